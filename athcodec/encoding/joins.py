@@ -24,7 +24,7 @@ SMOOTH, ROUGH, ROUGH_WORTH = 1.2, 1.4, 10.0
 ERROR_WORTH = 8.0  # ticks that an error twice as large weighs
 ORDER_WORTH = 400.0  # likewise, of one that is twice that of the level before
 BYTES_WORTH = 40.0  # likewise twice as many bytes
-CORRECTION_BYTES = 1.25  # that a correction takes
+CORRECTION_BYTES = 0.3  # that each position beyond the limit takes: a correction reaches over frames
 
 
 @dataclass(frozen=True)
@@ -126,14 +126,18 @@ def _changes(positions: np.ndarray) -> np.ndarray:
 def best_join(end: End, positions: np.ndarray, source: np.ndarray, price: ErrorPrice | CorrectionPrice) -> int:
     """How to join a level of a segment to the end of the one before: over how many frames, SLOPED above that where
     slopes are joined too; 0: not at all. source: (N, 3, T) what is coded, in the coordinates of the positions."""
-    usual = min(end.usual, float(np.median(_changes(positions))))
+    natural = np.concatenate([np.zeros(END_FRAMES), _changes(positions)])
+    usual = min(end.usual, float(np.median(natural[END_FRAMES:])))
+    natural = np.maximum(natural, usual)  # at the last frame before, and the segment's own
+    natural[: END_FRAMES + 1] = usual
 
     def cost(join: int) -> float:
         width = join % SLOPED
         own, aim = positions[:, :, :width], source[:, :, :width]
         moved = own + offsets(end, positions, join)
         shown = np.concatenate([end.positions, moved, positions[:, :, width : width + 2]], axis=2)
-        tick = float(_changes(shown).max()) / usual if usual > 0 else 0.0
+        found = _changes(shown)
+        tick = float((found / natural[: len(found)]).max()) if usual > 0 else 0.0
         return (
             max(tick, SMOOTH) + ROUGH_WORTH * max(0.0, tick - ROUGH) + price(_squares(own - aim), _squares(moved - aim))
         )
