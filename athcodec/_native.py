@@ -104,6 +104,18 @@ class Integers(ctypes.Structure):
     ]
 
 
+class Rounding(ctypes.Structure):
+    """ath_rounding."""
+
+    _fields_ = [("dead_zone", c_double), ("ends", c_double * 3)]
+
+
+class CoreMetEnds(ctypes.Structure):
+    """ath_met_ends."""
+
+    _fields_ = [("decided", c_void_p), ("count", c_int64), ("closed", c_int32), ("reserved", c_int32)]
+
+
 class Header(ctypes.Structure):
     """ath_header."""
 
@@ -200,12 +212,21 @@ _ENCODING = {  # core/plan.h, core/motion.h, core/encode.h
         None,
         [
             *[POINTER(CorePlan), POINTER(Motion), POINTER(Integers), c_int32, c_int32],
-            *[c_void_p, c_double, c_void_p, c_int, c_void_p],
+            *[c_void_p, POINTER(Rounding), c_void_p, c_int, c_void_p],
         ],
     ),
     "ath_analyse_nodes": (
         None,
-        [POINTER(CorePlan), POINTER(Motion), POINTER(Integers), c_int32, c_int32, c_void_p, c_void_p, c_double],
+        [
+            POINTER(CorePlan),
+            POINTER(Motion),
+            POINTER(Integers),
+            c_int32,
+            c_int32,
+            c_void_p,
+            c_void_p,
+            POINTER(Rounding),
+        ],
     ),
     "ath_pose": (
         None,
@@ -217,7 +238,10 @@ _ENCODING = {  # core/plan.h, core/motion.h, core/encode.h
     ),
     "ath_add_moments": (c_int64, [c_int64, c_int32, c_void_p, c_double, c_void_p]),
     "ath_error": (None, [c_int32, c_int32, c_int, *[c_void_p] * 6]),
-    "ath_find_corrections": (c_int64, [c_int32, c_int32, c_int, *[c_void_p] * 5, c_double, c_void_p, c_int64]),
+    "ath_find_corrections": (
+        c_int64,
+        [c_int32, c_int32, c_int, *[c_void_p] * 5, c_double, POINTER(CoreMetEnds), c_void_p, c_int64],
+    ),
     "ath_apply_corrections": (None, [c_int32, c_int, c_void_p, c_double, c_void_p, c_int64]),
     "ath_encode_front": (c_int64, [c_void_p, c_size_t, POINTER(Header), *[c_void_p] * 3]),
     "ath_encode_hierarchy": (c_int64, [c_void_p, c_void_p, c_size_t, c_void_p, c_int32, c_int32, c_void_p, c_void_p]),

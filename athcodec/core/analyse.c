@@ -87,8 +87,70 @@ static int32_t row_extent(const int32_t *row, int32_t count)
     return count;
 }
 
+/* What a row amounts to at its first frame (side 1) or its last (side -1): its value, slope and bend there. */
+static void end_parts(const double *row, int32_t T, int32_t side, double parts[ATH_END_PARTS])
+{
+    const double *end = side > 0 ? row : row + T - 1;
+    parts[0] = end[0];
+    parts[1] = end[side] - end[0];
+    parts[2] = end[0] - 2.0 * end[side] + end[2 * side];
+}
+
+static void both_ends(const double *row, int32_t T, double parts[2 * ATH_END_PARTS])
+{
+    end_parts(row, T, 1, parts);
+    end_parts(row, T, -1, parts + ATH_END_PARTS);
+}
+
+/* What it is worth, in squared steps, to have `by` more in place of `was`: the error of its own and those of the ends. */
+static double settling(const ath_rounding *rounding, int32_t was, int32_t by, double off,
+                       const double parts[2 * ATH_END_PARTS], const double left[2 * ATH_END_PARTS])
+{
+    static const double emptied = 0.5; /* for an integer that becomes 0 */
+    double cost = (off - by) * (off - by) - off * off - (was + by == 0 ? emptied : 0.0);
+    for (int32_t i = 0; i < 2 * ATH_END_PARTS; i++) {
+        double after = left[i] - by * parts[i];
+        cost += rounding->ends[i % ATH_END_PARTS] * (after * after - left[i] * left[i]);
+    }
+    return -cost;
+}
+
+/* Rounds integers of a row the other way where that brings its ends nearer, whose errors are the largest and are seen where
+ * segments meet. units: what they stand for, less what is predicted; row: what they are to become. */
+static void settle_ends(const ath_stream *stream, int32_t T, double step, const ath_rounding *rounding,
+                        const double *row, const double *units, const int32_t *predicted, int32_t *quantised)
+{
+    enum { LEAST_FRAMES = 8 };
+    static const double least = 1e-3;
+    double parts[ATH_SEGMENT_FRAMES][2 * ATH_END_PARTS], left[2 * ATH_END_PARTS];
+    int32_t rank = ath_row_extent(quantised, T, stream->temporal_rank);
+    if (T < LEAST_FRAMES || rank == 0 || rounding->ends[0] == 0.0) return;
+    both_ends(row, T, left);
+    for (int32_t i = 0; i < 2 * ATH_END_PARTS; i++) left[i] /= step;
+    for (int32_t k = 0; k < stream->temporal_rank; k++) {
+        double value = (double)(quantised[k] + (predicted ? predicted[k] : 0));
+        both_ends(stream->temporal + (size_t)k * (size_t)T, T, parts[k]);
+        for (int32_t i = 0; i < 2 * ATH_END_PARTS; i++) left[i] -= value * parts[k][i];
+    }
+    for (int32_t turned = 0; turned < rank; turned++) {
+        double most = least;
+        int32_t chosen = 0, by = 0;
+        for (int32_t k = 0; k < rank; k++)
+            for (int32_t d = -1; d <= 1 && quantised[k] != 0; d += 2) {
+                double worth = settling(rounding, quantised[k], d, units[k] - (double)quantised[k], parts[k], left);
+                if (worth <= most) continue;
+                most = worth;
+                chosen = k;
+                by = d;
+            }
+        if (by == 0) return;
+        quantised[chosen] += by;
+        for (int32_t i = 0; i < 2 * ATH_END_PARTS; i++) left[i] -= by * parts[chosen][i];
+    }
+}
+
 /* Quantises a track of three axes about its prediction, if there is one, and replaces it by what the decoder will have. */
-static void code_track(const ath_stream *stream, int32_t T, double step, double dead_zone, double *track,
+static void code_track(const ath_stream *stream, int32_t T, double step, const ath_rounding *rounding, double *track,
                        const int32_t *predicted, int32_t *quantised)
 {
     double units[3][ATH_SEGMENT_FRAMES];
@@ -97,13 +159,16 @@ static void code_track(const ath_stream *stream, int32_t T, double step, double 
     for (int32_t axis = 0; axis < 3; axis++) {
         const int32_t *about = predicted ? predicted + axis * T : 0;
         int32_t known = about ? row_extent(about, stream->temporal_rank) : 0;
-        int32_t count = forward_temporal(stream, T, step, dead_zone, known, track + axis * T, units[axis]);
+        int32_t count = forward_temporal(stream, T, step, rounding->dead_zone, known, track + axis * T, units[axis]);
         for (int32_t k = 0; k < known; k++) units[axis][k] -= (double)about[k];
         for (int32_t k = 0; k < count; k++)
-            quantised[axis * T + k] = quantise(units[axis][k], k < known && about[k] ? 0.5 : dead_zone);
+            quantised[axis * T + k] = quantise(units[axis][k], k < known && about[k] ? 0.5 : rounding->dead_zone);
         longest = ath_max(longest, count);
     }
     drop_lone_ones(T, longest, units, predicted, quantised);
+    for (int32_t axis = 0; axis < 3; axis++)
+        settle_ends(stream, T, step, rounding, track + axis * T, units[axis], predicted ? predicted + axis * T : 0,
+                    quantised + axis * T);
     for (int32_t i = 0; predicted && i < 3 * T; i++) quantised[i] += predicted[i];
     for (int32_t axis = 0; axis < 3; axis++)
         ath_inverse_temporal(stream, T, longest, step, quantised + axis * T, track + axis * T);
@@ -191,7 +256,7 @@ static void to_local(int32_t T, const ath_piece *piece, const ath_frames *at, co
 }
 
 static void code_shift(const ath_motion *motion, const ath_piece *piece, const ath_piece_before *before,
-                       ath_piece_rows *rows, const ath_scratch *scratch, double dead_zone)
+                       ath_piece_rows *rows, const ath_scratch *scratch, const ath_rounding *rounding)
 {
     const ath_stream *base = ath_base_stream(motion, piece);
     int32_t T = motion->frames;
@@ -199,7 +264,7 @@ static void code_shift(const ath_motion *motion, const ath_piece *piece, const a
     if (before)
         ath_predict_track(base, T, before->frequencies, step, motion->ratio, before->shift, rows->coarse_shift,
                           rows->predicted_shift);
-    code_track(base, T, step, dead_zone, scratch->track, rows->predicted_shift, rows->shift);
+    code_track(base, T, step, rounding, scratch->track, rows->predicted_shift, rows->shift);
     ath_move_point(T, scratch->track, scratch->at.point);
     if (motion->decoded) memcpy(scratch->shift, scratch->track, 3 * (size_t)T * sizeof(double));
 }
@@ -236,7 +301,7 @@ static void shift_of_all(const ath_plan *plan, int32_t T, const ath_piece *piece
  * is turned first, so that the one does not stand for the other. */
 static void analyse_tracks(const ath_plan *plan, const ath_motion *motion, const ath_piece *piece,
                            const ath_piece_before *before, ath_piece_rows *rows, const ath_scratch *scratch,
-                           const double *source, double dead_zone, double *local)
+                           const double *source, const ath_rounding *rounding, double *local)
 {
     const ath_stream *base = ath_base_stream(motion, piece);
     int32_t T = motion->frames;
@@ -245,7 +310,7 @@ static void analyse_tracks(const ath_plan *plan, const ath_motion *motion, const
     ath_attach(plan, motion, piece, scratch->at);
     if (ath_has_shift(piece) && !rigid) {
         shift_of_first(plan, T, piece, scratch, source);
-        code_shift(motion, piece, before, rows, scratch, dead_zone);
+        code_shift(motion, piece, before, rows, scratch, rounding);
     }
     to_local(T, piece, &scratch->at, source, local);
     if (rotation_step > 0.0) {
@@ -253,13 +318,13 @@ static void analyse_tracks(const ath_plan *plan, const ath_motion *motion, const
         if (before)
             ath_predict_track(base, T, before->frequencies, rotation_step, motion->ratio, before->rotation,
                               rows->coarse_rotation, rows->predicted_rotation);
-        code_track(base, T, rotation_step, dead_zone, scratch->track, rows->predicted_rotation, rows->rotation);
+        code_track(base, T, rotation_step, rounding, scratch->track, rows->predicted_rotation, rows->rotation);
         ath_turn(T, scratch->track, scratch->at.rotation);
         if (motion->decoded) memcpy(scratch->rotation, scratch->track, 3 * (size_t)T * sizeof(double));
     }
     if (ath_has_shift(piece) && rigid) {
         shift_of_all(plan, T, piece, scratch, source);
-        code_shift(motion, piece, before, rows, scratch, dead_zone);
+        code_shift(motion, piece, before, rows, scratch, rounding);
     }
 }
 
@@ -296,7 +361,8 @@ static ath_piece_before piece_before(const ath_plan *plan, const ath_motion *mot
 
 /* Returns the vertices as decoded. */
 static const double *analyse_piece(const ath_plan *plan, const ath_motion *motion, const ath_integers *integers,
-                                   int32_t p, const ath_scratch *scratch, const double *source, double dead_zone)
+                                   int32_t p, const ath_scratch *scratch, const double *source,
+                                   const ath_rounding *rounding)
 {
     const ath_piece *piece = plan->pieces + p;
     ath_piece_rows rows = ath_rows_of_piece(plan, integers, motion->frames, p);
@@ -307,7 +373,7 @@ static const double *analyse_piece(const ath_plan *plan, const ath_motion *motio
         ath_coarse_rows(motion, piece, p, &rows);
     }
     if (motion->decoded) memset(scratch->rotation, 0, 6 * (size_t)T * sizeof(double));
-    analyse_tracks(plan, motion, piece, motion->before ? &before : 0, &rows, scratch, source, dead_zone,
+    analyse_tracks(plan, motion, piece, motion->before ? &before : 0, &rows, scratch, source, rounding,
                    scratch->placed);
     if (motion->before) ath_predict_modes(plan, motion, piece, &before, scratch, &rows);
     ath_to_local(plan, T, piece, &scratch->at, source + (size_t)piece->first * 3 * (size_t)T, scratch->placed);
@@ -315,7 +381,7 @@ static const double *analyse_piece(const ath_plan *plan, const ath_motion *motio
     if (rows.shape_count > 0)
         to_shapes(T, piece, rows.shape_count, integers->duals + integers->shape_first[p] * ATH_SHAPE_NUMBERS, scratch);
     for (int32_t r = 0; r < ath_rank(piece); r++)
-        code_track(ath_mode_stream(motion, piece, r), T, ath_row_step(motion, piece, &rows, r), dead_zone,
+        code_track(ath_mode_stream(motion, piece, r), T, ath_row_step(motion, piece, &rows, r), rounding,
                    scratch->rows + (size_t)r * 3 * (size_t)T,
                    rows.predicted_modes ? ath_row(rows.predicted_modes, r, T) : 0, ath_row(rows.modes, r, T));
     const double *placed = ath_pose_rows(plan, motion, p, &rows, scratch);
@@ -324,13 +390,13 @@ static const double *analyse_piece(const ath_plan *plan, const ath_motion *motio
 }
 
 void ath_analyse(const ath_plan *plan, const ath_motion *motion, const ath_integers *integers, int32_t first,
-                 int32_t stop, const double *source, double dead_zone, const double origin[3], int is_float64,
-                 void *positions)
+                 int32_t stop, const double *source, const ath_rounding *rounding, const double origin[3],
+                 int is_float64, void *positions)
 {
     ath_scratch scratch = ath_motion_scratch(plan, motion);
     for (int32_t p = first; p < stop; p++) {
         const ath_piece *piece = plan->pieces + p;
-        const double *placed = analyse_piece(plan, motion, integers, p, &scratch, source, dead_zone);
+        const double *placed = analyse_piece(plan, motion, integers, p, &scratch, source, rounding);
         if (positions)
             ath_store_positions(placed, piece->first, piece->count, motion->frames, origin, is_float64, positions);
     }
@@ -395,7 +461,7 @@ static int32_t half_octaves(double step)
 
 static void analyse_node(const ath_plan *plan, const ath_motion *motion, const ath_node *node,
                          const ath_node_rows *rows, const ath_scratch *scratch, const double *source, double level_step,
-                         double dead_zone)
+                         const ath_rounding *rounding)
 {
     const ath_piece *piece = plan->pieces + node->piece;
     int32_t T = motion->frames;
@@ -408,17 +474,17 @@ static void analyse_node(const ath_plan *plan, const ath_motion *motion, const a
     double step = ath_node_step(*rows->step);
     ath_stream stream = ath_node_stream(motion, step);
     for (int32_t r = 0; r < node->rank; r++)
-        code_track(&stream, T, step, dead_zone, tracks + r * 3 * T, 0, ath_row(rows->rows, r, T));
-    if (free_base) code_track(&stream, T, step, dead_zone, tracks + 9 * T, 0, ath_row(rows->rows, 3, T));
+        code_track(&stream, T, step, rounding, tracks + r * 3 * T, 0, ath_row(rows->rows, r, T));
+    if (free_base) code_track(&stream, T, step, rounding, tracks + 9 * T, 0, ath_row(rows->rows, 3, T));
 }
 
 void ath_analyse_nodes(const ath_plan *plan, const ath_motion *motion, const ath_integers *integers, int32_t first,
-                       int32_t stop, const double *source, const double *level_steps, double dead_zone)
+                       int32_t stop, const double *source, const double *level_steps, const ath_rounding *rounding)
 {
     ath_scratch scratch = ath_motion_scratch(plan, motion);
     for (int32_t n = first; n < stop; n++) {
         const ath_node *node = plan->nodes + n;
         ath_node_rows rows = ath_rows_of_node(integers, motion->frames, n);
-        if (node->coded) analyse_node(plan, motion, node, &rows, &scratch, source, level_steps[node->level], dead_zone);
+        if (node->coded) analyse_node(plan, motion, node, &rows, &scratch, source, level_steps[node->level], rounding);
     }
 }

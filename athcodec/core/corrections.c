@@ -10,7 +10,8 @@ static const double BEND_BITS = 0.5, LEAST_BEND = 1.0 / 16;
 /* One vertex over time: as decoded and as wanted, what corrections add so far, and the error that is left. */
 typedef struct {
     int32_t frames, is_float64;
-    int32_t worst; /* the frame that is farthest beyond the limit; -1: none is */
+    int32_t closed; /* of its ends, as ath_met_ends has it */
+    int32_t worst;  /* the frame that is farthest beyond the limit; -1: none is */
     double step, limit2;
     double decoded[ATH_SEGMENT_FRAMES][3], wanted[ATH_SEGMENT_FRAMES][3], error[ATH_SEGMENT_FRAMES][3];
     double squares[ATH_SEGMENT_FRAMES];  /* of the errors' lengths */
@@ -145,16 +146,29 @@ static int32_t footprint_bend(int32_t width, int32_t away)
            + ath_footprint_part(width, away + 1);
 }
 
+static int has_bend(const track *track, int32_t t) { return t > 0 && t < track->frames - 1; }
+
+/* Behind a closed end the error goes on as it comes. */
 static place place_at(const track *track, int32_t frame, int32_t width)
 {
     place place = {frame, width, {0.0, 0.0, 0.0}, 0.0};
     int32_t reach = ath_footprint_reach[width] + 1;
-    for (int32_t t = ath_max(1, frame - reach); t <= ath_min(track->frames - 2, frame + reach); t++) {
+    int32_t first = track->closed & 1 ? -1 : 1, last = track->closed & 2 ? track->frames : track->frames - 2;
+    for (int32_t t = ath_max(first, frame - reach); t <= ath_min(last, frame + reach); t++) {
         double bend = footprint_bend(width, t - frame);
-        for (int32_t k = 0; k < 3; k++) place.slope[k] += bend * track->bends[t][k];
+        for (int32_t k = 0; k < 3 && has_bend(track, t); k++) place.slope[k] += bend * track->bends[t][k];
         place.curve += bend * bend;
     }
     return place;
+}
+
+/* Whether a closed end would cut off more of a footprint than its faint end. */
+static int is_cut(const track *track, int32_t frame, int32_t width)
+{
+    enum { FAINT = 5 };
+    int32_t reach = ath_footprint_reach[width], behind = track->frames - frame;
+    if (track->closed & 1 && frame + 1 <= reach && ath_footprint_part(width, frame + 1) > FAINT) return 1;
+    return track->closed & 2 && behind <= reach && ath_footprint_part(width, behind) > FAINT;
 }
 
 static double more_bends(const track *track, const place *place, const int32_t q[3])
@@ -229,7 +243,8 @@ static int try_frame(const track *track, const ath_correction *above, int32_t fr
     static const int32_t masks[7] = {1, 2, 4, 3, 5, 6, 7}, stop_of[3] = {3, 6, 7}; /* by the number of axes */
     double scale = track->step * ath_footprint_part(width, track->worst - frame) / ATH_FOOTPRINT_PARTS;
     int32_t whole[3], found = 0;
-    if (is_any(track->own + frame) || !whole_correction(track->error[track->worst], scale, whole)) return 0;
+    if (is_any(track->own + frame) || is_cut(track, frame, width)) return 0;
+    if (!whole_correction(track->error[track->worst], scale, whole)) return 0;
     const place place = place_at(track, frame, width);
     for (int32_t axes = 0, i = 0; axes < 3 && !found; axes++)
         for (; i < stop_of[axes]; i++) found |= try_axes(track, above, &place, masks[i], whole, best);
@@ -270,22 +285,42 @@ static int correct_track(track *track, const ath_correction *above, int32_t wide
     return 1;
 }
 
+/* Applies what is decided of a vertex. */
+static void decide(track *track, const ath_met_ends *ends, int64_t first, int64_t stop)
+{
+    for (int64_t i = first; i < stop; i++) {
+        const int32_t *row = ends->decided + ATH_CORRECTION_ROW * i;
+        candidate chosen = {.frame = row[1]};
+        memcpy(&chosen.own, row + 2, sizeof chosen.own);
+        apply(track, &chosen);
+    }
+    find_worst(track);
+}
+
 int64_t ath_find_corrections(int32_t vertex_count, int32_t frames, int is_float64, const void *positions,
                              const double *source, const double origin[3], const double *limits, const uint8_t *narrow,
-                             double step, int32_t *corrections, int64_t capacity)
+                             double step, const ath_met_ends *ends, int32_t *corrections, int64_t capacity)
 {
     track track = {.frames = frames, .is_float64 = is_float64, .step = step};
     ath_correction above[ATH_SEGMENT_FRAMES] = {{{0}, 0}};
-    int64_t count = 0;
-    for (int32_t v = 0; v < vertex_count; v++) {
-        if (is_within(frames, is_float64, positions, source, origin, limits[v], (size_t)v * 3 * (size_t)frames)) {
+    int64_t count = 0, decided = 0, next = 0;
+    for (int32_t v = 0; v < vertex_count; v++, decided = next) {
+        while (next < ends->count && ends->decided[ATH_CORRECTION_ROW * next] == v) next++;
+        if (decided == next
+            && is_within(frames, is_float64, positions, source, origin, limits[v], (size_t)v * 3 * (size_t)frames)) {
             memset(above, 0, (size_t)frames * sizeof above[0]);
             continue;
         }
         int32_t widest = narrow[v] ? 0 : ATH_FOOTPRINTS - 1; /* those of one frame cannot be in each other's way */
+        track.closed = ends->closed;
         for (int corrected = 0; !corrected; widest--) {
-            if (widest < 0) return -1;
+            if (widest < 0 && decided == next) return -1;
+            if (widest < 0) {
+                decided = next;
+                widest = 0;
+            }
             open_track(&track, v, positions, source, origin, limits[v]);
+            decide(&track, ends, decided, next);
             corrected = correct_track(&track, above, widest);
         }
         for (int32_t t = 0; t < frames; t++) {

@@ -77,6 +77,14 @@ ATH_ENCODER_API void ath_gather(int32_t vertex_count, int32_t frames, const int3
                                 int32_t source_count, int is_float64, const void *source, const double origin[3],
                                 double *out);
 
+enum { ATH_END_PARTS = 3 };
+
+/* How numbers become integers: below `dead_zone` steps they are 0, and what is left of a row's value, slope and bend at
+ * either end weighs as many squared steps as `ends` says; 0: it does not. */
+typedef struct ath_rounding {
+    double dead_zone, ends[ATH_END_PARTS];
+} ath_rounding;
+
 /* Quantised coefficients and tracks of all pieces in closed loop, then the maps of the nodes in between. source:
  * vertex-major doubles less the origin. A map's step is that of its level (height + 2 lengths) over the root of its
  * number of vertices: the same error in all of them together costs the same everywhere. Attach caches are to be kept
@@ -84,11 +92,11 @@ ATH_ENCODER_API void ath_gather(int32_t vertex_count, int32_t frames, const int3
  * each with scratch memory of its own, once the pieces that theirs hang on are done. positions: where those of
  * the last level go, as ath_pose has them; 0: nowhere. */
 ATH_ENCODER_API void ath_analyse(const ath_plan *plan, const ath_motion *motion, const ath_integers *integers,
-                                 int32_t first, int32_t stop, const double *source, double dead_zone,
+                                 int32_t first, int32_t stop, const double *source, const ath_rounding *rounding,
                                  const double origin[3], int is_float64, void *positions);
 ATH_ENCODER_API void ath_analyse_nodes(const ath_plan *plan, const ath_motion *motion, const ath_integers *integers,
                                        int32_t first, int32_t stop, const double *source, const double *level_steps,
-                                       double dead_zone);
+                                       const ath_rounding *rounding);
 
 /* Puts decoded vertices, less the origin, into positions as ath_pose has them. */
 void ath_store_positions(const double *placed, int32_t first, int32_t count, int32_t frames, const double origin[3],
@@ -119,13 +127,23 @@ ATH_ENCODER_API void ath_error(int32_t vertex_count, int32_t frames, int is_floa
 
 enum { ATH_CORRECTION_ROW = 6 }; /* numbers */
 
+/* How the corrections of a segment meet those of the segments beside it: at ends that are closed (1: its first frame, 2: its
+ * last) no footprint is cut off, but for its faint end. count: of the vertices and frames, of either end, whose corrections
+ * are decided, rows as below in ascending order, since they stand in the first frame of one segment like in the last
+ * of the other. They are given up where a vertex cannot be corrected with them. */
+typedef struct ath_met_ends {
+    const int32_t *decided;
+    int64_t count;
+    int32_t closed, reserved;
+} ath_met_ends;
+
 /* Finds the corrections that bring every vertex within its own limit: up to `capacity` rows of vertex, frame and
  * ath_correction. narrow: of each vertex whether its corrections are to be of one frame. Returns how many there are; -1:
  * the step cannot express them. */
 ATH_ENCODER_API int64_t ath_find_corrections(int32_t vertex_count, int32_t frames, int is_float64,
                                              const void *positions, const double *source, const double origin[3],
                                              const double *limits, const uint8_t *narrow, double step,
-                                             int32_t *corrections, int64_t capacity);
+                                             const ath_met_ends *ends, int32_t *corrections, int64_t capacity);
 ATH_ENCODER_API void ath_apply_corrections(int32_t frames, int is_float64, void *positions, double step,
                                            const int32_t *corrections, int64_t count);
 

@@ -29,6 +29,7 @@ from athcodec.decoder import open as open_ath
 from athcodec.discovery import Found, with_branches
 from athcodec.encoding import polygons, streams
 from athcodec.encoding import quantise as qz
+from athcodec.encoding.joins import End
 from athcodec.encoding.layers import (
     MOST_LAYERS,
     MOST_LEVELS,
@@ -517,11 +518,11 @@ class EncodingJob:
             chunks, errors = code_predicted_segment(decided.prelude, decided.choice, positions, exact)
             return CodedSegment(taken[0], chunks, errors, np.zeros(len(errors), int))
 
-        def code(taken: tuple[int, list[np.ndarray]]) -> tuple[int, CodedMotion, list[np.ndarray | None]]:
+        def code(taken: tuple[int, list[np.ndarray]]) -> tuple[int, CodedMotion, list[End | None]]:
             motion = self._motion(decided, taken[0], taken[1].pop())
             return taken[0], motion, motion.ends() if len(source.segments) > 1 else []
 
-        def join(taken: tuple[int, CodedMotion, list[np.ndarray | None]]) -> CodedSegment:
+        def join(taken: tuple[int, CodedMotion, list[End | None]]) -> CodedSegment:
             index, motion, ends = taken
             return CodedSegment(index, *motion.joined_to(ends))
 
@@ -533,7 +534,8 @@ class EncodingJob:
     def _motion(self, decided: _Decided, index: int, block: np.ndarray) -> CodedMotion:
         positions, exact = self._positions(block)
         layers = decided.layers.of_segment(decided.source.is_whole_loop(index))
-        return CodedMotion(decided.prelude, layers, self.segment_count, positions, exact)
+        goes_on = decided.source.goes_on(index)
+        return CodedMotion(decided.prelude, layers, self.segment_count, positions, exact, goes_on)
 
     @staticmethod
     def _with_those_before(source: Source, segments: Sequence[int]) -> Iterator[int]:
@@ -572,8 +574,8 @@ class EncodingJob:
 
 
 def _beside_ends(
-    source: Source, coded: Iterable[tuple[int, CodedMotion, list[np.ndarray | None]]], wanted: frozenset[int]
-) -> Iterator[tuple[int, CodedMotion, list[np.ndarray | None]]]:
+    source: Source, coded: Iterable[tuple[int, CodedMotion, list[End | None]]], wanted: frozenset[int]
+) -> Iterator[tuple[int, CodedMotion, list[End | None]]]:
     """Those that are wanted, with the ends that they go on from in place of their own."""
     last, last_ends = None, []
     for index, motion, ends in coded:

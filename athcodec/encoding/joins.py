@@ -7,28 +7,68 @@ Positions are vertex-major, (N, 3, T), as decoded, not corrected.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from itertools import product
+
 import numpy as np
 
 END_FRAMES = 2  # of a segment, that the next one looks at
-WIDTHS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96)  # frames
+WIDTHS = (1, 2, 3, 4, 5, 6, 8, 10, 12, 14, 16, 20, 24, 28, 32, 40, 48, 64, 96)  # frames
 SLOPED = 128
+END_FOOTPRINTS = {2: (5, 16, 27, 32), 1: (0, 0, 16, 32)}  # by width, in the last frames of what stands in the last one
+AXES = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 0], [1, 0, 1], [0, 1, 1], [1, 1, 1]])
+NO_CORRECTIONS = np.empty((0, 6), np.int32)
 # Ticks, changes of velocity at a seam over those of a usual frame: up to the first nobody sees them, beyond the second
 # they weigh more.
-SMOOTH, ROUGH, ROUGH_WORTH = 1.2, 1.45, 3.0
+SMOOTH, ROUGH, ROUGH_WORTH = 1.2, 1.4, 10.0
 ERROR_WORTH = 8.0  # ticks that an error twice as large weighs
 ORDER_WORTH = 400.0  # likewise, of one that is twice that of the level before
 BYTES_WORTH = 40.0  # likewise twice as many bytes
-CORRECTION_BYTES = 1.25  # that a correction takes
+CORRECTION_BYTES = 0.3  # that each position beyond the limit takes: a correction reaches over frames
 
 
-def end_of(positions: np.ndarray) -> np.ndarray | None:
-    """(N, 3, END_FRAMES) that the segment behind goes on from; None: it is too short."""
-    return positions[:, :, -END_FRAMES:].copy() if positions.shape[2] > END_FRAMES else None
+@dataclass(frozen=True)
+class End:
+    """What a level of the segment behind goes on from.
+
+    positions: (N, 3, END_FRAMES). usual: the change of velocity in a usual frame. corrections: (K, 6) in the last frame,
+    which stand in the first one of the segment behind as well.
+    """
+
+    positions: np.ndarray
+    usual: float
+    corrections: np.ndarray
 
 
-def offsets(end: np.ndarray, positions: np.ndarray, join: int) -> np.ndarray:
+def end_of(positions: np.ndarray, corrections: np.ndarray = NO_CORRECTIONS) -> End | None:
+    """The end of a level; None: the segment is too short."""
+    if positions.shape[2] <= END_FRAMES:
+        return None
+    return End(positions[:, :, -END_FRAMES:].copy(), float(np.median(_changes(positions))), corrections)
+
+
+def end_corrections(away: np.ndarray, limit: float | np.ndarray, step: float, frame: int) -> np.ndarray:
+    """Corrections (K, 6) of `frame`, the last one, for vertices that are beyond their limits there or right before, of as
+    few axes as do. away: (N, 3, 4) how far they are off in the last frames."""
+    limits = np.broadcast_to(limit, len(away))
+    own = np.flatnonzero((_squares(away[:, :, -2:]) > limits[:, None] ** 2).any(axis=1))
+    away, limits = away[own], limits[own]
+    whole = np.rint(-away[:, :, -1] / step)
+    whole = np.where(whole == 0, np.where(away[:, :, -1] < 0, 1, -1), whole)
+    rows, found = np.zeros((len(own), 6), np.int32), np.zeros(len(own), bool)
+    rows[:, 0], rows[:, 1] = own, frame
+    for axes, (width, parts), shorter in product(AXES, END_FOOTPRINTS.items(), (0, 1)):
+        tried = axes * (whole - shorter * np.sign(whole))
+        left = away + tried[:, :, None] * (step * np.array(parts) / 32)
+        good = ~found & (_squares(left) <= limits[:, None] ** 2).all(axis=1)
+        rows[good, 2:5], rows[good, 5] = tried[good], width
+        found |= good
+    return rows[found]
+
+
+def offsets(end: End, positions: np.ndarray, join: int) -> np.ndarray:
     """What a join adds to its frames, (N, 3, width) float64."""
-    start, last = (end[:, :, i].astype(np.float64) for i in range(END_FRAMES))
+    start, last = (end.positions[:, :, i].astype(np.float64) for i in range(END_FRAMES))
     first, second = (positions[:, :, i].astype(np.float64) for i in range(2))
     jump, slope = 0.5 * (3.0 * (last - first) - (start - second)), (last - start) - (second - first)
     width, is_sloped = join % SLOPED, join >= SLOPED
@@ -37,7 +77,7 @@ def offsets(end: np.ndarray, positions: np.ndarray, join: int) -> np.ndarray:
     return jump[:, :, None] * (1.0 - u * u * (3.0 - 2.0 * u)) + slope[:, :, None] * slopes
 
 
-def joined(end: np.ndarray, positions: np.ndarray, join: int) -> np.ndarray:
+def joined(end: End, positions: np.ndarray, join: int) -> np.ndarray:
     """The positions as a decoder joins them, bit for bit but where maps of nodes make them."""
     result, width = positions.copy(), join % SLOPED
     result[:, :, :width] = positions[:, :, :width] + offsets(end, positions, join)
@@ -83,17 +123,21 @@ def _changes(positions: np.ndarray) -> np.ndarray:
     return np.sqrt(_squares(np.diff(positions.astype(np.float64), 2, axis=2)).mean(axis=0))
 
 
-def best_join(end: np.ndarray, positions: np.ndarray, source: np.ndarray, price: ErrorPrice | CorrectionPrice) -> int:
+def best_join(end: End, positions: np.ndarray, source: np.ndarray, price: ErrorPrice | CorrectionPrice) -> int:
     """How to join a level of a segment to the end of the one before: over how many frames, SLOPED above that where
     slopes are joined too; 0: not at all. source: (N, 3, T) what is coded, in the coordinates of the positions."""
-    usual = float(np.median(_changes(positions)))
+    natural = np.concatenate([np.zeros(END_FRAMES), _changes(positions)])
+    usual = min(end.usual, float(np.median(natural[END_FRAMES:])))
+    natural = np.maximum(natural, usual)  # at the last frame before, and the segment's own
+    natural[: END_FRAMES + 1] = usual
 
     def cost(join: int) -> float:
         width = join % SLOPED
         own, aim = positions[:, :, :width], source[:, :, :width]
         moved = own + offsets(end, positions, join)
-        shown = np.concatenate([end, moved, positions[:, :, width : width + 2]], axis=2)
-        tick = float(_changes(shown).max()) / usual if usual > 0 else 0.0
+        shown = np.concatenate([end.positions, moved, positions[:, :, width : width + 2]], axis=2)
+        found = _changes(shown)
+        tick = float((found / natural[: len(found)]).max()) if usual > 0 else 0.0
         return (
             max(tick, SMOOTH) + ROUGH_WORTH * max(0.0, tick - ROUGH) + price(_squares(own - aim), _squares(moved - aim))
         )

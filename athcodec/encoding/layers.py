@@ -19,7 +19,17 @@ from athcodec import container as ct
 from athcodec._native import MEASURES
 from athcodec.encoding import quantise as qz
 from athcodec.encoding import streams
-from athcodec.encoding.joins import END_FRAMES, CorrectionPrice, ErrorPrice, best_join, end_of, joined
+from athcodec.encoding.joins import (
+    END_FRAMES,
+    NO_CORRECTIONS,
+    CorrectionPrice,
+    End,
+    ErrorPrice,
+    best_join,
+    end_corrections,
+    end_of,
+    joined,
+)
 from athcodec.encoding.learned_modes import LearnedModes, nested
 from athcodec.encoding.motion import Plan, SegmentMotion, position_errors
 from athcodec.encoding.polygons import Mesh
@@ -33,6 +43,7 @@ from athcodec.encoding.segment import (
     code_source_rest,
     correct,
     correction_chunk,
+    correction_step,
     learned_bases,
     stem_streams,
     stems_head,
@@ -49,6 +60,7 @@ LEAST_RATIO = 8  # of the steps of neighbouring layers
 MOST_RATIO = 1 << 14  # likewise
 MOST_LAYERS, MOST_LEVELS = 8, 32  # of a file
 LEVEL_0_STEP = 4  # of the rest pose of level 0, over that of the first layer
+LEAST_MEETING = 8  # frames of a segment whose corrections meet those of the segments beside it
 RMS = MEASURES.index("rms")
 LEVEL_TOLERANCE = 1.005  # of the RMS error of a level, over that of the level before
 FINER_MAPS, COARSER_MAPS = 3, 16  # half octaves that steps of maps may move for that
@@ -134,6 +146,7 @@ def layers_of(source: Source, prelude: CodedPrelude, choice: Choice, ratios: Seq
             step=qz.single(settings.step * ratio),
             limit=settings.limit * ratio,
             layer=i,
+            end_weights=source.end_weights(settings.bound * ratio),
         )
         layers.append(Layer(plan, own, _modes(plan, choice, own, ratio), ratio, refined))
     source_rest = code_source_rest(source, prelude.plan.branches, layers[-1].plan.rest, settings.bound)
@@ -269,7 +282,9 @@ class _ShownLevel:
 class _SegmentCoder:
     """Chunks {(level, kind): payload} and errors of stopping at each level, by each of MEASURES, of one segment."""
 
-    def __init__(self, prelude: CodedPrelude, layers: Layers, segment_count: int, positions: np.ndarray):
+    def __init__(
+        self, prelude: CodedPrelude, layers: Layers, segment_count: int, positions: np.ndarray, goes_on: bool
+    ):
         self._output, self._origin, self.positions = prelude.output, prelude.origin, positions
         self._pool, self._layered = prelude.plan.pool, len(layers.each) > 1
         self._level_0 = layers.level_0
@@ -279,6 +294,9 @@ class _SegmentCoder:
         self.errors: list[tuple[float, ...]] = []
         self._shown: list[_ShownLevel] = []
         self._decoded = np.empty(0)  # at the last level
+        self._goes_on = goes_on  # in a segment behind it
+        self._met = streams.FREE_ENDS  # by the corrections of the last layer
+        self._end_corrections = NO_CORRECTIONS  # likewise: of the last frame
         self.joins = [0] * layers.level_count
 
     def first(self, layer: Layer) -> SegmentMotion:
@@ -291,7 +309,7 @@ class _SegmentCoder:
         stems, _ = stem_streams(segment, settings, bases)
         self.chunks |= {(level, ct.STEMS): data for level, data in stems.items()}
         self._finish_with(decoded, layer, plan.level_count - 1)
-        segment.analyse_nodes(self.positions, settings.node_steps, qz.DEAD_ZONE)
+        segment.analyse_nodes(self.positions, settings.node_steps, settings.rounding)
         shown = [self._at_level_0(segment, settings), *[segment] * (plan.level_count - 2)]
         self.errors = _EvenLevels(self, shown, settings).errors
         self._shown = [
@@ -320,7 +338,7 @@ class _SegmentCoder:
         if self._level_0 is segment.plan:
             return segment
         shown = SegmentMotion(self._level_0, segment.frames, segment.streams, periodic=settings.periodic)
-        shown.analyse_nodes(self.positions, settings.node_steps, qz.DEAD_ZONE, level=0)
+        shown.analyse_nodes(self.positions, settings.node_steps, settings.rounding, level=0)
         return shown
 
     def refine(self, layer: Layer, before: SegmentMotion, ratio: int, level: int) -> SegmentMotion:
@@ -337,8 +355,18 @@ class _SegmentCoder:
 
     def _finish_with(self, decoded: np.ndarray, layer: Layer, level: int) -> None:
         """Corrections of the level that a layer ends with, and its errors; decoded: the positions without."""
+        if layer.ratio == 1 and self._goes_on and decoded.shape[2] >= LEAST_MEETING:
+            self._end_corrections = self._corrections_of_end(layer, decoded)
+            self._met = streams.MetEnds(streams.LAST, self._end_corrections)
         self._shown.append(_ShownLevel(lambda: decoded, layer))
         self.errors.append(self._finish_level(layer, level, decoded))
+
+    def _corrections_of_end(self, layer: Layer, decoded: np.ndarray) -> np.ndarray:
+        """Of the last frame, but for rigid parts, which keep their shape."""
+        away = decoded[:, :, -4:] - (self.positions[:, :, -4:] + self._origin[:, None])
+        limit, count = layer.settings.limit, layer.plan.pieces["count"]
+        rows = end_corrections(away, limit, correction_step(limit), decoded.shape[2] - 1)
+        return rows[~np.repeat(layer.plan.is_rigid, count)[rows[:, 0]]]
 
     def _finish_level(self, layer: Layer, level: int, decoded: np.ndarray) -> tuple[float, ...]:
         if layer.ratio == 1:
@@ -360,11 +388,18 @@ class _SegmentCoder:
             len(chunk) for key, chunk in self.chunks.items() if key[0] <= level and key != (level, ct.CORRECTIONS)
         )
 
-    def ends(self) -> list[np.ndarray | None]:
+    def ends(self) -> list[End | None]:
         """What each level of the segment behind this one goes on from."""
-        return [end_of(shown.pose()) for shown in self._shown]
+        *before, last = (shown.pose() for shown in self._shown)
+        return [*map(end_of, before), end_of(last, self._end_corrections)]
 
-    def join(self, ends: Sequence[np.ndarray | None]) -> None:
+    def _meet(self, start: np.ndarray) -> None:
+        """Closes the start of the last level, in whose first frame the corrections of an end stand."""
+        rows = np.concatenate([start * np.array([1, 0, 1, 1, 1, 1], np.int32), self._end_corrections])
+        ordered = rows[np.lexsort(rows[:, 1::-1].T)]
+        self._met = streams.MetEnds(self._met.closed | streams.FIRST, ordered)
+
+    def join(self, ends: Sequence[End | None]) -> None:
         """Lets the levels go on from the ends of the segment before, where they are better for it."""
         source = self.positions + self._origin[:, None]
         for level, (end, shown) in enumerate(zip(ends, self._shown)):
@@ -384,6 +419,8 @@ class _SegmentCoder:
                 largest, p99, rms = self.error(positions)
                 self.errors[level] = largest + rounding, p99, rms + rounding
             else:
+                if layer.ratio == 1 and positions.shape[2] >= LEAST_MEETING:
+                    self._meet(end.corrections)
                 self.errors[level] = self._finish_level(layer, level, positions)
             if level == self._level_0.level_count - 1:
                 self._keep_last_level_best(layer, level, positions)
@@ -404,8 +441,11 @@ class _SegmentCoder:
         """Positions within the limit times a factor, and the corrections that bring them there; but for rigid parts of
         a layer before the last, which keep their shape."""
         decoded, settings = decoded.copy(), replace(layer.settings, limit=layer.settings.limit * factor)
+        is_last = layer.ratio == 1
+        met = self._met if is_last and factor == 1.0 else replace(self._met, decided=NO_CORRECTIONS)
+        met = met if is_last else streams.FREE_ENDS
         corrections, step = correct(
-            decoded, self.positions, self._origin, settings, layer.plan, keeps_all=layer.ratio == 1
+            decoded, self.positions, self._origin, settings, layer.plan, keeps_all=is_last, ends=met
         )
         return decoded, correction_chunk(corrections, step, decoded.shape)
 
@@ -449,6 +489,7 @@ class _EvenLevels:
 
     def __init__(self, coder: _SegmentCoder, shown: list[SegmentMotion], settings: Settings):
         self._coder, self._shown, self._steps = coder, shown, settings.node_steps.copy()
+        self._rounding = settings.rounding
         self.errors = [coder.error_at(own, level) for level, own in enumerate(shown)] + coder.errors
         for level in range(1, len(shown)):
             self._move(level, level, level, 0.5**0.5, FINER_MAPS)
@@ -490,14 +531,14 @@ class _EvenLevels:
             self.errors[level] = self._coder.error_at(self._shown[level], level)
 
     def _analyse(self, level: int) -> None:
-        self._shown[level].analyse_nodes(self._coder.positions, self._steps, qz.DEAD_ZONE, level)
+        self._shown[level].analyse_nodes(self._coder.positions, self._steps, self._rounding, level)
 
 
 class CodedMotion:
     """The motion of one segment in layers, all but how it goes on from the segment before it.
 
     layers: with the settings of the segment (see Layers.of_segment). exact: the source's own numbers (see
-    Source.exact), which one more level is to give.
+    Source.exact), which one more level is to give. goes_on: in the segment behind it.
     """
 
     def __init__(
@@ -507,20 +548,21 @@ class CodedMotion:
         segment_count: int,
         positions: np.ndarray,
         exact: np.ndarray | None = None,
+        goes_on: bool = False,
     ):
-        coder = _SegmentCoder(prelude, layers, segment_count, positions)
+        coder = _SegmentCoder(prelude, layers, segment_count, positions, goes_on)
         self._coder: _SegmentCoder | None = coder
         self._exact, self._largest_bound = exact, layers.each[-1].settings.largest_bound
         segment = coder.first(layers.each[0])
         for level, (before, layer) in enumerate(pairwise(layers.each), layers.level_0.level_count):
             segment = coder.refine(layer, segment, round(before.ratio / layer.ratio), level)
 
-    def ends(self) -> list[np.ndarray | None]:
+    def ends(self) -> list[End | None]:
         """What the levels of the next segment go on from."""
         return self._coder.ends()
 
     def joined_to(
-        self, ends: Sequence[np.ndarray | None] = ()
+        self, ends: Sequence[End | None] = ()
     ) -> tuple[dict[tuple[int, int], bytes], np.ndarray, np.ndarray]:
         """Chunks {(level, kind): payload}, (levels, 3) errors of stopping at each level, and (levels,) how each is
         joined to the ends of the segment before; there are none for the first of a clip. To be called once."""

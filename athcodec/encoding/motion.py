@@ -28,6 +28,7 @@ from athcodec._native import (
     CorePlan,
     Integers,
     Motion,
+    Rounding,
     Stream,
     address,
     lib,
@@ -298,27 +299,27 @@ class SegmentMotion:
             ):
                 setattr(self.integers, name, array.ctypes.data)
 
-    def analyse(self, source: np.ndarray, dead_zone: float) -> None:
+    def analyse(self, source: np.ndarray, rounding: Rounding) -> None:
         """Fills coefficients and tracks from positions, (N, 3, frames) float64 less the origin, in closed loop."""
-        self._analyse(source, dead_zone, None, False, None)
+        self._analyse(source, rounding, None, False, None)
 
-    def analyse_and_pose(self, source: np.ndarray, dead_zone: float, origin: np.ndarray, dtype) -> np.ndarray:
+    def analyse_and_pose(self, source: np.ndarray, rounding: Rounding, origin: np.ndarray, dtype) -> np.ndarray:
         """The same; returns what `pose` gives at the last level, which the closed loop has at hand."""
         positions = np.empty((self.plan.vertex_count, 3, self.frames), dtype)
         into = address(origin, np.float64, 3), positions.dtype == np.float64, positions.ctypes.data
-        self._analyse(source, dead_zone, *into)
+        self._analyse(source, rounding, *into)
         return positions
 
-    def _analyse(self, source: np.ndarray, dead_zone: float, *into) -> None:
+    def _analyse(self, source: np.ndarray, rounding: Rounding, *into) -> None:
         at = self._source(source)
         self._piecewise(
             lambda motion, first, stop: lib.ath_analyse(
-                self.plan.core, motion, self.integers, first, stop, at, dead_zone, *into
+                self.plan.core, motion, self.integers, first, stop, at, rounding, *into
             )
         )
 
     def analyse_nodes(
-        self, source: np.ndarray, level_steps: np.ndarray, dead_zone: float, level: int | None = None
+        self, source: np.ndarray, level_steps: np.ndarray, rounding: Rounding, level: int | None = None
     ) -> None:
         """Fills the maps of the nodes, or those of one level; after `analyse` or `pose`, but for level 0.
 
@@ -327,7 +328,7 @@ class SegmentMotion:
         at, steps = self._source(source), address(level_steps, np.float64, self.plan.level_count)
         self._nodewise(
             lambda motion, first, stop: lib.ath_analyse_nodes(
-                self.plan.core, motion, self.integers, first, stop, at, steps, dead_zone
+                self.plan.core, motion, self.integers, first, stop, at, steps, rounding
             ),
             level,
         )

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from athcodec import container as ct
+from athcodec._native import Rounding
 from athcodec.ath import Ath, Survey, Thresholds
 from athcodec.encoding import quantise as qz
 from athcodec.encoding import streams
@@ -189,5 +190,5 @@ def _with_maps(prelude: CodedPrelude, positions: np.ndarray, error: float) -> It
         moved = _still(prelude, positions.shape[2])
         step = part * error * (plan.vertex_count / len(plan.nodes)) ** 0.5
         if step > 0:
-            moved.analyse_nodes(positions, np.full(plan.level_count, step), qz.DEAD_ZONE, level=0)
+            moved.analyse_nodes(positions, np.full(plan.level_count, step), Rounding(qz.DEAD_ZONE), level=0)
             yield moved

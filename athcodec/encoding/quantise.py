@@ -31,6 +31,20 @@ ROTATION_FACTORS = (0, 1, 2, 4, 8)
 
 WEIGHT_PARTS = (0.0, 0.05, 0.2)  # of a level's vertices that may have weights below that of its step
 
+# What the value, the slope and the bend of a row at either end of a segment weigh, in squared steps, at bounds over the
+# diagonal of 10^-5 to 10^-2; where the ends meet those of other segments, and where they do not.
+SEAM_WEIGHTS = ((0.0, 2.0, 3.0, 5.0), (0.0, 3.0, 40.0, 100.0), (0.0, 1.0, 10.0, 50.0))
+END_WEIGHTS = ((0.0, 0.0, 1.0, 1.0),) * 3
+
+
+def end_weights(relative_bound: float, has_seams: bool) -> tuple[float, float, float]:
+    """The weights of ends for a bound."""
+    at = np.log10(max(relative_bound, SMALLEST_BOUND))
+    value, slope, bend = (
+        float(np.interp(at, [-5, -4, -3, -2], weights)) for weights in (SEAM_WEIGHTS if has_seams else END_WEIGHTS)
+    )
+    return value, slope, bend
+
 
 def error_limit(bound: float, diagonal: float) -> float:
     """What decoded positions are held to: the bound less a margin for how others measure."""

@@ -158,6 +158,7 @@ def first_settings(
         learned_bases=(False,) * levels,
         learned_pieces=None,
         node_steps=np.full(levels, step),
+        end_weights=source.end_weights(bound),
     )
     if layered and not settings.details.any():  # adaptive rest poses are worth less to those that refine them
         return with_connected_rest(source, ath, replace(settings, lags=lags(source, rest_step, settings.details)))
@@ -346,7 +347,12 @@ class Search:
 
     def first_layer(self, settings: Settings, ratio: int) -> Settings:
         """Settings of a layer whose step is `ratio` times that of the given ones."""
-        first = replace(_coarser(settings, ratio), learned_bases=(False,) * self.levels, learned_pieces=None)
+        first = replace(
+            _coarser(settings, ratio),
+            learned_bases=(False,) * self.levels,
+            learned_pieces=None,
+            end_weights=self.source.end_weights(ratio * settings.bound),
+        )
         for step in (self._with_rotations, self._with_learned_bases, self._with_learned_modes):
             first = first if self.effort == "fast" else step(first)
         return self._with_node_steps(first)
@@ -785,7 +791,7 @@ class Search:
             if roots <= qz.FEW_ROOTS:
                 steps[0] = qz.ROOT_QUALITY * errors[0]
             segment.clear_nodes()
-            segment.analyse_nodes(self.sample, steps, qz.DEAD_ZONE)
+            segment.analyse_nodes(self.sample, steps, settings.rounding)
             if limits is None:
                 size = sum(
                     len(streams.encode_affines(segment, level)) * self.extrapolation.nodes[level]

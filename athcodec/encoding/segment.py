@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 
 from athcodec import container as ct
-from athcodec._native import BRANCH, LOOSE, SHEET, WHOLE, address, lib
+from athcodec._native import BRANCH, LOOSE, SHEET, WHOLE, Rounding, address, lib
 from athcodec.ath import Ath, Survey
 from athcodec.clip import MotionClip, stands_still
 from athcodec.encoding import quantise as qz
@@ -89,6 +89,11 @@ class Source:
         ]
         self.segments = [segment for segments in self.clip_range_segments for segment in segments]
 
+    def end_weights(self, bound: float) -> tuple[float, float, float]:
+        """What the ends of rows weigh at a bound, see qz.end_weights."""
+        relative = bound / self.seen.diagonal if self.seen.diagonal > 0 else 1.0
+        return qz.end_weights(relative, has_seams=len(self.segments) > len(self.clip_range_segments))
+
     def about(self, reference: np.ndarray | None) -> Source:
         """The same about another reference pose."""
         if reference is None and self.reference is None:
@@ -128,6 +133,11 @@ class Source:
                 loop = len(own) > 1 and bool(self.clip.clip_ranges) and self.clip.clip_ranges[i].loop
                 return start + len(own) - 1 if loop else None
         return segment - 1
+
+    def goes_on(self, segment: int) -> bool:
+        """Whether a segment of the same clip is behind it."""
+        following = {segment + 1, *self.clip_range_starts} - {len(self.segments)}
+        return any(self.segment_before(other) == segment for other in following)
 
     @cached_property
     def mesh(self) -> Mesh | None:
@@ -227,11 +237,17 @@ class Settings:
     node_steps: np.ndarray  # (levels,) of the maps of nodes, scene units; see SegmentMotion.analyse_nodes
     rest_slack: float = 0.0  # what the rest pose may be off by, to save bits
     periodic: bool = False  # waves over time are, of loops that are one segment
+    end_weights: tuple[float, float, float] = (0.0, 0.0, 0.0)  # of rows, see qz.end_weights
 
     @property
     def learning_levels(self) -> list[int]:
         """Levels that learn their time bases."""
         return [level for level, learned in enumerate(self.learned_bases) if learned]
+
+    @property
+    def rounding(self) -> Rounding:
+        """How numbers become integers."""
+        return Rounding(qz.DEAD_ZONE, self.end_weights)
 
     def step_of(self, level: int) -> float:
         """Of the stems of a level."""
@@ -471,7 +487,7 @@ def analyse_finely(plan: Plan, settings: Settings, positions: np.ndarray) -> Seg
     segment = SegmentMotion(
         plan, positions.shape[2], level_streams(fine, plan.level_count, {}), periodic=settings.periodic
     )
-    segment.analyse(positions, qz.DEAD_ZONE)
+    segment.analyse(positions, Rounding(qz.DEAD_ZONE))
     return segment
 
 
@@ -538,7 +554,7 @@ def analyse(
     type of these. bases: of the levels that learn theirs; before, ratio, layered: as SegmentMotion has them."""
     own = level_streams(settings, plan.level_count, bases)
     segment = SegmentMotion(plan, positions.shape[2], own, learned_modes, before, ratio, layered, settings.periodic)
-    return segment, segment.analyse_and_pose(positions, qz.DEAD_ZONE, *output)
+    return segment, segment.analyse_and_pose(positions, settings.rounding, *output)
 
 
 def stems_head(settings: Settings, level: int, bases: dict[int, StreamBasis]) -> ct.StemsHead:
@@ -570,6 +586,11 @@ def stem_streams(segment: SegmentMotion, settings: Settings, bases: dict[int, St
     return stems, heads
 
 
+def correction_step(limit: float | np.ndarray) -> float:
+    """That is tried first."""
+    return qz.single(qz.CORRECTION_STEP * float(np.min(limit)))
+
+
 def correct(
     decoded: np.ndarray,
     positions: np.ndarray,
@@ -577,21 +598,23 @@ def correct(
     settings: Settings,
     plan: Plan,
     keeps_all: bool = True,
+    ends: streams.MetEnds = streams.FREE_ENDS,
 ) -> tuple[np.ndarray, float]:
     """Corrections (K, 6) that keep the limit, applied to `decoded`, and their step; those of a rigid part move all
-    of it where that serves, and else, unless each vertex is to keep the limit, there are none. Raises BoundError."""
+    of it where that serves, and else, unless each vertex is to keep the limit, there are none. ends: what they meet;
+    in the step of correction_step. Raises BoundError."""
     factor, stored, is_rigid = 1.0, decoded.dtype.type, np.repeat(plan.is_rigid, plan.pieces["count"])
     limit = settings.limit if keeps_all else np.where(is_rigid, np.inf, settings.limit)
     while True:
-        step = qz.single(qz.CORRECTION_STEP * float(np.min(settings.limit)) * factor)
+        step = qz.single(correction_step(settings.limit) * factor)
         tried = decoded.copy() if is_rigid.any() else decoded
         parts = move_rigid_parts(plan, tried, positions, origin, settings.limit, step, stored)
-        corrections = streams.find_corrections(tried, positions, origin, limit, step, plan.pool, is_rigid)
+        corrections = streams.find_corrections(tried, positions, origin, limit, step, plan.pool, is_rigid, ends)
         if corrections is not None:
             decoded[...] = tried
             corrections = np.concatenate([parts, corrections])
             return corrections[np.lexsort(corrections[:, 1::-1].T)], step
-        factor *= 0.5
+        factor, ends = 0.5 * factor, streams.FREE_ENDS
         if factor < 1e-3:
             raise BoundError(
                 f"max error: got {settings.bound:.3g}; it cannot be kept in the output's {decoded.dtype.name} numbers"

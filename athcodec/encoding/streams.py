@@ -7,11 +7,11 @@ the container's business. Reading streams is the core's.
 from __future__ import annotations
 
 from contextlib import nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from athcodec._native import BRANCH, address, encode_stream, lib
+from athcodec._native import BRANCH, CoreMetEnds, address, encode_stream, lib
 from athcodec.encoding.learned_modes import LearnedModes
 from athcodec.encoding.motion import Plan, SegmentMotion
 from athcodec.encoding.polygons import Mesh
@@ -256,6 +256,27 @@ def encode_exact(positions: np.ndarray, source: np.ndarray) -> bytes:
     )
 
 
+@dataclass(frozen=True)
+class MetEnds:
+    """How the corrections of a segment meet those of the segments beside it.
+
+    closed: the ends at which no footprint is cut off, FIRST and LAST. decided: (K, 6) int32 corrections in ascending order,
+    which stand in the first frame of one segment as in the last of the other.
+    """
+
+    closed: int = 0
+    decided: np.ndarray = field(default_factory=lambda: np.empty((0, 6), np.int32))
+
+    def of_vertices(self, start: int, stop: int) -> MetEnds:
+        """The same for some of the vertices, numbered from `start` on."""
+        first, last = np.searchsorted(self.decided[:, 0], (start, stop))
+        return MetEnds(self.closed, self.decided[first:last] - np.array([start, 0, 0, 0, 0, 0], np.int32))
+
+
+FIRST, LAST = 1, 2
+FREE_ENDS = MetEnds()
+
+
 def find_corrections(
     positions: np.ndarray,
     source: np.ndarray,
@@ -264,11 +285,12 @@ def find_corrections(
     step: float,
     pool: ThreadPool = SERIAL,
     narrow: np.ndarray | bool = False,
+    ends: MetEnds = FREE_ENDS,
 ) -> np.ndarray | None:
     """Brings every vertex of (N, 3, T) positions within `limit` of the source, in place; limit: one, or one each (N,).
 
-    narrow: of which vertices, (N,) bool, corrections are to be of one frame. Returns the corrections applied,
-    (K, 6) int32, or None where they cannot be expressed in this step.
+    narrow: of which vertices, (N,) bool, corrections are to be of one frame. ends: how they meet those of the segments beside
+    this one. Returns the corrections applied, (K, 6) int32, or None where they cannot be expressed in this step.
     """
     vertices, _, frames = positions.shape
     limits = np.array(np.broadcast_to(limit, vertices), np.float64)
@@ -276,7 +298,8 @@ def find_corrections(
 
     def found(start: int, stop: int) -> np.ndarray | None:
         some = slice(start, stop)
-        rows = _corrections(positions[some], source[some], origin, limits[some], of_one_frame[some], step)
+        met = ends.of_vertices(start, stop)
+        rows = _corrections(positions[some], source[some], origin, limits[some], of_one_frame[some], step, met)
         if rows is not None:
             rows[:, 0] += start
         return rows
@@ -297,9 +320,17 @@ def find_corrections(
 
 
 def _corrections(
-    positions: np.ndarray, source: np.ndarray, origin: np.ndarray, limits: np.ndarray, narrow: np.ndarray, step: float
+    positions: np.ndarray,
+    source: np.ndarray,
+    origin: np.ndarray,
+    limits: np.ndarray,
+    narrow: np.ndarray,
+    step: float,
+    ends: MetEnds,
 ) -> np.ndarray | None:
     vertices, _, frames = positions.shape
+    decided = np.ascontiguousarray(ends.decided, np.int32)
+    met = CoreMetEnds(decided.ctypes.data, len(decided), ends.closed)
     capacity = 1024
     while True:
         rows = np.empty((capacity, 6), np.int32)
@@ -313,6 +344,7 @@ def _corrections(
             address(limits, np.float64, vertices),
             address(narrow, np.uint8, vertices),
             step,
+            met,
             rows.ctypes.data,
             capacity,
         )
