@@ -29,6 +29,7 @@ from athcodec.decoder import open as open_ath
 from athcodec.discovery import Found, with_branches
 from athcodec.encoding import polygons, streams
 from athcodec.encoding import quantise as qz
+from athcodec.encoding.features import Feature
 from athcodec.encoding.layers import (
     MOST_LAYERS,
     MOST_LEVELS,
@@ -74,6 +75,7 @@ class EncodingOptions:
     jobs: int | None = None
     ladder: tuple[float, ...] = ()  # largest errors over the diagonal, descending; (): a single layer
     predicted_frames: int = MAX_SEGMENT  # longest segment of predicted motion
+    without: frozenset[Feature] = frozenset()  # features that the file is to do without
 
     @classmethod
     def of(
@@ -262,6 +264,7 @@ class EncodingJob:
             options.host_rest,
             polygons=_polygons(clip, options),
             rest_precision=options.rest_precision,
+            without=options.without,
         )
 
     @property
@@ -309,7 +312,8 @@ class EncodingJob:
 
     def _best_prediction(self, bound: float, most_bytes: float) -> FoundPrediction | None:
         """None for one who asks for a hierarchy of maps, which predicted motion has not."""
-        return None if self.options.tam else best_prediction(self._long_segments, bound, most_bytes)
+        is_out = self.options.tam or Feature.PREDICTED in self.options.without
+        return None if is_out else best_prediction(self._long_segments, bound, most_bytes)
 
     @property
     def _long_segments(self) -> Source:
@@ -523,7 +527,7 @@ class EncodingJob:
 
         def join(taken: tuple[int, CodedMotion, list[np.ndarray | None]]) -> CodedSegment:
             index, motion, ends = taken
-            return CodedSegment(index, *motion.joined_to(ends))
+            return CodedSegment(index, *motion.joined_to([] if Feature.JOINS in source.without else ends))
 
         if decided.choice.predicted is not None:
             return pool.ordered(predict, read(segments), at_once)
