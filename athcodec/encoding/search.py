@@ -675,14 +675,15 @@ class Search:
 
     def _with_basis(self, settings: Settings) -> Settings:
         """The spatial basis of each branch: all alike, or by shape; judged without rotations and with some."""
-        rotations = {settings.rotation_step_factors}
+        plain = [replace(settings, sheet=sheet) for sheet in self._sheets()]
+        candidates = [*plain]
         if not any(settings.rotation_step_factors) and not self._without(Feature.ROTATIONS):
-            rotations.add((2,) * self.levels)
-        candidates = [
-            replace(settings, sheet=sheet, rotation_step_factors=factors)
-            for sheet in self._sheets()
-            for factors in sorted(rotations)
-        ]
+            costs = [cost for cost, _ in self._costs(plain)]
+            candidates += [
+                replace(own, rotation_step_factors=(2,) * self.levels)
+                for own, cost in zip(plain, costs)
+                if cost <= HOPELESS * min(costs)
+            ]
         return replace(self._cheapest(candidates), rotation_step_factors=settings.rotation_step_factors)
 
     def _sheets(self) -> list[np.ndarray]:

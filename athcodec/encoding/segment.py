@@ -106,6 +106,8 @@ class Source:
     def _changed(self, **fields) -> Source:
         source = replace(self, **fields)
         source.still = self.still  # for which frames are read
+        if len(self.segments) == len(source.segments) == 1:
+            source._all_positions = self._all_positions
         return source
 
     @property
@@ -201,7 +203,14 @@ class Source:
 
     def positions(self, segment: int) -> np.ndarray:
         """(N, 3, T) float64 positions of a segment, less the origin."""
-        return self.relative(self.block(segment))
+        return self._all_positions if len(self.segments) == 1 else self.relative(self.block(segment))
+
+    @cached_property
+    def _all_positions(self) -> np.ndarray:
+        """Of the only segment, which a search asks for again and again."""
+        positions = self.relative(self.block(0))
+        positions.setflags(write=False)
+        return positions
 
 
 @dataclass(frozen=True)
