@@ -554,7 +554,10 @@ def analyse(
     type of these. bases: of the levels that learn theirs; before, ratio, layered: as SegmentMotion has them."""
     own = level_streams(settings, plan.level_count, bases)
     segment = SegmentMotion(plan, positions.shape[2], own, learned_modes, before, ratio, layered, settings.periodic)
-    return segment, segment.analyse_and_pose(positions, qz.DEAD_ZONE, *output)
+    origin, dtype = output
+    decoded = np.empty(positions.shape, dtype)
+    segment.analyse(positions, qz.DEAD_ZONE, origin, decoded)
+    return segment, decoded
 
 
 def stems_head(settings: Settings, level: int, bases: dict[int, StreamBasis]) -> ct.StemsHead:
