@@ -15,8 +15,10 @@ import numpy as np
 import pytest
 
 import athcodec
+from athcodec import encoding
 from athcodec._native import crc32c
 from athcodec.container import KIND_NAMES
+from athcodec.encoding.features import Feature
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.append(str(ROOT))  # for bench, which is not installed; athcodec stays the installed one
@@ -74,6 +76,21 @@ def test_sizes_come_with_a_bound_that_was_measured_and_kept(sizes):
     assert sum(kinds.values()) == size["bytes"]
     assert chunks["AFFINES %"] == pytest.approx(100 * chunks["AFFINES"] / size["bytes"])
     assert {"rotations", "learned"} <= choices.keys()
+
+
+def test_what_a_feature_saves_is_what_a_file_without_it_takes_more(tmp_path, sample_clip):
+    words = ["features", "sample", "--bounds", "1e-4", "--features", "shapes", "loose"]
+    text, result = run_bench(tmp_path, *words)
+    rows = {row["name"]: row for row in result["tables"][0]["rows"]}
+    assert rows["loose"]["mean %"] == 0  # nothing of this tree leaves its place
+    sizes = []
+    for without in (frozenset(), frozenset({Feature.SHAPES})):
+        options = {"attributes": "none", "rest_error": "bound", "ladder": "none", "without": without}
+        plan = encoding.draft(sample_clip, rel_error=1e-4, **options)
+        coded = encoding.code_segments(sample_clip, plan, range(plan.segment_count))
+        sizes.append(encoding.write(sample_clip, plan, coded, tmp_path / "a.ath").bytes)
+    assert rows["shapes"]["mean %"] == pytest.approx(100 * (sizes[1] / sizes[0] - 1), abs=0.005)
+    assert rows["shapes"]["mean %"] > 1 and "learned shapes" in text
 
 
 def test_levels_end_within_the_bound_and_have_no_gaps_where_the_papers_have(tmp_path):

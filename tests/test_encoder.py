@@ -267,13 +267,13 @@ def test_progress_rises_from_nothing_to_one_through_the_stages(effort, small, tm
 def test_half_of_the_progress_is_about_half_of_the_work(frames, effort, tmp_path, monkeypatch):
     """Work: positions that are analysed, which is most of what a search and coding do."""
     done, reported = [0], []
-    analyse = SegmentMotion._analyse
+    analyse = SegmentMotion.analyse
 
     def counted(self, source, *more):
         done[0] += source.size
         return analyse(self, source, *more)
 
-    monkeypatch.setattr(SegmentMotion, "_analyse", counted)
+    monkeypatch.setattr(SegmentMotion, "analyse", counted)
     athcodec.encode(
         endless_clip(frames, at_once=frames),
         tmp_path / "e.ath",

@@ -29,6 +29,7 @@ from athcodec.decoder import open as open_ath
 from athcodec.discovery import Found, with_branches
 from athcodec.encoding import polygons, streams
 from athcodec.encoding import quantise as qz
+from athcodec.encoding.features import Feature
 from athcodec.encoding.joins import End
 from athcodec.encoding.layers import (
     MOST_LAYERS,
@@ -75,6 +76,7 @@ class EncodingOptions:
     jobs: int | None = None
     ladder: tuple[float, ...] = ()  # largest errors over the diagonal, descending; (): a single layer
     predicted_frames: int = MAX_SEGMENT  # longest segment of predicted motion
+    without: frozenset[Feature] = frozenset()  # features that the file is to do without
 
     @classmethod
     def of(
@@ -263,6 +265,7 @@ class EncodingJob:
             options.host_rest,
             polygons=_polygons(clip, options),
             rest_precision=options.rest_precision,
+            without=options.without,
         )
 
     @property
@@ -310,7 +313,8 @@ class EncodingJob:
 
     def _best_prediction(self, bound: float, most_bytes: float) -> FoundPrediction | None:
         """None for one who asks for a hierarchy of maps, which predicted motion has not."""
-        return None if self.options.tam else best_prediction(self._long_segments, bound, most_bytes)
+        is_out = self.options.tam or Feature.PREDICTED in self.options.without
+        return None if is_out else best_prediction(self._long_segments, bound, most_bytes)
 
     @property
     def _long_segments(self) -> Source:
@@ -524,7 +528,7 @@ class EncodingJob:
 
         def join(taken: tuple[int, CodedMotion, list[End | None]]) -> CodedSegment:
             index, motion, ends = taken
-            return CodedSegment(index, *motion.joined_to(ends))
+            return CodedSegment(index, *motion.joined_to([] if Feature.JOINS in source.without else ends))
 
         if decided.choice.predicted is not None:
             return pool.ordered(predict, read(segments), at_once)

@@ -282,9 +282,7 @@ class _ShownLevel:
 class _SegmentCoder:
     """Chunks {(level, kind): payload} and errors of stopping at each level, by each of MEASURES, of one segment."""
 
-    def __init__(
-        self, prelude: CodedPrelude, layers: Layers, segment_count: int, positions: np.ndarray, goes_on: bool
-    ):
+    def __init__(self, prelude: CodedPrelude, layers: Layers, segment_count: int, positions: np.ndarray, goes_on: bool):
         self._output, self._origin, self.positions = prelude.output, prelude.origin, positions
         self._pool, self._layered = prelude.plan.pool, len(layers.each) > 1
         self._level_0 = layers.level_0
@@ -561,9 +559,7 @@ class CodedMotion:
         """What the levels of the next segment go on from."""
         return self._coder.ends()
 
-    def joined_to(
-        self, ends: Sequence[End | None] = ()
-    ) -> tuple[dict[tuple[int, int], bytes], np.ndarray, np.ndarray]:
+    def joined_to(self, ends: Sequence[End | None] = ()) -> tuple[dict[tuple[int, int], bytes], np.ndarray, np.ndarray]:
         """Chunks {(level, kind): payload}, (levels, 3) errors of stopping at each level, and (levels,) how each is
         joined to the ends of the segment before; there are none for the first of a clip. To be called once."""
         coder, self._coder = self._coder, None  # which takes much memory

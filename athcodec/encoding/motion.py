@@ -299,19 +299,20 @@ class SegmentMotion:
             ):
                 setattr(self.integers, name, array.ctypes.data)
 
-    def analyse(self, source: np.ndarray, rounding: Rounding) -> None:
-        """Fills coefficients and tracks from positions, (N, 3, frames) float64 less the origin, in closed loop."""
-        self._analyse(source, rounding, None, False, None)
+    def analyse(
+        self,
+        source: np.ndarray,
+        rounding: Rounding,
+        origin: np.ndarray | None = None,
+        positions: np.ndarray | None = None,
+    ) -> None:
+        """Fills coefficients and tracks from positions, (N, 3, frames) float64 less the origin, in closed loop.
 
-    def analyse_and_pose(self, source: np.ndarray, rounding: Rounding, origin: np.ndarray, dtype) -> np.ndarray:
-        """The same; returns what `pose` gives at the last level, which the closed loop has at hand."""
-        positions = np.empty((self.plan.vertex_count, 3, self.frames), dtype)
-        into = address(origin, np.float64, 3), positions.dtype == np.float64, positions.ctypes.data
-        self._analyse(source, rounding, *into)
-        return positions
-
-    def _analyse(self, source: np.ndarray, rounding: Rounding, *into) -> None:
-        at = self._source(source)
+        positions: is filled with what `pose` gives at the last level, which the closed loop has at hand.
+        """
+        at, into = self._source(source), (None, False, None)
+        if positions is not None:
+            into = address(origin, np.float64, 3), positions.dtype == np.float64, positions.ctypes.data
         self._piecewise(
             lambda motion, first, stop: lib.ath_analyse(
                 self.plan.core, motion, self.integers, first, stop, at, rounding, *into

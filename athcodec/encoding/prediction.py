@@ -16,6 +16,7 @@ from athcodec._native import Rounding
 from athcodec.ath import Ath, Survey, Thresholds
 from athcodec.encoding import quantise as qz
 from athcodec.encoding import streams
+from athcodec.encoding.features import Feature
 from athcodec.encoding.layers import Layer, Layers
 from athcodec.encoding.motion import LevelStream, SegmentMotion, position_errors
 from athcodec.encoding.search import Choice, SegmentSample, typical_segments
@@ -104,10 +105,12 @@ def best_prediction(source: Source, bound: float, most_bytes: float) -> FoundPre
     try:
         if sum(_begun(preludes[first.rest_step], first, sample) for sample in samples) > TOO_MANY * most_bytes:
             return None
-        found, _, memory = best(coded(first, memory) for memory in MEMORIES)
+        memories = MEMORIES[:1] if Feature.MEMORIES in source.without else MEMORIES
+        found, _, memory = best(coded(first, memory) for memory in memories)
         preludes |= {own.rest_step: CodedPrelude(source, ath, own, predicted=True) for own in others}
         found, settings, _ = best([found, *(coded(own, memory) for own in others)])
-        found, _, _ = best([found, coded(settings, memory | LATTICE)])
+        if Feature.LATTICE not in source.without:
+            found, _, _ = best([found, coded(settings, memory | LATTICE)])
     except BoundError:
         return None
     return found if found.bytes < most_bytes else None

@@ -18,6 +18,7 @@ import numpy as np
 from athcodec.ath import Ath
 from athcodec.encoding import quantise as qz
 from athcodec.encoding import streams
+from athcodec.encoding.features import Feature
 from athcodec.encoding.learned_modes import Components, LearnedModes, components, estimated_bits, learn
 from athcodec.encoding.motion import Plan, SegmentMotion, position_errors
 from athcodec.encoding.progress import Progress, trials
@@ -143,7 +144,7 @@ def first_settings(
         step=qz.single(step),
         level_steps=np.ones(levels),
         rest_step=qz.single(rest_step),
-        sheet=source.sheet_like,
+        sheet=source.sheet_like & (Feature.SHEETS not in source.without),
         loose=loose_branches(source, samples[-1].positions),
         rigid=rigid,
         layer=len(ratios) - 1,
@@ -159,6 +160,7 @@ def first_settings(
         learned_pieces=None,
         node_steps=np.full(levels, step),
         end_weights=source.end_weights(bound),
+        narrow=Feature.WIDE in source.without,
     )
     if layered and not settings.details.any():  # adaptive rest poses are worth less to those that refine them
         return with_connected_rest(source, ath, replace(settings, lags=lags(source, rest_step, settings.details)))
@@ -168,6 +170,8 @@ def first_settings(
 def _rigid(source: Source, bound: float, samples: Sequence[SegmentSample], ratios: Sequence[int]) -> np.ndarray:
     """(B,) in how many of the layers branches that are to keep their shape move rigidly."""
     hierarchy, least = source.hierarchy, source.smallest_bound(bound)
+    if Feature.RIGID in source.without:
+        return np.zeros(hierarchy.branch_count, np.int32)
     return rigid_layers(
         hierarchy.first_vertex,
         hierarchy.stem_count,
@@ -262,6 +266,9 @@ class Search:
         samples = samples_of(source)
         start = first_settings(source, ath, bound, samples, ratios)
         return cls(source, ath, start, samples, effort, report, jobs, ratios=ratios)
+
+    def _without(self, feature: Feature) -> bool:
+        return feature in self.source.without
 
     def _level_errors(self, bound: float) -> np.ndarray:
         """Per level, the error in all vertices of one node together that would double the level's own, (levels,).
@@ -364,7 +371,8 @@ class Search:
             yield settings
             return
         factor, least = settings.rotation_step_factors[self.prelude(settings).plan.main_level], math.inf
-        for own, only_tips in dict.fromkeys([(factor, settings.only_tips), (factor, True), (0, False)]):
+        tips = settings.only_tips or not self._without(Feature.TIPS)
+        for own, only_tips in dict.fromkeys([(factor, settings.only_tips), (factor, tips), (0, False)]):
             candidate = replace(settings, rotation_step_factors=(own,) * self.levels, only_tips=only_tips)
             if self.effort != "fast":
                 plain = replace(candidate, learned_pieces=None)
@@ -386,6 +394,8 @@ class Search:
         is tried with what was found about the rest pose, and goes on from there."""
         if self.effort == "fast" or self.source.host_rest or self.source.details.any():
             return self  # the mean of what turns is smaller than it
+        if self._without(Feature.MEAN_POSE):
+            return self
         other = self.about_mean_pose()
         tried, its = self.of_sample or self, other.of_sample or other
         tried._extra_trials += MEAN_POSE_WORTH
@@ -577,6 +587,8 @@ class Search:
     def _with_learned_modes(self, settings: Settings) -> Settings:
         """Learned modes for the pieces that take fewer bits with them, if the file as a whole gets shorter."""
         plain = replace(settings, learned_pieces=None)
+        if self._without(Feature.SHAPES):
+            return plain
         wanted = dict(zip(qz.REQUIRED_SAVINGS, self._pieces_for_learned_modes(plain, qz.REQUIRED_SAVINGS)))
         tried = {None: plain} | {
             saving: replace(plain, learned_pieces=some) for saving, some in wanted.items() if some.any()
@@ -663,24 +675,27 @@ class Search:
 
     def _with_free_rigid(self, settings: Settings) -> Settings:
         """Rigid branches that move away from what they hang on, or not."""
-        if not (settings.rigid > settings.layer).any():
+        if self._without(Feature.FREE_RIGID) or not (settings.rigid > settings.layer).any():
             return settings
         return self._cheapest([settings, replace(settings, free_rigid=True)])
 
     def _with_basis(self, settings: Settings) -> Settings:
         """The spatial basis of each branch: all alike, or by shape; judged without rotations and with some."""
-        rotations = {settings.rotation_step_factors}
-        if not any(settings.rotation_step_factors):
-            rotations.add((2,) * self.levels)
-        candidates = [
-            replace(settings, sheet=sheet, rotation_step_factors=factors)
-            for sheet in self._sheets()
-            for factors in sorted(rotations)
-        ]
+        plain = [replace(settings, sheet=sheet) for sheet in self._sheets()]
+        candidates = [*plain]
+        if not any(settings.rotation_step_factors) and not self._without(Feature.ROTATIONS):
+            costs = [cost for cost, _ in self._costs(plain)]
+            candidates += [
+                replace(own, rotation_step_factors=(2,) * self.levels)
+                for own, cost in zip(plain, costs)
+                if cost <= HOPELESS * min(costs)
+            ]
         return replace(self._cheapest(candidates), rotation_step_factors=settings.rotation_step_factors)
 
     def _sheets(self) -> list[np.ndarray]:
         """Which branches may have the affine functions first."""
+        if self._without(Feature.SHEETS):
+            return [np.zeros_like(self.source.sheet_like)]
         sheets = [self.source.sheet_like, np.zeros_like(self.source.sheet_like), np.ones_like(self.source.sheet_like)]
         return sheets if self.source.sheet_like.any() and not self.source.sheet_like.all() else sheets[1:]
 
@@ -694,6 +709,9 @@ class Search:
         return self._cheapest([settings, *candidates])
 
     def _with_rotations(self, settings: Settings) -> Settings:
+        if self._without(Feature.ROTATIONS):
+            return settings
+
         def turning(factors: Sequence[int]) -> dict[int, Settings]:
             return {k: replace(settings, rotation_step_factors=(k,) * self.levels) for k in factors}
 
@@ -709,7 +727,7 @@ class Search:
         tips = [
             replace(own, only_tips=True)
             for own in (best, *candidates.values())
-            if any(own.rotation_step_factors) and self.cost(own)[0] <= most
+            if any(own.rotation_step_factors) and self.cost(own)[0] <= most and not self._without(Feature.TIPS)
         ]
         return self._cheapest([best, *tips])
 
@@ -722,6 +740,8 @@ class Search:
 
     def _with_learned_bases(self, settings: Settings) -> Settings:
         """Learned time bases for the levels whose streams they shorten, where the file as a whole gets shorter."""
+        if self._without(Feature.TIME_BASES):
+            return settings
         learning = replace(settings, learned_bases=(True,) * self.levels)
         (cost, plain), (_, learned) = self._costs([settings, learning])
         mixed = replace(settings, learned_bases=tuple((learned < plain).tolist()))
@@ -730,6 +750,8 @@ class Search:
     def _with_periodic_waves(self, settings: Settings) -> Settings:
         """Loops that are one segment by waves that go on across their seam: those of a motion that does not are
         larger so."""
+        if self._without(Feature.PERIODIC):
+            return settings
         return self._cheapest([replace(settings, periodic=True), settings])
 
     def _with_steps(self, settings: Settings) -> Settings:

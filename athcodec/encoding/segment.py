@@ -18,6 +18,7 @@ from athcodec.ath import Ath, Survey
 from athcodec.clip import MotionClip, stands_still
 from athcodec.encoding import quantise as qz
 from athcodec.encoding import streams
+from athcodec.encoding.features import Feature
 from athcodec.encoding.learned_modes import LearnedModes
 from athcodec.encoding.motion import LevelStream, Plan, SegmentMotion, gather
 from athcodec.encoding.polygons import Mesh
@@ -48,7 +49,7 @@ class Source:
     """A clip in file order, relative to an origin, cut into segments, and the reference pose of its motion.
 
     exact_rest: the numbers of its rest pose are to come back. reference: (N, 3) float64 less the origin, file order;
-    None: the rest pose. polygons: what the file stores as FACES.
+    None: the rest pose. polygons: what the file stores as FACES. without: features that the file is to do without.
     """
 
     clip: MotionClip
@@ -62,6 +63,7 @@ class Source:
     rest_precision: RestPrecision = RestPrecision()
     reference: np.ndarray | None = None
     polygons: Polygons | None = None
+    without: frozenset[Feature] = frozenset()
     source_rest: np.ndarray = field(init=False)  # (N, 3) float64, less the origin
     rest: np.ndarray = field(init=False)  # likewise: the reference pose
     origin: np.ndarray = field(init=False)  # (3,) float64
@@ -109,6 +111,8 @@ class Source:
     def _changed(self, **fields) -> Source:
         source = replace(self, **fields)
         source.still = self.still  # for which frames are read
+        if len(self.segments) == len(source.segments) == 1:
+            source._all_positions = self._all_positions
         return source
 
     @property
@@ -142,6 +146,8 @@ class Source:
     @cached_property
     def mesh(self) -> Mesh | None:
         """What rest poses may go by."""
+        if Feature.CONNECTED in self.without:
+            return None
         return Mesh.of(self.polygons, self.hierarchy.vertex_source)
 
     @cached_property
@@ -207,7 +213,14 @@ class Source:
 
     def positions(self, segment: int) -> np.ndarray:
         """(N, 3, T) float64 positions of a segment, less the origin."""
-        return self.relative(self.block(segment))
+        return self._all_positions if len(self.segments) == 1 else self.relative(self.block(segment))
+
+    @cached_property
+    def _all_positions(self) -> np.ndarray:
+        """Of the only segment, which a search asks for again and again."""
+        positions = self.relative(self.block(0))
+        positions.setflags(write=False)
+        return positions
 
 
 @dataclass(frozen=True)
@@ -238,6 +251,7 @@ class Settings:
     rest_slack: float = 0.0  # what the rest pose may be off by, to save bits
     periodic: bool = False  # waves over time are, of loops that are one segment
     end_weights: tuple[float, float, float] = (0.0, 0.0, 0.0)  # of rows, see qz.end_weights
+    narrow: bool = False  # corrections are of one frame
 
     @property
     def learning_levels(self) -> list[int]:
@@ -331,7 +345,7 @@ def with_best_lags(source: Source, ath: Ath, settings: Settings) -> Settings:
     """The lags, and adaptive, connected or neither, that make hierarchy and rest pose smallest at these steps."""
     own = lags(source, settings.rest_step, settings.details)
     candidates = [replace(settings, lags=own, adaptive_rest=False, connected_rest=False)]
-    if not source.reference_is_exact:
+    if not source.reference_is_exact and (Feature.ADAPTIVE not in source.without or settings.details.any()):
         candidates += _lag_candidates(source, settings, own)
     if source.mesh is not None and not source.host_rest:
         is_adaptive = not source.reference_is_exact
@@ -410,6 +424,8 @@ def lags(source: Source, step: float, details: np.ndarray) -> np.ndarray:
 
 def loose_branches(source: Source, sample: np.ndarray) -> np.ndarray:
     """Branches whose base leaves its attach point by more than their own size: fallen leaves, separate parts."""
+    if Feature.LOOSE in source.without:
+        return np.zeros(source.hierarchy.branch_count, bool)
     hierarchy, rest = source.hierarchy, source.rest
     first, attach = hierarchy.first_vertex, np.maximum(hierarchy.attach, 0)
     gap = np.linalg.norm(sample[first] - sample[attach], axis=1)
@@ -554,7 +570,10 @@ def analyse(
     type of these. bases: of the levels that learn theirs; before, ratio, layered: as SegmentMotion has them."""
     own = level_streams(settings, plan.level_count, bases)
     segment = SegmentMotion(plan, positions.shape[2], own, learned_modes, before, ratio, layered, settings.periodic)
-    return segment, segment.analyse_and_pose(positions, settings.rounding, *output)
+    origin, dtype = output
+    decoded = np.empty(positions.shape, dtype)
+    segment.analyse(positions, settings.rounding, origin, decoded)
+    return segment, decoded
 
 
 def stems_head(settings: Settings, level: int, bases: dict[int, StreamBasis]) -> ct.StemsHead:
@@ -609,7 +628,9 @@ def correct(
         step = qz.single(correction_step(settings.limit) * factor)
         tried = decoded.copy() if is_rigid.any() else decoded
         parts = move_rigid_parts(plan, tried, positions, origin, settings.limit, step, stored)
-        corrections = streams.find_corrections(tried, positions, origin, limit, step, plan.pool, is_rigid, ends)
+        corrections = streams.find_corrections(
+            tried, positions, origin, limit, step, plan.pool, is_rigid | settings.narrow, ends
+        )
         if corrections is not None:
             decoded[...] = tried
             corrections = np.concatenate([parts, corrections])
