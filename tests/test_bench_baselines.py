@@ -13,6 +13,7 @@ import pytest
 
 from athcodec.clip import MotionClip
 from bench.codecs import Source, check
+from bench.codecs.acl import SEGMENT, SkeletalTracks, _Track
 from bench.codecs.baseline import Choice, Ladder, Search
 from bench.codecs.baselines import BASELINES
 from bench.codecs.coder import DamagedStream, RangeCoder, Reader, Writer, Zstd, read_varint, varint
@@ -95,6 +96,54 @@ def test_clips_longer_than_a_segment_are_coded_in_parts(piece):
     bound = 1e-3 * source.diagonal
     decoded = codec.decode(codec._trial(source, bound, settings, codec.coder))
     assert np.linalg.norm(decoded - source.positions, axis=2).max() <= bound
+
+
+@pytest.mark.parametrize(
+    "codec", [codec for codec in BASELINES[::2] if "PCA" in codec.name], ids=lambda codec: codec.name
+)
+def test_settings_found_with_a_part_of_a_large_clip_are_about_as_good(codec, piece, monkeypatch):
+    bound = BOUND * piece.diagonal
+    whole = len(check(codec, piece, bound)[0])
+    monkeypatch.setattr("bench.codecs.baseline.LARGE", 0)
+    monkeypatch.setattr("bench.codecs.baseline.SEARCHED", 500)
+    assert len(check(codec, Source(piece.clip), bound)[0]) < 1.03 * whole
+
+
+def test_a_part_of_a_clip_has_whole_branches_and_what_carries_them(piece):
+    part = piece.part(300)
+    part.clip.check()
+    count = part.positions.shape[1]
+    assert 200 < count < 700 and part.positions.shape[0] == piece.positions.shape[0]
+    whole = {tuple(point) for point in piece.rest.tolist()}
+    assert {tuple(point) for point in part.rest.tolist()} <= whole
+    sizes, some = (np.bincount(source.clip.vertex_branch) for source in (piece, part))
+    assert set(some) <= set(sizes)
+
+
+def test_skeletal_tracks_keep_their_errors_with_the_fewest_bits():
+    random, frames = np.random.default_rng(1), 5 * SEGMENT + 3
+    numbers = np.cumsum(random.normal(size=(7, frames, 3)), axis=1) * np.geomspace(1e-6, 1, 7)[:, None, None]
+    error = np.full(7, 1e-3)
+    track = _Track(error, frames)
+    decoded = track.write(np.arange(7), numbers)
+    assert (np.linalg.norm(decoded - numbers, axis=2).max(axis=1) <= error).all()
+    assert (track._rates(slice(None))[0] == 0).all() and track._rates(slice(None)).max() < 14
+    again = _Track(error, frames)
+    again.set_ranges(*track.ranges())
+    for tier in (0, 1):
+        bits = track.bits(tier)
+        assert again.set_bits(tier, bits, 0) == len(bits)
+    assert np.array_equal(again.values(), decoded)
+
+
+def test_the_first_tier_of_skeletal_tracks_shows_every_other_frame(piece):
+    codec = SkeletalTracks(RangeCoder())
+    bound = BOUND * piece.diagonal
+    data = codec.encode(piece, bound)
+    [one, both] = [SkeletalTracks(RangeCoder(), tiers).read(Reader(RangeCoder(), data))[0] for tiers in (1, 2)]
+    assert np.allclose(one[:, :, ::2], both[:, :, ::2])
+    assert np.allclose(one[:, :, 1], (one[:, :, 0] + one[:, :, 2]) / 2, atol=0.02 * piece.diagonal)
+    assert not np.array_equal(one, both)
 
 
 @pytest.mark.parametrize("single_depth", (False, True))

@@ -18,6 +18,7 @@ import athcodec
 from athcodec.hierarchy import Hierarchy, hierarchy_of
 
 BLOCK = 1 << 20  # numbers
+RUNS = 16  # of branches in a part of a clip
 
 
 @dataclass
@@ -40,6 +41,29 @@ class Source:
     def hierarchy(self) -> Hierarchy:
         """Branches and vertices in file order; its vertex_source has their numbers in the source."""
         return hierarchy_of(self.clip)
+
+    def part(self, vertices: int) -> Source:
+        """About so many vertices: some runs of branches, evenly spaced, with all that carries them."""
+        hierarchy, count = self.hierarchy, self.positions.shape[1]
+        run = max(1, vertices // RUNS)
+        taken = (np.cumsum(hierarchy.stem_count) // run) % -(-count // vertices) == 0
+        taken[0] = True
+        for branch in range(len(taken) - 1, 0, -1):
+            if taken[branch] and hierarchy.branch_parent[branch] >= 0:
+                taken[hierarchy.branch_parent[branch]] = True
+        number = np.cumsum(taken) - 1
+        parent = hierarchy.branch_parent[taken]
+        of_vertex = hierarchy.vertex_branch()
+        kept = taken[of_vertex]
+        source = hierarchy.vertex_source[kept]
+        clip = athcodec.MotionClip(
+            np.ascontiguousarray(self.positions[:, source]),
+            self.clip.time,
+            number[of_vertex[kept]],
+            np.where(parent < 0, -1, number[parent]),
+            rest=self.rest[source],
+        )
+        return Source(clip)
 
     @cached_property
     def diagonal(self) -> float:

@@ -3,7 +3,8 @@
 A baseline writes and reads its lossy part; here its positions are decoded as a reader decodes them, and vertices whose
 error exceeds the bound are corrected as in athcodec. So a baseline's step may be coarser than its worst vertex allows,
 and step and corrections are searched together. Settings are searched one after the other, each along its ladder from
-its current value in strides of two and then one, until a round changes nothing: a local search.
+its current value in strides of two and then one, until a round changes nothing: a local search. Of large clips a part
+is searched, and then the step alone with all vertices.
 """
 
 from __future__ import annotations
@@ -21,6 +22,9 @@ from bench.codecs.coder import EntropyCoder, Reader, Writer, compiler, read_corr
 from bench.codecs.tree import VertexOrder, ordered
 
 FINALISTS = 3
+LARGE = 8_000_000  # numbers; larger clips are searched by a part of them
+SEARCHED = 6_000  # vertices of that part
+AGAIN = ("step", "clusters")  # what is searched with all vertices
 
 
 @dataclass(frozen=True)
@@ -139,12 +143,28 @@ class Baseline(ABC):
 
     def encode(self, source: Source, bound: float) -> bytes:
         quick = self.coder.quick()
-        search = Search(lambda settings: len(self._trial(source, bound, settings, quick)), self.grid(source, bound))
-        tried = search.run(self.rounds)
+        tried = self._searched(source, bound, quick)
         finalists = tried[:1] if quick is self.coder else tried[:FINALISTS]
         encodings = [(self._trial(source, bound, settings, self.coder), settings) for settings in finalists]
         data, self.settings = min(encodings, key=lambda encoding: len(encoding[0]))
         return data
+
+    def _searched(self, source: Source, bound: float, coder: EntropyCoder) -> list[Settings]:
+        """All settings tried, best first."""
+
+        def search(source: Source, grid: dict[str, Ladder | Choice], rounds: int) -> list[Settings]:
+            return Search(lambda settings: len(self._trial(source, bound, settings, coder)), grid).run(rounds)
+
+        if source.positions.size <= LARGE:
+            return search(source, self.grid(source, bound), self.rounds)
+        part = source.part(SEARCHED)
+        grid = self.grid(part, bound)
+        best = search(part, grid, self.rounds)[0]
+        near = {
+            name: axis.starting_at(best[name]) if name in AGAIN else Choice((best[name],))
+            for name, axis in grid.items()
+        }
+        return search(source, near, 1)
 
     def _trial(self, source: Source, bound: float, settings: Settings, coder: EntropyCoder) -> bytes:
         writer = Writer(coder)

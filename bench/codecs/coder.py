@@ -311,6 +311,10 @@ class Writer:
             streams = [code(np.ascontiguousarray(limb, np.int32)) for limb in limbs]
         return varint(len(streams)) + b"".join(varint(len(stream)) + stream for stream in streams), integers
 
+    def bits(self, bits: np.ndarray) -> np.ndarray:
+        """Bits, one per byte, packed and not compressed."""
+        return self._add(varint(len(bits)) + np.packbits(bits).tobytes(), bits)
+
     def hierarchy(self, hierarchy: Hierarchy) -> Hierarchy:
         branches = np.zeros(hierarchy.branch_count, BRANCH)
         branches["parent"], branches["count"] = hierarchy.branch_parent, hierarchy.stem_count
@@ -329,7 +333,7 @@ class Echo:
     def _next(self):
         return next(self._values)
 
-    count = single = rows = table = hierarchy = _next
+    count = single = rows = table = bits = hierarchy = _next
 
 
 class Reader:
@@ -365,6 +369,10 @@ class Reader:
             for limb in range(self.count()):
                 result += decode(self.take(self.count())).astype(np.int64) << limb * LOW_BITS
         return result
+
+    def bits(self) -> np.ndarray:
+        count = self.count()
+        return np.unpackbits(np.frombuffer(self.take(-(-count // 8)), np.uint8), count=count)
 
     def hierarchy(self) -> Hierarchy:
         branch_count, vertex_count = self.count(), self.count()

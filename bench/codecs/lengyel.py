@@ -21,6 +21,7 @@ from bench.codecs.pca import GRID, Trajectories, cosines, grid_of, principal, re
 from bench.codecs.tree import VertexOrder, memo, ordered, read_order, read_pose, vertex_order, write_order, write_pose
 
 LEAST_EXTENT = 1e-3  # of the part's largest; flatter directions are not stretched
+DEEPEST = 5  # branches with parts of their own
 REGULARISATION = 1e-3  # towards no rotation, which determines the twist of straight parts
 
 
@@ -28,7 +29,7 @@ class Lengyel(Baseline):
     title = "moving frames + PCA (Lengyel)"
 
     def grid(self, source: Source, bound: float) -> dict[str, Ladder | Choice]:
-        depths = tuple(range(min(3, int(source.hierarchy.branch_depth.max())) + 1))
+        depths = tuple(range(min(DEEPEST, int(source.hierarchy.branch_depth.max())) + 1))
         return grid_of(
             "rigid joint depth step learned keep_tracks tracks keep basis pose_of differences dead_zone pose first",
             rigid=Choice((0, 1)),
@@ -181,9 +182,13 @@ class Parts:
         shifts = (centre - self.centre[:, :, None]) * np.sqrt(self.sizes)[:, None, None]
         return np.stack([shifts, turns * self._lever()], axis=1)
 
-    def place_rigid(self, tracks: np.ndarray) -> np.ndarray:
+    def rigid_maps(self, tracks: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Where the centres are, (parts, 3, T), and turns about them, (parts, T, 3, 3)."""
         centre = self.centre[:, :, None] + tracks[:, 0] / np.sqrt(self.sizes)[:, None, None]
-        rotation = _rotations(np.moveaxis(tracks[:, 1] / self._lever(), 1, 2))  # (parts, T, 3, 3)
+        return centre, _rotations(np.moveaxis(tracks[:, 1] / self._lever(), 1, 2))
+
+    def place_rigid(self, tracks: np.ndarray) -> np.ndarray:
+        centre, rotation = self.rigid_maps(tracks)
         rotation = np.ascontiguousarray(np.moveaxis(rotation, 1, 3))
         positions = centre[self.of_vertex]
         for i in range(3):
@@ -204,7 +209,7 @@ def _rotation_vectors(rotation: np.ndarray) -> np.ndarray:
     """(parts, T, 3) of (parts, T, 3, 3), each the one nearest to that of the frame before (which half turns
     need).
     """
-    quaternion = _quaternions(rotation)
+    quaternion = quaternions(rotation)
     for t in range(1, quaternion.shape[1]):
         opposite = (quaternion[:, t] * quaternion[:, t - 1]).sum(axis=-1) < 0
         quaternion[opposite, t] *= -1
@@ -213,7 +218,7 @@ def _rotation_vectors(rotation: np.ndarray) -> np.ndarray:
     return quaternion[..., 1:] * np.where(sine > 1e-12, angle / np.maximum(sine, 1e-12), 2.0)[..., None]
 
 
-def _quaternions(rotation: np.ndarray) -> np.ndarray:
+def quaternions(rotation: np.ndarray) -> np.ndarray:
     """(..., 4), scalar first and positive: the eigenvector of the largest eigenvalue."""
     m = rotation
     trace = np.trace(m, axis1=-2, axis2=-1)

@@ -24,7 +24,7 @@ from functools import cache
 
 import numpy as np
 
-from bench.codecs import Source
+from bench.codecs import Source, blocks
 from bench.codecs.baseline import Baseline, Choice, Ladder, Settings, Split, quantised
 from bench.codecs.coder import Reader, Writer
 from bench.codecs.tree import (
@@ -107,20 +107,19 @@ def principal(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return np.sqrt(np.maximum(values[::-1][:count], 0)), np.ascontiguousarray(vectors[:, ::-1][:, :count].T)
 
 
-def mean_motion(source: Source, order: VertexOrder) -> tuple[np.ndarray, np.ndarray]:
-    """(N, 3) mean of each vertex and (N, 3, T) motion about it."""
+def mean_of(source: Source, order: VertexOrder) -> np.ndarray:
+    """(N, 3) mean of each vertex."""
+    return memo(source, ("mean", order.hierarchy is not None), lambda: ordered(source, order).mean(axis=2))
 
-    def make() -> tuple[np.ndarray, np.ndarray]:
-        positions = ordered(source, order)
-        mean = positions.mean(axis=2)
-        return mean, positions - mean[:, :, None]
 
-    return memo(source, ("motion", order.hierarchy is not None), make)
+def mean_motion(source: Source, order: VertexOrder) -> np.ndarray:
+    """(N, 3, T) motion about the mean."""
+    return ordered(source, order) - mean_of(source, order)[:, :, None]
 
 
 def source_basis(source: Source, order: VertexOrder, trajectories: Trajectories) -> tuple[np.ndarray, np.ndarray]:
     return memo(
-        source, ("principal", trajectories.joint), lambda: principal(trajectories.rows(mean_motion(source, order)[1]))
+        source, ("principal", trajectories.joint), lambda: principal(trajectories.rows(mean_motion(source, order)))
     )
 
 
@@ -200,13 +199,17 @@ def write_coefficients(
     <= most.
     """
     q = q.reshape(len(order.source), -1, q.shape[1])
-    options = [differences(q, order, degree) for degree in range(most + 1)]
-    costs = [np.log2(1 + np.abs(option)).sum(axis=(0, 1)) for option in options]
+    costs = np.array([_cost(differences(q, order, degree)) for degree in range(most + 1)])
     degrees = writer.table(np.argmin(costs, axis=0)[None])[0]
     chosen = np.empty_like(q)
-    for degree, option in enumerate(options):
-        chosen[:, :, degrees == degree] = option[:, :, degrees == degree]
+    for degree in np.unique(degrees):
+        chosen[:, :, degrees == degree] = differences(q[:, :, degrees == degree], order, degree)
     writer.rows(trajectories.to_axes(chosen.reshape(-1, q.shape[2])))
+
+
+def _cost(q: np.ndarray) -> np.ndarray:
+    """About the bits of each component."""
+    return sum(np.log2(1 + np.abs(q[some])).sum(axis=(0, 1)) for some in blocks(q))
 
 
 def read_coefficients(reader: Reader, order: VertexOrder, trajectories: Trajectories) -> np.ndarray:
@@ -290,11 +293,11 @@ def write_front(
     """Order, kind of trajectories, mean pose (N, 3), motion about that pose (N, 3, T), and step."""
     order = vertex_order(source, settings.get("order", "hierarchy"))
     write_order(writer, order)
-    mean, motion = mean_motion(source, order)
-    frames = writer.count(motion.shape[2])
+    positions = ordered(source, order)
+    frames = writer.count(positions.shape[2])
     trajectories = Trajectories(bool(writer.count(settings["joint"])), frames)
-    pose = write_pose(writer, order, mean, settings["pose"] * bound)
-    return order, trajectories, pose, motion + (mean - pose)[:, :, None], writer.single(settings["step"] * bound)
+    pose = write_pose(writer, order, mean_of(source, order), settings["pose"] * bound)
+    return order, trajectories, pose, positions - pose[:, :, None], writer.single(settings["step"] * bound)
 
 
 def read_front(reader: Reader) -> tuple[VertexOrder, Trajectories, np.ndarray, float]:
@@ -334,7 +337,7 @@ class PredictedPca(GlobalPca):
 
 class ClusteredPca(Baseline):
     title = "clustered PCA (Sattler)"
-    counts = (1, 2, 4, 8, 16, 24, 32, 48, 64, 96)
+    counts = (1, 2, 4, 8, 16, 24, 32, 48, 64, 96, 128, 192)
     rank = 8  # of the bases that define the clusters
     turns = 8
 
@@ -366,7 +369,7 @@ class ClusteredPca(Baseline):
         """Cluster of each vertex (N,), and the spectrum of each cluster."""
 
         def make():
-            motion = mean_motion(source, order)[1]
+            motion = mean_motion(source, order)
             groups = self._lloyd(trajectories.rows(motion), count, 1 if trajectories.joint else 3, len(motion))
             spectra = [principal(trajectories.rows(motion[groups == group])) for group in range(groups.max() + 1)]
             return groups, spectra

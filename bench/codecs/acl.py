@@ -1,0 +1,274 @@
+"""Baseline: tracks of a skeleton with bit rates of their own, as games store animation.
+
+Frechette, "Animation Compression Library" (ACL, 2017 and later): every bone has a track of rotations and one of
+translations against its parent; segments of 16 frames have a range each, and the fewest bits per number, from none to
+19, that keep the error at the bone's skin. Numbers are packed without entropy coding. A second tier, with every other
+frame, may come later; without it those frames are interpolated.
+
+Bones are runs of vertices along the branches, a leaf being one; two neighbours on a branch share the skin between them
+by linear weights. All that a rigger would do is done by least squares, and kinder than ACL: a bone turns about the
+point that stays nearest to its parent, tracks follow the decoded parent, so errors do not add up, and ranges are
+entropy coded. What a skeleton cannot follow is corrected as in all baselines.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from athcodec.hierarchy import Hierarchy
+from bench.codecs import Source
+from bench.codecs.baseline import Baseline, Choice, Ladder, Settings
+from bench.codecs.coder import EntropyCoder, Reader, Writer
+from bench.codecs.lengyel import Parts, quaternions
+from bench.codecs.pca import GRID
+from bench.codecs.tree import VertexOrder, memo, ordered, read_order, read_pose, vertex_order, write_order, write_pose
+
+SEGMENT = 16  # frames
+MOST_BITS = 19
+RANGE_STEPS = 8  # of a range's ends, in the error of a number
+HELD = 1e-4  # how much a hinge is drawn to the bone's middle, over what the motion says
+BLOCK = 1024  # vertices
+
+Follow = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
+
+
+class SkeletalTracks(Baseline):
+    title = "skeletal tracks (ACL)"
+
+    def __init__(self, coder: EntropyCoder, tiers: int = 2):
+        super().__init__(coder)
+        self.tiers = tiers  # that are read
+
+    def grid(self, source: Source, bound: float) -> dict[str, Ladder | Choice]:
+        return {
+            "step": Ladder.geometric(0.25, 16, 2.0),
+            "bone": Ladder((6, 12, 24, 48, 96, 192, 384), 2),
+            "blend": Choice((1, 0)),
+            "pose_of": Choice(("rest", "mean")),
+            "pose": GRID["pose"].starting_at(0.25),
+        }
+
+    def write(self, writer: Writer, source: Source, bound: float, settings: Settings) -> VertexOrder:
+        order = vertex_order(source, "hierarchy")
+        write_order(writer, order)
+        positions = ordered(source, order)
+        frames = writer.count(positions.shape[2])
+        pose = positions.mean(axis=2) if settings["pose_of"] == "mean" else source.rest[order.source].astype(np.float64)
+        pose = write_pose(writer, order, pose, settings["pose"] * bound)
+        bones = Bones(order.hierarchy, writer.count(settings["bone"]), pose)
+        writer.count(settings["blend"])
+        key = ("bones", settings["bone"], settings["pose_of"], settings["pose"] * bound)
+        turns, shifts, hinges = memo(source, key, lambda: bones.fitted(positions))
+        step = writer.single(settings["step"] * bound)
+        hinges = writer.table(np.rint((hinges - bones.parts.centre) / step)) * step + bones.parts.centre
+        tracks = [_Track(step / (2 * bones.radius), frames), _Track(np.full(bones.count, step), frames)]
+
+        def coded(some: np.ndarray, turn: np.ndarray, at: np.ndarray) -> np.ndarray:
+            wanted = np.swapaxes(turn, 2, 3) @ turns[some]
+            target = _moved(turns[some], shifts[some], hinges[some])
+            offset = (np.swapaxes(turn, 2, 3) @ (target - at)[..., None])[..., 0]
+            quaternion = quaternions(wanted)[..., 1:]
+            return np.stack([track.write(some, x) for track, x in zip(tracks, (quaternion, offset), strict=True)])
+
+        bones.follow(hinges, frames, coded)
+        for track in tracks:
+            for table in track.ranges():
+                writer.table(table)
+        for tier in (0, 1):
+            writer.bits(np.concatenate([track.bits(tier) for track in tracks]))
+        return order
+
+    def read(self, reader: Reader) -> tuple[np.ndarray, VertexOrder]:
+        order, frames = read_order(reader), reader.count()
+        pose = read_pose(reader, order)
+        bones, blend, step = Bones(order.hierarchy, reader.count(), pose), reader.count(), reader.single()
+        hinges = reader.table() * step + bones.parts.centre
+        tracks = [_Track(step / (2 * bones.radius), frames), _Track(np.full(bones.count, step), frames)]
+        for track in tracks:
+            track.set_ranges(reader.table(), reader.table())
+        for tier in range(self.tiers):
+            bits, at = reader.bits(), 0
+            for track in tracks:
+                at = track.set_bits(tier, bits, at)
+        values = [track.values() if self.tiers == 2 else track.between() for track in tracks]
+        turns, shifts = bones.follow(hinges, frames, lambda some, turn, at: np.stack([x[some] for x in values]))
+        return bones.skin(turns, shifts, bool(blend)), order
+
+
+@dataclass(eq=False)
+class _Track:
+    """Three numbers of every bone and frame within `error` (bones,) each, in segments with ranges of their own."""
+
+    error: np.ndarray
+    frames: int
+
+    def __post_init__(self) -> None:
+        self.unit = self.error / np.sqrt(3) / RANGE_STEPS
+        segments = -(-self.frames // SEGMENT)
+        self.low, self.extent = (np.zeros((len(self.error), segments, 3), np.int64) for _ in range(2))
+        self.codes = np.zeros((len(self.error), segments, SEGMENT, 3), np.int64)
+
+    def write(self, some: np.ndarray, numbers: np.ndarray) -> np.ndarray:
+        """Codes numbers (M, T, 3) of some bones; returns what a reader gets."""
+        padded = np.pad(numbers, ((0, 0), (0, -self.frames % SEGMENT), (0, 0)), "edge")
+        padded = padded.reshape(len(some), -1, SEGMENT, 3) / self.unit[some, None, None, None]
+        self.low[some] = np.floor(padded.min(axis=2))
+        self.extent[some] = np.ceil(padded.max(axis=2)) - self.low[some]
+        share = (padded - self.low[some][:, :, None]) / np.maximum(self.extent[some], 1)[:, :, None]
+        self.codes[some] = np.rint(share * ((1 << self._rates(some)) - 1)[:, :, None, None])
+        return self.values(some)
+
+    def _rates(self, some: np.ndarray | slice) -> np.ndarray:
+        """(M, segments) bits of a number: its steps are at most two errors apart."""
+        steps = self.extent[some].max(axis=2) / (2 * RANGE_STEPS)
+        return np.where(steps <= 1, 0, np.minimum(np.ceil(np.log2(1 + steps)), MOST_BITS)).astype(np.int64)
+
+    def values(self, some: np.ndarray | slice = slice(None)) -> np.ndarray:
+        """(M, T, 3)"""
+        most = ((1 << self._rates(some)) - 1)[:, :, None, None]
+        share = np.where(most > 0, self.codes[some] / np.maximum(most, 1), 0.5)
+        numbers = (self.low[some][:, :, None] + share * self.extent[some][:, :, None]) * self.unit[
+            some, None, None, None
+        ]
+        return numbers.reshape(len(numbers), -1, 3)[:, : self.frames]
+
+    def between(self) -> np.ndarray:
+        """(M, T, 3) with frames of odd numbers from those beside them."""
+        numbers = self.values()
+        last = self.frames - 1 & ~1
+        numbers[:, 1:last:2] = (numbers[:, :last:2] + numbers[:, 2 : last + 1 : 2]) / 2
+        numbers[:, last + 1 :] = numbers[:, last : last + 1]
+        return numbers
+
+    def ranges(self) -> list[np.ndarray]:
+        """Two tables, one row per bone."""
+        low = np.diff(self.low, axis=1, prepend=0)
+        return [table.reshape(len(table), -1) for table in (low, self.extent)]
+
+    def set_ranges(self, low: np.ndarray, extent: np.ndarray) -> None:
+        self.low, self.extent = np.cumsum(low.reshape(self.low.shape), axis=1), extent.reshape(self.low.shape)
+
+    def _layout(self, tier: int) -> tuple[np.ndarray, np.ndarray]:
+        """Bits of each number of a tier, in order, and where they begin."""
+        rates = self._rates(slice(None))[:, :, None, None]
+        rates = np.broadcast_to(rates, (*rates.shape[:2], SEGMENT // 2, 3)).ravel()
+        return rates, np.cumsum(rates) - rates
+
+    def bits(self, tier: int) -> np.ndarray:
+        """Bits, one per byte, of the frames of even (0) or odd (1) number."""
+        (rates, begin), codes = self._layout(tier), self.codes[:, :, tier::2].ravel()
+        bits = np.zeros(rates.sum(), np.uint8)
+        for bit in range(rates.max(initial=0)):
+            has = rates > bit
+            bits[begin[has] + bit] = codes[has] >> bit & 1
+        return bits
+
+    def set_bits(self, tier: int, bits: np.ndarray, at: int) -> int:
+        rates, begin = self._layout(tier)
+        codes = np.zeros(len(rates), np.int64)
+        for bit in range(rates.max(initial=0)):
+            has = rates > bit
+            codes[has] |= bits[at + begin[has] + bit].astype(np.int64) << bit
+        shape = self.codes[:, :, tier::2].shape
+        self.codes[:, :, tier::2] = codes.reshape(shape)
+        return at + int(rates.sum())
+
+
+class Bones:
+    """Runs of at most `size` vertices along the branches, each but those of roots on a parent with a lower number."""
+
+    def __init__(self, hierarchy: Hierarchy, size: int, pose: np.ndarray):
+        branch = hierarchy.vertex_branch()
+        self.place = np.arange(len(branch)) - hierarchy.first_vertex[branch]
+        count = np.maximum(1, np.rint(hierarchy.stem_count / size).astype(int))  # bones of a branch
+        first = np.cumsum(count) - count
+        self.length = (hierarchy.stem_count / count)[branch]  # vertices of a bone
+        self.of_vertex = first[branch] + np.minimum(self.place / self.length, count[branch] - 1).astype(int)
+        self.branch, self.pose, self.count = np.repeat(np.arange(len(count)), count), pose, int(count.sum())
+        self.parts = Parts(self.of_vertex, pose)
+        self.parent = np.arange(self.count) - 1
+        self.parent[first] = np.where(hierarchy.attach < 0, -1, self.of_vertex[hierarchy.attach])
+
+    @property
+    def radius(self) -> np.ndarray:
+        """(bones,) farthest vertex from the middle."""
+        far = np.linalg.norm(self.parts.around, axis=1)
+        radius = np.zeros(self.count)
+        np.maximum.at(radius, self.of_vertex, far)
+        return np.maximum(2 * radius, 1e-9)  # a hinge is at an end
+
+    def generations(self) -> Iterator[np.ndarray]:
+        depth = np.zeros(self.count, int)
+        for bone, parent in enumerate(self.parent.tolist()):
+            depth[bone] = depth[parent] + 1 if parent >= 0 else 0
+        yield from np.split(np.argsort(depth, kind="stable"), np.cumsum(np.bincount(depth))[:-1])
+
+    def fitted(self, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Turns (bones, T, 3, 3) and shifts (bones, T, 3) of the pose, and hinges (bones, 3) in it."""
+        centre, turns = self.parts.rigid_maps(self.parts.fit_rigid(positions))
+        shifts = np.moveaxis(centre, 1, 2) - (turns @ self.parts.centre[:, None, :, None])[..., 0]
+        hinges = self.parts.centre.copy()
+        for some in np.array_split(np.arange(self.count), -(-self.count // BLOCK)):
+            below = self.parent[some]
+            root = (below < 0)[:, None, None]
+            apart = turns[some] - np.where(root[..., None], np.eye(3), turns[below])
+            drift = shifts[some] - np.where(root, 0.0, shifts[below])
+            normal = np.einsum("ntki,ntkj->nij", apart, apart)
+            held = (HELD * np.trace(normal, axis1=1, axis2=2) + 1e-12)[:, None]
+            middle = self.parts.centre[some]
+            wanted = held * middle - np.einsum("ntki,ntk->ni", apart, drift)
+            hinges[some] = np.linalg.solve(normal + held[..., None] * np.eye(3), wanted[..., None])[..., 0]
+        return turns, shifts, hinges
+
+    def follow(self, hinges: np.ndarray, frames: int, tracks: Follow) -> tuple[np.ndarray, np.ndarray]:
+        """Turns and shifts, parents first. tracks(bones, turns of the parents, where these take the hinges) gives
+        vectors of quaternions and offsets, (2, M, T, 3).
+        """
+        turns, shifts = np.empty((self.count, frames, 3, 3)), np.empty((self.count, frames, 3))
+        for some in self.generations():
+            below = self.parent[some]
+            turn, at = turns[below], _moved(turns[below], shifts[below], hinges[some])
+            if below[0] < 0:
+                turn, at = np.broadcast_to(np.eye(3), turn.shape), np.broadcast_to(hinges[some][:, None], at.shape)
+            vector, offset = tracks(some, turn, at)
+            turns[some] = turn @ _turns(vector)
+            shifts[some] = at + (turn @ offset[..., None])[..., 0] - _moved(turns[some], 0.0, hinges[some])
+        return turns, shifts
+
+    def skin(self, turns: np.ndarray, shifts: np.ndarray, blend: bool) -> np.ndarray:
+        """(N, 3, T) vertices under the maps of their own bone and of the nearest other one of the branch."""
+        along = (self.place - self._first_place()[self.of_vertex] + 0.5) / self.length - 0.5
+        other = np.clip(self.of_vertex + np.where(along < 0, -1, 1), 0, self.count - 1)
+        weight = np.abs(along) * blend * (self.branch[other] == self.branch[self.of_vertex])
+        positions = np.empty((len(self.pose), 3, turns.shape[1]))
+        for start in range(0, len(self.pose), BLOCK):
+            some = slice(start, start + BLOCK)
+            w, pose = weight[some, None, None], self.pose[some]
+            moved = _moved(turns[self.of_vertex[some]], shifts[self.of_vertex[some]], pose)
+            if w.any():
+                moved = (1 - w) * moved + w * _moved(turns[other[some]], shifts[other[some]], pose)
+            positions[some] = np.moveaxis(moved, 1, 2)
+        return positions
+
+    def _first_place(self) -> np.ndarray:
+        """(bones,) place of the first vertex on the branch."""
+        return self.place[np.unique(self.of_vertex, return_index=True)[1]]
+
+
+def _moved(turns: np.ndarray, shifts: np.ndarray | float, points: np.ndarray) -> np.ndarray:
+    """(M, T, 3) points (M, 3) under maps."""
+    return (turns @ points[:, None, :, None])[..., 0] + shifts
+
+
+def _turns(vector: np.ndarray) -> np.ndarray:
+    """(..., 3, 3) of the vector parts of unit quaternions with positive scalars."""
+    square = (vector**2).sum(axis=-1, keepdims=True)
+    vector = vector / np.sqrt(np.maximum(square, 1.0))
+    w = np.sqrt(np.maximum(1 - square, 0.0))[..., None]
+    cross = np.zeros((*vector.shape, 3))
+    cross[..., 0, 1], cross[..., 0, 2], cross[..., 1, 2] = -vector[..., 2], vector[..., 1], -vector[..., 0]
+    cross -= np.swapaxes(cross, -1, -2)
+    return np.eye(3) + 2 * w * cross + 2 * (cross @ cross)
