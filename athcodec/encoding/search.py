@@ -93,8 +93,8 @@ def typical_segments(source: Source) -> list[tuple[int, int]]:
     """Those that `samples_of` takes, and how many frames of the file each stands for."""
     middles = [start + len(own) // 2 for start, own in zip(source.clip_range_starts, source.clip_range_segments)]
     if len(middles) == 1:
-        return [(middles[0], source.clip.frame_count)]
-    lengths = np.array([own[-1][1] - own[0][0] for own in source.clip_range_segments])
+        return [(middles[0], source.coded_frames)]
+    lengths = np.array([(~source.repeats[own[0][0] : own[-1][1]]).sum() for own in source.clip_range_segments])
     groups = np.array_split(
         np.argsort([_moved(source, segment) for segment in middles], kind="stable"), min(SAMPLES, len(middles))
     )
@@ -181,7 +181,7 @@ def _rigid(source: Source, bound: float, samples: Sequence[SegmentSample], ratio
 def still_settings(source: Source, ath: Ath, bound: float) -> Settings:
     """Of a clip all of whose frames are the rest pose: no motion, a rest pose of the bound's precision."""
     step = STILL_STEP * source.smallest_bound(bound)
-    settings = first_settings(source, ath, bound, [SegmentSample(source.positions(0), source.clip.frame_count)])
+    settings = first_settings(source, ath, bound, [SegmentSample(source.positions(0), source.coded_frames)])
     slack = float(np.min(settings.limit)) - float(np.spacing(source.largest_number))
     settings = with_rest_slack(source, ath, settings, max(slack, 0.5 * source.smallest_bound(bound)))
     return replace(
@@ -777,7 +777,7 @@ class Search:
         prelude, errors = self.prelude(settings), self._level_errors(settings.bound)
         segment = self._analysed(settings, len(self.samples) // 2, self.learned_modes(prelude.plan, settings))
         rest = self.cost(settings)[1].sum() + self._prelude_bytes(prelude)
-        scale = self.source.clip.frame_count / self.sample.shape[2]
+        scale = self.source.coded_frames / self.sample.shape[2]
         allowed = max(qz.NODE_BYTES, qz.NODE_SHARE / (1 - qz.NODE_SHARE) * rest)
         roots = int((self.source.hierarchy.branch_parent < 0).sum())
         chosen = limits = None
