@@ -778,13 +778,12 @@ class Search:
         segment = self._analysed(settings, len(self.samples) // 2, self.learned_modes(prelude.plan, settings))
         rest = self.cost(settings)[1].sum() + self._prelude_bytes(prelude)
         scale = self.source.coded_frames / self.sample.shape[2]
-        allowed = max(qz.NODE_BYTES, qz.NODE_SHARE / (1 - qz.NODE_SHARE) * rest)
-        roots = int((self.source.hierarchy.branch_parent < 0).sum())
+        least = qz.NODE_BYTES if self._layered else min(qz.NODE_BYTES, qz.SMALL_NODE_SHARE * rest)
+        allowed = max(least, qz.NODE_SHARE / (1 - qz.NODE_SHARE) * rest)
+        qualities = self._node_qualities()
         chosen = limits = None
-        for quality in qz.NODE_QUALITIES:
+        for quality in qualities:
             steps = quality * errors
-            if roots <= qz.FEW_ROOTS:
-                steps[0] = qz.ROOT_QUALITY * errors[0]
             segment.clear_nodes()
             segment.analyse_nodes(self.sample, steps, qz.DEAD_ZONE)
             if limits is None:
@@ -792,7 +791,7 @@ class Search:
                     len(streams.encode_affines(segment, level)) * self.extrapolation.nodes[level]
                     for level in self._map_levels(prelude.plan)
                 )
-                if size * scale > allowed and quality < qz.NODE_QUALITIES[-1]:
+                if size * scale > allowed and quality is not qualities[-1]:
                     continue
                 chosen, limits = steps, self._errors_of_maps(prelude, segment)
                 limits[1:] = np.minimum(qz.NODE_ERROR_TOLERANCE * limits[1:], limits[:-1])  # deeper levels stay better
@@ -801,6 +800,15 @@ class Search:
             else:
                 break
         return replace(settings, node_steps=chosen)
+
+    def _node_qualities(self) -> list[np.ndarray]:
+        """(levels,) each, from fine to coarse; that of a few roots is another and rises last."""
+        qualities = [np.full(self.levels, quality) for quality in qz.NODE_QUALITIES]
+        if (self.source.hierarchy.branch_parent < 0).sum() > qz.FEW_ROOTS:
+            return qualities
+        coarsest = qualities[-1:] * (len(qz.ROOT_QUALITIES) - 1)
+        roots = [qz.ROOT_QUALITIES[0]] * len(qualities) + [*qz.ROOT_QUALITIES[1:]]
+        return [np.append(root, quality[1:]) for root, quality in zip(roots, qualities + coarsest)]
 
     def _map_levels(self, plan: Plan) -> list[int]:
         return [level for level in range(self.levels) if plan.has_affines(level)]
