@@ -9,7 +9,7 @@ elsewhere.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -389,6 +389,8 @@ class Survey:
         The surveyed one; None where lam was 0.
     most_beyond_xi : (C,) integer array or None
         The most vertices beyond xi in a frame (LAD); None where lam was 0.
+    repeats : (T,) bool array
+        Whether each frame is the one before it, bit for bit.
     """
 
     hierarchy: Hierarchy
@@ -403,6 +405,7 @@ class Survey:
     largest_distance: np.ndarray
     xi: float | None
     most_beyond_xi: np.ndarray | None
+    repeats: np.ndarray
 
     @property
     def diagonal(self) -> float:
@@ -512,7 +515,9 @@ def survey(
         return _Extent.of(frames, rest), _Differences.of(_seen_from(pieces.origin, frames), pieces, xi)
 
     extent, differences, gads = None, None, _Largest(limits.eta + 1)
-    for where, how in pool.ordered(measured, _portions(clip, hierarchy.vertex_count), 2 * pool.jobs):
+    repeats: list[bool] = []
+    portions = _noting_repeats(_portions(clip, hierarchy.vertex_count), repeats)
+    for where, how in pool.ordered(measured, portions, 2 * pool.jobs):
         extent, differences = (where, how) if extent is None else (extent | where, differences | how)
         gads.add(how.gads)
         if progress is not None:
@@ -531,6 +536,7 @@ def survey(
         largest_distance=differences.largest_distance,
         xi=xi,
         most_beyond_xi=None if xi is None else differences.most_beyond_xi,
+        repeats=np.array(repeats),
     )
 
 
@@ -719,6 +725,21 @@ def _portions(positions: MotionClip | np.ndarray, vertex_count: int) -> Iterator
     for block in _blocks(positions, vertex_count):
         for start in range(0, len(block), at_once):
             yield block[start : start + at_once]
+
+
+def _noting_repeats(portions: Iterable[np.ndarray], repeats: list[bool]) -> Iterator[np.ndarray]:
+    """The portions; as they pass, notes of each frame whether it has the bits of the one before it."""
+    before = None
+    for portion in portions:
+        for frame in portion:
+            repeats.append(before is not None and _same_bits(frame, before))
+            before = frame
+        yield portion
+
+
+def _same_bits(one: np.ndarray, other: np.ndarray) -> bool:
+    last = one[-1].tobytes() == other[-1].tobytes()  # mostly says it all
+    return last and np.ascontiguousarray(one).tobytes() == np.ascontiguousarray(other).tobytes()
 
 
 def _in_file_order(portion: np.ndarray, hierarchy: Hierarchy) -> np.ndarray:

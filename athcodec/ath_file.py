@@ -341,8 +341,9 @@ class AthFile:
     @property
     def header(self) -> ct.Header:
         """The fixed header."""
-        counts = [field.name for field in fields(ct.Header) if field.name != "joins"]
-        return ct.Header(**{name: getattr(self.core.info, name) for name in counts}, joins=self.core.joins())
+        counts = [field.name for field in fields(ct.Header) if field.name not in ("joins", "repeats")]
+        values = {name: getattr(self.core.info, name) for name in counts}
+        return ct.Header(**values, joins=self.core.joins(), repeats=self.core.repeats())
 
     @property
     def vertex_count(self) -> int:

@@ -57,8 +57,9 @@ KIND_NAMES = {
 
 _HEADER = struct.Struct("<8sHHIII")
 _CHECKSUM = struct.Struct("<I")
-_FRONT_BYTES, _FRONT_BYTES_OF_EACH = 512, 128
-"""Space for the front stream, of each chunk and each entry of the error table too: more than it ever takes."""
+_FRONT_BYTES, _FRONT_BYTES_OF_EACH, _FRONT_BYTES_OF_FRAME = 512, 128, 2
+"""Space for the front stream, of each chunk, each entry of the error table and each frame too: more than it ever takes.
+"""
 
 
 @dataclass(frozen=True)
@@ -113,6 +114,7 @@ class Header:
     chunk_count: int = 0
     file_length: int = 0
     joins: np.ndarray | None = field(default=None, compare=False)  # (levels, segments) uint8; None: all are 0
+    repeats: np.ndarray | None = field(default=None, compare=False)  # (frames,) bool: like the one before; None: none
 
 
 def is_prelude(kind: Any) -> Any:
@@ -171,12 +173,15 @@ def _front_stream(header: Header, chunks: list[Chunk], errors: np.ndarray) -> by
     table = np.zeros(len(chunks), _native.CHUNK)
     for name in ("length", "segment", "kind", "level"):
         table[name] = [getattr(chunk, name) for chunk in chunks]
-    data = np.empty(_FRONT_BYTES + _FRONT_BYTES_OF_EACH * (len(chunks) + errors.size // len(MEASURES)), np.uint8)
+    space = _FRONT_BYTES + _FRONT_BYTES_OF_EACH * (len(chunks) + errors.size // len(MEASURES))
+    data = np.empty(space + _FRONT_BYTES_OF_FRAME * header.frame_count, np.uint8)
     entries = header.level_count * header.segment_count
     announced = address(errors, np.int32, entries * len(MEASURES))
     joins = np.zeros(entries, np.uint8) if header.joins is None else np.ascontiguousarray(header.joins)
     widths = address(joins, np.uint8, entries)
-    size = lib.ath_encode_front(data.ctypes.data, len(data), counts, table.ctypes.data, announced, widths)
+    flags = None if header.repeats is None or not header.repeats.any() else header.repeats.astype(np.uint8)
+    repeats = None if flags is None else address(flags, np.uint8, header.frame_count)
+    size = lib.ath_encode_front(data.ctypes.data, len(data), counts, table.ctypes.data, announced, widths, repeats)
     assert size >= 0, "every front has a stream, and space enough"
     return data[:size].tobytes()
 
@@ -553,11 +558,17 @@ def _array_name(text: bytes, what: str, limits: Limits) -> str:
     return name
 
 
+_PHRASES = (b'{"unit":"', b'","up_axis":"', b'"}', b'","', b'":"', b'":')
+"""What the bytes from 1 on stand for in METADATA that is plain. JSON has no such bytes."""
+
+
 def pack_metadata(metadata: dict) -> bytes:
     """JSON, zstd-compressed where that is shorter. Raises ClipError for what no reader would accept."""
     with _refusals("metadata"):
         text = json.dumps(metadata, separators=(",", ":"), ensure_ascii=False, allow_nan=False).encode()
         shorter = zstandard.ZstdCompressor(level=19, write_content_size=True).compress(text)
+        for code, phrase in enumerate(_PHRASES, 1):
+            text = text.replace(phrase, bytes([code]))
         packed = b"\1" + shorter if len(shorter) < len(text) else b"\0" + text
         parse_metadata(packed, Limits())
     return packed
@@ -578,6 +589,9 @@ def parse_metadata(data: bytes, limits: Limits) -> dict:
         if size > limits.metadata_bytes:
             raise LimitExceeded(f"METADATA: got {size} bytes; the limit is {limits.metadata_bytes}")
         text = zstd_decompress_exact(text, size, "METADATA", limits)
+    elif len(text) <= limits.metadata_bytes:
+        for code, phrase in enumerate(_PHRASES, 1):
+            text = text.replace(bytes([code]), phrase)
     if len(text) > limits.metadata_bytes:
         raise LimitExceeded(f"METADATA: got {len(text)} bytes; the limit is {limits.metadata_bytes}")
     return _parse_json(text, "METADATA")

@@ -337,6 +337,10 @@ class File:
         shape = self.info.level_count, self.info.segment_count
         return self._array(lib.ath_joins(self._file), np.uint8, math.prod(shape)).reshape(shape)
 
+    def repeats(self) -> np.ndarray:
+        """(frames,) bool: whether each frame shows the very positions of the one before."""
+        return self._array(lib.ath_repeats(self._file), np.uint8, self.info.frame_count) > 0
+
     def level_error(self, level: int, segments: range) -> tuple[float, float, float]:
         """Error of a level in these segments by each of MEASURES, scene units."""
         largest, p99, rms = (

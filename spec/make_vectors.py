@@ -1409,6 +1409,11 @@ valid(
     "METADATA as plain text, with white space around it",
     lambda: metadata('\t\r\n {"unit": "m", "up_axis": "y", "more": [1, -0, 2.5e-3, true, false, null]} \n'),
 )
+valid(
+    "metadata-phrases",
+    "all bytes that stand for phrases",
+    lambda: metadata(b'\1m\2y\4part\5leaf\4fps\x0630,"names\x06["a\4b"],"more\x06{"a\5b\3}'),
+)
 valid("metadata-zstd", "METADATA in a zstd frame of compressed blocks", lambda: metadata(WIND_FRAME, 1))
 valid("metadata-empty", "an object without members", lambda: metadata("{}"))
 valid(
@@ -2254,6 +2259,48 @@ valid(
     ),
 )
 
+# ---- valid: repeats ----------------------------------------------------------------------------------------
+
+TWOS, THREES = (0, 1) * 6, (0, 1, 1) * 4
+valid(
+    "repeats",
+    "poses held for one to eleven frames",
+    lambda: moving(FORK, 124, frames=14, repeats=(0, 0, *(0, 1), *(1,) * 9, 0)),
+)
+valid(
+    "repeats-of-one",
+    "all frames are alike, and one is coded",
+    lambda: moving(FORK, 125, frames=12, repeats=(0, *(1,) * 11)),
+)
+valid("repeats-joined", "over all coded frames that may be", lambda: joined(FORK, 126, *(0, 1.5) * 3, repeats=TWOS))
+valid(
+    "repeats-clips",
+    "a periodic loop, and a clip of which a segment has no repeats",
+    lambda: moving(
+        FORK,
+        127,
+        heads=HEADS,
+        clips=(periodic(rd.Clip(6, 1, "loop"), 0.0, 0.0, 0.0), rd.Clip(12, 2, "once")),
+        repeats=(*TWOS, *(0,) * 6),
+    ),
+)
+valid("repeats-layers", "two layers", lambda: refinements(MIXED, 128, frames=12, repeats=THREES))
+valid(
+    "repeats-predicted",
+    "predicted motion",
+    lambda: replace(predicted(ROOTED, swayed(4, 129)), frames=12, repeats=THREES),
+)
+valid(
+    "repeats-lossless",
+    "the source's own numbers",
+    lambda: (
+        moving(FORK, 130, frames=12, repeats=THREES)
+        .draft()
+        .with_header(level_count=4, full_level_count=4)
+        .add(Entry(rd.EXACT, b"", 3, 0))
+    ),
+)
+
 # ---- invalid: tables ---------------------------------------------------------------------------------------
 
 
@@ -2303,6 +2350,18 @@ invalid(
         *(FORK, 121, 2, 0, 0, 0, 0, 0), clips=(loop(rd.Clip(9, 1, "loop"), 0.0, 0.0, 0.0), rd.Clip(3, 1, "once"))
     ).file(),
 )
+for name, reason, widths, repeats in (
+    ("first", "the first frame of the second segment is a repeat", (0, 0), (*(0,) * 6, 1, *(0,) * 5)),
+    ("join-too-long", "a join over as many frames as are coded, less one", (0, 3), (*(0,) * 7, 1, 1, *(0,) * 3)),
+    ("join-to-one", "a segment goes on from one with a single coded frame", (0, 2), (0, *(1,) * 5, *(0,) * 6)),
+):
+    invalid(
+        f"repeats-{name}",
+        "BAD_CHUNK_TABLE",
+        "open",
+        reason,
+        lambda widths=widths, repeats=repeats: joined(FORK, 136, *widths * 3, repeats=repeats).file(),
+    )
 invalid(
     "joins-exact",
     "BAD_CHUNK_TABLE",

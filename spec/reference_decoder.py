@@ -443,9 +443,9 @@ def short_float(stored: int) -> float:
     return from_bits(stored << 18, 32)
 
 
-def read_front(data: bytes, limits: Limits) -> tuple[Header, list[Chunk], list, list]:
-    """Counts, chunk table, [level][segment] (largest, 99th percentile, root mean square) errors, and [level][segment]
-    joins."""
+def read_front(data: bytes, limits: Limits) -> tuple[Header, list[Chunk], list, list, list[int]]:
+    """Counts, chunk table, [level][segment] (largest, 99th percentile, root mean square) errors, [level][segment]
+    joins, and of each frame whether it repeats the one before."""
     check_magic(data)
     front_length, chunk_count = check_lengths(data, limits)
     checksums_at = front_length - CHECKSUM_BYTES * chunk_count
@@ -455,15 +455,15 @@ def read_front(data: bytes, limits: Limits) -> tuple[Header, list[Chunk], list, 
 
 def decode_front(
     stream: bytes, front_length: int, checksums: list[int], limits: Limits
-) -> tuple[Header, list[Chunk], list, list]:
+) -> tuple[Header, list[Chunk], list, list, list[int]]:
     coder = RangeDecoder(stream)
     header = decode_counts(coder, front_length, len(checksums))
     check_counts(header, limits)
     chunks = decode_chunk_table(coder, header, checksums, limits)
     errors = decode_error_table(coder, header)
-    joins = decode_joins(coder, header)
+    joins, repeats = decode_joins(coder, header), decode_repeats(coder, header)
     require(coder.is_finished(), "the front stream is not used up where it should be", "BAD_CHUNK_TABLE")
-    return header, chunks, errors, joins
+    return header, chunks, errors, joins, repeats
 
 
 def check_magic(data: bytes) -> None:
@@ -680,6 +680,20 @@ def decode_joins(coder: RangeDecoder, header: Header) -> list[list[Join]]:
             row.append(last)
         table.append(row)
     return table
+
+
+MOST_SHOWN = 8
+
+
+def decode_repeats(coder: RangeDecoder, header: Header) -> list[int]:
+    repeats, shown, before = [0] * header.frame_count, 1, 1
+    contexts = [[Context(32768) for _ in range(MOST_SHOWN)] for _ in range(MOST_SHOWN)]
+    if not coder.bit(Context(1000)):
+        return repeats
+    for i in range(1, header.frame_count):
+        repeats[i] = coder.bit(contexts[shown - 1][before - 1])
+        shown, before = (min(shown + 1, MOST_SHOWN), before) if repeats[i] else (1, shown)
+    return repeats
 
 
 # ---- hierarchy stream --------------------------------------------------------------------------------------
@@ -3551,10 +3565,16 @@ def array_name(text: bytes, what: str, limits: Limits) -> str:
         raise AthError("BAD_CHUNK", f"{what}: has a name that is not UTF-8") from None
 
 
+PHRASES = (b'{"unit":"', b'","up_axis":"', b'"}', b'","', b'":"', b'":')  # for the bytes from 1 on
+
+
 def parse_metadata(chunk: bytes, limits: Limits) -> bytes:
     """Text of METADATA."""
     require(len(chunk) > 0 and chunk[0] <= 1, "METADATA has an unknown Method")
-    text = chunk[1:] if chunk[0] == 0 else unzstd(chunk[1:], None, "METADATA", limits.metadata_bytes)
+    if chunk[0] == 0:
+        text = b"".join(PHRASES[byte - 1] if 1 <= byte <= len(PHRASES) else bytes([byte]) for byte in chunk[1:])
+    else:
+        text = unzstd(chunk[1:], None, "METADATA", limits.metadata_bytes)
     require(len(text) <= limits.metadata_bytes, "METADATA is too long", "LIMIT_EXCEEDED")
     parse_json(text, "METADATA")
     return text
@@ -3572,14 +3592,16 @@ class AthFile:
 
     def __init__(self, data: bytes, strict: bool = False, limits: Limits | None = None):
         self.data, self.limits = bytes(data), limits or Limits()
-        self.header, self.chunks, self.errors, self.joins = read_front(self.data, self.limits)
+        self.header, self.chunks, self.errors, self.joins, self.repeats = read_front(self.data, self.limits)
         self.file_length = self.chunks[-1].offset + self.chunks[-1].length
         self._places = {(c.kind, c.level, c.segment): c for c in self.chunks if not c.repeatable}
         self._check_length(strict)
         self._check_memory(-(-self.header.frame_count // self.header.segment_count))
         self.clips = self._read_clips()
-        self._segment_lengths = [frames for clip in self.clips for frames in clip.segment_lengths]
-        self._check_memory(max(self._segment_lengths))
+        lengths = [frames for clip in self.clips for frames in clip.segment_lengths]
+        self._check_memory(max(lengths))
+        self._shown_frames = self._read_repeats(lengths)
+        self._segment_lengths = [shown[-1] + 1 for shown in self._shown_frames]  # of frames that are coded
         with np.errstate(all="ignore"):  # infinities and NaN are results like others
             self._read_hierarchy(self.content(HIERARCHY))
             self._check_motion_chunks()
@@ -3624,6 +3646,16 @@ class AthFile:
         if self.header.clip_count == 1 and not self.find(CLIPS):
             return [Clip(self.header.frame_count, self.header.segment_count)]
         return read_clips(self.content(CLIPS), self.header)
+
+    def _read_repeats(self, lengths: list[int]) -> list[list[int]]:
+        """Of each segment which of its coded frames each frame shows."""
+        segments, start = [], 0
+        for frames in lengths:
+            own = self.repeats[start : start + frames]
+            require(not own[0], "the first frame of a segment is a repeat", "BAD_CHUNK_TABLE")
+            segments.append([t - sum(own[: t + 1]) for t in range(frames)])
+            start += frames
+        return segments
 
     def _read_hierarchy(self, chunk: bytes) -> None:
         require(len(chunk) >= 8, "HIERARCHY is too short")
@@ -3678,9 +3710,11 @@ class AthFile:
         levels = 1 if self.header.is_predicted else self.lossy_levels
         for level, row in enumerate(self.joins):
             for s, join in enumerate(row):
+                before = self._segment_before(s)
+                goes_on = before is not None and self._segment_lengths[before] >= 2
                 fits = level < levels and join.width <= self._segment_lengths[s] - 2
                 require(
-                    join.width == 0 or (fits and self._segment_before(s) is not None),
+                    join.width == 0 or (fits and goes_on),
                     f"level {level}, segment {s}: a join of {join.width} frames cannot be",
                     "BAD_CHUNK_TABLE",
                 )
@@ -3841,11 +3875,11 @@ class AthFile:
         if not 0 <= level < self.header.level_count:
             raise ValueError(f"level {level}: the file has 0 to {self.header.level_count - 1}")
         with np.errstate(all="ignore"):
-            segments = [self._segment(s, level) for s in range(self.header.segment_count)]
+            segments = [self._segment(s, level)[..., shown] for s, shown in enumerate(self._shown_frames)]
         return np.ascontiguousarray(self._in_source_order(np.concatenate(segments, axis=2)).transpose(2, 0, 1))
 
     def _segment(self, s: int, level: int) -> np.ndarray:
-        """(vertices, 3, frames) in file order."""
+        """(vertices, 3, frames) in file order, of the frames that are coded."""
         for chunk in self._needed(s, level):
             require(self.is_available(chunk), f"{chunk} has not arrived", "TRUNCATED")
         frames, shown = self._segment_lengths[s], min(level, self.lossy_levels - 1)

@@ -316,6 +316,10 @@ class FrontScript:
                 self.values += [int(join.is_sloped), join.width - last]
                 last = join.width
 
+    def add_repeats(self, repeats: Sequence[int]) -> None:
+        """One of each frame; none: no frame is a repeat."""
+        self.values += [int(any(repeats)), *(repeats[1:] if any(repeats) else ())]
+
 
 def _bits(value: int, count: int) -> list[int]:
     """From the top."""
@@ -330,6 +334,7 @@ class Draft:
     entries: tuple[Entry, ...]
     errors: tuple[int, ...] | None = None  # the error table as stored
     joins: tuple[rd.Join, ...] | None = None  # of each level and segment
+    repeats: tuple[int, ...] = ()  # of each frame
     stream: Callable[[bytes], bytes] | None = None  # what becomes of the front stream
 
     def file(self) -> bytes:
@@ -367,6 +372,7 @@ class Draft:
         if entries <= MOST_ENTRIES:
             script.add_errors((0,) * (3 * entries) if self.errors is None else self.errors)
             script.add_joins((rd.Join(0),) * entries if self.joins is None else self.joins)
+            script.add_repeats(self.repeats)
         stream = write(rd.decode_front, script.values, 0, [0] * len(self.entries), rd.Limits())
         return self.stream(stream) if self.stream else stream
 
@@ -621,6 +627,7 @@ class Plant:
     ratio: int = 4  # of the steps of layers, as STEMS and REFINED_REST have it
     shift: int = 2  # of SHAPES
     joins: tuple[rd.Join, ...] | None = None
+    repeats: tuple[int, ...] = ()  # of each frame, of one clip; none: no frame is one
     predicted: bytes | None = None  # of predicted motion, Step and Settings; then AFFINES are there only with a script
 
     def draft(self) -> Draft:
@@ -662,9 +669,10 @@ class Plant:
                 entries.append(Entry(rd.SHAPES, self._shapes(level), level))
         for q in range(1, self.layers):
             entries += self._layer(branches, q, rests)
-        segments = [(frames, clip.periodic) for clip in clips for frames in clip.segment_lengths]
+        segments, start = [(frames, clip.periodic) for clip in clips for frames in clip.segment_lengths], 0
         for s, (frames, periodic) in enumerate(segments):
-            entries += self._segment(s, frames, periodic)
+            entries += self._segment(s, frames - sum(self.repeats[start : start + frames]), periodic)
+            start += frames
         entries.sort(key=lambda entry: entry.key)
         levels = self.plan.height + 1 + self.layers
         return Draft(
@@ -682,6 +690,7 @@ class Plant:
             ),
             tuple(entries),
             joins=self.joins,
+            repeats=self.repeats,
         )
 
     def file(self) -> bytes:

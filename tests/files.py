@@ -84,7 +84,8 @@ def draft_of(data: bytes) -> Draft:
     entries = tuple(Entry(chunk.kind, payload, chunk.level, chunk.segment) for chunk, payload in parts.chunks)
     counts = {name: getattr(parts.header, name) for name in COUNTS}
     joins = tuple(Join(join % 128, join >= 128) for join in parts.header.joins.ravel().tolist())
-    return Draft(counts, entries, tuple(ct.short_floats(parts.errors).ravel().tolist()), joins)
+    repeats = tuple(parts.header.repeats.astype(int).tolist())
+    return Draft(counts, entries, tuple(ct.short_floats(parts.errors).ravel().tolist()), joins, repeats)
 
 
 def with_header(data: bytes, **fields) -> bytes:

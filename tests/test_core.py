@@ -173,6 +173,7 @@ _SIGNATURES = {
     "ath_follow": (c_int, [c_void_p, c_void_p]),
     "ath_joined_to": (c_int32, [c_void_p, c_int32, c_int32]),
     "ath_joins": (c_void_p, [c_void_p]),
+    "ath_repeats": (c_void_p, [c_void_p]),
     "ath_cut_size": (None, [c_void_p, c_int32, *[POINTER(c_int32)] * 3]),
     "ath_cut": (None, [c_void_p, c_int32, POINTER(Part)]),
     "ath_work_size": (c_size_t, [c_void_p]),

@@ -485,7 +485,7 @@ def some_limits(rng: np.random.Generator) -> Limits:
 def both_readings(data: bytes, limits: Limits) -> str:
     """What a file says of a front, once the reference decoder has said the same."""
     try:
-        header, chunks, announced, joins = reference_front(data, rd.Limits(**vars(limits)))
+        header, chunks, announced, joins, repeats = reference_front(data, rd.Limits(**vars(limits)))
     except rd.AthError as error:
         with pytest.raises(errors.FormatError) as caught:
             AthFile(BytesIO(data), limits=limits)
@@ -498,6 +498,7 @@ def both_readings(data: bytes, limits: Limits) -> str:
     for name in COUNTS:
         assert getattr(file.header, name) == getattr(header, name)
     assert np.array_equal(file.errors, announced)
+    assert file.header.repeats.tolist() == list(map(bool, repeats))
     assert file.joins.tolist() == [[join.width + 128 * join.is_sloped for join in row] for row in joins]
     assert [astuple(chunk)[:6] for chunk in file.chunks] == [
         astuple(chunk) for chunk in chunks if chunk.kind in ct.KIND_NAMES
@@ -505,12 +506,12 @@ def both_readings(data: bytes, limits: Limits) -> str:
     return "opened"
 
 
-def reference_front(data: bytes, limits: rd.Limits) -> tuple[rd.Header, list[rd.Chunk], list, list]:
-    header, chunks, announced, joins = rd.read_front(data, limits)
+def reference_front(data: bytes, limits: rd.Limits) -> tuple[rd.Header, list[rd.Chunk], list, list, list[int]]:
+    header, chunks, announced, joins, repeats = rd.read_front(data, limits)
     end = chunks[-1].offset + chunks[-1].length
     prelude = next((chunk.offset for chunk in chunks if chunk.key[0] > 0), end)
     rd.require(len(data) >= prelude, "ends inside its prelude", "TRUNCATED")
-    return header, chunks, announced, joins
+    return header, chunks, announced, joins, repeats
 
 
 def read_corrupted_fronts(data: bytes, count: int, seed: int) -> set[str]:

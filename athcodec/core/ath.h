@@ -143,6 +143,7 @@ typedef enum ath_field {
     ATH_FIELD_FRONT_CHECKSUM,
     ATH_FIELD_ERROR,         /* an entry of the error table, of this level and segment */
     ATH_FIELD_JOIN,          /* frames that a segment is joined over at a level, of this level and segment */
+    ATH_FIELD_REPEAT,        /* a frame that repeats the one before, and is the first of its segment */
     ATH_FIELD_FRONT,         /* the end of its stream */
     ATH_FIELD_MEMORY,        /* bytes that a segment may take */
     ATH_FIELD_MISSING_CHUNK, /* a chunk that the table lacks: kind, level and segment say which */
@@ -440,6 +441,9 @@ ATH_API int32_t ath_joined_to(const ath_file *file, int32_t segment, int32_t lev
  * segment_count of them. */
 enum { ATH_JOIN_SLOPED = 128 };
 ATH_API const uint8_t *ath_joins(const ath_file *file);
+
+/* Of each frame whether it shows the very positions of the one before, at all levels: such frames take no bytes. */
+ATH_API const uint8_t *ath_repeats(const ath_file *file);
 /* What the error of the preparation is about, and which bytes ATH_MISSING: of _start once it had its memory, of
  * _step. */
 ATH_API void ath_work_fault(const ath_work *work, ath_fault_info *fault);

@@ -272,12 +272,25 @@ static int read_joins(ath_coder *coder, const ath_header *header, uint8_t *joins
             if (joins) *joins++ = (uint8_t)width;
         }
     }
+    return ATH_OK;
+}
+
+static int read_repeats(ath_coder *coder, const ath_header *header, uint8_t *repeats, ath_fault_info *fault)
+{
+    repeat_model model;
+    int has_repeats = code_has_repeats(coder, &model, 0);
+    if (repeats) memset(repeats, 0, header->frame_count);
+    for (uint32_t i = 1; has_repeats && i < header->frame_count; i++) {
+        int repeat = code_repeat(coder, &model, 0);
+        if (repeats) repeats[i] = (uint8_t)repeat;
+    }
     if (coder_finish(coder)) return ATH_OK;
     return ath_refuse(fault, ATH_BAD_CHUNK_TABLE, ATH_FIELD_FRONT, 0, 0, 0);
 }
 
 int ath_read_tables(const uint8_t *bytes, size_t available, const ath_limits *limits, ath_header *header,
-                    uint64_t *needed, ath_chunk *chunks, double *errors, uint8_t *joins, ath_fault_info *fault)
+                    uint64_t *needed, ath_chunk *chunks, double *errors, uint8_t *joins, uint8_t *repeats,
+                    ath_fault_info *fault)
 {
     ath_coder coder;
     const uint8_t *checksums = bytes + (header->front_length - (uint64_t)CHECKSUM_SIZE * header->chunk_count);
@@ -285,6 +298,7 @@ int ath_read_tables(const uint8_t *bytes, size_t available, const ath_limits *li
     int result = read_chunks(&coder, checksums, limits, header, needed, chunks, fault);
     if (result == ATH_OK) result = read_errors(&coder, header, errors, fault);
     if (result == ATH_OK) result = read_joins(&coder, header, joins, fault);
+    if (result == ATH_OK) result = read_repeats(&coder, header, repeats, fault);
     return result != ATH_OK ? result : check_size(available, *needed, ATH_FIELD_PRELUDE_SIZE, fault);
 }
 

@@ -25,9 +25,10 @@ int ath_fault_at(ath_fault_info *fault, const ath_chunk *chunk, int32_t index);
 int ath_read_header(const uint8_t *bytes, size_t available, const ath_limits *limits, ath_header *header,
                     uint64_t *needed, ath_fault_info *fault);
 /* The rest of a front whose header is valid: fills the header's file_length and, unless null, chunk_count chunks, the
- * errors that ath_errors gives, and the joins. */
+ * errors that ath_errors gives, the joins, and of each frame whether it repeats the one before. */
 int ath_read_tables(const uint8_t *bytes, size_t available, const ath_limits *limits, ath_header *header,
-                    uint64_t *needed, ath_chunk *chunks, double *errors, uint8_t *joins, ath_fault_info *fault);
+                    uint64_t *needed, ath_chunk *chunks, double *errors, uint8_t *joins, uint8_t *repeats,
+                    ath_fault_info *fault);
 
 /* Index of the first chunk that does not come before this one in file order. */
 uint32_t ath_first_chunk(const ath_chunk *chunks, uint32_t chunk_count, int32_t kind, int32_t level, uint32_t segment);

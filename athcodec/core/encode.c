@@ -18,11 +18,12 @@ static void copy_pose(const ath_branch *branches, int32_t branch_count, const do
 static int64_t written(ath_coder *coder, int valid) { return valid ? coder_finish(coder) : -2; }
 
 int64_t ath_encode_front(uint8_t *bytes, size_t capacity, const ath_header *header, const ath_chunk *chunks,
-                         const int32_t *errors, const uint8_t *joins)
+                         const int32_t *errors, const uint8_t *joins, const uint8_t *repeats)
 {
     ath_coder coder;
     chunk_model keys;
     join_model widths;
+    repeat_model shown;
     error_model table;
     ath_header counts = *header;
     int32_t first[ATH_MEASURES];
@@ -52,6 +53,8 @@ int64_t ath_encode_front(uint8_t *bytes, size_t capacity, const ath_header *head
     for (int32_t level = 0; header->segment_count > 1 && level < header->level_count; level++)
         for (uint32_t segment = 0; segment < header->segment_count; segment++, joins++)
             valid = valid && code_join(&coder, &widths, segment > 0 ? joins[-1] : -1, *joins) >= 0;
+    code_has_repeats(&coder, &shown, repeats != 0);
+    for (uint32_t i = 1; repeats && i < header->frame_count; i++) code_repeat(&coder, &shown, repeats[i]);
     return written(&coder, valid);
 }
 

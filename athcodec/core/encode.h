@@ -148,9 +148,11 @@ ATH_ENCODER_API void ath_apply_corrections(int32_t frames, int is_float64, void 
                                            const int32_t *corrections, int64_t count);
 
 /* Writers of the streams: the size written, -1 when `capacity` is too small, -2 when the input cannot be expressed. */
-/* errors: of each level and segment ATH_MEASURES stored numbers; joins: one, read where there are several segments. */
+/* errors: of each level and segment ATH_MEASURES stored numbers; joins: one, read where there are several segments;
+ * repeats: one of each frame, or null. */
 ATH_ENCODER_API int64_t ath_encode_front(uint8_t *bytes, size_t capacity, const ath_header *header,
-                                         const ath_chunk *chunks, const int32_t *errors, const uint8_t *joins);
+                                         const ath_chunk *chunks, const int32_t *errors, const uint8_t *joins,
+                                         const uint8_t *repeats);
 ATH_ENCODER_API int64_t ath_encode_hierarchy(void *model, uint8_t *bytes, size_t capacity, const ath_branch *branches,
                                              int32_t branch_count, int32_t vertex_count, const int32_t *branch_source,
                                              const int32_t *vertex_source);

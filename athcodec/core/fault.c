@@ -166,6 +166,7 @@ static const char *const sentences[] = {
     "front: got checksum %f%a",
     "error table: got an entry%l that is out of range; expected a finite length",
     "front: got a join%l that cannot be; expected at most its frames less two, to a segment before it",
+    "front: got a frame %f that repeats the one before its segment; expected repeats within segments",
     "front: got a stream that does not decode; expected a valid one",
     "header: got a need of %f bytes of memory%a",
     "chunk table: got no %k; expected one",

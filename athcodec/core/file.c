@@ -55,6 +55,8 @@ static uint64_t carve(ath_file *file, const ath_header *header, uint8_t *base)
     file->chunks = (ath_chunk *)ath_take(&arena, (uint64_t)header->chunk_count * sizeof(ath_chunk));
     file->errors = (double *)ath_take(&arena, entries * ATH_MEASURES * sizeof(double));
     file->joins = (uint8_t *)ath_take(&arena, entries);
+    file->repeats = (uint8_t *)ath_take(&arena, header->frame_count);
+    file->coded = (uint8_t *)ath_take(&arena, header->frame_count);
     file->clips = (ath_clip *)ath_take(&arena, clips * sizeof(ath_clip));
     file->names = (char *)ath_take(&arena, clips * NAME_BYTES);
     file->seams = (float *)ath_take(&arena, clips * (uint64_t)header->full_level_count * sizeof(float));
@@ -105,7 +107,7 @@ int ath_front(const uint8_t *bytes, size_t available, const ath_limits *limits, 
     uint64_t needed;
     why->code = ATH_OK;
     int result = ath_read_header(bytes, available, &chosen, &header, &needed, why), has_front = result == ATH_OK;
-    if (has_front) result = ath_read_tables(bytes, available, &chosen, &header, &needed, 0, 0, 0, why);
+    if (has_front) result = ath_read_tables(bytes, available, &chosen, &header, &needed, 0, 0, 0, 0, why);
     *front_bytes = ath_size_or_most(needed);
     *memory_bytes = 0;
     if (needed > SIZE_MAX)
@@ -201,6 +203,43 @@ static int read_clips(ath_file *file, ath_fault_info *fault)
     int whole = chunk.size == 0 && last->first_frame + last->frame_count == (int32_t)header->frame_count
                 && last->first_segment + last->segment_count == (int32_t)header->segment_count;
     return whole ? ATH_OK : ATH_BAD_CHUNK;
+}
+
+/* The last clip that begins at or before this frame or segment; `first`: the offset of first_frame or first_segment in
+ * ath_clip. */
+static const ath_clip *clip_at(const ath_file *file, size_t first, int32_t place)
+{
+    int32_t low = 0, high = file->info.clip_count;
+    while (high - low > 1) {
+        int32_t middle = low + (high - low) / 2;
+        if (*(const int32_t *)(const void *)((const char *)(file->clips + middle) + first) <= place)
+            low = middle;
+        else
+            high = middle;
+    }
+    return file->clips + low;
+}
+
+static const ath_clip *clip_of(const ath_file *file, int32_t segment)
+{
+    return clip_at(file, offsetof(ath_clip, first_segment), segment);
+}
+
+/* The first frame of a segment has nothing to repeat that the segment has. */
+static int count_coded(ath_file *file, ath_fault_info *fault)
+{
+    for (int32_t s = 0, i = 0; s < file->info.segment_count; s++) {
+        int32_t start = i, stop = ath_segment_start(file, s + 1);
+        for (int32_t coded = -1; i < stop; i++) {
+            coded += !file->repeats[i];
+            file->coded[i] = (uint8_t)coded;
+        }
+        if (!file->repeats[start]) continue;
+        ath_refuse(fault, ATH_BAD_CHUNK_TABLE, ATH_FIELD_REPEAT, start, 0, 0);
+        fault->segment = (uint32_t)s;
+        return ATH_BAD_CHUNK_TABLE;
+    }
+    return ATH_OK;
 }
 
 static int check_depth(const ath_file *file, const ath_limits *limits, ath_fault_info *fault)
@@ -339,7 +378,6 @@ static int check_motion_chunks(const ath_file *file, ath_fault_info *fault)
     return ATH_OK;
 }
 
-/* The segments of a clip differ by a frame at most: where the one has three, the one before has the two that this takes. */
 static int check_joins(ath_file *file, ath_fault_info *fault)
 {
     int32_t segments = file->info.segment_count, lossy = ath_lossy_levels(file);
@@ -348,8 +386,9 @@ static int check_joins(ath_file *file, ath_fault_info *fault)
         int32_t level = i / segments, segment = i % segments, width = file->joins[i] % ATH_JOIN_SLOPED;
         if (width == 0) continue;
         int32_t before = ath_segment_before(file, segment);
+        int goes_on = before >= 0 && ath_file_frames(file, before) >= ATH_END_FRAMES;
         file->has_joins = 1;
-        if (before >= 0 && level < lossy && width <= ath_file_frames(file, segment) - 2) continue;
+        if (goes_on && level < lossy && width <= ath_file_frames(file, segment) - 2) continue;
         ath_refuse(fault, ATH_BAD_CHUNK_TABLE, ATH_FIELD_JOIN, 0, 0, 0);
         fault->level = (uint8_t)level;
         fault->segment = (uint32_t)segment;
@@ -495,6 +534,7 @@ static int read_prelude(ath_file *file, const ath_limits *limits, ath_fault_info
 {
     int result = read_clips(file, fault);
     if (result == ATH_OK) result = check_memory(&file->header, limits, (uint64_t)file->longest, fault);
+    if (result == ATH_OK) result = count_coded(file, fault);
     if (result == ATH_OK) result = read_hierarchy(file, limits, fault);
     if (result != ATH_OK) return result;
     build_plan(file);
@@ -524,8 +564,8 @@ static int read_front(ath_file *file, size_t memory_bytes, const uint8_t *bytes,
     if (memory_bytes < carve(file, &header, 0)) return ath_refuse(fault, ATH_NO_MEMORY, ATH_FIELD_NONE, 0, 0, 0);
     memset(file, 0, sizeof *file);
     carve(file, &header, (uint8_t *)file);
-    result =
-        ath_read_tables(bytes, available, limits, &header, &needed, file->chunks, file->errors, file->joins, fault);
+    result = ath_read_tables(bytes, available, limits, &header, &needed, file->chunks, file->errors, file->joins,
+                             file->repeats, fault);
     file->header = header;
     set_info(file, needed);
     if (result == ATH_OK) result = check_least_memory(&header, limits, fault);
@@ -630,25 +670,16 @@ int ath_set_host_mesh(ath_file *file, const void *xyz, size_t stride, int32_t ve
 
 /* ---- building ---- */
 
-/* The segments of a clip have as many frames as each other, or one more. */
-static int has_segments_of(const ath_file *file, int32_t periodic, int32_t frames)
-{
-    for (int32_t i = 0; i < file->info.clip_count; i++) {
-        const ath_clip *clip = file->clips + i;
-        int32_t shorter = clip->frame_count / clip->segment_count, rest = clip->frame_count % clip->segment_count;
-        if (clip->periodic != periodic) continue;
-        if (frames == shorter || (rest > 0 && frames == shorter + 1)) return 1;
-    }
-    return 0;
-}
-
 static uint64_t carve_build(ath_file *file, uint8_t *base)
 {
     ath_arena arena = {base, 0};
+    uint8_t are_there[2][ATH_SEGMENT_FRAMES + 1] = {{0}};
+    for (int32_t s = 0; s < file->info.segment_count; s++)
+        are_there[clip_of(file, s)->periodic][ath_file_frames(file, s)] = 1;
     file->bases = (double *)ath_take(&arena, file->bases_count * sizeof(double));
     for (int32_t periodic = 0; periodic < 2; periodic++)
         for (uint64_t frames = 1; frames <= ATH_SEGMENT_FRAMES; frames++)
-            if (has_segments_of(file, periodic, (int32_t)frames))
+            if (are_there[periodic][frames])
                 file->waves[periodic][frames] = (double *)ath_take(&arena, frames * frames * sizeof(double));
     return arena.used;
 }
@@ -806,6 +837,8 @@ const double *ath_errors(const ath_file *file) { return file->errors; }
 
 const uint8_t *ath_joins(const ath_file *file) { return file->joins; }
 
+const uint8_t *ath_repeats(const ath_file *file) { return file->repeats; }
+
 const ath_branch *ath_branches(const ath_file *file) { return file->branches; }
 
 const int32_t *ath_vertex_source(const ath_file *file) { return file->vertex_source; }
@@ -917,29 +950,9 @@ double ath_level_error(const ath_file *file, int32_t level, int32_t first, int32
     return measure != ATH_RMS || first == last ? largest : ath_sqrt(squares / frames);
 }
 
-/* The last clip that begins at or before this frame or segment; `first`: the offset of first_frame or first_segment in
- * ath_clip. */
-static const ath_clip *clip_at(const ath_file *file, size_t first, int32_t place)
-{
-    int32_t low = 0, high = file->info.clip_count;
-    while (high - low > 1) {
-        int32_t middle = low + (high - low) / 2;
-        if (*(const int32_t *)(const void *)((const char *)(file->clips + middle) + first) <= place)
-            low = middle;
-        else
-            high = middle;
-    }
-    return file->clips + low;
-}
-
 const ath_clip *ath_file_clip(const ath_file *file, int32_t frame)
 {
     return clip_at(file, offsetof(ath_clip, first_frame), frame);
-}
-
-static const ath_clip *clip_of(const ath_file *file, int32_t segment)
-{
-    return clip_at(file, offsetof(ath_clip, first_segment), segment);
 }
 
 const double *ath_file_waves(const ath_file *file, int32_t segment)
@@ -956,7 +969,7 @@ int32_t ath_segment_start(const ath_file *file, int32_t segment)
 
 int32_t ath_file_frames(const ath_file *file, int32_t segment)
 {
-    return ath_segment_start(file, segment + 1) - ath_segment_start(file, segment);
+    return file->coded[ath_segment_start(file, segment + 1) - 1] + 1;
 }
 
 int32_t ath_segment_before(const ath_file *file, int32_t segment)

@@ -23,8 +23,10 @@ struct ath_file {
     ath_info info;
     ath_plan plan;
     ath_chunk *chunks;
-    double *errors; /* level_count x segment_count x ATH_MEASURES */
-    uint8_t *joins; /* level_count x segment_count, see ath_joins */
+    double *errors;   /* level_count x segment_count x ATH_MEASURES */
+    uint8_t *joins;   /* level_count x segment_count, see ath_joins */
+    uint8_t *repeats; /* frame_count, see ath_repeats */
+    uint8_t *coded;   /* of each frame, which of the coded frames of its segment it shows */
     ath_clip *clips;
     char *names;  /* of the clips, NAME_BYTES each */
     float *seams; /* clip_count x full_level_count */
@@ -56,6 +58,9 @@ struct ath_file {
     uint32_t affine_levels[ATH_LEVELS]; /* bit d of entry L: AFFINES of level d serve to show level L */
 };
 
+enum { ATH_END_FRAMES = 2 }; /* of a segment, that the next one is joined to */
+
+/* Frames of a segment that are coded: that do not repeat the one before. */
 int32_t ath_file_frames(const ath_file *file, int32_t segment);
 /* The one before a segment in its clip; before the first of a loop of several its last; -1: none. */
 int32_t ath_segment_before(const ath_file *file, int32_t segment);

@@ -187,6 +187,32 @@ static int32_t code_join(ath_coder *coder, join_model *model, int32_t before, in
     return width > 0 && width < ATH_JOIN_SLOPED ? model->last : -1;
 }
 
+enum { MOST_SHOWN = 8 };
+
+/* By how many frames show what the frame before does, it included, and how many showed what came before that. */
+typedef struct {
+    ath_context repeats[MOST_SHOWN][MOST_SHOWN];
+    int32_t shown, before; /* at most MOST_SHOWN */
+} repeat_model;
+
+/* Whether any frame repeats the one before. */
+static int code_has_repeats(ath_coder *coder, repeat_model *model, int has_repeats)
+{
+    ath_context any;
+    for (int32_t i = 0; i < MOST_SHOWN * MOST_SHOWN; i++) context_init(&model->repeats[0][0] + i, 32768);
+    model->shown = model->before = 1;
+    context_init(&any, 1000);
+    return coder_bit(coder, &any, has_repeats);
+}
+
+static int code_repeat(ath_coder *coder, repeat_model *model, int repeats)
+{
+    repeats = coder_bit(coder, &model->repeats[model->shown - 1][model->before - 1], repeats);
+    if (!repeats) model->before = model->shown;
+    model->shown = repeats ? ath_min(model->shown + 1, MOST_SHOWN) : 1;
+    return repeats;
+}
+
 /* What the errors of the first level in the first segment are coded about. */
 static int32_t first_error(double max_error)
 {

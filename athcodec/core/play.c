@@ -70,7 +70,7 @@ ath_blend ath_blend_at(const ath_file *file, double frame)
 /* The frames to show, in the segments that have them. */
 typedef struct {
     const ath_segment *segment[2];
-    size_t frame[2]; /* within the segment */
+    size_t frame[2]; /* of those coded in the segment */
     double weight;
 } shown_frames;
 
@@ -83,10 +83,10 @@ static const ath_segment *find_segment(const ath_segment *const *segments, int32
     return 0;
 }
 
-static int show_one(const ath_segment *segment, int32_t frame, shown_frames *shown)
+static int show_one(const ath_file *file, const ath_segment *segment, int32_t frame, shown_frames *shown)
 {
     shown->segment[0] = shown->segment[1] = segment;
-    shown->frame[0] = shown->frame[1] = (size_t)(frame - segment->start);
+    shown->frame[0] = shown->frame[1] = file->coded[frame];
     shown->weight = 0.0;
     return ATH_HELD;
 }
@@ -103,15 +103,14 @@ static int find_frames(const ath_file *file, const ath_segment *const *segments,
         if (!second) continue;
         shown->segment[0] = first;
         shown->segment[1] = second;
-        shown->frame[0] = (size_t)(blend.frame[0] - first->start);
-        shown->frame[1] = (size_t)(blend.frame[1] - second->start);
+        for (int32_t k = 0; k < 2; k++) shown->frame[k] = file->coded[blend.frame[k]];
         return ATH_OK;
     }
     int32_t nearer = blend.weight < 0.5 ? 0 : 1;
     for (int32_t i = 0; i < 2; i++) {
         int32_t side = i == 0 ? nearer : 1 - nearer;
         const ath_segment *segment = find_segment(segments, count, blend.segment[side], level);
-        if (segment) return show_one(segment, blend.frame[side], shown);
+        if (segment) return show_one(file, segment, blend.frame[side], shown);
     }
     return ATH_NOT_PREPARED;
 }

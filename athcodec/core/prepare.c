@@ -462,7 +462,6 @@ static int begin(ath_work *work, const preparation *asked, int32_t index, int32_
     carve(work, file, frames, (uint8_t *)work);
     carve_segment(segment, file, level, frames, (uint8_t *)segment);
     segment->index = segment->level = -1;
-    segment->start = ath_segment_start(file, index);
     work->file = file;
     work->segment = segment;
     work->asked = *asked;

@@ -4,12 +4,11 @@
 
 #include "file.h"
 
-enum { ATH_END_FRAMES = 2 }; /* of a segment, that the next one is joined to */
-enum { ATH_MAP = 12 };       /* doubles of a map x = c + R (x0 - a): R row by row, c relative to the origin */
+enum { ATH_MAP = 12 }; /* doubles of a map x = c + R (x0 - a): R row by row, c relative to the origin */
 
 struct ath_segment {
     int32_t index, level; /* level -1: not prepared */
-    int32_t start, frames;
+    int32_t frames;       /* coded ones */
     int32_t exact_vertices, node_count, part_count;
     int32_t is_float64;
     ath_part *parts;

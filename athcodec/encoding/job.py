@@ -329,14 +329,13 @@ class EncodingJob:
         """Of the motion of a file whose segments are like typical ones."""
         total = float(decided.shared_bytes)
         for segment, frames in typical_segments(self.source):
-            first, stop = self.source.segments[segment]
             if segment not in decided.tried:
                 motion = self._motion(decided, segment, self.source.block(segment))
                 decided.tried[segment] = CodedSegment(segment, *motion.joined_to())
             coded = decided.tried[segment]
             lossy = [data for (_, kind), data in coded.chunks.items() if kind != ct.EXACT]
             front = CHUNK_BYTES * len(lossy) + LEVEL_BYTES * len(coded.errors)
-            total += (front + sum(map(len, lossy))) * frames / (stop - first)
+            total += (front + sum(map(len, lossy))) * frames / self.source.frames_of(segment)
         return total
 
     def _layer_ratios(self, ath: Ath, bound: float) -> list[int]:
@@ -429,6 +428,7 @@ class EncodingJob:
             len(layers.each),
             decided.choice.predicted is not None,
             joins=joins,
+            repeats=decided.source.repeats,
         )
         return _Result(store, header, errors)
 

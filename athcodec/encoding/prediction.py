@@ -127,7 +127,7 @@ def _samples(source: Source) -> list[SegmentSample]:
         return [SegmentSample(source.positions(segment), frames) for segment, frames in typical_segments(source)]
     some = np.unique(np.linspace(0, len(source.segments) - 1, TRIAL_SEGMENTS).astype(int))
     positions = [source.positions(segment) for segment in some]
-    scale = source.clip.frame_count / sum(own.shape[2] for own in positions)
+    scale = source.coded_frames / sum(own.shape[2] for own in positions)
     return [SegmentSample(own, scale * own.shape[2]) for own in positions]
 
 

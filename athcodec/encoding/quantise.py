@@ -13,7 +13,8 @@ from athcodec.errors import BoundError
 DEAD_ZONE = 0.55
 NODE_QUALITIES = (0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0)  # of maps: step over the error that is theirs
 NODE_SHARE, NODE_BYTES = 0.02, 320  # of the file that the maps may take, whichever is more
-FEW_ROOTS, ROOT_QUALITY = 4, 0.7  # whose maps are a few bytes
+SMALL_NODE_SHARE = 0.04  # that they may take of a file without layers where that is less than NODE_BYTES
+FEW_ROOTS, ROOT_QUALITIES = 4, (0.7, 1.4, 2.8)  # whose maps are a few bytes, mostly
 NODE_ERROR_TOLERANCE = 1.08  # times a level's own error that cheaper maps may have
 MODE_STEP = 0.1  # precision of a learned mode: what it moves in a frame (RMS), in steps
 LEAST_MODE = 0.12  # what a learned mode that is kept moves in a frame (RMS), in steps

@@ -60,7 +60,7 @@ class PlantSample:
             weights=None if source.weights is None else source.weights[self.vertices],
             reference=None if source.reference is None else source.reference[self.vertices],
         )
-        sample.segments = source.segments
+        sample.segments, sample.repeats = source.segments, source.repeats
         return sample
 
     def _hierarchy(self, whole: Hierarchy, vertex_source: np.ndarray) -> Hierarchy:

@@ -93,8 +93,8 @@ def typical_segments(source: Source) -> list[tuple[int, int]]:
     """Those that `samples_of` takes, and how many frames of the file each stands for."""
     middles = [start + len(own) // 2 for start, own in zip(source.clip_range_starts, source.clip_range_segments)]
     if len(middles) == 1:
-        return [(middles[0], source.clip.frame_count)]
-    lengths = np.array([own[-1][1] - own[0][0] for own in source.clip_range_segments])
+        return [(middles[0], source.coded_frames)]
+    lengths = np.array([(~source.repeats[own[0][0] : own[-1][1]]).sum() for own in source.clip_range_segments])
     groups = np.array_split(
         np.argsort([_moved(source, segment) for segment in middles], kind="stable"), min(SAMPLES, len(middles))
     )
@@ -185,7 +185,7 @@ def _rigid(source: Source, bound: float, samples: Sequence[SegmentSample], ratio
 def still_settings(source: Source, ath: Ath, bound: float) -> Settings:
     """Of a clip all of whose frames are the rest pose: no motion, a rest pose of the bound's precision."""
     step = STILL_STEP * source.smallest_bound(bound)
-    settings = first_settings(source, ath, bound, [SegmentSample(source.positions(0), source.clip.frame_count)])
+    settings = first_settings(source, ath, bound, [SegmentSample(source.positions(0), source.coded_frames)])
     slack = float(np.min(settings.limit)) - float(np.spacing(source.largest_number))
     settings = with_rest_slack(source, ath, settings, max(slack, 0.5 * source.smallest_bound(bound)))
     return replace(
@@ -804,14 +804,13 @@ class Search:
         prelude, errors = self.prelude(settings), self._level_errors(settings.bound)
         segment = self._analysed(settings, len(self.samples) // 2, self.learned_modes(prelude.plan, settings))
         rest = self.cost(settings)[1].sum() + self._prelude_bytes(prelude)
-        scale = self.source.clip.frame_count / self.sample.shape[2]
-        allowed = max(qz.NODE_BYTES, qz.NODE_SHARE / (1 - qz.NODE_SHARE) * rest)
-        roots = int((self.source.hierarchy.branch_parent < 0).sum())
+        scale = self.source.coded_frames / self.sample.shape[2]
+        least = qz.NODE_BYTES if self._layered else min(qz.NODE_BYTES, qz.SMALL_NODE_SHARE * rest)
+        allowed = max(least, qz.NODE_SHARE / (1 - qz.NODE_SHARE) * rest)
+        qualities = self._node_qualities()
         chosen = limits = None
-        for quality in qz.NODE_QUALITIES:
+        for quality in qualities:
             steps = quality * errors
-            if roots <= qz.FEW_ROOTS:
-                steps[0] = qz.ROOT_QUALITY * errors[0]
             segment.clear_nodes()
             segment.analyse_nodes(self.sample, steps, settings.rounding)
             if limits is None:
@@ -819,7 +818,7 @@ class Search:
                     len(streams.encode_affines(segment, level)) * self.extrapolation.nodes[level]
                     for level in self._map_levels(prelude.plan)
                 )
-                if size * scale > allowed and quality < qz.NODE_QUALITIES[-1]:
+                if size * scale > allowed and quality is not qualities[-1]:
                     continue
                 chosen, limits = steps, self._errors_of_maps(prelude, segment)
                 limits[1:] = np.minimum(qz.NODE_ERROR_TOLERANCE * limits[1:], limits[:-1])  # deeper levels stay better
@@ -828,6 +827,15 @@ class Search:
             else:
                 break
         return replace(settings, node_steps=chosen)
+
+    def _node_qualities(self) -> list[np.ndarray]:
+        """(levels,) each, from fine to coarse; that of a few roots is another and rises last."""
+        qualities = [np.full(self.levels, quality) for quality in qz.NODE_QUALITIES]
+        if (self.source.hierarchy.branch_parent < 0).sum() > qz.FEW_ROOTS:
+            return qualities
+        coarsest = qualities[-1:] * (len(qz.ROOT_QUALITIES) - 1)
+        roots = [qz.ROOT_QUALITIES[0]] * len(qualities) + [*qz.ROOT_QUALITIES[1:]]
+        return [np.append(root, quality[1:]) for root, quality in zip(roots, qualities + coarsest)]
 
     def _map_levels(self, plan: Plan) -> list[int]:
         return [level for level in range(self.levels) if plan.has_affines(level)]

@@ -199,9 +199,27 @@ class Source:
         """Of the float32 positions of the longest segment."""
         return 12 * self.clip.vertex_count * max(stop - start for start, stop in self.segments)
 
+    @cached_property
+    def repeats(self) -> np.ndarray:
+        """(frames,) bool: frames of the clip that are not coded, because the one before in their segment is the same.
+        Where all are the rest pose none is: that takes no bytes either."""
+        repeats = self.seen.repeats & (not self.still)
+        repeats[[start for start, _ in self.segments]] = False
+        return repeats
+
+    @property
+    def coded_frames(self) -> int:
+        """Of the clip."""
+        return int((~self.repeats).sum())
+
+    def frames_of(self, segment: int) -> int:
+        """Coded frames of a segment, T."""
+        return int((~self.repeats[slice(*self.segments[segment])]).sum())
+
     def block(self, segment: int) -> np.ndarray:
-        """(T, N, 3) positions of a segment as the clip has them."""
-        return self.clip.block(*self.segments[segment])
+        """(T, N, 3) positions of a segment as the clip has them, of the frames that are coded."""
+        block, repeats = self.clip.block(*self.segments[segment]), self.repeats[slice(*self.segments[segment])]
+        return block[~repeats] if repeats.any() else block
 
     def exact(self, block: np.ndarray) -> np.ndarray:
         """(N, 3, T) of a block in file order, its very numbers."""
