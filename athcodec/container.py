@@ -558,17 +558,11 @@ def _array_name(text: bytes, what: str, limits: Limits) -> str:
     return name
 
 
-_PHRASES = (b'{"unit":"', b'","up_axis":"', b'"}', b'","', b'":"', b'":')
-"""What the bytes from 1 on stand for in METADATA that is plain. JSON has no such bytes."""
-
-
 def pack_metadata(metadata: dict) -> bytes:
     """JSON, zstd-compressed where that is shorter. Raises ClipError for what no reader would accept."""
     with _refusals("metadata"):
         text = json.dumps(metadata, separators=(",", ":"), ensure_ascii=False, allow_nan=False).encode()
         shorter = zstandard.ZstdCompressor(level=19, write_content_size=True).compress(text)
-        for code, phrase in enumerate(_PHRASES, 1):
-            text = text.replace(phrase, bytes([code]))
         packed = b"\1" + shorter if len(shorter) < len(text) else b"\0" + text
         parse_metadata(packed, Limits())
     return packed
@@ -589,9 +583,6 @@ def parse_metadata(data: bytes, limits: Limits) -> dict:
         if size > limits.metadata_bytes:
             raise LimitExceeded(f"METADATA: got {size} bytes; the limit is {limits.metadata_bytes}")
         text = zstd_decompress_exact(text, size, "METADATA", limits)
-    elif len(text) <= limits.metadata_bytes:
-        for code, phrase in enumerate(_PHRASES, 1):
-            text = text.replace(bytes([code]), phrase)
     if len(text) > limits.metadata_bytes:
         raise LimitExceeded(f"METADATA: got {len(text)} bytes; the limit is {limits.metadata_bytes}")
     return _parse_json(text, "METADATA")

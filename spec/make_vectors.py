@@ -1409,11 +1409,6 @@ valid(
     "METADATA as plain text, with white space around it",
     lambda: metadata('\t\r\n {"unit": "m", "up_axis": "y", "more": [1, -0, 2.5e-3, true, false, null]} \n'),
 )
-valid(
-    "metadata-phrases",
-    "all bytes that stand for phrases",
-    lambda: metadata(b'\1m\2y\4part\5leaf\4fps\x0630,"names\x06["a\4b"],"more\x06{"a\5b\3}'),
-)
 valid("metadata-zstd", "METADATA in a zstd frame of compressed blocks", lambda: metadata(WIND_FRAME, 1))
 valid("metadata-empty", "an object without members", lambda: metadata("{}"))
 valid(

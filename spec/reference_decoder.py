@@ -3565,16 +3565,10 @@ def array_name(text: bytes, what: str, limits: Limits) -> str:
         raise AthError("BAD_CHUNK", f"{what}: has a name that is not UTF-8") from None
 
 
-PHRASES = (b'{"unit":"', b'","up_axis":"', b'"}', b'","', b'":"', b'":')  # for the bytes from 1 on
-
-
 def parse_metadata(chunk: bytes, limits: Limits) -> bytes:
     """Text of METADATA."""
     require(len(chunk) > 0 and chunk[0] <= 1, "METADATA has an unknown Method")
-    if chunk[0] == 0:
-        text = b"".join(PHRASES[byte - 1] if 1 <= byte <= len(PHRASES) else bytes([byte]) for byte in chunk[1:])
-    else:
-        text = unzstd(chunk[1:], None, "METADATA", limits.metadata_bytes)
+    text = chunk[1:] if chunk[0] == 0 else unzstd(chunk[1:], None, "METADATA", limits.metadata_bytes)
     require(len(text) <= limits.metadata_bytes, "METADATA is too long", "LIMIT_EXCEEDED")
     parse_json(text, "METADATA")
     return text

@@ -339,17 +339,6 @@ def test_metadata_come_back_unchanged(metadata, scratch):
     assert reopened(with_static(plant(frames=3), metadata=metadata), scratch).metadata == metadata
 
 
-def test_unit_and_axis_take_a_few_bytes():
-    packed = ct.pack_metadata({"unit": "cm", "up_axis": "z"})
-    assert len(packed) <= 8
-    assert ct.parse_metadata(packed, ct.Limits()) == {"unit": "cm", "up_axis": "z"}
-
-
-def test_bytes_that_stand_for_phrases_may_be_in_strings():
-    metadata = {"unit": '"},"\1\2\3\4\5\6', '\6":': ['","', {'":"': '"}'}]}
-    assert ct.parse_metadata(ct.pack_metadata(metadata), ct.Limits()) == metadata
-
-
 def test_a_clip_without_static_data_has_none_in_its_file(scratch):
     decoder = reopened(plant(frames=3), scratch)
     assert decoder.faces is None and decoder.edges is None and decoder.attributes == {} and decoder.metadata == {}
