@@ -304,9 +304,18 @@ static const correction_row *code_vertex(ath_coder *coder, correction_model *mod
 }
 
 #ifndef ATH_ENCODING
+/* Whether corrections may reach the block of frame t. */
+ATH_INLINE int is_reached(const correction_row *row, int32_t t)
+{
+    const uint8_t *blocks = row->blocks + t / CORRECTION_BLOCK;
+    return (blocks[0] | blocks[1] | blocks[2]) != 0;
+}
+
+/* Of the blocks that corrections may reach; the others are not written. */
 static void correction_parts(const correction_row *row, int32_t frames, ath_corrected_parts parts)
 {
-    memset(parts, 0, (size_t)frames * sizeof parts[0]);
+    for (int32_t t = 0; t < frames; t += CORRECTION_BLOCK)
+        if (is_reached(row, t)) memset(parts + t, 0, CORRECTION_BLOCK * sizeof parts[0]);
     for (int32_t t = 0; t < frames; t++)
         if (has_correction(row, t)) ath_add_correction(frames, t, row->of + t, parts);
 }

@@ -44,23 +44,43 @@ typedef struct {
     uint32_t ratio;
 } row_prediction;
 
-ATH_INLINE uint32_t coarse_at(const row_prediction *p, const int32_t *row, int32_t axis, int32_t k)
+/* What the layer before has around the integers of a row: magnitudes in its own steps, sums of them over the axes, and
+ * likewise those of the row that follows; zeros behind the last. */
+typedef struct {
+    uint32_t steps[3][ATH_SEGMENT_FRAMES + 2], all[ATH_SEGMENT_FRAMES + 2];
+    uint32_t below[3][ATH_SEGMENT_FRAMES + 2], all_below[ATH_SEGMENT_FRAMES + 2];
+} coarse_surroundings;
+
+/* Sums over the axes of the first `count` magnitudes of a row, and the magnitudes. */
+static void coarse_magnitudes(const row_prediction *p, const int32_t *row, int32_t count,
+                              uint32_t steps[3][ATH_SEGMENT_FRAMES + 2], uint32_t *all)
 {
-    if (k >= p->frames) return 0;
-    return p->coarse ? clipped(row[axis * p->frames + k]) : coarse_steps(row[axis * p->frames + k], p->ratio);
+    int32_t known = ath_min(count, p->frames);
+    memset(all, 0, (size_t)count * sizeof *all);
+    for (int32_t axis = 0; axis < 3; axis++) {
+        const int32_t *from = row + axis * p->frames;
+        for (int32_t k = 0; k < known; k++) {
+            steps[axis][k] = p->coarse ? clipped(from[k]) : coarse_steps(from[k], p->ratio);
+            all[k] += steps[axis][k];
+        }
+        for (int32_t k = known; k < count; k++) steps[axis][k] = 0;
+    }
+}
+
+/* Of the first `count` frequencies. */
+static void look_around(const row_prediction *p, int32_t count, coarse_surroundings *around)
+{
+    if (count == 0) return;
+    coarse_magnitudes(p, p->coarse ? p->coarse : p->row, count + 2, around->steps, around->all);
+    if (p->below) coarse_magnitudes(p, p->below, count + 1, around->below, around->all_below);
 }
 
 /* How loud the layer before is around an integer, where that is not known otherwise yet. */
-static uint32_t loudness(const row_prediction *p, int32_t axis, int32_t k)
+ATH_INLINE uint32_t loudness(const row_prediction *p, const coarse_surroundings *around, int32_t axis, int32_t k)
 {
-    const int32_t *row = p->coarse ? p->coarse : p->row;
-    uint32_t loud = 2 * (2 * coarse_at(p, row, axis, k + 1) + coarse_at(p, row, axis, k + 2)), below = 0;
-    for (int32_t other = 0; other < 3; other++) {
-        loud += coarse_at(p, row, other, k + 1);
-        if (other > axis) loud += coarse_at(p, row, other, k);
-        if (p->below) below += coarse_at(p, p->below, other, k);
-    }
-    return p->below ? loud + 2 * below + coarse_at(p, p->below, axis, k + 1) : loud;
+    uint32_t loud = 2 * (2 * around->steps[axis][k + 1] + around->steps[axis][k + 2]) + around->all[k + 1];
+    for (int32_t other = axis + 1; other < 3; other++) loud += around->steps[other][k];
+    return p->below ? loud + 2 * around->all_below[k] + around->below[axis][k + 1] : loud;
 }
 
 static int32_t differing_frequencies(const int32_t *row, const int32_t *predicted, int32_t frames)
@@ -74,11 +94,12 @@ static int32_t differing_frequencies(const int32_t *row, const int32_t *predicte
 
 /* expected: of the differences around this one, in 1/16. */
 static int32_t code_refined_difference(ath_coder *coder, refinement_model *model, const row_prediction *prediction,
-                                       int32_t axis, int32_t k, uint32_t expected, int32_t difference)
+                                       const coarse_surroundings *around, int32_t axis, int32_t k, uint32_t expected,
+                                       int32_t difference)
 {
     int32_t predicted = prediction->row[axis * prediction->frames + k];
-    int known = coarse_at(prediction, prediction->coarse ? prediction->coarse : prediction->row, axis, k) > 0;
-    expected = !known                  ? expected + 2 * loudness(prediction, axis, k)
+    int known = around->steps[axis][k] > 0;
+    expected = !known                  ? expected + 2 * loudness(prediction, around, axis, k)
                : prediction->ratio > 1 ? 4 * prediction->ratio
                                        : expected;
     uint32_t magnitude = code_unsigned(coder, &model->numbers[known], expected, magnitude_of(difference));
@@ -107,16 +128,18 @@ static int32_t code_refined_row(ath_coder *coder, refinement_model *refinement, 
     uint32_t *sums = model->sums[model->turn ^= 1] + SUMS_BEFORE, last[3][3] = {{0}};
     int32_t count = code_count(coder, model, model->history_count[slot], ath_max(above_count, 0), rank,
                                ENCODING ? differing_frequencies(row, predicted, frames) : 0);
+    coarse_surroundings around;
+    look_around(prediction, count, &around);
     for (int32_t k = 0; k < count; k++) {
         uint32_t over = above_count < 0 ? 0 : 2 * above[k] + above[k - 1] + above[k + 1];
         uint32_t common = (2 * sums[k - 1] + sums[k - 2]) * 2 + over, beside = 0;
         for (int32_t axis = 0; axis < 3; axis++) {
             int32_t at = axis * frames + k;
             uint32_t *near = last[axis];
-            uint32_t around = axis == 0 ? history[k] : (beside * 16 / (uint32_t)axis + history[k]) / 2;
-            uint32_t expected = ((2 * near[0] + near[1] + near[2]) * 16 + common + around * 8) / 16;
-            int32_t difference =
-                code_refined_difference(coder, refinement, prediction, axis, k, expected, row[at] - predicted[at]);
+            uint32_t other = axis == 0 ? history[k] : (beside * 16 / (uint32_t)axis + history[k]) / 2;
+            uint32_t expected = ((2 * near[0] + near[1] + near[2]) * 16 + common + other * 8) / 16;
+            int32_t difference = code_refined_difference(coder, refinement, prediction, &around, axis, k, expected,
+                                                         row[at] - predicted[at]);
             if (!ENCODING) row[at] = predicted[at] + difference;
             near[2] = near[1];
             near[1] = near[0];
