@@ -9,7 +9,7 @@
 
 typedef struct {
     coefficient_model rows;
-    uint32_t history[ATH_SLOTS * ATH_SHAPE_MODES];
+    uint32_t history[HISTORY_ROWS * ATH_SHAPE_MODES];
     number_model count;
     int32_t count_before[2]; /* of the piece before, by part */
 } shape_model;
@@ -46,7 +46,7 @@ static int32_t code_shapes(ath_coder *coder, shape_model *model, const ath_piece
 
 typedef struct {
     refinement_model rows;
-    uint32_t history[ATH_SLOTS * ATH_SHAPE_MODES];
+    uint32_t history[HISTORY_ROWS * ATH_SHAPE_MODES];
     number_model count;
 } refined_shape_model;
 
