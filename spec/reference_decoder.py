@@ -1804,16 +1804,16 @@ def decode_temporal(stream: bytes, rank: int, frames: int, bits: int) -> list[li
     return basis
 
 
-SLOTS, SHIFT_SLOT, ROTATION_SLOT = 66, 64, 65
+SLOTS, SHIFT_SLOT, ROTATION_SLOT, BANDS = 66, 64, 65, 4
 
 
 class CoefficientModel:
     def __init__(self):
-        self.number = NumberModel()
+        self.numbers = [NumberModel() for _ in range(2 * BANDS)]
         self.empty = [[Context(32768) for _ in range(6)] for _ in range(6)]
         self.count_size = [[Context(40000) for _ in range(10)] for _ in range(6)]
         self.count_mantissa = [[Context(32768) for _ in range(4)] for _ in range(10)]
-        self.history = [[0] * SEGMENT_FRAMES for _ in range(SLOTS)]  # magnitudes per slot and frequency
+        self.history = [[[0] * SEGMENT_FRAMES for _ in range(3)] for _ in range(SLOTS)]  # mean magnitudes, in 1/16
         self.history_count = [0] * SLOTS
 
 
@@ -1840,31 +1840,48 @@ def at_frequency(axis: list[int], k: int) -> int:
     return clipped(axis[k]) if 0 <= k < len(axis) else 0
 
 
-def common_magnitude(row: list[list[int]], above, k: int) -> int:
-    """What is near in frequency on all axes, and in the row above."""
-    before = over = 0
-    for axis in row:
-        before += 2 * at_frequency(axis, k - 1) + at_frequency(axis, k - 2)
-    for axis in above or ():
-        over += 2 * at_frequency(axis, k) + at_frequency(axis, k - 1) + at_frequency(axis, k + 1)
-    return before * 2 + over
+def averaged(mean: int, magnitude: int, half: int) -> int:
+    """A running mean in 1/16 with one magnitude more."""
+    return mean - (mean + half) // 8 + 2 * magnitude
 
 
-def expected_magnitude(row: list[list[int]], common: int, history: int, axis: int, k: int) -> int:
-    """How large a number is expected to be, in 1/16: by that, the axis itself, those before it, and rows of the
-    same slot."""
-    own = row[axis]
-    near = 2 * at_frequency(own, k - 1) + at_frequency(own, k - 2) + at_frequency(own, k - 3)
-    beside = sum(clipped(row[a][k]) for a in range(axis))
-    around = history if axis == 0 else (beside * 16 // axis + history) // 2
-    return (near * 16 + common + around * 8) // 16
+class RowSurroundings:
+    """What tells how large the integers of a row are, while it passes: the axis itself, those before it, the frequency
+    before, the row above, and rows of the same slot."""
 
+    def __init__(self, model: CoefficientModel, slot: int, above):
+        self.model, self.slot, self.history, self.above = model, slot, model.history[slot], above
+        self.near, self.run = [0, 0, 0], [0, 0, 0]  # of each axis: the last magnitude, the mean of late ones in 1/16
+        self.before = self.beside = self.over = self.mean = 0
 
-def remember(history: list[int], row: list[list[int]]) -> None:
-    """Adds a row to the magnitudes of its slot."""
-    for k in range(len(row[0])):
-        total = clipped(row[0][k]) + clipped(row[1][k]) + clipped(row[2][k])
-        history[k] = history[k] - (history[k] + 3) // 4 + total * 4 // 3
+    def start(self, k: int) -> None:
+        """Goes on to a frequency."""
+        self.before, self.beside = self.beside, 0
+        self.over = sum(at_frequency(axis, k) for axis in self.above or ())
+        self.mean = sum(axis[k] for axis in self.history) // 3
+
+    def expected(self, axis: int, k: int) -> int:
+        """The magnitude expected of an integer, in 1/16."""
+        around = self.mean if axis == 0 else (self.beside * 16 // axis + self.mean) // 2
+        own = 16 * (self.near[axis] + self.run[axis]) + 12 * self.history[axis][k]
+        return (own + 2 * around + self.before + self.over) // 16
+
+    def number(self, axis: int, k: int) -> NumberModel:
+        """The model that codes it."""
+        louder = self.run[axis] > self.history[axis][k]
+        return self.model.numbers[2 * min((k + 1).bit_length() - 1, BANDS - 1) + louder]
+
+    def note(self, axis: int, k: int, magnitude: int) -> None:
+        self.history[axis][k] = averaged(self.history[axis][k], magnitude, 7)
+        self.run[axis] = averaged(self.run[axis], magnitude, 4)
+        self.near[axis] = magnitude
+        self.beside += magnitude
+
+    def finish(self, count: int) -> None:
+        """The frequencies from `count` on are 0."""
+        for axis in self.history:
+            axis[count:] = [averaged(mean, 0, 7) for mean in axis[count:]]
+        self.model.history_count[self.slot] = count
 
 
 def zero_row(frames: int) -> list[list[int]]:
@@ -1875,16 +1892,14 @@ def decode_row(
     coder: RangeDecoder, model: CoefficientModel, frames: int, rank: int, slot: int, above=None, above_count: int = 0
 ):
     """Three axes of `frames` integers over frequency, and how many frequencies were coded."""
-    history = model.history[slot]
     count = decode_count(coder, model, model.history_count[slot], above_count, rank)
-    row = zero_row(frames)
+    row, around = zero_row(frames), RowSurroundings(model, slot, above)
     for k in range(count):
-        common = common_magnitude(row, above, k)
+        around.start(k)
         for axis in range(3):
-            expected = expected_magnitude(row, common, history[k], axis, k)
-            row[axis][k] = code_signed(coder, model.number, expected)
-    model.history_count[slot] = count
-    remember(history, row)
+            row[axis][k] = code_signed(coder, around.number(axis, k), around.expected(axis, k))
+            around.note(axis, k, clipped(row[axis][k]))
+    around.finish(count)
     return row, count
 
 
@@ -1893,8 +1908,8 @@ def decode_row(
 
 class RefinementModel:
     def __init__(self):
-        self.rows = CoefficientModel()  # of differences
-        self.numbers = [NumberModel(), NumberModel()]  # where the layer before has 0, elsewhere
+        self.rows = CoefficientModel()  # of differences, whose numbers are where the layer before has 0
+        self.known = NumberModel()  # elsewhere
         self.sign = [Context(32768) for _ in range(3)]
 
 
@@ -1935,27 +1950,27 @@ def decode_refined_row(
     """Integers that are known about. `ratio`: steps of this layer in one of the layer before. `steps`: magnitudes of
     the row in steps of the layer before, `below`: those of the row that follows."""
     frames, rows = len(predicted[0]), model.rows
-    history = rows.history[slot]
     count = decode_count(coder, rows, rows.history_count[slot], above.count if above else 0, rank)
-    differences = zero_row(frames)
+    differences, around = zero_row(frames), RowSurroundings(rows, slot, above and above.differences)
     for k in range(count):
-        common = common_magnitude(differences, above and above.differences, k)
+        around.start(k)
         for axis in range(3):
-            expected = expected_magnitude(differences, common, history[k], axis, k)
-            known = steps[axis][k] > 0
-            if not known:
-                expected += 2 * loudness(steps, below, axis, k)
+            number, expected = model.known, around.expected(axis, k)
+            if steps[axis][k] == 0:
+                number, expected = around.number(axis, k), expected + 2 * loudness(steps, below, axis, k)
             elif ratio > 1:
                 expected = 4 * ratio
-            differences[axis][k] = decode_difference(coder, model, known, expected, predicted[axis][k])
-    rows.history_count[slot] = count
-    remember(history, differences)
+            differences[axis][k] = decode_difference(coder, model, number, expected, predicted[axis][k])
+            around.note(axis, k, clipped(differences[axis][k]))
+    around.finish(count)
     row = [[p + d for p, d in zip(*axis, strict=True)] for axis in zip(predicted, differences, strict=True)]
     return RefinedRow(row, differences, count)
 
 
-def decode_difference(coder: RangeDecoder, model: RefinementModel, known: bool, expected: int, predicted: int) -> int:
-    magnitude = code_unsigned(coder, model.numbers[known], expected)
+def decode_difference(
+    coder: RangeDecoder, model: RefinementModel, number: NumberModel, expected: int, predicted: int
+) -> int:
+    magnitude = code_unsigned(coder, number, expected)
     if magnitude == 0:
         return 0
     if predicted == 0:

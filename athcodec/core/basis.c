@@ -7,46 +7,56 @@
 enum { MOST_PROBES = 64, MOST_ROWS = ATH_SEGMENT_FRAMES, MODE_STEPS = 24 };
 
 /* Householder reduction of the symmetric n x n matrix `a` to tridiagonal form; on return row i of `q` is the i-th
- * basis vector in which the matrix is tridiagonal (diagonal d, subdiagonal e[1..n-1]). */
-static void tridiagonalise(int32_t n, double *a, double *q, double *d, double *e)
+ * basis vector in which the matrix is tridiagonal (diagonal d, subdiagonal e[1..n-1]). Rounding makes the matrix
+ * unsymmetric: `a` has its columns one behind the other, so that sums of a row each run side by side. */
+ATH_HOT static void tridiagonalise(int32_t n, double *ATH_RESTRICT a, double *ATH_RESTRICT q, double *d, double *e)
 {
-    double v[MOST_ROWS], p[MOST_ROWS];
+    double v[MOST_ROWS], p[MOST_ROWS], sums[MOST_ROWS];
     for (int32_t i = 0; i < n; i++)
         for (int32_t j = 0; j < n; j++) q[i * n + j] = i == j ? 1.0 : 0.0;
     for (int32_t k = 0; k + 2 < n; k++) {
-        double norm2 = 0.0;
-        for (int32_t i = k + 1; i < n; i++) norm2 = norm2 + a[i * n + k] * a[i * n + k];
-        double below2 = norm2 - a[(k + 1) * n + k] * a[(k + 1) * n + k];
+        double norm2 = 0.0, *column = a + k * n;
+        for (int32_t i = k + 1; i < n; i++) norm2 = norm2 + column[i] * column[i];
+        double below2 = norm2 - column[k + 1] * column[k + 1];
         if (!(below2 > norm2 * 1e-30)) continue;
-        double norm = ath_sqrt(norm2), head = a[(k + 1) * n + k];
+        double norm = ath_sqrt(norm2), head = column[k + 1];
         double alpha = head > 0.0 ? -norm : norm;
         double scale = 1.0 / (norm2 - head * alpha); /* 2 / v.v, halved: v.v = 2 (norm2 - head alpha) */
         v[k + 1] = head - alpha;
-        for (int32_t i = k + 2; i < n; i++) v[i] = a[i * n + k];
+        for (int32_t i = k + 2; i < n; i++) v[i] = column[i];
         double vp = 0.0;
-        for (int32_t i = k; i < n; i++) {
-            double sum = 0.0;
-            for (int32_t j = k + 1; j < n; j++) sum = sum + a[i * n + j] * v[j];
-            p[i] = sum * scale;
-        }
+        for (int32_t i = k + 1; i < n; i++) p[i] = 0.0;
+        for (int32_t j = k + 1; j < n; j++)
+            for (int32_t i = k + 1; i < n; i++) p[i] = p[i] + a[j * n + i] * v[j];
+        for (int32_t i = k + 1; i < n; i++) p[i] = p[i] * scale;
         for (int32_t i = k + 1; i < n; i++) vp = vp + v[i] * p[i];
         double half = 0.5 * scale * vp;
         for (int32_t i = k + 1; i < n; i++) p[i] = p[i] - half * v[i];
-        for (int32_t i = k + 1; i < n; i++)
-            for (int32_t j = k + 1; j < n; j++) a[i * n + j] = a[i * n + j] - v[i] * p[j] - p[i] * v[j];
+        for (int32_t j = k + 1; j < n; j++)
+            for (int32_t i = k + 1; i < n; i++) a[j * n + i] = a[j * n + i] - v[i] * p[j] - p[i] * v[j];
         a[(k + 1) * n + k] = alpha;
-        a[k * n + k + 1] = alpha;
-        for (int32_t i = k + 2; i < n; i++) a[i * n + k] = a[k * n + i] = 0.0;
-        for (int32_t j = 0; j < n; j++) {
-            double sum = 0.0;
-            for (int32_t i = k + 1; i < n; i++) sum = sum + v[i] * q[i * n + j];
-            sum = sum * scale;
-            for (int32_t i = k + 1; i < n; i++) q[i * n + j] = q[i * n + j] - sum * v[i];
-        }
+        column[k + 1] = alpha;
+        for (int32_t i = k + 2; i < n; i++) a[i * n + k] = column[i] = 0.0;
+        for (int32_t j = 0; j < n; j++) sums[j] = 0.0;
+        for (int32_t i = k + 1; i < n; i++)
+            for (int32_t j = 0; j < n; j++) sums[j] = sums[j] + v[i] * q[i * n + j];
+        for (int32_t j = 0; j < n; j++) sums[j] = sums[j] * scale;
+        for (int32_t i = k + 1; i < n; i++)
+            for (int32_t j = 0; j < n; j++) q[i * n + j] = q[i * n + j] - sums[j] * v[i];
     }
     for (int32_t i = 0; i < n; i++) {
         d[i] = a[i * n + i];
-        e[i] = i > 0 ? a[i * n + i - 1] : 0.0;
+        e[i] = i > 0 ? a[(i - 1) * n + i] : 0.0;
+    }
+}
+
+/* Turns two rows into each other. */
+ATH_HOT static void rotate_rows(int32_t n, double c, double s, double *ATH_RESTRICT low, double *ATH_RESTRICT high)
+{
+    for (int32_t k = 0; k < n; k++) {
+        double h = high[k], w = low[k];
+        high[k] = s * w + c * h;
+        low[k] = c * w - s * h;
     }
 }
 
@@ -86,12 +96,7 @@ static void diagonalise(int32_t n, double *d, double *e, double *q)
                 p = s * r;
                 d[i + 1] = g + p;
                 g = c * r - b;
-                double *low = q + i * n, *high = q + (i + 1) * n;
-                for (int32_t k = 0; k < n; k++) {
-                    double h = high[k], w = low[k];
-                    high[k] = s * w + c * h;
-                    low[k] = c * w - s * h;
-                }
+                rotate_rows(n, c, s, q + i * n, q + (i + 1) * n);
             }
             if (r == 0.0 && i >= l) continue;
             d[l] = d[l] - p;

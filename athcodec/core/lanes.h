@@ -55,6 +55,46 @@ ATH_INLINE void lanes_store(double *to, const ath_lanes *from)
 
 #endif
 
+#if defined(__has_builtin)
+#if __has_builtin(__builtin_shufflevector) && __has_builtin(__builtin_convertvector)
+#define ATH_TRANSPOSES
+#endif
+#endif
+
+/* A square of ATH_LANES rows and frames, `origin` of each row added, from rows over time to frames of floats. */
+#if defined(ATH_TRANSPOSES)
+
+typedef float ath_float_lanes __attribute__((vector_size(ATH_LANES * 4), aligned(4), may_alias));
+
+ATH_INLINE void lanes_transpose(const double *from, size_t row_size, const double origin[ATH_LANES], float *out,
+                                size_t frame_size)
+{
+    ath_float_lanes row[ATH_LANES];
+    for (size_t i = 0; i < ATH_LANES; i++) {
+        ath_lanes sum = *(const ath_lanes *)(const void *)(from + i * row_size) + origin[i];
+        row[i] = __builtin_convertvector(sum, ath_float_lanes);
+    }
+    ath_float_lanes a = __builtin_shufflevector(row[0], row[1], 0, 4, 1, 5);
+    ath_float_lanes b = __builtin_shufflevector(row[2], row[3], 0, 4, 1, 5);
+    ath_float_lanes c = __builtin_shufflevector(row[0], row[1], 2, 6, 3, 7);
+    ath_float_lanes d = __builtin_shufflevector(row[2], row[3], 2, 6, 3, 7);
+    *(ath_float_lanes *)(void *)out = __builtin_shufflevector(a, b, 0, 1, 4, 5);
+    *(ath_float_lanes *)(void *)(out + frame_size) = __builtin_shufflevector(a, b, 2, 3, 6, 7);
+    *(ath_float_lanes *)(void *)(out + 2 * frame_size) = __builtin_shufflevector(c, d, 0, 1, 4, 5);
+    *(ath_float_lanes *)(void *)(out + 3 * frame_size) = __builtin_shufflevector(c, d, 2, 3, 6, 7);
+}
+
+#else
+
+ATH_INLINE void lanes_transpose(const double *from, size_t row_size, const double origin[ATH_LANES], float *out,
+                                size_t frame_size)
+{
+    for (size_t i = 0; i < ATH_LANES; i++)
+        for (size_t t = 0; t < ATH_LANES; t++) out[t * frame_size + i] = (float)(from[i * row_size + t] + origin[i]);
+}
+
+#endif
+
 /* out[t] = first + sum of weight[i] * row[i][t], i ascending, for `frames` values of t. */
 ATH_INLINE void lanes_sum(int32_t frames, int32_t count, const double *weight, const double *const *row, double first,
                           double *out)

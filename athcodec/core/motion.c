@@ -669,7 +669,13 @@ static int32_t nearest_or_none(double units, double least)
 
 static int is_zero(const int32_t *integers, int32_t count)
 {
-    for (int32_t i = 0; i < count; i++)
+    int32_t i = 0;
+    for (; i + PREDICTED <= count; i += PREDICTED) {
+        int32_t any = 0;
+        for (int32_t j = 0; j < PREDICTED; j++) any |= integers[i + j];
+        if (any) return 0;
+    }
+    for (; i < count; i++)
         if (integers[i] != 0) return 0;
     return 1;
 }
@@ -686,12 +692,13 @@ void ath_predict_track(const ath_stream *stream, int32_t T, int32_t frequencies,
         for (int32_t t = 0; t < T && !any; t++) any = row[t] != 0.0;
         if (!any) continue;
         const int32_t *known = coarse ? coarse + axis * T : 0;
-        for (; k + PREDICTED <= count; k += PREDICTED) {
+        for (; k < count; k += PREDICTED) {
             double sums[PREDICTED];
-            if (known && is_zero(known + k, PREDICTED)) continue;
-            project_waves(T, stream->temporal + (size_t)k * (size_t)T, row, sums);
-            for (int32_t i = 0; i < PREDICTED; i++)
-                predicted[axis * T + k + i] = nearest_or_none(sums[i] / step, least);
+            int32_t stop = ath_min(k + PREDICTED, count), first = ath_min(k, stream->temporal_rank - PREDICTED);
+            if (first < 0) break;
+            if (known && is_zero(known + k, stop - k)) continue;
+            project_waves(T, stream->temporal + (size_t)first * (size_t)T, row, sums);
+            for (int32_t i = k; i < stop; i++) predicted[axis * T + i] = nearest_or_none(sums[i - first] / step, least);
         }
         for (; k < count; k++)
             predicted[axis * T + k] =
@@ -732,13 +739,14 @@ ATH_HOT static void project_mode(const ath_plan *plan, int32_t T, const ath_piec
                                  const double *local, double *ATH_RESTRICT row)
 {
     const double *mode = plan->bases + piece->basis + (size_t)m * (size_t)piece->count;
-    double tip = ath_tip_weight(piece, plan->rest);
-    for (int32_t i = 0; i < 3 * T; i++) row[i] = 0.0;
-    for (int32_t v = 0; v < piece->count; v++) {
-        double weight = v == piece->count - 1 ? mode[v] * tip : mode[v];
-        const double *x = local + (size_t)v * 3 * (size_t)T;
-        for (int32_t i = 0; i < 3 * T; i++) row[i] = row[i] + weight * x[i];
+    const double *x[ATH_PIECE_VERTICES];
+    double weight[ATH_PIECE_VERTICES];
+    int32_t last = piece->count - 1;
+    for (int32_t v = 0; v <= last; v++) {
+        x[v] = local + (size_t)v * 3 * (size_t)T;
+        weight[v] = v == last ? mode[v] * ath_tip_weight(piece, plan->rest) : mode[v];
     }
+    lanes_sum(3 * T, piece->count, weight, x, 0.0, row);
 }
 
 void ath_project(const ath_plan *plan, int32_t T, const ath_piece *piece, int32_t count, const double *local,

@@ -9,7 +9,7 @@
 
 typedef struct {
     coefficient_model rows;
-    uint32_t history[ATH_SLOTS * ATH_SHAPE_MODES];
+    uint32_t history[HISTORY_ROWS * ATH_SHAPE_MODES];
     number_model count;
     int32_t count_before[2]; /* of the piece before, by part */
 } shape_model;
@@ -46,7 +46,7 @@ static int32_t code_shapes(ath_coder *coder, shape_model *model, const ath_piece
 
 typedef struct {
     refinement_model rows;
-    uint32_t history[ATH_SLOTS * ATH_SHAPE_MODES];
+    uint32_t history[HISTORY_ROWS * ATH_SHAPE_MODES];
     number_model count;
 } refined_shape_model;
 
@@ -304,9 +304,18 @@ static const correction_row *code_vertex(ath_coder *coder, correction_model *mod
 }
 
 #ifndef ATH_ENCODING
+/* Whether corrections may reach the block of frame t. */
+ATH_INLINE int is_reached(const correction_row *row, int32_t t)
+{
+    const uint8_t *blocks = row->blocks + t / CORRECTION_BLOCK;
+    return (blocks[0] | blocks[1] | blocks[2]) != 0;
+}
+
+/* Of the blocks that corrections may reach; the others are not written. */
 static void correction_parts(const correction_row *row, int32_t frames, ath_corrected_parts parts)
 {
-    memset(parts, 0, (size_t)frames * sizeof parts[0]);
+    for (int32_t t = 0; t < frames; t += CORRECTION_BLOCK)
+        if (is_reached(row, t)) memset(parts + t, 0, CORRECTION_BLOCK * sizeof parts[0]);
     for (int32_t t = 0; t < frames; t++)
         if (has_correction(row, t)) ath_add_correction(frames, t, row->of + t, parts);
 }

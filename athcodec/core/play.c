@@ -237,6 +237,16 @@ ATH_HOT static void blend_floats(const float *a, const float *b, float weight, s
         for (size_t i = 0; i < count; i++) out[i] = a[i] + (b[i] - a[i]) * weight;
 }
 
+/* Floats as they are, each vertex to its place. */
+static void scatter_floats(const float *from, size_t count, size_t vertex, const target *to)
+{
+    const int32_t *place = to->place ? to->place + vertex : 0;
+    char *out = to->out;
+    size_t stride = to->stride;
+    for (size_t i = 0; i < count; i++)
+        memcpy(out + (place ? (size_t)place[i] : vertex + i) * stride, from + 3 * i, 3 * sizeof(float));
+}
+
 /* Vertices first to first + count - 1 go to `vertex` on, those of the exact run that begins at `index`. */
 static void put_floats(const shown_frames *shown, size_t index, size_t count, size_t vertex, const target *to)
 {
@@ -248,6 +258,10 @@ static void put_floats(const shown_frames *shown, size_t index, size_t count, si
     float weight = (float)shown->weight, block[3 * BLOCK];
     if (is_packed(to)) {
         blend_floats(at[0], at[1], weight, 3 * count, (float *)(void *)to->out + 3 * vertex);
+        return;
+    }
+    if (weight == 0.0f && !to->is_float64 && to->share == 1.0f) {
+        scatter_floats(at[0], count, vertex, to);
         return;
     }
     for (size_t start = 0; start < count; start += BLOCK) {

@@ -3,6 +3,7 @@
 #include "decode.h"
 #include "exact_model.h"
 #include "kept.h"
+#include "lanes.h"
 #include "motion_streams.h"
 #include "predict.h"
 #include "segment.h"
@@ -836,12 +837,20 @@ static int refine_piece(ath_work *work, int32_t q, int32_t p, const double **pla
 ATH_HOT static void store_floats(const double *placed, int32_t rows, int32_t T, const double origin[3], float *out,
                                  size_t frame_size)
 {
+    double added[3 + ATH_LANES];
+    int32_t whole = rows - rows % ATH_LANES;
+    for (int32_t i = 0; i < 3 + ATH_LANES; i++) added[i] = origin[i % 3];
     for (int32_t start = 0; start < T; start += TILE) {
-        int32_t count = ath_min(TILE, T - start);
-        for (int32_t r = 0; r < rows; r++) {
-            const double *from = placed + (size_t)r * (size_t)T + start;
-            float *to = out + (size_t)start * frame_size + r;
-            for (int32_t t = 0; t < count; t++) to[(size_t)t * frame_size] = (float)(from[t] + origin[r % 3]);
+        int32_t stop = ath_min(start + TILE, T), squares = start + (stop - start) / ATH_LANES * ATH_LANES;
+        for (int32_t r = 0; r < rows; r += ATH_LANES) {
+            const double *from = placed + (size_t)r * (size_t)T;
+            float *to = out + r;
+            int32_t t = start;
+            for (; r < whole && t < squares; t += ATH_LANES)
+                lanes_transpose(from + t, (size_t)T, added + r % 3, to + (size_t)t * frame_size, frame_size);
+            for (; t < stop; t++)
+                for (int32_t i = 0; i < ath_min(ATH_LANES, rows - r); i++)
+                    to[(size_t)t * frame_size + (size_t)i] = (float)(from[i * T + t] + added[r % 3 + i]);
         }
     }
 }
@@ -882,9 +891,14 @@ static void correct_vertex(const corrections_reader *reader, const correction_ro
 {
     ath_corrected_parts parts;
     correction_parts(row, segment->frames, parts);
-    for (int32_t t = 0; t < segment->frames; t++)
+    for (int32_t t = 0; t < segment->frames; t++) {
+        if (!is_reached(row, t)) {
+            t += CORRECTION_BLOCK - 1;
+            continue;
+        }
         for (size_t k = 0; k < 3; k++)
             correct(segment, ((size_t)t * (size_t)segment->exact_vertices + vertex) * 3 + k, parts[t][k], reader->step);
+    }
 }
 
 static void correct_piece(ath_work *work, const ath_piece *piece)

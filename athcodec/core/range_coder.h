@@ -141,13 +141,18 @@ typedef struct {
     size_t size, at;
 } ath_coder;
 
-static uint32_t coder_word(ath_coder *coder)
+/* The next four bytes; those behind the end are 0. */
+ATH_INLINE uint32_t coder_word(ath_coder *coder)
 {
     uint32_t word = 0;
-    for (int i = 0; i < 4; i++) {
-        word = word << 8 | (coder->at < coder->size ? coder->bytes[coder->at] : 0u);
-        coder->at++;
+    if (coder->at + 4 <= coder->size) {
+        const uint8_t *from = coder->bytes + coder->at;
+        word = (uint32_t)from[0] << 24 | (uint32_t)from[1] << 16 | (uint32_t)from[2] << 8 | from[3];
+    } else {
+        for (size_t i = coder->at; i < coder->size; i++)
+            word |= (uint32_t)coder->bytes[i] << (24 - 8 * (i - coder->at));
     }
+    coder->at += 4;
     return word;
 }
 

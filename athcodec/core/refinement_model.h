@@ -10,8 +10,8 @@
 enum { REFINED_SIGNS = 3 };
 
 typedef struct {
-    coefficient_model rows;  /* counts, and what is remembered of rows: of the differences */
-    number_model numbers[2]; /* of integers that are 0 in the layer before, of others */
+    coefficient_model rows; /* of the differences; its numbers are those of integers that are 0 in the layer before */
+    number_model known;     /* of others */
     ath_context sign[REFINED_SIGNS];
 } refinement_model;
 
@@ -19,7 +19,7 @@ typedef struct {
 static void refinement_model_init(refinement_model *model, int32_t frames, uint32_t *history)
 {
     coefficient_model_init(&model->rows, frames, history);
-    for (int32_t i = 0; i < 2; i++) number_model_init(&model->numbers[i]);
+    number_model_init(&model->known);
     for (int32_t i = 0; i < REFINED_SIGNS; i++) context_init(&model->sign[i], 32768);
 }
 
@@ -44,23 +44,43 @@ typedef struct {
     uint32_t ratio;
 } row_prediction;
 
-ATH_INLINE uint32_t coarse_at(const row_prediction *p, const int32_t *row, int32_t axis, int32_t k)
+/* What the layer before has around the integers of a row: magnitudes in its own steps, sums of them over the axes, and
+ * likewise those of the row that follows; zeros behind the last. */
+typedef struct {
+    uint32_t steps[3][ATH_SEGMENT_FRAMES + 2], all[ATH_SEGMENT_FRAMES + 2];
+    uint32_t below[3][ATH_SEGMENT_FRAMES + 2], all_below[ATH_SEGMENT_FRAMES + 2];
+} coarse_surroundings;
+
+/* Sums over the axes of the first `count` magnitudes of a row, and the magnitudes. */
+static void coarse_magnitudes(const row_prediction *p, const int32_t *row, int32_t count,
+                              uint32_t steps[3][ATH_SEGMENT_FRAMES + 2], uint32_t *all)
 {
-    if (k >= p->frames) return 0;
-    return p->coarse ? clipped(row[axis * p->frames + k]) : coarse_steps(row[axis * p->frames + k], p->ratio);
+    int32_t known = ath_min(count, p->frames);
+    memset(all, 0, (size_t)count * sizeof *all);
+    for (int32_t axis = 0; axis < 3; axis++) {
+        const int32_t *from = row + axis * p->frames;
+        for (int32_t k = 0; k < known; k++) {
+            steps[axis][k] = p->coarse ? clipped(from[k]) : coarse_steps(from[k], p->ratio);
+            all[k] += steps[axis][k];
+        }
+        for (int32_t k = known; k < count; k++) steps[axis][k] = 0;
+    }
+}
+
+/* Of the first `count` frequencies. */
+static void look_around(const row_prediction *p, int32_t count, coarse_surroundings *around)
+{
+    if (count == 0) return;
+    coarse_magnitudes(p, p->coarse ? p->coarse : p->row, count + 2, around->steps, around->all);
+    if (p->below) coarse_magnitudes(p, p->below, count + 1, around->below, around->all_below);
 }
 
 /* How loud the layer before is around an integer, where that is not known otherwise yet. */
-static uint32_t loudness(const row_prediction *p, int32_t axis, int32_t k)
+ATH_INLINE uint32_t loudness(const row_prediction *p, const coarse_surroundings *around, int32_t axis, int32_t k)
 {
-    const int32_t *row = p->coarse ? p->coarse : p->row;
-    uint32_t loud = 2 * (2 * coarse_at(p, row, axis, k + 1) + coarse_at(p, row, axis, k + 2)), below = 0;
-    for (int32_t other = 0; other < 3; other++) {
-        loud += coarse_at(p, row, other, k + 1);
-        if (other > axis) loud += coarse_at(p, row, other, k);
-        if (p->below) below += coarse_at(p, p->below, other, k);
-    }
-    return p->below ? loud + 2 * below + coarse_at(p, p->below, axis, k + 1) : loud;
+    uint32_t loud = 2 * (2 * around->steps[axis][k + 1] + around->steps[axis][k + 2]) + around->all[k + 1];
+    for (int32_t other = axis + 1; other < 3; other++) loud += around->steps[other][k];
+    return p->below ? loud + 2 * around->all_below[k] + around->below[axis][k + 1] : loud;
 }
 
 static int32_t differing_frequencies(const int32_t *row, const int32_t *predicted, int32_t frames)
@@ -72,16 +92,18 @@ static int32_t differing_frequencies(const int32_t *row, const int32_t *predicte
     return count;
 }
 
-/* expected: of the differences around this one, in 1/16. */
+/* differences: those around this one. */
 static int32_t code_refined_difference(ath_coder *coder, refinement_model *model, const row_prediction *prediction,
-                                       int32_t axis, int32_t k, uint32_t expected, int32_t difference)
+                                       const coarse_surroundings *around, const row_surroundings *differences,
+                                       int32_t axis, int32_t k, int32_t difference)
 {
     int32_t predicted = prediction->row[axis * prediction->frames + k];
-    int known = coarse_at(prediction, prediction->coarse ? prediction->coarse : prediction->row, axis, k) > 0;
-    expected = !known                  ? expected + 2 * loudness(prediction, axis, k)
-               : prediction->ratio > 1 ? 4 * prediction->ratio
-                                       : expected;
-    uint32_t magnitude = code_unsigned(coder, &model->numbers[known], expected, magnitude_of(difference));
+    int known = around->steps[axis][k] > 0;
+    number_model *number = known ? &model->known : model->rows.numbers + row_number(differences, axis, k);
+    uint32_t expected =
+        known && prediction->ratio > 1 ? 4 * prediction->ratio : expected_magnitude(differences, axis, k);
+    if (!known) expected += 2 * loudness(prediction, around, axis, k);
+    uint32_t magnitude = code_unsigned(coder, number, expected, magnitude_of(difference));
     if (magnitude == 0) return 0;
     int negative = predicted < 0;
     if (predicted == 0)
@@ -102,33 +124,25 @@ static int32_t code_refined_row(ath_coder *coder, refinement_model *refinement, 
     coefficient_model *model = &refinement->rows;
     int32_t frames = prediction->frames;
     const int32_t *predicted = prediction->row;
-    const uint32_t *history = model->history + (size_t)slot * (size_t)frames;
-    const uint32_t *above = model->sums[model->turn] + SUMS_BEFORE;
-    uint32_t *sums = model->sums[model->turn ^= 1] + SUMS_BEFORE, last[3][3] = {{0}};
+    row_surroundings differences = start_row(model, frames, slot, above_count);
     int32_t count = code_count(coder, model, model->history_count[slot], ath_max(above_count, 0), rank,
                                ENCODING ? differing_frequencies(row, predicted, frames) : 0);
+    coarse_surroundings around;
+    look_around(prediction, count, &around);
     for (int32_t k = 0; k < count; k++) {
-        uint32_t over = above_count < 0 ? 0 : 2 * above[k] + above[k - 1] + above[k + 1];
-        uint32_t common = (2 * sums[k - 1] + sums[k - 2]) * 2 + over, beside = 0;
+        start_frequency(&differences, k);
         for (int32_t axis = 0; axis < 3; axis++) {
             int32_t at = axis * frames + k;
-            uint32_t *near = last[axis];
-            uint32_t around = axis == 0 ? history[k] : (beside * 16 / (uint32_t)axis + history[k]) / 2;
-            uint32_t expected = ((2 * near[0] + near[1] + near[2]) * 16 + common + around * 8) / 16;
-            int32_t difference =
-                code_refined_difference(coder, refinement, prediction, axis, k, expected, row[at] - predicted[at]);
+            int32_t difference = code_refined_difference(coder, refinement, prediction, &around, &differences, axis, k,
+                                                         row[at] - predicted[at]);
             if (!ENCODING) row[at] = predicted[at] + difference;
-            near[2] = near[1];
-            near[1] = near[0];
-            near[0] = clipped(difference);
-            beside += near[0];
+            note_magnitude(&differences, axis, k, clipped(difference));
         }
-        sums[k] = beside;
+        finish_frequency(&differences, k);
     }
     for (int32_t axis = 0; axis < 3 && !ENCODING; axis++)
         memcpy(row + axis * frames + count, predicted + axis * frames + count, (size_t)(frames - count) * sizeof *row);
-    memset(sums + count, 0, (size_t)(frames + 1 - count) * sizeof *sums);
-    remember_row(model, slot, frames, count, sums);
+    finish_row(model, &differences, slot, count);
     return count;
 }
 

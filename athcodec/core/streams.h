@@ -278,7 +278,7 @@ typedef struct {
         coefficient_model modes;
         refinement_model refined_modes;
     };
-    uint32_t history[ATH_SLOTS * REST_RUN];
+    uint32_t history[HISTORY_ROWS * REST_RUN];
     double bases[REST_BASES]; /* of runs of 1, 2, ... REST_RUN vertices, each made when it is first needed */
     double work[2 * REST_RUN * REST_RUN];
     uint8_t made[REST_RUN + 1];
