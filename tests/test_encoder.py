@@ -269,9 +269,9 @@ def test_half_of_the_progress_is_about_half_of_the_work(frames, effort, tmp_path
     done, reported = [0], []
     analyse = SegmentMotion.analyse
 
-    def counted(self, source, dead_zone):
+    def counted(self, source, rounding):
         done[0] += source.size
-        return analyse(self, source, dead_zone)
+        return analyse(self, source, rounding)
 
     monkeypatch.setattr(SegmentMotion, "analyse", counted)
     athcodec.encode(

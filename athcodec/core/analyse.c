@@ -81,7 +81,7 @@ static void both_ends(const double *row, int32_t T, double parts[2 * ATH_END_PAR
 static double settling(const ath_rounding *rounding, int32_t was, int32_t by, double off,
                        const double parts[2 * ATH_END_PARTS], const double left[2 * ATH_END_PARTS])
 {
-    static const double emptied = 0.5; /* for an integer that becomes 0 */
+    static const double emptied = 0.25; /* for an integer that becomes 0 */
     double cost = (off - by) * (off - by) - off * off - (was + by == 0 ? emptied : 0.0);
     for (int32_t i = 0; i < 2 * ATH_END_PARTS; i++) {
         double after = left[i] - by * parts[i];
@@ -92,8 +92,8 @@ static double settling(const ath_rounding *rounding, int32_t was, int32_t by, do
 
 /* Rounds integers of a row the other way where that brings its ends nearer, whose errors are the largest and are seen where
  * segments meet. units: what they stand for, less what is predicted; row: what they are to become. */
-static void settle_ends(const ath_stream *stream, int32_t T, double step, const ath_rounding *rounding, const double *row,
-                        const double *units, const int32_t *predicted, int32_t *quantised)
+static void settle_ends(const ath_stream *stream, int32_t T, double step, const ath_rounding *rounding,
+                        const double *row, const double *units, const int32_t *predicted, int32_t *quantised)
 {
     enum { LEAST_FRAMES = 8 };
     static const double least = 1e-3;

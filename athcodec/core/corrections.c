@@ -11,7 +11,7 @@ static const double BEND_BITS = 0.5, LEAST_BEND = 1.0 / 16;
 typedef struct {
     int32_t frames, is_float64;
     int32_t closed; /* of its ends, as ath_met_ends has it */
-    int32_t worst; /* the frame that is farthest beyond the limit; -1: none is */
+    int32_t worst;  /* the frame that is farthest beyond the limit; -1: none is */
     double step, limit2;
     double decoded[ATH_SEGMENT_FRAMES][3], wanted[ATH_SEGMENT_FRAMES][3], error[ATH_SEGMENT_FRAMES][3];
     double squares[ATH_SEGMENT_FRAMES];  /* of the errors' lengths */

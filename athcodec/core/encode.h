@@ -137,8 +137,7 @@ typedef struct ath_met_ends {
 ATH_ENCODER_API int64_t ath_find_corrections(int32_t vertex_count, int32_t frames, int is_float64,
                                              const void *positions, const double *source, const double origin[3],
                                              const double *limits, const uint8_t *narrow, double step,
-                                             const ath_met_ends *ends, int32_t *corrections,
-                                             int64_t capacity);
+                                             const ath_met_ends *ends, int32_t *corrections, int64_t capacity);
 ATH_ENCODER_API void ath_apply_corrections(int32_t frames, int is_float64, void *positions, double step,
                                            const int32_t *corrections, int64_t count);
 

@@ -300,9 +300,7 @@ class _ShownLevel:
 class _SegmentCoder:
     """Chunks {(level, kind): payload} and errors of stopping at each level, by each of MEASURES, of one segment."""
 
-    def __init__(
-        self, prelude: CodedPrelude, layers: Layers, segment_count: int, positions: np.ndarray, goes_on: bool
-    ):
+    def __init__(self, prelude: CodedPrelude, layers: Layers, segment_count: int, positions: np.ndarray, goes_on: bool):
         self._origin, self._dtype, self.positions = prelude.origin, prelude.dtype, positions
         self._pool, self._layered = prelude.plan.pool, len(layers.each) > 1
         self._level_0 = layers.level_0
@@ -405,8 +403,9 @@ class _SegmentCoder:
 
     def ends(self) -> list[End | None]:
         """What each level of the segment behind this one goes on from."""
+        source = self.positions + self._origin[:, None]
         *before, last = (shown.pose() for shown in self._shown)
-        return [*map(end_of, before), end_of(last, self._end_corrections)]
+        return [*(end_of(own, source) for own in before), end_of(last, source, self._end_corrections)]
 
     def _meet(self, start: np.ndarray) -> None:
         """Closes the start of the last level, in whose first frame the corrections of an end stand."""
@@ -576,9 +575,7 @@ class CodedMotion:
         """What the levels of the next segment go on from."""
         return self._coder.ends()
 
-    def joined_to(
-        self, ends: Sequence[End | None] = ()
-    ) -> tuple[dict[tuple[int, int], bytes], np.ndarray, np.ndarray]:
+    def joined_to(self, ends: Sequence[End | None] = ()) -> tuple[dict[tuple[int, int], bytes], np.ndarray, np.ndarray]:
         """Chunks {(level, kind): payload}, (levels, 3) errors of stopping at each level, and (levels,) how each is
         joined to the ends of the segment before; there are none for the first of a clip. To be called once."""
         coder, self._coder = self._coder, None  # which takes much memory

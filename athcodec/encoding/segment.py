@@ -34,6 +34,7 @@ FINER = 32  # step over that of segments that bases and modes are learned from
 ROWS_AT_ONCE = 1 << 14  # of coefficients
 WORK_BYTES = 1536 << 20  # of the segments coded at once, where `jobs` does not say how many these are
 CONNECTED_SHARE = 0.8  # of a rest pose at once, that one by faces may take where layers refine it
+LOOKED_AT = 64  # frames of a segment, for how it moves
 SEGMENT_WORK = 8  # memory of a segment while it is coded, over its float32 positions
 
 
@@ -89,10 +90,19 @@ class Source:
         ]
         self.segments = [segment for segments in self.clip_range_segments for segment in segments]
 
-    def end_weights(self, bound: float) -> tuple[float, float, float]:
-        """What the ends of rows weigh at a bound, see qz.end_weights."""
-        relative = bound / self.seen.diagonal if self.seen.diagonal > 0 else 1.0
-        return qz.end_weights(relative, has_seams=len(self.segments) > len(self.clip_range_segments))
+    def end_weights(self, bound: float) -> tuple[float, ...]:
+        """What the ends of rows weigh at a bound, where segments meet; see qz.end_weights."""
+        if len(self.segments) == len(self.clip_range_segments):
+            return (0.0, 0.0, 0.0)
+        return qz.end_weights(self.usual_change / bound)
+
+    @cached_property
+    def usual_change(self) -> float:
+        """RMS of the change of velocity, in length per frame squared, in the segment in the middle."""
+        start, stop = self.segments[len(self.segments) // 2]
+        frames = self.clip.block(start, min(stop, start + LOOKED_AT)).astype(np.float64)
+        changes = np.diff(frames, 2, axis=0)
+        return float(np.sqrt((changes**2).sum(axis=2).mean())) if len(changes) else 0.0
 
     def about(self, reference: np.ndarray | None) -> Source:
         """The same about another reference pose."""
@@ -237,7 +247,7 @@ class Settings:
     node_steps: np.ndarray  # (levels,) of the maps of nodes, scene units; see SegmentMotion.analyse_nodes
     rest_slack: float = 0.0  # what the rest pose may be off by, to save bits
     periodic: bool = False  # waves over time are, of loops that are one segment
-    end_weights: tuple[float, float, float] = (0.0, 0.0, 0.0)  # of rows, see qz.end_weights
+    end_weights: tuple[float, ...] = (0.0, 0.0, 0.0)  # of rows, see qz.end_weights
 
     @property
     def learning_levels(self) -> list[int]:
