@@ -31,8 +31,8 @@ CORRECTION_BYTES = 0.3  # that each position beyond the limit takes: a correctio
 class End:
     """What a level of the segment behind goes on from.
 
-    positions, source: (N, 3, END_FRAMES), decoded and wanted. usual: the change of velocity in a usual frame. corrections: (K, 6) in the last
-    frame, which stand in the first one of the segment behind as well.
+    positions, source: (N, 3, END_FRAMES), decoded and wanted. usual: the change of velocity in a usual frame.
+    corrections: (K, 6) in the last frame, which stand in the first one of the segment behind as well.
     """
 
     positions: np.ndarray

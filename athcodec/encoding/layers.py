@@ -164,7 +164,6 @@ def layers_of(source: Source, prelude: CodedPrelude, choice: Choice, ratios: Seq
             step=qz.single(settings.step * ratio),
             limit=settings.limit * ratio,
             layer=i,
-            end_weights=source.end_weights(settings.bound * ratio),
         )
         layers.append(Layer(plan, own, _modes(plan, choice, own, ratio), ratio, refined))
     source_rest = code_source_rest(source, prelude.plan.branches, layers[-1].plan.rest, settings.bound)

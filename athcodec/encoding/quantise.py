@@ -31,8 +31,8 @@ ROTATION_FACTORS = (0, 1, 2, 4, 8)
 
 WEIGHT_PARTS = (0.0, 0.05, 0.2)  # of a level's vertices that may have weights below that of its step
 
-# What the value, the slope and the bend of a row weigh, in squared steps, where the ends of segments meet: at most, and where
-# vertices change their velocity by one bound in a usual frame. Less by the square of that: who moves hides its errors.
+# What the value, the slope and the bend of a row weigh, in squared steps, where the ends of segments meet: at most, and
+# where the velocity changes by one bound in a usual frame. Less by the square of that: who moves hides its errors.
 MOST_END_WEIGHTS = (3.0, 100.0, 50.0)
 END_WEIGHTS = (5.0, 1.0, 0.25)
 MOST_USUAL_CHANGE = 6.0  # beyond which errors are noise everywhere, and ends weigh nothing

@@ -34,7 +34,6 @@ FINER = 32  # step over that of segments that bases and modes are learned from
 ROWS_AT_ONCE = 1 << 14  # of coefficients
 WORK_BYTES = 1536 << 20  # of the segments coded at once, where `jobs` does not say how many these are
 CONNECTED_SHARE = 0.8  # of a rest pose at once, that one by faces may take where layers refine it
-LOOKED_AT = 64  # frames of a segment, for how it moves
 SEGMENT_WORK = 8  # memory of a segment while it is coded, over its float32 positions
 
 
@@ -90,19 +89,10 @@ class Source:
         ]
         self.segments = [segment for segments in self.clip_range_segments for segment in segments]
 
-    def end_weights(self, bound: float) -> tuple[float, ...]:
-        """What the ends of rows weigh at a bound, where segments meet; see qz.end_weights."""
-        if len(self.segments) == len(self.clip_range_segments):
-            return (0.0, 0.0, 0.0)
-        return qz.end_weights(self.usual_change / bound)
-
-    @cached_property
-    def usual_change(self) -> float:
-        """RMS of the change of velocity, in length per frame squared, in the segment in the middle."""
-        start, stop = self.segments[len(self.segments) // 2]
-        frames = self.clip.block(start, min(stop, start + LOOKED_AT)).astype(np.float64)
-        changes = np.diff(frames, 2, axis=0)
-        return float(np.sqrt((changes**2).sum(axis=2).mean())) if len(changes) else 0.0
+    @property
+    def has_seams(self) -> bool:
+        """Whether segments meet."""
+        return len(self.segments) > len(self.clip_range_segments)
 
     def about(self, reference: np.ndarray | None) -> Source:
         """The same about another reference pose."""
@@ -247,7 +237,7 @@ class Settings:
     node_steps: np.ndarray  # (levels,) of the maps of nodes, scene units; see SegmentMotion.analyse_nodes
     rest_slack: float = 0.0  # what the rest pose may be off by, to save bits
     periodic: bool = False  # waves over time are, of loops that are one segment
-    end_weights: tuple[float, ...] = (0.0, 0.0, 0.0)  # of rows, see qz.end_weights
+    usual_change: float = np.inf  # of velocity, in length per frame squared, where segments meet
 
     @property
     def learning_levels(self) -> list[int]:
@@ -257,7 +247,7 @@ class Settings:
     @property
     def rounding(self) -> Rounding:
         """How numbers become integers."""
-        return Rounding(qz.DEAD_ZONE, self.end_weights)
+        return Rounding(qz.DEAD_ZONE, qz.end_weights(self.usual_change / float(np.min(self.limit))))
 
     def step_of(self, level: int) -> float:
         """Of the stems of a level."""
