@@ -106,7 +106,7 @@ static void both_ends(const double *row, int32_t T, double parts[2 * ATH_END_PAR
 static double settling(const ath_rounding *rounding, int32_t was, int32_t by, double off,
                        const double parts[2 * ATH_END_PARTS], const double left[2 * ATH_END_PARTS])
 {
-    static const double emptied = 0.5; /* for an integer that becomes 0 */
+    static const double emptied = 0.25; /* for an integer that becomes 0 */
     double cost = (off - by) * (off - by) - off * off - (was + by == 0 ? emptied : 0.0);
     for (int32_t i = 0; i < 2 * ATH_END_PARTS; i++) {
         double after = left[i] - by * parts[i];

@@ -31,25 +31,27 @@ CORRECTION_BYTES = 0.3  # that each position beyond the limit takes: a correctio
 class End:
     """What a level of the segment behind goes on from.
 
-    positions: (N, 3, END_FRAMES). usual: the change of velocity in a usual frame. corrections: (K, 6) in the last frame,
-    which stand in the first one of the segment behind as well.
+    positions, source: (N, 3, END_FRAMES), decoded and wanted. usual: the change of velocity in a usual frame.
+    corrections: (K, 6) in the last frame, which stand in the first one of the segment behind as well.
     """
 
     positions: np.ndarray
+    source: np.ndarray
     usual: float
     corrections: np.ndarray
 
 
-def end_of(positions: np.ndarray, corrections: np.ndarray = NO_CORRECTIONS) -> End | None:
+def end_of(positions: np.ndarray, source: np.ndarray, corrections: np.ndarray = NO_CORRECTIONS) -> End | None:
     """The end of a level; None: the segment is too short."""
     if positions.shape[2] <= END_FRAMES:
         return None
-    return End(positions[:, :, -END_FRAMES:].copy(), float(np.median(_changes(positions))), corrections)
+    ends = (numbers[:, :, -END_FRAMES:].copy() for numbers in (positions, source))
+    return End(*ends, _usual(_changes(positions)), corrections)
 
 
 def end_corrections(away: np.ndarray, limit: float | np.ndarray, step: float, frame: int) -> np.ndarray:
-    """Corrections (K, 6) of `frame`, the last one, for vertices that are beyond their limits there or right before, of as
-    few axes as do. away: (N, 3, 4) how far they are off in the last frames."""
+    """Corrections (K, 6) of `frame`, the last one, for vertices that are beyond their limits there or right before, of
+    as few axes as do. away: (N, 3, 4) how far they are off in the last frames."""
     limits = np.broadcast_to(limit, len(away))
     own = np.flatnonzero((_squares(away[:, :, -2:]) > limits[:, None] ** 2).any(axis=1))
     away, limits = away[own], limits[own]
@@ -123,13 +125,19 @@ def _changes(positions: np.ndarray) -> np.ndarray:
     return np.sqrt(_squares(np.diff(positions.astype(np.float64), 2, axis=2)).mean(axis=0))
 
 
+def _usual(changes: np.ndarray) -> float:
+    """Those of a usual frame; of motion between keys, most frames of which have none, half the RMS."""
+    return max(float(np.median(changes)), 0.5 * float(np.sqrt((changes**2).mean())))
+
+
 def best_join(end: End, positions: np.ndarray, source: np.ndarray, price: ErrorPrice | CorrectionPrice) -> int:
     """How to join a level of a segment to the end of the one before: over how many frames, SLOPED above that where
     slopes are joined too; 0: not at all. source: (N, 3, T) what is coded, in the coordinates of the positions."""
-    natural = np.concatenate([np.zeros(END_FRAMES), _changes(positions)])
-    usual = min(end.usual, float(np.median(natural[END_FRAMES:])))
-    natural = np.maximum(natural, usual)  # at the last frame before, and the segment's own
-    natural[: END_FRAMES + 1] = usual
+    own = _changes(positions)
+    usual = min(end.usual, _usual(own))
+    wanted = _changes(np.concatenate([end.source, source[:, :, : END_FRAMES + 1]], axis=2))
+    wanted *= usual / max(_usual(_changes(source)), 1e-300)
+    natural = np.maximum(np.concatenate([wanted, own[1:]]), usual)  # from the last frame before the seam on
 
     def cost(join: int) -> float:
         width = join % SLOPED

@@ -146,7 +146,6 @@ def layers_of(source: Source, prelude: CodedPrelude, choice: Choice, ratios: Seq
             step=qz.single(settings.step * ratio),
             limit=settings.limit * ratio,
             layer=i,
-            end_weights=source.end_weights(settings.bound * ratio),
         )
         layers.append(Layer(plan, own, _modes(plan, choice, own, ratio), ratio, refined))
     source_rest = code_source_rest(source, prelude.plan.branches, layers[-1].plan.rest, settings.bound)
@@ -388,8 +387,9 @@ class _SegmentCoder:
 
     def ends(self) -> list[End | None]:
         """What each level of the segment behind this one goes on from."""
+        source = self.positions + self._origin[:, None]
         *before, last = (shown.pose() for shown in self._shown)
-        return [*map(end_of, before), end_of(last, self._end_corrections)]
+        return [*(end_of(own, source) for own in before), end_of(last, source, self._end_corrections)]
 
     def _meet(self, start: np.ndarray) -> None:
         """Closes the start of the last level, in whose first frame the corrections of an end stand."""

@@ -32,19 +32,20 @@ ROTATION_FACTORS = (0, 1, 2, 4, 8)
 
 WEIGHT_PARTS = (0.0, 0.05, 0.2)  # of a level's vertices that may have weights below that of its step
 
-# What the value, the slope and the bend of a row at either end of a segment weigh, in squared steps, at bounds over the
-# diagonal of 10^-5 to 10^-2; where the ends meet those of other segments, and where they do not.
-SEAM_WEIGHTS = ((0.0, 2.0, 3.0, 5.0), (0.0, 3.0, 40.0, 100.0), (0.0, 1.0, 10.0, 50.0))
-END_WEIGHTS = ((0.0, 0.0, 1.0, 1.0),) * 3
+# What the value, the slope and the bend of a row weigh, in squared steps, where the ends of segments meet: at most, and
+# where the velocity changes by one bound in a usual frame. Less by the square of that: who moves hides its errors.
+MOST_END_WEIGHTS = (3.0, 100.0, 50.0)
+END_WEIGHTS = (5.0, 1.0, 0.25)
+MOST_USUAL_CHANGE = 6.0  # beyond which errors are noise everywhere, and ends weigh nothing
 
 
-def end_weights(relative_bound: float, has_seams: bool) -> tuple[float, float, float]:
-    """The weights of ends for a bound."""
-    at = np.log10(max(relative_bound, SMALLEST_BOUND))
-    value, slope, bend = (
-        float(np.interp(at, [-5, -4, -3, -2], weights)) for weights in (SEAM_WEIGHTS if has_seams else END_WEIGHTS)
+def end_weights(usual_change: float) -> tuple[float, ...]:
+    """The weights for a change of velocity in a usual frame, over the bound."""
+    if usual_change > MOST_USUAL_CHANGE:
+        return (0.0, 0.0, 0.0)
+    return tuple(
+        min(most, weight / max(usual_change, 1e-9) ** 2) for most, weight in zip(MOST_END_WEIGHTS, END_WEIGHTS)
     )
-    return value, slope, bend
 
 
 def error_limit(bound: float, diagonal: float) -> float:

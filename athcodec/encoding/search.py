@@ -159,7 +159,7 @@ def first_settings(
         learned_bases=(False,) * levels,
         learned_pieces=None,
         node_steps=np.full(levels, step),
-        end_weights=source.end_weights(bound),
+        usual_change=usual_change(samples) if source.has_seams else np.inf,
         narrow=Feature.WIDE in source.without,
     )
     if layered and not settings.details.any():  # adaptive rest poses are worth less to those that refine them
@@ -205,6 +205,12 @@ def with_rest_slack(source: Source, ath: Ath, settings: Settings, slack: float) 
     """A rest pose that is off by as much, of the coarsest step that allows it."""
     rest_step = qz.single(0.9999 * qz.LATTICE_REST_CAP * slack)
     return with_best_lags(source, ath, replace(settings, rest_step=rest_step, rest_slack=slack))
+
+
+def usual_change(samples: Sequence[SegmentSample]) -> float:
+    """RMS of the change of velocity of samples, in length per frame squared; infinite where they are too short."""
+    changes = [np.diff(sample.positions, 2, axis=2) for sample in samples if sample.positions.shape[2] > 2]
+    return float(np.sqrt(np.mean([(own**2).sum(axis=1).mean() for own in changes]))) if changes else np.inf
 
 
 def _coarser(settings: Settings, ratio: int) -> Settings:
@@ -354,12 +360,7 @@ class Search:
 
     def first_layer(self, settings: Settings, ratio: int) -> Settings:
         """Settings of a layer whose step is `ratio` times that of the given ones."""
-        first = replace(
-            _coarser(settings, ratio),
-            learned_bases=(False,) * self.levels,
-            learned_pieces=None,
-            end_weights=self.source.end_weights(ratio * settings.bound),
-        )
+        first = replace(_coarser(settings, ratio), learned_bases=(False,) * self.levels, learned_pieces=None)
         for step in (self._with_rotations, self._with_learned_bases, self._with_learned_modes):
             first = first if self.effort == "fast" else step(first)
         return self._with_node_steps(first)

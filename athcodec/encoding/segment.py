@@ -91,10 +91,10 @@ class Source:
         ]
         self.segments = [segment for segments in self.clip_range_segments for segment in segments]
 
-    def end_weights(self, bound: float) -> tuple[float, float, float]:
-        """What the ends of rows weigh at a bound, see qz.end_weights."""
-        relative = bound / self.seen.diagonal if self.seen.diagonal > 0 else 1.0
-        return qz.end_weights(relative, has_seams=len(self.segments) > len(self.clip_range_segments))
+    @property
+    def has_seams(self) -> bool:
+        """Whether segments meet."""
+        return len(self.segments) > len(self.clip_range_segments)
 
     def about(self, reference: np.ndarray | None) -> Source:
         """The same about another reference pose."""
@@ -268,7 +268,7 @@ class Settings:
     node_steps: np.ndarray  # (levels,) of the maps of nodes, scene units; see SegmentMotion.analyse_nodes
     rest_slack: float = 0.0  # what the rest pose may be off by, to save bits
     periodic: bool = False  # waves over time are, of loops that are one segment
-    end_weights: tuple[float, float, float] = (0.0, 0.0, 0.0)  # of rows, see qz.end_weights
+    usual_change: float = np.inf  # of velocity, in length per frame squared, where segments meet
     narrow: bool = False  # corrections are of one frame
 
     @property
@@ -279,7 +279,7 @@ class Settings:
     @property
     def rounding(self) -> Rounding:
         """How numbers become integers."""
-        return Rounding(qz.DEAD_ZONE, self.end_weights)
+        return Rounding(qz.DEAD_ZONE, qz.end_weights(self.usual_change / float(np.min(self.limit))))
 
     def step_of(self, level: int) -> float:
         """Of the stems of a level."""

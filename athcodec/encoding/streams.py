@@ -260,8 +260,8 @@ def encode_exact(positions: np.ndarray, source: np.ndarray) -> bytes:
 class MetEnds:
     """How the corrections of a segment meet those of the segments beside it.
 
-    closed: the ends at which no footprint is cut off, FIRST and LAST. decided: (K, 6) int32 corrections in ascending order,
-    which stand in the first frame of one segment as in the last of the other.
+    closed: the ends at which no footprint is cut off, FIRST and LAST. decided: (K, 6) int32 corrections in ascending
+    order, which stand in the first frame of one segment as in the last of the other.
     """
 
     closed: int = 0
@@ -289,9 +289,9 @@ def find_corrections(
 ) -> np.ndarray | None:
     """Brings every vertex of (N, 3, T) positions within `limit` of the source, in place; limit: one, or one each (N,).
 
-    narrow: of which vertices, (N,) bool, corrections are to be of one frame. ends: how they meet those of the segments beside
-    this one. Returns the corrections applied, (K, 6) int32, or None where they cannot be expressed in this step.
-    """
+    narrow: of which vertices, (N,) bool, corrections are to be of one frame. ends: how they meet those of the
+    segments beside this one. Returns the corrections applied, (K, 6) int32, or None where this step cannot
+    express them."""
     vertices, _, frames = positions.shape
     limits = np.array(np.broadcast_to(limit, vertices), np.float64)
     of_one_frame = np.array(np.broadcast_to(narrow, vertices), np.uint8)
