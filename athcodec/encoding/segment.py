@@ -33,6 +33,7 @@ from athcodec.threads import SERIAL, ThreadPool, default_jobs
 FINER = 32  # step over that of segments that bases and modes are learned from
 ROWS_AT_ONCE = 1 << 14  # of coefficients
 WORK_BYTES = 1536 << 20  # of the segments coded at once, where `jobs` does not say how many these are
+COPIES_BENDS = 0.0, 0.15  # of copies of one shape that are tried
 CONNECTED_SHARE = 0.8  # of a rest pose at once, that one by faces may take where layers refine it
 SEGMENT_WORK = 8  # memory of a segment while it is coded, over its float32 positions
 
@@ -226,6 +227,7 @@ class Settings:
     only_tips: bool  # pieces that carry others have no rotations
     node_steps: np.ndarray  # (levels,) of the maps of nodes, scene units; see SegmentMotion.analyse_nodes
     rest_slack: float = 0.0  # what the rest pose may be off by, to save bits
+    copies_bend: float | None = None  # what copies of one shape may be bent by, over their size; None: not looked for
     periodic: bool = False  # waves over time are, of loops that are one segment
 
     @property
@@ -290,7 +292,8 @@ def _rest_within(source: Source, branches: np.ndarray, settings: Settings) -> st
 
     def encode(step: float) -> streams.CodedRest:
         mesh = source.mesh if settings.connected_rest else None
-        return streams.encode_rest(branches, step, source.rest, None, settings.adaptive_rest, settings.rest_slack, mesh)
+        given = (settings.adaptive_rest, settings.rest_slack, mesh, settings.copies_bend)
+        return streams.encode_rest(branches, step, source.rest, None, *given)
 
     return _within(settings.bound, source.rest, encode, settings.rest_step)
 
@@ -320,7 +323,7 @@ def with_best_lags(source: Source, ath: Ath, settings: Settings) -> Settings:
         ]
     if settings.details.any():
         candidates = [own for own in candidates if own.adaptive_rest]
-
+    candidates += [replace(own, copies_bend=bend) for own in candidates if own.adaptive_rest for bend in COPIES_BENDS]
     return candidates[0] if len(candidates) == 1 else min(candidates, key=lambda some: _poses_size(source, ath, some))
 
 
