@@ -30,8 +30,8 @@ typedef struct {
     number_model rank, turn, scale;
     uint32_t mean_rank;
     lattice_model lattice;
-    rest_memory first, others; /* of the vertices of copies */
-    double increment[3];       /* of the last copy, to its first vertex */
+    rest_memory first, others;                        /* of the vertices of copies */
+    double increment[3];                              /* of the last copy, to its first vertex */
     int32_t shape_count, are_bent, role[COPY_COUNTS]; /* role: of the last branch of so many vertices */
     rest_shape shapes[REST_SHAPES];                   /* the one used last comes first */
 } copy_model;
@@ -214,7 +214,13 @@ typedef struct {
 static void jacobi4(double A[4][4], double V[4][4])
 {
     for (int32_t i = 0; i < 16; i++) V[i / 4][i % 4] = i / 4 == i % 4;
-    for (int32_t sweep = 0; sweep < JACOBI_SWEEPS; sweep++)
+    for (int32_t sweep = 0; sweep < JACOBI_SWEEPS; sweep++) {
+        double left = 0.0, whole = 0.0;
+        for (int32_t i = 0; i < 4; i++) {
+            whole += A[i][i] * A[i][i];
+            for (int32_t j = 0; j < i; j++) left += A[i][j] * A[i][j];
+        }
+        if (left <= 1e-28 * whole) break;
         for (int32_t p = 0; p < 3; p++)
             for (int32_t r = p + 1; r < 4; r++) {
                 if (A[p][r] == 0.0) continue;
@@ -235,6 +241,7 @@ static void jacobi4(double A[4][4], double V[4][4])
                     V[k][r] = s * a + c * b;
                 }
             }
+    }
 }
 
 static void mean_point(const double *points, int32_t count, double mean[3])
@@ -285,8 +292,7 @@ static void fit_copy(const double *from, const double *to, int32_t count, int mi
     for (int32_t k = 0; k < 4; k++) fit->q[k] = V[k][best];
     if (2.0 * (A[best][best] - A[next][next]) <= 0.1 * tolerance * tolerance * count) {
         double z = V[3][best], other = V[3][next], length = ath_sqrt(z * z + other * other);
-        for (int32_t k = 0; k < 4 && length > 1e-12; k++)
-            fit->q[k] = (V[k][best] * other - V[k][next] * z) / length;
+        for (int32_t k = 0; k < 4 && length > 1e-12; k++) fit->q[k] = (V[k][best] * other - V[k][next] * z) / length;
     }
     fit->scale = squares > 0.0 ? A[best][best] / squares : 1.0;
     double left = others - fit->scale * A[best][best];
@@ -294,7 +300,8 @@ static void fit_copy(const double *from, const double *to, int32_t count, int mi
 }
 
 /* Is a branch a copy of a shape, but for so much, or bent by no more than such a part of its size? */
-static int looks_like_copy(const ath_branch *shape, const ath_branch *branch, const double *pose, double tolerance, double bend)
+static int looks_like_copy(const ath_branch *shape, const ath_branch *branch, const double *pose, double tolerance,
+                           double bend)
 {
     const double *from = pose + 3 * (size_t)shape->first, *to = pose + 3 * (size_t)branch->first;
     double lever = copy_lever(shape, pose), size = copy_lever(branch, pose), most = OF_TOLERANCE * tolerance;
@@ -397,8 +404,8 @@ static double copy_cost(const copy_model *model, const ath_branch *branch, const
         cost *= 1.0 + magnitude_of(integers[k]);
     }
     if (place->bent) return cost;
-    error = copy_error(place, rest + 3 * (size_t)shape->first, target, source + 3 * (size_t)branch->first,
-                       branch->count);
+    error =
+        copy_error(place, rest + 3 * (size_t)shape->first, target, source + 3 * (size_t)branch->first, branch->count);
     return error <= tolerance ? cost + 0.01 * error / tolerance : 1e300;
 }
 

@@ -227,7 +227,7 @@ class Settings:
     only_tips: bool  # pieces that carry others have no rotations
     node_steps: np.ndarray  # (levels,) of the maps of nodes, scene units; see SegmentMotion.analyse_nodes
     rest_slack: float = 0.0  # what the rest pose may be off by, to save bits
-    copies_bend: float | None = None  # what copies of one shape may be bent by, over their size; None: not looked for
+    shape_of: np.ndarray | None = None  # (B,) of streams.find_copies; None: the rest pose has no copies
     periodic: bool = False  # waves over time are, of loops that are one segment
 
     @property
@@ -264,6 +264,7 @@ class CodedPrelude:
         self.origin, self.dtype = source.origin, np.dtype(source.clip.dtype)
         branches = branch_records(hierarchy, ath, settings)
         self.plan = Plan(branches, hierarchy.vertex_count, source.pool, predicted=predicted, layer=settings.layer)
+        self.shape_of = settings.shape_of
         self.rest_chunk, rest = _coded_rest(source, branches, settings)
         self.plan.set_rest(rest)
         self.hierarchy_stream = streams.encode_hierarchy(branches, hierarchy.branch_source, hierarchy.vertex_source)
@@ -292,7 +293,7 @@ def _rest_within(source: Source, branches: np.ndarray, settings: Settings) -> st
 
     def encode(step: float) -> streams.CodedRest:
         mesh = source.mesh if settings.connected_rest else None
-        given = (settings.adaptive_rest, settings.rest_slack, mesh, settings.copies_bend)
+        given = (settings.adaptive_rest, settings.rest_slack, mesh, settings.shape_of)
         return streams.encode_rest(branches, step, source.rest, None, *given)
 
     return _within(settings.bound, source.rest, encode, settings.rest_step)
@@ -310,7 +311,8 @@ def _within(
 
 
 def with_best_lags(source: Source, ath: Ath, settings: Settings) -> Settings:
-    """The lags, and adaptive, connected or neither, that make hierarchy and rest pose smallest at these steps."""
+    """The lags, adaptive, connected or neither, and copies that make hierarchy and rest pose smallest at these steps."""
+    settings = replace(settings, shape_of=None)
     own = lags(source, settings.rest_step, settings.details)
     candidates = [replace(settings, lags=own, adaptive_rest=False, connected_rest=False)]
     if not source.reference_is_exact:
@@ -323,8 +325,19 @@ def with_best_lags(source: Source, ath: Ath, settings: Settings) -> Settings:
         ]
     if settings.details.any():
         candidates = [own for own in candidates if own.adaptive_rest]
-    candidates += [replace(own, copies_bend=bend) for own in candidates if own.adaptive_rest for bend in COPIES_BENDS]
+    candidates += _with_copies(source, ath, candidates)
     return candidates[0] if len(candidates) == 1 else min(candidates, key=lambda some: _poses_size(source, ath, some))
+
+
+def _with_copies(source: Source, ath: Ath, candidates: list[Settings]) -> list[Settings]:
+    """The adaptive ones of the candidates with branches that are copies of others, where there are any."""
+    adaptive = [settings for settings in candidates if settings.adaptive_rest]
+    if not adaptive:
+        return []
+    own, branches = adaptive[0], branch_records(source.hierarchy, ath, adaptive[0])
+    found = [streams.find_copies(branches, own.rest_step, source.rest, own.rest_slack, bend) for bend in COPIES_BENDS]
+    shapes = [shape_of for shape_of in found if shape_of is not None]
+    return [replace(settings, shape_of=shape_of) for settings in adaptive for shape_of in shapes]
 
 
 def _poses_size(source: Source, ath: Ath, settings: Settings) -> int:

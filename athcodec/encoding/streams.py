@@ -52,14 +52,13 @@ def encode_rest(
     adaptive: bool = False,
     slack: float = 0.0,
     mesh: Mesh | None = None,
-    bend: float | None = None,
+    shape_of: np.ndarray | None = None,
 ) -> CodedRest:
     """A rest pose, (N, 3) float64 less the origin; about that of the layer before, if there is one.
 
     slack: how far from its place a vertex may be put to save bits, where `adaptive`. mesh: that it goes by, then.
-    bend: branches that are copies of others, but for so much of their size, are coded as such; None: none are.
+    shape_of: as find_copies gives it; copies that are too far off are coded as other branches are.
     """
-    shape_of = None if bend is None else find_copies(branches, step, rest, slack, bend)
     decoded, steps, moved = np.zeros_like(rest), np.zeros(rest.shape, np.int32), np.empty_like(rest)
     with nullcontext() if mesh is None else mesh.lock:
         data = encode_stream(
