@@ -10,7 +10,7 @@ enum { PLAIN_PART, SHAPE_PART, COPY_PART, PART_ROLES };
 
 #define SHAPE_FINER 0.25 /* steps of a shape, over those of other branches */
 #define COPY_PLACE 0.5   /* units of a copy's first vertex, likewise */
-#define COPY_TURN 0.5    /* what a unit of a quaternion's number moves the furthest vertex by, halved, in units */
+#define COPY_TURN 0.9    /* units that the furthest vertex moves by where a quaternion's number changes by 1, halved */
 #define BENT_TURN 2.0    /* the same of copies whose other vertices are coded as well */
 
 /* Mean magnitudes of an integer, and of its difference from the one before. */
@@ -64,11 +64,6 @@ static void copy_model_init(copy_model *model)
     rest_memory_init(&model->others);
 }
 
-ATH_INLINE int32_t *last_role(copy_model *model, const ath_branch *branch)
-{
-    return model->role + ath_min(branch->count, COPY_COUNTS) - 1;
-}
-
 /* Shape number `rank` of those with so many vertices, by when they were used last; -1: there are not so many. */
 static int32_t shape_of_rank(const copy_model *model, const ath_branch *branches, int32_t count, int32_t rank)
 {
@@ -119,12 +114,18 @@ static double copy_lever(const ath_branch *shape, const double *rest)
     return ath_sqrt(most);
 }
 
-/* Rotation, scale and mirror of a copy from its integers; shape gets what is remembered of it. 0: not valid. */
-static int copy_matrix(copy_place *place, double lever, double unit, rest_shape *shape)
+/* What one is to a copy's integers. */
+ATH_INLINE double copy_quantum(const copy_place *place, double lever, double unit)
 {
-    double quantum = lever > 0.0 ? (place->bent ? BENT_TURN : COPY_TURN) * unit / lever : 0.0;
+    return lever > 0.0 ? (place->bent ? BENT_TURN : COPY_TURN) * unit / lever : 1.0;
+}
+
+ATH_INLINE int is_copy_scale(double s) { return s > 1e-3 && s < 1e3; }
+
+/* Rotation, scale and mirror of a copy from its integers; shape gets what is remembered of it. 0: not valid. */
+static int copy_matrix(copy_place *place, double quantum, rest_shape *shape)
+{
     double scale = (double)place->scale * quantum, s = 1.0 + scale, squares = 0.0, *q = shape->turn;
-    if (!(s > 1e-3 && s < 1e3)) return 0;
     for (int32_t c = 0; c < 4; c++) {
         if (c == place->largest) continue;
         q[c] = (double)place->turns[c] * (quantum / s);
@@ -184,10 +185,11 @@ static int code_copy_place(ath_coder *coder, copy_model *model, rest_shape *shap
 {
     place->mirrored = coder_bit(coder, &model->mirrored[shape->mirrored], place->mirrored);
     place->bent = model->are_bent = coder_bit(coder, &model->bent[model->are_bent], place->bent);
-    double quantum = lever > 0.0 ? (place->bent ? BENT_TURN : COPY_TURN) * unit / lever : 1.0;
+    double quantum = copy_quantum(place, lever, unit), s;
     if (!code_copy_number(coder, &model->scale, &shape->scales, steps_in(shape->scale, quantum, 0.5), &place->scale))
         return 0;
-    double s = 1.0 + (double)place->scale * quantum;
+    s = 1.0 + (double)place->scale * quantum;
+    if (!is_copy_scale(s)) return 0;
     int32_t high = coder_bit(coder, &model->largest[0], place->largest >> 1);
     place->largest = high << 1 | coder_bit(coder, &model->largest[1 + high], place->largest & 1);
     for (int32_t c = 0; c < 4; c++) {
@@ -195,7 +197,7 @@ static int code_copy_place(ath_coder *coder, copy_model *model, rest_shape *shap
         if (c != place->largest && !code_copy_number(coder, &model->turn, shape->turns + c, last, place->turns + c))
             return 0;
     }
-    return copy_matrix(place, lever, unit, shape);
+    return copy_matrix(place, quantum, shape);
 }
 
 #ifdef ATH_ENCODING
@@ -329,12 +331,11 @@ static double copy_tolerance(const ath_branch *branch, double unit, double slack
 }
 
 /* Integers that are next to a similarity. 0: there are none. */
-static int copy_integers(const copy_fit *fit, double lever, double unit, copy_place *place)
+static int copy_integers(const copy_fit *fit, double quantum, copy_place *place)
 {
-    double quantum = lever > 0.0 ? (place->bent ? BENT_TURN : COPY_TURN) * unit / lever : 1.0;
     place->scale = steps_in(fit->scale - 1.0, quantum, 0.5);
     double s = 1.0 + (double)place->scale * quantum;
-    if (!(s > 1e-3 && s < 1e3)) return 0;
+    if (!is_copy_scale(s)) return 0;
     place->largest = 0;
     for (int32_t c = 1; c < 4; c++)
         if (fit->q[c] * fit->q[c] > fit->q[place->largest] * fit->q[place->largest]) place->largest = c;
@@ -425,7 +426,8 @@ static int choose_copy(const copy_model *model, const ath_branch *branches, cons
     double change = (fit->scale - 1.0) * lever;
     if (change * change < 0.04 * tolerance * tolerance) fit->scale = 1.0;
     start.bent = fit->off > tolerance;
-    if (!copy_integers(fit, lever, unit, &start)) return 0;
+    double quantum = copy_quantum(&start, lever, unit);
+    if (!copy_integers(fit, quantum, &start)) return 0;
     for (int32_t choice = 0; choice < 27 && cheapest > 1.1; choice++) {
         copy_place tried = start;
         rest_shape memory = model->shapes[index];
@@ -435,7 +437,7 @@ static int choose_copy(const copy_model *model, const ath_branch *branches, cons
             if (fit->q[c] != 0.0) tried.turns[c] += step[left % 3];
             left /= 3;
         }
-        if (!copy_matrix(&tried, lever, unit, &memory)) continue;
+        if (!copy_matrix(&tried, quantum, &memory)) continue;
         double cost = copy_cost(model, branch, shape, &tried, unit, slack, source, rest);
         if (cost >= cheapest) continue;
         cheapest = cost;

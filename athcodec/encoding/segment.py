@@ -311,7 +311,7 @@ def _within(
 
 
 def with_best_lags(source: Source, ath: Ath, settings: Settings) -> Settings:
-    """The lags, adaptive, connected or neither, and copies that make hierarchy and rest pose smallest at these steps."""
+    """The lags, adaptive, connected or neither, and the copies that make hierarchy and rest pose smallest."""
     settings = replace(settings, shape_of=None)
     own = lags(source, settings.rest_step, settings.details)
     candidates = [replace(settings, lags=own, adaptive_rest=False, connected_rest=False)]
