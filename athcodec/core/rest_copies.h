@@ -75,7 +75,7 @@ static int32_t shape_of_rank(const copy_model *model, const ath_branch *branches
 static void move_to_front(copy_model *model, int32_t at)
 {
     rest_shape used = model->shapes[at];
-    memmove(model->shapes + 1, model->shapes, (size_t)at * sizeof used);
+    for (; at > 0; at--) model->shapes[at] = model->shapes[at - 1];
     model->shapes[0] = used;
 }
 
