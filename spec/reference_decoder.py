@@ -881,12 +881,21 @@ def decode_rest(
     rest: list[list[float]] = []
     all_steps: list[list[int]] = []
     adaptive = AdaptiveRest(), AdaptiveRest()  # of branches without detail, and with it
+    copies = Copies()
+    has_copies = is_adaptive and before is None and bool(coder.bit(copies.any))
     if mesh is not None:
-        rest, all_steps = decode_connected_rest(coder, branches, usual_step, before, mesh, adaptive)
+        own = copies if has_copies else None
+        rest, all_steps = decode_connected_rest(coder, branches, usual_step, before, mesh, adaptive, own)
         coder.finish()
         return RestLayer(rest, all_steps)
-    for branch in branches:
+    for b, branch in enumerate(branches):
         step = rest_step(branch, usual_step)
+        is_shape, copy = decode_part(coder, copies, branches, b, step, rest) if has_copies else (False, None)
+        if copy is not None:
+            rest += copy
+            all_steps += [[0, 0, 0] for _ in copy]
+            continue
+        step = SHAPE_FINER * step if is_shape else step
         single_vertices = branch.count if branch.lag > 0 else 1 if branch.attach < 0 else 0
         for i in range(single_vertices):
             if is_adaptive:
@@ -1034,7 +1043,7 @@ def decode_expected_vertex(
     """Position and integers of a vertex about the guesses of its offset."""
     own, per_unit = model.phases[phase], 1.0 / unit
     offset = [expected_offset(model.all, own, guesses, k) for k in range(3)]
-    steps = decode_rest_point(coder, model, own)
+    steps = decode_rest_point(coder, model.lattice, model.all, own)
     point = [(base[k] + offset[k] * unit) + float(steps[k]) * unit for k in range(3)]
     offset = [(point[k] - base[k]) * per_unit for k in range(3)]
     for memory, rate in (model.all, 0.06), (own, 0.1):
@@ -1102,11 +1111,11 @@ def expected_offset(everywhere: RestMemory, own: RestMemory, guesses: Points, k:
     return total / weights
 
 
-def decode_rest_point(coder: RangeDecoder, model: AdaptiveRest, own: RestMemory) -> list[int]:
+def decode_rest_point(coder: RangeDecoder, lattice: LatticeModel, everywhere: RestMemory, own: RestMemory) -> list[int]:
     steps: list[int] = []
     for k in range(3):
-        classes = [number_class((m[k] + m[0] + m[1] + m[2]) // 4) for m in (model.all.mean, own.mean)]
-        steps.append(model.lattice.code(coder, parity_of(steps, k), (classes[0] + classes[1] + 1) // 2))
+        classes = [number_class((m[k] + m[0] + m[1] + m[2]) // 4) for m in (everywhere.mean, own.mean)]
+        steps.append(lattice.code(coder, parity_of(steps, k), (classes[0] + classes[1] + 1) // 2))
     return steps
 
 
@@ -1298,6 +1307,7 @@ def decode_connected_rest(
     before: RestLayer | None,
     mesh: Mesh,
     by_stems: tuple[AdaptiveRest, AdaptiveRest],
+    copies: Copies | None,
 ) -> tuple[list, list]:
     """In the order of the mesh; by_stems: what is learned of vertices without neighbours, as `decode_rest` has it."""
     by_faces = AdaptiveRest(), AdaptiveRest()
@@ -1307,9 +1317,21 @@ def decode_connected_rest(
             own.filters[f].weight = [1.0 if j == (0 if f > 0 else 2) else 0.0 for j in range(10)]
     rest: list = [None] * len(mesh.order)
     steps, seen_from = list(rest), list(rest)
-    for v in mesh.order:
+    shape = None  # the last branch that is one
+    for t, v in enumerate(mesh.order):
+        if rest[v] is not None:
+            continue
         ring, branch = ring_of(mesh, rest, v), branch_of(branches, v)
-        unit, kind = 0.625 * rest_step(branch, step), branch.detail > 0
+        own_step, kind = rest_step(branch, step), branch.detail > 0
+        stem = range(branch.first, branch.first + branch.count)
+        if copies and ring.base is None and v == branch.first and all(mesh.rank[w] >= t for w in stem):
+            is_shape, copy = decode_part(coder, copies, branches, branches.index(branch), own_step, rest)
+            if copy is not None:
+                for w, point in zip(stem, copy):
+                    rest[w], steps[w] = point, [0, 0, 0]
+                continue
+            shape = branch if is_shape else shape
+        unit = 0.625 * (SHAPE_FINER * own_step if branch is shape else own_step)
         seen_from[v] = ring.base
         if ring.base is None:
             model, i = by_stems[kind], v - branch.first
@@ -1351,6 +1373,140 @@ def decode_connected_vertex(
     between = [0.5 * (terms[0][k] + terms[2][k]) for k in range(3)]
     guesses = [none] + terms[:4] + [weighted_terms(weights, terms), between] + terms[6:]
     return decode_expected_vertex(coder, model, place, weights, base, terms, guesses, unit)
+
+
+# ---- copies in adaptive rest poses -------------------------------------------------------------------------
+
+SHAPE_FINER = 0.25  # steps of a shape, over those of other branches
+
+
+class RestShape:
+    """A branch that others are copies of, and what the last of them was."""
+
+    def __init__(self, branch: int):
+        self.branch, self.mirrored, self.turn, self.scale = branch, 0, [1.0, 0.0, 0.0, 0.0], 0.0
+        self.means = [[512, 512] for _ in range(4)] + [[0, 0]]
+
+
+class Copies:
+    def __init__(self) -> None:
+        self.any, self.copied = Context(2048), [Context(32768) for _ in range(3)]
+        self.is_shape, self.largest = [Context(4096) for _ in range(3)], [Context(32768) for _ in range(3)]
+        self.mirrored, self.bent = ([Context(8192), Context(8192)] for _ in range(2))
+        self.rank, self.turn, self.scale = NumberModel(), NumberModel(), NumberModel()
+        self.lattice = LatticeModel()
+        self.first, self.others, self.increment = RestMemory(), RestMemory(), [0.0] * 3
+        self.mean_rank, self.are_bent, self.roles = 16, 0, [0] * 16
+        self.shapes: list[RestShape] = []
+
+
+def decode_part(
+    coder: RangeDecoder, copies: Copies, branches: list[Branch], b: int, step: float, rest: list
+) -> tuple[bool, list | None]:
+    """Whether branch b is a shape; the positions of a copy."""
+    branch = branches[b]
+    kind, like = min(branch.count, 16) - 1, [s for s in copies.shapes if branches[s.branch].count == branch.count]
+    role = copies.roles[kind]
+    if like and coder.bit(copies.copied[role]):
+        copies.roles[kind] = 2
+        rank = code_unsigned(coder, copies.rank, copies.mean_rank)
+        require(rank < len(like), "a copy is of no shape")
+        copies.mean_rank = copies.mean_rank - (copies.mean_rank + 7) // 8 + clipped(rank) * 2
+        shape = like[rank]
+        copies.shapes.remove(shape)
+        copies.shapes.insert(0, shape)
+        return False, decode_copy(coder, copies, branch, branches[shape.branch], shape, 0.625 * step, rest)
+    copies.roles[kind] = coder.bit(copies.is_shape[role])
+    if copies.roles[kind] == 1:
+        shape = RestShape(b)
+        copies.shapes = [shape] + copies.shapes[:63]
+    return copies.roles[kind] == 1, None
+
+
+def decode_copy(
+    coder: RangeDecoder, copies: Copies, branch: Branch, stem: Branch, shape: RestShape, unit: float, rest: list
+) -> list[list[float]]:
+    """stem: the branch that is the shape."""
+    points = rest[stem.first : stem.first + stem.count]
+    bent, matrix = decode_copy_place(coder, copies, shape, lever_of(points), unit)
+    attach = rest[branch.attach] if branch.attach >= 0 else None
+    from_attach = rest[stem.attach] if stem.attach >= 0 and attach is not None else points[0]
+    base, own = attach or [0.0] * 3, 0.5 * unit
+    guesses = [[0.0] * 3, copies.increment, way_in_copy(matrix, from_attach, points[0])]
+    guesses = [[x * (1.0 / own) for x in guess] for guess in guesses]
+    placed = [decode_copy_vertex(coder, copies, copies.first, base, guesses, own)]
+    copies.increment = [placed[0][k] - base[k] for k in range(3)]
+    for i in range(1, branch.count):
+        way = way_in_copy(matrix, points[0], points[i])
+        expected = [placed[0][k] + way[k] for k in range(3)]
+        if bent:
+            guesses = [[expected[k] - placed[-1][k] for k in range(3)], way_in_copy(matrix, points[i - 1], points[i])]
+            guesses = [[x * (1.0 / unit) for x in guess] for guess in guesses]
+            expected = decode_copy_vertex(coder, copies, copies.others, placed[-1], guesses, unit)
+        placed.append(expected)
+    return placed
+
+
+def lever_of(points: list[list[float]]) -> float:
+    most = 0.0
+    for point in points[1:]:
+        x, y, z = (point[k] - points[0][k] for k in range(3))
+        most = max(most, x * x + y * y + z * z)
+    return math.sqrt(most)
+
+
+def decode_copy_place(
+    coder: RangeDecoder, copies: Copies, shape: RestShape, lever: float, unit: float
+) -> tuple[int, list[list[float]]]:
+    """Whether a copy is bent; its rotation, scale and mirror in one."""
+    shape.mirrored = coder.bit(copies.mirrored[shape.mirrored])
+    copies.are_bent = coder.bit(copies.bent[copies.are_bent])
+    quantum = (2.0 if copies.are_bent else 0.9) * unit / lever if lever > 0.0 else 1.0
+    number = decode_copy_number(coder, copies.scale, shape.means[4], steps_in(shape.scale, quantum))
+    shape.scale = float(number) * quantum
+    s = 1.0 + shape.scale
+    require(1e-3 < s < 1e3, "the scale of a copy is out of range")
+    largest = coder.bit(copies.largest[0])
+    largest, q, squares = 2 * largest + coder.bit(copies.largest[1 + largest]), shape.turn, 0.0
+    for c in range(4):
+        if c != largest:
+            number = decode_copy_number(coder, copies.turn, shape.means[c], steps_in(q[c], quantum / s))
+            q[c] = float(number) * (quantum / s)
+            squares = squares + q[c] * q[c]
+    require(squares <= 1.0, "the rotation of a copy is out of range")
+    q[largest] = math.sqrt(1.0 - squares)
+    (w, x, y, z), m = q, -s if shape.mirrored else s
+    return copies.are_bent, [
+        [m * (1.0 - 2.0 * (y * y + z * z)), s * (2.0 * (x * y - w * z)), s * (2.0 * (x * z + w * y))],
+        [m * (2.0 * (x * y + w * z)), s * (1.0 - 2.0 * (x * x + z * z)), s * (2.0 * (y * z - w * x))],
+        [m * (2.0 * (x * z - w * y)), s * (2.0 * (y * z + w * x)), s * (1.0 - 2.0 * (x * x + y * y))],
+    ]
+
+
+def decode_copy_number(coder: RangeDecoder, model: NumberModel, mean: list[int], last: int) -> int:
+    """About 0 or the last one, whichever has been nearer."""
+    repeated = 1 if mean[1] < mean[0] else 0
+    number = (last if repeated else 0) + code_signed(coder, model, mean[repeated])
+    require(-(1 << 29) < number < 1 << 29, "a number of a copy is out of range")
+    for i in range(2):
+        magnitude = clipped(number - last if i else number)
+        mean[i] = mean[i] - (mean[i] + 7) // 8 + magnitude * 2
+    return number
+
+
+def way_in_copy(matrix: list[list[float]], start: list[float], end: list[float]) -> list[float]:
+    x, y, z = (end[k] - start[k] for k in range(3))
+    return [row[0] * x + row[1] * y + row[2] * z for row in matrix]
+
+
+def decode_copy_vertex(
+    coder: RangeDecoder, copies: Copies, memory: RestMemory, base: list[float], guesses: list[list[float]], unit: float
+) -> list[float]:
+    expected = [base[k] + expected_offset(memory, memory, guesses, k) * unit for k in range(3)]
+    steps = decode_rest_point(coder, copies.lattice, memory, memory)
+    point = [expected[k] + float(steps[k]) * unit for k in range(3)]
+    note_vertex(memory, guesses, [(point[k] - base[k]) * (1.0 / unit) for k in range(3)], steps, 0.1)
+    return point
 
 
 # ---- rest pose of the source -------------------------------------------------------------------------------

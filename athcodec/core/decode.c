@@ -55,7 +55,7 @@ int ath_decode_rest(void *model, const uint8_t *bytes, size_t size, const ath_br
                     int32_t *steps, double *rest)
 {
     ath_coder coder;
-    rest_layer layer = {coarse, before, steps, adaptive, mesh, 0.0, 0};
+    rest_layer layer = {coarse, before, steps, adaptive, mesh, 0.0, 0, 0};
     coder_start(&coder, bytes, size);
     return finished(&coder, code_rest(&coder, (rest_model *)model, &layer, branches, branch_count, step, 0, rest));
 }

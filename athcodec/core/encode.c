@@ -73,13 +73,47 @@ int64_t ath_encode_hierarchy(void *model, uint8_t *bytes, size_t capacity, const
 
 int64_t ath_encode_rest(void *model, uint8_t *bytes, size_t capacity, const ath_branch *branches, int32_t branch_count,
                         double step, int adaptive, double slack, ath_mesh *mesh, const int32_t *coarse,
-                        const double *before, int32_t *steps, const double *source, double *moved, double *rest)
+                        const double *before, const int32_t *shape_of, int32_t *steps, const double *source,
+                        double *moved, double *rest)
 {
     ath_coder coder;
-    rest_layer layer = {coarse, before, steps, adaptive, mesh, slack, moved};
+    rest_layer layer = {coarse, before, steps, adaptive, mesh, slack, moved, shape_of};
     copy_pose(branches, branch_count, source, moved);
     coder_start(&coder, bytes, capacity);
     return written(&coder, code_rest(&coder, (rest_model *)model, &layer, branches, branch_count, step, source, rest));
+}
+
+int32_t ath_find_copies(const ath_branch *branches, int32_t branch_count, const double *pose, double step, double slack,
+                        double bend, int32_t *uses, int32_t *shape_of)
+{
+    int32_t recent[REST_SHAPES], count = 0, copies = 0;
+    memset(uses, 0, (size_t)branch_count * sizeof *uses);
+    for (int32_t b = 0; b < branch_count; b++) {
+        const ath_branch *branch = branches + b;
+        double unit = LATTICE_UNIT * rest_step(branch, step), tolerance = copy_tolerance(branch, unit, slack);
+        int32_t found = -1;
+        shape_of[b] = -1;
+        if (branch->count < 2) continue;
+        for (int32_t i = 0; i < count && found < 0; i++) {
+            const ath_branch *shape = branches + recent[i];
+            if (shape->count == branch->count && looks_like_copy(shape, branch, pose, tolerance, bend)) found = i;
+        }
+        if (found < 0) {
+            if (count < REST_SHAPES) count++;
+            found = count - 1;
+            recent[found] = b;
+        }
+        int32_t shape = recent[found];
+        memmove(recent + 1, recent, (size_t)found * sizeof *recent);
+        recent[0] = shape;
+        shape_of[b] = shape;
+        uses[shape] += shape != b;
+    }
+    for (int32_t b = 0; b < branch_count; b++) {
+        if (shape_of[b] >= 0 && uses[shape_of[b]] < LEAST_COPIES) shape_of[b] = -1;
+        copies += shape_of[b] >= 0 && shape_of[b] != b;
+    }
+    return copies;
 }
 
 int64_t ath_encode_source_rest(void *model, uint8_t *bytes, size_t capacity, const ath_branch *branches,

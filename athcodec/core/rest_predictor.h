@@ -177,23 +177,30 @@ static void rest_learn_axis(rest_filter *filter, const rest_guess *at, int32_t k
     }
 }
 
+/* Notes how good the guesses of a vertex were, which is at `offset`; integers: what was coded for it. */
+static void rest_note(rest_memory *memory, const rest_guess *at, const double offset[3], const int32_t integers[3],
+                      double rate)
+{
+    for (int32_t k = 0; k < 3; k++) {
+        for (int32_t g = 0; g < at->guess_count; g++) {
+            double error = offset[k] - at->guesses[g][k];
+            rest_note_error(&memory->error[g][k], error * error, rate);
+        }
+        memory->mean[k] = memory->mean[k] - (memory->mean[k] + 7) / 8 + clipped(integers[k]) * 2;
+    }
+}
+
 /* `point`: where the vertex is; `integers`: what was coded for it. */
 static void rest_learn(rest_predictor *predictor, rest_guess *at, double per_unit, const double point[3],
                        const int32_t integers[3])
 {
     double offset[3], squares = 0.0, usual, noise;
     rest_term(offset, at->base, point, per_unit);
+    rest_note(&predictor->all, at, offset, integers, 0.06);
+    rest_note(at->phase, at, offset, integers, 0.1);
     for (int32_t k = 0; k < 3; k++) {
         double error = offset[k] - at->guesses[5][k];
         squares = squares + error * error;
-        for (int32_t g = 0; g < at->guess_count; g++) {
-            error = offset[k] - at->guesses[g][k];
-            rest_note_error(&predictor->all.error[g][k], error * error, 0.06);
-            rest_note_error(&at->phase->error[g][k], error * error, 0.1);
-        }
-        uint32_t *mean = &predictor->all.mean[k], *own = &at->phase->mean[k];
-        *mean = *mean - (*mean + 7) / 8 + clipped(integers[k]) * 2;
-        *own = *own - (*own + 7) / 8 + clipped(integers[k]) * 2;
     }
     squares = squares / 3.0;
     usual = 0.3 + at->filter->noise;

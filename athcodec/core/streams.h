@@ -8,6 +8,7 @@
 #include "motion.h"
 #include "refinement_model.h"
 #include "rest_connected.h"
+#include "rest_copies.h"
 
 /* ---- hierarchy ---- */
 
@@ -250,6 +251,7 @@ static int code_hierarchy(ath_coder *coder, hierarchy_model *model, int32_t bran
 
 /* ---- rest pose ---- */
 
+enum { OF_COPY = -2 }; /* in place of the vertex that one was seen from */
 enum { REST_RUN = 32, REST_BASES = REST_RUN * (REST_RUN + 1) * (2 * REST_RUN + 1) / 6 };
 
 /* The rest pose of the layer before, which a refinement is coded about: positions, and integers, three for each vertex; those of
@@ -263,6 +265,8 @@ typedef struct {
     /* An encoder's: how far from its place it may put a vertex to save bits; a copy of the source's pose, in which what
      * has detail goes along with what it hangs on. */
     double slack, *moved;
+    /* Likewise: of each branch the one that it is a copy of, itself where others are copies of it, -1: neither. */
+    const int32_t *shape_of;
 } rest_layer;
 
 typedef struct {
@@ -283,6 +287,7 @@ typedef struct {
     double work[2 * REST_RUN * REST_RUN];
     uint8_t made[REST_RUN + 1];
     adaptive_rest adaptive[2]; /* of branches without detail, and with it */
+    copy_model copies;
 } rest_model;
 
 static void rest_model_init(rest_model *model, int is_refinement)
@@ -301,6 +306,7 @@ static void rest_model_init(rest_model *model, int is_refinement)
         rest_predictor_init(&model->adaptive[i].predictor);
         rest_connected_init(&model->adaptive[i].connected);
     }
+    copy_model_init(&model->copies);
 }
 
 /* The step of a branch's rest pose, where `step` is that of others. */
@@ -410,6 +416,105 @@ static void code_rest_vertex(ath_coder *coder, rest_model *model, const rest_lay
         code_step_vertex(coder, model, layer, branch, i, step, source, rest);
 }
 
+/* Vertex i of a copy as a point of a lattice. */
+static void code_copy_vertex(ath_coder *coder, copy_model *model, rest_memory *memory, rest_guess *at, double unit,
+                             double slack, const double *source, double *out)
+{
+    double expected[3], offset[3], per_unit = 1.0 / unit;
+    int32_t integers[3] = {0, 0, 0};
+    at->phase = memory;
+    for (int32_t k = 0; k < 3; k++) expected[k] = at->base[k] + rest_expected(memory, at, k) * unit;
+#ifdef ATH_ENCODING
+    double units[3];
+    rest_term(units, expected, source, per_unit);
+    nearest_of_lattice(units, slack * per_unit, memory->mean, integers);
+#endif
+    (void)source;
+    (void)slack;
+    code_rest_point(coder, &model->lattice, memory, memory, integers);
+    for (int32_t k = 0; k < 3; k++) out[k] = expected[k] + (double)integers[k] * unit;
+    rest_term(offset, at->base, out, per_unit);
+    rest_note(memory, at, offset, integers, 0.1);
+}
+
+/* A branch as a copy of the shape used last; `place`: what an encoder has chosen. */
+static int code_copy(ath_coder *coder, copy_model *model, const rest_layer *layer, const ath_branch *branches,
+                     const ath_branch *branch, double step, copy_place *place, const double *source, double *rest)
+{
+    const ath_branch *shape = branches + model->shapes[0].branch;
+    const double *from = rest + 3 * (size_t)shape->first;
+    double unit = LATTICE_UNIT * step, own = COPY_PLACE * unit, slack = 0.0, target[3] = {0.0, 0.0, 0.0};
+    double *out = rest + 3 * (size_t)branch->first;
+    rest_guess at;
+    if (!code_copy_place(coder, model, model->shapes, copy_lever(shape, rest), unit, place)) return 0;
+    copy_guess(model, branch, shape, place, rest, 0, 1.0 / own, &at);
+#ifdef ATH_ENCODING
+    double expected[3];
+    copy_start(model, branch, shape, place, rest, own, expected);
+    slack = copy_target(branch, shape, place, unit, layer->slack, expected, source, rest, target);
+#endif
+    code_copy_vertex(coder, model, &model->first, &at, own, slack, target, out);
+    rest_term(model->increment, at.base, out, 1.0);
+    for (int32_t i = 1; i < branch->count; i++) {
+        if (place->bent) {
+            copy_guess(model, branch, shape, place, rest, i, 1.0 / unit, &at);
+            code_copy_vertex(coder, model, &model->others, &at, unit, branch->detail > 0 ? 0.0 : layer->slack,
+                             ENCODING ? source + (out - rest) + 3 * i : target, out + 3 * i);
+        } else {
+            double way[3];
+            copy_way(place->R, from, from + 3 * i, way);
+            for (int32_t k = 0; k < 3; k++) out[3 * i + k] = out[k] + way[k];
+        }
+    }
+    if (layer->steps) memset(layer->steps + (out - rest), 0, 3 * (size_t)branch->count * sizeof *layer->steps);
+    return 1;
+}
+
+/* An encoder's choice: is branch b a copy of a shape, and which one, by `rank` among those of as many vertices? */
+static int32_t wanted_role(const copy_model *model, const rest_layer *layer, const ath_branch *branches, int32_t b,
+                           double step, const double *source, const double *rest, int32_t *rank, copy_place *place)
+{
+#ifdef ATH_ENCODING
+    int32_t shape = layer->shape_of[b];
+    if (shape == b) return SHAPE_PART;
+    *rank = 0;
+    for (int32_t i = 0; shape >= 0 && i < model->shape_count; i++) {
+        if (model->shapes[i].branch == shape)
+            return choose_copy(model, branches, branches + b, i, LATTICE_UNIT * step, layer->slack, source, rest, place)
+                       ? COPY_PART
+                       : PLAIN_PART;
+        *rank += branches[model->shapes[i].branch].count == branches[b].count;
+    }
+#endif
+    (void)model, (void)layer, (void)branches, (void)b, (void)step, (void)source, (void)rest, (void)rank, (void)place;
+    return PLAIN_PART;
+}
+
+/* What branch b is: a copy, which is coded at once, a shape, or neither. -1: not valid. */
+static int32_t code_part(ath_coder *coder, rest_model *model, const rest_layer *layer, const ath_branch *branches,
+                         int32_t b, double step, const double *source, double *rest)
+{
+    copy_model *copies = &model->copies;
+    const ath_branch *branch = branches + b;
+    int32_t *last = copies->role + ath_min(branch->count, COPY_COUNTS) - 1, rank = 0, before = *last;
+    copy_place place;
+    memset(&place, 0, sizeof place);
+    int32_t role = wanted_role(copies, layer, branches, b, step, source, rest, &rank, &place);
+    if (shape_of_rank(copies, branches, branch->count, 0) >= 0
+        && coder_bit(coder, &copies->copied[before], role == COPY_PART)) {
+        *last = COPY_PART;
+        rank = (int32_t)code_unsigned(coder, &copies->rank, copies->mean_rank, (uint32_t)rank);
+        int32_t index = shape_of_rank(copies, branches, branch->count, rank);
+        if (index < 0) return -1;
+        copies->mean_rank = copies->mean_rank - (copies->mean_rank + 7) / 8 + clipped(rank) * 2;
+        move_to_front(copies, index);
+        return code_copy(coder, copies, layer, branches, branch, step, &place, source, rest) ? COPY_PART : -1;
+    }
+    *last = coder_bit(coder, &copies->is_shape[before], role == SHAPE_PART) ? SHAPE_PART : PLAIN_PART;
+    if (*last == SHAPE_PART) add_shape(copies, b);
+    return *last;
+}
+
 static const double *rest_basis(rest_model *model, int32_t n)
 {
     double *basis = model->bases + (n - 1) * n * (2 * n - 1) / 6;
@@ -494,27 +599,50 @@ static const ath_branch *branch_of(const ath_branch *branches, int32_t branch_co
     return branches + low;
 }
 
-/* Vertices in the order of their mesh, by their neighbours; those without as elsewhere: all below them are known. */
-static void code_connected_rest(ath_coder *coder, rest_model *model, const rest_layer *layer,
-                                const ath_branch *branches, int32_t branch_count, double step, const double *source,
-                                double *rest)
+/* Are all vertices of a branch, of which `v` comes first, to be coded from place t of the mesh's order on? */
+static int is_untouched(const ath_mesh *mesh, const ath_branch *branch, int32_t v, int32_t t)
 {
-    for (int32_t t = 0; t < layer->mesh->vertex_count; t++) {
-        int32_t v = layer->mesh->order[t];
+    if (v != branch->first) return 0;
+    for (int32_t i = 1; i < branch->count; i++)
+        if (mesh->rank[v + i] < t) return 0;
+    return 1;
+}
+
+/* Vertices in the order of their mesh, by their neighbours; those without as elsewhere: all below them are known. */
+static int code_connected_rest(ath_coder *coder, rest_model *model, const rest_layer *layer, const ath_branch *branches,
+                               int32_t branch_count, int has_copies, double step, const double *source, double *rest)
+{
+    ath_mesh *mesh = layer->mesh;
+    int32_t shape = -1; /* the last branch that is one */
+    for (int32_t v = 0; v < mesh->vertex_count; v++) mesh->from[v] = -1;
+    for (int32_t t = 0; t < mesh->vertex_count; t++) {
+        int32_t v = mesh->order[t];
+        if (mesh->from[v] == OF_COPY) continue;
         const ath_branch *branch = branch_of(branches, branch_count, v);
         rest_predictor *predictor = &adaptive_of(model, branch)->connected;
-        double step_here = rest_step(branch, step), unit = LATTICE_UNIT * step_here;
+        double step_here = rest_step(branch, step);
         rest_ring ring;
         rest_guess at;
-        rest_ring_of(layer->mesh, rest, v, &ring);
-        layer->mesh->from[v] = ring.base;
+        rest_ring_of(mesh, rest, v, &ring);
+        if (has_copies && ring.base < 0 && is_untouched(mesh, branch, v, t)) {
+            int32_t b = (int32_t)(branch - branches);
+            int32_t role = code_part(coder, model, layer, branches, b, step_here, source, rest);
+            if (role < 0) return 0;
+            if (role == SHAPE_PART) shape = b;
+            for (int32_t i = 0; role == COPY_PART && i < branch->count; i++) mesh->from[v + i] = OF_COPY;
+            if (role == COPY_PART) continue;
+        }
+        if (branch == branches + shape) step_here = SHAPE_FINER * step_here;
+        double unit = LATTICE_UNIT * step_here;
+        mesh->from[v] = ring.base;
         if (ring.base < 0) {
             code_adaptive_vertex(coder, model, layer, branch, v - branch->first, step_here, source, rest);
             continue;
         }
-        rest_look_beside(predictor, layer->mesh, &ring, rest, layer->before, v, 1.0 / unit, &at);
+        rest_look_beside(predictor, mesh, &ring, rest, layer->before, v, 1.0 / unit, &at);
         code_expected_vertex(coder, model, layer, branch, predictor, &at, v, unit, source, rest);
     }
+    return 1;
 }
 
 /* What has detail keeps its shape: it goes where the stem is that it hangs on, of less detail, and with it what hangs
@@ -533,14 +661,19 @@ static void take_along(const ath_branch *branches, const ath_branch *branch, con
 static int code_rest(ath_coder *coder, rest_model *model, const rest_layer *layer, const ath_branch *branches,
                      int32_t branch_count, double step, const double *source, double *rest)
 {
+    int has_copies = layer->adaptive && !layer->coarse;
     rest_model_init(model, layer->coarse != 0);
-    if (layer->mesh) {
-        code_connected_rest(coder, model, layer, branches, branch_count, step, source, rest);
-        return 1;
-    }
+    if (has_copies) has_copies = coder_bit(coder, &model->copies.any, layer->shape_of != 0);
+    if (layer->mesh)
+        return code_connected_rest(coder, model, layer, branches, branch_count, has_copies, step, source, rest);
     for (int32_t b = 0; b < branch_count && !model->modes.invalid; b++) {
         double own = rest_step(branches + b, step);
         if (ENCODING) take_along(branches, branches + b, source, layer->moved, rest);
+        int32_t role = PLAIN_PART;
+        if (has_copies) role = code_part(coder, model, layer, branches, b, own, layer->moved, rest);
+        if (role < 0) return 0;
+        if (role == COPY_PART) continue;
+        if (role == SHAPE_PART) own = SHAPE_FINER * own;
         if (branches[b].lag == 0)
             code_rest_beam(coder, model, layer, branches + b, own, layer->moved, rest);
         else

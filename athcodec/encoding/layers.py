@@ -194,7 +194,7 @@ def _rests(
         return rest, None, [(prelude.plan.rest, None)] * len(ratios)
     first_step, *steps = (qz.single(rest.step * max(1.0, ratio / 2)) for ratio in ratios)
     branches, mesh = prelude.plan.branches, source.mesh if rest.connected else None
-    coded = _first_rests(prelude.plan, first_step, source.rest, rest.adaptive, mesh)
+    coded = _first_rests(prelude, first_step, source.rest, mesh)
     for step in steps:
         if np.array_equal(rest_steps(branches, step), rest_steps(branches, coded[-1].step)):
             coded.append(coded[-1])
@@ -207,15 +207,19 @@ def _rests(
     return rest, level_0, [(own.decoded, None if own is last else own) for own, last in zip(of_layers, before)]
 
 
-def _first_rests(
-    plan: Plan, step: float, rest: np.ndarray, adaptive: bool, mesh: Mesh | None
-) -> list[streams.CodedRest]:
+def _first_rests(prelude: CodedPrelude, step: float, rest: np.ndarray, mesh: Mesh | None) -> list[streams.CodedRest]:
     """The rest pose at the step of the first layer; before it that of level 0, where that takes few bytes more."""
-    at_once = streams.encode_rest(plan.branches, step, rest, None, adaptive, mesh=mesh)
+    plan, adaptive = prelude.plan, prelude.rest_chunk.adaptive
+
+    def encode(step: float, before: streams.CodedRest | None = None) -> streams.CodedRest:
+        shape_of = prelude.shape_of if before is None else None
+        return streams.encode_rest(plan.branches, step, rest, before, adaptive, mesh=mesh, shape_of=shape_of)
+
+    at_once = encode(step)
     if not plan.level_0_stands_alone:
         return [at_once]
-    level_0 = streams.encode_rest(plan.branches, LEVEL_0_STEP * step, rest, None, adaptive, mesh=mesh)
-    refined = streams.encode_rest(plan.branches, step, rest, level_0, adaptive, mesh=mesh)
+    level_0 = encode(LEVEL_0_STEP * step)
+    refined = encode(step, level_0)
     both = len(level_0.stream) + len(refined.stream)
     return [level_0, refined] if both <= LEVEL_0_SHARE * len(at_once.stream) else [at_once]
 

@@ -425,6 +425,7 @@ class Search:
             lags=self.start.lags,
             adaptive_rest=self.start.adaptive_rest,
             connected_rest=self.start.connected_rest,
+            shape_of=self.start.shape_of,
             loose=self.start.loose,
             learned_pieces=None,
         )
@@ -446,6 +447,7 @@ class Search:
             details=start.details[kept],
             rigid=start.rigid[kept],
             limit=limit,
+            shape_of=None,
         )
         extrapolation = ExtrapolationFactors.of(
             branch_records(self.source.hierarchy, self.ath, start),
@@ -669,6 +671,7 @@ class Search:
             settings.adaptive_rest,
             settings.connected_rest,
             settings.lags.tobytes(),
+            None if settings.shape_of is None else settings.shape_of.tobytes(),
             settings.sheet.tobytes(),
             settings.layer,
             settings.free_rigid,

@@ -34,6 +34,7 @@ from athcodec.threads import SERIAL, ThreadPool, default_jobs
 FINER = 32  # step over that of segments that bases and modes are learned from
 ROWS_AT_ONCE = 1 << 14  # of coefficients
 WORK_BYTES = 1536 << 20  # of the segments coded at once, where `jobs` does not say how many these are
+COPIES_BENDS = 0.0, 0.15  # of copies of one shape that are tried
 CONNECTED_SHARE = 0.8  # of a rest pose at once, that one by faces may take where layers refine it
 SEGMENT_WORK = 8  # memory of a segment while it is coded, over its float32 positions
 
@@ -267,6 +268,7 @@ class Settings:
     only_tips: bool  # pieces that carry others have no rotations
     node_steps: np.ndarray  # (levels,) of the maps of nodes, scene units; see SegmentMotion.analyse_nodes
     rest_slack: float = 0.0  # what the rest pose may be off by, to save bits
+    shape_of: np.ndarray | None = None  # (B,) of streams.find_copies; None: the rest pose has no copies
     periodic: bool = False  # waves over time are, of loops that are one segment
     usual_change: float = np.inf  # of velocity, in length per frame squared, where segments meet
     narrow: bool = False  # corrections are of one frame
@@ -310,6 +312,7 @@ class CodedPrelude:
         self.origin, self.dtype = source.origin, np.dtype(source.clip.dtype)
         branches = branch_records(hierarchy, ath, settings)
         self.plan = Plan(branches, hierarchy.vertex_count, source.pool, predicted=predicted, layer=settings.layer)
+        self.shape_of = settings.shape_of
         self.rest_chunk, rest = _coded_rest(source, branches, settings)
         self.plan.set_rest(rest)
         self.hierarchy_stream = streams.encode_hierarchy(branches, hierarchy.branch_source, hierarchy.vertex_source)
@@ -343,7 +346,8 @@ def _rest_within(source: Source, branches: np.ndarray, settings: Settings) -> st
 
     def encode(step: float) -> streams.CodedRest:
         mesh = source.mesh if settings.connected_rest else None
-        return streams.encode_rest(branches, step, source.rest, None, settings.adaptive_rest, settings.rest_slack, mesh)
+        given = (settings.adaptive_rest, settings.rest_slack, mesh, settings.shape_of)
+        return streams.encode_rest(branches, step, source.rest, None, *given)
 
     return _within(settings.bound, source.rest, encode, settings.rest_step)
 
@@ -360,7 +364,8 @@ def _within(
 
 
 def with_best_lags(source: Source, ath: Ath, settings: Settings) -> Settings:
-    """The lags, and adaptive, connected or neither, that make hierarchy and rest pose smallest at these steps."""
+    """The lags, adaptive, connected or neither, and the copies that make hierarchy and rest pose smallest."""
+    settings = replace(settings, shape_of=None)
     own = lags(source, settings.rest_step, settings.details)
     candidates = [replace(settings, lags=own, adaptive_rest=False, connected_rest=False)]
     if not source.reference_is_exact and (Feature.ADAPTIVE not in source.without or settings.details.any()):
@@ -373,8 +378,19 @@ def with_best_lags(source: Source, ath: Ath, settings: Settings) -> Settings:
         ]
     if settings.details.any():
         candidates = [own for own in candidates if own.adaptive_rest]
-
+    candidates += _with_copies(source, ath, candidates)
     return candidates[0] if len(candidates) == 1 else min(candidates, key=lambda some: _poses_size(source, ath, some))
+
+
+def _with_copies(source: Source, ath: Ath, candidates: list[Settings]) -> list[Settings]:
+    """The adaptive ones of the candidates with branches that are copies of others, where there are any."""
+    adaptive = [settings for settings in candidates if settings.adaptive_rest]
+    if not adaptive:
+        return []
+    own, branches = adaptive[0], branch_records(source.hierarchy, ath, adaptive[0])
+    found = [streams.find_copies(branches, own.rest_step, source.rest, own.rest_slack, bend) for bend in COPIES_BENDS]
+    shapes = [shape_of for shape_of in found if shape_of is not None]
+    return [replace(settings, shape_of=shape_of) for settings in adaptive for shape_of in shapes]
 
 
 def _poses_size(source: Source, ath: Ath, settings: Settings) -> int:

@@ -52,10 +52,12 @@ def encode_rest(
     adaptive: bool = False,
     slack: float = 0.0,
     mesh: Mesh | None = None,
+    shape_of: np.ndarray | None = None,
 ) -> CodedRest:
     """A rest pose, (N, 3) float64 less the origin; about that of the layer before, if there is one.
 
     slack: how far from its place a vertex may be put to save bits, where `adaptive`. mesh: that it goes by, then.
+    shape_of: as find_copies gives it; copies that are too far off are coded as other branches are.
     """
     decoded, steps, moved = np.zeros_like(rest), np.zeros(rest.shape, np.int32), np.empty_like(rest)
     with nullcontext() if mesh is None else mesh.lock:
@@ -70,12 +72,30 @@ def encode_rest(
             None if mesh is None else mesh.address,
             None if coarse is None else address(coarse.steps, np.int32, rest.size),
             None if coarse is None else address(coarse.decoded, np.float64, rest.size),
+            None if shape_of is None else address(shape_of, np.int32, len(branches)),
             address(steps, np.int32, rest.size),
             address(rest, np.float64, rest.size),
             address(moved, np.float64, rest.size),
             address(decoded, np.float64, rest.size),
         )
     return CodedRest(step, data, decoded, steps, adaptive, mesh is not None)
+
+
+def find_copies(branches: np.ndarray, step: float, rest: np.ndarray, slack: float, bend: float) -> np.ndarray | None:
+    """(B,) int32, of each branch the one that it is a copy of, itself where others are copies of it, or -1; None: there
+    are no copies."""
+    shape_of, uses = np.empty((2, len(branches)), np.int32)
+    copies = lib.ath_find_copies(
+        address(branches, BRANCH, 1),
+        len(branches),
+        address(rest, np.float64, rest.size),
+        step,
+        slack,
+        bend,
+        address(uses, np.int32, len(branches)),
+        address(shape_of, np.int32, len(branches)),
+    )
+    return shape_of if copies else None
 
 
 def encode_source_rest(branches: np.ndarray, step: float, reference: np.ndarray, rest: np.ndarray) -> CodedRest:

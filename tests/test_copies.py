@@ -1,0 +1,134 @@
+"""Congruent parts share one shape in a rest pose: what they take, and how far off they are."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from files import Parts, opened
+
+import athcodec
+from athcodec import MotionClip, container
+from athcodec._native import BRANCH
+from athcodec.encoding import streams
+from athcodec.errors import AthError
+from spec import reference_decoder as rd
+
+STEP = 0.02
+REACH = 0.6989 * STEP  # of an adaptive rest pose at most
+LEAF = np.array([[-0.3, 0, 0], [0.3, 0, 0.05], [-0.4, 0.5, 0.2], [0.4, 0.5, 0.2], [-0.1, 1, 0.1], [0.1, 1, 0.1]])
+
+
+def parts(
+    shapes: list[np.ndarray], seed: int, scale: float = 0.0, mirror: bool = False
+) -> tuple[np.ndarray, np.ndarray]:
+    """Branches and pose of a stem of 20 vertices with the shapes on it, each turned by chance."""
+    random = np.random.default_rng(seed)
+    stem = np.linspace(0, 4, 20)[:, None] * [0, 1, 0.1]
+    attach = random.integers(0, 20, len(shapes))
+    placed = [stem]
+    for at, shape in zip(attach, shapes):
+        turn = np.linalg.qr(random.normal(size=(3, 3)))[0]
+        turn *= 1 if mirror else np.linalg.det(turn)
+        placed.append(stem[at] + random.uniform(1 - scale, 1 + scale) * shape @ turn.T)
+    branches = np.zeros(len(placed), BRANCH)
+    branches["parent"], branches["attach"], branches["lag"] = 0, [-1, *attach], [1, *map(len, shapes)]
+    branches["parent"][0] = -1
+    branches["count"] = [len(part) for part in placed]
+    branches["first"] = np.cumsum(branches["count"]) - branches["count"]
+    return branches, np.concatenate(placed)
+
+
+def coded(branches: np.ndarray, pose: np.ndarray, copies: bool = True, bend: float = 0.0) -> streams.CodedRest:
+    found = streams.find_copies(branches, STEP, pose, 0.0, bend) if copies else None
+    assert not copies or found is not None
+    return streams.encode_rest(branches, STEP, pose, None, True, shape_of=found)
+
+
+def bits_each(rest: streams.CodedRest, others: streams.CodedRest, count: int) -> float:
+    return 8 * (len(rest.stream) - len(others.stream)) / count
+
+
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("scale, mirror, most", [(0.0, False, 32), (0.0, True, 32), (0.3, False, 40)])
+def test_congruent_parts_stay_within_the_rest_error_and_take_few_bits(seed, scale, mirror, most):
+    branches, pose = parts([LEAF] * 200, seed, scale, mirror)
+    alone = coded(branches[:1], pose[:20], copies=False)
+    rest, plain = coded(branches, pose), coded(branches, pose, copies=False)
+    assert np.linalg.norm(rest.decoded - pose, axis=1).max() <= REACH
+    assert bits_each(rest, alone, 200) < most < 90 < bits_each(plain, alone, 200)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_unrelated_parts_are_no_copies_and_cost_the_others_nothing(seed):
+    random = np.random.default_rng(seed)
+    unrelated = [random.normal(size=(6, 3)) * 0.4 for _ in range(100)]
+    assert streams.find_copies(*parts_at(unrelated, seed)) is None
+    mixed = [shape for pair in zip(unrelated, [LEAF] * 100) for shape in pair]
+    branches, pose = parts(mixed, seed)
+    rest = coded(branches, pose)
+    unrelated_alone = coded(*parts(unrelated, seed), copies=False)
+    assert np.linalg.norm(rest.decoded - pose, axis=1).max() <= REACH
+    assert bits_each(rest, unrelated_alone, 100) < 40
+
+
+def parts_at(shapes: list[np.ndarray], seed: int) -> tuple[np.ndarray, float, np.ndarray, float, float]:
+    branches, pose = parts(shapes, seed)
+    return branches, STEP, pose, 0.0, 0.0
+
+
+@pytest.mark.parametrize("size", [0.0, 1e-3, 0.01, 0.1])
+def test_copies_that_are_bent_by_chance_stay_within_the_rest_error(size):
+    random = np.random.default_rng(5)
+    branches, pose = parts([LEAF + size * random.normal(size=LEAF.shape) for _ in range(60)], 5)
+    assert np.linalg.norm(coded(branches, pose, bend=0.3).decoded - pose, axis=1).max() <= REACH
+
+
+def test_needles_take_two_directions_and_no_twist():
+    needle = np.array([[0, 0, 0], [0, 0.5, 0], [0, 1.0, 0]])
+    branches, pose = parts([needle] * 200, 1)
+    rest = coded(branches, pose)
+    assert bits_each(rest, coded(branches[:1], pose[:20], copies=False), 200) < 20
+    assert np.linalg.norm(rest.decoded - pose, axis=1).max() <= REACH
+
+
+@pytest.mark.parametrize("shape", [LEAF, LEAF[:2], np.zeros((3, 3))])
+@pytest.mark.parametrize("bend", [0.0, 0.3])
+def test_copies_mean_the_same_to_encoder_and_reference(shape, bend):
+    random = np.random.default_rng(2)
+    branches, pose = parts([shape + 0.5 * bend * random.normal(size=shape.shape) / 3 for _ in range(40)], 3, 0.2, True)
+    rest = coded(branches, pose, bend=bend)
+    records = []
+    for branch in branches:
+        own = rd.Branch(*(int(branch[name]) for name in ("parent", "depth", "first", "count", "flags", "lag")))
+        own.attach = int(branch["attach"])
+        records.append(own)
+    assert np.array(rd.decode_rest(rest.stream, records, STEP, None, True).rest).tobytes() == rest.decoded.tobytes()
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_damaged_copies_are_the_same_positions_to_all_or_refused(scratch, seed):
+    branches, pose = parts([LEAF] * 12, 1, 0.2)
+    faces = np.concatenate([first + np.array([[0, 1, 3, 2], [2, 3, 5, 4]]) for first in branches["first"][1:]])
+    clip = MotionClip(
+        pose[None].astype(np.float32),
+        np.zeros(1),
+        vertex_branch=np.repeat(np.arange(len(branches)), branches["count"]).astype(np.int32),
+        branch_parent=branches["parent"].astype(np.int32),
+        faces=faces.astype(np.int32),
+    )
+    athcodec.encode(clip, scratch / "leaves.ath", rel_error=1e-3, attributes="none", ladder="none")
+    reference = rd.AthFile((scratch / "leaves.ath").read_bytes())
+    with athcodec.open(scratch / "leaves.ath") as decoder:
+        assert decoder.positions().tobytes() == reference.positions(len(decoder.levels) - 1).tobytes()
+    outcomes = []
+    parts_of_file, random = Parts.of((scratch / "leaves.ath").read_bytes()), np.random.default_rng(seed)
+    rest = bytearray(parts_of_file.payload(container.REST))
+    for place in random.integers(17, len(rest), 3):
+        rest[place] = random.integers(1, 256)
+    data = parts_of_file.with_payload(container.REST, bytes(rest))
+    for play in (lambda: opened(data).positions(), lambda: rd.AthFile(data).positions()):
+        try:
+            outcomes.append(play().tobytes())
+        except (AthError, rd.AthError):
+            outcomes.append(None)
+    assert outcomes[0] == outcomes[1]
