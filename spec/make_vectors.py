@@ -921,6 +921,18 @@ valid(
     "a subnormal Rest_Step",
     lambda: with_rest(ADAPTIVE, adaptive_rest(ADAPTIVE, Chance(36, large=9), FLOAT_TINY)),
 )
+COPIED = [  # a shape and its copies, of branches that have detail and that have none
+    Stem(-1, 8, lag=2),
+    Stem(0, 4, 3, lag=2),
+    Stem(0, 4, 5, SHEET, lag=2, detail=118),
+    Stem(0, 4, 0, lag=1),
+    Stem(0, 8, 2, lag=2),
+]
+for name_, seed_, title_ in (
+    ("rest-copies", 2364, "copies of shapes: one that is mirrored and scaled, one that is bent"),
+    ("rest-copies-bent", 2949, "copies of shapes that are bent, mirrored and scaled"),
+):
+    valid(name_, title_, lambda seed_=seed_: with_rest(COPIED, adaptive_rest(COPIED, Chance(seed_, large=3))))
 DETAILED = [  # finer and coarser than the step, the largest and the smallest, alike and unlike by lag
     replace(stem, detail=detail) for stem, detail in zip(ADAPTIVE, (0, 121, 118, 0, 255, 110, 1))
 ]
@@ -2826,6 +2838,22 @@ prelude(
     "Method has Is_Exact and Is_Adaptive",
     lambda: exact_rest(FORK, [0.5] * 15, False, reserved=rd.REST_ADAPTIVE >> 2),
 )
+for name_, seed_, title_ in (
+    ("rest-copies-of-no-shape", 2, "a copy of a shape that is not there"),
+    ("rest-copies-scale", 15, "the scale of a copy is not above 0"),
+    ("rest-copies-rotation", 89, "a quaternion of more than 1"),
+):
+    invalid(
+        name_,
+        "BAD_CHUNK",
+        "open",
+        title_,
+        lambda seed_=seed_: (
+            with_rest(COPIED, adaptive_rest(COPIED, Chance(2364, large=3)))
+            .draft()
+            .change(rd.REST, content=adaptive_rest(COPIED, Chance(seed_, large=3)))
+        ),
+    )
 invalid(
     "rest-connected-without-faces",
     "BAD_CHUNK_TABLE",
