@@ -152,29 +152,50 @@ def moving(stems: list[Stem], seed: int, frames: int = 3, segments: int = 1, **f
 
 ROOTED = [Stem(-1, 4, flags=WHOLE), Stem(0, 3, 2), Stem(1, 2, 2), Stem(0, 3, 3)]
 SINGLE = [Stem(-1, 1, flags=WHOLE)]
-RESTING = [0, 1, *[0] * 12]  # a frame of them that is no copy
+TWINS = [Stem(-1, 6, flags=WHOLE), Stem(-1, 6, flags=WHOLE), Stem(1, 2, 5)]
+ROOTS = [Stem(-1, 1), Stem(-1, 3), Stem(-1, 2, flags=WHOLE), Stem(2, 2, 1)]
+LONG = [Stem(-1, 5, flags=WHOLE), Stem(0, 4, 3)]
+FORKED = [Stem(-1, 3), Stem(0, 2, 1)]
+RESTING = [0, 1, *[0] * 16]  # a frame of them that is no copy, and in which none follow
 
 
-def frame_steps(vertices: int, seed: int, large: int = 12, still: float = 0.5) -> list[int]:
+def frame_of(stems: list[Stem], of_vertex: Callable[[], list[int]], follow: Callable[[], int]) -> list[int]:
+    """What a frame says of its vertices, but for those that follow the ends of their stem."""
+    values = []
+    for stem in stems:
+        ends = 2 if stem.parent < 0 and stem.count > 1 else 1
+        for _ in range(ends):
+            values += of_vertex()
+        if stem.count > ends:
+            values.append(follow())
+            for _ in range(stem.count - ends if not values[-1] else 0):
+                values += of_vertex()
+    return values
+
+
+def frame_steps(stems: list[Stem], seed: int, large: int = 12, still: float = 0.5, follow: float = 0.3) -> list[int]:
     """Of a frame: whether vertices have integers, and these."""
-    chance, values = Chance(seed, large=large), []
-    for _ in range(vertices):
+    chance = Chance(seed, large=large)
+
+    def of_vertex() -> list[int]:
         moved = int(chance.random.random() >= still)
-        values += [1, *(chance.answer("signed", 0) for _ in range(3))] if moved else [0]
-    return values
+        return [1, *(chance.answer("signed", 0) for _ in range(3))] if moved else [0]
+
+    return frame_of(stems, of_vertex, lambda: int(chance.random.random() < follow))
 
 
-def frame_points(vertices: int, seed: int) -> list[int]:
+def frame_points(stems: list[Stem], seed: int) -> list[int]:
     """The same of points of the lattice: integers, or halves of even ones, or signs and halves of odd ones."""
-    chance, values = Chance(seed, large=12), []
-    for _ in range(vertices):
-        if chance.answer("bit", 1):
-            first = chance.answer("signed", 0)
-            asked = ("bit", "unsigned") * 2 if first % 2 else ("signed",) * 2
-            values += [1, first, *(chance.answer(what, 0) for what in asked)]
-        else:
-            values.append(0)
-    return values
+    chance = Chance(seed, large=12)
+
+    def of_vertex() -> list[int]:
+        if not chance.answer("bit", 1):
+            return [0]
+        first = chance.answer("signed", 0)
+        asked = ("bit", "unsigned") * 2 if first % 2 else ("signed",) * 2
+        return [1, first, *(chance.answer(what, 0) for what in asked)]
+
+    return frame_of(stems, of_vertex, lambda: int(chance.random.random() < 0.3))
 
 
 def predicted(stems: list[Stem], frames: list, segments: int = 1, settings: int = 2, **fields) -> Plant:
@@ -185,13 +206,25 @@ def predicted(stems: list[Stem], frames: list, segments: int = 1, settings: int 
     return Plant(stems, len(frames) * segments, segments, **fields)
 
 
-def swayed(frames: int, seed: int, vertices: int = 12, **options) -> list:
-    return [[0, 1, *frame_steps(vertices, seed + t, **options)] for t in range(frames)]
+def swayed(frames: int, seed: int, stems: list[Stem] = ROOTED, **options) -> list:
+    return [[0, 1, *frame_steps(stems, seed + t, **options)] for t in range(frames)]
 
 
 valid("predicted-still", "nothing moves", lambda: predicted(ROOTED, [RESTING] * 3))
 valid("predicted-smallest", "one vertex, one frame", lambda: predicted(SINGLE, [[0, 1]]))
 valid("predicted", "vertices move at random, longer than any line", lambda: predicted(ROOTED, swayed(30, 1, large=5)))
+valid(
+    "predicted-following",
+    "most stems follow their ends, for long and then for a while not",
+    lambda: predicted(ROOTED, swayed(8, 21, follow=0.9) + swayed(4, 40, follow=0.1) + swayed(8, 50, follow=0.9)),
+)
+valid(
+    "predicted-following-huge",
+    "what follows leaves the range of binary32, and of binary64",
+    lambda: predicted(
+        LONG, swayed(6, 60, LONG, large=30, follow=1.0), predicted=predicted_head(FLOAT_MAX, 3), is_float64=True
+    ),
+)
 for settings in (0, 7, 8, 15):
     valid(
         f"predicted-settings-{settings}",
@@ -201,7 +234,7 @@ for settings in (0, 7, 8, 15):
 valid(
     "predicted-lattice",
     "vertices are points of the lattice",
-    lambda: predicted(ROOTED, [[0, 1, *frame_points(12, 30 + t)] for t in range(20)], settings=18),
+    lambda: predicted(ROOTED, [[0, 1, *frame_points(ROOTED, 30 + t)] for t in range(20)], settings=18),
 )
 valid(
     "predicted-lattice-huge",
@@ -221,14 +254,14 @@ valid(
     lambda: predicted(
         ROOTED,
         [
-            [0, 1, *frame_steps(12, 3)],
-            [0, 1, *frame_steps(12, 4)],
+            [0, 1, *frame_steps(ROOTED, 3)],
+            [0, 1, *frame_steps(ROOTED, 4)],
             [1, 1],
             [1, 1],
-            [0, 0, 2, *frame_steps(12, 5)],
+            [0, 0, 2, *frame_steps(ROOTED, 5)],
             [1, 0, 5],
-            [0, 1, *frame_steps(12, 6)],
-            [0, 0, 0, *frame_steps(12, 7)],
+            [0, 1, *frame_steps(ROOTED, 6)],
+            [0, 0, 0, *frame_steps(ROOTED, 7)],
         ],
     ),
 )
@@ -239,9 +272,7 @@ valid(
     "predicted-twins",
     "vertices that rest at the same places, and a stem as long as another",
     lambda: predicted(
-        [Stem(-1, 6, flags=WHOLE), Stem(-1, 6, flags=WHOLE), Stem(1, 2, 5)],
-        swayed(9, 8, 14, large=6),
-        points=[[4.0 * (i % 3), float(i % 2), 1.0] for i in range(14)],
+        TWINS, swayed(9, 8, TWINS, large=6), points=[[4.0 * (i % 3), float(i % 2), 1.0] for i in range(14)]
     ),
 )
 valid(
@@ -277,11 +308,7 @@ valid(
 valid(
     "predicted-roots",
     "maps of roots of one vertex, of one stem and of a subtree",
-    lambda: predicted(
-        [Stem(-1, 1), Stem(-1, 3), Stem(-1, 2, flags=WHOLE), Stem(2, 2, 1)],
-        swayed(3, 14, 8),
-        scripts={(rd.AFFINES, 0, 0): lambda: Chance(15, large=4)},
-    ),
+    lambda: predicted(ROOTS, swayed(3, 14, ROOTS), scripts={(rd.AFFINES, 0, 0): lambda: Chance(15, large=4)}),
 )
 valid("predicted-level-0", "shortened: level 0 of 2", lambda: predicted(ROOTED, swayed(2, 16)).draft().upto(0))
 valid(
@@ -3570,9 +3597,7 @@ invalid(
     "BAD_HEADER",
     "open",
     "h is 1",
-    lambda: (
-        predicted([Stem(-1, 3), Stem(0, 2, 1)], swayed(1, 19, 5)).draft().with_header(full_level_count=3, level_count=2)
-    ),
+    lambda: predicted(FORKED, swayed(1, 19, FORKED)).draft().with_header(full_level_count=3, level_count=2),
 )
 for name, reason, content in (
     ("short", "4 bytes", predicted_head()[:4]),

@@ -2138,7 +2138,7 @@ def decode_difference(
 
 # ---- predicted motion --------------------------------------------------------------------------------------
 
-GUESSES, FEATURES, LINE_GUESS, FITTED = 12, 8, 6, 11
+GUESSES, FEATURES, LINE_GUESS = 13, 8, 6
 LONGEST_LINE, LONGEST_MEAN, SOLVED_EVERY, RUNS = 24, 64, 16, 8
 
 Point = list[float]
@@ -2152,6 +2152,8 @@ class Follower:
     near: int
     base: int
     like: int
+    tip: int  # the last one of its stem, -1: it is an end itself
+    earlier: int  # the one before it in the order of coding
     line: Point
     mean: Point
     above: int = -1
@@ -2163,6 +2165,8 @@ class Follower:
     frames: int = 0
     steps: list[int] = field(default_factory=lambda: [0] * 3)
     size: tuple[int, int] = (0, 0)
+    leads: bool = False  # whether its stem has others than ends, which may follow it
+    followed: int = 0  # whether they do
 
     @property
     def kind(self) -> int:
@@ -2190,31 +2194,42 @@ class Follower:
             self.mean[k] = self.mean[k] + (x[k] - self.mean[k]) / self.frames
 
 
-def followers(branches: list[Branch], rest: list[Point], step: float) -> list[Follower]:
-    found: list[Follower] = []
-    first_before, last = -1, {}
+def followers(branches: list[Branch], rest: list[Point], step: float) -> tuple[list[Follower], list[int]]:
+    """By their numbers, and the numbers in the order of coding: of each stem the ends first."""
+    found: dict[int, Follower] = {}
+    order: list[int] = []
+    tip_before, first_before, last = -1, -1, {}
     for branch in branches:
-        like = last.get(branch.count, -1)
-        last[branch.count] = branch.first
-        for i in range(branch.count):
-            before = branch.first + i - 1 if i > 0 else branch.attach
-            at = rest[branch.first + i]
-            near = before if i > 0 else first_before
-            base = branch.attach if branch.attach >= 0 else branch.first if i > 0 else -1
-            found.append(Follower(before, near, base, like + i if like >= 0 else -1, list(at), list(at)))
-        first_before = branch.first
-    follow_twins(found, [tuple(steps_in(x, step * 0.00390625) for x in at) for at in rest])
-    for vertex in found:
-        vertex.above = found[vertex.before].before if vertex.before >= 0 else -1
-    return found
+        like, first, tip = last.get(branch.count, -1), branch.first, branch.first + branch.count - 1
+        last[branch.count] = first
+        is_free = branch.attach < 0 and branch.count > 1
+        ends = [first, tip] if is_free else [tip]
+        start = first if is_free else branch.attach
+        for v in ends + [v for v in range(first, tip) if v not in ends]:
+            is_end = v in ends
+            before = branch.attach if v == first else start if is_end else v - 1
+            near = tip_before if is_end else first_before if v == first else v - 1
+            base, tip_of = -1 if v == start else start, -1 if is_end else tip
+            twin = like + v - first if like >= 0 else -1
+            earlier = order[-1] if order else -1
+            found[v] = Follower(before, near, base, twin, tip_of, earlier, list(rest[v]), list(rest[v]))
+            order.append(v)
+        found[tip].leads = branch.count > len(ends)
+        tip_before, first_before = tip, first if branch.count > 1 else first_before
+    vertices = [found[v] for v in range(len(found))]
+    follow_twins(vertices, order, [tuple(steps_in(x, step * 0.00390625) for x in at) for at in rest])
+    for vertex in vertices:
+        vertex.above = vertices[vertex.before].before if vertex.before >= 0 else -1
+    return vertices, order
 
 
-def follow_twins(found: list[Follower], cells: list[tuple[int, ...]]) -> None:
+def follow_twins(found: list[Follower], order: list[int], cells: list[tuple[int, ...]]) -> None:
     """Vertices that rest where an earlier one does, and not where the one does that they follow, follow that."""
     places, table = 16, {}
     while places < 2 * len(found):
         places *= 2
-    for v, vertex in enumerate(found):
+    for v in order:
+        vertex = found[v]
         x, y, z = cells[v]
         entry = (x * 73856093 + y * 19349663 + z * 83492791) % (1 << 32)
         entry = (entry ^ entry >> 15) % places
@@ -2302,7 +2317,7 @@ class Prediction:
         require(finite(self.step) and self.step > 0.0, "Step of PREDICTED is out of range")
         self.coder = RangeDecoder(chunk[5:])
         self.rest, self.origin, self.number = rest.tolist(), origin, number
-        self.vertices = followers(branches, self.rest, self.step)
+        self.vertices, self.order = followers(branches, self.rest, self.step)
         self.numbers, self.distances = LatticeModel(), NumberModel()
         self.signs = [[Context(32768) for _ in range(3)] for _ in range(3)]
         self.moved = [
@@ -2310,6 +2325,8 @@ class Prediction:
         ]
         self.copied = [[Context(6000) for _ in range(RUNS)] for _ in range(RUNS)]
         self.usual = [Context(60000) for _ in range(2)]
+        self.followed = [[Context(32768) for _ in range(2)] for _ in range(2)]
+        self.last_followed = 0
         self.fits = [Fit() for _ in range(3)]
         self.run = self.last_run = 0
         self.distance = 1
@@ -2326,7 +2343,7 @@ class Prediction:
                 now = out[about - 1] if about > 0 else self._put_out(self.rest)
             else:
                 was = [known[about], known[abouts[about]], known[abouts[abouts[about]]]]
-                now = self._decode_frame(Around(self.rest, was, known[-1], []))
+                now = self._decode_frame(Around(self.rest, was, known[-1], [[]] * len(self.rest)))
             out.append(now)
             known.append((now.astype(float) - self.origin).tolist())
         self.coder.finish()
@@ -2347,21 +2364,46 @@ class Prediction:
         return copied
 
     def _decode_frame(self, around: Around) -> np.ndarray:
-        out = []
-        for v in range(len(self.vertices)):
+        out = np.empty((len(self.vertices), 3), self.number)
+        for v in self.order:
+            vertex = self.vertices[v]
+            if vertex.tip >= 0 and self.vertices[vertex.tip].followed:
+                vertex.size = 0, vertex.size[0]
+                self._place(around, v, self._between_ends(around, v), out)
+                continue
             p = self._predict(around, v)
             steps = self._decode_steps(v)
             at = [around.was[0][v][k] + p.way[k] + float(steps[k]) * self.unit for k in range(3)]
-            out.append(self._put_out([at])[0])
-            around.now.append((out[v].astype(float) - self.origin).tolist())
+            self._place(around, v, at, out)
             self._learn(around, v, p)
-        return np.array(out)
+            if vertex.leads:
+                vertex.followed = self.coder.bit(self.followed[vertex.followed][self.last_followed])
+                self.last_followed = vertex.followed
+        return out
+
+    def _place(self, around: Around, v: int, at: Point, out: np.ndarray) -> None:
+        out[v] = self._put_out([at])[0]
+        around.now[v] = (out[v].astype(float) - self.origin).tolist()
+
+    def _between_ends(self, around: Around, v: int) -> Point:
+        base, scale = self.vertices[v].base, self._stem_scale(around, v)
+        at = [around.now[base][k] + scale * (around.rest[v][k] - around.rest[base][k]) for k in range(3)]
+        return [x if finite(x) else was for x, was in zip(at, around.was[0][v])]
+
+    def _stem_scale(self, around: Around, v: int) -> float:
+        """How long the stem of a vertex is over how long it is at rest; of an end as it was, and changed."""
+        vertex = self.vertices[v]
+        if vertex.tip >= 0:
+            return self._grown(around, around.now, vertex.base, vertex.tip)
+        was, was2 = (self._grown(around, around.was[i], vertex.base, v) for i in range(2))
+        return was + (was - was2)
 
     def _predict(self, around: Around, v: int) -> Way:
         vertex = self.vertices[v]
-        fit, scales = self.fits[vertex.kind], (1.0, 1.0)
+        fit, edge = self.fits[vertex.kind], 1.0
         if vertex.kind == 2:
-            scales = self._grown(around, vertex.above, vertex.before), self._grown(around, vertex.base, vertex.before)
+            edge = self._grown(around, around.now, vertex.above, vertex.before)
+        scales = edge, self._stem_scale(around, v)
         guesses, features = zip(*(self._guess(vertex, around, v, k, scales, fit.weights) for k in range(3)))
         errors = list(vertex.error)
         if vertex.near >= 0:
@@ -2374,14 +2416,14 @@ class Prediction:
         way = [own[chosen] if finite(own[chosen]) else 0.0 for own in guesses]
         return Way(list(guesses), list(features), way)
 
-    def _grown(self, around: Around, u: int, v: int) -> float:
+    def _grown(self, around: Around, at: list[Point], u: int, v: int) -> float:
         """How far apart two vertices are along the way between them at rest, over that; near 1 where a step is more."""
         if u < 0 or v < 0:
             return 1.0
         along = length2 = self.step * self.step
         for k in range(3):
             edge = around.rest[v][k] - around.rest[u][k]
-            along = along + edge * (around.now[v][k] - around.now[u][k])
+            along = along + edge * (at[v][k] - at[u][k])
             length2 = length2 + edge * edge
         return along / length2 if length2 > 1e-60 else 1.0
 
@@ -2392,11 +2434,12 @@ class Prediction:
         def moved(u: int) -> tuple[float, float]:
             return (now[u][k] - was[u][k], was[u][k] - was2[u][k]) if u >= 0 else (0.0, 0.0)
 
-        x, u, joined, edge, stem = was[v][k], vertex.before, 0.0, 0.0, 0.0
+        x, u, joined, edge, stem, waits = was[v][k], vertex.before, 0.0, 0.0, 0.0, 0.0
         if u >= 0:
             joined = now[u][k] - x
             edge = joined + scales[0] * (around.rest[v][k] - around.rest[u][k])
         if vertex.base >= 0:
+            waits = around.rest[vertex.base][k] - x
             stem = (now[vertex.base][k] - x) + scales[1] * (around.rest[v][k] - around.rest[vertex.base][k])
         own, (before, before2), (above, above2) = x - was2[v][k], moved(u), moved(vertex.above)
         line, mean = (vertex.line[k] + vertex.slope[k]) - x, vertex.mean[k] - x
@@ -2406,13 +2449,13 @@ class Prediction:
             fitted = fitted + weight * feature
         like = moved(vertex.like)[0]
         both, older = own + (before - before2), vertex.older[k]
-        return [0.0, own, before, both, edge, joined, line, mean, like, older, stem, fitted], features
+        return [0.0, own, before, both, edge, joined, line, mean, like, older, stem, waits, fitted], features
 
     def _decode_steps(self, v: int) -> list[int]:
         vertex, vertices = self.vertices[v], self.vertices
         own, older = vertex.size
         near = vertices[vertex.near].size[0] if vertex.near >= 0 else 0
-        beside = max(vertices[u].size[0] if u >= 0 else 0 for u in (v - 1, vertex.before))
+        beside = max(vertices[u].size[0] if u >= 0 else 0 for u in (vertex.earlier, vertex.before))
         contexts = self.moved[size_class(own + older // 2)][size_class(near)]
         expected, steps, total = (2 * own + older + 2 * near + beside) * 8 // 9, [], 0
         signs = vertices[vertex.near].steps if vertex.near >= 0 else [0, 0, 0]

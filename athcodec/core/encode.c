@@ -434,19 +434,41 @@ static int choose_steps(prediction *p, const predicted_source *source, int32_t v
     return is_within(p, source, p->frame, v);
 }
 
+/* Whether those that follow the last vertex of a stem keep their limits. */
+static int may_follow(prediction *p, const predicted_source *source, int32_t tip)
+{
+    double scale = stem_scale(&p->around, p->vertices + p->vertices[tip].next, tip, p->head.step);
+    for (int32_t v = p->vertices[tip].next; v >= 0 && p->vertices[v].tip == tip; v = p->vertices[v].next) {
+        follow_ends(p, v, scale);
+        if (!is_within(p, source, p->frame, v)) return 0;
+    }
+    return 1;
+}
+
+/* 0: there are no integers that keep the vertex within its limit. */
+static int encode_vertex(ath_coder *coder, prediction *p, const predicted_source *source, int32_t v)
+{
+    predicted_vertex *vertex = p->vertices + v;
+    predicted_way way;
+    int32_t steps[3];
+    if (follows(p, v)) {
+        follow(p, v);
+        return 1;
+    }
+    predict_vertex(&p->model, &p->head, p->vertices, &p->around, v, &way);
+    if (!choose_steps(p, source, v, &way, steps)) return 0;
+    code_steps(coder, &p->model, p->head.lattice, p->vertices, v, steps);
+    learn_vertex(&p->model, &p->head, p->vertices, &p->around, v, &way);
+    if (vertex->leads) code_followed(coder, &p->model, vertex, may_follow(p, source, v));
+    return 1;
+}
+
 static int encode_frame(ath_coder *coder, prediction *p, const predicted_source *source)
 {
-    predicted_way way;
     int copied, valid = 1;
     int32_t distance = find_reference(p, source, &copied);
     if (!start_frame(coder, p, &copied, distance)) return 0;
-    for (int32_t v = 0; !copied && valid && v < p->vertex_count; v++) {
-        int32_t steps[3];
-        predict_vertex(&p->model, &p->head, p->vertices, &p->around, v, &way);
-        valid = choose_steps(p, source, v, &way, steps);
-        code_steps(coder, &p->model, p->head.lattice, p->vertices, v, steps);
-        learn_vertex(&p->model, &p->head, p->vertices, &p->around, v, &way);
-    }
+    for (int32_t v = 0; !copied && valid && v >= 0; v = p->vertices[v].next) valid = encode_vertex(coder, p, source, v);
     p->frame++;
     return valid;
 }

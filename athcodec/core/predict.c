@@ -7,7 +7,8 @@ enum { STEP_VERTICES = 1024 };
 struct ath_prediction {
     prediction segment; /* whose arrays lie behind it */
     ath_coder coder;
-    int32_t frames, vertex; /* vertex: the next of the frame */
+    int32_t frames, vertex; /* vertex: how many of the frame are decoded */
+    int32_t next;           /* the one that comes then */
 };
 
 /* The coder's place, and the arrays behind it. */
@@ -48,10 +49,15 @@ static void decode_vertex(ath_coder *coder, prediction *p, int32_t v)
 {
     predicted_way way;
     int32_t steps[3] = {0, 0, 0};
+    if (follows(p, v)) {
+        follow(p, v);
+        return;
+    }
     predict_vertex(&p->model, &p->head, p->vertices, &p->around, v, &way);
     code_steps(coder, &p->model, p->head.lattice, p->vertices, v, steps);
     place_vertex(p, v, &way, steps);
     learn_vertex(&p->model, &p->head, p->vertices, &p->around, v, &way);
+    if (p->vertices[v].leads) code_followed(coder, &p->model, p->vertices + v, 0);
 }
 
 int ath_prediction_step(ath_prediction *p)
@@ -61,7 +67,11 @@ int ath_prediction_step(ath_prediction *p)
     if (p->vertex == 0 && !start_frame(&p->coder, segment, &copied, 0)) return ATH_BAD_CHUNK;
     int32_t stop = copied ? segment->vertex_count : ath_min(p->vertex + STEP_VERTICES, segment->vertex_count);
     ath_coder coder = p->coder;
-    for (int32_t v = p->vertex; !copied && v < stop; v++) decode_vertex(&coder, segment, v);
+    if (p->vertex == 0) p->next = 0;
+    for (int32_t i = p->vertex; !copied && i < stop; i++) {
+        decode_vertex(&coder, segment, p->next);
+        p->next = segment->vertices[p->next].next;
+    }
     p->coder = coder;
     p->vertex = stop;
     if (stop < segment->vertex_count) return ATH_MORE;

@@ -7,7 +7,7 @@
 #include "lattice.h"
 #include "plan.h"
 
-enum { GUESSES = 12, FEATURES = 8, FITS = 3, FITTED = GUESSES - 1, LINE_GUESS = 6 };
+enum { GUESSES = 13, FEATURES = 8, FITS = 3, FITTED = GUESSES - 1, LINE_GUESS = 6 };
 enum { LONGEST_LINE = 24, LONGEST_MEAN = 64, SOLVED_EVERY = 16, RUNS = 8 };
 
 /* A vertex from frame to frame. */
@@ -23,6 +23,9 @@ typedef struct {
     int32_t base;                 /* where its stem is attached, or begins; -1: it is there itself */
     int32_t like;                 /* its place on an earlier stem that is as long, -1: none */
     int32_t near;                 /* whose errors and integers tell of its own, -1: none */
+    int32_t tip;                  /* the last vertex of its stem, -1: it is an end itself */
+    int32_t earlier, next;        /* in the order of coding, -1: none */
+    int32_t leads, followed;      /* of a last vertex: whether its stem has others than ends; these follow it */
 } predicted_vertex;
 
 /* Weights of the features by least squares, and the mean errors of the guesses. */
@@ -34,9 +37,9 @@ typedef struct {
 typedef struct {
     lattice_model lattice;
     number_model distance;
-    ath_context moved[4][4][3], sign[3][3], copied[RUNS][RUNS], usual[2];
+    ath_context moved[4][4][3], sign[3][3], copied[RUNS][RUNS], usual[2], followed[2][2];
     predicted_fit fits[FITS];
-    int32_t run, last_run, last_distance;
+    int32_t run, last_run, last_distance, last_followed;
 } predicted_model;
 
 /* Positions around the frame that is coded, less the origin, vertex_count x 3 each. */
@@ -67,6 +70,8 @@ static void predicted_model_init(predicted_model *model)
     for (int32_t run = 0; run < RUNS; run++)
         for (int32_t last = 0; last < RUNS; last++) context_init(&model->copied[run][last], 6000);
     for (int32_t copied = 0; copied < 2; copied++) context_init(&model->usual[copied], 60000);
+    for (int32_t own = 0; own < 2; own++)
+        for (int32_t last = 0; last < 2; last++) context_init(&model->followed[own][last], 32768);
     for (int32_t f = 0; f < FITS; f++) model->fits[f].wait = 1;
     model->last_distance = 1;
 }
@@ -150,17 +155,25 @@ ATH_INLINE int is_number(double x) { return x - x == 0.0; }
 ATH_INLINE double absolute(double x) { return x < 0.0 ? -x : x; }
 
 /* How far apart two vertices are along the way between them at rest, over that; near 1 where a step is more. */
-ATH_INLINE double grown(const predicted_frames *frames, int32_t from, int32_t to, double step)
+ATH_INLINE double grown(const double *rest, const double *now, int32_t from, int32_t to, double step)
 {
     double along = step * step, length2 = along;
     if (from < 0 || to < 0) return 1.0;
     size_t p = 3 * (size_t)from, u = 3 * (size_t)to;
     for (size_t k = 0; k < 3; k++) {
-        double edge = frames->rest[u + k] - frames->rest[p + k];
-        along = along + edge * (frames->now[u + k] - frames->now[p + k]);
+        double edge = rest[u + k] - rest[p + k];
+        along = along + edge * (now[u + k] - now[p + k]);
         length2 = length2 + edge * edge;
     }
     return length2 > 1e-60 ? along / length2 : 1.0;
+}
+
+/* That of its stem, as far as it is coded; of an end as it was and changed. */
+ATH_INLINE double stem_scale(const predicted_frames *frames, const predicted_vertex *vertex, int32_t v, double step)
+{
+    if (vertex->tip >= 0) return grown(frames->rest, frames->now, vertex->base, vertex->tip, step);
+    double was = grown(frames->rest, frames->was[0], vertex->base, v, step);
+    return was + (was - grown(frames->rest, frames->was[1], vertex->base, v, step));
 }
 
 ATH_INLINE void guess_axis(const predicted_vertex *vertex, const predicted_frames *frames, size_t v, size_t k,
@@ -169,7 +182,7 @@ ATH_INLINE void guess_axis(const predicted_vertex *vertex, const predicted_frame
     const double *now = frames->now, *was = frames->was[0], *was2 = frames->was[1];
     size_t at = 3 * v + k;
     double x = was[at], own = x - was2[at], before = 0.0, before2 = 0.0, above = 0.0, above2 = 0.0;
-    double joined = 0.0, edge = 0.0, stem = 0.0, like = 0.0;
+    double joined = 0.0, edge = 0.0, stem = 0.0, like = 0.0, waits = 0.0;
     if (vertex->before >= 0) {
         size_t u = 3 * (size_t)vertex->before + k;
         before = now[u] - was[u];
@@ -184,6 +197,7 @@ ATH_INLINE void guess_axis(const predicted_vertex *vertex, const predicted_frame
     }
     if (vertex->base >= 0) {
         size_t u = 3 * (size_t)vertex->base + k;
+        waits = frames->rest[u] - x;
         stem = (now[u] - x) + scales[1] * (frames->rest[at] - frames->rest[u]);
     }
     if (vertex->like >= 0) {
@@ -204,7 +218,8 @@ ATH_INLINE void guess_axis(const predicted_vertex *vertex, const predicted_frame
         fitted = fitted + weights[i] * features[i];
     }
     double guesses[GUESSES] = {0.0,         own,         before, own + (before - before2), edge, joined,
-                               features[6], features[7], like,   vertex->older[k],         stem, fitted};
+                               features[6], features[7], like,   vertex->older[k],         stem, waits,
+                               fitted};
     for (int32_t i = 0; i < GUESSES; i++) p->guess[i][k] = guesses[i];
 }
 
@@ -219,9 +234,9 @@ static void predict_vertex(const predicted_model *model, const ath_predicted_hea
     double scales[2] = {1.0, 1.0}, best = 0.0;
     int32_t chosen = 0;
     if (inner) {
-        scales[0] = grown(frames, vertex->above, vertex->before, head->step);
-        scales[1] = grown(frames, vertex->base, vertex->before, head->step);
+        scales[0] = grown(frames->rest, frames->now, vertex->above, vertex->before, head->step);
     }
+    scales[1] = stem_scale(frames, vertex, v, head->step);
     for (size_t k = 0; k < 3; k++) guess_axis(vertex, frames, (size_t)v, k, scales, fit->weights, p);
     for (int32_t i = 0; i < GUESSES; i++) {
         double error = vertex->error[i];
@@ -287,7 +302,7 @@ ATH_INLINE uint32_t expected_size(const predicted_vertex *vertices, int32_t v, u
 {
     const predicted_vertex *vertex = vertices + v;
     *near = vertex->near >= 0 ? vertices[vertex->near].size[0] : 0;
-    *beside = v > 0 ? vertices[v - 1].size[0] : 0;
+    *beside = vertex->earlier >= 0 ? vertices[vertex->earlier].size[0] : 0;
     if (vertex->before >= 0 && vertices[vertex->before].size[0] > *beside) *beside = vertices[vertex->before].size[0];
     return (2 * vertex->size[0] + vertex->size[1] + 2 * *near + *beside) * 8 / 9;
 }
@@ -320,6 +335,13 @@ ATH_INLINE void code_steps(ath_coder *coder, predicted_model *model, int32_t lat
     }
     vertex->size[1] = vertex->size[0];
     vertex->size[0] = sum;
+}
+
+/* Whether the vertices of a stem follow its last one. */
+ATH_INLINE void code_followed(ath_coder *coder, predicted_model *model, predicted_vertex *tip, int followed)
+{
+    tip->followed = coder_bit(coder, &model->followed[tip->followed][model->last_followed], followed);
+    model->last_followed = tip->followed;
 }
 
 /* ---- what follows what ---- */
@@ -374,23 +396,33 @@ static uint64_t carve_prediction(prediction *p, int32_t vertex_count, uint8_t *b
     return arena.used;
 }
 
-/* Stems in file order: a vertex follows the one before it, the first one the attach vertex. */
+/* Stems in file order, the ends of each before the others: the first vertex of a stem that hangs on nothing, the last of
+ * any. A vertex follows the one before it, the first and the last one the attach vertex. */
 static void follow_stems(prediction *p, const ath_branch *branches, int32_t branch_count)
 {
-    int32_t first_before = -1;
+    int32_t tip_before = -1, first_before = -1, earlier = -1;
     for (int32_t i = 0; i <= p->vertex_count; i++) p->last[i] = -1;
     for (int32_t b = 0; b < branch_count; b++) {
         const ath_branch *branch = branches + b;
-        int32_t like = p->last[branch->count];
-        p->last[branch->count] = branch->first;
+        int32_t like = p->last[branch->count], first = branch->first, tip = first + branch->count - 1;
+        int32_t ends = branch->attach < 0 && tip > first ? 2 : 1, base = ends == 2 ? first : branch->attach;
+        p->last[branch->count] = first;
         for (int32_t i = 0; i < branch->count; i++) {
-            predicted_vertex *vertex = p->vertices + branch->first + i;
-            vertex->before = i > 0 ? branch->first + i - 1 : branch->attach;
-            vertex->near = i > 0 ? vertex->before : first_before;
-            vertex->base = branch->attach >= 0 ? branch->attach : i > 0 ? branch->first : -1;
-            vertex->like = like >= 0 ? like + i : -1;
+            int32_t v = i == ends - 1 ? tip : i < ends ? first : first + i - 1;
+            predicted_vertex *vertex = p->vertices + v;
+            vertex->before = v == first ? branch->attach : i < ends ? base : v - 1;
+            vertex->near = i < ends ? tip_before : v == first ? first_before : v - 1;
+            vertex->tip = i < ends ? -1 : tip;
+            vertex->base = v == base ? -1 : base;
+            vertex->like = like >= 0 ? like + (v - first) : -1;
+            vertex->earlier = earlier;
+            vertex->next = -1;
+            if (earlier >= 0) p->vertices[earlier].next = v;
+            earlier = v;
         }
-        first_before = branch->first;
+        p->vertices[tip].leads = branch->count > ends;
+        tip_before = tip;
+        if (branch->count > 1) first_before = first;
     }
 }
 
@@ -400,7 +432,7 @@ static void follow_twins(prediction *p)
     double width = p->head.step * 0.00390625;
     uint32_t places = twin_places(p->vertex_count);
     for (uint32_t i = 0; i < places; i++) p->last[i] = -1;
-    for (int32_t v = 0; v < p->vertex_count; v++) {
+    for (int32_t v = 0; v >= 0; v = p->vertices[v].next) {
         predicted_vertex *vertex = p->vertices + v;
         int32_t twin = take_place(p->rest, p->last, places, width, v), joined = vertex->before >= 0;
         for (size_t k = 0; k < 3 && joined; k++)
@@ -504,6 +536,32 @@ static void place_vertex(prediction *p, int32_t v, const predicted_way *way, con
         put_out(p, at, k, p->around.was[0][from + k] + way->way[k] + (double)steps[k] * unit);
         p->around.now[from + k] = put_back(p, at, k);
     }
+}
+
+ATH_INLINE int follows(const prediction *p, int32_t v)
+{
+    int32_t tip = p->vertices[v].tip;
+    return tip >= 0 && p->vertices[tip].followed;
+}
+
+/* Puts out a vertex that lies between the ends of its stem as it does at rest. */
+static void follow_ends(prediction *p, int32_t v, double scale)
+{
+    size_t from = 3 * (size_t)v, u = 3 * (size_t)p->vertices[v].base;
+    size_t at = 3 * (size_t)p->vertex_count * (size_t)p->frame + from;
+    for (size_t k = 0; k < 3; k++) {
+        double x = p->around.now[u + k] + scale * (p->rest[from + k] - p->rest[u + k]);
+        put_out(p, at, k, is_number(x) ? x : p->around.was[0][from + k]);
+        p->around.now[from + k] = put_back(p, at, k);
+    }
+}
+
+static void follow(prediction *p, int32_t v)
+{
+    predicted_vertex *vertex = p->vertices + v;
+    follow_ends(p, v, stem_scale(&p->around, vertex, v, p->head.step));
+    vertex->size[1] = vertex->size[0];
+    vertex->size[0] = 0;
 }
 
 #endif

@@ -25,9 +25,13 @@ from athcodec.encoding.shape import finer_than
 from athcodec.errors import BoundError
 
 MEMORIES, LATTICE = (2, 9, 0, 13), 16  # of the second field of PREDICTED: to choose from, and beside them
-REST_STEPS = (0.5, 1.15)  # over the bound
+REST_STEPS = (0.5, 0.25, 0.125, 1.15)  # over the bound
 STEPS = (0.999, 0.97, 0.9, 0.75, 0.5, 0.3)  # over the largest that reaches every point within the limit
 TRIAL_SEGMENTS, TRIAL_FRAMES = 3, 64
+STILL, FINE_STILL = 0.35, 0.25  # over the limit, errors whose second differences are at most 1.4 limits, or one
+FINE = 9e-4  # over the diagonal, bounds below which it is to be one
+TWITCHING = 0.02  # of the vertices, which may twitch in any frame
+MOST_FOR_STILL = 2.0  # over the bytes without, that errors without twitches may take
 TOO_MANY = 1.2  # over the bytes wanted, that a few frames may promise
 MAP_SHARE, MAP_STEPS = 0.02, (0.1, 0.25, 0.5, 1.0)  # of the bytes, for level 0; over the error of the rest pose
 LESS_ERROR = 0.9  # of level 0, with maps that are worth their bytes
@@ -54,7 +58,7 @@ def _settings(source: Source, ath: Ath, bound: float, rest_step: float) -> Setti
         bound=bound,
         largest_bound=source.largest_bound(bound),
         limit=source.limit(bound),
-        step=_step(source.limit(bound), MEMORIES[0]),
+        step=_largest_step(source.limit(bound), MEMORIES[0]),
         level_steps=np.ones(levels),
         rest_step=qz.single(rest_step),
         sheet=none,
@@ -82,6 +86,7 @@ class FoundPrediction:
 
     choice: Choice
     bytes: float
+    twitches: bool
 
 
 def best_prediction(source: Source, bound: float, most_bytes: float) -> FoundPrediction | None:
@@ -91,11 +96,14 @@ def best_prediction(source: Source, bound: float, most_bytes: float) -> FoundPre
     samples = _samples(source)
     preludes = {first.rest_step: CodedPrelude(source, ath, first, predicted=True)}
 
-    def coded(settings: Settings, head: int) -> FoundPrediction:
-        own = replace(settings, step=_step(settings.limit, head))
+    def coded(settings: Settings, head: int, error_share: float = 1.0) -> FoundPrediction:
+        own = replace(settings, step=_largest_step(error_share * settings.limit, head))
+        choice = Choice(own, own, None, predicted=head, error_share=error_share)
         prelude = preludes[settings.rest_step]
-        motion = sum(len(_predicted(prelude, own, sample.positions, head)[0]) * sample.scale for sample in samples)
-        return FoundPrediction(Choice(own, own, None, predicted=head), motion + prelude.prelude_bytes)
+        parts = [(sample, *_predicted(prelude, choice, sample.positions)) for sample in samples]
+        motion = sum(len(payload) * sample.scale for sample, payload, _ in parts)
+        twitches = any(_twitches(shown, sample.positions, settings.limit) for sample, _, shown in parts)
+        return FoundPrediction(choice, motion + prelude.prelude_bytes, twitches)
 
     def best(found: Iterable[FoundPrediction]) -> tuple[FoundPrediction, Settings, int]:
         one = min(found, key=lambda one: one.bytes)
@@ -111,12 +119,30 @@ def best_prediction(source: Source, bound: float, most_bytes: float) -> FoundPre
         found, settings, _ = best([found, *(coded(own, memory) for own in others)])
         if Feature.LATTICE not in source.without:
             found, _, _ = best([found, coded(settings, memory | LATTICE)])
+        if found.twitches:
+            share = STILL if source.smallest_bound(bound) >= FINE * source.seen.diagonal else FINE_STILL
+            still, _, _ = best(coded(own, memory, share) for own in (first, *others))
+            if still.bytes < min(most_bytes, MOST_FOR_STILL * found.bytes):
+                found = still
     except BoundError:
         return None
     return found if found.bytes < most_bytes else None
 
 
-def _step(limit: np.ndarray | float, head: int) -> float:
+def _twitches(shown: np.ndarray, positions: np.ndarray, limit: np.ndarray | float) -> bool:
+    """Whether second differences of the error over frames, (N, 3, T), are seen to be above the limit: of many vertices
+    in some frames only, or of vertices that hardly jerk themselves.
+    """
+    if positions.shape[2] < 3:
+        return False
+    moved = np.linalg.norm(np.diff(positions, 2, axis=2), axis=1)
+    error = np.linalg.norm(np.diff(shown - positions, 2, axis=2), axis=1)
+    above = error > np.reshape(limit, (-1, 1))
+    share, seen = above.mean(axis=0), (above & (error > moved)).mean(axis=0)
+    return share.max() > max(TWITCHING, 2 * np.median(share)) or seen.max() > TWITCHING
+
+
+def _largest_step(limit: np.ndarray | float, head: int) -> float:
     """The largest that reaches every place within the limit."""
     return qz.single((qz.LATTICE_REST_CAP if head & LATTICE else qz.SAFE_REST_CAP) * float(np.min(limit)))
 
@@ -134,19 +160,25 @@ def _samples(source: Source) -> list[SegmentSample]:
 def _begun(prelude: CodedPrelude, settings: Settings, sample: SegmentSample) -> float:
     """Bytes of the frames that a sample stands for, but for first ones, as far as a few of it tell."""
     some = sample.positions[:, :, :TRIAL_FRAMES]
-    coded, first = (len(_predicted(prelude, settings, part, MEMORIES[0])[0]) for part in (some, some[:, :, :1]))
+    choice = Choice(settings, settings, None, predicted=MEMORIES[0])
+    coded, first = (len(_predicted(prelude, choice, part)[0]) for part in (some, some[:, :, :1]))
     return (coded - first) / some.shape[2] * sample.frames
 
 
-def _predicted(prelude: CodedPrelude, settings: Settings, positions: np.ndarray, head: int) -> tuple[bytes, np.ndarray]:
+def _predicted(prelude: CodedPrelude, choice: Choice, positions: np.ndarray) -> tuple[bytes, np.ndarray]:
     """PREDICTED of a segment and its positions, (N, 3, T). Raises BoundError."""
+    head, settings = choice.predicted, choice.settings
+    assert head is not None
     source = np.ascontiguousarray(positions.transpose(2, 0, 1))
     limits = np.array(np.broadcast_to(settings.limit, len(positions)), np.float64)
-    for factor in STEPS:
-        step = qz.single(factor * settings.step)
-        coded = streams.encode_predicted(prelude.plan, prelude.origin, source, limits, step, head, prelude.dtype)
-        if coded is not None:
-            return ct.pack_predicted(step, head, coded[0]), np.ascontiguousarray(coded[1].transpose(1, 2, 0))
+    for share in dict.fromkeys((choice.error_share, 1.0)):  # the whole limit where numbers are too coarse for a part
+        for factor in STEPS:
+            step = qz.single(factor * _largest_step(share * limits, head))
+            coded = streams.encode_predicted(
+                prelude.plan, prelude.origin, source, share * limits, step, head, prelude.dtype
+            )
+            if coded is not None:
+                return ct.pack_predicted(step, head, coded[0]), np.ascontiguousarray(coded[1].transpose(1, 2, 0))
     raise BoundError(
         f"max error: got {settings.bound:.3g}; it cannot be kept in the output's {prelude.dtype.name} numbers"
     )
@@ -158,7 +190,7 @@ def code_predicted_segment(
     """Chunks and errors as CodedMotion.joined_to gives them; predicted motion is not joined."""
     assert choice.predicted is not None
     plan, settings = prelude.plan, choice.settings
-    payload, decoded = _predicted(prelude, settings, positions, choice.predicted)
+    payload, decoded = _predicted(prelude, choice, positions)
 
     def error(shown: np.ndarray) -> tuple[float, ...]:
         return position_errors(shown, positions, prelude.origin, plan.pool)
