@@ -93,7 +93,7 @@ static void code_piece(ath_coder *coder, coefficient_model *model, const ath_pla
     if (level == ath_base_level(piece)) {
         if (ath_has_shift(piece))
             note_count(rows, SHIFT_SLOT, code_row(coder, model, frames, rank, SHIFT_SLOT, -1, rows->shift));
-        if (ath_rotation_step(plan, piece, stream) > 0.0)
+        if (ath_has_rotation(plan, piece, stream))
             note_count(rows, ROTATION_SLOT, code_row(coder, model, frames, rank, ROTATION_SLOT, -1, rows->rotation));
     }
     if (piece->low_level == level) to = ath_min(piece->low_modes, ath_rank(piece));
@@ -126,7 +126,7 @@ static void code_refined_tracks(ath_coder *coder, refinement_model *model, const
     if (ath_has_shift(piece))
         code_refined_track(coder, model, stream, motion, SHIFT_SLOT, rows->predicted_shift, rows->coarse_shift, rows,
                            rows->shift);
-    if (ath_rotation_step(plan, piece, stream) > 0.0)
+    if (ath_has_rotation(plan, piece, stream))
         code_refined_track(coder, model, stream, motion, ROTATION_SLOT, rows->predicted_rotation, rows->coarse_rotation,
                            rows, rows->rotation);
 }

@@ -797,6 +797,7 @@ static void look_before(ath_work *work, int32_t q, int32_t p, const double *plac
     before->placed = placed;
     before->rotation = coarse->scratch.rotation;
     before->shift = coarse->scratch.shift;
+    before->frames = piece->flags & ATH_RIGID ? coarse->scratch.at.point : 0;
     before->modes = 0;
     before->frequencies = ath_max(ath_row_extent(coarse->rows.shift, T, coarse->counts[SHIFT_SLOT]),
                                   ath_row_extent(coarse->rows.rotation, T, coarse->counts[ROTATION_SLOT]));
@@ -822,7 +823,7 @@ static int refine_piece(ath_work *work, int32_t q, int32_t p, const double **pla
     ath_coder coder = reader->coder;
     if (refine_shapes(work, q, piece) != ATH_OK) return ATH_BAD_CHUNK;
     look_before(work, q, p, *placed);
-    ath_predict_tracks(layer->plan, &layer->motion, piece, &layer->before, &layer->rows);
+    ath_predict_tracks(layer->plan, &layer->motion, piece, &layer->before, &layer->scratch, &layer->rows);
     code_refined_tracks(&coder, reader->refined, layer->plan, stream, &layer->motion, piece, &layer->rows);
     ath_turned_attach(layer->plan, &layer->motion, p, &layer->rows, &layer->scratch);
     ath_predict_modes(layer->plan, &layer->motion, piece, &layer->before, &layer->scratch, &layer->rows);

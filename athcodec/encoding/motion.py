@@ -243,14 +243,18 @@ class SegmentMotion:
         if layered:
             self.placed = np.zeros((plan.vertex_count, 3, frames))
             self.placed_tracks = np.zeros(self.tracks.shape)
+            self.placed_frames = np.zeros((core.piece_count, 12, frames))  # those of rigid pieces are touched
             self.extents = np.zeros((core.piece_count, 2), np.int32)
+            self.rigid = np.zeros(core.piece_count, np.uint8)
             self.coarse = Coarse(
                 self.placed.ctypes.data,
                 self.coefficients.ctypes.data,
                 self.tracks.ctypes.data,
                 None if learned_modes is None else learned_modes.counts.ctypes.data,
                 self.placed_tracks.ctypes.data,
+                self.placed_frames.ctypes.data,
                 self.extents.ctypes.data,
+                self.rigid.ctypes.data,
             )
         self._bind()
 

@@ -171,7 +171,7 @@ def _rigid(source: Source, bound: float, samples: Sequence[SegmentSample], ratio
     return rigid_layers(
         hierarchy.first_vertex,
         hierarchy.stem_count,
-        source.details > 0,
+        source.sheet_like | (source.details > 0),
         source.rest,
         [sample.positions for sample in samples],
         [ratio * least for ratio in ratios],
