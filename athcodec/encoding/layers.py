@@ -249,8 +249,8 @@ class _TimeBases:
     """The time bases of the layers of one segment: one, learned for the last layer, with more rows in each."""
 
     def __init__(self, last: Layer, positions: np.ndarray):
-        level, learning = last.plan.level_count - 1, last.settings.learning_levels
-        self._components = time_components(last.plan, last.settings, positions, learning[-1:]).get(level)
+        everything = [None] if last.settings.learned_bases[-1] else []
+        self._components = time_components(last.plan, last.settings, positions, everything).get(None)
         self._before: tuple[int, StreamBasis] | None = None
 
     def first(self, layer: Layer) -> dict[int, StreamBasis]:

@@ -174,9 +174,9 @@ class Plan:
     @property
     def main_level(self) -> int:
         """The level whose stream holds the most rows."""
-        pieces, low = self.pieces, self.pieces["low_modes"]
-        rows = np.bincount(self.base_level, low, self.level_count)
-        return int((rows + np.bincount(pieces["level"], pieces["rank"] - low, self.level_count)).argmax())
+        low, rotations = np.minimum(self.pieces["low_modes"], self.ranks), self.is_rigid
+        rows = np.bincount(self.base_level, low + rotations, self.level_count)
+        return int((rows + np.bincount(self.pieces["level"], self.ranks - low, self.level_count)).argmax())
 
     def has_stems(self, level: int) -> bool:
         """Whether the level has a coefficient stream."""

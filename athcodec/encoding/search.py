@@ -149,7 +149,7 @@ def first_settings(
         rigid=rigid,
         layer=len(ratios) - 1,
         free_rigid=False,
-        turn_step=TURN_STEP if rigid.any() else 0.0,
+        turn_step=TURN_STEP if rigid[source.details > 0].any() else 0.0,
         lags=np.zeros(source.hierarchy.branch_count, np.int32),
         details=source.details if layered else finer_than(source.details, bound),
         adaptive_rest=False,
