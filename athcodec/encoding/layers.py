@@ -30,6 +30,7 @@ from athcodec.encoding.segment import (
     Source,
     StreamBasis,
     analyse,
+    basis_ratio,
     code_source_rest,
     correct,
     correction_chunk,
@@ -265,7 +266,7 @@ class _TimeBases:
         """Of a stream of the layer's settings, which stands at a level of the file."""
         if self._components is None or not layer.settings.learned_bases[stream]:
             return {}
-        steps = self._components.basis(layer.ratio)
+        steps = self._components.basis(basis_ratio(layer.plan, layer.settings, layer.ratio))
         if steps is None:
             return {}
         own = StreamBasis(steps, level)

@@ -171,6 +171,13 @@ class Plan:
         """Per piece whether it turns and moves as it is, (P,)."""
         return self.pieces["flags"] & RIGID > 0
 
+    def levers(self) -> np.ndarray:
+        """(P,) by how much a turn by one radian moves a piece: the root of its mean moment of inertia."""
+        pieces = self.pieces
+        at = np.where(pieces["attach"] >= 0, pieces["attach"], pieces["first"])
+        away = self.rest - np.repeat(self.rest[at], pieces["count"], axis=0)
+        return np.sqrt(2 / 3 * np.add.reduceat((away**2).sum(axis=1), pieces["first"]))
+
     @property
     def main_level(self) -> int:
         """The level whose stream holds the most rows."""

@@ -31,6 +31,7 @@ from athcodec.encoding.segment import (
     StreamBasis,
     analyse,
     analyse_finely,
+    basis_ratio,
     branch_records,
     code_stems,
     lags,
@@ -347,8 +348,11 @@ class Search:
 
     def first_layer(self, settings: Settings, ratio: int) -> Settings:
         """Settings of a layer whose step is `ratio` times that of the given ones."""
-        first = replace(_coarser(settings, ratio), learned_bases=(False,) * self.levels, learned_pieces=None)
-        for step in (self._with_rotations, self._with_learned_bases, self._with_learned_modes):
+        first, steps = replace(_coarser(settings, ratio), learned_pieces=None), [self._with_rotations]
+        if not settings.turn_step:  # else its turns are as fine as those of refinements, which have that basis
+            first = replace(first, learned_bases=(False,) * self.levels)
+            steps.append(self._with_learned_bases)
+        for step in (*steps, self._with_learned_modes):
             first = first if self.effort == "fast" else step(first)
         return self._with_node_steps(first)
 
@@ -535,7 +539,7 @@ class Search:
             return {}
         step, components = self._learn_time(settings)
         some = {level: own for level, own in components[number].items() if settings.learned_bases[level]}
-        return level_bases(some, settings.step / step)
+        return level_bases(some, basis_ratio(self.prelude(settings).plan, settings, settings.step / step))
 
     def _learn_time(self, settings: Settings) -> tuple[float, list[dict[int, TimeComponents]]]:
         """Components of the samples over time, of all levels, and the step of the trial that asked first for them: they

@@ -493,6 +493,17 @@ def level_bases(components: dict[int, TimeComponents], ratio: float = 1.0) -> di
     return {level: StreamBasis(basis, level) for level, basis in bases.items() if basis is not None}
 
 
+def basis_ratio(plan: Plan, settings: Settings, ratio: float) -> float:
+    """By how much rows may be coarser than where a time basis was learned, at steps `ratio` times as fine: by less where
+    the turns of rigid pieces have a largest step."""
+    levers = plan.levers()[plan.is_rigid]
+    if not settings.turn_step or not levers.any():
+        return ratio
+    steps = np.minimum(settings.step / levers[levers > 0], settings.turn_step)
+    finest = np.minimum(settings.step / ratio / levers[levers > 0], settings.turn_step)
+    return float(np.sqrt(np.mean((steps / finest) ** 2)))
+
+
 def learned_bases(plan: Plan, settings: Settings, positions: np.ndarray) -> dict[int, StreamBasis]:
     """Of the levels that learn theirs."""
     return level_bases(time_components(plan, settings, positions, settings.learning_levels))
