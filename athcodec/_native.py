@@ -88,7 +88,7 @@ class Coarse(ctypes.Structure):
 
     _fields_ = [
         (name, c_void_p)
-        for name in "placed integers integer_tracks shape_counts tracks frames extents rigid".split()
+        for name in "placed integers integer_tracks shape_counts tracks frames extents turn_steps".split()
     ]
 
 

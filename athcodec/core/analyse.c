@@ -220,7 +220,7 @@ static void analyse_tracks(const ath_plan *plan, const ath_motion *motion, const
 }
 
 /* What the next layer predicts from. */
-static void note_piece(const ath_motion *motion, const ath_piece *piece, int32_t p, const ath_piece_rows *rows,
+static void note_piece(const ath_plan *plan, const ath_motion *motion, const ath_piece *piece, int32_t p, const ath_piece_rows *rows,
                        const ath_scratch *scratch, const double *placed)
 {
     const ath_coarse *decoded = motion->decoded;
@@ -228,8 +228,9 @@ static void note_piece(const ath_motion *motion, const ath_piece *piece, int32_t
     memcpy(decoded->placed + (size_t)piece->first * 3 * T, placed, (size_t)piece->count * 3 * T * sizeof(double));
     memcpy(decoded->tracks + (size_t)p * 6 * T, scratch->rotation, 3 * T * sizeof(double));
     memcpy(decoded->tracks + (size_t)p * 6 * T + 3 * T, scratch->shift, 3 * T * sizeof(double));
-    decoded->rigid[p] = (piece->flags & ATH_RIGID) != 0;
-    if (decoded->rigid[p]) {
+    if (piece->flags & ATH_RIGID) {
+        ath_turning turning = ath_turning_of(plan, piece, ath_base_stream(motion, piece));
+        memcpy(decoded->turn_steps + 3 * (size_t)p, turning.steps, sizeof turning.steps);
         memcpy(decoded->frames + (size_t)p * 12 * T, scratch->at.point, 3 * T * sizeof(double));
         memcpy(decoded->frames + (size_t)p * 12 * T + 3 * T, scratch->at.rotation, 9 * T * sizeof(double));
     }
@@ -250,7 +251,7 @@ static ath_piece_before piece_before(const ath_plan *plan, const ath_motion *mot
     size_t T = (size_t)motion->frames;
     ath_piece_before before = {layer->placed + (size_t)plan->pieces[p].first * 3 * T, layer->tracks + (size_t)p * 6 * T,
                                layer->tracks + (size_t)p * 6 * T + 3 * T,
-                               layer->rigid[p] ? layer->frames + (size_t)p * 12 * T : 0, layer->extents[2 * p],
+                               layer->turn_steps[3 * p] > 0.0 ? layer->frames + (size_t)p * 12 * T : 0, layer->extents[2 * p],
                                layer->extents[2 * p + 1]};
     if (!motion->known[p] && before.frequencies > 0) before.frequencies = motion->frames;
     return before;
@@ -280,7 +281,7 @@ static void analyse_piece(const ath_plan *plan, const ath_motion *motion, const 
                    scratch->rows + (size_t)r * 3 * (size_t)T,
                    rows.predicted_modes ? ath_row(rows.predicted_modes, r, T) : 0, ath_row(rows.modes, r, T));
     const double *placed = ath_pose_rows(plan, motion, p, &rows, scratch);
-    if (motion->decoded) note_piece(motion, piece, p, &rows, scratch, placed);
+    if (motion->decoded) note_piece(plan, motion, piece, p, &rows, scratch, placed);
 }
 
 void ath_analyse(const ath_plan *plan, const ath_motion *motion, const ath_integers *integers, int32_t first,

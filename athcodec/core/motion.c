@@ -433,6 +433,15 @@ ath_turning ath_turning_of(const ath_plan *plan, const ath_piece *piece, const a
     return turning;
 }
 
+void ath_turn_ratios(const ath_motion *motion, const ath_turning *turning, const double *coarse_steps,
+                     uint32_t ratios[3])
+{
+    for (int32_t k = 0; k < 3; k++) {
+        double ratio = coarse_steps ? coarse_steps[k] / turning->steps[k] + 0.5 : (double)motion->ratio;
+        ratios[k] = ratio >= 65535.0 ? 65535 : ratio >= 1.0 ? (uint32_t)ratio : 1;
+    }
+}
+
 void ath_into_axes(int32_t T, const ath_turning *turning, double *track)
 {
     const double *A = turning->axes;
@@ -741,14 +750,14 @@ static int is_zero(const int32_t *integers, int32_t count)
     return 1;
 }
 
-void ath_predict_track(const ath_stream *stream, int32_t T, int32_t frequencies, const double steps[3], int32_t ratio,
-                       const double *track, const int32_t *coarse, int32_t *predicted)
+void ath_predict_track(const ath_stream *stream, int32_t T, int32_t frequencies, const double steps[3],
+                       const uint32_t ratios[3], const double *track, const int32_t *coarse, int32_t *predicted)
 {
     int32_t count = ath_min(frequencies, stream->temporal_rank);
-    double least = coarse ? 0.5 : 0.5 * (double)ratio;
     memset(predicted, 0, 3 * (size_t)T * sizeof *predicted);
     for (int32_t axis = 0; axis < 3 && count > 0; axis++) {
         const double *row = track + axis * T;
+        double least = coarse ? 0.5 : 0.5 * (double)ratios[axis];
         int32_t k = 0, any = 0;
         for (int32_t t = 0; t < T && !any; t++) any = row[t] != 0.0;
         if (!any) continue;
@@ -857,18 +866,25 @@ static void rotations_between(int32_t T, const double *from, const double *to, d
     }
 }
 
+static void predict_evenly(const ath_stream *stream, const ath_motion *motion, int32_t frequencies, double step,
+                           const double *track, const int32_t *coarse, int32_t *predicted)
+{
+    uint32_t ratio = (uint32_t)motion->ratio, ratios[3] = {ratio, ratio, ratio};
+    double steps[3] = {step, step, step};
+    ath_predict_track(stream, motion->frames, frequencies, steps, ratios, track, coarse, predicted);
+}
+
 void ath_predict_shift(const ath_motion *motion, const ath_piece *piece, const ath_piece_before *before,
                        const ath_scratch *scratch, ath_piece_rows *rows)
 {
     const ath_stream *stream = ath_base_stream(motion, piece);
-    double step = ath_shift_step(piece, stream), steps[3] = {step, step, step};
     const double *track = before->shift;
     if (before->frames && before->frequencies > 0) {
         for (int32_t i = 0; i < 3 * motion->frames; i++) scratch->shift[i] = before->frames[i] - scratch->at.point[i];
         track = scratch->shift;
     }
-    ath_predict_track(stream, motion->frames, before->frequencies, steps, motion->ratio, track, rows->coarse_shift,
-                      rows->predicted_shift);
+    predict_evenly(stream, motion, before->frequencies, ath_shift_step(piece, stream), track, rows->coarse_shift,
+                   rows->predicted_shift);
 }
 
 void ath_predict_rotation(const ath_plan *plan, const ath_motion *motion, const ath_piece *piece,
@@ -877,13 +893,15 @@ void ath_predict_rotation(const ath_plan *plan, const ath_motion *motion, const 
     const ath_stream *stream = ath_base_stream(motion, piece);
     ath_turning turning = ath_turning_of(plan, piece, stream);
     int32_t T = motion->frames;
+    uint32_t ratios[3];
     const double *track = before->rotation;
+    ath_turn_ratios(motion, &turning, rows->coarse_turn_steps, ratios);
     if (before->frames && before->frequencies > 0) {
         rotations_between(T, scratch->at.rotation, before->frames + 3 * (size_t)T, scratch->rotation);
         ath_into_axes(T, &turning, scratch->rotation);
         track = scratch->rotation;
     }
-    ath_predict_track(stream, T, before->frequencies, turning.steps, motion->ratio, track, rows->coarse_rotation,
+    ath_predict_track(stream, T, before->frequencies, turning.steps, ratios, track, rows->coarse_rotation,
                       rows->predicted_rotation);
 }
 
@@ -928,9 +946,8 @@ void ath_predict_modes(const ath_plan *plan, const ath_motion *motion, const ath
             shape_tracks(T, piece, rows, r, scratch->rows, scratch->track);
             track = scratch->track;
         }
-        double step = ath_row_step(motion, piece, rows, r), steps[3] = {step, step, step};
-        ath_predict_track(stream, T, has_prediction ? before->frequencies : 0, steps, motion->ratio, track, coarse,
-                          ath_row(rows->predicted_modes, r, T));
+        predict_evenly(stream, motion, has_prediction ? before->frequencies : 0, ath_row_step(motion, piece, rows, r),
+                       track, coarse, ath_row(rows->predicted_modes, r, T));
     }
     for (int32_t r = modes; r < ath_rank(piece); r++)
         memset(ath_row(rows->predicted_modes, r, T), 0, 3 * (size_t)T * sizeof(int32_t));

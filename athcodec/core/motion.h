@@ -24,7 +24,7 @@ typedef struct ath_coarse {
     double *tracks;   /* piece_count x 2 x 3 x frames: rotation, translation over time; 0 where none is coded */
     double *frames;   /* piece_count x 12 x frames: point and rotation of rigid pieces, moved and turned */
     int32_t *extents; /* piece_count x 2: frequencies and modes that its rows reach */
-    uint8_t *rigid;   /* piece_count */
+    double *turn_steps; /* piece_count x 3: of rotations; 0 where a piece is not rigid */
 } ath_coarse;
 
 /* What the pieces and nodes of one segment are placed with. */
@@ -57,6 +57,7 @@ typedef struct {
         *predicted_shift; /* of a refinement, as large as the rows; else null */
     const int32_t *coarse_modes, *coarse_rotation,
         *coarse_shift; /* rows of the layer before; null: of other functions */
+    const double *coarse_turn_steps; /* of rotations there; null: the piece was not rigid */
 } ath_piece_rows;
 
 /* A piece as the layer before has it. */
@@ -112,9 +113,9 @@ void ath_node_map(const ath_plan *plan, const ath_motion *motion, int32_t n, con
                   const ath_node_rows *rows, const ath_scratch *scratch);
 
 /* Integers of three axes over temporal frequency that a track would have in `steps` of the axes, nearest, where they are at least
- * half of `ratio`, the steps of the layer before over this one's; 0 elsewhere and from `frequencies` on. */
+ * half of their ratio, the step of the layer before over this one's; 0 elsewhere and from `frequencies` on. */
 void ath_predict_track(const ath_stream *stream, int32_t frames, int32_t frequencies, const double steps[3],
-                       int32_t ratio, const double *track, const int32_t *coarse, int32_t *predicted);
+                       const uint32_t ratios[3], const double *track, const int32_t *coarse, int32_t *predicted);
 /* Those of a piece's translation and rotation, which make its attach frame; scratch->at is that without them. */
 void ath_predict_shift(const ath_motion *motion, const ath_piece *piece, const ath_piece_before *before,
                        const ath_scratch *scratch, ath_piece_rows *rows);
@@ -157,6 +158,9 @@ typedef struct {
 /* Whether rotations of a piece are coded. */
 int ath_has_rotation(const ath_plan *plan, const ath_piece *piece, const ath_stream *stream);
 ath_turning ath_turning_of(const ath_plan *plan, const ath_piece *piece, const ath_stream *stream);
+/* Of a refinement, the steps of rotations in the layer before over this one's. */
+void ath_turn_ratios(const ath_motion *motion, const ath_turning *turning, const double *coarse_steps,
+                     uint32_t ratios[3]);
 /* Rotation vectors about the piece's axes, and back. */
 void ath_into_axes(int32_t frames, const ath_turning *turning, double *track);
 void ath_out_of_axes(int32_t frames, const ath_turning *turning, double *track);

@@ -41,13 +41,13 @@ ATH_INLINE uint32_t coarse_steps(int32_t predicted, uint32_t ratio)
 typedef struct {
     const int32_t *row, *coarse, *below;
     int32_t frames;
-    uint32_t ratio;
+    uint32_t ratio[3]; /* of the axes */
 } row_prediction;
 
 ATH_INLINE uint32_t coarse_at(const row_prediction *p, const int32_t *row, int32_t axis, int32_t k)
 {
     if (k >= p->frames) return 0;
-    return p->coarse ? clipped(row[axis * p->frames + k]) : coarse_steps(row[axis * p->frames + k], p->ratio);
+    return p->coarse ? clipped(row[axis * p->frames + k]) : coarse_steps(row[axis * p->frames + k], p->ratio[axis]);
 }
 
 /* How loud the layer before is around an integer, where that is not known otherwise yet. */
@@ -79,8 +79,8 @@ static int32_t code_refined_difference(ath_coder *coder, refinement_model *model
     int32_t predicted = prediction->row[axis * prediction->frames + k];
     int known = coarse_at(prediction, prediction->coarse ? prediction->coarse : prediction->row, axis, k) > 0;
     expected = !known                  ? expected + 2 * loudness(prediction, axis, k)
-               : prediction->ratio > 1 ? 4 * prediction->ratio
-                                       : expected;
+               : prediction->ratio[axis] > 1 ? 4 * prediction->ratio[axis]
+                                             : expected;
     uint32_t magnitude = code_unsigned(coder, &model->numbers[known], expected, magnitude_of(difference));
     if (magnitude == 0) return 0;
     int negative = predicted < 0;

@@ -252,7 +252,7 @@ class SegmentMotion:
             self.placed_tracks = np.zeros(self.tracks.shape)
             self.placed_frames = np.zeros((core.piece_count, 12, frames))  # those of rigid pieces are touched
             self.extents = np.zeros((core.piece_count, 2), np.int32)
-            self.rigid = np.zeros(core.piece_count, np.uint8)
+            self.turn_steps = np.zeros((core.piece_count, 3))
             self.coarse = Coarse(
                 self.placed.ctypes.data,
                 self.coefficients.ctypes.data,
@@ -261,7 +261,7 @@ class SegmentMotion:
                 self.placed_tracks.ctypes.data,
                 self.placed_frames.ctypes.data,
                 self.extents.ctypes.data,
-                self.rigid.ctypes.data,
+                self.turn_steps.ctypes.data,
             )
         self._bind()
 
