@@ -155,7 +155,8 @@ static void code_shift(const ath_motion *motion, const ath_piece *piece, const a
     const ath_stream *base = ath_base_stream(motion, piece);
     int32_t T = motion->frames;
     if (before) ath_predict_shift(motion, piece, before, scratch, rows);
-    code_even_track(base, T, ath_shift_step(piece, base), dead_zone, scratch->track, rows->predicted_shift, rows->shift);
+    code_even_track(base, T, ath_shift_step(piece, base), dead_zone, scratch->track, rows->predicted_shift,
+                    rows->shift);
     ath_move_point(T, scratch->track, scratch->at.point);
     if (motion->decoded) memcpy(scratch->shift, scratch->track, 3 * (size_t)T * sizeof(double));
 }
@@ -220,8 +221,8 @@ static void analyse_tracks(const ath_plan *plan, const ath_motion *motion, const
 }
 
 /* What the next layer predicts from. */
-static void note_piece(const ath_plan *plan, const ath_motion *motion, const ath_piece *piece, int32_t p, const ath_piece_rows *rows,
-                       const ath_scratch *scratch, const double *placed)
+static void note_piece(const ath_plan *plan, const ath_motion *motion, const ath_piece *piece, int32_t p,
+                       const ath_piece_rows *rows, const ath_scratch *scratch, const double *placed)
 {
     const ath_coarse *decoded = motion->decoded;
     size_t T = (size_t)motion->frames;
@@ -249,9 +250,11 @@ static ath_piece_before piece_before(const ath_plan *plan, const ath_motion *mot
 {
     const ath_coarse *layer = motion->before;
     size_t T = (size_t)motion->frames;
-    ath_piece_before before = {layer->placed + (size_t)plan->pieces[p].first * 3 * T, layer->tracks + (size_t)p * 6 * T,
+    ath_piece_before before = {layer->placed + (size_t)plan->pieces[p].first * 3 * T,
+                               layer->tracks + (size_t)p * 6 * T,
                                layer->tracks + (size_t)p * 6 * T + 3 * T,
-                               layer->turn_steps[3 * p] > 0.0 ? layer->frames + (size_t)p * 12 * T : 0, layer->extents[2 * p],
+                               layer->turn_steps[3 * p] >= 0.0 ? layer->frames + (size_t)p * 12 * T : 0,
+                               layer->extents[2 * p],
                                layer->extents[2 * p + 1]};
     if (!motion->known[p] && before.frequencies > 0) before.frequencies = motion->frames;
     return before;
@@ -278,8 +281,8 @@ static void analyse_piece(const ath_plan *plan, const ath_motion *motion, const 
         to_shapes(T, piece, rows.shape_count, integers->duals + integers->shape_first[p] * ATH_SHAPE_NUMBERS, scratch);
     for (int32_t r = 0; r < ath_rank(piece); r++)
         code_even_track(ath_mode_stream(motion, piece, r), T, ath_row_step(motion, piece, &rows, r), dead_zone,
-                   scratch->rows + (size_t)r * 3 * (size_t)T,
-                   rows.predicted_modes ? ath_row(rows.predicted_modes, r, T) : 0, ath_row(rows.modes, r, T));
+                        scratch->rows + (size_t)r * 3 * (size_t)T,
+                        rows.predicted_modes ? ath_row(rows.predicted_modes, r, T) : 0, ath_row(rows.modes, r, T));
     const double *placed = ath_pose_rows(plan, motion, p, &rows, scratch);
     if (motion->decoded) note_piece(plan, motion, piece, p, &rows, scratch, placed);
 }

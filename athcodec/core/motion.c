@@ -423,6 +423,7 @@ ath_turning ath_turning_of(const ath_plan *plan, const ath_piece *piece, const a
     ath_turning turning = {{0.0}, {0.0}, (piece->flags & ATH_RIGID) != 0};
     double lever2 = squared_lever(plan, piece), moments[3], least = LEAST_MOMENT * lever2;
     double step = rotation_factor(piece, stream) * stream->step;
+    if (!(lever2 > 0.0)) return turning;
     if (turning.own_axes) axes_of_inertia(plan, piece, lever2, moments, turning.axes);
     for (int32_t k = 0; k < 3; k++) {
         double moment = turning.own_axes ? moments[k] > least ? moments[k] : least : lever2 * 2.0 / 3.0;

@@ -21,10 +21,10 @@ typedef struct ath_coarse {
     double *placed;                           /* vertex_count x 3 x frames: positions less the origin */
     const int32_t *integers, *integer_tracks; /* vertex_count x 3 x frames, piece_count x 2 x 3 x frames */
     const int32_t *shape_counts;              /* piece_count; null: no piece has shapes */
-    double *tracks;   /* piece_count x 2 x 3 x frames: rotation, translation over time; 0 where none is coded */
-    double *frames;   /* piece_count x 12 x frames: point and rotation of rigid pieces, moved and turned */
-    int32_t *extents; /* piece_count x 2: frequencies and modes that its rows reach */
-    double *turn_steps; /* piece_count x 3: of rotations; 0 where a piece is not rigid */
+    double *tracks;     /* piece_count x 2 x 3 x frames: rotation, translation over time; 0 where none is coded */
+    double *frames;     /* piece_count x 12 x frames: point and rotation of rigid pieces, moved and turned */
+    int32_t *extents;   /* piece_count x 2: frequencies and modes that its rows reach */
+    double *turn_steps; /* piece_count x 3: of rotations; below 0 where a piece is not rigid */
 } ath_coarse;
 
 /* What the pieces and nodes of one segment are placed with. */
@@ -56,7 +56,7 @@ typedef struct {
     int32_t *predicted_modes, *predicted_rotation,
         *predicted_shift; /* of a refinement, as large as the rows; else null */
     const int32_t *coarse_modes, *coarse_rotation,
-        *coarse_shift; /* rows of the layer before; null: of other functions */
+        *coarse_shift;               /* rows of the layer before; null: of other functions */
     const double *coarse_turn_steps; /* of rotations there; null: the piece was not rigid */
 } ath_piece_rows;
 

@@ -78,7 +78,7 @@ static int32_t code_refined_difference(ath_coder *coder, refinement_model *model
 {
     int32_t predicted = prediction->row[axis * prediction->frames + k];
     int known = coarse_at(prediction, prediction->coarse ? prediction->coarse : prediction->row, axis, k) > 0;
-    expected = !known                  ? expected + 2 * loudness(prediction, axis, k)
+    expected = !known                        ? expected + 2 * loudness(prediction, axis, k)
                : prediction->ratio[axis] > 1 ? 4 * prediction->ratio[axis]
                                              : expected;
     uint32_t magnitude = code_unsigned(coder, &model->numbers[known], expected, magnitude_of(difference));

@@ -252,7 +252,7 @@ class SegmentMotion:
             self.placed_tracks = np.zeros(self.tracks.shape)
             self.placed_frames = np.zeros((core.piece_count, 12, frames))  # those of rigid pieces are touched
             self.extents = np.zeros((core.piece_count, 2), np.int32)
-            self.turn_steps = np.zeros((core.piece_count, 3))
+            self.turn_steps = np.full((core.piece_count, 3), -1.0)
             self.coarse = Coarse(
                 self.placed.ctypes.data,
                 self.coefficients.ctypes.data,
