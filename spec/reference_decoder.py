@@ -1919,8 +1919,8 @@ def decode_refined_row(
     below=None,
     above: RefinedRow | None = None,
 ) -> RefinedRow:
-    """Integers that are known about. `ratios`: of the axes, steps of this layer in one of the layer before. `steps`: magnitudes of
-    the row in steps of the layer before, `below`: those of the row that follows."""
+    """Integers that are known about. `ratios`: of the axes, steps of this layer in one of the layer before. `steps`:
+    magnitudes of the row in steps of the layer before, `below`: those of the row that follows."""
     frames, rows = len(predicted[0]), model.rows
     history = rows.history[slot]
     count = decode_count(coder, rows, rows.history_count[slot], above.count if above else 0, rank)
@@ -2494,7 +2494,7 @@ def distances(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 def cantilever(gaps: tuple[int, ...], turn: float, rough: float, tip: float) -> np.ndarray:
     """(n, n): modes of a randomly bent cantilever, its covariance's eigenvectors, largest eigenvalue
     first; orthonormal where the last vertex counts `tip` times."""
-    n, total = len(gaps), float(sum(gaps))
+    total = float(sum(gaps))
     s = np.cumsum(gaps) / total
     high, low = np.maximum(s[:, None], s), np.minimum(s[:, None], s)
     bend = low * low * (3.0 * high - low) / 6.0
@@ -3290,8 +3290,8 @@ def row_extent(row) -> int:
 def predict_row(
     stream: LevelStream, frequencies: int, steps, ratios: list[int], track: np.ndarray, coarse
 ) -> list[list[int]]:
-    """Integers that a track, (3, frames), would have in steps of the axes. None for `coarse`: not known; else predicted is
-    what is not 0 there."""
+    """Integers that a track, (3, frames), would have in steps of the axes. None for `coarse`: not known; else predicted
+    is what is not 0 there."""
     frames, count = track.shape[1], min(frequencies, len(stream.waves))
     units = in_order(stream.waves[:count].T[:, :, None] * track.T[:, None, :]) / steps  # (count, 3)
     row = zero_row(frames)

@@ -494,8 +494,8 @@ def level_bases(components: dict[int, TimeComponents], ratio: float = 1.0) -> di
 
 
 def basis_ratio(plan: Plan, settings: Settings, ratio: float) -> float:
-    """By how much rows may be coarser than where a time basis was learned, at steps `ratio` times as fine: by less where
-    the turns of rigid pieces have a largest step."""
+    """By how much rows may be coarser than where a time basis was learned, at steps `ratio` times as fine: by less
+    where the turns of rigid pieces have a largest step."""
     levers = plan.levers()[plan.is_rigid]
     if not settings.turn_step or not levers.any():
         return ratio
