@@ -88,7 +88,8 @@ class Coarse(ctypes.Structure):
     """ath_coarse."""
 
     _fields_ = [
-        (name, c_void_p) for name in ("placed", "integers", "integer_tracks", "shape_counts", "tracks", "extents")
+        (name, c_void_p)
+        for name in "placed integers integer_tracks shape_counts tracks frames extents turn_steps".split()
     ]
 
 

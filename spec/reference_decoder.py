@@ -963,7 +963,7 @@ def decode_refined_run(
         sums = in_order((modes * run[:, k]).T)
         coarse[k][:n] = numbers[k * n : k * n + n]
         predicted[k][:n] = [steps_in(total, step) if known != 0 else 0 for total, known in zip(sums, coarse[k])]
-    return decode_refined_row(coder, model, n, 0, predicted, 1, magnitudes(coarse)).row
+    return decode_refined_row(coder, model, n, 0, predicted, [1] * 3, magnitudes(coarse)).row
 
 
 def rest_step(branch: Branch, step: float) -> float:
@@ -2098,13 +2098,13 @@ def decode_refined_row(
     rank: int,
     slot: int,
     predicted: list[list[int]],
-    ratio: int,
+    ratios: list[int],
     steps: list[list[int]],
     below=None,
     above: RefinedRow | None = None,
 ) -> RefinedRow:
-    """Integers that are known about. `ratio`: steps of this layer in one of the layer before. `steps`: magnitudes of
-    the row in steps of the layer before, `below`: those of the row that follows."""
+    """Integers that are known about. `ratios`: of the axes, steps of this layer in one of the layer before. `steps`:
+    magnitudes of the row in steps of the layer before, `below`: those of the row that follows."""
     frames, rows = len(predicted[0]), model.rows
     count = decode_count(coder, rows, rows.history_count[slot], above.count if above else 0, rank)
     differences, around = zero_row(frames), RowSurroundings(rows, slot, above and above.differences)
@@ -2114,8 +2114,8 @@ def decode_refined_row(
             number, expected = model.known, around.expected(axis, k)
             if steps[axis][k] == 0:
                 number, expected = around.number(axis, k), expected + 2 * loudness(steps, below, axis, k)
-            elif ratio > 1:
-                expected = 4 * ratio
+            elif ratios[axis] > 1:
+                expected = 4 * ratios[axis]
             differences[axis][k] = decode_difference(coder, model, number, expected, predicted[axis][k])
             around.note(axis, k, clipped(differences[axis][k]))
     around.finish(count)
@@ -2721,23 +2721,30 @@ def distances(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 def cantilever(gaps: tuple[int, ...], turn: float, rough: float, tip: float) -> np.ndarray:
     """(n, n): modes of a randomly bent cantilever, its covariance's eigenvectors, largest eigenvalue
     first; orthonormal where the last vertex counts `tip` times."""
-    n, total = len(gaps), float(sum(gaps))
+    total = float(sum(gaps))
     s = np.cumsum(gaps) / total
     high, low = np.maximum(s[:, None], s), np.minimum(s[:, None], s)
     bend = low * low * (3.0 * high - low) / 6.0
     covariance = bend + turn * (low * high) + rough * low
     covariance[:, -1] *= math.sqrt(tip)
     covariance[-1] *= math.sqrt(tip)
-    q, d, e = tridiagonalise(covariance)
+    _, modes = principal(covariance)
+    modes[:, -1] /= math.sqrt(tip)
+    return modes
+
+
+def principal(a: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Eigenvalues in descending order, and a row for the vector of each."""
+    n, values, vectors = len(a), [], []
+    q, d, e = tridiagonalise(a)
     diagonalise(q, d, e)
-    modes = []
     for _ in range(n):
         best = max(range(n), key=lambda i: d[i])  # the first of equals
         sign = -1.0 if q[best, n - 1] < 0.0 else 1.0
-        modes.append(sign * q[best])
-        modes[-1][-1] /= math.sqrt(tip)
+        values.append(d[best])
+        vectors.append(sign * q[best])
         d[best] = -1e300
-    return np.array(modes)
+    return np.array(values), np.array(vectors)
 
 
 def tridiagonalise(a: np.ndarray):
@@ -3034,7 +3041,7 @@ def decode_refined_shapes(stream: bytes, plan: Plan, motion: Motion, before: Mot
             coarse = known[s] if s < len(known) else zero_row(SHAPE_MODES)
             predicted = [[min(max(number, -most), most) << shift for number in axis] for axis in coarse]
             above = decode_refined_row(
-                coder, model, plan.shape_modes(piece), s, predicted, 1 << shift, magnitudes(coarse), None, above
+                coder, model, plan.shape_modes(piece), s, predicted, [1 << shift] * 3, magnitudes(coarse), None, above
             )
             rows.append(above.row)
         set_shapes(motion, piece, rows)
@@ -3080,7 +3087,7 @@ def decode_stems(stream: bytes, plan: Plan, motion: Motion, level: int) -> None:
         if level == piece.base_level:
             if piece.has_shift:
                 motion.shift[piece.number], _ = decode_row(coder, model, frames, rank, SHIFT_SLOT)
-            if rotation_step(plan, piece, motion.streams[level]) > 0.0:
+            if turning(plan, piece, motion.streams[level]) is not None:
                 motion.rotation[piece.number], _ = decode_row(coder, model, frames, rank, ROTATION_SLOT)
         start = stop = 0
         if level == piece.low_level:
@@ -3256,10 +3263,10 @@ def over_time(row, step: float, waves: np.ndarray) -> np.ndarray:
     if row is None:
         return np.zeros((3, waves.shape[1]))
     tracks = []
-    for axis in row:
+    for axis, own in zip(row, np.broadcast_to(step, 3)):
         numbers = np.array(axis[: len(waves)])
         there = np.flatnonzero(numbers)
-        tracks.append(in_order((numbers[there].astype(float) * step)[:, None] * waves[there]))
+        tracks.append(in_order((numbers[there].astype(float) * own)[:, None] * waves[there]))
     return np.array(tracks)
 
 
@@ -3267,19 +3274,44 @@ def shift_step(piece: Piece, stream: LevelStream) -> float:
     return stream.step / math.sqrt(float(piece.count))
 
 
-def rotation_step(plan: Plan, piece: Piece, stream: LevelStream) -> float:
-    """0.0: no rotation is coded."""
-    d = plan.from_attach(piece).ravel()
-    lever2 = in_order(d * d)
+LEAST_MOMENT = 0.0009765625  # of inertia, that a rotation's step is made for, over the squared lever
+
+
+@dataclass(frozen=True)
+class Turning:
+    """Steps of a rotation about three axes, the rows of `axes`; None: those of the rest pose's space."""
+
+    steps: np.ndarray
+    axes: np.ndarray | None = None
+
+
+def turning(plan: Plan, piece: Piece, stream: LevelStream) -> Turning | None:
+    """None: no rotation is coded."""
+    away = plan.from_attach(piece)
+    lever2 = in_order(away.ravel() * away.ravel())
     factor = stream.rotation_step_factor
     if piece.rigid:
         factor = factor if factor > 0.0 else 1.0
     elif stream.only_tips and piece.carries:
         factor = 0.0
     if not lever2 > 0.0 or not factor > 0.0:
-        return 0.0
-    step = factor * stream.step / np.sqrt(lever2 * 2.0 / 3.0)
-    return stream.turn_step if piece.rigid and 0.0 < stream.turn_step < step else step
+        return None
+    step = factor * stream.step
+    if not piece.rigid:
+        return Turning(np.full(3, step / np.sqrt(lever2 * 2.0 / 3.0)))
+    moments, axes = axes_of_inertia(away, lever2)
+    steps = step / np.sqrt(np.where(moments > LEAST_MOMENT * lever2, moments, LEAST_MOMENT * lever2))
+    if stream.turn_step > 0.0:
+        steps = np.where(stream.turn_step < steps, stream.turn_step, steps)
+    return Turning(steps, axes)
+
+
+def axes_of_inertia(away: np.ndarray, lever2: float) -> tuple[np.ndarray, np.ndarray]:
+    """Moments about the attach point, the largest first, and a row for the axis of each."""
+    M = lever2 * np.eye(3)
+    for d in away:
+        M = M - d[:, None] * d
+    return principal(M)
 
 
 @dataclass(frozen=True)
@@ -3343,15 +3375,16 @@ class Pose:
     def rotation_track(self, piece: Piece) -> np.ndarray:
         """(3, frames); 0.0 where none is coded."""
         stream = self.base_stream(piece)
-        step = rotation_step(self.plan, piece, stream)
-        return over_time(self.motion.rotation.get(piece.number), step, stream.waves)
+        own = turning(self.plan, piece, stream)
+        track = over_time(self.motion.rotation.get(piece.number), 0.0 if own is None else own.steps, stream.waves)
+        return track if own is None or own.axes is None else mat_vec(own.axes.T[:, :, None], track)
 
     def turned_frames(self, piece: Piece):
         """The attach frame, moved and turned by the piece's own tracks."""
         c, R = self.attach_frame(piece)
         if piece.has_shift:
             c = c + self.shift_track(piece)
-        if rotation_step(self.plan, piece, self.base_stream(piece)) > 0.0:
+        if turning(self.plan, piece, self.base_stream(piece)) is not None:
             x, y, z = 0.25 * self.rotation_track(piece)
             R = mat_mul(R, rotation(x, y, z))
         return c, R
@@ -3482,17 +3515,16 @@ def row_extent(row) -> int:
 
 
 def predict_row(
-    stream: LevelStream, frequencies: int, step: float, ratio: int, track: np.ndarray, coarse
+    stream: LevelStream, frequencies: int, steps, ratios: list[int], track: np.ndarray, coarse
 ) -> list[list[int]]:
-    """Integers that a track, (3, frames), would have. None for `coarse`: not known; else predicted is what is not 0
-    there."""
-    frames = track.shape[1]
-    count, least = min(frequencies, len(stream.waves)), 0.5 * ratio if coarse is None else 0.5
-    units = in_order(stream.waves[:count].T[:, :, None] * track.T[:, None, :]) / step  # (count, 3)
+    """Integers that a track, (3, frames), would have in steps of the axes. None for `coarse`: not known; else predicted
+    is what is not 0 there."""
+    frames, count = track.shape[1], min(frequencies, len(stream.waves))
+    units = in_order(stream.waves[:count].T[:, :, None] * track.T[:, None, :]) / steps  # (count, 3)
     row = zero_row(frames)
     for k in range(count):
         for axis in range(3):
-            size = abs(float(units[k, axis]))
+            size, least = abs(float(units[k, axis])), 0.5 * ratios[axis] if coarse is None else 0.5
             if size >= least and (coarse is None or coarse[axis][k] != 0):
                 nearest = MOST_PREDICTED if size >= MOST_PREDICTED else int(size + 0.5)
                 row[axis][k] = -nearest if units[k, axis] < 0.0 else nearest
@@ -3534,60 +3566,83 @@ class Refinement(Pose):
         alike = bool(motion.shapes_of(piece)) == bool(self.motion.shapes_of(piece))
         self.decode_modes(piece, frequencies, min(known, len(self.plan.basis(piece))), rows if same and alike else None)
 
-    def magnitudes(self, predicted, coarse):
+    def magnitudes(self, predicted, ratios: list[int], coarse):
         """In steps of the layer before."""
         if coarse is not None:
             return magnitudes(coarse)
-        return [[clipped((abs(number) + self.ratio // 2) // self.ratio) for number in axis] for axis in predicted]
+        return [
+            [clipped((abs(number) + ratio // 2) // ratio) for number in axis] for axis, ratio in zip(predicted, ratios)
+        ]
+
+    def coarse_tracks(self, piece: Piece) -> tuple[np.ndarray, np.ndarray]:
+        """Translation and rotation as the layer before has them; of a rigid piece those that take the attach frame of
+        this layer to where it was there."""
+        before, coarse_piece = self.before, self.before.plan.pieces[piece.number]
+        if not coarse_piece.rigid:
+            return before.shift_track(coarse_piece), before.rotation_track(coarse_piece)
+        (here, A), (c, R) = self.attach_frame(piece), before.kept[piece.number]
+        turned = mat_mul(A.transpose(1, 0, 2), R)
+        rotation, q = np.empty((3, self.frames)), np.array([1.0, 0.0, 0.0, 0.0])
+        for t in range(self.frames):
+            q = nearer_quaternion(turned[:, :, t].ravel(), q)
+            rotation[:, t] = 4.0 * q[1:] / (1.0 + q[0])
+        own = turning(self.plan, piece, self.base_stream(piece))
+        turns = own is not None and own.axes is not None
+        return c - here, mat_vec(own.axes[:, :, None], rotation) if turns else rotation
+
+    def turn_ratios(self, piece: Piece, own: Turning) -> list[int]:
+        before, coarse_piece = self.before, self.before.plan.pieces[piece.number]
+        if not coarse_piece.rigid:
+            return [self.ratio] * 3
+        coarse = turning(before.plan, coarse_piece, before.base_stream(coarse_piece))
+        ratios = (np.zeros(3) if coarse is None else coarse.steps) / own.steps + 0.5
+        return [65535 if ratio >= 65535.0 else int(ratio) if ratio >= 1.0 else 1 for ratio in ratios]
 
     def decode_tracks(self, piece: Piece, frequencies: int, same: bool) -> None:
-        before, n = self.before, piece.number
-        coarse_piece = before.plan.pieces[n]
+        before, n = self.before.motion, piece.number
+        shift, rotation = self.coarse_tracks(piece)
         if piece.has_shift:
+            step, ratios = shift_step(piece, self.stream), [self.ratio] * 3
             self.motion.shift[n] = self.decode_track(
-                SHIFT_SLOT,
-                frequencies,
-                shift_step(piece, self.stream),
-                before.shift_track(coarse_piece),
-                before.motion.shift.get(n),
-                same,
+                SHIFT_SLOT, frequencies, step, ratios, shift, before.shift.get(n), same
             )
-        step = rotation_step(self.plan, piece, self.stream)
-        if step > 0.0:
+        own = turning(self.plan, piece, self.stream)
+        if own is not None:
             self.motion.rotation[n] = self.decode_track(
                 ROTATION_SLOT,
                 frequencies,
-                step,
-                before.rotation_track(coarse_piece),
-                before.motion.rotation.get(n),
+                own.steps,
+                self.turn_ratios(piece, own),
+                rotation,
+                before.rotation.get(n),
                 same,
             )
 
-    def decode_track(self, slot: int, frequencies: int, step: float, track: np.ndarray, row, same: bool):
+    def decode_track(self, slot: int, frequencies: int, steps, ratios: list[int], track: np.ndarray, row, same: bool):
         coarse = (row or zero_row(self.frames)) if same else None
-        predicted = predict_row(self.stream, frequencies, step, self.ratio, track, coarse)
+        predicted = predict_row(self.stream, frequencies, steps, ratios, track, coarse)
         return decode_refined_row(
             self.coder,
             self.model,
             len(self.stream.waves),
             slot,
             predicted,
-            self.ratio,
-            self.magnitudes(predicted, coarse),
+            ratios,
+            self.magnitudes(predicted, ratios, coarse),
         ).row
 
     def decode_modes(self, piece: Piece, frequencies: int, known: int, coarse) -> None:
         """Rows of modes and shapes; `known`: modes that the layer before has, `coarse`: its rows, or None."""
         shapes, rank = self.motion.shapes_of(piece), len(self.plan.basis(piece))
-        predicted = self.predict_modes(piece, frequencies, known, coarse)
-        steps = [self.magnitudes(predicted[m], coarse and coarse[m]) for m in range(rank)]
+        predicted, ratios = self.predict_modes(piece, frequencies, known, coarse), [self.ratio] * 3
+        steps = [self.magnitudes(predicted[m], ratios, coarse and coarse[m]) for m in range(rank)]
         above = None
         for m in range(rank):
             if shapes and len(shapes) <= 3 * m < 3 * self.plan.shape_modes(piece):
                 continue
             below = steps[m + 1] if m + 1 < rank else None
             above = decode_refined_row(
-                self.coder, self.model, len(self.stream.waves), m, predicted[m], self.ratio, steps[m], below, above
+                self.coder, self.model, len(self.stream.waves), m, predicted[m], ratios, steps[m], below, above
             )
             self.motion.coefficients[piece.first + m] = above.row
 
@@ -3612,9 +3667,19 @@ class Refinement(Pose):
                     weights = shape[: plan.shape_modes(piece)]
                     track[axis] = in_order((weights[:, :, None] * tracks[: len(weights)]).reshape(-1, self.frames))
             predicted[m] = predict_row(
-                self.stream, frequencies, self.row_step(piece, m), self.ratio, track, coarse and coarse[m]
+                self.stream, frequencies, self.row_step(piece, m), [self.ratio] * 3, track, coarse and coarse[m]
             )
         return predicted
+
+
+def nearer_quaternion(R: np.ndarray, last: np.ndarray) -> np.ndarray:
+    """Of a rotation, of the two the one nearer to the last; not from -1.0 to -0.9."""
+    sizes = [1.0 + R[0] + R[4] + R[8], 1.0 + R[0] - R[4] - R[8], 1.0 - R[0] + R[4] - R[8], 1.0 - R[0] - R[4] + R[8]]
+    x, y, z, xy, xz, yz = R[7] - R[5], R[2] - R[6], R[3] - R[1], R[1] + R[3], R[2] + R[6], R[5] + R[7]
+    largest = max(range(4), key=lambda i: sizes[i])  # the first of equals
+    p = np.array([[sizes[0], x, y, z], [x, sizes[1], xy, xz], [y, xy, sizes[2], yz], [z, xz, yz, sizes[3]]][largest])
+    q = p * ((-1.0 if in_order(p * last) < 0.0 else 1.0) / np.sqrt(in_order(p * p)))
+    return -q if q[0] < -0.9 else q
 
 
 def follow_tangent(R: np.ndarray, tangent: np.ndarray, v: np.ndarray) -> np.ndarray:

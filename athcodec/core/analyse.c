@@ -150,8 +150,8 @@ static void settle_ends(const ath_stream *stream, int32_t T, double step, const 
 }
 
 /* Quantises a track of three axes about its prediction, if there is one, and replaces it by what the decoder will have. */
-static void code_track(const ath_stream *stream, int32_t T, double step, const ath_rounding *rounding, double *track,
-                       const int32_t *predicted, int32_t *quantised)
+static void code_track(const ath_stream *stream, int32_t T, const double steps[3], const ath_rounding *rounding,
+                       double *track, const int32_t *predicted, int32_t *quantised)
 {
     double units[3][ATH_SEGMENT_FRAMES];
     int32_t longest = 0;
@@ -159,7 +159,8 @@ static void code_track(const ath_stream *stream, int32_t T, double step, const a
     for (int32_t axis = 0; axis < 3; axis++) {
         const int32_t *about = predicted ? predicted + axis * T : 0;
         int32_t known = about ? row_extent(about, stream->temporal_rank) : 0;
-        int32_t count = forward_temporal(stream, T, step, rounding->dead_zone, known, track + axis * T, units[axis]);
+        int32_t count =
+            forward_temporal(stream, T, steps[axis], rounding->dead_zone, known, track + axis * T, units[axis]);
         for (int32_t k = 0; k < known; k++) units[axis][k] -= (double)about[k];
         for (int32_t k = 0; k < count; k++)
             quantised[axis * T + k] = quantise(units[axis][k], k < known && about[k] ? 0.5 : rounding->dead_zone);
@@ -167,31 +168,18 @@ static void code_track(const ath_stream *stream, int32_t T, double step, const a
     }
     drop_lone_ones(T, longest, units, predicted, quantised);
     for (int32_t axis = 0; axis < 3; axis++)
-        settle_ends(stream, T, step, rounding, track + axis * T, units[axis], predicted ? predicted + axis * T : 0,
-                    quantised + axis * T);
+        settle_ends(stream, T, steps[axis], rounding, track + axis * T, units[axis],
+                    predicted ? predicted + axis * T : 0, quantised + axis * T);
     for (int32_t i = 0; predicted && i < 3 * T; i++) quantised[i] += predicted[i];
     for (int32_t axis = 0; axis < 3; axis++)
-        ath_inverse_temporal(stream, T, longest, step, quantised + axis * T, track + axis * T);
+        ath_inverse_temporal(stream, T, longest, steps[axis], quantised + axis * T, track + axis * T);
 }
 
-/* The unit quaternion of a rotation matrix, of the two the one nearer to the last. */
-static void to_quaternion(const double R[9], double q[4])
+static void code_even_track(const ath_stream *stream, int32_t T, double step, const ath_rounding *rounding,
+                            double *track, const int32_t *predicted, int32_t *quantised)
 {
-    double size[4] = {1.0 + R[0] + R[4] + R[8], 1.0 + R[0] - R[4] - R[8], 1.0 - R[0] + R[4] - R[8],
-                      1.0 - R[0] - R[4] + R[8]};
-    double symmetric[6] = {R[7] - R[5], R[2] - R[6], R[3] - R[1], R[1] + R[3], R[2] + R[6], R[5] + R[7]};
-    static const int8_t row[4][4] = {{-1, 0, 1, 2}, {0, -1, 3, 4}, {1, 3, -1, 5}, {2, 4, 5, -1}};
-    int32_t largest = 0;
-    double p[4], length2 = 0.0, towards = 0.0;
-    for (int32_t i = 1; i < 4; i++)
-        if (size[i] > size[largest]) largest = i;
-    for (int32_t i = 0; i < 4; i++) {
-        p[i] = i == largest ? size[i] : symmetric[row[largest][i]];
-        length2 += p[i] * p[i];
-        towards += p[i] * q[i];
-    }
-    double scale = (towards < 0.0 ? -1.0 : 1.0) / ath_sqrt(length2);
-    for (int32_t i = 0; i < 4; i++) q[i] = p[i] * scale;
+    double steps[3] = {step, step, step};
+    code_track(stream, T, steps, rounding, track, predicted, quantised);
 }
 
 static void rest_centre(const ath_plan *plan, const ath_piece *piece, double centre[3])
@@ -213,7 +201,7 @@ static void fit_rotation(const ath_plan *plan, int32_t T, const ath_piece *piece
     memcpy(a, ath_rest_attach(plan, piece), sizeof a);
     if (rigid) rest_centre(plan, piece, a);
     for (int32_t t = 0; t < T; t++) {
-        double H[9] = {0}, size2 = 0.0;
+        double H[9] = {0}, size2 = 0.0, own[3];
         for (int32_t i = 0; i < piece->count; i++) {
             const double *x0 = ath_rest_of(plan, piece->first + i), *x = local + (size_t)i * 3 * (size_t)T;
             for (int32_t k = 0; k < 3; k++) {
@@ -225,10 +213,8 @@ static void fit_rotation(const ath_plan *plan, int32_t T, const ath_piece *piece
         double prior = 1e-6 * size2 + (rigid ? 0.0 : step * step * (double)piece->count);
         for (int32_t k = 0; k < 9; k++) H[k] += prior * R[k];
         ath_turn_to(H, t == 0 ? FIRST_ROTATION_STEPS : ROTATION_STEPS, R);
-        to_quaternion(R, q);
-        if (q[0] < -0.9) /* beyond about 310 degrees: the same rotation the other way round */
-            for (int32_t i = 0; i < 4; i++) q[i] = -q[i];
-        for (int32_t k = 0; k < 3; k++) omega[k * T + t] = 4.0 * q[k + 1] / (1.0 + q[0]);
+        ath_rotation_vector(R, q, own);
+        for (int32_t k = 0; k < 3; k++) omega[k * T + t] = own[k];
     }
 }
 
@@ -260,11 +246,8 @@ static void code_shift(const ath_motion *motion, const ath_piece *piece, const a
 {
     const ath_stream *base = ath_base_stream(motion, piece);
     int32_t T = motion->frames;
-    double step = ath_shift_step(piece, base);
-    if (before)
-        ath_predict_track(base, T, before->frequencies, step, motion->ratio, before->shift, rows->coarse_shift,
-                          rows->predicted_shift);
-    code_track(base, T, step, rounding, scratch->track, rows->predicted_shift, rows->shift);
+    if (before) ath_predict_shift(motion, piece, before, scratch, rows);
+    code_even_track(base, T, ath_shift_step(piece, base), rounding, scratch->track, rows->predicted_shift, rows->shift);
     ath_move_point(T, scratch->track, scratch->at.point);
     if (motion->decoded) memcpy(scratch->shift, scratch->track, 3 * (size_t)T * sizeof(double));
 }
@@ -306,19 +289,19 @@ static void analyse_tracks(const ath_plan *plan, const ath_motion *motion, const
     const ath_stream *base = ath_base_stream(motion, piece);
     int32_t T = motion->frames;
     int rigid = (piece->flags & ATH_RIGID) != 0;
-    double rotation_step = ath_rotation_step(plan, piece, base);
     ath_attach(plan, motion, piece, scratch->at);
     if (ath_has_shift(piece) && !rigid) {
         shift_of_first(plan, T, piece, scratch, source);
         code_shift(motion, piece, before, rows, scratch, rounding);
     }
     to_local(T, piece, &scratch->at, source, local);
-    if (rotation_step > 0.0) {
+    if (ath_has_rotation(plan, piece, base)) {
+        ath_turning turning = ath_turning_of(plan, piece, base);
         fit_rotation(plan, T, piece, base->step, local, scratch->track);
-        if (before)
-            ath_predict_track(base, T, before->frequencies, rotation_step, motion->ratio, before->rotation,
-                              rows->coarse_rotation, rows->predicted_rotation);
-        code_track(base, T, rotation_step, rounding, scratch->track, rows->predicted_rotation, rows->rotation);
+        ath_into_axes(T, &turning, scratch->track);
+        if (before) ath_predict_rotation(plan, motion, piece, before, scratch, rows);
+        code_track(base, T, turning.steps, rounding, scratch->track, rows->predicted_rotation, rows->rotation);
+        ath_out_of_axes(T, &turning, scratch->track);
         ath_turn(T, scratch->track, scratch->at.rotation);
         if (motion->decoded) memcpy(scratch->rotation, scratch->track, 3 * (size_t)T * sizeof(double));
     }
@@ -329,14 +312,20 @@ static void analyse_tracks(const ath_plan *plan, const ath_motion *motion, const
 }
 
 /* What the next layer predicts from. */
-static void note_piece(const ath_motion *motion, const ath_piece *piece, int32_t p, const ath_piece_rows *rows,
-                       const ath_scratch *scratch, const double *placed)
+static void note_piece(const ath_plan *plan, const ath_motion *motion, const ath_piece *piece, int32_t p,
+                       const ath_piece_rows *rows, const ath_scratch *scratch, const double *placed)
 {
     const ath_coarse *decoded = motion->decoded;
     size_t T = (size_t)motion->frames;
     memcpy(decoded->placed + (size_t)piece->first * 3 * T, placed, (size_t)piece->count * 3 * T * sizeof(double));
     memcpy(decoded->tracks + (size_t)p * 6 * T, scratch->rotation, 3 * T * sizeof(double));
     memcpy(decoded->tracks + (size_t)p * 6 * T + 3 * T, scratch->shift, 3 * T * sizeof(double));
+    if (piece->flags & ATH_RIGID) {
+        ath_turning turning = ath_turning_of(plan, piece, ath_base_stream(motion, piece));
+        memcpy(decoded->turn_steps + 3 * (size_t)p, turning.steps, sizeof turning.steps);
+        memcpy(decoded->frames + (size_t)p * 12 * T, scratch->at.point, 3 * T * sizeof(double));
+        memcpy(decoded->frames + (size_t)p * 12 * T + 3 * T, scratch->at.rotation, 9 * T * sizeof(double));
+    }
     int32_t *extents = decoded->extents + 2 * p;
     extents[0] = ath_max(ath_row_extent(rows->shift, motion->frames, motion->frames),
                          ath_row_extent(rows->rotation, motion->frames, motion->frames));
@@ -352,8 +341,11 @@ static ath_piece_before piece_before(const ath_plan *plan, const ath_motion *mot
 {
     const ath_coarse *layer = motion->before;
     size_t T = (size_t)motion->frames;
-    ath_piece_before before = {layer->placed + (size_t)plan->pieces[p].first * 3 * T, layer->tracks + (size_t)p * 6 * T,
-                               layer->tracks + (size_t)p * 6 * T + 3 * T, layer->extents[2 * p],
+    ath_piece_before before = {layer->placed + (size_t)plan->pieces[p].first * 3 * T,
+                               layer->tracks + (size_t)p * 6 * T,
+                               layer->tracks + (size_t)p * 6 * T + 3 * T,
+                               layer->turn_steps[3 * p] >= 0.0 ? layer->frames + (size_t)p * 12 * T : 0,
+                               layer->extents[2 * p],
                                layer->extents[2 * p + 1]};
     if (!motion->known[p] && before.frequencies > 0) before.frequencies = motion->frames;
     return before;
@@ -381,11 +373,11 @@ static const double *analyse_piece(const ath_plan *plan, const ath_motion *motio
     if (rows.shape_count > 0)
         to_shapes(T, piece, rows.shape_count, integers->duals + integers->shape_first[p] * ATH_SHAPE_NUMBERS, scratch);
     for (int32_t r = 0; r < ath_rank(piece); r++)
-        code_track(ath_mode_stream(motion, piece, r), T, ath_row_step(motion, piece, &rows, r), rounding,
-                   scratch->rows + (size_t)r * 3 * (size_t)T,
-                   rows.predicted_modes ? ath_row(rows.predicted_modes, r, T) : 0, ath_row(rows.modes, r, T));
+        code_even_track(ath_mode_stream(motion, piece, r), T, ath_row_step(motion, piece, &rows, r), rounding,
+                        scratch->rows + (size_t)r * 3 * (size_t)T,
+                        rows.predicted_modes ? ath_row(rows.predicted_modes, r, T) : 0, ath_row(rows.modes, r, T));
     const double *placed = ath_pose_rows(plan, motion, p, &rows, scratch);
-    if (motion->decoded) note_piece(motion, piece, p, &rows, scratch, placed);
+    if (motion->decoded) note_piece(plan, motion, piece, p, &rows, scratch, placed);
     return placed;
 }
 
@@ -474,8 +466,8 @@ static void analyse_node(const ath_plan *plan, const ath_motion *motion, const a
     double step = ath_node_step(*rows->step);
     ath_stream stream = ath_node_stream(motion, step);
     for (int32_t r = 0; r < node->rank; r++)
-        code_track(&stream, T, step, rounding, tracks + r * 3 * T, 0, ath_row(rows->rows, r, T));
-    if (free_base) code_track(&stream, T, step, rounding, tracks + 9 * T, 0, ath_row(rows->rows, 3, T));
+        code_even_track(&stream, T, step, rounding, tracks + r * 3 * T, 0, ath_row(rows->rows, r, T));
+    if (free_base) code_even_track(&stream, T, step, rounding, tracks + 9 * T, 0, ath_row(rows->rows, 3, T));
 }
 
 void ath_analyse_nodes(const ath_plan *plan, const ath_motion *motion, const ath_integers *integers, int32_t first,

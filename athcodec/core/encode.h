@@ -46,6 +46,7 @@ ATH_INLINE void ath_coarse_rows(const ath_motion *motion, const ath_piece *piece
     size_t T = (size_t)motion->frames;
     int known = motion->known[p];
     int alike = (before->shape_counts && before->shape_counts[p] > 0) == (rows->shape_count > 0);
+    rows->coarse_turn_steps = before->turn_steps[3 * p] >= 0.0 ? before->turn_steps + 3 * (size_t)p : 0;
     rows->coarse_modes = known && alike ? before->integers + (size_t)piece->first * 3 * T : 0;
     rows->coarse_rotation = known ? before->integer_tracks + (size_t)p * 6 * T : 0;
     rows->coarse_shift = known ? before->integer_tracks + (size_t)p * 6 * T + 3 * T : 0;

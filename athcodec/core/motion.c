@@ -5,6 +5,8 @@
 
 enum { POLAR_ITERATIONS = 4, TURN_LANES = 16, ATH_TERMS = ATH_SHAPE_NUMBERS + ATH_PIECE_VERTICES - ATH_SHAPE_MODES };
 
+static const double LEAST_MOMENT = 0.0009765625; /* of inertia, that a rotation's step is made for, over all of them */
+
 /* A map takes four rows. */
 static size_t scratch_rows(int32_t longest, int32_t frames) { return (size_t)ath_max(longest, 4) * 3 * (size_t)frames; }
 
@@ -376,20 +378,87 @@ static void carry(const ath_plan *plan, const ath_motion *motion, const ath_piec
         copy_rows(at.rotation, scratch->at.rotation, 9 * (size_t)T);
 }
 
-/* The rotation is weighted by its lever, so that its error moves the piece's vertices like any other coefficient's. */
-double ath_rotation_step(const ath_plan *plan, const ath_piece *piece, const ath_stream *stream)
+/* Squared distances of a piece's vertices from where it hangs. */
+static double squared_lever(const ath_plan *plan, const ath_piece *piece)
 {
     const double *a = ath_rest_attach(plan, piece);
-    int rigid = (piece->flags & ATH_RIGID) != 0;
-    double lever2 = 0.0, factor = rigid && !(stream->rotation_step_factor > 0.0) ? 1.0 : stream->rotation_step_factor;
-    if (stream->only_tips && piece->last_attached >= 0 && !rigid) return 0.0;
+    double lever2 = 0.0;
     for (int32_t i = 0; i < piece->count; i++) {
         const double *x0 = ath_rest_of(plan, piece->first + i);
         for (int32_t k = 0; k < 3; k++) lever2 = lever2 + (x0[k] - a[k]) * (x0[k] - a[k]);
     }
-    if (!(lever2 > 0.0) || !(factor > 0.0)) return 0.0;
-    double step = factor * stream->step / ath_sqrt(lever2 * 2.0 / 3.0);
-    return rigid && stream->turn_step > 0.0 && stream->turn_step < step ? stream->turn_step : step;
+    return lever2;
+}
+
+static double rotation_factor(const ath_piece *piece, const ath_stream *stream)
+{
+    int rigid = (piece->flags & ATH_RIGID) != 0;
+    if (stream->only_tips && piece->last_attached >= 0 && !rigid) return 0.0;
+    return rigid && !(stream->rotation_step_factor > 0.0) ? 1.0 : stream->rotation_step_factor;
+}
+
+int ath_has_rotation(const ath_plan *plan, const ath_piece *piece, const ath_stream *stream)
+{
+    return rotation_factor(piece, stream) > 0.0 && squared_lever(plan, piece) > 0.0;
+}
+
+/* Of inertia about the point that a piece hangs on, the largest moment first. */
+static void axes_of_inertia(const ath_plan *plan, const ath_piece *piece, double lever2, double moments[3],
+                            double axes[9])
+{
+    const double *a = ath_rest_attach(plan, piece);
+    double M[9] = {lever2, 0.0, 0.0, 0.0, lever2, 0.0, 0.0, 0.0, lever2}, work[9];
+    for (int32_t v = 0; v < piece->count; v++) {
+        const double *x0 = ath_rest_of(plan, piece->first + v);
+        double d[3] = {x0[0] - a[0], x0[1] - a[1], x0[2] - a[2]};
+        for (int32_t i = 0; i < 3; i++)
+            for (int32_t k = 0; k < 3; k++) M[3 * i + k] = M[3 * i + k] - d[i] * d[k];
+    }
+    ath_principal(1, 3, M, work, moments, axes);
+}
+
+/* Rotations are weighted by their lever, so that an error moves the piece's vertices like any other coefficient's. */
+ath_turning ath_turning_of(const ath_plan *plan, const ath_piece *piece, const ath_stream *stream)
+{
+    ath_turning turning = {{0.0}, {0.0}, (piece->flags & ATH_RIGID) != 0};
+    double lever2 = squared_lever(plan, piece), moments[3], least = LEAST_MOMENT * lever2;
+    double step = rotation_factor(piece, stream) * stream->step;
+    if (!(lever2 > 0.0)) return turning;
+    if (turning.own_axes) axes_of_inertia(plan, piece, lever2, moments, turning.axes);
+    for (int32_t k = 0; k < 3; k++) {
+        double moment = turning.own_axes ? moments[k] > least ? moments[k] : least : lever2 * 2.0 / 3.0;
+        turning.steps[k] = step / ath_sqrt(moment);
+        if (turning.own_axes && stream->turn_step > 0.0 && stream->turn_step < turning.steps[k])
+            turning.steps[k] = stream->turn_step;
+    }
+    return turning;
+}
+
+void ath_turn_ratios(const ath_motion *motion, const ath_turning *turning, const double *coarse_steps,
+                     uint32_t ratios[3])
+{
+    for (int32_t k = 0; k < 3; k++) {
+        double ratio = coarse_steps ? coarse_steps[k] / turning->steps[k] + 0.5 : (double)motion->ratio;
+        ratios[k] = ratio >= 65535.0 ? 65535 : ratio >= 1.0 ? (uint32_t)ratio : 1;
+    }
+}
+
+void ath_into_axes(int32_t T, const ath_turning *turning, double *track)
+{
+    const double *A = turning->axes;
+    for (int32_t t = 0; turning->own_axes && t < T; t++) {
+        double x = track[t], y = track[T + t], z = track[2 * T + t];
+        for (int32_t k = 0; k < 3; k++) track[k * T + t] = A[3 * k] * x + A[3 * k + 1] * y + A[3 * k + 2] * z;
+    }
+}
+
+void ath_out_of_axes(int32_t T, const ath_turning *turning, double *track)
+{
+    const double *A = turning->axes;
+    for (int32_t t = 0; turning->own_axes && t < T; t++) {
+        double x = track[t], y = track[T + t], z = track[2 * T + t];
+        for (int32_t k = 0; k < 3; k++) track[k * T + t] = A[k] * x + A[3 + k] * y + A[6 + k] * z;
+    }
 }
 
 double ath_shift_step(const ath_piece *piece, const ath_stream *stream)
@@ -404,6 +473,14 @@ static void inverse_track(const ath_stream *stream, int32_t T, int32_t count, do
         ath_inverse_temporal(stream, T, count, step, quantised + axis * T, track + axis * T);
 }
 
+static void rotation_track(const ath_stream *stream, int32_t T, int32_t count, const ath_turning *turning,
+                           const int32_t *quantised, double *track)
+{
+    for (int32_t axis = 0; axis < 3; axis++)
+        ath_inverse_temporal(stream, T, count, turning->steps[axis], quantised + axis * T, track + axis * T);
+    ath_out_of_axes(T, turning, track);
+}
+
 static int32_t count_of(const ath_piece_rows *rows, int32_t slot, const ath_stream *stream)
 {
     return rows->counts ? rows->counts[slot] : stream->temporal_rank;
@@ -415,7 +492,6 @@ void ath_turned_attach(const ath_plan *plan, const ath_motion *motion, int32_t p
     int32_t T = motion->frames;
     const ath_piece *piece = plan->pieces + p;
     const ath_stream *base = ath_base_stream(motion, piece);
-    double rotation_step = ath_rotation_step(plan, piece, base);
     ath_attach(plan, motion, piece, scratch->at);
     memset(scratch->rotation, 0, 6 * (size_t)T * sizeof(double));
     if (ath_has_shift(piece)) {
@@ -423,8 +499,9 @@ void ath_turned_attach(const ath_plan *plan, const ath_motion *motion, int32_t p
                       scratch->shift);
         ath_move_point(T, scratch->shift, scratch->at.point);
     }
-    if (rotation_step > 0.0) {
-        inverse_track(base, T, count_of(rows, ROTATION_SLOT, base), rotation_step, rows->rotation, scratch->rotation);
+    if (ath_has_rotation(plan, piece, base)) {
+        ath_turning turning = ath_turning_of(plan, piece, base);
+        rotation_track(base, T, count_of(rows, ROTATION_SLOT, base), &turning, rows->rotation, scratch->rotation);
         ath_turn(T, scratch->rotation, scratch->at.rotation);
     }
 }
@@ -680,14 +757,14 @@ static int is_zero(const int32_t *integers, int32_t count)
     return 1;
 }
 
-void ath_predict_track(const ath_stream *stream, int32_t T, int32_t frequencies, double step, int32_t ratio,
-                       const double *track, const int32_t *coarse, int32_t *predicted)
+void ath_predict_track(const ath_stream *stream, int32_t T, int32_t frequencies, const double steps[3],
+                       const uint32_t ratios[3], const double *track, const int32_t *coarse, int32_t *predicted)
 {
     int32_t count = ath_min(frequencies, stream->temporal_rank);
-    double least = coarse ? 0.5 : 0.5 * (double)ratio;
     memset(predicted, 0, 3 * (size_t)T * sizeof *predicted);
     for (int32_t axis = 0; axis < 3 && count > 0; axis++) {
         const double *row = track + axis * T;
+        double least = coarse ? 0.5 : 0.5 * (double)ratios[axis];
         int32_t k = 0, any = 0;
         for (int32_t t = 0; t < T && !any; t++) any = row[t] != 0.0;
         if (!any) continue;
@@ -698,11 +775,12 @@ void ath_predict_track(const ath_stream *stream, int32_t T, int32_t frequencies,
             if (first < 0) break;
             if (known && is_zero(known + k, stop - k)) continue;
             project_waves(T, stream->temporal + (size_t)first * (size_t)T, row, sums);
-            for (int32_t i = k; i < stop; i++) predicted[axis * T + i] = nearest_or_none(sums[i - first] / step, least);
+            for (int32_t i = k; i < stop; i++)
+                predicted[axis * T + i] = nearest_or_none(sums[i - first] / steps[axis], least);
         }
         for (; k < count; k++)
             predicted[axis * T + k] =
-                nearest_or_none(wave_product(T, stream->temporal + (size_t)k * (size_t)T, row) / step, least);
+                nearest_or_none(wave_product(T, stream->temporal + (size_t)k * (size_t)T, row) / steps[axis], least);
         for (k = 0; known && k < count; k++)
             if (known[k] == 0) predicted[axis * T + k] = 0;
     }
@@ -755,17 +833,95 @@ void ath_project(const ath_plan *plan, int32_t T, const ath_piece *piece, int32_
     for (int32_t m = 0; m < count; m++) project_mode(plan, T, piece, m, local, rows + (size_t)m * 3 * (size_t)T);
 }
 
-void ath_predict_tracks(const ath_plan *plan, const ath_motion *motion, const ath_piece *piece,
-                        const ath_piece_before *before, ath_piece_rows *rows)
+/* The unit quaternion of a rotation matrix, of the two the one nearer to the last. */
+static void to_quaternion(const double R[9], double q[4])
+{
+    double size[4] = {1.0 + R[0] + R[4] + R[8], 1.0 + R[0] - R[4] - R[8], 1.0 - R[0] + R[4] - R[8],
+                      1.0 - R[0] - R[4] + R[8]};
+    double symmetric[6] = {R[7] - R[5], R[2] - R[6], R[3] - R[1], R[1] + R[3], R[2] + R[6], R[5] + R[7]};
+    static const int8_t row[4][4] = {{-1, 0, 1, 2}, {0, -1, 3, 4}, {1, 3, -1, 5}, {2, 4, 5, -1}};
+    int32_t largest = 0;
+    double p[4], length2 = 0.0, towards = 0.0;
+    for (int32_t i = 1; i < 4; i++)
+        if (size[i] > size[largest]) largest = i;
+    for (int32_t i = 0; i < 4; i++) {
+        p[i] = i == largest ? size[i] : symmetric[row[largest][i]];
+        length2 = length2 + p[i] * p[i];
+        towards = towards + p[i] * q[i];
+    }
+    double scale = (towards < 0.0 ? -1.0 : 1.0) / ath_sqrt(length2);
+    for (int32_t i = 0; i < 4; i++) q[i] = p[i] * scale;
+}
+
+void ath_rotation_vector(const double R[9], double q[4], double omega[3])
+{
+    to_quaternion(R, q);
+    if (q[0] < -0.9) /* beyond about 310 degrees: the same rotation the other way round */
+        for (int32_t i = 0; i < 4; i++) q[i] = -q[i];
+    for (int32_t k = 0; k < 3; k++) omega[k] = 4.0 * q[k + 1] / (1.0 + q[0]);
+}
+
+/* From the rotations `from`, 9 x frames, to others. */
+static void rotations_between(int32_t T, const double *from, const double *to, double *omega)
+{
+    double q[4] = {1.0, 0.0, 0.0, 0.0};
+    for (int32_t t = 0; t < T; t++) {
+        double R[9], own[3];
+        for (int32_t i = 0; i < 3; i++)
+            for (int32_t k = 0; k < 3; k++)
+                R[3 * i + k] = from[i * T + t] * to[k * T + t] + from[(3 + i) * T + t] * to[(3 + k) * T + t]
+                               + from[(6 + i) * T + t] * to[(6 + k) * T + t];
+        ath_rotation_vector(R, q, own);
+        for (int32_t k = 0; k < 3; k++) omega[k * T + t] = own[k];
+    }
+}
+
+static void predict_evenly(const ath_stream *stream, const ath_motion *motion, int32_t frequencies, double step,
+                           const double *track, const int32_t *coarse, int32_t *predicted)
+{
+    uint32_t ratio = (uint32_t)motion->ratio, ratios[3] = {ratio, ratio, ratio};
+    double steps[3] = {step, step, step};
+    ath_predict_track(stream, motion->frames, frequencies, steps, ratios, track, coarse, predicted);
+}
+
+void ath_predict_shift(const ath_motion *motion, const ath_piece *piece, const ath_piece_before *before,
+                       const ath_scratch *scratch, ath_piece_rows *rows)
 {
     const ath_stream *stream = ath_base_stream(motion, piece);
-    double step = ath_rotation_step(plan, piece, stream);
-    if (ath_has_shift(piece))
-        ath_predict_track(stream, motion->frames, before->frequencies, ath_shift_step(piece, stream), motion->ratio,
-                          before->shift, rows->coarse_shift, rows->predicted_shift);
-    if (step > 0.0)
-        ath_predict_track(stream, motion->frames, before->frequencies, step, motion->ratio, before->rotation,
-                          rows->coarse_rotation, rows->predicted_rotation);
+    const double *track = before->shift;
+    if (before->frames && before->frequencies > 0) {
+        for (int32_t i = 0; i < 3 * motion->frames; i++) scratch->shift[i] = before->frames[i] - scratch->at.point[i];
+        track = scratch->shift;
+    }
+    predict_evenly(stream, motion, before->frequencies, ath_shift_step(piece, stream), track, rows->coarse_shift,
+                   rows->predicted_shift);
+}
+
+void ath_predict_rotation(const ath_plan *plan, const ath_motion *motion, const ath_piece *piece,
+                          const ath_piece_before *before, const ath_scratch *scratch, ath_piece_rows *rows)
+{
+    const ath_stream *stream = ath_base_stream(motion, piece);
+    ath_turning turning = ath_turning_of(plan, piece, stream);
+    int32_t T = motion->frames;
+    uint32_t ratios[3];
+    const double *track = before->rotation;
+    ath_turn_ratios(motion, &turning, rows->coarse_turn_steps, ratios);
+    if (before->frames && before->frequencies > 0) {
+        rotations_between(T, scratch->at.rotation, before->frames + 3 * (size_t)T, scratch->rotation);
+        ath_into_axes(T, &turning, scratch->rotation);
+        track = scratch->rotation;
+    }
+    ath_predict_track(stream, T, before->frequencies, turning.steps, ratios, track, rows->coarse_rotation,
+                      rows->predicted_rotation);
+}
+
+void ath_predict_tracks(const ath_plan *plan, const ath_motion *motion, const ath_piece *piece,
+                        const ath_piece_before *before, const ath_scratch *scratch, ath_piece_rows *rows)
+{
+    if (before->frames) ath_attach(plan, motion, piece, scratch->at);
+    if (ath_has_shift(piece)) ath_predict_shift(motion, piece, before, scratch, rows);
+    if (ath_has_rotation(plan, piece, ath_base_stream(motion, piece)))
+        ath_predict_rotation(plan, motion, piece, before, scratch, rows);
 }
 
 /* Three tracks of shapes at a time: the products of the modes with each. */
@@ -800,8 +956,8 @@ void ath_predict_modes(const ath_plan *plan, const ath_motion *motion, const ath
             shape_tracks(T, piece, rows, r, scratch->rows, scratch->track);
             track = scratch->track;
         }
-        ath_predict_track(stream, T, has_prediction ? before->frequencies : 0, ath_row_step(motion, piece, rows, r),
-                          motion->ratio, track, coarse, ath_row(rows->predicted_modes, r, T));
+        predict_evenly(stream, motion, has_prediction ? before->frequencies : 0, ath_row_step(motion, piece, rows, r),
+                       track, coarse, ath_row(rows->predicted_modes, r, T));
     }
     for (int32_t r = modes; r < ath_rank(piece); r++)
         memset(ath_row(rows->predicted_modes, r, T), 0, 3 * (size_t)T * sizeof(int32_t));

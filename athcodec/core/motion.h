@@ -21,8 +21,10 @@ typedef struct ath_coarse {
     double *placed;                           /* vertex_count x 3 x frames: positions less the origin */
     const int32_t *integers, *integer_tracks; /* vertex_count x 3 x frames, piece_count x 2 x 3 x frames */
     const int32_t *shape_counts;              /* piece_count; null: no piece has shapes */
-    double *tracks;   /* piece_count x 2 x 3 x frames: rotation, translation over time; 0 where none is coded */
-    int32_t *extents; /* piece_count x 2: frequencies and modes that its rows reach */
+    double *tracks;     /* piece_count x 2 x 3 x frames: rotation, translation over time; 0 where none is coded */
+    double *frames;     /* piece_count x 12 x frames: point and rotation of rigid pieces, moved and turned */
+    int32_t *extents;   /* piece_count x 2: frequencies and modes that its rows reach */
+    double *turn_steps; /* piece_count x 3: of rotations; below 0 where a piece is not rigid */
 } ath_coarse;
 
 /* What the pieces and nodes of one segment are placed with. */
@@ -54,13 +56,15 @@ typedef struct {
     int32_t *predicted_modes, *predicted_rotation,
         *predicted_shift; /* of a refinement, as large as the rows; else null */
     const int32_t *coarse_modes, *coarse_rotation,
-        *coarse_shift; /* rows of the layer before; null: of other functions */
+        *coarse_shift;               /* rows of the layer before; null: of other functions */
+    const double *coarse_turn_steps; /* of rotations there; null: the piece was not rigid */
 } ath_piece_rows;
 
 /* A piece as the layer before has it. */
 typedef struct {
     const double *placed;           /* count x 3 x frames */
     const double *rotation, *shift; /* 3 x frames */
+    const double *frames;           /* where it hung once moved and turned: point, rotation; null: it was not rigid */
     int32_t frequencies, modes;     /* that its rows reach; 0 frequencies: nothing is predicted from it */
 } ath_piece_before;
 
@@ -108,13 +112,18 @@ int32_t ath_row_extent(const int32_t *row, int32_t frames, int32_t most);
 void ath_node_map(const ath_plan *plan, const ath_motion *motion, int32_t n, const ath_piece_rows *piece_rows,
                   const ath_node_rows *rows, const ath_scratch *scratch);
 
-/* Integers of three axes over temporal frequency that a track would have in steps of `step`, nearest, where they are at least
- * half of `ratio`, the steps of the layer before over this one's; 0 elsewhere and from `frequencies` on. */
-void ath_predict_track(const ath_stream *stream, int32_t frames, int32_t frequencies, double step, int32_t ratio,
-                       const double *track, const int32_t *coarse, int32_t *predicted);
-/* Those of a piece's tracks, which make its attach frame. */
+/* Integers of three axes over temporal frequency that a track would have in `steps` of the axes, nearest, where they are at least
+ * half of their ratio, the step of the layer before over this one's; 0 elsewhere and from `frequencies` on. */
+void ath_predict_track(const ath_stream *stream, int32_t frames, int32_t frequencies, const double steps[3],
+                       const uint32_t ratios[3], const double *track, const int32_t *coarse, int32_t *predicted);
+/* Those of a piece's translation and rotation, which make its attach frame; scratch->at is that without them. */
+void ath_predict_shift(const ath_motion *motion, const ath_piece *piece, const ath_piece_before *before,
+                       const ath_scratch *scratch, ath_piece_rows *rows);
+void ath_predict_rotation(const ath_plan *plan, const ath_motion *motion, const ath_piece *piece,
+                          const ath_piece_before *before, const ath_scratch *scratch, ath_piece_rows *rows);
+/* Both. */
 void ath_predict_tracks(const ath_plan *plan, const ath_motion *motion, const ath_piece *piece,
-                        const ath_piece_before *before, ath_piece_rows *rows);
+                        const ath_piece_before *before, const ath_scratch *scratch, ath_piece_rows *rows);
 /* The same for the modes of a piece, from its vertices in the layer before seen from its attach frame now (scratch->at). */
 void ath_predict_modes(const ath_plan *plan, const ath_motion *motion, const ath_piece *piece,
                        const ath_piece_before *before, const ath_scratch *scratch, ath_piece_rows *rows);
@@ -137,7 +146,24 @@ void ath_follow_tangent(const double tangent[3], const double from[3], const dou
                         double turned[9]);
 /* Turns R towards the rotation nearest to H, column k of which is what rest axis k became; not where H vanishes. */
 void ath_turn_to(const double H[9], int32_t steps, double R[9]);
-double ath_rotation_step(const ath_plan *plan, const ath_piece *piece, const ath_stream *stream);
+/* A rotation matrix as ath_turn takes it, from the unit quaternion that is nearer to the last, `q`. */
+void ath_rotation_vector(const double R[9], double q[4], double omega[3]);
+
+/* What the rows of a piece's rotation are: steps about axes, which are the rows of `axes`. */
+typedef struct {
+    double steps[3], axes[9];
+    int own_axes; /* 0: those of the rest pose's space */
+} ath_turning;
+
+/* Whether rotations of a piece are coded. */
+int ath_has_rotation(const ath_plan *plan, const ath_piece *piece, const ath_stream *stream);
+ath_turning ath_turning_of(const ath_plan *plan, const ath_piece *piece, const ath_stream *stream);
+/* Of a refinement, the steps of rotations in the layer before over this one's. */
+void ath_turn_ratios(const ath_motion *motion, const ath_turning *turning, const double *coarse_steps,
+                     uint32_t ratios[3]);
+/* Rotation vectors about the piece's axes, and back. */
+void ath_into_axes(int32_t frames, const ath_turning *turning, double *track);
+void ath_out_of_axes(int32_t frames, const ath_turning *turning, double *track);
 double ath_shift_step(const ath_piece *piece, const ath_stream *stream);
 double ath_node_step(int32_t exponent);
 /* Shapes of unit length from the integers that a stream holds of each, 3 x ATH_SHAPE_MODES. 0: those of one are all

@@ -69,7 +69,8 @@ static int32_t code_refined_shapes(ath_coder *coder, refined_shape_model *model,
     for (int32_t s = 0; s < own; s++) {
         const int32_t *known = s < coarse_count ? coarse + s * ATH_SHAPE_NUMBERS : nothing;
         int32_t predicted[ATH_SHAPE_NUMBERS];
-        row_prediction prediction = {predicted, known, 0, ATH_SHAPE_MODES, 1u << shift};
+        uint32_t ratio = 1u << shift;
+        row_prediction prediction = {predicted, known, 0, ATH_SHAPE_MODES, {ratio, ratio, ratio}};
         for (int32_t i = 0; i < ATH_SHAPE_NUMBERS; i++) predicted[i] = shifted(known[i], shift);
         above_count =
             code_refined_row(coder, &model->rows, modes, s, above_count, &prediction, integers + s * ATH_SHAPE_NUMBERS);
@@ -93,7 +94,7 @@ static void code_piece(ath_coder *coder, coefficient_model *model, const ath_pla
     if (level == ath_base_level(piece)) {
         if (ath_has_shift(piece))
             note_count(rows, SHIFT_SLOT, code_row(coder, model, frames, rank, SHIFT_SLOT, -1, rows->shift));
-        if (ath_rotation_step(plan, piece, stream) > 0.0)
+        if (ath_has_rotation(plan, piece, stream))
             note_count(rows, ROTATION_SLOT, code_row(coder, model, frames, rank, ROTATION_SLOT, -1, rows->rotation));
     }
     if (piece->low_level == level) to = ath_min(piece->low_modes, ath_rank(piece));
@@ -111,10 +112,11 @@ static void code_piece(ath_coder *coder, coefficient_model *model, const ath_pla
 /* What the stream of a refinement holds of a piece, once its predictions are known: tracks first, then modes, whose
  * predictions need the attach frame that the tracks make. */
 static void code_refined_track(ath_coder *coder, refinement_model *model, const ath_stream *stream,
-                               const ath_motion *motion, int32_t slot, const int32_t *predicted, const int32_t *coarse,
-                               const ath_piece_rows *rows, int32_t *row)
+                               const ath_motion *motion, int32_t slot, const uint32_t ratios[3],
+                               const int32_t *predicted, const int32_t *coarse, const ath_piece_rows *rows,
+                               int32_t *row)
 {
-    row_prediction prediction = {predicted, coarse, 0, motion->frames, (uint32_t)motion->ratio};
+    row_prediction prediction = {predicted, coarse, 0, motion->frames, {ratios[0], ratios[1], ratios[2]}};
     code_refined_row(coder, model, stream->temporal_rank, slot, -1, &prediction, row);
     note_count(rows, slot, ath_row_extent(row, motion->frames, motion->frames));
 }
@@ -123,19 +125,24 @@ static void code_refined_tracks(ath_coder *coder, refinement_model *model, const
                                 const ath_stream *stream, const ath_motion *motion, const ath_piece *piece,
                                 const ath_piece_rows *rows)
 {
+    uint32_t ratio = (uint32_t)motion->ratio, ratios[3] = {ratio, ratio, ratio};
     if (ath_has_shift(piece))
-        code_refined_track(coder, model, stream, motion, SHIFT_SLOT, rows->predicted_shift, rows->coarse_shift, rows,
-                           rows->shift);
-    if (ath_rotation_step(plan, piece, stream) > 0.0)
-        code_refined_track(coder, model, stream, motion, ROTATION_SLOT, rows->predicted_rotation, rows->coarse_rotation,
-                           rows, rows->rotation);
+        code_refined_track(coder, model, stream, motion, SHIFT_SLOT, ratios, rows->predicted_shift, rows->coarse_shift,
+                           rows, rows->shift);
+    if (ath_has_rotation(plan, piece, stream)) {
+        ath_turning turning = ath_turning_of(plan, piece, stream);
+        ath_turn_ratios(motion, &turning, rows->coarse_turn_steps, ratios);
+        code_refined_track(coder, model, stream, motion, ROTATION_SLOT, ratios, rows->predicted_rotation,
+                           rows->coarse_rotation, rows, rows->rotation);
+    }
 }
 
 static void code_refined_modes(ath_coder *coder, refinement_model *model, const ath_stream *stream,
                                const ath_motion *motion, const ath_piece *piece, const ath_piece_rows *rows)
 {
     int32_t T = motion->frames, above_count = -1;
-    row_prediction prediction = {0, 0, 0, T, (uint32_t)motion->ratio};
+    uint32_t ratio = (uint32_t)motion->ratio;
+    row_prediction prediction = {0, 0, 0, T, {ratio, ratio, ratio}};
     for (int32_t m = 0; m < ath_rank(piece); m++) {
         if (ath_is_shape_row(piece, rows, m) && 3 * m >= rows->shape_count) continue;
         prediction.row = ath_row(rows->predicted_modes, m, T);

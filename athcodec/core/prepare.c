@@ -60,6 +60,7 @@ typedef struct {
     int32_t *shape_integers; /* of the piece, 0 between pieces */
     double *unit_shapes;
     ath_piece_before before; /* the piece as the layer before has it */
+    double turn_steps[3];    /* of its rotations there */
 } layer_work;
 
 /* What is prepared, and from what. */
@@ -797,6 +798,14 @@ static void look_before(ath_work *work, int32_t q, int32_t p, const double *plac
     before->placed = placed;
     before->rotation = coarse->scratch.rotation;
     before->shift = coarse->scratch.shift;
+    before->frames = 0;
+    layer->rows.coarse_turn_steps = 0;
+    if (piece->flags & ATH_RIGID) {
+        ath_turning turning = ath_turning_of(coarse->plan, piece, ath_base_stream(&coarse->motion, piece));
+        memcpy(layer->turn_steps, turning.steps, sizeof turning.steps);
+        before->frames = coarse->scratch.at.point;
+        layer->rows.coarse_turn_steps = layer->turn_steps;
+    }
     before->modes = 0;
     before->frequencies = ath_max(ath_row_extent(coarse->rows.shift, T, coarse->counts[SHIFT_SLOT]),
                                   ath_row_extent(coarse->rows.rotation, T, coarse->counts[ROTATION_SLOT]));
@@ -822,7 +831,7 @@ static int refine_piece(ath_work *work, int32_t q, int32_t p, const double **pla
     ath_coder coder = reader->coder;
     if (refine_shapes(work, q, piece) != ATH_OK) return ATH_BAD_CHUNK;
     look_before(work, q, p, *placed);
-    ath_predict_tracks(layer->plan, &layer->motion, piece, &layer->before, &layer->rows);
+    ath_predict_tracks(layer->plan, &layer->motion, piece, &layer->before, &layer->scratch, &layer->rows);
     code_refined_tracks(&coder, reader->refined, layer->plan, stream, &layer->motion, piece, &layer->rows);
     ath_turned_attach(layer->plan, &layer->motion, p, &layer->rows, &layer->scratch);
     ath_predict_modes(layer->plan, &layer->motion, piece, &layer->before, &layer->scratch, &layer->rows);

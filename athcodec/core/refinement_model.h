@@ -41,7 +41,7 @@ ATH_INLINE uint32_t coarse_steps(int32_t predicted, uint32_t ratio)
 typedef struct {
     const int32_t *row, *coarse, *below;
     int32_t frames;
-    uint32_t ratio;
+    uint32_t ratio[3]; /* of the axes */
 } row_prediction;
 
 /* What the layer before has around the integers of a row: magnitudes in its own steps, sums of them over the axes, and
@@ -60,7 +60,7 @@ static void coarse_magnitudes(const row_prediction *p, const int32_t *row, int32
     for (int32_t axis = 0; axis < 3; axis++) {
         const int32_t *from = row + axis * p->frames;
         for (int32_t k = 0; k < known; k++) {
-            steps[axis][k] = p->coarse ? clipped(from[k]) : coarse_steps(from[k], p->ratio);
+            steps[axis][k] = p->coarse ? clipped(from[k]) : coarse_steps(from[k], p->ratio[axis]);
             all[k] += steps[axis][k];
         }
         for (int32_t k = known; k < count; k++) steps[axis][k] = 0;
@@ -100,8 +100,8 @@ static int32_t code_refined_difference(ath_coder *coder, refinement_model *model
     int32_t predicted = prediction->row[axis * prediction->frames + k];
     int known = around->steps[axis][k] > 0;
     number_model *number = known ? &model->known : model->rows.numbers + row_number(differences, axis, k);
-    uint32_t expected =
-        known && prediction->ratio > 1 ? 4 * prediction->ratio : expected_magnitude(differences, axis, k);
+    uint32_t ratio = prediction->ratio[axis];
+    uint32_t expected = known && ratio > 1 ? 4 * ratio : expected_magnitude(differences, axis, k);
     if (!known) expected += 2 * loudness(prediction, around, axis, k);
     uint32_t magnitude = code_unsigned(coder, number, expected, magnitude_of(difference));
     if (magnitude == 0) return 0;

@@ -40,6 +40,7 @@ from athcodec.encoding.segment import (
     Source,
     StreamBasis,
     analyse,
+    basis_ratio,
     code_source_rest,
     correct,
     correction_chunk,
@@ -247,8 +248,8 @@ class _TimeBases:
     """The time bases of the layers of one segment: one, learned for the last layer, with more rows in each."""
 
     def __init__(self, last: Layer, positions: np.ndarray):
-        level, learning = last.plan.level_count - 1, last.settings.learning_levels
-        self._components = time_components(last.plan, last.settings, positions, learning[-1:]).get(level)
+        everything = [None] if last.settings.learned_bases[-1] else []
+        self._components = time_components(last.plan, last.settings, positions, everything).get(None)
         self._before: tuple[int, StreamBasis] | None = None
 
     def first(self, layer: Layer) -> dict[int, StreamBasis]:
@@ -263,7 +264,7 @@ class _TimeBases:
         """Of a stream of the layer's settings, which stands at a level of the file."""
         if self._components is None or not layer.settings.learned_bases[stream]:
             return {}
-        steps = self._components.basis(layer.ratio)
+        steps = self._components.basis(basis_ratio(layer.plan, layer.settings, layer.ratio))
         if steps is None:
             return {}
         own = StreamBasis(steps, level)

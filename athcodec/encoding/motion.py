@@ -172,12 +172,19 @@ class Plan:
         """Per piece whether it turns and moves as it is, (P,)."""
         return self.pieces["flags"] & RIGID > 0
 
+    def levers(self) -> np.ndarray:
+        """(P,) by how much a turn by one radian moves a piece: the root of its mean moment of inertia."""
+        pieces = self.pieces
+        at = np.where(pieces["attach"] >= 0, pieces["attach"], pieces["first"])
+        away = self.rest - np.repeat(self.rest[at], pieces["count"], axis=0)
+        return np.sqrt(2 / 3 * np.add.reduceat((away**2).sum(axis=1), pieces["first"]))
+
     @property
     def main_level(self) -> int:
         """The level whose stream holds the most rows."""
-        pieces, low = self.pieces, self.pieces["low_modes"]
-        rows = np.bincount(self.base_level, low, self.level_count)
-        return int((rows + np.bincount(pieces["level"], pieces["rank"] - low, self.level_count)).argmax())
+        low, rotations = np.minimum(self.pieces["low_modes"], self.ranks), self.is_rigid
+        rows = np.bincount(self.base_level, low + rotations, self.level_count)
+        return int((rows + np.bincount(self.pieces["level"], self.ranks - low, self.level_count)).argmax())
 
     def has_stems(self, level: int) -> bool:
         """Whether the level has a coefficient stream."""
@@ -244,14 +251,18 @@ class SegmentMotion:
         if layered:
             self.placed = np.zeros((plan.vertex_count, 3, frames))
             self.placed_tracks = np.zeros(self.tracks.shape)
+            self.placed_frames = np.zeros((core.piece_count, 12, frames))  # those of rigid pieces are touched
             self.extents = np.zeros((core.piece_count, 2), np.int32)
+            self.turn_steps = np.full((core.piece_count, 3), -1.0)
             self.coarse = Coarse(
                 self.placed.ctypes.data,
                 self.coefficients.ctypes.data,
                 self.tracks.ctypes.data,
                 None if learned_modes is None else learned_modes.counts.ctypes.data,
                 self.placed_tracks.ctypes.data,
+                self.placed_frames.ctypes.data,
                 self.extents.ctypes.data,
+                self.turn_steps.ctypes.data,
             )
         self._bind()
 

@@ -41,7 +41,7 @@ def rigid_layers(
         bend = np.max([_bends(rest[vertices], sample, vertices) for sample in samples], axis=0)
         extent = np.linalg.norm(np.ptp(rest[vertices], axis=1), axis=1)
         for bound in bounds:  # refinements of rotations cost more than those of modes: where shape needs them
-            stiff = bend <= STIFF_BEND * bound if len(bounds) == 1 else False
+            stiff = bend <= STIFF_BEND * bound
             layers[own] += (bend <= OWN_BEND * bound) & ((extent <= LARGEST * bound) | stiff)
     return layers
 

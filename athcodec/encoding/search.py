@@ -32,6 +32,7 @@ from athcodec.encoding.segment import (
     StreamBasis,
     analyse,
     analyse_finely,
+    basis_ratio,
     branch_records,
     code_stems,
     lags,
@@ -151,7 +152,7 @@ def first_settings(
         rigid=rigid,
         layer=len(ratios) - 1,
         free_rigid=False,
-        turn_step=TURN_STEP if rigid.any() else 0.0,
+        turn_step=TURN_STEP if rigid[source.details > 0].any() else 0.0,
         lags=np.zeros(source.hierarchy.branch_count, np.int32),
         details=source.details if layered else finer_than(source.details, bound),
         adaptive_rest=False,
@@ -177,7 +178,7 @@ def _rigid(source: Source, bound: float, samples: Sequence[SegmentSample], ratio
     return rigid_layers(
         hierarchy.first_vertex,
         hierarchy.stem_count,
-        source.details > 0,
+        source.sheet_like | (source.details > 0),
         source.rest,
         [sample.positions for sample in samples],
         [ratio * least for ratio in ratios],
@@ -362,8 +363,11 @@ class Search:
 
     def first_layer(self, settings: Settings, ratio: int) -> Settings:
         """Settings of a layer whose step is `ratio` times that of the given ones."""
-        first = replace(_coarser(settings, ratio), learned_bases=(False,) * self.levels, learned_pieces=None)
-        for step in (self._with_rotations, self._with_learned_bases, self._with_learned_modes):
+        first, steps = replace(_coarser(settings, ratio), learned_pieces=None), [self._with_rotations]
+        if not settings.turn_step:  # else its turns are as fine as those of refinements, which have that basis
+            first = replace(first, learned_bases=(False,) * self.levels)
+            steps.append(self._with_learned_bases)
+        for step in (*steps, self._with_learned_modes):
             first = first if self.effort == "fast" else step(first)
         return self._with_node_steps(first)
 
@@ -555,7 +559,7 @@ class Search:
             return {}
         step, components = self._learn_time(settings)
         some = {level: own for level, own in components[number].items() if settings.learned_bases[level]}
-        return level_bases(some, settings.step / step)
+        return level_bases(some, basis_ratio(self.prelude(settings).plan, settings, settings.step / step))
 
     def _learn_time(self, settings: Settings) -> tuple[float, list[dict[int, TimeComponents]]]:
         """Components of the samples over time, of all levels, and the step of the trial that asked first for them: they

@@ -6,7 +6,7 @@ predicted from what the decoder will have, corrections are found on what it will
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -509,9 +509,12 @@ def level_streams(settings: Settings, levels: int, bases: dict[int, StreamBasis]
     return found
 
 
-def _level_moments(segment: SegmentMotion, level: int) -> tuple[np.ndarray, int]:
-    """Second moments over time, (T, T), of those tracks of one level's stream that do not quantise to nothing, in units
-    of their steps, and how many they are; of a segment that was analysed finely, in no learned basis."""
+def _level_moments(segment: SegmentMotion, level: int | None) -> tuple[np.ndarray, int]:
+    """Second moments over time, (T, T), of those tracks of one level's stream, or of all, that do not quantise to
+    nothing, in units of their steps, and how many they are; of a segment that was analysed finely, in no learned
+    basis."""
+    if level is None:
+        return _moments(segment, [segment.coefficients, segment.tracks])
     pieces, slots = segment.plan.pieces, []
     for low, high, at in (
         (0, pieces["low_modes"], pieces["low_level"]),
@@ -521,9 +524,13 @@ def _level_moments(segment: SegmentMotion, level: int) -> tuple[np.ndarray, int]
             start = low if np.isscalar(low) else low[piece]
             slots.append(np.arange(pieces["first"][piece] + start, pieces["first"][piece] + high[piece]))
     chosen = np.concatenate(slots) if slots else np.zeros(0, int)
-    lower, count, least = np.zeros((segment.frames, segment.frames)), 0, (FINER * qz.DEAD_ZONE) ** 2
     parts = (segment.coefficients[chosen[at : at + ROWS_AT_ONCE]] for at in range(0, len(chosen), ROWS_AT_ONCE))
-    for part in (*parts, segment.tracks[segment.plan.base_level == level]):
+    return _moments(segment, (*parts, segment.tracks[segment.plan.base_level == level]))
+
+
+def _moments(segment: SegmentMotion, parts: Iterable[np.ndarray]) -> tuple[np.ndarray, int]:
+    lower, count, least = np.zeros((segment.frames, segment.frames)), 0, (FINER * qz.DEAD_ZONE) ** 2
+    for part in parts:
         rows = part.reshape(-1, segment.frames)
         into = address(rows, np.int32, rows.size), least, address(lower, np.float64, lower.size)
         count += lib.ath_add_moments(len(rows), segment.frames, *into)
@@ -542,9 +549,9 @@ def analyse_finely(plan: Plan, settings: Settings, positions: np.ndarray) -> Seg
 
 
 def time_components(
-    plan: Plan, settings: Settings, positions: np.ndarray, levels: Sequence[int]
-) -> dict[int, TimeComponents]:
-    """Of some levels, from a finer pass."""
+    plan: Plan, settings: Settings, positions: np.ndarray, levels: Sequence[int | None]
+) -> dict[int | None, TimeComponents]:
+    """Of some levels, None: of all that moves, from a finer pass."""
     if not levels:
         return {}
     segment = analyse_finely(plan, settings, positions)
@@ -555,6 +562,17 @@ def level_bases(components: dict[int, TimeComponents], ratio: float = 1.0) -> di
     """Each level's own, for steps `ratio` times those of the components."""
     bases = {level: found.basis(ratio) for level, found in components.items()}
     return {level: StreamBasis(basis, level) for level, basis in bases.items() if basis is not None}
+
+
+def basis_ratio(plan: Plan, settings: Settings, ratio: float) -> float:
+    """By how much rows may be coarser than where a time basis was learned, at steps `ratio` times as fine: by less
+    where the turns of rigid pieces have a largest step."""
+    levers = plan.levers()[plan.is_rigid]
+    if not settings.turn_step or not levers.any():
+        return ratio
+    steps = np.minimum(settings.step / levers[levers > 0], settings.turn_step)
+    finest = np.minimum(settings.step / ratio / levers[levers > 0], settings.turn_step)
+    return float(np.sqrt(np.mean((steps / finest) ** 2)))
 
 
 def learned_bases(plan: Plan, settings: Settings, positions: np.ndarray) -> dict[int, StreamBasis]:
