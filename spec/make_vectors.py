@@ -2047,10 +2047,18 @@ valid(
     "the rest pose of level 0 is a point: its maps have no directions, those of level 1 have",
     rest_by_level([Stem(-1, 3), Stem(0, 2, 1), Stem(1, 2, 1)], 41, points=[(0, 0, 0)] * 7),
 )
+LOOSE_BEAMS = [*BEAMS[:3], Stem(0, 9, 30, LOOSE), Stem(-1, 70, lag=0)]
 valid(
     "rest-of-level-1-beams",
     "runs of beams, loose stems, a root of two pieces and two roots",
-    rest_by_level([*BEAMS[:3], Stem(0, 9, 30, LOOSE), Stem(-1, 70, lag=0)], 42, frames=5, segments=2, is_float64=True),
+    rest_by_level(
+        LOOSE_BEAMS,
+        42,
+        rest=rest_chunk(write(rd.decode_rest, Chance(47, large=6), branches_of(LOOSE_BEAMS), 1.0), rest_type=1),
+        frames=5,
+        segments=2,
+        is_float64=True,
+    ),
 )
 valid(
     "rest-of-level-1-whole",
