@@ -124,7 +124,7 @@ def full_clip_of(seed: int):
 
 @pytest.fixture(scope="session")
 def full_clip():
-    return full_clip_of(11)
+    return full_clip_of(111)
 
 
 @pytest.fixture(scope="session")

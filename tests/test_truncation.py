@@ -103,15 +103,16 @@ def test_every_prefix_fails_in_strict_opening(full):
     full.cut(len(full.data), strict=True).file.check()
 
 
-def test_what_is_missing_is_named(bushy):
+def test_what_is_missing_is_named(bushy, full):
     first = next(c.offset for c in bushy.chunks if (c.is_motion, c.level, c.segment) == (True, 1, 2))
     decoder = bushy.cut(first + 1)
     levels = len(bushy.levels)
     assert decoder.missing.startswith("level 1: segments 2-3; level 2: segments 0-3")
     assert decoder.missing.count("level") == levels - 1
-    last = [chunk for chunk in bushy.chunks if chunk.is_motion][-1]
-    missing = bushy.cut(last.offset + last.length - 1).missing
-    assert missing == f"level {levels - 1}: segment 3; rest pose of the source"
+    for file, rest in ((bushy, ""), (full, "; rest pose of the source")):
+        last = [chunk for chunk in file.chunks if chunk.is_motion][-1]
+        missing = file.cut(last.offset + last.length - 1).missing
+        assert missing == f"level {last.level}: segment {last.segment}{rest}"
 
 
 def test_a_file_cut_in_its_attributes_plays_in_full_and_says_so(full):

@@ -67,7 +67,7 @@ LEVEL_TOLERANCE = 1.005  # of the RMS error of a level, over that of the level b
 FINER_MAPS, COARSER_MAPS = 3, 16  # half octaves that steps of maps may move for that
 EVEN_SHARE = 0.05  # of the bytes of a segment, that corrections may take for that
 TIGHTER_LIMITS = tuple(2.0 ** (-i / 8) for i in range(1, 17))  # of corrections for that
-LEVEL_0_SHARE = 1.03  # of the first layer's rest pose, that it may take together with that of level 0
+LEVEL_0_SHARE, LEVEL_0_BYTES = 1.03, 24  # of the first layer's rest pose, and beyond, that it may take with level 0's
 
 
 @dataclass
@@ -222,7 +222,8 @@ def _first_rests(prelude: CodedPrelude, step: float, rest: np.ndarray, mesh: Mes
     level_0 = encode(LEVEL_0_STEP * step)
     refined = encode(step, level_0)
     both = len(level_0.stream) + len(refined.stream)
-    return [level_0, refined] if both <= LEVEL_0_SHARE * len(at_once.stream) else [at_once]
+    takes_little = both <= LEVEL_0_SHARE * len(at_once.stream) + LEVEL_0_BYTES
+    return [level_0, refined] if takes_little else [at_once]
 
 
 def layer_chunks(layers: Layers) -> dict[tuple[int, int], bytes]:

@@ -77,7 +77,7 @@ ath_chunk *fuzz_chunks(uint8_t *file, size_t size, uint32_t *count, uint32_t *ve
     repair_front(file, front);
     if (ath_read_header(file, size, &limits, &header, &needed, &fault) != ATH_OK) return NULL;
     ath_chunk *chunks = fuzz_memory(header.chunk_count * sizeof *chunks, 0);
-    int result = ath_read_tables(file, size, &limits, &header, &needed, chunks, NULL, NULL, &fault);
+    int result = ath_read_tables(file, size, &limits, &header, &needed, chunks, NULL, NULL, NULL, &fault);
     *count = header.chunk_count;
     *vertices = header.vertex_count;
     if (result == ATH_OK || result == ATH_MISSING) return chunks;
@@ -308,8 +308,9 @@ int fuzz_same(const ath_file *file, const ath_segment *a, const ath_segment *b)
 {
     size_t vertices = (size_t)file->info.vertex_count, size = 3 * vertices * sizeof(double);
     double *first = fuzz_memory(size, 0), *second = fuzz_memory(size, 0xff);
+    int32_t start = ath_segment_start(file, a->index), stop = ath_segment_start(file, a->index + 1);
     int same = 1;
-    for (int32_t t = a->start; t < a->start + a->frames && same; t++) {
+    for (int32_t t = start; t < stop && same; t++) {
         REQUIRE(ath_positions_float64(file, &a, 1, t, ATH_SOURCE_ORDER, first, 3 * sizeof(double)) == ATH_OK,
                 "it plays");
         REQUIRE(ath_positions_float64(file, &b, 1, t, ATH_SOURCE_ORDER, second, 3 * sizeof(double)) == ATH_OK,
