@@ -123,7 +123,8 @@ BENCH_API int64_t bench_corrections(stream_bytes bytes, int64_t size, int32_t ve
         for (size_t axis = 0; axis < 3; axis++)
             for (int32_t t = 0; t < frames; t++) {
                 float *at = positions + ((size_t)v * 3 + axis) * (size_t)stride + t;
-                if (parts[t][axis] != 0.0) *at = (float)ath_corrected((double)*at, parts[t][axis], step);
+                if (is_reached(row, t) && parts[t][axis] != 0.0)
+                    *at = (float)ath_corrected((double)*at, parts[t][axis], step);
             }
     }
     free(model);
