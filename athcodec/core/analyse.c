@@ -123,7 +123,7 @@ static void settle_ends(const ath_stream *stream, int32_t T, double step, const 
     enum { LEAST_FRAMES = 8 };
     static const double least = 1e-3;
     double parts[ATH_SEGMENT_FRAMES][2 * ATH_END_PARTS], left[2 * ATH_END_PARTS];
-    int32_t rank = ath_row_extent(quantised, T, stream->temporal_rank);
+    int32_t rank = row_extent(quantised, stream->temporal_rank);
     if (T < LEAST_FRAMES || rank == 0 || rounding->ends[0] == 0.0) return;
     both_ends(row, T, left);
     for (int32_t i = 0; i < 2 * ATH_END_PARTS; i++) left[i] /= step;

@@ -815,7 +815,7 @@ class Search:
         segment = self._analysed(settings, len(self.samples) // 2, self.learned_modes(prelude.plan, settings))
         rest = self.cost(settings)[1].sum() + self._prelude_bytes(prelude)
         scale = self.source.coded_frames / self.sample.shape[2]
-        least = qz.NODE_BYTES if self._layered else min(qz.NODE_BYTES, qz.SMALL_NODE_SHARE * rest)
+        least = min(qz.NODE_BYTES, qz.SMALL_NODE_SHARE * rest) if self._is_played_whole() else qz.NODE_BYTES
         allowed = max(least, qz.NODE_SHARE / (1 - qz.NODE_SHARE) * rest)
         qualities = self._node_qualities()
         chosen = limits = None
@@ -838,13 +838,17 @@ class Search:
                 break
         return replace(settings, node_steps=chosen)
 
+    def _is_played_whole(self) -> bool:
+        """Of one layer and segment, so that its coarse levels are hardly ever shown, and need not meet."""
+        return not self._layered and not self.source.has_seams
+
     def _node_qualities(self) -> list[np.ndarray]:
-        """(levels,) each, from fine to coarse; that of a few roots is another and rises last."""
+        """(levels,) each, from fine to coarse; that of a few roots is another and rises last, if at all."""
         qualities = [np.full(self.levels, quality) for quality in qz.NODE_QUALITIES]
         if (self.source.hierarchy.branch_parent < 0).sum() > qz.FEW_ROOTS:
             return qualities
-        coarsest = qualities[-1:] * (len(qz.ROOT_QUALITIES) - 1)
-        roots = [qz.ROOT_QUALITIES[0]] * len(qualities) + [*qz.ROOT_QUALITIES[1:]]
+        fine, *coarser = qz.ROOT_QUALITIES if self._is_played_whole() else qz.ROOT_QUALITIES[:1]
+        roots, coarsest = [fine] * len(qualities) + coarser, qualities[-1:] * len(coarser)
         return [np.append(root, quality[1:]) for root, quality in zip(roots, qualities + coarsest)]
 
     def _map_levels(self, plan: Plan) -> list[int]:
