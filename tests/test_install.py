@@ -4,9 +4,11 @@ memory functions, is found by CMake and pkg-config once it is installed, and pla
 from __future__ import annotations
 
 import os
+import platform
 import re
 import shutil
 import subprocess
+import sys
 import sysconfig
 from pathlib import Path
 
@@ -112,6 +114,49 @@ def test_the_sources_that_are_no_encoder_are_the_decoder():
     """A new file is in one of the two lists, so that an engine cannot miss it."""
     (encoder,) = re.findall(r"ATH_ENCODER_SOURCES ([^)]*)\)", (CORE / "CMakeLists.txt").read_text())
     assert sorted(CORE.glob("*.c")) == sorted(decoder_sources() + [CORE / name for name in encoder.split()])
+
+
+# ---- one file ----
+
+
+@pytest.fixture
+def single(tmp_path) -> Path:
+    """A folder with the decoder as one file, its header, and a program."""
+    run(sys.executable, CORE / "amalgamate.py", tmp_path / "ath.c")
+    shutil.copy(CORE / "ath.h", tmp_path)
+    (tmp_path / "consumer.c").write_text(CONSUMER)
+    return tmp_path
+
+
+@pytest.mark.parametrize("compiler", C_COMPILERS)
+@pytest.mark.parametrize("options", ["", "-O2", "-O3 -march=native -ffp-contract=fast"])
+def test_the_decoder_as_one_file_decodes_what_python_does(compiler, options, single, sample_ath, expected):
+    """Also where the compiler was told that it may fuse multiplications and additions."""
+    flags = [*options.split(), "-DATH_STATIC", "-I", single]
+    run(compiler, *flags, single / "consumer.c", single / "ath.c", "-lm", "-o", single / "consumer")
+    assert run(single / "consumer", sample_ath) == expected
+
+
+def test_no_instruction_of_the_decoder_rounds_once_for_two_operations(single):
+    """Compiled for processors that have such instructions, by a compiler that takes them where it is let."""
+    fused = re.compile(r"\b(vfn?m(?:add|sub)|fn?m(?:add|sub)\b|fml[as]\b|vfm[as]|fmadd\.|m[as][ed]br)")
+    compiler = [sys.executable, "-m", "ziglang", "cc", *"-O2 -g0 -DATH_STATIC -ffp-contract=fast-honor-pragmas".split()]
+    for target in ("x86_64-linux-musl -mcpu=haswell", "aarch64-linux-musl"):
+        run(*compiler, "-target", *target.split(), "-S", single / "ath.c", "-o", single / "ath.s")
+        assembly = (single / "ath.s").read_text()
+        assert "ath_prepare" in assembly and not fused.findall(assembly), target
+
+
+@pytest.mark.parametrize(
+    "options, why",
+    [("-ffast-math", "expected a build without -ffast-math"), ("-m32 -mfpmath=387", "expected doubles in registers")],
+)
+def test_a_build_whose_arithmetic_differs_is_refused(options, why, single):
+    if "x86_64" not in platform.machine() and "-m32" in options:
+        pytest.skip("this processor has no x87 registers")
+    command = ["gcc", "-ffreestanding", *options.split(), "-c", single / "ath.c", "-o", single / "ath.o"]
+    done = subprocess.run([str(part) for part in command], env=TOOLS, text=True, capture_output=True)
+    assert done.returncode != 0 and why in done.stderr
 
 
 # ---- installing ----

@@ -29,7 +29,7 @@
  * file order unless an ath_order says otherwise: every subtree is one range of vertices there.
  *
  * Exactness. Decoded positions have the same bits on every machine, in WebAssembly and in Python, at whole frames and
- * between them. Compile without contraction to FMA (-ffp-contract=off), without -ffast-math.
+ * between them. Arithmetic that would change them is switched off (contraction to FMA) or refused (-ffast-math, x87).
  *
  * Needs memcpy, memmove and memset, and sqrt as an instruction (-fno-math-errno); nothing else. C11 or C++17. */
 #ifndef ATH_H

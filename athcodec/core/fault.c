@@ -82,7 +82,7 @@ static void put_character(writer *out, char character)
     out->length++;
 }
 
-static void put(writer *out, const char *text)
+static void write_text(writer *out, const char *text)
 {
     while (*text) put_character(out, *text++);
 }
@@ -102,7 +102,7 @@ static void put_integer(writer *out, uint64_t value)
 
 static void put_hex(writer *out, uint32_t value, int digits)
 {
-    put(out, "0x");
+    write_text(out, "0x");
     while (digits-- > 0) put_character(out, "0123456789abcdef"[value >> 4 * digits & 15]);
 }
 
@@ -120,20 +120,20 @@ static void put_scientific(writer *out, double value)
     put_integer(out, digits / 100000);
     put_character(out, '.');
     for (uint64_t unit = 10000; unit > 0; unit /= 10) put_character(out, (char)('0' + digits / unit % 10));
-    put(out, exponent < 0 ? "e-" : "e+");
+    write_text(out, exponent < 0 ? "e-" : "e+");
     put_integer(out, (uint64_t)(exponent < 0 ? -exponent : exponent));
 }
 
 static void put_number(writer *out, double value)
 {
     if (value != value) {
-        put(out, "nan");
+        write_text(out, "nan");
         return;
     }
     if (value < 0.0) put_character(out, '-');
     value = value < 0.0 ? -value : value;
     if (!ath_is_finite(value))
-        put(out, "inf");
+        write_text(out, "inf");
     else if (value < 0x1p53 && value == (double)(uint64_t)value)
         put_integer(out, (uint64_t)value);
     else
@@ -202,10 +202,10 @@ static void put_value(writer *out, int32_t field, double value)
 static void put_allowed(writer *out, const ath_fault_info *fault)
 {
     int is_limit = fault->code == ATH_LIMIT_EXCEEDED;
-    put(out, is_limit ? "; the limit is " : "; expected ");
+    write_text(out, is_limit ? "; the limit is " : "; expected ");
     if (!is_limit && fault->least < fault->most) {
         put_value(out, fault->field, fault->least);
-        put(out, " to ");
+        write_text(out, " to ");
     }
     put_value(out, fault->field, fault->most);
 }
@@ -213,25 +213,25 @@ static void put_allowed(writer *out, const ath_fault_info *fault)
 static void put_level(writer *out, const ath_fault_info *fault)
 {
     if (fault->level == ATH_NO_LEVEL) return;
-    put(out, " of level ");
+    write_text(out, " of level ");
     put_integer(out, fault->level);
-    put(out, ", segment ");
+    write_text(out, ", segment ");
     put_integer(out, fault->segment);
 }
 
 static void put_kind(writer *out, const ath_fault_info *fault)
 {
     const char *name = ath_kind_name(fault->kind);
-    put(out, name ? name : "kind ");
+    write_text(out, name ? name : "kind ");
     if (!name) put_hex(out, fault->kind, 4);
     put_level(out, fault);
 }
 
 static void put_place(writer *out, const ath_fault_info *fault)
 {
-    put(out, "chunk ");
+    write_text(out, "chunk ");
     put_kind(out, fault);
-    put(out, " at byte ");
+    write_text(out, " at byte ");
     put_integer(out, fault->offset);
 }
 
@@ -267,16 +267,16 @@ size_t ath_level_name(const ath_file *file, int32_t level, char *text, size_t ca
     writer out = {text, capacity, 0};
     int32_t layers = (int32_t)file->header.layer_count;
     if (level <= file->plan.height) {
-        put(&out, "depth ");
+        write_text(&out, "depth ");
         put_integer(&out, (uint64_t)level);
     } else if (level >= ath_lossy_levels(file)) {
-        put(&out, "lossless");
+        write_text(&out, "lossless");
     } else if (layers == 1) {
-        put(&out, "all branches");
+        write_text(&out, "all branches");
     } else {
-        put(&out, "layer ");
+        write_text(&out, "layer ");
         put_integer(&out, (uint64_t)ath_layer_of(file, level) + 1);
-        put(&out, " of ");
+        write_text(&out, " of ");
         put_integer(&out, (uint64_t)layers);
     }
     return ended(&out);

@@ -46,7 +46,7 @@ static uint64_t mesh_work(uint64_t vertices)
 }
 
 /* Places the file's arrays behind its struct; with a null base it only counts. Returns the bytes that they take. */
-static uint64_t carve(ath_file *file, const ath_header *header, uint8_t *base)
+static uint64_t carve_file(ath_file *file, const ath_header *header, uint8_t *base)
 {
     ath_arena arena = {base, 0};
     uint64_t vertices = header->vertex_count, branches = header->branch_count;
@@ -114,7 +114,7 @@ int ath_front(const uint8_t *bytes, size_t available, const ath_limits *limits, 
         return ath_refuse(why, ATH_LIMIT_EXCEEDED, ATH_FIELD_PRELUDE_SIZE, (double)needed, 0, (double)SIZE_MAX);
     if (!has_front || (result != ATH_OK && result != ATH_MISSING)) return result;
     int limit = check_least_memory(&header, &chosen, &beyond_limit);
-    if (limit == ATH_OK) *memory_bytes = ath_size_or_most(carve(&file, &header, 0));
+    if (limit == ATH_OK) *memory_bytes = ath_size_or_most(carve_file(&file, &header, 0));
     if (limit == ATH_OK || result == ATH_MISSING) return result;
     *why = beyond_limit;
     return limit;
@@ -561,17 +561,18 @@ static int read_front(ath_file *file, size_t memory_bytes, const uint8_t *bytes,
     int result = ath_read_header(bytes, available, limits, &header, &needed, fault);
     if (result != ATH_OK) return result;
     header.has_faces = 0; /* not known before the table is read, which needs memory; what they need comes last */
-    if (memory_bytes < carve(file, &header, 0)) return ath_refuse(fault, ATH_NO_MEMORY, ATH_FIELD_NONE, 0, 0, 0);
+    if (memory_bytes < carve_file(file, &header, 0)) return ath_refuse(fault, ATH_NO_MEMORY, ATH_FIELD_NONE, 0, 0, 0);
     memset(file, 0, sizeof *file);
-    carve(file, &header, (uint8_t *)file);
+    carve_file(file, &header, (uint8_t *)file);
     result = ath_read_tables(bytes, available, limits, &header, &needed, file->chunks, file->errors, file->joins,
                              file->repeats, fault);
     file->header = header;
     set_info(file, needed);
     if (result == ATH_OK) result = check_least_memory(&header, limits, fault);
     if (result != ATH_OK) return result;
-    if (memory_bytes < carve(&counted, &header, 0)) return ath_refuse(fault, ATH_NO_MEMORY, ATH_FIELD_NONE, 0, 0, 0);
-    carve(file, &header, (uint8_t *)file);
+    if (memory_bytes < carve_file(&counted, &header, 0))
+        return ath_refuse(fault, ATH_NO_MEMORY, ATH_FIELD_NONE, 0, 0, 0);
+    carve_file(file, &header, (uint8_t *)file);
     return ATH_OK;
 }
 

@@ -7,6 +7,21 @@
 
 #include "ath.h"
 
+/* Arithmetic that would give other bits is refused, and contraction to FMA switched off, by what each compiler obeys. */
+#if defined(__FAST_MATH__)
+#error "athcodec: expected a build without -ffast-math, which would change what a file decodes to"
+#endif
+#if defined(__FLT_EVAL_METHOD__) && __FLT_EVAL_METHOD__ != 0 && __FLT_EVAL_METHOD__ != 16
+#error "athcodec: expected doubles in registers as wide as they are (on i386: -msse2 -mfpmath=sse)"
+#endif
+#if defined(__clang__)
+#pragma STDC FP_CONTRACT OFF
+#elif defined(__GNUC__) && (defined(__FMA__) || defined(__FMA4__) || !(defined(__x86_64__) || defined(__i386__)))
+#pragma GCC optimize("fp-contract=off")
+#elif defined(_MSC_VER)
+#pragma fp_contract(off)
+#endif
+
 /* Hot loops are compiled for AVX2 too, where compiler and C library can choose at load time (clang names such clones
  * so that other files do not find them). Lanes are frames: the results are the same. With ThreadSanitizer the choice
  * would run before the sanitizer does, and crash. */

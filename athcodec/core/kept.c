@@ -21,7 +21,7 @@ const uint8_t *ath_kept_waves(const uint8_t *at, double *waves, size_t count)
     return at + count * sizeof *from;
 }
 
-static uint8_t *put(uint8_t *at, int32_t number)
+static uint8_t *put_kept(uint8_t *at, int32_t number)
 {
     uint32_t left = (uint32_t)number << 1 ^ (number < 0 ? 0xffffffffu : 0);
     for (; left > 127; left >>= 7) *at++ = (uint8_t)(left | 128);
@@ -40,16 +40,16 @@ const uint8_t *ath_kept_number(const uint8_t *at, int32_t *number)
 void ath_keep_number(kept_writer *to, int32_t number)
 {
     uint8_t *at = (uint8_t *)ath_kept_take(to, KEPT_NUMBER);
-    if (at) to->at = put(at, number);
+    if (at) to->at = put_kept(at, number);
 }
 
 void ath_keep_row(kept_writer *to, const int32_t *row, int32_t frames, int32_t count)
 {
     uint8_t *at = (uint8_t *)ath_kept_take(to, kept_row_most(count));
     if (!at) return;
-    at = put(at, count);
+    at = put_kept(at, count);
     for (int32_t axis = 0; axis < 3; axis++)
-        for (int32_t k = 0; k < count; k++) at = put(at, row[axis * frames + k]);
+        for (int32_t k = 0; k < count; k++) at = put_kept(at, row[axis * frames + k]);
     to->at = at;
 }
 

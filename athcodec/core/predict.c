@@ -12,7 +12,7 @@ struct ath_prediction {
 };
 
 /* The coder's place, and the arrays behind it. */
-static uint64_t carve(ath_prediction *p, int32_t vertex_count, uint8_t *base)
+static uint64_t carve_all(ath_prediction *p, int32_t vertex_count, uint8_t *base)
 {
     ath_arena arena = {base, 0};
     ath_take(&arena, sizeof *p);
@@ -22,7 +22,7 @@ static uint64_t carve(ath_prediction *p, int32_t vertex_count, uint8_t *base)
 uint64_t ath_prediction_size(int32_t vertex_count)
 {
     ath_prediction counted;
-    return carve(&counted, vertex_count, 0);
+    return carve_all(&counted, vertex_count, 0);
 }
 
 int ath_prediction_start(ath_prediction *p, const ath_plan *plan, const double *origin, int32_t frames, int is_float64,
@@ -30,7 +30,7 @@ int ath_prediction_start(ath_prediction *p, const ath_plan *plan, const double *
 {
     prediction *segment = &p->segment;
     ath_bytes body;
-    carve(p, plan->vertex_count, (uint8_t *)p);
+    carve_all(p, plan->vertex_count, (uint8_t *)p);
     if (ath_parse_predicted(chunk, &segment->head, &body) != ATH_OK) return ATH_BAD_CHUNK;
     start_prediction(segment, plan, origin, is_float64, positions);
     coder_start(&p->coder, body.bytes, body.size);

@@ -169,7 +169,7 @@ static void carve_end(ath_join *join, const ath_file *file, ath_arena *arena)
     join->positions = ath_take(arena, ATH_END_FRAMES * vertices * 3 * number_size(file));
 }
 
-static uint64_t carve(ath_work *work, const ath_file *file, int32_t frames, uint8_t *base)
+static uint64_t carve_work(ath_work *work, const ath_file *file, int32_t frames, uint8_t *base)
 {
     ath_arena arena = {base, 0};
     uint64_t row = 3 * (uint64_t)frames * sizeof(int32_t);
@@ -213,7 +213,7 @@ static uint64_t carve_segment(ath_segment *segment, const ath_file *file, int32_
 size_t ath_work_size(const ath_file *file)
 {
     ath_work counted;
-    return ath_size_or_most(carve(&counted, file, file->longest, 0));
+    return ath_size_or_most(carve_work(&counted, file, file->longest, 0));
 }
 
 size_t ath_segment_size(const ath_file *file, int32_t level)
@@ -461,7 +461,7 @@ static int begin(ath_work *work, const preparation *asked, int32_t index, int32_
     ath_join join = work->join;
     memset(work, 0, sizeof *work);
     memset(segment, 0, sizeof *segment);
-    carve(work, file, frames, (uint8_t *)work);
+    carve_work(work, file, frames, (uint8_t *)work);
     carve_segment(segment, file, level, frames, (uint8_t *)segment);
     segment->index = segment->level = -1;
     work->file = file;
