@@ -7,7 +7,7 @@ import { DynamicDrawUsage, Frustum, Group, InstancedBufferAttribute, InstancedBu
 
 import { dataTexture, eased, roundOf } from "./ATHMotion.js";
 import { clustered, gather } from "./geometry.js";
-import { injectMotion, motionUniforms } from "./shader.js";
+import { injectMotion, motionUniforms, shadowMaterials } from "./shader.js";
 
 const MOST_TEXELS = 4 << 20; // of one level: 64 MiB; longer clips are played at fewer frames a second
 const TALLEST = 4096;        // rows of a texture that every device has
@@ -98,7 +98,7 @@ export class ATHForest extends Group {
     const { channel, metadata } = this.#ath, known = await channel.parts(level);
     const step = Math.max(1, Math.ceil(clip.frameCount * known.texels / Math.min(MOST_TEXELS, 1024 * TALLEST)));
     const baked = await channel.bake(clip.index, level, step);
-    if (!baked.data || !this.#ath) {
+    if (!baked.data || baked.texels !== known.texels || !this.#ath) {
       this.#baking.delete(key);
       return;
     }
@@ -116,7 +116,7 @@ export class ATHForest extends Group {
     const { channel, motion, rest, sphere } = this.#ath, deepest = level === motion.levelCount - 1;
     const error = (of) => clip.errors[of][this.measure];
     const least = error(level), most = level > 0 ? error(level - 1) : sphere.radius / 4;
-    const node = channel.nodeNumbers(known), texel = channel.partOfVertices(known);
+    const node = channel.nodeNumbers(known), texel = known.vertices;
     node.forEach((_, vertex) => { if (texel[vertex] < 0) node[vertex] = -1; }); // exact runs: one space
     const material = injectMotion(this.#material(!this.#geometry.hasAttribute("normal"), level), played.uniforms, true);
     const place = (geometry, tolerance) => this.#addBin(clip, geometry, material, { ...played, texel, level, tolerance });
@@ -146,6 +146,7 @@ export class ATHForest extends Group {
     geometry.setAttribute("athPart", parts(played));
     if (played.from) geometry.setAttribute("athPartBefore", parts(played.from));
     const drawn = lines ? new LineSegments(geometry, material) : new Mesh(geometry, material);
+    Object.assign(drawn, shadowMaterials(played.uniforms, true));
     Object.assign(drawn.userData, { level: played.level, clip });
     drawn.frustumCulled = false; // instances are, one by one
     const bin = { ...played, drawn, size: source.length, filled: 0 };
@@ -293,7 +294,7 @@ export class ATHForest extends Group {
     for (const { uniforms, drawn } of this.#allBins()) {
       uniforms.athData.value.dispose();
       drawn.geometry.dispose();
-      drawn.material.dispose();
+      for (const material of [drawn.material, drawn.customDepthMaterial, drawn.customDistanceMaterial]) material.dispose();
     }
     this.#bins.clear();
     this.#ath = null;

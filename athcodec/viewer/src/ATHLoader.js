@@ -1,10 +1,10 @@
 // Loads .ath files for three.js: a Loader with the conventions of DRACOLoader and KTX2Loader. The decoder is in
 // ath_worker.js, beside this module.
 
-import { Group, LineBasicMaterial, LineSegments, Loader, Mesh, MeshStandardMaterial, EventDispatcher, DoubleSide,
-  LoaderUtils } from "three";
+import { Box3, Group, LineBasicMaterial, LineSegments, Loader, Mesh, MeshStandardMaterial, EventDispatcher, DoubleSide,
+  LoaderUtils, Vector3 } from "three";
 
-import { ATHMotion, eased, restBounds } from "./ATHMotion.js";
+import { ATHMotion, eased, failureOf, restBounds } from "./ATHMotion.js";
 import { addAttributes, lineGeometry, meshGeometry, polygonsOf } from "./geometry.js";
 
 const EASING_MS = 16; // between two steps of the rest pose
@@ -19,12 +19,22 @@ function numbersOf(mesh) {
   return Float32Array.from({ length: 3 * position.count }, (_, i) => position.getComponent(Math.floor(i / 3), i % 3));
 }
 
+// A copy of the bytes of a buffer or of a view of one, which may be shared.
+function bytesOf(data) {
+  if (ArrayBuffer.isView(data)) return new Uint8Array(data.buffer, data.byteOffset, data.byteLength).slice();
+  if (!/Buffer/.test(Object.prototype.toString.call(data))) throw new TypeError("buffer: got something else, expected an ArrayBuffer or a view of one");
+  return new Uint8Array(data).slice();
+}
+
+const aborted = () => failureOf({ message: "loading was aborted", codeName: "AbortError" });
+
 /** A file that is open in a worker: what the page knows of it, and the way there. */
 class Channel {
   views = new Map();
   state = { fetched: 0, requests: 0, ready: new Int8Array(1).fill(-1) };
   failure = null;
-  #asked = new Map(); // what is under way: key: resolve
+  known = new Map();  // level: {parts, texels, vertices, boxes}
+  #asked = new Map(); // what is under way: key: {promise, resolve, reject}
   #nextView = 1;
   #nextBake = 1;
   #toRest = null;     // {to, timer}: the finer rest pose, as long as the one that is shown goes to it
@@ -33,10 +43,18 @@ class Channel {
     this.id = ++files;
     this.worker = worker;
     this.release = release;
-    this.opened = new Promise((resolve, reject) => { this.settle = { resolve, reject }; });
-    this.opened.catch(() => {});
-    this.arrays = new Promise((resolve) => { this.settle.arrays = resolve; });
+    this.settle = {};
+    for (const name of ["opened", "whole", "arrays"]) {
+      this[name] = new Promise((resolve, reject) => { this.settle[name] = { resolve, reject }; });
+      this[name].catch(() => {}); // whoever waits gets the error
+    }
     worker.channels.set(this.id, this);
+  }
+
+  // What is not settled is not going to be.
+  #fail(error) {
+    for (const { reject } of [this.settle.opened, this.settle.whole, ...this.#asked.values()]) reject(error);
+    this.#asked.clear();
   }
 
   send(message, transfer = []) {
@@ -48,33 +66,61 @@ class Channel {
     if (type === "opened") {
       Object.assign(this, message, { type: undefined }, restBounds(message.rest));
       this.state.ready = new Int8Array(message.info.segmentCount).fill(-1);
-      this.settle.resolve(this);
+      this.settle.opened.resolve(this);
     } else if (type === "rest") {
       this.#easeRest(message.rest);
     } else if (type === "failed") {
-      this.settle.reject(Object.assign(new Error(message.message), { codeName: message.codeName }));
+      const error = failureOf(message);
+      this.#fail(error);
+      for (const view of this.views.values()) view.fail(error);
+      this.#failed({ ...message, type: "stopped" });
     } else if (type === "attributes") {
-      this.settle.arrays(message.attributes);
+      this.settle.arrays.resolve(message.attributes);
     } else if (type === "state") {
       this.#changed(message);
     } else if (type === "picture") {
       this.views.get(message.view)?.picture(message);
     } else if (type === "parts") {
-      this.#asked.get(`parts ${message.level}`)(message);
+      this.#learn(message);
     } else if (type === "decoded") {
       for (const view of this.views.values()) view.refresh();
     } else if (type === "baked") {
-      this.#asked.get(`bake ${message.id}`)(message);
+      this.#answer(`bake ${message.id}`, message);
     } else {
-      this.failure = { type, level: message.level ?? null, message: message.message, codeName: message.codeName };
-      this.#tell(this.failure); // "stopped", "damaged"
+      if (type === "stopped") this.settle.whole.reject(failureOf(message));
+      this.#failed(message);
     }
+  }
+
+  #failed({ type, level = null, message, codeName }) {
+    this.failure = { type, level, message, codeName };
+    this.#tell(this.failure); // "stopped", "damaged"
+  }
+
+  // vertices: athPart of every vertex, in source order.
+  #learn({ level, parts, texels }) {
+    const known = { parts, texels, vertices: this.#partOfVertices(parts, texels), boxes: this.#boxes(parts) };
+    this.known.set(level, known);
+    this.#answer(`parts ${level}`, known);
+  }
+
+  // Of every node where its matrix is in a texture, and the middle and half the size of the box of what it moves.
+  #boxes({ branch, first, count, index }) {
+    const { rest, vertexSource } = this, point = new Vector3(), box = new Box3(), half = new Vector3(), found = [];
+    for (let part = 0; part < branch.length; part++) {
+      if (branch[part] < 0) continue;
+      box.makeEmpty();
+      for (let i = first[part]; i < first[part] + count[part]; i++) box.expandByPoint(point.fromArray(rest, 3 * vertexSource[i]));
+      found.push([12 * index[part], ...box.getCenter(point), ...box.getSize(half).multiplyScalar(0.5)]);
+    }
+    return found;
   }
 
   #changed(message) {
     const ready = message.ready.some((level, segment) => level !== this.state.ready[segment]);
     this.state = message;
     this.#tell({ type: "progress", loaded: message.fetched, total: message.total });
+    if (message.whole) this.settle.whole.resolve();
     if (!ready) return;
     this.#tell({ type: "ready" });
     for (const view of this.views.values()) view.refresh();
@@ -112,6 +158,7 @@ class Channel {
     const { box, sphere } = restBounds(rest);
     this.box.copy(box);
     this.sphere.copy(sphere);
+    for (const known of this.known.values()) known.boxes = this.#boxes(known.parts);
     for (const view of this.views.values()) view.setRest();
   }
 
@@ -119,8 +166,9 @@ class Channel {
     for (const view of this.views.values()) view.dispatchEvent({ ...event });
   }
 
-  parts(level) {
-    return this.#ask(`parts ${level}`, { type: "parts", level });
+  /** How a level cuts the plant. */
+  async parts(level) {
+    return this.known.get(level) ?? this.#ask(`parts ${level}`, { type: "parts", level });
   }
 
   bake(clip, level, step) {
@@ -128,20 +176,35 @@ class Channel {
     return this.#ask(`bake ${id}`, { type: "bake", id, clip, level, step });
   }
 
-  #waiting = new Map();
-
   #ask(key, message) {
-    if (!this.#waiting.has(key)) {
-      this.#waiting.set(key, new Promise((resolve) => { this.#asked.set(key, resolve); }));
+    if (!this.#asked.has(key)) {
+      const asked = {};
+      asked.promise = new Promise((resolve, reject) => { Object.assign(asked, { resolve, reject }); });
+      this.#asked.set(key, asked);
       this.send(message);
     }
-    return this.#waiting.get(key);
+    return this.#asked.get(key).promise;
   }
 
-  /** athPart of every vertex, in source order. */
-  partOfVertices({ parts, texels }) {
-    const { nodeCount, exactCount, branch, first, count, index } = parts, out = new Float32Array(this.info.vertexCount);
-    const stride = exactCount > 0 ? (texels - 3 * nodeCount) / exactCount : 1;
+  #answer(key, message) {
+    this.#asked.get(key)?.resolve(message);
+    this.#asked.delete(key);
+  }
+
+  /** Has all bytes fetched; resolves when they are here. */
+  fetchAll() {
+    this.send({ type: "all" });
+    return this.whole;
+  }
+
+  abort() {
+    this.settle.opened.reject(aborted());
+    this.settle.whole.reject(aborted());
+    this.send({ type: "abort" });
+  }
+
+  #partOfVertices({ nodeCount, exactCount, branch, first, count, index }, texels) {
+    const out = new Float32Array(this.info.vertexCount), stride = exactCount > 0 ? (texels - 3 * nodeCount) / exactCount : 1;
     for (let part = 0; part < branch.length; part++)
       for (let i = 0; i < count[part]; i++)
         out[this.vertexSource[first[part] + i]] = branch[part] >= 0 ? 1 + 3 * index[part]
@@ -170,14 +233,15 @@ class Channel {
   }
 
   dropView(id) {
-    this.views.delete(id);
-    this.send({ type: "drop", view: id });
+    if (this.views.delete(id)) this.send({ type: "drop", view: id });
   }
 
   close() {
+    if (!this.worker.channels.delete(this.id)) return;
     clearInterval(this.#toRest?.timer);
     this.send({ type: "close" });
-    this.worker.channels.delete(this.id);
+    for (const view of [...this.views.values()]) view.dispose();
+    this.#fail(aborted());
     this.release();
   }
 }
@@ -190,6 +254,7 @@ export class ATH extends EventDispatcher {
   #geometry = null;
   #lines = null;
   #object = null;
+  #loaded = null;
 
   constructor(channel, mode) {
     super();
@@ -198,6 +263,16 @@ export class ATH extends EventDispatcher {
     this.metadata = channel.statics.metadata;
     this.#faces = polygonsOf(channel.statics, {});
     this.arrays = channel.arrays.then((attributes) => this.#addArrays(attributes));
+  }
+
+  /** Resolves when all bytes of the file are here, which are fetched once it is asked for. */
+  get loaded() {
+    return this.#loaded ??= this.#channel.fetchAll().then(() => this);
+  }
+
+  /** Ends the downloads; what is here goes on playing. */
+  abort() {
+    this.#channel.abort();
   }
 
   get hasFaces() {
@@ -238,12 +313,12 @@ export class ATH extends EventDispatcher {
       old.material.dispose();
     }
     if (!geometry) {
-      this.#object.add(new LineSegments(this.lines, motion.bind(new LineBasicMaterial({ color: 0x6b5b45 }))));
+      this.#object.add(motion.bindShadows(new LineSegments(this.lines, motion.bind(new LineBasicMaterial({ color: 0x6b5b45 })))));
       return;
     }
     const vertexColors = geometry.hasAttribute("color"), color = vertexColors ? 0xffffff : 0x8a9a6b;
     const material = new MeshStandardMaterial({ color, vertexColors, roughness: 0.8, side: DoubleSide });
-    this.#object.add(new Mesh(geometry, motion.bind(material)));
+    this.#object.add(motion.bindShadows(new Mesh(geometry, motion.bind(material))));
   }
 
   /** Edges (u, v) in any case, the file's or those that follow from the branches. */
@@ -289,7 +364,6 @@ export class ATH extends EventDispatcher {
   }
 
   dispose() {
-    this.motion.dispose();
     for (const geometry of [this.#geometry, this.#lines]) geometry?.dispose();
     for (const drawn of this.#object?.children ?? []) drawn.material.dispose();
     this.#channel.close();
@@ -361,39 +435,52 @@ export class ATHLoader extends Loader {
       });
   }
 
-  /** The same of bytes that are here: an ArrayBuffer, which the worker gets a copy of. */
+  /** The same of bytes that are here: a buffer or a view of one, of which the worker gets a copy. */
   parse(buffer, onLoad, onError = (error) => console.error(error)) {
-    const bytes = buffer.slice(0);
-    this.#open({ bytes }, [bytes]).then(onLoad, onError);
+    this.parseAsync(buffer).then(onLoad, onError);
   }
 
-  parseAsync(buffer) {
-    return new Promise((resolve, reject) => this.parse(buffer, resolve, reject));
+  async parseAsync(buffer) {
+    const { buffer: bytes } = bytesOf(buffer);
+    return this.#open({ bytes }, [bytes]);
+  }
+
+  /** Ends all downloads: what is not shown yet fails, all else goes on playing what is here. */
+  abort() {
+    for (const { channels } of this.workerPool) for (const channel of [...channels.values()]) channel.abort();
+    return this;
   }
 
   async #open(message, transfer, onProgress) {
-    const worker = this.#worker();
-    const channel = new Channel(worker, () => { worker.files--; });
+    const worker = this.#worker(), signal = this.manager.abortController?.signal, abort = () => channel.abort();
+    const channel = new Channel(worker, () => {
+      worker.files--;
+      signal?.removeEventListener("abort", abort);
+    });
+    signal?.addEventListener("abort", abort);
     worker.files++;
-    channel.send({ type: "open", clip: this.clip, hostMesh: this.hostMesh, ...message }, transfer);
     try {
+      channel.send({ type: "open", clip: this.clip, hostMesh: this.hostMesh, ...message }, transfer);
       await channel.opened;
+      const ath = new ATH(channel, this.mode);
+      if (onProgress) ath.motion.addEventListener("progress", ({ loaded, total }) => onProgress({ loaded, total, lengthComputable: true }));
+      await this.#firstPicture(ath.motion);
+      return ath;
     } catch (error) {
       channel.close();
       throw error;
     }
-    const ath = new ATH(channel, this.mode), { motion } = ath;
-    if (onProgress) motion.addEventListener("progress", ({ loaded, total }) => onProgress({ loaded, total, lengthComputable: true }));
-    await new Promise((resolve, reject) => {
-      const failed = ({ level = 0, message: text, codeName }) => {
-        if (level === 0) reject(Object.assign(new Error(text), { codeName }));
-      };
+  }
+
+  // Where something is wrong, what is here may do for one.
+  #firstPicture(motion) {
+    return new Promise((resolve, reject) => {
+      const failed = (event) => { if (motion.level < 0) motion.show(0, 0).catch(() => reject(failureOf(event))); };
       motion.addEventListener("frame", resolve);
       motion.addEventListener("stopped", failed);
       motion.addEventListener("damaged", failed);
       motion.setTime(0);
     });
-    return ath;
   }
 
   // The worker with the fewest files; a new one as long as there may be more.

@@ -1,12 +1,11 @@
 // The motion of one loaded plant: what time and level it shows, what of it is here, and how it gets into a material.
 // Decoding is the worker's; this holds the textures that the vertex shaders read.
 
-import { Box3, BufferAttribute, DataTexture, EventDispatcher, FloatType, InstancedBufferAttribute,
-  MathUtils, NearestFilter, RGBAFormat, Sphere,
+import { Box3, BufferAttribute, DataTexture, EventDispatcher, FloatType, InstancedBufferAttribute, MathUtils, NearestFilter, RGBAFormat, Sphere,
   Vector3 } from "three";
 
-import { setRest } from "./geometry.js";
-import { injectMotion, motionUniforms } from "./shader.js";
+import { Followed, setRest } from "./geometry.js";
+import { injectMotion, motionUniforms, shadowMaterials } from "./shader.js";
 
 const WIDTH = 1024; // as in session.js
 const centre = new Vector3(), scale = new Vector3();
@@ -23,6 +22,12 @@ export function roundOf({ duration, frameCount }) {
   return frameCount > 1 ? duration * frameCount / (frameCount - 1) : 0;
 }
 
+const CLOSED = { message: "ath: got a request after dispose(), expected none", codeName: "CLOSED" };
+
+/** The error of a message of the worker. */
+export const failureOf = ({ message, codeName }) =>
+  Object.assign(new Error(message ?? "MISSING: bytes are still to come"), { codeName: codeName ?? "MISSING" });
+
 const FRAME_MS = 33; // between pictures of a fade that nobody asks for
 
 /** What is shown of the next where `passed` of a fade's time has: it begins and ends at rest. */
@@ -33,7 +38,7 @@ export function eased(passed) {
 const SHAPES = 0x13, REFINED_REST = 0x15; // chunks that serve all segments
 
 /** Events: "frame" (a new picture is shown), "level" (another level is), "clip" (another clip is), "progress" (bytes
- * came), "ready" (what can be shown changed), "stopped" and "damaged" (with `message`: what is here goes on playing). */
+ * came), "ready" (what can be shown changed), "stopped", "damaged" and "error" (with `message`: what is here goes on playing). */
 export class ATHMotion extends EventDispatcher {
   clip;               // that plays, one of `clips`
   time = 0;           // seconds, as asked for
@@ -57,8 +62,10 @@ export class ATHMotion extends EventDispatcher {
   #channel;
   #id;
   #geometries = new Set();
-  #parts = new Map();     // level: {parts, texels}
-  #perVertex = new Map(); // level: athPart in source order
+  #known = null;          // of the level that is shown: see Channel's `known`
+  #moved = null;          // all vertices of the picture that is shown, once somebody asks for them
+  #bounds = new Box3();   // of that picture
+  #shadows = null;
   #textures = new Map();
   #spare = null;
   #asked = null;          // what the worker was asked last, "" while it is at work
@@ -275,6 +282,7 @@ export class ATHMotion extends EventDispatcher {
   #exactly(seconds, message) {
     const id = this.#next++;
     return new Promise((resolve, reject) => {
+      if (!this.#channel.views.has(this.#id)) throw failureOf(CLOSED);
       this.#answers.set(id, { resolve, reject, aside: message.aside });
       this.#channel.send({ type: "picture", view: this.#id, id, exactly: true, ...this.#place(seconds), ...message });
     });
@@ -314,39 +322,39 @@ export class ATHMotion extends EventDispatcher {
     this.#ask();
   }
 
-  // A picture of the worker: data is a texture (see session.js) or, in mode "positions", all vertices.
-  async picture(message) {
-    const answer = this.#answers.get(message.id);
+  /** A picture of the worker: data is a texture (see session.js) or, in mode "positions", all vertices. */
+  picture(message) {
+    const answer = this.#answers.get(message.id), { shown, codeName } = message;
     this.#answers.delete(message.id);
     if (!answer) this.#pending = false;
-    if (message.shown < 0) {
-      answer?.reject(Object.assign(new Error(message.message), { codeName: message.codeName }));
-    } else if (answer?.aside) {
-      answer.resolve(message);
-    } else {
-      if (!this.#parts.has(message.shown)) await this.#learn(message.shown);
-      this.#take(message);
-      answer?.resolve(message);
-    }
+    if (shown < 0) answer?.reject(failureOf(message));
+    else if (!answer?.aside) this.#take(message);
+    if (shown >= 0) answer?.resolve(message);
+    if (!answer && message.message) this.dispatchEvent({ type: "error", message: message.message, codeName });
     if (!answer && this.#stale) this.#ask();
   }
 
-  async #learn(level) {
-    if (!this.#parts.has(level)) this.#parts.set(level, await this.#channel.parts(level));
+  /** A listener that throws keeps nothing else from being told or shown. */
+  dispatchEvent(event) {
+    try {
+      super.dispatchEvent(event);
+    } catch (error) {
+      queueMicrotask(() => { throw error; });
+    }
   }
 
   #take({ shown, frame, data, heat, ms, held, clip, exactly, fading }) {
-    const changed = shown !== this.level;
+    const changed = shown !== this.level, known = this.#channel.known.get(shown), cut = known !== this.#known;
     Object.assign(this, { frame, held, fading, milliseconds: ms, distances: heat ?? null, level: shown });
+    this.#known = known;
     if (shown > 0) this.#channel.endEasing();
     clearTimeout(this.#timer);
     if (fading) this.#timer = setTimeout(() => this.refresh(), FRAME_MS); // time may stand still
     if (this.mode === "positions") this.#write(data);
     else this.#upload(shown, data);
-    if (changed) {
-      for (const geometry of this.#geometries) this.#setParts(geometry);
-      this.dispatchEvent({ type: "level", level: shown });
-    }
+    this.#setBounds(data);
+    if (cut) for (const geometry of this.#geometries) this.#setParts(geometry);
+    if (changed) this.dispatchEvent({ type: "level", level: shown });
     if (this.switching === "waiting" && clip === this.clip.index) this.#begin(this.#old);
     if (exactly) this.#old = null;
     this.dispatchEvent({ type: "frame", frame, level: shown });
@@ -370,7 +378,7 @@ export class ATHMotion extends EventDispatcher {
       old?.dispose();
       this.#textures.set(level, dataTexture(data));
     }
-    const { texels, parts: { nodeCount, exactCount } } = this.#parts.get(level);
+    const { texels, parts: { nodeCount, exactCount } } = this.#known;
     this.uniforms.athData.value = this.#textures.get(level);
     this.uniforms.athStride.value = exactCount > 0 ? (texels - 3 * nodeCount) / exactCount : 1;
   }
@@ -385,15 +393,47 @@ export class ATHMotion extends EventDispatcher {
     }
   }
 
-  /** What the shader makes of the texture that it reads now: 3 numbers per vertex, in source order. */
+  // The box of the picture: of the exact vertices, and of what nodes make of the boxes of their parts.
+  #setBounds(data) {
+    const { min, max } = this.#bounds.makeEmpty(), { boxes } = this.#known, low = [...min], high = [...max];
+    const add = (k, a, b) => {
+      if (a < low[k]) low[k] = a;
+      if (b > high[k]) high[k] = b;
+    };
+    const points = (from, to, step) => { for (let at = from; at < to; at += step) for (let k = 0; k < 3; k++) add(k, data[at + k], data[at + k]); };
+    if (this.mode === "positions") points(0, data.length, 3);
+    else {
+      const { parts: { nodeCount, exactCount } } = this.#known, stride = 4 * this.uniforms.athStride.value;
+      points(12 * nodeCount, 12 * nodeCount + stride * exactCount, stride);
+      for (const [at, x, y, z, u, v, w] of boxes) // of a box the middle and half its size
+        for (let k = 0; k < 3; k++) {
+          const [a, b, c, d] = data.subarray(at + 4 * k, at + 4 * k + 4), middle = a * x + b * y + c * z + d;
+          const half = Math.abs(a) * u + Math.abs(b) * v + Math.abs(c) * w;
+          add(k, middle - half, middle + half);
+        }
+    }
+    min.fromArray(low);
+    max.fromArray(high);
+    this.#moved = this.mode === "positions" ? data : null;
+    for (const geometry of this.#geometries) this.#setBox(geometry);
+  }
+
+  #setBox(geometry) {
+    geometry.boundingBox = (geometry.boundingBox ?? new Box3()).copy(this.#bounds);
+    geometry.boundingSphere = this.#bounds.getBoundingSphere(geometry.boundingSphere ?? new Sphere());
+  }
+
+  /** The vertices of the picture that is shown, 3 numbers each, in source order: what the shader makes of the texture; null
+   * where none is shown yet. */
   uploaded() {
-    const data = this.uniforms.athData.value.image.data, { rest } = this.#channel, out = new Float32Array(rest.length);
-    this.#partOfVertices(this.level).forEach((part, vertex) => {
-      const at = 4 * (Math.abs(part) - 1), [x, y, z] = rest.subarray(3 * vertex, 3 * vertex + 3);
-      for (let k = 0; k < 3; k++)
-        out[3 * vertex + k] = part < 0 ? data[at + k]
-          : data[at + 4 * k] * x + data[at + 4 * k + 1] * y + data[at + 4 * k + 2] * z + data[at + 4 * k + 3];
-    });
+    if (this.#moved || this.level < 0) return this.#moved;
+    const { data } = this.uniforms.athData.value.image, { rest } = this.#channel, { vertices } = this.#known;
+    const out = this.#moved = new Float32Array(rest.length);
+    for (let vertex = 0, i = 0; vertex < vertices.length; vertex++) {
+      const part = vertices[vertex], x = rest[i], y = rest[i + 1], z = rest[i + 2];
+      for (let at = 4 * (Math.abs(part) - 1), k = 0; k < 3; k++, i++, at += part < 0 ? 1 : 4)
+        out[i] = part < 0 ? data[at] : data[at] * x + data[at + 1] * y + data[at + 2] * z + data[at + 3];
+    }
     return out;
   }
 
@@ -404,20 +444,30 @@ export class ATHMotion extends EventDispatcher {
     return this.mode === "positions" ? material : injectMotion(material, this.uniforms);
   }
 
-  /** Keeps a geometry made by the loader (`userData.source`) in step with what is shown. */
+  /** Lets shadows of an object move as it does. */
+  bindShadows(object) {
+    if (this.mode !== "positions") Object.assign(object, this.#shadows ??= shadowMaterials(this.uniforms));
+    return object;
+  }
+
+  /** Keeps a geometry made by the loader (`userData.source`) in step with what is shown: its vertices, and what boxes and rays
+   * find of them. */
   attach(geometry) {
-    geometry.boundingSphere = this.#channel.sphere.clone();
+    const { source, other } = geometry.userData, position = geometry.getAttribute("position");
+    if (this.mode !== "positions" && !other)
+      geometry.setAttribute("position", new Followed(position.array, 3).follow(source, () => this.uploaded()));
+    if (this.level < 0) this.#bounds.copy(this.#channel.box);
     this.#geometries.add(geometry);
+    this.#setBox(geometry);
     this.#setParts(geometry);
     return geometry;
   }
 
   /** Puts the rest pose into the geometries again. */
   setRest() {
-    for (const geometry of this.#geometries) {
-      geometry.boundingSphere.copy(this.#channel.sphere);
-      if (this.mode !== "positions") setRest(geometry, this.#channel.rest);
-    }
+    if (this.mode === "positions") return;
+    for (const geometry of this.#geometries) setRest(geometry, this.#channel.rest);
+    if (this.level >= 0) this.#setBounds(this.uniforms.athData.value.image.data);
   }
 
   detach(geometry) {
@@ -433,22 +483,15 @@ export class ATHMotion extends EventDispatcher {
 
   #setPart(geometry, name, source) {
     const there = geometry.getAttribute(name), array = there?.array ?? new Float32Array(source.length);
-    const parts = this.level >= 0 ? this.#partOfVertices(this.level) : null;
+    const parts = this.#known?.vertices;
     if (parts) for (let i = 0; i < source.length; i++) array[i] = parts[source[i]];
     if (there) there.needsUpdate = true;
     else geometry.setAttribute(name, new (geometry.isInstancedBufferGeometry ? InstancedBufferAttribute : BufferAttribute)(array, 1));
   }
 
-  // athPart of every vertex in source order: 1 + first texel of its node's matrix, or minus that of its position.
-  #partOfVertices(level) {
-    if (!this.#perVertex.has(level)) this.#perVertex.set(level, this.#channel.partOfVertices(this.#parts.get(level)));
-    return this.#perVertex.get(level);
-  }
-
   /** Per vertex in source order, the branch (file order) whose node moves it at a level; its own where it moves alone. */
   async nodeNumbers(level = this.level) {
-    await this.#learn(level);
-    return this.#channel.nodeNumbers(this.#parts.get(level));
+    return this.#channel.nodeNumbers(await this.#channel.parts(level));
   }
 
   /** A second view of the same file, with a clip, a time and a level of its own. */
@@ -459,8 +502,16 @@ export class ATHMotion extends EventDispatcher {
   dispose() {
     clearTimeout(this.#timer);
     for (const texture of this.#textures.values()) texture.dispose();
+    for (const material of Object.values(this.#shadows ?? {})) material.dispose();
     this.#textures.clear();
     this.#channel.dropView(this.#id);
+    this.fail(failureOf(CLOSED));
+  }
+
+  /** No more answers come. */
+  fail(error) {
+    for (const { reject } of this.#answers.values()) reject(error);
+    this.#answers.clear();
   }
 }
 

@@ -15,16 +15,25 @@ function open({ file, url, options, bytes, clip, hostMesh }) {
   ready.then(() => session.run(), (error) => post({ type: "failed", ...describe(error) }));
 }
 
-self.onmessage = ({ data }) => {
+function take(data) {
   const session = sessions.get(data.file);
   if (data.type === "open") open(data);
   else if (data.type === "picture") session?.picture(data);
   else if (data.type === "drop") session?.drop(data.view);
-  else if (data.type === "parts") self.postMessage({ type: "parts", file: data.file, level: data.level,
-    parts: session.parts(data.level), texels: session.texels(data.level) });
+  else if (data.type === "parts") session?.tell(data.level);
   else if (data.type === "bake") session?.bake(data);
+  else if (data.type === "all") session?.fetchAll();
+  else if (data.type === "abort") session?.abort();
   else if (data.type === "close") {
     session?.close();
     sessions.delete(data.file);
+  }
+}
+
+self.onmessage = ({ data }) => {
+  try {
+    take(data);
+  } catch (error) {
+    self.postMessage({ type: "failed", file: data.file, ...describe(error) });
   }
 };

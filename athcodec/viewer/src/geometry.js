@@ -44,6 +44,37 @@ export function setRest(geometry, rest) {
   }
 }
 
+/** Positions of which the vertex shader is given those of the rest pose, and whoever reads them one by one, as rays and boxes
+ * do, those that are shown. */
+export class Followed extends BufferAttribute {
+  #source;
+  #moved = () => null;
+
+  /** source: the file's vertex of each; moved(): all of these where they are shown, null before. */
+  follow(source, moved) {
+    this.#source = source;
+    this.#moved = moved;
+    return this;
+  }
+
+  getComponent(index, k) {
+    const moved = this.#moved();
+    return moved ? moved[3 * this.#source[index] + k] : super.getComponent(index, k);
+  }
+
+  getX(index) {
+    return this.getComponent(index, 0);
+  }
+
+  getY(index) {
+    return this.getComponent(index, 1);
+  }
+
+  getZ(index) {
+    return this.getComponent(index, 2);
+  }
+}
+
 function withPositions(rest, source) {
   const geometry = new BufferGeometry(), position = new Float32Array(3 * source.length);
   gather(position, rest, source, 3);

@@ -30,11 +30,16 @@ export class Session {
   #prepared = new Map();  // "segment/level": Segment, those used last at the end
   #underway = [];         // ranges that are being fetched
   #parts = new Map();
+  #told = new Set();      // levels whose parts the page knows
   #attributes = "missing"; // "here"
   #speed = 0;             // bytes a second
   #busy = false;
   #goingOnFrom = null;    // the segment that the preparation under way reads
-  #failed = new Set();    // damaged chunks, "segment/level"
+  #failed = new Set();    // "segment/level" that need a damaged chunk
+  #everything = false;    // whether all bytes are wanted, whatever the views show
+  #whole = false;         // whether they are here
+  #stopped = false;       // no more bytes come
+  #ended = false;         // the page knows that the file is too short
   #wake = null;
   #stateAt = 0;
   #stateTimer = 0;
@@ -75,7 +80,7 @@ export class Session {
       await reading; // without ranges: the whole file
       this.#readAttributes();
     } catch (error) {
-      if (!this.#closed) this.post({ type: "stopped", ...describe(error) });
+      this.#stop(error);
       return;
     }
     await Promise.all(Array.from({ length: LANES }, () => this.#lane()));
@@ -169,9 +174,10 @@ export class Session {
   // ---- fetching ----
 
   async #lane() {
-    while (!this.#closed) {
+    while (!this.#closed && !this.#stopped) {
       const range = this.#next();
       if (!range) {
+        this.#tellOfEnd();
         await new Promise((wake) => { const before = this.#wake; this.#wake = () => { before?.(); wake(); }; });
         continue;
       }
@@ -184,8 +190,7 @@ export class Session {
           this.#take(bytes, offset);
         });
       } catch (error) {
-        if (this.#closed) return;
-        this.post({ type: "stopped", ...describe(error) });
+        this.#stop(error);
         return;
       } finally {
         this.#underway.splice(this.#underway.indexOf(range), 1);
@@ -195,6 +200,34 @@ export class Session {
       this.#readAttributes();
       this.#changed(true);
     }
+  }
+
+  #stop(error) {
+    if (this.#closed || this.#stopped) return;
+    this.#stopped = true;
+    this.#wakeUp();
+    this.post({ type: "stopped", ...describe(error) });
+  }
+
+  // Where the file ends before what is wanted of it.
+  #tellOfEnd() {
+    const { total } = this.source, { fileLength } = this.#file.info;
+    if (this.#ended || total === null || total >= fileLength || this.#underway.length > 0 || this.#wanted().next().done) return;
+    this.#ended = true;
+    this.post({ type: "stopped", message: `MISSING: got a file of ${total} bytes, expected ${fileLength}`, codeName: "MISSING" });
+  }
+
+  /** Has all bytes fetched, behind those that the views want. */
+  fetchAll() {
+    this.#everything = true;
+    this.#wakeUp();
+  }
+
+  /** Ends the downloads; what is here goes on playing. */
+  abort() {
+    const error = new DOMException("loading was aborted", "AbortError");
+    this.source.abort(error);
+    if (this.#opened) this.#stop(error);
   }
 
   // The next bytes to ask for: one range; null: none for now.
@@ -228,6 +261,8 @@ export class Session {
     if (this.#attributes === "missing") yield* attributeRanges(this.#file);
     for (const { soon, level } of wishes) yield* this.#missing(soon, 2, level);
     for (const { late, level } of wishes) yield* this.#missing(late, 0, level);
+    if (this.#everything && !this.#whole)
+      yield* this.#file.chunks().filter(({ fed }) => !fed).map(({ offset, length }) => ({ offset, size: length }));
   }
 
   // Of every clip that a view plays, the deepest level and the segments from the playhead on: {level, soon, late}. What
@@ -266,6 +301,7 @@ export class Session {
       if (attributes.face_vertex_counts && attributes.face_vertex_indices) {
         this.#faces = { counts: attributes.face_vertex_counts.array, array: attributes.face_vertex_indices.array };
         this.#restNormals = null;
+        this.#told.clear(); // texels of a level
       }
       this.post({ type: "attributes", attributes });
     } catch (error) {
@@ -302,18 +338,18 @@ export class Session {
     this.#stateAt = performance.now();
     if (this.#closed) return;
     const { segmentCount, fileLength } = this.#file.info;
+    this.#whole ||= this.#file.chunks().every(({ fed }) => fed);
     this.post({
       type: "state", fetched: this.source.fetched, requests: this.source.requests, ranged: this.source.ranged,
-      total: fileLength, there: this.source.total, speed: this.#speed,
+      total: fileLength, whole: this.#whole, speed: this.#speed,
       ready: Int8Array.from({ length: segmentCount }, (_, segment) => this.#readyLevel(segment)),
     });
   }
 
-  // The deepest level that a segment can be shown at: its bytes are here and are not damaged.
-  #readyLevel(segment) {
-    let level = this.#file.readyLevel(segment);
-    for (let damaged = 0; damaged <= level; damaged++)
-      if (this.#failed.has(`${segment}/${damaged}`)) level = damaged - 1;
+  // The deepest level up to `most` that a segment can be shown at: its bytes are here and are not damaged; -1: none.
+  #readyLevel(segment, most = Infinity) {
+    let level = Math.min(most, this.#file.readyLevel(segment));
+    while (level >= 0 && this.#failed.has(`${segment}/${level}`)) level--;
     return level;
   }
 
@@ -337,22 +373,30 @@ export class Session {
   async #decode() {
     if (this.#busy) return;
     this.#busy = true;
-    for (let job = this.#job(); job && !this.#closed; job = this.#job()) await this.#prepareInSteps(...job);
-    this.#busy = false;
+    try {
+      for (let job = this.#job(); job && !this.#closed; job = this.#job()) await this.#prepareInSteps(...job);
+    } finally {
+      this.#busy = false;
+    }
   }
 
-  // The next segment and level to decode: what the views show, then what they show next.
   #job() {
-    const shown = [...this.#views.values()].flatMap(({ level, frames }) => frames.map((frame) => ({ level, frame })));
-    for (const next of [0, 1]) {
-      for (const { level, frame } of shown) {
-        const { firstSegment, segmentCount } = this.#clipAt(frame);
-        const segment = firstSegment + (this.#segmentAt(frame) - firstSegment + next) % segmentCount;
-        const best = Math.min(level, this.#readyLevel(segment));
-        if (best >= 0 && !this.#prepared.has(`${segment}/${best}`)) return [segment, best];
-      }
-    }
+    for (const [segment, level] of this.#jobs()) if (level >= 0 && !this.#prepared.has(`${segment}/${level}`)) return [segment, level];
     return null;
+  }
+
+  // Segments and levels to decode: what the views show, then what that blends into and what they show next.
+  * #jobs() {
+    const shown = [...this.#views.values()].flatMap(({ level, frames }) => frames.map((frame) => {
+      const [own, other] = this.#around(frame);
+      return { clip: this.#clipAt(frame), most: level, own, other, level: this.#readyLevel(own, level) };
+    }));
+    for (const { own, level } of shown) yield [own, level];
+    for (const { other = -1, level } of shown) if (other >= 0 && this.#readyLevel(other, level) === level) yield [other, level];
+    for (const { clip: { firstSegment, segmentCount }, own, most } of shown) {
+      const next = firstSegment + (own - firstSegment + 1) % segmentCount;
+      yield [next, this.#readyLevel(next, most)];
+    }
   }
 
   async #prepareInSteps(segment, level) {
@@ -387,10 +431,14 @@ export class Session {
     return { from, keep: true, following };
   }
 
+  // Leaves out what needs the chunk that is damaged, in all segments.
   #damaged(segment, level, error) {
-    const chunk = error.chunk >= 0 ? this.#file.chunks()[error.chunk] : null;
-    const known = this.#failed.size, bad = chunk && chunk.level < 255 ? Math.min(level, chunk.level) : level;
-    this.#failed.add(`${segment}/${bad}`);
+    const file = this.#file, { levelCount, segmentCount } = file.info, chunk = file.chunks()[error.chunk];
+    const known = this.#failed.size, bad = chunk?.level < levelCount ? Math.min(level, chunk.level) : level;
+    this.#failed.add(`${segment}/${level}`);
+    for (let s = 0; chunk && s < segmentCount; s++)
+      for (let l = bad; l < levelCount; l++)
+        if (file.ranges(l, s, s, true).some(({ offset, size }) => offset <= chunk.offset && chunk.offset < offset + size)) this.#failed.add(`${s}/${l}`);
     if (this.#failed.size > known) this.post({ type: "damaged", segment, level: bad, ...describe(error) });
     this.#state(true);
   }
@@ -403,9 +451,10 @@ export class Session {
     this.#prepared.set(key, segment);
     const { frameCount, segmentCount, vertexCount } = this.#file.info;
     const most = Math.max(6, Math.floor(MOST_PREPARED / (16 * vertexCount * (frameCount / segmentCount))));
+    const wanted = new Set(Array.from(this.#jobs(), (job) => job.join("/")));
     for (const [oldest, old] of this.#prepared) {
       if (this.#prepared.size <= most) break;
-      if (old === this.#goingOnFrom) continue;
+      if (old === this.#goingOnFrom || old === segment || wanted.has(oldest)) continue;
       old.free();
       this.#prepared.delete(oldest);
     }
@@ -427,13 +476,17 @@ export class Session {
   }
 
   // What shows `frame`, {frame, level, segments}: at the deepest level that is decoded or, where nothing is, at the
-  // coarsest.
+  // coarsest; where its own segment is not to be had, the frame that it blends into.
   #show(frame, level) {
-    for (let shown = level; shown >= 0; shown--) {
-      const found = this.#decoded(frame, shown);
+    for (const blended of [false, true]) {
+      for (let shown = level; shown >= 0; shown--) {
+        const found = this.#decoded(frame, shown, blended);
+        if (found) return found;
+      }
+      const found = blended ? null : this.#coarser(frame, 0);
       if (found) return found;
     }
-    return this.#coarser(frame, 0);
+    return null;
   }
 
   // The same but that of two levels that are decoded a coarser one waits for the one that is asked for.
@@ -441,10 +494,10 @@ export class Session {
     return (now > level && !this.#isDecoded(frame, level) && this.#decoded(frame, now)) || this.#show(frame, level);
   }
 
-  // At this level and no other, if that is decoded; else null.
-  #decoded(frame, level) {
+  // At this level and no other, if that is decoded; else null. blended: the frame that it blends into will do.
+  #decoded(frame, level, blended = false) {
     const segments = this.#around(frame).map((index) => this.#segment(index, level));
-    return segments[0] ? { frame, level, segments } : null;
+    return segments[0] || (blended && segments[1]) ? { frame, level, segments } : null;
   }
 
   // At this level and no other, decoded now. Throws where that cannot be.
@@ -485,7 +538,7 @@ export class Session {
 
   #isDecoded(frame, level) {
     const index = this.#segmentAt(frame);
-    return this.#prepared.has(`${index}/${Math.min(level, this.#readyLevel(index))}`);
+    return this.#prepared.has(`${index}/${this.#readyLevel(index, level)}`);
   }
 
   // ---- pictures ----
@@ -495,24 +548,42 @@ export class Session {
     return this.#parts.get(level);
   }
 
-  /** The picture of a view: see ATHMotion's #picture. */
-  picture({ view, id, clip, seconds, wrap, level, old = null, exactly = false, aside = false, heat = false,
-    positions = false, buffer = null, now = 0, fade = 0, coarsely = false }) {
-    if (!this.#opened) return;
-    const start = performance.now(), frame = this.#file.frameAt(seconds, wrap, clip);
-    const fading = aside ? new Fading() : this.#fading(view);
-    const answer = { type: "picture", view, id, shown: -1, frame, exactly };
+  /** Tells of the parts of a level, where the page does not know them. */
+  tell(level) {
+    if (this.#told.has(level)) return;
+    this.#told.add(level);
+    this.post({ type: "parts", level, parts: this.parts(level), texels: this.texels(level) });
+  }
+
+  /** The picture of a view: see ATHMotion's #ask. Whatever goes wrong, there is an answer; where a picture cannot be made as it
+   * is asked for, it is made without what fades. */
+  picture(message) {
+    const { view, id, clip, seconds, level, exactly = false } = message, start = performance.now();
+    const answer = { type: "picture", view, id, shown: -1, exactly };
     try {
-      const shown = exactly ? this.#exactly(frame, level) : this.#viewed({ view, frame, level, old, fading, coarsely });
-      if (shown) {
-        fading.to(shown.level, now, exactly ? 0 : fade);
-        Object.assign(answer, this.#picture(shown, fading, positions, buffer), heat ? { heat: this.#distances(shown) } : {});
-      }
+      Object.assign(answer, this.#answer(message));
     } catch (error) {
-      Object.assign(answer, { shown: -1, ...describe(error) });
+      const { message: why, codeName } = describe(error);
+      Object.assign(answer, { message: exactly ? why : `picture of clip ${clip} at ${seconds} s, level ${level}: ${why}`, codeName });
+      if (!exactly) this.drop(view);
+      try {
+        if (!exactly) Object.assign(answer, this.#answer({ ...message, old: null, heat: false, buffer: null }));
+      } catch {
+        // it is said already
+      }
     }
+    if (answer.shown >= 0) this.tell(answer.shown);
     answer.ms = performance.now() - start;
     this.post(answer, [answer.data, answer.heat].filter(Boolean).map((array) => array.buffer));
+  }
+
+  #answer({ view, clip, seconds, wrap, level, old = null, exactly = false, aside = false, heat = false, positions = false,
+    buffer = null, now = 0, fade = 0, coarsely = false }) {
+    const frame = this.#file.frameAt(seconds, wrap, clip), fading = aside ? new Fading() : this.#fading(view);
+    const shown = exactly ? this.#exactly(frame, level) : this.#viewed({ view, frame, level, old, fading, coarsely });
+    if (!shown) return { frame };
+    fading.to(shown.level, now, exactly ? 0 : fade);
+    return { ...this.#picture(shown, fading, positions, buffer), ...(heat ? { heat: this.#distances(shown) } : {}) };
   }
 
   // What the answer says of it.
@@ -631,9 +702,9 @@ export class Session {
 
   /** All frames of a clip at a level, every `step`-th of them, one behind the other: what a forest plays. */
   async bake({ id, clip, level, step }) {
-    const { firstFrame, frameCount } = this.#file.clips[clip], texels = this.texels(level);
-    const rows = Math.ceil(frameCount / step), data = new Float32Array(4 * WIDTH * Math.ceil((rows * texels) / WIDTH));
     try {
+      const { firstFrame, frameCount } = this.#file.clips[clip], texels = this.texels(level);
+      const rows = Math.ceil(frameCount / step), data = new Float32Array(4 * WIDTH * Math.ceil((rows * texels) / WIDTH));
       for (let row = 0; row < rows; row++) {
         this.#fill(data, 4 * row * texels, this.#exactly(firstFrame + row * step, level), level);
         if (row % 4 === 3) await turn();
@@ -647,6 +718,7 @@ export class Session {
 
   close() {
     this.#closed = true;
+    clearTimeout(this.#stateTimer);
     this.source.abort();
     this.#wakeUp();
   }

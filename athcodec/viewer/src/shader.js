@@ -3,7 +3,7 @@
 // place, a size, a turn about the up axis and a frame of its own, and the texture holds all frames of a clip; where its
 // level changes it fades, and there are texture, athPart and frame of the level before, too.
 
-import { Vector2 } from "three";
+import { MeshDepthMaterial, MeshDistanceMaterial, RGBADepthPacking, Vector2 } from "three";
 
 const PARS = /* glsl */`
 attribute float athPart;
@@ -110,22 +110,53 @@ vec3 objectTangent = vec3(tangent.xyz);
 #endif
 `;
 
+const bound = new WeakMap(); // material: the uniforms that it reads
+const warned = new WeakSet();
+
+// A clone has no onBeforeCompile.
+function cloneOf(material) {
+  const clone = Object.getPrototypeOf(material).clone.call(material), uniforms = bound.get(material);
+  clone.onBeforeCompile = () => {
+    if (bound.has(clone) || warned.has(uniforms)) return;
+    warned.add(uniforms);
+    console.warn("athcodec-three: got a clone of a bound material, which draws the rest pose; motion.bind(clone) lets it move");
+  };
+  return clone;
+}
+
 /** Lets `material` draw geometries of a motion. `uniforms`: athData, athStride, athForest, shared by all materials
- * of one motion; where a forest fades athDataBefore and athBefore. Other changes in onBeforeCompile have to come before. */
+ * of one motion; where a forest fades athDataBefore and athBefore. Other changes in onBeforeCompile have to come before. A
+ * material that is bound already draws the motion that it was bound to last. */
 export function injectMotion(material, uniforms, forest = false) {
+  const known = bound.get(material);
+  if (known === uniforms) return material;
+  bound.set(material, uniforms);
+  if (known) {
+    material.dispose(); // its programs have the uniforms of the motion before
+    return material;
+  }
   const defines = [...(forest ? ["ATH_FOREST"] : []), ...(uniforms.athBefore ? ["ATH_FADING"] : [])];
   const before = material.onBeforeCompile, key = `ath ${defines} ${material.customProgramCacheKey()}`;
   material.onBeforeCompile = (shader, renderer) => {
     before.call(material, shader, renderer);
-    Object.assign(shader.uniforms, uniforms);
+    Object.assign(shader.uniforms, bound.get(material));
     shader.vertexShader = `${defines.map((name) => `#define ${name}\n`).join("")}${shader.vertexShader}`
       .replace("#include <common>", `#include <common>\n${PARS}`)
       .replace("#include <begin_vertex>", POSITION)
       .replace("#include <beginnormal_vertex>", NORMAL);
   };
   material.customProgramCacheKey = () => key;
+  material.clone = () => cloneOf(material);
   material.needsUpdate = true;
   return material;
+}
+
+/** Materials with which an object's shadows move as it does: {customDepthMaterial, customDistanceMaterial}. */
+export function shadowMaterials(uniforms, forest = false) {
+  return {
+    customDepthMaterial: injectMotion(new MeshDepthMaterial({ depthPacking: RGBADepthPacking }), uniforms, forest),
+    customDistanceMaterial: injectMotion(new MeshDistanceMaterial(), uniforms, forest),
+  };
 }
 
 export const MOTION_PARS = PARS;

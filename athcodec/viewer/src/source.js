@@ -75,7 +75,7 @@ export class HttpSource {
       headers: { ...headers, Range: `bytes=${offset}-${offset + size - 1}` }, credentials, signal: this.#abort.signal,
       cache: "no-store", // browsers' caches let ranges of one file wait for each other, and ask for some twice
     });
-    if (answer.status === 416) return this.#beyond(answer);
+    if (answer.status === 416) return this.#beyond(answer, offset);
     if (answer.status >= 500 || answer.status === 429) throw new TypeError(`status ${answer.status}`);
     if (!answer.ok) throw new LoadError(`${this.url}: got status ${answer.status} ${answer.statusText}`, "HTTP");
     const from = this.#place(answer, offset);
@@ -84,10 +84,10 @@ export class HttpSource {
     return true;
   }
 
-  #beyond(answer) {
+  #beyond(answer, offset) {
     const total = /\/(\d+)$/.exec(answer.headers.get("Content-Range") ?? "");
     this.ranged = true;
-    this.total = total ? Number(total[1]) : this.total;
+    this.total = total ? Number(total[1]) : offset;
     return false;
   }
 
@@ -117,13 +117,16 @@ export class HttpSource {
     const reader = answer.body.getReader();
     for (;;) {
       const { done, value } = await reader.read();
-      if (done) return;
+      if (done) {
+        if (!this.ranged) this.total = offset;
+        return;
+      }
       forward(value, offset);
       offset += value.length;
     }
   }
 
-  abort() {
-    this.#abort.abort();
+  abort(reason) {
+    this.#abort.abort(reason);
   }
 }

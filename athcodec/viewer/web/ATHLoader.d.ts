@@ -46,16 +46,20 @@ export class ATHLoader extends Loader<ATH> {
   load(url: string, onLoad: (ath: ATH) => void, onProgress?: (event: ProgressEvent) => void,
        onError?: (error: unknown) => void): void;
   loadAsync(url: string, onProgress?: (event: ProgressEvent) => void): Promise<ATH>;
-  /** The same of a whole file in memory, or the front of one; the buffer stays as it is. */
-  parse(buffer: ArrayBuffer, onLoad: (ath: ATH) => void, onError?: (error: unknown) => void): void;
-  parseAsync(buffer: ArrayBuffer): Promise<ATH>;
+  /** The same of a whole file in memory, or the front of one: a buffer, shared or not, or any view of one. It stays as it is. */
+  parse(buffer: ArrayBufferLike | ArrayBufferView, onLoad: (ath: ATH) => void, onError?: (error: unknown) => void): void;
+  parseAsync(buffer: ArrayBufferLike | ArrayBufferView): Promise<ATH>;
+  /** Ends all downloads of this loader, as `abort()` of its manager does. What has no picture yet fails, "AbortError"; all else
+   * plays what is here. */
+  abort(): this;
   /** Ends all workers. */
   dispose(): this;
 }
 
 /** What is wrong with a file or its way here. */
 export interface ATHFailure extends Error {
-  /** Of FORMAT.md, "Errors", "MISSING" where the file ends too early, or "HTTP", "NETWORK", "CHANGED", "WORKER", "CLIP". */
+  /** Of FORMAT.md, "Errors", "MISSING" where the file ends too early, or "HTTP", "NETWORK", "CHANGED", "WORKER", "CLIP",
+   * "AbortError" after abort(), "CLOSED" after dispose(). */
   readonly codeName: string;
 }
 
@@ -93,7 +97,13 @@ export class ATH extends EventDispatcher<{ arrays: {} }> {
   readonly branches: Record<"parent" | "first" | "count" | "subtree" | "depth" | "attach" | "flags" | "lag" | "rigid" | "detail", Int32Array>;
   /** Branch of every vertex in source order. */
   readonly vertexBranch: Int32Array;
-  /** Ends its downloads and frees its memory. */
+  /** Resolves when all bytes of the file are here, of all levels and clips: they are fetched, behind what is wanted for pictures,
+   * once this is asked for. Rejects where no more bytes come: after abort() and dispose(), where the file ends too early and
+   * where the network fails. Damage is no such failure: see the event "damaged". */
+  readonly loaded: Promise<ATH>;
+  /** Ends its downloads; what is here goes on playing. */
+  abort(): void;
+  /** Ends its downloads and frees its memory, that of clones of its motion, too. */
   dispose(): void;
 }
 
@@ -126,6 +136,9 @@ export interface ATHMotionEvents {
   stopped: { message: string; codeName: string };
   /** A part of the file is damaged; what is whole goes on playing. level: from which on; null: a static array. */
   damaged: { message: string; codeName: string; level: number | null };
+  /** A picture could not be made as it was asked for; the message says of which clip, time and level, and why. What can be shown
+   * is, and the next picture can be asked for. */
+  error: { message: string; codeName: string };
 }
 
 export class ATHMotion extends EventDispatcher<ATHMotionEvents> {
@@ -215,12 +228,17 @@ export class ATHMotion extends EventDispatcher<ATHMotionEvents> {
   /** Per vertex in source order, the branch whose node moves it at a level; its own where it moves alone. */
   nodeNumbers(level?: number): Promise<Int32Array>;
   refresh(): void;
-  /** What the vertex shader makes of the texture, computed here. */
-  uploaded(): Float32Array;
+  /** The vertices that are shown, in source order: what the vertex shader makes of the texture, computed here when it is asked
+   * for. Null before the first picture. */
+  uploaded(): Float32Array | null;
 
-  /** Lets a material draw geometries of this motion (by onBeforeCompile, after what is there already). */
+  /** Lets a material draw geometries of this motion (by onBeforeCompile, after what is there already). Once is enough; a
+   * material moves by the motion that it was bound to last. Clones of it are not bound. */
   bind<T extends Material>(material: T): T;
-  /** Keeps a geometry in step: `userData.source` holds the file's vertex of each of its vertices. */
+  /** Gives an object the customDepthMaterial and customDistanceMaterial by which its shadows move; `ath.object` has them. */
+  bindShadows<T extends Object3D>(object: T): T;
+  /** Keeps a geometry in step: `userData.source` holds the file's vertex of each of its vertices. Its boundingBox and
+   * boundingSphere are those of what is shown, and so is what raycasters find of its `position`, whose array stays the rest pose. */
   attach<T extends BufferGeometry>(geometry: T): T;
   detach(geometry: BufferGeometry): void;
   readonly uniforms: Record<"athData" | "athStride" | "athForest", IUniform>;

@@ -1,0 +1,225 @@
+// What test_loader.py asks of the loader: node loader_cases.mjs NAME FILE prints, as JSON, what came of it.
+
+import { AthFile, ATHLoader, Line, pause, read, three, thrown, until } from "./loading.mjs";
+
+const [name, path] = process.argv.slice(2), data = read(path);
+const refusal = (promise) => promise.then(() => null, (error) => error.codeName ?? error.name);
+
+// A file of which `here` bytes have come, loaded.
+async function load(here = Infinity, { bytes = data, mode = "matrices", ...options } = {}) {
+  const line = new Line(bytes, options), loader = new ATHLoader().setWorkerLimit(1).setMode(mode);
+  line.allow(here);
+  const ath = await loader.loadAsync(line.url);
+  return { line, loader, ath, motion: ath.motion };
+}
+
+const cases = {};
+
+// Seeks between segments of which one is not here: those after which the plant does not show the decoder's picture.
+cases.between = async () => {
+  const file = AthFile.open(data), times = file.times(), stuck = [];
+  const motionBytes = file.chunks().filter(({ level }) => level < 255).map(({ offset }) => offset + 1).slice(1);
+  for (const mode of ["matrices", "positions"])
+    for (let i = 0; i < motionBytes.length; i += 1 + (motionBytes.length >> 3)) {
+      const { line, loader, motion } = await load(motionBytes[i], { mode });
+      for (let segment = 1; segment < file.info.segmentCount; segment++) {
+        const last = file.segmentStart(segment) - 1;
+        for (const share of [0, 0.3, 0.5, 0.7, 1]) motion.setTime(times[last] + share * (times[last + 1] - times[last]) - times[0]);
+        await pause(60);
+      }
+      const first = file.segmentStart(1), seconds = (times[first - 1] + times[first]) / 2 - times[0];
+      motion.setTime(seconds);
+      await pause(200);
+      line.allow(Infinity);
+      if (!(await until(() => motion.frame === first - 0.5 && motion.level === file.info.levelCount - 1 && !motion.fading && !motion.held)))
+        stuck.push([mode, motionBytes[i], motion.frame, motion.level]);
+      loader.dispose();
+    }
+  return (stuck);
+};
+
+// Two pictures under way, the first of a level that is not known yet: whether the second is shown.
+cases.overtaken = async () => {
+  const { motion } = await load();
+  motion.fade = 0;
+  motion.setLevel(1).setTime(0.5);
+  await until(() => motion.level === 1 && motion.readyLevel === motion.levelCount - 1);
+  const shown = motion.show(1, 2); // whose parts are not known yet
+  motion.setTime(0.75);
+  await shown;
+  return (await until(() => motion.level === 1 && Math.abs(motion.frame - AthFile.open(data).frameAt(0.75, "loop")) < 1e-9));
+};
+
+// A picture that the worker cannot make, and listeners that throw.
+cases.unanswerable = async () => {
+  const { motion } = await load(), errors = [];
+  motion.addEventListener("error", ({ message, codeName }) => errors.push([message, codeName]));
+  motion.addEventListener("frame", () => { throw new Error("of a listener"); });
+  const uncaught = [];
+  process.on("uncaughtException", (error) => uncaught.push(error.message));
+  motion.wrap = "backwards";
+  motion.setTime(0.5);
+  await until(() => errors.length > 0);
+  motion.wrap = "loop";
+  motion.setTime(0.75);
+  const moved = await until(() => motion.frame > 1);
+  return ({ moved, error: errors[0], uncaught: [...new Set(uncaught)],
+    refused: [await refusal(motion.show(0, 99)), await refusal(motion.positions(0, -1)), await refusal(motion.nodeNumbers(0))] });
+};
+
+// The levels that four segments reach, and what is said.
+cases.damaged = async () => {
+  const { ath, motion } = await load(), failures = [];
+  motion.fade = 0;
+  motion.addEventListener("damaged", ({ message, codeName, level }) => failures.push([message, codeName, level]));
+  const reached = [], file = AthFile.open(data);
+  await ath.loaded;
+  for (const segment of [0, 1, 2, 3]) {
+    const at = ath.motion.clip.duration * (segment + 0.5) / 4;
+    motion.setTime(at);
+    await until(() => Math.abs(motion.frame - file.frameAt(at)) < 1e-9 && motion.level === motion.readyLevels[segment]);
+    reached.push(motion.level);
+  }
+  return ({ reached, failures, whole: await ath.loaded.then((found) => found === ath) });
+};
+
+// Whether `loaded` waits for all bytes, of files that are whole, cut off, and too short for a picture.
+cases.loaded = async () => {
+  const { line, ath, motion } = await load(data.length >> 1);
+  motion.setLevel(0); // which needs none of it
+  let whole = false;
+  const loaded = ath.loaded.then((found) => { whole = found === ath; });
+  await pause(300);
+  const early = whole;
+  line.allow(Infinity);
+  await loaded;
+  const short = await load(Infinity, { bytes: data.subarray(0, data.length - 9) });
+  const cut = await load(Infinity, { bytes: data.subarray(0, data.length - 9), ranges: false });
+  const file = AthFile.open(data), first = file.chunks().find(({ level }) => level === 0);
+  return ({ early, whole, same: ath.loaded === ath.loaded,
+    ready: file.chunks().length > 0 && [...motion.readyLevels].every((level) => level === motion.levelCount - 1),
+    short: [await refusal(short.ath.loaded), short.motion.failure?.codeName], cut: await refusal(cut.ath.loaded),
+    none: await refusal(load(Infinity, { bytes: data.subarray(0, first.offset + 1) })) });
+};
+
+// Downloads that are ended before and after the first picture.
+cases.aborted = async () => {
+  const half = await load(data.length >> 1), { ath, motion, loader } = half, loaded = refusal(ath.loaded);
+  await until(() => motion.readyLevel >= 0);
+  ath.abort();
+  const codes = [await loaded];
+  await until(() => motion.failure);
+  codes.push(motion.failure.codeName);
+  motion.setLevel(0).setTime(0.4);
+  const plays = await until(() => motion.frame > 1 && motion.level === 0);
+  const waiting = new Line(data), loading = refusal(loader.loadAsync(waiting.url));
+  await pause(50);
+  loader.abort();
+  codes.push(await loading);
+  ath.dispose();
+  codes.push(await refusal(motion.show(0, 0)));
+  return ({ codes, plays, files: loader.workerPool[0].files, channels: loader.workerPool[0].channels.size });
+};
+
+// Buffers and views of all kinds.
+cases.parsed = async () => {
+  const loader = new ATHLoader().setWorkerLimit(1), shared = new Uint8Array(new SharedArrayBuffer(data.length + 7), 7);
+  shared.set(data);
+  const padded = new Uint8Array(data.length + 16);
+  padded.set(data, 8);
+  const inside = padded.subarray(8, 8 + data.length), whole = new SharedArrayBuffer(data.length);
+  new Uint8Array(whole).set(data);
+  const positions = [];
+  for (const buffer of [data.slice().buffer, inside, new DataView(inside.buffer, 8, data.length), shared, whole, Buffer.from(data)]) {
+    const ath = await loader.parseAsync(buffer);
+    await ath.loaded;
+    positions.push([...await ath.motion.positions(0.5)]);
+  }
+  const wrong = [];
+  for (const buffer of [null, "text", [1, 2], inside.subarray(1)]) wrong.push(await refusal(loader.parseAsync(buffer)));
+  return ({ same: positions.every((each) => String(each) === String(positions[0])), kept: inside.length === data.length, wrong });
+};
+
+// What bound materials make of a shader.
+cases.bound = async () => {
+  const { ath, motion } = await load(), warnings = [];
+  console.warn = (text) => warnings.push(text);
+  const { MeshLambertMaterial } = three, compiled = (material) => {
+    const shader = { uniforms: {}, vertexShader: "#include <common>\n#include <begin_vertex>" };
+    material.onBeforeCompile(shader);
+    return { uses: Object.values(shader.uniforms).includes(motion.uniforms.athData), times: shader.vertexShader.split("uniform highp sampler2D athData;").length - 1 };
+  };
+  const twice = motion.bind(motion.bind(new MeshLambertMaterial())), other = motion.clone();
+  const found = { twice: compiled(twice), other: compiled(motion.bind(other.bind(new MeshLambertMaterial()))) };
+  const clones = [twice.clone(), twice.clone()];
+  for (let i = 0; i < 3; i++) clones.forEach(compiled);
+  found.warnings = warnings.length;
+  found.clone = compiled(motion.bind(clones[0]));
+  found.text = warnings[0];
+  return (found);
+};
+
+// Boxes, spheres and rays against the vertices that are shown.
+cases.rays = async () => {
+  const found = {};
+  for (const mode of ["matrices", "positions"]) {
+    const { ath, motion } = await load(Infinity, { mode }), [drawn] = ath.object.children, { Ray, Vector3 } = three, rows = [];
+    for (const [seconds, level] of [[0, 0], [0.4, 0], [0.9, motion.levelCount - 1], [0.3, motion.levelCount - 1]]) {
+      await motion.show(seconds, level);
+      const at = motion.uploaded(), { boundingBox: box, boundingSphere: sphere } = drawn.geometry;
+      const point = new Vector3(), end = 3 * (at.length / 3 - 1), size = box.getSize(new Vector3()).length();
+      let inside = true;
+      const low = [Infinity, Infinity, Infinity], high = [-Infinity, -Infinity, -Infinity];
+      for (let i = 0; i < at.length; i += 3) {
+        point.fromArray(at, i);
+        inside &&= box.distanceToPoint(point) < 1e-5 * size && sphere.distanceToPoint(point) < 1e-5 * size;
+        for (let k = 0; k < 3; k++) { low[k] = Math.min(low[k], at[i + k]); high[k] = Math.max(high[k], at[i + k]); }
+      }
+      const exact = new three.Box3().setFromBufferAttribute(drawn.geometry.attributes.position);
+      const off = Math.max(...["x", "y", "z"].map((k, i) => Math.max(Math.abs(exact.min[k] - low[i]), Math.abs(exact.max[k] - high[i]))));
+      // A ray straight down on a corner of the last edge or face.
+      const hits = [], ray = new Ray(new Vector3().fromArray(at, end).add(new Vector3(0, 0, 5 * size)), new Vector3(0, 0, -1));
+      const near = drawn.isMesh ? new Vector3().fromArray(at, 0).sub(new Vector3().fromArray(at, end)).setZ(0).setLength(1e-3 * size) : new Vector3();
+      ray.origin.add(near);
+      drawn.raycast({ ray, near: 0, far: Infinity, params: { Line: { threshold: 1e-3 * size } } }, hits);
+      rows.push({ inside, off: off / size, hit: hits.length > 0, loose: size / Math.hypot(...high.map((h, k) => h - low[k])) });
+    }
+    found[mode] = rows;
+  }
+  return (found);
+};
+
+// Fifty loads: how many instances of the decoder are left after every ten.
+cases.memory = async () => {
+  const { Instance } = WebAssembly, alive = new Set(), gone = new FinalizationRegistry((key) => alive.delete(key));
+  let made = 0;
+  WebAssembly.Instance = new Proxy(Instance, { construct(target, words) {
+    const instance = new target(...words);
+    alive.add(made);
+    gone.register(instance, made++);
+    return instance;
+  } });
+  const loader = new ATHLoader().setWorkerLimit(1), used = [];
+  const settled = async () => { for (let i = 0; i < 6; i++) { await pause(200); gc(); } };
+  const line = new Line(data);
+  line.allow(Infinity);
+  for (let i = 0; i < 50; i++) {
+    const ath = await loader.loadAsync(line.url), { motion } = ath;
+    ath.object.children.length;
+    const other = motion.clone();
+    other.setTime(0.4);
+    if (i % 2) await ath.loaded;
+    motion.show(0.3, 1).catch(() => {});
+    ath.dispose();
+    if (i % 10 === 9) {
+      await settled();
+      used.push(alive.size);
+    }
+  }
+  return ({ made, used, files: loader.workerPool[0].files, channels: loader.workerPool[0].channels.size });
+};
+
+const found = await cases[name]();
+if (thrown.length > 0) throw thrown[0];
+console.log(JSON.stringify(found));
+process.exit();

@@ -1,0 +1,229 @@
+"""The loader for three.js: whatever is asked for while bytes come, and whatever is wrong with them, a plant never stops
+for good, every request is answered, and at last the picture is what the decoder gives.
+
+Loader and worker run as they ship, in Node (tests/node/loading.mjs); with the marker `browser` in Chromium.
+"""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from plants import tube
+
+import athcodec
+
+ROOT = Path(__file__).resolve().parent.parent
+sys.path.append(str(ROOT))  # for bench, which is not installed; athcodec stays the installed one
+
+from bench.browser import chromium  # noqa: E402
+from bench.throttled_server import ThrottledServer  # noqa: E402
+
+NODE = ROOT / "tests" / "node"
+
+
+def node(*words) -> object:
+    """What a program of tests/node prints, as JSON."""
+    program = shutil.which("node")
+    if program is None:
+        pytest.fail("node: got none on PATH, expected Node.js 18 or newer to test the loader in")
+    command = [program, "--no-warnings", "--expose-gc", *map(str, words)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=1800)
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
+
+
+def run_node(case: str, path: Path):
+    return node(NODE / "loader_cases.mjs", case, path)
+
+
+@pytest.fixture(scope="module")
+def mesh_ath(tmp_path_factory):
+    """A tube of quads in three segments."""
+    clip = tube(20, 8, 40)
+    rings = np.arange(19)[:, None] * 8
+    around = np.arange(8)[None]
+    corners = [rings + around, rings + (around + 1) % 8, rings + 8 + (around + 1) % 8, rings + 8 + around]
+    clip.faces = np.stack(corners, axis=-1).reshape(-1, 4).astype(np.int32)
+    clip.check()
+    path = tmp_path_factory.mktemp("mesh") / "mesh.ath"
+    athcodec.encode(clip, path, rel_error=1e-3, segment_frames=16)
+    return path
+
+
+# ---- it never stops for good ----
+
+
+def test_a_seek_between_two_segments_of_which_one_is_not_here_does_not_stop_the_plant(layered_ath):
+    """Segments of this file go on from the one before, which may be absent as well."""
+    assert run_node("between", layered_ath) == []
+
+
+def test_what_was_asked_for_last_is_what_is_shown(layered_ath):
+    assert run_node("overtaken", layered_ath) is True
+
+
+def test_a_picture_that_cannot_be_made_is_an_error_that_says_where_and_the_next_one_comes(layered_ath):
+    found = run_node("unanswerable", layered_ath)
+    message, code = found["error"]
+    assert found["moved"] and code == "RangeError"
+    assert "clip 0 at 0.5 s, level" in message and "got backwards, expected one of clamp, loop" in message
+    assert found["uncaught"] == ["of a listener"] and found["refused"] == ["RangeError", "RangeError", None]
+
+
+def random_runs(first: int, count: int, *paths):
+    assert node(NODE / "random_loading.mjs", first, count, *paths) == []
+
+
+def test_random_seeks_while_random_bytes_come_end_with_the_picture_of_the_decoder(
+    layered_ath, bushy_ath, medley_ath, mesh_ath, sample_ath
+):
+    random_runs(0, 200, layered_ath, bushy_ath, medley_ath, mesh_ath, sample_ath)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("part", range(10))
+def test_thousands_of_random_seeks_end_with_the_picture_of_the_decoder(
+    part, layered_ath, bushy_ath, medley_ath, mesh_ath, sample_ath, stepwise_ath, full_ath
+):
+    paths = layered_ath, bushy_ath, medley_ath, mesh_ath, sample_ath, stepwise_ath, full_ath
+    random_runs(1000 * (1 + part), 1000, *paths)
+
+
+def test_damage_is_named_and_other_segments_are_shown_at_their_deepest_level(layered_ath, tmp_path):
+    data = bytearray(layered_ath.read_bytes())
+    with athcodec.open(layered_ath) as decoder:
+        deepest = decoder.level_count - 1
+        chunk = next(c for c in decoder.file.chunks if c.is_motion and (c.level, c.segment) == (deepest, 1))
+        data[chunk.offset] ^= 1
+    path = tmp_path / "damaged.ath"
+    path.write_bytes(data)
+    found = run_node("damaged", path)
+    assert found["reached"][1] == deepest - 1 and found["reached"][0] == found["reached"][3] == deepest
+    assert found["whole"]
+    message, code, level = found["failures"][0]
+    assert (
+        code == "BAD_CHECKSUM" and level == deepest and f"level {deepest}, segment 1 at byte {chunk.offset}" in message
+    )
+
+
+# ---- loaded, abort, parse ----
+
+
+def test_loaded_resolves_when_all_bytes_are_here_and_rejects_where_they_cannot_be(layered_ath):
+    found = run_node("loaded", layered_ath)
+    assert not found["early"] and found["whole"] and found["same"] and found["ready"]
+    assert found["short"] == ["MISSING", "MISSING"] and found["cut"] == "MISSING" and found["none"] == "MISSING"
+
+
+def test_abort_ends_downloads_and_what_is_here_goes_on_playing(layered_ath):
+    found = run_node("aborted", layered_ath)
+    assert found["codes"] == ["AbortError", "AbortError", "AbortError", "CLOSED"] and found["plays"]
+    assert found["files"] == 0 and found["channels"] == 0
+
+
+def test_parse_takes_buffers_and_views_of_all_kinds_and_leaves_them_as_they_are(layered_ath):
+    found = run_node("parsed", layered_ath)
+    assert found["same"] and found["kept"]
+    assert found["wrong"] == ["TypeError", "TypeError", "TypeError", "NOT_AN_ATH_FILE"]
+
+
+# ---- materials, boxes, rays ----
+
+
+def test_a_material_may_be_bound_twice_and_an_unbound_clone_warns_once(mesh_ath):
+    found = run_node("bound", mesh_ath)
+    once = {"uses": True, "times": 1}
+    assert found["twice"] == found["other"] == found["clone"] == once
+    assert found["warnings"] == 1 and "motion.bind(clone)" in found["text"]
+
+
+@pytest.mark.parametrize("kind", ["lines", "mesh"])
+def test_boxes_and_rays_find_the_plant_where_it_is_shown(kind, sample_ath, mesh_ath):
+    found = run_node("rays", sample_ath if kind == "lines" else mesh_ath)
+    for mode, rows in found.items():
+        for row in rows:
+            assert row["inside"] and row["off"] < 1e-6 and row["loose"] < 1.5, (mode, row)
+            assert row["hit"] or kind == "mesh", (mode, row)
+    assert any(row["hit"] for rows in found.values() for row in rows)
+
+
+def test_fifty_loads_and_disposals_leave_no_memory_behind(layered_ath):
+    found = run_node("memory", layered_ath)
+    assert found["made"] >= 50 and found["files"] == found["channels"] == 0
+    assert max(found["used"]) <= 4, found  # that which all files of a worker share, and what is not collected yet
+
+
+# ---- in a browser ----
+
+
+@pytest.fixture(scope="module")
+def browser():
+    with chromium() as found:
+        yield found
+
+
+DISPOSED = """async () => {
+  const { ATHLoader } = await import("athcodec-three"), { Scene } = await import("three");
+  const { renderer, camera } = athcodecViewer.stage, scene = new Scene();
+  const loader = new ATHLoader(), url = new URLSearchParams(location.search).get("file"), counts = [];
+  for (let i = 0; i < 50; i++) {
+    const ath = await loader.loadAsync(url);
+    scene.add(ath.object);
+    await ath.loaded;
+    await ath.motion.show(0.3, ath.motion.levelCount - 1);
+    renderer.render(scene, camera);
+    ath.object.removeFromParent();
+    ath.dispose();
+    renderer.render(scene, camera);
+    counts.push([renderer.info.memory.geometries, renderer.info.memory.textures, renderer.info.programs.length]);
+  }
+  loader.dispose();
+  return { first: counts[0], last: counts.at(-1) };
+}"""
+
+
+@pytest.mark.browser
+def test_fifty_loads_and_disposals_leave_nothing_on_the_gpu(browser, sample_ath):
+    with ThrottledServer({"tree.ath": sample_ath.read_bytes()}) as line:
+        page = browser.new_page(viewport={"width": 300, "height": 200})
+        page.goto(line.page("tree.ath"))
+        page.wait_for_function("() => athcodecViewer.motion?.complete", timeout=60_000)
+        page.evaluate("athcodecViewer.setPlaying(false)")
+        found = page.evaluate(DISPOSED)
+        page.close()
+    assert found["first"] == found["last"]
+
+
+@pytest.mark.browser
+@pytest.mark.parametrize("mode", ["matrices", "positions"])
+def test_shadows_move_with_the_plant_in_every_mode(browser, mode, tmp_path):
+    clip = tube(40, 12, 30)
+    clip.positions = clip.positions * np.float32(1)
+    clip.positions[..., 0] += (np.arange(30, dtype=np.float32) / 29)[:, None] * np.float32(0.06) * clip.rest[:, 2] ** 2
+    clip.faces = np.array(
+        [
+            [12 * r + k, 12 * r + (k + 1) % 12, 12 * r + 12 + (k + 1) % 12, 12 * r + 12 + k]
+            for r in range(39)
+            for k in range(12)
+        ],
+        np.int32,
+    )
+    clip.check()
+    path = tmp_path / "tube.ath"
+    athcodec.encode(clip, path, rel_error=1e-3)
+    with ThrottledServer({"tree.ath": path.read_bytes()}) as line:
+        page = browser.new_page(viewport={"width": 300, "height": 200})
+        errors = []
+        page.on("console", lambda message: errors.append(message.text) if message.type == "error" else None)
+        page.goto(line.page("tree.ath"))
+        page.wait_for_function("() => athcodecViewer.motion?.complete", timeout=60_000)
+        page.evaluate("athcodecViewer.setPlaying(false)")
+        found = page.evaluate((NODE / "shadows.js").read_text("utf-8"), mode)
+        page.close()
+    assert errors == [] and found["covered"] > 0.95 and found["changed"] > 20, found
