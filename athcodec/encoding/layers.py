@@ -29,6 +29,7 @@ from athcodec.encoding.joins import (
     end_corrections,
     end_of,
     joined,
+    seen,
 )
 from athcodec.encoding.learned_modes import LearnedModes, nested
 from athcodec.encoding.motion import Plan, SegmentMotion, position_errors
@@ -393,9 +394,11 @@ class _SegmentCoder:
 
     def ends(self) -> list[End | None]:
         """What each level of the segment behind this one goes on from."""
-        source = self.positions + self._origin[:, None]
-        *before, last = (shown.pose() for shown in self._shown)
-        return [*(end_of(own, source) for own in before), end_of(last, source, self._end_corrections)]
+        source = self.positions[:, :, -END_FRAMES:] + self._origin[:, None]
+        ends = [end_of(shown.pose(), source) for shown in self._shown]
+        if ends[-1] is not None:
+            ends[-1] = replace(ends[-1], corrections=self._end_corrections)
+        return ends
 
     def _meet(self, start: np.ndarray) -> None:
         """Closes the start of the last level, in whose first frame the corrections of an end stand."""
@@ -405,16 +408,20 @@ class _SegmentCoder:
 
     def join(self, ends: Sequence[End | None]) -> None:
         """Lets the levels go on from the ends of the segment before, where they are better for it."""
-        source = self.positions + self._origin[:, None]
+        some = seen(len(self.positions))
+        source = self.positions[some] + self._origin[:, None]
         for level, (end, shown) in enumerate(zip(ends, self._shown)):
             if end is None or self.positions.shape[2] <= END_FRAMES:
                 continue
             positions, layer = shown.pose(), shown.layer
             if layer is None:
-                price = ErrorPrice(positions, source, self.errors[level - 1][RMS] if level > 0 else math.inf)
+                most_rms = self.errors[level - 1][RMS] if level > 0 else math.inf
+                price = ErrorPrice(self.errors[level][RMS], most_rms, positions.shape[2])
             else:
-                price = CorrectionPrice(layer.settings.limit, self._shared_bytes + self._bytes_up_to(level))
-            join = best_join(end, positions, source, price)
+                limit, share = layer.settings.limit, len(source) / len(positions)
+                bytes_ = share * (self._shared_bytes + self._bytes_up_to(level))
+                price = CorrectionPrice(limit if np.isscalar(limit) else limit[some], bytes_)
+            join = best_join(end.of(some), positions[some], source, price)
             if join == 0:
                 continue
             self.joins[level], positions = join, joined(end, positions, join)
