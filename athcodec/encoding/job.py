@@ -507,7 +507,7 @@ class EncodingJob:
                 store.add(ct.ATTRIBUTE, ct.pack_array(name, array))
 
     def coded(self, decided: _Decided, segments: Sequence[int]) -> Iterator[CodedSegment]:
-        """Some segments, coded a few at a time, while the next one is read."""
+        """Some segments, as many at a time as there is memory for."""
         source = decided.source
         if len(source.segments) == 1 and decided.tried:
             return iter(decided.tried.values())
@@ -532,7 +532,7 @@ class EncodingJob:
 
         if decided.choice.predicted is not None:
             return pool.ordered(predict, read(segments), at_once)
-        coded = pool.ordered(code, read(self._with_those_before(source, segments)), max(1, at_once - 1))
+        coded = pool.ordered(code, read(self._with_those_before(source, segments)), at_once - 1)
         return pool.ordered(join, _beside_ends(source, coded, frozenset(segments)), 0)
 
     def _motion(self, decided: _Decided, index: int, block: np.ndarray) -> CodedMotion:

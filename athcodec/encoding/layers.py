@@ -288,7 +288,15 @@ class _ShownLevel:
 class _SegmentCoder:
     """Chunks {(level, kind): payload} and errors of stopping at each level, by each of MEASURES, of one segment."""
 
-    def __init__(self, prelude: CodedPrelude, layers: Layers, segment_count: int, positions: np.ndarray, goes_on: bool):
+    def __init__(
+        self,
+        prelude: CodedPrelude,
+        layers: Layers,
+        segment_count: int,
+        positions: np.ndarray,
+        goes_on: bool,
+        keeps_last: bool,
+    ):
         self._output, self._origin, self.positions = prelude.output, prelude.origin, positions
         self._pool, self._layered = prelude.plan.pool, len(layers.each) > 1
         self._level_0 = layers.level_0
@@ -297,7 +305,7 @@ class _SegmentCoder:
         self.chunks: dict[tuple[int, int], bytes] = {}
         self.errors: list[tuple[float, ...]] = []
         self._shown: list[_ShownLevel] = []
-        self._decoded = np.empty(0)  # at the last level
+        self._keeps_last, self._decoded = keeps_last, np.empty(0)  # at the last level
         self._goes_on = goes_on  # in a segment behind it
         self._met = streams.FREE_ENDS  # by the corrections of the last layer
         self._end_corrections = NO_CORRECTIONS  # likewise: of the last frame
@@ -349,11 +357,13 @@ class _SegmentCoder:
         """One further level; ratio: the step of the layer before over that of this one."""
         settings, last = layer.settings, layer.plan.level_count - 1
         bases = self._bases.refined(layer, last, level)
+        is_last = layer.ratio == 1
         segment, decoded = analyse(
-            layer.plan, self._output, settings, self.positions, layer.modes, bases, before, ratio, layered=True
+            layer.plan, self._output, settings, self.positions, layer.modes, bases, before, ratio, layered=not is_last
         )
         head = stems_head(settings, last, bases)
         self.chunks[level, ct.STEMS] = ct.pack_refined_stems(ratio, head, streams.encode_refinement(segment, last))
+        segment.forget_before()
         self._finish_with(decoded, layer, level)
         return segment
 
@@ -382,7 +392,7 @@ class _SegmentCoder:
         self.chunks.pop((level, ct.CORRECTIONS), None)
         if chunk:
             self.chunks[level, ct.CORRECTIONS] = chunk
-        if layer.ratio == 1:
+        if layer.ratio == 1 and self._keeps_last:
             self._decoded = decoded
         return self.error(decoded)
 
@@ -561,7 +571,7 @@ class CodedMotion:
         exact: np.ndarray | None = None,
         goes_on: bool = False,
     ):
-        coder = _SegmentCoder(prelude, layers, segment_count, positions, goes_on)
+        coder = _SegmentCoder(prelude, layers, segment_count, positions, goes_on, exact is not None)
         self._coder: _SegmentCoder | None = coder
         self._exact, self._largest_bound = exact, layers.each[-1].settings.largest_bound
         segment = coder.first(layers.each[0])

@@ -33,10 +33,10 @@ from athcodec.threads import SERIAL, ThreadPool, default_jobs
 
 FINER = 32  # step over that of segments that bases and modes are learned from
 ROWS_AT_ONCE = 1 << 14  # of coefficients
-WORK_BYTES = 1536 << 20  # of the segments coded at once, where `jobs` does not say how many these are
+WORK_BYTES = 1 << 30  # of the segments coded at once, where `jobs` does not say how many these are
 COPIES_BENDS = 0.0, 0.15  # of copies of one shape that are tried
 CONNECTED_SHARE = 0.8  # of a rest pose at once, that one by faces may take where layers refine it
-SEGMENT_WORK = 8  # memory of a segment while it is coded, over its float32 positions
+SEGMENT_WORK = 16  # memory of a segment while it is coded, over its float32 positions
 
 
 def thread_count(jobs: int | None, source: Source) -> int:
