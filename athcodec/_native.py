@@ -244,6 +244,10 @@ _ENCODING = {  # core/plan.h, core/motion.h, core/encode.h
         c_int64,
         [c_int32, c_int32, c_int, *[c_void_p] * 5, c_double, POINTER(CoreMetEnds), c_void_p, c_int64],
     ),
+    "ath_find_rigid_corrections": (
+        c_int64,
+        [c_int32, c_void_p, c_void_p, c_int32, c_int, *[c_void_p] * 4, c_double, c_void_p, c_int64],
+    ),
     "ath_apply_corrections": (None, [c_int32, c_int, c_void_p, c_double, c_void_p, c_int64]),
     "ath_encode_front": (c_int64, [c_void_p, c_size_t, POINTER(Header), *[c_void_p] * 4]),
     "ath_encode_hierarchy": (c_int64, [c_void_p, c_void_p, c_size_t, c_void_p, c_int32, c_int32, c_void_p, c_void_p]),

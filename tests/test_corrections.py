@@ -89,3 +89,14 @@ def test_no_vertex_of_the_sample_pops_at_a_loose_bound(ladder, tmp_path):
             bound = max(level.max_error, decoder.max_error_bound)
             assert bends(error).max() <= 1.5 * bound
             assert ((bends(error) > bound).mean(axis=0) <= 0.02).all()
+
+
+def test_rigid_parts_are_moved_as_a_whole_where_that_serves_all_of_their_vertices():
+    parts = np.array([(0, 3), (3, 3)], [("first", np.int32), ("count", np.int32)])
+    wanted, origin, limit, step = np.zeros((6, 3, 12)), np.zeros(3), 1.0, 0.5
+    decoded = wanted.astype(np.float32)
+    decoded[:3, 0, 5] = 1.2, 1.4, 1.6  # one way
+    decoded[3:, 1, 7] = 1.6, 0.0, -1.6  # in opposite ways: no correction of all serves
+    rows = streams.find_rigid_corrections(parts, decoded, wanted, origin, limit, step)
+    assert rows.tolist() == [[vertex, 5, -3, 0, 0, 0] for vertex in range(3)]
+    assert np.abs(decoded[:3]).max() <= limit and decoded[3, 1, 7] == np.float32(1.6)

@@ -10,7 +10,7 @@ from files import Parts
 from plants import plant
 
 import athcodec
-from athcodec.encoding import encoder
+from athcodec.encoding import encoder, joins
 from athcodec.joining import looped
 from athcodec.sources import read_hdf5, sample_path
 
@@ -156,3 +156,13 @@ def test_the_end_of_a_segment_is_part_of_what_the_next_one_needs(coded):
         stems = min(of_second)
         assert any(offset <= stems[0] < offset + size for offset, size in core.missing(level, 2))
         assert not any(offset <= stems[0] < offset + size for offset, size in core.missing_of(2, level))
+
+
+def test_squared_lengths_of_vectors_that_move_follow_from_those_before():
+    rng = np.random.default_rng(1)
+    vectors, jump, slope = rng.normal(size=(5, 3, 9)), *rng.normal(size=(2, 5, 3))
+    jumps, slopes = rng.normal(size=(2, 7))
+    moved = vectors[:, :, :7] + jump[:, :, None] * jumps + slope[:, :, None] * slopes
+    found = joins._Moved(vectors, jump, slope)
+    np.testing.assert_allclose(found.by(jumps, slopes), (moved**2).sum(axis=1))
+    np.testing.assert_allclose(found.mean().by(jumps, slopes), (moved**2).sum(axis=1).mean(axis=0))

@@ -102,50 +102,60 @@ static void both_ends(const double *row, int32_t T, double parts[2 * ATH_END_PAR
     end_parts(row, T, -1, parts + ATH_END_PARTS);
 }
 
-/* What it is worth, in squared steps, to have `by` more in place of `was`: the error of its own and those of the ends. */
-static double settling(const ath_rounding *rounding, int32_t was, int32_t by, double off,
-                       const double parts[2 * ATH_END_PARTS], const double left[2 * ATH_END_PARTS])
-{
-    static const double emptied = 0.25; /* for an integer that becomes 0 */
-    double cost = (off - by) * (off - by) - off * off - (was + by == 0 ? emptied : 0.0);
-    for (int32_t i = 0; i < 2 * ATH_END_PARTS; i++) {
-        double after = left[i] - by * parts[i];
-        cost += rounding->ends[i % ATH_END_PARTS] * (after * after - left[i] * left[i]);
-    }
-    return -cost;
-}
+/* An integer of a row that may be rounded the other way: its parts at the ends, these by what errors there weigh, and what a
+ * step more or less costs by itself. */
+typedef struct {
+    int32_t k;
+    double parts[2 * ATH_END_PARTS], pull[2 * ATH_END_PARTS], cost;
+} end_integer;
 
 /* Rounds integers of a row the other way where that brings its ends nearer, whose errors are the largest and are seen where
- * segments meet. units: what they stand for, less what is predicted; row: what they are to become. */
+ * segments meet. units: what they stand for, less what is predicted; row: what they are to become. What it is worth, in
+ * squared steps, is the change of the error of its own and of those of the ends. */
 static void settle_ends(const ath_stream *stream, int32_t T, double step, const ath_rounding *rounding,
                         const double *row, const double *units, const int32_t *predicted, int32_t *quantised)
 {
     enum { LEAST_FRAMES = 8 };
-    static const double least = 1e-3;
-    double parts[ATH_SEGMENT_FRAMES][2 * ATH_END_PARTS], left[2 * ATH_END_PARTS];
-    int32_t rank = row_extent(quantised, stream->temporal_rank);
+    static const double least = 1e-3, emptied = 0.25; /* for an integer that becomes 0 */
+    end_integer found[ATH_SEGMENT_FRAMES];
+    double left[2 * ATH_END_PARTS];
+    int32_t rank = row_extent(quantised, stream->temporal_rank), count = 0;
     if (T < LEAST_FRAMES || rank == 0 || rounding->ends[0] == 0.0) return;
     both_ends(row, T, left);
     for (int32_t i = 0; i < 2 * ATH_END_PARTS; i++) left[i] /= step;
     for (int32_t k = 0; k < stream->temporal_rank; k++) {
         double value = (double)(quantised[k] + (predicted ? predicted[k] : 0));
-        both_ends(stream->temporal + (size_t)k * (size_t)T, T, parts[k]);
-        for (int32_t i = 0; i < 2 * ATH_END_PARTS; i++) left[i] -= value * parts[k][i];
+        if (quantised[k] == 0 && value == 0.0) continue;
+        end_integer *own = found + count;
+        *own = (end_integer){.k = k, .cost = 1.0};
+        both_ends(stream->temporal + (size_t)k * (size_t)T, T, own->parts);
+        for (int32_t i = 0; i < 2 * ATH_END_PARTS; i++) {
+            left[i] -= value * own->parts[i];
+            own->pull[i] = rounding->ends[i % ATH_END_PARTS] * own->parts[i];
+            own->cost += own->pull[i] * own->parts[i];
+        }
+        count += quantised[k] != 0;
     }
     for (int32_t turned = 0; turned < rank; turned++) {
         double most = least;
-        int32_t chosen = 0, by = 0;
-        for (int32_t k = 0; k < rank; k++)
-            for (int32_t d = -1; d <= 1 && quantised[k] != 0; d += 2) {
-                double worth = settling(rounding, quantised[k], d, units[k] - (double)quantised[k], parts[k], left);
+        const end_integer *chosen = 0;
+        int32_t by = 0;
+        for (const end_integer *own = found; own < found + count; own++) {
+            int32_t q = quantised[own->k];
+            if (q == 0) continue;
+            double lean = units[own->k] - (double)q;
+            for (int32_t i = 0; i < 2 * ATH_END_PARTS; i++) lean += own->pull[i] * left[i];
+            for (int32_t d = -1; d <= 1; d += 2) {
+                double worth = 2.0 * d * lean - own->cost + (q + d == 0 ? emptied : 0.0);
                 if (worth <= most) continue;
                 most = worth;
-                chosen = k;
+                chosen = own;
                 by = d;
             }
-        if (by == 0) return;
-        quantised[chosen] += by;
-        for (int32_t i = 0; i < 2 * ATH_END_PARTS; i++) left[i] -= by * parts[chosen][i];
+        }
+        if (!chosen) return;
+        quantised[chosen->k] += by;
+        for (int32_t i = 0; i < 2 * ATH_END_PARTS; i++) left[i] -= by * chosen->parts[i];
     }
 }
 

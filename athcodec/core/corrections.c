@@ -338,6 +338,83 @@ int64_t ath_find_corrections(int32_t vertex_count, int32_t frames, int is_float6
     return count;
 }
 
+/* ---- rigid parts ---- */
+
+/* How far the vertices of a part are from where they are wanted, over time: on each axis the least and the most, and
+ * whether one is beyond its limit. */
+typedef struct {
+    double least[3][ATH_SEGMENT_FRAMES], most[3][ATH_SEGMENT_FRAMES];
+    uint8_t beyond[ATH_SEGMENT_FRAMES];
+} spread;
+
+ATH_HOT static void spread_of_part(int32_t first, int32_t count, int32_t frames, int is_float64, const void *positions,
+                                   const double *source, const double origin[3], const double *limits, spread *spread)
+{
+    double squares[ATH_SEGMENT_FRAMES];
+    memset(spread->beyond, 0, (size_t)frames);
+    for (int32_t v = first; v < first + count; v++) {
+        memset(squares, 0, (size_t)frames * sizeof *squares);
+        for (size_t k = 0; k < 3; k++) {
+            size_t row = ((size_t)v * 3 + k) * (size_t)frames;
+            double *least = spread->least[k], *most = spread->most[k];
+            for (int32_t t = 0; t < frames; t++) {
+                double away = source[row + (size_t)t] + origin[k] - number_at(is_float64, positions, row + (size_t)t);
+                least[t] = v == first || away < least[t] ? away : least[t];
+                most[t] = v == first || away > most[t] ? away : most[t];
+                squares[t] += away * away;
+            }
+        }
+        for (int32_t t = 0; t < frames; t++) spread->beyond[t] |= squares[t] > limits[v] * limits[v];
+    }
+}
+
+/* Whether a correction brings all vertices of a part within their limits in a frame. */
+static int serves_part(int32_t first, int32_t count, int32_t frames, int is_float64, const void *positions,
+                       const double *source, const double origin[3], const double *limits, double step, int32_t t,
+                       const ath_correction *own)
+{
+    for (int32_t v = first; v < first + count; v++) {
+        double error[3];
+        for (int32_t k = 0; k < 3; k++) {
+            size_t at = ((size_t)v * 3 + (size_t)k) * (size_t)frames + (size_t)t;
+            double sum = number_at(is_float64, positions, at), parts = (double)own->q[k] * ATH_FOOTPRINT_PARTS;
+            if (parts != 0.0) sum = ath_corrected(sum, parts, step);
+            error[k] = (is_float64 ? sum : ath_single(sum)) - (source[at] + origin[k]);
+        }
+        if (!(square(error) <= limits[v] * limits[v])) return 0;
+    }
+    return is_any(own);
+}
+
+int64_t ath_find_rigid_corrections(int32_t part_count, const int32_t *first, const int32_t *counts, int32_t frames,
+                                   int is_float64, const void *positions, const double *source, const double origin[3],
+                                   const double *limits, double step, int32_t *corrections, int64_t capacity)
+{
+    int64_t count = 0;
+    for (int32_t p = 0; p < part_count; p++) {
+        spread spread;
+        spread_of_part(first[p], counts[p], frames, is_float64, positions, source, origin, limits, &spread);
+        for (int32_t t = 0; t < frames; t++) {
+            ath_correction own = {{0, 0, 0}, 0};
+            if (!spread.beyond[t]) continue;
+            for (int32_t k = 0; k < 3; k++) {
+                double units = (spread.most[k][t] + spread.least[k][t]) / (2.0 * step);
+                own.q[k] = units > -1e9 && units < 1e9 ? to_steps(units) : 0;
+            }
+            if (!serves_part(first[p], counts[p], frames, is_float64, positions, source, origin, limits, step, t, &own))
+                continue;
+            for (int32_t v = first[p]; v < first[p] + counts[p]; v++, count++) {
+                if (count >= capacity) continue;
+                int32_t *row = corrections + ATH_CORRECTION_ROW * count;
+                row[0] = v;
+                row[1] = t;
+                memcpy(row + 2, &own, sizeof own);
+            }
+        }
+    }
+    return count;
+}
+
 static void apply_to_vertex(int32_t frames, int is_float64, void *positions, size_t first, const double parts[][3],
                             double step)
 {

@@ -16,7 +16,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
-from typing import IO, BinaryIO
+from typing import IO, Any, BinaryIO
 
 import numpy as np
 
@@ -507,7 +507,7 @@ class EncodingJob:
                 store.add(ct.ATTRIBUTE, ct.pack_array(name, array))
 
     def coded(self, decided: _Decided, segments: Sequence[int]) -> Iterator[CodedSegment]:
-        """Some segments, coded a few at a time, while the next one is read."""
+        """Some segments, as many at a time as there is memory for."""
         source = decided.source
         if len(source.segments) == 1 and decided.tried:
             return iter(decided.tried.values())
@@ -532,8 +532,14 @@ class EncodingJob:
 
         if decided.choice.predicted is not None:
             return pool.ordered(predict, read(segments), at_once)
-        coded = pool.ordered(code, read(self._with_those_before(source, segments)), max(1, at_once - 1))
-        return pool.ordered(join, _beside_ends(source, coded, frozenset(segments)), 0)
+        coded = pool.ordered(code, read(self._with_those_before(source, segments)), at_once - 1)
+        return pool.ordered(join, _beside_ends(source, self._halfway(coded), frozenset(segments)), 0)
+
+    def _halfway(self, coded: Iterable[Any]) -> Iterator[Any]:
+        """Reports each segment that is coded, but not yet joined."""
+        for done, one in enumerate(coded):
+            self.report("motion", min((done + 0.5) / self.segment_count, 1.0))
+            yield one
 
     def _motion(self, decided: _Decided, index: int, block: np.ndarray) -> CodedMotion:
         positions, exact = self._positions(block)

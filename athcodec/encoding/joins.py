@@ -7,7 +7,8 @@ Positions are vertex-major, (N, 3, T), as decoded, not corrected.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import copy
+from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
@@ -15,6 +16,7 @@ import numpy as np
 END_FRAMES = 2  # of a segment, that the next one looks at
 WIDTHS = (1, 2, 3, 4, 5, 6, 8, 10, 12, 14, 16, 20, 24, 28, 32, 40, 48, 64, 96)  # frames
 SLOPED = 128
+SEEN = 1 << 12  # vertices by which joins are chosen, about
 END_FOOTPRINTS = {2: (5, 16, 27, 32), 1: (0, 0, 16, 32)}  # by width, in the last frames of what stands in the last one
 AXES = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 0], [1, 0, 1], [0, 1, 1], [1, 1, 1]])
 NO_CORRECTIONS = np.empty((0, 6), np.int32)
@@ -40,13 +42,17 @@ class End:
     usual: float
     corrections: np.ndarray
 
+    def of(self, some: slice) -> End:
+        """Of some of the vertices, as far as a join is chosen by it."""
+        return replace(self, positions=self.positions[some], source=self.source[some])
+
 
 def end_of(positions: np.ndarray, source: np.ndarray, corrections: np.ndarray = NO_CORRECTIONS) -> End | None:
     """The end of a level; None: the segment is too short."""
     if positions.shape[2] <= END_FRAMES:
         return None
     ends = (numbers[:, :, -END_FRAMES:].copy() for numbers in (positions, source))
-    return End(*ends, _usual(_changes(positions)), corrections)
+    return End(*ends, _usual(_changes(positions[seen(len(positions))])), corrections)
 
 
 def end_corrections(away: np.ndarray, limit: float | np.ndarray, step: float, frame: int) -> np.ndarray:
@@ -68,15 +74,24 @@ def end_corrections(away: np.ndarray, limit: float | np.ndarray, step: float, fr
     return rows[found]
 
 
-def offsets(end: End, positions: np.ndarray, join: int) -> np.ndarray:
-    """What a join adds to its frames, (N, 3, width) float64."""
+def _ways(end: End, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The jump and the change of slope from an end to the positions behind it, (N, 3) float64 each."""
     start, last = (end.positions[:, :, i].astype(np.float64) for i in range(END_FRAMES))
     first, second = (positions[:, :, i].astype(np.float64) for i in range(2))
-    jump, slope = 0.5 * (3.0 * (last - first) - (start - second)), (last - start) - (second - first)
+    return 0.5 * (3.0 * (last - first) - (start - second)), (last - start) - (second - first)
+
+
+def _shares(join: int) -> tuple[np.ndarray, np.ndarray]:
+    """Of the ways, that a join adds to its frames, (width,) each."""
     width, is_sloped = join % SLOPED, join >= SLOPED
     u = (np.arange(width) + 0.5) / width if width else np.empty(0)
-    slopes = width * u * (1.0 - u) * (1.0 - u) if is_sloped else np.zeros(width)
-    return jump[:, :, None] * (1.0 - u * u * (3.0 - 2.0 * u)) + slope[:, :, None] * slopes
+    return 1.0 - u * u * (3.0 - 2.0 * u), width * u * (1.0 - u) * (1.0 - u) if is_sloped else np.zeros(width)
+
+
+def offsets(end: End, positions: np.ndarray, join: int) -> np.ndarray:
+    """What a join adds to its frames, (N, 3, width) float64."""
+    (jump, slope), (jumps, slopes) = _ways(end, positions), _shares(join)
+    return jump[:, :, None] * jumps + slope[:, :, None] * slopes
 
 
 def joined(end: End, positions: np.ndarray, join: int) -> np.ndarray:
@@ -87,24 +102,25 @@ def joined(end: End, positions: np.ndarray, join: int) -> np.ndarray:
 
 
 class ErrorPrice:
-    """What a larger error costs a level without corrections, in ticks; most_rms: that of the level before."""
+    """What a larger error costs a level without corrections, in ticks; rms: the level's own, over so many frames,
+    most_rms: that of the level before."""
 
-    def __init__(self, positions: np.ndarray, source: np.ndarray, most_rms: float):
-        self._squares, self._most_rms = float(_squares(positions - source).sum()), most_rms
-        self._count = positions.shape[0] * positions.shape[2]
+    def __init__(self, rms: float, most_rms: float, frames: int):
+        self._rms, self._most_rms, self._frames = rms, most_rms, frames
 
     def __call__(self, before: np.ndarray, after: np.ndarray) -> float:
         """Of squared errors in some frames, (N, frames), that become others."""
-        if self._squares == 0:
+        if self._rms == 0:
             return 0.0
-        squares = self._squares + float(after.sum() - before.sum())
-        rms, own_rms = ((max(total, 0.0) / self._count) ** 0.5 for total in (squares, self._squares))
+        more = float(after.sum() - before.sum()) / (len(before) * self._frames)
+        rms = max(self._rms**2 + more, 0.0) ** 0.5
         beyond = max(0.0, rms / self._most_rms - 1.0) if self._most_rms > 0 else 0.0
-        return ERROR_WORTH * max(0.0, rms / own_rms - 1.0) + ORDER_WORTH * beyond
+        return ERROR_WORTH * max(0.0, rms / self._rms - 1.0) + ORDER_WORTH * beyond
 
 
 class CorrectionPrice:
-    """What is beyond a limit, one or (N,), costs in corrections, in ticks; bytes_: of the file up to the level."""
+    """What is beyond a limit, one or (N,), costs in corrections, in ticks; bytes_: of those vertices, up to the
+    level."""
 
     def __init__(self, limit: float | np.ndarray, bytes_: float):
         self._squared_limit, self._bytes = np.reshape(np.square(limit), (-1, 1)), bytes_
@@ -113,6 +129,36 @@ class CorrectionPrice:
         """As ErrorPrice."""
         known, now = ((squares > self._squared_limit).sum(dtype=int) for squares in (before, after))
         return BYTES_WORTH * max(0.0, CORRECTION_BYTES * (now - known) / self._bytes)
+
+
+class _Moved:
+    """Squared lengths of vectors in some frames, (N, 3, frames), that move by shares of two ways, (N, 3) each."""
+
+    def __init__(self, vectors: np.ndarray, jump: np.ndarray, slope: np.ndarray):
+        self.squares = _squares(vectors)
+        self._along = [np.einsum("nkt,nk->nt", vectors, way) for way in (jump, slope)]
+        self._ways = [(a * b).sum(axis=1, keepdims=True) for a, b in ((jump, jump), (jump, slope), (slope, slope))]
+
+    def mean(self) -> _Moved:
+        """Those of all vertices."""
+        means = copy.copy(self)
+        means.squares = self.squares.mean(axis=0)
+        means._along, means._ways = ([own.mean(axis=0) for own in some] for some in (self._along, self._ways))
+        return means
+
+    def by(self, jumps: np.ndarray, slopes: np.ndarray) -> np.ndarray:
+        """(N, width) of the first frames."""
+        width, (jump2, both, slope2) = len(jumps), self._ways
+        of_jump, of_slope = (own[..., :width] for own in self._along)
+        moved = jumps * (2.0 * of_jump + jumps * jump2)
+        if slopes.any():
+            moved += slopes * (2.0 * of_slope + 2.0 * jumps * both + slopes * slope2)
+        return np.maximum(self.squares[..., :width] + moved, 0.0)
+
+
+def seen(vertices: int) -> slice:
+    """Those of so many vertices by which joins are chosen: each of a card with 4 comes in turn."""
+    return slice(None, None, vertices // SEEN | 1)
 
 
 def _squares(away: np.ndarray) -> np.ndarray:
@@ -132,23 +178,27 @@ def _usual(changes: np.ndarray) -> float:
 
 def best_join(end: End, positions: np.ndarray, source: np.ndarray, price: ErrorPrice | CorrectionPrice) -> int:
     """How to join a level of a segment to the end of the one before: over how many frames, SLOPED above that where
-    slopes are joined too; 0: not at all. source: (N, 3, T) what is coded, in the coordinates of the positions."""
+    slopes are joined too; 0: not at all. source: (N, 3, T) what is coded, in the coordinates of the positions; of those
+    vertices that are `seen`."""
     own = _changes(positions)
     usual = min(end.usual, _usual(own))
     wanted = _changes(np.concatenate([end.source, source[:, :, : END_FRAMES + 1]], axis=2))
     wanted *= usual / max(_usual(_changes(source)), 1e-300)
     natural = np.maximum(np.concatenate([wanted, own[1:]]), usual)  # from the last frame before the seam on
 
+    width = min(max(WIDTHS), positions.shape[2] - END_FRAMES)
+    ways, away = _ways(end, positions), positions[:, :, :width] - source[:, :, :width]
+    errors = _Moved(away, *ways)
+    shown = np.concatenate([end.positions, positions[:, :, : width + 2]], axis=2, dtype=np.float64)
+    changes = _Moved(np.diff(shown, 2, axis=2), *ways).mean()
+
     def cost(join: int) -> float:
-        width = join % SLOPED
-        own, aim = positions[:, :, :width], source[:, :, :width]
-        moved = own + offsets(end, positions, join)
-        shown = np.concatenate([end.positions, moved, positions[:, :, width : width + 2]], axis=2)
-        found = _changes(shown)
+        shares = _shares(join)
+        moves = [np.diff(np.pad(own, 2), 2) for own in shares]
+        found = np.sqrt(changes.by(*moves))
         tick = float((found / natural[: len(found)]).max()) if usual > 0 else 0.0
-        return (
-            max(tick, SMOOTH) + ROUGH_WORTH * max(0.0, tick - ROUGH) + price(_squares(own - aim), _squares(moved - aim))
-        )
+        price_of_errors = price(errors.squares[:, : len(shares[0])], errors.by(*shares))
+        return max(tick, SMOOTH) + ROUGH_WORTH * max(0.0, tick - ROUGH) + price_of_errors
 
     widths = [width for width in WIDTHS if width <= positions.shape[2] - END_FRAMES]
     return min([0, *widths, *(SLOPED + width for width in widths)], key=cost)

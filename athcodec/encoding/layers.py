@@ -29,6 +29,7 @@ from athcodec.encoding.joins import (
     end_corrections,
     end_of,
     joined,
+    seen,
 )
 from athcodec.encoding.learned_modes import LearnedModes, nested
 from athcodec.encoding.motion import Plan, SegmentMotion, position_errors
@@ -287,7 +288,15 @@ class _ShownLevel:
 class _SegmentCoder:
     """Chunks {(level, kind): payload} and errors of stopping at each level, by each of MEASURES, of one segment."""
 
-    def __init__(self, prelude: CodedPrelude, layers: Layers, segment_count: int, positions: np.ndarray, goes_on: bool):
+    def __init__(
+        self,
+        prelude: CodedPrelude,
+        layers: Layers,
+        segment_count: int,
+        positions: np.ndarray,
+        goes_on: bool,
+        keeps_last: bool,
+    ):
         self._output, self._origin, self.positions = prelude.output, prelude.origin, positions
         self._pool, self._layered = prelude.plan.pool, len(layers.each) > 1
         self._level_0 = layers.level_0
@@ -296,7 +305,7 @@ class _SegmentCoder:
         self.chunks: dict[tuple[int, int], bytes] = {}
         self.errors: list[tuple[float, ...]] = []
         self._shown: list[_ShownLevel] = []
-        self._decoded = np.empty(0)  # at the last level
+        self._keeps_last, self._decoded = keeps_last, np.empty(0)  # at the last level
         self._goes_on = goes_on  # in a segment behind it
         self._met = streams.FREE_ENDS  # by the corrections of the last layer
         self._end_corrections = NO_CORRECTIONS  # likewise: of the last frame
@@ -348,11 +357,13 @@ class _SegmentCoder:
         """One further level; ratio: the step of the layer before over that of this one."""
         settings, last = layer.settings, layer.plan.level_count - 1
         bases = self._bases.refined(layer, last, level)
+        is_last = layer.ratio == 1
         segment, decoded = analyse(
-            layer.plan, self._output, settings, self.positions, layer.modes, bases, before, ratio, layered=True
+            layer.plan, self._output, settings, self.positions, layer.modes, bases, before, ratio, layered=not is_last
         )
         head = stems_head(settings, last, bases)
         self.chunks[level, ct.STEMS] = ct.pack_refined_stems(ratio, head, streams.encode_refinement(segment, last))
+        segment.forget_before()
         self._finish_with(decoded, layer, level)
         return segment
 
@@ -381,7 +392,7 @@ class _SegmentCoder:
         self.chunks.pop((level, ct.CORRECTIONS), None)
         if chunk:
             self.chunks[level, ct.CORRECTIONS] = chunk
-        if layer.ratio == 1:
+        if layer.ratio == 1 and self._keeps_last:
             self._decoded = decoded
         return self.error(decoded)
 
@@ -393,9 +404,11 @@ class _SegmentCoder:
 
     def ends(self) -> list[End | None]:
         """What each level of the segment behind this one goes on from."""
-        source = self.positions + self._origin[:, None]
-        *before, last = (shown.pose() for shown in self._shown)
-        return [*(end_of(own, source) for own in before), end_of(last, source, self._end_corrections)]
+        source = self.positions[:, :, -END_FRAMES:] + self._origin[:, None]
+        ends = [end_of(shown.pose(), source) for shown in self._shown]
+        if ends[-1] is not None:
+            ends[-1] = replace(ends[-1], corrections=self._end_corrections)
+        return ends
 
     def _meet(self, start: np.ndarray) -> None:
         """Closes the start of the last level, in whose first frame the corrections of an end stand."""
@@ -405,16 +418,20 @@ class _SegmentCoder:
 
     def join(self, ends: Sequence[End | None]) -> None:
         """Lets the levels go on from the ends of the segment before, where they are better for it."""
-        source = self.positions + self._origin[:, None]
+        some = seen(len(self.positions))
+        source = self.positions[some] + self._origin[:, None]
         for level, (end, shown) in enumerate(zip(ends, self._shown)):
             if end is None or self.positions.shape[2] <= END_FRAMES:
                 continue
             positions, layer = shown.pose(), shown.layer
             if layer is None:
-                price = ErrorPrice(positions, source, self.errors[level - 1][RMS] if level > 0 else math.inf)
+                most_rms = self.errors[level - 1][RMS] if level > 0 else math.inf
+                price = ErrorPrice(self.errors[level][RMS], most_rms, positions.shape[2])
             else:
-                price = CorrectionPrice(layer.settings.limit, self._shared_bytes + self._bytes_up_to(level))
-            join = best_join(end, positions, source, price)
+                limit, share = layer.settings.limit, len(source) / len(positions)
+                bytes_ = share * (self._shared_bytes + self._bytes_up_to(level))
+                price = CorrectionPrice(limit if np.isscalar(limit) else limit[some], bytes_)
+            join = best_join(end.of(some), positions[some], source, price)
             if join == 0:
                 continue
             self.joins[level], positions = join, joined(end, positions, join)
@@ -554,7 +571,7 @@ class CodedMotion:
         exact: np.ndarray | None = None,
         goes_on: bool = False,
     ):
-        coder = _SegmentCoder(prelude, layers, segment_count, positions, goes_on)
+        coder = _SegmentCoder(prelude, layers, segment_count, positions, goes_on, exact is not None)
         self._coder: _SegmentCoder | None = coder
         self._exact, self._largest_bound = exact, layers.each[-1].settings.largest_bound
         segment = coder.first(layers.each[0])

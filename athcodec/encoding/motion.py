@@ -310,6 +310,14 @@ class SegmentMotion:
             ):
                 setattr(self.integers, name, array.ctypes.data)
 
+    def forget_before(self) -> None:
+        """Lets go of the layer before, which is predicted from no more, and of what is predicted from it."""
+        before, self.before = self.before, None
+        before.coarse = before.placed = before.placed_tracks = before.placed_frames = None
+        self.predicted = self.predicted_tracks = None
+        before.motion.decoded = self.motion.before = self.motion.known = None
+        self.integers.predicted = self.integers.predicted_tracks = None
+
     def analyse(
         self,
         source: np.ndarray,

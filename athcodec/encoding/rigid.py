@@ -1,4 +1,4 @@
-"""Small parts that move as they are: which branches are rigid (FORMAT.md, Rigid), and corrections that keep them so.
+"""Small parts that move as they are: which branches are rigid (FORMAT.md, Rigid).
 
 A card that is smaller than the bound is noise after affine functions and modes have been quantised to it. As a rigid
 part it keeps its shape whatever the bound, and takes three rows in place of nine.
@@ -6,12 +6,11 @@ part it keeps its shape whatever the bound, and takes three rows in place of nin
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
 from athcodec._native import PIECE_VERTICES
-from athcodec.encoding.motion import Plan
 from athcodec.encoding.quantise import half_octave
 
 OWN_BEND = 0.3  # what a rigid part may bend by in the source, over the bound
@@ -57,36 +56,3 @@ def _bends(shapes: np.ndarray, sample: np.ndarray, vertices: np.ndarray) -> np.n
         u[:, :, 2] *= np.sign(np.linalg.det(u @ v))[:, None]
         worst = np.maximum(worst, np.linalg.norm(x - d @ (u @ v).transpose(0, 2, 1), axis=2).max(axis=1))
     return worst
-
-
-def move_rigid_parts(
-    plan: Plan,
-    decoded: np.ndarray,
-    positions: np.ndarray,
-    origin: np.ndarray,
-    limit: float | np.ndarray,
-    step: float,
-    stored: Callable[[np.ndarray], np.ndarray],
-) -> np.ndarray:
-    """Corrections, (K, 6), each of which moves all vertices of a rigid part together, applied to `decoded`, (N, 3, T):
-    where a vertex is beyond its limit, and this brings all of them within."""
-    found = [np.empty((0, 6), np.int32)]
-    rigid = plan.pieces[plan.is_rigid]
-    limits = np.broadcast_to(limit, len(decoded))
-    for size in np.unique(rigid["count"]).tolist():
-        vertices = rigid["first"][rigid["count"] == size][:, None] + np.arange(size)
-        away = positions[vertices] + origin[:, None] - decoded[vertices]
-        part, frame = np.nonzero(((away**2).sum(axis=2) > limits[vertices, None] ** 2).any(axis=1))
-        if not len(part):
-            continue
-        away, own = away[part, :, :, frame], limits[vertices[part]]
-        steps = np.rint((away.max(axis=1) + away.min(axis=1)) / (2 * step)).astype(np.int32)
-        here = decoded[vertices[part], :, frame[:, None]]
-        moved = np.where(steps[:, None] != 0, stored(here + steps[:, None] * step), here)
-        left = positions[vertices[part], :, frame[:, None]] + origin - moved
-        good = np.flatnonzero(((left**2).sum(axis=2) <= own**2).all(axis=1) & steps.any(axis=1))
-        decoded[vertices[part[good]], :, frame[good, None]] = moved[good]
-        rows = np.zeros((len(good), size, 6), np.int32)
-        rows[:, :, 0], rows[:, :, 1], rows[:, :, 2:5] = vertices[part[good]], frame[good, None], steps[good, None]
-        found.append(rows.reshape(-1, 6))
-    return np.concatenate(found)

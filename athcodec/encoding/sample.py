@@ -17,8 +17,8 @@ from athcodec.encoding.segment import Source
 from athcodec.frames import Frames
 from athcodec.hierarchy import Hierarchy
 
-LARGE = 1 << 16  # vertices: smaller plants are not sampled
-LEAST_SAMPLE = 1 << 15  # vertices of a sample
+LARGE = 10_000  # vertices: smaller plants are not sampled
+LEAST_SAMPLE, MOST_SAMPLE = 6_000, 1 << 16  # vertices of a sample
 SEGMENT_SHARE = 1 / 64  # of the plant that each segment of the clip adds to a sample
 SUBTREES = 8  # of a sample, at least
 
@@ -149,7 +149,7 @@ def sample_vertices(vertices: int, segments: int, effort: str) -> int | None:
     """About how many vertices a sample has; None: the plant is not sampled."""
     if vertices <= LARGE or effort == "best":
         return None
-    return min(max(int(vertices * segments * SEGMENT_SHARE), LEAST_SAMPLE), LARGE)
+    return min(max(int(vertices * segments * SEGMENT_SHARE), LEAST_SAMPLE), MOST_SAMPLE)
 
 
 def _even_branches(hierarchy: Hierarchy, wanted: int, deepest: int) -> np.ndarray:

@@ -258,6 +258,7 @@ class Search:
         self._time_components: dict[tuple, tuple[float, list[dict[int, TimeComponents]]]] = {}
         self._preludes: dict[tuple, CodedPrelude] = {}
         self._ratios, self._layered = ratios, len(ratios) > 1
+        self._sheet: np.ndarray | None = None  # that is best in all of a plant that is sampled
         self._extra_trials, self._trials = 0, trials(effort, self._layered)
 
     @classmethod
@@ -491,11 +492,23 @@ class Search:
             sheet=start.sheet if by_form else np.full_like(start.sheet, found.sheet[0]),
             node_steps=found.node_steps * np.where(inner > 0, fewer, 1.0),
         )
+        settings = replace(settings, sheet=self._sheet_of_all(settings))
         if found.rest_slack > 0:
             settings = with_rest_slack(self.source, self.ath, settings, found.rest_slack)
         if search.required_saving is None:
             return settings
         return replace(settings, learned_pieces=self._pieces_for_learned_modes(settings, [search.required_saving])[0])
+
+    def _sheet_of_all(self, settings: Settings) -> np.ndarray:
+        """Which branches have the affine functions first: as in the sample, or by form or all where those did. A sample
+        holds more than its share of what carries others, and errs there by more than in all else."""
+        if self._sheet is None:
+            by_form, everything = self.start.sheet, np.ones_like(self.start.sheet)
+            candidates = [settings]
+            if self.effort != "fast" and settings.sheet.any() and not np.array_equal(by_form, everything):
+                candidates = [replace(settings, sheet=sheet) for sheet in (by_form, everything)]
+            self._sheet = self._cheapest(candidates).sheet if len(candidates) > 1 else settings.sheet
+        return self._sheet
 
     def cost(self, settings: Settings) -> tuple[float, np.ndarray]:
         """(bytes of a whole file, and of each level's streams in it) at these settings."""

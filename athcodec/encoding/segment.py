@@ -22,7 +22,7 @@ from athcodec.encoding.features import Feature
 from athcodec.encoding.learned_modes import LearnedModes
 from athcodec.encoding.motion import LevelStream, Plan, SegmentMotion, gather
 from athcodec.encoding.polygons import Mesh
-from athcodec.encoding.rigid import TURN, move_rigid_parts
+from athcodec.encoding.rigid import TURN
 from athcodec.encoding.shape import RestPrecision
 from athcodec.encoding.time_bases import BASIS_BITS, TimeComponents, basis_rows
 from athcodec.errors import BoundError
@@ -33,10 +33,10 @@ from athcodec.threads import SERIAL, ThreadPool, default_jobs
 
 FINER = 32  # step over that of segments that bases and modes are learned from
 ROWS_AT_ONCE = 1 << 14  # of coefficients
-WORK_BYTES = 1536 << 20  # of the segments coded at once, where `jobs` does not say how many these are
+WORK_BYTES = 1 << 30  # of the segments coded at once, where `jobs` does not say how many these are
 COPIES_BENDS = 0.0, 0.15  # of copies of one shape that are tried
 CONNECTED_SHARE = 0.8  # of a rest pose at once, that one by faces may take where layers refine it
-SEGMENT_WORK = 8  # memory of a segment while it is coded, over its float32 positions
+SEGMENT_WORK = 16  # memory of a segment while it is coded, over its float32 positions
 
 
 def thread_count(jobs: int | None, source: Source) -> int:
@@ -674,12 +674,13 @@ def correct(
     """Corrections (K, 6) that keep the limit, applied to `decoded`, and their step; those of a rigid part move all
     of it where that serves, and else, unless each vertex is to keep the limit, there are none. ends: what they meet;
     in the step of correction_step. Raises BoundError."""
-    factor, stored, is_rigid = 1.0, decoded.dtype.type, np.repeat(plan.is_rigid, plan.pieces["count"])
+    factor, is_rigid = 1.0, np.repeat(plan.is_rigid, plan.pieces["count"])
+    rigid = plan.pieces[plan.is_rigid]
     limit = settings.limit if keeps_all else np.where(is_rigid, np.inf, settings.limit)
     while True:
         step = qz.single(correction_step(settings.limit) * factor)
         tried = decoded.copy() if is_rigid.any() else decoded
-        parts = move_rigid_parts(plan, tried, positions, origin, settings.limit, step, stored)
+        parts = streams.find_rigid_corrections(rigid, tried, positions, origin, settings.limit, step, plan.pool)
         corrections = streams.find_corrections(
             tried, positions, origin, limit, step, plan.pool, is_rigid | settings.narrow, ends
         )

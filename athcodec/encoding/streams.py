@@ -6,6 +6,7 @@ the container's business. Reading streams is the core's.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from contextlib import nullcontext
 from dataclasses import dataclass, field
 
@@ -328,15 +329,74 @@ def find_corrections(
     if any(rows is None for rows in parts):
         return None
     corrections = np.concatenate(parts)
+    _apply(corrections, positions, step)
+    return corrections
+
+
+def _apply(corrections: np.ndarray, positions: np.ndarray, step: float) -> None:
     lib.ath_apply_corrections(
-        frames,
+        positions.shape[2],
         positions.dtype == np.float64,
         address(positions, positions.dtype, positions.size),
         step,
         corrections.ctypes.data,
         len(corrections),
     )
+
+
+def find_rigid_corrections(
+    parts: np.ndarray,
+    positions: np.ndarray,
+    source: np.ndarray,
+    origin: np.ndarray,
+    limit: float | np.ndarray,
+    step: float,
+    pool: ThreadPool = SERIAL,
+) -> np.ndarray:
+    """Corrections, (K, 6), each of which moves all vertices of a part together, applied to `positions`, as
+    `find_corrections` has them: where a vertex is beyond its limit, and this brings all of them within. parts: records
+    with `first` and `count`."""
+    vertices, _, frames = positions.shape
+    limits = np.array(np.broadcast_to(limit, vertices), np.float64)
+    first, counts = (np.ascontiguousarray(parts[name], np.int32) for name in ("first", "count"))
+
+    def found(start: int, stop: int) -> np.ndarray:
+        return _rows(
+            lambda rows, capacity: lib.ath_find_rigid_corrections(
+                stop - start,
+                address(first[start:stop], np.int32, stop - start),
+                address(counts[start:stop], np.int32, stop - start),
+                frames,
+                positions.dtype == np.float64,
+                address(positions, positions.dtype, positions.size),
+                address(source, np.float64, positions.size),
+                address(origin, np.float64, 3),
+                address(limits, np.float64, vertices),
+                step,
+                rows,
+                capacity,
+            )
+        )
+
+    per_part = 3 * frames * max(1, int(counts.sum()) // max(1, len(counts)))
+    corrections = np.concatenate([np.empty((0, 6), np.int32), *pool.map(found, ranges(len(first), per_part))])
+    corrections = corrections[np.lexsort(corrections[:, 1::-1].T)]
+    _apply(corrections, positions, step)
     return corrections
+
+
+def _rows(find: Callable[[int, int], int]) -> np.ndarray | None:
+    """The corrections, (K, 6), that a function of the core finds, which takes their place and how many have room; None
+    where it finds that there are none that serve."""
+    capacity = 1024
+    while True:
+        rows = np.empty((capacity, 6), np.int32)
+        count = find(rows.ctypes.data, capacity)
+        if count < 0:
+            return None
+        if count <= capacity:
+            return rows[:count]
+        capacity = count
 
 
 def _corrections(
@@ -351,10 +411,8 @@ def _corrections(
     vertices, _, frames = positions.shape
     decided = np.ascontiguousarray(ends.decided, np.int32)
     met = CoreMetEnds(decided.ctypes.data, len(decided), ends.closed)
-    capacity = 1024
-    while True:
-        rows = np.empty((capacity, 6), np.int32)
-        count = lib.ath_find_corrections(
+    return _rows(
+        lambda rows, capacity: lib.ath_find_corrections(
             vertices,
             frames,
             positions.dtype == np.float64,
@@ -365,11 +423,7 @@ def _corrections(
             address(narrow, np.uint8, vertices),
             step,
             met,
-            rows.ctypes.data,
+            rows,
             capacity,
         )
-        if count < 0:
-            return None
-        if count <= capacity:
-            return rows[:count]
-        capacity = count
+    )
