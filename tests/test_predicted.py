@@ -23,8 +23,9 @@ from athcodec.encoding import prediction, search
 from athcodec.errors import AthError, BadChunk, BadChunkTable
 from athcodec.metrics import SmoothnessMeter
 
-sys.path.append(str(Path(__file__).resolve().parent.parent))  # for spec, which is not installed
+sys.path.append(str(Path(__file__).resolve().parent.parent))  # for bench and spec, which are not installed
 
+from bench.odd.growing import unfolding_leaves  # noqa: E402
 from spec import reference_decoder as rd  # noqa: E402
 
 FRAMES = 60
@@ -100,6 +101,7 @@ def circle() -> np.ndarray:
 ODD = {
     "growth": growth,
     "eased growth": lambda: growth(eased=True),
+    "leaves that unfold": lambda: unfolding_leaves(seed=1, frames=60, leaves=25),
     "noise": lambda: alone(np.random.default_rng(3).normal(size=(40, 90, 3))),
     "one vertex": lambda: alone(circle()),
     "one vertex in one frame": lambda: alone(circle()[:1]),
