@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import sys
 from io import BytesIO
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,6 +15,10 @@ from athcodec.encoding import encoder
 from athcodec.encoding.quantise import SOURCE_REST_TOLERANCE
 from athcodec.encoding.search import Search
 from athcodec.errors import BadChecksum, Truncated
+
+sys.path.append(str(Path(__file__).resolve().parent.parent))  # for bench, which is not installed
+
+from bench.odd.bending import scanned_tree  # noqa: E402
 
 OPTIONS = {"rel_error": 1e-4, "segment_frames": 16, "tam": athcodec.Thresholds(0, 0, 0, 0)}  # not predicted
 
@@ -49,6 +55,19 @@ def test_a_rest_pose_that_was_given_comes_back_within_its_tolerance(bushy_clip, 
             vertices = decoder.hierarchy.vertex_source[some]
             moved = decoder.level_rest(level)[vertices] @ maps.matrices[node, :, :3].T + maps.matrices[node, :, 3]
             assert distance(moved, decoder.positions(3, level)[vertices]) <= 1e-5 * size
+
+
+@pytest.mark.parametrize(("fraction", "most"), [(1e-3, 1.0), (1e-5, 0.98)])
+def test_the_pose_that_is_chosen_makes_the_smaller_file(fraction, most, tmp_path, monkeypatch):
+    def size() -> int:
+        path = tmp_path / "a.ath"
+        return athcodec.encode(clip, path, rel_error=fraction, ladder="none", attributes="none").bytes
+
+    clip = scanned_tree(seed=1, frames=120, stems=120, longest=5, lean=0.6)  # far from its rest pose
+    monkeypatch.undo()
+    chosen = size()
+    monkeypatch.setattr(Search, "about_best_reference", lambda search: search)
+    assert chosen <= most * size()
 
 
 @pytest.mark.parametrize("options", [{"exact_rest": True}, {"lossless": True}])

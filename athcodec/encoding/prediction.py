@@ -6,6 +6,7 @@ It suits what waves and modes do not: growth, few frames, noise, jumps, rests. `
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 
@@ -30,6 +31,7 @@ STEPS = (0.999, 0.97, 0.9, 0.75, 0.5, 0.3)  # over the largest that reaches ever
 TRIAL_SEGMENTS, TRIAL_FRAMES = 3, 64
 STILL, FINE_STILL = 0.35, 0.25  # over the limit, errors whose second differences are at most 1.4 limits, or one
 FINE = 9e-4  # over the diagonal, bounds below which it is to be one
+UNSEEN, INVISIBLE = 1e-5, 1e-6  # over the diagonal, bounds from which on twitches count for less, and for nothing
 TWITCHING = 0.02  # of the vertices, which may twitch in any frame
 MOST_FOR_STILL = 2.0  # over the bytes without, that errors without twitches may take
 TOO_MANY = 1.2  # over the bytes wanted, that a few frames may promise
@@ -120,13 +122,24 @@ def best_prediction(source: Source, bound: float, most_bytes: float) -> FoundPre
         if Feature.LATTICE not in source.without:
             found, _, _ = best([found, coded(settings, memory | LATTICE)])
         if found.twitches:
-            share = STILL if source.smallest_bound(bound) >= FINE * source.seen.diagonal else FINE_STILL
-            still, _, _ = best(coded(own, memory, share) for own in (first, *others))
+            relative = source.smallest_bound(bound) / source.seen.diagonal
+            share = _still_share(relative)
+            still, own, _ = best(coded(own, memory, share) for own in (first, *others))
+            if relative < FINE and Feature.LATTICE not in source.without:
+                still, _, _ = best([still, coded(own, memory | LATTICE, share)])
             if still.bytes < min(most_bytes, MOST_FOR_STILL * found.bytes):
                 found = still
     except BoundError:
         return None
     return found if found.bytes < most_bytes else None
+
+
+def _still_share(relative: float) -> float:
+    """Of the limit, for errors that do not twitch; it grows by less than the bound, over the diagonal, falls."""
+    if relative >= FINE:
+        return STILL
+    unseen = math.log(UNSEEN / relative) / math.log(UNSEEN / INVISIBLE)
+    return FINE_STILL ** (1.0 - min(max(unseen, 0.0), 1.0))
 
 
 def _twitches(shown: np.ndarray, positions: np.ndarray, limit: np.ndarray | float) -> bool:

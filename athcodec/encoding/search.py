@@ -409,7 +409,7 @@ class Search:
         tried._extra_trials += MEAN_POSE_WORTH
         its._extra_trials = tried._extra_trials + len(tried._known)
         found = its.like(tried, tried.at_first_step)
-        if its.cost(found)[0] >= tried.cost(tried.at_first_step)[0]:
+        if its._cost_with_maps(found) >= tried._cost_with_maps(tried.at_first_step):
             tried._extra_trials += len(its._known)
             return self
         its.at_first_step = found
@@ -827,7 +827,6 @@ class Search:
         prelude, errors = self.prelude(settings), self._level_errors(settings.bound)
         segment = self._analysed(settings, len(self.samples) // 2, self.learned_modes(prelude.plan, settings))
         rest = self.cost(settings)[1].sum() + self._prelude_bytes(prelude)
-        scale = self.source.coded_frames / self.sample.shape[2]
         least = min(qz.NODE_BYTES, qz.SMALL_NODE_SHARE * rest) if self._is_played_whole() else qz.NODE_BYTES
         allowed = max(least, qz.NODE_SHARE / (1 - qz.NODE_SHARE) * rest)
         qualities = self._node_qualities()
@@ -837,11 +836,7 @@ class Search:
             segment.clear_nodes()
             segment.analyse_nodes(self.sample, steps, settings.rounding)
             if limits is None:
-                size = sum(
-                    len(streams.encode_affines(segment, level)) * self.extrapolation.nodes[level]
-                    for level in self._map_levels(prelude.plan)
-                )
-                if size * scale > allowed and quality is not qualities[-1]:
+                if self._map_bytes(prelude.plan, segment) > allowed and quality is not qualities[-1]:
                     continue
                 chosen, limits = steps, self._errors_of_maps(prelude, segment)
                 limits[1:] = np.minimum(qz.NODE_ERROR_TOLERANCE * limits[1:], limits[:-1])  # deeper levels stay better
@@ -850,6 +845,22 @@ class Search:
             else:
                 break
         return replace(settings, node_steps=chosen)
+
+    def _cost_with_maps(self, settings: Settings) -> float:
+        """Bytes of a whole file, those of the maps of nodes included; of layers without: others choose their steps."""
+        if self._layered:
+            return self.cost(settings)[0]
+        settings = self._with_node_steps(settings)
+        plan = self.prelude(settings).plan
+        segment = self._analysed(settings, len(self.samples) // 2, self.learned_modes(plan, settings))
+        segment.analyse_nodes(self.sample, settings.node_steps, settings.rounding)
+        return self.cost(settings)[0] + self._map_bytes(plan, segment)
+
+    def _map_bytes(self, plan: Plan, segment: SegmentMotion) -> float:
+        """Of the maps of nodes in a whole file, where all segments are like this one."""
+        levels = self._map_levels(plan)
+        size = sum(len(streams.encode_affines(segment, level)) * self.extrapolation.nodes[level] for level in levels)
+        return size * self.source.coded_frames / self.sample.shape[2]
 
     def _is_played_whole(self) -> bool:
         """Of one layer and segment, so that its coarse levels are hardly ever shown, and need not meet."""
