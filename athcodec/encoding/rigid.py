@@ -59,7 +59,7 @@ def _bends(shapes: np.ndarray, sample: np.ndarray, vertices: np.ndarray) -> np.n
     return worst
 
 
-def move_rigid_parts(
+def rigid_moves(
     plan: Plan,
     decoded: np.ndarray,
     positions: np.ndarray,
@@ -68,8 +68,8 @@ def move_rigid_parts(
     step: float,
     stored: Callable[[np.ndarray], np.ndarray],
 ) -> np.ndarray:
-    """Corrections, (K, 6), each of which moves all vertices of a rigid part together, applied to `decoded`, (N, 3, T):
-    where a vertex is beyond its limit, and this brings all of them within."""
+    """Corrections, (K, 6), ascending, that move all vertices of a rigid part together: where one of `decoded`,
+    (N, 3, T), is beyond its limit, and this brings all of them within."""
     found = [np.empty((0, 6), np.int32)]
     rigid = plan.pieces[plan.is_rigid]
     limits = np.broadcast_to(limit, len(decoded))
@@ -85,8 +85,12 @@ def move_rigid_parts(
         moved = np.where(steps[:, None] != 0, stored(here + steps[:, None] * step), here)
         left = positions[vertices[part], :, frame[:, None]] + origin - moved
         good = np.flatnonzero(((left**2).sum(axis=2) <= own**2).all(axis=1) & steps.any(axis=1))
-        decoded[vertices[part[good]], :, frame[good, None]] = moved[good]
         rows = np.zeros((len(good), size, 6), np.int32)
         rows[:, :, 0], rows[:, :, 1], rows[:, :, 2:5] = vertices[part[good]], frame[good, None], steps[good, None]
         found.append(rows.reshape(-1, 6))
-    return np.concatenate(found)
+    return ascending(np.concatenate(found))
+
+
+def ascending(corrections: np.ndarray) -> np.ndarray:
+    """The same by vertex and frame."""
+    return corrections[np.lexsort(corrections[:, 1::-1].T)]

@@ -22,7 +22,7 @@ from athcodec.encoding.features import Feature
 from athcodec.encoding.learned_modes import LearnedModes
 from athcodec.encoding.motion import LevelStream, Plan, SegmentMotion, gather
 from athcodec.encoding.polygons import Mesh
-from athcodec.encoding.rigid import TURN, move_rigid_parts
+from athcodec.encoding.rigid import TURN, ascending, rigid_moves
 from athcodec.encoding.shape import RestPrecision
 from athcodec.encoding.time_bases import BASIS_BITS, TimeComponents, basis_rows
 from athcodec.errors import BoundError
@@ -678,15 +678,11 @@ def correct(
     limit = settings.limit if keeps_all else np.where(is_rigid, np.inf, settings.limit)
     while True:
         step = qz.single(correction_step(settings.limit) * factor)
-        tried = decoded.copy() if is_rigid.any() else decoded
-        parts = move_rigid_parts(plan, tried, positions, origin, settings.limit, step, stored)
-        corrections = streams.find_corrections(
-            tried, positions, origin, limit, step, plan.pool, is_rigid | settings.narrow, ends
-        )
+        moves = rigid_moves(plan, decoded, positions, origin, settings.limit, step, stored)
+        met = replace(ends, decided=ascending(np.concatenate([ends.decided, moves])))
+        corrections = streams.find_corrections(decoded, positions, origin, limit, step, plan.pool, settings.narrow, met)
         if corrections is not None:
-            decoded[...] = tried
-            corrections = np.concatenate([parts, corrections])
-            return corrections[np.lexsort(corrections[:, 1::-1].T)], step
+            return corrections, step
         factor, ends = 0.5 * factor, streams.FREE_ENDS
         if factor < 1e-3:
             raise BoundError(

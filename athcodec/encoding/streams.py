@@ -281,7 +281,7 @@ class MetEnds:
     """How the corrections of a segment meet those of the segments beside it.
 
     closed: the ends at which no footprint is cut off, FIRST and LAST. decided: (K, 6) int32 corrections in ascending
-    order, which stand in the first frame of one segment as in the last of the other.
+    order, which stand in the first frame of one segment as in the last of the other, or move rigid parts as a whole.
     """
 
     closed: int = 0
