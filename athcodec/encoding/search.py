@@ -785,6 +785,8 @@ class Search:
     def _corrected_parts(self, settings: Settings) -> float:
         """Of the vertices of rigid parts whose turns are finer than their step asks for, over all frames: the share
         that is corrected."""
+        if not settings.turn_step:
+            return 0.0
         plan = self.prelude(settings).plan
         small = plan.is_rigid & (plan.levers() * settings.turn_step < settings.step)
         of_small = np.repeat(small, plan.pieces["count"])
