@@ -58,6 +58,10 @@ STILL_STEP = 1024.0  # over what nothing is to be left of
 FIRST_FACTORS, HOPELESS = (0, 2, 8), 1.3  # of rotations; the others, and those of tips, save no more than that
 MODES_SAVE, LAYERS_SAVE = 1.5, 1.05  # of a single layer's bytes, at most: learned modes, what suits refinements better
 SHORT_STEM = 3  # vertices of a stem whose learned modes are tried in place of rotations and in any basis
+CALM_STEP, CALM_COST = 1.15, 1.02  # of small rigid parts: how much finer a step at a time, for how much in all
+CALM_SHARE = (
+    1e-4  # of their vertices over time, that may be corrected: a tenth of what the 99.9th percentile leaves out
+)
 WORTH = {
     "_with_learned_bases": 2,
     "_with_learned_modes_for_all": 6,
@@ -351,7 +355,7 @@ class Search:
     @cached_property
     def best(self) -> Settings:
         """Settings of a file of one layer."""
-        steps = [] if self.effort == "fast" else [self._with_steps, self._with_rest_slack]
+        steps = [] if self.effort == "fast" else [self._with_steps, self._with_calm_parts, self._with_rest_slack]
         if self.effort == "best" and self.source.weights is None:
             steps += [self._with_rotations, self._with_learned_bases, self._with_finer_steps]
         return self._after([*steps, self._with_node_steps], self.at_first_step)
@@ -780,6 +784,31 @@ class Search:
     def _with_steps(self, settings: Settings) -> Settings:
         """On short stems those of each basis: affine functions are best at finer steps than modes are."""
         return self._cheapest([self._walk_steps(start, 1.15, 1.4) for start in self._in_each_basis(settings)])
+
+    def _with_calm_parts(self, settings: Settings) -> Settings:
+        """A finer step where corrections bend and twitch many small rigid parts, as far as it is cheap."""
+        most = CALM_COST * self.cost(settings)[0]
+        while self._corrected_parts(settings) > CALM_SHARE:
+            finer = replace(settings, step=qz.single(settings.step / CALM_STEP))
+            if self.cost(finer)[0] > most:
+                break
+            settings = finer
+        return settings
+
+    def _corrected_parts(self, settings: Settings) -> float:
+        """Of the vertices of rigid parts whose turns are finer than their step asks for, over all frames: the share
+        that is corrected."""
+        if not settings.turn_step:
+            return 0.0
+        plan = self.prelude(settings).plan
+        small = plan.is_rigid & (plan.levers() * settings.turn_step < settings.step)
+        of_small = np.repeat(small, plan.pieces["count"])
+        if not of_small.any():
+            return 0.0
+        number = len(self.samples) // 2
+        modes, own = self.learned_modes(plan, settings), settings.of_segment(self.samples[number].whole_loop)
+        coded = code_stems(self.prelude(settings), own, self.sample, modes, self._bases(settings, number))
+        return of_small[coded.corrections[:, 0]].sum() / (of_small.sum() * self.sample.shape[2])
 
     def _with_finer_steps(self, settings: Settings) -> Settings:
         return self._walk_steps(settings, 1.04, 1.12)

@@ -679,15 +679,11 @@ def correct(
     limit = settings.limit if keeps_all else np.where(is_rigid, np.inf, settings.limit)
     while True:
         step = qz.single(correction_step(settings.limit) * factor)
-        tried = decoded.copy() if is_rigid.any() else decoded
-        parts = streams.find_rigid_corrections(rigid, tried, positions, origin, settings.limit, step, plan.pool)
-        corrections = streams.find_corrections(
-            tried, positions, origin, limit, step, plan.pool, is_rigid | settings.narrow, ends
-        )
+        moves = streams.find_rigid_corrections(rigid, decoded, positions, origin, settings.limit, step, plan.pool)
+        met = replace(ends, decided=streams.ascending(np.concatenate([ends.decided, moves])))
+        corrections = streams.find_corrections(decoded, positions, origin, limit, step, plan.pool, settings.narrow, met)
         if corrections is not None:
-            decoded[...] = tried
-            corrections = np.concatenate([parts, corrections])
-            return corrections[np.lexsort(corrections[:, 1::-1].T)], step
+            return corrections, step
         factor, ends = 0.5 * factor, streams.FREE_ENDS
         if factor < 1e-3:
             raise BoundError(

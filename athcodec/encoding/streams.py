@@ -282,7 +282,7 @@ class MetEnds:
     """How the corrections of a segment meet those of the segments beside it.
 
     closed: the ends at which no footprint is cut off, FIRST and LAST. decided: (K, 6) int32 corrections in ascending
-    order, which stand in the first frame of one segment as in the last of the other.
+    order, which stand in the first frame of one segment as in the last of the other, or move rigid parts as a whole.
     """
 
     closed: int = 0
@@ -329,19 +329,15 @@ def find_corrections(
     if any(rows is None for rows in parts):
         return None
     corrections = np.concatenate(parts)
-    _apply(corrections, positions, step)
-    return corrections
-
-
-def _apply(corrections: np.ndarray, positions: np.ndarray, step: float) -> None:
     lib.ath_apply_corrections(
-        positions.shape[2],
+        frames,
         positions.dtype == np.float64,
         address(positions, positions.dtype, positions.size),
         step,
         corrections.ctypes.data,
         len(corrections),
     )
+    return corrections
 
 
 def find_rigid_corrections(
@@ -353,9 +349,8 @@ def find_rigid_corrections(
     step: float,
     pool: ThreadPool = SERIAL,
 ) -> np.ndarray:
-    """Corrections, (K, 6), each of which moves all vertices of a part together, applied to `positions`, as
-    `find_corrections` has them: where a vertex is beyond its limit, and this brings all of them within. parts: records
-    with `first` and `count`."""
+    """Corrections, (K, 6), ascending, each of which moves all vertices of a part together, where one of `positions` is
+    beyond its limit, and this brings all of them within. parts: records with `first` and `count`."""
     vertices, _, frames = positions.shape
     limits = np.array(np.broadcast_to(limit, vertices), np.float64)
     first, counts = (np.ascontiguousarray(parts[name], np.int32) for name in ("first", "count"))
@@ -380,9 +375,12 @@ def find_rigid_corrections(
 
     per_part = 3 * frames * max(1, int(counts.sum()) // max(1, len(counts)))
     corrections = np.concatenate([np.empty((0, 6), np.int32), *pool.map(found, ranges(len(first), per_part))])
-    corrections = corrections[np.lexsort(corrections[:, 1::-1].T)]
-    _apply(corrections, positions, step)
-    return corrections
+    return ascending(corrections)
+
+
+def ascending(corrections: np.ndarray) -> np.ndarray:
+    """The same by vertex and frame."""
+    return corrections[np.lexsort(corrections[:, 1::-1].T)]
 
 
 def _rows(find: Callable[[int, int], int]) -> np.ndarray | None:
