@@ -326,8 +326,8 @@ class EncodingJob:
         """The same without levels between a map for each root and the whole motion, where a small file gets smaller:
         their maps and streams, and what keeps these apart, are much of it, and nobody waits for the rest of it."""
         options, source = self.options, self.source
-        is_out = options.tam or options.effort == "fast" or source.has_seams or Feature.ONE_NODE in source.without
-        if is_out or self._estimated_bytes(best) > SMALL_FILE:
+        is_out = options.tam or options.lossless or options.effort == "fast" or Feature.ONE_NODE in source.without
+        if is_out or source.has_seams or self._estimated_bytes(best) > SMALL_FILE:
             return best
         search = Search.of(
             source, self.seen.ath(self.seen.one_node(bound)), bound, options.effort, self.report, options.jobs
