@@ -99,4 +99,6 @@ def test_rigid_parts_are_moved_as_a_whole_where_that_serves_all_of_their_vertice
     decoded[3:, 1, 7] = 1.6, 0.0, -1.6  # in opposite ways: no correction of all serves
     rows = streams.find_rigid_corrections(parts, decoded, wanted, origin, limit, step)
     assert rows.tolist() == [[vertex, 5, -3, 0, 0, 0] for vertex in range(3)]
+    ends = streams.MetEnds(decided=rows)
+    assert streams.find_corrections(decoded, wanted, origin, [limit] * 3 + [np.inf] * 3, step, ends=ends) is not None
     assert np.abs(decoded[:3]).max() <= limit and decoded[3, 1, 7] == np.float32(1.6)
