@@ -434,21 +434,6 @@ class Survey:
         accepted[self.branches] = self._keeps_epsilon(thresholds) & self._keeps_xi(thresholds)
         return _prune(self.hierarchy, thresholds, self.rest, accepted, self.max_depth)
 
-    def one_node(self, least: float) -> Thresholds:
-        """Thresholds that accept the subtree of each root, where lam was 0.
-
-        Parameters
-        ----------
-        least : float
-            What epsilon and xi are at least, scene units.
-
-        Returns
-        -------
-        Thresholds
-        """
-        gads, distances = self.largest_gads[0], self.largest_distance
-        return Thresholds(max(least, gads.max(initial=0.0)), 0, max(least, distances.max(initial=0.0)), 0)
-
     def _keeps_epsilon(self, thresholds: Thresholds) -> np.ndarray | bool:
         """TAM's first condition: at most eta frames have a GAD above epsilon."""
         eta, surveyed = thresholds.eta, len(self.largest_gads) - 1

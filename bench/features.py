@@ -145,7 +145,6 @@ def _uses(made: Draft, feature: Feature) -> bool:
         Feature.WIDE: True,
         Feature.JOINS: made.segment_count > 1,
         Feature.PERIODIC: choice.settings.periodic,
-        Feature.ONE_NODE: made.thresholds.epsilon > choice.settings.bound,
     }.get(feature, False)
 
 

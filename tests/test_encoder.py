@@ -16,9 +16,6 @@ from athcodec.container import Limits
 from athcodec.encoding.motion import SegmentMotion
 from athcodec.errors import BoundError, ClipError
 from athcodec.segmentation import decoding_bytes, split_segments
-from bench.odd import bending
-from bench.odd.bending import Bones
-from bench.trees.plant import grow
 
 
 @pytest.fixture
@@ -31,24 +28,6 @@ def encoded(clip, folder, **options) -> bytes:
 
 
 # ---- bounds and sizes ----
-
-
-def test_a_small_plant_gives_up_levels_where_its_file_gets_smaller_unless_they_are_asked_for(tmp_path):
-    bones = Bones.of(grow(200, 3, 2.0, 5))
-    time = np.arange(48) / 30.0
-    blow = np.exp(-1.5 * time) * np.sin(9 * time)
-    shares = np.random.default_rng(5).uniform(0.1, 0.3, len(bones.branch_parent))
-    turns = (blow[:, None] * shares)[..., None] * np.array([0.3, 0.0, -1.0])
-    clip = bending.clip_of(bones, bones.bent(turns))
-    bound = 1e-3 * float(np.linalg.norm(np.ptp(clip.positions, axis=(0, 1))))
-    given = {"max_error": bound, "ladder": "none", "attributes": "none"}
-    small = athcodec.encode(clip, tmp_path / "small.ath", **given)
-    asked = athcodec.encode(clip, tmp_path / "asked.ath", tam=athcodec.Thresholds(bound, 0, bound, 0), **given)
-    assert small.bytes < 0.9 * asked.bytes
-    assert len(small.levels) == 2 < len(asked.levels)
-    with athcodec.open(small.path, strict=True) as decoder:
-        error = np.linalg.norm(decoder.positions() - clip.positions.astype(np.float64), axis=2).max()
-    assert error <= bound
 
 
 @pytest.mark.parametrize("target", [6_000, 15_000, 40_000])

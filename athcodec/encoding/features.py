@@ -25,4 +25,3 @@ class Feature(Enum):
     WIDE = "corrections of several frames"
     JOINS = "joins"
     PERIODIC = "periodic time bases"
-    ONE_NODE = "one node for all of a small plant"

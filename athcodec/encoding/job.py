@@ -57,10 +57,6 @@ SPOOL_BYTES = 64 << 20
 CHUNK_BYTES, LEVEL_BYTES = 6, 6  # of the front for a chunk, and for the errors of a level and segment
 PREDICTED_SHARE = 0.8  # of a file with layers, that one with predicted motion, which has none, may take
 SEARCH_SAVES = 0.5  # of the bytes at the settings that a search starts with, at most
-SMALL_FILE, ONE_NODE_SHARE = (
-    10_000,
-    0.97,
-)  # bytes up to which levels are given up, where that leaves no more than so much
 STATIC_METADATA = ("unit", "up_axis")
 
 
@@ -118,7 +114,6 @@ class Draft:
     """
 
     choice: Choice
-    thresholds: Thresholds
     seen: Survey
     segment_count: int
     found: Found | None  # branches, for a clip without
@@ -309,31 +304,12 @@ class EncodingJob:
         prediction = None if search.start.rigid.any() else self._best_prediction(bound, unsearched)
         if prediction is not None and prediction.bytes < SEARCH_SAVES * unsearched:
             return self._predicted(prediction.choice)
-        best = self._searched(search, ratio)
-        if ratio == 1 and ath.height > 0:
-            best = self._of_one_node(best, bound)
+        choices, prelude = search.decide(ratio)
+        layered = [self._layered(ath, choice, prelude) for choice in choices]
+        best = layered[0] if len(layered) == 1 else min(layered, key=self._estimated_bytes)
         if prediction is not None and prediction.bytes < share * self._estimated_bytes(best):
             return self._predicted(prediction.choice)
         return best
-
-    def _searched(self, search: Search, ratio: int) -> _Decided:
-        """The best file with a hierarchy of maps; ratio: as Search.decide has it."""
-        choices, prelude = search.decide(ratio)
-        layered = [self._layered(search.ath, choice, prelude) for choice in choices]
-        return layered[0] if len(layered) == 1 else min(layered, key=self._estimated_bytes)
-
-    def _of_one_node(self, best: _Decided, bound: float) -> _Decided:
-        """The same without levels between a map for each root and the whole motion, where a small file gets smaller:
-        their maps and streams, and what keeps these apart, are much of it, and nobody waits for the rest of it."""
-        options, source = self.options, self.source
-        is_out = options.tam or options.lossless or options.effort == "fast" or Feature.ONE_NODE in source.without
-        if is_out or source.has_seams or self._estimated_bytes(best) > SMALL_FILE:
-            return best
-        search = Search.of(
-            source, self.seen.ath(self.seen.one_node(bound)), bound, options.effort, self.report, options.jobs
-        )
-        other = self._searched(search, 1)
-        return other if self._estimated_bytes(other) < ONE_NODE_SHARE * self._estimated_bytes(best) else best
 
     def _best_prediction(self, bound: float, most_bytes: float) -> FoundPrediction | None:
         """None for one who asks for a hierarchy of maps, which predicted motion has not."""
@@ -376,15 +352,7 @@ class EncodingJob:
         return _Decided(ath, choice, prelude, layers, source)
 
     def draft(self, decided: _Decided) -> Draft:
-        return Draft(
-            decided.choice,
-            decided.ath.thresholds,
-            self.seen,
-            decided.segment_count,
-            self.found,
-            self.options,
-            decided.fingerprint,
-        )
+        return Draft(decided.choice, self.seen, decided.segment_count, self.found, self.options, decided.fingerprint)
 
     def decided(self, draft: Draft) -> _Decided:
         """What the draft's maker had decided, made again. Raises ClipError where it is not the same."""
@@ -392,7 +360,7 @@ class EncodingJob:
         if draft.choice.predicted is not None:
             decided = self._predicted(draft.choice)
         else:
-            ath = self.seen.ath(draft.thresholds)
+            ath = self.seen.ath(self.thresholds(settings.bound))
             source = self.source.about(draft.choice.reference)
             decided = self._layered(ath, draft.choice, CodedPrelude(source, ath, settings))
         if decided.fingerprint != draft.fingerprint:
