@@ -2847,79 +2847,59 @@ PI = 3.14159265358979323846
 
 @cache
 def waves_over_time(frames: int, periodic: bool) -> np.ndarray:
-    """(frames, frames): wave k at frame t, modes of a free beam or a Fourier series."""
-    return np.array(periodic_waves(frames) if periodic else beam_waves(frames))
+    """(frames, frames): wave k at frame t, the smoothest functions or a Fourier series."""
+    return np.array(periodic_waves(frames) if periodic else smooth_waves(frames))
 
 
-def beam_waves(frames: int) -> list[list[float]]:
-    waves = [unit_length([1.0] * frames)]
-    if frames > 1:
-        waves.append(unit_length([0.5 * (frames - 1) - t for t in range(frames)]))
-    return waves + [beam_wave(frames, k) for k in range(2, frames)]
+def smooth_waves(frames: int) -> list[np.ndarray]:
+    waves = [np.zeros(frames) for _ in range(frames)]
+    for sign in (1, -1):
+        n = (frames + 1) // 2 if sign > 0 else frames // 2
+        for m, folded in enumerate(folded_waves(frames, n, sign) if n > 0 else []):
+            wave = waves[2 * m + (1 if sign < 0 else 0)]
+            for i in range(n):
+                t = n - 1 - i
+                x = folded[i] if 2 * t + 1 == frames else folded[i] * math.sqrt(0.5)
+                wave[frames - 1 - t] = sign * x
+                wave[t] = x
+    return waves
 
 
-def unit_length(x: list[float]) -> list[float]:
-    length2 = 0.0
-    for value in x:
-        length2 = length2 + value * value
-    scale = 1.0 / math.sqrt(length2)
-    return [value * scale for value in x]
+def folded_waves(frames: int, n: int, sign: int) -> list[np.ndarray]:
+    """Those even about the middle, or odd, as numbers of the frames from the middle to the first."""
+    _, vectors = principal(folded_bending(frames, n, sign))
+    waves: list[np.ndarray] = []
+    for degree in (0, 2) if sign > 0 else (1, 3):
+        if len(waves) < n:
+            append_orthonormal(waves, polynomial(frames, n, degree), 0.0)
+    for m in range(n - 1 - len(waves), -1, -1):
+        append_orthonormal(waves, vectors[m], 0.0)
+    return waves
 
 
-def beam_wave(frames: int, k: int) -> list[float]:
-    """Of a mode that bends: cos((2 t + 1) h + phase), and what falls by `decay` a frame from either end."""
-    sine, cosine, decay, slope = mode_at(frames, k, PI * (k - 0.5) / (2 * frames))
-    for _ in range(24):
-        sine, cosine, decay, slope = mode_at(frames, k, (0.5 * PI * k - atan_of(slope)) / frames)
-    sign, unit = 1.0 if k % 2 == 0 else -1.0, 1.0 / math.sqrt(1.0 + slope * slope)
-    c, s = (cosine - sine * slope) * unit, (sine + cosine * slope) * unit
-    turn_c, turn_s = 1.0 - 2.0 * sine * sine, 2.0 * sine * cosine
-    edge, fall, wave = c / (1.0 + sign * power(decay, frames - 1)), [1.0], [0.0] * frames
-    for _ in range(frames - 1):
-        fall.append(fall[-1] * decay)
-    for t in range((frames + 1) // 2):
-        x = c + edge * (fall[t] + sign * fall[frames - 1 - t])
-        wave[frames - 1 - t] = sign * x
-        wave[t] = x
-        c, s = c * turn_c - s * turn_s, s * turn_c + c * turn_s
-    return unit_length(wave)
+def polynomial(frames: int, n: int, degree: int) -> np.ndarray:
+    values = []
+    for i in range(n):
+        t = (frames - 1 - 2 * (n - 1 - i)) / frames
+        x = 1.0 if degree % 2 == 0 else t
+        if degree > 1:
+            x = x * t * t
+        values.append(x * math.sqrt(0.5) if 2 * (n - 1 - i) + 1 == frames else x)
+    return np.array(values)
 
 
-def mode_at(frames: int, k: int, h: float) -> tuple[float, float, float, float]:
-    """Sine and cosine of h, decay, tangent of the phase."""
-    sine, cosine = sin_of(h), cos_of(h)
-    root = math.sqrt(1.0 + sine * sine)
-    decay = (root - sine) * (root - sine)
-    far = power(decay, frames)
-    ratio = (1.0 - far) / (1.0 + far)
-    return sine, cosine, decay, cosine / root * (ratio if k % 2 == 0 else 1.0 / ratio)
-
-
-def power(x: float, n: int) -> float:
-    product = 1.0
-    while n > 0:
-        if n % 2 == 1:
-            product = product * x
-        x, n = x * x, n // 2
-    return product
-
-
-def cos_of(x: float) -> float:
-    """0 <= x <= pi / 2."""
-    return cos_series(x) if x <= 0.25 * PI else sin_series(0.5 * PI - x)
-
-
-def sin_of(x: float) -> float:
-    return sin_series(x) if x <= 0.25 * PI else cos_series(0.5 * PI - x)
-
-
-def atan_of(x: float) -> float:
-    """x >= 0."""
-    half = x / (1.0 + math.sqrt(1.0 + x * x))
-    quarter, total = half / (1.0 + math.sqrt(1.0 + half * half)), 0.0
-    for k in range(25, 0, -2):
-        total = 1.0 / k - total * (quarter * quarter)
-    return 4.0 * (quarter * total)
+def folded_bending(frames: int, n: int, sign: int) -> np.ndarray:
+    d = np.diff(np.eye(frames), 4, axis=0) if frames > 4 else np.zeros((0, frames))
+    bending, a = d.T @ d, np.empty((n, n))  # whole numbers
+    for i in range(n):
+        for j in range(i + 1):
+            t, u = n - 1 - i, n - 1 - j
+            value = bending[t, u] + sign * bending[t, frames - 1 - u]
+            for place in (t, u):
+                if 2 * place + 1 == frames:
+                    value = value * math.sqrt(0.5)
+            a[i, j] = a[j, i] = value
+    return a
 
 
 def periodic_waves(frames: int) -> list[list[float]]:

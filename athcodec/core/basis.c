@@ -4,7 +4,7 @@
 
 #define PI 3.14159265358979323846
 
-enum { MOST_PROBES = 64, MOST_ROWS = ATH_SEGMENT_FRAMES, MODE_STEPS = 24 };
+enum { MOST_PROBES = 64, MOST_ROWS = ATH_SEGMENT_FRAMES };
 
 /* Householder reduction of the symmetric n x n matrix `a` to tridiagonal form; on return row i of `q` is the i-th
  * basis vector in which the matrix is tridiagonal (diagonal d, subdiagonal e[1..n-1]). Rounding makes the matrix
@@ -376,98 +376,86 @@ static void periodic_waves(int32_t frames, double *waves)
     }
 }
 
-/* For 0 <= x <= pi / 2. */
-static double cos_of(double x) { return x <= 0.25 * PI ? cos_series(x) : sin_series(0.5 * PI - x); }
-
-static double sin_of(double x) { return x <= 0.25 * PI ? sin_series(x) : cos_series(0.5 * PI - x); }
-
-/* For x >= 0, by the series at a quarter of the angle. */
-static double atan_of(double x)
+/* What bends a row over time: the entry of D'D, D its fourth differences, and its mirror image in time. */
+static double bending(int32_t frames, int32_t i, int32_t j)
 {
-    double half = x / (1.0 + ath_sqrt(1.0 + x * x)), quarter = half / (1.0 + ath_sqrt(1.0 + half * half)), sum = 0.0;
-    for (int32_t k = 25; k > 0; k -= 2) sum = 1.0 / (double)k - sum * (quarter * quarter);
-    return 4.0 * (quarter * sum);
+    static const int32_t difference[] = {1, -4, 6, -4, 1};
+    int32_t sum = 0;
+    for (int32_t r = 0; r + 4 < frames; r++)
+        if (i >= r && i <= r + 4 && j >= r && j <= r + 4) sum += difference[i - r] * difference[j - r];
+    return (double)sum;
 }
 
-static double power(double x, int32_t n)
+/* D'D on the rows that are even about the middle (sign 1), or odd (-1), as numbers of the frames from the middle to the first:
+ * a frame and its mirror image are one, times the root of two. */
+static void fold_bending(int32_t frames, int32_t n, int32_t sign, double *a)
 {
-    double product = 1.0;
-    for (; n > 0; n /= 2) {
-        if (n % 2 == 1) product = product * x;
-        x = x * x;
+    double half = ath_sqrt(0.5);
+    for (int32_t i = 0; i < n; i++)
+        for (int32_t j = 0; j <= i; j++) {
+            int32_t t = n - 1 - i, u = n - 1 - j, mirrored = frames - 1 - u;
+            double value = bending(frames, t, u) + (double)sign * bending(frames, t, mirrored);
+            if (2 * t + 1 == frames) value = value * half;
+            if (2 * u + 1 == frames) value = value * half;
+            a[i * n + j] = a[j * n + i] = value;
+        }
+}
+
+/* The even or the odd waves, folded: polynomials of degree 0 and 2, or 1 and 3, and the eigenvectors beyond them. */
+static void folded_waves(int32_t frames, int32_t n, int32_t sign, double *waves, double *work)
+{
+    double *a = work, *q = a + n * n, *vectors = q + n * n, values[MOST_ROWS], candidate[MOST_ROWS];
+    double half = ath_sqrt(0.5);
+    int32_t count = 0;
+    fold_bending(frames, n, sign, a);
+    eigenvectors(n, a, q, values, vectors);
+    for (int32_t degree = sign > 0 ? 0 : 1; degree < 4 && count < n; degree += 2) {
+        for (int32_t i = 0; i < n; i++) {
+            double t = (double)(frames - 1 - 2 * (n - 1 - i)) / (double)frames, x = degree % 2 == 0 ? 1.0 : t;
+            if (degree > 1) x = x * t * t;
+            candidate[i] = 2 * (n - 1 - i) + 1 == frames ? x * half : x;
+        }
+        count = append_orthonormal(n, waves, count, candidate, 0.0);
     }
-    return product;
+    for (int32_t m = n - 1 - count; m >= 0; m--) count = append_orthonormal(n, waves, count, vectors + m * n, 0.0);
 }
 
-/* A mode of a free beam, cos((2 t + 1) h + phase) and what falls by `decay` a frame from either end. */
-typedef struct {
-    double sine, cosine; /* of h */
-    double decay, slope; /* slope: tan(phase) */
-} beam_mode;
-
-/* Mode k, its h taken as right; even modes are even about the middle, odd ones odd. */
-static beam_mode mode_at(int32_t frames, int32_t k, double h)
+static void unfold(int32_t frames, int32_t n, int32_t sign, const double *folded, double *wave)
 {
-    beam_mode mode = {sin_of(h), cos_of(h), 0.0, 0.0};
-    double root = ath_sqrt(1.0 + mode.sine * mode.sine), other = root - mode.sine;
-    mode.decay = other * other;
-    double far = power(mode.decay, frames), ratio = (1.0 - far) / (1.0 + far);
-    mode.slope = mode.cosine / root * (k % 2 == 0 ? ratio : 1.0 / ratio);
-    return mode;
-}
-
-/* h solves 2 frames h = pi k - 2 phase(h): each step takes at least two bits, mostly ten, off the error. */
-static beam_mode find_mode(int32_t frames, int32_t k)
-{
-    beam_mode mode = mode_at(frames, k, PI * ((double)k - 0.5) / (double)(2 * frames));
-    for (int32_t step = 0; step < MODE_STEPS; step++)
-        mode = mode_at(frames, k, (0.5 * PI * (double)k - atan_of(mode.slope)) / (double)frames);
-    return mode;
-}
-
-static void unit_length(int32_t frames, double *wave)
-{
-    double length2 = 0.0;
-    for (int32_t t = 0; t < frames; t++) length2 = length2 + wave[t] * wave[t];
-    double scale = 1.0 / ath_sqrt(length2);
-    for (int32_t t = 0; t < frames; t++) wave[t] = wave[t] * scale;
-}
-
-static void beam_wave(int32_t frames, int32_t k, double *wave)
-{
-    beam_mode mode = find_mode(frames, k);
-    double sign = k % 2 == 0 ? 1.0 : -1.0, unit = 1.0 / ath_sqrt(1.0 + mode.slope * mode.slope);
-    double c = (mode.cosine - mode.sine * mode.slope) * unit, s = (mode.sine + mode.cosine * mode.slope) * unit;
-    double turn_c = 1.0 - 2.0 * mode.sine * mode.sine, turn_s = 2.0 * mode.sine * mode.cosine;
-    double edge = c / (1.0 + sign * power(mode.decay, frames - 1)), fall[ATH_SEGMENT_FRAMES];
-    fall[0] = 1.0;
-    for (int32_t t = 1; t < frames; t++) fall[t] = fall[t - 1] * mode.decay;
-    for (int32_t t = 0; 2 * t < frames; t++) {
-        double x = c + edge * (fall[t] + sign * fall[frames - 1 - t]), turned = c * turn_c - s * turn_s;
-        wave[frames - 1 - t] = sign * x;
+    double half = ath_sqrt(0.5);
+    wave[frames / 2] = 0.0;
+    for (int32_t i = 0; i < n; i++) {
+        int32_t t = n - 1 - i;
+        double x = 2 * t + 1 == frames ? folded[i] : folded[i] * half;
+        wave[frames - 1 - t] = (double)sign * x;
         wave[t] = x;
-        s = s * turn_c + c * turn_s;
-        c = turned;
     }
-    unit_length(frames, wave);
 }
 
-static void beam_waves(int32_t frames, double *waves)
+static void smooth_waves(int32_t frames, double *waves, double *work)
 {
-    for (int32_t t = 0; t < frames; t++) waves[t] = 1.0;
-    unit_length(frames, waves);
-    if (frames == 1) return;
-    for (int32_t t = 0; t < frames; t++) waves[frames + t] = 0.5 * (double)(frames - 1) - (double)t;
-    unit_length(frames, waves + frames);
-    for (int32_t k = 2; k < frames; k++) beam_wave(frames, k, waves + k * frames);
+    for (int32_t sign = 1; sign >= -1; sign -= 2) {
+        int32_t n = sign > 0 ? (frames + 1) / 2 : frames / 2;
+        if (n == 0) return;
+        double *folded = work + 3 * n * n;
+        folded_waves(frames, n, sign, folded, work);
+        for (int32_t m = 0; m < n; m++)
+            unfold(frames, n, sign, folded + m * n, waves + (2 * m + (sign < 0)) * frames);
+    }
 }
 
-void ath_waves(int32_t frames, int32_t periodic, double *waves)
+size_t ath_waves_work(int32_t frames)
+{
+    size_t half = (size_t)(frames + 1) / 2;
+    return 4 * half * half;
+}
+
+void ath_waves(int32_t frames, int32_t periodic, double *waves, double *work)
 {
     if (periodic)
         periodic_waves(frames, waves);
     else
-        beam_waves(frames, waves);
+        smooth_waves(frames, waves, work);
 }
 
 double ath_tan_of_half(double x)

@@ -20,6 +20,8 @@ static uint64_t scratch_size(const ath_header *header)
 {
     uint64_t size = larger(header->vertex_count, ath_basis_table_size(most_pieces(header))) * sizeof(int32_t);
     size = larger(size, turns_place() + (uint64_t)header->branch_count * 9 * sizeof(double));
+    uint32_t frames = header->frame_count < ATH_SEGMENT_FRAMES ? header->frame_count : ATH_SEGMENT_FRAMES;
+    size = larger(size, ath_waves_work((int32_t)frames) * sizeof(double));
     return larger(size, ATH_BASIS_WORK * sizeof(double));
 }
 
@@ -704,7 +706,8 @@ int ath_build(ath_file *file, void *memory, size_t memory_bytes)
     file->plan.bases = file->bases;
     for (int32_t periodic = 0; periodic < 2; periodic++)
         for (int32_t frames = 1; frames <= ATH_SEGMENT_FRAMES; frames++)
-            if (file->waves[periodic][frames]) ath_waves(frames, periodic, file->waves[periodic][frames]);
+            if (file->waves[periodic][frames])
+                ath_waves(frames, periodic, file->waves[periodic][frames], (double *)file->scratch);
     return ATH_OK;
 }
 
