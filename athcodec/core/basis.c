@@ -439,8 +439,7 @@ static void smooth_waves(int32_t frames, double *waves, double *work)
         if (n == 0) return;
         double *folded = work + 3 * n * n;
         folded_waves(frames, n, sign, folded, work);
-        for (int32_t m = 0; m < n; m++)
-            unfold(frames, n, sign, folded + m * n, waves + (2 * m + (sign < 0)) * frames);
+        for (int32_t m = 0; m < n; m++) unfold(frames, n, sign, folded + m * n, waves + (2 * m + (sign < 0)) * frames);
     }
 }
 

@@ -44,8 +44,8 @@ RANGES, LEAST_RANGE = 24, 1024  # of a plant's vertices per thread and call
 
 @lru_cache(16)
 def waves_over_time(frames: int, periodic: bool = False) -> np.ndarray:
-    """The smoothest functions of time or, if periodic, a Fourier series: orthonormal rows, (frames, frames) float64, bit
-    for bit those of the decoder."""
+    """The smoothest functions of time or, if periodic, a Fourier series: orthonormal rows, (frames, frames) float64,
+    bit for bit those of the decoder."""
     waves, work = np.empty((frames, frames)), np.empty(lib.ath_waves_work(frames))
     lib.ath_waves(frames, periodic, waves.ctypes.data, work.ctypes.data)
     waves.setflags(write=False)

@@ -32,8 +32,9 @@ ROTATION_FACTORS = (0, 1, 2, 4, 8)
 
 WEIGHT_PARTS = (0.0, 0.05, 0.2)  # of a level's vertices that may have weights below that of its step
 
-# What the value, the slope and the bend of a row weigh at its ends, in squared steps: at least, where segments meet at most,
-# and there where the velocity changes by one bound in a usual frame. Less by the square of that: who moves hides its errors.
+# What the value, the slope and the bend of a row weigh at its ends, in squared steps: at least; where segments meet, at
+# most, and where the velocity changes by one bound in a usual frame. Less by the square of that: who moves hides its
+# errors.
 LEAST_END_WEIGHTS = (0.5, 5.0, 5.0)
 MOST_END_WEIGHTS = (3.0, 100.0, 50.0)
 END_WEIGHTS = (5.0, 1.0, 0.25)
