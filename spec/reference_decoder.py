@@ -2869,7 +2869,7 @@ def folded_waves(frames: int, n: int, sign: int) -> list[np.ndarray]:
     """Those even about the middle, or odd, as numbers of the frames from the middle to the first."""
     _, vectors = principal(folded_bending(frames, n, sign))
     waves: list[np.ndarray] = []
-    for degree in (0, 2) if sign > 0 else (1, 3):
+    for degree in (0, 2) if sign > 0 else (1,):
         if len(waves) < n:
             append_orthonormal(waves, polynomial(frames, n, degree), 0.0)
     for m in range(n - 1 - len(waves), -1, -1):
@@ -2889,7 +2889,7 @@ def polynomial(frames: int, n: int, degree: int) -> np.ndarray:
 
 
 def folded_bending(frames: int, n: int, sign: int) -> np.ndarray:
-    d = np.diff(np.eye(frames), 4, axis=0) if frames > 4 else np.zeros((0, frames))
+    d = np.diff(np.eye(frames), 3, axis=0) if frames > 3 else np.zeros((0, frames))
     bending, a = d.T @ d, np.empty((n, n))  # whole numbers
     for i in range(n):
         for j in range(i + 1):

@@ -376,13 +376,13 @@ static void periodic_waves(int32_t frames, double *waves)
     }
 }
 
-/* What bends a row over time: the entry of D'D, D its fourth differences, and its mirror image in time. */
+/* What bends a row over time: the entry of D'D, D its third differences, and its mirror image in time. */
 static double bending(int32_t frames, int32_t i, int32_t j)
 {
-    static const int32_t difference[] = {1, -4, 6, -4, 1};
+    static const int32_t difference[] = {-1, 3, -3, 1};
     int32_t sum = 0;
-    for (int32_t r = 0; r + 4 < frames; r++)
-        if (i >= r && i <= r + 4 && j >= r && j <= r + 4) sum += difference[i - r] * difference[j - r];
+    for (int32_t r = 0; r + 3 < frames; r++)
+        if (i >= r && i <= r + 3 && j >= r && j <= r + 3) sum += difference[i - r] * difference[j - r];
     return (double)sum;
 }
 
@@ -401,7 +401,7 @@ static void fold_bending(int32_t frames, int32_t n, int32_t sign, double *a)
         }
 }
 
-/* The even or the odd waves, folded: polynomials of degree 0 and 2, or 1 and 3, and the eigenvectors beyond them. */
+/* The even or the odd waves, folded: polynomials of degree 0 and 2, or 1, and the eigenvectors beyond them. */
 static void folded_waves(int32_t frames, int32_t n, int32_t sign, double *waves, double *work)
 {
     double *a = work, *q = a + n * n, *vectors = q + n * n, values[MOST_ROWS], candidate[MOST_ROWS];
@@ -409,7 +409,7 @@ static void folded_waves(int32_t frames, int32_t n, int32_t sign, double *waves,
     int32_t count = 0;
     fold_bending(frames, n, sign, a);
     eigenvectors(n, a, q, values, vectors);
-    for (int32_t degree = sign > 0 ? 0 : 1; degree < 4 && count < n; degree += 2) {
+    for (int32_t degree = sign > 0 ? 0 : 1; degree < 3 && count < n; degree += 2) {
         for (int32_t i = 0; i < n; i++) {
             double t = (double)(frames - 1 - 2 * (n - 1 - i)) / (double)frames, x = degree % 2 == 0 ? 1.0 : t;
             if (degree > 1) x = x * t * t;
