@@ -2847,8 +2847,14 @@ PI = 3.14159265358979323846
 
 @cache
 def waves_over_time(frames: int, periodic: bool) -> np.ndarray:
-    """(frames, frames): wave k at frame t, the smoothest functions or a Fourier series."""
+    """(frames, frames): wave k at frame t, of stems."""
     return np.array(periodic_waves(frames) if periodic else smooth_waves(frames))
+
+
+@cache
+def node_waves_over_time(frames: int, periodic: bool) -> np.ndarray:
+    """Of the maps of nodes."""
+    return np.array(periodic_waves(frames) if periodic else beam_waves(frames))
 
 
 def smooth_waves(frames: int) -> list[np.ndarray]:
@@ -2900,6 +2906,77 @@ def folded_bending(frames: int, n: int, sign: int) -> np.ndarray:
                     value = value * math.sqrt(0.5)
             a[i, j] = a[j, i] = value
     return a
+
+
+def beam_waves(frames: int) -> list[list[float]]:
+    waves = [unit_length([1.0] * frames)]
+    if frames > 1:
+        waves.append(unit_length([0.5 * (frames - 1) - t for t in range(frames)]))
+    return waves + [beam_wave(frames, k) for k in range(2, frames)]
+
+
+def unit_length(x: list[float]) -> list[float]:
+    length2 = 0.0
+    for value in x:
+        length2 = length2 + value * value
+    scale = 1.0 / math.sqrt(length2)
+    return [value * scale for value in x]
+
+
+def beam_wave(frames: int, k: int) -> list[float]:
+    """Of a mode that bends: cos((2 t + 1) h + phase), and what falls by `decay` a frame from either end."""
+    sine, cosine, decay, slope = mode_at(frames, k, PI * (k - 0.5) / (2 * frames))
+    for _ in range(24):
+        sine, cosine, decay, slope = mode_at(frames, k, (0.5 * PI * k - atan_of(slope)) / frames)
+    sign, unit = 1.0 if k % 2 == 0 else -1.0, 1.0 / math.sqrt(1.0 + slope * slope)
+    c, s = (cosine - sine * slope) * unit, (sine + cosine * slope) * unit
+    turn_c, turn_s = 1.0 - 2.0 * sine * sine, 2.0 * sine * cosine
+    edge, fall, wave = c / (1.0 + sign * power(decay, frames - 1)), [1.0], [0.0] * frames
+    for _ in range(frames - 1):
+        fall.append(fall[-1] * decay)
+    for t in range((frames + 1) // 2):
+        x = c + edge * (fall[t] + sign * fall[frames - 1 - t])
+        wave[frames - 1 - t] = sign * x
+        wave[t] = x
+        c, s = c * turn_c - s * turn_s, s * turn_c + c * turn_s
+    return unit_length(wave)
+
+
+def mode_at(frames: int, k: int, h: float) -> tuple[float, float, float, float]:
+    """Sine and cosine of h, decay, tangent of the phase."""
+    sine, cosine = sin_of(h), cos_of(h)
+    root = math.sqrt(1.0 + sine * sine)
+    decay = (root - sine) * (root - sine)
+    far = power(decay, frames)
+    ratio = (1.0 - far) / (1.0 + far)
+    return sine, cosine, decay, cosine / root * (ratio if k % 2 == 0 else 1.0 / ratio)
+
+
+def power(x: float, n: int) -> float:
+    product = 1.0
+    while n > 0:
+        if n % 2 == 1:
+            product = product * x
+        x, n = x * x, n // 2
+    return product
+
+
+def cos_of(x: float) -> float:
+    """0 <= x <= pi / 2."""
+    return cos_series(x) if x <= 0.25 * PI else sin_series(0.5 * PI - x)
+
+
+def sin_of(x: float) -> float:
+    return sin_series(x) if x <= 0.25 * PI else cos_series(0.5 * PI - x)
+
+
+def atan_of(x: float) -> float:
+    """x >= 0."""
+    half = x / (1.0 + math.sqrt(1.0 + x * x))
+    quarter, total = half / (1.0 + math.sqrt(1.0 + half * half)), 0.0
+    for k in range(25, 0, -2):
+        total = 1.0 / k - total * (quarter * quarter)
+    return 4.0 * (quarter * total)
 
 
 def periodic_waves(frames: int) -> list[list[float]]:
@@ -2957,7 +3034,7 @@ class Motion:
     """The integers of a segment: rows of three axes over frequency. What no chunk holds is missing."""
 
     frames: int
-    waves: np.ndarray
+    periodic: bool
     streams: dict[int, LevelStream] = field(default_factory=dict)  # by level
     shapes: dict[int, list[np.ndarray]] = field(default_factory=dict)  # by piece: (16, 3), one per shape
     shape_rows: dict[int, list] = field(default_factory=dict)  # by piece: their integers
@@ -2967,6 +3044,14 @@ class Motion:
     node_rows: dict[int, list] = field(default_factory=dict)  # by node
     node_shift: dict[int, list] = field(default_factory=dict)  # by node
     node_step: dict[int, float] = field(default_factory=dict)  # by node
+
+    @property
+    def waves(self) -> np.ndarray:
+        return waves_over_time(self.frames, self.periodic)
+
+    @property
+    def node_waves(self) -> np.ndarray:
+        return node_waves_over_time(self.frames, self.periodic)
 
     def shapes_of(self, piece: Piece) -> list[np.ndarray]:
         return self.shapes.get(piece.number, [])
@@ -3448,13 +3533,13 @@ class Pose:
         step = motion.node_step.get(node.number, 1.0)
         c, R = self.attach_frame(piece)
         if piece.has_shift:
-            c = c + over_time(motion.node_shift.get(node.number), step, motion.waves)
+            c = c + over_time(motion.node_shift.get(node.number), step, motion.node_waves)
         rows = motion.node_rows.get(node.number, [])  # of predicted motion, where no chunk has them
         return (
             c,
             R,
             [
-                (functional, over_time(row, step, motion.waves))
+                (functional, over_time(row, step, motion.node_waves))
                 for functional, row in zip(self.plan.whitening(node), rows)
             ],
         )
@@ -4185,14 +4270,12 @@ class AthFile:
         end = self._needed(self._segment_before(s), level, with_end=False)
         return needed + [chunk for chunk in end if chunk.kind not in (CORRECTIONS, EXACT)]
 
-    def _waves(self, s: int) -> np.ndarray:
-        """Of a segment."""
-        periodic = [clip.periodic for clip in self.clips for _ in range(clip.segments)]
-        return waves_over_time(self._segment_lengths[s], periodic[s])
+    def _is_periodic(self, s: int) -> bool:
+        return [clip.periodic for clip in self.clips for _ in range(clip.segments)][s]
 
     def _first_layer(self, s: int, frames: int, level: int, join: Join, end: End | None) -> Pose:
         """All vertices of a segment at a level of the branch hierarchy."""
-        plan, motion = self._plan_of(level, 0), Motion(frames, self._waves(s))
+        plan, motion = self._plan_of(level, 0), Motion(frames, self._is_periodic(s))
         for d in range(level + 1):
             if self.find(SHAPES, d):
                 decode_shapes(self.content(SHAPES, d), plan, motion, d)
@@ -4208,7 +4291,7 @@ class AthFile:
         """All vertices of a segment in a layer, from those of the layer before."""
         level = self.plan.height + 1 + q
         plan = self._plan_of(level, q)
-        motion = Motion(frames, self._waves(s), dict(before.motion.streams))
+        motion = Motion(frames, self._is_periodic(s), dict(before.motion.streams))
         if self.find(SHAPES, level):
             chunk = self.content(SHAPES, level)
             require(len(chunk) >= 1 and chunk[0] <= MOST_SHIFT, "Shift of SHAPES is out of range")

@@ -4,7 +4,7 @@
 
 #define PI 3.14159265358979323846
 
-enum { MOST_PROBES = 64, MOST_ROWS = ATH_SEGMENT_FRAMES };
+enum { MOST_PROBES = 64, MOST_ROWS = ATH_SEGMENT_FRAMES, MODE_STEPS = 24 };
 
 /* Householder reduction of the symmetric n x n matrix `a` to tridiagonal form; on return row i of `q` is the i-th
  * basis vector in which the matrix is tridiagonal (diagonal d, subdiagonal e[1..n-1]). Rounding makes the matrix
@@ -376,6 +376,92 @@ static void periodic_waves(int32_t frames, double *waves)
     }
 }
 
+/* For 0 <= x <= pi / 2. */
+static double cos_of(double x) { return x <= 0.25 * PI ? cos_series(x) : sin_series(0.5 * PI - x); }
+
+static double sin_of(double x) { return x <= 0.25 * PI ? sin_series(x) : cos_series(0.5 * PI - x); }
+
+/* For x >= 0, by the series at a quarter of the angle. */
+static double atan_of(double x)
+{
+    double half = x / (1.0 + ath_sqrt(1.0 + x * x)), quarter = half / (1.0 + ath_sqrt(1.0 + half * half)), sum = 0.0;
+    for (int32_t k = 25; k > 0; k -= 2) sum = 1.0 / (double)k - sum * (quarter * quarter);
+    return 4.0 * (quarter * sum);
+}
+
+static double power(double x, int32_t n)
+{
+    double product = 1.0;
+    for (; n > 0; n /= 2) {
+        if (n % 2 == 1) product = product * x;
+        x = x * x;
+    }
+    return product;
+}
+
+/* A mode of a free beam, cos((2 t + 1) h + phase) and what falls by `decay` a frame from either end. */
+typedef struct {
+    double sine, cosine; /* of h */
+    double decay, slope; /* slope: tan(phase) */
+} beam_mode;
+
+/* Mode k, its h taken as right; even modes are even about the middle, odd ones odd. */
+static beam_mode mode_at(int32_t frames, int32_t k, double h)
+{
+    beam_mode mode = {sin_of(h), cos_of(h), 0.0, 0.0};
+    double root = ath_sqrt(1.0 + mode.sine * mode.sine), other = root - mode.sine;
+    mode.decay = other * other;
+    double far = power(mode.decay, frames), ratio = (1.0 - far) / (1.0 + far);
+    mode.slope = mode.cosine / root * (k % 2 == 0 ? ratio : 1.0 / ratio);
+    return mode;
+}
+
+/* h solves 2 frames h = pi k - 2 phase(h): each step takes at least two bits, mostly ten, off the error. */
+static beam_mode find_mode(int32_t frames, int32_t k)
+{
+    beam_mode mode = mode_at(frames, k, PI * ((double)k - 0.5) / (double)(2 * frames));
+    for (int32_t step = 0; step < MODE_STEPS; step++)
+        mode = mode_at(frames, k, (0.5 * PI * (double)k - atan_of(mode.slope)) / (double)frames);
+    return mode;
+}
+
+static void unit_length(int32_t frames, double *wave)
+{
+    double length2 = 0.0;
+    for (int32_t t = 0; t < frames; t++) length2 = length2 + wave[t] * wave[t];
+    double scale = 1.0 / ath_sqrt(length2);
+    for (int32_t t = 0; t < frames; t++) wave[t] = wave[t] * scale;
+}
+
+static void beam_wave(int32_t frames, int32_t k, double *wave)
+{
+    beam_mode mode = find_mode(frames, k);
+    double sign = k % 2 == 0 ? 1.0 : -1.0, unit = 1.0 / ath_sqrt(1.0 + mode.slope * mode.slope);
+    double c = (mode.cosine - mode.sine * mode.slope) * unit, s = (mode.sine + mode.cosine * mode.slope) * unit;
+    double turn_c = 1.0 - 2.0 * mode.sine * mode.sine, turn_s = 2.0 * mode.sine * mode.cosine;
+    double edge = c / (1.0 + sign * power(mode.decay, frames - 1)), fall[ATH_SEGMENT_FRAMES];
+    fall[0] = 1.0;
+    for (int32_t t = 1; t < frames; t++) fall[t] = fall[t - 1] * mode.decay;
+    for (int32_t t = 0; 2 * t < frames; t++) {
+        double x = c + edge * (fall[t] + sign * fall[frames - 1 - t]), turned = c * turn_c - s * turn_s;
+        wave[frames - 1 - t] = sign * x;
+        wave[t] = x;
+        s = s * turn_c + c * turn_s;
+        c = turned;
+    }
+    unit_length(frames, wave);
+}
+
+static void beam_waves(int32_t frames, double *waves)
+{
+    for (int32_t t = 0; t < frames; t++) waves[t] = 1.0;
+    unit_length(frames, waves);
+    if (frames == 1) return;
+    for (int32_t t = 0; t < frames; t++) waves[frames + t] = 0.5 * (double)(frames - 1) - (double)t;
+    unit_length(frames, waves + frames);
+    for (int32_t k = 2; k < frames; k++) beam_wave(frames, k, waves + k * frames);
+}
+
 /* What bends a row over time: the entry of D'D, D its third differences, and its mirror image in time. */
 static double bending(int32_t frames, int32_t i, int32_t j)
 {
@@ -449,10 +535,12 @@ size_t ath_waves_work(int32_t frames)
     return 4 * half * half;
 }
 
-void ath_waves(int32_t frames, int32_t periodic, double *waves, double *work)
+void ath_waves(int32_t frames, int32_t kind, double *waves, double *work)
 {
-    if (periodic)
+    if (kind == ATH_PERIODIC)
         periodic_waves(frames, waves);
+    else if (kind == ATH_BEAM)
+        beam_waves(frames, waves);
     else
         smooth_waves(frames, waves, work);
 }
