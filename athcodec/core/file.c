@@ -713,8 +713,7 @@ int ath_build(ath_file *file, void *memory, size_t memory_bytes)
     file->plan.bases = file->bases;
     for (int32_t kind = 0; kind < ATH_WAVE_KINDS; kind++)
         for (int32_t frames = 1; frames <= ATH_SEGMENT_FRAMES; frames++)
-            if (file->waves[kind][frames])
-                ath_waves(frames, kind, file->waves[kind][frames], (double *)file->scratch);
+            if (file->waves[kind][frames]) ath_waves(frames, kind, file->waves[kind][frames], (double *)file->scratch);
     return ATH_OK;
 }
 

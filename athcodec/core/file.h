@@ -41,10 +41,10 @@ struct ath_file {
     void *scratch; /* of opening and building */
     double *bases; /* null until ath_build */
     int32_t adaptive_rest;
-    ath_mesh mesh;                /* where there are FACES */
-    ath_mesh *connected;          /* it, where the rest pose is connected, else null */
-    int32_t *rest_steps;          /* null where no layer refines the rest pose */
-    ath_layer layers[ATH_LAYERS]; /* first_layer to layer_count - 1 */
+    ath_mesh mesh;                                         /* where there are FACES */
+    ath_mesh *connected;                                   /* it, where the rest pose is connected, else null */
+    int32_t *rest_steps;                                   /* null where no layer refines the rest pose */
+    ath_layer layers[ATH_LAYERS];                          /* first_layer to layer_count - 1 */
     double *waves[ATH_WAVE_KINDS][ATH_SEGMENT_FRAMES + 1]; /* of so many frames; null: no segment has any */
     uint64_t bases_count;
     int32_t rest_known;        /* 0 until the host gives it */
