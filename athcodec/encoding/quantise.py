@@ -36,7 +36,7 @@ WEIGHT_PARTS = (0.0, 0.05, 0.2)  # of a level's vertices that may have weights b
 # most, and where the velocity changes by one bound in a usual frame. Less by the square of that: who moves hides its
 # errors.
 LEAST_END_WEIGHTS = (0.5, 5.0, 5.0)
-MOST_END_WEIGHTS = (3.0, 100.0, 50.0)
+MOST_END_WEIGHTS = (10.0, 300.0, 50.0)
 END_WEIGHTS = (5.0, 1.0, 0.25)
 
 
