@@ -3456,13 +3456,13 @@ def forked_plan() -> rd.Plan:
 
 
 def stems_motion(head: bytes, frames: int) -> rd.Motion:
-    made = rd.Motion(frames, rd.waves_over_time(frames, False))
+    made = rd.Motion(frames, False)
     rd.read_stems_head(head, made, 1)
     return made
 
 
 def affines(*script) -> Callable[[], bytes]:
-    return lambda: write(rd.decode_affines, list(script), forked_plan(), rd.Motion(2, rd.waves_over_time(2, False)), 0)
+    return lambda: write(rd.decode_affines, list(script), forked_plan(), rd.Motion(2, False), 0)
 
 
 motion("step-beyond", rd.AFFINES, 0, "the step of a map is 2^100.5", affines(201))
@@ -3486,7 +3486,7 @@ invalid(
 
 
 def shapes(*script) -> Callable[[], bytes]:
-    return lambda: write(rd.decode_shapes, list(script), forked_plan(), rd.Motion(1, rd.waves_over_time(1, False)), 1)
+    return lambda: write(rd.decode_shapes, list(script), forked_plan(), rd.Motion(1, False), 1)
 
 
 motion("too-many", rd.SHAPES, 1, "a piece of three modes has ten shapes", shapes(10))

@@ -2847,8 +2847,65 @@ PI = 3.14159265358979323846
 
 @cache
 def waves_over_time(frames: int, periodic: bool) -> np.ndarray:
-    """(frames, frames): wave k at frame t, modes of a free beam or a Fourier series."""
+    """(frames, frames): wave k at frame t, of stems."""
+    return np.array(periodic_waves(frames) if periodic else smooth_waves(frames))
+
+
+@cache
+def node_waves_over_time(frames: int, periodic: bool) -> np.ndarray:
+    """Of the maps of nodes."""
     return np.array(periodic_waves(frames) if periodic else beam_waves(frames))
+
+
+def smooth_waves(frames: int) -> list[np.ndarray]:
+    waves = [np.zeros(frames) for _ in range(frames)]
+    for sign in (1, -1):
+        n = (frames + 1) // 2 if sign > 0 else frames // 2
+        for m, folded in enumerate(folded_waves(frames, n, sign) if n > 0 else []):
+            wave = waves[2 * m + (1 if sign < 0 else 0)]
+            for i in range(n):
+                t = n - 1 - i
+                x = folded[i] if 2 * t + 1 == frames else folded[i] * math.sqrt(0.5)
+                wave[frames - 1 - t] = sign * x
+                wave[t] = x
+    return waves
+
+
+def folded_waves(frames: int, n: int, sign: int) -> list[np.ndarray]:
+    """Those even about the middle, or odd, as numbers of the frames from the middle to the first."""
+    _, vectors = principal(folded_bending(frames, n, sign))
+    waves: list[np.ndarray] = []
+    for degree in (0, 2) if sign > 0 else (1,):
+        if len(waves) < n:
+            append_orthonormal(waves, polynomial(frames, n, degree), 0.0)
+    for m in range(n - 1 - len(waves), -1, -1):
+        append_orthonormal(waves, vectors[m], 0.0)
+    return waves
+
+
+def polynomial(frames: int, n: int, degree: int) -> np.ndarray:
+    values = []
+    for i in range(n):
+        t = (frames - 1 - 2 * (n - 1 - i)) / frames
+        x = 1.0 if degree % 2 == 0 else t
+        if degree > 1:
+            x = x * t * t
+        values.append(x * math.sqrt(0.5) if 2 * (n - 1 - i) + 1 == frames else x)
+    return np.array(values)
+
+
+def folded_bending(frames: int, n: int, sign: int) -> np.ndarray:
+    d = np.diff(np.eye(frames), 3, axis=0) if frames > 3 else np.zeros((0, frames))
+    bending, a = d.T @ d, np.empty((n, n))  # whole numbers
+    for i in range(n):
+        for j in range(i + 1):
+            t, u = n - 1 - i, n - 1 - j
+            value = bending[t, u] + sign * bending[t, frames - 1 - u]
+            for place in (t, u):
+                if 2 * place + 1 == frames:
+                    value = value * math.sqrt(0.5)
+            a[i, j] = a[j, i] = value
+    return a
 
 
 def beam_waves(frames: int) -> list[list[float]]:
@@ -2977,7 +3034,7 @@ class Motion:
     """The integers of a segment: rows of three axes over frequency. What no chunk holds is missing."""
 
     frames: int
-    waves: np.ndarray
+    periodic: bool
     streams: dict[int, LevelStream] = field(default_factory=dict)  # by level
     shapes: dict[int, list[np.ndarray]] = field(default_factory=dict)  # by piece: (16, 3), one per shape
     shape_rows: dict[int, list] = field(default_factory=dict)  # by piece: their integers
@@ -2987,6 +3044,14 @@ class Motion:
     node_rows: dict[int, list] = field(default_factory=dict)  # by node
     node_shift: dict[int, list] = field(default_factory=dict)  # by node
     node_step: dict[int, float] = field(default_factory=dict)  # by node
+
+    @property
+    def waves(self) -> np.ndarray:
+        return waves_over_time(self.frames, self.periodic)
+
+    @property
+    def node_waves(self) -> np.ndarray:
+        return node_waves_over_time(self.frames, self.periodic)
 
     def shapes_of(self, piece: Piece) -> list[np.ndarray]:
         return self.shapes.get(piece.number, [])
@@ -3468,13 +3533,13 @@ class Pose:
         step = motion.node_step.get(node.number, 1.0)
         c, R = self.attach_frame(piece)
         if piece.has_shift:
-            c = c + over_time(motion.node_shift.get(node.number), step, motion.waves)
+            c = c + over_time(motion.node_shift.get(node.number), step, motion.node_waves)
         rows = motion.node_rows.get(node.number, [])  # of predicted motion, where no chunk has them
         return (
             c,
             R,
             [
-                (functional, over_time(row, step, motion.waves))
+                (functional, over_time(row, step, motion.node_waves))
                 for functional, row in zip(self.plan.whitening(node), rows)
             ],
         )
@@ -4205,14 +4270,12 @@ class AthFile:
         end = self._needed(self._segment_before(s), level, with_end=False)
         return needed + [chunk for chunk in end if chunk.kind not in (CORRECTIONS, EXACT)]
 
-    def _waves(self, s: int) -> np.ndarray:
-        """Of a segment."""
-        periodic = [clip.periodic for clip in self.clips for _ in range(clip.segments)]
-        return waves_over_time(self._segment_lengths[s], periodic[s])
+    def _is_periodic(self, s: int) -> bool:
+        return [clip.periodic for clip in self.clips for _ in range(clip.segments)][s]
 
     def _first_layer(self, s: int, frames: int, level: int, join: Join, end: End | None) -> Pose:
         """All vertices of a segment at a level of the branch hierarchy."""
-        plan, motion = self._plan_of(level, 0), Motion(frames, self._waves(s))
+        plan, motion = self._plan_of(level, 0), Motion(frames, self._is_periodic(s))
         for d in range(level + 1):
             if self.find(SHAPES, d):
                 decode_shapes(self.content(SHAPES, d), plan, motion, d)
@@ -4228,7 +4291,7 @@ class AthFile:
         """All vertices of a segment in a layer, from those of the layer before."""
         level = self.plan.height + 1 + q
         plan = self._plan_of(level, q)
-        motion = Motion(frames, self._waves(s), dict(before.motion.streams))
+        motion = Motion(frames, self._is_periodic(s), dict(before.motion.streams))
         if self.find(SHAPES, level):
             chunk = self.content(SHAPES, level)
             require(len(chunk) >= 1 and chunk[0] <= MOST_SHIFT, "Shift of SHAPES is out of range")

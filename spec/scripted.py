@@ -594,7 +594,7 @@ def basis_stream(rows: list[list[int]], bits: int) -> bytes:
 
 
 def _no_motion(frames: int, periodic: bool = False, shapes: rd.Motion | None = None) -> rd.Motion:
-    motion = rd.Motion(frames, rd.waves_over_time(frames, periodic))
+    motion = rd.Motion(frames, periodic)
     if shapes:
         motion.shapes, motion.shape_rows = shapes.shapes, shapes.shape_rows
     return motion

@@ -462,12 +462,87 @@ static void beam_waves(int32_t frames, double *waves)
     for (int32_t k = 2; k < frames; k++) beam_wave(frames, k, waves + k * frames);
 }
 
-void ath_waves(int32_t frames, int32_t periodic, double *waves)
+/* What bends a row over time: the entry of D'D, D its third differences, and its mirror image in time. */
+static double bending(int32_t frames, int32_t i, int32_t j)
 {
-    if (periodic)
+    static const int32_t difference[] = {-1, 3, -3, 1};
+    int32_t sum = 0;
+    for (int32_t r = 0; r + 3 < frames; r++)
+        if (i >= r && i <= r + 3 && j >= r && j <= r + 3) sum += difference[i - r] * difference[j - r];
+    return (double)sum;
+}
+
+/* D'D on the rows that are even about the middle (sign 1), or odd (-1), as numbers of the frames from the middle to the first:
+ * a frame and its mirror image are one, times the root of two. */
+static void fold_bending(int32_t frames, int32_t n, int32_t sign, double *a)
+{
+    double half = ath_sqrt(0.5);
+    for (int32_t i = 0; i < n; i++)
+        for (int32_t j = 0; j <= i; j++) {
+            int32_t t = n - 1 - i, u = n - 1 - j, mirrored = frames - 1 - u;
+            double value = bending(frames, t, u) + (double)sign * bending(frames, t, mirrored);
+            if (2 * t + 1 == frames) value = value * half;
+            if (2 * u + 1 == frames) value = value * half;
+            a[i * n + j] = a[j * n + i] = value;
+        }
+}
+
+/* The even or the odd waves, folded: polynomials of degree 0 and 2, or 1, and the eigenvectors beyond them. */
+static void folded_waves(int32_t frames, int32_t n, int32_t sign, double *waves, double *work)
+{
+    double *a = work, *q = a + n * n, *vectors = q + n * n, values[MOST_ROWS], candidate[MOST_ROWS];
+    double half = ath_sqrt(0.5);
+    int32_t count = 0;
+    fold_bending(frames, n, sign, a);
+    eigenvectors(n, a, q, values, vectors);
+    for (int32_t degree = sign > 0 ? 0 : 1; degree < 3 && count < n; degree += 2) {
+        for (int32_t i = 0; i < n; i++) {
+            double t = (double)(frames - 1 - 2 * (n - 1 - i)) / (double)frames, x = degree % 2 == 0 ? 1.0 : t;
+            if (degree > 1) x = x * t * t;
+            candidate[i] = 2 * (n - 1 - i) + 1 == frames ? x * half : x;
+        }
+        count = append_orthonormal(n, waves, count, candidate, 0.0);
+    }
+    for (int32_t m = n - 1 - count; m >= 0; m--) count = append_orthonormal(n, waves, count, vectors + m * n, 0.0);
+}
+
+static void unfold(int32_t frames, int32_t n, int32_t sign, const double *folded, double *wave)
+{
+    double half = ath_sqrt(0.5);
+    wave[frames / 2] = 0.0;
+    for (int32_t i = 0; i < n; i++) {
+        int32_t t = n - 1 - i;
+        double x = 2 * t + 1 == frames ? folded[i] : folded[i] * half;
+        wave[frames - 1 - t] = (double)sign * x;
+        wave[t] = x;
+    }
+}
+
+static void smooth_waves(int32_t frames, double *waves, double *work)
+{
+    for (int32_t sign = 1; sign >= -1; sign -= 2) {
+        int32_t n = sign > 0 ? (frames + 1) / 2 : frames / 2;
+        if (n == 0) return;
+        double *folded = work + 3 * n * n;
+        folded_waves(frames, n, sign, folded, work);
+        for (int32_t m = 0; m < n; m++) unfold(frames, n, sign, folded + m * n, waves + (2 * m + (sign < 0)) * frames);
+    }
+}
+
+size_t ath_waves_work(int32_t frames)
+{
+    size_t half = (size_t)(frames + 1) / 2;
+    return 4 * half * half;
+}
+
+void ath_waves(int32_t frames, int32_t kind, double *waves, double *work)
+{
+    if (kind == ATH_PERIODIC)
         periodic_waves(frames, waves);
-    else
+    else if (kind == ATH_BEAM)
         beam_waves(frames, waves);
+    else
+        smooth_waves(frames, waves, work);
 }
 
 double ath_tan_of_half(double x)

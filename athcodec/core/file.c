@@ -20,6 +20,8 @@ static uint64_t scratch_size(const ath_header *header)
 {
     uint64_t size = larger(header->vertex_count, ath_basis_table_size(most_pieces(header))) * sizeof(int32_t);
     size = larger(size, turns_place() + (uint64_t)header->branch_count * 9 * sizeof(double));
+    uint32_t frames = header->frame_count < ATH_SEGMENT_FRAMES ? header->frame_count : ATH_SEGMENT_FRAMES;
+    size = larger(size, ath_waves_work((int32_t)frames) * sizeof(double));
     return larger(size, ATH_BASIS_WORK * sizeof(double));
 }
 
@@ -671,17 +673,24 @@ int ath_set_host_mesh(ath_file *file, const void *xyz, size_t stride, int32_t ve
 
 /* ---- building ---- */
 
+static int32_t wave_kind(const ath_file *file, int32_t segment, int32_t of_nodes)
+{
+    if (clip_of(file, segment)->periodic) return ATH_PERIODIC;
+    return of_nodes ? ATH_BEAM : ATH_SMOOTH;
+}
+
 static uint64_t carve_build(ath_file *file, uint8_t *base)
 {
     ath_arena arena = {base, 0};
-    uint8_t are_there[2][ATH_SEGMENT_FRAMES + 1] = {{0}};
+    uint8_t are_there[ATH_WAVE_KINDS][ATH_SEGMENT_FRAMES + 1] = {{0}};
     for (int32_t s = 0; s < file->info.segment_count; s++)
-        are_there[clip_of(file, s)->periodic][ath_file_frames(file, s)] = 1;
+        for (int32_t of_nodes = 0; of_nodes < 2; of_nodes++)
+            are_there[wave_kind(file, s, of_nodes)][ath_file_frames(file, s)] = 1;
     file->bases = (double *)ath_take(&arena, file->bases_count * sizeof(double));
-    for (int32_t periodic = 0; periodic < 2; periodic++)
+    for (int32_t kind = 0; kind < ATH_WAVE_KINDS; kind++)
         for (uint64_t frames = 1; frames <= ATH_SEGMENT_FRAMES; frames++)
-            if (are_there[periodic][frames])
-                file->waves[periodic][frames] = (double *)ath_take(&arena, frames * frames * sizeof(double));
+            if (are_there[kind][frames])
+                file->waves[kind][frames] = (double *)ath_take(&arena, frames * frames * sizeof(double));
     return arena.used;
 }
 
@@ -703,9 +712,9 @@ int ath_build(ath_file *file, void *memory, size_t memory_bytes)
                        file->bases);
     }
     file->plan.bases = file->bases;
-    for (int32_t periodic = 0; periodic < 2; periodic++)
+    for (int32_t kind = 0; kind < ATH_WAVE_KINDS; kind++)
         for (int32_t frames = 1; frames <= ATH_SEGMENT_FRAMES; frames++)
-            if (file->waves[periodic][frames]) ath_waves(frames, periodic, file->waves[periodic][frames]);
+            if (file->waves[kind][frames]) ath_waves(frames, kind, file->waves[kind][frames], (double *)file->scratch);
     return ATH_OK;
 }
 
@@ -958,7 +967,12 @@ const ath_clip *ath_file_clip(const ath_file *file, int32_t frame)
 
 const double *ath_file_waves(const ath_file *file, int32_t segment)
 {
-    return file->waves[clip_of(file, segment)->periodic][ath_file_frames(file, segment)];
+    return file->waves[wave_kind(file, segment, 0)][ath_file_frames(file, segment)];
+}
+
+const double *ath_file_node_waves(const ath_file *file, int32_t segment)
+{
+    return file->waves[wave_kind(file, segment, 1)][ath_file_frames(file, segment)];
 }
 
 int32_t ath_segment_start(const ath_file *file, int32_t segment)

@@ -41,12 +41,11 @@ struct ath_file {
     void *scratch; /* of opening and building */
     double *bases; /* null until ath_build */
     int32_t adaptive_rest;
-    ath_mesh mesh;                /* where there are FACES */
-    ath_mesh *connected;          /* it, where the rest pose is connected, else null */
-    int32_t *rest_steps;          /* null where no layer refines the rest pose */
-    ath_layer layers[ATH_LAYERS]; /* first_layer to layer_count - 1 */
-    double
-        *waves[2][ATH_SEGMENT_FRAMES + 1]; /* of segments, periodic or not, of so many frames; null: there are none */
+    ath_mesh mesh;                                         /* where there are FACES */
+    ath_mesh *connected;                                   /* it, where the rest pose is connected, else null */
+    int32_t *rest_steps;                                   /* null where no layer refines the rest pose */
+    ath_layer layers[ATH_LAYERS];                          /* first_layer to layer_count - 1 */
+    double *waves[ATH_WAVE_KINDS][ATH_SEGMENT_FRAMES + 1]; /* of so many frames; null: no segment has any */
     uint64_t bases_count;
     int32_t rest_known;        /* 0 until the host gives it */
     int32_t source_rest_known; /* 0 until SOURCE_REST has been read */
@@ -67,7 +66,9 @@ int32_t ath_segment_before(const ath_file *file, int32_t segment);
 /* How the positions that a level shows are joined: an entry of ath_joins. */
 int32_t ath_join_at(const ath_file *file, int32_t segment, int32_t level);
 const ath_clip *ath_file_clip(const ath_file *file, int32_t frame);
+/* Of the stems of a segment, and of the maps of its nodes. */
 const double *ath_file_waves(const ath_file *file, int32_t segment);
+const double *ath_file_node_waves(const ath_file *file, int32_t segment);
 const ath_chunk *ath_file_chunk(const ath_file *file, int32_t kind, int32_t level, int32_t segment);
 /* Kinds whose one chunk of a level stands with segment 0 and serves all segments. */
 ATH_INLINE int ath_is_shared(int32_t kind) { return kind == ATH_SHAPES || kind == ATH_REFINED_REST; }

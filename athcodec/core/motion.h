@@ -30,7 +30,7 @@ typedef struct ath_coarse {
 /* What the pieces and nodes of one segment are placed with. */
 typedef struct ath_motion {
     const ath_stream *streams; /* one per level, 0 to height + 1 */
-    const double *waves;       /* frames x frames: ath_waves */
+    const double *waves;       /* frames x frames, of the maps of nodes: ath_waves */
     double *attach_caches;     /* ath_attach_cache_size(attach_cache_rows, frames) doubles */
     double *work;              /* ath_motion_work(longest, frames) doubles */
     const ath_coarse *before;  /* of a refinement; else null */

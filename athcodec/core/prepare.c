@@ -427,7 +427,7 @@ static void ready_layer(ath_work *work, int32_t q)
     layer->plan = ath_layer_plan(work->file, q, work->level);
     layer->motion.frames = work->segment->frames;
     layer->motion.streams = work->streams;
-    layer->motion.waves = ath_file_waves(work->file, work->index);
+    layer->motion.waves = ath_file_node_waves(work->file, work->index);
     layer->motion.ratio = 1;
     layer->scratch = ath_motion_scratch(layer->plan, &layer->motion);
     layer->rows.counts = layer->counts;

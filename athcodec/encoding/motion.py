@@ -11,6 +11,7 @@ import math
 from collections.abc import Callable
 from ctypes import addressof
 from dataclasses import dataclass
+from enum import IntEnum
 from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING
 
@@ -42,12 +43,17 @@ if TYPE_CHECKING:
 RANGES, LEAST_RANGE = 24, 1024  # of a plant's vertices per thread and call
 
 
+class Waves(IntEnum):  # core/plan.h
+    """Eigenvectors of third differences, a Fourier series, modes of a free beam."""
+
+    SMOOTH, PERIODIC, BEAM = range(3)
+
+
 @lru_cache(16)
-def waves_over_time(frames: int, periodic: bool = False) -> np.ndarray:
-    """The modes of a free beam or, if periodic, a Fourier series: orthonormal rows, (frames, frames) float64, bit for
-    bit those of the decoder."""
-    waves = np.empty((frames, frames))
-    lib.ath_waves(frames, periodic, waves.ctypes.data)
+def waves_over_time(frames: int, kind: Waves = Waves.SMOOTH) -> np.ndarray:
+    """Orthonormal rows, (frames, frames) float64, bit for bit those of the decoder."""
+    waves, work = np.empty((frames, frames)), np.empty(lib.ath_waves_work(frames))
+    lib.ath_waves(frames, kind, waves.ctypes.data, work.ctypes.data)
     waves.setflags(write=False)
     return waves
 
@@ -242,7 +248,8 @@ class SegmentMotion:
         self.node_tracks = np.zeros((core.node_count, 4, 3, frames), np.int32)
         self.node_steps = np.zeros(core.node_count, np.int32)
         self._attach_caches = np.empty(lib.ath_attach_cache_size(core.attach_cache_rows, frames))
-        self.waves = waves_over_time(frames, periodic)
+        self.waves = waves_over_time(frames, Waves.PERIODIC if periodic else Waves.SMOOTH)
+        self.node_waves = waves_over_time(frames, Waves.PERIODIC if periodic else Waves.BEAM)
         self.before, self.ratio = before, ratio
         if before is not None:
             self.predicted, self.predicted_tracks = np.zeros_like(self.coefficients), np.zeros_like(self.tracks)
@@ -284,7 +291,7 @@ class SegmentMotion:
             c_stream.root, c_stream.only_tips, c_stream.turn_step = stream.root, stream.only_tips, stream.turn_step
         self.motion = Motion(
             streams=addressof(self._c_streams),
-            waves=self.waves.ctypes.data,
+            waves=self.node_waves.ctypes.data,
             attach_caches=self._attach_caches.ctypes.data,
             frames=self.frames,
             ratio=self.ratio,

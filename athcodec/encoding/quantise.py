@@ -32,19 +32,20 @@ ROTATION_FACTORS = (0, 1, 2, 4, 8)
 
 WEIGHT_PARTS = (0.0, 0.05, 0.2)  # of a level's vertices that may have weights below that of its step
 
-# What the value, the slope and the bend of a row weigh, in squared steps, where the ends of segments meet: at most, and
-# where the velocity changes by one bound in a usual frame. Less by the square of that: who moves hides its errors.
-MOST_END_WEIGHTS = (3.0, 100.0, 50.0)
+# What the value, the slope and the bend of a row weigh at its ends, in squared steps: at least; where segments meet, at
+# most, and where the velocity changes by one bound in a usual frame. Less by the square of that: who moves hides its
+# errors.
+LEAST_END_WEIGHTS = (0.5, 5.0, 5.0)
+MOST_END_WEIGHTS = (10.0, 300.0, 50.0)
 END_WEIGHTS = (5.0, 1.0, 0.25)
-MOST_USUAL_CHANGE = 6.0  # beyond which errors are noise everywhere, and ends weigh nothing
 
 
 def end_weights(usual_change: float) -> tuple[float, ...]:
-    """The weights for a change of velocity in a usual frame, over the bound."""
-    if usual_change > MOST_USUAL_CHANGE:
-        return (0.0, 0.0, 0.0)
+    """The weights for a change of velocity in a usual frame, over the bound; infinite where no segments meet."""
+    scale = max(usual_change, 1e-9) ** -2
     return tuple(
-        min(most, weight / max(usual_change, 1e-9) ** 2) for most, weight in zip(MOST_END_WEIGHTS, END_WEIGHTS)
+        max(least, min(most, weight * scale))
+        for least, most, weight in zip(LEAST_END_WEIGHTS, MOST_END_WEIGHTS, END_WEIGHTS)
     )
 
 
