@@ -945,7 +945,7 @@ def test_a_frame_that_lies_about_its_size_is_refused():
     [
         {"chunks": 5},
         {"table_bytes": 100},
-        {"vertices": 11},
+        {"vertices": 12},
         {"branches": 4},
         {"frames": 19},
         {"chunk_bytes": 30},
@@ -965,13 +965,13 @@ def test_a_file_beyond_a_limit_is_refused_by_that_limit(limits, data):
     assert "\n" not in str(caught.value)
 
 
-def test_limits_that_just_hold_the_file_accept_it(data, parts):
+def test_limits_that_just_hold_the_file_accept_it(data, parts, full_clip):
     longest = max(len(payload) for _, payload in parts.chunks)
     check(
         data,
         limits=Limits(
             chunks=len(parts.chunks),
-            vertices=12,
+            vertices=full_clip.vertex_count,
             branches=5,
             frames=20,
             attributes=2,
