@@ -92,7 +92,7 @@ def crc32c(data: bytes) -> int:
 # ---- the front: header and chunks ----------------------------------------------------------------------
 
 MAGIC = b"\x89ATH\r\n\x1a\n"
-VERSION = (0, 10)
+VERSION = (0, 11)
 HEADER_BYTES, CHECKSUM_BYTES, TABLE_BYTES_OF_EACH = 24, 4, 16
 SEGMENT_FRAMES, MOST_LEVELS, MOST_LAYERS, MOST_CLIPS, NO_LEVEL = 256, 32, 8, 255, 255
 

@@ -86,7 +86,7 @@ ATH_API const char *ath_result_name(int result);
 
 /* ---- constants of the format ------------------------------------------------------------------------------------- */
 
-enum { ATH_FORMAT_MAJOR = 0, ATH_FORMAT_MINOR = 10 };
+enum { ATH_FORMAT_MAJOR = 0, ATH_FORMAT_MINOR = 11 };
 
 /* Kinds of chunks. An unknown kind with the bit ATH_OPTIONAL is skipped. */
 enum {

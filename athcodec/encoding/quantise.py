@@ -35,7 +35,7 @@ WEIGHT_PARTS = (0.0, 0.05, 0.2)  # of a level's vertices that may have weights b
 # What the value, the slope and the bend of a row weigh at its ends, in squared steps: at least; where segments meet, at
 # most, and where the velocity changes by one bound in a usual frame. Less by the square of that: who moves hides its
 # errors.
-LEAST_END_WEIGHTS = (0.5, 5.0, 5.0)
+LEAST_END_WEIGHTS = (0.25, 2.5, 2.5)
 MOST_END_WEIGHTS = (10.0, 300.0, 50.0)
 END_WEIGHTS = (5.0, 1.0, 0.25)
 
