@@ -106,11 +106,12 @@ def layered_ath(bushy_clip, tmp_path_factory):
 def full_clip_of(seed: int):
     """A small clip that needs every kind of chunk: 20 frames of five branches with all sorts of static data.
 
-    It sways along one line, so its stems have shapes that are worth learning.
+    It sways along one line, so its stems have shapes that are worth learning, and about a pose that is not its rest pose.
     """
     clip = plant(seed=seed, branches=5, longest=4, frames=20, rough=0.02)
     line = np.array([0.6, 0.48, 0.64])
     along = (clip.positions - clip.rest) @ line
+    along = along + 0.03 * np.random.default_rng(seed).normal(size=along.shape[1])
     clip.positions = (clip.rest + along[..., None] * line).astype(np.float32)
     count = clip.vertex_count
     clip.faces = np.array([[0, 1, 2], [2, 1, 3]], np.uint16)
