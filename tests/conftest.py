@@ -106,7 +106,7 @@ def layered_ath(bushy_clip, tmp_path_factory):
 def full_clip_of(seed: int):
     """A small clip that needs every kind of chunk: 20 frames of five branches with all sorts of static data.
 
-    It sways along one line, so its stems have shapes that are worth learning, and about a pose that is not its rest pose.
+    It sways along one line, so its stems have shapes that are worth learning, and not about its rest pose.
     """
     clip = plant(seed=seed, branches=5, longest=4, frames=20, rough=0.02)
     line = np.array([0.6, 0.48, 0.64])
