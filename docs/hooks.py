@@ -22,6 +22,7 @@ SHOWN = (
     "athcodec/viewer/src/index.d.ts",
     "athcodec/exporters/vat.md",
     "athcodec/core/ath.h",
+    "athcodec/core/ath_player.h",
     "athcodec/core/examples/play.c",
 )
 

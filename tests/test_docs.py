@@ -71,23 +71,31 @@ def run(*command, **options):
     return subprocess.run(list(map(str, command)), capture_output=True, check=True, timeout=120, **options).stdout
 
 
-def test_the_c_program_shows_a_coarse_level_at_a_distance(files, tmp_path):
-    ((_, text),) = blocks(ROOT / "docs" / "c-api.md", "c")
-    (tmp_path / "example.c").write_text(text)
-    library, warnings = library_path(), ("-std=c11", "-Wall", "-Wextra", "-Werror")
-    run(
-        "cc",
-        *warnings,
-        "-I",
-        ROOT / "athcodec" / "core",
-        "example.c",
-        library,
-        f"-Wl,-rpath,{library.parent}",
-        "-o",
-        "example",
-        cwd=tmp_path,
-    )
-    shown = run(tmp_path / "example", files / "tree.ath", text=True)
+@pytest.fixture
+def c_program(tmp_path):
+    """A function that compiles a program of docs/c-api.md, by its number, and runs it on a file."""
+
+    def run_it(number: int, path: Path) -> str:
+        (tmp_path / "example.c").write_text(blocks(ROOT / "docs" / "c-api.md", "c")[number][1])
+        library, flags = library_path(), ("-std=c11", "-Wall", "-Wextra", "-Werror", "-I", ROOT / "athcodec" / "core")
+        linked = (library, f"-Wl,-rpath,{library.parent}", "-lm")
+        run("cc", *flags, "example.c", *linked, "-o", "example", cwd=tmp_path)
+        return run(tmp_path / "example", path, text=True)
+
+    return run_it
+
+
+def test_the_c_program_with_a_player_shows_the_positions_of_python(files, c_program):
+    x, y, z = map(float, re.findall(r"-?\d+\.\d+", c_program(0, files / "tree.ath")))
+    with athcodec.open(files / "tree.ath") as decoder:
+        frame = (299 / 60) % (decoder.time[-1] - decoder.time[0] + 1 / 30) * 30  # the frame of the last drawn one
+        source = np.flatnonzero(decoder.vertex_branch == np.flatnonzero(decoder.branch_parent < 0)[0])[0]
+        around = decoder.positions()[[int(frame), (int(frame) + 1) % decoder.frame_count]][:, source]
+    assert (around.min(axis=0) - 1e-5 <= (x, y, z)).all() and ((x, y, z) <= around.max(axis=0) + 1e-5).all()
+
+
+def test_the_c_program_shows_a_coarse_level_at_a_distance(files, c_program):
+    shown = c_program(1, files / "tree.ath")
     found = re.fullmatch(r"level (\d+): (\d+) matrices, (\d+) exact vertices\n", shown)
     level, matrices, exact = map(int, found.groups())
     with athcodec.open(files / "tree.ath") as decoder:

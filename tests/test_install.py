@@ -226,8 +226,10 @@ def test_an_install_holds_the_header_both_libraries_and_both_ways_to_find_them(i
         "cmake/athcodec/athcodecConfig.cmake",
         "cmake/athcodec/athcodecConfigVersion.cmake",
     } <= files
-    assert (installed / "include" / "ath.h").read_bytes() == (CORE / "ath.h").read_bytes()
-    assert not [path for path in installed.rglob("*") if path.suffix == ".h" and path.name != "ath.h"]
+    public = {"ath.h", "ath_player.h"}
+    assert {path.name for path in installed.rglob("*.h")} == public
+    for name in public:
+        assert (installed / "include" / name).read_bytes() == (CORE / name).read_bytes()
 
 
 def test_the_shared_library_exports_what_the_header_declares_and_nothing_else(installed):

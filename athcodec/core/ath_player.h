@@ -1,0 +1,744 @@
+/* athcodec: plays an .ath file that is in memory. One optional file on top of ath.h: it allocates, keeps prepared
+ * segments, and prepares the next one ahead.
+ *
+ *     #define ATH_PLAYER_IMPLEMENTATION      in one C or C++ file, before the include
+ *     #include "ath_player.h"
+ *
+ *     ath_player_open, ath_player_close      bytes, all of a file or a prefix of it
+ *     ath_player_positions, _matrices        what to draw of a clip at a time and level
+ *     ath_player_faded_positions             the same of a fade from level to level
+ *     ath_player_show                        the segments of a moment, for any other function of ath.h
+ *     ath_player_ahead                       prepares the next segment, a bounded piece of work for each drawn frame;
+ *     ath_player_begin, _run, _end           or on any thread: a job for the engine's own job system
+ *     ath_player_triangles, _lines           topology; ath_player_normals, ath_player_tangents
+ *
+ * Memory comes from malloc or from the caller's functions. The bytes of the file stay where they are until the player is
+ * closed. For downloads that grow, and for what decides by itself what is in memory, ath.h has the functions.
+ *
+ * Threads. One thread at a time uses a player; ath_player_run alone may run on any thread meanwhile, each job on one.
+ * Handing the job over there and back is the engine's: by the queue that it has for that.
+ *
+ * Results are those of ath.h; where bytes are to blame ath_player_fault says why. C11 or C++17. */
+#ifndef ATH_PLAYER_H
+#define ATH_PLAYER_H
+
+#include "ath.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+typedef struct ath_player ath_player;
+typedef struct ath_player_job ath_player_job; /* one segment that is prepared ahead */
+
+/* Zeros are the defaults. */
+typedef struct ath_player_options {
+    void *(*allocate)(void *context, size_t size); /* aligned to 16; null: none is left. Null: malloc */
+    void (*release)(void *context, void *memory);  /* of `allocate`; null: nothing is freed */
+    void *context;
+    size_t cache_bytes;       /* of prepared segments; what is shown stays, whatever it takes. 0: 64 MiB */
+    const ath_limits *limits; /* null: those of ath_default_limits */
+    const void *host_mesh;    /* as for ath_set_host_mesh; null: none */
+    size_t host_stride;
+    int32_t host_vertex_count;
+} ath_player_options;
+
+/* Opens a file, of which `size` bytes are there: at least its prelude. options, fault: null, or as for ath_open.
+ * Errors of the file; ATH_MISSING, ATH_NO_MEMORY, ATH_NEEDS_HOST_MESH, ATH_WRONG_HOST_MESH: *player is null. */
+int ath_player_open(ath_player **player, const uint8_t *bytes, size_t size, const ath_player_options *options,
+                    ath_fault_info *fault);
+/* Jobs are ended before. Null is passed over. */
+void ath_player_close(ath_player *player);
+/* For ath_get_info, ath_clips, ath_level_for, ath_cut and all else that takes a const file. */
+const ath_file *ath_player_file(const ath_player *player);
+/* What the last error was about. */
+const ath_fault_info *ath_player_fault(const ath_player *player);
+
+/* A moment: segments that show it, all at one level. They stay until the next call that shows something. */
+typedef struct ath_player_moment {
+    double frame; /* for ath_positions, ath_matrices and the like */
+    int32_t level, segment_count;
+    const ath_segment *segments[2];
+} ath_player_moment;
+
+/* What shows a clip at a time, in seconds since its first frame. level: -1 for the deepest; where bytes of one are not
+ * there, the deepest that is. What is not prepared is prepared at once. ATH_OK; ATH_MISSING: not even level 0 is there;
+ * ATH_BAD_CHECKSUM, ATH_BAD_CHUNK; ATH_BAD_ARGUMENT: no such clip; ATH_NO_MEMORY. */
+int ath_player_show(ath_player *player, int32_t clip, double seconds, ath_wrap wrap, int32_t level,
+                    ath_player_moment *moment);
+/* The same, and then ath_positions. */
+int ath_player_positions(ath_player *player, int32_t clip, double seconds, ath_wrap wrap, int32_t level,
+                         ath_order order, float *xyz, size_t stride);
+/* The same, and then ath_matrices and ath_exact, of 12 and 3 floats without gaps. *shown, which may be null, is the level
+ * whose ath_cut they are of. There is room for as many as ath_cut_size says of any level up to `level`. */
+int ath_player_matrices(ath_player *player, int32_t clip, double seconds, ath_wrap wrap, int32_t level, float *matrices,
+                        float *exact, int32_t *shown);
+/* ath_faded_positions of all levels of a fade. ATH_NOT_PREPARED: bytes of one of them are not there. */
+int ath_player_faded_positions(ath_player *player, int32_t clip, double seconds, ath_wrap wrap, const ath_fade *fade,
+                               ath_order order, float *xyz, size_t stride);
+
+/* Goes on with preparing what comes after what was shown last, in the direction and with the wrap that it was shown in,
+ * for `steps` steps (ath_prepare_step). ATH_MORE; ATH_OK: nothing is left to do until time goes on; errors as above. */
+int ath_player_ahead(ath_player *player, int32_t steps);
+
+/* The same as a job: null where nothing is left to do, or there is no memory. */
+ath_player_job *ath_player_begin(ath_player *player);
+/* Goes on for `steps` steps: ATH_MORE until it is done. On any thread. */
+int ath_player_run(ath_player_job *job, int32_t steps);
+/* Takes over what a job has prepared; what is not done is dropped. The job is gone. */
+void ath_player_end(ath_player *player, ath_player_job *job);
+
+/* Triangles of the faces, those of more corners as fans: three vertices each, in file or in source order. *count is
+ * their number; triangles: null, or room for that many. ATH_BAD_ARGUMENT: the file has no faces; the errors of
+ * ath_read_polygons. */
+int ath_player_triangles(ath_player *player, ath_order order, uint32_t *triangles, size_t *count);
+/* The same of edges, two vertices each: those of the source, or along its stems. */
+int ath_player_lines(ath_player *player, ath_order order, uint32_t *lines, size_t *count);
+
+/* Normals of vertices: of the triangles around each, weighted by their areas; zeros where there are none. xyz: positions of
+ * three floats, `stride` bytes apart; normals: three floats each without gaps. */
+void ath_player_normals(const uint32_t *triangles, size_t count, const float *xyz, size_t stride, int32_t vertex_count,
+                        float *normals);
+/* Tangents, along which u grows, at right angles to the normals: four floats each, the last of them 1 or -1, so that the
+ * bitangent is it times the cross product of normal and tangent, as glTF has it. uv: two floats for each vertex, `uv_stride`
+ * bytes apart. Zeros where there are none. */
+void ath_player_tangents(const uint32_t *triangles, size_t count, const float *xyz, size_t stride, const float *uv,
+                         size_t uv_stride, const float *normals, int32_t vertex_count, float *tangents);
+
+#ifdef __cplusplus
+}
+#endif
+#endif
+
+#ifdef ATH_PLAYER_IMPLEMENTATION
+#ifndef ATH_PLAYER_IMPLEMENTED
+#define ATH_PLAYER_IMPLEMENTED
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+enum { ATH_PLAYER_ALL_STEPS = 0x7fffffff };
+
+/* A prepared segment, or one that a job prepares. Its memory stands behind it. */
+typedef struct ath_player_entry {
+    struct ath_player_entry *next;
+    size_t size;
+    uint64_t used; /* when it was shown last, in calls */
+    int32_t segment, level;
+} ath_player_entry;
+
+struct ath_player_job {
+    ath_player_job *next;
+    ath_player_entry *entry;
+    ath_work *work;
+    int result;
+};
+
+/* Memory that is freed when the player is closed. */
+typedef struct ath_player_block {
+    struct ath_player_block *next;
+} ath_player_block;
+
+struct ath_player {
+    ath_player_options options;
+    ath_file *file;
+    ath_info info;
+    ath_fault_info fault;
+    ath_player_block *blocks;
+    ath_player_entry *entries;
+    ath_player_job *jobs, *idle; /* that run; whose work memory waits for the next one */
+    ath_player_job *own;         /* of ath_player_ahead: one of `jobs` */
+    size_t cached;
+    uint64_t calls;
+    int32_t deepest; /* level that is built */
+    int32_t clip, segment, level, direction;
+    double frame;
+    ath_wrap wrap;
+};
+
+enum { ATH_PLAYER_HEAD = 64 }; /* bytes in front of aligned memory: the structs above fit */
+
+/* malloc's memory, aligned to 16 where it is not; the pointer that it gave stands in front. */
+static void *ath_player_aligned(size_t size)
+{
+    const size_t extra = 16 + sizeof(void *);
+    char *memory = size <= SIZE_MAX - extra ? (char *)malloc(size + extra) : NULL;
+    if (!memory) return NULL;
+    char *aligned = memory + extra - (uintptr_t)(memory + extra) % 16;
+    memcpy(aligned - sizeof(void *), &memory, sizeof memory);
+    return aligned;
+}
+
+static void *ath_player_take(const ath_player_options *options, size_t size)
+{
+    if (options->allocate) return options->allocate(options->context, size > 0 ? size : 1);
+    return ath_player_aligned(size);
+}
+
+static void ath_player_give(const ath_player_options *options, void *memory)
+{
+    void *given;
+    if (!memory) return;
+    if (options->allocate) {
+        if (options->release) options->release(options->context, memory);
+        return;
+    }
+    memcpy(&given, (char *)memory - sizeof(void *), sizeof given);
+    free(given);
+}
+
+/* Memory that lasts as long as the player. */
+static void *ath_player_block_of(ath_player *p, size_t size)
+{
+    char *memory = (char *)ath_player_take(&p->options, ATH_PLAYER_HEAD + size);
+    if (!memory) return NULL;
+    ath_player_block *block = (ath_player_block *)memory;
+    block->next = p->blocks;
+    p->blocks = block;
+    return memory + ATH_PLAYER_HEAD;
+}
+
+static void *ath_player_memory_of(ath_player_entry *entry) { return (char *)entry + ATH_PLAYER_HEAD; }
+
+/* ---- opening ---- */
+
+/* What the levels share, as far as bytes are there. */
+static int ath_player_refine(ath_player *p)
+{
+    for (int32_t level = 1; level < p->info.level_count; level++) {
+        size_t size;
+        int result = ath_refine_size(p->file, level, &size, &p->fault);
+        if (result == ATH_MISSING) return ATH_OK;
+        if (result != ATH_OK) return result;
+        void *memory = size > 0 ? ath_player_block_of(p, size) : NULL;
+        if (size > 0 && !memory) return ATH_NO_MEMORY;
+        result = ath_refine(p->file, level, memory, size);
+        if (result != ATH_OK) return result;
+        p->deepest = level;
+    }
+    return ATH_OK;
+}
+
+static int ath_player_build(ath_player *p, const uint8_t *bytes, size_t size, size_t file_size)
+{
+    const ath_player_options *own = &p->options;
+    void *memory = ath_player_block_of(p, file_size);
+    if (!memory) return ATH_NO_MEMORY;
+    int result = ath_open(memory, file_size, bytes, size, own->limits, &p->fault);
+    if (result != ATH_OK) return result;
+    p->file = (ath_file *)memory;
+    ath_get_info(p->file, &p->info);
+    if (p->info.rest_is_host && own->host_mesh)
+        result = ath_set_host_mesh(p->file, own->host_mesh, own->host_stride, own->host_vertex_count, &p->fault);
+    if (result != ATH_OK) return result;
+    size_t build = ath_build_size(p->file);
+    if (!(memory = ath_player_block_of(p, build))) return ATH_NO_MEMORY;
+    result = ath_build(p->file, memory, build);
+    return result == ATH_OK ? ath_player_refine(p) : result;
+}
+
+int ath_player_open(ath_player **player, const uint8_t *bytes, size_t size, const ath_player_options *options,
+                    ath_fault_info *fault)
+{
+    ath_player_options own;
+    ath_fault_info why;
+    size_t front, file_size;
+    memset(&own, 0, sizeof own);
+    if (options) own = *options;
+    if (own.cache_bytes == 0) own.cache_bytes = (size_t)64 << 20;
+    *player = NULL;
+    int result = ath_front(bytes, size, own.limits, &front, &file_size, &why);
+    if (fault) *fault = why;
+    if (result != ATH_OK) return result;
+    ath_player *p = (ath_player *)ath_player_take(&own, sizeof *p);
+    if (!p) return ATH_NO_MEMORY;
+    memset(p, 0, sizeof *p);
+    p->options = own;
+    p->segment = -1;
+    result = ath_player_build(p, bytes, size, file_size);
+    if (fault) *fault = p->fault;
+    if (result != ATH_OK) {
+        ath_player_close(p);
+        return result;
+    }
+    *player = p;
+    return ATH_OK;
+}
+
+static void ath_player_free_jobs(ath_player *p, ath_player_job *job)
+{
+    while (job) {
+        ath_player_job *next = job->next;
+        ath_player_give(&p->options, job->entry);
+        ath_player_give(&p->options, job);
+        job = next;
+    }
+}
+
+void ath_player_close(ath_player *player)
+{
+    if (!player) return;
+    ath_player_options options = player->options;
+    ath_player_free_jobs(player, player->jobs);
+    ath_player_free_jobs(player, player->idle);
+    for (ath_player_entry *entry = player->entries, *next; entry; entry = next) {
+        next = entry->next;
+        ath_player_give(&options, entry);
+    }
+    for (ath_player_block *block = player->blocks, *next; block; block = next) {
+        next = block->next;
+        ath_player_give(&options, block);
+    }
+    ath_player_give(&options, player);
+}
+
+const ath_file *ath_player_file(const ath_player *player) { return player->file; }
+
+const ath_fault_info *ath_player_fault(const ath_player *player) { return &player->fault; }
+
+/* ---- prepared segments ---- */
+
+static ath_player_entry *ath_player_find(const ath_player *p, int32_t segment, int32_t level)
+{
+    ath_player_entry *entry = p->entries;
+    while (entry && (entry->segment != segment || entry->level != level)) entry = entry->next;
+    return entry;
+}
+
+/* Frees what was shown longest ago until there is room for so many bytes more; not what this call has used. */
+static void ath_player_make_room(ath_player *p, size_t size)
+{
+    while (p->cached + size > p->options.cache_bytes) {
+        ath_player_entry **oldest = NULL;
+        for (ath_player_entry **at = &p->entries; *at; at = &(*at)->next)
+            if ((*at)->used < p->calls && (!oldest || (*at)->used < (*oldest)->used)) oldest = at;
+        if (!oldest) return;
+        ath_player_entry *gone = *oldest;
+        *oldest = gone->next;
+        p->cached -= gone->size;
+        ath_player_give(&p->options, gone);
+    }
+}
+
+static void ath_player_insert(ath_player *p, ath_player_entry *entry)
+{
+    ath_player_make_room(p, entry->size);
+    entry->next = p->entries;
+    p->entries = entry;
+    p->cached += entry->size;
+}
+
+/* A job whose work memory is there, and is used again. */
+static ath_player_job *ath_player_idle_job(ath_player *p)
+{
+    ath_player_job *job = p->idle;
+    size_t size = ath_work_size(p->file);
+    if (job) {
+        p->idle = job->next;
+    } else {
+        char *memory = (char *)ath_player_take(&p->options, ATH_PLAYER_HEAD + size);
+        if (!memory) return NULL;
+        job = (ath_player_job *)memory;
+        job->work = (ath_work *)(memory + ATH_PLAYER_HEAD);
+    }
+    job->entry = NULL;
+    job->result = ATH_MORE;
+    return job;
+}
+
+static void ath_player_retire(ath_player *p, ath_player_job *job)
+{
+    ath_player_give(&p->options, job->entry);
+    job->entry = NULL;
+    job->next = p->idle;
+    p->idle = job;
+}
+
+/* Begins to prepare a segment; where the one that it is joined to is there, from that. */
+static int ath_player_start(ath_player *p, int32_t segment, int32_t level, ath_player_job **started)
+{
+    size_t size = ath_segment_size(p->file, level), work_size = ath_work_size(p->file);
+    ath_player_entry *before = ath_player_find(p, ath_joined_to(p->file, segment, level), level);
+    ath_player_job *job = ath_player_idle_job(p);
+    if (!job) return ATH_NO_MEMORY;
+    job->entry = (ath_player_entry *)ath_player_take(&p->options, ATH_PLAYER_HEAD + size);
+    int result = ATH_NO_MEMORY;
+    if (job->entry) {
+        memset(job->entry, 0, ATH_PLAYER_HEAD);
+        job->entry->size = ATH_PLAYER_HEAD + size;
+        job->entry->segment = segment;
+        job->entry->level = level;
+        job->entry->used = p->calls;
+        result =
+            ath_prepare_start(job->work, work_size, p->file, segment, level, ath_player_memory_of(job->entry), size);
+    }
+    if (result != ATH_OK) {
+        if (job->entry) ath_work_fault(job->work, &p->fault);
+        ath_player_retire(p, job);
+        return result;
+    }
+    if (before) ath_follow(job->work, (const ath_segment *)ath_player_memory_of(before));
+    job->next = p->jobs;
+    p->jobs = job;
+    *started = job;
+    return ATH_OK;
+}
+
+int ath_player_run(ath_player_job *job, int32_t steps)
+{
+    if (job->result == ATH_MORE) job->result = ath_prepare_step(job->work, steps);
+    return job->result;
+}
+
+void ath_player_end(ath_player *player, ath_player_job *job)
+{
+    ath_player_job **at = &player->jobs;
+    while (*at != job) at = &(*at)->next;
+    *at = job->next;
+    if (player->own == job) player->own = NULL;
+    if (job->result != ATH_OK && job->result != ATH_MORE) ath_work_fault(job->work, &player->fault);
+    if (job->result == ATH_OK && !ath_player_find(player, job->entry->segment, job->entry->level)) {
+        ath_player_insert(player, job->entry);
+        job->entry = NULL;
+    }
+    ath_player_retire(player, job);
+}
+
+/* A segment at a level, prepared at once where it is not there. */
+static int ath_player_segment(ath_player *p, int32_t segment, int32_t level, const ath_segment **found)
+{
+    ath_player_job *job = p->own;
+    if (job && job->entry->segment == segment && job->entry->level == level) {
+        ath_player_run(job, ATH_PLAYER_ALL_STEPS);
+        ath_player_end(p, job);
+    }
+    ath_player_entry *entry = ath_player_find(p, segment, level);
+    if (!entry) {
+        int result = ath_player_start(p, segment, level, &job);
+        if (result != ATH_OK) return result;
+        result = ath_player_run(job, ATH_PLAYER_ALL_STEPS);
+        ath_player_end(p, job);
+        if (result != ATH_OK) return result;
+        entry = ath_player_find(p, segment, level);
+    }
+    entry->used = p->calls;
+    *found = (const ath_segment *)ath_player_memory_of(entry);
+    return ATH_OK;
+}
+
+/* ---- showing ---- */
+
+/* The deepest level up to `level` (-1: any) that a segment has. */
+static int32_t ath_player_level_of(const ath_player *p, int32_t segment, int32_t level)
+{
+    int32_t ready = ath_ready_level(p->file, segment);
+    if (ready > p->deepest) ready = p->deepest;
+    return level < 0 || level > ready ? ready : level;
+}
+
+/* The segments of a place on the frames at a level. */
+static int ath_player_moment_at(ath_player *p, double frame, int32_t level, ath_player_moment *moment)
+{
+    ath_blend blend = ath_blend_at(p->file, frame);
+    int32_t count = blend.segment[1] != blend.segment[0] ? 2 : 1;
+    moment->frame = frame;
+    moment->segment_count = 0;
+    for (int32_t i = 0; i < count; i++) level = ath_player_level_of(p, blend.segment[i], level);
+    moment->level = level;
+    if (level < 0) return ATH_MISSING;
+    for (int32_t i = 0; i < count; i++) {
+        int result = ath_player_segment(p, blend.segment[i], level, &moment->segments[i]);
+        if (result != ATH_OK) return result;
+        moment->segment_count = i + 1;
+    }
+    return ATH_OK;
+}
+
+/* Where a clip is at a time; what is to be prepared ahead follows from it. */
+static int ath_player_move(ath_player *p, int32_t clip, double seconds, ath_wrap wrap, int32_t level, double *frame)
+{
+    if (clip < 0 || clip >= p->info.clip_count) return ATH_BAD_ARGUMENT;
+    *frame = ath_frame_at(p->file, clip, seconds, wrap);
+    if (wrap == ATH_AS_MARKED) wrap = ath_clips(p->file)[clip].loop ? ATH_LOOP : ATH_CLAMP;
+    int32_t segment = ath_blend_at(p->file, *frame).segment[0];
+    int was_here = p->segment >= 0 && p->clip == clip;
+    int wrapped = was_here && wrap == ATH_LOOP && (segment > p->segment + 1 || segment < p->segment - 1);
+    if (!was_here)
+        p->direction = 1;
+    else if (!wrapped && *frame != p->frame)
+        p->direction = *frame < p->frame ? -1 : 1;
+    p->clip = clip;
+    p->segment = segment;
+    p->level = level;
+    p->frame = *frame;
+    p->wrap = wrap;
+    p->calls++;
+    return ATH_OK;
+}
+
+int ath_player_show(ath_player *player, int32_t clip, double seconds, ath_wrap wrap, int32_t level,
+                    ath_player_moment *moment)
+{
+    double frame;
+    int result = ath_player_move(player, clip, seconds, wrap, level, &frame);
+    return result == ATH_OK ? ath_player_moment_at(player, frame, level, moment) : result;
+}
+
+int ath_player_positions(ath_player *player, int32_t clip, double seconds, ath_wrap wrap, int32_t level,
+                         ath_order order, float *xyz, size_t stride)
+{
+    ath_player_moment moment;
+    int result = ath_player_show(player, clip, seconds, wrap, level, &moment);
+    if (result != ATH_OK) return result;
+    return ath_positions(player->file, moment.segments, moment.segment_count, moment.frame, order, xyz, stride);
+}
+
+int ath_player_matrices(ath_player *player, int32_t clip, double seconds, ath_wrap wrap, int32_t level, float *matrices,
+                        float *exact, int32_t *shown)
+{
+    const size_t size = sizeof(float);
+    ath_player_moment now;
+    int result = ath_player_show(player, clip, seconds, wrap, level, &now);
+    if (result != ATH_OK) return result;
+    if (shown) *shown = now.level;
+    result = ath_matrices(player->file, now.segments, now.segment_count, now.frame, matrices, 12 * size);
+    if (result != ATH_OK) return result;
+    return ath_exact(player->file, now.segments, now.segment_count, now.frame, exact, 3 * size);
+}
+
+int ath_player_faded_positions(ath_player *player, int32_t clip, double seconds, ath_wrap wrap, const ath_fade *fade,
+                               ath_order order, float *xyz, size_t stride)
+{
+    const ath_segment *segments[2 * ATH_FADE_LEVELS];
+    int32_t count = 0, latest = fade->count > 0 ? fade->level[fade->count - 1] : 0;
+    double frame;
+    int result = ath_player_move(player, clip, seconds, wrap, latest, &frame);
+    if (result != ATH_OK) return result;
+    for (int32_t i = 0; i < fade->count; i++) {
+        ath_player_moment moment;
+        result = ath_player_moment_at(player, frame, fade->level[i], &moment);
+        if (result != ATH_OK) return result;
+        for (int32_t k = 0; k < moment.segment_count; k++) segments[count++] = moment.segments[k];
+    }
+    return ath_faded_positions(player->file, segments, count, frame, fade, order, xyz, stride);
+}
+
+/* ---- ahead ---- */
+
+/* The segment that is shown after this one; -1: none is. */
+static int32_t ath_player_next(const ath_player *p)
+{
+    const ath_clip *clip = ath_clips(p->file) + p->clip;
+    int32_t last = clip->first_segment + clip->segment_count - 1, next = p->segment + p->direction;
+    if (p->segment < 0) return -1;
+    if (next >= clip->first_segment && next <= last) return next;
+    if (p->wrap == ATH_LOOP) return next > last ? clip->first_segment : last;
+    if (p->wrap == ATH_PING_PONG && clip->segment_count > 1) return p->segment - p->direction;
+    return -1;
+}
+
+/* Whether a segment waits to be prepared; `level` is then that to prepare it at. */
+static int ath_player_wants(const ath_player *p, int32_t segment, int32_t *level)
+{
+    if (segment < 0) return 0;
+    *level = ath_player_level_of(p, segment, p->level);
+    if (*level < 0 || ath_player_find(p, segment, *level)) return 0;
+    for (const ath_player_job *job = p->jobs; job; job = job->next)
+        if (job->entry->segment == segment && job->entry->level == *level) return 0;
+    return 1;
+}
+
+ath_player_job *ath_player_begin(ath_player *player)
+{
+    ath_player_job *job = NULL;
+    int32_t level, next = ath_player_next(player);
+    if (ath_player_wants(player, next, &level)) ath_player_start(player, next, level, &job);
+    return job;
+}
+
+int ath_player_ahead(ath_player *player, int32_t steps)
+{
+    if (!player->own) player->own = ath_player_begin(player);
+    if (!player->own) return ATH_OK;
+    int result = ath_player_run(player->own, steps);
+    if (result != ATH_MORE) ath_player_end(player, player->own);
+    return result;
+}
+
+/* ---- topology ---- */
+
+/* Of each source vertex the file's; null: no memory. */
+static uint32_t *ath_player_file_vertices(const ath_player *p)
+{
+    size_t size = (size_t)p->info.vertex_count * sizeof(uint32_t);
+    uint32_t *vertices = (uint32_t *)ath_player_take(&p->options, size);
+    const int32_t *source = ath_vertex_source(p->file);
+    for (int32_t i = 0; vertices && i < p->info.vertex_count; i++) vertices[source[i]] = (uint32_t)i;
+    return vertices;
+}
+
+static int ath_player_reorder(const ath_player *p, ath_order order, uint32_t *vertices, size_t count)
+{
+    uint32_t *own = order == ATH_FILE_ORDER ? ath_player_file_vertices(p) : NULL;
+    if (order == ATH_FILE_ORDER && !own) return ATH_NO_MEMORY;
+    for (size_t i = 0; own && i < count; i++) vertices[i] = own[vertices[i]];
+    ath_player_give(&p->options, own);
+    return ATH_OK;
+}
+
+/* Polygons of a kind, as fans of primitives of `size` corners. */
+static size_t ath_player_split(const ath_polygons *shape, const uint32_t *counts, const int32_t *corners, uint32_t size,
+                               uint32_t *primitives)
+{
+    size_t made = 0;
+    for (uint32_t face = 0; face < shape->face_count; face++) {
+        uint32_t count = counts ? counts[face] : shape->columns;
+        for (uint32_t i = size - 1; i < count; i++, made++) {
+            if (!primitives) continue;
+            uint32_t *own = primitives + made * size;
+            own[0] = (uint32_t)corners[size == 2 ? i - 1 : 0];
+            if (size == 3) own[1] = (uint32_t)corners[i - 1];
+            own[size - 1] = (uint32_t)corners[i];
+        }
+        corners += count;
+    }
+    return made;
+}
+
+static int ath_player_primitives(ath_player *p, int kind, uint32_t size, ath_order order, uint32_t *out, size_t *count)
+{
+    ath_polygons shape;
+    int result = ath_polygons_of(p->file, kind, &shape, &p->fault);
+    if (result != ATH_OK) return result;
+    size_t counts_size = shape.is_mixed ? shape.face_count * sizeof(uint32_t) : 0,
+           work_size = ath_polygons_size(p->file);
+    char *memory = (char *)ath_player_take(&p->options, work_size);
+    uint32_t *counts = (uint32_t *)ath_player_take(&p->options, counts_size);
+    int32_t *corners = (int32_t *)ath_player_take(&p->options, shape.corner_count * sizeof(int32_t));
+    result = memory && counts && corners ? ATH_OK : ATH_NO_MEMORY;
+    if (result == ATH_OK)
+        result =
+            ath_read_polygons(p->file, kind, memory, work_size, shape.is_mixed ? counts : NULL, corners, &p->fault);
+    if (result == ATH_OK) *count = ath_player_split(&shape, shape.is_mixed ? counts : NULL, corners, size, out);
+    ath_player_give(&p->options, memory);
+    ath_player_give(&p->options, counts);
+    ath_player_give(&p->options, corners);
+    return result == ATH_OK && out ? ath_player_reorder(p, order, out, *count * size) : result;
+}
+
+int ath_player_triangles(ath_player *player, ath_order order, uint32_t *triangles, size_t *count)
+{
+    return ath_player_primitives(player, ATH_FACES, 3, order, triangles, count);
+}
+
+/* Along stems, and from each stem to the vertex that it hangs on. */
+static size_t ath_player_stem_lines(const ath_player *p, ath_order order, uint32_t *lines)
+{
+    const ath_branch *branches = ath_branches(p->file);
+    const int32_t *source = ath_vertex_source(p->file);
+    size_t made = 0;
+    for (int32_t b = 0; b < p->info.branch_count; b++)
+        for (int32_t i = 0; i < branches[b].count; i++) {
+            int32_t to = branches[b].first + i, from = i > 0 ? to - 1 : branches[b].attach;
+            if (from < 0) continue;
+            if (lines) lines[2 * made] = (uint32_t)(order == ATH_SOURCE_ORDER ? source[from] : from);
+            if (lines) lines[2 * made + 1] = (uint32_t)(order == ATH_SOURCE_ORDER ? source[to] : to);
+            made++;
+        }
+    return made;
+}
+
+int ath_player_lines(ath_player *player, ath_order order, uint32_t *lines, size_t *count)
+{
+    ath_polygons shape;
+    int result = ath_polygons_of(player->file, ATH_EDGES, &shape, &player->fault);
+    if (result == ATH_OK && !shape.is_derived) return ath_player_primitives(player, ATH_EDGES, 2, order, lines, count);
+    if (result != ATH_OK && result != ATH_BAD_ARGUMENT) return result;
+    *count = ath_player_stem_lines(player, order, lines);
+    return ATH_OK;
+}
+
+/* ---- normals and tangents ---- */
+
+static const float *ath_player_at(const float *first, size_t stride, uint32_t index)
+{
+    return (const float *)((const char *)first + stride * index);
+}
+
+static void ath_player_edge(const float *from, const float *to, float *edge)
+{
+    for (int k = 0; k < 3; k++) edge[k] = to[k] - from[k];
+}
+
+static void ath_player_cross(const float *a, const float *b, float *out)
+{
+    out[0] = a[1] * b[2] - a[2] * b[1];
+    out[1] = a[2] * b[0] - a[0] * b[2];
+    out[2] = a[0] * b[1] - a[1] * b[0];
+}
+
+static float ath_player_dot(const float *a, const float *b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+
+/* Nothing where it has no length. */
+static void ath_player_normalise(float *vector)
+{
+    float length = sqrtf(ath_player_dot(vector, vector)), scale = length > 0.0f ? 1.0f / length : 0.0f;
+    for (int k = 0; k < 3; k++) vector[k] *= scale;
+}
+
+void ath_player_normals(const uint32_t *triangles, size_t count, const float *xyz, size_t stride, int32_t vertex_count,
+                        float *normals)
+{
+    memset(normals, 0, (size_t)vertex_count * 3 * sizeof(float));
+    for (const uint32_t *corner = triangles, *end = triangles + 3 * count; corner < end; corner += 3) {
+        const float *first = ath_player_at(xyz, stride, corner[0]);
+        float a[3], b[3], normal[3];
+        ath_player_edge(first, ath_player_at(xyz, stride, corner[1]), a);
+        ath_player_edge(first, ath_player_at(xyz, stride, corner[2]), b);
+        ath_player_cross(a, b, normal);
+        for (int i = 0; i < 3; i++)
+            for (int k = 0; k < 3; k++) normals[3 * (size_t)corner[i] + (size_t)k] += normal[k];
+    }
+    for (int32_t i = 0; i < vertex_count; i++) ath_player_normalise(normals + 3 * (size_t)i);
+}
+
+/* Adds to the corners' tangents how the surface goes on with u; the fourth number is the area in u and v, with its sign. */
+static void ath_player_add_tangent(const uint32_t *corner, const float *xyz, size_t stride, const float *uv,
+                                   size_t uv_stride, float *tangents)
+{
+    const float *first = ath_player_at(xyz, stride, corner[0]), *origin = ath_player_at(uv, uv_stride, corner[0]);
+    const float *second = ath_player_at(uv, uv_stride, corner[1]), *third = ath_player_at(uv, uv_stride, corner[2]);
+    float u1 = second[0] - origin[0], v1 = second[1] - origin[1], u2 = third[0] - origin[0], v2 = third[1] - origin[1];
+    float a[3], b[3], area = u1 * v2 - u2 * v1, sign = area < 0.0f ? -1.0f : 1.0f;
+    ath_player_edge(first, ath_player_at(xyz, stride, corner[1]), a);
+    ath_player_edge(first, ath_player_at(xyz, stride, corner[2]), b);
+    for (int i = 0; i < 3; i++) {
+        float *own = tangents + 4 * (size_t)corner[i];
+        for (int k = 0; k < 3; k++) own[k] += sign * (a[k] * v2 - b[k] * v1);
+        own[3] += area;
+    }
+}
+
+void ath_player_tangents(const uint32_t *triangles, size_t count, const float *xyz, size_t stride, const float *uv,
+                         size_t uv_stride, const float *normals, int32_t vertex_count, float *tangents)
+{
+    memset(tangents, 0, (size_t)vertex_count * 4 * sizeof(float));
+    for (size_t i = 0; i < count; i++) ath_player_add_tangent(triangles + 3 * i, xyz, stride, uv, uv_stride, tangents);
+    for (int32_t i = 0; i < vertex_count; i++) {
+        float *own = tangents + 4 * (size_t)i, along = ath_player_dot(own, normals + 3 * (size_t)i);
+        for (int k = 0; k < 3; k++) own[k] -= along * normals[3 * (size_t)i + (size_t)k];
+        ath_player_normalise(own);
+        own[3] = own[3] < 0.0f ? -1.0f : 1.0f;
+    }
+}
+
+#ifdef __cplusplus
+}
+#endif
+#endif
+#endif
