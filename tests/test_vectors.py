@@ -191,6 +191,12 @@ def test_limits_of_a_decoder_s_own_can_be_left_out(tmp_path):
     assert "0 wrong" in run("--without", "limits", *chosen, *unlimited)
 
 
+def test_halves_of_wide_numbers_are_no_nans():
+    data = (conformance.FOLDER / "valid/smallest-wide.ath").read_bytes()
+    number = bytes.fromhex("0100a0ffffffef3f")  # just below 1
+    assert conformance.checksum_of(data, "1", number) == f"{conformance.crc32c(number):08x}"
+
+
 def test_a_nan_is_a_nan_whatever_its_bits():
     data = (conformance.FOLDER / "valid/not-a-number.ath").read_bytes()
     quiet, other = bytes.fromhex("0000c07f"), bytes.fromhex("0100a0ff")

@@ -33,7 +33,7 @@
 #endif
 
 #if defined(__GNUC__)
-#define ATH_INLINE static inline __attribute__((always_inline))
+#define ATH_INLINE static inline __attribute__((always_inline, unused))
 #else
 #define ATH_INLINE static inline
 #endif
