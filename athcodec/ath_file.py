@@ -9,7 +9,7 @@ from __future__ import annotations
 import builtins
 import os
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, fields
 from functools import cached_property
@@ -39,6 +39,7 @@ from athcodec.errors import (
 from athcodec.hierarchy import Hierarchy, derived_edges
 from athcodec.host_mesh import HostMesh, mesh_positions
 from athcodec.polygons import Polygons
+from athcodec.threads import ThreadPool, default_jobs
 
 CHUNK_FIELDS = ("kind", "level", "segment", "length", "checksum", "offset")
 
@@ -919,6 +920,75 @@ class AthFile:
             self._decode(segment, level, ready, before, joined_to)
         return ready
 
+    def show_all(self, segments: range, level: int, show: Callable[[int, core_file.Segment], None]) -> None:
+        """Decodes segments of the file at a level, in runs that threads share.
+
+        Parameters
+        ----------
+        segments : range
+            Counted over the whole file.
+        level : int
+            One that is stored.
+        show : callable
+            Takes a segment's number and what was prepared, whose memory the next one takes over; threads call it.
+
+        Raises
+        ------
+        LevelUnavailable, FormatError
+            As for `prepare`.
+        """
+        what = f"level {level}, segments {segments.start} to {segments.stop - 1}"
+        with self._lock, self._fed(self.core.missing(level, segments[0], segments[-1]), what):
+            self._refine(level)
+            follows, runs = self._runs(segments, level, what)
+            items = [(run, level, follows, show) for run in runs]
+            faults = ThreadPool(len(runs)).map(self._show_run, items)
+            for fault in filter(None, faults):
+                raise fault
+        self._rests_read = max(self._rests_read, level)
+
+    def _runs(self, segments: range, level: int, what: str) -> tuple[bool, list[range]]:
+        """Whether memory allows to go on from a segment to one that is joined to it, and one run for each thread.
+
+        The first segment of a run is decoded with the one that it is joined to, whose end nobody else has yet.
+        """
+        joined = any(self.core.joined_to(segment, level) >= 0 for segment in segments)
+        size, limit = self.core.segment_size(level), self.limits.memory_bytes
+        needed = size + self.core.work_size()
+        if needed > limit:
+            raise LimitExceeded(f"{what}: got a need of {needed} bytes; the limit is {limit}")
+        follows = joined and needed + size <= limit
+        room = limit // (needed + size if follows else needed)
+        count = max(1, min(default_jobs(), len(segments) // (2 if joined else 1), room))
+        cuts = [len(segments) * i // count for i in range(count + 1)]
+        return follows, [segments[start:stop] for start, stop in zip(cuts, cuts[1:])]
+
+    def _show_run(
+        self, run: range, level: int, follows: bool, show: Callable[[int, core_file.Segment], None]
+    ) -> core_file.CoreError | None:
+        """Returns a fault rather than raises it: the other runs need the file's bytes until they end."""
+        work, size = core_file.Work(self.core.work_size()), self.core.segment_size(level)
+        ready, spare = core_file.Segment(size), None
+        for segment in run:
+            joined_to = None
+            if follows and segment > run.start and self.core.joined_to(segment, level) == segment - 1:
+                joined_to, ready = ready, spare or core_file.Segment(size)
+                spare = joined_to
+            try:
+                self.core.prepare(work, segment, level, ready, joined_to=joined_to)
+            except core_file.CoreError as fault:
+                return fault
+            show(segment, ready)
+        return None
+
+    def _refine(self, level: int) -> None:
+        """Builds what the segments share at a level, whose bytes are there."""
+        needed, limit = self.core.refinement_size(level), self.limits.memory_bytes
+        if needed > limit:
+            raise LimitExceeded(f"level {level}: got layers of {needed} bytes; the limit is {limit}")
+        self.core.build()
+        self.core.refine(level)
+
     def _decode(
         self,
         segment: int,
@@ -928,9 +998,7 @@ class AthFile:
         joined_to: core_file.Segment | None,
     ) -> None:
         with self._fed(self._missing(segment, level, before, joined_to), f"level {level}, segment {segment}"):
-            needed, limit = self.core.refinement_size(level), self.limits.memory_bytes
-            if needed > limit:
-                raise LimitExceeded(f"level {level}: got layers of {needed} bytes; the limit is {limit}")
+            self._refine(level)
             self.core.prepare(self._work, segment, level, ready, before, joined_to)
         self._rests_read = max(self._rests_read, level)
 

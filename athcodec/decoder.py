@@ -320,12 +320,18 @@ class Decoder:
         level, (first, last) = self._checked_level(level), self._checked_frames(frames)
         dtype = np.dtype(dtype or self.dtype)
         shown = np.empty((last - first, self.vertex_count, 3), dtype if dtype in SHOWN_TYPES else self.dtype)
-        for segment in self._prefetched(level, first, last):
-            start, stop = self.segments[segment]
-            low, high = max(start, first), min(stop, last)
-            with self._prepared(segment, level) as ready:
-                for frame in range(low, high):
-                    self.file.core.positions(ready, self.clip.first_frame + frame, shown[frame - first])
+
+        def show(segment: int, ready: core_file.Segment) -> None:
+            start, stop = self.segments[segment - self.clip.first_segment]
+            for frame in range(max(start, first), min(stop, last)):
+                self.file.core.positions(ready, self.clip.first_frame + frame, shown[frame - first])
+
+        segments = self._segments_of(first, last)
+        if len(segments) > 1:
+            self.file.show_all(self._in_file(segments), level, show)
+        elif len(segments) == 1:
+            with self._prepared(segments.start, level) as ready:
+                show(self.clip.first_segment + segments.start, ready)
         out = shown.astype(dtype, copy=False)
         return out if frames is None or isinstance(frames, slice) else out[0]
 
@@ -352,7 +358,10 @@ class Decoder:
             As for `positions`.
         """
         level, (first, last) = self._checked_level(level), self._checked_frames(frames)
-        for segment in self._prefetched(level, first, last):
+        segments = self._segments_of(first, last)
+        if len(segments) > 1:
+            self.file.prefetch(self._in_file(segments), level)
+        for segment in segments:
             start, stop = self.segments[segment]
             low, high = max(start, first), min(stop, last)
             yield low, self.positions(slice(low, high), level, dtype)
@@ -487,14 +496,12 @@ class Decoder:
             with self._lock:
                 self._last = place, ready
 
-    def _prefetched(self, level: int, first: int, last: int) -> range:
-        """The segments that hold the frames first to last - 1; what they need is there, if they are more than one."""
-        segments = range(self._segment_of(first), self._segment_of(last - 1) + 1) if first < last else range(0)
-        if len(segments) > 1:
-            self.file.prefetch(
-                range(self.clip.first_segment + segments.start, self.clip.first_segment + segments.stop), level
-            )
-        return segments
+    def _segments_of(self, first: int, last: int) -> range:
+        """The clip's segments that hold the frames first to last - 1."""
+        return range(self._segment_of(first), self._segment_of(last - 1) + 1) if first < last else range(0)
+
+    def _in_file(self, segments: range) -> range:
+        return range(self.clip.first_segment + segments.start, self.clip.first_segment + segments.stop)
 
     def _segment_of(self, frame: int) -> int:
         return bisect_right(self._segment_starts, frame) - 1

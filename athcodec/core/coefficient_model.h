@@ -150,16 +150,18 @@ static int32_t code_row(ath_coder *coder, coefficient_model *model, int32_t fram
     row_surroundings around = start_row(model, frames, slot, above_count);
     int32_t count = code_count(coder, model, model->history_count[slot], ath_max(above_count, 0), rank,
                                ENCODING ? used_frequencies(row, frames) : 0);
+    ath_coder own_coder = *coder; /* in registers: nothing below takes its address */
     for (int32_t k = 0; k < count; k++) {
         start_frequency(&around, k);
         for (int32_t axis = 0; axis < 3; axis++) {
             int32_t *own = row + axis * frames + k;
             number_model *number = model->numbers + row_number(&around, axis, k);
-            *own = code_signed(coder, number, expected_magnitude(&around, axis, k), *own);
+            *own = code_signed(&own_coder, number, expected_magnitude(&around, axis, k), *own);
             note_magnitude(&around, axis, k, clipped(*own));
         }
         finish_frequency(&around, k);
     }
+    *coder = own_coder;
     finish_row(model, &around, slot, count);
     return count;
 }

@@ -64,8 +64,8 @@ ATH_INLINE uint64_t code_mantissa(ath_coder *coder, ath_context contexts[4], int
     for (int32_t bit = length - 2; bit >= 0; bit--) {
         int given = (int)(value >> bit & 1);
         int32_t taken = length - 2 - bit;
-        int coded =
-            taken < 2 ? coder_bit(coder, &contexts[taken ? 1 + (built & 1) : 0], given) : coder_raw_bit(coder, given);
+        int coded = taken < 2 ? coder_even_bit(coder, &contexts[taken ? 1 + (built & 1) : 0], given)
+                              : coder_raw_bit(coder, given);
         built = built << 1 | (uint64_t)coded;
     }
     return built;

@@ -103,6 +103,12 @@ ATH_INLINE int coder_bit(ath_coder *coder, ath_context *context, int bit)
     return bit;
 }
 
+/* Of about as many zeros as ones. */
+ATH_INLINE int coder_even_bit(ath_coder *coder, ath_context *context, int bit)
+{
+    return coder_bit(coder, context, bit);
+}
+
 ATH_INLINE int coder_raw_bit(ath_coder *coder, int bit)
 {
     coder_narrow(coder, coder->range >> 1, bit);
@@ -166,34 +172,62 @@ static void coder_start(ath_coder *coder, const uint8_t *bytes, size_t size)
     coder->code |= coder_word(coder);
 }
 
-ATH_INLINE int coder_narrow(ath_coder *coder, uint64_t bound)
+ATH_INLINE void coder_renew(ath_coder *coder)
 {
+    if (coder->range < (uint64_t)1 << 32) {
+        coder->range <<= 32;
+        coder->code = coder->code << 32 | coder_word(coder);
+    }
+}
+
+ATH_INLINE int coder_bit(ath_coder *coder, ath_context *context, int ignored)
+{
+    uint64_t bound = (coder->range >> 16) * context->one;
     int bit = coder->code < bound;
+    (void)ignored;
     if (bit) {
         coder->range = bound;
     } else {
         coder->code -= bound;
         coder->range -= bound;
     }
-    if (coder->range < (uint64_t)1 << 32) {
-        coder->range <<= 32;
-        coder->code = coder->code << 32 | coder_word(coder);
-    }
-    return bit;
-}
-
-ATH_INLINE int coder_bit(ath_coder *coder, ath_context *context, int ignored)
-{
-    int bit = coder_narrow(coder, (coder->range >> 16) * context->one);
-    (void)ignored;
+    coder_renew(coder);
     context_learn(context, bit);
     return bit;
 }
 
+/* As context_learn, without a branch on the bit. */
+ATH_INLINE void context_learn_either(ath_context *context, uint32_t bit)
+{
+    uint32_t rate = ath_rate[context->experience], one = context->one, unless = bit - 1;
+    uint32_t way = (((one ^ ~unless) + (65537u & ~unless)) * rate) >> 16;
+    one += (way ^ unless) - unless;
+    one = one < PROBABILITY_MIN ? PROBABILITY_MIN : one;
+    one = one > 65536u - PROBABILITY_MIN ? 65536u - PROBABILITY_MIN : one;
+    context->one = (uint16_t)one;
+    context->experience = (uint16_t)(context->experience + (context->experience < RATE_LIMIT));
+}
+
+/* Of about as many zeros as ones: a branch on them would be guessed wrong. */
+ATH_INLINE int coder_even_bit(ath_coder *coder, ath_context *context, int ignored)
+{
+    uint64_t bound = (coder->range >> 16) * context->one, bit = coder->code < bound, unless = bit - 1;
+    (void)ignored;
+    coder->code -= bound & unless;
+    coder->range = bound + ((coder->range - 2 * bound) & unless);
+    coder_renew(coder);
+    context_learn_either(context, (uint32_t)bit);
+    return (int)bit;
+}
+
 ATH_INLINE int coder_raw_bit(ath_coder *coder, int ignored)
 {
+    uint64_t half = coder->range >> 1, bit = coder->code < half, unless = bit - 1;
     (void)ignored;
-    return coder_narrow(coder, coder->range >> 1);
+    coder->code -= half & unless;
+    coder->range = half + (coder->range & 1 & unless);
+    coder_renew(coder);
+    return (int)bit;
 }
 
 /* A stream is whole when its bytes were all read, nothing beyond them was needed except the zeros left out at the

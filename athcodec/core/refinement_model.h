@@ -93,9 +93,9 @@ static int32_t differing_frequencies(const int32_t *row, const int32_t *predicte
 }
 
 /* differences: those around this one. */
-static int32_t code_refined_difference(ath_coder *coder, refinement_model *model, const row_prediction *prediction,
-                                       const coarse_surroundings *around, const row_surroundings *differences,
-                                       int32_t axis, int32_t k, int32_t difference)
+ATH_INLINE int32_t code_refined_difference(ath_coder *coder, refinement_model *model, const row_prediction *prediction,
+                                           const coarse_surroundings *around, const row_surroundings *differences,
+                                           int32_t axis, int32_t k, int32_t difference)
 {
     int32_t predicted = prediction->row[axis * prediction->frames + k];
     int known = around->steps[axis][k] > 0;
@@ -129,17 +129,19 @@ static int32_t code_refined_row(ath_coder *coder, refinement_model *refinement, 
                                ENCODING ? differing_frequencies(row, predicted, frames) : 0);
     coarse_surroundings around;
     look_around(prediction, count, &around);
+    ath_coder own_coder = *coder; /* as in code_row */
     for (int32_t k = 0; k < count; k++) {
         start_frequency(&differences, k);
         for (int32_t axis = 0; axis < 3; axis++) {
             int32_t at = axis * frames + k;
-            int32_t difference = code_refined_difference(coder, refinement, prediction, &around, &differences, axis, k,
-                                                         row[at] - predicted[at]);
+            int32_t difference = code_refined_difference(&own_coder, refinement, prediction, &around, &differences,
+                                                         axis, k, row[at] - predicted[at]);
             if (!ENCODING) row[at] = predicted[at] + difference;
             note_magnitude(&differences, axis, k, clipped(difference));
         }
         finish_frequency(&differences, k);
     }
+    *coder = own_coder;
     for (int32_t axis = 0; axis < 3 && !ENCODING; axis++)
         memcpy(row + axis * frames + count, predicted + axis * frames + count, (size_t)(frames - count) * sizeof *row);
     finish_row(model, &differences, slot, count);
