@@ -139,7 +139,7 @@ def layer_ratios(ladder: Sequence[float], bound: float, diagonal: float) -> list
 def layers_of(source: Source, prelude: CodedPrelude, choice: Choice, ratios: Sequence[int]) -> Layers:
     """The layers for what was chosen; prelude: of the last of them."""
     settings = choice.settings
-    rest, level_0, rests = _rests(source, prelude, ratios)
+    rest, level_0, rests = _rests(source, prelude, ratios, settings.bound)
     layers: list[Layer] = []
     for i, (ratio, (pose, refined)) in enumerate(zip(ratios, rests)):
         plan = prelude.plan if len(ratios) == 1 else _plan_on(pose, prelude, i)
@@ -187,14 +187,15 @@ def _uniform(plan: Plan, settings: Settings) -> Settings:
 
 
 def _rests(
-    source: Source, prelude: CodedPrelude, ratios: Sequence[int]
+    source: Source, prelude: CodedPrelude, ratios: Sequence[int], bound: float
 ) -> tuple[ct.Rest, np.ndarray | None, list[tuple[np.ndarray, streams.CodedRest | None]]]:
     """The content of REST; what it decodes to, where the first layer refines that; of each layer the decoded pose and
     what refines one."""
     rest = prelude.rest_chunk
     if source.exact_rest or len(ratios) == 1:
         return rest, None, [(prelude.plan.rest, None)] * len(ratios)
-    first_step, *steps = (qz.single(rest.step * max(1.0, ratio / 2)) for ratio in ratios)
+    first_step = qz.first_rest_step(rest.step, bound, ratios[0])
+    steps = [qz.single(rest.step * max(1.0, ratio / 2)) for ratio in ratios[1:]]
     branches, mesh = prelude.plan.branches, source.mesh if rest.connected else None
     coded = _first_rests(prelude, first_step, source.rest, mesh)
     for step in steps:

@@ -219,14 +219,14 @@ def usual_change(samples: Sequence[SegmentSample]) -> float:
 
 
 def _coarser(settings: Settings, ratio: int) -> Settings:
-    """The same, so many times as coarse; the rest pose half of that."""
+    """The same, so many times as coarse, as a first layer."""
     return replace(
         settings,
         bound=ratio * settings.bound,
         largest_bound=ratio * settings.largest_bound,
         limit=ratio * settings.limit,
         step=qz.single(ratio * settings.step),
-        rest_step=qz.single(ratio / 2 * settings.rest_step),
+        rest_step=qz.first_rest_step(settings.rest_step, settings.bound, ratio),
         layer=0,
     )
 
