@@ -357,6 +357,7 @@ def find_rigid_corrections(
 
     def found(start: int, stop: int) -> np.ndarray:
         return _rows(
+            int(counts[start:stop].sum()) * frames,
             lambda rows, capacity: lib.ath_find_rigid_corrections(
                 stop - start,
                 address(first[start:stop], np.int32, stop - start),
@@ -370,7 +371,7 @@ def find_rigid_corrections(
                 step,
                 rows,
                 capacity,
-            )
+            ),
         )
 
     per_part = 3 * frames * max(1, int(counts.sum()) // max(1, len(counts)))
@@ -383,18 +384,12 @@ def ascending(corrections: np.ndarray) -> np.ndarray:
     return corrections[np.lexsort(corrections[:, 1::-1].T)]
 
 
-def _rows(find: Callable[[int, int], int]) -> np.ndarray | None:
-    """The corrections, (K, 6), that a function of the core finds, which takes their place and how many have room; None
-    where it finds that there are none that serve."""
-    capacity = 1024
-    while True:
-        rows = np.empty((capacity, 6), np.int32)
-        count = find(rows.ctypes.data, capacity)
-        if count < 0:
-            return None
-        if count <= capacity:
-            return rows[:count]
-        capacity = count
+def _rows(most: int, find: Callable[[int, int], int]) -> np.ndarray | None:
+    """The corrections, (K, 6), at most so many, that a function of the core finds, which takes their place and how many
+    have room; None where it finds that there are none that serve."""
+    rows = np.empty((most, 6), np.int32)
+    count = find(rows.ctypes.data, most)
+    return None if count < 0 else rows[:count].copy()
 
 
 def _corrections(
@@ -410,6 +405,7 @@ def _corrections(
     decided = np.ascontiguousarray(ends.decided, np.int32)
     met = CoreMetEnds(decided.ctypes.data, len(decided), ends.closed)
     return _rows(
+        vertices * frames,
         lambda rows, capacity: lib.ath_find_corrections(
             vertices,
             frames,
@@ -423,5 +419,5 @@ def _corrections(
             met,
             rows,
             capacity,
-        )
+        ),
     )
