@@ -502,14 +502,13 @@ class Search:
         return replace(settings, learned_pieces=self._pieces_for_learned_modes(settings, [search.required_saving])[0])
 
     def _sheet_of_all(self, settings: Settings) -> np.ndarray:
-        """Which branches have the affine functions first: as in the sample, or by form or all where those did. A sample
-        holds more than its share of what carries others, and errs there by more than in all else."""
+        """Which branches have the affine functions first: as in the sample or by form, or by form or all where some did
+        there. A sample holds more than its share of what carries others, and errs there by more than in all else."""
         if self._sheet is None:
-            by_form, everything = self.start.sheet, np.ones_like(self.start.sheet)
-            candidates = [settings]
-            if self.effort != "fast" and settings.sheet.any() and not np.array_equal(by_form, everything):
-                candidates = [replace(settings, sheet=sheet) for sheet in (by_form, everything)]
-            self._sheet = self._cheapest(candidates).sheet if len(candidates) > 1 else settings.sheet
+            other = np.ones_like(self.start.sheet) if settings.sheet.any() else settings.sheet
+            candidates = [replace(settings, sheet=sheet) for sheet in (self.start.sheet, other)]
+            is_clear = self.effort == "fast" or np.array_equal(self.start.sheet, other)
+            self._sheet = settings.sheet if is_clear else self._cheapest(candidates).sheet
         return self._sheet
 
     def cost(self, settings: Settings) -> tuple[float, np.ndarray]:
