@@ -552,9 +552,9 @@ class Search:
         levels, heads = np.zeros(self.levels), np.zeros(self.levels)
         for level, data in coded.stems.items():
             levels[level], heads[level] = len(data), coded.heads[level]
-        corrections = len(coded.correction_chunk)
-        if corrections:
-            levels += corrections * self._corrected(prelude.plan, coded.corrections)
+        corrections = coded.corrections
+        if corrections.chunk:
+            levels += len(corrections.chunk) * self._corrected(prelude.plan, corrections.rows)
         levels += (levels - heads) * (self.extrapolation.rows - 1)
         return levels * sample.scale
 
@@ -805,7 +805,7 @@ class Search:
         number = len(self.samples) // 2
         modes, own = self.learned_modes(plan, settings), settings.of_segment(self.samples[number].whole_loop)
         coded = code_stems(self.prelude(settings), own, self.sample, modes, self._bases(settings, number))
-        return of_small[coded.corrections[:, 0]].sum() / (of_small.sum() * self.sample.shape[2])
+        return of_small[coded.corrections.rows[:, 0]].sum() / (of_small.sum() * self.sample.shape[2])
 
     def _with_finer_steps(self, settings: Settings) -> Settings:
         return self._walk_steps(settings, 1.04, 1.12)

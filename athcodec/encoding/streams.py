@@ -308,11 +308,11 @@ def find_corrections(
     narrow: np.ndarray | bool = False,
     ends: MetEnds = FREE_ENDS,
 ) -> np.ndarray | None:
-    """Brings every vertex of (N, 3, T) positions within `limit` of the source, in place; limit: one, or one each (N,).
+    """Corrections, (K, 6) int32, that bring every vertex of (N, 3, T) positions within `limit` of the source; None
+    where this step cannot express them. limit: one, or one each (N,).
 
     narrow: of which vertices, (N,) bool, corrections are to be of one frame. ends: how they meet those of the
-    segments beside this one. Returns the corrections applied, (K, 6) int32, or None where this step cannot
-    express them."""
+    segments beside this one."""
     vertices, _, frames = positions.shape
     limits = np.array(np.broadcast_to(limit, vertices), np.float64)
     of_one_frame = np.array(np.broadcast_to(narrow, vertices), np.uint8)
@@ -328,16 +328,19 @@ def find_corrections(
     parts = pool.map(found, ranges(vertices, 3 * frames))
     if any(rows is None for rows in parts):
         return None
-    corrections = np.concatenate(parts)
+    return np.concatenate(parts)
+
+
+def apply_corrections(positions: np.ndarray, corrections: np.ndarray, step: float) -> None:
+    """Moves (N, 3, T) positions by corrections of a step."""
     lib.ath_apply_corrections(
-        frames,
+        positions.shape[2],
         positions.dtype == np.float64,
         address(positions, positions.dtype, positions.size),
         step,
-        corrections.ctypes.data,
+        address(corrections, np.int32, corrections.size),
         len(corrections),
     )
-    return corrections
 
 
 def find_rigid_corrections(
