@@ -15,8 +15,10 @@ def found(error: np.ndarray, limit, dtype=np.float32) -> tuple[np.ndarray, np.nd
     """Corrections of positions that are off by (N, 3, T), and what is left."""
     wanted = np.random.default_rng(1).normal(size=error.shape)
     decoded = (wanted + error).astype(dtype)
-    rows = streams.find_corrections(decoded, wanted, NOWHERE, limit, qz.single(qz.CORRECTION_STEP * np.min(limit)))
+    step = qz.single(qz.CORRECTION_STEP * np.min(limit))
+    rows = streams.find_corrections(decoded, wanted, NOWHERE, limit, step)
     assert rows is not None
+    streams.apply_corrections(decoded, rows, step)
     return rows, decoded.astype(np.float64) - wanted
 
 
@@ -100,5 +102,7 @@ def test_rigid_parts_are_moved_as_a_whole_where_that_serves_all_of_their_vertice
     rows = streams.find_rigid_corrections(parts, decoded, wanted, origin, limit, step)
     assert rows.tolist() == [[vertex, 5, -3, 0, 0, 0] for vertex in range(3)]
     ends = streams.MetEnds(decided=rows)
-    assert streams.find_corrections(decoded, wanted, origin, [limit] * 3 + [np.inf] * 3, step, ends=ends) is not None
+    rows = streams.find_corrections(decoded, wanted, origin, [limit] * 3 + [np.inf] * 3, step, ends=ends)
+    assert rows is not None
+    streams.apply_corrections(decoded, rows, step)
     assert np.abs(decoded[:3]).max() <= limit and decoded[3, 1, 7] == np.float32(1.6)

@@ -136,7 +136,7 @@ static double estimated_bits(const ath_correction *own, const ath_correction *li
 /* Where a correction may stand, and what it does to the sum of squared bends: with the vector x in parts of a step,
  * 2 x * slope + x * x * curve. */
 typedef struct {
-    int32_t frame, width;
+    int32_t frame, width, beyond; /* beyond: frames in reach that are beyond the limit */
     double slope[3], curve;
 } place;
 
@@ -151,8 +151,9 @@ static int has_bend(const track *track, int32_t t) { return t > 0 && t < track->
 /* Behind a closed end the error goes on as it comes. */
 static place place_at(const track *track, int32_t frame, int32_t width)
 {
-    place place = {frame, width, {0.0, 0.0, 0.0}, 0.0};
-    int32_t reach = ath_footprint_reach[width] + 1;
+    place place = {frame, width, 0, {0.0, 0.0, 0.0}, 0.0};
+    int32_t reach = ath_footprint_reach[width] + 1, stop = last_frame(track, frame, reach - 1);
+    for (int32_t t = first_frame(frame, reach - 1); t <= stop; t++) place.beyond += track->squares[t] > track->limit2;
     int32_t first = track->closed & 1 ? -1 : 1, last = track->closed & 2 ? track->frames : track->frames - 2;
     for (int32_t t = ath_max(first, frame - reach); t <= ath_min(last, frame + reach); t++) {
         double bend = footprint_bend(width, t - frame);
@@ -189,18 +190,21 @@ static double square_with(const track *track, const candidate *tried, int32_t t)
     return square(error);
 }
 
-/* Whether a candidate brings the worst frame within the limit, and moves none away that is beyond it then; its cost. */
-static int try_candidate(const track *track, const ath_correction *above, const place *place, candidate *tried)
+/* Whether a candidate may cost less than `most`, brings the worst frame within the limit, and moves none away that is beyond
+ * it then; its cost. */
+static int try_candidate(const track *track, const ath_correction *above, const place *place, double most,
+                         candidate *tried)
 {
     int32_t at = place->frame, reach = ath_footprint_reach[place->width], fixed = 0;
+    double bits = estimated_bits(&tried->own, above + at) + track->bend_bits * more_bends(track, place, tried->own.q);
+    if (bits >= most * (bits > 0.0 ? place->beyond : 1)) return 0;
     if (square_with(track, tried, track->worst) > track->limit2) return 0;
     for (int32_t t = first_frame(at, reach); t <= last_frame(track, at, reach); t++) {
         double after = square_with(track, tried, t), before = track->squares[t];
         if (after > track->limit2 && after > before) return 0;
         fixed += before > track->limit2 && after <= track->limit2;
     }
-    double bits = estimated_bits(&tried->own, above + at);
-    tried->cost = (bits + track->bend_bits * more_bends(track, place, tried->own.q)) / fixed;
+    tried->cost = bits / fixed;
     return 1;
 }
 
@@ -218,7 +222,8 @@ static int whole_correction(const double error[3], double scale, int32_t whole[3
     return 1;
 }
 
-/* Tries the axes of a mask: the whole correction, and up to two that are shorter by a step each. */
+/* Tries the axes of a mask: the whole correction, and up to two that are shorter by a step each. Whether one serves that may
+ * be chosen. */
 static int try_axes(const track *track, const ath_correction *above, const place *place, int32_t mask,
                     const int32_t whole[3], candidate *best)
 {
@@ -230,9 +235,9 @@ static int try_axes(const track *track, const ath_correction *above, const place
     for (int32_t size = longest; size > ath_max(0, longest - SIZES); size--) {
         for (int32_t k = 0; k < 3; k++)
             tried.own.q[k] = mask >> k & 1 ? to_steps((double)whole[k] * size / longest) : 0;
-        if (!try_candidate(track, above, place, &tried)) continue;
+        if (!try_candidate(track, above, place, best->cost, &tried)) continue;
         found = 1;
-        if (!(tried.cost >= best->cost)) *best = tried;
+        if (tried.cost < best->cost) *best = tried;
     }
     return found;
 }

@@ -37,15 +37,15 @@ from athcodec.encoding.polygons import Mesh
 from athcodec.encoding.search import Choice
 from athcodec.encoding.segment import (
     CodedPrelude,
+    Corrections,
     Settings,
     Source,
     StreamBasis,
     analyse,
     basis_ratio,
     code_source_rest,
-    correct,
-    correction_chunk,
     correction_step,
+    find_corrections,
     learned_bases,
     stem_streams,
     stems_head,
@@ -139,7 +139,7 @@ def layer_ratios(ladder: Sequence[float], bound: float, diagonal: float) -> list
 def layers_of(source: Source, prelude: CodedPrelude, choice: Choice, ratios: Sequence[int]) -> Layers:
     """The layers for what was chosen; prelude: of the last of them."""
     settings = choice.settings
-    rest, level_0, rests = _rests(source, prelude, ratios)
+    rest, level_0, rests = _rests(source, prelude, ratios, settings.bound)
     layers: list[Layer] = []
     for i, (ratio, (pose, refined)) in enumerate(zip(ratios, rests)):
         plan = prelude.plan if len(ratios) == 1 else _plan_on(pose, prelude, i)
@@ -187,14 +187,15 @@ def _uniform(plan: Plan, settings: Settings) -> Settings:
 
 
 def _rests(
-    source: Source, prelude: CodedPrelude, ratios: Sequence[int]
+    source: Source, prelude: CodedPrelude, ratios: Sequence[int], bound: float
 ) -> tuple[ct.Rest, np.ndarray | None, list[tuple[np.ndarray, streams.CodedRest | None]]]:
     """The content of REST; what it decodes to, where the first layer refines that; of each layer the decoded pose and
     what refines one."""
     rest = prelude.rest_chunk
     if source.exact_rest or len(ratios) == 1:
         return rest, None, [(prelude.plan.rest, None)] * len(ratios)
-    first_step, *steps = (qz.single(rest.step * max(1.0, ratio / 2)) for ratio in ratios)
+    first_step = qz.first_rest_step(rest.step, bound, ratios[0])
+    steps = [qz.single(rest.step * max(1.0, ratio / 2)) for ratio in ratios[1:]]
     branches, mesh = prelude.plan.branches, source.mesh if rest.connected else None
     coded = _first_rests(prelude, first_step, source.rest, mesh)
     for step in steps:
@@ -340,10 +341,10 @@ class _SegmentCoder:
         for factor in TIGHTER_LIMITS:
             if self.errors[level][RMS] <= LEVEL_TOLERANCE * before:
                 break
-            corrected, chunk = self._corrected(decoded, layer, factor)
-            if len(chunk) > most:
+            corrections = self._corrections(decoded, layer, factor)
+            if len(corrections.chunk) > most:
                 break
-            self.errors[level] = self._set_last(layer, level, corrected, chunk)
+            self.errors[level] = self._set_last(layer, level, decoded, corrections)
 
     def _at_level_0(self, segment: SegmentMotion, settings: Settings) -> SegmentMotion:
         """The segment as level 0 shows it, which may have a rest pose of its own."""
@@ -383,15 +384,18 @@ class _SegmentCoder:
         return rows[~np.repeat(layer.plan.is_rigid, count)[rows[:, 0]]]
 
     def _finish_level(self, layer: Layer, level: int, decoded: np.ndarray) -> tuple[float, ...]:
-        if layer.ratio == 1:
-            return self._set_last(layer, level, *self._corrected(decoded, layer))
-        return self._set_last(layer, level, *self._tightest(decoded, layer, level))
+        is_last = layer.ratio == 1
+        corrections = self._corrections(decoded, layer) if is_last else self._tightest(decoded, layer, level)
+        return self._set_last(layer, level, decoded, corrections)
 
-    def _set_last(self, layer: Layer, level: int, decoded: np.ndarray, chunk: bytes) -> tuple[float, ...]:
-        """The positions and the corrections of the level that a layer ends with; returns its errors."""
+    def _set_last(
+        self, layer: Layer, level: int, decoded: np.ndarray, corrections: Corrections | None
+    ) -> tuple[float, ...]:
+        """The corrections of the level that a layer ends with; decoded: the positions without. Returns its errors."""
         self.chunks.pop((level, ct.CORRECTIONS), None)
-        if chunk:
-            self.chunks[level, ct.CORRECTIONS] = chunk
+        if corrections is not None and corrections.chunk:
+            self.chunks[level, ct.CORRECTIONS] = corrections.chunk
+            decoded = corrections.applied(decoded)
         if layer.ratio == 1 and self._keeps_last:
             self._decoded = decoded
         return self.error(decoded)
@@ -458,33 +462,32 @@ class _SegmentCoder:
         exact_level = (len(self.errors), ct.EXACT)
         return self.chunks | {exact_level: chunk}, np.array([*self.errors, (0.0,) * 3]), np.array([*self.joins, 0])
 
-    def _corrected(self, decoded: np.ndarray, layer: Layer, factor: float = 1.0) -> tuple[np.ndarray, bytes]:
-        """Positions within the limit times a factor, and the corrections that bring them there; but for rigid parts of
-        a layer before the last, which keep their shape."""
-        decoded, settings = decoded.copy(), replace(layer.settings, limit=layer.settings.limit * factor)
+    def _corrections(self, decoded: np.ndarray, layer: Layer, factor: float = 1.0) -> Corrections:
+        """Those that bring the positions within the limit times a factor; but for rigid parts of a layer before the
+        last, which keep their shape."""
+        settings = replace(layer.settings, limit=layer.settings.limit * factor)
         is_last = layer.ratio == 1
         met = self._met if is_last and factor == 1.0 else replace(self._met, decided=NO_CORRECTIONS)
         met = met if is_last else streams.FREE_ENDS
-        corrections, step = correct(
+        return find_corrections(
             decoded, self.positions, self._origin, settings, layer.plan, keeps_all=is_last, ends=met
         )
-        return decoded, correction_chunk(corrections, step, decoded.shape)
 
-    def _tightest(self, decoded: np.ndarray, layer: Layer, level: int) -> tuple[np.ndarray, bytes]:
-        """Positions within the tightest limit that corrections reach for their share of the bytes so far."""
+    def _tightest(self, decoded: np.ndarray, layer: Layer, level: int) -> Corrections | None:
+        """Those of the tightest limit that they reach for their share of the bytes so far, if any do."""
 
-        def within(factor: float, share: float) -> tuple[np.ndarray, bytes] | None:
-            corrected = self._corrected(decoded, layer, factor)
-            return corrected if len(corrected[1]) <= share * bytes_ else None
+        def within(factor: float, share: float) -> Corrections | None:
+            corrections = self._corrections(decoded, layer, factor)
+            return corrections if len(corrections.chunk) <= share * bytes_ else None
 
         bytes_ = self._shared_bytes + self._bytes_up_to(level)
-        best, loosest, tightest = (decoded, b""), 0, len(CORRECTED_LIMITS)
+        best, loosest, tightest = None, 0, len(CORRECTED_LIMITS)
         if named := within(1 / COARSER, NAMED_SHARE):
             best, loosest = named, sum(factor >= 1 / COARSER for factor in CORRECTED_LIMITS)
         while loosest < tightest:
             middle = (loosest + tightest) // 2
-            if corrected := within(CORRECTED_LIMITS[middle], CORRECTIONS_SHARE):
-                best, loosest = corrected, middle + 1
+            if corrections := within(CORRECTED_LIMITS[middle], CORRECTIONS_SHARE):
+                best, loosest = corrections, middle + 1
             else:
                 tightest = middle
         return best

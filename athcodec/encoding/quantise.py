@@ -23,6 +23,7 @@ REQUIRED_SAVINGS = (1.0, 1.25)  # by which factor a piece's estimated bits must 
 SMALLEST_BOUND = 1e-35  # steps, in float32, are smaller still; squares of errors must not vanish
 LARGEST_EXTENT = 2.0**28  # extent over bound that corrections alone can still express
 REST_CAP = 1.6  # rest pose step over bound at which its own error reaches the bound
+FIRST_REST = 0.2  # largest step of the first layer's, over half its bound: all layers pay for what it bends wrongly
 SAFE_REST_CAP = 2 / 3**0.5  # the same for the worst possible rounding of a vertex
 LATTICE_REST_CAP = 3.2 / 5**0.5  # and for that to a point of the lattice
 SOURCE_REST_TOLERANCE = 3e-3  # over the diagonal: how far a rest pose that is no reference pose may be off
@@ -103,6 +104,11 @@ def first_step_ratio(relative_bound: float) -> float:
 def rest_step_ratio(relative_bound: float) -> float:
     """Rest pose step over error bound."""
     return float(np.interp(np.log10(relative_bound), [-5, -4, -3], [0.7, 0.7, 0.45]))
+
+
+def first_rest_step(rest_step: float, bound: float, ratio: float) -> float:
+    """Of the first layer, whose step is `ratio` times that of the last, which has the given step and bound."""
+    return single(max(rest_step, ratio * min(0.5 * rest_step, FIRST_REST * bound)))
 
 
 REST_SLACKS = (0.5, 0.65, 0.8, 0.95)  # over the bound

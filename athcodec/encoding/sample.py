@@ -17,8 +17,8 @@ from athcodec.encoding.segment import Source
 from athcodec.frames import Frames
 from athcodec.hierarchy import Hierarchy
 
-LARGE = 10_000  # vertices: smaller plants are not sampled
-LEAST_SAMPLE, MOST_SAMPLE = 6_000, 1 << 16  # vertices of a sample
+LARGE = 5_000  # vertices: smaller plants are not sampled
+LEAST_SAMPLE, MOST_SAMPLE = 3_500, 1 << 16  # vertices of a sample
 SEGMENT_SHARE = 1 / 64  # of the plant that each segment of the clip adds to a sample
 SUBTREES = 8  # of a sample, at least
 

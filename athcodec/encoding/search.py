@@ -219,14 +219,14 @@ def usual_change(samples: Sequence[SegmentSample]) -> float:
 
 
 def _coarser(settings: Settings, ratio: int) -> Settings:
-    """The same, so many times as coarse; the rest pose half of that."""
+    """The same, so many times as coarse, as a first layer."""
     return replace(
         settings,
         bound=ratio * settings.bound,
         largest_bound=ratio * settings.largest_bound,
         limit=ratio * settings.limit,
         step=qz.single(ratio * settings.step),
-        rest_step=qz.single(ratio / 2 * settings.rest_step),
+        rest_step=qz.first_rest_step(settings.rest_step, settings.bound, ratio),
         layer=0,
     )
 
@@ -502,14 +502,13 @@ class Search:
         return replace(settings, learned_pieces=self._pieces_for_learned_modes(settings, [search.required_saving])[0])
 
     def _sheet_of_all(self, settings: Settings) -> np.ndarray:
-        """Which branches have the affine functions first: as in the sample, or by form or all where those did. A sample
-        holds more than its share of what carries others, and errs there by more than in all else."""
+        """Which branches have the affine functions first: as in the sample or by form, or by form or all where some did
+        there. A sample holds more than its share of what carries others, and errs there by more than in all else."""
         if self._sheet is None:
-            by_form, everything = self.start.sheet, np.ones_like(self.start.sheet)
-            candidates = [settings]
-            if self.effort != "fast" and settings.sheet.any() and not np.array_equal(by_form, everything):
-                candidates = [replace(settings, sheet=sheet) for sheet in (by_form, everything)]
-            self._sheet = self._cheapest(candidates).sheet if len(candidates) > 1 else settings.sheet
+            other = np.ones_like(self.start.sheet) if settings.sheet.any() else settings.sheet
+            candidates = [replace(settings, sheet=sheet) for sheet in (self.start.sheet, other)]
+            is_clear = self.effort == "fast" or np.array_equal(self.start.sheet, other)
+            self._sheet = settings.sheet if is_clear else self._cheapest(candidates).sheet
         return self._sheet
 
     def cost(self, settings: Settings) -> tuple[float, np.ndarray]:
@@ -553,9 +552,9 @@ class Search:
         levels, heads = np.zeros(self.levels), np.zeros(self.levels)
         for level, data in coded.stems.items():
             levels[level], heads[level] = len(data), coded.heads[level]
-        corrections = len(coded.correction_chunk)
-        if corrections:
-            levels += corrections * self._corrected(prelude.plan, coded.corrections)
+        corrections = coded.corrections
+        if corrections.chunk:
+            levels += len(corrections.chunk) * self._corrected(prelude.plan, corrections.rows)
         levels += (levels - heads) * (self.extrapolation.rows - 1)
         return levels * sample.scale
 
@@ -806,7 +805,7 @@ class Search:
         number = len(self.samples) // 2
         modes, own = self.learned_modes(plan, settings), settings.of_segment(self.samples[number].whole_loop)
         coded = code_stems(self.prelude(settings), own, self.sample, modes, self._bases(settings, number))
-        return of_small[coded.corrections[:, 0]].sum() / (of_small.sum() * self.sample.shape[2])
+        return of_small[coded.corrections.rows[:, 0]].sum() / (of_small.sum() * self.sample.shape[2])
 
     def _with_finer_steps(self, settings: Settings) -> Settings:
         return self._walk_steps(settings, 1.04, 1.12)

@@ -580,31 +580,40 @@ def learned_bases(plan: Plan, settings: Settings, positions: np.ndarray) -> dict
     return level_bases(time_components(plan, settings, positions, settings.learning_levels))
 
 
+@dataclass(frozen=True)
+class Corrections:
+    """Those of positions of a shape, (N, 3, T): rows (K, 6) int32, and their step."""
+
+    rows: np.ndarray
+    step: float
+    shape: tuple[int, ...]
+
+    @cached_property
+    def chunk(self) -> bytes:
+        """CORRECTIONS; empty where there are none."""
+        if not len(self.rows):
+            return b""
+        return ct.pack_corrections(self.step, streams.encode_corrections(self.rows, self.shape[0], self.shape[2]))
+
+    def applied(self, decoded: np.ndarray) -> np.ndarray:
+        """The positions as they are with them."""
+        corrected = decoded.copy()
+        streams.apply_corrections(corrected, self.rows, self.step)
+        return corrected
+
+
 @dataclass
 class Coded:
-    """The stems of one segment: integers, streams by level, corrections (K, 6), and the corrected positions."""
+    """The stems of one segment: integers, streams by level, and corrections."""
 
     segment: SegmentMotion
     stems: dict[int, bytes]
-    corrections: np.ndarray
-    decoded: np.ndarray  # (N, 3, T)
-    correction_step: float
+    corrections: Corrections
     heads: dict[int, int]  # bytes of each stream that are the same for few pieces and for many: its time basis
 
     @property
     def bytes(self) -> int:
-        return sum(map(len, self.stems.values())) + len(self.correction_chunk)
-
-    @cached_property
-    def correction_chunk(self) -> bytes:
-        return correction_chunk(self.corrections, self.correction_step, self.decoded.shape)
-
-
-def correction_chunk(corrections: np.ndarray, step: float, shape: tuple[int, int, int]) -> bytes:
-    """CORRECTIONS for positions of a shape, (N, 3, T); empty where there are none."""
-    if not len(corrections):
-        return b""
-    return ct.pack_corrections(step, streams.encode_corrections(corrections, shape[0], shape[2]))
+        return sum(map(len, self.stems.values())) + len(self.corrections.chunk)
 
 
 def analyse(
@@ -662,7 +671,7 @@ def correction_step(limit: float | np.ndarray) -> float:
     return qz.single(qz.CORRECTION_STEP * float(np.min(limit)))
 
 
-def correct(
+def find_corrections(
     decoded: np.ndarray,
     positions: np.ndarray,
     origin: np.ndarray,
@@ -670,10 +679,9 @@ def correct(
     plan: Plan,
     keeps_all: bool = True,
     ends: streams.MetEnds = streams.FREE_ENDS,
-) -> tuple[np.ndarray, float]:
-    """Corrections (K, 6) that keep the limit, applied to `decoded`, and their step; those of a rigid part move all
-    of it where that serves, and else, unless each vertex is to keep the limit, there are none. ends: what they meet;
-    in the step of correction_step. Raises BoundError."""
+) -> Corrections:
+    """Those that keep the limit; those of a rigid part move all of it where that serves, and else, unless each vertex
+    is to keep the limit, there are none. ends: what they meet; in the step of correction_step. Raises BoundError."""
     factor, is_rigid = 1.0, np.repeat(plan.is_rigid, plan.pieces["count"])
     rigid = plan.pieces[plan.is_rigid]
     limit = settings.limit if keeps_all else np.where(is_rigid, np.inf, settings.limit)
@@ -681,9 +689,9 @@ def correct(
         step = qz.single(correction_step(settings.limit) * factor)
         moves = streams.find_rigid_corrections(rigid, decoded, positions, origin, settings.limit, step, plan.pool)
         met = replace(ends, decided=streams.ascending(np.concatenate([ends.decided, moves])))
-        corrections = streams.find_corrections(decoded, positions, origin, limit, step, plan.pool, settings.narrow, met)
-        if corrections is not None:
-            return corrections, step
+        rows = streams.find_corrections(decoded, positions, origin, limit, step, plan.pool, settings.narrow, met)
+        if rows is not None:
+            return Corrections(rows, step, decoded.shape)
         factor, ends = 0.5 * factor, streams.FREE_ENDS
         if factor < 1e-3:
             raise BoundError(
@@ -703,5 +711,5 @@ def code_stems(
         bases = learned_bases(prelude.plan, settings, positions)
     segment, decoded = analyse(prelude.plan, prelude.output, settings, positions, learned_modes, bases)
     stems, heads = stem_streams(segment, settings, bases)
-    corrections, step = correct(decoded, positions, prelude.origin, settings, prelude.plan)
-    return Coded(segment, stems, corrections, decoded, step, heads)
+    corrections = find_corrections(decoded, positions, prelude.origin, settings, prelude.plan)
+    return Coded(segment, stems, corrections, heads)

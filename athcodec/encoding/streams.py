@@ -308,11 +308,11 @@ def find_corrections(
     narrow: np.ndarray | bool = False,
     ends: MetEnds = FREE_ENDS,
 ) -> np.ndarray | None:
-    """Brings every vertex of (N, 3, T) positions within `limit` of the source, in place; limit: one, or one each (N,).
+    """Corrections, (K, 6) int32, that bring every vertex of (N, 3, T) positions within `limit` of the source; None
+    where this step cannot express them. limit: one, or one each (N,).
 
     narrow: of which vertices, (N,) bool, corrections are to be of one frame. ends: how they meet those of the
-    segments beside this one. Returns the corrections applied, (K, 6) int32, or None where this step cannot
-    express them."""
+    segments beside this one."""
     vertices, _, frames = positions.shape
     limits = np.array(np.broadcast_to(limit, vertices), np.float64)
     of_one_frame = np.array(np.broadcast_to(narrow, vertices), np.uint8)
@@ -328,16 +328,19 @@ def find_corrections(
     parts = pool.map(found, ranges(vertices, 3 * frames))
     if any(rows is None for rows in parts):
         return None
-    corrections = np.concatenate(parts)
+    return np.concatenate(parts)
+
+
+def apply_corrections(positions: np.ndarray, corrections: np.ndarray, step: float) -> None:
+    """Moves (N, 3, T) positions by corrections of a step."""
     lib.ath_apply_corrections(
-        frames,
+        positions.shape[2],
         positions.dtype == np.float64,
         address(positions, positions.dtype, positions.size),
         step,
-        corrections.ctypes.data,
+        address(corrections, np.int32, corrections.size),
         len(corrections),
     )
-    return corrections
 
 
 def find_rigid_corrections(
@@ -357,6 +360,7 @@ def find_rigid_corrections(
 
     def found(start: int, stop: int) -> np.ndarray:
         return _rows(
+            int(counts[start:stop].sum()) * frames,
             lambda rows, capacity: lib.ath_find_rigid_corrections(
                 stop - start,
                 address(first[start:stop], np.int32, stop - start),
@@ -370,7 +374,7 @@ def find_rigid_corrections(
                 step,
                 rows,
                 capacity,
-            )
+            ),
         )
 
     per_part = 3 * frames * max(1, int(counts.sum()) // max(1, len(counts)))
@@ -383,18 +387,12 @@ def ascending(corrections: np.ndarray) -> np.ndarray:
     return corrections[np.lexsort(corrections[:, 1::-1].T)]
 
 
-def _rows(find: Callable[[int, int], int]) -> np.ndarray | None:
-    """The corrections, (K, 6), that a function of the core finds, which takes their place and how many have room; None
-    where it finds that there are none that serve."""
-    capacity = 1024
-    while True:
-        rows = np.empty((capacity, 6), np.int32)
-        count = find(rows.ctypes.data, capacity)
-        if count < 0:
-            return None
-        if count <= capacity:
-            return rows[:count]
-        capacity = count
+def _rows(most: int, find: Callable[[int, int], int]) -> np.ndarray | None:
+    """The corrections, (K, 6), at most so many, that a function of the core finds, which takes their place and how many
+    have room; None where it finds that there are none that serve."""
+    rows = np.empty((most, 6), np.int32)
+    count = find(rows.ctypes.data, most)
+    return None if count < 0 else rows[:count].copy()
 
 
 def _corrections(
@@ -410,6 +408,7 @@ def _corrections(
     decided = np.ascontiguousarray(ends.decided, np.int32)
     met = CoreMetEnds(decided.ctypes.data, len(decided), ends.closed)
     return _rows(
+        vertices * frames,
         lambda rows, capacity: lib.ath_find_corrections(
             vertices,
             frames,
@@ -423,5 +422,5 @@ def _corrections(
             met,
             rows,
             capacity,
-        )
+        ),
     )
