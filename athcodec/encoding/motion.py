@@ -52,8 +52,8 @@ class Waves(IntEnum):  # core/plan.h
 @lru_cache(16)
 def waves_over_time(frames: int, kind: Waves = Waves.SMOOTH) -> np.ndarray:
     """Orthonormal rows, (frames, frames) float64, bit for bit those of the decoder."""
-    waves, work = np.empty((frames, frames)), np.empty(lib.ath_waves_work(frames))
-    lib.ath_waves(frames, kind, waves.ctypes.data, work.ctypes.data)
+    waves = np.empty((frames, frames))
+    lib.ath_waves(frames, kind, waves.ctypes.data)
     waves.setflags(write=False)
     return waves
 
