@@ -491,14 +491,16 @@ static int begin(ath_work *work, const preparation *asked, int32_t index, int32_
     return result;
 }
 
-/* Hermite's polynomials: no jump is left where the join ends, and no jump of the slope. */
+/* Shares of a jump and of a slope, from 1 to 0 with level ends, that bend as little as any over so many frames: parabolas,
+ * which turn where half of the way is left, or where 1 - sqrt(1/2) is. */
 static void set_join(ath_join *join, int32_t how)
 {
+    const double turn = 0.70710678118654752440, bend = 0.5 + turn;
     join->width = how % ATH_JOIN_SLOPED;
     for (int32_t t = 0; t < join->width; t++) {
-        double w = (double)join->width, u = ((double)t + 0.5) / w;
-        join->jumps[t] = 1.0 - u * u * (3.0 - 2.0 * u);
-        join->slopes[t] = how >= ATH_JOIN_SLOPED ? w * u * (1.0 - u) * (1.0 - u) : 0.0;
+        double w = (double)join->width, u = ((double)t + 0.5) / w, left = 1.0 - u;
+        join->jumps[t] = u < 0.5 ? 1.0 - 2.0 * u * u : 2.0 * left * left;
+        join->slopes[t] = how < ATH_JOIN_SLOPED ? 0.0 : w * (u < turn ? u - bend * u * u : bend * left * left);
     }
 }
 
