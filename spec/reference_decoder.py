@@ -642,6 +642,10 @@ def decode_errors(coder: RangeDecoder, model: NumberModel, before: list[int], me
 MOST_WIDTH = 127
 
 
+ROOT_HALF = 0.70710678118654752440
+BEND = 0.5 + ROOT_HALF
+
+
 @dataclass(frozen=True)
 class Join:
     """How a segment goes on from the end of the one before it."""
@@ -656,7 +660,9 @@ class Join:
         joined, w = x.copy(), float(self.width)
         for t in range(self.width):
             u = (t + 0.5) / w
-            jumps, slopes = 1.0 - u * u * (3.0 - 2.0 * u), w * u * (1.0 - u) * (1.0 - u) if self.is_sloped else 0.0
+            left = 1.0 - u
+            jumps = 1.0 - 2.0 * u * u if u < 0.5 else 2.0 * left * left
+            slopes = w * (u - BEND * u * u if u < ROOT_HALF else BEND * left * left) if self.is_sloped else 0.0
             joined[..., t] = x[..., t].astype(float) + (jump * jumps + slope * slopes)
         return joined
 
@@ -3005,7 +3011,7 @@ class LevelStream:
     only_tips: bool  # pieces that carry others have no rotations
     turn_step: float  # largest of rotations of rigid pieces; 0.0: any
     waves: np.ndarray  # (rank, frames)
-    root: int | None  # the first of the levels whose learned bases begin with the same rows; None: they are waves
+    root: int  # the first of the levels whose learned bases begin with the same rows; -1: waves of stems, -2: of nodes
 
 
 @dataclass
@@ -3097,9 +3103,9 @@ def read_stems_head(chunk: bytes, motion: Motion, level: int) -> bytes:
     require(len(chunk) >= 6, "STEMS is too short")
     step, rotation, bits = f32(chunk, 0), chunk[4], chunk[5]
     require(finite(step) and step > 0.0 and rotation & 7 <= 4, "Step or Rotation of STEMS is out of range")
-    require(bits == 0 or 8 <= bits <= 16, "Basis_Bits is out of range")
-    waves, root, body = motion.waves, None, chunk[6:]
-    if bits:
+    require(bits <= 1 or 8 <= bits <= 16, "Basis_Bits is out of range")
+    waves, root, body = (motion.waves, -1, chunk[6:]) if bits == 0 else (motion.node_waves, -2, chunk[6:])
+    if bits > 1:
         waves, root, body = read_basis(body, motion, level, bits)
     factor, turn_step = float((1 << (rotation & 7)) >> 1), half_octave(-(rotation >> 4)) if rotation >> 4 > 0 else 0.0
     motion.streams[level] = LevelStream(step, factor, rotation & 8 != 0, turn_step, waves, root)
@@ -3115,7 +3121,7 @@ def read_basis(body: bytes, motion: Motion, level: int, bits: int) -> tuple[np.n
     known, root = np.empty((0, motion.frames)), level
     if base != 255:
         require(base < level and base in motion.streams, "Basis_Level is not a level before with STEMS")
-        require(motion.streams[base].root is not None, "Basis_Level is a level without a learned basis")
+        require(motion.streams[base].root >= 0, "Basis_Level is a level without a learned basis")
         known, root = motion.streams[base].waves, motion.streams[base].root
     require(len(known) <= rank, "Basis_Rank is less than that of the basis that it begins with")
     rows = decode_temporal(body[7 : 7 + length], rank - len(known), motion.frames, bits)

@@ -23,7 +23,7 @@ AXES = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 0], [1, 0, 1], [0, 1, 1
 NO_CORRECTIONS = np.empty((0, 6), np.int32)
 # Ticks, changes of velocity at a seam over those of a usual frame: up to the first nobody sees them, beyond the second
 # they weigh more.
-SMOOTH, ROUGH, ROUGH_WORTH = 1.2, 1.4, 10.0
+SMOOTH, ROUGH, ROUGH_WORTH = 1.2, 1.4, 30.0
 ERROR_WORTH = 8.0  # ticks that an error twice as large weighs
 ORDER_WORTH = 400.0  # likewise, of one that is twice that of the level before
 BYTES_WORTH = 40.0  # likewise twice as many bytes
