@@ -642,6 +642,10 @@ def decode_errors(coder: RangeDecoder, model: NumberModel, before: list[int], me
 MOST_WIDTH = 127
 
 
+ROOT_HALF = 0.70710678118654752440
+BEND = 0.5 + ROOT_HALF
+
+
 @dataclass(frozen=True)
 class Join:
     """How a segment goes on from the end of the one before it."""
@@ -656,7 +660,9 @@ class Join:
         joined, w = x.copy(), float(self.width)
         for t in range(self.width):
             u = (t + 0.5) / w
-            jumps, slopes = 1.0 - u * u * (3.0 - 2.0 * u), w * u * (1.0 - u) * (1.0 - u) if self.is_sloped else 0.0
+            left = 1.0 - u
+            jumps = 1.0 - 2.0 * u * u if u < 0.5 else 2.0 * left * left
+            slopes = w * (u - BEND * u * u if u < ROOT_HALF else BEND * left * left) if self.is_sloped else 0.0
             joined[..., t] = x[..., t].astype(float) + (jump * jumps + slope * slopes)
         return joined
 
@@ -2843,76 +2849,35 @@ def append_orthonormal(basis: list, x: np.ndarray, keep: float) -> None:
 
 
 PI = 3.14159265358979323846
+HALF_ROOT_3 = 0.86602540378443864676
+
+
+# Of what falls: its wave number over that of the cosine, its size at the end over the sine of the phase, and this over
+# the square of the first; and how many waves are polynomials.
+SECOND = (1.0, 0.0), (1.0, 0.0), (1.0, 0.0), 2
+THIRD = (HALF_ROOT_3, -0.5), (2.0 * HALF_ROOT_3, 1.0), (0.0, 2.0), 3
 
 
 @cache
 def waves_over_time(frames: int, periodic: bool) -> np.ndarray:
     """(frames, frames): wave k at frame t, of stems."""
-    return np.array(periodic_waves(frames) if periodic else smooth_waves(frames))
+    return np.array(periodic_waves(frames) if periodic else free_waves(frames, THIRD))
 
 
 @cache
 def node_waves_over_time(frames: int, periodic: bool) -> np.ndarray:
     """Of the maps of nodes."""
-    return np.array(periodic_waves(frames) if periodic else beam_waves(frames))
+    return np.array(periodic_waves(frames) if periodic else free_waves(frames, SECOND))
 
 
-def smooth_waves(frames: int) -> list[np.ndarray]:
-    waves = [np.zeros(frames) for _ in range(frames)]
-    for sign in (1, -1):
-        n = (frames + 1) // 2 if sign > 0 else frames // 2
-        for m, folded in enumerate(folded_waves(frames, n, sign) if n > 0 else []):
-            wave = waves[2 * m + (1 if sign < 0 else 0)]
-            for i in range(n):
-                t = n - 1 - i
-                x = folded[i] if 2 * t + 1 == frames else folded[i] * math.sqrt(0.5)
-                wave[frames - 1 - t] = sign * x
-                wave[t] = x
-    return waves
+def free_waves(frames: int, order: tuple) -> list[list[float]]:
+    return [polynomial_wave(frames, k) if k < order[3] else mode_wave(frames, k, order) for k in range(frames)]
 
 
-def folded_waves(frames: int, n: int, sign: int) -> list[np.ndarray]:
-    """Those even about the middle, or odd, as numbers of the frames from the middle to the first."""
-    _, vectors = principal(folded_bending(frames, n, sign))
-    waves: list[np.ndarray] = []
-    for degree in (0, 2) if sign > 0 else (1,):
-        if len(waves) < n:
-            append_orthonormal(waves, polynomial(frames, n, degree), 0.0)
-    for m in range(n - 1 - len(waves), -1, -1):
-        append_orthonormal(waves, vectors[m], 0.0)
-    return waves
-
-
-def polynomial(frames: int, n: int, degree: int) -> np.ndarray:
-    values = []
-    for i in range(n):
-        t = (frames - 1 - 2 * (n - 1 - i)) / frames
-        x = 1.0 if degree % 2 == 0 else t
-        if degree > 1:
-            x = x * t * t
-        values.append(x * math.sqrt(0.5) if 2 * (n - 1 - i) + 1 == frames else x)
-    return np.array(values)
-
-
-def folded_bending(frames: int, n: int, sign: int) -> np.ndarray:
-    d = np.diff(np.eye(frames), 3, axis=0) if frames > 3 else np.zeros((0, frames))
-    bending, a = d.T @ d, np.empty((n, n))  # whole numbers
-    for i in range(n):
-        for j in range(i + 1):
-            t, u = n - 1 - i, n - 1 - j
-            value = bending[t, u] + sign * bending[t, frames - 1 - u]
-            for place in (t, u):
-                if 2 * place + 1 == frames:
-                    value = value * math.sqrt(0.5)
-            a[i, j] = a[j, i] = value
-    return a
-
-
-def beam_waves(frames: int) -> list[list[float]]:
-    waves = [unit_length([1.0] * frames)]
-    if frames > 1:
-        waves.append(unit_length([0.5 * (frames - 1) - t for t in range(frames)]))
-    return waves + [beam_wave(frames, k) for k in range(2, frames)]
+def polynomial_wave(frames: int, k: int) -> list[float]:
+    way = [0.5 * (frames - 1) - t for t in range(frames)]
+    mean = (frames * frames - 1) / 12.0
+    return unit_length([1.0 if k == 0 else x if k == 1 else x * x - mean for x in way])
 
 
 def unit_length(x: list[float]) -> list[float]:
@@ -2923,41 +2888,59 @@ def unit_length(x: list[float]) -> list[float]:
     return [value * scale for value in x]
 
 
-def beam_wave(frames: int, k: int) -> list[float]:
-    """Of a mode that bends: cos((2 t + 1) h + phase), and what falls by `decay` a frame from either end."""
-    sine, cosine, decay, slope = mode_at(frames, k, PI * (k - 0.5) / (2 * frames))
-    for _ in range(24):
-        sine, cosine, decay, slope = mode_at(frames, k, (0.5 * PI * k - atan_of(slope)) / frames)
-    sign, unit = 1.0 if k % 2 == 0 else -1.0, 1.0 / math.sqrt(1.0 + slope * slope)
-    c, s = (cosine - sine * slope) * unit, (sine + cosine * slope) * unit
+def mode_wave(frames: int, k: int, order: tuple) -> list[float]:
+    """cos((2 t + 1) h + phase), and what falls from either end by `decay` in half a frame."""
+    sine, cosine, slope, decay, apart = mode_at(frames, k, PI * (k - 0.5) / (2 * frames), order)
+    for _ in range(32):
+        sine, cosine, slope, decay, apart = mode_at(frames, k, (0.5 * PI * k - atan_of(slope)) / frames, order)
+    sign, phase_cosine = 1.0 if k % 2 == 0 else -1.0, 1.0 / math.sqrt(1.0 + slope * slope)
+    phase_sine = slope * phase_cosine
+    c, s = cosine * phase_cosine - sine * phase_sine, sine * phase_cosine + cosine * phase_sine
     turn_c, turn_s = 1.0 - 2.0 * sine * sine, 2.0 * sine * cosine
-    edge, fall, wave = c / (1.0 + sign * power(decay, frames - 1)), [1.0], [0.0] * frames
-    for _ in range(frames - 1):
-        fall.append(fall[-1] * decay)
+    edge = times(times((phase_sine * order[1][0], phase_sine * order[1][1]), apart), decay)
+    fall, frame_decay, wave = [], times(decay, decay), [0.0] * frames
+    for _ in range(frames):
+        fall.append(edge[0])
+        edge = times(edge, frame_decay)
     for t in range((frames + 1) // 2):
-        x = c + edge * (fall[t] + sign * fall[frames - 1 - t])
+        x = c + (fall[t] + sign * fall[frames - 1 - t])
         wave[frames - 1 - t] = sign * x
         wave[t] = x
         c, s = c * turn_c - s * turn_s, s * turn_c + c * turn_s
     return unit_length(wave)
 
 
-def mode_at(frames: int, k: int, h: float) -> tuple[float, float, float, float]:
-    """Sine and cosine of h, decay, tangent of the phase."""
+def mode_at(frames: int, k: int, h: float, order: tuple):
+    """Sine and cosine of h, the tangent of the phase, decay, 1 / (1 - what is left of it at the other end)."""
     sine, cosine = sin_of(h), cos_of(h)
-    root = math.sqrt(1.0 + sine * sine)
-    decay = (root - sine) * (root - sine)
-    far = power(decay, frames)
-    ratio = (1.0 - far) / (1.0 + far)
-    return sine, cosine, decay, cosine / root * (ratio if k % 2 == 0 else 1.0 / ratio)
+    falls = sine * order[0][0], sine * order[0][1]
+    square = times(falls, falls)
+    real = 1.0 + square[0]
+    length = math.sqrt(real * real + square[1] * square[1])
+    root_real = math.sqrt(0.5 * (length + real))
+    root = root_real, 0.5 * square[1] / root_real
+    decay = root[0] - falls[0], root[1] - falls[1]
+    far = power(decay, 2 * frames)
+    if k % 2 == 1:
+        far = -far[0], -far[1]
+    left = 1.0 - far[0]
+    scale = 1.0 / (left * left + far[1] * far[1])
+    apart = left * scale, far[1] * scale
+    slope = cosine / times(times(order[2], root), times((1.0 + far[0], far[1]), apart))[0]
+    return sine, cosine, slope, decay, apart
 
 
-def power(x: float, n: int) -> float:
-    product = 1.0
+def times(a: tuple[float, float], b: tuple[float, float]) -> tuple[float, float]:
+    """The product of complex numbers."""
+    return a[0] * b[0] - a[1] * b[1], a[0] * b[1] + a[1] * b[0]
+
+
+def power(x: tuple[float, float], n: int) -> tuple[float, float]:
+    product = 1.0, 0.0
     while n > 0:
         if n % 2 == 1:
-            product = product * x
-        x, n = x * x, n // 2
+            product = times(product, x)
+        x, n = times(x, x), n // 2
     return product
 
 
@@ -2972,6 +2955,8 @@ def sin_of(x: float) -> float:
 
 def atan_of(x: float) -> float:
     """x >= 0."""
+    if x > 1.0:
+        return 0.5 * PI - atan_of(1.0 / x)
     half = x / (1.0 + math.sqrt(1.0 + x * x))
     quarter, total = half / (1.0 + math.sqrt(1.0 + half * half)), 0.0
     for k in range(25, 0, -2):
@@ -3026,7 +3011,7 @@ class LevelStream:
     only_tips: bool  # pieces that carry others have no rotations
     turn_step: float  # largest of rotations of rigid pieces; 0.0: any
     waves: np.ndarray  # (rank, frames)
-    root: int | None  # the first of the levels whose learned bases begin with the same rows; None: they are waves
+    root: int  # the first of the levels whose learned bases begin with the same rows; -1: waves of stems, -2: of nodes
 
 
 @dataclass
@@ -3118,9 +3103,9 @@ def read_stems_head(chunk: bytes, motion: Motion, level: int) -> bytes:
     require(len(chunk) >= 6, "STEMS is too short")
     step, rotation, bits = f32(chunk, 0), chunk[4], chunk[5]
     require(finite(step) and step > 0.0 and rotation & 7 <= 4, "Step or Rotation of STEMS is out of range")
-    require(bits == 0 or 8 <= bits <= 16, "Basis_Bits is out of range")
-    waves, root, body = motion.waves, None, chunk[6:]
-    if bits:
+    require(bits <= 1 or 8 <= bits <= 16, "Basis_Bits is out of range")
+    waves, root, body = (motion.waves, -1, chunk[6:]) if bits == 0 else (motion.node_waves, -2, chunk[6:])
+    if bits > 1:
         waves, root, body = read_basis(body, motion, level, bits)
     factor, turn_step = float((1 << (rotation & 7)) >> 1), half_octave(-(rotation >> 4)) if rotation >> 4 > 0 else 0.0
     motion.streams[level] = LevelStream(step, factor, rotation & 8 != 0, turn_step, waves, root)
@@ -3136,7 +3121,7 @@ def read_basis(body: bytes, motion: Motion, level: int, bits: int) -> tuple[np.n
     known, root = np.empty((0, motion.frames)), level
     if base != 255:
         require(base < level and base in motion.streams, "Basis_Level is not a level before with STEMS")
-        require(motion.streams[base].root is not None, "Basis_Level is a level without a learned basis")
+        require(motion.streams[base].root >= 0, "Basis_Level is a level without a learned basis")
         known, root = motion.streams[base].waves, motion.streams[base].root
     require(len(known) <= rank, "Basis_Rank is less than that of the basis that it begins with")
     rows = decode_temporal(body[7 : 7 + length], rank - len(known), motion.frames, bits)

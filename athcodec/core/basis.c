@@ -3,8 +3,9 @@
 #include "plan.h"
 
 #define PI 3.14159265358979323846
+#define HALF_ROOT_3 0.86602540378443864676
 
-enum { MOST_PROBES = 64, MOST_ROWS = ATH_SEGMENT_FRAMES, MODE_STEPS = 24 };
+enum { MOST_PROBES = 64, MOST_ROWS = ATH_SEGMENT_FRAMES, MODE_STEPS = 32 };
 
 /* Householder reduction of the symmetric n x n matrix `a` to tridiagonal form; on return row i of `q` is the i-th
  * basis vector in which the matrix is tridiagonal (diagonal d, subdiagonal e[1..n-1]). Rounding makes the matrix
@@ -384,45 +385,82 @@ static double sin_of(double x) { return x <= 0.25 * PI ? sin_series(x) : cos_ser
 /* For x >= 0, by the series at a quarter of the angle. */
 static double atan_of(double x)
 {
+    if (x > 1.0) return 0.5 * PI - atan_of(1.0 / x);
     double half = x / (1.0 + ath_sqrt(1.0 + x * x)), quarter = half / (1.0 + ath_sqrt(1.0 + half * half)), sum = 0.0;
     for (int32_t k = 25; k > 0; k -= 2) sum = 1.0 / (double)k - sum * (quarter * quarter);
     return 4.0 * (quarter * sum);
 }
 
-static double power(double x, int32_t n)
+typedef struct {
+    double re, im;
+} complex_number;
+
+static complex_number times(complex_number a, complex_number b)
 {
-    double product = 1.0;
+    complex_number product = {a.re * b.re - a.im * b.im, a.re * b.im + a.im * b.re};
+    return product;
+}
+
+static complex_number power(complex_number x, int32_t n)
+{
+    complex_number product = {1.0, 0.0};
     for (; n > 0; n /= 2) {
-        if (n % 2 == 1) product = product * x;
-        x = x * x;
+        if (n % 2 == 1) product = times(product, x);
+        x = times(x, x);
     }
     return product;
 }
 
-/* A mode of a free beam, cos((2 t + 1) h + phase) and what falls by `decay` a frame from either end. */
+/* What tells the modes of second differences from those of third ones. */
 typedef struct {
-    double sine, cosine; /* of h */
-    double decay, slope; /* slope: tan(phase) */
-} beam_mode;
+    complex_number root; /* of the wave number, over that of the cosine: what falls from the ends */
+    complex_number edge; /* what falls, at the end: over the sine of the phase */
+    complex_number turn; /* edge / root^2 */
+} mode_order;
+
+static const mode_order SECOND = {{1.0, 0.0}, {1.0, 0.0}, {1.0, 0.0}},
+                        THIRD = {{HALF_ROOT_3, -0.5}, {2.0 * HALF_ROOT_3, 1.0}, {0.0, 2.0}};
+
+/* A mode, cos((2 t + 1) h + phase) and what falls from either end, by `decay` in half a frame. */
+typedef struct {
+    double sine, cosine, slope; /* of h; tan(phase) */
+    complex_number decay;
+    complex_number apart; /* 1 / (1 - what is left of it at the other end) */
+} mode;
 
 /* Mode k, its h taken as right; even modes are even about the middle, odd ones odd. */
-static beam_mode mode_at(int32_t frames, int32_t k, double h)
+static mode mode_at(int32_t frames, int32_t k, double h, const mode_order *order)
 {
-    beam_mode mode = {sin_of(h), cos_of(h), 0.0, 0.0};
-    double root = ath_sqrt(1.0 + mode.sine * mode.sine), other = root - mode.sine;
-    mode.decay = other * other;
-    double far = power(mode.decay, frames), ratio = (1.0 - far) / (1.0 + far);
-    mode.slope = mode.cosine / root * (k % 2 == 0 ? ratio : 1.0 / ratio);
-    return mode;
+    mode own = {sin_of(h), cos_of(h), 0.0, {0.0, 0.0}, {0.0, 0.0}};
+    complex_number falls = {own.sine * order->root.re, own.sine * order->root.im}, square = times(falls, falls), root;
+    double re = 1.0 + square.re, length = ath_sqrt(re * re + square.im * square.im);
+    root.re = ath_sqrt(0.5 * (length + re));
+    root.im = 0.5 * square.im / root.re;
+    own.decay.re = root.re - falls.re;
+    own.decay.im = root.im - falls.im;
+
+    complex_number far = power(own.decay, 2 * frames);
+    if (k % 2 == 1) far.re = -far.re, far.im = -far.im;
+    double left = 1.0 - far.re, scale = 1.0 / (left * left + far.im * far.im);
+    own.apart.re = left * scale;
+    own.apart.im = far.im * scale;
+    far.re = 1.0 + far.re;
+    own.slope = own.cosine / times(times(order->turn, root), times(far, own.apart)).re;
+    return own;
 }
 
-/* h solves 2 frames h = pi k - 2 phase(h): each step takes at least two bits, mostly ten, off the error. */
-static beam_mode find_mode(int32_t frames, int32_t k)
+/* h solves 2 frames h = pi k - 2 phase(h): most steps take ten bits off the error, those of few frames two. */
+static mode find_mode(int32_t frames, int32_t k, const mode_order *order)
 {
-    beam_mode mode = mode_at(frames, k, PI * ((double)k - 0.5) / (double)(2 * frames));
-    for (int32_t step = 0; step < MODE_STEPS; step++)
-        mode = mode_at(frames, k, (0.5 * PI * (double)k - atan_of(mode.slope)) / (double)frames);
-    return mode;
+    double h = PI * ((double)k - 0.5) / (double)(2 * frames);
+    mode own = mode_at(frames, k, h, order);
+    for (int32_t step = 0; step < MODE_STEPS; step++) {
+        double next = (0.5 * PI * (double)k - atan_of(own.slope)) / (double)frames;
+        if (next == h) break;
+        h = next;
+        own = mode_at(frames, k, h, order);
+    }
+    return own;
 }
 
 static void unit_length(int32_t frames, double *wave)
@@ -433,17 +471,21 @@ static void unit_length(int32_t frames, double *wave)
     for (int32_t t = 0; t < frames; t++) wave[t] = wave[t] * scale;
 }
 
-static void beam_wave(int32_t frames, int32_t k, double *wave)
+static void mode_wave(int32_t frames, int32_t k, const mode_order *order, double *wave)
 {
-    beam_mode mode = find_mode(frames, k);
-    double sign = k % 2 == 0 ? 1.0 : -1.0, unit = 1.0 / ath_sqrt(1.0 + mode.slope * mode.slope);
-    double c = (mode.cosine - mode.sine * mode.slope) * unit, s = (mode.sine + mode.cosine * mode.slope) * unit;
-    double turn_c = 1.0 - 2.0 * mode.sine * mode.sine, turn_s = 2.0 * mode.sine * mode.cosine;
-    double edge = c / (1.0 + sign * power(mode.decay, frames - 1)), fall[ATH_SEGMENT_FRAMES];
-    fall[0] = 1.0;
-    for (int32_t t = 1; t < frames; t++) fall[t] = fall[t - 1] * mode.decay;
+    mode own = find_mode(frames, k, order);
+    double sign = k % 2 == 0 ? 1.0 : -1.0, cosine = 1.0 / ath_sqrt(1.0 + own.slope * own.slope);
+    double sine = own.slope * cosine, fall[ATH_SEGMENT_FRAMES];
+    double c = own.cosine * cosine - own.sine * sine, s = own.sine * cosine + own.cosine * sine;
+    double turn_c = 1.0 - 2.0 * own.sine * own.sine, turn_s = 2.0 * own.sine * own.cosine;
+    complex_number edge = {sine * order->edge.re, sine * order->edge.im}, decay = times(own.decay, own.decay);
+    edge = times(times(edge, own.apart), own.decay);
+    for (int32_t t = 0; t < frames; t++) {
+        fall[t] = edge.re;
+        edge = times(edge, decay);
+    }
     for (int32_t t = 0; 2 * t < frames; t++) {
-        double x = c + edge * (fall[t] + sign * fall[frames - 1 - t]), turned = c * turn_c - s * turn_s;
+        double x = c + (fall[t] + sign * fall[frames - 1 - t]), turned = c * turn_c - s * turn_s;
         wave[frames - 1 - t] = sign * x;
         wave[t] = x;
         s = s * turn_c + c * turn_s;
@@ -452,97 +494,30 @@ static void beam_wave(int32_t frames, int32_t k, double *wave)
     unit_length(frames, wave);
 }
 
-static void beam_waves(int32_t frames, double *waves)
+/* Wave k of the polynomials that do not bend: 1, t and what t^2 has beyond them, about the middle. */
+static void polynomial_wave(int32_t frames, int32_t k, double *wave)
 {
-    for (int32_t t = 0; t < frames; t++) waves[t] = 1.0;
-    unit_length(frames, waves);
-    if (frames == 1) return;
-    for (int32_t t = 0; t < frames; t++) waves[frames + t] = 0.5 * (double)(frames - 1) - (double)t;
-    unit_length(frames, waves + frames);
-    for (int32_t k = 2; k < frames; k++) beam_wave(frames, k, waves + k * frames);
-}
-
-/* What bends a row over time: the entry of D'D, D its third differences, and its mirror image in time. */
-static double bending(int32_t frames, int32_t i, int32_t j)
-{
-    static const int32_t difference[] = {-1, 3, -3, 1};
-    int32_t sum = 0;
-    for (int32_t r = 0; r + 3 < frames; r++)
-        if (i >= r && i <= r + 3 && j >= r && j <= r + 3) sum += difference[i - r] * difference[j - r];
-    return (double)sum;
-}
-
-/* D'D on the rows that are even about the middle (sign 1), or odd (-1), as numbers of the frames from the middle to the first:
- * a frame and its mirror image are one, times the root of two. */
-static void fold_bending(int32_t frames, int32_t n, int32_t sign, double *a)
-{
-    double half = ath_sqrt(0.5);
-    for (int32_t i = 0; i < n; i++)
-        for (int32_t j = 0; j <= i; j++) {
-            int32_t t = n - 1 - i, u = n - 1 - j, mirrored = frames - 1 - u;
-            double value = bending(frames, t, u) + (double)sign * bending(frames, t, mirrored);
-            if (2 * t + 1 == frames) value = value * half;
-            if (2 * u + 1 == frames) value = value * half;
-            a[i * n + j] = a[j * n + i] = value;
-        }
-}
-
-/* The even or the odd waves, folded: polynomials of degree 0 and 2, or 1, and the eigenvectors beyond them. */
-static void folded_waves(int32_t frames, int32_t n, int32_t sign, double *waves, double *work)
-{
-    double *a = work, *q = a + n * n, *vectors = q + n * n, values[MOST_ROWS], candidate[MOST_ROWS];
-    double half = ath_sqrt(0.5);
-    int32_t count = 0;
-    fold_bending(frames, n, sign, a);
-    eigenvectors(n, a, q, values, vectors);
-    for (int32_t degree = sign > 0 ? 0 : 1; degree < 3 && count < n; degree += 2) {
-        for (int32_t i = 0; i < n; i++) {
-            double t = (double)(frames - 1 - 2 * (n - 1 - i)) / (double)frames, x = degree % 2 == 0 ? 1.0 : t;
-            if (degree > 1) x = x * t * t;
-            candidate[i] = 2 * (n - 1 - i) + 1 == frames ? x * half : x;
-        }
-        count = append_orthonormal(n, waves, count, candidate, 0.0);
+    double mean = (double)(frames * frames - 1) / 12.0;
+    for (int32_t t = 0; t < frames; t++) {
+        double way = 0.5 * (double)(frames - 1) - (double)t;
+        wave[t] = k == 0 ? 1.0 : k == 1 ? way : way * way - mean;
     }
-    for (int32_t m = n - 1 - count; m >= 0; m--) count = append_orthonormal(n, waves, count, vectors + m * n, 0.0);
+    unit_length(frames, wave);
 }
 
-static void unfold(int32_t frames, int32_t n, int32_t sign, const double *folded, double *wave)
+void ath_waves(int32_t frames, int32_t kind, double *waves)
 {
-    double half = ath_sqrt(0.5);
-    wave[frames / 2] = 0.0;
-    for (int32_t i = 0; i < n; i++) {
-        int32_t t = n - 1 - i;
-        double x = 2 * t + 1 == frames ? folded[i] : folded[i] * half;
-        wave[frames - 1 - t] = (double)sign * x;
-        wave[t] = x;
-    }
-}
-
-static void smooth_waves(int32_t frames, double *waves, double *work)
-{
-    for (int32_t sign = 1; sign >= -1; sign -= 2) {
-        int32_t n = sign > 0 ? (frames + 1) / 2 : frames / 2;
-        if (n == 0) return;
-        double *folded = work + 3 * n * n;
-        folded_waves(frames, n, sign, folded, work);
-        for (int32_t m = 0; m < n; m++) unfold(frames, n, sign, folded + m * n, waves + (2 * m + (sign < 0)) * frames);
-    }
-}
-
-size_t ath_waves_work(int32_t frames)
-{
-    size_t half = (size_t)(frames + 1) / 2;
-    return 4 * half * half;
-}
-
-void ath_waves(int32_t frames, int32_t kind, double *waves, double *work)
-{
-    if (kind == ATH_PERIODIC)
+    if (kind == ATH_PERIODIC) {
         periodic_waves(frames, waves);
-    else if (kind == ATH_BEAM)
-        beam_waves(frames, waves);
-    else
-        smooth_waves(frames, waves, work);
+        return;
+    }
+    int32_t polynomials = kind == ATH_BEAM ? 2 : 3;
+    for (int32_t k = 0; k < frames; k++) {
+        if (k < polynomials)
+            polynomial_wave(frames, k, waves + k * frames);
+        else
+            mode_wave(frames, k, kind == ATH_BEAM ? &SECOND : &THIRD, waves + k * frames);
+    }
 }
 
 double ath_tan_of_half(double x)

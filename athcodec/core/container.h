@@ -77,12 +77,14 @@ typedef struct {
 /* 0: first + i * step; 1: first + i / step; 2: stream; 3 as 1 and 4 as 0, by a whole rate, from 0 on */
 typedef int32_t ath_time_method;
 
+enum { ATH_NODE_WAVES = 1 }; /* bits of a stream in the waves of maps of nodes */
+
 typedef struct {
     double step, rotation_step_factor;
-    int32_t bits, rank;
-    int32_t base;  /* level of the stream whose time basis this one's begins with; -1: none */
-    int32_t ratio; /* of a refinement: the step of the layer before over this one's */
-    int32_t turn;  /* half octaves below 1 of the largest step of rigid pieces' rotations; 0: none */
+    int32_t bits, rank; /* of a learned basis; bits up to ATH_NODE_WAVES: there is none */
+    int32_t base;       /* level of the stream whose time basis this one's begins with; -1: none */
+    int32_t ratio;      /* of a refinement: the step of the layer before over this one's */
+    int32_t turn;       /* half octaves below 1 of the largest step of rigid pieces' rotations; 0: none */
     int32_t only_tips;
     ath_bytes basis;
 } ath_stems_head;

@@ -20,8 +20,6 @@ static uint64_t scratch_size(const ath_header *header)
 {
     uint64_t size = larger(header->vertex_count, ath_basis_table_size(most_pieces(header))) * sizeof(int32_t);
     size = larger(size, turns_place() + (uint64_t)header->branch_count * 9 * sizeof(double));
-    uint32_t most = ATH_SEGMENT_FRAMES, frames = header->frame_count < most ? header->frame_count : most;
-    size = larger(size, ath_waves_work((int32_t)frames) * sizeof(double));
     return larger(size, ATH_BASIS_WORK * sizeof(double));
 }
 
@@ -714,7 +712,7 @@ int ath_build(ath_file *file, void *memory, size_t memory_bytes)
     file->plan.bases = file->bases;
     for (int32_t kind = 0; kind < ATH_WAVE_KINDS; kind++)
         for (int32_t frames = 1; frames <= ATH_SEGMENT_FRAMES; frames++)
-            if (file->waves[kind][frames]) ath_waves(frames, kind, file->waves[kind][frames], (double *)file->scratch);
+            if (file->waves[kind][frames]) ath_waves(frames, kind, file->waves[kind][frames]);
     return ATH_OK;
 }
 

@@ -4,13 +4,17 @@
 
 #include "plan.h"
 
+/* Of streams in no learned basis: the waves of stems, those of nodes. */
+enum ath_root { ATH_STEM_ROOT = -1, ATH_NODE_ROOT = -2 };
+
 /* How the integers of one level and segment are to be read. */
 typedef struct ath_stream {
     double step;                 /* quantisation step, scene units */
     double rotation_step_factor; /* of rotation tracks; 0: none are coded */
     const double *temporal;      /* temporal_rank x frames, orthonormal rows */
     int32_t temporal_rank;
-    int32_t root; /* level of the first of the streams whose learned bases begin with the same rows; -1: ath_waves */
+    int32_t
+        root; /* level of the first of the streams whose learned bases begin with the same rows; ath_root: ath_waves */
     double turn_step;  /* largest step of the rotations of rigid pieces, 0: any */
     int32_t only_tips; /* 1: of pieces that carry others no rotations are coded */
     int32_t reserved;

@@ -92,9 +92,8 @@ ATH_ENCODER_API void ath_plan_nodes(const ath_plan *plan, ath_node *nodes);
 
 /* Eigenvectors of third differences, Fourier series, and modes of a free beam. */
 enum { ATH_SMOOTH, ATH_PERIODIC, ATH_BEAM, ATH_WAVE_KINDS };
-/* frames x frames, orthonormal: row k is the k-th wave of its kind. work: ath_waves_work numbers. */
-ATH_ENCODER_API void ath_waves(int32_t frames, int32_t kind, double *waves, double *work);
-ATH_ENCODER_API size_t ath_waves_work(int32_t frames);
+/* frames x frames, orthonormal: row k is the k-th wave of its kind. */
+ATH_ENCODER_API void ath_waves(int32_t frames, int32_t kind, double *waves);
 
 /* tan(x / 2) for 0 <= x < pi, by the series of sine and cosine. */
 double ath_tan_of_half(double x);

@@ -263,6 +263,15 @@ int ath_keep(ath_work *work, void *memory, size_t memory_bytes)
 
 size_t ath_kept_size(const void *kept) { return (size_t)((const kept_head *)kept)->bytes; }
 
+/* Waves that are not learned, by their root. */
+static void set_waves(const ath_work *work, ath_stream *stream, int32_t root)
+{
+    stream->temporal =
+        root == ATH_NODE_ROOT ? ath_file_node_waves(work->file, work->index) : ath_file_waves(work->file, work->index);
+    stream->temporal_rank = work->segment->frames;
+    stream->root = root;
+}
+
 /* Of the waves of a basis that is learned. */
 static size_t learned_numbers(const ath_work *work, const ath_stream *stream)
 {
@@ -319,6 +328,7 @@ static void restore_streams(ath_work *work)
         stream->only_tips = kept.only_tips;
         stream->temporal_rank = kept.temporal_rank;
         stream->root = kept.root;
+        if (kept.root < 0) set_waves(work, stream, kept.root);
         size_t learned = learned_numbers(work, stream);
         work->kept = ath_kept_waves(work->kept, waves, learned);
         if (learned > 0) stream->temporal = waves;
@@ -446,9 +456,7 @@ static void ready_motion(ath_work *work)
     memset(work->node.rows, 0, 4 * 3 * (size_t)work->segment->frames * sizeof *work->node.rows);
     for (int32_t d = 0; d < ATH_LEVELS; d++) {
         work->streams[d].step = 1.0;
-        work->streams[d].temporal = ath_file_waves(work->file, work->index);
-        work->streams[d].root = -1;
-        work->streams[d].temporal_rank = work->segment->frames;
+        set_waves(work, work->streams + d, ATH_STEM_ROOT);
     }
 }
 
@@ -491,14 +499,16 @@ static int begin(ath_work *work, const preparation *asked, int32_t index, int32_
     return result;
 }
 
-/* Hermite's polynomials: no jump is left where the join ends, and no jump of the slope. */
+/* Shares of a jump and of a slope, from 1 to 0 with level ends, that bend as little as any over so many frames: parabolas,
+ * which turn where half of the way is left, or where 1 - sqrt(1/2) is. */
 static void set_join(ath_join *join, int32_t how)
 {
+    const double turn = 0.70710678118654752440, bend = 0.5 + turn;
     join->width = how % ATH_JOIN_SLOPED;
     for (int32_t t = 0; t < join->width; t++) {
-        double w = (double)join->width, u = ((double)t + 0.5) / w;
-        join->jumps[t] = 1.0 - u * u * (3.0 - 2.0 * u);
-        join->slopes[t] = how >= ATH_JOIN_SLOPED ? w * u * (1.0 - u) * (1.0 - u) : 0.0;
+        double w = (double)join->width, u = ((double)t + 0.5) / w, left = 1.0 - u;
+        join->jumps[t] = u < 0.5 ? 1.0 - 2.0 * u * u : 2.0 * left * left;
+        join->slopes[t] = how < ATH_JOIN_SLOPED ? 0.0 : w * (u < turn ? u - bend * u * u : bend * left * left);
     }
 }
 
@@ -649,7 +659,10 @@ static int open_stems(ath_work *work, int32_t d)
     stream->rotation_step_factor = head.rotation_step_factor;
     stream->only_tips = head.only_tips;
     stream->turn_step = head.turn > 0 ? ath_node_step(-head.turn) : 0.0;
-    if (head.bits) result = read_temporal(work, &head, d);
+    if (head.bits == ATH_NODE_WAVES)
+        set_waves(work, stream, ATH_NODE_ROOT);
+    else if (head.bits > 0)
+        result = read_temporal(work, &head, d);
     if (q > 0) {
         work->layers[q].motion.ratio = head.ratio;
         refinement_model_init(reader->refined, frames, reader->history);

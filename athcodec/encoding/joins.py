@@ -16,13 +16,14 @@ import numpy as np
 END_FRAMES = 2  # of a segment, that the next one looks at
 WIDTHS = (1, 2, 3, 4, 5, 6, 8, 10, 12, 14, 16, 20, 24, 28, 32, 40, 48, 64, 96)  # frames
 SLOPED = 128
+TURN = 0.5**0.5  # where the share of a slope stops to fall faster
 SEEN = 1 << 12  # vertices by which joins are chosen, about
 END_FOOTPRINTS = {2: (5, 16, 27, 32), 1: (0, 0, 16, 32)}  # by width, in the last frames of what stands in the last one
 AXES = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 0], [1, 0, 1], [0, 1, 1], [1, 1, 1]])
 NO_CORRECTIONS = np.empty((0, 6), np.int32)
 # Ticks, changes of velocity at a seam over those of a usual frame: up to the first nobody sees them, beyond the second
 # they weigh more.
-SMOOTH, ROUGH, ROUGH_WORTH = 1.2, 1.4, 10.0
+SMOOTH, ROUGH, ROUGH_WORTH = 1.2, 1.4, 30.0
 ERROR_WORTH = 8.0  # ticks that an error twice as large weighs
 ORDER_WORTH = 400.0  # likewise, of one that is twice that of the level before
 BYTES_WORTH = 40.0  # likewise twice as many bytes
@@ -85,7 +86,10 @@ def _shares(join: int) -> tuple[np.ndarray, np.ndarray]:
     """Of the ways, that a join adds to its frames, (width,) each."""
     width, is_sloped = join % SLOPED, join >= SLOPED
     u = (np.arange(width) + 0.5) / width if width else np.empty(0)
-    return 1.0 - u * u * (3.0 - 2.0 * u), width * u * (1.0 - u) * (1.0 - u) if is_sloped else np.zeros(width)
+    left = 1.0 - u
+    jumps = np.where(u < 0.5, 1.0 - 2.0 * u * u, 2.0 * left * left)
+    slopes = width * np.where(u < TURN, u - (0.5 + TURN) * u * u, (0.5 + TURN) * left * left)
+    return jumps, slopes if is_sloped else np.zeros(width)
 
 
 def offsets(end: End, positions: np.ndarray, join: int) -> np.ndarray:

@@ -40,6 +40,7 @@ from athcodec.threads import SERIAL, ThreadPool, ranges
 if TYPE_CHECKING:
     from athcodec.encoding.learned_modes import LearnedModes
 
+STEM_ROOT, NODE_ROOT = -1, -2  # core/motion.h: of streams in waves that are not learned, of stems and of nodes
 RANGES, LEAST_RANGE = 24, 1024  # of a plant's vertices per thread and call
 
 
@@ -52,8 +53,8 @@ class Waves(IntEnum):  # core/plan.h
 @lru_cache(16)
 def waves_over_time(frames: int, kind: Waves = Waves.SMOOTH) -> np.ndarray:
     """Orthonormal rows, (frames, frames) float64, bit for bit those of the decoder."""
-    waves, work = np.empty((frames, frames)), np.empty(lib.ath_waves_work(frames))
-    lib.ath_waves(frames, kind, waves.ctypes.data, work.ctypes.data)
+    waves = np.empty((frames, frames))
+    lib.ath_waves(frames, kind, waves.ctypes.data)
     waves.setflags(write=False)
     return waves
 
@@ -216,10 +217,10 @@ class LevelStream:
 
     step: float
     rotation_step_factor: float = 0.0
-    temporal: np.ndarray | None = None  # (rank, frames) float64; None: waves_over_time
+    temporal: np.ndarray | None = None  # (rank, frames) float64; None: waves_over_time, by the root
     only_tips: bool = False  # pieces that carry others have no rotations
     turn_step: float = 0.0  # largest step of rotations of rigid pieces; 0: any
-    root: int = -1  # level of the first of the streams whose learned bases begin with the same rows
+    root: int = STEM_ROOT  # level of the first of the streams whose learned bases begin with the same rows
 
 
 class SegmentMotion:
@@ -280,11 +281,17 @@ class SegmentMotion:
         all_at_base = before.plan.ranks <= pieces["low_modes"]
         return (same[before.plan.base_level] & (same[pieces["level"]] | all_at_base)).astype(np.uint8)
 
+    def waves_of(self, stream: LevelStream) -> np.ndarray:
+        """Those over time, or what is learned in their place, (rank, frames)."""
+        if stream.temporal is not None:
+            return stream.temporal
+        return self.node_waves if stream.root == NODE_ROOT else self.waves
+
     def _bind(self) -> None:
         self._c_streams = (Stream * len(self.streams))()
         self._temporal = []  # keeps what the C structs point to
         for c_stream, stream in zip(self._c_streams, self.streams):
-            temporal = self.waves if stream.temporal is None else stream.temporal
+            temporal = self.waves_of(stream)
             self._temporal.append(temporal)
             c_stream.step, c_stream.rotation_step_factor = stream.step, stream.rotation_step_factor
             c_stream.temporal, c_stream.temporal_rank = temporal.ctypes.data, len(temporal)

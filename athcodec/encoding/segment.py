@@ -20,7 +20,7 @@ from athcodec.encoding import quantise as qz
 from athcodec.encoding import streams
 from athcodec.encoding.features import Feature
 from athcodec.encoding.learned_modes import LearnedModes
-from athcodec.encoding.motion import LevelStream, Plan, SegmentMotion, gather
+from athcodec.encoding.motion import NODE_ROOT, STEM_ROOT, LevelStream, Plan, SegmentMotion, gather
 from athcodec.encoding.polygons import Mesh
 from athcodec.encoding.rigid import TURN
 from athcodec.encoding.shape import RestPrecision
@@ -32,6 +32,7 @@ from athcodec.segmentation import split_segments
 from athcodec.threads import SERIAL, ThreadPool, default_jobs
 
 FINER = 32  # step over that of segments that bases and modes are learned from
+STRAIGHT = 0.05  # of the bound, what the velocity changes by in a frame of motion whose rows end in straight lines
 ROWS_AT_ONCE = 1 << 14  # of coefficients
 WORK_BYTES = 1 << 30  # of the segments coded at once, where `jobs` does not say how many these are
 COPIES_BENDS = 0.0, 0.15  # of copies of one shape that are tried
@@ -283,6 +284,12 @@ class Settings:
         """How numbers become integers."""
         return Rounding(qz.DEAD_ZONE, qz.end_weights(self.usual_change / float(np.min(self.limit))))
 
+    @property
+    def is_straight(self) -> bool:
+        """Whether rows end in straight lines, as modes of a beam do, and not in parabolas: where segments meet and the
+        motion that is left is far calmer than the source, bends at ends are seen most."""
+        return self.usual_change < STRAIGHT * float(np.min(self.limit))
+
     def step_of(self, level: int) -> float:
         """Of the stems of a level."""
         return qz.single(self.step * self.level_steps[level])
@@ -500,8 +507,9 @@ def level_streams(settings: Settings, levels: int, bases: dict[int, StreamBasis]
     found = []
     for level in range(levels):
         factor = float(settings.rotation_step_factors[level])
+        root = NODE_ROOT if settings.is_straight else STEM_ROOT
         stream = LevelStream(
-            settings.step_of(level), factor, only_tips=settings.only_tips, turn_step=settings.turn_step
+            settings.step_of(level), factor, only_tips=settings.only_tips, turn_step=settings.turn_step, root=root
         )
         if level in bases:
             stream.temporal, stream.root = basis_rows(bases[level].steps), bases[level].root
@@ -534,7 +542,7 @@ def _moments(segment: SegmentMotion, parts: Iterable[np.ndarray]) -> tuple[np.nd
         rows = part.reshape(-1, segment.frames)
         into = address(rows, np.int32, rows.size), least, address(lower, np.float64, lower.size)
         count += lib.ath_add_moments(len(rows), segment.frames, *into)
-    moments, waves = (np.tril(lower) + np.tril(lower, -1).T) / FINER**2, segment.waves
+    moments, waves = (np.tril(lower) + np.tril(lower, -1).T) / FINER**2, segment.waves_of(segment.streams[0])
     return np.einsum("ka,kb->ab", waves, np.einsum("kl,lb->kb", moments, waves)), count  # without NumPy's threads
 
 
@@ -644,6 +652,7 @@ def stems_head(settings: Settings, level: int, bases: dict[int, StreamBasis]) ->
         settings.rotation_step_factors[level],
         only_tips=settings.only_tips,
         turn=TURN if settings.turn_step else 0,
+        bits=ct.NODE_WAVES if settings.is_straight else 0,
     )
     if level in bases:
         own = bases[level]
