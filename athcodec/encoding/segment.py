@@ -264,6 +264,7 @@ class Settings:
     connected_rest: bool  # then it is adaptive, or exact
     rotation_step_factors: tuple[int, ...]  # per level: rotation factors
     learned_bases: tuple[bool, ...]  # per level: whether the time basis is
+    common_basis: bool  # these levels share one, else each has its own
     learned_pieces: np.ndarray | None  # (P,) bool: pieces that have learned modes; None: none has
     only_tips: bool  # pieces that carry others have no rotations
     node_steps: np.ndarray  # (levels,) of the maps of nodes, scene units; see SegmentMotion.analyse_nodes
@@ -558,10 +559,22 @@ def time_components(
     return {level: TimeComponents(*_level_moments(segment, level)) for level in levels}
 
 
-def level_bases(components: dict[int, TimeComponents], ratio: float = 1.0) -> dict[int, StreamBasis]:
-    """Each level's own, for steps `ratio` times those of the components."""
-    bases = {level: found.basis(ratio) for level, found in components.items()}
-    return {level: StreamBasis(basis, level) for level, basis in bases.items() if basis is not None}
+def level_bases(
+    plan: Plan, settings: Settings, components: dict[int | None, TimeComponents], ratio: float = 1.0
+) -> dict[int, StreamBasis]:
+    """Of the levels that learn theirs, for steps `ratio` times those of the components: each its own, or that of all,
+    which lies with the first of them."""
+    levels = [level for level in settings.learning_levels if plan.has_stems(level)]
+    if not settings.common_basis:
+        bases = {level: components[level].basis(ratio) for level in levels}
+        return {level: StreamBasis(basis, level) for level, basis in bases.items() if basis is not None}
+    basis = components[None].basis(ratio)
+    if basis is None:
+        return {}
+    first, *others = levels
+    return {first: StreamBasis(basis, first)} | {
+        level: StreamBasis(basis, first, len(basis), first) for level in others
+    }
 
 
 def basis_ratio(plan: Plan, settings: Settings, ratio: float) -> float:
@@ -577,7 +590,8 @@ def basis_ratio(plan: Plan, settings: Settings, ratio: float) -> float:
 
 def learned_bases(plan: Plan, settings: Settings, positions: np.ndarray) -> dict[int, StreamBasis]:
     """Of the levels that learn theirs."""
-    return level_bases(time_components(plan, settings, positions, settings.learning_levels))
+    levels = [None] if settings.common_basis and any(settings.learned_bases) else settings.learning_levels
+    return level_bases(plan, settings, time_components(plan, settings, positions, levels))
 
 
 @dataclass
