@@ -77,6 +77,8 @@ typedef struct {
 /* 0: first + i * step; 1: first + i / step; 2: stream; 3 as 1 and 4 as 0, by a whole rate, from 0 on */
 typedef int32_t ath_time_method;
 
+enum { ATH_BASIS_IN_WAVES = 1 }; /* Basis_Bits of rows that are integers of waves */
+
 typedef struct {
     double step, rotation_step_factor;
     int32_t bits, rank;

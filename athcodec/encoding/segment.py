@@ -24,7 +24,7 @@ from athcodec.encoding.motion import LevelStream, Plan, SegmentMotion, gather
 from athcodec.encoding.polygons import Mesh
 from athcodec.encoding.rigid import TURN
 from athcodec.encoding.shape import RestPrecision
-from athcodec.encoding.time_bases import BASIS_BITS, TimeComponents, basis_rows
+from athcodec.encoding.time_bases import Entries, InWaves, TimeComponents
 from athcodec.errors import BoundError
 from athcodec.hierarchy import Hierarchy
 from athcodec.polygons import Polygons
@@ -488,10 +488,10 @@ def _thin_branches(source: Source) -> np.ndarray:
 
 @dataclass(frozen=True)
 class StreamBasis:
-    """The learned time basis of a stream, (rank, frames) int32 as stored; root as in LevelStream. It begins with the
-    `known` rows of the stream of another level, if any."""
+    """The learned time basis of a stream; root as in LevelStream. It begins with the `known` rows of the stream of
+    another level, if any."""
 
-    steps: np.ndarray
+    stored: Entries | InWaves
     root: int
     known: int = 0
     base: int = ct.NO_LEVEL
@@ -505,7 +505,7 @@ def level_streams(settings: Settings, levels: int, bases: dict[int, StreamBasis]
             settings.step_of(level), factor, only_tips=settings.only_tips, turn_step=settings.turn_step
         )
         if level in bases:
-            stream.temporal, stream.root = basis_rows(bases[level].steps), bases[level].root
+            stream.temporal, stream.root = bases[level].stored.rows, bases[level].root
         found.append(stream)
     return found
 
@@ -556,7 +556,7 @@ def time_components(
     if not levels:
         return {}
     segment = analyse_finely(plan, settings, positions)
-    return {level: TimeComponents(*_level_moments(segment, level)) for level in levels}
+    return {level: TimeComponents(*_level_moments(segment, level), segment.waves) for level in levels}
 
 
 def level_bases(
@@ -566,14 +566,14 @@ def level_bases(
     which lies with the first of them."""
     levels = [level for level in settings.learning_levels if plan.has_stems(level)]
     if not settings.common_basis:
-        bases = {level: components[level].basis(ratio) for level in levels}
+        bases = {level: components[level].basis(ratio, ratio) for level in levels}
         return {level: StreamBasis(basis, level) for level, basis in bases.items() if basis is not None}
-    basis = components[None].basis(ratio)
+    basis = components[None].basis(ratio, ratio)
     if basis is None:
         return {}
     first, *others = levels
     return {first: StreamBasis(basis, first)} | {
-        level: StreamBasis(basis, first, len(basis), first) for level in others
+        level: StreamBasis(basis, first, len(basis.rows), first) for level in others
     }
 
 
@@ -652,8 +652,8 @@ def stems_head(settings: Settings, level: int, bases: dict[int, StreamBasis]) ->
     )
     if level in bases:
         own = bases[level]
-        head.bits, head.rank, head.base = BASIS_BITS, len(own.steps), own.base
-        head.basis = streams.encode_temporal(own.steps[own.known :], BASIS_BITS)
+        head.bits, head.rank, head.base = own.stored.bits, len(own.stored.rows), own.base
+        head.basis = own.stored.stream(own.known)
     return head
 
 
