@@ -593,6 +593,12 @@ def basis_stream(rows: list[list[int]], bits: int) -> bytes:
     return write(rd.decode_temporal, script, len(rows), len(rows[0]), bits)
 
 
+def basis_in_waves(frames: int, *script: int, rank: int, known: list[list[float]] | None = None) -> bytes:
+    """A learned basis in waves: of three rows at a time the changes of their exponents, then the script of a row."""
+    rows = np.array(known, float) if known else np.empty((0, frames))
+    return write(rd.decode_basis, list(script), rows, rank, frames, rd.waves_over_time(frames, False))
+
+
 def _no_motion(frames: int, periodic: bool = False, shapes: rd.Motion | None = None) -> rd.Motion:
     motion = rd.Motion(frames, periodic)
     if shapes:
