@@ -146,8 +146,8 @@ def encode_temporal(steps: np.ndarray, bits: int) -> bytes:
 
 
 def encode_basis(exponents: np.ndarray, integers: np.ndarray) -> bytes:
-    """Rows of a learned temporal basis in waves: half octaves of their steps, (rows,) int32, and integers, (rows, frames)
-    int32."""
+    """Rows of a learned temporal basis in waves: half octaves of their steps, (rows,) int32, and integers,
+    (rows, frames) int32."""
     rank, frames = integers.shape
     padded = np.concatenate([integers, np.zeros((-rank % 3, frames), np.int32)])
     return encode_stream(

@@ -91,8 +91,8 @@ class TimeComponents:
         self._count = count
 
     def basis(self, ratio: float = 1.0, precision: float = 1.0) -> Entries | InWaves | None:
-        """The rows that tracks in steps `ratio` times as large need, or None where no basis smaller than waves would do;
-        precision: how many times as large the steps may be for which they are precise enough."""
+        """The rows that tracks in steps `ratio` times as large need, or None where no basis smaller than waves would
+        do; precision: how many times as large the steps are that they are precise enough for."""
         rank = self._rank(ratio)
         if self._count <= 1 or not 1 <= rank <= len(self._rows) // 2:
             return None
