@@ -35,6 +35,7 @@ from spec.scripted import (
     Plant,
     Script,
     Stem,
+    basis_in_waves,
     basis_stream,
     clip_entry,
     grown,
@@ -1169,6 +1170,58 @@ valid(
     "learned-basis-zero",
     "a learned basis of zeros, of no bytes but the stream's",
     lambda: moving([Stem(-1, 3)], 44, heads={0: stems_head(0.5, 1, 12, 2, basis_stream([[0] * 3] * 2, 12))}),
+)
+WAVE_ROWS = (  # of four rows over four frames: exponents, integers; the axes without a use of the last row are not 0
+    *(-6, 3, -1),
+    *row((9, 0, 1), (-4, 60, 0), (0, 2, 700)),
+    -200 + 4,
+    *row((1, 2, 3), (5, 0, 0)),
+)
+valid(
+    "basis-in-waves",
+    "a learned basis of four rows in waves, one of them of the least step",
+    lambda: moving(FORK, 45, frames=4, heads={1: stems_head(0.5, 2, 2, 4, basis_in_waves(4, *WAVE_ROWS, rank=4))}),
+)
+valid(
+    "basis-in-waves-zero",
+    "a learned basis of two rows in waves: one of zeros, and one like the first of its level before",
+    lambda: moving(
+        FORK,
+        46,
+        frames=4,
+        heads={
+            1: stems_head(0.5, 2, 2, 2, basis_in_waves(4, 0, 0, *row((1, 0, 0), (2, 0, 0)), rank=2)),
+            2: stems_head(0.25, 0, 2, 3, basis_in_waves(4, 8, *row((1, 0, 0), (2, 0, 0)), rank=1), base=1),
+        },
+    ),
+)
+valid(
+    "basis-shared",
+    "levels that share a learned basis, which lies with the first of them",
+    lambda: moving(
+        FORK,
+        47,
+        frames=4,
+        heads={
+            1: stems_head(0.5, 2, 2, 4, basis_in_waves(4, *WAVE_ROWS, rank=4)),
+            2: stems_head(0.25, 0, 2, 4, b"", base=1),
+        },
+    ),
+)
+valid(
+    "basis-of-both-kinds",
+    "learned bases in waves that begin with rows by their entries, and the other way round",
+    lambda: moving(
+        FORK,
+        48,
+        frames=4,
+        segments=1,
+        heads={
+            1: stems_head(0.5, 2, 9, 1, basis_stream([[256, -256, 256, 200]], 9)),
+            2: stems_head(0.25, 0, 2, 3, basis_in_waves(4, -3, 2, *row((3, 1, 0), (0, 2, 0)), rank=2), base=1),
+            3: stems_head(0.25, 0, 9, 4, basis_stream([[5, 6, 7, -200]], 9), base=2),
+        },
+    ),
 )
 valid("shapes", "learned shapes at base levels and at the levels that complete a piece, in both segments", fork)
 valid(
@@ -3413,6 +3466,33 @@ motion(
     1,
     "an entry of a learned basis of 8 bits is -129",
     basis(1, 8, basis_stream([[-129, 0]], 8)),
+)
+motion("bits-3", rd.STEMS, 1, "Basis_Bits 3", basis(1, 3, basis_stream([[0, 0]], 8)))
+for name, reason, exponents in (
+    ("change", "an exponent of a row of a basis changes by 401", (-200, 401)),
+    ("high", "an exponent of a row of a basis is 201", (201, 0)),
+    ("low", "an exponent of a row of a basis is -201", (0, -201)),
+):
+    motion(
+        f"basis-exponent-{name}",
+        rd.STEMS,
+        1,
+        reason,
+        lambda exponents=exponents: basis(2, 2, basis_in_waves(2, *exponents, *row((1, 1, 0)), rank=2))(),
+    )
+motion(
+    "basis-in-waves-frequencies",
+    rd.STEMS,
+    1,
+    "a row of a basis codes three frequencies of two frames",
+    lambda: basis(1, 2, basis_in_waves(2, 0, *row((1, 0, 0), (1, 0, 0), (1, 0, 0)), rank=1))(),
+)
+motion(
+    "basis-in-waves-zero-behind",
+    rd.STEMS,
+    1,
+    "a zero byte behind the stream of a basis in waves",
+    lambda: basis(1, 2, basis_in_waves(2, 0, *row((1, 0, 0)), rank=1) + b"\0")(),
 )
 motion(
     "basis-zero-behind",

@@ -2065,6 +2065,32 @@ def decode_row(
     return row, count
 
 
+def decode_basis(stream: bytes, known: np.ndarray, rank: int, frames: int, waves: np.ndarray) -> np.ndarray:
+    """(rank, frames): a learned basis that begins with the `known` rows, the others in waves."""
+    coder, model, steps = RangeDecoder(stream), CoefficientModel(), NumberModel()
+    basis, exponent, above, count = known, 0, None, 0
+    while len(basis) < rank:
+        units = []
+        for _ in range(min(3, rank - len(basis))):
+            change = code_signed(coder, steps, 32)
+            require(abs(change) <= 400 and abs(exponent + change) <= 200, "the step of a row is out of range")
+            exponent += change
+            units.append(half_octave(exponent))
+        above, count = decode_row(coder, model, frames, frames, 0, above, count)
+        for row in over_time(above[: len(units)], units, waves):
+            basis = np.concatenate([basis, [orthonormal(basis, row)]])
+    coder.finish()
+    return basis
+
+
+def orthonormal(basis: np.ndarray, row: np.ndarray) -> np.ndarray:
+    """A row at right angles to those of a basis, of length 1, in binary32."""
+    for other in basis:
+        row = row - in_order(other * row) * other
+    length2 = in_order(row * row)
+    return (row * (1.0 / np.sqrt(length2 if length2 > 1e-200 else 1.0))).astype(np.float32).astype(float)
+
+
 # ---- refined rows ------------------------------------------------------------------------------------------
 
 
@@ -3103,7 +3129,7 @@ def read_stems_head(chunk: bytes, motion: Motion, level: int) -> bytes:
     require(len(chunk) >= 6, "STEMS is too short")
     step, rotation, bits = f32(chunk, 0), chunk[4], chunk[5]
     require(finite(step) and step > 0.0 and rotation & 7 <= 4, "Step or Rotation of STEMS is out of range")
-    require(bits <= 1 or 8 <= bits <= 16, "Basis_Bits is out of range")
+    require(bits <= 2 or 8 <= bits <= 16, "Basis_Bits is out of range")
     waves, root, body = (motion.waves, -1, chunk[6:]) if bits == 0 else (motion.node_waves, -2, chunk[6:])
     if bits > 1:
         waves, root, body = read_basis(body, motion, level, bits)
@@ -3124,9 +3150,12 @@ def read_basis(body: bytes, motion: Motion, level: int, bits: int) -> tuple[np.n
         require(motion.streams[base].root >= 0, "Basis_Level is a level without a learned basis")
         known, root = motion.streams[base].waves, motion.streams[base].root
     require(len(known) <= rank, "Basis_Rank is less than that of the basis that it begins with")
-    rows = decode_temporal(body[7 : 7 + length], rank - len(known), motion.frames, bits)
+    stream, rest = body[7 : 7 + length], body[7 + length :]
+    if bits == 2:
+        return decode_basis(stream, known, rank, motion.frames, motion.waves), root, rest
+    rows = decode_temporal(stream, rank - len(known), motion.frames, bits)
     own = np.array(rows, float).reshape(len(rows), motion.frames) * 2.0 ** -(bits - 1)
-    return np.concatenate([known, own]), root, body[7 + length :]
+    return np.concatenate([known, own]), root, rest
 
 
 def decode_stems(stream: bytes, plan: Plan, motion: Motion, level: int) -> None:
@@ -3313,7 +3342,7 @@ def over_time(row, step: float, waves: np.ndarray) -> np.ndarray:
     if row is None:
         return np.zeros((3, waves.shape[1]))
     tracks = []
-    for axis, own in zip(row, np.broadcast_to(step, 3)):
+    for axis, own in zip(row, np.broadcast_to(step, len(row))):
         numbers = np.array(axis[: len(waves)])
         there = np.flatnonzero(numbers)
         tracks.append(in_order((numbers[there].astype(float) * own)[:, None] * waves[there]))

@@ -575,7 +575,7 @@ def stems_head(
     step: float = 0.125, rotation: int = 0, bits: int = 0, rank: int = 0, basis: bytes = b"", base: int = 255
 ) -> bytes:
     head = struct.pack("<fBB", step, rotation, bits)
-    return head + struct.pack("<HBI", rank, base, len(basis)) + basis if bits else head
+    return head + struct.pack("<HBI", rank, base, len(basis)) + basis if bits > 1 else head
 
 
 def predicted_head(step: float = 0.0625, settings: int = 2) -> bytes:
@@ -591,6 +591,12 @@ def basis_stream(rows: list[list[int]], bits: int) -> bytes:
             script.append(value - before - slope)
             slope, before = value - before if t > 0 else 0, value
     return write(rd.decode_temporal, script, len(rows), len(rows[0]), bits)
+
+
+def basis_in_waves(frames: int, *script: int, rank: int, known: list[list[float]] | None = None) -> bytes:
+    """A learned basis in waves: of three rows at a time the changes of their exponents, then the script of a row."""
+    rows = np.array(known, float) if known else np.empty((0, frames))
+    return write(rd.decode_basis, list(script), rows, rank, frames, rd.waves_over_time(frames, False))
 
 
 def _no_motion(frames: int, periodic: bool = False, shapes: rd.Motion | None = None) -> rd.Motion:

@@ -542,7 +542,8 @@ int ath_parse_stems(ath_bytes chunk, int32_t frames, ath_stems_head *head, ath_b
     *body = rest_of(chunk, 6);
     if (!is_step(head->step) || rotation > 4) return ATH_BAD_CHUNK;
     if (head->bits <= ATH_NODE_WAVES) return ATH_OK;
-    if (head->bits < 8 || head->bits > 16 || body->size < 7) return ATH_BAD_CHUNK;
+    if (head->bits != ATH_BASIS_IN_WAVES && (head->bits < 8 || head->bits > 16)) return ATH_BAD_CHUNK;
+    if (body->size < 7) return ATH_BAD_CHUNK;
     head->rank = (int32_t)u16_at(body->bytes);
     head->base = body->bytes[2] == ATH_NO_LEVEL ? -1 : body->bytes[2];
     size_t length = u32_at(body->bytes + 3);

@@ -77,7 +77,8 @@ typedef struct {
 /* 0: first + i * step; 1: first + i / step; 2: stream; 3 as 1 and 4 as 0, by a whole rate, from 0 on */
 typedef int32_t ath_time_method;
 
-enum { ATH_NODE_WAVES = 1 }; /* bits of a stream in the waves of maps of nodes */
+/* Bits of a stream in the waves of maps of nodes; of one whose basis is rows that are integers of waves. */
+enum { ATH_NODE_WAVES = 1, ATH_BASIS_IN_WAVES = 2 };
 
 typedef struct {
     double step, rotation_step_factor;

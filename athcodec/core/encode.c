@@ -161,6 +161,21 @@ int64_t ath_encode_temporal(void *model, uint8_t *bytes, size_t capacity, int32_
     return written(&coder, code_temporal(&coder, (number_model *)model, rank, frames, limit, (int32_t *)basis));
 }
 
+int64_t ath_encode_basis(void *memory, uint8_t *bytes, size_t capacity, int32_t rank, int32_t frames,
+                         int32_t *exponents, int32_t *integers)
+{
+    ath_coder coder;
+    coefficient_model *rows = (coefficient_model *)memory;
+    number_model steps;
+    basis_model model = basis_model_of(rows, &steps, frames, (uint32_t *)(rows + 1));
+    int valid = 1;
+    coder_start(&coder, bytes, capacity);
+    for (int32_t r = 0; r < rank && valid; r += BASIS_AXES)
+        valid = code_basis_rows(&coder, &model, frames, ath_min(rank - r, BASIS_AXES), exponents + r,
+                                integers + (size_t)r * (size_t)frames);
+    return written(&coder, valid);
+}
+
 int64_t ath_encode_shapes(void *memory, uint8_t *bytes, size_t capacity, const ath_plan *plan,
                           const int32_t *shape_counts, const int64_t *shape_first, int32_t *integers, int32_t level)
 {

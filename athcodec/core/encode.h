@@ -189,6 +189,9 @@ ATH_ENCODER_API int64_t ath_encode_times(void *model, uint8_t *bytes, size_t cap
                                          const double *times);
 ATH_ENCODER_API int64_t ath_encode_temporal(void *model, uint8_t *bytes, size_t capacity, int32_t rank, int32_t frames,
                                             int32_t limit, const int32_t *basis);
+/* Rows of a basis in waves; integers: as many rows of `frames` as rank, and zeros up to a multiple of 3. */
+ATH_ENCODER_API int64_t ath_encode_basis(void *model, uint8_t *bytes, size_t capacity, int32_t rank, int32_t frames,
+                                         int32_t *exponents, int32_t *integers);
 /* integers: as streams hold them, ATH_SHAPE_NUMBERS of each shape. */
 ATH_ENCODER_API int64_t ath_encode_shapes(void *model, uint8_t *bytes, size_t capacity, const ath_plan *plan,
                                           const int32_t *shape_counts, const int64_t *shape_first, int32_t *integers,

@@ -573,6 +573,31 @@ static double half_octave(int32_t exponent)
 
 double ath_node_step(int32_t exponent) { return half_octave(exponent); }
 
+/* At right angles to the rows before it, of length 1, in floats. */
+static void make_orthonormal(const double *rows, int32_t before, int32_t T, double *row)
+{
+    double length2 = 0.0;
+    for (const double *other = rows; other < rows + (size_t)before * (size_t)T; other += T) {
+        double shared = 0.0;
+        for (int32_t t = 0; t < T; t++) shared = shared + other[t] * row[t];
+        for (int32_t t = 0; t < T; t++) row[t] = row[t] - shared * other[t];
+    }
+    for (int32_t t = 0; t < T; t++) length2 = length2 + row[t] * row[t];
+    double inverse = 1.0 / ath_sqrt(length2 > 1e-200 ? length2 : 1.0);
+    for (int32_t t = 0; t < T; t++) row[t] = (double)ath_single(row[t] * inverse);
+}
+
+void ath_add_basis_rows(const double *waves, int32_t T, int32_t known, int32_t count, const int32_t *exponents,
+                        const int32_t *integers, double *rows)
+{
+    ath_stream stream = {.temporal = waves};
+    for (int32_t r = 0; r < count; r++) {
+        double *row = rows + (size_t)(known + r) * (size_t)T;
+        ath_inverse_temporal(&stream, T, T, half_octave(exponents[r]), integers + (size_t)r * (size_t)T, row);
+        make_orthonormal(rows, known + r, T, row);
+    }
+}
+
 ath_stream ath_node_stream(const ath_motion *motion, double step)
 {
     ath_stream stream = {step, 0.0, motion->waves, motion->frames, -1, 0.0, 0, 0};

@@ -139,6 +139,10 @@ void ath_to_local(const ath_plan *plan, int32_t frames, const ath_piece *piece, 
 /* Tracks of `count` modes from that, 3 x frames each. */
 void ath_project(const ath_plan *plan, int32_t frames, const ath_piece *piece, int32_t count, const double *local,
                  double *rows);
+/* Adds rows to a learned basis, rows x frames, of which `known` are there: integers of waves by steps of the square root of
+ * 2 to these exponents, made orthonormal. */
+ATH_ENCODER_API void ath_add_basis_rows(const double *waves, int32_t frames, int32_t known, int32_t count,
+                                        const int32_t *exponents, const int32_t *integers, double *rows);
 void ath_inverse_temporal(const ath_stream *stream, int32_t frames, int32_t count, double step,
                           const int32_t *quantised, double *row);
 /* x := c + R x, 3 x frames. */

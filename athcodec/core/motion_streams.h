@@ -185,6 +185,37 @@ static int code_node(ath_coder *coder, affine_model *model, const ath_plan *plan
     return !model->rows.invalid;
 }
 
+/* ---- learned bases in waves ---- */
+
+enum { BASIS_AXES = 3 };
+
+typedef struct {
+    coefficient_model *rows;
+    number_model *steps;
+    int32_t step_before, above_count;
+} basis_model;
+
+/* Up to three rows of a basis are the axes of one row: an exponent of each, which is the change from the one before, and
+ * the integers. */
+static int code_basis_rows(ath_coder *coder, basis_model *model, int32_t frames, int32_t count, int32_t *exponents,
+                           int32_t *row)
+{
+    for (int32_t r = 0; r < count; r++) {
+        int32_t before = model->step_before, change = code_signed(coder, model->steps, 32, exponents[r] - before);
+        if (change < -400 || change > 400 || before + change < -200 || before + change > 200) return 0;
+        exponents[r] = model->step_before = before + change;
+    }
+    model->above_count = code_row(coder, model->rows, frames, frames, 0, model->above_count, row);
+    return !model->rows->invalid;
+}
+
+static basis_model basis_model_of(coefficient_model *rows, number_model *steps, int32_t frames, uint32_t *history)
+{
+    coefficient_model_init(rows, frames, history);
+    number_model_init(steps);
+    return (basis_model){.rows = rows, .steps = steps, .above_count = -1};
+}
+
 /* ---- corrections ---- */
 
 enum { CORRECTION_BLOCK = 8, CORRECTION_BLOCKS = ATH_SEGMENT_FRAMES / CORRECTION_BLOCK };

@@ -623,26 +623,51 @@ static int check_some(ath_work *work)
     return ATH_OK;
 }
 
-/* Rows of a basis: those of the one that it begins with, then its own. Integers are decoded into the far half of the rows
- * that they become. */
+/* Own rows of a basis in waves. */
+static int read_waves(ath_work *work, const ath_stems_head *head, int32_t known, int32_t d)
+{
+    stems_reader *reader = work->stems + d;
+    coefficient_model *rows = reader->refined ? &reader->refined->rows : reader->model;
+    int32_t frames = work->segment->frames, exponents[BASIS_AXES], integers[BASIS_AXES * ATH_SEGMENT_FRAMES];
+    basis_model model = basis_model_of(rows, (number_model *)work->prelude_model, frames, reader->history);
+    ath_coder coder;
+    coder_start(&coder, head->basis.bytes, head->basis.size);
+    for (int32_t count; known < head->rank; known += count) {
+        count = ath_min(head->rank - known, BASIS_AXES);
+        memset(integers, 0, BASIS_AXES * (size_t)frames * sizeof *integers);
+        if (!code_basis_rows(&coder, &model, frames, count, exponents, integers)) return ATH_BAD_CHUNK;
+        ath_add_basis_rows(ath_file_waves(work->file, work->index), frames, known, count, exponents, integers,
+                           reader->temporal);
+    }
+    return coder_finish(&coder) ? ATH_OK : ATH_BAD_CHUNK;
+}
+
+/* Own rows of a basis by their entries. Integers are decoded into the far half of the rows that they become. */
+static int read_entries(ath_work *work, const ath_stems_head *head, int32_t known, int32_t d)
+{
+    int32_t frames = work->segment->frames, limit = 1 << (head->bits - 1);
+    size_t count = (size_t)(head->rank - known) * (size_t)frames;
+    double *rows = work->stems[d].temporal + (size_t)known * (size_t)frames, unit = 1.0 / (double)limit;
+    int32_t *integers = (int32_t *)(void *)rows + count;
+    int result = ath_decode_temporal(work->prelude_model, head->basis.bytes, head->basis.size, head->rank - known,
+                                     frames, limit, integers);
+    for (size_t i = 0; result == ATH_OK && i < count; i++) rows[i] = (double)integers[i] * unit;
+    return result;
+}
+
+/* Rows of a basis: those of the one that it begins with, then its own. */
 static int read_temporal(ath_work *work, const ath_stems_head *head, int32_t d)
 {
     stems_reader *reader = work->stems + d;
     ath_stream *stream = work->streams + d;
     const ath_stream *base = head->base >= 0 && head->base < d ? work->streams + head->base : 0;
     if (head->base >= 0 && (!base || base->root < 0 || base->temporal_rank > head->rank)) return ATH_BAD_CHUNK;
-    int32_t frames = work->segment->frames, limit = 1 << (head->bits - 1), known = base ? base->temporal_rank : 0;
-    size_t count = (size_t)(head->rank - known) * (size_t)frames;
-    double *rows = reader->temporal + (size_t)known * (size_t)frames, unit = 1.0 / (double)limit;
-    int32_t *integers = (int32_t *)(void *)rows + count;
-    if (base) memcpy(reader->temporal, base->temporal, (size_t)known * (size_t)frames * sizeof *rows);
-    int result = ath_decode_temporal(work->prelude_model, head->basis.bytes, head->basis.size, head->rank - known,
-                                     frames, limit, integers);
-    for (size_t i = 0; result == ATH_OK && i < count; i++) rows[i] = (double)integers[i] * unit;
+    int32_t known = base ? base->temporal_rank : 0;
+    if (base) memcpy(reader->temporal, base->temporal, (size_t)known * (size_t)work->segment->frames * sizeof(double));
     stream->temporal = reader->temporal;
     stream->temporal_rank = head->rank;
     stream->root = base ? base->root : d;
-    return result;
+    return head->bits == ATH_BASIS_IN_WAVES ? read_waves(work, head, known, d) : read_entries(work, head, known, d);
 }
 
 static int open_stems(ath_work *work, int32_t d)

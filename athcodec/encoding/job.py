@@ -617,6 +617,7 @@ def _summary(
         "rest_step_ratio": settings.rest_step / bound,
         "rotations": list(settings.rotation_step_factors),
         "learned": list(settings.learned_bases),
+        "common_basis": settings.common_basis,
         "sheets": int(settings.sheet.sum()),
         "periodic": settings.periodic,
         "learned_pieces": 0 if settings.learned_pieces is None else int(settings.learned_pieces.sum()),

@@ -267,13 +267,13 @@ class _TimeBases:
         """Of a stream of the layer's settings, which stands at a level of the file."""
         if self._components is None or not layer.settings.learned_bases[stream]:
             return {}
-        steps = self._components.basis(basis_ratio(layer.plan, layer.settings, layer.ratio))
-        if steps is None:
+        stored = self._components.basis(basis_ratio(layer.plan, layer.settings, layer.ratio))
+        if stored is None:
             return {}
-        own = StreamBasis(steps, level)
+        own = StreamBasis(stored, level)
         if self._before is not None:
             base, before = self._before
-            own = StreamBasis(steps, before.root, len(before.steps), base)
+            own = StreamBasis(stored, before.root, len(before.stored.rows), base)
         self._before = level, own
         return {stream: own}
 

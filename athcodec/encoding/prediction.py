@@ -76,6 +76,7 @@ def _settings(source: Source, ath: Ath, bound: float, rest_step: float) -> Setti
         rotation_step_factors=(0,) * levels,
         only_tips=False,
         learned_bases=(False,) * levels,
+        common_basis=False,
         learned_pieces=None,
         node_steps=np.ones(levels),
     )

@@ -162,6 +162,7 @@ def first_settings(
         rotation_step_factors=(0,) * levels,
         only_tips=False,
         learned_bases=(False,) * levels,
+        common_basis=False,
         learned_pieces=None,
         node_steps=np.full(levels, step),
         usual_change=usual_change(samples) if source.has_seams else np.inf,
@@ -490,6 +491,7 @@ class Search:
             only_tips=found.only_tips,
             free_rigid=found.free_rigid,
             learned_bases=found.learned_bases,
+            common_basis=found.common_basis,
             periodic=found.periodic,
             sheet=start.sheet if by_form else np.full_like(start.sheet, found.sheet[0]),
             node_steps=found.node_steps * np.where(inner > 0, fewer, 1.0),
@@ -527,6 +529,7 @@ class Search:
             settings.only_tips,
             settings.periodic,
             settings.learned_bases,
+            settings.common_basis,
             settings.learned_pieces is not None and settings.learned_pieces.tobytes(),
         )
 
@@ -572,16 +575,17 @@ class Search:
         if not any(settings.learned_bases):
             return {}
         step, components = self._learn_time(settings)
-        some = {level: own for level, own in components[number].items() if settings.learned_bases[level]}
-        return level_bases(some, basis_ratio(self.prelude(settings).plan, settings, settings.step / step))
+        plan = self.prelude(settings).plan
+        ratio = basis_ratio(plan, settings, settings.step / step)
+        return level_bases(plan, settings, components[number], ratio)
 
     def _learn_time(self, settings: Settings) -> tuple[float, list[dict[int, TimeComponents]]]:
-        """Components of the samples over time, of all levels, and the step of the trial that asked first for them: they
-        hardly depend on it."""
+        """Components of the samples over time, of each level and of all, and the step of the trial that asked first for
+        them: they hardly depend on it."""
         known = *self._turning(settings), settings.level_steps.tobytes(), settings.periodic
         if known not in self._time_components:
             plan = self.prelude(settings).plan
-            levels = [level for level in range(self.levels) if plan.has_stems(level)]
+            levels = [*(level for level in range(self.levels) if plan.has_stems(level)), None]
             found = [
                 time_components(plan, settings.of_segment(sample.whole_loop), sample.positions, levels)
                 for sample in self.samples
@@ -763,13 +767,16 @@ class Search:
         return list(candidates.items())[int(np.argmin(costs))]
 
     def _with_learned_bases(self, settings: Settings) -> Settings:
-        """Learned time bases for the levels whose streams they shorten, where the file as a whole gets shorter."""
+        """Learned time bases, one for all levels or one for each whose stream it shortens, where the file as a whole
+        gets shorter."""
         if self._without(Feature.TIME_BASES):
             return settings
-        learning = replace(settings, learned_bases=(True,) * self.levels)
-        (cost, plain), (_, learned) = self._costs([settings, learning])
-        mixed = replace(settings, learned_bases=tuple((learned < plain).tolist()))
-        return mixed if any(mixed.learned_bases) and self.cost(mixed)[0] < cost else settings
+        unlearned = replace(settings, learned_bases=(False,) * self.levels, common_basis=False)
+        own = replace(unlearned, learned_bases=(True,) * self.levels)
+        common = replace(own, common_basis=True)
+        (_, plain), (_, learned), _ = self._costs([unlearned, own, common])
+        mixed = replace(own, learned_bases=tuple((learned < plain).tolist()))
+        return self._cheapest([unlearned, mixed, common])
 
     def _with_periodic_waves(self, settings: Settings) -> Settings:
         """Loops that are one segment by waves that go on across their seam: those of a motion that does not are

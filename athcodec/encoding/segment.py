@@ -24,7 +24,7 @@ from athcodec.encoding.motion import NODE_ROOT, STEM_ROOT, LevelStream, Plan, Se
 from athcodec.encoding.polygons import Mesh
 from athcodec.encoding.rigid import TURN
 from athcodec.encoding.shape import RestPrecision
-from athcodec.encoding.time_bases import BASIS_BITS, TimeComponents, basis_rows
+from athcodec.encoding.time_bases import Entries, InWaves, TimeComponents
 from athcodec.errors import BoundError
 from athcodec.hierarchy import Hierarchy
 from athcodec.polygons import Polygons
@@ -265,6 +265,7 @@ class Settings:
     connected_rest: bool  # then it is adaptive, or exact
     rotation_step_factors: tuple[int, ...]  # per level: rotation factors
     learned_bases: tuple[bool, ...]  # per level: whether the time basis is
+    common_basis: bool  # these levels share one, else each has its own
     learned_pieces: np.ndarray | None  # (P,) bool: pieces that have learned modes; None: none has
     only_tips: bool  # pieces that carry others have no rotations
     node_steps: np.ndarray  # (levels,) of the maps of nodes, scene units; see SegmentMotion.analyse_nodes
@@ -494,10 +495,10 @@ def _thin_branches(source: Source) -> np.ndarray:
 
 @dataclass(frozen=True)
 class StreamBasis:
-    """The learned time basis of a stream, (rank, frames) int32 as stored; root as in LevelStream. It begins with the
-    `known` rows of the stream of another level, if any."""
+    """The learned time basis of a stream; root as in LevelStream. It begins with the `known` rows of the stream of
+    another level, if any."""
 
-    steps: np.ndarray
+    stored: Entries | InWaves
     root: int
     known: int = 0
     base: int = ct.NO_LEVEL
@@ -512,7 +513,7 @@ def level_streams(settings: Settings, levels: int, bases: dict[int, StreamBasis]
             settings.step_of(level), factor, only_tips=settings.only_tips, turn_step=settings.turn_step, root=root
         )
         if level in bases:
-            stream.temporal, stream.root = basis_rows(bases[level].steps), bases[level].root
+            stream.temporal, stream.root = bases[level].stored.rows, bases[level].root
         found.append(stream)
     return found
 
@@ -563,13 +564,25 @@ def time_components(
     if not levels:
         return {}
     segment = analyse_finely(plan, settings, positions)
-    return {level: TimeComponents(*_level_moments(segment, level)) for level in levels}
+    return {level: TimeComponents(*_level_moments(segment, level), segment.waves) for level in levels}
 
 
-def level_bases(components: dict[int, TimeComponents], ratio: float = 1.0) -> dict[int, StreamBasis]:
-    """Each level's own, for steps `ratio` times those of the components."""
-    bases = {level: found.basis(ratio) for level, found in components.items()}
-    return {level: StreamBasis(basis, level) for level, basis in bases.items() if basis is not None}
+def level_bases(
+    plan: Plan, settings: Settings, components: dict[int | None, TimeComponents], ratio: float = 1.0
+) -> dict[int, StreamBasis]:
+    """Of the levels that learn theirs, for steps `ratio` times those of the components: each its own, or that of all,
+    which lies with the first of them."""
+    levels = [level for level in settings.learning_levels if plan.has_stems(level)]
+    if not settings.common_basis:
+        bases = {level: components[level].basis(ratio, ratio) for level in levels}
+        return {level: StreamBasis(basis, level) for level, basis in bases.items() if basis is not None}
+    basis = components[None].basis(ratio, ratio)
+    if basis is None:
+        return {}
+    first, *others = levels
+    return {first: StreamBasis(basis, first)} | {
+        level: StreamBasis(basis, first, len(basis.rows), first) for level in others
+    }
 
 
 def basis_ratio(plan: Plan, settings: Settings, ratio: float) -> float:
@@ -585,7 +598,8 @@ def basis_ratio(plan: Plan, settings: Settings, ratio: float) -> float:
 
 def learned_bases(plan: Plan, settings: Settings, positions: np.ndarray) -> dict[int, StreamBasis]:
     """Of the levels that learn theirs."""
-    return level_bases(time_components(plan, settings, positions, settings.learning_levels))
+    levels = [None] if settings.common_basis and any(settings.learned_bases) else settings.learning_levels
+    return level_bases(plan, settings, time_components(plan, settings, positions, levels))
 
 
 @dataclass(frozen=True)
@@ -656,8 +670,8 @@ def stems_head(settings: Settings, level: int, bases: dict[int, StreamBasis]) ->
     )
     if level in bases:
         own = bases[level]
-        head.bits, head.rank, head.base = BASIS_BITS, len(own.steps), own.base
-        head.basis = streams.encode_temporal(own.steps[own.known :], BASIS_BITS)
+        head.bits, head.rank, head.base = own.stored.bits, len(own.stored.rows), own.base
+        head.basis = own.stored.stream(own.known)
     return head
 
 

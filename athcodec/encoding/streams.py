@@ -145,6 +145,21 @@ def encode_temporal(steps: np.ndarray, bits: int) -> bytes:
     )
 
 
+def encode_basis(exponents: np.ndarray, integers: np.ndarray) -> bytes:
+    """Rows of a learned temporal basis in waves: half octaves of their steps, (rows,) int32, and integers,
+    (rows, frames) int32."""
+    rank, frames = integers.shape
+    padded = np.concatenate([integers, np.zeros((-rank % 3, frames), np.int32)])
+    return encode_stream(
+        "ath_encode_basis",
+        1024 + 8 * integers.size,
+        rank,
+        frames,
+        address(exponents, np.int32, rank),
+        address(padded, np.int32, padded.size),
+    )
+
+
 def encode_learned_modes(plan: Plan, learned_modes: LearnedModes | None) -> dict[int, bytes]:
     """Learned learned_modes by level; nothing where there are none."""
     if learned_modes is None:

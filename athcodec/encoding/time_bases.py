@@ -1,22 +1,24 @@
 """Time bases learned from the tracks of a segment, which take the place of waves.
 
 The principal components over time of a level's tracks (Lengyel 1999) represent it in fewer rows than waves, at the
-price of storing them. FORMAT.md, "Temporal basis stream".
+price of storing them. FORMAT.md, "Temporal basis stream" and "Basis in waves".
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from functools import cached_property
+
 import numpy as np
 
 from athcodec._native import address, lib
+from athcodec.encoding import streams
 
-BASIS_BITS = 14  # of stored integers
+BASIS_BITS = 14  # of stored entries
+BASIS_IN_WAVES = 2  # in the place of their number
+PRECISION = 0.7  # step of a row's integers, over that by which they err as much as those of all tracks in the row
+LEAST_STEP, MOST_STEP = -200, 0  # half octaves
 TOLERANCE = 5e-4  # mean square, in steps, that a basis may leave out
-
-
-def basis_rows(steps: np.ndarray) -> np.ndarray:
-    """The rows over time that stored integers mean, (rank, frames) float64."""
-    return steps.astype(np.float64) * 2.0 ** -(BASIS_BITS - 1)
 
 
 def principal(moments: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -28,24 +30,91 @@ def principal(moments: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return values, vectors
 
 
+@dataclass(frozen=True)
+class Entries:
+    """Rows of a learned basis as integers of BASIS_BITS bits, (rank, frames) int32."""
+
+    bits = BASIS_BITS
+    integers: np.ndarray
+
+    @cached_property
+    def rows(self) -> np.ndarray:
+        """(rank, frames) float64, as a decoder has them."""
+        return self.integers.astype(np.float64) * 2.0 ** -(BASIS_BITS - 1)
+
+    def stream(self, known: int = 0) -> bytes:
+        """Of all rows but the `known` first."""
+        return streams.encode_temporal(self.integers[known:], BASIS_BITS)
+
+
+@dataclass(frozen=True)
+class InWaves:
+    """The same by waves, (frames, frames): integers, (rank, frames) int32, of steps in half octaves, (rank,) int32."""
+
+    bits = BASIS_IN_WAVES
+    waves: np.ndarray
+    exponents: np.ndarray
+    integers: np.ndarray
+
+    @cached_property
+    def rows(self) -> np.ndarray:
+        """(rank, frames) float64, as a decoder has them."""
+        rows = np.empty(self.integers.shape)
+        rank, frames = rows.shape
+        lib.ath_add_basis_rows(
+            self.waves.ctypes.data,
+            frames,
+            0,
+            rank,
+            address(self.exponents, np.int32, rank),
+            address(self.integers, np.int32, rows.size),
+            rows.ctypes.data,
+        )
+        return rows
+
+    def stream(self, known: int = 0) -> bytes:
+        """Of all rows but the `known` first."""
+        return streams.encode_basis(self.exponents[known:], self.integers[known:])
+
+
 class TimeComponents:
     """Principal components over time, in descending order, of `count` tracks.
 
-    moments: (frames, frames), their second moments in units of their steps.
+    moments: (frames, frames), their second moments in units of their steps; waves: (frames, frames), those of the clip.
     """
 
-    def __init__(self, moments: np.ndarray, count: int):
+    def __init__(self, moments: np.ndarray, count: int, waves: np.ndarray):
         values, vectors = principal(moments[None])
-        self._left_out = np.cumsum(np.maximum(values[0, ::-1], 0.0))  # by leaving out the last i + 1
-        self._rows = vectors[0]
+        self._energies = np.maximum(values[0], 0.0)
+        self._left_out = np.cumsum(self._energies[::-1])  # by leaving out the last i + 1
+        self._rows, self._waves = vectors[0], waves
         self._count = count
 
-    def basis(self, ratio: float = 1.0) -> np.ndarray | None:
-        """The rows that tracks in steps `ratio` times as large need, (rank, frames) int32 as stored, or None where no
-        basis smaller than the DCT's would do."""
+    def basis(self, ratio: float = 1.0, precision: float = 1.0) -> Entries | InWaves | None:
+        """The rows that tracks in steps `ratio` times as large need, or None where no basis smaller than waves would
+        do; precision: how many times as large the steps are that they are precise enough for."""
+        rank = self._rank(ratio)
+        if self._count <= 1 or not 1 <= rank <= len(self._rows) // 2:
+            return None
+        return self._in_waves(rank, precision) if self._suits_waves else self._entries(rank)
+
+    def _rank(self, ratio: float) -> int:
         frames = len(self._rows)
         allowed = TOLERANCE * ratio**2 * self._count * frames
-        rank = frames - int(np.searchsorted(self._left_out, allowed, side="right"))
-        if self._count <= 1 or not 1 <= rank <= frames // 2:
-            return None
-        return np.rint(self._rows[:rank] * 2.0 ** (BASIS_BITS - 1)).astype(np.int32)
+        return frames - int(np.searchsorted(self._left_out, allowed, side="right"))
+
+    @cached_property
+    def _suits_waves(self) -> bool:
+        """Whether the rows are smaller so."""
+        rank = max(self._rank(1.0), 1)
+        return len(self._in_waves(rank, 1.0).stream()) < len(self._entries(rank).stream())
+
+    def _entries(self, rank: int) -> Entries:
+        return Entries(np.rint(self._rows[:rank] * 2.0 ** (BASIS_BITS - 1)).astype(np.int32))
+
+    def _in_waves(self, rank: int, precision: float) -> InWaves:
+        step = PRECISION * precision / np.sqrt(np.maximum(self._energies[:rank], 1e-30))
+        exponents = np.clip(np.floor(2.0 * np.log2(step)), LEAST_STEP, MOST_STEP).astype(np.int32)
+        parts = np.einsum("rt,kt->rk", self._rows[:rank], self._waves)  # without NumPy's threads
+        integers = np.clip(np.rint(parts / np.exp2(exponents[:, None] / 2.0)), -(2**30), 2**30)
+        return InWaves(self._waves, exponents, integers.astype(np.int32))

@@ -1,0 +1,116 @@
+"""Learned bases over time: precise where their tracks are large, shared by the levels of a layer, worth their bytes."""
+
+from __future__ import annotations
+
+import io
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import athcodec
+from athcodec.container import STEMS
+from athcodec.encoding.motion import waves_over_time
+from athcodec.encoding.search import Search
+from athcodec.encoding.time_bases import BASIS_IN_WAVES, InWaves, TimeComponents
+from bench.odd.bending import FPS, Bones, clip_of, gusty
+from bench.trees.plant import grow
+from spec import reference_decoder as rd
+
+FRAMES = 96
+
+
+def tracks(rng: np.random.Generator, count: int, rank: int) -> np.ndarray:
+    """(count, FRAMES) of smooth rows, each ten times as quiet as the one before."""
+    time = np.linspace(0, 1, FRAMES)
+    rows = [np.sin((3 + 2 * r) * time + r) * np.exp(-(((time - 0.5) * 4) ** 2)) for r in range(rank)]
+    return rng.normal(size=(count, rank)) * 1000 * 0.1 ** np.arange(rank) @ rows
+
+
+def components(data: np.ndarray) -> TimeComponents:
+    return TimeComponents(data.T @ data, len(data), waves_over_time(FRAMES))
+
+
+def hit_by_a_gust(seed: int = 5, frames: int = 90) -> athcodec.MotionClip:
+    """A calm shrub that bends once."""
+    bones, rng = Bones.of(grow(300, 2, 8.0, seed)), np.random.default_rng(seed)
+    time, stems = np.arange(frames) / FPS, len(bones.branch_parent)
+    late, strength = rng.uniform(0, 0.5, stems), rng.uniform(0.25, 0.75, stems)
+    hit = strength * np.exp(-(((time[:, None] - 2 - late) / 0.35) ** 2))
+    turns = gusty(time, stems, 0.01, 0.0, rng) + hit[..., None] * np.sqrt([0.5, 0, 0.5])
+    return clip_of(bones, bones.bent(turns))
+
+
+def stems_heads(data: bytes) -> list[tuple[int, int, int]]:
+    """Basis_Bits, Basis_Level and Basis_Length of each level with STEMS, of files of one segment and layer."""
+    file = rd.AthFile(data)
+    own = [file.content(STEMS, chunk.level) for chunk in file.chunks if chunk.kind == STEMS]
+    return [(chunk[5], chunk[8], int.from_bytes(chunk[9:13], "little")) for chunk in own]
+
+
+def assert_same_as_reference(data: bytes) -> None:
+    reference = rd.AthFile(data)
+    with athcodec.open(io.BytesIO(data)) as decoder:
+        for level in range(decoder.level_count):
+            assert np.array_equal(
+                reference.positions(level), decoder.play(decoder.clips[0].name).positions(level=level)
+            )
+
+
+@pytest.mark.parametrize("rank", [1, 2, 3, 4, 7])
+def test_rows_in_waves_are_orthonormal_and_those_of_the_reference_decoder(rank):
+    waves, rng = waves_over_time(FRAMES), np.random.default_rng(rank)
+    integers = rng.integers(-300, 300, (rank, FRAMES)).astype(np.int32)
+    stored = InWaves(waves, rng.integers(-20, 0, rank).astype(np.int32), integers)
+    assert abs(stored.rows @ stored.rows.T - np.eye(rank)).max() < 1e-5
+    nothing = np.empty((0, FRAMES))
+    assert rd.decode_basis(stored.stream(), nothing, rank, FRAMES, waves).tobytes() == stored.rows.tobytes()
+    known = stored.rows[: rank // 2]
+    assert rd.decode_basis(stored.stream(rank // 2), known, rank, FRAMES, waves).tobytes() == stored.rows.tobytes()
+
+
+def test_a_basis_leaves_less_of_its_tracks_than_their_steps_do():
+    data = tracks(np.random.default_rng(1), 500, 4)
+    stored = components(data).basis()
+    assert isinstance(stored, InWaves) and len(stored.rows) <= 4
+    left = data - data @ stored.rows.T @ stored.rows
+    assert np.sqrt((left**2).mean()) < 0.25
+
+
+def test_a_basis_of_sudden_motion_is_stored_by_its_entries():
+    data = np.outer(np.arange(1.0, 400.0), np.arange(FRAMES) // 20 % 2)
+    assert not isinstance(components(data).basis(), InWaves)
+
+
+def test_levels_share_a_basis_that_lies_with_the_first_of_them(tmp_path):
+    path, clip = tmp_path / "gust.ath", hit_by_a_gust()
+    summary = athcodec.encode(clip, path, rel_error=1e-3, ladder="none", attributes="none")
+    assert summary.choices["common_basis"]
+    (_, base, length), *others = stems_heads(path.read_bytes())
+    assert base == 255 and length > 0 and others
+    assert all((own[0], own[2]) == (BASIS_IN_WAVES, 0) and own[1] < 255 for own in others)
+    with athcodec.open(path) as decoder:
+        errors = np.linalg.norm(decoder.play(decoder.clips[0].name).positions() - clip.positions, axis=2)
+    assert errors.max() <= summary.max_error_bound
+    assert_same_as_reference(path.read_bytes())
+
+
+def test_a_shared_basis_makes_files_smaller(tmp_path, monkeypatch):
+    clip, options = hit_by_a_gust(), {"rel_error": 1e-3, "ladder": "none", "attributes": "none"}
+    shared = athcodec.encode(clip, tmp_path / "shared.ath", **options).bytes
+
+    def unlearned(search, settings):
+        return replace(settings, learned_bases=(False,) * search.levels)
+
+    monkeypatch.setattr(Search, "_with_learned_bases", unlearned)
+    assert shared < 0.9 * athcodec.encode(clip, tmp_path / "waves.ath", **options).bytes
+
+
+def test_layers_in_learned_bases_are_decoded_as_the_reference_decoder_does(tmp_path, monkeypatch):
+    def learned(search, settings):
+        return replace(settings, learned_bases=(True,) * search.levels)
+
+    monkeypatch.setattr(Search, "_with_learned_bases", learned)
+    path = tmp_path / "layers.ath"
+    athcodec.encode(hit_by_a_gust(), path, rel_error=1e-4, attributes="none", ladder=(1e-2, 1e-3))
+    assert_same_as_reference(path.read_bytes())
