@@ -153,6 +153,8 @@ static void decode(const char *path, const char *mesh_path)
 {
     contents data = read_all(path), mesh = {NULL, 0};
     if (mesh_path) mesh = read_all(mesh_path);
+    if (is_big_endian())
+        for (size_t i = 0; i + 4 <= mesh.size; i += 4) turn_bytes(mesh.bytes + i, 4);
     printf("%s", path);
     ath_file *file = opened(data, mesh_path ? &mesh : NULL);
     ath_info info;
