@@ -256,9 +256,13 @@ class SegmentMotion:
             self.known = self._known(before)
         self.coarse = None
         if layered:
-            self.placed = np.zeros((plan.vertex_count, 3, frames))
-            self.placed_tracks = np.zeros(self.tracks.shape)
-            self.placed_frames = np.zeros((core.piece_count, 12, frames))  # those of rigid pieces are touched
+            if before is None:
+                self.placed = np.zeros((plan.vertex_count, 3, frames))
+                self.placed_tracks = np.zeros(self.tracks.shape)
+                self.placed_frames = np.zeros((core.piece_count, 12, frames))  # those of rigid pieces are touched
+            else:  # piece by piece, each read before it is replaced
+                self.placed, self.placed_tracks = before.placed, before.placed_tracks
+                self.placed_frames = before.placed_frames
             self.extents = np.zeros((core.piece_count, 2), np.int32)
             self.turn_steps = np.full((core.piece_count, 3), -1.0)
             self.coarse = Coarse(
