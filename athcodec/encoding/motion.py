@@ -41,6 +41,7 @@ if TYPE_CHECKING:
     from athcodec.encoding.learned_modes import LearnedModes
 
 RANGES, LEAST_RANGE = 24, 1024  # of a plant's vertices per thread and call
+RUN, RUNS = 64, 2  # vertices of a run, and how many runs there are for each in a sample
 
 
 class Waves(IntEnum):  # core/plan.h
@@ -163,6 +164,15 @@ class Plan:
         bounds = np.unique(share, return_index=True)[1].tolist()
         return list(zip(bounds, [*bounds[1:], len(self.nodes)]))
 
+    @cached_property
+    def sample(self) -> PlanSample:
+        """Of the pieces in short runs all along the plant."""
+        pieces = self.pieces[self.pieces["first"] // RUN % RUNS == 0]
+        first, count = np.cumsum(pieces["count"]) - pieces["count"], pieces["count"]
+        vertices = np.arange(count.sum()) + np.repeat(pieces["first"] - first, count)
+        pieces["first"] = first
+        return PlanSample(vertices, pieces, self.pool)
+
     @property
     def base_level(self) -> np.ndarray:
         """Per piece the level whose stream holds its tracks and first modes, (P,)."""
@@ -208,6 +218,20 @@ class Plan:
     def exact_branches(self, level: int) -> np.ndarray:
         """Branches whose stems are exact at `level`."""
         return np.unique(self.pieces["branch"][self.pieces["level"] <= level])
+
+
+@dataclass(frozen=True)
+class PlanSample:
+    """Some pieces of a plan, whose vertices follow each other, and the places of these in the plan."""
+
+    vertices: np.ndarray
+    pieces: np.ndarray
+    pool: ThreadPool
+
+    @property
+    def is_rigid(self) -> np.ndarray:
+        """As Plan has it."""
+        return self.pieces["flags"] & RIGID > 0
 
 
 @dataclass
