@@ -543,6 +543,7 @@ class EncodingJob:
 
     def _motion(self, decided: _Decided, index: int, block: np.ndarray) -> CodedMotion:
         positions, exact = self._positions(block)
+        del block  # which nobody else holds
         layers = decided.layers.of_segment(decided.source.is_whole_loop(index))
         goes_on = decided.source.goes_on(index)
         return CodedMotion(decided.prelude, layers, self.segment_count, positions, exact, goes_on)

@@ -42,6 +42,7 @@ if TYPE_CHECKING:
 
 STEM_ROOT, NODE_ROOT = -1, -2  # core/motion.h: of streams in waves that are not learned, of stems and of nodes
 RANGES, LEAST_RANGE = 24, 1024  # of a plant's vertices per thread and call
+RUN, RUNS = 64, 2  # vertices of a run, and how many runs there are for each in a sample
 
 
 class Waves(IntEnum):  # core/plan.h
@@ -164,6 +165,15 @@ class Plan:
         bounds = np.unique(share, return_index=True)[1].tolist()
         return list(zip(bounds, [*bounds[1:], len(self.nodes)]))
 
+    @cached_property
+    def sample(self) -> PlanSample:
+        """Of the pieces in short runs all along the plant."""
+        pieces = self.pieces[self.pieces["first"] // RUN % RUNS == 0]
+        first, count = np.cumsum(pieces["count"]) - pieces["count"], pieces["count"]
+        vertices = np.arange(count.sum()) + np.repeat(pieces["first"] - first, count)
+        pieces["first"] = first
+        return PlanSample(vertices, pieces, self.pool)
+
     @property
     def base_level(self) -> np.ndarray:
         """Per piece the level whose stream holds its tracks and first modes, (P,)."""
@@ -209,6 +219,20 @@ class Plan:
     def exact_branches(self, level: int) -> np.ndarray:
         """Branches whose stems are exact at `level`."""
         return np.unique(self.pieces["branch"][self.pieces["level"] <= level])
+
+
+@dataclass(frozen=True)
+class PlanSample:
+    """Some pieces of a plan, whose vertices follow each other, and the places of these in the plan."""
+
+    vertices: np.ndarray
+    pieces: np.ndarray
+    pool: ThreadPool
+
+    @property
+    def is_rigid(self) -> np.ndarray:
+        """As Plan has it."""
+        return self.pieces["flags"] & RIGID > 0
 
 
 @dataclass
@@ -257,9 +281,13 @@ class SegmentMotion:
             self.known = self._known(before)
         self.coarse = None
         if layered:
-            self.placed = np.zeros((plan.vertex_count, 3, frames))
-            self.placed_tracks = np.zeros(self.tracks.shape)
-            self.placed_frames = np.zeros((core.piece_count, 12, frames))  # those of rigid pieces are touched
+            if before is None:
+                self.placed = np.zeros((plan.vertex_count, 3, frames))
+                self.placed_tracks = np.zeros(self.tracks.shape)
+                self.placed_frames = np.zeros((core.piece_count, 12, frames))  # those of rigid pieces are touched
+            else:  # piece by piece, each read before it is replaced
+                self.placed, self.placed_tracks = before.placed, before.placed_tracks
+                self.placed_frames = before.placed_frames
             self.extents = np.zeros((core.piece_count, 2), np.int32)
             self.turn_steps = np.full((core.piece_count, 3), -1.0)
             self.coarse = Coarse(

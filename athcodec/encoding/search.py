@@ -555,9 +555,9 @@ class Search:
         levels, heads = np.zeros(self.levels), np.zeros(self.levels)
         for level, data in coded.stems.items():
             levels[level], heads[level] = len(data), coded.heads[level]
-        corrections = coded.corrections
-        if corrections.chunk:
-            levels += len(corrections.chunk) * self._corrected(prelude.plan, corrections.rows)
+        corrections = len(coded.corrections.chunk) / coded.sample_share
+        if corrections:
+            levels += corrections * self._corrected(prelude.plan, coded.corrected)
         levels += (levels - heads) * (self.extrapolation.rows - 1)
         return levels * sample.scale
 
@@ -660,10 +660,10 @@ class Search:
         price = estimated_bits(learned_modes.integers, owners, len(learned_modes.counts))
         return [(learned_modes.counts > 0) & ((tracks + price) * saving < modes) for saving in required_savings]
 
-    def _corrected(self, plan: Plan, corrections: np.ndarray) -> np.ndarray:
-        """Fractions of the corrections that fall on the pieces of each level."""
+    def _corrected(self, plan: Plan, corrected: np.ndarray) -> np.ndarray:
+        """Fractions of the corrections, of such vertices, that fall on the pieces of each level."""
         level_of_vertex = np.repeat(plan.base_level, plan.pieces["count"])
-        counts = np.bincount(level_of_vertex[corrections[:, 0]], minlength=self.levels)
+        counts = np.bincount(level_of_vertex[corrected], minlength=self.levels)
         return counts / counts.sum()
 
     def _costs(self, candidates: list[Settings]) -> list[tuple[float, np.ndarray]]:
@@ -812,7 +812,7 @@ class Search:
         number = len(self.samples) // 2
         modes, own = self.learned_modes(plan, settings), settings.of_segment(self.samples[number].whole_loop)
         coded = code_stems(self.prelude(settings), own, self.sample, modes, self._bases(settings, number))
-        return of_small[coded.corrections.rows[:, 0]].sum() / (of_small.sum() * self.sample.shape[2])
+        return of_small[coded.corrected].sum() / (max(1, of_small[coded.sample].sum()) * self.sample.shape[2])
 
     def _with_finer_steps(self, settings: Settings) -> Settings:
         return self._walk_steps(settings, 1.04, 1.12)

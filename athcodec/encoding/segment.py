@@ -20,7 +20,7 @@ from athcodec.encoding import quantise as qz
 from athcodec.encoding import streams
 from athcodec.encoding.features import Feature
 from athcodec.encoding.learned_modes import LearnedModes
-from athcodec.encoding.motion import NODE_ROOT, STEM_ROOT, LevelStream, Plan, SegmentMotion, gather
+from athcodec.encoding.motion import NODE_ROOT, STEM_ROOT, LevelStream, Plan, PlanSample, SegmentMotion, gather
 from athcodec.encoding.polygons import Mesh
 from athcodec.encoding.rigid import TURN
 from athcodec.encoding.shape import RestPrecision
@@ -37,6 +37,7 @@ ROWS_AT_ONCE = 1 << 14  # of coefficients
 WORK_BYTES = 1 << 30  # of the segments coded at once, where `jobs` does not say how many these are
 COPIES_BENDS = 0.0, 0.15  # of copies of one shape that are tried
 CONNECTED_SHARE = 0.8  # of a rest pose at once, that one by faces may take where layers refine it
+SAMPLED = 1500  # vertices from which on trials correct a sample
 SEGMENT_WORK = 16  # memory of a segment while it is coded, over its float32 positions
 
 
@@ -626,16 +627,23 @@ class Corrections:
 
 @dataclass
 class Coded:
-    """The stems of one segment: integers, streams by level, and corrections."""
+    """The stems of one segment: integers, streams by level, and corrections of a sample of its vertices."""
 
     segment: SegmentMotion
     stems: dict[int, bytes]
     corrections: Corrections
+    sample: np.ndarray  # (n,) vertices, in whose numbers the corrections are
     heads: dict[int, int]  # bytes of each stream that are the same for few pieces and for many: its time basis
 
     @property
-    def bytes(self) -> int:
-        return sum(map(len, self.stems.values())) + len(self.corrections.chunk)
+    def corrected(self) -> np.ndarray:
+        """(K,) the vertex of each correction."""
+        return self.sample[self.corrections.rows[:, 0]]
+
+    @property
+    def sample_share(self) -> float:
+        """Of the vertices."""
+        return len(self.sample) / self.segment.plan.vertex_count
 
 
 def analyse(
@@ -699,7 +707,7 @@ def find_corrections(
     positions: np.ndarray,
     origin: np.ndarray,
     settings: Settings,
-    plan: Plan,
+    plan: Plan | PlanSample,
     keeps_all: bool = True,
     ends: streams.MetEnds = streams.FREE_ENDS,
 ) -> Corrections:
@@ -729,10 +737,17 @@ def code_stems(
     learned_modes: LearnedModes | None,
     bases: dict[int, StreamBasis] | None = None,
 ) -> Coded:
-    """Streams of the stems of a single layer and the corrections that keep the limit. bases: None: to be learned."""
+    """Streams of the stems of a single layer and the corrections that keep the limit, of a sample where there are many
+    vertices. bases: None: to be learned."""
     if bases is None:
         bases = learned_bases(prelude.plan, settings, positions)
     segment, decoded = analyse(prelude.plan, prelude.output, settings, positions, learned_modes, bases)
     stems, heads = stem_streams(segment, settings, bases)
-    corrections = find_corrections(decoded, positions, prelude.origin, settings, prelude.plan)
-    return Coded(segment, stems, corrections, heads)
+    some = prelude.plan.sample if prelude.plan.vertex_count >= SAMPLED else None
+    if some is None:
+        corrections = find_corrections(decoded, positions, prelude.origin, settings, prelude.plan)
+        return Coded(segment, stems, corrections, np.arange(len(decoded)), heads)
+    at, limit = some.vertices, settings.limit
+    own = replace(settings, limit=limit if np.isscalar(limit) else limit[at])
+    corrections = find_corrections(decoded[at], positions[at], prelude.origin, own, some)
+    return Coded(segment, stems, corrections, at, heads)

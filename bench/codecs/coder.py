@@ -31,6 +31,7 @@ from athcodec.encoding import quantise, streams
 from athcodec.hierarchy import Hierarchy
 
 CORE = Path(__file__).resolve().parents[2] / "athcodec" / "core"
+CORE_SOURCES = [CORE / name for name in ("basis.c", "motion.c")]
 LARGEST = 1 << 30
 LOW_BITS = 24
 
@@ -65,7 +66,7 @@ def library(writes: bool) -> ctypes.CDLL:
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
     file = folder / ("writer.so" if writes else "reader.so")
     options = ["-shared", "-fPIC", *(["-DATH_ENCODING"] if writes else [])]
-    compile_c(file, [Path(__file__).with_name("coder.c")], *options)
+    compile_c(file, [Path(__file__).with_name("coder.c"), *CORE_SOURCES], *options)
     loaded = ctypes.CDLL(str(file))
     arguments = {
         "bench_rows": [c_int32] * 3 + [c_void_p],
@@ -74,6 +75,7 @@ def library(writes: bool) -> ctypes.CDLL:
     }
     if not writes:
         arguments["bench_corrections"] = [c_int32, c_int32, c_double, c_int32, c_void_p]
+        arguments["bench_pose"] = [c_void_p, c_int32, c_double, c_int32, c_void_p]
     for name, rest in arguments.items():
         function = getattr(loaded, name)
         function.restype, function.argtypes = c_int64, [c_void_p, c_int64, *rest]
@@ -257,6 +259,14 @@ def read_varint(data: bytes, at: int) -> tuple[int, int]:
 # ---- parts of an encoding ----
 
 
+def core_branches(hierarchy: Hierarchy) -> np.ndarray:
+    branches = np.zeros(hierarchy.branch_count, BRANCH)
+    branches["parent"], branches["count"] = hierarchy.branch_parent, hierarchy.stem_count
+    branches["attach"], branches["first"] = hierarchy.attach, hierarchy.first_vertex
+    branches["subtree"], branches["depth"] = hierarchy.subtree_branches, hierarchy.branch_depth
+    return branches
+
+
 class Writer:
     """Parts of an encoding, in the order in which they are read. Each method returns what a reader will get."""
 
@@ -275,7 +285,7 @@ class Writer:
 
     def echo(self) -> Echo:
         """A reader of the written values, without decoding."""
-        return Echo(self.values)
+        return Echo(self.coder, self.values)
 
     def count(self, value: int) -> int:
         return self._add(varint(value), value)
@@ -315,10 +325,21 @@ class Writer:
         """Bits, one per byte, packed and not compressed."""
         return self._add(varint(len(bits)) + np.packbits(bits).tobytes(), bits)
 
+    def pose(self, branches: np.ndarray, lags: Sequence[np.ndarray], step: float, pose: np.ndarray) -> np.ndarray:
+        """(N, 3) as athcodec codes a rest pose, by the best of several lags of the branches."""
+        coded = []
+        for adaptive, own in ((adaptive, own) for own in lags for adaptive in (False, True)):
+            branches["lag"] = own
+            rest = streams.encode_rest(branches, step, pose, adaptive=adaptive)
+            table = Writer(self.coder)
+            table.count(int(adaptive))
+            table.table(own[None])
+            coded.append((table.data(), rest))
+        head, rest = min(coded, key=lambda some: len(some[0]) + len(some[1].stream))
+        return self._add(head + varint(len(rest.stream)) + rest.stream, rest.decoded)
+
     def hierarchy(self, hierarchy: Hierarchy) -> Hierarchy:
-        branches = np.zeros(hierarchy.branch_count, BRANCH)
-        branches["parent"], branches["count"] = hierarchy.branch_parent, hierarchy.stem_count
-        branches["attach"] = hierarchy.attach
+        branches = core_branches(hierarchy)
         stream = streams.encode_hierarchy(branches, hierarchy.branch_source, hierarchy.vertex_source)
         head = varint(hierarchy.branch_count) + varint(hierarchy.vertex_count) + varint(len(stream))
         return self._add(head + stream, hierarchy)
@@ -327,13 +348,16 @@ class Writer:
 class Echo:
     """The values of a Writer, one after the other."""
 
-    def __init__(self, values: list[object]):
-        self._values = iter(values)
+    def __init__(self, coder: EntropyCoder, values: list[object]):
+        self.coder, self._values = coder, iter(values)
 
     def _next(self):
         return next(self._values)
 
     count = single = rows = table = bits = hierarchy = _next
+
+    def pose(self, branches: np.ndarray, step: float) -> np.ndarray:
+        return self._next()
 
 
 class Reader:
@@ -373,6 +397,13 @@ class Reader:
     def bits(self) -> np.ndarray:
         count = self.count()
         return np.unpackbits(np.frombuffer(self.take(-(-count // 8)), np.uint8), count=count)
+
+    def pose(self, branches: np.ndarray, step: float) -> np.ndarray:
+        """Sets the lags of the branches."""
+        adaptive, branches["lag"] = self.count(), self.table()[0]
+        pose, stream = np.zeros((int(branches["count"].sum()), 3)), self.take(self.count())
+        _read("bench_pose", stream, branches.ctypes.data, len(branches), step, adaptive, pose.ctypes.data)
+        return pose
 
     def hierarchy(self) -> Hierarchy:
         branch_count, vertex_count = self.count(), self.count()

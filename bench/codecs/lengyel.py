@@ -3,7 +3,7 @@
 Lengyel, "Compression of time-dependent geometry", I3D 1999: vertices are grouped, each
 group is moved by an affine or rigid map per frame, and the residuals are coded. Here parts are the stems of
 the branches, or whole subtrees below some depth, in place of his greedy clustering; the maps' tracks go
-through a transform in time (cosines or a learned basis), and the residuals through PCA (pca.py), both better
+through a transform in time (athcodec's waves or a learned basis), and the residuals through PCA (pca.py), both better
 than what the paper has. Maps are fitted in the space of their own part (affine: orthonormal functions of the
 coded pose; rigid: a turn about the part's centre), and quantised before the residual is taken. The residual
 stays in world space.
@@ -13,11 +13,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from athcodec.encoding.motion import waves_over_time
 from athcodec.hierarchy import Hierarchy
 from bench.codecs import Source
 from bench.codecs.baseline import Baseline, Choice, Ladder, Settings, Split, quantised
 from bench.codecs.coder import Reader, Writer
-from bench.codecs.pca import GRID, Trajectories, cosines, grid_of, principal, read_group, write_group
+from bench.codecs.pca import GRID, Trajectories, grid_of, principal, read_group, write_group
 from bench.codecs.tree import VertexOrder, memo, ordered, read_order, read_pose, vertex_order, write_order, write_pose
 
 LEAST_EXTENT = 1e-3  # of the part's largest; flatter directions are not stretched
@@ -85,7 +86,7 @@ class Lengyel(Baseline):
 
 
 def _write_tracks(writer: Writer, exact: np.ndarray, step: float, settings: Settings) -> np.ndarray:
-    """Tracks (parts, k, 3, T) by cosines or by a learned basis in time; returns what a reader will decode."""
+    """Tracks (parts, k, 3, T) by athcodec's waves or by a learned basis in time; returns what a reader will decode."""
     parts, count, _, frames = exact.shape
     writer.count(count)
     if writer.count(settings["learned"]):
@@ -101,16 +102,16 @@ def _write_tracks(writer: Writer, exact: np.ndarray, step: float, settings: Sett
             trajectories,
         )
         return tracks.reshape(exact.shape)
-    waves = quantised(exact @ cosines(frames).T / step, settings["dead_zone"])
+    waves = quantised(exact @ waves_over_time(frames).T / step, settings["dead_zone"])
     writer.rows(waves.reshape(-1, 3, frames), count)
-    return (waves * step) @ cosines(frames)
+    return (waves * step) @ waves_over_time(frames)
 
 
 def _read_tracks(reader: Reader, parts: int, frames: int, step: float) -> np.ndarray:
     rows = parts * reader.count()
     if reader.count():
         return read_group(reader, VertexOrder(np.arange(rows)), step, Trajectories(False, frames))
-    return (reader.rows() * step) @ cosines(frames)
+    return (reader.rows() * step) @ waves_over_time(frames)
 
 
 def part_of_vertex(hierarchy: Hierarchy, depth: int) -> np.ndarray:

@@ -12,7 +12,7 @@
 Left out of all: removal of rigid motion (a plant is rooted), and meshes' connectivity (the order of vertices
 replaces it). The mean of each vertex is subtracted and coded. The larger of the two factors has a
 uniform step (uniform error in the positions); each component of the smaller one gets the precision that it needs. Basis
-vectors are coded as they are or by their cosine transform (for smooth ones), whichever is smaller. None of the papers
+vectors are coded as they are or by athcodec's waves (for smooth ones), whichever is smaller. None of the papers
 predicts coefficients from a neighbour's; here each component may be, by differences of the integers along the order of
 vertices, because that halves the sizes.
 """
@@ -20,10 +20,10 @@ vertices, because that halves the sizes.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
 
 import numpy as np
 
+from athcodec.encoding.motion import waves_over_time
 from bench.codecs import Source, blocks
 from bench.codecs.baseline import Baseline, Choice, Ladder, Settings, Split, quantised
 from bench.codecs.coder import Reader, Writer
@@ -61,15 +61,6 @@ def grid_of(names: str, **own: Ladder | Choice) -> dict[str, Ladder | Choice]:
 
 
 # ---- trajectories and bases ----
-
-
-@cache
-def cosines(frames: int) -> np.ndarray:
-    """(T, T) orthonormal rows."""
-    angles = np.pi / frames * np.outer(np.arange(frames), np.arange(frames) + 0.5)
-    basis = np.sqrt(2 / frames) * np.cos(angles)
-    basis[0] /= np.sqrt(2)
-    return basis
 
 
 @dataclass
@@ -135,10 +126,10 @@ def write_basis(
         writer.count(2)
         return _write_predicted(writer, tracks[:, 0], steps, lpc)
     plain = np.rint(tracks / steps[:, None, None])
-    waves = np.rint(tracks @ cosines(trajectories.frames).T / steps[:, None, None])
+    waves = np.rint(tracks @ waves_over_time(trajectories.frames).T / steps[:, None, None])
     kind = writer.count(int(np.log2(1 + np.abs(waves)).sum() < np.log2(1 + np.abs(plain)).sum()))
     writer.rows(_in_threes((plain, waves)[kind].reshape(-1, trajectories.frames)))
-    tracks = waves @ cosines(trajectories.frames) if kind else plain
+    tracks = waves @ waves_over_time(trajectories.frames) if kind else plain
     return (tracks * steps[:, None, None]).reshape(basis.shape)
 
 
@@ -151,7 +142,7 @@ def read_basis(reader: Reader, trajectories: Trajectories) -> np.ndarray:
     tracks = reader.rows().reshape(-1, trajectories.frames)[: width * len(steps)].astype(np.float64)
     tracks = tracks.reshape(len(steps), width, -1)
     if kind:
-        tracks = tracks @ cosines(trajectories.frames)
+        tracks = tracks @ waves_over_time(trajectories.frames)
     return (tracks * steps[:, None, None]).reshape(len(steps), -1)
 
 

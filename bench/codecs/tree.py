@@ -12,9 +12,11 @@ from functools import cached_property
 
 import numpy as np
 
+from athcodec._native import BRANCH
+from athcodec.encoding import quantise
 from athcodec.hierarchy import Hierarchy
 from bench.codecs import Source
-from bench.codecs.coder import Reader, Writer
+from bench.codecs.coder import RangeCoder, Reader, Writer, core_branches
 
 KEPT = 6  # cached values of each kind
 ORDERS = ("source", "hierarchy")
@@ -32,6 +34,15 @@ class VertexOrder:
 
     source: np.ndarray
     hierarchy: Hierarchy | None = None
+
+    @cached_property
+    def branches(self) -> np.ndarray:
+        """As the core has them; without a hierarchy one of all vertices."""
+        if self.hierarchy is not None:
+            return core_branches(self.hierarchy)
+        branches = np.zeros(1, BRANCH)
+        branches["parent"], branches["attach"], branches["count"], branches["subtree"] = -1, -1, len(self.source), 1
+        return branches
 
     @cached_property
     def before(self) -> np.ndarray:
@@ -132,8 +143,10 @@ def _shaped(mask: np.ndarray, like: np.ndarray) -> np.ndarray:
 
 
 def write_pose(writer: Writer, order: VertexOrder, pose: np.ndarray, step: float) -> np.ndarray:
-    """A static pose, (N, 3), at a step; returns what a reader will get."""
+    """A static pose, (N, 3), at a step, with the range coder as a rest pose of a file; returns what a reader will get."""
     step = writer.single(step)
+    if isinstance(writer.coder, RangeCoder):
+        return writer.pose(order.branches, _lags(order, pose, step), step, pose)
     q = np.rint(pose / step).astype(np.int64)
     costs = [np.log2(1 + np.abs(differences(q, order, degree))).sum() for degree in (0, 1, 2)]
     degree = writer.count(int(np.argmin(costs)))
@@ -142,5 +155,16 @@ def write_pose(writer: Writer, order: VertexOrder, pose: np.ndarray, step: float
 
 
 def read_pose(reader: Reader, order: VertexOrder) -> np.ndarray:
-    step, degree = reader.single(), reader.count()
+    step = reader.single()
+    if isinstance(reader.coder, RangeCoder):
+        return reader.pose(order.branches, step)
+    degree = reader.count()
     return sums(reader.table(), order, degree) * step
+
+
+def _lags(order: VertexOrder, pose: np.ndarray, step: float) -> list[np.ndarray]:
+    """Of all branches: beams, and what is best for the first branch of so many vertices."""
+    counts = order.branches["count"]
+    sizes, examples, kinds = np.unique(counts, return_index=True, return_inverse=True)
+    stems = (pose[order.branches["first"][b] :][:size] for size, b in zip(sizes, examples))
+    return [np.zeros_like(counts), np.array([quantise.rest_lag(stem, None, step) for stem in stems])[kinds]]
