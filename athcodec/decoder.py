@@ -294,7 +294,7 @@ class Decoder:
     def positions(
         self, frames: int | slice | None = None, level: int | None = None, dtype: npt.DTypeLike | None = None
     ) -> np.ndarray:
-        """Positions of all vertices in one or several frames.
+        """Positions of all vertices in one or several frames. Threads share the segments, where there are several.
 
         Parameters
         ----------

@@ -1,8 +1,9 @@
 """Time and memory of the decoder in C: whole files, levels, playing, seeking, many plants; compared with SZ3 and HDF5.
 
-One thread. The decoder is timed by decode.c, compiled here with the core's own sources and flags, so that no Python is
-in its loops. Runs of whole decoding alternate with SZ3 (pysz, where it is installed) and h5py, so that conditions are
-the same for all. The decoder's frames are compared with those of athcodec.open by their checksum.
+One thread, and two where Python decodes whole files. The decoder is timed by decode.c, compiled here with the core's
+own sources and flags, so that no Python is in its loops. Runs of whole decoding alternate with SZ3 (pysz, where it is
+installed) and h5py, so that conditions are the same for all. The decoder's frames are compared with those of
+athcodec.open by their checksum.
 """
 
 from __future__ import annotations
@@ -20,11 +21,13 @@ from itertools import product
 from pathlib import Path
 from statistics import median
 from typing import Any
+from unittest.mock import patch
 
 import h5py
 import numpy as np
 
 import athcodec
+from athcodec import ath_file
 from athcodec._native import crc32c
 from athcodec.metrics import ErrorMeter
 from bench.clips import add_ladder, add_rel_error
@@ -38,6 +41,7 @@ except ImportError:
     pysz = None
 
 ROUNDS, SEEKS, INSTANCES = 9, 1000, 1000
+THREADS = (1, 2)  # of Python's positions()
 TABLES = ("target", "whole", "levels", "onward", "memory", "instances")
 GZIP_CHUNK = 1 << 20
 SZ3_LAYOUTS = ("T,N,3", "N,T,3", "3,T,N", "3,N,T", "T,3N", "3N,T")
@@ -56,7 +60,8 @@ for playing (table Memory) over one segment's float32 positions.
 
 WHOLE_NOTE = """
 Readers alternate, {rounds} rounds; ratio: the reader's median over athcodec's. Each writes into memory that it has
-written before. The second athcodec row includes opening the file and building its bases, as the others do. SZ3 bounds
+written before, but for Python's rows, whose memory is new. The second athcodec row includes opening the file and
+building its bases, as the others do. Threads share segments: a clip of one segment takes one thread. SZ3 bounds
 values, not distances: its bound is bound/sqrt(3), and a distance reaches the bound only where all three axes do.
 It compresses positions or displacements from the rest pose (then without the rest pose, and without adding
 it again), in {layouts} layouts with {algorithms} algorithms: the configuration with the smallest file, and the
@@ -207,7 +212,7 @@ class _Reader:
 
 
 def _whole(case: Case, folder: Path, rounds: int) -> list[dict[str, Any]]:
-    others = [*_sz3_readers(case), _hdf5_reader(case, folder)]
+    others = [*(_python_reader(case, threads) for threads in THREADS), *_sz3_readers(case), _hdf5_reader(case, folder)]
     decode, opening, read = [], [], {other.name: [] for other in others}
     for number in range(rounds + 1):  # the first round is a warm-up
         ours = case.program("once")
@@ -225,7 +230,7 @@ def _whole(case: Case, folder: Path, rounds: int) -> list[dict[str, Any]]:
     for other in others:
         rows.append(_whole_row(case, other.name, read[other.name], decode, other.bytes, other.max_error))
     if pysz is None:
-        rows.insert(2, {"reader": "SZ3: not installed (pip install pysz)"})
+        rows.insert(2 + len(THREADS), {"reader": "SZ3: not installed (pip install pysz)"})
     return rows
 
 
@@ -243,6 +248,20 @@ def _whole_row(
         "bytes": size,
         "error/bound": max_error / case.bound,
     }
+
+
+def _python_reader(case: Case, threads: int) -> _Reader:
+    """athcodec.open and all positions, by so many threads."""
+
+    def read() -> float:
+        with patch.object(ath_file, "default_jobs", lambda: threads):
+            start = time.perf_counter()
+            with athcodec.open(case.file) as decoder:
+                decoder.positions()
+            return 1e3 * (time.perf_counter() - start)
+
+    name = f"athcodec in Python, opening included, {threads} thread{'s' if threads > 1 else ''}"
+    return _Reader(name, case.file.stat().st_size, case.max_error, read)
 
 
 def _hdf5_reader(case: Case, folder: Path) -> _Reader:

@@ -10,7 +10,10 @@ from files import Parts
 from plants import plant
 
 import athcodec
+from athcodec import ath_file, core_file
+from athcodec.container import Limits
 from athcodec.encoding import encoder, joins
+from athcodec.errors import BadChecksum, LimitExceeded
 from athcodec.joining import looped
 from athcodec.sources import read_hdf5, sample_path
 
@@ -156,6 +159,64 @@ def test_the_end_of_a_segment_is_part_of_what_the_next_one_needs(coded):
         stems = min(of_second)
         assert any(offset <= stems[0] < offset + size for offset, size in core.missing(level, 2))
         assert not any(offset <= stems[0] < offset + size for offset, size in core.missing_of(2, level))
+
+
+@pytest.fixture(scope="module")
+def many(tmp_path_factory) -> bytes:
+    """Of seven segments, joined."""
+    path = tmp_path_factory.mktemp("joins") / "many.ath"
+    with read_hdf5(sample_path()) as clip:
+        athcodec.encode(clip, path, rel_error=1e-3, segment_frames=18, effort="fast")
+    return path.read_bytes()
+
+
+@pytest.fixture
+def threads(monkeypatch):
+    return lambda count: monkeypatch.setattr(ath_file, "default_jobs", lambda: count)
+
+
+@pytest.mark.parametrize("count", [2, 3, 8])
+def test_threads_that_share_the_segments_show_what_one_does(count, many, threads):
+    with athcodec.open(io.BytesIO(many)) as decoder:
+        assert len(decoder.segments) == 7 and decoder.file.joins.any()
+        for level in (1, decoder.level_count - 1):
+            threads(1)
+            alone = decoder.positions(level=level)
+            threads(count)
+            assert np.array_equal(decoder.positions(level=level), alone)
+            assert np.array_equal(decoder.positions(slice(20, 111), level), alone[20:111])
+            assert np.array_equal(np.concatenate([block for _, block in decoder.blocks(level)]), alone)
+
+
+def test_threads_take_no_more_memory_than_is_allowed(many, threads, monkeypatch):
+    """What one segment takes, without what another is joined to, is enough for all of them."""
+    threads(3)
+    with athcodec.open(io.BytesIO(many)) as decoder:
+        core, level = decoder.file.core, decoder.level_count - 1
+        expected, needed = decoder.positions(), core.segment_size(level) + core.work_size()
+    sizes = []
+    own = core_file.Segment.__init__
+    monkeypatch.setattr(core_file.Segment, "__init__", lambda self, size: (sizes.append(size), own(self, size))[1])
+    with athcodec.open(io.BytesIO(many)) as decoder:
+        decoder.file.limits = Limits(memory_bytes=needed)
+        assert np.array_equal(decoder.positions(), expected)
+        assert len(sizes) == 1
+        decoder.file.limits = Limits(memory_bytes=needed - 1)
+        with pytest.raises(LimitExceeded, match="segments 0 to 6"):
+            decoder.positions()
+
+
+def test_damage_that_one_of_the_threads_meets_is_refused(many, threads):
+    threads(3)
+    data = bytearray(many)
+    with athcodec.open(io.BytesIO(many)) as decoder:
+        intact, level = decoder.positions(slice(0, 36)), decoder.level_count - 1
+        last = [chunk for chunk in decoder.file.chunks if chunk.segment == 5 and chunk.level == level][-1]
+    data[last.offset + last.length // 2] ^= 1
+    with athcodec.open(io.BytesIO(bytes(data))) as decoder:
+        with pytest.raises(BadChecksum, match="segment 5"):
+            decoder.positions()
+        assert np.array_equal(decoder.positions(slice(0, 36)), intact)
 
 
 def test_squared_lengths_of_vectors_that_move_follow_from_those_before():
