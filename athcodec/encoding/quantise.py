@@ -38,8 +38,8 @@ WEIGHT_PARTS = (0.0, 0.05, 0.2)  # of a level's vertices that may have weights b
 LEAST_END_WEIGHTS = (0.25, 2.5, 2.5)
 MOST_END_WEIGHTS = (10.0, 300.0, 50.0)
 END_WEIGHTS = (5.0, 1.0, 0.25)
-# Where segments meet and the velocity changes by less than STRAIGHT bounds in a usual frame, the motion that is left is far
-# calmer than the source, and every bend at an end is seen: rows end in straight lines there, in waves of that kind.
+# Where segments meet and the velocity changes by less than STRAIGHT bounds in a usual frame, the motion that is left is
+# far calmer than the source, and every bend at an end is seen: rows end in straight lines there, in waves of that kind.
 STRAIGHT, STRAIGHT_END_WEIGHTS = 0.05, (20.0, 600.0, 50.0)
 
 
