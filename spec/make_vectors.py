@@ -1170,6 +1170,11 @@ valid(
     "a learned basis of zeros, of no bytes but the stream's",
     lambda: moving([Stem(-1, 3)], 44, heads={0: stems_head(0.5, 1, 12, 2, basis_stream([[0] * 3] * 2, 12))}),
 )
+valid(
+    "node-waves",
+    "stems in the waves of maps beside those of stems: Basis_Bits 1",
+    lambda: moving(FORK, 45, heads={1: stems_head(0.5, 2, 1)}),
+)
 valid("shapes", "learned shapes at base levels and at the levels that complete a piece, in both segments", fork)
 valid(
     "shapes-high",
