@@ -75,6 +75,16 @@ def test_the_last_level_does_not_tick_where_segments_meet(coded, sample_position
     assert (near > 1).mean(axis=1).max() < 0.01 and near.max() < 1.5
 
 
+def test_at_loose_bounds_no_level_without_corrections_ticks_where_segments_meet(tmp_path):
+    path = tmp_path / "loose.ath"
+    with read_hdf5(sample_path()) as clip:
+        athcodec.encode(clip, path, rel_error=1e-2, segment_frames=SEGMENT, ladder="none")
+    with athcodec.open(path) as decoder:
+        seams = [start for start, _ in decoder.segments[1:]]
+        assert max(tick(decoder.positions(level=level), seams) for level in range(decoder.level_count - 1)) < 1.5
+    assert_the_same_however_one_comes_to_it(path.read_bytes())
+
+
 def test_a_loop_does_not_tick_where_it_begins_again(loop):
     with athcodec.open(io.BytesIO(loop)) as decoder, without_joins(loop) as bare:
         for level in range(3):

@@ -114,6 +114,14 @@ def test_learned_time_bases_have_the_same_bits(tmp_path):
     assert_same_bits(data)
 
 
+def test_coarse_layers_in_the_waves_of_maps_have_the_same_bits(sample_clip, tmp_path):
+    data = encoded(sample_clip, tmp_path, rel_error=1e-3, ladder=(1e-2,), segment_frames=40, effort="fast")
+    file = reference.AthFile(data)
+    kinds = {chunk.level: file.content(16, chunk.level, 0) for chunk in file.chunks if chunk.kind == 16}
+    assert kinds.pop(max(kinds))[7] == 0 and all(content[5] == 1 for content in kinds.values())
+    assert_same_bits(data)
+
+
 @pytest.mark.parametrize(
     "make, options",
     [

@@ -185,7 +185,7 @@ def best_join(end: End, positions: np.ndarray, source: np.ndarray, price: ErrorP
     slopes are joined too; 0: not at all. source: (N, 3, T) what is coded, in the coordinates of the positions; of those
     vertices that are `seen`."""
     own = _changes(positions)
-    usual = min(end.usual, _usual(own))
+    usual = 0.5 * (end.usual + _usual(own))  # of both: one alone may move in straight lines
     wanted = _changes(np.concatenate([end.source, source[:, :, : END_FRAMES + 1]], axis=2))
     wanted *= usual / max(_usual(_changes(source)), 1e-300)
     natural = np.maximum(np.concatenate([wanted, own[1:]]), usual)  # from the last frame before the seam on

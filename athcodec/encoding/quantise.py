@@ -39,11 +39,16 @@ WEIGHT_PARTS = (0.0, 0.05, 0.2)  # of a level's vertices that may have weights b
 LEAST_END_WEIGHTS = (0.25, 2.5, 2.5)
 MOST_END_WEIGHTS = (10.0, 300.0, 50.0)
 END_WEIGHTS = (5.0, 1.0, 0.25)
+# Where segments meet and the velocity changes by less than STRAIGHT bounds in a usual frame, the motion that is left is
+# far calmer than the source, and every bend at an end is seen: rows end in straight lines there, in waves of that kind.
+STRAIGHT, STRAIGHT_END_WEIGHTS = 0.05, (20.0, 600.0, 50.0)
 
 
 def end_weights(usual_change: float) -> tuple[float, ...]:
     """The weights for a change of velocity in a usual frame, over the bound; infinite where no segments meet."""
-    scale = max(usual_change, 1e-9) ** -2
+    if usual_change < STRAIGHT:
+        return STRAIGHT_END_WEIGHTS
+    scale = usual_change**-2
     return tuple(
         max(least, min(most, weight * scale))
         for least, most, weight in zip(LEAST_END_WEIGHTS, MOST_END_WEIGHTS, END_WEIGHTS)

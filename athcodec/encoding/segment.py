@@ -32,7 +32,6 @@ from athcodec.segmentation import split_segments
 from athcodec.threads import SERIAL, ThreadPool, default_jobs
 
 FINER = 32  # step over that of segments that bases and modes are learned from
-STRAIGHT = 0.05  # of the bound, what the velocity changes by in a frame of motion whose rows end in straight lines
 ROWS_AT_ONCE = 1 << 14  # of coefficients
 WORK_BYTES = 1 << 30  # of the segments coded at once, where `jobs` does not say how many these are
 COPIES_BENDS = 0.0, 0.15  # of copies of one shape that are tried
@@ -284,13 +283,17 @@ class Settings:
     @property
     def rounding(self) -> Rounding:
         """How numbers become integers."""
-        return Rounding(qz.DEAD_ZONE, qz.end_weights(self.usual_change / float(np.min(self.limit))))
+        return Rounding(qz.DEAD_ZONE, qz.end_weights(self._relative_change))
+
+    @property
+    def _relative_change(self) -> float:
+        """usual_change over the bound."""
+        return self.usual_change / float(np.min(self.limit))
 
     @property
     def is_straight(self) -> bool:
-        """Whether rows end in straight lines, as modes of a beam do, and not in parabolas: where segments meet and the
-        motion that is left is far calmer than the source, bends at ends are seen most."""
-        return self.usual_change < STRAIGHT * float(np.min(self.limit))
+        """Whether rows end in straight lines, as modes of a beam do, and not in parabolas."""
+        return self._relative_change < qz.STRAIGHT
 
     def step_of(self, level: int) -> float:
         """Of the stems of a level."""
