@@ -219,6 +219,11 @@ def usual_change(samples: Sequence[SegmentSample]) -> float:
     return float(np.sqrt(np.mean([(own**2).sum(axis=1).mean() for own in changes]))) if changes else np.inf
 
 
+def _in_waves(settings: Settings) -> Settings:
+    """The same without learned time bases."""
+    return replace(settings, learned_bases=(False,) * len(settings.learned_bases), common_basis=False)
+
+
 def _coarser(settings: Settings, ratio: int) -> Settings:
     """The same, so many times as coarse, as a first layer."""
     return replace(
@@ -354,7 +359,9 @@ class Search:
     @cached_property
     def best(self) -> Settings:
         """Settings of a file of one layer."""
-        steps = [] if self.effort == "fast" else [self._with_steps, self._with_calm_parts, self._with_rest_slack]
+        steps = [self._with_steps, self._with_calm_parts, self._with_rest_slack, self._with_waves_if_smaller]
+        if self.effort == "fast":
+            steps = []
         if self.effort == "best" and self.source.weights is None:
             steps += [self._with_rotations, self._with_learned_bases, self._with_finer_steps]
         return self._after([*steps, self._with_node_steps], self.at_first_step)
@@ -369,7 +376,7 @@ class Search:
         """Settings of a layer whose step is `ratio` times that of the given ones."""
         first, steps = replace(_coarser(settings, ratio), learned_pieces=None), [self._with_rotations]
         if not settings.turn_step:  # else its turns are as fine as those of refinements, which have that basis
-            first = replace(first, learned_bases=(False,) * self.levels)
+            first = _in_waves(first)
             steps.append(self._with_learned_bases)
         for step in (*steps, self._with_learned_modes):
             first = first if self.effort == "fast" else step(first)
@@ -626,8 +633,10 @@ class Search:
     def _with_learned_modes_for_all(self, settings: Settings) -> Settings:
         """Learned modes beside what was found without them, or in its place: on stems of few vertices they serve the
         motion that rotations and affine functions serve, which were chosen before learned modes were known."""
-        found = []
-        for start in self._in_each_basis(settings):
+        found, starts = [], self._in_each_basis(settings)
+        if any(settings.learned_bases):  # which were chosen before learned modes were known, too
+            starts.append(_in_waves(settings))
+        for start in starts:
             chosen = self._with_learned_modes(start)
             found.append((self.cost(chosen)[0], len(found), self.required_saving, chosen))
         _, _, self.required_saving, settings = min(found)
@@ -771,12 +780,16 @@ class Search:
         gets shorter."""
         if self._without(Feature.TIME_BASES):
             return settings
-        unlearned = replace(settings, learned_bases=(False,) * self.levels, common_basis=False)
+        unlearned = _in_waves(settings)
         own = replace(unlearned, learned_bases=(True,) * self.levels)
         common = replace(own, common_basis=True)
         (_, plain), (_, learned), _ = self._costs([unlearned, own, common])
         mixed = replace(own, learned_bases=tuple((learned < plain).tolist()))
         return self._cheapest([unlearned, mixed, common])
+
+    def _with_waves_if_smaller(self, settings: Settings) -> Settings:
+        """Learned time bases, or none: they take more bytes the finer the steps are."""
+        return self._cheapest([settings, _in_waves(settings)]) if any(settings.learned_bases) else settings
 
     def _with_periodic_waves(self, settings: Settings) -> Settings:
         """Loops that are one segment by waves that go on across their seam: those of a motion that does not are

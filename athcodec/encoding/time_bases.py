@@ -16,7 +16,7 @@ from athcodec.encoding import streams
 
 BASIS_BITS = 14  # of stored entries
 BASIS_IN_WAVES = 2  # in the place of their number
-PRECISION = 0.7  # step of a row's integers, over that by which they err as much as those of all tracks in the row
+PRECISION = 0.6  # step of a row's integers, over that by which they err as much as those of all tracks in the row
 LEAST_STEP, MOST_STEP = -200, 0  # half octaves
 TOLERANCE = 5e-4  # mean square, in steps, that a basis may leave out
 
