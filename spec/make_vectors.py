@@ -1222,6 +1222,7 @@ valid(
             3: stems_head(0.25, 0, 9, 4, basis_stream([[5, 6, 7, -200]], 9), base=2),
         },
     ),
+)
 valid(
     "node-waves",
     "stems in the waves of maps beside those of stems: Basis_Bits 1",

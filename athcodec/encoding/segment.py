@@ -36,7 +36,7 @@ ROWS_AT_ONCE = 1 << 14  # of coefficients
 WORK_BYTES = 1 << 30  # of the segments coded at once, where `jobs` does not say how many these are
 COPIES_BENDS = 0.0, 0.15  # of copies of one shape that are tried
 CONNECTED_SHARE = 0.8  # of a rest pose at once, that one by faces may take where layers refine it
-SAMPLED = 1500  # vertices from which on trials correct a sample
+SAMPLED = 4000  # vertices from which on trials correct a sample
 SEGMENT_WORK = 16  # memory of a segment while it is coded, over its float32 positions
 
 
