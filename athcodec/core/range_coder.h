@@ -202,8 +202,8 @@ ATH_INLINE void context_learn_either(ath_context *context, uint32_t bit)
     uint32_t rate = ath_rate[context->experience], one = context->one, unless = bit - 1;
     uint32_t way = (((one ^ ~unless) + (65537u & ~unless)) * rate) >> 16;
     one += (way ^ unless) - unless;
-    one = one < PROBABILITY_MIN ? PROBABILITY_MIN : one;
-    one = one > 65536u - PROBABILITY_MIN ? 65536u - PROBABILITY_MIN : one;
+    if (one < PROBABILITY_MIN) one = PROBABILITY_MIN;
+    if (one > 65536u - PROBABILITY_MIN) one = 65536u - PROBABILITY_MIN;
     context->one = (uint16_t)one;
     context->experience = (uint16_t)(context->experience + (context->experience < RATE_LIMIT));
 }
