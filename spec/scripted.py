@@ -575,7 +575,7 @@ def stems_head(
     step: float = 0.125, rotation: int = 0, bits: int = 0, rank: int = 0, basis: bytes = b"", base: int = 255
 ) -> bytes:
     head = struct.pack("<fBB", step, rotation, bits)
-    return head + struct.pack("<HBI", rank, base, len(basis)) + basis if bits else head
+    return head + struct.pack("<HBI", rank, base, len(basis)) + basis if bits > 1 else head
 
 
 def predicted_head(step: float = 0.0625, settings: int = 2) -> bytes:
