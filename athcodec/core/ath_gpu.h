@@ -23,23 +23,24 @@ extern "C" {
 
 enum {
     ATH_GPU_NODE = 1,    /* a body that is a matrix; else a piece, at most 64 vertices */
-    ATH_GPU_FOLLOWS = 2, /* its rotation is its parent's, turned as the parent's tangent turned */
+    ATH_GPU_FOLLOWS = 2, /* it turns with its parent's tangent */
     ATH_GPU_FITTED = 4   /* a sheet with children: what it hands on is the rotation nearest to its vertices */
 };
 
 /* What is placed at once. Bodies come in file order. */
 typedef struct ath_gpu_body {
     uint32_t flags;
-    int32_t parent;       /* the body that it hangs on, -1: none */
-    int32_t attach;       /* the position that it hangs on; -1: rest_point */
-    int32_t from, to;     /* positions that the parent's tangent goes between; from -1: from the parent's own point */
+    int32_t parent; /* the body that it hangs on, -1: none */
+    int32_t attach; /* the position that it hangs on; -1: rest_point */
+    int32_t from,
+        to; /* of the parent's positions, counted from its first: what its tangent goes between; from -1: its point */
     int32_t first;        /* of the positions that it places; of a node, its matrix */
     int32_t count;        /* of positions; 3 of a node: the columns of its map */
     int32_t vertex;       /* whose rest position is that of the first */
     uint32_t basis;       /* mode m moves position i by word basis + m * count + i */
     uint32_t shape_modes; /* modes that shapes are made of, where it has any */
     float rest_point[3];  /* what it hangs on, in the rest pose */
-    float tangent[3];     /* of the parent there, in the rest pose, of length 1 */
+    float tangent[3];     /* of the parent there: the way between the two in the rest pose */
 } ath_gpu_body;
 
 typedef struct ath_gpu_vertex {

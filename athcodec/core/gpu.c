@@ -168,7 +168,7 @@ static void set_floats(float out[3], const double x[3])
     for (int32_t k = 0; k < 3; k++) out[k] = (float)x[k];
 }
 
-static void set_tangent(const ath_plan *plan, const ath_piece *piece, const ath_gpu_body *base, ath_gpu_body *body)
+static void set_tangent(const ath_plan *plan, const ath_piece *piece, ath_gpu_body *body)
 {
     const ath_piece *parent = plan->pieces + piece->parent;
     int32_t before = piece->attach - 1, after = ath_min(piece->attach + 1, parent->first + parent->count - 1);
@@ -180,11 +180,10 @@ static void set_tangent(const ath_plan *plan, const ath_piece *piece, const ath_
         length2 = length2 + tangent[k] * tangent[k];
     }
     if (parent->flags & (ATH_SHEET | ATH_RIGID) || !(length2 > 1e-200)) return;
-    for (int32_t k = 0; k < 3; k++) tangent[k] = tangent[k] / ath_sqrt(length2);
     set_floats(body->tangent, tangent);
     body->flags |= ATH_GPU_FOLLOWS;
-    body->from = before < parent->first ? -1 : base->first + (before - parent->first);
-    body->to = base->first + (after - parent->first);
+    body->from = ath_max(before - parent->first, -1);
+    body->to = after - parent->first;
 }
 
 static void put_body(level_writer *writer, const body_walk *walk, int32_t b)
@@ -201,7 +200,7 @@ static void put_body(level_writer *writer, const body_walk *walk, int32_t b)
         body->parent = writer->body_of[piece->parent];
         body->attach = base->first + (piece->attach - walk->plan->pieces[piece->parent].first);
         writer->depth[b] = writer->depth[body->parent] + 1;
-        set_tangent(walk->plan, piece, base, body);
+        set_tangent(walk->plan, piece, body);
     }
     set_floats(body->rest_point, ath_rest_attach(walk->plan, piece));
     body->shape_modes = (uint32_t)ath_shape_modes(piece);
@@ -747,13 +746,8 @@ static void widen_positions(const ath_file *file, const ath_segment *segment, do
     }
 }
 
-/* The float at or beyond x, on the side of `sign`. */
-static float outward(double x, double sign)
-{
-    float near = (float)x;
-    double size = x < 0.0 ? -x : x;
-    return sign * (double)near >= sign * x ? near : (float)(x + sign * size * 2e-7);
-}
+/* Of the box: what its own numbers and those of a GPU are rounded by. */
+static const double BOX_MARGIN = 1e-6;
 
 void ath_gpu_bounds(const ath_file *file, const ath_segment *segment, float box[6])
 {
@@ -761,7 +755,8 @@ void ath_gpu_bounds(const ath_file *file, const ath_segment *segment, float box[
     widen_positions(file, segment, wide);
     for (int32_t i = 0; i < segment->part_count; i++)
         if (segment->parts[i].branch >= 0) widen_node(file, segment, segment->parts + i, wide);
-    for (int32_t k = 0; k < 6; k++) box[k] = outward(wide[k], k < 3 ? -1.0 : 1.0);
+    double margin = BOX_MARGIN * (wide[3] - wide[0] + wide[4] - wide[1] + wide[5] - wide[2]);
+    for (int32_t k = 0; k < 6; k++) box[k] = (float)(wide[k] + (k < 3 ? -margin : margin));
 }
 
 int32_t ath_gpu_frame(const ath_file *file, int32_t frame) { return file->coded[frame]; }

@@ -69,6 +69,7 @@ class Passes:
             shape = self._of["frames"], *self.positions.shape[1:]
             self.positions[:] = section(segment, self._of["baked"], "<f4", np.prod(shape)).reshape(shape)[self._frames]
             return
+        self._local: dict[int, np.ndarray] = {}  # of pieces, how far their positions have moved in their own frames
         self._amplitudes = self._over_time()
         for body in section(level, self._of_level["order"], "<u4", len(self._bodies)):
             self._place(int(body))
@@ -117,7 +118,8 @@ class Passes:
         placed = np.einsum("tij,tvj->tvi", rotation, offsets + local) + point[:, None]
         self.positions[:, body["first"] : body["first"] + body["count"]] = placed
         if body["flags"] & FITTED:
-            rotation = fitted(offsets, placed - point[:, None], rotation)
+            rotation = rotation @ fitted(offsets, offsets + local)
+        self._local[b] = local
         self._attach[:, b, :, :3], self._attach[:, b, :, 3] = rotation, point
 
     def _offsets(self, body: np.void) -> np.ndarray:
@@ -132,8 +134,9 @@ class Passes:
         base = self._attach[:, body["parent"]]
         point, rotation = self.positions[:, body["attach"]], base[:, :, :3]
         if body["flags"] & FOLLOWS:
-            start = base[:, :, 3] if body["from"] < 0 else self.positions[:, body["from"]]
-            rotation = followed(rotation, body["tangent"], self.positions[:, body["to"]] - start)
+            moved = self._local[body["parent"]]
+            way = moved[:, body["to"]] if body["from"] < 0 else moved[:, body["to"]] - moved[:, body["from"]]
+            rotation = rotation @ between(unit(body["tangent"]), unit(body["tangent"] + way))
         return point, rotation
 
     def _moved(self, body: np.void, move: np.void, tracks: dict[int, np.ndarray]) -> np.ndarray:
@@ -244,9 +247,8 @@ def unit(v: np.ndarray) -> np.ndarray:
     return v / np.sqrt(np.where(n2 > 1e-30, n2, 1))
 
 
-def followed(rotation: np.ndarray, tangent: np.ndarray, way: np.ndarray) -> np.ndarray:
-    """Rotations, turned by the least angle that takes the tangent, as they turn it, to a way."""
-    u, v = unit(rotation @ tangent), unit(way)
+def between(u: np.ndarray, v: np.ndarray) -> np.ndarray:
+    """Rotations by the least angle from one vector of length 1 to others; beyond a right angle by less and less."""
     cosine, axis = (u * v).sum(-1), np.cross(u, v)
     w, sine2 = 1 + np.maximum(cosine, 0), (axis * axis).sum(-1)
     h = 2 / (w * w + sine2)
@@ -254,18 +256,18 @@ def followed(rotation: np.ndarray, tangent: np.ndarray, way: np.ndarray) -> np.n
     zero = np.zeros_like(x)
     cross = np.stack([np.stack([zero, -z, y], -1), np.stack([z, zero, -x], -1), np.stack([-y, x, zero], -1)], -2)
     turn = h[:, None, None] * axis[:, :, None] * axis[:, None] + (h * w)[:, None, None] * cross
-    return (turn + (1 - h * sine2)[:, None, None] * np.eye(3, dtype=np.float32)) @ rotation
+    return turn + (1 - h * sine2)[:, None, None] * np.eye(3, dtype=np.float32)
 
 
-def fitted(offsets: np.ndarray, placed: np.ndarray, rotation: np.ndarray) -> np.ndarray:
-    """The rotations nearest to what took the offsets of a sheet to where they are, with a hundredth of its own."""
-    H = np.einsum("tvi,vj->tij", placed, offsets) + np.float32(0.01) * (offsets * offsets).sum() * rotation
-    norm2 = (H * H).sum((1, 2))
-    H = H / np.sqrt(np.where(norm2 > 1e-30, norm2, 1))[:, None, None]
-    out = rotation
+def fitted(offsets: np.ndarray, placed: np.ndarray) -> np.ndarray:
+    """The rotations nearest to what took the offsets of a sheet to where they are, with a hundredth of none."""
+    identity = np.eye(3, dtype=np.float32)
+    H = np.einsum("tvi,vj->tij", placed, offsets) + np.float32(0.01) * (offsets * offsets).sum() * identity
+    norm2 = (H * H).sum((1, 2), keepdims=True)
+    H, out = H / np.sqrt(np.where(norm2 > 1e-30, norm2, 1)), np.broadcast_to(identity, H.shape)
     for _ in range(POLAR_ITERATIONS):
         out = turned_towards(H, out)
-    return np.where((norm2 > 1e-30)[:, None, None], out, rotation)
+    return np.where(norm2 > 1e-30, out, identity)
 
 
 def turned_towards(H: np.ndarray, R: np.ndarray) -> np.ndarray:
