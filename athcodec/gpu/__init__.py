@@ -1,4 +1,4 @@
-"""The GPU form of a file (core/ath_gpu.h): blocks of words that shaders compute positions from. docs/gpu.md describes them.
+"""The GPU form of a file (core/ath_gpu.h): blocks of words that shaders compute positions from. See docs/gpu.md.
 
 `GpuFile` makes the blocks; evaluate.py computes with them in NumPy what the shaders beside it, *.wgsl, do on a GPU.
 """
@@ -74,10 +74,11 @@ class GpuFile:
         """Words of the block of a segment at a level, uint32."""
         room, block = Room(), None
         while block is None:  # first to find out how much room there has to be
-            block = self._recorded(segment, level, room)
+            block = self.recorded(segment, level, room)
         return block
 
-    def _recorded(self, segment: int, level: int, room: Room) -> np.ndarray | None:
+    def recorded(self, segment: int, level: int, room: Room) -> np.ndarray | None:
+        """The block where there is that much room for it; else `room` is set to what it needs."""
         memory = core_file.aligned(lib.ath_gpu_record_size(self._file, level, byref(room)))
         self._prepare(segment, level, room, memory)
         at = lib.ath_gpu_recorded(memory.ctypes.data, byref(room))
@@ -116,3 +117,12 @@ class GpuFile:
     def _check(result: int) -> None:
         if result != core_file.OK:
             raise core_file.CoreError(result)
+
+
+def corners_of(triangles: np.ndarray, vertex_count: int) -> np.ndarray:
+    """What vertices.wgsl takes normals from, uint32: where the corners of each vertex begin, and one behind the last; then
+    the two other corners of each triangle at the vertex, in the order of its turn. triangles: (F, 3), in file order."""
+    turns = np.concatenate([np.roll(triangles, -turn, axis=1) for turn in range(3)]).astype(np.uint32)
+    turns = turns[np.argsort(turns[:, 0], kind="stable")]
+    first = np.searchsorted(turns[:, 0], np.arange(vertex_count + 1))
+    return np.concatenate([(vertex_count + 1 + 2 * first).astype(np.uint32), turns[:, 1:].reshape(-1)])

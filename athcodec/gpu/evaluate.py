@@ -1,5 +1,5 @@
-"""The three passes of docs/gpu.md in NumPy, in float32 as a GPU has them: what the shaders are compared with, and a program to
-read beside them."""
+"""The three passes of docs/gpu.md in NumPy, in float32 as a GPU has them: what shows that the blocks are whole, and a
+program to read beside the shaders."""
 
 from __future__ import annotations
 
