@@ -113,7 +113,7 @@ fn move_at(b: u32) -> Move {
 fn row_at(r: u32) -> Row {
     let at = segment[ROWS] + ROW_WORDS * r;
     let packed = segment[at + 1u];
-    return Row(segment[at], packed & 0xffffu, packed >> 16u & 0xffu, packed >> 24u, segment_float(at + 2u));
+    return Row(segment[at], packed & 0xffffu, (packed >> 16u) & 0xffu, packed >> 24u, segment_float(at + 2u));
 }
 
 fn rest_of(vertex: u32) -> vec3<f32> {

@@ -78,7 +78,7 @@ fn corrections(@builtin(global_invocation_id) id: vec3<u32>) {
         let at = segment[CORRECTIONS] + 2u * c;
         let low = segment[at];
         let high = segment[at + 1u];
-        let away = abs(i32(run.frame) - i32(high >> 16u & 0xffu));
+        let away = abs(i32(run.frame) - i32((high >> 16u) & 0xffu));
         if (away < 4) {
             let width = high >> 24u;
             let part = FOOTPRINTS[width & 15u][away] * exp2(f32(width >> 4u));
