@@ -19,6 +19,7 @@ from fuzz.targets import CORE, decoder_sources
 import athcodec
 from athcodec._native import crc32c
 
+HEADERS = "ath.h", "ath_gpu.h"
 C_COMPILERS = [name for name in ("gcc", "clang") if shutil.which(name)] or ["cc"]
 CXX_COMPILERS = [name for name in ("g++", "clang++") if shutil.which(name)] or ["c++"]
 TOOLS = {**os.environ, "PATH": os.pathsep.join([sysconfig.get_path("scripts"), os.environ["PATH"]])}
@@ -111,9 +112,10 @@ def test_decoding_compiles_freestanding_without_warnings_and_needs_only_memory_f
 
 
 def test_the_sources_that_are_no_encoder_are_the_decoder():
-    """A new file is in one of the two lists, so that an engine cannot miss it."""
-    (encoder,) = re.findall(r"ATH_ENCODER_SOURCES ([^)]*)\)", (CORE / "CMakeLists.txt").read_text())
-    assert sorted(CORE.glob("*.c")) == sorted(decoder_sources() + [CORE / name for name in encoder.split()])
+    """A new file is in one of the three lists, so that an engine cannot miss it."""
+    lists = re.findall(r"ATH_(?:ENCODER|GPU)_SOURCES ([^)]*)\)", (CORE / "CMakeLists.txt").read_text())
+    others = [CORE / name for names in lists for name in names.split()]
+    assert len(lists) == 2 and sorted(CORE.glob("*.c")) == sorted(decoder_sources() + others)
 
 
 # ---- one file ----
@@ -226,13 +228,14 @@ def test_an_install_holds_the_header_both_libraries_and_both_ways_to_find_them(i
         "cmake/athcodec/athcodecConfig.cmake",
         "cmake/athcodec/athcodecConfigVersion.cmake",
     } <= files
-    assert (installed / "include" / "ath.h").read_bytes() == (CORE / "ath.h").read_bytes()
-    assert not [path for path in installed.rglob("*") if path.suffix == ".h" and path.name != "ath.h"]
+    for name in HEADERS:
+        assert (installed / "include" / name).read_bytes() == (CORE / name).read_bytes()
+    assert sorted(path.name for path in installed.rglob("*.h")) == sorted(HEADERS)
 
 
 def test_the_shared_library_exports_what_the_header_declares_and_nothing_else(installed):
-    header = (installed / "include" / "ath.h").read_text()
-    declared = re.findall(r"^ATH_API [^;(]*?(ath_\w+)\(", header, re.MULTILINE)
+    headers = "".join((installed / "include" / name).read_text() for name in HEADERS)
+    declared = re.findall(r"^ATH_API [^;(]*?(ath_\w+)\(", headers, re.MULTILINE)
     names = run("nm", "-D", "--defined-only", library_folder(installed) / "libath.so").split("\n")
     assert sorted(line.split()[-1] for line in names if line) == sorted(declared) and len(declared) > 30
 

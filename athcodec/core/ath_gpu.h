@@ -134,7 +134,7 @@ typedef struct ath_gpu_room {
 ATH_API size_t ath_gpu_record_size(const ath_file *file, int32_t level, const ath_gpu_room *room);
 /* Between ath_prepare_start and the first step: what is prepared is recorded in `memory`, too, which is left alone until the last
  * step has come. ATH_NO_MEMORY. */
-ATH_API int ath_gpu_record(ath_work *work, int32_t level, const ath_gpu_room *room, void *memory, size_t memory_bytes);
+ATH_API int ath_gpu_record(ath_work *work, const ath_gpu_room *room, void *memory, size_t memory_bytes);
 /* After ath_prepare_step was ATH_OK: the segment's block; null where there was too little room, and `needed` says how much there
  * has to be in a preparation that is done again. With a room of zeros that is the way to find out. needed: may be null. */
 ATH_API const ath_gpu_segment *ath_gpu_recorded(const void *memory, ath_gpu_room *needed);

@@ -527,7 +527,12 @@ static void record_curve(recorder *record, int32_t width, const double *jumps, c
     }
 }
 
-static int32_t nearest(double x) { return x < 0.0 ? -(int32_t)(0.5 - x) : (int32_t)(x + 0.5); }
+static int32_t nearest(double x)
+{
+    if (!(x > -INT16_MOST)) return -INT16_MOST; /* those that are no numbers, too */
+    if (x > INT16_MOST) return INT16_MOST;
+    return x < 0.0 ? -(int32_t)(0.5 - x) : (int32_t)(x + 0.5);
+}
 
 static void record_join(ath_watcher *watcher, int32_t width, const double *jumps, const double *slopes, int32_t count,
                         double off[][2])
@@ -668,8 +673,9 @@ static void record_done(ath_watcher *watcher, const ath_motion *motion, const at
         head->wave_sets[set] = record->waves_used[set] > 0 ? begins[WAVES] + waves[set] : 0;
 }
 
-int ath_gpu_record(ath_work *work, int32_t level, const ath_gpu_room *room, void *memory, size_t memory_bytes)
+int ath_gpu_record(ath_work *work, const ath_gpu_room *room, void *memory, size_t memory_bytes)
 {
+    int32_t level = ath_watched_level(work);
     const ath_file *file = ath_watched_file(work);
     recorder *record = (recorder *)memory;
     if (!ath_fits(memory, memory_bytes, ath_gpu_record_size(file, level, room))) return ATH_NO_MEMORY;

@@ -267,6 +267,8 @@ void ath_watch(ath_work *work, ath_watcher *watcher) { work->asked.watcher = wat
 
 const ath_file *ath_watched_file(const ath_work *work) { return work->file; }
 
+int32_t ath_watched_level(const ath_work *work) { return work->asked.level; }
+
 /* Of the segment asked for, not of the one before it. */
 static ath_watcher *watcher_of(const ath_work *work) { return work->only_end ? 0 : work->asked.watcher; }
 

@@ -28,7 +28,7 @@ _FUNCTIONS = {  # core/ath_gpu.h
     "ath_gpu_level_size": (c_size_t, [c_void_p, c_int32]),
     "ath_gpu_build_level": (c_int, [c_void_p, c_int32, c_void_p, c_size_t]),
     "ath_gpu_record_size": (c_size_t, [c_void_p, c_int32, POINTER(Room)]),
-    "ath_gpu_record": (c_int, [c_void_p, c_int32, POINTER(Room), c_void_p, c_size_t]),
+    "ath_gpu_record": (c_int, [c_void_p, POINTER(Room), c_void_p, c_size_t]),
     "ath_gpu_recorded": (c_void_p, [c_void_p, POINTER(Room)]),
     "ath_gpu_bounds": (None, [c_void_p, c_void_p, POINTER(c_float * 6)]),
     "ath_gpu_frame": (c_int32, [c_void_p, c_int32]),
@@ -72,9 +72,11 @@ class GpuFile:
 
     def segment(self, segment: int, level: int) -> np.ndarray:
         """Words of the block of a segment at a level, uint32."""
-        room, block = Room(), None
-        while block is None:  # first to find out how much room there has to be
+        room = Room()  # none: to find out how much there has to be
+        block = self.recorded(segment, level, room)
+        if block is None:
             block = self.recorded(segment, level, room)
+        assert block is not None
         return block
 
     def recorded(self, segment: int, level: int, room: Room) -> np.ndarray | None:
@@ -99,7 +101,7 @@ class GpuFile:
         place = self._work.pointer, len(self._work.memory), self._file, segment, level
         self._check(lib.ath_prepare_start(*place, into.pointer, len(into.memory)))
         if memory is not None:
-            self._check(lib.ath_gpu_record(self._work.pointer, level, byref(room), memory.ctypes.data, len(memory)))
+            self._check(lib.ath_gpu_record(self._work.pointer, byref(room), memory.ctypes.data, len(memory)))
         self._check(lib.ath_prepare_step(self._work.pointer, core_file.MOST_STEPS))
         return into
 
