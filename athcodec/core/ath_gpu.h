@@ -30,17 +30,17 @@ enum {
 /* What is placed at once. Bodies come in file order. */
 typedef struct ath_gpu_body {
     uint32_t flags;
-    int32_t parent; /* the body that it hangs on, -1: none */
-    int32_t attach; /* the position that it hangs on; -1: rest_point */
-    int32_t from,
-        to; /* of the parent's positions, counted from its first: what its tangent goes between; from -1: its point */
+    int32_t parent;       /* the body that it hangs on, -1: none */
+    int32_t attach;       /* the position that it hangs on; -1: rest_point */
+    uint32_t way;         /* word of the bases: mode m of the parent moves its tangent by word way + m */
+    uint32_t modes;       /* that it may have */
     int32_t first;        /* of the positions that it places; of a node, its matrix */
     int32_t count;        /* of positions; 3 of a node: the columns of its map */
     int32_t vertex;       /* whose rest position is that of the first */
     uint32_t basis;       /* mode m moves position i by word basis + m * count + i */
     uint32_t shape_modes; /* modes that shapes are made of, where it has any */
     float rest_point[3];  /* what it hangs on, in the rest pose */
-    float tangent[3];     /* of the parent there: the way between the two in the rest pose */
+    float tangent[3];     /* of the parent there, in the rest pose, as long as it is */
 } ath_gpu_body;
 
 typedef struct ath_gpu_vertex {

@@ -88,7 +88,8 @@ static uint64_t most_basis_numbers(const ath_file *file, int32_t level)
 {
     body_walk walk = walk_bodies(file, level);
     uint64_t count = 0;
-    while (next_body(&walk)) count += (uint64_t)modes_of(&walk) * (uint64_t)(walk.node ? 3 : walk.piece->count);
+    while (next_body(&walk))
+        count += (uint64_t)modes_of(&walk) * (uint64_t)(walk.node ? 3 : walk.piece->count) + ATH_PIECE_VERTICES;
     return count;
 }
 
@@ -168,7 +169,8 @@ static void set_floats(float out[3], const double x[3])
     for (int32_t k = 0; k < 3; k++) out[k] = (float)x[k];
 }
 
-static void set_tangent(const ath_plan *plan, const ath_piece *piece, ath_gpu_body *body)
+/* Differences of modes, as those of positions would not be fine enough as floats. */
+static void set_tangent(level_writer *writer, const ath_plan *plan, const ath_piece *piece, ath_gpu_body *body)
 {
     const ath_piece *parent = plan->pieces + piece->parent;
     int32_t before = piece->attach - 1, after = ath_min(piece->attach + 1, parent->first + parent->count - 1);
@@ -182,8 +184,12 @@ static void set_tangent(const ath_plan *plan, const ath_piece *piece, ath_gpu_bo
     if (parent->flags & (ATH_SHEET | ATH_RIGID) || !(length2 > 1e-200)) return;
     set_floats(body->tangent, tangent);
     body->flags |= ATH_GPU_FOLLOWS;
-    body->from = ath_max(before - parent->first, -1);
-    body->to = after - parent->first;
+    body->way = writer->bases_used;
+    for (int32_t m = 0; m < ath_rank(parent); m++) {
+        const double *mode = plan->bases + parent->basis + (size_t)m * (size_t)parent->count;
+        double way = mode[after - parent->first] - (before < parent->first ? 0.0 : mode[before - parent->first]);
+        put_numbers(writer, &way, 1);
+    }
 }
 
 static void put_body(level_writer *writer, const body_walk *walk, int32_t b)
@@ -193,16 +199,17 @@ static void put_body(level_writer *writer, const body_walk *walk, int32_t b)
     const ath_piece *piece = walk->piece;
     int32_t first = piece->first;
     memset(body, 0, sizeof *body);
-    body->parent = body->attach = body->from = body->to = -1;
+    body->parent = body->attach = -1;
     writer->depth[b] = 0;
     if (piece->parent >= 0) {
         const ath_gpu_body *base = writer->bodies + writer->body_of[piece->parent];
         body->parent = writer->body_of[piece->parent];
         body->attach = base->first + (piece->attach - walk->plan->pieces[piece->parent].first);
         writer->depth[b] = writer->depth[body->parent] + 1;
-        set_tangent(walk->plan, piece, body);
+        set_tangent(writer, walk->plan, piece, body);
     }
     set_floats(body->rest_point, ath_rest_attach(walk->plan, piece));
+    body->modes = (uint32_t)modes_of(walk);
     body->shape_modes = (uint32_t)ath_shape_modes(piece);
     body->vertex = first;
     if (walk->node) {

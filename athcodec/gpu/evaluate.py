@@ -20,8 +20,8 @@ LEVEL = np.dtype(
 VERTEX = np.dtype([("rest", "<f4", 3), ("binding", "<u4")])
 BODY = np.dtype(
     [("flags", "<u4")]
-    + [(name, "<i4") for name in "parent attach from to first count vertex".split()]
-    + [("basis", "<u4"), ("shape_modes", "<u4"), ("rest_point", "<f4", 3), ("tangent", "<f4", 3)]
+    + [("parent", "<i4"), ("attach", "<i4"), ("way", "<u4"), ("modes", "<u4")]
+    + [("first", "<i4"), ("count", "<i4"), ("vertex", "<i4"), ("basis", "<u4"), ("shape_modes", "<u4"), ("rest_point", "<f4", 3), ("tangent", "<f4", 3)]
 )
 ROW = np.dtype([("values", "<u4"), ("count", "<u2"), ("slot", "u1"), ("waves", "u1"), ("step", "<f4")])
 MOVE = np.dtype([("row", "<u4"), ("rows", "<u2"), ("shape_count", "<u2"), ("shapes", "<u4"), ("turn", "<u4")])
@@ -69,7 +69,7 @@ class Passes:
             shape = self._of["frames"], *self.positions.shape[1:]
             self.positions[:] = section(segment, self._of["baked"], "<f4", np.prod(shape)).reshape(shape)[self._frames]
             return
-        self._local: dict[int, np.ndarray] = {}  # of pieces, how far their positions have moved in their own frames
+        self._modes: dict[int, np.ndarray] = {}  # of pieces, (modes, 3, frames)
         self._amplitudes = self._over_time()
         for body in section(level, self._of_level["order"], "<u4", len(self._bodies)):
             self._place(int(body))
@@ -108,7 +108,8 @@ class Passes:
         if ROTATION in tracks:
             turn = section(self._segment, self._of["turns"] + move["turn"], "<f4", 9).reshape(3, 3)
             rotation = rotation @ rotations(tracks[ROTATION].T @ turn.T)
-        local = self._moved(body, move, tracks)
+        modes = self._modes[b] = self._modes_of(body, move, tracks)
+        local = np.tensordot(modes, self._basis(body["basis"], len(modes), body["count"]), (0, 0)).transpose(1, 2, 0)
         if body["flags"] & NODE:
             matrix = np.swapaxes(np.eye(3, dtype=np.float32) + local, 1, 2)  # its columns are the three positions
             self.matrices[:, body["first"], :, :3] = rotation @ matrix
@@ -119,7 +120,6 @@ class Passes:
         self.positions[:, body["first"] : body["first"] + body["count"]] = placed
         if body["flags"] & FITTED:
             rotation = rotation @ fitted(offsets, offsets + local)
-        self._local[b] = local
         self._attach[:, b, :, :3], self._attach[:, b, :, 3] = rotation, point
 
     def _offsets(self, body: np.void) -> np.ndarray:
@@ -134,21 +134,22 @@ class Passes:
         base = self._attach[:, body["parent"]]
         point, rotation = self.positions[:, body["attach"]], base[:, :, :3]
         if body["flags"] & FOLLOWS:
-            moved = self._local[body["parent"]]
-            way = moved[:, body["to"]] if body["from"] < 0 else moved[:, body["to"]] - moved[:, body["from"]]
+            modes = self._modes[body["parent"]]
+            way = np.tensordot(modes, self._basis(body["way"], len(modes), 1)[:, 0], (0, 0)).T
             rotation = rotation @ between(unit(body["tangent"]), unit(body["tangent"] + way))
         return point, rotation
 
-    def _moved(self, body: np.void, move: np.void, tracks: dict[int, np.ndarray]) -> np.ndarray:
-        """(frames, count, 3): how far modes move its positions in its own frame."""
+    def _basis(self, at: int, modes: int, count: int) -> np.ndarray:
+        return section(self._level, self._of_level["bases"] + at, "<f4", modes * count).reshape(modes, count)
+
+    def _modes_of(self, body: np.void, move: np.void, tracks: dict[int, np.ndarray]) -> np.ndarray:
+        """(modes, 3, frames): what each mode is."""
         modes = {slot: track for slot, track in tracks.items() if slot < SHIFT}
         if move["shape_count"] > 0:
             modes = self._unshaped(body, move, modes)
-        count, top = int(body["count"]), max(modes, default=-1) + 1
-        basis = section(self._level, self._of_level["bases"] + body["basis"], "<f4", top * count).reshape(top, count)
-        out = np.zeros((len(self._frames), count, 3), np.float32)
+        out = np.zeros((body["modes"], 3, len(self._frames)), np.float32)
         for mode, track in modes.items():
-            out += basis[mode][None, :, None] * track.T[:, None]
+            out[mode] = track
         return out
 
     def _unshaped(self, body: np.void, move: np.void, rows: dict[int, np.ndarray]) -> dict[int, np.ndarray]:

@@ -10,7 +10,7 @@ struct Run {
 @group(0) @binding(3) var<storage, read> amplitudes: array<f32>;
 @group(0) @binding(4) var<storage, read_write> positions: array<f32>;
 @group(0) @binding(5) var<storage, read_write> matrices: array<f32>;
-@group(0) @binding(6) var<storage, read_write> moved: array<f32>; // of positions, in the frames of their bodies
+@group(0) @binding(6) var<storage, read_write> parent_modes: array<f32>; // those of a body from its first position on
 @group(0) @binding(7) var<storage, read_write> frames: array<f32>; // of bodies: rotation, point
 
 const SHIFT = 64u;
@@ -19,7 +19,7 @@ const POLAR_ITERATIONS = 4;
 const IDENTITY = mat3x3<f32>(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0);
 
 var<workgroup> modes: array<vec3<f32>, 64>;
-var<workgroup> placed: array<vec3<f32>, 64>;
+var<workgroup> placed: array<vec3<f32>, 64>; // before: what modes of the parent add to its tangent
 
 struct Frame {
     point: vec3<f32>,
@@ -35,8 +35,15 @@ fn position_at(index: u32) -> vec3<f32> {
     return vec3<f32>(positions[at], positions[at + 1u], positions[at + 2u]);
 }
 
-fn moved_at(index: u32) -> vec3<f32> {
-    return vec3<f32>(moved[3u * index], moved[3u * index + 1u], moved[3u * index + 2u]);
+// What mode m of its parent adds to the tangent that a body follows.
+fn way_by_mode(body: Body, m: u32) -> vec3<f32> {
+    let parent = level[BODIES] + BODY_WORDS * u32(max(body.parent, 0));
+    if ((body.flags & FOLLOWS) == 0u || m >= level[parent + 4u]) {
+        return vec3<f32>(0.0);
+    }
+    let at = 3u * (level[parent + 5u] + m);
+    let mode = vec3<f32>(parent_modes[at], parent_modes[at + 1u], parent_modes[at + 2u]);
+    return level_float(level[BASES] + body.way + m) * mode;
 }
 
 // The rotation of the quaternion normalize(1, q) squared.
@@ -86,10 +93,9 @@ fn hung(body: Body) -> Frame {
         frames[at + 6u], frames[at + 7u], frames[at + 8u],
     );
     if ((body.flags & FOLLOWS) != 0u) {
-        let first = level[level[BODIES] + BODY_WORDS * u32(body.parent) + 5u];
-        var way = moved_at(first + u32(body.to_local));
-        if (body.from_local >= 0) {
-            way -= moved_at(first + u32(body.from_local));
+        var way = vec3<f32>(0.0);
+        for (var m = 0u; m < 64u; m++) {
+            way += placed[m];
         }
         rotation = rotation * between(unit(body.tangent), unit(body.tangent + way));
     }
@@ -205,6 +211,7 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     let body = body_at(b);
     let own = move_at(b);
     modes[i] = vec3<f32>(0.0);
+    placed[i] = way_by_mode(body, i);
     workgroupBarrier();
     let from_shapes = select(0u, body.shape_modes, own.shape_count > 0u);
     for (var r = i; r < own.rows; r += 64u) {
@@ -223,6 +230,7 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
         top = max(top, select(0u, last + 1u, last < SHIFT));
     }
     var frame = turned(body, own);
+    workgroupBarrier();
     let is_node = (body.flags & NODE) != 0u;
     if (i < body.count) {
         let by_modes = moved_by_modes(body, top, i);
@@ -233,7 +241,7 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
             let x = frame.point + frame.rotation * placed[i];
             for (var axis = 0u; axis < 3u; axis++) {
                 positions[run.positions + 3u * (body.first + i) + axis] = x[axis];
-                moved[3u * (body.first + i) + axis] = by_modes[axis];
+                parent_modes[3u * (body.first + i) + axis] = modes[i][axis];
             }
         }
     }

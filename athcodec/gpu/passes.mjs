@@ -34,7 +34,7 @@ export class Passes {
     this.size = { positions: 3 * level[POSITION_COUNT], matrices: 12 * level[MATRIX_COUNT] };
     this.positions = this.buffer(slots * this.size.positions);
     this.matrices = this.buffer(slots * this.size.matrices);
-    this.moved = this.buffer(this.size.positions);
+    this.modes = this.buffer(this.size.positions);
     this.frames = this.buffer(12 * level[BODY_COUNT]);
     this.vertices = this.buffer(9 * level[VERTEX_COUNT]);
     this.corners = this.buffer(1);
@@ -83,7 +83,7 @@ export class Passes {
       this.dispatch(pass, "time", Math.ceil(words[ROW_COUNT] / WORKGROUP), null, buffer, run(frame), amplitudes);
       for (let depth = 0; depth < this.words[DEPTH_COUNT]; depth++) {
         const [first, end] = this.words.subarray(this.words[DEPTHS] + depth);
-        const outputs = [amplitudes, positions, matrices, this.moved, this.frames];
+        const outputs = [amplitudes, positions, matrices, this.modes, this.frames];
         this.dispatch(pass, "hierarchy", end - first, level, buffer, run(first, ...at), ...outputs);
       }
       const finish = [buffer, run(frame, ...at), positions];
