@@ -19,9 +19,9 @@ LEVEL = np.dtype(
 )
 VERTEX = np.dtype([("rest", "<f4", 3), ("binding", "<u4")])
 BODY = np.dtype(
-    [("flags", "<u4")]
-    + [("parent", "<i4"), ("attach", "<i4"), ("way", "<u4"), ("modes", "<u4")]
-    + [("first", "<i4"), ("count", "<i4"), ("vertex", "<i4"), ("basis", "<u4"), ("shape_modes", "<u4"), ("rest_point", "<f4", 3), ("tangent", "<f4", 3)]
+    [("flags", "<u4"), ("parent", "<i4"), ("attach", "<i4"), ("way", "<u4"), ("modes", "<u4")]
+    + [("first", "<i4"), ("count", "<i4"), ("vertex", "<i4"), ("basis", "<u4"), ("shape_modes", "<u4")]
+    + [("rest_point", "<f4", 3), ("tangent", "<f4", 3)]
 )
 ROW = np.dtype([("values", "<u4"), ("count", "<u2"), ("slot", "u1"), ("waves", "u1"), ("step", "<f4")])
 MOVE = np.dtype([("row", "<u4"), ("rows", "<u2"), ("shape_count", "<u2"), ("shapes", "<u4"), ("turn", "<u4")])
