@@ -2,8 +2,8 @@
 
     python athcodec/core/amalgamate.py ath.c
 
-The file needs ath.h beside it, and nothing else: ``cc -O2 -c ath.c``. With --gpu it holds the functions of ath_gpu.h, too,
-and needs that as well. What a compiler must not do to its arithmetic it says itself.
+The file needs ath.h beside it, and nothing else: ``cc -O2 -c ath.c``. With --gpu it holds the functions of ath_gpu.h,
+too, and needs that as well. What a compiler must not do to its arithmetic it says itself.
 """
 
 import re
@@ -28,8 +28,8 @@ def decoder_sources() -> list[str]:
 
 
 def amalgamation(gpu: bool = False) -> str:
-    """The decoder's C files, one after the other, each header in front of the first that includes it; with `gpu` those of
-    ath_gpu.h, too."""
+    """The decoder's C files, with `gpu` those of ath_gpu.h, too, one after the other, each header in front of the first
+    that includes it."""
     seen: set[str] = set()
 
     def whole(name: str) -> str:
