@@ -139,6 +139,16 @@ def test_the_decoder_as_one_file_decodes_what_python_does(compiler, options, sin
     assert run(single / "consumer", sample_ath) == expected
 
 
+@pytest.mark.parametrize("compiler", ["gcc -std=c11", "g++ -std=c++17 -x c++"])
+def test_the_single_file_may_hold_the_gpu_form(compiler, single):
+    """Without warnings, as C and as C++."""
+    run(sys.executable, CORE / "amalgamate.py", "--gpu", single / "ath_with_gpu.c")
+    shutil.copy(CORE / "ath_gpu.h", single)
+    flags = "-O1 -Wall -Wextra -Werror -DATH_STATIC -c".split()
+    run(*compiler.split(), *flags, "-I", single, single / "ath_with_gpu.c", "-o", single / "ath.o")
+    assert "ath_gpu_record" in run("nm", single / "ath.o")
+
+
 def test_no_instruction_of_the_decoder_rounds_once_for_two_operations(single):
     """Compiled for processors that have such instructions, by a compiler that takes them where it is let."""
     fused = re.compile(r"\b(vfn?m(?:add|sub)|fn?m(?:add|sub)\b|fml[as]\b|vfm[as]|fmadd\.|m[as][ed]br)")

@@ -83,14 +83,12 @@ typedef struct ath_gpu_row {
 } ath_gpu_row;
 enum { ATH_GPU_SHIFT = 64, ATH_GPU_ROTATION = 65, ATH_GPU_WIDE = 128 };
 
-/* What moves a body. */
+/* What moves a body. Its rows ascend by slot, but that those of its shift and its rotation are the first. */
 typedef struct ath_gpu_move {
     uint32_t row;    /* its first */
     uint32_t counts; /* rows; 65536 times shapes */
     uint32_t shapes; /* word in the section of shapes: of each 3 * shape_modes floats, axis a of mode m at 3 m + a */
-    uint32_t
-        turn; /* word in that of turns: 9 floats, row by row, the matrix that takes what the row of the rotation is to a
-                        rotation vector */
+    uint32_t turn;   /* word in that of turns: 9 floats, the matrix that makes a rotation vector of its row */
 } ath_gpu_move;
 
 /* A vector that is added around a frame: a value is integer * 2^(width >> 4) * correction_part * part(width & 15, distance). */
@@ -115,11 +113,10 @@ typedef struct ath_gpu_segment {
     uint32_t values;        /* 16 or 32-bit integers */
     uint32_t shapes, turns; /* floats */
     uint32_t join_curve;    /* 2 floats of each joined frame: what is left of jumps and of slopes */
-    uint32_t join_steps;    /* 2 floats of each body that is a piece: the steps of its jumps and of its slopes */
+    uint32_t join_steps;    /* 2 floats of each body: the steps of the jumps and of the slopes of its positions */
     uint32_t joins;         /* of each number of a position a word: its jump, and times 65536 its slope, 16 bits each */
     uint32_t matrix_joins;  /* 24 floats of each matrix: jump and slope of 9 numbers of R, then of c */
-    uint32_t
-        corrected; /* 2 words of each corrected position, and of one behind the last: it, and its first correction */
+    uint32_t corrected;   /* 2 words of each corrected position, and of one behind the last: it, its first correction */
     uint32_t corrections; /* ath_gpu_correction, of 2 words each */
     uint32_t baked;       /* 0, or frames x positions x 3 floats, in place of all that moves: motion that has no rows */
     uint32_t wave_sets[ATH_GPU_WAVE_SETS]; /* words of their floats, each wave `frames` of them; 0: none */
