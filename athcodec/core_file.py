@@ -204,6 +204,11 @@ class File:
         self._refined = -1  # levels up to this one have what their segments share
         self._building = threading.Lock()
 
+    @property
+    def pointer(self) -> int:
+        """The ath_file, for functions beside ath.h."""
+        return self._file
+
     @staticmethod
     def _check(result: int, fault: Fault | None = None) -> int:
         if result not in (OK, HELD):

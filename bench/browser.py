@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
 BROWSER_VARIABLE = "ATHCODEC_CHROMIUM"
@@ -15,6 +15,12 @@ FLAGS = [
     "--enable-unsafe-swiftshader",
     "--ignore-gpu-blocklist",
 ]
+WEBGPU_FLAGS = [
+    "--no-sandbox",
+    "--enable-unsafe-webgpu",
+    "--use-webgpu-adapter=swiftshader",
+    "--enable-unsafe-swiftshader",
+]
 INSTALL = "apt-get install chromium && pip install playwright"
 
 
@@ -23,7 +29,7 @@ class MissingBrowser(Exception):
 
 
 @contextmanager
-def chromium() -> Iterator:
+def chromium(flags: Sequence[str] = FLAGS) -> Iterator:
     """A Playwright browser. Raises MissingBrowser."""
     path = os.environ.get(BROWSER_VARIABLE) or shutil.which("chromium") or shutil.which("chromium-browser")
     try:
@@ -33,7 +39,7 @@ def chromium() -> Iterator:
     if path is None:
         raise MissingBrowser(f"chromium: got none on PATH or in {BROWSER_VARIABLE}: {INSTALL}")
     with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=path, args=FLAGS)
+        browser = playwright.chromium.launch(executable_path=path, args=list(flags))
         try:
             yield browser
         finally:

@@ -19,6 +19,7 @@ from fuzz.targets import CORE, decoder_sources
 import athcodec
 from athcodec._native import crc32c
 
+HEADERS = "ath.h", "ath_gpu.h", "ath_player.h"
 C_COMPILERS = [name for name in ("gcc", "clang") if shutil.which(name)] or ["cc"]
 CXX_COMPILERS = [name for name in ("g++", "clang++") if shutil.which(name)] or ["c++"]
 TOOLS = {**os.environ, "PATH": os.pathsep.join([sysconfig.get_path("scripts"), os.environ["PATH"]])}
@@ -111,9 +112,10 @@ def test_decoding_compiles_freestanding_without_warnings_and_needs_only_memory_f
 
 
 def test_the_sources_that_are_no_encoder_are_the_decoder():
-    """A new file is in one of the two lists, so that an engine cannot miss it."""
-    (encoder,) = re.findall(r"ATH_ENCODER_SOURCES ([^)]*)\)", (CORE / "CMakeLists.txt").read_text())
-    assert sorted(CORE.glob("*.c")) == sorted(decoder_sources() + [CORE / name for name in encoder.split()])
+    """A new file is in one of the three lists, so that an engine cannot miss it."""
+    lists = re.findall(r"ATH_(?:ENCODER|GPU)_SOURCES ([^)]*)\)", (CORE / "CMakeLists.txt").read_text())
+    others = [CORE / name for names in lists for name in names.split()]
+    assert len(lists) == 2 and sorted(CORE.glob("*.c")) == sorted(decoder_sources() + others)
 
 
 # ---- one file ----
@@ -135,6 +137,16 @@ def test_the_decoder_as_one_file_decodes_what_python_does(compiler, options, sin
     flags = [*options.split(), "-DATH_STATIC", "-I", single]
     run(compiler, *flags, single / "consumer.c", single / "ath.c", "-lm", "-o", single / "consumer")
     assert run(single / "consumer", sample_ath) == expected
+
+
+@pytest.mark.parametrize("compiler", ["gcc -std=c11", "g++ -std=c++17 -x c++"])
+def test_the_single_file_may_hold_the_gpu_form(compiler, single):
+    """Without warnings, as C and as C++."""
+    run(sys.executable, CORE / "amalgamate.py", "--gpu", single / "ath_with_gpu.c")
+    shutil.copy(CORE / "ath_gpu.h", single)
+    flags = "-O1 -Wall -Wextra -Werror -DATH_STATIC -c".split()
+    run(*compiler.split(), *flags, "-I", single, single / "ath_with_gpu.c", "-o", single / "ath.o")
+    assert "ath_gpu_record" in run("nm", single / "ath.o")
 
 
 def test_no_instruction_of_the_decoder_rounds_once_for_two_operations(single):
@@ -226,15 +238,14 @@ def test_an_install_holds_the_header_both_libraries_and_both_ways_to_find_them(i
         "cmake/athcodec/athcodecConfig.cmake",
         "cmake/athcodec/athcodecConfigVersion.cmake",
     } <= files
-    public = {"ath.h", "ath_player.h"}
-    assert {path.name for path in installed.rglob("*.h")} == public
-    for name in public:
+    for name in HEADERS:
         assert (installed / "include" / name).read_bytes() == (CORE / name).read_bytes()
+    assert sorted(path.name for path in installed.rglob("*.h")) == sorted(HEADERS)
 
 
 def test_the_shared_library_exports_what_the_header_declares_and_nothing_else(installed):
-    header = (installed / "include" / "ath.h").read_text()
-    declared = re.findall(r"^ATH_API [^;(]*?(ath_\w+)\(", header, re.MULTILINE)
+    headers = "".join((installed / "include" / name).read_text() for name in HEADERS)
+    declared = re.findall(r"^ATH_API [^;(]*?(ath_\w+)\(", headers, re.MULTILINE)
     names = run("nm", "-D", "--defined-only", library_folder(installed) / "libath.so").split("\n")
     assert sorted(line.split()[-1] for line in names if line) == sorted(declared) and len(declared) > 30
 

@@ -2,8 +2,8 @@
 
     python athcodec/core/amalgamate.py ath.c
 
-The file needs ath.h beside it, and nothing else: ``cc -O2 -c ath.c``. What a compiler must not do to its arithmetic it
-says itself.
+The file needs ath.h beside it, and nothing else: ``cc -O2 -c ath.c``. With --gpu it holds the functions of ath_gpu.h,
+too, and needs that as well. What a compiler must not do to its arithmetic it says itself.
 """
 
 import re
@@ -12,23 +12,29 @@ from pathlib import Path
 
 CORE = Path(__file__).parent
 INCLUDE = re.compile(r'^#include "(\w+\.h)".*\n', re.MULTILINE)
-PUBLIC = "ath.h"
+PUBLIC = "ath.h", "ath_gpu.h"
+
+
+def listed(name: str) -> list[str]:
+    """Names of C files, as the build lists them."""
+    found = re.search(rf"set\({name}([^)]*)\)", (CORE / "CMakeLists.txt").read_text())
+    assert found is not None
+    return found.group(1).split()
 
 
 def decoder_sources() -> list[str]:
-    """Names of the decoder's C files, as the build lists them."""
-    listed = re.search(r"set\(ATH_DECODER_SOURCES([^)]*)\)", (CORE / "CMakeLists.txt").read_text())
-    assert listed is not None
-    return listed.group(1).split()
+    """Names of the decoder's C files."""
+    return listed("ATH_DECODER_SOURCES")
 
 
-def amalgamation() -> str:
-    """The decoder's C files, one after the other, each header in front of the first that includes it."""
+def amalgamation(gpu: bool = False) -> str:
+    """The decoder's C files, with `gpu` those of ath_gpu.h, too, one after the other, each header in front of the first
+    that includes it."""
     seen: set[str] = set()
 
     def whole(name: str) -> str:
-        if name == PUBLIC:
-            return f'#include "{PUBLIC}"\n'
+        if name in PUBLIC:
+            return f'#include "{name}"\n'
         if name.endswith(".h") and name in seen:
             return ""
         seen.add(name)
@@ -36,10 +42,11 @@ def amalgamation() -> str:
             lambda found: whole(found.group(1)), (CORE / name).read_text()
         )
 
-    return "\n".join(whole(name) for name in decoder_sources())
+    return "\n".join(whole(name) for name in decoder_sources() + (listed("ATH_GPU_SOURCES") if gpu else []))
 
 
 if __name__ == "__main__":
-    if len(sys.argv) != 2:
-        sys.exit("usage: amalgamate.py OUT.c")
-    Path(sys.argv[1]).write_text(amalgamation())
+    paths = [argument for argument in sys.argv[1:] if argument != "--gpu"]
+    if len(paths) != 1:
+        sys.exit("usage: amalgamate.py [--gpu] OUT.c")
+    Path(paths[0]).write_text(amalgamation(gpu="--gpu" in sys.argv))

@@ -614,8 +614,7 @@ ATH_HOT static void add_outer(int32_t T, const double *track, const double funct
         }
 }
 
-/* g = mean over the node's vertices of mode(x) (x0 - a), through the whitening twice: the affine part of a mode. */
-static void affine_part(const ath_plan *plan, const ath_node *node, const double *mode, double g[3])
+void ath_affine_part(const ath_plan *plan, const ath_node *node, const double *mode, double g[3])
 {
     const double *a = ath_rest_attach(plan, plan->pieces + node->piece);
     double moment[3] = {0.0, 0.0, 0.0};
@@ -653,7 +652,7 @@ static void map_of_modes(const ath_plan *plan, const ath_motion *motion, const a
     const ath_piece *piece = plan->pieces + node->piece;
     for (int32_t m = 0; m < ath_min(piece->low_modes, ath_rank(piece)); m++) {
         double g[3];
-        affine_part(plan, node, plan->bases + piece->basis + (size_t)m * (size_t)piece->count, g);
+        ath_affine_part(plan, node, plan->bases + piece->basis + (size_t)m * (size_t)piece->count, g);
         inverse_row(motion, piece, rows, m, scratch->track);
         add_outer(motion->frames, scratch->track, g, E);
     }
@@ -675,7 +674,7 @@ static void map_of_shapes(const ath_plan *plan, const ath_motion *motion, const 
     int32_t T = motion->frames, count = ath_min(rows->shape_count, ath_base_shapes(piece));
     double functionals[ATH_SHAPE_MODES][3];
     for (int32_t m = 0; m < ath_shape_modes(piece); m++)
-        affine_part(plan, node, plan->bases + piece->basis + (size_t)m * (size_t)piece->count, functionals[m]);
+        ath_affine_part(plan, node, plan->bases + piece->basis + (size_t)m * (size_t)piece->count, functionals[m]);
     for (int32_t s = 0; s < count; s++) {
         double G[9];
         const double *track = scratch->track + s % 3 * T;

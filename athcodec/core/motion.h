@@ -116,6 +116,9 @@ int32_t ath_row_extent(const int32_t *row, int32_t frames, int32_t most);
 void ath_node_map(const ath_plan *plan, const ath_motion *motion, int32_t n, const ath_piece_rows *piece_rows,
                   const ath_node_rows *rows, const ath_scratch *scratch);
 
+/* g = mean over the node's vertices of mode(x) (x0 - a), through the whitening twice: the affine part of a mode. */
+void ath_affine_part(const ath_plan *plan, const ath_node *node, const double *mode, double g[3]);
+
 /* Integers of three axes over temporal frequency that a track would have in `steps` of the axes, nearest, where they are at least
  * half of their ratio, the step of the layer before over this one's; 0 elsewhere and from `frequencies` on. */
 void ath_predict_track(const ath_stream *stream, int32_t frames, int32_t frequencies, const double steps[3],

@@ -7,6 +7,7 @@
 #include "motion_streams.h"
 #include "predict.h"
 #include "segment.h"
+#include "watch.h"
 
 enum { CHECKSUM_STEP = 1 << 16, TILE = 8, MOST_SHAPES = ATH_SHAPE_NUMBERS };
 
@@ -72,6 +73,7 @@ typedef struct {
     const void *kept;        /* of that; null: nothing */
     kept_head *keeps;        /* what this preparation keeps, written at `keeping`; null: nothing */
     kept_writer keeping;
+    ath_watcher *watcher; /* null: none */
 } preparation;
 
 /* How a segment goes on where the one before it ends. */
@@ -260,6 +262,15 @@ int ath_keep(ath_work *work, void *memory, size_t memory_bytes)
     work->asked.keeping = work->keeping;
     return ATH_OK;
 }
+
+void ath_watch(ath_work *work, ath_watcher *watcher) { work->asked.watcher = watcher; }
+
+const ath_file *ath_watched_file(const ath_work *work) { return work->file; }
+
+int32_t ath_watched_level(const ath_work *work) { return work->asked.level; }
+
+/* Of the segment asked for, not of the one before it. */
+static ath_watcher *watcher_of(const ath_work *work) { return work->only_end ? 0 : work->asked.watcher; }
 
 size_t ath_kept_size(const void *kept) { return (size_t)((const kept_head *)kept)->bytes; }
 
@@ -948,6 +959,13 @@ static void correct_vertex(const corrections_reader *reader, const correction_ro
     }
 }
 
+static void watch_corrections(const ath_work *work, const correction_row *row, int32_t position)
+{
+    ath_watcher *watcher = watcher_of(work);
+    for (int32_t t = 0; t < work->segment->frames; t++)
+        if (has_correction(row, t)) watcher->correction(watcher, position, t, row->of + t, work->corrections.step);
+}
+
 static void correct_piece(ath_work *work, const ath_piece *piece)
 {
     corrections_reader *reader = &work->corrections;
@@ -955,6 +973,7 @@ static void correct_piece(ath_work *work, const ath_piece *piece)
     for (int32_t i = 0; i < piece->count; i++) {
         const correction_row *row = code_vertex(&coder, reader->model, work->segment->frames, 0);
         if (row) correct_vertex(reader, row, work->segment, (size_t)(work->exact + i));
+        if (row && watcher_of(work)) watch_corrections(work, row, work->exact + i);
     }
     reader->coder = coder;
 }
@@ -1039,6 +1058,24 @@ static void join_doubles(const ath_join *join, const double *start, const double
         for (size_t i = 0; i < count; i++) x[i] = joined(join, t, x[i], off[i]);
 }
 
+static double join_number(const void *numbers, size_t at, int is_float64)
+{
+    return is_float64 ? ((const double *)numbers)[at] : (double)((const float *)numbers)[at];
+}
+
+static void watch_join(const ath_work *work, const void *start, const void *end, const void *x, size_t count,
+                       size_t frame_size, int is_float64)
+{
+    double off[3 * ATH_PIECE_VERTICES][2];
+    ath_watcher *watcher = watcher_of(work);
+    const ath_join *join = &work->join;
+    if (!watcher) return;
+    for (size_t i = 0; i < count; i++)
+        set_off(join_number(start, i, is_float64), join_number(end, i, is_float64), join_number(x, i, is_float64),
+                join_number(x, frame_size + i, is_float64), off[i]);
+    watcher->join(watcher, join->width, join->jumps, join->slopes, (int32_t)count, off);
+}
+
 static void join_piece(ath_work *work, const ath_piece *piece)
 {
     ath_segment *segment = work->segment;
@@ -1047,6 +1084,8 @@ static void join_piece(ath_work *work, const ath_piece *piece)
            frame_size = 3 * (size_t)segment->exact_vertices;
     const void *start = vertex_at(segment, join->positions, 0, vertex);
     const void *end = vertex_at(segment, join->positions, 1, vertex);
+    watch_join(work, start, end, vertex_at(segment, segment->positions, 0, vertex), count, frame_size,
+               segment->is_float64);
     if (segment->is_float64)
         join_doubles(join, (const double *)start, (const double *)end, (double *)segment->positions + 3 * vertex, count,
                      frame_size);
@@ -1077,6 +1116,13 @@ static int do_frames(ath_work *work)
     return result == ATH_MORE ? ATH_OK : blame(work, work->predicted, result);
 }
 
+static void watch_piece(const ath_work *work, int32_t p)
+{
+    ath_watcher *watcher = watcher_of(work);
+    const layer_work *layer = work->layers + work->layer;
+    watcher->piece(watcher, layer->plan, &layer->motion, p, &layer->rows);
+}
+
 /* The piece at the first layer, then as each further one refines it. */
 static int place_piece(ath_work *work, int32_t p)
 {
@@ -1086,6 +1132,7 @@ static int place_piece(ath_work *work, int32_t p)
     for (int32_t q = work->first_layer + 1; q <= work->layer; q++)
         if (refine_piece(work, q, p, &placed) != ATH_OK) return ATH_BAD_CHUNK;
     if (work->keeping.at) keep_piece(work, piece);
+    if (watcher_of(work)) watch_piece(work, p);
     store_piece(work, piece, placed);
     keep_end(work, piece);
     if (work->join.width > 0) join_piece(work, piece);
@@ -1111,6 +1158,8 @@ static void show_node(ath_work *work, int32_t n)
     size_t T = (size_t)segment->frames, nodes = (size_t)segment->node_count;
     double *maps = segment->maps + ATH_MAP * (size_t)work->shown++;
     layer_work *layer = work->layers;
+    ath_watcher *watcher = watcher_of(work);
+    if (watcher) watcher->node(watcher, layer->plan, &layer->motion, n, &layer->rows, &work->node);
     ath_node_map(layer->plan, &layer->motion, n, &layer->rows, &work->node, &layer->scratch);
     for (size_t t = 0; t < T; t++) {
         double *map = maps + t * nodes * ATH_MAP;
@@ -1119,6 +1168,7 @@ static void show_node(ath_work *work, int32_t n)
     }
     if (work->join.width == 0) return;
     const double *end = work->join.maps + (maps - segment->maps);
+    watch_join(work, end, end + nodes * ATH_MAP, maps, ATH_MAP, nodes * ATH_MAP, 1);
     join_doubles(&work->join, end, end + nodes * ATH_MAP, maps, ATH_MAP, nodes * ATH_MAP);
 }
 
@@ -1155,6 +1205,7 @@ static int finish(ath_work *work)
     ath_cut(work->file, work->level, work->segment->parts);
     work->segment->index = work->index;
     work->segment->level = work->level;
+    if (watcher_of(work)) watcher_of(work)->done(watcher_of(work), &work->layers[work->layer].motion, work->segment);
     if (work->keeping.at) work->keeps->bytes = (uint64_t)(work->keeping.at - (uint8_t *)work->keeps);
     work->phase = DONE;
     return ATH_OK;

@@ -1,0 +1,291 @@
+"""The three passes of docs/gpu.md in NumPy, in float32 as a GPU has them: what shows that the blocks are whole, and a
+program to read beside the shaders."""
+
+from __future__ import annotations
+
+import numpy as np
+
+NODE, FOLLOWS, FITTED = 1, 2, 4
+MOVED = 1 << 31
+SHIFT, ROTATION, WIDE = 64, 65, 128
+POLAR_ITERATIONS = 4
+FOOTPRINTS = np.array([[32, 0, 0, 0], [32, 16, 0, 0], [32, 27, 16, 5]])
+"""Of widths: parts of a correction so many frames from its own."""
+
+LEVEL = np.dtype(
+    [(name, "<u4") for name in "words level vertex_count body_count position_count matrix_count depth_count".split()]
+    + [(name, "<u4") for name in "vertices bodies order depths bases".split()]
+    + [("origin", "<f4", 3), ("reserved", "<u4")]
+)
+VERTEX = np.dtype([("rest", "<f4", 3), ("binding", "<u4")])
+BODY = np.dtype(
+    [("flags", "<u4"), ("parent", "<i4"), ("attach", "<i4"), ("way", "<u4"), ("modes", "<u4")]
+    + [("first", "<i4"), ("count", "<i4"), ("vertex", "<i4"), ("basis", "<u4"), ("shape_modes", "<u4")]
+    + [("rest_point", "<f4", 3), ("tangent", "<f4", 3)]
+)
+ROW = np.dtype([("values", "<u4"), ("count", "<u2"), ("slot", "u1"), ("waves", "u1"), ("step", "<f4")])
+MOVE = np.dtype([("row", "<u4"), ("rows", "<u2"), ("shape_count", "<u2"), ("shapes", "<u4"), ("turn", "<u4")])
+CORRECTION = np.dtype([("value", "<i2", 3), ("frame", "u1"), ("width", "u1")])
+SEGMENT = np.dtype(
+    [(name, "<u4") for name in "words level segment frames join_frames row_count corrected_count".split()]
+    + [("correction_part", "<f4")]
+    + [(name, "<u4") for name in "moves rows values shapes turns join_curve join_steps joins matrix_joins".split()]
+    + [(name, "<u4") for name in "corrected corrections baked".split()]
+    + [("wave_sets", "<u4", 34)]
+)
+
+
+def section(words: np.ndarray, at: int, dtype, count: int) -> np.ndarray:
+    """Records of a block."""
+    size = np.dtype(dtype).itemsize // 4
+    return words[at : at + size * count].view(dtype)
+
+
+def head(words: np.ndarray, dtype: np.dtype) -> np.void:
+    """The header of a block."""
+    return section(words, 0, dtype, 1)[0]
+
+
+class Passes:
+    """What the blocks of a level and of one of its segments show at some of the segment's frames.
+
+    Attributes
+    ----------
+    positions : (frames, positions, 3) float32
+    matrices : (frames, matrices, 3, 4) float32, from rest positions to positions
+    """
+
+    def __init__(self, level: np.ndarray, segment: np.ndarray, frames: np.ndarray):
+        self._level, self._segment, self._frames = level, segment, np.asarray(frames)
+        self._of_level, self._of = head(level, LEVEL), head(segment, SEGMENT)
+        self._vertices = section(level, self._of_level["vertices"], VERTEX, self._of_level["vertex_count"])
+        self._bodies = section(level, self._of_level["bodies"], BODY, self._of_level["body_count"])
+        self._moves = section(segment, self._of["moves"], MOVE, len(self._bodies))
+        count = len(self._frames)
+        self.positions = np.zeros((count, self._of_level["position_count"], 3), np.float32)
+        self.matrices = np.zeros((count, self._of_level["matrix_count"], 3, 4), np.float32)
+        self._attach = np.zeros((count, len(self._bodies), 3, 4), np.float32)
+        if self._of["baked"]:
+            shape = self._of["frames"], *self.positions.shape[1:]
+            self.positions[:] = section(segment, self._of["baked"], "<f4", np.prod(shape)).reshape(shape)[self._frames]
+            return
+        self._modes: dict[int, np.ndarray] = {}  # of pieces, (modes, 3, frames)
+        self._amplitudes = self._over_time()
+        for body in section(level, self._of_level["order"], "<u4", len(self._bodies)):
+            self._place(int(body))
+        self._join()
+        self._correct()
+        self._finish_matrices()
+
+    # ---- pass 1: time ----
+
+    def _over_time(self) -> np.ndarray:
+        """(rows, 3, frames) float32."""
+        rows = section(self._segment, self._of["rows"], ROW, self._of["row_count"])
+        out = np.zeros((len(rows), 3, len(self._frames)), np.float32)
+        for i, row in enumerate(rows):
+            first = self._of["wave_sets"][row["waves"] & (WIDE - 1)]
+            waves = section(self._segment, first, "<f4", row["count"] * self._of["frames"])
+            waves = waves.reshape(row["count"], -1)[:, self._frames]
+            out[i] = row["step"] * (self._values(row).astype(np.float32) @ waves)
+        return out
+
+    def _values(self, row: np.void) -> np.ndarray:
+        at, count = self._of["values"] + row["values"], 3 * int(row["count"])
+        if row["waves"] & WIDE:
+            return section(self._segment, at, "<i4", count).reshape(3, -1)
+        return self._segment[at : at + (count + 1) // 2].view("<i2")[:count].reshape(3, -1)
+
+    # ---- pass 2: hierarchy ----
+
+    def _place(self, b: int) -> None:
+        body, move = self._bodies[b], self._moves[b]
+        rows = section(self._segment, self._of["rows"] + 3 * move["row"], ROW, move["rows"])
+        tracks = dict(zip(rows["slot"].tolist(), self._amplitudes[move["row"] :], strict=False))
+        point, rotation = self._hung(body)
+        if SHIFT in tracks:
+            point = point + tracks[SHIFT].T
+        if ROTATION in tracks:
+            turn = section(self._segment, self._of["turns"] + move["turn"], "<f4", 9).reshape(3, 3)
+            rotation = rotation @ rotations(tracks[ROTATION].T @ turn.T)
+        modes = self._modes[b] = self._modes_of(body, move, tracks)
+        local = np.tensordot(modes, self._basis(body["basis"], len(modes), body["count"]), (0, 0)).transpose(1, 2, 0)
+        if body["flags"] & NODE:
+            matrix = np.swapaxes(np.eye(3, dtype=np.float32) + local, 1, 2)  # its columns are the three positions
+            self.matrices[:, body["first"], :, :3] = rotation @ matrix
+            self.matrices[:, body["first"], :, 3] = point
+            return
+        offsets = self._offsets(body)
+        placed = np.einsum("tij,tvj->tvi", rotation, offsets + local) + point[:, None]
+        self.positions[:, body["first"] : body["first"] + body["count"]] = placed
+        if body["flags"] & FITTED:
+            rotation = rotation @ fitted(offsets, offsets + local)
+        self._attach[:, b, :, :3], self._attach[:, b, :, 3] = rotation, point
+
+    def _offsets(self, body: np.void) -> np.ndarray:
+        rest = self._vertices["rest"][body["vertex"] : body["vertex"] + body["count"]]
+        return rest - body["rest_point"]
+
+    def _hung(self, body: np.void) -> tuple[np.ndarray, np.ndarray]:
+        """Where a body hangs, before it is moved and turned itself."""
+        count = len(self._frames)
+        if body["parent"] < 0:
+            return np.tile(body["rest_point"], (count, 1)), np.tile(np.eye(3, dtype=np.float32), (count, 1, 1))
+        base = self._attach[:, body["parent"]]
+        point, rotation = self.positions[:, body["attach"]], base[:, :, :3]
+        if body["flags"] & FOLLOWS:
+            modes = self._modes[body["parent"]]
+            way = np.tensordot(modes, self._basis(body["way"], len(modes), 1)[:, 0], (0, 0)).T
+            rotation = rotation @ between(unit(body["tangent"]), unit(body["tangent"] + way))
+        return point, rotation
+
+    def _basis(self, at: int, modes: int, count: int) -> np.ndarray:
+        return section(self._level, self._of_level["bases"] + at, "<f4", modes * count).reshape(modes, count)
+
+    def _modes_of(self, body: np.void, move: np.void, tracks: dict[int, np.ndarray]) -> np.ndarray:
+        """(modes, 3, frames): what each mode is."""
+        modes = {slot: track for slot, track in tracks.items() if slot < SHIFT}
+        if move["shape_count"] > 0:
+            modes = self._unshaped(body, move, modes)
+        out = np.zeros((body["modes"], 3, len(self._frames)), np.float32)
+        for mode, track in modes.items():
+            out[mode] = track
+        return out
+
+    def _unshaped(self, body: np.void, move: np.void, rows: dict[int, np.ndarray]) -> dict[int, np.ndarray]:
+        """Modes that shapes are made of, in place of the rows of shapes."""
+        modes, count = int(body["shape_modes"]), int(move["shape_count"])
+        shapes = section(self._segment, self._of["shapes"] + move["shapes"], "<f4", 3 * modes * count)
+        shapes = shapes.reshape(count, modes, 3)
+        out = {slot: track for slot, track in rows.items() if slot >= modes}
+        sums = np.zeros((modes, 3, len(self._frames)), np.float32)
+        for slot, track in rows.items():
+            for axis in range(3):
+                shape = 3 * slot + axis
+                if slot < modes and shape < count:
+                    sums += shapes[shape][:, :, None] * track[axis]
+        return out | dict(enumerate(sums))
+
+    # ---- between passes: joins, corrections ----
+
+    def _join(self) -> None:
+        frames = self._of["join_frames"]
+        joined = self._frames < frames
+        if not joined.any():
+            return
+        curve = section(self._segment, self._of["join_curve"], "<f4", 2 * frames).reshape(-1, 2)[self._frames[joined]]
+        count = self.positions.shape[1]
+        integers = section(self._segment, self._of["joins"], "<i2", 3 * count)  # words
+        integers = self._segment[self._of["joins"] : self._of["joins"] + 3 * count].view("<i2").reshape(count, 3, 2)
+        steps = section(self._segment, self._of["join_steps"], "<f4", 2 * len(self._bodies)).reshape(-1, 2)
+        is_piece = (self._bodies["flags"] & NODE) == 0
+        off = integers * np.repeat(steps[is_piece], self._bodies["count"][is_piece], axis=0)[:, None]
+        self.positions[joined] += np.einsum("vak,tk->tva", off, curve)
+        at, size = self._of["matrix_joins"], 24 * self.matrices.shape[1]
+        off = section(self._segment, at, "<f4", size).reshape(-1, 12, 2)
+        added = np.einsum("mik,tk->tmi", off, curve)
+        self.matrices[joined, :, :, :3] += added[:, :, :9].reshape(*added.shape[:2], 3, 3)
+        self.matrices[joined, :, :, 3] += added[:, :, 9:]
+
+    def _correct(self) -> None:
+        count = self._of["corrected_count"]
+        if not count:
+            return
+        corrected = section(self._segment, self._of["corrected"], "<u4", 2 * count + 2).reshape(-1, 2)
+        corrections = section(self._segment, self._of["corrections"], CORRECTION, corrected[-1, 1])
+        positions = np.repeat(corrected[:-1, 0], np.diff(corrected[:, 1]))
+        parts = FOOTPRINTS[corrections["width"] & 15] << (corrections["width"] >> 4)[:, None]
+        away = np.abs(self._frames[:, None] - corrections["frame"])
+        part = np.where(away < 4, np.take_along_axis(parts, np.minimum(away, 3).T, axis=1).T, 0)
+        sums = np.zeros(self.positions.shape)
+        for i in range(len(self._frames)):
+            np.add.at(sums[i], positions, corrections["value"] * part[i][:, None])
+        self.positions += (sums * self._of["correction_part"]).astype(np.float32)
+
+    def _finish_matrices(self) -> None:
+        """From R and c of x = c + R (x0 - a) to what is added to R x0."""
+        points = self._bodies["rest_point"][(self._bodies["flags"] & NODE) != 0]
+        self.matrices[:, :, :, 3] -= np.einsum("tmij,mj->tmi", self.matrices[:, :, :, :3], points)
+
+    # ---- pass 3: vertices ----
+
+    def vertices(self) -> np.ndarray:
+        """(frames, vertices, 3) float32 in file order, relative to the origin."""
+        binding = self._vertices["binding"]
+        moved, index = (binding & MOVED) != 0, (binding & ~np.uint32(MOVED)).astype(int)
+        out = np.empty((len(self._frames), len(binding), 3), np.float32)
+        out[:, ~moved] = self.positions[:, index[~moved]]
+        matrices = self.matrices[:, index[moved]]
+        rest = self._vertices["rest"][moved]
+        out[:, moved] = np.einsum("tvij,vj->tvi", matrices[..., :3], rest) + matrices[..., 3]
+        return out
+
+
+def rotations(omega: np.ndarray) -> np.ndarray:
+    """(..., 3, 3): of the quaternions normalize(1, omega / 4) squared."""
+    return squared(np.float32(0.25) * omega)
+
+
+def squared(half: np.ndarray) -> np.ndarray:
+    """Rotations of the quaternions normalize(1, half) squared."""
+    n2 = (half * half).sum(-1, keepdims=True)
+    scale = 1 / (1 + n2)
+    w = ((1 - n2) * scale)[..., 0]
+    x, y, z = np.moveaxis(2 * half * scale, -1, 0)
+    return np.stack(
+        [
+            np.stack([1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)], -1),
+            np.stack([2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)], -1),
+            np.stack([2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)], -1),
+        ],
+        -2,
+    )
+
+
+def unit(v: np.ndarray) -> np.ndarray:
+    """Vectors of length 1; those that vanish as they are."""
+    n2 = (v * v).sum(-1, keepdims=True)
+    return v / np.sqrt(np.where(n2 > 1e-30, n2, 1))
+
+
+def between(u: np.ndarray, v: np.ndarray) -> np.ndarray:
+    """Rotations by the least angle from one vector of length 1 to others; beyond a right angle by less and less."""
+    cosine, axis = (u * v).sum(-1), np.cross(u, v)
+    w, sine2 = 1 + np.maximum(cosine, 0), (axis * axis).sum(-1)
+    h = 2 / (w * w + sine2)
+    x, y, z = np.moveaxis(axis, -1, 0)
+    zero = np.zeros_like(x)
+    cross = np.stack([np.stack([zero, -z, y], -1), np.stack([z, zero, -x], -1), np.stack([-y, x, zero], -1)], -2)
+    turn = h[:, None, None] * axis[:, :, None] * axis[:, None] + (h * w)[:, None, None] * cross
+    return turn + (1 - h * sine2)[:, None, None] * np.eye(3, dtype=np.float32)
+
+
+def fitted(offsets: np.ndarray, placed: np.ndarray) -> np.ndarray:
+    """The rotations nearest to what took the offsets of a sheet to where they are, with a hundredth of none."""
+    identity = np.eye(3, dtype=np.float32)
+    H = np.einsum("tvi,vj->tij", placed, offsets) + np.float32(0.01) * (offsets * offsets).sum() * identity
+    norm2 = (H * H).sum((1, 2), keepdims=True)
+    H, out = H / np.sqrt(np.where(norm2 > 1e-30, norm2, 1)), np.broadcast_to(identity, H.shape)
+    for _ in range(POLAR_ITERATIONS):
+        out = turned_towards(H, out)
+    return np.where(norm2 > 1e-30, out, identity)
+
+
+def turned_towards(H: np.ndarray, R: np.ndarray) -> np.ndarray:
+    """A step of Newton's method to the rotations nearest to H."""
+    C = H @ np.swapaxes(R, 1, 2)
+    axial = np.stack([C[:, 2, 1] - C[:, 1, 2], C[:, 0, 2] - C[:, 2, 0], C[:, 1, 0] - C[:, 0, 1]], -1)
+    most = np.maximum(np.trace(C, axis1=1, axis2=2), 1) + np.float32(1e-6)
+    A = most[:, None, None] * np.eye(3, dtype=np.float32) - (C + np.swapaxes(C, 1, 2)) / 2
+    a, b, c, d, e, f = A[:, 0, 0], A[:, 1, 1], A[:, 2, 2], A[:, 0, 1], A[:, 0, 2], A[:, 1, 2]
+    adjugate = np.stack(
+        [
+            np.stack([b * c - f * f, e * f - d * c, d * f - e * b], -1),
+            np.stack([e * f - d * c, a * c - e * e, d * e - a * f], -1),
+            np.stack([d * f - e * b, d * e - a * f, a * b - d * d], -1),
+        ],
+        -2,
+    )
+    determinant = a * adjugate[:, 0, 0] + d * adjugate[:, 0, 1] + e * adjugate[:, 0, 2]
+    half = np.einsum("tij,tj->ti", adjugate, axial) * (np.float32(0.25) / determinant)[:, None]
+    return squared(half) @ R
