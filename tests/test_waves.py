@@ -9,7 +9,7 @@ import athcodec
 from athcodec.encoding.motion import Waves, waves_over_time
 from spec import reference_decoder as rd
 
-FRAMES = (1, 2, 3, 4, 5, 8, 31, 64, 121, 200, 255, 256)
+FRAMES = (1, 2, 3, 4, 5, 8, 31, 64, 121, 200, 255, 256, 270)
 
 
 @pytest.mark.parametrize("kind", Waves)

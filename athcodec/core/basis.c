@@ -475,17 +475,17 @@ static void mode_wave(int32_t frames, int32_t k, const mode_order *order, double
 {
     mode own = find_mode(frames, k, order);
     double sign = k % 2 == 0 ? 1.0 : -1.0, cosine = 1.0 / ath_sqrt(1.0 + own.slope * own.slope);
-    double sine = own.slope * cosine, fall[ATH_SEGMENT_FRAMES];
+    double sine = own.slope * cosine;
     double c = own.cosine * cosine - own.sine * sine, s = own.sine * cosine + own.cosine * sine;
     double turn_c = 1.0 - 2.0 * own.sine * own.sine, turn_s = 2.0 * own.sine * own.cosine;
     complex_number edge = {sine * order->edge.re, sine * order->edge.im}, decay = times(own.decay, own.decay);
     edge = times(times(edge, own.apart), own.decay);
     for (int32_t t = 0; t < frames; t++) {
-        fall[t] = edge.re;
+        wave[t] = edge.re;
         edge = times(edge, decay);
     }
     for (int32_t t = 0; 2 * t < frames; t++) {
-        double x = c + (fall[t] + sign * fall[frames - 1 - t]), turned = c * turn_c - s * turn_s;
+        double x = c + (wave[t] + sign * wave[frames - 1 - t]), turned = c * turn_c - s * turn_s;
         wave[frames - 1 - t] = sign * x;
         wave[t] = x;
         s = s * turn_c + c * turn_s;
