@@ -21,7 +21,7 @@ import athcodec
 from athcodec import container as ct
 from athcodec.ath import Thresholds, survey
 from athcodec.encoding.search import Search
-from athcodec.encoding.segment import CodedPrelude, Settings, Source, code_stems
+from athcodec.encoding.segment import Coded, CodedPrelude, Settings, Source, code_stems
 from athcodec.encoding.streams import encode_learned_modes
 from athcodec.hierarchy import hierarchy_of
 from athcodec.metrics import ErrorMeter
@@ -195,6 +195,11 @@ def _serves_levels(chunk: ct.Chunk, last: int) -> bool:
     return chunk.kind == ct.AFFINES or (chunk.kind in (ct.STEMS, ct.SHAPES) and chunk.level < last)
 
 
+def _bytes_of(coded: Coded) -> int:
+    """Of the streams of a segment, and of its corrections: of all vertices, where those of some were sought."""
+    return sum(map(len, coded.stems.values())) + round(len(coded.corrections.chunk) / coded.sample_share)
+
+
 class _Recoding:
     """The clip coded by the encoder's own stages, at the settings that the encoder finds."""
 
@@ -231,4 +236,4 @@ class _Recoding:
         learned_modes = self._search.learned_modes(prelude.plan, settings)
         of_shapes = sum(map(len, encode_learned_modes(prelude.plan, learned_modes).values()))
         coded = (code_stems(prelude, settings, positions, learned_modes) for positions in self._positions)
-        return of_shapes + sum(stems.bytes for stems in coded)
+        return of_shapes + sum(map(_bytes_of, coded))

@@ -590,7 +590,9 @@ static void make_orthonormal(const double *rows, int32_t before, int32_t T, doub
 void ath_add_basis_rows(const double *waves, int32_t T, int32_t known, int32_t count, const int32_t *exponents,
                         const int32_t *integers, double *rows)
 {
-    ath_stream stream = {.temporal = waves};
+    ath_stream stream;
+    memset(&stream, 0, sizeof stream);
+    stream.temporal = waves;
     for (int32_t r = 0; r < count; r++) {
         double *row = rows + (size_t)(known + r) * (size_t)T;
         ath_inverse_temporal(&stream, T, T, half_octave(exponents[r]), integers + (size_t)r * (size_t)T, row);

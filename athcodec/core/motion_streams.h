@@ -213,7 +213,12 @@ static basis_model basis_model_of(coefficient_model *rows, number_model *steps, 
 {
     coefficient_model_init(rows, frames, history);
     number_model_init(steps);
-    return (basis_model){.rows = rows, .steps = steps, .above_count = -1};
+    basis_model model;
+    model.rows = rows;
+    model.steps = steps;
+    model.step_before = 0;
+    model.above_count = -1;
+    return model;
 }
 
 /* ---- corrections ---- */

@@ -163,7 +163,7 @@ def _prelude_inputs(data: bytes) -> Iterator[bytes]:
     if time[0] == 2:
         yield _prelude_head(*counts, 4, step, len(hierarchy) - 8) + hierarchy[8:] + time[1:]
     for chunk, payload in parts.chunks:
-        if chunk.kind == ct.STEMS and payload[5]:
+        if chunk.kind == ct.STEMS and payload[5] >= 8:
             bits, (length,) = payload[5], struct.unpack_from("<I", payload, 8)
             stream = payload[12 : 12 + length]
             yield _prelude_head(*counts, 8 | bits - 8 << 4 & 255, step, 0) + stream
