@@ -18,7 +18,8 @@ from athcodec.frames import Frames
 from athcodec.hierarchy import Hierarchy
 
 LARGE = 5_000  # vertices: smaller plants are not sampled
-LEAST_SAMPLE, MOST_SAMPLE = 3_500, 1 << 16  # vertices of a sample
+LEAST_SAMPLE, ENOUGH, MOST_SAMPLE = 3_500, 6_000, 1 << 16  # vertices of a sample; between the first two its share
+LEAST_SHARE = 0.4  # of the plant
 SEGMENT_SHARE = 1 / 64  # of the plant that each segment of the clip adds to a sample
 SUBTREES = 8  # of a sample, at least
 
@@ -149,7 +150,8 @@ def sample_vertices(vertices: int, segments: int, effort: str) -> int | None:
     """About how many vertices a sample has; None: the plant is not sampled."""
     if vertices <= LARGE or effort == "best":
         return None
-    return min(max(int(vertices * segments * SEGMENT_SHARE), LEAST_SAMPLE), MOST_SAMPLE)
+    least = min(max(int(vertices * LEAST_SHARE), LEAST_SAMPLE), ENOUGH)
+    return min(max(int(vertices * segments * SEGMENT_SHARE), least), MOST_SAMPLE)
 
 
 def _even_branches(hierarchy: Hierarchy, wanted: int, deepest: int) -> np.ndarray:
