@@ -22,7 +22,7 @@ from bench.suite import SUITES, Case, cases
 from bench.tables import table
 
 BOUNDS = (1e-3, 1e-4, 1e-5)
-CLIPS = ("sample", "mj_1k_200f", "leaves_8k_60f", "grass", "scanned", "growth_carried", "cube", "morph")
+CLIPS = ("sample", "mj_1k_200f", "canopy_4k_60f", "grass", "scanned", "growth_carried", "cube", "morph")
 OPTIONS: Mapping[Feature, dict[str, Any]] = {  # of files that can have the feature, beside those of all
     Feature.RIGID: {"rest_error": None},
     Feature.FREE_RIGID: {"rest_error": None},

@@ -656,11 +656,7 @@ class Plant:
             Entry(rd.TIME, self.time or steady_times(*[(0.0, 0.25)] * len(clips))),
         ]
         if self.clips:
-            entries.append(
-                Entry(
-                    rd.CLIPS, b"".join(clip_entry(clip.frames, clip.segments, clip.name, clip.seams) for clip in clips)
-                )
-            )
+            entries.append(Entry(rd.CLIPS, b"".join(clip.entry() for clip in clips)))
         if self.source_rest is not None:
             entries.append(Entry(rd.SOURCE_REST, self.source_rest))
         if self.faces is not None:

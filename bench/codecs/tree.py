@@ -143,7 +143,7 @@ def _shaped(mask: np.ndarray, like: np.ndarray) -> np.ndarray:
 
 
 def write_pose(writer: Writer, order: VertexOrder, pose: np.ndarray, step: float) -> np.ndarray:
-    """A static pose, (N, 3), at a step, with the range coder as a rest pose of a file; returns what a reader will get."""
+    """A static pose, (N, 3), at a step, by the range coder as a rest pose of a file; returns what a reader will get."""
     step = writer.single(step)
     if isinstance(writer.coder, RangeCoder):
         return writer.pose(order.branches, _lags(order, pose, step), step, pose)
