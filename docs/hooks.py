@@ -21,7 +21,11 @@ SHOWN = (
     "athcodec/viewer/*.d.ts",
     "athcodec/viewer/src/index.d.ts",
     "athcodec/exporters/vat.md",
+    "athcodec/gpu/*.wgsl",
+    "athcodec/gpu/*.mjs",
+    "athcodec/gpu/*.py",
     "athcodec/core/ath.h",
+    "athcodec/core/ath_gpu.h",
     "athcodec/core/ath_player.h",
     "athcodec/core/examples/play.c",
 )
