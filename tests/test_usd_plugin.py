@@ -1,0 +1,243 @@
+"""USD itself opens .ath files: stages reference them, and their samples are what decoding gives."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from files import Parts
+from moving_meshes import mixed_clip
+from programs import run_script, usd_plugin_python
+
+import athcodec
+from athcodec import container as ct
+from athcodec.cli import main
+
+pytestmark = pytest.mark.programs
+
+COMPARE = """
+import json, sys
+import numpy as np
+from pxr import Usd, UsdGeom
+path, known, prims = sys.argv[1], np.load(sys.argv[2])["positions"], json.loads(sys.argv[3])
+stage = Usd.Stage.Open(path)
+shown = [UsdGeom.PointBased(stage.GetPrimAtPath(prim)) for prim in prims]
+codes = shown[0].GetPointsAttr().GetTimeSamples()
+assert len(codes) == len(known), codes
+for code, frame in zip(codes, known):
+    points = [np.array(prim.GetPointsAttr().Get(code)) for prim in shown]
+    assert np.array_equal(np.concatenate(points), frame), code
+    for own, prim in zip(points, shown):
+        low, high = np.array(prim.GetExtentAttr().Get(code))
+        assert (low <= own.min(axis=0)).all() and (high >= own.max(axis=0)).all()
+print(json.dumps({
+    "codes": codes, "rate": stage.GetTimeCodesPerSecond(), "unit": UsdGeom.GetStageMetersPerUnit(stage),
+    "up": UsdGeom.GetStageUpAxis(stage), "default": str(stage.GetDefaultPrim().GetPath()),
+    "types": [prim.GetPrim().GetTypeName() for prim in shown],
+}))
+"""
+
+
+def script(text: str, *arguments: object) -> dict:
+    return json.loads(run_script(usd_plugin_python(), text, *arguments).splitlines()[-1])
+
+
+def decoded(file: Path, clip: str | None = None, level: int | None = None) -> Path:
+    out = file.with_suffix(".npz")
+    with athcodec.open(file) as opened:
+        frames = (opened if clip is None else opened.play(clip)).positions(level=level)
+    np.savez(out, positions=frames.astype(np.float32, copy=False))
+    return out
+
+
+@pytest.fixture(scope="module")
+def mesh_ath(tmp_path_factory):
+    """A file of several objects, with polygons and arrays of all domains."""
+    file = tmp_path_factory.mktemp("usd") / "mixed.ath"
+    clip = mixed_clip(fps=24.0, start=1001)
+    athcodec.encode(clip, file, rel_error=1e-3)
+    return file, clip
+
+
+def test_a_stage_has_the_positions_that_decoding_gives(sample_ath):
+    found = script(COMPARE, sample_ath, decoded(sample_ath), json.dumps(["/clip/plant"]))
+    assert found["types"] == ["BasisCurves"] and found["default"] == "/clip"
+    assert found["rate"] == 30 and found["unit"] == 1 and found["up"] == "Y"
+
+
+def test_objects_polygons_and_arrays_are_those_that_decode_writes(mesh_ath, tmp_path):
+    file, clip = mesh_ath
+    written = tmp_path / "written.usda"
+    assert main(["decode", str(file), str(written)]) == 0
+    prims = script(
+        """
+import json, sys
+import numpy as np
+from pxr import Usd
+OWN = "athcodec"
+def described(path):
+    stage, prims = Usd.Stage.Open(path), {}
+    for prim in stage.GetDefaultPrim().GetChildren():
+        own = {}
+        for attribute in prim.GetAuthoredAttributes():
+            value = attribute.Get(1001)
+            own[attribute.GetName()] = [
+                str(attribute.GetTypeName()), attribute.GetMetadata("interpolation"),
+                attribute.GetMetadata("elementSize") or 1,
+                np.asarray(value).tolist() if not isinstance(value, str) else value, attribute.GetNumTimeSamples(),
+            ]
+        prims[prim.GetName()] = [str(prim.GetTypeName()), own]
+    return prims
+ours, theirs = described(sys.argv[1]), described(sys.argv[2])
+assert ours == theirs, (ours, theirs)
+print(json.dumps({name: [kind, sorted(own)] for name, (kind, own) in ours.items()}))
+""",
+        file,
+        written,
+    )
+    assert len(prims) == len(clip.metadata["part_names"]) > 1
+    assert {kind for kind, _ in prims.values()} == {"Mesh", "BasisCurves"}
+
+
+def test_clips_are_variants_and_can_be_asked_for_by_name(medley_ath, medley_clips):
+    names = list(medley_clips)
+    text = """
+import json, sys
+import numpy as np
+from pxr import Usd
+stage = Usd.Stage.CreateInMemory()
+prim = stage.DefinePrim("/tree")
+prim.GetReferences().AddReference(sys.argv[1])
+clips = prim.GetVariantSet("clip")
+assert clips.GetVariantNames() == json.loads(sys.argv[3]) and clips.GetVariantSelection() == sys.argv[4]
+clips.SetVariantSelection(sys.argv[5])
+points = stage.GetPrimAtPath("/tree/plant").GetAttribute("points")
+for code, frame in zip(points.GetTimeSamples(), np.load(sys.argv[2])["positions"], strict=True):
+    assert np.array_equal(np.array(points.Get(code)), frame)
+one = Usd.Stage.Open(f"{sys.argv[1]}:SDF_FORMAT_ARGS:clip={sys.argv[5]}")
+assert not one.GetDefaultPrim().HasVariantSets()
+alone = one.GetPrimAtPath("/clip/plant").GetAttribute("points")
+own, shared = np.array(alone.GetTimeSamples()), np.array(points.GetTimeSamples())
+assert np.allclose(own / one.GetTimeCodesPerSecond(), shared / stage.GetTimeCodesPerSecond(), rtol=0, atol=1e-5)
+print(json.dumps(np.array_equal(alone.Get(own[3]), points.Get(shared[3]))))
+"""
+    last = names[-1]
+    assert script(text, medley_ath, decoded(medley_ath, last), json.dumps(sorted(names)), names[0], last)
+
+
+def test_a_level_can_be_asked_for(sample_ath):
+    path = f"{sample_ath}:SDF_FORMAT_ARGS:level=1"
+    script(COMPARE, path, decoded(sample_ath, level=1), json.dumps(["/clip/plant"]))
+
+
+def test_flattened_and_exported_stages_hold_all_samples(sample_ath, tmp_path):
+    text = """
+import json, sys
+import numpy as np
+from pxr import Sdf, Usd
+stage = Usd.Stage.CreateInMemory()
+stage.DefinePrim("/tree").GetPayloads().AddPayload(sys.argv[1])
+flat = stage.Flatten().ExportToString()
+path = sys.argv[3] + "/copied.usdc"
+assert Sdf.Layer.FindOrOpen(sys.argv[1]).Export(path)
+copied = Usd.Stage.Open(path)
+copy = copied.GetPrimAtPath("/clip/plant").GetAttribute("points")
+for code, frame in zip(copy.GetTimeSamples(), np.load(sys.argv[2])["positions"], strict=True):
+    assert np.array_equal(np.array(copy.Get(code)), frame)
+print(json.dumps(flat.count("point3f[] points.timeSamples")))
+"""
+    assert script(text, sample_ath, decoded(sample_ath), tmp_path) == 1
+
+
+def test_a_hundred_stages_are_open_at_once_on_several_threads(sample_ath):
+    text = """
+import json, sys
+from concurrent.futures import ThreadPoolExecutor
+import numpy as np
+from pxr import Usd
+known = np.load(sys.argv[2])["positions"]
+stages = [Usd.Stage.Open(sys.argv[1]) for _ in range(100)]
+def right(number):
+    frame = number * 37 % len(known)
+    points = stages[number % 100].GetPrimAtPath("/clip/plant").GetAttribute("points").Get(frame)
+    return np.array_equal(np.array(points), known[frame])
+with ThreadPoolExecutor(8) as pool:
+    print(json.dumps(all(pool.map(right, range(400)))))
+"""
+    assert script(text, sample_ath, decoded(sample_ath))
+
+
+@pytest.mark.parametrize(
+    "what, says",
+    [
+        ("cut", "expected"),
+        ("other", "Cannot determine file format|not an .ath|ath"),
+        ("clip=nope", 'clip: got "nope"; expected one of'),
+        ("level=99", 'level: got "99"; expected 0 to'),
+        ("level=", "level"),
+    ],
+)
+def test_what_cannot_be_opened_is_one_error_that_names_the_file(sample_ath, tmp_path, what, says):
+    bad, data = tmp_path / "bad.ath", sample_ath.read_bytes()
+    bad.write_bytes({"cut": data[:100], "other": b"nothing of the kind"}.get(what, data))
+    path = f"{bad}:SDF_FORMAT_ARGS:{what}" if "=" in what else str(bad)
+    text = """
+import json, sys
+from pxr import Sdf, Tf
+try:
+    layer = Sdf.Layer.FindOrOpen(sys.argv[1])
+    print(json.dumps(["", bool(layer)]))
+except Tf.ErrorException as error:
+    print(json.dumps([str(error), False]))
+"""
+    error, opened = script(text, path)
+    assert not opened and "bad.ath" in error
+    assert any(part in error for part in says.split("|"))
+
+
+def test_damaged_motion_is_reported_once_and_other_segments_play(tmp_path, sample_clip):
+    file = tmp_path / "damaged.ath"
+    athcodec.encode(sample_clip, file, rel_error=1e-3, segment_frames=40, ladder="none")
+    data = bytearray(file.read_bytes())
+    last = next(c for c, _ in Parts.of(bytes(data)).chunks if c.kind == ct.STEMS and c.segment == 2)
+    data[last.offset + last.length // 2] ^= 1
+    file.write_bytes(data)
+    text = """
+import json, sys
+import numpy as np
+from pxr import Tf, Usd
+stage = Usd.Stage.Open(sys.argv[1])
+points = stage.GetPrimAtPath("/clip/plant").GetAttribute("points")
+said = []
+for frame in (0, 100, 110):
+    try:
+        said.append(["", len(points.Get(frame) or [])])
+    except Tf.ErrorException as error:
+        said.append([str(error), 0])
+print(json.dumps(said))
+"""
+    first, second, third = script(text, file)
+    assert first == ["", sample_clip.vertex_count]
+    assert "damaged.ath" in second[0] and second[1] == third[1] == 0 and third[0] == ""
+
+
+def test_a_thousand_references_share_one_decoder(sample_ath):
+    text = """
+import json, sys, time
+import numpy as np
+from pxr import Usd, UsdGeom
+stage = Usd.Stage.CreateInMemory()
+for i in range(1000):
+    stage.DefinePrim(f"/forest/t{i}").GetReferences().AddReference(sys.argv[1])
+
+stage.GetRootLayer().Export(sys.argv[2])
+started = time.perf_counter()
+stage = Usd.Stage.Open(sys.argv[2])
+opened = time.perf_counter()
+prims = [UsdGeom.PointBased(prim) for prim in stage.Traverse() if prim.IsA(UsdGeom.PointBased)]
+sums = [sum(len(prim.GetPointsAttr().Get(frame)) for prim in prims) for frame in range(10)]
+print(json.dumps([opened - started, time.perf_counter() - opened, sums]))
+"""
+    opened, composed, sums = script(text, sample_ath, sample_ath.with_suffix(".usdc"))
+    print(f"1,000 references: opened in {opened:.2f} s, ten frames composed in {composed:.2f} s")
+    assert sums == [1_001_000] * 10
