@@ -1,0 +1,583 @@
+"""Puts a motion into the GLB that it was read from, and back: its vertices move by ATH_motion, all else stays as it is.
+
+What moved them before goes where nothing else needs it: morph targets, skins and their joints, channels of animations,
+and the bytes of these. Meshes keep their bytes where their vertices lie in the motion's space; one that hangs on a
+moving node gets new positions, normals and tangents there and a node of its own. spec/gltf/README.md describes the
+extension.
+"""
+
+from __future__ import annotations
+
+import copy
+import io
+import json
+import os
+import struct
+from collections.abc import Iterator
+from contextlib import closing
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from athcodec.ath_file import AthFile
+from athcodec.atomic_files import new_file
+from athcodec.clip import ClipRange, MotionClip
+from athcodec.clip_view import ClipView
+from athcodec.errors import ClipError
+from athcodec.exporters.gltf import check_morphs
+from athcodec.exporters.gltf_build import COMPONENTS, TYPES, VERTICES, takes
+from athcodec.frames import Frames
+from athcodec.joining import split
+from athcodec.sources import ReadOptions
+from athcodec.sources.gltf import GltfNode, read_moving
+from athcodec.sources.gltf_file import HARMLESS, MESHOPT, GltfFile
+from athcodec.sources.gltf_json import BROKEN
+from athcodec.sources.gltf_motion import EXTENSION, MAGIC, VERTEX_ATTRIBUTE, GltfPlace, extension_of, places_of
+from athcodec.sources.opening import naming
+
+SHARE_OF_TWINS = 1 / 8  # of the vertices: from there on the motion holds twins once, and meshes number its vertices
+ALIGNMENT = 8  # of what is left of the bytes
+INSTANCES = "EXT_mesh_gpu_instancing"
+DRACO = "KHR_draco_mesh_compression"
+KNOWN = (*HARMLESS, INSTANCES, DRACO, "FB_ngon_encoding")  # of whose indices _references has all
+POINTING = ("KHR_animation_pointer",)  # to places in the file, as text
+Reference = tuple[str, Any, Any]
+"""An array of the file ("accessors" ...), and the holder and key of an index into it."""
+
+
+class Into:
+    """A GLB whose vertices are to move by ATH_motion: `clip` is their motion, with the meshes as its rest pose.
+
+    Close it. keep_animation leaves what moved the vertices in the file, for programs that do not know the extension.
+    Raises ClipError where the file is no GLB with its bytes inside, nothing in it moves, or what moves has to move to
+    another node though it is to be kept.
+    """
+
+    def __init__(self, path: str | os.PathLike[str], options: ReadOptions, keep_animation: bool = False):
+        self.path, self._keep = os.fspath(path), keep_animation
+        with naming(path, *BROKEN):
+            self._file = GltfFile(path)
+        try:
+            with naming(path, *BROKEN):
+                self._json = self._file.json
+                self._check()
+                clip, self._nodes, self._placement = read_moving(self._file, options)
+                first, self._vertex = _twins(clip)
+                self.clip = _named(clip if self._vertex is None else _without_twins(clip, first, self._vertex))
+                if not np.array_equal(self._placement.space, np.eye(4)):
+                    self.clip.metadata = {
+                        key: value for key, value in self.clip.metadata.items() if key not in ("unit", "up_axis")
+                    }
+        except BaseException:
+            self._file.close()
+            raise
+
+    def _check(self) -> None:
+        with open(self.path, "rb") as file:
+            if file.read(4) != MAGIC:
+                raise ClipError(
+                    "into: got glTF as text, expected a GLB: pack it first, for example with gltf-transform copy"
+                )
+        if any("uri" in buffer for buffer in self._file.items("buffers")):
+            raise ClipError("into: got buffers outside the GLB, expected all bytes in it")
+        if extension_of(self._json) is not None:
+            raise ClipError(f"into: got a file with {EXTENSION}, expected one without it")
+
+    def close(self) -> None:
+        self._file.close()
+
+    def __enter__(self) -> Into:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def write(self, path: str | os.PathLike[str], encoded: str | os.PathLike[str]) -> None:
+        """Write the file with the .ath file `encoded` of `clip` in it, once. Raises ClipError, OSError."""
+        with naming(self.path, *BROKEN):
+            self._check_unchanged()
+            used = _used(self._json)
+            binary, ath = _Binary(self._file), Path(encoded).read_bytes()
+            animations = self._json["animations"]
+            self._replace_motion(binary)
+            motion = self._motion(binary.add(ath), ath, animations)
+            self._json.setdefault("extensions", {})[EXTENSION] = {"motions": [motion]}
+            self._json.setdefault("extensionsUsed", []).append(EXTENSION)
+            if all(name.startswith(KNOWN) and name not in POINTING for name in self._json["extensionsUsed"]):
+                _prune(self._json, used, self._needless)
+            data = binary.packed(self._json)
+        with new_file(path) as out:
+            out.write(_glb(self._json, data))
+
+    def _check_unchanged(self) -> None:
+        if not self._file.unchanged():
+            raise ClipError("got another file than when it was opened, expected the same")
+
+    def _motion(self, view: int, ath: bytes, animations: list[dict]) -> dict[str, Any]:
+        """Clips begin when their animations' first keys do, and keep what these say in extras."""
+        said = {animation.get("name"): animation.get("extras") for animation in animations}
+        clips = []
+        with AthFile(io.BytesIO(ath)) as file:
+            for clip, name, start in zip(file.clips, split(self.clip), self._placement.starts):
+                more = {"start": start, "extras": said.get(name)}
+                clips.append({"name": clip.name} | {key: value for key, value in more.items() if value})
+        clips = [clip for clip in clips if len(clip) > 1]
+        return {"bufferView": view} | ({"clips": clips} if clips else {})
+
+    # ---- meshes and nodes ----
+
+    def _replace_motion(self, binary: _Binary) -> None:
+        gltf, moving = self._json, {node.index for node in self._nodes}
+        bound = {}
+        for index in sorted(moving):
+            node = gltf["nodes"][index]
+            mesh = gltf["meshes"][node["mesh"]]
+            is_shared = sum(other.get("mesh") == node["mesh"] for other in gltf["nodes"]) > 1
+            if is_shared:  # others go on showing it as it is
+                bound[index] = mesh = copy.deepcopy(mesh)
+                gltf["meshes"].append(mesh)
+                node["mesh"] = len(gltf["meshes"]) - 1
+            if not self._keep:
+                mesh.pop("weights", None)
+                mesh.get("extras", {}).pop("targetNames", None)  # of morph targets, by custom
+                for key in ("weights", "skin"):
+                    node.pop(key, None)
+        for part in self._nodes:
+            self._replace_part(part, bound.get(part.index), binary)
+        if self._keep:
+            self._needless: set[int] = set()
+            return
+        for index in sorted(moving):
+            if not self._placement.stays(index):
+                self._move_mesh(index)
+        freed = moving | {joint for node in self._nodes for joint in node.joints}
+        self._needless = _needless_nodes(gltf, freed)
+        _drop_channels(gltf, moving, self._needless)
+
+    def _replace_part(self, part: GltfNode, mesh: dict | None, binary: _Binary) -> None:
+        primitives = part.primitives
+        if mesh is not None:
+            originals = self._json["meshes"][part.mesh]["primitives"]
+            primitives = [
+                mesh["primitives"][number]
+                for number, one in enumerate(originals)
+                if any(one is own for own in primitives)
+            ]
+        attributes = self._attributes(part, binary)
+        if self._keep and ("POSITION" in attributes or not self._placement.stays(part.index)):
+            raise ClipError(
+                f"mesh {part.name!r}: got one that lies elsewhere than its motion, expected no animation to keep"
+            )
+        for primitive in primitives:
+            if not self._keep:
+                primitive.pop("targets", None)
+            kept = {
+                key: value
+                for key, value in primitive["attributes"].items()
+                if self._keep or not key.startswith(("JOINTS_", "WEIGHTS_"))
+            }
+            primitive["attributes"] = kept | {
+                key: value for key, value in attributes.items() if key in kept or key == VERTEX_ATTRIBUTE
+            }
+            said = {"motion": 0} | ({"firstVertex": part.first} if part.first and self._vertex is None else {})
+            primitive.setdefault("extensions", {})[EXTENSION] = said
+
+    def _attributes(self, part: GltfNode, binary: _Binary) -> dict[str, int]:
+        """The attributes of a part that change, as new accessors."""
+        found = {}
+        rest = self.clip.source_rest[self._vertices(part)]
+        positions = part.attributes["POSITION"]
+        stored = self._file.array(positions)
+        if stored.dtype != np.float32 or not np.array_equal(stored.view("<u4"), rest.view("<u4")):
+            found["POSITION"] = binary.attribute(rest, bounds=True)
+            for key in ("NORMAL", "TANGENT"):
+                if key in part.attributes:
+                    values = self._file.floats(part.attributes[key]).astype(np.float32)
+                    values[:, :3] = self._placement.turned(part, values[:, :3], key == "NORMAL")
+                    found[key] = binary.attribute(values)
+        if self._vertex is not None:
+            dtype = np.uint16 if self.clip.vertex_count <= 1 << 16 else np.float32
+            found[VERTEX_ATTRIBUTE] = binary.attribute(self._vertices(part)[:, None].astype(dtype))
+        return found
+
+    def _vertices(self, part: GltfNode) -> np.ndarray:
+        return np.arange(part.first, part.first + part.count) if self._vertex is None else self._vertex[part.vertices]
+
+    def _move_mesh(self, index: int) -> None:
+        """Its mesh to a node of its own, in the motion's space."""
+        gltf, node = self._json, self._json["nodes"][index]
+        matrix = self._placement.space
+        own = {"mesh": node.pop("mesh")} | ({"name": node["name"]} if "name" in node else {})
+        if not np.array_equal(matrix, np.eye(4)):
+            own["matrix"] = matrix.T.ravel().tolist()
+        gltf["nodes"].append(own)
+        scene = gltf["scenes"][gltf.get("scene", 0)] if gltf.get("scenes") else None
+        if scene is not None:
+            scene.setdefault("nodes", []).append(len(gltf["nodes"]) - 1)
+
+
+def _named(clip: MotionClip) -> MotionClip:
+    """With the name of the animation where it is a single one."""
+    played = clip.metadata.get("animations", [])
+    if clip.clip_ranges[1:] or len(played) != 1:
+        return clip
+    is_loop = bool(clip.clip_ranges and clip.clip_ranges[0].loop)
+    return clip.replace(clip_ranges=(ClipRange(played[0], clip.frame_count, is_loop),))
+
+
+def write_back(path: str | os.PathLike[str], motion: ClipView, out: str | os.PathLike[str]) -> None:
+    """Write the GLB `path` with morph targets, a frame of `motion` each, in place of the ATH_motion that this shows.
+
+    Raises ClipError where these are more than glTF can sensibly hold, OSError.
+    """
+    check_morphs(motion)
+    with naming(path, *BROKEN), closing(GltfFile(path)) as file:
+        gltf, used, binary, places = file.json, _used(file.json), _Binary(file), places_of(file)
+        motions = (extension_of(gltf) or {}).get("motions", [{}])
+        said = {clip["name"]: clip for clip in motions[0].get("clips", ())}
+        _add_targets(gltf, binary, places, motion)
+        needless = _morph_nodes(gltf, binary, motion, said)
+        for holder in (gltf, *(primitive for primitive, _ in places)):
+            _pop_extension(holder)
+        gltf["extensionsUsed"].remove(EXTENSION)
+        if all(name.startswith(KNOWN) and name not in POINTING for name in gltf["extensionsUsed"]):
+            _prune(gltf, used, needless)
+        if not gltf["extensionsUsed"]:
+            del gltf["extensionsUsed"]
+        data = binary.packed(gltf)
+    with new_file(out) as written:
+        written.write(_glb(gltf, data))
+
+
+def _add_targets(gltf: dict, binary: _Binary, places: list[GltfPlace], motion: ClipView) -> None:
+    """A morph target per frame for each primitive that moves, and as many without effect for the others of its mesh."""
+    rest = np.asarray(motion.rest).astype(np.float32)
+    for primitive, _ in places:
+        primitive["targets"] = []
+        primitive["attributes"].pop(VERTEX_ATTRIBUTE, None)
+    for _, frames in motion.blocks():
+        for frame in frames:
+            offsets = (frame.astype(np.float64) - rest).astype(np.float32)
+            for primitive, vertices in places:
+                primitive["targets"].append({"POSITION": binary.attribute(offsets[vertices], bounds=True)})
+    moved = {id(primitive) for primitive, _ in places}
+    for mesh in gltf["meshes"]:
+        if moved.isdisjoint(map(id, mesh["primitives"])):
+            continue
+        mesh.pop("weights", None)
+        for primitive in mesh["primitives"]:
+            if id(primitive) not in moved:
+                count = gltf["accessors"][primitive["attributes"]["POSITION"]]["count"]
+                still = {"componentType": 5126, "count": count, "type": "VEC3", "min": [0.0] * 3, "max": [0.0] * 3}
+                gltf["accessors"].append(still)
+                primitive["targets"] = [{"POSITION": len(gltf["accessors"]) - 1}] * motion.frame_count
+
+
+def _morph_nodes(gltf: dict, binary: _Binary, motion: ClipView, said: dict[str, dict]) -> set[int]:
+    """Animates the weights of nodes that show meshes which move, by each clip, in the animation of its name; what moved
+    them before goes. Returns the nodes that nothing needs any more."""
+    moving = {
+        index
+        for index, node in enumerate(gltf["nodes"])
+        if "mesh" in node and any(extension_of(one) for one in gltf["meshes"][node["mesh"]]["primitives"])
+    }
+    skins = [gltf["nodes"][index].pop("skin") for index in moving if "skin" in gltf["nodes"][index]]
+    for index in moving:
+        gltf["nodes"][index].pop("weights", None)
+    needless = _needless_nodes(gltf, moving | {joint for skin in skins for joint in gltf["skins"][skin]["joints"]})
+    _drop_channels(gltf, moving, needless)
+    weights = np.eye(motion.frame_count, dtype=np.float32)
+    for take, clip_range in zip(takes(motion), motion.clip_ranges):
+        mine = said.get(clip_range.name, {})
+        times = (take.times + mine.get("start", 0.0)).astype(np.float32)
+        sampler = {"input": binary.array(times[:, None]), "output": binary.array(take.of(weights).reshape(-1, 1))}
+        _animate(gltf, take.name, take.extras | mine.get("extras", {}), sampler, sorted(moving))
+    return needless
+
+
+def _animate(gltf: dict, name: str, extras: dict[str, Any], sampler: dict[str, int], nodes: list[int]) -> None:
+    every = gltf.setdefault("animations", [])
+    found = next((one for one in every if one.get("name") == name), None)
+    if found is None:
+        found = {"name": name, "samplers": [], "channels": []} | ({"extras": extras} if extras else {})
+        every.append(found)
+    found["samplers"].append(sampler)
+    number = len(found["samplers"]) - 1
+    found["channels"] += [{"sampler": number, "target": {"node": node, "path": "weights"}} for node in nodes]
+
+
+def _pop_extension(holder: dict) -> None:
+    holder["extensions"].pop(EXTENSION)
+    if not holder["extensions"]:
+        del holder["extensions"]
+
+
+def _twins(clip: MotionClip) -> tuple[np.ndarray, np.ndarray | None]:
+    """Of vertices that are at one place in each frame the first, and which of these each vertex is; None where twins
+    are few."""
+    everyone = np.arange(clip.vertex_count)
+    kind = _kinds(np.zeros(clip.vertex_count, np.int64), clip.source_rest)
+    for _, block in clip.blocks():
+        if _few_twins(kind):
+            return everyone, None
+        first = np.unique(kind, return_index=True)[1]
+        if not np.array_equal(block, block[:, first[kind]]):
+            for frame in block:
+                kind = _kinds(kind, frame)
+    if _few_twins(kind):
+        return everyone, None
+    first = np.unique(kind, return_index=True)[1]
+    order = np.argsort(first)
+    place = np.empty(len(first), np.int64)
+    place[order] = np.arange(len(first))
+    return first[order], place[kind]
+
+
+def _few_twins(kind: np.ndarray) -> bool:
+    return len(kind) - int(kind.max()) - 1 < SHARE_OF_TWINS * len(kind)
+
+
+def _kinds(kind: np.ndarray, positions: np.ndarray) -> np.ndarray:
+    """(N,) from 0 on, the same where `kind` and positions (N, 3) are."""
+    table = np.concatenate([kind[:, None], positions.astype(np.float32).view("<i4").astype(np.int64)], axis=1)
+    rows = np.ascontiguousarray(table).view(f"V{table.dtype.itemsize * table.shape[1]}").ravel()
+    return np.unique(rows, return_inverse=True)[1].ravel()
+
+
+def _without_twins(clip: MotionClip, first: np.ndarray, vertex: np.ndarray) -> MotionClip:
+    source = clip.positions
+    skin = clip.skin and clip.skin.__class__(clip.skin.joint_parent, clip.skin.vertex_joint[first], clip.skin.names)
+    return clip.replace(
+        positions=Frames(lambda start, stop: np.asarray(source[start:stop])[:, first], clip.frame_count, len(first)),
+        rest=clip.source_rest[first],
+        rest_given=True,
+        faces=None if clip.faces is None else vertex[clip.faces].astype(np.int32),
+        edges=None if clip.edges is None else vertex[clip.edges].astype(np.int32),
+        attributes={},
+        skin=skin,
+        vertex_branch=None,
+        branch_parent=None,
+        stem_index=None,
+    )
+
+
+def _drop_channels(gltf: dict, moving: set[int], needless: set[int]) -> None:
+    """Those of the weights of these nodes, and of needless ones."""
+    kept = []
+    for animation in gltf.get("animations", []):
+        targets = [(channel["target"].get("node"), channel["target"].get("path")) for channel in animation["channels"]]
+        channels = [
+            channel
+            for channel, (node, path) in zip(animation["channels"], targets)
+            if node not in needless and not (path == "weights" and node in moving)
+        ]
+        samplers = sorted({channel["sampler"] for channel in channels})
+        animation["samplers"] = [animation["samplers"][sampler] for sampler in samplers]
+        for channel in channels:
+            channel["sampler"] = samplers.index(channel["sampler"])
+        if channels:
+            kept.append(animation | {"channels": channels})
+    gltf.pop("animations", None)
+    if kept:
+        gltf["animations"] = kept
+
+
+def _needless_nodes(gltf: dict, freed: set[int]) -> set[int]:
+    """Of nodes that moved vertices, those above and those below them: which show nothing, no skin uses, and nothing
+    that stays is below."""
+    nodes = gltf["nodes"]
+    parent = {child: index for index, node in enumerate(nodes) for child in node.get("children", ())}
+    related = set(freed)
+    for index in freed:
+        related.update(_above(index, parent))
+    related |= {index for index in range(len(nodes)) if not freed.isdisjoint(_above(index, parent))}
+    skins = {node["skin"] for node in nodes if "skin" in node}
+    joints = {joint for number in skins for joint in gltf["skins"][number]["joints"]}
+    stays = {
+        index
+        for index, node in enumerate(nodes)
+        if index not in related or index in joints or node.keys() & {"mesh", "camera", "extensions", "extras"}
+    }
+    for index in list(stays):
+        stays.update(_above(index, parent))
+    return set(range(len(nodes))) - stays
+
+
+def _above(index: int, parent: dict[int, int]) -> list[int]:
+    found = []
+    while index in parent:
+        index = parent[index]
+        found.append(index)
+    return found
+
+
+# ---- what is needed no more ----
+
+
+def _references(gltf: dict) -> Iterator[Reference]:
+    """Every index of the file's arrays into each other, but those of meshes, animations and what these do not need."""
+    for scene in gltf.get("scenes", ()):
+        yield from _each("nodes", scene, "nodes")
+    for node in gltf.get("nodes", ()):
+        yield from _each("nodes", node, "children")
+        yield from _own("skins", node, "skin")
+        if INSTANCES in (node.get("extensions") or {}):
+            yield from _all("accessors", node["extensions"][INSTANCES]["attributes"])
+    for skin in gltf.get("skins", ()):
+        yield from _each("nodes", skin, "joints")
+        yield from _own("nodes", skin, "skeleton")
+        yield from _own("accessors", skin, "inverseBindMatrices")
+    for animation in gltf.get("animations", ()):
+        for channel in animation["channels"]:
+            yield from _own("nodes", channel["target"], "node")
+        for sampler in animation["samplers"]:
+            yield from _all("accessors", sampler, ("input", "output"))
+    for mesh in gltf.get("meshes", ()):
+        for primitive in mesh["primitives"]:
+            yield from _all("accessors", primitive["attributes"])
+            yield from _own("accessors", primitive, "indices")
+            for target in primitive.get("targets", ()):
+                yield from _all("accessors", target)
+            if DRACO in (primitive.get("extensions") or {}):
+                yield from _own("bufferViews", primitive["extensions"][DRACO], "bufferView")
+    for accessor in gltf.get("accessors", ()):
+        yield from _own("bufferViews", accessor, "bufferView")
+        for part in ("indices", "values") if "sparse" in accessor else ():
+            yield from _own("bufferViews", accessor["sparse"][part], "bufferView")
+    for image in gltf.get("images", ()):
+        yield from _own("bufferViews", image, "bufferView")
+    for motion in (extension_of(gltf) or {}).get("motions", ()):
+        yield from _own("bufferViews", motion, "bufferView")
+
+
+def _own(kind: str, holder: dict, key: str) -> Iterator[Reference]:
+    if key in holder:
+        yield kind, holder, key
+
+
+def _all(kind: str, holder: dict, keys: Any = None) -> Iterator[Reference]:
+    for key in list(holder) if keys is None else keys:
+        yield from _own(kind, holder, key)
+
+
+def _each(kind: str, holder: dict, key: str) -> Iterator[Reference]:
+    for place in range(len(holder.get(key, ()))):
+        yield kind, holder[key], place
+
+
+def _used(gltf: dict) -> dict[str, set[int]]:
+    """What of each array is referred to."""
+    found: dict[str, set[int]] = {kind: set() for kind in ("nodes", "skins", "accessors", "bufferViews")}
+    for kind, holder, key in _references(gltf):
+        found[kind].add(holder[key])
+    return found
+
+
+def _prune(gltf: dict, before: dict[str, set[int]], needless: set[int]) -> None:
+    """Removes these nodes, and what was referred to before and is no more."""
+    _remove(gltf, "skins", before["skins"] - _used(gltf)["skins"])
+    for holder, key in [(scene, "nodes") for scene in gltf.get("scenes", ())] + [
+        (node, "children") for node in gltf["nodes"]
+    ]:
+        if not needless.isdisjoint(holder.get(key, ())):
+            holder[key] = [node for node in holder[key] if node not in needless]
+            if not holder[key]:
+                del holder[key]
+    _remove(gltf, "nodes", needless)
+    for kind in ("accessors", "bufferViews"):
+        _remove(gltf, kind, before[kind] - _used(gltf)[kind])
+
+
+def _remove(gltf: dict, kind: str, dead: set[int]) -> None:
+    """Entries of an array, to which nothing that remains refers; the others get new numbers."""
+    if not dead:
+        return
+    place = np.cumsum([index not in dead for index in range(len(gltf[kind]))]) - 1
+    gltf[kind] = [item for index, item in enumerate(gltf[kind]) if index not in dead]
+    for kind_of, holder, key in _references(gltf):
+        if kind_of == kind:
+            holder[key] = int(place[holder[key]])
+    if not gltf[kind]:
+        del gltf[kind]
+
+
+class _Binary:
+    """The binary chunk: its bytes so far, and what is added."""
+
+    def __init__(self, file: GltfFile):
+        self._json, self._added = file.json, bytearray()
+        self._old = file.binary_chunk()
+        self._start = len(self._old) + -len(self._old) % 4
+        self._views_before = copy.deepcopy(self._json.get("bufferViews", []))
+
+    def add(self, data: bytes, **view: Any) -> int:
+        """A buffer view of these bytes."""
+        self._json.setdefault("bufferViews", []).append(
+            {"buffer": 0, "byteOffset": self._start + len(self._added), "byteLength": len(data)} | view
+        )
+        self._added += data + bytes(-len(data) % 4)
+        return len(self._json["bufferViews"]) - 1
+
+    def attribute(self, values: np.ndarray, bounds: bool = False) -> int:
+        """An accessor of (count, width) values of vertices, each padded to whole words."""
+        width, item = values.shape[1], values.itemsize * values.shape[1]
+        padded = np.zeros((len(values), item + -item % 4), np.uint8)
+        padded[:, :item] = np.ascontiguousarray(values).view(np.uint8).reshape(len(values), item)
+        stride = {"byteStride": padded.shape[1]} if padded.shape[1] != item else {}
+        accessor = {
+            "bufferView": self.add(padded.tobytes(), target=VERTICES, **stride),
+            "componentType": COMPONENTS[values.dtype.name],
+            "count": len(values),
+            "type": TYPES[width],
+        }
+        if bounds:
+            accessor |= {"min": values.min(axis=0).tolist(), "max": values.max(axis=0).tolist()}
+        self._json.setdefault("accessors", []).append(accessor)
+        return len(self._json["accessors"]) - 1
+
+    def array(self, values: np.ndarray) -> int:
+        """An accessor of (count, 1) float32, with its bounds."""
+        index = self.attribute(values, bounds=True)
+        self._json["bufferViews"][self._json["accessors"][index]["bufferView"]].pop("target")
+        return index
+
+    def packed(self, gltf: dict) -> bytes:
+        """The bytes without those that only views had which are gone; the views' offsets become those in it."""
+        data = bytes(self._old).ljust(self._start, b"\0") + bytes(self._added)
+        needless = np.zeros(len(data) + 1, bool)
+        for holder in _byte_ranges(self._views_before):
+            needless[holder.get("byteOffset", 0) :][: holder["byteLength"]] = True
+        kept = list(_byte_ranges(gltf["bufferViews"]))
+        for holder in kept:
+            needless[holder.get("byteOffset", 0) :][: holder["byteLength"]] = False
+        edges = np.flatnonzero(np.diff(needless, prepend=False)).reshape(-1, 2)
+        starts, stops = edges[:, 0] + -edges[:, 0] % ALIGNMENT, edges[:, 1] // ALIGNMENT * ALIGNMENT
+        gaps = [(start, stop) for start, stop in zip(starts.tolist(), stops.tolist()) if stop > start]
+        ends, gone = np.array([stop for _, stop in gaps]), np.cumsum([0] + [stop - start for start, stop in gaps])
+        for holder in kept:
+            offset = holder.get("byteOffset", 0)
+            if offset or gaps:
+                holder["byteOffset"] = int(offset - gone[np.searchsorted(ends, offset, "right")])
+        pieces = zip([0] + [stop for _, stop in gaps], [start for start, _ in gaps] + [len(data)])
+        return b"".join(data[start:stop] for start, stop in pieces)
+
+
+def _byte_ranges(views: list[dict]) -> Iterator[dict]:
+    """What has byteOffset and byteLength in the binary chunk: views, and what decompresses to them."""
+    for view in views:
+        for holder in (view, *((view.get("extensions") or {}).get(name) for name in MESHOPT)):
+            if holder is not None and holder["buffer"] == 0:
+                yield holder
+
+
+def _glb(gltf: dict, data: bytes) -> bytes:
+    gltf.setdefault("buffers", [{}])[0]["byteLength"] = len(data)
+    data = data + bytes(-len(data) % 4)
+    text = json.dumps(gltf, separators=(",", ":"), allow_nan=False, ensure_ascii=False).encode()
+    text += b" " * (-len(text) % 4)
+    size = 28 + len(text) + len(data)
+    if size >= 1 << 32:
+        raise ClipError(f"GLB: got {size} bytes, expected less than 4 GiB")
+    head = struct.pack("<4sII", MAGIC, 2, size) + struct.pack("<II", len(text), 0x4E4F534A)
+    return head + text + struct.pack("<II", len(data), 0x004E4942) + data

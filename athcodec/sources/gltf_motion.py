@@ -1,0 +1,136 @@
+"""ATH_motion in a GLB: where the .ath file lies, and what the meshes around it are to it: rest pose and faces.
+
+The extension is described in spec/gltf/README.md. Its motions are the bytes of buffer views; a primitive names one and
+says which vertices of it its own are.
+"""
+
+from __future__ import annotations
+
+import os
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from athcodec.errors import ClipError
+from athcodec.sources.gltf_file import GltfFile
+from athcodec.sources.gltf_json import BROKEN, entries, entry, integer
+from athcodec.sources.opening import closing_on_failure, naming
+
+EXTENSION = "ATH_motion"
+VERTEX_ATTRIBUTE = "_ATH_VERTEX"
+MAGIC = b"glTF"
+GltfPlace = tuple[dict, np.ndarray]
+"""A primitive, and the motion's vertex of each of its vertices."""
+
+
+def extension_of(holder: dict) -> dict | None:
+    """What the extension says of a part of the file, None where that is nothing. Raises ClipError."""
+    extensions = holder.get("extensions")
+    return entry(extensions, EXTENSION) if isinstance(extensions, dict) and EXTENSION in extensions else None
+
+
+class GltfMotion:
+    """The .ath file in a GLB, as a file object to read; close it. Raises ClipError where the GLB has not exactly one.
+
+    host_mesh (N, 3) float32 is the rest pose, faces (F, 3) int32 or None.
+    """
+
+    def __init__(self, path: str | os.PathLike[str]):
+        self.path = os.fspath(path)
+        with naming(path, *BROKEN):
+            self._gltf = GltfFile(path)
+            with closing_on_failure(self._gltf):
+                self._bytes, self._start, self._size = self._gltf.part(self._motion(), "bufferView")
+        self._place = 0
+
+    def _motion(self) -> dict:
+        found = entries(extension_of(self._gltf.json) or {}, "motions")
+        if len(found) != 1:
+            raise ClipError(f"{EXTENSION}: got {len(found)} motions, expected one")
+        return found[0]
+
+    # ---- the bytes ----
+
+    def seek(self, place: int, whence: int = os.SEEK_SET) -> int:
+        self._place = max(place + (0, self._place, self._size)[whence], 0)
+        return self._place
+
+    def tell(self) -> int:
+        return self._place
+
+    def read(self, size: int = -1) -> bytes:
+        left = max(self._size - self._place, 0)
+        size = left if size < 0 else min(size, left)
+        data: bytes = self._bytes.read(self._start + self._place, size) if size else b""
+        self._place += len(data)
+        return data
+
+    def close(self) -> None:
+        self._gltf.close()
+
+    # ---- the meshes ----
+
+    @cached_property
+    def _places(self) -> list[GltfPlace]:
+        found = places_of(self._gltf)
+        if not found:
+            raise ClipError(f"{EXTENSION}: got no primitive that a motion moves, expected at least one")
+        return found
+
+    @cached_property
+    def host_mesh(self) -> np.ndarray:
+        with naming(self.path, *BROKEN):
+            return self._rest()
+
+    def _rest(self) -> np.ndarray:
+        total = sum(len(vertices) for _, vertices in self._places)
+        count = 1 + max(int(vertices.max()) for _, vertices in self._places)
+        if count > total:
+            raise ClipError(
+                f"{EXTENSION}: got vertex {count - 1} of {total} in all primitives, expected each one there"
+            )
+        rest, seen = np.empty((count, 3), np.float32), np.zeros(count, bool)
+        for primitive, vertices in self._places:
+            positions = self._gltf.floats(entry(primitive, "attributes")["POSITION"])
+            if positions.dtype != np.float32 or positions.shape != (len(vertices), 3):
+                raise ClipError(f"{EXTENSION}: got POSITION as {positions.dtype} {positions.shape}, expected float32")
+            rest[vertices], seen[vertices] = positions, True
+        for primitive, vertices in self._places:
+            if not np.array_equal(rest[vertices], self._gltf.floats(primitive["attributes"]["POSITION"])):
+                raise ClipError(f"{EXTENSION}: got places that differ for one vertex of the motion, expected the same")
+        if not seen.all():
+            raise ClipError(f"{EXTENSION}: got no place for vertex {int(seen.argmin())}, expected one for each")
+        return rest
+
+    @cached_property
+    def faces(self) -> np.ndarray | None:
+        from athcodec.sources.gltf import triangles  # which itself looks for the extension
+
+        with naming(self.path, *BROKEN):
+            found = [vertices[triangles(self._gltf, primitive, len(vertices))] for primitive, vertices in self._places]
+            return np.concatenate(found).astype(np.int32) if any(map(len, found)) else None
+
+
+def places_of(file: GltfFile) -> list[GltfPlace]:
+    """The primitives that the file's only motion moves. Raises ClipError."""
+    found = []
+    for mesh in file.items("meshes"):
+        for primitive in entries(mesh, "primitives"):
+            said = extension_of(primitive)
+            if said is not None:
+                integer(said, "motion", stop=1)
+                found.append((primitive, _vertices(file, primitive, said)))
+    return found
+
+
+def _vertices(file: GltfFile, primitive: dict, said: dict) -> np.ndarray:
+    """(n,) the motion's vertex of each vertex of a primitive."""
+    attributes: dict[str, Any] = entry(primitive, "attributes")
+    count = len(file.array(integer(attributes, "POSITION")))  # those that the file has bytes for
+    if VERTEX_ATTRIBUTE not in attributes:
+        return integer(said, "firstVertex", 0) + np.arange(count)
+    values = file.array(integer(attributes, VERTEX_ATTRIBUTE))[:, 0]
+    if len(values) != count or not np.isfinite(values).all() or values.min() < 0 or (values % 1).any():
+        raise ClipError(f"{VERTEX_ATTRIBUTE}: got what numbers no vertices, expected {count} whole numbers")
+    return values.astype(np.int64)
