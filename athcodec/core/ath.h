@@ -6,10 +6,12 @@
  *     ath_refine                                once per level above 0
  *     ath_ranges, ath_feed                      which bytes a level needs; here they are
  *     ath_prepare, or _start and _step          one segment at one level: entropy decoding, inverse transforms
+ *     ath_prepare_to                            the same, for who wants all of its positions at once
  *     ath_keep, ath_prepare_onward              a deeper level of a segment, from the one that is prepared
  *     ath_positions, ath_matrices, ath_exact    what to draw at a time, as often as wanted
  *     ath_level_for                             which level to draw at a distance
  *     ath_fade_to, ath_faded_positions          from one level to the next without a jump
+ *     ath_blended_positions, ath_wind_weights   several clips at once: calm to storm
  *
  * Memory. Nothing here allocates, and there are no globals: the caller asks for a size, provides that many bytes,
  * aligned to 16, and keeps them while they are in use. Objects are freed by freeing their memory. An ath_file holds
@@ -436,6 +438,12 @@ ATH_API int ath_prepare_step(ath_work *work, int32_t steps);
  * a preparation that takes no end.
  *     ath_joined_to: the segment that one is joined to at a level, -1: to none. */
 ATH_API int ath_follow(ath_work *work, const ath_segment *before);
+/* Between the call that begins a preparation and its first step: the segment's positions go to memory of the caller's, frame by
+ * frame, 3 floats (info.is_float64: doubles) a vertex, as ath_positions would copy them; of its own memory, their part stays
+ * untouched. They have to stay there as long as the segment is used. ATH_BAD_ARGUMENT, and nothing has changed, where
+ * ath_positions would not only copy: the order of the file is not the source's, frames of the segment repeat, or the level
+ * has nodes. */
+ATH_API int ath_prepare_to(ath_work *work, void *positions);
 ATH_API int32_t ath_joined_to(const ath_file *file, int32_t segment, int32_t level);
 /* Over how many frames, 0: not at all; ATH_JOIN_SLOPED above that where velocities are joined, too: level_count x
  * segment_count of them. */
@@ -557,6 +565,39 @@ ATH_API int ath_faded_matrices(const ath_file *file, const ath_segment *const *s
                                double frame, const ath_fade *fade, float *matrices, size_t stride);
 ATH_API int ath_faded_exact(const ath_file *file, const ath_segment *const *segments, int32_t segment_count,
                             double frame, const ath_fade *fade, float *xyz, size_t stride);
+
+/* ---- several clips at once --------------------------------------------------------------------------------------- */
+
+/* Up to four clips of a file blended, from calm to storm or between headings of the wind, each at its own frame and level.
+ * What each shows is taken apart along the hierarchy and blended there: edges of stems by direction and length, sheets by
+ * rotation and by what they keep from it. So branches stay where they hang, and an edge of a stem is as long as those of
+ * the clips in their weighted mean. Roots take the mean of positions. */
+enum { ATH_BLEND_CLIPS = 4 };
+typedef struct ath_share {
+    const ath_segment *const *segments; /* as for ath_positions */
+    int32_t segment_count;
+    double frame, weight;
+} ath_share;
+
+/* Weights need not add up to 1. Shares of none (or less) are passed over and need no segments; where only one is left the
+ * numbers have the bits of ath_positions. memory: ath_blend_size, scratch. ATH_OK, ATH_HELD; ATH_NOT_PREPARED,
+ * ATH_NO_MEMORY; ATH_BAD_ARGUMENT: no share has a weight, one is infinite, or there are more than ATH_BLEND_CLIPS: nothing
+ * was written. */
+ATH_API size_t ath_blend_size(const ath_file *file);
+ATH_API int ath_blended_positions(const ath_file *file, const ath_share *shares, int32_t share_count, ath_order order,
+                                  float *xyz, size_t stride, void *memory, size_t memory_bytes);
+
+/* The wind of a clip, as its metadata name it: the heading in degrees. A strength that is not finite: it has none. */
+typedef struct ath_wind {
+    double strength, heading;
+} ath_wind;
+
+/* Weights of clips for a wanted wind, of which at most four are above 0; they add up to 1 and change without a jump. They
+ * are bilinear in strength and heading: between the two strengths of clips that are next to the wanted one by how near each
+ * is, and in each of them between the clips whose headings are next to the wanted one on either side of the circle.
+ * Beyond the calmest and the wildest clip these are shown. Of clips of one wind the first; where none has any, clip 0. */
+ATH_API void ath_wind_weights(const ath_wind *clips, int32_t clip_count, double strength, double heading,
+                              double *weights);
 
 /* ---- level of detail --------------------------------------------------------------------------------------------- */
 
