@@ -20,6 +20,12 @@ WEBGPU_FLAGS = [
     "--enable-unsafe-webgpu",
     "--use-webgpu-adapter=swiftshader",
     "--enable-unsafe-swiftshader",
+    # what a canvas of WebGPU is presented by; without these Chromium's GPU process ends at the first picture
+    "--use-gl=angle",
+    "--use-angle=swiftshader",
+    "--ignore-gpu-blocklist",
+    "--enable-features=Vulkan",
+    "--use-vulkan=swiftshader",
 ]
 INSTALL = "apt-get install chromium && pip install playwright"
 

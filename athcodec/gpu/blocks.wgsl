@@ -1,7 +1,21 @@
 // The blocks of a level and of a segment, as core/ath_gpu.h lays them out. This text stands in front of time, hierarchy and finish.
 
 @group(0) @binding(0) var<storage, read> level: array<u32>;
-@group(0) @binding(1) var<storage, read> segment: array<u32>;
+@group(0) @binding(1) var<storage, read> segments: array<u32>; // blocks one behind the other
+
+// A frame that is placed. A dispatch places several, one for each y of its workgroups.
+struct Place {
+    segment: u32, // word that the block of its segment begins at
+    frame: u32,
+    positions: u32, // number before those of this frame; so are the others
+    matrices: u32,
+    amplitudes: u32,
+    modes: u32,
+    bodies: u32,
+    strength: f32, // that motion is multiplied by
+}
+@group(0) @binding(2) var<storage, read> places: array<Place>;
+var<private> run: Place;
 
 // Words of the header of a level.
 const VERTEX_COUNT = 2u;
@@ -10,6 +24,7 @@ const MATRIX_COUNT = 5u;
 const VERTICES = 7u;
 const BODIES = 8u;
 const ORDER = 9u;
+const DEPTHS = 10u;
 const BASES = 11u;
 
 // Words of the header of a segment.
@@ -74,12 +89,16 @@ struct Move {
     turn: u32,
 }
 
+fn segment(at: u32) -> u32 {
+    return segments[run.segment + at];
+}
+
 fn level_float(at: u32) -> f32 {
     return bitcast<f32>(level[at]);
 }
 
 fn segment_float(at: u32) -> f32 {
-    return bitcast<f32>(segment[at]);
+    return bitcast<f32>(segment(at));
 }
 
 fn level_vector(at: u32) -> vec3<f32> {
@@ -105,15 +124,15 @@ fn body_at(b: u32) -> Body {
 }
 
 fn move_at(b: u32) -> Move {
-    let at = segment[MOVES] + MOVE_WORDS * b;
-    let counts = segment[at + 1u];
-    return Move(segment[at], counts & 0xffffu, counts >> 16u, segment[at + 2u], segment[at + 3u]);
+    let at = segment(MOVES) + MOVE_WORDS * b;
+    let counts = segment(at + 1u);
+    return Move(segment(at), counts & 0xffffu, counts >> 16u, segment(at + 2u), segment(at + 3u));
 }
 
 fn row_at(r: u32) -> Row {
-    let at = segment[ROWS] + ROW_WORDS * r;
-    let packed = segment[at + 1u];
-    return Row(segment[at], packed & 0xffffu, (packed >> 16u) & 0xffu, packed >> 24u, segment_float(at + 2u));
+    let at = segment(ROWS) + ROW_WORDS * r;
+    let packed = segment(at + 1u);
+    return Row(segment(at), packed & 0xffffu, (packed >> 16u) & 0xffu, packed >> 24u, segment_float(at + 2u));
 }
 
 fn rest_of(vertex: u32) -> vec3<f32> {

@@ -1,12 +1,5 @@
 // The end of pass 2, when all depths have been placed: joins, matrices, corrections, and motion that is baked.
 
-struct Run {
-    frame: u32,
-    positions: u32, // number before those of this frame
-    matrices: u32,
-}
-
-@group(0) @binding(2) var<uniform> run: Run;
 @group(0) @binding(3) var<storage, read_write> positions: array<f32>;
 @group(0) @binding(4) var<storage, read_write> matrices: array<f32>;
 
@@ -15,20 +8,20 @@ const FOOTPRINTS = array<array<f32, 4>, 3>(
 );
 
 fn is_joined() -> bool {
-    return run.frame < segment[JOIN_FRAMES];
+    return run.frame < segment(JOIN_FRAMES);
 }
 
 // What is left of jumps and of slopes at the frame.
 fn curve() -> vec2<f32> {
-    let at = segment[JOIN_CURVE] + 2u * run.frame;
-    return vec2<f32>(segment_float(at), segment_float(at + 1u));
+    let at = segment(JOIN_CURVE) + 2u * run.frame;
+    return run.strength * vec2<f32>(segment_float(at), segment_float(at + 1u));
 }
 
 fn join_position(b: u32, index: u32) {
-    let steps = segment[JOIN_STEPS] + 2u * b;
+    let steps = segment(JOIN_STEPS) + 2u * b;
     let step = curve() * vec2<f32>(segment_float(steps), segment_float(steps + 1u));
     for (var axis = 0u; axis < 3u; axis++) {
-        let word = segment[segment[JOINS] + 3u * index + axis];
+        let word = segment(segment(JOINS) + 3u * index + axis);
         positions[run.positions + 3u * index + axis] += f32(half(word, 0u)) * step.x + f32(half(word, 1u)) * step.y;
     }
 }
@@ -36,7 +29,7 @@ fn join_position(b: u32, index: u32) {
 // Numbers of R, row by row, then of c, as a matrix has them: R and c side by side.
 fn join_matrix(index: u32) {
     for (var k = 0u; k < 12u; k++) {
-        let at = segment[MATRIX_JOINS] + 2u * (12u * index + k);
+        let at = segment(MATRIX_JOINS) + 2u * (12u * index + k);
         let place = select(4u * (k - 9u) + 3u, 4u * (k / 3u) + k % 3u, k < 9u);
         matrices[run.matrices + 12u * index + place] += segment_float(at) * curve().x + segment_float(at + 1u) * curve().y;
     }
@@ -53,6 +46,7 @@ fn finish_matrix(index: u32, a: vec3<f32>) {
 // One workgroup per body.
 @compute @workgroup_size(64)
 fn bodies(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) i: u32) {
+    run = places[group.y];
     let body = body_at(group.x);
     if ((body.flags & NODE) == 0u) {
         if (is_joined() && i < body.count) {
@@ -69,15 +63,16 @@ fn bodies(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_ind
 // One invocation per corrected position.
 @compute @workgroup_size(64)
 fn corrections(@builtin(global_invocation_id) id: vec3<u32>) {
-    if (id.x >= segment[CORRECTED_COUNT]) {
+    run = places[id.y];
+    if (id.x >= segment(CORRECTED_COUNT)) {
         return;
     }
-    let own = segment[CORRECTED] + 2u * id.x;
+    let own = segment(CORRECTED) + 2u * id.x;
     var sum = vec3<f32>(0.0);
-    for (var c = segment[own + 1u]; c < segment[own + 3u]; c++) {
-        let at = segment[CORRECTIONS] + 2u * c;
-        let low = segment[at];
-        let high = segment[at + 1u];
+    for (var c = segment(own + 1u); c < segment(own + 3u); c++) {
+        let at = segment(CORRECTIONS) + 2u * c;
+        let low = segment(at);
+        let high = segment(at + 1u);
         let away = abs(i32(run.frame) - i32((high >> 16u) & 0xffu));
         if (away < 4) {
             let width = high >> 24u;
@@ -86,15 +81,16 @@ fn corrections(@builtin(global_invocation_id) id: vec3<u32>) {
         }
     }
     for (var axis = 0u; axis < 3u; axis++) {
-        positions[run.positions + 3u * segment[own] + axis] += sum[axis] * segment_float(CORRECTION_PART);
+        positions[run.positions + 3u * segment(own) + axis] += sum[axis] * run.strength * segment_float(CORRECTION_PART);
     }
 }
 
 // One invocation per number of a position, in place of all passes before.
 @compute @workgroup_size(64)
 fn baked(@builtin(global_invocation_id) id: vec3<u32>) {
+    run = places[id.y];
     let count = 3u * level[POSITION_COUNT];
     if (id.x < count) {
-        positions[run.positions + id.x] = segment_float(segment[BAKED] + run.frame * count + id.x);
+        positions[run.positions + id.x] = segment_float(segment(BAKED) + run.frame * count + id.x);
     }
 }

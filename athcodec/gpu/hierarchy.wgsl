@@ -1,12 +1,6 @@
 // Pass 2: bodies of one depth, each placed from the one that it hangs on. One workgroup per body, one invocation per position.
 
-struct Run {
-    first: u32, // in the order of bodies, of those of this depth
-    positions: u32, // number before those of this frame
-    matrices: u32,
-}
-
-@group(0) @binding(2) var<uniform> run: Run;
+@group(0) @binding(8) var<uniform> depth: u32; // of the bodies that are placed
 @group(0) @binding(3) var<storage, read> amplitudes: array<f32>;
 @group(0) @binding(4) var<storage, read_write> positions: array<f32>;
 @group(0) @binding(5) var<storage, read_write> matrices: array<f32>;
@@ -27,7 +21,8 @@ struct Frame {
 }
 
 fn amplitude(row: u32) -> vec3<f32> {
-    return vec3<f32>(amplitudes[3u * row], amplitudes[3u * row + 1u], amplitudes[3u * row + 2u]);
+    let at = run.amplitudes + 3u * row;
+    return vec3<f32>(amplitudes[at], amplitudes[at + 1u], amplitudes[at + 2u]);
 }
 
 fn position_at(index: u32) -> vec3<f32> {
@@ -41,7 +36,7 @@ fn way_by_mode(body: Body, m: u32) -> vec3<f32> {
     if ((body.flags & FOLLOWS) == 0u || m >= level[parent + 4u]) {
         return vec3<f32>(0.0);
     }
-    let at = 3u * (level[parent + 5u] + m);
+    let at = run.modes + 3u * (level[parent + 5u] + m);
     let mode = vec3<f32>(parent_modes[at], parent_modes[at + 1u], parent_modes[at + 2u]);
     return level_float(level[BASES] + body.way + m) * mode;
 }
@@ -86,7 +81,7 @@ fn hung(body: Body) -> Frame {
     if (body.parent < 0) {
         return Frame(body.rest_point, IDENTITY);
     }
-    let at = 12u * u32(body.parent);
+    let at = run.bodies + 12u * u32(body.parent);
     var rotation = mat3x3<f32>(
         frames[at], frames[at + 1u], frames[at + 2u],
         frames[at + 3u], frames[at + 4u], frames[at + 5u],
@@ -110,7 +105,7 @@ fn turned(body: Body, own: Move) -> Frame {
         if (slot == SHIFT) {
             frame.point += amplitude(r);
         } else if (slot == ROTATION) {
-            let at = segment[TURNS] + own.turn;
+            let at = segment(TURNS) + own.turn;
             let q = amplitude(r);
             var omega = vec3<f32>(0.0);
             for (var k = 0u; k < 3u; k++) {
@@ -134,7 +129,7 @@ fn unshaped(body: Body, own: Move, m: u32) -> vec3<f32> {
         for (var axis = 0u; axis < 3u; axis++) {
             let shape = 3u * slot + axis;
             if (slot < body.shape_modes && shape < own.shape_count) {
-                let at = segment[SHAPES] + own.shapes + 3u * (shape * body.shape_modes + m);
+                let at = segment(SHAPES) + own.shapes + 3u * (shape * body.shape_modes + m);
                 sum += tracks[axis] * vec3<f32>(segment_float(at), segment_float(at + 1u), segment_float(at + 2u));
             }
         }
@@ -199,15 +194,16 @@ fn write_column(node: u32, column: u32, v: vec3<f32>) {
 fn write_frame(b: u32, frame: Frame) {
     for (var axis = 0u; axis < 3u; axis++) {
         for (var column = 0u; column < 3u; column++) {
-            frames[12u * b + 3u * column + axis] = frame.rotation[column][axis];
+            frames[run.bodies + 12u * b + 3u * column + axis] = frame.rotation[column][axis];
         }
-        frames[12u * b + 9u + axis] = frame.point[axis];
+        frames[run.bodies + 12u * b + 9u + axis] = frame.point[axis];
     }
 }
 
 @compute @workgroup_size(64)
 fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) i: u32) {
-    let b = level[level[ORDER] + run.first + group.x];
+    run = places[group.y];
+    let b = level[level[ORDER] + level[level[DEPTHS] + depth] + group.x];
     let body = body_at(b);
     let own = move_at(b);
     modes[i] = vec3<f32>(0.0);
@@ -241,7 +237,7 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
             let x = frame.point + frame.rotation * placed[i];
             for (var axis = 0u; axis < 3u; axis++) {
                 positions[run.positions + 3u * (body.first + i) + axis] = x[axis];
-                parent_modes[3u * (body.first + i) + axis] = modes[i][axis];
+                parent_modes[run.modes + 3u * (body.first + i) + axis] = modes[i][axis];
             }
         }
     }

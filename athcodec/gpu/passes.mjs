@@ -1,9 +1,11 @@
-// Runs the three passes over WebGPU: a host to read beside docs/gpu.md, and what the tests run.
+// Runs the three passes over WebGPU: what the three.js package draws forests with, the tests run, and a host to read beside
+// docs/gpu.md.
 //
-//     const passes = new Passes(device, {blocks, time, hierarchy, finish, vertices}, level, slots)
+//     const passes = new Passes(device, new Kernels(device, {blocks, time, hierarchy, finish, vertices}), level, {slots, shown})
 //     const segment = passes.segment(words)
-//     passes.place(segment, frame, slot)                   passes 1 and 2: a frame of the segment, once for all instances
-//     await passes.show([slot, slot], weight, ...)         pass 3, read back
+//     passes.run(places, shows)   places: [{segment, frame, slot, strength}], passes 1 and 2: each a frame, once for all that
+//                                 show it; shows: [{slots, weight, previous, previousWeight}], pass 3: each a plant at a time
+//     await passes.read(shows)    the same shows, read back
 //
 // `level` and `words` are the blocks of core/ath_gpu.h, as Uint32Array.
 
@@ -12,108 +14,187 @@ const UNIFORM = 0x40 | 8;
 const READ = 1 | 8;
 const [VERTEX_COUNT, BODY_COUNT, POSITION_COUNT, MATRIX_COUNT, DEPTH_COUNT, DEPTHS] = [2, 3, 4, 5, 6, 10];
 const [ROW_COUNT, CORRECTED_COUNT, BAKED] = [5, 6, 19];
-const WORKGROUP = 64;
+const WORKGROUP = 64, PLACE_WORDS = 8, SHOW_WORDS = 12, VERTEX_FLOATS = 9;
+const groups = (count) => Math.ceil(count / WORKGROUP);
 
-export class Passes {
-  constructor(device, shaders, level, slots = 2) {
-    this.device = device;
-    this.words = level;
-    const module = (name, ...texts) => device.createShaderModule({ label: name, code: texts.join("\n") });
-    const kernel = (of, entryPoint) =>
+/** The pipelines of a device, which all levels share. */
+export class Kernels {
+  constructor(device, { blocks, time, hierarchy, finish, vertices }) {
+    const module = (...texts) => device.createShaderModule({ code: texts.join("\n") });
+    const kernel = (of, entryPoint = "main") =>
       device.createComputePipeline({ layout: "auto", compute: { module: of, entryPoint } });
-    const finish = module("finish", shaders.blocks, shaders.finish);
-    this.kernels = {
-      time: kernel(module("time", shaders.blocks, shaders.time), "main"),
-      hierarchy: kernel(module("hierarchy", shaders.blocks, shaders.hierarchy), "main"),
-      bodies: kernel(finish, "bodies"),
-      corrections: kernel(finish, "corrections"),
-      baked: kernel(finish, "baked"),
-      vertices: kernel(module("vertices", shaders.vertices), "main"),
+    const finishing = module(blocks, finish);
+    this.time = kernel(module(blocks, time));
+    this.hierarchy = kernel(module(blocks, hierarchy));
+    this.bodies = kernel(finishing, "bodies");
+    this.corrections = kernel(finishing, "corrections");
+    this.baked = kernel(finishing, "baked");
+    this.vertices = kernel(module(vertices));
+  }
+}
+
+/** A level of a file. slots: frames that are kept at once; shown: plants that pass 3 writes, into `vertices`, a buffer of nine
+ * floats of each of their vertices, or one that it makes. */
+export class Passes {
+  uploaded = 0; // bytes
+  #sets = new Map();
+  #rows = 0;      // most of any segment, which is what scratch has room for
+  #corrected = 0;
+  #used = 0;      // words of `segments`
+
+  constructor(device, kernels, level, { slots = 2, shown = 1, vertices = null } = {}) {
+    Object.assign(this, { device, kernels, words: level, slots, shown });
+    this.size = { positions: 3 * level[POSITION_COUNT], matrices: 12 * level[MATRIX_COUNT], bodies: 12 * level[BODY_COUNT],
+      vertices: VERTEX_FLOATS * level[VERTEX_COUNT] };
+    this.baked = false;
+    const { positions, matrices, bodies } = this.size;
+    this.buffers = {
+      level: this.#upload(level), segments: this.#buffer(1), places: this.#buffer(PLACE_WORDS * slots),
+      shows: this.#buffer(SHOW_WORDS * shown), amplitudes: this.#buffer(1), positions: this.#buffer(slots * positions),
+      matrices: this.#buffer(slots * matrices), modes: this.#buffer(slots * positions), bodies: this.#buffer(slots * bodies),
+      corners: this.#buffer(1), vertices: vertices ?? this.#buffer(shown * this.size.vertices),
     };
-    this.level = this.upload(level);
-    this.size = { positions: 3 * level[POSITION_COUNT], matrices: 12 * level[MATRIX_COUNT] };
-    this.positions = this.buffer(slots * this.size.positions);
-    this.matrices = this.buffer(slots * this.size.matrices);
-    this.modes = this.buffer(this.size.positions);
-    this.frames = this.buffer(12 * level[BODY_COUNT]);
-    this.vertices = this.buffer(9 * level[VERTEX_COUNT]);
-    this.corners = this.buffer(1);
+    this.ownsVertices = !vertices;
+    this.depths = Array.from({ length: level[DEPTH_COUNT] }, (_, depth) => {
+      const [first, end] = level.subarray(level[DEPTHS] + depth);
+      return { count: end - first, uniform: this.#upload(new Uint32Array([depth, 0, 0, 0]), UNIFORM) };
+    });
     this.hasCorners = false;
   }
 
-  buffer(words, usage = STORAGE) {
+  /** Bytes on the GPU. */
+  get bytes() {
+    return Object.values(this.buffers).reduce((sum, { size }) => sum + size, 0);
+  }
+
+  #buffer(words, usage = STORAGE) {
     return this.device.createBuffer({ size: Math.max(16, 4 * words), usage });
   }
 
-  upload(words, usage = STORAGE) {
-    const buffer = this.buffer(words.length, usage);
-    this.device.queue.writeBuffer(buffer, 0, words.buffer, words.byteOffset, words.byteLength);
+  #upload(words, usage = STORAGE) {
+    const buffer = this.#buffer(words.length, usage);
+    this.#write(buffer, words);
     return buffer;
   }
 
-  segment(words) {
-    return { words, buffer: this.upload(words), amplitudes: this.buffer(3 * words[ROW_COUNT]) };
+  #write(buffer, words, at = 0, length = words.length) {
+    this.uploaded += 4 * length;
+    this.device.queue.writeBuffer(buffer, 4 * at, words.buffer, words.byteOffset, 4 * length);
   }
 
-  // Triangles at each vertex, for normals: see normal_at in vertices.wgsl.
-  setCorners(words) {
-    this.corners = this.upload(words);
-    this.hasCorners = true;
-  }
-
-  dispatch(pass, name, count, ...buffers) {
-    if (count === 0) return;
-    const pipeline = this.kernels[name];
-    const entries = buffers.flatMap((buffer, binding) => (buffer ? [{ binding, resource: { buffer } }] : []));
-    pass.setPipeline(pipeline);
-    pass.setBindGroup(0, this.device.createBindGroup({ layout: pipeline.getBindGroupLayout(0), entries }));
-    pass.dispatchWorkgroups(count);
-  }
-
-  // Passes 1 and 2 of a frame of a segment.
-  place(segment, frame, slot) {
-    const encoder = this.device.createCommandEncoder(), pass = encoder.beginComputePass();
-    const at = [slot * this.size.positions, slot * this.size.matrices];
-    const run = (...numbers) => this.upload(new Uint32Array([...numbers, 0, 0, 0].slice(0, 4)), UNIFORM);
-    const { words, buffer, amplitudes } = segment, { level, positions, matrices } = this;
-    if (words[BAKED]) {
-      const count = Math.ceil(this.size.positions / WORKGROUP);
-      this.dispatch(pass, "baked", count, level, buffer, run(frame, ...at), positions);
-    } else {
-      this.dispatch(pass, "time", Math.ceil(words[ROW_COUNT] / WORKGROUP), null, buffer, run(frame), amplitudes);
-      for (let depth = 0; depth < this.words[DEPTH_COUNT]; depth++) {
-        const [first, end] = this.words.subarray(this.words[DEPTHS] + depth);
-        const outputs = [amplitudes, positions, matrices, this.modes, this.frames];
-        this.dispatch(pass, "hierarchy", end - first, level, buffer, run(first, ...at), ...outputs);
-      }
-      const finish = [buffer, run(frame, ...at), positions];
-      this.dispatch(pass, "bodies", this.words[BODY_COUNT], level, ...finish, matrices);
-      this.dispatch(pass, "corrections", Math.ceil(words[CORRECTED_COUNT] / WORKGROUP), null, ...finish);
+  // Another buffer in place of one, larger; what it holds is copied where `kept` words say so.
+  #grow(name, words, kept = 0) {
+    const old = this.buffers[name], { device } = this;
+    if (4 * words <= old.size) return;
+    const buffer = this.#buffer(words);
+    if (kept > 0) {
+      const encoder = device.createCommandEncoder();
+      encoder.copyBufferToBuffer(old, 0, buffer, 0, 4 * kept);
+      device.queue.submit([encoder.finish()]);
     }
+    old.destroy();
+    this.buffers[name] = buffer;
+    this.#sets.clear();
+  }
+
+  /** Uploads a segment, once. What it returns is what places name. */
+  segment(words) {
+    const at = this.#used;
+    if (at + words.length > this.buffers.segments.size / 4) this.#grow("segments", 2 * (at + words.length), at);
+    this.#write(this.buffers.segments, words, at);
+    this.#used += words.length;
+    this.#rows = Math.max(this.#rows, words[ROW_COUNT]);
+    this.#corrected = Math.max(this.#corrected, words[CORRECTED_COUNT]);
+    this.baked ||= words[BAKED] !== 0;
+    this.#grow("amplitudes", 3 * this.#rows * this.slots);
+    return at;
+  }
+
+  /** Triangles at each vertex, for normals: see normal_at in vertices.wgsl. */
+  setCorners(words) {
+    this.buffers.corners.destroy();
+    this.buffers.corners = this.#upload(words);
+    this.hasCorners = true;
+    this.#sets.clear();
+  }
+
+  #dispatch(pass, kernel, [x, y], names, depth = null) {
+    if (x === 0 || y === 0) return;
+    const key = depth ?? kernel;
+    if (!this.#sets.has(key)) {
+      const entries = names.flatMap((name, binding) => (name ? [{ binding, resource: { buffer: this.buffers[name] } }] : []));
+      if (depth) entries.push({ binding: names.length, resource: { buffer: depth.uniform } });
+      const layout = this.kernels[kernel].getBindGroupLayout(0);
+      this.#sets.set(key, this.device.createBindGroup({ layout, entries }));
+    }
+    pass.setPipeline(this.kernels[kernel]);
+    pass.setBindGroup(0, this.#sets.get(key));
+    pass.dispatchWorkgroups(x, y);
+  }
+
+  /** All passes, at most `slots` places and `shown` shows. Results of a show are at its index, or at `at`. */
+  run(places, shows) {
+    const encoder = this.device.createCommandEncoder(), pass = encoder.beginComputePass();
+    if (places.length > 0) this.#place(pass, places);
+    if (shows.length > 0) this.#show(pass, shows);
     pass.end();
     this.device.queue.submit([encoder.finish()]);
   }
 
-  // Pass 3: 9 floats of each vertex between two frames; previous: those of the time drawn before.
-  async show(slots, weight, previous = slots, previousWeight = weight) {
-    const all = [...slots, ...previous];
-    const run = new Uint32Array([
-      ...all.map((slot) => slot * this.size.positions),
-      ...all.map((slot) => slot * this.size.matrices),
-      ...new Uint32Array(new Float32Array([weight, previousWeight]).buffer),
-      this.hasCorners ? 1 : 0,
-      0,
-    ]);
-    const encoder = this.device.createCommandEncoder(), pass = encoder.beginComputePass();
-    const count = Math.ceil(this.words[VERTEX_COUNT] / WORKGROUP), uniform = this.upload(run, UNIFORM);
-    this.dispatch(pass, "vertices", count, this.level, this.corners, uniform, this.positions, this.matrices, this.vertices);
-    pass.end();
-    const read = this.buffer(9 * this.words[VERTEX_COUNT], READ);
-    encoder.copyBufferToBuffer(this.vertices, 0, read, 0, this.vertices.size);
+  #place(pass, places) {
+    const { positions, matrices, bodies } = this.size, count = places.length, numbers = new Uint32Array(PLACE_WORDS * count);
+    const floats = new Float32Array(numbers.buffer);
+    places.forEach(({ segment, frame, slot, strength = 1 }, i) => {
+      numbers.set([segment, frame, slot * positions, slot * matrices, 3 * this.#rows * i, i * positions, i * bodies], PLACE_WORDS * i);
+      floats[PLACE_WORDS * i + 7] = strength;
+    });
+    this.#write(this.buffers.places, numbers);
+    if (this.baked) {
+      this.#dispatch(pass, "baked", [groups(positions), count], ["level", "segments", "places", "positions"]);
+      return;
+    }
+    this.#dispatch(pass, "time", [groups(this.#rows), count], [null, "segments", "places", "amplitudes"]);
+    const outputs = ["amplitudes", "positions", "matrices", "modes", "bodies"];
+    for (const depth of this.depths)
+      this.#dispatch(pass, "hierarchy", [depth.count, count], ["level", "segments", "places", ...outputs], depth);
+    this.#dispatch(pass, "bodies", [this.words[BODY_COUNT], count], ["level", "segments", "places", "positions", "matrices"]);
+    this.#dispatch(pass, "corrections", [groups(this.#corrected), count], [null, "segments", "places", "positions"]);
+  }
+
+  #show(pass, shows) {
+    const { positions, matrices, vertices } = this.size, numbers = new Uint32Array(SHOW_WORDS * shows.length);
+    const floats = new Float32Array(numbers.buffer);
+    shows.forEach(({ slots, weight, previous = slots, previousWeight = weight, at = null }, i) => {
+      const to = SHOW_WORDS * i;
+      [...slots, ...previous].forEach((slot, k) => {
+        numbers[to + k] = slot * positions;
+        numbers[to + 4 + k] = slot * matrices;
+      });
+      floats[to + 8] = weight;
+      floats[to + 9] = previousWeight;
+      numbers[to + 10] = this.hasCorners ? 1 : 0;
+      numbers[to + 11] = (at ?? i) * vertices;
+    });
+    this.#write(this.buffers.shows, numbers);
+    this.#dispatch(pass, "vertices", [groups(this.words[VERTEX_COUNT]), shows.length],
+      ["level", "corners", "shows", "positions", "matrices", "vertices"]);
+  }
+
+  /** Pass 3, read back: nine floats of each vertex of each show. */
+  async read(shows) {
+    this.run([], shows);
+    const encoder = this.device.createCommandEncoder(), bytes = 4 * this.size.vertices * shows.length;
+    const read = this.device.createBuffer({ size: bytes, usage: READ });
+    encoder.copyBufferToBuffer(this.buffers.vertices, 0, read, 0, bytes);
     this.device.queue.submit([encoder.finish()]);
     await read.mapAsync(1);
     const floats = new Float32Array(read.getMappedRange().slice(0));
     read.destroy();
     return floats;
+  }
+
+  dispose() {
+    for (const { uniform } of this.depths) uniform.destroy();
+    for (const [name, buffer] of Object.entries(this.buffers)) if (name !== "vertices" || this.ownsVertices) buffer.destroy();
   }
 }

@@ -1,36 +1,32 @@
 // Pass 1: what each row is at a frame. One invocation per row.
 
-struct Run {
-    frame: u32,
-}
-
-@group(0) @binding(2) var<uniform> run: Run;
 @group(0) @binding(3) var<storage, read_write> amplitudes: array<f32>;
 
 const WIDE = 128u;
 
 fn value(row: Row, index: u32) -> f32 {
-    let at = segment[VALUES] + row.values;
+    let at = segment(VALUES) + row.values;
     if ((row.waves & WIDE) != 0u) {
-        return f32(bitcast<i32>(segment[at + index]));
+        return f32(bitcast<i32>(segment(at + index)));
     }
-    return f32(half(segment[at + index / 2u], index % 2u));
+    return f32(half(segment(at + index / 2u), index % 2u));
 }
 
 @compute @workgroup_size(64)
 fn main(@builtin(global_invocation_id) id: vec3<u32>) {
-    if (id.x >= segment[ROW_COUNT]) {
+    run = places[id.y];
+    if (id.x >= segment(ROW_COUNT)) {
         return;
     }
     let row = row_at(id.x);
-    let frames = segment[FRAMES];
-    let waves = segment[WAVE_SETS + (row.waves & 127u)] + run.frame;
+    let frames = segment(FRAMES);
+    let waves = segment(WAVE_SETS + (row.waves & 127u)) + run.frame;
     var sum = vec3<f32>(0.0);
     for (var k = 0u; k < row.count; k++) {
         let integers = vec3<f32>(value(row, k), value(row, row.count + k), value(row, 2u * row.count + k));
         sum += integers * segment_float(waves + k * frames);
     }
     for (var axis = 0u; axis < 3u; axis++) {
-        amplitudes[3u * id.x + axis] = row.step * sum[axis];
+        amplitudes[run.amplitudes + 3u * id.x + axis] = run.strength * row.step * sum[axis];
     }
 }

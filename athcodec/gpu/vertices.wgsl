@@ -6,6 +6,7 @@ struct Run {
     matrices: vec4<u32>,
     weights: vec2<f32>, // of the second of each two
     with_normals: u32,
+    vertices: u32, // number before those that are written
 }
 
 struct Vertex {
@@ -15,7 +16,8 @@ struct Vertex {
 }
 
 @group(0) @binding(1) var<storage, read> corners: array<u32>; // see `normal_at`
-@group(0) @binding(2) var<uniform> run: Run;
+@group(0) @binding(2) var<storage, read> shows: array<Run>; // one for each y of the workgroups
+var<private> run: Run;
 @group(0) @binding(3) var<storage, read> positions: array<f32>;
 @group(0) @binding(4) var<storage, read> matrices: array<f32>;
 @group(0) @binding(5) var<storage, read_write> vertices: array<f32>; // position, normal, previous position of each
@@ -83,13 +85,14 @@ fn vertex_at(v: u32) -> Vertex {
 
 @compute @workgroup_size(64)
 fn main(@builtin(global_invocation_id) id: vec3<u32>) {
+    run = shows[id.y];
     if (id.x >= level[VERTEX_COUNT]) {
         return;
     }
     let vertex = vertex_at(id.x);
     for (var axis = 0u; axis < 3u; axis++) {
-        vertices[9u * id.x + axis] = vertex.position[axis];
-        vertices[9u * id.x + 3u + axis] = vertex.normal[axis];
-        vertices[9u * id.x + 6u + axis] = vertex.previous[axis];
+        vertices[run.vertices + 9u * id.x + axis] = vertex.position[axis];
+        vertices[run.vertices + 9u * id.x + 3u + axis] = vertex.normal[axis];
+        vertices[run.vertices + 9u * id.x + 6u + axis] = vertex.previous[axis];
     }
 }

@@ -348,6 +348,21 @@ export class AthFile {
   positions(segments: Segments, frame: number, options: { out: Float32Array; order?: Order; fade: Fading }): Float32Array | null;
   positions<T extends Float32Array | Float64Array>(segments: Segments, frame: number,
                                                    options: { out: T; order?: Order }): T | null;
+  /** Up to four clips blended along the branches, each at its own frame and level: branches stay attached, edges of stems
+   * are as long as those of the clips in their weighted mean. Weights need not add up to 1; a share of none is passed over,
+   * and one that is left alone has the bits of positions(). */
+  blended(
+    shares: readonly { segments: Iterable<Segment | null>; frame: number; weight: number }[],
+    options?: { out?: Float32Array; order?: "source" | "file" },
+  ): Float32Array | null;
+  /** Weights of clips for a wanted wind, of which at most four are above 0, given the wind of each: its metadata "strength"
+   * and "heading", in degrees. Bilinear in both, held beyond the calmest and the wildest. */
+  windWeights(
+    winds: readonly ({ strength: number; heading?: number } | null)[],
+    strength: number,
+    heading: number,
+  ): number[];
+
   /** For skinning on the GPU: parts().nodeCount matrices of 12 numbers, from levelRest(level, "file") to
    * positions.
    * Vertices of exact runs have none, exact() has them. */
@@ -356,6 +371,13 @@ export class AthFile {
                                                   options: { out: T }): T | null;
   /** parts().exactCount positions of 3 numbers, in file order. */
   exact(segments: Segments, frame: number, options?: { out?: Float32Array; fade?: Fading | null }): Float32Array | null;
+
+  /** The GPU form of a level (core/ath_gpu.h, docs/gpu.md): a block of words that goes to the GPU as it is. */
+  gpuLevel(level: number): Uint32Array;
+  /** The same of a segment at a level; its bytes have to be here. */
+  gpuSegment(segment: number, level: number): Uint32Array;
+  /** Which of the coded frames of its segment shows a frame of the file. */
+  gpuFrame(frame: number): number;
 
   /** Lets go of the memory at once instead of with the object; nothing but free() and cancel() may be
    * called then. */

@@ -38,6 +38,8 @@ const POLYGONS = { faceCount: "u32", cornerCount: "u32", columns: "u32", isMixed
 const POLYGONS_SIZE = 16, POLYGON_KINDS = { faces: 0x8005, edges: 0x8006 };
 const RANGE = { offset: "u64", size: "u64" };
 const RANGE_SIZE = 16;
+const SHARE_SIZE = 24, BLEND_CLIPS = 4;
+const GPU_ROOM_SIZE = 28;
 const FADE = { levels: 4, weights: 24, passed: 56 }, FADE_SIZE = 88, FADE_LEVELS = 4; // offsets of arrays
 const TYPES = {
   u8: [1, (view, at) => view.getUint8(at)],
@@ -840,6 +842,38 @@ export class AthFile {
       : c.ath_positions(this.#at, array, count, frame, which, at, 12));
   }
 
+  // Shares are { segments, frame, weight }.
+  blended(shares, { out, order = "source" } = {}) {
+    const c = this.#c, core = this.#core, length = 3 * this.info.vertexCount, which = choice(order, ORDERS, "order");
+    const result = asOut(out, length, [Float32Array]), count = whole(shares.length, 1, BLEND_CLIPS, "clips to blend");
+    const pointers = shares.map(({ segments }) => Array.from(segments, (segment) => this.#pointer(segment)));
+    const table = count * SHARE_SIZE, scratch = c.ath_blend_size(this.#at) >>> 0;
+    const start = Math.ceil((table + 4 * pointers.flat().length) / 16) * 16;
+    return core.with(start + scratch, (at) => {
+      let next = at + table;
+      for (const [i, { frame, weight }] of shares.entries()) {
+        const own = pointers[i];
+        core.view(Uint32Array, next, own.length).set(own);
+        core.view(Int32Array, at + i * SHARE_SIZE, 2).set([next, own.length]);
+        core.view(Float64Array, at + i * SHARE_SIZE + 8, 2).set([number(frame, "frame"), number(weight, "weight")]);
+        next += 4 * own.length;
+      }
+      return this.#fill(result, length, (to) =>
+        c.ath_blended_positions(this.#at, at, count, which, to, 12, at + start, scratch));
+    });
+  }
+
+  // Weights of clips, given { strength, heading } of each, null for one without.
+  windWeights(winds, strength, heading) {
+    const c = this.#c, count = winds.length;
+    return this.#core.with(24 * count, (at) => {
+      this.#core.view(Float64Array, at, 2 * count).set(winds.flatMap((wind) =>
+        wind ? [number(wind.strength, "strength"), number(wind.heading ?? 0, "heading")] : [NaN, 0]));
+      c.ath_wind_weights(at, count, number(strength, "strength"), number(heading, "heading"), at + 16 * count);
+      return Array.from(this.#core.view(Float64Array, at + 16 * count, count));
+    });
+  }
+
   matrices(segments, frame, { out, fade = null } = {}) {
     const c = this.#c, length = 12 * this.#most(segments, fade, 1);
     const result = asOut(out, length, [Float32Array, Float64Array]);
@@ -857,6 +891,56 @@ export class AthFile {
       c.ath_faded_exact(this.#at, array, count, frame, faded, at, 12));
     return this.#show(segments, frame, result, length, (array, count, at) =>
       c.ath_exact(this.#at, array, count, frame, at, 12));
+  }
+
+  // ---- the GPU form ----
+
+  gpuLevel(level) {
+    const c = this.#c, core = this.#core;
+    this.#refine(this.#level(level));
+    const size = c.ath_gpu_level_size(this.#at, level) >>> 0;
+    return core.with(size, (at) => {
+      this.#check(c.ath_gpu_build_level(this.#at, level, at, size), `the block of level ${level}`);
+      return this.#block(at);
+    });
+  }
+
+  // The first try has no room, and tells how much there has to be.
+  gpuSegment(segment, level) {
+    const core = this.#core;
+    this.#segment(segment);
+    this.#refine(this.#level(level));
+    return core.with(GPU_ROOM_SIZE, (room) => {
+      core.view(Uint32Array, room, GPU_ROOM_SIZE / 4).fill(0);
+      return this.#recorded(segment, level, room) ?? this.#recorded(segment, level, room);
+    });
+  }
+
+  gpuFrame(frame) {
+    return this.#c.ath_gpu_frame(this.#at, whole(frame, 0, this.info.frameCount - 1, "frame"));
+  }
+
+  // The block of a segment where there is room for it, else null, and what it needs in `room`.
+  #recorded(segment, level, room) {
+    const c = this.#c, core = this.#core, size = c.ath_segment_size(this.#at, level) >>> 0;
+    const workSize = c.ath_work_size(this.#at) >>> 0, recordSize = c.ath_gpu_record_size(this.#at, level, room) >>> 0;
+    const work = this.#works.pop() ?? core.take(workSize);
+    try {
+      return core.with(size, (at) => core.with(recordSize, (record) => {
+        this.#checkWork(c.ath_prepare_start(work, workSize, this.#at, segment, level, at, size), work);
+        this.#check(c.ath_gpu_record(work, room, record, recordSize), `the block of segment ${segment}`);
+        this.#checkWork(c.ath_prepare_step(work, MOST_STEPS), work);
+        const block = c.ath_gpu_recorded(record, room) >>> 0;
+        return block ? this.#block(block) : null;
+      }));
+    } finally {
+      this.#works.push(work);
+    }
+  }
+
+  // A copy of a block, whose first word is the number of its words.
+  #block(at) {
+    return this.#core.copy(Uint32Array, at, this.#core.view(Uint32Array, at, 1)[0]);
   }
 
   dispose() {

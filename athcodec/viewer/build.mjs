@@ -15,7 +15,7 @@ mkdirSync(out, { recursive: true });
 async function bundle(entry, name, external) {
   await esbuild.build({
     ...entry, outfile: join(out, name), bundle: true, minify: true, format: "esm", target: "es2022", external,
-    nodePaths: [modules], legalComments: "none", charset: "utf8", logLevel: "error",
+    nodePaths: [modules], loader: { ".wgsl": "text" }, legalComments: "none", charset: "utf8", logLevel: "error",
   });
   return readFileSync(join(out, name), "utf8");
 }
@@ -26,20 +26,26 @@ function names(text) {
     .flatMap(([, list]) => list.split(",").map((name) => name.trim().split(" as ")[0]));
 }
 
-const orbit = "three/addons/controls/OrbitControls.js", outside = ["three", "athcodec-three", orbit];
+const orbit = "three/addons/controls/OrbitControls.js", outside = ["three", "three/webgpu", "athcodec-three", "athcodec-three/webgpu", orbit];
 const loader = await bundle({ entryPoints: [join(here, "src/index.js")] }, "ATHLoader.js", outside);
+await bundle({ entryPoints: [join(here, "src/webgpu.js")] }, "ATHForestGPU.js", outside);
 await bundle({ entryPoints: [join(here, "src/ath_worker.js")] }, "ath_worker.js", []);
 const viewer = await bundle({ entryPoints: [join(here, "page/main.js")] }, "viewer.js", outside);
 const controls = await bundle({ entryPoints: [join(modules, "three/examples/jsm/controls/OrbitControls.js")] }, "OrbitControls.js", ["three"]);
 const used = [...new Set([loader, viewer, controls].flatMap(names))].sort();
 await bundle({ stdin: { contents: `export { ${used.join(", ")} } from "three";`, resolveDir: modules } }, "three.js", []);
+await bundle({ entryPoints: [join(here, "page/forest.js")] }, "forest.js", outside);
+await bundle({ stdin: { contents: 'export * from "three/webgpu";', resolveDir: modules } }, "three.webgpu.js", []);
 
-copyFileSync(join(here, "page/viewer.css"), join(out, "viewer.css"));
-const page = readFileSync(join(here, "page/index.html"), "utf8"), map = /<script type="importmap">([^]*?)<\/script>/.exec(page)[1];
-const digest = createHash("sha256").update(map).digest("base64");
-writeFileSync(join(out, "index.html"), page.replace("IMPORT_MAP_HASH", `'sha256-${digest}'`));
+for (const name of ["viewer.css", "forest.css"]) copyFileSync(join(here, "page", name), join(out, name));
+for (const name of ["index.html", "forest.html"]) {
+  const page = readFileSync(join(here, "page", name), "utf8"), map = /<script type="importmap">([^]*?)<\/script>/.exec(page)[1];
+  const digest = createHash("sha256").update(map).digest("base64");
+  writeFileSync(join(out, name), page.replace("IMPORT_MAP_HASH", `'sha256-${digest}'`));
+}
 copyFileSync(join(here, "src/index.d.ts"), join(out, "ATHLoader.d.ts"));
+copyFileSync(join(here, "src/webgpu.d.ts"), join(out, "ATHForestGPU.d.ts"));
 const licence = (name) => readFileSync(join(modules, name, "LICENSE"), "utf8").trim();
 const version = (name) => JSON.parse(readFileSync(join(modules, name, "package.json"), "utf8")).version;
-writeFileSync(join(out, "LICENSES.txt"), [["three", "three.js, OrbitControls.js"], ["fzstd", "in ath_worker.js"]]
+writeFileSync(join(out, "LICENSES.txt"), [["three", "three.js, three.webgpu.js, OrbitControls.js"], ["fzstd", "in ath_worker.js"]]
   .map(([name, where]) => `${name} ${version(name)} (${where})\n\n${licence(name)}\n`).join(`\n${"-".repeat(80)}\n\n`));

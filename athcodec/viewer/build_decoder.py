@@ -26,7 +26,7 @@ ZIG = "0.17.1"
 """Version of the package ziglang that the committed module was built with."""
 
 STACK_BYTES = 64 << 10
-SMALL = ("container.c", "decode.c", "fault.c", "file.c", "kept.c", "mesh.c", "plan.c")
+SMALL = ("container.c", "decode.c", "fault.c", "file.c", "gpu.c", "kept.c", "mesh.c", "plan.c")
 """Run once per file, or little: compiled for size, all else for speed."""
 FLAGS = [
     "-target",
@@ -57,10 +57,10 @@ class BuildError(Exception):
 
 def decoder_sources() -> list[Path]:
     """The C files that a player needs, as core/CMakeLists.txt lists them."""
-    found = re.search(r"set\(ATH_DECODER_SOURCES ([^)]*)\)", (CORE / "CMakeLists.txt").read_text("utf-8"))
-    if not found:
-        raise BuildError(f"{CORE / 'CMakeLists.txt'}: got no ATH_DECODER_SOURCES, expected a list of C files")
-    return [CORE / name for name in found[1].split()]
+    found = re.findall(r"set\(ATH_(?:DECODER|GPU)_SOURCES ([^)]*)\)", (CORE / "CMakeLists.txt").read_text("utf-8"))
+    if len(found) != 2:
+        raise BuildError(f"{CORE / 'CMakeLists.txt'}: got {len(found)} lists of C files, expected decoder and GPU form")
+    return [CORE / name for names in found for name in names.split()]
 
 
 def exports(template: str) -> list[str]:

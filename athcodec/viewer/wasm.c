@@ -1,6 +1,7 @@
 /* What the C decoder needs in WebAssembly beside its own sources: the memory functions, which become one
  * instruction each, and checks that ath.h's structs are as ath_decoder.template.mjs reads them. */
 #include "ath.h"
+#include "ath_gpu.h"
 
 void *memcpy(void *restrict to, const void *restrict from, size_t size) { return __builtin_memcpy(to, from, size); }
 
@@ -14,6 +15,7 @@ _Static_assert(offsetof(ath_branch, detail) == 36 && sizeof(ath_branch) == 40, "
 _Static_assert(offsetof(ath_part, index) == 12 && sizeof(ath_part) == 16, "PART");
 _Static_assert(offsetof(ath_polygons, is_derived) == 13 && sizeof(ath_polygons) == 16, "POLYGONS");
 _Static_assert(offsetof(ath_range, size) == 8 && sizeof(ath_range) == 16, "RANGE_SIZE");
+_Static_assert(sizeof(ath_gpu_room) == 28, "GPU_ROOM_SIZE");
 _Static_assert(offsetof(ath_fade, level) == 4 && offsetof(ath_fade, weight) == 24 && offsetof(ath_fade, passed) == 56
                    && sizeof(ath_fade) == 88 && ATH_FADE_LEVELS == 4,
                "FADE");

@@ -3,7 +3,8 @@
 import { BufferAttribute, BufferGeometry, DoubleSide, Group, InstancedBufferAttribute, LineBasicMaterial, LineSegments, Mesh, MeshLambertMaterial } from "three";
 
 import { barkColour, heat, nodeColour, orderColour } from "./colours.js";
-import { limbGeometry, limbMaterial, radii, setRadii } from "./limbs.js";
+import { limbGeometry, limbMaterial, setRadii } from "./limbs.js";
+import { radii } from "./radii.js";
 
 const LEAF = [0.19, 0.33, 0.09], OVER = [0.55, 0.2, 0.06];
 

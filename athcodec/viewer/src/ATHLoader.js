@@ -36,7 +36,7 @@ class Channel {
   known = new Map();  // level: {parts, texels, vertices, boxes}
   #asked = new Map(); // what is under way: key: {promise, resolve, reject}
   #nextView = 1;
-  #nextBake = 1;
+  #nextWork = 1;
   #toRest = null;     // {to, timer}: the finer rest pose, as long as the one that is shown goes to it
 
   constructor(worker, release) {
@@ -86,6 +86,8 @@ class Channel {
       for (const view of this.views.values()) view.refresh();
     } else if (type === "baked") {
       this.#answer(`bake ${message.id}`, message);
+    } else if (type === "gpu") {
+      this.#answer(`gpu ${message.id}`, message);
     } else {
       if (type === "stopped") this.settle.whole.reject(failureOf(message));
       this.#failed(message);
@@ -172,8 +174,15 @@ class Channel {
   }
 
   bake(clip, level, step) {
-    const id = this.#nextBake++;
+    const id = this.#nextWork++;
     return this.#ask(`bake ${id}`, { type: "bake", id, clip, level, step });
+  }
+
+  /** The GPU form of a level, or of a segment at it: {words, coded}. Rejects where bytes of it are missing or damaged. */
+  async gpu(level, segment = null) {
+    const id = this.#nextWork++, answer = await this.#ask(`gpu ${id}`, { type: "gpu", id, level, segment });
+    if (!answer.words) throw failureOf(answer);
+    return answer;
   }
 
   #ask(key, message) {

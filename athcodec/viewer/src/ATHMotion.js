@@ -35,6 +35,15 @@ export function eased(passed) {
   return passed < 1 ? passed * passed * (3 - 2 * passed) : 1;
 }
 
+let refused = false;
+
+// Node renderers pass over onBeforeCompile: what is drawn would stand still, which is said once.
+function refuseNodes({ isWebGPURenderer }) {
+  if (!isWebGPURenderer || refused) return;
+  refused = true;
+  console.warn('ath: got a WebGPURenderer, expected WebGLRenderer: the plant stands still. Use loader.setMode("positions"), or ATHForest of athcodec-three/webgpu');
+}
+
 const SHAPES = 0x13, REFINED_REST = 0x15; // chunks that serve all segments
 
 /** Events: "frame" (a new picture is shown), "level" (another level is), "clip" (another clip is), "progress" (bytes
@@ -446,8 +455,8 @@ export class ATHMotion extends EventDispatcher {
 
   /** Lets shadows of an object move as it does. */
   bindShadows(object) {
-    if (this.mode !== "positions") Object.assign(object, this.#shadows ??= shadowMaterials(this.uniforms));
-    return object;
+    if (this.mode === "positions") return object;
+    return Object.assign(object, this.#shadows ??= shadowMaterials(this.uniforms), { onBeforeRender: refuseNodes });
   }
 
   /** Keeps a geometry made by the loader (`userData.source`) in step with what is shown: its vertices, and what boxes and rays

@@ -22,6 +22,7 @@ function take(data) {
   else if (data.type === "drop") session?.drop(data.view);
   else if (data.type === "parts") session?.tell(data.level);
   else if (data.type === "bake") session?.bake(data);
+  else if (data.type === "gpu") session?.gpu(data);
   else if (data.type === "all") session?.fetchAll();
   else if (data.type === "abort") session?.abort();
   else if (data.type === "close") {

@@ -716,6 +716,21 @@ export class Session {
     }
   }
 
+  /** The GPU form of a level or, with `segment`, of a segment at it and which of its coded frames shows each of its frames. */
+  gpu({ id, level, segment = null }) {
+    const file = this.#file, answer = { type: "gpu", id, words: null, coded: null };
+    try {
+      answer.words = segment === null ? file.gpuLevel(level) : file.gpuSegment(segment, level);
+      if (segment !== null) {
+        const first = file.segmentStart(segment);
+        answer.coded = Int32Array.from({ length: file.segmentStart(segment + 1) - first }, (_, i) => file.gpuFrame(first + i));
+      }
+    } catch (error) {
+      Object.assign(answer, describe(error));
+    }
+    this.post(answer, [answer.words, answer.coded].filter(Boolean).map((array) => array.buffer));
+  }
+
   close() {
     this.#closed = true;
     clearTimeout(this.#stateTimer);

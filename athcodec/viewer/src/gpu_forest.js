@@ -1,0 +1,419 @@
+// Many instances of one plant for WebGPURenderer. What moves is a few plants, one of each clip and phase, which the passes of
+// athcodec/gpu place and turn into vertices, all in the same dispatches; instances are drawn with the vertices of theirs. Which
+// shape an instance is drawn with is chosen on the GPU.
+
+import { Box3, BufferAttribute, DoubleSide, Group, IndirectStorageBufferAttribute, LineBasicNodeMaterial, LineSegments, Mesh,
+  MeshStandardNodeMaterial, Frustum, Matrix4, StorageBufferAttribute, TSL, Vector3, WebGPUCoordinateSystem } from "three/webgpu";
+
+import blocks from "../../gpu/blocks.wgsl";
+import choose from "../../gpu/choose.wgsl";
+import finish from "../../gpu/finish.wgsl";
+import hierarchy from "../../gpu/hierarchy.wgsl";
+import time from "../../gpu/time.wgsl";
+import vertices from "../../gpu/vertices.wgsl";
+import { Kernels, Passes } from "../../gpu/passes.mjs";
+import { roundOf } from "./ATHMotion.js";
+import { clustered } from "./geometry.js";
+
+const MOST_SHAPES = 32;
+const SLOTS = 4;          // frames that a plant keeps: two that are shown, and two that were before
+const CELL = 1.5;         // side of the cells of simplified geometry, in pixels' worth of error
+const COARSER = 2;        // from one shape to the next
+const FEWER = 0.85;       // of the vertices before, for a shape to be worth it
+const VIEW_WORDS = 32, FLOATS = 9;
+const WHITE = 0xffffff;
+
+const plainMaterial = (lines) => (lines ? new LineBasicNodeMaterial({ color: 0x6b5b45 })
+  : new MeshStandardNodeMaterial({ color: 0x8a9a6b, roughness: 0.8, side: DoubleSide }));
+
+export class ATHForest extends Group {
+  pixels = 1;      // error on the screen that a level may have
+  measure = "p99";
+  phases = 8;      // in which instances of a clip can be, evenly over its time
+  bytesOfMotion = 0;     // uploaded so far: segments and levels, once each
+  bytesOfParameters = 0; // and what says which frames are shown, every frame
+  levels = [];     // that can be drawn: {level, passes, ...}
+
+  #renderer;
+  #ath;
+  #geometry;
+  #material;
+  #shape;
+  #device;
+  #kernels;
+  #choose;
+  #motions = new Map(); // of clips that instances play: a view that has their bytes fetched
+  #plants = [];         // {clip, ahead}: what instances show, one of each clip and phase in use
+  #times = [];          // of each plant at this frame: {frames, weight}
+  #instances = null;    // StorageBufferAttribute
+  #draws = null;
+  #lists = null;
+  #set = null;
+  #shapes = [];         // {level, tolerance, list, drawn}, the finest first
+  #box = new Box3();
+  #size = 1;            // of the largest instance
+  #count = 0;
+  #loading = false;
+  #version = 0;
+  #inView = new Float32Array(VIEW_WORDS);
+  #zeros = null;
+  #strength = 1;
+  #heading = TSL.uniform(new Vector3(1, 0, 0)); // cosine, sine, 1 where the motion has a heading of its own
+
+  /** renderer: a WebGPURenderer on which init() has been awaited. geometry: as in ATHForest of athcodec-three; shape(geometry,
+   * tolerance): what is drawn of each of its simplifications (default: it). */
+  constructor(renderer, ath, { geometry = ath.geometry ?? ath.lines, material = plainMaterial, shape = (simple) => simple } = {}) {
+    super();
+    this.name = "ath forest";
+    this.#device = renderer.backend.device;
+    if (!this.#device) throw new Error("ATHForest: got a renderer without WebGPU, expected one after init(); ATHForest of athcodec-three is for WebGL");
+    this.#renderer = renderer;
+    this.#ath = ath;
+    this.#geometry = geometry;
+    this.#material = material;
+    this.#shape = shape;
+    this.#kernels = new Kernels(this.#device, { blocks, time, hierarchy, finish, vertices });
+    this.#choose = this.#device.createComputePipeline({ layout: "auto",
+      compute: { module: this.#device.createShaderModule({ code: choose }), entryPoint: "main" } });
+    this.view = this.#device.createBuffer({ size: 4 * VIEW_WORDS, usage: GPUBufferUsage.UNIFORM | GPUBufferUsage.COPY_DST });
+    this.tolerances = this.#device.createBuffer({ size: 8 * MOST_SHAPES, usage: GPUBufferUsage.STORAGE | GPUBufferUsage.COPY_DST });
+  }
+
+  get count() {
+    return this.#count;
+  }
+
+  /** Plants that are computed: one of each clip and phase in use. */
+  get plantCount() {
+    return this.#plants.length;
+  }
+
+  /** Bytes on the GPU, but for shapes. */
+  get bytes() {
+    return this.levels.reduce((sum, { passes }) => sum + passes.bytes, 0);
+  }
+
+  /** instances: {x, y, z, size, angle, seconds, clip, tint} in the units and axes of the file; tint: a colour such as 0xffeecc. */
+  setInstances(instances) {
+    const { motion, channel } = this.#ath, { limits } = this.#device, numbers = new Float32Array(8 * Math.max(1, instances.length));
+    this.#forget();
+    const clipOf = (name) => motion.clips.find(({ index, name: own }) => name === index || name === own) ?? motion.clip;
+    const clips = new Set(instances.map(({ clip }) => clipOf(clip)));
+    const most = Math.floor(limits.maxStorageBufferBindingSize / (12 * SLOTS * channel.info.vertexCount) / Math.max(1, clips.size));
+    const phases = Math.max(1, Math.min(this.phases, most)), plants = new Map();
+    const plantOf = (clip, seconds = 0) => {
+      const round = roundOf(clip) || 1, phase = Math.floor(((seconds / round) % 1 + 1) % 1 * phases), key = clip.index * phases + phase;
+      if (!plants.has(key)) plants.set(key, { index: plants.size, clip, ahead: phase / phases * round, kept: new Map() });
+      return plants.get(key).index;
+    };
+    instances.forEach(({ x, y, z, size = 1, angle = 0, seconds, clip, tint = WHITE }, i) => {
+      numbers.set([x, y, z, size, Math.cos(angle), Math.sin(angle), plantOf(clipOf(clip), seconds), tint], 8 * i);
+      this.#box.expandByPoint(new Vector3(x, y, z));
+      this.#size = Math.max(this.#size, size);
+    });
+    this.#plants = [...plants.values()];
+    this.#count = instances.length;
+    for (const clip of clips) this.#motions.set(clip, motion.clone().play(clip.index).setLevel(0).setTime(0));
+    this.#instances = this.#storage(numbers, 4);
+    this.#draws = new IndirectStorageBufferAttribute(new Uint32Array(5 * MOST_SHAPES), 5);
+    this.#renderer.backend.createIndirectStorageAttribute(this.#draws);
+    this.#lists = this.#storage(new Uint32Array(MOST_SHAPES * Math.max(1, this.#count)), 1);
+    this.#zeros = new Uint32Array(5 * MOST_SHAPES);
+    this.#set = this.#device.createBindGroup({ layout: this.#choose.getBindGroupLayout(0),
+      entries: [this.#bufferOf(this.#instances), this.view, this.tolerances, this.#bufferOf(this.#draws), this.#bufferOf(this.#lists)]
+        .map((buffer, binding) => ({ binding, resource: { buffer } })) });
+    return this;
+  }
+
+  // An attribute of which the buffer is there from now on.
+  #storage(array, size) {
+    const attribute = new StorageBufferAttribute(array, size);
+    this.#renderer.backend.createStorageAttribute(attribute);
+    return attribute;
+  }
+
+  #bufferOf(attribute) {
+    return this.#renderer.backend.get(attribute).buffer;
+  }
+
+  /** How strong the wind is, 1: as in the file; heading: where it blows to, radians about the axis that is up, of all instances
+   * alike; null: each as it is turned itself. */
+  wind(strength, heading = null) {
+    this.#strength = strength;
+    this.#heading.value.set(Math.cos(heading ?? 0), Math.sin(heading ?? 0), heading === null ? 0 : 1);
+    return this;
+  }
+
+  // ---- levels ----
+
+  // The next level, once its bytes are here and an instance is so near that the one before does not do.
+  #loadNext(hidden) {
+    const next = this.levels.length, { motion } = this.#ath;
+    if (this.#loading || next >= motion.levelCount) return;
+    if (next > 0 && this.#error(next - 1) <= hidden) return;
+    for (const view of this.#motions.values()) if (view.target < next) view.setLevel(next);
+    if ([...this.#motions.values()].some(({ readyLevel }) => readyLevel < next)) return;
+    this.#loading = true;
+    this.#load(next).catch(({ message, codeName }) => this.#ath.motion.dispatchEvent({ type: "error", message, codeName }));
+  }
+
+  // Of all clips that are played.
+  #error(level) {
+    return Math.max(...Array.from(this.#motions.keys(), ({ errors }) => errors[level][this.measure]));
+  }
+
+  async #load(level) {
+    const { channel } = this.#ath, version = this.#version, is = () => version === this.#version;
+    const [known, { words }] = [await channel.parts(level), await channel.gpu(level)];
+    if (!is()) return;
+    const shown = this.#plants.length, shared = this.#storage(new Float32Array(FLOATS * words[2] * shown), 1);
+    const passes = new Passes(this.#device, this.#kernels, words, { slots: SLOTS * shown, shown, vertices: this.#bufferOf(shared) });
+    const places = new Map(); // of frames of the file: {segment, frame}
+    for (const { firstSegment, segmentCount } of this.#motions.keys()) {
+      for (let s = firstSegment; s < firstSegment + segmentCount; s++) {
+        const { words: block, coded } = await channel.gpu(level, s);
+        if (!is()) {
+          passes.dispose();
+          return;
+        }
+        const segment = passes.segment(block);
+        coded.forEach((frame, i) => places.set(channel.segments[s] + i, { segment, frame }));
+      }
+    }
+    if (this.#ath.hasFaces) passes.setCorners(cornersOf(this.#ath.geometry, channel.vertexSource));
+    passes.bytesOfMotion = passes.uploaded;
+    this.bytesOfMotion += passes.uploaded;
+    const own = { level, passes, shared, places, uploaded: passes.uploaded, strength: NaN,
+      slots: this.#plants.map(() => new Array(SLOTS).fill(-1)), before: this.#plants.map(() => null) };
+    this.levels.push(own);
+    this.#addShapes(own, known);
+    this.#loading = false;
+    this.dispatchEvent({ type: "level", level });
+  }
+
+  // Geometries of a level: the finest for where its error is a pixel, coarser ones up to where the level before takes over.
+  #addShapes(own, known) {
+    const { channel, motion, rest, sphere } = this.#ath, { level } = own, least = this.#error(level);
+    const most = level > 0 ? this.#error(level - 1) : sphere.radius / 4, node = channel.nodeNumbers(known);
+    known.vertices.forEach((texel, vertex) => { if (texel < 0) node[vertex] = -1; }); // exact runs: one space
+    let before = level === motion.levelCount - 1 ? this.#geometry : clustered(this.#geometry, rest, CELL * least, node);
+    this.#addShape(own, before, least);
+    for (let tolerance = Math.max(COARSER * least, sphere.radius / 2000); tolerance < most; tolerance *= COARSER) {
+      const less = clustered(this.#geometry, rest, CELL * tolerance, node);
+      if (less.userData.source.length > FEWER * before.userData.source.length) continue;
+      this.#addShape(own, less, tolerance);
+      before = less;
+    }
+    const list = Float32Array.from({ length: 2 * this.#shapes.length }), lists = new Uint32Array(list.buffer);
+    this.#shapes.sort((a, b) => a.tolerance - b.tolerance).forEach((shape, i) => {
+      list[2 * i] = shape.tolerance;
+      lists[2 * i + 1] = shape.list;
+    });
+    this.#device.queue.writeBuffer(this.tolerances, 0, list);
+  }
+
+  #addShape(own, simple, tolerance) {
+    const list = this.#shapes.length;
+    if (list === MOST_SHAPES) return;
+    const geometry = this.#shape(simple, tolerance).clone(), { source } = simple.userData, lines = !geometry.hasAttribute("normal");
+    const place = inverse(this.#ath.channel.vertexSource), vertexOf = geometry.userData.vertices ?? source;
+    geometry.setAttribute("athVertex", new BufferAttribute(Uint32Array.from(vertexOf, (vertex) => place[vertex]), 1));
+    geometry.setAttribute("position", new BufferAttribute(Float32Array.from({ length: 3 * vertexOf.length },
+      (_, i) => this.#ath.rest[3 * vertexOf[Math.floor(i / 3)] + i % 3]), 3)); // the rest pose: not what rays find
+    geometry.setIndirect(this.#draws, 20 * list);
+    this.#zeros[5 * list] = geometry.index.count;
+    const material = this.#material(lines, own.level), drawn = lines ? new LineSegments(geometry, material) : new Mesh(geometry, material);
+    this.#bind(material, geometry, own, list);
+    drawn.frustumCulled = false; // instances are, one by one
+    drawn.castShadow = drawn.receiveShadow = !lines;
+    this.#shapes.push({ level: own.level, tolerance, list, drawn, size: geometry.index.count });
+    this.add(drawn);
+  }
+
+  // The vertices of the plant that an instance shows, turned as it is and at its place; those of the image before, too.
+  #bind(material, geometry, { passes, shared }, list) {
+    const { Fn, storage, uint, float, vec3, attribute, instanceIndex, positionGeometry, positionPrevious, normalLocal, normalGeometry, select } = TSL;
+    const { metadata, channel: { info } } = this.#ath;
+    const upright = metadata.up_axis === "z", heading = this.#heading, origin = vec3(...info.origin), count = uint(passes.words[2]);
+    const vertices = storage(shared, "float", shared.count).toReadOnly();
+    const instances = storage(this.#instances, "vec4", 2 * Math.max(1, this.#count)).toReadOnly();
+    const lists = storage(this.#lists, "uint", this.#lists.count).toReadOnly();
+    const spun = (v, c, s) => (upright ? vec3(c.mul(v.x).sub(s.mul(v.y)), s.mul(v.x).add(c.mul(v.y)), v.z)
+      : vec3(c.mul(v.x).add(s.mul(v.z)), v.y, c.mul(v.z).sub(s.mul(v.x))));
+    const number = () => lists.element(uint(list * Math.max(1, this.#count)).add(instanceIndex));
+    const hasOffset = geometry.hasAttribute("athOffset"), hasNormals = passes.hasCorners && !geometry.userData.vertices;
+    material.positionNode = Fn((_, builder) => {
+      const which = number().toVar(), place = instances.element(which.mul(2)).toVar(), turn = instances.element(which.mul(2).add(1)).toVar();
+      const at = uint(turn.z).mul(count).add(attribute("athVertex", "uint")).mul(FLOATS).toVar();
+      const three = (from) => vec3(...[0, 1, 2].map((k) => vertices.element(at.add(from + k))));
+      const placed = (moved) => {
+        const x = moved.add(origin).toVar(), bent = x.sub(positionGeometry).toVar();
+        const c = heading.x.mul(turn.x).add(heading.y.mul(turn.y)), s = heading.y.mul(turn.x).sub(heading.x.mul(turn.y)); // beside its own
+        const headed = positionGeometry.add(spun(bent, c, s)), shown = select(heading.z.greaterThan(0.5), headed, x).toVar();
+        const whole = hasOffset ? shown.add(attribute("athOffset", "vec3")) : shown;
+        return spun(whole, turn.x, turn.y).mul(place.w).add(place.xyz);
+      };
+      if (geometry.hasAttribute("normal")) normalLocal.assign(spun(hasNormals ? three(3) : normalGeometry, turn.x, turn.y));
+      if (builder.needsPreviousData?.()) positionPrevious.assign(placed(three(6)));
+      return placed(three(0));
+    })();
+    const tint = Fn(() => {
+      const packed = uint(instances.element(number().mul(2).add(1)).w), byte = (shift) => float(packed.shiftRight(uint(shift)).bitAnd(uint(255))).div(255);
+      return vec3(byte(16), byte(8), byte(0));
+    })();
+    material.colorNode = TSL.varying(tint).mul(material.colorNode ?? (geometry.hasAttribute("color") ? attribute("color", "vec3") : TSL.materialColor));
+  }
+
+  // ---- frames ----
+
+  /** What is shown at `seconds`: once per frame, before rendering. height: of the screen, in pixels. */
+  update(camera, height, seconds) {
+    if (!this.#set) return;
+    const hidden = this.#look(camera, height);
+    this.#loadNext(hidden);
+    this.#place(seconds);
+    for (const own of this.levels) if (own.level === 0 || this.#error(own.level - 1) > hidden) this.#show(own);
+    this.#select();
+  }
+
+  // Where the camera is, for the shader. How large an error is hidden at the nearest instance that there may be.
+  #look(camera, height) {
+    this.updateWorldMatrix(true, false);
+    camera.updateMatrixWorld();
+    const { sphere } = this.#ath, reach = sphere.center.length() + 1.2 * sphere.radius, numbers = this.#inView;
+    const eye = new Vector3().setFromMatrixPosition(camera.matrixWorld).applyMatrix4(new Matrix4().copy(this.matrixWorld).invert());
+    const view = new Frustum().setFromProjectionMatrix(new Matrix4().multiplyMatrices(camera.projectionMatrix, camera.matrixWorldInverse)
+      .multiply(this.matrixWorld), camera.coordinateSystem ?? WebGPUCoordinateSystem);
+    view.planes.forEach(({ normal, constant }, k) => numbers.set([normal.x, normal.y, normal.z, constant], 4 * k));
+    const pixel = this.pixels * 2 * Math.tan(camera.fov * Math.PI / 360) / height, distance = this.#box.distanceToPoint(eye);
+    numbers.set([eye.x, eye.y, eye.z, pixel], 24);
+    new Uint32Array(numbers.buffer).set([this.#count, this.#shapes.length], 28);
+    numbers[30] = reach;
+    new Uint32Array(numbers.buffer)[31] = Math.max(1, this.#count);
+    return pixel * Math.max(distance - 0.5 * reach * this.#size, 1e-6) / this.#size;
+  }
+
+  // The two frames of the file that each plant is between.
+  #place(seconds) {
+    const { times } = this.#ath.channel;
+    this.#times = this.#plants.map(({ clip, ahead }) => {
+      const { firstFrame, frameCount, duration } = clip, round = roundOf(clip);
+      if (frameCount === 1 || !(round > 0)) return { frames: [firstFrame, firstFrame], weight: 0 };
+      const passed = (((seconds + ahead) % round) + round) % round, start = times[firstFrame];
+      let low = 0, high = frameCount - 1;
+      if (passed >= duration) return { frames: [firstFrame + high, firstFrame], weight: Math.min((passed - duration) / (round - duration), 1) };
+      while (high - low > 1) {
+        const middle = (low + high) >> 1;
+        if (times[firstFrame + middle] - start <= passed) low = middle;
+        else high = middle;
+      }
+      const [a, b] = [times[firstFrame + low], times[firstFrame + high]];
+      return { frames: [firstFrame + low, firstFrame + high], weight: (passed + start - a) / (b - a) };
+    });
+  }
+
+  // A level at that time: frames are placed that are not there, and all plants shown.
+  #show(own) {
+    const places = [], shows = [], strength = this.#strength, changed = own.strength !== strength;
+    own.strength = strength;
+    this.#times.forEach(({ frames, weight }, plant) => {
+      const kept = own.slots[plant], before = own.before[plant], first = SLOTS * plant;
+      if (changed) kept.fill(-1);
+      const slots = frames.map((frame) => {
+        let slot = kept.indexOf(frame);
+        if (slot < 0) {
+          slot = kept.findIndex((old, k) => !frames.includes(old) && !before?.slots.includes(first + k));
+          kept[slot] = frame;
+          places.push({ ...own.places.get(frame), slot: first + slot, strength });
+        }
+        return first + slot;
+      });
+      shows.push({ slots, weight, previous: before?.slots ?? slots, previousWeight: before?.weight ?? weight });
+      own.before[plant] = { slots, weight };
+    });
+    own.passes.run(places, shows);
+    this.bytesOfParameters += own.passes.uploaded - own.uploaded;
+    own.uploaded = own.passes.uploaded;
+  }
+
+  #select() {
+    const { queue } = this.#device, encoder = this.#device.createCommandEncoder();
+    queue.writeBuffer(this.view, 0, this.#inView);
+    queue.writeBuffer(this.#bufferOf(this.#draws), 0, this.#zeros);
+    this.bytesOfParameters += this.#inView.byteLength + this.#zeros.byteLength;
+    const pass = encoder.beginComputePass();
+    pass.setPipeline(this.#choose);
+    pass.setBindGroup(0, this.#set);
+    pass.dispatchWorkgroups(Math.ceil(Math.max(1, this.#count) / 64));
+    pass.end();
+    queue.submit([encoder.finish()]);
+  }
+
+  /** Instances that the last update() drew, by level: read back, for tests and figures. */
+  async drawn() {
+    const size = this.#zeros.byteLength, read = this.#device.createBuffer({ size, usage: GPUBufferUsage.COPY_DST | GPUBufferUsage.MAP_READ });
+    const encoder = this.#device.createCommandEncoder(), counts = new Array(this.#ath.motion.levelCount).fill(0);
+    encoder.copyBufferToBuffer(this.#bufferOf(this.#draws), 0, read, 0, size);
+    this.#device.queue.submit([encoder.finish()]);
+    await read.mapAsync(GPUMapMode.READ);
+    const numbers = new Uint32Array(read.getMappedRange().slice(0));
+    read.destroy();
+    for (const { level, list } of this.#shapes) counts[level] += numbers[5 * list + 1];
+    return counts;
+  }
+
+  /** Vertices of plants at a level as the last update() showed them, in file order: nine floats of each, read back. */
+  async vertices(level) {
+    const { shared } = this.levels[level];
+    return new Float32Array(await this.#renderer.getArrayBufferAsync(shared));
+  }
+
+  #forget() {
+    this.#version++;
+    this.#loading = false;
+    for (const { drawn } of this.#shapes) {
+      drawn.removeFromParent();
+      drawn.geometry.dispose();
+      drawn.material.dispose();
+    }
+    for (const { passes, shared } of this.levels) {
+      passes.dispose();
+      this.#renderer.backend.destroyAttribute(shared);
+    }
+    for (const attribute of [this.#instances, this.#draws, this.#lists].filter(Boolean)) this.#renderer.backend.destroyAttribute(attribute);
+    for (const motion of this.#motions.values()) motion.dispose();
+    this.#motions.clear();
+    this.levels = [];
+    this.#shapes = [];
+    this.#set = null;
+    this.#box.makeEmpty();
+    this.#size = 1e-9;
+  }
+
+  dispose() {
+    this.#forget();
+    this.view.destroy();
+    this.tolerances.destroy();
+  }
+}
+
+function inverse(source) {
+  const place = new Uint32Array(source.length);
+  source.forEach((vertex, i) => { place[vertex] = i; });
+  return place;
+}
+
+// What vertices.wgsl takes normals from: see `corners_of` in athcodec/gpu.
+function cornersOf(geometry, vertexSource) {
+  const place = inverse(vertexSource), index = Uint32Array.from(geometry.index.array, (i) => place[geometry.userData.source[i]]);
+  const count = vertexSource.length, next = new Uint32Array(count + 1), out = new Uint32Array(count + 1 + 2 * index.length);
+  for (const vertex of index) next[vertex + 1]++;
+  for (let v = 0; v < count; v++) next[v + 1] += next[v];
+  for (let v = 0; v <= count; v++) out[v] = count + 1 + 2 * next[v];
+  for (let i = 0; i < index.length; i++) {
+    const first = i - i % 3, at = count + 1 + 2 * next[index[i]]++;
+    out[at] = index[first + (i + 1) % 3];
+    out[at + 1] = index[first + (i + 2) % 3];
+  }
+  return out;
+}
