@@ -89,8 +89,8 @@ class MotionClip:
     edges : (E, 2) array of integers, optional
         Pairs of vertices.
     faces : (F, k) array of integers, optional
-        Vertices of each polygon. Polygons of different sizes are the attributes face_vertex_counts (F,) and
-        face_vertex_indices (C,) instead; `polygons` gives either.
+        Vertices of each polygon; rows of fewer corners end with -1. Polygons of different sizes become the attributes
+        face_vertex_counts (F,) and face_vertex_indices (C,) instead; `polygons` gives either.
     attributes : dict of str to array, optional
         Further named static arrays (radius, colours ...) of any shape: numbers, booleans or bytes. An array of records
         is taken apart: its field "u" becomes an array whose name ends in ".u".
@@ -100,7 +100,8 @@ class MotionClip:
         "unit", "up_axis" and whatever else describes the clip: str, int, float, bool, lists and dicts of them. "fps"
         and "start_frame" are the rate, and the number of the first frame, in the tool that made the clip: its frames
         are start_frame + time * fps. "part_names" are the objects that the vertices belong to, one after the other;
-        the attribute part_vertex_counts has their numbers of vertices.
+        the attribute part_vertex_counts has their numbers of vertices. Where part_copies is there too, an object is so
+        many copies of one shape, one after the other, each of which moves as a whole: the leaves of an instancer.
     rest_pose : {"first", "mean"}, optional
         How the rest pose is made where none is given: the first frame, or the mean of all, which reads the clip once.
     stem_index : (N,) array of integers, optional
@@ -115,6 +116,8 @@ class MotionClip:
         Says, without arguments, whether what the positions are read from is as it was when the clip was made.
     skin : Skin, optional
         The joints that moved the vertices. Not stored in .ath files; `find_branches` uses it.
+    not_read : dict of str to sequence of str, optional
+        What the source holds besides, by its kind ("Material", "Camera" ...), named. Not stored in .ath files.
 
     Attributes
     ----------
@@ -144,6 +147,7 @@ class MotionClip:
     resource: Any = None
     unchanged: Callable[[], bool] | None = None
     skin: Skin | None = None
+    not_read: Mapping[str, Sequence[str]] = field(default_factory=dict)
     rest_dtype: np.dtype = field(init=False)
     rest_given: bool = field(init=False, default=False)
     _checked_rest: np.ndarray | None = field(init=False, default=None)
@@ -258,10 +262,10 @@ class MotionClip:
         self.time = check_time(self.time, frame_count, self.clip_ranges)
         self._check_branches(vertex_count)
         self.edges = check_indices("edges", self.edges, vertex_count, width=2)
+        self.attributes, self.metadata = check_attributes(self.attributes), dict(self.metadata or {})
+        self._take_padding_off()
         self.faces = check_indices("faces", self.faces, vertex_count)
-        self.attributes = check_attributes(self.attributes)
         check_polygons(self.polygons, vertex_count)
-        self.metadata = dict(self.metadata or {})
         self._check_rest()
 
     @contextmanager
@@ -352,6 +356,22 @@ class MotionClip:
             raise ClipError("branches: got one of vertex_branch and branch_parent, expected both or neither")
         self.vertex_branch, self.branch_parent = check_branches(self.vertex_branch, self.branch_parent, vertex_count)
         self.stem_index = check_stem_index(self.stem_index, self.vertex_branch)
+
+    def _take_padding_off(self) -> None:
+        """Faces whose rows end with -1 become polygons of their own sizes."""
+        faces = np.asarray(self.faces)
+        if self.faces is None or faces.ndim != 2 or faces.dtype.kind != "i" or not (faces == -1).any():
+            return
+        used = np.logical_or.accumulate((faces != -1)[:, ::-1], axis=1)[:, ::-1]
+        counts = used.sum(axis=1, dtype=np.int32)
+        if counts.min() == counts.max() > 0:
+            self.faces = faces[:, : counts[0]]
+            return
+        self.faces = None
+        self.attributes |= {"face_vertex_counts": counts, "face_vertex_indices": faces[used]}
+        domains = {"face_vertex_counts": "face", "face_vertex_indices": "corner"}
+        said = self.metadata.get("domains")
+        self.metadata["domains"] = (said if isinstance(said, dict) else {}) | domains
 
     def _check_positions(self) -> tuple[int, int]:
         shape, dtype = tuple(self.positions.shape or ()), self.positions.dtype

@@ -83,8 +83,8 @@ class Found:
 
 def candidates(clip: MotionClip) -> list[Found]:
     """What find_branches gives; and where that goes by motion, or by runs that leave many points alone, also patches of
-    other sizes, patches without parents, and one single branch: only a trial shows which of them makes the smallest
-    file. A clip that stands still has no patches and no runs."""
+    other sizes, patches without parents, and one single branch; where it welds pieces of a mesh, also the pieces: only
+    a trial shows which of them makes the smallest file. A clip that stands still has no patches and no runs."""
     seen = _Seen(clip)
     single = Found(np.zeros(clip.vertex_count, np.int32), np.array([-1], np.int32), None, "motion")
     if stands_still(clip):
@@ -94,6 +94,9 @@ def candidates(clip: MotionClip) -> list[Found]:
     if found.method == "skeleton":
         return [found, dataclasses.replace(found, stem_index=None)]
     lone = np.count_nonzero(np.bincount(found.vertex_branch) == 1)
+    if found.method == "components":
+        unwelded = pieces(clip)  # leaves that touch are welded, which is wrong where they move by themselves
+        return [found] if len(unwelded.branch_parent) == len(found.branch_parent) else [found, unwelded]
     if found.method != "motion" and not (found.method == "runs" and lone > LONE_POINTS * clip.vertex_count):
         return [found]
     patches = [found] if found.method == "motion" else [found, _by_motion(seen, None)]
@@ -141,6 +144,30 @@ def find_branches(clip: MotionClip, method: str = "auto", root: int | None = Non
     if found is None:
         raise ClipError(f"branches: the clip has nothing to find them by {method}, expected {_EXPECTED[method]}")
     return found
+
+
+def pieces(clip: MotionClip) -> Found:
+    """The connected pieces of a clip's mesh as branches without parents: what can be had without scipy.
+
+    Parameters
+    ----------
+    clip : MotionClip
+
+    Returns
+    -------
+    Found
+        A single branch where there is one piece, or too many of few vertices.
+    """
+    links, label = _links(clip), np.arange(clip.vertex_count)
+    while len(links) and (label[links[:, 0]] != label[links[:, 1]]).any():
+        ends = label[links]
+        np.minimum.at(label, ends, ends.min(axis=1, keepdims=True))
+        while not np.array_equal(label, label[label]):
+            label = label[label]
+    label = _numbered(label)
+    if label.max() >= COMPONENTS_AT_MOST * clip.vertex_count:
+        label[:] = 0
+    return Found(label.astype(np.int32), np.full(label.max() + 1, -1, np.int32), None, "components")
 
 
 class _Seen:
@@ -452,7 +479,25 @@ def _links(clip: MotionClip) -> np.ndarray:
         ends = np.cumsum(counts)
         following[ends[counts > 0] - 1] = (ends - counts)[counts > 0]
         pairs.append(np.stack([indices, indices[following]], axis=1))
+    copy = copies_of(clip)
+    inside = np.flatnonzero((copy[1:] == copy[:-1]) & (copy[1:] > 0))
+    pairs.append(np.stack([inside, inside + 1], axis=1))
     return np.concatenate(pairs)
+
+
+def copies_of(clip: MotionClip) -> np.ndarray:
+    """(N,) the number of the copy that each vertex is of, from 1 on; 0 for what is none (MotionClip, part_copies)."""
+    counts, copies = (clip.attributes.get(f"part_{name}") for name in ("vertex_counts", "copies"))
+    none = np.zeros(clip.vertex_count, np.int64)
+    if counts is None or copies is None or counts.dtype.kind not in "iu" or copies.dtype.kind not in "iu":
+        return none
+    usable = counts.shape == copies.shape and counts.ndim == 1 and (counts >= 0).all() and (copies >= 1).all()
+    usable = usable and (copies <= np.maximum(counts, 1)).all()
+    if not usable or counts.sum(dtype=np.int64) != len(none) or (counts % copies).any():
+        return none
+    is_copied = np.repeat(copies > 1, counts)
+    each = np.repeat(counts // copies, copies)
+    return np.where(is_copied, np.repeat(np.arange(1, len(each) + 1), each), 0)
 
 
 def _welded(clip: MotionClip, links: np.ndarray) -> np.ndarray:
@@ -463,7 +508,8 @@ def _welded(clip: MotionClip, links: np.ndarray) -> np.ndarray:
     step = max(WELD * float(np.linalg.norm(np.ptp(rest, axis=0))), 1e-30)
     cells = np.round(np.concatenate([rest, last, middle], axis=1) / step)
     order = np.lexsort(cells.T)
-    same = np.flatnonzero((cells[order[1:]] == cells[order[:-1]]).all(axis=1))
+    copy = copies_of(clip)[order]
+    same = np.flatnonzero((cells[order[1:]] == cells[order[:-1]]).all(axis=1) & (copy[1:] == copy[:-1]))
     return np.concatenate([links, np.stack([order[same], order[same + 1]], axis=1)])
 
 

@@ -15,6 +15,10 @@ class ClipError(AthError, ValueError):
     """A motion clip, or the source file it comes from, is not usable."""
 
 
+class SourceWarning(UserWarning):
+    """A source holds something that is part of its picture and is not read."""
+
+
 class BoundError(AthError, ValueError):
     """An error bound or target size cannot be kept."""
 

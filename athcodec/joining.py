@@ -8,6 +8,7 @@ makes a clip that can be played over and over. All read frames only when they ar
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from typing import Any
@@ -20,6 +21,7 @@ from athcodec.frames import Frames
 
 BLEND = "loop_blend"  # metadata: frames that were blended
 OWN = "clips"  # metadata: by name, what one of several clips has of its own
+STRENGTH, HEADING = "strength", "heading"  # metadata: the wind of a clip, the heading in degrees
 NAME, LOOP = "clip_name", "loop"  # metadata of files that hold a single clip and know no names or loops
 
 
@@ -68,6 +70,7 @@ def join(clips: Mapping[str, MotionClip]) -> MotionClip:
         resource=closing,
         unchanged=_all_unchanged(parts),
         skin=first.skin,
+        not_read=first.not_read,
     )
     joined.rest_given = any(part.rest_given for part in parts)
     return joined
@@ -104,6 +107,46 @@ def metadata_of(metadata: Mapping[str, Any], name: str) -> dict[str, Any]:
     own = owned.get(name) if isinstance(owned, dict) else None
     common = {key: value for key, value in metadata.items() if key != OWN}
     return common | own if isinstance(own, dict) else common
+
+
+def in_wind(clip: MotionClip, strength: float, heading: float = 0.0) -> MotionClip:
+    """The clip with the wind that it shows, by which players choose what to blend.
+
+    Parameters
+    ----------
+    clip : MotionClip
+    strength : float
+        Of the wind, 0 or more, in any unit that all clips of a file share.
+    heading : float, optional
+        Where the wind blows to, degrees about the up axis.
+
+    Returns
+    -------
+    MotionClip
+        Closing it closes `clip`.
+
+    Raises
+    ------
+    ClipError
+        Where a number is not finite, or the strength below 0.
+    """
+    if not (math.isfinite(strength) and strength >= 0 and math.isfinite(heading)):
+        raise ClipError(
+            f"wind: got strength {strength} and heading {heading}, expected finite numbers, the first 0 or more"
+        )
+    return clip.replace(metadata=clip.metadata | {STRENGTH: float(strength), HEADING: float(heading) % 360})
+
+
+def wind_of(metadata: Mapping[str, Any]) -> tuple[float, float]:
+    """Strength and heading of a clip's wind, given its metadata; not a number where it names none."""
+    strength, heading = metadata.get(STRENGTH), metadata.get(HEADING, 0.0)
+    numbers = [
+        float(value)
+        if isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < 1e300
+        else math.nan
+        for value in (strength, heading)
+    ]
+    return (numbers[0], numbers[1]) if not any(map(math.isnan, numbers)) else (math.nan, math.nan)
 
 
 def looped(clip: MotionClip, blend: int = 0) -> MotionClip:

@@ -13,7 +13,7 @@ from alembic3d import Abc, AbcCoreAbstract, AbcGeom
 from test_usd import GRID, QUADS, assert_same, awkward_clip, sway, whole_plant
 
 import athcodec
-from athcodec.errors import ClipError
+from athcodec.errors import ClipError, SourceWarning
 
 FPS = float(Fraction(24000, 1001))
 Y_UP = np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]])  # of rows whose Z is up
@@ -66,6 +66,52 @@ def test_meshes_below_moving_transforms_are_read_in_world_space(tmp_path):
         assert clip.metadata["part_names"] == ["grid"]
         assert np.array_equal(clip.faces, QUADS)  # clockwise in the file
         assert np.allclose(clip.time, np.arange(10) / FPS, rtol=0, atol=1e-12)
+
+
+def test_subdivision_surfaces_are_read_as_their_cage(tmp_path):
+    archive = Abc.OArchive(str(tmp_path / "a.abc"))
+    sampling = Abc.Argument(archive.addTimeSampling(AbcCoreAbstract.TimeSampling(1 / 24, 0)))
+    surface = AbcGeom.OSubD(archive.getTop(), "grid", sampling)
+    counts = filled(imath.IntArray, np.full(len(QUADS), 4))
+    corners = filled(imath.IntArray, QUADS[:, ::-1].reshape(-1))
+    for i in range(4):
+        surface.getSchema().set(AbcGeom.OSubDSchemaSample(filled(imath.V3fArray, sway(i)), corners, counts))
+    del archive, surface
+    gc.collect()
+    with athcodec.read(tmp_path / "a.abc") as clip:
+        assert np.array_equal(clip.block(0, 4), [sway(i) for i in range(4)]) and np.array_equal(clip.faces, QUADS)
+
+
+def test_instances_are_read_as_copies_and_what_is_not_read_is_named(tmp_path):
+    archive = Abc.OArchive(str(tmp_path / "a.abc"))
+    sampling = Abc.Argument(archive.addTimeSampling(AbcCoreAbstract.TimeSampling(1 / 24, 0)))
+    places = [AbcGeom.OXform(archive.getTop(), f"place{i}", sampling) for i in range(3)]
+    leaf = AbcGeom.OPolyMesh(places[0], "leaf", sampling)
+    corners, counts = filled(imath.IntArray, QUADS[:, ::-1].reshape(-1)), filled(imath.IntArray, [4] * len(QUADS))
+    leaf.getSchema().set(AbcGeom.OPolyMeshSchemaSample(filled(imath.V3fArray, GRID), corners, counts))
+    for i, place in enumerate(places):
+        for frame in range(4):
+            sample = AbcGeom.XformSample()
+            sample.setMatrix(matrix(np.linalg.matrix_power(TURN, i), [10 * i, frame * i, 0]))
+            place.getSchema().set(sample)
+        if i:
+            place.addChildInstance(leaf, "leaf")
+    camera = AbcGeom.OCamera(archive.getTop(), "eye")
+    patch = AbcGeom.ONuPatch(archive.getTop(), "petal")
+    del archive, places, place, leaf, camera, patch
+    gc.collect()
+    with pytest.warns(SourceWarning, match="a.abc: not read: NuPatch /petal$"):
+        clip = athcodec.read(tmp_path / "a.abc")
+    with clip:
+        assert clip.not_read == {"Camera": ["/eye"], "NuPatch": ["/petal"]}
+        assert clip.metadata["part_names"] == ["leaf"] and clip.attributes["part_copies"].tolist() == [3]
+        assert np.array_equal(clip.faces, np.concatenate([QUADS, QUADS + 12, QUADS + 24]))
+        for frame, positions in enumerate(clip.block(0, 4)):
+            for i in range(3):
+                expected = GRID @ np.linalg.matrix_power(TURN, i) + [10 * i, frame * i, 0]
+                assert np.allclose(positions[12 * i : 12 * i + 12], expected, atol=1e-6)
+        found = athcodec.find_branches(clip)
+        assert np.array_equal(found.vertex_branch, np.repeat([0, 1, 2], 12))
 
 
 def test_another_frame_rate_interpolates_linearly_between_samples(tmp_path):
@@ -245,6 +291,35 @@ def test_what_blender_writes_is_read_as_blender_shows_it(blender, tmp_path, suff
             first += count
         assert clip.metadata["fps"] == pytest.approx(FPS, rel=1e-6) and clip.metadata["start_frame"] == 3
         assert clip.frame_count == 10 and "uv" in clip.attributes
+
+
+MIXED = """
+fresh()
+scene = bpy.context.scene
+scene.render.fps = 24
+scene.frame_start, scene.frame_end = 1, 6
+bpy.ops.mesh.primitive_uv_sphere_add(segments=8, ring_count=5)
+ball = bpy.context.object
+ball.name = ball.data.name = "Ball"
+ball.keyframe_insert("location", frame=1)
+ball.location = (0, 0, 2)
+ball.keyframe_insert("location", frame=6)
+shown = []
+for frame in range(1, 7):
+    scene.frame_set(frame)
+    shown.append(world("Ball"))
+ball.modifiers.new("smooth", "SUBSURF")
+bpy.ops.wm.alembic_export(filepath=args["path"], start=1, end=6, subdiv_schema=True)
+save(shown=shown, sizes=[len(polygon.vertices) for polygon in ball.data.polygons])
+"""
+
+
+@pytest.mark.programs
+def test_subdivision_surfaces_of_blender_are_read_with_their_mixed_polygons(blender, tmp_path):
+    found = blender.run(MIXED, path=tmp_path / "a.abc")
+    with athcodec.read(tmp_path / "a.abc") as clip:
+        assert np.allclose(clip.block(0, 6), found["shown"] @ Y_UP, rtol=0, atol=3e-6)
+        assert np.array_equal(clip.polygons[0], found["sizes"]) and set(found["sizes"]) == {3, 4}
 
 
 OPEN = """

@@ -147,6 +147,15 @@ def reasons(items, out) -> dict[str, str]:
     return {forecast.item.name: forecast.reason for forecast in batch.preview(items, out)}
 
 
+def test_what_is_not_read_of_a_clip_is_in_its_line_and_said(tmp_path, cluster, capsys):
+    (tmp_path / "a.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\ncurv 0 1 1 2 3\nf 1 2 3\n")
+    words = ["batch", str(tmp_path / "a.obj"), "--out", str(tmp_path / "out"), "--scheduler", cluster]
+    assert cli.main(words) == 0
+    [line] = lines(tmp_path / "out")
+    assert line["not_read"] == "curve or surface curv"
+    assert "a.obj: curve or surface curv" in capsys.readouterr().err
+
+
 def test_a_second_run_does_only_what_is_not_as_it_should_be(clips, tmp_path, cluster):
     out = tmp_path / "out"
     items = batch.find([clips], out, settings=FAST)

@@ -273,6 +273,20 @@ def test_what_blender_shows_is_written_within_the_bound(extended_blender, tmp_pa
 
 
 @pytest.mark.programs
+def test_meshes_without_branches_are_written_within_the_bound_too(extended_blender, tmp_path):
+    script = EXPORT.replace('obj.data.attributes.new("vertex_branch"', 'obj.data.attributes.new("other"')
+    found = extended_blender.run(script, ath=tmp_path / "a.ath", options={})
+    with athcodec.open(tmp_path / "a.ath", strict=True) as decoder:
+        error = np.linalg.norm(decoder.positions().astype(float) - found["shown"], axis=2).max()
+        assert error <= decoder.max_error_bound + 2e-6
+
+
+@pytest.mark.programs
+def test_the_package_is_small(extended_blender):
+    assert (extended_blender.folder / "athcodec-blender.zip").stat().st_size < 15e6
+
+
+@pytest.mark.programs
 def test_an_exported_mesh_is_imported_at_the_same_place(extended_blender, tmp_path):
     found = extended_blender.run(
         EXPORT

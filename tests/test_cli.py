@@ -158,6 +158,13 @@ def test_a_level_and_a_range_of_frames_are_those_of_the_whole(encoded, tmp_path)
         assert np.array_equal(part.time, decoder.time[20:70])
 
 
+@pytest.mark.parametrize("name, files", [("a-1.obj", ["a-1_0003.obj", "a-1_0005.obj"]), ("a.vtu", ["a.pvd"])])
+def test_decode_names_the_files_that_are_there_then(encoded, tmp_path, capsys, name, files):
+    assert run("decode", encoded, tmp_path / name, "--frames", "3:6") == 0
+    said = capsys.readouterr().out.split(": ")[0].split(" to ")
+    assert said == [str(tmp_path / file) for file in files] and all(Path(path).exists() for path in said)
+
+
 def test_decode_takes_the_coarsest_level_within_a_length(encoded, facts, tmp_path, capsys):
     error = facts["levels"][2]["max_error"]
     assert run("decode", encoded, tmp_path / "a.h5", "--max-error", f"{100.1 * error}cm") == 0

@@ -138,6 +138,7 @@ REFUSED = {
     "rest NaN": ({"rest": np.where(np.arange(6)[:, None] == 2, np.nan, np.zeros((6, 3)))}, "rest: vertex 2"),
     "edge out of range": ({"edges": [[0, 1], [2, 6]]}, "edges: row 1 names vertex 6"),
     "edges of three": ({"edges": np.zeros((2, 3), int)}, r"edges: got shape \(2, 3\)"),
+    "face with a gap": ({"faces": [[0, 1, 2, -1], [0, -1, 1, 2]]}, "face_vertex_indices: row 4 names vertex -1"),
     "float faces": ({"faces": np.zeros((2, 3))}, "faces: got dtype float64"),
     "objects": ({"attributes": {"names": np.array(["a", None])}}, "names has dtype object"),
     "reserved name": ({"attributes": {"rest": np.zeros(3)}}, "name 'rest'"),
@@ -163,3 +164,14 @@ def test_a_cycle_far_from_the_branches_that_lead_into_it_is_named():
 def test_places_that_repeat_the_vertex_order_are_dropped(forked):
     assert MotionClip(**forked, stem_index=[0, 1, 2, 3, 0, 1]).stem_index is None
     assert MotionClip(**forked, stem_index=[3, 2, 1, 0, 0, 1]).stem_index.tolist() == [3, 2, 1, 0, 0, 1]
+
+
+def test_rows_of_faces_that_end_with_minus_one_are_polygons_of_their_own_sizes(forked):
+    del forked["metadata"]
+    faces, metadata = np.array([[0, 1, 2, 3], [3, 4, 5, -1]]), {"domains": {"uv": "corner"}}
+    clip = MotionClip(**forked, faces=faces, metadata=metadata)
+    assert clip.faces is None and [part.tolist() for part in clip.polygons] == [[4, 3], [0, 1, 2, 3, 3, 4, 5]]
+    assert clip.metadata["domains"] == {"uv": "corner", "face_vertex_counts": "face", "face_vertex_indices": "corner"}
+    clip.check()
+    assert clip.polygons[0].tolist() == [4, 3]
+    assert MotionClip(**forked, faces=[[0, 1, 2, -1], [3, 4, 5, -1]]).faces.tolist() == [[0, 1, 2], [3, 4, 5]]

@@ -369,3 +369,33 @@ def test_candidates_for_branches_are_tried_at_a_bound_that_meets_the_target_size
         tried.append(trial_bounds(loose_points, tmp_path / "b.ath", monkeypatch, target_size=size))
     loose, tight = (Counter(bounds).most_common(1)[0][0] for bounds in tried)  # the one that all are judged at
     assert loose > 10 * tight
+
+
+def test_leaves_that_touch_and_move_by_themselves_are_branches_of_their_own(tmp_path):
+    rng, count, frames = np.random.default_rng(5), 40, 30
+    leaf = np.array([[0, 0, 0], [1, 0.3, 0], [2, 0, 0], [1, -0.3, 0]])
+    base = np.array([[i % 5, i // 5, 0] for i in range(count)], float)
+    base[1::2] = base[::2]  # two on each place
+    axes = rng.normal(size=(count, 3))
+    turns = [np.stack([about(axis, 0.5 * np.sin(t / 3 + k)) for k, axis in enumerate(axes)]) for t in range(frames)]
+    positions = np.stack([leaf @ turn.swapaxes(1, 2) + base[:, None] for turn in turns]).reshape(frames, -1, 3)
+    faces = (np.array([[0, 1, 2, 3]]) + 4 * np.arange(count)[:, None]).astype(np.int32)
+    clip = MotionClip(positions.astype(np.float32), np.arange(frames) / 30, faces=faces)
+    assert len(athcodec.find_branches(clip).branch_parent) == count // 2
+    summary = athcodec.encode(clip, tmp_path / "a.ath", rel_error=1e-3)
+    assert summary.found_branches.startswith(f"{count} branches by components")
+
+
+def about(axis: np.ndarray, angle: float) -> np.ndarray:
+    """The rotation matrix of an axis and an angle."""
+    x, y, z = axis / np.linalg.norm(axis)
+    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
+
+
+def test_pieces_need_no_scipy_and_are_those_that_hang_together(dressed, monkeypatch):
+    expected = discovery._components(discovery._links(dressed), dressed.vertex_count)
+    monkeypatch.setattr(discovery, "scipy_module", None)
+    found = discovery.pieces(bare(dressed))
+    assert np.array_equal(found.vertex_branch, expected) and (found.branch_parent == -1).all()
+    assert len(discovery.pieces(bare(dressed, faces=None, edges=None)).branch_parent) == 1

@@ -132,6 +132,43 @@ def about(axis, angle):
 # ---- reading ----
 
 
+def test_instances_on_the_gpu_are_read_as_copies_and_what_is_not_read_is_named(tmp_path):
+    made = Maker()
+    corners = [0, 1, 2, 1, 3, 2]
+    shape = {
+        "POSITION": made.array(CUBE),
+        "_AGE": made.array(np.arange(8.0)),
+        "TEXCOORD_1": made.array(np.zeros((8, 2))),
+    }
+    mesh = made.mesh(shape, "leaf", indices=corners)
+    turns = [about([0, 0, 1], angle) for angle in (0.1, 0.2, 0.3)]
+    shifts, sizes = np.array([[1, 2, 3], [4, 5, 6], [7, 8, 9.0]]), np.array([[1, 1, 1], [2, 2, 2], [1, 2, 3.0]])
+    parts = {
+        "TRANSLATION": made.array(shifts),
+        "ROTATION": made.array([quaternion for quaternion, _ in turns]),
+        "SCALE": made.array(sizes),
+        "_ID": made.array(np.arange(3.0)),
+    }
+    made.node(mesh=made.mesh({"POSITION": made.array(CUBE)}, "trunk", indices=corners))
+    node = made.node(mesh=mesh, name="leaves", extensions={"EXT_mesh_gpu_instancing": {"attributes": parts}})
+    made.gltf.extensionsUsed = made.gltf.extensionsRequired = ["EXT_mesh_gpu_instancing"]
+    made.gltf.materials.append(pygltflib.Material(name="bark"))
+    made.animation([(node, "translation", [0, 1], [[0, 0, 0], [3, 0, 0]], "LINEAR")])
+    positions, clip = frames_of(made.save(tmp_path / "a.glb"), fps=1)
+    assert clip.attributes["part_copies"].tolist() == [1, 3]
+    assert clip.attributes["part_vertex_counts"].tolist() == [8, 24]
+    for frame in range(2):
+        expected = [(CUBE * size) @ turn.T + shift for size, (_, turn), shift in zip(sizes, turns, shifts)]
+        assert np.allclose(positions[frame, 8:], np.concatenate(expected) + [3 * frame, 0, 0], rtol=0, atol=1e-5)
+    assert clip.faces.tolist() == [
+        [a + 8 * i, b + 8 * i, c + 8 * i] for i in range(4) for a, b, c in ((0, 1, 2), (1, 3, 2))
+    ]
+    assert np.array_equal(clip.attributes["age"][8:], np.tile(np.arange(8), 3))
+    assert clip.not_read == {"Material": ["bark"], "attribute": ["leaves.TEXCOORD_1", "leaves._ID"]}
+    with read(tmp_path / "a.glb") as clip:
+        assert np.array_equal(athcodec.find_branches(clip).vertex_branch, np.repeat([0, 1, 2, 3], 8))
+
+
 def test_what_trimesh_writes_is_read_where_trimesh_puts_it(tmp_path):
     scene, box = trimesh.Scene(), trimesh.creation.box((1, 2, 3))
     turn = trimesh.transformations.euler_matrix(0.3, 0.5, 0.7)
@@ -469,7 +506,7 @@ REFUSED = {
     "a buffer on the net": ({"buffers": [{"byteLength": 96, "uri": "https://a.b/c.bin"}]}, "beside the glTF"),
     "no base64": ({"buffers": [{"byteLength": 96, "uri": "data:;base64,$$"}]}, "base64"),
     "draco": ({"extensionsRequired": ["KHR_draco_mesh_compression"]}, "KHR_draco_mesh_compression"),
-    "instancing": ({"nodes": [{"mesh": 0, "extensions": {"EXT_mesh_gpu_instancing": {}}}]}, "a node per instance"),
+    "instancing": ({"nodes": [{"mesh": 0, "extensions": {"EXT_mesh_gpu_instancing": {}}}]}, "attributes: got None"),
     "joints missing": ({"nodes": [{"mesh": 0, "skin": 0}], "skins": [{"joints": [0]}]}, "JOINTS_0"),
     "nesting": ({"extras": json.loads("[" * 900 + "]" * 900)}, None),
 }

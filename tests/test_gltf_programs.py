@@ -35,6 +35,9 @@ PACKAGES = [
     "@gltf-transform/extensions@4.5.1",
     "@gltf-transform/functions@4.5.1",
     "meshoptimizer@1.3.0",
+    "@babylonjs/core@8.56.2",
+    "@babylonjs/loaders@8.56.2",
+    "esbuild@0.28.2",
 ]
 
 
@@ -148,6 +151,15 @@ def test_what_is_written_is_valid_and_three_plays_it_within_the_stated_error(
             stated = json.loads(structure(path))["asset"]["extras"]["athcodec"]["max_error"]
             shown = played(path, view.time - view.time[0])
             assert far(shown, view.block(0, 26)) <= stated + 1e-5
+
+
+def test_a_rig_is_valid_and_three_plays_it_within_the_stated_error(leafy_ath, node, played, tmp_path):
+    path = tmp_path / "a.glb"
+    with athcodec.open(leafy_ath) as decoder:
+        view = ClipView(decoder)
+        stated = write(view, path, rig=300).facts["max_error"]
+        assert_valid(node, path)
+        assert far(played(path, view.time - view.time[0]), view.block(0, view.frame_count)) <= stated + 1e-5
 
 
 @pytest.mark.parametrize("animation", ["joints", "morphs"])

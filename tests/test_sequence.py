@@ -13,7 +13,7 @@ from moving_meshes import assert_same_mesh, assert_same_motion, coded, mixed_cli
 import athcodec
 from athcodec.clip import MotionClip
 from athcodec.clip_view import ClipView
-from athcodec.errors import ClipError
+from athcodec.errors import ClipError, SourceWarning
 from athcodec.sources.mesh import parse_mesh
 
 TRIANGLE = "v 0 0 {}\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
@@ -122,6 +122,22 @@ def test_obj_with_comments_continuations_and_relative_numbers_is_read():
     assert mesh.attributes["uv"].tolist() == [[0, 0], [1, 0], [1, 1], [0, 0], [0, 0], [0, 0]]
     assert mesh.attributes["face_material"].tolist() == [0, 1]
     assert mesh.metadata["material_names"] == ["green", "bark"] and mesh.metadata["part_names"] == ["leaf"]
+
+
+def test_statements_and_elements_that_are_not_read_are_named(tmp_path):
+    (tmp_path / "a.obj").write_text("mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 1\ns off\nf 1//1 2//1 3//1\n")
+    with athcodec.read(tmp_path / "a.obj") as clip:
+        assert clip.not_read == {"statement": ["mtllib", "vn", "s"]}
+    with (tmp_path / "a.obj").open("a") as file:
+        file.write("cstype bezier\ncurv 0 1 1 2 3\n")
+    with pytest.warns(SourceWarning, match="curve or surface curv$"), athcodec.read(tmp_path / "a.obj") as clip:
+        assert clip.faces.tolist() == [[0, 1, 2]]
+    (tmp_path / "a.ply").write_text(
+        "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\n"
+        "element camera 1\nproperty float fov\nend_header\n1 2 3\n50\n"
+    )
+    with athcodec.read(tmp_path / "a.ply") as clip:
+        assert clip.not_read == {"element": ["camera"]}
 
 
 def test_objects_and_groups_are_parts_where_their_vertices_lie_together():

@@ -14,8 +14,9 @@ import pytest
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdSkel, UsdValidation, Vt
 
 import athcodec
+from athcodec import cli
 from athcodec.clip import MotionClip
-from athcodec.errors import ClipError
+from athcodec.errors import ClipError, SourceWarning
 from athcodec.frames import Frames
 
 GRID = np.array([[x, y, 0] for y in range(4) for x in range(3)], np.float32)
@@ -192,6 +193,166 @@ def test_instances_are_read_where_they_stand_and_what_is_hidden_is_not(tmp_path)
     assert sorted(clip.metadata["part_names"]) == ["/late", "/tree0/grid", "/tree1/grid"]
     first = 12 * clip.metadata["part_names"].index("/tree0/grid")
     assert np.allclose(positions[:, first + 12 : first + 24] - positions[:, first : first + 12], [10, 0, 0], atol=1e-5)
+
+
+LEAF = np.array([[0, 0, 0], [0.2, 0.1, 0], [0.4, 0, 0], [0.2, -0.1, 0]], np.float32)
+
+
+def add_leaves(stage, place="/root/leaves", count=5, frames=range(101, 111)):
+    """Two kinds of leaves on an instancer that turns and moves them, and a thorn that none of them is."""
+    instancer = UsdGeom.PointInstancer.Define(stage, place)
+    instancer.AddTranslateOp().Set(Gf.Vec3d(0, 0, 2))
+    for name, size in (("small", 1), ("large", 2), ("thorn", 3)):
+        mesh = UsdGeom.Mesh.Define(stage, f"{place}/prototypes/{name}/blade")
+        mesh.CreatePointsAttr(vec3(LEAF))
+        mesh.CreateFaceVertexCountsAttr([3, 3])
+        mesh.CreateFaceVertexIndicesAttr([0, 1, 3, 1, 2, 3])
+        mesh.AddTranslateOp().Set(Gf.Vec3d(0.1, 0, 0))
+        UsdGeom.Xform.Define(stage, f"{place}/prototypes/{name}").AddScaleOp().Set(Gf.Vec3f(size))
+    instancer.CreatePrototypesRel().SetTargets([f"{place}/prototypes/{name}" for name in ("small", "large", "thorn")])
+    instancer.CreateProtoIndicesAttr([i % 2 for i in range(count)])
+    UsdGeom.PrimvarsAPI(instancer).CreatePrimvar("age", Sdf.ValueTypeNames.FloatArray, "vertex").Set(list(range(count)))
+    places = {}
+    for frame in frames:
+        angle = 10.0 * (frame - 101)
+        shifts = np.array([[i, 0.1 * i * (frame - 101), 0] for i in range(count)])
+        instancer.GetPositionsAttr().Set(vec3(shifts), frame)
+        turns = Vt.QuathArray(
+            [Gf.Quath(Gf.Rotation(Gf.Vec3d(0, 0, 1), angle + 20 * i).GetQuat()) for i in range(count)]
+        )
+        instancer.GetOrientationsAttr().Set(turns, frame)
+        places[frame] = shifts, np.radians(angle + 20 * np.arange(count))
+    return instancer, places
+
+
+def leaf_at(shift, angle, size):
+    turn = np.array([[np.cos(angle), np.sin(angle), 0], [-np.sin(angle), np.cos(angle), 0], [0, 0, 1]])
+    return (LEAF + [0.1, 0, 0]) * size @ turn + shift + [0, 0, 2]
+
+
+def test_a_point_instancer_is_read_as_copies_of_its_prototypes(tmp_path):
+    stage = new_stage(tmp_path / "a.usda")
+    add_grid(stage)
+    _, places = add_leaves(stage)
+    stage.Save()
+    clip, positions = read_all(tmp_path / "a.usda")
+    assert clip.metadata["part_names"] == [
+        "/root/grid",
+        "/root/leaves:prototypes/small/blade",
+        "/root/leaves:prototypes/large/blade",
+    ]
+    assert clip.attributes["part_vertex_counts"].tolist() == [12, 12, 8]
+    assert clip.attributes["part_copies"].tolist() == [1, 3, 2]
+    assert clip.attributes["age"].tolist() == [0] * 12 + [0] * 4 + [2] * 4 + [4] * 4 + [1] * 4 + [3] * 4
+    for row, frame in enumerate(range(101, 111)):
+        shifts, angles = places[frame]
+        expected = [leaf_at(shifts[i], angles[i], 1 + i % 2) for i in (0, 2, 4, 1, 3)]
+        assert np.allclose(positions[row, 12:], np.concatenate(expected), rtol=0, atol=2e-3)  # half floats turn them
+    counts, corners = clip.polygons
+    assert counts.tolist() == [4] * 6 + [3] * 10 and corners[24:36].tolist() == [
+        12,
+        13,
+        15,
+        13,
+        14,
+        15,
+        16,
+        17,
+        19,
+        17,
+        18,
+        19,
+    ]
+    with athcodec.read(tmp_path / "a.usda") as clip:
+        found = athcodec.find_branches(clip)
+    assert len(found.branch_parent) == 6 and len(set(found.vertex_branch[12:16])) == 1
+
+
+@pytest.mark.parametrize("suffix", ["usda", "abc"])
+@pytest.mark.parametrize("instances", [True, False])
+def test_copies_come_back_as_copies_from_the_formats_that_have_instances(tmp_path, suffix, instances):
+    stage = new_stage(tmp_path / "a.usda")
+    add_grid(stage)
+    add_leaves(stage, count=9)
+    stage.Save()
+    with athcodec.read(tmp_path / "a.usda") as clip:
+        clip.attributes["noise"] = np.random.default_rng(0).random(clip.vertex_count).astype(np.float32)
+        written = athcodec.write(clip, tmp_path / f"b.{suffix}", instances=instances)
+        with athcodec.read(tmp_path / f"b.{suffix}") as again:
+            off = np.linalg.norm(again.block(0, 10).astype(float) - clip.block(0, 10), axis=2).max()
+            assert off <= written.facts.get("max_error", 0) + 1e-5 and bool(written.facts) == instances
+            assert np.array_equal(again.polygons[1], clip.polygons[1])
+            for name in ("part_vertex_counts", "part_copies", "age", "noise"):
+                assert np.array_equal(again.attributes[name], clip.attributes[name]), name
+
+
+def test_copies_are_written_as_instances_again(tmp_path, capsys):
+    stage = new_stage(tmp_path / "a.usda")
+    add_grid(stage)
+    add_leaves(stage, count=40)
+    stage.Save()
+    with athcodec.read(tmp_path / "a.usda") as clip:
+        clip.attributes["noise"] = np.random.default_rng(0).random(clip.vertex_count).astype(np.float32)
+        written = athcodec.write(clip, tmp_path / "b.usda", instances=True)
+        with athcodec.read(tmp_path / "b.usda") as again:
+            off = np.linalg.norm(again.block(0, 10).astype(float) - clip.block(0, 10), axis=2).max()
+            assert written.facts["instances"] == 40 and off <= written.facts["max_error"] + 1e-5 < 1e-3
+            assert np.array_equal(again.faces if again.faces is not None else again.polygons[1], clip.polygons[1])
+            for name in ("part_vertex_counts", "part_copies", "age", "noise"):
+                assert np.array_equal(again.attributes[name], clip.attributes[name])
+        athcodec.encode(clip, tmp_path / "a.ath", rel_error=1e-3)
+    stage = Usd.Stage.Open(str(tmp_path / "b.usda"))
+    kinds = [prim.GetTypeName() for prim in stage.Traverse()]
+    assert kinds.count("PointInstancer") == 2 and complaints(tmp_path / "b.usda") == []
+    assert cli.main(["decode", str(tmp_path / "a.ath"), str(tmp_path / "c.usdc"), "--instances"]) == 0
+    assert "As instances that is off the level by up to" in capsys.readouterr().out
+    with athcodec.open(tmp_path / "a.ath") as decoder, athcodec.read(tmp_path / "c.usdc") as again:
+        off = np.linalg.norm(again.block(0, 10).astype(float) - decoder.positions(slice(0, 10)), axis=2).max()
+        assert again.attributes["part_copies"].tolist() == [1, 20, 20] and off <= 1.01 * decoder.max_error_bound
+
+
+def test_what_of_a_point_instancer_is_never_seen_is_not_read(tmp_path):
+    stage = new_stage(tmp_path / "a.usda")
+    instancer, _ = add_leaves(stage)
+    instancer.CreateInvisibleIdsAttr([0, 3])
+    instancer.GetInvisibleIdsAttr().Set([0], 105)
+    stage.Save()
+    clip, _ = read_all(tmp_path / "a.usda")
+    assert clip.attributes["part_copies"].tolist() == [2, 2]
+    instancer.GetProtoIndicesAttr().Set([0] * 5, 104)
+    instancer.GetProtoIndicesAttr().Set([1] * 5, 105)
+    stage.Save()
+    with pytest.raises(ClipError, match="protoIndices changes in frame"):
+        athcodec.read(tmp_path / "a.usda")
+
+
+def test_what_is_not_read_is_named_once(tmp_path, capsys):
+    stage = new_stage(tmp_path / "a.usda")
+    add_grid(stage)
+    for i in range(2):
+        UsdGeom.Cube.Define(stage, f"/root/box{i}")
+    UsdGeom.Camera.Define(stage, "/eye")
+    stage.DefinePrim("/root/bark", "Material")
+    stage.DefinePrim("/root/bark/shader", "Shader")
+    wet = UsdGeom.PrimvarsAPI(stage.GetPrimAtPath("/root/grid")).CreatePrimvar("wet", Sdf.ValueTypeNames.Float)
+    wet.Set(0.5, 101)
+    wet.Set(0.7, 103)
+    stage.DefinePrim("/gone").GetReferences().AddReference("./none.usda")
+    stage.Save()
+    with pytest.warns(SourceWarning, match="Cube /root/box0, /root/box1$") as said:
+        clip, _ = read_all(tmp_path / "a.usda")
+    assert len(said) == 1
+    assert {kind: len(names) for kind, names in clip.not_read.items()} == {
+        "missing": 1,
+        "Material": 1,
+        "Cube": 2,
+        "Camera": 1,
+        "attribute": 1,
+    }
+    assert cli.main(["encode", str(tmp_path / "a.usda"), str(tmp_path / "a.ath")]) == 0
+    [line] = [line for line in capsys.readouterr().err.splitlines() if "not read" in line]
+    assert line.startswith(f"athcodec: not read: {tmp_path / 'a.usda'}: missing ")
+    assert line.endswith("Cube /root/box0, /root/box1; Material /root/bark; Camera /eye; attribute /root/grid.wet")
 
 
 def skinned(path):

@@ -31,7 +31,7 @@ from athcodec.units import parse_length, parse_size
 
 BOUNDS = ("max_error", "rel_error", "target_size")  # of which a clip has one
 READING = ("source_format", "rest", "fps", "mesh", "field", "only", "takes", "unit", "up_axis")
-SHAPING = ("hierarchy", "loop", "loop_blend")  # what is made of a clip before it is coded
+SHAPING = ("hierarchy", "loop", "loop_blend", "strength", "heading")  # what is made of a clip before it is coded
 
 Settings = dict[str, Any]
 
@@ -78,7 +78,8 @@ def check_settings(
     Parameters
     ----------
     settings : dict
-        Keywords of `athcodec.encode`, of `athcodec.read` (its format as source_format), hierarchy, loop and loop_blend.
+        Keywords of `athcodec.encode`, of `athcodec.read` (its format as source_format), hierarchy, loop,
+        loop_blend, strength and heading.
         Lengths and sizes may be text with a unit, "1mm".
     where : str, optional
         What error messages begin with.
@@ -173,6 +174,12 @@ def _rest_error(value: Any) -> float | str:
 def _fraction(value: Any) -> float:
     if isinstance(value, bool) or not 0 < float(value) < 1:
         raise ValueError("expected a number between 0 and 1")
+    return float(value)
+
+
+def _finite(value: Any) -> float:
+    if isinstance(value, bool) or not math.isfinite(float(value)):
+        raise ValueError("expected a number")
     return float(value)
 
 
@@ -272,4 +279,6 @@ _CHECKS: dict[str, Callable[[Any], Any]] = {
     "up_axis": _one_of("x", "y", "z"),
     "loop": _BOOL,
     "loop_blend": _whole(0, 1 << 31),
+    "strength": _finite,
+    "heading": _finite,
 }

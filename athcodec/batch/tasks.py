@@ -12,6 +12,7 @@ from __future__ import annotations
 import os
 import pickle
 import time
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from typing import Any
@@ -24,8 +25,10 @@ from athcodec.batch.inputs import Item, download, identity, is_telling, sha256, 
 from athcodec.batch.settings import coding_options, loop_frames, reading_options
 from athcodec.clip import MotionClip
 from athcodec.encoding import CodedSegment, Draft
-from athcodec.errors import AthError, ClipError
+from athcodec.errors import AthError, ClipError, SourceWarning
+from athcodec.joining import in_wind
 from athcodec.segmentation import split_segments
+from athcodec.sources import listed
 
 BETWEEN_REPORTS = 0.3  # seconds
 
@@ -129,6 +132,7 @@ def _done(
             "verified": verified is not None,
             "seconds": round(time.perf_counter() - start, 3),
         }
+        | ({"not_read": listed(summary.not_read)} if summary.not_read else {})
     }
 
 
@@ -143,7 +147,13 @@ def _opened(item: Item, folder: str, source: dict[str, Any]) -> Iterator[MotionC
     path = _local_path(item, folder)
     if is_url(item.input) and (not os.path.exists(path) or sha256(path) != source["sha256"]):
         raise ClipError(f"{item.shown}: the download is not what it was, expected a scratch folder that all share")
-    with athcodec.read(path, **reading_options(item.settings)) as clip:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SourceWarning)  # the record says it
+        opened = athcodec.read(path, **reading_options(item.settings))
+    with opened as source_clip:
+        clip = source_clip
+        if "strength" in item.settings:
+            clip = in_wind(clip, item.settings["strength"], item.settings.get("heading", 0.0))
         blend = loop_frames(item.settings)
         clip = clip if blend is None else athcodec.looped(clip, blend)
         hierarchy = item.settings.get("hierarchy")

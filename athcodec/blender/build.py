@@ -1,8 +1,8 @@
 """Packs the Blender extension: python -m athcodec.blender.build athcodec.zip athcodec-*.whl
 
-The wheels of athcodec (one per platform) are given; those of zstandard and scipy, which it needs besides what Blender
-has, the latter to find branches, are given too or fetched by pip for the same platforms and the Pythons of Blender.
-Wheels go in as they are.
+The wheels of athcodec (one per platform) are given; those of zstandard, which it needs besides what Blender has, are
+given too or fetched by pip for the same platforms and the Pythons of Blender. Wheels go in as they are, also others:
+with those of scipy what Blender exports gets the branches that athcodec finds, in place of the pieces of the mesh.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from pathlib import Path
 from athcodec.atomic_files import new_file
 
 PYTHONS = ("3.11", "3.13")  # of Blender 4.2 to 5.0, and from 5.1
-NEEDED = ("zstandard", "scipy")
+NEEDED = ("zstandard",)
 EXTENSION = Path(__file__).resolve().parent / "extension"
 PLATFORMS = {"linux": "linux", "manylinux": "linux", "win": "windows", "macosx": "macos"}
 MACHINES = {"x86_64": "x64", "amd64": "x64", "aarch64": "arm64", "arm64": "arm64"}

@@ -19,6 +19,7 @@ from athcodec.options import (
     MAX_SEGMENT,
     METHODS,
     MIN_SEGMENT,
+    RIG_JOINTS,
     SAMPLES,
     ladder_of,
 )
@@ -120,6 +121,18 @@ def _encode_arguments(verb: argparse.ArgumentParser) -> None:
         "-o", "--output", metavar="OUT.ath", action=_Output, help="the same, with all of IN in front of it or behind"
     )
     verb.add_argument(
+        "--into",
+        metavar="OUT.glb",
+        action=_Output,
+        help="of an animated GLB in place of OUT.ath: the same GLB, its vertices moved by the extension ATH_motion; "
+        "every animation is a clip, where they do not run together",
+    )
+    verb.add_argument(
+        "--keep-animation",
+        action="store_true",
+        help="with --into: leave skins and morph targets in the GLB too, for programs that do not know ATH_motion",
+    )
+    verb.add_argument(
         "--names",
         metavar="NAME,...",
         type=_argument(_names),
@@ -140,6 +153,18 @@ def _encode_arguments(verb: argparse.ArgumentParser) -> None:
         help="for loops that do not end where they began: take so many frames off their end and blend "
         "them into those at their beginning",
     )
+    verb.add_argument(
+        "--strength",
+        metavar="S,...",
+        type=_argument(_numbers),
+        help="of the wind of each clip, in any unit that they share: by it players choose what to blend",
+    )
+    verb.add_argument(
+        "--heading",
+        metavar="DEG,...",
+        type=_argument(_numbers),
+        help="where the wind of each clip blows to, degrees about the up axis (default: 0), with --strength",
+    )
     _source_arguments(verb)
     _coding_arguments(verb)
     verb.add_argument(
@@ -158,7 +183,7 @@ class _Output(argparse.Action):
     def __call__(
         self, parser: argparse.ArgumentParser, args: argparse.Namespace, value: Any, option: Any = None
     ) -> None:
-        args.output = value
+        setattr(args, self.dest, value)
         next(action for action in parser._actions if action.dest == "paths").required = False
 
 
@@ -380,6 +405,21 @@ def _decode_arguments(verb: argparse.ArgumentParser) -> None:
         help="how glTF moves (default auto: joints where they keep within the file's error)",
     )
     verb.add_argument(
+        "--rig",
+        metavar="JOINTS",
+        nargs="?",
+        type=_argument(_jobs),
+        const=RIG_JOINTS,
+        help="write a skeleton for engines to USD or glTF, with so many joints at most (default %(const)s), and say "
+        "how far off it is",
+    )
+    verb.add_argument(
+        "--instances",
+        action="store_true",
+        help="write copies of one shape, such as leaves of an instancer, to USD or Alembic as instances, where that "
+        "is off by no more than the level is",
+    )
+    verb.add_argument(
         "--allow-partial",
         action="store_true",
         help="leave out a damaged level and those beyond it instead of giving up",
@@ -474,7 +514,9 @@ def _view_arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("--clip", metavar="NAME", help="begin with it (default: the file's first)")
     _host_mesh_argument(verb)
     verb.add_argument("--no-browser", action="store_true", help="print the address and open nothing")
-    verb.add_argument(
+    what = verb.add_mutually_exclusive_group()
+    what.add_argument("--forest", action="store_true", help="show 10,000 plants in the wind, on WebGPU")
+    what.add_argument(
         "--export", metavar="PAGE.html", help="write one page with the file and the viewer inside, and serve nothing"
     )
 
@@ -496,6 +538,10 @@ def _argument(parse: Callable[[str], Any]) -> Callable[[str], Any]:
             raise argparse.ArgumentTypeError(str(error)) from None
 
     return parsed
+
+
+def _numbers(text: str) -> list[float]:
+    return [float(part) for part in text.split(",")]
 
 
 def _names(text: str) -> list[str]:

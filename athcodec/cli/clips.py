@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import argparse
 import os
-from collections.abc import Iterator, Sequence
+import warnings
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import athcodec
 from athcodec import discovery
@@ -18,34 +19,57 @@ from athcodec.cli.printing import counted, progress, say
 from athcodec.clip import MotionClip
 from athcodec.clip_view import ClipView
 from athcodec.decoder import Decoder
-from athcodec.errors import AthError, ClipError, LevelUnavailable, NeedsHostMesh, RemoteError
-from athcodec.joining import BLEND
+from athcodec.errors import AthError, ClipError, LevelUnavailable, NeedsHostMesh, RemoteError, SourceWarning
+from athcodec.joining import BLEND, in_wind
 from athcodec.metrics import ErrorMeter, MotionMeter, SmoothnessMeter, compare_clips, level_meters
 from athcodec.options import HOST
+from athcodec.sources import ReadOptions, find_format, listed
 from athcodec.units import Length
+
+if TYPE_CHECKING:
+    from athcodec.exporters.gltf_into import Into
 
 ROUNDING = 1e-6
 """How far, relatively, the encoder's figure of an error and that of ErrorMeter may differ."""
 
 
-def clip_to_encode(paths: Sequence[str], args: argparse.Namespace) -> MotionClip:
-    """The clip in a file, or all of several files and of their takes, as one."""
+def clip_to_encode(
+    paths: Sequence[str], args: argparse.Namespace, read: Callable[[str], MotionClip] | None = None
+) -> MotionClip:
+    """The clip in a file, or all of several files and of their takes, as one; `read` opens one (default read_clip)."""
     with ExitStack() as opened:
         parts = []
         for path in paths:
-            whole = opened.enter_context(read_clip(args, path))
-            _say_takes(whole, path, args)
+            whole = opened.enter_context(read(path) if read else read_clip(args, path))
+            if read is None:
+                _say_takes(whole, path, args)
             parts += [(name, Path(path).stem, part) for name, part in athcodec.split(whole).items()]
         names = args.names or [name or (stem if len(parts) > 1 else "") for name, stem, _ in parts]
         loops = _checked_names(names, len(parts), args)
+        winds = _checked_winds(len(parts), args)
         clips: dict[str, MotionClip] = {}
-        for name, (_, _, clip) in zip(names, parts):
+        for name, wind, (_, _, clip) in zip(names, winds, parts):
             if args.rest not in ("auto", HOST) and clips:  # one that was made: the first clip's is as good for all
                 clip = clip.replace(rest=next(iter(clips.values())).source_rest, rest_given=False)
+            clip = in_wind(clip, *wind) if wind else clip
             clips[name] = athcodec.looped(clip, args.loop_blend) if name in loops else clip
         joined = athcodec.join(clips) if len(clips) > 1 or names != [""] else clips[""]
         opened.pop_all()
     return joined
+
+
+def gltf_to_fill(paths: Sequence[str], args: argparse.Namespace) -> Into:
+    """The GLB whose vertices --into gives a motion. ClipError for what says otherwise how to read it."""
+    from athcodec.exporters.gltf_into import Into
+
+    if len(paths) != 1 or args.output:
+        raise ClipError(f"--into: got {len(paths)} inputs or an output besides, expected one GLB and no other output")
+    for name in ("source_format", "mesh", "field", "unit", "up_axis"):
+        if getattr(args, name) is not None:
+            raise ClipError(f"--into: got --{name.replace('_', '-')} too, expected the GLB as it is")
+    if args.rest not in ("auto", HOST) or args.exact_rest:
+        raise ClipError("--into: got another rest pose, expected the meshes of the GLB")
+    return Into(paths[0], _gltf_options(args), args.keep_animation)
 
 
 def _checked_names(names: Sequence[str], clip_count: int, args: argparse.Namespace) -> Sequence[str]:
@@ -59,6 +83,19 @@ def _checked_names(names: Sequence[str], clip_count: int, args: argparse.Namespa
     if args.loop_blend and not loops:
         raise ClipError("--loop-blend: got no clips to make loops of, expected some with --loop")
     return loops
+
+
+def _checked_winds(clip_count: int, args: argparse.Namespace) -> Sequence[tuple[float, ...]]:
+    """Strength and heading of each clip; empty where none is given. ClipError where they do not fit the clips."""
+    given = {"--strength": args.strength, "--heading": args.heading}
+    if args.strength is None and args.heading is not None:
+        raise ClipError("--heading: got no strengths, expected some with --strength")
+    for option, numbers in given.items():
+        if numbers is not None and len(numbers) != clip_count:
+            raise ClipError(f"{option}: got {len(numbers)}, expected {clip_count}, one for each clip")
+    if args.strength is None:
+        return [()] * clip_count
+    return list(zip(args.strength, args.heading or [0.0] * clip_count))
 
 
 def _say_takes(clip: MotionClip, path: str, args: argparse.Namespace) -> None:
@@ -95,28 +132,48 @@ def with_sources(
     sources = [
         (path, clip)
         for path in args.against
-        for clip in athcodec.split(opened.enter_context(read_clip(args, path))).values()
+        for clip in athcodec.split(opened.enter_context(_source_of(decoder, args, path))).values()
     ]
     if len(sources) != len(played):
         raise ClipError(f"--against: got {len(sources)} sources, expected {len(played)}, one for each clip")
     return [(decoder, path, clip) for decoder, (path, clip) in zip(played, sources)]
 
 
+def _source_of(decoder: Decoder, args: argparse.Namespace, path: str) -> MotionClip:
+    """The clip in `path`; of a GLB that a motion was put into, what moves in it as the motion has it."""
+    from athcodec.sources.gltf_motion import GltfMotion
+
+    if not isinstance(decoder.file.source, GltfMotion) or find_format(path).name != "gltf":
+        return read_clip(args, path)
+    from athcodec.exporters.gltf_into import Into
+
+    return Into(path, _gltf_options(args)).clip
+
+
+def _gltf_options(args: argparse.Namespace) -> ReadOptions:
+    return ReadOptions(fps=args.fps, only=args.only or (), takes=args.takes or ())
+
+
 def read_clip(args: argparse.Namespace, path: str) -> MotionClip:
     """The clip in `path`, read as the options of _source_arguments say."""
     rest = getattr(args, "rest", "auto")
-    return athcodec.read(
-        path,
-        args.source_format,
-        rest="auto" if rest == HOST else rest,
-        fps=args.fps,
-        mesh=args.mesh,
-        field=args.field,
-        only=args.only or (),
-        takes=args.takes or (),
-        unit=args.unit,
-        up_axis=args.up_axis,
-    )
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SourceWarning)  # said below, with what is no shape
+        clip = athcodec.read(
+            path,
+            args.source_format,
+            rest="auto" if rest == HOST else rest,
+            fps=args.fps,
+            mesh=args.mesh,
+            field=args.field,
+            only=args.only or (),
+            takes=args.takes or (),
+            unit=args.unit,
+            up_axis=args.up_axis,
+        )
+    if clip.not_read:
+        say("not read", f"{path}: {listed(clip.not_read)}")
+    return clip
 
 
 @contextmanager

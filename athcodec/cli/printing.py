@@ -24,7 +24,10 @@ from athcodec.metrics import ErrorMeter
 from athcodec.options import DEFAULT_REL_ERROR
 
 if TYPE_CHECKING:
+    from athcodec.ath_file import Level
+    from athcodec.clip_view import ClipView
     from athcodec.encoding import Seam
+    from athcodec.exporters import Written
 
 JUMP = 3
 """How many times the ways from frame to frame are what the way over a loop's seam should not be."""
@@ -118,7 +121,7 @@ def _print_facts(facts: dict[str, Any]) -> None:
         print(f"Holds levels 0 to {len(facts['levels']) - 1} of 0 to {facts['full_level_count'] - 1}.")
     if facts["missing"]:
         print(f"{facts['available_bytes']:,} bytes are there; missing {facts['missing']}.")
-    if len(facts["clips"]) > 1 or facts["clips"][0]["name"] or facts["clips"][0]["loop"]:
+    if len(facts["clips"]) > 1 or facts["clips"][0]["name"] or any(facts["clips"][0][key] for key in ("loop", "wind")):
         _print_clips(facts)
     _print_levels(facts)
 
@@ -139,13 +142,14 @@ def _print_clips(facts: dict[str, Any]) -> None:
             f"{clip['frames']:,}",
             f"{clip['seconds']:.4g}",
             f"{clip['segments']:,}",
+            f"{clip['wind']['strength']:g} to {clip['wind']['heading']:g}°" if clip["wind"] else "",
             f"{clip['seam_errors'][len(facts['levels']) - 1]:.3g}" if clip["loop"] else "",
             *(f"{error:.3g}" for error in clip["max_errors"]),
         ]
         for clip in facts["clips"]
     ]
     levels = [f"max at {level}" for level in range(len(facts["levels"]))]
-    print_table(["clip", "frames", "seconds", "segments", _head("loop's seam", facts["unit"]), *levels], rows)
+    print_table(["clip", "frames", "seconds", "segments", "wind", _head("loop's seam", facts["unit"]), *levels], rows)
 
 
 def _print_levels(facts: dict[str, Any]) -> None:
@@ -190,6 +194,19 @@ def print_demo(facts: dict[str, Any], meters: Sequence[ErrorMeter]) -> None:
     )
     print_table([*LEVEL_COLUMNS, *columns], _level_rows(facts, cells))
     print(_size(facts))
+
+
+def print_written(written: Written, motion: ClipView, level: Level) -> None:
+    """The files that are there now, and what their format costs."""
+    names = [os.fspath(path) for path in written.files]
+    error = written.facts.get("max_error")
+    print(
+        f"{names[0]}{f' to {names[-1]}' if len(names) > 1 else ''}: {counted(motion.frame_count, 'frame')}, "
+        f"{counted(motion.vertex_count, 'vertex', 'vertices')}, level {level.level} ({level.name})"
+    )
+    if error is not None:
+        unit = f" {motion.metadata['unit']}" if motion.metadata.get("unit") else ""
+        print(f"As {written.facts.get('animation', 'textures')} that is off the level by up to {error:.3g}{unit}.")
 
 
 def print_verdict(result: dict[str, Any]) -> None:
@@ -281,6 +298,9 @@ def print_outcome(outcome: Any, args: argparse.Namespace) -> None:
             f"{args.out}: {counted(len(outcome.done), 'clip')} done, {len(outcome.kept):,} kept, "
             f"{len(outcome.failed):,} failed; {outcome.bytes:,} bytes{ratio}, {outcome.seconds:.1f} s"
         )
+    for record in outcome.done:
+        if "not_read" in record:
+            say("not read", f"{record['input']}: {record['not_read']}")
     for record in outcome.failed:
         say("failed", f"{record['output']}: {record['reason']}")
 

@@ -9,18 +9,20 @@ import tempfile
 from contextlib import ExitStack, nullcontext
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 import athcodec
 from athcodec import discovery
+from athcodec.atomic_files import scratch_folder
 from athcodec.cli.arguments import DEMO_PAGE
 from athcodec.cli.clips import (
     bound,
     check_output,
     clip_to_encode,
     decode_and_measure,
+    gltf_to_fill,
     measure_against,
     naming,
     open_file,
@@ -43,21 +45,46 @@ from athcodec.cli.printing import (
     print_preview,
     print_table,
     print_verdict,
+    print_written,
     progress,
     say,
     say_seam,
 )
+from athcodec.clip import MotionClip
+from athcodec.clip_view import ClipView
 from athcodec.errors import AthError
 from athcodec.hierarchy import branch_orders
 from athcodec.options import DEFAULT_LADDER, DEFAULT_REL_ERROR, HOST, ladder_of
 
+if TYPE_CHECKING:
+    from athcodec.exporters import Written
+
 
 def encode(args: argparse.Namespace) -> int:
     paths = [args.input, *(args.paths or ())]
-    output = args.output or paths.pop()
+    output = args.into or args.output or paths.pop()
     for path in paths:
         check_output(output, path)
-    with clip_to_encode(paths, args) as clip, naming(paths[0]), progress() as report:
+    if args.into:
+        _encode_into(paths, args)
+    else:
+        with clip_to_encode(paths, args) as clip:
+            _encode(clip, paths[0], output, args, attributes=args.attributes, host_rest=args.rest == HOST)
+    with open_file(output, strict=True) as decoder:
+        print_file(output, decoder, args.json)
+    return 0
+
+
+def _encode_into(paths: list[str], args: argparse.Namespace) -> None:
+    with gltf_to_fill(paths, args) as host, scratch_folder(args.into) as folder:
+        encoded = os.path.join(folder, "motion.ath")
+        with clip_to_encode(paths, args, lambda _: host.clip) as clip:
+            _encode(clip, paths[0], encoded, args, attributes="none", host_rest=True)
+            host.write(args.into, encoded)
+
+
+def _encode(clip: MotionClip, path: str, output: str, args: argparse.Namespace, **options: Any) -> None:
+    with naming(path), progress() as report:
         unit = clip.metadata.get("unit")
         summary = athcodec.encode(
             with_branches(clip, args.hierarchy),
@@ -65,24 +92,20 @@ def encode(args: argparse.Namespace) -> int:
             segment_frames=args.segment_frames,
             tam=thresholds(args.tam, unit),
             exact_rest=args.exact_rest,
-            host_rest=args.rest == HOST,
             rest_error=args.rest_error,
             lossless=args.lossless,
             weights=args.weights,
-            attributes=args.attributes,
             effort=args.effort,
             ladder=args.ladder,
             jobs=args.jobs,
             progress=report,
             **bound(args, unit),
+            **options,
         )
     if summary.found_branches is not None:
         say("hierarchy", summary.found_branches)
-    with open_file(output, strict=True) as decoder:
-        print_file(output, decoder, args.json)
     for seam in summary.seams:
-        say_seam(seam, paths[0])
-    return 0
+        say_seam(seam, path)
 
 
 def batch(args: argparse.Namespace) -> int:
@@ -179,16 +202,28 @@ def decode(args: argparse.Namespace) -> int:
     how = {"clip": args.clip, "allow_partial": args.allow_partial, "host_mesh": args.host_mesh}
     with open_file(args.input, args.stats, **how) as decoder:
         motion = view_to_decode(decoder, args)
-        with progress() as report:
-            athcodec.write(motion, args.output, args.format, progress=report, gzip=args.gzip, animation=args.animation)
+        written = _write_decoded(motion, args)
         if decoder.missing:
             say("warning", f"{args.input}: decoded to level {motion.level}; {what_is_missing(decoder)}")
-        level = decoder.levels[motion.level]
-        print(
-            f"{args.output}: {motion.frame_count:,} frames, {motion.vertex_count:,} vertices, "
-            f"level {level.level} ({level.name})"
-        )
+        print_written(written, motion, decoder.levels[motion.level])
     return 0
+
+
+def _write_decoded(motion: ClipView, args: argparse.Namespace) -> Written:
+    """In the format that is asked for; of a GLB to a GLB into a copy of it, if not as joints."""
+    from athcodec import exporters, sources
+    from athcodec.sources.gltf_motion import GltfMotion
+
+    name = args.format or sources.format_by_suffix(args.output, exporters.FORMATS).name
+    as_morphs = args.animation != "joints" and args.rig is None
+    if name == "gltf" and as_morphs and isinstance(motion.decoder.file.source, GltfMotion):
+        from athcodec.exporters.gltf_into import write_back
+
+        write_back(args.input, motion, args.output)
+        return exporters.Written((Path(args.output),))
+    how = {option: getattr(args, option) for option in ("gzip", "animation", "instances", "rig")}
+    with progress() as report:
+        return athcodec.write(motion, args.output, name, progress=report, **how)
 
 
 def info(args: argparse.Namespace) -> int:
@@ -284,7 +319,7 @@ def view(args: argparse.Namespace) -> int:
             print(f"{args.export}: {size:,} bytes, opens in any browser")
             return 0
         ready = partial(_say_where, no_browser=args.no_browser)
-        view.serve(args.file, args.port, ready, args.clip, args.host_mesh)
+        view.serve(args.file, args.port, ready, args.clip, args.host_mesh, forest=args.forest)
     return 0
 
 

@@ -1,15 +1,17 @@
 """Writers: one module per file format, mirroring sources/. Nothing here knows how .ath files are coded.
 
 `write` imports the module of the wanted format and no other. A module has one function,
-`write_clip(motion, path, options, report)`, where `motion` is a MotionClip or a ClipView of an .ath file.
+`write_clip(motion, path, options, report)`, where `motion` is a MotionClip or a ClipView of an .ath file. It returns
+None, or what there is to know of the files: see Written.
 """
 
 from __future__ import annotations
 
 import importlib
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from os import PathLike
+from pathlib import Path
 from typing import Any
 
 from athcodec.atomic_files import check_target
@@ -17,6 +19,9 @@ from athcodec.errors import ClipError
 from athcodec.sources import Format, format_by_suffix, format_named
 
 Report = Callable[[str, float], None]
+MOST_RIGGED = 65535
+RIGS = ("usd", "gltf")
+FILES = "files"  # in what write_clip returns: the names of the files where they are not the one that was asked for
 
 
 @dataclass(frozen=True)
@@ -31,6 +36,12 @@ class WriteOptions:
         How glTF moves: by joints, by morph targets, or by the one that keeps the error, the smaller if both do.
     half : bool, optional
         Textures in half precision in place of float.
+    instances : bool, optional
+        Copies of one shape (MotionClip, part_copies) as instances of USD and Alembic, where transforms are off by no
+        more than the level is; else, and by default, as vertices.
+    rig : int, optional
+        For USD and glTF: a skeleton for engines, with so many joints at most besides its root, in place of vertices. It
+        is as close as that many allow; `Written` says how close.
 
     Raises
     ------
@@ -41,8 +52,12 @@ class WriteOptions:
     gzip: bool = False
     animation: str = "auto"
     half: bool = True
+    instances: bool = False
+    rig: int | None = None
 
     def __post_init__(self) -> None:
+        if self.rig is not None and not 1 <= self.rig <= MOST_RIGGED:
+            raise ValueError(f"rig: got {self.rig!r}, expected 1 to {MOST_RIGGED} joints")
         if self.animation not in ("auto", "joints", "morphs"):
             raise ValueError(f'animation: got {self.animation!r}, expected "auto", "joints" or "morphs"')
 
@@ -77,9 +92,26 @@ FORMATS = (
 )
 
 
+@dataclass(frozen=True)
+class Written:
+    """What `write` has written.
+
+    Parameters
+    ----------
+    files : tuple of pathlib.Path
+        The files that hold the clip, in the order of their frames; one, the path that was given, of most formats.
+    facts : dict
+        What a format costs that does not hold positions as they are: "max_error" in the clip's unit, and more. Empty of
+        others.
+    """
+
+    files: tuple[Path, ...]
+    facts: dict[str, Any] = field(default_factory=dict)
+
+
 def write(
     motion: Any, path: str | PathLike[str], format: str | None = None, *, progress: Report | None = None, **options: Any
-) -> None:
+) -> Written:
     """Write a motion to a file of any known format, which appears under its name only when it is complete.
 
     Parameters
@@ -93,7 +125,12 @@ def write(
     progress : callable, optional
         Called with "export" and the fraction that is done.
     **options
-        Parameters of `athcodec.exporters.WriteOptions`: gzip, animation, half.
+        Parameters of `athcodec.exporters.WriteOptions`: gzip, animation, half, instances, rig.
+
+    Returns
+    -------
+    Written
+        The files, and what they cost in error.
 
     Raises
     ------
@@ -111,10 +148,16 @@ def write(
     wanted = WriteOptions(**options)
     kind = format_by_suffix(path, FORMATS) if format is None else format_named(format, FORMATS)
     kind.check()
-    _check_clips(motion, kind)
+    if wanted.rig is not None and kind.name not in RIGS:
+        raise ClipError(f"rig: got {kind.name}, expected one of {', '.join(RIGS)}")
+    if wanted.rig is None:
+        _check_clips(motion, kind)
     check_target(path)
     report = progress or (lambda stage, fraction: None)
-    importlib.import_module(kind.module).write_clip(motion, path, wanted, lambda done: report("export", done))
+    module = importlib.import_module(kind.module)
+    facts = dict(module.write_clip(motion, path, wanted, lambda done: report("export", done)) or {})
+    names = facts.pop(FILES, [Path(path).name])
+    return Written(tuple(Path(path).with_name(name) for name in names), facts)
 
 
 def _check_clips(motion: Any, kind: Format) -> None:

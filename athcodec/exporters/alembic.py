@@ -1,8 +1,9 @@
 """Writes Alembic (Ogawa): one mesh, curves or points object per object of a clip, its points sample by sample.
 
 Faces and static arrays are written once; samples go to disk as they come. Points are float32, a clip in float64 is
-rounded. Everything lies below one transform, which turns a clip whose Z is up to Alembic's custom, Y up, and keeps what
-Alembic has no place for (unit, branches, bytes); sources/alembic.py takes it back from there.
+rounded; copies of one shape become instances where options.instances asks for it. Everything lies below one transform,
+which turns a clip whose Z is up to Alembic's custom, Y up, and keeps what Alembic has no place for (unit, branches,
+bytes); sources/alembic.py takes it back from there.
 """
 
 from __future__ import annotations
@@ -21,6 +22,8 @@ from alembic3d import Abc, AbcCoreAbstract, AbcGeom
 
 from athcodec.atomic_files import new_files
 from athcodec.exporters import WriteOptions
+from athcodec.exporters.copies import Copies, cost_of, fit_copies, one_copy, rows_of_one
+from athcodec.exporters.fitting import rotation_matrices
 from athcodec.exporters.scene_objects import (
     DOMAINS,
     KNOWN_ATTRIBUTES,
@@ -51,22 +54,25 @@ TYPES = {
     ("f4", (3,)): (imath.V3fArray, "V3f"),
     ("f8", (3,)): (imath.V3dArray, "V3d"),
 }
+KINDS = {"mesh": AbcGeom.OPolyMesh, "curves": AbcGeom.OCurves, "points": AbcGeom.OPoints}
 Z_UP = ((1, 0, 0, 0), (0, 0, -1, 0), (0, 1, 0, 0), (0, 0, 0, 1))  # row vectors
 
 
-def write_clip(motion: Any, path: str | PathLike[str], options: WriteOptions, report: Callable[[float], None]) -> None:
-    """Write a MotionClip or a ClipView as .abc. Raises ClipError, OSError."""
+def write_clip(
+    motion: Any, path: str | PathLike[str], options: WriteOptions, report: Callable[[float], None]
+) -> dict[str, Any]:
+    """Write a MotionClip or a ClipView as .abc; returns what instances cost. Raises ClipError, OSError."""
     path = os.fspath(path)
     with new_files(path) as folder:
         try:
-            _write(motion, os.path.join(folder, os.path.basename(path)), report)
+            return _write(motion, os.path.join(folder, os.path.basename(path)), options, report)
         except (RuntimeError, TypeError) as error:
             raise OSError(f"{path}: cannot be written: {' '.join(str(error).split())}") from None
         finally:
             gc.collect()  # an archive is complete when nothing refers to it
 
 
-def _write(motion: Any, name: str, report: Callable[[float], None]) -> None:
+def _write(motion: Any, name: str, options: WriteOptions, report: Callable[[float], None]) -> dict[str, Any]:
     numbers, rate = distinct_frame_numbers(motion), frame_rate_of(motion)
     archive = Abc.CreateArchiveWithInfo(name, rate, "athcodec", "plant motion")
     sampling = Abc.Argument(archive.addTimeSampling(_sampling(numbers, rate)))
@@ -76,16 +82,25 @@ def _write(motion: Any, name: str, report: Callable[[float], None]) -> None:
         turn.setMatrix(imath.M44d(*(float(number) for row in Z_UP for number in row)))
         root.getSchema().set(turn)
     objects = objects_of(motion)
-    statics, left = _divide(motion)
+    instanced = fit_copies(motion, objects) if options.instances else {}
+    for number, obj in enumerate(objects):
+        obj.copies = obj.copies if number in instanced else 1
+    statics, left = _divide(motion, objects)
     _keep_own(root.getSchema().getUserProperties(), motion, left)
     names = distinct(re.sub(r"[/\0]", "_", obj.name.strip("/")) or "part" for obj in objects)
-    for obj, name in zip(objects, names):
-        obj.target = _create(root, name, obj, sampling)
+    for number, (obj, name) in enumerate(zip(objects, names)):
+        if number in instanced:
+            _add_instanced(root, name, obj, instanced[number], statics, sampling)
+        else:
+            obj.target = _create(root, name, obj, sampling)
     for start, block in motion.blocks():
         for row, positions in enumerate(block.astype(np.float32, copy=False)):
             for obj in objects:
-                _add(obj, positions[obj.vertices], statics if start + row == 0 else None)
+                if obj.copies == 1:
+                    own = _rows(statics, obj) if start + row == 0 else None
+                    _add(obj, positions[obj.vertices], own)
         report((start + len(block)) / len(numbers))
+    return cost_of(instanced)
 
 
 def _sampling(numbers: np.ndarray, rate: float) -> Any:
@@ -99,8 +114,35 @@ def _sampling(numbers: np.ndarray, rate: float) -> Any:
 
 
 def _create(root: Any, name: str, obj: SceneObject, sampling: Any) -> Any:
-    kind = {"mesh": AbcGeom.OPolyMesh, "curves": AbcGeom.OCurves, "points": AbcGeom.OPoints}[obj.kind]
-    return kind(AbcGeom.OXform(root, name), name, sampling)  # programs expect a transform of its own
+    return KINDS[obj.kind](AbcGeom.OXform(root, name), name, sampling)  # programs expect a transform of its own
+
+
+def _add_instanced(
+    root: Any, name: str, obj: SceneObject, copies: Copies, statics: dict[str, tuple[np.ndarray, str]], sampling: Any
+) -> None:
+    """The shape below the transform of the first copy, and an instance of it below that of each other one."""
+    matrices = np.tile(np.eye(4), (*copies.places.shape[:2], 1, 1))  # of row vectors
+    linear = rotation_matrices(copies.turns.astype(np.float64)) * copies.scales[:, :, None, :]
+    matrices[..., :3, :3], matrices[..., 3, :3] = linear.swapaxes(2, 3), copies.places
+    places = [AbcGeom.OXform(root, f"{name}_{number}", sampling) for number in range(obj.copies)]
+    for place, track in zip(places, matrices.swapaxes(0, 1)):
+        for matrix in track:
+            sample = AbcGeom.XformSample()
+            sample.setMatrix(imath.M44d(*matrix.reshape(-1).tolist()))
+            place.getSchema().set(sample)
+    one = one_copy(obj)
+    one.target = KINDS[obj.kind](places[0], name)
+    own = {
+        key: (values if domain == "constant" else rows_of_one(values, obj), domain)
+        for key, (values, domain) in _rows(statics, obj).items()
+    }
+    _add(one, copies.shape, own)
+    for place in places[1:]:
+        place.addChildInstance(one.target, name)
+
+
+def _rows(statics: dict[str, tuple[np.ndarray, str]], obj: SceneObject) -> dict[str, tuple[np.ndarray, str]]:
+    return {name: (rows_of(values, domain, obj), domain) for name, (values, domain) in statics.items()}
 
 
 def _filled(kind: Any, values: np.ndarray) -> Any:
@@ -113,11 +155,11 @@ def _filled(kind: Any, values: np.ndarray) -> Any:
 # ---- samples ----
 
 
-def _add(obj: SceneObject, positions: np.ndarray, statics: dict[str, tuple[np.ndarray, str]] | None) -> None:
-    """A sample of the points; the first one brings what does not move."""
+def _add(obj: SceneObject, positions: np.ndarray, own: dict[str, tuple[np.ndarray, str]] | None) -> None:
+    """A sample of the points; the first one brings what does not move, the rows of the object."""
     points = _filled(imath.V3fArray, positions)
     schema = obj.target.getSchema()
-    if statics is None:
+    if own is None:
         sample = {
             "mesh": AbcGeom.OPolyMeshSchemaSample,
             "curves": AbcGeom.OCurvesSchemaSample,
@@ -126,7 +168,6 @@ def _add(obj: SceneObject, positions: np.ndarray, statics: dict[str, tuple[np.nd
         schema.set(sample)
         return
     order = turned_corners(obj.faces[0])
-    own = {name: (rows_of(values, domain, obj), domain) for name, (values, domain) in statics.items()}
     own = {name: (values[order] if domain == "corner" else values, domain) for name, (values, domain) in own.items()}
     # samples refer to arrays that somebody has to keep until they are written
     held = {
@@ -183,8 +224,11 @@ def _widths(held: dict, own: dict, name: str) -> dict:
 # ---- static arrays ----
 
 
-def _divide(motion: Any) -> tuple[dict[str, tuple[np.ndarray, str]], dict[str, tuple[np.ndarray, str]]]:
-    """Static arrays that Alembic has types and places for, and the others; each with its domain."""
+def _divide(
+    motion: Any, objects: list[SceneObject]
+) -> tuple[dict[str, tuple[np.ndarray, str]], dict[str, tuple[np.ndarray, str]]]:
+    """Static arrays that Alembic has types and places for, and the others; each with its domain. Of copies it has those
+    that all copies share."""
     fitting, left = {}, {}
     for name, values in motion.attributes.items():
         if name in KNOWN_ATTRIBUTES:
@@ -192,6 +236,10 @@ def _divide(motion: Any) -> tuple[dict[str, tuple[np.ndarray, str]], dict[str, t
         domain = domain_of(motion, name, values, motion.metadata.get("domains", {}))
         key = values.dtype.str[1:], values.shape[1:]
         fits = domain in DOMAINS and key in TYPES and values.dtype.isnative and "/" not in name and len(values)
+        fits = fits and (
+            domain == "constant"
+            or all(rows_of_one(rows_of(values, domain, obj), obj) is not None for obj in objects if obj.copies > 1)
+        )
         (fitting if fits else left)[name] = values, domain
     return fitting, left
 

@@ -4,7 +4,8 @@
 clip), all side by side below one node. A joint has translation, rotation and three scales; a part that this leaves
 further off than the level itself is (of a clip: fitting.OF_CLIP of its size) is cut into shorter ones (fitting.py).
 "morphs": a morph target per frame, exact but for float32, and large. "auto": the smaller of both for a
-short clip, else joints. Some engines, three.js among them, move triangles only: lines and points stand still there.
+short clip, else joints. options.rig makes a hierarchy of joints for engines (rig.py). Some engines, three.js among
+them, move triangles only: lines and points stand still there.
 
 Each of several clips is an animation of its name over the same joints or targets, and moves all that any of them
 moves: players may go from one to the other. glTF knows no loops: theirs end with the first frame again, and have
@@ -43,6 +44,7 @@ from athcodec.exporters.gltf_build import (
     takes,
 )
 from athcodec.exporters.gltf_joints import Joints, fit_joints
+from athcodec.exporters.rig import fit_rig
 
 MOST_JOINTS = 65536
 SHORT_FRAMES, SHORT_BYTES = 300, 256 << 20
@@ -58,7 +60,9 @@ def write_clip(
     Raises ClipError where it has more joints, frames or bytes than glTF can sensibly hold.
     """
     wanted, joints = options.animation, None
-    if wanted != "morphs":
+    if options.rig is not None:
+        wanted, joints = "joints", fit_rig(motion, options.rig, lambda done: report(0.95 * done))
+    elif wanted != "morphs":
         joints = fit_joints(motion, allowed_error(motion), MOST_JOINTS, lambda done: report(0.95 * done))
     if wanted == "joints" and joints is None:
         raise ClipError(
@@ -68,8 +72,8 @@ def write_clip(
     if wanted == "auto":
         wanted = _smaller(motion, joints)
     if wanted == "morphs":
-        _check_morphs(motion)
-    facts = {"animation": wanted, "unit": str(motion.metadata.get("unit") or "")}
+        check_morphs(motion)
+    facts = {"animation": wanted if options.rig is None else "a rig", "unit": str(motion.metadata.get("unit") or "")}
     if isinstance(motion, ClipView):
         facts |= {"level": motion.level, "level_max_error": float(motion.max_error)}
     try:
@@ -114,7 +118,8 @@ def _smaller(motion: Any, joints: Joints | None) -> str:
     return "morphs" if is_short and morphs < size else "joints"
 
 
-def _check_morphs(motion: Any) -> None:
+def check_morphs(motion: Any) -> None:
+    """Raises ClipError where a motion is more than morph targets can sensibly hold."""
     size = 12 * motion.frame_count * motion.vertex_count
     if motion.frame_count > MORPH_FRAMES or size > MORPH_BYTES:
         raise ClipError(
@@ -140,18 +145,16 @@ class _Joined:
 
     def add(self, glb: Glb, root: int, found: list[GltfMesh], report: Callable[[float], None]) -> Iterator[bytes]:
         joints = self._joints
-        nodes = [
-            glb.node(root, name=f"part_{i}", translation=t.tolist(), rotation=_unit(r))
-            for i, (t, r) in enumerate(zip(*joints.rest[:2]))
-        ]
+        nodes: list[int] = []
+        for i, (place, turn) in enumerate(zip(*joints.rest[:2])):
+            above = root if joints.parent is None or joints.parent[i] < 0 else nodes[joints.parent[i]]
+            name = joints.names[i] if joints.names else f"part_{i}"
+            nodes.append(glb.node(above, name=name, translation=place.tolist(), rotation=_unit(turn)))
         bind = glb.array(np.ascontiguousarray(joints.bind.swapaxes(1, 2)).reshape(-1, 16))
         glb.json["skins"] = [{"joints": nodes, "inverseBindMatrices": bind, "skeleton": root}]
         dtype = np.uint8 if len(nodes) <= 256 else np.uint16
         for shape in found:
-            own = np.zeros((len(shape.source), 4), dtype)
-            own[:, 0] = joints.vertex_joint[shape.source]
-            weights = np.zeros((len(shape.source), 4), np.uint8)
-            weights[:, 0] = 255
+            own, weights = _influences(joints, shape.source, dtype)
             mesh = add_mesh(glb, shape, np.asarray(self._motion.rest), {"JOINTS_0": own, "WEIGHTS_0": weights})
             glb.node(name=shape.name, mesh=mesh, skin=0)
         self._animate(glb, nodes)
@@ -170,6 +173,19 @@ class _Joined:
                 path = next(path for path, of in enumerate(used) if of.any())
                 moves[path][used[path].argmax()] = True  # one that stands still lasts as long as it does
             _add_animation(glb, take, *_channels(glb, nodes, take, poses, used, moves))
+
+
+def _influences(joints: Joints, source: np.ndarray, dtype: type) -> tuple[np.ndarray, np.ndarray]:
+    """(n, 4) joints and their weights."""
+    own = np.zeros((len(source), 4), dtype)
+    if joints.weights is None:
+        weights = np.zeros(own.shape, np.uint8)
+        own[:, 0], weights[:, 0] = joints.vertex_joint[source], 255
+        return own, weights
+    found, width = np.zeros(own.shape, np.float32), joints.weights.shape[1]
+    found[:, :width] = joints.weights[source]
+    own[:, :width] = np.where(found[:, :width] > 0, joints.vertex_joint[source], 0)
+    return own, found
 
 
 def _keys(take: Take, values: np.ndarray) -> np.ndarray:

@@ -21,9 +21,10 @@ SLACK = 0.01  # of the allowed error: what moves less stands still
 class Joints:
     """J joints over T frames, as written: all arrays float32.
 
-    vertex_joint (N,); bind (J, 4, 4) from the clip's vertices to each joint; rest and moving poses are (translation,
-    rotation, scale): (J, 3), (J, 4), (J, 3) and (T, J, 3), (T, J, 4), (T, J, 3), quaternions x y z w. max_error: the
-    largest distance of a vertex from the motion, in scene units.
+    vertex_joint (N,), or (N, k) with weights (N, k) that add up to 1; parent (J,), before its children, -1 for none, or
+    None where none has any; names (J,); bind (J, 4, 4) from the clip's vertices to each joint; rest and moving poses
+    are (translation, rotation, scale): (J, 3), (J, 4), (J, 3) and (T, J, 3), (T, J, 4), (T, J, 3), quaternions x y z w.
+    max_error: the largest distance of a vertex from the motion, in scene units.
     """
 
     vertex_joint: np.ndarray
@@ -31,6 +32,9 @@ class Joints:
     rest: tuple[np.ndarray, np.ndarray, np.ndarray]
     poses: tuple[np.ndarray, np.ndarray, np.ndarray]
     max_error: float = 0.0
+    parent: np.ndarray | None = None
+    weights: np.ndarray | None = None
+    names: tuple[str, ...] = ()
 
     def pose(self, rest: np.ndarray, frame: int) -> np.ndarray:
         """(N, 3) float64: where an engine puts vertices whose rest pose (N, 3) is that of the file."""

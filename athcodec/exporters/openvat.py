@@ -31,8 +31,8 @@ HIGHEST = 16384
 def write_clip(
     motion: Any, path: str | PathLike[str], options: WriteOptions, report: Callable[[float], None]
 ) -> dict[str, Any]:
-    """Write a MotionClip or a ClipView to the new folder `path`; returns what the JSON says. options.half: 16 bits in
-    place of float.
+    """Write a MotionClip or a ClipView to the new folder `path`; returns what the JSON says of it. options.half: 16
+    bits in place of float.
 
     Raises ClipError where the texture would be larger than engines take, FileExistsError where `path` exists.
     """
@@ -53,7 +53,7 @@ def write_clip(
         }
         write_json(os.path.join(folder, f"{name}-remap_info.json"), facts)
     report(1.0)
-    return facts
+    return facts["athcodec"]
 
 
 def _texels(motion: Any, width: int) -> tuple[np.ndarray, np.ndarray]:

@@ -33,7 +33,9 @@ class SceneObject:
     face_rows: slice
     corner_rows: slice
     details: dict[str, str]
+    copies: int = 1  # its vertices and faces are so many copies of one shape
     target: Any = None  # what a writer makes of it
+    instancer: Any = None  # and of its copies
     width: float = 0.0  # the largest, of curves and points
 
     @property
@@ -57,7 +59,27 @@ def objects_of(motion: Any) -> list[SceneObject]:
         faces = np.asarray(face_counts[low:high]), face_indices[rows] - first
         face_rows = slice(int(low), int(high))
         objects.append(SceneObject(name, kind, first, int(count), faces, next(curves), face_rows, rows, detail))
+    for obj, copies in zip(objects, _copies(motion, len(objects))):
+        obj.copies = copies if 1 < copies <= obj.count and _repeats(obj, copies) else 1
     return objects
+
+
+def _copies(motion: Any, object_count: int) -> list[int]:
+    found = motion.attributes.get("part_copies")
+    usable = found is not None and found.shape == (object_count,) and found.dtype.kind in "iu"
+    return found.tolist() if usable else [1] * object_count
+
+
+def _repeats(obj: SceneObject, copies: int) -> bool:
+    """Whether vertices, faces and curves are those of the first copy again and again."""
+    counts, indices = obj.faces
+    if obj.count % copies or len(counts) % copies or len(indices) % copies or len(obj.curves) % copies:
+        return False
+    shift = np.arange(copies)[:, None] * (obj.count // copies)
+    rows = indices.reshape(copies, -1) - shift
+    return all(
+        bool((each == each[:1]).all()) for each in (counts.reshape(copies, -1), rows, obj.curves.reshape(copies, -1))
+    )
 
 
 def _owners(corners: np.ndarray, indices: np.ndarray, ends: np.ndarray) -> np.ndarray:

@@ -19,7 +19,7 @@ import numpy as np
 
 from athcodec.atomic_files import check_target, new_files
 from athcodec.errors import ClipError
-from athcodec.exporters import WriteOptions
+from athcodec.exporters import FILES, WriteOptions
 from athcodec.exporters.mesh import WRITERS
 from athcodec.exporters.timing import frame_numbers
 from athcodec.sources.sequence import LARGEST_NUMBER, Numbering, numbering_of
@@ -27,9 +27,11 @@ from athcodec.sources.sequence import LARGEST_NUMBER, Numbering, numbering_of
 DIGITS = 4
 
 
-def write_clip(motion: Any, path: str | PathLike[str], options: WriteOptions, report: Callable[[float], None]) -> None:
-    """Write all files. Raises ClipError where there are others of the same numbering, OSError where nothing can be
-    written."""
+def write_clip(
+    motion: Any, path: str | PathLike[str], options: WriteOptions, report: Callable[[float], None]
+) -> dict[str, Any]:
+    """Write all files; returns their names. Raises ClipError where there are others of the same numbering, OSError
+    where nothing can be written."""
     suffix = Path(path).suffix.lower()
     if suffix not in WRITERS:
         raise ClipError(f"{fspath(path)}: got the suffix {suffix!r}, expected one of {', '.join(WRITERS)}")
@@ -37,6 +39,7 @@ def write_clip(motion: Any, path: str | PathLike[str], options: WriteOptions, re
     writer = WRITERS[suffix](motion)
     with new_files(path, named=False) as folder:
         write_frames(motion, writer, [os.path.join(folder, name) for name in names], report)
+    return {FILES: names}
 
 
 def write_frames(motion: Any, writer: Any, paths: Sequence[str], report: Callable[[float], None]) -> None:

@@ -2,7 +2,8 @@
 
 Faces, texture coordinates and other static arrays are written once. Frames are written as they come and saved now and
 then: what has been saved leaves memory, so that a clip may be longer than memory. USD's points are float32, a clip in
-float64 is rounded. Prims are in world space and hold no transforms. What USD has no place for (branches, arrays per
+float64 is rounded. Prims are in world space and hold no transforms, but for copies of one shape, which become a
+PointInstancer where options.instances asks for it. What USD has no place for (branches, arrays per
 branch, bytes) lies in the namespace "athcodec" of the root prim, from where sources/usd.py takes it back.
 """
 
@@ -17,10 +18,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pxr import Sdf, Tf, Usd, UsdGeom, Vt
+from pxr import Sdf, Tf, Usd, UsdGeom, UsdSkel, Vt
 
 from athcodec.atomic_files import new_files
 from athcodec.exporters import WriteOptions
+from athcodec.exporters.copies import Copies, cost_of, fit_copies, one_copy, rows_of_one
+from athcodec.exporters.gltf_joints import Joints
+from athcodec.exporters.rig import fit_rig
 from athcodec.exporters.scene_objects import (
     KNOWN_ATTRIBUTES,
     KNOWN_METADATA,
@@ -32,6 +36,7 @@ from athcodec.exporters.scene_objects import (
     rows_of,
 )
 from athcodec.exporters.timing import distinct_frame_numbers, frame_rate_of
+from athcodec.exporters.usd_rig import write_rig
 from athcodec.sources.scene_objects import OWN
 from athcodec.units import METRES, unit_symbol
 
@@ -68,15 +73,19 @@ NUMPY = {"i": "<i4", "u": "<u4", "q": "<i8", "Q": "<u8", "B": "u1", "?": "?", "e
 INTERPOLATION = {"vertex": "vertex", "corner": "faceVarying", "face": "uniform", "constant": "constant"}
 
 
-def write_clip(motion: Any, path: str | PathLike[str], options: WriteOptions, report: Callable[[float], None]) -> None:
-    """Write a MotionClip or a ClipView as .usdc, .usda, .usdz or, binary, .usd. Raises ClipError, OSError."""
+def write_clip(
+    motion: Any, path: str | PathLike[str], options: WriteOptions, report: Callable[[float], None]
+) -> dict[str, Any]:
+    """Write a MotionClip or a ClipView as .usdc, .usda, .usdz or, binary, .usd; returns what instances cost. Raises
+    ClipError, OSError."""
     path = os.fspath(path)
     with new_files(path) as folder, _saying(path):
         name = Path(path).name
         suffix = Path(path).suffix.lower()
         binary = os.path.join(folder, f"{_identifier(Path(path).stem)}.usdc")
-        _write(motion, binary, report)
+        facts = _write(motion, binary, options, report)
         _convert(binary, os.path.join(folder, name), suffix)
+    return facts
 
 
 @contextmanager
@@ -113,18 +122,55 @@ def _must(done: object, name: str) -> None:
         raise OSError(f"{name}: cannot be written")
 
 
-def _write(motion: Any, name: str, report: Callable[[float], None]) -> None:
-    codes, rate = distinct_frame_numbers(motion), frame_rate_of(motion)
+def _write(motion: Any, name: str, options: WriteOptions, report: Callable[[float], None]) -> dict[str, Any]:
+    codes, rate = _time_codes(motion), frame_rate_of(motion)
     stage = Usd.Stage.CreateNew(name)
-    root = UsdGeom.Xform.Define(stage, "/clip").GetPrim()
+    joints = None if options.rig is None else fit_rig(motion, options.rig, lambda done: report(0.9 * done))
+    root = (UsdGeom.Xform if joints is None else UsdSkel.Root).Define(stage, "/clip").GetPrim()
     stage.SetDefaultPrim(root)
-    _describe_stage(stage, motion, codes, rate)
+    _describe_stage(stage, motion, max((codes[a:b] for a, b in motion.clip_range_frames), key=len), rate)
     objects = objects_of(motion)
-    for obj, name in zip(objects, distinct(_identifier(obj.name) for obj in objects)):
-        obj.target = _define(stage, f"/clip/{name}", obj)
+    instanced = fit_copies(motion, objects) if options.instances and joints is None else {}
+    for number, (obj, name) in enumerate(zip(objects, distinct(_identifier(obj.name) for obj in objects))):
+        if number in instanced:
+            _define_instanced(stage, f"/clip/{name}", obj, instanced[number])
+        else:
+            obj.copies, obj.target = 1, _define(stage, f"/clip/{name}", obj)
     left = _static_arrays(stage, motion, objects)
     _own_arrays(root, motion, left)
+    if joints is not None:
+        return _write_rigged(stage, motion, joints, objects, codes, report)
+    _write_places(stage, [(objects[number], copies) for number, copies in instanced.items()], codes)
     _write_frames(stage, motion, objects, codes, report)
+    return cost_of(instanced)
+
+
+def _time_codes(motion: Any) -> np.ndarray:
+    """(T,) of all frames; of several clips each from 0 on."""
+    if len(motion.clip_ranges) < 2:
+        return distinct_frame_numbers(motion)
+    times = (np.asarray(motion.time[start:stop], np.float64) for start, stop in motion.clip_range_frames)
+    return np.concatenate([np.round((time - time[0]) * frame_rate_of(motion), 6) for time in times])
+
+
+def _write_rigged(
+    stage: Usd.Stage,
+    motion: Any,
+    joints: Joints,
+    objects: list[SceneObject],
+    codes: np.ndarray,
+    report: Callable[[float], None],
+) -> dict[str, Any]:
+    rest = np.asarray(motion.rest, np.float32)
+    for obj in objects:
+        own = rest[obj.vertices]
+        obj.target.GetPointsAttr().Set(_vec3(own))
+        if len(own):
+            obj.target.GetExtentAttr().Set(_vec3([own.min(axis=0), own.max(axis=0)]))
+    write_rig(stage, motion, joints, objects, codes)
+    _must(stage.GetRootLayer().Save(), stage.GetRootLayer().identifier)
+    report(1.0)
+    return {"animation": "a rig", "joints": len(joints.bind), "max_error": joints.max_error}
 
 
 def _describe_stage(stage: Usd.Stage, motion: Any, codes: np.ndarray, rate: float) -> None:
@@ -180,6 +226,37 @@ def _define(stage: Usd.Stage, place: str, obj: SceneObject) -> UsdGeom.PointBase
     return schema
 
 
+def _define_instanced(stage: Usd.Stage, place: str, obj: SceneObject, copies: Copies) -> None:
+    """A PointInstancer, and below it the shape of one copy, which is the object's target."""
+    instancer = UsdGeom.PointInstancer.Define(stage, place)
+    one, name = one_copy(obj), place.rpartition("/")[2]
+    obj.target = _define(stage, f"{place}/{name}", one)
+    obj.target.GetPointsAttr().Set(Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(copies.shape)))
+    obj.target.GetExtentAttr().Set(_vec3([copies.shape.min(axis=0), copies.shape.max(axis=0)]))
+    instancer.CreatePrototypesRel().SetTargets([f"{place}/{name}"])
+    instancer.CreateProtoIndicesAttr(Vt.IntArray(obj.copies, 0))
+    obj.instancer = instancer
+
+
+def _vec3(points: Any) -> Vt.Vec3fArray:
+    return Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(points, np.float32))
+
+
+def _write_places(stage: Usd.Stage, instanced: list[tuple[SceneObject, Copies]], codes: np.ndarray) -> None:
+    """Where the copies are in each frame. USD's older programs know rotations in half precision only."""
+    for obj, copies in instanced:
+        instancer = obj.instancer
+        turned = [(instancer.CreateOrientationsAttr(), Vt.QuathArray, np.float16)]
+        if hasattr(instancer, "CreateOrientationsfAttr"):
+            turned.append((instancer.CreateOrientationsfAttr(), Vt.QuatfArray, np.float32))
+        places, scales = instancer.CreatePositionsAttr(), instancer.CreateScalesAttr()
+        for frame, code in enumerate(codes.tolist()):
+            places.Set(_vec3(copies.places[frame]), code)
+            scales.Set(_vec3(copies.scales[frame]), code)
+            for attribute, array, dtype in turned:
+                attribute.Set(array.FromNumpy(copies.turns[frame].astype(dtype)), code)
+
+
 def _int_array(values: np.ndarray) -> Vt.IntArray:
     return Vt.IntArray.FromNumpy(np.ascontiguousarray(values, np.int32))
 
@@ -212,9 +289,11 @@ def _write_array(name: str, values: np.ndarray, domain: str, objects: list[Scene
     if row not in shapes and len(row) > 1:
         return False
     type_name = _type_name(name, kind, row if row in shapes else ())
-    for obj in objects:
-        rows = rows_of(values, domain, obj)
-        primvar = UsdGeom.PrimvarsAPI(obj.target).CreatePrimvar(
+    placed = [_placed_rows(rows_of(values, domain, obj), domain, obj) for obj in objects]
+    if any(found is None for found in placed):
+        return False
+    for target, rows in placed:
+        primvar = UsdGeom.PrimvarsAPI(target).CreatePrimvar(
             PRIMVARS.get(name, _identifier(name)), type_name, INTERPOLATION[domain], element_size
         )
         primvar.Set(_vt(rows, type_name, NUMPY[kind]))
@@ -225,10 +304,26 @@ def _write_array(name: str, values: np.ndarray, domain: str, objects: list[Scene
     return True
 
 
+def _placed_rows(rows: np.ndarray, domain: str, obj: SceneObject) -> tuple[Any, np.ndarray] | None:
+    """The schema that takes the rows of an object, and those that it takes: of copies those of one, where all have the
+    same, or one for each, where it has the same throughout. None where neither is so."""
+    if obj.copies == 1 or domain == "constant":
+        return obj.target, rows
+    shared = rows_of_one(rows, obj)
+    if shared is not None:
+        return obj.target, shared
+    each = rows.reshape(obj.copies, -1, *rows.shape[1:])
+    if domain == "vertex" and (each == each[:, :1]).all():
+        return obj.instancer, each[:, 0]
+    return None
+
+
 def _write_radius(values: np.ndarray, domain: str, objects: list[SceneObject]) -> bool:
     """As widths of curves and points; of meshes as a primvar."""
-    for obj in objects:
-        rows = rows_of(values, domain, obj)
+    placed = [_placed_rows(rows_of(values, domain, obj), domain, obj) for obj in objects]
+    if any(found is None or found[0] is not obj.target for found, obj in zip(placed, objects)):
+        return False
+    for obj, (_, rows) in zip(objects, placed):
         if obj.kind == "mesh":
             primvar = UsdGeom.PrimvarsAPI(obj.target).CreatePrimvar(
                 "radius", Sdf.ValueTypeNames.FloatArray, INTERPOLATION[domain]
@@ -273,7 +368,14 @@ def _write_frames(
     stage: Usd.Stage, motion: Any, objects: list[SceneObject], codes: np.ndarray, report: Callable[[float], None]
 ) -> None:
     layer = stage.GetRootLayer()
-    places = [(obj, obj.target.GetPointsAttr().GetPath(), obj.target.GetExtentAttr().GetPath()) for obj in objects]
+    places = [
+        (
+            obj,
+            None if obj.copies > 1 else obj.target.GetPointsAttr().GetPath(),
+            _whole(obj).CreateExtentAttr().GetPath(),
+        )
+        for obj in objects
+    ]
     unsaved = 0
     for start, block in motion.blocks():
         for row, positions in enumerate(block.astype(np.float32, copy=False)):
@@ -287,10 +389,16 @@ def _write_frames(
     _must(layer.Save(), layer.identifier)
 
 
+def _whole(obj: SceneObject) -> Any:
+    """The schema that all its vertices are under."""
+    return obj.target if obj.copies == 1 else obj.instancer
+
+
 def _write_frame(layer: Sdf.Layer, places: list, positions: np.ndarray, code: float) -> None:
     for obj, points, extent in places:
         own = np.ascontiguousarray(positions[obj.vertices])
-        layer.SetTimeSample(points, code, Vt.Vec3fArray.FromNumpy(own) if len(own) else Vt.Vec3fArray())
+        if points is not None:
+            layer.SetTimeSample(points, code, Vt.Vec3fArray.FromNumpy(own) if len(own) else Vt.Vec3fArray())
         if len(own):
             half = np.float32(obj.width / 2)
             box = np.stack([own.min(axis=0) - half, own.max(axis=0) + half])

@@ -19,7 +19,7 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 
 from athcodec.atomic_files import check_target, new_files
-from athcodec.exporters import WriteOptions
+from athcodec.exporters import FILES, WriteOptions
 from athcodec.exporters.cells import cell_and_point_data, cells_of
 from athcodec.exporters.sequence import file_names, write_frames
 
@@ -29,9 +29,11 @@ _HEAD = (
 )
 
 
-def write_clip(motion: Any, path: str | PathLike[str], options: WriteOptions, report: Callable[[float], None]) -> None:
-    """Write all files. Raises ClipError where there are others of the same numbering, OSError where nothing can be
-    written."""
+def write_clip(
+    motion: Any, path: str | PathLike[str], options: WriteOptions, report: Callable[[float], None]
+) -> dict[str, Any]:
+    """Write all files; returns the name of the index, or of the only one. Raises ClipError where there are others of
+    the same numbering, OSError where nothing can be written."""
     target = Path(check_target(path))
     names = file_names(motion, target.with_suffix(".vtu"))
     index = "" if names == [target.name] else f"{_stem(target)}.pvd"
@@ -42,6 +44,7 @@ def write_clip(motion: Any, path: str | PathLike[str], options: WriteOptions, re
         write_frames(motion, writer, [os.path.join(folder, name) for name in names], report)
         if index:
             Path(folder, index).write_text(_index(motion, names), "utf-8")
+    return {FILES: [index] if index else names}
 
 
 def _stem(target: Path) -> str:

@@ -10,7 +10,8 @@ from __future__ import annotations
 import importlib
 import os
 import re
-from collections.abc import Collection, Sequence
+import warnings
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from importlib.util import find_spec
 from os import PathLike
@@ -20,13 +21,32 @@ from typing import Any
 import numpy as np
 
 from athcodec.clip import MotionClip
-from athcodec.errors import ClipError, MissingExtra
+from athcodec.errors import ClipError, MissingExtra, SourceWarning
 from athcodec.frames import Frames
 from athcodec.options import SAMPLES
 from athcodec.sources.opening import closing_on_failure
 from athcodec.units import METRES, unit_symbol
 
 HEAD_BYTES = 4096
+# what is not read of a scene and is no shape
+NO_SHAPES = frozenset(
+    (
+        "Material",
+        "Camera",
+        "Light",
+        "GeomSubset",
+        "FaceSet",
+        "SkelAnimation",
+        "attribute",
+        "element",
+        "empty",
+        "field",
+        "hidden",
+        "statement",
+        "other",
+    )
+)
+LISTED = 8
 NUMBER_PATTERN = re.compile(r"([^#%]*)(#+|%0?(\d?)d)([^#%]*)", re.DOTALL)
 
 
@@ -201,7 +221,8 @@ def read(
     Returns
     -------
     MotionClip
-        Close it, or use it in a ``with`` statement; frames are read from the file when they are asked for.
+        Close it, or use it in a ``with`` statement; frames are read from the file when they are asked for. What else
+        the file holds is in its `not_read`; SourceWarning names what is missing from the picture for that.
 
     Raises
     ------
@@ -220,8 +241,19 @@ def read(
     kind = find_format(path) if format is None else format_named(format, FORMATS)
     kind.check()
     clip: MotionClip = importlib.import_module(kind.module).read_clip(path, wanted)
+    lost = {kind: names for kind, names in clip.not_read.items() if kind not in NO_SHAPES}
+    if lost:
+        warnings.warn(f"{os.fspath(path)}: not read: {listed(lost)}", SourceWarning, stacklevel=2)
     with closing_on_failure(clip):
         return _in_axes(_in_units(clip, unit), up_axis)
+
+
+def listed(not_read: Mapping[str, Sequence[str]]) -> str:
+    """MotionClip.not_read in words: each kind once, with its first names."""
+    return "; ".join(
+        f"{kind} {', '.join(names[:LISTED])}{f' and {len(names) - LISTED} more' if len(names) > LISTED else ''}"
+        for kind, names in not_read.items()
+    )
 
 
 def is_pattern(path: str | PathLike[str]) -> bool:

@@ -3,7 +3,8 @@
 Frames are the times at which anything that is read has a sample; options.fps sets another rate. Between samples points
 and transforms go on straight lines. Alembic lists the corners of a face clockwise: they come counter-clockwise, as
 everywhere else here. An Alembic file names no unit and no axis; Y is up by custom, which is said of Blender's files
-alone. Objects that are hidden throughout, NURBS patches, materials and velocities are not read.
+alone. What has instances, and a shape that stays as it is, becomes one object, of as many copies. Objects that are
+hidden throughout, NURBS patches, materials and others are named in the clip's `not_read`; velocities are not read.
 
 Alembic's library crashes on damaged archives. So it works in a process of its own (alembic_archive.py), which gives
 frames when it is asked for them, and whose crash becomes a ClipError.
@@ -59,6 +60,7 @@ def read_clip(path: str | PathLike[str], options: ReadOptions) -> MotionClip:
             metadata=json.loads(arrays["metadata"].tobytes()),
             resource=archive,
             unchanged=unchanged,
+            not_read=json.loads(arrays["not_read"].tobytes()),
             **{name: arrays[name] for name in ARRAYS if name in arrays},
         )
         clip.rest_given = bool(arrays["rest_given"])

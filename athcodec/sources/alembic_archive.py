@@ -51,6 +51,7 @@ SCOPES = {
     AbcGeom.GeometryScope.kUniformScope: "face",
     AbcGeom.GeometryScope.kConstantScope: "constant",
 }
+NAMED_PARAMS = (("uv", "getUVsParam"), ("normals", "getNormalsParam"), ("radius", "getWidthsParam"))
 PARAMS = tuple(
     getattr(AbcGeom, f"I{name}GeomParam")
     for name in (
@@ -98,7 +99,9 @@ def _described(clip: MotionClip) -> bytes:
         if getattr(clip, name) is not None:
             arrays[name] = getattr(clip, name)
     arrays["rest"], arrays["rest_given"] = clip.source_rest, np.array(clip.rest_given)
-    arrays["metadata"] = np.frombuffer(json.dumps(clip.metadata).encode(), np.uint8)
+    arrays["metadata"], arrays["not_read"] = (
+        np.frombuffer(json.dumps(found).encode(), np.uint8) for found in (clip.metadata, clip.not_read)
+    )
     out = io.BytesIO()
     np.savez(out, **arrays)
     return out.getvalue()
@@ -160,33 +163,41 @@ class _Xform:
 
 @dataclass
 class _Object(SceneObject):
-    """An object that is read, the transforms above it, leaf first, and how its points are found."""
+    """An object that is read, the transforms above it and above its instances, leaf first, and how its points are
+    found. source: its path, of an instance that of what it shows."""
 
     schema: Any = None
     xforms: list[_Xform] = field(default_factory=list)
+    instances: list[list[_Xform]] = field(default_factory=list)
+    source: str = ""
     points: Any = None
     track: _Track | None = None
 
     def tracks(self) -> Iterator[_Track]:
-        yield from (track for track in (self.track, *(xform.track for xform in self.xforms)) if len(track.times) > 1)
+        tracks = (xform.track for xforms in (self.xforms, *self.instances) for xform in xforms)
+        yield from (track for track in (self.track, *tracks) if len(track.times) > 1)
 
     @property
     def moves(self) -> bool:
-        return any(len(xform.track.times) > 1 for xform in self.xforms)
+        return any(len(xform.track.times) > 1 for xforms in (self.xforms, *self.instances) for xform in xforms)
 
 
 def _clip(archive: Any, options: ReadOptions) -> MotionClip:
     if not archive.valid():
         raise ClipError("archive: cannot be opened")
     own, kept = _own(archive)
-    objects = _find(archive, options.only)
+    not_read: dict[str, list[str]] = {}
+    objects = _together(_find(archive, options.only, not_read))
     times, rate = _times(archive, objects, options.fps)
     first = 0
     for obj in objects:
         obj.first, obj.count, obj.is_still = first, len(_points(obj, times[0])), not any(obj.tracks())
-        first += obj.count
         order = _topology(obj)
         _statics(obj, order, times[0])
+        if obj.instances:
+            obj.statics.pop("normals", None)  # they turn with each copy
+            obj.repeat(1 + len(obj.instances))
+        first += obj.count
     if first == 0:
         raise ClipError("points: got none, expected at least one")
 
@@ -207,17 +218,19 @@ def _clip(archive: Any, options: ReadOptions) -> MotionClip:
         own_metadata(own) | _metadata(archive, times, rate),
         kept,
         options,
+        not_read=not_read,
     )
 
 
 # ---- objects ----
 
 
-def _find(archive: Any, only: Sequence[str]) -> list[_Object]:
+def _find(archive: Any, only: Sequence[str], not_read: dict[str, list[str]]) -> list[_Object]:
+    """All objects that are read, those of instances too; adds the others to not_read, by the names of their kinds."""
     objects, visited = [], 0
-    waiting = [(archive.getTop(), [])]
+    waiting = [(archive.getTop(), [], "")]
     while waiting:
-        parent, xforms = waiting.pop()
+        parent, xforms, above = waiting.pop()
         children = []
         for i in range(parent.getNumChildren()):
             visited += 1
@@ -225,8 +238,10 @@ def _find(archive: Any, only: Sequence[str]) -> list[_Object]:
                 raise ClipError(f"archive: got more than {MAX_OBJECTS} objects")
             child = parent.getChild(i)
             if _hidden(child):
+                not_read.setdefault("hidden", []).append(child.getFullName())
                 continue
-            children.append((child, _add(child, xforms, objects, only)))
+            source = child.instanceSourcePath() if child.isInstanceRoot() else f"{above}/{child.getName()}"
+            children.append((child, _add(child, source, xforms, objects, only, not_read), source))
         waiting += reversed(children)
     if not objects:
         what = f" named like {', '.join(only)}" if only else ""
@@ -234,20 +249,49 @@ def _find(archive: Any, only: Sequence[str]) -> list[_Object]:
     return objects
 
 
-def _add(child: Any, xforms: list[_Xform], objects: list[_Object], only: Sequence[str]) -> list[_Xform]:
+def _together(objects: list[_Object]) -> list[_Object]:
+    """Instances of one object, whose shape stays as it is, as copies at the place of the first."""
+    by_source: dict[str, _Object] = {}
+    found = []
+    for obj in objects:
+        first = by_source.get(obj.source)
+        if first is None:
+            by_source[obj.source] = obj
+            found.append(obj)
+        elif len(obj.track.times) > 1:
+            found.append(obj)
+        else:
+            first.instances.append(obj.xforms)
+    return found
+
+
+def _add(
+    child: Any,
+    source: str,
+    xforms: list[_Xform],
+    objects: list[_Object],
+    only: Sequence[str],
+    not_read: dict[str, list[str]],
+) -> list[_Xform]:
     """Adds an object that has points; returns the transforms above its children."""
     name = child.getHeader().getMetaData().get("schema") or ""
     if name.startswith("AbcGeom_Xform"):
         return _above(child, xforms)
     found = next((schema for start, schema in SCHEMAS.items() if name.startswith(start)), None)
     names = (child.getName(), child.getFullName())
+    if found is None and name:
+        kind = name.partition("_")[2].rpartition("_")[0] or name  # of AbcGeom_NuPatch_v2
+        not_read.setdefault(kind, []).append(names[1])
     if found is None or only and not any(fnmatchcase(name, pattern) for pattern in only for name in names):
         return xforms
     kind, wrap = found
     schema = wrap(child, EXISTING).getSchema()
     points = schema.getPositionsProperty()
     if points.getNumSamples():
-        objects.append(_Object(kind, *names, schema=schema, xforms=xforms, points=points, track=_track(points)))
+        track = _track(points)
+        objects.append(_Object(kind, *names, schema=schema, xforms=xforms, points=points, track=track, source=source))
+    else:
+        not_read.setdefault("empty", []).append(names[1])
     return xforms
 
 
@@ -354,30 +398,32 @@ def _metadata(archive: Any, times: np.ndarray, rate: float | None) -> dict[str, 
 
 
 def _statics(obj: _Object, order: np.ndarray, time: float) -> None:
-    params = (
-        [] if obj.kind == "points" else [("uv", obj.schema.getUVsParam()), ("normals", obj.schema.getNormalsParam())]
-    )
-    if obj.kind != "mesh":
-        params.append(("radius", obj.schema.getWidthsParam()))
-    for name, param in params if obj.kind != "mesh" or hasattr(obj.schema, "getNormalsParam") else params[:1]:
-        _keep(obj, name, param, order)
+    for name, getter in NAMED_PARAMS:
+        if hasattr(obj.schema, getter):  # of a subdivision surface without normals
+            _keep(obj, name, getattr(obj.schema, getter)(), order)
     further = obj.schema.getArbGeomParams()
     for i in range(further.getNumProperties() if further.valid() else 0):
         header = further.getPropertyHeader(i)
         kind = next((param for param in PARAMS if param.matches(header)), None)
         if kind is not None:
             _keep(obj, header.getName(), kind(further, header.getName()), order)
+        else:
+            obj.left_out.append(header.getName())
     if obj.kind != "mesh":
-        obj.halve_widths(_matrix(obj, time))
-    obj.turn_normals(_matrix(obj, time), obj.moves)
+        obj.halve_widths(_product(obj.xforms, time))
+    obj.turn_normals(_product(obj.xforms, time), obj.moves)
 
 
 def _keep(obj: _Object, name: str, param: Any, order: np.ndarray) -> None:
-    if not param.valid() or not param.isConstant() or not param.getNumSamples():
+    if not param.valid() or not param.getNumSamples():
+        return
+    if not param.isConstant():
+        obj.left_out.append(name)
         return
     sample = param.getExpandedValue()
     values = np.array(sample.getVals())
     if values.dtype.kind not in "biuf" or values.ndim == 0:
+        obj.left_out.append(name)
         return
     domain = SCOPES.get(sample.getScope())
     extent = param.getArrayExtent()
@@ -452,8 +498,17 @@ def _points(obj: _Object, time: float) -> np.ndarray:
 
 
 def _matrix(obj: _Object, time: float) -> np.ndarray:
+    """(4, 4) to the world; of what has instances (copies, 4, 4)."""
+    return (
+        _product(obj.xforms, time)
+        if not obj.instances
+        else np.stack([_product(xforms, time) for xforms in (obj.xforms, *obj.instances)])
+    )
+
+
+def _product(xforms: list[_Xform], time: float) -> np.ndarray:
     matrix = np.eye(4)
-    for xform in obj.xforms:
+    for xform in xforms:
         matrix = matrix @ xform.at(time)
     return matrix
 

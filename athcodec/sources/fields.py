@@ -3,7 +3,8 @@
 Points of a step are those of the file plus the displacement. It is options.field, else the one field per point that is
 called displacement, disp or u; where there is none, the points themselves move, and where they do move, a field of such
 a name is left alone unless it is asked for. Other data per point and per cell are kept where they are the same in all
-steps, and left out where they change in time. The format of the file is not known here.
+steps, and left out where they change in time: those per point are in the clip's `not_read`. The format of the file is
+not known here.
 """
 
 from __future__ import annotations
@@ -94,6 +95,7 @@ def clip_of_steps(
         "part_kinds": [kind_of(polygons, topology.edges)],
         "domains": {key: domain for key, domain in domains.items() if key in attributes},
     }
+    moving = [key for key in steps.fields() if key != moved_by and key not in attributes and key not in options.skip]
     rest = first.astype(dtype) if moved_by and options.rest == "auto" else None
     return MotionClip(
         Frames(read, len(time), count, dtype),
@@ -106,6 +108,7 @@ def clip_of_steps(
         metadata=said | metadata,
         resource=resource,
         unchanged=unchanged,
+        not_read={"field": moving} if moving else {},
     )
 
 

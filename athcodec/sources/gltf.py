@@ -1,19 +1,21 @@
 """Reads glTF 2.0, .glb or .gltf with its buffers, as positions in world space: skins, animated nodes, morph targets.
 
-Vertices are those of the meshes in the order of the nodes in the scene; a mesh that two nodes show is there twice.
+Vertices are those of the meshes in the order of the nodes in the scene; a mesh that two nodes show is there twice, one
+with EXT_mesh_gpu_instancing as an object of so many copies.
 Frames are evaluated a block at a time; keys of animations and base meshes are held in memory, morph targets are read
 when a frame needs them. Frames lie at `fps`; by default at the rate that the keys were sampled at, else 30 per second.
 Animations that move different nodes run together, of several for the same nodes the first; `only` takes patterns of the
 names of nodes and meshes, and "animation:NAME" for another animation; `takes` makes a clip of its own of each. One
-whose extras say {"loop": true} is a loop, and loses its last frame where that is the first again. Not read: Draco,
-instancing on the GPU, materials, cameras; normals of a mesh that moves.
+whose extras say {"loop": true} is a loop, and loses its last frame where that is the first again. Not read: Draco;
+materials, cameras, lights, other scenes and other attributes, which the clip's `not_read` names; normals of a mesh that
+moves.
 """
 
 from __future__ import annotations
 
 import fnmatch
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from os import PathLike
 from typing import Any
 
@@ -25,8 +27,9 @@ from athcodec.frames import Frames
 from athcodec.joining import join
 from athcodec.sources import ReadOptions
 from athcodec.sources.gltf_file import GltfFile
-from athcodec.sources.gltf_json import brief, entries, entry, integer
-from athcodec.sources.gltf_scene import Scene, key_rate, on_grid
+from athcodec.sources.gltf_json import BROKEN, brief, entries, entry, indices, integer
+from athcodec.sources.gltf_motion import EXTENSION, extension_of
+from athcodec.sources.gltf_scene import Scene, key_rate, on_grid, rotation_matrices
 from athcodec.sources.opening import closing_on_failure, naming
 
 WORK_BYTES = 64 << 20
@@ -36,8 +39,10 @@ KINDS = ("points", "curves", "mesh")  # the last that a node has is what it is
 MODE_KINDS = ("points", "curves", "curves", "curves", "mesh", "mesh", "mesh")
 NAMES = {"TEXCOORD_0": "uv", "COLOR_0": "colors", "NORMAL": "normals"}
 FILLERS = {"colors": 1.0}
+TAKEN = ("POSITION", *NAMES)
 ANIMATION = "animation:"
-_BROKEN = (LookupError, AttributeError, MemoryError, OverflowError, RecursionError, TypeError, ValueError)
+INSTANCING = "EXT_mesh_gpu_instancing"
+INSTANCE_PARTS = {"TRANSLATION": 3, "ROTATION": 4, "SCALE": 3}
 REST_ROUNDING = 1e-6  # of the largest coordinate, by which joints may miss the mesh that they leave as it is
 SAME = 1e-5  # of the size: how far off the end of a loop may be from its beginning
 
@@ -52,7 +57,10 @@ def read_clip(path: str | PathLike[str], options: ReadOptions) -> MotionClip:
     """
     with naming(path):
         file = GltfFile(path)
-    with naming(path, *_BROKEN), closing_on_failure(file), np.errstate(all="ignore"):
+        if extension_of(file.json) is not None:
+            file.close()
+            raise ClipError(f"{EXTENSION}: got a motion of its own, expected one of glTF: decode the file first")
+    with naming(path, *BROKEN), closing_on_failure(file), np.errstate(all="ignore"):
         return _read(file, options)
 
 
@@ -77,6 +85,12 @@ class GltfNode:
     bind: np.ndarray | None = None
     influences: list[tuple[int, np.ndarray, np.ndarray]] = field(default_factory=list)
     strongest: np.ndarray | None = None
+    copies: np.ndarray | None = None  # (k, 4, 4) from each instance to the node
+
+    @property
+    def shape_count(self) -> int:
+        """Vertices of one copy."""
+        return self.count if self.copies is None else self.count // len(self.copies)
 
     @property
     def vertices(self) -> slice:
@@ -86,10 +100,88 @@ class GltfNode:
 def _read(file: GltfFile, options: ReadOptions) -> MotionClip:
     scenes = _scenes(file, options)
     scene = next(iter(scenes.values()))
-    nodes = _chosen(scene, [name for name in options.only if not name.startswith(ANIMATION)])
+    nodes = _chosen(scene, _patterns(options))
     for node in nodes:
         _load(node, scene)
-    motions = {name: _Motion(take, nodes) for name, take in scenes.items()}
+    return _clip(file, scenes, nodes, options, None)
+
+
+def read_moving(file: GltfFile, options: ReadOptions) -> tuple[MotionClip, list[GltfNode], Placement]:
+    """The clip of what moves alone, its nodes, and how they lie in the space of the clip.
+
+    Where nodes or skins leave meshes together as they are stored but for one matrix, the space is that of the meshes:
+    the rest pose has their very numbers. Closes nothing. Raises ClipError.
+    """
+    if not options.takes and len(Scene(file).played) < len(file.items("animations")):
+        options = replace(options, takes="all")
+    with np.errstate(all="ignore"):
+        scenes = _scenes(file, options)
+        scene = next(iter(scenes.values()))
+        moving = [
+            node for node in _chosen(scene, _patterns(options)) if any(_moves(take, node) for take in scenes.values())
+        ]
+        if not moving:
+            raise ClipError("animations: got none that moves vertices, expected skins, nodes or morph targets that do")
+        _number(moving)
+        for node in moving:
+            _load(node, scene)
+            if node.copies is not None:
+                raise ClipError(
+                    f"node {node.name!r}: got {INSTANCING} on a mesh that moves, expected one without: each instance "
+                    "would need vertices of its own"
+                )
+        placement = Placement(list(scenes.values()), moving)
+        return _clip(file, scenes, moving, options, placement.from_world), moving, placement
+
+
+class Placement:
+    """The space of a clip that is the motion of some nodes of a scene: `space` (4, 4) leads from it to the world.
+    `starts` are the seconds at which its takes begin."""
+
+    def __init__(self, scenes: list[Scene], nodes: list[GltfNode]):
+        self._scenes = scenes
+        self.starts = [float(scene.keys[0]) for scene in scenes]
+        self.space = _Motion(scenes[0], nodes).placed(max(nodes, key=self._preference))
+        if not abs(np.linalg.det(self.space[:3, :3])) > 0:
+            self.space = np.eye(4)
+        self.from_world = None if np.array_equal(self.space, np.eye(4)) else np.linalg.inv(self.space)
+        self._motion = _Motion(scenes[0], nodes, self.from_world)
+
+    def _preference(self, node: GltfNode) -> tuple[bool, int]:
+        """The largest mesh keeps its place, of those that can."""
+        hangs = node.skin is None and any(scene.animates({node.index}) for scene in self._scenes)
+        return not hangs, node.count
+
+    def stays(self, index: int) -> bool:
+        """Whether what a node shows lies in this space, at all times."""
+        scene = self._scenes[0]
+        matrix = scene.matrices(scene.ancestors({index}), None)[index][0]
+        off = np.abs(matrix - self.space).max()
+        return off <= REST_ROUNDING * np.abs(self.space).max() and not any(
+            each.animates({index}) for each in self._scenes
+        )
+
+    def turned(self, node: GltfNode, directions: np.ndarray, is_normal: bool) -> np.ndarray:
+        """(n, 3) unit directions at a node's vertices, in this space without animation."""
+        return self._motion.turned(node, directions, is_normal)
+
+
+def _moves(scene: Scene, node: GltfNode) -> bool:
+    """Whether an animation that is played moves its vertices."""
+    joints = [node.index] if node.skin is None else indices(scene.file.item("skins", node.skin), "joints")
+    return scene.morphs(node.index) or scene.animates(set(joints))
+
+
+def _patterns(options: ReadOptions) -> list[str]:
+    """Of the names of nodes and meshes to read."""
+    return [name for name in options.only if not name.startswith(ANIMATION)]
+
+
+def _clip(
+    file: GltfFile, scenes: dict[str, Scene], nodes: list[GltfNode], options: ReadOptions, from_world: np.ndarray | None
+) -> MotionClip:
+    scene = next(iter(scenes.values()))
+    motions = {name: _Motion(take, nodes, from_world) for name, take in scenes.items()}
     motion = next(iter(motions.values()))
     timings = {name: _sampling(take, options.fps) for name, take in motions.items()}
     still = all(len(timing.times) == 1 for timing in timings.values())
@@ -114,6 +206,7 @@ def _read(file: GltfFile, options: ReadOptions) -> MotionClip:
             | _names(nodes)
             | ({} if options.takes else _played(scene)),
             unchanged=file.unchanged,
+            not_read=_not_read(scene, nodes),
             **branches,
         )
         clips[name].rest_given = options.rest == "auto"
@@ -126,6 +219,8 @@ def _rest_pose(motion: _Motion, nodes: Sequence[GltfNode]) -> np.ndarray:
     others who read the file have too: products of matrices round."""
     rest = motion.read(None)[0]
     for node in nodes:
+        if node.copies is not None:
+            continue
         placed = rest[node.vertices]
         with np.errstate(all="ignore"):
             off, size = np.abs(placed - node.base).max(initial=0.0), np.abs(node.base).max(initial=0.0)
@@ -173,13 +268,18 @@ def _chosen(scene: Scene, patterns: Sequence[str]) -> list[GltfNode]:
             if patterns and seen
             else "meshes: got none in the scene, expected at least one"
         )
+    _number(nodes)
+    return nodes
+
+
+def _number(nodes: Sequence[GltfNode]) -> None:
+    """Gives each node its vertices."""
     first = 0
     for node in nodes:
         node.first = first
         first += node.count
     if first > MOST_VERTICES:
         raise ClipError(f"meshes: got {first} vertices, expected at most {MOST_VERTICES}")
-    return nodes
 
 
 def _animations(file: GltfFile, patterns: Sequence[str], what: str) -> dict[str, int]:
@@ -207,8 +307,7 @@ def _animation_numbers(file: GltfFile) -> dict[str, int]:
 
 def _nodes(scene: Scene, index: int, mesh: dict, name: str) -> list[GltfNode]:
     """One per set of vertices: primitives that use the same accessors share theirs."""
-    if "EXT_mesh_gpu_instancing" in (scene.nodes[index].get("extensions") or {}):
-        raise ClipError(f"node {index}: got EXT_mesh_gpu_instancing, expected a node per instance")
+    copies = _copies(scene, index)
     nodes: dict[Any, GltfNode] = {}
     for primitive in entries(mesh, "primitives"):
         attributes = {key: integer(entry(primitive, "attributes"), key) for key in entry(primitive, "attributes")}
@@ -231,7 +330,8 @@ def _nodes(scene: Scene, index: int, mesh: dict, name: str) -> list[GltfNode]:
                 attributes,
                 targets,
                 np.array(weights, np.float64),
-                count=scene.file.count(attributes["POSITION"]),
+                count=scene.file.count(attributes["POSITION"]) * (1 if copies is None else len(copies)),
+                copies=copies,
             )
         node = nodes[key]
         kind = MODE_KINDS[integer(primitive, "mode", 4, stop=7)]
@@ -240,6 +340,63 @@ def _nodes(scene: Scene, index: int, mesh: dict, name: str) -> list[GltfNode]:
     found = list(nodes.values())
     for number, node in enumerate(found[1:], 1):
         node.name = f"{name}.{number}"
+    return found
+
+
+def _extension(item: dict, name: str) -> dict | None:
+    """None where it has not got it."""
+    extensions = item.get("extensions")
+    return entry(extensions, name) if isinstance(extensions, dict) and name in extensions else None
+
+
+def _copies(scene: Scene, index: int) -> np.ndarray | None:
+    """(k, 4, 4) from each instance of EXT_mesh_gpu_instancing to its node; None without."""
+    extension = _extension(scene.nodes[index], INSTANCING)
+    if extension is None:
+        return None
+    if scene.nodes[index].get("skin") is not None:
+        raise ClipError(f"node {index}: got {INSTANCING} of a mesh with a skin, expected one without")
+    own = entry(extension, "attributes")
+    parts = {name: scene.file.floats(integer(own, name)).astype(np.float64) for name in INSTANCE_PARTS if name in own}
+    counts = {len(values) for values in parts.values()}
+    widths = all(values.shape[1] == INSTANCE_PARTS[name] for name, values in parts.items())
+    if len(counts) != 1 or not widths:
+        raise ClipError(
+            f"node {index}: got {INSTANCING} of {sorted(counts)} instances, expected TRANSLATION, ROTATION "
+            "or SCALE of as many"
+        )
+    found = np.tile(np.eye(4), (counts.pop(), 1, 1))
+    if "ROTATION" in parts:
+        found[:, :3, :3] = rotation_matrices(parts["ROTATION"])
+    if "SCALE" in parts:
+        found[:, :3, :3] *= parts["SCALE"][:, None, :]
+    if "TRANSLATION" in parts:
+        found[:, :3, 3] = parts["TRANSLATION"]
+    return found
+
+
+def _not_read(scene: Scene, nodes: Sequence[GltfNode]) -> dict[str, list[str]]:
+    """What else is in the file; of what each node has, by the name of the node."""
+    file, found = scene.file, {}
+
+    def add(kind: str, number: int, item: Any) -> None:
+        name = item.get("name") if isinstance(item, dict) else None
+        found.setdefault(kind, []).append(name if isinstance(name, str) and name else f"{kind.lower()} {number}")
+
+    for kind, items in (("Material", "materials"), ("Camera", "cameras"), ("scene", "scenes")):
+        for number, item in enumerate(file.items(items)):
+            if kind != "scene" or number != file.json.get("scene", 0):
+                add(kind, number, item)
+    for index in scene.order:
+        if _extension(scene.nodes[index], "KHR_lights_punctual") is not None:
+            add("Light", index, scene.nodes[index])
+    for node in nodes:
+        instancing = _extension(scene.nodes[node.index], INSTANCING)
+        own = () if instancing is None else entry(instancing, "attributes")
+        left = [key for key in node.attributes if not key.startswith(("_", "JOINTS_", "WEIGHTS_")) and key not in TAKEN]
+        left += [key for key in own if key not in INSTANCE_PARTS]
+        for key in left:
+            found.setdefault("attribute", []).append(f"{node.name}.{key}")
     return found
 
 
@@ -254,11 +411,11 @@ def _refuse_draco(file: GltfFile, primitive: dict, positions: int) -> None:
 
 def _load(node: GltfNode, scene: Scene) -> None:
     file = scene.file
-    node.base = _triples(file, node.attributes["POSITION"], node.count, "POSITION")
+    node.base = _triples(file, node.attributes["POSITION"], node.shape_count, "POSITION")
     for target in node.targets:
-        if target is not None and file.count(target) != node.count:
+        if target is not None and file.count(target) != node.shape_count:
             raise ClipError(
-                f"mesh {node.name!r}: got a morph target of {file.count(target)} vertices, expected {node.count}"
+                f"mesh {node.name!r}: got a morph target of {file.count(target)} vertices, expected {node.shape_count}"
             )
     if node.skin is None:
         return
@@ -331,8 +488,8 @@ def _load_influences(node: GltfNode, file: GltfFile) -> None:
 class _Motion:
     """Positions of all nodes at any times."""
 
-    def __init__(self, scene: Scene, nodes: list[GltfNode]):
-        self.scene, self._nodes = scene, nodes
+    def __init__(self, scene: Scene, nodes: list[GltfNode], from_world: np.ndarray | None = None):
+        self.scene, self._nodes, self._from_world = scene, nodes, from_world
         self.count = nodes[-1].first + nodes[-1].count
         self.ancestors = scene.ancestors(_movers(nodes))
 
@@ -345,6 +502,8 @@ class _Motion:
             for start in range(0, len(out), step):
                 now = None if times is None else times[start : start + step]
                 matrices = self.scene.matrices(self.ancestors, now)
+                if self._from_world is not None:
+                    matrices = {index: self._from_world @ matrix for index, matrix in matrices.items()}
                 for node in self._nodes:
                     rows = node.vertices
                     out[start : start + step, rows] = self._positions(node, matrices, now)
@@ -354,6 +513,13 @@ class _Motion:
         local = self._morphed(node, times)
         if node.skin is None:
             matrix = matrices[node.index]
+            if node.copies is not None:
+                matrix = (matrix[:, None] @ node.copies).reshape(-1, 4, 4)
+                local = np.repeat(
+                    np.broadcast_to(local, (len(matrices[node.index]), *local.shape[1:])), len(node.copies), axis=0
+                )
+                placed = local @ matrix[:, :3, :3].swapaxes(1, 2) + matrix[:, None, :3, 3]
+                return placed.reshape(-1, node.count, 3)
             return local @ matrix[:, :3, :3].swapaxes(1, 2) + matrix[:, None, :3, 3]
         return self._skinned(node, matrices, local)
 
@@ -366,7 +532,7 @@ class _Motion:
         for column in np.flatnonzero((weights != 0).any(axis=0)):
             if node.targets[column] is not None:
                 rows = np.flatnonzero(weights[:, column])
-                moved = _triples(self.scene.file, node.targets[column], node.count, "morph target")
+                moved = _triples(self.scene.file, node.targets[column], node.shape_count, "morph target")
                 local[rows] += weights[rows, column, None, None] * moved
         return local
 
@@ -380,6 +546,33 @@ class _Motion:
             points *= weights
             out[:, :, vertices] += _product(matrix, points)
         return out.swapaxes(1, 2)
+
+    def placed(self, node: GltfNode) -> np.ndarray:
+        """(4, 4) from a node's mesh to the world, without animation; of a skin, by the joint that counts most."""
+        matrices = self.scene.matrices(self.ancestors, None)
+        if node.skin is None:
+            return matrices[node.index][0]
+        strongest = np.bincount(node.strongest).argmax()
+        return matrices[node.joints[strongest]][0] @ node.bind[strongest]
+
+    def turned(self, node: GltfNode, directions: np.ndarray, is_normal: bool) -> np.ndarray:
+        """(n, 3) directions at a node's vertices, as its joints or it turn them without animation; of length 1."""
+        matrices = self.scene.matrices(self.ancestors, None)
+        linear = np.eye(3) if self._from_world is None else self._from_world[:3, :3]
+
+        def moved(matrix: np.ndarray, given: np.ndarray) -> np.ndarray:
+            matrix = linear @ matrix[:3, :3]
+            return given @ (np.linalg.pinv(matrix) if is_normal else matrix.T)
+
+        if node.skin is None:
+            turned = moved(matrices[node.index][0], directions)
+        else:
+            turned = np.zeros((node.count, 3))
+            for joint, vertices, weights in node.influences:
+                matrix = matrices[node.joints[joint]][0] @ node.bind[joint]
+                turned[vertices] += weights[:, None] * moved(matrix, directions[vertices])
+        length = np.linalg.norm(turned, axis=1, keepdims=True)
+        return turned / np.where(length > 0, length, 1.0)
 
     def normal_matrix(self, node: GltfNode) -> np.ndarray:
         """(3, 3) that turns normals of an unskinned node into the world."""
@@ -481,19 +674,25 @@ def _connections(file: GltfFile, nodes: list[GltfNode]) -> tuple[np.ndarray | No
             mode = integer(primitive, "mode", 4)
             if mode == 0:
                 continue
-            rows = _rows(_corners(file, primitive, node), mode)
-            found[rows.shape[1]].append((rows + node.first).astype(np.int32))
+            rows = _rows(_corners(file, primitive, node.shape_count, f"mesh {node.name!r}"), mode)
+            starts = np.arange(node.first, node.first + node.count, max(node.shape_count, 1))
+            rows = (rows + starts[:, None, None]).reshape(-1, rows.shape[1])
+            found[rows.shape[1]].append(rows.astype(np.int32))
     return tuple(np.concatenate(found[size]) if found[size] else None for size in (3, 2))
 
 
-def _corners(file: GltfFile, primitive: dict, node: GltfNode) -> np.ndarray:
+def triangles(file: GltfFile, primitive: dict, count: int) -> np.ndarray:
+    """(F, 3) a primitive's triangles of its `count` vertices; none where it draws points or lines. Raises ClipError."""
+    mode = integer(primitive, "mode", 4, stop=7)
+    return _rows(_corners(file, primitive, count, "primitive"), mode) if mode >= 4 else np.zeros((0, 3), np.int64)
+
+
+def _corners(file: GltfFile, primitive: dict, count: int, name: str) -> np.ndarray:
     if primitive.get("indices") is None:
-        return np.arange(node.count)
+        return np.arange(count)
     values = file.array(primitive["indices"])
-    if values.shape[1] != 1 or values.dtype.kind != "u" or int(values.max()) >= node.count:
-        raise ClipError(
-            f"mesh {node.name!r}: got indices up to {values.max()}, expected those of {node.count} vertices"
-        )
+    if values.shape[1] != 1 or values.dtype.kind != "u" or int(values.max()) >= count:
+        raise ClipError(f"{name}: got indices up to {values.max()}, expected those of {count} vertices")
     return values[:, 0].astype(np.int64)
 
 
@@ -523,7 +722,9 @@ def _attributes(
 ) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
     """Static arrays over all vertices; nodes that lack one have 0, no number, or white. And branches, where the file
     was written with them."""
-    keep_normals = keep_normals and not any(node.skin is not None or node.weights.any() for node in nodes)
+    keep_normals = keep_normals and not any(
+        node.skin is not None or node.weights.any() or node.copies is not None for node in nodes
+    )
     keys = dict.fromkeys(
         key
         for node in nodes
@@ -539,7 +740,13 @@ def _attributes(
     for name in RESERVED_NAMES & found.keys():
         found[f"{name}_"] = found.pop(name)
     found["part_vertex_counts"] = np.array([node.count for node in nodes], np.int32)
+    if any(node.copies is not None for node in nodes):
+        found["part_copies"] = np.array([_rigid_copies(node) for node in nodes], np.int32)
     return found, branches
+
+
+def _rigid_copies(node: GltfNode) -> int:
+    return 1 if node.copies is None or node.targets else len(node.copies)
 
 
 def _attribute(file: GltfFile, nodes: list[GltfNode], key: str, name: str, motion: _Motion) -> np.ndarray:
@@ -549,13 +756,13 @@ def _attribute(file: GltfFile, nodes: list[GltfNode], key: str, name: str, motio
             index = node.attributes[key]
             plain = key.startswith("_") and not file.item("accessors", index).get("normalized")
             values = file.array(index) if plain else file.floats(index).astype(np.float32)
-            if len(values) != node.count:
-                raise ClipError(f"mesh {node.name!r}: got {len(values)} entries of {key}, expected {node.count}")
+            if len(values) != node.shape_count:
+                raise ClipError(f"mesh {node.name!r}: got {len(values)} entries of {key}, expected {node.shape_count}")
             if key == "NORMAL" and values.shape[1] == 3:
                 turned = values @ motion.normal_matrix(node).T
                 length = np.linalg.norm(turned, axis=1, keepdims=True)
                 values = (turned / np.where(length > 0, length, 1)).astype(np.float32)
-            pieces[number] = values
+            pieces[number] = values if node.copies is None else np.tile(values, (len(node.copies), 1))
     dtype, width = np.result_type(*pieces.values()), max(piece.shape[1] for piece in pieces.values())
     filler = FILLERS.get(name, np.nan if dtype.kind == "f" and key.startswith("_") else 0)
     out = np.full((motion.count, width), filler, dtype)
@@ -585,7 +792,8 @@ def _skin(scene: Scene, nodes: list[GltfNode]) -> Skin | None:
     """The joints, or nodes, that vertices hang on; None where one node moves them all."""
     movers = _movers(nodes)
     order = [joint for joint in scene.order if joint in movers]
-    if len(order) < 2:
+    copied = [node for node in nodes if node.copies is not None]
+    if len(order) < 2 and not copied:
         return None
     place = {joint: number for number, joint in enumerate(order)}
     vertex_joint = np.full(nodes[-1].first + nodes[-1].count, -1, np.int32)
@@ -595,11 +803,13 @@ def _skin(scene: Scene, nodes: list[GltfNode]) -> Skin | None:
             vertex_joint[rows] = place[node.index]
         else:
             vertex_joint[rows] = np.array([place[joint] for joint in node.joints])[node.strongest]
-    return Skin(
-        np.array([_above(scene, joint, place) for joint in order], np.int32),
-        vertex_joint,
-        tuple(scene.name(joint) for joint in order),
-    )
+    parents, names = [_above(scene, joint, place) for joint in order], [scene.name(joint) for joint in order]
+    for node in copied:  # each copy hangs on a joint of its own, below the node
+        own = len(parents) + np.arange(len(node.copies))
+        vertex_joint[node.vertices] = np.repeat(own, node.shape_count)
+        parents += [place[node.index]] * len(own)
+        names += [node.name] * len(own)
+    return Skin(np.array(parents, np.int32), vertex_joint, tuple(names))
 
 
 def _above(scene: Scene, joint: int, place: dict[int, int]) -> int:

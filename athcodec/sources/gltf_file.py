@@ -40,6 +40,8 @@ HARMLESS = (
     "ADOBE_materials_",
     "KHR_mesh_quantization",
     "KHR_animation_pointer",
+    "ATH_motion",
+    "EXT_mesh_gpu_instancing",
     *MESHOPT,
 )
 
@@ -186,6 +188,20 @@ class GltfFile:
         values[rows] = self._strided(changed, values.dtype, values.shape[1], count, f"{where}: sparse values")
         return values
 
+    def binary_chunk(self) -> bytes:
+        """The bytes of the GLB's own buffer; none where it has none."""
+        return self._binary.read(0, self._binary.size) if self._binary is not None else b""
+
+    def part(self, holder: Mapping, key: str) -> tuple[_Bytes, int, int]:
+        """Where the bytes of the buffer view `key` lie: a buffer to `read`, an offset and a size. Raises ClipError."""
+        index = integer(holder, key)
+        view = self.item("bufferViews", index)
+        offset, size = integer(view, "byteOffset", 0), integer(view, "byteLength", low=1)
+        buffer = self._buffer_of(view)
+        if offset + size > buffer.size or any(name in (view.get("extensions") or {}) for name in MESHOPT):
+            raise ClipError(f"bufferView {index}: got one that is compressed or cut off, expected {size} plain bytes")
+        return buffer, offset, size
+
     def _view(self, index: Any, view: Mapping, offset: int, size: int) -> bytes:
         extensions = view.get("extensions") or {}
         for name in MESHOPT:
@@ -203,15 +219,18 @@ class GltfFile:
         return self._unpacked_views[index]
 
     def _slice(self, view: Mapping, offset: int, size: int, where: str) -> bytes:
-        index = integer(view, "buffer")
-        if index not in self._buffers:
-            self._buffers[index] = self._buffer(index)
-        buffer = self._buffers[index]
+        buffer = self._buffer_of(view)
         if offset + size > buffer.size:
             raise ClipError(
                 f"{where}: got bytes {offset} to {offset + size}, expected those of a buffer of {buffer.size}"
             )
         return buffer.read(offset, size)
+
+    def _buffer_of(self, view: Mapping) -> _Bytes:
+        index = integer(view, "buffer")
+        if index not in self._buffers:
+            self._buffers[index] = self._buffer(index)
+        return self._buffers[index]
 
     def _buffer(self, index: int) -> _Bytes:
         buffer = self.item("buffers", index)

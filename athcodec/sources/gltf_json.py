@@ -9,6 +9,9 @@ import numpy as np
 
 from athcodec.errors import ClipError
 
+BROKEN = (LookupError, AttributeError, MemoryError, OverflowError, RecursionError, TypeError, ValueError)
+"""What a reader may stumble on in a file that keeps to no rule."""
+
 
 def entry(holder: Mapping, key: str) -> dict:
     """The object `key` of another. Raises ClipError."""

@@ -232,6 +232,15 @@ class Scene:
         tables = {id(track.times): track.times for track in tracks}
         return np.unique(np.concatenate(list(tables.values()))) if tables else np.zeros(0)
 
+    def animates(self, nodes: set[int]) -> bool:
+        """Whether an animation that is played moves any of these nodes or one above them."""
+        moved = {index for _, grouped, _ in self._groups for index in grouped}
+        return not moved.isdisjoint(self.ancestors(nodes))
+
+    def morphs(self, node: int) -> bool:
+        """Whether an animation that is played changes the weights of a node's mesh."""
+        return (node, "weights") in self._tracks
+
     # ---- evaluation ----
 
     def weights(self, node: int, times: np.ndarray | None, default: np.ndarray) -> np.ndarray:

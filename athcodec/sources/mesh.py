@@ -3,7 +3,8 @@
 OBJ: v (with colours where there are six or seven numbers), vt, f, l, o, g and usemtl; polygons of any size, relative
 indices, lines continued by a backslash. PLY: ascii and binary of both byte orders; vertices with any scalar properties,
 faces with texture coordinates per corner, edges. Not read: normals (they belong to one pose), materials' contents,
-curves and surfaces of OBJ, triangle strips of PLY. A file is read whole, and nothing in it is trusted.
+curves and surfaces of OBJ, triangle strips of PLY; the clip's `not_read` names such statements and elements. A file is
+read whole, and nothing in it is trusted.
 """
 
 from __future__ import annotations
@@ -21,6 +22,10 @@ from athcodec.clip import RESERVED_NAMES, polygons
 from athcodec.errors import ClipError
 
 FLOAT32_DIGITS = 9
+STATEMENT_BYTES = 16  # of a word of OBJ that is not known
+STRIPS = "tristrips"
+PLY_ELEMENTS = ("vertex", "face", "edge")
+FREE_FORM = ("curv", "curv2", "surf")
 HEADER_BYTES = 1 << 16
 PLY_TYPES = {
     "char": "i1",
@@ -51,6 +56,7 @@ class Mesh:
     edges: np.ndarray | None = None
     attributes: dict[str, np.ndarray] = field(default_factory=dict)
     metadata: dict[str, Any] = field(default_factory=dict)
+    not_read: dict[str, list[str]] = field(default_factory=dict)
 
     @property
     def polygons(self) -> tuple[np.ndarray, np.ndarray] | None:
@@ -149,15 +155,17 @@ class _Obj:
         self.face_labels: list[tuple[int, int, int]] = []
         self.element_labels: list[tuple[int, int, Sequence[int]]] = []  # of lines and points
         self.point_objects: list[int] = []
+        self.not_read: dict[bytes, None] = {}
 
     def line(self, line: bytes) -> None:
         """Take the next line. Raises ClipError."""
         words = line.split()
         if not words:
             return
-        take = getattr(self, f"_{words[0].decode('ascii', 'replace')}", None) if words[0] in _OBJ_WORDS else None
-        if take is not None:
-            take(words[1:])
+        if words[0] in _OBJ_WORDS:
+            getattr(self, f"_{words[0].decode('ascii')}")(words[1:])
+        elif words[0].isalpha():
+            self.not_read[words[0][:STATEMENT_BYTES]] = None
 
     def _v(self, words: Sequence[bytes]) -> None:
         self.points.append(words)
@@ -230,6 +238,8 @@ def parse_obj(data: bytes) -> Mesh:
         mesh.edges = _checked("lines", np.array(file.edges, np.int64).reshape(-1), count).reshape(-1, 2)
     if colors is not None:
         mesh.attributes["colors"] = colors
+    for word in map(_text, ([word] for word in file.not_read)):
+        mesh.not_read.setdefault("curve or surface" if word in FREE_FORM else "statement", []).append(word)
     _add_face_rows(mesh)
     _add_obj_uv(mesh, file)
     _add_obj_names(mesh, file)
@@ -531,6 +541,9 @@ def parse_ply(data: bytes) -> Mesh:
     if {"vertex1", "vertex2"} <= edges.keys():
         ends = np.stack([edges["vertex1"], edges["vertex2"]], axis=1).astype(np.int64)
         mesh.edges = _checked("edges", ends.reshape(-1), len(mesh.points)).reshape(-1, 2)
+    others = [element.name for element in header.elements if element.name not in PLY_ELEMENTS and element.count]
+    for name in others:
+        mesh.not_read.setdefault(STRIPS if name == STRIPS else "element", []).append(name)
     return mesh
 
 

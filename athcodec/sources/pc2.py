@@ -74,6 +74,7 @@ def open_cache(path: str | PathLike[str], options: ReadOptions, read_header: Any
         return MotionClip(
             **fields,
             metadata=metadata,
+            not_read=mesh.not_read,
             faces=mesh.faces,
             edges=mesh.edges,
             attributes=mesh.attributes,

@@ -19,6 +19,7 @@ from athcodec.errors import ClipError
 from athcodec.frames import Frames
 from athcodec.sources import ReadOptions
 
+MOST_VERTICES = 1 << 27  # of copies
 MAX_METADATA_BYTES = 1 << 24
 DESCRIPTOR = ".descriptor"  # behind the name of an array's property in an Alembic file: that of its ArrayDescriptor
 OWN = "athcodec"  # the namespace of what our writers add to files of other formats
@@ -49,6 +50,9 @@ class SceneObject:
     face_indices: np.ndarray = field(default_factory=lambda: np.empty(0, np.int32))
     curve_counts: np.ndarray | None = None
     details: dict[str, str] = field(default_factory=dict)
+    copies: int = 1  # its vertices are so many copies of one shape, one after the other
+    is_rigid: bool = True  # the shape of the copies stays as it is
+    left_out: list[str] = field(default_factory=list)  # names of arrays that do not fit
     statics: dict[str, Static] = field(default_factory=dict)
     is_still: bool = False  # neither its points nor its place change
     still: np.ndarray | None = None  # its positions then, once they have been read
@@ -79,7 +83,10 @@ class SceneObject:
 
     def keep(self, name: str, domain: str | None, values: np.ndarray | None) -> None:
         """Keeps a static array where its rows fit; a row per curve becomes one per vertex."""
-        if values is None or domain is None or name in self.statics or domain == "constant" and len(values) != 1:
+        if name in self.statics:
+            return
+        if values is None or domain is None or domain == "constant" and len(values) != 1:
+            self.left_out.append(name)
             return
         if domain == "face" and self.curve_counts is not None and len(values) == len(self.curve_counts):
             domain, values = "vertex", np.repeat(values, self.curve_counts, axis=0)
@@ -87,6 +94,29 @@ class SceneObject:
             domain = "constant"
         if len(values) == self.rows(domain):
             self.statics[name] = Static(domain, values)
+        else:
+            self.left_out.append(name)
+
+    def repeat(self, copies: int) -> None:
+        """Makes so many copies, one after the other, of what it is. They have no rest pose but where they are. Raises
+        ClipError for more vertices than make sense."""
+        if self.count * copies > MOST_VERTICES:
+            raise ClipError(
+                f"{self.path}: got {copies} copies of {self.count} vertices, expected {MOST_VERTICES} at most"
+            )
+        shift = np.repeat(np.arange(copies, dtype=np.int32) * np.int32(self.count), len(self.face_indices))
+        self.face_indices = np.tile(self.face_indices, copies) + shift
+        self.face_counts = np.tile(self.face_counts, copies)
+        if self.curve_counts is not None:
+            self.curve_counts = np.tile(self.curve_counts, copies)
+        self.statics = {
+            name: static
+            if static.domain == "constant"
+            else Static(static.domain, np.concatenate([static.values] * copies))
+            for name, static in self.statics.items()
+            if name != "rest"
+        }
+        self.count, self.copies = self.count * copies, copies
 
     def turn_normals(self, matrix: np.ndarray, moves: bool) -> None:
         """Transforms normals to world space; removes them where they turn in time, or have no direction there."""
@@ -146,9 +176,12 @@ def clip_of_objects(
     known = _fields(attributes, domains)
     rest, links = known.pop("rest", None), known.pop("edges", None)
     polygons = _faces(objects, attributes)
+    left_out = [f"{obj.path}.{name}" for obj in objects for name in obj.left_out if name not in options.skip]
+    not_read = more.pop("not_read", {}) | ({"attribute": left_out} if left_out else {})
     return MotionClip(
         frames,
         time,
+        not_read=not_read,
         rest=rest if options.rest == "auto" else None,
         rest_pose="mean" if options.rest == "mean" else "first",
         edges=_edges(objects) if links is None else links,
@@ -170,6 +203,7 @@ def frames_of_objects(
     """Positions of all objects in world space, frame by frame.
 
     sample(object, frame) gives its points (n, 3) and the (4, 4) matrix, for row vectors, that takes them to the world;
+    of copies the points of one and (copies, 4, 4) matrices;
     frame_name is how errors name a frame; frames are read inside `context()`.
     """
     count = sum(obj.count for obj in objects)
@@ -178,10 +212,10 @@ def frames_of_objects(
         if obj.still is not None:
             return obj.still
         points, matrix = sample(obj, frame)
-        if len(points) != obj.count:
+        if len(points) * obj.copies != obj.count:
             raise ClipError(
-                f"{obj.path}: got {len(points)} points in {frame_name(frame)}, expected {obj.count} as in "
-                "the first frame"
+                f"{obj.path}: got {len(points)} points in {frame_name(frame)}, expected {obj.count // obj.copies} as "
+                "in the first frame"
             )
         points = transformed(points, matrix)
         if obj.is_still:
@@ -200,7 +234,9 @@ def frames_of_objects(
 
 
 def transformed(points: np.ndarray, matrix: np.ndarray) -> np.ndarray:
-    """(n, 3) points by a (4, 4) matrix for row vectors, as float32."""
+    """(n, 3) points by a (4, 4) matrix for row vectors, as float32; by (k, 4, 4) k times, one after the other."""
+    if matrix.ndim == 3:
+        return (points @ matrix[:, :3, :3] + matrix[:, 3:, :3]).astype(np.float32).reshape(-1, 3)
     if np.array_equal(matrix, np.eye(4)):
         return points
     return (points @ matrix[:3, :3] + matrix[3, :3]).astype(np.float32)
@@ -248,6 +284,9 @@ def _joined_statics(objects: list[SceneObject], skip: Collection[str]) -> tuple[
                 domains[name] = array.domain
     attributes["part_vertex_counts"] = np.array([obj.count for obj in objects], np.int32)
     domains["part_vertex_counts"] = "constant"
+    if any(obj.copies > 1 for obj in objects):
+        attributes["part_copies"] = np.array([obj.copies if obj.is_rigid else 1 for obj in objects], np.int32)
+        domains["part_copies"] = "constant"
     if any(obj.curve_counts is not None for obj in objects):
         attributes["curve_vertex_counts"] = np.concatenate(
             [obj.curve_counts for obj in objects if obj.curve_counts is not None]

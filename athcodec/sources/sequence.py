@@ -120,6 +120,7 @@ def read_clip(path: str | PathLike[str], options: ReadOptions) -> MotionClip:
             edges=mesh.edges,
             attributes=attributes,
             metadata=mesh.metadata | metadata,
+            not_read=mesh.not_read,
             rest_pose="mean" if options.rest == "mean" else "first",
             unchanged=reader.unchanged,
         )

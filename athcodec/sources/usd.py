@@ -2,20 +2,21 @@
 
 Every visible prim of the kinds Mesh, BasisCurves, NurbsCurves, HermiteCurves and Points with the purpose "default" or
 "render" is read, also inside instances, into world space: time samples (interpolated as USD does), transforms, and of
-UsdSkel the skinning and the blend shapes. The frames are the whole time codes of the stage's range where it has one,
-else the time codes that have samples; options.fps sets another rate. Static primvars become attributes.
+UsdSkel the skinning and the blend shapes. Each such prim in a prototype of a PointInstancer becomes one object, of as
+many copies as the instancer shows at any time. The frames are the whole time codes of the stage's range where it has
+one, else the time codes that have samples; options.fps sets another rate. Static primvars become attributes.
 
 Points are float32 in USD and so they are here. The stage is opened as it is composed (layers, payloads, value clips);
-what a layer needs and cannot be found is one warning each. Point instancers, patches, tetrahedra, materials and
-velocities are not read. A stage is opened by its structure; positions are read frame by frame. USD trusts the
-lengths of arrays in a binary file even where it is damaged: read files that are not trusted under a limit of memory.
+what else it holds, such as layers that cannot be found, patches, tetrahedra, materials, is named in the clip's
+`not_read`; velocities are not read. A stage is opened by its structure; positions are read frame by frame. USD trusts
+the lengths of arrays in a binary file even where it is damaged: read files that are not trusted under a limit of
+memory.
 """
 
 from __future__ import annotations
 
 import math
 import os
-import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -44,6 +45,10 @@ from athcodec.sources.scene_objects import (
 from athcodec.units import METRES
 
 MAX_FRAMES = 1 << 24
+READ = frozenset(("", "Xform", "Scope", "SkelRoot", "Skeleton", "SkelAnimation", "BlendShape"))  # what is no loss
+WHOLE = ("Material",)  # prims that are named without those below them
+KNOWN = ("Material", "Camera", "GeomSubset")
+PLACES = ("positions", "orientations", "orientationsf", "scales")
 PURPOSES = (UsdGeom.Tokens.default_, UsdGeom.Tokens.render)
 NAMES = {"st": "uv", "displayColor": "colors"}
 DOMAINS = {"vertex": "vertex", "varying": "vertex", "faceVarying": "corner", "uniform": "face", "constant": "constant"}
@@ -94,8 +99,7 @@ class _Stage:
         self.stage = Usd.Stage.Open(path)
         if not self.stage:
             raise ClipError("stage: cannot be opened")
-        for error in self.stage.GetCompositionErrors():
-            warnings.warn(f"{path}: {' '.join(str(error).split())}", stacklevel=4)
+        self.errors = [" ".join(str(error).split()) for error in self.stage.GetCompositionErrors()]
         files = [layer.realPath for layer in self.stage.GetUsedLayers() if os.path.isfile(layer.realPath)]
         self.unchanged = FileWatch(*files)
 
@@ -117,22 +121,26 @@ class _Prim(SceneObject):
     prim: Usd.Prim = None
     points: Usd.AttributeQuery = None
     skeleton: _Skeleton | None = None
+    instances: _Instances | None = None
     moves: bool = False  # its transforms do, or a skeleton moves it
 
 
 def _clip(source: _Stage, options: ReadOptions) -> MotionClip:
     stage = source.stage
     layer = own_metadata(stage.GetRootLayer().customLayerData.get(OWN))
-    objects = _find_objects(stage, options.only)
-    skins = _bind_skeletons(stage, objects)
+    not_read: dict[str, list[str]] = {"missing": source.errors} if source.errors else {}
+    objects = _find_objects(stage, options.only, not_read)
+    skins = _bind_skeletons(stage, objects, not_read)
     codes, rate = _time_codes(stage, objects, options.fps, layer.pop("irregular", False))
-    objects = _visible(objects, codes)
+    objects = _visible(objects, codes, not_read)
     _measure(objects, codes)
     cache = UsdGeom.XformCache()
 
     def sample(obj: _Prim, frame: int) -> tuple[np.ndarray, np.ndarray]:
         points, space = _points(obj, codes, frame), obj.prim if obj.skeleton is None else obj.skeleton.space
         cache.SetTime(codes[frame])
+        if obj.instances is not None:
+            return points, obj.instances.matrices(cache, obj.prim, codes[frame])
         return points, np.array(cache.GetLocalToWorldTransform(space))
 
     frames = frames_of_objects(objects, len(codes), sample, lambda frame: _frame_name(codes, frame), source.reading)
@@ -146,31 +154,142 @@ def _clip(source: _Stage, options: ReadOptions) -> MotionClip:
         resource=source,
         unchanged=source.unchanged,
         skin=_skin(objects, skins),
+        not_read=not_read,
     )
 
 
 # ---- prims ----
 
 
-def _find_objects(stage: Usd.Stage, only: Sequence[str]) -> list[_Prim]:
+def _find_objects(stage: Usd.Stage, only: Sequence[str], not_read: dict[str, list[str]]) -> list[_Prim]:
+    """All with points. What has none, or is no object, is added to not_read by the name of its type."""
     objects = []
     prims = iter(Usd.PrimRange(stage.GetPseudoRoot(), Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate)))
     for prim in prims:
         if prim.IsA(UsdGeom.PointInstancer):
             prims.PruneChildren()
+            objects += _instanced(UsdGeom.PointInstancer(prim), only, not_read)
             continue
-        kind = _kind(prim)
-        if kind is None or not _wanted(prim, only) or UsdGeom.Imageable(prim).ComputePurpose() not in PURPOSES:
-            continue
-        points = Usd.AttributeQuery(UsdGeom.PointBased(prim).GetPointsAttr())
-        if points.HasAuthoredValue():
-            objects.append(_Prim(kind, prim.GetName(), str(prim.GetPath()), prim=prim, points=points))
+        obj = _object(prim, only, not_read)
+        if obj is not None:
+            objects.append(obj)
+        if prim.GetTypeName() in WHOLE:
+            prims.PruneChildren()
     if not objects:
         what = f" named like {', '.join(only)}" if only else ""
         raise ClipError(
             f"prims: got none with points{what}, expected a visible Mesh, BasisCurves, NurbsCurves or Points"
         )
     return objects
+
+
+def _object(prim: Usd.Prim, only: Sequence[str], not_read: dict[str, list[str]]) -> _Prim | None:
+    kind, path = _kind(prim), str(prim.GetPath())
+    if kind is None:
+        if prim.GetTypeName() not in READ:
+            not_read.setdefault(_kind_not_read(prim), []).append(path)
+        return None
+    if not _wanted(prim, only):
+        return None
+    points = Usd.AttributeQuery(UsdGeom.PointBased(prim).GetPointsAttr())
+    if UsdGeom.Imageable(prim).ComputePurpose() not in PURPOSES:
+        not_read.setdefault("hidden", []).append(path)
+    elif points.HasAuthoredValue():
+        return _Prim(kind, prim.GetName(), path, prim=prim, points=points)
+    else:
+        not_read.setdefault("empty", []).append(path)
+    return None
+
+
+def _kind_not_read(prim: Usd.Prim) -> str:
+    if prim.HasAPI("LightAPI"):
+        return "Light"
+    return str(prim.GetTypeName()) if prim.IsA(UsdGeom.Boundable) or prim.GetTypeName() in KNOWN else "other"
+
+
+def _instanced(
+    instancer: UsdGeom.PointInstancer, only: Sequence[str], not_read: dict[str, list[str]]
+) -> Iterator[_Prim]:
+    """What is in the prototypes of a PointInstancer, each as often as the instancer has it."""
+    path = instancer.GetPath()
+    indices = _array(instancer.GetProtoIndicesAttr().Get(Usd.TimeCode.EarliestTime()), np.int64)
+    if UsdGeom.Imageable(instancer).ComputePurpose() not in PURPOSES:
+        not_read.setdefault("hidden", []).append(str(path))
+        return
+    for number, target in enumerate(instancer.GetPrototypesRel().GetForwardedTargets()):
+        rows, prototype = np.flatnonzero(indices == number), instancer.GetPrim().GetStage().GetPrimAtPath(target)
+        if not len(rows) or not prototype:
+            continue
+        prims = iter(Usd.PrimRange(prototype, Usd.TraverseInstanceProxies(Usd.PrimIsActive & Usd.PrimIsLoaded)))
+        for prim in prims:
+            if prim.IsA(UsdGeom.PointInstancer):
+                not_read.setdefault("PointInstancer inside a PointInstancer", []).append(str(prim.GetPath()))
+                prims.PruneChildren()
+                continue
+            if prim.GetTypeName() in WHOLE:
+                prims.PruneChildren()
+            wanted = only if not _wanted(instancer.GetPrim(), only) else ()
+            obj = _object(prim, wanted, not_read)
+            if obj is not None:
+                obj.path = f"{path}:{obj.path.removeprefix(f'{path}/')}"
+                obj.instances = _Instances(instancer, prototype, rows)
+                yield obj
+
+
+class _Instances:
+    """The copies of one prototype that a PointInstancer has: `rows` of its arrays."""
+
+    def __init__(self, instancer: UsdGeom.PointInstancer, prototype: Usd.Prim, rows: np.ndarray):
+        self.instancer, self.prototype, self.rows = instancer, prototype, rows
+
+    @property
+    def attributes(self) -> list[Usd.Attribute]:
+        """Those that say which instances there are, and where."""
+        prim = self.instancer.GetPrim()
+        return [prim.GetAttribute(name) for name in PLACES if prim.HasAttribute(name)]
+
+    def keep_visible(self, codes: np.ndarray) -> None:
+        """Leaves out those that are not shown at any time. Raises ClipError where their number changes."""
+        indices = self.instancer.GetProtoIndicesAttr()
+        times = {float(codes[0])}
+        for attribute in (indices, self.instancer.GetInvisibleIdsAttr()):
+            times.update(time for time in attribute.GetTimeSamples() if codes[0] <= time <= codes[-1])
+        first = _array(indices.Get(codes[0]), np.int64)
+        shown = np.zeros(len(first), bool)
+        for time in sorted(times):
+            if not np.array_equal(_array(indices.Get(time), np.int64), first):
+                frame = min(int(np.searchsorted(codes, time - 1e-9)), len(codes) - 1)
+                raise ClipError(
+                    f"{self.instancer.GetPath()}: protoIndices changes in frame {frame} (time code {time:g}), expected "
+                    "the same instances in all"
+                )
+            mask = self.instancer.ComputeMaskAtTime(time)
+            shown |= np.array(mask, bool) if len(mask) else True
+        self.rows = self.rows[shown[self.rows]]
+
+    def matrices(self, cache: UsdGeom.XformCache, prim: Usd.Prim, code: float) -> np.ndarray:
+        """(copies, 4, 4) from a prim of the prototype to the world, at the time of the cache."""
+        found = self.instancer.ComputeInstanceTransformsAtTime(
+            code, code, UsdGeom.PointInstancer.IncludeProtoXform, UsdGeom.PointInstancer.IgnoreMask
+        )
+        placed = np.array(found).reshape(-1, 4, 4)
+        if len(placed) <= self.rows.max(initial=-1):
+            raise ClipError(
+                f"{self.instancer.GetPath()}: got {len(placed)} positions at time code {code:g}, expected more"
+            )
+        inner = np.array(cache.ComputeRelativeTransform(prim, self.prototype)[0])
+        return inner @ placed[self.rows] @ np.array(cache.GetLocalToWorldTransform(self.instancer.GetPrim()))
+
+    def add_arrays(self, obj: _Prim, code: float) -> None:
+        """Adds the static arrays that the instancer has for each of its copies."""
+        for primvar in UsdGeom.PrimvarsAPI(self.instancer).GetPrimvarsWithValues():
+            name, values = str(primvar.GetPrimvarName()), _numbers(primvar.ComputeFlattened(code))
+            if values is None or primvar.ValueMightBeTimeVarying() or len(values) <= self.rows.max(initial=-1):
+                obj.left_out.append(name)
+            elif NAMES.get(name, name) not in obj.statics:
+                obj.left_out = [other for other in obj.left_out if other != NAMES.get(name, name)]
+                spread = np.repeat(values[self.rows], obj.count // obj.copies, axis=0)
+                obj.keep(NAMES.get(name, name), "vertex", spread)
 
 
 def _kind(prim: Usd.Prim) -> str | None:
@@ -191,7 +310,14 @@ def _lineage(prim: Usd.Prim) -> Iterator[Usd.Prim]:
         prim = prim.GetParent()
 
 
-def _visible(objects: list[_Prim], codes: np.ndarray) -> list[_Prim]:
+def _all_above(obj: _Prim) -> Iterator[Usd.Prim]:
+    """The prims whose transforms place an object."""
+    yield from _lineage(obj.prim)
+    if obj.instances is not None:
+        yield from _lineage(obj.instances.instancer.GetPrim())
+
+
+def _visible(objects: list[_Prim], codes: np.ndarray, not_read: dict[str, list[str]]) -> list[_Prim]:
     """Those that are visible at some time from the first frame to the last."""
 
     def seen(prim: Usd.Prim) -> bool:
@@ -202,7 +328,15 @@ def _visible(objects: list[_Prim], codes: np.ndarray) -> list[_Prim]:
         image = UsdGeom.Imageable(prim)
         return any(image.ComputeVisibility(time) != UsdGeom.Tokens.invisible for time in times)
 
-    left = [obj for obj in objects if seen(obj.prim)]
+    left = []
+    for obj in objects:
+        if obj.instances is not None:
+            obj.instances.keep_visible(codes)
+        place = obj.prim if obj.instances is None else obj.instances.instancer.GetPrim()
+        if seen(place) and (obj.instances is None or len(obj.instances.rows)):
+            left.append(obj)
+        else:
+            not_read.setdefault("hidden", []).append(obj.path)
     if not left:
         raise ClipError(f"prims: got {len(objects)} that are invisible, expected a visible one")
     return left
@@ -214,14 +348,21 @@ def _measure(objects: list[_Prim], codes: np.ndarray) -> None:
     for obj in objects:
         points = _points(obj, codes, 0)
         obj.first, obj.count = first, len(points)
-        first += obj.count
         obj.moves = obj.skeleton is not None or any(
             prim.IsA(UsdGeom.Xformable) and UsdGeom.Xformable(prim).TransformMightBeTimeVarying()
-            for prim in _lineage(obj.prim)
+            for prim in _all_above(obj)
         )
-        obj.is_still = not obj.moves and not obj.points.ValueMightBeTimeVarying()
+        if obj.instances is not None:
+            obj.moves |= any(attribute.ValueMightBeTimeVarying() for attribute in obj.instances.attributes)
+        obj.is_rigid = not obj.points.ValueMightBeTimeVarying()
+        obj.is_still = not obj.moves and obj.is_rigid
         _topology(obj, codes)
         _statics(obj, codes, np.array(cache.GetLocalToWorldTransform(obj.prim)))
+        if obj.instances is not None:
+            obj.statics.pop("normals", None)  # they turn with each copy
+            obj.repeat(len(obj.instances.rows))
+            obj.instances.add_arrays(obj, codes[0])
+        first += obj.count
     if first == 0:
         raise ClipError("points: got none, expected at least one")
 
@@ -299,8 +440,10 @@ def _sampled(objects: list[_Prim]) -> list[float]:
     found: set[float] = set()
     for obj in objects:
         found.update(obj.points.GetTimeSamples())
-        prims = [obj.prim] if obj.skeleton is None else [obj.prim, obj.skeleton.query.GetPrim()]
-        for prim in (ancestor for one in prims for ancestor in _lineage(one)):
+        prims = [*_all_above(obj), *(() if obj.skeleton is None else _lineage(obj.skeleton.query.GetPrim()))]
+        for attribute in () if obj.instances is None else obj.instances.attributes:
+            found.update(attribute.GetTimeSamples())
+        for prim in prims:
             if prim.IsA(UsdGeom.Xformable):
                 found.update(UsdGeom.Xformable(prim).GetTimeSamples())
         if obj.skeleton is not None and obj.skeleton.animation:
@@ -326,7 +469,9 @@ def _metadata(stage: Usd.Stage, codes: np.ndarray, rate: float) -> dict[str, Any
 
 def _statics(obj: _Prim, codes: np.ndarray, matrix: np.ndarray) -> None:
     for primvar in UsdGeom.PrimvarsAPI(obj.prim).FindPrimvarsWithInheritance():
-        if primvar.HasValue() and not primvar.ValueMightBeTimeVarying():
+        if primvar.HasValue() and primvar.ValueMightBeTimeVarying():
+            obj.left_out.append(primvar.GetPrimvarName())
+        elif primvar.HasValue():
             values = primvar.ComputeFlattened(codes[0])
             name = _said(primvar.GetAttr(), "name") or primvar.GetPrimvarName()
             _keep(
@@ -487,11 +632,15 @@ class _Skeleton:
         return np.where(weights[rows] > 0, chosen, -1).astype(np.int32)
 
 
-def _bind_skeletons(stage: Usd.Stage, objects: list[_Prim]) -> list[UsdSkel.SkeletonQuery]:
+def _bind_skeletons(
+    stage: Usd.Stage, objects: list[_Prim], not_read: dict[str, list[str]]
+) -> list[UsdSkel.SkeletonQuery]:
     by_path = {obj.prim.GetPath(): obj for obj in objects}
     predicate = Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate)
-    queries = []
+    queries, animations = [], {}
     for prim in Usd.PrimRange(stage.GetPseudoRoot(), predicate):
+        if prim.IsA(UsdSkel.Animation):
+            animations[prim.GetPath()] = str(prim.GetPath())
         if not prim.IsA(UsdSkel.Root):
             continue
         root, cache = UsdSkel.Root(prim), UsdSkel.Cache()
@@ -502,7 +651,15 @@ def _bind_skeletons(stage: Usd.Stage, objects: list[_Prim]) -> list[UsdSkel.Skel
             for target in binding.GetSkinningTargets():
                 obj = by_path.get(target.GetPrim().GetPath())
                 if obj is not None and query and (target.HasJointInfluences() or target.HasBlendShapes()):
+                    if obj.instances is not None:
+                        not_read.setdefault("Skeleton of an instance", []).append(obj.path)
+                        continue
                     obj.skeleton = _Skeleton(query, target)
+    for _, query in queries:
+        if query.GetAnimQuery():
+            animations.pop(query.GetAnimQuery().GetPrim().GetPath(), None)
+    if animations:
+        not_read["SkelAnimation"] = list(animations.values())
     return queries
 
 

@@ -2,13 +2,15 @@
 
 The frames go to a temporary file first, uncompressed: Blender evaluates each once, the encoder reads them twice.
 Branches come from the vertex attribute vertex_branch, with the mesh's property ath_branch_parent, where both are there
-(an imported mesh has them), else athcodec finds them, by the armature if there is one.
+(an imported mesh has them), else athcodec finds them, by the armature if there is one. That takes scipy, which Blender
+has not got: without it the pieces of the mesh are the branches, and files are larger.
 """
 
 # ruff: noqa: F722, F821 -- Blender's properties are annotations
 
 import math
 import tempfile
+from importlib.util import find_spec
 
 import bpy
 import numpy as np
@@ -87,6 +89,7 @@ def write_object(
 ):
     """Compress the frames of the scene; returns athcodec's Summary. Raises athcodec's errors, OSError."""
     import athcodec
+    from athcodec import discovery
 
     scene = context.scene
     before = scene.frame_current_final
@@ -95,6 +98,8 @@ def write_object(
     try:
         with tempfile.TemporaryFile() as spool:
             clip = _clip(context, obj, spool, world, lambda done: manager.progress_update(done / 2))
+            if not clip.has_branches and find_spec("scipy") is None:
+                clip = discovery.with_branches(clip, discovery.pieces(clip))
             return athcodec.encode(
                 clip,
                 bpy.path.abspath(path),

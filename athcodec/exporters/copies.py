@@ -1,0 +1,93 @@
+"""Objects that are copies of one shape, as that shape and what places each copy: for formats that have instances.
+
+The shape is the first copy's at rest, about its middle and along its principal axes; a copy is placed by a translation,
+a rotation and three scales, fitted frame by frame (fitting.py). How far that is off is measured on every vertex. It
+knows no file format.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+from athcodec.exporters.fitting import Parts, Placed, allowed_error, portions
+from athcodec.exporters.scene_objects import SceneObject
+
+
+@dataclass(eq=False)
+class Copies:
+    """shape (m, 3); of k copies in T frames places (T, k, 3), turns (T, k, 4), quaternions x y z w whose signs run on,
+    scales (T, k, 3), all float32; and the largest distance of a vertex from where it was to be."""
+
+    shape: np.ndarray
+    places: np.ndarray
+    turns: np.ndarray
+    scales: np.ndarray
+    max_error: float
+
+
+def fit_copies(motion: Any, objects: list[SceneObject]) -> dict[int, Copies]:
+    """Of those objects that are copies, and that transforms keep within what the level is off, by their place in the
+    list."""
+    allowed = allowed_error(motion)
+    fits = {number: _Fit(motion, obj) for number, obj in enumerate(objects) if obj.copies > 1 and obj.count}
+    for start, frames in portions(motion, motion.vertex_count) if fits else ():
+        for fit in fits.values():
+            fit.add(start, frames)
+    return {number: fit.found for number, fit in fits.items() if fit.found.max_error <= allowed}
+
+
+def cost_of(instanced: dict[int, Copies]) -> dict[str, Any]:
+    """What a writer says of its instances."""
+    if not instanced:
+        return {}
+    error = max(copies.max_error for copies in instanced.values())
+    return {
+        "animation": "instances",
+        "instances": sum(copies.places.shape[1] for copies in instanced.values()),
+        "max_error": error,
+    }
+
+
+def one_copy(obj: SceneObject) -> SceneObject:
+    """The first copy as an object of its own."""
+    (counts, indices), copies = obj.faces, obj.copies
+    faces = counts[: len(counts) // copies], indices[: len(indices) // copies]
+    return replace(obj, count=obj.count // copies, faces=faces, curves=obj.curves[: len(obj.curves) // copies])
+
+
+def rows_of_one(rows: np.ndarray, obj: SceneObject) -> np.ndarray | None:
+    """The rows of the first copy, of those of a static array; None where others have other ones."""
+    each = rows.reshape(obj.copies, -1, *rows.shape[1:])
+    return each[0] if (each == each[:1]).all() else None
+
+
+class _Fit:
+    """The copies of one object, fitted as the frames come."""
+
+    def __init__(self, motion: Any, obj: SceneObject):
+        self._rows, count = obj.vertices, obj.count // obj.copies
+        rest = np.asarray(motion.rest, np.float64)[obj.first : obj.first + count]
+        part = Parts.over(np.arange(count), np.zeros(1, np.int64), np.array([count]), rest)
+        self._shape = ((rest - part.middle[0]) @ part.axes[0]).astype(np.float32)
+        self._local = self._shape.astype(np.float64)
+        spread = np.tile((self._local**2).mean(axis=0), (obj.copies, 1))
+        self._solver = Placed(SimpleNamespace(spread=spread, axes=np.tile(part.axes[0], (obj.copies, 1, 1))))
+        room = (motion.frame_count, obj.copies)
+        values = (np.empty((*room, width), np.float32) for width in (3, 4, 3))
+        self.found = Copies(self._shape, *values, 0.0)
+
+    def add(self, start: int, frames: np.ndarray) -> None:
+        """Fits the next frames."""
+        found = self.found
+        copies, count = found.places.shape[1], len(self._local)
+        points = frames[:, self._rows].astype(np.float64).reshape(len(frames), copies, count, 3)
+        middle = points.mean(axis=2)
+        for frame, (away, place) in enumerate(zip(points - middle[:, :, None], middle), start):
+            linear, (turns, scales) = self._solver(np.einsum("kmi,mj->kij", away, self._local) / count)
+            found.places[frame], found.turns[frame], found.scales[frame] = place, turns, scales
+            square = ((away - self._local @ linear.swapaxes(1, 2)) ** 2).sum(axis=2)
+            found.max_error = max(found.max_error, float(np.sqrt(square.max())))

@@ -1,0 +1,68 @@
+"""A motion as UsdSkel: what athcodec/exporters/rig.py finds, as a Skeleton, a SkelAnimation for each clip, and weights.
+
+The skeleton plays the first clip; others are there by their names, for programs that choose among them. Meshes stand in
+the rest pose.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from pxr import Gf, Tf, Usd, UsdSkel, Vt
+
+from athcodec.exporters.gltf_joints import Joints
+from athcodec.exporters.scene_objects import SceneObject, distinct
+
+SKELETON, ROOT_PRIM = "skeleton", "/clip"
+
+
+def write_rig(stage: Usd.Stage, motion: Any, joints: Joints, objects: list[SceneObject], codes: np.ndarray) -> None:
+    """Adds the skeleton, its animations, and what binds the objects' targets to it. codes: of all frames, (T,), which
+    begin again with each clip."""
+    skeleton = UsdSkel.Skeleton.Define(stage, f"{ROOT_PRIM}/{SKELETON}")
+    paths = _paths(joints)
+    skeleton.CreateJointsAttr(paths)
+    skeleton.CreateBindTransformsAttr([Gf.Matrix4d(np.linalg.inv(bind).T) for bind in joints.bind.astype(np.float64)])
+    skeleton.CreateRestTransformsAttr([_shifted(place) for place in joints.rest[0].tolist()])
+    names = distinct(Tf.MakeValidIdentifier(clip.name or "motion") for clip in motion.clip_ranges) or ["motion"]
+    for name, (start, stop) in zip(names, motion.clip_range_frames):
+        animation = UsdSkel.Animation.Define(stage, f"{ROOT_PRIM}/{SKELETON}/{name}")
+        _animate(animation, paths, [pose[start:stop] for pose in joints.poses], codes[start:stop])
+    binding = UsdSkel.BindingAPI.Apply(skeleton.GetPrim())
+    binding.CreateAnimationSourceRel().SetTargets([f"{ROOT_PRIM}/{SKELETON}/{names[0]}"])
+    for obj in objects:
+        _bind(obj, joints)
+
+
+def _paths(joints: Joints) -> list[str]:
+    paths: list[str] = []
+    for name, above in zip(joints.names, joints.parent.tolist()):
+        paths.append(name if above < 0 else f"{paths[above]}/{name}")
+    return paths
+
+
+def _shifted(place: list[float]) -> Gf.Matrix4d:
+    return Gf.Matrix4d().SetTranslate(Gf.Vec3d(*place))
+
+
+def _animate(animation: UsdSkel.Animation, paths: list[str], poses: list[np.ndarray], codes: np.ndarray) -> None:
+    """Samples of translations and rotations; the scales are 1 throughout."""
+    animation.CreateJointsAttr(paths)
+    animation.CreateScalesAttr(Vt.Vec3hArray(len(paths), Gf.Vec3h(1)))
+    places, turns = animation.CreateTranslationsAttr(), animation.CreateRotationsAttr()
+    for code, place, turn in zip(codes.tolist(), poses[0], poses[1]):
+        places.Set(Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(place)), code)
+        turns.Set(Vt.QuatfArray.FromNumpy(np.ascontiguousarray(turn)), code)
+
+
+def _bind(obj: SceneObject, joints: Joints) -> None:
+    binding = UsdSkel.BindingAPI.Apply(obj.target.GetPrim())
+    bones, weights = joints.vertex_joint[obj.vertices], joints.weights[obj.vertices]
+    width = bones.shape[1]
+    binding.CreateSkeletonRel().SetTargets([f"{ROOT_PRIM}/{SKELETON}"])
+    binding.CreateGeomBindTransformAttr(Gf.Matrix4d(1))
+    binding.CreateJointIndicesPrimvar(False, width).Set(
+        Vt.IntArray.FromNumpy(np.where(weights > 0, bones, 0).astype(np.int32).reshape(-1))
+    )
+    binding.CreateJointWeightsPrimvar(False, width).Set(Vt.FloatArray.FromNumpy(weights.reshape(-1)))
