@@ -93,6 +93,18 @@ def test_no_vertex_of_the_sample_pops_at_a_loose_bound(ladder, tmp_path):
             assert ((bends(error) > bound).mean(axis=0) <= 0.02).all()
 
 
+def test_an_excursion_of_a_rigid_part_takes_one_correction_that_bends_little():
+    parts = np.array([(0, 4)], [("first", np.int32), ("count", np.int32)])
+    wanted, origin, limit, step = np.zeros((4, 3, 20)), np.zeros(3), 1.0, 0.5
+    decoded = wanted.astype(np.float32)
+    decoded[:, 2] = 1.3 * np.exp(-(((np.arange(20) - 9) / 3) ** 2))
+    rows = streams.find_rigid_corrections(parts, decoded, wanted, origin, limit, step)
+    assert rows.tolist() == [[vertex, 9, 0, 0, -3, 2] for vertex in range(4)]
+    before = bends(decoded).max()
+    streams.apply_corrections(decoded, rows, step)
+    assert np.abs(decoded).max() <= limit and bends(decoded).max() <= before + 0.5 * limit
+
+
 def test_rigid_parts_are_moved_as_a_whole_where_that_serves_all_of_their_vertices():
     parts = np.array([(0, 3), (3, 3)], [("first", np.int32), ("count", np.int32)])
     wanted, origin, limit, step = np.zeros((6, 3, 12)), np.zeros(3), 1.0, 0.5
@@ -100,7 +112,9 @@ def test_rigid_parts_are_moved_as_a_whole_where_that_serves_all_of_their_vertice
     decoded[:3, 0, 5] = 1.2, 1.4, 1.6  # one way
     decoded[3:, 1, 7] = 1.6, 0.0, -1.6  # in opposite ways: no correction of all serves
     rows = streams.find_rigid_corrections(parts, decoded, wanted, origin, limit, step)
-    assert rows.tolist() == [[vertex, 5, -3, 0, 0, 0] for vertex in range(3)]
+    assert rows.tolist() == [[vertex, 5, -3, 0, 0, 1] for vertex in range(3)]  # and not in that frame alone: it pops
+    narrow = streams.find_rigid_corrections(parts, decoded, wanted, origin, limit, step, narrow=True)
+    assert narrow.tolist() == [[vertex, 5, -3, 0, 0, 0] for vertex in range(3)]
     ends = streams.MetEnds(decided=rows)
     rows = streams.find_corrections(decoded, wanted, origin, [limit] * 3 + [np.inf] * 3, step, ends=ends)
     assert rows is not None

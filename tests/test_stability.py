@@ -99,3 +99,16 @@ def test_what_hangs_on_a_stem_that_has_turned_over_costs_no_more_than_on_one_tha
         return size_at(clip, 1e-4, tmp_path / "a.ath", **about_rest)
 
     assert swaying(angle) <= 1.25 * swaying(0.0)
+
+
+def test_a_plant_in_a_pot_that_turns_takes_little_more_than_one_that_stands(tmp_path):
+    """The trunk of the sample is upright, so that it hardly shows by itself how it turns."""
+    with athcodec.read_hdf5(athcodec.sample_path()) as sample:
+        calm = sample.rest + 0.2 * (sample.block(0, 60) - sample.rest)
+        angles = np.linspace(0, math.pi / 2, 60)
+        c, s, o = np.cos(angles), np.sin(angles), np.zeros(60)
+        turns = np.stack([c, o, s, o, o + 1, o, -s, o, c], axis=1).reshape(60, 3, 3)
+        standing = sample.replace(positions=calm.astype(np.float32), time=sample.time[:60])
+        turning = standing.replace(positions=np.einsum("tij,tvj->tvi", turns, calm).astype(np.float32))
+        sizes = [size_at(clip, 1e-2, tmp_path / "a.ath") for clip in (standing, turning)]
+    assert sizes[1] <= sizes[0] + 150, sizes

@@ -84,7 +84,7 @@ def test_a_basis_of_sudden_motion_is_stored_by_its_entries():
 
 def test_levels_share_a_basis_that_lies_with_the_first_of_them(tmp_path):
     path, clip = tmp_path / "gust.ath", hit_by_a_gust()
-    summary = athcodec.encode(clip, path, rel_error=1e-3, ladder="none", attributes="none")
+    summary = athcodec.encode(clip, path, rel_error=3e-4, ladder="none", attributes="none")
     assert summary.choices["common_basis"]
     (_, base, length), *others = stems_heads(path.read_bytes())
     assert base == 255 and length > 0 and others
@@ -103,6 +103,7 @@ def test_a_shared_basis_makes_files_smaller(tmp_path, monkeypatch):
         return replace(settings, learned_bases=(False,) * search.levels)
 
     monkeypatch.setattr(Search, "_with_learned_bases", unlearned)
+    monkeypatch.setattr(Search, "_other_waves", lambda search, settings: iter(()))
     assert shared < 0.9 * athcodec.encode(clip, tmp_path / "waves.ath", **options).bytes
 
 

@@ -199,12 +199,41 @@ static void rest_centre(const ath_plan *plan, const ath_piece *piece, double cen
         for (int32_t k = 0; k < 3; k++) centre[k] += ath_rest_of(plan, piece->first + i)[k] / (double)piece->count;
 }
 
+/* How many vertices, from its first on, tell how a piece turns: of a root that is one piece those of all its tree, since
+ * an upright stem hardly says how it turns about itself, and what hangs on it turns along. */
+static int32_t turned_vertices(const ath_plan *plan, const ath_piece *piece)
+{
+    const ath_branch *branch = plan->branches + piece->branch;
+    if (piece->parent >= 0 || piece->count < branch->count || piece->flags & ATH_RIGID) return piece->count;
+    int32_t next = piece->branch + branch->subtree;
+    return (next < plan->branch_count ? plan->branches[next].first : plan->vertex_count) - piece->first;
+}
+
+/* Adds the products of what hangs on a root with its rest pose in frame t, which count as much as the root's own in all.
+ * source: of the whole plant; own2: squared distances of the root's vertices from its base. */
+static void add_carried(const ath_plan *plan, int32_t T, const ath_piece *root, int32_t t, const double *source,
+                        double own2, double H[9])
+{
+    const double *a = ath_rest_attach(plan, root), *first = source + (size_t)root->first * 3 * (size_t)T;
+    double products[9] = {0}, carried2 = 0.0;
+    for (int32_t i = root->count, count = turned_vertices(plan, root); i < count; i++) {
+        const double *x0 = ath_rest_of(plan, root->first + i), *x = first + (size_t)i * 3 * (size_t)T;
+        for (int32_t k = 0; k < 3; k++) {
+            double d = x0[k] - a[k];
+            carried2 += d * d;
+            for (int32_t j = 0; j < 3; j++) products[3 * j + k] += (x[j * T + t] - first[j * T + t]) * d;
+        }
+    }
+    for (int32_t i = 0; i < 9 && carried2 > 0.0; i++) H[i] += own2 / carried2 * products[i];
+}
+
 /* The piece's own rotation against its predicted one, as rotation vectors over time, unwrapped. `local`: its
  * vertices relative to the attach point, in the predicted frame. What they say no more of than an error of `step` would,
- * such as the twist of a straight stem, stays as in the frame before. That of a rigid piece is about its centre: an error of
+ * such as the twist of a straight stem, stays as in the frame before. `carried`: the source, where what hangs on a root tells
+ * more; else 0. That of a rigid piece is about its centre: an error of
  * what it hangs on does not turn it. */
 static void fit_rotation(const ath_plan *plan, int32_t T, const ath_piece *piece, double step, const double *local,
-                         double *omega)
+                         const double *carried, double *omega)
 {
     int rigid = (piece->flags & ATH_RIGID) != 0;
     double a[3], q[4] = {1.0, 0.0, 0.0, 0.0}, R[9] = {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0};
@@ -220,6 +249,7 @@ static void fit_rotation(const ath_plan *plan, int32_t T, const ath_piece *piece
                 for (int32_t j = 0; j < 3; j++) H[3 * j + k] += x[j * T + t] * d;
             }
         }
+        if (carried) add_carried(plan, T, piece, t, carried, size2, H);
         double prior = 1e-6 * size2 + (rigid ? 0.0 : step * step * (double)piece->count);
         for (int32_t k = 0; k < 9; k++) H[k] += prior * R[k];
         ath_turn_to(H, t == 0 ? FIRST_ROTATION_STEPS : ROTATION_STEPS, R);
@@ -307,7 +337,8 @@ static void analyse_tracks(const ath_plan *plan, const ath_motion *motion, const
     to_local(T, piece, &scratch->at, source, local);
     if (ath_has_rotation(plan, piece, base)) {
         ath_turning turning = ath_turning_of(plan, piece, base);
-        fit_rotation(plan, T, piece, base->step, local, scratch->track);
+        int carries = turned_vertices(plan, piece) > piece->count;
+        fit_rotation(plan, T, piece, base->step, local, carries ? source : 0, scratch->track);
         ath_into_axes(T, &turning, scratch->track);
         if (before) ath_predict_rotation(plan, motion, piece, before, scratch, rows);
         code_track(base, T, turning.steps, rounding, scratch->track, rows->predicted_rotation, rows->rotation);

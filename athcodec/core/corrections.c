@@ -164,12 +164,12 @@ static place place_at(const track *track, int32_t frame, int32_t width)
 }
 
 /* Whether a closed end would cut off more of a footprint than its faint end. */
-static int is_cut(const track *track, int32_t frame, int32_t width)
+static int is_cut(int32_t frames, int32_t closed, int32_t frame, int32_t width)
 {
     enum { FAINT = 5 };
-    int32_t reach = ath_footprint_reach[width], behind = track->frames - frame;
-    if (track->closed & 1 && frame + 1 <= reach && ath_footprint_part(width, frame + 1) > FAINT) return 1;
-    return track->closed & 2 && behind <= reach && ath_footprint_part(width, behind) > FAINT;
+    int32_t reach = ath_footprint_reach[width], behind = frames - frame;
+    if (closed & 1 && frame + 1 <= reach && ath_footprint_part(width, frame + 1) > FAINT) return 1;
+    return closed & 2 && behind <= reach && ath_footprint_part(width, behind) > FAINT;
 }
 
 static double more_bends(const track *track, const place *place, const int32_t q[3])
@@ -248,7 +248,7 @@ static int try_frame(const track *track, const ath_correction *above, int32_t fr
     static const int32_t masks[7] = {1, 2, 4, 3, 5, 6, 7}, stop_of[3] = {3, 6, 7}; /* by the number of axes */
     double scale = track->step * ath_footprint_part(width, track->worst - frame) / ATH_FOOTPRINT_PARTS;
     int32_t whole[3], found = 0;
-    if (is_any(track->own + frame) || is_cut(track, frame, width)) return 0;
+    if (is_any(track->own + frame) || is_cut(track->frames, track->closed, frame, width)) return 0;
     if (!whole_correction(track->error[track->worst], scale, whole)) return 0;
     const place place = place_at(track, frame, width);
     for (int32_t axes = 0, i = 0; axes < 3 && !found; axes++)
@@ -345,77 +345,136 @@ int64_t ath_find_corrections(int32_t vertex_count, int32_t frames, int is_float6
 
 /* ---- rigid parts ---- */
 
-/* How far the vertices of a part are from where they are wanted, over time: on each axis the least and the most, and
- * whether one is beyond its limit. */
+/* A part whose vertices are corrected together, so that it keeps its shape. */
 typedef struct {
-    double least[3][ATH_SEGMENT_FRAMES], most[3][ATH_SEGMENT_FRAMES];
-    uint8_t beyond[ATH_SEGMENT_FRAMES];
-} spread;
+    int32_t first, count, frames, is_float64;
+    const void *positions;
+    const double *source, *origin, *limits;
+    double step;
+    double beyond[ATH_SEGMENT_FRAMES]; /* the largest square of an error over that of its limit; 0: left as it is */
+    ath_corrected_parts middle;        /* between the least and the most that vertices are off, without corrections */
+    ath_corrected_parts parts;
+    ath_correction own[ATH_SEGMENT_FRAMES]; /* all zero: none */
+} rigid_part;
 
-ATH_HOT static void spread_of_part(int32_t first, int32_t count, int32_t frames, int is_float64, const void *positions,
-                                   const double *source, const double origin[3], const double *limits, spread *spread)
+static void raise_to(double value, double *most)
 {
-    double squares[ATH_SEGMENT_FRAMES];
-    memset(spread->beyond, 0, (size_t)frames);
-    for (int32_t v = first; v < first + count; v++) {
+    if (value > *most) *most = value;
+}
+
+ATH_HOT static void open_part(rigid_part *part)
+{
+    double least[3][ATH_SEGMENT_FRAMES], most[3][ATH_SEGMENT_FRAMES], squares[ATH_SEGMENT_FRAMES];
+    int32_t frames = part->frames;
+    memset(part->beyond, 0, (size_t)frames * sizeof part->beyond[0]);
+    for (int32_t v = part->first; v < part->first + part->count; v++) {
         memset(squares, 0, (size_t)frames * sizeof *squares);
         for (size_t k = 0; k < 3; k++) {
             size_t row = ((size_t)v * 3 + k) * (size_t)frames;
-            double *least = spread->least[k], *most = spread->most[k];
             for (int32_t t = 0; t < frames; t++) {
-                double away = source[row + (size_t)t] + origin[k] - number_at(is_float64, positions, row + (size_t)t);
-                least[t] = v == first || away < least[t] ? away : least[t];
-                most[t] = v == first || away > most[t] ? away : most[t];
+                double decoded = number_at(part->is_float64, part->positions, row + (size_t)t);
+                double away = part->source[row + (size_t)t] + part->origin[k] - decoded;
+                least[k][t] = v == part->first || away < least[k][t] ? away : least[k][t];
+                most[k][t] = v == part->first || away > most[k][t] ? away : most[k][t];
                 squares[t] += away * away;
             }
         }
-        for (int32_t t = 0; t < frames; t++) spread->beyond[t] |= squares[t] > limits[v] * limits[v];
+        for (int32_t t = 0; t < frames; t++)
+            raise_to(squares[t] / (part->limits[v] * part->limits[v]), part->beyond + t);
     }
+    for (int32_t t = 0; t < frames; t++)
+        for (int32_t k = 0; k < 3; k++) part->middle[t][k] = 0.5 * (least[k][t] + most[k][t]);
+    memset(part->parts, 0, (size_t)frames * sizeof part->parts[0]);
+    memset(part->own, 0, (size_t)frames * sizeof part->own[0]);
 }
 
-/* Whether a correction brings all vertices of a part within their limits in a frame. */
-static int serves_part(int32_t first, int32_t count, int32_t frames, int is_float64, const void *positions,
-                       const double *source, const double origin[3], const double *limits, double step, int32_t t,
-                       const ath_correction *own)
+/* What `beyond` is in a frame with `more` of a further correction. */
+static double beyond_with(const rigid_part *part, int32_t t, const int32_t q[3], int32_t more)
 {
-    for (int32_t v = first; v < first + count; v++) {
+    double most = 0.0;
+    for (int32_t v = part->first; v < part->first + part->count; v++) {
         double error[3];
         for (int32_t k = 0; k < 3; k++) {
-            size_t at = ((size_t)v * 3 + (size_t)k) * (size_t)frames + (size_t)t;
-            double sum = number_at(is_float64, positions, at), parts = (double)own->q[k] * ATH_FOOTPRINT_PARTS;
-            if (parts != 0.0) sum = ath_corrected(sum, parts, step);
-            error[k] = (is_float64 ? sum : ath_single(sum)) - (source[at] + origin[k]);
+            size_t at = ((size_t)v * 3 + (size_t)k) * (size_t)part->frames + (size_t)t;
+            double sum = number_at(part->is_float64, part->positions, at);
+            double parts = part->parts[t][k] + (double)q[k] * more;
+            if (parts != 0.0) sum = ath_corrected(sum, parts, part->step);
+            error[k] = (part->is_float64 ? sum : ath_single(sum)) - (part->source[at] + part->origin[k]);
         }
-        if (!(square(error) <= limits[v] * limits[v])) return 0;
+        raise_to(square(error) / (part->limits[v] * part->limits[v]), &most);
     }
-    return is_any(own);
+    return most;
+}
+
+/* Moves a part by the middle of what its vertices are off in a frame, if that brings all of them within their limits there
+ * and takes none farther beyond it in the frames around. Whether it does. */
+static int move_part(rigid_part *part, int32_t closed, int32_t frame, int32_t width)
+{
+    ath_correction own = {{0, 0, 0}, width};
+    double after[2 * ATH_FOOTPRINT_REACH + 1];
+    int32_t reach = ath_footprint_reach[width];
+    int32_t start = first_frame(frame, reach), stop = ath_min(part->frames - 1, frame + reach);
+    for (int32_t k = 0; k < 3; k++) {
+        double units = part->middle[frame][k] / part->step - part->parts[frame][k] / ATH_FOOTPRINT_PARTS;
+        own.q[k] = units > -1e9 && units < 1e9 ? to_steps(units) : 0;
+    }
+    if (!is_any(&own) || is_any(part->own + frame) || is_cut(part->frames, closed, frame, width)) return 0;
+    for (int32_t t = start; t <= stop; t++) {
+        after[t - start] = beyond_with(part, t, own.q, ath_footprint_part(width, t - frame));
+        if (after[t - start] > 1.0 && (t == frame || after[t - start] > part->beyond[t])) return 0;
+    }
+    memcpy(part->beyond + start, after, (size_t)(stop - start + 1) * sizeof after[0]);
+    part->own[frame] = own;
+    ath_add_correction(part->frames, frame, &own, part->parts);
+    return 1;
+}
+
+/* The frame that is farthest beyond a limit; -1: none is. */
+static int32_t worst_of(const rigid_part *part)
+{
+    int32_t worst = -1;
+    double most = 1.0;
+    for (int32_t t = 0; t < part->frames; t++)
+        if (part->beyond[t] > most) {
+            most = part->beyond[t];
+            worst = t;
+        }
+    return worst;
+}
+
+/* Each frame in turn, over as many frames as serve: what moves in one alone pops. */
+static void correct_part(rigid_part *part, int32_t closed, int32_t widest)
+{
+    for (int32_t t = worst_of(part); t >= 0; t = worst_of(part)) {
+        int32_t width = widest;
+        while (width >= 0 && !move_part(part, closed, t, width)) width--;
+        if (width < 0) part->beyond[t] = 0.0;
+    }
 }
 
 int64_t ath_find_rigid_corrections(int32_t part_count, const int32_t *first, const int32_t *counts, int32_t frames,
                                    int is_float64, const void *positions, const double *source, const double origin[3],
-                                   const double *limits, double step, int32_t *corrections, int64_t capacity)
+                                   const double *limits, int is_narrow, double step, int32_t closed,
+                                   int32_t *corrections, int64_t capacity)
 {
+    rigid_part part = {.frames = frames, .is_float64 = is_float64, .positions = positions, .source = source};
     int64_t count = 0;
+    part.origin = origin;
+    part.limits = limits;
+    part.step = step;
     for (int32_t p = 0; p < part_count; p++) {
-        spread spread;
-        spread_of_part(first[p], counts[p], frames, is_float64, positions, source, origin, limits, &spread);
-        for (int32_t t = 0; t < frames; t++) {
-            ath_correction own = {{0, 0, 0}, 0};
-            if (!spread.beyond[t]) continue;
-            for (int32_t k = 0; k < 3; k++) {
-                double units = (spread.most[k][t] + spread.least[k][t]) / (2.0 * step);
-                own.q[k] = units > -1e9 && units < 1e9 ? to_steps(units) : 0;
-            }
-            if (!serves_part(first[p], counts[p], frames, is_float64, positions, source, origin, limits, step, t, &own))
-                continue;
-            for (int32_t v = first[p]; v < first[p] + counts[p]; v++, count++) {
+        part.first = first[p];
+        part.count = counts[p];
+        open_part(&part);
+        correct_part(&part, closed, is_narrow ? 0 : ATH_FOOTPRINTS - 1);
+        for (int32_t t = 0; t < frames; t++)
+            for (int32_t v = first[p]; v < first[p] + counts[p] && is_any(part.own + t); v++, count++) {
                 if (count >= capacity) continue;
                 int32_t *row = corrections + ATH_CORRECTION_ROW * count;
                 row[0] = v;
                 row[1] = t;
-                memcpy(row + 2, &own, sizeof own);
+                memcpy(row + 2, part.own + t, sizeof part.own[t]);
             }
-        }
     }
     return count;
 }

@@ -145,12 +145,13 @@ ATH_ENCODER_API int64_t ath_find_corrections(int32_t vertex_count, int32_t frame
                                              const void *positions, const double *source, const double origin[3],
                                              const double *limits, const uint8_t *narrow, double step,
                                              const ath_met_ends *ends, int32_t *corrections, int64_t capacity);
-/* Those that move all vertices of a part, first and counts, together in one frame, where one is beyond its limit and all are
- * within it then; as many rows as there are. */
+/* Those that move all vertices of a part, first and counts, together, where one is beyond its limit and all are within it
+ * then; over several frames where that serves, unless is_narrow. closed: of ath_met_ends; as many rows as there are. */
 ATH_ENCODER_API int64_t ath_find_rigid_corrections(int32_t part_count, const int32_t *first, const int32_t *counts,
                                                    int32_t frames, int is_float64, const void *positions,
                                                    const double *source, const double origin[3], const double *limits,
-                                                   double step, int32_t *corrections, int64_t capacity);
+                                                   int is_narrow, double step, int32_t closed, int32_t *corrections,
+                                                   int64_t capacity);
 /* Rows of one vertex stand together, in the order of their frames. */
 ATH_ENCODER_API void ath_apply_corrections(int32_t frames, int is_float64, void *positions, double step,
                                            const int32_t *corrections, int64_t count);

@@ -153,13 +153,10 @@ static uint32_t basis_of_node(level_writer *writer, const body_walk *walk)
     const ath_piece *piece = walk->piece;
     for (int32_t m = 0; m < modes_of(walk); m++) {
         double affine[3];
-        const double *numbers = walk->node->whitening + 3 * m;
-        if (!walk->node->coded) {
+        if (!walk->node->coded)
             ath_affine_part(walk->plan, walk->node, walk->plan->bases + piece->basis + (size_t)m * (size_t)piece->count,
                             affine);
-            numbers = affine;
-        }
-        put_numbers(writer, numbers, 3);
+        put_numbers(writer, walk->node->coded ? walk->node->whitening + 3 * m : affine, 3);
     }
     return at;
 }

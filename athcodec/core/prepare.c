@@ -67,7 +67,8 @@ typedef struct {
 /* What is prepared, and from what. */
 typedef struct {
     const ath_file *file;
-    void *memory; /* of the segment */
+    void *memory;    /* of the segment */
+    void *positions; /* where they go; null: to that memory */
     int32_t index, level;
     const ath_segment *from; /* the same segment at an earlier level; null: none */
     const void *kept;        /* of that; null: nothing */
@@ -496,6 +497,7 @@ static int begin(ath_work *work, const preparation *asked, int32_t index, int32_
         work->join = join;
         work->keeps = asked->keeps;
         work->keeping = asked->keeping;
+        if (asked->positions) segment->positions = asked->positions;
     }
     if (asked->from && !work->only_end) {
         work->first_level = asked->from->level + 1;
@@ -573,6 +575,24 @@ int ath_follow(ath_work *work, const ath_segment *before)
         return ATH_BAD_ARGUMENT;
     take_end(&work->join, before);
     work->phase = CHECKSUMS;
+    return ATH_OK;
+}
+
+static int is_in_source_order(const ath_file *file)
+{
+    int32_t vertex = 0;
+    while (vertex < file->plan.vertex_count && file->vertex_source[vertex] == vertex) vertex++;
+    return vertex == file->plan.vertex_count;
+}
+
+int ath_prepare_to(ath_work *work, void *positions)
+{
+    const ath_file *file = work->file;
+    int32_t index = work->asked.index, shown = ath_segment_start(file, index + 1) - ath_segment_start(file, index);
+    if (work->segment->exact_vertices < file->plan.vertex_count || shown != work->segment->frames
+        || !is_in_source_order(file))
+        return ATH_BAD_ARGUMENT;
+    work->asked.positions = work->segment->positions = positions;
     return ATH_OK;
 }
 

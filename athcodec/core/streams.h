@@ -717,7 +717,8 @@ static void code_bent_vertex(ath_coder *coder, rest_model *model, const bent_pos
                              const double turn[9])
 {
     double *out = pose->rest + 3 * (size_t)v, predicted[3], d[3];
-    const double *here = pose->reference + 3 * (size_t)v, *from = pose->reference + 3 * (size_t)before;
+    const double *here = pose->reference + 3 * (size_t)v;
+    const double *from = pose->reference + 3 * (size_t)(before < 0 ? v : before);
     uint32_t *mean = model->mean[0];
     for (int32_t k = 0; k < 3; k++) d[k] = before < 0 ? 0.0 : here[k] - from[k];
     for (int32_t k = 0; k < 3; k++) {

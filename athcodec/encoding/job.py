@@ -42,6 +42,7 @@ from athcodec.encoding.layers import (
 )
 from athcodec.encoding.prediction import FoundPrediction, best_prediction, code_predicted_segment, predicted_layers
 from athcodec.encoding.progress import Progress, silent
+from athcodec.encoding.sample import is_small
 from athcodec.encoding.search import Choice, Search, still_choice, typical_segments
 from athcodec.encoding.segment import CodedPrelude, Source, thread_count
 from athcodec.encoding.shape import RestPrecision
@@ -56,6 +57,7 @@ from athcodec.units import Length
 SPOOL_BYTES = 64 << 20
 CHUNK_BYTES, LEVEL_BYTES = 6, 6  # of the front for a chunk, and for the errors of a level and segment
 PREDICTED_SHARE = 0.8  # of a file with layers, that one with predicted motion, which has none, may take
+FEW_BYTES = 2000  # of a small clip's file, which may do without coarse levels
 SEARCH_SAVES = 0.5  # of the bytes at the settings that a search starts with, at most
 STATIC_METADATA = ("unit", "up_axis")
 
@@ -119,6 +121,7 @@ class Draft:
     found: Found | None  # branches, for a clip without
     options: EncodingOptions
     fingerprint: str
+    thresholds: Thresholds
 
 
 @dataclass(frozen=True)
@@ -304,12 +307,32 @@ class EncodingJob:
         prediction = None if search.start.rigid.any() else self._best_prediction(bound, unsearched)
         if prediction is not None and prediction.bytes < SEARCH_SAVES * unsearched:
             return self._predicted(prediction.choice)
-        choices, prelude = search.decide(ratio)
-        layered = [self._layered(ath, choice, prelude) for choice in choices]
-        best = layered[0] if len(layered) == 1 else min(layered, key=self._estimated_bytes)
+        best = self._found_by(search, ratio)
+        if self._is_short(best):
+            best = min(best, self._without_levels(bound), key=self._estimated_bytes)
         if prediction is not None and prediction.bytes < share * self._estimated_bytes(best):
             return self._predicted(prediction.choice)
         return best
+
+    def _found_by(self, search: Search, ratio: int) -> _Decided:
+        """The best of what a search has found."""
+        choices, prelude = search.decide(ratio)
+        layered = [self._layered(search.ath, choice, prelude) for choice in choices]
+        return layered[0] if len(layered) == 1 else min(layered, key=self._estimated_bytes)
+
+    def _is_short(self, decided: _Decided) -> bool:
+        """Whether a file is loaded and played whole, so that its coarse levels are hardly ever shown."""
+        options = self.options
+        is_whole = len(decided.layers.each) == 1
+        if not is_whole or decided.ath.height == 0 or options.tam is not None:
+            return False
+        small = is_small(self.clip.vertex_count, self.source.segments, options.effort)
+        return small and self._estimated_bytes(decided) <= FEW_BYTES
+
+    def _without_levels(self, bound: float) -> _Decided:
+        """With one node for the whole plant, whatever its error."""
+        ath = self.seen.ath(Thresholds(bound, self.clip.frame_count, self.seen.largest_distance.max(), 0))
+        return self._found_by(Search.of(self.source, ath, bound, self.options.effort, silent, self.options.jobs), 1)
 
     def _best_prediction(self, bound: float, most_bytes: float) -> FoundPrediction | None:
         """None for one who asks for a hierarchy of maps, which predicted motion has not."""
@@ -352,7 +375,15 @@ class EncodingJob:
         return _Decided(ath, choice, prelude, layers, source)
 
     def draft(self, decided: _Decided) -> Draft:
-        return Draft(decided.choice, self.seen, decided.segment_count, self.found, self.options, decided.fingerprint)
+        return Draft(
+            decided.choice,
+            self.seen,
+            decided.segment_count,
+            self.found,
+            self.options,
+            decided.fingerprint,
+            decided.ath.thresholds,
+        )
 
     def decided(self, draft: Draft) -> _Decided:
         """What the draft's maker had decided, made again. Raises ClipError where it is not the same."""
@@ -360,7 +391,7 @@ class EncodingJob:
         if draft.choice.predicted is not None:
             decided = self._predicted(draft.choice)
         else:
-            ath = self.seen.ath(self.thresholds(settings.bound))
+            ath = self.seen.ath(draft.thresholds)
             source = self.source.about(draft.choice.reference)
             decided = self._layered(ath, draft.choice, CodedPrelude(source, ath, settings))
         if decided.fingerprint != draft.fingerprint:
@@ -636,4 +667,5 @@ def _summary(
         choices,
         job.seams(decoder),
         None if job.found is None else str(job.found),
+        job.clip.not_read,
     )

@@ -13,6 +13,8 @@ from itertools import product
 
 import numpy as np
 
+from athcodec.threads import ranges
+
 END_FRAMES = 2  # of a segment, that the next one looks at
 WIDTHS = (1, 2, 3, 4, 5, 6, 8, 10, 12, 14, 16, 20, 24, 28, 32, 40, 48, 64, 96)  # frames
 SLOPED = 128
@@ -44,7 +46,7 @@ class End:
     corrections: np.ndarray
 
     def of(self, some: slice) -> End:
-        """Of some of the vertices, as far as a join is chosen by it."""
+        """Of some of the vertices, as far as a join is chosen and made by it."""
         return replace(self, positions=self.positions[some], source=self.source[some])
 
 
@@ -98,11 +100,12 @@ def offsets(end: End, positions: np.ndarray, join: int) -> np.ndarray:
     return jump[:, :, None] * jumps + slope[:, :, None] * slopes
 
 
-def joined(end: End, positions: np.ndarray, join: int) -> np.ndarray:
-    """The positions as a decoder joins them, bit for bit but where maps of nodes make them."""
-    result, width = positions.copy(), join % SLOPED
-    result[:, :, :width] = positions[:, :, :width] + offsets(end, positions, join)
-    return result
+def apply_join(end: End, positions: np.ndarray, join: int) -> None:
+    """Joins the positions in place, as a decoder does, bit for bit but where maps of nodes make them."""
+    width = join % SLOPED
+    for part in (slice(*some) for some in ranges(len(positions), 3 * width)):
+        moved = positions[part, :, :width]
+        moved[:] = moved + offsets(end.of(part), positions[part], join)
 
 
 class ErrorPrice:

@@ -25,10 +25,10 @@ from athcodec.encoding.joins import (
     CorrectionPrice,
     End,
     ErrorPrice,
+    apply_join,
     best_join,
     end_corrections,
     end_of,
-    joined,
     seen,
 )
 from athcodec.encoding.learned_modes import LearnedModes, nested
@@ -332,6 +332,7 @@ class _SegmentCoder:
         for level, nodes in enumerate(shown):
             if plan.has_affines(level):
                 self.chunks[level, ct.AFFINES] = streams.encode_affines(nodes, level)
+            nodes.forget_caches()
         return segment
 
     def _keep_last_level_best(self, layer: Layer, level: int, decoded: np.ndarray) -> None:
@@ -424,31 +425,38 @@ class _SegmentCoder:
         """Lets the levels go on from the ends of the segment before, where they are better for it."""
         some = seen(len(self.positions))
         source = self.positions[some] + self._origin[:, None]
-        for level, (end, shown) in enumerate(zip(ends, self._shown)):
-            if end is None or self.positions.shape[2] <= END_FRAMES:
-                continue
-            positions, layer = shown.pose(), shown.layer
-            if layer is None:
-                most_rms = self.errors[level - 1][RMS] if level > 0 else math.inf
-                price = ErrorPrice(self.errors[level][RMS], most_rms, positions.shape[2])
-            else:
-                limit, share = layer.settings.limit, len(source) / len(positions)
-                bytes_ = share * (self._shared_bytes + self._bytes_up_to(level))
-                price = CorrectionPrice(limit if np.isscalar(limit) else limit[some], bytes_)
-            join = best_join(end.of(some), positions[some], source, price)
-            if join == 0:
-                continue
-            self.joins[level], positions = join, joined(end, positions, join)
-            if layer is None:
-                rounding = 2 * float(np.spacing(np.abs(positions).max()))  # of maps, which are what is joined
-                largest, p99, rms = self.error(positions)
-                self.errors[level] = largest + rounding, p99, rms + rounding
-            else:
-                if layer.ratio == 1 and positions.shape[2] >= LEAST_MEETING:
-                    self._meet(end.corrections)
-                self.errors[level] = self._finish_level(layer, level, positions)
-            if level == self._level_0.level_count - 1:
-                self._keep_last_level_best(layer, level, positions)
+        shown, self._shown = self._shown[::-1], []
+        for level, end in enumerate(ends):
+            own = shown.pop()  # which is not held any longer
+            if end is not None and self.positions.shape[2] > END_FRAMES:
+                self._join_level(level, end, own.pose(), own.layer, some, source)
+
+    def _join_level(
+        self, level: int, end: End, positions: np.ndarray, layer: Layer | None, some: slice, source: np.ndarray
+    ) -> None:
+        """Joins one level, whose positions change; layer: that it ends, if one; source: of some vertices."""
+        if layer is None:
+            most_rms = self.errors[level - 1][RMS] if level > 0 else math.inf
+            price = ErrorPrice(self.errors[level][RMS], most_rms, positions.shape[2])
+        else:
+            limit, share = layer.settings.limit, len(source) / len(positions)
+            bytes_ = share * (self._shared_bytes + self._bytes_up_to(level))
+            price = CorrectionPrice(limit if np.isscalar(limit) else limit[some], bytes_)
+        join = best_join(end.of(some), positions[some], source, price)
+        if join == 0:
+            return
+        self.joins[level] = join
+        apply_join(end, positions, join)
+        if layer is None:
+            rounding = 2 * float(np.spacing(np.abs(positions).max()))  # of maps, which are what is joined
+            largest, p99, rms = self.error(positions)
+            self.errors[level] = largest + rounding, p99, rms + rounding
+        else:
+            if layer.ratio == 1 and positions.shape[2] >= LEAST_MEETING:
+                self._meet(end.corrections)
+            self.errors[level] = self._finish_level(layer, level, positions)
+        if level == self._level_0.level_count - 1:
+            self._keep_last_level_best(layer, level, positions)
 
     def coded(
         self, exact: np.ndarray | None, largest_bound: float

@@ -65,6 +65,7 @@ def components(plan: Plan, segments: Iterable[SegmentMotion]) -> Components:
             for part in _parts(pieces, segment.frames * total.shape[1]):
                 rows = _tracks(plan, segment, pieces[part], total.shape[1] // 3)
                 total[part] += np.einsum("pif,pjf->pij", rows, rows)  # without NumPy's threads, see principal()
+        del segment  # before the next one is made
     return Components(frames, [(pieces, *_principal(total)) for pieces, total in groups])
 
 

@@ -272,7 +272,7 @@ class SegmentMotion:
         self.tracks = np.zeros((core.piece_count, 2, 3, frames), np.int32)
         self.node_tracks = np.zeros((core.node_count, 4, 3, frames), np.int32)
         self.node_steps = np.zeros(core.node_count, np.int32)
-        self._attach_caches = np.empty(lib.ath_attach_cache_size(core.attach_cache_rows, frames))
+        self._attach_caches: np.ndarray | None = None
         self.waves = waves_over_time(frames, Waves.PERIODIC if periodic else Waves.SMOOTH)
         self.node_waves = waves_over_time(frames, Waves.PERIODIC if periodic else Waves.BEAM)
         self.before, self.ratio = before, ratio
@@ -327,7 +327,6 @@ class SegmentMotion:
         self.motion = Motion(
             streams=addressof(self._c_streams),
             waves=self.node_waves.ctypes.data,
-            attach_caches=self._attach_caches.ctypes.data,
             frames=self.frames,
             ratio=self.ratio,
             before=None if self.before is None else addressof(self.before.coarse),
@@ -351,6 +350,10 @@ class SegmentMotion:
                 ("duals", self.learned_modes.duals),
             ):
                 setattr(self.integers, name, array.ctypes.data)
+
+    def forget_caches(self) -> None:
+        """Lets go of what `analyse` and `pose` leave for `analyse_nodes`."""
+        self._attach_caches = None
 
     def forget_before(self) -> None:
         """Lets go of the layer before, which is predicted from no more, and of what is predicted from it."""
@@ -402,6 +405,9 @@ class SegmentMotion:
 
     def _piecewise(self, call: Callable[[Motion, int, int], None]) -> None:
         """Calls with a motion and each range of pieces, those that others hang on first."""
+        if self._attach_caches is None:
+            self._attach_caches = np.empty(lib.ath_attach_cache_size(self.plan.core.attach_cache_rows, self.frames))
+            self.motion.attach_caches = self._attach_caches.ctypes.data
         carrying, carried = self.plan.piece_ranges
         for first, stop in carrying:
             self._with_scratch(call)(first, stop)

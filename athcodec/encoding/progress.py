@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from athcodec.encoding.sample import sample_vertices
+from athcodec.encoding.sample import is_small, sample_vertices
 
 Progress = Callable[[str, float], None]
 
@@ -15,6 +15,7 @@ Progress = Callable[[str, float], None]
 SURVEY, TRIAL, MOTION = 0.11, 0.13, 0.24
 TRIALS = {"fast": 7, "default": 31, "best": 50}  # that a search is worth, for the effort
 LAYER_TRIALS = {"fast": 3, "default": 24, "best": 10}  # beyond these where there are layers of precision
+SMALL_TRIALS = 100  # and of a small clip, whose choices are made again
 BRANCHES = 0.5  # of all the rest, to find branches for a clip without
 SIZES = 6  # files that are made to meet a target size
 
@@ -23,9 +24,9 @@ def silent(stage: str, fraction: float) -> None:
     """Reports to nobody."""
 
 
-def trials(effort: str, layered: bool) -> int:
+def trials(effort: str, layered: bool, small: bool) -> int:
     """That a search is worth."""
-    return TRIALS[effort] + LAYER_TRIALS[effort] * layered
+    return TRIALS[effort] + LAYER_TRIALS[effort] * layered + SMALL_TRIALS * small
 
 
 class WeightedProgress:
@@ -59,12 +60,13 @@ def stage_weights(
 ) -> dict[str, float]:
     """The estimated work of each stage. samples: segments that each trial codes; branches: they have to be found first;
     sizes: a target is to be met; motion: it is coded too, after the search; layers: of precision, about."""
-    longest = max(stop - start for start, stop in segments)
+    longest, frames = max(stop - start for start, stop in segments), segments[-1][1]
+    small = is_small(vertices, segments, effort)
     some = vertices if (part := sample_vertices(vertices, len(segments), effort)) is None else part
     work = {
-        "survey": SURVEY * vertices * segments[-1][1],
-        "search": TRIAL * trials(effort, layers > 1) * samples * some * longest,
-        "motion": MOTION * (1 + layers) / 2 * vertices * segments[-1][1],
+        "survey": SURVEY * vertices * frames,
+        "search": TRIAL * trials(effort, layers > 1, small) * samples * some * longest,
+        "motion": MOTION * (1 + layers) / 2 * vertices * frames,
     }
     before = {"branches": BRANCHES * sum(work.values())} if branches else {}
     tries = {"size": SIZES * (work["search"] + work["motion"])} if sizes else {}

@@ -21,6 +21,7 @@ LARGE = 5_000  # vertices: smaller plants are not sampled
 LEAST_SAMPLE, ENOUGH, MOST_SAMPLE = 3_500, 6_000, 1 << 16  # vertices of a sample; between the first two its share
 LEAST_SHARE = 0.4  # of the plant
 SEGMENT_SHARE = 1 / 64  # of the plant that each segment of the clip adds to a sample
+SMALL = 1 << 18  # vertices times frames of a clip, up to which trials are so cheap that choices are made again
 SUBTREES = 8  # of a sample, at least
 
 
@@ -144,6 +145,12 @@ def sample_plant(source: Source, ath: Ath, effort: str) -> PlantSample | None:
     branches = _even_branches(source.hierarchy, wanted, int(ath.node_branch[ath.node_depth.argmax()]))
     sample = PlantSample(source, ath, branches)
     return sample if len(sample.vertices) < source.clip.vertex_count // 2 else None
+
+
+def is_small(vertices: int, segments: list[tuple[int, int]], effort: str) -> bool:
+    """Whether what a search has chosen is tried again when the rest is known: not where segments meet, since bytes do
+    not count what is seen there."""
+    return vertices * segments[-1][1] <= SMALL and len(segments) == 1 and effort != "fast"
 
 
 def sample_vertices(vertices: int, segments: int, effort: str) -> int | None:

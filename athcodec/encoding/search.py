@@ -24,7 +24,7 @@ from athcodec.encoding.motion import Plan, SegmentMotion, position_errors
 from athcodec.encoding.progress import Progress, trials
 from athcodec.encoding.reference import mean_pose
 from athcodec.encoding.rigid import TURN_STEP, rigid_layers
-from athcodec.encoding.sample import ExtrapolationFactors, PlantSample, sample_plant
+from athcodec.encoding.sample import ExtrapolationFactors, PlantSample, is_small, sample_plant
 from athcodec.encoding.segment import (
     CodedPrelude,
     Settings,
@@ -58,6 +58,7 @@ STILL_STEP = 1024.0  # over what nothing is to be left of
 FIRST_FACTORS, HOPELESS = (0, 2, 8), 1.3  # of rotations; the others, and those of tips, save no more than that
 MODES_SAVE, LAYERS_SAVE = 1.5, 1.05  # of a single layer's bytes, at most: learned modes, what suits refinements better
 SHORT_STEM = 3  # vertices of a stem whose learned modes are tried in place of rotations and in any basis
+NEAREST, NEAR = 4, 1.12  # other choices that steps are found for, and what they cost before, over the best
 CALM_STEP, CALM_COST = 1.15, 1.02  # of small rigid parts: how much finer a step at a time, for how much in all
 CALM_SHARE = 1e-4  # of their vertices over time, that may be corrected
 WORTH = {
@@ -266,8 +267,10 @@ class Search:
         self._time_components: dict[tuple, tuple[float, list[dict[int, TimeComponents]]]] = {}
         self._preludes: dict[tuple, CodedPrelude] = {}
         self._ratios, self._layered = ratios, len(ratios) > 1
+        keeps_shape = start.turn_step > 0  # which a few bytes less would cost
+        self._is_small = is_small(source.clip.vertex_count, source.segments, effort) and not keeps_shape
         self._sheet: np.ndarray | None = None  # that is best in all of a plant that is sampled
-        self._extra_trials, self._trials = 0, trials(effort, self._layered)
+        self._extra_trials, self._trials = 0, trials(effort, self._layered, self._is_small)
 
     @classmethod
     def of(
@@ -359,7 +362,13 @@ class Search:
     @cached_property
     def best(self) -> Settings:
         """Settings of a file of one layer."""
-        steps = [self._with_steps, self._with_calm_parts, self._with_rest_slack, self._with_waves_if_smaller]
+        steps = [
+            self._with_steps,
+            self._settled,
+            self._with_calm_parts,
+            self._with_rest_slack,
+            self._with_waves_if_smaller,
+        ]
         if self.effort == "fast":
             steps = []
         if self.effort == "best" and self.source.weights is None:
@@ -387,6 +396,8 @@ class Search:
         without."""
         if ratio == 1 or not any(settings.rotation_step_factors):
             yield settings
+            if ratio > 1 and self._is_small and settings.learned_pieces is not None:
+                yield replace(settings, learned_pieces=None)
             return
         factor, least = settings.rotation_step_factors[self.prelude(settings).plan.main_level], math.inf
         tips = settings.only_tips or not self._without(Feature.TIPS)
@@ -409,7 +420,7 @@ class Search:
 
     def about_best_reference(self) -> Search:
         """The same about the rest pose or the mean pose of the motion, whichever makes the smaller file: the mean pose
-        is tried with what was found about the rest pose, and goes on from there."""
+        is tried with what was found about the rest pose, and goes on from there; in small clips both are searched."""
         if self.effort == "fast" or self.source.host_rest or self.source.details.any():
             return self  # the mean of what turns is smaller than it
         if self._without(Feature.MEAN_POSE):
@@ -417,13 +428,18 @@ class Search:
         other = self.about_mean_pose()
         tried, its = self.of_sample or self, other.of_sample or other
         tried._extra_trials += MEAN_POSE_WORTH
+        own_cost = tried._cost_to_compare()
         its._extra_trials = tried._extra_trials + len(tried._known)
-        found = its.like(tried, tried.at_first_step)
-        if its._cost_with_maps(found) >= tried._cost_with_maps(tried.at_first_step):
-            tried._extra_trials += len(its._known)
-            return self
-        its.at_first_step = found
-        return other
+        if not self._is_small:
+            its.at_first_step = its.like(tried, tried.at_first_step)
+        if its._cost_to_compare() < own_cost:
+            return other
+        tried._extra_trials += len(its._known)
+        return self
+
+    def _cost_to_compare(self) -> float:
+        """With that of a search about another reference pose."""
+        return self._cost_with_maps(self.best if self._is_small else self.at_first_step)
 
     def about_mean_pose(self) -> Search:
         """The same about the mean pose of the motion, nothing found yet."""
@@ -759,7 +775,8 @@ class Search:
         factors = list(candidates)
         per_level = np.array([levels for _, levels in self._costs(list(candidates.values()))])
         mixed = replace(settings, rotation_step_factors=tuple(factors[i] for i in per_level.argmin(axis=0)))
-        best = self._cheapest([settings, mixed, *candidates.values()])
+        roots = [replace(settings, rotation_step_factors=(k, *[0] * (self.levels - 1))) for k in factors if k]
+        best = self._cheapest([settings, mixed, *roots, *candidates.values()])
         most = HOPELESS * self.cost(best)[0]
         tips = [
             replace(own, only_tips=True)
@@ -788,8 +805,13 @@ class Search:
         return self._cheapest([unlearned, mixed, common])
 
     def _with_waves_if_smaller(self, settings: Settings) -> Settings:
-        """Learned time bases, or none: they take more bytes the finer the steps are."""
-        return self._cheapest([settings, _in_waves(settings)]) if any(settings.learned_bases) else settings
+        """Learned time bases, or none: they take more bytes the finer the steps are. As a file will have them, learned
+        at its own step: where a component is just left out, that of another step may have had it."""
+        if not any(settings.learned_bases):
+            return settings
+        self._time_components.clear()
+        self._known.pop(self._key(settings), None)
+        return self._cheapest([settings, _in_waves(settings)])
 
     def _with_periodic_waves(self, settings: Settings) -> Settings:
         """Loops that are one segment by waves that go on across their seam: those of a motion that does not are
@@ -801,6 +823,50 @@ class Search:
     def _with_steps(self, settings: Settings) -> Settings:
         """On short stems those of each basis: affine functions are best at finer steps than modes are."""
         return self._cheapest([self._walk_steps(start, 1.15, 1.4) for start in self._in_each_basis(settings)])
+
+    def _settled(self, settings: Settings) -> Settings:
+        """Of small clips those that no other choice of one kind makes smaller, each with steps of its own: what was
+        chosen first was chosen at other steps, and sizes jump from bound to bound where the worse one of two stays."""
+        while self._is_small:
+            plain = replace(settings, learned_pieces=None)
+            bases = self._nearest(plain, list(self._other_bases(plain)))
+            others = self._nearest(
+                settings, [*self._each_with_learned_modes([plain, *bases]), *self._other_waves(settings)]
+            )
+            best = self._cheapest([settings, *(self._walk_steps(own, 1.15, 1.4) for own in others)])
+            if best is settings:
+                break
+            settings = best
+        return settings
+
+    def _other_bases(self, plain: Settings) -> Iterator[Settings]:
+        """Other spatial bases and rotations."""
+        turned = [
+            replace(plain, rotation_step_factors=(factor,) * self.levels, only_tips=False) for factor in FIRST_FACTORS
+        ]
+        yield from turned
+        yield from (replace(own, sheet=sheet) for own in (plain, turned[0]) for sheet in self._sheets())
+
+    def _each_with_learned_modes(self, plain: Sequence[Settings]) -> Iterator[Settings]:
+        """The settings, and the same with learned modes."""
+        yield from plain
+        for own in plain if not self._without(Feature.SHAPES) else ():
+            some = self._pieces_for_learned_modes(own, qz.REQUIRED_SAVINGS)
+            yield from (replace(own, learned_pieces=pieces) for pieces in some if pieces.any())
+
+    def _other_waves(self, settings: Settings) -> Iterator[Settings]:
+        """Waves, or learned time bases."""
+        yield _in_waves(settings)
+        if not self._without(Feature.TIME_BASES):
+            own = replace(settings, learned_bases=(True,) * self.levels)
+            yield from (replace(own, common_basis=common) for common in (False, True))
+
+    def _nearest(self, settings: Settings, others: list[Settings]) -> list[Settings]:
+        """The few of the others that are the cheapest, and hardly dearer than the cheapest of all."""
+        others = list({self._key(own): own for own in others if self._key(own) != self._key(settings)}.values())
+        costs = [cost for cost, _ in self._costs(others)]
+        most = NEAR * min([self.cost(settings)[0], *costs])
+        return [others[i] for i in np.argsort(costs, kind="stable")[:NEAREST] if costs[i] <= most]
 
     def _with_calm_parts(self, settings: Settings) -> Settings:
         """A finer step where corrections bend and twitch many small rigid parts, as far as it is cheap."""

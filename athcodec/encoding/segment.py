@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from weakref import WeakValueDictionary
 
 import numpy as np
 
@@ -73,6 +74,7 @@ class Source:
     sheet_like: np.ndarray = field(init=False)  # (B,) bool: branches that do not look like beams
     clip_range_segments: list[list[tuple[int, int]]] = field(init=False)  # per clip of the file
     segments: list[tuple[int, int]] = field(init=False)  # of all of them
+    _held: WeakValueDictionary[int, np.ndarray] = field(init=False, repr=False, compare=False)  # positions, by segment
 
     def __post_init__(self) -> None:
         self.origin = qz.nearest_singles((self.seen.low + self.seen.high) / 2)
@@ -92,6 +94,7 @@ class Source:
             for start, stop in self.clip.clip_range_frames
         ]
         self.segments = [segment for segments in self.clip_range_segments for segment in segments]
+        self._held = WeakValueDictionary()
 
     @property
     def has_seams(self) -> bool:
@@ -104,6 +107,7 @@ class Source:
             return self
         source = self._changed(reference=reference)
         source.clip_range_segments, source.segments = self.clip_range_segments, self.segments
+        source._held = self._held
         return source
 
     def in_segments(self, frames: int) -> Source:
@@ -232,8 +236,14 @@ class Source:
         return gather(block, self.hierarchy.vertex_source, self.origin, self.pool)
 
     def positions(self, segment: int) -> np.ndarray:
-        """(N, 3, T) float64 positions of a segment, less the origin."""
-        return self._all_positions if len(self.segments) == 1 else self.relative(self.block(segment))
+        """(N, 3, T) float64 positions of a segment, less the origin: made once for all who hold them at a time."""
+        if len(self.segments) == 1:
+            return self._all_positions
+        positions = self._held.get(segment)
+        if positions is None:
+            self._held[segment] = positions = self.relative(self.block(segment))
+            positions.setflags(write=False)
+        return positions
 
     @cached_property
     def _all_positions(self) -> np.ndarray:
@@ -667,6 +677,8 @@ def analyse(
     origin, dtype = output
     decoded = np.empty(positions.shape, dtype)
     segment.analyse(positions, settings.rounding, origin, decoded)
+    if before is not None:
+        segment.forget_caches()  # a refinement has no nodes
     return segment, decoded
 
 
@@ -721,7 +733,9 @@ def find_corrections(
     limit = settings.limit if keeps_all else np.where(is_rigid, np.inf, settings.limit)
     while True:
         step = qz.single(correction_step(settings.limit) * factor)
-        moves = streams.find_rigid_corrections(rigid, decoded, positions, origin, settings.limit, step, plan.pool)
+        moves = streams.find_rigid_corrections(
+            rigid, decoded, positions, origin, settings.limit, step, plan.pool, settings.narrow, ends.closed
+        )
         met = replace(ends, decided=streams.ascending(np.concatenate([ends.decided, moves])))
         rows = streams.find_corrections(decoded, positions, origin, limit, step, plan.pool, settings.narrow, met)
         if rows is not None:

@@ -366,9 +366,12 @@ def find_rigid_corrections(
     limit: float | np.ndarray,
     step: float,
     pool: ThreadPool = SERIAL,
+    narrow: bool = False,
+    closed: int = 0,
 ) -> np.ndarray:
     """Corrections, (K, 6), ascending, each of which moves all vertices of a part together, where one of `positions` is
-    beyond its limit, and this brings all of them within. parts: records with `first` and `count`."""
+    beyond its limit, and this brings all of them within. parts: records with `first` and `count`; narrow: corrections
+    are to be of one frame; closed: as MetEnds has it."""
     vertices, _, frames = positions.shape
     limits = np.array(np.broadcast_to(limit, vertices), np.float64)
     first, counts = (np.ascontiguousarray(parts[name], np.int32) for name in ("first", "count"))
@@ -386,7 +389,9 @@ def find_rigid_corrections(
                 address(source, np.float64, positions.size),
                 address(origin, np.float64, 3),
                 address(limits, np.float64, vertices),
+                narrow,
                 step,
+                closed,
                 rows,
                 capacity,
             ),

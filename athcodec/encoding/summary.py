@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -57,6 +58,8 @@ class Summary:
         One for each loop.
     found_branches : str or None
         The branches that were found for a clip without, in words; None for a clip that has branches.
+    not_read : dict of str to sequence of str
+        What the source holds besides, by its kind, named: MotionClip.not_read.
     """
 
     path: Path
@@ -70,6 +73,7 @@ class Summary:
     choices: dict[str, Any]
     seams: tuple[Seam, ...] = ()
     found_branches: str | None = None
+    not_read: Mapping[str, Sequence[str]] = field(default_factory=dict)
 
     @property
     def ratio(self) -> float:
