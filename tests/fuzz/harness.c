@@ -87,9 +87,9 @@ ath_chunk *fuzz_chunks(uint8_t *file, size_t size, uint32_t *count, uint32_t *ve
 
 /* ---- the mesh of a host: the same numbers for every file ---- */
 
-enum { MESH_VERTICES = 1 << 14, REST_HEAD = 17, IS_HOST = 4 };
+enum { REST_HEAD = 17, IS_HOST = 4 };
 
-static float *host_mesh(size_t vertices)
+float *fuzz_host_mesh(size_t vertices)
 {
     float *mesh = fuzz_memory(3 * vertices * sizeof *mesh, 0);
     for (size_t i = 0; i < 3 * vertices; i++) mesh[i] = (float)(i * i % 251) / 8.0f;
@@ -99,8 +99,8 @@ static float *host_mesh(size_t vertices)
 /* Checksums of that mesh in a REST chunk that asks for one. */
 static void repair_rest(uint8_t *rest, size_t length, size_t vertices)
 {
-    if (length != REST_HEAD + 8 || rest[0] != IS_HOST || vertices > MESH_VERTICES) return;
-    float *mesh = host_mesh(vertices);
+    if (length != REST_HEAD + 8 || rest[0] != IS_HOST || vertices > FUZZ_MESH_VERTICES) return;
+    float *mesh = fuzz_host_mesh(vertices);
     size_t size = 3 * vertices * sizeof *mesh;
     uint8_t *backwards = fuzz_copy((const uint8_t *)mesh, size);
     for (size_t i = 0; i < size; i++) backwards[i] = ((const uint8_t *)mesh)[size - 1 - i];
@@ -163,9 +163,9 @@ static int give_mesh(ath_file *file)
     ath_fault_info fault;
     ath_get_info(file, &info);
     if (!info.rest_is_host) return 1;
-    if (info.vertex_count > MESH_VERTICES) return 0;
+    if (info.vertex_count > FUZZ_MESH_VERTICES) return 0;
     check_needs_mesh(file, info.vertex_count);
-    float *mesh = host_mesh((size_t)info.vertex_count);
+    float *mesh = fuzz_host_mesh((size_t)info.vertex_count);
     REQUIRE(ath_set_host_mesh(file, mesh, 12, info.vertex_count - 1, &fault) == ATH_WRONG_HOST_MESH, "vertices count");
     check_fault(&fault, ATH_WRONG_HOST_MESH);
     int result = ath_set_host_mesh(file, mesh, 12, info.vertex_count, &fault);
@@ -301,6 +301,36 @@ void fuzz_go_on(fuzz_file *opened, int32_t segment, int32_t level, int32_t deepe
     }
     free(kept);
     free(from);
+    free(work);
+}
+
+void fuzz_prepare_to(fuzz_file *opened, int32_t segment, int32_t level, uint64_t most, int fill)
+{
+    const ath_file *file = opened->file;
+    int32_t start = ath_segment_start(file, segment), stop = ath_segment_start(file, segment + 1);
+    size_t work_size = ath_work_size(file), size = ath_segment_size(file, level);
+    size_t frame = 3 * (size_t)file->info.vertex_count * (file->info.is_float64 ? sizeof(double) : sizeof(float));
+    size_t room = frame * (size_t)(stop - start);
+    if (work_size > most || size > most || room > most || !fuzz_refine(opened, level, most, fill)) return;
+    void *work = fuzz_memory(work_size, fill), *memory = fuzz_memory(size, fill);
+    uint8_t *positions = fuzz_memory(room, fill), *wanted = fuzz_memory(frame, 0);
+    int result = ath_prepare_start(work, work_size, file, segment, level, memory, size);
+    int gone = result == ATH_OK && ath_prepare_to((ath_work *)work, positions) == ATH_OK;
+    result = run_to_end(result, work);
+    ath_segment *alone = fuzz_prepare(opened, segment, level, INT32_MAX, most, fill);
+    REQUIRE((alone != NULL) == (result == ATH_OK), "where positions go decides nothing");
+    if (alone) REQUIRE(fuzz_same(file, alone, memory), "where positions go changes nothing");
+    for (int32_t t = start; alone && gone && t < stop; t++) {
+        if (file->info.is_float64)
+            ath_positions_float64(file, (const ath_segment **)&alone, 1, t, ATH_SOURCE_ORDER, wanted, 24);
+        else
+            ath_positions(file, (const ath_segment **)&alone, 1, t, ATH_SOURCE_ORDER, (void *)wanted, 12);
+        REQUIRE(memcmp(wanted, positions + frame * (size_t)(t - start), frame) == 0, "positions are the caller's");
+    }
+    free(alone);
+    free(wanted);
+    free(positions);
+    free(memory);
     free(work);
 }
 

@@ -11,7 +11,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-enum { OPTIONS = 16, HEADER = 24, CHUNK_COUNT_AT = 20 };
+enum { OPTIONS = 16, HEADER = 24, CHUNK_COUNT_AT = 20, FUZZ_MESH_VERTICES = 1 << 14 };
 
 #define REQUIRE(condition, what)                                                                                       \
     do {                                                                                                               \
@@ -41,6 +41,9 @@ void fuzz_repair(uint8_t *file, size_t size);
  * number of vertices; null: none. */
 ath_chunk *fuzz_chunks(uint8_t *file, size_t size, uint32_t *count, uint32_t *vertices);
 
+/* The mesh that a host has, of up to FUZZ_MESH_VERTICES, three floats each, to be freed. */
+float *fuzz_host_mesh(size_t vertices);
+
 /* Limits small enough for a fuzzer, and for the memory of all its objects to be bounded by. */
 ath_limits fuzz_limits(uint64_t memory_bytes);
 
@@ -67,6 +70,10 @@ ath_segment *fuzz_prepare(fuzz_file *opened, int32_t segment, int32_t level, int
 /* Goes on from a segment at `level`, where that can be prepared, to `deeper`: that has to come out as when it is
  * prepared alone. */
 void fuzz_go_on(fuzz_file *opened, int32_t segment, int32_t level, int32_t deeper, uint64_t most, int fill);
+
+/* Prepares a segment with its positions in memory of the caller's, where they can go there: they have to be those of the
+ * segment prepared alone. */
+void fuzz_prepare_to(fuzz_file *opened, int32_t segment, int32_t level, uint64_t most, int fill);
 
 /* Whether both show the same bits. */
 int fuzz_same(const ath_file *file, const ath_segment *a, const ath_segment *b);

@@ -21,7 +21,7 @@ HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
 CORE = ROOT / "athcodec" / "core"
 BUILD = ROOT / "build" / "fuzz"
-TARGETS = ("container", "prelude", "motion", "decode")
+TARGETS = ("container", "prelude", "motion", "decode", "gpu", "player")
 NO_FUZZER = (
     "no clang with -fsanitize=fuzzer was found (install clang, or name one in FUZZ_CLANG): inputs are tried "
     "once, not mutated"
@@ -97,8 +97,9 @@ def compiler() -> Compiler:
 
 
 def decoder_sources(core: Path = CORE) -> list[Path]:
-    (names,) = re.findall(r"ATH_DECODER_SOURCES ([^)]*)\)", (core / "CMakeLists.txt").read_text())
-    return [core / name for name in names.split()]
+    """With the GPU form."""
+    lists = re.findall(r"set\(ATH_(?:DECODER|GPU)_SOURCES ([^)]*)\)", (core / "CMakeLists.txt").read_text())
+    return [core / name for names in lists for name in names.split()]
 
 
 def _run(command: list) -> None:
