@@ -13,7 +13,7 @@ if TYPE_CHECKING:  # what __getattr__ finds, for type checkers and the reference
     from athcodec.discovery import Found, find_branches
     from athcodec.encoding import Summary, encode
     from athcodec.exporters import write, write_hdf5
-    from athcodec.joining import join, looped, split
+    from athcodec.joining import in_wind, join, looped, split
     from athcodec.sources import read, read_hdf5, sample_path
     from athcodec.truncation import truncate
 
@@ -31,6 +31,7 @@ __all__ = [
     "encode",
     "errors",
     "find_branches",
+    "in_wind",
     "join",
     "looped",
     "metrics",
@@ -52,7 +53,7 @@ _LAZY = {  # by module: to import the package loads none, so that a command or a
     "discovery": ("Found", "find_branches"),
     "encoding": ("Summary", "encode"),
     "exporters": ("write", "write_hdf5"),
-    "joining": ("join", "looped", "split"),
+    "joining": ("in_wind", "join", "looped", "split"),
     "sources": ("read", "read_hdf5", "sample_path"),
     "truncation": ("truncate",),
 }

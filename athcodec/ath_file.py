@@ -7,10 +7,11 @@ this module feeds it bytes and reads the static data. What one clip shows is the
 from __future__ import annotations
 
 import builtins
+import math
 import os
 import threading
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import asdict, dataclass, fields
 from functools import cached_property
 from typing import Any, BinaryIO, cast
@@ -38,6 +39,7 @@ from athcodec.errors import (
 )
 from athcodec.hierarchy import Hierarchy, derived_edges
 from athcodec.host_mesh import HostMesh, mesh_positions
+from athcodec.joining import HEADING, STRENGTH, metadata_of, wind_of
 from athcodec.polygons import Polygons
 from athcodec.threads import ThreadPool, default_jobs
 
@@ -119,7 +121,8 @@ class AthFile:
     Parameters
     ----------
     path : str, path-like or binary file object
-        A path, a URL, or a seekable file object, which stays open when this is closed.
+        A path, a URL, or a seekable file object, which stays open when this is closed. A path may be that of a GLB with
+        ATH_motion, whose meshes are the host's.
     strict : bool
         Refuse a file that is shorter or longer than its header says.
     allow_partial : bool
@@ -170,6 +173,8 @@ class AthFile:
             self._check_length(strict)
             self._set_tables()
             self._damaged_from = self._first_damaged_level() if allow_partial else self.level_count
+            if host_mesh is None and self.needs_host_mesh:
+                host_mesh = getattr(self._source, "host_mesh", None)
             if host_mesh is not None:
                 self.set_host_mesh(host_mesh)
         except BaseException:
@@ -641,6 +646,7 @@ class AthFile:
                     "segments": clip.segment_count,
                     "seconds": clip.duration,
                     "loop": clip.loop,
+                    "wind": self._wind_of(clip),
                     "seam_errors": list(clip.seam_errors),
                     "max_errors": [level.max_error for level in self.levels_in(clip.segments)],
                 }
@@ -648,6 +654,11 @@ class AthFile:
             ],
             "levels": [asdict(level) for level in self.levels],
         }
+
+    def _wind_of(self, clip: Clip) -> dict[str, float] | None:
+        """Its strength and heading; None where its metadata name none."""
+        strength, heading = wind_of(metadata_of(self.metadata, clip.name))
+        return None if math.isnan(strength) else {STRENGTH: strength, HEADING: heading}
 
     # ---- static data, in the source's numbering ----
 
@@ -757,7 +768,9 @@ class AthFile:
     @cached_property
     def faces(self) -> np.ndarray | None:
         """Vertex numbers of the corners, (F, k) of the source's integer type, or None; faces of different sizes are
-        attributes."""
+        attributes. Of a motion in a GLB that holds none, the triangles there."""
+        if self.find(ct.FACES) is None:
+            return getattr(self._source, "faces", None)
         return None if self._polygons is None or self._polygons.counts is not None else self._polygons.rows
 
     @cached_property
@@ -878,7 +891,9 @@ class AthFile:
         with self._lock:
             self._prefetch(self.core.missing(level, segments[0], segments[-1]))
 
-    def prepare(self, segment: int, level: int, spare: core_file.Segment | None = None) -> core_file.Segment:
+    def prepare(
+        self, segment: int, level: int, spare: core_file.Segment | None = None, to: np.ndarray | None = None
+    ) -> core_file.Segment:
         """Decodes a segment of the file at a level.
 
         Parameters
@@ -891,11 +906,14 @@ class AthFile:
             A prepared segment that nobody needs any more. Where it is this one, at a coarser level of all vertices, or
             the one that this is joined to, decoding goes on from there, and its bytes are not read again; else its
             memory is taken if it is large enough.
+        to : (k, N, 3) array, optional
+            Where the positions of its k frames go, of the file's type, contiguous, in the source's order; where they
+            cannot go there at once, they do not.
 
         Returns
         -------
         core_file.Segment
-            What `core.positions` and `core.matrices` show.
+            What `core.positions` and `core.matrices` show, unless it is `gone` to the array.
 
         Raises
         ------
@@ -917,10 +935,16 @@ class AthFile:
         is_free = spare and not before and not joined_to and len(spare.memory) >= size
         ready = spare if spare and is_free else core_file.Segment(size)
         with self._lock:
-            self._decode(segment, level, ready, before, joined_to)
+            self._decode(segment, level, ready, before, joined_to, to)
         return ready
 
-    def show_all(self, segments: range, level: int, show: Callable[[int, core_file.Segment], None]) -> None:
+    def show_all(
+        self,
+        segments: range,
+        level: int,
+        show: Callable[[int, core_file.Segment], None],
+        room: Callable[[int], np.ndarray | None],
+    ) -> None:
         """Decodes segments of the file at a level, in runs that threads share.
 
         Parameters
@@ -931,6 +955,8 @@ class AthFile:
             One that is stored.
         show : callable
             Takes a segment's number and what was prepared, whose memory the next one takes over; threads call it.
+        room : callable
+            Takes a segment's number and gives the array that `prepare` has as `to`. What went there is not shown.
 
         Raises
         ------
@@ -941,7 +967,7 @@ class AthFile:
         with self._lock, self._fed(self.core.missing(level, segments[0], segments[-1]), what):
             self._refine(level)
             follows, runs = self._runs(segments, level, what)
-            items = [(run, level, follows, show) for run in runs]
+            items = [(run, level, follows, show, room) for run in runs]
             faults = ThreadPool(len(runs)).map(self._show_run, items)
             for fault in filter(None, faults):
                 raise fault
@@ -964,7 +990,12 @@ class AthFile:
         return follows, [segments[start:stop] for start, stop in zip(cuts, cuts[1:])]
 
     def _show_run(
-        self, run: range, level: int, follows: bool, show: Callable[[int, core_file.Segment], None]
+        self,
+        run: range,
+        level: int,
+        follows: bool,
+        show: Callable[[int, core_file.Segment], None],
+        room: Callable[[int], np.ndarray | None],
     ) -> core_file.CoreError | None:
         """Returns a fault rather than raises it: the other runs need the file's bytes until they end."""
         work, size = core_file.Work(self.core.work_size()), self.core.segment_size(level)
@@ -975,10 +1006,11 @@ class AthFile:
                 joined_to, ready = ready, spare or core_file.Segment(size)
                 spare = joined_to
             try:
-                self.core.prepare(work, segment, level, ready, joined_to=joined_to)
+                self.core.prepare(work, segment, level, ready, joined_to=joined_to, to=room(segment))
             except core_file.CoreError as fault:
                 return fault
-            show(segment, ready)
+            if not ready.gone:
+                show(segment, ready)
         return None
 
     def _refine(self, level: int) -> None:
@@ -996,10 +1028,11 @@ class AthFile:
         ready: core_file.Segment,
         before: core_file.Segment | None,
         joined_to: core_file.Segment | None,
+        to: np.ndarray | None,
     ) -> None:
         with self._fed(self._missing(segment, level, before, joined_to), f"level {level}, segment {segment}"):
             self._refine(level)
-            self.core.prepare(self._work, segment, level, ready, before, joined_to)
+            self.core.prepare(self._work, segment, level, ready, before, joined_to, to)
         self._rests_read = max(self._rests_read, level)
 
     def _missing(
@@ -1066,7 +1099,15 @@ def _opened(path: Any) -> Any:
         from athcodec.remote import Remote  # what it needs takes long to import
 
         return Remote(path)
-    return builtins.open(os.fspath(path), "rb")
+    file = builtins.open(os.fspath(path), "rb")
+    with ExitStack() as unread:
+        unread.callback(file.close)
+        if file.read(4) != b"glTF":
+            unread.pop_all()
+            return file
+    from athcodec.sources.gltf_motion import GltfMotion  # a decoder reads no sources otherwise
+
+    return GltfMotion(path)
 
 
 def median_rate(time: np.ndarray) -> float:

@@ -23,6 +23,7 @@ from ctypes import (
     c_uint16,
     c_uint32,
     c_uint64,
+    c_void_p,
 )
 
 import numpy as np
@@ -40,6 +41,8 @@ FAULT_TEXT = 256
 LEVEL_NAME = 32
 OK, HELD, MISSING = 0, 65, 66
 FILE_ORDER, SOURCE_ORDER = 0, 1
+AS_MARKED = 3
+BLEND_CLIPS = 4
 
 PART = np.dtype([(name, "<i4") for name in ("first", "count", "branch", "index")])
 
@@ -121,6 +124,12 @@ class Fault(Structure):
         return text.value.decode()
 
 
+class Share(Structure):
+    """ath_share."""
+
+    _fields_ = [("segments", c_void_p), ("segment_count", c_int32), ("frame", c_double), ("weight", c_double)]
+
+
 class Range(Structure):
     """ath_range."""
 
@@ -155,10 +164,13 @@ def front(data: bytes, limits: Limits) -> tuple[int, int, Fault]:
 
 class Segment:
     """One segment prepared at one level, in memory of its own that another preparation may take over, and what a deeper
-    level goes on from."""
+    level goes on from.
+
+    gone: its positions went to an array of the caller's. Then nothing but its end is to be used.
+    """
 
     def __init__(self, size: int):
-        self.memory, self._kept = aligned(size), aligned(0)
+        self.memory, self._kept, self.gone = aligned(size), aligned(0), False
 
     @property
     def pointer(self) -> int:
@@ -405,7 +417,7 @@ class File:
 
     def goes_on(self, before: Segment, segment: int, level: int) -> bool:
         """Whether what was prepared is this segment, at a level that this one goes on from."""
-        same = lib.ath_segment_index(before.pointer) == segment
+        same = lib.ath_segment_index(before.pointer) == segment and not before.gone
         return same and bool(lib.ath_goes_on(self._file, before.pointer, before.kept_pointer, level))
 
     def joined_to(self, segment: int, level: int) -> int:
@@ -428,10 +440,12 @@ class File:
         into: Segment,
         before: Segment | None = None,
         joined_to: Segment | None = None,
+        to: np.ndarray | None = None,
     ) -> None:
         """Decodes a segment at a level, from the beginning or from what goes_on() is true of.
 
-        joined_to: the segment that it is joined to, where that is ready at the level.
+        joined_to: the segment that it is joined to, where that is ready at the level; to: a contiguous array for its
+        positions, of the file's type, where they are to go if they can (`into.gone`).
         """
         self.build()
         self.refine(level)
@@ -445,6 +459,7 @@ class File:
             self._check(lib.ath_keep(work.pointer, keeping.ctypes.data, len(keeping)))
             if joined_to is not None:
                 self._check(lib.ath_follow(work.pointer, joined_to.pointer))
+            into.gone = to is not None and lib.ath_prepare_to(work.pointer, to.ctypes.data) == OK
             result = lib.ath_prepare_step(work.pointer, MOST_STEPS)
         if result != OK:
             lib.ath_work_fault(work.pointer, byref(fault))
@@ -461,6 +476,27 @@ class File:
         self._check(
             show(self._file, byref(ctypes.c_void_p(segment.pointer)), 1, frame, order, out.ctypes.data, out.strides[0])
         )
+
+    def frame_at(self, clip: int, seconds: float) -> float:
+        """Where on the file's frames a time of a clip is, a loop's wrapped around."""
+        return lib.ath_frame_at(self._file, clip, seconds, AS_MARKED)
+
+    def blended(self, shares: list[tuple[list[Segment], float, float]], order: int = SOURCE_ORDER) -> np.ndarray:
+        """(N, 3) float32: several clips at once, of each the segments that show it, its frame and its weight."""
+        arrays = [(c_void_p * len(segments))(*(segment.pointer for segment in segments)) for segments, _, _ in shares]
+        given = (Share * len(shares))(
+            *(
+                Share(ctypes.addressof(array), len(array), frame, weight)
+                for array, (_, frame, weight) in zip(arrays, shares)
+            )
+        )
+        out, scratch = np.empty((self.info.vertex_count, 3), np.float32), aligned(lib.ath_blend_size(self._file))
+        self._check(
+            lib.ath_blended_positions(
+                self._file, given, len(given), order, out.ctypes.data, 12, scratch.ctypes.data, len(scratch)
+            )
+        )
+        return out
 
     def matrices(self, segment: Segment, frame: float, node_count: int) -> np.ndarray:
         """(nodes, 3, 4) float64: maps of the cut's nodes from rest positions to positions."""
@@ -480,3 +516,10 @@ class File:
             raise ValueError(f"measure: got {measure!r}; expected one of {', '.join(MEASURES)}")
         number = MEASURES.index(measure)
         return lib.ath_level_for(self._file, segments[0], segments[-1], number, distance, fov, height, pixels)
+
+
+def wind_weights(winds: np.ndarray, strength: float, heading: float) -> np.ndarray:
+    """(K,) float64: weights of clips for a wind, given the strengths and headings of theirs, (K, 2); NaN: none."""
+    given, weights = np.ascontiguousarray(winds, np.float64), np.zeros(len(winds))
+    lib.ath_wind_weights(given.ctypes.data, len(given), strength, heading, weights.ctypes.data)
+    return weights

@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 import threading
 from bisect import bisect_right
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
@@ -24,7 +24,7 @@ from athcodec.ath_file import AthFile, Clip, Level, median_rate
 from athcodec.container import Limits
 from athcodec.errors import BadChunk, LevelUnavailable
 from athcodec.host_mesh import HostMesh
-from athcodec.joining import metadata_of
+from athcodec.joining import metadata_of, wind_of
 
 SHOWN_TYPES = (np.dtype(np.float32), np.dtype(np.float64))
 
@@ -176,6 +176,7 @@ class Decoder:
         self.clip: Clip = file.clips[0] if clip is None else file.clip_named(clip)
         self._lock = threading.Lock()
         self._last: tuple[tuple[int, int] | None, core_file.Segment | None] = None, None  # (segment, level), prepared
+        self._blending: dict[tuple[int, int], core_file.Segment] = {}  # prepared for the last call of `blended`
 
     def play(self, name: str) -> Decoder:
         """Another clip of the same file, at the same time as this one.
@@ -326,12 +327,18 @@ class Decoder:
             for frame in range(max(start, first), min(stop, last)):
                 self.file.core.positions(ready, self.clip.first_frame + frame, shown[frame - first])
 
-        segments = self._segments_of(first, last)
+        def room(segment: int) -> np.ndarray | None:
+            start, stop = self.segments[segment - self.clip.first_segment]
+            is_all = first <= start and stop <= last and shown.dtype == self.dtype
+            return shown[start - first : stop - first] if is_all else None
+
+        segments = self._in_file(self._segments_of(first, last))
         if len(segments) > 1:
-            self.file.show_all(self._in_file(segments), level, show)
+            self.file.show_all(segments, level, show, room)
         elif len(segments) == 1:
-            with self._prepared(segments.start, level) as ready:
-                show(self.clip.first_segment + segments.start, ready)
+            with self._prepared(segments.start, level, room(segments.start)) as ready:
+                if not ready.gone:
+                    show(segments.start, ready)
         out = shown.astype(dtype, copy=False)
         return out if frames is None or isinstance(frames, slice) else out[0]
 
@@ -365,6 +372,86 @@ class Decoder:
             start, stop = self.segments[segment]
             low, high = max(start, first), min(stop, last)
             yield low, self.positions(slice(low, high), level, dtype)
+
+    def wind_weights(self, strength: float, heading: float) -> dict[str, float]:
+        """Clips to blend for a wind.
+
+        Bilinear in strength and heading of the clips' own winds (metadata "strength" and "heading"): between the two
+        strengths next to the wanted one, and at each between the two headings next to the wanted one on the circle.
+        It changes without a jump, and is held beyond the calmest and the wildest clip.
+
+        Parameters
+        ----------
+        strength : float
+            In the unit that the clips' strengths have.
+        heading : float
+            Degrees.
+
+        Returns
+        -------
+        dict of str to float
+            At most four clips by name, with weights above 0 that add up to 1; for `blended`.
+        """
+        winds = np.array([wind_of(metadata_of(self.file.metadata, clip.name)) for clip in self.clips])
+        weights = core_file.wind_weights(winds, strength, heading)
+        return {clip.name: float(weight) for clip, weight in zip(self.clips, weights) if weight > 0}
+
+    def blended(
+        self,
+        weights: Mapping[str, float],
+        seconds: float | Mapping[str, float],
+        level: int | None | Mapping[str, int] = None,
+    ) -> np.ndarray:
+        """Several clips of the file at once, blended along the branches.
+
+        These stay attached, and edges along stems are as long as those of the clips in their weighted mean.
+
+        Parameters
+        ----------
+        weights : mapping of str to float
+            By name of clip; up to four are above 0. They need not add up to 1.
+        seconds : float or mapping of str to float
+            Since the first frame, of all clips or of each; loops wrap around.
+        level : int or mapping of str to int, optional
+            Level of detail, of all clips or of each; by default the deepest that is complete.
+
+        Returns
+        -------
+        numpy.ndarray
+            (N, 3) float32, scene units. Where one clip alone has a weight, that clip's numbers.
+
+        Raises
+        ------
+        ValueError
+            Where no weight is above 0, one is not finite, or more than four are above 0.
+        ClipUnavailable, LevelUnavailable, FormatError
+            As for `play` and `positions`.
+        """
+        used = {name: float(weight) for name, weight in weights.items() if not weight <= 0}
+        if not 0 < len(used) <= core_file.BLEND_CLIPS or not np.isfinite(list(used.values())).all():
+            raise ValueError(f"weights: got {dict(weights)}; expected 1 to {core_file.BLEND_CLIPS} that are above 0")
+        with self._lock:
+            before, self._blending = self._blending, {}
+        ready: dict[tuple[int, int], core_file.Segment] = {}
+        shares = []
+        for name, weight in used.items():
+            clip = self.file.clip_named(name)
+            own_level = self._checked_level(level.get(name) if isinstance(level, Mapping) else level)
+            own_seconds = seconds[name] if isinstance(seconds, Mapping) else seconds
+            frame = self.file.core.frame_at(self.clips.index(clip), own_seconds)
+            first, starts = int(frame), self.file.segment_starts(clip)
+            after = first + 1 if first + 1 < starts[-1] else starts[0]
+            shown = {
+                clip.first_segment + bisect_right(starts, place) - 1
+                for place in ([first, after] if frame > first else [first])
+            }
+            for segment in shown:
+                place = segment, own_level
+                ready[place] = ready.get(place) or before.get(place) or self.file.prepare(*place)
+            shares.append(([ready[segment, own_level] for segment in shown], frame, weight))
+        with self._lock:
+            self._blending = ready
+        return self.file.core.blended(shares)
 
     def level_rest(self, level: int | None = None) -> np.ndarray:
         """The reference pose of a level, which its maps move: the source's rest pose, or another that the motion is
@@ -414,7 +501,7 @@ class Decoder:
         parts = core.cut(level)
         nodes, stems = parts[parts["branch"] >= 0], file.exact_branches(parts)
         positions = np.empty((self.vertex_count, 3))
-        with self._prepared(self._segment_of(frame), level) as ready:
+        with self._prepared(self.clip.first_segment + self._segment_of(frame), level) as ready:
             node_matrices = core.matrices(ready, in_file, len(nodes))
             core.positions(ready, in_file, positions, core_file.FILE_ORDER)
         try:
@@ -483,18 +570,21 @@ class Decoder:
         return index, index + 1
 
     @contextmanager
-    def _prepared(self, segment: int, level: int) -> Iterator[core_file.Segment]:
-        """A segment of the clip at a level, for the caller alone; the last one is kept. Raises as `positions`."""
-        place = self.clip.first_segment + segment, level
+    def _prepared(self, segment: int, level: int, to: np.ndarray | None = None) -> Iterator[core_file.Segment]:
+        """A segment of the file at a level, for the caller alone; the last one is kept. Raises as `positions`.
+
+        to: as for `AthFile.prepare`.
+        """
+        place = segment, level
         with self._lock:
             (last, ready), self._last = self._last, (None, None)
         if last != place or ready is None:
-            ready = self.file.prepare(*place, ready)
+            ready = self.file.prepare(*place, ready, to)
         try:
             yield ready
         finally:
             with self._lock:
-                self._last = place, ready
+                self._last = (None if ready.gone else place), ready
 
     def _segments_of(self, first: int, last: int) -> range:
         """The clip's segments that hold the frames first to last - 1."""

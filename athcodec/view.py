@@ -142,6 +142,7 @@ def serve(
     ready: Callable[[str], None] = print,
     clip: str | None = None,
     host_mesh: HostMesh | None = None,
+    forest: bool = False,
 ) -> None:
     """Serves the viewer with an .ath file on 127.0.0.1 until it is interrupted.
 
@@ -157,6 +158,8 @@ def serve(
         The name of the clip to begin with; by default the first.
     host_mesh : array, MotionClip, str or path-like, optional
         As `export_page`.
+    forest : bool
+        Whether the address is that of the page that shows many plants, on WebGPU.
 
     Raises
     ------
@@ -182,7 +185,7 @@ def serve(
             more = ("" if clip is None else f"&clip={quote(clip, safe='')}") + (
                 "" if mesh is None else f"&mesh={quote(place)}.mesh"
             )
-            ready(f"{address}/?file={quote(place)}{more}")
+            ready(f"{address}/{'forest.html' if forest else ''}?file={quote(place)}{more}")
             await asyncio.Event().wait()
         finally:
             await runner.cleanup()

@@ -130,15 +130,24 @@ static void write_matrices(const opened *clip, ath_segment *const *segments, dou
 
 static size_t frame_floats(const opened *clip) { return 3 * (size_t)clip->info.vertex_count; }
 
-/* All frames in the source's order, segment by segment in one segment's memory. */
+/* All frames of a segment in the source's order, at once where that can be. */
+static void decode_segment(const opened *clip, int32_t s, ath_segment *segment, float *out)
+{
+    int32_t first = ath_segment_start(clip->file, s), stop = ath_segment_start(clip->file, s + 1);
+    int32_t level = clip->info.level_count - 1;
+    ath_work *work = (ath_work *)clip->work;
+    expect_ok("ath_prepare_start", ath_prepare_start(work, clip->work_bytes, clip->file, s, level, segment,
+                                                     ath_segment_size(clip->file, level)));
+    int is_there = !clip->info.is_float64 && ath_prepare_to(work, out + (size_t)first * frame_floats(clip)) == ATH_OK;
+    expect_ok("ath_prepare_step", ath_prepare_step(work, INT32_MAX));
+    for (int32_t t = first; t < stop && !is_there; t++)
+        write_frame(clip, &segment, 1, (double)t, ATH_SOURCE_ORDER, out + (size_t)t * frame_floats(clip));
+}
+
+/* Segment by segment in one segment's memory. */
 static void decode_all(const opened *clip, ath_segment *segment, float *out)
 {
-    for (int32_t s = 0; s < clip->info.segment_count; s++) {
-        int32_t stop = ath_segment_start(clip->file, s + 1);
-        prepare(clip, s, clip->info.level_count - 1, segment);
-        for (int32_t t = ath_segment_start(clip->file, s); t < stop; t++)
-            write_frame(clip, &segment, 1, (double)t, ATH_SOURCE_ORDER, out + (size_t)t * frame_floats(clip));
-    }
+    for (int32_t s = 0; s < clip->info.segment_count; s++) decode_segment(clip, s, segment, out);
 }
 
 static uint32_t crc_of(const opened *clip, const float *frames)

@@ -29,6 +29,7 @@ from bench.clips import Encoded, encoded, measure
 
 TABLE_ENTRY, ERROR_ENTRY = 6, 2.5  # bytes of the front, about: of a chunk, and of the errors of a level in a segment
 ROUNDING = 1e-6  # the error table holds float32
+STREAMS = ("SHAPES", "STEMS", "CORRECTIONS")
 
 CURVE_NOTE = """
 Bytes: length of the prefix; segments: number at this level, the others are at the one before. Max and RMS over
@@ -150,20 +151,33 @@ def _pooled(parts: Iterable[tuple[float, float, int]], diagonal: float) -> tuple
 # ---- the cost ----
 
 
-def cost(clip_path: Path, rel_error: float) -> dict[str, Any]:
-    """One row: bytes of a file, bytes of each part that serves its levels, and bytes without them."""
+def cost(clip_path: Path, rel_error: float) -> dict[str, Any] | None:
+    """One row: bytes of a file, bytes of each part that serves its levels, and bytes without them. None for a file
+    whose levels have no streams, such as one of predicted motion, and for a short one without coarse levels."""
     with encoded(clip_path, rel_error) as result:
         chunks, sizes = result.decoder.file.chunks, result.summary.chunk_bytes
         levels, segments = result.decoder.level_count, len(result.decoder.segments)
-    with athcodec.read_hdf5(clip_path) as clip:
-        return _cost(_Recoding(clip, rel_error), chunks, sizes, levels, segments, result.summary.bytes)
+        if not any(sizes.get(kind) for kind in STREAMS):
+            return None
+        clip = result.clip if result.clip.has_branches else _with_those_of(result.decoder, result.clip)
+        recoding = _Recoding(clip, rel_error)
+        if recoding.level_count != levels:
+            return None
+        return _cost(recoding, chunks, sizes, levels, segments, result.summary.bytes)
+
+
+def _with_those_of(decoder: athcodec.Decoder, clip: athcodec.MotionClip) -> athcodec.MotionClip:
+    """The clip on the branches that encoding found for it."""
+    return clip.replace(
+        vertex_branch=decoder.vertex_branch, branch_parent=decoder.branch_parent, stem_index=decoder.stem_index
+    )
 
 
 def _cost(
     recoding: _Recoding, chunks: list[ct.Chunk], sizes: dict[str, int], levels: int, segments: int, bytes_: int
 ) -> dict[str, Any]:
     stored = recoding.streams(recoding.settings)
-    in_file = sum(sizes.get(kind, 0) for kind in ("SHAPES", "STEMS", "CORRECTIONS"))
+    in_file = sum(sizes.get(kind, 0) for kind in STREAMS)
     if stored != in_file:
         raise RuntimeError(
             f"{recoding.name}: got {stored} bytes of motion when coding again; expected the {in_file} of the file"
@@ -215,6 +229,10 @@ class _Recoding:
         self._source = self._search.source
         self._positions = [self._source.positions(i) for i in range(len(self._source.segments))]
         _, (self.settings,) = self._search.found()
+
+    @property
+    def level_count(self) -> int:
+        return len(self.settings.rotation_step_factors)
 
     def of_one_level(self) -> list[Settings]:
         """Settings for a single stream: those of each level in turn, applied to all levels."""

@@ -276,8 +276,9 @@ def _levels(case: Case, clip_digest: str, bounds: tuple[float, ...], suite: str,
     wanted += [("costs", bound, progressive.cost) for bound in costs]
     for name, bound, measure in wanted:
         identity = {"clip": case.name, "bound": bound}
-        if store.find(name, identity, depends) is None:
-            store.add(name, identity | measure(case.path, bound) | {"depends": depends})
+        measured = None if store.find(name, identity, depends) else measure(case.path, bound)
+        if measured is not None:
+            store.add(name, identity | measured | {"depends": depends})
 
 
 # ---- tables ----

@@ -3,6 +3,7 @@ folder where that is not set."""
 
 from __future__ import annotations
 
+import hashlib
 import os
 import subprocess
 import sys
@@ -31,6 +32,15 @@ def vtk_python() -> str:
     return os.environ.get("ATHCODEC_VTK") or _environment("vtk", "vtk", "pyvista")
 
 
+@cache
+def usd_plugin_python() -> str:
+    """A Python that has USD and this repository's plugin for it, and never athcodec."""
+    root = Path(__file__).parent.parent
+    sources = sorted(path for folder in ("usd", "core") for path in (root / "athcodec" / folder).rglob("*.*"))
+    digest = hashlib.sha256(b"".join(path.read_bytes() for path in sources if path.is_file())).hexdigest()
+    return _environment("usd-plugin", str(root / "athcodec/usd"), "numpy", state=digest)
+
+
 def run_script(python: str, script: str, *arguments: object) -> str:
     """What the script prints; its errors with a failed run."""
     done = subprocess.run([python, "-c", script, *map(str, arguments)], capture_output=True, text=True, timeout=600)
@@ -50,7 +60,7 @@ def install_once(folder: Path, packages: str, install: Callable[[], object]) -> 
             installed.write_text(packages)
 
 
-def _environment(name: str, *packages: str) -> str:
+def _environment(name: str, *packages: str, state: str = "") -> str:
     folder = CACHE / f"{name}-{sys.version_info.major}.{sys.version_info.minor}"
     python = folder / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
 
@@ -58,5 +68,5 @@ def _environment(name: str, *packages: str) -> str:
         venv.create(folder, with_pip=True, clear=True)
         subprocess.run([python, "-m", "pip", "install", "-q", *packages], check=True)
 
-    install_once(folder, " ".join(packages), install)
+    install_once(folder, " ".join([*packages, state]), install)
     return str(python)

@@ -256,6 +256,17 @@ def test_a_failure_of_a_codec_is_reported_in_its_row(tmp_path, bushy_file):
     assert "\nBROKEN" not in text  # of programs; a baseline that breaks its bound is our own mistake
 
 
+def test_clips_without_branches_are_measured_on_those_that_encoding_finds(tmp_path, sample_clip):
+    bare = sample_clip.replace(
+        positions=sample_clip.positions[:20], time=sample_clip.time[:20], vertex_branch=None, branch_parent=None
+    )
+    athcodec.write_hdf5(bare.replace(edges=None), tmp_path / "bare.h5")
+    with athcodec.read(tmp_path / "bare.h5") as clip:
+        assert not clip.has_branches
+    text, result = run_bench(tmp_path, "rd", tmp_path / "bare.h5", "--bounds", "1e-4", "--codecs", "athcodec")
+    assert "What levels cost: bare" in text and result["costs"][0]["levels"] > 1
+
+
 def test_results_from_before_a_measure_print_without_it():
     old = point("athcodec", "athcodec", 1e-3, 100, 0.1) | {"clip": "oak", "cpu": "any", "settings": "", "bits": 1.0}
     times = {"encode_s": 1.0, "encode_runs": 1, "encode_peak_bytes": 1, "decode_s": 1.0, "decode_peak_bytes": 1}

@@ -180,6 +180,7 @@ _SIGNATURES = {
     "ath_segment_size": (c_size_t, [c_void_p, c_int32]),
     "ath_prepare_start": (c_int, [c_void_p, c_size_t, c_void_p, c_int32, c_int32, c_void_p, c_size_t]),
     "ath_prepare_step": (c_int, [c_void_p, c_int32]),
+    "ath_prepare_to": (c_int, [c_void_p, c_void_p]),
     "ath_prepare_steps": (c_int32, [c_void_p, c_int32, c_int32]),
     "ath_prepare": (c_int, [c_void_p, c_size_t, c_void_p, c_int32, c_int32, c_void_p, c_size_t]),
     "ath_keep_size": (c_size_t, [c_void_p, c_int32]),
@@ -909,6 +910,47 @@ def test_threads_prepare_from_one_file_at_the_same_time(player):
         for frame in range(player.start_of(segment), player.start_of(segment + 1)):
             one, *others = [player.frame([done[segment, level]], frame) for done in (alone, *together)]
             assert all(np.array_equal(one, other) for other in others)
+
+
+@pytest.mark.parametrize(
+    "name, options, levels",
+    [
+        ("tree", {"segment_frames": 50, "ladder": "none", "rel_error": 1e-3}, 1),
+        ("tree", {"segment_frames": 50, "ladder": LADDER, "rel_error": 1e-4}, 3),
+        ("tree", {"segment_frames": 50, "ladder": "none", "rel_error": 1e-3, "lossless": True}, 2),
+        ("growth", {"segment_frames": 50, "ladder": "none", "rel_error": 1e-3}, 1),
+        (None, {"rel_error": 1e-2}, 0),
+    ],
+    ids=["transformed", "layers", "lossless", "predicted", "another order"],
+)
+def test_positions_go_to_the_callers_memory_at_levels_of_all_vertices_in_the_order_of_the_source(
+    name, options, levels, scratch
+):
+    """The segments are joined, too; frames of the growth repeat. What cannot go there is not touched."""
+    clip = awkward(6, branches=6, shuffled=True) if name is None else athcodec.read(athcodec.sample_path(name))
+    athcodec.encode(clip, scratch / "to.ath", attributes="none", effort="fast", **options)
+    player, went = Player((scratch / "to.ath").read_bytes()), set()
+    for level, segment in itertools.product(player.levels, player.segments):
+        alone, work, into = player.prepare(segment, level), player.work(), player.room(level)
+        frames = range(player.start_of(segment), player.start_of(segment + 1))
+        assert player.start(segment, level, work, into) == OK
+        number = 8 if player.info.is_float64 else 4
+        positions = Memory(len(frames) * player.info.vertex_count * 3 * number)
+        result = core.ath_prepare_to(work.address, positions.address)
+        assert result in (OK, BAD_ARGUMENT)
+        assert core.ath_prepare_step(work.address, 2**31 - 1) == OK
+        for memory in (work, into, positions):
+            memory.check()
+        shown = shown_of(player, alone)
+        assert np.array_equal(shown_of(player, into), shown)
+        if result == OK:
+            went.add((level, segment))
+            assert np.array_equal(positions.bytes.view(f"f{number}").reshape(shown.shape), shown)
+        else:
+            assert not positions.bytes.any()
+    repeats = ctypes.string_at(core.ath_repeats(player.address), player.info.frame_count)
+    steady = [own for own in player.segments if not any(repeats[player.start_of(own) : player.start_of(own + 1)])]
+    assert steady and went == set(itertools.product(player.levels[player.info.level_count - levels :], steady))
 
 
 # ---- going on ----

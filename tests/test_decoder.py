@@ -233,6 +233,26 @@ def test_any_frames_alone_equal_those_of_the_whole(played):
             assert np.array_equal(decoder.positions(frame, level), whole[frame])
 
 
+@pytest.mark.parametrize("segment_frames", [40, 120])
+def test_all_frames_at_once_are_those_of_frame_after_frame_and_the_callers_own(segment_frames, tmp_path):
+    """They need no memory but their own where the order of the file is the source's, as the sample's is."""
+    with athcodec.read_hdf5(athcodec.sample_path()) as clip:
+        athcodec.encode(clip, tmp_path / "sample.ath", rel_error=1e-3, segment_frames=segment_frames)
+    with athcodec.open(tmp_path / "sample.ath") as once, athcodec.open(tmp_path / "sample.ath") as in_turn:
+        frames = np.stack([in_turn.positions(t) for t in range(in_turn.frame_count)])
+        for _ in range(2):
+            whole = once.positions()
+            assert np.array_equal(whole, frames)
+            whole[:] = np.nan
+            assert np.array_equal(once.positions(50), frames[50])
+        blocks = [block for _, block in once.blocks()]
+        blocks_then = np.concatenate(blocks)
+        for block in blocks:
+            block[:] = np.nan
+        assert np.array_equal(blocks_then, frames) and np.array_equal(once.positions(119), frames[119])
+        assert np.array_equal(once.positions(level=0), in_turn.positions(level=0))
+
+
 def test_blocks_are_the_motion_in_order(bushy_ath):
     with athcodec.open(bushy_ath) as decoder:
         blocks = list(decoder.blocks(level=2))

@@ -15,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from test_usd import add_leaves, new_stage
 
 import athcodec
 from athcodec import cli
@@ -41,12 +42,16 @@ def files(tmp_path_factory):
         athcodec.encode(clip, folder / "tree.ath", effort="fast")
         clip.attributes["slack"] = np.ones(clip.vertex_count, np.float32)
         athcodec.write(clip, folder / "tree.usdc")
+        athcodec.write(clip, folder / "tree.glb")
         for name, frames in {"calm": slice(0, 50), "gale": slice(60, 120), "storm": slice(60, 120)}.items():
             motion = dataclasses.replace(
                 clip, positions=clip.positions[frames], time=clip.time[frames], rest=clip.rest.astype(np.float32)
             )
             athcodec.write(motion, folder / f"{name}.h5")
             athcodec.write(motion, folder / f"{name}.abc")
+    stage = new_stage(folder / "forest.usda")
+    add_leaves(stage)
+    stage.Save()
     return folder
 
 

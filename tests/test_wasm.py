@@ -22,7 +22,7 @@ from athcodec._library import load_library
 
 VIEWER = Path(__file__).resolve().parent.parent / "athcodec" / "viewer"
 MODULE = VIEWER / "ath_decoder.mjs"
-MOST_BYTES = 158_000
+MOST_BYTES = 168_000
 OK, HELD, NOT_PREPARED = 0, 65, 67
 
 

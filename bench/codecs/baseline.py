@@ -4,7 +4,7 @@ A baseline writes and reads its lossy part; here its positions are decoded as a 
 error exceeds the bound are corrected as in athcodec. So a baseline's step may be coarser than its worst vertex allows,
 and step and corrections are searched together. Settings are searched one after the other, each along its ladder from
 its current value in strides of two and then one, until a round changes nothing: a local search. Of large clips a part
-is searched, and then the step alone with all vertices.
+is searched in one round, and then step and clusters with all vertices.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from bench.codecs.tree import VertexOrder, ordered
 
 FINALISTS = 3
 LARGE = 8_000_000  # numbers; larger clips are searched by a part of them
-SEARCHED = 6_000  # vertices of that part
+SEARCHED = 3_000  # vertices of that part
 AGAIN = ("step", "clusters")  # what is searched with all vertices
 
 
@@ -159,7 +159,7 @@ class Baseline(ABC):
             return search(source, self.grid(source, bound), self.rounds)
         part = source.part(SEARCHED)
         grid = self.grid(part, bound)
-        best = search(part, grid, self.rounds)[0]
+        best = search(part, grid, 1)[0]
         near = {
             name: axis.starting_at(best[name]) if name in AGAIN else Choice((best[name],))
             for name, axis in grid.items()

@@ -330,7 +330,9 @@ class ClusteredPca(Baseline):
     title = "clustered PCA (Sattler)"
     counts = (1, 2, 4, 8, 16, 24, 32, 48, 64, 96, 128, 192)
     rank = 8  # of the bases that define the clusters
+    main = 24  # components of the motion that clusters are formed by
     turns = 8
+    moved = 16_000  # vertices that turns are made with; the others join the clusters in the end
 
     def grid(self, source: Source, bound: float) -> dict[str, Ladder | Choice]:
         return grid_of(
@@ -361,26 +363,36 @@ class ClusteredPca(Baseline):
 
         def make():
             motion = mean_motion(source, order)
-            groups = self._lloyd(trajectories.rows(motion), count, 1 if trajectories.joint else 3, len(motion))
+            _, basis = source_basis(source, order, trajectories)
+            groups = self._lloyd(trajectories.rows(motion) @ basis[: self.main].T, count, len(motion))
             spectra = [principal(trajectories.rows(motion[groups == group])) for group in range(groups.max() + 1)]
             return groups, spectra
 
         return memo(source, ("clusters", order.hierarchy is not None, count, trajectories.joint), make)
 
-    def _lloyd(self, rows: np.ndarray, count: int, rows_per_vertex: int, vertices: int) -> np.ndarray:
-        """Clusters of vertices by the basis with the smallest residual; starts from runs of neighbours."""
-        groups = np.arange(vertices) * count // vertices
-        coefficients = rows @ principal(rows)[1][:24].T  # the main part of the motion, small enough to iterate on
+    def _lloyd(self, coefficients: np.ndarray, count: int, vertices: int) -> np.ndarray:
+        """Clusters of vertices by the basis that has most of their motion; starts from runs of neighbours."""
+        by_vertex = coefficients.reshape(vertices, -1, coefficients.shape[1])
+        some = by_vertex[:: -(-vertices // self.moved)]
+        groups = np.arange(len(some)) * count // len(some)
         for _ in range(self.turns):
-            residuals = np.full((count, vertices), np.inf)
-            for group in range(count):
-                mine = coefficients[np.repeat(groups == group, rows_per_vertex)]
-                if len(mine):
-                    basis = principal(mine)[1][: self.rank]
-                    residual = (coefficients**2).sum(axis=1) - ((coefficients @ basis.T) ** 2).sum(axis=1)
-                    residuals[group] = residual.reshape(vertices, -1).sum(axis=1)
-            nearest = residuals.argmin(axis=0)
+            bases = [self._basis(some[groups == group]) for group in range(count)]
+            nearest = self._nearest(some, bases)
             if np.array_equal(nearest, groups):
                 break
             groups = nearest
+        if len(some) < vertices:
+            groups = self._nearest(by_vertex, bases)
         return np.unique(groups, return_inverse=True)[1]
+
+    def _basis(self, members: np.ndarray) -> np.ndarray:
+        return principal(members.reshape(-1, members.shape[2]))[1][: self.rank]
+
+    @staticmethod
+    def _nearest(by_vertex: np.ndarray, bases: list[np.ndarray]) -> np.ndarray:
+        """Of (N, rows, K) the basis that has most of each vertex's motion; never an empty one before another."""
+        caught = [
+            ((by_vertex @ basis.T) ** 2).sum(axis=(1, 2)) if len(basis) else np.full(len(by_vertex), -1.0)
+            for basis in bases
+        ]
+        return np.argmax(caught, axis=0)
