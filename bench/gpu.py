@@ -1,17 +1,21 @@
-"""Forests on WebGPU: bytes uploaded, memory of levels beside baked textures, and what a frame costs the processor.
+"""Forests on WebGPU: bytes uploaded, memory of levels beside baked textures, what a frame costs the processor, and how
+long the passes take beside skinning.
 
-A clip is joined with copies of it, as many as there are clips. Rendering is in software, so nothing is said of the time
-that a graphics processor takes; what is timed is the page's own work, without three.js, on a stopped page.
+A clip is joined with copies of it, as many as there are clips. Where there is no graphics card rendering is in
+software: times of passes then say something only beside those of skinning; the processor's are the page's own, without
+those of its GPU process.
 """
 
 from __future__ import annotations
 
 import argparse
+import sys
 import tempfile
 from pathlib import Path
 from typing import Any
 
 import athcodec
+from athcodec.exporters import WriteOptions, openvat
 from bench.browser import WEBGPU_FLAGS, chromium
 from bench.clips import add_clips, add_effort, add_rel_error
 from bench.tables import table
@@ -20,27 +24,16 @@ from bench.throttled_server import ThrottledServer
 COUNTS = (100, 10_000)
 UPDATES = 40
 TEXEL = 8  # of a texture of four halves, one for each vertex and frame: positions, without normals
-READY = "athcodecForest.forest.levels.length === athcodecForest.ath.motion.levelCount"
-NOTE = (
-    "motion: bytes uploaded once, of levels and segments. parameters: bytes a frame, which frames are shown, and "
-    f"the view. All levels are computed in each frame. milliseconds: mean of {UPDATES} updates, 60 a second."
-)
-MEASURED = """async (updates) => {
-  const { forest, camera, renderer, ath } = athcodecForest, { device } = renderer.backend;
-  camera.position.set(0, ath.sphere.radius, 0);
-  forest.update(camera, 720, 0);
-  const before = forest.bytesOfParameters;
-  let spent = 0;
-  for (let i = 0; i < updates; i++) {
-    const start = performance.now();
-    forest.update(camera, 720, i / 60);
-    spent += performance.now() - start;
-    if (i % 5 === 4) await device.queue.onSubmittedWorkDone();
-  }
-  return { milliseconds: spent / updates, parameters: (forest.bytesOfParameters - before) / updates,
-    motion: forest.bytesOfMotion, plants: forest.plantCount, gpu: forest.levels.map(({ passes }) => passes.bytes),
-    uploads: forest.levels.map(({ passes }) => passes.bytesOfMotion) };
-}"""
+HERE = Path(__file__).parent
+COSTS = f"""motion: bytes uploaded once, of levels and segments. again: bytes of motion uploaded in {UPDATES} updates
+when all of them are there. parameters: bytes a frame, which frames are shown, and the view. All levels are computed in
+each frame. update: milliseconds, the median of {UPDATES} updates, 60 a second, of the forest; render: of three.js, the
+median of 5."""
+MEMORY = """Of all clips. textures: positions as four halves for each vertex and frame. OpenVAT: the PNG files that the
+exporter writes, 16 bits a number."""
+PASSES = """Milliseconds for all plants, each position, normal and previous position of each vertex, the median of 7.
+skinning: one matrix for each branch, of two frames. shown: pass 3 alone, as between two frames; placed: passes 1 to 3
+where every plant has come to its next frame, as a clip of 30 frames a second does in every other picture."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -51,31 +44,45 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> dict[str, Any]:
-    costs, memory = [], []
+    costs, memory, passes = [], [], []
     for path in args.clips:
         with tempfile.TemporaryDirectory() as folder, athcodec.read(path) as clip:
             file = Path(folder) / "clips.ath"
             clips = athcodec.join({f"copy {i}": clip for i in range(args.copies)})
             athcodec.encode(clips, file, rel_error=args.rel_error, effort=args.effort, attributes="none")
             texture = TEXEL * clip.frame_count * clip.vertex_count * args.copies
+            theirs = args.copies * openvat_bytes(clip, Path(folder) / "vat")
             data = file.read_bytes()
         for count in COUNTS:
-            found = measured(data, count)
+            print(f"{path.stem}: {count:,} instances", file=sys.stderr)
+            found = measured(data, count, beside_skinning=count == COUNTS[0])
             case = {"clip": path.stem, "clips": args.copies, "instances": count}
-            costs.append(case | {name: found[name] for name in ("plants", "milliseconds", "parameters", "motion")})
+            names = ("plants", "update", "render", "parameters", "again", "motion")
+            costs.append(case | {name: found[name] for name in names})
+            for row in found["passes"]:
+                ratios = {f"{name} / skinning": row[name] / row["skinning"] for name in ("shown", "placed")}
+                passes.append({"clip": path.stem, "plants": found["plants"]} | row | ratios)
         for level, (size, upload) in enumerate(zip(found["gpu"], found["uploads"], strict=True)):
-            memory.append(
-                {"clip": path.stem, "level": level, "uploaded": upload, "on the GPU": size, "texture": texture}
-            )
-    return {"tables": [table("A frame", costs, NOTE), table("Bytes of a level", memory)], "broken": []}
+            sizes = {"uploaded": upload, "on the GPU": size, "textures": texture, "OpenVAT": theirs}
+            memory.append({"clip": path.stem, "level": level} | sizes)
+    tables = [table("A frame", costs, COSTS), table("Bytes of a level", memory, MEMORY)]
+    return {"tables": [*tables, table("Passes beside skinning", passes, PASSES)], "broken": []}
 
 
-def measured(data: bytes, count: int) -> dict[str, Any]:
+def openvat_bytes(clip: Any, folder: Path) -> int:
+    openvat.write_clip(clip, folder, WriteOptions(half=True), lambda share: None)
+    return sum(file.stat().st_size for file in folder.glob("*.png"))
+
+
+def measured(data: bytes, count: int, beside_skinning: bool) -> dict[str, Any]:
     with chromium(WEBGPU_FLAGS) as browser, ThrottledServer({"plant.ath": data}) as line:
         page = browser.new_page(viewport={"width": 320, "height": 200})
         page.goto(f"{line.address}forest.html?file=plant.ath&count={count}&drawn=0")
         page.wait_for_function("() => window.athcodecForest?.forest")
-        page.evaluate("athcodecForest.forest.pixels = 1e-6")  # so that all levels are wanted
-        page.wait_for_function(f"() => {READY}", timeout=300_000)
-        page.evaluate("athcodecForest.playing = false")
-        return page.evaluate(MEASURED, UPDATES)
+        page.evaluate(f"window.measure = {(HERE / 'gpu.js').read_text()}; null")
+        page.evaluate("measure.opened()")
+        found = page.evaluate("(updates) => measure.measured(updates)", UPDATES)
+        if not beside_skinning:
+            return found | {"passes": []}
+        shader = (HERE / "skinning.wgsl").read_text()
+        return found | {"passes": page.evaluate("(shader) => measure.besideSkinning(shader)", shader)}

@@ -328,3 +328,15 @@ def blown_tree(seed: int, branches: int = 120, frames: int = 120, lean: float = 
         vertex_branch=np.repeat(np.arange(branches, dtype=np.int32), counts),
         branch_parent=np.array(parent, np.int32),
     )
+
+
+def bending_tube() -> MotionClip:
+    """Of quads, which bends to one side."""
+    clip = tube(40, 12, 30)
+    clip.positions = clip.positions * np.float32(1)
+    clip.positions[..., 0] += (np.arange(30, dtype=np.float32) / 29)[:, None] * np.float32(0.06) * clip.rest[:, 2] ** 2
+    rings, around = 12 * np.arange(39)[:, None], np.arange(12)[None]
+    corners = [rings + around, rings + (around + 1) % 12, rings + 12 + (around + 1) % 12, rings + 12 + around]
+    clip.faces = np.stack(corners, axis=-1).reshape(-1, 4).astype(np.int32)
+    clip.check()
+    return clip

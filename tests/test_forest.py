@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from plants import blown_tree
+from plants import bending_tube, blown_tree
 
 import athcodec
 
@@ -125,3 +125,12 @@ def test_ten_thousand_plants_are_seen(opened, grove):
     assert page.evaluate("athcodecForest.forest.count") == 10_000
     assert sum(page.evaluate("athcodecForest.forest.drawn()")) > 1000
     assert page.evaluate("athcodecForest.milliseconds") < 100
+
+
+@pytest.mark.parametrize("mode", ["matrices", "positions"])
+def test_one_plant_and_its_shadow_move_on_a_renderer_for_webgpu(opened, mode, tmp_path):
+    path = tmp_path / "tube.ath"
+    athcodec.encode(bending_tube(), path, rel_error=1e-3)
+    page = opened(path, 1, "true")
+    found = page.evaluate((Path(__file__).parent / "node" / "shadows.js").read_text("utf-8"), mode)
+    assert found["covered"] > 0.95 and found["changed"] > 20, found

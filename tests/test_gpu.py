@@ -248,10 +248,10 @@ def shaders(browser):
         kinds = {".mjs": "text/javascript", ".html": "text/html"}
         route.fulfill(body=body, content_type=kinds.get(Path(name).suffix, "application/octet-stream"))
 
-    def run(level: np.ndarray, segments: list[np.ndarray], shows: list, corners: np.ndarray | None = None):
+    def run(level: np.ndarray, segments: list[np.ndarray], shows: list, corners: np.ndarray | None = None, **options):
         blocks = {f"block{i}": words.tobytes() for i, words in enumerate([level, *segments])}
         served.update(blocks | ({} if corners is None else {"corners": corners.tobytes()}))
-        arguments = ["block0", list(blocks)[1:], shows, None if corners is None else "corners"]
+        arguments = ["block0", list(blocks)[1:], shows, None if corners is None else "corners", options]
         results = page.evaluate("(arguments) => check(...arguments)", arguments)
         return [np.frombuffer(base64.b64decode(text), np.float32).reshape(-1, 3, 3) for text in results]
 
@@ -298,6 +298,17 @@ def test_the_shaders_show_what_the_decoder_does(files, shaders, name):
         off_before = max(distance(own[:, 2], x) for own, x in zip(got, np.roll(wanted, -1, axis=0), strict=True))
         print(f"{name}, level {level}: {off / tolerance:.3f} of what is allowed, {tolerance:.2e}")
         assert max(off, off_before) <= tolerance
+
+
+@pytest.mark.browser
+def test_more_workgroups_than_go_side_by_side_do_all_the_work(files, shaders):
+    file = files("layers")
+    level = file.info.level_count - 1
+    place = [0, file.gpu.coded_frame(2)]
+    asked = file.gpu.level(level), [file.gpu.segment(0, level)], [[[place] * 4, [0.0, 0.0]]]
+    assert head(asked[0], LEVEL)["body_count"] > 21
+    (rows,), (row,) = (shaders(*asked, **options) for options in ({"across": 7}, {}))
+    assert np.array_equal(rows, row) and distance(rows[:, 0], file.decoded(2, level)) <= file.tolerance()
 
 
 @pytest.mark.browser

@@ -19,6 +19,7 @@ var<private> run: Place;
 
 // Words of the header of a level.
 const VERTEX_COUNT = 2u;
+const BODY_COUNT = 3u;
 const POSITION_COUNT = 4u;
 const MATRIX_COUNT = 5u;
 const VERTICES = 7u;

@@ -45,12 +45,17 @@ fn finish_matrix(index: u32, a: vec3<f32>) {
 
 // One workgroup per body.
 @compute @workgroup_size(64)
-fn bodies(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) i: u32) {
+fn bodies(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
+          @builtin(local_invocation_index) i: u32) {
     run = places[group.y];
-    let body = body_at(group.x);
+    let b = group.x + groups.x * group.z;
+    if (b >= level[BODY_COUNT]) {
+        return;
+    }
+    let body = body_at(b);
     if ((body.flags & NODE) == 0u) {
         if (is_joined() && i < body.count) {
-            join_position(group.x, body.first + i);
+            join_position(b, body.first + i);
         }
     } else if (i == 0u) {
         if (is_joined()) {
@@ -62,12 +67,13 @@ fn bodies(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_ind
 
 // One invocation per corrected position.
 @compute @workgroup_size(64)
-fn corrections(@builtin(global_invocation_id) id: vec3<u32>) {
+fn corrections(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
+    let i = id.x + 64u * groups.x * id.z;
     run = places[id.y];
-    if (id.x >= segment(CORRECTED_COUNT)) {
+    if (i >= segment(CORRECTED_COUNT)) {
         return;
     }
-    let own = segment(CORRECTED) + 2u * id.x;
+    let own = segment(CORRECTED) + 2u * i;
     var sum = vec3<f32>(0.0);
     for (var c = segment(own + 1u); c < segment(own + 3u); c++) {
         let at = segment(CORRECTIONS) + 2u * c;
@@ -87,10 +93,11 @@ fn corrections(@builtin(global_invocation_id) id: vec3<u32>) {
 
 // One invocation per number of a position, in place of all passes before.
 @compute @workgroup_size(64)
-fn baked(@builtin(global_invocation_id) id: vec3<u32>) {
+fn baked(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
+    let i = id.x + 64u * groups.x * id.z;
     run = places[id.y];
     let count = 3u * level[POSITION_COUNT];
-    if (id.x < count) {
-        positions[run.positions + id.x] = segment_float(segment(BAKED) + run.frame * count + id.x);
+    if (i < count) {
+        positions[run.positions + i] = segment_float(segment(BAKED) + run.frame * count + i);
     }
 }

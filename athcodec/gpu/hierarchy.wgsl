@@ -201,9 +201,14 @@ fn write_frame(b: u32, frame: Frame) {
 }
 
 @compute @workgroup_size(64)
-fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) i: u32) {
+fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
+        @builtin(local_invocation_index) i: u32) {
     run = places[group.y];
-    let b = level[level[ORDER] + level[level[DEPTHS] + depth] + group.x];
+    let at = level[level[DEPTHS] + depth] + group.x + groups.x * group.z;
+    if (at >= level[level[DEPTHS] + depth + 1u]) {
+        return;
+    }
+    let b = level[level[ORDER] + at];
     let body = body_at(b);
     let own = move_at(b);
     modes[i] = vec3<f32>(0.0);

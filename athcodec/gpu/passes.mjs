@@ -34,7 +34,7 @@ export class Kernels {
 }
 
 /** A level of a file. slots: frames that are kept at once; shown: plants that pass 3 writes, into `vertices`, a buffer of nine
- * floats of each of their vertices, or one that it makes. */
+ * floats of each of their vertices, or one that it makes; across: workgroups that go side by side. */
 export class Passes {
   uploaded = 0; // bytes
   #sets = new Map();
@@ -42,8 +42,8 @@ export class Passes {
   #corrected = 0;
   #used = 0;      // words of `segments`
 
-  constructor(device, kernels, level, { slots = 2, shown = 1, vertices = null } = {}) {
-    Object.assign(this, { device, kernels, words: level, slots, shown });
+  constructor(device, kernels, level, { slots = 2, shown = 1, vertices = null, across = device.limits.maxComputeWorkgroupsPerDimension } = {}) {
+    Object.assign(this, { device, kernels, words: level, slots, shown, across });
     this.size = { positions: 3 * level[POSITION_COUNT], matrices: 12 * level[MATRIX_COUNT], bodies: 12 * level[BODY_COUNT],
       vertices: VERTEX_FLOATS * level[VERTEX_COUNT] };
     this.baked = false;
@@ -129,7 +129,8 @@ export class Passes {
     }
     pass.setPipeline(this.kernels[kernel]);
     pass.setBindGroup(0, this.#sets.get(key));
-    pass.dispatchWorkgroups(x, y);
+    const across = Math.min(x, this.across);
+    pass.dispatchWorkgroups(across, y, Math.ceil(x / across));
   }
 
   /** All passes, at most `slots` places and `shown` shows. Results of a show are at its index, or at `at`. */

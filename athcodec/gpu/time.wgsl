@@ -13,12 +13,13 @@ fn value(row: Row, index: u32) -> f32 {
 }
 
 @compute @workgroup_size(64)
-fn main(@builtin(global_invocation_id) id: vec3<u32>) {
+fn main(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
+    let i = id.x + 64u * groups.x * id.z;
     run = places[id.y];
-    if (id.x >= segment(ROW_COUNT)) {
+    if (i >= segment(ROW_COUNT)) {
         return;
     }
-    let row = row_at(id.x);
+    let row = row_at(i);
     let frames = segment(FRAMES);
     let waves = segment(WAVE_SETS + (row.waves & 127u)) + run.frame;
     var sum = vec3<f32>(0.0);
@@ -27,6 +28,6 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
         sum += integers * segment_float(waves + k * frames);
     }
     for (var axis = 0u; axis < 3u; axis++) {
-        amplitudes[run.amplitudes + 3u * id.x + axis] = run.strength * row.step * sum[axis];
+        amplitudes[run.amplitudes + 3u * i + axis] = run.strength * row.step * sum[axis];
     }
 }

@@ -84,15 +84,16 @@ fn vertex_at(v: u32) -> Vertex {
 }
 
 @compute @workgroup_size(64)
-fn main(@builtin(global_invocation_id) id: vec3<u32>) {
+fn main(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
+    let i = id.x + 64u * groups.x * id.z;
     run = shows[id.y];
-    if (id.x >= level[VERTEX_COUNT]) {
+    if (i >= level[VERTEX_COUNT]) {
         return;
     }
-    let vertex = vertex_at(id.x);
+    let vertex = vertex_at(i);
     for (var axis = 0u; axis < 3u; axis++) {
-        vertices[run.vertices + 9u * id.x + axis] = vertex.position[axis];
-        vertices[run.vertices + 9u * id.x + 3u + axis] = vertex.normal[axis];
-        vertices[run.vertices + 9u * id.x + 6u + axis] = vertex.previous[axis];
+        vertices[run.vertices + 9u * i + axis] = vertex.position[axis];
+        vertices[run.vertices + 9u * i + 3u + axis] = vertex.normal[axis];
+        vertices[run.vertices + 9u * i + 6u + axis] = vertex.previous[axis];
     }
 }

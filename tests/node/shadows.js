@@ -1,7 +1,9 @@
-// The shadow that a plant casts on the ground, in the viewer's page: how many of its vertices are over dark pixels, and how many
+// The shadow that a plant casts on the ground, in the viewer's page or, on WebGPU, the forest's: how many of its vertices are over dark pixels, and how many
 // pixels change as it moves.
 async (mode) => {
-  const three = await import("three"), { ATHLoader } = await import("athcodec-three"), { renderer } = athcodecViewer.stage;
+  const three = await import("three"), { ATHLoader } = await import("athcodec-three"), onNodes = !window.athcodecViewer;
+  const renderer = onNodes ? new three.WebGPURenderer() : athcodecViewer.stage.renderer;
+  await renderer.init?.();
   const loader = new ATHLoader().setMode(mode), url = new URLSearchParams(location.search).get("file");
   const ath = await loader.loadAsync(url), scene = new three.Scene(), found = {};
   await ath.loaded;
@@ -18,15 +20,15 @@ async (mode) => {
   Object.assign(light.shadow.camera, { left: -2 * size, right: 2 * size, top: 2 * size, bottom: -2 * size, near: 0.1 * size, far: 12 * size });
   light.castShadow = true;
   scene.add(ath.object, ground, light, light.target);
-  const target = new three.WebGLRenderTarget(256, 256), { enabled } = renderer.shadowMap;
+  const target = new (onNodes ? three.RenderTarget : three.WebGLRenderTarget)(256, 256), { enabled } = renderer.shadowMap;
   renderer.shadowMap.enabled = true;
   ground.material.needsUpdate = true;
   const picture = async (seconds) => {
     await ath.motion.show(seconds, ath.motion.levelCount - 1);
     renderer.setRenderTarget(target);
     renderer.render(scene, camera);
-    const pixels = new Uint8Array(4 * 256 * 256);
-    renderer.readRenderTargetPixels(target, 0, 0, 256, 256, pixels);
+    const pixels = onNodes ? await renderer.readRenderTargetPixelsAsync(target, 0, 0, 256, 256) : new Uint8Array(4 * 256 * 256);
+    if (!onNodes) renderer.readRenderTargetPixels(target, 0, 0, 256, 256, pixels);
     renderer.setRenderTarget(null);
     return pixels.filter((_, i) => i % 4 === 0);
   };
@@ -34,10 +36,11 @@ async (mode) => {
   // where the vertices are, seen from the light: along z
   const at = await ath.motion.positions(0.5), dark = b.map((value) => value < 0.5 * white);
   let covered = 0;
+  const row = (v) => (onNodes ? 255 - v : v); // of the picture, which WebGPU has the top first of
   for (let i = 0; i < at.length; i += 3) {
     const u = Math.floor((at[i] - ground.position.x + 2 * size) / (4 * size) * 256), v = Math.floor((at[i + 1] - ground.position.y + 2 * size) / (4 * size) * 256);
     let near = false;
-    for (let p = u - 2; p <= u + 2; p++) for (let q = v - 2; q <= v + 2; q++) near ||= dark[256 * q + p] === 1;
+    for (let p = u - 2; p <= u + 2; p++) for (let q = v - 2; q <= v + 2; q++) near ||= dark[256 * row(q) + p] === 1;
     covered += near;
   }
   found.covered = covered / (at.length / 3);
@@ -45,6 +48,7 @@ async (mode) => {
   found.changed = a.reduce((sum, value, i) => sum + (Math.abs(value - b[i]) > 0.3 * white), 0);
   renderer.shadowMap.enabled = enabled;
   ath.dispose();
+  if (onNodes) renderer.dispose();
   loader.dispose();
   return found;
 }

@@ -35,15 +35,6 @@ export function eased(passed) {
   return passed < 1 ? passed * passed * (3 - 2 * passed) : 1;
 }
 
-let refused = false;
-
-// Node renderers pass over onBeforeCompile: what is drawn would stand still, which is said once.
-function refuseNodes({ isWebGPURenderer }) {
-  if (!isWebGPURenderer || refused) return;
-  refused = true;
-  console.warn('ath: got a WebGPURenderer, expected WebGLRenderer: the plant stands still. Use loader.setMode("positions"), or ATHForest of athcodec-three/webgpu');
-}
-
 const SHAPES = 0x13, REFINED_REST = 0x15; // chunks that serve all segments
 
 /** Events: "frame" (a new picture is shown), "level" (another level is), "clip" (another clip is), "progress" (bytes
@@ -247,7 +238,8 @@ export class ATHMotion extends EventDispatcher {
   }
 
   /** "matrices" (default): the vertex shader moves the vertices. "positions": the worker does, and every picture
-   * writes the position attributes, for materials that injectMotion() cannot change. Before any bind(). */
+   * writes the position attributes, for materials that injectMotion() cannot change. Before any bind(); a WebGPURenderer that draws
+   * the object goes over to it. */
   setMode(mode) {
     this.mode = mode;
     return this;
@@ -352,16 +344,17 @@ export class ATHMotion extends EventDispatcher {
     }
   }
 
-  #take({ shown, frame, data, heat, ms, held, clip, exactly, fading }) {
+  #take({ shown, frame, data, heat, ms, held, clip, exactly, fading, whole }) {
     const changed = shown !== this.level, known = this.#channel.known.get(shown), cut = known !== this.#known;
     Object.assign(this, { frame, held, fading, milliseconds: ms, distances: heat ?? null, level: shown });
     this.#known = known;
     if (shown > 0) this.#channel.endEasing();
     clearTimeout(this.#timer);
     if (fading) this.#timer = setTimeout(() => this.refresh(), FRAME_MS); // time may stand still
-    if (this.mode === "positions") this.#write(data);
-    else this.#upload(shown, data);
+    this.#moved = whole ? data : null;
+    if (!whole) this.#upload(shown, data);
     this.#setBounds(data);
+    if (this.mode === "positions") this.#write(this.uploaded());
     if (cut) for (const geometry of this.#geometries) this.#setParts(geometry);
     if (changed) this.dispatchEvent({ type: "level", level: shown });
     if (this.switching === "waiting" && clip === this.clip.index) this.#begin(this.#old);
@@ -410,7 +403,7 @@ export class ATHMotion extends EventDispatcher {
       if (b > high[k]) high[k] = b;
     };
     const points = (from, to, step) => { for (let at = from; at < to; at += step) for (let k = 0; k < 3; k++) add(k, data[at + k], data[at + k]); };
-    if (this.mode === "positions") points(0, data.length, 3);
+    if (this.#moved) points(0, data.length, 3);
     else {
       const { parts: { nodeCount, exactCount } } = this.#known, stride = 4 * this.uniforms.athStride.value;
       points(12 * nodeCount, 12 * nodeCount + stride * exactCount, stride);
@@ -423,7 +416,6 @@ export class ATHMotion extends EventDispatcher {
     }
     min.fromArray(low);
     max.fromArray(high);
-    this.#moved = this.mode === "positions" ? data : null;
     for (const geometry of this.#geometries) this.#setBox(geometry);
   }
 
@@ -456,8 +448,15 @@ export class ATHMotion extends EventDispatcher {
   /** Lets shadows of an object move as it does. */
   bindShadows(object) {
     if (this.mode === "positions") return object;
-    return Object.assign(object, this.#shadows ??= shadowMaterials(this.uniforms), { onBeforeRender: refuseNodes });
+    return Object.assign(object, this.#shadows ??= shadowMaterials(this.uniforms), { onBeforeRender: this.#forNodes });
   }
+
+  // Node renderers pass over what bind() does to a material: there the worker moves the vertices.
+  #forNodes = ({ isWebGPURenderer }) => {
+    if (!isWebGPURenderer || this.mode === "positions") return;
+    this.setMode("positions");
+    if (this.level >= 0) this.#write(this.uploaded());
+  };
 
   /** Keeps a geometry made by the loader (`userData.source`) in step with what is shown: its vertices, and what boxes and rays
    * find of them. */
@@ -476,6 +475,7 @@ export class ATHMotion extends EventDispatcher {
   setRest() {
     if (this.mode === "positions") return;
     for (const geometry of this.#geometries) setRest(geometry, this.#channel.rest);
+    this.#moved = null;
     if (this.level >= 0) this.#setBounds(this.uniforms.athData.value.image.data);
   }
 

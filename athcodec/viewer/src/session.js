@@ -593,7 +593,7 @@ export class Session {
       ? ({ segments, frame, fade }) => this.#file.positions(segments, frame, { fade })
       : (term, i) => this.#pack(term, cut, i === 0 ? buffer : null));
     return { shown: cut, frame: shown.frame, fading: fading.underWay, clip: this.#file.clips.indexOf(this.#clipAt(shown.frame)),
-      held: this.#file.held, data };
+      held: this.#file.held, whole: positions, data };
   }
 
   // coarsely: level 0 for now, whatever is wanted.

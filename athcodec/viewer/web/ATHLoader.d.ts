@@ -16,7 +16,7 @@
  * Files are fetched by HTTP ranges, level by level and ahead of the time that is shown, as deep as is asked for, and only
  * the clips that play; from a server without ranges in one download, which plays while it grows. Workers decode (ath_worker.js, beside the module).
  * Levels and errors are those of the file; positions are in its units, `metadata.unit`, and its axes,
- * `metadata.up_axis`; nothing is scaled or turned. Materials work with WebGLRenderer; for others see setMode().
+ * `metadata.up_axis`; nothing is scaled or turned. Materials work with WebGLRenderer and, as `object`, WebGPURenderer; for others see setMode().
  */
 
 import {
@@ -31,7 +31,8 @@ export class ATHLoader extends Loader<ATH> {
   /** At most so many workers (default 4); a file lives in one of them. */
   setWorkerLimit(limit: number): this;
   /** How vertices move: "matrices" (default) in the vertex shader, by textures; "positions" in the worker, by position
-   * attributes that every picture writes, for WebGPURenderer and materials without onBeforeCompile. */
+   * attributes that every picture writes, for materials without onBeforeCompile; so do objects of bindShadows() that a WebGPURenderer
+   * draws. */
   setMode(mode: "matrices" | "positions"): this;
   /** The name of the clip to begin with (default, and null: the file's first). Loading fails where a file has none of
    * that name. */
