@@ -38,6 +38,7 @@ from bench import (
     speed,
     tables,
     viewer,
+    wrappings,
 )
 
 VERBS = {
@@ -66,6 +67,7 @@ VERBS = {
     "motions": motions,
     "smoothness": smoothness,
     "compare": side_by_side,
+    "wrappings": wrappings,
 }
 
 

@@ -110,6 +110,16 @@ def test_motions_of_one_plant_take_less_in_one_file_and_keep_the_bound(tmp_path)
     assert 0 < row["seam"] <= 2 and result["broken"] == []
 
 
+def test_wrappings_hold_the_same_motion_and_ours_keep_the_bound(tmp_path):
+    _, result = run_bench(tmp_path, "wrappings", "--rel-error", "1e-3", "--joints", "64")
+    rows = {row["file"]: row for row in tables_of(result)[0]}
+    ours = [row for name, row in rows.items() if name.startswith("ours")]
+    assert len(ours) == 3 and all(0 < row["max error"] <= 1e-3 for row in ours)
+    assert all(rows[name]["max error"] < 1e-6 for name in ("USD crate", "Alembic", "GLB, morph targets"))
+    assert max(row["bytes"] for row in ours) < min(row["bytes"] for name, row in rows.items() if "ours" not in name)
+    assert result["broken"] == []
+
+
 def test_figures_come_with_command_versions_and_machine(sizes):
     _, result = sizes
     assert result["command"].startswith("python -m bench sizes --rel-error 1e-3")

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from test_usd import add_leaves, new_stage
+from test_usd import add_grid, add_leaves, new_stage
 
 import athcodec
 from athcodec import cli
@@ -50,6 +50,7 @@ def files(tmp_path_factory):
             athcodec.write(motion, folder / f"{name}.h5")
             athcodec.write(motion, folder / f"{name}.abc")
     stage = new_stage(folder / "forest.usda")
+    add_grid(stage)
     add_leaves(stage)
     stage.Save()
     return folder

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pytest
-from pxr import Usd, UsdSkel
+from pxr import Sdf, Usd, UsdGeom, UsdSkel
 from test_usd import add_grid, add_leaves, complaints, new_stage
 
 import athcodec
@@ -94,3 +96,66 @@ def test_rigs_that_cannot_be_are_refused(sample_ath, tmp_path):
         with pytest.raises(ValueError, match="rig: got 0"):
             athcodec.write(ClipView(decoder), tmp_path / "a.usda", rig=0)
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("suffix", ["usda", "usdc"])
+def test_an_assembly_has_its_instances_on_joints_and_is_as_far_off_as_it_says(tmp_path, suffix):
+    stage = new_stage(tmp_path / "a.usda")
+    add_grid(stage)
+    add_leaves(stage)
+    stage.Save()
+    with athcodec.read(tmp_path / "a.usda") as clip:
+        written = athcodec.write(clip, tmp_path / f"b.{suffix}", rig=20, nanite=True)
+        positions = clip.block(0, clip.frame_count).astype(np.float64)
+    assert written.facts["instances"] == 5 and complaints(tmp_path / f"b.{suffix}") == []
+    stage = Usd.Stage.Open(str(tmp_path / f"b.{suffix}"))
+    root, off = stage.GetDefaultPrim(), 0.0
+    assert root.GetTypeName() == "Xform" and _schemas(root) == ["NaniteAssemblyRootAPI"]
+    assert root.GetAttribute("unreal:naniteAssembly:meshType").Get() == "skeletalMesh"
+    [path] = root.GetRelationship("unreal:naniteAssembly:skeleton").GetTargets()
+    skeleton = UsdSkel.Cache().GetSkelQuery(UsdSkel.Skeleton(stage.GetPrimAtPath(path)))
+    names = [joint.rpartition("/")[2] for joint in skeleton.GetJointOrder()]
+    instancers = [UsdGeom.PointInstancer(prim) for prim in stage.Traverse() if prim.IsA(UsdGeom.PointInstancer)]
+    for frame in range(10):
+        moved = np.array(skeleton.ComputeSkinningTransforms(101 + frame))
+        shown = [_instances(stage, instancer, moved, names) for instancer in instancers]
+        off = max(off, np.abs(np.concatenate(shown) - positions[frame, 12:]).max())
+    assert off <= written.facts["max_error"] * (1 + 1e-5) + 2e-3  # of rotations in half precision
+    wind = json.loads((tmp_path / "b.wind.json").read_text())
+    assert [joint["JointName"] for joint in wind["Joints"]] == names
+    assert {joint["SimulationGroupIndex"] for joint in wind["Joints"]} <= set(range(len(wind["SimulationGroups"])))
+
+
+def _schemas(prim):
+    """Those that USD itself does not know, too."""
+    return prim.GetMetadata("apiSchemas").GetAppliedItems()
+
+
+def _instances(stage, instancer, moved, names):
+    """Vertices of instances that move as the joints that they are bound to, as Unreal's schema says."""
+    prim, [target] = instancer.GetPrim(), instancer.GetPrototypesRel().GetTargets()
+    assert _schemas(prim) == ["NaniteAssemblySkelBindingAPI"]
+    assert stage.GetPrimAtPath(target).IsA(UsdSkel.Root)
+    points = np.array(UsdGeom.Mesh(stage.GetPrimAtPath(f"{target}/mesh")).GetPointsAttr().Get())
+    joints = prim.GetAttribute("primvars:unreal:naniteAssembly:bindJoints")
+    assert joints.GetVariability() == Sdf.VariabilityUniform and UsdGeom.Primvar(joints).GetElementSize() == 1
+    assert list(prim.GetAttribute("primvars:unreal:naniteAssembly:bindJointWeights").Get()) == [1] * len(joints.Get())
+    found = []
+    for joint, matrix in zip(joints.Get(), instancer.ComputeInstanceTransformsAtTime(0, 0), strict=True):
+        whole = np.array(matrix) @ moved[names.index(joint)]
+        found.append(points @ whole[:3, :3] + whole[3, :3])
+    return np.concatenate(found)
+
+
+def test_an_assembly_needs_a_base_a_rig_and_usd(tmp_path, sample_clip):
+    stage = new_stage(tmp_path / "a.usda")
+    add_leaves(stage)
+    stage.Save()
+    with athcodec.read(tmp_path / "a.usda") as clip:
+        with pytest.raises(ClipError, match="nanite: got no mesh beside the copies"):
+            athcodec.write(clip, tmp_path / "b.usda", rig=20, nanite=True)
+        with pytest.raises(ValueError, match="nanite: got no rig"):
+            athcodec.write(clip, tmp_path / "b.usda", nanite=True)
+        with pytest.raises(ClipError, match="nanite: got gltf"):
+            athcodec.write(clip, tmp_path / "b.glb", rig=20, nanite=True)
+    assert [path.name for path in tmp_path.iterdir()] == ["a.usda"]

@@ -38,10 +38,14 @@ def png16(path):
 
 
 def mesh_of(path):
-    """Attributes of the one mesh of a GLB, by pygltflib."""
+    """Attributes of the meshes of a GLB, one after the other, by pygltflib."""
     gltf = pygltflib.GLTF2().load(str(path))
-    named = gltf.meshes[0].primitives[0].attributes
-    return {name: accessor_of(gltf, index) for name, index in vars(named).items() if index is not None}
+    named = [vars(mesh.primitives[0].attributes) for mesh in gltf.meshes]
+    return {
+        name: np.concatenate([accessor_of(gltf, each[name]) for each in named])
+        for name, index in named[0].items()
+        if index is not None
+    }
 
 
 def shown_by_matrices(folder):

@@ -414,6 +414,12 @@ def _decode_arguments(verb: argparse.ArgumentParser) -> None:
         "how far off it is",
     )
     verb.add_argument(
+        "--nanite",
+        action="store_true",
+        help="with --rig and USD: laid out as Nanite Assemblies of Unreal Engine 5.7, copies as instances on the "
+        "joints, and the JSON of Dynamic Wind beside it",
+    )
+    verb.add_argument(
         "--instances",
         action="store_true",
         help="write copies of one shape, such as leaves of an instancer, to USD or Alembic as instances, where that "

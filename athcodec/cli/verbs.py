@@ -221,7 +221,7 @@ def _write_decoded(motion: ClipView, args: argparse.Namespace) -> Written:
 
         write_back(args.input, motion, args.output)
         return exporters.Written((Path(args.output),))
-    how = {option: getattr(args, option) for option in ("gzip", "animation", "instances", "rig")}
+    how = {option: getattr(args, option) for option in ("gzip", "animation", "instances", "rig", "nanite")}
     with progress() as report:
         return athcodec.write(motion, args.output, name, progress=report, **how)
 

@@ -42,11 +42,14 @@ class WriteOptions:
     rig : int, optional
         For USD and glTF: a skeleton for engines, with so many joints at most besides its root, in place of vertices. It
         is as close as that many allow; `Written` says how close.
+    nanite : bool, optional
+        For USD with a rig: laid out as Nanite Assemblies of Unreal Engine 5.7, with copies of one shape as instances on
+        the joints, and the JSON of Dynamic Wind beside it.
 
     Raises
     ------
     ValueError
-        For another animation.
+        For another animation, or nanite without a rig.
     """
 
     gzip: bool = False
@@ -54,10 +57,13 @@ class WriteOptions:
     half: bool = True
     instances: bool = False
     rig: int | None = None
+    nanite: bool = False
 
     def __post_init__(self) -> None:
         if self.rig is not None and not 1 <= self.rig <= MOST_RIGGED:
             raise ValueError(f"rig: got {self.rig!r}, expected 1 to {MOST_RIGGED} joints")
+        if self.nanite and self.rig is None:
+            raise ValueError("nanite: got no rig, expected one too")
         if self.animation not in ("auto", "joints", "morphs"):
             raise ValueError(f'animation: got {self.animation!r}, expected "auto", "joints" or "morphs"')
 
@@ -125,7 +131,7 @@ def write(
     progress : callable, optional
         Called with "export" and the fraction that is done.
     **options
-        Parameters of `athcodec.exporters.WriteOptions`: gzip, animation, half, instances, rig.
+        Parameters of `athcodec.exporters.WriteOptions`: gzip, animation, half, instances, rig, nanite.
 
     Returns
     -------
@@ -150,6 +156,8 @@ def write(
     kind.check()
     if wanted.rig is not None and kind.name not in RIGS:
         raise ClipError(f"rig: got {kind.name}, expected one of {', '.join(RIGS)}")
+    if wanted.nanite and kind.name != "usd":
+        raise ClipError(f"nanite: got {kind.name}, expected usd")
     if wanted.rig is None:
         _check_clips(motion, kind)
     check_target(path)

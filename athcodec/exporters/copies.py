@@ -29,10 +29,10 @@ class Copies:
     max_error: float
 
 
-def fit_copies(motion: Any, objects: list[SceneObject]) -> dict[int, Copies]:
-    """Of those objects that are copies, and that transforms keep within what the level is off, by their place in the
-    list."""
-    allowed = allowed_error(motion)
+def fit_copies(motion: Any, objects: list[SceneObject], allowed: float | None = None) -> dict[int, Copies]:
+    """Of those objects that are copies, and that transforms keep within `allowed`, or within what the level is off, by
+    their place in the list."""
+    allowed = allowed_error(motion) if allowed is None else allowed
     fits = {number: _Fit(motion, obj) for number, obj in enumerate(objects) if obj.copies > 1 and obj.count}
     for start, frames in portions(motion, motion.vertex_count) if fits else ():
         for fit in fits.values():

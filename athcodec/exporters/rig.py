@@ -93,7 +93,7 @@ def _cut(
 
 def fit_rig(motion: Any, most: int = RIG_JOINTS, report: Callable[[float], None] = lambda done: None) -> Joints:
     """The joints of a motion, `most` at most beside the root. A clip without branches gets those that are found."""
-    hierarchy = _hierarchy(motion)
+    hierarchy = hierarchy_to_rig(motion)
     order = hierarchy.vertex_source
     rest = np.asarray(motion.rest).astype(np.float32).astype(np.float64)[order]
     allowed, parts = allowed_error(motion), _Parts.whole(hierarchy)
@@ -110,7 +110,8 @@ def fit_rig(motion: Any, most: int = RIG_JOINTS, report: Callable[[float], None]
     return _posed(motion, _Bones(hierarchy, parts, rest), order, lambda done: report(0.4 + 0.6 * done))
 
 
-def _hierarchy(motion: Any) -> Hierarchy:
+def hierarchy_to_rig(motion: Any) -> Hierarchy:
+    """The branches of a motion, or those that are found where it has none."""
     if isinstance(motion, ClipView):
         return motion.decoder.hierarchy
     return hierarchy_of(motion if motion.has_branches else with_branches(motion, find_branches(motion)))

@@ -22,6 +22,7 @@ from pxr import Sdf, Tf, Usd, UsdGeom, UsdSkel, Vt
 
 from athcodec.atomic_files import new_files
 from athcodec.exporters import WriteOptions
+from athcodec.exporters import usd_nanite as nanite
 from athcodec.exporters.copies import Copies, cost_of, fit_copies, one_copy, rows_of_one
 from athcodec.exporters.gltf_joints import Joints
 from athcodec.exporters.rig import fit_rig
@@ -70,6 +71,7 @@ WIDER = {
     "d": "d",
 }
 NUMPY = {"i": "<i4", "u": "<u4", "q": "<i8", "Q": "<u8", "B": "u1", "?": "?", "e": "<f2", "f": "<f4", "d": "<f8"}
+WIND = "wind"  # in what is known of an assembly: the text of its JSON
 INTERPOLATION = {"vertex": "vertex", "corner": "faceVarying", "face": "uniform", "constant": "constant"}
 
 
@@ -84,6 +86,8 @@ def write_clip(
         suffix = Path(path).suffix.lower()
         binary = os.path.join(folder, f"{_identifier(Path(path).stem)}.usdc")
         facts = _write(motion, binary, options, report)
+        if wind := facts.pop(WIND, ""):
+            Path(folder, f"{Path(path).stem}.wind.json").write_text(wind, "utf-8")
         _convert(binary, os.path.join(folder, name), suffix)
     return facts
 
@@ -126,10 +130,12 @@ def _write(motion: Any, name: str, options: WriteOptions, report: Callable[[floa
     codes, rate = _time_codes(motion), frame_rate_of(motion)
     stage = Usd.Stage.CreateNew(name)
     joints = None if options.rig is None else fit_rig(motion, options.rig, lambda done: report(0.9 * done))
-    root = (UsdGeom.Xform if joints is None else UsdSkel.Root).Define(stage, "/clip").GetPrim()
+    root = (UsdGeom.Xform if joints is None or options.nanite else UsdSkel.Root).Define(stage, "/clip").GetPrim()
     stage.SetDefaultPrim(root)
     _describe_stage(stage, motion, max((codes[a:b] for a, b in motion.clip_range_frames), key=len), rate)
     objects = objects_of(motion)
+    if joints is not None and options.nanite:
+        return _write_assembly(stage, motion, joints, objects, codes, report)
     instanced = fit_copies(motion, objects) if options.instances and joints is None else {}
     for number, (obj, name) in enumerate(zip(objects, distinct(_identifier(obj.name) for obj in objects))):
         if number in instanced:
@@ -161,16 +167,54 @@ def _write_rigged(
     codes: np.ndarray,
     report: Callable[[float], None],
 ) -> dict[str, Any]:
+    _set_rest(motion, objects)
+    write_rig(stage, "/clip", motion, joints, objects, codes)
+    _must(stage.GetRootLayer().Save(), stage.GetRootLayer().identifier)
+    report(1.0)
+    return {"animation": "a rig", "joints": len(joints.bind), "max_error": joints.max_error}
+
+
+def _set_rest(motion: Any, objects: list[SceneObject]) -> None:
     rest = np.asarray(motion.rest, np.float32)
     for obj in objects:
         own = rest[obj.vertices]
         obj.target.GetPointsAttr().Set(_vec3(own))
         if len(own):
             obj.target.GetExtentAttr().Set(_vec3([own.min(axis=0), own.max(axis=0)]))
-    write_rig(stage, motion, joints, objects, codes)
+
+
+def _write_assembly(
+    stage: Usd.Stage,
+    motion: Any,
+    joints: Joints,
+    objects: list[SceneObject],
+    codes: np.ndarray,
+    report: Callable[[float], None],
+) -> dict[str, Any]:
+    """As Nanite Assemblies are laid out, see usd_nanite.py."""
+    parts = nanite.parts_of(motion, objects, joints)
+    UsdSkel.Root.Define(stage, nanite.BASE)
+    names = distinct(("base", *(_identifier(obj.name) for obj in objects)))[1:]
+    for number, (obj, name) in enumerate(zip(objects, names)):
+        if number in parts:
+            mesh = nanite.define_part(stage, f"{nanite.ROOT_PRIM}/{name}", name)
+            obj.target = _define(stage, mesh, one_copy(obj))
+            obj.instancer = UsdGeom.PointInstancer(stage.GetPrimAtPath(f"{nanite.ROOT_PRIM}/{name}"))
+        else:
+            obj.copies, obj.target = 1, _define(stage, f"{nanite.BASE}/{name}", obj)
+    nanite.mark_root(stage.GetDefaultPrim())
+    _own_arrays(stage.GetDefaultPrim(), motion, _static_arrays(stage, motion, objects))
+    base = [obj for number, obj in enumerate(objects) if number not in parts]
+    _set_rest(motion, base)
+    write_rig(stage, nanite.BASE, motion, joints, base, codes)
+    for number, part in parts.items():
+        nanite.place_part(stage, f"{nanite.ROOT_PRIM}/{names[number]}", names[number], objects[number], part, joints)
     _must(stage.GetRootLayer().Save(), stage.GetRootLayer().identifier)
+    error = nanite.largest_error(motion, objects, joints, parts)
     report(1.0)
-    return {"animation": "a rig", "joints": len(joints.bind), "max_error": joints.max_error}
+    instances = sum(len(part.joint) for part in parts.values())
+    facts = {"animation": "a Nanite Assembly", "joints": len(joints.bind), "instances": instances, "max_error": error}
+    return facts | {WIND: nanite.wind_of(motion, joints)}
 
 
 def _describe_stage(stage: Usd.Stage, motion: Any, codes: np.ndarray, rate: float) -> None:

@@ -14,25 +14,27 @@ from pxr import Gf, Tf, Usd, UsdSkel, Vt
 from athcodec.exporters.gltf_joints import Joints
 from athcodec.exporters.scene_objects import SceneObject, distinct
 
-SKELETON, ROOT_PRIM = "skeleton", "/clip"
+SKELETON = "skeleton"
 
 
-def write_rig(stage: Usd.Stage, motion: Any, joints: Joints, objects: list[SceneObject], codes: np.ndarray) -> None:
-    """Adds the skeleton, its animations, and what binds the objects' targets to it. codes: of all frames, (T,), which
-    begin again with each clip."""
-    skeleton = UsdSkel.Skeleton.Define(stage, f"{ROOT_PRIM}/{SKELETON}")
+def write_rig(
+    stage: Usd.Stage, place: str, motion: Any, joints: Joints, objects: list[SceneObject], codes: np.ndarray
+) -> None:
+    """Adds below the prim at `place` the skeleton, its animations, and what binds the objects' targets to it. codes: of
+    all frames, (T,), which begin again with each clip."""
+    skeleton = UsdSkel.Skeleton.Define(stage, f"{place}/{SKELETON}")
     paths = _paths(joints)
     skeleton.CreateJointsAttr(paths)
     skeleton.CreateBindTransformsAttr([Gf.Matrix4d(np.linalg.inv(bind).T) for bind in joints.bind.astype(np.float64)])
     skeleton.CreateRestTransformsAttr([_shifted(place) for place in joints.rest[0].tolist()])
     names = distinct(Tf.MakeValidIdentifier(clip.name or "motion") for clip in motion.clip_ranges) or ["motion"]
     for name, (start, stop) in zip(names, motion.clip_range_frames):
-        animation = UsdSkel.Animation.Define(stage, f"{ROOT_PRIM}/{SKELETON}/{name}")
+        animation = UsdSkel.Animation.Define(stage, f"{place}/{SKELETON}/{name}")
         _animate(animation, paths, [pose[start:stop] for pose in joints.poses], codes[start:stop])
     binding = UsdSkel.BindingAPI.Apply(skeleton.GetPrim())
-    binding.CreateAnimationSourceRel().SetTargets([f"{ROOT_PRIM}/{SKELETON}/{names[0]}"])
+    binding.CreateAnimationSourceRel().SetTargets([f"{place}/{SKELETON}/{names[0]}"])
     for obj in objects:
-        _bind(obj, joints)
+        _bind(obj, joints, f"{place}/{SKELETON}")
 
 
 def _paths(joints: Joints) -> list[str]:
@@ -56,11 +58,11 @@ def _animate(animation: UsdSkel.Animation, paths: list[str], poses: list[np.ndar
         turns.Set(Vt.QuatfArray.FromNumpy(np.ascontiguousarray(turn)), code)
 
 
-def _bind(obj: SceneObject, joints: Joints) -> None:
+def _bind(obj: SceneObject, joints: Joints, skeleton: str) -> None:
     binding = UsdSkel.BindingAPI.Apply(obj.target.GetPrim())
     bones, weights = joints.vertex_joint[obj.vertices], joints.weights[obj.vertices]
     width = bones.shape[1]
-    binding.CreateSkeletonRel().SetTargets([f"{ROOT_PRIM}/{SKELETON}"])
+    binding.CreateSkeletonRel().SetTargets([skeleton])
     binding.CreateGeomBindTransformAttr(Gf.Matrix4d(1))
     binding.CreateJointIndicesPrimvar(False, width).Set(
         Vt.IntArray.FromNumpy(np.where(weights > 0, bones, 0).astype(np.int32).reshape(-1))
