@@ -93,6 +93,23 @@ def test_no_vertex_of_the_sample_pops_at_a_loose_bound(ladder, tmp_path):
             assert ((bends(error) > bound).mean(axis=0) <= 0.02).all()
 
 
+def test_corrections_that_a_closed_end_cuts_off_bend_little_there():
+    """What they add is nothing behind the end, where the segment beside it goes on."""
+    random, frames, step = np.random.default_rng(0), 24, 1.12
+    ends = []
+    for _ in range(100):
+        way, middle, width = random.normal(size=3), random.uniform(15, 22), random.uniform(1, 4)
+        bump = random.uniform(1.05, 1.4) * np.exp(-(((np.arange(frames) - middle) / width) ** 2))
+        decoded = (way[:, None] / np.linalg.norm(way) * bump)[None].astype(np.float32)
+        corrected, wanted = decoded.copy(), np.zeros((1, 3, frames))
+        met = streams.MetEnds(closed=streams.LAST)
+        rows = streams.find_corrections(decoded, wanted, np.zeros(3), 1.0, step, ends=met)
+        streams.apply_corrections(corrected, rows, step)
+        added = np.pad(corrected - decoded, ((0, 0), (0, 0), (0, 2)))
+        ends.append(bends(added)[0, -3:].max())
+    assert np.mean(ends) < 0.2
+
+
 def test_an_excursion_of_a_rigid_part_takes_one_correction_that_bends_little():
     parts = np.array([(0, 4)], [("first", np.int32), ("count", np.int32)])
     wanted, origin, limit, step = np.zeros((4, 3, 20)), np.zeros(3), 1.0, 0.5

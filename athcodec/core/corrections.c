@@ -140,15 +140,21 @@ typedef struct {
     double slope[3], curve;
 } place;
 
-static int32_t footprint_bend(int32_t width, int32_t away)
+/* What is there of a footprint, which an end cuts off. */
+static int32_t shown_part(const track *track, int32_t frame, int32_t width, int32_t t)
 {
-    return ath_footprint_part(width, away - 1) - 2 * ath_footprint_part(width, away)
-           + ath_footprint_part(width, away + 1);
+    return t >= 0 && t < track->frames ? ath_footprint_part(width, t - frame) : 0;
+}
+
+static int32_t footprint_bend(const track *track, int32_t frame, int32_t width, int32_t t)
+{
+    return shown_part(track, frame, width, t - 1) - 2 * shown_part(track, frame, width, t)
+           + shown_part(track, frame, width, t + 1);
 }
 
 static int has_bend(const track *track, int32_t t) { return t > 0 && t < track->frames - 1; }
 
-/* Behind a closed end the error goes on as it comes. */
+/* Behind a closed end the error goes on as it comes, and nothing stands of a correction. */
 static place place_at(const track *track, int32_t frame, int32_t width)
 {
     place place = {frame, width, 0, {0.0, 0.0, 0.0}, 0.0};
@@ -156,7 +162,7 @@ static place place_at(const track *track, int32_t frame, int32_t width)
     for (int32_t t = first_frame(frame, reach - 1); t <= stop; t++) place.beyond += track->squares[t] > track->limit2;
     int32_t first = track->closed & 1 ? -1 : 1, last = track->closed & 2 ? track->frames : track->frames - 2;
     for (int32_t t = ath_max(first, frame - reach); t <= ath_min(last, frame + reach); t++) {
-        double bend = footprint_bend(width, t - frame);
+        double bend = footprint_bend(track, frame, width, t);
         for (int32_t k = 0; k < 3 && has_bend(track, t); k++) place.slope[k] += bend * track->bends[t][k];
         place.curve += bend * bend;
     }
