@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from plants import bending_tube, tube
+from programs import CACHE, install_once
 
 import athcodec
 
@@ -93,6 +94,20 @@ def test_thousands_of_random_seeks_end_with_the_picture_of_the_decoder(
 ):
     paths = layered_ath, bushy_ath, medley_ath, mesh_ath, sample_ath, stepwise_ath, full_ath
     random_runs(1000 * (1 + part), 1000, *paths)
+
+
+@pytest.mark.programs
+def test_react_draws_a_plant_that_use_loader_of_fiber_loads(layered_ath):
+    packages, folder = ["three@0.187.0", "react@19", "react-dom@19", "@react-three/fiber@9"], CACHE / "react"
+
+    def install() -> None:
+        (folder / "package.json").write_text('{"name": "checks", "private": true, "type": "module"}')
+        subprocess.run(["npm", "install", "--no-audit", "--no-fund", *packages], cwd=folder, check=True)
+
+    install_once(folder, " ".join(packages), install)
+    found = node(NODE / "use_loader.mjs", folder, layered_ath)
+    with athcodec.open(layered_ath) as decoder:
+        assert f"of {decoder.level_count} levels" in found["drawn"] and found["errors"] == []
 
 
 def test_damage_is_named_and_other_segments_are_shown_at_their_deepest_level(layered_ath, tmp_path):
