@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import os
 from dataclasses import replace
+from pathlib import Path
 
 from athcodec import container as ct
 from athcodec.ath_file import AthFile
 from athcodec.atomic_files import new_file
-from athcodec.errors import LevelUnavailable, Truncated
+from athcodec.errors import ClipError, LevelUnavailable, Truncated
 
 
 def truncate(
@@ -27,9 +28,10 @@ def truncate(
     Parameters
     ----------
     source : str or path-like
-        The file to shorten.
+        The file to shorten, or a GLB whose vertices one moves (ATH_motion).
     target : str or path-like
-        The file to write; it appears when it is complete.
+        The file to write; it appears when it is complete. Of a GLB to a name that ends in ``.glb``: the GLB with the
+        shorter file in it.
     level : int, optional
         The last level to keep.
     max_error : float, optional
@@ -48,6 +50,8 @@ def truncate(
         Where the source has no such level.
     FormatError
         Where the source is damaged, or was cut off before that level.
+    ClipError
+        Where a GLB is to be written and the source is none, or one that has no single motion in it.
     OSError
         Where a file cannot be read or written.
     TypeError
@@ -55,7 +59,7 @@ def truncate(
     """
     if sum(option is not None for option in (level, max_error, target_size)) != 1:
         raise TypeError("truncate: expected one of level, max_error and target_size")
-    with open(os.fspath(source), "rb") as opened, AthFile(opened) as file:
+    with AthFile(source) as file:
         if max_error is not None:
             last = file.level_within(max_error)
         elif target_size is not None:
@@ -69,6 +73,13 @@ def truncate(
                     f"{chunk}: got a file of {file.available_length} bytes; expected at least "
                     f"{chunk.offset + chunk.length}"
                 )
+        if Path(target).suffix.lower() == ".glb":
+            from athcodec.exporters.gltf_into import put_motion  # which takes long to import
+            from athcodec.sources.gltf_motion import GltfMotion
+
+            if not isinstance(file.source, GltfMotion):
+                raise ClipError(f"{target}: got an .ath file to cut, expected a GLB with a motion to write another one")
+            return put_motion(source, b"".join([front, *map(file.payload, chunks)]), target)
         with new_file(target) as out:
             out.write(front)
             for chunk in chunks:

@@ -329,6 +329,24 @@ def test_decode_verify_and_info_take_the_glb_itself(source, tmp_path, capsys):
             assert far(one.block(0, 40), two.block(0, 40)) <= 3 * BOUND * size
 
 
+def test_truncate_takes_a_glb_and_writes_one_or_the_file_alone(source, tmp_path):
+    whole, cut, alone = encoded(source, tmp_path / "out.glb"), tmp_path / "cut.glb", tmp_path / "cut.ath"
+    for out in (cut, alone):
+        assert main(["truncate", str(whole), str(out), "--level", "1"]) == 0
+    check_schemas(structure(cut))
+    assert structure(cut)["meshes"] == structure(whole)["meshes"] and cut.stat().st_size < whole.stat().st_size
+    with athcodec.open(whole) as long, athcodec.open(cut) as short, athcodec.open(alone, host_mesh=short.rest) as bare:
+        assert short.level_count == bare.level_count == 2 < long.level_count
+        for frame in (0, 17, 39):
+            assert np.array_equal(short.positions(frame), long.positions(frame, 1))
+            assert np.array_equal(bare.positions(frame), long.positions(frame, 1))
+
+
+def test_a_glb_comes_from_a_glb_only(source, tmp_path, sample_ath, capsys):
+    assert main(["truncate", str(sample_ath), str(tmp_path / "cut.glb"), "--level", "1"]) == 1
+    assert capsys.readouterr().err.count("\n") == 1 and not list(tmp_path.glob("cut*"))
+
+
 @pytest.mark.parametrize("keep", [[], ["--keep-animation"]])
 def test_a_glb_is_decoded_into_a_glb_that_has_all_it_had(keep, source, tmp_path):
     def dress(gltf):

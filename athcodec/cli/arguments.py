@@ -494,8 +494,8 @@ def _verify_arguments(verb: argparse.ArgumentParser) -> None:
 
 
 def _truncate_arguments(verb: argparse.ArgumentParser) -> None:
-    verb.add_argument("input", metavar="IN.ath")
-    verb.add_argument("output", metavar="OUT.ath", help=WRITTEN)
+    verb.add_argument("input", metavar="IN.ath", help="or a GLB whose vertices such a file moves (ATH_motion)")
+    verb.add_argument("output", metavar="OUT.ath", help=f"{WRITTEN}; of a GLB also OUT.glb: the same with less motion")
     kept = verb.add_mutually_exclusive_group(required=True)
     kept.add_argument("--level", "--depth", metavar="LEVEL", type=_argument(_whole), help="the last level to keep")
     kept.add_argument(

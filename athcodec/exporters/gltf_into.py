@@ -32,7 +32,7 @@ from athcodec.joining import split
 from athcodec.sources import ReadOptions
 from athcodec.sources.gltf import GltfNode, read_moving
 from athcodec.sources.gltf_file import HARMLESS, MESHOPT, GltfFile
-from athcodec.sources.gltf_json import BROKEN
+from athcodec.sources.gltf_json import BROKEN, entries
 from athcodec.sources.gltf_motion import EXTENSION, MAGIC, VERTEX_ATTRIBUTE, GltfPlace, extension_of, places_of
 from athcodec.sources.opening import naming
 
@@ -248,6 +248,27 @@ def write_back(path: str | os.PathLike[str], motion: ClipView, out: str | os.Pat
         data = binary.packed(gltf)
     with new_file(out) as written:
         written.write(_glb(gltf, data))
+
+
+def put_motion(path: str | os.PathLike[str], ath: bytes, out: str | os.PathLike[str]) -> int:
+    """Write the GLB `path` with these bytes in place of those of its motion, which are as many or more; its size.
+
+    Raises ClipError where it is no GLB that holds one motion, OSError.
+    """
+    with naming(path, *BROKEN), closing(GltfFile(path)) as file:
+        motions = entries(extension_of(file.json) or {}, "motions")
+        if len(motions) != 1:
+            raise ClipError(f"{EXTENSION}: got {len(motions)} motions, expected one")
+        _, start, _ = file.part(motions[0], "bufferView")
+        view, binary = file.json["bufferViews"][motions[0]["bufferView"]], _Binary(file)
+        if view["buffer"] != 0 or "uri" in file.json["buffers"][0]:
+            raise ClipError(f"{EXTENSION}: got a motion outside the GLB, expected it inside")
+        view["byteLength"] = len(ath)
+        binary.put(start, ath)
+        data = binary.packed(file.json)
+    with new_file(out) as written:
+        written.write(_glb(file.json, data))
+        return written.tell()
 
 
 def _add_targets(gltf: dict, binary: _Binary, places: list[GltfPlace], motion: ClipView) -> None:
@@ -518,6 +539,10 @@ class _Binary:
         )
         self._added += data + bytes(-len(data) % 4)
         return len(self._json["bufferViews"]) - 1
+
+    def put(self, start: int, data: bytes) -> None:
+        """These bytes in place of as many that were there."""
+        self._old = self._old[:start] + data + self._old[start + len(data) :]
 
     def attribute(self, values: np.ndarray, bounds: bool = False) -> int:
         """An accessor of (count, width) values of vertices, each padded to whole words."""
