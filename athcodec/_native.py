@@ -26,11 +26,13 @@ SHORT_SHIFT, SHORT_FLOATS = 18, 255 << 5
 MEASURES = "max", "p99", "rms"
 """ath_measure, in its order."""
 
-BRANCH = np.dtype([(name, "<i4") for name in "parent count attach flags lag first subtree depth rigid detail".split()])
+BRANCH = np.dtype(
+    [(name, "<i4") for name in "parent count attach flags lag first subtree depth rigid detail ring".split()]
+)
 PIECE = np.dtype(
     [(name, "<i8") for name in ("modes", "basis", "attach_cache")]
     + [(name, "<i4") for name in "first count parent attach branch flags rank level low_level low_modes".split()]
-    + [("last_attached", "<i4"), ("reserved", "<i4")]
+    + [("last_attached", "<i4"), ("ring", "<i4")]
 )
 NODE = np.dtype(
     [("whitening", "<f8", (9,))] + [(name, "<i4") for name in "branch piece first count level last coded rank".split()]
@@ -291,7 +293,7 @@ _ENCODING = {  # core/plan.h, core/motion.h, core/encode.h
     "ath_add_basis_rows": (None, [c_void_p, c_int32, c_int32, c_int32, *[c_void_p] * 3]),
     "ath_encode_basis": (c_int64, [c_void_p, c_void_p, c_size_t, c_int32, c_int32, c_void_p, c_void_p]),
     "ath_encode_temporal": (c_int64, [c_void_p, c_void_p, c_size_t, c_int32, c_int32, c_int32, c_void_p]),
-    "ath_mode_weights": (None, [c_int32, c_void_p]),
+    "ath_mode_weights": (None, [c_void_p, c_void_p]),
     "ath_unit_shapes": (c_int, [c_int32, c_void_p, c_void_p]),
     "ath_encode_shapes": (
         c_int64,

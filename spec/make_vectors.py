@@ -2022,6 +2022,23 @@ valid(
         heads={level: stems_head(0.5 / 4 ** max(level - 2, 0), 16 * level | level % 5) for level in range(12)},
     ),
 )
+TUBES = [
+    Stem(-1, 13, 0, SHEET, lag=4, ring=4),
+    Stem(0, 70, 5, SHEET, lag=6, ring=6),
+    Stem(1, 8, 69, SHEET | LOOSE, ring=2),
+    Stem(1, 5, 30),
+    Stem(0, 62, 3, SHEET, ring=30),
+    Stem(0, 20, 1, SHEET, ring=32),
+    Stem(-1, 9, 0, SHEET, rigid=1, ring=3),
+    Stem(6, 12, 4, SHEET | WHOLE, ring=3),
+    Stem(7, 6, 2, SHEET, ring=2),
+]
+valid(
+    "tubes",
+    "tubes: with a tip, of two pieces, loose, of a ring that is none, rigid, and what hangs on them",
+    refinements(TUBES, 41, layers=1),
+)
+valid("layers-tubes", "the same in layers", refinements(TUBES, 42, frames=9, segments=2))
 valid(
     "layers-mixed",
     "rotations, loose stems, sheets, a stem of two pieces and a subtree that is whole",
@@ -2856,6 +2873,10 @@ hierarchy("rigid-negative", "Rigid -1", [Stem(-1, 3, rigid=1), Stem(0, 2, 1, rig
 hierarchy("rigid-9", "Rigid 9", [Stem(-1, 3), Stem(0, 2, 1, rigid=9)])
 hierarchy("detail-negative", "Detail -1", [Stem(-1, 3, detail=1), Stem(0, 2, 1, detail=-1)])
 hierarchy("detail-256", "Detail 256", [Stem(-1, 3), Stem(0, 2, 1, detail=256)])
+hierarchy("ring-negative", "Ring -1", [Stem(-1, 3, 0, SHEET, ring=2), Stem(0, 2, 1, SHEET, ring=-1)])
+hierarchy("ring-1", "Ring 1", [Stem(-1, 3), Stem(0, 2, 1, SHEET, ring=1)])
+hierarchy("ring-33", "Ring 33", [Stem(-1, 3), Stem(0, 2, 1, SHEET, ring=33)])
+hierarchy("ring-of-beam", "a branch that is no SHEET has a Ring", [Stem(-1, 3), Stem(0, 2, 1, ring=2)])
 hierarchy("root-loose", "a root is LOOSE", [Stem(-1, 3, 0, LOOSE), Stem(0, 2, 1)])
 hierarchy("second-root-loose", "another root is LOOSE", [Stem(-1, 3), Stem(-1, 2, 0, LOOSE)])
 hierarchy(

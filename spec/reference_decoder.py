@@ -92,7 +92,7 @@ def crc32c(data: bytes) -> int:
 # ---- the front: header and chunks ----------------------------------------------------------------------
 
 MAGIC = b"\x89ATH\r\n\x1a\n"
-VERSION = (0, 11)
+VERSION = (0, 12)
 HEADER_BYTES, CHECKSUM_BYTES, TABLE_BYTES_OF_EACH = 24, 4, 16
 SEGMENT_FRAMES, MOST_LEVELS, MOST_LAYERS, MOST_CLIPS, NO_LEVEL = 256, 32, 8, 255, 255
 
@@ -722,6 +722,7 @@ class Branch:
     last_place: int = 0  # where on this stem the last child so far hangs
     rigid: int = 0  # layers in which it moves as it is
     detail: int = 0
+    ring: int = 0  # vertices of each ring of a tube; 0: it is none
 
 
 PLACES = 256  # of a stem, whose numbers are expected from those of other stems
@@ -736,6 +737,9 @@ def decode_hierarchy(stream: bytes, branch_count: int, vertex_count: int):
         branch.rigid = rigid
     for branch, detail in zip(branches, decode_of_branches(coder, branches, 255)):
         branch.detail = detail
+    for branch, ring in zip(branches, decode_of_branches(coder, branches, 32)):
+        require(ring == 0 or (ring > 1 and branch.flags & SHEET), "a Ring of 1, or of a branch that is no SHEET")
+        branch.ring = ring
     branch_source = decode_numbers(coder, [(0, branch_count)], branch_count)
     stem_start, start = [0] * branch_count, 0  # in a source that is sorted by branch
     for b in sorted(range(branch_count), key=lambda b: branch_source[b]):
@@ -2548,6 +2552,12 @@ class Piece:
     low_modes: int = 0
     carries: bool = False  # whether another piece hangs on it
     rigid: bool = False  # whether its branch is, in the layer
+    ring: int = 0  # vertices of each of its rings
+
+    @property
+    def rings(self) -> int:
+        """How many it has; the last one may lack vertices."""
+        return divided_up(self.count, self.ring) if self.ring else 0
 
     @property
     def base_level(self) -> int:
@@ -2578,6 +2588,16 @@ class Node:
     @property
     def vertices(self) -> slice:
         return slice(self.first, self.first + self.count)
+
+
+def divided_up(a: int, b: int) -> int:
+    return (a + b - 1) // b
+
+
+def piece_count(branch: Branch) -> int:
+    """Pieces are of at most 64 vertices and of whole rings."""
+    ring = max(branch.ring, 1)
+    return divided_up(divided_up(branch.count, ring), PIECE_VERTICES // ring)
 
 
 class Plan:
@@ -2616,14 +2636,15 @@ class Plan:
                 last_branch.first + last_branch.count - branch.first,
                 level=branch.depth,
                 last=self.height if branch.flags & WHOLE else branch.depth,
-                coded=self.is_predicted or branch.subtree > 1 or branch.count > PIECE_VERTICES,
+                coded=self.is_predicted or branch.subtree > 1 or piece_count(branch) > 1,
             )
         )
 
     def _add_pieces(self, branch: Branch, node: Node | None, piece_of_vertex: list[int]) -> None:
-        parts = (branch.count + PIECE_VERTICES - 1) // PIECE_VERTICES
+        parts, ring = piece_count(branch), max(branch.ring, 1)
+        rings = divided_up(branch.count, ring)
         for j in range(parts):
-            start, stop = branch.count * j // parts, branch.count * (j + 1) // parts
+            start, stop = ring * (rings * j // parts), min(ring * (rings * (j + 1) // parts), branch.count)
             first = branch.first + start
             attach = branch.attach if j == 0 else first - 1
             piece = Piece(
@@ -2635,12 +2656,13 @@ class Plan:
                 flags=branch.flags if j == 0 else branch.flags & ~LOOSE,
                 level=self.height + 1,
                 rigid=branch.rigid > self.layer,
+                ring=branch.ring,
             )
             if node is not None and not branch.flags & WHOLE:
                 piece.level = branch.depth + 1
             if node is not None and not node.coded:
                 piece.low_level = branch.depth
-                piece.low_modes = min(branch.count, 3 if branch.flags & SHEET else 2)
+                piece.low_modes = min(piece.rings or branch.count, 3 if branch.flags & SHEET and not branch.ring else 2)
             piece_of_vertex += [piece.number] * piece.count
             self.pieces.append(piece)
             if piece.parent >= 0:
@@ -2674,7 +2696,9 @@ class Plan:
         """(modes, count): functions over the piece's vertices."""
         if piece.number not in self._bases:
             modes = cantilever(piece_gaps(self, piece), 0.1, 0.001, tip_weight(self, piece))
-            own = sheet(self, piece, modes) if piece.flags & SHEET else modes
+            own = modes
+            if piece.flags & SHEET:
+                own = tube(self, piece, modes) if piece.ring else sheet(self, piece, modes)
             self._bases[piece.number] = own[:0] if piece.rigid else own
         return self._bases[piece.number]
 
@@ -2732,8 +2756,12 @@ def piece_gaps(plan: Plan, piece: Piece) -> tuple[int, ...]:
     lengths = distances(plan.rest[piece.vertices], before)
     if piece.flags & SHEET:
         lengths[:] = 0.0
+    return quarters_of_mean(lengths)
+
+
+def quarters_of_mean(lengths: np.ndarray) -> tuple[int, ...]:
     total = in_order(lengths)
-    quarters = 4.0 * lengths * float(piece.count) / total + 0.5 if total > 0.0 else np.full(piece.count, 4.0)
+    quarters = 4.0 * lengths * float(len(lengths)) / total + 0.5 if total > 0.0 else np.full(len(lengths), 4.0)
     return tuple(64 if q >= 64.0 else int(q) if q >= 1.0 else 1 for q in quarters.tolist())
 
 
@@ -2861,6 +2889,22 @@ def sheet(plan: Plan, piece: Piece, modes: np.ndarray) -> np.ndarray:
     for mode in modes:
         if len(basis) < piece.count:
             append_orthonormal(basis, mode, 1e-10)
+    return np.array(basis).reshape(-1, piece.count)
+
+
+def tube(plan: Plan, piece: Piece, modes: np.ndarray) -> np.ndarray:
+    """Rings that move as they are along a cantilever, as affine functions of all, each ring so, then what is left of the
+    modes."""
+    x, starts = plan.rest[piece.vertices], range(0, piece.count, piece.ring)
+    centres = np.array([in_order(x[i : i + piece.ring]) / float(len(x[i : i + piece.ring])) for i in starts])
+    lengths = distances(centres, np.vstack([plan.attach_point(piece), centres[:-1]]))
+    ring_of = np.arange(piece.count) // piece.ring
+    along = cantilever(quarters_of_mean(lengths), 0.1, 0.001, 1.0)[:, ring_of]
+    across = (x - centres[ring_of]).T
+    basis: list[np.ndarray] = []
+    for function in (*along, *across, *(mode * column for mode in along for column in across), *modes):
+        if len(basis) < piece.count:
+            append_orthonormal(basis, function, 1e-10)
     return np.array(basis).reshape(-1, piece.count)
 
 
@@ -3478,7 +3522,7 @@ class Pose:
         step = self.mode_stream(piece, m).step
         if self.motion.shapes_of(piece) and m < self.plan.shape_modes(piece):
             return 0.875 * step
-        if piece.flags & SHEET:
+        if m >= piece.rings if piece.ring else piece.flags & SHEET:
             return step
         return step * ([0.75, 0.875, 0.9375, 1.0][m] if m < 4 else 1.125)
 

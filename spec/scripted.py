@@ -420,6 +420,7 @@ class Stem:
     lag: int = 1
     rigid: int = 0
     detail: int = 0
+    ring: int = 0
 
 
 def hierarchy_script(stems: list[Stem], branch_source: list | None = None, vertex_source: list | None = None) -> list:
@@ -440,6 +441,7 @@ def hierarchy_script(stems: list[Stem], branch_source: list | None = None, verte
         script
         + numbers_script([(stem.lag, stem.rigid) for stem in stems])
         + numbers_script([(stem.lag, stem.detail) for stem in stems])
+        + numbers_script([(stem.lag, stem.ring) for stem in stems])
         + permutation_script(branch_source, stems, False)
         + permutation_script(vertex_source, stems, True, branch_source)
     )

@@ -111,7 +111,7 @@ def test_corrections_that_a_closed_end_cuts_off_bend_little_there():
 
 
 def test_an_excursion_of_a_rigid_part_takes_one_correction_that_bends_little():
-    parts = np.array([(0, 4)], [("first", np.int32), ("count", np.int32)])
+    parts = np.array([0]), np.array([4])
     wanted, origin, limit, step = np.zeros((4, 3, 20)), np.zeros(3), 1.0, 0.5
     decoded = wanted.astype(np.float32)
     decoded[:, 2] = 1.3 * np.exp(-(((np.arange(20) - 9) / 3) ** 2))
@@ -123,7 +123,7 @@ def test_an_excursion_of_a_rigid_part_takes_one_correction_that_bends_little():
 
 
 def test_rigid_parts_are_moved_as_a_whole_where_that_serves_all_of_their_vertices():
-    parts = np.array([(0, 3), (3, 3)], [("first", np.int32), ("count", np.int32)])
+    parts = np.array([0, 3]), np.array([3, 3])
     wanted, origin, limit, step = np.zeros((6, 3, 12)), np.zeros(3), 1.0, 0.5
     decoded = wanted.astype(np.float32)
     decoded[:3, 0, 5] = 1.2, 1.4, 1.6  # one way

@@ -300,7 +300,7 @@ answer({
          info.nodeCount, info.chunkCount, info.isFloat64],
   branches: digest(...each(info.branchCount, (i) => Int32Array.of(
     b.parent[i], b.count[i], b.attach[i], b.flags[i], b.lag[i], b.first[i], b.subtree[i], b.depth[i],
-    b.rigid[i], b.detail[i]))),
+    b.rigid[i], b.detail[i], b.ring[i]))),
   times: [...file.times()],
   rest: [digest(file.rest()), digest(file.rest("file", { out: new Float64Array(3 * info.vertexCount) }))],
   errors: levels.map((level) => [0, info.segmentCount - 1].map((first) => file.levelError(level, first))),
@@ -522,7 +522,7 @@ OPEN = "answer(thrown(() => AthFile.open(read(path))));"
     "at, name, in_chunk, sentence",
     [
         (0, "NOT_AN_ATH_FILE", False, "file: got first bytes 0x99415448; expected 0x89415448"),
-        (8, "UNSUPPORTED_VERSION", False, "file: got format version 16.11; expected 0.11"),
+        (8, "UNSUPPORTED_VERSION", False, "file: got format version 16.12; expected 0.12"),
         (70, "BAD_CHECKSUM", False, "front: got checksum 0x[0-9a-f]{8}; expected 0x[0-9a-f]{8}"),
         (-1, "BAD_CHECKSUM", True, r"chunk HIERARCHY at byte \d+: got checksum 0x[0-9a-f]{8}; expected 0x[0-9a-f]{8}"),
     ],

@@ -227,6 +227,30 @@ static void add_carried(const ath_plan *plan, int32_t T, const ath_piece *root, 
     for (int32_t i = 0; i < 9 && carried2 > 0.0; i++) H[i] += own2 / carried2 * products[i];
 }
 
+/* The rotation nearest to H, wherever it is: the quaternion is the first eigenvector of a matrix (Horn, "Closed-form
+ * solution of absolute orientation using unit quaternions", J. Opt. Soc. Am. A 4(4), 1987). */
+static void nearest_rotation(const double H[9], double R[9])
+{
+    double matrix[16], work[16], values[4], q[16];
+    matrix[0] = H[0] + H[4] + H[8];
+    matrix[5] = H[0] - H[4] - H[8];
+    matrix[10] = H[4] - H[0] - H[8];
+    matrix[15] = H[8] - H[0] - H[4];
+    matrix[1] = matrix[4] = H[7] - H[5];
+    matrix[2] = matrix[8] = H[2] - H[6];
+    matrix[3] = matrix[12] = H[3] - H[1];
+    matrix[6] = matrix[9] = H[1] + H[3];
+    matrix[7] = matrix[13] = H[2] + H[6];
+    matrix[11] = matrix[14] = H[5] + H[7];
+    ath_principal(1, 4, matrix, work, values, q);
+    for (int32_t i = 0; i < 3; i++)
+        for (int32_t k = 0; k < 3; k++) {
+            int32_t other = 3 - i - k;
+            double turn = (k - i + 3) % 3 == 1 ? -q[0] : q[0];
+            R[3 * i + k] = 2.0 * (q[i + 1] * q[k + 1] + (i == k ? q[0] * q[0] - 0.5 : turn * q[other + 1]));
+        }
+}
+
 /* The piece's own rotation against its predicted one, as rotation vectors over time, unwrapped. `local`: its
  * vertices relative to the attach point, in the predicted frame. What they say no more of than an error of `step` would,
  * such as the twist of a straight stem, stays as in the frame before. `carried`: the source, where what hangs on a root tells
@@ -252,7 +276,10 @@ static void fit_rotation(const ath_plan *plan, int32_t T, const ath_piece *piece
         if (carried) add_carried(plan, T, piece, t, carried, size2, H);
         double prior = 1e-6 * size2 + (rigid ? 0.0 : step * step * (double)piece->count);
         for (int32_t k = 0; k < 9; k++) H[k] += prior * R[k];
-        ath_turn_to(H, t == 0 ? FIRST_ROTATION_STEPS : ROTATION_STEPS, R);
+        if (rigid)
+            nearest_rotation(H, R);
+        else
+            ath_turn_to(H, t == 0 ? FIRST_ROTATION_STEPS : ROTATION_STEPS, R);
         ath_rotation_vector(R, q, own);
         for (int32_t k = 0; k < 3; k++) omega[k * T + t] = own[k];
     }
@@ -435,9 +462,9 @@ void ath_analyse(const ath_plan *plan, const ath_motion *motion, const ath_integ
     }
 }
 
-void ath_mode_weights(int32_t flags, double weights[ATH_SHAPE_MODES])
+void ath_mode_weights(const ath_piece *piece, double weights[ATH_SHAPE_MODES])
 {
-    for (int32_t m = 0; m < ATH_SHAPE_MODES; m++) weights[m] = ath_mode_weight(flags, m);
+    for (int32_t m = 0; m < ATH_SHAPE_MODES; m++) weights[m] = ath_mode_weight(piece, m);
 }
 
 /* Means over the subtree of the residual in the attach frame, e = R'(x - c) - d: tracks r < rank become the mean of

@@ -88,7 +88,7 @@ ATH_API const char *ath_result_name(int result);
 
 /* ---- constants of the format ------------------------------------------------------------------------------------- */
 
-enum { ATH_FORMAT_MAJOR = 0, ATH_FORMAT_MINOR = 11 };
+enum { ATH_FORMAT_MAJOR = 0, ATH_FORMAT_MINOR = 12 };
 
 /* Kinds of chunks. An unknown kind with the bit ATH_OPTIONAL is skipped. */
 enum {
@@ -295,6 +295,7 @@ typedef struct ath_branch {
     int32_t depth;
     int32_t rigid;  /* layers, from the first on, in which its pieces turn and move as they are */
     int32_t detail; /* 0, or what its largest step of the rest pose is, 2 to the power of half of it less 64 */
+    int32_t ring;   /* vertices of each ring of a tube, which move alike; 0: it has no rings */
 } ath_branch;
 
 ATH_API const ath_branch *ath_branches(const ath_file *file);

@@ -5,6 +5,9 @@
 #define PI 3.14159265358979323846
 #define HALF_ROOT_3 0.86602540378443864676
 
+/* Of a function's squared length, what those before it must leave of it to go on with. */
+#define LEFT 1e-10
+
 enum { MOST_PROBES = 64, MOST_ROWS = ATH_SEGMENT_FRAMES, MODE_STEPS = 32 };
 
 /* Householder reduction of the symmetric n x n matrix `a` to tridiagonal form; on return row i of `q` is the i-th
@@ -181,6 +184,77 @@ static int32_t append_orthonormal(int32_t n, double *basis, int32_t count, doubl
     return count + 1;
 }
 
+static double distance(const double *a, const double *b)
+{
+    double x = a[0] - b[0], y = a[1] - b[1], z = a[2] - b[2];
+    return ath_sqrt(x * x + y * y + z * z);
+}
+
+/* Lengths in quarters of their mean, rounded, 1 to 64: coarse enough that evenly meshed stems share one basis, and never 0,
+ * so that coincident vertices do no harm. */
+static void quarters_of_mean(int32_t count, const double *lengths, uint8_t *gaps)
+{
+    double total = 0.0;
+    for (int32_t i = 0; i < count; i++) total = total + lengths[i];
+    for (int32_t i = 0; i < count; i++) {
+        double quarters = total > 0.0 ? 4.0 * lengths[i] * (double)count / total + 0.5 : 4.0;
+        gaps[i] = (uint8_t)(quarters >= 64.0 ? 64 : quarters >= 1.0 ? (int32_t)quarters : 1);
+    }
+}
+
+enum { MOST_RINGS = ATH_PIECE_VERTICES / 2 };
+
+/* Of a piece's rings: their centres, and the modes of a cantilever along these, rings x rings. */
+static void modes_of_rings(const ath_piece *piece, const double *rest, double centres[][3], double *modes)
+{
+    int32_t rings = ath_rings(piece);
+    const double *before = rest + 3 * (size_t)(piece->attach >= 0 ? piece->attach : piece->first);
+    double lengths[MOST_RINGS], work[2 * MOST_RINGS * MOST_RINGS];
+    uint8_t gaps[MOST_RINGS];
+    for (int32_t r = 0; r < rings; r++) {
+        int32_t from = r * piece->ring, to = ath_min(from + piece->ring, piece->count);
+        for (int32_t k = 0; k < 3; k++) {
+            double sum = 0.0;
+            for (int32_t i = from; i < to; i++) sum = sum + rest[3 * (size_t)(piece->first + i) + (size_t)k];
+            centres[r][k] = sum / (double)(to - from);
+        }
+        lengths[r] = distance(centres[r], before);
+        before = centres[r];
+    }
+    quarters_of_mean(rings, lengths, gaps);
+    cantilever(rings, gaps, 0.1, 0.001, 1.0, modes, work);
+}
+
+/* Rings that move as they are along a cantilever first, then as affine functions of all, then each ring so, then what is left of
+ * the modes of an evenly spaced cantilever. Returns the rank. */
+static int32_t tube(const ath_piece *piece, const double *rest, const double *modes, double *basis)
+{
+    int32_t n = piece->count, rank = 0, rings = ath_rings(piece);
+    double centres[MOST_RINGS][3], along[MOST_RINGS * MOST_RINGS], across[3][ATH_PIECE_VERTICES];
+    double candidate[ATH_PIECE_VERTICES];
+    modes_of_rings(piece, rest, centres, along);
+    for (int32_t m = 0; m < rings; m++) {
+        for (int32_t i = 0; i < n; i++) candidate[i] = along[m * rings + i / piece->ring];
+        rank = append_orthonormal(n, basis, rank, candidate, LEFT);
+    }
+    for (int32_t k = 0; k < 3; k++) {
+        for (int32_t i = 0; i < n; i++)
+            across[k][i] = rest[3 * (size_t)(piece->first + i) + (size_t)k] - centres[i / piece->ring][k];
+        memcpy(candidate, across[k], (size_t)n * sizeof(double));
+        if (rank < n) rank = append_orthonormal(n, basis, rank, candidate, LEFT);
+    }
+    for (int32_t m = 0; m < rings; m++)
+        for (int32_t k = 0; k < 3 && rank < n; k++) {
+            for (int32_t i = 0; i < n; i++) candidate[i] = along[m * rings + i / piece->ring] * across[k][i];
+            rank = append_orthonormal(n, basis, rank, candidate, LEFT);
+        }
+    for (int32_t m = 0; m < n && rank < n; m++) {
+        memcpy(candidate, modes + m * n, (size_t)n * sizeof(double));
+        rank = append_orthonormal(n, basis, rank, candidate, LEFT);
+    }
+    return rank;
+}
+
 /* The functions x0 - a over the piece's vertices first (flat and straight pieces have fewer than three), then what is
  * left of the modes of an evenly spaced cantilever. Returns the rank. */
 static int32_t sheet(const ath_piece *piece, const double *rest, const double *modes, double *basis)
@@ -204,33 +278,22 @@ static int32_t sheet(const ath_piece *piece, const double *rest, const double *m
     }
     for (int32_t m = 0; m < n && rank < n; m++) {
         memcpy(candidate, modes + m * n, (size_t)n * sizeof(double));
-        rank = append_orthonormal(n, basis, rank, candidate, 1e-10);
+        rank = append_orthonormal(n, basis, rank, candidate, LEFT);
     }
     return rank;
 }
 
-static double distance(const double *a, const double *b)
-{
-    double x = a[0] - b[0], y = a[1] - b[1], z = a[2] - b[2];
-    return ath_sqrt(x * x + y * y + z * z);
-}
-
-/* Distances along the piece in quarters of their mean, rounded, 1 to 64: coarse enough that evenly meshed stems share
- * one basis, and never 0, so that coincident vertices do no harm. */
+/* Distances along the piece; a sheet is taken for evenly spaced. */
 static void piece_gaps(const ath_piece *piece, const double *rest, uint8_t *gaps)
 {
-    double length[ATH_PIECE_VERTICES], total = 0.0;
+    double length[ATH_PIECE_VERTICES];
     const double *before = rest + 3 * (size_t)(piece->attach >= 0 ? piece->attach : piece->first);
     for (int32_t i = 0; i < piece->count; i++) {
         const double *here = rest + 3 * (size_t)(piece->first + i);
         length[i] = piece->flags & ATH_SHEET ? 0.0 : distance(here, before);
-        total = total + length[i];
         before = here;
     }
-    for (int32_t i = 0; i < piece->count; i++) {
-        double quarters = total > 0.0 ? 4.0 * length[i] * (double)piece->count / total + 0.5 : 4.0;
-        gaps[i] = (uint8_t)(quarters >= 64.0 ? 64 : quarters >= 1.0 ? (int32_t)quarters : 1);
-    }
+    quarters_of_mean(piece->count, length, gaps);
 }
 
 static uint32_t gaps_hash(const uint8_t *gaps, int32_t n)
@@ -325,7 +388,11 @@ void ath_basis_modes(const ath_piece *pieces, int32_t first, int32_t stop, const
 void ath_basis_sheets(ath_piece *pieces, int32_t first, int32_t stop, const double *rest, double *bases)
 {
     for (ath_piece *piece = pieces + first; piece < pieces + stop; piece++)
-        if (piece->flags & ATH_SHEET) piece->rank = sheet(piece, rest, bases + piece->modes, bases + piece->basis);
+        if (piece->flags & ATH_SHEET) {
+            const double *modes = bases + piece->modes;
+            double *basis = bases + piece->basis;
+            piece->rank = piece->ring > 0 ? tube(piece, rest, modes, basis) : sheet(piece, rest, modes, basis);
+        }
 }
 
 void ath_basis_fill(ath_piece *pieces, int32_t piece_count, const double *rest, const uint8_t *gaps, double *work,

@@ -37,6 +37,13 @@ static int whole_are_nodes(const ath_branch *branches, int32_t branch_count)
     return 1;
 }
 
+static int rings_are_tubes(const ath_branch *branches, int32_t branch_count)
+{
+    for (int32_t b = 0; b < branch_count; b++)
+        if (branches[b].ring > 0 && (branches[b].ring < 2 || !(branches[b].flags & ATH_SHEET))) return 0;
+    return 1;
+}
+
 int ath_decode_hierarchy(void *model, const uint8_t *bytes, size_t size, int32_t branch_count, int32_t vertex_count,
                          ath_branch *branches, int32_t *branch_source, int32_t *vertex_source)
 {
@@ -45,6 +52,7 @@ int ath_decode_hierarchy(void *model, const uint8_t *bytes, size_t size, int32_t
     int valid = code_hierarchy(&coder, (hierarchy_model *)model, branch_count, vertex_count, branches, branch_source,
                                vertex_source);
     valid = valid && is_permutation(branch_count, branch_source) && is_permutation(vertex_count, vertex_source);
+    valid = valid && rings_are_tubes(branches, branch_count);
     valid = valid && ath_count_pieces(branches, branch_count, vertex_count) > 0;
     valid = valid && whole_are_nodes(branches, branch_count);
     return finished(&coder, valid);

@@ -113,7 +113,7 @@ ATH_ENCODER_API void ath_pose_nodes(const ath_plan *plan, const ath_motion *moti
                                     void *positions);
 
 /* Steps of the first ATH_SHAPE_MODES modes of a branch with such flags, over that of their stream. */
-ATH_ENCODER_API void ath_mode_weights(int32_t flags, double weights[ATH_SHAPE_MODES]);
+ATH_ENCODER_API void ath_mode_weights(const ath_piece *piece, double weights[ATH_SHAPE_MODES]);
 
 /* Adds the second moments over time of rows of integers, each of `frames`, to the lower half of `moments`, frames x frames:
  * of the rows whose squares add up to more than `least`. Returns how many these are. */

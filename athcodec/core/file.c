@@ -3,12 +3,13 @@
 #include "decode.h"
 
 enum { NAME_BYTES = 256 }; /* of a clip's name, with the zero behind it */
+enum { LEAST_PIECE = 32 }; /* vertices of those of a long stem: of rings, as many as make no more than 64 */
 
 /* ---- memory ---- */
 
 static int32_t most_pieces(const ath_header *header)
 {
-    return (int32_t)(header->branch_count + header->vertex_count / ATH_PIECE_VERTICES);
+    return (int32_t)(header->branch_count + header->vertex_count / LEAST_PIECE);
 }
 
 static uint64_t larger(uint64_t a, uint64_t b) { return a > b ? a : b; }

@@ -212,16 +212,17 @@ ATH_INLINE int ath_is_shape_row(const ath_piece *piece, const ath_piece_rows *ro
 
 /* Steps of modes over that of their stream. Modes of a cantilever are quantised finer the more of the motion they
  * carry: an error of the first ones would have to be corrected by the pieces that hang on this one. */
-ATH_INLINE double ath_mode_weight(int32_t flags, int32_t m)
+ATH_INLINE double ath_mode_weight(const ath_piece *piece, int32_t m)
 {
     static const double weight[4] = {0.75, 0.875, 0.9375, 1.0};
-    return flags & ATH_SHEET ? 1.0 : m < 4 ? weight[m] : 1.125;
+    if (piece->ring > 0 ? m >= ath_rings(piece) : (piece->flags & ATH_SHEET) != 0) return 1.0;
+    return m < 4 ? weight[m] : 1.125;
 }
 
 ATH_INLINE double ath_row_step(const ath_motion *motion, const ath_piece *piece, const ath_piece_rows *rows, int32_t r)
 {
     double step = ath_mode_stream(motion, piece, r)->step;
-    return step * (ath_is_shape_row(piece, rows, r) ? 0.875 : ath_mode_weight(piece->flags, r));
+    return step * (ath_is_shape_row(piece, rows, r) ? 0.875 : ath_mode_weight(piece, r));
 }
 
 ATH_INLINE int32_t *ath_row(int32_t *rows, int32_t row, int32_t frames)

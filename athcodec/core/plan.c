@@ -4,7 +4,14 @@
 /* Smallest second moment that counts as a direction, relative to the largest. */
 #define RANK_TOLERANCE 1e-4
 
-static int32_t pieces_of(int32_t count) { return (count + ATH_PIECE_VERTICES - 1) / ATH_PIECE_VERTICES; }
+static int32_t divide_up(int32_t a, int32_t b) { return (a + b - 1) / b; }
+
+/* Pieces end where rings do: what is shared among them are rings, each vertex being one of a stem that has none. */
+static int32_t pieces_of(const ath_branch *branch)
+{
+    int32_t ring = ath_max(branch->ring, 1);
+    return divide_up(divide_up(branch->count, ring), ATH_PIECE_VERTICES / ring);
+}
 
 int32_t ath_count_pieces(ath_branch *branches, int32_t branch_count, int32_t vertex_count)
 {
@@ -24,7 +31,7 @@ int32_t ath_count_pieces(ath_branch *branches, int32_t branch_count, int32_t ver
             return 0;
         }
         next += branch->count;
-        total += pieces_of(branch->count);
+        total += pieces_of(branch);
     }
     for (int32_t b = branch_count - 1; b > 0; b--)
         if (branches[b].parent >= 0) branches[branches[b].parent].subtree += branches[b].subtree;
@@ -58,11 +65,11 @@ static void split_branch(const ath_branch *branches, int32_t b, ath_piece *piece
                          int32_t *piece_of_vertex)
 {
     const ath_branch *branch = branches + b;
-    int32_t parts = pieces_of(branch->count);
+    int32_t parts = pieces_of(branch), ring = ath_max(branch->ring, 1), rings = divide_up(branch->count, ring);
     for (int32_t j = 0; j < parts; j++) {
         ath_piece *piece = pieces + next + j;
-        int32_t from = (int32_t)((int64_t)branch->count * j / parts);
-        int32_t to = (int32_t)((int64_t)branch->count * (j + 1) / parts);
+        int32_t from = ring * (int32_t)((int64_t)rings * j / parts);
+        int32_t to = ath_min(ring * (int32_t)((int64_t)rings * (j + 1) / parts), branch->count);
         memset(piece, 0, sizeof *piece);
         piece->first = branch->first + from;
         piece->count = to - from;
@@ -70,6 +77,7 @@ static void split_branch(const ath_branch *branches, int32_t b, ath_piece *piece
         piece->parent = piece->attach < 0 ? -1 : piece_of_vertex[piece->attach];
         piece->branch = b;
         piece->flags = j == 0 ? branch->flags : branch->flags & ~ATH_LOOSE;
+        piece->ring = branch->ring;
         piece->rank = piece->count;
         piece->low_level = -1;
         piece->attach_cache = piece->last_attached = -1;
@@ -110,10 +118,11 @@ static void plan_node(const ath_plan *plan, ath_piece *pieces, ath_node *node, i
     node->count = subtree_vertices(plan->branches, b);
     node->level = branch->depth;
     node->last = branch->flags & ATH_WHOLE ? plan->height : branch->depth;
-    node->coded = branch->subtree > 1 || branch->count > ATH_PIECE_VERTICES;
+    node->coded = branch->subtree > 1 || pieces_of(branch) > 1;
     if (!node->coded) {
         pieces[piece].low_level = node->level;
-        pieces[piece].low_modes = ath_min(branch->count, branch->flags & ATH_SHEET ? 3 : 2);
+        pieces[piece].low_modes = branch->ring > 0 ? ath_min(ath_rings(pieces + piece), 2)
+                                                   : ath_min(branch->count, branch->flags & ATH_SHEET ? 3 : 2);
     }
 }
 
@@ -125,7 +134,7 @@ void ath_build_plan(ath_plan *plan, ath_piece *pieces, ath_node *nodes, int32_t 
     for (int32_t b = 0; b < plan->branch_count; b = next_node(branches, b))
         plan->height = ath_max(plan->height, branches[b].depth);
     for (int32_t b = 0; b < plan->branch_count; b++) {
-        int32_t parts = pieces_of(branches[b].count), level = plan->height + 1;
+        int32_t parts = pieces_of(branches + b), level = plan->height + 1;
         split_branch(branches, b, pieces, next_piece, memory);
         if (b == following) {
             plan_node(plan, pieces, nodes + node++, b, next_piece);

@@ -22,7 +22,7 @@ typedef struct ath_piece {
     int32_t low_level; /* whose stream holds its tracks and first modes, -1 when `level` does */
     int32_t low_modes;
     int32_t last_attached; /* last piece that hangs on it, -1: none */
-    int32_t reserved;
+    int32_t ring;          /* vertices of each of its rings, 0: it has none */
 } ath_piece;
 
 /* A node of the ATH: the subtree of a branch, moved by one affine map per frame at levels `level` to `last`. */
@@ -115,6 +115,9 @@ ATH_INLINE int32_t ath_base_level(const ath_piece *piece)
 
 /* Modes that it moves by. */
 ATH_INLINE int32_t ath_rank(const ath_piece *piece) { return piece->flags & ATH_RIGID ? 0 : piece->rank; }
+
+/* Rings of a piece that has some; the last one may lack vertices. */
+ATH_INLINE int32_t ath_rings(const ath_piece *piece) { return (piece->count + piece->ring - 1) / piece->ring; }
 
 ATH_INLINE int ath_has_shift(const ath_piece *piece) { return piece->parent < 0 || (piece->flags & ATH_LOOSE); }
 

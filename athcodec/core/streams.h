@@ -12,7 +12,7 @@
 
 /* ---- hierarchy ---- */
 
-enum { PLACES = 256, MOST_LAYERS = 8, MOST_DETAIL = 255, WHOLE_DETAIL = 128 /* of step 1 */ };
+enum { PLACES = 256, MOST_LAYERS = 8, MOST_DETAIL = 255, MOST_RING = 32, WHOLE_DETAIL = 128 /* of step 1 */ };
 
 /* Of numbers in an order of their own: each is expected one step after the number before it, or else one step after that
  * at the same place of the last run that has one there, as in a source that holds all first vertices, then all second. */
@@ -31,7 +31,7 @@ typedef struct {
 
 typedef struct {
     number_model up, count, attach, lag;
-    branch_number_model rigid, detail;
+    branch_number_model rigid, detail, ring;
     permutation_model branch_source, vertex_source;
     ath_context flag[3][2];
 } hierarchy_model;
@@ -61,6 +61,7 @@ static void hierarchy_model_init(hierarchy_model *model)
     number_model_init(&model->lag);
     branch_number_model_init(&model->rigid);
     branch_number_model_init(&model->detail);
+    branch_number_model_init(&model->ring);
     permutation_model_init(&model->branch_source);
     permutation_model_init(&model->vertex_source);
     for (int32_t i = 0; i < 3; i++)
@@ -93,7 +94,7 @@ static int32_t code_parent(ath_coder *coder, hierarchy_model *model, const ath_b
 static int code_branch(ath_coder *coder, hierarchy_model *model, ath_branch *branches, int32_t b, int32_t vertices_left,
                        int32_t *last_up, int32_t *mean_count)
 {
-    static const ath_branch none = {0, 0, 0, 0, 0, 0, 0, 0, 0, 0};
+    static const ath_branch none = {0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0};
     ath_branch *branch = branches + b;
     const ath_branch *before = b == 0 ? &none : branch - 1;
     branch->parent = b == 0 ? -1 : code_parent(coder, model, branches, b, last_up);
@@ -245,6 +246,7 @@ static int code_hierarchy(ath_coder *coder, hierarchy_model *model, int32_t bran
     }
     return code_of_branches(coder, &model->rigid, branch_count, branches, &branches->rigid, MOST_LAYERS)
            && code_of_branches(coder, &model->detail, branch_count, branches, &branches->detail, MOST_DETAIL)
+           && code_of_branches(coder, &model->ring, branch_count, branches, &branches->ring, MOST_RING)
            && code_branch_numbers(coder, model, branch_count, branch_source)
            && code_vertex_numbers(coder, model, branches, branch_count, vertex_count, branch_source, vertex_source);
 }

@@ -13,6 +13,7 @@ class Feature(Enum):
     SHAPES = "learned shapes"
     TIME_BASES = "learned time bases"
     SHEETS = "affine functions first"
+    RINGS = "tubes of rings"
     LOOSE = "loose branches"
     RIGID = "rigid parts"
     FREE_RIGID = "loose rigid parts"

@@ -44,7 +44,7 @@ from athcodec.encoding.prediction import FoundPrediction, best_prediction, code_
 from athcodec.encoding.progress import Progress, silent
 from athcodec.encoding.sample import is_small
 from athcodec.encoding.search import Choice, Search, still_choice, typical_segments
-from athcodec.encoding.segment import CodedPrelude, Source, thread_count
+from athcodec.encoding.segment import SHEET, CodedPrelude, Source, thread_count
 from athcodec.encoding.shape import RestPrecision
 from athcodec.encoding.summary import Seam, Summary
 from athcodec.errors import BoundError, ClipError
@@ -650,7 +650,8 @@ def _summary(
         "rotations": list(settings.rotation_step_factors),
         "learned": list(settings.learned_bases),
         "common_basis": settings.common_basis,
-        "sheets": int(settings.sheet.sum()),
+        "sheets": int((settings.forms == SHEET).sum()),
+        "tubes": int((settings.forms > SHEET).sum()),
         "periodic": settings.periodic,
         "learned_pieces": 0 if settings.learned_pieces is None else int(settings.learned_pieces.sum()),
     }

@@ -13,12 +13,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from athcodec._native import SHAPE_MODES, SHEET, address, lib
+from athcodec._native import SHAPE_MODES, address, lib
 from athcodec.encoding import quantise as qz
 from athcodec.encoding.motion import Plan, SegmentMotion
 from athcodec.encoding.time_bases import principal
 
 NUMBERS = 3 * SHAPE_MODES
+FAINT = 0.15  # steps that a shape bends rings by, which stretches them where they turn
 
 
 @dataclass(frozen=True)
@@ -80,20 +81,29 @@ def _parts(pieces: np.ndarray, row_bytes: int) -> Iterator[slice]:
     return (slice(at, at + count) for at in range(0, len(pieces), count))
 
 
-def _mode_weights(flags: int) -> np.ndarray:
-    weights = np.empty(SHAPE_MODES)
-    lib.ath_mode_weights(flags, address(weights, np.float64, SHAPE_MODES))
-    return weights
+def _mode_weights(pieces: np.ndarray) -> np.ndarray:
+    """(P, SHAPE_MODES) of pieces, (P,) of _native.PIECE."""
+    kinds, kind = np.unique(pieces[["flags", "count", "ring"]], return_index=True, return_inverse=True)[1:]
+    weights = np.empty((len(kinds), SHAPE_MODES))
+    for own, piece in zip(weights, pieces[kinds]):
+        lib.ath_mode_weights(np.array(piece).ctypes.data, address(own, np.float64, SHAPE_MODES))
+    return weights[kind]
 
 
 def _tracks(plan: Plan, segment: SegmentMotion, pieces: np.ndarray, size: int) -> np.ndarray:
     """Tracks of the first modes over temporal frequency, (pieces, 3 size, frames) float64 in scene units."""
     slots = plan.pieces["first"][pieces][:, None] + np.arange(size)
     steps = np.array([stream.step for stream in segment.streams])
-    weight = np.where(plan.pieces["flags"][pieces, None] & SHEET, _mode_weights(SHEET), _mode_weights(0))[:, :size]
+    weight = _mode_weights(plan.pieces[pieces])[:, :size]
     scale = steps[plan.pieces["level"][pieces]][:, None] * weight
     rows = segment.coefficients[slots] * scale[:, :, None, None]
     return rows.reshape(len(pieces), 3 * size, segment.frames)
+
+
+def _across(pieces: np.ndarray, size: int) -> np.ndarray:
+    """(P, size) bool: which numbers of a shape are of modes that bend rings."""
+    rings = -(-pieces["count"] // np.maximum(pieces["ring"], 1))
+    return (pieces["ring"] > 0)[:, None] & (np.arange(size) // 3 >= rings[:, None])
 
 
 def learn(plan: Plan, seen: Components, step: float, wanted: np.ndarray | None = None) -> LearnedModes:
@@ -104,6 +114,8 @@ def learn(plan: Plan, seen: Components, step: float, wanted: np.ndarray | None =
     for pieces, lengths, vectors in seen.groups:
         scale = np.minimum(lengths / (qz.MODE_STEP * least), qz.LARGEST_MODE)
         numbers = np.rint(vectors * scale[:, :, None]).astype(np.int32)
+        faint = np.abs(vectors * lengths[:, :, None]) < FAINT * least
+        numbers[_across(plan.pieces[pieces], numbers.shape[2])[:, None] & faint] = 0
         kept = (lengths > qz.LEAST_MODE * least) & numbers.any(axis=2)
         if wanted is not None:
             kept &= wanted[pieces, None]

@@ -63,7 +63,7 @@ def _settings(source: Source, ath: Ath, bound: float, rest_step: float) -> Setti
         step=_largest_step(source.limit(bound), MEMORIES[0]),
         level_steps=np.ones(levels),
         rest_step=qz.single(rest_step),
-        sheet=none,
+        forms=np.zeros(branches, np.int32),
         loose=none,
         rigid=np.zeros(branches, np.int32),
         layer=0,

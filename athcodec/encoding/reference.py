@@ -20,7 +20,7 @@ SEGMENTS = 4  # that the mean is taken of
 
 def mean_pose(source: Source, ath: Ath, settings: Settings) -> np.ndarray:
     """(N, 3) float64 less the origin, file order; settings: the start of a search."""
-    settings = replace(settings, sheet=source.sheet_like)
+    settings = replace(settings, forms=source.sheet_like.astype(np.int32))
     plan = Plan(branch_records(source.hierarchy, ath, settings), source.clip.vertex_count, source.pool)
     plan.set_rest(source.rest)
     some = np.unique(np.linspace(0, len(source.segments) - 1, SEGMENTS).astype(int))

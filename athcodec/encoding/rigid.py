@@ -17,8 +17,8 @@ OWN_BEND = 0.3  # what a rigid part may bend by in the source, over the bound
 STIFF_BEND = 0.05  # the same of one that is rigid at any bound
 LARGEST = 20.0  # size of a part whose shape the bound would spoil, over that
 FRAMES = 12  # of a segment that are looked at
-TURN = 7  # half octaves of the largest step of rotations, below 1 radian: errors of 1 to 2 degrees
-TURN_STEP = half_octave(-TURN)
+TURN_STEP = half_octave(-7)  # largest of rotations: errors of 1 to 2 degrees
+MOST_TURN = 15
 
 
 def rigid_layers(
@@ -56,3 +56,13 @@ def _bends(shapes: np.ndarray, sample: np.ndarray, vertices: np.ndarray) -> np.n
         u[:, :, 2] *= np.sign(np.linalg.det(u @ v))[:, None]
         worst = np.maximum(worst, np.linalg.norm(x - d @ (u @ v).transpose(0, 2, 1), axis=2).max(axis=1))
     return worst
+
+
+def turn_of(turn_step: float) -> int:
+    """Half octaves of the largest step of rotations below 1 radian; 0: any."""
+    return round(-2 * np.log2(turn_step)) if turn_step else 0
+
+
+def finer_turn(turn_step: float) -> float:
+    """The next step, or the same where there is none."""
+    return half_octave(-min(turn_of(turn_step) + 1, MOST_TURN))

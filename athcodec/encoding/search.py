@@ -23,9 +23,12 @@ from athcodec.encoding.learned_modes import Components, LearnedModes, components
 from athcodec.encoding.motion import Plan, SegmentMotion, position_errors
 from athcodec.encoding.progress import Progress, trials
 from athcodec.encoding.reference import mean_pose
-from athcodec.encoding.rigid import TURN_STEP, rigid_layers
+from athcodec.encoding.rigid import TURN_STEP, finer_turn, rigid_layers
+from athcodec.encoding.rings import ring_sizes
 from athcodec.encoding.sample import ExtrapolationFactors, PlantSample, is_small, sample_plant
 from athcodec.encoding.segment import (
+    BEAM,
+    SHEET,
     CodedPrelude,
     Settings,
     Source,
@@ -59,7 +62,7 @@ FIRST_FACTORS, HOPELESS = (0, 2, 8), 1.3  # of rotations; the others, and those 
 MODES_SAVE, LAYERS_SAVE = 1.5, 1.05  # of a single layer's bytes, at most: learned modes, what suits refinements better
 SHORT_STEM = 3  # vertices of a stem whose learned modes are tried in place of rotations and in any basis
 NEAREST, NEAR = 4, 1.12  # other choices that steps are found for, and what they cost before, over the best
-CALM_STEP, CALM_COST = 1.15, 1.02  # of small rigid parts: how much finer a step at a time, for how much in all
+CALM_STEP, CALM_COST = 1.15, 1.03  # of small rigid parts: how much finer a step at a time, for how much in all
 CALM_SHARE = 1e-4  # of their vertices over time, that may be corrected
 WORTH = {
     "_with_learned_bases": 2,
@@ -150,7 +153,7 @@ def first_settings(
         step=qz.single(step),
         level_steps=np.ones(levels),
         rest_step=qz.single(rest_step),
-        sheet=source.sheet_like & (Feature.SHEETS not in source.without),
+        forms=_forms(source, samples),
         loose=loose_branches(source, samples[-1].positions),
         rigid=rigid,
         layer=len(ratios) - 1,
@@ -172,6 +175,17 @@ def first_settings(
     if layered and not settings.details.any():  # adaptive rest poses are worth less to those that refine them
         return with_connected_rest(source, ath, replace(settings, lags=lags(source, rest_step, settings.details)))
     return with_best_lags(source, ath, settings)
+
+
+def _forms(source: Source, samples: Sequence[SegmentSample]) -> np.ndarray:
+    """(B,) of Settings.forms: tubes where rings move alike, else by how branches look."""
+    hierarchy, sheets = source.hierarchy, source.sheet_like & (Feature.SHEETS not in source.without)
+    if Feature.RINGS in source.without:
+        return sheets.astype(np.int32)
+    first, count = hierarchy.first_vertex, hierarchy.stem_count
+    positions = [sample.positions for sample in samples]
+    rings = ring_sizes(first, count, np.ones_like(source.sheet_like), source.rest, positions)
+    return np.where(rings > 0, rings, sheets)
 
 
 def _rigid(source: Source, bound: float, samples: Sequence[SegmentSample], ratios: Sequence[int]) -> np.ndarray:
@@ -269,7 +283,7 @@ class Search:
         self._ratios, self._layered = ratios, len(ratios) > 1
         keeps_shape = start.turn_step > 0  # which a few bytes less would cost
         self._is_small = is_small(source.clip.vertex_count, source.segments, effort) and not keeps_shape
-        self._sheet: np.ndarray | None = None  # that is best in all of a plant that is sampled
+        self._forms: np.ndarray | None = None  # that is best in all of a plant that is sampled
         self._extra_trials, self._trials = 0, trials(effort, self._layered, self._is_small)
 
     @classmethod
@@ -450,11 +464,9 @@ class Search:
 
     def like(self, other: Search, settings: Settings) -> Settings:
         """Settings that were found about another reference pose, about this one."""
-        by_form = np.array_equal(settings.sheet, other.source.sheet_like)
-        sheet = self.source.sheet_like if by_form else settings.sheet
         own = replace(
             settings,
-            sheet=sheet,
+            forms=self._forms_like(settings.forms, other),
             lags=self.start.lags,
             adaptive_rest=self.start.adaptive_rest,
             connected_rest=self.start.connected_rest,
@@ -474,7 +486,7 @@ class Search:
         limit = start.limit if np.isscalar(start.limit) else start.limit[sample.vertices]
         some = replace(
             start,
-            sheet=sample.source.sheet_like,
+            forms=start.forms[kept],
             loose=start.loose[kept],
             lags=start.lags[kept],
             details=start.details[kept],
@@ -504,7 +516,6 @@ class Search:
         """What was found last for a sample of the plant, for all of it; start: what does not depend on that."""
         inner, all_inner = search.inner_nodes(), self.inner_nodes()
         fewer = np.sqrt(search.extrapolation.vertices * inner / np.maximum(all_inner, 1))
-        by_form = np.array_equal(found.sheet, search.source.sheet_like)
         settings = replace(
             start,
             step=found.step,
@@ -516,25 +527,33 @@ class Search:
             learned_bases=found.learned_bases,
             common_basis=found.common_basis,
             periodic=found.periodic,
-            sheet=start.sheet if by_form else np.full_like(start.sheet, found.sheet[0]),
+            forms=self._forms_like(found.forms, search),
             node_steps=found.node_steps * np.where(inner > 0, fewer, 1.0),
         )
-        settings = replace(settings, sheet=self._sheet_of_all(settings))
+        settings = replace(settings, forms=self._forms_of_all(settings))
         if found.rest_slack > 0:
             settings = with_rest_slack(self.source, self.ath, settings, found.rest_slack)
         if search.required_saving is None:
             return settings
         return replace(settings, learned_pieces=self._pieces_for_learned_modes(settings, [search.required_saving])[0])
 
-    def _sheet_of_all(self, settings: Settings) -> np.ndarray:
+    def _forms_like(self, forms: np.ndarray, other: Search) -> np.ndarray:
+        """What was chosen for the branches of another search, for those of this one: tubes or none, and for others by
+        how they look, or one for all."""
+        plain = forms <= SHEET
+        by_look = np.array_equal(forms[plain], other.source.sheet_like[plain])
+        own = self.source.sheet_like.astype(np.int32) if by_look else np.full_like(self.start.forms, forms[plain][0])
+        return own if plain.all() else np.where(self.start.forms > SHEET, self.start.forms, own)
+
+    def _forms_of_all(self, settings: Settings) -> np.ndarray:
         """Which branches have the affine functions first: as in the sample or by form, or by form or all where some did
         there. A sample holds more than its share of what carries others, and errs there by more than in all else."""
-        if self._sheet is None:
-            other = np.ones_like(self.start.sheet) if settings.sheet.any() else settings.sheet
-            candidates = [replace(settings, sheet=sheet) for sheet in (self.start.sheet, other)]
-            is_clear = self.effort == "fast" or np.array_equal(self.start.sheet, other)
-            self._sheet = settings.sheet if is_clear else self._cheapest(candidates).sheet
-        return self._sheet
+        if self._forms is None:
+            other = np.maximum(settings.forms, SHEET) if settings.forms.any() else settings.forms
+            candidates = [replace(settings, forms=forms) for forms in (self.start.forms, other)]
+            is_clear = self.effort == "fast" or np.array_equal(self.start.forms, other)
+            self._forms = settings.forms if is_clear else self._cheapest(candidates).forms
+        return self._forms
 
     def cost(self, settings: Settings) -> tuple[float, np.ndarray]:
         """(bytes of a whole file, and of each level's streams in it) at these settings."""
@@ -547,6 +566,7 @@ class Search:
         return (
             settings.step,
             settings.level_steps.tobytes(),
+            settings.turn_step,
             *self._prelude_key(settings),
             settings.rotation_step_factors,
             settings.only_tips,
@@ -618,7 +638,7 @@ class Search:
 
     def _turning(self, settings: Settings) -> tuple:
         """What decides what is left for the modes of a piece."""
-        return settings.rotation_step_factors, settings.only_tips, settings.sheet.tobytes()
+        return settings.rotation_step_factors, settings.only_tips, settings.forms.tobytes()
 
     def learned_modes(self, plan: Plan, settings: Settings, everywhere: bool = False) -> LearnedModes | None:
         """Of the pieces that `settings` gives some, or of all, learned from segments spread over the clip."""
@@ -661,7 +681,7 @@ class Search:
     def _in_each_basis(self, settings: Settings) -> list[Settings]:
         """The settings and, on short stems, the same without rotations in each basis."""
         unturned = replace(settings, rotation_step_factors=(0,) * self.levels, only_tips=False)
-        bases = [replace(unturned, sheet=sheet) for sheet in self._sheets()] if self._short_stems() else []
+        bases = [replace(unturned, forms=forms) for forms in self._all_forms()] if self._short_stems() else []
         return list({self._key(own): own for own in (settings, *bases)}.values())
 
     def _short_stems(self) -> bool:
@@ -721,7 +741,7 @@ class Search:
             settings.connected_rest,
             settings.lags.tobytes(),
             None if settings.shape_of is None else settings.shape_of.tobytes(),
-            settings.sheet.tobytes(),
+            settings.forms.tobytes(),
             settings.layer,
             settings.free_rigid,
         )
@@ -734,7 +754,7 @@ class Search:
 
     def _with_basis(self, settings: Settings) -> Settings:
         """The spatial basis of each branch: all alike, or by shape; judged without rotations and with some."""
-        plain = [replace(settings, sheet=sheet) for sheet in self._sheets()]
+        plain = [replace(settings, forms=forms) for forms in self._all_forms()]
         candidates = [*plain]
         if not any(settings.rotation_step_factors) and not self._without(Feature.ROTATIONS):
             costs = [cost for cost, _ in self._costs(plain)]
@@ -745,12 +765,16 @@ class Search:
             ]
         return replace(self._cheapest(candidates), rotation_step_factors=settings.rotation_step_factors)
 
-    def _sheets(self) -> list[np.ndarray]:
-        """Which branches may have the affine functions first."""
-        if self._without(Feature.SHEETS):
-            return [np.zeros_like(self.source.sheet_like)]
-        sheets = [self.source.sheet_like, np.zeros_like(self.source.sheet_like), np.ones_like(self.source.sheet_like)]
-        return sheets if self.source.sheet_like.any() and not self.source.sheet_like.all() else sheets[1:]
+    def _all_forms(self) -> list[np.ndarray]:
+        """The forms that branches may have: tubes stay tubes where branches are to keep their shape."""
+        looks, tubes = self.source.sheet_like, np.where(self.start.forms > SHEET, self.start.forms, 0)
+        forms = [np.full(looks.shape, BEAM, np.int32)]
+        if not self._without(Feature.SHEETS):
+            forms.append(np.full(looks.shape, SHEET, np.int32))
+            if looks.any() and not looks.all():
+                forms.insert(0, looks.astype(np.int32))
+        with_tubes = [np.where(tubes > 0, tubes, own) for own in forms if tubes.any()]
+        return with_tubes if self.start.details[tubes > 0].any() else with_tubes + forms
 
     def _with_level_steps(self, settings: Settings) -> Settings:
         """Coarser steps for levels whose vertices, and those that hang on them, may be further off."""
@@ -845,7 +869,7 @@ class Search:
             replace(plain, rotation_step_factors=(factor,) * self.levels, only_tips=False) for factor in FIRST_FACTORS
         ]
         yield from turned
-        yield from (replace(own, sheet=sheet) for own in (plain, turned[0]) for sheet in self._sheets())
+        yield from (replace(own, forms=forms) for own in (plain, turned[0]) for forms in self._all_forms())
 
     def _each_with_learned_modes(self, plain: Sequence[Settings]) -> Iterator[Settings]:
         """The settings, and the same with learned modes."""
@@ -869,13 +893,19 @@ class Search:
         return [others[i] for i in np.argsort(costs, kind="stable")[:NEAREST] if costs[i] <= most]
 
     def _with_calm_parts(self, settings: Settings) -> Settings:
-        """A finer step where corrections bend and twitch many small rigid parts, as far as it is cheap."""
-        most = CALM_COST * self.cost(settings)[0]
-        while self._corrected_parts(settings) > CALM_SHARE:
-            finer = replace(settings, step=qz.single(settings.step / CALM_STEP))
-            if self.cost(finer)[0] > most:
+        """A finer step, of all or of turns, where corrections bend and twitch many small rigid parts, as far as it is
+        cheap."""
+        most, share = CALM_COST * self.cost(settings)[0], self._corrected_parts(settings)
+        while share > CALM_SHARE:
+            finer = (
+                replace(settings, step=qz.single(settings.step / CALM_STEP)),
+                replace(settings, turn_step=finer_turn(settings.turn_step)),
+            )
+            calmer = {self._corrected_parts(own): own for own in finer if self.cost(own)[0] <= most}
+            if min(calmer, default=share) >= share:
                 break
-            settings = finer
+            share = min(calmer)
+            settings = calmer[share]
         return settings
 
     def _corrected_parts(self, settings: Settings) -> float:

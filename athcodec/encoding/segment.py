@@ -23,7 +23,7 @@ from athcodec.encoding.features import Feature
 from athcodec.encoding.learned_modes import LearnedModes
 from athcodec.encoding.motion import NODE_ROOT, STEM_ROOT, LevelStream, Plan, PlanSample, SegmentMotion, gather
 from athcodec.encoding.polygons import Mesh
-from athcodec.encoding.rigid import TURN
+from athcodec.encoding.rigid import turn_of
 from athcodec.encoding.shape import RestPrecision
 from athcodec.encoding.time_bases import Entries, InWaves, TimeComponents
 from athcodec.errors import BoundError
@@ -32,6 +32,7 @@ from athcodec.polygons import Polygons
 from athcodec.segmentation import split_segments
 from athcodec.threads import SERIAL, ThreadPool, default_jobs
 
+BEAM = 0  # form of a branch; others are SHEET, or a tube's vertices for each ring
 FINER = 32  # step over that of segments that bases and modes are learned from
 ROWS_AT_ONCE = 1 << 14  # of coefficients
 WORK_BYTES = 1 << 30  # of the segments coded at once, where `jobs` does not say how many these are
@@ -263,7 +264,7 @@ class Settings:
     step: float
     level_steps: np.ndarray  # (levels,) factors on it
     rest_step: float
-    sheet: np.ndarray  # (B,) bool, file order
+    forms: np.ndarray  # (B,) int32, file order: BEAM, SHEET, or the vertices of each ring of a tube
     loose: np.ndarray  # (B,) bool, file order
     rigid: np.ndarray  # (B,) int32: in how many layers, from the first on, branches are rigid
     layer: int  # that these settings are of
@@ -320,9 +321,12 @@ def branch_records(hierarchy: Hierarchy, ath: Ath, settings: Settings) -> np.nda
     branches["parent"], branches["count"] = hierarchy.branch_parent, hierarchy.stem_count
     branches["attach"], branches["first"] = hierarchy.attach, hierarchy.first_vertex
     free = settings.free_rigid & (settings.rigid > settings.layer) & (hierarchy.branch_parent >= 0)
-    branches["flags"] = SHEET * settings.sheet + WHOLE * ath.whole_branches() + LOOSE * (settings.loose | free)
+    branches["flags"] = (
+        SHEET * (settings.forms != BEAM) + WHOLE * ath.whole_branches() + LOOSE * (settings.loose | free)
+    )
     branches["rigid"] = settings.rigid
     branches["lag"], branches["detail"] = settings.lags, settings.details
+    branches["ring"] = np.where(settings.forms > SHEET, settings.forms, 0)
     return branches
 
 
@@ -688,7 +692,7 @@ def stems_head(settings: Settings, level: int, bases: dict[int, StreamBasis]) ->
         settings.step_of(level),
         settings.rotation_step_factors[level],
         only_tips=settings.only_tips,
-        turn=TURN if settings.turn_step else 0,
+        turn=turn_of(settings.turn_step),
         bits=ct.NODE_WAVES if settings.is_straight else 0,
     )
     if level in bases:
@@ -726,17 +730,18 @@ def find_corrections(
     keeps_all: bool = True,
     ends: streams.MetEnds = streams.FREE_ENDS,
 ) -> Corrections:
-    """Those that keep the limit; those of a rigid part move all of it where that serves, and else, unless each vertex
-    is to keep the limit, there are none. ends: what they meet; in the step of correction_step. Raises BoundError."""
+    """Those that keep the limit; those of a rigid part, or of a ring, move all of it where that serves, and else,
+    unless each vertex of a rigid part is to keep the limit, it has none. ends: what they meet; in the step of
+    correction_step. Raises BoundError."""
     factor, is_rigid = 1.0, np.repeat(plan.is_rigid, plan.pieces["count"])
-    rigid = plan.pieces[plan.is_rigid]
+    parts = _parts_that_keep_their_shape(plan)
     limit = settings.limit if keeps_all else np.where(is_rigid, np.inf, settings.limit)
     while True:
         step = qz.single(correction_step(settings.limit) * factor)
         moves = streams.find_rigid_corrections(
-            rigid, decoded, positions, origin, settings.limit, step, plan.pool, settings.narrow, ends.closed
+            parts, decoded, positions, origin, settings.limit, step, plan.pool, settings.narrow, ends.closed
         )
-        met = replace(ends, decided=streams.ascending(np.concatenate([ends.decided, moves])))
+        met = ends.with_moves(moves)
         rows = streams.find_corrections(decoded, positions, origin, limit, step, plan.pool, settings.narrow, met)
         if rows is not None:
             return Corrections(rows, step, decoded.shape)
@@ -745,6 +750,16 @@ def find_corrections(
             raise BoundError(
                 f"max error: got {settings.bound:.3g}; it cannot be kept in the output's {decoded.dtype.name} numbers"
             )
+
+
+def _parts_that_keep_their_shape(plan: Plan | PlanSample) -> tuple[np.ndarray, np.ndarray]:
+    """First vertices and numbers of vertices of rigid pieces, and of the rings of others."""
+    rigid, tubes = plan.pieces[plan.is_rigid], plan.pieces[~plan.is_rigid & (plan.pieces["ring"] > 0)]
+    count = -(-tubes["count"] // np.maximum(tubes["ring"], 1))
+    rings, number = np.repeat(tubes, count), np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
+    offset = number * rings["ring"]
+    size = np.minimum(rings["ring"], rings["count"] - offset)
+    return np.append(rigid["first"], rings["first"] + offset), np.append(rigid["count"], size)
 
 
 def code_stems(

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import nullcontext
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -297,11 +297,18 @@ class MetEnds:
     """How the corrections of a segment meet those of the segments beside it.
 
     closed: the ends at which no footprint is cut off, FIRST and LAST. decided: (K, 6) int32 corrections in ascending
-    order, which stand in the first frame of one segment as in the last of the other, or move rigid parts as a whole.
+    order, which stand in the first frame of one segment as in the last of the other, or move parts as a whole; no two
+    are of one vertex and frame.
     """
 
     closed: int = 0
     decided: np.ndarray = field(default_factory=lambda: np.empty((0, 6), np.int32))
+
+    def with_moves(self, moves: np.ndarray) -> MetEnds:
+        """And corrections that move parts as a whole, (K, 6), but for those where others stand."""
+        taken, wanted = (rows[:, 0].astype(np.int64) << 32 | rows[:, 1] for rows in (self.decided, moves))
+        moves = moves[~np.isin(wanted, taken)]
+        return replace(self, decided=ascending(np.concatenate([self.decided, moves])))
 
     def of_vertices(self, start: int, stop: int) -> MetEnds:
         """The same for some of the vertices, numbered from `start` on."""
@@ -359,7 +366,7 @@ def apply_corrections(positions: np.ndarray, corrections: np.ndarray, step: floa
 
 
 def find_rigid_corrections(
-    parts: np.ndarray,
+    parts: tuple[np.ndarray, np.ndarray],
     positions: np.ndarray,
     source: np.ndarray,
     origin: np.ndarray,
@@ -370,11 +377,11 @@ def find_rigid_corrections(
     closed: int = 0,
 ) -> np.ndarray:
     """Corrections, (K, 6), ascending, each of which moves all vertices of a part together, where one of `positions` is
-    beyond its limit, and this brings all of them within. parts: records with `first` and `count`; narrow: corrections
-    are to be of one frame; closed: as MetEnds has it."""
+    beyond its limit, and this brings all of them within. parts: first vertices and numbers of vertices; narrow:
+    corrections are to be of one frame; closed: as MetEnds has it."""
     vertices, _, frames = positions.shape
     limits = np.array(np.broadcast_to(limit, vertices), np.float64)
-    first, counts = (np.ascontiguousarray(parts[name], np.int32) for name in ("first", "count"))
+    first, counts = (np.ascontiguousarray(numbers, np.int32) for numbers in parts)
 
     def found(start: int, stop: int) -> np.ndarray:
         return _rows(

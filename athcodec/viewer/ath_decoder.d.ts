@@ -127,6 +127,8 @@ export interface Branches {
   readonly rigid: Int32Array;
   /** 0, or its largest step of the rest pose, in half octaves about 128. */
   readonly detail: Int32Array;
+  /** Vertices of each ring of a tube, which move alike; 0: it has no rings. */
+  readonly ring: Int32Array;
   /** Vertex (file order) of the parent's stem that it hangs on; -1 for a root. */
   readonly attach: Int32Array;
   /** 1: flat or compact; 2: not attached; 4: its subtree moves as one. Added up. */

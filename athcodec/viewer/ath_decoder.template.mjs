@@ -30,7 +30,7 @@ const CHUNK = {
   fed: "u64", offset: "u64", length: "u32", checksum: "u32", segment: "u32", kind: "u16", level: "u8",
 };
 const CHUNK_SIZE = 32;
-const BRANCH = ["parent", "count", "attach", "flags", "lag", "first", "subtree", "depth", "rigid", "detail"];
+const BRANCH = ["parent", "count", "attach", "flags", "lag", "first", "subtree", "depth", "rigid", "detail", "ring"];
 const PART = ["first", "count", "branch", "index"];
 const FAULT = { code: "i32", field: "i32", chunk: "i32" }; // ath_fault_text reads the rest
 const FAULT_SIZE = 56, FAULT_TEXT = 256, LEVEL_NAME = 32;

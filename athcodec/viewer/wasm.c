@@ -11,7 +11,7 @@ _Static_assert(sizeof(size_t) == 4 && sizeof(void *) == 4, "pointers and sizes a
 _Static_assert(offsetof(ath_info, is_predicted) == 128 && sizeof(ath_info) == 136, "INFO");
 _Static_assert(offsetof(ath_clip, loop) == 32 && sizeof(ath_clip) == 40, "CLIP");
 _Static_assert(offsetof(ath_chunk, level) == 30 && sizeof(ath_chunk) == 32, "CHUNK");
-_Static_assert(offsetof(ath_branch, detail) == 36 && sizeof(ath_branch) == 40, "BRANCH");
+_Static_assert(offsetof(ath_branch, ring) == 40 && sizeof(ath_branch) == 44, "BRANCH");
 _Static_assert(offsetof(ath_part, index) == 12 && sizeof(ath_part) == 16, "PART");
 _Static_assert(offsetof(ath_polygons, is_derived) == 13 && sizeof(ath_polygons) == 16, "POLYGONS");
 _Static_assert(offsetof(ath_range, size) == 8 && sizeof(ath_range) == 16, "RANGE_SIZE");

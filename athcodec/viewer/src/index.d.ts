@@ -95,7 +95,7 @@ export class ATH extends EventDispatcher<{ arrays: {} }> {
   readonly box: Box3;
   readonly sphere: Sphere;
   /** One entry per branch in file order: see ath_decoder.d.ts. */
-  readonly branches: Record<"parent" | "first" | "count" | "subtree" | "depth" | "attach" | "flags" | "lag" | "rigid" | "detail", Int32Array>;
+  readonly branches: Record<"parent" | "first" | "count" | "subtree" | "depth" | "attach" | "flags" | "lag" | "rigid" | "detail" | "ring", Int32Array>;
   /** Branch of every vertex in source order. */
   readonly vertexBranch: Int32Array;
   /** Resolves when all bytes of the file are here, of all levels and clips: they are fetched, behind what is wanted for pictures,
