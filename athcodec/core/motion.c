@@ -4,6 +4,7 @@
 #include "motion.h"
 
 enum { POLAR_ITERATIONS = 4, TURN_LANES = 16, ATH_TERMS = ATH_SHAPE_NUMBERS + ATH_PIECE_VERTICES - ATH_SHAPE_MODES };
+enum { PLACED_VERTICES = 2 * ATH_LANES, PLACED_FRAMES = 2 * ATH_LANES };
 
 static const double LEAST_MOMENT = 0.0009765625; /* of inertia, that a rotation's step is made for, over all of them */
 
@@ -232,12 +233,12 @@ static int any_nonzero(const double *row, int32_t count)
     return 0;
 }
 
-/* What a piece is placed by: tracks over time, and how far each moves a vertex along an axis. */
+/* What a piece is placed by: tracks over time, of modes three, one behind the other. */
 typedef struct {
-    const double *track[3][ATH_TERMS];
+    const double *track[ATH_TERMS];
     int32_t shape[ATH_TERMS]; /* of the first shape_count terms, which are the same for all axes */
     int32_t mode[ATH_TERMS];  /* of those behind */
-    int32_t shape_count, count;
+    int32_t shape_count, count, frames;
 } placing_terms;
 
 static placing_terms terms_of(const ath_piece *piece, const ath_piece_rows *rows, int32_t T, const uint8_t *used,
@@ -245,60 +246,163 @@ static placing_terms terms_of(const ath_piece *piece, const ath_piece_rows *rows
 {
     placing_terms terms;
     int32_t from = rows->shape_count > 0 ? ath_shape_modes(piece) : 0;
+    terms.frames = T;
     terms.shape_count = terms.count = 0;
     for (int32_t s = 0; s < rows->shape_count; s++) {
         const double *track = tracks + (size_t)s * (size_t)T;
         if (!used[s / 3] || !any_nonzero(track, T)) continue;
-        for (int32_t axis = 0; axis < 3; axis++) terms.track[axis][terms.count] = track;
+        terms.track[terms.count] = track;
         terms.shape[terms.count++] = s;
     }
     terms.shape_count = terms.count;
     for (int32_t m = from; m < ath_rank(piece); m++) {
         if (!used[m]) continue;
-        for (int32_t axis = 0; axis < 3; axis++)
-            terms.track[axis][terms.count] = tracks + ((size_t)m * 3 + (size_t)axis) * (size_t)T;
+        terms.track[terms.count] = tracks + (size_t)m * 3 * (size_t)T;
         terms.mode[terms.count++] = m;
     }
     return terms;
 }
 
-/* How far each term moves vertex i along an axis. */
-static void weigh_terms(const ath_piece *piece, const ath_piece_rows *rows, const placing_terms *terms,
-                        const double *basis, int32_t i, double weight[3][ATH_TERMS])
+/* A few vertices side by side: where they are at rest, less the attach point, and how far each term moves them. */
+typedef struct {
+    double rest[3][PLACED_VERTICES], weight[ATH_TERMS][3][PLACED_VERTICES]; /* of modes the same for all axes */
+} placed_vertices;
+
+/* `mode`: of each of a shape's modes the numbers of the vertices. */
+ATH_INLINE void weigh_shape(int32_t modes, const double *shape, double mode[][PLACED_VERTICES],
+                            double weight[3][PLACED_VERTICES])
 {
-    size_t n = (size_t)piece->count;
-    for (int32_t j = 0; j < terms->shape_count; j++) {
-        const double *shape = rows->shapes + terms->shape[j] * ATH_SHAPE_NUMBERS;
-        double x = 0.0, y = 0.0, z = 0.0;
-        for (int32_t m = 0; m < ath_shape_modes(piece); m++) {
-            double mode = basis[(size_t)m * n + (size_t)i];
-            x = x + mode * shape[3 * m];
-            y = y + mode * shape[3 * m + 1];
-            z = z + mode * shape[3 * m + 2];
+    for (int32_t v = 0; v < PLACED_VERTICES; v += ATH_LANES) {
+        ath_lanes x, y, z;
+        lanes_set(&x, 0.0);
+        lanes_set(&y, 0.0);
+        lanes_set(&z, 0.0);
+        for (int32_t m = 0; m < modes; m++) {
+            lanes_add_scaled(&x, shape[3 * m], mode[m] + v);
+            lanes_add_scaled(&y, shape[3 * m + 1], mode[m] + v);
+            lanes_add_scaled(&z, shape[3 * m + 2], mode[m] + v);
         }
-        weight[0][j] = x;
-        weight[1][j] = y;
-        weight[2][j] = z;
+        lanes_store(weight[0] + v, &x);
+        lanes_store(weight[1] + v, &y);
+        lanes_store(weight[2] + v, &z);
     }
-    for (int32_t j = terms->shape_count; j < terms->count; j++)
-        weight[0][j] = weight[1][j] = weight[2][j] = basis[(size_t)terms->mode[j] * n + (size_t)i];
 }
 
-/* placed = c + R (x0 - a + sum over terms of weight * track), shapes first, tracks of zeros left out. */
+ATH_INLINE void weigh_terms(const ath_plan *plan, const ath_piece *piece, const ath_piece_rows *rows,
+                            const placing_terms *terms, int32_t first, int32_t count, placed_vertices *vertices)
+{
+    const double *basis = plan->bases + piece->basis + first, *a = ath_rest_attach(plan, piece);
+    double mode[ATH_SHAPE_MODES][PLACED_VERTICES];
+    for (int32_t i = 0; i < count; i++) {
+        const double *x0 = ath_rest_of(plan, piece->first + first + i);
+        for (int32_t k = 0; k < 3; k++) vertices->rest[k][i] = x0[k] - a[k];
+    }
+    if (terms->shape_count > 0)
+        for (int32_t m = 0; m < ath_shape_modes(piece); m++)
+            for (int32_t i = 0; i < PLACED_VERTICES; i++) mode[m][i] = i < count ? basis[m * piece->count + i] : 0.0;
+    for (int32_t j = 0; j < terms->shape_count; j++)
+        weigh_shape(ath_shape_modes(piece), rows->shapes + terms->shape[j] * ATH_SHAPE_NUMBERS, mode,
+                    vertices->weight[j]);
+    for (int32_t j = terms->shape_count; j < terms->count; j++)
+        for (int32_t i = 0; i < count; i++) vertices->weight[j][0][i] = basis[terms->mode[j] * piece->count + i];
+}
+
+/* What the terms make of vertex v in PLACED_FRAMES frames from t on. */
+ATH_INLINE void add_terms(int32_t t, const placing_terms *terms, const placed_vertices *vertices, int32_t v,
+                          double sum[3][PLACED_FRAMES])
+{
+    ath_lanes x0, x1, y0, y1, z0, z1;
+    int32_t T = terms->frames, j = 0;
+    lanes_set(&x0, vertices->rest[0][v]);
+    lanes_set(&y0, vertices->rest[1][v]);
+    lanes_set(&z0, vertices->rest[2][v]);
+    x1 = x0;
+    y1 = y0;
+    z1 = z0;
+    for (; j < terms->shape_count; j++) {
+        const double *track = terms->track[j] + t;
+        lanes_add_scaled(&x0, vertices->weight[j][0][v], track);
+        lanes_add_scaled(&x1, vertices->weight[j][0][v], track + ATH_LANES);
+        lanes_add_scaled(&y0, vertices->weight[j][1][v], track);
+        lanes_add_scaled(&y1, vertices->weight[j][1][v], track + ATH_LANES);
+        lanes_add_scaled(&z0, vertices->weight[j][2][v], track);
+        lanes_add_scaled(&z1, vertices->weight[j][2][v], track + ATH_LANES);
+    }
+    for (; j < terms->count; j++) {
+        const double *track = terms->track[j] + t;
+        double weight = vertices->weight[j][0][v];
+        lanes_add_scaled(&x0, weight, track);
+        lanes_add_scaled(&x1, weight, track + ATH_LANES);
+        lanes_add_scaled(&y0, weight, track + T);
+        lanes_add_scaled(&y1, weight, track + T + ATH_LANES);
+        lanes_add_scaled(&z0, weight, track + 2 * T);
+        lanes_add_scaled(&z1, weight, track + 2 * T + ATH_LANES);
+    }
+    lanes_store(sum[0], &x0);
+    lanes_store(sum[0] + ATH_LANES, &x1);
+    lanes_store(sum[1], &y0);
+    lanes_store(sum[1] + ATH_LANES, &y1);
+    lanes_store(sum[2], &z0);
+    lanes_store(sum[2] + ATH_LANES, &z1);
+}
+
+/* x := c + R x of `count` vertices in ATH_LANES frames, T frames apart. */
+ATH_INLINE void move_vertices(int32_t T, int32_t count, const double *R, const double *c,
+                              double sums[][3][PLACED_FRAMES], int32_t from, double *out)
+{
+    const ath_lanes r0 = lanes_at(R), r1 = lanes_at(R + T), r2 = lanes_at(R + 2 * T);
+    const ath_lanes r3 = lanes_at(R + 3 * T), r4 = lanes_at(R + 4 * T), r5 = lanes_at(R + 5 * T);
+    const ath_lanes r6 = lanes_at(R + 6 * T), r7 = lanes_at(R + 7 * T), r8 = lanes_at(R + 8 * T);
+    const ath_lanes c0 = lanes_at(c), c1 = lanes_at(c + T), c2 = lanes_at(c + 2 * T);
+    for (int32_t i = 0; i < count; i++, out += 3 * T) {
+        ath_lanes x = lanes_at(sums[i][0] + from), y = lanes_at(sums[i][1] + from), z = lanes_at(sums[i][2] + from);
+        ath_lanes moved = lanes_moved(&c0, &r0, &x, &r1, &y, &r2, &z);
+        lanes_store(out, &moved);
+        moved = lanes_moved(&c1, &r3, &x, &r4, &y, &r5, &z);
+        lanes_store(out + T, &moved);
+        moved = lanes_moved(&c2, &r6, &x, &r7, &y, &r8, &z);
+        lanes_store(out + 2 * T, &moved);
+    }
+}
+
+/* Vertex v at one frame. */
+ATH_INLINE void place_frame(int32_t t, const placing_terms *terms, const placed_vertices *vertices, int32_t v,
+                            const ath_frames *at, double *out)
+{
+    int32_t T = terms->frames, shapes = terms->shape_count;
+    const double *R = at->rotation + t, *c = at->point + t;
+    double x[3];
+    for (int32_t k = 0; k < 3; k++) {
+        x[k] = vertices->rest[k][v];
+        for (int32_t j = 0; j < shapes; j++) x[k] = x[k] + vertices->weight[j][k][v] * terms->track[j][t];
+        for (int32_t j = shapes; j < terms->count; j++)
+            x[k] = x[k] + vertices->weight[j][0][v] * terms->track[j][k * T + t];
+    }
+    for (int32_t k = 0; k < 3; k++, R += 3 * T)
+        out[k * T + t] = c[k * T] + (R[0] * x[0] + R[T] * x[1] + R[2 * T] * x[2]);
+}
+
+/* placed = c + R (x0 - a + sum over terms of weight * track), shapes first, tracks of zeros left out. A few vertices
+ * pass through a few frames at a time, while tracks and attach frames stay in the innermost cache. */
 ATH_HOT static void place(const ath_plan *plan, const ath_motion *motion, const ath_piece *piece,
                           const ath_piece_rows *rows, const uint8_t *used, const ath_scratch *scratch)
 {
-    int32_t T = motion->frames;
-    const double *a = ath_rest_attach(plan, piece);
+    int32_t T = motion->frames, count;
     placing_terms terms = terms_of(piece, rows, T, used, scratch->rows);
-    double weight[3][ATH_TERMS];
-    for (int32_t i = 0; i < piece->count; i++) {
-        const double *x0 = ath_rest_of(plan, piece->first + i);
-        double *out = scratch->placed + i * 3 * T;
-        weigh_terms(piece, rows, &terms, plan->bases + piece->basis, i, weight);
-        for (int32_t axis = 0; axis < 3; axis++)
-            lanes_sum(T, terms.count, weight[axis], terms.track[axis], x0[axis] - a[axis], out + axis * T);
-        ath_move(T, &scratch->at, out);
+    placed_vertices vertices;
+    double sums[PLACED_VERTICES][3][PLACED_FRAMES], *out = scratch->placed;
+    const double *R = scratch->at.rotation, *c = scratch->at.point;
+    for (int32_t first = 0; first < piece->count; first += count, out += count * 3 * T) {
+        int32_t t = 0;
+        count = ath_min(PLACED_VERTICES, piece->count - first);
+        weigh_terms(plan, piece, rows, &terms, first, count, &vertices);
+        for (; t + PLACED_FRAMES <= T; t += PLACED_FRAMES) {
+            for (int32_t i = 0; i < count; i++) add_terms(t, &terms, &vertices, i, sums[i]);
+            for (int32_t from = 0; from < PLACED_FRAMES; from += ATH_LANES)
+                move_vertices(T, count, R + t + from, c + t + from, sums, from, out + t + from);
+        }
+        for (; t < T; t++)
+            for (int32_t i = 0; i < count; i++) place_frame(t, &terms, &vertices, i, &scratch->at, out + i * 3 * T);
     }
 }
 
