@@ -4,7 +4,7 @@
 #include "motion.h"
 
 enum { POLAR_ITERATIONS = 4, TURN_LANES = 16, ATH_TERMS = ATH_SHAPE_NUMBERS + ATH_PIECE_VERTICES - ATH_SHAPE_MODES };
-enum { PLACED_VERTICES = 2 * ATH_LANES, PLACED_FRAMES = 2 * ATH_LANES };
+enum { PLACED_VERTICES = 2 * ATH_LANES, PLACED_FRAMES = 2 * ATH_LANES, PROJECTED_NUMBERS = 8 * ATH_LANES };
 
 static const double LEAST_MOMENT = 0.0009765625; /* of inertia, that a rotation's step is made for, over all of them */
 
@@ -916,51 +916,58 @@ void ath_predict_track(const ath_stream *stream, int32_t T, int32_t frequencies,
     }
 }
 
-/* out = R^T (x - c) */
-ATH_HOT void ath_into_rest_space(int32_t T, const ath_frames *at, const double *x, double *ATH_RESTRICT out)
+/* out = R^T (x - c) - d */
+ATH_INLINE void into_rest_space(int32_t T, const ath_frames *at, const double *x, const double d[3],
+                                double *ATH_RESTRICT out)
 {
     const double *R = at->rotation, *c = at->point;
     for (int32_t t = 0; t < T; t++) {
         double dx = x[t] - c[t], dy = x[T + t] - c[T + t], dz = x[2 * T + t] - c[2 * T + t];
-        out[t] = R[t] * dx + R[3 * T + t] * dy + R[6 * T + t] * dz;
-        out[T + t] = R[T + t] * dx + R[4 * T + t] * dy + R[7 * T + t] * dz;
-        out[2 * T + t] = R[2 * T + t] * dx + R[5 * T + t] * dy + R[8 * T + t] * dz;
+        out[t] = R[t] * dx + R[3 * T + t] * dy + R[6 * T + t] * dz - d[0];
+        out[T + t] = R[T + t] * dx + R[4 * T + t] * dy + R[7 * T + t] * dz - d[1];
+        out[2 * T + t] = R[2 * T + t] * dx + R[5 * T + t] * dy + R[8 * T + t] * dz - d[2];
     }
 }
 
-void ath_to_local(const ath_plan *plan, int32_t T, const ath_piece *piece, const ath_frames *at, const double *placed,
-                  double *local)
+ATH_HOT void ath_into_rest_space(int32_t T, const ath_frames *at, const double *x, double *ATH_RESTRICT out)
+{
+    static const double nothing[3] = {0.0, 0.0, 0.0};
+    into_rest_space(T, at, x, nothing, out);
+}
+
+ATH_HOT void ath_to_local(const ath_plan *plan, int32_t T, const ath_piece *piece, const ath_frames *at,
+                          const double *placed, double *local)
 {
     const double *a = ath_rest_attach(plan, piece);
     for (int32_t i = 0; i < piece->count; i++) {
         const double *x0 = ath_rest_of(plan, piece->first + i);
-        double *own = local + (size_t)i * 3 * (size_t)T;
-        ath_into_rest_space(T, at, placed + (size_t)i * 3 * (size_t)T, own);
-        for (int32_t axis = 0; axis < 3; axis++) {
-            double d = x0[axis] - a[axis];
-            for (int32_t t = axis * T; t < (axis + 1) * T; t++) own[t] = own[t] - d;
-        }
+        double d[3] = {x0[0] - a[0], x0[1] - a[1], x0[2] - a[2]};
+        into_rest_space(T, at, placed + (size_t)i * 3 * (size_t)T, d, local + (size_t)i * 3 * (size_t)T);
     }
 }
 
-ATH_HOT static void project_mode(const ath_plan *plan, int32_t T, const ath_piece *piece, int32_t m,
-                                 const double *local, double *ATH_RESTRICT row)
+/* row = sum over the vertices of what each counts in a mode times its track. */
+ATH_HOT static void project_modes(const ath_plan *plan, int32_t T, const ath_piece *piece, int32_t first, int32_t stop,
+                                  const double *local, double *ATH_RESTRICT rows)
 {
-    const double *mode = plan->bases + piece->basis + (size_t)m * (size_t)piece->count;
+    double weight[ATH_PIECE_VERTICES], tip = ath_tip_weight(piece, plan->rest);
     const double *x[ATH_PIECE_VERTICES];
-    double weight[ATH_PIECE_VERTICES];
-    int32_t last = piece->count - 1;
-    for (int32_t v = 0; v <= last; v++) {
-        x[v] = local + (size_t)v * 3 * (size_t)T;
-        weight[v] = v == last ? mode[v] * ath_tip_weight(piece, plan->rest) : mode[v];
+    int32_t last = piece->count - 1, count;
+    for (int32_t from = 0; from < 3 * T; from += count) {
+        count = ath_min(PROJECTED_NUMBERS, 3 * T - from);
+        for (int32_t v = 0; v <= last; v++) x[v] = local + (size_t)v * 3 * (size_t)T + from;
+        for (int32_t m = first; m < stop; m++) {
+            const double *mode = plan->bases + piece->basis + (size_t)m * (size_t)piece->count;
+            for (int32_t v = 0; v <= last; v++) weight[v] = v == last ? mode[v] * tip : mode[v];
+            lanes_sum(count, piece->count, weight, x, 0.0, rows + (size_t)m * 3 * (size_t)T + from);
+        }
     }
-    lanes_sum(3 * T, piece->count, weight, x, 0.0, row);
 }
 
 void ath_project(const ath_plan *plan, int32_t T, const ath_piece *piece, int32_t count, const double *local,
                  double *ATH_RESTRICT rows)
 {
-    for (int32_t m = 0; m < count; m++) project_mode(plan, T, piece, m, local, rows + (size_t)m * 3 * (size_t)T);
+    project_modes(plan, T, piece, 0, count, local, rows);
 }
 
 /* The unit quaternion of a rotation matrix, of the two the one nearer to the last. */
@@ -1055,16 +1062,14 @@ void ath_predict_tracks(const ath_plan *plan, const ath_motion *motion, const at
 }
 
 /* Three tracks of shapes at a time: the products of the modes with each. */
-static void shape_tracks(int32_t T, const ath_piece *piece, const ath_piece_rows *rows, int32_t r, const double *modes,
-                         double *track)
+ATH_HOT static void shape_tracks(int32_t T, const ath_piece *piece, const ath_piece_rows *rows, int32_t r,
+                                 const double *modes, double *track)
 {
-    for (int32_t i = 0; i < 3 * T; i++) track[i] = 0.0;
-    for (int32_t s = 3 * r; s < ath_min(3 * r + 3, rows->shape_count); s++)
-        for (int32_t j = 0; j < 3 * ath_shape_modes(piece); j++) {
-            double weight = rows->shapes[s * ATH_SHAPE_NUMBERS + j], *own = track + (s - 3 * r) * T;
-            const double *mode = modes + (size_t)j * (size_t)T;
-            for (int32_t t = 0; t < T; t++) own[t] = own[t] + weight * mode[t];
-        }
+    int32_t count = 3 * ath_shape_modes(piece);
+    const double *x[ATH_SHAPE_NUMBERS];
+    for (int32_t j = 0; j < count; j++) x[j] = modes + (size_t)j * (size_t)T;
+    for (int32_t s = 3 * r; s < 3 * r + 3; s++, track += T)
+        lanes_sum(T, s < rows->shape_count ? count : 0, rows->shapes + s * ATH_SHAPE_NUMBERS, x, 0.0, track);
 }
 
 void ath_predict_modes(const ath_plan *plan, const ath_motion *motion, const ath_piece *piece,
@@ -1081,8 +1086,8 @@ void ath_predict_modes(const ath_plan *plan, const ath_motion *motion, const ath
         const int32_t *coarse = rows->coarse_modes ? rows->coarse_modes + (size_t)r * 3 * (size_t)T : 0;
         double *track = scratch->rows + (size_t)r * 3 * (size_t)T;
         int has_prediction = !coarse || !is_zero(coarse, 3 * T);
-        if (has_prediction && rows->shape_count == 0) project_mode(plan, T, piece, r, scratch->placed, track);
-        if (ath_is_shape_row(piece, rows, r)) {
+        if (has_prediction && rows->shape_count == 0) project_modes(plan, T, piece, r, r + 1, scratch->placed, scratch->rows);
+        if (has_prediction && ath_is_shape_row(piece, rows, r)) {
             shape_tracks(T, piece, rows, r, scratch->rows, scratch->track);
             track = scratch->track;
         }
@@ -1096,8 +1101,12 @@ void ath_predict_modes(const ath_plan *plan, const ath_motion *motion, const ath
 int32_t ath_row_extent(const int32_t *row, int32_t T, int32_t most)
 {
     int32_t count = 0;
-    for (int32_t axis = 0; axis < 3; axis++)
-        for (int32_t k = most; k > count; k--)
-            if (row[axis * T + k - 1] != 0) count = k;
+    for (int32_t axis = 0; axis < 3; axis++) {
+        const int32_t *own = row + axis * T;
+        int32_t k = most;
+        while (k - count >= PREDICTED && is_zero(own + k - PREDICTED, PREDICTED)) k -= PREDICTED;
+        while (k > count && own[k - 1] == 0) k--;
+        count = k;
+    }
     return count;
 }
