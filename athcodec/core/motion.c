@@ -167,9 +167,9 @@ ATH_HOT void ath_inverse_temporal(const ath_stream *stream, int32_t T, int32_t c
     const double *wave[ATH_SEGMENT_FRAMES];
     int32_t used = 0;
     for (int32_t k = 0; k < count; k++) {
-        if (quantised[k] == 0) continue;
-        value[used] = (double)quantised[k] * step;
-        wave[used++] = stream->temporal + (size_t)k * (size_t)T;
+        value[used] = (double)quantised[k] * step; /* without a branch, which would be guessed wrong */
+        wave[used] = stream->temporal + (size_t)k * (size_t)T;
+        used += quantised[k] != 0;
     }
     lanes_sum(T, used, value, wave, 0.0, row);
 }
