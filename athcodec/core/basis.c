@@ -55,7 +55,7 @@ ATH_HOT static void tridiagonalise(int32_t n, double *ATH_RESTRICT a, double *AT
 }
 
 /* Turns two rows into each other. */
-ATH_HOT static void rotate_rows(int32_t n, double c, double s, double *ATH_RESTRICT low, double *ATH_RESTRICT high)
+ATH_INLINE void rotate_rows(int32_t n, double c, double s, double *ATH_RESTRICT low, double *ATH_RESTRICT high)
 {
     for (int32_t k = 0; k < n; k++) {
         double h = high[k], w = low[k];
@@ -66,7 +66,7 @@ ATH_HOT static void rotate_rows(int32_t n, double c, double s, double *ATH_RESTR
 
 /* Implicit QL on the tridiagonal matrix; rotates the rows of q into eigenvectors. The iteration count is capped, so
  * that the time is bounded for every input; the cap is never reached by the matrices of cantilever(). */
-static void diagonalise(int32_t n, double *d, double *e, double *q)
+ATH_HOT static void diagonalise(int32_t n, double *d, double *e, double *q)
 {
     for (int32_t i = 1; i < n; i++) e[i - 1] = e[i];
     e[n - 1] = 0.0;
@@ -370,19 +370,40 @@ int64_t ath_basis_layout(ath_piece *pieces, int32_t piece_count, const double *r
     return next;
 }
 
-void ath_basis_modes(const ath_piece *pieces, int32_t first, int32_t stop, const double *rest, const uint8_t *gaps,
-                     double *work, double *bases)
+/* Modes of a piece by those that it has in another plan, where they are the same. */
+static int take_modes(const ath_plan *before, int32_t p, const ath_piece *piece, const double *rest,
+                      const uint8_t *gaps, double *modes)
+{
+    uint8_t known[ATH_PIECE_VERTICES];
+    if (!before) return 0;
+    const ath_piece *other = before->pieces + p;
+    piece_gaps(other, before->rest, known);
+    if (!same_gaps(known, gaps, piece->count) || ath_tip_weight(other, before->rest) != ath_tip_weight(piece, rest))
+        return 0;
+    memcpy(modes, before->bases + other->modes, (size_t)piece->count * (size_t)piece->count * sizeof *modes);
+    return 1;
+}
+
+static void fill_modes(const ath_piece *pieces, int32_t first, int32_t stop, const double *rest, const uint8_t *gaps,
+                       const ath_plan *before, double *work, double *bases)
 {
     int64_t laid_out = 0; /* up to here by the pieces before: modes that stand further back are the piece's own */
     for (int32_t p = 0; p < stop; p++) {
         const ath_piece *piece = pieces + p;
         int64_t last = piece->flags & ATH_SHEET ? piece->basis : piece->modes;
-        if (p >= first && piece->modes >= laid_out)
+        if (p >= first && piece->modes >= laid_out
+            && !take_modes(before, p, piece, rest, gaps + piece->first, bases + piece->modes))
             cantilever(piece->count, gaps + piece->first, 0.1, 0.001, ath_tip_weight(piece, rest), bases + piece->modes,
                        work);
         last += (int64_t)piece->count * piece->count;
         if (last > laid_out) laid_out = last;
     }
+}
+
+void ath_basis_modes(const ath_piece *pieces, int32_t first, int32_t stop, const double *rest, const uint8_t *gaps,
+                     double *work, double *bases)
+{
+    fill_modes(pieces, first, stop, rest, gaps, 0, work, bases);
 }
 
 void ath_basis_sheets(ath_piece *pieces, int32_t first, int32_t stop, const double *rest, double *bases)
@@ -395,10 +416,10 @@ void ath_basis_sheets(ath_piece *pieces, int32_t first, int32_t stop, const doub
         }
 }
 
-void ath_basis_fill(ath_piece *pieces, int32_t piece_count, const double *rest, const uint8_t *gaps, double *work,
-                    double *bases)
+void ath_basis_fill(ath_piece *pieces, int32_t piece_count, const double *rest, const uint8_t *gaps,
+                    const ath_plan *before, double *work, double *bases)
 {
-    ath_basis_modes(pieces, 0, piece_count, rest, gaps, work, bases);
+    fill_modes(pieces, 0, piece_count, rest, gaps, before, work, bases);
     ath_basis_sheets(pieces, 0, piece_count, rest, bases);
 }
 

@@ -106,10 +106,10 @@ ATH_INLINE void start_frequency(row_surroundings *row, int32_t k)
     row->band = ath_min(bit_length((uint32_t)k + 1) - 1, BANDS - 1);
 }
 
-/* Of the magnitude, in 1/16. */
+/* Of the magnitude, in 1/16: beside is of one or two axes. */
 ATH_INLINE uint32_t expected_magnitude(const row_surroundings *row, int32_t axis, int32_t k)
 {
-    uint32_t around = axis == 0 ? row->mean : (row->beside * 16 / (uint32_t)axis + row->mean) / 2;
+    uint32_t around = axis == 0 ? row->mean : ((row->beside * 16 >> (axis - 1)) + row->mean) / 2;
     return (16 * (row->near[axis] + row->run[axis]) + 12 * row->history[axis][k] + 2 * around + row->before + row->over)
            / 16;
 }

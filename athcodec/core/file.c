@@ -707,7 +707,7 @@ int ath_build(ath_file *file, void *memory, size_t memory_bytes)
     carve_build(file, (uint8_t *)memory);
     if (file->bases_count > 0) { /* laid out again: the gaps may be a layer's since */
         ath_basis_layout(file->pieces, file->plan.piece_count, file->rest, file->gaps, (int32_t *)file->scratch);
-        ath_basis_fill(file->pieces, file->plan.piece_count, file->rest, file->gaps, (double *)file->scratch,
+        ath_basis_fill(file->pieces, file->plan.piece_count, file->rest, file->gaps, 0, (double *)file->scratch,
                        file->bases);
     }
     file->plan.bases = file->bases;
@@ -728,6 +728,12 @@ static size_t place_of(const ath_file *file, ath_order order, size_t v)
 static const ath_plan *plan_before(const ath_file *file, int32_t q)
 {
     return q > file->first_layer ? &file->layers[q - 1].plan : &file->plan;
+}
+
+/* What a layer refines, if that has bases. */
+static const ath_plan *known_bases(const ath_file *file, int32_t q)
+{
+    return q > file->first_layer || file->bases_count > 0 ? plan_before(file, q) : 0;
 }
 
 static const int32_t *rest_steps_before(const ath_file *file, int32_t q)
@@ -807,8 +813,8 @@ int ath_refine(ath_file *file, int32_t level, void *memory, size_t memory_bytes)
         double *bases = (double *)ath_take(&arena, layer->bases_count * sizeof(double));
         if (layer->bases_count > 0) {
             ath_basis_layout(layer->pieces, layer->plan.piece_count, layer->rest, file->gaps, (int32_t *)file->scratch);
-            ath_basis_fill(layer->pieces, layer->plan.piece_count, layer->rest, file->gaps, (double *)file->scratch,
-                           bases);
+            ath_basis_fill(layer->pieces, layer->plan.piece_count, layer->rest, file->gaps, known_bases(file, q),
+                           (double *)file->scratch, bases);
             layer->plan.bases = bases;
         } else {
             const ath_piece *before = plan_before(file, q)->pieces;

@@ -44,6 +44,13 @@
 #define ATH_RESTRICT restrict
 #endif
 
+/* Fetches memory that is to be written soon, wherever that points. */
+#if defined(__GNUC__) && (defined(__x86_64__) || defined(__aarch64__))
+#define ath_expect_write(address) __builtin_prefetch((const void *)(address), 1)
+#else
+#define ath_expect_write(address) ((void)(address))
+#endif
+
 #if defined(__STDC_HOSTED__) && __STDC_HOSTED__
 #include <string.h>
 #else

@@ -25,6 +25,15 @@ ATH_INLINE void lanes_add_product(ath_lanes *to, const double *a, const double *
     *to = *to + *(const ath_lanes *)(const void *)a * *(const ath_lanes *)(const void *)b;
 }
 
+ATH_INLINE ath_lanes lanes_at(const double *from) { return *(const ath_lanes *)(const void *)from; }
+
+/* c + (a x + b y + d z) */
+ATH_INLINE ath_lanes lanes_moved(const ath_lanes *c, const ath_lanes *a, const ath_lanes *x, const ath_lanes *b,
+                                 const ath_lanes *y, const ath_lanes *d, const ath_lanes *z)
+{
+    return *c + (*a * *x + *b * *y + *d * *z);
+}
+
 ATH_INLINE void lanes_store(double *to, const ath_lanes *from) { *(ath_lanes *)(void *)to = *from; }
 
 #else
@@ -46,6 +55,22 @@ ATH_INLINE void lanes_add_scaled(ath_lanes *to, double weight, const double *fro
 ATH_INLINE void lanes_add_product(ath_lanes *to, const double *a, const double *b)
 {
     for (int i = 0; i < ATH_LANES; i++) to->lane[i] = to->lane[i] + a[i] * b[i];
+}
+
+ATH_INLINE ath_lanes lanes_at(const double *from)
+{
+    ath_lanes lanes;
+    for (int i = 0; i < ATH_LANES; i++) lanes.lane[i] = from[i];
+    return lanes;
+}
+
+ATH_INLINE ath_lanes lanes_moved(const ath_lanes *c, const ath_lanes *a, const ath_lanes *x, const ath_lanes *b,
+                                 const ath_lanes *y, const ath_lanes *d, const ath_lanes *z)
+{
+    ath_lanes moved;
+    for (int i = 0; i < ATH_LANES; i++)
+        moved.lane[i] = c->lane[i] + (a->lane[i] * x->lane[i] + b->lane[i] * y->lane[i] + d->lane[i] * z->lane[i]);
+    return moved;
 }
 
 ATH_INLINE void lanes_store(double *to, const ath_lanes *from)

@@ -4,6 +4,7 @@
 #include "motion.h"
 
 enum { POLAR_ITERATIONS = 4, TURN_LANES = 16, ATH_TERMS = ATH_SHAPE_NUMBERS + ATH_PIECE_VERTICES - ATH_SHAPE_MODES };
+enum { PLACED_VERTICES = 2 * ATH_LANES, PLACED_FRAMES = 2 * ATH_LANES, PROJECTED_NUMBERS = 8 * ATH_LANES };
 
 static const double LEAST_MOMENT = 0.0009765625; /* of inertia, that a rotation's step is made for, over all of them */
 
@@ -166,9 +167,9 @@ ATH_HOT void ath_inverse_temporal(const ath_stream *stream, int32_t T, int32_t c
     const double *wave[ATH_SEGMENT_FRAMES];
     int32_t used = 0;
     for (int32_t k = 0; k < count; k++) {
-        if (quantised[k] == 0) continue;
-        value[used] = (double)quantised[k] * step;
-        wave[used++] = stream->temporal + (size_t)k * (size_t)T;
+        value[used] = (double)quantised[k] * step; /* without a branch, which would be guessed wrong */
+        wave[used] = stream->temporal + (size_t)k * (size_t)T;
+        used += quantised[k] != 0;
     }
     lanes_sum(T, used, value, wave, 0.0, row);
 }
@@ -232,12 +233,12 @@ static int any_nonzero(const double *row, int32_t count)
     return 0;
 }
 
-/* What a piece is placed by: tracks over time, and how far each moves a vertex along an axis. */
+/* What a piece is placed by: tracks over time, of modes three, one behind the other. */
 typedef struct {
-    const double *track[3][ATH_TERMS];
+    const double *track[ATH_TERMS];
     int32_t shape[ATH_TERMS]; /* of the first shape_count terms, which are the same for all axes */
     int32_t mode[ATH_TERMS];  /* of those behind */
-    int32_t shape_count, count;
+    int32_t shape_count, count, frames;
 } placing_terms;
 
 static placing_terms terms_of(const ath_piece *piece, const ath_piece_rows *rows, int32_t T, const uint8_t *used,
@@ -245,60 +246,163 @@ static placing_terms terms_of(const ath_piece *piece, const ath_piece_rows *rows
 {
     placing_terms terms;
     int32_t from = rows->shape_count > 0 ? ath_shape_modes(piece) : 0;
+    terms.frames = T;
     terms.shape_count = terms.count = 0;
     for (int32_t s = 0; s < rows->shape_count; s++) {
         const double *track = tracks + (size_t)s * (size_t)T;
         if (!used[s / 3] || !any_nonzero(track, T)) continue;
-        for (int32_t axis = 0; axis < 3; axis++) terms.track[axis][terms.count] = track;
+        terms.track[terms.count] = track;
         terms.shape[terms.count++] = s;
     }
     terms.shape_count = terms.count;
     for (int32_t m = from; m < ath_rank(piece); m++) {
         if (!used[m]) continue;
-        for (int32_t axis = 0; axis < 3; axis++)
-            terms.track[axis][terms.count] = tracks + ((size_t)m * 3 + (size_t)axis) * (size_t)T;
+        terms.track[terms.count] = tracks + (size_t)m * 3 * (size_t)T;
         terms.mode[terms.count++] = m;
     }
     return terms;
 }
 
-/* How far each term moves vertex i along an axis. */
-static void weigh_terms(const ath_piece *piece, const ath_piece_rows *rows, const placing_terms *terms,
-                        const double *basis, int32_t i, double weight[3][ATH_TERMS])
+/* A few vertices side by side: where they are at rest, less the attach point, and how far each term moves them. */
+typedef struct {
+    double rest[3][PLACED_VERTICES], weight[ATH_TERMS][3][PLACED_VERTICES]; /* of modes the same for all axes */
+} placed_vertices;
+
+/* `mode`: of each of a shape's modes the numbers of the vertices. */
+ATH_INLINE void weigh_shape(int32_t modes, const double *shape, double mode[][PLACED_VERTICES],
+                            double weight[3][PLACED_VERTICES])
 {
-    size_t n = (size_t)piece->count;
-    for (int32_t j = 0; j < terms->shape_count; j++) {
-        const double *shape = rows->shapes + terms->shape[j] * ATH_SHAPE_NUMBERS;
-        double x = 0.0, y = 0.0, z = 0.0;
-        for (int32_t m = 0; m < ath_shape_modes(piece); m++) {
-            double mode = basis[(size_t)m * n + (size_t)i];
-            x = x + mode * shape[3 * m];
-            y = y + mode * shape[3 * m + 1];
-            z = z + mode * shape[3 * m + 2];
+    for (int32_t v = 0; v < PLACED_VERTICES; v += ATH_LANES) {
+        ath_lanes x, y, z;
+        lanes_set(&x, 0.0);
+        lanes_set(&y, 0.0);
+        lanes_set(&z, 0.0);
+        for (int32_t m = 0; m < modes; m++) {
+            lanes_add_scaled(&x, shape[3 * m], mode[m] + v);
+            lanes_add_scaled(&y, shape[3 * m + 1], mode[m] + v);
+            lanes_add_scaled(&z, shape[3 * m + 2], mode[m] + v);
         }
-        weight[0][j] = x;
-        weight[1][j] = y;
-        weight[2][j] = z;
+        lanes_store(weight[0] + v, &x);
+        lanes_store(weight[1] + v, &y);
+        lanes_store(weight[2] + v, &z);
     }
-    for (int32_t j = terms->shape_count; j < terms->count; j++)
-        weight[0][j] = weight[1][j] = weight[2][j] = basis[(size_t)terms->mode[j] * n + (size_t)i];
 }
 
-/* placed = c + R (x0 - a + sum over terms of weight * track), shapes first, tracks of zeros left out. */
+ATH_INLINE void weigh_terms(const ath_plan *plan, const ath_piece *piece, const ath_piece_rows *rows,
+                            const placing_terms *terms, int32_t first, int32_t count, placed_vertices *vertices)
+{
+    const double *basis = plan->bases + piece->basis + first, *a = ath_rest_attach(plan, piece);
+    double mode[ATH_SHAPE_MODES][PLACED_VERTICES];
+    for (int32_t i = 0; i < count; i++) {
+        const double *x0 = ath_rest_of(plan, piece->first + first + i);
+        for (int32_t k = 0; k < 3; k++) vertices->rest[k][i] = x0[k] - a[k];
+    }
+    if (terms->shape_count > 0)
+        for (int32_t m = 0; m < ath_shape_modes(piece); m++)
+            for (int32_t i = 0; i < PLACED_VERTICES; i++) mode[m][i] = i < count ? basis[m * piece->count + i] : 0.0;
+    for (int32_t j = 0; j < terms->shape_count; j++)
+        weigh_shape(ath_shape_modes(piece), rows->shapes + terms->shape[j] * ATH_SHAPE_NUMBERS, mode,
+                    vertices->weight[j]);
+    for (int32_t j = terms->shape_count; j < terms->count; j++)
+        for (int32_t i = 0; i < count; i++) vertices->weight[j][0][i] = basis[terms->mode[j] * piece->count + i];
+}
+
+/* What the terms make of vertex v in PLACED_FRAMES frames from t on. */
+ATH_INLINE void add_terms(int32_t t, const placing_terms *terms, const placed_vertices *vertices, int32_t v,
+                          double sum[3][PLACED_FRAMES])
+{
+    ath_lanes x0, x1, y0, y1, z0, z1;
+    int32_t T = terms->frames, j = 0;
+    lanes_set(&x0, vertices->rest[0][v]);
+    lanes_set(&y0, vertices->rest[1][v]);
+    lanes_set(&z0, vertices->rest[2][v]);
+    x1 = x0;
+    y1 = y0;
+    z1 = z0;
+    for (; j < terms->shape_count; j++) {
+        const double *track = terms->track[j] + t;
+        lanes_add_scaled(&x0, vertices->weight[j][0][v], track);
+        lanes_add_scaled(&x1, vertices->weight[j][0][v], track + ATH_LANES);
+        lanes_add_scaled(&y0, vertices->weight[j][1][v], track);
+        lanes_add_scaled(&y1, vertices->weight[j][1][v], track + ATH_LANES);
+        lanes_add_scaled(&z0, vertices->weight[j][2][v], track);
+        lanes_add_scaled(&z1, vertices->weight[j][2][v], track + ATH_LANES);
+    }
+    for (; j < terms->count; j++) {
+        const double *track = terms->track[j] + t;
+        double weight = vertices->weight[j][0][v];
+        lanes_add_scaled(&x0, weight, track);
+        lanes_add_scaled(&x1, weight, track + ATH_LANES);
+        lanes_add_scaled(&y0, weight, track + T);
+        lanes_add_scaled(&y1, weight, track + T + ATH_LANES);
+        lanes_add_scaled(&z0, weight, track + 2 * T);
+        lanes_add_scaled(&z1, weight, track + 2 * T + ATH_LANES);
+    }
+    lanes_store(sum[0], &x0);
+    lanes_store(sum[0] + ATH_LANES, &x1);
+    lanes_store(sum[1], &y0);
+    lanes_store(sum[1] + ATH_LANES, &y1);
+    lanes_store(sum[2], &z0);
+    lanes_store(sum[2] + ATH_LANES, &z1);
+}
+
+/* x := c + R x of `count` vertices in ATH_LANES frames, T frames apart. */
+ATH_INLINE void move_vertices(int32_t T, int32_t count, const double *R, const double *c,
+                              double sums[][3][PLACED_FRAMES], int32_t from, double *out)
+{
+    const ath_lanes r0 = lanes_at(R), r1 = lanes_at(R + T), r2 = lanes_at(R + 2 * T);
+    const ath_lanes r3 = lanes_at(R + 3 * T), r4 = lanes_at(R + 4 * T), r5 = lanes_at(R + 5 * T);
+    const ath_lanes r6 = lanes_at(R + 6 * T), r7 = lanes_at(R + 7 * T), r8 = lanes_at(R + 8 * T);
+    const ath_lanes c0 = lanes_at(c), c1 = lanes_at(c + T), c2 = lanes_at(c + 2 * T);
+    for (int32_t i = 0; i < count; i++, out += 3 * T) {
+        ath_lanes x = lanes_at(sums[i][0] + from), y = lanes_at(sums[i][1] + from), z = lanes_at(sums[i][2] + from);
+        ath_lanes moved = lanes_moved(&c0, &r0, &x, &r1, &y, &r2, &z);
+        lanes_store(out, &moved);
+        moved = lanes_moved(&c1, &r3, &x, &r4, &y, &r5, &z);
+        lanes_store(out + T, &moved);
+        moved = lanes_moved(&c2, &r6, &x, &r7, &y, &r8, &z);
+        lanes_store(out + 2 * T, &moved);
+    }
+}
+
+/* Vertex v at one frame. */
+ATH_INLINE void place_frame(int32_t t, const placing_terms *terms, const placed_vertices *vertices, int32_t v,
+                            const ath_frames *at, double *out)
+{
+    int32_t T = terms->frames, shapes = terms->shape_count;
+    const double *R = at->rotation + t, *c = at->point + t;
+    double x[3];
+    for (int32_t k = 0; k < 3; k++) {
+        x[k] = vertices->rest[k][v];
+        for (int32_t j = 0; j < shapes; j++) x[k] = x[k] + vertices->weight[j][k][v] * terms->track[j][t];
+        for (int32_t j = shapes; j < terms->count; j++)
+            x[k] = x[k] + vertices->weight[j][0][v] * terms->track[j][k * T + t];
+    }
+    for (int32_t k = 0; k < 3; k++, R += 3 * T)
+        out[k * T + t] = c[k * T] + (R[0] * x[0] + R[T] * x[1] + R[2 * T] * x[2]);
+}
+
+/* placed = c + R (x0 - a + sum over terms of weight * track), shapes first, tracks of zeros left out. A few vertices
+ * pass through a few frames at a time, while tracks and attach frames stay in the innermost cache. */
 ATH_HOT static void place(const ath_plan *plan, const ath_motion *motion, const ath_piece *piece,
                           const ath_piece_rows *rows, const uint8_t *used, const ath_scratch *scratch)
 {
-    int32_t T = motion->frames;
-    const double *a = ath_rest_attach(plan, piece);
+    int32_t T = motion->frames, count;
     placing_terms terms = terms_of(piece, rows, T, used, scratch->rows);
-    double weight[3][ATH_TERMS];
-    for (int32_t i = 0; i < piece->count; i++) {
-        const double *x0 = ath_rest_of(plan, piece->first + i);
-        double *out = scratch->placed + i * 3 * T;
-        weigh_terms(piece, rows, &terms, plan->bases + piece->basis, i, weight);
-        for (int32_t axis = 0; axis < 3; axis++)
-            lanes_sum(T, terms.count, weight[axis], terms.track[axis], x0[axis] - a[axis], out + axis * T);
-        ath_move(T, &scratch->at, out);
+    placed_vertices vertices;
+    double sums[PLACED_VERTICES][3][PLACED_FRAMES], *out = scratch->placed;
+    const double *R = scratch->at.rotation, *c = scratch->at.point;
+    for (int32_t first = 0; first < piece->count; first += count, out += count * 3 * T) {
+        int32_t t = 0;
+        count = ath_min(PLACED_VERTICES, piece->count - first);
+        weigh_terms(plan, piece, rows, &terms, first, count, &vertices);
+        for (; t + PLACED_FRAMES <= T; t += PLACED_FRAMES) {
+            for (int32_t i = 0; i < count; i++) add_terms(t, &terms, &vertices, i, sums[i]);
+            for (int32_t from = 0; from < PLACED_FRAMES; from += ATH_LANES)
+                move_vertices(T, count, R + t + from, c + t + from, sums, from, out + t + from);
+        }
+        for (; t < T; t++)
+            for (int32_t i = 0; i < count; i++) place_frame(t, &terms, &vertices, i, &scratch->at, out + i * 3 * T);
     }
 }
 
@@ -812,51 +916,58 @@ void ath_predict_track(const ath_stream *stream, int32_t T, int32_t frequencies,
     }
 }
 
-/* out = R^T (x - c) */
-ATH_HOT void ath_into_rest_space(int32_t T, const ath_frames *at, const double *x, double *ATH_RESTRICT out)
+/* out = R^T (x - c) - d */
+ATH_INLINE void into_rest_space(int32_t T, const ath_frames *at, const double *x, const double d[3],
+                                double *ATH_RESTRICT out)
 {
     const double *R = at->rotation, *c = at->point;
     for (int32_t t = 0; t < T; t++) {
         double dx = x[t] - c[t], dy = x[T + t] - c[T + t], dz = x[2 * T + t] - c[2 * T + t];
-        out[t] = R[t] * dx + R[3 * T + t] * dy + R[6 * T + t] * dz;
-        out[T + t] = R[T + t] * dx + R[4 * T + t] * dy + R[7 * T + t] * dz;
-        out[2 * T + t] = R[2 * T + t] * dx + R[5 * T + t] * dy + R[8 * T + t] * dz;
+        out[t] = R[t] * dx + R[3 * T + t] * dy + R[6 * T + t] * dz - d[0];
+        out[T + t] = R[T + t] * dx + R[4 * T + t] * dy + R[7 * T + t] * dz - d[1];
+        out[2 * T + t] = R[2 * T + t] * dx + R[5 * T + t] * dy + R[8 * T + t] * dz - d[2];
     }
 }
 
-void ath_to_local(const ath_plan *plan, int32_t T, const ath_piece *piece, const ath_frames *at, const double *placed,
-                  double *local)
+ATH_HOT void ath_into_rest_space(int32_t T, const ath_frames *at, const double *x, double *ATH_RESTRICT out)
+{
+    static const double nothing[3] = {0.0, 0.0, 0.0};
+    into_rest_space(T, at, x, nothing, out);
+}
+
+ATH_HOT void ath_to_local(const ath_plan *plan, int32_t T, const ath_piece *piece, const ath_frames *at,
+                          const double *placed, double *local)
 {
     const double *a = ath_rest_attach(plan, piece);
     for (int32_t i = 0; i < piece->count; i++) {
         const double *x0 = ath_rest_of(plan, piece->first + i);
-        double *own = local + (size_t)i * 3 * (size_t)T;
-        ath_into_rest_space(T, at, placed + (size_t)i * 3 * (size_t)T, own);
-        for (int32_t axis = 0; axis < 3; axis++) {
-            double d = x0[axis] - a[axis];
-            for (int32_t t = axis * T; t < (axis + 1) * T; t++) own[t] = own[t] - d;
-        }
+        double d[3] = {x0[0] - a[0], x0[1] - a[1], x0[2] - a[2]};
+        into_rest_space(T, at, placed + (size_t)i * 3 * (size_t)T, d, local + (size_t)i * 3 * (size_t)T);
     }
 }
 
-ATH_HOT static void project_mode(const ath_plan *plan, int32_t T, const ath_piece *piece, int32_t m,
-                                 const double *local, double *ATH_RESTRICT row)
+/* row = sum over the vertices of what each counts in a mode times its track. */
+ATH_HOT static void project_modes(const ath_plan *plan, int32_t T, const ath_piece *piece, int32_t first, int32_t stop,
+                                  const double *local, double *ATH_RESTRICT rows)
 {
-    const double *mode = plan->bases + piece->basis + (size_t)m * (size_t)piece->count;
+    double weight[ATH_PIECE_VERTICES], tip = ath_tip_weight(piece, plan->rest);
     const double *x[ATH_PIECE_VERTICES];
-    double weight[ATH_PIECE_VERTICES];
-    int32_t last = piece->count - 1;
-    for (int32_t v = 0; v <= last; v++) {
-        x[v] = local + (size_t)v * 3 * (size_t)T;
-        weight[v] = v == last ? mode[v] * ath_tip_weight(piece, plan->rest) : mode[v];
+    int32_t last = piece->count - 1, count;
+    for (int32_t from = 0; from < 3 * T; from += count) {
+        count = ath_min(PROJECTED_NUMBERS, 3 * T - from);
+        for (int32_t v = 0; v <= last; v++) x[v] = local + (size_t)v * 3 * (size_t)T + from;
+        for (int32_t m = first; m < stop; m++) {
+            const double *mode = plan->bases + piece->basis + (size_t)m * (size_t)piece->count;
+            for (int32_t v = 0; v <= last; v++) weight[v] = v == last ? mode[v] * tip : mode[v];
+            lanes_sum(count, piece->count, weight, x, 0.0, rows + (size_t)m * 3 * (size_t)T + from);
+        }
     }
-    lanes_sum(3 * T, piece->count, weight, x, 0.0, row);
 }
 
 void ath_project(const ath_plan *plan, int32_t T, const ath_piece *piece, int32_t count, const double *local,
                  double *ATH_RESTRICT rows)
 {
-    for (int32_t m = 0; m < count; m++) project_mode(plan, T, piece, m, local, rows + (size_t)m * 3 * (size_t)T);
+    project_modes(plan, T, piece, 0, count, local, rows);
 }
 
 /* The unit quaternion of a rotation matrix, of the two the one nearer to the last. */
@@ -951,16 +1062,14 @@ void ath_predict_tracks(const ath_plan *plan, const ath_motion *motion, const at
 }
 
 /* Three tracks of shapes at a time: the products of the modes with each. */
-static void shape_tracks(int32_t T, const ath_piece *piece, const ath_piece_rows *rows, int32_t r, const double *modes,
-                         double *track)
+ATH_HOT static void shape_tracks(int32_t T, const ath_piece *piece, const ath_piece_rows *rows, int32_t r,
+                                 const double *modes, double *track)
 {
-    for (int32_t i = 0; i < 3 * T; i++) track[i] = 0.0;
-    for (int32_t s = 3 * r; s < ath_min(3 * r + 3, rows->shape_count); s++)
-        for (int32_t j = 0; j < 3 * ath_shape_modes(piece); j++) {
-            double weight = rows->shapes[s * ATH_SHAPE_NUMBERS + j], *own = track + (s - 3 * r) * T;
-            const double *mode = modes + (size_t)j * (size_t)T;
-            for (int32_t t = 0; t < T; t++) own[t] = own[t] + weight * mode[t];
-        }
+    int32_t count = 3 * ath_shape_modes(piece);
+    const double *x[ATH_SHAPE_NUMBERS];
+    for (int32_t j = 0; j < count; j++) x[j] = modes + (size_t)j * (size_t)T;
+    for (int32_t s = 3 * r; s < 3 * r + 3; s++, track += T)
+        lanes_sum(T, s < rows->shape_count ? count : 0, rows->shapes + s * ATH_SHAPE_NUMBERS, x, 0.0, track);
 }
 
 void ath_predict_modes(const ath_plan *plan, const ath_motion *motion, const ath_piece *piece,
@@ -977,8 +1086,8 @@ void ath_predict_modes(const ath_plan *plan, const ath_motion *motion, const ath
         const int32_t *coarse = rows->coarse_modes ? rows->coarse_modes + (size_t)r * 3 * (size_t)T : 0;
         double *track = scratch->rows + (size_t)r * 3 * (size_t)T;
         int has_prediction = !coarse || !is_zero(coarse, 3 * T);
-        if (has_prediction && rows->shape_count == 0) project_mode(plan, T, piece, r, scratch->placed, track);
-        if (ath_is_shape_row(piece, rows, r)) {
+        if (has_prediction && rows->shape_count == 0) project_modes(plan, T, piece, r, r + 1, scratch->placed, scratch->rows);
+        if (has_prediction && ath_is_shape_row(piece, rows, r)) {
             shape_tracks(T, piece, rows, r, scratch->rows, scratch->track);
             track = scratch->track;
         }
@@ -992,8 +1101,12 @@ void ath_predict_modes(const ath_plan *plan, const ath_motion *motion, const ath
 int32_t ath_row_extent(const int32_t *row, int32_t T, int32_t most)
 {
     int32_t count = 0;
-    for (int32_t axis = 0; axis < 3; axis++)
-        for (int32_t k = most; k > count; k--)
-            if (row[axis * T + k - 1] != 0) count = k;
+    for (int32_t axis = 0; axis < 3; axis++) {
+        const int32_t *own = row + axis * T;
+        int32_t k = most;
+        while (k - count >= PREDICTED && is_zero(own + k - PREDICTED, PREDICTED)) k -= PREDICTED;
+        while (k > count && own[k - 1] == 0) k--;
+        count = k;
+    }
     return count;
 }

@@ -72,10 +72,11 @@ ATH_ENCODER_API int64_t ath_basis_layout(ath_piece *pieces, int32_t piece_count,
 /* What the last vertex of a piece counts in the products of its modes, which are orthonormal so: twice in a cantilever that
  * is not far from straight, whose errors are largest there. */
 double ath_tip_weight(const ath_piece *piece, const double *rest);
-/* work: ATH_BASIS_WORK doubles. */
+/* before: a plan of the same pieces about another rest pose, with bases, which are taken from there where they are the same;
+ * may be null. work: ATH_BASIS_WORK doubles. */
 enum { ATH_BASIS_WORK = 2 * ATH_PIECE_VERTICES * ATH_PIECE_VERTICES };
-void ath_basis_fill(ath_piece *pieces, int32_t piece_count, const double *rest, const uint8_t *gaps, double *work,
-                    double *bases);
+void ath_basis_fill(ath_piece *pieces, int32_t piece_count, const double *rest, const uint8_t *gaps,
+                    const ath_plan *before, double *work, double *bases);
 /* The same by ranges of pieces, in two passes: the sheets of one need the modes of any. */
 ATH_ENCODER_API void ath_basis_modes(const ath_piece *pieces, int32_t first, int32_t stop, const double *rest,
                                      const uint8_t *gaps, double *work, double *bases);

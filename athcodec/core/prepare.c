@@ -9,7 +9,7 @@
 #include "segment.h"
 #include "watch.h"
 
-enum { CHECKSUM_STEP = 1 << 16, TILE = 8, MOST_SHAPES = ATH_SHAPE_NUMBERS };
+enum { CHECKSUM_STEP = 1 << 16, TILE = 8, CACHE_LINE = 16 /* floats */, MOST_SHAPES = ATH_SHAPE_NUMBERS };
 
 typedef enum { BEFORE, CHECKSUMS, HEADS, FRAMES, PIECES, DONE, FAILED } prepare_phase;
 
@@ -911,6 +911,14 @@ static int refine_piece(ath_work *work, int32_t q, int32_t p, const double **pla
     return ATH_OK;
 }
 
+/* The memory behind a piece in some frames, which the next one fills: fetched while that is decoded. */
+ATH_INLINE void expect_next(float *next, int32_t rows, int32_t start, int32_t stop, size_t frame_size)
+{
+    for (int32_t r = 0; r < rows; r += CACHE_LINE)
+        for (int32_t t = start; t < stop; t++)
+            ath_expect_write((uintptr_t)next + ((size_t)t * frame_size + (size_t)(r + CACHE_LINE - 1)) * sizeof *next);
+}
+
 /* Transposes rows over time into frames. */
 ATH_HOT static void store_floats(const double *placed, int32_t rows, int32_t T, const double origin[3], float *out,
                                  size_t frame_size)
@@ -920,6 +928,7 @@ ATH_HOT static void store_floats(const double *placed, int32_t rows, int32_t T, 
     for (int32_t i = 0; i < 3 + ATH_LANES; i++) added[i] = origin[i % 3];
     for (int32_t start = 0; start < T; start += TILE) {
         int32_t stop = ath_min(start + TILE, T), squares = start + (stop - start) / ATH_LANES * ATH_LANES;
+        expect_next(out + rows, rows, start, stop, frame_size);
         for (int32_t r = 0; r < rows; r += ATH_LANES) {
             const double *from = placed + (size_t)r * (size_t)T;
             float *to = out + r;

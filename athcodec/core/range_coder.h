@@ -26,14 +26,15 @@ ATH_INLINE void context_learn(ath_context *context, int bit)
 {
     uint32_t rate = ath_rate[context->experience];
     uint32_t one = context->one;
-    if (bit)
+    if (bit) {
         one += ((65536u - one) * rate) >> 16;
-    else
+        if (one > 65536u - PROBABILITY_MIN) one = 65536u - PROBABILITY_MIN;
+    } else {
         one -= (one * rate) >> 16;
-    if (one < PROBABILITY_MIN) one = PROBABILITY_MIN;
-    if (one > 65536u - PROBABILITY_MIN) one = 65536u - PROBABILITY_MIN;
+        if (one < PROBABILITY_MIN) one = PROBABILITY_MIN;
+    }
     context->one = (uint16_t)one;
-    if (context->experience < RATE_LIMIT) context->experience++;
+    context->experience = (uint16_t)(context->experience + (context->experience < RATE_LIMIT));
 }
 
 ATH_INLINE void context_init(ath_context *context, uint32_t one)
