@@ -1,0 +1,157 @@
+"""Bark: tubes whose rings move as they are are found, keep their thickness at loose bounds, and decode to the same bits
+everywhere. And leaves that turn far from frame to frame."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from moving_meshes import leafed_tree
+from plants import clip_of, tube
+
+import athcodec
+from athcodec.clip import MotionClip
+from athcodec.encoding import streams
+from athcodec.encoding.rings import ring_sizes
+
+sys.path.append(str(Path(__file__).resolve().parent.parent))  # for spec, which is not installed
+
+from spec import reference_decoder as rd  # noqa: E402
+
+SIDES, RINGS, TWIGS = 6, 12, 9
+RADIUS = 0.004
+
+
+def twigs(frames: int = 40) -> MotionClip:
+    """Thin twigs of twelve rings on a bare stem, which sway by many times their thickness, with faces."""
+    time, along = np.linspace(0, 9, frames)[:, None], np.linspace(0.05, 1, RINGS)
+    angle = 2 * np.pi * np.arange(SIDES) / SIDES
+    stem = np.stack([0 * along, 0 * along, 2 * along], 1)
+    positions, rest = [np.repeat(stem[None], frames, axis=0)], [stem]
+    for twig in range(TWIGS):
+        heading = 2.4 * twig
+        out, up = np.array([np.cos(heading), np.sin(heading), 0.0]), np.array([0.0, 0.0, 1.0])
+        side = np.cross(up, out)
+        bend = 0.12 * np.sin(time * (1 + 0.1 * twig) + twig) * along**2
+        slope = np.arctan(np.gradient(bend, along, axis=1))[..., None, None]
+        base = stem[3 + twig % 9]
+        line = base + along[:, None] * out + bend[..., None] * up
+        ring = RADIUS * (
+            np.cos(angle)[:, None] * side + np.sin(angle)[:, None] * (np.cos(slope) * up - np.sin(slope) * out)
+        )
+        still = RADIUS * (np.cos(angle)[:, None] * side + np.sin(angle)[:, None] * up)
+        positions.append((line[:, :, None] + ring).reshape(frames, -1, 3))
+        rest.append(((base + along[:, None] * out)[:, None] + still).reshape(-1, 3))
+    branch = np.repeat(np.arange(TWIGS + 1), [RINGS, *[RINGS * SIDES] * TWIGS])
+    clip = clip_of(np.concatenate(positions, axis=1), np.concatenate(rest), branch, np.array([-1] + [0] * TWIGS))
+    return clip.replace(faces=quads())
+
+
+def quads() -> np.ndarray:
+    """(F, 4) of the twigs."""
+    lower = np.concatenate([RINGS + SIDES * (RINGS * twig + np.arange(RINGS - 1)) for twig in range(TWIGS)])[:, None]
+    side, following = np.arange(SIDES), (np.arange(SIDES) + 1) % SIDES
+    upper = lower + SIDES
+    faces = np.stack([lower + side, lower + following, upper + following, upper + side], axis=2)
+    return faces.reshape(-1, 4).astype(np.int32)
+
+
+def around_rings(frames: np.ndarray) -> np.ndarray:
+    """(T, K) lengths of the edges of rings."""
+    rings = frames[:, RINGS:].reshape(len(frames), -1, SIDES, 3)
+    return np.linalg.norm(rings - np.roll(rings, 1, axis=2), axis=3).reshape(len(frames), -1)
+
+
+def sizes_of(*clips: MotionClip, wanted: bool = True) -> list[int]:
+    found = []
+    for clip in clips:
+        positions = np.asarray(clip.positions, np.float64)
+        count = np.array([positions.shape[1]])
+        rest = np.asarray(clip.rest, np.float64)
+        found += ring_sizes(np.array([0]), count, np.array([wanted]), rest, [positions.transpose(1, 2, 0)]).tolist()
+    return found
+
+
+@pytest.mark.parametrize("around", [3, 6, 17, 32])
+def test_the_rings_of_bark_are_found(around):
+    assert sizes_of(tube(8, around, 9)) == [around]
+
+
+def test_a_tube_may_end_in_a_tip():
+    clip = tube(9, 5, 12)
+    assert sizes_of(first(clip, 41)) == [5]
+
+
+def test_what_has_no_rings_that_move_alike_has_none():
+    rng = np.random.default_rng(3)
+    wide = tube(12, 6, 9)
+    twisted = np.asarray(wide.positions, np.float64)
+    twisted[:, :, :2] *= 1 + 0.5 * rng.standard_normal((9, 72, 1))
+    centre_line = clip_of(wide.positions[:, ::6], wide.rest[::6], np.zeros(12, np.int32), np.array([-1]))
+    assert sizes_of(centre_line, first(wide, 18)) == [0, 0]
+    assert sizes_of(wide, wanted=False) == [0]
+    assert sizes_of(clip_of(twisted, wide.rest, np.zeros(72, np.int32), np.array([-1]))) == [0]
+
+
+def first(clip: MotionClip, count: int) -> MotionClip:
+    """Of a clip of one branch, the first vertices."""
+    return clip_of(clip.positions[:, :count], clip.rest[:count], np.zeros(count, np.int32), np.array([-1]))
+
+
+@pytest.mark.parametrize("options", [{"ladder": "none"}, {}])
+@pytest.mark.parametrize("bound", [1e-2, 1e-3])
+def test_twigs_keep_their_thickness_at_loose_bounds(scratch, bound, options):
+    """A bound of ten times their thickness left rings that were off by a third."""
+    clip = twigs()
+    athcodec.encode(clip, scratch / "twigs.ath", rel_error=bound, attributes="none", **options)
+    with athcodec.open(scratch / "twigs.ath") as decoder:
+        assert np.all(decoder.file.branches["ring"][1:] == SIDES)
+        decoded = decoder.positions().astype(np.float64)
+    stretch = np.abs(around_rings(decoded) / around_rings(np.asarray(clip.positions, np.float64)) - 1)
+    assert np.quantile(stretch, 0.999) < 0.06
+
+
+@pytest.mark.parametrize("options", [{"rel_error": 1e-3, "ladder": "none"}, {"rel_error": 1e-5}])
+def test_the_reference_decoder_plays_the_same_tubes(scratch, options):
+    athcodec.encode(twigs(12), scratch / "twigs.ath", attributes="none", **options)
+    reference = rd.AthFile((scratch / "twigs.ath").read_bytes())
+    assert any(branch.ring for branch in reference.branches)
+    with athcodec.open(scratch / "twigs.ath") as decoder:
+        for level in range(len(decoder.levels)):
+            assert decoder.positions(level=level).tobytes() == reference.positions(level).tobytes()
+
+
+def test_leaves_that_turn_by_more_than_a_right_angle_between_frames_do_not_tumble(scratch):
+    """The rotation was sought from that of the frame before, and not found from there."""
+    tree = leafed_tree(cards=12, frames=20)
+    positions = np.asarray(tree.positions, np.float64)
+    cards = np.asarray(tree.vertex_branch) >= np.max(tree.vertex_branch) - 11
+    numbers = np.flatnonzero(cards).reshape(12, -1)
+    rng = np.random.default_rng(4)
+    for card in numbers:
+        for t in range(20):
+            base = positions[t, card[0]]
+            positions[t, card] = base + (positions[t, card] - base) @ rotation(rng).T
+    clip = tree.replace(positions=positions.astype(np.float32))
+    athcodec.encode(clip, scratch / "tree.ath", rel_error=1e-2, ladder="none", attributes="none")
+    with athcodec.open(scratch / "tree.ath") as decoder:
+        shown = decoder.positions().astype(np.float64)
+    across = [frames[:, numbers[:, 2]] - frames[:, numbers[:, 0]] for frames in (positions, shown)]
+    source, decoded = (vectors / np.linalg.norm(vectors, axis=2, keepdims=True) for vectors in across)
+    assert np.degrees(np.arccos(np.clip((source * decoded).sum(axis=2), -1, 1))).max() < 15
+
+
+def rotation(rng: np.random.Generator) -> np.ndarray:
+    matrix = np.linalg.qr(rng.standard_normal((3, 3)))[0]
+    return matrix * np.sign(np.linalg.det(matrix))
+
+
+def test_no_part_is_moved_where_a_seam_has_decided_on_a_correction():
+    """Both were applied, and one was stored: the bound was broken, and the encoder refused the clip."""
+    decided = np.array([[4, 0, 1, 0, 0, 1], [7, 3, 0, 2, 0, 0]], np.int32)
+    moves = np.array([[3, 0, 5, 5, 5, 0], [4, 0, 5, 5, 5, 0], [4, 2, 5, 5, 5, 0]], np.int32)
+    met = streams.MetEnds(streams.FIRST, decided).with_moves(moves)
+    assert met.decided.tolist() == [moves[0].tolist(), decided[0].tolist(), moves[2].tolist(), decided[1].tolist()]
+    assert met.closed == streams.FIRST
