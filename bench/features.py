@@ -17,6 +17,7 @@ import athcodec
 from athcodec.encoding import Draft, code_segments, draft, write
 from athcodec.encoding.features import Feature
 from athcodec.encoding.prediction import LATTICE, MEMORIES
+from athcodec.encoding.segment import SHEET
 from bench.clips import add_ladder, measure
 from bench.suite import SUITES, Case, cases
 from bench.tables import table
@@ -137,7 +138,8 @@ def _uses(made: Draft, feature: Feature) -> bool:
         Feature.TIPS: any(own.only_tips for own in both),
         Feature.SHAPES: any(own.learned_pieces is not None for own in both),
         Feature.TIME_BASES: any(any(own.learned_bases) for own in both),
-        Feature.SHEETS: bool(choice.settings.sheet.any()),
+        Feature.SHEETS: bool((choice.settings.forms == SHEET).any()),
+        Feature.RINGS: bool((choice.settings.forms > SHEET).any()),
         Feature.LOOSE: bool(choice.settings.loose.any()),
         Feature.RIGID: bool(choice.settings.rigid.any()),
         Feature.FREE_RIGID: choice.settings.free_rigid,

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from moving_meshes import leafed_tree
 from plants import blown_tree, bush, chain_plant
+from test_tubes import twigs
 
 import athcodec
 from athcodec.core_file import FILE_ORDER, CoreError
@@ -28,7 +29,7 @@ VECTORS = Path(__file__).parents[1] / "spec" / "vectors" / "valid"
 SHARE_OF_BOUND, SHARE_OF_DIAGONAL, SHARE_OF_AWKWARD = 0.05, 1e-6, 1e-4
 BEYOND_FLOATS = {  # so far from the origin that decoded floats are coarse; sheets whose rotation is chance
     *("origin-far", "source-rest-wide", "layers-large", "host-mesh-far", "host-mesh-wide"),
-    *("everything", "layers-ratio-1"),
+    *("everything", "layers-ratio-1", "layers-tubes"),
 }
 
 
@@ -100,6 +101,7 @@ MAKERS = {
     "layers": lambda path: sample(path, rel_error=1e-4, segment_frames=60),
     "coarse": lambda path: sample(path, rel_error=1e-3, segment_frames=30),
     "leaves": lambda path: loaded(leafed_tree(frames=32), path, segment_frames=16),
+    "tubes": lambda path: loaded(twigs(32), path, rel_error=1e-3, segment_frames=16),
     "several clips": several,
     "chain": lambda path: loaded(chain_plant(12, 150), path, rel_error=1e-4),
     "doubles": lambda path: loaded(bush(40, 5), path, rel_error=1e-5),

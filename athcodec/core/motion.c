@@ -1086,7 +1086,8 @@ void ath_predict_modes(const ath_plan *plan, const ath_motion *motion, const ath
         const int32_t *coarse = rows->coarse_modes ? rows->coarse_modes + (size_t)r * 3 * (size_t)T : 0;
         double *track = scratch->rows + (size_t)r * 3 * (size_t)T;
         int has_prediction = !coarse || !is_zero(coarse, 3 * T);
-        if (has_prediction && rows->shape_count == 0) project_modes(plan, T, piece, r, r + 1, scratch->placed, scratch->rows);
+        if (has_prediction && rows->shape_count == 0)
+            project_modes(plan, T, piece, r, r + 1, scratch->placed, scratch->rows);
         if (has_prediction && ath_is_shape_row(piece, rows, r)) {
             shape_tracks(T, piece, rows, r, scratch->rows, scratch->track);
             track = scratch->track;
