@@ -25,13 +25,12 @@ ATH_INLINE void lanes_add_product(ath_lanes *to, const double *a, const double *
     *to = *to + *(const ath_lanes *)(const void *)a * *(const ath_lanes *)(const void *)b;
 }
 
-ATH_INLINE ath_lanes lanes_at(const double *from) { return *(const ath_lanes *)(const void *)from; }
+ATH_INLINE void lanes_load(ath_lanes *to, const double *from) { *to = *(const ath_lanes *)(const void *)from; }
 
-/* c + (a x + b y + d z) */
-ATH_INLINE ath_lanes lanes_moved(const ath_lanes *c, const ath_lanes *a, const ath_lanes *x, const ath_lanes *b,
-                                 const ath_lanes *y, const ath_lanes *d, const ath_lanes *z)
+/* to := c + row . x */
+ATH_INLINE void lanes_move(double *to, const ath_lanes *c, const ath_lanes row[3], const ath_lanes x[3])
 {
-    return *c + (*a * *x + *b * *y + *d * *z);
+    *(ath_lanes *)(void *)to = *c + (row[0] * x[0] + row[1] * x[1] + row[2] * x[2]);
 }
 
 ATH_INLINE void lanes_store(double *to, const ath_lanes *from) { *(ath_lanes *)(void *)to = *from; }
@@ -57,20 +56,16 @@ ATH_INLINE void lanes_add_product(ath_lanes *to, const double *a, const double *
     for (int i = 0; i < ATH_LANES; i++) to->lane[i] = to->lane[i] + a[i] * b[i];
 }
 
-ATH_INLINE ath_lanes lanes_at(const double *from)
+ATH_INLINE void lanes_load(ath_lanes *to, const double *from)
 {
-    ath_lanes lanes;
-    for (int i = 0; i < ATH_LANES; i++) lanes.lane[i] = from[i];
-    return lanes;
+    for (int i = 0; i < ATH_LANES; i++) to->lane[i] = from[i];
 }
 
-ATH_INLINE ath_lanes lanes_moved(const ath_lanes *c, const ath_lanes *a, const ath_lanes *x, const ath_lanes *b,
-                                 const ath_lanes *y, const ath_lanes *d, const ath_lanes *z)
+ATH_INLINE void lanes_move(double *to, const ath_lanes *c, const ath_lanes row[3], const ath_lanes x[3])
 {
-    ath_lanes moved;
     for (int i = 0; i < ATH_LANES; i++)
-        moved.lane[i] = c->lane[i] + (a->lane[i] * x->lane[i] + b->lane[i] * y->lane[i] + d->lane[i] * z->lane[i]);
-    return moved;
+        to[i] = c->lane[i]
+                + (row[0].lane[i] * x[0].lane[i] + row[1].lane[i] * x[1].lane[i] + row[2].lane[i] * x[2].lane[i]);
 }
 
 ATH_INLINE void lanes_store(double *to, const ath_lanes *from)

@@ -350,18 +350,14 @@ ATH_INLINE void add_terms(int32_t t, const placing_terms *terms, const placed_ve
 ATH_INLINE void move_vertices(int32_t T, int32_t count, const double *R, const double *c,
                               double sums[][3][PLACED_FRAMES], int32_t from, double *out)
 {
-    const ath_lanes r0 = lanes_at(R), r1 = lanes_at(R + T), r2 = lanes_at(R + 2 * T);
-    const ath_lanes r3 = lanes_at(R + 3 * T), r4 = lanes_at(R + 4 * T), r5 = lanes_at(R + 5 * T);
-    const ath_lanes r6 = lanes_at(R + 6 * T), r7 = lanes_at(R + 7 * T), r8 = lanes_at(R + 8 * T);
-    const ath_lanes c0 = lanes_at(c), c1 = lanes_at(c + T), c2 = lanes_at(c + 2 * T);
+    ath_lanes rows[3][3], centre[3], x[3];
+    for (int32_t k = 0; k < 3; k++) {
+        for (int32_t j = 0; j < 3; j++) lanes_load(&rows[k][j], R + (3 * k + j) * T);
+        lanes_load(&centre[k], c + k * T);
+    }
     for (int32_t i = 0; i < count; i++, out += 3 * T) {
-        ath_lanes x = lanes_at(sums[i][0] + from), y = lanes_at(sums[i][1] + from), z = lanes_at(sums[i][2] + from);
-        ath_lanes moved = lanes_moved(&c0, &r0, &x, &r1, &y, &r2, &z);
-        lanes_store(out, &moved);
-        moved = lanes_moved(&c1, &r3, &x, &r4, &y, &r5, &z);
-        lanes_store(out + T, &moved);
-        moved = lanes_moved(&c2, &r6, &x, &r7, &y, &r8, &z);
-        lanes_store(out + 2 * T, &moved);
+        for (int32_t k = 0; k < 3; k++) lanes_load(&x[k], sums[i][k] + from);
+        for (int32_t k = 0; k < 3; k++) lanes_move(out + k * T, &centre[k], rows[k], x);
     }
 }
 
