@@ -28,6 +28,7 @@ MOST_FRAMES = 3000  # that are compared with each other
 TRIED = 1500  # pairs of frames that are looked at closely
 VERTICES = 256  # that are compared
 VELOCITY = 4.0  # frames: what a difference of velocities counts beside one of positions
+LONGEST = 1e7  # seconds of a play: 115 days
 TAKEN = 0.5  # of transitions that a player comes to
 
 
@@ -114,15 +115,15 @@ class EndlessPlay:
         Parameters
         ----------
         seconds : float
-            Since the play began, 0 or more, without an end.
+            Since the play began, 0 to 1e7.
 
         Returns
         -------
         list of tuple of float
             Seconds since the clip's first frame and weight, of one place or, within a transition, of two.
         """
-        if not 0.0 <= seconds < float("inf"):
-            raise ValueError(f"seconds: got {seconds}, expected a finite number, 0 or more")
+        if not 0.0 <= seconds <= LONGEST:
+            raise ValueError(f"seconds: got {seconds}, expected 0 to {LONGEST:g}")
         while (begins := self._begins[-1] + self._next.leave - self._runs[-1].enter) <= seconds:
             self._begins.append(begins)
             self._runs.append(self._next)

@@ -42,6 +42,15 @@ class Share(ctypes.Structure):
     _fields_ = [("clip", c_int32), ("level", c_int32), ("wrap", c_int32), ("seconds", c_double), ("weight", c_double)]
 
 
+class Transition(ctypes.Structure):
+    _fields_ = [("leave", c_int32), ("enter", c_int32), ("frames", c_int32)]
+
+
+class Endless(ctypes.Structure):
+    _fields_ = [("transitions", POINTER(Transition)), ("count", c_int32), ("clip", c_int32), ("seed", c_uint32)]
+    _fields_ += [("state", c_uint32), ("run", c_int32), ("next", c_int32), ("begins", c_double)]
+
+
 @pytest.fixture(scope="module")
 def lib(tmp_path_factory):
     """The decoder as one file and the player, as an engine would compile them."""
@@ -413,6 +422,31 @@ def test_what_comes_of_each_blended_clip_is_prepared_ahead(lib, scratch, sample_
         assert lib.ath_player_begin(player.player) is None  # nothing is left to do
         taken = memory.taken
         assert isinstance(at(1.5), np.ndarray) and memory.taken == taken
+
+
+def test_a_play_without_an_end_is_that_of_python_also_backwards(lib, scratch, sample_clip):
+    path = scratch / "endless.ath"
+    athcodec.encode(athcodec.endless(sample_clip), path, rel_error=1e-3)
+    with athcodec.open(path) as file, Player(lib, path.read_bytes()) as player:
+        ways = [Transition(*way) for way in reversed(file.metadata["transitions"])]
+        play, table, xyz = Endless(), (Transition * len(ways))(*ways), np.empty((file.vertex_count, 3), np.float32)
+        begin = lib.ath_player_endless_begin
+        assert begin(player.player, byref(play), 0, table, len(ways), 9) == OK
+        wanted = file.endless(seed=9)
+        for seconds in (0.0, *np.arange(30, 40, 0.11), 3600.3, 7.7):
+            assert OK == lib.ath_player_endless_positions(
+                player.player, byref(play), c_double(seconds), -1, SOURCE_ORDER, xyz.ctypes, c_size_t(12)
+            )
+            np.testing.assert_array_equal(xyz, wanted.positions(seconds))
+        for seconds in (-1.0, float("nan"), float("inf")):
+            assert BAD_ARGUMENT == lib.ath_player_endless_positions(
+                player.player, byref(play), c_double(seconds), -1, SOURCE_ORDER, xyz.ctypes, c_size_t(12)
+            )
+        frames, most = file.frame_count, 2**31 - 1
+        for way in ((5, 5, 0), (-1, 0, 2), (5, -1, 2), (5, 9, 2), (frames - 2, 0, 2), (most, most, most)):
+            assert begin(player.player, byref(play), 0, (Transition * 1)(way), 1, 1) == BAD_ARGUMENT
+        assert begin(player.player, byref(play), 1, table, len(ways), 1) == BAD_ARGUMENT
+        assert begin(player.player, byref(play), 0, table, 0, 1) == BAD_ARGUMENT
 
 
 # ---- topology ----

@@ -9,6 +9,7 @@
  *     ath_player_faded_positions             the same of a fade from level to level
  *     ath_player_blended_positions           several clips by weights; ath_player_wind_positions: by the wind
  *     ath_player_show                        the segments of a moment, for any other function of ath.h
+ *     ath_player_endless_positions           a clip without an end, over transitions between its like frames
  *     ath_player_ahead                       prepares the next segment, a bounded piece of work for each drawn frame;
  *     ath_player_begin, _run, _end           or on any thread: a job for the engine's own job system
  *     ath_player_triangles, _lines           topology; ath_player_normals, ath_player_tangents
@@ -92,6 +93,32 @@ int ath_player_blended_positions(ath_player *player, const ath_player_share *sha
 /* The same of the clips that ath_wind_weights chooses for a wind, all at one time. winds: of each clip of the file. */
 int ath_player_wind_positions(ath_player *player, const ath_wind *winds, double strength, double heading,
                               double seconds, ath_wrap wrap, int32_t level, ath_order order, float *xyz, size_t stride);
+
+/* From frame `leave` on, numbered from the clip's first, a clip goes over into what begins at frame `enter`, over so many frames:
+ * what the metadata's "transitions" name. */
+typedef struct ath_player_transition {
+    int32_t leave, enter, frames;
+} ath_player_transition;
+
+/* A clip that is played without an end: whenever it comes to transitions chance decides whether one is taken. The same seed
+ * gives the same play, also that of Decoder.endless in Python. */
+typedef struct ath_player_endless {
+    const ath_player_transition *transitions; /* stay where they are */
+    int32_t transition_count, clip;
+    uint32_t seed, state;
+    int32_t run, next; /* the transition that led to where it is (-1: none has) and the one that comes */
+    double begins;     /* when that was; seconds */
+} ath_player_endless;
+
+/* Begins at the clip's first frame. ATH_BAD_ARGUMENT: no such clip; no transitions, one beyond the clip, or one that is not over
+ * before the last of them leaves. */
+int ath_player_endless_begin(const ath_player *player, ath_player_endless *play, int32_t clip,
+                             const ath_player_transition *transitions, int32_t transition_count, uint32_t seed);
+/* The positions of a time since the play began, of 0 or more: in a transition a blend along the branches. Time that goes back
+ * behind the last transition takes as long as playing again from the beginning. Errors of ath_player_blended_positions;
+ * ATH_BAD_ARGUMENT: below 0, or above 1e7. */
+int ath_player_endless_positions(ath_player *player, ath_player_endless *play, double seconds, int32_t level,
+                                 ath_order order, float *xyz, size_t stride);
 
 /* Goes on with preparing what comes after what was shown last, in the direction and with the wrap that it was shown in,
  * for `steps` steps (ath_prepare_step). ATH_MORE; ATH_OK: nothing is left to do until time goes on; errors as above. */
@@ -634,6 +661,158 @@ int ath_player_wind_positions(ath_player *player, const ath_wind *winds, double 
         shares[count++].weight = player->weights[i];
     }
     return ath_player_blended_positions(player, shares, count, order, xyz, stride);
+}
+
+/* ---- without an end ---- */
+
+static const double ATH_PLAYER_LONGEST = 1e7; /* seconds of a play: 115 days */
+
+enum { ATH_PLAYER_NONE = -1 };
+
+/* Seconds from a clip's first frame to another. */
+static double ath_player_since(const ath_player *p, int32_t clip, int32_t frame)
+{
+    const double *times = ath_times(p->file) + ath_clips(p->file)[clip].first_frame;
+    return times[frame] - times[0];
+}
+
+static double ath_player_lasts(const ath_player *p, int32_t clip, const ath_player_transition *way)
+{
+    double old = ath_player_since(p, clip, way->leave + way->frames) - ath_player_since(p, clip, way->leave);
+    double now = ath_player_since(p, clip, way->enter + way->frames) - ath_player_since(p, clip, way->enter);
+    return now < old ? now : old;
+}
+
+/* 0 to 1, of a 32-bit xorshift (Marsaglia 2003). */
+static double ath_player_chance(ath_player_endless *play)
+{
+    play->state ^= play->state << 13;
+    play->state ^= play->state >> 17;
+    play->state ^= play->state << 5;
+    return (double)play->state / 4294967296.0;
+}
+
+/* The first frame from `from` on that a transition leaves at; the last such of all where there is none. */
+static int32_t ath_player_leave(const ath_player_endless *play, int32_t from, int32_t last)
+{
+    int32_t found = last;
+    for (int32_t i = 0; i < play->transition_count; i++) {
+        int32_t leave = play->transitions[i].leave;
+        if (leave >= from && leave < found) found = leave;
+    }
+    return found;
+}
+
+static int32_t ath_player_last_leave(const ath_player_transition *ways, int32_t count)
+{
+    int32_t last = 0;
+    for (int32_t i = 0; i < count; i++)
+        if (ways[i].leave > last) last = ways[i].leave;
+    return last;
+}
+
+/* Whether one is in front of another among those that leave at one frame. */
+static int ath_player_in_front(const ath_player_transition *a, const ath_player_transition *b)
+{
+    return a->enter != b->enter ? a->enter < b->enter : a->frames < b->frames;
+}
+
+/* Of those that leave at a frame the one with so many in front of it. */
+static int32_t ath_player_way(const ath_player_endless *play, int32_t leave, int32_t place)
+{
+    const ath_player_transition *ways = play->transitions;
+    for (int32_t i = 0; i < play->transition_count; i++) {
+        int32_t in_front = 0;
+        if (ways[i].leave != leave) continue;
+        for (int32_t k = 0; k < play->transition_count; k++)
+            if (ways[k].leave == leave
+                && (ath_player_in_front(ways + k, ways + i) || (k < i && !ath_player_in_front(ways + i, ways + k))))
+                in_front++;
+        if (in_front == place) return i;
+    }
+    return 0;
+}
+
+/* The transition that is taken from a frame on. */
+static int32_t ath_player_draw(ath_player_endless *play, int32_t from)
+{
+    int32_t last = ath_player_last_leave(play->transitions, play->transition_count), same = 0;
+    int32_t leave = ath_player_leave(play, from, last);
+    while (leave < last && !(ath_player_chance(play) < 0.5)) leave = ath_player_leave(play, leave + 1, last);
+    for (int32_t i = 0; i < play->transition_count; i++) same += play->transitions[i].leave == leave;
+    return ath_player_way(play, leave, (int32_t)(ath_player_chance(play) * same));
+}
+
+static void ath_player_restart(ath_player_endless *play)
+{
+    play->state = play->seed * 2654435761u + 1u;
+    if (play->state == 0) play->state = 1;
+    play->run = ATH_PLAYER_NONE;
+    play->begins = 0.0;
+    play->next = ath_player_draw(play, 0);
+}
+
+int ath_player_endless_begin(const ath_player *player, ath_player_endless *play, int32_t clip,
+                             const ath_player_transition *transitions, int32_t transition_count, uint32_t seed)
+{
+    if (clip < 0 || clip >= player->info.clip_count || transition_count < 1) return ATH_BAD_ARGUMENT;
+    int32_t frames = ath_clips(player->file)[clip].frame_count;
+    int32_t last = ath_player_last_leave(transitions, transition_count);
+    for (int32_t i = 0; i < transition_count; i++) {
+        const ath_player_transition *way = transitions + i;
+        if (way->leave < 0 || way->enter < 0 || way->frames < 1 || way->frames >= frames) return ATH_BAD_ARGUMENT;
+        if (way->leave >= frames - way->frames || way->enter > last - way->frames) return ATH_BAD_ARGUMENT;
+    }
+    play->transitions = transitions;
+    play->transition_count = transition_count;
+    play->clip = clip;
+    play->seed = seed;
+    ath_player_restart(play);
+    return ATH_OK;
+}
+
+/* Where in the clip a run of a play begins. */
+static double ath_player_enters(const ath_player *p, const ath_player_endless *play)
+{
+    return play->run < 0 ? 0.0 : ath_player_since(p, play->clip, play->transitions[play->run].enter);
+}
+
+/* Takes the transitions up to a time. */
+static void ath_player_go(const ath_player *p, ath_player_endless *play, double seconds)
+{
+    if (seconds < play->begins) ath_player_restart(play);
+    for (;;) {
+        const ath_player_transition *way = play->transitions + play->next;
+        double begins = play->begins + ath_player_since(p, play->clip, way->leave) - ath_player_enters(p, play);
+        if (!(begins <= seconds)) return;
+        play->begins = begins;
+        play->run = play->next;
+        play->next = ath_player_draw(play, way->enter + way->frames);
+    }
+}
+
+int ath_player_endless_positions(ath_player *player, ath_player_endless *play, double seconds, int32_t level,
+                                 ath_order order, float *xyz, size_t stride)
+{
+    ath_player_share shares[2];
+    if (!(seconds >= 0.0 && seconds <= ATH_PLAYER_LONGEST)) return ATH_BAD_ARGUMENT;
+    ath_player_go(player, play, seconds);
+    double passed = seconds - play->begins, weight = 1.0;
+    for (int32_t i = 0; i < 2; i++) {
+        shares[i].clip = play->clip;
+        shares[i].level = level;
+        shares[i].wrap = ATH_AS_MARKED;
+    }
+    shares[0].seconds = shares[1].seconds = ath_player_enters(player, play) + passed;
+    if (play->run >= 0) {
+        const ath_player_transition *way = play->transitions + play->run;
+        double lasts = ath_player_lasts(player, play->clip, way), share = passed / lasts;
+        shares[0].seconds = ath_player_since(player, play->clip, way->leave) + passed;
+        if (passed < lasts) weight = share * share * (3.0 - 2.0 * share);
+    }
+    shares[0].weight = 1.0 - weight;
+    shares[1].weight = weight;
+    return ath_player_blended_positions(player, shares, 2, order, xyz, stride);
 }
 
 /* ---- ahead ---- */
