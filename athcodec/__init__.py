@@ -15,6 +15,7 @@ if TYPE_CHECKING:  # what __getattr__ finds, for type checkers and the reference
     from athcodec.exporters import write, write_hdf5
     from athcodec.joining import in_wind, join, looped, split
     from athcodec.sources import read, read_hdf5, sample_path
+    from athcodec.transitions import endless
     from athcodec.truncation import truncate
 
 __version__ = "0.1.0"
@@ -29,6 +30,7 @@ __all__ = [
     "Thresholds",
     "build_ath",
     "encode",
+    "endless",
     "errors",
     "find_branches",
     "in_wind",
@@ -55,6 +57,7 @@ _LAZY = {  # by module: to import the package loads none, so that a command or a
     "exporters": ("write", "write_hdf5"),
     "joining": ("in_wind", "join", "looped", "split"),
     "sources": ("read", "read_hdf5", "sample_path"),
+    "transitions": ("endless",),
     "truncation": ("truncate",),
 }
 _MODULES = ("errors", "metrics")

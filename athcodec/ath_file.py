@@ -42,6 +42,7 @@ from athcodec.host_mesh import HostMesh, mesh_positions
 from athcodec.joining import HEADING, STRENGTH, metadata_of, wind_of
 from athcodec.polygons import Polygons
 from athcodec.threads import ThreadPool, default_jobs
+from athcodec.transitions import transitions_of
 
 CHUNK_FIELDS = ("kind", "level", "segment", "length", "checksum", "offset")
 
@@ -647,6 +648,7 @@ class AthFile:
                     "seconds": clip.duration,
                     "loop": clip.loop,
                     "wind": self._wind_of(clip),
+                    "transitions": len(transitions_of(metadata_of(self.metadata, clip.name), clip.frame_count)),
                     "seam_errors": list(clip.seam_errors),
                     "max_errors": [level.max_error for level in self.levels_in(clip.segments)],
                 }

@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 import threading
 from bisect import bisect_right
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
@@ -25,6 +25,7 @@ from athcodec.container import Limits
 from athcodec.errors import BadChunk, LevelUnavailable
 from athcodec.host_mesh import HostMesh
 from athcodec.joining import metadata_of, wind_of
+from athcodec.transitions import EndlessPlay
 
 SHOWN_TYPES = (np.dtype(np.float32), np.dtype(np.float64))
 
@@ -430,14 +431,71 @@ class Decoder:
         used = {name: float(weight) for name, weight in weights.items() if not weight <= 0}
         if not 0 < len(used) <= core_file.BLEND_CLIPS or not np.isfinite(list(used.values())).all():
             raise ValueError(f"weights: got {dict(weights)}; expected 1 to {core_file.BLEND_CLIPS} that are above 0")
+        return self._blend(
+            [
+                (
+                    self.file.clip_named(name),
+                    seconds[name] if isinstance(seconds, Mapping) else seconds,
+                    self._checked_level(level.get(name) if isinstance(level, Mapping) else level),
+                    weight,
+                )
+                for name, weight in used.items()
+            ]
+        )
+
+    def endless(self, seed: int = 1) -> EndlessPlay:
+        """The clip played without an end, over transitions that `athcodec.endless` has found between its like frames.
+
+        Parameters
+        ----------
+        seed : int, optional
+            Another one gives another order.
+
+        Returns
+        -------
+        EndlessPlay
+            Its `positions(seconds)` are those of any time.
+
+        Raises
+        ------
+        ValueError
+            Where the clip names no transitions.
+        """
+        return EndlessPlay(self, seed)
+
+    def blended_places(self, places: Sequence[tuple[float, float]], level: int | None = None) -> np.ndarray:
+        """The clip at several times at once, blended along the branches as `blended` blends clips.
+
+        Parameters
+        ----------
+        places : sequence of tuple of float
+            Up to four: seconds since the first frame, and weight, above 0.
+        level : int, optional
+            Level of detail; by default the deepest that is complete.
+
+        Returns
+        -------
+        numpy.ndarray
+            (N, 3) float32, scene units.
+
+        Raises
+        ------
+        ValueError, LevelUnavailable, FormatError
+            As for `blended`.
+        """
+        weights = np.array([weight for _, weight in places], np.float64)
+        if not 0 < len(places) <= core_file.BLEND_CLIPS or not (np.isfinite(weights) & (weights > 0)).all():
+            raise ValueError(f"places: got {list(places)}; expected 1 to {core_file.BLEND_CLIPS} with weights above 0")
+        own = self._checked_level(level)
+        return self._blend([(self.clip, seconds, own, weight) for seconds, weight in places])
+
+    def _blend(self, parts: Sequence[tuple[Clip, float, int, float]]) -> np.ndarray:
+        """Clips, each at its seconds, level and weight."""
         with self._lock:
             before, self._blending = self._blending, {}
         ready: dict[tuple[int, int], core_file.Segment] = {}
         shares = []
-        for name, weight in used.items():
-            clip = self.file.clip_named(name)
-            own_level = self._checked_level(level.get(name) if isinstance(level, Mapping) else level)
-            own_seconds = seconds[name] if isinstance(seconds, Mapping) else seconds
+        for clip, own_seconds, own_level, weight in parts:
             frame = self.file.core.frame_at(self.clips.index(clip), own_seconds)
             first, starts = int(frame), self.file.segment_starts(clip)
             after = first + 1 if first + 1 < starts[-1] else starts[0]

@@ -18,6 +18,7 @@ from plants import bending_tube, tube
 from programs import CACHE, install_once
 
 import athcodec
+from athcodec.joining import in_wind
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.append(str(ROOT))  # for bench, which is not installed; athcodec stays the installed one
@@ -140,6 +141,23 @@ def test_abort_ends_downloads_and_what_is_here_goes_on_playing(layered_ath):
     found = run_node("aborted", layered_ath)
     assert found["codes"] == ["AbortError", "AbortError", "AbortError", "CLOSED"] and found["plays"]
     assert found["files"] == 0 and found["channels"] == 0
+
+
+@pytest.mark.parametrize("with_faces", [False, True])
+def test_a_wind_shows_the_blended_clips_of_the_decoder(with_faces, sample_clip, mesh_ath, tmp_path):
+    with athcodec.open(mesh_ath) as decoder:
+        source = athcodec.ClipView(decoder, decoder.deepest) if with_faces else sample_clip
+        clip = athcodec.MotionClip(
+            source.block(0, 40), np.arange(40) / 30, source.vertex_branch, source.branch_parent, source.rest,
+            source.edges, source.faces,
+        )  # fmt: skip
+    clips = {}
+    for i in range(3):
+        moved = clip.rest + (clip.positions - clip.rest) * np.float32(1 + i)
+        clips[f"clip{i}"] = in_wind(clip.replace(positions=moved), 2.0 + 6.0 * (i > 0), 90.0 * i)
+    path = tmp_path / "winds.ath"
+    athcodec.encode(athcodec.join(clips), path, rel_error=1e-3, segment_frames=16)
+    assert run_node("winds", path) == {"off": [], "refused": ["RangeError", "RangeError"]}
 
 
 def test_parse_takes_buffers_and_views_of_all_kinds_and_leaves_them_as_they_are(layered_ath):

@@ -17,6 +17,7 @@ from test_install import C_COMPILERS, CXX_COMPILERS, run
 
 import athcodec
 from athcodec import container as ct
+from athcodec import core_file
 from athcodec.core_file import Fault
 
 CLAMP, LOOP, PING_PONG, AS_MARKED = range(4)
@@ -35,6 +36,19 @@ class Options(ctypes.Structure):
 
 class Fade(ctypes.Structure):
     _fields_ = [("count", c_int32), ("level", c_int32 * 4), ("weight", c_double * 4), ("passed", c_double * 4)]
+
+
+class Share(ctypes.Structure):
+    _fields_ = [("clip", c_int32), ("level", c_int32), ("wrap", c_int32), ("seconds", c_double), ("weight", c_double)]
+
+
+class Transition(ctypes.Structure):
+    _fields_ = [("leave", c_int32), ("enter", c_int32), ("frames", c_int32)]
+
+
+class Endless(ctypes.Structure):
+    _fields_ = [("transitions", POINTER(Transition)), ("count", c_int32), ("clip", c_int32), ("seed", c_uint32)]
+    _fields_ += [("state", c_uint32), ("run", c_int32), ("next", c_int32), ("begins", c_double)]
 
 
 @pytest.fixture(scope="module")
@@ -98,6 +112,21 @@ class Player:
         result = self.lib.ath_player_positions(
             self.player, clip, c_double(seconds), wrap, level, order, xyz.ctypes, c_size_t(12)
         )
+        return xyz if result == OK else result
+
+    def blended(self, count, shares, order=SOURCE_ORDER):
+        xyz = np.full((count, 3), np.nan, np.float32)
+        result = self.lib.ath_player_blended_positions(
+            self.player, (Share * len(shares))(*shares), len(shares), order, xyz.ctypes, c_size_t(12)
+        )
+        return xyz if result == OK else result
+
+    def in_wind(self, count, winds, strength, heading, seconds):
+        xyz, winds = np.full((count, 3), np.nan, np.float32), np.array(winds, np.float64)
+        result = self.lib.ath_player_wind_positions(
+            self.player, winds.ctypes, c_double(strength), c_double(heading), c_double(seconds), AS_MARKED, -1,
+            SOURCE_ORDER, xyz.ctypes, c_size_t(12),
+        )  # fmt: skip
         return xyz if result == OK else result
 
     def lines(self, kind, corners, order=SOURCE_ORDER):
@@ -336,6 +365,88 @@ def test_a_job_that_is_not_done_can_be_dropped(lib, sample_ath):
         again = c_void_p(lib.ath_player_begin(player.player))
         assert again  # closing ends it
     assert not memory.held
+
+
+# ---- several clips ----
+
+
+def test_clips_are_blended_as_python_blends_them(lib, medley_ath):
+    rng = np.random.default_rng(7)
+    with athcodec.open(medley_ath) as file, Player(lib, medley_ath.read_bytes(), cache_bytes=1) as player:
+        names = [clip.name for clip in file.clips]
+        for _ in range(30):
+            chosen = rng.permutation(len(names))[: rng.integers(1, 5)]
+            seconds = {names[i]: float(rng.uniform(0, 2)) for i in chosen}
+            weights = {name: float(rng.uniform(0.1, 1)) for name in seconds}
+            level = int(rng.integers(file.level_count))
+            shares = [Share(names.index(n), level, AS_MARKED, seconds[n], weights[n]) for n in seconds]
+            unused = Share(len(names), 99, LOOP, 0.0, 0.0)
+            shown = player.blended(file.vertex_count, [*shares, unused])
+            np.testing.assert_array_equal(shown, file.blended(weights, seconds, level))
+
+
+def test_the_wind_chooses_what_is_blended(lib, medley_ath):
+    with athcodec.open(medley_ath) as file, Player(lib, medley_ath.read_bytes()) as player:
+        names = [clip.name for clip in file.clips]
+        winds = [(2.0 + 6.0 * (i > 0), 90.0 * i) for i in range(len(names))]
+        for strength, heading in ((0, 0), (5, 130), (8, 95), (99, 300)):
+            weights = core_file.wind_weights(np.array(winds), strength, heading)
+            wanted = file.blended(dict(zip(names, weights.tolist())), 0.37)
+            np.testing.assert_array_equal(player.in_wind(file.vertex_count, winds, strength, heading, 0.37), wanted)
+
+
+def test_blends_without_a_weight_or_a_clip_or_memory_are_refused(lib, medley_ath):
+    data, memory = medley_ath.read_bytes(), Memory()
+    with athcodec.open(medley_ath) as file, Player(lib, data, memory) as player:
+        count, clips = file.vertex_count, len(file.clips)
+        for weights, clip in (([], 0), ([0.0], 0), ([float("nan")], 0), ([1.0] * 5, 0), ([1.0], clips), ([1.0], -1)):
+            assert player.blended(count, [Share(clip, -1, CLAMP, 0.0, weight) for weight in weights]) == BAD_ARGUMENT
+        memory.fails = memory.taken
+        both = [Share(0, -1, CLAMP, 0.1, 1.0), Share(1, -1, CLAMP, 0.2, 1.0)]
+        assert player.blended(count, both) == NO_MEMORY
+        assert isinstance(player.blended(count, both), np.ndarray)
+    assert not memory.held
+
+
+def test_what_comes_of_each_blended_clip_is_prepared_ahead(lib, scratch, sample_clip):
+    memory, path = Memory(), scratch / "twice.ath"
+    athcodec.encode(athcodec.join({"one": sample_clip, "other": sample_clip}), path, rel_error=1e-3)
+    with Player(lib, path.read_bytes(), memory) as player:
+
+        def at(seconds):
+            return player.blended(sample_clip.vertex_count, [Share(i, -1, CLAMP, seconds, 1.0) for i in range(2)])
+
+        at(0.5)
+        for _ in range(2):  # a segment of each
+            assert player.ahead() == OK
+        assert lib.ath_player_begin(player.player) is None  # nothing is left to do
+        taken = memory.taken
+        assert isinstance(at(1.5), np.ndarray) and memory.taken == taken
+
+
+def test_a_play_without_an_end_is_that_of_python_also_backwards(lib, scratch, sample_clip):
+    path = scratch / "endless.ath"
+    athcodec.encode(athcodec.endless(sample_clip), path, rel_error=1e-3)
+    with athcodec.open(path) as file, Player(lib, path.read_bytes()) as player:
+        ways = [Transition(*way) for way in reversed(file.metadata["transitions"])]
+        play, table, xyz = Endless(), (Transition * len(ways))(*ways), np.empty((file.vertex_count, 3), np.float32)
+        begin = lib.ath_player_endless_begin
+        assert begin(player.player, byref(play), 0, table, len(ways), 9) == OK
+        wanted = file.endless(seed=9)
+        for seconds in (0.0, *np.arange(30, 40, 0.11), 3600.3, 7.7):
+            assert OK == lib.ath_player_endless_positions(
+                player.player, byref(play), c_double(seconds), -1, SOURCE_ORDER, xyz.ctypes, c_size_t(12)
+            )
+            np.testing.assert_array_equal(xyz, wanted.positions(seconds))
+        for seconds in (-1.0, float("nan"), float("inf")):
+            assert BAD_ARGUMENT == lib.ath_player_endless_positions(
+                player.player, byref(play), c_double(seconds), -1, SOURCE_ORDER, xyz.ctypes, c_size_t(12)
+            )
+        frames, most = file.frame_count, 2**31 - 1
+        for way in ((5, 5, 0), (-1, 0, 2), (5, -1, 2), (5, 9, 2), (frames - 2, 0, 2), (most, most, most)):
+            assert begin(player.player, byref(play), 0, (Transition * 1)(way), 1, 1) == BAD_ARGUMENT
+        assert begin(player.player, byref(play), 1, table, len(ways), 1) == BAD_ARGUMENT
+        assert begin(player.player, byref(play), 0, table, 0, 1) == BAD_ARGUMENT
 
 
 # ---- topology ----

@@ -154,6 +154,13 @@ def _encode_arguments(verb: argparse.ArgumentParser) -> None:
         "them into those at their beginning",
     )
     verb.add_argument(
+        "--endless",
+        metavar="NAME,...",
+        type=_argument(_names),
+        help="clips to find transitions in, between like frames, over which players play them without an end; all: "
+        "every one",
+    )
+    verb.add_argument(
         "--strength",
         metavar="S,...",
         type=_argument(_numbers),

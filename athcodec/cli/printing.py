@@ -121,7 +121,11 @@ def _print_facts(facts: dict[str, Any]) -> None:
         print(f"Holds levels 0 to {len(facts['levels']) - 1} of 0 to {facts['full_level_count'] - 1}.")
     if facts["missing"]:
         print(f"{facts['available_bytes']:,} bytes are there; missing {facts['missing']}.")
-    if len(facts["clips"]) > 1 or facts["clips"][0]["name"] or any(facts["clips"][0][key] for key in ("loop", "wind")):
+    if (
+        len(facts["clips"]) > 1
+        or facts["clips"][0]["name"]
+        or any(facts["clips"][0][key] for key in ("loop", "wind", "transitions"))
+    ):
         _print_clips(facts)
     _print_levels(facts)
 
@@ -143,13 +147,15 @@ def _print_clips(facts: dict[str, Any]) -> None:
             f"{clip['seconds']:.4g}",
             f"{clip['segments']:,}",
             f"{clip['wind']['strength']:g} to {clip['wind']['heading']:g}°" if clip["wind"] else "",
+            f"{clip['transitions']:,}" if clip["transitions"] else "",
             f"{clip['seam_errors'][len(facts['levels']) - 1]:.3g}" if clip["loop"] else "",
             *(f"{error:.3g}" for error in clip["max_errors"]),
         ]
         for clip in facts["clips"]
     ]
     levels = [f"max at {level}" for level in range(len(facts["levels"]))]
-    print_table(["clip", "frames", "seconds", "segments", "wind", _head("loop's seam", facts["unit"]), *levels], rows)
+    seam = _head("loop's seam", facts["unit"])
+    print_table(["clip", "frames", "seconds", "segments", "wind", "transitions", seam, *levels], rows)
 
 
 def _print_levels(facts: dict[str, Any]) -> None:

@@ -7,7 +7,9 @@
  *     ath_player_open, ath_player_close      bytes, all of a file or a prefix of it
  *     ath_player_positions, _matrices        what to draw of a clip at a time and level
  *     ath_player_faded_positions             the same of a fade from level to level
+ *     ath_player_blended_positions           several clips by weights; ath_player_wind_positions: by the wind
  *     ath_player_show                        the segments of a moment, for any other function of ath.h
+ *     ath_player_endless_positions           a clip without an end, over transitions between its like frames
  *     ath_player_ahead                       prepares the next segment, a bounded piece of work for each drawn frame;
  *     ath_player_begin, _run, _end           or on any thread: a job for the engine's own job system
  *     ath_player_triangles, _lines           topology; ath_player_normals, ath_player_tangents
@@ -77,6 +79,47 @@ int ath_player_matrices(ath_player *player, int32_t clip, double seconds, ath_wr
 int ath_player_faded_positions(ath_player *player, int32_t clip, double seconds, ath_wrap wrap, const ath_fade *fade,
                                ath_order order, float *xyz, size_t stride);
 
+/* One of the clips of a blend, at its own time and level, with a weight as that of an ath_share. */
+typedef struct ath_player_share {
+    int32_t clip, level;
+    ath_wrap wrap;
+    double seconds, weight;
+} ath_player_share;
+
+/* ath_blended_positions of clips, up to ATH_BLEND_CLIPS of which have a weight. Only of these is anything prepared, now and
+ * ahead. Scratch memory stays until the player is closed. Errors of ath_player_show and of ath_blended_positions. */
+int ath_player_blended_positions(ath_player *player, const ath_player_share *shares, int32_t share_count,
+                                 ath_order order, float *xyz, size_t stride);
+/* The same of the clips that ath_wind_weights chooses for a wind, all at one time. winds: of each clip of the file. */
+int ath_player_wind_positions(ath_player *player, const ath_wind *winds, double strength, double heading,
+                              double seconds, ath_wrap wrap, int32_t level, ath_order order, float *xyz, size_t stride);
+
+/* From frame `leave` on, numbered from the clip's first, a clip goes over into what begins at frame `enter`, over so many frames:
+ * what the metadata's "transitions" name. */
+typedef struct ath_player_transition {
+    int32_t leave, enter, frames;
+} ath_player_transition;
+
+/* A clip that is played without an end: whenever it comes to transitions chance decides whether one is taken. The same seed
+ * gives the same play, also that of Decoder.endless in Python. */
+typedef struct ath_player_endless {
+    const ath_player_transition *transitions; /* stay where they are */
+    int32_t transition_count, clip;
+    uint32_t seed, state;
+    int32_t run, next; /* the transition that led to where it is (-1: none has) and the one that comes */
+    double begins;     /* when that was; seconds */
+} ath_player_endless;
+
+/* Begins at the clip's first frame. ATH_BAD_ARGUMENT: no such clip; no transitions, one beyond the clip, or one that is not over
+ * before the last of them leaves. */
+int ath_player_endless_begin(const ath_player *player, ath_player_endless *play, int32_t clip,
+                             const ath_player_transition *transitions, int32_t transition_count, uint32_t seed);
+/* The positions of a time since the play began, of 0 or more: in a transition a blend along the branches. Time that goes back
+ * behind the last transition takes as long as playing again from the beginning. Errors of ath_player_blended_positions;
+ * ATH_BAD_ARGUMENT: below 0, or above 1e7. */
+int ath_player_endless_positions(ath_player *player, ath_player_endless *play, double seconds, int32_t level,
+                                 ath_order order, float *xyz, size_t stride);
+
 /* Goes on with preparing what comes after what was shown last, in the direction and with the wrap that it was shown in,
  * for `steps` steps (ath_prepare_step). ATH_MORE; ATH_OK: nothing is left to do until time goes on; errors as above. */
 int ath_player_ahead(ath_player *player, int32_t steps);
@@ -144,6 +187,13 @@ typedef struct ath_player_block {
     struct ath_player_block *next;
 } ath_player_block;
 
+/* A clip that is shown, from which follows what is prepared ahead. */
+typedef struct ath_player_track {
+    int32_t clip, segment, level, direction;
+    double frame;
+    ath_wrap wrap;
+} ath_player_track;
+
 struct ath_player {
     ath_player_options options;
     ath_file *file;
@@ -156,9 +206,10 @@ struct ath_player {
     size_t cached;
     uint64_t calls;
     int32_t deepest; /* level that is built */
-    int32_t clip, segment, level, direction;
-    double frame;
-    ath_wrap wrap;
+    int32_t track_count;
+    ath_player_track tracks[ATH_BLEND_CLIPS];
+    void *blending;  /* scratch memory of blends; null: none was shown */
+    double *weights; /* of winds, of each clip */
 };
 
 enum { ATH_PLAYER_HEAD = 64 }; /* bytes in front of aligned memory: the structs above fit */
@@ -259,7 +310,6 @@ int ath_player_open(ath_player **player, const uint8_t *bytes, size_t size, cons
     if (!p) return ATH_NO_MEMORY;
     memset(p, 0, sizeof *p);
     p->options = own;
-    p->segment = -1;
     result = ath_player_build(p, bytes, size, file_size);
     if (fault) *fault = p->fault;
     if (result != ATH_OK) {
@@ -459,33 +509,61 @@ static int ath_player_moment_at(ath_player *p, double frame, int32_t level, ath_
     return ATH_OK;
 }
 
-/* Where a clip is at a time; what is to be prepared ahead follows from it. */
-static int ath_player_move(ath_player *p, int32_t clip, double seconds, ath_wrap wrap, int32_t level, double *frame)
+/* Where a clip is at a time. before: where it was when it was shown last; null: it was not. */
+static ath_player_track ath_player_track_of(const ath_player *p, const ath_player_track *before,
+                                            const ath_player_share *share)
 {
-    if (clip < 0 || clip >= p->info.clip_count) return ATH_BAD_ARGUMENT;
-    *frame = ath_frame_at(p->file, clip, seconds, wrap);
-    if (wrap == ATH_AS_MARKED) wrap = ath_clips(p->file)[clip].loop ? ATH_LOOP : ATH_CLAMP;
-    int32_t segment = ath_blend_at(p->file, *frame).segment[0];
-    int was_here = p->segment >= 0 && p->clip == clip;
-    int wrapped = was_here && wrap == ATH_LOOP && (segment > p->segment + 1 || segment < p->segment - 1);
-    if (!was_here)
-        p->direction = 1;
-    else if (!wrapped && *frame != p->frame)
-        p->direction = *frame < p->frame ? -1 : 1;
-    p->clip = clip;
-    p->segment = segment;
-    p->level = level;
-    p->frame = *frame;
-    p->wrap = wrap;
+    ath_player_track now;
+    ath_wrap wrap = share->wrap;
+    now.frame = ath_frame_at(p->file, share->clip, share->seconds, wrap);
+    if (wrap == ATH_AS_MARKED) wrap = ath_clips(p->file)[share->clip].loop ? ATH_LOOP : ATH_CLAMP;
+    now.clip = share->clip;
+    now.segment = ath_blend_at(p->file, now.frame).segment[0];
+    now.level = share->level;
+    now.wrap = wrap;
+    now.direction = before ? before->direction : 1;
+    int wrapped =
+        before && wrap == ATH_LOOP && (now.segment > before->segment + 1 || now.segment < before->segment - 1);
+    if (before && !wrapped && now.frame != before->frame) now.direction = now.frame < before->frame ? -1 : 1;
+    return now;
+}
+
+/* Shows clips from now on; what is to be prepared ahead follows from them. */
+static int ath_player_move(ath_player *p, const ath_player_share *shares, int32_t count)
+{
+    ath_player_track tracks[ATH_BLEND_CLIPS];
+    for (int32_t i = 0; i < count; i++) {
+        const ath_player_track *before = NULL;
+        if (shares[i].clip < 0 || shares[i].clip >= p->info.clip_count) return ATH_BAD_ARGUMENT;
+        for (int32_t k = 0; k < p->track_count && !before; k++)
+            if (p->tracks[k].clip == shares[i].clip) before = p->tracks + k;
+        tracks[i] = ath_player_track_of(p, before, shares + i);
+    }
+    for (int32_t i = 0; i < count; i++) p->tracks[i] = tracks[i];
+    p->track_count = count;
     p->calls++;
     return ATH_OK;
+}
+
+/* The same of one clip. */
+static int ath_player_move_one(ath_player *p, int32_t clip, double seconds, ath_wrap wrap, int32_t level, double *frame)
+{
+    ath_player_share share;
+    share.clip = clip;
+    share.level = level;
+    share.wrap = wrap;
+    share.seconds = seconds;
+    share.weight = 1.0;
+    int result = ath_player_move(p, &share, 1);
+    *frame = result == ATH_OK ? p->tracks[0].frame : 0.0;
+    return result;
 }
 
 int ath_player_show(ath_player *player, int32_t clip, double seconds, ath_wrap wrap, int32_t level,
                     ath_player_moment *moment)
 {
     double frame;
-    int result = ath_player_move(player, clip, seconds, wrap, level, &frame);
+    int result = ath_player_move_one(player, clip, seconds, wrap, level, &frame);
     return result == ATH_OK ? ath_player_moment_at(player, frame, level, moment) : result;
 }
 
@@ -517,7 +595,7 @@ int ath_player_faded_positions(ath_player *player, int32_t clip, double seconds,
     const ath_segment *segments[2 * ATH_FADE_LEVELS];
     int32_t count = 0, latest = fade->count > 0 ? fade->level[fade->count - 1] : 0;
     double frame;
-    int result = ath_player_move(player, clip, seconds, wrap, latest, &frame);
+    int result = ath_player_move_one(player, clip, seconds, wrap, latest, &frame);
     if (result != ATH_OK) return result;
     for (int32_t i = 0; i < fade->count; i++) {
         ath_player_moment moment;
@@ -528,25 +606,233 @@ int ath_player_faded_positions(ath_player *player, int32_t clip, double seconds,
     return ath_faded_positions(player->file, segments, count, frame, fade, order, xyz, stride);
 }
 
+/* ---- several clips ---- */
+
+/* The shares that have a weight, in front; -1: more than ATH_BLEND_CLIPS. */
+static int32_t ath_player_used(const ath_player_share *shares, int32_t count, ath_player_share *used)
+{
+    int32_t found = 0;
+    for (int32_t i = 0; i < count; i++) {
+        if (!(shares[i].weight > 0.0)) continue;
+        if (found == ATH_BLEND_CLIPS) return -1;
+        used[found++] = shares[i];
+    }
+    return found;
+}
+
+int ath_player_blended_positions(ath_player *player, const ath_player_share *shares, int32_t share_count,
+                                 ath_order order, float *xyz, size_t stride)
+{
+    ath_player_share used[ATH_BLEND_CLIPS];
+    ath_player_moment moments[ATH_BLEND_CLIPS];
+    ath_share blended[ATH_BLEND_CLIPS];
+    size_t size = ath_blend_size(player->file);
+    int32_t count = ath_player_used(shares, share_count, used);
+    if (count <= 0) return ATH_BAD_ARGUMENT;
+    int result = ath_player_move(player, used, count);
+    if (result != ATH_OK) return result;
+    if (count > 1 && !player->blending && !(player->blending = ath_player_block_of(player, size))) return ATH_NO_MEMORY;
+    for (int32_t i = 0; i < count; i++) {
+        result = ath_player_moment_at(player, player->tracks[i].frame, used[i].level, moments + i);
+        if (result != ATH_OK) return result;
+        blended[i].segments = moments[i].segments;
+        blended[i].segment_count = moments[i].segment_count;
+        blended[i].frame = moments[i].frame;
+        blended[i].weight = used[i].weight;
+    }
+    return ath_blended_positions(player->file, blended, count, order, xyz, stride, player->blending,
+                                 player->blending ? size : 0);
+}
+
+int ath_player_wind_positions(ath_player *player, const ath_wind *winds, double strength, double heading,
+                              double seconds, ath_wrap wrap, int32_t level, ath_order order, float *xyz, size_t stride)
+{
+    ath_player_share shares[ATH_BLEND_CLIPS];
+    size_t size = (size_t)player->info.clip_count * sizeof(double);
+    int32_t count = 0;
+    if (!player->weights && !(player->weights = (double *)ath_player_block_of(player, size))) return ATH_NO_MEMORY;
+    ath_wind_weights(winds, player->info.clip_count, strength, heading, player->weights);
+    for (int32_t i = 0; i < player->info.clip_count && count < ATH_BLEND_CLIPS; i++) {
+        if (!(player->weights[i] > 0.0)) continue;
+        shares[count].clip = i;
+        shares[count].level = level;
+        shares[count].wrap = wrap;
+        shares[count].seconds = seconds;
+        shares[count++].weight = player->weights[i];
+    }
+    return ath_player_blended_positions(player, shares, count, order, xyz, stride);
+}
+
+/* ---- without an end ---- */
+
+static const double ATH_PLAYER_LONGEST = 1e7; /* seconds of a play: 115 days */
+
+enum { ATH_PLAYER_NONE = -1 };
+
+/* Seconds from a clip's first frame to another. */
+static double ath_player_since(const ath_player *p, int32_t clip, int32_t frame)
+{
+    const double *times = ath_times(p->file) + ath_clips(p->file)[clip].first_frame;
+    return times[frame] - times[0];
+}
+
+static double ath_player_lasts(const ath_player *p, int32_t clip, const ath_player_transition *way)
+{
+    double old = ath_player_since(p, clip, way->leave + way->frames) - ath_player_since(p, clip, way->leave);
+    double now = ath_player_since(p, clip, way->enter + way->frames) - ath_player_since(p, clip, way->enter);
+    return now < old ? now : old;
+}
+
+/* 0 to 1, of a 32-bit xorshift (Marsaglia 2003). */
+static double ath_player_chance(ath_player_endless *play)
+{
+    play->state ^= play->state << 13;
+    play->state ^= play->state >> 17;
+    play->state ^= play->state << 5;
+    return (double)play->state / 4294967296.0;
+}
+
+/* The first frame from `from` on that a transition leaves at; the last such of all where there is none. */
+static int32_t ath_player_leave(const ath_player_endless *play, int32_t from, int32_t last)
+{
+    int32_t found = last;
+    for (int32_t i = 0; i < play->transition_count; i++) {
+        int32_t leave = play->transitions[i].leave;
+        if (leave >= from && leave < found) found = leave;
+    }
+    return found;
+}
+
+static int32_t ath_player_last_leave(const ath_player_transition *ways, int32_t count)
+{
+    int32_t last = 0;
+    for (int32_t i = 0; i < count; i++)
+        if (ways[i].leave > last) last = ways[i].leave;
+    return last;
+}
+
+/* Whether one is in front of another among those that leave at one frame. */
+static int ath_player_in_front(const ath_player_transition *a, const ath_player_transition *b)
+{
+    return a->enter != b->enter ? a->enter < b->enter : a->frames < b->frames;
+}
+
+/* Of those that leave at a frame the one with so many in front of it. */
+static int32_t ath_player_way(const ath_player_endless *play, int32_t leave, int32_t place)
+{
+    const ath_player_transition *ways = play->transitions;
+    for (int32_t i = 0; i < play->transition_count; i++) {
+        int32_t in_front = 0;
+        if (ways[i].leave != leave) continue;
+        for (int32_t k = 0; k < play->transition_count; k++)
+            if (ways[k].leave == leave
+                && (ath_player_in_front(ways + k, ways + i) || (k < i && !ath_player_in_front(ways + i, ways + k))))
+                in_front++;
+        if (in_front == place) return i;
+    }
+    return 0;
+}
+
+/* The transition that is taken from a frame on. */
+static int32_t ath_player_draw(ath_player_endless *play, int32_t from)
+{
+    int32_t last = ath_player_last_leave(play->transitions, play->transition_count), same = 0;
+    int32_t leave = ath_player_leave(play, from, last);
+    while (leave < last && !(ath_player_chance(play) < 0.5)) leave = ath_player_leave(play, leave + 1, last);
+    for (int32_t i = 0; i < play->transition_count; i++) same += play->transitions[i].leave == leave;
+    return ath_player_way(play, leave, (int32_t)(ath_player_chance(play) * same));
+}
+
+static void ath_player_restart(ath_player_endless *play)
+{
+    play->state = play->seed * 2654435761u + 1u;
+    if (play->state == 0) play->state = 1;
+    play->run = ATH_PLAYER_NONE;
+    play->begins = 0.0;
+    play->next = ath_player_draw(play, 0);
+}
+
+int ath_player_endless_begin(const ath_player *player, ath_player_endless *play, int32_t clip,
+                             const ath_player_transition *transitions, int32_t transition_count, uint32_t seed)
+{
+    if (clip < 0 || clip >= player->info.clip_count || transition_count < 1) return ATH_BAD_ARGUMENT;
+    int32_t frames = ath_clips(player->file)[clip].frame_count;
+    int32_t last = ath_player_last_leave(transitions, transition_count);
+    for (int32_t i = 0; i < transition_count; i++) {
+        const ath_player_transition *way = transitions + i;
+        if (way->leave < 0 || way->enter < 0 || way->frames < 1 || way->frames >= frames) return ATH_BAD_ARGUMENT;
+        if (way->leave >= frames - way->frames || way->enter > last - way->frames) return ATH_BAD_ARGUMENT;
+    }
+    play->transitions = transitions;
+    play->transition_count = transition_count;
+    play->clip = clip;
+    play->seed = seed;
+    ath_player_restart(play);
+    return ATH_OK;
+}
+
+/* Where in the clip a run of a play begins. */
+static double ath_player_enters(const ath_player *p, const ath_player_endless *play)
+{
+    return play->run < 0 ? 0.0 : ath_player_since(p, play->clip, play->transitions[play->run].enter);
+}
+
+/* Takes the transitions up to a time. */
+static void ath_player_go(const ath_player *p, ath_player_endless *play, double seconds)
+{
+    if (seconds < play->begins) ath_player_restart(play);
+    for (;;) {
+        const ath_player_transition *way = play->transitions + play->next;
+        double begins = play->begins + ath_player_since(p, play->clip, way->leave) - ath_player_enters(p, play);
+        if (!(begins <= seconds)) return;
+        play->begins = begins;
+        play->run = play->next;
+        play->next = ath_player_draw(play, way->enter + way->frames);
+    }
+}
+
+int ath_player_endless_positions(ath_player *player, ath_player_endless *play, double seconds, int32_t level,
+                                 ath_order order, float *xyz, size_t stride)
+{
+    ath_player_share shares[2];
+    if (!(seconds >= 0.0 && seconds <= ATH_PLAYER_LONGEST)) return ATH_BAD_ARGUMENT;
+    ath_player_go(player, play, seconds);
+    double passed = seconds - play->begins, weight = 1.0;
+    for (int32_t i = 0; i < 2; i++) {
+        shares[i].clip = play->clip;
+        shares[i].level = level;
+        shares[i].wrap = ATH_AS_MARKED;
+    }
+    shares[0].seconds = shares[1].seconds = ath_player_enters(player, play) + passed;
+    if (play->run >= 0) {
+        const ath_player_transition *way = play->transitions + play->run;
+        double lasts = ath_player_lasts(player, play->clip, way), share = passed / lasts;
+        shares[0].seconds = ath_player_since(player, play->clip, way->leave) + passed;
+        if (passed < lasts) weight = share * share * (3.0 - 2.0 * share);
+    }
+    shares[0].weight = 1.0 - weight;
+    shares[1].weight = weight;
+    return ath_player_blended_positions(player, shares, 2, order, xyz, stride);
+}
+
 /* ---- ahead ---- */
 
 /* The segment that is shown after this one; -1: none is. */
-static int32_t ath_player_next(const ath_player *p)
+static int32_t ath_player_next(const ath_player *p, const ath_player_track *now)
 {
-    const ath_clip *clip = ath_clips(p->file) + p->clip;
-    int32_t last = clip->first_segment + clip->segment_count - 1, next = p->segment + p->direction;
-    if (p->segment < 0) return -1;
+    const ath_clip *clip = ath_clips(p->file) + now->clip;
+    int32_t last = clip->first_segment + clip->segment_count - 1, next = now->segment + now->direction;
     if (next >= clip->first_segment && next <= last) return next;
-    if (p->wrap == ATH_LOOP) return next > last ? clip->first_segment : last;
-    if (p->wrap == ATH_PING_PONG && clip->segment_count > 1) return p->segment - p->direction;
+    if (now->wrap == ATH_LOOP) return next > last ? clip->first_segment : last;
+    if (now->wrap == ATH_PING_PONG && clip->segment_count > 1) return now->segment - now->direction;
     return -1;
 }
 
-/* Whether a segment waits to be prepared; `level` is then that to prepare it at. */
+/* Whether a segment waits to be prepared. *level: that to show it at; then the one to prepare it at. */
 static int ath_player_wants(const ath_player *p, int32_t segment, int32_t *level)
 {
     if (segment < 0) return 0;
-    *level = ath_player_level_of(p, segment, p->level);
+    *level = ath_player_level_of(p, segment, *level);
     if (*level < 0 || ath_player_find(p, segment, *level)) return 0;
     for (const ath_player_job *job = p->jobs; job; job = job->next)
         if (job->entry->segment == segment && job->entry->level == *level) return 0;
@@ -556,8 +842,10 @@ static int ath_player_wants(const ath_player *p, int32_t segment, int32_t *level
 ath_player_job *ath_player_begin(ath_player *player)
 {
     ath_player_job *job = NULL;
-    int32_t level, next = ath_player_next(player);
-    if (ath_player_wants(player, next, &level)) ath_player_start(player, next, level, &job);
+    for (int32_t i = 0; i < player->track_count && !job; i++) {
+        int32_t level = player->tracks[i].level, next = ath_player_next(player, player->tracks + i);
+        if (ath_player_wants(player, next, &level)) ath_player_start(player, next, level, &job);
+    }
     return job;
 }
 

@@ -84,7 +84,12 @@ static float *shown(user *u, int32_t clip, double seconds, ath_wrap wrap, int32_
     int result;
     ath_fade_to(&fade, way / 4 % u->info.level_count, 1.0);
     ath_fade_to(&fade, way / 2 % u->info.level_count, 0.25);
-    if (way % 2)
+    ath_player_share shares[3] = {{clip, level, wrap, seconds, 1.0},
+                                  {way % u->info.clip_count, way % u->info.level_count, ATH_LOOP, seconds, way / 8.0},
+                                  {0, -1, ATH_PING_PONG, -seconds, 0.5}};
+    if (way % 8 == 7)
+        result = ath_player_blended_positions(u->player, shares, 3, ATH_SOURCE_ORDER, xyz, 12);
+    else if (way % 2)
         result = ath_player_faded_positions(u->player, clip, seconds, wrap, &fade, ATH_SOURCE_ORDER, xyz, 12);
     else
         result = ath_player_positions(u->player, clip, seconds, wrap, level, ATH_SOURCE_ORDER, xyz, 12);

@@ -4,6 +4,7 @@ import { AthFile, ATHLoader, Line, pause, read, three, thrown, until } from "./l
 
 const [name, path] = process.argv.slice(2), data = read(path);
 const refusal = (promise) => promise.then(() => null, (error) => error.codeName ?? error.name);
+const refusalOf = (call) => { try { call(); return null; } catch (error) { return error.name; } };
 
 // A file of which `here` bytes have come, loaded.
 async function load(here = Infinity, { bytes = data, mode = "matrices", ...options } = {}) {
@@ -119,6 +120,34 @@ cases.aborted = async () => {
   ath.dispose();
   codes.push(await refusal(motion.show(0, 0)));
   return ({ codes, plays, files: loader.workerPool[0].files, channels: loader.workerPool[0].channels.size });
+};
+
+// Pictures in winds against the decoder's, in both modes, what a clip shows after that, and what is refused.
+cases.winds = async () => {
+  const file = AthFile.open(data), level = file.info.levelCount - 1, off = [];
+  const segments = Array.from({ length: file.info.segmentCount }, (_, segment) => file.prepare(segment, level));
+  const winds = file.clips.map((_, i) => ({ strength: 2 + 6 * (i > 0), heading: 90 * i }));
+  for (const mode of ["matrices", "positions"]) {
+    const { ath, motion, loader } = await load(Infinity, { mode });
+    ath.geometry ?? ath.lines;
+    motion.fade = 0;
+    for (const [strength, heading, seconds] of [[2, 0, 0.1], [5, 100, 0.31], [8, 135, 0.33], [99, 260, 0.7]]) {
+      const shares = file.windWeights(winds, strength, heading).map((weight, clip) =>
+        ({ segments, weight, frame: file.frameAt(seconds, motion.wrap, clip) })).filter(({ weight }) => weight > 0);
+      const wanted = file.blended(shares), apart = (found) => Math.max(...wanted.map((number, i) => Math.abs(number - found[i])));
+      motion.wind(strength, heading).setTime(seconds);
+      const here = () => motion.level === level && apart(motion.uploaded()) === 0;
+      if (!(await until(here))) off.push([mode, strength, heading, motion.level]);
+      off.push(...(apart(await motion.positions(seconds)) > 0 ? [[mode, "positions"]] : []));
+    }
+    motion.play(0).setTime(0.9);
+    const alone = () => file.positions(segments, file.frameAt(motion.time - motion.start, motion.wrap, 0));
+    const plays = () => !motion.switching && alone().every((number, i) => Math.abs(number - motion.uploaded()[i]) < 1e-4);
+    if (!(await until(plays))) off.push([mode, "play"]);
+    loader.dispose();
+  }
+  const { motion } = await load();
+  return ({ off, refused: [refusalOf(() => motion.wind(NaN)), refusalOf(() => motion.wind(1, Infinity))] });
 };
 
 // Buffers and views of all kinds.

@@ -73,6 +73,7 @@ export class ATHMotion extends EventDispatcher {
   #stale = false;
   #timer = 0;
   #old = null;            // the clip before, as long as it is shown: {clip, seconds, wrap, at, fade, passed, begun}
+  #wind = null;           // [strength, heading] of the clips that are blended
   #answers = new Map();
   #next = 1;
 
@@ -214,8 +215,18 @@ export class ATHMotion extends EventDispatcher {
   play(clip, { fade = 0, at = 0 } = {}) {
     const next = this.clips.find(({ index, name }) => clip === index || clip === name);
     if (!next) throw new RangeError(`clip: got ${clip}, expected one of ${this.clips.map(({ name }) => name).join(", ")}`);
+    this.#wind = null;
     if (this.level >= 0) this.#old = { ...this.#mostlyShown(), at, fade, passed: 0, begun: false };
     Object.assign(this, { clip: next, start: this.time - at });
+    this.#ask();
+    return this;
+  }
+
+  /** Blends clips for a wind. See index.d.ts. */
+  wind(strength, heading = 0) {
+    if (![strength, heading].every(Number.isFinite)) throw new RangeError(`wind: got ${strength} and ${heading}, expected two finite numbers`);
+    this.#wind = [strength, heading];
+    this.#old = null;
     this.#ask();
     return this;
   }
@@ -285,7 +296,7 @@ export class ATHMotion extends EventDispatcher {
     return new Promise((resolve, reject) => {
       if (!this.#channel.views.has(this.#id)) throw failureOf(CLOSED);
       this.#answers.set(id, { resolve, reject, aside: message.aside });
-      this.#channel.send({ type: "picture", view: this.#id, id, exactly: true, ...this.#place(seconds), ...message });
+      this.#channel.send({ type: "picture", view: this.#id, id, exactly: true, ...this.#place(seconds), wind: this.#wind, ...message });
     });
   }
 
@@ -299,7 +310,7 @@ export class ATHMotion extends EventDispatcher {
     const { clip, seconds, wrap } = this.#place(waits ? this.start + old.at : this.time);
     const fading = old && { clip: old.clip, seconds: old.seconds, wrap: old.wrap, begun: old.begun,
       share: old.fade > 0 ? 1 - old.passed / old.fade : 0 };
-    const wish = `${clip} ${seconds} ${wrap} ${this.target} ${this.heat} ${JSON.stringify(fading)}`;
+    const wish = `${clip} ${seconds} ${wrap} ${this.target} ${this.heat} ${JSON.stringify([fading, this.#wind])}`;
     if (this.#pending) {
       this.#stale = wish !== this.#asked;
       return;
@@ -311,7 +322,7 @@ export class ATHMotion extends EventDispatcher {
     const buffer = this.#spare;
     this.#spare = null;
     this.#channel.send({
-      type: "picture", view: this.#id, id: 0, clip, seconds, wrap, old: fading, level: this.target, heat: this.heat,
+      type: "picture", view: this.#id, id: 0, clip, seconds, wrap, old: fading, wind: this.#wind, level: this.target, heat: this.heat,
       positions: this.mode === "positions", buffer, now: performance.now(), fade: this.fade,
       coarsely: this.#channel.easing,
     }, buffer ? [buffer] : []);
@@ -344,15 +355,15 @@ export class ATHMotion extends EventDispatcher {
     }
   }
 
-  #take({ shown, frame, data, heat, ms, held, clip, exactly, fading, whole }) {
-    const changed = shown !== this.level, known = this.#channel.known.get(shown), cut = known !== this.#known;
+  #take({ shown, cut: of = shown, frame, data, heat, ms, held, clip, exactly, fading, whole }) {
+    const changed = shown !== this.level, known = this.#channel.known.get(of), cut = known !== this.#known;
     Object.assign(this, { frame, held, fading, milliseconds: ms, distances: heat ?? null, level: shown });
     this.#known = known;
     if (shown > 0) this.#channel.endEasing();
     clearTimeout(this.#timer);
     if (fading) this.#timer = setTimeout(() => this.refresh(), FRAME_MS); // time may stand still
     this.#moved = whole ? data : null;
-    if (!whole) this.#upload(shown, data);
+    if (!whole) this.#upload(of, data);
     this.#setBounds(data);
     if (this.mode === "positions") this.#write(this.uploaded());
     if (cut) for (const geometry of this.#geometries) this.#setParts(geometry);

@@ -155,6 +155,11 @@ export class ATHMotion extends EventDispatcher<ATHMotionEvents> {
    * time that passes in setTime() the two are blended, vertex by vertex and matrix by matrix. Throws RangeError where
    * there is no such clip. */
   play(clip: string | number, options?: { fade?: number; at?: number }): this;
+  /** Blends up to four clips for a wind from now on, until play(): those whose own strength and heading (metadata "strength" and
+   * "heading", in degrees) are next to these, by how near they are, all at the time that is set. Branches stay attached and edges of
+   * stems as long as in the clips. Bytes of all of these clips are fetched; those that are not here yet are left out, and levels
+   * change without a fade. Where no clip names a wind, the first is shown. Throws RangeError where a number is not finite. */
+  wind(strength: number, heading?: number): this;
   /** Whether the clip before is still shown: "waiting" for the one that plays, "fading" into it; else null. */
   readonly switching: "waiting" | "fading" | null;
   /** Seconds until the clip repeats (in a loop the last frame blends into the first) or, where it does not, ends. */

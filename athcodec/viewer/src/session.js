@@ -17,6 +17,7 @@ const MOST_PREPARED = 256 << 20;  // bytes of decoded segments that are kept
 const STATE_MS = 50;
 const WIDTH = 1024;               // of the texture, in texels of four numbers
 const REFINED_REST = 0x15;
+const BLENDED = -1;               // in place of a level: all vertices are exact, as blended clips leave them
 
 const channel = new MessageChannel(), waiting = [];
 channel.port1.onmessage = () => waiting.shift()();
@@ -26,7 +27,7 @@ export class Session {
   #file = null;
   #front = new Uint8Array(0);
   #came = 0;              // bytes from the file's beginning on
-  #views = new Map();     // id: {level, frames, fading}, the frame of a clip that fades out behind the other
+  #views = new Map();     // id: {level, frames, wanted, fading}, the frame of a clip that fades out, which is not fetched, last
   #prepared = new Map();  // "segment/level": Segment, those used last at the end
   #underway = [];         // ranges that are being fetched
   #parts = new Map();
@@ -52,6 +53,7 @@ export class Session {
   #restNormals = null;
   #faces = null;
   #first = 0;             // the clip to begin with
+  #winds = [];            // of each clip {strength, heading}, null: it has none
 
   /** clip: the name of the one to begin with, null: the file's first. hostMesh: of a file that does not hold its rest
    * pose, a Float32Array. */
@@ -101,6 +103,7 @@ export class Session {
     const file = this.#file, { info } = file, statics = readPrelude(file), clips = this.#clips();
     const levelNames = Array.from({ length: info.levelCount }, (_, level) => file.levelName(level));
     this.#faces = statics.faces;
+    this.#winds = clips.map(({ name }) => windOf({ ...statics.metadata, ...statics.metadata.clips?.[name] }));
     this.#first = this.clip === null ? 0 : clips.findIndex(({ name }) => name === this.clip);
     if (this.#first < 0) {
       const names = clips.map(({ name }) => name).join(", ");
@@ -269,8 +272,8 @@ export class Session {
   // fades out shows what is here.
   #wishes() {
     const wishes = new Map(), views = [...this.#views.values()];
-    if (views.length === 0) views.push({ level: 0, frames: [this.#file.clips[this.#first].firstFrame] });
-    for (const { level, frames: [frame] } of views) {
+    if (views.length === 0) views.push({ level: 0, wanted: [this.#file.clips[this.#first].firstFrame] });
+    for (const { level, frame } of views.flatMap(({ level, wanted }) => wanted.map((frame) => ({ level, frame })))) {
       const clip = this.#clipAt(frame), wish = wishes.get(clip);
       if (wish) wish.level = Math.max(wish.level, level);
       else wishes.set(clip, { level, ...this.#fromHere(clip, frame) });
@@ -355,9 +358,10 @@ export class Session {
 
   // ---- decoding ----
 
-  /** A view shows `frames` at `level` from now on: one, or two that fade over. */
-  view(id, level, frames) {
-    this.#views.set(id, { level, frames, fading: this.#fading(id) });
+  /** A view shows `frames` at `level` from now on: one, two that fade over, or those that are blended. Bytes of the clips of
+   * `wanted` are fetched. */
+  view(id, level, frames, wanted = frames.slice(0, 1)) {
+    this.#views.set(id, { level, frames, wanted, fading: this.#fading(id) });
     this.#wakeUp();
     if (this.#opened) this.#decode();
   }
@@ -450,7 +454,8 @@ export class Session {
     this.#prepared.delete(key);
     this.#prepared.set(key, segment);
     const { frameCount, segmentCount, vertexCount } = this.#file.info;
-    const most = Math.max(6, Math.floor(MOST_PREPARED / (16 * vertexCount * (frameCount / segmentCount))));
+    const shown = [...this.#views.values()].reduce((sum, { frames }) => sum + frames.length, 0);
+    const most = Math.max(6, 2 * shown + 2, Math.floor(MOST_PREPARED / (16 * vertexCount * (frameCount / segmentCount))));
     const wanted = new Set(Array.from(this.#jobs(), (job) => job.join("/")));
     for (const [oldest, old] of this.#prepared) {
       if (this.#prepared.size <= most) break;
@@ -544,8 +549,13 @@ export class Session {
   // ---- pictures ----
 
   parts(level) {
-    if (!this.#parts.has(level)) this.#parts.set(level, this.#file.parts(level));
+    if (!this.#parts.has(level)) this.#parts.set(level, level === BLENDED ? this.#allExact() : this.#file.parts(level));
     return this.#parts.get(level);
+  }
+
+  #allExact() {
+    const exactCount = this.#file.info.vertexCount, one = (number) => Int32Array.of(number);
+    return { nodeCount: 0, exactCount, branch: one(-1), first: one(0), count: one(exactCount), index: one(0) };
   }
 
   /** Tells of the parts of a level, where the page does not know them. */
@@ -572,18 +582,38 @@ export class Session {
         // it is said already
       }
     }
-    if (answer.shown >= 0) this.tell(answer.shown);
+    if (answer.shown >= 0) this.tell(answer.cut ?? answer.shown);
     answer.ms = performance.now() - start;
     this.post(answer, [answer.data, answer.heat].filter(Boolean).map((array) => array.buffer));
   }
 
-  #answer({ view, clip, seconds, wrap, level, old = null, exactly = false, aside = false, heat = false, positions = false,
-    buffer = null, now = 0, fade = 0, coarsely = false }) {
+  #answer(message) {
+    const { view, clip, seconds, wrap, level, old = null, exactly = false, aside = false, heat = false, positions = false,
+      buffer = null, now = 0, fade = 0, coarsely = false } = message;
+    if (message.wind) return this.#inWind(message);
     const frame = this.#file.frameAt(seconds, wrap, clip), fading = aside ? new Fading() : this.#fading(view);
     const shown = exactly ? this.#exactly(frame, level) : this.#viewed({ view, frame, level, old, fading, coarsely });
     if (!shown) return { frame };
     fading.to(shown.level, now, exactly ? 0 : fade);
     return { ...this.#picture(shown, fading, positions, buffer), ...(heat ? { heat: this.#distances(shown) } : {}) };
+  }
+
+  // Clips that are blended for a wind, each at the deepest level that is decoded of it; those of which nothing is are left out.
+  #inWind({ view, clip, seconds, wrap, level, wind: [strength, heading], exactly = false, aside = false, positions = false,
+    buffer = null, coarsely = false }) {
+    const file = this.#file, weights = file.windWeights(this.#winds, strength, heading), shares = [];
+    const used = weights.flatMap((weight, index) => (weight > 0 ? [{ weight, frame: file.frameAt(seconds, wrap, index) }] : []));
+    const frames = used.map(({ frame }) => frame), frame = file.frameAt(seconds, wrap, clip);
+    if (!aside) this.view(view, level, frames, frames);
+    for (const share of used) {
+      const shown = exactly ? this.#exactly(share.frame, level) : this.#show(share.frame, coarsely ? 0 : level);
+      if (shown) shares.push({ ...shown, weight: share.weight });
+    }
+    if (shares.length === 0) return { frame };
+    const xyz = file.blended(shares), shown = Math.min(...shares.map((share) => share.level));
+    if (!aside) this.#fading(view).to(shown);
+    return { shown, cut: BLENDED, frame, fading: false, clip, held: file.held, whole: positions,
+      data: positions ? xyz : this.#packExact(xyz, buffer) };
   }
 
   // What the answer says of it.
@@ -658,9 +688,24 @@ export class Session {
   }
 
   #pack(shown, level, buffer) {
+    const { data } = this.#room(level, buffer);
+    this.#fill(data, 0, shown, level);
+    return data;
+  }
+
+  // A texture of a level, and the numbers of an exact vertex in it.
+  #room(level, buffer) {
     const size = 4 * WIDTH * Math.ceil(this.texels(level) / WIDTH);
     const data = buffer?.byteLength === 4 * size ? new Float32Array(buffer) : new Float32Array(size);
-    this.#fill(data, 0, shown, level);
+    return { data, stride: this.#faces ? 8 : 4 };
+  }
+
+  // All vertices as exact ones.
+  #packExact(xyz, buffer) {
+    const { data, stride } = this.#room(BLENDED, buffer), source = this.#order;
+    for (let i = 0, to = 0; i < source.length; i++, to += stride)
+      for (let k = 0; k < 3; k++) data[to + k] = xyz[3 * source[i] + k];
+    if (this.#faces) this.#fillTurns(data, 0, BLENDED, xyz);
     return data;
   }
 
@@ -737,6 +782,11 @@ export class Session {
     this.source.abort();
     this.#wakeUp();
   }
+}
+
+// Numbers that are none do not name a wind.
+function windOf({ strength, heading = 0 }) {
+  return Number.isFinite(strength) && Number.isFinite(heading) ? { strength, heading } : null;
 }
 
 export function describe(error) {
