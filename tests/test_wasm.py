@@ -345,7 +345,7 @@ def test_the_module_describes_a_file_as_the_c_library_does(any_ath, tmp_path):
             info.chunk_count,
             bool(info.is_float64),
         ],
-        "branches": digest(np.frombuffer(ctypes.string_at(lib.ath_branches(file), 44 * info.branch_count))),
+        "branches": digest(np.frombuffer(ctypes.string_at(lib.ath_branches(file), 44 * info.branch_count), np.int32)),
         "times": list(ctypes.cast(lib.ath_times(file), POINTER(c_double))[: info.frame_count]),
         "rest": [digest(rest), digest(wide)],
         "errors": [
