@@ -36,8 +36,10 @@ if TYPE_CHECKING:
 STEPS = 3  # of a frame
 
 
-def bend(plant: Plant, wind: Wind, frames: int, fps: float = 30.0, damping: float = 0.05) -> np.ndarray:
-    """(T, N, 3) float32 positions of the plant's nodes."""
+def bend(
+    plant: Plant, wind: Wind, frames: int, fps: float = 30.0, damping: float = 0.05, spin_up: float = SPIN_UP_SECONDS
+) -> np.ndarray:
+    """(T, N, 3) float32 positions of the plant's nodes, from `spin_up` seconds after the wind began."""
     from scipy.sparse.linalg import splu
 
     stiffness, mass, drag = _stiffness(plant), _mass(plant), _drag(plant)
@@ -49,7 +51,7 @@ def bend(plant: Plant, wind: Wind, frames: int, fps: float = 30.0, damping: floa
     factors = splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
     place, speed, pull = (np.zeros(len(mass)) for _ in range(3))
     positions = np.empty((frames, len(plant.parent), 3), np.float32)
-    first = -round(SPIN_UP_SECONDS * fps * STEPS)
+    first = -round(spin_up * fps * STEPS)
     for count in range(first, (frames - 1) * STEPS + 1):
         air = wind.at(plant.position, count * step) * min(1.0, (count - first) * step)
         force = drag.reshape(-1, 6) * np.pad(np.linalg.norm(air, axis=1, keepdims=True) * air, ((0, 0), (0, 3)))

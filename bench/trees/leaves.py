@@ -64,7 +64,7 @@ class Species:
         return float(np.ptp(self.blade[:, 0]))
 
 
-def _sheet(along: list[float], half: list[float], fold: list[float]) -> tuple[np.ndarray, np.ndarray]:
+def sheet(along: list[float], half: list[float], fold: list[float]) -> tuple[np.ndarray, np.ndarray]:
     """Vertices in pairs across the leaf, and the quads between them."""
     pairs = [[(x, -y, z), (x, y, z)] for x, y, z in zip(along, half, fold, strict=True)]
     first = 2 * np.arange(len(along) - 1)[:, None]
@@ -73,7 +73,7 @@ def _sheet(along: list[float], half: list[float], fold: list[float]) -> tuple[np
 
 def _leaflets(places: list[tuple[float, float, float]], size: float) -> tuple[np.ndarray, np.ndarray]:
     """Quads at (along, across) that point away by an angle."""
-    card, quad = _sheet([0.0, size], [0.2 * size, 0.2 * size], [0.0, 0.0])
+    card, quad = sheet([0.0, size], [0.2 * size, 0.2 * size], [0.0, 0.0])
     blades = []
     for along, across, angle in places:
         turn = np.array([[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]])
@@ -83,10 +83,10 @@ def _leaflets(places: list[tuple[float, float, float]], size: float) -> tuple[np
 
 SPECIES = {
     "broadleaf": Species(
-        *_sheet([0.2, 0.65, 1.1], [0.22, 0.36, 0.12], [0.0, 0.05, -0.04]), 0.02, 0.6, 0.25, (6.0, 2.5, 3.2), 0.25
+        *sheet([0.2, 0.65, 1.1], [0.22, 0.36, 0.12], [0.0, 0.05, -0.04]), 0.02, 0.6, 0.25, (6.0, 2.5, 3.2), 0.25
     ),
     # a long, flat stalk that hardly resists sideways turns and twist
-    "poplar": Species(*_sheet([0.45, 1.2], [0.33, 0.33], [0.0, 0.0]), 0.018, 0.66, 0.2, (1.8, 3.2, 1.4), 0.06),
+    "poplar": Species(*sheet([0.45, 1.2], [0.33, 0.33], [0.0, 0.0]), 0.018, 0.66, 0.2, (1.8, 3.2, 1.4), 0.06),
     "compound": Species(
         *_leaflets([(0.25, 0.06, 0.9), (0.45, -0.06, -0.7), (0.65, 0.0, 0.0)], 0.6),
         *(0.035, 0.5, 0.35, (3.6, 1.7, 2.2), 0.2),

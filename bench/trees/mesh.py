@@ -19,7 +19,7 @@ SIDES = 6
 def dress(clip: MotionClip, wind: Wind, frames: int, leaves: int, seed: int, species: str = "poplar") -> MotionClip:
     """The first frames of a simulated clip as a mesh with so many leaves."""
     skeleton, kind = Skeleton.of(clip, frames), SPECIES[species]
-    tubes = _Tubes(skeleton)
+    tubes = Tubes(skeleton)
     cards = Leaves(skeleton, kind, leaves, np.random.default_rng(seed))
     turns = cards.flown(wind)
     shape = (tubes.count + len(kind.blade) * leaves, 3)
@@ -43,11 +43,11 @@ def dress(clip: MotionClip, wind: Wind, frames: int, leaves: int, seed: int, spe
     )
 
 
-class _Tubes:
+class Tubes:
     """Rings in the order of the stems, each with a centre node and the node whose element carries it."""
 
-    def __init__(self, skeleton: Skeleton) -> None:
-        self.skeleton = skeleton
+    def __init__(self, skeleton: Skeleton, sides: int = SIDES) -> None:
+        self.skeleton, self.sides = skeleton, sides
         nodes = np.arange(len(skeleton.parent))
         first = np.flatnonzero((np.diff(skeleton.branch, prepend=0) != 0) & (nodes > 0))
         # the trunk's first ring is that of the root itself; every other stem gets one on its parent
@@ -55,19 +55,19 @@ class _Tubes:
         order = np.argsort(place)
         self.centre = np.concatenate([nodes, skeleton.parent[first]])[order]
         self.carrier = np.concatenate([nodes, first])[order]
-        self.count = SIDES * len(order)
+        self.count = sides * len(order)
         ring_branch = skeleton.branch[self.carrier]
-        self.branch = np.repeat(ring_branch, SIDES)
+        self.branch = np.repeat(ring_branch, sides)
         self.offsets = self._circles(skeleton.radius[self.carrier])
-        self.faces = _tube_faces(ring_branch)
+        self.faces = _tube_faces(ring_branch, sides)
 
     def _circles(self, radius: np.ndarray) -> np.ndarray:
-        """(rings, SIDES, 3) around the elements of the rest pose, without twist from ring to ring."""
+        """(rings, sides, 3) around the elements of the rest pose, without twist from ring to ring."""
         along = self.skeleton.direction(self.skeleton.rest, self.carrier)
         helper = np.eye(3)[np.abs(self._chords()).argmin(axis=1)]
         first = np.cross(along, helper)
         first /= np.linalg.norm(first, axis=1, keepdims=True)
-        angle = 2 * np.pi * np.arange(SIDES)[:, None, None] / SIDES
+        angle = 2 * np.pi * np.arange(self.sides)[:, None, None] / self.sides
         around = np.cos(angle) * first + np.sin(angle) * np.cross(along, first)
         return radius[:, None, None] * around.transpose(1, 0, 2)
 
@@ -86,9 +86,9 @@ class _Tubes:
         return points.reshape(*nodes.shape[:-2], -1, 3)
 
 
-def _tube_faces(ring_branch: np.ndarray) -> np.ndarray:
+def _tube_faces(ring_branch: np.ndarray, sides: int) -> np.ndarray:
     """(F, 4) quads between each ring and the next one of its stem."""
-    lower = SIDES * np.flatnonzero(ring_branch[1:] == ring_branch[:-1])[:, None]
-    side, following = np.arange(SIDES), (np.arange(SIDES) + 1) % SIDES
-    upper = lower + SIDES
+    lower = sides * np.flatnonzero(ring_branch[1:] == ring_branch[:-1])[:, None]
+    side, following = np.arange(sides), (np.arange(sides) + 1) % sides
+    upper = lower + sides
     return np.stack([lower + side, lower + following, upper + following, upper + side], axis=2).reshape(-1, 4)

@@ -26,7 +26,7 @@ def refine(
 ) -> MotionClip:
     """The first frames of a simulated clip, with `factor` vertices per element, and with twigs."""
     skeleton = Skeleton.of(clip, frames)
-    spline = _Splines(skeleton, factor)
+    spline = Splines(skeleton, factor)
     riders = _Twigs(skeleton, spline, wind, twigs, twig_vertices, np.random.default_rng(seed))
     count = spline.count + twigs * twig_vertices
     positions = np.empty((frames, count, 3), np.float32)
@@ -49,15 +49,15 @@ def refine(
     )
 
 
-class _Splines:
+class Splines:
     """Vertices as weighted sums of four nodes; node i of the skeleton is vertex factor * i."""
 
     def __init__(self, skeleton: Skeleton, factor: int) -> None:
         self.count = factor * (len(skeleton.parent) - 1) + 1
         self.node = -(-np.arange(self.count) // factor)
         self.branch = skeleton.branch[self.node]
-        share = ((np.arange(self.count) - 1) % factor + 1) / factor
-        self.controls, self.weights = _controls(skeleton, self.node, share)
+        self.share = ((np.arange(self.count) - 1) % factor + 1) / factor
+        self.controls, self.weights = _controls(skeleton, self.node, self.share)
         below = np.arange(-1, self.count - 1)
         below[1::factor] = factor * skeleton.parent[1:]
         self.edges = np.stack([below[1:], np.arange(1, self.count)], axis=1)
@@ -90,7 +90,7 @@ class _Twigs:
     """Straight twigs at random places of the outer stems, each bending about its foot."""
 
     def __init__(
-        self, skeleton: Skeleton, spline: _Splines, wind: Wind, twigs: int, vertices: int, rng: np.random.Generator
+        self, skeleton: Skeleton, spline: Splines, wind: Wind, twigs: int, vertices: int, rng: np.random.Generator
     ) -> None:
         self.skeleton = skeleton
         places = np.flatnonzero(np.isin(spline.node, skeleton.outer_nodes()))

@@ -21,13 +21,16 @@ WAVES = 192
 
 @dataclass(frozen=True)
 class Wind:
-    """Mean speed (m/s) at `height` (m), turbulence intensity (of each component), integral length (m)."""
+    """Mean speed (m/s) at `height` (m), turbulence intensity (of each component), integral length (m), and the time
+    (s) after which it repeats, 0 for never.
+    """
 
     speed: float
     height: float
     intensity: float = 0.25
     length: float = 15.0
     seed: int = 0
+    period: float = 0.0
 
     def at(self, points: np.ndarray, time: float) -> np.ndarray:
         """(..., 3) velocities in m/s at (..., 3) points in metres, y up."""
@@ -38,8 +41,15 @@ class Wind:
     def _gusts(self, points: np.ndarray, time: float) -> np.ndarray:
         waves, phases, amplitudes = self._waves
         # in float64 up to one turn: float32 phases would jump after some minutes
-        offset = np.remainder(phases - time * self.speed * (waves @ DIRECTION), 2 * np.pi)
+        offset = np.remainder(phases - time * self._rates, 2 * np.pi)
         return np.cos(points @ waves.T.astype(np.float32) + offset.astype(np.float32)) @ amplitudes
+
+    @cached_property
+    def _rates(self) -> np.ndarray:
+        """(K,) radians per second at a place that stands still; where the wind repeats, whole turns per period."""
+        rates = self.speed * (self._waves[0] @ DIRECTION)
+        turn = 2 * np.pi / self.period if self.period > 0 else 0.0
+        return turn * np.round(rates / turn) if turn else rates
 
     @cached_property
     def _waves(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -1,0 +1,166 @@
+"""A broadleaf tree to look at: smooth bark tubes and sprays of leaves, in winds that repeat, so that its clips are loops.
+
+The wind repeats after each clip, and beams and leaves run until what they began with has died away. A spray is one
+hinged blade of several leaves. Texture coordinates: on bark the first is 0 to 1 and back around the stem and the
+second grows along it, by the stem's own girth; on leaves they are 1 + 2 k to 2 + 2 k across the leaf, with a shade k
+from 0 to SHADES - 1, and 0 to 1 along it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from athcodec import MotionClip, join
+from athcodec.clip import ClipRange
+from athcodec.joining import in_wind
+from bench.trees.beams import bend
+from bench.trees.leaves import Leaves, Species, sheet
+from bench.trees.mesh import Tubes
+from bench.trees.plant import Plant, grow
+from bench.trees.refine import Splines
+from bench.trees.ride import BLOCK_FRAMES, Skeleton
+from bench.trees.wind import Wind
+
+SIDES = 8
+FINER = 2  # rings per element
+SHADES = 8
+LEAVES_OF_SPRAY = 5
+SPRAY_LENGTH = 0.034  # over the plant's height
+LEAF_WIDTH = 0.62  # over its length, of the card that the leaf is cut from
+THICKER = 2.4  # the trunk drawn, over the one that bends
+ROOTS, ROOTS_HEIGHT = 0.7, 0.025  # how much wider the trunk's foot is, and over what height
+SETTLING_SECONDS = 24.0
+
+
+def leafed(
+    nodes: int, orders: int, height: float, sprays: int, frames: int, winds: Mapping[str, float], seed: int, fps: float
+) -> MotionClip:
+    """The tree in one loop for each of the winds (m/s)."""
+    plant = grow(nodes, orders, height, seed)
+    parts = {}
+    for name, speed in winds.items():
+        wind = Wind(speed, height, seed=seed, period=frames / fps)
+        part = _Dressed(plant, bend(plant, wind, frames, fps, spin_up=SETTLING_SECONDS), sprays, fps, seed).clip(wind)
+        part.clip_ranges = (ClipRange(name, frames, loop=True),)
+        parts[name] = in_wind(part, speed)
+    return join(parts)
+
+
+class _Dressed:
+    """A moving plant with its bark and leaves."""
+
+    def __init__(self, plant: Plant, nodes: np.ndarray, sprays: int, fps: float, seed: int) -> None:
+        self.frames, self.fps = len(nodes), fps
+        self.skeleton = _smooth(plant, nodes, fps)
+        self.tubes = Tubes(self.skeleton, SIDES)
+        rng = np.random.default_rng(seed)
+        self.leaves = Leaves(self.skeleton, _spray(), sprays, rng)
+        self.shade = rng.integers(0, SHADES, sprays * LEAVES_OF_SPRAY)
+
+    def clip(self, wind: Wind) -> MotionClip:
+        turns = self.leaves.flown(wind)[self.frames :]
+        skeleton = self.skeleton
+        positions = np.concatenate(
+            [
+                self._at(skeleton.positions[start : start + BLOCK_FRAMES], turns[start : start + BLOCK_FRAMES])
+                for start in range(0, self.frames, BLOCK_FRAMES)
+            ]
+        )[: self.frames]
+        each = len(self.leaves.species.blade)
+        sprays = len(self.leaves.node)
+        return MotionClip(
+            positions=positions,
+            time=np.arange(self.frames) / self.fps,
+            rest=self._at(skeleton.rest, self.leaves.unturned()),
+            vertex_branch=np.concatenate(
+                [self.tubes.branch, np.repeat(len(skeleton.branch_parent) + np.arange(sprays), each)]
+            ),
+            branch_parent=np.concatenate([skeleton.branch_parent, skeleton.branch[self.leaves.node]]),
+            faces=np.concatenate([self.tubes.faces, self.tubes.count + self.leaves.faces]).astype(np.int32),
+            attributes={"uv": np.concatenate([self._bark_uv(), self._leaf_uv()]).astype(np.float32)},
+            metadata={"unit": "m", "up_axis": "y", "fps": self.fps, "surfaces": "bark, leaves"},
+        )
+
+    def _at(self, nodes: np.ndarray, turns: np.ndarray) -> np.ndarray:
+        nodes = nodes[: len(turns)] if nodes.ndim == 3 else nodes
+        return np.concatenate([self.tubes.at(nodes), self.leaves.at(nodes, turns)], axis=-2).astype(np.float32)
+
+    def _bark_uv(self) -> np.ndarray:
+        """The girth of a stem at its foot is one unit along it, too."""
+        skeleton, tubes = self.skeleton, self.tubes
+        below = skeleton.rest[np.maximum(skeleton.parent, 0)]
+        length = np.linalg.norm(skeleton.rest - below, axis=1)
+        girth = 2 * np.pi * np.maximum.reduceat(skeleton.radius, np.unique(skeleton.branch, return_index=True)[1])
+        along = np.zeros(len(length))
+        for node in range(1, len(length)):
+            same = skeleton.branch[node] == skeleton.branch[skeleton.parent[node]]
+            start = along[skeleton.parent[node]] if same else 0.0
+            along[node] = start + length[node] / girth[skeleton.branch[node]]
+        first = tubes.centre != tubes.carrier
+        rings = np.where(first, 0.0, along[tubes.carrier])
+        around = 1 - np.abs(np.arange(SIDES) * 2 / SIDES - 1)
+        uv = np.stack([np.tile(around, len(rings)), np.repeat(rings, SIDES)], axis=1)
+        return np.round(uv * 64) / 64
+
+    def _leaf_uv(self) -> np.ndarray:
+        along = np.repeat(np.linspace(0, 1, len(_LEAF[0]) // 2), 2)
+        across = np.tile([0.0, 1.0], len(along) // 2)
+        card = np.stack([across, along], axis=1)
+        uv = np.tile(card, (len(self.shade), 1))
+        uv[:, 0] += 1 + 2 * np.repeat(self.shade, len(card))
+        return uv
+
+
+_LEAF = sheet([0.0, 0.5, 1.0], [LEAF_WIDTH / 2] * 3, [0.0, 0.09, 0.0])
+
+
+def _spray() -> Species:
+    """Leaves along a short twig, one at its end, lying about in one plane as light lets them."""
+    points, quads = _LEAF
+    cards = []
+    for number in range(LEAVES_OF_SPRAY):
+        share = number / (LEAVES_OF_SPRAY - 1)
+        angle = 0.0 if number == LEAVES_OF_SPRAY - 1 else (1.15 - 0.5 * share) * (-1) ** number
+        tilt = 0.35 * np.sin(2.4 * number)
+        turn = np.array([[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]])
+        lean = np.array([[np.cos(tilt), 0, -np.sin(tilt)], [0, 1, 0], [np.sin(tilt), 0, np.cos(tilt)]])
+        size = 0.62 + 0.18 * np.sin(3.1 * number + 1)
+        cards.append(size * points @ lean.T @ turn.T + [0.1 + 0.75 * share, 0.0, 0.06 * np.sin(2.0 * number)])
+    faces = np.concatenate([quads + len(points) * i for i in range(LEAVES_OF_SPRAY)])
+    return Species(np.concatenate(cards), faces, SPRAY_LENGTH, 0.8, 0.2, (4.5, 2.0, 2.6), 0.3)
+
+
+def _smooth(plant: Plant, nodes: np.ndarray, fps: float) -> Skeleton:
+    """The stems as splines, their motion twice over: leaves settle in the first round."""
+    bare = Skeleton(
+        nodes,
+        plant.position,
+        plant.parent,
+        plant.branch,
+        plant.branch_parent,
+        plant.radius,
+        np.arange(len(nodes)) / fps,
+    )
+    splines = Splines(bare, FINER)
+    rest, moved = splines.apply(bare.rest).astype(np.float32), splines.apply(nodes).astype(np.float32)
+    parent = np.full(splines.count, -1)
+    parent[splines.edges[:, 1]] = splines.edges[:, 0]
+    twice = np.concatenate([moved, moved])
+    radius = _drawn_radius(plant, splines, rest)
+    return Skeleton(twice, rest, parent, splines.branch, plant.branch_parent, radius, np.arange(len(twice)) / fps)
+
+
+def _drawn_radius(plant: Plant, splines: Splines, rest: np.ndarray) -> np.ndarray:
+    """(V,) with a thicker trunk, its foot wider, and tips that end thin."""
+    start, end = splines.controls[:, 1], splines.controls[:, 2]
+    same = plant.branch[start] == plant.branch[end]
+    share = splines.share
+    radius = (1 - share) * np.where(same, plant.radius[start], plant.radius[end]) + share * plant.radius[end]
+    radius = radius * (1 + (THICKER - 1) * np.sqrt(radius / radius.max()))
+    trunk = splines.branch == 0
+    radius[trunk] *= 1 + ROOTS * np.exp(-rest[trunk, 1] / (ROOTS_HEIGHT * plant.height))
+    last = np.flatnonzero(np.diff(splines.branch, append=-1))
+    radius[last] *= 0.4
+    return radius
