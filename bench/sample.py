@@ -27,9 +27,7 @@ frame to its first, over the largest between two frames after each other.
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "--out", type=Path, default=athcodec.sample_path().with_name("leafed_tree.ath"), metavar="FILE.ath"
-    )
+    parser.add_argument("--out", type=Path, default=athcodec.sample_path("leafed"), metavar="FILE.ath")
     parser.add_argument("--rel-error", type=float, default=REL_ERROR, metavar="FRACTION")
     add_effort(parser)
 

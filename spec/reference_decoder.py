@@ -2893,8 +2893,8 @@ def sheet(plan: Plan, piece: Piece, modes: np.ndarray) -> np.ndarray:
 
 
 def tube(plan: Plan, piece: Piece, modes: np.ndarray) -> np.ndarray:
-    """Rings that move as they are along a cantilever, as affine functions of all, each ring so, then what is left of the
-    modes."""
+    """Rings that move as they are along a cantilever, as affine functions of all, each ring so, then what is left of
+    the modes."""
     x, starts = plan.rest[piece.vertices], range(0, piece.count, piece.ring)
     centres = np.array([in_order(x[i : i + piece.ring]) / float(len(x[i : i + piece.ring])) for i in starts])
     lengths = distances(centres, np.vstack([plan.attach_point(piece), centres[:-1]]))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import json
 import re
 import shutil
@@ -212,8 +213,22 @@ def test_the_demo_shows_growth_too_and_other_samples_are_refused(tmp_path, capsy
     assert run("demo", "--sample", "growth", "--keep", tmp_path) == 0
     assert "Encoded the sample growth_1k_120f within 0.0001 of its diagonal" in capsys.readouterr().out
     assert run("verify", tmp_path / "growth_1k_120f.ath", "--against", sample_path("growth")) == 0
-    with pytest.raises(ValueError, match="sample: got 'oak', expected one of tree, growth"):
+    with pytest.raises(ValueError, match="sample: got 'oak', expected one of tree, growth, leafed"):
         sample_path("oak")
+
+
+def test_the_page_of_the_demo_shows_the_leafed_tree(tmp_path, capsys):
+    assert run("demo", "--keep", tmp_path) == 0
+    assert "leafed_tree.ath moves in " in capsys.readouterr().out
+    assert (
+        base64.b64encode(sample_path("leafed").read_bytes()).decode() in (tmp_path / "athcodec_demo.html").read_text()
+    )
+    with athcodec.open(sample_path("leafed"), strict=True) as decoder:
+        assert [(clip.name, clip.loop, clip.frame_count) for clip in decoder.clips] == [
+            ("calm", True, 150),
+            ("gale", True, 150),
+        ]
+        assert decoder.complete and decoder.faces is not None
 
 
 # ---- damaged files ----

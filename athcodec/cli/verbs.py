@@ -342,7 +342,8 @@ def demo(args: argparse.Namespace) -> int:
             with open_file(encoded, strict=True) as decoder:
                 meters = [decode_and_measure(decoder, clip, encoded, d) for d in range(decoder.level_count)]
                 print_demo(facts_of(encoded, decoder), meters)
-        _export_demo(encoded, Path(args.keep or ".", DEMO_PAGE))
+        shown = athcodec.sample_path("leafed") if args.sample == "tree" else encoded
+        _export_demo(shown, Path(args.keep or ".", DEMO_PAGE))
         if args.keep is not None:
             print(f"The file and its decoded levels are in {folder}.")
     return 0
@@ -356,4 +357,4 @@ def _export_demo(encoded: Path, page: Path) -> None:
     except OSError as error:  # a folder that is read-only is no reason to fail at the end
         say("warning", f"no page to look at: {one_line(error)}")
     else:
-        print(f"The sample moves in {page.resolve()}: open it in a browser.")
+        print(f"{encoded.name} moves in {page.resolve()}: open it in a browser.")

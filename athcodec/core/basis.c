@@ -210,7 +210,7 @@ static void modes_of_rings(const ath_piece *piece, const double *rest, double ce
     int32_t rings = ath_rings(piece);
     const double *before = rest + 3 * (size_t)(piece->attach >= 0 ? piece->attach : piece->first);
     double lengths[MOST_RINGS] = {0.0}, work[2 * MOST_RINGS * MOST_RINGS];
-    uint8_t gaps[MOST_RINGS];
+    uint8_t gaps[MOST_RINGS] = {0};
     for (int32_t r = 0; r < rings; r++) {
         int32_t from = r * piece->ring, to = ath_min(from + piece->ring, piece->count);
         for (int32_t k = 0; k < 3; k++) {

@@ -1,4 +1,4 @@
-"""A broadleaf tree to look at: smooth bark tubes and sprays of leaves, in winds that repeat, so that its clips are loops.
+"""A broadleaf tree to look at: smooth bark tubes and sprays of leaves, in winds that repeat: its clips are loops.
 
 The wind repeats after each clip, and beams and leaves run until what they began with has died away. A spray is one
 hinged blade of several leaves. Texture coordinates: on bark the first is 0 to 1 and back around the stem and the

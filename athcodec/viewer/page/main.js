@@ -135,11 +135,12 @@ async function open(source, name, beside = false) {
 const breath = () => new Promise((done) => { setTimeout(done); });
 
 function describe() {
-  const [ath] = opened, { info, clips } = ath.motion, frames = `${countText(info.frameCount)} frames`;
+  const [ath] = opened, { info, clips } = ath.motion, counts = [...new Set(clips.map((clip) => clip.frameCount))];
+  const frames = clips.length > 1 && counts.length === 1 ? `${countText(counts[0])} frames each` : `${countText(info.frameCount)} frames`;
   $("name").textContent = opened.map((each) => each.fileName).join("  ·  ");
   document.title = `${ath.fileName} – athcodec`;
   $("summary").textContent = [`${countText(info.vertexCount)} vertices`, `${countText(info.branchCount)} branches`,
-    clips.length > 1 ? `${clips.length} clips of ${frames}` : frames].join(", ");
+    clips.length > 1 ? `${clips.length} clips, ${frames}` : frames].join(", ");
 }
 
 // ---- what is on the stage ----

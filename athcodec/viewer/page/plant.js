@@ -6,7 +6,8 @@ import { barkColour, heat, nodeColour, orderColour } from "./colours.js";
 import { limbGeometry, limbMaterial, setRadii } from "./limbs.js";
 import { radii } from "./radii.js";
 
-const LEAF = [0.19, 0.33, 0.09], OVER = [0.55, 0.2, 0.06];
+const LEAF = [0.16, 0.29, 0.07], OVER = [0.55, 0.2, 0.06];
+const SLIMMEST = 4; // order from which on bark is as pale as it gets
 
 export const meshMaterial = () => new MeshLambertMaterial({ vertexColors: true, side: DoubleSide });
 export const lineMaterial = () => new LineBasicMaterial({ vertexColors: true });
@@ -191,11 +192,12 @@ export class Plant {
     const line = this.show === "both" && this.colour === "plain" ? OVER : null;
     for (const { kind, geometry, object } of this.#drawn) {
       if (!object.visible) continue;
-      const fixed = kind === "skeleton" ? line : leafy && !stored ? LEAF : null, own = leafy && kind === "mesh";
+      const fixed = kind === "skeleton" ? line : null, own = stored && kind === "mesh";
+      const vertexColour = leafy && kind !== "skeleton" ? this.#leafColours() : colourOf;
       for (const [name, source] of coloured(geometry)) {
         const colour = geometry.getAttribute(name), out = colour.array;
         for (let i = 0, at = 0; i < source.length; i++, at += 3) {
-          const value = fixed ?? (own ? stored.array.subarray(i * stored.itemSize) : colourOf(source[i]));
+          const value = fixed ?? (own ? stored.array.subarray(i * stored.itemSize) : vertexColour(source[i]));
           out[at] = value[0];
           out[at + 1] = value[1];
           out[at + 2] = value[2];
@@ -203,6 +205,15 @@ export class Plant {
         colour.needsUpdate = true;
       }
     }
+  }
+
+  /** Of meshes without colours of their own: tubes are bark, and what has no rings is a leaf, none quite like the next. */
+  #leafColours() {
+    const { ring, depth } = this.ath.branches, branch = this.ath.vertexBranch;
+    return (vertex) => {
+      const own = branch[vertex], shade = 0.75 + 0.6 * ((own * 0.61803398875) % 1);
+      return ring[own] ? barkColour(Math.min(1, depth[own] / SLIMMEST)) : LEAF.map((value) => value * shade);
+    };
   }
 
   dispose() {
