@@ -231,7 +231,7 @@ def write_back(path: str | os.PathLike[str], motion: ClipView, out: str | os.Pat
 
     Raises ClipError where these are more than glTF can sensibly hold, OSError.
     """
-    check_morphs(motion)
+    check_morphs(motion, motion.vertex_count)
     with naming(path, *BROKEN), closing(GltfFile(path)) as file:
         gltf, used, binary, places = file.json, _used(file.json), _Binary(file), places_of(file)
         motions = (extension_of(gltf) or {}).get("motions", [{}])
