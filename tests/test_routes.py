@@ -237,13 +237,14 @@ def in_gltf(path: Path) -> Found:
     sampler = gltf.animations[0].samplers[0]
     shown = [node for node in gltf.nodes if node.mesh is not None]
     primitives = [gltf.meshes[node.mesh].primitives[0] for node in shown]
+    meshes = dict.fromkeys(node.mesh for node in shown)
     said = (gltf.asset.extras or {}) | (gltf.animations[0].extras or {})
     return Found(
         np.stack(frames),
-        [gltf.meshes[node.mesh].name for node in shown],
+        [gltf.meshes[mesh].name for mesh in meshes],
         np.concatenate([accessor_of(gltf, primitive.attributes.TEXCOORD_0) for primitive in primitives]),
         [material.name for material in gltf.materials],
-        any("EXT_mesh_gpu_instancing" in (node.extensions or {}) for node in gltf.nodes),
+        len(meshes) < len(shown),
         clips=len(gltf.animations),
         unit="m",
         up="y",
@@ -748,6 +749,14 @@ TARGETS: list[Route] = [
         "pygltflib",
         "yes | yes | no | yes | as vertices | yes | metres | y up | yes | yes",
         {"animation": "morphs"},
+    ),
+    Route(
+        "glTF, `--instances`",
+        "a.glb",
+        in_gltf,
+        "pygltflib",
+        "yes | yes | no | yes | yes | yes | metres | y up | yes | yes",
+        {"instances": True},
     ),
     Route(
         "glTF, `--rig`",

@@ -429,8 +429,8 @@ def _decode_arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument(
         "--instances",
         action="store_true",
-        help="write copies of one shape, such as leaves of an instancer, to USD or Alembic as instances, where that "
-        "is off by no more than the level is",
+        help="write copies of one shape, such as leaves of an instancer, to USD, Alembic or glTF as instances, where "
+        "that is off by no more than the level is",
     )
     verb.add_argument(
         "--allow-partial",

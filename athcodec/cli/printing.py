@@ -212,7 +212,9 @@ def print_written(written: Written, motion: ClipView, level: Level) -> None:
     )
     if error is not None:
         unit = f" {motion.metadata['unit']}" if motion.metadata.get("unit") else ""
-        print(f"As {written.facts.get('animation', 'textures')} that is off the level by up to {error:.3g}{unit}.")
+        how, instances = written.facts.get("animation", "textures"), written.facts.get("instances")
+        how += f" and {counted(instances, 'instance')}" if instances and how in ("joints", "morphs") else ""
+        print(f"As {how} that is off the level by up to {error:.3g}{unit}.")
 
 
 def print_verdict(result: dict[str, Any]) -> None:

@@ -44,7 +44,7 @@ from athcodec.exporters.gltf_build import (
     root_transform,
     takes,
 )
-from athcodec.exporters.gltf_copies import PATHS, GltfCopies, Movers, split_copies, unit_quaternion
+from athcodec.exporters.gltf_copies import PATHS, GltfCopies, Movers, unit_quaternion, with_copies
 from athcodec.exporters.gltf_joints import Joints, fit_joints
 from athcodec.exporters.rig import fit_rig
 
@@ -74,10 +74,8 @@ def write_clip(
 def _write(
     motion: Any, path: str | PathLike[str], options: WriteOptions, report: Callable[[float], None]
 ) -> dict[str, Any]:
-    found, left_out = meshes_of(motion, Path(fspath(path)).stem)
-    copied: list[GltfCopies] = []
-    if options.instances and options.rig is None:
-        found, copied = split_copies(motion, found)
+    meshes, left_out = meshes_of(motion, Path(fspath(path)).stem)
+    found = with_copies(motion, meshes) if options.instances and options.rig is None else list(meshes)
     write = _writer(motion, options, found, lambda done: report(0.95 * done))
     facts = {
         "animation": write.name if options.rig is None else "a rig",
@@ -86,17 +84,17 @@ def _write(
     if isinstance(motion, ClipView):
         facts |= {"level": motion.level, "level_max_error": float(motion.max_error)}
     facts |= write.facts
+    copied = [shape for shape in found if isinstance(shape, GltfCopies)]
+    if copied:
+        facts["instances"] = sum(len(shape.copies.rest[0]) for shape in copied)
+        write.max_error = max(write.max_error, *(shape.copies.max_error for shape in copied))
     lost = copied[0].lost if copied else []
     left_out += [key[1:] for key in lost]
     facts |= {"left_out": left_out} if left_out else {}
     facts |= branch_extras(motion) if "_vertex_branch" not in lost else {}
     glb = Glb(clock(motion) | {"athcodec": facts})
-    root = glb.node(name="plant", **root_transform(motion.metadata))
-    if copied:
-        facts["instances"] = sum(copies.copies.places.shape[1] for copies in copied)
-        write.max_error = max(write.max_error, *(copies.copies.max_error for copies in copied))
-    movers = [copies.add(glb, root) for copies in copied]
-    later = write.add(glb, root, found, [each for each in movers if each is not None], report)
+    transform = root_transform(motion.metadata)
+    later = write.add(glb, glb.node(name="plant", **transform), transform, found, report)
     facts |= {"max_error": write.max_error, "vertices": motion.vertex_count}
     with new_file(path) as out:
         glb.write(out, later)
@@ -104,14 +102,15 @@ def _write(
 
 
 def _writer(
-    motion: Any, options: WriteOptions, found: list[GltfMesh], report: Callable[[float], None]
+    motion: Any, options: WriteOptions, found: list[GltfMesh | GltfCopies], report: Callable[[float], None]
 ) -> _Joined | _Morphed:
     """What moves the meshes as the options say."""
     if options.rig is not None:
         return _Joined(motion, fit_rig(motion, options.rig, report))
     chosen = np.zeros(motion.vertex_count, bool)
     for shape in found:
-        chosen[shape.source] = True
+        if isinstance(shape, GltfMesh):
+            chosen[shape.source] = True
     count = int(chosen.sum())
     if not count:
         return _Joined(motion, None)
@@ -193,23 +192,35 @@ def _animate(glb: Glb, found: list[Take], movers: Movers | None, more: list[tupl
 class _Joined:
     """Adds joints, and meshes that hang on them; None: there are none. It is all in memory."""
 
-    name = "joints"
-
     def __init__(self, motion: Any, joints: Joints | None):
         self._motion, self._joints = motion, joints
+        self.name = "instances" if joints is None else "joints"
         self.max_error = 0.0 if joints is None else joints.max_error
         self.facts = {} if joints is None else {"joints": len(joints.bind)}
 
     def add(
-        self, glb: Glb, root: int, found: list[GltfMesh], movers: list[Movers], report: Callable[[float], None]
+        self,
+        glb: Glb,
+        root: int,
+        transform: dict[str, Any],
+        found: list[GltfMesh | GltfCopies],
+        report: Callable[[float], None],
     ) -> Iterator[bytes]:
-        if self._joints is not None:
-            movers = [self._add_skin(glb, root, found, self._joints), *movers]
+        joints, movers = self._joints, []
+        if joints is not None:
+            movers.append(Movers(self._add_skin(glb, root, joints), joints.rest, joints.poses))
+        # meshes with a skin are beside the root, as nothing but joints places them, and copies beside those
+        place: tuple[int | None, dict[str, Any]] = (root, {}) if joints is None else (None, transform)
+        for shape in found:
+            if isinstance(shape, GltfCopies):
+                movers += shape.add(glb, *place)
+            elif joints is not None:
+                self._add_mesh(glb, shape, joints)
         moving = takes(self._motion)
         _animate(glb, moving, Movers.all_of(movers), [([], []) for _ in moving])
         return iter(())
 
-    def _add_skin(self, glb: Glb, root: int, found: list[GltfMesh], joints: Joints) -> Movers:
+    def _add_skin(self, glb: Glb, root: int, joints: Joints) -> list[int]:
         nodes: list[int] = []
         for i, (place, turn) in enumerate(zip(*joints.rest[:2])):
             above = root if joints.parent is None or joints.parent[i] < 0 else nodes[joints.parent[i]]
@@ -217,12 +228,12 @@ class _Joined:
             nodes.append(glb.node(above, name=name, translation=place.tolist(), rotation=unit_quaternion(turn)))
         bind = glb.array(np.ascontiguousarray(joints.bind.swapaxes(1, 2)).reshape(-1, 16))
         glb.json["skins"] = [{"joints": nodes, "inverseBindMatrices": bind, "skeleton": root}]
-        dtype = np.uint8 if len(nodes) <= 256 else np.uint16
-        for shape in found:
-            own, weights = _influences(joints, shape.source, dtype)
-            mesh = add_mesh(glb, shape, np.asarray(self._motion.rest), {"JOINTS_0": own, "WEIGHTS_0": weights})
-            glb.node(name=shape.name, mesh=mesh, skin=0)
-        return Movers(nodes, joints.rest, joints.poses)
+        return nodes
+
+    def _add_mesh(self, glb: Glb, shape: GltfMesh, joints: Joints) -> None:
+        own, weights = _influences(joints, shape.source, np.uint8 if len(joints.bind) <= 256 else np.uint16)
+        mesh = add_mesh(glb, shape, np.asarray(self._motion.rest), {"JOINTS_0": own, "WEIGHTS_0": weights})
+        glb.node(name=shape.name, mesh=mesh, skin=0)
 
 
 def _influences(joints: Joints, source: np.ndarray, dtype: type) -> tuple[np.ndarray, np.ndarray]:
@@ -284,23 +295,32 @@ class _Morphed:
         self.max_error = 0.0
 
     def add(
-        self, glb: Glb, root: int, found: list[GltfMesh], movers: list[Movers], report: Callable[[float], None]
+        self,
+        glb: Glb,
+        root: int,
+        transform: dict[str, Any],
+        found: list[GltfMesh | GltfCopies],
+        report: Callable[[float], None],
     ) -> Iterator[bytes]:
-        meshes = [add_mesh(glb, shape, np.asarray(self._motion.rest)) for shape in found]
-        channels = []
-        for mesh, shape in zip(meshes, found):
-            node = glb.node(root, name=shape.name, mesh=mesh)
+        shapes, meshes, channels, movers = [], [], [], []
+        for shape in found:
+            if isinstance(shape, GltfCopies):
+                movers += shape.add(glb, root, {})
+                continue
+            shapes.append(shape)
+            meshes.append(add_mesh(glb, shape, np.asarray(self._motion.rest)))
+            node = glb.node(root, name=shape.name, mesh=meshes[-1])
             channels.append({"sampler": 0, "target": {"node": node, "path": "weights"}})
-        frames, count = self._motion.frame_count, sum(len(shape.source) for shape in found)
+        frames, count = self._motion.frame_count, sum(len(shape.source) for shape in shapes)
         weights, moving, more = np.eye(frames, dtype=np.float32), takes(self._motion), []
         for take in moving:
             times, values = glb.array(take.times, bounds=True), glb.array(take.of(weights).reshape(-1, 1))
             more.append(([{"input": times, "output": values}], list(channels)))
         _animate(glb, moving, Movers.all_of(movers), more)
         view = glb.view(12 * count * frames, target=VERTICES, byteStride=12)
-        bounds = self._add_targets(glb, found, meshes, view, count)
+        bounds = self._add_targets(glb, shapes, meshes, view, count)
         least, self.max_error = self.max_error, UNKNOWN_BOUND
-        return self._targets(glb, found, bounds, least, report)
+        return self._targets(glb, shapes, bounds, least, report)
 
     def _add_targets(
         self, glb: Glb, found: list[GltfMesh], meshes: list[int], view: int, count: int

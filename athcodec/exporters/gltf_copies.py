@@ -52,54 +52,49 @@ class GltfCopies:
     own: dict[str, np.ndarray]
     lost: list[str]
 
-    def add(self, glb: Glb, root: int) -> Movers | None:
-        """The mesh and its nodes; None where they do not move."""
+    def add(self, glb: Glb, parent: int | None, transform: dict[str, Any]) -> list[Movers]:
+        """The mesh and its nodes, below one with a transform; those that move."""
         mesh = add_mesh(glb, self.shape, self.copies.shape)
         poses = self.copies.places, self.copies.turns, self.copies.scales
         if all((pose == pose[:1]).all() for pose in poses):
-            self._add_instancing(glb, root, mesh)
-            return None
-        above = glb.node(root, name=self.shape.name, extras={"copies": True})
+            self._add_instancing(glb, parent, mesh, transform)
+            return []
+        above = glb.node(parent, name=self.shape.name, extras={"copies": True}, **transform)
         nodes = []
         for number, (place, turn, scale) in enumerate(zip(*self.copies.rest)):
             at = dict(zip(PATHS, (place.tolist(), unit_quaternion(turn), scale.tolist())))
-            extras = {key[1:].lower(): _plain(values[number]) for key, values in self.own.items()}
+            extras = {key[1:]: _plain(values[number]) for key, values in self.own.items()}
             name = f"{self.shape.name}_{number}"
             nodes.append(glb.node(above, name=name, mesh=mesh, **at, **({"extras": extras} if extras else {})))
-        return Movers(nodes, self.copies.rest, poses)
+        return [Movers(nodes, self.copies.rest, poses)]
 
-    def _add_instancing(self, glb: Glb, root: int, mesh: int) -> None:
+    def _add_instancing(self, glb: Glb, parent: int | None, mesh: int, transform: dict[str, Any]) -> None:
         poses = self.copies.places[0], self.copies.turns[0], self.copies.scales[0]
         parts = {path.upper(): glb.array(pose) for path, pose in zip(PATHS, poses)}
         parts |= {key: glb.array(values) for key, values in self.own.items()}
-        glb.node(root, name=self.shape.name, mesh=mesh, extensions={INSTANCING: {"attributes": parts}})
+        extension = {INSTANCING: {"attributes": parts}}
+        glb.node(parent, name=self.shape.name, mesh=mesh, extensions=extension, **transform)
         for key in ("extensionsUsed", "extensionsRequired"):  # without it one of them would be shown
             glb.json[key] = [INSTANCING]
 
 
-def split_copies(motion: Any, found: list[GltfMesh]) -> tuple[list[GltfMesh], list[GltfCopies]]:
-    """The meshes that are no copies of one shape, and those that are: where transforms keep them within what the level
-    is off, and they have one set of texture coordinates and colours. Attributes that copies lose all meshes lose."""
+def with_copies(motion: Any, found: list[GltfMesh]) -> list[GltfMesh | GltfCopies]:
+    """The meshes, those that are copies of one shape as such: where transforms keep them within what the level is off,
+    and they have one set of texture coordinates and colours. Attributes that copies lose all meshes lose."""
     objects, allowed = objects_of(motion), allowed_error(motion)
     instanced = {
         (objects[number].first, objects[number].count): (objects[number], copies)
         for number, copies in fit_copies(motion, objects, allowed).items()
     }
-    plain, copied = [], []
+    shapes: list[GltfMesh | GltfCopies] = []
     for shape in found:
         fitted = instanced.get((int(shape.source[0]), len(np.unique(shape.source))))
         made = None if fitted is None else _as_copies(shape, *fitted)
-        if made is None:
-            plain.append(shape)
-        else:
+        if made is not None:
             _hold(motion, made.copies, allowed)
-            copied.append(made)
-    lost = {key for made in copied for key in made.lost}
-    for made in copied:
-        made.shape = _without(made.shape, lost)
-        made.own = {key: values for key, values in made.own.items() if key not in lost}
-        made.lost = sorted(lost)
-    return [_without(shape, lost) for shape in plain], copied
+        shapes.append(made or shape)
+    lost = {key for shape in shapes if isinstance(shape, GltfCopies) for key in shape.lost}
+    return [_without(shape, lost) for shape in shapes] if lost else shapes
 
 
 def unit_quaternion(quaternion: np.ndarray) -> list[float]:
@@ -108,7 +103,10 @@ def unit_quaternion(quaternion: np.ndarray) -> list[float]:
     return (exact / np.linalg.norm(exact)).tolist()
 
 
-def _without(shape: GltfMesh, lost: set[str]) -> GltfMesh:
+def _without(shape: GltfMesh | GltfCopies, lost: set[str]) -> GltfMesh | GltfCopies:
+    if isinstance(shape, GltfCopies):
+        own = {key: values for key, values in shape.own.items() if key not in lost}
+        return GltfCopies(_without(shape.shape, lost), shape.copies, own, sorted(lost))
     return replace(shape, attributes={key: values for key, values in shape.attributes.items() if key not in lost})
 
 
