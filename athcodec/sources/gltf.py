@@ -120,7 +120,9 @@ def read_moving(file: GltfFile, options: ReadOptions) -> tuple[MotionClip, list[
         scenes = _scenes(file, options)
         scene = next(iter(scenes.values()))
         moving = [
-            node for node in _chosen(scene, _patterns(options)) if any(_moves(take, node) for take in scenes.values())
+            node
+            for node in _chosen(scene, _patterns(options))
+            if any(_moves(take, node) for take in scenes.values()) and not _has_motion(node)
         ]
         if not moving:
             raise ClipError("animations: got none that moves vertices, expected skins, nodes or morph targets that do")
@@ -174,6 +176,11 @@ def _moves(scene: Scene, node: GltfNode) -> bool:
     return scene.morphs(node.index) or scene.animates(set(joints))
 
 
+def _has_motion(node: GltfNode) -> bool:
+    """Whether a motion of ATH_motion moves it already."""
+    return any(extension_of(primitive) is not None for primitive in node.primitives)
+
+
 def _patterns(options: ReadOptions) -> list[str]:
     """Of the names of nodes and meshes to read."""
     return [name for name in options.only if not name.startswith(ANIMATION)]
@@ -206,7 +213,7 @@ def _clip(
             metadata={"unit": "m", "up_axis": "y"}
             | timing.clock
             | _names(scene, nodes)
-            | ({} if options.takes else _played(scene)),
+            | ({} if options.takes else _played(scene, nodes)),
             unchanged=file.unchanged,
             not_read=_not_read(scene, nodes),
             **branches,
@@ -708,9 +715,12 @@ def _names(scene: Scene, nodes: list[GltfNode]) -> dict[str, Any]:
     return {"part_names": [name for name, _ in parts], "part_kinds": [own[0].kind for _, own in parts]}
 
 
-def _played(scene: Scene) -> dict[str, Any]:
+def _played(scene: Scene, nodes: list[GltfNode]) -> dict[str, Any]:
+    """The names of the animations that move these nodes, and of those that are not played."""
     names = list(_animation_numbers(scene.file))
-    played, others = [names[i] for i in scene.played], [name for i, name in enumerate(names) if i not in scene.played]
+    movers = {node.index for node in nodes}.union(scene.ancestors(_movers(nodes)))
+    played = [names[i] for i in scene.played if not movers.isdisjoint(scene.targets(i))]
+    others = [name for i, name in enumerate(names) if i not in scene.played]
     return ({"animations": played} if played else {}) | ({"other_animations": others} if others else {})
 
 
