@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from athcodec.exporters.fitting import Parts, Placed, allowed_error, portions
-from athcodec.exporters.scene_objects import SceneObject
+from athcodec.exporters.scene_objects import SceneObject, face_materials
 
 
 @dataclass(eq=False)
@@ -33,10 +33,17 @@ class Copies:
 
 
 def fit_copies(motion: Any, objects: list[SceneObject], allowed: float | None = None) -> dict[int, Copies]:
-    """Of those objects that are copies, and that transforms keep within `allowed`, or within what the level is off, by
-    their place in the list."""
+    """Of those objects that are copies, of the same materials, and that transforms keep within `allowed`, or within
+    what the level is off, by their place in the list."""
     allowed = allowed_error(motion) if allowed is None else allowed
-    fits = {number: _Fit(motion, obj) for number, obj in enumerate(objects) if obj.copies > 1 and obj.count}
+    materials = face_materials(motion)
+    fits = {
+        number: _Fit(motion, obj)
+        for number, obj in enumerate(objects)
+        if obj.copies > 1
+        and obj.count
+        and (materials is None or rows_of_one(materials[0][obj.face_rows], obj) is not None)
+    }
     for start, frames in portions(motion, motion.vertex_count) if fits else ():
         for fit in fits.values():
             fit.add(start, frames)

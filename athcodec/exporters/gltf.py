@@ -37,6 +37,7 @@ from athcodec.exporters.gltf_build import (
     Glb,
     GltfMesh,
     Take,
+    add_materials,
     add_mesh,
     branch_extras,
     clock,
@@ -93,6 +94,7 @@ def _write(
     facts |= {"left_out": left_out} if left_out else {}
     facts |= branch_extras(motion) if "_vertex_branch" not in lost else {}
     glb = Glb(clock(motion) | {"athcodec": facts})
+    add_materials(glb, motion)
     transform = root_transform(motion.metadata)
     later = write.add(glb, glb.node(name="plant", **transform), transform, found, report)
     facts |= {"max_error": write.max_error, "vertices": motion.vertex_count}
@@ -134,6 +136,7 @@ def write_rest(motion: Any, path: str, name: str, more: Mapping[str, np.ndarray]
     """The rest pose alone, with attributes by their semantic (N, width) besides those of the clip."""
     found, left_out = meshes_of(motion, name, more)
     glb = Glb(clock(motion) | {"athcodec": dict(extras) | ({"left_out": left_out} if left_out else {})})
+    add_materials(glb, motion)
     root = glb.node(name="plant", **root_transform(motion.metadata))
     for shape in found:
         if "TEXCOORD_1" in shape.attributes:  # glTF allows a second set only beside a first
@@ -340,8 +343,8 @@ class _Morphed:
                     max=[UNKNOWN_BOUND] * 3,
                 )
                 accessors[-1].append(glb.json["accessors"][index])
-                primitive = glb.json["meshes"][mesh]["primitives"][0]
-                primitive.setdefault("targets", []).append({"POSITION": index})
+                for primitive in glb.json["meshes"][mesh]["primitives"]:
+                    primitive.setdefault("targets", []).append({"POSITION": index})
                 place += 12 * len(shape.source)
         return accessors
 

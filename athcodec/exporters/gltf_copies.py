@@ -142,10 +142,11 @@ def _as_copies(shape: GltfMesh, obj: SceneObject, copies: Copies) -> GltfCopies 
             lost.append(key)
     place = np.full(len(which), -1)
     place[rows[0]] = np.arange(rows.shape[1])
-    corners = shape.corners
+    corners, materials = shape.corners, shape.materials
     if corners is not None:
-        corners = place[corners[(which[corners] == 0).all(axis=1)]]
-    return GltfCopies(GltfMesh(shape.name, local[rows[0]], corners, shared), copies, own, lost)
+        mine = (which[corners] == 0).all(axis=1)
+        corners, materials = place[corners[mine]], None if materials is None else materials[mine]
+    return GltfCopies(GltfMesh(shape.name, local[rows[0]], corners, shared, materials), copies, own, lost)
 
 
 def _same(values: np.ndarray, expected: np.ndarray) -> bool:

@@ -6,7 +6,8 @@ Frames are evaluated a block at a time; keys of animations and base meshes are h
 when a frame needs them. Frames lie at `fps`; by default at the rate that the keys were sampled at, else 30 per second.
 Animations that move different nodes run together, of several for the same nodes the first; `only` takes patterns of the
 names of nodes and meshes, and "animation:NAME" for another animation; `takes` makes a clip of its own of each. One
-whose extras say {"loop": true} is a loop, and loses its last frame where that is the first again. Not read: Draco;
+whose extras say {"loop": true} is a loop, and loses its last frame where that is the first again. The attribute
+"face_material" numbers the materials, whose names are the metadata "material_names". Not read: Draco; what is in
 materials, cameras, lights, other scenes and other attributes, which the clip's `not_read` names; normals of a mesh that
 moves.
 """
@@ -31,6 +32,7 @@ from athcodec.sources.gltf_json import BROKEN, brief, entries, entry, indices, i
 from athcodec.sources.gltf_motion import EXTENSION, extension_of
 from athcodec.sources.gltf_scene import Scene, key_rate, on_grid, rotation_matrices
 from athcodec.sources.opening import closing_on_failure, naming
+from athcodec.sources.scene_objects import FACE_MATERIAL, MATERIAL_NAMES
 
 WORK_BYTES = 64 << 20
 MOST_VERTICES = 1 << 27
@@ -195,7 +197,11 @@ def _clip(
     timings = {name: _sampling(take, options.fps) for name, take in motions.items()}
     still = all(len(timing.times) == 1 for timing in timings.values())
     attributes, branches = _attributes(scene, nodes, options.skip, motion, keep_normals=still)
-    faces, edges = _connections(file, nodes)
+    faces, edges, face_material = _connections(file, nodes)
+    said: dict[str, Any] = {}
+    if face_material is not None and FACE_MATERIAL not in options.skip:
+        attributes[FACE_MATERIAL] = face_material
+        said = {MATERIAL_NAMES: _material_names(file), "domains": {FACE_MATERIAL: "face"}}
     rest = _rest_pose(motion, nodes) if options.rest == "auto" else None
     clips = {}
     for name, timing in timings.items():
@@ -213,6 +219,7 @@ def _clip(
             metadata={"unit": "m", "up_axis": "y"}
             | timing.clock
             | _names(scene, nodes)
+            | said
             | ({} if options.takes else _played(scene, nodes)),
             unchanged=file.unchanged,
             not_read=_not_read(scene, nodes),
@@ -724,19 +731,39 @@ def _played(scene: Scene, nodes: list[GltfNode]) -> dict[str, Any]:
     return ({"animations": played} if played else {}) | ({"other_animations": others} if others else {})
 
 
-def _connections(file: GltfFile, nodes: list[GltfNode]) -> tuple[np.ndarray | None, np.ndarray | None]:
-    """Faces (F, 3) and edges (E, 2), int32."""
+def _connections(
+    file: GltfFile, nodes: list[GltfNode]
+) -> tuple[np.ndarray | None, np.ndarray | None, np.ndarray | None]:
+    """Faces (F, 3) and edges (E, 2), int32; and the material of each face (F,), -1 for none, where any has one."""
     found: dict[int, list[np.ndarray]] = {2: [], 3: []}
+    materials = []
     for node in nodes:
+        own: dict[int, list[np.ndarray]] = {2: [], 3: []}
+        labels = []
         for primitive in node.primitives:
             mode = integer(primitive, "mode", 4)
             if mode == 0:
                 continue
             rows = _rows(_corners(file, primitive, node.shape_count, f"mesh {node.name!r}"), mode)
-            starts = np.arange(node.first, node.first + node.count, max(node.shape_count, 1))
-            rows = (rows + starts[:, None, None]).reshape(-1, rows.shape[1])
-            found[rows.shape[1]].append(rows.astype(np.int32))
-    return tuple(np.concatenate(found[size]) if found[size] else None for size in (3, 2))
+            own[rows.shape[1]].append(rows)
+            if rows.shape[1] == 3:
+                label = integer(primitive, "material", -1, low=-1, stop=len(file.items("materials")))
+                labels.append(np.full(len(rows), label, np.int32))
+        starts = np.arange(node.first, node.first + node.count, max(node.shape_count, 1))
+        for size, parts in own.items():
+            if parts:
+                rows = np.concatenate(parts)
+                found[size].append((rows + starts[:, None, None]).reshape(-1, size).astype(np.int32))
+        if labels:
+            materials.append(np.tile(np.concatenate(labels), len(starts)))
+    faces, edges = (np.concatenate(found[size]) if found[size] else None for size in (3, 2))
+    face_material = np.concatenate(materials) if materials else np.empty(0, np.int32)
+    return faces, edges, face_material if (face_material >= 0).any() else None
+
+
+def _material_names(file: GltfFile) -> list[str]:
+    names = [item.get("name") for item in file.items("materials")]
+    return [name if isinstance(name, str) and name else f"material {number}" for number, name in enumerate(names)]
 
 
 def triangles(file: GltfFile, primitive: dict, count: int) -> np.ndarray:
