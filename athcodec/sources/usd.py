@@ -187,7 +187,7 @@ def _find_objects(stage: Usd.Stage, only: Sequence[str], not_read: dict[str, lis
 def _object(prim: Usd.Prim, only: Sequence[str], not_read: dict[str, list[str]]) -> _Prim | None:
     kind, path = _kind(prim), str(prim.GetPath())
     if kind is None:
-        if prim.GetTypeName() not in READ:
+        if prim.GetTypeName() not in READ and not _is_material_subset(prim):
             not_read.setdefault(_kind_not_read(prim), []).append(path)
         return None
     if not _wanted(prim, only):
@@ -200,6 +200,10 @@ def _object(prim: Usd.Prim, only: Sequence[str], not_read: dict[str, list[str]])
     else:
         not_read.setdefault("empty", []).append(path)
     return None
+
+
+def _is_material_subset(prim: Usd.Prim) -> bool:
+    return prim.IsA(UsdGeom.Subset) and UsdGeom.Subset(prim).GetFamilyNameAttr().Get() == UsdShade.Tokens.materialBind
 
 
 def _kind_not_read(prim: Usd.Prim) -> str:
@@ -488,6 +492,8 @@ def _metadata(stage: Usd.Stage, codes: np.ndarray, rate: float) -> dict[str, Any
 
 def _statics(obj: _Prim, codes: np.ndarray, matrix: np.ndarray) -> None:
     for primvar in UsdGeom.PrimvarsAPI(obj.prim).FindPrimvarsWithInheritance():
+        if obj.skeleton is not None and str(primvar.GetPrimvarName()).startswith("skel:"):
+            continue  # which has moved it
         if primvar.HasValue() and primvar.ValueMightBeTimeVarying():
             obj.left_out.append(primvar.GetPrimvarName())
         elif primvar.HasValue():
