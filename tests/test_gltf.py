@@ -994,6 +994,26 @@ def test_copies_are_nodes_of_one_mesh_and_come_back_as_copies(tmp_path, animatio
     assert shown is None or np.allclose(shown.bounds[1, :2], as_metres(clip, 1)[0, 30:].max(axis=0)[:2], atol=1e-5)
 
 
+@pytest.mark.parametrize("moving", [True, False])
+@pytest.mark.parametrize("animation", ["joints", "morphs"])
+def test_objects_of_one_shape_show_one_mesh_and_keep_their_names(tmp_path, animation, moving):
+    clip = crown(moving=moving)
+    counts = np.array([30] + [5] * 10 + [4] * 4, np.int32)
+    names = ["stem", *(f"leaf {i}" for i in range(10)), *(f"bud {i}" for i in range(4))]
+    attributes = {"part_vertex_counts": counts, "wetness": clip.attributes["wetness"]}
+    clip = clip.replace(attributes=attributes, metadata=clip.metadata | {"part_names": names})
+    written = write(clip, tmp_path / "a.glb", animation=animation, instances=True)
+    assert written.facts["instances"] == 14
+    gltf = pygltflib.GLTF2().load(str(tmp_path / "a.glb"))
+    assert [sum(node.mesh == mesh for node in gltf.nodes) for mesh in range(len(gltf.meshes))] == [1, 10, 4]
+    with read(tmp_path / "a.glb") as again:
+        frames = min(again.frame_count, clip.frame_count)
+        assert far(again.block(0, frames), as_metres(clip, frames)) <= written.facts["max_error"] / 100 + 1e-7
+        assert again.metadata["part_names"] == names and "part_copies" not in again.attributes
+        assert np.array_equal(again.vertex_branch, clip.vertex_branch)
+        assert np.array_equal(again.attributes["wetness"], clip.attributes["wetness"])
+
+
 def test_copies_that_stand_still_are_instances_on_the_gpu(tmp_path):
     clip = crown(frames=3, moving=False)
     written = write(clip, tmp_path / "a.glb", instances=True)

@@ -3,10 +3,13 @@
 Animations move them. glTF's EXT_mesh_gpu_instancing, which has no animation, says the same in less where none of them
 moves. The node above the copies of an object has its name, and {"copies": true} in extras; what an array has for each
 copy stands in the extras of its node, or among the attributes of the instancing. sources/gltf.py takes both back.
+Objects side by side that are of one shape show one mesh too, and keep their names: the node above them has
+{"copies": false}.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -45,28 +48,31 @@ class Movers:
 @dataclass(eq=False)
 class GltfCopies:
     """`shape` is the mesh of one copy; own: what each copy has instead of each vertex, (k, width) by its semantic;
-    lost: the semantics of what neither has."""
+    lost: the semantics of what neither has; names: of each, where they are objects of their own."""
 
     shape: GltfMesh
     copies: Copies
     own: dict[str, np.ndarray]
     lost: list[str]
+    names: list[str] | None = None
 
     def add(self, glb: Glb, parent: int | None, transform: dict[str, Any]) -> list[Movers]:
         """The mesh and its nodes, below one with a transform; those that move."""
         mesh = add_mesh(glb, self.shape, self.copies.shape)
         poses = self.copies.places, self.copies.turns, self.copies.scales
-        if all((pose == pose[:1]).all() for pose in poses):
+        is_still = all((pose == pose[:1]).all() for pose in poses)
+        if is_still and self.names is None:
             self._add_instancing(glb, parent, mesh, transform)
             return []
-        above = glb.node(parent, name=self.shape.name, extras={"copies": True}, **transform)
-        nodes = []
-        for number, (place, turn, scale) in enumerate(zip(*self.copies.rest)):
+        named = {"name": self.shape.name} if self.names is None else {}
+        above = glb.node(parent, **named, extras={"copies": self.names is None}, **transform)
+        nodes, at_rest = [], [pose[0] for pose in poses] if is_still else self.copies.rest
+        for number, (place, turn, scale) in enumerate(zip(*at_rest)):
             at = dict(zip(PATHS, (place.tolist(), unit_quaternion(turn), scale.tolist())))
             extras = {key[1:]: _plain(values[number]) for key, values in self.own.items()}
-            name = f"{self.shape.name}_{number}"
+            name = f"{self.shape.name}_{number}" if self.names is None else self.names[number]
             nodes.append(glb.node(above, name=name, mesh=mesh, **at, **({"extras": extras} if extras else {})))
-        return [Movers(nodes, self.copies.rest, poses)]
+        return [] if is_still else [Movers(nodes, self.copies.rest, poses)]
 
     def _add_instancing(self, glb: Glb, parent: int | None, mesh: int, transform: dict[str, Any]) -> None:
         poses = self.copies.places[0], self.copies.turns[0], self.copies.scales[0]
@@ -81,20 +87,78 @@ class GltfCopies:
 def with_copies(motion: Any, found: list[GltfMesh]) -> list[GltfMesh | GltfCopies]:
     """The meshes, those that are copies of one shape as such: where transforms keep them within what the level is off,
     and they have one set of texture coordinates and colours. Attributes that copies lose all meshes lose."""
-    objects, allowed = objects_of(motion), allowed_error(motion)
-    instanced = {
-        (objects[number].first, objects[number].count): (objects[number], copies)
-        for number, copies in fit_copies(motion, objects, allowed).items()
-    }
+    runs, allowed = list(_runs(objects_of(motion))), allowed_error(motion)
+    if sum(len(run) for run in runs) != len(found):
+        return list(found)
+    together = [_together(run) for run in runs]
+    fits = fit_copies(motion, together, allowed)
     shapes: list[GltfMesh | GltfCopies] = []
-    for shape in found:
-        fitted = instanced.get((int(shape.source[0]), len(np.unique(shape.source))))
-        made = None if fitted is None else _as_copies(shape, *fitted)
-        if made is not None:
-            _hold(motion, made.copies, allowed)
-        shapes.append(made or shape)
+    waiting = iter(found)
+    for number, (run, obj) in enumerate(zip(runs, together)):
+        own = [next(waiting) for _ in run]
+        made = _as_copies(_joined(own), obj, fits[number]) if number in fits else None
+        if made is None:
+            shapes += own
+            continue
+        made.names = [shape.name for shape in own] if len(run) > 1 else None
+        _hold(motion, made.copies, allowed)
+        shapes.append(made)
     lost = {key for shape in shapes if isinstance(shape, GltfCopies) for key in shape.lost}
     return [_without(shape, lost) for shape in shapes] if lost else shapes
+
+
+def _runs(objects: list[SceneObject]) -> Iterator[list[SceneObject]]:
+    """Objects side by side that have as many vertices in the same faces; each other one alone."""
+    run: list[SceneObject] = []
+    for obj in objects:
+        if run and not _is_alike(run[0], obj):
+            yield run
+            run = []
+        run.append(obj)
+    if run:
+        yield run
+
+
+def _is_alike(one: SceneObject, other: SceneObject) -> bool:
+    return (
+        one.copies == other.copies == 1
+        and (one.kind, one.count) == (other.kind, other.count)
+        and all(map(np.array_equal, (*one.faces, one.curves), (*other.faces, other.curves)))
+    )
+
+
+def _together(run: list[SceneObject]) -> SceneObject:
+    """Objects side by side as copies of the first."""
+    first, last = run[0], run[-1]
+    if len(run) == 1:
+        return first
+    counts, indices = first.faces
+    shift = np.repeat(np.arange(len(run)) * first.count, len(indices))
+    return replace(
+        first,
+        count=first.count * len(run),
+        faces=(np.tile(counts, len(run)), np.tile(indices, len(run)) + shift),
+        curves=np.tile(first.curves, len(run)),
+        face_rows=slice(first.face_rows.start, last.face_rows.stop),
+        corner_rows=slice(first.corner_rows.start, last.corner_rows.stop),
+        copies=len(run),
+    )
+
+
+def _joined(shapes: list[GltfMesh]) -> GltfMesh:
+    """One mesh of several, which are drawn alike."""
+    if len(shapes) == 1:
+        return shapes[0]
+    starts = np.cumsum([0] + [len(shape.source) for shape in shapes])
+    corners = [shape.corners + start for shape, start in zip(shapes, starts) if shape.corners is not None]
+    materials = [shape.materials for shape in shapes if shape.materials is not None]
+    return GltfMesh(
+        shapes[0].name,
+        np.concatenate([shape.source for shape in shapes]),
+        np.concatenate(corners) if corners else None,
+        {key: np.concatenate([shape.attributes[key] for shape in shapes]) for key in shapes[0].attributes},
+        np.concatenate(materials) if materials else None,
+    )
 
 
 def unit_quaternion(quaternion: np.ndarray) -> list[float]:
@@ -106,7 +170,7 @@ def unit_quaternion(quaternion: np.ndarray) -> list[float]:
 def _without(shape: GltfMesh | GltfCopies, lost: set[str]) -> GltfMesh | GltfCopies:
     if isinstance(shape, GltfCopies):
         own = {key: values for key, values in shape.own.items() if key not in lost}
-        return GltfCopies(_without(shape.shape, lost), shape.copies, own, sorted(lost))
+        return GltfCopies(_without(shape.shape, lost), shape.copies, own, sorted(lost), shape.names)
     return replace(shape, attributes={key: values for key, values in shape.attributes.items() if key not in lost})
 
 

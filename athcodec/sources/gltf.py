@@ -44,7 +44,7 @@ FILLERS = {"colors": 1.0}
 TAKEN = ("POSITION", *NAMES)
 ANIMATION = "animation:"
 INSTANCING = "EXT_mesh_gpu_instancing"
-COPIES = "copies"  # true in the extras of a node: all below show one shape
+COPIES = "copies"  # true in the extras of a node: those below show one shape, and are one object; false: or are not
 INSTANCE_PARTS = {"TRANSLATION": 3, "ROTATION": 4, "SCALE": 3}
 REST_ROUNDING = 1e-6  # of the largest coordinate, by which joints may miss the mesh that they leave as it is
 SAME = 1e-5  # of the size: how far off the end of a loop may be from its beginning
@@ -400,9 +400,9 @@ def _copies(scene: Scene, index: int) -> tuple[np.ndarray | None, dict[str, np.n
 
 
 def _own_extras(scene: Scene, index: int) -> dict[str, np.ndarray]:
-    """Numbers in the extras of a node below one that COPIES marks, (1, width) by attribute."""
+    """Numbers in the extras of a node below one that has COPIES, (1, width) by attribute."""
     extras = scene.nodes[index].get("extras")
-    if not _is_marked(scene, int(scene.parent[index])) or not isinstance(extras, dict):
+    if _mark(scene, int(scene.parent[index])) is None or not isinstance(extras, dict):
         return {}
     found = {}
     for key, value in extras.items():
@@ -412,9 +412,11 @@ def _own_extras(scene: Scene, index: int) -> dict[str, np.ndarray]:
     return found
 
 
-def _is_marked(scene: Scene, index: int) -> bool:
+def _mark(scene: Scene, index: int) -> bool | None:
+    """What a node says of those below it by COPIES: whether they are one object; None for nothing."""
     extras = scene.nodes[index].get("extras") if index >= 0 else None
-    return isinstance(extras, dict) and extras.get(COPIES) is True
+    said = extras.get(COPIES) if isinstance(extras, dict) else None
+    return said if isinstance(said, bool) else None
 
 
 def _not_read(scene: Scene, nodes: Sequence[GltfNode]) -> dict[str, list[str]]:
@@ -703,7 +705,7 @@ def _parts(scene: Scene, nodes: list[GltfNode]) -> list[tuple[str, list[GltfNode
     parts: list[tuple[int, str, list[GltfNode]]] = []
     for node in nodes:
         above = int(scene.parent[node.index])
-        if not _is_marked(scene, above) or node.skin is not None or node.targets or node.copies is not None:
+        if not _mark(scene, above) or node.skin is not None or node.targets or node.copies is not None:
             parts.append((-1, node.name, [node]))
         elif parts and parts[-1][0] == above and _is_alike(parts[-1][2][-1], node):
             parts[-1][2].append(node)
