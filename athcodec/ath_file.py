@@ -132,6 +132,8 @@ class AthFile:
         What the file may ask for; by default those of FORMAT.md.
     host_mesh : array, MotionClip, str or path-like, optional
         The mesh that is the rest pose, for files that do not hold one: see `set_host_mesh`.
+    gltf_motion : str, optional
+        Of a GLB that has several motions, the name of the one to open; "motion 0" and so on where they have none.
 
     Attributes
     ----------
@@ -148,6 +150,8 @@ class AthFile:
     ------
     FormatError
         Where it cannot be decoded: Truncated, BadChecksum, LimitExceeded ...
+    ClipError
+        Where a GLB has no such motion.
     RemoteError, OSError
         Where it cannot be read.
     """
@@ -160,6 +164,7 @@ class AthFile:
         allow_partial: bool = False,
         limits: Limits | None = None,
         host_mesh: HostMesh | None = None,
+        gltf_motion: str | None = None,
     ):
         self.limits = limits or Limits()
         self.bytes_read = 0
@@ -167,7 +172,7 @@ class AthFile:
         self._rests_read = 0  # those of layers up to this level's
         self._rest_read = -1, np.empty(0)  # the level that gave it
         self._owned = not hasattr(path, "read")
-        self._source = _opened(path) if self._owned else cast(Any, path)
+        self._source = _opened(path, gltf_motion) if self._owned else cast(Any, path)
         try:
             self.available_length: int = self._source.seek(0, os.SEEK_END)
             self.core = self._open_core()
@@ -1096,7 +1101,7 @@ class AthFile:
                 ready = self.prepare(segment, level, ready)
 
 
-def _opened(path: Any) -> Any:
+def _opened(path: Any, gltf_motion: str | None) -> Any:
     if is_url(path):
         from athcodec.remote import Remote  # what it needs takes long to import
 
@@ -1105,11 +1110,13 @@ def _opened(path: Any) -> Any:
     with ExitStack() as unread:
         unread.callback(file.close)
         if file.read(4) != b"glTF":
+            if gltf_motion is not None:
+                raise ClipError(f"gltf_motion: got {gltf_motion!r} of a file that is no GLB, expected a GLB")
             unread.pop_all()
             return file
     from athcodec.sources.gltf_motion import GltfMotion  # a decoder reads no sources otherwise
 
-    return GltfMotion(path)
+    return GltfMotion(path, gltf_motion)
 
 
 def median_rate(time: np.ndarray) -> float:

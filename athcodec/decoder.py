@@ -64,6 +64,7 @@ def open(
     allow_partial: bool = False,
     limits: Limits | None = None,
     host_mesh: HostMesh | None = None,
+    gltf_motion: str | None = None,
 ) -> Decoder:
     """Opens an .ath file for playing one of its clips.
 
@@ -83,6 +84,8 @@ def open(
     host_mesh : (N, 3) array, MotionClip, str or path-like, optional
         The mesh that is the rest pose, for files that do not hold one (`encode`, host_rest): positions in the source's
         order, or what has them; see AthFile.set_host_mesh. Without it such a file opens, and says what it holds.
+    gltf_motion : str, optional
+        Of a GLB that has several motions, the name of the one to open; "motion 0" and so on where they have none.
 
     Returns
     -------
@@ -95,10 +98,14 @@ def open(
         Where the file cannot be decoded: Truncated, BadChecksum, LimitExceeded ...
     ClipUnavailable
         Where no clip has that name.
+    ClipError
+        Where a GLB has no such motion.
     RemoteError, OSError
         Where it cannot be read.
     """
-    file = AthFile(path, strict=strict, allow_partial=allow_partial, limits=limits, host_mesh=host_mesh)
+    file = AthFile(
+        path, strict=strict, allow_partial=allow_partial, limits=limits, host_mesh=host_mesh, gltf_motion=gltf_motion
+    )
     try:
         return Decoder(file, clip, closes_file=True)
     except BaseException:

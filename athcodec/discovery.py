@@ -344,17 +344,22 @@ def _vertex_labels(clip: MotionClip, array: np.ndarray | None) -> np.ndarray | N
 
 
 def _by_skeleton(seen: _Seen, root: int | None) -> Found | None:
-    """Chains of joints: the vertices whose strongest weights are theirs."""
+    """Chains of joints: the vertices whose strongest weights are theirs. An object that no joint moves hangs on the one
+    that is nearest."""
     clip = seen.clip
     if clip.skin is None or (clip.skin.vertex_joint >= 0).sum() == 0:
         return None
-    joint = clip.skin.vertex_joint.astype(np.int64)
+    joint, parents = clip.skin.vertex_joint.astype(np.int64), np.asarray(clip.skin.joint_parent)
     if (joint < 0).any():
-        joint = _nearest_label(clip.rest, joint)
+        nearest, parts = _nearest_label(clip.rest, joint), _unlabelled_parts(clip, joint)
+        joint = np.where(parts < 0, nearest[0], len(parents) + parts)
+        order = np.lexsort((nearest[1], parts))
+        first = order[np.flatnonzero(np.diff(parts[order], prepend=-1))]  # of each part the vertex that is nearest
+        parents = np.concatenate([parents, nearest[0][first]])
     names, label = np.unique(joint, return_inverse=True)
-    is_used = np.zeros(len(clip.skin.joint_parent), bool)
+    is_used = np.zeros(len(parents), bool)
     is_used[names] = True
-    parent = np.array([_used_ancestor(int(name), clip.skin.joint_parent, is_used) for name in names])
+    parent = np.array([_used_ancestor(int(name), parents, is_used) for name in names])
     parent = np.where(parent < 0, -1, np.searchsorted(names, parent))
     return _arranged(seen, label, root, "skeleton", parent)
 
@@ -366,9 +371,24 @@ def _used_ancestor(joint: int, parents: np.ndarray, is_used: np.ndarray) -> int:
     return joint
 
 
-def _nearest_label(rest: np.ndarray, label: np.ndarray) -> np.ndarray:
+def _nearest_label(rest: np.ndarray, label: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(N,) the label of the vertex that is nearest and has one, and how far away it is."""
     tree = scipy_module("spatial").cKDTree(rest[label >= 0])
-    return np.where(label >= 0, label, label[label >= 0][tree.query(rest)[1]])
+    distance, place = tree.query(rest)
+    return np.where(label >= 0, label, label[label >= 0][place]), distance
+
+
+def _unlabelled_parts(clip: MotionClip, label: np.ndarray) -> np.ndarray:
+    """(N,) of objects, and of each of their copies, that have no label at all, from 0 on; -1 for all other vertices."""
+    counts, copies = (clip.attributes.get(name) for name in ("part_vertex_counts", "part_copies"))
+    if counts is None or counts.ndim != 1 or counts.sum() != len(label):
+        return np.full(len(label), -1)
+    if copies is not None and copies.shape == counts.shape and (counts % np.maximum(copies, 1) == 0).all():
+        counts = np.repeat(counts // np.maximum(copies, 1), np.maximum(copies, 1))
+    part = np.repeat(np.arange(len(counts)), counts)
+    is_bare = np.bincount(part, label >= 0, len(counts)) == 0
+    place = np.cumsum(is_bare) - 1
+    return np.where(is_bare[part], place[part], -1)
 
 
 def _by_edges(seen: _Seen, root: int | None) -> Found | None:

@@ -19,6 +19,7 @@ def truncate(
     *,
     max_error: float | None = None,
     target_size: int | None = None,
+    gltf_motion: str | None = None,
 ) -> int:
     """Write the first levels of an .ath file as a complete file, whose error bound is that of the last of them.
 
@@ -38,6 +39,8 @@ def truncate(
         Scene units: keep the levels down to the first whose largest error this is or less.
     target_size : int, optional
         Bytes: keep as many levels as fit.
+    gltf_motion : str, optional
+        Of a GLB that has several motions, the name of the one to shorten.
 
     Returns
     -------
@@ -51,7 +54,7 @@ def truncate(
     FormatError
         Where the source is damaged, or was cut off before that level.
     ClipError
-        Where a GLB is to be written and the source is none, or one that has no single motion in it.
+        Where a GLB is to be written and the source is none, or one that has no such motion, or several.
     OSError
         Where a file cannot be read or written.
     TypeError
@@ -59,7 +62,7 @@ def truncate(
     """
     if sum(option is not None for option in (level, max_error, target_size)) != 1:
         raise TypeError("truncate: expected one of level, max_error and target_size")
-    with AthFile(source) as file:
+    with AthFile(source, gltf_motion=gltf_motion) as file:
         if max_error is not None:
             last = file.level_within(max_error)
         elif target_size is not None:
@@ -79,7 +82,7 @@ def truncate(
 
             if not isinstance(file.source, GltfMotion):
                 raise ClipError(f"{target}: got an .ath file to cut, expected a GLB with a motion to write another one")
-            return put_motion(source, b"".join([front, *map(file.payload, chunks)]), target)
+            return put_motion(source, b"".join([front, *map(file.payload, chunks)]), target, file.source.number)
         with new_file(target) as out:
             out.write(front)
             for chunk in chunks:

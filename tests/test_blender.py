@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import json
 import zipfile
 from pathlib import Path
 
 import numpy as np
+import pygltflib
 import pytest
+from test_gltf_motion import check_schemas, structure
 
 import athcodec
 from athcodec.blender import build
@@ -279,6 +282,64 @@ def test_meshes_without_branches_are_written_within_the_bound_too(extended_blend
     with athcodec.open(tmp_path / "a.ath", strict=True) as decoder:
         error = np.linalg.norm(decoder.positions().astype(float) - found["shown"], axis=2).max()
         assert error <= decoder.max_error_bound + 2e-6
+
+
+GLTF = """
+fresh()
+scene = bpy.context.scene
+scene.render.fps, scene.frame_start, scene.frame_end = 24, 11, 30
+bpy.ops.mesh.primitive_grid_add(x_subdivisions=9, y_subdivisions=7)
+obj = bpy.context.active_object
+obj.name = obj.data.name = "flag"
+obj.modifiers.new("wave", "WAVE").height = 0.4
+if args["subdivided"]:
+    obj.modifiers.new("fine", "SUBSURF").levels = 1
+obj.location = (1, 2, 3)
+for number, name in enumerate(("bark", "green")):
+    obj.data.materials.append(bpy.data.materials.new(name))
+for polygon in obj.data.polygons:
+    polygon.material_index = polygon.index % 2
+    polygon.use_smooth = bool(polygon.index % 3)
+bpy.ops.mesh.primitive_cube_add()
+scene.frame_set(17)
+scene.ath_gltf.use, scene.ath_gltf.rel_error = True, 1e-4
+bpy.ops.export_scene.gltf(filepath=args["glb"], export_apply=args["apply"])
+assert scene.frame_current == 17
+shown = []
+for frame in range(11, 31):
+    scene.frame_set(frame)
+    shown.append(world("flag"))
+save(shown=np.array(shown))
+"""
+
+
+@pytest.mark.programs
+@pytest.mark.parametrize("apply, subdivided", [(True, True), (True, False), (False, False)])
+def test_blenders_gltf_has_the_motion_of_what_modifiers_move(extended_blender, tmp_path, apply, subdivided):
+    path = tmp_path / "a.glb"
+    shown = extended_blender.run(GLTF, glb=path, apply=apply, subdivided=subdivided)["shown"]
+    gltf = pygltflib.GLTF2().load(str(path))
+    [motion] = gltf.extensions["ATH_motion"]["motions"]
+    assert (motion["name"], motion["clips"]) == ("flag", [{"name": "Scene", "start": 11 / 24}])
+    assert gltf.extensionsUsed == ["ATH_motion"] and len(gltf.meshes) == 2
+    [mesh] = [gltf.meshes[each.mesh] for each in gltf.nodes if each.name == "flag"]
+    assert all("ATH_motion" in each.extensions for each in mesh.primitives) and len(mesh.primitives) == 2
+    with athcodec.open(path) as decoder:
+        assert decoder.clip.name == "Scene" and decoder.fps == 24
+        positions = decoder.positions().astype(float) @ [[1, 0, 0], [0, 0, 1], [0, -1, 0]] + [1, 2, 3]
+        assert positions.shape == shown.shape
+        error = np.linalg.norm(positions - shown, axis=2).max()
+        assert error <= decoder.max_error_bound + 1e-6 < 1e-3
+        assert len(decoder.faces) == 2 * (4 if subdivided else 1) * 9 * 7
+    check_schemas(json.loads(json.dumps(structure(path))))
+
+
+@pytest.mark.programs
+def test_blenders_gltf_stays_as_it_was_where_no_motion_is_asked_for(extended_blender, tmp_path):
+    script = GLTF.replace("scene.ath_gltf.use, scene.ath_gltf.rel_error = True, 1e-4", "")
+    extended_blender.run(script, glb=tmp_path / "a.glb", apply=True, subdivided=False)
+    gltf = structure(tmp_path / "a.glb")
+    assert "extensionsUsed" not in gltf and "_ATH_VERTEX" not in json.dumps(gltf)
 
 
 @pytest.mark.programs

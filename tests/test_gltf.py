@@ -16,7 +16,7 @@ from plants import plant
 
 import athcodec
 from athcodec.cli import main
-from athcodec.clip import MotionClip
+from athcodec.clip import ClipRange, MotionClip
 from athcodec.clip_view import ClipView
 from athcodec.errors import ClipError, MissingExtra
 from athcodec.exporters import gltf as gltf_exporter
@@ -164,7 +164,8 @@ def test_instances_on_the_gpu_are_read_as_copies_and_what_is_not_read_is_named(t
         [a + 8 * i, b + 8 * i, c + 8 * i] for i in range(4) for a, b, c in ((0, 1, 2), (1, 3, 2))
     ]
     assert np.array_equal(clip.attributes["age"][8:], np.tile(np.arange(8), 3))
-    assert clip.not_read == {"Material": ["bark"], "attribute": ["leaves.TEXCOORD_1", "leaves._ID"]}
+    assert clip.not_read == {"Material": ["bark"], "attribute": ["leaves.TEXCOORD_1"]}
+    assert clip.attributes["id"][8:].tolist() == [0] * 8 + [1] * 8 + [2] * 8
     with read(tmp_path / "a.glb") as clip:
         assert np.array_equal(athcodec.find_branches(clip).vertex_branch, np.repeat([0, 1, 2, 3], 8))
 
@@ -919,3 +920,135 @@ def test_the_takes_that_are_not_read_are_named(tmp_path, capsys):
     assert "takes" not in capsys.readouterr().err.splitlines()[-1]
     with athcodec.open(out) as decoder:
         assert {clip.name: clip.loop for clip in decoder.clips} == {"a": True, "b": False, "c": False, "d": True}
+
+
+# ---- copies ----
+
+
+def crown(frames=12, moving=True, **attributes):
+    """A stem that bends, ten leaves on it and four buds that grow, the leaves of a shape with a seam."""
+    random, t = np.random.default_rng(4), np.arange(frames) / 24
+    stem = np.linspace(0, 4, 30)[:, None] * [0, 0, 1] + random.normal(size=(30, 3)) * 0.02
+    bend = 0.3 * np.sin(2 * np.pi * t)[:, None, None] * moving
+    placed = [stem + bend * (stem[:, 2:] ** 2 / 8) * [1, 0, 0]]
+    leaf = np.array([[0, 0, 0], [0.3, 0, 0.1], [0.35, 0.4, 0], [0, 0.5, 0.2], [-0.1, 0.3, 0.0]])
+    for number in range(14):
+        at = stem[rng_row(number)]
+        turns = [np.array(about([1, 2, 3], number + moving * 0.5 * np.sin(7 * x))[1]) for x in t]
+        sizes = np.ones(frames) if number < 10 else 0.2 + 0.1 * t * moving
+        shape = leaf if number < 10 else leaf[:4]
+        shift = bend[:, 0] * at[2] ** 2 / 8 * [1, 0, 0] + at
+        placed.append(np.stack([size * shape @ turn.T for size, turn in zip(sizes, turns)]) + shift[:, None])
+    counts = [30, 50, 16]
+    corners = [[0, 1, 2, 3], [0, 2, 3, 4]]
+    faces = [np.array(corners) + 30 + 5 * i for i in range(10)]
+    faces += [np.array([[0, 1, 2, 3]]) + 80 + 4 * i for i in range(4)]
+    branch = np.repeat(np.arange(15), [30] + [5] * 10 + [4] * 4)
+    return MotionClip(
+        np.concatenate(placed, axis=1).astype(np.float32),
+        t,
+        faces=np.concatenate(faces).astype(np.int32),
+        edges=np.stack([np.arange(29), np.arange(1, 30)], axis=1),
+        vertex_branch=branch.astype(np.int32),
+        branch_parent=np.array([-1] + [0] * 14, np.int32),
+        attributes={
+            "part_vertex_counts": np.array(counts, np.int32),
+            "part_copies": np.array([1, 10, 4], np.int32),
+            "wetness": np.concatenate([np.zeros(30), np.repeat(np.arange(14), [5] * 10 + [4] * 4)]).astype(np.float32),
+        }
+        | attributes,
+        metadata={"part_names": ["stem", "leaf", "bud"], "unit": "cm", "up_axis": "z", "fps": 24.0},
+    )
+
+
+def rng_row(number):
+    return 5 + (number * 7) % 24
+
+
+def as_metres(clip, frames=None):
+    points = clip.block(0, frames or clip.frame_count).astype(float)
+    return np.stack([points[..., 0], points[..., 2], -points[..., 1]], axis=-1) / 100
+
+
+@pytest.mark.parametrize("animation", ["auto", "joints", "morphs"])
+def test_copies_are_nodes_of_one_mesh_and_come_back_as_copies(tmp_path, animation):
+    clip = crown()
+    calm = clip.replace(clip_ranges=(ClipRange("calm", clip.frame_count, True),))
+    both = athcodec.join({"calm": calm, "gust": clip.replace(positions=clip.positions[::-1])})
+    plain = write(both, tmp_path / "plain.glb", animation=animation)
+    written = write(both, tmp_path / "a.glb", animation=animation, instances=True)
+    assert written.facts["instances"] == 14 and "instances" not in plain.facts
+    assert (tmp_path / "a.glb").stat().st_size < (tmp_path / "plain.glb").stat().st_size
+    with read(tmp_path / "a.glb", takes="all") as again:
+        assert far(again.block(0, 24), as_metres(both)) <= written.facts["max_error"] / 100 + 1e-7
+        assert [each.name for each in again.clip_ranges] == ["calm", "gust"] and again.clip_ranges[0].loop
+        assert again.metadata["part_names"] == ["stem", "leaf", "bud"]
+        for name in ("part_copies", "part_vertex_counts", "wetness"):
+            assert np.array_equal(again.attributes[name], clip.attributes[name]), name
+        assert np.array_equal(again.vertex_branch, clip.vertex_branch)
+        assert np.array_equal(again.branch_parent, clip.branch_parent)
+    gltf = pygltflib.GLTF2().load(str(tmp_path / "a.glb"))
+    assert [gltf.accessors[m.primitives[0].attributes.POSITION].count for m in gltf.meshes] == [30, 5, 4]
+    assert [sum(node.mesh == mesh for node in gltf.nodes) for mesh in range(3)] == [1, 10, 4]
+    shown = trimesh.load(str(tmp_path / "a.glb")).to_geometry() if animation == "joints" else None
+    assert shown is None or np.allclose(shown.bounds[1, :2], as_metres(clip, 1)[0, 30:].max(axis=0)[:2], atol=1e-5)
+
+
+@pytest.mark.parametrize("moving", [True, False])
+@pytest.mark.parametrize("animation", ["joints", "morphs"])
+def test_objects_of_one_shape_show_one_mesh_and_keep_their_names(tmp_path, animation, moving):
+    clip = crown(moving=moving)
+    counts = np.array([30] + [5] * 10 + [4] * 4, np.int32)
+    names = ["stem", *(f"leaf {i}" for i in range(10)), *(f"bud {i}" for i in range(4))]
+    attributes = {"part_vertex_counts": counts, "wetness": clip.attributes["wetness"]}
+    clip = clip.replace(attributes=attributes, metadata=clip.metadata | {"part_names": names})
+    written = write(clip, tmp_path / "a.glb", animation=animation, instances=True)
+    assert written.facts["instances"] == 14
+    gltf = pygltflib.GLTF2().load(str(tmp_path / "a.glb"))
+    assert [sum(node.mesh == mesh for node in gltf.nodes) for mesh in range(len(gltf.meshes))] == [1, 10, 4]
+    with read(tmp_path / "a.glb") as again:
+        frames = min(again.frame_count, clip.frame_count)
+        assert far(again.block(0, frames), as_metres(clip, frames)) <= written.facts["max_error"] / 100 + 1e-7
+        assert again.metadata["part_names"] == names and "part_copies" not in again.attributes
+        assert np.array_equal(again.vertex_branch, clip.vertex_branch)
+        assert np.array_equal(again.attributes["wetness"], clip.attributes["wetness"])
+
+
+def test_copies_that_stand_still_are_instances_on_the_gpu(tmp_path):
+    clip = crown(frames=3, moving=False)
+    written = write(clip, tmp_path / "a.glb", instances=True)
+    gltf = pygltflib.GLTF2().load(str(tmp_path / "a.glb"))
+    assert gltf.extensionsRequired == ["EXT_mesh_gpu_instancing"]
+    with read(tmp_path / "a.glb") as again:
+        assert far(again.block(0, 1), as_metres(clip, 1)) <= written.facts["max_error"] / 100 + 1e-7
+        for name in ("part_copies", "part_vertex_counts", "wetness"):
+            assert np.array_equal(again.attributes[name], clip.attributes[name]), name
+        assert np.array_equal(again.vertex_branch, clip.vertex_branch)
+
+
+def test_copies_whose_colours_differ_stay_vertices_and_what_copies_cannot_have_is_named(tmp_path):
+    random = np.random.default_rng(0)
+    clip = crown(colors=random.random((96, 3)).astype(np.float32))
+    written = write(clip, tmp_path / "a.glb", instances=True)
+    assert "instances" not in written.facts
+    clip = crown(noise=random.random(96).astype(np.float32), uv=np.zeros((96, 2), np.float32))
+    written = write(clip, tmp_path / "b.glb", instances=True)
+    assert written.facts["instances"] == 14 and "noise" in written.facts["left_out"]
+    with read(tmp_path / "b.glb") as again:
+        assert "noise" not in again.attributes and again.attributes["uv"].shape == (96, 2)
+
+
+def test_texture_coordinates_with_seams_are_those_of_each_copy(tmp_path):
+    corner = np.tile(np.linspace(0, 1, 16).reshape(8, 2), (10, 1))
+    uv = np.concatenate([corner, np.tile(np.linspace(0, 1, 8).reshape(4, 2), (4, 1))]).astype(np.float32)
+    clip = crown(uv=uv)
+    clip.metadata["domains"] = {"uv": "corner"}
+    written = write(clip, tmp_path / "a.glb", instances=True)
+    assert written.facts["instances"] == 14
+    gltf = pygltflib.GLTF2().load(str(tmp_path / "a.glb"))
+    leaf = gltf.meshes[1].primitives[0].attributes
+    assert sorted(map(tuple, accessor_of(gltf, leaf.TEXCOORD_0).tolist())) == sorted(
+        map(tuple, corner[:8].astype(np.float32).tolist())
+    )
+    with read(tmp_path / "a.glb") as again:
+        assert again.attributes["part_copies"].tolist() == [1, 10, 4]

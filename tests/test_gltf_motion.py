@@ -329,6 +329,73 @@ def test_decode_verify_and_info_take_the_glb_itself(source, tmp_path, capsys):
             assert far(one.block(0, 40), two.block(0, 40)) <= 3 * BOUND * size
 
 
+@pytest.fixture
+def stand(tmp_path):
+    """Two plants with bones of their own, of which a motion moves each."""
+    made = Maker()
+    for number, name in enumerate(("oak", "beech")):
+        bone = made.node(name=f"{name} bone")
+        top = made.node(name=name, children=[bone], translation=[3.0 * number, 0, 0])
+        shape = {
+            "POSITION": made.array(CUBE * (1 + number)),
+            "JOINTS_0": made.array(np.zeros((8, 4), np.uint8)),
+            "WEIGHTS_0": made.array(np.tile(np.array([1, 0, 0, 0], np.float32), (8, 1))),
+        }
+        made.node(mesh=made.mesh(shape, name, indices=[0, 1, 2, 1, 3, 2]), skin=number, name=f"{name} mesh")
+        made.gltf.skins.append(pygltflib.Skin(joints=[bone]))
+        turns = [about([0, 0, 1], 0.3 * np.sin(f) * (1 + number))[0] for f in range(12)]
+        made.animation([(bone, "rotation", np.arange(12) / 30, turns, "LINEAR")], f"{name} sways")
+        made.gltf.scenes[0].nodes = [node for node in made.gltf.scenes[0].nodes if node not in (bone,)]
+        assert top in made.gltf.scenes[0].nodes
+    made.save(tmp_path / "stand.glb")
+    encoded(tmp_path / "stand.glb", tmp_path / "one.glb", "--only", "oak*", "--gltf-motion", "oak")
+    return encoded(tmp_path / "one.glb", tmp_path / "two.glb", "--gltf-motion", "beech")
+
+
+def test_a_glb_with_several_motions_is_opened_by_name(stand, tmp_path, capsys):
+    source = tmp_path / "stand.glb"
+    assert [motion["name"] for motion in structure(stand)["extensions"]["ATH_motion"]["motions"]] == ["oak", "beech"]
+    for name in ("oak", "beech"):
+        with read(source, only=[f"{name}*"]) as wanted, athcodec.open(stand, gltf_motion=name) as decoder:
+            shown = decoder.positions(slice(0, 12)) + (wanted.rest - decoder.rest)
+            assert decoder.vertex_count == 8 and len(decoder.faces) == 2
+            assert far(shown, wanted.block(0, 12)) <= decoder.max_error_bound + 1e-5
+    for choice, said in ((None, "oak.*beech"), ("elm", "oak.*beech")):
+        with pytest.raises(ClipError, match=said):
+            athcodec.open(stand, gltf_motion=choice)
+    capsys.readouterr()
+    assert main(["info", str(stand), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)["motions"]
+    assert [each["file"].rpartition(", ")[2] for each in found] == ["oak", "beech"]
+    assert main(["verify", str(stand)]) == 0
+    assert main(["verify", str(stand), "--gltf-motion", "oak", "--against", str(source), "--only", "oak*"]) == 0
+    assert main(["decode", str(stand), str(tmp_path / "a.npz")]) == 1
+    assert main(["decode", str(stand), str(tmp_path / "a.npz"), "--gltf-motion", "beech"]) == 0
+
+
+def test_motions_of_a_glb_are_written_back_and_cut_each_or_all(stand, tmp_path):
+    assert main(["decode", str(stand), str(tmp_path / "all.glb")]) == 0
+    assert main(["decode", str(stand), str(tmp_path / "oak.glb"), "--gltf-motion", "oak"]) == 0
+    with read(tmp_path / "stand.glb", takes="all") as wanted, read(tmp_path / "all.glb", takes="all") as shown:
+        assert [each.name for each in shown.clip_ranges] == ["oak sways", "beech sways"]
+        assert far(shown.block(0, 24), wanted.block(0, 24)) <= 3 * BOUND * 4
+    assert "ATH_motion" not in structure(tmp_path / "all.glb").get("extensionsUsed", [])
+    left = structure(tmp_path / "oak.glb")
+    check_schemas(left)
+    assert [motion["name"] for motion in left["extensions"]["ATH_motion"]["motions"]] == ["beech"]
+    with athcodec.open(tmp_path / "oak.glb") as decoder, athcodec.open(stand, gltf_motion="beech") as before:
+        assert np.array_equal(decoder.positions(5), before.positions(5))
+    cut = tmp_path / "cut.glb"
+    assert main(["truncate", str(stand), str(cut), "--level", "0", "--gltf-motion", "oak"]) == 0
+    with athcodec.open(cut, gltf_motion="oak") as oak, athcodec.open(cut, gltf_motion="beech") as beech:
+        assert oak.level_count == 1 < beech.level_count
+
+
+def test_a_motion_takes_no_name_that_the_glb_has(stand, tmp_path, capsys):
+    assert main(["encode", str(stand), "--into", str(tmp_path / "x.glb"), "--gltf-motion", "oak"]) == 1
+    assert "oak" in capsys.readouterr().err
+
+
 def test_truncate_takes_a_glb_and_writes_one_or_the_file_alone(source, tmp_path):
     whole, cut, alone = encoded(source, tmp_path / "out.glb"), tmp_path / "cut.glb", tmp_path / "cut.ath"
     for out in (cut, alone):

@@ -16,7 +16,7 @@ import numpy as np
 import pygltflib
 import pytest
 from programs import install_once
-from test_gltf import Maker, far, leafy, leafy_ath, seasons, seasons_ath  # noqa: F401, the fixtures too
+from test_gltf import Maker, as_metres, crown, far, leafy, leafy_ath, seasons, seasons_ath  # noqa: F401, the fixtures too
 from test_vat import exr
 
 import athcodec
@@ -160,6 +160,23 @@ def test_a_rig_is_valid_and_three_plays_it_within_the_stated_error(leafy_ath, no
         stated = write(view, path, rig=300).facts["max_error"]
         assert_valid(node, path)
         assert far(played(path, view.time - view.time[0]), view.block(0, view.frame_count)) <= stated + 1e-5
+
+
+@pytest.mark.parametrize("animation", ["joints", "morphs"])
+def test_copies_are_valid_and_three_plays_them_within_the_stated_error(animation, node, played, tmp_path):
+    clip, path = crown(), tmp_path / "a.glb"
+    stated = write(clip, path, animation=animation, instances=True).facts["max_error"]
+    assert_valid(node, path)
+    assert far(played(path, clip.time), as_metres(clip)[:, 30:]) <= stated / 100 + 1e-6, "the stem is lines"
+
+
+def test_copies_that_stand_still_are_instances_for_three(node, played, tmp_path):
+    clip, path = crown(moving=False), tmp_path / "a.glb"
+    stated = write(clip, path, instances=True).facts["max_error"]
+    found = json.loads(node("validate.mjs", path))
+    notes = {message.partition(" ")[0] for message in found["messages"]}
+    assert found["errors"] == found["warnings"] == 0 and notes <= {"UNSUPPORTED_EXTENSION", "UNUSED_OBJECT"}
+    assert far(played(path, [0]), as_metres(clip, 1)[:, 30:]) <= stated / 100 + 1e-6
 
 
 @pytest.mark.parametrize("animation", ["joints", "morphs"])

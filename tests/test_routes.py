@@ -201,7 +201,7 @@ def in_alembic(path: Path) -> Found:
     found.uv = np.concatenate([uv for _, uv, _ in shapes])
     found.times = shapes[0][2]
     found.start, found.up = shapes[0][2][0] * RATE, "y"  # which Alembic's programs take for granted
-    found.names = list(dict.fromkeys(found.names))
+    found.names, found.materials = (list(dict.fromkeys(each or [])) for each in (found.names, found.materials))
     return found
 
 
@@ -223,6 +223,7 @@ def _walk_alembic(above: Any, matrices: np.ndarray, shapes: list, found: Found) 
         uv = np.array(schema.getUVsParam().getExpandedValue().getVals())
         shapes.append((points, uv, times))
         found.names.append(child.getName())
+        found.materials = [*(found.materials or []), *schema.getFaceSetNames()]
 
 
 def _samples(schema: Any) -> list[Any]:
@@ -237,13 +238,14 @@ def in_gltf(path: Path) -> Found:
     sampler = gltf.animations[0].samplers[0]
     shown = [node for node in gltf.nodes if node.mesh is not None]
     primitives = [gltf.meshes[node.mesh].primitives[0] for node in shown]
+    meshes = dict.fromkeys(node.mesh for node in shown)
     said = (gltf.asset.extras or {}) | (gltf.animations[0].extras or {})
     return Found(
         np.stack(frames),
-        [gltf.meshes[node.mesh].name for node in shown],
+        [gltf.meshes[mesh].name for mesh in meshes],
         np.concatenate([accessor_of(gltf, primitive.attributes.TEXCOORD_0) for primitive in primitives]),
         [material.name for material in gltf.materials],
-        any("EXT_mesh_gpu_instancing" in (node.extensions or {}) for node in gltf.nodes),
+        len(meshes) < len(shown),
         clips=len(gltf.animations),
         unit="m",
         up="y",
@@ -431,10 +433,12 @@ def in_openvat(path: Path) -> Found:
 
 
 def _of_textures(frames: np.ndarray, facts: dict, mesh: Path) -> Found:
+    gltf = pygltflib.GLTF2().load(str(mesh))
     return Found(
         frames,
-        [each.name for each in pygltflib.GLTF2().load(str(mesh)).meshes],
+        [each.name for each in gltf.meshes],
         mesh_of(mesh)["TEXCOORD_0"],
+        [material.name for material in gltf.materials],
         unit=facts.get("unit"),
         up=facts.get("up_axis"),
         rate=facts.get("fps"),
@@ -476,11 +480,14 @@ def by_usd(path: Path) -> None:
     UsdGeom.SetStageMetersPerUnit(stage, 0.01)
     UsdGeom.SetStageUpAxis(stage, "Z")
     mesh = _mesh_by_usd(stage, "/bough", QUADS, UV[:12])
-    bark = UsdShade.Material.Define(stage, "/bark")
+    bark = UsdShade.Material.Define(stage, "/looks/bark")
     UsdShade.MaterialBindingAPI.Apply(mesh.GetPrim()).Bind(bark)
     instancer = UsdGeom.PointInstancer.Define(stage, "/leaf")
     card = _mesh_by_usd(stage, "/leaf/leaf", np.arange(4)[None], UV[12:16])
     card.GetPointsAttr().Set(Vt.Vec3fArray.FromNumpy(CARD))
+    subset = UsdShade.MaterialBindingAPI.Apply(card.GetPrim()).CreateMaterialBindSubset("lamina", [0])
+    green = UsdShade.Material.Define(stage, "/looks/green")
+    UsdShade.MaterialBindingAPI.Apply(subset.GetPrim()).Bind(green)
     instancer.CreatePrototypesRel().SetTargets(["/leaf/leaf"])
     instancer.CreateProtoIndicesAttr([0] * COPIES)
     turns = [Gf.Quatf(np.cos(i / 2), 0, 0, np.sin(i / 2)) for i in range(COPIES)]
@@ -505,10 +512,10 @@ def by_alembic(path: Path) -> None:
     archive = Abc.OArchive(str(path))
     sampling = Abc.Argument(archive.addTimeSampling(AbcCoreAbstract.TimeSampling(1 / RATE, START / RATE)))
     mesh = AbcGeom.OPolyMesh(archive.getTop(), "bough", sampling)
-    _fill_by_alembic(mesh, [bough(frame) for frame in range(FRAMES)], QUADS, UV[:12])
+    _fill_by_alembic(mesh, [bough(frame) for frame in range(FRAMES)], QUADS, UV[:12], "bark")
     at = [AbcGeom.OXform(archive.getTop(), f"at{i}", sampling) for i in range(COPIES)]
     card = AbcGeom.OPolyMesh(at[0], "leaf")
-    _fill_by_alembic(card, [CARD], np.arange(4)[None], UV[12:16])
+    _fill_by_alembic(card, [CARD], np.arange(4)[None], UV[12:16], "green")
     for i, place in enumerate(at):
         for frame in range(FRAMES):
             rotation, shift = places(frame)[i]
@@ -521,7 +528,7 @@ def by_alembic(path: Path) -> None:
     gc.collect()
 
 
-def _fill_by_alembic(mesh: Any, frames: list[np.ndarray], faces: np.ndarray, uv: np.ndarray) -> None:
+def _fill_by_alembic(mesh: Any, frames: list[np.ndarray], faces: np.ndarray, uv: np.ndarray, material: str) -> None:
     held = [filled(imath.IntArray, faces[:, ::-1].reshape(-1)), filled(imath.IntArray, [4] * len(faces))]
     coordinates = filled(imath.V2fArray, uv)
     said = AbcGeom.OV2fGeomParamSample(coordinates, AbcGeom.GeometryScope.kVertexScope)
@@ -529,6 +536,8 @@ def _fill_by_alembic(mesh: Any, frames: list[np.ndarray], faces: np.ndarray, uv:
         points = filled(imath.V3fArray, points)
         sample = AbcGeom.OPolyMeshSchemaSample
         mesh.getSchema().set(sample(points) if number else sample(points, *held, iUVs=said))
+    every = filled(imath.IntArray, np.arange(len(faces)))
+    mesh.getSchema().createFaceSet(material).getSchema().set(AbcGeom.OFaceSetSchemaSample(every))
 
 
 def by_gltf(path: Path) -> None:
@@ -539,19 +548,18 @@ def by_gltf(path: Path) -> None:
     targets = [{"POSITION": made.array(frame - own[0])} for frame in own]
     shape = {"POSITION": made.array(own[0]), "TEXCOORD_0": uv[0]}
     node = made.node(mesh=made.mesh(shape, "bough", corners(QUADS), targets=targets, weights=[0.0] * FRAMES))
-    made.gltf.materials.append(pygltflib.Material(name="bark"))
+    made.gltf.materials += [pygltflib.Material(name=name) for name in ("bark", "green")]
     made.gltf.meshes[0].primitives[0].material = 0
     parts = {
         "TRANSLATION": made.array(metres(np.array([at for _, at in places(0)]))),
         "ROTATION": made.array(np.array([[0, np.sin(i / 2), 0, np.cos(i / 2)] for i in range(COPIES)])),
     }
     shape = {"POSITION": made.array(card), "TEXCOORD_0": uv[1]}
-    leaf = made.node(
-        mesh=made.mesh(shape, "leaf", corners(np.arange(4)[None])),
-        extensions={"EXT_mesh_gpu_instancing": {"attributes": parts}},
-    )
+    leaf_mesh = made.mesh(shape, "leaf", corners(np.arange(4)[None]))
+    made.gltf.meshes[leaf_mesh].primitives[0].material = 1
+    leaf = made.node(mesh=leaf_mesh, extensions={"EXT_mesh_gpu_instancing": {"attributes": parts}})
     made.gltf.extensionsUsed = made.gltf.extensionsRequired = ["EXT_mesh_gpu_instancing"]
-    times, lift = np.arange(FRAMES) / RATE, [metres(places(f)[0][1] - places(0)[0][1]) for f in range(FRAMES)]
+    times, lift = (START + np.arange(FRAMES)) / RATE, [metres(places(f)[0][1] - places(0)[0][1]) for f in range(FRAMES)]
     for name in ("calm", "storm"):
         weights = (node, "weights", times, np.eye(FRAMES), "LINEAR")
         made.animation([weights, (leaf, "translation", times, lift, "LINEAR")], name)
@@ -617,7 +625,9 @@ def by_schema(path: Path) -> None:
     """HDF5 by h5py, .npz by NumPy, as the schema of the page says."""
     arrays = {"positions": POSITIONS, "time": np.arange(FRAMES) / RATE, "faces": FACES, "uv": UV}
     arrays |= {"part_vertex_counts": np.array(COUNTS), "part_copies": np.array([1, COPIES])}
+    arrays["face_material"] = np.repeat([0, 1], [len(QUADS), COPIES])
     said = {"unit": "cm", "up_axis": "z", "fps": RATE, "start_frame": START, "part_names": NAMES}
+    said["material_names"] = ["bark", "green"]
     if path.suffix == ".npz":
         np.savez(path, **arrays, metadata=json.dumps(said))
         return
@@ -640,14 +650,16 @@ class Route:
 
 
 SOURCES: list[Route] = [
-    Route("USD", "a.usda", by_usd, "usd-core", "yes | yes | no | yes | yes | one a file | yes | yes | yes | yes"),
-    Route("Alembic", "a.abc", by_alembic, "alembic3d", "yes | yes | no | yes | yes | one a file | no | no | yes | yes"),
+    Route("USD", "a.usda", by_usd, "usd-core", "yes | yes | names | yes | yes | one a file | yes | yes | yes | yes"),
+    Route(
+        "Alembic", "a.abc", by_alembic, "alembic3d", "yes | yes | names | yes | yes | one a file | no | no | yes | yes"
+    ),
     Route(
         "glTF",
         "a.glb",
         by_gltf,
         "pygltflib",
-        "yes | yes | no | yes | yes | yes | metres | y up | yes | no",
+        "yes | yes | names | yes | yes | yes | metres | y up | yes | yes",
         {"takes": ["all"]},
     ),
     Route(
@@ -695,19 +707,23 @@ SOURCES: list[Route] = [
         "meshio",
         "yes | no | no | yes | as vertices | one a file | no | no | no | yes",
     ),
-    Route("HDF5", "a.h5", by_schema, "h5py", "yes | yes | no | yes | yes | one a file | yes | yes | yes | yes"),
-    Route("NumPy", "a.npz", by_schema, "NumPy", "yes | yes | no | yes | yes | one a file | yes | yes | yes | yes"),
+    Route("HDF5", "a.h5", by_schema, "h5py", "yes | yes | names | yes | yes | one a file | yes | yes | yes | yes"),
+    Route("NumPy", "a.npz", by_schema, "NumPy", "yes | yes | names | yes | yes | one a file | yes | yes | yes | yes"),
 ]
 TARGETS: list[Route] = [
     Route(
-        "USD", "a.usda", in_usd, "usd-core", "yes | yes | no | yes | as vertices | one a file | yes | yes | yes | yes"
+        "USD",
+        "a.usda",
+        in_usd,
+        "usd-core",
+        "yes | yes | names | yes | as vertices | one a file | yes | yes | yes | yes",
     ),
     Route(
         "USD, `--instances`",
         "a.usdc",
         in_usd,
         "usd-core",
-        "yes | yes | no | yes | yes | one a file | yes | yes | yes | yes",
+        "yes | yes | names | yes | yes | one a file | yes | yes | yes | yes",
         {"instances": True},
     ),
     Route(
@@ -715,7 +731,7 @@ TARGETS: list[Route] = [
         "rig.usda",
         in_usd,
         "usd-core",
-        "yes | yes | no | yes | as vertices | yes | yes | yes | yes | yes",
+        "yes | yes | names | yes | as vertices | yes | yes | yes | yes | yes",
         {"rig": 64},
     ),
     Route(
@@ -723,14 +739,14 @@ TARGETS: list[Route] = [
         "a.abc",
         in_alembic,
         "alembic3d",
-        "yes | yes | no | yes | as vertices | one a file | no | y up | yes | yes",
+        "yes | yes | names | yes | as vertices | one a file | no | y up | yes | yes",
     ),
     Route(
         "Alembic, `--instances`",
         "a.abc",
         in_alembic,
         "alembic3d",
-        "yes | yes | no | yes | yes | one a file | no | y up | yes | yes",
+        "yes | yes | names | yes | yes | one a file | no | y up | yes | yes",
         {"instances": True},
     ),
     Route(
@@ -738,7 +754,7 @@ TARGETS: list[Route] = [
         "a.glb",
         in_gltf,
         "pygltflib",
-        "yes | yes | no | yes | as vertices | yes | metres | y up | yes | yes",
+        "yes | yes | names | yes | as vertices | yes | metres | y up | yes | yes",
         {"animation": "joints"},
     ),
     Route(
@@ -746,15 +762,23 @@ TARGETS: list[Route] = [
         "a.glb",
         in_gltf,
         "pygltflib",
-        "yes | yes | no | yes | as vertices | yes | metres | y up | yes | yes",
+        "yes | yes | names | yes | as vertices | yes | metres | y up | yes | yes",
         {"animation": "morphs"},
+    ),
+    Route(
+        "glTF, `--instances`",
+        "a.glb",
+        in_gltf,
+        "pygltflib",
+        "yes | yes | names | yes | yes | yes | metres | y up | yes | yes",
+        {"instances": True},
     ),
     Route(
         "glTF, `--rig`",
         "rig.glb",
         in_gltf,
         "pygltflib",
-        "yes | yes | no | yes | as vertices | yes | metres | y up | yes | yes",
+        "yes | yes | names | yes | as vertices | yes | metres | y up | yes | yes",
         {"rig": 64},
     ),
     Route(
@@ -786,7 +810,7 @@ TARGETS: list[Route] = [
         "a.vat",
         in_vat,
         "OpenEXR, pygltflib",
-        "yes | yes | no | yes | as vertices | one a file | yes | yes | yes | yes",
+        "yes | yes | names | yes | as vertices | one a file | yes | yes | yes | yes",
         {"half": False},
     ),
     Route(
@@ -794,7 +818,7 @@ TARGETS: list[Route] = [
         "a.openvat",
         in_openvat,
         "OpenEXR, pygltflib",
-        "yes | yes | no | yes | as vertices | one a file | no | no | no | no",
+        "yes | yes | names | yes | as vertices | one a file | no | no | no | no",
         {"half": False},
     ),
 ]
@@ -839,6 +863,36 @@ def test_what_other_libraries_write_is_read_as_the_table_says(tmp_path, route):
         warnings.simplefilter("ignore", SourceWarning)
         found = as_read(tmp_path / route.file, **route.options)
     assert " | ".join(cells(found).values()) == route.cells
+
+
+@pytest.mark.parametrize("instances", [False, True])
+@pytest.mark.parametrize("suffix", ["usda", "usdc", "abc", "glb", "h5", "npz", "obj"])
+def test_each_face_keeps_its_material_to_a_file_and_back(clip, tmp_path, suffix, instances):
+    materials = np.array([2, 0, -1, 0, 2, 1, 3, 3, 3], np.int32)
+    if suffix == "obj":
+        materials = np.sort(np.abs(materials))  # which has no word for no material
+    clip = clip.replace(
+        attributes=clip.attributes | {"face_material": materials},
+        metadata=clip.metadata | {"material_names": ["wet bark", "Moss.001", "bark", "green"]},
+    )
+    written = athcodec.write(clip, tmp_path / f"a.{suffix}", instances=instances)
+    with athcodec.read(written.files[0]) as again:
+        names, found = again.metadata["material_names"], again.attributes["face_material"]
+        assert again.metadata["domains"]["face_material"] == "face"
+        counts, corners = again.polygons
+        first = {tuple(sorted(face)): number for number, face in enumerate(FACES.tolist())}
+        faces = np.split(corners, np.cumsum(counts)[:-1])
+        of_face = [next(n for corners, n in first.items() if set(face) <= set(corners)) for face in faces]
+        expected = [clip.metadata["material_names"][n] if n >= 0 else None for n in materials[of_face]]
+        assert [names[n] if n >= 0 else None for n in found] == expected
+
+
+def test_faces_of_other_materials_keep_copies_vertices(clip, tmp_path):
+    clip = clip.replace(
+        attributes=clip.attributes | {"face_material": np.repeat([0, 1, 0], [6, 2, 1]).astype(np.int32)}
+    )
+    for suffix in ("usda", "abc", "glb"):
+        assert "instances" not in athcodec.write(clip, tmp_path / f"a.{suffix}", instances=True).facts
 
 
 def table() -> str:

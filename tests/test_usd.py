@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from pxr import Gf, Sdf, Usd, UsdGeom, UsdSkel, UsdValidation, Vt
+from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade, UsdSkel, UsdValidation, Vt
 
 import athcodec
 from athcodec import cli
@@ -405,6 +405,28 @@ def test_skeletons_and_blend_shapes_are_evaluated_and_the_joints_are_kept(tmp_pa
         assert np.allclose(positions[i], expected, rtol=0, atol=2e-6)
     assert clip.skin.joint_parent.tolist() == [-1, 0] and list(clip.skin.names) == ["stem", "stem/twig"]
     assert clip.skin.vertex_joint.tolist() == [0] * 6 + [1] * 6
+
+
+def test_objects_beside_a_skinned_mesh_are_branches_on_the_nearest_joint(tmp_path):
+    skinned(tmp_path / "a.usda")
+    stage = Usd.Stage.Open(str(tmp_path / "a.usda"))
+    bark = UsdShade.Material.Define(stage, "/bark")
+    plant = stage.GetPrimAtPath("/plant/mesh")
+    subset = UsdShade.MaterialBindingAPI.Apply(plant).CreateMaterialBindSubset("low", [0, 1])
+    UsdShade.MaterialBindingAPI.Apply(subset.GetPrim()).Bind(bark)
+    for number, height in enumerate((0, 3)):
+        leaf = UsdGeom.Mesh.Define(stage, f"/leaf{number}")
+        leaf.CreatePointsAttr(vec3(GRID[:3] + [5, height, 7]))
+        leaf.CreateFaceVertexCountsAttr([3])
+        leaf.CreateFaceVertexIndicesAttr([0, 1, 2])
+    stage.Save()
+    with athcodec.read(tmp_path / "a.usda") as clip:
+        assert clip.not_read == {"Material": ["/bark"]} and not any(name.startswith("skel") for name in clip.attributes)
+        assert clip.attributes["face_material"].tolist() == [0, 0] + [-1] * (len(clip.polygons[0]) - 2)
+        found = athcodec.find_branches(clip)
+        assert found.method == "skeleton" and len(found.branch_parent) == 4
+        leaves = found.vertex_branch[[12, 15]]
+        assert found.branch_parent[leaves].tolist() == [found.vertex_branch[0], found.vertex_branch[11]]
 
 
 @pytest.mark.parametrize("change", ["faces", "points"])

@@ -130,6 +130,50 @@ def test_a_level_can_be_asked_for(sample_ath):
     script(COMPARE, path, decoded(sample_ath, level=1), json.dumps(["/clip/plant"]))
 
 
+DYNAMIC = """
+import json, sys
+import numpy as np
+from pxr import Sdf, Usd
+stage = Usd.Stage.CreateInMemory()
+def points(prim):
+    return stage.GetPrimAtPath(f"{prim.GetPath()}/plant").GetAttribute("points")
+def shows(prim, key):
+    codes = points(prim).GetTimeSamples()
+    known = np.load(sys.argv[2])[key]
+    return len(codes) == len(known) and all(np.array_equal(points(prim).Get(c), f) for c, f in zip(codes, known))
+base = stage.CreateClassPrim("/_oak")
+base.GetPayloads().AddPayload(sys.argv[1])
+trees = [stage.DefinePrim(f"/tree{i}") for i in range(3)]
+for tree in trees:
+    tree.GetInherits().AddInherit("/_oak")
+clip = trees[1].CreateAttribute("ath:clip", Sdf.ValueTypeNames.String, True, Sdf.VariabilityUniform)
+level = trees[2].CreateAttribute("ath:level", Sdf.ValueTypeNames.Int, True, Sdf.VariabilityUniform)
+clip.Set("Böe")
+level.Set(0)
+said = [shows(trees[0], "calm"), shows(trees[1], "Böe"), shows(trees[2], "calm 0")]
+clip.Set("calm")
+trees[2].GetVariantSet("clip").SetVariantSelection("Böe")
+said += [shows(trees[1], "calm"), shows(trees[2], "Böe 0")]
+for tree in trees:
+    tree.SetInstanceable(True)
+said.append(len({str(tree.GetPrototype().GetPath()) for tree in trees}))
+trees[2].SetInstanceable(False)
+level.Set(99)
+said += [len(trees[2].GetChildren()), " ".join(map(str, stage.GetCompositionErrors()))]
+print(json.dumps(said))
+"""
+
+
+def test_a_payload_shows_the_clip_and_the_level_that_attributes_of_its_prim_name(medley_ath, tmp_path):
+    with athcodec.open(medley_ath) as file:
+        frames = {name: file.play(name).positions(dtype=np.float32) for name in ("calm", "Böe")}
+        frames |= {f"{name} 0": file.play(name).positions(level=0, dtype=np.float32) for name in ("calm", "Böe")}
+    np.savez(tmp_path / "known.npz", **frames)
+    *shown, prototypes, children, error = script(DYNAMIC, medley_ath, tmp_path / "known.npz")
+    assert shown == [True] * 5 and prototypes == 3 and children == 0
+    assert 'level: got "99"' in error
+
+
 def test_flattened_and_exported_stages_hold_all_samples(sample_ath, tmp_path):
     text = """
 import json, sys

@@ -132,6 +132,7 @@ def _encode_arguments(verb: argparse.ArgumentParser) -> None:
         action="store_true",
         help="with --into: leave skins and morph targets in the GLB too, for programs that do not know ATH_motion",
     )
+    _gltf_motion_argument(verb, "with --into: the name of the motion, of which a GLB may have several")
     verb.add_argument(
         "--names",
         metavar="NAME,...",
@@ -381,6 +382,9 @@ def _decode_arguments(verb: argparse.ArgumentParser) -> None:
         help="the clip to decode; without it glTF holds all of a file that has several, as animations of their names",
     )
     _host_mesh_argument(verb)
+    _gltf_motion_argument(
+        verb, "of a GLB with several motions (ATH_motion), the one of this name; to a GLB, by default, all"
+    )
     _stats_argument(verb)
     shown = verb.add_mutually_exclusive_group()
     shown.add_argument(
@@ -429,8 +433,8 @@ def _decode_arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument(
         "--instances",
         action="store_true",
-        help="write copies of one shape, such as leaves of an instancer, to USD or Alembic as instances, where that "
-        "is off by no more than the level is",
+        help="write copies of one shape, such as leaves of an instancer, to USD, Alembic or glTF as instances, where "
+        "that is off by no more than the level is",
     )
     verb.add_argument(
         "--allow-partial",
@@ -446,6 +450,12 @@ def _host_mesh_argument(verb: argparse.ArgumentParser, more: str = "") -> None:
         help="the mesh that the file was made for, of a file without a rest pose (encode --rest host): its source, or "
         f"a file of any format that is read, with the same vertices in their order{more}",
     )
+
+
+def _gltf_motion_argument(
+    verb: argparse.ArgumentParser, text: str = "of a GLB with several motions (ATH_motion), the one of this name"
+) -> None:
+    verb.add_argument("--gltf-motion", metavar="NAME", help=text)
 
 
 def _stats_argument(verb: argparse.ArgumentParser) -> None:
@@ -481,6 +491,7 @@ def _info_arguments(verb: argparse.ArgumentParser) -> None:
         "near that of a loop, than in its median frame",
     )
     _host_mesh_argument(verb, ", which --motion takes")
+    _gltf_motion_argument(verb)
     _stats_argument(verb)
     verb.add_argument("--json", action="store_true", help="print as JSON")
 
@@ -496,6 +507,7 @@ def _verify_arguments(verb: argparse.ArgumentParser) -> None:
     )
     verb.add_argument("--clip", metavar="NAME", help="compare this clip only")
     _host_mesh_argument(verb, " (default: the first SOURCE; without any, only checksums are compared)")
+    _gltf_motion_argument(verb)
     _source_arguments(verb)
     verb.add_argument("--json", action="store_true", help="print the result as JSON")
 
@@ -517,6 +529,7 @@ def _truncate_arguments(verb: argparse.ArgumentParser) -> None:
         type=_argument(parse_size),
         help="keep as many levels as fit: bytes, 50kB, 1.5MB, 48KiB",
     )
+    _gltf_motion_argument(verb)
 
 
 def _view_arguments(verb: argparse.ArgumentParser) -> None:

@@ -14,7 +14,7 @@ import athcodec
 from athcodec import discovery
 from athcodec.ath import Thresholds
 from athcodec.ath_file import Level
-from athcodec.atomic_files import check_target
+from athcodec.atomic_files import check_target, is_url
 from athcodec.cli.printing import counted, progress, say
 from athcodec.clip import MotionClip
 from athcodec.clip_view import ClipView
@@ -70,7 +70,7 @@ def gltf_to_fill(paths: Sequence[str], args: argparse.Namespace) -> Into:
             raise ClipError(f"--into: got --{name.replace('_', '-')} too, expected the GLB as it is")
     if args.rest not in ("auto", HOST) or args.exact_rest:
         raise ClipError("--into: got another rest pose, expected the meshes of the GLB")
-    return Into(paths[0], _gltf_options(args), args.keep_animation)
+    return Into(paths[0], _gltf_options(args), args.keep_animation, args.gltf_motion)
 
 
 def _endless(name: str, clip: MotionClip) -> MotionClip:
@@ -183,6 +183,17 @@ def read_clip(args: argparse.Namespace, path: str) -> MotionClip:
     if clip.not_read:
         say("not read", f"{path}: {listed(clip.not_read)}")
     return clip
+
+
+def motions_of(path: str, args: argparse.Namespace) -> list[str | None]:
+    """The names of the motions to open, one after the other; [None] where there is nothing to choose."""
+    from athcodec.sources.gltf_motion import motions_in
+
+    if args.gltf_motion is not None or is_url(path):
+        return [args.gltf_motion]
+    with naming(path):
+        names = motions_in(path)
+    return list(names) if len(names) > 1 else [None]
 
 
 @contextmanager

@@ -72,24 +72,20 @@ LOOKS = {
 """What is shown of a level beside its errors, by the names of MotionMeter.figures."""
 
 
-def print_file(
-    path: str, decoder: Decoder, as_json: bool, tick_ratios: Sequence[Sequence[float | None]] | None = None
-) -> None:
-    """tick_ratios: of each clip at each level, where they were measured."""
-    facts = facts_of(path, decoder)
-    if tick_ratios is not None:
-        for clip, ratios in zip(facts["clips"], tick_ratios, strict=True):
-            clip["tick_ratios"] = list(ratios)
-        for level, ratios in zip(facts["levels"], zip(*tick_ratios), strict=True):
-            level["tick_ratio"] = max((ratio for ratio in ratios if ratio is not None), default=None)
+def print_files(facts: list[dict[str, Any]], as_json: bool) -> None:
+    """What facts_of gives of a file, or of each motion of a GLB."""
     if as_json:
-        print_json(facts)
-    else:
-        _print_facts(facts)
+        print_json(facts[0] if len(facts) == 1 else {"motions": facts})
+        return
+    for each in facts:
+        _print_facts(each)
 
 
-def facts_of(path: str | Path, decoder: Decoder) -> dict[str, Any]:
-    """decoder.file.info(), and per level what it adds to the file cut before it."""
+def facts_of(
+    path: str | Path, decoder: Decoder, tick_ratios: Sequence[Sequence[float | None]] | None = None
+) -> dict[str, Any]:
+    """decoder.file.info(), and per level what it adds to the file cut before it. tick_ratios: of each clip at each
+    level, where they were measured."""
     facts = {"file": os.fspath(path)} | decoder.file.info()
     facts |= {"unit": decoder.metadata.get("unit"), "missing": decoder.missing}
     facts["raw_bytes"] = facts["frames"] * decoder.vertex_count * 12
@@ -99,6 +95,10 @@ def facts_of(path: str | Path, decoder: Decoder) -> dict[str, Any]:
         level["added_bytes"] = level["bytes"] - before
         level["share"] = level["added_bytes"] / facts["bytes"]
         before = level["bytes"]
+    for clip, ratios in zip(facts["clips"], tick_ratios or ()):
+        clip["tick_ratios"] = list(ratios)
+    for level, ratios in zip(facts["levels"], zip(*(tick_ratios or ()))):
+        level["tick_ratio"] = max((ratio for ratio in ratios if ratio is not None), default=None)
     return facts
 
 
@@ -212,7 +212,9 @@ def print_written(written: Written, motion: ClipView, level: Level) -> None:
     )
     if error is not None:
         unit = f" {motion.metadata['unit']}" if motion.metadata.get("unit") else ""
-        print(f"As {written.facts.get('animation', 'textures')} that is off the level by up to {error:.3g}{unit}.")
+        how, instances = written.facts.get("animation", "textures"), written.facts.get("instances")
+        how += f" and {counted(instances, 'instance')}" if instances and how in ("joints", "morphs") else ""
+        print(f"As {how} that is off the level by up to {error:.3g}{unit}.")
 
 
 def print_verdict(result: dict[str, Any]) -> None:

@@ -6,7 +6,7 @@ import argparse
 import os
 import sys
 import tempfile
-from contextlib import ExitStack, nullcontext
+from contextlib import ExitStack, nullcontext, suppress
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -24,6 +24,7 @@ from athcodec.cli.clips import (
     decode_and_measure,
     gltf_to_fill,
     measure_against,
+    motions_of,
     naming,
     open_file,
     read_clip,
@@ -39,7 +40,7 @@ from athcodec.cli.printing import (
     facts_of,
     one_line,
     print_demo,
-    print_file,
+    print_files,
     print_json,
     print_outcome,
     print_preview,
@@ -70,9 +71,15 @@ def encode(args: argparse.Namespace) -> int:
     else:
         with clip_to_encode(paths, args) as clip:
             _encode(clip, paths[0], output, args, attributes=args.attributes, host_rest=args.rest == HOST)
-    with open_file(output, strict=True) as decoder:
-        print_file(output, decoder, args.json)
+    with open_file(output, strict=True, gltf_motion=_last_motion(output) if args.into else None) as decoder:
+        print_files([facts_of(output, decoder)], args.json)
     return 0
+
+
+def _last_motion(path: str) -> str:
+    from athcodec.sources.gltf_motion import motions_in
+
+    return motions_in(path)[-1]
 
 
 def _encode_into(paths: list[str], args: argparse.Namespace) -> None:
@@ -200,42 +207,74 @@ def hierarchy(args: argparse.Namespace) -> int:
 def decode(args: argparse.Namespace) -> int:
     check_output(args.output, args.input)
     how = {"clip": args.clip, "allow_partial": args.allow_partial, "host_mesh": args.host_mesh}
-    with open_file(args.input, args.stats, **how) as decoder:
-        motion = view_to_decode(decoder, args)
-        written = _write_decoded(motion, args)
-        if decoder.missing:
-            say("warning", f"{args.input}: decoded to level {motion.level}; {what_is_missing(decoder)}")
-        print_written(written, motion, decoder.levels[motion.level])
+    with ExitStack() as opened:
+        names = motions_of(args.input, args) if _goes_back(args) else [args.gltf_motion]
+        decoders = [opened.enter_context(open_file(args.input, args.stats, gltf_motion=name, **how)) for name in names]
+        motions = [view_to_decode(decoder, args) for decoder in decoders]
+        written = _write_decoded(motions, args)
+        for decoder, motion in zip(decoders, motions):
+            if decoder.missing:
+                say("warning", f"{args.input}: decoded to level {motion.level}; {what_is_missing(decoder)}")
+            print_written(written, motion, decoder.levels[motion.level])
     return 0
 
 
-def _write_decoded(motion: ClipView, args: argparse.Namespace) -> Written:
-    """In the format that is asked for; of a GLB to a GLB into a copy of it, if not as joints."""
+def _goes_back(args: argparse.Namespace) -> bool:
+    """Whether a GLB with motions is to be written as a copy of it, with morph targets."""
+    is_gltf = (args.format or Path(args.output).suffix.lower()) in ("gltf", ".glb")
+    return is_gltf and args.animation != "joints" and args.rig is None and not args.instances
+
+
+def _write_decoded(motions: list[ClipView], args: argparse.Namespace) -> Written:
+    """In the format that is asked for; several are those of a GLB, to go back into it."""
     from athcodec import exporters, sources
     from athcodec.sources.gltf_motion import GltfMotion
 
-    name = args.format or sources.format_by_suffix(args.output, exporters.FORMATS).name
-    as_morphs = args.animation != "joints" and args.rig is None
-    if name == "gltf" and as_morphs and isinstance(motion.decoder.file.source, GltfMotion):
+    motion = motions[0]
+    if _goes_back(args) and isinstance(motion.decoder.file.source, GltfMotion):
         from athcodec.exporters.gltf_into import write_back
 
-        write_back(args.input, motion, args.output)
+        write_back(args.input, motions, args.output)
         return exporters.Written((Path(args.output),))
+    name = args.format or sources.format_by_suffix(args.output, exporters.FORMATS).name
     how = {option: getattr(args, option) for option in ("gzip", "animation", "instances", "rig", "nanite")}
     with progress() as report:
         return athcodec.write(motion, args.output, name, progress=report, **how)
 
 
 def info(args: argparse.Namespace) -> int:
-    with open_file(args.file, args.stats, host_mesh=args.host_mesh) as decoder:
-        print_file(args.file, decoder, args.json, tick_ratios(decoder) if args.motion else None)
+    found = []
+    for name in motions_of(args.file, args):
+        with open_file(args.file, args.stats, host_mesh=args.host_mesh, gltf_motion=name) as decoder:
+            ratios = tick_ratios(decoder) if args.motion else None
+            found.append(facts_of(_called(args.file, name), decoder, ratios))
+    print_files(found, args.json)
     return 0
 
 
+def _called(path: str, motion: str | None) -> str:
+    return path if motion is None else f"{path}, {motion}"
+
+
 def verify(args: argparse.Namespace) -> int:
-    result: dict[str, Any] = {"file": args.file, "ok": False, "clips": []}
+    names: list[str | None] = [None]
+    with suppress(AthError):  # which is said below, as of any damaged file
+        names = motions_of(args.file, args)
+    results = [_verified(args, name) for name in names]
+    if args.json:
+        print_json(results[0] if len(results) == 1 else {"motions": results})
+    for result in results:
+        if not args.json:
+            print_verdict(result)
+        if not result["ok"]:
+            say("error", result["error"])
+    return 0 if all(result["ok"] for result in results) else 1
+
+
+def _verified(args: argparse.Namespace, name: str | None) -> dict[str, Any]:
+    result: dict[str, Any] = {"file": _called(args.file, name), "ok": False, "clips": []}
     try:
-        how = {"strict": True, "clip": args.clip, "host_mesh": args.host_mesh}
+        how = {"strict": True, "clip": args.clip, "host_mesh": args.host_mesh, "gltf_motion": name}
         with open_file(args.file, args.stats, **how) as decoder, ExitStack() as opened:
             if decoder.file.needs_host_mesh and args.against:
                 decoder.file.set_host_mesh(opened.enter_context(read_clip(args, args.against[0])))
@@ -250,13 +289,7 @@ def verify(args: argparse.Namespace) -> int:
         result["ok"] = True
     except AthError as error:
         result["error"] = one_line(error)
-    if args.json:
-        print_json(result)
-    else:
-        print_verdict(result)
-    if not result["ok"]:
-        say("error", result["error"])
-    return 0 if result["ok"] else 1
+    return result
 
 
 def truncate(args: argparse.Namespace) -> int:
@@ -264,10 +297,18 @@ def truncate(args: argparse.Namespace) -> int:
     with naming(args.input):
         max_error = args.max_error
         if max_error is not None:
-            with open_file(args.input) as decoder:
+            with open_file(args.input, gltf_motion=args.gltf_motion) as decoder:
                 max_error = max_error.in_scene_units(decoder.metadata.get("unit"))
-        athcodec.truncate(args.input, args.output, args.level, max_error=max_error, target_size=args.target_size)
-    with open_file(args.output) as decoder:
+        athcodec.truncate(
+            args.input,
+            args.output,
+            args.level,
+            max_error=max_error,
+            target_size=args.target_size,
+            gltf_motion=args.gltf_motion,
+        )
+    kept = args.gltf_motion if args.output.lower().endswith(".glb") else None
+    with open_file(args.output, gltf_motion=kept) as decoder:
         last = decoder.level_count - 1
     before, after = (os.path.getsize(path) for path in (args.input, args.output))
     print(f"{args.output}: levels 0 to {last}, {after:,} of {before:,} bytes")

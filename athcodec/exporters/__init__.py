@@ -37,8 +37,8 @@ class WriteOptions:
     half : bool, optional
         Textures in half precision in place of float.
     instances : bool, optional
-        Copies of one shape (MotionClip, part_copies) as instances of USD and Alembic, where transforms are off by no
-        more than the level is; else, and by default, as vertices.
+        Copies of one shape (MotionClip, part_copies) as instances of USD and Alembic and nodes of glTF that show one
+        mesh, where transforms are off by no more than the level is; else, and by default, as vertices.
     rig : int, optional
         For USD and glTF: a skeleton for engines, with so many joints at most besides its root, in place of vertices. It
         is as close as that many allow; `Written` says how close.

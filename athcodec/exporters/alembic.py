@@ -1,9 +1,9 @@
 """Writes Alembic (Ogawa): one mesh, curves or points object per object of a clip, its points sample by sample.
 
-Faces and static arrays are written once; samples go to disk as they come. Points are float32, a clip in float64 is
-rounded; copies of one shape become instances where options.instances asks for it. Everything lies below one transform,
-which turns a clip whose Z is up to Alembic's custom, Y up, and keeps what Alembic has no place for (unit, branches,
-bytes); sources/alembic.py takes it back from there.
+Faces and static arrays are written once, materials' names as those of face sets; samples go to disk as they come.
+Points are float32, a clip in float64 is rounded; copies of one shape become instances where options.instances asks for
+it. Everything lies below one transform, which turns a clip whose Z is up to Alembic's custom, Y up, and keeps what
+Alembic has no place for (unit, branches, bytes); sources/alembic.py takes it back from there.
 """
 
 from __future__ import annotations
@@ -31,12 +31,14 @@ from athcodec.exporters.scene_objects import (
     SceneObject,
     distinct,
     domain_of,
+    face_materials,
+    material_runs,
     objects_of,
     own_arrays,
     rows_of,
 )
 from athcodec.exporters.timing import distinct_frame_numbers, frame_rate_of
-from athcodec.sources.scene_objects import DESCRIPTOR, OWN, turned_corners
+from athcodec.sources.scene_objects import DESCRIPTOR, FACE_MATERIAL, OWN, turned_corners
 
 SCOPES = {
     "vertex": AbcGeom.GeometryScope.kVertexScope,
@@ -93,6 +95,7 @@ def _write(motion: Any, name: str, options: WriteOptions, report: Callable[[floa
             _add_instanced(root, name, obj, instanced[number], statics, sampling)
         else:
             obj.target = _create(root, name, obj, sampling)
+    _bind_materials(motion, objects)
     for start, block in motion.blocks():
         for row, positions in enumerate(block.astype(np.float32, copy=False)):
             for obj in objects:
@@ -131,7 +134,7 @@ def _add_instanced(
             sample.setMatrix(imath.M44d(*matrix.reshape(-1).tolist()))
             place.getSchema().set(sample)
     one = one_copy(obj)
-    one.target = KINDS[obj.kind](places[0], name)
+    obj.target = one.target = KINDS[obj.kind](places[0], name)
     own = {
         key: (values if domain == "constant" else rows_of_one(values, obj), domain)
         for key, (values, domain) in _rows(statics, obj).items()
@@ -139,6 +142,18 @@ def _add_instanced(
     _add(one, copies.shape, own)
     for place in places[1:]:
         place.addChildInstance(one.target, name)
+
+
+def _bind_materials(motion: Any, objects: list[SceneObject]) -> None:
+    """Materials by their names alone: a set of the faces that have one."""
+    labels, names = face_materials(motion) or (np.empty(0), [])
+    sets = distinct(re.sub(r"[/\0]", "_", name) or "material" for name in names)
+    for obj in objects if sets else ():
+        own = rows_of_one(labels[obj.face_rows], obj) if obj.copies > 1 else labels[obj.face_rows]
+        for label, faces in material_runs(own, names) if obj.kind == "mesh" else ():
+            held = _filled(imath.IntArray, faces)
+            face_set = obj.target.getSchema().createFaceSet(sets[label])
+            face_set.getSchema().set(AbcGeom.OFaceSetSchemaSample(held))
 
 
 def _rows(statics: dict[str, tuple[np.ndarray, str]], obj: SceneObject) -> dict[str, tuple[np.ndarray, str]]:
@@ -231,7 +246,7 @@ def _divide(
     that all copies share."""
     fitting, left = {}, {}
     for name, values in motion.attributes.items():
-        if name in KNOWN_ATTRIBUTES:
+        if name in KNOWN_ATTRIBUTES or name == FACE_MATERIAL and face_materials(motion):
             continue
         domain = domain_of(motion, name, values, motion.metadata.get("domains", {}))
         key = values.dtype.str[1:], values.shape[1:]

@@ -14,26 +14,36 @@ from typing import Any
 import numpy as np
 
 from athcodec.exporters.fitting import Parts, Placed, allowed_error, portions
-from athcodec.exporters.scene_objects import SceneObject
+from athcodec.exporters.scene_objects import SceneObject, face_materials
 
 
 @dataclass(eq=False)
 class Copies:
     """shape (m, 3); of k copies in T frames places (T, k, 3), turns (T, k, 4), quaternions x y z w whose signs run on,
-    scales (T, k, 3), all float32; and the largest distance of a vertex from where it was to be."""
+    scales (T, k, 3), and the same at rest, (k, 3), (k, 4), (k, 3), all float32; the largest distance of a vertex from
+    where it was to be; and the axes of the shape, as columns (3, 3), in the first copy at rest."""
 
     shape: np.ndarray
     places: np.ndarray
     turns: np.ndarray
     scales: np.ndarray
+    rest: tuple[np.ndarray, np.ndarray, np.ndarray]
     max_error: float
+    axes: np.ndarray
 
 
 def fit_copies(motion: Any, objects: list[SceneObject], allowed: float | None = None) -> dict[int, Copies]:
-    """Of those objects that are copies, and that transforms keep within `allowed`, or within what the level is off, by
-    their place in the list."""
+    """Of those objects that are copies, of the same materials, and that transforms keep within `allowed`, or within
+    what the level is off, by their place in the list."""
     allowed = allowed_error(motion) if allowed is None else allowed
-    fits = {number: _Fit(motion, obj) for number, obj in enumerate(objects) if obj.copies > 1 and obj.count}
+    materials = face_materials(motion)
+    fits = {
+        number: _Fit(motion, obj)
+        for number, obj in enumerate(objects)
+        if obj.copies > 1
+        and obj.count
+        and (materials is None or rows_of_one(materials[0][obj.face_rows], obj) is not None)
+    }
     for start, frames in portions(motion, motion.vertex_count) if fits else ():
         for fit in fits.values():
             fit.add(start, frames)
@@ -70,24 +80,29 @@ class _Fit:
 
     def __init__(self, motion: Any, obj: SceneObject):
         self._rows, count = obj.vertices, obj.count // obj.copies
-        rest = np.asarray(motion.rest, np.float64)[obj.first : obj.first + count]
-        part = Parts.over(np.arange(count), np.zeros(1, np.int64), np.array([count]), rest)
-        self._shape = ((rest - part.middle[0]) @ part.axes[0]).astype(np.float32)
-        self._local = self._shape.astype(np.float64)
+        rest = np.asarray(motion.rest, np.float64)[obj.vertices]
+        part = Parts.over(np.arange(count), np.zeros(1, np.int64), np.array([count]), rest[:count])
+        shape = ((rest[:count] - part.middle[0]) @ part.axes[0]).astype(np.float32)
+        self._local = shape.astype(np.float64)
         spread = np.tile((self._local**2).mean(axis=0), (obj.copies, 1))
         self._solver = Placed(SimpleNamespace(spread=spread, axes=np.tile(part.axes[0], (obj.copies, 1, 1))))
         room = (motion.frame_count, obj.copies)
         values = (np.empty((*room, width), np.float32) for width in (3, 4, 3))
-        self.found = Copies(self._shape, *values, 0.0)
+        still, _ = self._placed(rest.reshape(obj.copies, count, 3))
+        self.found = Copies(shape, *values, tuple(part.astype(np.float32) for part in still), 0.0, part.axes[0])
 
     def add(self, start: int, frames: np.ndarray) -> None:
         """Fits the next frames."""
         found = self.found
-        copies, count = found.places.shape[1], len(self._local)
-        points = frames[:, self._rows].astype(np.float64).reshape(len(frames), copies, count, 3)
-        middle = points.mean(axis=2)
-        for frame, (away, place) in enumerate(zip(points - middle[:, :, None], middle), start):
-            linear, (turns, scales) = self._solver(np.einsum("kmi,mj->kij", away, self._local) / count)
-            found.places[frame], found.turns[frame], found.scales[frame] = place, turns, scales
-            square = ((away - self._local @ linear.swapaxes(1, 2)) ** 2).sum(axis=2)
-            found.max_error = max(found.max_error, float(np.sqrt(square.max())))
+        points = frames[:, self._rows].astype(np.float64).reshape(len(frames), found.places.shape[1], -1, 3)
+        for frame, own in enumerate(points, start):
+            (found.places[frame], found.turns[frame], found.scales[frame]), error = self._placed(own)
+            found.max_error = max(found.max_error, error)
+
+    def _placed(self, points: np.ndarray) -> tuple[tuple[np.ndarray, np.ndarray, np.ndarray], float]:
+        """Places, turns and scales of copies at points (k, m, 3), and how far off that leaves one."""
+        middle = points.mean(axis=1)
+        away = points - middle[:, None]
+        linear, (turns, scales) = self._solver(np.einsum("kmi,mj->kij", away, self._local) / len(self._local))
+        square = ((away - self._local @ linear.swapaxes(1, 2)) ** 2).sum(axis=2)
+        return (middle, turns, scales), float(np.sqrt(square.max()))

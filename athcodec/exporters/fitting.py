@@ -68,8 +68,8 @@ class Parts:
         return cls(order, first, count, middle, axes, np.maximum(spread, 0.0), extent)
 
     def vertex_part(self) -> np.ndarray:
-        """(N,) the part of each vertex; of parts that hold all vertices."""
-        out = np.empty(int(self.count.sum()), np.int64)
+        """(N,) the part of each vertex of the clip, 0 where none holds it."""
+        out = np.zeros(len(self.order), np.int64)
         for part, (first, count) in enumerate(zip(self.first, self.count)):
             out[self.order[first : first + count]] = part
         return out
@@ -135,10 +135,21 @@ class Mapped:
         return linear, ((linear @ self._axes.swapaxes(1, 2)).reshape(-1, 9),)
 
 
-def fit(motion: Any, solver: type, allowed: float, most: int, report: Callable[[float], None]) -> Moving | None:
-    """The parts of a motion, cut until none is further off than `allowed`; None where that takes more than `most`."""
+def fit(
+    motion: Any,
+    solver: type,
+    allowed: float,
+    most: int,
+    report: Callable[[float], None],
+    chosen: np.ndarray | None = None,
+) -> Moving | None:
+    """The parts of a motion, cut until none is further off than `allowed`; None where that takes more than `most`.
+    chosen (N,) bool: parts without any of these vertices, of which there is one at least, are left out."""
     rest = np.asarray(motion.rest, np.float64)
     order, first, count = _ranges(motion)
+    if chosen is not None:
+        wanted = np.array([chosen[order[a : a + n]].any() for a, n in zip(first, count)])
+        first, count = first[wanted], count[wanted]
     done: list[tuple[np.ndarray, np.ndarray, np.ndarray, list[np.ndarray]]] = []
     number = 0
     while len(first):

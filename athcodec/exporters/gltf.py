@@ -4,8 +4,9 @@
 clip), all side by side below one node. A joint has translation, rotation and three scales; a part that this leaves
 further off than the level itself is (of a clip: fitting.OF_CLIP of its size) is cut into shorter ones (fitting.py).
 "morphs": a morph target per frame, exact but for float32, and large. "auto": the smaller of both for a
-short clip, else joints. options.rig makes a hierarchy of joints for engines (rig.py). Some engines, three.js among
-them, move triangles only: lines and points stand still there.
+short clip, else joints. options.rig makes a hierarchy of joints for engines (rig.py), options.instances nodes of copies
+of one shape (gltf_copies.py). Some engines, three.js among them, move triangles only: lines and points stand still
+there.
 
 Each of several clips is an animation of its name over the same joints or targets, and moves all that any of them
 moves: players may go from one to the other. glTF knows no loops: theirs end with the first frame again, and have
@@ -36,6 +37,7 @@ from athcodec.exporters.gltf_build import (
     Glb,
     GltfMesh,
     Take,
+    add_materials,
     add_mesh,
     branch_extras,
     clock,
@@ -43,6 +45,7 @@ from athcodec.exporters.gltf_build import (
     root_transform,
     takes,
 )
+from athcodec.exporters.gltf_copies import PATHS, GltfCopies, Movers, unit_quaternion, with_copies
 from athcodec.exporters.gltf_joints import Joints, fit_joints
 from athcodec.exporters.rig import fit_rig
 
@@ -59,35 +62,8 @@ def write_clip(
 
     Raises ClipError where it has more joints, frames or bytes than glTF can sensibly hold.
     """
-    wanted, joints = options.animation, None
-    if options.rig is not None:
-        wanted, joints = "joints", fit_rig(motion, options.rig, lambda done: report(0.95 * done))
-    elif wanted != "morphs":
-        joints = fit_joints(motion, allowed_error(motion), MOST_JOINTS, lambda done: report(0.95 * done))
-    if wanted == "joints" and joints is None:
-        raise ClipError(
-            f"joints: got more than {MOST_JOINTS} that it takes to move the clip, expected fewer: choose a "
-            "lower level, or morphs"
-        )
-    if wanted == "auto":
-        wanted = _smaller(motion, joints)
-    if wanted == "morphs":
-        check_morphs(motion)
-    facts = {"animation": wanted if options.rig is None else "a rig", "unit": str(motion.metadata.get("unit") or "")}
-    if isinstance(motion, ClipView):
-        facts |= {"level": motion.level, "level_max_error": float(motion.max_error)}
     try:
-        found, left_out = meshes_of(motion, Path(fspath(path)).stem)
-        if wanted == "joints":
-            facts["joints"] = len(joints.bind)
-        facts |= ({"left_out": left_out} if left_out else {}) | branch_extras(motion)
-        write = _Joined(motion, joints) if wanted == "joints" else _Morphed(motion)
-        glb = Glb(clock(motion) | {"athcodec": facts})
-        root = glb.node(name="plant", **root_transform(motion.metadata))
-        later = write.add(glb, root, found, lambda done: report(done if wanted == "morphs" else 1.0))
-        facts |= {"max_error": write.max_error, "vertices": motion.vertex_count}
-        with new_file(path) as out:
-            glb.write(out, later)
+        facts = _write(motion, path, options, report)
     except ValueError as error:
         if isinstance(error, ClipError):
             raise
@@ -96,10 +72,71 @@ def write_clip(
     return facts
 
 
+def _write(
+    motion: Any, path: str | PathLike[str], options: WriteOptions, report: Callable[[float], None]
+) -> dict[str, Any]:
+    meshes, left_out = meshes_of(motion, Path(fspath(path)).stem)
+    found = with_copies(motion, meshes) if options.instances and options.rig is None else list(meshes)
+    write = _writer(motion, options, found, lambda done: report(0.95 * done))
+    facts = {
+        "animation": write.name if options.rig is None else "a rig",
+        "unit": str(motion.metadata.get("unit") or ""),
+    }
+    if isinstance(motion, ClipView):
+        facts |= {"level": motion.level, "level_max_error": float(motion.max_error)}
+    facts |= write.facts
+    copied = [shape for shape in found if isinstance(shape, GltfCopies)]
+    if copied:
+        facts["instances"] = sum(len(shape.copies.rest[0]) for shape in copied)
+        write.max_error = max(write.max_error, *(shape.copies.max_error for shape in copied))
+    lost = copied[0].lost if copied else []
+    left_out += [key[1:] for key in lost]
+    facts |= {"left_out": left_out} if left_out else {}
+    facts |= branch_extras(motion) if "_vertex_branch" not in lost else {}
+    glb = Glb(clock(motion) | {"athcodec": facts})
+    add_materials(glb, motion)
+    transform = root_transform(motion.metadata)
+    later = write.add(glb, glb.node(name="plant", **transform), transform, found, report)
+    facts |= {"max_error": write.max_error, "vertices": motion.vertex_count}
+    with new_file(path) as out:
+        glb.write(out, later)
+    return facts
+
+
+def _writer(
+    motion: Any, options: WriteOptions, found: list[GltfMesh | GltfCopies], report: Callable[[float], None]
+) -> _Joined | _Morphed:
+    """What moves the meshes as the options say."""
+    if options.rig is not None:
+        return _Joined(motion, fit_rig(motion, options.rig, report))
+    chosen = np.zeros(motion.vertex_count, bool)
+    for shape in found:
+        if isinstance(shape, GltfMesh):
+            chosen[shape.source] = True
+    count = int(chosen.sum())
+    if not count:
+        return _Joined(motion, None)
+    wanted, joints = options.animation, None
+    if wanted != "morphs":
+        joints = fit_joints(motion, allowed_error(motion), MOST_JOINTS, report, None if chosen.all() else chosen)
+    if wanted == "joints" and joints is None:
+        raise ClipError(
+            f"joints: got more than {MOST_JOINTS} that it takes to move the clip, expected fewer: choose a "
+            "lower level, or morphs"
+        )
+    if wanted == "auto":
+        wanted = _smaller(motion, count, joints)
+    if wanted == "joints":
+        return _Joined(motion, joints)
+    check_morphs(motion, count)
+    return _Morphed(motion)
+
+
 def write_rest(motion: Any, path: str, name: str, more: Mapping[str, np.ndarray], extras: Mapping[str, Any]) -> None:
     """The rest pose alone, with attributes by their semantic (N, width) besides those of the clip."""
     found, left_out = meshes_of(motion, name, more)
     glb = Glb(clock(motion) | {"athcodec": dict(extras) | ({"left_out": left_out} if left_out else {})})
+    add_materials(glb, motion)
     root = glb.node(name="plant", **root_transform(motion.metadata))
     for shape in found:
         if "TEXCOORD_1" in shape.attributes:  # glTF allows a second set only beside a first
@@ -109,8 +146,8 @@ def write_rest(motion: Any, path: str, name: str, more: Mapping[str, np.ndarray]
         glb.write(out)
 
 
-def _smaller(motion: Any, joints: Joints | None) -> str:
-    morphs = motion.frame_count * (12 * motion.vertex_count + 4 * motion.frame_count + BYTES_PER_TARGET)
+def _smaller(motion: Any, vertex_count: int, joints: Joints | None) -> str:
+    morphs = motion.frame_count * (12 * vertex_count + 4 * motion.frame_count + BYTES_PER_TARGET)
     if joints is None:
         return "morphs"
     is_short = motion.frame_count <= SHORT_FRAMES and morphs <= SHORT_BYTES
@@ -118,12 +155,12 @@ def _smaller(motion: Any, joints: Joints | None) -> str:
     return "morphs" if is_short and morphs < size else "joints"
 
 
-def check_morphs(motion: Any) -> None:
-    """Raises ClipError where a motion is more than morph targets can sensibly hold."""
-    size = 12 * motion.frame_count * motion.vertex_count
+def check_morphs(motion: Any, vertex_count: int) -> None:
+    """Raises ClipError where a motion of so many vertices is more than morph targets can sensibly hold."""
+    size = 12 * motion.frame_count * vertex_count
     if motion.frame_count > MORPH_FRAMES or size > MORPH_BYTES:
         raise ClipError(
-            f"morph targets: got {motion.frame_count} frames of {motion.vertex_count} vertices, "
+            f"morph targets: got {motion.frame_count} frames of {vertex_count} vertices, "
             f"{size} bytes; expected at most {MORPH_FRAMES} frames and {MORPH_BYTES} bytes: choose joints, "
             "or fewer frames"
         )
@@ -136,43 +173,70 @@ def _add_animation(glb: Glb, take: Take, samplers: list[dict], channels: list[di
         glb.json.setdefault("animations", []).append(animation | extras)
 
 
+def _animate(glb: Glb, found: list[Take], movers: Movers | None, more: list[tuple[list[dict], list[dict]]]) -> None:
+    """An animation for each take, of samplers and channels in `more`, and of the movers that are anywhere else than at
+    rest in any of them; one key where such a one stands still in one."""
+    if movers is None:
+        movers = Movers([], (np.zeros((0, 3)),) * 3, (np.zeros((found[-1].stop, 0, 3)),) * 3)
+    has_others = bool(more[0][1])
+    used = [(values != rest).any(axis=(0, 2)) for values, rest in zip(movers.poses, movers.rest)]
+    if len(found) > 1 and not np.any(used) and movers.nodes and not has_others:
+        used[0][0] = True  # an animation has a channel at least
+    for take, (samplers, channels) in zip(found, more):
+        poses = [_keys(take, values) for values in movers.poses]
+        moves = [of & (values != values[:1]).any(axis=(0, 2)) for of, values in zip(used, poses)]
+        if len(found) > 1 and np.any(used) and not np.any(moves) and not has_others:
+            path = next(path for path, of in enumerate(used) if of.any())
+            moves[path][used[path].argmax()] = True  # one that stands still lasts as long as it does
+        _add_channels(glb, movers.nodes, take, poses, used, moves, samplers, channels)
+        _add_animation(glb, take, samplers, channels)
+
+
 class _Joined:
-    """Adds joints, and meshes that hang on them. It is all in memory."""
+    """Adds joints, and meshes that hang on them; None: there are none. It is all in memory."""
 
-    def __init__(self, motion: Any, joints: Joints):
+    def __init__(self, motion: Any, joints: Joints | None):
         self._motion, self._joints = motion, joints
-        self.max_error = joints.max_error
+        self.name = "instances" if joints is None else "joints"
+        self.max_error = 0.0 if joints is None else joints.max_error
+        self.facts = {} if joints is None else {"joints": len(joints.bind)}
 
-    def add(self, glb: Glb, root: int, found: list[GltfMesh], report: Callable[[float], None]) -> Iterator[bytes]:
-        joints = self._joints
+    def add(
+        self,
+        glb: Glb,
+        root: int,
+        transform: dict[str, Any],
+        found: list[GltfMesh | GltfCopies],
+        report: Callable[[float], None],
+    ) -> Iterator[bytes]:
+        joints, movers = self._joints, []
+        if joints is not None:
+            movers.append(Movers(self._add_skin(glb, root, joints), joints.rest, joints.poses))
+        # meshes with a skin are beside the root, as nothing but joints places them, and copies beside those
+        place: tuple[int | None, dict[str, Any]] = (root, {}) if joints is None else (None, transform)
+        for shape in found:
+            if isinstance(shape, GltfCopies):
+                movers += shape.add(glb, *place)
+            elif joints is not None:
+                self._add_mesh(glb, shape, joints)
+        moving = takes(self._motion)
+        _animate(glb, moving, Movers.all_of(movers), [([], []) for _ in moving])
+        return iter(())
+
+    def _add_skin(self, glb: Glb, root: int, joints: Joints) -> list[int]:
         nodes: list[int] = []
         for i, (place, turn) in enumerate(zip(*joints.rest[:2])):
             above = root if joints.parent is None or joints.parent[i] < 0 else nodes[joints.parent[i]]
             name = joints.names[i] if joints.names else f"part_{i}"
-            nodes.append(glb.node(above, name=name, translation=place.tolist(), rotation=_unit(turn)))
+            nodes.append(glb.node(above, name=name, translation=place.tolist(), rotation=unit_quaternion(turn)))
         bind = glb.array(np.ascontiguousarray(joints.bind.swapaxes(1, 2)).reshape(-1, 16))
         glb.json["skins"] = [{"joints": nodes, "inverseBindMatrices": bind, "skeleton": root}]
-        dtype = np.uint8 if len(nodes) <= 256 else np.uint16
-        for shape in found:
-            own, weights = _influences(joints, shape.source, dtype)
-            mesh = add_mesh(glb, shape, np.asarray(self._motion.rest), {"JOINTS_0": own, "WEIGHTS_0": weights})
-            glb.node(name=shape.name, mesh=mesh, skin=0)
-        self._animate(glb, nodes)
-        return iter(())
+        return nodes
 
-    def _animate(self, glb: Glb, nodes: list[int]) -> None:
-        """Channels of what is anywhere else than at rest, in all clips; one key where it stands still in one."""
-        joints, found = self._joints, takes(self._motion)
-        used = [(values != rest).any(axis=(0, 2)) for values, rest in zip(joints.poses, joints.rest)]
-        if len(found) > 1 and not np.any(used):
-            used[0][0] = True  # an animation has a channel at least
-        for take in found:
-            poses = [_keys(take, values) for values in joints.poses]
-            moves = [of & (values != values[:1]).any(axis=(0, 2)) for of, values in zip(used, poses)]
-            if len(found) > 1 and not np.any(moves):
-                path = next(path for path, of in enumerate(used) if of.any())
-                moves[path][used[path].argmax()] = True  # one that stands still lasts as long as it does
-            _add_animation(glb, take, *_channels(glb, nodes, take, poses, used, moves))
+    def _add_mesh(self, glb: Glb, shape: GltfMesh, joints: Joints) -> None:
+        own, weights = _influences(joints, shape.source, np.uint8 if len(joints.bind) <= 256 else np.uint16)
+        mesh = add_mesh(glb, shape, np.asarray(self._motion.rest), {"JOINTS_0": own, "WEIGHTS_0": weights})
+        glb.node(name=shape.name, mesh=mesh, skin=0)
 
 
 def _influences(joints: Joints, source: np.ndarray, dtype: type) -> tuple[np.ndarray, np.ndarray]:
@@ -196,13 +260,20 @@ def _keys(take: Take, values: np.ndarray) -> np.ndarray:
     return keys
 
 
-def _channels(
-    glb: Glb, nodes: list[int], take: Take, poses: list[np.ndarray], used: list[np.ndarray], moves: list[np.ndarray]
-) -> tuple[list[dict], list[dict]]:
-    """Samplers and channels of those joints (J,) that are used, by path; what moves has all keys, the others one."""
+def _add_channels(
+    glb: Glb,
+    nodes: list[int],
+    take: Take,
+    poses: list[np.ndarray],
+    used: list[np.ndarray],
+    moves: list[np.ndarray],
+    samplers: list[dict],
+    channels: list[dict],
+) -> None:
+    """Adds samplers and channels of those nodes (J,) that are used, by path; what moves has all keys, the others
+    one."""
     inputs: dict[int, int] = {}  # accessors of times, by their number
-    samplers, channels = [], []
-    for path, values, mine, moving in zip(("translation", "rotation", "scale"), poses, used, moves):
+    for path, values, mine, moving in zip(PATHS, poses, used, moves):
         for which, count in ((moving, len(values)), (mine & ~moving, 1)):
             chosen = np.flatnonzero(which)
             if not len(chosen):
@@ -215,36 +286,44 @@ def _channels(
                 output = glb.accessor(view, data.dtype, count, data.shape[2], byteOffset=place * size)
                 samplers.append({"input": inputs[count], "output": output})
                 channels.append({"sampler": len(samplers) - 1, "target": {"node": nodes[joint], "path": path}})
-    return samplers, channels
-
-
-def _unit(quaternion: np.ndarray) -> list[float]:
-    exact = quaternion.astype(np.float64)
-    return (exact / np.linalg.norm(exact)).tolist()
 
 
 class _Morphed:
     """Adds meshes with a morph target per frame; the targets are written last, frame by frame."""
 
+    name, facts = "morphs", {}
+
     def __init__(self, motion: Any):
         self._motion = motion
         self.max_error = 0.0
 
-    def add(self, glb: Glb, root: int, found: list[GltfMesh], report: Callable[[float], None]) -> Iterator[bytes]:
-        meshes = [add_mesh(glb, shape, np.asarray(self._motion.rest)) for shape in found]
-        channels = []
-        for mesh, shape in zip(meshes, found):
-            node = glb.node(root, name=shape.name, mesh=mesh)
+    def add(
+        self,
+        glb: Glb,
+        root: int,
+        transform: dict[str, Any],
+        found: list[GltfMesh | GltfCopies],
+        report: Callable[[float], None],
+    ) -> Iterator[bytes]:
+        shapes, meshes, channels, movers = [], [], [], []
+        for shape in found:
+            if isinstance(shape, GltfCopies):
+                movers += shape.add(glb, root, {})
+                continue
+            shapes.append(shape)
+            meshes.append(add_mesh(glb, shape, np.asarray(self._motion.rest)))
+            node = glb.node(root, name=shape.name, mesh=meshes[-1])
             channels.append({"sampler": 0, "target": {"node": node, "path": "weights"}})
-        frames, count = self._motion.frame_count, sum(len(shape.source) for shape in found)
-        weights = np.eye(frames, dtype=np.float32)
-        for take in takes(self._motion):
+        frames, count = self._motion.frame_count, sum(len(shape.source) for shape in shapes)
+        weights, moving, more = np.eye(frames, dtype=np.float32), takes(self._motion), []
+        for take in moving:
             times, values = glb.array(take.times, bounds=True), glb.array(take.of(weights).reshape(-1, 1))
-            _add_animation(glb, take, [{"input": times, "output": values}], channels)
+            more.append(([{"input": times, "output": values}], list(channels)))
+        _animate(glb, moving, Movers.all_of(movers), more)
         view = glb.view(12 * count * frames, target=VERTICES, byteStride=12)
-        bounds = self._add_targets(glb, found, meshes, view, count)
-        self.max_error = UNKNOWN_BOUND
-        return self._targets(glb, found, bounds, report)
+        bounds = self._add_targets(glb, shapes, meshes, view, count)
+        least, self.max_error = self.max_error, UNKNOWN_BOUND
+        return self._targets(glb, shapes, bounds, least, report)
 
     def _add_targets(
         self, glb: Glb, found: list[GltfMesh], meshes: list[int], view: int, count: int
@@ -264,16 +343,21 @@ class _Morphed:
                     max=[UNKNOWN_BOUND] * 3,
                 )
                 accessors[-1].append(glb.json["accessors"][index])
-                primitive = glb.json["meshes"][mesh]["primitives"][0]
-                primitive.setdefault("targets", []).append({"POSITION": index})
+                for primitive in glb.json["meshes"][mesh]["primitives"]:
+                    primitive.setdefault("targets", []).append({"POSITION": index})
                 place += 12 * len(shape.source)
         return accessors
 
     def _targets(
-        self, glb: Glb, found: list[GltfMesh], accessors: list[list[dict]], report: Callable[[float], None]
+        self,
+        glb: Glb,
+        found: list[GltfMesh],
+        accessors: list[list[dict]],
+        least: float,
+        report: Callable[[float], None],
     ) -> Iterator[bytes]:
         rest = np.asarray(self._motion.rest).astype(np.float32)
-        largest = 0.0
+        largest = least**2
         for start, frames in self._motion.blocks():
             for i, frame in enumerate(frames):
                 offsets = (frame.astype(np.float64) - rest).astype(np.float32)

@@ -20,8 +20,10 @@ import numpy as np
 from athcodec import __version__
 from athcodec.clip import ClipRange, stated_fps
 from athcodec.errors import ClipError
+from athcodec.exporters.scene_objects import face_materials
 from athcodec.exporters.timing import start_frame_of
 from athcodec.joining import metadata_of
+from athcodec.sources.scene_objects import FACE_MATERIAL
 from athcodec.sources.timing import whole
 from athcodec.units import METRES, unit_symbol
 
@@ -138,12 +140,13 @@ class Glb:
 @dataclass(frozen=True, eq=False)
 class GltfMesh:
     """One object: source (n,) the clip's vertices that it shows, corners (F, 3) or (E, 2) of them, or None for points;
-    attributes by their semantic, (n, width)."""
+    attributes by their semantic, (n, width); the material of each triangle (F,), -1 for none, or None."""
 
     name: str
     source: np.ndarray
     corners: np.ndarray | None
     attributes: dict[str, np.ndarray]
+    materials: np.ndarray | None = None
 
 
 def meshes_of(motion: Any, name: str, more: Mapping[str, np.ndarray] | None = None) -> tuple[list[GltfMesh], list[str]]:
@@ -157,15 +160,22 @@ def meshes_of(motion: Any, name: str, more: Mapping[str, np.ndarray] | None = No
     values = {key: array[source] for key, array in per_vertex.items()}
     values |= {key: _from_corners(array, corner_place, len(source)) for key, array in per_corner.items()}
     edges = np.asarray(motion.edges, np.int64) if motion.edges is not None else np.zeros((0, 2), np.int64)
+    labels, names = face_materials(motion) or (np.full(0 if faces is None else len(faces[0]), -1), [])
+    labels = np.where((labels >= 0) & (labels < len(names)), labels, -1)
+    if faces is not None:
+        labels = np.repeat(labels, np.maximum(np.asarray(faces[0], np.int64) - 2, 0))  # of each triangle
     made = []
     for part_name, start, stop in _objects(motion, name, corner_vertex[triangles], edges):
         rows = np.flatnonzero((source >= start) & (source < stop))
         place = np.full(len(source), -1)
         place[rows] = np.arange(len(rows))
-        mine = triangles[(corner_vertex[triangles[:, 0]] >= start) & (corner_vertex[triangles[:, 0]] < stop)]
+        own = np.flatnonzero((corner_vertex[triangles[:, 0]] >= start) & (corner_vertex[triangles[:, 0]] < stop))
+        mine, materials = triangles[own], labels[own]
         lines = edges[(edges[:, 0] >= start) & (edges[:, 0] < stop)]
         corners = place[corner_place[mine]] if len(mine) else place[lines] if len(lines) else None
-        made.append(GltfMesh(part_name, source[rows], corners, {key: array[rows] for key, array in values.items()}))
+        attributes = {key: array[rows] for key, array in values.items()}
+        materials = materials if (materials >= 0).any() else None
+        made.append(GltfMesh(part_name, source[rows], corners, attributes, materials))
     return made, left_out
 
 
@@ -178,12 +188,34 @@ def add_mesh(
         is_ratio = key == "COLOR_0" or key.startswith("WEIGHTS_")
         semantic[key] = glb.array(values, target=VERTICES, normalized=is_ratio and values.dtype.kind == "u")
     primitive |= {"attributes": semantic, "mode": 0}
+    primitives = [primitive]
     if mesh.corners is not None:
-        dtype = np.uint16 if mesh.corners.max() < 65535 else np.uint32
         primitive["mode"] = 4 if mesh.corners.shape[1] == 3 else 1
-        primitive["indices"] = glb.array(mesh.corners.astype(dtype).reshape(-1, 1), target=INDICES)
-    glb.json["meshes"].append({"name": mesh.name, "primitives": [primitive]})
+        dtype = np.uint16 if mesh.corners.max() < 65535 else np.uint32
+        primitives = [
+            primitive | more | {"indices": glb.array(corners.astype(dtype).reshape(-1, 1), target=INDICES)}
+            for corners, more in _by_material(mesh)
+        ]
+    glb.json["meshes"].append({"name": mesh.name, "primitives": primitives})
     return len(glb.json["meshes"]) - 1
+
+
+def _by_material(mesh: GltfMesh) -> list[tuple[np.ndarray, dict[str, Any]]]:
+    """The corners of each primitive, and which material it has: those of the first triangle's first."""
+    if mesh.materials is None:
+        return [(mesh.corners, {})]
+    labels, first = np.unique(mesh.materials, return_index=True)
+    return [
+        (mesh.corners[mesh.materials == label], {"material": int(label)} if label >= 0 else {})
+        for label in labels[np.argsort(first)]
+    ]
+
+
+def add_materials(glb: Glb, motion: Any) -> None:
+    """The clip's materials, of which it has the names alone."""
+    _, names = face_materials(motion) or (None, [])
+    if names:
+        glb.json["materials"] = [{"name": name} for name in names]
 
 
 def root_transform(metadata: Mapping[str, Any]) -> dict[str, Any]:
@@ -274,7 +306,7 @@ def _sorted_attributes(motion: Any, corner_count: int) -> tuple[dict, dict, list
             arrays[name] = getattr(motion, name)
     per_vertex, per_corner, left_out = {}, {}, []
     for name, array in arrays.items():
-        if name in NOT_PER_VERTEX:
+        if name in NOT_PER_VERTEX or name == FACE_MATERIAL and face_materials(motion):
             continue
         domain = domains.get(name, "vertex" if array.ndim and len(array) == motion.vertex_count else "")
         where = {"vertex": (per_vertex, motion.vertex_count), "corner": (per_corner, corner_count)}.get(domain)

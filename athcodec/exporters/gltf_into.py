@@ -13,7 +13,7 @@ import io
 import json
 import os
 import struct
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import closing
 from pathlib import Path
 from typing import Any
@@ -33,7 +33,15 @@ from athcodec.sources import ReadOptions
 from athcodec.sources.gltf import GltfNode, read_moving
 from athcodec.sources.gltf_file import HARMLESS, MESHOPT, GltfFile
 from athcodec.sources.gltf_json import BROKEN, entries
-from athcodec.sources.gltf_motion import EXTENSION, MAGIC, VERTEX_ATTRIBUTE, GltfPlace, extension_of, places_of
+from athcodec.sources.gltf_motion import (
+    EXTENSION,
+    MAGIC,
+    VERTEX_ATTRIBUTE,
+    GltfPlace,
+    extension_of,
+    motion_names,
+    places_of,
+)
 from athcodec.sources.opening import naming
 
 SHARE_OF_TWINS = 1 / 8  # of the vertices: from there on the motion holds twins once, and meshes number its vertices
@@ -50,12 +58,15 @@ class Into:
     """A GLB whose vertices are to move by ATH_motion: `clip` is their motion, with the meshes as its rest pose.
 
     Close it. keep_animation leaves what moved the vertices in the file, for programs that do not know the extension.
+    name: of the motion. What other motions of the file move is left to them.
     Raises ClipError where the file is no GLB with its bytes inside, nothing in it moves, or what moves has to move to
     another node though it is to be kept.
     """
 
-    def __init__(self, path: str | os.PathLike[str], options: ReadOptions, keep_animation: bool = False):
-        self.path, self._keep = os.fspath(path), keep_animation
+    def __init__(
+        self, path: str | os.PathLike[str], options: ReadOptions, keep_animation: bool = False, name: str | None = None
+    ):
+        self.path, self._keep, self._name = os.fspath(path), keep_animation, name
         with naming(path, *BROKEN):
             self._file = GltfFile(path)
         try:
@@ -81,8 +92,10 @@ class Into:
                 )
         if any("uri" in buffer for buffer in self._file.items("buffers")):
             raise ClipError("into: got buffers outside the GLB, expected all bytes in it")
-        if extension_of(self._json) is not None:
-            raise ClipError(f"into: got a file with {EXTENSION}, expected one without it")
+        names = motion_names(self._json)
+        if self._name in names:
+            raise ClipError(f"gltf_motion: got {self._name!r}, which the file has, expected another name")
+        self._number = len(names)
 
     def close(self) -> None:
         self._file.close()
@@ -102,8 +115,10 @@ class Into:
             animations = self._json["animations"]
             self._replace_motion(binary)
             motion = self._motion(binary.add(ath), ath, animations)
-            self._json.setdefault("extensions", {})[EXTENSION] = {"motions": [motion]}
-            self._json.setdefault("extensionsUsed", []).append(EXTENSION)
+            said = self._json.setdefault("extensions", {}).setdefault(EXTENSION, {})
+            said.setdefault("motions", []).append(motion)
+            if EXTENSION not in self._json.setdefault("extensionsUsed", []):
+                self._json["extensionsUsed"].append(EXTENSION)
             if all(name.startswith(KNOWN) and name not in POINTING for name in self._json["extensionsUsed"]):
                 _prune(self._json, used, self._needless)
             data = binary.packed(self._json)
@@ -123,7 +138,8 @@ class Into:
                 more = {"start": start, "extras": said.get(name)}
                 clips.append({"name": clip.name} | {key: value for key, value in more.items() if value})
         clips = [clip for clip in clips if len(clip) > 1]
-        return {"bufferView": view} | ({"clips": clips} if clips else {})
+        named = {} if self._name is None else {"name": self._name}
+        return named | {"bufferView": view} | ({"clips": clips} if clips else {})
 
     # ---- meshes and nodes ----
 
@@ -180,7 +196,9 @@ class Into:
             primitive["attributes"] = kept | {
                 key: value for key, value in attributes.items() if key in kept or key == VERTEX_ATTRIBUTE
             }
-            said = {"motion": 0} | ({"firstVertex": part.first} if part.first and self._vertex is None else {})
+            said = {"motion": self._number} | (
+                {"firstVertex": part.first} if part.first and self._vertex is None else {}
+            )
             primitive.setdefault("extensions", {})[EXTENSION] = said
 
     def _attributes(self, part: GltfNode, binary: _Binary) -> dict[str, int]:
@@ -226,41 +244,56 @@ def _named(clip: MotionClip) -> MotionClip:
     return clip.replace(clip_ranges=(ClipRange(played[0], clip.frame_count, is_loop),))
 
 
-def write_back(path: str | os.PathLike[str], motion: ClipView, out: str | os.PathLike[str]) -> None:
-    """Write the GLB `path` with morph targets, a frame of `motion` each, in place of the ATH_motion that this shows.
+def write_back(path: str | os.PathLike[str], views: Sequence[ClipView], out: str | os.PathLike[str]) -> None:
+    """Write the GLB `path` with morph targets, a frame each, in place of the motions of ATH_motion that `views` show.
 
     Raises ClipError where these are more than glTF can sensibly hold, OSError.
     """
-    check_morphs(motion)
+    for view in views:
+        check_morphs(view, view.vertex_count)
     with naming(path, *BROKEN), closing(GltfFile(path)) as file:
-        gltf, used, binary, places = file.json, _used(file.json), _Binary(file), places_of(file)
-        motions = (extension_of(gltf) or {}).get("motions", [{}])
-        said = {clip["name"]: clip for clip in motions[0].get("clips", ())}
-        _add_targets(gltf, binary, places, motion)
-        needless = _morph_nodes(gltf, binary, motion, said)
-        for holder in (gltf, *(primitive for primitive, _ in places)):
-            _pop_extension(holder)
-        gltf["extensionsUsed"].remove(EXTENSION)
-        if all(name.startswith(KNOWN) and name not in POINTING for name in gltf["extensionsUsed"]):
+        gltf, used, binary, needless = file.json, _used(file.json), _Binary(file), set[int]()
+        numbers = [view.decoder.file.source.number for view in views]
+        for number, view, places in zip(numbers, views, [places_of(file, number) for number in numbers]):
+            said = {clip["name"]: clip for clip in gltf["extensions"][EXTENSION]["motions"][number].get("clips", ())}
+            _add_targets(gltf, binary, places, view)
+            needless |= _morph_nodes(gltf, binary, places, view, said)
+            for primitive, _ in places:
+                _pop_extension(primitive)
+        _remove_motions(gltf, set(numbers))
+        if all(name.startswith(KNOWN) and name not in POINTING for name in gltf.get("extensionsUsed", ())):
             _prune(gltf, used, needless)
-        if not gltf["extensionsUsed"]:
-            del gltf["extensionsUsed"]
         data = binary.packed(gltf)
     with new_file(out) as written:
         written.write(_glb(gltf, data))
 
 
-def put_motion(path: str | os.PathLike[str], ath: bytes, out: str | os.PathLike[str]) -> int:
-    """Write the GLB `path` with these bytes in place of those of its motion, which are as many or more; its size.
+def _remove_motions(gltf: dict, numbers: set[int]) -> None:
+    """Motions of the file, and with the last of them the extension; primitives that others move name these anew."""
+    said = gltf["extensions"][EXTENSION]
+    kept = [number for number in range(len(said["motions"])) if number not in numbers]
+    if not kept:
+        _pop_extension(gltf)
+        gltf["extensionsUsed"].remove(EXTENSION)
+        if not gltf["extensionsUsed"]:
+            del gltf["extensionsUsed"]
+        return
+    said["motions"] = [said["motions"][number] for number in kept]
+    for primitive in (primitive for mesh in gltf["meshes"] for primitive in mesh["primitives"]):
+        own = extension_of(primitive)
+        if own is not None:
+            own["motion"] = kept.index(own["motion"])
 
-    Raises ClipError where it is no GLB that holds one motion, OSError.
+
+def put_motion(path: str | os.PathLike[str], ath: bytes, out: str | os.PathLike[str], number: int) -> int:
+    """Write the GLB `path` with these bytes in place of those of a motion of it, which are as many or more; its size.
+
+    Raises ClipError where it is no GLB that holds the motion inside, OSError.
     """
     with naming(path, *BROKEN), closing(GltfFile(path)) as file:
-        motions = entries(extension_of(file.json) or {}, "motions")
-        if len(motions) != 1:
-            raise ClipError(f"{EXTENSION}: got {len(motions)} motions, expected one")
-        _, start, _ = file.part(motions[0], "bufferView")
-        view, binary = file.json["bufferViews"][motions[0]["bufferView"]], _Binary(file)
+        motion = entries(extension_of(file.json) or {}, "motions")[number]
+        _, start, _ = file.part(motion, "bufferView")
+        view, binary = file.json["bufferViews"][motion["bufferView"]], _Binary(file)
         if view["buffer"] != 0 or "uri" in file.json["buffers"][0]:
             raise ClipError(f"{EXTENSION}: got a motion outside the GLB, expected it inside")
         view["byteLength"] = len(ath)
@@ -295,13 +328,16 @@ def _add_targets(gltf: dict, binary: _Binary, places: list[GltfPlace], motion: C
                 primitive["targets"] = [{"POSITION": len(gltf["accessors"]) - 1}] * motion.frame_count
 
 
-def _morph_nodes(gltf: dict, binary: _Binary, motion: ClipView, said: dict[str, dict]) -> set[int]:
+def _morph_nodes(
+    gltf: dict, binary: _Binary, places: list[GltfPlace], motion: ClipView, said: dict[str, dict]
+) -> set[int]:
     """Animates the weights of nodes that show meshes which move, by each clip, in the animation of its name; what moved
     them before goes. Returns the nodes that nothing needs any more."""
+    moved = {id(primitive) for primitive, _ in places}
     moving = {
         index
         for index, node in enumerate(gltf["nodes"])
-        if "mesh" in node and any(extension_of(one) for one in gltf["meshes"][node["mesh"]]["primitives"])
+        if "mesh" in node and not moved.isdisjoint(map(id, gltf["meshes"][node["mesh"]]["primitives"]))
     }
     skins = [gltf["nodes"][index].pop("skin") for index in moving if "skin" in gltf["nodes"][index]]
     for index in moving:

@@ -6,7 +6,7 @@ that is written. It writes nothing.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -46,15 +46,18 @@ class Joints:
         return np.einsum("nij,nj->ni", matrices[own], local) + translation[own]
 
 
-def fit_joints(motion: Any, allowed: float, most: int, report: Callable[[float], None]) -> Joints | None:
-    """Joints that are at most about `allowed` off; None where that takes more than `most`."""
-    moving = fit(motion, Placed, allowed, most, lambda done: report(0.7 * done))
+def fit_joints(
+    motion: Any, allowed: float, most: int, report: Callable[[float], None], chosen: np.ndarray | None = None
+) -> Joints | None:
+    """Joints that are at most about `allowed` off; None where that takes more than `most`. chosen (N,) bool: the
+    vertices that they are to move, all by default."""
+    moving = fit(motion, Placed, allowed, most, lambda done: report(0.7 * done), chosen)
     if moving is None:
         return None
     parts, poses = moving.parts, [moving.places, *moving.values]
     still = (parts.middle, quaternions(parts.axes), np.ones((len(parts), 3)))
     for start, stop in motion.clip_range_frames:
-        _hold([pose[start:stop] for pose in poses], still, parts.extent, SLACK * allowed)
+        hold([pose[start:stop] for pose in poses], still, parts.extent, SLACK * allowed)
     bind = np.zeros((len(parts), 4, 4))
     bind[:, :3, :3] = parts.axes.swapaxes(1, 2)
     bind[:, :3, 3] = -np.einsum("kij,ki->kj", parts.axes, parts.middle)
@@ -65,23 +68,25 @@ def fit_joints(motion: Any, allowed: float, most: int, report: Callable[[float],
         tuple(a.astype(np.float32) for a in still),
         tuple(pose.astype(np.float32) for pose in poses),
     )
-    joints.max_error = _measured(motion, joints, lambda done: report(0.7 + 0.3 * done))
+    joints.max_error = _measured(motion, joints, chosen, lambda done: report(0.7 + 0.3 * done))
     return joints
 
 
-def _measured(motion: Any, joints: Joints, report: Callable[[float], None]) -> float:
+def _measured(motion: Any, joints: Joints, chosen: np.ndarray | None, report: Callable[[float], None]) -> float:
+    rows = slice(None) if chosen is None else chosen
     rest = np.asarray(motion.rest).astype(np.float32).astype(np.float64)
     largest = 0.0
     for start, frames in motion.blocks():
         for i, frame in enumerate(frames):
-            away = joints.pose(rest, start + i) - frame
+            away = (joints.pose(rest, start + i) - frame)[rows]
             largest = max(largest, float(np.einsum("ni,ni->n", away, away).max()))
         report((start + len(frames)) / motion.frame_count)
     return float(np.sqrt(largest))
 
 
-def _hold(poses: list[np.ndarray], still: tuple[np.ndarray, ...], extent: np.ndarray, slack: float) -> None:
-    """Makes constant, as in the first frame or better as at rest, what moves no vertex by `slack`."""
+def hold(poses: Sequence[np.ndarray], still: Sequence[np.ndarray], extent: np.ndarray, slack: float) -> None:
+    """Makes constant, as in the first frame or better as at rest, what moves no vertex by `slack`: of translations,
+    rotations and scales (T, K, width), those at rest (K, width), and how far vertices go along the axes (K, 3)."""
     around = np.sqrt((extent**2).sum(axis=1, keepdims=True) - extent**2)  # from each axis
     moves = (
         lambda values, constant: values - constant,

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from athcodec.sources.scene_objects import ArrayDescriptor
+from athcodec.sources.scene_objects import FACE_MATERIAL, MATERIAL_NAMES, ArrayDescriptor
 
 # kept by the formats themselves, or by their objects
 KNOWN_METADATA = ("fps", "start_frame", "part_names", "part_kinds", "part_usd", "domains")
@@ -171,6 +171,21 @@ def _curve_counts(motion: Any, ends: np.ndarray, kinds: list[str]) -> Iterator[n
         else:
             chains = None if motion.edges is None else _chains(motion.edges, int(end) - total, int(end))
             yield np.array([total]) if chains is None else chains
+
+
+def face_materials(motion: Any) -> tuple[np.ndarray, list[str]] | None:
+    """(F,) the material of each face, among the names; outside them where it has none. None where the clip says it of
+    no face."""
+    labels, names = motion.attributes.get(FACE_MATERIAL), motion.metadata.get(MATERIAL_NAMES)
+    count = 0 if motion.polygons is None else len(motion.polygons[0])
+    if labels is None or not isinstance(names, list) or labels.shape != (count,) or labels.dtype.kind not in "iu":
+        return None
+    return labels.astype(np.int64), [str(name) for name in names]
+
+
+def material_runs(labels: np.ndarray, names: list[str]) -> list[tuple[int, np.ndarray]]:
+    """The materials that faces have, (F,), and which faces these are."""
+    return [(int(label), np.flatnonzero(labels == label)) for label in np.unique(labels) if 0 <= label < len(names)]
 
 
 def domain_of(motion: Any, name: str, values: np.ndarray, domains: dict[str, str]) -> str:

@@ -1,9 +1,9 @@
 """Writes USD: one Mesh, BasisCurves or Points prim per object of a clip, with time samples of points and extent.
 
-Faces, texture coordinates and other static arrays are written once. Frames are written as they come and saved now and
-then: what has been saved leaves memory, so that a clip may be longer than memory. USD's points are float32, a clip in
-float64 is rounded. Prims are in world space and hold no transforms, but for copies of one shape, which become a
-PointInstancer where options.instances asks for it. What USD has no place for (branches, arrays per
+Faces, texture coordinates, names of materials and other static arrays are written once. Frames are written as they come
+and saved now and then: what has been saved leaves memory, so that a clip may be longer than memory. USD's points are
+float32, a clip in float64 is rounded. Prims are in world space and hold no transforms, but for copies of one shape,
+which become a PointInstancer where options.instances asks for it. What USD has no place for (branches, arrays per
 branch, bytes) lies in the namespace "athcodec" of the root prim, from where sources/usd.py takes it back.
 """
 
@@ -11,14 +11,14 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from os import PathLike
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pxr import Sdf, Tf, Usd, UsdGeom, UsdSkel, Vt
+from pxr import Sdf, Tf, Usd, UsdGeom, UsdShade, UsdSkel, Vt
 
 from athcodec.atomic_files import new_files
 from athcodec.exporters import WriteOptions
@@ -32,13 +32,15 @@ from athcodec.exporters.scene_objects import (
     SceneObject,
     distinct,
     domain_of,
+    face_materials,
+    material_runs,
     objects_of,
     own_arrays,
     rows_of,
 )
 from athcodec.exporters.timing import distinct_frame_numbers, frame_rate_of
 from athcodec.exporters.usd_rig import write_rig
-from athcodec.sources.scene_objects import OWN
+from athcodec.sources.scene_objects import FACE_MATERIAL, OWN
 from athcodec.units import METRES, unit_symbol
 
 SAVE_BYTES = 16 << 20
@@ -71,6 +73,7 @@ WIDER = {
     "d": "d",
 }
 NUMPY = {"i": "<i4", "u": "<u4", "q": "<i8", "Q": "<u8", "B": "u1", "?": "?", "e": "<f2", "f": "<f4", "d": "<f8"}
+MATERIALS = "materials"
 WIND = "wind"  # in what is known of an assembly: the text of its JSON
 INTERPOLATION = {"vertex": "vertex", "corner": "faceVarying", "face": "uniform", "constant": "constant"}
 
@@ -137,11 +140,13 @@ def _write(motion: Any, name: str, options: WriteOptions, report: Callable[[floa
     if joints is not None and options.nanite:
         return _write_assembly(stage, motion, joints, objects, codes, report)
     instanced = fit_copies(motion, objects) if options.instances and joints is None else {}
-    for number, (obj, name) in enumerate(zip(objects, distinct(_identifier(obj.name) for obj in objects))):
+    names = distinct(_identifier(obj.name) for obj in objects)
+    for number, (obj, name) in enumerate(zip(objects, names)):
         if number in instanced:
             _define_instanced(stage, f"/clip/{name}", obj, instanced[number])
         else:
             obj.copies, obj.target = 1, _define(stage, f"/clip/{name}", obj)
+    _bind_materials(stage, motion, objects, names)
     left = _static_arrays(stage, motion, objects)
     _own_arrays(root, motion, left)
     if joints is not None:
@@ -202,6 +207,7 @@ def _write_assembly(
             obj.instancer = UsdGeom.PointInstancer(stage.GetPrimAtPath(f"{nanite.ROOT_PRIM}/{name}"))
         else:
             obj.copies, obj.target = 1, _define(stage, f"{nanite.BASE}/{name}", obj)
+    _bind_materials(stage, motion, objects, ["base", *names])
     nanite.mark_root(stage.GetDefaultPrim())
     _own_arrays(stage.GetDefaultPrim(), motion, _static_arrays(stage, motion, objects))
     base = [obj for number, obj in enumerate(objects) if number not in parts]
@@ -270,6 +276,32 @@ def _define(stage: Usd.Stage, place: str, obj: SceneObject) -> UsdGeom.PointBase
     return schema
 
 
+def _bind_materials(stage: Usd.Stage, motion: Any, objects: list[SceneObject], taken: Iterable[str]) -> None:
+    """The materials by their names, without contents, and the faces that have them."""
+    found = face_materials(motion)
+    if found is None or not found[1]:
+        return
+    labels, names = found
+    scope = UsdGeom.Scope.Define(stage, f"/clip/{distinct([*taken, MATERIALS])[-1]}").GetPath()
+    materials = []
+    for name, identifier in zip(names, distinct(map(_identifier, names))):
+        material = UsdShade.Material.Define(stage, scope.AppendChild(identifier))
+        if name != identifier:
+            material.GetPrim().SetDisplayName(name)
+        materials.append(material)
+    for obj in objects:
+        own = rows_of_one(labels[obj.face_rows], obj) if obj.copies > 1 else labels[obj.face_rows]
+        runs = [] if own is None or obj.kind != "mesh" else material_runs(own, names)
+        prim = obj.target.GetPrim()
+        if len(runs) == 1 and len(runs[0][1]) == len(own):
+            UsdShade.MaterialBindingAPI.Apply(prim).Bind(materials[runs[0][0]])
+            continue
+        for label, faces in runs:
+            binding, part = UsdShade.MaterialBindingAPI.Apply(prim), materials[label].GetPrim().GetName()
+            subset = binding.CreateMaterialBindSubset(part, _int_array(faces)).GetPrim()
+            UsdShade.MaterialBindingAPI.Apply(subset).Bind(materials[label])
+
+
 def _define_instanced(stage: Usd.Stage, place: str, obj: SceneObject, copies: Copies) -> None:
     """A PointInstancer, and below it the shape of one copy, which is the object's target."""
     instancer = UsdGeom.PointInstancer.Define(stage, place)
@@ -313,7 +345,7 @@ def _static_arrays(stage: Usd.Stage, motion: Any, objects: list[SceneObject]) ->
     left = {}
     domains = motion.metadata.get("domains", {})
     for name, values in motion.attributes.items():
-        if name in KNOWN_ATTRIBUTES:
+        if name in KNOWN_ATTRIBUTES or name == FACE_MATERIAL and face_materials(motion):
             continue
         domain = domain_of(motion, name, values, domains)
         if domain not in INTERPOLATION or not _write_array(name, values, domain, objects):

@@ -3,8 +3,9 @@
 Frames are the times at which anything that is read has a sample; options.fps sets another rate. Between samples points
 and transforms go on straight lines. Alembic lists the corners of a face clockwise: they come counter-clockwise, as
 everywhere else here. An Alembic file names no unit and no axis; Y is up by custom, which is said of Blender's files
-alone. What has instances, and a shape that stays as it is, becomes one object, of as many copies. Objects that are
-hidden throughout, NURBS patches, materials and others are named in the clip's `not_read`; velocities are not read.
+alone. The names of face sets become those of materials: attribute "face_material", metadata "material_names". What has
+instances, and a shape that stays as it is, becomes one object, of as many copies. Objects that are hidden throughout,
+NURBS patches, materials and others are named in the clip's `not_read`; velocities are not read.
 
 Alembic's library crashes on damaged archives. So it works in a process of its own (alembic_archive.py), which gives
 frames when it is asked for them, and whose crash becomes a ClipError.

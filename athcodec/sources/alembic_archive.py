@@ -279,6 +279,8 @@ def _add(
         return _above(child, xforms)
     found = next((schema for start, schema in SCHEMAS.items() if name.startswith(start)), None)
     names = (child.getName(), child.getFullName())
+    if name.startswith("AbcGeom_FaceSet"):
+        return xforms  # of a mesh, which is read with it
     if found is None and name:
         kind = name.partition("_")[2].rpartition("_")[0] or name  # of AbcGeom_NuPatch_v2
         not_read.setdefault(kind, []).append(names[1])
@@ -332,7 +334,17 @@ def _topology(obj: _Object) -> np.ndarray:
     obj.check()
     order = turned_corners(obj.face_counts)
     obj.face_indices = obj.face_indices[order]
+    if obj.kind == "mesh":
+        _bind_materials(obj)
     return order
+
+
+def _bind_materials(obj: _Object) -> None:
+    """By the names of face sets, in which programs write those of materials."""
+    for name in obj.schema.getFaceSetNames():
+        faces = np.array(obj.schema.getFaceSet(name).getSchema().getValue().getFaces(), np.int64)
+        if len(faces) and 0 <= faces.min() and faces.max() < len(obj.face_counts):
+            obj.bind(str(name), faces)
 
 
 def _fixed(obj: _Object, found: Any) -> np.ndarray:

@@ -1,12 +1,13 @@
 """Reads glTF 2.0, .glb or .gltf with its buffers, as positions in world space: skins, animated nodes, morph targets.
 
 Vertices are those of the meshes in the order of the nodes in the scene; a mesh that two nodes show is there twice, one
-with EXT_mesh_gpu_instancing as an object of so many copies.
+with EXT_mesh_gpu_instancing as an object of so many copies. So are the nodes below one that athcodec's writer marks.
 Frames are evaluated a block at a time; keys of animations and base meshes are held in memory, morph targets are read
 when a frame needs them. Frames lie at `fps`; by default at the rate that the keys were sampled at, else 30 per second.
 Animations that move different nodes run together, of several for the same nodes the first; `only` takes patterns of the
 names of nodes and meshes, and "animation:NAME" for another animation; `takes` makes a clip of its own of each. One
-whose extras say {"loop": true} is a loop, and loses its last frame where that is the first again. Not read: Draco;
+whose extras say {"loop": true} is a loop, and loses its last frame where that is the first again. The attribute
+"face_material" numbers the materials, whose names are the metadata "material_names". Not read: Draco; what is in
 materials, cameras, lights, other scenes and other attributes, which the clip's `not_read` names; normals of a mesh that
 moves.
 """
@@ -31,6 +32,7 @@ from athcodec.sources.gltf_json import BROKEN, brief, entries, entry, indices, i
 from athcodec.sources.gltf_motion import EXTENSION, extension_of
 from athcodec.sources.gltf_scene import Scene, key_rate, on_grid, rotation_matrices
 from athcodec.sources.opening import closing_on_failure, naming
+from athcodec.sources.scene_objects import FACE_MATERIAL, MATERIAL_NAMES
 
 WORK_BYTES = 64 << 20
 MOST_VERTICES = 1 << 27
@@ -42,6 +44,7 @@ FILLERS = {"colors": 1.0}
 TAKEN = ("POSITION", *NAMES)
 ANIMATION = "animation:"
 INSTANCING = "EXT_mesh_gpu_instancing"
+COPIES = "copies"  # true in the extras of a node: those below show one shape, and are one object; false: or are not
 INSTANCE_PARTS = {"TRANSLATION": 3, "ROTATION": 4, "SCALE": 3}
 REST_ROUNDING = 1e-6  # of the largest coordinate, by which joints may miss the mesh that they leave as it is
 SAME = 1e-5  # of the size: how far off the end of a loop may be from its beginning
@@ -86,6 +89,7 @@ class GltfNode:
     influences: list[tuple[int, np.ndarray, np.ndarray]] = field(default_factory=list)
     strongest: np.ndarray | None = None
     copies: np.ndarray | None = None  # (k, 4, 4) from each instance to the node
+    of_copies: dict[str, np.ndarray] = field(default_factory=dict)  # (k, width) by attribute: what each copy has
 
     @property
     def shape_count(self) -> int:
@@ -118,7 +122,9 @@ def read_moving(file: GltfFile, options: ReadOptions) -> tuple[MotionClip, list[
         scenes = _scenes(file, options)
         scene = next(iter(scenes.values()))
         moving = [
-            node for node in _chosen(scene, _patterns(options)) if any(_moves(take, node) for take in scenes.values())
+            node
+            for node in _chosen(scene, _patterns(options))
+            if any(_moves(take, node) for take in scenes.values()) and not _has_motion(node)
         ]
         if not moving:
             raise ClipError("animations: got none that moves vertices, expected skins, nodes or morph targets that do")
@@ -172,6 +178,11 @@ def _moves(scene: Scene, node: GltfNode) -> bool:
     return scene.morphs(node.index) or scene.animates(set(joints))
 
 
+def _has_motion(node: GltfNode) -> bool:
+    """Whether a motion of ATH_motion moves it already."""
+    return any(extension_of(primitive) is not None for primitive in node.primitives)
+
+
 def _patterns(options: ReadOptions) -> list[str]:
     """Of the names of nodes and meshes to read."""
     return [name for name in options.only if not name.startswith(ANIMATION)]
@@ -185,8 +196,12 @@ def _clip(
     motion = next(iter(motions.values()))
     timings = {name: _sampling(take, options.fps) for name, take in motions.items()}
     still = all(len(timing.times) == 1 for timing in timings.values())
-    attributes, branches = _attributes(file, nodes, options.skip, motion, keep_normals=still)
-    faces, edges = _connections(file, nodes)
+    attributes, branches = _attributes(scene, nodes, options.skip, motion, keep_normals=still)
+    faces, edges, face_material = _connections(file, nodes)
+    said: dict[str, Any] = {}
+    if face_material is not None and FACE_MATERIAL not in options.skip:
+        attributes[FACE_MATERIAL] = face_material
+        said = {MATERIAL_NAMES: _material_names(file), "domains": {FACE_MATERIAL: "face"}}
     rest = _rest_pose(motion, nodes) if options.rest == "auto" else None
     clips = {}
     for name, timing in timings.items():
@@ -203,8 +218,9 @@ def _clip(
             clip_ranges=(ClipRange("", len(timing.times), True),) if timing.is_loop else (),
             metadata={"unit": "m", "up_axis": "y"}
             | timing.clock
-            | _names(nodes)
-            | ({} if options.takes else _played(scene)),
+            | _names(scene, nodes)
+            | said
+            | ({} if options.takes else _played(scene, nodes)),
             unchanged=file.unchanged,
             not_read=_not_read(scene, nodes),
             **branches,
@@ -307,7 +323,7 @@ def _animation_numbers(file: GltfFile) -> dict[str, int]:
 
 def _nodes(scene: Scene, index: int, mesh: dict, name: str) -> list[GltfNode]:
     """One per set of vertices: primitives that use the same accessors share theirs."""
-    copies = _copies(scene, index)
+    copies, of_copies = _copies(scene, index)
     nodes: dict[Any, GltfNode] = {}
     for primitive in entries(mesh, "primitives"):
         attributes = {key: integer(entry(primitive, "attributes"), key) for key in entry(primitive, "attributes")}
@@ -332,6 +348,7 @@ def _nodes(scene: Scene, index: int, mesh: dict, name: str) -> list[GltfNode]:
                 np.array(weights, np.float64),
                 count=scene.file.count(attributes["POSITION"]) * (1 if copies is None else len(copies)),
                 copies=copies,
+                of_copies=of_copies,
             )
         node = nodes[key]
         kind = MODE_KINDS[integer(primitive, "mode", 4, stop=7)]
@@ -349,11 +366,12 @@ def _extension(item: dict, name: str) -> dict | None:
     return entry(extensions, name) if isinstance(extensions, dict) and name in extensions else None
 
 
-def _copies(scene: Scene, index: int) -> np.ndarray | None:
-    """(k, 4, 4) from each instance of EXT_mesh_gpu_instancing to its node; None without."""
+def _copies(scene: Scene, index: int) -> tuple[np.ndarray | None, dict[str, np.ndarray]]:
+    """(k, 4, 4) from each instance of EXT_mesh_gpu_instancing to its node, None without; and what each copy of a shape
+    has, (k, width) by attribute."""
     extension = _extension(scene.nodes[index], INSTANCING)
     if extension is None:
-        return None
+        return None, _own_extras(scene, index)
     if scene.nodes[index].get("skin") is not None:
         raise ClipError(f"node {index}: got {INSTANCING} of a mesh with a skin, expected one without")
     own = entry(extension, "attributes")
@@ -372,7 +390,33 @@ def _copies(scene: Scene, index: int) -> np.ndarray | None:
         found[:, :3, :3] *= parts["SCALE"][:, None, :]
     if "TRANSLATION" in parts:
         found[:, :3, 3] = parts["TRANSLATION"]
+    of_copies = {name: scene.file.attribute(integer(own, name)) for name in own if name.startswith("_")}
+    for name, values in of_copies.items():
+        if len(values) != len(found):
+            raise ClipError(
+                f"node {index}: got {len(values)} entries of {name}, expected {len(found)}, one an instance"
+            )
+    return found, of_copies
+
+
+def _own_extras(scene: Scene, index: int) -> dict[str, np.ndarray]:
+    """Numbers in the extras of a node below one that has COPIES, (1, width) by attribute."""
+    extras = scene.nodes[index].get("extras")
+    if _mark(scene, int(scene.parent[index])) is None or not isinstance(extras, dict):
+        return {}
+    found = {}
+    for key, value in extras.items():
+        row = value if isinstance(value, list) else [value]
+        if 1 <= len(row) <= 4 and all(_is_number(number) for number in row):
+            found[f"_{key}"] = np.array([row], np.int64 if all(type(n) is int for n in row) else np.float32)
     return found
+
+
+def _mark(scene: Scene, index: int) -> bool | None:
+    """What a node says of those below it by COPIES: whether they are one object; None for nothing."""
+    extras = scene.nodes[index].get("extras") if index >= 0 else None
+    said = extras.get(COPIES) if isinstance(extras, dict) else None
+    return said if isinstance(said, bool) else None
 
 
 def _not_read(scene: Scene, nodes: Sequence[GltfNode]) -> dict[str, list[str]]:
@@ -394,7 +438,7 @@ def _not_read(scene: Scene, nodes: Sequence[GltfNode]) -> dict[str, list[str]]:
         instancing = _extension(scene.nodes[node.index], INSTANCING)
         own = () if instancing is None else entry(instancing, "attributes")
         left = [key for key in node.attributes if not key.startswith(("_", "JOINTS_", "WEIGHTS_")) and key not in TAKEN]
-        left += [key for key in own if key not in INSTANCE_PARTS]
+        left += [key for key in own if key not in INSTANCE_PARTS and not key.startswith("_")]
         for key in left:
             found.setdefault("attribute", []).append(f"{node.name}.{key}")
     return found
@@ -656,29 +700,72 @@ def _on_keys(times: np.ndarray, keys: np.ndarray, fps: float) -> np.ndarray:
 # ---- what does not move ----
 
 
-def _names(nodes: list[GltfNode]) -> dict[str, Any]:
-    return {"part_names": [node.name for node in nodes], "part_kinds": [node.kind for node in nodes]}
+def _parts(scene: Scene, nodes: list[GltfNode]) -> list[tuple[str, list[GltfNode]]]:
+    """The objects, by name: a node each, but for those side by side that show one shape below a node that says so."""
+    parts: list[tuple[int, str, list[GltfNode]]] = []
+    for node in nodes:
+        above = int(scene.parent[node.index])
+        if not _mark(scene, above) or node.skin is not None or node.targets or node.copies is not None:
+            parts.append((-1, node.name, [node]))
+        elif parts and parts[-1][0] == above and _is_alike(parts[-1][2][-1], node):
+            parts[-1][2].append(node)
+        else:
+            parts.append((above, scene.name(above) or node.name, [node]))
+    return [(name if len(own) > 1 else own[0].name, own) for _, name, own in parts]
 
 
-def _played(scene: Scene) -> dict[str, Any]:
+def _is_alike(node: GltfNode, other: GltfNode) -> bool:
+    """Whether two nodes show the same vertices and faces."""
+    return node.mesh == other.mesh and node.index != other.index and node.primitives == other.primitives
+
+
+def _names(scene: Scene, nodes: list[GltfNode]) -> dict[str, Any]:
+    parts = _parts(scene, nodes)
+    return {"part_names": [name for name, _ in parts], "part_kinds": [own[0].kind for _, own in parts]}
+
+
+def _played(scene: Scene, nodes: list[GltfNode]) -> dict[str, Any]:
+    """The names of the animations that move these nodes, and of those that are not played."""
     names = list(_animation_numbers(scene.file))
-    played, others = [names[i] for i in scene.played], [name for i, name in enumerate(names) if i not in scene.played]
+    movers = {node.index for node in nodes}.union(scene.ancestors(_movers(nodes)))
+    played = [names[i] for i in scene.played if not movers.isdisjoint(scene.targets(i))]
+    others = [name for i, name in enumerate(names) if i not in scene.played]
     return ({"animations": played} if played else {}) | ({"other_animations": others} if others else {})
 
 
-def _connections(file: GltfFile, nodes: list[GltfNode]) -> tuple[np.ndarray | None, np.ndarray | None]:
-    """Faces (F, 3) and edges (E, 2), int32."""
+def _connections(
+    file: GltfFile, nodes: list[GltfNode]
+) -> tuple[np.ndarray | None, np.ndarray | None, np.ndarray | None]:
+    """Faces (F, 3) and edges (E, 2), int32; and the material of each face (F,), -1 for none, where any has one."""
     found: dict[int, list[np.ndarray]] = {2: [], 3: []}
+    materials = []
     for node in nodes:
+        own: dict[int, list[np.ndarray]] = {2: [], 3: []}
+        labels = []
         for primitive in node.primitives:
             mode = integer(primitive, "mode", 4)
             if mode == 0:
                 continue
             rows = _rows(_corners(file, primitive, node.shape_count, f"mesh {node.name!r}"), mode)
-            starts = np.arange(node.first, node.first + node.count, max(node.shape_count, 1))
-            rows = (rows + starts[:, None, None]).reshape(-1, rows.shape[1])
-            found[rows.shape[1]].append(rows.astype(np.int32))
-    return tuple(np.concatenate(found[size]) if found[size] else None for size in (3, 2))
+            own[rows.shape[1]].append(rows)
+            if rows.shape[1] == 3:
+                label = integer(primitive, "material", -1, low=-1, stop=len(file.items("materials")))
+                labels.append(np.full(len(rows), label, np.int32))
+        starts = np.arange(node.first, node.first + node.count, max(node.shape_count, 1))
+        for size, parts in own.items():
+            if parts:
+                rows = np.concatenate(parts)
+                found[size].append((rows + starts[:, None, None]).reshape(-1, size).astype(np.int32))
+        if labels:
+            materials.append(np.tile(np.concatenate(labels), len(starts)))
+    faces, edges = (np.concatenate(found[size]) if found[size] else None for size in (3, 2))
+    face_material = np.concatenate(materials) if materials else np.empty(0, np.int32)
+    return faces, edges, face_material if (face_material >= 0).any() else None
+
+
+def _material_names(file: GltfFile) -> list[str]:
+    names = [item.get("name") for item in file.items("materials")]
+    return [name if isinstance(name, str) and name else f"material {number}" for number, name in enumerate(names)]
 
 
 def triangles(file: GltfFile, primitive: dict, count: int) -> np.ndarray:
@@ -718,17 +805,18 @@ def _rows(corners: np.ndarray, mode: int) -> np.ndarray:
 
 
 def _attributes(
-    file: GltfFile, nodes: list[GltfNode], skip: Collection[str], motion: _Motion, keep_normals: bool
+    scene: Scene, nodes: list[GltfNode], skip: Collection[str], motion: _Motion, keep_normals: bool
 ) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
     """Static arrays over all vertices; nodes that lack one have 0, no number, or white. And branches, where the file
     was written with them."""
     keep_normals = keep_normals and not any(
         node.skin is not None or node.weights.any() or node.copies is not None for node in nodes
     )
+    file = scene.file
     keys = dict.fromkeys(
         key
         for node in nodes
-        for key in node.attributes
+        for key in (*node.attributes, *node.of_copies)
         if key.startswith("_") or key in ("TEXCOORD_0", "COLOR_0") or keep_normals and key == "NORMAL"
     )
     found: dict[str, np.ndarray] = {}
@@ -739,23 +827,27 @@ def _attributes(
     branches = _branches(file, found)
     for name in RESERVED_NAMES & found.keys():
         found[f"{name}_"] = found.pop(name)
-    found["part_vertex_counts"] = np.array([node.count for node in nodes], np.int32)
-    if any(node.copies is not None for node in nodes):
-        found["part_copies"] = np.array([_rigid_copies(node) for node in nodes], np.int32)
+    parts = [own for _, own in _parts(scene, nodes)]
+    found["part_vertex_counts"] = np.array([sum(node.count for node in own) for own in parts], np.int32)
+    copies = [_rigid_copies(own) for own in parts]
+    if any(count > 1 for count in copies) or any(node.copies is not None for node in nodes):
+        found["part_copies"] = np.array(copies, np.int32)
     return found, branches
 
 
-def _rigid_copies(node: GltfNode) -> int:
-    return 1 if node.copies is None or node.targets else len(node.copies)
+def _rigid_copies(part: list[GltfNode]) -> int:
+    copies = part[0].copies
+    return len(part) if copies is None else 1 if part[0].targets else len(copies)
 
 
 def _attribute(file: GltfFile, nodes: list[GltfNode], key: str, name: str, motion: _Motion) -> np.ndarray:
     pieces = {}
     for number, node in enumerate(nodes):
-        if key in node.attributes:
+        if key in node.of_copies:
+            pieces[number] = np.repeat(node.of_copies[key], node.shape_count, axis=0)
+        elif key in node.attributes:
             index = node.attributes[key]
-            plain = key.startswith("_") and not file.item("accessors", index).get("normalized")
-            values = file.array(index) if plain else file.floats(index).astype(np.float32)
+            values = file.attribute(index) if key.startswith("_") else file.floats(index).astype(np.float32)
             if len(values) != node.shape_count:
                 raise ClipError(f"mesh {node.name!r}: got {len(values)} entries of {key}, expected {node.shape_count}")
             if key == "NORMAL" and values.shape[1] == 3:

@@ -162,6 +162,11 @@ class GltfFile:
             return values.astype(np.float64)
         return np.maximum(values / float(np.iinfo(values.dtype).max), -1.0)
 
+    def attribute(self, index: Any) -> np.ndarray:
+        """Accessor `index` in the type that it is stored in, normalized integers as float32."""
+        is_normalized = self.item("accessors", index).get("normalized")
+        return self.floats(index).astype(np.float32) if is_normalized else self.array(index)
+
     def _strided(self, accessor: Mapping, dtype: np.dtype, width: int, count: int, where: str) -> np.ndarray:
         index = accessor.get("bufferView")
         view = self.item("bufferViews", index)

@@ -7,6 +7,7 @@ says which vertices of it its own are.
 from __future__ import annotations
 
 import os
+from contextlib import closing
 from functools import cached_property
 from typing import Any
 
@@ -14,7 +15,7 @@ import numpy as np
 
 from athcodec.errors import ClipError
 from athcodec.sources.gltf_file import GltfFile
-from athcodec.sources.gltf_json import BROKEN, entries, entry, integer
+from athcodec.sources.gltf_json import BROKEN, brief, entries, entry, integer
 from athcodec.sources.opening import closing_on_failure, naming
 
 EXTENSION = "ATH_motion"
@@ -30,25 +31,52 @@ def extension_of(holder: dict) -> dict | None:
     return entry(extensions, EXTENSION) if isinstance(extensions, dict) and EXTENSION in extensions else None
 
 
-class GltfMotion:
-    """The .ath file in a GLB, as a file object to read; close it. Raises ClipError where the GLB has not exactly one.
+def motion_names(gltf: dict) -> list[str]:
+    """What the motions of a file are called, each by another name. Raises ClipError."""
+    found: list[str] = []
+    for number, motion in enumerate(entries(extension_of(gltf) or {}, "motions")):
+        said = motion.get("name")
+        name = said if isinstance(said, str) and said else f"motion {number}"
+        found.append(f"{name}.{number}" if name in found else name)
+    return found
 
-    host_mesh (N, 3) float32 is the rest pose, faces (F, 3) int32 or None.
+
+def motions_in(path: str | os.PathLike[str]) -> list[str]:
+    """The names of the motions in a GLB; none of another file. Raises ClipError, OSError."""
+    with open(path, "rb") as file:
+        if file.read(4) != MAGIC:
+            return []
+    with naming(path, *BROKEN), closing(GltfFile(path)) as gltf:
+        return motion_names(gltf.json)
+
+
+class GltfMotion:
+    """An .ath file in a GLB, by its name where there are several, as a file object to read; close it. Raises ClipError.
+
+    `number` is its place among the motions; host_mesh (N, 3) float32 the rest pose, faces (F, 3) int32 or None.
     """
 
-    def __init__(self, path: str | os.PathLike[str]):
+    def __init__(self, path: str | os.PathLike[str], name: str | None = None):
         self.path = os.fspath(path)
         with naming(path, *BROKEN):
             self._gltf = GltfFile(path)
             with closing_on_failure(self._gltf):
-                self._bytes, self._start, self._size = self._gltf.part(self._motion(), "bufferView")
+                self.number = self._chosen(name)
+                motion = entries(extension_of(self._gltf.json) or {}, "motions")[self.number]
+                self._bytes, self._start, self._size = self._gltf.part(motion, "bufferView")
         self._place = 0
 
-    def _motion(self) -> dict:
-        found = entries(extension_of(self._gltf.json) or {}, "motions")
-        if len(found) != 1:
-            raise ClipError(f"{EXTENSION}: got {len(found)} motions, expected one")
-        return found[0]
+    def _chosen(self, name: str | None) -> int:
+        names = motion_names(self._gltf.json)
+        if not names:
+            raise ClipError(f"{EXTENSION}: got no motion, expected one at least")
+        if name is None and len(names) > 1:
+            raise ClipError(
+                f"{EXTENSION}: got {len(names)} motions, expected the name of one (gltf_motion): {brief(names)}"
+            )
+        if name is not None and name not in names:
+            raise ClipError(f"gltf_motion: got {brief(name)}, expected one of {brief(names)}")
+        return 0 if name is None else names.index(name)
 
     # ---- the bytes ----
 
@@ -73,7 +101,7 @@ class GltfMotion:
 
     @cached_property
     def _places(self) -> list[GltfPlace]:
-        found = places_of(self._gltf)
+        found = places_of(self._gltf, self.number)
         if not found:
             raise ClipError(f"{EXTENSION}: got no primitive that a motion moves, expected at least one")
         return found
@@ -112,14 +140,13 @@ class GltfMotion:
             return np.concatenate(found).astype(np.int32) if any(map(len, found)) else None
 
 
-def places_of(file: GltfFile) -> list[GltfPlace]:
-    """The primitives that the file's only motion moves. Raises ClipError."""
-    found = []
+def places_of(file: GltfFile, number: int) -> list[GltfPlace]:
+    """The primitives that one of the file's motions moves. Raises ClipError."""
+    found, count = [], len(motion_names(file.json))
     for mesh in file.items("meshes"):
         for primitive in entries(mesh, "primitives"):
             said = extension_of(primitive)
-            if said is not None:
-                integer(said, "motion", stop=1)
+            if said is not None and integer(said, "motion", stop=count) == number:
                 found.append((primitive, _vertices(file, primitive, said)))
     return found
 

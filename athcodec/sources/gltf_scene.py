@@ -157,12 +157,16 @@ class Scene:
         """The first animation, and every further one that moves no node that those before it move: tools that write an
         animation per object mean them to run at once, one with several takes starts with the default one."""
         played, moved = [], set()
-        for index, animation in enumerate(self.file.items("animations")):
-            targets = {node for node, _, _ in self._channels(animation)}
+        for index in range(len(self.file.items("animations"))):
+            targets = self.targets(index)
             if targets and not targets & moved:
                 played.append(index)
                 moved |= targets
         return played
+
+    def targets(self, index: int) -> set[int]:
+        """The nodes of the scene that an animation moves."""
+        return {node for node, _, _ in self._channels(self.file.item("animations", index))}
 
     def _channels(self, animation: dict) -> list[tuple[int, str, int]]:
         """(node, path, sampler) of the channels that move nodes of the scene."""

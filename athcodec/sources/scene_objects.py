@@ -22,6 +22,7 @@ from athcodec.sources import ReadOptions
 MOST_VERTICES = 1 << 27  # of copies
 MAX_METADATA_BYTES = 1 << 24
 DESCRIPTOR = ".descriptor"  # behind the name of an array's property in an Alembic file: that of its ArrayDescriptor
+FACE_MATERIAL, MATERIAL_NAMES = "face_material", "material_names"  # an attribute, and metadata
 OWN = "athcodec"  # the namespace of what our writers add to files of other formats
 KNOWN_METADATA = ("fps", "start_frame", "meters_per_unit", "part_names", "part_kinds", "part_usd", "domains")
 
@@ -54,6 +55,8 @@ class SceneObject:
     is_rigid: bool = True  # the shape of the copies stays as it is
     left_out: list[str] = field(default_factory=list)  # names of arrays that do not fit
     statics: dict[str, Static] = field(default_factory=dict)
+    materials: list[str] = field(default_factory=list)
+    face_materials: np.ndarray | None = None  # (F,) the material of each face, -1 for none
     is_still: bool = False  # neither its points nor its place change
     still: np.ndarray | None = None  # its positions then, once they have been read
 
@@ -97,6 +100,14 @@ class SceneObject:
         else:
             self.left_out.append(name)
 
+    def bind(self, name: str, faces: np.ndarray | slice = slice(None)) -> None:
+        """Gives faces a material, by its name."""
+        if name not in self.materials:
+            self.materials.append(name)
+        if self.face_materials is None:
+            self.face_materials = np.full(len(self.face_counts), -1, np.int32)
+        self.face_materials[faces] = self.materials.index(name)
+
     def repeat(self, copies: int) -> None:
         """Makes so many copies, one after the other, of what it is. They have no rest pose but where they are. Raises
         ClipError for more vertices than make sense."""
@@ -107,6 +118,8 @@ class SceneObject:
         shift = np.repeat(np.arange(copies, dtype=np.int32) * np.int32(self.count), len(self.face_indices))
         self.face_indices = np.tile(self.face_indices, copies) + shift
         self.face_counts = np.tile(self.face_counts, copies)
+        if self.face_materials is not None:
+            self.face_materials = np.tile(self.face_materials, copies)
         if self.curve_counts is not None:
             self.curve_counts = np.tile(self.curve_counts, copies)
         self.statics = {
@@ -173,6 +186,7 @@ def clip_of_objects(
     MotionClip."""
     attributes, domains = _joined_statics(objects, options.skip)
     _add_kept(kept, attributes, domains, options.skip)
+    metadata = metadata | _join_materials(objects, metadata, attributes, domains, options.skip)
     known = _fields(attributes, domains)
     rest, links = known.pop("rest", None), known.pop("edges", None)
     polygons = _faces(objects, attributes)
@@ -329,6 +343,29 @@ def _spread(obj: SceneObject, static: Static | None, domain: str, shape: tuple[i
     if static.domain == "vertex":
         return static.values[obj.face_indices]
     return np.repeat(static.values, obj.face_counts, axis=0)
+
+
+def _join_materials(
+    objects: list[SceneObject],
+    metadata: dict[str, Any],
+    attributes: dict[str, np.ndarray],
+    domains: dict[str, str],
+    skip: Collection[str],
+) -> dict[str, Any]:
+    """Adds "face_material", the material of each face among "material_names", which it returns as metadata, or -1.
+    Names come in the order that the file was written from, where it says one."""
+    if FACE_MATERIAL in skip or all(obj.face_materials is None for obj in objects):
+        return {}
+    said = metadata.get(MATERIAL_NAMES)
+    said = said if isinstance(said, list) and all(isinstance(name, str) for name in said) else []
+    names = list(dict.fromkeys([*said, *(name for obj in objects for name in obj.materials)]))
+    rows = []
+    for obj in objects:
+        place = np.array([*(names.index(name) for name in obj.materials), -1], np.int32)
+        own = np.full(len(obj.face_counts), -1) if obj.face_materials is None else obj.face_materials
+        rows.append(place[own])
+    attributes[FACE_MATERIAL], domains[FACE_MATERIAL] = np.concatenate(rows), "face"
+    return {MATERIAL_NAMES: names}
 
 
 def _faces(objects: list[SceneObject], attributes: dict[str, np.ndarray]) -> np.ndarray | None:

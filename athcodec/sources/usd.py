@@ -4,12 +4,13 @@ Every visible prim of the kinds Mesh, BasisCurves, NurbsCurves, HermiteCurves an
 "render" is read, also inside instances, into world space: time samples (interpolated as USD does), transforms, and of
 UsdSkel the skinning and the blend shapes. Each such prim in a prototype of a PointInstancer becomes one object, of as
 many copies as the instancer shows at any time. The frames are the whole time codes of the stage's range where it has
-one, else the time codes that have samples; options.fps sets another rate. Static primvars become attributes.
+one, else the time codes that have samples; options.fps sets another rate. Static primvars become attributes, the names
+of materials the metadata "material_names", of which the attribute "face_material" says the number for each face.
 
 Points are float32 in USD and so they are here. The stage is opened as it is composed (layers, payloads, value clips);
-what else it holds, such as layers that cannot be found, patches, tetrahedra, materials, is named in the clip's
-`not_read`; velocities are not read. A stage is opened by its structure; positions are read frame by frame. USD trusts
-the lengths of arrays in a binary file even where it is damaged: read files that are not trusted under a limit of
+what else it holds, such as layers that cannot be found, patches, tetrahedra, what is in materials, is named in the
+clip's `not_read`; velocities are not read. A stage is opened by its structure; positions are read frame by frame. USD
+trusts the lengths of arrays in a binary file even where it is damaged: read files that are not trusted under a limit of
 memory.
 """
 
@@ -25,7 +26,7 @@ from os import PathLike, fspath
 from typing import Any
 
 import numpy as np
-from pxr import Gf, Sdf, Tf, Usd, UsdGeom, UsdSkel, Vt
+from pxr import Gf, Sdf, Tf, Usd, UsdGeom, UsdShade, UsdSkel, Vt
 
 from athcodec.clip import MotionClip, Skin
 from athcodec.errors import ClipError
@@ -186,7 +187,7 @@ def _find_objects(stage: Usd.Stage, only: Sequence[str], not_read: dict[str, lis
 def _object(prim: Usd.Prim, only: Sequence[str], not_read: dict[str, list[str]]) -> _Prim | None:
     kind, path = _kind(prim), str(prim.GetPath())
     if kind is None:
-        if prim.GetTypeName() not in READ:
+        if prim.GetTypeName() not in READ and not _is_material_subset(prim):
             not_read.setdefault(_kind_not_read(prim), []).append(path)
         return None
     if not _wanted(prim, only):
@@ -199,6 +200,10 @@ def _object(prim: Usd.Prim, only: Sequence[str], not_read: dict[str, list[str]])
     else:
         not_read.setdefault("empty", []).append(path)
     return None
+
+
+def _is_material_subset(prim: Usd.Prim) -> bool:
+    return prim.IsA(UsdGeom.Subset) and UsdGeom.Subset(prim).GetFamilyNameAttr().Get() == UsdShade.Tokens.materialBind
 
 
 def _kind_not_read(prim: Usd.Prim) -> str:
@@ -373,6 +378,7 @@ def _topology(obj: _Prim, codes: np.ndarray) -> None:
         obj.face_counts = _fixed(obj, mesh.GetFaceVertexCountsAttr(), codes)
         obj.face_indices = _fixed(obj, mesh.GetFaceVertexIndicesAttr(), codes)
         _note(obj, "orientation", mesh.GetOrientationAttr(), "rightHanded")
+        _bind_materials(obj)
     elif obj.kind == "curves":
         obj.curve_counts = _fixed(obj, UsdGeom.Curves(obj.prim).GetCurveVertexCountsAttr(), codes)
         if obj.prim.IsA(UsdGeom.BasisCurves):
@@ -382,6 +388,23 @@ def _topology(obj: _Prim, codes: np.ndarray) -> None:
             if "type" in obj.details:
                 _note(obj, "basis", curves.GetBasisAttr(), "")
     obj.check()
+
+
+def _bind_materials(obj: _Prim) -> None:
+    """By the names of the materials that the mesh and subsets of its faces are bound to."""
+    binding = UsdShade.MaterialBindingAPI(obj.prim)
+    material, _ = binding.ComputeBoundMaterial()
+    if material:
+        obj.bind(_material_name(material))
+    for subset in binding.GetMaterialBindSubsets():
+        material, _ = UsdShade.MaterialBindingAPI(subset.GetPrim()).ComputeBoundMaterial()
+        faces = _array(subset.GetIndicesAttr().Get(Usd.TimeCode.EarliestTime()), np.int64)
+        if material and len(faces) and 0 <= faces.min() and faces.max() < len(obj.face_counts):
+            obj.bind(_material_name(material), faces)
+
+
+def _material_name(material: UsdShade.Material) -> str:
+    return str(material.GetPrim().GetDisplayName() or material.GetPrim().GetName())
 
 
 def _note(obj: _Prim, name: str, attribute: Usd.Attribute, usual: str) -> None:
@@ -469,6 +492,8 @@ def _metadata(stage: Usd.Stage, codes: np.ndarray, rate: float) -> dict[str, Any
 
 def _statics(obj: _Prim, codes: np.ndarray, matrix: np.ndarray) -> None:
     for primvar in UsdGeom.PrimvarsAPI(obj.prim).FindPrimvarsWithInheritance():
+        if obj.skeleton is not None and str(primvar.GetPrimvarName()).startswith("skel:"):
+            continue  # which has moved it
         if primvar.HasValue() and primvar.ValueMightBeTimeVarying():
             obj.left_out.append(primvar.GetPrimvarName())
         elif primvar.HasValue():

@@ -3,7 +3,7 @@
 import { readFileSync, writeFileSync } from "node:fs";
 
 globalThis.self = globalThis;
-const { AnimationMixer, LoopOnce, Vector3 } = await import("three");
+const { AnimationMixer, LoopOnce, Matrix4, Vector3 } = await import("three");
 const { GLTFLoader } = await import("three/addons/loaders/GLTFLoader.js");
 const { MeshoptDecoder } = await import("three/addons/libs/meshopt_decoder.module.js");
 
@@ -23,7 +23,12 @@ for (const clip of gltf.animations) {
 }
 const meshes = [];
 gltf.scene.traverse((each) => { if (each.isMesh) meshes.push(each); });
-const count = meshes.reduce((sum, mesh) => sum + mesh.geometry.attributes.position.count, 0);
+const placesOf = (mesh) => Array.from({ length: mesh.isInstancedMesh ? mesh.count : 1 }, (_, i) => {
+  const matrix = new Matrix4();
+  if (mesh.isInstancedMesh) mesh.getMatrixAt(i, matrix);
+  return matrix.premultiply(mesh.matrixWorld);
+});
+const count = meshes.reduce((sum, mesh) => sum + mesh.geometry.attributes.position.count * (mesh.count ?? 1), 0);
 const all = new Float32Array(times.length * count * 3);
 const point = new Vector3();
 let place = 0;
@@ -32,9 +37,11 @@ for (const time of times) {
   gltf.scene.updateMatrixWorld(true);
   for (const mesh of meshes) {
     if (mesh.isSkinnedMesh) mesh.skeleton.update();
-    for (let i = 0; i < mesh.geometry.attributes.position.count; i++) {
-      mesh.getVertexPosition(i, point).applyMatrix4(mesh.matrixWorld).toArray(all, place); // by applyBoneTransform
-      place += 3;
+    for (const matrix of placesOf(mesh)) {
+      for (let i = 0; i < mesh.geometry.attributes.position.count; i++) {
+        mesh.getVertexPosition(i, point).applyMatrix4(matrix).toArray(all, place); // by applyBoneTransform
+        place += 3;
+      }
     }
   }
 }

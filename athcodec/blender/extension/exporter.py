@@ -88,20 +88,19 @@ def write_object(
     context, obj, path: str, world: bool = True, effort: str = "default", attributes: bool = True, **bound
 ):
     """Compress the frames of the scene; returns athcodec's Summary. Raises athcodec's errors, OSError."""
-    import athcodec
-    from athcodec import discovery
-
     scene = context.scene
-    before = scene.frame_current_final
+    before, frames = scene.frame_current_final, range(scene.frame_start, scene.frame_end + 1)
     manager = context.window_manager
     manager.progress_begin(0, 1)
     try:
         with tempfile.TemporaryFile() as spool:
-            clip = _clip(context, obj, spool, world, lambda done: manager.progress_update(done / 2))
-            if not clip.has_branches and find_spec("scipy") is None:
-                clip = discovery.with_branches(clip, discovery.pieces(clip))
-            return athcodec.encode(
-                clip,
+            recording = Recording(obj, spool, world)
+            for number, frame in enumerate(frames, 1):
+                set_frame(scene, frame)
+                recording.add(context, frame)
+                manager.progress_update(number / len(frames) / 2)
+            return encoded(
+                recording.clip(scene),
                 bpy.path.abspath(path),
                 effort=effort,
                 attributes="all" if attributes else "none",
@@ -110,46 +109,72 @@ def write_object(
             )
     finally:
         manager.progress_end()
-        _set_frame(scene, before)
+        set_frame(scene, before)
 
 
-def _set_frame(scene, frame: float) -> None:
+def encoded(clip, path: str, **options):
+    """athcodec.encode, with the pieces of the mesh as branches where none are named and none can be found."""
+    import athcodec
+    from athcodec import discovery
+
+    if not clip.has_branches and find_spec("scipy") is None:
+        clip = discovery.with_branches(clip, discovery.pieces(clip))
+    return athcodec.encode(clip, path, **options)
+
+
+def set_frame(scene, frame: float) -> None:
     scene.frame_set(math.floor(frame), subframe=frame - math.floor(frame))
 
 
-def _clip(context, obj, spool, world: bool, report):
-    from athcodec.clip import MotionClip
+def frame_rate(scene) -> float:
+    return scene.render.fps / scene.render.fps_base
 
-    scene = context.scene
-    frames = range(scene.frame_start, scene.frame_end + 1)
-    rate = scene.render.fps / scene.render.fps_base
-    static = None
-    for i, frame in enumerate(frames):
-        _set_frame(scene, frame)
-        evaluated = obj.evaluated_get(context.evaluated_depsgraph_get())
+
+class Recording:
+    """The frames of an object as they come, in the file `spool`; `moves`: whether any is other than the first."""
+
+    def __init__(self, obj, spool, world: bool):
+        self.name, self.moves, self.vertex_count = obj.name, False, 0
+        self._obj, self._spool, self._world = obj, spool, world
+        self._frames, self._first, self._shape, self._static = [], None, None, {}
+
+    def add(self, context, frame: int) -> None:
+        """The object in this frame, which the scene is at. Raises ValueError where it has other vertices or faces."""
+        evaluated = self._obj.evaluated_get(context.evaluated_depsgraph_get())
         mesh = evaluated.to_mesh()
         try:
-            if static is None:
-                static = _static(mesh, obj)
-                shape = _shape(mesh)
-            elif _shape(mesh) != shape:
-                raise ValueError(f"{obj.name}: the vertices or faces change in frame {frame}, expected the same in all")
-            spool.write(_positions(mesh, evaluated.matrix_world if world else None).tobytes())
+            positions = _positions(mesh, evaluated.matrix_world if self._world else None)
+            if self._first is None:
+                self._static, self._shape, self._first = _static(mesh, self._obj), _shape(mesh), positions
+                self.vertex_count = len(positions)
+            elif _shape(mesh) != self._shape:
+                raise ValueError(
+                    f"{self.name}: the vertices or faces change in frame {frame}, expected the same in all"
+                )
         finally:
             evaluated.to_mesh_clear()
-        report((i + 1) / len(frames))
-    spool.flush()
-    positions = np.memmap(spool, np.float32, "r", shape=(len(frames), shape[0], 3))
-    metadata = {
-        "fps": rate,
-        "start_frame": frames[0],
-        "up_axis": "z",
-        **_unit(scene, world),
-        "part_names": [obj.name],
-        "part_kinds": ["mesh"],
-        "domains": static.pop("domains"),
-    }
-    return MotionClip(positions, np.arange(len(frames)) / rate, metadata=metadata, skin=_skin(obj, shape[0]), **static)
+        self.moves = self.moves or not np.array_equal(positions, self._first)
+        self._frames.append(frame)
+        self._spool.write(positions.tobytes())
+
+    def clip(self, scene):
+        """The MotionClip of the frames."""
+        from athcodec.clip import MotionClip
+
+        self._spool.flush()
+        positions = np.memmap(self._spool, np.float32, "r", shape=(len(self._frames), self.vertex_count, 3))
+        static, rate = dict(self._static), frame_rate(scene)
+        metadata = {
+            "fps": rate,
+            "start_frame": self._frames[0],
+            "up_axis": "z",
+            **_unit(scene, self._world),
+            "part_names": [self.name],
+            "part_kinds": ["mesh"],
+            "domains": static.pop("domains"),
+        }
+        skin = _skin(self._obj, self.vertex_count)
+        return MotionClip(positions, np.arange(len(positions)) / rate, metadata=metadata, skin=skin, **static)
 
 
 def _shape(mesh) -> tuple[int, int, int, int]:

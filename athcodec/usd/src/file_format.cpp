@@ -2,10 +2,14 @@
 //
 //     @oak.ath@                                          all clips, as variants of the set "clip"
 //     @oak.ath:SDF_FORMAT_ARGS:clip=storm&level=1@       one clip, and a level for far away
+//     payload = @oak.ath@                                the same by attributes of the prim that has the payload,
+//                                                        string ath:clip and int ath:level
 #include "layer_data.h"
 #include "motion.h"
 #include "scene.h"
 
+#include <pxr/pcp/dynamicFileFormatContext.h>
+#include <pxr/pcp/dynamicFileFormatInterface.h>
 #include <pxr/sdf/fileFormat.h>
 #include <pxr/sdf/layer.h>
 #include <pxr/tf/registryManager.h>
@@ -15,9 +19,11 @@
 
 SDF_NAMESPACE_OPEN_SCOPE
 
-class AthFileFormat : public SdfFileFormat
+class AthFileFormat : public SdfFileFormat, public PcpDynamicFileFormatInterface
 {
   public:
+    void ComposeFieldsForFileFormatArguments(const std::string &path, const PcpDynamicFileFormatContext &context,
+                                             FileFormatArguments *arguments, VtValue *data) const override;
     bool CanRead(const std::string &path) const override { return athusd::Motion::IsAth(path); }
     bool Read(SdfLayer *layer, const std::string &path, bool metadata_only) const override;
 
@@ -59,6 +65,20 @@ bool Chosen(const SdfFileFormat::FileFormatArguments &arguments, const athusd::M
 }
 
 } // namespace
+
+void AthFileFormat::ComposeFieldsForFileFormatArguments(const std::string &, const PcpDynamicFileFormatContext &context,
+                                                        FileFormatArguments *arguments, VtValue *) const
+{
+    VtValue clip, level;
+    if (context.ComposeAttributeDefaultValue(TfToken("ath:clip"), &clip)) {
+        if (clip.IsHolding<TfToken>())
+            (*arguments)["clip"] = clip.UncheckedGet<TfToken>().GetString();
+        else if (clip.IsHolding<std::string>())
+            (*arguments)["clip"] = clip.UncheckedGet<std::string>();
+    }
+    if (context.ComposeAttributeDefaultValue(TfToken("ath:level"), &level) && level.IsHolding<int>())
+        (*arguments)["level"] = TfStringPrintf("%d", level.UncheckedGet<int>());
+}
 
 bool AthFileFormat::Read(SdfLayer *layer, const std::string &path, bool metadata_only) const
 {

@@ -1,0 +1,222 @@
+"""Copies of one shape in glTF: nodes that show one mesh, each with a translation, a rotation and scales of its own.
+
+Animations move them. glTF's EXT_mesh_gpu_instancing, which has no animation, says the same in less where none of them
+moves. The node above the copies of an object has its name, and {"copies": true} in extras; what an array has for each
+copy stands in the extras of its node, or among the attributes of the instancing. sources/gltf.py takes both back.
+Objects side by side that are of one shape show one mesh too, and keep their names: the node above them has
+{"copies": false}.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from athcodec.exporters.copies import Copies, fit_copies
+from athcodec.exporters.fitting import allowed_error
+from athcodec.exporters.gltf_build import Glb, GltfMesh, add_mesh
+from athcodec.exporters.gltf_joints import SLACK, hold
+from athcodec.exporters.scene_objects import SceneObject, objects_of
+
+INSTANCING = "EXT_mesh_gpu_instancing"
+PATHS = ("translation", "rotation", "scale")
+
+
+@dataclass(eq=False)
+class Movers:
+    """Nodes that animations move: where J of them are at rest and in T frames, as Joints has it."""
+
+    nodes: list[int]
+    rest: tuple[np.ndarray, ...]
+    poses: tuple[np.ndarray, ...]
+
+    @classmethod
+    def all_of(cls, movers: list[Movers]) -> Movers | None:
+        """Those of several, one after the other; None of none."""
+        if not movers:
+            return None
+        return cls(
+            [node for each in movers for node in each.nodes],
+            tuple(np.concatenate(parts) for parts in zip(*(each.rest for each in movers))),
+            tuple(np.concatenate(parts, axis=1) for parts in zip(*(each.poses for each in movers))),
+        )
+
+
+@dataclass(eq=False)
+class GltfCopies:
+    """`shape` is the mesh of one copy; own: what each copy has instead of each vertex, (k, width) by its semantic;
+    lost: the semantics of what neither has; names: of each, where they are objects of their own."""
+
+    shape: GltfMesh
+    copies: Copies
+    own: dict[str, np.ndarray]
+    lost: list[str]
+    names: list[str] | None = None
+
+    def add(self, glb: Glb, parent: int | None, transform: dict[str, Any]) -> list[Movers]:
+        """The mesh and its nodes, below one with a transform; those that move."""
+        mesh = add_mesh(glb, self.shape, self.copies.shape)
+        poses = self.copies.places, self.copies.turns, self.copies.scales
+        is_still = all((pose == pose[:1]).all() for pose in poses)
+        if is_still and self.names is None:
+            self._add_instancing(glb, parent, mesh, transform)
+            return []
+        named = {"name": self.shape.name} if self.names is None else {}
+        above = glb.node(parent, **named, extras={"copies": self.names is None}, **transform)
+        nodes, at_rest = [], [pose[0] for pose in poses] if is_still else self.copies.rest
+        for number, (place, turn, scale) in enumerate(zip(*at_rest)):
+            at = dict(zip(PATHS, (place.tolist(), unit_quaternion(turn), scale.tolist())))
+            extras = {key[1:]: _plain(values[number]) for key, values in self.own.items()}
+            name = f"{self.shape.name}_{number}" if self.names is None else self.names[number]
+            nodes.append(glb.node(above, name=name, mesh=mesh, **at, **({"extras": extras} if extras else {})))
+        return [] if is_still else [Movers(nodes, self.copies.rest, poses)]
+
+    def _add_instancing(self, glb: Glb, parent: int | None, mesh: int, transform: dict[str, Any]) -> None:
+        poses = self.copies.places[0], self.copies.turns[0], self.copies.scales[0]
+        parts = {path.upper(): glb.array(pose) for path, pose in zip(PATHS, poses)}
+        parts |= {key: glb.array(values) for key, values in self.own.items()}
+        extension = {INSTANCING: {"attributes": parts}}
+        glb.node(parent, name=self.shape.name, mesh=mesh, extensions=extension, **transform)
+        for key in ("extensionsUsed", "extensionsRequired"):  # without it one of them would be shown
+            glb.json[key] = [INSTANCING]
+
+
+def with_copies(motion: Any, found: list[GltfMesh]) -> list[GltfMesh | GltfCopies]:
+    """The meshes, those that are copies of one shape as such: where transforms keep them within what the level is off,
+    and they have one set of texture coordinates and colours. Attributes that copies lose all meshes lose."""
+    runs, allowed = list(_runs(objects_of(motion))), allowed_error(motion)
+    if sum(len(run) for run in runs) != len(found):
+        return list(found)
+    together = [_together(run) for run in runs]
+    fits = fit_copies(motion, together, allowed)
+    shapes: list[GltfMesh | GltfCopies] = []
+    waiting = iter(found)
+    for number, (run, obj) in enumerate(zip(runs, together)):
+        own = [next(waiting) for _ in run]
+        made = _as_copies(_joined(own), obj, fits[number]) if number in fits else None
+        if made is None:
+            shapes += own
+            continue
+        made.names = [shape.name for shape in own] if len(run) > 1 else None
+        _hold(motion, made.copies, allowed)
+        shapes.append(made)
+    lost = {key for shape in shapes if isinstance(shape, GltfCopies) for key in shape.lost}
+    return [_without(shape, lost) for shape in shapes] if lost else shapes
+
+
+def _runs(objects: list[SceneObject]) -> Iterator[list[SceneObject]]:
+    """Objects side by side that have as many vertices in the same faces; each other one alone."""
+    run: list[SceneObject] = []
+    for obj in objects:
+        if run and not _is_alike(run[0], obj):
+            yield run
+            run = []
+        run.append(obj)
+    if run:
+        yield run
+
+
+def _is_alike(one: SceneObject, other: SceneObject) -> bool:
+    return (
+        one.copies == other.copies == 1
+        and (one.kind, one.count) == (other.kind, other.count)
+        and all(map(np.array_equal, (*one.faces, one.curves), (*other.faces, other.curves)))
+    )
+
+
+def _together(run: list[SceneObject]) -> SceneObject:
+    """Objects side by side as copies of the first."""
+    first, last = run[0], run[-1]
+    if len(run) == 1:
+        return first
+    counts, indices = first.faces
+    shift = np.repeat(np.arange(len(run)) * first.count, len(indices))
+    return replace(
+        first,
+        count=first.count * len(run),
+        faces=(np.tile(counts, len(run)), np.tile(indices, len(run)) + shift),
+        curves=np.tile(first.curves, len(run)),
+        face_rows=slice(first.face_rows.start, last.face_rows.stop),
+        corner_rows=slice(first.corner_rows.start, last.corner_rows.stop),
+        copies=len(run),
+    )
+
+
+def _joined(shapes: list[GltfMesh]) -> GltfMesh:
+    """One mesh of several, which are drawn alike."""
+    if len(shapes) == 1:
+        return shapes[0]
+    starts = np.cumsum([0] + [len(shape.source) for shape in shapes])
+    corners = [shape.corners + start for shape, start in zip(shapes, starts) if shape.corners is not None]
+    materials = [shape.materials for shape in shapes if shape.materials is not None]
+    return GltfMesh(
+        shapes[0].name,
+        np.concatenate([shape.source for shape in shapes]),
+        np.concatenate(corners) if corners else None,
+        {key: np.concatenate([shape.attributes[key] for shape in shapes]) for key in shapes[0].attributes},
+        np.concatenate(materials) if materials else None,
+    )
+
+
+def unit_quaternion(quaternion: np.ndarray) -> list[float]:
+    """Of length 1 in float64."""
+    exact = quaternion.astype(np.float64)
+    return (exact / np.linalg.norm(exact)).tolist()
+
+
+def _without(shape: GltfMesh | GltfCopies, lost: set[str]) -> GltfMesh | GltfCopies:
+    if isinstance(shape, GltfCopies):
+        own = {key: values for key, values in shape.own.items() if key not in lost}
+        return GltfCopies(_without(shape.shape, lost), shape.copies, own, sorted(lost), shape.names)
+    return replace(shape, attributes={key: values for key, values in shape.attributes.items() if key not in lost})
+
+
+def _hold(motion: Any, copies: Copies, allowed: float) -> None:
+    """What hardly moves stands still, and needs no keys."""
+    extent = np.tile(np.abs(copies.shape).max(axis=0), (copies.places.shape[1], 1))
+    for start, stop in motion.clip_range_frames:
+        poses = [pose[start:stop] for pose in (copies.places, copies.turns, copies.scales)]
+        hold(poses, copies.rest, extent, SLACK * allowed)
+    copies.max_error += len(PATHS) * SLACK * allowed
+
+
+def _as_copies(shape: GltfMesh, obj: SceneObject, copies: Copies) -> GltfCopies | None:
+    """None where copies have texture coordinates or colours of their own."""
+    which, local = np.divmod(shape.source - obj.first, obj.count // obj.copies)
+    if (np.bincount(which) * obj.copies != len(which)).any():
+        return None
+    rows = np.argsort(which, kind="stable").reshape(obj.copies, -1)
+    if (local[rows] != local[rows[:1]]).any():
+        return None
+    shared, own, lost = {}, {}, []
+    for key, values in shape.attributes.items():
+        each = values[rows]
+        if key == "NORMAL":
+            shared[key] = (each[0] @ copies.axes).astype(np.float32)
+        elif _same(each, each[:1]):
+            shared[key] = each[0]
+        elif not key.startswith("_"):
+            return None
+        elif _same(each, each[:, :1]):
+            own[key] = each[:, 0]
+        else:
+            lost.append(key)
+    place = np.full(len(which), -1)
+    place[rows[0]] = np.arange(rows.shape[1])
+    corners, materials = shape.corners, shape.materials
+    if corners is not None:
+        mine = (which[corners] == 0).all(axis=1)
+        corners, materials = place[corners[mine]], None if materials is None else materials[mine]
+    return GltfCopies(GltfMesh(shape.name, local[rows[0]], corners, shared, materials), copies, own, lost)
+
+
+def _same(values: np.ndarray, expected: np.ndarray) -> bool:
+    return bool(((values == expected) | ((values != values) & (expected != expected))).all())
+
+
+def _plain(row: np.ndarray) -> Any:
+    """As JSON has it."""
+    return row[0].item() if len(row) == 1 else row.tolist()
