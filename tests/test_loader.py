@@ -6,6 +6,7 @@ Loader and worker run as they ship, in Node (tests/node/loading.mjs); with the m
 
 from __future__ import annotations
 
+import hashlib
 import json
 import shutil
 import subprocess
@@ -40,8 +41,8 @@ def node(*words) -> object:
     return json.loads(done.stdout)
 
 
-def run_node(case: str, path: Path):
-    return node(NODE / "loader_cases.mjs", case, path)
+def run_node(case: str, path: Path, *words):
+    return node(NODE / "loader_cases.mjs", case, path, *words)
 
 
 @pytest.fixture(scope="module")
@@ -158,6 +159,21 @@ def test_a_wind_shows_the_blended_clips_of_the_decoder(with_faces, sample_clip, 
     path = tmp_path / "winds.ath"
     athcodec.encode(athcodec.join(clips), path, rel_error=1e-3, segment_frames=16)
     assert run_node("winds", path) == {"off": [], "refused": ["RangeError", "RangeError"]}
+
+
+def test_endless_play_shows_what_the_decoder_in_python_does(sample_clip, tmp_path):
+    path = tmp_path / "endless.ath"
+    transitions = [[30, 2, 6], [50, 10, 8], [50, 20, 6], [40, 31, 7]]
+    clip = sample_clip.replace(metadata=sample_clip.metadata | {"transitions": transitions})
+    athcodec.encode(clip, path, rel_error=1e-3, segment_frames=16)
+    with athcodec.open(path) as decoder:
+        play = decoder.endless(7)
+        seconds = [float(t) for t in np.arange(0, 40, 0.63)]
+        wanted = [hashlib.sha256(play.positions(t)).hexdigest() for t in seconds]
+        assert sum(len(play.places(t)) == 2 for t in seconds) > 5
+    found = run_node("endless", path, *seconds)
+    assert found["duration"] and found["refused"] == "RangeError" and found["shown"] == []
+    assert found["positions"] == wanted
 
 
 def test_parse_takes_buffers_and_views_of_all_kinds_and_leaves_them_as_they_are(layered_ath):

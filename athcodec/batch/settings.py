@@ -31,7 +31,14 @@ from athcodec.units import parse_length, parse_size
 
 BOUNDS = ("max_error", "rel_error", "target_size")  # of which a clip has one
 READING = ("source_format", "rest", "fps", "mesh", "field", "only", "takes", "unit", "up_axis")
-SHAPING = ("hierarchy", "loop", "loop_blend", "strength", "heading")  # what is made of a clip before it is coded
+SHAPING = (
+    "hierarchy",
+    "loop",
+    "loop_blend",
+    "endless",
+    "strength",
+    "heading",
+)  # what is made of a clip before it is coded
 
 Settings = dict[str, Any]
 
@@ -79,7 +86,7 @@ def check_settings(
     ----------
     settings : dict
         Keywords of `athcodec.encode`, of `athcodec.read` (its format as source_format), hierarchy, loop,
-        loop_blend, strength and heading.
+        loop_blend, endless, strength and heading.
         Lengths and sizes may be text with a unit, "1mm".
     where : str, optional
         What error messages begin with.
@@ -279,6 +286,7 @@ _CHECKS: dict[str, Callable[[Any], Any]] = {
     "up_axis": _one_of("x", "y", "z"),
     "loop": _BOOL,
     "loop_blend": _whole(0, 1 << 31),
+    "endless": _BOOL,
     "strength": _finite,
     "heading": _finite,
 }

@@ -238,6 +238,11 @@ def _batch_arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("--dry-run", action="store_true", help="only say what would be done with each clip, and why")
     verb.add_argument("--loop", action="store_true", help="mark clips as loops, their first frame following their last")
     verb.add_argument(
+        "--endless",
+        action="store_true",
+        help="find transitions between like frames, over which players play clips without an end",
+    )
+    verb.add_argument(
         "--loop-blend",
         metavar="FRAMES",
         type=_argument(_whole),

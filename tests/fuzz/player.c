@@ -4,7 +4,7 @@
 #include "ath_player.h"
 #include "harness.h"
 
-enum { MOST_MEMORY = 8 << 20, CALLS = 7, JOBS = 2 };
+enum { MOST_MEMORY = 8 << 20, CALLS = 9, JOBS = 2 };
 
 /* Who hands out memory: none beyond MOST_MEMORY, nor every `scarce`-th time, 0: always. */
 typedef struct {
@@ -99,6 +99,15 @@ static float *shown(user *u, int32_t clip, double seconds, ath_wrap wrap, int32_
     return NULL;
 }
 
+/* What both show of one moment, which is freed. */
+static void compare(user users[2], float *first, float *second)
+{
+    if (first && second && users[0].memory.scarce + users[1].memory.scarce == 0)
+        REQUIRE(memcmp(first, second, 12 * (size_t)users[0].info.vertex_count) == 0, "what is kept changes nothing");
+    free(first);
+    free(second);
+}
+
 static void show(user users[2], int32_t argument, const uint8_t *options)
 {
     int32_t clip = argument % (users[0].info.clip_count + 1), level = options[2] % (users[0].info.level_count + 1) - 1;
@@ -106,10 +115,7 @@ static void show(user users[2], int32_t argument, const uint8_t *options)
     ath_wrap wrap = (ath_wrap)(options[4] % 4);
     float *first = shown(users, clip, seconds, wrap, level, options[5]);
     float *second = shown(users + 1, clip, seconds, wrap, level, options[5]);
-    if (first && second && users[0].memory.scarce + users[1].memory.scarce == 0)
-        REQUIRE(memcmp(first, second, 12 * (size_t)users[0].info.vertex_count) == 0, "what is kept changes nothing");
-    free(first);
-    free(second);
+    compare(users, first, second);
 }
 
 static void show_matrices(user *u, int32_t argument)
@@ -188,9 +194,63 @@ static void shade(user *u, int32_t argument)
     free(corners(u, 1, (ath_order)(argument & 1), &count));
 }
 
+/* A wind over all clips, each in one of its own, and numbers that name none. */
+static float *in_wind(user *u, int32_t argument, const uint8_t *options)
+{
+    int32_t clips = u->info.clip_count;
+    ath_wind *winds = fuzz_memory((size_t)clips * sizeof *winds, 0);
+    float *xyz = fuzz_memory(12 * (size_t)u->info.vertex_count, 0);
+    for (int32_t i = 0; i < clips; i++) {
+        winds[i].strength = (i + options[3]) % 5 ? (double)((i * 7 + argument) % 11) : NAN;
+        winds[i].heading = 45.0 * ((i + argument) % 9) - 90.0;
+    }
+    int result = ath_player_wind_positions(u->player, winds, argument / 8.0, 3.0 * options[2], options[5] / 32.0,
+                                           (ath_wrap)(options[4] % 4), argument % (u->info.level_count + 1) - 1,
+                                           ATH_SOURCE_ORDER, xyz, 12);
+    free(winds);
+    if (result == ATH_OK || result == ATH_HELD) return xyz;
+    REQUIRE(is_error(result), "winds give their codes");
+    free(xyz);
+    return NULL;
+}
+
+/* A play without an end over any transitions, those that are none included: forth in time and back. */
+static float *without_end(user *u, int32_t argument, const uint8_t *options)
+{
+    ath_player_transition transitions[3];
+    ath_player_endless play;
+    for (int32_t i = 0; i < 3; i++) {
+        transitions[i].leave = options[i] / (1 + argument % 4);
+        transitions[i].enter = options[i + 1] % 16 - 1;
+        transitions[i].frames = options[i + 2] % 8;
+    }
+    if (ath_player_endless_begin(u->player, &play, options[5] % (u->info.clip_count + 1), transitions, 1 + argument % 3,
+                                 options[4])
+        != ATH_OK)
+        return NULL;
+    float *xyz = fuzz_memory(12 * (size_t)u->info.vertex_count, 0);
+    int result = ATH_OK;
+    for (int32_t step = 0; step < 4 && (result == ATH_OK || result == ATH_HELD); step++)
+        result = ath_player_endless_positions(u->player, &play, step == 3 ? 0.5 : step * (options[3] / 4.0),
+                                              argument % (u->info.level_count + 1) - 1, ATH_SOURCE_ORDER, xyz, 12);
+    if (result == ATH_OK || result == ATH_HELD) return xyz;
+    REQUIRE(is_error(result), "a play without an end gives its codes");
+    free(xyz);
+    return NULL;
+}
+
+static void show_alike(user users[2], float *(*of)(user *, int32_t, const uint8_t *), int32_t argument,
+                       const uint8_t *options)
+{
+    float *first = of(users, argument, options);
+    compare(users, first, of(users + 1, argument, options));
+}
+
 static void call(user users[2], int32_t which, int32_t argument, const uint8_t *options)
 {
     if (which == 0 || which == 1) show(users, argument, options);
+    if (which == 7) show_alike(users, in_wind, argument, options);
+    if (which == 8) show_alike(users, without_end, argument, options);
     for (int32_t i = 0; i < 2; i++) {
         if (which == 2) show_matrices(users + i, argument);
         if (which == 3 || which == 4) go_ahead(users + i, argument);

@@ -359,9 +359,9 @@ export class Session {
   // ---- decoding ----
 
   /** A view shows `frames` at `level` from now on: one, two that fade over, or those that are blended. Bytes of the clips of
-   * `wanted` are fetched. */
-  view(id, level, frames, wanted = frames.slice(0, 1)) {
-    this.#views.set(id, { level, frames, wanted, fading: this.#fading(id) });
+   * `wanted` are fetched; `ahead` are decoded as well. */
+  view(id, level, frames, wanted = frames.slice(0, 1), ahead = []) {
+    this.#views.set(id, { level, frames, wanted, ahead, fading: this.#fading(id) });
     this.#wakeUp();
     if (this.#opened) this.#decode();
   }
@@ -401,6 +401,8 @@ export class Session {
       const next = firstSegment + (own - firstSegment + 1) % segmentCount;
       yield [next, this.#readyLevel(next, most)];
     }
+    for (const { level, ahead } of this.#views.values())
+      for (const segment of ahead.map((frame) => this.#segmentAt(frame))) yield [segment, this.#readyLevel(segment, level)];
   }
 
   async #prepareInSteps(segment, level) {
@@ -588,22 +590,31 @@ export class Session {
   }
 
   #answer(message) {
-    const { view, clip, seconds, wrap, level, old = null, exactly = false, aside = false, heat = false, positions = false,
+    const { view, clip, seconds, wrap, level, ahead = null, old = null, exactly = false, aside = false, heat = false, positions = false,
       buffer = null, now = 0, fade = 0, coarsely = false } = message;
-    if (message.wind) return this.#inWind(message);
+    const shares = this.#shares(message);
+    if (shares) return this.#ofShares(message, shares);
     const frame = this.#file.frameAt(seconds, wrap, clip), fading = aside ? new Fading() : this.#fading(view);
-    const shown = exactly ? this.#exactly(frame, level) : this.#viewed({ view, frame, level, old, fading, coarsely });
+    const shown = exactly ? this.#exactly(frame, level) : this.#viewed({ view, frame, level, old, fading, coarsely,
+      ahead: ahead === null ? [] : [this.#file.frameAt(ahead, wrap, clip)] });
     if (!shown) return { frame };
     fading.to(shown.level, now, exactly ? 0 : fade);
     return { ...this.#picture(shown, fading, positions, buffer), ...(heat ? { heat: this.#distances(shown) } : {}) };
   }
 
-  // Clips that are blended for a wind, each at the deepest level that is decoded of it; those of which nothing is are left out.
-  #inWind({ view, clip, seconds, wrap, level, wind: [strength, heading], exactly = false, aside = false, positions = false,
-    buffer = null, coarsely = false }) {
-    const file = this.#file, weights = file.windWeights(this.#winds, strength, heading), shares = [];
-    const used = weights.flatMap((weight, index) => (weight > 0 ? [{ weight, frame: file.frameAt(seconds, wrap, index) }] : []));
-    const frames = used.map(({ frame }) => frame), frame = file.frameAt(seconds, wrap, clip);
+  // Frames that are blended, [{frame, weight}]: of clips for a wind, or of two places of a clip that plays without an end; null:
+  // there is one alone.
+  #shares({ wind, places, clip, seconds, wrap }) {
+    const file = this.#file;
+    if (wind)
+      return file.windWeights(this.#winds, ...wind).flatMap((weight, index) =>
+        (weight > 0 ? [{ weight, frame: file.frameAt(seconds, wrap, index) }] : []));
+    return places?.length > 1 ? places.map((place) => ({ weight: place.weight, frame: file.frameAt(place.seconds, wrap, clip) })) : null;
+  }
+
+  // Each at the deepest level that is decoded of it; those of which nothing is are left out.
+  #ofShares({ view, clip, seconds, wrap, level, exactly = false, aside = false, positions = false, buffer = null, coarsely = false }, used) {
+    const file = this.#file, shares = [], frames = used.map((share) => share.frame), frame = file.frameAt(seconds, wrap, clip);
     if (!aside) this.view(view, level, frames, frames);
     for (const share of used) {
       const shown = exactly ? this.#exactly(share.frame, level) : this.#show(share.frame, coarsely ? 0 : level);
@@ -627,10 +638,11 @@ export class Session {
   }
 
   // coarsely: level 0 for now, whatever is wanted.
-  #viewed({ view, frame, level: wanted, old, fading, coarsely }) {
+  // ahead: frames that it goes over into.
+  #viewed({ view, frame, level: wanted, old, fading, coarsely, ahead }) {
     const level = coarsely ? 0 : wanted;
     if (old) old.frame = this.#file.frameAt(old.seconds, old.wrap, old.clip);
-    this.view(view, wanted, old ? [frame, old.frame] : [frame]);
+    this.view(view, wanted, old ? [frame, old.frame] : [frame], [frame, ...ahead], ahead);
     return old ? this.#change(frame, old, level, fading.level) : this.#showNext(frame, level, fading.level);
   }
 
