@@ -19,7 +19,7 @@ import athcodec
 from athcodec import core_file
 
 CORPUS = Path(__file__).resolve().parent / "corpus"
-TESTED = {"colliding_gaps.ath", "integers_not_yet_written.prelude"}
+TESTED = {"colliding_gaps.ath", "connected_rest_without_faces.player", "integers_not_yet_written.prelude"}
 
 
 def test_every_find_has_a_test():

@@ -417,13 +417,13 @@ static int read_mesh(ath_file *file, ath_fault_info *fault)
     ath_mesh *mesh = &file->mesh;
     int32_t vertex_count = (int32_t)file->header.vertex_count, is_absolute;
     size_t vertices = file->header.vertex_count, building = ath_mesh_work(vertices, MESH_CORNERS * vertices);
-    int32_t *corners = mesh->work + larger(building, (ath_faces_memory(vertex_count) + 3) / 4);
     ath_bytes chunk, body;
     ath_polygons shape;
-    int result = load(file, ATH_FACES, &chunk, fault);
+    int result = load(file, ATH_FACES, &chunk, fault); /* without which there is no memory for a mesh */
     if (result == ATH_OK) result = ath_parse_polygons(chunk, &shape, &is_absolute, &body);
     if (result != ATH_OK) return fault->code = result;
     if (shape.is_derived || !ath_serves_rest(&shape, vertex_count)) return ATH_BAD_CHUNK;
+    int32_t *corners = mesh->work + larger(building, (ath_faces_memory(vertex_count) + 3) / 4);
     uint32_t *counts = shape.is_mixed ? (uint32_t *)(void *)(corners + shape.corner_count) : 0;
     result = ath_decode_faces(mesh->work, body, &shape, is_absolute, vertex_count, counts, corners);
     if (result == ATH_OK) ath_build_mesh(mesh, &shape, counts, corners, file->vertex_source);
