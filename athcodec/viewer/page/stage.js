@@ -1,4 +1,4 @@
-// The stage: renderer, camera and light, and one or two panes side by side, each with its own scene.
+// The stage: renderer, camera and light, and one or two panes, each with its own scene; two share the view, on either side of a split.
 
 import { BufferAttribute, Color, DirectionalLight, Fog, HemisphereLight, Mesh, PerspectiveCamera, PlaneGeometry, Scene, ShaderMaterial, Vector3,
   WebGLRenderer } from "three";
@@ -15,6 +15,8 @@ void main() {
 
 export class Stage {
   panes = [];
+
+  split = 0.5; // share of the picture that is the left one of two panes
 
   moved = false; // by hand, since the whole was last in view
 
@@ -118,7 +120,7 @@ export class Stage {
   /** The whole of a box (in the world) in view, from any side; `ground`: its height and size. */
   look(box, ground) {
     const size = box.getSize(new Vector3()), across = Math.hypot(size.x, size.z), half = Math.tan(this.camera.fov * Math.PI / 360);
-    const aspect = (this.width - this.inset) / this.height / Math.max(1, this.panes.length);
+    const aspect = (this.width - this.inset) / this.height;
     const distance = 0.35 * across + 0.68 * Math.max(size.y, 0.9 * across / aspect, 1e-6) / half;
     box.getCenter(this.controls.target);
     this.camera.position.copy(this.controls.target).add(new Vector3(0.35, 0.16, 0.92).normalize().multiplyScalar(distance));
@@ -143,23 +145,21 @@ export class Stage {
     for (const { scene } of this.panes) scene.fog = far > 0 ? new Fog(scene.background, near, far) : null;
   }
 
-  /** Height of a pane in pixels of the device. */
+  /** Height of the picture in pixels of the device. */
   get pixels() {
     return this.height * this.renderer.getPixelRatio();
   }
 
   // What lies behind the settings is drawn too, and counts for nothing else.
   render() {
-    const { renderer, camera, panes, height, inset } = this, width = (this.width - inset) / Math.max(1, panes.length);
-    camera.aspect = width / height;
+    const { renderer, camera, panes, width, height } = this, seen = width - this.inset, left = this.split * seen;
+    camera.aspect = seen / height;
+    camera.setViewOffset(seen, height, 0, 0, width, height);
+    camera.updateMatrixWorld();
     renderer.setScissorTest(panes.length > 1);
     panes.forEach(({ scene, before }, i) => {
-      const drawn = i === panes.length - 1 ? width + inset : width;
-      camera.setViewOffset(width, height, 0, 0, drawn, height);
-      camera.updateMatrixWorld();
-      before?.(drawn * renderer.getPixelRatio(), this.pixels);
-      renderer.setViewport(i * width, 0, drawn, height);
-      renderer.setScissor(i * width, 0, drawn, height);
+      before?.(width * renderer.getPixelRatio(), this.pixels);
+      if (panes.length > 1) renderer.setScissor(i * left, 0, i === 0 ? left : width - left, height);
       renderer.render(scene, camera);
     });
   }

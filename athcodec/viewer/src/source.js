@@ -31,6 +31,57 @@ export class MemorySource {
   abort() {}
 }
 
+const PACKET = 1460, NAP_MS = 8; // sleeps shorter than this are put together
+
+/** Another source over a slower line: all its bytes pass one after another at `rate` bytes a second. */
+export class PacedSource {
+  fetched = 0;
+  #free = 0;
+
+  constructor(source, rate) {
+    this.source = source;
+    this.rate = rate;
+    this.aborted = new Promise((_, reject) => { this.reject = reject; });
+    this.aborted.catch(() => {});
+  }
+
+  get ranged() {
+    return this.source.ranged;
+  }
+
+  get requests() {
+    return this.source.requests;
+  }
+
+  get total() {
+    return this.source.total;
+  }
+
+  async read(offset, size, take) {
+    const pieces = [];
+    await this.source.read(offset, size, (bytes, from) => { pieces.push([bytes, from]); });
+    for (const [bytes, from] of pieces)
+      for (let at = 0; at < bytes.length; at += PACKET) {
+        const packet = bytes.subarray(at, at + PACKET);
+        await this.#pass(packet.length);
+        this.fetched += packet.length;
+        take(packet, from + at);
+      }
+  }
+
+  async #pass(size) {
+    const now = performance.now();
+    this.#free = Math.max(this.#free, now) + (1000 * size) / this.rate;
+    const wait = this.#free - now;
+    await Promise.race([this.aborted, wait < NAP_MS ? null : new Promise((done) => { setTimeout(done, wait); })]);
+  }
+
+  abort(reason) {
+    this.source.abort(reason);
+    this.reject(reason ?? new DOMException("loading was aborted", "AbortError"));
+  }
+}
+
 /** A file behind http or https. `ranged` is null until the first answer. */
 export class HttpSource {
   ranged = null;

@@ -41,6 +41,9 @@ export class ATHLoader extends Loader<ATH> {
    * they were in the source, bit for bit and in that order, or a geometry that has them, as GLTFLoader gives it. Without it
    * such a file fails with the codeName "NEEDS_HOST_MESH", with another mesh "WRONG_HOST_MESH"; other files pass it over. */
   setHostMesh(mesh: Float32Array | BufferGeometry | null): this;
+  /** Bits a second at which bytes of files that are loaded from now on come at most, from memory too, as over a slow line
+   * (default null: as fast as they do). To show how a file loads, not to share a line: a range is fetched at once, and passed on slowly. */
+  setBandwidth(bandwidth: number | null): this;
   /** Starts a worker before there is a file for it. */
   preload(): this;
   /** onLoad: at the first picture. onProgress: {loaded, total} bytes, as long as bytes come. */
@@ -194,6 +197,8 @@ export class ATHMotion extends EventDispatcher<ATHMotionEvents> {
   /** Chooses the automatic level: once per frame, before setTime(). height: of the picture in pixels. */
   update(camera: Camera, height: number, object?: Object3D): this;
   levelFor(camera: Camera, height: number, matrixWorld?: Matrix4 | null, pixels?: number): number;
+  /** How many pixels the error of a level is on the screen, by `measure`, where the plant is nearest to the camera. */
+  pixelError(level: number, camera: Camera, height: number, matrixWorld?: Matrix4 | null): number;
   /** Decodes this very time and level and shows it. Rejects where bytes are missing or damaged. */
   show(seconds: number, level?: number): Promise<unknown>;
   /** All vertices in source order, 3 numbers each; what is shown stays. Rejects like show(). */
