@@ -228,6 +228,9 @@ def test_fifty_loads_and_disposals_leave_nothing_on_the_gpu(browser, sample_ath)
         page.goto(line.page("tree.ath"))
         page.wait_for_function("() => athcodecViewer.motion?.complete", timeout=60_000)
         page.evaluate("athcodecViewer.setPlaying(false)")
+        page.wait_for_function(
+            "() => athcodecViewer.motion.level === athcodecViewer.motion.target && !athcodecViewer.motion.fading"
+        )
         found = page.evaluate(DISPOSED)
         page.close()
     assert found["first"] == found["last"]

@@ -12,6 +12,6 @@ export const app = { stage: null, plants: [], opened: [] };
 export const state = { playing: true, speed: 1, loop: null, time: 0, turns: 0, wind: null, forest: null, dirty: true };
 
 export const counters = { frames: 0, fps: 0, frameMs: 0, since: performance.now(), pictures: 0, started: 0, firstPicture: null, firstMotion: null,
-  whole: null };
+  arrived: {} };
 
 export const main = () => app.plants.at(-1);

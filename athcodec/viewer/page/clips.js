@@ -10,8 +10,7 @@ const FADE = 0.4; // seconds, from one clip to the next
 
 export function clipControls() {
   const { clips, clip } = app.opened[0].motion, select = $("clip");
-  const windy = Object.assign(new Option("wind", "wind"), { hidden: true });
-  select.replaceChildren(...clips.map(({ index, name, loop }) => new Option(loop ? `${name} ↻` : name, index)), windy);
+  select.replaceChildren(...clips.map(({ index, name, loop }) => new Option(loop ? `${name} ↻` : name, index)));
   select.value = clip.index;
   select.hidden = $("forest-mix-row").hidden = clips.length < 2;
 }
@@ -25,6 +24,7 @@ export function playClip(index) {
   const ended = state.time >= limit(), [{ motion }] = app.plants;
   state.wind = null;
   for (const plant of app.plants) playIn(plant.motion, motion.clips[index].name);
+  clipControls();
   $("clip").value = index;
   fromTheStart();
   setLoop(null);

@@ -6,7 +6,7 @@ import { playIn } from "./clips.js";
 import { compare } from "./look.js";
 import { Plant } from "./plant.js";
 import { restore } from "./address.js";
-import { loadingStory, replayed, tellSizes } from "./story.js";
+import { loadingStory, replayed, tellSizes, watchArrival } from "./story.js";
 import { shownWithout, wordsOf } from "./trouble.js";
 import { $ } from "./ui.js";
 
@@ -100,7 +100,7 @@ export async function open(source, name, beside = false, again = null) {
   const wish = ++asked, retry = () => open(source, name, beside, again);
   message.hidden = true;
   if (!beside) {
-    Object.assign(counters, { started: performance.now(), firstPicture: null, firstMotion: null, whole: null, pictures: 0 });
+    Object.assign(counters, { started: performance.now(), firstPicture: null, firstMotion: null, arrived: {}, pictures: 0 });
     $("trouble").hidden = true;
     loadingStory(name);
   }
@@ -116,6 +116,7 @@ export async function open(source, name, beside = false, again = null) {
     return;
   }
   Object.assign(ath, { fileName: name, source });
+  if (!beside) watchArrival(ath);
   if (beside) {
     close(app.opened.splice(1));
     playIn(ath.motion, app.opened[0].motion.clip.name);
@@ -138,9 +139,8 @@ async function show(ath, beside, again) {
   plant?.prepare(1, 1);
   await breath();
   arrange(plant);
-  tellSizes();
-  await breath();
   if (!app.stage.moved) frameView();
+  tellSizes();
   if (first) restore();
   first = false;
 }

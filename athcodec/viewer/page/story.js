@@ -52,30 +52,38 @@ function needed({ channel }, { clip, bytesTotal }) {
   return state.wind ? bytesTotal : others.reduce((sum, { length }) => sum - length, bytesTotal);
 }
 
-/** When the first picture was drawn, the first that differs from it, and the first of the full detail. */
+/** When the first picture was drawn, and the first that differs from it. */
 export function markFirst() {
   const { motion } = main();
-  if (motion.level < 0 || counters.whole) return;
+  if (motion.level < 0 || counters.firstMotion) return;
   const now = { ms: performance.now() - counters.started, bytes: motion.bytesFetched, frame: motion.frame };
   if (!counters.firstPicture) document.body.classList.remove("loading");
   counters.firstPicture ??= now;
-  if (motion.frame !== counters.firstPicture.frame) counters.firstMotion ??= now;
-  if (motion.complete && motion.level === motion.target) counters.whole = now;
+  if (motion.frame !== counters.firstPicture.frame) counters.firstMotion = now;
 }
 
-const seconds = ({ ms }) => `${(ms / 1000).toFixed(ms < 9950 ? 1 : 0)} s`;
+/** From now on it is told when the bytes of a file have come; the first picture is decoded. Drawing it takes time of its own. */
+export function watchArrival({ motion }) {
+  const now = () => performance.now() - counters.started;
+  const whole = () => { if (motion.complete) counters.arrived.whole ??= now(); };
+  counters.arrived = { first: now() };
+  motion.addEventListener("ready", whole);
+  whole();
+}
+
+const seconds = (ms) => `${(ms / 1000).toFixed(ms < 9950 ? 1 : 0)} s`;
 
 function tellArrived() {
   const { ath, motion } = main(), wanted = needed(ath, motion), { bytesFetched, bytesTotal } = motion;
-  const share = Math.min(1, bytesFetched / wanted), shown = Math.max(motion.level, 0), { firstPicture, whole } = counters;
+  const share = Math.min(1, bytesFetched / wanted), shown = Math.max(motion.level, 0), { first, whole } = counters.arrived;
   const bar = $("progress"), settled = motion.level >= motion.target;
   bar.firstElementChild.style.width = `${100 * share}%`;
   bar.setAttribute("aria-valuenow", String(Math.round(100 * share)));
   bar.setAttribute("aria-valuetext", `${bytesText(bytesFetched)} of ${bytesText(wanted)}`);
   const here = bytesFetched >= bytesTotal ? "All here" : whole ? `${bytesText(bytesFetched)} here, all that this needs` : `${bytesText(bytesFetched)} here`;
   $("arrived").textContent = `${here}: ${detailText(motion, shown)}, error up to ${within(main(), shown)}${settled ? "" : ", sharpening…"}`;
-  $("timing").hidden = !bandwidth || !firstPicture;
-  if (firstPicture) $("timing").textContent = `Moving after ${seconds(firstPicture)}${whole ? `, in full detail after ${seconds(whole)}` : ""}`;
+  $("timing").hidden = !bandwidth;
+  $("timing").textContent = `First picture after ${seconds(first)}${whole ? `, full detail after ${seconds(whole)}` : ""}`;
 }
 
 export function tellFacts() {

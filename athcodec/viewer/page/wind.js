@@ -61,7 +61,9 @@ function mark() {
 export function applyWind() {
   if (!state.wind || !range || state.forest) return;
   for (const { motion } of app.plants) motion.wind(...state.wind);
-  $("clip").value = "wind";
+  const select = $("clip");
+  if (!select.querySelector("[value=wind]")) select.append(new Option("wind", "wind"));
+  select.value = "wind";
 }
 
 export function setWind(strength, heading) {
