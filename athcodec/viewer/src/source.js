@@ -36,7 +36,8 @@ const PACKET = 1460, NAP_MS = 8; // sleeps shorter than this are put together
 /** Another source over a slower line: all its bytes pass one after another at `rate` bytes a second. */
 export class PacedSource {
   fetched = 0;
-  #free = 0;
+  #free = 0; // when the line is, by the clock
+  #readers = 0;
 
   constructor(source, rate) {
     this.source = source;
@@ -60,20 +61,21 @@ export class PacedSource {
   async read(offset, size, take) {
     const pieces = [];
     await this.source.read(offset, size, (bytes, from) => { pieces.push([bytes, from]); });
-    for (const [bytes, from] of pieces)
-      for (let at = 0; at < bytes.length; at += PACKET) {
-        const packet = bytes.subarray(at, at + PACKET);
-        await this.#pass(packet.length);
-        this.fetched += packet.length;
-        take(packet, from + at);
-      }
+    if (this.#readers++ === 0) this.#free = Math.max(this.#free, performance.now()); // else what a late timer lost is made up for
+    try {
+      for (const [bytes, from] of pieces)
+        for (let at = 0; at < bytes.length; at += PACKET) await this.#pass(bytes.subarray(at, at + PACKET), from + at, take);
+    } finally {
+      this.#readers--;
+    }
   }
 
-  async #pass(size) {
-    const now = performance.now();
-    this.#free = Math.max(this.#free, now) + (1000 * size) / this.rate;
-    const wait = this.#free - now;
+  async #pass(packet, offset, take) {
+    this.#free += (1000 * packet.length) / this.rate;
+    const wait = this.#free - performance.now();
     await Promise.race([this.aborted, wait < NAP_MS ? null : new Promise((done) => { setTimeout(done, wait); })]);
+    this.fetched += packet.length;
+    take(packet, offset);
   }
 
   abort(reason) {
