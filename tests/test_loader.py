@@ -23,7 +23,6 @@ from athcodec.joining import in_wind
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.append(str(ROOT))  # for bench, which is not installed; athcodec stays the installed one
 
-from bench.browser import chromium  # noqa: E402
 from bench.throttled_server import ThrottledServer  # noqa: E402
 
 NODE = ROOT / "tests" / "node"
@@ -193,12 +192,6 @@ def test_fifty_loads_and_disposals_leave_no_memory_behind(layered_ath):
 
 
 # ---- in a browser ----
-
-
-@pytest.fixture(scope="module")
-def browser():
-    with chromium() as found:
-        yield found
 
 
 DISPOSED = """async () => {

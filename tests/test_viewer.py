@@ -31,7 +31,6 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path.append(str(ROOT))  # for bench, which is not installed; athcodec stays the installed one
 
 from bench import throttled_server  # noqa: E402
-from bench.browser import chromium  # noqa: E402
 from bench.throttled_server import WEB, ThrottledServer  # noqa: E402
 from bench.trees.plant import grow  # noqa: E402
 
@@ -262,32 +261,6 @@ const seconds = (motion: ATHBabylonMotion): string => motion.setSeconds(bytes.le
 # ---- in a browser ----
 
 browser_test = pytest.mark.browser
-
-
-@pytest.fixture(scope="module")
-def browser():
-    with chromium() as found:
-        yield found
-
-
-@pytest.fixture
-def opened(browser):
-    """A function that opens an address and waits for a condition; the page must not have logged an error at the end."""
-    pages, errors = [], []
-
-    def visit(address: str, until: str = "athcodecViewer.motion?.complete", **options):
-        page = browser.new_page(viewport={"width": 1000, "height": 700}, **options)
-        pages.append(page)
-        page.on("console", lambda message: errors.append(message.text) if message.type == "error" else None)
-        page.on("pageerror", lambda error: errors.append(str(error)))
-        page.goto(address)
-        page.wait_for_function(f"() => {until}", timeout=60_000)
-        return page
-
-    yield visit
-    for page in pages:
-        page.close()
-    assert errors == []
 
 
 @pytest.fixture(scope="module")

@@ -65,8 +65,16 @@ export function restore() {
     get(name, (value) => { if (choice.buttons.some((button) => button.dataset.value === value)) choice.pick(value); });
   get("split", restoreSplit);
   get("view", restoreView);
-  get("t", (text) => {
-    setPlaying(false);
-    if (Number.isFinite(Number(text))) seek(Number(text));
-  });
+  get("t", (text) => { if (Number.isFinite(Number(text))) stopAt(Number(text)); });
+}
+
+// A clip that is waited for begins at its start.
+function stopAt(seconds) {
+  const { motion } = main(), begun = () => {
+    motion.removeEventListener("clip", begun);
+    seek(seconds);
+  };
+  setPlaying(false);
+  seek(seconds);
+  if (motion.switching) motion.addEventListener("clip", begun);
 }

@@ -8,10 +8,11 @@ import { forestOf, forestSwitch } from "./forests.js";
 import { setLevel, setSplit } from "./look.js";
 import { readback } from "./readback.js";
 import { seek, setPlaying } from "./time.js";
+import { moveView } from "./camera.js";
 import { setWind } from "./wind.js";
 
 globalThis.athcodecViewer = {
-  counters, state, open, loadAgain, seek, setPlaying, setLevel, setSplit, setWind, playClip, forestSwitch, forestOf, frameView,
+  counters, state, open, loadAgain, seek, setPlaying, setLevel, setSplit, setWind, moveView, playClip, forestSwitch, forestOf, frameView,
   get stage() { return app.stage; },
   get plants() { return app.plants; },
   get motion() { return main()?.motion; },
