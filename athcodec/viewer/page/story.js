@@ -80,7 +80,7 @@ function tellArrived() {
   bar.firstElementChild.style.width = `${100 * share}%`;
   bar.setAttribute("aria-valuenow", String(Math.round(100 * share)));
   bar.setAttribute("aria-valuetext", `${bytesText(bytesFetched)} of ${bytesText(wanted)}`);
-  const here = bytesFetched >= bytesTotal ? "All here" : whole ? `${bytesText(bytesFetched)} here, all that this needs` : `${bytesText(bytesFetched)} here`;
+  const here = bytesFetched >= bytesTotal ? "All here" : whole ? `${bytesText(bytesFetched)}, all this clip needs` : `${bytesText(bytesFetched)} here`;
   $("arrived").textContent = `${here}: ${detailText(motion, shown)}, error up to ${within(main(), shown)}${settled ? "" : ", sharpening…"}`;
   $("timing").hidden = !bandwidth;
   $("timing").textContent = `First picture after ${seconds(first)}${whole ? `, full detail after ${seconds(whole)}` : ""}`;
