@@ -34,8 +34,9 @@ function setStage() {
 
 function tick(now) {
   requestAnimationFrame(tick);
-  const passed = Math.min(0.1, (now - last) / 1000), { stage, plants } = app;
+  const passed = Math.min(1, (now - last) / 1000), { stage, plants } = app; // a page that was hidden goes on from where it was
   last = now;
+  if (state.playing && plants.length > 0) stage.took(1000 * passed);
   if (plants.length === 0) return;
   stage.controls.update();
   if (state.playing) advance(passed);
