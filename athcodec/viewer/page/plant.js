@@ -3,8 +3,8 @@
 import { BufferAttribute, BufferGeometry, DoubleSide, Group, InstancedBufferAttribute, LineBasicMaterial, LineSegments, Mesh, MeshLambertMaterial } from "three";
 
 import { barkColour, heat, nodeColour, orderColour } from "./colours.js";
-import { limbGeometry, limbMaterial, setRadii } from "./limbs.js";
-import { radii } from "./radii.js";
+import { limbGeometry, limbMaterial, setRadii } from "../src/limbs.js";
+import { radii } from "../src/radii.js";
 
 const LEAF = [0.16, 0.29, 0.07], OVER = [0.55, 0.2, 0.06];
 const SLIMMEST = 4; // order from which on bark is as pale as it gets
