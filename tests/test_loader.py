@@ -304,7 +304,8 @@ LIMBS = """async () => {
   const { ATHLimbs } = await import("athcodec-three");
   const { OrthographicCamera, Scene, WebGLRenderer } = await import("three");
   const { ath } = viewer, canvas = document.createElement("canvas"), renderer = new WebGLRenderer({ canvas });
-  const { center, radius: r } = ath.sphere, scene = new Scene(), camera = new OrthographicCamera(-r, r, r, -r, 0, 4 * r);
+  const { center, radius: r } = ath.sphere, scene = new Scene();
+  const camera = new OrthographicCamera(-r, r, r, -r, 0, 4 * r);
   camera.position.set(center.x, center.y, center.z + 2 * r);
   const limbs = new ATHLimbs(ath, { color: 0x00ff00 });
   const seen = () => {
