@@ -1,6 +1,6 @@
 """Screenshots of the viewer's page, as people see it: at the sizes of a desk and of a phone, light and dark; start,
-playing, two levels under the split, the error as colours, a forest, loading over a slow line, and each thing that can be
-wrong with a file.
+playing, two levels under the split, the error as colours, a forest, loading over a slow line, and each thing that can
+be wrong with a file.
 
 Drawing is in software, by Chromium; the pictures are WebP.
 """
@@ -22,7 +22,7 @@ from bench.throttled_server import ThrottledServer
 SIZES = [(1440, 900), (390, 844)]
 SCHEMES = ["light", "dark"]
 PHONE = 680  # pixels; as in viewer.css
-MEGABIT = 125_000
+SLOW = 125_000  # bytes a second
 QUALITY = 80
 PLANTS = 300  # of the forest
 TIMEOUT = 120_000  # ms
@@ -67,12 +67,13 @@ def _page(browser, size: tuple[int, int], scheme: str) -> Iterator:
 
 
 def _shot(page, data: bytes, name: str) -> bytes:
-    rate = MEGABIT if name == "loading" else None
+    rate = SLOW if name == "loading" else None
     with ThrottledServer({"tree.ath": data}, rate=rate) as line:
         page.goto(line.page("tree.ath"))
         if name != "loading":
             page.wait_for_function(f"() => {WHOLE}")
         SHOTS[name](page)
+        line.rate = line.rate and 1  # what is loading stays so while it is drawn
         return page.screenshot(timeout=TIMEOUT)
 
 
