@@ -172,6 +172,7 @@ def test_the_bundles_are_what_the_sources_make():
 PACKED = """
 import { ATHLoader, ATHForest, ATHMotion, injectMotion } from "athcodec-three";
 import { AthFile } from "athcodec-three/decoder";
+import.meta.resolve("athcodec-three/viewer");
 import { athMotion } from "athcodec-three/gltf/three";
 import { ATHMotionExtension, aside } from "athcodec-three/gltf/transform";
 import { createRequire } from "node:module";
@@ -230,8 +231,9 @@ TYPED = """
 import { type Loader, PerspectiveCamera, Scene } from "three";
 import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
 import { NodeIO } from "@gltf-transform/core";
-import { type ATH, ATHForest, ATHLoader, type ATHMotion } from "athcodec-three";
+import { type ATH, ATHForest, ATHLimbs, ATHLoader, type ATHMotion } from "athcodec-three";
 import { athMotion } from "athcodec-three/gltf/three";
+import type { ATHViewerElement } from "athcodec-three/viewer";
 import type { ATHBabylonMotion } from "athcodec-three/gltf/babylon";
 import { ATHMotionExtension, aside, type MotionList } from "athcodec-three/gltf/transform";
 const ath = await new ATHLoader().setWorkerLimit(2).loadAsync("tree.ath");
@@ -249,6 +251,9 @@ whole.motion.addEventListener("error", ({ message }) => console.error(message));
 const loader: Loader<ATH> = new ATHLoader().abort();
 for (const bytes of [new ArrayBuffer(8), new SharedArrayBuffer(8), xyz.subarray(1), new DataView(new ArrayBuffer(8))])
   await new ATHLoader().parseAsync(bytes);
+new Scene().add(new ATHLimbs(ath, { color: "brown" }).setColor((vertex) => [vertex, 0, 0]));
+const pixelsOff = ({ ath, camera }: ATHViewerElement): number | undefined => ath?.motion.pixelError(0, camera, 9);
+pixelsOff(new HTMLElement() as ATHViewerElement);
 ath.abort();
 new GLTFLoader().register(athMotion(new ATHLoader()));
 const io = new NodeIO().registerExtensions([ATHMotionExtension]), document = await io.read("tree_motion.glb");

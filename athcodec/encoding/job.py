@@ -353,7 +353,7 @@ class EncodingJob:
         total = float(decided.shared_bytes)
         for segment, frames in typical_segments(self.source):
             if segment not in decided.tried:
-                motion = self._motion(decided, segment, self.source.block(segment))
+                motion = self._motion(decided, segment, self.source.positions(segment), self._exact(segment))
                 decided.tried[segment] = CodedSegment(segment, *motion.joined_to())
             coded = decided.tried[segment]
             lossy = [data for (_, kind), data in coded.chunks.items() if kind != ct.EXACT]
@@ -554,7 +554,7 @@ class EncodingJob:
             return CodedSegment(taken[0], chunks, errors, np.zeros(len(errors), int))
 
         def code(taken: tuple[int, list[np.ndarray]]) -> tuple[int, CodedMotion, list[End | None]]:
-            motion = self._motion(decided, taken[0], taken[1].pop())
+            motion = self._motion(decided, taken[0], *self._positions(taken[1].pop()))
             return taken[0], motion, motion.ends() if len(source.segments) > 1 else []
 
         def join(taken: tuple[int, CodedMotion, list[End | None]]) -> CodedSegment:
@@ -572,9 +572,7 @@ class EncodingJob:
             self.report("motion", min((done + 0.5) / self.segment_count, 1.0))
             yield one
 
-    def _motion(self, decided: _Decided, index: int, block: np.ndarray) -> CodedMotion:
-        positions, exact = self._positions(block)
-        del block  # which nobody else holds
+    def _motion(self, decided: _Decided, index: int, positions: np.ndarray, exact: np.ndarray | None) -> CodedMotion:
         layers = decided.layers.of_segment(decided.source.is_whole_loop(index))
         goes_on = decided.source.goes_on(index)
         return CodedMotion(decided.prelude, layers, self.segment_count, positions, exact, goes_on)
@@ -593,6 +591,9 @@ class EncodingJob:
     def _positions(self, block: np.ndarray) -> tuple[np.ndarray, np.ndarray | None]:
         """What is coded of a block, and its own numbers where these are to come back."""
         return self.source.relative(block), self.source.exact(block) if self.options.lossless else None
+
+    def _exact(self, segment: int) -> np.ndarray | None:
+        return self.source.exact(self.source.block(segment)) if self.options.lossless else None
 
     def _add_motion(
         self, store: ct.ChunkStore, decided: _Decided, coded: Iterable[CodedSegment]

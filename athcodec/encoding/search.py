@@ -338,10 +338,12 @@ class Search:
         search = self.about_best_reference()
         first_layer, candidates = search.found(ratio)
         prelude = search.prelude(candidates[0])
-        return [
+        choices = [
             Choice(settings, first_layer, search.learned_modes(prelude.plan, settings), search.source.reference)
             for settings in candidates
-        ], prelude
+        ]
+        search._components.clear()  # they take as much memory as a segment
+        return choices, prelude
 
     def found(self, ratio: int = 1) -> tuple[Settings, list[Settings]]:
         """Settings of a first layer, and those to choose from for refinements; for a large plant those of a sample of

@@ -72,7 +72,8 @@ function box() {
 
 export function place() {
   const all = box(), size = all.getSize(new Vector3());
-  app.stage.placeGround(all.min.y, (state.forest ? 2.6 * forestRadius() : 1.9 * Math.max(size.x, size.y, size.z)));
+  const plant = 1.9 * Math.max(size.x, size.y, size.z);
+  app.stage.placeGround(all.min.y, state.forest ? Math.max(plant, 2.6 * forestRadius()) : plant, plant);
 }
 
 /** The whole plant, or of a forest what is near, in view. */
@@ -85,7 +86,7 @@ export function frameView() {
   }
   const reach = Math.max(forestRadius(), most), near = Math.min(reach, 2.2 * most);
   const part = new Box3(new Vector3(-near, all.min.y, -near), new Vector3(near, all.max.y, near));
-  stage.look(part, { height: all.min.y, size: 2.6 * reach });
+  stage.look(part, { height: all.min.y, size: 2.6 * reach, plant: 1.9 * most });
   stage.controls.maxDistance = 6 * reach;
   stage.camera.far = 12 * reach + 20 * most;
   stage.fog(stage.camera.position.distanceTo(stage.controls.target) * 0.7, 3.2 * reach + 4 * most);

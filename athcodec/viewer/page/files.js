@@ -71,8 +71,8 @@ function say(title, text, technical = "", again = null) {
 
 /** Says that nothing can be shown. */
 export function refuse(error, again = null) {
-  const { title, advice } = wordsOf(error.codeName);
-  say(title, advice, error.message, again);
+  const { title, advice, passing } = wordsOf(error.codeName);
+  say(title, advice, error.message, passing ? again : null);
   loadingStory(null);
 }
 

@@ -7,6 +7,7 @@ import { app, main, state } from "./app.js";
 import { arrange, frameView, place } from "./arrange.js";
 import { nodeColour } from "./colours.js";
 import { colour, compare, level, setLevel, show } from "./look.js";
+import { surfaceMaterial } from "./surfaces.js";
 import { setLoop } from "./time.js";
 import { $, countText } from "./ui.js";
 import { windControl } from "./wind.js";
@@ -31,7 +32,10 @@ function instances(count) {
   });
 }
 
+const hasSurfaces = () => colour.value === "plain" && app.plants[0].hasSurfaces;
+
 function forestMaterial(lines, of) {
+  if (hasSurfaces() && !lines) return surfaceMaterial();
   const material = lines ? new LineBasicMaterial() : new MeshLambertMaterial({ side: DoubleSide });
   tintForest(material, lines, of);
   return material;
@@ -46,7 +50,8 @@ function tintForest(material, lines, of) {
 }
 
 export function colourForest() {
-  state.forest?.children.forEach((drawn) => tintForest(drawn.material, drawn.isLineSegments, drawn.userData.level));
+  if (state.forest && app.plants[0].hasSurfaces) forestOn(); // in other materials
+  else state.forest?.children.forEach((drawn) => tintForest(drawn.material, drawn.isLineSegments, drawn.userData.level));
 }
 
 export function forestOn() {

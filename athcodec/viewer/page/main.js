@@ -7,7 +7,7 @@ import { write } from "./address.js";
 import { app, counters, loader, state } from "./app.js";
 import { reframe } from "./arrange.js";
 import { begin, refuse } from "./files.js";
-import { limbMaterial } from "./limbs.js";
+import { limbMaterial } from "../src/limbs.js";
 import { setSplit, splitLabels, tellLevel, tellScale } from "./look.js";
 import { togglePanel } from "./panel.js";
 import { lineMaterial, meshMaterial } from "./plant.js";

@@ -3,8 +3,8 @@
 import { BufferAttribute, BufferGeometry, DoubleSide, Group, InstancedBufferAttribute, LineBasicMaterial, LineSegments, Mesh, MeshLambertMaterial } from "three";
 
 import { barkColour, heat, nodeColour, orderColour } from "./colours.js";
-import { limbDepth, limbGeometry, limbMaterial, setRadii } from "./limbs.js";
-import { radii } from "./radii.js";
+import { limbDepth, limbGeometry, limbMaterial, setRadii } from "../src/limbs.js";
+import { radii } from "../src/radii.js";
 import { surfaceDepth, surfaceMaterial } from "./surfaces.js";
 
 const LEAF = [0.16, 0.29, 0.07], OVER = [0.55, 0.2, 0.06];
@@ -89,13 +89,13 @@ export class Plant {
   }
 
   // Whether the file says what is bark and what is leaf, by its texture coordinates.
-  get #hasSurfaces() {
+  get hasSurfaces() {
     return this.ath.metadata.surfaces === "bark, leaves" && this.ath.geometry.hasAttribute("uv");
   }
 
   // Bark and leaves as they look near by, or colours that tell something.
   #dress() {
-    const drawn = this.#drawn.find(({ kind }) => kind === "mesh"), wanted = this.colour === "plain" && this.ath.hasFaces && this.#hasSurfaces;
+    const drawn = this.#drawn.find(({ kind }) => kind === "mesh"), wanted = this.colour === "plain" && this.ath.hasFaces && this.hasSurfaces;
     if (!drawn || wanted === Boolean(drawn.other)) return;
     if (wanted) this.#surface ??= this.motion.bind(surfaceMaterial());
     [drawn.object.material, drawn.other] = wanted ? [this.#surface, drawn.object.material] : [drawn.other, null];
@@ -111,7 +111,7 @@ export class Plant {
       object.renderOrder = 1;
     } else if (ath.hasFaces) {
       object = motion.bindShadows(new Mesh(motion.attach(sharing(ath.geometry)), motion.bind(meshMaterial())));
-      if (this.#hasSurfaces) Object.assign(object, { customDepthMaterial: motion.bind(surfaceDepth()) });
+      if (this.hasSurfaces) Object.assign(object, { customDepthMaterial: motion.bind(surfaceDepth()) });
     } else {
       const geometry = limbGeometry(ath, this.#radii);
       object = new Mesh(motion.attach(geometry), limbMaterial(motion.uniforms));

@@ -135,16 +135,18 @@ export class Stage {
     this.camera.near = distance / 500;
     this.camera.far = distance * 60;
     this.controls.maxDistance = distance * 20;
-    this.placeGround(ground.height, ground.size);
+    this.placeGround(ground.height, ground.size, ground.plant);
     this.controls.update();
     this.changed();
   }
 
-  placeGround(height, size) {
+  /** size: of all that stands on it; plant: of a single plant, which the blades of grass are as large as. */
+  placeGround(height, size, plant = size) {
     for (const { scene } of this.panes) {
       const ground = scene.getObjectByName("ground");
       ground.position.y = height;
       ground.scale.setScalar(size);
+      ground.getObjectByName("grass").scale.setScalar(plant / size);
       this.sky.shade(scene, new Vector3(0, height + 0.25 * size, 0), 0.75 * size);
     }
     this.fog(0, 0);

@@ -18,10 +18,12 @@ const WORDS = {
 };
 const DAMAGED = ["The file is damaged", "Some of its bytes are not what they were when it was made. Get it again."];
 
-/** Of a failure: {title, advice}. */
+const PASSING = ["HTTP", "NETWORK", "MISSING", "TRUNCATED", "CHANGED", "WORKER"];
+
+/** Of a failure: {title, advice, passing}; `passing`: whether it may be gone when it is tried again. */
 export function wordsOf(codeName) {
   const [title, advice] = WORDS[codeName] ?? DAMAGED;
-  return { title, advice };
+  return { title, advice, passing: PASSING.includes(codeName) };
 }
 
 /** What is shown in spite of a failure. */

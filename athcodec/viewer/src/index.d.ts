@@ -20,8 +20,8 @@
  */
 
 import {
-  Box3, BufferGeometry, Camera, DataTexture, EventDispatcher, Group, IUniform, Loader, LoadingManager, Material, Matrix4,
-  Object3D, Sphere,
+  Box3, BufferGeometry, Camera, ColorRepresentation, DataTexture, EventDispatcher, Group, IUniform, Loader, LoadingManager, Material,
+  Matrix4, Mesh, Object3D, Sphere,
 } from "three";
 
 export class ATHLoader extends Loader<ATH> {
@@ -302,6 +302,17 @@ export class ATHForest extends Group {
   readonly vertices: number;
   dispose(): void;
 }
+
+/** The branches of a file without faces as round limbs, each edge a strip that faces the camera, lit as a cylinder by a light of its own;
+ * as thick as the attribute "radius" says or, without one, as follows from how much grows beyond an edge. For WebGLRenderer. */
+export class ATHLimbs extends Mesh {
+  constructor(ath: ATH, options?: { motion?: ATHMotion; color?: LimbColor });
+  setColor(color: LimbColor): this;
+  dispose(): void;
+}
+
+/** One colour, or linear red, green and blue of a vertex of the source. */
+export type LimbColor = ColorRepresentation | ((vertex: number) => [number, number, number]);
 
 /** The same as ATHMotion.bind(), by uniforms. */
 export function injectMotion<T extends Material>(material: T, uniforms: Record<string, IUniform>, forest?: boolean): T;

@@ -2,7 +2,7 @@
 // cylinder. Widths are the attribute "radius" or, without one, follow from how much grows beyond an edge.
 
 import { BufferAttribute, InstancedBufferAttribute, InstancedBufferGeometry, ShaderMaterial, Vector2 } from "three";
-import { MOTION_PARS } from "athcodec-three";
+import { MOTION_PARS } from "./shader.js";
 
 // One instance per edge, of four corners: `position` says which end, and which side. Attributes of the far end have
 // "Other" in their names.
