@@ -146,7 +146,7 @@ export class Stage {
       const ground = scene.getObjectByName("ground");
       ground.position.y = height;
       ground.scale.setScalar(size);
-      ground.getObjectByName("grass").scale.setScalar(plant / size);
+      ground.getObjectByName("grass").scale.setScalar(Math.sqrt(plant / size));
       this.sky.shade(scene, new Vector3(0, height + 0.25 * size, 0), 0.75 * size);
     }
     this.fog(0, 0);
