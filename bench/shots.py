@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import argparse
 import io
+import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -23,6 +24,7 @@ SIZES = [(1440, 900), (390, 844)]
 SCHEMES = ["light", "dark"]
 PHONE = 680  # pixels; as in viewer.css
 SLOW = 125_000  # bytes a second
+LOADED = 0.3  # share of the file that has come where it is loading
 QUALITY = 80
 PLANTS = 300  # of the forest
 TIMEOUT = 120_000  # ms
@@ -66,14 +68,22 @@ def _page(browser, size: tuple[int, int], scheme: str) -> Iterator:
         page.close()
 
 
+class _Held(ThrottledServer):
+    """A line that stops after a share of its file, so that what is loading stays so while it is drawn."""
+
+    def wait(self, size: int) -> None:
+        super().wait(size)
+        if self.sent("tree.ath") > LOADED * len(self.files["tree.ath"]):
+            threading.Event().wait()
+
+
 def _shot(page, data: bytes, name: str) -> bytes:
-    rate = SLOW if name == "loading" else None
-    with ThrottledServer({"tree.ath": data}, rate=rate) as line:
-        page.goto(line.page("tree.ath"))
+    server = _Held if name == "loading" else ThrottledServer
+    with server({"tree.ath": data}, rate=SLOW if name == "loading" else None) as line:
+        page.goto(line.page("tree.ath", quality="full"))
         if name != "loading":
             page.wait_for_function(f"() => {WHOLE}")
         SHOTS[name](page)
-        line.rate = line.rate and 1  # what is loading stays so while it is drawn
         return page.screenshot(timeout=TIMEOUT)
 
 
@@ -120,7 +130,7 @@ SHOTS: dict[str, Callable] = {
     "split": _split,
     "error": _error,
     "forest": _forest,
-    "loading": lambda page: page.wait_for_selector("#sizes"),
+    "loading": lambda page: page.wait_for_function("() => athcodecViewer.counters.firstMotion"),
 }
 
 
@@ -141,7 +151,7 @@ WRONG: dict[str, Callable[[bytes], bytes | None]] = {
 def _wrong(page, data: bytes, name: str) -> bytes:
     broken = WRONG[name](data)
     with ThrottledServer({} if broken is None else {"tree.ath": broken}) as line:
-        page.goto(line.page("tree.ath"))
+        page.goto(line.page("tree.ath", quality="full"))
         page.wait_for_selector("#message:not([hidden]), #trouble:not([hidden])")
         page.wait_for_timeout(1500)
         return page.screenshot(timeout=TIMEOUT)

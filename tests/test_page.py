@@ -289,6 +289,17 @@ def test_a_file_that_cannot_be_fetched_can_be_tried_again(browser, sample_ath):
         page.close()
 
 
+def test_a_file_that_ends_within_a_chunk_is_fetched_once_and_said_to_be_cut_off(opened):
+    data = athcodec.sample_path("leafed").read_bytes()
+    data = data[: int(0.4 * len(data))]
+    with ThrottledServer({"tree.ath": data}) as line:
+        page = opened(line.page("tree.ath"), "document.getElementById('trouble').checkVisibility()")
+        assert "cut off" in page.inner_text("#trouble")
+        pictures = page.evaluate("athcodecViewer.counters.pictures")
+        page.wait_for_function(f"() => athcodecViewer.counters.pictures > {pictures + 3}", timeout=60_000)
+        assert line.sent("tree.ath") < 1.6 * len(data)
+
+
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize("size", [(1200, 800), (390, 844)])
 def test_axe_finds_nothing(opened, windy, scheme, size):

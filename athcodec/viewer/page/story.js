@@ -76,7 +76,7 @@ const seconds = (ms) => `${(ms / 1000).toFixed(ms < 9950 ? 1 : 0)} s`;
 function tellArrived() {
   const { ath, motion } = main(), wanted = needed(ath, motion), { bytesFetched, bytesTotal } = motion;
   const share = Math.min(1, bytesFetched / wanted), shown = Math.max(motion.level, 0), { first, whole } = counters.arrived;
-  const bar = $("progress"), settled = motion.level >= motion.target;
+  const bar = $("progress"), settled = motion.level >= motion.target || motion.failure;
   bar.firstElementChild.style.width = `${100 * share}%`;
   bar.setAttribute("aria-valuenow", String(Math.round(100 * share)));
   bar.setAttribute("aria-valuetext", `${bytesText(bytesFetched)} of ${bytesText(wanted)}`);
