@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 import re
+import subprocess
+import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
+from PIL import Image, ImageSequence
 
 import athcodec
+from athcodec import cli
 from athcodec.viewer.build_viewer import modules
 from bench.throttled_server import ThrottledServer
 
@@ -298,6 +303,31 @@ def test_a_file_that_ends_within_a_chunk_is_fetched_once_and_said_to_be_cut_off(
         pictures = page.evaluate("athcodecViewer.counters.pictures")
         page.wait_for_function(f"() => athcodecViewer.counters.pictures > {pictures + 3}", timeout=60_000)
         assert line.sent("tree.ath") < 1.6 * len(data)
+
+
+def test_the_command_line_makes_pictures_that_move(sample_ath, tmp_path):
+    for kind, more in (("png", ["--time", "1"]), ("gif", []), ("webp", [])):
+        out = tmp_path / f"tree.{kind}"
+        command = ["picture", str(sample_ath), f"--{kind}", str(out), "--size", "160x120", "--fps", "2", *more]
+        done = subprocess.run([sys.executable, "-m", "athcodec", *command], capture_output=True, text=True)
+        assert done.stdout == f"{out}: {out.stat().st_size:,} bytes\n", done.stderr
+        with Image.open(out) as image:
+            frames = [np.asarray(image.convert("RGB")) for _ in ImageSequence.Iterator(image)]
+            assert image.size == (160, 120) and image.format.lower() == kind
+        assert len(frames) == (1 if kind == "png" else 8)  # four seconds
+        assert np.ptp(frames[0]) > 100
+        assert all((a != b).any() for a, b in zip(frames, frames[1:]))
+
+
+def test_a_picture_without_what_it_takes_is_an_error_of_one_line(sample_ath, tmp_path, monkeypatch, capsys):
+    out = tmp_path / "tree.gif"
+    with monkeypatch.context() as without:
+        without.setitem(sys.modules, "PIL", None)
+        assert cli.main(["picture", str(sample_ath), "--gif", str(out)]) == 1
+    error = capsys.readouterr().err.strip()
+    assert 'pip install "athcodec[picture]"' in error and "\n" not in error
+    assert cli.main(["picture", str(sample_ath), "--gif", str(out), "--clip", "none"]) == 1
+    assert "none" in capsys.readouterr().err and not out.exists()
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
