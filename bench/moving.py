@@ -19,7 +19,10 @@ SIZE = 760, 460
 FRAMES, LOOP_SECONDS = 60, 5.0  # of the picture; the loop plays in its own time
 QUALITY = 58
 TIMEOUT = 120_000  # ms
-ALONE = "body > :not(#stage), #split-view { display: none !important } body #stage { --inset: 0px !important }"
+ALONE = """() => {
+    for (const part of document.body.children) part.hidden = part.id !== "stage";
+    document.body.classList.add("no-panel");
+}"""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -36,7 +39,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
         page.set_default_timeout(TIMEOUT)
         page.goto(line.page("tree.ath", quality="full"))
         page.wait_for_function("() => athcodecViewer.motion?.complete")
-        page.add_style_tag(content=ALONE)
+        page.evaluate(ALONE)
         page.evaluate("athcodecViewer.playClip(athcodecViewer.motion.clips.length - 1)")
         page.wait_for_function("() => !athcodecViewer.motion.switching && athcodecViewer.motion.complete")
         page.evaluate("athcodecViewer.stage.fit(); athcodecViewer.frameView()")

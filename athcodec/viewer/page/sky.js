@@ -59,7 +59,7 @@ export class Sky {
 
   /** Dome and lights of a scene, for the theme; those before are taken away. */
   light(scene) {
-    const { sun: colour, sunlight, above, below, fill, around } = this.colours, old = scene.getObjectByName("sky");
+    const { sun: colour, sunlight, above, below, fill } = this.colours, old = scene.getObjectByName("sky");
     old?.removeFromParent();
     const sun = new DirectionalLight(colour, sunlight), back = dome(this.colours, false);
     sun.name = "sun";
@@ -70,10 +70,17 @@ export class Sky {
     back.frustumCulled = false;
     const sky = new Scene().add(back, sun, sun.target, new HemisphereLight(above, below, fill));
     sky.name = "sky";
+    sky.children.at(-1).name = "fill";
     if (old) this.#reach(sun, old.getObjectByName("sun"));
     scene.add(sky);
-    scene.environment = this.#environment;
+  }
+
+  /** The light of the whole sky, or more of what fills shadows in its place. */
+  surround(scene, whole) {
+    const { fill, around } = this.colours;
+    scene.environment = whole ? this.#environment : null;
     scene.environmentIntensity = around;
+    scene.getObjectByName("fill").intensity = whole ? fill : fill + 0.8 * around;
   }
 
   #reach(sun, like) {

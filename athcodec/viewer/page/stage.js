@@ -7,7 +7,15 @@ import { meadow, tintMeadow } from "./ground.js";
 import { Sky } from "./sky.js";
 
 const SLOW_MS = 20, PATIENCE = 24; // pictures that are slow, one behind the other, before there is less to draw
-const QUALITY = [{ ratio: 2, shadows: true, grass: true }, { ratio: 1.25, shadows: true, grass: true }, { ratio: 1, shadows: false, grass: false }];
+const SOFTWARE = /swiftshader|llvmpipe|software|basic render/i;
+const QUALITY = [{ ratio: 2, shadows: true, grass: true, around: true }, { ratio: 1.25, shadows: true, grass: true, around: true },
+  { ratio: 1, shadows: false, grass: false, around: false }];
+
+// Whether there is no graphics processor, so that each picture takes long.
+function isSoftware(gl) {
+  const names = gl.getExtension("WEBGL_debug_renderer_info");
+  return SOFTWARE.test(gl.getParameter(names ? names.UNMASKED_RENDERER_WEBGL : gl.RENDERER));
+}
 
 export class Stage {
   panes = [];
@@ -28,6 +36,7 @@ export class Stage {
     this.renderer.shadowMap.enabled = true;
     this.renderer.shadowMap.type = PCFShadowMap;
     this.sky = new Sky(this.renderer);
+    if (!this.steady && isSoftware(this.renderer.getContext())) this.less = QUALITY.length - 1;
     this.camera = new PerspectiveCamera(38, 1, 0.01, 1000);
     this.controls = new OrbitControls(this.camera, canvas);
     this.controls.enableDamping = true;
@@ -82,7 +91,6 @@ export class Stage {
     const scene = new Scene();
     scene.add(meadow(), ...content);
     this.#tint([scene]);
-    this.#draw([scene]);
     return scene;
   }
 
@@ -93,6 +101,7 @@ export class Stage {
       tintMeadow(scene.getObjectByName("ground"), this.sky.dark);
       scene.fog?.color.copy(this.sky.horizon);
     }
+    this.#draw(scenes);
   }
 
   /** What of QUALITY there is time for. */
@@ -100,11 +109,12 @@ export class Stage {
     return QUALITY[this.less];
   }
 
-  // Shadows and blades, as far as there is time for them.
+  // Shadows, blades and light from all sides, as far as there is time for them.
   #draw(scenes = this.panes.map(({ scene }) => scene)) {
     for (const scene of scenes) {
       scene.getObjectByName("sun").castShadow = this.quality.shadows;
       scene.getObjectByName("grass").visible = this.quality.grass;
+      this.sky.surround(scene, this.quality.around);
     }
   }
 
