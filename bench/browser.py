@@ -2,19 +2,11 @@
 
 from __future__ import annotations
 
-import os
-import shutil
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
-BROWSER_VARIABLE = "ATHCODEC_CHROMIUM"
-FLAGS = [
-    "--no-sandbox",
-    "--use-gl=angle",
-    "--use-angle=swiftshader",
-    "--enable-unsafe-swiftshader",
-    "--ignore-gpu-blocklist",
-]
+from athcodec.picture import BROWSER_VARIABLE, FLAGS, browser_path
+
 WEBGPU_FLAGS = [
     "--no-sandbox",
     "--enable-unsafe-webgpu",
@@ -37,7 +29,7 @@ class MissingBrowser(Exception):
 @contextmanager
 def chromium(flags: Sequence[str] = FLAGS) -> Iterator:
     """A Playwright browser. Raises MissingBrowser."""
-    path = os.environ.get(BROWSER_VARIABLE) or shutil.which("chromium") or shutil.which("chromium-browser")
+    path = browser_path()
     try:
         from playwright.sync_api import sync_playwright
     except ImportError:

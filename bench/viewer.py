@@ -19,6 +19,7 @@ import numpy as np
 
 import athcodec
 from athcodec.options import LADDERS
+from athcodec.viewer.build_viewer import MOST_BYTES, OURS, own_bytes
 from bench.browser import chromium
 from bench.clips import add_clips, add_rel_error, encoded
 from bench.tables import table
@@ -27,8 +28,6 @@ from bench.throttled_server import WEB, ThrottledServer
 MEGABIT = 125_000
 SLOW = 10_000  # bytes a second
 ROUNDS = 7
-OURS = ("ATHLoader.js", "ath_worker.js", "viewer.js")
-MOST_BYTES = 150_000
 MOST_SECONDS, MOST_SHARE, LONGEST_TASK = 0.5, 0.1, 50
 
 OBSERVE = """new Promise((found) => {
@@ -121,14 +120,14 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
             forests += [{"clip": path.stem} | row for row in _forests(browser, files["tree.ath"], args.instances)]
             modes += [{"clip": path.stem} | row for row in _modes(browser, files["tree.ath"])]
     sizes = [{"file": name, "bytes": (WEB / name).stat().st_size} for name in (*OURS, "three.js", "OrbitControls.js")]
-    own = sum(row["bytes"] for row in sizes[:3])
+    own = own_bytes(WEB)
     if own > MOST_BYTES:
         broken.append(f"bundle: got {own:,} bytes, expected at most {MOST_BYTES:,}")
     return {
         "tables": [
             table(f"First motion at {args.line:g} Mbit/s", starts, NOTE_START),
             table("Tasks of the main thread, ms", tasks, NOTE_TASKS),
-            table(f"Bundles; loader, worker with decoder and page together {own:,} bytes", sizes),
+            table(f"Bundles; loader, worker with decoder and page together {own:,} bytes, compressed", sizes),
             table("Forest", forests, NOTE_FOREST),
             table("Ways of moving the vertices", modes, NOTE_MODES),
         ],

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,39 @@ import athcodec
 from athcodec import core_file
 from athcodec.clip import MotionClip
 from athcodec.sources import read_hdf5, sample_path
+
+sys.path.append(
+    str(Path(__file__).resolve().parent.parent)
+)  # for bench, which is not installed; athcodec stays the installed one
+
+
+@pytest.fixture(scope="module")
+def browser():
+    """Chromium, of the tests that are marked so."""
+    from bench.browser import chromium
+
+    with chromium() as found:
+        yield found
+
+
+@pytest.fixture
+def opened(browser):
+    """A function that opens an address and waits for a condition; the page must not have logged an error at the end."""
+    pages, errors = [], []
+
+    def visit(address: str, until: str = "athcodecViewer.motion?.complete", **options):
+        page = browser.new_page(**{"viewport": {"width": 1000, "height": 700}} | options)
+        pages.append(page)
+        page.on("console", lambda message: errors.append(message.text) if message.type == "error" else None)
+        page.on("pageerror", lambda error: errors.append(str(error)))
+        page.goto(address)
+        page.wait_for_function(f"() => {until}", timeout=60_000)
+        return page
+
+    yield visit
+    for page in pages:
+        page.close()
+    assert errors == []
 
 
 @pytest.fixture

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import re
 import shutil
 import subprocess
 import sys
@@ -24,8 +25,7 @@ from athcodec.joining import in_wind
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.append(str(ROOT))  # for bench, which is not installed; athcodec stays the installed one
 
-from bench.browser import chromium  # noqa: E402
-from bench.throttled_server import ThrottledServer  # noqa: E402
+from bench.throttled_server import WEB, ThrottledServer  # noqa: E402
 
 NODE = ROOT / "tests" / "node"
 
@@ -211,12 +211,6 @@ def test_fifty_loads_and_disposals_leave_no_memory_behind(layered_ath):
 # ---- in a browser ----
 
 
-@pytest.fixture(scope="module")
-def browser():
-    with chromium() as found:
-        yield found
-
-
 DISPOSED = """async () => {
   const { ATHLoader } = await import("athcodec-three"), { Scene } = await import("three");
   const { renderer, camera } = athcodecViewer.stage, scene = new Scene();
@@ -244,6 +238,9 @@ def test_fifty_loads_and_disposals_leave_nothing_on_the_gpu(browser, sample_ath)
         page.goto(line.page("tree.ath"))
         page.wait_for_function("() => athcodecViewer.motion?.complete", timeout=60_000)
         page.evaluate("athcodecViewer.setPlaying(false)")
+        page.wait_for_function(
+            "() => athcodecViewer.motion.level === athcodecViewer.motion.target && !athcodecViewer.motion.fading"
+        )
         found = page.evaluate(DISPOSED)
         page.close()
     assert found["first"] == found["last"]
@@ -264,3 +261,90 @@ def test_shadows_move_with_the_plant_in_every_mode(browser, mode, tmp_path):
         found = page.evaluate((NODE / "shadows.js").read_text("utf-8"), mode)
         page.close()
     assert errors == [] and found["covered"] > 0.95 and found["changed"] > 20, found
+
+
+ELEMENTS = """<!doctype html><script type="importmap">%s</script><script type="module" src="/ath-viewer.js"></script>
+<style>ath-viewer { width: 300px; height: 200px }</style>
+<ath-viewer src="/tree.ath" level="1" alt="A tree"></ath-viewer>"""
+
+
+@pytest.fixture
+def element(browser, sample_ath):
+    """A page with <ath-viewer>, whose motion is here at level 1 and above."""
+    imports = re.search(r'<script type="importmap">(.*?)</script>', (WEB / "index.html").read_text("utf-8"))[1]
+    errors = []
+    with ThrottledServer({"tree.ath": sample_ath.read_bytes(), "page.ath": b"<!doctype html>" + bytes(100)}) as line:
+        page = browser.new_page(viewport={"width": 400, "height": 300})
+        page.on("pageerror", lambda error: errors.append(str(error)))
+        page.route("**/element.html", lambda route: route.fulfill(body=ELEMENTS % imports, content_type="text/html"))
+        page.goto(f"{line.address}element.html")
+        page.evaluate("globalThis.viewer = document.querySelector('ath-viewer')")
+        page.wait_for_function("() => viewer.ath?.motion.level === 1", timeout=60_000)
+        yield page
+        page.close()
+    assert errors == []
+
+
+@pytest.mark.browser
+def test_the_element_plays_at_the_level_of_its_attribute_until_it_is_paused(element):
+    element.wait_for_function("() => viewer.currentTime > 0.1")
+    element.evaluate("viewer.pause()")
+    element.evaluate("viewer.currentTime = 2")
+    element.wait_for_function("() => viewer.ath.motion.time === 2")
+    element.evaluate("viewer.setAttribute('level', '0')")
+    element.wait_for_function("() => viewer.ath.motion.level === 0")
+    assert element.evaluate("viewer.currentTime") == 2
+    assert element.evaluate("viewer.shadowRoot.querySelector('canvas').ariaLabel") == "A tree"
+
+
+@pytest.mark.browser
+def test_the_element_tells_of_files_and_of_what_is_wrong_with_them(element):
+    told = """(name) => new Promise((done) => {
+      for (const type of ["load", "error"])
+        viewer.addEventListener(type, ({ detail }) => done(detail.codeName ?? type), { once: true });
+      viewer.src = name;
+    })"""
+    assert element.evaluate(told, "page.ath") == "NOT_AN_ATH_FILE"
+    assert element.evaluate(told, "tree.ath") == "load"
+
+
+@pytest.mark.browser
+def test_the_element_frees_its_file_where_it_is_taken_out_and_loads_it_again(element):
+    element.evaluate("viewer.remove()")
+    assert element.evaluate("viewer.ath") is None
+    element.evaluate("document.body.append(viewer)")
+    element.wait_for_function("() => viewer.ath?.motion.level === 1", timeout=60_000)
+
+
+LIMBS = """async () => {
+  const { ATHLimbs } = await import("athcodec-three");
+  const { OrthographicCamera, Scene, WebGLRenderer } = await import("three");
+  const { ath } = viewer, canvas = document.createElement("canvas"), renderer = new WebGLRenderer({ canvas });
+  const { center, radius: r } = ath.sphere, scene = new Scene();
+  const camera = new OrthographicCamera(-r, r, r, -r, 0, 4 * r);
+  camera.position.set(center.x, center.y, center.z + 2 * r);
+  const limbs = new ATHLimbs(ath, { color: 0x00ff00 });
+  const seen = () => {
+    const gl = renderer.getContext(), data = new Uint8Array(4 * 200 * 200);
+    renderer.render(scene, camera);
+    gl.readPixels(0, 0, 200, 200, gl.RGBA, gl.UNSIGNED_BYTE, data);
+    return [0, 1].map((c) => data.filter((value, i) => i % 4 === c && value > 40).length);
+  };
+  renderer.setSize(200, 200);
+  scene.add(limbs);
+  const found = [seen()];
+  limbs.setColor(() => [1, 0, 0]);
+  found.push(seen());
+  limbs.dispose();
+  found.push(seen());
+  renderer.dispose();
+  return found;
+}"""
+
+
+@pytest.mark.browser
+def test_limbs_are_drawn_in_the_colour_that_is_given(element):
+    green, red, none = element.evaluate(LIMBS)
+    assert green[0] == 0 and green[1] > 200
+    assert red[0] == green[1] and red[1] == 0
+    assert none == [0, 0]

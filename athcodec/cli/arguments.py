@@ -98,6 +98,13 @@ def make_parser() -> argparse.ArgumentParser:
             "Serves the viewer on this computer only, until it is interrupted.",
         )
     )
+    _picture_arguments(
+        verb(
+            "picture",
+            "make a picture of a plant, still or moving",
+            "Drawn in Chromium by the viewer; takes athcodec[picture].",
+        )
+    )
     _demo_arguments(
         verb(
             "demo",
@@ -550,6 +557,43 @@ def _view_arguments(verb: argparse.ArgumentParser) -> None:
     what.add_argument(
         "--export", metavar="PAGE.html", help="write one page with the file and the viewer inside, and serve nothing"
     )
+
+
+def _picture_arguments(verb: argparse.ArgumentParser) -> None:
+    verb.add_argument("file", metavar="FILE.ath", help=READ)
+    kind = verb.add_mutually_exclusive_group(required=True)
+    kind.add_argument("--gif", metavar="OUT.gif", help="one round of the clip")
+    kind.add_argument("--webp", metavar="OUT.webp", help="the same in more colours and fewer bytes")
+    kind.add_argument("--png", metavar="OUT.png", help="one picture")
+    verb.add_argument("--clip", metavar="NAME", help="of this clip (default: the file's first)")
+    verb.add_argument(
+        "--size",
+        metavar="WxH",
+        type=_argument(_width_and_height),
+        default=(640, 480),
+        help="in pixels (default: 640x480)",
+    )
+    verb.add_argument(
+        "--fps", metavar="N", type=_argument(_above_zero), default=15, help="pictures a second (default: %(default)s)"
+    )
+    verb.add_argument(
+        "--time", metavar="SECONDS", type=float, default=0.0, help="of --png, from the clip's first frame"
+    )
+    _host_mesh_argument(verb)
+
+
+def _width_and_height(text: str) -> tuple[int, int]:
+    if not re.fullmatch(r"[1-9]\d{0,3}x[1-9]\d{0,3}", text):
+        raise ValueError(f"got {text!r}, expected width and height in pixels, as 640x480")
+    width, height = text.split("x")
+    return int(width), int(height)
+
+
+def _above_zero(text: str) -> float:
+    number = float(text)
+    if not 0 < number < math.inf:
+        raise ValueError(f"got {text!r}, expected a number above 0")
+    return number
 
 
 def _demo_arguments(verb: argparse.ArgumentParser) -> None:

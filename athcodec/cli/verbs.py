@@ -372,6 +372,18 @@ def _say_where(address: str, no_browser: bool) -> None:
         view.open_browser(address)
 
 
+def picture(args: argparse.Namespace) -> int:
+    from athcodec import picture
+
+    kind = next(name for name in picture.FORMATS if getattr(args, name))
+    out = getattr(args, kind)
+    with naming(args.file):
+        check_output(out, args.file)
+        size = picture.save_picture(args.file, out, kind, args.clip, args.size, args.fps, args.time, args.host_mesh)
+    print(f"{out}: {size:,} bytes")
+    return 0
+
+
 def demo(args: argparse.Namespace) -> int:
     with tempfile.TemporaryDirectory() if args.keep is None else nullcontext(args.keep) as folder:
         Path(folder).mkdir(parents=True, exist_ok=True)

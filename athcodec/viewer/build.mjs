@@ -30,9 +30,10 @@ const orbit = "three/addons/controls/OrbitControls.js", outside = ["three", "thr
 const loader = await bundle({ entryPoints: [join(here, "src/index.js")] }, "ATHLoader.js", outside);
 await bundle({ entryPoints: [join(here, "src/webgpu.js")] }, "ATHForestGPU.js", outside);
 await bundle({ entryPoints: [join(here, "src/ath_worker.js")] }, "ath_worker.js", []);
+const element = await bundle({ entryPoints: [join(here, "src/element.js")] }, "ath-viewer.js", outside);
 const viewer = await bundle({ entryPoints: [join(here, "page/main.js")] }, "viewer.js", outside);
 const controls = await bundle({ entryPoints: [join(modules, "three/examples/jsm/controls/OrbitControls.js")] }, "OrbitControls.js", ["three"]);
-const used = [...new Set([loader, viewer, controls].flatMap(names))].sort();
+const used = [...new Set([loader, viewer, element, controls].flatMap(names))].sort();
 await bundle({ stdin: { contents: `export { ${used.join(", ")} } from "three";`, resolveDir: modules } }, "three.js", []);
 await bundle({ entryPoints: [join(here, "page/forest.js")] }, "forest.js", outside);
 await bundle({ stdin: { contents: 'export * from "three/webgpu";', resolveDir: modules } }, "three.webgpu.js", []);
@@ -44,6 +45,7 @@ for (const name of ["index.html", "forest.html"]) {
   writeFileSync(join(out, name), page.replace("IMPORT_MAP_HASH", `'sha256-${digest}'`));
 }
 copyFileSync(join(here, "src/index.d.ts"), join(out, "ATHLoader.d.ts"));
+copyFileSync(join(here, "src/element.d.ts"), join(out, "ath-viewer.d.ts"));
 copyFileSync(join(here, "src/webgpu.d.ts"), join(out, "ATHForestGPU.d.ts"));
 const licence = (name) => readFileSync(join(modules, name, "LICENSE"), "utf8").trim();
 const version = (name) => JSON.parse(readFileSync(join(modules, name, "package.json"), "utf8")).version;

@@ -8,7 +8,7 @@ import { Color, DirectionalLight, DoubleSide, Fog, HemisphereLight, Mesh, MeshSt
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 
 import { foliage } from "./foliage.js";
-import { radii } from "./radii.js";
+import { radii } from "../src/radii.js";
 
 const $ = (id) => document.getElementById(id), asked = new URLSearchParams(location.search);
 const SKY = new Color(0xcfdde4), GROUND = 0x7c8a58, SPACING = 1.5; // of plants, in radii of one

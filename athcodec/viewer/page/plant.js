@@ -3,8 +3,9 @@
 import { BufferAttribute, BufferGeometry, DoubleSide, Group, InstancedBufferAttribute, LineBasicMaterial, LineSegments, Mesh, MeshLambertMaterial } from "three";
 
 import { barkColour, heat, nodeColour, orderColour } from "./colours.js";
-import { limbGeometry, limbMaterial, setRadii } from "./limbs.js";
-import { radii } from "./radii.js";
+import { limbDepth, limbGeometry, limbMaterial, setRadii } from "../src/limbs.js";
+import { radii } from "../src/radii.js";
+import { surfaceDepth, surfaceMaterial } from "./surfaces.js";
 
 const LEAF = [0.16, 0.29, 0.07], OVER = [0.55, 0.2, 0.06];
 const SLIMMEST = 4; // order from which on bark is as pale as it gets
@@ -35,6 +36,7 @@ export class Plant {
   #node = null;
   #radii;
   #drawn = [];
+  #surface = null;
   #stale = true;
 
   constructor(ath, motion = ath.motion) {
@@ -63,12 +65,15 @@ export class Plant {
   }
 
   #clear() {
-    for (const { object, geometry } of this.#drawn) {
+    for (const { object, geometry, other } of this.#drawn) {
       this.root.remove(object);
       this.motion.detach(geometry);
       geometry.dispose();
       object.material.dispose();
+      other?.dispose();
     }
+    this.#surface?.dispose();
+    this.#surface = null;
     this.#drawn = [];
   }
 
@@ -83,6 +88,19 @@ export class Plant {
     this.paint();
   }
 
+  // Whether the file says what is bark and what is leaf, by its texture coordinates.
+  get hasSurfaces() {
+    return this.ath.metadata.surfaces === "bark, leaves" && this.ath.geometry.hasAttribute("uv");
+  }
+
+  // Bark and leaves as they look near by, or colours that tell something.
+  #dress() {
+    const drawn = this.#drawn.find(({ kind }) => kind === "mesh"), wanted = this.colour === "plain" && this.ath.hasFaces && this.hasSurfaces;
+    if (!drawn || wanted === Boolean(drawn.other)) return;
+    if (wanted) this.#surface ??= this.motion.bind(surfaceMaterial());
+    [drawn.object.material, drawn.other] = wanted ? [this.#surface, drawn.object.material] : [drawn.other, null];
+  }
+
   // Made when it is first shown.
   #need(kind) {
     if (this.#drawn.some((drawn) => drawn.kind === kind)) return;
@@ -92,17 +110,21 @@ export class Plant {
       object = new LineSegments(motion.attach(this.#lines()), motion.bind(lineMaterial()));
       object.renderOrder = 1;
     } else if (ath.hasFaces) {
-      object = new Mesh(motion.attach(sharing(ath.geometry)), motion.bind(meshMaterial()));
+      object = motion.bindShadows(new Mesh(motion.attach(sharing(ath.geometry)), motion.bind(meshMaterial())));
+      if (this.hasSurfaces) Object.assign(object, { customDepthMaterial: motion.bind(surfaceDepth()) });
     } else {
       const geometry = limbGeometry(ath, this.#radii);
       object = new Mesh(motion.attach(geometry), limbMaterial(motion.uniforms));
+      object.customDepthMaterial = limbDepth(motion.uniforms);
     }
+    object.castShadow = object.receiveShadow = kind === "mesh";
     const { geometry } = object;
     const Colours = geometry.isInstancedBufferGeometry ? InstancedBufferAttribute : BufferAttribute;
     for (const [name, list] of coloured(geometry)) geometry.setAttribute(name, new Colours(new Float32Array(3 * list.length), 3));
     object.frustumCulled = false;
     this.#drawn.push({ kind, geometry, object });
     this.root.add(object);
+    this.#dress();
   }
 
   /** What a forest draws of a plant without faces: lines in the colours of bark. */
@@ -145,6 +167,7 @@ export class Plant {
 
   setColour(colour) {
     this.colour = colour;
+    this.#dress();
     this.motion.heat = colour === "distance";
     if (colour === "node") this.#numberNodes();
     this.motion.refresh();

@@ -1,26 +1,42 @@
-// The stage: renderer, camera and light, and one or two panes side by side, each with its own scene.
+// The stage: renderer, camera and light, and one or two panes, each with its own scene; two share the view, on either side of a split.
 
-import { BufferAttribute, Color, DirectionalLight, Fog, HemisphereLight, Mesh, PerspectiveCamera, PlaneGeometry, Scene, ShaderMaterial, Vector3,
-  WebGLRenderer } from "three";
+import { ACESFilmicToneMapping, BufferAttribute, Fog, PCFShadowMap, PerspectiveCamera, Scene, Vector3, WebGLRenderer } from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 
-const GROUND = /* glsl */`
-varying vec2 at;
-uniform vec3 tint;
-uniform float strength;
-void main() {
-  float d = length(at);
-  gl_FragColor = vec4(tint, strength * pow(max(1.0 - d, 0.0), 1.8));
-}`;
+import { meadow, tintMeadow } from "./ground.js";
+import { Sky } from "./sky.js";
+
+const SLOW_MS = 20, PATIENCE = 24; // pictures that are slow, one behind the other, before there is less to draw
+const SOFTWARE = /swiftshader|llvmpipe|software|basic render/i;
+const QUALITY = [{ ratio: 2, shadows: true, grass: true, around: true }, { ratio: 1.25, shadows: true, grass: true, around: true },
+  { ratio: 1, shadows: false, grass: false, around: false }];
+
+// Whether there is no graphics processor, so that each picture takes long.
+function isSoftware(gl) {
+  const names = gl.getExtension("WEBGL_debug_renderer_info");
+  return SOFTWARE.test(gl.getParameter(names ? names.UNMASKED_RENDERER_WEBGL : gl.RENDERER));
+}
 
 export class Stage {
   panes = [];
+
+  split = 0.5; // share of the picture that is the left one of two panes
+
+  less = 0; // how many of QUALITY are passed over
+  steady = new URLSearchParams(location.search).get("quality") === "full";
+
+  slow = 0; // pictures, one behind the other
 
   moved = false; // by hand, since the whole was last in view
 
   constructor(canvas, changed, resized) {
     this.canvas = canvas;
     this.renderer = new WebGLRenderer({ canvas, antialias: true, powerPreference: "high-performance" });
+    Object.assign(this.renderer, { toneMapping: ACESFilmicToneMapping, toneMappingExposure: 0.82 });
+    this.renderer.shadowMap.enabled = true;
+    this.renderer.shadowMap.type = PCFShadowMap;
+    this.sky = new Sky(this.renderer);
+    if (!this.steady && isSoftware(this.renderer.getContext())) this.less = QUALITY.length - 1;
     this.camera = new PerspectiveCamera(38, 1, 0.01, 1000);
     this.controls = new OrbitControls(this.camera, canvas);
     this.controls.enableDamping = true;
@@ -29,11 +45,9 @@ export class Stage {
     this.controls.addEventListener("start", () => { this.moved = true; });
     this.dark = matchMedia("(prefers-color-scheme: dark)");
     this.dark.addEventListener("change", () => {
-      this.#readBack();
       this.#tint();
       changed();
     });
-    this.#readBack();
     this.changed = changed;
     this.resized = resized;
     new ResizeObserver(() => this.fit()).observe(canvas.parentElement);
@@ -47,14 +61,9 @@ export class Stage {
     this.changed();
   }
 
-  // The page's own background; once, as it makes the page lay itself out.
-  #readBack() {
-    this.back = getComputedStyle(document.documentElement).getPropertyValue("--back").trim() || "#ffffff";
-  }
-
   #resize() {
     const { clientWidth: width, clientHeight: height } = this.canvas.parentElement;
-    const ratio = Math.min(devicePixelRatio, 2);
+    const ratio = Math.min(devicePixelRatio, this.quality.ratio);
     const inset = parseInt(getComputedStyle(this.canvas.parentElement).getPropertyValue("--inset"), 10) || 0;
     const sized = width !== this.width || height !== this.height || ratio !== this.renderer.getPixelRatio();
     if (!sized && inset === this.inset) return false;
@@ -79,34 +88,45 @@ export class Stage {
 
   /** A pane's scene; `content` is added to it. */
   scene(content) {
-    const scene = new Scene(), sun = new DirectionalLight(0xfff2dd, 2.4);
-    sun.position.set(0.6, 1, 0.7);
-    scene.add(new HemisphereLight(0xeaf2ff, 0x8a8371, 1.9), sun, this.#ground(), ...content);
+    const scene = new Scene();
+    scene.add(meadow(), ...content);
     this.#tint([scene]);
     return scene;
   }
 
-  #ground() {
-    const material = new ShaderMaterial({
-      vertexShader: "varying vec2 at; void main() { at = position.xy * 2.0; gl_Position = projectionMatrix * modelViewMatrix * vec4(position, 1.0); }",
-      fragmentShader: GROUND, transparent: true, depthWrite: false,
-      uniforms: { tint: { value: new Color(0, 0, 0) }, strength: { value: 0.16 } },
-    });
-    const ground = new Mesh(new PlaneGeometry(1, 1), material);
-    ground.name = "ground";
-    ground.rotation.x = -Math.PI / 2;
-    ground.renderOrder = -1;
-    return ground;
+  #tint(scenes = this.panes.map(({ scene }) => scene)) {
+    this.sky.dark = this.dark.matches;
+    for (const scene of scenes) {
+      this.sky.light(scene);
+      tintMeadow(scene.getObjectByName("ground"), this.sky.dark);
+      scene.fog?.color.copy(this.sky.horizon);
+    }
+    this.#draw(scenes);
   }
 
-  #tint(scenes = this.panes.map(({ scene }) => scene)) {
+  /** What of QUALITY there is time for. */
+  get quality() {
+    return QUALITY[this.less];
+  }
+
+  // Shadows, blades and light from all sides, as far as there is time for them.
+  #draw(scenes = this.panes.map(({ scene }) => scene)) {
     for (const scene of scenes) {
-      scene.background = new Color(this.back);
-      scene.fog?.color.copy(scene.background);
-      const { tint, strength } = scene.getObjectByName("ground").material.uniforms;
-      tint.value.set(0, 0, 0);
-      strength.value = this.dark.matches ? 0.5 : 0.16;
+      scene.getObjectByName("sun").castShadow = this.quality.shadows;
+      scene.getObjectByName("grass").visible = this.quality.grass;
+      this.sky.surround(scene, this.quality.around);
     }
+  }
+
+  /** Milliseconds since the picture before, while one follows the other. */
+  took(ms) {
+    this.slow = ms > SLOW_MS ? this.slow + 1 : 0;
+    if (this.steady || this.slow < PATIENCE || this.less >= QUALITY.length - 1) return;
+    this.slow = 0;
+    this.less++;
+    this.#draw();
+    this.#resize();
+    this.changed();
   }
 
   setPanes(panes) {
@@ -118,48 +138,58 @@ export class Stage {
   /** The whole of a box (in the world) in view, from any side; `ground`: its height and size. */
   look(box, ground) {
     const size = box.getSize(new Vector3()), across = Math.hypot(size.x, size.z), half = Math.tan(this.camera.fov * Math.PI / 360);
-    const aspect = (this.width - this.inset) / this.height / Math.max(1, this.panes.length);
+    const aspect = (this.width - this.inset) / this.height;
     const distance = 0.35 * across + 0.68 * Math.max(size.y, 0.9 * across / aspect, 1e-6) / half;
     box.getCenter(this.controls.target);
     this.camera.position.copy(this.controls.target).add(new Vector3(0.35, 0.16, 0.92).normalize().multiplyScalar(distance));
     this.camera.near = distance / 500;
     this.camera.far = distance * 60;
     this.controls.maxDistance = distance * 20;
-    this.placeGround(ground.height, ground.size);
+    this.placeGround(ground.height, ground.size, ground.plant);
     this.controls.update();
     this.changed();
   }
 
-  placeGround(height, size) {
+  /** size: of all that stands on it; plant: of a single plant, which the blades of grass are as large as. */
+  placeGround(height, size, plant = size) {
     for (const { scene } of this.panes) {
       const ground = scene.getObjectByName("ground");
       ground.position.y = height;
       ground.scale.setScalar(size);
+      ground.getObjectByName("grass").scale.setScalar(Math.sqrt(plant / size));
+      this.sky.shade(scene, new Vector3(0, height + 0.25 * size, 0), 0.75 * size);
+    }
+    this.fog(0, 0);
+  }
+
+  /** Haze from one distance to another; where both are 0 only the ground far off is in it. */
+  fog(near, far) {
+    for (const { scene } of this.panes) {
+      const size = scene.getObjectByName("ground").scale.x, [from, to] = far > 0 ? [near, far] : [1.6 * size, 15 * size];
+      scene.fog = new Fog(this.sky.horizon, from, to);
     }
   }
 
-  /** Haze from one distance to another; none where both are 0. */
-  fog(near, far) {
-    for (const { scene } of this.panes) scene.fog = far > 0 ? new Fog(scene.background, near, far) : null;
-  }
-
-  /** Height of a pane in pixels of the device. */
+  /** Height of the picture in pixels of the device. */
   get pixels() {
     return this.height * this.renderer.getPixelRatio();
   }
 
   // What lies behind the settings is drawn too, and counts for nothing else.
   render() {
-    const { renderer, camera, panes, height, inset } = this, width = (this.width - inset) / Math.max(1, panes.length);
-    camera.aspect = width / height;
+    const { renderer, camera, panes, width, height } = this, seen = width - this.inset, left = this.split * seen;
+    camera.aspect = seen / height;
+    camera.setViewOffset(seen, height, 0, 0, width, height);
+    camera.updateMatrixWorld();
     renderer.setScissorTest(panes.length > 1);
+    for (const { scene } of panes) {
+      const dome = scene.getObjectByName("dome");
+      dome.position.copy(camera.position);
+      dome.scale.setScalar(camera.far * 0.5);
+    }
     panes.forEach(({ scene, before }, i) => {
-      const drawn = i === panes.length - 1 ? width + inset : width;
-      camera.setViewOffset(width, height, 0, 0, drawn, height);
-      camera.updateMatrixWorld();
-      before?.(drawn * renderer.getPixelRatio(), this.pixels);
-      renderer.setViewport(i * width, 0, drawn, height);
-      renderer.setScissor(i * width, 0, drawn, height);
+      before?.(width * renderer.getPixelRatio(), this.pixels);
+      if (panes.length > 1) renderer.setScissor(i * left, 0, i === 0 ? left : width - left, height);
       renderer.render(scene, camera);
     });
   }

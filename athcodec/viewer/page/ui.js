@@ -6,7 +6,7 @@ const UNITS = { m: 1, cm: 0.01, mm: 0.001, km: 1000, in: 0.0254, ft: 0.3048 };
 
 export function bytesText(bytes) {
   if (bytes < 1e3) return `${bytes} B`;
-  return bytes < 1e6 ? `${(bytes / 1e3).toFixed(bytes < 1e4 ? 1 : 0)} kB` : `${(bytes / 1e6).toFixed(bytes < 1e7 ? 2 : 1)} MB`;
+  return bytes < 999500 ? `${(bytes / 1e3).toFixed(bytes < 1e4 ? 1 : 0)} kB` : `${(bytes / 1e6).toFixed(bytes < 1e7 ? 2 : 1)} MB`;
 }
 
 export function rateText(bits) {
@@ -14,17 +14,21 @@ export function rateText(bits) {
 }
 
 export const upper = (text) => text[0].toUpperCase() + text.slice(1);
-export const countText = (number) => String(number).replace(/\B(?=(\d{3})+$)/g, ",");
+export const countText = (number) => number.toLocaleString("en");
 
-/** A length of the file, in millimetres and the like where its unit is known. */
+/** A length of the file, where its unit is known in millimetres, or in metres from ten on. */
 export function lengthText(length, unit) {
   if (!(unit in UNITS)) return `${Number(length.toPrecision(3))}${unit ? ` ${unit}` : ""}`;
   const metres = length * UNITS[unit];
-  const [factor, name] = metres >= 1 ? [1, "m"] : metres >= 0.01 ? [100, "cm"] : metres >= 1e-4 ? [1e3, "mm"] : [1e6, "µm"];
-  return `${Number((metres * factor).toPrecision(3))} ${name}`;
+  return metres >= 10 ? `${Number(metres.toPrecision(3))} m` : `${countText(Number((1e3 * metres).toPrecision(3)))} mm`;
 }
 
-/** Buttons of which one is chosen: {value, set, values}. */
+/** A level, for people: "detail 2 of 6". */
+export function detailText({ levelCount }, level) {
+  return level >= levelCount - 1 ? "full detail" : `detail ${level} of ${levelCount - 1}`;
+}
+
+/** Buttons of which one is chosen, a radio group: {value, set, values}. One of them takes the focus, arrows move the choice. */
 export class Choice {
   constructor(element, chosen) {
     this.element = element;
@@ -32,6 +36,13 @@ export class Choice {
     element.addEventListener("click", ({ target }) => {
       const button = target.closest("button");
       if (button && !button.disabled) this.pick(button.dataset.value);
+    });
+    element.addEventListener("keydown", (event) => {
+      const by = { ArrowLeft: -1, ArrowUp: -1, ArrowRight: 1, ArrowDown: 1 }[event.key];
+      if (!by) return;
+      event.preventDefault();
+      this.next(by);
+      this.buttons.find((button) => button.tabIndex === 0)?.focus();
     });
     this.mark();
   }
@@ -41,17 +52,21 @@ export class Choice {
   }
 
   fill(values, labels, titles = []) {
-    this.element.replaceChildren(...values.map((value, i) =>
-      Object.assign(document.createElement("button"), { textContent: labels[i], title: titles[i] ?? "" })));
+    const text = values.map((value, i) => [value, labels[i], titles[i] ?? ""]), same = JSON.stringify(text);
+    if (this.filled === same) return;
+    this.filled = same;
+    this.element.replaceChildren(...text.map(([, textContent, title]) => Object.assign(document.createElement("button"), { textContent, title })));
     this.buttons.forEach((button, i) => { button.dataset.value = values[i]; });
     this.mark();
   }
 
   mark() {
-    for (const button of this.buttons) {
+    const { buttons } = this, at = Math.max(0, buttons.findIndex((button) => button.dataset.value === this.value));
+    buttons.forEach((button, i) => {
       button.setAttribute("role", "radio");
       button.setAttribute("aria-checked", String(button.dataset.value === this.value));
-    }
+      button.tabIndex = i === at ? 0 : -1;
+    });
   }
 
   set(value) {
@@ -64,10 +79,18 @@ export class Choice {
     this.chosen(value);
   }
 
-  next() {
+  next(by = 1) {
     const values = this.buttons.filter((button) => !button.disabled).map((button) => button.dataset.value);
-    this.pick(values[(values.indexOf(this.value) + 1) % values.length]);
+    this.pick(values[(values.indexOf(this.value) + by + values.length) % values.length]);
   }
+}
+
+/** Says something for a while. */
+export function note(text) {
+  $("note").textContent = text;
+  $("note").hidden = false;
+  clearTimeout(note.timer);
+  note.timer = setTimeout(() => { $("note").hidden = true; }, 5000);
 }
 
 /** Rows of text, made once and changed where they differ. */

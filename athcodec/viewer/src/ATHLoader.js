@@ -388,6 +388,7 @@ export class ATHLoader extends Loader {
     this.mode = "matrices";
     this.clip = null;
     this.hostMesh = null;
+    this.bandwidth = null;
   }
 
   /** Where ath_worker.js is, if not beside this module: its folder, or its URL. */
@@ -418,6 +419,13 @@ export class ATHLoader extends Loader {
    * order that the file was made from, or a BufferGeometry whose positions are these. Other files pass it over. */
   setHostMesh(mesh) {
     this.hostMesh = numbersOf(mesh);
+    return this;
+  }
+
+  /** Bits a second at which bytes of files that are loaded from now on come at most, from memory too, as over a slow line;
+   * null: as fast as they do. */
+  setBandwidth(bandwidth) {
+    this.bandwidth = bandwidth;
     return this;
   }
 
@@ -469,7 +477,7 @@ export class ATHLoader extends Loader {
     signal?.addEventListener("abort", abort);
     worker.files++;
     try {
-      channel.send({ type: "open", clip: this.clip, hostMesh: this.hostMesh, ...message }, transfer);
+      channel.send({ type: "open", clip: this.clip, hostMesh: this.hostMesh, bandwidth: this.bandwidth, ...message }, transfer);
       await channel.opened;
       const ath = new ATH(channel, this.mode);
       if (onProgress) ath.motion.addEventListener("progress", ({ loaded, total }) => onProgress({ loaded, total, lengthComputable: true }));

@@ -274,6 +274,19 @@ export class ATHMotion extends EventDispatcher {
 
   /** The coarsest level whose error by `measure` is at most `pixels` on a screen `height` pixels high. */
   levelFor(camera, height, matrixWorld = null, pixels = this.pixels) {
+    const perUnit = this.#pixelsPerUnit(camera, height, matrixWorld);
+    for (let level = 0; level < this.levelCount; level++)
+      if (this.error(level)[this.measure] * perUnit <= pixels) return level;
+    return this.levelCount - 1;
+  }
+
+  /** How many pixels the error of a level by `measure` is there. */
+  pixelError(level, camera, height, matrixWorld = null) {
+    return this.error(level)[this.measure] * this.#pixelsPerUnit(camera, height, matrixWorld);
+  }
+
+  // Where the plant is nearest.
+  #pixelsPerUnit(camera, height, matrixWorld) {
     const sphere = this.#channel.sphere;
     centre.copy(sphere.center);
     let size = 1;
@@ -281,12 +294,9 @@ export class ATHMotion extends EventDispatcher {
       centre.applyMatrix4(matrixWorld);
       size = matrixWorld.getMaxScaleOnAxis();
     }
+    if (camera.isOrthographicCamera) return size * height * camera.zoom / (camera.top - camera.bottom);
     const distance = Math.max(centre.distanceTo(scale.setFromMatrixPosition(camera.matrixWorld)) - sphere.radius * size, 1e-9);
-    const perUnit = camera.isOrthographicCamera ? height * camera.zoom / (camera.top - camera.bottom)
-      : height / (2 * Math.tan(MathUtils.degToRad(camera.fov) / 2) / camera.zoom * distance);
-    for (let level = 0; level < this.levelCount; level++)
-      if (this.error(level)[this.measure] * size * perUnit <= pixels) return level;
-    return this.levelCount - 1;
+    return size * height / (2 * Math.tan(MathUtils.degToRad(camera.fov) / 2) / camera.zoom * distance);
   }
 
   /** Automatic level for a camera; once per frame, before setTime(). */

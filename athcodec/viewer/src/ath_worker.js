@@ -3,14 +3,14 @@
 
 import { ready } from "../ath_decoder.mjs";
 import { describe, Session } from "./session.js";
-import { HttpSource, MemorySource } from "./source.js";
+import { HttpSource, MemorySource, PacedSource } from "./source.js";
 
 const sessions = new Map();
 
-function open({ file, url, options, bytes, clip, hostMesh }) {
+function open({ file, url, options, bytes, clip, hostMesh, bandwidth }) {
   const post = (message, transfer = []) => self.postMessage({ ...message, file }, transfer);
   const source = bytes ? new MemorySource(new Uint8Array(bytes)) : new HttpSource(url, options);
-  const session = new Session(source, post, clip, hostMesh);
+  const session = new Session(bandwidth ? new PacedSource(source, bandwidth / 8) : source, post, clip, hostMesh);
   sessions.set(file, session);
   ready.then(() => session.run(), (error) => post({ type: "failed", ...describe(error) }));
 }

@@ -20,8 +20,8 @@
  */
 
 import {
-  Box3, BufferGeometry, Camera, DataTexture, EventDispatcher, Group, IUniform, Loader, LoadingManager, Material, Matrix4,
-  Object3D, Sphere,
+  Box3, BufferGeometry, Camera, ColorRepresentation, DataTexture, EventDispatcher, Group, IUniform, Loader, LoadingManager, Material,
+  Matrix4, Mesh, Object3D, Sphere,
 } from "three";
 
 export class ATHLoader extends Loader<ATH> {
@@ -41,6 +41,9 @@ export class ATHLoader extends Loader<ATH> {
    * they were in the source, bit for bit and in that order, or a geometry that has them, as GLTFLoader gives it. Without it
    * such a file fails with the codeName "NEEDS_HOST_MESH", with another mesh "WRONG_HOST_MESH"; other files pass it over. */
   setHostMesh(mesh: Float32Array | BufferGeometry | null): this;
+  /** Bits a second at which bytes of files that are loaded from now on come at most, from memory too, as over a slow line
+   * (default null: as fast as they do). To show how a file loads, not to share a line: a range is fetched at once, and passed on slowly. */
+  setBandwidth(bandwidth: number | null): this;
   /** Starts a worker before there is a file for it. */
   preload(): this;
   /** onLoad: at the first picture. onProgress: {loaded, total} bytes, as long as bytes come. */
@@ -198,6 +201,8 @@ export class ATHMotion extends EventDispatcher<ATHMotionEvents> {
   /** Chooses the automatic level: once per frame, before setTime(). height: of the picture in pixels. */
   update(camera: Camera, height: number, object?: Object3D): this;
   levelFor(camera: Camera, height: number, matrixWorld?: Matrix4 | null, pixels?: number): number;
+  /** How many pixels the error of a level is on the screen, by `measure`, where the plant is nearest to the camera. */
+  pixelError(level: number, camera: Camera, height: number, matrixWorld?: Matrix4 | null): number;
   /** Decodes this very time and level and shows it. Rejects where bytes are missing or damaged. */
   show(seconds: number, level?: number): Promise<unknown>;
   /** All vertices in source order, 3 numbers each; what is shown stays. Rejects like show(). */
@@ -301,6 +306,17 @@ export class ATHForest extends Group {
   readonly vertices: number;
   dispose(): void;
 }
+
+/** The branches of a file without faces as round limbs, each edge a strip that faces the camera, lit as a cylinder by a light of its own;
+ * as thick as the attribute "radius" says or, without one, as follows from how much grows beyond an edge. For WebGLRenderer. */
+export class ATHLimbs extends Mesh {
+  constructor(ath: ATH, options?: { motion?: ATHMotion; color?: LimbColor });
+  setColor(color: LimbColor): this;
+  dispose(): void;
+}
+
+/** One colour, or linear red, green and blue of a vertex of the source. */
+export type LimbColor = ColorRepresentation | ((vertex: number) => [number, number, number]);
 
 /** The same as ATHMotion.bind(), by uniforms. */
 export function injectMotion<T extends Material>(material: T, uniforms: Record<string, IUniform>, forest?: boolean): T;

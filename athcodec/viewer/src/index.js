@@ -1,6 +1,7 @@
 // The npm package athcodec-three: see index.d.ts.
 
 export { ATH, ATHLoader } from "./ATHLoader.js";
+export { ATHLimbs } from "./ATHLimbs.js";
 export { ATHMotion, dataTexture } from "./ATHMotion.js";
 export { ATHForest } from "./ATHForest.js";
 export { injectMotion, MOTION_PARS, motionUniforms } from "./shader.js";

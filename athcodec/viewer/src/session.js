@@ -40,6 +40,7 @@ export class Session {
   #everything = false;    // whether all bytes are wanted, whatever the views show
   #whole = false;         // whether they are here
   #stopped = false;       // no more bytes come
+  #cut = new Set();       // ranges that the end of the file cuts, which have been asked for
   #ended = false;         // the page knows that the file is too short
   #wake = null;
   #stateAt = 0;
@@ -240,11 +241,13 @@ export class Session {
     let found = null;
     for (const { offset, size } of this.#wanted()) {
       const from = Math.max(offset, Math.min(this.#came, offset + size)); // the beginning of a chunk may be here
-      const range = { offset: from, size: Math.min(offset + size, this.source.total ?? Infinity) - from };
-      if (range.size <= 0 || this.#isUnderway(range)) {
+      const end = Math.min(offset + size, this.source.total ?? Infinity), range = { offset: from, size: end - from };
+      const cut = end < offset + size;
+      if (range.size <= 0 || (cut && this.#cut.has(offset)) || this.#isUnderway(range)) {
         if (found) break;
         continue;
       }
+      if (cut && !found) this.#cut.add(offset);
       if (!found) found = range;
       else if (range.offset === found.offset + found.size) found.size += range.size;
       else break;

@@ -31,6 +31,59 @@ export class MemorySource {
   abort() {}
 }
 
+const PACKET = 1460, NAP_MS = 8; // sleeps shorter than this are put together
+
+/** Another source over a slower line: all its bytes pass one after another at `rate` bytes a second. */
+export class PacedSource {
+  fetched = 0;
+  #free = 0; // when the line is, by the clock
+  #readers = 0;
+
+  constructor(source, rate) {
+    this.source = source;
+    this.rate = rate;
+    this.aborted = new Promise((_, reject) => { this.reject = reject; });
+    this.aborted.catch(() => {});
+  }
+
+  get ranged() {
+    return this.source.ranged;
+  }
+
+  get requests() {
+    return this.source.requests;
+  }
+
+  get total() {
+    return this.source.total;
+  }
+
+  async read(offset, size, take) {
+    const pieces = [];
+    await this.source.read(offset, size, (bytes, from) => { pieces.push([bytes, from]); });
+    if (this.#readers++ === 0) this.#free = Math.max(this.#free, performance.now()); // else what a late timer lost is made up for
+    try {
+      for (const [bytes, from] of pieces)
+        for (let at = 0; at < bytes.length; at += PACKET) await this.#pass(bytes.subarray(at, at + PACKET), from + at, take);
+    } finally {
+      this.#readers--;
+    }
+  }
+
+  async #pass(packet, offset, take) {
+    this.#free += (1000 * packet.length) / this.rate;
+    const wait = this.#free - performance.now();
+    await Promise.race([this.aborted, wait < NAP_MS ? null : new Promise((done) => { setTimeout(done, wait); })]);
+    this.fetched += packet.length;
+    take(packet, offset);
+  }
+
+  abort(reason) {
+    this.source.abort(reason);
+    this.reject(reason ?? new DOMException("loading was aborted", "AbortError"));
+  }
+}
+
 /** A file behind http or https. `ranged` is null until the first answer. */
 export class HttpSource {
   ranged = null;

@@ -2,7 +2,7 @@
 // cylinder. Widths are the attribute "radius" or, without one, follow from how much grows beyond an edge.
 
 import { BufferAttribute, InstancedBufferAttribute, InstancedBufferGeometry, ShaderMaterial, Vector2 } from "three";
-import { MOTION_PARS } from "athcodec-three";
+import { MOTION_PARS } from "./shader.js";
 
 // One instance per edge, of four corners: `position` says which end, and which side. Attributes of the far end have
 // "Other" in their names.
@@ -18,11 +18,12 @@ void main() {
   bool far = position.x > 0.5;
   vec4 p = modelViewMatrix * vec4(athMoved(rest, athPart), 1.0);
   vec4 q = modelViewMatrix * vec4(athMoved(restOther, athPartOther), 1.0);
-  vec2 along = p.xy / -p.z - q.xy / -q.z;
+  vec2 along = isOrthographic ? p.xy - q.xy : p.xy / -p.z - q.xy / -q.z;
   vec2 across = length(along) > 1e-9 ? normalize(vec2(-along.y, along.x)) : vec2(1.0, 0.0);
   if (far) p = q;
-  float pixel = -p.z * 2.0 / (projectionMatrix[1][1] * screen.y);
-  p.xy += across * position.y * max(far ? radiusOther : radius, 0.55 * pixel);
+  float pixel = (isOrthographic ? 1.0 : -p.z) * 2.0 / (projectionMatrix[1][1] * screen.y);
+  float wide = max(far ? radiusOther : radius, 0.55 * pixel);
+  p.xy += wide * (across * position.y + vec2(across.y, -across.x) * (far ? -0.6 : 0.6)); // over the joints, where limbs bend
   gl_Position = projectionMatrix * p;
   vColor = far ? colorOther : color;
   vSide = position.y;
@@ -77,6 +78,12 @@ export function setRadii(geometry, perVertex) {
     for (let i = 0; i < vertices.length; i++) out[i] = perVertex[vertices[i]];
     geometry.setAttribute(name, new InstancedBufferAttribute(out, 1));
   }
+}
+
+/** What their shadows are drawn with. */
+export function limbDepth(uniforms) {
+  const fragmentShader = "#include <packing>\nvoid main() { gl_FragColor = packDepthToRGBA(gl_FragCoord.z); }";
+  return new ShaderMaterial({ vertexShader: VERTEX, fragmentShader, side: 2, uniforms: { ...uniforms, screen: { value: new Vector2(2048, 2048) } } });
 }
 
 export function limbMaterial(uniforms) {

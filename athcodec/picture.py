@@ -1,0 +1,147 @@
+"""Pictures of a file: still ones and moving ones, drawn by the viewer's page in Chromium.
+
+Takes Playwright, Pillow and Chromium, Debian's or any that ATHCODEC_CHROMIUM names.
+"""
+
+from __future__ import annotations
+
+import base64
+import io
+import os
+import shutil
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from athcodec.atomic_files import new_file
+from athcodec.decoder import open as open_ath
+from athcodec.errors import MissingExtra
+from athcodec.host_mesh import HostMesh
+from athcodec.view import export_page
+
+INSTALL = 'pip install "athcodec[picture]"'
+BROWSER_VARIABLE = "ATHCODEC_CHROMIUM"
+FLAGS = [
+    "--no-sandbox",
+    "--use-gl=angle",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+    "--ignore-gpu-blocklist",
+]
+"""Of Chromium, so that it draws in software."""
+
+SIZE = (640, 480)
+FRAMES_PER_SECOND = 15
+FORMATS = {"png": "PNG", "gif": "GIF", "webp": "WEBP"}
+
+_TIMEOUT = 120_000  # ms
+_WHOLE = "() => globalThis.athcodecViewer?.motion?.complete"
+_ALONE = """() => {
+  document.body.classList.add("no-panel");
+  athcodecViewer.stage.fit();
+  athcodecViewer.frameView();
+}"""
+_DRAWN = """async (seconds) => {
+  const { motion, stage } = athcodecViewer;
+  await athcodecViewer.shown(seconds, motion.levelCount - 1);
+  stage.render();
+  return stage.canvas.toDataURL("image/png").split(",")[1];
+}"""
+
+
+def browser_path() -> str | None:
+    """Chromium's program; None where none is found."""
+    return os.environ.get(BROWSER_VARIABLE) or shutil.which("chromium") or shutil.which("chromium-browser")
+
+
+def save_picture(
+    path: str | os.PathLike[str],
+    out: str | os.PathLike[str],
+    kind: str = "gif",
+    clip: str | None = None,
+    size: tuple[int, int] = SIZE,
+    fps: float = FRAMES_PER_SECOND,
+    time: float = 0.0,
+    host_mesh: HostMesh | None = None,
+) -> int:
+    """Writes a picture of a plant at full detail.
+
+    Parameters
+    ----------
+    path : str or path-like
+        The .ath file, or its URL.
+    out : str or path-like
+        The picture; it appears when it is complete.
+    kind : str
+        "gif" and "webp" move, over one round of the clip; "png" stands still.
+    clip : str, optional
+        The name of a clip; by default the first.
+    size : tuple of int
+        Width and height in pixels.
+    fps : float
+        Pictures a second of what moves.
+    time : float
+        Seconds from the clip's first frame, of what stands still.
+    host_mesh : array, MotionClip, str or path-like, optional
+        As `athcodec.view.export_page`.
+
+    Returns
+    -------
+    int
+        Size of the picture, bytes.
+
+    Raises
+    ------
+    MissingExtra
+        Where Playwright, Pillow or Chromium is not there.
+    AthError, OSError
+        As `athcodec.view.export_page`.
+    """
+    image = _packages()
+    pictures = [
+        image.open(io.BytesIO(data)).convert("RGB") for data in _drawn(path, kind, clip, size, fps, time, host_mesh)
+    ]
+    data = io.BytesIO()
+    moving = {"save_all": True, "append_images": pictures[1:], "duration": round(1000 / fps), "loop": 0}
+    pictures[0].save(data, FORMATS[kind], **({} if kind == "png" else moving))
+    with new_file(out) as file:
+        file.write(data.getvalue())
+    return data.tell()
+
+
+def _packages() -> Any:
+    """Pillow's module of images, once all that is needed is there."""
+    try:
+        import playwright.sync_api  # noqa: F401
+        from PIL import Image
+    except ImportError as error:
+        raise MissingExtra(f"athcodec picture: needs {error.name}: {INSTALL}") from None
+    if browser_path() is None:
+        raise MissingExtra(
+            f"athcodec picture: needs Chromium on PATH or in {BROWSER_VARIABLE}: apt-get install chromium"
+        )
+    return Image
+
+
+def _drawn(path, kind, clip, size, fps, time, host_mesh) -> Iterator[bytes]:
+    """Each picture as PNG."""
+    from playwright.sync_api import sync_playwright
+
+    with open_ath(path, clip=clip, host_mesh=host_mesh) as decoder:
+        playing = decoder.clip
+        steps = max(playing.frame_count - 1, 1)
+        seconds = playing.duration * ((steps + 1) / steps if playing.loop else 1)
+    times = [time] if kind == "png" else [i / fps for i in range(max(1, round(seconds * fps)))]
+    with tempfile.TemporaryDirectory() as folder, sync_playwright() as playwright:
+        export_page(path, Path(folder) / "page.html", clip, host_mesh)
+        browser = playwright.chromium.launch(executable_path=browser_path(), args=FLAGS)
+        try:
+            page = browser.new_page(viewport={"width": size[0], "height": size[1]})
+            page.goto((Path(folder) / "page.html").as_uri())
+            page.wait_for_function(_WHOLE, timeout=_TIMEOUT)
+            page.evaluate(_ALONE)
+            for at in times:
+                yield base64.b64decode(page.evaluate(_DRAWN, at))
+        finally:
+            browser.close()

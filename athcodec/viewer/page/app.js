@@ -1,0 +1,17 @@
+// What the parts of the page share: what is open, what is on the stage, and how it plays.
+
+import { ATHLoader } from "athcodec-three";
+
+export const loader = new ATHLoader();
+
+/** `plants`: on the stage, the one that is asked about last; `opened`: the files, each with its `fileName` and `source`. */
+export const app = { stage: null, plants: [], opened: [] };
+
+/** `time` is that of the clip, `turns` that of the rounds before; `loop`: null, as is usual for the file, or what was chosen;
+ * `wind`: [strength, heading] where clips are blended for it. */
+export const state = { playing: true, speed: 1, loop: null, time: 0, turns: 0, wind: null, forest: null, dirty: true };
+
+export const counters = { frames: 0, fps: 0, frameMs: 0, since: performance.now(), pictures: 0, started: 0, firstPicture: null, firstMotion: null,
+  arrived: {} };
+
+export const main = () => app.plants.at(-1);

@@ -1,0 +1,103 @@
+// What is on the stage: plants for the files that are open and what is chosen, and the view of them.
+
+import { Box3, Vector3 } from "three";
+
+import { app, counters, main, state } from "./app.js";
+import { clipControls } from "./clips.js";
+import { forestOff, forestOn, forestRadius, forestSwitch } from "./forests.js";
+import { colour, compare, level, levelControls, setLevel, show, splitLabels } from "./look.js";
+import { Plant } from "./plant.js";
+import { applyWind, windControl } from "./wind.js";
+import { describe } from "./story.js";
+import { fromTheStart, setLoop } from "./time.js";
+
+/** Plants and panes; under the split the right one is asked about. `first`: that of the first file, if there is one. */
+export function arrange(first = null) {
+  const { stage, opened, plants: before } = app;
+  for (const plant of before) {
+    plant.dispose();
+    if (plant.motion !== plant.ath.motion) plant.motion.dispose();
+  }
+  const [ath] = opened, plants = [first ?? new Plant(ath)];
+  if (compare.value === "levels") plants.unshift(new Plant(ath, ath.motion.clone()));
+  if (compare.value === "file" && opened[1]) plants.push(new Plant(opened[1]));
+  app.plants = plants;
+  for (const plant of plants) {
+    if (plant.show !== show.value) plant.setShow(show.value);
+    if (plant.colour !== colour.value) plant.setColour(colour.value);
+    plant.beside = plants;
+    plant.onPaint = () => { state.dirty = true; };
+    plant.motion.addEventListener("frame", () => pictured(plant));
+    plant.motion.addEventListener("clip", fromTheStart);
+    plant.motion.addEventListener("ready", () => { state.dirty = true; });
+  }
+  if (plants.length > 1) forestSwitch(false);
+  stage.setPanes(plants.map((plant) => ({
+    scene: stage.scene([plant.root]), before: (width, height) => plant.prepare(width, height),
+  })));
+  place();
+  levelControls();
+  setLevel(level.value ?? "auto");
+  clipControls();
+  windControl();
+  applyWind();
+  setLoop(state.loop);
+  describe();
+  splitLabels();
+  if (state.forest) forestOn();
+}
+
+function pictured(plant) {
+  state.dirty = true;
+  if (plant === main()) counters.pictures++;
+}
+
+/** Takes what is on the stage away, before a file is loaded anew. */
+export function clear() {
+  if (state.forest) forestOff();
+  for (const plant of app.plants.splice(0)) plant.dispose();
+  app.stage.setPanes([{ scene: app.stage.scene([]) }]);
+  app.stage.render();
+}
+
+// The world's box of all rest poses.
+function box() {
+  const all = new Box3();
+  for (const { ath, root } of app.plants) {
+    root.updateMatrixWorld(true);
+    all.union(ath.box.clone().applyMatrix4(root.matrixWorld));
+  }
+  return all;
+}
+
+export function place() {
+  const all = box(), size = all.getSize(new Vector3());
+  const plant = 1.9 * Math.max(size.x, size.y, size.z);
+  app.stage.placeGround(all.min.y, state.forest ? Math.max(plant, 2.6 * forestRadius()) : plant, plant);
+}
+
+/** The whole plant, or of a forest what is near, in view. */
+export function frameView() {
+  const { stage } = app, all = box(), size = all.getSize(new Vector3()), most = Math.max(size.x, size.y, size.z);
+  if (!state.forest) {
+    stage.fog(0, 0);
+    stage.look(all, { height: all.min.y, size: 1.9 * most });
+    return;
+  }
+  const reach = Math.max(forestRadius(), most), near = Math.min(reach, 2.2 * most);
+  const part = new Box3(new Vector3(-near, all.min.y, -near), new Vector3(near, all.max.y, near));
+  stage.look(part, { height: all.min.y, size: 2.6 * reach, plant: 1.9 * most });
+  stage.controls.maxDistance = 6 * reach;
+  stage.camera.far = 12 * reach + 20 * most;
+  stage.fog(stage.camera.position.distanceTo(stage.controls.target) * 0.7, 3.2 * reach + 4 * most);
+}
+
+/** The same, as long as nobody moved the view by hand. */
+export function reframe() {
+  if (app.plants.length > 0 && !app.stage.moved) frameView();
+}
+
+export function resetView() {
+  app.stage.moved = false;
+  frameView();
+}

@@ -1,0 +1,193 @@
+// Files: where they come from, how they are opened, and what is said where they cannot be.
+
+import { app, counters, loader, state } from "./app.js";
+import { arrange, clear, frameView } from "./arrange.js";
+import { playIn } from "./clips.js";
+import { compare } from "./look.js";
+import { Plant } from "./plant.js";
+import { restore } from "./address.js";
+import { loadingStory, replayed, tellSizes, watchArrival } from "./story.js";
+import { shownWithout, wordsOf } from "./trouble.js";
+import { $ } from "./ui.js";
+
+const message = $("message");
+let first = true, asked = 0; // whether nothing has been open yet; the newest wish to open a file
+
+// A page that carries its file and its worker: see serve.py.
+function embedded() {
+  const worker = $("ath-worker"), file = $("ath-file");
+  if (worker) loader.setDecoderPath(URL.createObjectURL(new Blob([worker.textContent], { type: "text/javascript" })));
+  if (!file) return false;
+  const mesh = $("ath-mesh");
+  if (mesh) loader.setHostMesh(new Float32Array(bytesOf(mesh)));
+  openFirst({ bytes: bytesOf(file) }, file.dataset.name, file.dataset.clip);
+  return true;
+}
+
+function bytesOf(element) {
+  return Uint8Array.from(atob(element.textContent.trim()), (character) => character.charCodeAt(0)).buffer;
+}
+
+// The mesh of a file that does not hold its rest pose: binary32, as it was in the file's source.
+async function fetchMesh(url) {
+  const answer = await fetch(url).catch(({ message: status }) => ({ ok: false, status }));
+  if (!answer.ok) throw Object.assign(new Error(`${url}: got status ${answer.status}`), { codeName: "HTTP" });
+  loader.setHostMesh(new Float32Array(await answer.arrayBuffer()));
+}
+
+// With one of its clips.
+function openFirst(source, name, clip = null) {
+  loader.setClip(clip);
+  const done = open(source, name);
+  loader.setClip(null);
+  return done;
+}
+
+const nameOf = (path) => decodeURIComponent(path.split("/").pop().split("?")[0]);
+
+/** Opens what the page carries or its address names. */
+export function begin() {
+  if (embedded()) return;
+  const wanted = new URLSearchParams(location.search), url = wanted.get("file"), second = wanted.get("compare");
+  const mesh = wanted.get("mesh"), ready = mesh ? fetchMesh(mesh) : null;
+  const openIt = () => openFirst(url, nameOf(url), wanted.get("clip"));
+  if (url) (ready?.then(openIt, refuse) ?? openIt()).then(() => second && app.opened.length && open(second, nameOf(second), true));
+  else ask();
+}
+
+function ask() {
+  say("No file yet", "Drop an .ath file here, or open one. It stays on this computer.");
+  loadingStory(null);
+}
+
+function say(title, text, technical = "", again = null) {
+  message.querySelector("h2").textContent = title;
+  message.querySelector("p").textContent = text;
+  message.querySelector("small").textContent = technical;
+  $("again").hidden = !again;
+  $("again").onclick = again;
+  message.hidden = false;
+}
+
+/** Says that nothing can be shown. */
+export function refuse(error, again = null) {
+  const { title, advice, passing } = wordsOf(error.codeName);
+  say(title, advice, error.message, passing ? again : null);
+  loadingStory(null);
+}
+
+// What is wrong with the file that is shown stays in view as long as the file does.
+function complain(failure, motion, again) {
+  const box = $("trouble");
+  box.querySelector("span").textContent = shownWithout(failure, motion);
+  box.title = failure.message;
+  box.querySelector("button").hidden = failure.type !== "stopped" || !again;
+  box.querySelector("button").onclick = again;
+  box.hidden = false;
+}
+
+// A URL, or {bytes}.
+function load(source) {
+  return typeof source === "string" ? loader.loadAsync(source) : loader.parseAsync(source.bytes);
+}
+
+function close(files) {
+  for (const each of files) each.dispose();
+}
+
+/** Opens a URL or {bytes}, in place of what is open or beside it. `again`: what is to stay as it is, of a file that is loaded anew. */
+export async function open(source, name, beside = false, again = null) {
+  const wish = ++asked, retry = () => open(source, name, beside, again);
+  message.hidden = true;
+  if (!beside) {
+    Object.assign(counters, { started: performance.now(), firstPicture: null, firstMotion: null, arrived: {}, pictures: 0 });
+    $("trouble").hidden = true;
+    loadingStory(name);
+  }
+  let ath;
+  try {
+    ath = await load(source);
+  } catch (error) {
+    if (wish === asked) refuse(error, typeof source === "string" ? retry : null);
+    return;
+  }
+  if (wish !== asked) {
+    ath.dispose();
+    return;
+  }
+  Object.assign(ath, { fileName: name, source });
+  if (!beside) watchArrival(ath);
+  if (beside) {
+    close(app.opened.splice(1));
+    playIn(ath.motion, app.opened[0].motion.clip.name);
+  } else {
+    close(app.opened.splice(0));
+    Object.assign(state, { time: 0, turns: 0, loop: null, wind: null }, again);
+  }
+  app.opened.push(ath);
+  const tell = (failure) => complain(failure, ath.motion, typeof source === "string" ? retry : null);
+  for (const type of ["stopped", "damaged"]) ath.motion.addEventListener(type, tell);
+  if (ath.motion.failure) tell(ath.motion.failure);
+  compare.set(beside ? "file" : "off");
+  await show(ath, beside, again);
+}
+
+async function show(ath, beside, again) {
+  if (!again) app.stage.moved = false;
+  await breath();
+  const plant = beside ? null : new Plant(ath);
+  plant?.prepare(1, 1);
+  await breath();
+  arrange(plant);
+  if (!app.stage.moved) frameView();
+  tellSizes();
+  if (first) restore();
+  first = false;
+}
+
+// Lets the page answer between two pieces of work.
+const breath = () => new Promise((done) => { setTimeout(done); });
+
+/** Plays the loading of the first file again, at so many bits a second. */
+export async function loadAgain(bandwidth) {
+  const [{ source, fileName, motion: { clip } }] = app.opened;
+  clear();
+  close(app.opened.splice(0));
+  replayed(bandwidth);
+  loader.setBandwidth(bandwidth).setClip(clip.name || null);
+  const done = open(source, fileName, false, { loop: state.loop });
+  loader.setBandwidth(null).setClip(null);
+  await done;
+}
+
+async function openFile(file, beside) {
+  if (!file) return;
+  replayed(null);
+  await open({ bytes: await file.arrayBuffer() }, file.name, beside && app.opened.length > 0);
+}
+
+/** Asks for a file. */
+export function choose(beside = "") {
+  $("file").dataset.beside = beside;
+  $("file").click();
+}
+
+$("open").addEventListener("click", () => choose());
+$("message-open").addEventListener("click", () => choose());
+$("file").addEventListener("change", async () => {
+  await openFile($("file").files[0], $("file").dataset.beside === "yes");
+  $("file").value = "";
+});
+
+let dragging = 0;
+addEventListener("dragenter", (event) => { event.preventDefault(); dragging++; $("drop").hidden = false; });
+addEventListener("dragleave", () => { if (--dragging <= 0) $("drop").hidden = true; });
+addEventListener("dragover", (event) => event.preventDefault());
+addEventListener("drop", async (event) => {
+  event.preventDefault();
+  dragging = 0;
+  $("drop").hidden = true;
+  const files = [...event.dataTransfer.files];
+  await openFile(files[0], event.shiftKey);
+  if (files[1]) await openFile(files[1], true);
+});

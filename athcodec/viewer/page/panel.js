@@ -1,0 +1,12 @@
+// The settings: shown or not.
+
+import { app } from "./app.js";
+import { $ } from "./ui.js";
+
+export function togglePanel() {
+  const hidden = document.body.classList.toggle("no-panel");
+  $("toggle-panel").setAttribute("aria-expanded", String(!hidden));
+  app.stage?.fit();
+}
+
+$("toggle-panel").addEventListener("click", togglePanel);

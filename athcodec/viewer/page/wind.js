@@ -1,0 +1,96 @@
+// Wind as one round control, where the clips of a file say which wind they show: away from the middle it is stronger, around it
+// another heading.
+
+import { app, state } from "./app.js";
+import { $ } from "./ui.js";
+
+const ROUND = 40; // radius of the disc, in its own units
+const disc = $("wind");
+let range = null; // {least, most, headings} of the clips
+
+function windsOf({ clips, metadata }) {
+  return clips.map(({ name }) => ({ ...metadata, ...metadata.clips?.[name] })).filter(({ strength }) => Number.isFinite(strength));
+}
+
+/** Where the clips allow it. Several headings, or else one: then only the strength can be chosen. */
+export function windControl() {
+  const [ath] = app.opened, winds = windsOf({ clips: ath.motion.clips, metadata: ath.metadata });
+  const strengths = [...new Set(winds.map(({ strength }) => strength))], headings = [...new Set(winds.map(({ heading = 0 }) => heading))];
+  range = strengths.length > 1 || headings.length > 1 ? { least: Math.min(...strengths), most: Math.max(...strengths), headings } : null;
+  $("wind-section").hidden = !range || Boolean(state.forest);
+  if (!range) return;
+  $("wind-clips").replaceChildren(...winds.map(({ strength, heading = 0 }) => dot(strength, heading)));
+  mark();
+}
+
+const radiusOf = (strength) => ROUND * Math.max(strength, 0) / range.most;
+
+function placeOf(strength, heading) {
+  const angle = heading * Math.PI / 180, radius = radiusOf(strength);
+  return [radius * Math.sin(angle), -radius * Math.cos(angle)];
+}
+
+function dot(strength, heading) {
+  const circle = document.createElementNS("http://www.w3.org/2000/svg", "circle"), [x, y] = placeOf(strength, heading);
+  for (const [name, value] of Object.entries({ cx: x, cy: y, r: 2 })) circle.setAttribute(name, value);
+  return circle;
+}
+
+// What plays, as a wind.
+function now() {
+  if (state.wind) return state.wind;
+  const { metadata, motion: { clip } } = app.opened[0], { strength = range.least, heading = 0 } = { ...metadata, ...metadata.clips?.[clip.name] };
+  return [strength, heading];
+}
+
+function mark() {
+  const [strength, heading] = now(), [x, y] = placeOf(strength, heading), handle = $("wind-handle"), arrow = $("wind-arrow");
+  handle.setAttribute("cx", x);
+  handle.setAttribute("cy", y);
+  arrow.setAttribute("x2", x);
+  arrow.setAttribute("y2", y);
+  const turns = range.headings.length > 1, text = `${strength.toFixed(1)}${turns ? `, to ${Math.round(heading)}°` : ""}`;
+  $("wind-text").value = text;
+  disc.setAttribute("aria-valuemin", range.least);
+  disc.setAttribute("aria-valuemax", range.most);
+  disc.setAttribute("aria-valuenow", strength.toFixed(1));
+  disc.setAttribute("aria-valuetext", `strength ${text.replace("to", "heading")}`);
+}
+
+/** Shows the plants in the wind that is chosen, if one is. */
+export function applyWind() {
+  if (!state.wind || !range || state.forest) return;
+  for (const { motion } of app.plants) motion.wind(...state.wind);
+  const select = $("clip");
+  if (!select.querySelector("[value=wind]")) select.append(new Option("wind", "wind"));
+  select.value = "wind";
+}
+
+export function setWind(strength, heading) {
+  if (!range) return;
+  const turned = range.headings.length > 1 ? ((heading % 360) + 360) % 360 : range.headings[0];
+  state.wind = [Math.max(range.least, Math.min(strength, range.most)), turned];
+  applyWind();
+  mark();
+  state.dirty = true;
+}
+
+function dragTo({ clientX, clientY }) {
+  const { left, top, width, height } = disc.getBoundingClientRect(), scale = 100 / width;
+  const x = (clientX - left - width / 2) * scale, y = (clientY - top - height / 2) * scale;
+  setWind(range.most * Math.hypot(x, y) / ROUND, Math.atan2(x, -y) * 180 / Math.PI);
+}
+
+disc.addEventListener("pointerdown", (event) => {
+  disc.setPointerCapture(event.pointerId);
+  disc.focus({ preventScroll: true });
+  dragTo(event);
+});
+disc.addEventListener("pointermove", (event) => { if (disc.hasPointerCapture(event.pointerId)) dragTo(event); });
+disc.addEventListener("keydown", (event) => {
+  const by = { ArrowUp: [0.05, 0], ArrowDown: [-0.05, 0], ArrowLeft: [0, -10], ArrowRight: [0, 10] }[event.key];
+  if (!by) return;
+  event.preventDefault();
+  const [strength, heading] = now(), sideways = range.headings.length < 2 ? by[1] / 200 : 0;
+  setWind(strength + (by[0] + sideways) * (range.most - range.least), heading + by[1]);
+});

@@ -1,0 +1,43 @@
+/**
+ * athcodec-three/viewer: a web component that plays .ath files.
+ *
+ *     <script type="module">import "athcodec-three/viewer";</script>
+ *     <ath-viewer src="oak.ath" camera-controls alt="An oak in the wind"></ath-viewer>
+ *
+ * It is as large as its style says, transparent behind the plant, and draws only what is in view. Attributes, all of which can change:
+ *
+ * * src: the file's address;
+ * * clip: the name of the clip that plays (default: the first);
+ * * wind: strength and heading, "6 90", in place of a clip, where the clips say which wind they show;
+ * * level: a level of detail, or "auto" (default): as much as can be seen;
+ * * speed: 1 is real time;
+ * * paused;
+ * * camera-controls: the plant can be turned and zoomed by mouse and touch;
+ * * alt: what is seen, in words.
+ *
+ * Events: "load" (detail: {ath}) at the first picture, "progress" (detail: {loaded, total}), "error" (detail: an ATHFailure, or what went
+ * wrong later, with message and codeName).
+ */
+
+import { Camera } from "three";
+import { ATH, ATHLoader } from "athcodec-three";
+
+export class ATHViewerElement extends HTMLElement {
+  /** Of all elements: setDecoderPath() and the like hold for files that load later. */
+  static readonly loader: ATHLoader;
+  src: string | null;
+  paused: boolean;
+  /** Seconds. */
+  currentTime: number;
+  play(): void;
+  pause(): void;
+  /** Null before the first picture. */
+  readonly ath: ATH | null;
+  readonly camera: Camera;
+}
+
+declare global {
+  interface HTMLElementTagNameMap {
+    "ath-viewer": ATHViewerElement;
+  }
+}

@@ -1,0 +1,362 @@
+"""The controls of the viewer's page, by mouse, touch and keyboard; what it tells of a file and of loading it."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image, ImageSequence
+
+import athcodec
+from athcodec import cli
+from athcodec.viewer.build_viewer import modules
+from bench.throttled_server import ThrottledServer
+
+pytestmark = pytest.mark.browser
+
+VIEW = "athcodecViewer.stage.camera.position.toArray()"
+PIXELS_OFF = """(({ motion, stage, plants }) =>
+  motion.pixelError(motion.level, stage.camera, stage.pixels, plants[0].root.matrixWorld))(athcodecViewer)"""
+
+
+@pytest.fixture(scope="module")
+def windy(tmp_path_factory):
+    """An .ath file of one plant in winds of strength 2 and 10 towards 0 degrees, and of 10 towards 90."""
+    folder = tmp_path_factory.mktemp("windy")
+    with athcodec.read(athcodec.sample_path()) as clip:
+        clips = {}
+        for name, strength, heading in (("calm", 2.0, 0.0), ("gale", 10.0, 0.0), ("across", 10.0, 90.0)):
+            clips[name] = athcodec.in_wind(clip, strength, heading)
+        athcodec.encode(athcodec.join(clips), folder / "windy.ath", rel_error=1e-3, effort="fast")
+    return (folder / "windy.ath").read_bytes()
+
+
+@pytest.fixture
+def page(opened, sample_ath):
+    with ThrottledServer({"tree.ath": sample_ath.read_bytes()}) as line:
+        yield opened(line.page("tree.ath"))
+
+
+def centre(page, selector: str) -> tuple[float, float]:
+    box = page.locator(selector).bounding_box()
+    return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+
+
+def drag(page, start: tuple[float, float], end: tuple[float, float]) -> None:
+    page.mouse.move(*start)
+    page.mouse.down()
+    page.mouse.move(*end, steps=4)
+    page.mouse.up()
+
+
+def chosen(page, group: str) -> str:
+    return page.locator(f"#{group} [aria-checked=true]").get_attribute("data-value")
+
+
+def test_the_sizes_are_those_of_the_file_and_of_its_positions_as_float32(page, sample_ath):
+    with athcodec.open(sample_ath) as decoder:
+        source = decoder.vertex_count * decoder.frame_count * 12
+    size = sample_ath.stat().st_size
+    assert page.inner_text("#times") == f"{source / size:.0f} times smaller"
+    assert (
+        page.inner_text("#source-size") == f"{source / 1e6:.2f} MB"
+        and page.inner_text("#file-size") == f"{size / 1e3:.0f} kB"
+    )
+    assert f"{size:,} bytes" in page.get_attribute("#sizes", "title")
+
+
+def test_the_loading_is_played_again_at_the_rate_that_is_chosen(page, sample_ath):
+    """Without a server's help: the bytes come no faster than such a line has them."""
+    page.evaluate("athcodecViewer.setLevel('1')")
+    page.click("#replay button[data-mbit='1']")
+    page.wait_for_function(
+        "() => athcodecViewer.motion?.readyLevel >= 1 && athcodecViewer.counters.arrived.first", timeout=60_000
+    )
+    page.evaluate("athcodecViewer.setLevel('auto')")
+    page.wait_for_function("() => athcodecViewer.counters.arrived.whole", timeout=60_000)
+    fetched, seconds = page.evaluate(
+        "[athcodecViewer.motion.bytesFetched, athcodecViewer.counters.arrived.whole / 1000]"
+    )
+    assert fetched > 0.9 * sample_ath.stat().st_size
+    assert 8 * fetched / seconds <= 1.02e6
+    page.wait_for_function("() => document.getElementById('timing').textContent.includes('full detail after')")
+    assert page.get_attribute("#progress", "aria-valuenow") == "100"
+
+
+def test_loading_is_told_before_the_first_picture(opened, sample_ath):
+    with ThrottledServer({"tree.ath": sample_ath.read_bytes()}, rate=2_000) as line:
+        page = opened(line.page("tree.ath"), "document.getElementById('arrived').textContent === 'Loading…'")
+        assert page.inner_text("#name") == "tree.ath" and page.is_visible("#progress")
+
+
+def test_arrows_move_the_choice_in_a_group(page):
+    page.locator("#colour [data-value=plain]").focus()
+    for key, value in (
+        ("ArrowRight", "node"),
+        ("ArrowRight", "order"),
+        ("ArrowLeft", "node"),
+        ("ArrowUp", "plain"),
+        ("ArrowUp", "distance"),
+    ):
+        page.keyboard.press(key)
+        assert chosen(page, "colour") == value
+        assert page.evaluate("document.activeElement.dataset.value") == value
+    assert page.evaluate("document.querySelectorAll('#colour [tabindex=\"0\"]').length") == 1
+
+
+def test_the_view_turns_and_zooms_by_keys_and_a_double_tap_resets_it(page):
+    page.evaluate("athcodecViewer.setPlaying(false)")
+    before = page.evaluate(VIEW)
+    page.locator("#canvas").focus()
+    time = page.evaluate("athcodecViewer.state.time")
+    page.keyboard.press("ArrowRight")
+    turned = page.evaluate(VIEW)
+    page.keyboard.press("+")
+    nearer = page.evaluate(VIEW)
+    target = page.evaluate("athcodecViewer.stage.controls.target.toArray()")
+    assert turned != before and page.evaluate("athcodecViewer.state.time") == time
+    assert sum((a - b) ** 2 for a, b in zip(nearer, target)) < 0.8 * sum((a - b) ** 2 for a, b in zip(turned, target))
+    page.mouse.dblclick(400, 500)
+    assert page.evaluate(VIEW) == pytest.approx(before)
+
+
+def test_a_double_tap_fits_by_touch(opened, sample_ath):
+    with ThrottledServer({"tree.ath": sample_ath.read_bytes()}) as line:
+        page = opened(line.page("tree.ath"), has_touch=True, viewport={"width": 390, "height": 844})
+        page.evaluate("athcodecViewer.setPlaying(false)")  # drawing in software keeps taps apart
+        before = page.evaluate(VIEW)
+        page.evaluate("athcodecViewer.moveView(1, 0.2)")
+        assert page.evaluate(VIEW) != pytest.approx(before)
+        for _ in range(2):
+            page.touchscreen.tap(200, 500)
+        page.wait_for_function("() => !athcodecViewer.stage.moved")
+        assert page.evaluate(VIEW) == pytest.approx(before, rel=1e-3)
+        page.touchscreen.tap(*centre(page, "#toggle-panel"))
+        page.touchscreen.tap(*centre(page, "#colour [data-value=order]"))
+        assert chosen(page, "colour") == "order"
+
+
+def test_two_levels_lie_under_one_split_that_is_dragged_and_moved_by_keys(page):
+    page.click("#compare [data-value=levels]")
+    assert page.evaluate("athcodecViewer.plants.length") == 2 and page.is_visible("#split")
+    page.wait_for_function("() => document.getElementById('split-left').textContent.startsWith('Detail 1')")
+    left, right = (page.wait_for_selector(f"#split-{side}").inner_text() for side in ("left", "right"))
+    assert "Detail 1" in left and "error up to" in right
+    x, y = centre(page, "#split svg")
+    drag(page, (x, y), (x - 150, y))
+    share = page.evaluate("athcodecViewer.stage.split")
+    width = page.evaluate("document.getElementById('split-view').clientWidth")
+    assert share == pytest.approx(0.5 - 150 / width, abs=0.01)
+    page.keyboard.press("ArrowRight")
+    assert page.evaluate("athcodecViewer.stage.split") == pytest.approx(share + 0.02)
+    assert page.get_attribute("#split", "aria-valuetext").startswith(f"{round(100 * (share + 0.02))} %")
+    page.click("#compare [data-value=off]")
+    assert not page.is_visible("#split")
+
+
+def test_the_legend_of_the_error_is_in_millimetres(page):
+    page.evaluate("athcodecViewer.setLevel('0')")
+    page.click("#colour [data-value=distance]")
+    page.wait_for_function("() => /^[\\d.,]+ mm$/.test(document.getElementById('scale-high').textContent)")
+    high = float(page.inner_text("#scale-high").split()[0].replace(",", ""))
+    assert high == pytest.approx(1000 * page.evaluate("athcodecViewer.motion.error(0).max"), rel=0.01)
+
+
+def test_no_number_promises_more_than_is_shown(page):
+    """Less than a pixel is said only where the level that is shown has such an error there."""
+    for level in range(page.evaluate("athcodecViewer.motion.levelCount")):
+        page.evaluate(f"athcodecViewer.setLevel('{level}')")
+        page.wait_for_function(f"() => athcodecViewer.motion.level === {level} && !athcodecViewer.motion.fading")
+        page.wait_for_timeout(600)
+        off = page.evaluate(PIXELS_OFF)
+        assert ("less than a pixel" in page.inner_text("#level-hint")) == (off <= 1)
+
+
+def test_wind_is_chosen_on_a_disc(opened, windy):
+    with ThrottledServer({"tree.ath": windy}) as line:
+        page = opened(line.page("tree.ath"))
+        assert page.input_value("#clip") == "0" and page.inner_text("#wind-text").startswith("2.0")
+        x, y = centre(page, "#wind")
+        page.mouse.click(x + 25, y)
+        strength, heading = page.evaluate("athcodecViewer.state.wind")
+        assert 2 < strength < 10 and heading == pytest.approx(90, abs=1)
+        assert page.input_value("#clip") == "wind"
+        page.wait_for_function("() => athcodecViewer.motion.level >= 0")
+        page.keyboard.press("ArrowUp")
+        page.keyboard.press("ArrowLeft")
+        stronger, turned = page.evaluate("athcodecViewer.state.wind")
+        assert stronger > strength and turned == pytest.approx(heading - 10)
+        assert "heading 8" in page.get_attribute("#wind", "aria-valuetext")
+        page.select_option("#clip", label="gale")
+        assert page.evaluate("athcodecViewer.state.wind") is None and page.inner_text("#wind-text").startswith("10.0")
+
+
+def test_a_file_of_one_clip_has_no_wind_to_choose(page):
+    assert not page.is_visible("#wind-section")
+
+
+def test_sliders_are_read_out_with_units(page):
+    page.wait_for_function("() => document.getElementById('time').getAttribute('aria-valuetext')")
+    assert re.fullmatch(r"[\d.]+ of [\d.]+ seconds", page.get_attribute("#time", "aria-valuetext"))
+    page.locator("#level").focus()
+    page.keyboard.press("Home")
+    assert (
+        "error up to" in page.get_attribute("#level", "aria-valuetext")
+        and page.evaluate("athcodecViewer.motion.target") == 0
+    )
+    assert page.get_attribute("#forest-count", "aria-valuetext").endswith(" plants")
+
+
+def test_arrows_on_the_time_go_from_frame_to_frame(page):
+    page.evaluate("athcodecViewer.setPlaying(false)")
+    page.keyboard.press("Home")
+    page.locator("#time").focus()
+    page.keyboard.press("ArrowRight")
+    page.keyboard.press("ArrowRight")
+    assert page.evaluate("athcodecViewer.state.time") == pytest.approx(2 / 30, rel=1e-3)
+
+
+@pytest.mark.parametrize("size", [(1000, 700), (390, 844)])
+def test_the_thumb_of_the_time_runs_on_its_track(opened, sample_ath, size):
+    with ThrottledServer({"tree.ath": sample_ath.read_bytes()}) as line:
+        page = opened(line.page("tree.ath"), viewport=dict(zip(("width", "height"), size)))
+        assert centre(page, "#time")[1] == pytest.approx(centre(page, "#ready")[1], abs=0.5)
+
+
+def test_the_address_brings_back_what_is_looked_at(opened, windy):
+    with ThrottledServer({"tree.ath": windy}) as line:
+        page = opened(line.page("tree.ath"))
+        page.select_option("#clip", label="across")
+        page.wait_for_function("() => !athcodecViewer.motion.switching")
+        page.click("#colour [data-value=order]")
+        page.evaluate("athcodecViewer.setLevel('1')")
+        page.evaluate("athcodecViewer.moveView(0.5, 0.1, 0.8)")
+        page.evaluate("athcodecViewer.setPlaying(false)")
+        page.evaluate("athcodecViewer.seek(1)")
+        page.wait_for_function("() => location.hash.includes('t=1')")
+        view, address = page.evaluate(VIEW), page.evaluate("location.href")
+        page = opened(address, "athcodecViewer.state.time === 1")
+        assert page.evaluate("athcodecViewer.motion.clip.name") == "across"
+        assert chosen(page, "colour") == "order" and chosen(page, "level-choice") == "1"
+        assert page.evaluate(VIEW) == pytest.approx(view, rel=1e-3)
+
+
+def test_what_an_address_names_and_is_not_there_is_passed_over(opened, sample_ath):
+    with ThrottledServer({"tree.ath": sample_ath.read_bytes()}) as line:
+        page = opened(line.page("tree.ath") + "#clip=none&detail=99&view=a+b&wind=x&colour=none&split=z&t=soon")
+        assert page.evaluate("athcodecViewer.motion.automatic") and chosen(page, "colour") == "plain"
+
+
+def test_links_and_embed_code_are_copied(opened, sample_ath):
+    with ThrottledServer({"tree.ath": sample_ath.read_bytes()}) as line:
+        page = opened(line.page("tree.ath"))
+        page.context.grant_permissions(["clipboard-read", "clipboard-write"])
+        page.click("#link")
+        page.wait_for_function("() => !document.getElementById('note').hidden")
+        assert page.evaluate("navigator.clipboard.readText()") == page.evaluate("location.href")
+        assert "this computer" in page.inner_text("#note")
+        page.click("#embed")
+        page.wait_for_function("() => document.getElementById('note').textContent.startsWith('Embed')")
+        assert page.evaluate("navigator.clipboard.readText()").startswith('<iframe src="http')
+
+
+def test_a_video_is_saved(page):
+    with page.expect_download() as download:
+        page.click("#video")
+        page.wait_for_timeout(1500)
+        page.click("#video")
+    assert download.value.suggested_filename.endswith(".webm")
+    assert Path(download.value.path()).read_bytes()[:4] == b"\x1aE\xdf\xa3"
+    assert page.inner_text("#video") == "Save video"
+
+
+def test_the_page_fills_the_screen(page):
+    page.click("#fullscreen")
+    page.wait_for_function(
+        "() => document.fullscreenElement && document.getElementById('fullscreen').ariaPressed === 'true'"
+    )
+    page.click("#fullscreen")
+    page.wait_for_function("() => !document.fullscreenElement")
+
+
+def test_a_file_that_cannot_be_fetched_can_be_tried_again(browser, sample_ath):
+    with ThrottledServer({}) as line:
+        page = browser.new_page()
+        page.goto(line.page("tree.ath"))
+        page.wait_for_selector("#again", timeout=60_000)
+        assert "cannot be fetched" in page.inner_text("#message h2")
+        line.files["tree.ath"] = sample_ath.read_bytes()
+        page.click("#again")
+        page.wait_for_function("() => athcodecViewer.motion?.complete", timeout=60_000)
+        assert not page.is_visible("#message")
+        page.close()
+
+
+def test_a_file_that_ends_within_a_chunk_is_fetched_once_and_said_to_be_cut_off(opened):
+    data = athcodec.sample_path("leafed").read_bytes()
+    data = data[: int(0.4 * len(data))]
+    with ThrottledServer({"tree.ath": data}) as line:
+        page = opened(line.page("tree.ath"), "document.getElementById('trouble').checkVisibility()")
+        assert "cut off" in page.inner_text("#trouble")
+        pictures = page.evaluate("athcodecViewer.counters.pictures")
+        page.wait_for_function(f"() => athcodecViewer.counters.pictures > {pictures + 3}", timeout=60_000)
+        assert line.sent("tree.ath") < 1.6 * len(data)
+
+
+def test_the_command_line_makes_pictures_that_move(sample_ath, tmp_path):
+    for kind, more in (("png", ["--time", "1"]), ("gif", []), ("webp", [])):
+        out = tmp_path / f"tree.{kind}"
+        command = ["picture", str(sample_ath), f"--{kind}", str(out), "--size", "160x120", "--fps", "2", *more]
+        done = subprocess.run([sys.executable, "-m", "athcodec", *command], capture_output=True, text=True)
+        assert done.stdout == f"{out}: {out.stat().st_size:,} bytes\n", done.stderr
+        with Image.open(out) as image:
+            frames = [np.asarray(image.convert("RGB")) for _ in ImageSequence.Iterator(image)]
+            assert image.size == (160, 120) and image.format.lower() == kind
+        assert len(frames) == (1 if kind == "png" else 8)  # four seconds
+        assert np.ptp(frames[0]) > 100
+        assert all((a != b).any() for a, b in zip(frames, frames[1:]))
+
+
+def test_a_picture_without_what_it_takes_is_an_error_of_one_line(sample_ath, tmp_path, monkeypatch, capsys):
+    out = tmp_path / "tree.gif"
+    with monkeypatch.context() as without:
+        without.setitem(sys.modules, "PIL", None)
+        assert cli.main(["picture", str(sample_ath), "--gif", str(out)]) == 1
+    error = capsys.readouterr().err.strip()
+    assert 'pip install "athcodec[picture]"' in error and "\n" not in error
+    assert cli.main(["picture", str(sample_ath), "--gif", str(out), "--clip", "none"]) == 1
+    assert "none" in capsys.readouterr().err and not out.exists()
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("size", [(1200, 800), (390, 844)])
+def test_axe_finds_nothing(opened, windy, scheme, size):
+    with ThrottledServer({"tree.ath": windy, "page.ath": b"<!doctype html>" + bytes(100)}) as line:
+        page = opened(
+            line.page("tree.ath"), viewport=dict(zip(("width", "height"), size)), color_scheme=scheme, bypass_csp=True
+        )
+        page.add_script_tag(path=modules() / "axe-core/axe.min.js")
+        page.evaluate("athcodecViewer.setPlaying(false)")
+
+        def violations() -> list[str]:
+            return page.evaluate(
+                "axe.run().then(({ violations }) => violations.map(({ id, nodes }) => `${id}: ${nodes[0].html}`))"
+            )
+
+        assert violations() == []
+        if size[0] < 680:
+            page.click("#toggle-panel")
+        page.evaluate("document.querySelectorAll('details').forEach((each) => { each.open = true; })")
+        page.click("#compare [data-value=levels]")
+        page.click("#colour [data-value=distance]")
+        assert violations() == []
+        page.click("#help")
+        assert violations() == []
+        page.keyboard.press("Escape")
+        page.evaluate("athcodecViewer.open('/page.ath', 'page.ath')")
+        page.wait_for_selector("#message")
+        assert violations() == []
