@@ -87,7 +87,7 @@ def _checked(path: Any, clip: str | None, host_mesh: HostMesh | None) -> bytes |
 def _refuse_glb(head: bytes) -> None:
     if head == b"glTF":
         raise ClipError(
-            "got a GLB, expected an .ath file: pages with the plugins of athcodec-three show it, and decode to .npz and "
+            "got a GLB, expected an .ath file: pages with the plugins of athcodec-three show it; decode to .npz and "
             "encode make an .ath file of it"
         )
 
