@@ -22,7 +22,7 @@ from urllib.parse import quote, urlsplit
 
 from athcodec.atomic_files import is_url, new_file
 from athcodec.decoder import open as open_ath
-from athcodec.errors import AthError, MissingExtra
+from athcodec.errors import AthError, ClipError, MissingExtra
 from athcodec.host_mesh import HostMesh
 
 WEB = Path(__file__).parent / "viewer" / "web"
@@ -69,6 +69,7 @@ def export_page(
         Where a file cannot be read or written.
     """
     data = _read(path)
+    _refuse_glb(data[:4])
     mesh = _checked(io.BytesIO(data), clip, host_mesh)
     text = self_contained(data, file_name(path), clip, mesh).encode()
     with new_file(page) as out:
@@ -81,6 +82,14 @@ def _checked(path: Any, clip: str | None, host_mesh: HostMesh | None) -> bytes |
     Raises AthError, OSError."""
     with open_ath(path, clip=clip, host_mesh=host_mesh) as decoder:
         return None if decoder.file.host_checksum is None else decoder.level_rest(0).astype("<f4").tobytes()
+
+
+def _refuse_glb(head: bytes) -> None:
+    if head == b"glTF":
+        raise ClipError(
+            "got a GLB, expected an .ath file: pages with the plugins of athcodec-three show it; decode to .npz and "
+            "encode make an .ath file of it"
+        )
 
 
 def _read(path: str | os.PathLike[str]) -> bytes:
@@ -169,6 +178,9 @@ def serve(
         As `export_page`.
     """
     _check_server(path)
+    if not is_url(path):
+        with open(path, "rb") as file:
+            _refuse_glb(file.read(4))
     mesh = _checked(path, clip, host_mesh)
     import asyncio
 

@@ -497,6 +497,14 @@ def test_read_says_that_the_motion_is_the_extensions(leafy, tmp_path):  # noqa: 
         read(out)
 
 
+def test_the_viewer_says_what_shows_a_glb(leafy, tmp_path, capsys):  # noqa: F811
+    write(leafy, tmp_path / "source.glb")
+    out = encoded(tmp_path / "source.glb", tmp_path / "out.glb")
+    for more in (["--export", str(tmp_path / "page.html")], ["--no-browser"]):
+        assert main(["view", str(out), *more]) == 1
+        assert "athcodec-three" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("options", [["--unit", "cm"], ["--rest", "mean"], ["-o", "b.ath"]])
 def test_options_that_would_change_the_mesh_are_refused(options, leafy, tmp_path, capsys, monkeypatch):  # noqa: F811
     monkeypatch.chdir(tmp_path)

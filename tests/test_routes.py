@@ -379,8 +379,10 @@ def in_xdmf(path: Path) -> Found:
     said = {item.get("Name"): item.get("Value") for item in root.findall(".//Information")}
     return Found(
         rest + np.stack(moved),
-        [],
+        json.loads(said["objects"])["names"],
         numbers(steps[0].find("Attribute[@Name='uv']/DataItem")),
+        json.loads(said["material_names"]),
+        json.loads(said["objects"])["copies"] == [1, COPIES],
         unit=said["unit"],
         up=said["up_axis"],
         times=np.array([float(step.find("Time").get("Value")) for step in steps]),
@@ -799,7 +801,7 @@ TARGETS: list[Route] = [
         "NumPy, meshio",
         "yes | yes | names | yes | as vertices | one a file | no | no | yes | yes",
     ),
-    Route("XDMF", "a.xdmf", in_xdmf, "h5py", "yes | no | no | yes | as vertices | one a file | yes | yes | yes | yes"),
+    Route("XDMF", "a.xdmf", in_xdmf, "h5py", "yes | yes | names | yes | yes | one a file | yes | yes | yes | yes"),
     Route(
         "VTU, PVD", "a.pvd", in_vtu, "meshio", "yes | no | no | yes | as vertices | one a file | no | no | yes | yes"
     ),
@@ -866,7 +868,7 @@ def test_what_other_libraries_write_is_read_as_the_table_says(tmp_path, route):
 
 
 @pytest.mark.parametrize("instances", [False, True])
-@pytest.mark.parametrize("suffix", ["usda", "usdc", "abc", "glb", "h5", "npz", "obj"])
+@pytest.mark.parametrize("suffix", ["usda", "usdc", "abc", "glb", "h5", "npz", "obj", "xdmf"])
 def test_each_face_keeps_its_material_to_a_file_and_back(clip, tmp_path, suffix, instances):
     materials = np.array([2, 0, -1, 0, 2, 1, 3, 3, 3], np.int32)
     if suffix == "obj":

@@ -2,12 +2,13 @@
 
 The mesh is there once, in the rest pose, in the first step, and the later steps refer to it; what moves is the field
 `displacement` per point, in the clip's own precision. Attributes per vertex, and those per cell where all cells are of
-one kind, are written once too. Rate, start frame, unit and up axis are Information of the domain. ParaView shows the
-motion through its filter "Warp By Vector".
+one kind, are written once too. Rate, start frame, unit and up axis, and as JSON the names of objects and materials, are
+Information of the domain. ParaView shows the motion through its filter "Warp By Vector".
 """
 
 from __future__ import annotations
 
+import json
 import os
 from collections.abc import Callable
 from os import PathLike, fspath
@@ -22,7 +23,9 @@ from athcodec.atomic_files import check_target, new_files
 from athcodec.exporters import WriteOptions
 from athcodec.exporters.cells import Cells, cell_and_point_data, cells_of
 from athcodec.exporters.hdf5 import Sink
+from athcodec.exporters.scene_objects import face_materials
 from athcodec.sources.cells import VTK_NAMES, VTK_NUMBERS
+from athcodec.sources.scene_objects import MATERIAL_NAMES
 from athcodec.sources.xdmf import MIXED
 
 DISPLACEMENT = "displacement"
@@ -70,6 +73,8 @@ class _Writer:
         for key in ("fps", "start_frame", "unit", "up_axis"):
             if motion.metadata.get(key) is not None:
                 ElementTree.SubElement(domain, "Information", Name=key, Value=str(motion.metadata[key]))
+        for key, names in _names(motion).items():
+            ElementTree.SubElement(domain, "Information", Name=key, Value=json.dumps(names, ensure_ascii=False))
         series = ElementTree.SubElement(domain, "Grid", Name=SERIES, GridType="Collection", CollectionType="Temporal")
         static, rest = self._static_elements(), np.asarray(motion.rest, np.float64)
         time = np.asarray(motion.time).tolist()
@@ -141,6 +146,20 @@ class _Writer:
         )
         item.text = f"{self._name}:/{place}"
         return item
+
+
+def _names(motion: Any) -> dict[str, Any]:
+    """Of the objects, with their kinds and numbers of vertices and copies, and of materials."""
+    found = {}
+    names, counts = motion.metadata.get("part_names"), motion.attributes.get("part_vertex_counts")
+    if isinstance(names, list) and counts is not None and counts.shape == (len(names),):
+        copies, kinds = motion.attributes.get("part_copies"), motion.metadata.get("part_kinds")
+        found["objects"] = {"names": names, "vertices": counts.tolist()}
+        found["objects"] |= {"kinds": kinds} if isinstance(kinds, list) else {}
+        found["objects"] |= {"copies": copies.tolist()} if copies is not None else {}
+    if face_materials(motion) is not None:
+        found[MATERIAL_NAMES] = motion.metadata[MATERIAL_NAMES]
+    return found
 
 
 def _mixed(cells: Cells) -> np.ndarray:

@@ -8,6 +8,8 @@ HDF5 are read when a frame is asked for. One array may have 1 GiB.
 
 from __future__ import annotations
 
+import json
+from contextlib import suppress
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -22,6 +24,7 @@ from athcodec.sources import ReadOptions
 from athcodec.sources.cells import NODES, Block, blocks_of, topology_of
 from athcodec.sources.fields import clip_of_steps
 from athcodec.sources.opening import FileWatch, closing_on_failure, naming
+from athcodec.sources.scene_objects import MATERIAL_NAMES
 from athcodec.sources.timing import times_in_seconds, whole
 
 MAX_ARRAY_BYTES = 1 << 30
@@ -416,7 +419,8 @@ def _find_steps(root: ElementTree.Element, field: str | None) -> tuple[ElementTr
 
 
 def _information(root: ElementTree.Element) -> dict[str, Any]:
-    """fps, start_frame, unit and up_axis, where the domain has Information of these names."""
+    """fps, start_frame, unit and up_axis, where the domain has Information of these names; and those of objects and
+    materials that our writer adds as JSON."""
     said: dict[str, Any] = {}
     for element in root.findall("Domain/Information"):
         name, value = element.get("Name"), element.get("Value", "")
@@ -424,6 +428,9 @@ def _information(root: ElementTree.Element) -> dict[str, Any]:
             said[name] = value
         elif name in ("fps", "start_frame"):
             said[name] = whole(float(value)) if name == "start_frame" else float(value)
+        elif name in ("objects", MATERIAL_NAMES):
+            with suppress(ValueError, RecursionError):  # of another program's: something else
+                said[name] = json.loads(value)
     frame_rate(said)
     return said
 
