@@ -141,8 +141,8 @@ def _done(
 
 @contextmanager
 def _opened(item: Item, folder: str, source: dict[str, Any]) -> Iterator[MotionClip]:
-    """The clip as a loop, without an end and on the branches, if its settings ask for that. Raises ClipError where it is another than
-    `source` was, at the beginning or at the end."""
+    """The clip as a loop, without an end and on the branches, if its settings ask for that. Raises ClipError where it
+    is another than `source` was, at the beginning or at the end."""
     _check_source(item, source)
     path = _local_path(item, folder)
     if is_url(item.input) and (not os.path.exists(path) or sha256(path) != source["sha256"]):
