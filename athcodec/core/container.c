@@ -115,7 +115,7 @@ static int check_front(const uint8_t *bytes, size_t available, const ath_limits 
                        ath_fault_info *fault)
 {
     double size = (double)header->front_length, most = (double)limits->table_bytes;
-    double least = HEADER_SIZE + (double)CHECKSUM_SIZE * header->chunk_count;
+    double least = (double)HEADER_SIZE + (double)CHECKSUM_SIZE * header->chunk_count;
     if (is_bad_count(fault, ATH_FIELD_CHUNK_COUNT, header->chunk_count, limits->chunks)
         || is_outside(fault, ATH_LIMIT_EXCEEDED, ATH_FIELD_FRONT_SIZE, size, 0, most)
         || is_outside(fault, ATH_BAD_HEADER, ATH_FIELD_FRONT_SIZE, size, least, most))
@@ -148,7 +148,8 @@ int ath_read_header(const uint8_t *bytes, size_t available, const ath_limits *li
     if ((result = check_front(bytes, available, limits, header, fault)) != ATH_OK) return result;
     start_stream(&coder, bytes, header);
     if (is_bad_header(limits, header, fault)) return fault->code;
-    double size = TABLE_ENTRY * ((double)header->chunk_count + (double)header->level_count * header->segment_count);
+    double size =
+        (double)TABLE_ENTRY * ((double)header->chunk_count + (double)header->level_count * header->segment_count);
     if (is_outside(fault, ATH_LIMIT_EXCEEDED, ATH_FIELD_TABLE_SIZE, size, 0, limits->table_bytes)) return fault->code;
     return ATH_OK;
 }

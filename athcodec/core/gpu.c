@@ -534,7 +534,7 @@ static void record_curve(recorder *record, int32_t width, const double *jumps, c
 static int32_t nearest(double x)
 {
     if (!(x > -INT16_MOST)) return -INT16_MOST; /* those that are no numbers, too */
-    if (x > INT16_MOST) return INT16_MOST;
+    if (x > (double)INT16_MOST) return INT16_MOST;
     return x < 0.0 ? -(int32_t)(0.5 - x) : (int32_t)(x + 0.5);
 }
 
@@ -547,7 +547,7 @@ static void record_join(ath_watcher *watcher, int32_t width, const double *jumps
     record_curve(record, width, jumps, slopes);
     for (int32_t i = 0; i < count; i++)
         for (int32_t k = 0; k < 2; k++) {
-            double size = (off[i][k] < 0.0 ? -off[i][k] : off[i][k]) / INT16_MOST;
+            double size = (off[i][k] < 0.0 ? -off[i][k] : off[i][k]) / (double)INT16_MOST;
             if (size > step[k]) step[k] = size;
         }
     push_float(record, JOIN_STEPS, step[0]);
@@ -585,7 +585,7 @@ static void record_correction(ath_watcher *watcher, int32_t position, int32_t fr
             at[1] = (uint32_t)(record->sections[CORRECTIONS].used / to_words(sizeof(ath_gpu_correction)));
         }
         record->corrected_before = position;
-        record->head->correction_part = (float)(step / ATH_FOOTPRINT_PARTS);
+        record->head->correction_part = (float)(step / (double)ATH_FOOTPRINT_PARTS);
     }
     for (int32_t k = 0; k < 3; k++) {
         high[k] = own->q[k] / (INT16_MOST + 1);

@@ -262,7 +262,7 @@ ATH_INLINE void ath_add_correction(int32_t frames, int32_t t, const ath_correcti
 /* Adds corrections to a position; nothing else does. */
 ATH_INLINE double ath_corrected(double position, double parts, double step)
 {
-    return position + parts * (step / ATH_FOOTPRINT_PARTS);
+    return position + parts * (step / (double)ATH_FOOTPRINT_PARTS);
 }
 
 #endif
