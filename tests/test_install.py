@@ -132,7 +132,7 @@ def single(tmp_path) -> Path:
 @pytest.mark.parametrize("compiler", C_COMPILERS)
 @pytest.mark.parametrize("options", ["", "-O2", "-O3 -march=native -ffp-contract=fast"])
 def test_the_decoder_as_one_file_decodes_what_python_does(compiler, options, single, sample_ath, expected):
-    """Also where the compiler was told that it may fuse multiplications and additions; Clang's plain "fast" is the one way
+    """Also where the compiler was told that it may fuse multiplications and additions. Clang's "fast" is the one way
     that sources cannot undo (docs/c-api.md)."""
     told = options.replace("=fast", "=on") if compiler == "clang" else options
     flags = [*told.split(), "-DATH_STATIC", "-I", single]
