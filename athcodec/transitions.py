@@ -24,6 +24,7 @@ MOST_STRETCH = 1.25  # of the largest second difference of the clip, that a tran
 LENGTHS = (6, 12, 24, 48)  # frames of a transition, the shortest first
 ENOUGH = 12  # transitions, for the shorter lengths to do
 MOST = 48  # transitions that are kept
+BITS = 19  # of coordinates that are compared, over their largest: the sums of VERTICES squares have less than 53
 MOST_FRAMES = 3000  # that are compared with each other
 TRIED = 1500  # pairs of frames that are looked at closely
 VERTICES = 256  # that are compared
@@ -205,7 +206,7 @@ def _of_length(sample: np.ndarray, length: int, most: float) -> list[Transition]
     distance = _distances(sample, length)
     chosen: list[Transition] = []
     taken = np.zeros(distance.shape, bool)
-    for flat in np.argsort(distance, axis=None)[: 20 * TRIED]:
+    for flat in np.argsort(distance, axis=None, kind="stable")[: 20 * TRIED]:
         leave, enter = (int(number) for number in np.unravel_index(flat, distance.shape))
         if not np.isfinite(distance[leave, enter]) or taken[leave, enter]:
             continue
@@ -227,7 +228,8 @@ def _distances(sample: np.ndarray, length: int) -> np.ndarray:
     count = len(sample) - length - 1
     if count < 1:
         return np.full((0, 0), np.inf)
-    flat = sample.reshape(len(sample), -1)
+    most = np.abs(sample).max(initial=0.0)
+    flat = np.rint(sample.reshape(len(sample), -1) * (2**BITS / most if most > 0 else 1.0))
     whole = _squares(flat[:-1]) + VELOCITY**2 * _squares(np.diff(flat, axis=0))
     distance = sum(whole[k : k + count, k : k + count] for k in range(length + 1))
     place = np.arange(count)
@@ -235,6 +237,7 @@ def _distances(sample: np.ndarray, length: int) -> np.ndarray:
 
 
 def _squares(rows: np.ndarray) -> np.ndarray:
+    """Squared distances of rows of integers, which are exact in whatever order BLAS adds them up."""
     lengths = (rows * rows).sum(axis=1)
     return np.maximum(lengths[:, None] + lengths - 2 * rows @ rows.T, 0)
 

@@ -84,3 +84,15 @@ def test_clips_are_compared_frame_by_frame(forked, forked_clip):
     shorter = MotionClip(**(forked | {"positions": forked["positions"][:3], "time": [0, 1, 2]}))
     with pytest.raises(ClipError, match=r"got \(3, 6\) .* expected \(5, 6\)"):
         compare_clips(forked_clip, shorter)
+
+
+@pytest.mark.parametrize("error", [1e-300, 1e-170, 1e-30, 1e180])
+def test_the_largest_error_is_exact_where_its_square_is_no_number(error):
+    reference, decoded = np.zeros((2, 4, 3)), np.zeros((2, 4, 3))
+    decoded[1, 2] = 3 * error, 0, 4 * error
+    meter = ErrorMeter(weights=np.ones(4))
+    with np.errstate(over="ignore"):
+        meter.add(reference, decoded)
+    assert meter.max_error == pytest.approx(5 * error, rel=1e-12)
+    assert meter.max_weighted_error == meter.max_error
+    assert (meter.worst_frame, meter.worst_vertex) == (1, 2)

@@ -98,6 +98,7 @@ def circle() -> np.ndarray:
     return np.stack([np.sin(t), np.cos(1.3 * t), t], axis=1)[:, None]
 
 
+SLOW = pytest.mark.slow
 ODD = {
     "growth": growth,
     "eased growth": lambda: growth(eased=True),
@@ -117,7 +118,7 @@ def size(clip: athcodec.MotionClip, folder: Path, fraction: float, **options) ->
     return athcodec.encode(clip, folder / "a.ath", attributes="none", **{"ladder": "none"} | given)
 
 
-@pytest.mark.parametrize("fraction", [1e-2, 1e-3, 1e-5, 1e-6])
+@pytest.mark.parametrize("fraction", [pytest.param(1e-2, marks=SLOW), 1e-3, 1e-5, pytest.param(1e-6, marks=SLOW)])
 @pytest.mark.parametrize("make", ODD.values(), ids=ODD)
 def test_no_odd_clip_takes_more_than_a_simple_codec(make, fraction, tmp_path):
     clip = make()
@@ -253,7 +254,7 @@ def test_segments_are_as_long_as_can_be_unless_told_otherwise(always, tmp_path):
 @pytest.mark.parametrize("target", [700, 1000, 1500, 2000])
 def test_a_target_size_is_met(target, always, tmp_path):
     found = size(growth(), tmp_path, 0, rel_error=None, target_size=target)
-    assert found.choices["motion"] == "predicted" and 0.95 * target <= found.bytes <= target
+    assert found.choices["motion"] == "predicted" and 0.9 * target <= found.bytes <= target
 
 
 # ---- files cut short, changed, damaged ----

@@ -120,6 +120,15 @@ ATH_ENCODER_API void ath_mode_weights(const ath_piece *piece, double weights[ATH
 ATH_ENCODER_API int64_t ath_add_moments(int64_t count, int32_t frames, const int32_t *rows, double least,
                                         double *moments);
 
+/* Products of `count` pairs of matrices, rows x inner and inner x columns; a_step, b_step: numbers from one to the next,
+ * 0: they share one. */
+ATH_ENCODER_API void ath_multiply(int64_t count, int64_t rows, int64_t inner, int64_t columns, const double *a,
+                                  int64_t a_step, const double *b, int64_t b_step, double *out);
+/* Singular values, 3 each, in descending order, of 3 x 3 matrices: left, columns, times these, times right, rows. */
+ATH_ENCODER_API void ath_decompose(int64_t count, const double *matrices, double *left, double *stretch, double *right);
+/* rows, n x columns, become what a positive definite n x n matrix, which is destroyed, takes to them. */
+ATH_ENCODER_API void ath_solve(int32_t n, int32_t columns, double *matrix, double *rows);
+
 /* Largest distance and sum of squared distances between positions and source (plus origin). histogram:
  * ATH_SHORT_FLOATS counts, to which each distance is added, rounded up as in the error table. */
 ATH_ENCODER_API void ath_error(int32_t vertex_count, int32_t frames, int is_float64, const void *positions,

@@ -57,7 +57,8 @@ def least_bound(source: Source) -> float:
 
 
 def _bound_for_size(source: Source, file_size: Callable[[float], float], target: int) -> float:
-    """A bound whose file takes 97 to 100 % of `target` bytes, or the finest that does not exceed it. Raises BoundError.
+    """A bound whose file takes 97 to 100 % of `target` bytes, or the finest found that does not exceed it: sizes of
+    small files jump by some percent from one bound to the next. Raises BoundError.
 
     Size falls about as the square root of the bound; between two known sizes it is interpolated in logarithms.
     """
@@ -65,10 +66,11 @@ def _bound_for_size(source: Source, file_size: Callable[[float], float], target:
     low, high = 1e-7, max(0.1, 2 * least_bound(source) / diagonal)  # low: file too large; high: fits, once tried
     sizes: dict[float, float] = {}
     guess = min(DEFAULT_REL_ERROR, high)
-    while high / low > 1.02 and sizes.get(high, 0) < 0.97 * target:
+    while high / low > 1.01 and sizes.get(high, 0) < 0.97 * target:
         sizes[guess] = file_size(guess * diagonal)
         low, high = (low, guess) if sizes[guess] <= target else (guess, high)
-        guess = _next_guess(low, high, sizes, target)
+        # rounded, since logarithms differ between C libraries in the last bit
+        guess = qz.single(_next_guess(low, high, sizes, target))
     if sizes.get(high, target + 1) > target:
         least = file_size(high * diagonal)
         raise BoundError(f"target size: got {target} bytes; expected at least {least} for this clip")

@@ -143,7 +143,7 @@ class _Moved:
 
     def __init__(self, vectors: np.ndarray, jump: np.ndarray, slope: np.ndarray):
         self.squares = _squares(vectors)
-        self._along = [np.einsum("nkt,nk->nt", vectors, way) for way in (jump, slope)]
+        self._along = [(vectors * way[:, :, None]).sum(axis=1) for way in (jump, slope)]
         self._ways = [(a * b).sum(axis=1, keepdims=True) for a, b in ((jump, jump), (jump, slope), (slope, slope))]
 
     def mean(self) -> _Moved:
@@ -170,7 +170,7 @@ def seen(vertices: int) -> slice:
 
 def _squares(away: np.ndarray) -> np.ndarray:
     """Of the lengths of vectors, (N, frames)."""
-    return np.einsum("nkt,nkt->nt", away, away, dtype=np.float64)
+    return np.square(away, dtype=np.float64).sum(axis=1)
 
 
 def _changes(positions: np.ndarray) -> np.ndarray:

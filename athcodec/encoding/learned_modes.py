@@ -14,9 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from athcodec._native import SHAPE_MODES, address, lib
+from athcodec.algebra import multiply, principal, solve
 from athcodec.encoding import quantise as qz
 from athcodec.encoding.motion import Plan, SegmentMotion
-from athcodec.encoding.time_bases import principal
 
 NUMBERS = 3 * SHAPE_MODES
 FAINT = 0.15  # steps that a shape bends rings by, which stretches them where they turn
@@ -65,7 +65,7 @@ def components(plan: Plan, segments: Iterable[SegmentMotion]) -> Components:
         for pieces, total in groups:
             for part in _parts(pieces, segment.frames * total.shape[1]):
                 rows = _tracks(plan, segment, pieces[part], total.shape[1] // 3)
-                total[part] += np.einsum("pif,pjf->pij", rows, rows)  # without NumPy's threads, see principal()
+                total[part] += multiply(rows, rows.transpose(0, 2, 1))
         del segment  # before the next one is made
     return Components(frames, [(pieces, *_principal(total)) for pieces, total in groups])
 
@@ -152,13 +152,13 @@ def _packed(counts: np.ndarray, rows: list[np.ndarray]) -> LearnedModes:
     at = 0
     for numbers in rows:
         own = units[at : at + len(numbers)]
-        duals[at : at + len(own)] = np.linalg.solve(own @ own.T + 1e-4 * np.eye(len(own)), own)  # few are nearly alike
+        duals[at : at + len(own)] = solve(multiply(own, own.T) + 1e-4 * np.eye(len(own)), own)  # few are nearly alike
         at += len(own)
     return LearnedModes(counts, first, integers, units, duals)
 
 
 def estimated_bits(integers: np.ndarray, pieces: np.ndarray, piece_count: int) -> np.ndarray:
     """About what integers (K, ...) take in a stream, summed by piece: pieces (K,); returns (piece_count,)."""
-    magnitudes = np.abs(integers).astype(np.float32)
-    bits = (2.0 * np.log2(1.0 + magnitudes) + (magnitudes > 0)).sum(axis=tuple(range(1, integers.ndim)))
+    magnitudes = np.abs(integers).astype(np.float64)
+    bits = (2.0 * qz.bits(magnitudes) + (magnitudes > 0)).sum(axis=tuple(range(1, integers.ndim)))
     return np.bincount(pieces, bits, piece_count)

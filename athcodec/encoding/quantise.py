@@ -95,6 +95,12 @@ def half_octave(exponent: int) -> float:
     return (1.4142135623730951 if odd else 1.0) * 2.0 ** ((exponent - odd) // 2)
 
 
+def half_octaves(exponents: np.ndarray) -> np.ndarray:
+    """The same of many."""
+    odd = exponents & 1
+    return np.ldexp(np.where(odd, half_octave(1), 1.0), (exponents - odd) // 2)
+
+
 def nearest_singles(values: np.ndarray) -> np.ndarray:
     """The same in numbers of float32, as float64."""
     most = float(np.finfo(np.float32).max)
@@ -116,7 +122,14 @@ def first_rest_step(rest_step: float, bound: float, ratio: float) -> float:
     return single(max(rest_step, ratio * min(0.5 * rest_step, FIRST_REST * bound)))
 
 
+def bits(numbers: np.ndarray) -> np.ndarray:
+    """About what numbers of such sizes, 0 or more, take: log2(1 + x), in parts that add up exactly. The logarithms of
+    processors differ in their last bits, and a choice between equals must not."""
+    return np.rint(BIT_PARTS * np.log2(1 + numbers)) / BIT_PARTS
+
+
 REST_SLACKS = (0.5, 0.65, 0.8, 0.95)  # over the bound
+BIT_PARTS = 2.0**16  # of a bit, that estimates are made of
 LONGEST_LAG, LONGEST_ROW = 40, 600  # of stems, and of those that may be whole meshes
 MESH = 1000  # vertices
 SHORT_STEM = 16  # vertices: stems that are likely to come in many alike, which a lag of all of them tells apart
@@ -132,6 +145,6 @@ def rest_lag(stem: np.ndarray, attach: np.ndarray | None, step: float) -> int:
     def cost(lag: int) -> float:
         residual = steps.copy()
         residual[lag:] -= steps[: max(0, len(steps) - lag)]
-        return float(np.log2(1 + np.abs(residual) / step).sum())
+        return float(bits(np.abs(residual) / step).sum())
 
     return min([none, *range(1, min(len(steps), longest))], key=cost)

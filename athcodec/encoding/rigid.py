@@ -11,6 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from athcodec._native import PIECE_VERTICES
+from athcodec.algebra import decompose, determinant, multiply
 from athcodec.encoding.quantise import half_octave
 
 OWN_BEND = 0.3  # what a rigid part may bend by in the source, over the bound
@@ -52,9 +53,10 @@ def _bends(shapes: np.ndarray, sample: np.ndarray, vertices: np.ndarray) -> np.n
     for t in np.unique(np.linspace(0, sample.shape[2] - 1, FRAMES).astype(int)):
         x = sample[:, :, t][vertices]
         x = x - x.mean(axis=1, keepdims=True)
-        u, _, v = np.linalg.svd(np.einsum("bni,bnj->bij", x, d))
-        u[:, :, 2] *= np.sign(np.linalg.det(u @ v))[:, None]
-        worst = np.maximum(worst, np.linalg.norm(x - d @ (u @ v).transpose(0, 2, 1), axis=2).max(axis=1))
+        u, _, v = decompose(multiply(x.transpose(0, 2, 1), d))
+        u[:, :, 2] *= np.sign(determinant(u) * determinant(v))[:, None]
+        away = x - multiply(d, multiply(u, v).transpose(0, 2, 1))
+        worst = np.maximum(worst, np.linalg.norm(away, axis=2).max(axis=1))
     return worst
 
 

@@ -10,6 +10,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from athcodec.encoding.quantise import bits
+
 LEAST_RING, LARGEST_RING = 2, 32
 LEAST_RINGS = 4  # of a tube
 FINE = 1e-3  # over a stem's length, of what a period is looked for in
@@ -52,7 +54,7 @@ def _periods(stems: np.ndarray) -> np.ndarray:
 def _cost(steps: np.ndarray, lag: int, unit: np.ndarray) -> np.ndarray:
     residual = steps.copy()
     residual[:, lag:] -= steps[:, :-lag]
-    return np.log2(1 + np.abs(residual) / unit).sum(axis=(1, 2))
+    return bits(np.abs(residual) / unit).sum(axis=(1, 2))
 
 
 def _move_alike(stems: np.ndarray, vertices: np.ndarray, samples: Sequence[np.ndarray], ring: int) -> np.ndarray:

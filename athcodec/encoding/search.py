@@ -643,9 +643,14 @@ class Search:
         return settings.rotation_step_factors, settings.only_tips, settings.forms.tobytes()
 
     def learned_modes(self, plan: Plan, settings: Settings, everywhere: bool = False) -> LearnedModes | None:
-        """Of the pieces that `settings` gives some, or of all, learned from segments spread over the clip."""
+        """Of the pieces that `settings` gives some, or of all, learned."""
         if settings.learned_pieces is None and not everywhere:
             return None
+        seen = self._learn_modes(settings)
+        return learn(plan, seen, settings.step, None if everywhere else settings.learned_pieces)
+
+    def _learn_modes(self, settings: Settings) -> Components:
+        """Of segments spread over the clip, in the steps of the trial that asked first for them."""
         known = self._turning(settings)
         if known not in self._components:
             prelude, count = self.prelude(settings), len(self.source.segments)
@@ -654,7 +659,7 @@ class Search:
                 prelude.plan,
                 (analyse_finely(prelude.plan, settings, self.source.positions(segment)) for segment in some),
             )
-        return learn(plan, self._components[known], settings.step, None if everywhere else settings.learned_pieces)
+        return self._components[known]
 
     def _with_learned_modes(self, settings: Settings) -> Settings:
         """Learned modes for the pieces that take fewer bits with them, if the file as a whole gets shorter."""
@@ -717,9 +722,11 @@ class Search:
         some = {self._prelude_key(settings): settings for settings in candidates}  # by prelude, each to be made once
         with ThreadPoolExecutor(thread_count(self.jobs, self.source)) as pool:
             list(pool.map(self.prelude, some.values()))
-            for settings in candidates:  # one after the other: the first one's step is that of all like it
+            for settings in candidates:  # one after the other: what the first one sees serves all like it
                 if any(settings.learned_bases):
                     self._learn_time(settings)
+                if settings.learned_pieces is not None:
+                    self._learn_modes(settings)
             costs = []
             for cost in pool.map(self.cost, candidates):
                 costs.append(cost)

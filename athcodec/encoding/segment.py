@@ -15,6 +15,7 @@ import numpy as np
 
 from athcodec import container as ct
 from athcodec._native import BRANCH, LOOSE, SHEET, WHOLE, Rounding, address, lib
+from athcodec.algebra import length, multiply
 from athcodec.ath import Ath, Survey
 from athcodec.clip import MotionClip, stands_still
 from athcodec.encoding import quantise as qz
@@ -172,7 +173,7 @@ class Source:
         """Diagonal of the box around all frames and the rest pose: the longest way a vertex can be from its place."""
         low = np.minimum(self.seen.low, self.source_rest.min(axis=0) + self.origin)
         high = np.maximum(self.seen.high, self.source_rest.max(axis=0) + self.origin)
-        return float(np.linalg.norm(high - low))
+        return length(high - low)
 
     def limit(self, bound: float) -> float | np.ndarray:
         """What decoded positions are held to: one for all vertices, or one each, (N,) in file order."""
@@ -562,7 +563,7 @@ def _moments(segment: SegmentMotion, parts: Iterable[np.ndarray]) -> tuple[np.nd
         into = address(rows, np.int32, rows.size), least, address(lower, np.float64, lower.size)
         count += lib.ath_add_moments(len(rows), segment.frames, *into)
     moments, waves = (np.tril(lower) + np.tril(lower, -1).T) / FINER**2, segment.waves_of(segment.streams[0])
-    return np.einsum("ka,kb->ab", waves, np.einsum("kl,lb->kb", moments, waves)), count  # without NumPy's threads
+    return multiply(waves.T, multiply(moments, waves)), count
 
 
 def analyse_finely(plan: Plan, settings: Settings, positions: np.ndarray) -> SegmentMotion:

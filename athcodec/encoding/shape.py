@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from athcodec.clip import MotionClip
+from athcodec.encoding.quantise import half_octaves
 from athcodec.errors import BoundError
 from athcodec.hierarchy import Hierarchy
 from athcodec.units import Length, parse_length
@@ -78,7 +79,7 @@ def finer_than(details: np.ndarray, step: float) -> np.ndarray:
 
 
 def _most(details: np.ndarray) -> np.ndarray:
-    return 2.0 ** ((details - WHOLE_DETAIL) / 2)
+    return half_octaves(details - WHOLE_DETAIL)
 
 
 def rest_steps(branches: np.ndarray, step: float) -> np.ndarray:

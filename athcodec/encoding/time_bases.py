@@ -12,22 +12,15 @@ from functools import cached_property
 import numpy as np
 
 from athcodec._native import address, lib
+from athcodec.algebra import multiply, principal
 from athcodec.encoding import streams
+from athcodec.encoding.quantise import half_octaves
 
 BASIS_BITS = 14  # of stored entries
 BASIS_IN_WAVES = 2  # in the place of their number
 PRECISION = 0.6  # step of a row's integers, over that by which they err as much as those of all tracks in the row
 LEAST_STEP, MOST_STEP = -200, 0  # half octaves
 TOLERANCE = 5e-4  # mean square, in steps, that a basis may leave out
-
-
-def principal(moments: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Eigenvalues, (K, n) in descending order, and eigenvectors, (K, n, n) a row each, of symmetric matrices (K, n, n),
-    which are destroyed. NumPy's own run in threads that go on spinning: they took a third of the time of encoding."""
-    values, vectors = np.empty(moments.shape[:2]), np.empty(moments.shape)
-    arrays = moments, np.empty(moments.shape[1:]), values, vectors
-    lib.ath_principal(*moments.shape[:2], *(address(array, np.float64, 0) for array in arrays))
-    return values, vectors
 
 
 @dataclass(frozen=True)
@@ -115,6 +108,6 @@ class TimeComponents:
     def _in_waves(self, rank: int, precision: float) -> InWaves:
         step = PRECISION * precision / np.sqrt(np.maximum(self._energies[:rank], 1e-30))
         exponents = np.clip(np.floor(2.0 * np.log2(step)), LEAST_STEP, MOST_STEP).astype(np.int32)
-        parts = np.einsum("rt,kt->rk", self._rows[:rank], self._waves)  # without NumPy's threads
-        integers = np.clip(np.rint(parts / np.exp2(exponents[:, None] / 2.0)), -(2**30), 2**30)
+        parts = multiply(self._rows[:rank], self._waves.T)
+        integers = np.clip(np.rint(parts / half_octaves(exponents)[:, None]), -(2**30), 2**30)
         return InWaves(self._waves, exponents, integers.astype(np.int32))

@@ -6,7 +6,7 @@ Positions alone are measured.
 
 from __future__ import annotations
 
-from math import inf, sqrt
+from math import frexp, inf, sqrt
 
 import numpy as np
 
@@ -65,18 +65,20 @@ class ErrorMeter:
             self._add(*pair)
 
     def _add(self, reference: np.ndarray, decoded: np.ndarray) -> None:
-        square = ((reference - decoded) ** 2).sum(axis=2)
+        difference = reference - decoded
+        scale = _scale(difference)
+        square = ((difference / scale) ** 2).sum(axis=2)
         square[np.isnan(square)] = inf
         frame, vertex = np.unravel_index(square.argmax(), square.shape)
-        if sqrt(square[frame, vertex]) > self.max_error:
-            self.max_error = sqrt(square[frame, vertex])
+        largest = weighted = scale * sqrt(square[frame, vertex])
+        if largest > self.max_error:
+            self.max_error = largest
             self.worst_frame = self.frame_count + int(frame)
             self.worst_vertex = int(vertex)
-        weighted = sqrt(square[frame, vertex])
         if self._weights is not None:
-            weighted = float(np.sqrt(square.max(axis=0) / self._weights**2).max())
+            weighted = scale * float(np.sqrt(square.max(axis=0) / self._weights**2).max())
         self.max_weighted_error = max(self.max_weighted_error, weighted)
-        self._error_square += float(square.sum())
+        self._error_square += scale * scale * float(square.sum())
         self._spread_square += float(((reference - reference.mean(axis=1, keepdims=True)) ** 2).sum())
         if self._rest is not None:
             self._motion_square += float(((reference - self._rest) ** 2).sum())
@@ -134,6 +136,12 @@ def compare_clips(reference: MotionClip, decoded: MotionClip) -> ErrorMeter:
 def bits_per_vertex_frame(byte_count: int, frame_count: int, vertex_count: int) -> float:
     """Size in bits per vertex and frame."""
     return 8.0 * byte_count / (frame_count * vertex_count)
+
+
+def _scale(values: np.ndarray) -> float:
+    """A power of two of about the largest magnitude, over which squares neither vanish nor overflow."""
+    largest = float(np.abs(values).max(initial=0.0))
+    return 2.0 ** min(max(frexp(largest)[1], -1021), 1023) if 0.0 < largest < inf else 1.0
 
 
 def _ratio(error_square: float, reference_square: float) -> float:

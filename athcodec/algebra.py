@@ -1,0 +1,79 @@
+"""Linear algebra of the encoder in the C core, whose sums have one order.
+
+NumPy's own (`@`, numpy.linalg) runs in BLAS and LAPACK, which give other bits with other processors and numbers of
+threads, and einsum with other instruction sets: what decides which bytes a file holds goes through these functions, so
+that a clip makes the same file everywhere."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from athcodec._native import address, lib
+
+
+def multiply(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """a @ b, of stacks of matrices, in float64."""
+    batch = np.broadcast_shapes(a.shape[:-2], b.shape[:-2])
+    (rows, inner), columns = a.shape[-2:], b.shape[-1]
+    if b.shape[-2] != inner:
+        raise ValueError(f"multiply: got {a.shape} and {b.shape}, expected as many columns as rows")
+    out = np.empty((*batch, rows, columns))
+    (of_a, a_step), (of_b, b_step) = _stack(a, batch), _stack(b, batch)
+    lib.ath_multiply(
+        math.prod(batch),
+        rows,
+        inner,
+        columns,
+        address(of_a, np.float64, 0),
+        a_step,
+        address(of_b, np.float64, 0),
+        b_step,
+        address(out, np.float64, 0),
+    )
+    return out
+
+
+def _stack(matrices: np.ndarray, batch: tuple[int, ...]) -> tuple[np.ndarray, int]:
+    """The matrices of a stack behind each other, and numbers from one to the next: none where all are the same."""
+    size = math.prod(matrices.shape[-2:])
+    if matrices.size == size:
+        return np.ascontiguousarray(matrices, np.float64), 0
+    return np.ascontiguousarray(np.broadcast_to(matrices, (*batch, *matrices.shape[-2:])), np.float64), size
+
+
+def decompose(matrices: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Singular value decomposition of (..., 3, 3), as numpy.linalg.svd gives it."""
+    matrices = np.ascontiguousarray(matrices, np.float64)
+    left, stretch, right = np.empty(matrices.shape), np.empty(matrices.shape[:-1]), np.empty(matrices.shape)
+    arrays = (address(array, np.float64, 0) for array in (matrices, left, stretch, right))
+    lib.ath_decompose(matrices.size // 9, *arrays)
+    return left, stretch, right
+
+
+def determinant(matrices: np.ndarray) -> np.ndarray:
+    """Of (..., 3, 3)."""
+    across = np.cross(matrices[..., 1, :], matrices[..., 2, :])
+    return (matrices[..., 0, :] * across).sum(axis=-1)
+
+
+def principal(moments: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Eigenvalues, (K, n) in descending order, and eigenvectors, (K, n, n) a row each, of symmetric matrices (K, n, n),
+    which are destroyed."""
+    values, vectors = np.empty(moments.shape[:2]), np.empty(moments.shape)
+    arrays = moments, np.empty(moments.shape[1:]), values, vectors
+    lib.ath_principal(*moments.shape[:2], *(address(array, np.float64, 0) for array in arrays))
+    return values, vectors
+
+
+def solve(matrix: np.ndarray, rows: np.ndarray) -> np.ndarray:
+    """What a positive definite matrix, (n, n), takes to the rows, (n, m)."""
+    out, scratch = np.array(rows, np.float64, order="C"), np.array(matrix, np.float64, order="C")
+    lib.ath_solve(*out.shape, address(scratch, np.float64, 0), address(out, np.float64, 0))
+    return out
+
+
+def length(vector: np.ndarray) -> float:
+    """Of one vector; numpy.linalg.norm asks BLAS for it unless it is told the axis."""
+    return float(np.linalg.norm(vector, axis=0))
