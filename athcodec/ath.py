@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from athcodec._native import address, lib
+from athcodec.algebra import decompose, determinant, length, multiply, principal
 from athcodec.hierarchy import Hierarchy, hierarchy_of
 from athcodec.threads import SERIAL, ThreadPool
 
@@ -250,7 +251,7 @@ class Ath:
         residuals = []
         for frames in self._frames(positions):
             inverse, offset = pieces.fit(frames).inverse_maps()
-            moved = np.moveaxis(frames[:, :, vertices], 0, 2) @ np.swapaxes(inverse[:, last], 1, 2)
+            moved = multiply(np.moveaxis(frames[:, :, vertices], 0, 2), np.swapaxes(inverse[:, last], 1, 2))
             residuals.append(moved + offset[:, last, None] + pieces.origin)
         return np.concatenate(residuals)
 
@@ -354,7 +355,7 @@ class Ath:
         parent = np.concatenate([parent, divided])
         pieces = _Pieces(hierarchy, self.rest, first_branch, stop_branch, parent, node_depth)
         shown = np.setdiff1d(np.arange(len(first_branch)), divided)
-        shown = shown[np.argsort(first_branch[shown])]
+        shown = shown[np.argsort(first_branch[shown], kind="stable")]
         return pieces, shown, shown >= len(nodes)
 
 
@@ -410,7 +411,7 @@ class Survey:
     @property
     def diagonal(self) -> float:
         """Length of the bounding box's diagonal over all frames, in scene units."""
-        return float(np.linalg.norm(self.high - self.low))
+        return length(self.high - self.low)
 
     def ath(self, thresholds: Thresholds) -> Ath:
         """The ATH for some thresholds (section 3), without reading the clip again.
@@ -813,16 +814,16 @@ class _Pieces:
             products = np.add.reduceat(points[:, None] * points, _starts(counts), axis=2)
             covariance[some] = (products / counts).transpose(2, 0, 1)
             self.centroid[some] = centroid.T
-        variance, axes = np.linalg.eigh(covariance)
-        variance, self.axes = variance[:, ::-1], np.ascontiguousarray(axes[:, :, ::-1])
+        variance, axes = principal(covariance)
+        self.axes = np.ascontiguousarray(np.swapaxes(axes, 1, 2))
         # Right-handed axes, so that completing a flat piece never mirrors it.
-        self.axes[:, :, 2] *= np.sign(np.linalg.det(self.axes))[:, None]
+        self.axes[:, :, 2] *= np.sign(determinant(self.axes))[:, None]
         extent = np.sqrt(np.maximum(variance, 0.0))
         smallest = max(_POINT_EXTENT * np.ptp(self.rest, axis=1).max(), _SMALLEST_EXTENT)
         present = (extent > RANK_TOLERANCE * extent[:, :1]) & (extent[:, :1] > smallest)
         self.rank = present.sum(axis=1)
         inverse_variance = np.divide(1.0, variance, out=np.zeros_like(variance), where=present)
-        self.pseudo_inverse = (self.axes * inverse_variance[:, None]) @ np.swapaxes(self.axes, 1, 2)
+        self.pseudo_inverse = multiply(self.axes * inverse_variance[:, None], np.swapaxes(self.axes, 1, 2))
 
 
 class _Fit:
@@ -837,7 +838,7 @@ class _Fit:
         self.centroid = sums[..., 3] / pieces.counts[:, None]
         covariance = sums[..., :3] / pieces.counts[:, None, None]
         covariance -= self.centroid[..., None] * pieces.centroid[:, None]
-        self.linear = covariance @ pieces.pseudo_inverse
+        self.linear = multiply(covariance, pieces.pseudo_inverse)
         self.inverse = np.empty_like(self.linear)
         rotation = np.broadcast_to(np.eye(3), (len(self.linear), len(pieces.first) + 1, 3, 3)).copy()
         for some in pieces.levels:
@@ -868,34 +869,34 @@ class _Fit:
         flat, straight, points = some[rank == 2], some[rank == 1], some[rank == 0]
         if len(flat):
             axes = pieces.axes[flat]
-            images = self.linear[:, flat] @ axes[:, :, :2]
+            images = multiply(self.linear[:, flat], axes[:, :, :2])
             normal = _unit(np.cross(images[..., 0], images[..., 1]))
             self.linear[:, flat] += normal[..., None] * axes[:, None, :, 2]
         if len(straight):
             axis = pieces.axes[straight][:, :, 0]
-            image = _unit((self.linear[:, straight] @ axis[..., None])[..., 0])
+            image = _unit(multiply(self.linear[:, straight], axis[..., None])[..., 0])
             inherited = rotation[:, pieces.parent[straight]]
-            turn = _least_rotation((inherited @ axis[..., None])[..., 0], image)
+            turn = _least_rotation(multiply(inherited, axis[..., None])[..., 0], image)
             across = np.eye(3) - axis[:, :, None] * axis[:, None]
-            self.linear[:, straight] += turn @ inherited @ across
+            self.linear[:, straight] += multiply(multiply(turn, inherited), across)
         self.linear[:, points] = rotation[:, pieces.parent[points]]
 
     def matrices(self) -> np.ndarray:
         """(k,n,3,4) from rest positions to positions of each frame, in the scene's coordinates."""
         pieces = self.pieces
         base = (pieces.centroid + pieces.origin)[..., None]
-        offset = self.centroid + pieces.origin - (self.linear @ base)[..., 0]
+        offset = self.centroid + pieces.origin - multiply(self.linear, base)[..., 0]
         return np.concatenate([self.linear, offset[..., None]], axis=3)
 
     def inverse_maps(self) -> tuple[np.ndarray, np.ndarray]:
         """(k,n,3,3) and (k,n,3): x goes to its residual as inverse x + offset, both seen from the origin."""
-        offset = self.pieces.centroid - (self.inverse @ self.centroid[..., None])[..., 0]
+        offset = self.pieces.centroid - multiply(self.inverse, self.centroid[..., None])[..., 0]
         return self.inverse, offset
 
     def apply(self, some: np.ndarray, vertices: np.ndarray, counts: np.ndarray) -> np.ndarray:
         """Where some pieces' maps put vertices, counts[i] of them by piece some[i]: (3,k,sum of counts)."""
         linear = self.linear[:, some]
-        offset = self.centroid[:, some] - (linear @ self.pieces.centroid[some][..., None])[..., 0]
+        offset = self.centroid[:, some] - multiply(linear, self.pieces.centroid[some][..., None])[..., 0]
         return _map_points(linear, offset, self.pieces.rest[:, None, vertices], counts)
 
     def differences(self, xi: float) -> _Differences:
@@ -951,19 +952,19 @@ def _invertible(linear: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _stretched(linear: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    left, stretch, right = np.linalg.svd(linear)
+    left, stretch, right = decompose(linear)
     least = MIN_STRETCH * np.clip(stretch[:, 0], _LEAST_SCALE, 1.0)
     # Which side a flattened subtree shows is noise: it is not turned inside out.
-    mirrored = (np.linalg.det(left) * np.linalg.det(right) < 0) & (stretch[:, 2] < least)
+    mirrored = (determinant(left) * determinant(right) < 0) & (stretch[:, 2] < least)
     left[mirrored, :, 2] *= -1.0
     stretch = np.maximum(stretch, least[:, None])[:, None]
-    return (left * stretch) @ right, (np.swapaxes(right, 1, 2) / stretch) @ np.swapaxes(left, 1, 2)
+    return multiply(left * stretch, right), multiply(np.swapaxes(right, 1, 2) / stretch, np.swapaxes(left, 1, 2))
 
 
 def _nearest_rotation(linear: np.ndarray) -> np.ndarray:
-    left, _, right = np.linalg.svd(linear)
-    left[..., 2] *= np.sign(np.linalg.det(left) * np.linalg.det(right))[..., None]
-    return left @ right
+    left, _, right = decompose(linear)
+    left[..., 2] *= np.sign(determinant(left) * determinant(right))[..., None]
+    return multiply(left, right)
 
 
 def _least_rotation(start: np.ndarray, goal: np.ndarray) -> np.ndarray:
@@ -974,7 +975,7 @@ def _least_rotation(start: np.ndarray, goal: np.ndarray) -> np.ndarray:
     turn[..., 0, 1], turn[..., 0, 2], turn[..., 1, 2] = -axis[..., 2], axis[..., 1], -axis[..., 0]
     turn -= np.swapaxes(turn, -1, -2)
     # Opposite vectors have no least rotation: they stay as they are.
-    return np.eye(3) + turn + turn @ turn / np.maximum(1.0 + cosine, 1e-9)[..., None, None]
+    return np.eye(3) + turn + multiply(turn, turn) / np.maximum(1.0 + cosine, 1e-9)[..., None, None]
 
 
 def _unit(vectors: np.ndarray) -> np.ndarray:

@@ -25,7 +25,7 @@ from athcodec.clip import ClipRange
 from athcodec.errors import BadChunk, ClipError, FormatError, LimitExceeded
 
 MAGIC = b"\x89ATH\r\n\x1a\n"
-MAJOR, MINOR = 0, 12
+MAJOR, MINOR, FEATURES = 1, 0, 0
 NO_LEVEL = 255
 NODE_WAVES = 1
 ONLY_TIPS = 8  # of Rotation
@@ -56,7 +56,7 @@ KIND_NAMES = {
     ATTRIBUTE: "ATTRIBUTE",
 }
 
-_HEADER = struct.Struct("<8sHHIII")
+_HEADER = struct.Struct("<8sBBHIII")
 _CHECKSUM = struct.Struct("<I")
 _FRONT_BYTES, _FRONT_BYTES_OF_EACH, _FRONT_BYTES_OF_FRAME = 512, 128, 2
 """Space for the front stream, of each chunk, each entry of the error table and each frame too: more than it ever takes.
@@ -162,9 +162,9 @@ def pack_front(header: Header, chunks: list[Chunk], errors: np.ndarray) -> bytes
     checksums = b"".join(_CHECKSUM.pack(chunk.checksum) for chunk in chunks)
     length = _HEADER.size + len(stream) + len(checksums)
     header.file_length = length + sum(chunk.length for chunk in chunks)
-    blank = _HEADER.pack(MAGIC, MAJOR, MINOR, 0, length, len(chunks))
+    blank = _HEADER.pack(MAGIC, MAJOR, MINOR, FEATURES, 0, length, len(chunks))
     checksum = crc32c(blank + stream + checksums)
-    return _HEADER.pack(MAGIC, MAJOR, MINOR, checksum, length, len(chunks)) + stream + checksums
+    return _HEADER.pack(MAGIC, MAJOR, MINOR, FEATURES, checksum, length, len(chunks)) + stream + checksums
 
 
 def _front_stream(header: Header, chunks: list[Chunk], errors: np.ndarray) -> bytes:

@@ -114,6 +114,12 @@ class WrongHostMesh(FormatError):
     code, name = 13, "WRONG_HOST_MESH"
 
 
+class UnsupportedFeature(FormatError):
+    """The file needs something of a later version of the format that this one does not have."""
+
+    code, name = 14, "UNSUPPORTED_FEATURE"
+
+
 class LevelUnavailable(AthError, LookupError):
     """A level or frame was asked for that the file, or what is there of it, does not hold."""
 

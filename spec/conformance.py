@@ -61,14 +61,27 @@ ERRORS = (
     "TRAILING_BYTES",
     "NEEDS_HOST_MESH",
     "WRONG_HOST_MESH",
+    "UNSUPPORTED_FEATURE",
 )
+RELEASED = {  # lines of expected.txt when a version of the format was released, and their SHA-256
+    "1.0": (907, "7837ab17a683691209e27a84e737bb55c35c7a229ce6df0c3e955fce25cbf556")
+}
 NO_ANSWER = ("strict", "open")
 SECONDS = 120
 LISTING = """\
-Vectors of the .ath format. A line is: the file, the CRC-32C of its bytes, ITEM=RESULT for each item that
-conformance.py describes, then # and the reason. RESULT is ok, the name of an error, or the CRC-32C of the
-answer, in which every NaN is the quiet one (0x7fc00000 or 0x7ff8000000000000). Lines and files are only ever
-added.
+Vectors of the .ath format. A line is: the file, the CRC-32C of its bytes, ITEM=RESULT for each item, then # and the
+reason. RESULT is ok, the name of an error, or the CRC-32C (FORMAT.md, "Checksums") of these bytes, little-endian,
+one after the other and nothing between them:
+0, 1, ...  the positions of that level: for each frame of all clips, in their order, repeats included, for each vertex
+           in source order x, y, z: binary64 where Is_Float64 is set, else binary32; every NaN is the quiet one
+           (0x7fc00000 or 0x7ff8000000000000)
+rest       the rest pose, as the reference pose of level 0 gives it: for each vertex in source order x, y, z of
+           Rest_Type
+time       the time of each frame of all clips, binary64
+clips      the entries of CLIPS, Periodic left at 0; the one that there would be where there is no CLIPS
+static     Text of METADATA, then the elements of FACES, of EDGES (derived ones as if stored), of face_vertex_counts and
+           face_vertex_indices, and of each ATTRIBUTE in file order, unshuffled, in the byte order of their types
+Lines and files are only ever added.
 """
 
 

@@ -1,7 +1,6 @@
 """The source of the vectors: every file of spec/vectors, with the rule that it tests.
 
     python -m spec.make_vectors            adds missing vectors and their lines in expected.txt
-    python -m spec.make_vectors --all      makes all again, for a changed format: while the major version is 0
 
 All but the last few valid ones are scripts (scripted.py), which do not need athcodec and always give the same bytes.
 The expected error of a vector is stated here; expected.txt gets the results of the reference decoder if they agree with
@@ -1364,6 +1363,12 @@ valid(
     lambda: fork().add(Entry(0x8009, FUTURE, checksum=0), Entry(0x8064, FUTURE, checksum=0)),
 )
 
+valid(
+    "minor-later",
+    "a later minor version, whose optional kinds are not known",
+    lambda: fork().with_header(minor=255).add(Entry(0x8009, FUTURE), Entry(0x8018, FUTURE, 0, 1)),
+)
+
 # ---- zstd frames and static data ---------------------------------------------------------------------------
 
 
@@ -2204,11 +2209,30 @@ invalid(
     "ends inside the checksums",
     lambda: first_bytes(rd.u32(lone().file(), 16) - 1),
 )
-header("major-1", "UNSUPPORTED_VERSION", "Major_Version 1, which is to come", major=1)
+header("major-0", "UNSUPPORTED_VERSION", "Major_Version 0: versions before the first", major=0)
+header("major-2", "UNSUPPORTED_VERSION", "Major_Version 2, which is to come", major=2)
+header("feature-first", "UNSUPPORTED_FEATURE", "the lowest bit of Features is set", features=1)
 header(
-    "minor-less", "UNSUPPORTED_VERSION", "Minor_Version less by 1, while Major_Version is 0", minor=rd.VERSION[1] - 1
+    "feature-last",
+    "UNSUPPORTED_FEATURE",
+    "the highest bit of Features is set, in a later minor version",
+    minor=9,
+    features=1 << 15,
 )
-header("minor-more", "UNSUPPORTED_VERSION", "Minor_Version more by 1", minor=rd.VERSION[1] + 1)
+header(
+    "feature-and-version",
+    "UNSUPPORTED_VERSION",
+    "what Features means is for the major version to say",
+    major=2,
+    features=1,
+)
+invalid(
+    "cut-behind-features",
+    "UNSUPPORTED_FEATURE",
+    "open",
+    "12 bytes are enough to refuse a feature",
+    lambda: first_bytes(12, b"\1\0\0\1"),
+)
 header("vertices-limit", "LIMIT_EXCEEDED", "Vertex_Count 2^26 + 1", vertex_count=(1 << 26) + 1)
 header(
     "branches-limit", "LIMIT_EXCEEDED", "Branch_Count 2^20 + 1, more than vertices as well", branch_count=(1 << 20) + 1
@@ -2754,6 +2778,13 @@ invalid(
     lambda: cut(lambda d: end_of(d, rd.AFFINES, 0, 1)),
 )
 invalid("cut-in-last-level", "TRUNCATED", 2, "the last byte is missing", lambda: cut(lambda d: len(d.file()) - 1))
+invalid(
+    "cut-behind-damage",
+    "TRUNCATED",
+    1,
+    "STEMS of level 1 is damaged and SHAPES is missing: what is missing comes first",
+    lambda: flipped(cut(lambda d: end_of(d, rd.SHAPES, 1) - 1), end_of(fork(), rd.STEMS, 1) - 1),
+)
 invalid(
     "cut-in-source-rest",
     "TRUNCATED",
@@ -4293,12 +4324,12 @@ def line_of(vector: Vector, data: bytes) -> str:
     return conformance.format_line(vector.path, data, found, vector.reason)
 
 
-def make(every: bool = False, folder: Path = conformance.FOLDER) -> int:
-    """Writes missing vectors, or all; returns their number."""
+def make(folder: Path = conformance.FOLDER) -> int:
+    """Writes missing vectors; returns their number."""
     for name in ("valid", "invalid"):
         (folder / name).mkdir(parents=True, exist_ok=True)
     listed = folder / "expected.txt"
-    lines = [] if every or not listed.exists() else [line for line in listed.read_text("utf-8").splitlines() if line]
+    lines = listed.read_text("utf-8").splitlines() if listed.exists() else []
     existing = {line.split()[0] for line in lines if not line.startswith("#")}
     made = 0
     for vector in VECTORS:
@@ -4317,9 +4348,8 @@ def make(every: bool = False, folder: Path = conformance.FOLDER) -> int:
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(prog="python -m spec.make_vectors", description="Makes missing vectors.")
-    parser.add_argument("--all", action="store_true", help="make all again")
-    print(f"{make(parser.parse_args().all)} vectors made, {len(VECTORS)} in all")
+    argparse.ArgumentParser(prog="python -m spec.make_vectors", description="Makes missing vectors.").parse_args()
+    print(f"{make()} vectors made, {len(VECTORS)} in all")
     return 0
 
 

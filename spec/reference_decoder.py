@@ -73,7 +73,7 @@ def _crc_table() -> list[int]:
     table = []
     for byte in range(256):
         for _ in range(8):
-            byte = byte >> 1 ^ (0x82F63B78 if byte & 1 else 0)
+            byte = (byte >> 1) ^ (0x82F63B78 if byte & 1 else 0)
         table.append(byte)
     return table
 
@@ -85,14 +85,14 @@ def crc32c(data: bytes) -> int:
     """FORMAT.md, "Checksums"; a byte at a time instead of a bit at a time."""
     crc = 0xFFFFFFFF
     for byte in data:
-        crc = crc >> 8 ^ CRC_TABLE[(crc ^ byte) & 255]
+        crc = (crc >> 8) ^ CRC_TABLE[(crc ^ byte) & 255]
     return crc ^ 0xFFFFFFFF
 
 
 # ---- the front: header and chunks ----------------------------------------------------------------------
 
 MAGIC = b"\x89ATH\r\n\x1a\n"
-VERSION = (0, 12)
+VERSION, KNOWN_FEATURES = (1, 0), 0x0000
 HEADER_BYTES, CHECKSUM_BYTES, TABLE_BYTES_OF_EACH = 24, 4, 16
 SEGMENT_FRAMES, MOST_LEVELS, MOST_LAYERS, MOST_CLIPS, NO_LEVEL = 256, 32, 8, 255, 255
 
@@ -162,7 +162,7 @@ class Chunk:
 
     @property
     def repeatable(self) -> bool:
-        return bool(self.kind & OPTIONAL) and self.kind & ~OPTIONAL >= 32
+        return bool(self.kind & OPTIONAL) and (self.kind & ~OPTIONAL) >= 32
 
     def __str__(self) -> str:
         name = KINDS.get(self.kind, f"kind {self.kind:#06x}")
@@ -173,7 +173,7 @@ def check_kind(kind: int) -> None:
     """Kinds that are not known are skipped where they are optional and their number is not that of a known
     one."""
     taken = {known & ~OPTIONAL for known in KINDS}
-    skipped = kind & OPTIONAL and kind & ~OPTIONAL not in taken
+    skipped = (kind & OPTIONAL) and (kind & ~OPTIONAL) not in taken
     require(kind in KINDS or bool(skipped), f"kind {kind:#06x} is not known", "UNKNOWN_CHUNK")
 
 
@@ -200,7 +200,7 @@ class Clip:
         """What CLIPS says of it."""
         name, seams = self.name.encode("utf-8"), self.seams or ()
         head = struct.pack(
-            "<IIBB", self.frames, self.segments, (self.seams is not None) | self.periodic << 1, len(name)
+            "<IIBB", self.frames, self.segments, (self.seams is not None) | (self.periodic << 1), len(name)
         )
         return head + name + struct.pack(f"<{len(seams)}f", *seams)
 
@@ -274,7 +274,7 @@ class RangeDecoder:
         """Four bytes, big-endian; those behind the end are 0."""
         four = self.stream[self.at : self.at + 4]
         self.at += 4
-        return int.from_bytes(four, "big") << 8 * (4 - len(four))
+        return int.from_bytes(four, "big") << (8 * (4 - len(four)))
 
     def narrow(self, bound: int) -> int:
         if self.code < bound:
@@ -283,18 +283,18 @@ class RangeDecoder:
             self.code -= bound
             self.range -= bound
             bit = 0
-        if self.range < 1 << 32:
+        if self.range < (1 << 32):
             self.range <<= 32
-            self.code = (self.code << 32 | self.word()) & MASK
+            self.code = ((self.code << 32) | self.word()) & MASK
         return bit
 
     def bit(self, context: Context) -> int:
         one = context.one
         bit = self.narrow((self.range >> 16) * one)
         if bit:
-            one += (65536 - one) * RATES[context.seen] >> 16
+            one += ((65536 - one) * RATES[context.seen]) >> 16
         else:
-            one -= one * RATES[context.seen] >> 16
+            one -= (one * RATES[context.seen]) >> 16
         context.one = LEAST if one < LEAST else MOST if one > MOST else one
         if context.seen < SLOWEST:
             context.seen += 1
@@ -324,7 +324,7 @@ def number_class(expected: int) -> int:
     length = expected.bit_length()
     if length < 2:
         return length
-    return min(2 * length - 2 + (expected >> length - 2 & 1), CLASSES - 1)
+    return min(2 * length - 2 + ((expected >> (length - 2)) & 1), CLASSES - 1)
 
 
 class Contexts(dict):
@@ -342,12 +342,12 @@ class Contexts(dict):
 @cache
 def size_starts(c: int) -> list[int]:
     """Probabilities of one more bit of length, for class c."""
-    mean = 2 * c + 1 if c < 2 else 5 + 2 * (c & 1) << c // 2 - 1
+    mean = 2 * c + 1 if c < 2 else (5 + 2 * (c & 1)) << (c // 2 - 1)
     more = (mean << 16) // (mean + 32)
     starts = [more]
     for _ in range(LONGEST - 1):
         starts.append(more)
-        more = more * more >> 16
+        more = (more * more) >> 16
     return starts
 
 
@@ -379,7 +379,7 @@ def code_mantissa(coder: RangeDecoder, contexts: Contexts, length: int) -> int:
             bit = coder.bit(contexts[length][0 if taken == 0 else 1 + (value & 1)])
         else:
             bit = coder.raw_bit()
-        value = value << 1 | bit
+        value = (value << 1) | bit
     return value
 
 
@@ -473,8 +473,9 @@ def check_magic(data: bytes) -> None:
         "NOT_AN_ATH_FILE",
     )
     if len(data) >= 12:
-        version = u16(data, 8), u16(data, 10)
-        require(version == VERSION, f"version {version} is not known", "UNSUPPORTED_VERSION")
+        require(data[8] == VERSION[0], f"version {data[8]}.{data[9]} is not known", "UNSUPPORTED_VERSION")
+        features = u16(data, 10)
+        require(features & ~KNOWN_FEATURES == 0, f"features {features:#06x} are not all known", "UNSUPPORTED_FEATURE")
 
 
 def check_lengths(data: bytes, limits: Limits) -> tuple[int, int]:
@@ -493,7 +494,7 @@ def check_lengths(data: bytes, limits: Limits) -> tuple[int, int]:
 def raw_bits(coder: RangeDecoder, count: int) -> int:
     value = 0
     for _ in range(count):
-        value = value << 1 | coder.raw_bit()
+        value = (value << 1) | coder.raw_bit()
     return value
 
 
@@ -563,8 +564,8 @@ class ChunkModel:
     def code_kind(self, coder: RangeDecoder) -> tuple[int, int]:
         """Its number in the list, and the Kind."""
         node = 1
-        while node < 1 << KIND_BITS:
-            node = node << 1 | coder.bit(self.kinds[self.before][node])
+        while node < (1 << KIND_BITS):
+            node = (node << 1) | coder.bit(self.kinds[self.before][node])
         index = min(node - (1 << KIND_BITS), OTHER)
         return index, KIND_LIST[index] if index < OTHER else raw_bits(coder, 16)
 
@@ -589,7 +590,7 @@ def decode_chunk_table(coder: RangeDecoder, header: Header, checksums: list[int]
     model, chunks, offset = ChunkModel(), [], header.front_length
     for checksum in checksums:
         index, kind = model.code_kind(coder)
-        motion = 16 <= kind & ~OPTIONAL < 32
+        motion = 16 <= (kind & ~OPTIONAL) < 32
         if motion:
             model.code_place(coder, index, header.segment_count)
         length = model.code_length(coder, index)
@@ -738,7 +739,7 @@ def decode_hierarchy(stream: bytes, branch_count: int, vertex_count: int):
     for branch, detail in zip(branches, decode_of_branches(coder, branches, 255)):
         branch.detail = detail
     for branch, ring in zip(branches, decode_of_branches(coder, branches, 32)):
-        require(ring == 0 or (ring > 1 and branch.flags & SHEET), "a Ring of 1, or of a branch that is no SHEET")
+        require(ring == 0 or (ring > 1 and (branch.flags & SHEET)), "a Ring of 1, or of a branch that is no SHEET")
         branch.ring = ring
     branch_source = decode_numbers(coder, [(0, branch_count)], branch_count)
     stem_start, start = [0] * branch_count, 0  # in a source that is sorted by branch
@@ -771,10 +772,10 @@ def decode_branches(coder: RangeDecoder, branch_count: int, vertex_count: int) -
         mean_count[c] += divide_to_zero(min(more, 1 << 16) * 16 - mean_count[c], 4)
         before, flags = flags, 0
         for i in range(3):
-            flags |= coder.bit(flag_contexts[i][before >> i & 1]) << i
+            flags |= coder.bit(flag_contexts[i][(before >> i) & 1]) << i
         lag += code_signed(coder, lags, 0)
         require(0 <= lag <= 65535, "a Lag is out of range")
-        require(parent >= 0 or not flags & LOOSE, "a root is LOOSE")
+        require(parent >= 0 or not (flags & LOOSE), "a root is LOOSE")
         branches.append(Branch(parent, depth, vertex_count - left, more + 1, flags, lag))
         left -= more + 1
     require(left == 0, "stems have fewer vertices than the file")
@@ -789,7 +790,7 @@ def decode_attaches(coder: RangeDecoder, branches: list[Branch]) -> None:
         parent = branches[branch.parent]
         step = code_signed(coder, attaches, mean)
         place = parent.last_place + step
-        require(abs(step) <= 1 << 28 and 0 <= place < parent.count, "an attach vertex is not on the parent's stem")
+        require(abs(step) <= (1 << 28) and 0 <= place < parent.count, "an attach vertex is not on the parent's stem")
         branch.attach = parent.first + place
         parent.last_place = place
         mean = mean - (mean + 3) // 4 + clipped(step) * 4
@@ -989,7 +990,8 @@ def predict_rest(branch: Branch, rest: list, i: int) -> list[float]:
             return rest[branch.first + j]
         return rest[branch.attach] if branch.attach >= 0 else None
 
-    before, lag = on_stem(i - 1) or [0.0, 0.0, 0.0], max(branch.lag, 1)
+    before, lag = on_stem(i - 1), max(branch.lag, 1)
+    before = [0.0, 0.0, 0.0] if before is None else before
     if i < lag or on_stem(i - lag - 1) is None:
         return before
     start, end = on_stem(i - lag - 1), on_stem(i - lag)
@@ -1080,10 +1082,10 @@ def rest_terms(
 
     origin = [0.0] * 3
     row = on_stem(i - lag) if i >= lag > 1 else None
-    base = on_stem(i - 1) or origin
+    base = origin if on_stem(i - 1) is None else on_stem(i - 1)
     terms = [way(on_stem(i - j - 2), on_stem(i - j - 1)) for j in range(3)]
     terms.append(way(on_stem(i - lag - 1), row) if i >= lag else last_offset)
-    terms.append(way(row, on_stem(i - lag + 1) if row else None))
+    terms.append(way(row, on_stem(i - lag + 1) if row is not None else None))
     terms.append(way(base, row))
     terms.append(way(on_stem(i - 2 * lag) if i >= 2 * lag else None, row))
     terms.append(way(base, origin))
@@ -1417,7 +1419,7 @@ def decode_part(
     branch = branches[b]
     kind, like = min(branch.count, 16) - 1, [s for s in copies.shapes if branches[s.branch].count == branch.count]
     role = copies.roles[kind]
-    if like and coder.bit(copies.copied[role]):
+    if len(like) > 0 and coder.bit(copies.copied[role]):
         copies.roles[kind] = 2
         rank = code_unsigned(coder, copies.rank, copies.mean_rank)
         require(rank < len(like), "a copy is of no shape")
@@ -1441,7 +1443,7 @@ def decode_copy(
     bent, matrix = decode_copy_place(coder, copies, shape, lever_of(points), unit)
     attach = rest[branch.attach] if branch.attach >= 0 else None
     from_attach = rest[stem.attach] if stem.attach >= 0 and attach is not None else points[0]
-    base, own = attach or [0.0] * 3, 0.5 * unit
+    base, own = [0.0] * 3 if attach is None else attach, 0.5 * unit
     guesses = [[0.0] * 3, copies.increment, way_in_copy(matrix, from_attach, points[0])]
     guesses = [[x * (1.0 / own) for x in guess] for guess in guesses]
     placed = [decode_copy_vertex(coder, copies, copies.first, base, guesses, own)]
@@ -1497,7 +1499,7 @@ def decode_copy_number(coder: RangeDecoder, model: NumberModel, mean: list[int],
     """About 0 or the last one, whichever has been nearer."""
     repeated = 1 if mean[1] < mean[0] else 0
     number = (last if repeated else 0) + code_signed(coder, model, mean[repeated])
-    require(-(1 << 29) < number < 1 << 29, "a number of a copy is out of range")
+    require(-(1 << 29) < number < (1 << 29), "a number of a copy is out of range")
     for i in range(2):
         magnitude = clipped(number - last if i else number)
         mean[i] = mean[i] - (mean[i] + 7) // 8 + magnitude * 2
@@ -1624,7 +1626,7 @@ def from_bits(bits: int, n: int) -> float:
 
 def ordered(bits: int, n: int) -> int:
     """Bits of a number as an integer that ascends with the numbers."""
-    return (1 << n) - 1 - bits if bits >> n - 1 else bits + (1 << n - 1)
+    return (1 << n) - 1 - bits if bits >> (n - 1) else bits + (1 << (n - 1))
 
 
 def code_exact(coder: RangeDecoder, model: ExactModel, n: int, expected: float, before: int):
@@ -1637,8 +1639,8 @@ def code_exact(coder: RangeDecoder, model: ExactModel, n: int, expected: float, 
         length += 1
     if length > 0:
         magnitude = code_mantissa(coder, model.mantissa, length)
-        at = at + (-magnitude if coder.raw_bit() else magnitude) & (1 << n) - 1
-    number = from_bits(at - (1 << n - 1) if at >> n - 1 else (1 << n) - 1 - at, n)
+        at = (at + (-magnitude if coder.raw_bit() else magnitude)) & ((1 << n) - 1)
+    number = from_bits(at - (1 << (n - 1)) if at >> (n - 1) else (1 << n) - 1 - at, n)
     require(finite(number), "a number is infinite or NaN")
     return number, length
 
@@ -1693,8 +1695,8 @@ def frame_times(chunk: bytes, clips: list[Clip]) -> list[list[float]]:
     require(len(chunk) > 0 and chunk[0] <= 4, "TIME has an unknown Method")
     times = uneven_times(chunk, clips) if chunk[0] == 2 else steady_times(chunk, clips)
     for own in times:
-        ascending = all(a < b for a, b in zip(own, own[1:]))
-        require(ascending and all(map(finite, own)), "times of a clip are not finite and ascending")
+        ascending = all(own[i] < own[i + 1] for i in range(len(own) - 1))
+        require(ascending and all(finite(x) for x in own), "times of a clip are not finite and ascending")
     return times
 
 
@@ -1743,12 +1745,12 @@ def parse_polygons(chunk: bytes, kind: int, limits: Limits) -> tuple[PolygonShap
     """FACES or EDGES, and its stream."""
     require(len(chunk) >= 1 and is_integer_type(chunk[0] & 15), "Index_Type is no type")
     flags = chunk[0] & ~15
-    shape = PolygonShape(chunk[0] & 15, None, flags & 32 != 0, flags == 64)
+    shape = PolygonShape(chunk[0] & 15, None, (flags & 32) != 0, flags == 64)
     if shape.is_derived:
         require(len(chunk) == 1 and kind == EDGES, "derived edges have data, or are FACES")
         return shape, b""
-    mixed = flags >> 4 & 1
-    require(flags & ~48 == 0 and len(chunk) >= 9 + mixed, "FACES or EDGES has reserved bits, or is too short")
+    mixed = (flags >> 4) & 1
+    require((flags & ~48) == 0 and len(chunk) >= 9 + mixed, "FACES or EDGES has reserved bits, or is too short")
     if mixed:
         shape.count_type = chunk[1]
         require(is_integer_type(chunk[1]), "Count_Type is no type")
@@ -1762,7 +1764,7 @@ def parse_polygons(chunk: bytes, kind: int, limits: Limits) -> tuple[PolygonShap
 
 
 def is_integer_type(code: int) -> bool:
-    return code <= 15 and code & 11 != 8
+    return code <= 15 and (code & 11) != 8
 
 
 class PolygonModel:
@@ -1815,12 +1817,12 @@ def decode_polygons(
 
 
 def largest_of_type(code: int) -> int:
-    return (1 << (8 << (code & 3)) - (code >> 2 & 1)) - 1
+    return (1 << ((8 << (code & 3)) - ((code >> 2) & 1))) - 1
 
 
 def decode_face_count(coder: RangeDecoder, model: PolygonModel, before: int) -> int:
     same = coder.bit(model.same_count[model.counts_seen])
-    model.counts_seen = (model.counts_seen << 1 | same) & 63
+    model.counts_seen = ((model.counts_seen << 1) | same) & 63
     if same:
         return before
     count = code_unsigned(coder, model.count, model.count_mean)
@@ -1870,7 +1872,7 @@ def follow(
     if i <= length:
         return 0
     for k in range(i - length, i):
-        code = (code + (corners[k] - corners[k - 1]) + 1) * 0x9E3779B1 & 0xFFFFFFFF
+        code = ((code + (corners[k] - corners[k - 1]) + 1) * 0x9E3779B1) & 0xFFFFFFFF
     found = model.places[table].get(code >> 18, 0)
     model.places[table][code >> 18] = i
     return found
@@ -1922,7 +1924,7 @@ def decode_other(
     if coder.bit(model.is_recent[place]):
         back = 1
         for _ in range(5):
-            back = back << 1 | coder.bit(model.recent[place][back])
+            back = (back << 1) | coder.bit(model.recent[place][back])
         model.way = 15
         require(back - 32 < i, "a recent corner is before the first")
         return corners[i - 1 - (back - 32)]
@@ -1960,7 +1962,7 @@ def decode_temporal(stream: bytes, rank: int, frames: int, bits: int) -> list[li
         for t in range(frames):
             rest = code_signed(coder, model, mean)
             value = before + slope + rest
-            require(abs(value) <= 1 << bits - 1, "an entry of a learned basis is beyond 1")
+            require(abs(value) <= (1 << (bits - 1)), "an entry of a learned basis is beyond 1")
             slope = value - before if t > 0 else 0
             before = value
             mean = mean - (mean + 3) // 4 + clipped(rest) * 4
@@ -1997,7 +1999,7 @@ def decode_count(coder: RangeDecoder, model: CoefficientModel, history: int, abo
     count = 1
     for taken in range(length - 1):
         c = 0 if taken == 0 else 1 + (count & 1) if taken == 1 else 3
-        count = count << 1 | coder.bit(model.count_mantissa[length - 1][c])
+        count = (count << 1) | coder.bit(model.count_mantissa[length - 1][c])
     require(count <= rank, "a row has more frequencies than its basis")
     return count
 
@@ -2268,7 +2270,7 @@ def follow_twins(found: list[Follower], order: list[int], cells: list[tuple[int,
         vertex = found[v]
         x, y, z = cells[v]
         entry = (x * 73856093 + y * 19349663 + z * 83492791) % (1 << 32)
-        entry = (entry ^ entry >> 15) % places
+        entry = (entry ^ (entry >> 15)) % places
         twin = table.get(entry, -1)
         table[entry] = v
         joined = vertex.before >= 0 and cells[vertex.before] == cells[v]
@@ -2504,7 +2506,7 @@ class Prediction:
                 total += clipped(steps[k])
             vertex.steps = steps
         vertex.size = total, own
-        return steps or [0, 0, 0]
+        return steps if len(steps) > 0 else [0, 0, 0]
 
     def _learn(self, around: Around, v: int, p: Way) -> None:
         vertex, x = self.vertices[v], around.now[v]
@@ -2658,11 +2660,13 @@ class Plan:
                 rigid=branch.rigid > self.layer,
                 ring=branch.ring,
             )
-            if node is not None and not branch.flags & WHOLE:
+            if node is not None and not (branch.flags & WHOLE):
                 piece.level = branch.depth + 1
             if node is not None and not node.coded:
                 piece.low_level = branch.depth
-                piece.low_modes = min(piece.rings or branch.count, 3 if branch.flags & SHEET and not branch.ring else 2)
+                piece.low_modes = min(
+                    piece.rings or branch.count, 3 if (branch.flags & SHEET) and not branch.ring else 2
+                )
             piece_of_vertex += [piece.number] * piece.count
             self.pieces.append(piece)
             if piece.parent >= 0:
@@ -2769,7 +2773,7 @@ def tip_weight(plan: Plan, piece: Piece) -> float:
     """What the last vertex counts in products of the modes of its piece."""
     points = np.vstack([plan.attach_point(piece), plan.rest[piece.vertices]])
     way, chord = in_order(distances(points[1:], points[:-1])), distances(points[-1], points[0])
-    return 2.0 if not piece.flags & SHEET and piece.count > 1 and 2.0 * way <= 3.0 * chord else 1.0
+    return 2.0 if not (piece.flags & SHEET) and piece.count > 1 and 2.0 * way <= 3.0 * chord else 1.0
 
 
 def distances(a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -3172,13 +3176,13 @@ def read_stems_head(chunk: bytes, motion: Motion, level: int) -> bytes:
     """Steps and waves of a level; returns its Stems_Stream."""
     require(len(chunk) >= 6, "STEMS is too short")
     step, rotation, bits = f32(chunk, 0), chunk[4], chunk[5]
-    require(finite(step) and step > 0.0 and rotation & 7 <= 4, "Step or Rotation of STEMS is out of range")
+    require(finite(step) and step > 0.0 and (rotation & 7) <= 4, "Step or Rotation of STEMS is out of range")
     require(bits <= 2 or 8 <= bits <= 16, "Basis_Bits is out of range")
     waves, root, body = (motion.waves, -1, chunk[6:]) if bits == 0 else (motion.node_waves, -2, chunk[6:])
     if bits > 1:
         waves, root, body = read_basis(body, motion, level, bits)
-    factor, turn_step = float((1 << (rotation & 7)) >> 1), half_octave(-(rotation >> 4)) if rotation >> 4 > 0 else 0.0
-    motion.streams[level] = LevelStream(step, factor, rotation & 8 != 0, turn_step, waves, root)
+    factor, turn_step = float((1 << (rotation & 7)) >> 1), half_octave(-(rotation >> 4)) if (rotation >> 4) > 0 else 0.0
+    motion.streams[level] = LevelStream(step, factor, (rotation & 8) != 0, turn_step, waves, root)
     return body
 
 
@@ -3278,7 +3282,7 @@ def decode_corrections(stream: bytes, vertex_count: int, frames: int) -> np.ndar
     for _ in range(vertex_count):
         corrected = coder.bit(model.vertex[before])
         above = decode_corrected_frames(coder, model, above, frames) if corrected else none
-        before = (before << 1 | corrected) & 3
+        before = ((before << 1) | corrected) & 3
         result.append(above)
     coder.finish()
     return np.array(result, np.int64).transpose(0, 2, 1)
@@ -3287,35 +3291,41 @@ def decode_corrections(stream: bytes, vertex_count: int, frames: int) -> np.ndar
 def decode_corrected_frames(coder: RangeDecoder, model: CorrectionModel, above: list, frames: int) -> list:
     """A vertex that has corrections: blocks of frames, frames of a block. What must be true is not coded."""
     row = [(0, 0, 0, 0)] * frames
-    some = [any(q) for q in above]
+    some = [is_corrected(q) for q in above]
     found_any = block_before = 0
     for start in range(0, frames, BLOCK_FRAMES):
         stop = min(start + BLOCK_FRAMES, frames)
-        around = any(some[start:stop]) + 2 * any(some[max(start - BLOCK_FRAMES, 0) : min(stop + BLOCK_FRAMES, frames)])
+        inside = True in some[start:stop]
+        beside = True in some[max(start - BLOCK_FRAMES, 0) : min(stop + BLOCK_FRAMES, frames)]
+        around = 3 if inside else 2 if beside else 0
         last_chance = stop == frames and not found_any
         block = block_before = 1 if last_chance else coder.bit(model.block[block_before][around])
         if not block:
             continue
         found_any, found = 1, 0
         for t in range(start, stop):
-            earlier = 2 if t > 0 and any(row[t - 1]) else 1 if t > 1 and any(row[t - 2]) else 0
-            near = 2 if some[t] else 1 if any(some[max(t - 1, 0) : t + 2]) else 0
+            earlier = 2 if t > 0 and is_corrected(row[t - 1]) else 1 if t > 1 and is_corrected(row[t - 2]) else 0
+            near = 2 if some[t] else 1 if True in some[max(t - 1, 0) : t + 2] else 0
             if (t == stop - 1 and not found) or coder.bit(model.frame[earlier][near][found]):
                 found = 1
                 row[t] = decode_correction(coder, model, above[t])
     return row
 
 
+def is_corrected(q: tuple) -> bool:
+    return q != (0, 0, 0, 0)
+
+
 def decode_correction(coder: RangeDecoder, model: CorrectionModel, like: tuple) -> tuple:
     """Three integers, not all 0, and a width, that are expected to be like others."""
     q, nonzero_any = [0, 0, 0, 0], 0
-    width = model.width[1 + like[3] if any(like) else 0]
+    width = model.width[1 + like[3] if is_corrected(like) else 0]
     while q[3] < len(FOOTPRINTS) - 1 and coder.bit(width[q[3]]):
         q[3] += 1
     for axis in range(3):
         sign = 0 if like[axis] == 0 else 1 if like[axis] < 0 else 2
         if axis < 2 or nonzero_any:
-            c = 1 if sign else 2 if any(like) else 0
+            c = 1 if sign else 2 if is_corrected(like) else 0
             if not coder.bit(model.zero[nonzero_any][c]):
                 continue
         nonzero_any = 1
@@ -3474,7 +3484,7 @@ class Pose:
             return plan.attach_point(piece)[:, None] * still, np.eye(3)[:, :, None] * still
         parent, (base, R) = plan.pieces[piece.parent], self.kept[piece.parent]
         c = self.placed[piece.attach].copy()
-        if parent.flags & SHEET or parent.rigid:
+        if (parent.flags & SHEET) or parent.rigid:
             return c, R
         before, after = piece.attach - 1, min(piece.attach + 1, parent.first + parent.count - 1)
         inside = before >= parent.first
@@ -3536,7 +3546,7 @@ class Pose:
         for moves, track in self.piece_terms(piece):
             x = x + moves[:, :, None] * track
         self.placed[piece.vertices] = c + mat_vec(R, x)
-        if piece.flags & SHEET and not piece.rigid:
+        if (piece.flags & SHEET) and not piece.rigid:
             R = self.sheet_rotation(piece, c, R)
         self.kept[piece.number] = c, R
 
@@ -3549,7 +3559,7 @@ class Pose:
         for m, mode in enumerate(self.plan.basis(piece)):
             row = self.mode_row(piece, m)
             if shapes and m < self.plan.shape_modes(piece):
-                for shape, track in zip(shapes[3 * m : 3 * m + 3], row):
+                for shape, track in zip(shapes[3 * m : 3 * m + 3], row, strict=False):  # the last mode may have fewer
                     if np.any(track != 0.0):
                         yield self.shape_moves(piece, shape), track
             elif np.any(row != 0.0):
@@ -3614,7 +3624,7 @@ class Pose:
             elif m < plan.shape_modes(piece):
                 parts += [
                     (self.map_of_shape(node, piece, shape), track)
-                    for shape, track in zip(shapes[3 * m : 3 * m + 3], row)
+                    for shape, track in zip(shapes[3 * m : 3 * m + 3], row, strict=False)
                 ]
         return c, R, parts
 
@@ -3899,10 +3909,10 @@ def parse_json(text: bytes, what: str) -> dict:
 
 def zstd_window(data: bytes) -> int:
     """Window_Size that a frame header asks for (RFC 8878, 3.1.1.1.2); 0 where it is the content's size."""
-    if len(data) < 6 or data[4] & 0x20:  # Single_Segment_flag
+    if len(data) < 6 or (data[4] & 0x20):  # Single_Segment_flag
         return 0
     exponent, mantissa = data[5] >> 3, data[5] & 7
-    return (1 << 10 + exponent) + (1 << 10 + exponent >> 3) * mantissa
+    return (1 << (10 + exponent)) + ((1 << (10 + exponent)) >> 3) * mantissa
 
 
 def unzstd(data: bytes, size: int | None, what: str, limit: int) -> bytes:
@@ -4086,7 +4096,7 @@ class AthFile:
             allowed |= {(REFINED_REST, level, 0)} if self._may_refine_rest(level) else set()
         there = {(c.kind, c.level, c.segment) for c in self.chunks if c.is_motion and c.kind in KINDS}
         require(
-            wanted <= there <= wanted | allowed,
+            wanted <= there <= (wanted | allowed),
             "motion chunks are not those that the hierarchy asks for",
             "BAD_CHUNK_TABLE",
         )
@@ -4118,15 +4128,16 @@ class AthFile:
     def _read_rest(self, chunk: bytes) -> None:
         require(len(chunk) >= 17, "REST is too short")
         known = REST_EXACT | REST_FLOAT64 | REST_ADAPTIVE | REST_CONNECTED
-        require(chunk[0] == IS_HOST or chunk[0] & ~known == 0, "Method has reserved bits, or others beside Is_Host")
-        require(chunk[0] & REST_EXACT == 0 or chunk[0] & REST_ADAPTIVE == 0, "a rest pose is exact and adaptive")
-        is_connected = chunk[0] & REST_CONNECTED != 0
+        require(chunk[0] == IS_HOST or (chunk[0] & ~known) == 0, "Method has reserved bits, or others beside Is_Host")
+        require((chunk[0] & REST_EXACT) == 0 or (chunk[0] & REST_ADAPTIVE) == 0, "a rest pose is exact and adaptive")
+        is_connected = (chunk[0] & REST_CONNECTED) != 0
         require(
-            chunk[0] & (REST_EXACT | IS_HOST) == 0 or not self.find(SOURCE_REST),
+            (chunk[0] & (REST_EXACT | IS_HOST)) == 0 or not self.find(SOURCE_REST),
             "there is a second rest pose, though the first is exact",
         )
         require(
-            not is_connected or chunk[0] & (REST_EXACT | REST_ADAPTIVE) != 0, "a connected rest pose is coded by steps"
+            not is_connected or (chunk[0] & (REST_EXACT | REST_ADAPTIVE)) != 0,
+            "a connected rest pose is coded by steps",
         )
         self.origin = np.array([f32(chunk, 1 + 4 * k) for k in range(3)])
         step = f32(chunk, 13)
@@ -4140,8 +4151,8 @@ class AthFile:
             self.mesh_checksums = u32(chunk, 17), u32(chunk, 21)
             return  # until there is a mesh
         self._mesh = self._read_mesh() if is_connected else None
-        if chunk[0] & REST_EXACT == 0:
-            self._is_adaptive = chunk[0] & REST_ADAPTIVE != 0
+        if (chunk[0] & REST_EXACT) == 0:
+            self._is_adaptive = (chunk[0] & REST_ADAPTIVE) != 0
             coded = decode_rest(chunk[17:], self.branches, step, None, self._is_adaptive, self._mesh)
             self._rests = [coded]
             rest = np.array(coded.rest)
@@ -4169,7 +4180,7 @@ class AthFile:
         """Of a file whose rest pose is the host's mesh: its positions, binary32 in source order."""
         require(len(mesh) == 12 * len(self.vertex_source), "the mesh has other vertices", "WRONG_HOST_MESH")
         bits = np.frombuffer(mesh, "<u4").reshape(-1, 3)
-        bits = np.where(bits == 1 << 31, 0, bits).astype("<u4")  # 0.0 for -0.0
+        bits = np.where(bits == (1 << 31), 0, bits).astype("<u4")  # 0.0 for -0.0
         require(
             bool(np.isfinite(bits.view("<f4")).all()), "the mesh has numbers that are not finite", "WRONG_HOST_MESH"
         )
@@ -4270,14 +4281,15 @@ class AthFile:
         level = self.deepest if level is None else level
         if not 0 <= level < self.header.level_count:
             raise ValueError(f"level {level}: the file has 0 to {self.header.level_count - 1}")
+        for s in range(self.header.segment_count):
+            for chunk in self._needed(s, level):
+                require(self.is_available(chunk), f"{chunk} has not arrived", "TRUNCATED")
         with np.errstate(all="ignore"):
             segments = [self._segment(s, level)[..., shown] for s, shown in enumerate(self._shown_frames)]
         return np.ascontiguousarray(self._in_source_order(np.concatenate(segments, axis=2)).transpose(2, 0, 1))
 
     def _segment(self, s: int, level: int) -> np.ndarray:
         """(vertices, 3, frames) in file order, of the frames that are coded."""
-        for chunk in self._needed(s, level):
-            require(self.is_available(chunk), f"{chunk} has not arrived", "TRUNCATED")
         frames, shown = self._segment_lengths[s], min(level, self.lossy_levels - 1)
         if self.header.is_predicted and shown > 0:
             chunk = self.content(PREDICTED, shown, s)

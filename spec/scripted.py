@@ -227,8 +227,8 @@ def write(function: Callable, script: Script | list, *arguments) -> bytes:
 
 # ---- files in pieces ---------------------------------------------------------------------------------------
 
-HEADER = struct.Struct("<8sHHIII")
-HEADER_FIELDS = "magic major minor checksum front_length chunk_count".split()
+HEADER = struct.Struct("<8sBBHIII")
+HEADER_FIELDS = "magic major minor features checksum front_length chunk_count".split()
 MOST_ENTRIES = 4096  # of an error table that is written
 
 
@@ -343,6 +343,7 @@ class Draft:
                 magic=rd.MAGIC,
                 major=rd.VERSION[0],
                 minor=rd.VERSION[1],
+                features=0,
                 checksum=None,
                 front_length=None,
                 chunk_count=len(self.entries),

@@ -94,7 +94,7 @@ def test_the_memory_of_a_segment_is_the_same_everywhere(vertices, frames):
 def test_codes_of_errors_are_the_same_everywhere():
     in_format = {name: int(code) for code, name in re.findall(r"^\| (\d+) \| ([A-Z_]+) \| [a-z]", FORMAT, flags=re.M)}
     of_python = {error.name: error.code for error in (errors.FormatError, *errors.FormatError.__subclasses__())}
-    assert len(in_format) == 13 and in_format == of_python
+    assert len(in_format) == 14 and in_format == of_python
     for name, code in in_format.items():
         assert C[name] == code and lib.ath_result_name(code) == name.encode()
 

@@ -466,7 +466,7 @@ def test_results_have_the_names_and_numbers_of_the_format():
     names = [core.ath_result_name(code).decode() for code in range(64, 70)]
     assert names == ["MORE", "HELD", "MISSING", "NOT_PREPARED", "NO_MEMORY", "BAD_ARGUMENT"]
     assert core.ath_result_name(0) == b"OK"
-    assert {core.ath_result_name(code) for code in (-1, 14, 63, 70, 2**31 - 1, -(2**31))} == {b"UNKNOWN"}
+    assert {core.ath_result_name(code) for code in (-1, 15, 63, 70, 2**31 - 1, -(2**31))} == {b"UNKNOWN"}
 
 
 def too_little(size: int) -> list[tuple[int, int]]:
@@ -559,8 +559,11 @@ def test_a_refused_front_is_described_by_the_place_and_the_values_found_and_allo
     data = parts.file()
     front = parts.chunks[0][0].offset
     assert refusal(b"PK" + data[2:]) == "NOT_AN_ATH_FILE file: got first bytes 0x504b5448; expected 0x89415448"
-    assert refusal(data[:8] + b"\1\0\6\0" + data[12:]) == (
-        "UNSUPPORTED_VERSION file: got format version 1.6; expected 0.12"
+    assert refusal(data[:8] + b"\2\6\0\0" + data[12:]) == (
+        "UNSUPPORTED_VERSION file: got format version 2.6; expected 1.0"
+    )
+    assert refusal(data[:8] + b"\1\3\4\x80" + data[12:]) == (
+        "UNSUPPORTED_FEATURE file: got format 1.3 with feature 2, 15; expected features that this decoder has"
     )
     assert refusal(data[:12]) == "MISSING header: got 12 bytes; expected 24"
     assert refusal(data[:100]) == f"MISSING front: got 100 bytes; expected {front}"

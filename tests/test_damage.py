@@ -42,6 +42,7 @@ from athcodec.errors import (
     TrailingBytes,
     Truncated,
     UnknownChunk,
+    UnsupportedFeature,
     UnsupportedVersion,
 )
 
@@ -237,10 +238,11 @@ def test_bytes_behind_the_end_are_refused_in_strict_mode_alone(data, played):
 @pytest.mark.parametrize(
     "field, value, error",
     [
-        ("major", 1, UnsupportedVersion),
-        ("major", 65535, UnsupportedVersion),
-        ("minor", 1, UnsupportedVersion),
-        ("minor", 65535, UnsupportedVersion),
+        ("major", 0, UnsupportedVersion),
+        ("major", 2, UnsupportedVersion),
+        ("major", 255, UnsupportedVersion),
+        ("features", 1, UnsupportedFeature),
+        ("features", 0x8000, UnsupportedFeature),
         ("front_length", 0, BadHeader),
         ("front_length", 100, FormatError),
         ("front_length", 2**24 + 1, LimitExceeded),
@@ -530,6 +532,7 @@ ALL_READINGS = {
     "refused for what is behind the front",
     "NOT_AN_ATH_FILE",
     "UNSUPPORTED_VERSION",
+    "UNSUPPORTED_FEATURE",
     "TRUNCATED",
     "BAD_CHECKSUM",
     "BAD_HEADER",
@@ -1031,6 +1034,7 @@ def test_many_attributes_together_keep_to_the_memory_limit(parts):
     [
         (NotAnAthFile, lambda d, p: b"PK\x03\x04 something else entirely" * 4),
         (UnsupportedVersion, lambda d, p: with_header(d, major=9)),
+        (UnsupportedFeature, lambda d, p: with_header(d, features=2)),
         (Truncated, lambda d, p: d[:-1]),
         (BadChecksum, lambda d, p: flipped(d, len(d) - 1)),
         (BadHeader, lambda d, p: with_header(d, clip_count=256)),
@@ -1056,5 +1060,5 @@ def test_every_error_of_the_format_can_happen_and_says_it_in_one_line(error, mak
 
 def test_the_codes_of_the_errors_are_those_of_the_format():
     classes = [c for c in vars(errors).values() if isinstance(c, type) and issubclass(c, FormatError)]
-    assert sorted(c.code for c in classes) == list(range(1, 14))
-    assert len({c.name for c in classes}) == 13
+    assert sorted(c.code for c in classes) == list(range(1, 15))
+    assert len({c.name for c in classes}) == 14

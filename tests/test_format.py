@@ -11,6 +11,7 @@ import io
 import math
 import re
 import struct
+import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import fields, replace
@@ -31,6 +32,9 @@ from athcodec.encoding.learned_modes import LearnedModes
 from athcodec.encoding.motion import LevelStream, Plan, SegmentMotion
 
 FORMAT = Path(__file__).resolve().parents[1] / "FORMAT.md"
+sys.path.append(str(FORMAT.parent))  # for spec, which is not installed
+from spec import conformance, reference_decoder  # noqa: E402
+
 VECTORS = FORMAT.parent / "spec" / "vectors" / "valid"
 TEXT = FORMAT.read_text(encoding="utf-8")
 
@@ -76,6 +80,23 @@ def single(x: float) -> float:
         return float(np.float32(x))
 
 
+def is_json_object(text: bytes) -> bool:
+    try:
+        reference_decoder.parse_json(text, "METADATA")
+    except reference_decoder.AthError:
+        return False
+    return True
+
+
+def zstd_frame(data: bytes) -> SimpleNamespace:
+    frame = SimpleNamespace(window_size=reference_decoder.zstd_window(data), content_size=None, content=None)
+    with suppress(zstandard.ZstdError):
+        frame.content_size = zstandard.frame_content_size(data)
+        if 0 < frame.content_size < 1 << 28:
+            frame.content = zstandard.ZstdDecompressor().decompress(data, allow_extra_data=False)
+    return frame
+
+
 @pytest.fixture(scope="module")
 def spec() -> SimpleNamespace:
     """The decoder that FORMAT.md's Python blocks make, given only what its Conventions take for granted."""
@@ -97,6 +118,10 @@ def spec() -> SimpleNamespace:
         "to_bits": lambda x, n: int.from_bytes(struct.pack(FLOATS[n], x), "little"),
         "from_bits": lambda b, n: struct.unpack(FLOATS[n], b.to_bytes(n // 8, "little"))[0],
         "utf8": utf8,
+        "limit": {row["Limit"]: int(row["Value"]) for row in table("Limits", "Limit")}.__getitem__,
+        "is_json_object": is_json_object,
+        "zstd_frame": zstd_frame,
+        **{row["Name"]: int(row["Kind"], 16) for row in table("Chunk table", "Name")},
     }
     for block in re.findall(r"^```python\n(.*?)^```", TEXT, re.M | re.S):
         exec(block, names)
@@ -110,11 +135,9 @@ def assert_same_bits(spec: SimpleNamespace, data: bytes) -> None:
             expected = np.concatenate([clip.positions(level=level) for clip in played])
             got = np.array(spec.decode(data, level), decoder.dtype)
             assert got.tobytes() == expected.tobytes(), f"level {level}"
-        header, chunks = spec.parse_front(data)
-        clips = spec.decode_clips(header, chunks)
-        assert by_document(clips) == by_code(decoder)
-        times = spec.frame_times(spec.content(chunks, container.TIME), clips)
-        assert [np.array(own).tobytes() for own in times] == [clip.time.tobytes() for clip in played]
+        file = spec.open_file(data, strict=True)
+        assert by_document(file.clips) == by_code(decoder)
+        assert [np.array(own).tobytes() for own in file.times] == [clip.time.tobytes() for clip in played]
 
 
 def by_document(clips: list) -> list[tuple]:
@@ -182,10 +205,11 @@ def test_errors_are_those_of_the_code():
     assert documented == {error.code: error.name for error in classes}
 
 
-def test_every_error_named_in_a_field_table_exists():
+def test_every_error_that_the_code_names_exists():
     names = {row["Name"] for row in table("Errors", "Code")}
-    used = set(re.findall(r"\b[A-Z]+(?:_[A-Z]+)*_[A-Z]+\b", section("File")))
-    assert used - set(container.KIND_NAMES.values()) <= names and "BAD_CHUNK_TABLE" in used
+    code = "".join(re.findall(r"^```python\n(.*?)^```", TEXT, re.M | re.S))
+    used = set(re.findall(r'require\([^\n]*"([A-Z_]+)"\)$', code, re.M))
+    assert used <= names and {"TRUNCATED", "BAD_HEADER", "BAD_CHUNK_TABLE", "LIMIT_EXCEEDED"} <= used
 
 
 def test_checksum_has_the_check_value_of_the_document(spec):
@@ -254,6 +278,45 @@ def test_worked_example_decodes_step_by_step(spec):
     assert streams.encode_temporal(np.array([values], np.int32), 8) == stream
 
 
+def traced(spec) -> dict[str, list]:
+    """What "A level traced" tells: each quantity by the document's own functions."""
+    branch = spec.Record(first=0, count=3, parent=-1, attach=-1, depth=0, subtree=1, flags=0, rigid=0, ring=0)
+    plan = spec.make_plan([branch], [[0.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 0.0, 2.0]])
+    (piece,) = plan.pieces
+    motion = spec.no_motion(plan, 4, False)
+    stream = spec.Record(step=0.25, rotation_step_factor=0.0, only_tips=False, waves=motion.waves, root=-1)
+    motion.streams = {0: stream, 1: stream}
+    zeros = [0, 0, 0, 0]
+    motion.coefficients = [[[3, -1, 0, 0], zeros, zeros], [zeros] * 3, [zeros] * 3]
+    step = spec.row_step(motion, 0, piece, 0)
+    track = spec.over_time(motion.coefficients[0], step, motion.waves, 4)
+    placed, _, _ = spec.pose(plan, motion, 1)
+    return {
+        "gaps": spec.piece_gaps(plan, piece),
+        "tip_weight": [spec.tip_weight(plan, piece)],
+        "mode 0": piece.basis[0],
+        "mode 1": piece.basis[1],
+        "mode 2": piece.basis[2],
+        "wave 0": motion.waves[0],
+        "wave 1": motion.waves[1],
+        "row, x": motion.coefficients[0][0],
+        "row_step": [step],
+        "track, x": track[0],
+        "vertex 2 in frame 0": placed[2][0],
+        "as put out": spec.output(placed, [0.0, 0.0, 0.0], 0)[2][0],
+    }
+
+
+def test_trace_of_a_level_is_what_the_code_computes(spec):
+    rows = {
+        row["Quantity"]: [float(x) for x in row["Numbers"].split(", ")] for row in table("A level traced", "Quantity")
+    }
+    computed = traced(spec)
+    assert rows.keys() == computed.keys()
+    for name, numbers in computed.items():
+        assert rows[name] == [float(x) for x in numbers], name
+
+
 @pytest.mark.parametrize("change", [b"\0", b"\1" * 9])
 def test_a_stream_with_bytes_too_many_is_refused_by_the_document_too(spec, change):
     stream = streams.encode_temporal(np.array([[0, 3, -20]], np.int32), 8)
@@ -310,7 +373,7 @@ def test_changed_clips_mean_the_same_to_the_document_and_the_code(spec, seed):
     parts = Parts.of((VECTORS / "clips-loops.ath").read_bytes())
 
     def document(data):
-        return by_document(spec.decode_clips(*spec.parse_front(data)))
+        return by_document(spec.decode_clips(*spec.read_front(data)[:2]))
 
     outcomes = []
     for _ in range(100):
@@ -421,25 +484,17 @@ def motion_function(spec: SimpleNamespace, parts: Parts, chunk: container.Chunk)
     frames = parts.header.frame_count
     if chunk.kind == container.CORRECTIONS:
         return "decode_corrections", parts.header.vertex_count, frames
-    _, chunks = spec.parse_front(parts.file())
-    branches, rest = prelude_by_document(spec, parts.header, chunks)
-    plan = spec.make_plan(branches, rest.rest)
+    file = spec.open_file(parts.file())
+    plan = spec.make_plan(file.branches, file.rest.rest)
     if chunk.kind == container.SHAPES:
         motion = spec.no_motion(plan, 1, False)
         for level in range(chunk.level):
-            if (container.SHAPES, level, 0) in chunks:
-                spec.decode_shapes(spec.content(chunks, container.SHAPES, level), plan, motion, level)
+            if (container.SHAPES, level, 0) in file.chunks:
+                spec.decode_shapes(spec.content(file.chunks, container.SHAPES, level), plan, motion, level)
         return "decode_shapes", plan, motion, chunk.level
-    motion = spec.decode_motion(chunks, plan, 0, frames, False, chunk.level)
+    motion = spec.decode_motion(file, plan, 0, chunk.level)
     name = "decode_stems" if chunk.kind == container.STEMS else "decode_affines"
     return name, plan, motion, chunk.level
-
-
-def prelude_by_document(spec: SimpleNamespace, header: container.Header, chunks: dict) -> tuple:
-    """Branches and the rest pose of the first layer."""
-    branches, *_ = spec.decode_hierarchy(spec.content(chunks, 1)[8:], header.branch_count, header.vertex_count)
-    rest = spec.content(chunks, 2)
-    return branches, spec.decode_rest(rest[17:], branches, spec.f32(rest, 13), None, rest[0] & 8 != 0)
 
 
 @pytest.mark.parametrize("refines_rest", [False, True])
@@ -448,14 +503,14 @@ def test_random_decisions_about_refinements_mean_the_same_to_the_document_and_th
     """A layer behind those of a sapling: its rest pose, shapes and stems."""
     parts, random = Parts.of(Sapling(seed).file()), np.random.default_rng(seed)
     level, ratio, shift = parts.header.level_count, int(random.choice([1, 3, 4, 16, 65535])), int(random.integers(16))
-    _, chunks = spec.parse_front(parts.file())
-    branches, rest = prelude_by_document(spec, parts.header, chunks)
+    file = spec.open_file(parts.file())
+    branches, rest = file.branches, file.rest
     plan = spec.make_plan(branches, rest.rest)
-    motion = spec.decode_motion(chunks, plan, 0, parts.header.frame_count, False, level - 1)
+    motion = spec.decode_motion(file, plan, 0, level - 1)
     before = spec.Record(plan=plan, motion=motion, placed=spec.pose(plan, motion, level - 1)[0])
     added, step = [], 2.0**-9
     if refines_rest:
-        arguments = branches, step, rest, spec.content(chunks, container.REST)[0] & 8 != 0, None
+        arguments = branches, step, rest, file.is_adaptive, None
         stream = random_stream(spec, random, "decode_rest", *arguments)
         added.append((container.REFINED_REST, container.pack_refined_rest(step, stream)))
         made = outcome(spec, lambda stream: spec.decode_rest(stream, *arguments), stream)
@@ -684,6 +739,72 @@ def outcome(spec: SimpleNamespace, decode, stream: bytes) -> object:
 
 
 # ---- what the document and the code refuse ----
+
+INVALID = [vector for vector in conformance.vectors() if not vector.valid and vector.path.stat().st_size < 100_000]
+
+AT_ONCE = [
+    vector
+    for vector in INVALID
+    if vector.mesh is not None or {vector.results["strict"], vector.results["open"]} & set(conformance.ERRORS)
+]
+
+
+@pytest.mark.parametrize("vector", AT_ONCE, ids=lambda vector: vector.name)
+def test_the_document_opens_and_refuses_files_as_the_vectors_have_it(spec, vector):
+    for item in ("strict", "open"):
+        try:
+            spec.open_file(vector.path.read_bytes(), strict=item == "strict")
+            result = "ok"
+        except spec.Invalid as error:
+            result = str(error)
+        assert result == vector.results[item], item
+
+
+ASKED = [
+    (vector, item)
+    for vector in INVALID
+    for item, result in vector.results.items()
+    if result in conformance.ERRORS and (item in ("rest", "static") or item.isdecimal()) and vector.mesh is None
+]
+
+
+@pytest.mark.parametrize("vector, item", ASKED, ids=lambda part: getattr(part, "name", part))
+def test_the_document_refuses_what_is_asked_for_as_the_vectors_have_it(spec, vector, item):
+    try:
+        data = vector.path.read_bytes()
+        if item.isdecimal():
+            spec.decode(data, int(item))
+        elif item == "rest":
+            read_rest(spec, spec.open_file(data))
+        else:
+            read_static(spec, spec.open_file(data))
+        result = "ok"
+    except spec.Invalid as error:
+        result = str(error)
+    assert result == vector.results[item]
+
+
+def read_rest(spec: SimpleNamespace, file: SimpleNamespace) -> None:
+    spec.require(file.rest.rest is not None, "NEEDS_HOST_MESH")
+    if (container.SOURCE_REST, None, 0) in file.chunks:
+        spec.source_rest(file, spec.shown_plans(file, 0))
+
+
+def read_static(spec: SimpleNamespace, file: SimpleNamespace) -> None:
+    of_faces = {}
+    for kind in (container.FACES, container.EDGES):
+        if (kind, None, 0) in file.chunks:
+            shape, stream = spec.parse_polygons(spec.content(file.chunks, kind), kind)
+            if shape.is_derived:
+                spec.derived_edges(file, shape.index_type)
+                continue
+            counts, corners = spec.decode_polygons(stream, shape, file.header.vertex_count)
+            if shape.count_type is not None:
+                of_faces["face_vertex_counts"] = bytes(len(counts) << (shape.count_type & 3))
+                of_faces["face_vertex_indices"] = bytes(len(corners) << (shape.index_type & 3))
+    spec.read_attributes(file, of_faces)
+    if (container.METADATA, None, 0) in file.chunks:
+        spec.parse_metadata(spec.content(file.chunks, container.METADATA))
 
 
 def assert_refused_alike(spec: SimpleNamespace, data: bytes, error: str) -> None:

@@ -15,7 +15,7 @@ from fuzz import coverage, seeds, targets
 
 import athcodec
 
-RUNS = 2000
+RUNS = 1000
 SEED = 1
 ROOT = Path(__file__).resolve().parent.parent
 

@@ -75,6 +75,7 @@ typedef enum ath_result {
     ATH_TRAILING_BYTES = 11,
     ATH_NEEDS_HOST_MESH = 12,
     ATH_WRONG_HOST_MESH = 13,
+    ATH_UNSUPPORTED_FEATURE = 14,
     ATH_MORE = 64,         /* not an error: there is more to do, call again */
     ATH_HELD = 65,         /* not an error: the frame to blend with is not prepared, the nearer one is shown */
     ATH_MISSING = 66,      /* bytes that this needs have not been fed */
@@ -88,7 +89,8 @@ ATH_API const char *ath_result_name(int result);
 
 /* ---- constants of the format ------------------------------------------------------------------------------------- */
 
-enum { ATH_FORMAT_MAJOR = 0, ATH_FORMAT_MINOR = 12 };
+/* Files of any minor version decode whose features are among ATH_FEATURES, which has a bit for each. */
+enum { ATH_FORMAT_MAJOR = 1, ATH_FORMAT_MINOR = 0, ATH_FEATURES = 0 };
 
 /* Kinds of chunks. An unknown kind with the bit ATH_OPTIONAL is skipped. */
 enum {
@@ -126,7 +128,8 @@ enum { ATH_BYTES_PER_FRAME = 60, ATH_BYTES_PER_VERTEX = 512 };
 typedef enum ath_field {
     ATH_FIELD_NONE,
     ATH_FIELD_MAGIC,        /* the four bytes of which one is wrong, as a number whose high byte comes first */
-    ATH_FIELD_VERSION,      /* major << 16 | minor */
+    ATH_FIELD_VERSION,      /* major << 8 | minor */
+    ATH_FIELD_FEATURES,     /* bits that are not among ATH_FEATURES; `most` is the file's version, `least` this one's */
     ATH_FIELD_FILE_SIZE,    /* bytes that are there: for a caller who knows that no more will come */
     ATH_FIELD_HEADER_SIZE,  /* bytes that are there */
     ATH_FIELD_FRONT_SIZE,   /* bytes that are there, or Front_Length */

@@ -49,6 +49,17 @@ static uint32_t word_at(const uint8_t *bytes, size_t available, size_t at)
     return word;
 }
 
+/* Any minor version is taken: what it has that is new and cannot be skipped is among the features. */
+static int check_version(uint32_t major, uint32_t minor, uint32_t features, ath_fault_info *fault)
+{
+    double known = (double)(ATH_FORMAT_MAJOR << 8 | ATH_FORMAT_MINOR), found = (double)(major << 8 | minor);
+    if (major != ATH_FORMAT_MAJOR)
+        return ath_refuse(fault, ATH_UNSUPPORTED_VERSION, ATH_FIELD_VERSION, found, known, known);
+    if ((features & ~(uint32_t)ATH_FEATURES) == 0) return ATH_OK;
+    return ath_refuse(fault, ATH_UNSUPPORTED_FEATURE, ATH_FIELD_FEATURES, (double)(features & ~(uint32_t)ATH_FEATURES),
+                      known, found);
+}
+
 static int check_magic(const uint8_t *bytes, size_t available, ath_fault_info *fault)
 {
     static const uint8_t magic[8] = {0x89, 'A', 'T', 'H', '\r', '\n', 0x1a, '\n'};
@@ -59,11 +70,7 @@ static int check_magic(const uint8_t *bytes, size_t available, ath_fault_info *f
                               (double)word_at(bytes, available, i & ~(size_t)3), expected, expected);
     }
     if (available < CHECKSUM_AT) return ATH_OK;
-    uint32_t version = u16_at(bytes + 8) << 16 | u16_at(bytes + 10),
-             expected = ATH_FORMAT_MAJOR << 16 | ATH_FORMAT_MINOR;
-    if (version == expected) return ATH_OK;
-    return ath_refuse(fault, ATH_UNSUPPORTED_VERSION, ATH_FIELD_VERSION, (double)version, (double)expected,
-                      (double)expected);
+    return check_version(bytes[8], bytes[9], u16_at(bytes + 10), fault);
 }
 
 /* Whether the value is none of those allowed: then the fault is filled in. */

@@ -16,7 +16,8 @@ const char *ath_result_name(int result)
                                          "LIMIT_EXCEEDED",
                                          "TRAILING_BYTES",
                                          "NEEDS_HOST_MESH",
-                                         "WRONG_HOST_MESH"};
+                                         "WRONG_HOST_MESH",
+                                         "UNSUPPORTED_FEATURE"};
     static const char *const calls[] = {"MORE", "HELD", "MISSING", "NOT_PREPARED", "NO_MEMORY", "BAD_ARGUMENT"};
     if (result >= 0 && result < (int)(sizeof errors / sizeof *errors)) return errors[result];
     int call = result - ATH_MORE;
@@ -143,11 +144,13 @@ static void put_number(writer *out, double value)
 /* ---- sentences ---- */
 
 /* By field. %f: the value found; %a: the values allowed; %p: the chunk and its place; %k: kind, level and segment;
- * %l: level and segment; %m: the most that is allowed, and %c: the least, as a checksum. */
+ * %l: level and segment; %m: the most that is allowed, and %c: the least, as a checksum;
+ * %n: the file's version and the features that are not known. */
 static const char *const sentences[] = {
     0,
     "file: got first bytes %f%a",
     "file: got format version %f%a",
+    "file: got %n; expected features that this decoder has",
     "file: got %f bytes%a",
     "header: got %f bytes%a",
     "front: got %f bytes%a",
@@ -185,12 +188,31 @@ static const char *const sentences[] = {
     "host mesh: got checksum %f%a",
 };
 
+static void put_version(writer *out, uint32_t version)
+{
+    put_integer(out, version >> 8);
+    put_character(out, '.');
+    put_integer(out, version & 0xff);
+}
+
+/* "format 1.3 with feature 2, 5" */
+static void put_features(writer *out, const ath_fault_info *fault)
+{
+    const char *before = " with feature ";
+    write_text(out, "format ");
+    put_version(out, (uint32_t)fault->most);
+    for (uint32_t bit = 0; bit < 16; bit++) {
+        if (((uint32_t)fault->found >> bit & 1) == 0) continue;
+        write_text(out, before);
+        put_integer(out, bit);
+        before = ", ";
+    }
+}
+
 static void put_value(writer *out, int32_t field, double value)
 {
     if (field == ATH_FIELD_VERSION) {
-        put_integer(out, (uint64_t)value >> 16);
-        put_character(out, '.');
-        put_integer(out, (uint64_t)value & 0xffff);
+        put_version(out, (uint32_t)value);
     } else if (field == ATH_FIELD_MAGIC || field == ATH_FIELD_FRONT_CHECKSUM || field == ATH_FIELD_CHUNK_CHECKSUM
                || field == ATH_FIELD_HOST_CHECKSUM) {
         put_hex(out, (uint32_t)value, 8);
@@ -248,6 +270,7 @@ static void put_sentence(writer *out, const ath_fault_info *fault, const char *s
         case 'p': put_place(out, fault); break;
         case 'k': put_kind(out, fault); break;
         case 'm': put_value(out, fault->field, fault->most); break;
+        case 'n': put_features(out, fault); break;
         case 'c': put_hex(out, (uint32_t)fault->least, 8); break;
         default: put_level(out, fault);
         }

@@ -138,7 +138,7 @@ def _flipped(data: bytes, bit: int) -> bytes:
 
 def repaired(data: bytes) -> bytes:
     """The file with correct checksums, as far as the front can be read."""
-    length = ct._HEADER.unpack_from(data)[4] if len(data) >= ct._HEADER.size else 0
+    *_, length, _ = ct._HEADER.unpack_from(data) if len(data) >= ct._HEADER.size else (0, 0)
     if not ct._HEADER.size <= length <= len(data):
         return data
     front, behind = with_checksum(data[:length]), data[length:]

@@ -60,7 +60,7 @@ size_t fuzz_chunks_at(const uint8_t *file, size_t size)
 static void repair_front(uint8_t *file, size_t front)
 {
     static const uint8_t fixed[12] = {
-        0x89, 'A', 'T', 'H', '\r', '\n', 0x1a, '\n', ATH_FORMAT_MAJOR, 0, ATH_FORMAT_MINOR, 0};
+        0x89, 'A', 'T', 'H', '\r', '\n', 0x1a, '\n', ATH_FORMAT_MAJOR, ATH_FORMAT_MINOR, ATH_FEATURES, 0};
     memcpy(file, fixed, sizeof fixed);
     fuzz_put_u32(file + CHECKSUM_AT, 0);
     fuzz_put_u32(file + CHECKSUM_AT, ath_crc32c(0, file, front));
@@ -128,7 +128,10 @@ void fuzz_repair(uint8_t *file, size_t size)
 
 /* ---- a file and its segments ---- */
 
-static int is_refusal(int result) { return result > ATH_OK && result < ATH_TRAILING_BYTES; }
+static int is_refusal(int result)
+{
+    return (result > ATH_OK && result < ATH_TRAILING_BYTES) || result == ATH_UNSUPPORTED_FEATURE;
+}
 
 /* Every refusal says what it is about, in a sentence that the caller's buffer holds. */
 static void check_fault(const ath_fault_info *fault, int result)
