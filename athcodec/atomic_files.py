@@ -82,6 +82,7 @@ class PendingFile:
             self._close()  # Windows renames no open files
         os.replace(self.name, self.path)
         self._close()
+        _sync_folder(os.path.dirname(self.path))
 
     def discard(self) -> None:
         """Removes what has been written."""
@@ -139,6 +140,7 @@ def new_files(path: str | os.PathLike[str], named: bool = True) -> Iterator[str]
             raise FileNotFoundError(f"{path}: the writer has made no such file")
         for file in made:
             os.replace(os.path.join(folder, file), os.path.join(directory, file))
+        _sync_folder(directory)
 
 
 @contextmanager
@@ -151,6 +153,7 @@ def new_folder(path: str | os.PathLike[str]) -> Iterator[str]:
     with scratch_folder(path) as folder:
         yield folder
         os.rename(folder, path)
+        _sync_folder(os.path.dirname(path))
 
 
 @contextmanager
@@ -172,6 +175,18 @@ def scratch_folder(path: str) -> Iterator[str]:
         shutil.rmtree(folder, ignore_errors=True)
         if lock >= 0:
             os.close(lock)
+
+
+def _sync_folder(folder: str) -> None:
+    """A name that was given is kept where the power fails: it is on the disk once its folder is."""
+    if fcntl is None:
+        return  # Windows opens no folders
+    with suppress(OSError):  # a folder that cannot be read, a file system that syncs none: the file itself is whole
+        descriptor = os.open(folder or ".", os.O_RDONLY | PLAIN_OPEN)
+        try:
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)
 
 
 def _locked_folder(folder: str) -> int:

@@ -213,7 +213,7 @@ def test_the_demo_shows_growth_too_and_other_samples_are_refused(tmp_path, capsy
     assert run("demo", "--sample", "growth", "--keep", tmp_path) == 0
     assert "Encoded the sample growth_1k_120f within 0.0001 of its diagonal" in capsys.readouterr().out
     assert run("verify", tmp_path / "growth_1k_120f.ath", "--against", sample_path("growth")) == 0
-    with pytest.raises(ValueError, match="sample: got 'oak', expected one of tree, growth, leafed"):
+    with pytest.raises(ValueError, match="sample: got 'oak', expected one of tree, growth, leafed, fern, grass"):
         sample_path("oak")
 
 
@@ -527,3 +527,27 @@ def test_a_missing_package_is_named_with_the_command_that_installs_it(encoded, t
     files = [str(scene), str(tmp_path / "b.ath")] if verb == "encode" else [str(encoded), str(tmp_path / "b.usdc")]
     assert run(verb, *files) == 1
     assert capsys.readouterr().err.endswith('needs pxr: pip install "athcodec[usd]"\n')
+
+
+def test_no_control_characters_of_a_file_reach_the_terminal(tmp_path, capsys):
+    unit = "m\x1b[2J\x9b1A\u202e\x7f\a\r"
+    with read_hdf5(SAMPLE) as clip:
+        athcodec.encode(clip.replace(metadata=clip.metadata | {"unit": unit}), tmp_path / "a.ath")
+    assert run("info", tmp_path / "a.ath") == 0
+    assert run("verify", tmp_path / "a.ath", "--against", SAMPLE) == 0
+    run("info", tmp_path / "\x1b[31m\u2066.ath")
+    shown = "".join(capsys.readouterr())
+    assert not set(shown) & set(unit[1:] + "\u2066") - set("[2J1A")
+    assert "m\\x1b[2J\\x9b1A\\u202e" in shown
+    assert run("info", tmp_path / "a.ath", "--json") == 0
+    text = capsys.readouterr().out
+    assert json.loads(text)["unit"] == unit
+    assert "\x7f" not in text
+
+
+@pytest.mark.skipif(not Path("/dev/zero").exists(), reason="no /dev/zero")
+def test_steps_that_are_no_plain_files_are_refused(tmp_path, capsys):
+    index = tmp_path / "a.pvd"
+    index.write_text('<VTKFile><Collection><DataSet timestep="0" file="/dev/zero"/></Collection></VTKFile>')
+    assert run("encode", index, tmp_path / "a.ath", "--allow-outside") == 1
+    assert "/dev/zero: got a folder, device or pipe" in capsys.readouterr().err

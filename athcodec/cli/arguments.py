@@ -26,6 +26,9 @@ from athcodec.options import (
 from athcodec.units import METRES, Length, parse_length, parse_size
 
 DEMO_PAGE = "athcodec_demo.html"
+DEMO_FLOOR = {"fern": 4.0, "grass": 9.0}
+"""Samples on the floor of the demo's forest, and how many of each around a tree."""
+
 TRACEBACK = "show the traceback of an error"
 WRITTEN = "file to write; replaced when the new one is complete"
 READ = 'a file or a URL, http://, https:// or another that fsspec knows (pip install "athcodec[remote]")'
@@ -380,6 +383,11 @@ def _source_arguments(verb: argparse.ArgumentParser) -> None:
         help="read these animations of a glTF file, each as a clip of its own; all: every one "
         "(default: the one that players begin with)",
     )
+    source.add_argument(
+        "--allow-outside",
+        action="store_true",
+        help="let XDMF, PVD, HDF5 and USD files name files outside of their own folder",
+    )
     source.add_argument("--unit", metavar="UNIT", help="unit of length to convert to, or that of a source without one")
     source.add_argument("--up-axis", choices=("x", "y", "z"), help="axis to turn up, or that of a source without one")
 
@@ -545,18 +553,34 @@ def _truncate_arguments(verb: argparse.ArgumentParser) -> None:
 
 
 def _view_arguments(verb: argparse.ArgumentParser) -> None:
-    verb.add_argument("file", metavar="FILE.ath", help=READ)
+    verb.add_argument("files", metavar="FILE.ath", nargs="+", help=f"{READ}; several with --export DIR")
     verb.add_argument(
         "--port", metavar="PORT", type=_argument(_whole), default=0, help="of the address (default: a free one)"
     )
     verb.add_argument("--clip", metavar="NAME", help="begin with it (default: the file's first)")
     _host_mesh_argument(verb)
+    verb.add_argument(
+        "--floor",
+        metavar="FILE.ath[=COUNT]",
+        action="append",
+        type=_argument(_counted),
+        help="a plant for the forest's floor, so many around each tree (default: 4); may be given again",
+    )
     verb.add_argument("--no-browser", action="store_true", help="print the address and open nothing")
     what = verb.add_mutually_exclusive_group()
     what.add_argument("--forest", action="store_true", help="show 10,000 plants in the wind, on WebGPU")
     what.add_argument(
-        "--export", metavar="PAGE.html", help="write one page with the file and the viewer inside, and serve nothing"
+        "--export",
+        metavar="PAGE.html|DIR",
+        help="write one page with the file and the viewer inside, and serve nothing; or a folder for a web host with a "
+        "gallery of all FILEs, with still pictures where athcodec[picture] is installed",
     )
+
+
+def _counted(text: str) -> tuple[str, float]:
+    """A file and how many of it: FILE or FILE=COUNT."""
+    file, equals, count = text.rpartition("=")
+    return (file, _above_zero(count)) if equals else (text, 4.0)
 
 
 def _picture_arguments(verb: argparse.ArgumentParser) -> None:

@@ -177,6 +177,7 @@ def read_clip(args: argparse.Namespace, path: str) -> MotionClip:
             field=args.field,
             only=args.only or (),
             takes=args.takes or (),
+            allow_outside=args.allow_outside,
             unit=args.unit,
             up_axis=args.up_axis,
         )

@@ -6,11 +6,12 @@ import argparse
 import json
 import math
 import os
+import re
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, TextIO
 
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
@@ -35,6 +36,7 @@ JUMP = 3
 LEVEL_COLUMNS = ["level", "", "nodes", "bytes", "share"]
 MEASURES = ["promised_max_error", "max_error", "rms_error", "kg_error_percent", "motion_normalised_error"]
 LEFT_OUT = {"left_out_edges": "an edge", "left_out_faces": "a face"}
+_UNSAFE = re.compile("[\\x00-\\x09\\x0b-\\x1f\\x7f-\\x9f\\u061c\\u200e\\u200f\\u2028-\\u202e\\u2066-\\u2069]")
 _TABLE_WIDTH = 250  # wider than any table here: a narrow terminal wraps its lines, nothing is left out
 
 Report = Callable[[str, float], None]
@@ -72,6 +74,16 @@ LOOKS = {
 """What is shown of a level beside its errors, by the names of MotionMeter.figures."""
 
 
+def shown(text: str) -> str:
+    """`text` as a terminal may have it: what files and servers say can neither move its cursor nor turn its lines."""
+    return _UNSAFE.sub(lambda found: ascii(found[0])[1:-1], text)
+
+
+def echo(text: str, *, file: TextIO | None = None, flush: bool = False) -> None:
+    """Print lines of text, as `shown`."""
+    print(shown(text), file=file, flush=flush)
+
+
 def print_files(facts: list[dict[str, Any]], as_json: bool) -> None:
     """What facts_of gives of a file, or of each motion of a GLB."""
     if as_json:
@@ -105,22 +117,22 @@ def facts_of(
 def _print_facts(facts: dict[str, Any]) -> None:
     ath = facts["ath"]
     rate = f" at {facts['fps']:.6g} per second" if facts["fps"] else ""
-    print(
+    echo(
         f"{facts['file']}: {counted(facts['vertices'], 'vertex', 'vertices')} on "
         f"{counted(facts['branches'], 'branch', 'branches')}, {counted(facts['frames'], 'frame')}{rate} in "
         f"{counted(facts['segments'], 'segment')}, format {facts['format']}"
     )
-    print(
+    echo(
         f"ATH: depth {ath['depth']}, {counted(ath['nodes'], 'node')}, {ath['leaves']:,} of them leaves; "
         f"epsilon {ath['epsilon']:.2g}, eta {ath['eta']}, xi {ath['xi']:.2g}, lambda {ath['lam']}"
     )
     unit = f" {facts['unit']}" if facts["unit"] else ""
-    print(f"Error bound: {facts['max_error_bound']:.4g}{unit}. {_size(facts)}")
-    print(f"Rest pose: {_rest(facts)}.")
+    echo(f"Error bound: {facts['max_error_bound']:.4g}{unit}. {_size(facts)}")
+    echo(f"Rest pose: {_rest(facts)}.")
     if len(facts["levels"]) < facts["full_level_count"]:
-        print(f"Holds levels 0 to {len(facts['levels']) - 1} of 0 to {facts['full_level_count'] - 1}.")
+        echo(f"Holds levels 0 to {len(facts['levels']) - 1} of 0 to {facts['full_level_count'] - 1}.")
     if facts["missing"]:
-        print(f"{facts['available_bytes']:,} bytes are there; missing {facts['missing']}.")
+        echo(f"{facts['available_bytes']:,} bytes are there; missing {facts['missing']}.")
     if (
         len(facts["clips"]) > 1
         or facts["clips"][0]["name"]
@@ -194,19 +206,19 @@ def print_demo(facts: dict[str, Any], meters: Sequence[ErrorMeter]) -> None:
         errors = [f"{meter.max_error:.3g}", f"{meter.rms_error:.3g}"]
         relative = [f"{error / meter.diagonal:.1e}" for error in (meter.max_error, meter.rms_error)]
         cells.append([*errors, *relative, f"{level['bytes'] / seconds:,.0f}"])
-    print(
+    echo(
         f"Encoded the sample {Path(facts['file']).stem} within {DEFAULT_REL_ERROR:g} of its diagonal, "
         "decoded every level and measured it against the source:"
     )
     print_table([*LEVEL_COLUMNS, *columns], _level_rows(facts, cells))
-    print(_size(facts))
+    echo(_size(facts))
 
 
 def print_written(written: Written, motion: ClipView, level: Level) -> None:
     """The files that are there now, and what their format costs."""
     names = [os.fspath(path) for path in written.files]
     error = written.facts.get("max_error")
-    print(
+    echo(
         f"{names[0]}{f' to {names[-1]}' if len(names) > 1 else ''}: {counted(motion.frame_count, 'frame')}, "
         f"{counted(motion.vertex_count, 'vertex', 'vertices')}, level {level.level} ({level.name})"
     )
@@ -214,20 +226,20 @@ def print_written(written: Written, motion: ClipView, level: Level) -> None:
         unit = f" {motion.metadata['unit']}" if motion.metadata.get("unit") else ""
         how, instances = written.facts.get("animation", "textures"), written.facts.get("instances")
         how += f" and {counted(instances, 'instance')}" if instances and how in ("joints", "morphs") else ""
-        print(f"As {how} that is off the level by up to {error:.3g}{unit}.")
+        echo(f"As {how} that is off the level by up to {error:.3g}{unit}.")
 
 
 def print_verdict(result: dict[str, Any]) -> None:
     for clip in result["clips"]:
         if clip["name"]:
-            print(f"{clip['name']}, against {clip['against']}:")
+            echo(f"{clip['name']}, against {clip['against']}:")
         _print_errors(clip["levels"], result["unit"])
         _print_looks(clip["levels"])
     if result["ok"]:
         sources = ", ".join(clip["against"] for clip in result["clips"])
         more = f"; every level is as close to {sources} as the file says" if sources else ""
         decodes = "every level decodes" if result["decoded"] else "nothing was decoded, which takes --host-mesh"
-        print(f"{result['file']}: whole, all checksums match, {decodes}{more}")
+        echo(f"{result['file']}: whole, all checksums match, {decodes}{more}")
 
 
 def _print_errors(levels: Sequence[dict[str, Any]], unit: Any) -> None:
@@ -251,11 +263,11 @@ def _print_looks(levels: Sequence[dict[str, Any]]) -> None:
         shown = [name for name in columns if any(level[part][name] is not None for level in levels)]
         rows = [[f"{level['level']}", *(columns[name].cell(level[part][name]) for name in shown)] for level in levels]
         if shown:
-            print(f"{part.capitalize()}: {captions[part]}")
+            echo(f"{part.capitalize()}: {captions[part]}")
             print_table(["level", *(columns[name].head for name in shown)], rows)
     left_out = [f"{one} {shape[name]:,} times" for name, one in LEFT_OUT.items() if shape[name]]
     if left_out:
-        print(f"Left out where the source has no extent: {', '.join(left_out)}.")
+        echo(f"Left out where the source has no extent: {', '.join(left_out)}.")
 
 
 def print_preview(todo: Sequence[Any], as_json: bool) -> None:
@@ -284,7 +296,7 @@ def print_preview(todo: Sequence[Any], as_json: bool) -> None:
         for task in todo
     ]
     print_table(["clip", "why", "output", "settings"], rows, "left")
-    print(f"{counted(sum(bool(task.reason) for task in todo), 'clip')} of {len(todo):,} to do.")
+    echo(f"{counted(sum(bool(task.reason) for task in todo), 'clip')} of {len(todo):,} to do.")
 
 
 def print_outcome(outcome: Any, args: argparse.Namespace) -> None:
@@ -302,7 +314,7 @@ def print_outcome(outcome: Any, args: argparse.Namespace) -> None:
         )
     else:
         ratio = f", {outcome.raw_bytes / outcome.bytes:.1f} to 1" if outcome.bytes else ""
-        print(
+        echo(
             f"{args.out}: {counted(len(outcome.done), 'clip')} done, {len(outcome.kept):,} kept, "
             f"{len(outcome.failed):,} failed; {outcome.bytes:,} bytes{ratio}, {outcome.seconds:.1f} s"
         )
@@ -316,14 +328,14 @@ def print_outcome(outcome: Any, args: argparse.Namespace) -> None:
 def print_table(columns: Sequence[str], rows: Sequence[Sequence[str]], justify: str = "right") -> None:
     table = Table(box=SIMPLE_HEAD, pad_edge=False, show_edge=False, collapse_padding=True)
     for index, name in enumerate(columns):
-        table.add_column(Text(name), justify=justify if index else "left", no_wrap=True)
+        table.add_column(Text(shown(name)), justify=justify if index else "left", no_wrap=True)
     for row in rows:
-        table.add_row(*(Text(cell) for cell in row))
+        table.add_row(*(Text(shown(cell)) for cell in row))
     Console(file=sys.stdout, width=_TABLE_WIDTH).print(table)
 
 
 def print_json(facts: dict[str, Any]) -> None:
-    print(json.dumps(_finite(facts), indent=2))
+    print(json.dumps(_finite(facts), indent=2).replace("\x7f", "\\u007f"))
 
 
 def _finite(value: Any) -> Any:
@@ -348,7 +360,7 @@ def _size(facts: dict[str, Any]) -> str:
 
 
 def say(kind: str, message: str) -> None:
-    print(f"athcodec: {kind}: {message}", file=sys.stderr)
+    echo(f"athcodec: {kind}: {message}".replace("\n", " "), file=sys.stderr)
 
 
 def say_seam(seam: Seam, path: str) -> None:

@@ -6,6 +6,7 @@ import argparse
 import os
 import sys
 import tempfile
+from collections.abc import Mapping
 from contextlib import ExitStack, nullcontext, suppress
 from functools import partial
 from pathlib import Path
@@ -16,7 +17,7 @@ import numpy as np
 import athcodec
 from athcodec import discovery
 from athcodec.atomic_files import scratch_folder
-from athcodec.cli.arguments import DEMO_PAGE
+from athcodec.cli.arguments import DEMO_FLOOR, DEMO_PAGE
 from athcodec.cli.clips import (
     bound,
     check_output,
@@ -37,6 +38,7 @@ from athcodec.cli.clips import (
     with_sources,
 )
 from athcodec.cli.printing import (
+    echo,
     facts_of,
     one_line,
     print_demo,
@@ -193,14 +195,14 @@ def hierarchy(args: argparse.Namespace) -> int:
             }
         )
         return 0
-    print(f"{args.input}: {found}")
+    echo(f"{args.input}: {found}")
     rows = [
         [f"{order}", f"{(orders == order).sum():,}", f"{sizes[orders == order].sum():,}"]
         for order in range(orders.max() + 1)
     ]
     print_table(["order", "branches", "vertices"], rows)
     if args.save:
-        print(f"{args.save}: edit it, and use it with athcodec encode --hierarchy")
+        echo(f"{args.save}: edit it, and use it with athcodec encode --hierarchy")
     return 0
 
 
@@ -311,7 +313,7 @@ def truncate(args: argparse.Namespace) -> int:
     with open_file(args.output, gltf_motion=kept) as decoder:
         last = decoder.level_count - 1
     before, after = (os.path.getsize(path) for path in (args.input, args.output))
-    print(f"{args.output}: levels 0 to {last}, {after:,} of {before:,} bytes")
+    echo(f"{args.output}: levels 0 to {last}, {after:,} of {before:,} bytes")
     return 0
 
 
@@ -353,21 +355,43 @@ def _needs(row: dict[str, Any]) -> str:
 def view(args: argparse.Namespace) -> int:
     from athcodec import view
 
-    with naming(args.file):
+    if args.export and Path(args.export).suffix.lower() not in (".html", ".htm"):
+        return _export_gallery(args)
+    file, *more = args.files
+    if more:
+        raise ValueError(f"got {len(args.files)} files, expected one, or --export DIR for a gallery")
+    floor = dict(args.floor or [])
+    with naming(file):
         if args.export:
-            check_output(args.export, args.file)
-            size = view.export_page(args.file, args.export, args.clip, args.host_mesh)
-            print(f"{args.export}: {size:,} bytes, opens in any browser")
+            check_output(args.export, file)
+            size = view.export_page(file, args.export, args.clip, args.host_mesh, floor)
+            echo(f"{args.export}: {size:,} bytes, opens in any browser")
             return 0
         ready = partial(_say_where, no_browser=args.no_browser)
-        view.serve(args.file, args.port, ready, args.clip, args.host_mesh, forest=args.forest)
+        view.serve(file, args.port, ready, args.clip, args.host_mesh, args.forest, floor)
+    return 0
+
+
+def _export_gallery(args: argparse.Namespace) -> int:
+    from athcodec import gallery, picture
+
+    if args.clip or args.host_mesh or args.floor:
+        raise ValueError("--export DIR: got --clip, --host-mesh or --floor, which are of pages with one file")
+    for file in args.files:
+        with naming(file):
+            gallery.facts_of(file)
+    stills = picture.can_draw()
+    if not stills:
+        say("warning", f"no still pictures: they need Chromium and {picture.INSTALL}")
+    size = gallery.export_gallery(args.files, args.export, stills)
+    echo(f"{args.export}: {len(args.files)} plants, {size:,} bytes, for any web host")
     return 0
 
 
 def _say_where(address: str, no_browser: bool) -> None:
     from athcodec import view
 
-    print(f"{address} (Ctrl-C ends it)", flush=True)
+    echo(f"{address} (Ctrl-C ends it)", flush=True)
     if not no_browser:
         view.open_browser(address)
 
@@ -380,7 +404,7 @@ def picture(args: argparse.Namespace) -> int:
     with naming(args.file):
         check_output(out, args.file)
         size = picture.save_picture(args.file, out, kind, args.clip, args.size, args.fps, args.time, args.host_mesh)
-    print(f"{out}: {size:,} bytes")
+    echo(f"{out}: {size:,} bytes")
     return 0
 
 
@@ -395,19 +419,23 @@ def demo(args: argparse.Namespace) -> int:
             with open_file(encoded, strict=True) as decoder:
                 meters = [decode_and_measure(decoder, clip, encoded, d) for d in range(decoder.level_count)]
                 print_demo(facts_of(encoded, decoder), meters)
-        shown = athcodec.sample_path("leafed") if args.sample == "tree" else encoded
-        _export_demo(shown, Path(args.keep or ".", DEMO_PAGE))
+        page = Path(args.keep or ".", DEMO_PAGE)
+        if args.sample == "tree":
+            floor = {athcodec.sample_path(name): each for name, each in DEMO_FLOOR.items()}
+            _export_demo(athcodec.sample_path("leafed"), page, floor)
+        else:
+            _export_demo(encoded, page)
         if args.keep is not None:
-            print(f"The file and its decoded levels are in {folder}.")
+            echo(f"The file and its decoded levels are in {folder}.")
     return 0
 
 
-def _export_demo(encoded: Path, page: Path) -> None:
+def _export_demo(encoded: Path, page: Path, floor: Mapping[Path, float] | None = None) -> None:
     from athcodec import view
 
     try:
-        view.export_page(encoded, page)
+        view.export_page(encoded, page, floor=floor)
     except OSError as error:  # a folder that is read-only is no reason to fail at the end
         say("warning", f"no page to look at: {one_line(error)}")
     else:
-        print(f"{encoded.name} moves in {page.resolve()}: open it in a browser.")
+        echo(f"{encoded.name} moves in {page.resolve()}: open it in a browser.")

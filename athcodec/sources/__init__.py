@@ -73,6 +73,8 @@ class ReadOptions:
         Names of static arrays to leave out.
     root : int or sequence of int, optional
         The vertex, or one per connected component, at which branches that are derived from edges begin.
+    allow_outside : bool, optional
+        Whether a source may name files outside of its own folder: XDMF, PVD, HDF5 and USD; by default that is refused.
 
     Raises
     ------
@@ -88,6 +90,7 @@ class ReadOptions:
     takes: Sequence[str] | str = ()
     skip: Collection[str] = ()
     root: int | Sequence[int] | None = None
+    allow_outside: bool = False
 
     def __post_init__(self) -> None:
         if self.rest not in ("auto", "first", "mean"):
@@ -375,22 +378,26 @@ def sample_path(name: str = "tree") -> Path:
 
     Parameters
     ----------
-    name : {"tree", "growth", "leafed"}, optional
-        A small finite-element tree in wind, a tree whose branches grow out of each other, or a leafed tree in a calm
-        wind and in a gale.
+    name : {"tree", "growth", "leafed", "fern", "grass"}, optional
+        A small finite-element tree in wind, a tree whose branches grow out of each other, or a leafed tree, a fern or
+        a tuft of grass in a calm wind and in a gale.
 
     Returns
     -------
     pathlib.Path
-        An HDF5 file of athcodec's schema, with 120 frames of 1,001 vertices; of the leafed tree an .ath of two loops
-        of 150 frames, 54,920 vertices.
+        An HDF5 file of athcodec's schema, with 120 frames of 1,001 vertices; of the last three an .ath of two loops of
+        150 frames, with 54,920, 2,844 and 1,400 vertices.
 
     Raises
     ------
     ValueError
         For another name.
     """
-    files = {own: f"{own}_1k_120f.h5" for own in SAMPLES} | {"leafed": "leafed_tree.ath"}
+    files = {own: f"{own}_1k_120f.h5" for own in SAMPLES} | {
+        "leafed": "leafed_tree.ath",
+        "fern": "fern.ath",
+        "grass": "grass.ath",
+    }
     if name not in files:
         raise ValueError(f"sample: got {name!r}, expected one of {', '.join(files)}")
     return Path(__file__).resolve().parent.parent / "sample" / files[name]

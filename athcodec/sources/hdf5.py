@@ -35,6 +35,7 @@ from athcodec.sources.schema import clip_of_arrays
 
 CHUNK_CACHE_BYTES = 64 << 20
 MAX_ATTRIBUTE_BYTES = 1 << 30
+_OWN = "expected numbers in the file itself; --allow-outside (allow_outside=True) reads others"
 
 
 def read_clip(path: str | PathLike[str], options: ReadOptions) -> MotionClip:
@@ -62,6 +63,8 @@ def _open(path: str | PathLike[str]) -> h5py.File:
 
 
 def _read(file: h5py.File, options: ReadOptions) -> MotionClip:
+    for name in () if options.allow_outside else _names(file):
+        check_own(file, name, False)
     unchanged = FileWatch(file.id.get_vfd_handle())  # HDF5 itself reads zeros where a file has become shorter
     positions = _dataset(file, "positions")
     if positions is None:
@@ -73,6 +76,39 @@ def _read(file: h5py.File, options: ReadOptions) -> MotionClip:
     return clip_of_arrays(
         positions, lambda name: _array(file, name), attributes, metadata, options, resource=file, unchanged=unchanged
     )
+
+
+def check_own(file: h5py.File, name: str, allow_outside: bool) -> None:
+    """Raises ClipError where a dataset, or a link on the way to it, is in another file."""
+    if allow_outside:
+        return
+    parts = [part for part in name.split("/") if part]
+    for end in range(1, len(parts) + 1):
+        link = file.get("/".join(parts[:end]), getlink=True)
+        if isinstance(link, h5py.ExternalLink):
+            raise ClipError(f"{name[:80]}: got a link to {link.filename[:80]!r}, {_OWN}")
+    found = file.get(name) if parts else None
+    if found is not None and found.file.filename != file.filename:
+        raise ClipError(f"{name[:80]}: got a link to {found.file.filename[:80]!r}, {_OWN}")
+    if isinstance(found, h5py.Dataset) and (found.external or found.is_virtual):
+        raise ClipError(f"{name[:80]}: got a dataset whose numbers are in other files, {_OWN}")
+
+
+def _names(file: h5py.File) -> list[str]:
+    """Of all that hangs in the file, links to other files among it, which are not followed."""
+    names, groups, seen = [], [("", file["/"])], set()
+    while groups:
+        within, group = groups.pop()
+        address = h5py.h5o.get_info(group.id).addr
+        if address in seen:  # groups may hold each other
+            continue
+        seen.add(address)
+        for key in group:
+            names.append(f"{within}/{key}")
+            is_own = group.get(key, getclass=True, getlink=True) is h5py.HardLink
+            if is_own and isinstance(group[key], h5py.Group):
+                groups.append((names[-1], group[key]))
+    return names
 
 
 def _dataset(file: h5py.File, name: str) -> h5py.Dataset | None:

@@ -8,6 +8,7 @@ import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from os import PathLike, fspath
+from pathlib import Path
 from typing import Protocol
 
 from athcodec.errors import ClipError
@@ -39,6 +40,30 @@ class FileWatch:
             return all(_stamp(file) == stamp for file, stamp in self._stamps.items())
         except OSError:
             return False
+
+
+def file_beside(folder: str | PathLike[str], name: str, allow_outside: bool = False) -> Path:
+    """A file that a source names, by a path from its own folder.
+
+    Raises ClipError where it is no plain file and, unless `allow_outside`, where it lies outside of that folder: a
+    source that is not trusted must not reach other files on the disk.
+    """
+    if not name or "\0" in name:
+        raise ClipError(f"got the file name {name[:80]!r}, expected a path")
+    path = Path(folder, name)
+    check_inside(folder, path, allow_outside)
+    if path.exists() and not path.is_file():
+        raise ClipError(f"{name[:80]}: got a folder, device or pipe, expected a plain file")
+    return path
+
+
+def check_inside(folder: str | PathLike[str], path: str | PathLike[str], allow_outside: bool) -> None:
+    """Raises ClipError for a path outside of a folder. Links inside the folder lead where they lead."""
+    if not allow_outside and not Path(os.path.abspath(path)).is_relative_to(os.path.abspath(folder)):
+        raise ClipError(
+            f"got the file {fspath(path)[-80:]!r}, expected one in the folder of the source or below it; "
+            "--allow-outside (allow_outside=True) reads others"
+        )
 
 
 def _stamp(file: File) -> tuple[int, int]:

@@ -23,6 +23,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from os import PathLike, fspath
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -32,7 +33,7 @@ from athcodec.clip import MotionClip, Skin
 from athcodec.errors import ClipError
 from athcodec.sources import ReadOptions
 from athcodec.sources.crate import check_crates
-from athcodec.sources.opening import FileWatch, naming
+from athcodec.sources.opening import FileWatch, check_inside, naming
 from athcodec.sources.scene_objects import (
     OWN,
     ArrayDescriptor,
@@ -65,7 +66,7 @@ def read_clip(path: str | PathLike[str], options: ReadOptions) -> MotionClip:
     with naming(path):
         check_crates(path)
         with quietly():
-            return _clip(_Stage(path), options)
+            return _clip(_Stage(path, options.allow_outside), options)
 
 
 @contextmanager
@@ -93,7 +94,7 @@ def _one_line(error: Exception) -> str:
 class _Stage:
     """An open stage, and whether the files that it is made of have stayed as they were."""
 
-    def __init__(self, path: str):
+    def __init__(self, path: str, allow_outside: bool):
         known = Sdf.Layer.Find(path)
         if known:
             known.Reload()  # USD keeps layers for as long as anybody has them open
@@ -103,6 +104,8 @@ class _Stage:
         self.errors = [" ".join(str(error).split()) for error in self.stage.GetCompositionErrors()]
         files = [layer.realPath for layer in self.stage.GetUsedLayers() if os.path.isfile(layer.realPath)]
         self.unchanged = FileWatch(*files)
+        for file in files:
+            check_inside(Path(self.stage.GetRootLayer().realPath).parent, file, allow_outside)
 
     def close(self) -> None:
         self.stage = None

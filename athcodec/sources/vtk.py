@@ -27,7 +27,7 @@ from athcodec.errors import ClipError, MissingExtra
 from athcodec.sources import ReadOptions
 from athcodec.sources.cells import VTK_NAMES, VTK_NUMBERS, blocks_of, topology_of
 from athcodec.sources.fields import clip_of_steps
-from athcodec.sources.opening import FileWatch, naming
+from athcodec.sources.opening import FileWatch, check_inside, naming
 from athcodec.sources.sequence import sequence_files
 from athcodec.sources.timing import numbered_times, times_in_seconds
 from athcodec.sources.xdmf import parse_xml
@@ -79,10 +79,10 @@ def read_clip(path: str | PathLike[str], options: ReadOptions) -> MotionClip:
 def _files(path: Path, options: ReadOptions) -> tuple[list[Path], np.ndarray, dict[str, Any]]:
     """The files in the order of time, and their times."""
     if path.suffix.lower() == ".pvd":
-        return _listed(path, options.fps)
+        return _listed(path, options)
     index = _index_of(path)
     if index is not None:
-        return _listed(index, options.fps)
+        return _listed(index, options)
     files = sequence_files(path)
     if None in files:
         return list(files.values()), np.zeros(1), {}
@@ -111,12 +111,14 @@ def _datasets(index: Path) -> list[tuple[Path, float]]:
     return [(file, time) for file, time, _ in found]
 
 
-def _listed(index: Path, fps: float | None) -> tuple[list[Path], np.ndarray, dict[str, Any]]:
+def _listed(index: Path, options: ReadOptions) -> tuple[list[Path], np.ndarray, dict[str, Any]]:
     files = [file for file, _ in _datasets(index)]
+    for file in files:
+        check_inside(index.parent, file, options.allow_outside)
     stored = np.array([time for _, time in _datasets(index)])
     if len(stored) == 1 and not np.isfinite(stored).all():
         stored = np.zeros(1)
-    time, metadata = times_in_seconds(stored, fps)
+    time, metadata = times_in_seconds(stored, options.fps)
     numbers = [re.search(r"(\d+)$", file.stem) for file in files]
     if "fps" in metadata and all(numbers):
         counted = np.array([float(number[1]) for number in numbers])
@@ -186,6 +188,8 @@ class _Grid:
 
 
 def _read_grid(path: Path) -> _Grid:
+    if path.exists() and not path.is_file():
+        raise ClipError(f"{path}: got a folder, device or pipe, expected a plain file")
     if path.suffix.lower() == ".vtk":
         return _legacy_grid(path)
     with naming(path, *_BROKEN):

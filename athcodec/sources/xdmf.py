@@ -23,7 +23,8 @@ from athcodec.errors import ClipError
 from athcodec.sources import ReadOptions
 from athcodec.sources.cells import NODES, Block, blocks_of, topology_of
 from athcodec.sources.fields import clip_of_steps
-from athcodec.sources.opening import FileWatch, closing_on_failure, naming
+from athcodec.sources.hdf5 import check_own
+from athcodec.sources.opening import FileWatch, closing_on_failure, file_beside, naming
 from athcodec.sources.scene_objects import MATERIAL_NAMES
 from athcodec.sources.timing import times_in_seconds, whole
 
@@ -87,7 +88,7 @@ _XML_ERRORS = (ElementTree.ParseError, ValueError, KeyError, OverflowError, Inde
 def read_clip(path: str | PathLike[str], options: ReadOptions) -> MotionClip:
     """Open the clip in the XDMF file `path`. Raises ClipError where it or what it names is no usable series, OSError
     where the file cannot be opened."""
-    data = Data(Path(path))
+    data = Data(Path(path), options.allow_outside)
     with naming(path, *_XML_ERRORS), closing_on_failure(data):
         steps = _Steps(data, parse_xml(Path(path).read_bytes(), "Xdmf"), options)
         time, metadata = steps.times(options)
@@ -110,8 +111,8 @@ def parse_xml(data: bytes, tag: str) -> ElementTree.Element:
 class Data:
     """DataItems of one XDMF file, and the HDF5 files that they lie in, open until close()."""
 
-    def __init__(self, path: Path):
-        self._folder = path.resolve().parent
+    def __init__(self, path: Path, allow_outside: bool):
+        self._folder, self._allow_outside = path.resolve().parent, allow_outside
         self._files: dict[Path, h5py.File] = {}
         self.unchanged = FileWatch(path.resolve())
 
@@ -159,6 +160,7 @@ class Data:
         if path not in self._files:
             self._files[path] = _open_hdf(path)
         try:
+            check_own(self._files[path], inside, self._allow_outside)
             dataset = self._files[path][inside]
             if not isinstance(dataset, h5py.Dataset) or dataset.shape is None or dataset.dtype.kind not in "fiu":
                 raise ClipError(f"{path.name}: {inside[:80]!r}: got no array of numbers")
@@ -194,8 +196,8 @@ class Data:
         return values.reshape(shape)
 
     def _file_named(self, name: str) -> Path:
-        path = self._folder / name
-        if not name or not path.is_file():
+        path = file_beside(self._folder, name, self._allow_outside)
+        if not path.is_file():
             raise ClipError(f"DataItem: got the file {name[:80]!r}, which does not exist")
         self.unchanged.add(path)
         return path
