@@ -33,7 +33,7 @@
     renderer.render(scene, camera);
     const render = await timed(5, () => renderer.render(scene, camera));
     return { update, render, parameters, motion, again: forest.bytesOfMotion - motion, plants: forest.plantCount,
-      gpu: forest.levels.map(({ passes }) => passes.bytes), uploads: forest.levels.map(({ passes }) => passes.bytesOfMotion) };
+      gpu: forest.levels.map(({ passes }) => passes.bytes), uploads: forest.levels.map(({ bytesOfMotion }) => bytesOfMotion) };
   },
 
   // The passes, and skinning by the shader `code`.
@@ -85,7 +85,7 @@
       const each = Array.from({ length: plants }, (_, plant) => plant), known = [...places.values()];
       const slots = (plant, k) => [4 * plant + k % 4, 4 * plant + (k + 1) % 4];
       const show = (i) => each.map((plant) => ({ slots: slots(plant, i), weight: 0.3, previous: slots(plant, i + 3), previousWeight: 0.2 }));
-      const place = (i) => each.map((plant) => ({ ...known[(plant + i) % known.length], slot: slots(plant, i)[1] }));
+      const place = (i) => each.map((plant) => ({ sources: [known[(plant + i) % known.length]], slot: slots(plant, i)[1] }));
       const shown = await timed((i) => passes.run([], show(i)));
       found.push({ level, bones, skinning, shown, placed: await timed((i) => passes.run(place(i), show(i))) });
     }

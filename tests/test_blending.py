@@ -26,7 +26,7 @@ WINDS = {"calm": (2.0, 0.0), "storm": (8.0, 0.0), "across": (8.0, 90.0)}
 DIRECTIONS = {0.0: winds.DIRECTION, 90.0: np.array([1.0, 0.0, 1.0]) / math.sqrt(2)}
 
 
-def _simulated(leaves: int = 0) -> athcodec.MotionClip:
+def simulated(leaves: int = 0) -> athcodec.MotionClip:
     """A small tree of beams in three winds."""
     plant, clips = grow(300, 2, 8.0, seed=3), {}
     with pytest.MonkeyPatch.context() as patched:
@@ -54,12 +54,12 @@ def _encoded(clip, path):
 
 @pytest.fixture(scope="module")
 def tree_ath(tmp_path_factory):
-    return _encoded(_simulated(), tmp_path_factory.mktemp("blending") / "tree.ath")
+    return _encoded(simulated(), tmp_path_factory.mktemp("blending") / "tree.ath")
 
 
 @pytest.fixture(scope="module")
 def leafed_ath(tmp_path_factory):
-    return _encoded(_simulated(leaves=40), tmp_path_factory.mktemp("blending") / "leafed.ath")
+    return _encoded(simulated(leaves=40), tmp_path_factory.mktemp("blending") / "leafed.ath")
 
 
 def _shown(decoder, name, seconds, level=None):

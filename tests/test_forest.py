@@ -18,6 +18,8 @@ sys.path.append(str(Path(__file__).parents[1]))  # for bench, which is not insta
 
 from athcodec.core_file import FILE_ORDER  # noqa: E402
 from athcodec.gpu import GpuFile  # noqa: E402
+from athcodec.gpu.evaluate import Passes, Source  # noqa: E402
+from athcodec.joining import in_wind  # noqa: E402
 from bench.browser import WEBGPU_FLAGS, chromium  # noqa: E402
 from bench.throttled_server import ThrottledServer  # noqa: E402
 
@@ -40,6 +42,18 @@ def grove(tmp_path_factory):
     return path
 
 
+@pytest.fixture(scope="module")
+def winds(tmp_path_factory):
+    """A file of two clips that say how strong their wind is, and have transitions."""
+    path = tmp_path_factory.mktemp("winds") / "winds.ath"
+    clips = {
+        "calm": in_wind(blown_tree(3, 60, 48, sway=0.02), 2.0, 0.0),
+        "gale": in_wind(blown_tree(3, 60, 40), 8.0, 0.0),
+    }
+    athcodec.encode(athcodec.join(clips), path, rel_error=1e-3, segment_frames=20)
+    return path
+
+
 @pytest.fixture
 def opened(browser):
     """A function that opens the forest of a file, stopped; the page must not have logged an error at the end."""
@@ -48,9 +62,11 @@ def opened(browser):
         page.on("console", lambda message: errors.append(message.text) if message.type == "error" else None)
         page.on("pageerror", lambda error: errors.append(str(error)))
 
-        def visit(path: Path, count: int, until: str = FINEST):
+        def visit(path: Path, count: int, until: str = FINEST, floor: Path | None = None):
             line.files["plant.ath"] = path.read_bytes()
-            page.goto(f"{line.address}forest.html?file=plant.ath&count={count}")
+            line.files["floor.ath"] = floor.read_bytes() if floor else b""
+            more = "&floor=floor.ath&each=3" if floor else ""
+            page.goto(f"{line.address}forest.html?file=plant.ath&count={count}{more}")
             page.wait_for_function(f"() => athcodecForest.forest && {until}", timeout=120_000)
             page.evaluate("athcodecForest.playing = false")
             return page
@@ -66,7 +82,7 @@ def shown(page, seconds: float, level: int, strength: float = 1.0) -> np.ndarray
         "([seconds, strength]) => { const { forest, camera } = athcodecForest;"
         " camera.position.set(0, 1, 0);"
         " camera.updateMatrixWorld();"
-        " forest.wind(strength).update(camera, 1e6, seconds); }",
+        " forest.sway(strength).update(camera, 1e6, seconds); }",
         [seconds, strength],
     )
     numbers = page.evaluate(f"athcodecForest.forest.vertices({level}).then((found) => Array.from(found))")
@@ -97,6 +113,81 @@ def test_plants_of_a_forest_are_where_the_decoder_has_them(opened, grove):
     assert np.array_equal(before, got), "the previous positions are those of the picture before"
 
 
+def blocks_show(path: Path, seconds: float, weights: dict[str, float], phase: float = 0.0) -> np.ndarray:
+    """(N, 3): what the blocks of the file show of its clips, each around its own time."""
+    file = GpuFile(path.read_bytes())
+    level = file.core.info.level_count - 1
+    starts = file.core.segment_starts(range(file.core.info.segment_count + 1))
+    with athcodec.open(path) as decoder:
+        clips = {clip.name: clip for clip in decoder.clips}
+    sources = []
+    for name, weight in weights.items():
+        clip = clips[name]
+        frame = (30 * seconds + phase * clip.frame_count) % clip.frame_count
+        for at, share in ((int(frame), 1 - frame % 1), (int(frame) + 1, frame % 1)):
+            first = clip.first_frame + at % clip.frame_count
+            segment = int(np.searchsorted(starts, first, side="right")) - 1
+            coded = np.array([file.coded_frame(first)])
+            sources.append(Source(file.segment(segment, level), coded, np.array([weight * share])))
+    return Passes(file.level(level), *sources).vertices()[0]
+
+
+@pytest.mark.parametrize(
+    ("strength", "weights", "times"),
+    [(6.5, {"calm": 0.25, "gale": 0.75}, (0.1, 0.55)), (8.0, {"gale": 1.0}, (0.1, 0.5))],
+)
+def test_a_wind_blends_clips_on_the_card(opened, winds, strength, weights, times):
+    """Also between frames, where one clip alone is a mean of positions."""
+    page = opened(winds, 1)
+    level = page.evaluate("athcodecForest.ath.motion.levelCount - 1")
+    page.evaluate(
+        "(strength) => { athcodecForest.forest.ease = 0; return athcodecForest.forest.wind(strength); }", strength
+    )
+    for seconds in times:
+        got = settled(page, seconds, level)
+        ((_, phase),) = page.evaluate("athcodecForest.forest.plants")
+        assert np.abs(got - blocks_show(winds, seconds, weights, phase)).max() < 1e-4
+
+
+def settled(page, seconds: float, level: int) -> np.ndarray:
+    """(N, 3): the only plant, once all clips that it shows are on the card."""
+    shown(page, seconds, level)
+    page.wait_for_function(
+        "athcodecForest.forest.levels.every(({ clips }) => clips.size === athcodecForest.forest.clips.length)"
+    )
+    return shown(page, seconds, level)[0, :, :3]
+
+
+def test_a_clip_that_comes_late_does_not_jump(opened, winds):
+    """Weights change over a time, once the bytes are here."""
+    page = opened(winds, 1)
+    level = page.evaluate("athcodecForest.ath.motion.levelCount - 1")
+    page.evaluate("athcodecForest.forest.wind(8)")
+    before = settled(page, 0.3, level)
+    page.evaluate("athcodecForest.forest.ease = 1e6, athcodecForest.forest.wind(2)")
+    after = settled(page, 0.3, level)
+    assert 0 <= np.abs(after - before).max() < 1e-3
+    page.evaluate("athcodecForest.forest.ease = 0")
+    assert np.abs(settled(page, 0.3, level) - before).max() > 0.01
+
+
+def test_plants_play_without_an_end(opened, tmp_path, sample_clip):
+    path = tmp_path / "endless.ath"
+    athcodec.encode(athcodec.endless(sample_clip), path, rel_error=1e-3)
+    page = opened(path, 1, "true")
+    page.wait_for_function(f"() => {{ athcodecForest.forest.update(athcodecForest.camera, 1e6, 0); return {FINEST}; }}")
+    level = page.evaluate("athcodecForest.ath.motion.levelCount - 1")
+    page.evaluate("athcodecForest.forest.endless(7)")
+    ((clip, phase),) = page.evaluate("athcodecForest.forest.plants")
+    with athcodec.open(path) as decoder:
+        play, core = decoder.endless(7), GpuFile(path.read_bytes()).core
+        round_of = decoder.time[-1] * decoder.frame_count / (decoder.frame_count - 1)
+        for seconds in np.linspace(0.4, 60.0, 40):
+            wanted = play.positions(seconds + phase * round_of)[core.vertex_source()] - np.array(core.info.origin)
+            got = shown(page, float(seconds), level)[0, :, :3]
+            assert np.abs(got - wanted).max() <= decoder.max_error_bound
+
+
 def test_every_instance_in_view_is_drawn_once_and_wind_of_no_strength_is_still(opened, grove):
     page = opened(grove, 300)
     page.evaluate(
@@ -120,11 +211,70 @@ def test_nothing_of_the_motion_is_uploaded_again(opened, grove):
     assert page.evaluate(uploaded) == first > 0
 
 
+def test_plants_of_another_file_stand_on_the_floor(opened, grove):
+    until = "athcodecForest.floor[0].levels.length > 0"
+    page = opened(grove, 12, until, floor=athcodec.sample_path("grass"))
+    assert page.evaluate("[athcodecForest.forest.count, athcodecForest.floor[0].count]") == [12, 36]
+
+
 def test_ten_thousand_plants_are_seen(opened, grove):
     page = opened(grove, 10_000, "athcodecForest.frames > 2 && athcodecForest.forest.levels.length > 0")
     assert page.evaluate("athcodecForest.forest.count") == 10_000
     assert sum(page.evaluate("athcodecForest.forest.drawn()")) > 1000
     assert page.evaluate("athcodecForest.milliseconds") < 100
+
+
+CAMERA = "[...athcodecForest.camera.position.toArray(), athcodecForest.camera.rotation.y]"
+
+
+def moves(page) -> list[float]:
+    """How far the camera goes, along x, y and z, and turns, until it has moved."""
+    before = np.array(page.evaluate(CAMERA))
+    page.wait_for_function(
+        f"(before) => Math.hypot(...{CAMERA}.map((x, i) => x - before[i])) > 0.05", arg=before.tolist()
+    )
+    return (np.array(page.evaluate(CAMERA)) - before).tolist()
+
+
+def test_the_forest_is_walked_through_by_keys(opened, grove):
+    page = opened(grove, 50)
+    page.evaluate("athcodecForest.playing = true")
+    page.keyboard.down("w")
+    page.wait_for_function("() => athcodecForest.walk.on")
+    page.wait_for_function(
+        "() => athcodecForest.camera.position.y < 1.05 * athcodecForest.walk.height", timeout=120_000
+    )
+    assert page.get_attribute("#walk", "aria-pressed") == "true"
+    way = page.evaluate(
+        "(() => { const way = athcodecForest.camera.matrixWorld.elements; return [-way[8], -way[10]]; })()"
+    )
+    x, _, z, turned = moves(page)
+    assert x * way[0] + z * way[1] > 0 and abs(turned) < 1e-6
+    page.keyboard.up("w")
+    page.mouse.move(200, 60)
+    page.mouse.down()
+    page.mouse.move(100, 60)
+    page.mouse.up()
+    page.wait_for_function("() => athcodecForest.frames > 0")
+    page.keyboard.press("Escape")
+    page.wait_for_function("() => !athcodecForest.walk.on && athcodecForest.controls.enabled")
+
+
+def test_the_forest_is_walked_through_by_a_thumb(browser, grove):
+    with ThrottledServer({"plant.ath": grove.read_bytes()}) as line:
+        page = browser.new_page(viewport={"width": 360, "height": 480}, has_touch=True, is_mobile=True)
+        page.goto(f"{line.address}forest.html?file=plant.ath&count=50")
+        page.wait_for_function(
+            "() => athcodecForest.forest?.levels.length > 0 && athcodecForest.frames > 1", timeout=120_000
+        )
+        box = page.locator("#stick").bounding_box()
+        page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+        page.mouse.down()
+        page.mouse.move(box["x"] + box["width"] / 2, box["y"] + 4)
+        page.wait_for_function("() => athcodecForest.walk.on")
+        assert max(map(abs, moves(page))) > 0.01
+        page.mouse.up()
+        page.close()
 
 
 @pytest.mark.parametrize("mode", ["matrices", "positions"])

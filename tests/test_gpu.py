@@ -12,12 +12,13 @@ import numpy as np
 import pytest
 from moving_meshes import leafed_tree
 from plants import blown_tree, bush, chain_plant
+from test_blending import simulated
 from test_tubes import twigs
 
 import athcodec
 from athcodec.core_file import FILE_ORDER, CoreError
 from athcodec.gpu import SHADERS, GpuFile, Room, corners_of
-from athcodec.gpu.evaluate import BODY, LEVEL, SEGMENT, Passes, head, section
+from athcodec.gpu.evaluate import BODY, LEVEL, SEGMENT, Passes, Source, head, section
 from athcodec.sources import sample_path
 
 sys.path.append(str(Path(__file__).parents[1]))  # for bench and spec; athcodec stays the installed one
@@ -132,7 +133,7 @@ def shown_by_both(file: Checked) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         for segment in range(file.info.segment_count):
             frames = range(file.starts[segment], file.starts[segment + 1])
             coded = np.array([file.gpu.coded_frame(frame) for frame in frames])
-            got = Passes(block, file.gpu.segment(segment, level), coded).vertices()
+            got = Passes(block, Source(file.gpu.segment(segment, level), coded)).vertices()
             yield got, np.array([file.decoded(frame, level) for frame in frames])
 
 
@@ -229,6 +230,60 @@ def test_too_little_room_is_said_and_needs_no_more_memory(files):
     assert (file.gpu.recorded(0, level, needed) == whole).all()
 
 
+# ---- blending ----
+
+
+@pytest.fixture(scope="module")
+def winds(tmp_path_factory):
+    """A leafed tree in three winds, with the edges of its faces and what the decoder blends."""
+    path = tmp_path_factory.mktemp("winds") / "winds.ath"
+    athcodec.encode(simulated(leaves=40), path, rel_error=1e-4, segment_frames=16)
+    file = Checked(path)
+    with athcodec.open(path) as decoder:
+        order = file.gpu.core.vertex_source()
+        faces = np.argsort(order)[decoder.faces]
+        file.edges = np.stack([faces, np.roll(faces, -1, axis=1)], axis=-1).reshape(-1, 2)
+        names = [clip.name for clip in decoder.clips]
+        blends = lambda weights, second: decoder.blended(dict(zip(names, weights)), second)  # noqa: E731
+        file.decoder_blends = lambda *asked: blends(*asked)[order] - np.array(file.info.origin)
+        yield file
+
+
+def sources_of(file: Checked, weights: list[float], second: float) -> list[tuple[int, int, float]]:
+    """Segments, their frames and weights: clips of like lengths, at a time in each."""
+    frame = 30 * second
+    pairs = []
+    for clip, weight in zip(file.gpu.core.clips(), weights, strict=True):
+        first, part = clip.first_frame + int(frame), frame - int(frame)
+        for at, share in ((first, 1 - part), (first + 1, part)):
+            pairs.append((file.segment_of(at), file.gpu.coded_frame(at), weight * share))
+    return [pair for pair in pairs if pair[2] > 0]
+
+
+def blended_clips(file: Checked, level: int, weights: list[float], second: float) -> np.ndarray:
+    """What the blocks show, (N, 3)."""
+    found = sources_of(file, weights, second)
+    sources = [Source(file.gpu.segment(s, level), np.array([frame]), np.array([w])) for s, frame, w in found]
+    return Passes(file.gpu.level(level), *sources).vertices()[0]
+
+
+@pytest.mark.parametrize("weights", [(0.5, 0.5, 0), (0, 0.5, 0.5), (0.2, 0.5, 0.3)])
+def test_blended_clips_keep_edges_as_long_as_they_are_in_the_clips(winds, weights):
+    """Within 1 %, leaves and bark; and are what the decoder blends, within a tenth of how far the clips are apart."""
+    level, edges = winds.info.level_count - 1, winds.edges
+    length = lambda x: np.linalg.norm(x[edges[:, 1]] - x[edges[:, 0]], axis=1)  # noqa: E731
+    alone = [blended_clips(winds, level, own, 0.55) for own in np.eye(3).tolist()]
+    lengths = np.array([length(x) for x, weight in zip(alone, weights) if weight])
+    blended = blended_clips(winds, level, weights, 0.55)
+    rounding = 2 * winds.info.max_error
+    assert (length(blended) <= 1.01 * lengths.max(0) + rounding).all()
+    assert (length(blended) >= 0.99 * lengths.min(0) - rounding).all()
+    apart = max(distance(a, b) for a in alone for b in alone)
+    off = distance(blended, winds.decoder_blends(weights, 0.55))
+    print(f"{weights}: {off / apart:.3f} of the distance of the clips from what the decoder blends")
+    assert off <= 0.1 * apart
+
+
 # ---- in a browser ----
 
 
@@ -290,7 +345,7 @@ def test_the_shaders_show_what_the_decoder_does(files, shaders, name):
     tolerance, shows = file.tolerance(), shows_of(file)
     for level in range(file.info.level_count):
         segments = [file.gpu.segment(segment, level) for segment in range(file.info.segment_count)]
-        place = lambda frame: [file.segment_of(frame), file.gpu.coded_frame(frame)]  # noqa: E731
+        place = lambda frame: [[file.segment_of(frame), file.gpu.coded_frame(frame), 1.0]]  # noqa: E731
         asked = []
         for show, before in zip(shows, [*shows[1:], shows[0]], strict=True):
             asked.append([[place(frame) for frame in show[0] + before[0]], [show[1], before[1]]])
@@ -303,10 +358,21 @@ def test_the_shaders_show_what_the_decoder_does(files, shaders, name):
 
 
 @pytest.mark.browser
+def test_the_shaders_blend_clips_as_the_blocks_say(winds, shaders):
+    for level in range(winds.info.level_count):
+        segments = [winds.gpu.segment(segment, level) for segment in range(winds.info.segment_count)]
+        times = [((0.2, 0.5, 0.3), 0.55), ((0, 0, 1), 0.55), ((0.5, 0.5, 0), 0.1), ((0, 0.7, 0.3), 0.7)]
+        asked = [sources_of(winds, *time) for time in times]
+        got = shaders(winds.gpu.level(level), segments, [[asked, [0.0, 0.0]]])[0]
+        for column, time in ((0, times[0]), (2, times[2])):
+            assert distance(got[:, column], blended_clips(winds, level, *time)) <= winds.tolerance()
+
+
+@pytest.mark.browser
 def test_more_workgroups_than_go_side_by_side_do_all_the_work(files, shaders):
     file = files("layers")
     level = file.info.level_count - 1
-    place = [0, file.gpu.coded_frame(2)]
+    place = [[0, file.gpu.coded_frame(2), 1.0]]
     asked = file.gpu.level(level), [file.gpu.segment(0, level)], [[[place] * 4, [0.0, 0.0]]]
     assert head(asked[0], LEVEL)["body_count"] > 21
     (rows,), (row,) = (shaders(*asked, **options) for options in ({"across": 7}, {}))
@@ -319,7 +385,7 @@ def test_normals_are_those_of_the_moved_triangles(files, shaders):
     level, frame, vertices = file.info.level_count - 1, 5, file.info.vertex_count
     triangles = np.arange(vertices - 12)[:, None] + [0, 1, 2]
     corners = corners_of(triangles, vertices)
-    segment, shown = file.segment_of(frame), [[[[0, frame]] * 4, [0.0, 0.0]]]
+    segment, shown = file.segment_of(frame), [[[[[0, frame, 1.0]]] * 4, [0.0, 0.0]]]
     got = shaders(file.gpu.level(level), [file.gpu.segment(segment, level)], shown, corners)[0][:, 1]
     x = file.decoded(frame, level)
     a, b, c = (x[triangles[:, k]] for k in range(3))

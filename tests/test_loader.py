@@ -158,7 +158,7 @@ def test_a_wind_shows_the_blended_clips_of_the_decoder(with_faces, sample_clip, 
         clips[f"clip{i}"] = in_wind(clip.replace(positions=moved), 2.0 + 6.0 * (i > 0), 90.0 * i)
     path = tmp_path / "winds.ath"
     athcodec.encode(athcodec.join(clips), path, rel_error=1e-3, segment_frames=16)
-    assert run_node("winds", path) == {"off": [], "refused": ["RangeError", "RangeError"]}
+    assert run_node("winds", path) == {"off": [], "eased": True, "refused": ["RangeError", "RangeError"]}
 
 
 def test_endless_play_shows_what_the_decoder_in_python_does(sample_clip, tmp_path):

@@ -3,19 +3,28 @@
 @group(0) @binding(0) var<storage, read> level: array<u32>;
 @group(0) @binding(1) var<storage, read> segments: array<u32>; // blocks one behind the other
 
-// A frame that is placed. A dispatch places several, one for each y of its workgroups.
+// What is placed: the blend of its sources. A dispatch places several, one for each y of its workgroups.
 struct Place {
-    segment: u32, // word that the block of its segment begins at
-    frame: u32,
-    positions: u32, // number before those of this frame; so are the others
+    sources: u32, // word of `places` that they begin at
+    source_count: u32,
+    positions: u32, // number before those of this place; so are the others
     matrices: u32,
-    amplitudes: u32,
     modes: u32,
     bodies: u32,
     strength: f32, // that motion is multiplied by
 }
-@group(0) @binding(2) var<storage, read> places: array<Place>;
+// A frame that a place shows, alone or blended with others.
+struct Source {
+    segment: u32, // word that the block of its segment begins at
+    frame: u32,
+    amplitudes: u32, // number before its own
+    weight: f32,     // those of a place add up to 1
+}
+@group(0) @binding(2) var<storage, read> places: array<u32>; // all of a dispatch, then all their sources
 var<private> run: Place;
+var<private> source: Source;
+const PLACE_WORDS = 8u;
+const SOURCE_WORDS = 4u;
 
 // Words of the header of a level.
 const VERTEX_COUNT = 2u;
@@ -90,8 +99,20 @@ struct Move {
     turn: u32,
 }
 
+fn place_at(y: u32) -> Place {
+    let at = PLACE_WORDS * y;
+    return Place(places[at], places[at + 1u], places[at + 2u], places[at + 3u], places[at + 4u], places[at + 5u],
+        bitcast<f32>(places[at + 6u]));
+}
+
+// Of the place that runs. Functions of segments are about the source that is set.
+fn source_at(s: u32) -> Source {
+    let at = run.sources + SOURCE_WORDS * s;
+    return Source(places[at], places[at + 1u], places[at + 2u], bitcast<f32>(places[at + 3u]));
+}
+
 fn segment(at: u32) -> u32 {
-    return segments[run.segment + at];
+    return segments[source.segment + at];
 }
 
 fn level_float(at: u32) -> f32 {

@@ -46,8 +46,143 @@ def head(words: np.ndarray, dtype: np.dtype) -> np.void:
     return section(words, 0, dtype, 1)[0]
 
 
+class Source:
+    """A segment at some of its frames, and how much each counts.
+
+    Parameters
+    ----------
+    segment : (W,) uint32
+        The block of the segment.
+    frames : (T,) int
+        Coded frames of the segment.
+    weights : (T,) float, optional
+        Of the frames, 1 where not given. Those of all sources of a picture add up to 1.
+    """
+
+    def __init__(self, segment: np.ndarray, frames: np.ndarray, weights: np.ndarray | None = None):
+        self.words, self.head, self.frames = segment, head(segment, SEGMENT), np.asarray(frames)
+        self.weights = np.ones(len(self.frames), np.float32) if weights is None else np.asarray(weights, np.float32)
+        self._amplitudes = np.zeros((0, 3, len(self.frames)), np.float32) if self.head["baked"] else self._over_time()
+
+    # ---- pass 1: time ----
+
+    def _over_time(self) -> np.ndarray:
+        """(rows, 3, frames) float32."""
+        rows = section(self.words, self.head["rows"], ROW, self.head["row_count"])
+        out = np.zeros((len(rows), 3, len(self.frames)), np.float32)
+        for i, row in enumerate(rows):
+            first = self.head["wave_sets"][row["waves"] & (WIDE - 1)]
+            waves = section(self.words, first, "<f4", row["count"] * self.head["frames"])
+            waves = waves.reshape(row["count"], -1)[:, self.frames]
+            out[i] = self.weights * row["step"] * (self._values(row).astype(np.float32) @ waves)
+        return out
+
+    def _values(self, row: np.void) -> np.ndarray:
+        at, count = self.head["values"] + row["values"], 3 * int(row["count"])
+        if row["waves"] & WIDE:
+            return section(self.words, at, "<i4", count).reshape(3, -1)
+        return self.words[at : at + (count + 1) // 2].view("<i2")[:count].reshape(3, -1)
+
+    # ---- what moves a body ----
+
+    def _move(self, b: int) -> tuple[np.void, dict[int, np.ndarray]]:
+        """Its ath_gpu_move, and the amplitudes of its rows by slot."""
+        move = section(self.words, self.head["moves"] + 4 * b, MOVE, 1)[0]
+        rows = section(self.words, self.head["rows"] + 3 * move["row"], ROW, move["rows"])
+        return move, dict(zip(rows["slot"].tolist(), self._amplitudes[move["row"] :], strict=False))
+
+    def shift(self, b: int) -> np.ndarray:
+        """(frames, 3)."""
+        return self._move(b)[1].get(SHIFT, np.zeros((3, len(self.frames)), np.float32)).T
+
+    def turn(self, b: int) -> np.ndarray:
+        """(frames, 3): vectors of rotations."""
+        move, tracks = self._move(b)
+        if ROTATION not in tracks:
+            return np.zeros((len(self.frames), 3), np.float32)
+        turn = section(self.words, self.head["turns"] + move["turn"], "<f4", 9).reshape(3, 3)
+        return tracks[ROTATION].T @ turn.T
+
+    def modes(self, b: int, body: np.void) -> np.ndarray:
+        """(modes, 3, frames): what each mode is."""
+        move, tracks = self._move(b)
+        modes = {slot: track for slot, track in tracks.items() if slot < SHIFT}
+        if move["shape_count"] > 0:
+            modes = self._unshaped(body, move, modes)
+        out = np.zeros((body["modes"], 3, len(self.frames)), np.float32)
+        for mode, track in modes.items():
+            out[mode] = track
+        return out
+
+    def _unshaped(self, body: np.void, move: np.void, rows: dict[int, np.ndarray]) -> dict[int, np.ndarray]:
+        """Modes that shapes are made of, in place of the rows of shapes."""
+        modes, count = int(body["shape_modes"]), int(move["shape_count"])
+        shapes = section(self.words, self.head["shapes"] + move["shapes"], "<f4", 3 * modes * count)
+        shapes = shapes.reshape(count, modes, 3)
+        out = {slot: track for slot, track in rows.items() if slot >= modes}
+        sums = np.zeros((modes, 3, len(self.frames)), np.float32)
+        for slot, track in rows.items():
+            for axis in range(3):
+                shape = 3 * slot + axis
+                if slot < modes and shape < count:
+                    sums += shapes[shape][:, :, None] * track[axis]
+        return out | dict(enumerate(sums))
+
+    # ---- joins, corrections ----
+
+    def join(self, bodies: np.ndarray, positions: np.ndarray, matrices: np.ndarray) -> None:
+        """Adds to them what is left of the jumps at the segment's seam."""
+        frames = self.head["join_frames"]
+        joined = self.frames < frames
+        if not joined.any():
+            return
+        curve = section(self.words, self.head["join_curve"], "<f4", 2 * frames).reshape(-1, 2)[self.frames[joined]]
+        curve = curve * self.weights[joined, None]
+        count = positions.shape[1]
+        integers = self.words[self.head["joins"] : self.head["joins"] + 3 * count].view("<i2").reshape(count, 3, 2)
+        steps = section(self.words, self.head["join_steps"], "<f4", 2 * len(bodies)).reshape(-1, 2)
+        is_piece = (bodies["flags"] & NODE) == 0
+        off = integers * np.repeat(steps[is_piece], bodies["count"][is_piece], axis=0)[:, None]
+        positions[joined] += np.einsum("vak,tk->tva", off, curve)
+        at, size = self.head["matrix_joins"], 24 * matrices.shape[1]
+        off = section(self.words, at, "<f4", size).reshape(-1, 12, 2)
+        added = np.einsum("mik,tk->tmi", off, curve)
+        matrices[joined, :, :, :3] += added[:, :, :9].reshape(*added.shape[:2], 3, 3)
+        matrices[joined, :, :, 3] += added[:, :, 9:]
+
+    def correct(self, positions: np.ndarray) -> None:
+        """Adds corrections to positions."""
+        count = self.head["corrected_count"]
+        if not count:
+            return
+        corrected = section(self.words, self.head["corrected"], "<u4", 2 * count + 2).reshape(-1, 2)
+        corrections = section(self.words, self.head["corrections"], CORRECTION, corrected[-1, 1])
+        of = np.repeat(corrected[:-1, 0], np.diff(corrected[:, 1]))
+        parts = FOOTPRINTS[corrections["width"] & 15] << (corrections["width"] >> 4)[:, None]
+        away = np.abs(self.frames[:, None] - corrections["frame"])
+        part = np.where(away < 4, np.take_along_axis(parts, np.minimum(away, 3).T, axis=1).T, 0)
+        sums = np.zeros(positions.shape)
+        for i in range(len(self.frames)):
+            np.add.at(sums[i], of, corrections["value"] * part[i][:, None])
+        sums *= self.weights[:, None, None]
+        positions += (sums * self.head["correction_part"]).astype(np.float32)
+
+    def baked(self, shape: tuple[int, ...]) -> np.ndarray:
+        """(frames, positions, 3)."""
+        shape = int(self.head["frames"]), *shape[1:]
+        every = section(self.words, self.head["baked"], "<f4", int(np.prod(shape))).reshape(shape)
+        return every[self.frames] * self.weights[:, None, None]
+
+
 class Passes:
-    """What the blocks of a level and of one of its segments show at some of the segment's frames.
+    """What the blocks of a level and of its segments show: frames of one segment, or of several, blended.
+
+    Parameters
+    ----------
+    level : (W,) uint32
+        The block of the level.
+    sources : Source
+        With as many frames each as pictures are computed.
 
     Attributes
     ----------
@@ -55,60 +190,33 @@ class Passes:
     matrices : (frames, matrices, 3, 4) float32, from rest positions to positions
     """
 
-    def __init__(self, level: np.ndarray, segment: np.ndarray, frames: np.ndarray):
-        self._level, self._segment, self._frames = level, segment, np.asarray(frames)
-        self._of_level, self._of = head(level, LEVEL), head(segment, SEGMENT)
+    def __init__(self, level: np.ndarray, *sources: Source):
+        self._level, self._sources, self._of_level = level, sources, head(level, LEVEL)
         self._vertices = section(level, self._of_level["vertices"], VERTEX, self._of_level["vertex_count"])
         self._bodies = section(level, self._of_level["bodies"], BODY, self._of_level["body_count"])
-        self._moves = section(segment, self._of["moves"], MOVE, len(self._bodies))
-        count = len(self._frames)
+        self._count = count = len(sources[0].frames)
         self.positions = np.zeros((count, self._of_level["position_count"], 3), np.float32)
         self.matrices = np.zeros((count, self._of_level["matrix_count"], 3, 4), np.float32)
         self._attach = np.zeros((count, len(self._bodies), 3, 4), np.float32)
-        if self._of["baked"]:
-            shape = self._of["frames"], *self.positions.shape[1:]
-            self.positions[:] = section(segment, self._of["baked"], "<f4", np.prod(shape)).reshape(shape)[self._frames]
+        if any(source.head["baked"] for source in sources):
+            self.positions += sum(source.baked(self.positions.shape) for source in sources)
             return
         self._modes: dict[int, np.ndarray] = {}  # of pieces, (modes, 3, frames)
-        self._amplitudes = self._over_time()
         for body in section(level, self._of_level["order"], "<u4", len(self._bodies)):
             self._place(int(body))
-        self._join()
-        self._correct()
+        for source in sources:
+            source.join(self._bodies, self.positions, self.matrices)
+            source.correct(self.positions)
         self._finish_matrices()
-
-    # ---- pass 1: time ----
-
-    def _over_time(self) -> np.ndarray:
-        """(rows, 3, frames) float32."""
-        rows = section(self._segment, self._of["rows"], ROW, self._of["row_count"])
-        out = np.zeros((len(rows), 3, len(self._frames)), np.float32)
-        for i, row in enumerate(rows):
-            first = self._of["wave_sets"][row["waves"] & (WIDE - 1)]
-            waves = section(self._segment, first, "<f4", row["count"] * self._of["frames"])
-            waves = waves.reshape(row["count"], -1)[:, self._frames]
-            out[i] = row["step"] * (self._values(row).astype(np.float32) @ waves)
-        return out
-
-    def _values(self, row: np.void) -> np.ndarray:
-        at, count = self._of["values"] + row["values"], 3 * int(row["count"])
-        if row["waves"] & WIDE:
-            return section(self._segment, at, "<i4", count).reshape(3, -1)
-        return self._segment[at : at + (count + 1) // 2].view("<i2")[:count].reshape(3, -1)
 
     # ---- pass 2: hierarchy ----
 
     def _place(self, b: int) -> None:
-        body, move = self._bodies[b], self._moves[b]
-        rows = section(self._segment, self._of["rows"] + 3 * move["row"], ROW, move["rows"])
-        tracks = dict(zip(rows["slot"].tolist(), self._amplitudes[move["row"] :], strict=False))
+        body, sources = self._bodies[b], self._sources
         point, rotation = self._hung(body)
-        if SHIFT in tracks:
-            point = point + tracks[SHIFT].T
-        if ROTATION in tracks:
-            turn = section(self._segment, self._of["turns"] + move["turn"], "<f4", 9).reshape(3, 3)
-            rotation = rotation @ rotations(tracks[ROTATION].T @ turn.T)
-        modes = self._modes[b] = self._modes_of(body, move, tracks)
+        point = point + sum(source.shift(b) for source in sources)
+        rotation = rotation @ rotations(sum(source.turn(b) for source in sources))
+        modes = self._modes[b] = sum(source.modes(b, body) for source in sources)
         local = np.tensordot(modes, self._basis(body["basis"], len(modes), body["count"]), (0, 0)).transpose(1, 2, 0)
         if body["flags"] & NODE:
             matrix = np.swapaxes(np.eye(3, dtype=np.float32) + local, 1, 2)  # its columns are the three positions
@@ -128,7 +236,7 @@ class Passes:
 
     def _hung(self, body: np.void) -> tuple[np.ndarray, np.ndarray]:
         """Where a body hangs, before it is moved and turned itself."""
-        count = len(self._frames)
+        count = self._count
         if body["parent"] < 0:
             return np.tile(body["rest_point"], (count, 1)), np.tile(np.eye(3, dtype=np.float32), (count, 1, 1))
         base = self._attach[:, body["parent"]]
@@ -142,66 +250,6 @@ class Passes:
     def _basis(self, at: int, modes: int, count: int) -> np.ndarray:
         return section(self._level, self._of_level["bases"] + at, "<f4", modes * count).reshape(modes, count)
 
-    def _modes_of(self, body: np.void, move: np.void, tracks: dict[int, np.ndarray]) -> np.ndarray:
-        """(modes, 3, frames): what each mode is."""
-        modes = {slot: track for slot, track in tracks.items() if slot < SHIFT}
-        if move["shape_count"] > 0:
-            modes = self._unshaped(body, move, modes)
-        out = np.zeros((body["modes"], 3, len(self._frames)), np.float32)
-        for mode, track in modes.items():
-            out[mode] = track
-        return out
-
-    def _unshaped(self, body: np.void, move: np.void, rows: dict[int, np.ndarray]) -> dict[int, np.ndarray]:
-        """Modes that shapes are made of, in place of the rows of shapes."""
-        modes, count = int(body["shape_modes"]), int(move["shape_count"])
-        shapes = section(self._segment, self._of["shapes"] + move["shapes"], "<f4", 3 * modes * count)
-        shapes = shapes.reshape(count, modes, 3)
-        out = {slot: track for slot, track in rows.items() if slot >= modes}
-        sums = np.zeros((modes, 3, len(self._frames)), np.float32)
-        for slot, track in rows.items():
-            for axis in range(3):
-                shape = 3 * slot + axis
-                if slot < modes and shape < count:
-                    sums += shapes[shape][:, :, None] * track[axis]
-        return out | dict(enumerate(sums))
-
-    # ---- between passes: joins, corrections ----
-
-    def _join(self) -> None:
-        frames = self._of["join_frames"]
-        joined = self._frames < frames
-        if not joined.any():
-            return
-        curve = section(self._segment, self._of["join_curve"], "<f4", 2 * frames).reshape(-1, 2)[self._frames[joined]]
-        count = self.positions.shape[1]
-        integers = section(self._segment, self._of["joins"], "<i2", 3 * count)  # words
-        integers = self._segment[self._of["joins"] : self._of["joins"] + 3 * count].view("<i2").reshape(count, 3, 2)
-        steps = section(self._segment, self._of["join_steps"], "<f4", 2 * len(self._bodies)).reshape(-1, 2)
-        is_piece = (self._bodies["flags"] & NODE) == 0
-        off = integers * np.repeat(steps[is_piece], self._bodies["count"][is_piece], axis=0)[:, None]
-        self.positions[joined] += np.einsum("vak,tk->tva", off, curve)
-        at, size = self._of["matrix_joins"], 24 * self.matrices.shape[1]
-        off = section(self._segment, at, "<f4", size).reshape(-1, 12, 2)
-        added = np.einsum("mik,tk->tmi", off, curve)
-        self.matrices[joined, :, :, :3] += added[:, :, :9].reshape(*added.shape[:2], 3, 3)
-        self.matrices[joined, :, :, 3] += added[:, :, 9:]
-
-    def _correct(self) -> None:
-        count = self._of["corrected_count"]
-        if not count:
-            return
-        corrected = section(self._segment, self._of["corrected"], "<u4", 2 * count + 2).reshape(-1, 2)
-        corrections = section(self._segment, self._of["corrections"], CORRECTION, corrected[-1, 1])
-        positions = np.repeat(corrected[:-1, 0], np.diff(corrected[:, 1]))
-        parts = FOOTPRINTS[corrections["width"] & 15] << (corrections["width"] >> 4)[:, None]
-        away = np.abs(self._frames[:, None] - corrections["frame"])
-        part = np.where(away < 4, np.take_along_axis(parts, np.minimum(away, 3).T, axis=1).T, 0)
-        sums = np.zeros(self.positions.shape)
-        for i in range(len(self._frames)):
-            np.add.at(sums[i], positions, corrections["value"] * part[i][:, None])
-        self.positions += (sums * self._of["correction_part"]).astype(np.float32)
-
     def _finish_matrices(self) -> None:
         """From R and c of x = c + R (x0 - a) to what is added to R x0."""
         points = self._bodies["rest_point"][(self._bodies["flags"] & NODE) != 0]
@@ -213,7 +261,7 @@ class Passes:
         """(frames, vertices, 3) float32 in file order, relative to the origin."""
         binding = self._vertices["binding"]
         moved, index = (binding & MOVED) != 0, (binding & ~np.uint32(MOVED)).astype(int)
-        out = np.empty((len(self._frames), len(binding), 3), np.float32)
+        out = np.empty((self._count, len(binding), 3), np.float32)
         out[:, ~moved] = self.positions[:, index[~moved]]
         matrices = self.matrices[:, index[moved]]
         rest = self._vertices["rest"][moved]

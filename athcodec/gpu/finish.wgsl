@@ -2,19 +2,20 @@
 
 @group(0) @binding(3) var<storage, read_write> positions: array<f32>;
 @group(0) @binding(4) var<storage, read_write> matrices: array<f32>;
+@group(0) @binding(5) var<uniform> which: u32; // of the sources of each place, for corrections
 
 const FOOTPRINTS = array<array<f32, 4>, 3>(
     array<f32, 4>(32.0, 0.0, 0.0, 0.0), array<f32, 4>(32.0, 16.0, 0.0, 0.0), array<f32, 4>(32.0, 27.0, 16.0, 5.0),
 );
 
 fn is_joined() -> bool {
-    return run.frame < segment(JOIN_FRAMES);
+    return source.frame < segment(JOIN_FRAMES);
 }
 
 // What is left of jumps and of slopes at the frame.
 fn curve() -> vec2<f32> {
-    let at = segment(JOIN_CURVE) + 2u * run.frame;
-    return run.strength * vec2<f32>(segment_float(at), segment_float(at + 1u));
+    let at = segment(JOIN_CURVE) + 2u * source.frame;
+    return run.strength * source.weight * vec2<f32>(segment_float(at), segment_float(at + 1u));
 }
 
 fn join_position(b: u32, index: u32) {
@@ -47,29 +48,35 @@ fn finish_matrix(index: u32, a: vec3<f32>) {
 @compute @workgroup_size(64)
 fn bodies(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
           @builtin(local_invocation_index) i: u32) {
-    run = places[group.y];
+    run = place_at(group.y);
     let b = group.x + groups.x * group.z;
     if (b >= level[BODY_COUNT]) {
         return;
     }
     let body = body_at(b);
-    if ((body.flags & NODE) == 0u) {
-        if (is_joined() && i < body.count) {
+    let is_node = (body.flags & NODE) != 0u;
+    for (var s = 0u; s < run.source_count; s++) {
+        source = source_at(s);
+        if (is_joined() && !is_node && i < body.count) {
             join_position(b, body.first + i);
-        }
-    } else if (i == 0u) {
-        if (is_joined()) {
+        } else if (is_joined() && is_node && i == 0u) {
             join_matrix(body.first);
         }
+    }
+    if (is_node && i == 0u) {
         finish_matrix(body.first, body.rest_point);
     }
 }
 
-// One invocation per corrected position.
+// One invocation per corrected position of a source.
 @compute @workgroup_size(64)
 fn corrections(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
     let i = id.x + 64u * groups.x * id.z;
-    run = places[id.y];
+    run = place_at(id.y);
+    if (which >= run.source_count) {
+        return;
+    }
+    source = source_at(which);
     if (i >= segment(CORRECTED_COUNT)) {
         return;
     }
@@ -79,7 +86,7 @@ fn corrections(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgr
         let at = segment(CORRECTIONS) + 2u * c;
         let low = segment(at);
         let high = segment(at + 1u);
-        let away = abs(i32(run.frame) - i32((high >> 16u) & 0xffu));
+        let away = abs(i32(source.frame) - i32((high >> 16u) & 0xffu));
         if (away < 4) {
             let width = high >> 24u;
             let part = FOOTPRINTS[width & 15u][away] * exp2(f32(width >> 4u));
@@ -87,7 +94,8 @@ fn corrections(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgr
         }
     }
     for (var axis = 0u; axis < 3u; axis++) {
-        positions[run.positions + 3u * segment(own) + axis] += sum[axis] * run.strength * segment_float(CORRECTION_PART);
+        positions[run.positions + 3u * segment(own) + axis] +=
+            sum[axis] * run.strength * source.weight * segment_float(CORRECTION_PART);
     }
 }
 
@@ -95,9 +103,15 @@ fn corrections(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgr
 @compute @workgroup_size(64)
 fn baked(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
     let i = id.x + 64u * groups.x * id.z;
-    run = places[id.y];
+    run = place_at(id.y);
     let count = 3u * level[POSITION_COUNT];
-    if (i < count) {
-        positions[run.positions + i] = segment_float(segment(BAKED) + run.frame * count + i);
+    if (i >= count) {
+        return;
     }
+    var sum = 0.0;
+    for (var s = 0u; s < run.source_count; s++) {
+        source = source_at(s);
+        sum += source.weight * segment_float(segment(BAKED) + source.frame * count + i);
+    }
+    positions[run.positions + i] = sum;
 }

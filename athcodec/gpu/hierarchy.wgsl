@@ -1,4 +1,5 @@
-// Pass 2: bodies of one depth, each placed from the one that it hangs on. One workgroup per body, one invocation per position.
+// Pass 2: bodies of one depth, each placed from the one that it hangs on; amplitudes of all sources of a place add up. One
+// workgroup per body, one invocation per position.
 
 @group(0) @binding(8) var<uniform> depth: u32; // of the bodies that are placed
 @group(0) @binding(3) var<storage, read> amplitudes: array<f32>;
@@ -21,7 +22,7 @@ struct Frame {
 }
 
 fn amplitude(row: u32) -> vec3<f32> {
-    let at = run.amplitudes + 3u * row;
+    let at = source.amplitudes + 3u * row;
     return vec3<f32>(amplitudes[at], amplitudes[at + 1u], amplitudes[at + 2u]);
 }
 
@@ -97,26 +98,35 @@ fn hung(body: Body) -> Frame {
     return Frame(position_at(u32(body.attach)), rotation);
 }
 
+// What a row of a rotation turns by.
+fn turn_of(own: Move, row: u32) -> vec3<f32> {
+    let at = segment(TURNS) + own.turn;
+    let q = amplitude(row);
+    var omega = vec3<f32>(0.0);
+    for (var k = 0u; k < 3u; k++) {
+        let turn = vec3<f32>(segment_float(at + 3u * k), segment_float(at + 3u * k + 1u), segment_float(at + 3u * k + 2u));
+        omega[k] = dot(turn, q);
+    }
+    return omega;
+}
+
 // The rows of a shift and of a rotation, where there are any, are the first of a body.
-fn turned(body: Body, own: Move) -> Frame {
+fn turned(b: u32, body: Body) -> Frame {
     var frame = hung(body);
-    for (var r = own.row; r < own.row + min(own.rows, 2u); r++) {
-        let slot = row_at(r).slot;
-        if (slot == SHIFT) {
-            frame.point += amplitude(r);
-        } else if (slot == ROTATION) {
-            let at = segment(TURNS) + own.turn;
-            let q = amplitude(r);
-            var omega = vec3<f32>(0.0);
-            for (var k = 0u; k < 3u; k++) {
-                let turn = vec3<f32>(
-                    segment_float(at + 3u * k), segment_float(at + 3u * k + 1u), segment_float(at + 3u * k + 2u),
-                );
-                omega[k] = dot(turn, q);
+    var omega = vec3<f32>(0.0);
+    for (var s = 0u; s < run.source_count; s++) {
+        source = source_at(s);
+        let own = move_at(b);
+        for (var r = own.row; r < own.row + min(own.rows, 2u); r++) {
+            let slot = row_at(r).slot;
+            if (slot == SHIFT) {
+                frame.point += amplitude(r);
+            } else if (slot == ROTATION) {
+                omega += turn_of(own, r);
             }
-            frame.rotation = frame.rotation * squared(0.25 * omega);
         }
     }
+    frame.rotation = frame.rotation * squared(0.25 * omega);
     return frame;
 }
 
@@ -200,37 +210,46 @@ fn write_frame(b: u32, frame: Frame) {
     }
 }
 
+// Adds the modes of a body in the source that is set, and returns the least that those above are nothing of.
+fn add_modes(b: u32, body: Body, i: u32) -> u32 {
+    let own = move_at(b);
+    let from_shapes = select(0u, body.shape_modes, own.shape_count > 0u);
+    for (var r = i; r < own.rows; r += 64u) {
+        let slot = row_at(own.row + r).slot;
+        if (slot >= from_shapes && slot < SHIFT) {
+            modes[slot] += amplitude(own.row + r);
+        }
+    }
+    if (i < from_shapes) {
+        modes[i] += unshaped(body, own, i);
+    }
+    if (own.rows == 0u) {
+        return from_shapes;
+    }
+    let last = row_at(own.row + own.rows - 1u).slot;
+    return max(from_shapes, select(0u, last + 1u, last < SHIFT));
+}
+
 @compute @workgroup_size(64)
 fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
         @builtin(local_invocation_index) i: u32) {
-    run = places[group.y];
+    run = place_at(group.y);
     let at = level[level[DEPTHS] + depth] + group.x + groups.x * group.z;
     if (at >= level[level[DEPTHS] + depth + 1u]) {
         return;
     }
     let b = level[level[ORDER] + at];
     let body = body_at(b);
-    let own = move_at(b);
     modes[i] = vec3<f32>(0.0);
     placed[i] = way_by_mode(body, i);
     workgroupBarrier();
-    let from_shapes = select(0u, body.shape_modes, own.shape_count > 0u);
-    for (var r = i; r < own.rows; r += 64u) {
-        let slot = row_at(own.row + r).slot;
-        if (slot >= from_shapes && slot < SHIFT) {
-            modes[slot] = amplitude(own.row + r);
-        }
+    var top = 0u;
+    for (var s = 0u; s < places[PLACE_WORDS * group.y + 1u]; s++) { // of the place: the same for all of the workgroup
+        source = source_at(s);
+        top = max(top, add_modes(b, body, i));
+        workgroupBarrier();
     }
-    if (i < from_shapes) {
-        modes[i] = unshaped(body, own, i);
-    }
-    workgroupBarrier();
-    var top = from_shapes;
-    if (own.rows > 0u) {
-        let last = row_at(own.row + own.rows - 1u).slot;
-        top = max(top, select(0u, last + 1u, last < SHIFT));
-    }
-    var frame = turned(body, own);
+    var frame = turned(b, body);
     workgroupBarrier();
     let is_node = (body.flags & NODE) != 0u;
     if (i < body.count) {

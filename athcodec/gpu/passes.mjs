@@ -3,8 +3,9 @@
 //
 //     const passes = new Passes(device, new Kernels(device, {blocks, time, hierarchy, finish, vertices}), level, {slots, shown})
 //     const segment = passes.segment(words)
-//     passes.run(places, shows)   places: [{segment, frame, slot, strength}], passes 1 and 2: each a frame, once for all that
-//                                 show it; shows: [{slots, weight, previous, previousWeight}], pass 3: each a plant at a time
+//     passes.run(places, shows)   places: [{sources: [{segment, frame, weight}], slot, strength}], passes 1 and 2: each a frame,
+//                                 or a blend of frames, once for all that show it; shows: [{slots, weight, previous,
+//                                 previousWeight}], pass 3: each a plant at a time
 //     await passes.read(shows)    the same shows, read back
 //
 // `level` and `words` are the blocks of core/ath_gpu.h, as Uint32Array.
@@ -14,7 +15,7 @@ const UNIFORM = 0x40 | 8;
 const READ = 1 | 8;
 const [VERTEX_COUNT, BODY_COUNT, POSITION_COUNT, MATRIX_COUNT, DEPTH_COUNT, DEPTHS] = [2, 3, 4, 5, 6, 10];
 const [ROW_COUNT, CORRECTED_COUNT, BAKED] = [5, 6, 19];
-const WORKGROUP = 64, PLACE_WORDS = 8, SHOW_WORDS = 12, VERTEX_FLOATS = 9;
+const WORKGROUP = 64, PLACE_WORDS = 8, SOURCE_WORDS = 4, SHOW_WORDS = 12, VERTEX_FLOATS = 9;
 const groups = (count) => Math.ceil(count / WORKGROUP);
 
 /** The pipelines of a device, which all levels share. */
@@ -49,7 +50,7 @@ export class Passes {
     this.baked = false;
     const { positions, matrices, bodies } = this.size;
     this.buffers = {
-      level: this.#upload(level), segments: this.#buffer(1), places: this.#buffer(PLACE_WORDS * slots),
+      level: this.#upload(level), segments: this.#buffer(1), places: this.#buffer((PLACE_WORDS + SOURCE_WORDS) * slots),
       shows: this.#buffer(SHOW_WORDS * shown), amplitudes: this.#buffer(1), positions: this.#buffer(slots * positions),
       matrices: this.#buffer(slots * matrices), modes: this.#buffer(slots * positions), bodies: this.#buffer(slots * bodies),
       corners: this.#buffer(1), vertices: vertices ?? this.#buffer(shown * this.size.vertices),
@@ -57,8 +58,9 @@ export class Passes {
     this.ownsVertices = !vertices;
     this.depths = Array.from({ length: level[DEPTH_COUNT] }, (_, depth) => {
       const [first, end] = level.subarray(level[DEPTHS] + depth);
-      return { count: end - first, uniform: this.#upload(new Uint32Array([depth, 0, 0, 0]), UNIFORM) };
+      return { count: end - first, uniform: this.#number(depth) };
     });
+    this.ordinals = []; // uniforms: 0, 1, 2, ...
     this.hasCorners = false;
   }
 
@@ -75,6 +77,10 @@ export class Passes {
     const buffer = this.#buffer(words.length, usage);
     this.#write(buffer, words);
     return buffer;
+  }
+
+  #number(value) {
+    return this.#upload(new Uint32Array([value, 0, 0, 0]), UNIFORM);
   }
 
   #write(buffer, words, at = 0, length = words.length) {
@@ -106,7 +112,6 @@ export class Passes {
     this.#rows = Math.max(this.#rows, words[ROW_COUNT]);
     this.#corrected = Math.max(this.#corrected, words[CORRECTED_COUNT]);
     this.baked ||= words[BAKED] !== 0;
-    this.#grow("amplitudes", 3 * this.#rows * this.slots);
     return at;
   }
 
@@ -118,12 +123,12 @@ export class Passes {
     this.#sets.clear();
   }
 
-  #dispatch(pass, kernel, [x, y], names, depth = null) {
+  #dispatch(pass, kernel, [x, y], names, uniform = null) {
     if (x === 0 || y === 0) return;
-    const key = depth ?? kernel;
+    const key = uniform ?? kernel;
     if (!this.#sets.has(key)) {
       const entries = names.flatMap((name, binding) => (name ? [{ binding, resource: { buffer: this.buffers[name] } }] : []));
-      if (depth) entries.push({ binding: names.length, resource: { buffer: depth.uniform } });
+      if (uniform) entries.push({ binding: names.length, resource: { buffer: uniform } });
       const layout = this.kernels[kernel].getBindGroupLayout(0);
       this.#sets.set(key, this.device.createBindGroup({ layout, entries }));
     }
@@ -143,13 +148,8 @@ export class Passes {
   }
 
   #place(pass, places) {
-    const { positions, matrices, bodies } = this.size, count = places.length, numbers = new Uint32Array(PLACE_WORDS * count);
-    const floats = new Float32Array(numbers.buffer);
-    places.forEach(({ segment, frame, slot, strength = 1 }, i) => {
-      numbers.set([segment, frame, slot * positions, slot * matrices, 3 * this.#rows * i, i * positions, i * bodies], PLACE_WORDS * i);
-      floats[PLACE_WORDS * i + 7] = strength;
-    });
-    this.#write(this.buffers.places, numbers);
+    const { positions, bodies } = this.size, count = places.length;
+    this.#writePlaces(places);
     if (this.baked) {
       this.#dispatch(pass, "baked", [groups(positions), count], ["level", "segments", "places", "positions"]);
       return;
@@ -157,9 +157,30 @@ export class Passes {
     this.#dispatch(pass, "time", [groups(this.#rows), count], [null, "segments", "places", "amplitudes"]);
     const outputs = ["amplitudes", "positions", "matrices", "modes", "bodies"];
     for (const depth of this.depths)
-      this.#dispatch(pass, "hierarchy", [depth.count, count], ["level", "segments", "places", ...outputs], depth);
+      this.#dispatch(pass, "hierarchy", [depth.count, count], ["level", "segments", "places", ...outputs], depth.uniform);
     this.#dispatch(pass, "bodies", [this.words[BODY_COUNT], count], ["level", "segments", "places", "positions", "matrices"]);
-    this.#dispatch(pass, "corrections", [groups(this.#corrected), count], [null, "segments", "places", "positions"]);
+    const most = Math.max(...places.map(({ sources }) => sources.length));
+    while (this.ordinals.length < most) this.ordinals.push(this.#number(this.ordinals.length));
+    for (const which of this.ordinals.slice(0, most)) // one after the other: they add to the same positions
+      this.#dispatch(pass, "corrections", [groups(this.#corrected), count], [null, "segments", "places", "positions", null], which);
+  }
+
+  #writePlaces(places) {
+    const { positions, matrices, bodies } = this.size, total = places.reduce((sum, { sources }) => sum + sources.length, 0);
+    const numbers = new Uint32Array(PLACE_WORDS * places.length + SOURCE_WORDS * total), floats = new Float32Array(numbers.buffer);
+    let at = PLACE_WORDS * places.length, used = 0;
+    places.forEach(({ sources, slot, strength = 1 }, i) => {
+      numbers.set([at, sources.length, slot * positions, slot * matrices, i * positions, i * bodies], PLACE_WORDS * i);
+      floats[PLACE_WORDS * i + 6] = strength;
+      for (const { segment, frame, weight = 1 } of sources) {
+        numbers.set([segment, frame, 3 * this.#rows * used++], at);
+        floats[at + 3] = weight;
+        at += SOURCE_WORDS;
+      }
+    });
+    this.#grow("places", numbers.length);
+    this.#grow("amplitudes", 3 * this.#rows * total);
+    this.#write(this.buffers.places, numbers);
   }
 
   #show(pass, shows) {
@@ -195,7 +216,7 @@ export class Passes {
   }
 
   dispose() {
-    for (const { uniform } of this.depths) uniform.destroy();
+    for (const uniform of [...this.depths.map((depth) => depth.uniform), ...this.ordinals]) uniform.destroy();
     for (const [name, buffer] of Object.entries(this.buffers)) if (name !== "vertices" || this.ownsVertices) buffer.destroy();
   }
 }

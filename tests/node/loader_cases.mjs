@@ -148,8 +148,22 @@ cases.winds = async () => {
     if (!(await until(plays))) off.push([mode, "play"]);
     loader.dispose();
   }
-  const { motion } = await load();
-  return ({ off, refused: [refusalOf(() => motion.wind(NaN)), refusalOf(() => motion.wind(1, Infinity))] });
+  const { ath, motion } = await load();
+  ath.geometry ?? ath.lines;
+  motion.fade = 0;
+  await until(() => motion.setTime(0.3).level === level);
+  await pause(500);
+  const seen = [motion.uploaded().slice()], last = () => seen.at(-1);
+  motion.fade = 1;
+  motion.wind(8, 0); // from the clip that was shown alone
+  await until(() => {
+    if (motion.uploaded().some((number, i) => number !== last()[i])) seen.push(motion.uploaded().slice());
+    return seen.length > 1 && !motion.fading;
+  });
+  const far = (a, b) => Math.max(...a.map((number, i) => Math.abs(number - b[i])));
+  const largest = Math.max(...seen.slice(1).map((picture, i) => far(picture, seen[i]))) / far(seen[0], last());
+  return ({ off, eased: seen.length > 4 && largest < 0.9,
+    refused: [refusalOf(() => motion.wind(NaN)), refusalOf(() => motion.wind(1, Infinity))] });
 };
 
 // A clip without an end, at the times of `words`: checksums of what positions() gives, and whether setTime() shows it.

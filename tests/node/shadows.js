@@ -9,7 +9,7 @@ async (mode) => {
   await ath.loaded;
   const size = ath.sphere.radius, [drawn] = ath.object.children;
   drawn.castShadow = true;
-  const ground = new three.Mesh(new three.PlaneGeometry(8 * size, 8 * size), new three.MeshLambertMaterial({ color: 0xffffff, side: three.DoubleSide }));
+  const ground = new three.Mesh(new three.CircleGeometry(6 * size, 64), new three.MeshLambertMaterial({ color: 0xffffff, side: three.DoubleSide }));
   ground.receiveShadow = true;
   ground.position.set(ath.sphere.center.x, ath.sphere.center.y, ath.box.min.z - size);
   const camera = new three.OrthographicCamera(-2 * size, 2 * size, 2 * size, -2 * size, 0.01 * size, 20 * size);

@@ -86,8 +86,8 @@ class Channel {
       for (const view of this.views.values()) view.refresh();
     } else if (type === "baked") {
       this.#answer(`bake ${message.id}`, message);
-    } else if (type === "gpu") {
-      this.#answer(`gpu ${message.id}`, message);
+    } else if (type === "gpu" || type === "wind") {
+      this.#answer(`${type} ${message.id}`, message);
     } else {
       if (type === "stopped") this.settle.whole.reject(failureOf(message));
       this.#failed(message);
@@ -183,6 +183,12 @@ class Channel {
     const id = this.#nextWork++, answer = await this.#ask(`gpu ${id}`, { type: "gpu", id, level, segment });
     if (!answer.words) throw failureOf(answer);
     return answer;
+  }
+
+  /** What each clip counts for a wind, by its own: {weights}. */
+  windWeights(strength, heading) {
+    const id = this.#nextWork++;
+    return this.#ask(`wind ${id}`, { type: "wind", id, strength, heading });
   }
 
   #ask(key, message) {

@@ -23,6 +23,7 @@ function take(data) {
   else if (data.type === "parts") session?.tell(data.level);
   else if (data.type === "bake") session?.bake(data);
   else if (data.type === "gpu") session?.gpu(data);
+  else if (data.type === "wind") session?.wind(data);
   else if (data.type === "all") session?.fetchAll();
   else if (data.type === "abort") session?.abort();
   else if (data.type === "close") {

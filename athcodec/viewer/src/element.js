@@ -1,15 +1,119 @@
 // <ath-viewer src="oak.ath">: see element.d.ts.
 
-import { Box3, DirectionalLight, HemisphereLight, PerspectiveCamera, Scene, Vector3, WebGLRenderer } from "three";
+import { DirectionalLight, HemisphereLight, PerspectiveCamera, Scene, Vector3, WebGLRenderer } from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import { ATHLoader } from "athcodec-three";
 
+import { ground, Grove } from "../page/grove.js";
+import { floorIn } from "../page/places.js";
 import { Plant } from "../page/plant.js";
+import { Stage } from "../page/stage.js";
 
-const STYLE = ":host { display: block; position: relative; min-height: 150px; } canvas { width: 100%; height: 100%; display: block; position: absolute; inset: 0; outline-offset: -2px; }";
+const STYLE = `:host { display: block; position: relative; min-height: 150px; overflow: hidden; }
+div, canvas, ::slotted(*) { position: absolute; inset: 0; width: 100%; height: 100%; }
+::slotted(*) { object-fit: cover; }
+canvas { display: block; outline-offset: -2px; opacity: 0; transition: opacity .5s; }
+canvas.drawn { opacity: 1; }
+@media (prefers-reduced-motion: reduce) { canvas { transition: none; } }`;
 const LONGEST = 0.5; // seconds that pass at most from a picture to the next, as in a tab that was hidden
+const NEAR = "120px"; // of being in view
+const MOST_TREES = 10000;
+const FORGET_MS = 4000; // out of view, after which a lazy one gives back what it takes
 
 let loader = null;
+
+// What a plant is drawn in where there is no scenery: light, and nothing behind it.
+class Bare {
+  camera = new PerspectiveCamera(38, 1, 0.01, 1000);
+  #scene = new Scene();
+
+  constructor(canvas, changed) {
+    this.canvas = canvas;
+    this.changed = changed;
+    this.renderer = new WebGLRenderer({ canvas, antialias: true, alpha: true });
+    this.controls = new OrbitControls(this.camera, canvas);
+    this.controls.enableDamping = true;
+    this.controls.addEventListener("change", changed);
+    const sun = new DirectionalLight(0xfff2dd, 2.4);
+    sun.position.set(0.6, 1, 0.7);
+    this.#scene.add(new HemisphereLight(0xeaf2ff, 0x8a8371, 1.9), sun);
+    this.sized = new ResizeObserver(() => this.#resize());
+    this.sized.observe(canvas.parentElement);
+    this.#resize();
+  }
+
+  get pixels() {
+    return this.canvas.height;
+  }
+
+  #resize() {
+    const { clientWidth: width, clientHeight: height } = this.canvas.parentElement;
+    if (width === 0 || height === 0) return;
+    this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
+    this.renderer.setSize(width, height, false);
+    this.camera.aspect = width / height;
+    this.camera.updateProjectionMatrix();
+    this.changed();
+  }
+
+  // The whole plant in view.
+  show(plant) {
+    const box = plant.ath.box.clone().applyMatrix4(plant.root.matrixWorld), size = box.getSize(new Vector3()), { camera } = this;
+    const half = Math.tan(camera.fov * Math.PI / 360), across = Math.hypot(size.x, size.z);
+    const distance = 0.35 * across + 0.6 * Math.max(size.y, across / camera.aspect, 1e-6) / half;
+    this.plant = plant;
+    this.#scene.add(plant.root);
+    box.getCenter(this.controls.target);
+    camera.position.copy(this.controls.target).add(new Vector3(0.35, 0.16, 0.92).normalize().multiplyScalar(distance));
+    Object.assign(camera, { near: distance / 500, far: distance * 60 }).updateProjectionMatrix();
+    this.controls.update();
+  }
+
+  took() {} // what a picture takes leaves nothing out
+
+  render() {
+    this.plant.prepare(this.canvas.width, this.canvas.height);
+    this.renderer.render(this.#scene, this.camera);
+  }
+
+  dispose() {
+    this.sized.disconnect();
+    this.controls.dispose();
+    this.renderer.dispose();
+  }
+}
+
+// On the meadow and under the sky of the viewer's page.
+class Scenery extends Stage {
+  constructor(canvas, changed) {
+    super(canvas, changed, () => this.#fit());
+  }
+
+  #box = null;
+  #reach = 0; // of a forest
+
+  #fit() {
+    if (!this.#box || this.moved) return;
+    if (this.#reach > 0) {
+      this.lookOver(this.#box, this.#reach);
+      return;
+    }
+    const size = this.#box.getSize(new Vector3());
+    this.look(this.#box, { height: this.#box.min.y, size: 1.9 * Math.max(size.x, size.y, size.z) });
+  }
+
+  show(plant, reach) {
+    this.#reach = reach;
+    this.setPanes([{ scene: this.scene([plant.root]), before: (width, height) => plant.prepare(width, height) }]);
+    this.#box = plant.ath.box.clone().applyMatrix4(plant.root.matrixWorld);
+    this.#fit();
+  }
+
+  add(plant) {
+    ground(plant, this.#box.min.y);
+    this.panes[0].scene.add(plant.root);
+  }
+}
 
 export class ATHViewerElement extends HTMLElement {
   static observedAttributes = ["src", "clip", "level", "wind", "paused", "alt", "camera-controls"];
@@ -19,62 +123,84 @@ export class ATHViewerElement extends HTMLElement {
     return loader ??= new ATHLoader();
   }
 
-  #canvas = document.createElement("canvas");
-  #renderer = null;
-  #controls = null;
-  #camera = new PerspectiveCamera(38, 1, 0.01, 1000);
-  #scene = new Scene();
+  #stand = document.createElement("div"); // what the canvas stands in
+  #canvas = null;
+  #stage = null; // null where it is lazy and out of view
   #plant = null;
+  #grove = null; // where it is a forest
+  #unseen = new PerspectiveCamera();
   #seconds = 0;
   #last = 0;
   #frame = 0;
   #seen = false;
   #dirty = false;
   #wish = 0; // the newest file that was asked for
-  #sized = new ResizeObserver(() => this.#resize());
-  #inView = new IntersectionObserver(([{ isIntersecting }]) => {
-    this.#seen = isIntersecting;
-    this.#go();
-  });
+  #forgetting = 0;
+  #inView = new IntersectionObserver((seen) => this.#look(seen.at(-1).isIntersecting), { rootMargin: NEAR });
 
   constructor() {
     super();
     const style = new CSSStyleSheet(), root = this.attachShadow({ mode: "open" });
     style.replaceSync(STYLE);
     root.adoptedStyleSheets = [style];
-    root.append(this.#canvas);
-    this.#canvas.setAttribute("role", "img");
-    const sun = new DirectionalLight(0xfff2dd, 2.4);
-    sun.position.set(0.6, 1, 0.7);
-    this.#scene.add(new HemisphereLight(0xeaf2ff, 0x8a8371, 1.9), sun);
+    root.append(document.createElement("slot"), this.#stand);
   }
 
   connectedCallback() {
-    this.#renderer = new WebGLRenderer({ canvas: this.#canvas, antialias: true, alpha: true });
-    this.#controls = new OrbitControls(this.#camera, this.#canvas);
-    this.#controls.enableDamping = true;
-    this.#controls.addEventListener("change", () => { this.#dirty = true; });
-    this.#sized.observe(this);
     this.#inView.observe(this);
+    if (!this.#isLazy) this.#wake();
+  }
+
+  disconnectedCallback() {
+    this.#inView.disconnect();
+    this.#look(false);
+    this.#sleep();
+  }
+
+  get #isLazy() {
+    return this.getAttribute("loading") === "lazy";
+  }
+
+  #look(seen) {
+    this.#seen = seen;
+    clearTimeout(this.#forgetting);
+    if (seen) this.#wake();
+    else if (this.#isLazy) this.#forgetting = setTimeout(() => this.#sleep(), FORGET_MS);
+    this.#go();
+  }
+
+  // A browser has few contexts of WebGL: those out of view give theirs back, and get another one with another canvas.
+  #wake() {
+    if (this.#stage || !this.isConnected) return;
+    this.#canvas = document.createElement("canvas");
+    this.#canvas.setAttribute("role", "img");
     this.#canvas.setAttribute("aria-label", this.getAttribute("alt") ?? "Moving plant");
+    this.#stand.replaceChildren(this.#canvas);
+    try {
+      this.#stage = new (this.hasAttribute("scenery") ? Scenery : Bare)(this.#canvas, () => { this.#dirty = true; });
+    } catch (error) { // a browser without WebGL
+      this.#canvas.remove();
+      this.#tell("error", Object.assign(error, { codeName: "GRAPHICS" }));
+      return;
+    }
     this.#steer();
     if (this.src) this.#load();
   }
 
-  disconnectedCallback() {
-    this.#sized.disconnect();
-    this.#inView.disconnect();
+  #sleep() {
+    clearTimeout(this.#forgetting);
     cancelAnimationFrame(this.#frame);
     this.#frame = 0;
-    this.#seen = false;
+    if (!this.#stage) return;
     this.#clear();
-    this.#controls.dispose();
-    this.#renderer.dispose();
-    this.#renderer = null;
+    this.#stage.dispose();
+    this.#stage.renderer.forceContextLoss();
+    this.#stage = null;
+    this.#canvas.remove();
   }
 
   attributeChangedCallback(name, before, value) {
-    if (!this.#renderer || before === value) return;
+    if (!this.#stage || before === value) return;
     if (name === "src") this.#load();
     if (name === "clip" || name === "wind") this.#play();
     if (name === "level") this.#setLevel();
@@ -122,14 +248,21 @@ export class ATHViewerElement extends HTMLElement {
     return this.#plant?.ath ?? null;
   }
 
+  /** What is drawn of a forest: the trees, and each plant of its floor. */
+  get forests() {
+    return this.#grove?.forests ?? [];
+  }
+
   get camera() {
-    return this.#camera;
+    return this.#stage?.camera ?? this.#unseen;
   }
 
   #steer() {
-    this.#controls.enabled = this.hasAttribute("camera-controls");
-    this.#canvas.style.touchAction = this.#controls.enabled ? "none" : "auto";
-    if (this.#controls.enabled) this.#canvas.tabIndex = 0;
+    const { controls } = this.#stage, wanted = this.getAttribute("camera-controls");
+    controls.enabled = wanted !== null;
+    controls.enableZoom = controls.enablePan = wanted !== "turn";
+    this.#canvas.style.touchAction = wanted === null ? "auto" : wanted === "turn" ? "pan-y" : "none";
+    if (controls.enabled) this.#canvas.tabIndex = 0;
     else this.#canvas.removeAttribute("tabindex");
   }
 
@@ -148,6 +281,7 @@ export class ATHViewerElement extends HTMLElement {
       const loading = ATHViewerElement.loader.loadAsync(new URL(src, document.baseURI).href);
       ATHViewerElement.loader.setClip(null);
       const ath = await loading;
+      if (this.#trees > 0) await ath.arrays.catch(() => {}); // which a forest is drawn with from the start
       if (wish === this.#wish) this.#show(ath);
       else ath.dispose();
     } catch (error) {
@@ -157,6 +291,8 @@ export class ATHViewerElement extends HTMLElement {
 
   #clear() {
     this.#wish++;
+    this.#grove?.dispose();
+    this.#grove = null;
     this.#plant?.dispose();
     this.#plant?.root.removeFromParent();
     this.#plant?.ath.dispose();
@@ -170,14 +306,28 @@ export class ATHViewerElement extends HTMLElement {
     for (const type of ["frame", "ready"]) motion.addEventListener(type, changed);
     motion.addEventListener("progress", ({ loaded, total }) => this.#tell("progress", { loaded, total }));
     for (const type of ["stopped", "damaged"]) motion.addEventListener(type, (event) => this.#tell("error", event));
-    this.#scene.add(plant.root);
     this.#seconds = 0;
-    if (this.hasAttribute("wind")) this.#play();
-    this.#setLevel();
-    this.#resize();
-    this.#fit();
+    if (this.#trees > 0) this.#grove = new Grove(plant, this.#trees, changed);
+    this.#stage.show(plant, this.#grove?.reach ?? 0);
+    if (this.#grove) this.#grow();
+    else this.#setLevel();
+    if (this.hasAttribute("wind") && !this.#grove) this.#play();
+    this.#dirty = true;
     this.#go();
     this.#tell("load", { ath });
+  }
+
+  get #trees() {
+    return this.hasAttribute("scenery") ? Math.round(Math.min(MOST_TREES, Number(this.getAttribute("forest")) || 0)) : 0;
+  }
+
+  #grow() {
+    const stage = this.#stage, tell = (error) => this.#tell("error", error);
+    const files = floorIn(this.getAttribute("floor") ?? "").map(({ source, each }) => ({ source: new URL(source, document.baseURI).href, each }));
+    this.#grove.grow(files, ATHViewerElement.loader, (plant) => {
+      stage.add(plant);
+      this.#dirty = true;
+    }).catch(tell);
   }
 
   #play() {
@@ -194,27 +344,6 @@ export class ATHViewerElement extends HTMLElement {
     this.#dirty = true;
   }
 
-  #resize() {
-    const { clientWidth: width, clientHeight: height } = this;
-    if (!this.#renderer || width === 0 || height === 0) return;
-    this.#renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
-    this.#renderer.setSize(width, height, false);
-    this.#camera.aspect = width / height;
-    this.#camera.updateProjectionMatrix();
-    this.#dirty = true;
-  }
-
-  // The whole plant in view.
-  #fit() {
-    const { ath, root } = this.#plant, box = ath.box.clone().applyMatrix4(root.matrixWorld), size = box.getSize(new Vector3());
-    const half = Math.tan(this.#camera.fov * Math.PI / 360), across = Math.hypot(size.x, size.z);
-    const distance = 0.35 * across + 0.6 * Math.max(size.y, across / this.#camera.aspect, 1e-6) / half;
-    box.getCenter(this.#controls.target);
-    this.#camera.position.copy(this.#controls.target).add(new Vector3(0.35, 0.16, 0.92).normalize().multiplyScalar(distance));
-    Object.assign(this.#camera, { near: distance / 500, far: distance * 60 }).updateProjectionMatrix();
-    this.#controls.update();
-  }
-
   #go() {
     if (this.#frame === 0 && this.#seen && this.#plant) {
       this.#last = 0;
@@ -229,13 +358,17 @@ export class ATHViewerElement extends HTMLElement {
     const passed = this.#last ? Math.min(LONGEST, (now - this.#last) / 1000) : 0, { ath: { motion }, root } = this.#plant;
     this.#last = now;
     if (!this.paused) this.#seconds += passed * (Number(this.getAttribute("speed")) || 1);
-    const height = this.#canvas.height;
-    this.#controls.update();
-    motion.update(this.#camera, height, root).setTime(this.#seconds);
+    const { controls, camera, pixels } = this.#stage;
+    controls.update();
+    if (this.#grove) {
+      this.#dirty ||= !this.paused || this.#grove.forests.some(({ fading }) => fading);
+      this.#grove.update(camera, pixels, this.#seconds);
+    } else motion.update(camera, pixels, root).setTime(this.#seconds);
     if (!this.#dirty) return;
     this.#dirty = false;
-    this.#plant.prepare(this.#canvas.width, height);
-    this.#renderer.render(this.#scene, this.#camera);
+    if (!this.paused) this.#stage.took(1000 * passed);
+    this.#stage.render();
+    this.#canvas.classList.add("drawn");
   }
 }
 

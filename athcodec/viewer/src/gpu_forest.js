@@ -14,6 +14,7 @@ import vertices from "../../gpu/vertices.wgsl";
 import { Kernels, Passes } from "../../gpu/passes.mjs";
 import { roundOf } from "./ATHMotion.js";
 import { clustered } from "./geometry.js";
+import { Mixture, Play } from "./gpu_blend.js";
 
 const MOST_SHAPES = 32;
 const SLOTS = 4;          // frames that a plant keeps: two that are shown, and two that were before
@@ -30,6 +31,7 @@ export class ATHForest extends Group {
   pixels = 1;      // error on the screen that a level may have
   measure = "p99";
   phases = 8;      // in which instances of a clip can be, evenly over its time
+  ease = 0.2;      // seconds in which two thirds of a change of weights have happened; 0: at once
   bytesOfMotion = 0;     // uploaded so far: segments and levels, once each
   bytesOfParameters = 0; // and what says which frames are shown, every frame
   levels = [];     // that can be drawn: {level, passes, ...}
@@ -42,9 +44,12 @@ export class ATHForest extends Group {
   #device;
   #kernels;
   #choose;
-  #motions = new Map(); // of clips that instances play: a view that has their bytes fetched
-  #plants = [];         // {clip, ahead}: what instances show, one of each clip and phase in use
-  #times = [];          // of each plant at this frame: {frames, weight}
+  #motions = new Map(); // of clips that are shown: a view that has their bytes fetched
+  #plants = [];         // {clip, phase}: what instances show, one of each clip and phase in use; phase: 0 to 1
+  #times = [];          // of each plant at this frame: [{frame, weight}]
+  #mixture = new Mixture();
+  #play;
+  #eased = 0;           // when weights were advanced, milliseconds
   #instances = null;    // StorageBufferAttribute
   #draws = null;
   #lists = null;
@@ -57,6 +62,7 @@ export class ATHForest extends Group {
   #version = 0;
   #inView = new Float32Array(VIEW_WORDS);
   #zeros = null;
+  #asked = null;        // the wind that was asked for last
   #strength = 1;
   #heading = TSL.uniform(new Vector3(1, 0, 0)); // cosine, sine, 1 where the motion has a heading of its own
 
@@ -69,6 +75,7 @@ export class ATHForest extends Group {
     if (!this.#device) throw new Error("ATHForest: got a renderer without WebGPU, expected one after init(); ATHForest of athcodec-three is for WebGL");
     this.#renderer = renderer;
     this.#ath = ath;
+    this.#play = new Play(ath.channel);
     this.#geometry = geometry;
     this.#material = material;
     this.#shape = shape;
@@ -88,6 +95,16 @@ export class ATHForest extends Group {
     return this.#plants.length;
   }
 
+  /** Of each plant that is computed: the name of its clip and its phase, 0 to 1. */
+  get plants() {
+    return this.#plants.map(({ clip, phase }) => [clip.name, phase]);
+  }
+
+  /** Names of the clips whose bytes are wanted. */
+  get clips() {
+    return Array.from(this.#motions.keys(), ({ name }) => name);
+  }
+
   /** Bytes on the GPU, but for shapes. */
   get bytes() {
     return this.levels.reduce((sum, { passes }) => sum + passes.bytes, 0);
@@ -97,13 +114,12 @@ export class ATHForest extends Group {
   setInstances(instances) {
     const { motion, channel } = this.#ath, { limits } = this.#device, numbers = new Float32Array(8 * Math.max(1, instances.length));
     this.#forget();
-    const clipOf = (name) => motion.clips.find(({ index, name: own }) => name === index || name === own) ?? motion.clip;
-    const clips = new Set(instances.map(({ clip }) => clipOf(clip)));
+    const clipOf = (name) => this.#clip(name) ?? motion.clip, clips = new Set(instances.map(({ clip }) => clipOf(clip)));
     const most = Math.floor(limits.maxStorageBufferBindingSize / (12 * SLOTS * channel.info.vertexCount) / Math.max(1, clips.size));
     const phases = Math.max(1, Math.min(this.phases, most)), plants = new Map();
     const plantOf = (clip, seconds = 0) => {
       const round = roundOf(clip) || 1, phase = Math.floor(((seconds / round) % 1 + 1) % 1 * phases), key = clip.index * phases + phase;
-      if (!plants.has(key)) plants.set(key, { index: plants.size, clip, ahead: phase / phases * round, kept: new Map() });
+      if (!plants.has(key)) plants.set(key, { index: plants.size, clip, phase: phase / phases });
       return plants.get(key).index;
     };
     instances.forEach(({ x, y, z, size = 1, angle = 0, seconds, clip, tint = WHITE }, i) => {
@@ -113,7 +129,7 @@ export class ATHForest extends Group {
     });
     this.#plants = [...plants.values()];
     this.#count = instances.length;
-    for (const clip of clips) this.#motions.set(clip, motion.clone().play(clip.index).setLevel(0).setTime(0));
+    for (const clip of [...clips, ...this.#mixture.clips]) this.#fetch(clip);
     this.#instances = this.#storage(numbers, 4);
     this.#draws = new IndirectStorageBufferAttribute(new Uint32Array(5 * MOST_SHAPES), 5);
     this.#renderer.backend.createIndirectStorageAttribute(this.#draws);
@@ -123,6 +139,16 @@ export class ATHForest extends Group {
       entries: [this.#bufferOf(this.#instances), this.view, this.tolerances, this.#bufferOf(this.#draws), this.#bufferOf(this.#lists)]
         .map((buffer, binding) => ({ binding, resource: { buffer } })) });
     return this;
+  }
+
+  #clip(name) {
+    return this.#ath.motion.clips.find(({ index, name: own }) => name === index || name === own);
+  }
+
+  // Has a clip's bytes fetched, as far as levels are shown.
+  #fetch(clip) {
+    if (this.#motions.has(clip)) return;
+    this.#motions.set(clip, this.#ath.motion.clone().play(clip.index).setLevel(Math.max(0, this.levels.length - 1)).setTime(0));
   }
 
   // An attribute of which the buffer is there from now on.
@@ -136,9 +162,35 @@ export class ATHForest extends Group {
     return this.#renderer.backend.get(attribute).buffer;
   }
 
-  /** How strong the wind is, 1: as in the file; heading: where it blows to, radians about the axis that is up, of all instances
-   * alike; null: each as it is turned itself. */
-  wind(strength, heading = null) {
+  /** Shows clips at once, in place of each instance's own. See webgpu.d.ts. */
+  blend(weights) {
+    const found = Object.entries(weights ?? {}).map(([name, weight]) => [this.#clip(name), weight]);
+    const wrong = found.findIndex(([clip, weight]) => !clip || !(weight >= 0 && weight < Infinity));
+    if (wrong >= 0 || (weights && !found.some(([, weight]) => weight > 0)))
+      throw new RangeError(`blend: got ${JSON.stringify(weights)}, expected weights of clips, ${this.#ath.motion.clips.map(({ name }) => name).join(", ")}`);
+    for (const [clip, weight] of found) if (weight > 0) this.#fetch(clip);
+    this.#mixture.set(weights && new Map(found));
+    return this;
+  }
+
+  /** Shows the clips whose own wind is nearest. See webgpu.d.ts. */
+  async wind(strength, heading = 0) {
+    if (![strength, heading].every(Number.isFinite)) throw new RangeError(`wind: got ${strength} and ${heading}, expected two finite numbers`);
+    const asked = this.#asked = {}, { weights } = await this.#ath.channel.windWeights(strength, heading), { clips } = this.#ath.motion;
+    if (asked === this.#asked) this.blend(Object.fromEntries(clips.map(({ name }, i) => [name, weights[i]])));
+    return this;
+  }
+
+  /** Plays clips without an end from now on, where they can; null: around again. See webgpu.d.ts. */
+  endless(seed = 1) {
+    if (seed !== null && !Number.isInteger(seed)) throw new RangeError(`endless: got the seed ${seed}, expected an integer`);
+    this.#play.seed = seed;
+    return this;
+  }
+
+  /** How far plants move, 1: as in the file; heading: where to, radians about the axis that is up, of all instances alike; null:
+   * each as it is turned itself. */
+  sway(strength, heading = null) {
     this.#strength = strength;
     this.#heading.value.set(Math.cos(heading ?? 0), Math.sin(heading ?? 0), heading === null ? 0 : 1);
     return this;
@@ -146,15 +198,21 @@ export class ATHForest extends Group {
 
   // ---- levels ----
 
-  // The next level, once its bytes are here and an instance is so near that the one before does not do.
+  // Of clips that have come later, what levels that are shown lack; then the next level, once its bytes are here and an instance
+  // is so near that the one before does not do.
   #loadNext(hidden) {
     const next = this.levels.length, { motion } = this.#ath;
-    if (this.#loading || next >= motion.levelCount) return;
-    if (next > 0 && this.#error(next - 1) <= hidden) return;
+    if (this.#loading) return;
+    for (const own of this.levels) for (const [clip, { readyLevel }] of this.#motions)
+      if (!own.clips.has(clip) && readyLevel >= own.level) return this.#begin(() => this.#loadClip(own, clip));
+    if (next >= motion.levelCount || (next > 0 && this.#error(next - 1) <= hidden)) return;
     for (const view of this.#motions.values()) if (view.target < next) view.setLevel(next);
-    if ([...this.#motions.values()].some(({ readyLevel }) => readyLevel < next)) return;
+    if ([...this.#motions.values()].every(({ readyLevel }) => readyLevel >= next)) this.#begin(() => this.#load(next));
+  }
+
+  #begin(work) {
     this.#loading = true;
-    this.#load(next).catch(({ message, codeName }) => this.#ath.motion.dispatchEvent({ type: "error", message, codeName }));
+    work().catch(({ message, codeName }) => this.#ath.motion.dispatchEvent({ type: "error", message, codeName }));
   }
 
   // Of all clips that are played.
@@ -168,27 +226,45 @@ export class ATHForest extends Group {
     if (!is()) return;
     const shown = this.#plants.length, shared = this.#storage(new Float32Array(FLOATS * words[2] * shown), 1);
     const passes = new Passes(this.#device, this.#kernels, words, { slots: SLOTS * shown, shown, vertices: this.#bufferOf(shared) });
-    const places = new Map(); // of frames of the file: {segment, frame}
-    for (const { firstSegment, segmentCount } of this.#motions.keys()) {
-      for (let s = firstSegment; s < firstSegment + segmentCount; s++) {
-        const { words: block, coded } = await channel.gpu(level, s);
-        if (!is()) {
-          passes.dispose();
-          return;
-        }
-        const segment = passes.segment(block);
-        coded.forEach((frame, i) => places.set(channel.segments[s] + i, { segment, frame }));
+    const own = { level, passes, shared, clips: new Set(), places: new Map(), uploaded: 0, bytesOfMotion: 0, bytesOfParameters: 0, strength: NaN,
+      slots: this.#plants.map(() => new Array(SLOTS).fill(-1)), before: this.#plants.map(() => null) };
+    if (this.#ath.hasFaces) passes.setCorners(cornersOf(this.#ath.geometry, channel.vertexSource));
+    for (const clip of this.#motions.keys()) {
+      if (!await this.#upload(own, clip, is)) {
+        passes.dispose();
+        return;
       }
     }
-    if (this.#ath.hasFaces) passes.setCorners(cornersOf(this.#ath.geometry, channel.vertexSource));
-    passes.bytesOfMotion = passes.uploaded;
-    this.bytesOfMotion += passes.uploaded;
-    const own = { level, passes, shared, places, uploaded: passes.uploaded, strength: NaN,
-      slots: this.#plants.map(() => new Array(SLOTS).fill(-1)), before: this.#plants.map(() => null) };
     this.levels.push(own);
     this.#addShapes(own, known);
     this.#loading = false;
     this.dispatchEvent({ type: "level", level });
+  }
+
+  async #loadClip(own, clip) {
+    const version = this.#version;
+    if (await this.#upload(own, clip, () => version === this.#version)) this.#loading = false;
+  }
+
+  // The segments of a clip at a level; false: nobody wants them any more. places: of frames of the file, {segment, frame}.
+  async #upload(own, clip, is) {
+    const { channel } = this.#ath, { passes, level, places } = own;
+    for (let s = clip.firstSegment; s < clip.firstSegment + clip.segmentCount; s++) {
+      const { words, coded } = await channel.gpu(level, s);
+      if (!is()) return false;
+      const segment = passes.segment(words);
+      this.#account(own, "bytesOfMotion");
+      coded.forEach((frame, i) => places.set(channel.segments[s] + i, { segment, frame }));
+    }
+    own.clips.add(clip);
+    return true;
+  }
+
+  // What has been uploaded since the last time.
+  #account(own, kind) {
+    this[kind] += own.passes.uploaded - own.uploaded;
+    own[kind] += own.passes.uploaded - own.uploaded;
+    own.uploaded = own.passes.uploaded;
   }
 
   // Geometries of a level: the finest for where its error is a pixel, coarser ones up to where the level before takes over.
@@ -293,47 +369,53 @@ export class ATHForest extends Group {
     return pixel * Math.max(distance - 0.5 * reach * this.#size, 1e-6) / this.#size;
   }
 
-  // The two frames of the file that each plant is between.
+  // The frames of the file that each plant shows. Clips are blended once all levels have them.
   #place(seconds) {
-    const { times } = this.#ath.channel;
-    this.#times = this.#plants.map(({ clip, ahead }) => {
-      const { firstFrame, frameCount, duration } = clip, round = roundOf(clip);
-      if (frameCount === 1 || !(round > 0)) return { frames: [firstFrame, firstFrame], weight: 0 };
-      const passed = (((seconds + ahead) % round) + round) % round, start = times[firstFrame];
-      let low = 0, high = frameCount - 1;
-      if (passed >= duration) return { frames: [firstFrame + high, firstFrame], weight: Math.min((passed - duration) / (round - duration), 1) };
-      while (high - low > 1) {
-        const middle = (low + high) >> 1;
-        if (times[firstFrame + middle] - start <= passed) low = middle;
-        else high = middle;
-      }
-      const [a, b] = [times[firstFrame + low], times[firstFrame + high]];
-      return { frames: [firstFrame + low, firstFrame + high], weight: (passed + start - a) / (b - a) };
-    });
+    const now = performance.now(), share = this.ease > 0 ? 1 - Math.exp((this.#eased - now) / (1000 * this.ease)) : 1;
+    this.#eased = now;
+    this.#mixture.advance(share, (clip) => this.levels.every((own) => own.clips.has(clip)));
+    this.#times = this.#plants.map(({ clip: own, phase }, plant) => [...this.#mixture.of(own)].flatMap(([clip, part]) =>
+      this.#play.at(clip, seconds + phase * roundOf(clip), plant).map(({ frame, weight }) => ({ frame, weight: part * weight }))));
   }
 
-  // A level at that time: frames are placed that are not there, and all plants shown.
+  // A level at that time: what is not there yet is placed, and all plants shown.
   #show(own) {
     const places = [], shows = [], strength = this.#strength, changed = own.strength !== strength;
     own.strength = strength;
-    this.#times.forEach(({ frames, weight }, plant) => {
-      const kept = own.slots[plant], before = own.before[plant], first = SLOTS * plant;
-      if (changed) kept.fill(-1);
-      const slots = frames.map((frame) => {
-        let slot = kept.indexOf(frame);
-        if (slot < 0) {
-          slot = kept.findIndex((old, k) => !frames.includes(old) && !before?.slots.includes(first + k));
-          kept[slot] = frame;
-          places.push({ ...own.places.get(frame), slot: first + slot, strength });
-        }
-        return first + slot;
-      });
-      shows.push({ slots, weight, previous: before?.slots ?? slots, previousWeight: before?.weight ?? weight });
-      own.before[plant] = { slots, weight };
+    this.#times.forEach((frames, plant) => {
+      const before = own.before[plant];
+      if (changed) own.slots[plant].fill(-1);
+      const shown = frames.length > 2 ? this.#blended(own, plant, frames, places) : this.#between(own, plant, frames, places);
+      shows.push({ ...shown, previous: before?.slots ?? shown.slots, previousWeight: before?.weight ?? shown.weight });
+      own.before[plant] = shown;
     });
     own.passes.run(places, shows);
-    this.bytesOfParameters += own.passes.uploaded - own.uploaded;
-    own.uploaded = own.passes.uploaded;
+    this.#account(own, "bytesOfParameters");
+  }
+
+  // At most two frames, of which each is placed once for all times around it.
+  #between(own, plant, frames, places) {
+    const kept = own.slots[plant], first = SLOTS * plant, names = frames.map(({ frame }) => frame);
+    const slots = names.map((frame) => {
+      let slot = kept.indexOf(frame);
+      if (slot < 0) {
+        slot = kept.findIndex((old, k) => !names.includes(old) && !own.before[plant]?.slots.includes(first + k));
+        kept[slot] = frame;
+        places.push({ sources: [own.places.get(frame)], slot: first + slot, strength: own.strength });
+      }
+      return first + slot;
+    });
+    return { slots: [slots[0], slots.at(-1)], weight: frames.length > 1 ? frames[1].weight : 0 };
+  }
+
+  // Several, which are blended before branches are placed: at this time alone.
+  #blended(own, plant, frames, places) {
+    const kept = own.slots[plant], first = SLOTS * plant;
+    const slot = kept.findIndex((_, k) => !own.before[plant]?.slots.includes(first + k));
+    kept[slot] = -1;
+    const sources = frames.filter(({ weight }) => weight > 0).map(({ frame, weight }) => ({ ...own.places.get(frame), weight }));
+    places.push({ sources, slot: first + slot, strength: own.strength });
+    return { slots: [first + slot, first + slot], weight: 0 };
   }
 
   #select() {

@@ -17,6 +17,9 @@ const MOST_PREPARED = 256 << 20;  // bytes of decoded segments that are kept
 const STATE_MS = 50;
 const WIDTH = 1024;               // of the texture, in texels of four numbers
 const REFINED_REST = 0x15;
+const MOST_BLENDED = 4;           // shares
+const GONE = 1e-3;                // a weight that is seen no more
+const LOOKED_AWAY = 1;            // seconds without a picture, after which weights are at once what they are wanted to be
 const BLENDED = -1;               // in place of a level: all vertices are exact, as blended clips leave them
 
 const channel = new MessageChannel(), waiting = [];
@@ -28,6 +31,7 @@ export class Session {
   #front = new Uint8Array(0);
   #came = 0;              // bytes from the file's beginning on
   #views = new Map();     // id: {level, frames, wanted, fading}, the frame of a clip that fades out, which is not fetched, last
+  #mixtures = new Map();  // of views: shares that were shown last and when, see #eased
   #prepared = new Map();  // "segment/level": Segment, those used last at the end
   #underway = [];         // ranges that are being fetched
   #parts = new Map();
@@ -112,7 +116,7 @@ export class Session {
     }
     this.#order = file.vertexSource();
     this.#finerRest = file.chunks().some(({ kind, level }) => kind === REFINED_REST && level === 1);
-    if (file.readyLevel(0) > 0) this.#readFinerRest();
+    this.#lookForFinerRest();
     this.#rest ??= file.levelRest(0);
     this.post({
       type: "opened", info: { ...info, levelNames }, statics, rest: this.#rest, times: file.times(), branches: file.branches(),
@@ -133,12 +137,17 @@ export class Session {
     }));
   }
 
+  // As soon as its bytes are here, whichever level is shown: what level 0 looks like does not depend on the order of events.
+  #lookForFinerRest() {
+    if (this.#finerRest && this.#file.readyLevel(0) > 0) this.#readFinerRest();
+  }
+
   // The reference pose of the levels above 0: matrices of level 0 are at home on it, too.
   #readFinerRest() {
     if (!this.#finerRest) return;
+    this.#finerRest = false;
     try {
       this.#rest = this.#file.levelRest(1);
-      this.#finerRest = false;
       this.#restNormals = null;
       if (this.#opened) this.post({ type: "rest", rest: this.#rest });
     } catch {
@@ -160,6 +169,7 @@ export class Session {
     if (offset <= this.#came) this.#came = Math.max(this.#came, offset + bytes.length);
     if (this.#file) {
       this.#file.feed(bytes, offset);
+      this.#lookForFinerRest();
       this.#changed();
       return;
     }
@@ -371,6 +381,7 @@ export class Session {
 
   drop(id) {
     this.#views.delete(id);
+    this.#mixtures.delete(id);
   }
 
   #fading(id) {
@@ -597,6 +608,7 @@ export class Session {
       buffer = null, now = 0, fade = 0, coarsely = false } = message;
     const shares = this.#shares(message);
     if (shares) return this.#ofShares(message, shares);
+    if (!aside) this.#mixtures.delete(view);
     const frame = this.#file.frameAt(seconds, wrap, clip), fading = aside ? new Fading() : this.#fading(view);
     const shown = exactly ? this.#exactly(frame, level) : this.#viewed({ view, frame, level, old, fading, coarsely,
       ahead: ahead === null ? [] : [this.#file.frameAt(ahead, wrap, clip)] });
@@ -611,23 +623,46 @@ export class Session {
     const file = this.#file;
     if (wind)
       return file.windWeights(this.#winds, ...wind).flatMap((weight, index) =>
-        (weight > 0 ? [{ weight, frame: file.frameAt(seconds, wrap, index) }] : []));
+        (weight > 0 ? [{ weight, clip: index, frame: file.frameAt(seconds, wrap, index) }] : []));
     return places?.length > 1 ? places.map((place) => ({ weight: place.weight, frame: file.frameAt(place.seconds, wrap, clip) })) : null;
   }
 
   // Each at the deepest level that is decoded of it; those of which nothing is are left out.
-  #ofShares({ view, clip, seconds, wrap, level, exactly = false, aside = false, positions = false, buffer = null, coarsely = false }, used) {
+  #ofShares(message, used) {
+    const { view, clip, seconds, wrap, level, exactly = false, aside = false, positions = false, buffer = null, coarsely = false } = message;
     const file = this.#file, shares = [], frames = used.map((share) => share.frame), frame = file.frameAt(seconds, wrap, clip);
     if (!aside) this.view(view, level, frames, frames);
     for (const share of used) {
       const shown = exactly ? this.#exactly(share.frame, level) : this.#show(share.frame, coarsely ? 0 : level);
-      if (shown) shares.push({ ...shown, weight: share.weight });
+      if (shown) shares.push({ ...share, ...shown });
     }
     if (shares.length === 0) return { frame };
-    const xyz = file.blended(shares), shown = Math.min(...shares.map((share) => share.level));
+    const shown = Math.min(...shares.map((share) => share.level)), eases = message.wind && !exactly && !aside;
+    const mixed = eases ? this.#eased(message, shares) : { shares, fading: false }, xyz = file.blended(mixed.shares);
     if (!aside) this.#fading(view).to(shown);
-    return { shown, cut: BLENDED, frame, fading: false, clip, held: file.held, whole: positions,
+    return { shown, cut: BLENDED, frame, fading: mixed.fading, clip, held: file.held, whole: positions,
       data: positions ? xyz : this.#packExact(xyz, buffer) };
+  }
+
+  // Shares on their way to these, as clips and levels of them come and go; at first from the clip that was shown.
+  #eased({ view, clip, seconds, wrap, now = 0, fade = 0 }, wanted) {
+    const { level } = this.#fading(view), alone = level >= 0 ? { shares: [{ clip, level, weight: 1 }], at: now } : null;
+    const before = this.#mixtures.get(view) ?? alone, passed = before ? (now - before.at) / 1000 : Infinity;
+    const part = fade > 0 && passed < LOOKED_AWAY ? 1 - Math.exp(-3 * Math.max(0, passed) / fade) : 1;
+    const same = (a) => (b) => a.clip === b.clip && a.level === b.level;
+    const leaving = (before?.shares ?? []).filter((share) => part < 1 && !wanted.some(same(share)) && share.weight * (1 - part) > GONE);
+    const old = leaving.flatMap((share) => {
+      const there = this.#decoded(this.#file.frameAt(seconds, wrap, share.clip), share.level);
+      return there ? [{ ...there, clip: share.clip, weight: share.weight * (1 - part) }] : [];
+    });
+    const arrived = wanted.map((share) => {
+      const weight = before?.shares.find(same(share))?.weight ?? 0;
+      return { ...share, weight: weight + (share.weight - weight) * part };
+    });
+    const shares = [...arrived, ...old].sort((a, b) => b.weight - a.weight).slice(0, MOST_BLENDED).filter(({ weight }) => weight > 0);
+    this.#mixtures.set(view, { shares, at: now });
+    const fading = old.length > 0 || wanted.some((share) => Math.abs(share.weight - (shares.find(same(share))?.weight ?? 0)) > GONE);
+    return { shares, fading };
   }
 
   // What the answer says of it.
@@ -789,6 +824,11 @@ export class Session {
       Object.assign(answer, describe(error));
     }
     this.post(answer, [answer.words, answer.coded].filter(Boolean).map((array) => array.buffer));
+  }
+
+  /** What each clip counts for a wind. */
+  wind({ id, strength, heading }) {
+    this.post({ type: "wind", id, weights: Array.from(this.#file.windWeights(this.#winds, strength, heading)) });
   }
 
   close() {

@@ -1,0 +1,96 @@
+// What a plant of a forest shows at a time: frames of clips, each with a weight, which add up to 1.
+
+import { EndlessPlay, transitionsOf } from "./endless.js";
+import { roundOf } from "./ATHMotion.js";
+
+const OWN = null; // in place of a clip: that which a plant itself plays
+const GONE = 1e-3; // a weight below this counts for nothing once it is on its way to nothing
+
+/** Weights of the clips that a forest shows, which change over a time. */
+export class Mixture {
+  #wanted = new Map([[OWN, 1]]);
+  #shown = new Map([[OWN, 1]]);
+
+  /** weights: of clips, in place of each plant's own; null: none. */
+  set(weights) {
+    const sum = weights ? [...weights.values()].reduce((total, weight) => total + weight, 0) : 0;
+    this.#wanted = sum > 0 ? new Map([...weights].map(([clip, weight]) => [clip, weight / sum])) : new Map([[OWN, 1]]);
+  }
+
+  /** Those that are wanted in place of plants' own. */
+  get clips() {
+    return [...this.#wanted.keys()].filter((clip) => clip !== OWN);
+  }
+
+  /** Takes what is shown nearer to what is wanted: `share` of the way. Clips that are not here leave their weight to others. */
+  advance(share, isHere) {
+    const here = [...this.#wanted].filter(([clip, weight]) => weight > 0 && (clip === OWN || isHere(clip)));
+    const sum = here.reduce((total, [, weight]) => total + weight, 0), target = new Map(here.map(([clip, weight]) => [clip, weight / sum]));
+    if (target.size === 0) return;
+    const both = [...new Set([...this.#shown.keys(), ...target.keys()])];
+    const next = both.map((clip) => [clip, (this.#shown.get(clip) ?? 0) * (1 - share) + (target.get(clip) ?? 0) * share])
+      .filter(([clip, weight]) => weight > GONE || target.has(clip));
+    const total = next.reduce((all, [, weight]) => all + weight, 0);
+    this.#shown = new Map(next.map(([clip, weight]) => [clip, weight / total]));
+  }
+
+  /** Of a plant that plays `own`: the weight of each clip. */
+  of(own) {
+    const weights = new Map();
+    for (const [clip, weight] of this.#shown) weights.set(clip ?? own, (weights.get(clip ?? own) ?? 0) + weight);
+    return weights;
+  }
+}
+
+/** Clips as forests play them: around, or without an end. */
+export class Play {
+  #channel;
+  #endless = new Map(); // of "clip plant"
+  seed = null;          // of endless play; null: clips go around
+
+  constructor(channel) {
+    this.#channel = channel;
+  }
+
+  /** [{frame, weight}] of a clip `seconds` after it began; of the plant with that number. */
+  at(clip, seconds, plant) {
+    const endless = this.seed === null ? null : this.#endlessOf(clip, plant);
+    if (!endless) return this.#around(clip, seconds);
+    return endless.at(seconds).places.flatMap((place) =>
+      this.#within(clip, place.seconds).map(({ frame, weight }) => ({ frame, weight: weight * place.weight })));
+  }
+
+  // Null where the clip has no transitions.
+  #endlessOf(clip, plant) {
+    const key = `${this.seed} ${clip.index} ${plant}`, { metadata } = this.#channel.statics, { firstFrame, frameCount, name } = clip;
+    if (!this.#endless.has(key)) {
+      const found = transitionsOf({ ...metadata, ...metadata.clips?.[name] }, frameCount);
+      this.#endless.set(key, found.length
+        ? new EndlessPlay(found, this.#channel.times.subarray(firstFrame, firstFrame + frameCount), this.seed + plant) : null);
+    }
+    return this.#endless.get(key);
+  }
+
+  #around(clip, seconds) {
+    const { firstFrame, frameCount, duration } = clip, round = roundOf(clip);
+    if (frameCount === 1 || !(round > 0)) return [{ frame: firstFrame, weight: 1 }];
+    const passed = ((seconds % round) + round) % round;
+    if (passed < duration) return this.#within(clip, passed);
+    return mixed(firstFrame + frameCount - 1, firstFrame, Math.min((passed - duration) / (round - duration), 1));
+  }
+
+  // Seconds from 0 to the clip's duration.
+  #within({ firstFrame, frameCount }, seconds) {
+    const { times } = this.#channel, at = times[firstFrame] + seconds;
+    let low = firstFrame, high = firstFrame + frameCount - 1;
+    while (high - low > 1) {
+      const middle = (low + high) >> 1;
+      if (times[middle] <= at) low = middle;
+      else high = middle;
+    }
+    return high === low ? [{ frame: low, weight: 1 }]
+      : mixed(low, high, Math.min(Math.max((at - times[low]) / (times[high] - times[low]), 0), 1));
+  }
+}
+
+const mixed = (a, b, weight) => [{ frame: a, weight: 1 - weight }, { frame: b, weight }];
