@@ -35,6 +35,8 @@ SIZE = (640, 480)
 FRAMES_PER_SECOND = 15
 FORMATS = {"png": "PNG", "gif": "GIF", "webp": "WEBP"}
 
+_STILL_QUALITY = 78
+_STILL_AT = 0.7  # of the clip's duration
 _TIMEOUT = 120_000  # ms
 _WHOLE = "() => globalThis.athcodecViewer?.motion?.complete"
 _ALONE = """() => {
@@ -110,6 +112,27 @@ def save_picture(
     return data.tell()
 
 
+def still(path: str | os.PathLike[str], size: tuple[int, int] = SIZE) -> bytes:
+    """A plant as WebP, with all of the viewer's scenery, late in its clip, when it has grown where it grows; raises as
+    `save_picture`."""
+    image = _packages()
+    with open_ath(path) as decoder:
+        time = _STILL_AT * decoder.clip.duration
+    (png,) = _drawn(path, "png", None, size, FRAMES_PER_SECOND, time, None, "?quality=full")
+    data = io.BytesIO()
+    image.open(io.BytesIO(png)).convert("RGB").save(data, "WEBP", quality=_STILL_QUALITY, method=6)
+    return data.getvalue()
+
+
+def can_draw() -> bool:
+    """Whether all is there that pictures take."""
+    try:
+        _packages()
+    except MissingExtra:
+        return False
+    return True
+
+
 def _packages() -> Any:
     """Pillow's module of images, once all that is needed is there."""
     try:
@@ -124,7 +147,7 @@ def _packages() -> Any:
     return Image
 
 
-def _drawn(path, kind, clip, size, fps, time, host_mesh) -> Iterator[bytes]:
+def _drawn(path, kind, clip, size, fps, time, host_mesh, asked="") -> Iterator[bytes]:
     """Each picture as PNG."""
     from playwright.sync_api import sync_playwright
 
@@ -138,7 +161,7 @@ def _drawn(path, kind, clip, size, fps, time, host_mesh) -> Iterator[bytes]:
         browser = playwright.chromium.launch(executable_path=browser_path(), args=FLAGS)
         try:
             page = browser.new_page(viewport={"width": size[0], "height": size[1]})
-            page.goto((Path(folder) / "page.html").as_uri())
+            page.goto((Path(folder) / "page.html").as_uri() + asked)
             page.wait_for_function(_WHOLE, timeout=_TIMEOUT)
             page.evaluate(_ALONE)
             for at in times:

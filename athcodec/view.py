@@ -14,7 +14,7 @@ import os
 import re
 import secrets
 import webbrowser
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -28,6 +28,7 @@ from athcodec.host_mesh import HostMesh
 WEB = Path(__file__).parent / "viewer" / "web"
 PAGE = WEB / "index.html"
 INSTALL = 'pip install "athcodec[view]"'
+Floor = Mapping[str | os.PathLike[str], float]
 PASSED_ON = ("Content-Length", "Content-Range", "Content-Type", "ETag", "Last-Modified", "Accept-Ranges")
 
 _MAP = re.compile(r'<script type="importmap">(.*?)</script>', re.DOTALL)
@@ -42,6 +43,7 @@ def export_page(
     page: str | os.PathLike[str],
     clip: str | None = None,
     host_mesh: HostMesh | None = None,
+    floor: Floor | None = None,
 ) -> int:
     """Writes one page that plays an .ath file without any other file or server.
 
@@ -55,6 +57,8 @@ def export_page(
         The name of the clip to begin with; by default the first.
     host_mesh : array, MotionClip, str or path-like, optional
         The mesh that is the rest pose, for a file that does not hold one: see AthFile.set_host_mesh.
+    floor : mapping of str or path-like to float, optional
+        Files of plants for the floor of the page's forest, and how many of each stand around a tree.
 
     Returns
     -------
@@ -71,10 +75,18 @@ def export_page(
     data = _read(path)
     _refuse_glb(data[:4])
     mesh = _checked(io.BytesIO(data), clip, host_mesh)
-    text = self_contained(data, file_name(path), clip, mesh).encode()
+    text = self_contained(data, file_name(path), clip, mesh, _read_floor(floor)).encode()
     with new_file(page) as out:
         out.write(text)
     return len(text)
+
+
+def _read_floor(floor: Floor | None) -> list[tuple[bytes, float]]:
+    files = [(_read(path), each) for path, each in (floor or {}).items()]
+    for data, _ in files:
+        _refuse_glb(data[:4])
+        _checked(io.BytesIO(data), None, None)
+    return files
 
 
 def _checked(path: Any, clip: str | None, host_mesh: HostMesh | None) -> bytes | None:
@@ -101,7 +113,13 @@ def _read(path: str | os.PathLike[str]) -> bytes:
         return file.read()
 
 
-def self_contained(data: bytes, name: str, clip: str | None = None, mesh: bytes | None = None) -> str:
+def self_contained(
+    data: bytes,
+    name: str,
+    clip: str | None = None,
+    mesh: bytes | None = None,
+    floor: Sequence[tuple[bytes, float]] = (),
+) -> str:
     """The page with everything inside: styles, modules as data URLs, the worker and the file as text."""
     text = PAGE.read_text("utf-8")
     modules = json.loads(_MAP.search(text)[1])["imports"]
@@ -115,6 +133,9 @@ def self_contained(data: bytes, name: str, clip: str | None = None, mesh: bytes 
     )
     if mesh is not None:
         file += f'\n<script type="text/plain" id="ath-mesh">{base64.b64encode(mesh).decode()}</script>'
+    for plant, each in floor:
+        plain = base64.b64encode(plant).decode()
+        file += f'\n<script type="text/plain" class="ath-floor" data-each="{each:g}">{plain}</script>'
     for old, new in (
         (r'content="default-src[^"]*"', f'content="{_POLICY}"'),
         (r'<link rel="modulepreload"[^>]*>\n', ""),
@@ -152,6 +173,7 @@ def serve(
     clip: str | None = None,
     host_mesh: HostMesh | None = None,
     forest: bool = False,
+    floor: Floor | None = None,
 ) -> None:
     """Serves the viewer with an .ath file on 127.0.0.1 until it is interrupted.
 
@@ -169,6 +191,8 @@ def serve(
         As `export_page`.
     forest : bool
         Whether the address is that of the page that shows many plants, on WebGPU.
+    floor : mapping, optional
+        As `export_page`; files on this computer.
 
     Raises
     ------
@@ -182,13 +206,16 @@ def serve(
         with open(path, "rb") as file:
             _refuse_glb(file.read(4))
     mesh = _checked(path, clip, host_mesh)
+    grown = _read_floor(floor)
     import asyncio
 
     from aiohttp import web
 
     async def run() -> None:
         place = f"file/{secrets.token_urlsafe(12)}/{file_name(path)}"
-        runner = web.AppRunner(application(path, place, mesh), access_log=None)
+        beside = {} if mesh is None else {f"{place}.mesh": mesh}
+        beside |= {f"{place}.floor{i}": data for i, (data, _) in enumerate(grown)}
+        runner = web.AppRunner(application(path, place, beside), access_log=None)
         await runner.setup()
         try:
             site = web.TCPSite(runner, "127.0.0.1", port)
@@ -197,6 +224,7 @@ def serve(
             more = ("" if clip is None else f"&clip={quote(clip, safe='')}") + (
                 "" if mesh is None else f"&mesh={quote(place)}.mesh"
             )
+            more += "".join(f"&floor={quote(place)}.floor{i}&each={each:g}" for i, (_, each) in enumerate(grown))
             ready(f"{address}/{'forest.html' if forest else ''}?file={quote(place)}{more}")
             await asyncio.Event().wait()
         finally:
@@ -220,16 +248,19 @@ def _refuse_other_urls(path: str | os.PathLike[str]) -> None:
         raise AthError(f"{path}: got {scheme}://, expected http:// or https://; --export PAGE reads others")
 
 
-def application(path: str | os.PathLike[str], place: str, mesh: bytes | None = None):
-    """The aiohttp application: the page, and the file at `place`, which only the page's address tells; beside that the
-    host's mesh, for a file that needs one."""
+def application(path: str | os.PathLike[str], place: str, beside: Mapping[str, bytes] | None = None):
+    """The aiohttp application: the page, and the file at `place`, which only the page's address tells; at other such
+    places what goes with it, such as the host's mesh."""
     from aiohttp import ClientSession, web
 
     async def page(request):
         return web.FileResponse(PAGE)
 
-    async def host_mesh(request):
-        return web.Response(body=mesh, content_type="application/octet-stream")
+    def at_once(data):
+        async def answer(request):
+            return web.Response(body=data, content_type="application/octet-stream")
+
+        return answer
 
     async def local(request):
         return web.FileResponse(path, headers={"Content-Type": "application/octet-stream", "Cache-Control": "no-cache"})
@@ -255,8 +286,8 @@ def application(path: str | os.PathLike[str], place: str, mesh: bytes | None = N
     if is_url(path):
         app.cleanup_ctx.append(client)
     app.router.add_get(f"/{quote(place)}", remote if is_url(path) else local)
-    if mesh is not None:
-        app.router.add_get(f"/{quote(place)}.mesh", host_mesh)
+    for name, data in (beside or {}).items():
+        app.router.add_get(f"/{quote(name)}", at_once(data))
     app.router.add_static("/", WEB)
     return app
 

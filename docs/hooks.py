@@ -3,24 +3,30 @@ relative link, to a page, a picture or a source file, works in both."""
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files
+from mkdocs.structure.pages import Page
 
 SHOWN = (
     "*.md",
     "LICENSE",
     "docs/*.md",
     "docs/*.css",
+    "docs/gallery/*",
     "spec/*.md",
     "spec/gltf/README.md",
+    "spec/media-type/*",
     "spec/gltf/schema/*.json",
     "spec/reference_decoder.py",
     "bench/results/report.md",
     "bench/results/*.png",
     "bench/results/*.svg",
     "bench/results/*.webp",
+    "athcodec/sample/*.ath",
+    "athcodec/viewer/web/*",
     "athcodec/viewer/*.d.ts",
     "athcodec/viewer/src/*.d.ts",
     "athcodec/exporters/vat.md",
@@ -45,3 +51,10 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
             *(File.generated(config, path.relative_to(root).as_posix(), abs_src_path=str(path)) for path in shown),
         ]
     )
+
+
+def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Files) -> str:
+    """Addresses in HTML of the gallery from the place that the site gives the page, a folder of its own."""
+    if page.file.src_uri != "docs/gallery.md":
+        return markdown
+    return re.sub(r'((?:src=|href=|floor=|: )"|(?<==\d) )(\.\./|gallery/)', r"\1../\2", markdown)

@@ -38,8 +38,8 @@ await bundle({ stdin: { contents: `export { ${used.join(", ")} } from "three";`,
 await bundle({ entryPoints: [join(here, "page/forest.js")] }, "forest.js", outside);
 await bundle({ stdin: { contents: 'export * from "three/webgpu";', resolveDir: modules } }, "three.webgpu.js", []);
 
-for (const name of ["viewer.css", "forest.css"]) copyFileSync(join(here, "page", name), join(out, name));
-for (const name of ["index.html", "forest.html"]) {
+for (const name of ["viewer.css", "forest.css", "gallery.css"]) copyFileSync(join(here, "page", name), join(out, name));
+for (const name of ["index.html", "forest.html", "gallery.html"]) {
   const page = readFileSync(join(here, "page", name), "utf8"), map = /<script type="importmap">([^]*?)<\/script>/.exec(page)[1];
   const digest = createHash("sha256").update(map).digest("base64");
   writeFileSync(join(out, name), page.replace("IMPORT_MAP_HASH", `'sha256-${digest}'`));

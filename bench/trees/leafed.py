@@ -8,7 +8,7 @@ from 0 to SHADES - 1, and 0 to 1 along it.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from athcodec.clip import ClipRange
 from athcodec.joining import in_wind
 from bench.trees.beams import bend
 from bench.trees.leaves import Leaves, Species, sheet
-from bench.trees.mesh import Tubes
+from bench.trees.mesh import Tubes, bark_uv
 from bench.trees.plant import Plant, grow
 from bench.trees.refine import Splines
 from bench.trees.ride import BLOCK_FRAMES, Skeleton
@@ -39,10 +39,20 @@ def leafed(
 ) -> MotionClip:
     """The tree in one loop for each of the winds (m/s)."""
     plant = grow(nodes, orders, height, seed)
+
+    def moved(wind: Wind) -> MotionClip:
+        return _Dressed(plant, bend(plant, wind, frames, fps, spin_up=SETTLING_SECONDS), sprays, fps, seed).clip(wind)
+
+    return in_winds(moved, winds, height, frames, fps, seed)
+
+
+def in_winds(
+    moved: Callable[[Wind], MotionClip], winds: Mapping[str, float], height: float, frames: int, fps: float, seed: int
+) -> MotionClip:
+    """One loop for each of the winds, whose speeds (m/s) are those at `height`."""
     parts = {}
     for name, speed in winds.items():
-        wind = Wind(speed, height, seed=seed, period=frames / fps)
-        part = _Dressed(plant, bend(plant, wind, frames, fps, spin_up=SETTLING_SECONDS), sprays, fps, seed).clip(wind)
+        part = moved(Wind(speed, height, seed=seed, period=frames / fps))
         part.clip_ranges = (ClipRange(name, frames, loop=True),)
         parts[name] = in_wind(part, speed)
     return join(parts)
@@ -79,7 +89,7 @@ class _Dressed:
             ),
             branch_parent=np.concatenate([skeleton.branch_parent, skeleton.branch[self.leaves.node]]),
             faces=np.concatenate([self.tubes.faces, self.tubes.count + self.leaves.faces]).astype(np.int32),
-            attributes={"uv": np.concatenate([self._bark_uv(), self._leaf_uv()]).astype(np.float32)},
+            attributes={"uv": np.concatenate([bark_uv(skeleton, self.tubes), self._leaf_uv()]).astype(np.float32)},
             metadata={"unit": "m", "up_axis": "y", "fps": self.fps, "surfaces": "bark, leaves"},
         )
 
@@ -87,30 +97,16 @@ class _Dressed:
         nodes = nodes[: len(turns)] if nodes.ndim == 3 else nodes
         return np.concatenate([self.tubes.at(nodes), self.leaves.at(nodes, turns)], axis=-2).astype(np.float32)
 
-    def _bark_uv(self) -> np.ndarray:
-        """The girth of a stem at its foot is one unit along it, too."""
-        skeleton, tubes = self.skeleton, self.tubes
-        below = skeleton.rest[np.maximum(skeleton.parent, 0)]
-        length = np.linalg.norm(skeleton.rest - below, axis=1)
-        girth = 2 * np.pi * np.maximum.reduceat(skeleton.radius, np.unique(skeleton.branch, return_index=True)[1])
-        along = np.zeros(len(length))
-        for node in range(1, len(length)):
-            same = skeleton.branch[node] == skeleton.branch[skeleton.parent[node]]
-            start = along[skeleton.parent[node]] if same else 0.0
-            along[node] = start + length[node] / girth[skeleton.branch[node]]
-        first = tubes.centre != tubes.carrier
-        rings = np.where(first, 0.0, along[tubes.carrier])
-        around = 1 - np.abs(np.arange(SIDES) * 2 / SIDES - 1)
-        uv = np.stack([np.tile(around, len(rings)), np.repeat(rings, SIDES)], axis=1)
-        return np.round(uv * 64) / 64
-
     def _leaf_uv(self) -> np.ndarray:
-        along = np.repeat(np.linspace(0, 1, len(_LEAF[0]) // 2), 2)
-        across = np.tile([0.0, 1.0], len(along) // 2)
-        card = np.stack([across, along], axis=1)
-        uv = np.tile(card, (len(self.shade), 1))
-        uv[:, 0] += 1 + 2 * np.repeat(self.shade, len(card))
-        return uv
+        return leaf_uv(np.linspace(0, 1, len(_LEAF[0]) // 2), self.shade)
+
+
+def leaf_uv(along: np.ndarray, shade: np.ndarray) -> np.ndarray:
+    """(V L, 2) of leaves with pairs of vertices across them, at these shares of their lengths."""
+    card = np.stack([np.tile([0.0, 1.0], len(along)), np.repeat(along, 2)], axis=1)
+    uv = np.tile(card, (len(shade), 1))
+    uv[:, 0] += 1 + 2 * np.repeat(shade, len(card))
+    return uv
 
 
 _LEAF = sheet([0.0, 0.5, 1.0], [LEAF_WIDTH / 2] * 3, [0.0, 0.09, 0.0])

@@ -97,6 +97,8 @@ SPECIES = {
 class Leaves:
     """Leaves at random nodes of a skeleton's outer stems, sorted by node; their turns over the skeleton's frames."""
 
+    steps = STEPS  # small leaves, which the wind turns faster, take more
+
     def __init__(self, skeleton: Skeleton, species: Species, count: int, rng: np.random.Generator) -> None:
         self.skeleton, self.species = skeleton, species
         self.node = np.sort(rng.choice(skeleton.outer_nodes(), count))
@@ -146,15 +148,15 @@ class Leaves:
             if frame == frames - 1:
                 break
             start, end = carriers.at(frame), carriers.at(frame + 1)
-            for part in range(STEPS):
-                share = (part + 0.5) / STEPS
+            for part in range(self.steps):
+                share = (part + 0.5) / self.steps
                 foot, to_plate = (
                     (1 - share) * before + share * after for before, after in zip(start, end, strict=True)
                 )
-                if part % (STEPS // WIND_STEPS) == 0:
+                if part % (self.steps // WIND_STEPS) == 0:
                     blowing = air(foot, (frame + share) * step)
                 relative = blowing - (end[0] - start[0]) / step
-                plates.step(np.einsum("lij,lj->il", to_plate, relative), step / STEPS)
+                plates.step(np.einsum("lij,lj->il", to_plate, relative), step / self.steps)
         return turns
 
 

@@ -1,7 +1,7 @@
 """A render mesh on a simulated plant: bark tubes around the stems, and leaves in the wind on the outer ones.
 
 A tube is a ring of vertices per node, and one where the stem leaves its parent; for the leaves see leaves.py. The
-branches of the clip are the stems, with their tubes, and then one per leaf. No normals, no texture coordinates.
+branches of the clip are the stems, with their tubes, and then one per leaf. No normals.
 """
 
 from __future__ import annotations
@@ -92,3 +92,20 @@ def _tube_faces(ring_branch: np.ndarray, sides: int) -> np.ndarray:
     side, following = np.arange(sides), (np.arange(sides) + 1) % sides
     upper = lower + sides
     return np.stack([lower + side, lower + following, upper + following, upper + side], axis=2).reshape(-1, 4)
+
+
+def bark_uv(skeleton: Skeleton, tubes: Tubes) -> np.ndarray:
+    """(count, 2): 0 to 1 and back around a stem, and along it in units of the girth at its foot."""
+    below = skeleton.rest[np.maximum(skeleton.parent, 0)]
+    length = np.linalg.norm(skeleton.rest - below, axis=1)
+    girth = 2 * np.pi * np.maximum.reduceat(skeleton.radius, np.unique(skeleton.branch, return_index=True)[1])
+    along = np.zeros(len(length))
+    for node in range(1, len(length)):
+        same = skeleton.branch[node] == skeleton.branch[skeleton.parent[node]]
+        start = along[skeleton.parent[node]] if same else 0.0
+        along[node] = start + length[node] / girth[skeleton.branch[node]]
+    first = tubes.centre != tubes.carrier
+    rings = np.where(first, 0.0, along[tubes.carrier])
+    around = 1 - np.abs(np.arange(tubes.sides) * 2 / tubes.sides - 1)
+    uv = np.stack([np.tile(around, len(rings)), np.repeat(rings, tubes.sides)], axis=1)
+    return np.round(uv * 64) / 64

@@ -4,9 +4,11 @@ import { app, main, state } from "./app.js";
 import { colour, compare, level, setLevel, setSplit, show } from "./look.js";
 import { seek, setPlaying } from "./time.js";
 import { playClip } from "./clips.js";
+import { forestOf } from "./forests.js";
 import { setWind } from "./wind.js";
 
 const choices = () => Object.entries({ colour, show });
+const MOST_TREES = 10000;
 const PRESET = { colour: "plain", show: "mesh" };
 
 const short = (value) => String(Number(value.toPrecision(5)));
@@ -65,7 +67,15 @@ export function restore() {
     get(name, (value) => { if (choice.buttons.some((button) => button.dataset.value === value)) choice.pick(value); });
   get("split", restoreSplit);
   get("view", restoreView);
+  get("forest", (text) => { if (Number(text) >= 1) plantAll(Math.min(MOST_TREES, Math.round(Number(text)))); });
   get("t", (text) => { if (Number.isFinite(Number(text))) stopAt(Number(text)); });
+}
+
+// Once all is here that plants are drawn with.
+async function plantAll(count) {
+  const { ath } = main();
+  await ath.arrays.catch(() => {});
+  if (main()?.ath === ath) forestOf(count);
 }
 
 // A clip that is waited for begins at its start.

@@ -84,12 +84,7 @@ export function frameView() {
     stage.look(all, { height: all.min.y, size: 1.9 * most });
     return;
   }
-  const reach = Math.max(forestRadius(), most), near = Math.min(reach, 2.2 * most);
-  const part = new Box3(new Vector3(-near, all.min.y, -near), new Vector3(near, all.max.y, near));
-  stage.look(part, { height: all.min.y, size: 2.6 * reach, plant: 1.9 * most });
-  stage.controls.maxDistance = 6 * reach;
-  stage.camera.far = 12 * reach + 20 * most;
-  stage.fog(stage.camera.position.distanceTo(stage.controls.target) * 0.7, 3.2 * reach + 4 * most);
+  stage.lookOver(all, forestRadius());
 }
 
 /** The same, as long as nobody moved the view by hand. */

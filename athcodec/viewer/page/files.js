@@ -6,6 +6,7 @@ import { playIn } from "./clips.js";
 import { compare } from "./look.js";
 import { Plant } from "./plant.js";
 import { restore } from "./address.js";
+import { floorOf } from "./places.js";
 import { loadingStory, replayed, tellSizes, watchArrival } from "./story.js";
 import { shownWithout, wordsOf } from "./trouble.js";
 import { $ } from "./ui.js";
@@ -20,6 +21,7 @@ function embedded() {
   if (!file) return false;
   const mesh = $("ath-mesh");
   if (mesh) loader.setHostMesh(new Float32Array(bytesOf(mesh)));
+  app.floor = [...document.querySelectorAll(".ath-floor")].map((each) => ({ source: bytesOf(each), each: Number(each.dataset.each) }));
   openFirst({ bytes: bytesOf(file) }, file.dataset.name, file.dataset.clip);
   return true;
 }
@@ -49,6 +51,7 @@ const nameOf = (path) => decodeURIComponent(path.split("/").pop().split("?")[0])
 export function begin() {
   if (embedded()) return;
   const wanted = new URLSearchParams(location.search), url = wanted.get("file"), second = wanted.get("compare");
+  app.floor = floorOf(wanted);
   const mesh = wanted.get("mesh"), ready = mesh ? fetchMesh(mesh) : null;
   const openIt = () => openFirst(url, nameOf(url), wanted.get("clip"));
   if (url) (ready?.then(openIt, refuse) ?? openIt()).then(() => second && app.opened.length && open(second, nameOf(second), true));

@@ -1,17 +1,22 @@
-// A forest of one plant in the wind, on WebGPU. The address says what is shown: ?file=URL&count=10000; with &drawn=0 it is only
-// computed, for measurements
+// A forest of one plant in the wind, on WebGPU. The address says what is shown: ?file=URL&count=10000, and on its floor
+// &floor=URL&each=4; with &drawn=0 it is only computed, for measurements
 
 import { ATHLoader } from "athcodec-three";
 import { ATHForest } from "athcodec-three/webgpu";
-import { Color, DirectionalLight, DoubleSide, Fog, HemisphereLight, Mesh, MeshStandardNodeMaterial, PerspectiveCamera, PlaneGeometry, Scene,
-  WebGPURenderer } from "three/webgpu";
+import { ACESFilmicToneMapping, DoubleSide, MeshStandardNodeMaterial, PerspectiveCamera, Scene, Vector3, WebGPURenderer } from "three/webgpu";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 
 import { foliage } from "./foliage.js";
+import { Stage, SUN } from "./forest_stage.js";
+import { forestMaterial } from "./forest_surfaces.js";
+import { floorOf, floorPlaces, rooted } from "./places.js";
+import { Walk } from "./walk.js";
 import { radii } from "../src/radii.js";
 
 const $ = (id) => document.getElementById(id), asked = new URLSearchParams(location.search);
-const SKY = new Color(0xcfdde4), GROUND = 0x7c8a58, SPACING = 1.5; // of plants, in radii of one
+const SPACING = 1.5; // of plants, in radii of one
+const EYES = 0.28, PACE = 0.7; // of who walks: above ground, and a second, in radii
+const SLOW_MS = 40, SLOW_FRAMES = 12; // of pictures after which there is less to draw
 const state = { frames: 0, milliseconds: 0, forest: null, ath: null, error: null };
 window.athcodecForest = state;
 
@@ -30,6 +35,25 @@ function planted(count, spacing, clips, flat) {
   });
 }
 
+// How strong the clips' own winds are; null: they are not told apart.
+function windsOf({ motion: { clips }, metadata }) {
+  const strengths = clips.map(({ name }) => metadata.clips?.[name]?.strength).filter(Number.isFinite);
+  const [calm, wild] = [Math.min(...strengths), Math.max(...strengths)];
+  return wild > calm ? { calm, wild } : null;
+}
+
+// What else the address names, between the trees.
+function floors(renderer, trees, reach) {
+  return Promise.all(floorOf(asked).map(async ({ source, each }, kind) => {
+    const ath = await new ATHLoader().loadAsync(source), winds = windsOf(ath), { clips } = ath.motion;
+    const material = () => forestMaterial(ath.metadata, SUN);
+    const forest = new ATHForest(renderer, ath, { material }), clipOf = (i) => clips[winds ? 0 : i % clips.length].name;
+    forest.setInstances(rooted(floorPlaces(trees, each, reach, kind), ath).map((place, i) => ({ ...place, clip: clipOf(i) })));
+    if (ath.metadata.up_axis === "z") forest.rotation.x = -Math.PI / 2;
+    return { forest, winds };
+  }));
+}
+
 async function start() {
   if (!navigator.gpu) throw new Error("This browser has no WebGPU");
   const renderer = new WebGPURenderer({ canvas: $("canvas"), antialias: true });
@@ -40,33 +64,59 @@ async function start() {
   const count = Number(asked.get("count") ?? 10000), isDrawn = asked.get("drawn") !== "0";
   const forest = new ATHForest(renderer, ath, {
     shape: isMesh ? undefined : foliage(ath, radii(ath)),
-    material: () => new MeshStandardNodeMaterial({ color: isMesh ? 0x7f9a55 : 0xffffff, roughness: 0.85, side: DoubleSide }),
+    material: () => (isMesh ? forestMaterial(ath.metadata, SUN) : new MeshStandardNodeMaterial({ roughness: 0.85, side: DoubleSide })),
   });
-  forest.setInstances(planted(count, spacing, ath.motion.clips, upright ? (x, z) => ({ x, y: -z, z: 0 }) : (x, z) => ({ x, y: 0, z })));
+  const winds = windsOf(ath), { clips } = ath.motion;
+  const trees = planted(count, spacing, winds ? clips.slice(0, 1) : clips, upright ? (x, z) => ({ x, y: -z, z: 0 }) : (x, z) => ({ x, y: 0, z }));
+  forest.setInstances(trees);
+  const floor = await floors(renderer, trees.map(({ x, y, z }) => (upright ? [x, -y] : [x, z])), 0.6 * spacing);
   const scene = new Scene(), camera = new PerspectiveCamera(40, 1, 0.02 * radius, 400 * radius), controls = new OrbitControls(camera, $("canvas"));
-  const sun = new DirectionalLight(0xfff0d0, 2.6), wide = 260 * radius;
-  const ground = new Mesh(new PlaneGeometry(4 * wide, 4 * wide), new MeshStandardNodeMaterial({ color: GROUND, roughness: 1 }));
-  ground.rotation.x = -Math.PI / 2;
+  const stage = new Stage(scene, radius), isSoftware = /swiftshader|llvmpipe/i.test(renderer.backend.device.adapterInfo?.architecture ?? "");
+  const walk = new Walk(camera, $("canvas"), $("stick"), { height: EYES * radius, speed: PACE * radius, changed: (on) => walks(on) });
+  renderer.toneMapping = ACESFilmicToneMapping;
+  renderer.shadowMap.enabled = true;
+  stage.shadows = asked.get("quality") === "full" || !isSoftware;
   if (upright) forest.rotation.x = -Math.PI / 2;
-  sun.position.set(0.7, 1, 0.35);
-  scene.background = SKY;
-  scene.fog = new Fog(SKY, 12 * radius, wide * 0.6);
-  scene.add(forest, ground, sun, new HemisphereLight(0xdcecff, 0x6f7048, 1.5));
-  camera.position.set(3 * radius, 3.2 * radius, 9 * radius);
+  scene.add(forest, ...floor.map((each) => each.forest));
+  camera.position.set(3 * radius, 2.4 * radius, 8 * radius);
   controls.target.set(0, 0.9 * radius, 0);
   controls.maxPolarAngle = 0.49 * Math.PI;
   controls.maxDistance = 150 * radius;
   controls.enableDamping = true;
-  Object.assign(state, { ath, forest, renderer, camera, controls, scene, time: null, playing: true });
+  Object.assign(state, { ath, forest, floor: floor.map((each) => each.forest), renderer, camera, controls, scene, walk, time: null, playing: true });
+  const walks = (on) => {
+    $("walk").setAttribute("aria-pressed", on);
+    controls.enabled = !on;
+    if (!on) controls.target.copy(camera.position).add(camera.getWorldDirection(new Vector3()).multiplyScalar(4 * radius)).setY(0.9 * radius);
+  };
+  $("walk").addEventListener("click", () => (walk.on ? walk.end() : walk.begin()));
+  if (winds) Object.assign($("strength"), { min: winds.calm, max: winds.wild, step: (winds.wild - winds.calm) / 100, value: winds.wild });
   const blow = () => {
     const strength = Number($("strength").value), degrees = Number($("heading").value);
     $("strength-value").textContent = strength.toFixed(1);
     $("heading-value").textContent = `${degrees}°`;
-    forest.wind(strength, degrees * Math.PI / 180);
+    for (const { forest: each, winds: own } of [{ forest, winds }, ...floor]) {
+      if (own) each.wind(winds ? strength : own.calm + 0.5 * strength * (own.wild - own.calm));
+      each.sway(own || winds ? 1 : strength, degrees * Math.PI / 180);
+    }
   };
   for (const id of ["strength", "heading"]) $(id).addEventListener("input", blow);
   blow();
+  let before = null, slow = 0;
+  // Shadows first, then fewer pixels, where pictures take long.
+  const keepUp = (passed) => {
+    slow = passed > SLOW_MS ? slow + 1 : 0;
+    if (slow < SLOW_FRAMES || asked.get("quality") === "full") return;
+    slow = 0;
+    if (stage.sun.castShadow) stage.shadows = false;
+    else renderer.setPixelRatio(1);
+  };
   const draw = (ms) => {
+    const passed = before === null ? 0 : ms - before;
+    before = ms;
+    keepUp(passed);
+    walk.update(Math.min(passed, 1000) / 1000);
+    stage.around(walk.on ? camera.position : controls.target);
     const { clientWidth: width, clientHeight: height } = $("canvas");
     if (width !== state.width || height !== state.height) {
       Object.assign(state, { width, height });
@@ -75,15 +125,18 @@ async function start() {
       camera.aspect = width / height;
       camera.updateProjectionMatrix();
     }
-    controls.update();
+    if (!walk.on) controls.update();
     const begun = performance.now();
-    forest.update(camera, height, state.time ?? ms / 1000);
+    for (const each of [forest, ...state.floor]) each.update(camera, height, state.time ?? ms / 1000);
     state.milliseconds = performance.now() - begun;
     if (isDrawn) renderer.render(scene, camera);
     state.frames++;
-    if (state.frames % 20 === 0 && forest.levels.length > 0)
-      $("status").textContent = `${count.toLocaleString("en")} plants, level ${forest.levels.length - 1}, ${(forest.bytesOfMotion / 1000).toFixed(0)} kB uploaded once`;
   };
+  const tell = () => {
+    const kilobytes = [forest, ...state.floor].reduce((sum, { bytesOfMotion }) => sum + bytesOfMotion, 0) / 1000;
+    $("status").textContent = `${count.toLocaleString("en")} plants, ${Math.round(kilobytes).toLocaleString("en")} kB of motion on the graphics card`;
+  };
+  for (const each of [forest, ...state.floor]) each.addEventListener("level", tell);
   renderer.setAnimationLoop((ms) => { if (state.playing) draw(ms); });
   state.draw = draw;
 }

@@ -6,36 +6,27 @@ import { ATHForest } from "athcodec-three";
 import { app, main, state } from "./app.js";
 import { arrange, frameView, place } from "./arrange.js";
 import { nodeColour } from "./colours.js";
+import { clearFloor, forests, growFloor } from "./floor.js";
 import { colour, compare, level, setLevel, show } from "./look.js";
+import { feet, forestReach, treePlaces } from "./places.js";
 import { surfaceMaterial } from "./surfaces.js";
 import { setLoop } from "./time.js";
 import { $, countText } from "./ui.js";
 import { windControl } from "./wind.js";
 
-const GOLDEN = Math.PI * (3 - Math.sqrt(5));
-
 const chosenCount = () => state.forestCount ?? Math.round(10 ** ($("forest-count").value / 25));
 
-export function forestRadius() {
-  return 2 * app.plants[0].ath.sphere.radius * Number($("forest-spread").value) * Math.sqrt(chosenCount()) * 0.55;
-}
+export const forestRadius = () => forestReach(app.plants[0].ath, chosenCount(), Number($("forest-spread").value));
 
 function instances(count) {
-  const { ath } = app.plants[0], { rest } = ath, up = ath.metadata.up_axis === "z" ? 2 : 1, spread = forestRadius();
-  const duration = ath.motion.duration || 1, foot = [rest[0], rest[1], rest[2]], { clips } = ath.motion;
-  const clipOf = (i) => ($("forest-mix").checked ? i % clips.length : undefined);
-  return Array.from({ length: count }, (_, i) => {
-    const far = spread * Math.sqrt((i + 0.3) / count), angle = i * GOLDEN + 0.5 * Math.sin(i * 12.9898);
-    const size = 0.75 + 0.5 * (Math.sin(i * 78.233) * 0.5 + 0.5), x = far * Math.cos(angle), y = far * Math.sin(angle);
-    const at = up === 2 ? { x, y, z: foot[2] * (1 - size) } : { x, y: foot[1] * (1 - size), z: y };
-    return { ...at, size, clip: clipOf(i), angle: i * 2.4, seconds: (i * 0.7548776662 % 1) * duration };
-  });
+  const { ath } = app.plants[0], { clips } = ath.motion, clipOf = (i) => ($("forest-mix").checked ? i % clips.length : undefined);
+  return treePlaces(ath, count, forestRadius()).map((place, i) => ({ ...place, clip: clipOf(i) }));
 }
 
-const hasSurfaces = () => colour.value === "plain" && app.plants[0].hasSurfaces;
+const surfaces = () => (colour.value === "plain" ? app.plants[0].surfaces : null);
 
 function forestMaterial(lines, of) {
-  if (hasSurfaces() && !lines) return surfaceMaterial();
+  if (surfaces() && !lines) return surfaceMaterial(surfaces());
   const material = lines ? new LineBasicMaterial() : new MeshLambertMaterial({ side: DoubleSide });
   tintForest(material, lines, of);
   return material;
@@ -50,7 +41,7 @@ function tintForest(material, lines, of) {
 }
 
 export function colourForest() {
-  if (state.forest && app.plants[0].hasSurfaces) forestOn(); // in other materials
+  if (state.forest && app.plants[0].surfaces) forestOn(); // in other materials
   else state.forest?.children.forEach((drawn) => tintForest(drawn.material, drawn.isLineSegments, drawn.userData.level));
 }
 
@@ -70,8 +61,10 @@ export function forestOn() {
 }
 
 export function plantForest() {
-  state.forest.setInstances(instances(chosenCount()));
+  const trees = instances(chosenCount()), { ath } = app.plants[0], mixed = $("forest-mix").checked;
+  state.forest.setInstances(trees);
   place();
+  growFloor(feet(trees, ath), forestRadius() / Math.sqrt(chosenCount()), ath.motion.clip.name, mixed);
   state.dirty = true;
 }
 
@@ -79,6 +72,7 @@ export function forestOff() {
   state.forest.removeFromParent();
   state.forest.dispose();
   state.forest = null;
+  clearFloor();
   $("forest").checked = false;
   $("forest-rows").hidden = true;
   app.plants[0].setShow(show.value);
@@ -142,5 +136,5 @@ $("forest").addEventListener("change", () => forestSwitch($("forest").checked));
 for (const id of ["forest-count", "forest-spread"]) $(id).addEventListener("input", () => { delete state.forestCount; forestNumbers(); plantForest(); });
 $("forest-count").addEventListener("change", frameView);
 $("forest-mix").addEventListener("change", plantForest);
-$("forest-lod").addEventListener("change", () => { state.forest.levelOfDetail = $("forest-lod").checked; state.dirty = true; });
+$("forest-lod").addEventListener("change", () => { for (const forest of forests()) forest.levelOfDetail = $("forest-lod").checked; state.dirty = true; });
 forestNumbers();

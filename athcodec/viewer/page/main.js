@@ -7,6 +7,7 @@ import { write } from "./address.js";
 import { app, counters, loader, state } from "./app.js";
 import { reframe } from "./arrange.js";
 import { begin, refuse } from "./files.js";
+import { bakeForests, forests, updateForests } from "./floor.js";
 import { limbMaterial } from "../src/limbs.js";
 import { setSplit, splitLabels, tellLevel, tellScale } from "./look.js";
 import { togglePanel } from "./panel.js";
@@ -45,9 +46,9 @@ function tick(now) {
     else motion.setTime(motion.start);
   }
   if (state.forest) {
-    state.forest.bakeReady();
-    state.dirty ||= state.forest.fading;
-    if (state.playing || state.dirty) state.forest.update(stage.camera, stage.pixels, state.turns + state.time);
+    bakeForests();
+    state.dirty ||= forests().some(({ fading }) => fading);
+    if (state.playing || state.dirty) updateForests(state.turns + state.time);
   }
   if (state.dirty || (state.playing && state.forest)) draw();
   count(now);

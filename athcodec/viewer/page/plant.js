@@ -5,7 +5,7 @@ import { BufferAttribute, BufferGeometry, DoubleSide, Group, InstancedBufferAttr
 import { barkColour, heat, nodeColour, orderColour } from "./colours.js";
 import { limbDepth, limbGeometry, limbMaterial, setRadii } from "../src/limbs.js";
 import { radii } from "../src/radii.js";
-import { surfaceDepth, surfaceMaterial } from "./surfaces.js";
+import { surfaceDepth, surfaceMaterial, surfacesOf } from "./surfaces.js";
 
 const LEAF = [0.16, 0.29, 0.07], OVER = [0.55, 0.2, 0.06];
 const SLIMMEST = 4; // order from which on bark is as pale as it gets
@@ -88,16 +88,16 @@ export class Plant {
     this.paint();
   }
 
-  // Whether the file says what is bark and what is leaf, by its texture coordinates.
-  get hasSurfaces() {
-    return this.ath.metadata.surfaces === "bark, leaves" && this.ath.geometry.hasAttribute("uv");
+  /** What the file's texture coordinates tell apart, see surfacesOf; null: nothing. */
+  get surfaces() {
+    return this.ath.geometry?.hasAttribute("uv") ? surfacesOf(this.ath.metadata) : null;
   }
 
   // Bark and leaves as they look near by, or colours that tell something.
   #dress() {
-    const drawn = this.#drawn.find(({ kind }) => kind === "mesh"), wanted = this.colour === "plain" && this.ath.hasFaces && this.hasSurfaces;
+    const drawn = this.#drawn.find(({ kind }) => kind === "mesh"), wanted = Boolean(this.colour === "plain" && this.ath.hasFaces && this.surfaces);
     if (!drawn || wanted === Boolean(drawn.other)) return;
-    if (wanted) this.#surface ??= this.motion.bind(surfaceMaterial());
+    if (wanted) this.#surface ??= this.motion.bind(surfaceMaterial(this.surfaces));
     [drawn.object.material, drawn.other] = wanted ? [this.#surface, drawn.object.material] : [drawn.other, null];
   }
 
@@ -111,7 +111,7 @@ export class Plant {
       object.renderOrder = 1;
     } else if (ath.hasFaces) {
       object = motion.bindShadows(new Mesh(motion.attach(sharing(ath.geometry)), motion.bind(meshMaterial())));
-      if (this.hasSurfaces) Object.assign(object, { customDepthMaterial: motion.bind(surfaceDepth()) });
+      if (this.surfaces) Object.assign(object, { customDepthMaterial: motion.bind(surfaceDepth(this.surfaces)) });
     } else {
       const geometry = limbGeometry(ath, this.#radii);
       object = new Mesh(motion.attach(geometry), limbMaterial(motion.uniforms));

@@ -4,6 +4,7 @@ import { app, counters, main, state } from "./app.js";
 import { frameView } from "./arrange.js";
 import { playClip } from "./clips.js";
 import { loadAgain, open } from "./files.js";
+import { forests, updateForests } from "./floor.js";
 import { forestOf, forestSwitch } from "./forests.js";
 import { setLevel, setSplit } from "./look.js";
 import { readback } from "./readback.js";
@@ -12,7 +13,7 @@ import { moveView } from "./camera.js";
 import { setWind } from "./wind.js";
 
 globalThis.athcodecViewer = {
-  counters, state, open, loadAgain, seek, setPlaying, setLevel, setSplit, setWind, moveView, playClip, forestSwitch, forestOf, frameView,
+  counters, state, open, loadAgain, seek, setPlaying, setLevel, setSplit, setWind, moveView, playClip, forestSwitch, forestOf, forests, frameView,
   get stage() { return app.stage; },
   get plants() { return app.plants; },
   get motion() { return main()?.motion; },
@@ -36,7 +37,7 @@ globalThis.athcodecViewer = {
     const { stage } = app, gl = stage.renderer.getContext(), pixel = new Uint8Array(4), times = [];
     for (let i = 0; i < frames; i++) {
       const start = performance.now();
-      state.forest.update(stage.camera, stage.pixels, state.time + i / 30);
+      updateForests(state.time + i / 30);
       stage.render();
       gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, pixel); // waits for the picture
       times.push(performance.now() - start);

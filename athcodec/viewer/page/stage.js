@@ -1,6 +1,6 @@
 // The stage: renderer, camera and light, and one or two panes, each with its own scene; two share the view, on either side of a split.
 
-import { ACESFilmicToneMapping, BufferAttribute, Fog, PCFShadowMap, PerspectiveCamera, Scene, Vector3, WebGLRenderer } from "three";
+import { ACESFilmicToneMapping, Box3, BufferAttribute, Fog, PCFShadowMap, PerspectiveCamera, Scene, Vector3, WebGLRenderer } from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 
 import { meadow, tintMeadow } from "./ground.js";
@@ -29,6 +29,10 @@ export class Stage {
 
   moved = false; // by hand, since the whole was last in view
 
+  #toned = null;
+
+  #sized = new ResizeObserver(() => this.fit());
+
   constructor(canvas, changed, resized) {
     this.canvas = canvas;
     this.renderer = new WebGLRenderer({ canvas, antialias: true, powerPreference: "high-performance" });
@@ -44,14 +48,22 @@ export class Stage {
     this.controls.addEventListener("change", changed);
     this.controls.addEventListener("start", () => { this.moved = true; });
     this.dark = matchMedia("(prefers-color-scheme: dark)");
-    this.dark.addEventListener("change", () => {
+    this.#toned = () => {
       this.#tint();
       changed();
-    });
+    };
+    this.dark.addEventListener("change", this.#toned);
     this.changed = changed;
     this.resized = resized;
-    new ResizeObserver(() => this.fit()).observe(canvas.parentElement);
+    this.#sized.observe(canvas.parentElement);
     this.#resize();
+  }
+
+  dispose() {
+    this.#sized.disconnect();
+    this.dark.removeEventListener("change", this.#toned);
+    this.controls.dispose();
+    this.renderer.dispose();
   }
 
   /** Takes the size that the page leaves. */
@@ -148,6 +160,16 @@ export class Stage {
     this.placeGround(ground.height, ground.size, ground.plant);
     this.controls.update();
     this.changed();
+  }
+
+  /** What is near of a forest that reaches so far; box: of one plant. */
+  lookOver(box, reach) {
+    const size = box.getSize(new Vector3()), most = Math.max(size.x, size.y, size.z), far = Math.max(reach, most), near = Math.min(far, 2.2 * most);
+    const part = new Box3(new Vector3(-near, box.min.y, -near), new Vector3(near, box.max.y, near));
+    this.look(part, { height: box.min.y, size: 2.6 * far, plant: 1.9 * most });
+    this.controls.maxDistance = 6 * far;
+    this.camera.far = 12 * far + 20 * most;
+    this.fog(this.camera.position.distanceTo(this.controls.target) * 0.7, 3.2 * far + 4 * most);
   }
 
   /** size: of all that stands on it; plant: of a single plant, which the blades of grass are as large as. */

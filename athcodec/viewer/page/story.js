@@ -1,6 +1,7 @@
 // What the page tells of the file: how small it is, how much of it is here, and how that looks.
 
 import { app, counters, main, state } from "./app.js";
+import { forests } from "./floor.js";
 import { forestBars } from "./forests.js";
 import { loadAgain } from "./files.js";
 import { $, bytesText, countText, detailText, lengthText, paintReady, rateText, rows } from "./ui.js";
@@ -96,7 +97,7 @@ export function tellFacts() {
     ...(motion.clip.loop ? [["Loop seam", lengthText(motion.seamError(shown), unit)]] : []),
     ["Decoding", `${motion.milliseconds.toFixed(1)} ms`],
     ["Frames", `${counters.fps.toFixed(0)} per second`],
-    ["Points drawn", countText(state.forest ? state.forest.vertices : app.plants.reduce((sum, plant) => sum + plant.vertices, 0))],
+    ["Points drawn", countText((state.forest ? forests() : app.plants).reduce((sum, { vertices }) => sum + vertices, 0))],
   ]);
   tellArrived();
   paintReady($("ready"), [...motion.readyLevels], motion.levelCount);

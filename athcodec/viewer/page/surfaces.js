@@ -1,13 +1,27 @@
-// Bark and leaves as they look near by: colour, bumps, roughness and the leaf's outline by code in the shader, from the
-// texture coordinates of a file whose metadata say `surfaces: "bark, leaves"`. On bark u is 0 to 1; on leaves it is
-// 1 + 2 k to 2 + 2 k across the leaf, k being one of eight shades, and v runs from stalk to tip.
+// Stems and leaves as they look near by: colour, bumps, roughness and the leaf's outline by code in the shader, from the
+// texture coordinates of a file whose metadata name both, such as `surfaces: "bark, leaves"`. On stems u is 0 to 1; on
+// leaves it is 1 + 2 k to 2 + 2 k across the leaf, k being one of eight shades, and v runs from stalk to tip.
 
 import { DoubleSide, MeshDepthMaterial, MeshStandardMaterial, RGBADepthPacking } from "three";
+
+const STEMS = ["bark", "stalks"], LEAVES = ["leaves", "blades", "pinnae"];
+
+/** What the metadata of a file call its surfaces, as [of stems, of leaves]; null where they name none that is known. */
+export function surfacesOf({ surfaces }) {
+  const [stem, leaf] = typeof surfaces === "string" ? surfaces.split(", ") : [];
+  return STEMS.includes(stem) && LEAVES.includes(leaf) ? [stem, leaf] : null;
+}
 
 const SHAPE = /* glsl */`
 varying vec2 athUv;
 varying vec3 athGrown;
 float athHalf(float v) { // half the width of a leaf, its teeth as long as they are wider than a pixel; below 0.1 its stalk
+#if ATH_LEAF == 1 // a blade ends as its geometry does
+  return 2.0;
+#elif ATH_LEAF == 2 // lobes to a pinna, to near its rib
+  float lobes = 1.0 - smoothstep(0.02, 0.06, fwidth(v));
+  return 0.97 - 0.55 * lobes * pow(abs(cos(3.14159 * 13.0 * v)), 3.0) * (1.0 - 0.6 * v);
+#endif
   float along = clamp((v - 0.1) / 0.9, 0.0, 1.0), teeth = 1.0 - smoothstep(0.02, 0.06, fwidth(v));
   float outline = pow(sin(3.14159 * pow(along, 0.8)), 0.8) * (0.95 - 0.06 * teeth * abs(sin(34.0 * along)));
   return max(outline, v < 0.2 ? 0.04 : 0.0);
@@ -40,6 +54,9 @@ float athBark(vec2 uv) { // height: furrows along the stem, broken across
   return mix(0.45, ridge * ridge * 0.75 + 0.25 * cracks, near);
 }
 float athVeins(vec2 leaf) { // 1 on a vein, as long as that is wider than a pixel
+#if ATH_LEAF == 1
+  return (1.0 - smoothstep(0.1, 0.5, fwidth(leaf.x))) * max(0.8 * (1.0 - smoothstep(0.0, 0.14, abs(leaf.x))), 0.3 + 0.3 * sin(28.0 * leaf.x));
+#endif
   float across = abs(leaf.x), rib = 1.0 - smoothstep(0.0, 0.05, across);
   float side = abs(fract(8.0 * (leaf.y - 0.42 * across)) - 0.5);
   float near = 1.0 - smoothstep(0.03, 0.12, fwidth(leaf.y));
@@ -59,16 +76,26 @@ if (athIsLeaf) {
   float veins = athVeins(leaf);
   vec3 green = mix(vec3(0.062, 0.155, 0.018), vec3(0.145, 0.255, 0.03), shade);
   green = mix(green, vec3(0.21, 0.22, 0.04), 0.3 * smoothstep(0.75, 1.0, shade));
+#if ATH_LEAF == 1 // pale at the foot, where blades hide each other from the sky, and dry at some tips
+  green = mix(vec3(0.16, 0.18, 0.05), green * 1.15, smoothstep(0.0, 0.45, leaf.y)) * (0.45 + 0.55 * smoothstep(0.0, 0.35, leaf.y));
+  green = mix(green, vec3(0.36, 0.31, 0.13), 0.8 * step(0.6, shade) * smoothstep(0.72, 1.0, leaf.y));
+#elif ATH_LEAF == 2
+  green = mix(vec3(0.07, 0.17, 0.02), vec3(0.135, 0.26, 0.03), shade) * (0.8 + 0.35 * leaf.y);
+#endif
   green *= 0.85 + 0.3 * athNoise(vec3(leaf * 5.0, 8.0 * shade));
   diffuseColor.rgb = mix(green, green * 1.5 + 0.015, veins * 0.6);
   athThin = 0.85 - 0.5 * veins;
   athBump = veins * 0.3;
 } else {
+#if ATH_STEM == 1
+  diffuseColor.rgb = mix(vec3(0.1, 0.075, 0.03), vec3(0.12, 0.17, 0.04), clamp(0.02 * athUv.y, 0.0, 1.0));
+#else
   athBump = athBark(athUv);
   float age = athNoise(athGrown * 3.0), lichen = smoothstep(0.62, 0.8, athNoise(athGrown * 7.0 + 3.0));
   vec3 bark = mix(vec3(0.05, 0.037, 0.027), vec3(0.27, 0.215, 0.165), athBump);
   bark = mix(bark, bark * vec3(0.85, 0.92, 0.8), age);
   diffuseColor.rgb = mix(bark, vec3(0.17, 0.19, 0.12), 0.35 * lichen * athBump);
+#endif
 }
 `;
 
@@ -102,32 +129,32 @@ if (athIsLeaf) {
 #endif
 `;
 
-function given(shader, fragment) {
+function given(shader, fragment, [stem, leaf]) {
   shader.vertexShader = shader.vertexShader
     .replace("#include <common>", "#include <common>\nvarying vec2 athUv;\nvarying vec3 athGrown;")
     .replace("#include <uv_vertex>", "#include <uv_vertex>\nathUv = uv;\nathGrown = position;");
-  shader.fragmentShader = fragment;
+  shader.fragmentShader = `#define ATH_STEM ${STEMS.indexOf(stem)}\n#define ATH_LEAF ${LEAVES.indexOf(leaf)}\n${fragment}`;
 }
 
-/** For geometries with texture coordinates; not yet bound to a motion. */
-export function surfaceMaterial() {
+/** For geometries with texture coordinates and the surfaces of a file; not yet bound to a motion. */
+export function surfaceMaterial(surfaces) {
   const material = new MeshStandardMaterial({ side: DoubleSide, shadowSide: DoubleSide });
   material.onBeforeCompile = (shader) => given(shader, shader.fragmentShader
     .replace("#include <common>", `#include <common>\n${SHAPE}${LOOK}`)
     .replace("#include <map_fragment>", SURFACE)
     .replace("#include <roughnessmap_fragment>", "float roughnessFactor = athIsLeaf ? 0.62 : 0.95;")
     .replace("#include <normal_fragment_maps>", BUMP)
-    .replace("#include <lights_fragment_end>", `#include <lights_fragment_end>\n${THROUGH}`));
-  material.customProgramCacheKey = () => "ath surface";
+    .replace("#include <lights_fragment_end>", `#include <lights_fragment_end>\n${THROUGH}`), surfaces);
+  material.customProgramCacheKey = () => `ath surface ${surfaces}`;
   return material;
 }
 
 /** What shadows are drawn with, so that they have the leaves' outlines. */
-export function surfaceDepth() {
+export function surfaceDepth(surfaces) {
   const material = new MeshDepthMaterial({ depthPacking: RGBADepthPacking, side: DoubleSide });
   material.onBeforeCompile = (shader) => given(shader, shader.fragmentShader
     .replace("#include <common>", `#include <common>\n${SHAPE}`)
-    .replace("#include <map_fragment>", "if (athInside() < 0.0) discard;"));
-  material.customProgramCacheKey = () => "ath surface depth";
+    .replace("#include <map_fragment>", "if (athInside() < 0.0) discard;"), surfaces);
+  material.customProgramCacheKey = () => `ath surface depth ${surfaces}`;
   return material;
 }

@@ -10,6 +10,7 @@ const WORDS = {
   UNSUPPORTED_VERSION: ["This file is of another version of the format", "A newer viewer may show it, or the file can be made again from its source."],
   HTTP: NETWORK, NETWORK, MISSING: CUT, TRUNCATED: CUT,
   NEEDS_HOST_MESH: ["This file needs the mesh that it was made for", "It holds the motion alone. Open it together with its mesh: athcodec view FILE --host-mesh MESH."],
+  UNSUPPORTED_FEATURE: ["This file uses something newer than this viewer", "A newer viewer may show it."],
   WRONG_HOST_MESH: ["The mesh is not the one that this file was made for", "The file fits one mesh alone, point for point."],
   CLIP: ["The file has no such clip", "The address names a clip that is not in the file."],
   CHANGED: ["The file has changed", "While it was loading, another one took its place. Load it again."],

@@ -46,6 +46,10 @@ export class ATHForest extends Group {
   readonly count: number;
   /** Plants that are computed: one of each clip and phase in use. */
   readonly plantCount: number;
+  /** Of each of them the name of its clip and its phase, 0 to 1 of the clip. */
+  readonly plants: [string, number][];
+  /** Names of the clips that are shown, or will be once they are here. */
+  readonly clips: string[];
   /** On the GPU, but for shapes. */
   readonly bytes: number;
   /** Uploaded so far: levels and segments, each once. */
@@ -53,10 +57,22 @@ export class ATHForest extends Group {
   /** Uploaded so far: which frames are shown, and the view. */
   readonly bytesOfParameters: number;
   setInstances(instances: ForestInstance[]): this;
+  /** Seconds in which two thirds of a change of weights have happened (default 0.2); 0: at once. */
+  ease: number;
+  /** Shows these clips at once in place of each instance's own, by their weights: on the card, before branches are placed, so that
+   * they stay attached and keep their lengths. null: each its own again. A clip counts once its bytes are here. Throws RangeError
+   * where a clip is not there or no weight is above 0. */
+  blend(weights: Record<string, number> | null): this;
+  /** Blends up to four clips for a wind: those whose own strength and heading (metadata "strength" and "heading", degrees) are
+   * nearest, as ATHMotion.wind() does. Where no clip names a wind, the first is shown. Rejects with RangeError where a number is
+   * not finite. */
+  wind(strength: number, heading?: number): Promise<this>;
+  /** Plays clips that have transitions without an end, each plant in an order of its own that the seed decides; null: around. */
+  endless(seed?: number | null): this;
   /** strength: that motion is multiplied by, 1: as in the file. heading: how far about the axis that is up the motion is turned from
    * the file's own, radians, whatever the angle of an instance; null (default): each blows as it is turned itself. A turned motion
    * keeps no lengths where it is large. */
-  wind(strength: number, heading?: number | null): this;
+  sway(strength: number, heading?: number | null): this;
   /** What is shown at `seconds`: once per frame, before rendering. height: of the screen, in pixels. */
   update(camera: Camera, height: number, seconds: number): void;
   /** Instances drawn by the last update(), by level: read back. */

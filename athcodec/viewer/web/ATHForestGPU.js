@@ -1,21 +1,30 @@
-import{Box3 as Vt,BufferAttribute as rt,DoubleSide as Lt,Group as Ht,IndirectStorageBufferAttribute as Gt,LineBasicNodeMaterial as qt,LineSegments as jt,Mesh as Yt,MeshStandardNodeMaterial as $t,Frustum as Xt,Matrix4 as ot,StorageBufferAttribute as Jt,TSL as I,Vector3 as L,WebGPUCoordinateSystem as Kt}from"three/webgpu";var $=`// The blocks of a level and of a segment, as core/ath_gpu.h lays them out. This text stands in front of time, hierarchy and finish.
+import{Box3 as Jt,BufferAttribute as ct,DoubleSide as Xt,Group as Kt,IndirectStorageBufferAttribute as Zt,LineBasicNodeMaterial as Qt,LineSegments as te,Mesh as ee,MeshStandardNodeMaterial as se,Frustum as ie,Matrix4 as ft,StorageBufferAttribute as re,TSL as P,Vector3 as $,WebGPUCoordinateSystem as oe}from"three/webgpu";var Q=`// The blocks of a level and of a segment, as core/ath_gpu.h lays them out. This text stands in front of time, hierarchy and finish.
 
 @group(0) @binding(0) var<storage, read> level: array<u32>;
 @group(0) @binding(1) var<storage, read> segments: array<u32>; // blocks one behind the other
 
-// A frame that is placed. A dispatch places several, one for each y of its workgroups.
+// What is placed: the blend of its sources. A dispatch places several, one for each y of its workgroups.
 struct Place {
-    segment: u32, // word that the block of its segment begins at
-    frame: u32,
-    positions: u32, // number before those of this frame; so are the others
+    sources: u32, // word of \`places\` that they begin at
+    source_count: u32,
+    positions: u32, // number before those of this place; so are the others
     matrices: u32,
-    amplitudes: u32,
     modes: u32,
     bodies: u32,
     strength: f32, // that motion is multiplied by
 }
-@group(0) @binding(2) var<storage, read> places: array<Place>;
+// A frame that a place shows, alone or blended with others.
+struct Source {
+    segment: u32, // word that the block of its segment begins at
+    frame: u32,
+    amplitudes: u32, // number before its own
+    weight: f32,     // those of a place add up to 1
+}
+@group(0) @binding(2) var<storage, read> places: array<u32>; // all of a dispatch, then all their sources
 var<private> run: Place;
+var<private> source: Source;
+const PLACE_WORDS = 8u;
+const SOURCE_WORDS = 4u;
 
 // Words of the header of a level.
 const VERTEX_COUNT = 2u;
@@ -90,8 +99,20 @@ struct Move {
     turn: u32,
 }
 
+fn place_at(y: u32) -> Place {
+    let at = PLACE_WORDS * y;
+    return Place(places[at], places[at + 1u], places[at + 2u], places[at + 3u], places[at + 4u], places[at + 5u],
+        bitcast<f32>(places[at + 6u]));
+}
+
+// Of the place that runs. Functions of segments are about the source that is set.
+fn source_at(s: u32) -> Source {
+    let at = run.sources + SOURCE_WORDS * s;
+    return Source(places[at], places[at + 1u], places[at + 2u], bitcast<f32>(places[at + 3u]));
+}
+
 fn segment(at: u32) -> u32 {
-    return segments[run.segment + at];
+    return segments[source.segment + at];
 }
 
 fn level_float(at: u32) -> f32 {
@@ -144,7 +165,7 @@ fn rest_of(vertex: u32) -> vec3<f32> {
 fn half(word: u32, index: u32) -> i32 {
     return bitcast<i32>(word << (16u - 16u * index)) >> 16u;
 }
-`;var X=`// What instances are drawn with: each that is in view is appended to the list of the coarsest shape whose error its distance
+`;var tt=`// What instances are drawn with: each that is in view is appended to the list of the coarsest shape whose error its distance
 // hides. One invocation per instance.
 
 struct Instance {
@@ -200,23 +221,24 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     let list = shapes[chosen].list;
     lists[list * view.room + atomicAdd(&draws[5u * list + 1u], 1u)] = id.x;
 }
-`;var J=`// The end of pass 2, when all depths have been placed: joins, matrices, corrections, and motion that is baked.
+`;var et=`// The end of pass 2, when all depths have been placed: joins, matrices, corrections, and motion that is baked.
 
 @group(0) @binding(3) var<storage, read_write> positions: array<f32>;
 @group(0) @binding(4) var<storage, read_write> matrices: array<f32>;
+@group(0) @binding(5) var<uniform> which: u32; // of the sources of each place, for corrections
 
 const FOOTPRINTS = array<array<f32, 4>, 3>(
     array<f32, 4>(32.0, 0.0, 0.0, 0.0), array<f32, 4>(32.0, 16.0, 0.0, 0.0), array<f32, 4>(32.0, 27.0, 16.0, 5.0),
 );
 
 fn is_joined() -> bool {
-    return run.frame < segment(JOIN_FRAMES);
+    return source.frame < segment(JOIN_FRAMES);
 }
 
 // What is left of jumps and of slopes at the frame.
 fn curve() -> vec2<f32> {
-    let at = segment(JOIN_CURVE) + 2u * run.frame;
-    return run.strength * vec2<f32>(segment_float(at), segment_float(at + 1u));
+    let at = segment(JOIN_CURVE) + 2u * source.frame;
+    return run.strength * source.weight * vec2<f32>(segment_float(at), segment_float(at + 1u));
 }
 
 fn join_position(b: u32, index: u32) {
@@ -249,29 +271,35 @@ fn finish_matrix(index: u32, a: vec3<f32>) {
 @compute @workgroup_size(64)
 fn bodies(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
           @builtin(local_invocation_index) i: u32) {
-    run = places[group.y];
+    run = place_at(group.y);
     let b = group.x + groups.x * group.z;
     if (b >= level[BODY_COUNT]) {
         return;
     }
     let body = body_at(b);
-    if ((body.flags & NODE) == 0u) {
-        if (is_joined() && i < body.count) {
+    let is_node = (body.flags & NODE) != 0u;
+    for (var s = 0u; s < run.source_count; s++) {
+        source = source_at(s);
+        if (is_joined() && !is_node && i < body.count) {
             join_position(b, body.first + i);
-        }
-    } else if (i == 0u) {
-        if (is_joined()) {
+        } else if (is_joined() && is_node && i == 0u) {
             join_matrix(body.first);
         }
+    }
+    if (is_node && i == 0u) {
         finish_matrix(body.first, body.rest_point);
     }
 }
 
-// One invocation per corrected position.
+// One invocation per corrected position of a source.
 @compute @workgroup_size(64)
 fn corrections(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
     let i = id.x + 64u * groups.x * id.z;
-    run = places[id.y];
+    run = place_at(id.y);
+    if (which >= run.source_count) {
+        return;
+    }
+    source = source_at(which);
     if (i >= segment(CORRECTED_COUNT)) {
         return;
     }
@@ -281,7 +309,7 @@ fn corrections(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgr
         let at = segment(CORRECTIONS) + 2u * c;
         let low = segment(at);
         let high = segment(at + 1u);
-        let away = abs(i32(run.frame) - i32((high >> 16u) & 0xffu));
+        let away = abs(i32(source.frame) - i32((high >> 16u) & 0xffu));
         if (away < 4) {
             let width = high >> 24u;
             let part = FOOTPRINTS[width & 15u][away] * exp2(f32(width >> 4u));
@@ -289,7 +317,8 @@ fn corrections(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgr
         }
     }
     for (var axis = 0u; axis < 3u; axis++) {
-        positions[run.positions + 3u * segment(own) + axis] += sum[axis] * run.strength * segment_float(CORRECTION_PART);
+        positions[run.positions + 3u * segment(own) + axis] +=
+            sum[axis] * run.strength * source.weight * segment_float(CORRECTION_PART);
     }
 }
 
@@ -297,13 +326,20 @@ fn corrections(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgr
 @compute @workgroup_size(64)
 fn baked(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
     let i = id.x + 64u * groups.x * id.z;
-    run = places[id.y];
+    run = place_at(id.y);
     let count = 3u * level[POSITION_COUNT];
-    if (i < count) {
-        positions[run.positions + i] = segment_float(segment(BAKED) + run.frame * count + i);
+    if (i >= count) {
+        return;
     }
+    var sum = 0.0;
+    for (var s = 0u; s < run.source_count; s++) {
+        source = source_at(s);
+        sum += source.weight * segment_float(segment(BAKED) + source.frame * count + i);
+    }
+    positions[run.positions + i] = sum;
 }
-`;var K=`// Pass 2: bodies of one depth, each placed from the one that it hangs on. One workgroup per body, one invocation per position.
+`;var st=`// Pass 2: bodies of one depth, each placed from the one that it hangs on; amplitudes of all sources of a place add up. One
+// workgroup per body, one invocation per position.
 
 @group(0) @binding(8) var<uniform> depth: u32; // of the bodies that are placed
 @group(0) @binding(3) var<storage, read> amplitudes: array<f32>;
@@ -326,7 +362,7 @@ struct Frame {
 }
 
 fn amplitude(row: u32) -> vec3<f32> {
-    let at = run.amplitudes + 3u * row;
+    let at = source.amplitudes + 3u * row;
     return vec3<f32>(amplitudes[at], amplitudes[at + 1u], amplitudes[at + 2u]);
 }
 
@@ -402,26 +438,35 @@ fn hung(body: Body) -> Frame {
     return Frame(position_at(u32(body.attach)), rotation);
 }
 
+// What a row of a rotation turns by.
+fn turn_of(own: Move, row: u32) -> vec3<f32> {
+    let at = segment(TURNS) + own.turn;
+    let q = amplitude(row);
+    var omega = vec3<f32>(0.0);
+    for (var k = 0u; k < 3u; k++) {
+        let turn = vec3<f32>(segment_float(at + 3u * k), segment_float(at + 3u * k + 1u), segment_float(at + 3u * k + 2u));
+        omega[k] = dot(turn, q);
+    }
+    return omega;
+}
+
 // The rows of a shift and of a rotation, where there are any, are the first of a body.
-fn turned(body: Body, own: Move) -> Frame {
+fn turned(b: u32, body: Body) -> Frame {
     var frame = hung(body);
-    for (var r = own.row; r < own.row + min(own.rows, 2u); r++) {
-        let slot = row_at(r).slot;
-        if (slot == SHIFT) {
-            frame.point += amplitude(r);
-        } else if (slot == ROTATION) {
-            let at = segment(TURNS) + own.turn;
-            let q = amplitude(r);
-            var omega = vec3<f32>(0.0);
-            for (var k = 0u; k < 3u; k++) {
-                let turn = vec3<f32>(
-                    segment_float(at + 3u * k), segment_float(at + 3u * k + 1u), segment_float(at + 3u * k + 2u),
-                );
-                omega[k] = dot(turn, q);
+    var omega = vec3<f32>(0.0);
+    for (var s = 0u; s < run.source_count; s++) {
+        source = source_at(s);
+        let own = move_at(b);
+        for (var r = own.row; r < own.row + min(own.rows, 2u); r++) {
+            let slot = row_at(r).slot;
+            if (slot == SHIFT) {
+                frame.point += amplitude(r);
+            } else if (slot == ROTATION) {
+                omega += turn_of(own, r);
             }
-            frame.rotation = frame.rotation * squared(0.25 * omega);
         }
     }
+    frame.rotation = frame.rotation * squared(0.25 * omega);
     return frame;
 }
 
@@ -505,37 +550,46 @@ fn write_frame(b: u32, frame: Frame) {
     }
 }
 
+// Adds the modes of a body in the source that is set, and returns the least that those above are nothing of.
+fn add_modes(b: u32, body: Body, i: u32) -> u32 {
+    let own = move_at(b);
+    let from_shapes = select(0u, body.shape_modes, own.shape_count > 0u);
+    for (var r = i; r < own.rows; r += 64u) {
+        let slot = row_at(own.row + r).slot;
+        if (slot >= from_shapes && slot < SHIFT) {
+            modes[slot] += amplitude(own.row + r);
+        }
+    }
+    if (i < from_shapes) {
+        modes[i] += unshaped(body, own, i);
+    }
+    if (own.rows == 0u) {
+        return from_shapes;
+    }
+    let last = row_at(own.row + own.rows - 1u).slot;
+    return max(from_shapes, select(0u, last + 1u, last < SHIFT));
+}
+
 @compute @workgroup_size(64)
 fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
         @builtin(local_invocation_index) i: u32) {
-    run = places[group.y];
+    run = place_at(group.y);
     let at = level[level[DEPTHS] + depth] + group.x + groups.x * group.z;
     if (at >= level[level[DEPTHS] + depth + 1u]) {
         return;
     }
     let b = level[level[ORDER] + at];
     let body = body_at(b);
-    let own = move_at(b);
     modes[i] = vec3<f32>(0.0);
     placed[i] = way_by_mode(body, i);
     workgroupBarrier();
-    let from_shapes = select(0u, body.shape_modes, own.shape_count > 0u);
-    for (var r = i; r < own.rows; r += 64u) {
-        let slot = row_at(own.row + r).slot;
-        if (slot >= from_shapes && slot < SHIFT) {
-            modes[slot] = amplitude(own.row + r);
-        }
+    var top = 0u;
+    for (var s = 0u; s < places[PLACE_WORDS * group.y + 1u]; s++) { // of the place: the same for all of the workgroup
+        source = source_at(s);
+        top = max(top, add_modes(b, body, i));
+        workgroupBarrier();
     }
-    if (i < from_shapes) {
-        modes[i] = unshaped(body, own, i);
-    }
-    workgroupBarrier();
-    var top = from_shapes;
-    if (own.rows > 0u) {
-        let last = row_at(own.row + own.rows - 1u).slot;
-        top = max(top, select(0u, last + 1u, last < SHIFT));
-    }
-    var frame = turned(body, own);
+    var frame = turned(b, body);
     workgroupBarrier();
     let is_node = (body.flags & NODE) != 0u;
     if (i < body.count) {
@@ -562,7 +616,7 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups
         write_frame(b, frame);
     }
 }
-`;var Z=`// Pass 1: what each row is at a frame. One invocation per row.
+`;var it=`// Pass 1: what each row is at the frame of each source. One invocation per row.
 
 @group(0) @binding(3) var<storage, read_write> amplitudes: array<f32>;
 
@@ -576,26 +630,32 @@ fn value(row: Row, index: u32) -> f32 {
     return f32(half(segment(at + index / 2u), index % 2u));
 }
 
-@compute @workgroup_size(64)
-fn main(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
-    let i = id.x + 64u * groups.x * id.z;
-    run = places[id.y];
-    if (i >= segment(ROW_COUNT)) {
-        return;
-    }
-    let row = row_at(i);
+fn evaluate(r: u32) {
+    let row = row_at(r);
     let frames = segment(FRAMES);
-    let waves = segment(WAVE_SETS + (row.waves & 127u)) + run.frame;
+    let waves = segment(WAVE_SETS + (row.waves & 127u)) + source.frame;
     var sum = vec3<f32>(0.0);
     for (var k = 0u; k < row.count; k++) {
         let integers = vec3<f32>(value(row, k), value(row, row.count + k), value(row, 2u * row.count + k));
         sum += integers * segment_float(waves + k * frames);
     }
     for (var axis = 0u; axis < 3u; axis++) {
-        amplitudes[run.amplitudes + 3u * i + axis] = run.strength * row.step * sum[axis];
+        amplitudes[source.amplitudes + 3u * r + axis] = run.strength * source.weight * row.step * sum[axis];
     }
 }
-`;var Q=`// Pass 3: vertices at a time, between two frames that the passes before have placed. \`vertex_at\` is what a vertex stage calls;
+
+@compute @workgroup_size(64)
+fn main(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
+    let i = id.x + 64u * groups.x * id.z;
+    run = place_at(id.y);
+    for (var s = 0u; s < run.source_count; s++) {
+        source = source_at(s);
+        if (i < segment(ROW_COUNT)) {
+            evaluate(i);
+        }
+    }
+}
+`;var rt=`// Pass 3: vertices at a time, between two frames that the passes before have placed. \`vertex_at\` is what a vertex stage calls;
 // here it writes all of them, for tests and for engines that compute once what several views draw. One invocation per vertex.
 
 struct Run {
@@ -694,5 +754,5 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) g
         vertices[run.vertices + 9u * i + 6u + axis] = vertex.previous[axis];
     }
 }
-`;var[tt,et,Ct,Mt,kt,It]=[2,3,4,5,6,10],[Nt,Dt,Bt]=[5,6,19],zt=64,R=8,F=12,Ut=9,C=p=>Math.ceil(p/zt),M=class{constructor(t,{blocks:e,time:i,hierarchy:s,finish:r,vertices:n}){let o=(...c)=>t.createShaderModule({code:c.join(`
-`)}),u=(c,f="main")=>t.createComputePipeline({layout:"auto",compute:{module:c,entryPoint:f}}),h=o(e,r);this.time=u(o(e,i)),this.hierarchy=u(o(e,s)),this.bodies=u(h,"bodies"),this.corrections=u(h,"corrections"),this.baked=u(h,"baked"),this.vertices=u(o(n))}},k=class{uploaded=0;#r=new Map;#t=0;#o=0;#d=0;constructor(t,e,i,{slots:s=2,shown:r=1,vertices:n=null,across:o=t.limits.maxComputeWorkgroupsPerDimension}={}){Object.assign(this,{device:t,kernels:e,words:i,slots:s,shown:r,across:o}),this.size={positions:3*i[Ct],matrices:12*i[Mt],bodies:12*i[et],vertices:Ut*i[tt]},this.baked=!1;let{positions:u,matrices:h,bodies:c}=this.size;this.buffers={level:this.#e(i),segments:this.#s(1),places:this.#s(R*s),shows:this.#s(F*r),amplitudes:this.#s(1),positions:this.#s(s*u),matrices:this.#s(s*h),modes:this.#s(s*u),bodies:this.#s(s*c),corners:this.#s(1),vertices:n??this.#s(r*this.size.vertices)},this.ownsVertices=!n,this.depths=Array.from({length:i[kt]},(f,a)=>{let[d,l]=i.subarray(i[It]+a);return{count:l-d,uniform:this.#e(new Uint32Array([a,0,0,0]),72)}}),this.hasCorners=!1}get bytes(){return Object.values(this.buffers).reduce((t,{size:e})=>t+e,0)}#s(t,e=140){return this.device.createBuffer({size:Math.max(16,4*t),usage:e})}#e(t,e=140){let i=this.#s(t.length,e);return this.#l(i,t),i}#l(t,e,i=0,s=e.length){this.uploaded+=4*s,this.device.queue.writeBuffer(t,4*i,e.buffer,e.byteOffset,4*s)}#c(t,e,i=0){let s=this.buffers[t],{device:r}=this;if(4*e<=s.size)return;let n=this.#s(e);if(i>0){let o=r.createCommandEncoder();o.copyBufferToBuffer(s,0,n,0,4*i),r.queue.submit([o.finish()])}s.destroy(),this.buffers[t]=n,this.#r.clear()}segment(t){let e=this.#d;return e+t.length>this.buffers.segments.size/4&&this.#c("segments",2*(e+t.length),e),this.#l(this.buffers.segments,t,e),this.#d+=t.length,this.#t=Math.max(this.#t,t[Nt]),this.#o=Math.max(this.#o,t[Dt]),this.baked||=t[Bt]!==0,this.#c("amplitudes",3*this.#t*this.slots),e}setCorners(t){this.buffers.corners.destroy(),this.buffers.corners=this.#e(t),this.hasCorners=!0,this.#r.clear()}#i(t,e,[i,s],r,n=null){if(i===0||s===0)return;let o=n??e;if(!this.#r.has(o)){let h=r.flatMap((f,a)=>f?[{binding:a,resource:{buffer:this.buffers[f]}}]:[]);n&&h.push({binding:r.length,resource:{buffer:n.uniform}});let c=this.kernels[e].getBindGroupLayout(0);this.#r.set(o,this.device.createBindGroup({layout:c,entries:h}))}t.setPipeline(this.kernels[e]),t.setBindGroup(0,this.#r.get(o));let u=Math.min(i,this.across);t.dispatchWorkgroups(u,s,Math.ceil(i/u))}run(t,e){let i=this.device.createCommandEncoder(),s=i.beginComputePass();t.length>0&&this.#n(s,t),e.length>0&&this.#v(s,e),s.end(),this.device.queue.submit([i.finish()])}#n(t,e){let{positions:i,matrices:s,bodies:r}=this.size,n=e.length,o=new Uint32Array(R*n),u=new Float32Array(o.buffer);if(e.forEach(({segment:c,frame:f,slot:a,strength:d=1},l)=>{o.set([c,f,a*i,a*s,3*this.#t*l,l*i,l*r],R*l),u[R*l+7]=d}),this.#l(this.buffers.places,o),this.baked){this.#i(t,"baked",[C(i),n],["level","segments","places","positions"]);return}this.#i(t,"time",[C(this.#t),n],[null,"segments","places","amplitudes"]);let h=["amplitudes","positions","matrices","modes","bodies"];for(let c of this.depths)this.#i(t,"hierarchy",[c.count,n],["level","segments","places",...h],c);this.#i(t,"bodies",[this.words[et],n],["level","segments","places","positions","matrices"]),this.#i(t,"corrections",[C(this.#o),n],[null,"segments","places","positions"])}#v(t,e){let{positions:i,matrices:s,vertices:r}=this.size,n=new Uint32Array(F*e.length),o=new Float32Array(n.buffer);e.forEach(({slots:u,weight:h,previous:c=u,previousWeight:f=h,at:a=null},d)=>{let l=F*d;[...u,...c].forEach((m,g)=>{n[l+g]=m*i,n[l+4+g]=m*s}),o[l+8]=h,o[l+9]=f,n[l+10]=this.hasCorners?1:0,n[l+11]=(a??d)*r}),this.#l(this.buffers.shows,n),this.#i(t,"vertices",[C(this.words[tt]),e.length],["level","corners","shows","positions","matrices","vertices"])}async read(t){this.run([],t);let e=this.device.createCommandEncoder(),i=4*this.size.vertices*t.length,s=this.device.createBuffer({size:i,usage:9});e.copyBufferToBuffer(this.buffers.vertices,0,s,0,i),this.device.queue.submit([e.finish()]),await s.mapAsync(1);let r=new Float32Array(s.getMappedRange().slice(0));return s.destroy(),r}dispose(){for(let{uniform:t}of this.depths)t.destroy();for(let[t,e]of Object.entries(this.buffers))(t!=="vertices"||this.ownsVertices)&&e.destroy()}};import{Box3 as pe,BufferAttribute as ge,DataTexture as ve,EventDispatcher as we,FloatType as be,InstancedBufferAttribute as xe,MathUtils as ye,NearestFilter as _e,RGBAFormat as Oe,Sphere as Ee,Vector3 as it}from"three";import{BufferAttribute as st,BufferGeometry as Pt,ShapeUtils as he,Vector2 as ce,Vector3 as fe}from"three";function Ft(p,t,e,i){for(let s=0;s<e.length;s++)for(let r=0;r<i;r++)p[i*s+r]=Number(t[i*e[s]+r]);return p}function W(p,t,e,i){let{source:s}=p.userData,r=p.index.array,n=!p.getAttribute("normal"),o=new Map,u=n?2:3,h=[],c=new Set,f=a=>{let d=3*s[a],l=g=>Math.floor(t[d+g]/e)&4095,m=((i[s[a]]+1&65535)*4096+l(0))*16777216+l(1)*4096+l(2);return o.has(m)||o.set(m,a),o.get(m)};for(let a=0;a<r.length;a+=u){let d=Array.from(r.subarray(a,a+u),f),[l,m,g]=d;if(l===m||!n&&(m===g||g===l))continue;let[y,_,O]=[...d].sort((E,D)=>E-D),S=n?y*2**26+_:`${y},${_},${O}`;c.has(S)||(c.add(S),h.push(...d))}return h.length===0&&h.push(...r.subarray(0,u)),Wt(p,Uint32Array.from(h))}function Wt(p,t){let e=Uint32Array.from(new Set(t)).sort(),i=new Map(Array.from(e,(r,n)=>[r,n])),s=new Pt;for(let[r,{array:n,itemSize:o}]of Object.entries(p.attributes))s.setAttribute(r,new st(Ft(new n.constructor(o*e.length),n,e,o),o));return s.setIndex(new st(t.map(r=>i.get(r)),1)),s.userData.source=e.map(r=>p.userData.source[r]),s}var Se=new it,Ae=new it;function V({duration:p,frameCount:t}){return t>1?p*t/(t-1):0}var A=32,N=4,nt=1.5,at=2,Zt=.85,ut=32,lt=9,Qt=16777215,te=p=>p?new qt({color:7035717}):new $t({color:9083499,roughness:.8,side:Lt}),H=class extends Ht{pixels=1;measure="p99";phases=8;bytesOfMotion=0;bytesOfParameters=0;levels=[];#r;#t;#o;#d;#s;#e;#l;#c;#i=new Map;#n=[];#v=[];#w=null;#h=null;#m=null;#b=null;#a=[];#_=new Vt;#p=1;#u=0;#x=!1;#O=0;#E=new Float32Array(ut);#g=null;#A=1;#T=I.uniform(new L(1,0,0));constructor(t,e,{geometry:i=e.geometry??e.lines,material:s=te,shape:r=n=>n}={}){if(super(),this.name="ath forest",this.#e=t.backend.device,!this.#e)throw new Error("ATHForest: got a renderer without WebGPU, expected one after init(); ATHForest of athcodec-three is for WebGL");this.#r=t,this.#t=e,this.#o=i,this.#d=s,this.#s=r,this.#l=new M(this.#e,{blocks:$,time:Z,hierarchy:K,finish:J,vertices:Q}),this.#c=this.#e.createComputePipeline({layout:"auto",compute:{module:this.#e.createShaderModule({code:X}),entryPoint:"main"}}),this.view=this.#e.createBuffer({size:4*ut,usage:GPUBufferUsage.UNIFORM|GPUBufferUsage.COPY_DST}),this.tolerances=this.#e.createBuffer({size:8*A,usage:GPUBufferUsage.STORAGE|GPUBufferUsage.COPY_DST})}get count(){return this.#u}get plantCount(){return this.#n.length}get bytes(){return this.levels.reduce((t,{passes:e})=>t+e.bytes,0)}setInstances(t){let{motion:e,channel:i}=this.#t,{limits:s}=this.#e,r=new Float32Array(8*Math.max(1,t.length));this.#C();let n=a=>e.clips.find(({index:d,name:l})=>a===d||a===l)??e.clip,o=new Set(t.map(({clip:a})=>n(a))),u=Math.floor(s.maxStorageBufferBindingSize/(12*N*i.info.vertexCount)/Math.max(1,o.size)),h=Math.max(1,Math.min(this.phases,u)),c=new Map,f=(a,d=0)=>{let l=V(a)||1,m=Math.floor((d/l%1+1)%1*h),g=a.index*h+m;return c.has(g)||c.set(g,{index:c.size,clip:a,ahead:m/h*l,kept:new Map}),c.get(g).index};t.forEach(({x:a,y:d,z:l,size:m=1,angle:g=0,seconds:y,clip:_,tint:O=Qt},S)=>{r.set([a,d,l,m,Math.cos(g),Math.sin(g),f(n(_),y),O],8*S),this.#_.expandByPoint(new L(a,d,l)),this.#p=Math.max(this.#p,m)}),this.#n=[...c.values()],this.#u=t.length;for(let a of o)this.#i.set(a,e.clone().play(a.index).setLevel(0).setTime(0));return this.#w=this.#S(r,4),this.#h=new Gt(new Uint32Array(5*A),5),this.#r.backend.createIndirectStorageAttribute(this.#h),this.#m=this.#S(new Uint32Array(A*Math.max(1,this.#u)),1),this.#g=new Uint32Array(5*A),this.#b=this.#e.createBindGroup({layout:this.#c.getBindGroupLayout(0),entries:[this.#f(this.#w),this.view,this.tolerances,this.#f(this.#h),this.#f(this.#m)].map((a,d)=>({binding:d,resource:{buffer:a}}))}),this}#S(t,e){let i=new Jt(t,e);return this.#r.backend.createStorageAttribute(i),i}#f(t){return this.#r.backend.get(t).buffer}wind(t,e=null){return this.#A=t,this.#T.value.set(Math.cos(e??0),Math.sin(e??0),e===null?0:1),this}#M(t){let e=this.levels.length,{motion:i}=this.#t;if(!(this.#x||e>=i.levelCount)&&!(e>0&&this.#y(e-1)<=t)){for(let s of this.#i.values())s.target<e&&s.setLevel(e);[...this.#i.values()].some(({readyLevel:s})=>s<e)||(this.#x=!0,this.#k(e).catch(({message:s,codeName:r})=>this.#t.motion.dispatchEvent({type:"error",message:s,codeName:r})))}}#y(t){return Math.max(...Array.from(this.#i.keys(),({errors:e})=>e[t][this.measure]))}async#k(t){let{channel:e}=this.#t,i=this.#O,s=()=>i===this.#O,[r,{words:n}]=[await e.parts(t),await e.gpu(t)];if(!s())return;let o=this.#n.length,u=this.#S(new Float32Array(lt*n[2]*o),1),h=new k(this.#e,this.#l,n,{slots:N*o,shown:o,vertices:this.#f(u)}),c=new Map;for(let{firstSegment:a,segmentCount:d}of this.#i.keys())for(let l=a;l<a+d;l++){let{words:m,coded:g}=await e.gpu(t,l);if(!s()){h.dispose();return}let y=h.segment(m);g.forEach((_,O)=>c.set(e.segments[l]+O,{segment:y,frame:_}))}this.#t.hasFaces&&h.setCorners(ee(this.#t.geometry,e.vertexSource)),h.bytesOfMotion=h.uploaded,this.bytesOfMotion+=h.uploaded;let f={level:t,passes:h,shared:u,places:c,uploaded:h.uploaded,strength:NaN,slots:this.#n.map(()=>new Array(N).fill(-1)),before:this.#n.map(()=>null)};this.levels.push(f),this.#I(f,r),this.#x=!1,this.dispatchEvent({type:"level",level:t})}#I(t,e){let{channel:i,motion:s,rest:r,sphere:n}=this.#t,{level:o}=t,u=this.#y(o),h=o>0?this.#y(o-1):n.radius/4,c=i.nodeNumbers(e);e.vertices.forEach((l,m)=>{l<0&&(c[m]=-1)});let f=o===s.levelCount-1?this.#o:W(this.#o,r,nt*u,c);this.#R(t,f,u);for(let l=Math.max(at*u,n.radius/2e3);l<h;l*=at){let m=W(this.#o,r,nt*l,c);m.userData.source.length>Zt*f.userData.source.length||(this.#R(t,m,l),f=m)}let a=Float32Array.from({length:2*this.#a.length}),d=new Uint32Array(a.buffer);this.#a.sort((l,m)=>l.tolerance-m.tolerance).forEach((l,m)=>{a[2*m]=l.tolerance,d[2*m+1]=l.list}),this.#e.queue.writeBuffer(this.tolerances,0,a)}#R(t,e,i){let s=this.#a.length;if(s===A)return;let r=this.#s(e,i).clone(),{source:n}=e.userData,o=!r.hasAttribute("normal"),u=ht(this.#t.channel.vertexSource),h=r.userData.vertices??n;r.setAttribute("athVertex",new rt(Uint32Array.from(h,a=>u[a]),1)),r.setAttribute("position",new rt(Float32Array.from({length:3*h.length},(a,d)=>this.#t.rest[3*h[Math.floor(d/3)]+d%3]),3)),r.setIndirect(this.#h,20*s),this.#g[5*s]=r.index.count;let c=this.#d(o,t.level),f=o?new jt(r,c):new Yt(r,c);this.#N(c,r,t,s),f.frustumCulled=!1,f.castShadow=f.receiveShadow=!o,this.#a.push({level:t.level,tolerance:i,list:s,drawn:f,size:r.index.count}),this.add(f)}#N(t,e,{passes:i,shared:s},r){let{Fn:n,storage:o,uint:u,float:h,vec3:c,attribute:f,instanceIndex:a,positionGeometry:d,positionPrevious:l,normalLocal:m,normalGeometry:g,select:y}=I,{metadata:_,channel:{info:O}}=this.#t,S=_.up_axis==="z",E=this.#T,D=c(...O.origin),ct=u(i.words[2]),ft=o(s,"float",s.count).toReadOnly(),B=o(this.#w,"vec4",2*Math.max(1,this.#u)).toReadOnly(),dt=o(this.#m,"uint",this.#m.count).toReadOnly(),z=(v,w,b)=>S?c(w.mul(v.x).sub(b.mul(v.y)),b.mul(v.x).add(w.mul(v.y)),v.z):c(w.mul(v.x).add(b.mul(v.z)),v.y,w.mul(v.z).sub(b.mul(v.x))),G=()=>dt.element(u(r*Math.max(1,this.#u)).add(a)),mt=e.hasAttribute("athOffset"),pt=i.hasCorners&&!e.userData.vertices;t.positionNode=n((v,w)=>{let b=G().toVar(),q=B.element(b.mul(2)).toVar(),x=B.element(b.mul(2).add(1)).toVar(),vt=u(x.z).mul(ct).add(f("athVertex","uint")).mul(lt).toVar(),U=P=>c(...[0,1,2].map(T=>ft.element(vt.add(P+T)))),j=P=>{let T=P.add(D).toVar(),wt=T.sub(d).toVar(),bt=E.x.mul(x.x).add(E.y.mul(x.y)),xt=E.y.mul(x.x).sub(E.x.mul(x.y)),yt=d.add(z(wt,bt,xt)),Y=y(E.z.greaterThan(.5),yt,T).toVar(),_t=mt?Y.add(f("athOffset","vec3")):Y;return z(_t,x.x,x.y).mul(q.w).add(q.xyz)};return e.hasAttribute("normal")&&m.assign(z(pt?U(3):g,x.x,x.y)),w.needsPreviousData?.()&&l.assign(j(U(6))),j(U(0))})();let gt=n(()=>{let v=u(B.element(G().mul(2).add(1)).w),w=b=>h(v.shiftRight(u(b)).bitAnd(u(255))).div(255);return c(w(16),w(8),w(0))})();t.colorNode=I.varying(gt).mul(t.colorNode??(e.hasAttribute("color")?f("color","vec3"):I.materialColor))}update(t,e,i){if(!this.#b)return;let s=this.#D(t,e);this.#M(s),this.#B(i);for(let r of this.levels)(r.level===0||this.#y(r.level-1)>s)&&this.#z(r);this.#U()}#D(t,e){this.updateWorldMatrix(!0,!1),t.updateMatrixWorld();let{sphere:i}=this.#t,s=i.center.length()+1.2*i.radius,r=this.#E,n=new L().setFromMatrixPosition(t.matrixWorld).applyMatrix4(new ot().copy(this.matrixWorld).invert());new Xt().setFromProjectionMatrix(new ot().multiplyMatrices(t.projectionMatrix,t.matrixWorldInverse).multiply(this.matrixWorld),t.coordinateSystem??Kt).planes.forEach(({normal:c,constant:f},a)=>r.set([c.x,c.y,c.z,f],4*a));let u=this.pixels*2*Math.tan(t.fov*Math.PI/360)/e,h=this.#_.distanceToPoint(n);return r.set([n.x,n.y,n.z,u],24),new Uint32Array(r.buffer).set([this.#u,this.#a.length],28),r[30]=s,new Uint32Array(r.buffer)[31]=Math.max(1,this.#u),u*Math.max(h-.5*s*this.#p,1e-6)/this.#p}#B(t){let{times:e}=this.#t.channel;this.#v=this.#n.map(({clip:i,ahead:s})=>{let{firstFrame:r,frameCount:n,duration:o}=i,u=V(i);if(n===1||!(u>0))return{frames:[r,r],weight:0};let h=((t+s)%u+u)%u,c=e[r],f=0,a=n-1;if(h>=o)return{frames:[r+a,r],weight:Math.min((h-o)/(u-o),1)};for(;a-f>1;){let m=f+a>>1;e[r+m]-c<=h?f=m:a=m}let[d,l]=[e[r+f],e[r+a]];return{frames:[r+f,r+a],weight:(h+c-d)/(l-d)}})}#z(t){let e=[],i=[],s=this.#A,r=t.strength!==s;t.strength=s,this.#v.forEach(({frames:n,weight:o},u)=>{let h=t.slots[u],c=t.before[u],f=N*u;r&&h.fill(-1);let a=n.map(d=>{let l=h.indexOf(d);return l<0&&(l=h.findIndex((m,g)=>!n.includes(m)&&!c?.slots.includes(f+g)),h[l]=d,e.push({...t.places.get(d),slot:f+l,strength:s})),f+l});i.push({slots:a,weight:o,previous:c?.slots??a,previousWeight:c?.weight??o}),t.before[u]={slots:a,weight:o}}),t.passes.run(e,i),this.bytesOfParameters+=t.passes.uploaded-t.uploaded,t.uploaded=t.passes.uploaded}#U(){let{queue:t}=this.#e,e=this.#e.createCommandEncoder();t.writeBuffer(this.view,0,this.#E),t.writeBuffer(this.#f(this.#h),0,this.#g),this.bytesOfParameters+=this.#E.byteLength+this.#g.byteLength;let i=e.beginComputePass();i.setPipeline(this.#c),i.setBindGroup(0,this.#b),i.dispatchWorkgroups(Math.ceil(Math.max(1,this.#u)/64)),i.end(),t.submit([e.finish()])}async drawn(){let t=this.#g.byteLength,e=this.#e.createBuffer({size:t,usage:GPUBufferUsage.COPY_DST|GPUBufferUsage.MAP_READ}),i=this.#e.createCommandEncoder(),s=new Array(this.#t.motion.levelCount).fill(0);i.copyBufferToBuffer(this.#f(this.#h),0,e,0,t),this.#e.queue.submit([i.finish()]),await e.mapAsync(GPUMapMode.READ);let r=new Uint32Array(e.getMappedRange().slice(0));e.destroy();for(let{level:n,list:o}of this.#a)s[n]+=r[5*o+1];return s}async vertices(t){let{shared:e}=this.levels[t];return new Float32Array(await this.#r.getArrayBufferAsync(e))}#C(){this.#O++,this.#x=!1;for(let{drawn:t}of this.#a)t.removeFromParent(),t.geometry.dispose(),t.material.dispose();for(let{passes:t,shared:e}of this.levels)t.dispose(),this.#r.backend.destroyAttribute(e);for(let t of[this.#w,this.#h,this.#m].filter(Boolean))this.#r.backend.destroyAttribute(t);for(let t of this.#i.values())t.dispose();this.#i.clear(),this.levels=[],this.#a=[],this.#b=null,this.#_.makeEmpty(),this.#p=1e-9}dispose(){this.#C(),this.view.destroy(),this.tolerances.destroy()}};function ht(p){let t=new Uint32Array(p.length);return p.forEach((e,i)=>{t[e]=i}),t}function ee(p,t){let e=ht(t),i=Uint32Array.from(p.index.array,o=>e[p.userData.source[o]]),s=t.length,r=new Uint32Array(s+1),n=new Uint32Array(s+1+2*i.length);for(let o of i)r[o+1]++;for(let o=0;o<s;o++)r[o+1]+=r[o];for(let o=0;o<=s;o++)n[o]=s+1+2*r[o];for(let o=0;o<i.length;o++){let u=o-o%3,h=s+1+2*r[i[o]]++;n[h]=i[u+(o+1)%3],n[h+1]=i[u+(o+2)%3]}return n}export{H as ATHForest};
+`;var[ot,nt,zt,Ut,Pt,Ft]=[2,3,4,5,6,10],[Wt,Vt,Lt]=[5,6,19],Gt=64,A=8,H=4,q=12,Ht=9,N=d=>Math.ceil(d/Gt),I=class{constructor(t,{blocks:e,time:r,hierarchy:i,finish:s,vertices:n}){let o=(...u)=>t.createShaderModule({code:u.join(`
+`)}),a=(u,c="main")=>t.createComputePipeline({layout:"auto",compute:{module:u,entryPoint:c}}),h=o(e,s);this.time=a(o(e,r)),this.hierarchy=a(o(e,i)),this.bodies=a(h,"bodies"),this.corrections=a(h,"corrections"),this.baked=a(h,"baked"),this.vertices=a(o(n))}},D=class{uploaded=0;#e=new Map;#t=0;#r=0;#o=0;constructor(t,e,r,{slots:i=2,shown:s=1,vertices:n=null,across:o=t.limits.maxComputeWorkgroupsPerDimension}={}){Object.assign(this,{device:t,kernels:e,words:r,slots:i,shown:s,across:o}),this.size={positions:3*r[zt],matrices:12*r[Ut],bodies:12*r[nt],vertices:Ht*r[ot]},this.baked=!1;let{positions:a,matrices:h,bodies:u}=this.size;this.buffers={level:this.#s(r),segments:this.#i(1),places:this.#i((A+H)*i),shows:this.#i(q*s),amplitudes:this.#i(1),positions:this.#i(i*a),matrices:this.#i(i*h),modes:this.#i(i*a),bodies:this.#i(i*u),corners:this.#i(1),vertices:n??this.#i(s*this.size.vertices)},this.ownsVertices=!n,this.depths=Array.from({length:r[Pt]},(c,l)=>{let[m,f]=r.subarray(r[Ft]+l);return{count:f-m,uniform:this.#m(l)}}),this.ordinals=[],this.hasCorners=!1}get bytes(){return Object.values(this.buffers).reduce((t,{size:e})=>t+e,0)}#i(t,e=140){return this.device.createBuffer({size:Math.max(16,4*t),usage:e})}#s(t,e=140){let r=this.#i(t.length,e);return this.#u(r,t),r}#m(t){return this.#s(new Uint32Array([t,0,0,0]),72)}#u(t,e,r=0,i=e.length){this.uploaded+=4*i,this.device.queue.writeBuffer(t,4*r,e.buffer,e.byteOffset,4*i)}#n(t,e,r=0){let i=this.buffers[t],{device:s}=this;if(4*e<=i.size)return;let n=this.#i(e);if(r>0){let o=s.createCommandEncoder();o.copyBufferToBuffer(i,0,n,0,4*r),s.queue.submit([o.finish()])}i.destroy(),this.buffers[t]=n,this.#e.clear()}segment(t){let e=this.#o;return e+t.length>this.buffers.segments.size/4&&this.#n("segments",2*(e+t.length),e),this.#u(this.buffers.segments,t,e),this.#o+=t.length,this.#t=Math.max(this.#t,t[Wt]),this.#r=Math.max(this.#r,t[Vt]),this.baked||=t[Lt]!==0,e}setCorners(t){this.buffers.corners.destroy(),this.buffers.corners=this.#s(t),this.hasCorners=!0,this.#e.clear()}#a(t,e,[r,i],s,n=null){if(r===0||i===0)return;let o=n??e;if(!this.#e.has(o)){let h=s.flatMap((c,l)=>c?[{binding:l,resource:{buffer:this.buffers[c]}}]:[]);n&&h.push({binding:s.length,resource:{buffer:n}});let u=this.kernels[e].getBindGroupLayout(0);this.#e.set(o,this.device.createBindGroup({layout:u,entries:h}))}t.setPipeline(this.kernels[e]),t.setBindGroup(0,this.#e.get(o));let a=Math.min(r,this.across);t.dispatchWorkgroups(a,i,Math.ceil(r/a))}run(t,e){let r=this.device.createCommandEncoder(),i=r.beginComputePass();t.length>0&&this.#y(i,t),e.length>0&&this.#p(i,e),i.end(),this.device.queue.submit([r.finish()])}#y(t,e){let{positions:r,bodies:i}=this.size,s=e.length;if(this.#f(e),this.baked){this.#a(t,"baked",[N(r),s],["level","segments","places","positions"]);return}this.#a(t,"time",[N(this.#t),s],[null,"segments","places","amplitudes"]);let n=["amplitudes","positions","matrices","modes","bodies"];for(let a of this.depths)this.#a(t,"hierarchy",[a.count,s],["level","segments","places",...n],a.uniform);this.#a(t,"bodies",[this.words[nt],s],["level","segments","places","positions","matrices"]);let o=Math.max(...e.map(({sources:a})=>a.length));for(;this.ordinals.length<o;)this.ordinals.push(this.#m(this.ordinals.length));for(let a of this.ordinals.slice(0,o))this.#a(t,"corrections",[N(this.#r),s],[null,"segments","places","positions",null],a)}#f(t){let{positions:e,matrices:r,bodies:i}=this.size,s=t.reduce((u,{sources:c})=>u+c.length,0),n=new Uint32Array(A*t.length+H*s),o=new Float32Array(n.buffer),a=A*t.length,h=0;t.forEach(({sources:u,slot:c,strength:l=1},m)=>{n.set([a,u.length,c*e,c*r,m*e,m*i],A*m),o[A*m+6]=l;for(let{segment:f,frame:p,weight:g=1}of u)n.set([f,p,3*this.#t*h++],a),o[a+3]=g,a+=H}),this.#n("places",n.length),this.#n("amplitudes",3*this.#t*s),this.#u(this.buffers.places,n)}#p(t,e){let{positions:r,matrices:i,vertices:s}=this.size,n=new Uint32Array(q*e.length),o=new Float32Array(n.buffer);e.forEach(({slots:a,weight:h,previous:u=a,previousWeight:c=h,at:l=null},m)=>{let f=q*m;[...a,...u].forEach((p,g)=>{n[f+g]=p*r,n[f+4+g]=p*i}),o[f+8]=h,o[f+9]=c,n[f+10]=this.hasCorners?1:0,n[f+11]=(l??m)*s}),this.#u(this.buffers.shows,n),this.#a(t,"vertices",[N(this.words[ot]),e.length],["level","corners","shows","positions","matrices","vertices"])}async read(t){this.run([],t);let e=this.device.createCommandEncoder(),r=4*this.size.vertices*t.length,i=this.device.createBuffer({size:r,usage:9});e.copyBufferToBuffer(this.buffers.vertices,0,i,0,r),this.device.queue.submit([e.finish()]),await i.mapAsync(1);let s=new Float32Array(i.getMappedRange().slice(0));return i.destroy(),s}dispose(){for(let t of[...this.depths.map(e=>e.uniform),...this.ordinals])t.destroy();for(let[t,e]of Object.entries(this.buffers))(t!=="vertices"||this.ownsVertices)&&e.destroy()}};import{Box3 as Ee,BufferAttribute as Se,DataTexture as Ae,EventDispatcher as Re,FloatType as Me,InstancedBufferAttribute as Te,MathUtils as Ce,NearestFilter as ke,RGBAFormat as Ne,Sphere as Ie,Vector3 as ht}from"three";function at({transitions:d},t){let e=s=>Array.isArray(s)&&s.length===3&&s.every(Number.isInteger)&&Math.min(...s)>=0&&s[2]>=1&&Math.max(s[0],s[1])+s[2]<t;if(!Array.isArray(d)||!d.length||!d.every(e))return[];let r=[...d].sort((s,n)=>s[0]-n[0]||s[1]-n[1]||s[2]-n[2]),i=r.at(-1)[0];return r.every(([,s,n])=>s+n<=i)?r:[]}var B=class{#e;#t;#r=[{begins:0,leave:0,enter:0,lasts:0,over:0}];#o;constructor(t,e,r){let i=s=>e[s]-e[0];this.#e=t.map(([s,n,o])=>({leave:i(s),enter:i(n),over:i(n+o),lasts:Math.min(i(s+o)-i(s),i(n+o)-i(n))})),this.#t=Math.imul(r,2654435761)+1>>>0||1,this.#o=this.#i(0)}at(t){let e=Math.min(Math.max(t,0),1e7);for(let u;(u=this.#r.at(-1).begins+this.#o.leave-this.#r.at(-1).enter)<=e;)this.#r.push({...this.#o,begins:u}),this.#o=this.#i(this.#o.over);let r=this.#r.findLastIndex(({begins:u})=>u<=e),i=this.#r[r],s=e-i.begins,n=(this.#r[r+1]??this.#o).enter,o=s/i.lasts,a=o*o*(3-2*o);return s>=i.lasts?{places:[{seconds:i.enter+s,weight:1}],ahead:n}:{places:[{seconds:i.leave+s,weight:1-a},{seconds:i.enter+s,weight:a}].filter(u=>u.weight>0),ahead:n}}#i(t){let e=this.#e.at(-1).leave,s=[...new Set(this.#e.map(({leave:o})=>o))].filter(o=>t<=o&&o<e).find(()=>this.#s()<.5)??e,n=this.#e.filter(o=>o.leave===s);return n[Math.floor(this.#s()*n.length)]}#s(){for(let t of[13,-17,5])this.#t=(this.#t^(t>0?this.#t<<t:this.#t>>>-t))>>>0;return this.#t/2**32}};import{BufferAttribute as ut,BufferGeometry as qt,ShapeUtils as be,Vector2 as xe,Vector3 as ye}from"three";function jt(d,t,e,r){for(let i=0;i<e.length;i++)for(let s=0;s<r;s++)d[r*i+s]=Number(t[r*e[i]+s]);return d}function j(d,t,e,r){let{source:i}=d.userData,s=d.index.array,n=!d.getAttribute("normal"),o=new Map,a=n?2:3,h=[],u=new Set,c=l=>{let m=3*i[l],f=g=>Math.floor(t[m+g]/e)&4095,p=((r[i[l]]+1&65535)*4096+f(0))*16777216+f(1)*4096+f(2);return o.has(p)||o.set(p,l),o.get(p)};for(let l=0;l<s.length;l+=a){let m=Array.from(s.subarray(l,l+a),c),[f,p,g]=m;if(f===p||!n&&(p===g||g===f))continue;let[_,O,S]=[...m].sort((y,F)=>y-F),E=n?_*2**26+O:`${_},${O},${S}`;u.has(E)||(u.add(E),h.push(...m))}return h.length===0&&h.push(...s.subarray(0,a)),$t(d,Uint32Array.from(h))}function $t(d,t){let e=Uint32Array.from(new Set(t)).sort(),r=new Map(Array.from(e,(s,n)=>[s,n])),i=new qt;for(let[s,{array:n,itemSize:o}]of Object.entries(d.attributes))i.setAttribute(s,new ut(jt(new n.constructor(o*e.length),n,e,o),o));return i.setIndex(new ut(t.map(s=>r.get(s)),1)),i.userData.source=e.map(s=>d.userData.source[s]),i}var De=new ht,Be=new ht;function R({duration:d,frameCount:t}){return t>1?d*t/(t-1):0}var M=null,Yt=.001,z=class{#e=new Map([[M,1]]);#t=new Map([[M,1]]);set(t){let e=t?[...t.values()].reduce((r,i)=>r+i,0):0;this.#e=e>0?new Map([...t].map(([r,i])=>[r,i/e])):new Map([[M,1]])}get clips(){return[...this.#e.keys()].filter(t=>t!==M)}advance(t,e){let r=[...this.#e].filter(([h,u])=>u>0&&(h===M||e(h))),i=r.reduce((h,[,u])=>h+u,0),s=new Map(r.map(([h,u])=>[h,u/i]));if(s.size===0)return;let o=[...new Set([...this.#t.keys(),...s.keys()])].map(h=>[h,(this.#t.get(h)??0)*(1-t)+(s.get(h)??0)*t]).filter(([h,u])=>u>Yt||s.has(h)),a=o.reduce((h,[,u])=>h+u,0);this.#t=new Map(o.map(([h,u])=>[h,u/a]))}of(t){let e=new Map;for(let[r,i]of this.#t)e.set(r??t,(e.get(r??t)??0)+i);return e}},U=class{#e;#t=new Map;seed=null;constructor(t){this.#e=t}at(t,e,r){let i=this.seed===null?null:this.#r(t,r);return i?i.at(e).places.flatMap(s=>this.#i(t,s.seconds).map(({frame:n,weight:o})=>({frame:n,weight:o*s.weight}))):this.#o(t,e)}#r(t,e){let r=`${this.seed} ${t.index} ${e}`,{metadata:i}=this.#e.statics,{firstFrame:s,frameCount:n,name:o}=t;if(!this.#t.has(r)){let a=at({...i,...i.clips?.[o]},n);this.#t.set(r,a.length?new B(a,this.#e.times.subarray(s,s+n),this.seed+e):null)}return this.#t.get(r)}#o(t,e){let{firstFrame:r,frameCount:i,duration:s}=t,n=R(t);if(i===1||!(n>0))return[{frame:r,weight:1}];let o=(e%n+n)%n;return o<s?this.#i(t,o):lt(r+i-1,r,Math.min((o-s)/(n-s),1))}#i({firstFrame:t,frameCount:e},r){let{times:i}=this.#e,s=i[t]+r,n=t,o=t+e-1;for(;o-n>1;){let a=n+o>>1;i[a]<=s?n=a:o=a}return o===n?[{frame:n,weight:1}]:lt(n,o,Math.min(Math.max((s-i[n])/(i[o]-i[n]),0),1))}},lt=(d,t,e)=>[{frame:d,weight:1-e},{frame:t,weight:e}];var T=32,C=4,dt=1.5,mt=2,ne=.85,pt=32,gt=9,ae=16777215,ue=d=>d?new Qt({color:7035717}):new se({color:9083499,roughness:.8,side:Xt}),Y=class extends Kt{pixels=1;measure="p99";phases=8;ease=.2;bytesOfMotion=0;bytesOfParameters=0;levels=[];#e;#t;#r;#o;#i;#s;#m;#u;#n=new Map;#a=[];#y=[];#f=new z;#p;#M=0;#_=null;#c=null;#g=null;#O=null;#h=[];#S=new Jt;#v=1;#l=0;#w=!1;#b=0;#A=new Float32Array(pt);#x=null;#T=null;#C=1;#k=P.uniform(new $(1,0,0));constructor(t,e,{geometry:r=e.geometry??e.lines,material:i=ue,shape:s=n=>n}={}){if(super(),this.name="ath forest",this.#s=t.backend.device,!this.#s)throw new Error("ATHForest: got a renderer without WebGPU, expected one after init(); ATHForest of athcodec-three is for WebGL");this.#e=t,this.#t=e,this.#p=new U(e.channel),this.#r=r,this.#o=i,this.#i=s,this.#m=new I(this.#s,{blocks:Q,time:it,hierarchy:st,finish:et,vertices:rt}),this.#u=this.#s.createComputePipeline({layout:"auto",compute:{module:this.#s.createShaderModule({code:tt}),entryPoint:"main"}}),this.view=this.#s.createBuffer({size:4*pt,usage:GPUBufferUsage.UNIFORM|GPUBufferUsage.COPY_DST}),this.tolerances=this.#s.createBuffer({size:8*T,usage:GPUBufferUsage.STORAGE|GPUBufferUsage.COPY_DST})}get count(){return this.#l}get plantCount(){return this.#a.length}get plants(){return this.#a.map(({clip:t,phase:e})=>[t.name,e])}get clips(){return Array.from(this.#n.keys(),({name:t})=>t)}get bytes(){return this.levels.reduce((t,{passes:e})=>t+e.bytes,0)}setInstances(t){let{motion:e,channel:r}=this.#t,{limits:i}=this.#s,s=new Float32Array(8*Math.max(1,t.length));this.#P();let n=l=>this.#N(l)??e.clip,o=new Set(t.map(({clip:l})=>n(l))),a=Math.floor(i.maxStorageBufferBindingSize/(12*C*r.info.vertexCount)/Math.max(1,o.size)),h=Math.max(1,Math.min(this.phases,a)),u=new Map,c=(l,m=0)=>{let f=R(l)||1,p=Math.floor((m/f%1+1)%1*h),g=l.index*h+p;return u.has(g)||u.set(g,{index:u.size,clip:l,phase:p/h}),u.get(g).index};t.forEach(({x:l,y:m,z:f,size:p=1,angle:g=0,seconds:_,clip:O,tint:S=ae},E)=>{s.set([l,m,f,p,Math.cos(g),Math.sin(g),c(n(O),_),S],8*E),this.#S.expandByPoint(new $(l,m,f)),this.#v=Math.max(this.#v,p)}),this.#a=[...u.values()],this.#l=t.length;for(let l of[...o,...this.#f.clips])this.#I(l);return this.#_=this.#R(s,4),this.#c=new Zt(new Uint32Array(5*T),5),this.#e.backend.createIndirectStorageAttribute(this.#c),this.#g=this.#R(new Uint32Array(T*Math.max(1,this.#l)),1),this.#x=new Uint32Array(5*T),this.#O=this.#s.createBindGroup({layout:this.#u.getBindGroupLayout(0),entries:[this.#d(this.#_),this.view,this.tolerances,this.#d(this.#c),this.#d(this.#g)].map((l,m)=>({binding:m,resource:{buffer:l}}))}),this}#N(t){return this.#t.motion.clips.find(({index:e,name:r})=>t===e||t===r)}#I(t){this.#n.has(t)||this.#n.set(t,this.#t.motion.clone().play(t.index).setLevel(Math.max(0,this.levels.length-1)).setTime(0))}#R(t,e){let r=new re(t,e);return this.#e.backend.createStorageAttribute(r),r}#d(t){return this.#e.backend.get(t).buffer}blend(t){let e=Object.entries(t??{}).map(([i,s])=>[this.#N(i),s]);if(e.findIndex(([i,s])=>!i||!(s>=0&&s<1/0))>=0||t&&!e.some(([,i])=>i>0))throw new RangeError(`blend: got ${JSON.stringify(t)}, expected weights of clips, ${this.#t.motion.clips.map(({name:i})=>i).join(", ")}`);for(let[i,s]of e)s>0&&this.#I(i);return this.#f.set(t&&new Map(e)),this}async wind(t,e=0){if(![t,e].every(Number.isFinite))throw new RangeError(`wind: got ${t} and ${e}, expected two finite numbers`);let r=this.#T={},{weights:i}=await this.#t.channel.windWeights(t,e),{clips:s}=this.#t.motion;return r===this.#T&&this.blend(Object.fromEntries(s.map(({name:n},o)=>[n,i[o]]))),this}endless(t=1){if(t!==null&&!Number.isInteger(t))throw new RangeError(`endless: got the seed ${t}, expected an integer`);return this.#p.seed=t,this}sway(t,e=null){return this.#C=t,this.#k.value.set(Math.cos(e??0),Math.sin(e??0),e===null?0:1),this}#F(t){let e=this.levels.length,{motion:r}=this.#t;if(!this.#w){for(let i of this.levels)for(let[s,{readyLevel:n}]of this.#n)if(!i.clips.has(s)&&n>=i.level)return this.#D(()=>this.#V(i,s));if(!(e>=r.levelCount||e>0&&this.#E(e-1)<=t)){for(let i of this.#n.values())i.target<e&&i.setLevel(e);[...this.#n.values()].every(({readyLevel:i})=>i>=e)&&this.#D(()=>this.#W(e))}}}#D(t){this.#w=!0,t().catch(({message:e,codeName:r})=>this.#t.motion.dispatchEvent({type:"error",message:e,codeName:r}))}#E(t){return Math.max(...Array.from(this.#n.keys(),({errors:e})=>e[t][this.measure]))}async#W(t){let{channel:e}=this.#t,r=this.#b,i=()=>r===this.#b,[s,{words:n}]=[await e.parts(t),await e.gpu(t)];if(!i())return;let o=this.#a.length,a=this.#R(new Float32Array(gt*n[2]*o),1),h=new D(this.#s,this.#m,n,{slots:C*o,shown:o,vertices:this.#d(a)}),u={level:t,passes:h,shared:a,clips:new Set,places:new Map,uploaded:0,bytesOfMotion:0,bytesOfParameters:0,strength:NaN,slots:this.#a.map(()=>new Array(C).fill(-1)),before:this.#a.map(()=>null)};this.#t.hasFaces&&h.setCorners(he(this.#t.geometry,e.vertexSource));for(let c of this.#n.keys())if(!await this.#B(u,c,i)){h.dispose();return}this.levels.push(u),this.#L(u,s),this.#w=!1,this.dispatchEvent({type:"level",level:t})}async#V(t,e){let r=this.#b;await this.#B(t,e,()=>r===this.#b)&&(this.#w=!1)}async#B(t,e,r){let{channel:i}=this.#t,{passes:s,level:n,places:o}=t;for(let a=e.firstSegment;a<e.firstSegment+e.segmentCount;a++){let{words:h,coded:u}=await i.gpu(n,a);if(!r())return!1;let c=s.segment(h);this.#z(t,"bytesOfMotion"),u.forEach((l,m)=>o.set(i.segments[a]+m,{segment:c,frame:l}))}return t.clips.add(e),!0}#z(t,e){this[e]+=t.passes.uploaded-t.uploaded,t[e]+=t.passes.uploaded-t.uploaded,t.uploaded=t.passes.uploaded}#L(t,e){let{channel:r,motion:i,rest:s,sphere:n}=this.#t,{level:o}=t,a=this.#E(o),h=o>0?this.#E(o-1):n.radius/4,u=r.nodeNumbers(e);e.vertices.forEach((f,p)=>{f<0&&(u[p]=-1)});let c=o===i.levelCount-1?this.#r:j(this.#r,s,dt*a,u);this.#U(t,c,a);for(let f=Math.max(mt*a,n.radius/2e3);f<h;f*=mt){let p=j(this.#r,s,dt*f,u);p.userData.source.length>ne*c.userData.source.length||(this.#U(t,p,f),c=p)}let l=Float32Array.from({length:2*this.#h.length}),m=new Uint32Array(l.buffer);this.#h.sort((f,p)=>f.tolerance-p.tolerance).forEach((f,p)=>{l[2*p]=f.tolerance,m[2*p+1]=f.list}),this.#s.queue.writeBuffer(this.tolerances,0,l)}#U(t,e,r){let i=this.#h.length;if(i===T)return;let s=this.#i(e,r).clone(),{source:n}=e.userData,o=!s.hasAttribute("normal"),a=vt(this.#t.channel.vertexSource),h=s.userData.vertices??n;s.setAttribute("athVertex",new ct(Uint32Array.from(h,l=>a[l]),1)),s.setAttribute("position",new ct(Float32Array.from({length:3*h.length},(l,m)=>this.#t.rest[3*h[Math.floor(m/3)]+m%3]),3)),s.setIndirect(this.#c,20*i),this.#x[5*i]=s.index.count;let u=this.#o(o,t.level),c=o?new te(s,u):new ee(s,u);this.#G(u,s,t,i),c.frustumCulled=!1,c.castShadow=c.receiveShadow=!o,this.#h.push({level:t.level,tolerance:r,list:i,drawn:c,size:s.index.count}),this.add(c)}#G(t,e,{passes:r,shared:i},s){let{Fn:n,storage:o,uint:a,float:h,vec3:u,attribute:c,instanceIndex:l,positionGeometry:m,positionPrevious:f,normalLocal:p,normalGeometry:g,select:_}=P,{metadata:O,channel:{info:S}}=this.#t,E=O.up_axis==="z",y=this.#k,F=u(...S.origin),wt=a(r.words[2]),bt=o(i,"float",i.count).toReadOnly(),W=o(this.#_,"vec4",2*Math.max(1,this.#l)).toReadOnly(),xt=o(this.#g,"uint",this.#g.count).toReadOnly(),V=(v,w,b)=>E?u(w.mul(v.x).sub(b.mul(v.y)),b.mul(v.x).add(w.mul(v.y)),v.z):u(w.mul(v.x).add(b.mul(v.z)),v.y,w.mul(v.z).sub(b.mul(v.x))),J=()=>xt.element(a(s*Math.max(1,this.#l)).add(l)),yt=e.hasAttribute("athOffset"),_t=r.hasCorners&&!e.userData.vertices;t.positionNode=n((v,w)=>{let b=J().toVar(),X=W.element(b.mul(2)).toVar(),x=W.element(b.mul(2).add(1)).toVar(),Et=a(x.z).mul(wt).add(c("athVertex","uint")).mul(gt).toVar(),L=G=>u(...[0,1,2].map(k=>bt.element(Et.add(G+k)))),K=G=>{let k=G.add(F).toVar(),St=k.sub(m).toVar(),At=y.x.mul(x.x).add(y.y.mul(x.y)),Rt=y.y.mul(x.x).sub(y.x.mul(x.y)),Mt=m.add(V(St,At,Rt)),Z=_(y.z.greaterThan(.5),Mt,k).toVar(),Tt=yt?Z.add(c("athOffset","vec3")):Z;return V(Tt,x.x,x.y).mul(X.w).add(X.xyz)};return e.hasAttribute("normal")&&p.assign(V(_t?L(3):g,x.x,x.y)),w.needsPreviousData?.()&&f.assign(K(L(6))),K(L(0))})();let Ot=n(()=>{let v=a(W.element(J().mul(2).add(1)).w),w=b=>h(v.shiftRight(a(b)).bitAnd(a(255))).div(255);return u(w(16),w(8),w(0))})();t.colorNode=P.varying(Ot).mul(t.colorNode??(e.hasAttribute("color")?c("color","vec3"):P.materialColor))}update(t,e,r){if(!this.#O)return;let i=this.#H(t,e);this.#F(i),this.#q(r);for(let s of this.levels)(s.level===0||this.#E(s.level-1)>i)&&this.#j(s);this.#J()}#H(t,e){this.updateWorldMatrix(!0,!1),t.updateMatrixWorld();let{sphere:r}=this.#t,i=r.center.length()+1.2*r.radius,s=this.#A,n=new $().setFromMatrixPosition(t.matrixWorld).applyMatrix4(new ft().copy(this.matrixWorld).invert());new ie().setFromProjectionMatrix(new ft().multiplyMatrices(t.projectionMatrix,t.matrixWorldInverse).multiply(this.matrixWorld),t.coordinateSystem??oe).planes.forEach(({normal:u,constant:c},l)=>s.set([u.x,u.y,u.z,c],4*l));let a=this.pixels*2*Math.tan(t.fov*Math.PI/360)/e,h=this.#S.distanceToPoint(n);return s.set([n.x,n.y,n.z,a],24),new Uint32Array(s.buffer).set([this.#l,this.#h.length],28),s[30]=i,new Uint32Array(s.buffer)[31]=Math.max(1,this.#l),a*Math.max(h-.5*i*this.#v,1e-6)/this.#v}#q(t){let e=performance.now(),r=this.ease>0?1-Math.exp((this.#M-e)/(1e3*this.ease)):1;this.#M=e,this.#f.advance(r,i=>this.levels.every(s=>s.clips.has(i))),this.#y=this.#a.map(({clip:i,phase:s},n)=>[...this.#f.of(i)].flatMap(([o,a])=>this.#p.at(o,t+s*R(o),n).map(({frame:h,weight:u})=>({frame:h,weight:a*u}))))}#j(t){let e=[],r=[],i=this.#C,s=t.strength!==i;t.strength=i,this.#y.forEach((n,o)=>{let a=t.before[o];s&&t.slots[o].fill(-1);let h=n.length>2?this.#Y(t,o,n,e):this.#$(t,o,n,e);r.push({...h,previous:a?.slots??h.slots,previousWeight:a?.weight??h.weight}),t.before[o]=h}),t.passes.run(e,r),this.#z(t,"bytesOfParameters")}#$(t,e,r,i){let s=t.slots[e],n=C*e,o=r.map(({frame:h})=>h),a=o.map(h=>{let u=s.indexOf(h);return u<0&&(u=s.findIndex((c,l)=>!o.includes(c)&&!t.before[e]?.slots.includes(n+l)),s[u]=h,i.push({sources:[t.places.get(h)],slot:n+u,strength:t.strength})),n+u});return{slots:[a[0],a.at(-1)],weight:r.length>1?r[1].weight:0}}#Y(t,e,r,i){let s=t.slots[e],n=C*e,o=s.findIndex((h,u)=>!t.before[e]?.slots.includes(n+u));s[o]=-1;let a=r.filter(({weight:h})=>h>0).map(({frame:h,weight:u})=>({...t.places.get(h),weight:u}));return i.push({sources:a,slot:n+o,strength:t.strength}),{slots:[n+o,n+o],weight:0}}#J(){let{queue:t}=this.#s,e=this.#s.createCommandEncoder();t.writeBuffer(this.view,0,this.#A),t.writeBuffer(this.#d(this.#c),0,this.#x),this.bytesOfParameters+=this.#A.byteLength+this.#x.byteLength;let r=e.beginComputePass();r.setPipeline(this.#u),r.setBindGroup(0,this.#O),r.dispatchWorkgroups(Math.ceil(Math.max(1,this.#l)/64)),r.end(),t.submit([e.finish()])}async drawn(){let t=this.#x.byteLength,e=this.#s.createBuffer({size:t,usage:GPUBufferUsage.COPY_DST|GPUBufferUsage.MAP_READ}),r=this.#s.createCommandEncoder(),i=new Array(this.#t.motion.levelCount).fill(0);r.copyBufferToBuffer(this.#d(this.#c),0,e,0,t),this.#s.queue.submit([r.finish()]),await e.mapAsync(GPUMapMode.READ);let s=new Uint32Array(e.getMappedRange().slice(0));e.destroy();for(let{level:n,list:o}of this.#h)i[n]+=s[5*o+1];return i}async vertices(t){let{shared:e}=this.levels[t];return new Float32Array(await this.#e.getArrayBufferAsync(e))}#P(){this.#b++,this.#w=!1;for(let{drawn:t}of this.#h)t.removeFromParent(),t.geometry.dispose(),t.material.dispose();for(let{passes:t,shared:e}of this.levels)t.dispose(),this.#e.backend.destroyAttribute(e);for(let t of[this.#_,this.#c,this.#g].filter(Boolean))this.#e.backend.destroyAttribute(t);for(let t of this.#n.values())t.dispose();this.#n.clear(),this.levels=[],this.#h=[],this.#O=null,this.#S.makeEmpty(),this.#v=1e-9}dispose(){this.#P(),this.view.destroy(),this.tolerances.destroy()}};function vt(d){let t=new Uint32Array(d.length);return d.forEach((e,r)=>{t[e]=r}),t}function he(d,t){let e=vt(t),r=Uint32Array.from(d.index.array,o=>e[d.userData.source[o]]),i=t.length,s=new Uint32Array(i+1),n=new Uint32Array(i+1+2*r.length);for(let o of r)s[o+1]++;for(let o=0;o<i;o++)s[o+1]+=s[o];for(let o=0;o<=i;o++)n[o]=i+1+2*s[o];for(let o=0;o<r.length;o++){let a=o-o%3,h=i+1+2*s[r[o]]++;n[h]=r[a+(o+1)%3],n[h+1]=r[a+(o+2)%3]}return n}export{Y as ATHForest};

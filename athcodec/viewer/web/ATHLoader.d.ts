@@ -160,8 +160,8 @@ export class ATHMotion extends EventDispatcher<ATHMotionEvents> {
   play(clip: string | number, options?: { fade?: number; at?: number }): this;
   /** Blends up to four clips for a wind from now on, until play(): those whose own strength and heading (metadata "strength" and
    * "heading", in degrees) are next to these, by how near they are, all at the time that is set. Branches stay attached and edges of
-   * stems as long as in the clips. Bytes of all of these clips are fetched; those that are not here yet are left out, and levels
-   * change without a fade. Where no clip names a wind, the first is shown. Throws RangeError where a number is not finite. */
+   * stems as long as in the clips. Bytes of all of these clips are fetched; those that are not here yet are left out. Weights
+   * and levels change over `fade` seconds. Where no clip names a wind, the first is shown. Throws RangeError where a number is not finite. */
   wind(strength: number, heading?: number): this;
   /** Plays the clip without an end from now on, until play() or wind(): over the transitions between its like frames that
    * `encode --endless` has found, in an order that the seed decides, the same as in Python and C. It begins with the clip's first

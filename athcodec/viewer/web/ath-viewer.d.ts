@@ -4,7 +4,8 @@
  *     <script type="module">import "athcodec-three/viewer";</script>
  *     <ath-viewer src="oak.ath" camera-controls alt="An oak in the wind"></ath-viewer>
  *
- * It is as large as its style says, transparent behind the plant, and draws only what is in view. Attributes, all of which can change:
+ * It is as large as its style says, transparent behind the plant, and draws only what is in view. What stands in it, such as a picture, is
+ * shown until the plant is. Attributes, of which all but the last four can change:
  *
  * * src: the file's address;
  * * clip: the name of the clip that plays (default: the first);
@@ -12,15 +13,18 @@
  * * level: a level of detail, or "auto" (default): as much as can be seen;
  * * speed: 1 is real time;
  * * paused;
- * * camera-controls: the plant can be turned and zoomed by mouse and touch;
- * * alt: what is seen, in words.
+ * * camera-controls: the plant can be turned and zoomed by mouse and touch; "turn": only turned, so that the page scrolls;
+ * * alt: what is seen, in words;
+ * * loading="lazy": the file is fetched once the element comes into view, and given back a while after it has left;
+ * * scenery: sky, meadow and shadows around the plant;
+ * * forest: in scenery, so many of the plant; floor: files for its floor, "fern.ath=4 grass.ath", so many to a tree.
  *
  * Events: "load" (detail: {ath}) at the first picture, "progress" (detail: {loaded, total}), "error" (detail: an ATHFailure, or what went
  * wrong later, with message and codeName).
  */
 
 import { Camera } from "three";
-import { ATH, ATHLoader } from "athcodec-three";
+import { ATH, ATHForest, ATHLoader } from "athcodec-three";
 
 export class ATHViewerElement extends HTMLElement {
   /** Of all elements: setDecoderPath() and the like hold for files that load later. */
@@ -33,6 +37,9 @@ export class ATHViewerElement extends HTMLElement {
   pause(): void;
   /** Null before the first picture. */
   readonly ath: ATH | null;
+  /** Of an element with the attribute: the trees, and each plant of the floor that is here. */
+  readonly forests: ATHForest[];
+  /** Another one each time that a lazy element comes into view. */
   readonly camera: Camera;
 }
 

@@ -1,0 +1,86 @@
+"""What the documentation's gallery shows besides the samples: files of a tree that grows and of a bare one, and a still
+picture of every plant and of the forest, drawn by Chromium.
+"""
+
+from __future__ import annotations
+
+import argparse
+import base64
+import io
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import athcodec
+from athcodec import picture, view
+from bench import data
+from bench.browser import chromium
+from bench.tables import table
+
+FOLDER = Path(__file__).parents[1] / "docs" / "gallery"
+FLOOR = {"fern": 4.0, "grass": 9.0}  # plants around each tree of the forest
+TREES = 40
+SIZE = (640, 480)
+QUALITY = 78
+TIMEOUT = 300_000  # ms
+
+_PLANTED = """() => {
+  const [trees, ...floor] = athcodecViewer.forests();
+  return floor.length > 0 &&
+    floor.every(({ baked }) => baked.length > 2) && !trees.fading &&
+    trees.baked.length === athcodecViewer.motion.levelCount;
+}"""
+_DRAWN = "(canvas) => { athcodecViewer.stage.render(); return canvas.toDataURL(); }"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--out", type=Path, default=FOLDER, metavar="FOLDER")
+
+
+def run(args: argparse.Namespace) -> dict[str, Any]:
+    args.out.mkdir(parents=True, exist_ok=True)
+    plants = {name: athcodec.sample_path(name) for name in ("leafed", "fern", "grass")} | _encoded(args.out)
+    for name, path in plants.items():
+        (args.out / f"{name}.webp").write_bytes(picture.still(path, SIZE))
+    (args.out / "forest.webp").write_bytes(_forest())
+    rows = [{"file": path.name, "bytes": path.stat().st_size} for path in sorted(args.out.iterdir())]
+    return {"tables": [table(str(args.out), rows)], "broken": []}
+
+
+def _encoded(folder: Path) -> dict[str, Path]:
+    """Files of the clips that do not ship as such."""
+    made = {}
+    for name, source, bound in (
+        ("growth", athcodec.sample_path("growth"), 1e-4),
+        ("bare", data.path_of("mj_8k_200f"), 1e-3),
+    ):
+        made[name] = folder / f"{name}.ath"
+        with athcodec.read(source) as clip:
+            athcodec.encode(clip, made[name], rel_error=bound)
+    return made
+
+
+def _forest() -> bytes:
+    from PIL import Image
+
+    with tempfile.TemporaryDirectory() as folder, chromium() as browser:
+        page_file = Path(folder, "page.html")
+        floor = {athcodec.sample_path(name): each for name, each in FLOOR.items()}
+        view.export_page(athcodec.sample_path("leafed"), page_file, floor=floor)
+        page = browser.new_page(viewport={"width": SIZE[0], "height": SIZE[1]})
+        page.set_default_timeout(TIMEOUT)
+        page.goto(page_file.as_uri() + "?quality=full")
+        page.wait_for_function("() => athcodecViewer.motion?.complete")
+        page.evaluate("document.body.classList.add('no-panel')")
+        page.evaluate(f"athcodecViewer.stage.fit(); athcodecViewer.forestOf({TREES})")
+        page.wait_for_function(_PLANTED)
+        page.evaluate("athcodecViewer.setPlaying(false)")
+        page.wait_for_timeout(2000)
+        shot = page.locator("#canvas").evaluate(_DRAWN)
+    return _webp(Image, shot)
+
+
+def _webp(image, address: str) -> bytes:
+    out = io.BytesIO()
+    image.open(io.BytesIO(base64.b64decode(address.split(",")[1]))).convert("RGB").save(out, "WEBP", quality=QUALITY)
+    return out.getvalue()
