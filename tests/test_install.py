@@ -10,6 +10,7 @@ import shutil
 import subprocess
 import sys
 import sysconfig
+import venv
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +21,7 @@ import athcodec
 from athcodec._native import crc32c
 
 HEADERS = "ath.h", "ath_gpu.h", "ath_player.h"
+SLOW = pytest.mark.slow
 C_COMPILERS = [name for name in ("gcc", "clang") if shutil.which(name)] or ["cc"]
 CXX_COMPILERS = [name for name in ("g++", "clang++") if shutil.which(name)] or ["c++"]
 TOOLS = {**os.environ, "PATH": os.pathsep.join([sysconfig.get_path("scripts"), os.environ["PATH"]])}
@@ -130,7 +132,9 @@ def single(tmp_path) -> Path:
 
 
 @pytest.mark.parametrize("compiler", C_COMPILERS)
-@pytest.mark.parametrize("options", ["", "-O2", "-O3 -march=native -ffp-contract=fast"])
+@pytest.mark.parametrize(
+    "options", [pytest.param("", marks=SLOW), pytest.param("-O2", marks=SLOW), "-O3 -march=native -ffp-contract=fast"]
+)
 def test_the_decoder_as_one_file_decodes_what_python_does(compiler, options, single, sample_ath, expected):
     """Also where the compiler was told that it may fuse multiplications and additions. Clang's "fast" is the one way
     that sources cannot undo (docs/c-api.md)."""
@@ -223,6 +227,25 @@ def said_of(path: Path) -> str:
         numbers = decoder.vertex_count, decoder.frame_count, len(decoder.segments), decoder.level_count
         crc = crc32c(np.ascontiguousarray(decoder.positions(), np.float32).tobytes())
     return "OK {} {} {} {} {:08x}\n".format(*numbers, crc)
+
+
+@pytest.mark.programs
+def test_conan_makes_a_package_that_find_package_finds(expected, sample_ath, tmp_path):
+    """Takes Conan from the index."""
+    venv.create(tmp_path / "venv", with_pip=True)
+    scripts = tmp_path / "venv" / "bin"
+    run(scripts / "pip", "install", "-q", "conan")
+    tools = {**TOOLS, "CONAN_HOME": str(tmp_path / "conan"), "PATH": os.pathsep.join([str(scripts), TOOLS["PATH"]])}
+    run("conan", "profile", "detect", env=tools)
+    run("conan", "create", CORE, env=tools)
+    project = tmp_path / "engine"
+    wanted = ["--requires", f"athcodec/{athcodec.__version__}", "-g", "CMakeToolchain", "-of", project]
+    run("conan", "install", *wanted, env=tools)
+    write_project(project, "find_package(athcodec REQUIRED)")
+    options = ["-DCMAKE_TOOLCHAIN_FILE=conan_toolchain.cmake", "-DCMAKE_BUILD_TYPE=Release"]
+    run("cmake", "-G", "Ninja", "-S", project, "-B", project / "build", *options, env=tools)
+    run("cmake", "--build", project / "build", env=tools)
+    assert {run(project / "build" / name, sample_ath) for name in ("shared", "static", "cxx")} == {expected}
 
 
 def library_folder(installed: Path) -> Path:
