@@ -6,6 +6,7 @@ athcodec; what is found there has to be what the table says. `python tests/test_
 
 from __future__ import annotations
 
+import base64
 import gc
 import json
 import struct
@@ -320,17 +321,29 @@ def _moved(points: np.ndarray, matrices: np.ndarray) -> np.ndarray:
 
 
 def in_numbered(path: Path) -> Found:
-    """OBJ and PLY, by meshio; what meshio does not say of OBJ, by its lines."""
+    """OBJ and PLY, by meshio; what meshio does not say of them, by their lines."""
     files = sorted(path.parent.glob(f"{path.stem}_*{path.suffix}"))
     meshes = [meshio.read(file) for file in files]
-    uv, names, materials = None, [], None
+    positions, number = np.stack([mesh.points for mesh in meshes]), int(files[0].stem.rpartition("_")[2])
     if path.suffix == ".obj":
         names, materials = (_after(files[0], word) for word in ("o", "usemtl"))
         uv = np.array([line.split() for line in _after(files[0], "vt")], float)
-    else:
-        uv = np.stack([meshes[0].point_data[name] for name in ("s", "t")], axis=1)
-    number = int(files[0].stem.rpartition("_")[2])
-    return Found(np.stack([mesh.points for mesh in meshes]), names, uv, materials, start=number)
+        return Found(positions, names, uv, materials, start=number)
+    uv = np.stack([meshes[0].point_data[name] for name in ("s", "t")], axis=1)
+    header = files[0].read_bytes().partition(b"end_header")[0].decode()
+    (said,) = (line.partition("athcodec ")[2] for line in header.splitlines() if line.startswith("comment athcodec "))
+    return _with_json(Found(positions, [], uv, start=number), said)
+
+
+def _with_json(found: Found, text: str, labels: np.ndarray | None = None) -> Found:
+    """With what athcodec adds to formats that have no place for it."""
+    said = json.loads(text)
+    labels = np.repeat(*np.transpose(said["face_material"])) if labels is None else labels
+    found.names, found.unit, found.up = said["objects"]["names"], said["unit"], said["up_axis"]
+    found.materials = [said["material_names"][number] for number in np.unique(labels)]
+    found.has_instances = said["objects"]["copies"] == [1, COPIES]
+    found.rate = said["fps"]
+    return found
 
 
 def in_pc2(path: Path) -> Found:
@@ -396,7 +409,10 @@ def in_vtu(path: Path) -> Found:
     meshes = [meshio.read(path.parent / step.get("file")) for step in steps]
     start = int(Path(steps[0].get("file")).stem.rpartition("_")[2])
     times = np.array([float(step.get("timestep")) for step in steps])
-    return Found(np.stack([m.points for m in meshes]), [], meshes[0].point_data["uv"], times=times, start=start)
+    found = Found(np.stack([m.points for m in meshes]), [], meshes[0].point_data["uv"], times=times, start=start)
+    labels = np.concatenate(meshes[0].cell_data["face_material"])
+    said = ElementTree.parse(path.parent / steps[0].get("file")).getroot().find(".//FieldData/DataArray").text
+    return _with_json(found, base64.b64decode(said)[8:].decode(), labels)
 
 
 def in_schema(path: Path) -> Found:
@@ -786,7 +802,7 @@ TARGETS: list[Route] = [
     Route(
         "OBJ", "a.obj", in_numbered, "meshio", "yes | yes | names | yes | as vertices | one a file | no | no | no | yes"
     ),
-    Route("PLY", "a.ply", in_numbered, "meshio", "yes | no | no | yes | as vertices | one a file | no | no | no | yes"),
+    Route("PLY", "a.ply", in_numbered, "meshio", "yes | yes | names | yes | yes | one a file | yes | yes | yes | yes"),
     Route(
         "PC2 and its OBJ",
         "a.pc2",
@@ -802,9 +818,7 @@ TARGETS: list[Route] = [
         "yes | yes | names | yes | as vertices | one a file | no | no | yes | yes",
     ),
     Route("XDMF", "a.xdmf", in_xdmf, "h5py", "yes | yes | names | yes | yes | one a file | yes | yes | yes | yes"),
-    Route(
-        "VTU, PVD", "a.pvd", in_vtu, "meshio", "yes | no | no | yes | as vertices | one a file | no | no | yes | yes"
-    ),
+    Route("VTU, PVD", "a.pvd", in_vtu, "meshio", "yes | yes | names | yes | yes | one a file | yes | yes | yes | yes"),
     Route("HDF5", "a.h5", in_schema, "h5py", "yes | yes | names | yes | yes | one a file | yes | yes | yes | yes"),
     Route("NumPy", "a.npz", in_schema, "NumPy", "yes | yes | names | yes | yes | one a file | yes | yes | yes | yes"),
     Route(
@@ -868,7 +882,7 @@ def test_what_other_libraries_write_is_read_as_the_table_says(tmp_path, route):
 
 
 @pytest.mark.parametrize("instances", [False, True])
-@pytest.mark.parametrize("suffix", ["usda", "usdc", "abc", "glb", "h5", "npz", "obj", "xdmf"])
+@pytest.mark.parametrize("suffix", ["usda", "usdc", "abc", "glb", "h5", "npz", "obj", "xdmf", "ply", "pvd"])
 def test_each_face_keeps_its_material_to_a_file_and_back(clip, tmp_path, suffix, instances):
     materials = np.array([2, 0, -1, 0, 2, 1, 3, 3, 3], np.int32)
     if suffix == "obj":

@@ -1,16 +1,20 @@
 """Meshes as OBJ and PLY text and bytes: what moves is written per frame, all else is put together once.
 
 OBJ has v per frame; texture coordinates, polygons, lines, objects, groups and materials' names behind it. PLY (binary,
-little endian) has the vertices with what each has (colours, uv, any plain number), polygons and edges. Coordinates come
-back bit for bit: nine digits for float32, seventeen for float64. Left out: normals, attributes that the format has no
-place for, metadata but the names of objects.
+little endian) has the vertices with what each has (colours, uv, any plain number), polygons and edges; objects,
+materials, unit, up axis and frame rate are JSON in a comment. Coordinates come back bit for bit: nine digits for
+float32, seventeen for float64. Left out: normals, attributes that the format has no place for, other metadata.
 """
 
 from __future__ import annotations
 
+import json
 from typing import Any, BinaryIO
 
 import numpy as np
+
+from athcodec.exporters.scene_objects import face_materials, said_scene
+from athcodec.sources.scene_objects import FACE_MATERIAL, OWN
 
 COORDINATE_FORMATS = {4: "v %.9g %.9g %.9g\n", 8: "v %.16e %.16e %.16e\n"}
 BLOCK_ROWS = 1 << 14
@@ -181,6 +185,7 @@ class PlyWriter:
         lines = [
             "ply",
             "format binary_little_endian 1.0",
+            f"comment {OWN} {json.dumps(_ply_said(motion))}",
             f"element vertex {motion.vertex_count}",
             *(f"property {_PLY_NAMES[self._rows.dtype[name].str[1:]]} {name}" for name in self._rows.dtype.names),
             *face_header,
@@ -214,6 +219,16 @@ def _ply_columns(motion: Any) -> dict[str, np.ndarray]:
         if values.dtype.str[1:] in _PLY_NAMES and not set(names) & {"x", "y", "z", *columns}:
             columns |= dict(zip(names, values.reshape(len(values), -1).T))
     return columns
+
+
+def _ply_said(motion: Any) -> dict[str, Any]:
+    """With the material of each face, as runs: a property of faces beside their corners stops meshio."""
+    said = said_scene(motion)
+    if face_materials(motion) is not None:
+        labels = motion.attributes[FACE_MATERIAL]
+        starts = np.flatnonzero(np.diff(labels, prepend=labels[:1] - 1))
+        said[FACE_MATERIAL] = np.stack([labels[starts], np.diff(starts, append=len(labels))], axis=1).tolist()
+    return said
 
 
 def _ply_faces(motion: Any) -> tuple[list[str], bytes]:

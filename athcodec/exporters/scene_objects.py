@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from athcodec.sources.scene_objects import FACE_MATERIAL, MATERIAL_NAMES, ArrayDescriptor
+from athcodec.sources.scene_objects import FACE_MATERIAL, MATERIAL_NAMES, SCENE_KEYS, ArrayDescriptor
 
 # kept by the formats themselves, or by their objects
 KNOWN_METADATA = ("fps", "start_frame", "part_names", "part_kinds", "part_usd", "domains")
@@ -62,6 +62,27 @@ def objects_of(motion: Any) -> list[SceneObject]:
     for obj, copies in zip(objects, _copies(motion, len(objects))):
         obj.copies = copies if 1 < copies <= obj.count and _repeats(obj, copies) else 1
     return objects
+
+
+def said_names(motion: Any) -> dict[str, Any]:
+    """What formats without a place for it keep as JSON: the objects, with their kinds and numbers of vertices and
+    copies, and the names of materials. sources.scene_objects.scene_said reads it back."""
+    found: dict[str, Any] = {}
+    names, counts = motion.metadata.get("part_names"), motion.attributes.get("part_vertex_counts")
+    if isinstance(names, list) and counts is not None and counts.shape == (len(names),):
+        copies, kinds = motion.attributes.get("part_copies"), motion.metadata.get("part_kinds")
+        found["objects"] = {"names": names, "vertices": counts.tolist()}
+        found["objects"] |= {"kinds": kinds} if isinstance(kinds, list) else {}
+        found["objects"] |= {"copies": copies.tolist()} if copies is not None else {}
+    if face_materials(motion) is not None:
+        found[MATERIAL_NAMES] = motion.metadata[MATERIAL_NAMES]
+    return found
+
+
+def said_scene(motion: Any) -> dict[str, Any]:
+    """said_names, with unit, up axis and frame rate."""
+    given = {key: motion.metadata[key] for key in SCENE_KEYS if motion.metadata.get(key) is not None}
+    return {key: SCENE_KEYS[key](value) for key, value in given.items()} | said_names(motion)
 
 
 def _copies(motion: Any, object_count: int) -> list[int]:

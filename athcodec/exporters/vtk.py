@@ -1,13 +1,15 @@
 """Writes a series of VTU files, and a .pvd that lists them with their times: ParaView opens that.
 
 Each file has the moved points, all cells, and the attributes per vertex, and those per cell where all cells are of one
-kind. Files are numbered as sequence.py does. Both tree.pvd and tree.vtu give tree_0001.vtu ... and tree.pvd; a single
-frame written to tree.vtu is that file alone. Numbers are as in the clip, packed by zlib with gzip.
+kind. Objects, names of materials, unit, up axis and frame rate are JSON in the field "athcodec", as characters. Files
+are numbered as sequence.py does. Both tree.pvd and tree.vtu give tree_0001.vtu ... and tree.pvd; a single frame written
+to tree.vtu is that file alone. Numbers are as in the clip, packed by zlib with gzip.
 """
 
 from __future__ import annotations
 
 import base64
+import json
 import os
 import zlib
 from collections.abc import Callable
@@ -21,12 +23,15 @@ import numpy as np
 from athcodec.atomic_files import check_target, new_files
 from athcodec.exporters import FILES, WriteOptions
 from athcodec.exporters.cells import cell_and_point_data, cells_of
+from athcodec.exporters.scene_objects import said_scene
 from athcodec.exporters.sequence import file_names, write_frames
+from athcodec.sources.scene_objects import OWN
 
 _HEAD = (
     '<?xml version="1.0"?>\n<VTKFile type="UnstructuredGrid" version="1.0" byte_order="LittleEndian" '
-    'header_type="UInt64"{}>\n<UnstructuredGrid>\n<Piece NumberOfPoints="{}" NumberOfCells="{}">\n<Points>\n'
+    'header_type="UInt64"{}>\n<UnstructuredGrid>\n'
 )
+_PIECE = '<Piece NumberOfPoints="{}" NumberOfCells="{}">\n<Points>\n'
 
 
 def write_clip(
@@ -74,7 +79,13 @@ class _VtuWriter:
         cells = cells_of(motion)
         self._packed = packed
         compressor = ' compressor="vtkZLibDataCompressor"' if packed else ""
-        self._head = _HEAD.format(compressor, motion.vertex_count, len(cells.types)).encode()
+        said = json.dumps(said_scene(motion)).encode()
+        parts = [
+            _HEAD.format(compressor).encode(),
+            *self._section("FieldData", {OWN: np.frombuffer(said, np.uint8)}),
+            _PIECE.format(motion.vertex_count, len(cells.types)).encode(),
+        ]
+        self._head = b"".join(parts)
         per_point, per_cell = cell_and_point_data(motion, cells)
         described = {"connectivity": cells.nodes, "offsets": cells.stops, "types": cells.types.astype(np.uint8)}
         parts = [
@@ -101,6 +112,7 @@ class _VtuWriter:
     def _array(self, name: str, values: np.ndarray) -> bytes:
         kind = {"f": "Float", "i": "Int", "u": "UInt"}[values.dtype.kind] + str(8 * values.dtype.itemsize)
         width = f' NumberOfComponents="{values.shape[1]}"' if values.ndim == 2 else ""
+        width += f' NumberOfTuples="{len(values)}"' if name == OWN else ""  # which fields have to say themselves
         raw = np.ascontiguousarray(values, values.dtype.newbyteorder("<")).tobytes()
         opened = f'<DataArray type="{kind}" Name={quoteattr(name)}{width} format="binary">'
         return opened.encode() + self._encoded(raw) + b"</DataArray>\n"

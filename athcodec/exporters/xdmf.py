@@ -23,9 +23,8 @@ from athcodec.atomic_files import check_target, new_files
 from athcodec.exporters import WriteOptions
 from athcodec.exporters.cells import Cells, cell_and_point_data, cells_of
 from athcodec.exporters.hdf5 import Sink
-from athcodec.exporters.scene_objects import face_materials
+from athcodec.exporters.scene_objects import said_names
 from athcodec.sources.cells import VTK_NAMES, VTK_NUMBERS
-from athcodec.sources.scene_objects import MATERIAL_NAMES
 from athcodec.sources.xdmf import MIXED
 
 DISPLACEMENT = "displacement"
@@ -73,7 +72,7 @@ class _Writer:
         for key in ("fps", "start_frame", "unit", "up_axis"):
             if motion.metadata.get(key) is not None:
                 ElementTree.SubElement(domain, "Information", Name=key, Value=str(motion.metadata[key]))
-        for key, names in _names(motion).items():
+        for key, names in said_names(motion).items():
             ElementTree.SubElement(domain, "Information", Name=key, Value=json.dumps(names, ensure_ascii=False))
         series = ElementTree.SubElement(domain, "Grid", Name=SERIES, GridType="Collection", CollectionType="Temporal")
         static, rest = self._static_elements(), np.asarray(motion.rest, np.float64)
@@ -146,20 +145,6 @@ class _Writer:
         )
         item.text = f"{self._name}:/{place}"
         return item
-
-
-def _names(motion: Any) -> dict[str, Any]:
-    """Of the objects, with their kinds and numbers of vertices and copies, and of materials."""
-    found = {}
-    names, counts = motion.metadata.get("part_names"), motion.attributes.get("part_vertex_counts")
-    if isinstance(names, list) and counts is not None and counts.shape == (len(names),):
-        copies, kinds = motion.attributes.get("part_copies"), motion.metadata.get("part_kinds")
-        found["objects"] = {"names": names, "vertices": counts.tolist()}
-        found["objects"] |= {"kinds": kinds} if isinstance(kinds, list) else {}
-        found["objects"] |= {"copies": copies.tolist()} if copies is not None else {}
-    if face_materials(motion) is not None:
-        found[MATERIAL_NAMES] = motion.metadata[MATERIAL_NAMES]
-    return found
 
 
 def _mixed(cells: Cells) -> np.ndarray:

@@ -20,7 +20,7 @@ from athcodec.frames import Frames
 from athcodec.sources import ReadOptions
 from athcodec.sources.cells import Topology
 from athcodec.sources.mesh import kind_of
-from athcodec.sources.scene_objects import MATERIAL_NAMES
+from athcodec.sources.scene_objects import scene_said
 
 DISPLACEMENTS = ("displacement", "displacements", "disp", "u", "displ")
 
@@ -88,11 +88,9 @@ def clip_of_steps(
         key: values for key, values in static.items() if key not in RESERVED_NAMES and key not in topology.attributes
     }
     attributes = {key: values for key, values in attributes.items() if key not in options.skip}
-    objects = _objects(metadata.pop("objects", None), count)
-    attributes |= objects[1] or {"part_vertex_counts": np.array([count], np.int32)}
+    metadata, numbers = scene_said(metadata, count)
+    attributes |= {"part_vertex_counts": np.array([count], np.int32)} | numbers
     domains |= dict.fromkeys(("part_vertex_counts", "part_copies"), "constant")
-    if not _are_names(metadata.get(MATERIAL_NAMES, [])):
-        del metadata[MATERIAL_NAMES]
     polygons = topology.faces if topology.faces is not None else topology.attributes.get("face_vertex_counts")
     said = {
         "part_names": [name],
@@ -109,32 +107,11 @@ def clip_of_steps(
         rest=rest,
         rest_pose="mean" if options.rest == "mean" else "first",
         attributes=attributes,
-        metadata=said | objects[0] | metadata,
+        metadata=said | metadata,
         resource=resource,
         unchanged=unchanged,
         not_read={"field": moving} if moving else {},
     )
-
-
-def _objects(said: Any, count: int) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
-    """Metadata and attributes of what a file says of its objects; nothing where that does not fit its vertices."""
-    said = said if isinstance(said, dict) else {}
-    names, numbers = said.get("names"), {key: said.get(key) for key in ("vertices", "copies") if key in said}
-    fits = all(
-        isinstance(each, list) and all(type(n) is int and 0 <= n <= count for n in each) for each in numbers.values()
-    )
-    if not _are_names(names) or not fits or sum(numbers.get("vertices", ())) != count:
-        return {}, {}
-    if {len(each) for each in numbers.values()} != {len(names)}:
-        return {}, {}
-    kinds = said.get("kinds")
-    metadata = {"part_names": names} | ({"part_kinds": kinds} if _are_names(kinds) and len(kinds) == len(names) else {})
-    keys = {"vertices": "part_vertex_counts", "copies": "part_copies"}
-    return metadata, {keys[key]: np.array(each, np.int32) for key, each in numbers.items()}
-
-
-def _are_names(said: Any) -> bool:
-    return isinstance(said, list) and all(isinstance(name, str) for name in said)
 
 
 def _padded(points: np.ndarray) -> np.ndarray:

@@ -2,9 +2,9 @@
 
 OBJ: v (with colours where there are six or seven numbers), vt, f, l, o, g and usemtl; polygons of any size, relative
 indices, lines continued by a backslash. PLY: ascii and binary of both byte orders; vertices with any scalar properties,
-faces with texture coordinates per corner, edges. Not read: normals (they belong to one pose), materials' contents,
-curves and surfaces of OBJ, triangle strips of PLY; the clip's `not_read` names such statements and elements. A file is
-read whole, and nothing in it is trusted.
+faces with texture coordinates per corner, edges, and what our writer says in a comment. Not read: normals (they belong
+to one pose), materials' contents, curves and surfaces of OBJ, triangle strips of PLY; the clip's `not_read` names such
+statements and elements. A file is read whole, and nothing in it is trusted.
 """
 
 from __future__ import annotations
@@ -20,13 +20,14 @@ import numpy as np
 
 from athcodec.clip import RESERVED_NAMES, polygons
 from athcodec.errors import ClipError
+from athcodec.sources.scene_objects import FACE_MATERIAL, OWN, scene_of_json, scene_said
 
 FLOAT32_DIGITS = 9
 STATEMENT_BYTES = 16  # of a word of OBJ that is not known
 STRIPS = "tristrips"
 PLY_ELEMENTS = ("vertex", "face", "edge")
 FREE_FORM = ("curv", "curv2", "surf")
-HEADER_BYTES = 1 << 16
+HEADER_BYTES = 1 << 24  # names of objects and materials included
 PLY_TYPES = {
     "char": "i1",
     "uchar": "u1",
@@ -378,6 +379,7 @@ class PlyHeader:
     order: str  # "<", ">", or "" for text
     elements: list[PlyElement]
     length: int
+    said: dict[str, Any] = field(default_factory=dict)  # what our writer adds
 
 
 def ply_header(data: bytes) -> PlyHeader:
@@ -396,6 +398,8 @@ def ply_header(data: bytes) -> PlyHeader:
             header.elements.append(PlyElement(words[1], int(words[2])))
         elif words[:1] == ["property"] and header.elements:
             header.elements[-1].properties.append(_ply_property(words[1:]))
+        elif words[:2] == ["comment", OWN]:
+            header.said = scene_of_json(line.split(OWN, 1)[1])
         elif words and words[0] not in ("comment", "obj_info"):
             raise ClipError(f"header: got {line[:60]!r}, expected an element or a property of PLY")
     for element in header.elements:
@@ -534,9 +538,12 @@ def parse_ply(data: bytes) -> Mesh:
     vertices = values.get("vertex", {})
     if not {"x", "y", "z"} <= vertices.keys():
         raise ClipError("got no vertices with x, y and z, expected a PLY file with some")
-    mesh = Mesh(ply_points(vertices), metadata={"domains": {}})
+    metadata, attributes = scene_said(header.said, len(vertices["x"]))
+    mesh = Mesh(ply_points(vertices), metadata={"domains": dict.fromkeys(attributes, "constant")} | metadata)
+    mesh.attributes |= attributes
     _add_ply_vertex_values(mesh, vertices)
     _add_ply_faces(mesh, values.get("face", {}))
+    _add_ply_materials(mesh, header.said.get(FACE_MATERIAL))
     edges = values.get("edge", {})
     if {"vertex1", "vertex2"} <= edges.keys():
         ends = np.stack([edges["vertex1"], edges["vertex2"]], axis=1).astype(np.int64)
@@ -590,6 +597,19 @@ def _add_attribute(mesh: Mesh, name: str, values: np.ndarray, prefix: str = "ver
 
 def _native(values: np.ndarray) -> np.ndarray:
     return values.astype(values.dtype.newbyteorder("="))
+
+
+def _add_ply_materials(mesh: Mesh, runs: Any) -> None:
+    """runs: [label, faces] one after the other, for all faces."""
+    fits = isinstance(runs, list) and all(
+        isinstance(run, list) and len(run) == 2 and all(type(n) is int and abs(n) < 1 << 31 for n in run)
+        for run in runs
+    )
+    polygons, labels = mesh.polygons, np.array(runs if fits and runs else np.zeros((0, 2)), np.int32)
+    if polygons is None or (labels[:, 1] < 0).any() or labels[:, 1].sum(dtype=np.int64) != len(polygons[0]):
+        return
+    mesh.attributes[FACE_MATERIAL] = np.repeat(labels[:, 0], labels[:, 1])
+    mesh.metadata["domains"][FACE_MATERIAL] = "face"
 
 
 def _add_ply_faces(mesh: Mesh, face_values: dict[str, np.ndarray]) -> None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Collection, Iterable, Sequence
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import AbstractContextManager, nullcontext, suppress
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -24,6 +24,7 @@ MAX_METADATA_BYTES = 1 << 24
 DESCRIPTOR = ".descriptor"  # behind the name of an array's property in an Alembic file: that of its ArrayDescriptor
 FACE_MATERIAL, MATERIAL_NAMES = "face_material", "material_names"  # an attribute, and metadata
 OWN = "athcodec"  # the namespace of what our writers add to files of other formats
+SCENE_KEYS = {"unit": str, "up_axis": str, "fps": float}  # of metadata, which some formats have no place for
 KNOWN_METADATA = ("fps", "start_frame", "meters_per_unit", "part_names", "part_kinds", "part_usd", "domains")
 
 
@@ -343,6 +344,46 @@ def _spread(obj: SceneObject, static: Static | None, domain: str, shape: tuple[i
     if static.domain == "vertex":
         return static.values[obj.face_indices]
     return np.repeat(static.values, obj.face_counts, axis=0)
+
+
+def scene_of_json(text: str | bytes) -> dict[str, Any]:
+    """What our writers add to files of formats without a place for it; nothing where it is no JSON object."""
+    with suppress(ValueError, RecursionError):
+        said = json.loads(text)
+        if isinstance(said, dict):
+            return {key: said[key] for key in (*SCENE_KEYS, MATERIAL_NAMES, FACE_MATERIAL, "objects") if key in said}
+    return {}
+
+
+def scene_said(said: dict[str, Any], count: int) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
+    """(metadata, attributes) of a clip of `count` vertices; objects where they fit its vertices, names where they are
+    some."""
+    metadata = {key: value for key, value in said.items() if key not in ("objects", MATERIAL_NAMES, FACE_MATERIAL)}
+    metadata = {key: value for key, value in metadata.items() if isinstance(value, SCENE_KEYS.get(key, object))}
+    if _are_names(said.get(MATERIAL_NAMES)):
+        metadata[MATERIAL_NAMES] = said[MATERIAL_NAMES]
+    objects, numbers = _objects_said(said.get("objects"), count)
+    return metadata | objects, numbers
+
+
+def _objects_said(said: Any, count: int) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
+    said = said if isinstance(said, dict) else {}
+    names, numbers = said.get("names"), {key: said.get(key) for key in ("vertices", "copies") if key in said}
+    fits = all(
+        isinstance(each, list) and all(type(n) is int and 0 <= n <= count for n in each) for each in numbers.values()
+    )
+    if not _are_names(names) or not fits or sum(numbers.get("vertices", ())) != count:
+        return {}, {}
+    if {len(each) for each in numbers.values()} != {len(names)}:
+        return {}, {}
+    kinds = said.get("kinds")
+    metadata = {"part_names": names} | ({"part_kinds": kinds} if _are_names(kinds) and len(kinds) == len(names) else {})
+    keys = {"vertices": "part_vertex_counts", "copies": "part_copies"}
+    return metadata, {keys[key]: np.array(each, np.int32) for key, each in numbers.items()}
+
+
+def _are_names(said: Any) -> bool:
+    return isinstance(said, list) and all(isinstance(name, str) for name in said)
 
 
 def _join_materials(

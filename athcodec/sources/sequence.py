@@ -18,7 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
-from athcodec.clip import MotionClip
+from athcodec.clip import MotionClip, stated_fps
 from athcodec.errors import ClipError
 from athcodec.frames import Frames
 from athcodec.sources import NUMBER_PATTERN, ReadOptions, is_pattern
@@ -106,10 +106,9 @@ def read_clip(path: str | PathLike[str], options: ReadOptions) -> MotionClip:
     read, has other vertices, faces or edges than the first; OSError where one cannot be opened."""
     files = sequence_files(path)
     reader = FileFrames(list(files.values()), parse_mesh, _fast_reader)
-    time, metadata = np.zeros(1), {}
+    mesh, time, metadata = reader.mesh, np.zeros(1), {}
     if None not in files:
-        time, metadata = numbered_times(np.array(list(files)), options.fps)
-    mesh = reader.mesh
+        time, metadata = numbered_times(np.array(list(files)), options.fps or stated_fps(mesh.metadata))
     mesh.metadata["part_names"] = _without_numbers(mesh.metadata["part_names"], reader.paths[0], path)
     attributes = {name: values for name, values in mesh.attributes.items() if name not in options.skip}
     with naming(path):

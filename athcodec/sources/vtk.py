@@ -28,6 +28,7 @@ from athcodec.sources import ReadOptions
 from athcodec.sources.cells import VTK_NAMES, VTK_NUMBERS, blocks_of, topology_of
 from athcodec.sources.fields import clip_of_steps
 from athcodec.sources.opening import FileWatch, check_inside, naming
+from athcodec.sources.scene_objects import OWN, scene_of_json
 from athcodec.sources.sequence import sequence_files
 from athcodec.sources.timing import numbered_times, times_in_seconds
 from athcodec.sources.xdmf import parse_xml
@@ -70,7 +71,8 @@ def read_clip(path: str | PathLike[str], options: ReadOptions) -> MotionClip:
         files, time, metadata = _files(Path(path), options)
         steps = _Steps(files)
         name = re.sub(r"[_.\-]*\d+$", "", files[0].stem) or files[0].stem
-        return clip_of_steps(steps, time, metadata, name, options, steps.static(), unchanged=steps.unchanged)
+        said = steps.said | metadata
+        return clip_of_steps(steps, time, said, name, options, steps.static(), unchanged=steps.unchanged)
     except _BROKEN as error:
         text = " ".join(str(error).split())
         raise ClipError(text if text.startswith(fspath(path)) else f"{fspath(path)}: {text}") from None
@@ -135,7 +137,7 @@ class _Steps:
         self.unchanged = FileWatch(*self._files)
         self._now: tuple[int, _Grid] | None = None
         first = self._grid(0)
-        self._cells = first.cells
+        self._cells, self.said = first.cells, first.said
         self.topology = topology_of(blocks_of(*first.cells, VTK_NAMES), len(first.points))
         others = [self._grid(step) for step in {len(files) - 1, len(files) // 2, 1} if 0 < step < len(files)]
         for name, values in first.cell_data.items():
@@ -179,10 +181,18 @@ class _Steps:
 
 
 class _Grid:
-    """points (N, 3), data per point and cell, and cells: types, and where their nodes start and stop in a list."""
+    """points (N, 3), data per point and cell, and cells: types, and where their nodes start and stop in a list; said:
+    what our writer adds."""
 
-    def __init__(self, points: np.ndarray, cells: tuple[np.ndarray, ...], point_data: dict, cell_data: dict):
-        self.points, self.cells = points, cells
+    def __init__(
+        self,
+        points: np.ndarray,
+        cells: tuple[np.ndarray, ...],
+        point_data: dict,
+        cell_data: dict,
+        said: dict[str, Any] | None = None,
+    ):
+        self.points, self.cells, self.said = points, cells, said or {}
         self.point_data = {name: values for name, values in point_data.items() if len(values) == len(points) and name}
         self.cell_data = {name: values for name, values in cell_data.items() if len(values) == len(cells[0]) and name}
 
@@ -258,9 +268,14 @@ class _Vtu:
         said = piece.get("NumberOfPoints")
         if said is not None and int(said) != len(found):
             raise ClipError(f"points: got {len(found)}, expected {int(said)}")
-        return _Grid(
-            found, (types, starts, stops, nodes), self._arrays(piece, "PointData"), self._arrays(piece, "CellData")
-        )
+        cells, said = (types, starts, stops, nodes), self._said()
+        return _Grid(found, cells, self._arrays(piece, "PointData"), self._arrays(piece, "CellData"), said)
+
+    def _said(self) -> dict[str, Any]:
+        for element in self._root.findall("UnstructuredGrid/FieldData/DataArray"):
+            if element.get("Name") == OWN and element.get("type") == "UInt8":
+                return scene_of_json(self._array(element).tobytes())
+        return {}
 
     def _arrays(self, piece: ElementTree.Element, tag: str) -> dict[str, np.ndarray]:
         found = {}
