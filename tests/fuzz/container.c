@@ -7,8 +7,7 @@ static void read_front(const uint8_t *bytes, size_t size, const ath_limits *limi
 {
     size_t front = 0, memory = 0, again = 0;
     int result = ath_front(bytes, size, limits, &front, &memory, NULL);
-    REQUIRE(ath_result_name(result)[0] != 'U' || result == ATH_UNSUPPORTED_VERSION || result == ATH_UNKNOWN_CHUNK,
-            "every result has a name");
+    REQUIRE(strcmp(ath_result_name(result), "UNKNOWN") != 0, "every result has a name");
     if (result == ATH_MISSING) {
         REQUIRE(front > size, "what is missing is more than what is there");
         return;
