@@ -388,6 +388,12 @@ def _source_arguments(verb: argparse.ArgumentParser) -> None:
         action="store_true",
         help="let XDMF, PVD, HDF5 and USD files name files outside of their own folder",
     )
+    source.add_argument(
+        "--max-memory",
+        metavar="SIZE",
+        type=_argument(parse_size),
+        help="bytes of memory that reading a source may take, such as 500MB or 16GiB (default 4GiB)",
+    )
     source.add_argument("--unit", metavar="UNIT", help="unit of length to convert to, or that of a source without one")
     source.add_argument("--up-axis", choices=("x", "y", "z"), help="axis to turn up, or that of a source without one")
 
