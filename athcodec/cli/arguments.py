@@ -23,6 +23,7 @@ from athcodec.options import (
     SAMPLES,
     ladder_of,
 )
+from athcodec.shown import shown
 from athcodec.units import METRES, Length, parse_length, parse_size
 
 DEMO_PAGE = "athcodec_demo.html"
@@ -34,10 +35,17 @@ WRITTEN = "file to write; replaced when the new one is complete"
 READ = 'a file or a URL, http://, https:// or another that fsspec knows (pip install "athcodec[remote]")'
 
 
+class _Parser(argparse.ArgumentParser):
+    """Whose messages are shown as all others are: they quote arguments, such as names of files."""
+
+    def _print_message(self, message: str, file: Any = None) -> None:
+        super()._print_message(shown(message), file)
+
+
 def make_parser() -> argparse.ArgumentParser:
-    shared = argparse.ArgumentParser(add_help=False)
+    shared = _Parser(add_help=False)
     shared.add_argument("--debug", action="store_true", default=argparse.SUPPRESS, help=TRACEBACK)
-    parser = argparse.ArgumentParser(
+    parser = _Parser(
         prog="athcodec",
         description="A codec for plant motion: levels of detail over its branches, within an error bound.",
         epilog="athcodec VERB --help explains a verb. Exit codes: 0 done, 1 error or failed check, 2 usage.",

@@ -391,7 +391,7 @@ def _export_gallery(args: argparse.Namespace) -> int:
 def _say_where(address: str, no_browser: bool) -> None:
     from athcodec import view
 
-    echo(f"{address} (Ctrl-C ends it)", flush=True)
+    print(f"{address} (Ctrl-C ends it)", flush=True)  # our own, with the key that the page asks for
     if not no_browser:
         view.open_browser(address)
 

@@ -11,11 +11,13 @@ from __future__ import annotations
 
 import base64
 import binascii
+import io
 import lzma
 import os
 import re
 import zlib
 from collections.abc import Callable, Sequence
+from contextlib import redirect_stderr
 from os import PathLike, fspath
 from pathlib import Path
 from typing import Any
@@ -208,7 +210,8 @@ def _legacy_grid(path: Path) -> _Grid:
     except ImportError:
         raise MissingExtra('VTK files: need meshio: pip install "athcodec[mesh]"') from None
     try:
-        mesh = vtk.read(path)
+        with redirect_stderr(io.StringIO()):  # meshio's warnings quote the file
+            mesh = vtk.read(path)
     except OSError:
         raise
     except Exception as error:  # meshio trusts its files: a damaged one may raise any exception
