@@ -24,7 +24,8 @@ from athcodec.clip import MotionClip
 from athcodec.errors import ClipError, MissingExtra, SourceWarning
 from athcodec.frames import Frames
 from athcodec.options import MAX_MEMORY, SAMPLES
-from athcodec.sources.opening import closing_on_failure, open_plain
+from athcodec.plain_files import open_plain
+from athcodec.sources.opening import closing_on_failure
 from athcodec.units import METRES, unit_symbol
 
 HEAD_BYTES = 4096

@@ -31,8 +31,9 @@ import numpy as np
 
 from athcodec.clip import RESERVED_NAMES, MotionClip
 from athcodec.errors import ClipError
+from athcodec.plain_files import open_plain
 from athcodec.sources import ReadOptions
-from athcodec.sources.opening import Budget, FileWatch, closing_on_failure, naming, open_plain
+from athcodec.sources.opening import Budget, FileWatch, closing_on_failure, naming
 from athcodec.sources.reader_process import read_apart
 from athcodec.sources.schema import clip_of_arrays
 

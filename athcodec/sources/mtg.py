@@ -22,7 +22,7 @@ import numpy as np
 
 from athcodec.clip import MotionClip
 from athcodec.errors import ClipError
-from athcodec.sources.opening import open_plain
+from athcodec.plain_files import open_plain
 
 MAX_FILE_BYTES = 1 << 28
 MAX_ENTITIES = 1 << 22

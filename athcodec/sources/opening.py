@@ -5,33 +5,21 @@ reading fails, say in errors which file it was, and count the memory that it tak
 from __future__ import annotations
 
 import os
-import stat
 from collections.abc import Iterator
 from contextlib import contextmanager
 from os import PathLike, fspath
 from pathlib import Path
-from typing import BinaryIO, Protocol
+from typing import Protocol
 
 from athcodec.errors import ClipError
 from athcodec.options import MAX_MEMORY
+from athcodec.plain_files import open_plain
 
 File = str | PathLike[str] | int
-
-_WITHOUT_WAITING = getattr(os, "O_NONBLOCK", 0)  # for somebody who writes to a pipe; of plain files it changes nothing
 
 
 class Closable(Protocol):
     def close(self) -> None: ...
-
-
-def open_plain(path: str | PathLike[str]) -> BinaryIO:
-    """A plain file, open to be read without a buffer. Raises ClipError for a device or pipe, which may have no end or
-    no beginning, OSError where it cannot be opened."""
-    file = open(path, "rb", buffering=0, opener=lambda name, flags: os.open(name, flags | _WITHOUT_WAITING))
-    if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
-        file.close()
-        raise ClipError(f"{fspath(path)}: got a device, pipe or socket, expected a plain file")
-    return file
 
 
 def read_plain(path: str | PathLike[str], budget: Budget) -> bytes:

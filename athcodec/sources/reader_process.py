@@ -21,8 +21,9 @@ import numpy as np
 from athcodec.clip import MotionClip, Skin
 from athcodec.errors import ClipError
 from athcodec.frames import Frames
+from athcodec.plain_files import open_plain
 from athcodec.sources import ReadOptions
-from athcodec.sources.opening import FileWatch, closing_on_failure, naming, open_plain
+from athcodec.sources.opening import FileWatch, closing_on_failure, naming
 
 ARRAYS = ("vertex_branch", "branch_parent", "stem_index", "edges", "faces")
 MAIN = "athcodec.sources.reader_main"
