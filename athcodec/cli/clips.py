@@ -24,6 +24,7 @@ from athcodec.joining import BLEND, in_wind
 from athcodec.metrics import ErrorMeter, MotionMeter, SmoothnessMeter, compare_clips, level_meters
 from athcodec.options import HOST, MAX_MEMORY
 from athcodec.sources import ReadOptions, find_format, listed
+from athcodec.sources.opening import naming_file
 from athcodec.units import Length
 
 if TYPE_CHECKING:
@@ -214,7 +215,8 @@ def open_file(path: str | Path, stats: bool = False, **options: Any) -> Iterator
 def naming(path: str | Path) -> Iterator[None]:
     """Let the errors of the block say which file they are about."""
     try:
-        yield
+        with naming_file(path):
+            yield
     except AthError as error:
         if str(error).startswith(f"{path}: ") or isinstance(error, RemoteError):
             raise

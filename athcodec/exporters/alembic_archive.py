@@ -3,7 +3,8 @@
 Faces and static arrays are written once, materials' names as those of face sets; samples go to disk as they come.
 Points are float32, a clip in float64 is rounded; copies of one shape become instances where options.instances asks for
 it. Everything lies below one transform, which turns a clip whose Z is up to Alembic's custom, Y up, and keeps what
-Alembic has no place for (unit, branches, bytes); sources/alembic_archive.py takes it back from there. Run by alembic.py.
+Alembic has no place for (unit, branches, bytes); sources/alembic_archive.py takes it back from there. See
+alembic.py for who runs it.
 """
 
 from __future__ import annotations

@@ -25,7 +25,7 @@ from athcodec.errors import ClipError, MissingExtra, SourceWarning
 from athcodec.frames import Frames
 from athcodec.options import MAX_MEMORY, SAMPLES
 from athcodec.plain_files import open_plain
-from athcodec.sources.opening import closing_on_failure
+from athcodec.sources.opening import closing_on_failure, naming_file
 from athcodec.units import METRES, unit_symbol
 
 HEAD_BYTES = 4096
@@ -249,9 +249,10 @@ def read(
         For options that do not exist.
     """
     wanted = ReadOptions(**options)
-    kind = find_format(path) if format is None else format_named(format, FORMATS)
-    kind.check()
-    clip: MotionClip = importlib.import_module(kind.module).read_clip(path, wanted)
+    with naming_file(path):
+        kind = find_format(path) if format is None else format_named(format, FORMATS)
+        kind.check()
+        clip: MotionClip = importlib.import_module(kind.module).read_clip(path, wanted)
     lost = {kind: names for kind, names in clip.not_read.items() if kind not in NO_SHAPES}
     if lost:
         warnings.warn(f"{os.fspath(path)}: not read: {listed(lost)}", SourceWarning, stacklevel=2)

@@ -23,6 +23,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Collection
+from contextlib import suppress
 from os import PathLike, fspath
 from typing import Any
 
@@ -59,20 +60,31 @@ def read_clip(path: str | PathLike[str], options: ReadOptions) -> MotionClip:
     Raises ClipError where the file is not HDF5 or its contents are no usable clip, OSError where it cannot be opened.
     """
     file = _open(path)
-    with naming(path, *BROKEN), closing_on_failure(file):
+    with naming(path, *BROKEN), closing_on_failure(_Reading(file)):
         if not options.allow_outside:
             for name in _names(file):
                 check_own(file, name, False)
         if not may_explode(file, options.max_memory):
             return _read(file, options)
-    file.close()
+    _Reading(file).close()
     return read_apart(path, options, "athcodec.sources.hdf5", "HDF5: it is damaged, or the HDF5 library")
+
+
+class _Reading:
+    """A file that has only been read: it does not matter whether it can be closed."""
+
+    def __init__(self, file: h5py.File):
+        self._file = file
+
+    def close(self) -> None:
+        with suppress(RuntimeError, OSError):
+            self._file.close()
 
 
 def open_clip(path: str, options: ReadOptions) -> MotionClip:
     """The clip in a file, for the process of reader_main.py. Raises ClipError, OSError."""
     file = _open(path)
-    with closing_on_failure(file):
+    with closing_on_failure(_Reading(file)):
         clip = _read(file, options)
     clip.unchanged = FileWatch(path)
     return clip
@@ -106,7 +118,7 @@ def _read(file: h5py.File, options: ReadOptions) -> MotionClip:
         attributes,
         metadata,
         options,
-        resource=file,
+        resource=_Reading(file),
         unchanged=unchanged,
     )
 

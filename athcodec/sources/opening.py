@@ -129,6 +129,17 @@ def naming(path: str | PathLike[str], *errors: type[Exception]) -> Iterator[None
 
 
 @contextmanager
+def naming_file(path: str | PathLike[str]) -> Iterator[None]:
+    """Errors of the system that name no file, such as those of reading, name this one."""
+    try:
+        yield
+    except OSError as error:
+        if error.filename is not None or error.errno is None:
+            raise
+        raise OSError(error.errno, error.strerror, fspath(path)) from error
+
+
+@contextmanager
 def closing_on_failure(resource: Closable) -> Iterator[None]:
     """Closes the resource where the block raises; else it stays open."""
     try:

@@ -87,7 +87,7 @@ def is_whole(path: Path) -> bool:
             with athcodec.open(path, strict=True) as decoder:
                 decoder.file.check()
         else:
-            with athcodec.read_hdf5(path) as clip:
+            with athcodec.read(path) as clip:
                 clip.block(0, clip.frame_count)
     except (athcodec.errors.AthError, OSError):
         return False
