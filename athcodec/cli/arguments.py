@@ -31,8 +31,11 @@ DEMO_FLOOR = {"fern": 4.0, "grass": 9.0}
 """Samples on the floor of the demo's forest, and how many of each around a tree."""
 
 TRACEBACK = "show the traceback of an error"
-WRITTEN = "file to write; replaced when the new one is complete"
-READ = 'a file or a URL, http://, https:// or another that fsspec knows (pip install "athcodec[remote]")'
+WRITTEN = "file to write; replaced when the new one is complete; - is standard output, with encode and decode"
+READ = (
+    "a file, - for standard input (decode and info), or a URL, http://, https:// or another that fsspec knows "
+    '(pip install "athcodec[remote]")'
+)
 
 
 class _Parser(argparse.ArgumentParser):
@@ -131,7 +134,7 @@ def _encode_arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument(
         "input",
         metavar="IN",
-        help="a clip in one of the formats that `athcodec formats` lists; several "
+        help="a clip in one of the formats that `athcodec formats` lists, - for standard input; several "
         "of one plant share their hierarchy and rest pose in the file",
     )
     verb.add_argument("paths", metavar="OUT.ath", nargs="+", help=WRITTEN)

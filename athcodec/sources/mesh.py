@@ -24,6 +24,7 @@ from athcodec.sources.opening import Budget, read_plain
 
 FLOAT32_DIGITS = 9
 WORD_ENDS, WORD_BYTES = b" \t\n\r\f\v/", 128  # what a word of text takes, and what is made of it
+MESSAGE = 300  # characters of what Python says of a number
 STATEMENT_BYTES = 16  # of a word of OBJ that is not known
 STRIPS = "tristrips"
 PLY_ELEMENTS = ("vertex", "face", "edge")
@@ -93,7 +94,7 @@ def parse_mesh(data: bytes, path: str | PathLike[str], budget: Budget) -> Mesh:
         else:
             mesh = parse_obj(data)
     except (ClipError, ValueError, OverflowError, IndexError, MemoryError) as error:
-        raise ClipError(f"{os.fspath(path)}: {error}") from None
+        raise ClipError(f"{os.fspath(path)}: {str(error)[:MESSAGE]}") from None
     mesh.metadata.setdefault("part_names", [Path(path).stem])
     mesh.metadata.setdefault("part_kinds", [kind_of(mesh.polygons, mesh.edges)])
     mesh.attributes.setdefault("part_vertex_counts", np.array([len(mesh.points)], np.int32))

@@ -1,5 +1,5 @@
 /* Input and output that fails on command: stands between a program and the C library (LD_PRELOAD) and lets the n-th call
- * on a file below a folder fail, once or from then on. io_errors.py arms it. */
+ * on a file below a folder fail, once or from then on. _io_errors.py arms it. */
 #define _GNU_SOURCE
 #include <dlfcn.h>
 #include <errno.h>

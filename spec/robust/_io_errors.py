@@ -47,7 +47,7 @@ def each_call(verb: str, folder: Path, sample: int = 0, lasts: bool = False, unt
     library = build(folder)
     asked = {"verb": verb, "folder": str(folder), "sample": sample, "lasts": lasts, "seconds": until - time.monotonic()}
     done = subprocess.run(
-        [sys.executable, "-m", "spec.robust.io_errors", json.dumps(asked, default=str)],
+        [sys.executable, "-m", "spec.robust._io_errors", json.dumps(asked, default=str)],
         env=os.environ | {"LD_PRELOAD": str(library), "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"},
         cwd=HERE.parent.parent,
         capture_output=True,
@@ -156,16 +156,16 @@ def _next_run(place: Place, target: Path) -> None:
         file.write(b"next")
 
 
-def run(budget: float) -> list[Row]:
+def rows(budget: float) -> list[Row]:
     """All calls of all verbs, within about `budget` seconds."""
-    start, rows = time.monotonic(), []
+    start, found = time.monotonic(), []
     for number, (verb, lasts) in enumerate((verb, lasts) for verb in VERBS for lasts in (False, True)):
         with tempfile.TemporaryDirectory() as folder:
             until = start + 0.7 * budget * (number + 1) / (2 * len(VERBS))
-            rows.append(each_call(verb, Path(folder).resolve(), lasts=lasts, until=until))
+            found.append(each_call(verb, Path(folder).resolve(), lasts=lasts, until=until))
     with tempfile.TemporaryDirectory() as folder:
-        rows.append(each_call_of_batch(Path(folder).resolve(), list(range(1, 100, 3)), start + budget))
-    return rows
+        found.append(each_call_of_batch(Path(folder).resolve(), list(range(1, 100, 3)), start + budget))
+    return found
 
 
 def main() -> None:
