@@ -46,7 +46,7 @@ def test_a_clip_goes_through_pipes_to_an_ath_file_and_back(source, run, clip, tm
     assert code == 0, err
     (tmp_path / "b.h5").write_bytes(decoded)
     with athcodec.read(tmp_path / "b.h5") as again:
-        assert np.abs(again.block(0, 5) - clip.block(0, 5)).max() < 1e-3
+        assert np.abs(again.block(0, 5) - clip.block(0, 5)).max() < 1e-2
     assert sorted(os.listdir(tmp_path)) == [source, "b.h5"], "no file is called -"
 
 

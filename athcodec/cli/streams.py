@@ -39,8 +39,8 @@ class Streams:
         """The source to read in place of `path`. Raises ClipError where nothing says its format, OSError."""
         if path != STREAM:
             return path
-        if format is not None:
-            return self._read(format_named(format, READ).suffixes[0])
+        if format is not None or self._input:
+            return self._read(format_named(format, READ).suffixes[0] if format else "")
         head = sys.stdin.buffer.peek(HEAD_BYTES)
         kind = next((kind for kind in READ if kind.magic and head.startswith(kind.magic)), None)
         if kind is None:

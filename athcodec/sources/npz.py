@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import json
 import struct
+import tokenize
 import zipfile
 import zlib
 from collections.abc import Iterator
@@ -35,6 +36,7 @@ PACKINGS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 _LOCAL_HEADER = struct.Struct("<4s22xHH")
 _BROKEN = (
     zipfile.BadZipFile,
+    OSError,
     zlib.error,
     EOFError,
     ValueError,
@@ -46,6 +48,7 @@ _BROKEN = (
     OverflowError,
     TypeError,
     SyntaxError,
+    tokenize.TokenError,  # NumPy's, of headers in old styles
 )
 
 

@@ -295,7 +295,8 @@ class _Vtu:
         if form == "ascii":
             self._budget.need(TEXT_BYTES * len(element.text or ""), element.get("Name", "points"))
             words = (element.text or "").split()
-            return np.array(words, np.float64 if dtype.kind == "f" else np.int64).astype(dtype)
+            with np.errstate(over="ignore", invalid="ignore"):  # what does not fit is refused where it is used
+                return np.array(words, np.float64 if dtype.kind == "f" else np.int64).astype(dtype)
         if form == "binary":
             data = self._decoded((element.text or "").strip().encode())
         elif form == "appended":

@@ -149,7 +149,8 @@ class Data:
     def _text(self, item: ElementTree.Element) -> np.ndarray:
         text = item.text or ""
         self.budget.need(TEXT_BYTES * len(text), "DataItem")
-        return np.array(text.split(), np.float64).astype(_dtype(item))
+        with np.errstate(over="ignore", invalid="ignore"):  # what does not fit is refused where it is used
+            return np.array(text.split(), np.float64).astype(_dtype(item))
 
     def _binary(self, item: ElementTree.Element, shape: tuple[int, ...]) -> np.ndarray:
         path = self._file_named((item.text or "").strip())
