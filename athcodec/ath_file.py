@@ -6,7 +6,6 @@ this module feeds it bytes and reads the static data. What one clip shows is the
 
 from __future__ import annotations
 
-import builtins
 import math
 import os
 import threading
@@ -40,6 +39,7 @@ from athcodec.errors import (
 from athcodec.hierarchy import Hierarchy, derived_edges
 from athcodec.host_mesh import HostMesh, mesh_positions
 from athcodec.joining import HEADING, STRENGTH, metadata_of, wind_of
+from athcodec.plain_files import open_plain
 from athcodec.polygons import Polygons
 from athcodec.threads import ThreadPool, default_jobs
 from athcodec.transitions import transitions_of
@@ -1106,7 +1106,7 @@ def _opened(path: Any, gltf_motion: str | None) -> Any:
         from athcodec.remote import Remote  # what it needs takes long to import
 
         return Remote(path)
-    file = builtins.open(os.fspath(path), "rb")
+    file = open_plain(os.fspath(path), -1)
     with ExitStack() as unread:
         unread.callback(file.close)
         if file.read(4) != b"glTF":

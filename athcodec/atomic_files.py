@@ -77,20 +77,25 @@ class PendingFile:
 
     def complete(self) -> None:
         """Gives the file its name, in place of an older one, once its bytes are on the disk."""
-        os.fsync(self.descriptor)
-        if fcntl is None:
-            self._close()  # Windows renames no open files
-        os.replace(self.name, self.path)
-        self._close()
+        try:
+            os.fsync(self.descriptor)
+            if fcntl is None:
+                self._close()  # Windows renames no open files
+            os.replace(self.name, self.path)
+        except OSError as error:
+            raise OSError(error.errno, error.strerror, self.path) from None
+        with suppress(OSError):  # its bytes are on the disk, under its name
+            self._close()
         _sync_folder(os.path.dirname(self.path))
 
     def discard(self) -> None:
         """Removes what has been written."""
         if fcntl is None:
             self._close()
-        with suppress(FileNotFoundError):
+        with suppress(OSError):  # it is gone, or the next writer removes it
             os.unlink(self.name)
-        self._close()
+        with suppress(OSError):
+            self._close()
 
     def _close(self) -> None:
         descriptor, self.descriptor = self.descriptor, -1
@@ -108,6 +113,12 @@ class _Naming(io.FileIO):
     def write(self, data) -> int | None:
         try:
             return super().write(data)
+        except OSError as error:
+            raise OSError(error.errno, error.strerror, self._path) from None
+
+    def truncate(self, size: int | None = None) -> int:
+        try:
+            return super().truncate(size)
         except OSError as error:
             raise OSError(error.errno, error.strerror, self._path) from None
 

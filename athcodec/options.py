@@ -14,6 +14,7 @@ DEFAULT_LADDER = "decades"
 MIN_SEGMENT, MAX_SEGMENT, DEFAULT_SEGMENT = 16, 256, 128  # frames
 METHODS = ("attributes", "skeleton", "edges", "components", "runs", "motion")  # that find branches
 SAMPLES = ("tree", "growth")  # that ship with the package
+MAX_MEMORY = 4 << 30  # bytes that reading a source may take
 RIG_JOINTS = 256  # of a rig, where none are asked for
 HOST = "host"
 """The word for a rest pose that whoever plays the file has: `--rest host`."""

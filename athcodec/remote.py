@@ -11,12 +11,14 @@ business.
 from __future__ import annotations
 
 import asyncio
+import ipaddress
 import os
 import re
 from collections import OrderedDict
-from urllib.parse import urlsplit
+from urllib.parse import urljoin, urlsplit
 
 from athcodec.errors import RemoteError
+from athcodec.shown import redacted, without_secrets
 
 READ_AHEAD = 64 << 10
 GAP = 16 << 10  # bytes that nobody asked for and that cost less than another request
@@ -153,6 +155,8 @@ def _source(remote: Remote, options: dict):
         http = urlsplit(remote.url).scheme.lower() in ("http", "https")
         if http:
             import aiohttp  # noqa: F401
+
+            options = guarded(remote.url, options)
         system, path = fsspec.core.url_to_fs(remote.url, **({"skip_instance_cache": True} | options))
     except ImportError as error:
         missing = getattr(error, "name", None)
@@ -164,14 +168,36 @@ def _source(remote: Remote, options: dict):
     return _Http(remote, system, shown) if http else _AnySystem(remote, system, path, shown)
 
 
-def without_secrets(url: str) -> str:
-    """The URL as messages show it: without user, password and query, which may hold keys."""
-    parts = urlsplit(url)
-    return f"{parts.scheme}://{parts.netloc.rpartition('@')[2]}{parts.path}"
+def guarded(url: str, options: dict) -> dict:
+    """Options for fsspec's file system of HTTP, with which a server cannot send us on to machines that it does not
+    reach itself: redirects from a public address to a private one raise RemoteError."""
+    import aiohttp
+
+    first = urlsplit(url).hostname or ""
+
+    async def check(session, context, params) -> None:
+        place = params.response.headers.get("Location") or params.response.headers.get("URI") or ""
+        target = urlsplit(urljoin(str(params.response.url), place)).hostname or ""
+        if await is_private(target) and not await is_private(first):
+            raise RemoteError(f"{without_secrets(url)}: got a redirect to {target[:80]!r}, expected a public address")
+
+    trace = aiohttp.TraceConfig()
+    trace.on_request_redirect.append(check)
+    own = options.get("client_kwargs") or {}
+    return options | {"client_kwargs": own | {"trace_configs": [*own.get("trace_configs", ()), trace]}}
+
+
+async def is_private(host: str) -> bool:
+    """Whether a name leads to an address of this machine, a private network or one of a link."""
+    try:
+        found = await asyncio.get_running_loop().getaddrinfo(host, None)
+    except (OSError, UnicodeError):
+        return False  # and is not to be reached either
+    return any(not ipaddress.ip_address(address[0].partition("%")[0]).is_global for *_, address in found)
 
 
 def _one_line(error: BaseException) -> str:
-    return " ".join(str(error).split()) or type(error).__name__
+    return " ".join(redacted(str(error)).split()) or type(error).__name__
 
 
 class _AnySystem:

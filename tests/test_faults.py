@@ -26,7 +26,7 @@ from athcodec.sources import sample_path
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.append(str(ROOT))  # for spec, which is not installed; athcodec stays the installed one
 
-from spec.robust import faults  # noqa: E402
+from spec.robust import _io_errors, faults  # noqa: E402
 
 DEAD = ".target.ath.0123abcd.part"
 
@@ -151,6 +151,29 @@ def _looks(path) -> tuple:
     """But for when it was read last, which looking at a link changes."""
     found = os.lstat(path)
     return found.st_mode, found.st_ino, found.st_uid, found.st_gid, found.st_size, found.st_mtime_ns
+
+
+# ---- input and output that fails ----
+
+
+@pytest.mark.parametrize("verb", _io_errors.VERBS)
+def test_a_call_that_fails_is_one_line_that_names_a_file_and_leaves_the_older_one_or_a_whole_one(verb, tmp_path):
+    row = _io_errors.each_call(verb, tmp_path, sample=8)
+    assert row.tried == 8 and row.crashes == row.wrong == 0, row.note
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("lasts", [False, True])
+@pytest.mark.parametrize("verb", _io_errors.VERBS)
+def test_so_it_is_with_every_call(verb, lasts, tmp_path):
+    row = _io_errors.each_call(verb, tmp_path, lasts=lasts)
+    assert row.tried > 10 and row.crashes == row.wrong == 0, row.note
+
+
+@pytest.mark.slow
+def test_a_batch_whose_calls_fail_is_finished_by_the_next_run(tmp_path):
+    row = _io_errors.each_call_of_batch(tmp_path, [1, 3, 7, 15, 25, 40, 60])
+    assert row.tried == 7 and row.crashes == row.wrong == 0, row.note
 
 
 # ---- what a new file is like ----

@@ -24,7 +24,7 @@ except OSError as error:
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no limits of file sizes to take the place of a full disk")
-@pytest.mark.parametrize("name", ["a.pc2", "a.mdd", "a.obj", "a.ply", "a.npz", "a.xdmf", "a.pvd"])
+@pytest.mark.parametrize("name", ["a.pc2", "a.mdd", "a.obj", "a.ply", "a.npz", "a.xdmf", "a.pvd", "a.abc"])
 def test_a_full_disk_is_an_error_and_leaves_no_file(tmp_path, name):
     for limit in (3000, 40000):
         done = subprocess.run(

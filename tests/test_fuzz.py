@@ -11,7 +11,7 @@ from io import BytesIO
 from pathlib import Path
 
 import pytest
-from fuzz import coverage, seeds, targets
+from fuzz import coverage, seeds, sources, targets
 
 import athcodec
 
@@ -115,3 +115,17 @@ def test_random_clips_come_back_in_a_short_run_of_the_command():
     done = subprocess.run([sys.executable, "-m", "tests.fuzz", *words], cwd=ROOT, capture_output=True, text=True)
     assert done.returncode == 0, done.stdout + done.stderr
     assert int(re.search(r"roundtrip: (\d+) inputs", done.stdout)[1]) >= 20
+
+
+@pytest.mark.parametrize("kind", sources.KINDS)
+def test_readers_give_a_clip_or_one_line_in_a_short_run(kind):
+    result = sources.blind(kind, 60, SEED, runs=60)
+    assert result["tried"] == 60 and not result["failure"], result
+
+
+def test_what_is_no_clip_and_no_line_is_a_find(tmp_path, monkeypatch):
+    """What the runs on readers promise can fail."""
+    data = sources.seeds("obj")[0]
+    monkeypatch.setattr("athcodec.read", lambda path, **options: {}["a fault"])
+    with pytest.raises(sources.Failed, match="a fault"):
+        sources.attempt("obj", data, tmp_path)

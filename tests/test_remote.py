@@ -5,6 +5,7 @@ The server is a real one on this machine, with faults that a test switches on.
 
 from __future__ import annotations
 
+import asyncio
 import gzip
 import json
 import re
@@ -282,6 +283,27 @@ def test_redirects_are_followed_and_counted(server, local):
     with athcodec.open(server.url) as decoder:
         assert np.array_equal(decoder.positions(), local.positions())
         assert decoder.file.source.requests == len(server.ranges)
+
+
+def test_a_redirect_from_a_public_address_to_a_private_one_is_refused(server, monkeypatch):
+    async def is_private(host: str) -> bool:
+        return host == "localhost"  # as if 127.0.0.1 were somewhere in the world
+
+    def redirect(handler: Handler, start: int, stop: int) -> bool:
+        place = f"http://localhost:{server.server_address[1]}/inside"
+        handler.send_head(302, {"Location": place, "Content-Length": "0"})
+        return True
+
+    server.fault = redirect
+    monkeypatch.setattr(remote, "is_private", is_private)
+    with pytest.raises(RemoteError, match="got a redirect to 'localhost', expected a public address"):
+        athcodec.open(server.url)
+    assert len(server.ranges) == 1
+
+
+@pytest.mark.parametrize("host", ["localhost", "127.0.0.1", "10.1.2.3", "169.254.169.254", "::1", "::ffff:10.0.0.1"])
+def test_addresses_of_this_machine_and_of_private_networks_are_known(host):
+    assert asyncio.run(remote.is_private(host)) and not asyncio.run(remote.is_private("1.1.1.1"))
 
 
 def test_several_threads_play_from_one_server(server, local):

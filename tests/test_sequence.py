@@ -15,12 +15,13 @@ from athcodec.clip import MotionClip
 from athcodec.clip_view import ClipView
 from athcodec.errors import ClipError, SourceWarning
 from athcodec.sources.mesh import parse_mesh
+from athcodec.sources.opening import Budget
 
 TRIANGLE = "v 0 0 {}\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
 
 
 def obj(text: str):
-    return parse_mesh(text.encode(), "leaf.obj")
+    return parse_mesh(text.encode(), "leaf.obj", Budget())
 
 
 def write_triangles(folder, names):

@@ -15,11 +15,13 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+from urllib.parse import urlsplit
 
 from athcodec.atomic_files import is_url
 from athcodec.batch.settings import Settings, check_settings, settings_of
 from athcodec.errors import ClipError, MissingExtra, RemoteError
-from athcodec.remote import _one_line, without_secrets
+from athcodec.remote import _one_line, guarded
+from athcodec.shown import without_secrets
 from athcodec.sources import FORMATS, NUMBER_PATTERN, is_pattern
 from athcodec.sources.sequence import sequence_files
 
@@ -211,7 +213,8 @@ def file_system(url: str) -> tuple[Any, str]:
     try:
         import fsspec
 
-        return fsspec.core.url_to_fs(url)
+        is_http = urlsplit(url).scheme.lower() in ("http", "https")
+        return fsspec.core.url_to_fs(url, **({"skip_instance_cache": True} | guarded(url, {}) if is_http else {}))
     except ImportError as error:
         raise MissingExtra(f'{without_secrets(url)}: {_one_line(error)}: pip install "athcodec[remote]"') from None
     except ValueError as error:

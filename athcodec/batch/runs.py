@@ -30,7 +30,7 @@ from athcodec.batch.manifest import Manifest, ManifestError, Record, read_record
 from athcodec.batch.show import Show
 from athcodec.batch.tasks import Result, one_line
 from athcodec.errors import AthError, MissingExtra
-from athcodec.remote import without_secrets
+from athcodec.shown import without_secrets
 
 MANIFEST = "athcodec-batch.jsonl"
 SCRATCH = "athcodec-batch"

@@ -30,7 +30,19 @@ from athcodec.sources import FORMATS, format_named
 from athcodec.units import parse_length, parse_size
 
 BOUNDS = ("max_error", "rel_error", "target_size")  # of which a clip has one
-READING = ("source_format", "rest", "fps", "mesh", "field", "only", "takes", "allow_outside", "unit", "up_axis")
+READING = (
+    "source_format",
+    "rest",
+    "fps",
+    "mesh",
+    "field",
+    "only",
+    "takes",
+    "allow_outside",
+    "max_memory",
+    "unit",
+    "up_axis",
+)
 SHAPING = (
     "hierarchy",
     "loop",
@@ -283,6 +295,7 @@ _CHECKS: dict[str, Callable[[Any], Any]] = {
     "only": _patterns,
     "takes": _patterns,
     "allow_outside": _BOOL,
+    "max_memory": _size,
     "unit": _TEXT,
     "up_axis": _one_of("x", "y", "z"),
     "loop": _BOOL,

@@ -16,6 +16,7 @@ from rich.text import Text
 
 if TYPE_CHECKING:
     from athcodec.batch.inputs import Item
+from athcodec.shown import shown
 
 ROWS = 20  # of the live table
 ENDED = ("done", "failed", "kept")
@@ -57,7 +58,7 @@ class Lines(Show):
         self._print(f"[{self.count}/{self.total}] {item.name}: kept")
 
     def _print(self, line: str) -> None:
-        print(line, file=sys.stderr, flush=True)
+        print(shown(line), file=sys.stderr, flush=True)
 
 
 class LiveTable(Show):
@@ -112,7 +113,7 @@ class LiveTable(Show):
         table.add_column("state", no_wrap=True, min_width=8)
         table.add_column("", no_wrap=True, ratio=3)
         for output, (state, figures) in rows[:ROWS]:
-            table.add_row(Text(self.names.get(output, output)), Text(state), Text(figures))
+            table.add_row(*(Text(shown(cell)) for cell in (self.names.get(output, output), state, figures)))
         return Group(Text(head), table if rows else Text("starting workers" if not ended else ""))
 
 

@@ -28,6 +28,7 @@ from athcodec.encoding import CodedSegment, Draft
 from athcodec.errors import AthError, ClipError, SourceWarning
 from athcodec.joining import in_wind
 from athcodec.segmentation import split_segments
+from athcodec.shown import redacted
 from athcodec.sources import listed
 
 BETWEEN_REPORTS = 0.3  # seconds
@@ -231,8 +232,8 @@ def _result(work: Callable[[], Result], item: Item, folder: str) -> Result:
 def one_line(error: BaseException) -> str:
     """The message of an error; one that is neither athcodec's nor the system's is named by its class too."""
     if isinstance(error, OSError) and error.filename is not None:
-        return f"{error.filename}: {error.strerror}"
-    text = " ".join(str(error).split())
+        return redacted(f"{error.filename}: {error.strerror}")
+    text = " ".join(redacted(str(error)).split())
     return text if text and isinstance(error, (AthError, OSError)) else f"{type(error).__name__}: {text}"
 
 

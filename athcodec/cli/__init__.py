@@ -10,16 +10,19 @@ progress only where that is a terminal. Exit codes: 0 done, 1 an error or a fail
 
 from __future__ import annotations
 
+import logging
 import os
 import signal
 import sys
 import threading
 import traceback
+import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from importlib import import_module
 
 from athcodec.cli.arguments import make_parser
+from athcodec.shown import shown
 
 INTERRUPTED, BROKEN_PIPE, TERMINATED = 130, 141, 143
 """Exit codes: 128 and the number of the signal, as shells have it."""
@@ -34,7 +37,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     if hasattr(sys.stdout, "reconfigure"):
         sys.stdout.reconfigure(errors="backslashreplace")  # a file name need not be valid text
     try:
-        with _termination_unwinds():
+        with _termination_unwinds(), _messages_escaped():
             code = getattr(import_module("athcodec.cli.verbs"), args.verb)(args)
             sys.stdout.flush()
         return code
@@ -46,11 +49,32 @@ def main(argv: Sequence[str] | None = None) -> int:
         return BROKEN_PIPE
     except Exception as error:
         if args.debug:
-            traceback.print_exc()
+            print(shown(traceback.format_exc()), file=sys.stderr)
         from athcodec.cli.printing import one_line, say
 
         say("error", one_line(error))
         return 1
+
+
+@contextmanager
+def _messages_escaped() -> Iterator[None]:
+    """Warnings, and what libraries log, reach the terminal as all else does."""
+
+    def warned(message: Warning | str, *_: object) -> None:
+        print(f"athcodec: warning: {shown(str(message))}".replace("\n", " "), file=sys.stderr)
+
+    before, logged = warnings.showwarning, logging.lastResort
+    warnings.showwarning, logging.lastResort = warned, _Escaping(sys.stderr)
+    logging.lastResort.setLevel(logging.WARNING)
+    try:
+        yield
+    finally:
+        warnings.showwarning, logging.lastResort = before, logged
+
+
+class _Escaping(logging.StreamHandler):
+    def format(self, record: logging.LogRecord) -> str:
+        return shown(super().format(record))
 
 
 @contextmanager

@@ -23,6 +23,7 @@ from athcodec.options import (
     SAMPLES,
     ladder_of,
 )
+from athcodec.shown import shown
 from athcodec.units import METRES, Length, parse_length, parse_size
 
 DEMO_PAGE = "athcodec_demo.html"
@@ -30,14 +31,24 @@ DEMO_FLOOR = {"fern": 4.0, "grass": 9.0}
 """Samples on the floor of the demo's forest, and how many of each around a tree."""
 
 TRACEBACK = "show the traceback of an error"
-WRITTEN = "file to write; replaced when the new one is complete"
-READ = 'a file or a URL, http://, https:// or another that fsspec knows (pip install "athcodec[remote]")'
+WRITTEN = "file to write; replaced when the new one is complete; - is standard output, with encode and decode"
+READ = (
+    "a file, - for standard input (decode and info), or a URL, http://, https:// or another that fsspec knows "
+    '(pip install "athcodec[remote]")'
+)
+
+
+class _Parser(argparse.ArgumentParser):
+    """Whose messages are shown as all others are: they quote arguments, such as names of files."""
+
+    def _print_message(self, message: str, file: Any = None) -> None:
+        super()._print_message(shown(message), file)
 
 
 def make_parser() -> argparse.ArgumentParser:
-    shared = argparse.ArgumentParser(add_help=False)
+    shared = _Parser(add_help=False)
     shared.add_argument("--debug", action="store_true", default=argparse.SUPPRESS, help=TRACEBACK)
-    parser = argparse.ArgumentParser(
+    parser = _Parser(
         prog="athcodec",
         description="A codec for plant motion: levels of detail over its branches, within an error bound.",
         epilog="athcodec VERB --help explains a verb. Exit codes: 0 done, 1 error or failed check, 2 usage.",
@@ -123,7 +134,7 @@ def _encode_arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument(
         "input",
         metavar="IN",
-        help="a clip in one of the formats that `athcodec formats` lists; several "
+        help="a clip in one of the formats that `athcodec formats` lists, - for standard input; several "
         "of one plant share their hierarchy and rest pose in the file",
     )
     verb.add_argument("paths", metavar="OUT.ath", nargs="+", help=WRITTEN)
@@ -387,6 +398,12 @@ def _source_arguments(verb: argparse.ArgumentParser) -> None:
         "--allow-outside",
         action="store_true",
         help="let XDMF, PVD, HDF5 and USD files name files outside of their own folder",
+    )
+    source.add_argument(
+        "--max-memory",
+        metavar="SIZE",
+        type=_argument(parse_size),
+        help="bytes of memory that reading a source may take, such as 500MB or 16GiB (default 4GiB)",
     )
     source.add_argument("--unit", metavar="UNIT", help="unit of length to convert to, or that of a source without one")
     source.add_argument("--up-axis", choices=("x", "y", "z"), help="axis to turn up, or that of a source without one")

@@ -22,8 +22,9 @@ from athcodec.decoder import Decoder
 from athcodec.errors import AthError, ClipError, LevelUnavailable, NeedsHostMesh, RemoteError, SourceWarning
 from athcodec.joining import BLEND, in_wind
 from athcodec.metrics import ErrorMeter, MotionMeter, SmoothnessMeter, compare_clips, level_meters
-from athcodec.options import HOST
+from athcodec.options import HOST, MAX_MEMORY
 from athcodec.sources import ReadOptions, find_format, listed
+from athcodec.sources.opening import naming_file
 from athcodec.units import Length
 
 if TYPE_CHECKING:
@@ -160,7 +161,9 @@ def _source_of(decoder: Decoder, args: argparse.Namespace, path: str) -> MotionC
 
 
 def _gltf_options(args: argparse.Namespace) -> ReadOptions:
-    return ReadOptions(fps=args.fps, only=args.only or (), takes=args.takes or ())
+    return ReadOptions(
+        fps=args.fps, only=args.only or (), takes=args.takes or (), max_memory=args.max_memory or MAX_MEMORY
+    )
 
 
 def read_clip(args: argparse.Namespace, path: str) -> MotionClip:
@@ -178,6 +181,7 @@ def read_clip(args: argparse.Namespace, path: str) -> MotionClip:
             only=args.only or (),
             takes=args.takes or (),
             allow_outside=args.allow_outside,
+            max_memory=args.max_memory or MAX_MEMORY,
             unit=args.unit,
             up_axis=args.up_axis,
         )
@@ -211,7 +215,8 @@ def open_file(path: str | Path, stats: bool = False, **options: Any) -> Iterator
 def naming(path: str | Path) -> Iterator[None]:
     """Let the errors of the block say which file they are about."""
     try:
-        yield
+        with naming_file(path):
+            yield
     except AthError as error:
         if str(error).startswith(f"{path}: ") or isinstance(error, RemoteError):
             raise

@@ -6,7 +6,6 @@ import argparse
 import json
 import math
 import os
-import re
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -23,6 +22,7 @@ from athcodec.decoder import Decoder
 from athcodec.errors import AthError
 from athcodec.metrics import ErrorMeter
 from athcodec.options import DEFAULT_REL_ERROR
+from athcodec.shown import redacted, shown
 
 if TYPE_CHECKING:
     from athcodec.ath_file import Level
@@ -36,7 +36,6 @@ JUMP = 3
 LEVEL_COLUMNS = ["level", "", "nodes", "bytes", "share"]
 MEASURES = ["promised_max_error", "max_error", "rms_error", "kg_error_percent", "motion_normalised_error"]
 LEFT_OUT = {"left_out_edges": "an edge", "left_out_faces": "a face"}
-_UNSAFE = re.compile("[\\x00-\\x09\\x0b-\\x1f\\x7f-\\x9f\\u061c\\u200e\\u200f\\u2028-\\u202e\\u2066-\\u2069]")
 _TABLE_WIDTH = 250  # wider than any table here: a narrow terminal wraps its lines, nothing is left out
 
 Report = Callable[[str, float], None]
@@ -72,11 +71,6 @@ LOOKS = {
     },
 }
 """What is shown of a level beside its errors, by the names of MotionMeter.figures."""
-
-
-def shown(text: str) -> str:
-    """`text` as a terminal may have it: what files and servers say can neither move its cursor nor turn its lines."""
-    return _UNSAFE.sub(lambda found: ascii(found[0])[1:-1], text)
 
 
 def echo(text: str, *, file: TextIO | None = None, flush: bool = False) -> None:
@@ -260,11 +254,11 @@ def _print_looks(levels: Sequence[dict[str, Any]]) -> None:
         "shape": " and ".join(f"{shape[name]:,} {name}" for name in ("edges", "faces") if shape[name]),
     }
     for part, columns in LOOKS.items():
-        shown = [name for name in columns if any(level[part][name] is not None for level in levels)]
-        rows = [[f"{level['level']}", *(columns[name].cell(level[part][name]) for name in shown)] for level in levels]
-        if shown:
+        named = [name for name in columns if any(level[part][name] is not None for level in levels)]
+        rows = [[f"{level['level']}", *(columns[name].cell(level[part][name]) for name in named)] for level in levels]
+        if named:
             echo(f"{part.capitalize()}: {captions[part]}")
-            print_table(["level", *(columns[name].head for name in shown)], rows)
+            print_table(["level", *(columns[name].head for name in named)], rows)
     left_out = [f"{one} {shape[name]:,} times" for name, one in LEFT_OUT.items() if shape[name]]
     if left_out:
         echo(f"Left out where the source has no extent: {', '.join(left_out)}.")
@@ -339,11 +333,13 @@ def print_json(facts: dict[str, Any]) -> None:
 
 
 def _finite(value: Any) -> Any:
-    """`value` for JSON, which knows neither infinity nor NaN: they become null."""
+    """`value` for JSON, which knows neither infinity nor NaN: they become null; URLs as people are shown them."""
     if isinstance(value, dict):
         return {key: _finite(item) for key, item in value.items()}
     if isinstance(value, list):
         return [_finite(item) for item in value]
+    if isinstance(value, str):
+        return redacted(value)
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 

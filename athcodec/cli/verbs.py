@@ -53,9 +53,10 @@ from athcodec.cli.printing import (
     say,
     say_seam,
 )
+from athcodec.cli.streams import STREAM, standard_streams
 from athcodec.clip import MotionClip
 from athcodec.clip_view import ClipView
-from athcodec.errors import AthError
+from athcodec.errors import AthError, ClipError
 from athcodec.hierarchy import branch_orders
 from athcodec.options import DEFAULT_LADDER, DEFAULT_REL_ERROR, HOST, ladder_of
 
@@ -66,15 +67,20 @@ if TYPE_CHECKING:
 def encode(args: argparse.Namespace) -> int:
     paths = [args.input, *(args.paths or ())]
     output = args.into or args.output or paths.pop()
-    for path in paths:
-        check_output(output, path)
-    if args.into:
-        _encode_into(paths, args)
-    else:
-        with clip_to_encode(paths, args) as clip:
-            _encode(clip, paths[0], output, args, attributes=args.attributes, host_rest=args.rest == HOST)
-    with open_file(output, strict=True, gltf_motion=_last_motion(output) if args.into else None) as decoder:
-        print_files([facts_of(output, decoder)], args.json)
+    with standard_streams() as streams:
+        paths = [streams.source(path, args.source_format) for path in paths]
+        if not args.into:
+            output = streams.target(output, None)
+        for path in paths:
+            check_output(output, path)
+        if args.into:
+            _encode_into(paths, args)
+        else:
+            with clip_to_encode(paths, args) as clip:
+                _encode(clip, paths[0], output, args, attributes=args.attributes, host_rest=args.rest == HOST)
+        with open_file(output, strict=True, gltf_motion=_last_motion(output) if args.into else None) as decoder:
+            if not streams.writes:
+                print_files([facts_of(output, decoder)], args.json)
     return 0
 
 
@@ -207,6 +213,14 @@ def hierarchy(args: argparse.Namespace) -> int:
 
 
 def decode(args: argparse.Namespace) -> int:
+    with standard_streams() as streams:
+        if args.output == STREAM and args.format is None:
+            raise ClipError(f"{STREAM}: got no suffix that says the format to write, expected --format")
+        args.input, args.output = streams.ath(args.input), streams.target(args.output, args.format)
+        return _decode(args, quiet=streams.writes)
+
+
+def _decode(args: argparse.Namespace, quiet: bool) -> int:
     check_output(args.output, args.input)
     how = {"clip": args.clip, "allow_partial": args.allow_partial, "host_mesh": args.host_mesh}
     with ExitStack() as opened:
@@ -217,7 +231,8 @@ def decode(args: argparse.Namespace) -> int:
         for decoder, motion in zip(decoders, motions):
             if decoder.missing:
                 say("warning", f"{args.input}: decoded to level {motion.level}; {what_is_missing(decoder)}")
-            print_written(written, motion, decoder.levels[motion.level])
+            if not quiet:
+                print_written(written, motion, decoder.levels[motion.level])
     return 0
 
 
@@ -245,11 +260,17 @@ def _write_decoded(motions: list[ClipView], args: argparse.Namespace) -> Written
 
 
 def info(args: argparse.Namespace) -> int:
+    with standard_streams() as streams:
+        called, args.file = args.file, streams.ath(args.file)
+        return _info(args, called)
+
+
+def _info(args: argparse.Namespace, called: str) -> int:
     found = []
     for name in motions_of(args.file, args):
         with open_file(args.file, args.stats, host_mesh=args.host_mesh, gltf_motion=name) as decoder:
             ratios = tick_ratios(decoder) if args.motion else None
-            found.append(facts_of(_called(args.file, name), decoder, ratios))
+            found.append(facts_of(_called(called, name), decoder, ratios))
     print_files(found, args.json)
     return 0
 
@@ -391,7 +412,7 @@ def _export_gallery(args: argparse.Namespace) -> int:
 def _say_where(address: str, no_browser: bool) -> None:
     from athcodec import view
 
-    echo(f"{address} (Ctrl-C ends it)", flush=True)
+    print(f"{address} (Ctrl-C ends it)", flush=True)  # our own, with the key that the page asks for
     if not no_browser:
         view.open_browser(address)
 

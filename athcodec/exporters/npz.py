@@ -7,6 +7,7 @@ it as they are, so that they can be read in any order. The same clip gives the s
 from __future__ import annotations
 
 import json
+import re
 import zipfile
 from collections.abc import Callable
 from os import PathLike
@@ -24,7 +25,8 @@ from athcodec.sources.npz import METADATA
 
 
 def write_clip(motion: Any, path: str | PathLike[str], options: WriteOptions, report: Callable[[float], None]) -> None:
-    """Write the archive. Raises ClipError where an attribute's name is taken, OSError where nothing can be written."""
+    """Write the archive. Raises ClipError for an attribute's name that is taken or leads elsewhere, OSError where
+    nothing can be written."""
     arrays = _arrays(motion)
     packing = zipfile.ZIP_DEFLATED if options.gzip else zipfile.ZIP_STORED
     with new_file(path) as file, zipfile.ZipFile(file, "w") as archive:
@@ -55,6 +57,9 @@ def _arrays(motion: Any) -> dict[str, np.ndarray]:
     taken = (RESERVED_NAMES | {METADATA}).intersection(motion.attributes)
     if taken:
         raise ClipError(f"attributes: got the name {min(taken)!r}, expected one that the schema does not use")
+    for name in motion.attributes:
+        if name.startswith(("/", "\\")) or ":" in name or not {"", ".", ".."}.isdisjoint(re.split(r"[/\\]", name)):
+            raise ClipError(f"attributes: got the name {name[:80]!r}, expected one that leads to no other folder")
     arrays = {"time": motion.time, "rest": getattr(motion, "source_rest", motion.rest)}
     if motion.branch_parent is not None:
         arrays["branch_order"] = branch_orders(motion.branch_parent)

@@ -23,6 +23,7 @@ from athcodec.exporters import WriteOptions
 from athcodec.exporters.mesh import ObjWriter, has_mesh
 from athcodec.exporters.timing import frame_numbers
 from athcodec.sources.mesh import Mesh, read_mesh
+from athcodec.sources.opening import Budget
 from athcodec.sources.pc2 import HEADER, MAGIC
 
 STEP_TOLERANCE = 1e-4
@@ -91,7 +92,7 @@ def _mesh_to_write(motion: Any, target: Path) -> str:
     mine = Mesh(np.empty((motion.vertex_count, 0)), motion.faces, motion.edges, motion.attributes)
     different = "got no OBJ mesh"
     with suppress(ClipError):
-        different = mine.same_topology(read_mesh(mesh_path))
+        different = mine.same_topology(read_mesh(mesh_path, Budget()))
     if different:
         raise ClipError(
             f"{fspath(mesh_path)}: {different} as in the clip; remove this file or choose another name: "

@@ -23,8 +23,9 @@ import numpy as np
 from athcodec.clip import MotionClip
 from athcodec.errors import ClipError, MissingExtra, SourceWarning
 from athcodec.frames import Frames
-from athcodec.options import SAMPLES
-from athcodec.sources.opening import closing_on_failure
+from athcodec.options import MAX_MEMORY, SAMPLES
+from athcodec.plain_files import open_plain
+from athcodec.sources.opening import closing_on_failure, naming_file
 from athcodec.units import METRES, unit_symbol
 
 HEAD_BYTES = 4096
@@ -75,6 +76,9 @@ class ReadOptions:
         The vertex, or one per connected component, at which branches that are derived from edges begin.
     allow_outside : bool, optional
         Whether a source may name files outside of its own folder: XDMF, PVD, HDF5 and USD; by default that is refused.
+    max_memory : int, optional
+        Bytes of memory that reading the source may take, 4 GiB by default: what of it is held, and what one frame or
+        one file of it takes besides.
 
     Raises
     ------
@@ -91,12 +95,15 @@ class ReadOptions:
     skip: Collection[str] = ()
     root: int | Sequence[int] | None = None
     allow_outside: bool = False
+    max_memory: int = MAX_MEMORY
 
     def __post_init__(self) -> None:
         if self.rest not in ("auto", "first", "mean"):
             raise ValueError(f'rest: got {self.rest!r}, expected "auto", "first" or "mean"')
         if self.fps is not None and not 0 < self.fps < float("inf"):
             raise ValueError(f"fps: got {self.fps!r}, expected a positive number")
+        if self.max_memory < 1:
+            raise ValueError(f"max_memory: got {self.max_memory!r}, expected a positive number of bytes")
 
 
 @dataclass(frozen=True)
@@ -219,7 +226,8 @@ def read(
     up_axis : {"x", "y", "z"}, optional
         Likewise: a clip with another up axis is turned.
     **options
-        Parameters of `athcodec.sources.ReadOptions`: rest, fps, mesh, field, only, takes, skip, root.
+        Parameters of `athcodec.sources.ReadOptions`: rest, fps, mesh, field, only, takes, skip, root, allow_outside,
+        max_memory.
 
     Returns
     -------
@@ -241,9 +249,10 @@ def read(
         For options that do not exist.
     """
     wanted = ReadOptions(**options)
-    kind = find_format(path) if format is None else format_named(format, FORMATS)
-    kind.check()
-    clip: MotionClip = importlib.import_module(kind.module).read_clip(path, wanted)
+    with naming_file(path):
+        kind = find_format(path) if format is None else format_named(format, FORMATS)
+        kind.check()
+        clip: MotionClip = importlib.import_module(kind.module).read_clip(path, wanted)
     lost = {kind: names for kind, names in clip.not_read.items() if kind not in NO_SHAPES}
     if lost:
         warnings.warn(f"{os.fspath(path)}: not read: {listed(lost)}", SourceWarning, stacklevel=2)
@@ -287,7 +296,7 @@ def find_format(path: str | PathLike[str]) -> Format:
     if is_pattern(path):
         head = b"#"
     else:
-        with open(path, "rb") as file:
+        with open_plain(path) as file:
             head = file.read(HEAD_BYTES)
     if not head:
         raise ClipError(f"{os.fspath(path)}: got an empty file, expected a clip")

@@ -1,21 +1,22 @@
-"""The process that reads an Alembic archive for sources/alembic.py, which see; nothing else imports it.
+"""Reads Alembic: meshes, subdivision surfaces, curves and points whose points or transforms move, in world space.
 
-It takes a path and ReadOptions as one line of JSON, answers with the clip but for its motion, and then with the frames
-that it is asked for, until there is nothing more to read. Each answer is a line of JSON, {"size": bytes} and these
-bytes or {"error": message}. Where this process crashes, as a damaged archive may make it, the answers end.
+Frames are the times at which anything that is read has a sample; options.fps sets another rate. Between samples points
+and transforms go on straight lines. Alembic lists the corners of a face clockwise: they come counter-clockwise, as
+everywhere else here. An Alembic file names no unit and no axis; Y is up by custom, which is said of Blender's files
+alone. The names of face sets become those of materials: attribute "face_material", metadata "material_names". What has
+instances, and a shape that stays as it is, becomes one object, of as many copies. Objects that are hidden throughout,
+NURBS patches, materials and others are named in the clip's `not_read`; velocities are not read. It is imported by the
+process of reader_main.py alone.
 """
 
 from __future__ import annotations
 
-import io
 import json
 import math
-import sys
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
-from typing import Any, BinaryIO
+from typing import Any
 
 import numpy as np
 from alembic3d import Abc, AbcGeom
@@ -23,6 +24,7 @@ from alembic3d import Abc, AbcGeom
 from athcodec.clip import MotionClip
 from athcodec.errors import ClipError
 from athcodec.sources import ReadOptions
+from athcodec.sources.opening import FileWatch
 from athcodec.sources.scene_objects import (
     DESCRIPTOR,
     OWN,
@@ -59,52 +61,20 @@ PARAMS = tuple(
     ).split()
 )
 # what the bindings raise: Alembic's exceptions, Boost's for types that do not match, and those of a broken archive
-BROKEN = (RuntimeError, ValueError, TypeError, IndexError, OverflowError, MemoryError, UnicodeError)
+BROKEN = (RuntimeError, ValueError, TypeError, IndexError, OverflowError, UnicodeError)
 
 
-def main() -> None:
-    asked, answers = sys.stdin.buffer, sys.stdout.buffer
-    wanted = json.loads(asked.readline())
-    path = wanted.pop("path")
-    with _answering(answers):
-        archive = Abc.IArchive(path)
-        clip = _clip(archive, ReadOptions(**wanted))
-        _send(answers, _described(clip))
-    for line in asked:
-        start, stop = map(int, line.split())
-        with _answering(answers):
-            _send(answers, np.ascontiguousarray(clip.positions[start:stop]).tobytes())
-
-
-@contextmanager
-def _answering(answers: BinaryIO) -> Iterator[None]:
+def open_clip(path: str, options: ReadOptions) -> MotionClip:
+    """The clip in an archive. Raises ClipError."""
+    unchanged = FileWatch(path)
     try:
-        yield
-    except (*BROKEN, ClipError) as error:
-        prefix = "" if isinstance(error, ClipError) else "archive: "
-        text = " ".join(str(error).split()) or type(error).__name__
-        answers.write(json.dumps({"error": prefix + text}).encode() + b"\n")
-        answers.flush()
-
-
-def _send(answers: BinaryIO, data: bytes) -> None:
-    answers.write(json.dumps({"size": len(data)}).encode() + b"\n" + data)
-    answers.flush()
-
-
-def _described(clip: MotionClip) -> bytes:
-    """All but the positions, as an .npz."""
-    arrays = {f"attributes/{name}": values for name, values in clip.attributes.items()}
-    for name in ("time", "vertex_branch", "branch_parent", "stem_index", "edges", "faces"):
-        if getattr(clip, name) is not None:
-            arrays[name] = getattr(clip, name)
-    arrays["rest"], arrays["rest_given"] = clip.source_rest, np.array(clip.rest_given)
-    arrays["metadata"], arrays["not_read"] = (
-        np.frombuffer(json.dumps(found).encode(), np.uint8) for found in (clip.metadata, clip.not_read)
-    )
-    out = io.BytesIO()
-    np.savez(out, **arrays)
-    return out.getvalue()
+        clip = _clip(Abc.IArchive(path), options)
+    except ClipError:
+        raise
+    except BROKEN as error:
+        raise ClipError(f"archive: {' '.join(str(error).split()) or type(error).__name__}") from None
+    clip.unchanged = unchanged
+    return clip
 
 
 class _Track:
@@ -523,7 +493,3 @@ def _product(xforms: list[_Xform], time: float) -> np.ndarray:
     for xform in xforms:
         matrix = matrix @ xform.at(time)
     return matrix
-
-
-if __name__ == "__main__":
-    main()

@@ -9,6 +9,7 @@ import zipfile
 from typing import BinaryIO
 
 from athcodec.errors import ClipError
+from athcodec.plain_files import open_plain
 
 MAGIC = b"PXR-USDC"
 LARGEST_EXPANSION = 1024  # integers per compressed byte: two bits each at least, and LZ4 makes at most 255 bytes of one
@@ -18,7 +19,7 @@ COMPRESSED = (0, 4, 0)  # the version since which the sections are compressed
 
 def check_crates(path: str) -> None:
     """ClipError where `path` is a crate, or a zip of crates, whose counts do not fit its size."""
-    with open(path, "rb") as file:
+    with open_plain(path) as file:
         head = file.read(8)
         if head == MAGIC:
             _check(file, 0, file.seek(0, 2))

@@ -36,6 +36,10 @@ from athcodec.sources.scene_objects import FACE_MATERIAL, MATERIAL_NAMES
 
 WORK_BYTES = 64 << 20
 MOST_VERTICES = 1 << 27
+INSTANCE_BYTES = 256  # what an instance takes
+CORNER_BYTES = 96  # what a corner of a face takes, of which strips make three
+INFLUENCE_BYTES = 100  # what a joint of a vertex takes
+VERTEX_BYTES = 160  # what a vertex takes in the poses that are held and made
 MOST_FRAMES = 1 << 20
 KINDS = ("points", "curves", "mesh")  # the last that a node has is what it is
 MODE_KINDS = ("points", "curves", "curves", "curves", "mesh", "mesh", "mesh")
@@ -59,7 +63,7 @@ def read_clip(path: str | PathLike[str], options: ReadOptions) -> MotionClip:
     needs a package, OSError where a file cannot be opened.
     """
     with naming(path):
-        file = GltfFile(path)
+        file = GltfFile(path, options.max_memory)
         if extension_of(file.json) is not None:
             file.close()
             raise ClipError(f"{EXTENSION}: got a motion of its own, expected one of glTF: decode the file first")
@@ -284,18 +288,19 @@ def _chosen(scene: Scene, patterns: Sequence[str]) -> list[GltfNode]:
             if patterns and seen
             else "meshes: got none in the scene, expected at least one"
         )
-    _number(nodes)
+    file.budget.take(VERTEX_BYTES * _number(nodes), "meshes")
     return nodes
 
 
-def _number(nodes: Sequence[GltfNode]) -> None:
-    """Gives each node its vertices."""
+def _number(nodes: Sequence[GltfNode]) -> int:
+    """Gives each node its vertices, and says how many there are."""
     first = 0
     for node in nodes:
         node.first = first
         first += node.count
     if first > MOST_VERTICES:
         raise ClipError(f"meshes: got {first} vertices, expected at most {MOST_VERTICES}")
+    return first
 
 
 def _animations(file: GltfFile, patterns: Sequence[str], what: str) -> dict[str, int]:
@@ -375,6 +380,8 @@ def _copies(scene: Scene, index: int) -> tuple[np.ndarray | None, dict[str, np.n
     if scene.nodes[index].get("skin") is not None:
         raise ClipError(f"node {index}: got {INSTANCING} of a mesh with a skin, expected one without")
     own = entry(extension, "attributes")
+    for name in own:
+        scene.file.budget.take(INSTANCE_BYTES * scene.file.count(integer(own, name)), f"node {index}")
     parts = {name: scene.file.floats(integer(own, name)).astype(np.float64) for name in INSTANCE_PARTS if name in own}
     counts = {len(values) for values in parts.values()}
     widths = all(values.shape[1] == INSTANCE_PARTS[name] for name, values in parts.items())
@@ -455,6 +462,8 @@ def _refuse_draco(file: GltfFile, primitive: dict, positions: int) -> None:
 
 def _load(node: GltfNode, scene: Scene) -> None:
     file = scene.file
+    slots = sum(key.startswith("JOINTS_") for key in node.attributes) if node.skin is not None else 0
+    file.budget.take(INFLUENCE_BYTES * 4 * slots * node.count, f"mesh {node.name!r}")
     node.base = _triples(file, node.attributes["POSITION"], node.shape_count, "POSITION")
     for target in node.targets:
         if target is not None and file.count(target) != node.shape_count:
@@ -481,6 +490,7 @@ def _triples(file: GltfFile, index: int, count: int, what: str) -> np.ndarray:
 def _bind_matrices(file: GltfFile, skin: dict, joint_count: int) -> np.ndarray:
     if skin.get("inverseBindMatrices") is None:
         return np.broadcast_to(np.eye(4), (joint_count, 4, 4))
+    file.budget.take(256 * file.count(skin["inverseBindMatrices"]), "skins")
     values = file.floats(skin["inverseBindMatrices"]).astype(np.float64)
     if values.shape[1] != 16 or len(values) < joint_count:
         raise ClipError(f"skins: got inverse bind matrices of shape {values.shape}, expected ({joint_count}, 16)")
@@ -650,6 +660,7 @@ def _sampling(motion: _Motion, wanted: float | None) -> Sampling:
     count = float(keys[-1] - keys[0]) * fps
     if not count < MOST_FRAMES:
         raise ClipError(f"animations: got {count:.0f} frames, expected at most {MOST_FRAMES}; sample at a lower rate")
+    scene.file.budget.take(32 * int(count), "animations")
     is_loop = said.get("loop") is True
     frames = int(count + 0.02) + 1
     if is_loop and frames > 1 and _returns(motion, keys):
@@ -746,6 +757,8 @@ def _connections(
             mode = integer(primitive, "mode", 4)
             if mode == 0:
                 continue
+            count = node.shape_count if primitive.get("indices") is None else file.count(primitive["indices"])
+            file.budget.take(CORNER_BYTES * count * (node.count // max(node.shape_count, 1)), f"mesh {node.name!r}")
             rows = _rows(_corners(file, primitive, node.shape_count, f"mesh {node.name!r}"), mode)
             own[rows.shape[1]].append(rows)
             if rows.shape[1] == 3:
@@ -856,6 +869,7 @@ def _attribute(file: GltfFile, nodes: list[GltfNode], key: str, name: str, motio
                 values = (turned / np.where(length > 0, length, 1)).astype(np.float32)
             pieces[number] = values if node.copies is None else np.tile(values, (len(node.copies), 1))
     dtype, width = np.result_type(*pieces.values()), max(piece.shape[1] for piece in pieces.values())
+    file.budget.take(2 * motion.count * width * dtype.itemsize, name)
     filler = FILLERS.get(name, np.nan if dtype.kind == "f" and key.startswith("_") else 0)
     out = np.full((motion.count, width), filler, dtype)
     for number, values in pieces.items():

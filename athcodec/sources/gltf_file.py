@@ -20,13 +20,16 @@ from urllib.parse import unquote
 import numpy as np
 
 from athcodec.errors import ClipError
+from athcodec.options import MAX_MEMORY
+from athcodec.plain_files import open_plain
 from athcodec.sources.gltf_json import brief, entries, entry, integer, looked_up
-from athcodec.sources.gltf_meshopt import unpack
-from athcodec.sources.opening import FileWatch, closing_on_failure
+from athcodec.sources.gltf_meshopt import unpack, unpacked_size
+from athcodec.sources.opening import Budget, FileWatch, closing_on_failure
 
 COMPONENTS = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 KEPT_VIEWS = 8  # that have been decompressed
+JSON_ENDS, JSON_BYTES = b",:[{", 96  # of text, and what is made of a part of it
 MESHOPT = ("EXT_meshopt_compression", "KHR_meshopt_compression")
 # Extensions that a reader of positions may ignore, or that are read here.
 HARMLESS = (
@@ -51,10 +54,11 @@ _JSON_CHUNK, _BIN_CHUNK = 0x4E4F534A, 0x004E4942
 
 
 class GltfFile:
-    """An opened file; close it. `json` is its structure, an object. Raises ClipError, OSError."""
+    """An opened file; close it. `json` is its structure, an object, `budget` what reading it may take. Raises
+    ClipError, OSError."""
 
-    def __init__(self, path: str | PathLike[str]):
-        self.path = fspath(path)
+    def __init__(self, path: str | PathLike[str], max_memory: int = MAX_MEMORY):
+        self.path, self.budget = fspath(path), Budget(max_memory)
         self._files: list[BinaryIO] = []
         self._buffers: dict[int, _Bytes] = {}
         self._unpacked_views: dict[int, bytes] = {}
@@ -63,13 +67,13 @@ class GltfFile:
             file = self._open(self.path)
             self.size = os.fstat(file.fileno()).st_size
             self._binary: _Bytes | None = None
-            self.json = _parsed(self._read_json(file))
+            text = self._read_json(file)
+            self.budget.need_for(text, JSON_ENDS, JSON_BYTES, "JSON")
+            self.json = _parsed(text)
             self._check_version()
 
     def _open(self, path: str) -> BinaryIO:
-        if not os.path.isfile(path) and os.path.exists(path):
-            raise ClipError(f"{path}: got a folder or a device, expected a file")
-        self._files.append(open(path, "rb"))
+        self._files.append(open_plain(path))
         self.unchanged.add(self._files[-1].fileno())
         return self._files[-1]
 
@@ -80,6 +84,7 @@ class GltfFile:
     # ---- structure ----
 
     def _read_json(self, file: BinaryIO) -> bytes:
+        self.budget.need(self.size, "file")
         head = file.read(_GLB_HEADER.size)
         if head[:4] != b"glTF":
             return head + file.read()
@@ -146,6 +151,7 @@ class GltfFile:
         if accessor.get("bufferView") is None:
             if count * width > max(self.size, 1 << 16):
                 raise ClipError(f"{where}: got {count} elements without bytes in a file of {self.size}")
+            self.budget.need(count * width * np.dtype(dtype).itemsize, where)
             values = np.zeros((count, width), dtype)
         else:
             values = self._strided(accessor, np.dtype(dtype), width, count, where)
@@ -218,6 +224,7 @@ class GltfFile:
         if index not in self._unpacked_views:
             packed = entry(entry(self.item("bufferViews", index), "extensions"), name)
             raw = self._slice(packed, integer(packed, "byteOffset", 0), integer(packed, "byteLength", low=1), name)
+            self.budget.need((KEPT_VIEWS + 4) * unpacked_size(packed), f"bufferView {index}")  # 4: while it is unpacked
             if len(self._unpacked_views) >= KEPT_VIEWS:
                 self._unpacked_views.pop(next(iter(self._unpacked_views)))
             self._unpacked_views[index] = unpack(raw, packed)

@@ -13,6 +13,11 @@ STRIDES = {"OCTAHEDRAL": (4, 8), "QUATERNION": (8,), "EXPONENTIAL": range(4, 257
 MOST_PER_BYTE = 2048  # bytes that the codec makes of one at most: more is refused before memory is allocated
 
 
+def unpacked_size(packed: Mapping) -> int:
+    """Bytes that the buffer view has. Raises ClipError."""
+    return integer(packed, "count", low=1) * integer(packed, "byteStride", low=1, stop=257)
+
+
 def unpack(raw: bytes, packed: Mapping) -> bytes:
     """The bytes of a buffer view whose extension object is `packed`. Raises ClipError, MissingExtra."""
     try:

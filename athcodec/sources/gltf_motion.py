@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from athcodec.errors import ClipError
+from athcodec.plain_files import open_plain
 from athcodec.sources.gltf_file import GltfFile
 from athcodec.sources.gltf_json import BROKEN, brief, entries, entry, integer
 from athcodec.sources.opening import closing_on_failure, naming
@@ -43,7 +44,7 @@ def motion_names(gltf: dict) -> list[str]:
 
 def motions_in(path: str | os.PathLike[str]) -> list[str]:
     """The names of the motions in a GLB; none of another file. Raises ClipError, OSError."""
-    with open(path, "rb") as file:
+    with open_plain(path) as file:
         if file.read(4) != MAGIC:
             return []
     with naming(path, *BROKEN), closing(GltfFile(path)) as gltf:

@@ -204,6 +204,7 @@ class Scene:
         times = self._times[key]
         if not np.isfinite(times).all() or (np.diff(times) < 0).any():
             raise ClipError(f"{where}: got key times that run backward or are not finite, expected ascending seconds")
+        self.file.budget.take(32 * self.file.count(integer(sampler, "output")), where)
         values = self.file.floats(integer(sampler, "output"))
         values_per_key = 3 if interpolation == "CUBICSPLINE" else 1
         width = len(TRS[path]) if path in TRS else values.size // (len(times) * values_per_key)

@@ -14,13 +14,16 @@
 Every other dataset, also one inside a group, is a named static array and survives unchanged (strings of
 variable length become UTF-8 of fixed length). Attributes of the file become metadata, but for clip_name and loop
 (true), which say the name of the clip and that it is a loop; attributes of datasets and groups are not read, links are
-not followed.
+not followed. Where a file could make the HDF5 library take more memory than options.max_memory, by filters that unpack
+to more than they should or by text that many elements share, it is read in a process of its own.
 """
 
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Collection
+from contextlib import suppress
 from os import PathLike, fspath
 from typing import Any
 
@@ -29,12 +32,22 @@ import numpy as np
 
 from athcodec.clip import RESERVED_NAMES, MotionClip
 from athcodec.errors import ClipError
+from athcodec.plain_files import open_plain
 from athcodec.sources import ReadOptions
-from athcodec.sources.opening import FileWatch, closing_on_failure, naming
+from athcodec.sources.opening import Budget, FileWatch, closing_on_failure, naming
+from athcodec.sources.reader_process import read_apart
 from athcodec.sources.schema import clip_of_arrays
 
 CHUNK_CACHE_BYTES = 64 << 20
-MAX_ATTRIBUTE_BYTES = 1 << 30
+GROWTH = {
+    h5py.h5z.FILTER_SHUFFLE: 1,
+    h5py.h5z.FILTER_FLETCHER32: 1,
+    h5py.h5z.FILTER_DEFLATE: 1032,
+    h5py.h5z.FILTER_LZF: 90,
+}
+"""How many bytes a filter makes of one at most; DEFLATE unpacks all that there is, whatever size a chunk has."""
+MOST_GROWTH = 1 << 20  # of a filter that is not known
+BROKEN = (OSError, RuntimeError, KeyError, ValueError, TypeError, OverflowError, UnicodeError, MemoryError)
 _OWN = "expected numbers in the file itself; --allow-outside (allow_outside=True) reads others"
 
 
@@ -47,13 +60,38 @@ def read_clip(path: str | PathLike[str], options: ReadOptions) -> MotionClip:
     Raises ClipError where the file is not HDF5 or its contents are no usable clip, OSError where it cannot be opened.
     """
     file = _open(path)
-    with naming(path), closing_on_failure(file):
-        return _read(file, options)
+    with naming(path, *BROKEN), closing_on_failure(_Reading(file)):
+        if not options.allow_outside:
+            for name in _names(file):
+                check_own(file, name, False)
+        if not may_explode(file, options.max_memory):
+            return _read(file, options)
+    _Reading(file).close()
+    return read_apart(path, options, "athcodec.sources.hdf5", "HDF5: it is damaged, or the HDF5 library")
+
+
+class _Reading:
+    """A file that has only been read: it does not matter whether it can be closed."""
+
+    def __init__(self, file: h5py.File):
+        self._file = file
+
+    def close(self) -> None:
+        with suppress(RuntimeError, OSError):
+            self._file.close()
+
+
+def open_clip(path: str, options: ReadOptions) -> MotionClip:
+    """The clip in a file, for the process of reader_main.py. Raises ClipError, OSError."""
+    file = _open(path)
+    with closing_on_failure(_Reading(file)):
+        clip = _read(file, options)
+    clip.unchanged = FileWatch(path)
+    return clip
 
 
 def _open(path: str | PathLike[str]) -> h5py.File:
-    with open(path, "rb"):
-        pass
+    open_plain(path).close()
     if not h5py.is_hdf5(path):
         raise ClipError(f"{fspath(path)}: got something else, expected an HDF5 file")
     try:
@@ -63,18 +101,25 @@ def _open(path: str | PathLike[str]) -> h5py.File:
 
 
 def _read(file: h5py.File, options: ReadOptions) -> MotionClip:
-    for name in () if options.allow_outside else _names(file):
-        check_own(file, name, False)
+    budget = Budget(options.max_memory)
     unchanged = FileWatch(file.id.get_vfd_handle())  # HDF5 itself reads zeros where a file has become shorter
     positions = _dataset(file, "positions")
     if positions is None:
         raise ClipError("positions: got no such dataset, expected (frames, vertices, 3)")
+    frame = positions.nbytes // max(positions.shape[0], 1) if positions.shape else 0
+    budget.need(4 * frame + chunk_bytes(positions), "positions: a frame")  # read, converted, checked, and the rest pose
     metadata = {name: _to_python(value) for name, value in file.attrs.items()}
     if isinstance(metadata.get("domains"), str):
         metadata["domains"] = _parsed("domains", metadata["domains"])
-    attributes = _static_arrays(file, options.skip)
+    attributes = _static_arrays(file, options.skip, budget)
     return clip_of_arrays(
-        positions, lambda name: _array(file, name), attributes, metadata, options, resource=file, unchanged=unchanged
+        positions,
+        lambda name: _array(file, name, budget),
+        attributes,
+        metadata,
+        options,
+        resource=_Reading(file),
+        unchanged=unchanged,
     )
 
 
@@ -120,32 +165,79 @@ def _dataset(file: h5py.File, name: str) -> h5py.Dataset | None:
     return dataset
 
 
-def _array(file: h5py.File, name: str) -> np.ndarray | None:
+def chunk_bytes(dataset: h5py.Dataset) -> int:
+    """What is unpacked at once of a dataset."""
+    return int(np.prod(dataset.chunks or (0,), dtype=object)) * dataset.dtype.itemsize
+
+
+def may_explode(file: h5py.File, limit: int) -> bool:
+    """Whether datasets or attributes of a file, or of a part of it, may take the HDF5 library more than `limit` bytes
+    whatever shape they have."""
+    size = os.fstat(file.id.get_vfd_handle()).st_size
+    texts = 0
+    for name in file.attrs:
+        attribute = file.attrs.get_id(name)
+        if attribute.dtype.hasobject:
+            texts += max(int(np.prod(attribute.shape, dtype=object)), 1) * size
+    if texts > max(limit, size):
+        return True
+    found: list[bool] = []
+    file.visititems(lambda _, item: found.append(isinstance(item, h5py.Dataset) and unpacks_to_more(item, limit)))
+    return any(found)
+
+
+def unpacks_to_more(dataset: h5py.Dataset, limit: int) -> bool:
+    """Whether a packed chunk, or one of its texts, may unpack to more than `limit` bytes, whatever it should be."""
+    if dataset.dtype.hasobject:
+        size = os.fstat(dataset.file.id.get_vfd_handle()).st_size
+        if max(int(np.prod(dataset.shape or (), dtype=object)), 1) * size > max(limit, size):
+            return True
+    packed = dataset.id.get_create_plist()
+    growth = 1
+    for number in range(packed.get_nfilters() if dataset.chunks else 0):
+        growth *= GROWTH.get(packed.get_filter(number)[0], MOST_GROWTH)
+    if growth == 1:
+        return False
+    largest = 0
+
+    def see(chunk: Any) -> None:
+        nonlocal largest
+        largest = max(largest, chunk.size)
+
+    dataset.id.chunk_iter(see)
+    return largest * growth > limit
+
+
+def _array(file: h5py.File, name: str, budget: Budget) -> np.ndarray | None:
     dataset = _dataset(file, name)
-    return None if dataset is None else _load(name, dataset)
+    return None if dataset is None else _load(name, dataset, budget)
 
 
-def _load(name: str, dataset: h5py.Dataset) -> np.ndarray:
-    if dataset.nbytes > MAX_ATTRIBUTE_BYTES:
-        raise ClipError(
-            f"{name}: got {dataset.nbytes} bytes, expected a static array of at most {MAX_ATTRIBUTE_BYTES}; or skip it"
-        )
+def _load(name: str, dataset: h5py.Dataset, budget: Budget) -> np.ndarray:
+    is_text = h5py.check_string_dtype(dataset.dtype) is not None
+    if dataset.dtype.hasobject and not is_text:
+        raise ClipError(f"{name}: got {str(dataset.dtype)[:80]}, expected numbers or text; or skip it")
+    budget.take(dataset.nbytes, name)
+    budget.need(chunk_bytes(dataset), name)
     try:
-        if h5py.check_string_dtype(dataset.dtype) and dataset.dtype.hasobject:
-            return np.asarray(dataset[...]).astype(np.bytes_)
-        return np.asarray(dataset[...])
+        values = np.asarray(dataset[...])
+        if not dataset.dtype.hasobject:
+            return values
+        longest = max(map(len, values.ravel()), default=0)
+        budget.take(longest * values.size, name)
+        return values.astype(np.bytes_)
     except (OSError, RuntimeError, UnicodeError, TypeError) as error:
         raise ClipError(f"{name}: the dataset cannot be read: {error}") from error
 
 
-def _static_arrays(file: h5py.File, skip: Collection[str]) -> dict[str, np.ndarray]:
+def _static_arrays(file: h5py.File, skip: Collection[str], budget: Budget) -> dict[str, np.ndarray]:
     arrays = {}
 
     def visit(name: str, item: Any) -> None:
         if isinstance(item, h5py.Dataset) and name not in RESERVED_NAMES and name not in skip:
             if item.shape is None:
                 raise ClipError(f"{name}: got an empty dataset, expected an array; or skip it")
-            arrays[name] = _load(name, item)
+            arrays[name] = _load(name, item, budget)
 
     file.visititems(visit)
     return arrays

@@ -20,9 +20,12 @@ import numpy as np
 
 from athcodec.clip import RESERVED_NAMES, polygons
 from athcodec.errors import ClipError
+from athcodec.sources.opening import Budget, read_plain
 from athcodec.sources.scene_objects import FACE_MATERIAL, OWN, scene_of_json, scene_said
 
 FLOAT32_DIGITS = 9
+WORD_ENDS, WORD_BYTES = b" \t\n\r\f\v/", 128  # what a word of text takes, and what is made of it
+MESSAGE = 300  # characters of what Python says of a number
 STATEMENT_BYTES = 16  # of a word of OBJ that is not known
 STRIPS = "tristrips"
 PLY_ELEMENTS = ("vertex", "face", "edge")
@@ -76,15 +79,15 @@ class Mesh:
         return ""
 
 
-def read_mesh(path: str | PathLike[str]) -> Mesh:
+def read_mesh(path: str | PathLike[str], budget: Budget) -> Mesh:
     """The mesh in an OBJ or PLY file. Raises ClipError, OSError."""
-    with open(path, "rb") as file:
-        return parse_mesh(file.read(), path)
+    return parse_mesh(read_plain(path, budget), path, budget)
 
 
-def parse_mesh(data: bytes, path: str | PathLike[str]) -> Mesh:
+def parse_mesh(data: bytes, path: str | PathLike[str], budget: Budget) -> Mesh:
     """The mesh in the bytes of a file, whose name is for messages. Raises ClipError."""
     try:
+        budget.need_for(data, WORD_ENDS, WORD_BYTES, "words")
         if data.startswith((b"ply\n", b"ply\r")):
             mesh = parse_ply(data)
         elif Path(path).suffix.lower() == ".ply":
@@ -92,7 +95,7 @@ def parse_mesh(data: bytes, path: str | PathLike[str]) -> Mesh:
         else:
             mesh = parse_obj(data)
     except (ClipError, ValueError, OverflowError, IndexError, MemoryError) as error:
-        raise ClipError(f"{os.fspath(path)}: {error}") from None
+        raise ClipError(f"{os.fspath(path)}: {str(error)[:MESSAGE]}") from None
     mesh.metadata.setdefault("part_names", [Path(path).stem])
     mesh.metadata.setdefault("part_kinds", [kind_of(mesh.polygons, mesh.edges)])
     mesh.attributes.setdefault("part_vertex_counts", np.array([len(mesh.points)], np.int32))

@@ -22,6 +22,7 @@ import numpy as np
 
 from athcodec.clip import MotionClip
 from athcodec.errors import ClipError
+from athcodec.plain_files import open_plain
 
 MAX_FILE_BYTES = 1 << 28
 MAX_ENTITIES = 1 << 22
@@ -65,7 +66,7 @@ def read_mtg(path: str | PathLike[str]) -> Mtg:
     """The plants in an MTG file. Raises ClipError that names the line, OSError where it cannot be opened."""
     if os.path.getsize(path) > MAX_FILE_BYTES:
         raise ClipError(f"{fspath(path)}: got {os.path.getsize(path)} bytes, expected at most {MAX_FILE_BYTES}")
-    with open(path, "rb") as file:
+    with open_plain(path) as file:
         text = file.read().decode("utf-8", "replace")
     try:
         return _parts(_Plants(text))

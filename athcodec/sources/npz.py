@@ -2,15 +2,15 @@
 
 Positions as numpy.savez writes them are read from the archive in blocks. Those of numpy.savez_compressed are unpacked
 as they are asked for: going forward once, going backward from the start again. Every other array is static and
-survives by its name, strings as UTF-8 of fixed length; at most 1 GiB each. Metadata are an array `metadata` with JSON
+survives by its name, strings as UTF-8 of fixed length. Metadata are an array `metadata` with JSON
 text, and the scalars fps, start_frame, unit and up_axis where there are such. Nothing is unpickled.
 """
 
 from __future__ import annotations
 
 import json
-import lzma
 import struct
+import tokenize
 import zipfile
 import zlib
 from collections.abc import Iterator
@@ -23,20 +23,21 @@ import numpy as np
 from athcodec.clip import RESERVED_NAMES, MotionClip, check_float_dtype
 from athcodec.errors import ClipError
 from athcodec.frames import Frames
+from athcodec.plain_files import open_plain
 from athcodec.sources import ReadOptions
-from athcodec.sources.opening import FileWatch, closing_on_failure, naming
+from athcodec.sources.opening import Budget, FileWatch, closing_on_failure, naming
 from athcodec.sources.raw import raw_frames, read_exactly
 from athcodec.sources.schema import clip_of_arrays
 
-MAX_ARRAY_BYTES = 1 << 30
 SCALARS = ("fps", "start_frame", "unit", "up_axis")
 METADATA = "metadata"
 SKIP_BYTES = 1 << 20
+PACKINGS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 _LOCAL_HEADER = struct.Struct("<4s22xHH")
 _BROKEN = (
     zipfile.BadZipFile,
+    OSError,
     zlib.error,
-    lzma.LZMAError,
     EOFError,
     ValueError,
     KeyError,
@@ -47,13 +48,14 @@ _BROKEN = (
     OverflowError,
     TypeError,
     SyntaxError,
+    tokenize.TokenError,  # NumPy's, of headers in old styles
 )
 
 
 def read_clip(path: str | PathLike[str], options: ReadOptions) -> MotionClip:
     """Open the clip in the archive `path`. Raises ClipError where it is no archive or its arrays are no usable clip,
     OSError where it cannot be opened."""
-    file = open(path, "rb", buffering=0)
+    file = open_plain(path)
     with naming(path, *_BROKEN), closing_on_failure(file):
         return _read(file, options)
 
@@ -71,16 +73,16 @@ def _naming_array(name: str) -> Iterator[None]:
 
 
 def _read(file: BinaryIO, options: ReadOptions) -> MotionClip:
-    archive = zipfile.ZipFile(file)
+    archive, budget = zipfile.ZipFile(file), Budget(options.max_memory)
     members = {
         info.filename.removesuffix(".npy"): info for info in archive.infolist() if info.filename.endswith(".npy")
     }
     if "positions" not in members:
         raise ClipError("positions: got no such array, expected (frames, vertices, 3)")
     with _naming_array("positions"):
-        positions = _Positions(file, archive, members.pop("positions")).frames()
+        positions = _Positions(file, archive, members.pop("positions"), budget).frames()
     arrays = {
-        name: _array(archive, name, info)
+        name: _array(archive, name, info, budget)
         for name, info in members.items()
         if name in RESERVED_NAMES or name not in options.skip
     }
@@ -91,16 +93,21 @@ def _read(file: BinaryIO, options: ReadOptions) -> MotionClip:
     )
 
 
-def _array(archive: zipfile.ZipFile, name: str, info: zipfile.ZipInfo) -> np.ndarray:
-    if info.file_size > MAX_ARRAY_BYTES:
-        raise ClipError(
-            f"{name}: got {info.file_size} bytes, expected a static array of at most {MAX_ARRAY_BYTES}; or skip it"
-        )
+def _array(archive: zipfile.ZipFile, name: str, info: zipfile.ZipInfo, budget: Budget) -> np.ndarray:
+    _check_packing(name, info)
+    budget.take(2 * info.file_size, name)  # once as it is, and once as the clip has it
     with _naming_array(name), archive.open(info) as member:
         values = np.lib.format.read_array(member, allow_pickle=False)
         if member.read(1):
             raise ClipError(f"{name}: got more bytes than its shape {values.shape} has")
     return np.char.encode(values, "utf-8") if values.dtype.kind == "U" and values.ndim else values
+
+
+def _check_packing(name: str, info: zipfile.ZipInfo) -> None:
+    if info.compress_type not in PACKINGS:
+        raise ClipError(
+            f"{name}: got an array that is packed otherwise than NumPy does, expected plain or deflated bytes"
+        )
 
 
 def _metadata(arrays: dict[str, np.ndarray]) -> dict[str, Any]:
@@ -127,7 +134,8 @@ def _text(value: Any) -> Any:
 class _Positions:
     """The member with the positions: where it lies, or how it is unpacked."""
 
-    def __init__(self, file: BinaryIO, archive: zipfile.ZipFile, info: zipfile.ZipInfo):
+    def __init__(self, file: BinaryIO, archive: zipfile.ZipFile, info: zipfile.ZipInfo, budget: Budget):
+        _check_packing("positions", info)
         self._file, self._archive, self._info = file, archive, info
         with archive.open(info) as member:
             shape, self._fortran, self.dtype = _header(member)
@@ -137,6 +145,7 @@ class _Positions:
         check_float_dtype("positions", self.dtype)
         self.shape = tuple(int(size) for size in shape)
         size = self.shape[0] * self.shape[1] * 3 * self.dtype.itemsize
+        budget.need(4 * size // self.shape[0], "positions: a frame")  # read, converted, checked, and the rest pose
         if self._header_bytes + size != info.file_size:
             raise ClipError(f"positions: got {info.file_size - self._header_bytes} bytes, expected {size} for {shape}")
         self._member: Any = None

@@ -1,5 +1,5 @@
-"""What readers do with the files that they open: watch them for changes, close them where reading fails, and say in
-errors which file it was. It knows no file format.
+"""What readers do with the files that they open: take plain files alone, watch them for changes, close them where
+reading fails, say in errors which file it was, and count the memory that it takes. It knows no file format.
 """
 
 from __future__ import annotations
@@ -12,12 +12,50 @@ from pathlib import Path
 from typing import Protocol
 
 from athcodec.errors import ClipError
+from athcodec.options import MAX_MEMORY
+from athcodec.plain_files import open_plain
 
 File = str | PathLike[str] | int
 
 
 class Closable(Protocol):
     def close(self) -> None: ...
+
+
+def read_plain(path: str | PathLike[str], budget: Budget) -> bytes:
+    """All bytes of a plain file. Raises ClipError, OSError."""
+    with open_plain(path) as file:
+        budget.need(os.fstat(file.fileno()).st_size, fspath(path))
+        return file.read()
+
+
+class Budget:
+    """The memory that reading a source may take, bytes, of which arrays that stay take their part.
+
+    What is counted are the arrays and texts of the file, as they are unpacked, not what libraries need besides.
+    """
+
+    def __init__(self, limit: int = MAX_MEMORY):
+        self.limit, self.left = limit, limit
+
+    def need(self, size: int, what: str) -> None:
+        """Raises ClipError where there is no room for so many bytes, which do not stay."""
+        if size > self.left:
+            raise ClipError(f"{what}: got {size:,} bytes to read, but {no_room(self.limit)}")
+
+    def need_for(self, text: bytes, marks: bytes, each: int, what: str) -> None:
+        """Room for the objects, each of so many bytes, that are made of a text: one before each of these marks."""
+        self.need(len(text) + each * (1 + len(text) - len(text.translate(None, marks))), what)
+
+    def take(self, size: int, what: str) -> None:
+        """The same for bytes that stay."""
+        self.need(size, what)
+        self.left -= size
+
+
+def no_room(limit: int) -> str:
+    """What messages say of memory that is not to be had."""
+    return f"expected at most {limit:,} bytes of memory for the whole source; --max-memory (max_memory=) allows more"
 
 
 class FileWatch:
@@ -27,17 +65,24 @@ class FileWatch:
     """
 
     def __init__(self, *files: File):
-        self._stamps: dict[File, tuple[int, int]] = {}
+        self.stamps: dict[File, tuple[int, int]] = {}
         for file in files:
             self.add(file)
 
+    @classmethod
+    def of(cls, stamps: dict[File, tuple[int, int]]) -> FileWatch:
+        """One that goes on from the `stamps` of another."""
+        watch = cls()
+        watch.stamps = stamps
+        return watch
+
     def add(self, file: File) -> None:
         """Raises OSError where there is no such file."""
-        self._stamps.setdefault(file, _stamp(file))
+        self.stamps.setdefault(file, _stamp(file))
 
     def __call__(self) -> bool:
         try:
-            return all(_stamp(file) == stamp for file, stamp in self._stamps.items())
+            return all(_stamp(file) == stamp for file, stamp in self.stamps.items())
         except OSError:
             return False
 
@@ -81,6 +126,17 @@ def naming(path: str | PathLike[str], *errors: type[Exception]) -> Iterator[None
     except errors as error:
         text = " ".join(str(error).split())[:200] or type(error).__name__
         raise ClipError(f"{fspath(path)}: cannot be read: {text}") from error
+
+
+@contextmanager
+def naming_file(path: str | PathLike[str]) -> Iterator[None]:
+    """Errors of the system that name no file, such as those of reading, name this one."""
+    try:
+        yield
+    except OSError as error:
+        if error.filename is not None or error.errno is None:
+            raise
+        raise OSError(error.errno, error.strerror, fspath(path)) from error
 
 
 @contextmanager

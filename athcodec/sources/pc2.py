@@ -19,9 +19,10 @@ import numpy as np
 
 from athcodec.clip import MotionClip
 from athcodec.errors import ClipError
+from athcodec.plain_files import open_plain
 from athcodec.sources import ReadOptions, read
 from athcodec.sources.mesh import Mesh, read_mesh
-from athcodec.sources.opening import FileWatch, closing_on_failure, naming
+from athcodec.sources.opening import Budget, FileWatch, closing_on_failure, naming
 from athcodec.sources.raw import raw_frames, read_exactly
 from athcodec.sources.timing import numbered_times
 
@@ -66,7 +67,7 @@ def check_size(file: BinaryIO, frame_count: int, vertex_count: int, header_bytes
 def open_cache(path: str | PathLike[str], options: ReadOptions, read_header: Any) -> MotionClip:
     """The clip in a point cache with the mesh that belongs to it. read_header(file, options) gives the clip's
     positions, time and metadata."""
-    file = open(path, "rb", buffering=0)
+    file = open_plain(path)
     with naming(path), closing_on_failure(file):
         fields = read_header(file, options)
         mesh = cached_mesh(path, options, fields["positions"].shape[1])
@@ -98,9 +99,9 @@ def cached_mesh(path: str | PathLike[str], options: ReadOptions, vertex_count: i
         attributes = {"part_vertex_counts": np.array([vertex_count], np.int32)}
         return Mesh(np.empty((vertex_count, 3)), attributes=attributes, metadata=metadata)
     if Path(found).suffix.lower() in MESH_SUFFIXES:
-        mesh = read_mesh(found)
+        mesh = read_mesh(found, Budget(options.max_memory))
     else:
-        with read(found, only=options.only) as clip:
+        with read(found, only=options.only, max_memory=options.max_memory) as clip:
             metadata = {name: value for name, value in clip.metadata.items() if name not in ("fps", "start_frame")}
             mesh = Mesh(clip.rest, clip.faces, clip.edges, clip.attributes, metadata)
     if len(mesh.points) != vertex_count:

@@ -23,7 +23,7 @@ from athcodec.errors import ClipError
 from athcodec.frames import Frames
 from athcodec.sources import NUMBER_PATTERN, ReadOptions, is_pattern
 from athcodec.sources.mesh import Mesh, obj_lines, obj_points, parse_mesh, ply_header, ply_points
-from athcodec.sources.opening import FileWatch, naming
+from athcodec.sources.opening import Budget, FileWatch, naming, read_plain
 from athcodec.sources.timing import numbered_times
 
 _NUMBERED = re.compile(r"(.*?)(\d+)", re.DOTALL)
@@ -105,7 +105,7 @@ def read_clip(path: str | PathLike[str], options: ReadOptions) -> MotionClip:
     """The clip in the sequence that `path` belongs to. Raises ClipError where a file is broken or, when its frame is
     read, has other vertices, faces or edges than the first; OSError where one cannot be opened."""
     files = sequence_files(path)
-    reader = FileFrames(list(files.values()), parse_mesh, _fast_reader)
+    reader = FileFrames(list(files.values()), parse_mesh, _fast_reader, Budget(options.max_memory))
     mesh, time, metadata = reader.mesh, np.zeros(1), {}
     if None not in files:
         time, metadata = numbered_times(np.array(list(files)), options.fps or stated_fps(mesh.metadata))
@@ -141,22 +141,25 @@ class FileFrames:
     paths : sequence of Path
         In the order of time.
     parse : callable
-        (bytes, path) -> Mesh.
+        (bytes, path, budget) -> Mesh.
     fast_reader : callable
         (bytes of the first file, its mesh) -> a function from the bytes of a further file to its points, or to None
         where that cannot tell whether all else is as in the first.
+    budget : Budget
+        What a file may take.
     """
 
     def __init__(
         self,
         paths: Sequence[Path],
-        parse: Callable[[bytes, Path], Mesh],
+        parse: Callable[[bytes, Path, Budget], Mesh],
         fast_reader: Callable[[bytes, Mesh], Callable[[bytes], np.ndarray | None]],
+        budget: Budget,
     ):
-        self.paths, self._parse = list(paths), parse
+        self.paths, self._parse, self._budget = list(paths), parse, budget
         self.unchanged = FileWatch(*self.paths)
-        data = self.paths[0].read_bytes()
-        self.mesh = parse(data, self.paths[0])
+        data = read_plain(self.paths[0], budget)
+        self.mesh = parse(data, self.paths[0], budget)
         self._fast = fast_reader(data, self.mesh)
         self.frames = Frames(self._read, len(self.paths), len(self.mesh.points), self.mesh.points.dtype)
 
@@ -169,14 +172,14 @@ class FileFrames:
 
     def _points(self, frame: int) -> np.ndarray:
         path = self.paths[frame]
-        data = path.read_bytes()
+        data = read_plain(path, self._budget)
         try:
             points = self._fast(data)
         except (ClipError, ValueError, IndexError, OverflowError):
             points = None  # the full parser says what is wrong
         if points is not None and points.shape == self.mesh.points.shape:
             return points
-        mesh = self._parse(data, path)
+        mesh = self._parse(data, path, self._budget)
         different = self.mesh.same_topology(mesh)
         if different:
             raise ClipError(

@@ -11,10 +11,13 @@ from __future__ import annotations
 
 import base64
 import binascii
+import io
 import lzma
+import os
 import re
 import zlib
 from collections.abc import Callable, Sequence
+from contextlib import redirect_stderr
 from os import PathLike, fspath
 from pathlib import Path
 from typing import Any
@@ -24,14 +27,15 @@ import numpy as np
 
 from athcodec.clip import MotionClip
 from athcodec.errors import ClipError, MissingExtra
+from athcodec.plain_files import open_plain
 from athcodec.sources import ReadOptions
-from athcodec.sources.cells import VTK_NAMES, VTK_NUMBERS, blocks_of, topology_of
+from athcodec.sources.cells import NODE_BYTES, VTK_NAMES, VTK_NUMBERS, blocks_of, topology_of
 from athcodec.sources.fields import clip_of_steps
-from athcodec.sources.opening import FileWatch, check_inside, naming
+from athcodec.sources.opening import Budget, FileWatch, check_inside, naming, read_plain
 from athcodec.sources.scene_objects import OWN, scene_of_json
 from athcodec.sources.sequence import sequence_files
 from athcodec.sources.timing import numbered_times, times_in_seconds
-from athcodec.sources.xdmf import parse_xml
+from athcodec.sources.xdmf import TEXT_BYTES, parse_xml
 
 _TYPES = {
     "Float32": "f4",
@@ -45,11 +49,13 @@ _TYPES = {
     "UInt32": "u4",
     "UInt64": "u8",
 }
-_UNPACKERS: dict[str, Callable[[], Any]] = {
-    "vtkZLibDataCompressor": zlib.decompressobj,
-    "vtkLZMADataCompressor": lzma.LZMADecompressor,
+_UNPACKERS: dict[str, Callable[[int], Any]] = {
+    "vtkZLibDataCompressor": lambda room: zlib.decompressobj(),
+    "vtkLZMADataCompressor": lambda room: lzma.LZMADecompressor(memlimit=room),
 }
-MAX_BLOCK_BYTES = 1 << 30
+"""Of the bytes that they may take themselves."""
+WORD_BYTES = 16  # what a byte of a legacy file takes while meshio reads it
+GRIDS = 4  # that are held at once: three that are compared, and one that is read
 _BROKEN = (
     ValueError,
     KeyError,
@@ -69,7 +75,7 @@ def read_clip(path: str | PathLike[str], options: ReadOptions) -> MotionClip:
     read, has other cells than the first; MissingExtra for .vtk without meshio; OSError where one cannot be opened."""
     try:
         files, time, metadata = _files(Path(path), options)
-        steps = _Steps(files)
+        steps = _Steps(files, options.max_memory // GRIDS)
         name = re.sub(r"[_.\-]*\d+$", "", files[0].stem) or files[0].stem
         said = steps.said | metadata
         return clip_of_steps(steps, time, said, name, options, steps.static(), unchanged=steps.unchanged)
@@ -82,7 +88,7 @@ def _files(path: Path, options: ReadOptions) -> tuple[list[Path], np.ndarray, di
     """The files in the order of time, and their times."""
     if path.suffix.lower() == ".pvd":
         return _listed(path, options)
-    index = _index_of(path)
+    index = _index_of(path, Budget(options.max_memory))
     if index is not None:
         return _listed(index, options)
     files = sequence_files(path)
@@ -91,17 +97,17 @@ def _files(path: Path, options: ReadOptions) -> tuple[list[Path], np.ndarray, di
     return [*files.values()], *numbered_times(np.array(list(files)), options.fps)
 
 
-def _index_of(path: Path) -> Path | None:
+def _index_of(path: Path, budget: Budget) -> Path | None:
     """A .pvd beside a file that lists it."""
-    for index in sorted(path.parent.glob("*.pvd")):
-        may_list = path.is_file() and index.stat().st_size < 1 << 28 and path.name.encode() in index.read_bytes()
-        if may_list and path in [file for file, _ in _datasets(index)]:
+    for index in sorted(path.parent.glob("*.pvd")) if path.is_file() else ():
+        may_list = index.is_file() and path.name.encode() in read_plain(index, budget)
+        if may_list and path in [file for file, _ in _datasets(index, budget)]:
             return index
     return None
 
 
-def _datasets(index: Path) -> list[tuple[Path, float]]:
-    root = parse_xml(index.read_bytes(), "VTKFile")
+def _datasets(index: Path, budget: Budget) -> list[tuple[Path, float]]:
+    root = parse_xml(read_plain(index, budget), "VTKFile", budget)
     found = [
         (index.parent / element.get("file", ""), float(element.get("timestep", "nan")), element.get("part", "0"))
         for element in root.iter("DataSet")
@@ -114,10 +120,11 @@ def _datasets(index: Path) -> list[tuple[Path, float]]:
 
 
 def _listed(index: Path, options: ReadOptions) -> tuple[list[Path], np.ndarray, dict[str, Any]]:
-    files = [file for file, _ in _datasets(index)]
+    datasets = _datasets(index, Budget(options.max_memory))
+    files = [file for file, _ in datasets]
     for file in files:
         check_inside(index.parent, file, options.allow_outside)
-    stored = np.array([time for _, time in _datasets(index)])
+    stored = np.array([time for _, time in datasets])
     if len(stored) == 1 and not np.isfinite(stored).all():
         stored = np.zeros(1)
     time, metadata = times_in_seconds(stored, options.fps)
@@ -132,8 +139,8 @@ def _listed(index: Path, options: ReadOptions) -> tuple[list[Path], np.ndarray, 
 class _Steps:
     """See fields.Steps."""
 
-    def __init__(self, files: Sequence[Path]):
-        self._files = list(files)
+    def __init__(self, files: Sequence[Path], max_memory: int):
+        self._files, self._max_memory = list(files), max_memory  # of one file
         self.unchanged = FileWatch(*self._files)
         self._now: tuple[int, _Grid] | None = None
         first = self._grid(0)
@@ -176,7 +183,7 @@ class _Steps:
 
     def _grid(self, step: int) -> _Grid:
         if self._now is None or self._now[0] != step:
-            self._now = step, _read_grid(self._files[step])
+            self._now = step, _read_grid(self._files[step], Budget(self._max_memory))
         return self._now[1]
 
 
@@ -197,13 +204,15 @@ class _Grid:
         self.cell_data = {name: values for name, values in cell_data.items() if len(values) == len(cells[0]) and name}
 
 
-def _read_grid(path: Path) -> _Grid:
-    if path.exists() and not path.is_file():
-        raise ClipError(f"{path}: got a folder, device or pipe, expected a plain file")
+def _read_grid(path: Path, budget: Budget) -> _Grid:
+    if path.is_dir():
+        raise ClipError(f"{path}: got a folder, expected a plain file")
     if path.suffix.lower() == ".vtk":
+        budget.need(WORD_BYTES * os.stat(path).st_size, fspath(path))
+        open_plain(path).close()
         return _legacy_grid(path)
     with naming(path, *_BROKEN):
-        return _Vtu(path.read_bytes()).grid()
+        return _Vtu(read_plain(path, budget), budget).grid()
 
 
 def _legacy_grid(path: Path) -> _Grid:
@@ -212,7 +221,8 @@ def _legacy_grid(path: Path) -> _Grid:
     except ImportError:
         raise MissingExtra('VTK files: need meshio: pip install "athcodec[mesh]"') from None
     try:
-        mesh = vtk.read(path)
+        with redirect_stderr(io.StringIO()):  # meshio's warnings quote the file
+            mesh = vtk.read(path)
     except OSError:
         raise
     except Exception as error:  # meshio trusts its files: a damaged one may raise any exception
@@ -231,9 +241,10 @@ def _legacy_grid(path: Path) -> _Grid:
 class _Vtu:
     """The arrays of one VTU file."""
 
-    def __init__(self, data: bytes):
+    def __init__(self, data: bytes, budget: Budget):
+        self._budget = budget
         data, self._appended = _without_raw(data)
-        self._root = parse_xml(data, "VTKFile")
+        self._root = parse_xml(data, "VTKFile", budget)
         if self._root.get("type") != "UnstructuredGrid":
             raise ClipError(f"got a VTK file of the type {self._root.get('type')!r}, expected UnstructuredGrid")
         order = ">" if self._root.get("byte_order") == "BigEndian" else "<"
@@ -289,20 +300,25 @@ class _Vtu:
         values = self._array(element)
         if values.dtype.kind not in "iu":
             raise ClipError(f"cells: got {element.get('Name')} of {values.dtype}, expected integers")
+        self._budget.take(8 * values.size, "cells")
+        self._budget.need(NODE_BYTES * values.size, "cells")
         return values.astype(np.int64)
 
     def _array(self, element: ElementTree.Element) -> np.ndarray:
         dtype = np.dtype(_TYPES[element.get("type", "")])
         form = element.get("format", "ascii")
         if form == "ascii":
+            self._budget.need(TEXT_BYTES * len(element.text or ""), element.get("Name", "points"))
             words = (element.text or "").split()
-            return np.array(words, np.float64 if dtype.kind == "f" else np.int64).astype(dtype)
+            with np.errstate(over="ignore", invalid="ignore"):  # what does not fit is refused where it is used
+                return np.array(words, np.float64 if dtype.kind == "f" else np.int64).astype(dtype)
         if form == "binary":
             data = self._decoded((element.text or "").strip().encode())
         elif form == "appended":
             data = self._appended_at(int(element.get("offset", "0")))
         else:
             raise ClipError(f"got data in the format {form[:40]!r}, expected ascii, binary or appended")
+        self._budget.take(len(data), element.get("Name", "points"))
         return np.frombuffer(data, dtype.newbyteorder(self._order)).astype(dtype)
 
     def _appended_at(self, offset: int) -> bytes:
@@ -336,10 +352,14 @@ class _Vtu:
             return data[size : size + first]
         sizes = self._numbers(data, 3 + first)
         at, parts = size * (3 + first), []
-        for length in sizes[3:]:
-            parts.append(self._unpack().decompress(data[at : at + length], max(1, min(sizes[1], MAX_BLOCK_BYTES))))
-            at += length
         whole_size = sizes[1] * (first - bool(sizes[2])) + sizes[2] if first else 0
+        self._budget.need(2 * whole_size, "packed data")
+        for length in sizes[3:]:
+            block = self._unpack(self._budget.left).decompress(
+                data[at : at + length], max(1, min(sizes[1], whole_size))
+            )
+            parts.append(block)
+            at += length
         joined = b"".join(parts)
         if len(joined) != whole_size:
             raise ClipError(f"got {len(joined)} bytes of unpacked data, expected {whole_size}")

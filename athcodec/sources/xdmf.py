@@ -3,12 +3,13 @@
 The mesh may be in every step, in the first one, or in a grid of its own that the steps include (as meshio and FEniCS
 write it). See fields.py for what becomes the motion and cells.py for the cells. Not read: structured grids, spatial
 collections (parallel pieces), polyhedra, functions of data. Files that the XML names must lie where it says; data of
-HDF5 are read when a frame is asked for. One array may have 1 GiB.
+HDF5 are read when a frame is asked for.
 """
 
 from __future__ import annotations
 
 import json
+import re
 from contextlib import suppress
 from os import PathLike
 from pathlib import Path
@@ -21,14 +22,14 @@ import numpy as np
 from athcodec.clip import MotionClip, frame_rate
 from athcodec.errors import ClipError
 from athcodec.sources import ReadOptions
-from athcodec.sources.cells import NODES, Block, blocks_of, topology_of
+from athcodec.sources.cells import NODE_BYTES, NODES, Block, blocks_of, topology_of
 from athcodec.sources.fields import clip_of_steps
-from athcodec.sources.hdf5 import check_own
-from athcodec.sources.opening import FileWatch, closing_on_failure, file_beside, naming
+from athcodec.sources.hdf5 import check_own, chunk_bytes, unpacks_to_more
+from athcodec.sources.opening import Budget, FileWatch, closing_on_failure, file_beside, naming, no_room, read_plain
 from athcodec.sources.scene_objects import MATERIAL_NAMES
 from athcodec.sources.timing import times_in_seconds, whole
 
-MAX_ARRAY_BYTES = 1 << 30
+XML_BYTES, TEXT_BYTES = 224, 40  # what an element or an attribute takes, and a byte of text that becomes numbers
 MIXED = {
     1: "poly_vertex",
     2: "poly_line",
@@ -80,6 +81,7 @@ TOPOLOGIES = {
     "line": "line",
 }
 PLAIN = {"polyvertex": "poly_vertex", "polyline": "poly_line", "polygon": "polygon"}
+_NAMED_DOCTYPE = re.compile(rb"""<!DOCTYPE\s+[\w.:-]+(\s+SYSTEM\s+("[^"<>]*"|'[^'<>]*'))?\s*(\[\s*\])?\s*>""")
 _KINDS = {"float": "f", "int": "i", "uint": "u", "char": "i", "uchar": "u", "short": "i", "ushort": "u"}
 _SIZES = {"char": 1, "uchar": 1, "short": 2, "ushort": 2}
 _XML_ERRORS = (ElementTree.ParseError, ValueError, KeyError, OverflowError, IndexError, TypeError, MemoryError)
@@ -88,17 +90,19 @@ _XML_ERRORS = (ElementTree.ParseError, ValueError, KeyError, OverflowError, Inde
 def read_clip(path: str | PathLike[str], options: ReadOptions) -> MotionClip:
     """Open the clip in the XDMF file `path`. Raises ClipError where it or what it names is no usable series, OSError
     where the file cannot be opened."""
-    data = Data(Path(path), options.allow_outside)
+    data = Data(Path(path), options.allow_outside, Budget(options.max_memory))
     with naming(path, *_XML_ERRORS), closing_on_failure(data):
-        steps = _Steps(data, parse_xml(Path(path).read_bytes(), "Xdmf"), options)
+        steps = _Steps(data, parse_xml(read_plain(path, data.budget), "Xdmf", data.budget), options)
         time, metadata = steps.times(options)
         return clip_of_steps(steps, time, metadata, Path(path).stem, options, steps.static(), data, data.unchanged)
 
 
-def parse_xml(data: bytes, tag: str) -> ElementTree.Element:
-    """The root element, of this tag. Entities that the file defines are refused: they can grow without end."""
-    if b"<!ENTITY" in data or b"\0" in data:
-        raise ClipError("got XML with entities of its own or in UTF-16, expected plain UTF-8")
+def parse_xml(data: bytes, tag: str, budget: Budget) -> ElementTree.Element:
+    """The root element, of this tag. A DOCTYPE with declarations is refused: entities, and the defaults of attributes,
+    can grow without end."""
+    if b"<!DOCTYPE" in _NAMED_DOCTYPE.sub(b"", data, count=1) or b"\0" in data:
+        raise ClipError("got XML with declarations in its DOCTYPE or in UTF-16, expected plain UTF-8 without any")
+    budget.need_for(data, b"<=", XML_BYTES, "XML")
     try:
         root = ElementTree.fromstring(data)
     except (ElementTree.ParseError, LookupError, ValueError) as error:  # LookupError: an unknown encoding
@@ -111,8 +115,8 @@ def parse_xml(data: bytes, tag: str) -> ElementTree.Element:
 class Data:
     """DataItems of one XDMF file, and the HDF5 files that they lie in, open until close()."""
 
-    def __init__(self, path: Path, allow_outside: bool):
-        self._folder, self._allow_outside = path.resolve().parent, allow_outside
+    def __init__(self, path: Path, allow_outside: bool, budget: Budget):
+        self._folder, self._allow_outside, self.budget = path.resolve().parent, allow_outside, budget
         self._files: dict[Path, h5py.File] = {}
         self.unchanged = FileWatch(path.resolve())
 
@@ -143,7 +147,10 @@ class Data:
         return values.reshape(shape)
 
     def _text(self, item: ElementTree.Element) -> np.ndarray:
-        return np.array((item.text or "").split(), np.float64).astype(_dtype(item))
+        text = item.text or ""
+        self.budget.need(TEXT_BYTES * len(text), "DataItem")
+        with np.errstate(over="ignore", invalid="ignore"):  # what does not fit is refused where it is used
+            return np.array(text.split(), np.float64).astype(_dtype(item))
 
     def _binary(self, item: ElementTree.Element, shape: tuple[int, ...]) -> np.ndarray:
         path = self._file_named((item.text or "").strip())
@@ -152,6 +159,7 @@ class Data:
         seek = int(item.get("Seek", 0))
         if not 0 <= seek <= path.stat().st_size - count * dtype.itemsize or min(shape, default=0) < 0:
             raise ClipError(f"{path.name}: got {path.stat().st_size} bytes, expected {shape} of {dtype} at {seek}")
+        self.budget.need(2 * count * dtype.itemsize, path.name)
         return np.fromfile(path, dtype, count, offset=seek).astype(dtype.newbyteorder("="))
 
     def _hdf(self, item: ElementTree.Element, selection: Any = ()) -> np.ndarray:
@@ -170,8 +178,12 @@ class Data:
                 else dataset.dtype.itemsize
                 * int(np.prod([len(range(*part.indices(length))) for part, length in zip(selection, dataset.shape)]))
             )
-            if size > MAX_ARRAY_BYTES:
-                raise ClipError(f"{path.name}: {inside[:80]!r}: got {size} bytes, expected at most {MAX_ARRAY_BYTES}")
+            self.budget.need(2 * size + chunk_bytes(dataset), f"{path.name}: {inside[:80]!r}")
+            if unpacks_to_more(dataset, self.budget.left):
+                raise ClipError(
+                    f"{path.name}: {inside[:80]!r}: got chunks that may unpack to any size, but "
+                    + no_room(self.budget.limit)
+                )
             return np.asarray(dataset[selection]).astype(dataset.dtype.newbyteorder("="), copy=False)
         except (KeyError, OSError, RuntimeError, TypeError, ValueError) as error:
             if isinstance(error, ClipError):
@@ -323,6 +335,7 @@ class _Steps:
             if self._is_static(name, "node"):
                 values = self.field(0, name)
                 if len(values) == count and name:
+                    self._data.budget.take(values.nbytes, name)
                     found[name] = values
         return found
 
@@ -332,6 +345,7 @@ class _Steps:
             if center == "cell" and name and self._is_static(name, "cell"):
                 values = self._data.read(element.find("DataItem"))
                 if len(values) == count:
+                    self._data.budget.take(2 * values.nbytes, name)
                     self.topology.add_cell_data(name, values[:, 0] if values.shape[1:] == (1,) else values)
 
     def _is_static(self, name: str, center: str) -> bool:
@@ -367,6 +381,7 @@ class _Steps:
         nodes = self._data.read(item)
         if nodes.dtype.kind not in "iu":
             nodes = _whole_numbers(nodes)
+        self._data.budget.need(NODE_BYTES * nodes.size, "Topology")
         nodes = nodes.astype(np.int64)
         if kind == "mixed":
             return _mixed_blocks(nodes.reshape(-1))

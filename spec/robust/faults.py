@@ -1,4 +1,5 @@
-"""External faults while files are written: writers killed at random moments, full disks, sources that change.
+"""External faults while files are written: writers killed at random moments, full disks, input and output that fails,
+sources that change.
 
 All of it runs the command line program in separate processes; `run` returns the rows of the table. A target must not
 exist, be unchanged, or be a complete new file; the next writer to the same place must leave no temporary file; an error
@@ -87,7 +88,7 @@ def is_whole(path: Path) -> bool:
             with athcodec.open(path, strict=True) as decoder:
                 decoder.file.check()
         else:
-            with athcodec.read_hdf5(path) as clip:
+            with athcodec.read(path) as clip:
                 clip.block(0, clip.frame_count)
     except (athcodec.errors.AthError, OSError):
         return False
@@ -274,6 +275,8 @@ def _damage(path: Path, rng: random.Random) -> None:
 
 def run(budget: float) -> list[Row]:
     """All faults, 200 kills among them, within about `budget` seconds."""
+    from spec.robust._io_errors import rows as io_errors  # which uses this module
+
     start = time.monotonic()
     with tempfile.TemporaryDirectory() as folder:
         place = Place.make(Path(folder))
@@ -283,5 +286,6 @@ def run(budget: float) -> list[Row]:
             fill_small_disk(place, [4, 8]),
             write_where_not_allowed(place, VERBS),
             change_source(place, 60, 1, start + 0.4 * budget),
-            kill_while_writing(place, 200, 2, start + budget),
+            kill_while_writing(place, 200, 2, start + 0.7 * budget),
+            *io_errors(0.3 * budget),
         ]

@@ -8,17 +8,20 @@ from __future__ import annotations
 import argparse
 import json
 import os
+import re
 import subprocess
 import sys
 import time
 from collections.abc import Sequence
+from importlib.util import find_spec
 from pathlib import Path
 
-from fuzz import coverage, seeds, targets
+from fuzz import coverage, seeds, sources, targets
 from fuzz.targets import BUILD, Outcome
 
 ROUNDTRIP = "roundtrip"
-ALL = (*targets.TARGETS, ROUNDTRIP)
+SOURCES = "sources"
+ALL = (*targets.TARGETS, ROUNDTRIP, *(f"{SOURCES}-{kind}" for kind in sources.KINDS))
 GRACE = 300
 
 
@@ -28,6 +31,8 @@ def fuzz(
     """One target for some time. Raises BuildError."""
     if target == ROUNDTRIP:
         return roundtrip(seconds, seed)
+    if target.startswith(SOURCES):
+        return read_sources(target.removeprefix(f"{SOURCES}-"), seconds, seed)
     used = targets.compiler()
     program = targets.build(target, used, sanitizer)
     if used.fuzzer:
@@ -35,6 +40,20 @@ def fuzz(
     start = BUILD / "seeds" / target
     seeds.write_inputs(target, start)
     return targets.replay(target, program, sorted(start.iterdir()))
+
+
+def read_sources(kind: str, seconds: float, seed: int) -> Outcome:
+    """The readers of a format; guided by what they run where atheris is installed."""
+    number, guide = seed or time.time_ns() % 10**9, ["guided"] if find_spec("atheris") else []
+    command = [sys.executable, "-m", "fuzz.sources", kind, str(seconds), str(number), *guide]
+    path, target = {"PYTHONPATH": str(targets.HERE.parent)}, f"{SOURCES}-{kind}"
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, env=os.environ | path, timeout=seconds + GRACE)
+    except subprocess.TimeoutExpired as late:
+        return Outcome(target, 0, "hang", f"no end {GRACE} s after its time: {late}")
+    log = done.stdout + done.stderr
+    tried = re.findall(r"stat::number_of_executed_units:\s+(\d+)" if guide else r'"tried": (\d+)', log)
+    return Outcome(target, int(tried[-1]) if tried else 0, "wrong" if done.returncode else "", log, seconds=seconds)
 
 
 def roundtrip(seconds: float, seed: int) -> Outcome:
@@ -56,7 +75,9 @@ def roundtrip(seconds: float, seed: int) -> Outcome:
 def arguments(argv: Sequence[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="python -m tests.fuzz", description=__doc__.split("\n\n")[0])
     parser.add_argument("--seconds", type=float, default=30.0, help="of each target (default: 30)")
-    parser.add_argument("--target", action="append", choices=ALL, help="this one alone; may be repeated")
+    parser.add_argument(
+        "--target", action="append", choices=(*ALL, SOURCES), help=f"this one alone, or all {SOURCES}; may be repeated"
+    )
     parser.add_argument(
         "--sanitizer",
         choices=[name for name in targets.SANITIZERS if name != "coverage"],
@@ -87,10 +108,12 @@ def main(argv: Sequence[str] | None = None) -> int:
         files = coverage.measure(args.corpus)
         print(coverage.as_text(files) if files is not None else coverage.NO_CLANG)
         return 0
-    if not targets.compiler().fuzzer:
-        print(f"fuzz: {targets.NO_FUZZER}", flush=True)
     outcomes = []
-    for target in args.target or ALL:
+    wanted = args.target or ALL
+    chosen = [target for target in ALL if target in wanted or SOURCES in wanted and target.startswith(SOURCES)]
+    if any(not target.startswith((SOURCES, ROUNDTRIP)) for target in chosen) and not targets.compiler().fuzzer:
+        print(f"fuzz: {targets.NO_FUZZER}", flush=True)
+    for target in chosen:
         outcomes.append(fuzz(target, args.seconds, args.corpus, args.sanitizer, args.seed))
         show(outcomes[-1])
     return 1 if any(outcome.kind for outcome in outcomes) else 0

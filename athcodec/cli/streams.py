@@ -1,0 +1,85 @@
+"""Standard input and output as files of the command line: what is called "-" there.
+
+Most formats are read from many places and written back and forth, so the bytes go through a temporary file.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import sys
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from athcodec.errors import ClipError
+from athcodec.exporters import FORMATS as WRITTEN
+from athcodec.sources import FORMATS as READ
+from athcodec.sources import HEAD_BYTES, format_named
+
+STREAM = "-"
+ATH = ".ath"
+
+
+class Streams:
+    """Files in place of "-", in a folder of their own. `writes`: whether one of them goes to standard output."""
+
+    def __init__(self, folder: str):
+        self._folder, self._input, self._output = folder, "", ""
+
+    @property
+    def writes(self) -> bool:
+        return bool(self._output)
+
+    def ath(self, path: str) -> str:
+        """The .ath file, or GLB, to read in place of `path`. Raises ClipError, OSError."""
+        return self._read(ATH) if path == STREAM else path
+
+    def source(self, path: str, format: str | None) -> str:
+        """The source to read in place of `path`. Raises ClipError where nothing says its format, OSError."""
+        if path != STREAM:
+            return path
+        if format is not None or self._input:
+            return self._read(format_named(format, READ).suffixes[0] if format else "")
+        head = sys.stdin.buffer.peek(HEAD_BYTES)
+        kind = next((kind for kind in READ if kind.magic and head.startswith(kind.magic)), None)
+        if kind is None:
+            raise ClipError(f"{STREAM}: got a format that its first bytes do not tell, expected --source-format")
+        return self._read(kind.suffixes[0])
+
+    def target(self, path: str, format: str | None) -> str:
+        """The file to write in place of `path`: format is None for .ath. Raises ClipError."""
+        if path != STREAM:
+            return path
+        suffix = ATH if format is None else format_named(format, WRITTEN).suffixes[0]
+        os.mkdir(os.path.join(self._folder, "out"))
+        self._output = os.path.join(self._folder, "out", f"standard_output{suffix}")
+        return self._output
+
+    def send(self) -> None:
+        """What has been written goes to standard output. Raises ClipError where it is more than one file, OSError."""
+        if not self.writes:
+            return
+        made = os.listdir(os.path.dirname(self._output))
+        if made != [os.path.basename(self._output)]:
+            raise ClipError(f"{STREAM}: got a format of several files, expected one that is a single file")
+        with open(self._output, "rb") as file:
+            shutil.copyfileobj(file, sys.stdout.buffer)
+        sys.stdout.buffer.flush()
+
+    def _read(self, suffix: str) -> str:
+        if self._input:
+            raise ClipError(f"{STREAM}: got standard input twice, expected it once")
+        self._input = os.path.join(self._folder, f"standard_input{suffix}")
+        with open(self._input, "wb") as file:
+            shutil.copyfileobj(sys.stdin.buffer, file)
+        return self._input
+
+
+@contextmanager
+def standard_streams() -> Iterator[Streams]:
+    """Streams whose output is sent when the block ends without an error."""
+    with tempfile.TemporaryDirectory(prefix="athcodec-") as folder:
+        streams = Streams(folder)
+        yield streams
+        streams.send()

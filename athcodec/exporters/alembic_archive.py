@@ -1,0 +1,281 @@
+"""Writes Alembic (Ogawa): one mesh, curves or points object per object of a clip, its points sample by sample.
+
+Faces and static arrays are written once, materials' names as those of face sets; samples go to disk as they come.
+Points are float32, a clip in float64 is rounded; copies of one shape become instances where options.instances asks for
+it. Everything lies below one transform, which turns a clip whose Z is up to Alembic's custom, Y up, and keeps what
+Alembic has no place for (unit, branches, bytes); sources/alembic_archive.py takes it back from there. See
+alembic.py for who runs it.
+"""
+
+from __future__ import annotations
+
+import gc
+import json
+import pickle
+import re
+import sys
+from collections.abc import Iterator
+from contextlib import suppress
+from typing import Any, BinaryIO
+
+import imath
+import numpy as np
+from alembic3d import Abc, AbcCoreAbstract, AbcGeom
+
+from athcodec.exporters.copies import Copies, one_copy, rows_of_one
+from athcodec.exporters.fitting import rotation_matrices
+from athcodec.exporters.scene_objects import (
+    DOMAINS,
+    KNOWN_ATTRIBUTES,
+    KNOWN_METADATA,
+    SceneObject,
+    distinct,
+    domain_of,
+    face_materials,
+    material_runs,
+    objects_of,
+    own_arrays,
+    rows_of,
+)
+from athcodec.exporters.timing import distinct_frame_numbers, frame_rate_of
+from athcodec.sources.scene_objects import DESCRIPTOR, FACE_MATERIAL, OWN, turned_corners
+
+SCOPES = {
+    "vertex": AbcGeom.GeometryScope.kVertexScope,
+    "corner": AbcGeom.GeometryScope.kFacevaryingScope,
+    "face": AbcGeom.GeometryScope.kUniformScope,
+    "constant": AbcGeom.GeometryScope.kConstantScope,
+}
+# of the dtype and the shape of a row: the array that holds it and the parameter that writes it
+TYPES = {
+    ("f4", ()): (imath.FloatArray, "Float"),
+    ("f8", ()): (imath.DoubleArray, "Double"),
+    ("i4", ()): (imath.IntArray, "Int32"),
+    ("u1", ()): (imath.UnsignedCharArray, "Uchar"),
+    ("f4", (2,)): (imath.V2fArray, "V2f"),
+    ("f4", (3,)): (imath.V3fArray, "V3f"),
+    ("f8", (3,)): (imath.V3dArray, "V3d"),
+}
+KINDS = {"mesh": AbcGeom.OPolyMesh, "curves": AbcGeom.OCurves, "points": AbcGeom.OPoints}
+Z_UP = ((1, 0, 0, 0), (0, 0, -1, 0), (0, 1, 0, 0), (0, 0, 0, 1))  # row vectors
+
+
+def main() -> None:
+    """Takes a clip but for its motion, and its instances, as a pickle, and then its frames likewise."""
+    given = sys.stdin.buffer
+    motion, instanced = pickle.load(given)
+    try:
+        _write(motion, _blocks(given), instanced, sys.argv[1])
+        gc.collect()  # an archive is complete when nothing refers to it
+        said = "done"
+    except (RuntimeError, TypeError, OSError) as error:
+        said = " ".join(str(error).split()) or type(error).__name__
+    print(said, end="")
+
+
+def _blocks(given: BinaryIO) -> Iterator[tuple[int, np.ndarray]]:
+    with suppress(EOFError):
+        while True:
+            yield pickle.load(given)
+
+
+def _write(motion: Any, blocks: Iterator[tuple[int, np.ndarray]], instanced: dict[int, Copies], name: str) -> None:
+    numbers, rate = distinct_frame_numbers(motion), frame_rate_of(motion)
+    archive = Abc.CreateArchiveWithInfo(name, rate, "athcodec", "plant motion")
+    sampling = Abc.Argument(archive.addTimeSampling(_sampling(numbers, rate)))
+    root = AbcGeom.OXform(archive.getTop(), "clip")
+    if str(motion.metadata.get("up_axis", "y")).lower() == "z":
+        turn = AbcGeom.XformSample()
+        turn.setMatrix(imath.M44d(*(float(number) for row in Z_UP for number in row)))
+        root.getSchema().set(turn)
+    objects = objects_of(motion)
+    for number, obj in enumerate(objects):
+        obj.copies = obj.copies if number in instanced else 1
+    statics, left = _divide(motion, objects)
+    _keep_own(root.getSchema().getUserProperties(), motion, left)
+    names = distinct(re.sub(r"[/\0]", "_", obj.name.strip("/")) or "part" for obj in objects)
+    for number, (obj, name) in enumerate(zip(objects, names)):
+        if number in instanced:
+            _add_instanced(root, name, obj, instanced[number], statics, sampling)
+        else:
+            obj.target = _create(root, name, obj, sampling)
+    _bind_materials(motion, objects)
+    for start, block in blocks:
+        for row, positions in enumerate(block.astype(np.float32, copy=False)):
+            for obj in objects:
+                if obj.copies == 1:
+                    own = _rows(statics, obj) if start + row == 0 else None
+                    _add(obj, positions[obj.vertices], own)
+
+
+def _sampling(numbers: np.ndarray, rate: float) -> Any:
+    steps = np.diff(numbers)
+    if np.allclose(steps, 1.0, rtol=0, atol=1e-5):
+        return AbcCoreAbstract.TimeSampling(1.0 / rate, float(numbers[0]) / rate)
+    times = AbcCoreAbstract.TimeVector()
+    times.extend([float(number) / rate for number in numbers])
+    acyclic = AbcCoreAbstract.TimeSamplingType(AbcCoreAbstract.AcyclicFlag.kAcyclic)
+    return AbcCoreAbstract.TimeSampling(acyclic, times)
+
+
+def _create(root: Any, name: str, obj: SceneObject, sampling: Any) -> Any:
+    return KINDS[obj.kind](AbcGeom.OXform(root, name), name, sampling)  # programs expect a transform of its own
+
+
+def _add_instanced(
+    root: Any, name: str, obj: SceneObject, copies: Copies, statics: dict[str, tuple[np.ndarray, str]], sampling: Any
+) -> None:
+    """The shape below the transform of the first copy, and an instance of it below that of each other one."""
+    matrices = np.tile(np.eye(4), (*copies.places.shape[:2], 1, 1))  # of row vectors
+    linear = rotation_matrices(copies.turns.astype(np.float64)) * copies.scales[:, :, None, :]
+    matrices[..., :3, :3], matrices[..., 3, :3] = linear.swapaxes(2, 3), copies.places
+    places = [AbcGeom.OXform(root, f"{name}_{number}", sampling) for number in range(obj.copies)]
+    for place, track in zip(places, matrices.swapaxes(0, 1)):
+        for matrix in track:
+            sample = AbcGeom.XformSample()
+            sample.setMatrix(imath.M44d(*matrix.reshape(-1).tolist()))
+            place.getSchema().set(sample)
+    one = one_copy(obj)
+    obj.target = one.target = KINDS[obj.kind](places[0], name)
+    own = {
+        key: (values if domain == "constant" else rows_of_one(values, obj), domain)
+        for key, (values, domain) in _rows(statics, obj).items()
+    }
+    _add(one, copies.shape, own)
+    for place in places[1:]:
+        place.addChildInstance(one.target, name)
+
+
+def _bind_materials(motion: Any, objects: list[SceneObject]) -> None:
+    """Materials by their names alone: a set of the faces that have one."""
+    labels, names = face_materials(motion) or (np.empty(0), [])
+    sets = distinct(re.sub(r"[/\0]", "_", name) or "material" for name in names)
+    for obj in objects if sets else ():
+        own = rows_of_one(labels[obj.face_rows], obj) if obj.copies > 1 else labels[obj.face_rows]
+        for label, faces in material_runs(own, names) if obj.kind == "mesh" else ():
+            held = _filled(imath.IntArray, faces)
+            face_set = obj.target.getSchema().createFaceSet(sets[label])
+            face_set.getSchema().set(AbcGeom.OFaceSetSchemaSample(held))
+
+
+def _rows(statics: dict[str, tuple[np.ndarray, str]], obj: SceneObject) -> dict[str, tuple[np.ndarray, str]]:
+    return {name: (rows_of(values, domain, obj), domain) for name, (values, domain) in statics.items()}
+
+
+def _filled(kind: Any, values: np.ndarray) -> Any:
+    array = kind(len(values))
+    if len(values):
+        np.asarray(memoryview(array))[...] = values
+    return array
+
+
+# ---- samples ----
+
+
+def _add(obj: SceneObject, positions: np.ndarray, own: dict[str, tuple[np.ndarray, str]] | None) -> None:
+    """A sample of the points; the first one brings what does not move, the rows of the object."""
+    points = _filled(imath.V3fArray, positions)
+    schema = obj.target.getSchema()
+    if own is None:
+        sample = {
+            "mesh": AbcGeom.OPolyMeshSchemaSample,
+            "curves": AbcGeom.OCurvesSchemaSample,
+            "points": AbcGeom.OPointsSchemaSample,
+        }[obj.kind](points)
+        schema.set(sample)
+        return
+    order = turned_corners(obj.faces[0])
+    own = {name: (values[order] if domain == "corner" else values, domain) for name, (values, domain) in own.items()}
+    # samples refer to arrays that somebody has to keep until they are written
+    held = {
+        "points": points,
+        "ids": _filled(imath.IntArray, np.arange(obj.count)),
+        "counts": _filled(imath.IntArray, obj.faces[0]),
+        "curves": _filled(imath.IntArray, obj.curves),
+        "indices": _filled(imath.IntArray, obj.faces[1][order]),
+    }
+    schema.set({"mesh": _mesh_sample, "curves": _curve_sample, "points": _point_sample}[obj.kind](obj, held, own))
+    for name, (values, domain) in own.items():
+        if len(values) and (domain in ("vertex", "constant") or obj.kind == "mesh"):
+            _write_param(schema.getArbGeomParams(), name, values, domain)
+
+
+def _mesh_sample(obj: SceneObject, held: dict, own: dict) -> Any:
+    further = {}
+    for name, row, array, keyword, kind in (
+        ("uv", (2,), imath.V2fArray, "iUVs", AbcGeom.OV2fGeomParamSample),
+        ("normals", (3,), imath.V3fArray, "iNormals", AbcGeom.ON3fGeomParamSample),
+    ):
+        values, domain = own.get(name, (None, ""))
+        if values is not None and values.shape[1:] == row and values.dtype == np.float32:
+            del own[name]
+            held[name] = _filled(array, values)
+            further[keyword] = kind(held[name], SCOPES[domain])
+    return AbcGeom.OPolyMeshSchemaSample(held["points"], held["indices"], held["counts"], **further)
+
+
+def _curve_sample(obj: SceneObject, held: dict, own: dict) -> Any:
+    is_cubic = obj.details.get("type") == "cubic"
+    kind = AbcGeom.CurveType.kCubic if is_cubic else AbcGeom.CurveType.kLinear
+    basis = AbcGeom.BasisType.kBsplineBasis if is_cubic else AbcGeom.BasisType.kNoBasis
+    is_closed = obj.details.get("wrap") == "periodic"
+    wrap = AbcGeom.CurvePeriodicity.kPeriodic if is_closed else AbcGeom.CurvePeriodicity.kNonPeriodic
+    return AbcGeom.OCurvesSchemaSample(
+        held["points"], held["curves"], iType=kind, iWrap=wrap, iBasis=basis, **_widths(held, own, "iWidth")
+    )
+
+
+def _point_sample(obj: SceneObject, held: dict, own: dict) -> Any:
+    return AbcGeom.OPointsSchemaSample(held["points"], held["ids"], **_widths(held, own, "iWidths"))
+
+
+def _widths(held: dict, own: dict, name: str) -> dict:
+    radius, domain = own.get("radius", (None, ""))
+    if radius is None or radius.dtype != np.float32 or radius.ndim != 1:
+        return {}
+    del own["radius"]
+    held["widths"] = _filled(imath.FloatArray, 2 * radius)
+    return {name: AbcGeom.OFloatGeomParamSample(held["widths"], SCOPES[domain])}
+
+
+# ---- static arrays ----
+
+
+def _divide(
+    motion: Any, objects: list[SceneObject]
+) -> tuple[dict[str, tuple[np.ndarray, str]], dict[str, tuple[np.ndarray, str]]]:
+    """Static arrays that Alembic has types and places for, and the others; each with its domain. Of copies it has those
+    that all copies share."""
+    fitting, left = {}, {}
+    for name, values in motion.attributes.items():
+        if name in KNOWN_ATTRIBUTES or name == FACE_MATERIAL and face_materials(motion):
+            continue
+        domain = domain_of(motion, name, values, motion.metadata.get("domains", {}))
+        key = values.dtype.str[1:], values.shape[1:]
+        fits = domain in DOMAINS and key in TYPES and values.dtype.isnative and "/" not in name and len(values)
+        fits = fits and (
+            domain == "constant"
+            or all(rows_of_one(rows_of(values, domain, obj), obj) is not None for obj in objects if obj.copies > 1)
+        )
+        (fitting if fits else left)[name] = values, domain
+    return fitting, left
+
+
+def _write_param(params: Any, name: str, values: np.ndarray, domain: str) -> None:
+    array, kind = TYPES[values.dtype.str[1:], values.shape[1:]]
+    scope = SCOPES[domain]
+    param = getattr(AbcGeom, f"O{kind}GeomParam")(params, name, False, scope, 1)
+    held = _filled(array, values)
+    param.set(getattr(AbcGeom, f"O{kind}GeomParamSample")(held, scope))
+
+
+def _keep_own(properties: Any, motion: Any, left: dict[str, tuple[np.ndarray, str]]) -> None:
+    kept = {key: value for key, value in motion.metadata.items() if key not in KNOWN_METADATA}
+    Abc.OStringProperty(properties, OWN).setValue(json.dumps(kept))
+    for i, (descriptor, raw) in enumerate(own_arrays(motion, left)):
+        Abc.OUcharArrayProperty(properties, f"array{i}").setValue(_filled(imath.UnsignedCharArray, raw))
+        Abc.OStringProperty(properties, f"array{i}{DESCRIPTOR}").setValue(json.dumps(descriptor._asdict()))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,35 @@
+"""Text as people are shown it: what files and servers say can neither steer a terminal nor give away keys. It imports
+nothing heavy, for the command line needs it to explain itself."""
+
+from __future__ import annotations
+
+import re
+from urllib.parse import urlsplit
+
+_UNSAFE = re.compile("[\\x00-\\x09\\x0b-\\x1f\\x7f-\\x9f\\u061c\\u200e\\u200f\\u2028-\\u202e\\u2066-\\u2069]")
+_USER = re.compile(r"(?<=://)[^\s/?#'\"<>]*@")
+_QUERY = re.compile(r"(://[^\s?#'\"<>]*)([?#][^\s'\"<>]*)")
+_VALUE = re.compile(r"(?<==)[^&;#\s'\"<>]+")
+
+
+def shown(text: str) -> str:
+    """Lines of `text` as a terminal may have them, and with the URLs in it as `redacted`."""
+    return escaped(redacted(text))
+
+
+def escaped(text: str) -> str:
+    """Lines of `text` without what moves a cursor, sets colours or turns the direction of writing."""
+    return _UNSAFE.sub(lambda found: ascii(found[0])[1:-1], text)
+
+
+def redacted(text: str) -> str:
+    """`text` without users, passwords and the values of queries in URLs, which may be keys."""
+    if "://" not in text:
+        return text
+    return _QUERY.sub(lambda found: found[1] + _VALUE.sub("...", found[2]), _USER.sub("", text))
+
+
+def without_secrets(url: str) -> str:
+    """A URL as messages show it: without user, password and query."""
+    parts = urlsplit(url)
+    return f"{parts.scheme}://{parts.netloc.rpartition('@')[2]}{parts.path}"

@@ -1,0 +1,113 @@
+"""Reads a file in a process of its own, for libraries that crash on damaged files or take all the memory that these ask
+for. The process (reader_main.py) may take options.max_memory bytes; it gives frames when it is asked for them, and its
+end becomes a ClipError.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import io
+import json
+import os
+import subprocess
+import sys
+import threading
+import weakref
+from os import PathLike, fspath
+from typing import Any
+
+import numpy as np
+
+from athcodec.clip import MotionClip, Skin
+from athcodec.errors import ClipError
+from athcodec.frames import Frames
+from athcodec.plain_files import open_plain
+from athcodec.sources import ReadOptions
+from athcodec.sources.opening import FileWatch, closing_on_failure, naming
+
+ARRAYS = ("vertex_branch", "branch_parent", "stem_index", "edges", "faces")
+MAIN = "athcodec.sources.reader_main"
+
+
+def read_apart(path: str | PathLike[str], options: ReadOptions, module: str, crashed: str) -> MotionClip:
+    """The clip that `open_clip` of a module gives, there. crashed: the beginning of what to say where it has crashed.
+    Raises ClipError, OSError."""
+    path = fspath(path)
+    open_plain(path).close()
+    process = _Process(path, options, module, crashed)
+    with naming(path), closing_on_failure(process), np.load(io.BytesIO(process.described)) as found:
+        arrays = {name: found[name] for name in found.files}
+        attributes = {name.split("/", 1)[1]: values for name, values in arrays.items() if "/" in name}
+        said = json.loads(arrays["said"].tobytes())
+        shape, dtype = tuple(said["shape"]), np.dtype(said["dtype"])
+
+        def frames(start: int, stop: int) -> np.ndarray:
+            return np.frombuffer(process.ask(f"{start} {stop}"), dtype).reshape(stop - start, *shape[1:])
+
+        skin = None
+        if "joint_parent" in arrays:
+            skin = Skin(arrays["joint_parent"], arrays["vertex_joint"], tuple(said["joint_names"]))
+        clip = MotionClip(
+            Frames(frames, *shape[:2], dtype),
+            arrays["time"],
+            rest=arrays["rest"],
+            attributes=attributes,
+            metadata=said["metadata"],
+            resource=process,
+            unchanged=FileWatch.of({file: tuple(stamp) for file, stamp in said["files"].items()}),
+            not_read=said["not_read"],
+            skin=skin,
+            **{name: arrays[name] for name in ARRAYS if name in arrays},
+        )
+        clip.rest_given = said["rest_given"]
+        return clip
+
+
+class _Process:
+    """The process that reads."""
+
+    def __init__(self, path: str, options: ReadOptions, module: str, crashed: str):
+        self._lock = threading.Lock()
+        self._crashed = (
+            f"{crashed} has crashed on it, or found no room in {options.max_memory:,} bytes (--max-memory, max_memory=)"
+        )
+        env = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+        self._process = subprocess.Popen(
+            [sys.executable, "-m", MAIN, module],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            env=env,
+        )
+        self._end = weakref.finalize(self, _stop, self._process)
+        wanted: dict[str, Any] = dataclasses.asdict(options)
+        wanted |= {"path": os.path.abspath(path), "mesh": None, "root": None}
+        wanted |= {name: list(wanted[name]) for name in ("only", "takes", "skip")}
+        with naming(path), closing_on_failure(self):
+            self.described = self.ask(json.dumps(wanted))
+
+    def ask(self, line: str) -> bytes:
+        """What the process answers. Raises ClipError where it says what is wrong, or has ended."""
+        if not self._end.alive:
+            raise ClipError("positions: the clip is closed")
+        with self._lock:
+            try:
+                self._process.stdin.write(line.encode() + b"\n")
+                self._process.stdin.flush()
+                answer = json.loads(self._process.stdout.readline() or b"{}")
+                data = self._process.stdout.read(answer.get("size", 0))
+            except (BrokenPipeError, ValueError):
+                answer, data = {}, b""
+        if "error" in answer:
+            raise ClipError(answer["error"])
+        if len(data) != answer.get("size"):
+            raise ClipError(self._crashed)
+        return data
+
+    def close(self) -> None:
+        self._end()
+
+
+def _stop(process: subprocess.Popen) -> None:
+    process.kill()
+    process.communicate()

@@ -1,0 +1,722 @@
+"""Reads USD stages: meshes, curves and points whose points, transforms or skeletons move.
+
+Every visible prim of the kinds Mesh, BasisCurves, NurbsCurves, HermiteCurves and Points with the purpose "default" or
+"render" is read, also inside instances, into world space: time samples (interpolated as USD does), transforms, and of
+UsdSkel the skinning and the blend shapes. Each such prim in a prototype of a PointInstancer becomes one object, of as
+many copies as the instancer shows at any time. The frames are the whole time codes of the stage's range where it has
+one, else the time codes that have samples; options.fps sets another rate. Static primvars become attributes, the names
+of materials the metadata "material_names", of which the attribute "face_material" says the number for each face.
+
+Points are float32 in USD and so they are here. The stage is opened as it is composed (layers, payloads, value clips);
+what else it holds, such as layers that cannot be found, patches, tetrahedra, what is in materials, is named in the
+clip's `not_read`; velocities are not read. A stage is opened by its structure; positions are read frame by frame. USD
+trusts the lengths of arrays in a binary file even where it is damaged: it is imported by the process of reader_main.py
+alone, under a limit of memory.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pxr import Gf, Sdf, Tf, Usd, UsdGeom, UsdShade, UsdSkel, Vt
+
+from athcodec.clip import MotionClip, Skin
+from athcodec.errors import ClipError
+from athcodec.sources import ReadOptions
+from athcodec.sources.crate import check_crates
+from athcodec.sources.opening import FileWatch, check_inside
+from athcodec.sources.scene_objects import (
+    OWN,
+    ArrayDescriptor,
+    SceneObject,
+    Static,
+    clip_of_objects,
+    frames_of_objects,
+    own_metadata,
+    transformed,
+)
+from athcodec.units import METRES
+
+MAX_FRAMES = 1 << 24
+READ = frozenset(("", "Xform", "Scope", "SkelRoot", "Skeleton", "SkelAnimation", "BlendShape"))  # what is no loss
+WHOLE = ("Material",)  # prims that are named without those below them
+KNOWN = ("Material", "Camera", "GeomSubset")
+PLACES = ("positions", "orientations", "orientationsf", "scales")
+PURPOSES = (UsdGeom.Tokens.default_, UsdGeom.Tokens.render)
+NAMES = {"st": "uv", "displayColor": "colors"}
+DOMAINS = {"vertex": "vertex", "varying": "vertex", "faceVarying": "corner", "uniform": "face", "constant": "constant"}
+
+
+def open_clip(path: str, options: ReadOptions) -> MotionClip:
+    """The clip in a USD file. Raises ClipError, OSError."""
+    check_crates(path)
+    with quietly():
+        return _clip(_Stage(path, options.allow_outside), options)
+
+
+@contextmanager
+def quietly() -> Iterator[None]:
+    """Keeps USD's messages off stderr; its errors become ClipErrors of one line."""
+    with Tf.DiagnosticTrap() as trap:
+        try:
+            yield
+        except Tf.ErrorException as error:
+            raise ClipError(f"stage: {_one_line(error)}") from None
+        finally:
+            trap.Clear()
+
+
+def _one_line(error: Exception) -> str:
+    """The message of the first of USD's errors, without its place in USD's source."""
+    try:
+        lines = [line.strip() for line in str(error).splitlines() if line.strip()]
+    except UnicodeDecodeError:  # it quotes bytes of the file
+        return "cannot be parsed"
+    text = (lines or [type(error).__name__])[0].split(" : '", 1)
+    return text[-1].rstrip("'")
+
+
+class _Stage:
+    """An open stage, and whether the files that it is made of have stayed as they were."""
+
+    def __init__(self, path: str, allow_outside: bool):
+        known = Sdf.Layer.Find(path)
+        if known:
+            known.Reload()  # USD keeps layers for as long as anybody has them open
+        self.stage = Usd.Stage.Open(path)
+        if not self.stage:
+            raise ClipError("stage: cannot be opened")
+        self.errors = [" ".join(str(error).split()) for error in self.stage.GetCompositionErrors()]
+        files = [layer.realPath for layer in self.stage.GetUsedLayers() if os.path.isfile(layer.realPath)]
+        self.unchanged = FileWatch(*files)
+        for file in files:
+            check_inside(Path(self.stage.GetRootLayer().realPath).parent, file, allow_outside)
+
+    def close(self) -> None:
+        self.stage = None
+
+    @contextmanager
+    def reading(self) -> Iterator[None]:
+        if self.stage is None:
+            raise ClipError("positions: the clip is closed")
+        with quietly():
+            yield
+
+
+@dataclass
+class _Prim(SceneObject):
+    """A prim that is read, and how its points are found."""
+
+    prim: Usd.Prim = None
+    points: Usd.AttributeQuery = None
+    skeleton: _Skeleton | None = None
+    instances: _Instances | None = None
+    moves: bool = False  # its transforms do, or a skeleton moves it
+
+
+def _clip(source: _Stage, options: ReadOptions) -> MotionClip:
+    stage = source.stage
+    layer = own_metadata(stage.GetRootLayer().customLayerData.get(OWN))
+    not_read: dict[str, list[str]] = {"missing": source.errors} if source.errors else {}
+    objects = _find_objects(stage, options.only, not_read)
+    skins = _bind_skeletons(stage, objects, not_read)
+    codes, rate = _time_codes(stage, objects, options.fps, layer.pop("irregular", False))
+    objects = _visible(objects, codes, not_read)
+    _measure(objects, codes)
+    cache = UsdGeom.XformCache()
+
+    def sample(obj: _Prim, frame: int) -> tuple[np.ndarray, np.ndarray]:
+        points, space = _points(obj, codes, frame), obj.prim if obj.skeleton is None else obj.skeleton.space
+        cache.SetTime(codes[frame])
+        if obj.instances is not None:
+            return points, obj.instances.matrices(cache, obj.prim, codes[frame])
+        return points, np.array(cache.GetLocalToWorldTransform(space))
+
+    frames = frames_of_objects(objects, len(codes), sample, lambda frame: _frame_name(codes, frame), source.reading)
+    return clip_of_objects(
+        objects,
+        frames,
+        (codes - codes[0]) / stage.GetTimeCodesPerSecond(),
+        layer | _metadata(stage, codes, rate),
+        _kept_arrays(stage),
+        options,
+        resource=source,
+        unchanged=source.unchanged,
+        skin=_skin(objects, skins),
+        not_read=not_read,
+    )
+
+
+# ---- prims ----
+
+
+def _find_objects(stage: Usd.Stage, only: Sequence[str], not_read: dict[str, list[str]]) -> list[_Prim]:
+    """All with points. What has none, or is no object, is added to not_read by the name of its type."""
+    objects = []
+    prims = iter(Usd.PrimRange(stage.GetPseudoRoot(), Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate)))
+    for prim in prims:
+        if prim.IsA(UsdGeom.PointInstancer):
+            prims.PruneChildren()
+            objects += _instanced(UsdGeom.PointInstancer(prim), only, not_read)
+            continue
+        obj = _object(prim, only, not_read)
+        if obj is not None:
+            objects.append(obj)
+        if prim.GetTypeName() in WHOLE:
+            prims.PruneChildren()
+    if not objects:
+        what = f" named like {', '.join(only)}" if only else ""
+        raise ClipError(
+            f"prims: got none with points{what}, expected a visible Mesh, BasisCurves, NurbsCurves or Points"
+        )
+    return objects
+
+
+def _object(prim: Usd.Prim, only: Sequence[str], not_read: dict[str, list[str]]) -> _Prim | None:
+    kind, path = _kind(prim), str(prim.GetPath())
+    if kind is None:
+        if prim.GetTypeName() not in READ and not _is_material_subset(prim):
+            not_read.setdefault(_kind_not_read(prim), []).append(path)
+        return None
+    if not _wanted(prim, only):
+        return None
+    points = Usd.AttributeQuery(UsdGeom.PointBased(prim).GetPointsAttr())
+    if UsdGeom.Imageable(prim).ComputePurpose() not in PURPOSES:
+        not_read.setdefault("hidden", []).append(path)
+    elif points.HasAuthoredValue():
+        return _Prim(kind, prim.GetName(), path, prim=prim, points=points)
+    else:
+        not_read.setdefault("empty", []).append(path)
+    return None
+
+
+def _is_material_subset(prim: Usd.Prim) -> bool:
+    return prim.IsA(UsdGeom.Subset) and UsdGeom.Subset(prim).GetFamilyNameAttr().Get() == UsdShade.Tokens.materialBind
+
+
+def _kind_not_read(prim: Usd.Prim) -> str:
+    if prim.HasAPI("LightAPI"):
+        return "Light"
+    return str(prim.GetTypeName()) if prim.IsA(UsdGeom.Boundable) or prim.GetTypeName() in KNOWN else "other"
+
+
+def _instanced(
+    instancer: UsdGeom.PointInstancer, only: Sequence[str], not_read: dict[str, list[str]]
+) -> Iterator[_Prim]:
+    """What is in the prototypes of a PointInstancer, each as often as the instancer has it."""
+    path = instancer.GetPath()
+    indices = _array(instancer.GetProtoIndicesAttr().Get(Usd.TimeCode.EarliestTime()), np.int64)
+    if UsdGeom.Imageable(instancer).ComputePurpose() not in PURPOSES:
+        not_read.setdefault("hidden", []).append(str(path))
+        return
+    for number, target in enumerate(instancer.GetPrototypesRel().GetForwardedTargets()):
+        rows, prototype = np.flatnonzero(indices == number), instancer.GetPrim().GetStage().GetPrimAtPath(target)
+        if not len(rows) or not prototype:
+            continue
+        prims = iter(Usd.PrimRange(prototype, Usd.TraverseInstanceProxies(Usd.PrimIsActive & Usd.PrimIsLoaded)))
+        for prim in prims:
+            if prim.IsA(UsdGeom.PointInstancer):
+                not_read.setdefault("PointInstancer inside a PointInstancer", []).append(str(prim.GetPath()))
+                prims.PruneChildren()
+                continue
+            if prim.GetTypeName() in WHOLE:
+                prims.PruneChildren()
+            wanted = only if not _wanted(instancer.GetPrim(), only) else ()
+            obj = _object(prim, wanted, not_read)
+            if obj is not None:
+                obj.path = f"{path}:{obj.path.removeprefix(f'{path}/')}"
+                obj.instances = _Instances(instancer, prototype, rows)
+                yield obj
+
+
+class _Instances:
+    """The copies of one prototype that a PointInstancer has: `rows` of its arrays."""
+
+    def __init__(self, instancer: UsdGeom.PointInstancer, prototype: Usd.Prim, rows: np.ndarray):
+        self.instancer, self.prototype, self.rows = instancer, prototype, rows
+
+    @property
+    def attributes(self) -> list[Usd.Attribute]:
+        """Those that say which instances there are, and where."""
+        prim = self.instancer.GetPrim()
+        return [prim.GetAttribute(name) for name in PLACES if prim.HasAttribute(name)]
+
+    def keep_visible(self, codes: np.ndarray) -> None:
+        """Leaves out those that are not shown at any time. Raises ClipError where their number changes."""
+        indices = self.instancer.GetProtoIndicesAttr()
+        times = {float(codes[0])}
+        for attribute in (indices, self.instancer.GetInvisibleIdsAttr()):
+            times.update(time for time in attribute.GetTimeSamples() if codes[0] <= time <= codes[-1])
+        first = _array(indices.Get(codes[0]), np.int64)
+        shown = np.zeros(len(first), bool)
+        for time in sorted(times):
+            if not np.array_equal(_array(indices.Get(time), np.int64), first):
+                frame = min(int(np.searchsorted(codes, time - 1e-9)), len(codes) - 1)
+                raise ClipError(
+                    f"{self.instancer.GetPath()}: protoIndices changes in frame {frame} (time code {time:g}), expected "
+                    "the same instances in all"
+                )
+            mask = self.instancer.ComputeMaskAtTime(time)
+            shown |= np.array(mask, bool) if len(mask) else True
+        self.rows = self.rows[shown[self.rows]]
+
+    def matrices(self, cache: UsdGeom.XformCache, prim: Usd.Prim, code: float) -> np.ndarray:
+        """(copies, 4, 4) from a prim of the prototype to the world, at the time of the cache."""
+        found = self.instancer.ComputeInstanceTransformsAtTime(
+            code, code, UsdGeom.PointInstancer.IncludeProtoXform, UsdGeom.PointInstancer.IgnoreMask
+        )
+        placed = np.array(found).reshape(-1, 4, 4)
+        if len(placed) <= self.rows.max(initial=-1):
+            raise ClipError(
+                f"{self.instancer.GetPath()}: got {len(placed)} positions at time code {code:g}, expected more"
+            )
+        inner = np.array(cache.ComputeRelativeTransform(prim, self.prototype)[0])
+        return inner @ placed[self.rows] @ np.array(cache.GetLocalToWorldTransform(self.instancer.GetPrim()))
+
+    def add_arrays(self, obj: _Prim, code: float) -> None:
+        """Adds the static arrays that the instancer has for each of its copies."""
+        for primvar in UsdGeom.PrimvarsAPI(self.instancer).GetPrimvarsWithValues():
+            name, values = str(primvar.GetPrimvarName()), _numbers(primvar.ComputeFlattened(code))
+            if values is None or primvar.ValueMightBeTimeVarying() or len(values) <= self.rows.max(initial=-1):
+                obj.left_out.append(name)
+            elif NAMES.get(name, name) not in obj.statics:
+                obj.left_out = [other for other in obj.left_out if other != NAMES.get(name, name)]
+                spread = np.repeat(values[self.rows], obj.count // obj.copies, axis=0)
+                obj.keep(NAMES.get(name, name), "vertex", spread)
+
+
+def _kind(prim: Usd.Prim) -> str | None:
+    for schema, kind in ((UsdGeom.Mesh, "mesh"), (UsdGeom.Curves, "curves"), (UsdGeom.Points, "points")):
+        if prim.IsA(schema):
+            return kind
+    return None
+
+
+def _wanted(prim: Usd.Prim, only: Sequence[str]) -> bool:
+    names = (prim.GetName(), str(prim.GetPath()))
+    return not only or any(fnmatchcase(name, pattern) for pattern in only for name in names)
+
+
+def _lineage(prim: Usd.Prim) -> Iterator[Usd.Prim]:
+    while prim and not prim.IsPseudoRoot():
+        yield prim
+        prim = prim.GetParent()
+
+
+def _all_above(obj: _Prim) -> Iterator[Usd.Prim]:
+    """The prims whose transforms place an object."""
+    yield from _lineage(obj.prim)
+    if obj.instances is not None:
+        yield from _lineage(obj.instances.instancer.GetPrim())
+
+
+def _visible(objects: list[_Prim], codes: np.ndarray, not_read: dict[str, list[str]]) -> list[_Prim]:
+    """Those that are visible at some time from the first frame to the last."""
+
+    def seen(prim: Usd.Prim) -> bool:
+        times = {float(codes[0])}
+        for ancestor in _lineage(prim):
+            attribute = UsdGeom.Imageable(ancestor).GetVisibilityAttr() if ancestor.IsA(UsdGeom.Imageable) else None
+            times.update(t for t in (attribute.GetTimeSamples() if attribute else ()) if codes[0] <= t <= codes[-1])
+        image = UsdGeom.Imageable(prim)
+        return any(image.ComputeVisibility(time) != UsdGeom.Tokens.invisible for time in times)
+
+    left = []
+    for obj in objects:
+        if obj.instances is not None:
+            obj.instances.keep_visible(codes)
+        place = obj.prim if obj.instances is None else obj.instances.instancer.GetPrim()
+        if seen(place) and (obj.instances is None or len(obj.instances.rows)):
+            left.append(obj)
+        else:
+            not_read.setdefault("hidden", []).append(obj.path)
+    if not left:
+        raise ClipError(f"prims: got {len(objects)} that are invisible, expected a visible one")
+    return left
+
+
+def _measure(objects: list[_Prim], codes: np.ndarray) -> None:
+    """Fills in what the objects are at the first frame."""
+    first, cache = 0, UsdGeom.XformCache(codes[0])
+    for obj in objects:
+        points = _points(obj, codes, 0)
+        obj.first, obj.count = first, len(points)
+        obj.moves = obj.skeleton is not None or any(
+            prim.IsA(UsdGeom.Xformable) and UsdGeom.Xformable(prim).TransformMightBeTimeVarying()
+            for prim in _all_above(obj)
+        )
+        if obj.instances is not None:
+            obj.moves |= any(attribute.ValueMightBeTimeVarying() for attribute in obj.instances.attributes)
+        obj.is_rigid = not obj.points.ValueMightBeTimeVarying()
+        obj.is_still = not obj.moves and obj.is_rigid
+        _topology(obj, codes)
+        _statics(obj, codes, np.array(cache.GetLocalToWorldTransform(obj.prim)))
+        if obj.instances is not None:
+            obj.statics.pop("normals", None)  # they turn with each copy
+            obj.repeat(len(obj.instances.rows))
+            obj.instances.add_arrays(obj, codes[0])
+        first += obj.count
+    if first == 0:
+        raise ClipError("points: got none, expected at least one")
+
+
+def _topology(obj: _Prim, codes: np.ndarray) -> None:
+    if obj.kind == "mesh":
+        mesh = UsdGeom.Mesh(obj.prim)
+        obj.face_counts = _fixed(obj, mesh.GetFaceVertexCountsAttr(), codes)
+        obj.face_indices = _fixed(obj, mesh.GetFaceVertexIndicesAttr(), codes)
+        _note(obj, "orientation", mesh.GetOrientationAttr(), "rightHanded")
+        _bind_materials(obj)
+    elif obj.kind == "curves":
+        obj.curve_counts = _fixed(obj, UsdGeom.Curves(obj.prim).GetCurveVertexCountsAttr(), codes)
+        if obj.prim.IsA(UsdGeom.BasisCurves):
+            curves = UsdGeom.BasisCurves(obj.prim)
+            _note(obj, "type", curves.GetTypeAttr(), "linear")
+            _note(obj, "wrap", curves.GetWrapAttr(), "nonperiodic")
+            if "type" in obj.details:
+                _note(obj, "basis", curves.GetBasisAttr(), "")
+    obj.check()
+
+
+def _bind_materials(obj: _Prim) -> None:
+    """By the names of the materials that the mesh and subsets of its faces are bound to."""
+    binding = UsdShade.MaterialBindingAPI(obj.prim)
+    material, _ = binding.ComputeBoundMaterial()
+    if material:
+        obj.bind(_material_name(material))
+    for subset in binding.GetMaterialBindSubsets():
+        material, _ = UsdShade.MaterialBindingAPI(subset.GetPrim()).ComputeBoundMaterial()
+        faces = _array(subset.GetIndicesAttr().Get(Usd.TimeCode.EarliestTime()), np.int64)
+        if material and len(faces) and 0 <= faces.min() and faces.max() < len(obj.face_counts):
+            obj.bind(_material_name(material), faces)
+
+
+def _material_name(material: UsdShade.Material) -> str:
+    return str(material.GetPrim().GetDisplayName() or material.GetPrim().GetName())
+
+
+def _note(obj: _Prim, name: str, attribute: Usd.Attribute, usual: str) -> None:
+    value = attribute.Get()
+    if value and value != usual:
+        obj.details[name] = str(value)
+
+
+def _fixed(obj: _Prim, attribute: Usd.Attribute, codes: np.ndarray) -> np.ndarray:
+    """Integers that stay the same in every frame; ClipError where they change."""
+    query = Usd.AttributeQuery(attribute)
+    first = _array(query.Get(codes[0]), np.int32)
+    if query.GetNumTimeSamples() > 1 and query.ValueMightBeTimeVarying():
+        for sample in query.GetTimeSamplesInInterval(_interval(codes)):
+            if not np.array_equal(_array(query.Get(sample), np.int32), first):
+                frame = int(np.searchsorted(codes, sample - 1e-9))
+                raise ClipError(
+                    f"{obj.path}: {attribute.GetName()} changes in frame {min(frame, len(codes) - 1)} "
+                    f"(time code {sample:g}), expected the same vertices and faces in all"
+                )
+    return first
+
+
+def _interval(codes: np.ndarray) -> Gf.Interval:
+    return Gf.Interval(float(codes[0]), float(codes[-1]))
+
+
+def _array(value: Any, dtype: Any) -> np.ndarray:
+    return np.empty(0, dtype) if value is None else np.array(value, dtype)
+
+
+# ---- time ----
+
+
+def _time_codes(stage: Usd.Stage, objects: list[_Prim], fps: float | None, irregular: bool) -> tuple[np.ndarray, float]:
+    """Time codes to read, and frames per second."""
+    own = stage.GetTimeCodesPerSecond()
+    if not 0 < own < math.inf:
+        raise ClipError(f"timeCodesPerSecond: got {own}, expected a positive number")
+    start, end, samples = stage.GetStartTimeCode(), stage.GetEndTimeCode(), None
+    if not stage.HasAuthoredTimeCodeRange() or not start <= end or irregular:
+        samples = _sampled(objects)
+        if not fps:
+            return (np.array(samples) if samples else np.zeros(1)), own
+        start, end = (samples[0], samples[-1]) if samples else (0.0, 0.0)
+    if not (math.isfinite(start) and math.isfinite(end)):
+        raise ClipError(f"time codes: got {start} to {end}, expected finite numbers")
+    step = own / fps if fps else 1.0
+    count = math.floor((end - start) / step + 1e-6) + 1
+    if count > MAX_FRAMES:
+        raise ClipError(f"time codes: got {start:g} to {end:g}, expected at most {MAX_FRAMES} frames")
+    return start + np.arange(count) * step, fps or own
+
+
+def _sampled(objects: list[_Prim]) -> list[float]:
+    found: set[float] = set()
+    for obj in objects:
+        found.update(obj.points.GetTimeSamples())
+        prims = [*_all_above(obj), *(() if obj.skeleton is None else _lineage(obj.skeleton.query.GetPrim()))]
+        for attribute in () if obj.instances is None else obj.instances.attributes:
+            found.update(attribute.GetTimeSamples())
+        for prim in prims:
+            if prim.IsA(UsdGeom.Xformable):
+                found.update(UsdGeom.Xformable(prim).GetTimeSamples())
+        if obj.skeleton is not None and obj.skeleton.animation:
+            found.update(obj.skeleton.animation.GetJointTransformTimeSamples())
+            found.update(obj.skeleton.animation.GetBlendShapeWeightTimeSamples())
+    return sorted(time for time in found if math.isfinite(time))
+
+
+def _metadata(stage: Usd.Stage, codes: np.ndarray, rate: float) -> dict[str, Any]:
+    start = float(codes[0]) * (rate / stage.GetTimeCodesPerSecond())
+    metadata: dict[str, Any] = {"fps": float(rate), "start_frame": int(start) if start == int(start) else start}
+    if stage.HasAuthoredMetadata(UsdGeom.Tokens.metersPerUnit):
+        metres = UsdGeom.GetStageMetersPerUnit(stage)
+        symbols = [symbol for symbol, value in METRES.items() if math.isclose(value, metres, rel_tol=1e-6)]
+        metadata |= {"unit": symbols[0]} if symbols else {"meters_per_unit": float(metres)}
+    if stage.HasAuthoredMetadata(UsdGeom.Tokens.upAxis):
+        metadata["up_axis"] = str(UsdGeom.GetStageUpAxis(stage)).lower()
+    return metadata
+
+
+# ---- what does not move ----
+
+
+def _statics(obj: _Prim, codes: np.ndarray, matrix: np.ndarray) -> None:
+    for primvar in UsdGeom.PrimvarsAPI(obj.prim).FindPrimvarsWithInheritance():
+        if obj.skeleton is not None and str(primvar.GetPrimvarName()).startswith("skel:"):
+            continue  # which has moved it
+        if primvar.HasValue() and primvar.ValueMightBeTimeVarying():
+            obj.left_out.append(primvar.GetPrimvarName())
+        elif primvar.HasValue():
+            values = primvar.ComputeFlattened(codes[0])
+            name = _said(primvar.GetAttr(), "name") or primvar.GetPrimvarName()
+            _keep(
+                obj,
+                NAMES.get(name, name),
+                values,
+                primvar.GetInterpolation(),
+                primvar.GetElementSize(),
+                primvar.GetAttr(),
+            )
+    _rename_first_uv(obj)
+    normals = UsdGeom.PointBased(obj.prim).GetNormalsAttr()
+    if normals.HasAuthoredValue() and not normals.ValueMightBeTimeVarying() and "normals" not in obj.statics:
+        _keep(obj, "normals", normals.Get(codes[0]), UsdGeom.PointBased(obj.prim).GetNormalsInterpolation())
+    obj.turn_normals(matrix, obj.moves)
+    if obj.kind != "mesh":
+        _widths(obj, codes, matrix)
+    rest = obj.statics.get("rest")
+    if rest is not None and rest.values.shape[1:] == (3,) and rest.values.dtype.kind == "f":
+        obj.statics["rest"] = Static(rest.domain, transformed(rest.values, matrix))
+
+
+def _rename_first_uv(obj: _Prim) -> None:
+    """Where no primvar is called st, the first texture coordinates are what a renderer takes."""
+    if "uv" in obj.statics:
+        return
+    for primvar in UsdGeom.PrimvarsAPI(obj.prim).GetPrimvars():
+        name = primvar.GetPrimvarName()
+        if primvar.GetTypeName().role == Sdf.ValueRoleNames.TextureCoordinate and name in obj.statics:
+            obj.statics = {("uv" if key == name else key): static for key, static in obj.statics.items()}
+            return
+
+
+def _widths(obj: _Prim, codes: np.ndarray, matrix: np.ndarray) -> None:
+    schema = (UsdGeom.Curves if obj.kind == "curves" else UsdGeom.Points)(obj.prim)
+    widths = schema.GetWidthsAttr()
+    if widths.HasAuthoredValue() and not widths.ValueMightBeTimeVarying() and "radius" not in obj.statics:
+        _keep(obj, "radius", widths.Get(codes[0]), schema.GetWidthsInterpolation())
+        obj.halve_widths(matrix)
+
+
+def _keep(
+    obj: _Prim,
+    name: str,
+    values: Any,
+    interpolation: str,
+    element_size: int = 1,
+    attribute: Usd.Attribute | None = None,
+) -> None:
+    """Notes a static array where its rows fit the prim; strings and references to files are none."""
+    values = _numbers(values)
+    if values is None:
+        return
+    if element_size > 1 and len(values) % element_size == 0:
+        values = values.reshape(-1, element_size, *values.shape[1:])
+        values = values[..., 0] if values.shape[2:] == (1,) else values
+    obj.keep(name, DOMAINS.get(interpolation), _as_written(values, attribute))
+
+
+def _numbers(values: Any) -> np.ndarray | None:
+    if values is None:
+        return None
+    try:
+        array = np.array(values)
+    except (TypeError, ValueError):
+        return None
+    if array.dtype.kind not in "biuf" or not isinstance(values, (bool, int, float)) and array.ndim == 0:
+        return None
+    return array.reshape(-1) if array.ndim == 0 else array if _is_array(values) else array[None]
+
+
+def _is_array(values: Any) -> bool:
+    return type(values).__module__.startswith("pxr.Vt")
+
+
+def _as_written(values: np.ndarray, attribute: Usd.Attribute | None) -> np.ndarray:
+    """In the dtype that an array had before exporters/usd.py chose one that USD has."""
+    said = _said(attribute, "dtype") if attribute else None
+    return values.astype(said) if said in WRITTEN_DTYPES else values
+
+
+def _said(attribute: Usd.Attribute, key: str) -> str | None:
+    found = attribute.GetCustomDataByKey(f"{OWN}:{key}")
+    return found if isinstance(found, str) else None
+
+
+WRITTEN_DTYPES = ("|i1", "|b1", "<i2", "<u2", ">i2", ">u2", ">i4", ">u4", ">i8", ">u8", ">f2", ">f4", ">f8", "<f2")
+
+
+# ---- what exporters/usd.py has written of a clip that USD has no place for ----
+
+
+def _kept_arrays(stage: Usd.Stage) -> Iterator[tuple[ArrayDescriptor, bytes]]:
+    root = stage.GetDefaultPrim()
+    for attribute in root.GetAuthoredPropertiesInNamespace(OWN) if root else ():
+        values = attribute.Get() if isinstance(attribute, Usd.Attribute) else None
+        if isinstance(values, Vt.UCharArray):
+            name = _said(attribute, "name") or str(attribute.GetName())[len(OWN) + 1 :]
+            texts = (_said(attribute, key) or "" for key in ("dtype", "shape", "domain"))
+            yield ArrayDescriptor(name, *texts), np.array(values).tobytes()
+
+
+# ---- skeletons ----
+
+
+class _Skeleton:
+    """A skeleton and one mesh that it moves."""
+
+    def __init__(self, query: UsdSkel.SkeletonQuery, target: UsdSkel.SkinningQuery):
+        self.query, self.target = query, target
+        self.animation = query.GetAnimQuery()
+        self.skins = target.HasJointInfluences()
+        self._shapes = self._mapper = None
+        if target.HasBlendShapes() and self.animation:
+            self._shapes = UsdSkel.BlendShapeQuery(UsdSkel.BindingAPI(target.GetPrim()))
+            self._mapper = target.GetBlendShapeMapper()
+            self._indices = self._shapes.ComputeBlendShapePointIndices()
+            self._offsets = self._shapes.ComputeSubShapePointOffsets()
+
+    def deform(self, points: Vt.Vec3fArray, code: float) -> Vt.Vec3fArray:
+        """Points in the skeleton's space where joints move them, else in the mesh's own."""
+        points = Vt.Vec3fArray(points)
+        if self._shapes is not None:
+            self._blend(points, code)
+        if self.skins:
+            joints = self.query.ComputeSkinningTransforms(code)
+            if not joints or not self.target.ComputeSkinnedPoints(joints, points, code):
+                raise ClipError(f"{self.target.GetPrim().GetPath()}: its skeleton cannot be evaluated at {code:g}")
+        return points
+
+    def _blend(self, points: Vt.Vec3fArray, code: float) -> None:
+        weights = self.animation.ComputeBlendShapeWeights(code)
+        if weights is None:
+            return
+        if self._mapper is not None:
+            weights = self._mapper.Remap(weights, elementSize=1)
+        found = self._shapes.ComputeSubShapeWeights(weights)
+        if found is None or not self._shapes.ComputeDeformedPoints(*found, self._indices, self._offsets, points):
+            raise ClipError(f"{self.target.GetPrim().GetPath()}: its blend shapes cannot be evaluated at {code:g}")
+
+    @property
+    def space(self) -> Usd.Prim:
+        return self.query.GetPrim() if self.skins else self.target.GetPrim()
+
+    def largest(self, count: int) -> np.ndarray:
+        """(count,) joint of the skeleton with the largest weight on each vertex, -1 for none."""
+        found = self.target.ComputeVaryingJointInfluences(count) if self.skins else None
+        if not found or count == 0:
+            return np.full(count, -1, np.int32)
+        joints, weights = (np.array(values).reshape(count, -1) for values in found)
+        rows = np.arange(count), weights.argmax(axis=1)
+        chosen = joints[rows]
+        order = self.target.GetJointOrder()
+        if order:
+            places = {str(name): i for i, name in enumerate(self.query.GetJointOrder())}
+            own = np.array([places.get(str(name), -1) for name in order])
+            chosen = own[np.clip(chosen, 0, len(own) - 1)]
+        return np.where(weights[rows] > 0, chosen, -1).astype(np.int32)
+
+
+def _bind_skeletons(
+    stage: Usd.Stage, objects: list[_Prim], not_read: dict[str, list[str]]
+) -> list[UsdSkel.SkeletonQuery]:
+    by_path = {obj.prim.GetPath(): obj for obj in objects}
+    predicate = Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate)
+    queries, animations = [], {}
+    for prim in Usd.PrimRange(stage.GetPseudoRoot(), predicate):
+        if prim.IsA(UsdSkel.Animation):
+            animations[prim.GetPath()] = str(prim.GetPath())
+        if not prim.IsA(UsdSkel.Root):
+            continue
+        root, cache = UsdSkel.Root(prim), UsdSkel.Cache()
+        cache.Populate(root, predicate)
+        for binding in cache.ComputeSkelBindings(root, predicate):
+            query = cache.GetSkelQuery(binding.GetSkeleton())
+            queries.append((cache, query))  # the cache owns what the query refers to
+            for target in binding.GetSkinningTargets():
+                obj = by_path.get(target.GetPrim().GetPath())
+                if obj is not None and query and (target.HasJointInfluences() or target.HasBlendShapes()):
+                    if obj.instances is not None:
+                        not_read.setdefault("Skeleton of an instance", []).append(obj.path)
+                        continue
+                    obj.skeleton = _Skeleton(query, target)
+    for _, query in queries:
+        if query.GetAnimQuery():
+            animations.pop(query.GetAnimQuery().GetPrim().GetPath(), None)
+    if animations:
+        not_read["SkelAnimation"] = list(animations.values())
+    return queries
+
+
+def _skin(objects: list[_Prim], queries: list[tuple[Any, UsdSkel.SkeletonQuery]]) -> Skin | None:
+    """The joints of all skeletons, one after the other."""
+    parents, names, first = [], [], {}
+    for _, query in queries:
+        path = query.GetPrim().GetPath()
+        if path in first:
+            continue
+        first[path] = sum(map(len, parents))
+        own = np.array(query.GetTopology().GetParentIndices(), np.int32)
+        parents.append(np.where(own < 0, -1, own + first[path]))
+        names += [str(name) for name in query.GetJointOrder()]
+    if not names or not any(obj.skeleton is not None and obj.skeleton.skins for obj in objects):
+        return None
+    joints = np.full(sum(obj.count for obj in objects), -1, np.int32)
+    for obj in objects:
+        if obj.skeleton is not None:
+            own = obj.skeleton.largest(obj.count)
+            offset = first[obj.skeleton.query.GetPrim().GetPath()]
+            joints[obj.first : obj.first + obj.count] = np.where(own < 0, -1, own + offset)
+    return Skin(np.concatenate(parents).astype(np.int32), joints, names)
+
+
+# ---- positions ----
+
+
+def _points(obj: _Prim, codes: np.ndarray, frame: int) -> np.ndarray:
+    points = obj.points.Get(codes[frame])
+    if points is None:
+        raise ClipError(f"{obj.path}: got no points in {_frame_name(codes, frame)}")
+    if obj.skeleton is not None:
+        points = obj.skeleton.deform(points, float(codes[frame]))
+    return np.array(points, np.float32).reshape(-1, 3)
+
+
+def _frame_name(codes: np.ndarray, frame: int) -> str:
+    return f"frame {frame} (time code {codes[frame]:g})"

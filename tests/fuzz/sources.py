@@ -1,0 +1,313 @@
+"""Fuzzing of the readers of other formats: `python -m fuzz.sources KIND SECONDS SEED [guided]`, for cli.py.
+
+An input is a file of one format. It passes where it gives a clip, or one line of a ClipError, within SECONDS of time
+and MEMORY. Inputs are valid files, mutated by what they are made of: members of JSON, numbers in text, fields of
+headers, arrays of archives. With `guided`, which takes atheris (pip install atheris), libFuzzer chooses what to go on
+with.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import random
+import re
+import signal
+import struct
+import sys
+import tempfile
+import time
+import traceback
+import warnings
+import zipfile
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+
+KINDS = ("glb", "pc2", "mdd", "obj", "ply", "xdmf", "npz", "vtu")
+BUDGET = 64 << 20  # bytes, max_memory
+MEMORY = 256 << 20  # bytes by which a process may grow: the budget, Python's own objects and what NumPy keeps
+SECONDS = 20
+CORPUS = Path(__file__).resolve().parent.parent / "corpus"
+NUMBERS = (0, 1, -1, 2, 3, 255, 65535, -(2**31), 2**31 - 1, 2**32, 2**53, 2**63, 10**30, 1e308, -1e-320, 0.5)
+WORDS = ("nan", "inf", "-inf", "1e400", "9" * 4400, "0x1", "", "1_0", "/", "..", "\0", "ü", "<", "-0", "1e-400")
+VALUES = (*NUMBERS, None, True, "x", "..", "\0", [], {}, [0], [[]], {"a": 1}, float(1 << 60))
+
+
+class Failed(Exception):
+    """What is no clip and no ClipError of one line."""
+
+
+def attempt(kind: str, data: bytes, folder: Path) -> bool:
+    """Whether the file gives a clip. Raises Failed."""
+    import athcodec
+    from athcodec.errors import ClipError
+
+    path = folder / f"a.{kind}"
+    path.write_bytes(data)
+    with _timed(), warnings.catch_warnings():
+        warnings.simplefilter("error")
+        warnings.simplefilter("ignore", athcodec.errors.SourceWarning)
+        try:
+            with athcodec.read(path, max_memory=BUDGET) as clip:
+                clip.block(0, min(clip.frame_count, 2))
+            return True
+        except ClipError as error:
+            text = str(error)
+            if "\n" in text or not text.strip() or len(text) > 2000:
+                raise Failed(f"a message that is not one short line: {text[:300]!r}") from error
+            return False
+        except Exception as error:
+            raise Failed("".join(traceback.format_exception(error)[-6:])) from error
+
+
+@contextmanager
+def _timed() -> Iterator[None]:
+    def late(*_: object) -> None:
+        raise Failed(f"no end after {SECONDS} s")
+
+    before = signal.signal(signal.SIGALRM, late)
+    signal.setitimer(signal.ITIMER_REAL, SECONDS)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGALRM, before)
+
+
+def peak() -> int:
+    """Bytes."""
+    status = Path("/proc/self/status")
+    return int(re.search(r"VmHWM:\s+(\d+)", status.read_text())[1]) * 1024 if status.exists() else 0
+
+
+# ---- valid files ----
+
+
+@cache
+def seeds(kind: str) -> tuple[bytes, ...]:
+    """Small valid files of a format, and those that once went wrong."""
+    from moving_meshes import quad_clip
+    from plants import plant
+
+    import athcodec
+
+    found = []
+    with tempfile.TemporaryDirectory() as name:
+        for number, clip in enumerate((plant(seed=1, branches=3, frames=4), quad_clip(frames=3, rings=3))):
+            for more in ({}, {"gzip": True}) if kind in ("npz", "vtu") else ({},):
+                for animation in ("joints", "morphs") if kind == "glb" else ("auto",):
+                    folder = Path(name, f"{number}{len(found)}")
+                    folder.mkdir()
+                    athcodec.write(clip, folder / f"a.{kind}", animation=animation, **more)
+                    file = next(file for file in sorted(folder.iterdir()) if file.suffix == f".{kind}")
+                    found.append(file.read_bytes())
+    if kind == "xdmf":
+        found.append(XDMF.encode())
+    found += [path.read_bytes() for path in sorted(CORPUS.glob(f"*.{kind}"))]
+    return tuple(found)
+
+
+XDMF = """<Xdmf Version="3.0"><Domain><Grid GridType="Collection" CollectionType="Temporal">
+<Grid><Time Value="0"/><Topology TopologyType="Mixed" NumberOfElements="2"><DataItem Dimensions="9" Format="XML"
+ NumberType="Int">4 0 1 2 5 0 1 2 3</DataItem></Topology><Geometry GeometryType="XYZ"><DataItem Dimensions="4 3"
+ Format="XML">0 0 0 1 0 0 0 1 0 1 1 0</DataItem></Geometry><Attribute Name="u" Center="Node"><DataItem
+ Dimensions="4 3" Format="XML">0 0 0 1 0 0 0 1 0 1 1 0</DataItem></Attribute><Attribute Name="c" Center="Cell">
+<DataItem Dimensions="2" Format="XML">1 2</DataItem></Attribute></Grid>
+<Grid><Time Value="0.1"/><Topology TopologyType="Mixed" NumberOfElements="2"><DataItem Dimensions="9" Format="XML"
+ NumberType="Int">4 0 1 2 5 0 1 2 3</DataItem></Topology><Geometry GeometryType="XYZ"><DataItem ItemType="HyperSlab"
+ Dimensions="4 3"><DataItem Dimensions="3 2" Format="XML" NumberType="Int">0 0 1 1 4 3</DataItem><DataItem
+ Dimensions="4 3" Format="XML">0 0 0 1 0 0 0 1 0 1 1 0</DataItem></DataItem></Geometry><Attribute Name="u">
+<DataItem Dimensions="4 3" Format="XML">0 0 1 1 0 0 0 1 0 1 1 0</DataItem></Attribute></Grid></Grid></Domain></Xdmf>"""
+
+
+# ---- mutation ----
+
+
+def mutated(kind: str, data: bytes, rng: random.Random) -> bytes:
+    """The file with a few changes, by the ways of its format."""
+    ways = WAYS[kind]
+    for _ in range(rng.choice((1, 1, 2, 4))):
+        try:
+            data = rng.choice(ways)(data, rng)
+        except Exception:  # what it was made of is gone already
+            data = _bytes(data, rng)
+    return data
+
+
+def _bytes(data: bytes, rng: random.Random) -> bytes:
+    """Some bytes changed, taken out, put in or doubled."""
+    made, at = bytearray(data), rng.randrange(len(data) + 1)
+    how = rng.randrange(5)
+    if how == 0 and made:
+        made[at % len(made)] = rng.randrange(256)
+    elif how == 1:
+        del made[at : at + rng.choice((1, 4, 100))]
+    elif how == 2:
+        made[at:at] = rng.randbytes(rng.choice((1, 4, 16)))
+    elif how == 3:
+        made[at:at] = made[at : at + rng.choice((4, 12, 200))]
+    else:
+        del made[at:]
+    return bytes(made)
+
+
+def _fields(data: bytes, rng: random.Random) -> bytes:
+    """A number of four bytes in the first of the file, or anywhere."""
+    at = 4 * rng.randrange(max(1, min(len(data), rng.choice((64, len(data)))) // 4))
+    number = rng.choice((0, 1, -1, 2**31 - 1, -(2**31), rng.randrange(-(2**31), 2**31), rng.randrange(64)))
+    return data[:at] + struct.pack(rng.choice("<>") + "i", number) + data[at + 4 :]
+
+
+def _text(data: bytes, rng: random.Random) -> bytes:
+    """A word of a text replaced by another, or by a number that is hard to hold."""
+    words = re.split(rb"([\s\"<>=/]+)", data)
+    at = rng.randrange(len(words))
+    new = rng.choice((str(rng.choice(NUMBERS)), rng.choice(WORDS))).encode()
+    words[at] = rng.choice((new, rng.choice(words), b""))
+    return b"".join(words)
+
+
+def _json(data: bytes, rng: random.Random) -> bytes:
+    """A member of the JSON of a GLB, whose lengths fit again."""
+    size = struct.unpack_from("<I", data, 12)[0]
+    gltf, rest = json.loads(data[20 : 20 + size]), data[20 + size :]
+    places = list(_places(gltf))
+    holder, key = rng.choice(places)
+    if rng.random() < 0.2 and isinstance(holder, dict):
+        del holder[key]
+    elif rng.random() < 0.2:
+        other, name = rng.choice(places)
+        holder[key] = json.loads(json.dumps(other[name]))
+    else:
+        holder[key] = rng.choice(VALUES)
+    text = json.dumps(gltf)
+    if rng.random() < 0.1:
+        text = re.sub(r"\d+", lambda found: "9" * 4400 if rng.random() < 0.05 else found[0], text)
+    packed = text.encode()
+    packed += b" " * (-len(packed) % 4)
+    whole = struct.pack("<II", len(packed), 0x4E4F534A) + packed + rest
+    return struct.pack("<4sII", b"glTF", 2, 12 + len(whole)) + whole
+
+
+def _places(value: object) -> Iterator[tuple]:
+    for key, item in list(value.items() if isinstance(value, dict) else enumerate(value)):
+        yield value, key
+        if isinstance(item, (dict, list)):
+            yield from _places(item)
+
+
+def _archive(data: bytes, rng: random.Random) -> bytes:
+    """An array of an .npz: another shape, type or name, or bytes of it; with the checksum that belongs to it."""
+    with zipfile.ZipFile(io.BytesIO(data)) as archive:
+        members = {info.filename: archive.read(info) for info in archive.infolist()}
+    name = rng.choice(list(members))
+    how = rng.randrange(4)
+    if how == 0:
+        members[name] = _bytes(members[name], rng)
+    elif how == 1:
+        shape = tuple(rng.choice((0, 1, 2, 3, 2**40, 7)) for _ in range(rng.randrange(4)))
+        dtype = rng.choice(("<f4", ">f8", "<i8", "|b1", "<U3", "|S4", "<c8", "<M8[s]", "|V0", "<f2", "|O"))
+        header = io.BytesIO()
+        np.lib.format.write_array_header_1_0(header, {"descr": dtype, "fortran_order": how == 2, "shape": shape})
+        members[name] = header.getvalue() + members[name][-rng.choice((4, 100)) :]
+    elif how == 2:
+        array = rng.choice(
+            (np.array(rng.choice((3.5, -1, "x", b"y", True))), np.zeros((2, 3)), np.full((4, 3), np.nan))
+        )
+        members[name] = _saved(array)
+    else:
+        new = rng.choice(("faces", "edges", "rest", "time", "vertex_branch", "branch_parent", "stem_index", "metadata"))
+        members[f"{new}.npy"] = members.pop(name)
+    out = io.BytesIO()
+    with zipfile.ZipFile(out, "w", rng.choice((zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED))) as archive:
+        for name, content in members.items():
+            archive.writestr(name, content)
+    return out.getvalue()
+
+
+def _saved(array: np.ndarray) -> bytes:
+    out = io.BytesIO()
+    np.lib.format.write_array(out, array)
+    return out.getvalue()
+
+
+WAYS: dict[str, tuple[Callable[[bytes, random.Random], bytes], ...]] = {
+    "glb": (_json, _json, _json, _bytes, _fields),
+    "pc2": (_fields, _bytes),
+    "mdd": (_fields, _bytes),
+    "obj": (_text, _text, _bytes),
+    "ply": (_text, _fields, _bytes),
+    "xdmf": (_text, _text, _bytes),
+    "npz": (_archive, _archive, _bytes, _fields),
+    "vtu": (_text, _text, _bytes),
+}
+
+
+# ---- runs ----
+
+
+def blind(kind: str, seconds: float, seed: int, runs: int = 1 << 62) -> dict:
+    """Mutates valid files for some time, or so many times: {"tried", "failure", "input"}."""
+    rng, tried, until = random.Random(seed), 0, time.monotonic() + seconds
+    with tempfile.TemporaryDirectory() as name:
+        for data in seeds(kind):
+            attempt(kind, data, Path(name))
+        start = peak()
+        while tried < runs and time.monotonic() < until:
+            data = mutated(kind, rng.choice(seeds(kind)), rng)
+            try:
+                attempt(kind, data, Path(name))
+                if peak() - start > MEMORY:
+                    raise Failed(f"the process has grown by {peak() - start:,} bytes")
+            except Failed as error:
+                return {"tried": tried, "failure": str(error), "input": data.hex()}
+            tried += 1
+    return {"tried": tried, "failure": "", "input": ""}
+
+
+def guided(kind: str, seconds: float, seed: int) -> None:
+    """The same, with what atheris learns of the readers. Does not return."""
+    import atheris
+
+    with atheris.instrument_imports(include=["athcodec.sources"]):
+        import athcodec.sources.gltf
+        import athcodec.sources.mdd
+        import athcodec.sources.npz
+        import athcodec.sources.pc2
+        import athcodec.sources.sequence
+        import athcodec.sources.vtk
+        import athcodec.sources.xdmf  # noqa: F401
+    folder = Path(tempfile.mkdtemp())
+    (folder / "corpus").mkdir()
+    for number, data in enumerate(seeds(kind)):
+        (folder / "corpus" / f"{number}").write_bytes(data)
+
+    def one(data: bytes) -> None:
+        attempt(kind, data, folder)
+
+    def mutate(data: bytes, size: int, number: int) -> bytes:
+        made = mutated(kind, data or seeds(kind)[0], random.Random(number))
+        return made if len(made) <= size else atheris.Mutate(data, size)
+
+    options = [f"-max_total_time={max(1, round(seconds))}", f"-seed={seed or 1}", "-max_len=65536", "-timeout=30"]
+    options += ["-rss_limit_mb=2048", f"-artifact_prefix={folder}/", "-print_final_stats=1"]
+    atheris.Setup([sys.argv[0], *options, str(folder / "corpus")], one, custom_mutator=mutate)
+    atheris.Fuzz()
+
+
+def main() -> None:
+    kind, seconds, seed = sys.argv[1], float(sys.argv[2]), int(sys.argv[3])
+    if sys.argv[4:] == ["guided"]:
+        guided(kind, seconds, seed)
+    else:
+        result = blind(kind, seconds, seed)
+        print(json.dumps(result))
+        sys.exit(bool(result["failure"]))
+
+
+if __name__ == "__main__":
+    main()
