@@ -9,6 +9,7 @@ import { nodeColour } from "./colours.js";
 import { clearFloor, forests, growFloor } from "./floor.js";
 import { colour, compare, level, setLevel, show } from "./look.js";
 import { feet, forestReach, treePlaces } from "./places.js";
+import { shadowed } from "./grove.js";
 import { surfaceMaterial } from "./surfaces.js";
 import { setLoop } from "./time.js";
 import { $, countText } from "./ui.js";
@@ -49,7 +50,7 @@ export function forestOn() {
   const [plant] = app.plants;
   state.forest?.removeFromParent();
   state.forest?.dispose();
-  const forest = new ATHForest(plant.ath, { geometry: plant.forestGeometry(), material: forestMaterial });
+  const forest = shadowed(new ATHForest(plant.ath, { geometry: plant.forestGeometry(), material: forestMaterial, depthMaterial: plant.depthMaterial }));
   state.forest = forest;
   forest.levelOfDetail = $("forest-lod").checked;
   forest.addEventListener("level", () => { state.dirty = true; });

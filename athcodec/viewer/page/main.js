@@ -16,6 +16,7 @@ import { Stage } from "./stage.js";
 import { markFirst, tellFacts } from "./story.js";
 import { advance, tellTime } from "./time.js";
 import { $ } from "./ui.js";
+import { breeze } from "./wind.js";
 import "./camera.js";
 import "./keys.js";
 import "./scripts.js";
@@ -57,6 +58,7 @@ function tick(now) {
 function draw() {
   state.dirty = false;
   const start = performance.now();
+  app.stage.breeze(state.turns + state.time, ...breeze());
   app.stage.render();
   markFirst();
   counters.frames++;

@@ -43,6 +43,7 @@ export class Plant {
     this.ath = ath;
     this.motion = motion;
     const up = ath.metadata.up_axis;
+    this.root.rotation.order = "YXZ";
     if (up === "z") this.root.rotation.x = -Math.PI / 2;
     if (up === "x") this.root.rotation.z = Math.PI / 2;
     this.root.updateMatrixWorld(true);
@@ -88,9 +89,21 @@ export class Plant {
     this.paint();
   }
 
+  /** Stands turned by so many degrees, clockwise from above, whole and with its motion. */
+  turn(degrees) {
+    this.root.rotation.y = -degrees * Math.PI / 180;
+    this.root.updateMatrixWorld(true);
+  }
+
   /** What the file's texture coordinates tell apart, see surfacesOf; null: nothing. */
   get surfaces() {
     return this.ath.geometry?.hasAttribute("uv") ? surfacesOf(this.ath.metadata) : null;
+  }
+
+  /** What a forest of it casts shadows with; null: nothing of its own. */
+  get depthMaterial() {
+    const { surfaces } = this;
+    return surfaces && (() => surfaceDepth(surfaces));
   }
 
   // Bark and leaves as they look near by, or colours that tell something.

@@ -3,10 +3,11 @@
 import { ACESFilmicToneMapping, Box3, BufferAttribute, Fog, PCFShadowMap, PerspectiveCamera, Scene, Vector3, WebGLRenderer } from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 
-import { meadow, tintMeadow } from "./ground.js";
+import { blow, meadow, tintMeadow } from "./ground.js";
 import { Sky } from "./sky.js";
 
 const SLOW_MS = 20, PATIENCE = 24; // pictures that are slow, one behind the other, before there is less to draw
+const SHADED = 12; // plants, across a forest
 const SOFTWARE = /swiftshader|llvmpipe|software|basic render/i;
 const QUALITY = [{ ratio: 2, shadows: true, grass: true, around: true }, { ratio: 1.25, shadows: true, grass: true, around: true },
   { ratio: 1, shadows: false, grass: false, around: false }];
@@ -151,7 +152,7 @@ export class Stage {
   look(box, ground) {
     const size = box.getSize(new Vector3()), across = Math.hypot(size.x, size.z), half = Math.tan(this.camera.fov * Math.PI / 360);
     const aspect = (this.width - this.inset) / this.height;
-    const distance = 0.35 * across + 0.68 * Math.max(size.y, 0.9 * across / aspect, 1e-6) / half;
+    const distance = 0.35 * across + 0.62 * Math.max(size.y, 0.84 * across / aspect, 1e-6) / half;
     box.getCenter(this.controls.target);
     this.camera.position.copy(this.controls.target).add(new Vector3(0.35, 0.16, 0.92).normalize().multiplyScalar(distance));
     this.camera.near = distance / 500;
@@ -179,7 +180,8 @@ export class Stage {
       ground.position.y = height;
       ground.scale.setScalar(size);
       ground.getObjectByName("grass").scale.setScalar(Math.sqrt(plant / size));
-      this.sky.shade(scene, new Vector3(0, height + 0.25 * size, 0), 0.75 * size);
+      const wide = Math.min(size, SHADED * plant); // of what has shadows
+      this.sky.shade(scene, new Vector3(0, height + 0.25 * wide, 0), 0.75 * wide);
     }
     this.fog(0, 0);
   }
@@ -190,6 +192,11 @@ export class Stage {
       const size = scene.getObjectByName("ground").scale.x, [from, to] = far > 0 ? [near, far] : [1.6 * size, 15 * size];
       scene.fog = new Fog(this.sky.horizon, from, to);
     }
+  }
+
+  /** The wind in the grass: seconds that passed, strength from 0 to 1, heading in degrees. */
+  breeze(seconds, strength, heading) {
+    for (const { scene } of this.panes) blow(scene.getObjectByName("ground"), seconds, strength, heading);
   }
 
   /** Height of the picture in pixels of the device. */

@@ -67,7 +67,11 @@ float athVeins(vec2 leaf) { // 1 on a vein, as long as that is wider than a pixe
 const SURFACE = /* glsl */`
 float athIn = athInside();
 diffuseColor.a = clamp(athIn / max(fwidth(athIn), 1e-4) + 0.5, 0.0, 1.0);
+#ifdef ALPHA_TO_COVERAGE
+if (diffuseColor.a < 0.02) discard;
+#else
 if (diffuseColor.a < 0.5) discard;
+#endif
 bool athIsLeaf = athUv.x >= 1.0;
 float athThin = 0.0, athBump = 0.0;
 if (athIsLeaf) {
@@ -139,6 +143,7 @@ function given(shader, fragment, [stem, leaf]) {
 /** For geometries with texture coordinates and the surfaces of a file; not yet bound to a motion. */
 export function surfaceMaterial(surfaces) {
   const material = new MeshStandardMaterial({ side: DoubleSide, shadowSide: DoubleSide });
+  material.onBeforeRender = (renderer) => { material.alphaToCoverage = renderer.getClearAlpha() === 1; }; // soft edges, where nothing shines through
   material.onBeforeCompile = (shader) => given(shader, shader.fragmentShader
     .replace("#include <common>", `#include <common>\n${SHAPE}${LOOK}`)
     .replace("#include <map_fragment>", SURFACE)
