@@ -22,7 +22,7 @@ import "./keys.js";
 import "./scripts.js";
 import "./sharing.js";
 
-const TELL_MS = 250;
+const TELL_MS = 250, PATIENCE_MS = 2000;
 
 let last = 0;
 
@@ -73,13 +73,22 @@ function count(now) {
   for (const tell of [tellFacts, tellLevel, tellScale, tellTime, splitLabels, write]) tell();
 }
 
-begin(); // the file is on its way while the stage is set up, which takes longer
-loader.preload();
-try {
-  setStage();
-  setSplit(0.5);
-  if (matchMedia("(max-width: 680px)").matches) togglePanel();
-  requestAnimationFrame(tick);
-} catch (error) {
-  refuse(Object.assign(error, { codeName: "GRAPHICS" }));
+const painted = () => new Promise((done) => { requestAnimationFrame(() => setTimeout(done)); });
+const late = () => new Promise((done) => { setTimeout(done, PATIENCE_MS); });
+
+// Setting the stage takes long without a graphics processor, and workers start and fetch only while the page does nothing.
+async function setUp() {
+  await Promise.race([Promise.all([painted(), app.coming]), late()]);
+  try {
+    setStage();
+    setSplit(0.5);
+    requestAnimationFrame(tick);
+  } catch (error) {
+    refuse(Object.assign(error, { codeName: "GRAPHICS" }));
+  }
 }
+
+if (matchMedia("(max-width: 680px)").matches) togglePanel();
+begin();
+loader.preload();
+app.staged = setUp();

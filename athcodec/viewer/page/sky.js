@@ -21,9 +21,8 @@ float noise(vec2 x) {
   f = f * f * (3.0 - 2.0 * f);
   return mix(mix(hash(i), hash(i + vec2(1, 0)), f.x), mix(hash(i + vec2(0, 1)), hash(i + vec2(1, 1)), f.x), f.y);
 }
-float ridge(float a, float k) { // height of hills all around, with woods on them
-  float rise = sin(2.0 * a + k) + 0.6 * sin(5.0 * a + 2.0 * k) + 0.35 * sin(11.0 * a + 5.0 * k) + 0.12 * sin(29.0 * a + k);
-  return 0.022 + 0.009 * rise + 0.0022 * sin(a * 97.0 + k) * sin(a * 61.0) + 0.0012 * sin(a * 223.0 + 3.0 * k);
+float ridge(vec2 way, vec2 k) { // height of hills all around, with woods on them
+  return 0.05 * noise(2.3 * way + k) + 0.016 * noise(9.0 * way + k) + 0.005 * noise(31.0 * way) + 0.0035 * noise(110.0 * way) - 0.012;
 }
 void main() {
   vec3 w = normalize(way);
@@ -35,10 +34,11 @@ void main() {
     vec2 at = w.xz / (w.y + 0.12);
     float thick = 0.55 * noise(at * 1.1 + 3.0) + 0.27 * noise(at * 2.7) + 0.13 * noise(at * 6.1) + 0.05 * noise(at * 13.0);
     c = mix(c, cloud, 0.75 * smoothstep(0.44, 0.76, thick) * smoothstep(0.015, 0.2, w.y));
-    float a = atan(w.z, w.x), soft = max(fwidth(w.y), 1e-4);
-    float far = ridge(a, 1.3) + 0.012, near = ridge(a, 4.1);
-    c = mix(c, mix(horizon, hills, 0.2 + 0.25 * smoothstep(0.0, far, w.y)), smoothstep(soft, -soft, w.y - far));
-    c = mix(c, mix(horizon, hills, 0.25 + 0.5 * smoothstep(0.0, near, w.y)), smoothstep(soft, -soft, w.y - near));
+    vec2 around = normalize(w.xz);
+    float soft = max(fwidth(w.y), 1e-4), far = ridge(around, vec2(7.3, 2.1)) + 0.012, near = ridge(around, vec2(1.7, 8.4));
+    float mist = smoothstep(0.0, 0.016, w.y); // in the valleys
+    c = mix(c, mix(horizon, hills, 0.12 + 0.28 * mist), smoothstep(soft, -soft, w.y - far));
+    c = mix(c, mix(horizon, hills, 0.12 + 0.58 * mist), smoothstep(soft, -soft, w.y - near));
   }
   gl_FragColor = vec4(c, 1.0);
   #include <colorspace_fragment>

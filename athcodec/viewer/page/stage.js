@@ -1,6 +1,6 @@
 // The stage: renderer, camera and light, and one or two panes, each with its own scene; two share the view, on either side of a split.
 
-import { ACESFilmicToneMapping, Box3, BufferAttribute, Fog, PCFShadowMap, PerspectiveCamera, Scene, Vector3, WebGLRenderer } from "three";
+import { ACESFilmicToneMapping, Box3, Fog, PCFShadowMap, PerspectiveCamera, Scene, Vector3, WebGLRenderer } from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 
 import { blow, meadow, tintMeadow } from "./ground.js";
@@ -36,7 +36,8 @@ export class Stage {
 
   constructor(canvas, changed, resized) {
     this.canvas = canvas;
-    this.renderer = new WebGLRenderer({ canvas, antialias: true, powerPreference: "high-performance" });
+    const context = canvas.getContext("webgl2", { alpha: false, antialias: true, powerPreference: "high-performance" }) ?? undefined;
+    this.renderer = new WebGLRenderer({ canvas, context });
     Object.assign(this.renderer, { toneMapping: ACESFilmicToneMapping, toneMappingExposure: 0.82 });
     this.renderer.shadowMap.enabled = true;
     this.renderer.shadowMap.type = PCFShadowMap;
@@ -88,21 +89,24 @@ export class Stage {
     return true;
   }
 
-  /** Compiles what plants are drawn with before there are any, and draws it once: what waits for the graphics
-   * processor waits here. */
+  /** Has what plants are drawn with compiled before there are any; nothing waits for it. */
   warm(objects) {
     this.kept = this.scene(objects); // programs live as long as a material that uses them
-    for (const object of objects) {
-      object.geometry.setAttribute("position", new BufferAttribute(new Float32Array(9), 3));
-      object.frustumCulled = false;
-    }
-    this.renderer.render(this.kept, this.camera);
+    this.renderer.compile(this.kept, this.camera);
+  }
+
+  /** Resolves once all is compiled that these objects are drawn with; the page answers in the meantime. */
+  async compile(objects) {
+    const scene = this.scene(objects);
+    await this.renderer.compileAsync(scene, this.camera);
+    scene.remove(...objects);
   }
 
   /** A pane's scene; `content` is added to it. */
   scene(content) {
     const scene = new Scene();
     scene.add(meadow(), ...content);
+    scene.fog = new Fog(this.sky.horizon, 1, 2);
     this.#tint([scene]);
     return scene;
   }
@@ -112,7 +116,7 @@ export class Stage {
     for (const scene of scenes) {
       this.sky.light(scene);
       tintMeadow(scene.getObjectByName("ground"), this.sky.dark);
-      scene.fog?.color.copy(this.sky.horizon);
+      scene.fog.color.copy(this.sky.horizon);
     }
     this.#draw(scenes);
   }
@@ -189,7 +193,7 @@ export class Stage {
   /** Haze from one distance to another; where both are 0 only the ground far off is in it. */
   fog(near, far) {
     for (const { scene } of this.panes) {
-      const size = scene.getObjectByName("ground").scale.x, [from, to] = far > 0 ? [near, far] : [1.6 * size, 15 * size];
+      const size = scene.getObjectByName("ground").scale.x, [from, to] = far > 0 ? [near, far] : [2 * size, 56 * size];
       scene.fog = new Fog(this.sky.horizon, from, to);
     }
   }

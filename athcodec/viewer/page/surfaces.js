@@ -143,7 +143,10 @@ function given(shader, fragment, [stem, leaf]) {
 /** For geometries with texture coordinates and the surfaces of a file; not yet bound to a motion. */
 export function surfaceMaterial(surfaces) {
   const material = new MeshStandardMaterial({ side: DoubleSide, shadowSide: DoubleSide });
-  material.onBeforeRender = (renderer) => { material.alphaToCoverage = renderer.getClearAlpha() === 1; }; // soft edges, where nothing shines through
+  material.onBeforeRender = (renderer) => { // soft edges, where the picture is of nothing that shines through it
+    material.alphaToCoverage = !renderer.getContextAttributes().alpha;
+    material.onBeforeRender = () => {};
+  };
   material.onBeforeCompile = (shader) => given(shader, shader.fragmentShader
     .replace("#include <common>", `#include <common>\n${SHAPE}${LOOK}`)
     .replace("#include <map_fragment>", SURFACE)
