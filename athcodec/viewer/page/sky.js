@@ -36,9 +36,9 @@ void main() {
     c = mix(c, cloud, 0.75 * smoothstep(0.44, 0.76, thick) * smoothstep(0.015, 0.2, w.y));
     vec2 around = normalize(w.xz);
     float soft = max(fwidth(w.y), 1e-4), far = ridge(around, vec2(7.3, 2.1)) + 0.012, near = ridge(around, vec2(1.7, 8.4));
-    float mist = smoothstep(0.0, 0.016, w.y); // in the valleys
-    c = mix(c, mix(horizon, hills, 0.12 + 0.28 * mist), smoothstep(soft, -soft, w.y - far));
-    c = mix(c, mix(horizon, hills, 0.12 + 0.58 * mist), smoothstep(soft, -soft, w.y - near));
+    float mist = smoothstep(0.0, 0.022, w.y); // in the valleys
+    c = mix(c, mix(horizon, hills, 0.2 + 0.2 * mist), smoothstep(soft, -soft, w.y - far));
+    c = mix(c, mix(horizon, hills, 0.3 + 0.4 * mist), smoothstep(soft, -soft, w.y - near));
   }
   gl_FragColor = vec4(c, 1.0);
   #include <colorspace_fragment>
