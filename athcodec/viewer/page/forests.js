@@ -10,7 +10,7 @@ import { clearFloor, forests, growFloor } from "./floor.js";
 import { colour, compare, level, setLevel, show } from "./look.js";
 import { feet, forestReach, treePlaces } from "./places.js";
 import { shadowed } from "./grove.js";
-import { surfaceMaterial } from "./surfaces.js";
+import { outlined, surfaceMaterial } from "./surfaces.js";
 import { setLoop } from "./time.js";
 import { $, countText } from "./ui.js";
 import { windControl } from "./wind.js";
@@ -30,7 +30,7 @@ function forestMaterial(lines, of) {
   if (surfaces() && !lines) return surfaceMaterial(surfaces());
   const material = lines ? new LineBasicMaterial() : new MeshLambertMaterial({ side: DoubleSide });
   tintForest(material, lines, of);
-  return material;
+  return app.plants[0].surfaces && !lines ? outlined(material, app.plants[0].surfaces) : material;
 }
 
 // Bark, leaves or the file's own colours; by level where nodes are told apart.

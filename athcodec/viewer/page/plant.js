@@ -5,7 +5,7 @@ import { BufferAttribute, BufferGeometry, DoubleSide, Group, InstancedBufferAttr
 import { barkColour, heat, nodeColour, orderColour } from "./colours.js";
 import { limbDepth, limbGeometry, limbMaterial, setRadii } from "../src/limbs.js";
 import { radii } from "../src/radii.js";
-import { surfaceDepth, surfaceMaterial, surfacesOf } from "./surfaces.js";
+import { outlined, surfaceDepth, surfaceMaterial, surfacesOf } from "./surfaces.js";
 
 const LEAF = [0.16, 0.29, 0.07], OVER = [0.55, 0.2, 0.06];
 const SLIMMEST = 4; // order from which on bark is as pale as it gets
@@ -123,7 +123,8 @@ export class Plant {
       object = new LineSegments(motion.attach(this.#lines()), motion.bind(lineMaterial()));
       object.renderOrder = 1;
     } else if (ath.hasFaces) {
-      object = motion.bindShadows(new Mesh(motion.attach(sharing(ath.geometry)), motion.bind(meshMaterial())));
+      const material = this.surfaces ? outlined(meshMaterial(), this.surfaces) : meshMaterial();
+      object = motion.bindShadows(new Mesh(motion.attach(sharing(ath.geometry)), motion.bind(material)));
       if (this.surfaces) Object.assign(object, { customDepthMaterial: motion.bind(surfaceDepth(this.surfaces)) });
     } else {
       const geometry = limbGeometry(ath, this.#radii);

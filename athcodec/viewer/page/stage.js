@@ -169,12 +169,12 @@ export class Stage {
 
   /** What is near of a forest that reaches so far; box: of one plant. */
   lookOver(box, reach) {
-    const size = box.getSize(new Vector3()), most = Math.max(size.x, size.y, size.z), far = Math.max(reach, most), near = Math.min(far, 2.2 * most);
+    const size = box.getSize(new Vector3()), most = Math.max(size.x, size.y, size.z), far = Math.max(reach, most), near = Math.min(far, 1.7 * most);
     const part = new Box3(new Vector3(-near, box.min.y, -near), new Vector3(near, box.max.y, near));
     this.look(part, { height: box.min.y, size: 2.6 * far, plant: 1.9 * most });
     this.controls.maxDistance = 6 * far;
     this.camera.far = 12 * far + 20 * most;
-    this.fog(this.camera.position.distanceTo(this.controls.target) * 0.7, 3.2 * far + 4 * most);
+    this.fog(this.camera.position.distanceTo(this.controls.target) * 0.7, 7 * far + 12 * most);
   }
 
   /** size: of all that stands on it; plant: of a single plant, which the blades of grass are as large as. */
