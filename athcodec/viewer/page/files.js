@@ -1,7 +1,7 @@
 // Files: where they come from, how they are opened, and what is said where they cannot be.
 
 import { app, counters, loader, state } from "./app.js";
-import { arrange, clear, frameView } from "./arrange.js";
+import { arrange, bare, clear, frameView } from "./arrange.js";
 import { playIn } from "./clips.js";
 import { compare } from "./look.js";
 import { Plant } from "./plant.js";
@@ -70,6 +70,7 @@ function say(title, text, technical = "", again = null) {
   $("again").hidden = !again;
   $("again").onclick = again;
   message.hidden = false;
+  breath().then(() => app.staged).then(bare);
 }
 
 /** Says that nothing can be shown. */

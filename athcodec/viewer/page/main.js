@@ -39,7 +39,10 @@ function tick(now) {
   const passed = Math.min(1, (now - last) / 1000), { stage, plants } = app; // a page that was hidden goes on from where it was
   last = now;
   if (state.playing && plants.length > 0) stage.took(1000 * passed);
-  if (plants.length === 0) return;
+  if (plants.length === 0) {
+    if (state.dirty && stage.panes.length > 0) draw();
+    return;
+  }
   stage.controls.update();
   if (state.playing) advance(passed);
   for (const { motion, root } of plants) {
@@ -60,7 +63,8 @@ function draw() {
   const start = performance.now();
   app.stage.breeze(state.turns + state.time, ...breeze());
   app.stage.render();
-  markFirst();
+  $("canvas").classList.add("drawn");
+  if (app.plants.length > 0) markFirst();
   counters.frames++;
   counters.frameMs = counters.frameMs * 0.8 + 0.2 * (performance.now() - start);
 }
