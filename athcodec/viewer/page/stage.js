@@ -95,10 +95,11 @@ export class Stage {
     this.renderer.compile(this.kept, this.camera);
   }
 
-  /** Resolves once all is compiled that these objects are drawn with; the page answers in the meantime. */
+  /** Resolves once all is compiled that these objects are drawn with; the page answers in the meantime, where the browser can do so. */
   async compile(objects) {
     const scene = this.scene(objects);
-    await this.renderer.compileAsync(scene, this.camera);
+    if (this.renderer.extensions.has("KHR_parallel_shader_compile")) await this.renderer.compileAsync(scene, this.camera);
+    else this.renderer.compile(scene, this.camera);
     scene.remove(...objects);
   }
 
