@@ -2,13 +2,15 @@
 playing, two levels under the split, the error as colours, a forest, loading over a slow line, and each thing that can
 be wrong with a file.
 
-Drawing is in software, by Chromium; the pictures are WebP.
+Drawing is in software, by Chromium; the pictures are WebP. Each is written once it is drawn, and those that are there
+are not drawn again, so that a run that was ended goes on where it was.
 """
 
 from __future__ import annotations
 
 import argparse
 import io
+import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -20,52 +22,101 @@ from bench.browser import chromium
 from bench.tables import table
 from bench.throttled_server import ThrottledServer
 
-SIZES = [(1440, 900), (390, 844)]
+FOLDER = Path(__file__).parent / "results" / "shots"
+SIZES = {"desk": (1440, 900), "phone": (390, 844)}
 SCHEMES = ["light", "dark"]
-PHONE = 680  # pixels; as in viewer.css
 SLOW = 125_000  # bytes a second
 LOADED = 0.3  # share of the file that has come where it is loading
 QUALITY = 80
-PLANTS = 300  # of the forest
-TIMEOUT = 120_000  # ms
-WHOLE = "athcodecViewer.counters.arrived.whole && athcodecViewer.motion.level === athcodecViewer.motion.target"
+FLOOR = {"fern": 4, "grass": 9}  # plants around each tree of the forest
+TREES = 40
+TIMEOUT = 300_000  # ms
+WHOLE = """() => athcodecViewer.counters.arrived.whole && athcodecViewer.counters.firstPicture &&
+  athcodecViewer.motion.level === athcodecViewer.motion.target"""
+DRAWN = """async () => {
+  const frame = () => new Promise((done) => { requestAnimationFrame(done); });
+  athcodecViewer.state.dirty = true;
+  for (let i = 0; i < 3; i++) await frame();
+  await new Promise((done) => { setTimeout(done, 400); }); // after which all texts are up to date
+  await frame();
+}"""
+PLANTED = """() => {
+  const forests = athcodecViewer.forests();
+  return forests.length === 3 && forests.slice(1).every(({ baked }) => baked.length > 2) &&
+    forests[0].baked.length === athcodecViewer.motion.levelCount && !forests.some(({ fading }) => fading);
+}"""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("file", type=Path, nargs="?", help="the .ath file (default: the leafed sample)")
-    parser.add_argument("--out", type=Path, required=True, metavar="FOLDER")
+    parser.add_argument("--out", type=Path, default=FOLDER, metavar="FOLDER")
     parser.add_argument(
         "--only", nargs="+", choices=[*SHOTS, *WRONG], metavar="SHOT", help=f"of {', '.join([*SHOTS, *WRONG])}"
     )
+    parser.add_argument("--again", action="store_true", help="draw those that are there, too")
 
 
 def run(args: argparse.Namespace) -> dict[str, Any]:
-    from PIL import Image
-
     data = (args.file or athcodec.sample_path("leafed")).read_bytes()
+    names = args.only or [*SHOTS, *WRONG]
     args.out.mkdir(parents=True, exist_ok=True)
-    rows = []
     with chromium() as browser:
         for size in SIZES:
-            for scheme in SCHEMES:
-                for name in args.only or [*SHOTS, *WRONG]:
-                    path = args.out / f"{name}_{size[0]}x{size[1]}_{scheme}.webp"
-                    with _page(browser, size, scheme) as page:
-                        picture = _wrong(page, data, name) if name in WRONG else _shot(page, data, name)
-                    Image.open(io.BytesIO(picture)).save(path, quality=QUALITY)
-                    rows.append({"picture": path.name, "bytes": path.stat().st_size})
+            wanted = [
+                name for name in names if args.again or not all(path.exists() for path in _paths(args.out, name, size))
+            ]
+            if size == "desk" and "settings" in wanted:
+                wanted.remove("settings")  # they are open from the start
+            _states(browser, data, size, [name for name in wanted if name in SHOTS and name != "loading"], args.out)
+            for name in wanted:
+                if name == "loading" or name in WRONG:
+                    _alone(browser, data, size, name, args.out)
+    rows = [{"picture": path.name, "bytes": path.stat().st_size} for path in sorted(args.out.glob("*.webp"))]
     total = sum(row["bytes"] for row in rows)
     return {"tables": [table(f"Pictures in {args.out}, {total:,} bytes", rows)], "broken": []}
 
 
+def _paths(folder: Path, name: str, size: str) -> list[Path]:
+    return [folder / f"{name}_{size}_{scheme}.webp" for scheme in SCHEMES]
+
+
 @contextmanager
-def _page(browser, size: tuple[int, int], scheme: str) -> Iterator:
-    page = browser.new_page(viewport={"width": size[0], "height": size[1]}, color_scheme=scheme)
+def _page(browser, size: str) -> Iterator:
+    width, height = SIZES[size]
+    page = browser.new_page(viewport={"width": width, "height": height})
     page.set_default_timeout(TIMEOUT)
     try:
         yield page
     finally:
         page.close()
+
+
+def _save(page, name: str, size: str, folder: Path) -> None:
+    """As it is now, in both schemes."""
+    from PIL import Image
+
+    for scheme, path in zip(SCHEMES, _paths(folder, name, size), strict=True):
+        page.emulate_media(color_scheme=scheme)
+        page.evaluate(DRAWN)
+        Image.open(io.BytesIO(page.screenshot(timeout=TIMEOUT))).save(path, quality=QUALITY, method=6)
+        print(path.name, file=sys.stderr, flush=True)
+    page.emulate_media(color_scheme=SCHEMES[0])
+
+
+def _states(browser, data: bytes, size: str, names: list[str], folder: Path) -> None:
+    """All that one page shows in turn."""
+    if not names:
+        return
+    floor = {f"{name}.ath": athcodec.sample_path(name).read_bytes() for name in FLOOR}
+    with ThrottledServer({"tree.ath": data} | floor) as line, _page(browser, size) as page:
+        grown = "".join(f"&floor=/{name}.ath&each={each}" for name, each in FLOOR.items())
+        page.goto(line.page("tree.ath", quality="full") + grown)
+        page.wait_for_function(WHOLE)
+        for name in names:
+            page.evaluate("athcodecViewer.setPlaying(false)")
+            page.evaluate("athcodecViewer.seek(1)")
+            with contextmanager(SHOTS[name])(page):
+                _save(page, name, size, folder)
 
 
 class _Held(ThrottledServer):
@@ -77,60 +128,76 @@ class _Held(ThrottledServer):
             threading.Event().wait()
 
 
-def _shot(page, data: bytes, name: str) -> bytes:
-    server = _Held if name == "loading" else ThrottledServer
-    with server({"tree.ath": data}, rate=SLOW if name == "loading" else None) as line:
+def _alone(browser, data: bytes, size: str, name: str, folder: Path) -> None:
+    """What takes a page of its own, as it is loading or something is wrong."""
+    files = {"tree.ath": WRONG[name](data) if name in WRONG else data}
+    line = (
+        _Held(files, rate=SLOW)
+        if name == "loading"
+        else ThrottledServer({k: v for k, v in files.items() if v is not None})
+    )
+    with line, _page(browser, size) as page:
         page.goto(line.page("tree.ath", quality="full"))
-        if name != "loading":
-            page.wait_for_function(f"() => {WHOLE}")
-        SHOTS[name](page)
-        return page.screenshot(timeout=TIMEOUT)
+        if name == "loading":
+            page.wait_for_function("() => athcodecViewer.counters.firstMotion")
+        else:
+            page.wait_for_selector("#message:not([hidden]), #trouble:not([hidden])")
+            page.wait_for_function(
+                "() => athcodecViewer.stage && (athcodecViewer.counters.firstPicture || !athcodecViewer.motion)"
+            )
+        page.evaluate("athcodecViewer.motion && athcodecViewer.setPlaying(false)")
+        _save(page, name, size, folder)
 
 
-def _settled(page, seconds: float) -> None:
-    page.evaluate("athcodecViewer.setPlaying(false)")
-    page.evaluate(f"athcodecViewer.seek({seconds})")
-    page.wait_for_timeout(1500)
+def _start(page) -> Iterator[None]:
+    page.evaluate("athcodecViewer.seek(0)")
+    yield
 
 
-def _playing(page) -> None:
+def _settings(page) -> Iterator[None]:
+    page.click("#toggle-panel")
+    yield
+    page.click("#toggle-panel")
+
+
+def _playing(page) -> Iterator[None]:
     page.evaluate("athcodecViewer.playClip(athcodecViewer.motion.clips.length - 1)")
     page.wait_for_function("() => !athcodecViewer.motion.switching && athcodecViewer.motion.complete")
-    page.wait_for_timeout(1500)
+    page.evaluate("athcodecViewer.setPlaying(true)")
+    yield
 
 
-def _split(page) -> None:
+def _split(page) -> Iterator[None]:
     page.keyboard.press("d")
-    _settled(page, 1)
+    page.wait_for_function("() => athcodecViewer.plants.every(({ motion }) => motion.level === motion.target)")
+    yield
+    page.keyboard.press("d")
 
 
-def _error(page) -> None:
+def _error(page) -> Iterator[None]:
     page.evaluate("athcodecViewer.setLevel('3')")
     page.evaluate("document.querySelector('#colour [data-value=distance]').click()")
-    _settled(page, 1)
+    page.wait_for_function("() => athcodecViewer.motion.level === 3 && !athcodecViewer.motion.fading")
+    yield
+    page.evaluate("document.querySelector('#colour [data-value=plain]').click()")
+    page.evaluate("athcodecViewer.setLevel('auto')")
 
 
-def _forest(page) -> None:
-    page.evaluate("athcodecViewer.setPlaying(false)")
-    page.evaluate(f"athcodecViewer.forestOf({PLANTS})")
-    page.wait_for_function("() => athcodecViewer.state.forest.baked.length === athcodecViewer.motion.levelCount")
-    page.wait_for_timeout(3000)
-
-
-def _settings(page) -> None:
-    if page.viewport_size["width"] <= PHONE:
-        page.click("#toggle-panel")
-    _settled(page, 0)
+def _forest(page) -> Iterator[None]:
+    page.evaluate(f"athcodecViewer.forestOf({TREES})")
+    page.wait_for_function(PLANTED)
+    yield
+    page.evaluate("athcodecViewer.forestSwitch(false)")
 
 
 SHOTS: dict[str, Callable] = {
-    "start": lambda page: _settled(page, 0),
+    "start": _start,
     "settings": _settings,
     "playing": _playing,
     "split": _split,
     "error": _error,
     "forest": _forest,
-    "loading": lambda page: page.wait_for_function("() => athcodecViewer.counters.firstMotion"),
+    "loading": _start,
 }
 
 
@@ -146,12 +213,3 @@ WRONG: dict[str, Callable[[bytes], bytes | None]] = {
     "incomplete": lambda data: data[: int(0.4 * len(data))],
     "not-found": lambda data: None,
 }
-
-
-def _wrong(page, data: bytes, name: str) -> bytes:
-    broken = WRONG[name](data)
-    with ThrottledServer({} if broken is None else {"tree.ath": broken}) as line:
-        page.goto(line.page("tree.ath", quality="full"))
-        page.wait_for_selector("#message:not([hidden]), #trouble:not([hidden])")
-        page.wait_for_timeout(1500)
-        return page.screenshot(timeout=TIMEOUT)

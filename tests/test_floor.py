@@ -114,7 +114,7 @@ def test_fern_and_grass_stand_between_the_trees_of_a_page(opened, sample_ath, tm
     page = opened(page_file.as_uri())
     assert page.evaluate("athcodecViewer.forests().length") == 0
     page.evaluate("athcodecViewer.forestOf(20)")
-    page.wait_for_function(f"() => ({PLANTED})().filter(({{ levels }}) => levels > 0).length === 3", timeout=120_000)
+    page.wait_for_function(f"() => ({PLANTED})().filter(({{ levels }}) => levels > 0).length === 3")
     page.wait_for_function(f"() => ({PLANTED})().every(({{ count, drawn }}) => count === drawn)")
     assert [each["count"] for each in page.evaluate(PLANTED)] == [20, 40, 60]
     page.evaluate("athcodecViewer.forestSwitch(false)")

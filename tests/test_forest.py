@@ -20,6 +20,7 @@ from athcodec.core_file import FILE_ORDER  # noqa: E402
 from athcodec.gpu import GpuFile  # noqa: E402
 from athcodec.gpu.evaluate import Passes, Source  # noqa: E402
 from athcodec.joining import in_wind  # noqa: E402
+from athcodec.viewer.build_viewer import modules  # noqa: E402
 from bench.browser import WEBGPU_FLAGS, chromium  # noqa: E402
 from bench.throttled_server import ThrottledServer  # noqa: E402
 
@@ -222,6 +223,13 @@ def test_ten_thousand_plants_are_seen(opened, grove):
     assert page.evaluate("athcodecForest.forest.count") == 10_000
     assert sum(page.evaluate("athcodecForest.forest.drawn()")) > 1000
     assert page.evaluate("athcodecForest.milliseconds") < 100
+
+
+def test_axe_finds_nothing_in_a_forest(opened, grove):
+    page = opened(grove, 10)
+    page.evaluate((modules() / "axe-core" / "axe.min.js").read_text("utf-8"))
+    found = page.evaluate("axe.run().then(({ violations }) => violations.map(({ id, nodes }) => [id, nodes[0].html]))")
+    assert found == []
 
 
 CAMERA = "[...athcodecForest.camera.position.toArray(), athcodecForest.camera.rotation.y]"

@@ -168,6 +168,29 @@ def test_what_stands_in_an_element_is_seen_until_the_plant_is(shown):
 
 
 @pytest.mark.browser
+def test_attributes_of_an_element_say_what_it_shows(shown, tmp_path):
+    (tmp_path / "gallery" / "plants" / "grass.ath").write_bytes(athcodec.sample_path("grass").read_bytes())
+    shown.evaluate("""() => {
+      globalThis.tuft = document.createElement("ath-viewer");
+      const wanted = { src: "plants/grass.ath", clip: "gale", level: 0, alt: "Grass", speed: 4, "camera-controls": "" };
+      for (const [name, value] of Object.entries(wanted)) tuft.setAttribute(name, value);
+      tuft.style.cssText = "display: block; width: 160px; height: 120px";
+      document.body.prepend(tuft);
+    }""")
+    shown.wait_for_function("() => tuft.currentTime > 1 && tuft.ath.motion.level === 0")
+    assert shown.evaluate("tuft.ath.motion.clip.name") == "gale"
+    canvas = "tuft.shadowRoot.querySelector('canvas')"
+    assert shown.evaluate(f"[{canvas}.ariaLabel, {canvas}.tabIndex]") == ["Grass", 0]
+    shown.evaluate("tuft.pause(); globalThis.stopped = tuft.currentTime")
+    shown.evaluate("tuft.setAttribute('clip', 'calm'); tuft.setAttribute('level', 'auto')")
+    shown.evaluate("tuft.removeAttribute('camera-controls')")
+    shown.wait_for_function("() => tuft.ath.motion.clip.name === 'calm' && tuft.ath.motion.level > 0")
+    assert shown.evaluate("tuft.currentTime === stopped") and shown.evaluate(f"{canvas}.tabIndex") == -1
+    shown.evaluate("tuft.setAttribute('src', 'plants/tree 0.ath')")
+    shown.wait_for_function("() => tuft.ath?.motion.clips.length === 1")
+
+
+@pytest.mark.browser
 def test_an_element_shows_a_forest_with_plants_on_its_floor(shown, tmp_path):
     (tmp_path / "gallery" / "plants" / "grass.ath").write_bytes(athcodec.sample_path("grass").read_bytes())
     shown.evaluate("""() => {

@@ -5,10 +5,12 @@ from __future__ import annotations
 import re
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import numpy as np
 import pytest
+from conftest import SLOWEST
 from PIL import Image, ImageSequence
 
 import athcodec
@@ -46,6 +48,30 @@ def centre(page, selector: str) -> tuple[float, float]:
     return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
 
 
+class Fingers:
+    """On a page, with a clock of their own: taps are as far apart as here, however long the browser takes."""
+
+    def __init__(self, page):
+        self.session, self.now = page.context.new_cdp_session(page), time.time()
+
+    def _send(self, kind: str, points) -> None:
+        self.now += 0.02
+        touches = [{"x": x, "y": y, "id": finger} for finger, (x, y) in enumerate(points)]
+        event = {"type": kind, "touchPoints": touches, "timestamp": self.now}
+        self.session.send("Input.dispatchTouchEvent", event)
+
+    def go(self, *ways) -> None:
+        """Each from one place to another, all at once."""
+        for step in range(5):
+            places = [(a + (c - a) * step / 4, b + (d - b) * step / 4) for (a, b), (c, d) in ways]
+            self._send("touchStart" if step == 0 else "touchMove", places)
+        self._send("touchEnd", [])
+
+    def tap(self, place) -> None:
+        self._send("touchStart", [place])
+        self._send("touchEnd", [])
+
+
 def drag(page, start: tuple[float, float], end: tuple[float, float]) -> None:
     page.mouse.move(*start)
     page.mouse.down()
@@ -77,7 +103,7 @@ def test_the_loading_is_played_again_at_the_rate_that_is_chosen(page, sample_ath
         "() => athcodecViewer.motion?.readyLevel >= 1 && athcodecViewer.counters.arrived.first", timeout=60_000
     )
     page.evaluate("athcodecViewer.setLevel('auto')")
-    page.wait_for_function("() => athcodecViewer.counters.arrived.whole", timeout=60_000)
+    page.wait_for_function("() => athcodecViewer.counters.arrived.whole")
     fetched, seconds = page.evaluate(
         "[athcodecViewer.motion.bytesFetched, athcodecViewer.counters.arrived.whole / 1000]"
     )
@@ -127,12 +153,12 @@ def test_the_view_turns_and_zooms_by_keys_and_a_double_tap_resets_it(page):
 def test_a_double_tap_fits_by_touch(opened, sample_ath):
     with ThrottledServer({"tree.ath": sample_ath.read_bytes()}) as line:
         page = opened(line.page("tree.ath"), has_touch=True, viewport={"width": 390, "height": 844})
-        page.evaluate("athcodecViewer.setPlaying(false)")  # drawing in software keeps taps apart
-        before = page.evaluate(VIEW)
+        page.evaluate("athcodecViewer.setPlaying(false)")
+        before, fingers = page.evaluate(VIEW), Fingers(page)
         page.evaluate("athcodecViewer.moveView(1, 0.2)")
         assert page.evaluate(VIEW) != pytest.approx(before)
         for _ in range(2):
-            page.touchscreen.tap(200, 500)
+            fingers.tap((200, 500))
         page.wait_for_function("() => !athcodecViewer.stage.moved")
         assert page.evaluate(VIEW) == pytest.approx(before, rel=1e-3)
         page.touchscreen.tap(*centre(page, "#toggle-panel"))
@@ -193,6 +219,111 @@ def test_wind_is_chosen_on_a_disc(opened, windy):
         assert "heading 8" in page.get_attribute("#wind", "aria-valuetext")
         page.select_option("#clip", label="gale")
         assert page.evaluate("athcodecViewer.state.wind") is None and page.inner_text("#wind-text").startswith("10.0")
+
+
+def test_where_all_clips_blow_one_way_the_plant_is_turned_with_its_wind(opened):
+    with ThrottledServer({"tree.ath": athcodec.sample_path("grass").read_bytes()}) as line:
+        page = opened(line.page("tree.ath"))
+        assert page.is_visible("#wind-note")
+        x, y = centre(page, "#wind")
+        page.mouse.click(x + 25, y)
+        strength, heading = page.evaluate("athcodecViewer.state.wind")
+        assert strength > 0 and heading == pytest.approx(90, abs=1)
+        turned = "athcodecViewer.plants[0].root.rotation.y"
+        assert page.evaluate(turned) == pytest.approx(-np.radians(heading))
+        page.evaluate("athcodecViewer.forestSwitch(true)")
+        assert page.evaluate(turned) == 0
+        page.evaluate("athcodecViewer.forestSwitch(false)")
+        page.select_option("#clip", index=1)
+        assert page.evaluate(turned) == 0
+
+
+def test_every_control_answers_to_a_finger(opened, windy):
+    with ThrottledServer({"tree.ath": windy}) as line:
+        page = opened(line.page("tree.ath"), has_touch=True, viewport={"width": 390, "height": 844})
+        fingers = Fingers(page)
+
+        def tapped(selector: str, then: str):
+            page.locator(selector).tap()
+            return page.evaluate(then)
+
+        def dragged(selector: str, x: float, y: float) -> None:
+            page.locator(selector).scroll_into_view_if_needed()
+            start = centre(page, selector)
+            fingers.go((start, (start[0] + x, start[1] + y)))
+
+        assert tapped("#play", "athcodecViewer.state.playing") is False
+        page.locator("#time").tap(position={"x": 80, "y": 15})
+        assert page.evaluate("athcodecViewer.state.time") > 0.3
+        assert tapped("#loop", "athcodecViewer.motion.wrap") in ("loop", "clamp")
+        assert not page.is_visible("#replay")
+        tapped("#more", "0")
+        assert page.is_visible("#replay") and page.get_attribute("#more", "aria-expanded") == "true"
+        distance = "athcodecViewer.stage.controls.getDistance()"
+        far = page.evaluate(distance)
+        fingers.go(((160, 400), (60, 400)), ((230, 400), (330, 400)))
+        page.wait_for_function(f"() => {distance} < {0.8 * far}")
+        tapped("#toggle-panel", "0")
+        assert tapped("#level-choice [data-value='1']", "athcodecViewer.motion.target") == 1
+        assert tapped("#colour [data-value=node]", "athcodecViewer.plants[0].colour") == "node"
+        assert tapped("#show [data-value=skeleton]", "athcodecViewer.plants[0].show") == "skeleton"
+        assert tapped("#compare [data-value=levels]", "athcodecViewer.plants.length") == 2
+        dragged("#split svg", -80, 0)
+        assert page.evaluate("athcodecViewer.stage.split") == pytest.approx(0.5 - 80 / 390, abs=0.02)
+        tapped("#compare [data-value=off]", "0")
+        dragged("#wind", 25, 0)
+        assert page.evaluate("athcodecViewer.state.wind[1]") == pytest.approx(90, abs=2)
+        assert tapped("#forest", "Boolean(athcodecViewer.state.forest)") is True
+
+
+REACHABLE = """() => [...document.querySelectorAll("button, input, select, summary, [tabindex]")]
+  .filter((each) => each.checkVisibility() && each.tabIndex >= 0 && !each.disabled)"""
+
+
+def test_every_control_is_reached_by_tab(opened, windy):
+    with ThrottledServer({"tree.ath": windy}) as line:
+        page = opened(line.page("tree.ath"))
+        page.evaluate("athcodecViewer.setPlaying(false)")
+        page.click("#compare [data-value=levels]")
+        wanted = page.evaluate(f"globalThis.wanted = ({REACHABLE})(); wanted.length")
+        page.evaluate("""() => {
+          globalThis.reached = new Set();
+          document.addEventListener("focusin", ({ target }) => reached.add(target));
+        }""")
+        for _ in range(wanted + 2):
+            page.keyboard.press("Tab")
+        assert page.evaluate("wanted.filter((each) => !reached.has(each)).map((each) => each.outerHTML)") == []
+
+
+PIXELS = """(stage) => {
+  stage.render();
+  const gl = stage.renderer.getContext(), { drawingBufferWidth: w, drawingBufferHeight: h } = gl;
+  const out = new Uint8Array(4 * w * h);
+  gl.readPixels(0, 0, w, h, gl.RGBA, gl.UNSIGNED_BYTE, out);
+  return out;
+}"""
+
+
+def test_grass_sways_and_the_plants_of_a_forest_cast_shadows(opened):
+    with ThrottledServer({"fern.ath": athcodec.sample_path("fern").read_bytes()}) as line:
+        page = opened(line.page("fern.ath", quality="full"), viewport={"width": 320, "height": 240})
+        page.evaluate("athcodecViewer.setPlaying(false)")
+        page.evaluate(f"globalThis.seen = () => ({PIXELS})(athcodecViewer.stage)")
+        moved = page.evaluate("""() => {
+          athcodecViewer.stage.breeze(0, 1, 0);
+          const before = seen();
+          athcodecViewer.stage.breeze(1, 1, 0);
+          return seen().filter((value, i) => Math.abs(value - before[i]) > 8).length;
+        }""")
+        assert moved > 100
+        page.evaluate("athcodecViewer.forestOf(30)")
+        page.wait_for_function("() => athcodecViewer.forests()[0].counts.some((count) => count > 0)")
+        darker = page.evaluate("""() => {
+          const shadowed = seen();
+          athcodecViewer.stage.panes[0].scene.getObjectByName("sun").castShadow = false;
+          return seen().filter((value, i) => value - shadowed[i] > 15).length;
+        }""")
+        assert darker > 300
 
 
 def test_a_file_of_one_clip_has_no_wind_to_choose(page):
@@ -286,12 +417,13 @@ def test_the_page_fills_the_screen(page):
 def test_a_file_that_cannot_be_fetched_can_be_tried_again(browser, sample_ath):
     with ThrottledServer({}) as line:
         page = browser.new_page()
+        page.set_default_timeout(SLOWEST)
         page.goto(line.page("tree.ath"))
-        page.wait_for_selector("#again", timeout=60_000)
+        page.wait_for_selector("#again")
         assert "cannot be fetched" in page.inner_text("#message h2")
         line.files["tree.ath"] = sample_ath.read_bytes()
         page.click("#again")
-        page.wait_for_function("() => athcodecViewer.motion?.complete", timeout=60_000)
+        page.wait_for_function("() => athcodecViewer.motion?.complete")
         assert not page.is_visible("#message")
         page.close()
 
@@ -303,7 +435,7 @@ def test_a_file_that_ends_within_a_chunk_is_fetched_once_and_said_to_be_cut_off(
         page = opened(line.page("tree.ath"), "document.getElementById('trouble').checkVisibility()")
         assert "cut off" in page.inner_text("#trouble")
         pictures = page.evaluate("athcodecViewer.counters.pictures")
-        page.wait_for_function(f"() => athcodecViewer.counters.pictures > {pictures + 3}", timeout=60_000)
+        page.wait_for_function(f"() => athcodecViewer.counters.pictures > {pictures + 3}")
         assert line.sent("tree.ath") < 1.6 * len(data)
 
 

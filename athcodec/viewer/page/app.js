@@ -4,9 +4,10 @@ import { ATHLoader } from "athcodec-three";
 
 export const loader = new ATHLoader();
 
-/** `plants`: on the stage, the one that is asked about last; `opened`: the files, each with its `fileName` and `source`; `floor`: what grows
- * on a forest's floor, {source, each}: a URL or bytes, and how many to a tree. */
-export const app = { stage: null, plants: [], opened: [], floor: [] };
+/** `coming`: settles once the first file can be shown, `staged` once there is a stage; `plants`: on it, the one that is asked about
+ * last; `opened`: the files, each with its `fileName` and `source`; `floor`: what grows on a forest's floor, {source, each}: a URL
+ * or bytes, and how many to a tree. */
+export const app = { stage: null, staged: null, coming: null, plants: [], opened: [], floor: [] };
 
 /** `time` is that of the clip, `turns` that of the rounds before; `loop`: null, as is usual for the file, or what was chosen;
  * `wind`: [strength, heading] where clips are blended for it. */

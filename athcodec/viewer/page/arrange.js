@@ -60,6 +60,14 @@ export function clear() {
   app.stage.render();
 }
 
+/** The meadow alone, where no file is open. */
+export function bare() {
+  const { stage } = app;
+  if (!stage || app.plants.length > 0) return;
+  stage.setPanes([{ scene: stage.scene([]) }]);
+  stage.look(new Box3(new Vector3(-1, 0, -1), new Vector3(1, 2, 1)), { height: 0, size: 4 });
+}
+
 // The world's box of all rest poses.
 function box() {
   const all = new Box3();

@@ -1,7 +1,7 @@
 // Files: where they come from, how they are opened, and what is said where they cannot be.
 
 import { app, counters, loader, state } from "./app.js";
-import { arrange, clear, frameView } from "./arrange.js";
+import { arrange, bare, clear, frameView } from "./arrange.js";
 import { playIn } from "./clips.js";
 import { compare } from "./look.js";
 import { Plant } from "./plant.js";
@@ -70,6 +70,7 @@ function say(title, text, technical = "", again = null) {
   $("again").hidden = !again;
   $("again").onclick = again;
   message.hidden = false;
+  breath().then(() => app.staged).then(bare);
 }
 
 /** Says that nothing can be shown. */
@@ -109,7 +110,9 @@ export async function open(source, name, beside = false, again = null) {
   }
   let ath;
   try {
-    ath = await load(source);
+    const loading = load(source);
+    app.coming ??= loading.catch(() => {});
+    ath = await loading;
   } catch (error) {
     if (wish === asked) refuse(error, typeof source === "string" ? retry : null);
     return;
@@ -132,15 +135,21 @@ export async function open(source, name, beside = false, again = null) {
   for (const type of ["stopped", "damaged"]) ath.motion.addEventListener(type, tell);
   if (ath.motion.failure) tell(ath.motion.failure);
   compare.set(beside ? "file" : "off");
-  await show(ath, beside, again);
+  await show(ath, beside, again, () => wish === asked);
 }
 
-async function show(ath, beside, again) {
+async function show(ath, beside, again, isWanted) {
+  await app.staged;
+  if (!app.stage) return; // a browser that cannot draw
   if (!again) app.stage.moved = false;
   await breath();
   const plant = beside ? null : new Plant(ath);
   plant?.prepare(1, 1);
-  await breath();
+  if (plant) await app.stage.compile([plant.root]);
+  if (!isWanted()) {
+    plant?.dispose();
+    return;
+  }
   arrange(plant);
   if (!app.stage.moved) frameView();
   tellSizes();

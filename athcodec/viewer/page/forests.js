@@ -9,7 +9,8 @@ import { nodeColour } from "./colours.js";
 import { clearFloor, forests, growFloor } from "./floor.js";
 import { colour, compare, level, setLevel, show } from "./look.js";
 import { feet, forestReach, treePlaces } from "./places.js";
-import { surfaceMaterial } from "./surfaces.js";
+import { shadowed } from "./grove.js";
+import { outlined, surfaceMaterial } from "./surfaces.js";
 import { setLoop } from "./time.js";
 import { $, countText } from "./ui.js";
 import { windControl } from "./wind.js";
@@ -29,7 +30,7 @@ function forestMaterial(lines, of) {
   if (surfaces() && !lines) return surfaceMaterial(surfaces());
   const material = lines ? new LineBasicMaterial() : new MeshLambertMaterial({ side: DoubleSide });
   tintForest(material, lines, of);
-  return material;
+  return app.plants[0].surfaces && !lines ? outlined(material, app.plants[0].surfaces) : material;
 }
 
 // Bark, leaves or the file's own colours; by level where nodes are told apart.
@@ -49,7 +50,7 @@ export function forestOn() {
   const [plant] = app.plants;
   state.forest?.removeFromParent();
   state.forest?.dispose();
-  const forest = new ATHForest(plant.ath, { geometry: plant.forestGeometry(), material: forestMaterial });
+  const forest = shadowed(new ATHForest(plant.ath, { geometry: plant.forestGeometry(), material: forestMaterial, depthMaterial: plant.depthMaterial }));
   state.forest = forest;
   forest.levelOfDetail = $("forest-lod").checked;
   forest.addEventListener("level", () => { state.dirty = true; });

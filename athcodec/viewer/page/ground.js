@@ -1,6 +1,6 @@
-// The ground: grass that fades into the haze of the horizon, and its blades where the plant stands.
+// The ground: grass that fades into the haze of the horizon, and its blades, which sway, where the plant stands.
 
-import { BufferAttribute, BufferGeometry, CircleGeometry, Color, Group, InstancedMesh, Matrix4, Mesh, MeshLambertMaterial, Object3D } from "three";
+import { BufferAttribute, BufferGeometry, CircleGeometry, Color, Group, InstancedMesh, Matrix4, Mesh, MeshLambertMaterial, Object3D, Vector3 } from "three";
 
 const REACH = 60; // of the disc, over the radius of the meadow
 const BLADES = 26000, TALL = 0.015, WIDE = 0.0015; // over the meadow's radius
@@ -22,14 +22,15 @@ float athNoise2(vec2 x) {
 }
 `;
 
-// Patches of all sizes, each as long as it is wider than a pixel.
+// Patches of all sizes, each as long as it is wider than a pixel; seen from low above the ground they would be streaks.
 const PATCHES = /* glsl */`
 {
-  float shade = 0.0, wide = length(fwidth(athMeadow));
+  float shade = 0.0, wide = length(fwidth(athMeadow)), low = dot(normalize(vViewPosition), normalize(vNormal));
   for (int i = 0; i < 6; i++) {
     float often = exp2(1.4 * float(i)) * 1.3;
     shade += (athNoise2(athMeadow * often + 7.0 * float(i)) - 0.5) * 0.36 * (1.0 - smoothstep(0.05, 0.3, wide * often));
   }
+  shade *= smoothstep(0.0, 0.3, low);
   diffuseColor.rgb = mix(diffuseColor.rgb, athOther, clamp(0.4 + shade, 0.0, 1.0)) * (0.92 + 0.3 * shade);
 }
 `;
@@ -67,8 +68,39 @@ function blade() {
   return geometry;
 }
 
+// Gusts that go over the meadow, and each blade's own trembling.
+const SWAY = /* glsl */`
+vec4 mvPosition = instanceMatrix * vec4(transformed, 1.0);
+{
+  vec2 way = vec2(cos(athBreeze.z), sin(athBreeze.z)), at = instanceMatrix[3].xy;
+  float own = fract(43.0 * at.x + 71.0 * at.y), up = mvPosition.z / ${TALL};
+  float gust = sin(11.0 * dot(at, way) + 2.0 * sin(5.0 * dot(at, way.yx)) - 2.1 * athBreeze.x) * 0.5 + 0.5;
+  float lean = athBreeze.y * (0.25 + 0.75 * gust + 0.2 * sin((5.0 + 3.0 * own) * athBreeze.x + 6.28 * own));
+  mvPosition.xy += way * lean * up * up * ${TALL};
+  mvPosition.z -= 0.3 * lean * lean * up * up * ${TALL};
+}
+mvPosition = modelViewMatrix * mvPosition;
+gl_Position = projectionMatrix * mvPosition;
+`;
+
+function bladeMaterial() {
+  const material = new MeshLambertMaterial({ vertexColors: true }), breeze = { value: new Vector3() };
+  material.userData.breeze = breeze.value;
+  material.onBeforeCompile = (shader) => {
+    shader.uniforms.athBreeze = breeze;
+    shader.vertexShader = shader.vertexShader.replace("#include <common>", "#include <common>\nuniform vec3 athBreeze;")
+      .replace("#include <project_vertex>", SWAY);
+  };
+  return material;
+}
+
+/** What the blades of a meadow sway in. strength: 0 to 1; heading: degrees, clockwise from above. */
+export function blow(ground, seconds, strength, heading) {
+  ground.getObjectByName("grass").material.userData.breeze.set(seconds, strength, (90 - heading) * Math.PI / 180);
+}
+
 function grass() {
-  const mesh = new InstancedMesh(blade(), new MeshLambertMaterial({ vertexColors: true }), BLADES), at = new Object3D(), matrix = new Matrix4();
+  const mesh = new InstancedMesh(blade(), bladeMaterial(), BLADES), at = new Object3D(), matrix = new Matrix4();
   for (let i = 0; i < BLADES; i++) {
     const far = chance(i, 1) ** 0.72 * 0.98, turn = 2 * Math.PI * chance(i, 2);
     const x = far * Math.cos(turn), y = far * Math.sin(turn), clump = 0.5 + 0.5 * Math.sin(9 * x + 3 * Math.sin(7 * y)) * Math.sin(8 * y);

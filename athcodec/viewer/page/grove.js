@@ -9,11 +9,14 @@ import { surfaceMaterial } from "./surfaces.js";
 
 const GREEN = 0x6f8f4a;
 
+/** The same forest, whose plants cast shadows on the ground and each other. */
+export const shadowed = (forest) => Object.assign(forest, { castShadow: true, receiveShadow: true });
+
 /** A forest of a plant, with its surfaces, in place of the plant itself. */
 export function forestOfPlant(plant, changed) {
   const { ath, root, surfaces } = plant;
   const material = surfaces ? () => surfaceMaterial(surfaces) : ath.hasFaces ? () => new MeshLambertMaterial({ color: GREEN, side: DoubleSide }) : undefined;
-  const forest = new ATHForest(ath, { geometry: plant.forestGeometry(), material });
+  const forest = shadowed(new ATHForest(ath, { geometry: plant.forestGeometry(), material, depthMaterial: plant.depthMaterial }));
   for (const child of root.children) child.visible = false;
   root.add(forest);
   ath.motion.wrap = "loop";

@@ -82,7 +82,7 @@ export function tellLevel() {
   const { camera, pixels } = app.stage, off = motion.pixelError(shown, camera, pixels, root.matrixWorld);
   const name = upper(detailText(motion, shown));
   $("level-hint").textContent = state.forest ? "Each plant as its distance asks for"
-    : motion.level < motion.target ? `${name} now, ${error}; ${detailText(motion, motion.target)} is on its way`
+    : motion.level < motion.target && !motion.failure ? `${name} now, ${error}; ${detailText(motion, motion.target)} is on its way`
     : off <= 1 ? `${name}, ${error}: less than a pixel here for 99 of 100 points` : `${name}, ${error}`;
   if (motion.automatic) $("level").value = motion.target;
   readOut();

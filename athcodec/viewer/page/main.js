@@ -16,12 +16,13 @@ import { Stage } from "./stage.js";
 import { markFirst, tellFacts } from "./story.js";
 import { advance, tellTime } from "./time.js";
 import { $ } from "./ui.js";
+import { breeze } from "./wind.js";
 import "./camera.js";
 import "./keys.js";
 import "./scripts.js";
 import "./sharing.js";
 
-const TELL_MS = 250;
+const TELL_MS = 250, PATIENCE_MS = 2000;
 
 let last = 0;
 
@@ -38,7 +39,10 @@ function tick(now) {
   const passed = Math.min(1, (now - last) / 1000), { stage, plants } = app; // a page that was hidden goes on from where it was
   last = now;
   if (state.playing && plants.length > 0) stage.took(1000 * passed);
-  if (plants.length === 0) return;
+  if (plants.length === 0) {
+    if (state.dirty && stage.panes.length > 0) draw();
+    return;
+  }
   stage.controls.update();
   if (state.playing) advance(passed);
   for (const { motion, root } of plants) {
@@ -57,8 +61,10 @@ function tick(now) {
 function draw() {
   state.dirty = false;
   const start = performance.now();
+  app.stage.breeze(state.turns + state.time, ...breeze());
   app.stage.render();
-  markFirst();
+  $("canvas").classList.add("drawn");
+  if (app.plants.length > 0) markFirst();
   counters.frames++;
   counters.frameMs = counters.frameMs * 0.8 + 0.2 * (performance.now() - start);
 }
@@ -71,13 +77,22 @@ function count(now) {
   for (const tell of [tellFacts, tellLevel, tellScale, tellTime, splitLabels, write]) tell();
 }
 
-begin(); // the file is on its way while the stage is set up, which takes longer
-loader.preload();
-try {
-  setStage();
-  setSplit(0.5);
-  if (matchMedia("(max-width: 680px)").matches) togglePanel();
-  requestAnimationFrame(tick);
-} catch (error) {
-  refuse(Object.assign(error, { codeName: "GRAPHICS" }));
+const painted = () => new Promise((done) => { requestAnimationFrame(() => setTimeout(done)); });
+const late = () => new Promise((done) => { setTimeout(done, PATIENCE_MS); });
+
+// Setting the stage takes long without a graphics processor, and workers start and fetch only while the page does nothing.
+async function setUp() {
+  await Promise.race([Promise.all([painted(), app.coming]), late()]);
+  try {
+    setStage();
+    setSplit(0.5);
+    requestAnimationFrame(tick);
+  } catch (error) {
+    refuse(Object.assign(error, { codeName: "GRAPHICS" }));
+  }
 }
+
+if (matchMedia("(max-width: 680px)").matches) togglePanel();
+begin();
+loader.preload();
+app.staged = setUp();

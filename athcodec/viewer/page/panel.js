@@ -1,4 +1,4 @@
-// The settings: shown or not.
+// The settings, and on small screens what is told of the file: shown or not.
 
 import { app } from "./app.js";
 import { $ } from "./ui.js";
@@ -10,3 +10,7 @@ export function togglePanel() {
 }
 
 $("toggle-panel").addEventListener("click", togglePanel);
+
+$("more").addEventListener("click", () => {
+  $("more").setAttribute("aria-expanded", String(document.body.classList.toggle("told")));
+});

@@ -5,7 +5,7 @@ import { BufferAttribute, BufferGeometry, DoubleSide, Group, InstancedBufferAttr
 import { barkColour, heat, nodeColour, orderColour } from "./colours.js";
 import { limbDepth, limbGeometry, limbMaterial, setRadii } from "../src/limbs.js";
 import { radii } from "../src/radii.js";
-import { surfaceDepth, surfaceMaterial, surfacesOf } from "./surfaces.js";
+import { outlined, surfaceDepth, surfaceMaterial, surfacesOf } from "./surfaces.js";
 
 const LEAF = [0.16, 0.29, 0.07], OVER = [0.55, 0.2, 0.06];
 const SLIMMEST = 4; // order from which on bark is as pale as it gets
@@ -43,6 +43,7 @@ export class Plant {
     this.ath = ath;
     this.motion = motion;
     const up = ath.metadata.up_axis;
+    this.root.rotation.order = "YXZ";
     if (up === "z") this.root.rotation.x = -Math.PI / 2;
     if (up === "x") this.root.rotation.z = Math.PI / 2;
     this.root.updateMatrixWorld(true);
@@ -88,9 +89,21 @@ export class Plant {
     this.paint();
   }
 
+  /** Stands turned by so many degrees, clockwise from above, whole and with its motion. */
+  turn(degrees) {
+    this.root.rotation.y = -degrees * Math.PI / 180;
+    this.root.updateMatrixWorld(true);
+  }
+
   /** What the file's texture coordinates tell apart, see surfacesOf; null: nothing. */
   get surfaces() {
     return this.ath.geometry?.hasAttribute("uv") ? surfacesOf(this.ath.metadata) : null;
+  }
+
+  /** What a forest of it casts shadows with; null: nothing of its own. */
+  get depthMaterial() {
+    const { surfaces } = this;
+    return surfaces && (() => surfaceDepth(surfaces));
   }
 
   // Bark and leaves as they look near by, or colours that tell something.
@@ -110,7 +123,8 @@ export class Plant {
       object = new LineSegments(motion.attach(this.#lines()), motion.bind(lineMaterial()));
       object.renderOrder = 1;
     } else if (ath.hasFaces) {
-      object = motion.bindShadows(new Mesh(motion.attach(sharing(ath.geometry)), motion.bind(meshMaterial())));
+      const material = this.surfaces ? outlined(meshMaterial(), this.surfaces) : meshMaterial();
+      object = motion.bindShadows(new Mesh(motion.attach(sharing(ath.geometry)), motion.bind(material)));
       if (this.surfaces) Object.assign(object, { customDepthMaterial: motion.bind(surfaceDepth(this.surfaces)) });
     } else {
       const geometry = limbGeometry(ath, this.#radii);

@@ -1,32 +1,51 @@
-// The sky by day and at dusk: a dome behind everything, the light that comes from all of it, and the sun.
+// The sky by day and at dusk: a dome behind everything, with hills far off and clouds, the light that comes from all of it, and the sun.
 
 import { BackSide, Color, DirectionalLight, HemisphereLight, Mesh, PMREMGenerator, Scene, ShaderMaterial, SphereGeometry, Vector3 } from "three";
 
 export const SUN = new Vector3(-0.62, 0.72, 0.32).normalize();
 const SHADOW_PIXELS = 2048;
 
-const DAY = { zenith: 0x8fb9dd, horizon: 0xe9eee9, glow: 0xfff0d6, grass: 0x9aa86f, sun: 0xfff1d8, sunlight: 3.4, above: 0xdcebf8, below: 0x8c8f62, fill: 0.55,
+const DAY = { zenith: 0x8fb9dd, horizon: 0xe9eee9, glow: 0xfff0d6, grass: 0x9aa86f, cloud: 0xffffff, hills: 0x7d9a8c, sun: 0xfff1d8, sunlight: 3.4, above: 0xdcebf8, below: 0x8c8f62, fill: 0.55,
   around: 0.75 };
-const DUSK = { zenith: 0x18202f, horizon: 0x4a5260, glow: 0x96806c, grass: 0x3a4332, sun: 0xffd9b0, sunlight: 4.2, above: 0xa9bfe0, below: 0x59604c, fill: 1.9,
+const DUSK = { zenith: 0x18202f, horizon: 0x4a5260, glow: 0x96806c, grass: 0x3a4332, cloud: 0x6f6a70, hills: 0x2b3644, sun: 0xffd9b0, sunlight: 4.2, above: 0xa9bfe0, below: 0x59604c, fill: 1.9,
   around: 3.2 };
 
 const VERTEX = "varying vec3 way; void main() { way = position; gl_Position = projectionMatrix * modelViewMatrix * vec4(position, 1.0); }";
 const FRAGMENT = /* glsl */`
-uniform vec3 zenith, horizon, glow, grass, sun;
+uniform vec3 zenith, horizon, glow, grass, sun, cloud, hills;
 uniform float ground;
 varying vec3 way;
+float hash(vec2 p) { p = fract(p * vec2(123.34, 456.21)); p += dot(p, p + 45.32); return fract(p.x * p.y); }
+float noise(vec2 x) {
+  vec2 i = floor(x), f = fract(x);
+  f = f * f * (3.0 - 2.0 * f);
+  return mix(mix(hash(i), hash(i + vec2(1, 0)), f.x), mix(hash(i + vec2(0, 1)), hash(i + vec2(1, 1)), f.x), f.y);
+}
+float ridge(vec2 way, vec2 k) { // height of hills all around, with woods on them
+  return 0.05 * noise(2.3 * way + k) + 0.016 * noise(9.0 * way + k) + 0.005 * noise(31.0 * way) + 0.0035 * noise(110.0 * way) - 0.012;
+}
 void main() {
   vec3 w = normalize(way);
-  vec3 c = mix(horizon, zenith, pow(clamp(w.y, 0.0, 1.0), 0.55));
+  vec3 c = mix(horizon, zenith, pow(clamp(w.y, 0.0, 1.0), 0.5));
   float toward = max(dot(w, sun), 0.0);
   c = mix(c, glow, 0.45 * pow(toward, 6.0) + 0.4 * pow(toward, 60.0));
-  c = mix(c, grass, ground * smoothstep(0.02, -0.06, w.y));
+  if (ground > 0.5) c = mix(c, grass, smoothstep(0.02, -0.06, w.y));
+  else if (w.y > 0.0) {
+    vec2 at = w.xz / (w.y + 0.12);
+    float thick = 0.55 * noise(at * 1.1 + 3.0) + 0.27 * noise(at * 2.7) + 0.13 * noise(at * 6.1) + 0.05 * noise(at * 13.0);
+    c = mix(c, cloud, 0.75 * smoothstep(0.44, 0.76, thick) * smoothstep(0.015, 0.2, w.y));
+    vec2 around = normalize(w.xz);
+    float soft = max(fwidth(w.y), 1e-4), far = ridge(around, vec2(7.3, 2.1)) + 0.012, near = ridge(around, vec2(1.7, 8.4));
+    float mist = smoothstep(0.0, 0.022, w.y); // in the valleys
+    c = mix(c, mix(horizon, hills, 0.2 + 0.2 * mist), smoothstep(soft, -soft, w.y - far));
+    c = mix(c, mix(horizon, hills, 0.3 + 0.4 * mist), smoothstep(soft, -soft, w.y - near));
+  }
   gl_FragColor = vec4(c, 1.0);
   #include <colorspace_fragment>
 }`;
 
 function dome(sky, ground) {
-  const uniforms = Object.fromEntries(["zenith", "horizon", "glow", "grass"].map((name) => [name, { value: new Color(sky[name]) }]));
+  const uniforms = Object.fromEntries(["zenith", "horizon", "glow", "grass", "cloud", "hills"].map((name) => [name, { value: new Color(sky[name]) }]));
   const material = new ShaderMaterial({ vertexShader: VERTEX, fragmentShader: FRAGMENT, side: BackSide, depthWrite: false, depthTest: false,
     uniforms: { ...uniforms, sun: { value: SUN }, ground: { value: ground ? 1 : 0 } } });
   return new Mesh(new SphereGeometry(1, 48, 24), material);

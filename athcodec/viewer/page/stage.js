@@ -1,12 +1,13 @@
 // The stage: renderer, camera and light, and one or two panes, each with its own scene; two share the view, on either side of a split.
 
-import { ACESFilmicToneMapping, Box3, BufferAttribute, Fog, PCFShadowMap, PerspectiveCamera, Scene, Vector3, WebGLRenderer } from "three";
+import { ACESFilmicToneMapping, Box3, Fog, PCFShadowMap, PerspectiveCamera, Scene, Vector3, WebGLRenderer } from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 
-import { meadow, tintMeadow } from "./ground.js";
+import { blow, meadow, tintMeadow } from "./ground.js";
 import { Sky } from "./sky.js";
 
 const SLOW_MS = 20, PATIENCE = 24; // pictures that are slow, one behind the other, before there is less to draw
+const SHADED = 12; // plants, across a forest
 const SOFTWARE = /swiftshader|llvmpipe|software|basic render/i;
 const QUALITY = [{ ratio: 2, shadows: true, grass: true, around: true }, { ratio: 1.25, shadows: true, grass: true, around: true },
   { ratio: 1, shadows: false, grass: false, around: false }];
@@ -35,7 +36,8 @@ export class Stage {
 
   constructor(canvas, changed, resized) {
     this.canvas = canvas;
-    this.renderer = new WebGLRenderer({ canvas, antialias: true, powerPreference: "high-performance" });
+    const context = canvas.getContext("webgl2", { alpha: false, antialias: true, powerPreference: "high-performance" }) ?? undefined;
+    this.renderer = new WebGLRenderer({ canvas, context });
     Object.assign(this.renderer, { toneMapping: ACESFilmicToneMapping, toneMappingExposure: 0.82 });
     this.renderer.shadowMap.enabled = true;
     this.renderer.shadowMap.type = PCFShadowMap;
@@ -87,21 +89,25 @@ export class Stage {
     return true;
   }
 
-  /** Compiles what plants are drawn with before there are any, and draws it once: what waits for the graphics
-   * processor waits here. */
+  /** Has what plants are drawn with compiled before there are any; nothing waits for it. */
   warm(objects) {
     this.kept = this.scene(objects); // programs live as long as a material that uses them
-    for (const object of objects) {
-      object.geometry.setAttribute("position", new BufferAttribute(new Float32Array(9), 3));
-      object.frustumCulled = false;
-    }
-    this.renderer.render(this.kept, this.camera);
+    this.renderer.compile(this.kept, this.camera);
+  }
+
+  /** Resolves once all is compiled that these objects are drawn with; the page answers in the meantime, where the browser can do so. */
+  async compile(objects) {
+    const scene = this.scene(objects);
+    if (this.renderer.extensions.has("KHR_parallel_shader_compile")) await this.renderer.compileAsync(scene, this.camera);
+    else this.renderer.compile(scene, this.camera);
+    scene.remove(...objects);
   }
 
   /** A pane's scene; `content` is added to it. */
   scene(content) {
     const scene = new Scene();
     scene.add(meadow(), ...content);
+    scene.fog = new Fog(this.sky.horizon, 1, 2);
     this.#tint([scene]);
     return scene;
   }
@@ -111,7 +117,7 @@ export class Stage {
     for (const scene of scenes) {
       this.sky.light(scene);
       tintMeadow(scene.getObjectByName("ground"), this.sky.dark);
-      scene.fog?.color.copy(this.sky.horizon);
+      scene.fog.color.copy(this.sky.horizon);
     }
     this.#draw(scenes);
   }
@@ -151,7 +157,7 @@ export class Stage {
   look(box, ground) {
     const size = box.getSize(new Vector3()), across = Math.hypot(size.x, size.z), half = Math.tan(this.camera.fov * Math.PI / 360);
     const aspect = (this.width - this.inset) / this.height;
-    const distance = 0.35 * across + 0.68 * Math.max(size.y, 0.9 * across / aspect, 1e-6) / half;
+    const distance = 0.35 * across + 0.62 * Math.max(size.y, 0.84 * across / aspect, 1e-6) / half;
     box.getCenter(this.controls.target);
     this.camera.position.copy(this.controls.target).add(new Vector3(0.35, 0.16, 0.92).normalize().multiplyScalar(distance));
     this.camera.near = distance / 500;
@@ -164,12 +170,12 @@ export class Stage {
 
   /** What is near of a forest that reaches so far; box: of one plant. */
   lookOver(box, reach) {
-    const size = box.getSize(new Vector3()), most = Math.max(size.x, size.y, size.z), far = Math.max(reach, most), near = Math.min(far, 2.2 * most);
+    const size = box.getSize(new Vector3()), most = Math.max(size.x, size.y, size.z), far = Math.max(reach, most), near = Math.min(far, 1.7 * most);
     const part = new Box3(new Vector3(-near, box.min.y, -near), new Vector3(near, box.max.y, near));
     this.look(part, { height: box.min.y, size: 2.6 * far, plant: 1.9 * most });
     this.controls.maxDistance = 6 * far;
     this.camera.far = 12 * far + 20 * most;
-    this.fog(this.camera.position.distanceTo(this.controls.target) * 0.7, 3.2 * far + 4 * most);
+    this.fog(this.camera.position.distanceTo(this.controls.target) * 0.7, 7 * far + 12 * most);
   }
 
   /** size: of all that stands on it; plant: of a single plant, which the blades of grass are as large as. */
@@ -179,7 +185,8 @@ export class Stage {
       ground.position.y = height;
       ground.scale.setScalar(size);
       ground.getObjectByName("grass").scale.setScalar(Math.sqrt(plant / size));
-      this.sky.shade(scene, new Vector3(0, height + 0.25 * size, 0), 0.75 * size);
+      const wide = Math.min(size, SHADED * plant); // of what has shadows
+      this.sky.shade(scene, new Vector3(0, height + 0.25 * wide, 0), 0.75 * wide);
     }
     this.fog(0, 0);
   }
@@ -187,9 +194,14 @@ export class Stage {
   /** Haze from one distance to another; where both are 0 only the ground far off is in it. */
   fog(near, far) {
     for (const { scene } of this.panes) {
-      const size = scene.getObjectByName("ground").scale.x, [from, to] = far > 0 ? [near, far] : [1.6 * size, 15 * size];
+      const size = scene.getObjectByName("ground").scale.x, [from, to] = far > 0 ? [near, far] : [2 * size, 56 * size];
       scene.fog = new Fog(this.sky.horizon, from, to);
     }
+  }
+
+  /** The wind in the grass: seconds that passed, strength from 0 to 1, heading in degrees. */
+  breeze(seconds, strength, heading) {
+    for (const { scene } of this.panes) blow(scene.getObjectByName("ground"), seconds, strength, heading);
   }
 
   /** Height of the picture in pixels of the device. */

@@ -64,10 +64,10 @@ export function markFirst() {
 }
 
 /** From now on it is told when the bytes of a file have come; the first picture is decoded. Drawing it takes time of its own. */
-export function watchArrival({ motion }) {
-  const now = () => performance.now() - counters.started;
+export function watchArrival({ motion, channel }) {
+  const now = () => channel.sent - counters.started;
   const whole = () => { if (motion.complete) counters.arrived.whole ??= now(); };
-  counters.arrived = { first: now() };
+  counters.arrived = { first: (channel.decodedAt ?? channel.sent) - counters.started };
   motion.addEventListener("ready", whole);
   whole();
 }

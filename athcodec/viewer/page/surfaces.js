@@ -64,10 +64,18 @@ float athVeins(vec2 leaf) { // 1 on a vein, as long as that is wider than a pixe
 }
 `;
 
-const SURFACE = /* glsl */`
+const EDGE = /* glsl */`
 float athIn = athInside();
 diffuseColor.a = clamp(athIn / max(fwidth(athIn), 1e-4) + 0.5, 0.0, 1.0);
+#ifdef ALPHA_TO_COVERAGE
+if (diffuseColor.a < 0.02) discard;
+#else
 if (diffuseColor.a < 0.5) discard;
+#endif
+`;
+
+const SURFACE = /* glsl */`
+${EDGE}
 bool athIsLeaf = athUv.x >= 1.0;
 float athThin = 0.0, athBump = 0.0;
 if (athIsLeaf) {
@@ -136,9 +144,18 @@ function given(shader, fragment, [stem, leaf]) {
   shader.fragmentShader = `#define ATH_STEM ${STEMS.indexOf(stem)}\n#define ATH_LEAF ${LEAVES.indexOf(leaf)}\n${fragment}`;
 }
 
+// Soft edges, where the picture is of nothing that shines through it.
+function soften(material) {
+  material.onBeforeRender = (renderer) => {
+    material.alphaToCoverage = !renderer.getContextAttributes().alpha;
+    material.onBeforeRender = () => {};
+  };
+  return material;
+}
+
 /** For geometries with texture coordinates and the surfaces of a file; not yet bound to a motion. */
 export function surfaceMaterial(surfaces) {
-  const material = new MeshStandardMaterial({ side: DoubleSide, shadowSide: DoubleSide });
+  const material = soften(new MeshStandardMaterial({ side: DoubleSide, shadowSide: DoubleSide }));
   material.onBeforeCompile = (shader) => given(shader, shader.fragmentShader
     .replace("#include <common>", `#include <common>\n${SHAPE}${LOOK}`)
     .replace("#include <map_fragment>", SURFACE)
@@ -147,6 +164,14 @@ export function surfaceMaterial(surfaces) {
     .replace("#include <lights_fragment_end>", `#include <lights_fragment_end>\n${THROUGH}`), surfaces);
   material.customProgramCacheKey = () => `ath surface ${surfaces}`;
   return material;
+}
+
+/** The same material with the leaves' outlines, in colours that tell something. */
+export function outlined(material, surfaces) {
+  material.onBeforeCompile = (shader) => given(shader, shader.fragmentShader
+    .replace("#include <common>", `#include <common>\n${SHAPE}`).replace("#include <map_fragment>", EDGE), surfaces);
+  material.customProgramCacheKey = () => `ath outlines ${surfaces}`;
+  return soften(material);
 }
 
 /** What shadows are drawn with, so that they have the leaves' outlines. */

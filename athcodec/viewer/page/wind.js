@@ -1,10 +1,12 @@
 // Wind as one round control, where the clips of a file say which wind they show: away from the middle it is stronger, around it
-// another heading.
+// another heading. A heading is blended of clips that have several; where all have one, a plant cannot be known in another, and
+// it is turned as a whole, with the wind that it is in.
 
 import { app, state } from "./app.js";
 import { $ } from "./ui.js";
 
 const ROUND = 40; // radius of the disc, in its own units
+const LIGHT = 0.35; // breeze, where none is told
 const disc = $("wind");
 let range = null; // {least, most, headings} of the clips
 
@@ -12,15 +14,31 @@ function windsOf({ clips, metadata }) {
   return clips.map(({ name }) => ({ ...metadata, ...metadata.clips?.[name] })).filter(({ strength }) => Number.isFinite(strength));
 }
 
-/** Where the clips allow it. Several headings, or else one: then only the strength can be chosen. */
+const isTurned = () => range.headings.length === 1;
+
+/** Where the clips allow it. */
 export function windControl() {
   const [ath] = app.opened, winds = windsOf({ clips: ath.motion.clips, metadata: ath.metadata });
   const strengths = [...new Set(winds.map(({ strength }) => strength))], headings = [...new Set(winds.map(({ heading = 0 }) => heading))];
   range = strengths.length > 1 || headings.length > 1 ? { least: Math.min(...strengths), most: Math.max(...strengths), headings } : null;
   $("wind-section").hidden = !range || Boolean(state.forest);
+  turnPlants();
   if (!range) return;
+  $("wind-note").hidden = !isTurned();
   $("wind-clips").replaceChildren(...winds.map(({ strength, heading = 0 }) => dot(strength, heading)));
   mark();
+}
+
+function turnPlants() {
+  const turn = range && state.wind && !state.forest && isTurned() ? state.wind[1] - range.headings[0] : 0;
+  for (const plant of app.plants) plant.turn(turn);
+}
+
+/** The wind of what plays, as the grass has it: strength from 0 to 1, heading. */
+export function breeze() {
+  if (!range) return [LIGHT, 0];
+  const [strength, heading] = now();
+  return [strength / range.most, heading];
 }
 
 const radiusOf = (strength) => ROUND * Math.max(strength, 0) / range.most;
@@ -49,7 +67,7 @@ function mark() {
   handle.setAttribute("cy", y);
   arrow.setAttribute("x2", x);
   arrow.setAttribute("y2", y);
-  const turns = range.headings.length > 1, text = `${strength.toFixed(1)}${turns ? `, to ${Math.round(heading)}°` : ""}`;
+  const text = `${strength.toFixed(1)}, to ${Math.round(heading) % 360}°`;
   $("wind-text").value = text;
   disc.setAttribute("aria-valuemin", range.least);
   disc.setAttribute("aria-valuemax", range.most);
@@ -60,7 +78,9 @@ function mark() {
 /** Shows the plants in the wind that is chosen, if one is. */
 export function applyWind() {
   if (!state.wind || !range || state.forest) return;
-  for (const { motion } of app.plants) motion.wind(...state.wind);
+  const [strength, heading] = state.wind;
+  for (const { motion } of app.plants) motion.wind(strength, isTurned() ? range.headings[0] : heading);
+  turnPlants();
   const select = $("clip");
   if (!select.querySelector("[value=wind]")) select.append(new Option("wind", "wind"));
   select.value = "wind";
@@ -68,8 +88,7 @@ export function applyWind() {
 
 export function setWind(strength, heading) {
   if (!range) return;
-  const turned = range.headings.length > 1 ? ((heading % 360) + 360) % 360 : range.headings[0];
-  state.wind = [Math.max(range.least, Math.min(strength, range.most)), turned];
+  state.wind = [Math.max(range.least, Math.min(strength, range.most)), ((heading % 360) + 360) % 360];
   applyWind();
   mark();
   state.dirty = true;
@@ -91,6 +110,6 @@ disc.addEventListener("keydown", (event) => {
   const by = { ArrowUp: [0.05, 0], ArrowDown: [-0.05, 0], ArrowLeft: [0, -10], ArrowRight: [0, 10] }[event.key];
   if (!by) return;
   event.preventDefault();
-  const [strength, heading] = now(), sideways = range.headings.length < 2 ? by[1] / 200 : 0;
-  setWind(strength + (by[0] + sideways) * (range.most - range.least), heading + by[1]);
+  const [strength, heading] = now();
+  setWind(strength + by[0] * (range.most - range.least), heading + by[1]);
 });

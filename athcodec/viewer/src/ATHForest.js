@@ -41,16 +41,18 @@ export class ATHForest extends Group {
   #turns = new Float32Array(0); // cosine, sine, seconds ahead, clip
   #states = [];         // of every instance that is in view: {clip, level, from, since}; from: -1, or what it fades in from
   #material;
+  #depthMaterial;
   #geometry;
   #now = 0;             // of the last update(), milliseconds
 
   /** geometry: what is drawn (default: the file's faces, else lines). material(isLines, level): makes the material of a
-   * level (default: like ath.object's). */
-  constructor(ath, { geometry = ath.geometry ?? ath.lines, material = plainMaterial } = {}) {
+   * level (default: like ath.object's); depthMaterial(): what its shadows are drawn with, where `castShadow` is set. */
+  constructor(ath, { geometry = ath.geometry ?? ath.lines, material = plainMaterial, depthMaterial = null } = {}) {
     super();
     this.#ath = ath;
     this.#geometry = geometry;
     this.#material = material;
+    this.#depthMaterial = depthMaterial;
     this.name = "ath forest";
   }
 
@@ -146,7 +148,8 @@ export class ATHForest extends Group {
     geometry.setAttribute("athPart", parts(played));
     if (played.from) geometry.setAttribute("athPartBefore", parts(played.from));
     const drawn = lines ? new LineSegments(geometry, material) : new Mesh(geometry, material);
-    Object.assign(drawn, shadowMaterials(played.uniforms, true));
+    Object.assign(drawn, shadowMaterials(played.uniforms, true), { castShadow: this.castShadow, receiveShadow: this.receiveShadow });
+    if (this.#depthMaterial) drawn.customDepthMaterial = injectMotion(this.#depthMaterial(), played.uniforms, true);
     Object.assign(drawn.userData, { level: played.level, clip });
     drawn.frustumCulled = false; // instances are, one by one
     const bin = { ...played, drawn, size: source.length, filled: 0 };

@@ -33,6 +33,8 @@ class Channel {
   views = new Map();
   state = { fetched: 0, requests: 0, ready: new Int8Array(1).fill(-1) };
   failure = null;
+  sent = 0; // when the worker sent what came last, by the page's clock: the page may have been busy since
+  decodedAt = null; // when the first of the motion was
   known = new Map();  // level: {parts, texels, vertices, boxes}
   #asked = new Map(); // what is under way: key: {promise, resolve, reject}
   #nextView = 1;
@@ -63,6 +65,7 @@ class Channel {
 
   receive(message) {
     const { type } = message;
+    this.sent = message.sent - performance.timeOrigin;
     if (type === "opened") {
       Object.assign(this, message, { type: undefined }, restBounds(message.rest));
       this.state.ready = new Int8Array(message.info.segmentCount).fill(-1);
@@ -83,6 +86,7 @@ class Channel {
     } else if (type === "parts") {
       this.#learn(message);
     } else if (type === "decoded") {
+      this.decodedAt ??= this.sent;
       for (const view of this.views.values()) view.refresh();
     } else if (type === "baked") {
       this.#answer(`bake ${message.id}`, message);

@@ -8,7 +8,7 @@ import { HttpSource, MemorySource, PacedSource } from "./source.js";
 const sessions = new Map();
 
 function open({ file, url, options, bytes, clip, hostMesh, bandwidth }) {
-  const post = (message, transfer = []) => self.postMessage({ ...message, file }, transfer);
+  const post = (message, transfer = []) => self.postMessage({ ...message, file, sent: performance.timeOrigin + performance.now() }, transfer);
   const source = bytes ? new MemorySource(new Uint8Array(bytes)) : new HttpSource(url, options);
   const session = new Session(bandwidth ? new PacedSource(source, bandwidth / 8) : source, post, clip, hostMesh);
   sessions.set(file, session);

@@ -17,6 +17,7 @@ canvas.drawn { opacity: 1; }
 @media (prefers-reduced-motion: reduce) { canvas { transition: none; } }`;
 const LONGEST = 0.5; // seconds that pass at most from a picture to the next, as in a tab that was hidden
 const NEAR = "120px"; // of being in view
+const BREEZE = 0.5; // in the grass of the scenery
 const MOST_TREES = 10000;
 const FORGET_MS = 4000; // out of view, after which a lazy one gives back what it takes
 
@@ -70,6 +71,8 @@ class Bare {
   }
 
   took() {} // what a picture takes leaves nothing out
+
+  breeze() {} // no grass
 
   render() {
     this.plant.prepare(this.canvas.width, this.canvas.height);
@@ -367,6 +370,7 @@ export class ATHViewerElement extends HTMLElement {
     if (!this.#dirty) return;
     this.#dirty = false;
     if (!this.paused) this.#stage.took(1000 * passed);
+    this.#stage.breeze(this.#seconds, BREEZE, 0);
     this.#stage.render();
     this.#canvas.classList.add("drawn");
   }

@@ -126,6 +126,7 @@ export class Session {
     });
     this.#opened = true;
     this.#state(true);
+    this.#decode();
   }
 
   // The clips with their numbers, and for every level the error and the one at the seam.
@@ -403,8 +404,13 @@ export class Session {
     return null;
   }
 
-  // Segments and levels to decode: what the views show, then what that blends into and what they show next.
+  // Segments and levels to decode: what the views show, then what that blends into and what they show next; before there is
+  // a view, what the first one begins with.
   * #jobs() {
+    if (this.#views.size === 0 && this.#prepared.size === 0) {
+      const { firstSegment } = this.#file.clips[this.#first];
+      yield [firstSegment, this.#readyLevel(firstSegment)];
+    }
     const shown = [...this.#views.values()].flatMap(({ level, frames }) => frames.map((frame) => {
       const [own, other] = this.#around(frame);
       return { clip: this.#clipAt(frame), most: level, own, other, level: this.#readyLevel(own, level) };
