@@ -12,13 +12,16 @@ spec/mutants.toml with the reason. The exit status is 1 if something else is not
 """
 
 from __future__ import annotations
-
 import __future__
+
 import argparse
 import ast
 import copy
 import gc
+import hashlib
+import math
 import os
+import pickle
 import re
 import resource
 import signal
@@ -36,16 +39,27 @@ from typing import Any
 import numpy as np
 
 from spec import conformance
-from spec import reference_decoder as rd
 
 HERE = Path(__file__).resolve().parent
 DECODER = HERE / "reference_decoder.py"
 REASONS, REPORT = HERE / "mutants.toml", HERE / "mutants.md"
+CACHE = HERE.parent / "build" / "mutants.pickle"
 LEFT_OUT = {"main", "show", "mesh_in", "Chunk.__str__", "KINDS", "AthError.__init__"}  # of no effect on results
 LONGEST_NAME = 72
+FIRST_SECONDS = 0.5  # of vectors that all changes are tried with before any is with more
+LARGEST = 14_000  # bytes of a vector that is tried: those of real size take too long
 SECONDS, TIMES_AS_LONG = 0.5, 10.0  # of the processor, for a vector; and how many times what the decoder takes
 MEMORY = 3 << 30
-NOT_CHANGED = ast.Import, ast.ImportFrom, ast.JoinedStr, ast.operator, ast.unaryop, ast.boolop, ast.cmpop, ast.expr_context
+NOT_CHANGED = (
+    ast.Import,
+    ast.ImportFrom,
+    ast.JoinedStr,
+    ast.operator,
+    ast.unaryop,
+    ast.boolop,
+    ast.cmpop,
+    ast.expr_context,
+)
 FLAGS = __future__.annotations.compiler_flag
 
 
@@ -500,6 +514,31 @@ def is_as_expected(module: types.ModuleType, vector: Known) -> bool:
     return all(answer(module, vector, item, opened) == expected for item, expected in vector.expected.items())
 
 
+@dataclass
+class Cache:
+    """What earlier runs have found out, while the decoder stays the same: vectors never change."""
+
+    source: str
+    known: dict[str, Known] = field(default_factory=dict)  # by the name of the vector
+    floats: set[int] = field(default_factory=set)  # numbers of expressions
+    fates: dict[str, str] = field(default_factory=dict)  # of changes
+    passed: dict[str, set[str]] = field(default_factory=dict)  # of changes: vectors that have not caught them
+
+    @staticmethod
+    def of(source: str) -> Cache:
+        own = hashlib.sha256(source.encode()).hexdigest()
+        if CACHE.exists():
+            kept = pickle.loads(CACHE.read_bytes())
+            if kept.source == own:
+                return kept
+        return Cache(own)
+
+    def keep(self) -> None:
+        CACHE.parent.mkdir(exist_ok=True)
+        CACHE.with_suffix(".new").write_bytes(pickle.dumps(self))
+        CACHE.with_suffix(".new").replace(CACHE)
+
+
 class Marked(ast.NodeTransformer):
     """Marks the statements that run, and the expressions that are of floats."""
 
@@ -521,11 +560,11 @@ def mark(statement: ast.stmt) -> ast.stmt:
     return ast.parse(f"_ran[{statement.number}] = 1").body[0]  # type: ignore[attr-defined]
 
 
-def measured(changes: Changes) -> tuple[list[Known], set[int]]:
-    """All vectors, and the expressions that are of floats."""
+def measure(changes: Changes, cache: Cache) -> list[Known]:
+    """All vectors; the cache gets those that it lacks, and the expressions that are of floats."""
     candidates = {mutant.of_floats for mutant in changes.mutants} - {-1}
     ran: dict[int, int] = {}
-    floats: set[int] = set()
+    floats = cache.floats
 
     def typed(number: int, value: Any) -> Any:
         if getattr(getattr(value, "dtype", None), "kind", "") == "f" or isinstance(value, float):
@@ -533,21 +572,23 @@ def measured(changes: Changes) -> tuple[list[Known], set[int]]:
         return value
 
     decoder = Decoder(Marked(candidates).visit(copy.deepcopy(changes.tree)))
-    known = []
     for vector in conformance.vectors():
+        if vector.name in cache.known or vector.path.stat().st_size > LARGEST:
+            continue
         ran.clear()
         one = Known(vector.name, vector.path.read_bytes(), vector.mesh)
         module, opened = decoder.module(given={"_ran": ran, "_typed": typed}), {}
         start = time.process_time()
         one.expected = {item: answer(module, one, item, opened) for item in sorted(vector.results, key=order_of)}
         one.seconds, one.statements = time.process_time() - start, frozenset(ran)
-        known.append(one)
+        cache.known[one.name] = one
         for item, result in vector.results.items():
             got = one.expected[item]
             got = got if isinstance(got, str) else conformance.checksum_of(one.data, item, got)
             if got != result:
                 raise SystemExit(f"{vector.name}, {item}: got {got}; expected {result}")
-    return sorted(known, key=lambda vector: vector.seconds), floats
+    cache.keep()
+    return sorted(cache.known.values(), key=lambda vector: vector.seconds)
 
 
 def order_of(item: str) -> tuple:
@@ -594,35 +635,55 @@ def start(decoder: Decoder, mutant: Mutant, vectors: list[Known]) -> tuple[int, 
 class Run:
     """Tries changes, some at a time."""
 
-    def __init__(self, changes: Changes, vectors: list[Known], jobs: int):
-        self.decoder, self.vectors, self.jobs = Decoder(changes.tree), vectors, jobs
+    def __init__(self, changes: Changes, vectors: list[Known], cache: Cache, jobs: int):
+        self.decoder, self.vectors, self.cache, self.jobs = Decoder(changes.tree), vectors, cache, jobs
         self.by_name = {vector.name: vector for vector in vectors}
         self.lately: dict[str, list[str]] = defaultdict(list)  # of a function: vectors that caught changes, last first
         self.fates: dict[str, str] = {}
+        self.tried: dict[str, set[str]] = {}  # vectors, of the changes that are running
 
-    def vectors_for(self, mutant: Mutant) -> list[Known]:
+    def vectors_for(self, mutant: Mutant, seconds: float) -> list[Known]:
         """First those that caught others in the same function; the fastest ones first."""
         first = [self.by_name[name] for name in self.lately[mutant.function][:8]]
         them = first + [vector for vector in self.vectors if vector.name not in self.lately[mutant.function][:8]]
-        return [vector for vector in them if not mutant.statements or mutant.statements & vector.statements]
+        passed = self.cache.passed.get(mutant.name, set())
+        chosen = []
+        for vector in them:
+            if vector.name not in passed and (not mutant.statements or mutant.statements & vector.statements):
+                chosen.append(vector)
+                seconds -= vector.seconds
+            if seconds < 0.0:
+                break
+        return chosen
 
-    def all(self, mutants: list[Mutant], tell: bool = True) -> dict[str, str]:
+    def all(self, mutants: list[Mutant]) -> dict[str, str]:
+        """First with the fastest vectors, then those that they miss with the others."""
         gc.freeze()  # its pages are shared by all processes
+        for seconds in FIRST_SECONDS, math.inf:
+            self._round([mutant for mutant in mutants if self.fates.get(mutant.name, MISSED) == MISSED], seconds)
+        return self.fates
+
+    def _round(self, mutants: list[Mutant], seconds: float) -> None:
         running: dict[int, tuple[Mutant, int]] = {}
         for i, mutant in enumerate(mutants):
-            vectors = self.vectors_for(mutant)
+            if self.cache.fates.get(mutant.name, MISSED) != MISSED:
+                self.fates[mutant.name] = self.cache.fates[mutant.name]
+                continue
+            vectors = self.vectors_for(mutant, seconds)
             if not vectors:
                 self.fates[mutant.name] = MISSED
                 continue
             process, answer_at = start(self.decoder, mutant, vectors)
             running[process] = mutant, answer_at
+            self.tried[mutant.name] = {vector.name for vector in vectors}
             if len(running) >= self.jobs:
                 self._wait(running)
-            if tell and i % 500 == 0:
+            if i % 200 == 0:
                 print(f"{i} of {len(mutants)}, {sum(f == MISSED for f in self.fates.values())} missed", flush=True)
+                self.cache.keep()
         while running:
             self._wait(running)
-        return self.fates
+        self.cache.keep()
 
     def _wait(self, running: dict[int, tuple[Mutant, int]]) -> None:
         process, status = os.wait()
@@ -631,8 +692,11 @@ class Run:
             fate = answers.read().decode()
         if os.WIFSIGNALED(status) or not fate:
             fate = "no end in a vector"
+        tried = self.tried.pop(mutant.name)
         if fate == MISSED:
+            self.cache.passed.setdefault(mutant.name, set()).update(tried)
             print(f"  {mutant.name}", flush=True)
+        self.cache.fates[mutant.name] = fate
         self.fates[mutant.name] = fate
         if fate.startswith("result of "):
             names = self.lately[mutant.function]
@@ -673,15 +737,18 @@ def main(words: list[str] | None = None) -> int:
     parser.add_argument("--only", metavar="GLOB", help="changes whose name matches; writes no report")
     parser.add_argument("--missed", metavar="FILE", help="changes named in a file, one a line; writes no report")
     parser.add_argument("--list", nargs="?", const="*", metavar="GLOB", help="print the names of changes")
+    parser.add_argument("--anew", action="store_true", help="do without what earlier runs have found out")
     parser.add_argument("--jobs", type=int, default=2)
     options = parser.parse_args(words)
-    changes = Changes(DECODER.read_text("utf-8"))
+    source = DECODER.read_text("utf-8")
+    changes = Changes(source)
     if options.list:
         names = [mutant.name for mutant in changes.mutants if fnmatchcase(mutant.name, options.list)]
         print(*names, f"{len(names)} changes", sep="\n")
         return 0
     begun = time.monotonic()
-    vectors, floats = measured(changes)
+    cache = Cache(source) if options.anew else Cache.of(source)
+    vectors, floats = measure(changes, cache), cache.floats
     print(f"{len(vectors)} vectors in {sum(v.seconds for v in vectors):.0f} s", flush=True)
     mutants = [mutant for mutant in changes.mutants if mutant.of_floats < 0 or mutant.of_floats in floats]
     if options.only:
@@ -689,8 +756,9 @@ def main(words: list[str] | None = None) -> int:
     if options.missed:
         chosen = set(Path(options.missed).read_text("utf-8").splitlines())
         mutants = [mutant for mutant in mutants if mutant.name in chosen]
-    fates = Run(changes, vectors, options.jobs).all(mutants)
+    fates = Run(changes, vectors, cache, options.jobs).all(mutants)
     missed = [name for name, fate in fates.items() if fate == MISSED]
+    print(*missed, sep="\n")
     print(f"{len(mutants)} changes, {len(missed)} not caught, {time.monotonic() - begun:.0f} s")
     return 0
 
