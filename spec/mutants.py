@@ -19,6 +19,7 @@ import ast
 import copy
 import gc
 import hashlib
+import io
 import math
 import os
 import pickle
@@ -26,13 +27,16 @@ import re
 import resource
 import signal
 import sys
+import tempfile
 import time
 import tomllib
 import types
 from collections import Counter, defaultdict
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -46,7 +50,8 @@ REASONS, REPORT = HERE / "mutants.toml", HERE / "mutants.md"
 CACHE = HERE.parent / "build" / "mutants.pickle"
 LEFT_OUT = {"main", "show", "mesh_in", "Chunk.__str__", "KINDS", "AthError.__init__"}  # of no effect on results
 LONGEST_NAME = 72
-FIRST_SECONDS = 0.5  # of vectors that all changes are tried with before any is with more
+FIRST_SECONDS = 0.3  # of vectors that all changes are tried with before any is with more
+TOGETHER = 40  # changes that a process tries
 LARGEST = 14_000  # bytes of a vector that is tried: those of real size take too long
 SECONDS, TIMES_AS_LONG = 0.5, 10.0  # of the processor, for a vector; and how many times what the decoder takes
 MEMORY = 3 << 30
@@ -330,9 +335,8 @@ def is_probability(node: ast.AST) -> bool:
 
 def binary(node: ast.BinOp) -> Iterator[Any]:
     left, op, right = node.left, node.op, node.right
-    if isinstance(op, (ast.Add, ast.Mod)) and isinstance(left, (ast.Constant, ast.JoinedStr)):
-        if not isinstance(getattr(left, "value", 0), (int, float)):
-            return
+    if isinstance(left, ast.JoinedStr) or isinstance(getattr(left, "value", 0), (str, bytes)):
+        return
     yield from (ast.BinOp(left, new(), right) for new in OPERATORS.get(type(op), ()))
     if isinstance(op, SWAPPED):
         yield ast.BinOp(right, op, left)
@@ -348,19 +352,27 @@ def other_roundings(node: ast.BinOp) -> Iterator[ast.AST]:
     sums, products = (ast.Add, ast.Sub), (ast.Mult, ast.Div)
     for kind, first, inverse in ((sums, ast.Add, ast.Sub), (products, ast.Mult, ast.Div)):
         if isinstance(op, kind) and isinstance(left, ast.BinOp) and isinstance(left.op, kind):
+            if kind == products and any(map(is_power_of_two, (left.left, left.right, right))):
+                continue
             forward = isinstance(left.op, first)
             within = op if forward else (inverse() if isinstance(op, first) else first())
             yield ast.BinOp(left.left, left.op, ast.BinOp(left.right, within, right))
     one = ast.Constant(1.0)
-    if isinstance(op, ast.Div) and not is_one(left):
+    if isinstance(op, ast.Div) and not is_power_of_two(left) and not is_power_of_two(right):
         yield ast.BinOp(left, ast.Mult(), ast.BinOp(one, op, right))
-    if isinstance(op, ast.Mult) and isinstance(right, ast.BinOp) and isinstance(right.op, ast.Div):
-        if is_one(right.left):
-            yield ast.BinOp(left, ast.Div(), right.right)
+    by_reciprocal = isinstance(op, ast.Mult) and isinstance(right, ast.BinOp) and isinstance(right.op, ast.Div)
+    if by_reciprocal and is_one(right.left):
+        yield ast.BinOp(left, ast.Div(), right.right)
 
 
 def is_one(node: ast.AST) -> bool:
     return isinstance(node, ast.Constant) and node.value == 1.0
+
+
+def is_power_of_two(node: ast.AST) -> bool:
+    """A factor that does not round."""
+    value = node.value if isinstance(node, ast.Constant) else None
+    return isinstance(value, (int, float)) and value != 0 and abs(math.frexp(value)[0]) == 0.5
 
 
 def augmented(node: ast.AugAssign) -> Iterator[Any]:
@@ -369,12 +381,28 @@ def augmented(node: ast.AugAssign) -> Iterator[Any]:
 
 
 def compared(node: ast.Compare) -> Iterator[Any]:
+    if chooses_one_of_them(node):  # which are the same where they are equal
+        return
     for i, op in enumerate(node.ops):
         for new in OPERATORS[type(op)]:
             yield ast.Compare(node.left, [*node.ops[:i], new(), *node.ops[i + 1 :]], node.comparators)
     if len(node.ops) > 1:
         yield ast.Compare(node.left, node.ops[:-1], node.comparators[:-1])
         yield ast.Compare(node.comparators[0], node.ops[1:], node.comparators[1:])
+
+
+def chooses_one_of_them(node: ast.Compare) -> bool:
+    """Whether the comparison is that of a minimum or maximum: a if a > b else b, where(a > b, a, b)."""
+    up = parent_of(node)
+    if isinstance(up, ast.IfExp) and up.test is node:
+        choice = [up.body, up.orelse]
+    elif isinstance(up, ast.Call) and ast.unparse(up.func) == "np.where" and up.args[0] is node:
+        choice = up.args[1:]
+    else:
+        return False
+    return len(node.ops) == 1 and {ast.unparse(x) for x in choice} == {
+        ast.unparse(x) for x in (node.left, node.comparators[0])
+    }
 
 
 def joined(node: ast.BoolOp) -> Iterator[Any]:
@@ -455,6 +483,14 @@ class Decoder:
         self.tree = tree
         self.parts = [compiled(node) for node in tree.body]
 
+    @cached_property
+    def usual(self) -> types.ModuleType:
+        return self.module()
+
+    @cached_property
+    def at_import(self) -> set[str]:
+        return used_at_import(self.tree)
+
     def module(self, top: int | None = None, given: dict[str, Any] | None = None) -> types.ModuleType:
         """Statement `top` is compiled anew."""
         module = types.ModuleType(self.NAME)
@@ -464,9 +500,30 @@ class Decoder:
             exec(compiled(self.tree.body[i]) if i == top else part, module.__dict__)
         return module
 
-    def changed(self, mutant: Mutant) -> types.ModuleType:
-        mutant.place.put(mutant.node)
-        return self.module(mutant.top)
+    @contextmanager
+    def changed(self, mutant: Mutant) -> Iterator[types.ModuleType]:
+        """The changed module; what only defines a function is changed in the usual module for a while."""
+        there = mutant.place.put(mutant.node)
+        node, names = self.tree.body[mutant.top], self.usual.__dict__
+        in_place = isinstance(node, ast.FunctionDef) and node.name not in self.at_import
+        try:
+            if in_place:
+                exec(compiled(node), names)
+            yield self.usual if in_place else self.module(mutant.top)
+        finally:
+            mutant.place.put(there)
+            if in_place:
+                exec(self.parts[mutant.top], names)
+            sys.modules[self.NAME] = self.usual
+            for value in names.values():
+                if hasattr(value, "cache_clear"):
+                    value.cache_clear()
+
+
+def used_at_import(tree: ast.Module) -> set[str]:
+    """Names that what is not in a function uses."""
+    names = [node for node in ast.walk(tree) if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Load)]
+    return {node.id for node in names if not in_function(node)}
 
 
 def compiled(node: ast.stmt) -> types.CodeType:
@@ -598,112 +655,131 @@ def order_of(item: str) -> tuple:
 
 # ---- running -----------------------------------------------------------------------------------------------
 
-CAUGHT, MISSED = "caught", "missed"
-ENDS = {signal.SIGPROF: "does not stop", signal.SIGKILL: "does not stop"}
+MISSED = "missed"
 
 
-def try_one(decoder: Decoder, mutant: Mutant, vectors: list[Known]) -> str:
-    """How a change is caught: "result of ...", "exception in ..."; MISSED if it is not. In a process of its own."""
-    at = "the module"
-    try:
-        module = decoder.changed(mutant)
-        for vector in vectors:
-            at = vector.name
-            signal.setitimer(signal.ITIMER_PROF, SECONDS + TIMES_AS_LONG * vector.seconds)
-            if not is_as_expected(module, vector):
-                return f"result of {at}"
-    except Exception:
-        return f"exception in {at}"
-    return MISSED
+@dataclass
+class Found:
+    """What became of a change: how it was caught, or MISSED by the vectors tried."""
 
-
-def start(decoder: Decoder, mutant: Mutant, vectors: list[Known]) -> tuple[int, int]:
-    """The process, and where its answer will be."""
-    read_end, write_end = os.pipe()
-    process = os.fork()
-    if process == 0:
-        os.close(read_end)
-        resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
-        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-        np.seterr(all="ignore")
-        os.write(write_end, try_one(decoder, mutant, vectors).encode())
-        os._exit(0)
-    os.close(write_end)
-    return process, read_end
+    number: int
+    fate: str = ""  # empty: it is being tried
+    tried: list[str] = field(default_factory=list)
 
 
 class Run:
-    """Tries changes, some at a time."""
+    """Tries changes, in processes that each try some of them one after the other."""
 
     def __init__(self, changes: Changes, vectors: list[Known], cache: Cache, jobs: int):
         self.decoder, self.vectors, self.cache, self.jobs = Decoder(changes.tree), vectors, cache, jobs
         self.by_name = {vector.name: vector for vector in vectors}
         self.lately: dict[str, list[str]] = defaultdict(list)  # of a function: vectors that caught changes, last first
+        self.mutants: list[Mutant] = []
         self.fates: dict[str, str] = {}
-        self.tried: dict[str, set[str]] = {}  # vectors, of the changes that are running
 
-    def vectors_for(self, mutant: Mutant, seconds: float) -> list[Known]:
-        """First those that caught others in the same function; the fastest ones first."""
-        first = [self.by_name[name] for name in self.lately[mutant.function][:8]]
-        them = first + [vector for vector in self.vectors if vector.name not in self.lately[mutant.function][:8]]
-        passed = self.cache.passed.get(mutant.name, set())
-        chosen = []
-        for vector in them:
-            if vector.name not in passed and (not mutant.statements or mutant.statements & vector.statements):
-                chosen.append(vector)
-                seconds -= vector.seconds
-            if seconds < 0.0:
-                break
-        return chosen
-
-    def all(self, mutants: list[Mutant]) -> dict[str, str]:
+    def all(self, mutants: list[Mutant], folder: Path, quick: bool) -> dict[str, str]:
         """First with the fastest vectors, then those that they miss with the others."""
-        gc.freeze()  # its pages are shared by all processes
-        for seconds in FIRST_SECONDS, math.inf:
-            self._round([mutant for mutant in mutants if self.fates.get(mutant.name, MISSED) == MISSED], seconds)
+        self.mutants, self.folder = mutants, folder
+        known = self.cache.fates
+        self.fates = {mutant.name: known[mutant.name] for mutant in mutants if known.get(mutant.name, MISSED) != MISSED}
+        rounds = [(FIRST_SECONDS, TOGETHER), (math.inf, 1)]
+        for seconds, count in rounds[: 1 if quick else 2]:
+            left = [i for i, mutant in enumerate(mutants) if self.fates.get(mutant.name, MISSED) == MISSED]
+            self._round([left[i : i + count] for i in range(0, len(left), count)], seconds)
         return self.fates
 
-    def _round(self, mutants: list[Mutant], seconds: float) -> None:
-        running: dict[int, tuple[Mutant, int]] = {}
-        for i, mutant in enumerate(mutants):
-            if self.cache.fates.get(mutant.name, MISSED) != MISSED:
-                self.fates[mutant.name] = self.cache.fates[mutant.name]
-                continue
-            vectors = self.vectors_for(mutant, seconds)
-            if not vectors:
-                self.fates[mutant.name] = MISSED
-                continue
-            process, answer_at = start(self.decoder, mutant, vectors)
-            running[process] = mutant, answer_at
-            self.tried[mutant.name] = {vector.name for vector in vectors}
-            if len(running) >= self.jobs:
-                self._wait(running)
-            if i % 200 == 0:
-                print(f"{i} of {len(mutants)}, {sum(f == MISSED for f in self.fates.values())} missed", flush=True)
-                self.cache.keep()
-        while running:
-            self._wait(running)
+    def _round(self, batches: list[list[int]], seconds: float) -> None:
+        batches, running = batches[::-1], {}
+        while batches or running:
+            while batches and len(running) < self.jobs:
+                batch = batches.pop()
+                running[self._start(batch, seconds)] = batch
+            process, _ = os.wait()
+            rest = self._note(process, running.pop(process))
+            batches += [rest] if rest else []
         self.cache.keep()
 
-    def _wait(self, running: dict[int, tuple[Mutant, int]]) -> None:
-        process, status = os.wait()
-        mutant, answer_at = running.pop(process)
-        with open(answer_at, "rb") as answers:
-            fate = answers.read().decode()
-        if os.WIFSIGNALED(status) or not fate:
-            fate = "no end in a vector"
-        tried = self.tried.pop(mutant.name)
-        if fate == MISSED:
-            self.cache.passed.setdefault(mutant.name, set()).update(tried)
-            print(f"  {mutant.name}", flush=True)
-        self.cache.fates[mutant.name] = fate
-        self.fates[mutant.name] = fate
-        if fate.startswith("result of "):
-            names = self.lately[mutant.function]
-            name = fate.removeprefix("result of ")
-            if name in names:
-                names.remove(name)
-            names.insert(0, name)
+    def _start(self, batch: list[int], seconds: float) -> int:
+        process = os.fork()
+        if process == 0:
+            resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
+            resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+            np.seterr(all="ignore")
+            with (self.folder / str(os.getpid())).open("wb", buffering=0) as out:
+                for number in batch:
+                    out.write(pickle.dumps(Found(number)))
+                    out.write(pickle.dumps(self._try(number, seconds)))
+            os._exit(0)
+        return process
+
+    def _try(self, number: int, seconds: float) -> Found:
+        mutant, tried, at = self.mutants[number], [], "the module"
+        try:
+            with self.decoder.changed(mutant) as module:
+                for vector in self._vectors_for(mutant, seconds):
+                    at = vector.name
+                    signal.setitimer(signal.ITIMER_PROF, SECONDS + TIMES_AS_LONG * vector.seconds)
+                    if not is_as_expected(module, vector):
+                        self._note_lately(mutant, at)
+                        return Found(number, f"result of {at}")
+                    tried.append(at)
+        except Exception:
+            return Found(number, f"exception in {at}")
+        return Found(number, MISSED, tried)
+
+    def _vectors_for(self, mutant: Mutant, seconds: float) -> Iterator[Known]:
+        """First those that caught others in the same function; the fastest ones first."""
+        first, passed = self.lately[mutant.function][:8], self.cache.passed.get(mutant.name, set())
+        for vector in [self.by_name[name] for name in first] + self.vectors:
+            if vector.name in passed or (mutant.statements and not mutant.statements & vector.statements):
+                continue
+            yield vector
+            seconds -= vector.seconds
+            if seconds < 0.0:
+                break
+
+    def _note_lately(self, mutant: Mutant, name: str) -> None:
+        names = self.lately[mutant.function]
+        if name in names:
+            names.remove(name)
+        names.insert(0, name)
+
+    def _note(self, process: int, batch: list[int]) -> list[int]:
+        """Notes what a process found; returns what it did not come to."""
+        path = self.folder / str(process)
+        found = list(unpickled(path.read_bytes()))
+        path.unlink()
+        if not found[-1].fate:  # the process was ended while it tried this
+            found.append(Found(found[-1].number, "no end in a vector"))
+        for one in found:
+            mutant = self.mutants[one.number]
+            if not one.fate:
+                continue
+            self.fates[mutant.name] = self.cache.fates[mutant.name] = one.fate
+            if one.fate.startswith("result of "):
+                self._note_lately(mutant, one.fate.removeprefix("result of "))
+            if one.fate == MISSED:
+                self.cache.passed.setdefault(mutant.name, set()).update(one.tried)
+        self._report()
+        return batch[batch.index(found[-1].number) + 1 :]
+
+    def _report(self) -> None:
+        if time.monotonic() - self.told > 20.0:
+            self.told = time.monotonic()
+            self.cache.keep()
+            missed = sum(fate == MISSED for fate in self.fates.values())
+            print(f"{len(self.fates)} of {len(self.mutants)} tried, {missed} not caught so far", flush=True)
+
+    told = 0.0
+
+
+def unpickled(data: bytes) -> Iterator[Any]:
+    stream = io.BytesIO(data)
+    while stream.tell() < len(data):
+        try:
+            yield pickle.load(stream)
+        except (pickle.UnpicklingError, EOFError):  # the process was ended while it wrote
+            return
 
 
 # ---- reasons and report ------------------------------------------------------------------------------------
@@ -738,6 +814,7 @@ def main(words: list[str] | None = None) -> int:
     parser.add_argument("--missed", metavar="FILE", help="changes named in a file, one a line; writes no report")
     parser.add_argument("--list", nargs="?", const="*", metavar="GLOB", help="print the names of changes")
     parser.add_argument("--anew", action="store_true", help="do without what earlier runs have found out")
+    parser.add_argument("--quick", action="store_true", help="only with the fastest vectors; writes no report")
     parser.add_argument("--jobs", type=int, default=2)
     options = parser.parse_args(words)
     source = DECODER.read_text("utf-8")
@@ -756,7 +833,9 @@ def main(words: list[str] | None = None) -> int:
     if options.missed:
         chosen = set(Path(options.missed).read_text("utf-8").splitlines())
         mutants = [mutant for mutant in mutants if mutant.name in chosen]
-    fates = Run(changes, vectors, cache, options.jobs).all(mutants)
+    gc.freeze()  # pages that all processes share
+    with tempfile.TemporaryDirectory() as folder:
+        fates = Run(changes, vectors, cache, options.jobs).all(mutants, Path(folder), options.quick)
     missed = [name for name, fate in fates.items() if fate == MISSED]
     print(*missed, sep="\n")
     print(f"{len(mutants)} changes, {len(missed)} not caught, {time.monotonic() - begun:.0f} s")
