@@ -4303,6 +4303,143 @@ zstd_frame(
 )
 
 
+# ---- valid: what only certain numbers tell -------------------------------------------------------------------
+
+
+def placed(stems: list[Stem], points: Sequence, seed: int, frames: int = 3, **fields) -> Plant:
+    """Random rows of stems that rest at any points, in binary64."""
+    rest = exact_rest(stems, np.array(points, float).ravel().tolist(), True)
+    return moving(stems, seed, frames, **{"rest": rest, "heads": HEADS} | fields)
+
+
+def along_x(*places: float) -> list[list[float]]:
+    return [[x, 0.5 * (i % 2), 0.0] for i, x in enumerate(places)]
+
+
+valid(
+    "gaps",
+    "distances along stems of under 1/4 to over 16 of their mean, of which 1 to 64 quarters are told apart",
+    lambda: placed(
+        [Stem(-1, 24), Stem(0, 20, 3)],
+        along_x(*range(12), *range(1011, 1023)) + along_x(3, *range(30, 40), 40.01, 40.02, 40.02, *range(241, 247)),
+        131,
+    ),
+)
+valid(
+    "tube-gaps",
+    "the same of the rings of a tube",
+    lambda: placed(
+        [Stem(-1, 40, flags=SHEET, ring=2)],
+        [[1000.0 * (i > 17) + i, j, 0.1 * i * j] for i in range(20) for j in (0, 1)],
+        132,
+    ),
+)
+valid(
+    "rigid-diagonal",
+    "rigid branches whose inertia has no products: nothing to reduce, axes that are equally long",
+    lambda: placed(
+        [Stem(-1, 2), Stem(0, 3, 1, rigid=1), Stem(0, 3, 0, rigid=1), Stem(0, 2, 1, rigid=1)],
+        [[0, 0, 0], [1, 0, 0], [5, 0, 0], [1, 8, 0], [1, 0, 2], [0, 0, 3], [0, 3, 0], [3, 0, 0], [1, 4, 0], [1, 5, 0]],
+        133,
+    ),
+)
+for side_, width_ in (("above", 203), ("below", 197)):
+    valid(
+        f"whitening-{side_}",
+        f"a node that extends {side_} 1/100 as far in its second direction as in its first",
+        lambda width_=width_: placed(
+            [Stem(-1, 2), Stem(0, 1, 1)], [[0, 0, 0], [10000, 0, 0], [10000, width_, 0]], 134
+        ),
+    )
+for side_, size_ in (("above", 1.015), ("below", 0.985)):
+    valid(
+        f"sheet-thin-{side_}",
+        f"a sheet that is {side_} 1/100 as wide as long, once turned",
+        lambda size_=size_: placed(
+            [Stem(-1, 1), Stem(0, 4, 0, SHEET)],
+            [[0, 0, 0], *([x, x + y * 0.01 * size_, 0] for x, y in ((1, 1), (1, -1), (-1, 1), (-1, -1)))],
+            135,
+        ),
+    )
+    valid(
+        f"sheet-mode-{side_}",
+        f"a sheet whose places leave {side_} 1/100000 of a mode",
+        lambda size_=size_: placed(
+            [Stem(-1, 1), Stem(0, 2, 0, SHEET)], [[0, 0, 0], *mode_and_more(1e-5 * size_)], 136
+        ),
+    )
+    valid(
+        f"tube-function-{side_}",
+        f"a tube whose rings leave {side_} 1/100000 of a function",
+        lambda size_=size_: placed(
+            [Stem(-1, 6, flags=SHEET, ring=2)],
+            [[10.0 * i + y, s * (1 + 2e-5 * size_ * (i == 2) + 0 * y), s] for i in range(3) for s, y in ((-1, 0), (1, 0))],
+            137,
+        ),
+    )
+    valid(
+        f"tangent-short-{side_}",
+        f"a stem of {side_} 1e-100, which has a direction or none",
+        lambda size_=size_: placed(
+            [Stem(-1, 2), Stem(0, 2, 1)], [[0, 0, 0], [0, 1e-100 * size_, 0], [0, 1, 1], [0, 2, 1]], 138
+        ),
+    )
+    valid(
+        f"sheet-short-{side_}",
+        f"sheets of which the squares of the turning matrix are {side_} 1e-200",
+        lambda size_=size_: placed(
+            [Stem(-1, 1), Stem(0, 2, 0, SHEET), Stem(1, 2, 1)],
+            [[0, 0, 0], [0, 1e-50 * size_**0.5, 0], [0, 1e-57, 0], [0, 1, 1], [0, 2, 1]],
+            139,
+            heads={},
+            scripts={(rd.AFFINES, 0): lambda: Chance(139, large=4)},
+        ),
+    )
+    valid(
+        f"predicted-short-{side_}",
+        f"a step and a way at rest whose squares add up to {side_} 1e-60",
+        lambda size_=size_: predicted(
+            ROOTED,
+            swayed(6, 140),
+            rest=exact_rest(ROOTED, (1e-30 * size_ * np.array(unit_steps(ROOTED))).ravel().tolist(), True),
+            predicted=predicted_head(1e-33),
+            is_float64=True,
+        ),
+    )
+
+
+def mode_and_more(share: float) -> list[list[float]]:
+    """Two places along x as the first mode of a sheet of two vertices, but for a share of it."""
+    mode = rd.cantilever((4, 4), 0.1, 0.001, 1.0)[0]
+    across = np.array([-mode[1], mode[0]])
+    return [[x, 0.0, 0.0] for x in mode + share * across]
+
+
+def unit_steps(stems: list[Stem]) -> list[list[float]]:
+    """Places of stems all of whose vertices are 1 from the one before."""
+    points: list[list[float]] = []
+    first = []
+    for stem in stems:
+        first.append(len(points))
+        for i in range(stem.count):
+            before = points[-1] if i else points[first[stem.parent] + stem.place] if stem.parent >= 0 else [0.0] * 3
+            points.append([x + (k == (i + stem.count) % 3) for k, x in enumerate(before)])
+    return points
+
+
+def tall(*counts: int) -> Draft:
+    """Roots of so many vertices, of which only the hierarchy is decoded: the host's mesh is not there."""
+    stems = [Stem(-1, count, lag=1) for count in counts]
+    vertices = sum(counts)
+    plant = Plant([Stem(-1, 1)], mesh=np.zeros((1, 3), "<f4"), origin=(0.0, 0.0, 0.0))
+    hierarchy = write(rd.decode_hierarchy, hierarchy_script(stems), len(stems), vertices)
+    return (
+        plant.draft()
+        .with_header(vertex_count=vertices, branch_count=len(stems))
+        .change(rd.HIERARCHY, content=hierarchy_chunk(hierarchy))
+    )
+
+
 # ---- making them -------------------------------------------------------------------------------------------
 
 

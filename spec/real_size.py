@@ -1,0 +1,231 @@
+"""A plant of real size for vectors that athcodec writes, and which features of the format a file uses.
+
+Some features exclude each other: an exact rest pose (which lossless files have) is not adaptive, connected, refined or a
+second one, and has no copies; predicted motion has no modes, shapes, learned bases, corrections or joins beyond level 0.
+So there are three files (`OPTIONS`), which together use all of them.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from spec import reference_decoder as rd
+
+SIDES, LEAF = 6, 12  # vertices of a ring, of a leaf
+OPTIONS: dict[str, dict[str, Any]] = {
+    "all": {"rel_error": 1e-3, "ladder": (4e-2, 6e-3), "segment_frames": 16, "lossless": True},
+    "refined-rest": {"rel_error": 5e-4, "ladder": (4e-2, 4e-3), "segment_frames": 20, "effort": "best"},
+    "exact-rest": {"rel_error": 2e-3, "ladder": (4e-2,), "segment_frames": 16, "exact_rest": True},
+    "predicted": {"rel_error": 5e-4, "segment_frames": 24, "ladder": "none"},
+}
+
+
+class Growing:
+    """Vertices and faces of a plant, branch by branch."""
+
+    def __init__(self, seed: int):
+        self.random = np.random.default_rng(seed)
+        self.points: list[np.ndarray] = []
+        self.parents: list[int] = []
+        self.faces: list[list[int]] = []
+        self.joints: list[np.ndarray] = []  # where a branch hangs
+
+    def add(self, parent: int, joint: np.ndarray, points: np.ndarray, faces: list[list[int]] = []) -> int:  # noqa: B006
+        first = sum(map(len, self.points))
+        self.points.append(points)
+        self.parents.append(parent)
+        self.joints.append(joint)
+        self.faces += [[first + v for v in face] for face in faces]
+        return len(self.parents) - 1
+
+    def tube(self, parent: int, joint: np.ndarray, end: np.ndarray, rings: int, radius: float) -> int:
+        along = np.linspace(0.0, 1.0, rings)[:, None, None]
+        across = np.linalg.svd((end - joint)[None])[2][1:]
+        angle = 2 * np.pi * np.arange(SIDES) / SIDES
+        ring = radius * (np.cos(angle)[:, None] * across[0] + np.sin(angle)[:, None] * across[1])
+        points = joint + along * (end - joint) + ring * (1.0 - 0.6 * along)
+        around = [
+            [SIDES * r + s, SIDES * r + (s + 1) % SIDES, SIDES * (r + 1) + (s + 1) % SIDES, SIDES * (r + 1) + s]
+            for r in range(rings - 1)
+            for s in range(SIDES)
+        ]
+        return self.add(parent, joint, points.reshape(-1, 3), around)
+
+    def leaf(self, parent: int, joint: np.ndarray, size: float, mirrored: bool) -> int:
+        """Quads and triangles; all leaves are the same shape, turned, scaled and mirrored."""
+        rows = np.array([[0.0, 0.0], [0.3, 0.25], [0.6, 0.35], [0.8, 0.2]])
+        shape = np.array([[x, y * side, 0.2 * x * x + 0.1 * side * y] for x, y in rows for side in (-1, 0, 1)])
+        turn = np.linalg.qr(self.random.normal(size=(3, 3)))[0]
+        turn[:, 0] *= np.sign(np.linalg.det(turn)) * (-1 if mirrored else 1)
+        faces = [[3 * i + j, 3 * i + j + 1, 3 * i + j + 4, 3 * i + j + 3] for i in range(1, 3) for j in range(2)]
+        return self.add(parent, joint, joint + size * shape @ turn.T, [[0, 4, 3], [2, 5, 4], *faces])
+
+
+def tree(seed: int = 3) -> Growing:
+    """A trunk and limbs that are tubes, twigs that are lines, leaves, and a stone beside."""
+    plant = Growing(seed)
+    random = plant.random
+    trunk = plant.tube(-1, np.zeros(3), np.array([0.1, 0.0, 3.0]), 14, 0.08)
+    for limb in range(3):
+        heading = 2.4 * limb
+        joint = np.array([0.1 * (0.4 + 0.12 * limb), 0.0, 3.0 * (0.4 + 0.12 * limb)])
+        end = joint + np.array([np.cos(heading), np.sin(heading), 0.5]) * (1.4 - 0.15 * limb)
+        own = plant.tube(trunk, joint, end, 9, 0.03)
+        for k in range(1):
+            start = joint + (end - joint) * (0.5 + 0.5 * k)
+            steps = 0.08 * (np.array([np.cos(heading), np.sin(heading), 0.2]) + random.normal(size=(8, 3)) * 0.3)
+            twig = plant.add(own, start, start + steps.cumsum(axis=0))
+            for i in range(5):
+                at = plant.points[twig][1 + i]
+                plant.leaf(twig, at, 0.12 + 0.03 * random.random(), bool(i % 2))
+    for needle in range(12):
+        joint = plant.points[trunk][SIDES * 13 + needle % SIDES]
+        plant.add(trunk, joint, joint + np.linspace(0.02, 0.2, 5)[:, None] * random.normal(size=3))
+    u, v = np.meshgrid(np.linspace(0, 1, 14), np.linspace(-0.3, 0.3, 10), indexing="ij")
+    blade = np.stack([1.0 + u, 1.0 + v, 0.8 * u - 0.7 * u * u + 0.4 * v * v], axis=2).reshape(-1, 3)
+    grid = [[10 * i + j, 10 * i + j + 1, 10 * i + j + 11, 10 * i + j + 10] for i in range(13) for j in range(9)]
+    plant.add(-1, np.array([1.0, 1.0, 0.0]), blade + 1e-3 * random.normal(size=blade.shape), grid)
+    return plant
+
+
+def motion(plant: Growing, frames: int, wind: float, turns: float, noise: float, gust: float) -> np.ndarray:
+    """(frames, vertices, 3): branches turn about where they hang, and carry others along."""
+    time = np.linspace(0.0, 1.0, frames, endpoint=False)
+    gusts = plant.random.normal(size=frames) * gust
+    turned: list[tuple[np.ndarray, np.ndarray]] = []  # of branches: matrix and shift of each frame
+    positions = []
+    for b, (points, parent, joint) in enumerate(zip(plant.points, plant.parents, plant.joints)):
+        matrix, shift = (np.eye(3)[None], np.zeros((1, 3))) if parent < 0 else turned[parent]
+        own = matrix @ rotations(b, time, wind * (0.3 if parent < 0 else 1.0), turns, len(points) == LEAF)
+        shift = shift + (matrix @ joint) - (own @ joint)
+        turned.append((own, shift))
+        x = points - joint
+        if len(points) > LEAF:
+            x = x + 0.1 * plant.random.normal(size=3)
+        bend = (wind * 0.1 * np.sin(2 * np.pi * (turns * time + 0.1 * b)) + gusts + 0.2)[:, None] * (x**2).sum(axis=1)
+        x = x + bend[:, :, None] * np.array([1.0, 0.4, -0.1])
+        positions.append((own @ joint + shift)[:, None, :] + x @ own.transpose(0, 2, 1))
+    found = np.concatenate(positions, axis=1)
+    return found + noise * plant.random.normal(size=found.shape)
+
+
+def rotations(b: int, time: np.ndarray, wind: float, turns: float, flutters: bool) -> np.ndarray:
+    """(frames, 3, 3) about two axes."""
+    a, c = (
+        wind * size * np.sin(2 * np.pi * (turns * k * time) + phase * b)
+        for size, k, phase in ((0.08, 1, 0.7), (0.3 if flutters else 0.04, 3, 1.9))
+    )
+    zero, one = np.zeros_like(time), np.ones_like(time)
+    first = np.array([[np.cos(a), zero, np.sin(a)], [zero, one, zero], [-np.sin(a), zero, np.cos(a)]])
+    second = np.array([[one, zero, zero], [zero, np.cos(c), -np.sin(c)], [zero, np.sin(c), np.cos(c)]])
+    return first.transpose(2, 0, 1) @ second.transpose(2, 0, 1)
+
+
+def clip(name: str) -> Any:
+    """A wind in which poses are held, at times of their own, and a loop."""
+    import athcodec
+    from athcodec.clip import MotionClip
+
+    plant = tree()
+    rest = np.concatenate(plant.points)
+    corners = [v for face in plant.faces for v in face]
+    frames, gust = (40, 0.15) if name == "refined-rest" else (22, 0.03)
+    wind = motion(plant, frames, 1.0, 2.3, 1e-4, gust)
+    loop = motion(plant, 12, 0.6, 1.0, 0.0, 0.0)
+    if name == "predicted":
+        jumps = plant.random.normal(size=wind.shape) * (plant.random.random(wind.shape[:2]) < 0.1)[:, :, None]
+        wind = wind[19] + 0.05 * jumps.cumsum(axis=0)
+    wind[20:23] = wind[19]
+
+    def clip_of(positions: np.ndarray, jitter: float) -> MotionClip:
+        return MotionClip(
+            positions=positions.astype(np.float32),
+            rest=rest,
+            time=np.arange(len(positions)) / 24 + jitter * plant.random.random(len(positions)),
+            vertex_branch=np.repeat(np.arange(len(plant.parents)), list(map(len, plant.points))),
+            branch_parent=np.array(plant.parents),
+            edges=np.array([[face[0], face[1]] for face in plant.faces]),
+            attributes={
+                "face_vertex_counts": np.array([len(face) for face in plant.faces], np.uint8),
+                "face_vertex_indices": np.array(corners, np.int32),
+                "colour": np.round(plant_colours(plant), 2).astype(np.float32),
+                "species": np.array([b"salix"]),
+            },
+            metadata={"unit": "m", "plant": {"height": 3.0}},
+        )
+
+    return athcodec.join({"wind": clip_of(wind, 0.01), "loop": athcodec.looped(clip_of(loop, 0.01))})
+
+
+def plant_colours(plant: Growing) -> np.ndarray:
+    return np.concatenate(
+        [np.repeat([[0.2 + 0.01 * (b % 9), 0.5, 0.1]], len(p), 0) for b, p in enumerate(plant.points)]
+    )
+
+
+def encoded(name: str) -> bytes:
+    """As athcodec writes it; one that has layers about the mean pose, whether it pays or not."""
+    import athcodec
+    from athcodec.encoding.search import Search
+
+    best = Search.about_best_reference
+    if name == "all":
+        Search.about_best_reference = Search.about_mean_pose
+    try:
+        with tempfile.TemporaryDirectory() as folder:
+            target = Path(folder) / "clip.ath"
+            athcodec.encode(clip(name), target, **OPTIONS[name])
+            return target.read_bytes()
+    finally:
+        Search.about_best_reference = best
+
+
+def features(data: bytes) -> set[str]:
+    """What a file uses of the format."""
+    file = rd.AthFile(data, strict=True)
+    kinds = {rd.KINDS[chunk.kind] for chunk in file.chunks}
+    method = file.content(rd.REST)[0]
+    counts = [
+        rd.u16(file.content(rd.STEMS, c.level, c.segment), 2 * (c.level > file.plan.height + 1) + 6)
+        for c in file.chunks
+        if c.kind == rd.STEMS and stems_head(file, c)[5] > 1
+    ]
+    heads = [stems_head(file, chunk) for chunk in file.chunks if chunk.kind == rd.STEMS]
+    shown = {
+        "several clips": len(file.clips) > 1,
+        "a loop": any(c.seams is not None for c in file.clips),
+        "periodic waves": any(c.periodic for c in file.clips),
+        "layers": file.header.layer_count > 1,
+        "predicted motion": file.header.is_predicted,
+        "joins": any(join.width for row in file.joins for join in row),
+        "sloped joins": any(join.is_sloped for row in file.joins for join in row),
+        "repeats": any(file.repeats),
+        "learned bases": any(head[5] > 1 for head in heads),
+        "shared bases": any(head[5] > 1 and head[8] != 255 for head in heads),
+        "waves of nodes": any(head[5] == 1 for head in heads),
+        "tips alone": any(head[4] & 8 for head in heads),
+        "sheets": any(branch.flags & rd.SHEET for branch in file.branches),
+        "loose branches": any(branch.flags & rd.LOOSE for branch in file.branches),
+        "whole subtrees": any(branch.flags & rd.WHOLE for branch in file.branches),
+        "tubes": any(branch.ring for branch in file.branches),
+        "rigid branches": any(branch.rigid for branch in file.branches),
+        "detail": any(branch.detail for branch in file.branches),
+        "several pieces": any(rd.piece_count(branch) > 1 for branch in file.branches),
+        "several roots": sum(branch.parent < 0 for branch in file.branches) > 1,
+        "exact rest pose": bool(method & rd.REST_EXACT),
+        "adaptive rest pose": bool(method & rd.REST_ADAPTIVE),
+        "connected rest pose": bool(method & rd.REST_CONNECTED),
+        "uneven times": file.content(rd.TIME)[0] == 2,
+        "mixed faces": bool(file._mixed_faces()),
+        "attributes": len(file.attributes()) > 2,
+    }
+    return {what for what, there in shown.items() if there} | kinds
+
+
+def stems_head(file: rd.AthFile, chunk: rd.Chunk) -> bytes:
+    """Without Ratio."""
+    return file.bytes_of(chunk)[2 if chunk.level > file.plan.height + 1 else 0 :]
