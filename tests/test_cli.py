@@ -550,4 +550,4 @@ def test_steps_that_are_no_plain_files_are_refused(tmp_path, capsys):
     index = tmp_path / "a.pvd"
     index.write_text('<VTKFile><Collection><DataSet timestep="0" file="/dev/zero"/></Collection></VTKFile>')
     assert run("encode", index, tmp_path / "a.ath", "--allow-outside") == 1
-    assert "/dev/zero: got a folder, device or pipe" in capsys.readouterr().err
+    assert "/dev/zero: got a device, pipe or socket" in capsys.readouterr().err

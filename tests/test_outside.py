@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -132,3 +133,10 @@ def test_what_is_no_plain_file_is_not_read(suffix, folder, tmp_path):
     others[0].mkdir()
     with pytest.raises(ClipError, match="plain file"):
         athcodec.read(path)
+
+
+def test_a_pipe_that_a_stage_names_is_refused_before_it_is_opened(tmp_path):
+    os.mkfifo(tmp_path / "layer.usda")
+    (tmp_path / "stage.usda").write_text("#usda 1.0\n(\n    subLayers = [@./layer.usda@]\n)\n", "utf-8")
+    with pytest.raises(ClipError, match="expected a plain file"):
+        athcodec.read(tmp_path / "stage.usda")

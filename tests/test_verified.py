@@ -31,7 +31,7 @@ OPTIONS = st.fixed_dictionaries(
     },
 )
 POWERS = st.floats(-30, 8)  # of ten, by which all is scaled
-REFUSALS = ("XXX",)
+REFUSALS = ("twice the spacing", "expected more than", "expected at least")
 """For which a clip is not encoded."""
 READING = ("--unit", "--up-axis")
 

@@ -68,7 +68,7 @@ def _naming_array(name: str) -> Iterator[None]:
     except ClipError:
         raise
     except _BROKEN as error:
-        text = " ".join(str(error).split()) or type(error).__name__
+        text = " ".join(str(error).split())[:200] or type(error).__name__
         raise ClipError(f"{name}: the array cannot be read: {text}") from None
 
 

@@ -122,6 +122,8 @@ def naming(path: str | PathLike[str], *errors: type[Exception]) -> Iterator[None
     try:
         yield
     except ClipError as error:
+        if str(error).startswith(f"{fspath(path)}: "):
+            raise
         raise ClipError(f"{fspath(path)}: {error}") from error
     except errors as error:
         text = " ".join(str(error).split())[:200] or type(error).__name__

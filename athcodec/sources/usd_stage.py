@@ -26,10 +26,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pxr import Gf, Sdf, Tf, Usd, UsdGeom, UsdShade, UsdSkel, Vt
+from pxr import Ar, Gf, Sdf, Tf, Usd, UsdGeom, UsdShade, UsdSkel, Vt
 
 from athcodec.clip import MotionClip, Skin
 from athcodec.errors import ClipError
+from athcodec.plain_files import open_plain
 from athcodec.sources import ReadOptions
 from athcodec.sources.crate import check_crates
 from athcodec.sources.opening import FileWatch, check_inside
@@ -91,6 +92,7 @@ class _Stage:
         known = Sdf.Layer.Find(path)
         if known:
             known.Reload()  # USD keeps layers for as long as anybody has them open
+        _check_layers(path, allow_outside)
         self.stage = Usd.Stage.Open(path)
         if not self.stage:
             raise ClipError("stage: cannot be opened")
@@ -109,6 +111,25 @@ class _Stage:
             raise ClipError("positions: the clip is closed")
         with quietly():
             yield
+
+
+def _check_layers(path: str, allow_outside: bool) -> None:
+    """ClipError where a layer names one that is no plain file or, unless `allow_outside`, lies outside of the folder of
+    the first: before USD opens it. Of value clips, and of what plugins name, USD alone knows."""
+    folder, waiting, seen = Path(path).parent, [path], set()
+    while waiting:
+        name = waiting.pop()
+        layer = Sdf.Layer.FindOrOpen(name)
+        for named in layer.GetCompositionAssetDependencies() if layer else ():
+            found = layer.ComputeAbsolutePath(named)
+            file = Ar.SplitPackageRelativePathOuter(found)[0]
+            if not file or found in seen:
+                continue
+            seen.add(found)
+            check_inside(folder, file, allow_outside)
+            if os.path.exists(file):
+                open_plain(file).close()
+            waiting.append(found)
 
 
 @dataclass
