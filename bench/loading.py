@@ -29,8 +29,8 @@ TIMES = """() => {
 
 NOTE = """
 Milliseconds, medians. Text: from the address until the page is painted, which says that it loads; page: until its
-programs run and it asks for the file. From there on: until the first moving picture is decoded, until it is drawn,
-until it has moved, and until the bytes of the whole file have come and are decoded.
+programs run and it asks for the file. From there on: until the first of the motion is decoded, by the worker's clock,
+until it is drawn, until it has moved, and until all bytes that the clip needs have come.
 """
 
 
@@ -70,5 +70,5 @@ def _row(line: float, rounds: list[dict[str, float]]) -> dict[str, Any]:
         "decoded": median["first"],
         "drawn": median["picture"],
         "moved": median["motion"],
-        "all decoded": median["whole"],
+        "all here": median["whole"],
     }

@@ -11,6 +11,7 @@ from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 
 import pytest
+from conftest import SLOWEST
 
 import athcodec
 from athcodec import cli, gallery, picture
@@ -97,7 +98,7 @@ def shown(browser, sample_ath, tmp_path):
     server = ThreadingHTTPServer(("127.0.0.1", 0), functools.partial(_Quiet, directory=str(tmp_path / "gallery")))
     threading.Thread(target=server.serve_forever, args=(0.02,), daemon=True).start()
     page, errors, asked = browser.new_page(viewport={"width": 360, "height": 360}), [], []
-    page.set_default_timeout(60_000)
+    page.set_default_timeout(SLOWEST)
     page.on("console", lambda message: errors.append(message.text) if message.type == "error" else None)
     page.on("pageerror", lambda error: errors.append(str(error)))
     page.on("request", lambda request: asked.append(request.url))
@@ -186,7 +187,7 @@ def test_attributes_of_an_element_say_what_it_shows(shown, tmp_path):
     shown.evaluate("tuft.removeAttribute('camera-controls')")
     shown.wait_for_function("() => tuft.ath.motion.clip.name === 'calm' && tuft.ath.motion.level > 0")
     assert shown.evaluate("tuft.currentTime === stopped") and shown.evaluate(f"{canvas}.tabIndex") == -1
-    shown.evaluate("tuft.setAttribute('src', 'plants/tree 0.ath')")
+    shown.evaluate("tuft.removeAttribute('clip'); tuft.setAttribute('src', 'plants/tree 0.ath')")
     shown.wait_for_function("() => tuft.ath?.motion.clips.length === 1")
 
 

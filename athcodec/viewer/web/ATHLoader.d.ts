@@ -280,6 +280,8 @@ export class ATHForest extends Group {
   constructor(ath: ATH, options?: {
     geometry?: BufferGeometry;
     material?: (isLines: boolean, level: number) => Material;
+    /** What its shadows are drawn with, where `castShadow` is set before the first bake(), as for `receiveShadow`. */
+    depthMaterial?: (() => Material) | null;
   });
   setInstances(instances: ATHInstance[]): void;
   /** Gets ready what is here of all clips that instances play: once per frame, until it is done. */
