@@ -22,7 +22,7 @@ from pathlib import Path
 import numpy as np
 import zstandard
 
-from spec import conformance
+from spec import conformance, real_size
 from spec import reference_decoder as rd
 from spec.scripted import (
     LOOSE,
@@ -4354,9 +4354,7 @@ for side_, width_ in (("above", 203), ("below", 197)):
     valid(
         f"whitening-{side_}",
         f"a node that extends {side_} 1/100 as far in its second direction as in its first",
-        lambda width_=width_: placed(
-            [Stem(-1, 2), Stem(0, 1, 1)], [[0, 0, 0], [10000, 0, 0], [10000, width_, 0]], 134
-        ),
+        lambda width_=width_: placed([Stem(-1, 2), Stem(0, 1, 1)], [[0, 0, 0], [10000, 0, 0], [10000, width_, 0]], 134),
     )
 for side_, size_ in (("above", 1.015), ("below", 0.985)):
     valid(
@@ -4371,16 +4369,18 @@ for side_, size_ in (("above", 1.015), ("below", 0.985)):
     valid(
         f"sheet-mode-{side_}",
         f"a sheet whose places leave {side_} 1/100000 of a mode",
-        lambda size_=size_: placed(
-            [Stem(-1, 1), Stem(0, 2, 0, SHEET)], [[0, 0, 0], *mode_and_more(1e-5 * size_)], 136
-        ),
+        lambda size_=size_: placed([Stem(-1, 1), Stem(0, 2, 0, SHEET)], [[0, 0, 0], *mode_and_more(1e-5 * size_)], 136),
     )
     valid(
         f"tube-function-{side_}",
         f"a tube whose rings leave {side_} 1/100000 of a function",
         lambda size_=size_: placed(
             [Stem(-1, 6, flags=SHEET, ring=2)],
-            [[10.0 * i + y, s * (1 + 2e-5 * size_ * (i == 2) + 0 * y), s] for i in range(3) for s, y in ((-1, 0), (1, 0))],
+            [
+                [10.0 * i + y, s * (1 + 2e-5 * size_ * (i == 2) + 0 * y), s]
+                for i in range(3)
+                for s, y in ((-1, 0), (1, 0))
+            ],
             137,
         ),
     )
@@ -4461,6 +4461,25 @@ invalid(
     deep,
 )
 
+
+# ---- valid: of real size -------------------------------------------------------------------------------------
+
+for name_, what_ in (
+    (
+        "all",
+        "clips, a loop, uneven times, repeats, layers, learned bases, tubes, a rest pose by faces, a second one, mixed "
+        "faces, edges, attributes, every bit of the source",
+    ),
+    ("refined-rest", "the same with joins, loose branches and a rest pose that layers refine"),
+    ("exact-rest", "the same about an exact rest pose, which excludes adaptive, connected and refined ones"),
+    ("predicted", "the same in predicted motion, which excludes modes, shapes, bases, corrections, joins and layers"),
+):
+    valid(
+        f"real-size-{name_}",
+        f"what athcodec wrote of a tree with leaves: {what_}",
+        lambda name_=name_: real_size.encoded(name_),
+        scripted=False,
+    )
 
 # ---- making them -------------------------------------------------------------------------------------------
 
