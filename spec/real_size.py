@@ -23,6 +23,12 @@ OPTIONS: dict[str, dict[str, Any]] = {
     "predicted": {"rel_error": 5e-4, "segment_frames": 24, "ladder": "none"},
 }
 
+FEATURES = set(
+    "several clips,a loop,periodic waves,layers,predicted motion,joins,sloped joins,repeats,learned bases,sheets,"
+    "loose branches,whole subtrees,tubes,rigid branches,detail,several pieces,several roots,exact rest pose,"
+    "adaptive rest pose,connected rest pose,uneven times,mixed faces,attributes".split(",")
+)
+
 
 class Growing:
     """Vertices and faces of a plant, branch by branch."""
