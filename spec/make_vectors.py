@@ -22,7 +22,7 @@ from pathlib import Path
 import numpy as np
 import zstandard
 
-from spec import conformance
+from spec import conformance, real_size
 from spec import reference_decoder as rd
 from spec.scripted import (
     LOOSE,
@@ -4316,6 +4316,13 @@ def along_x(*places: float) -> list[list[float]]:
     return [[x, 0.5 * (i % 2), 0.0] for i, x in enumerate(places)]
 
 
+def mode_and_more(share: float) -> list[list[float]]:
+    """Two places along x as the first mode of a sheet of two vertices, but for a share of it."""
+    mode = rd.cantilever((4, 4), 0.1, 0.001, 1.0)[0]
+    across = np.array([-mode[1], mode[0]])
+    return [[x, 0.0, 0.0] for x in mode + share * across]
+
+
 valid(
     "gaps",
     "distances along stems of under 1/4 to over 16 of their mean, of which 1 to 64 quarters are told apart",
@@ -4347,9 +4354,7 @@ for side_, width_ in (("above", 203), ("below", 197)):
     valid(
         f"whitening-{side_}",
         f"a node that extends {side_} 1/100 as far in its second direction as in its first",
-        lambda width_=width_: placed(
-            [Stem(-1, 2), Stem(0, 1, 1)], [[0, 0, 0], [10000, 0, 0], [10000, width_, 0]], 134
-        ),
+        lambda width_=width_: placed([Stem(-1, 2), Stem(0, 1, 1)], [[0, 0, 0], [10000, 0, 0], [10000, width_, 0]], 134),
     )
 for side_, size_ in (("above", 1.015), ("below", 0.985)):
     valid(
@@ -4364,16 +4369,18 @@ for side_, size_ in (("above", 1.015), ("below", 0.985)):
     valid(
         f"sheet-mode-{side_}",
         f"a sheet whose places leave {side_} 1/100000 of a mode",
-        lambda size_=size_: placed(
-            [Stem(-1, 1), Stem(0, 2, 0, SHEET)], [[0, 0, 0], *mode_and_more(1e-5 * size_)], 136
-        ),
+        lambda size_=size_: placed([Stem(-1, 1), Stem(0, 2, 0, SHEET)], [[0, 0, 0], *mode_and_more(1e-5 * size_)], 136),
     )
     valid(
         f"tube-function-{side_}",
         f"a tube whose rings leave {side_} 1/100000 of a function",
         lambda size_=size_: placed(
             [Stem(-1, 6, flags=SHEET, ring=2)],
-            [[10.0 * i + y, s * (1 + 2e-5 * size_ * (i == 2) + 0 * y), s] for i in range(3) for s, y in ((-1, 0), (1, 0))],
+            [
+                [10.0 * i + y, s * (1 + 2e-5 * size_ * (i == 2) + 0 * y), s]
+                for i in range(3)
+                for s, y in ((-1, 0), (1, 0))
+            ],
             137,
         ),
     )
@@ -4386,59 +4393,93 @@ for side_, size_ in (("above", 1.015), ("below", 0.985)):
     )
     valid(
         f"sheet-short-{side_}",
-        f"sheets of which the squares of the turning matrix are {side_} 1e-200",
+        f"a sheet whose matrix to turn by has squares that add up to {side_} 1e-200",
         lambda size_=size_: placed(
-            [Stem(-1, 1), Stem(0, 2, 0, SHEET), Stem(1, 2, 1)],
-            [[0, 0, 0], [0, 1e-50 * size_**0.5, 0], [0, 1e-57, 0], [0, 1, 1], [0, 2, 1]],
+            [Stem(-1, 2), Stem(0, 2, 0, SHEET), Stem(1, 2, 1)],
+            [[0, 0, 0], [0, 1, 0], [0, 1e-50 * (size_**2 / 1.0203) ** 0.25, 0], [0, 0, 0], [0, 1, 1], [0, 2, 1]],
             139,
-            heads={},
-            scripts={(rd.AFFINES, 0): lambda: Chance(139, large=4)},
+            is_float64=True,
+            scripts={(rd.STEMS, 1): [*row(), *row((9, -5, 7), (3, 8, -6))]},
+            heads={1: stems_head(0.125, 1)},
         ),
     )
     valid(
         f"predicted-short-{side_}",
         f"a step and a way at rest whose squares add up to {side_} 1e-60",
         lambda size_=size_: predicted(
-            ROOTED,
-            swayed(6, 140),
-            rest=exact_rest(ROOTED, (1e-30 * size_ * np.array(unit_steps(ROOTED))).ravel().tolist(), True),
+            [Stem(-1, 3, flags=WHOLE)],
+            swayed(6, 140, [Stem(-1, 3, flags=WHOLE)], follow=1.0, still=0.1),
+            rest=exact_rest([Stem(-1, 3)], [x * 1e-30 * size_ for x in (0, 0, 0, 0, 0.3, 0.2, 0, 1, 0)], True),
             predicted=predicted_head(1e-33),
             is_float64=True,
         ),
     )
 
 
-def mode_and_more(share: float) -> list[list[float]]:
-    """Two places along x as the first mode of a sheet of two vertices, but for a share of it."""
-    mode = rd.cantilever((4, 4), 0.1, 0.001, 1.0)[0]
-    across = np.array([-mode[1], mode[0]])
-    return [[x, 0.0, 0.0] for x in mode + share * across]
-
-
-def unit_steps(stems: list[Stem]) -> list[list[float]]:
-    """Places of stems all of whose vertices are 1 from the one before."""
-    points: list[list[float]] = []
-    first = []
-    for stem in stems:
-        first.append(len(points))
-        for i in range(stem.count):
-            before = points[-1] if i else points[first[stem.parent] + stem.place] if stem.parent >= 0 else [0.0] * 3
-            points.append([x + (k == (i + stem.count) % 3) for k, x in enumerate(before)])
-    return points
-
-
 def tall(*counts: int) -> Draft:
-    """Roots of so many vertices, of which only the hierarchy is decoded: the host's mesh is not there."""
-    stems = [Stem(-1, count, lag=1) for count in counts]
-    vertices = sum(counts)
-    plant = Plant([Stem(-1, 1)], mesh=np.zeros((1, 3), "<f4"), origin=(0.0, 0.0, 0.0))
-    hierarchy = write(rd.decode_hierarchy, hierarchy_script(stems), len(stems), vertices)
+    """Roots of so many vertices."""
+    return without_mesh([Stem(-1, count, lag=1) for count in counts])
+
+
+def deep() -> Draft:
+    stems = chain(1300, 1, flags=0)
+    for up in (1200, 1, 20, 98):
+        parent = len(stems) - 1
+        for _ in range(up):
+            parent = stems[parent].parent
+        stems.append(Stem(parent, 1))
+    return without_mesh([replace(stem, flags=WHOLE if b == 0 else 0) for b, stem in enumerate(stems)])
+
+
+def without_mesh(stems: list[Stem]) -> Draft:
+    """A file of which only the hierarchy is decoded: the rest pose is the host's mesh, which is not there."""
+    count = sum(stem.count for stem in stems)
+    stream = write(rd.decode_hierarchy, hierarchy_script(stems), len(stems), count)
+    plan = rd.Plan(rd.decode_hierarchy(stream, len(stems), count)[0])
+    levels, front = range(plan.height + 2), Plant([Stem(-1, 1)], mesh=np.zeros((1, 3), "<f4")).draft()
     return (
-        plant.draft()
-        .with_header(vertex_count=vertices, branch_count=len(stems))
-        .change(rd.HIERARCHY, content=hierarchy_chunk(hierarchy))
+        replace(front, entries=front.entries[:3])
+        .with_header(vertex_count=count, branch_count=len(stems), level_count=len(levels), full_level_count=len(levels))
+        .change(rd.HIERARCHY, content=hierarchy_chunk(stream))
+        .add(*(Entry(rd.STEMS, b"", level, 0) for level in levels if plan.has_stems(level)))
+        .add(*(Entry(rd.AFFINES, b"", level, 0) for level in levels if plan.has_affines(level, level)))
     )
 
+
+invalid(
+    "host-mesh-tall",
+    "NEEDS_HOST_MESH",
+    0,
+    "of a stem of 2^17 vertices among short ones only 2^16 count for how many others have",
+    lambda: tall(1 << 17, *range(1, 17)),
+)
+invalid(
+    "host-mesh-deep",
+    "NEEDS_HOST_MESH",
+    0,
+    "a chain of 1300 branches, from whose end others go up by 1200 and then by 1 to 1000",
+    deep,
+)
+
+
+# ---- valid: of real size -------------------------------------------------------------------------------------
+
+for name_, what_ in (
+    (
+        "all",
+        "clips, a loop, uneven times, repeats, layers, learned bases, tubes, a rest pose by faces, a second one, mixed "
+        "faces, edges, attributes, every bit of the source",
+    ),
+    ("refined-rest", "the same with joins, loose branches and a rest pose that layers refine"),
+    ("exact-rest", "the same about an exact rest pose, which excludes adaptive, connected and refined ones"),
+    ("predicted", "the same in predicted motion, which excludes modes, shapes, bases, corrections, joins and layers"),
+):
+    valid(
+        f"real-size-{name_}",
+        f"what athcodec wrote of a tree with leaves: {what_}",
+        lambda name_=name_: real_size.encoded(name_),
+        scripted=False,
+    )
 
 # ---- making them -------------------------------------------------------------------------------------------
 

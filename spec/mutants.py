@@ -228,9 +228,9 @@ def is_message(node: ast.AST, name: str, index: int | None = None) -> bool:
 
 def shown_with(node: ast.AST) -> ast.AST:
     """The largest expression or simple statement about a node that is short enough to name it by."""
-    while isinstance(parent_of(node), (ast.expr, ast.stmt, ast.comprehension, ast.keyword, ast.Slice)):
+    while not isinstance(node, ast.stmt):
         up = parent_of(node)
-        if isinstance(up, (ast.FunctionDef, ast.ClassDef)) or len(as_line(up)) > LONGEST_NAME:
+        if isinstance(up, (ast.FunctionDef, ast.ClassDef, ast.arguments)) or len(as_line(up)) > LONGEST_NAME:
             break
         node = up
     return node
@@ -808,10 +808,35 @@ def faults(fates: dict[str, str], known: dict[str, str]) -> list[str]:
     return lines
 
 
+def as_markdown(fates: dict[str, str], known: dict[str, str], vectors: int) -> str:
+    how = Counter("not caught" if fate == MISSED else fate.split(" of ")[0].split(" in ")[0] for fate in fates.values())
+    caught = len(fates) - how["not caught"]
+    lines = [
+        "# Changes of the reference decoder",
+        "",
+        f"Written by `python -m spec.mutants`, with {vectors} vectors. What is not caught cannot be, for reasons that",
+        "stand in `mutants.toml`.",
+        "",
+        "| what becomes of a change | changes |",
+        "|---|---:|",
+        f"| another result of a vector | {how['result']} |",
+        f"| an exception that is no error of the format | {how['exception']} |",
+        f"| no end | {how['no end']} |",
+        f"| caught in all | {caught} |",
+        f"| not caught | {how['not caught']} |",
+    ]
+    by_reason: dict[str, list[str]] = defaultdict(list)
+    for name, fate in fates.items():
+        if fate == MISSED:
+            by_reason[known.get(name, "No reason yet.")].append(name)
+    for why, names in by_reason.items():
+        lines += ["", f"## {why}", "", *(f"- `{name}`" for name in names)]
+    return "\n".join(lines) + "\n"
+
+
 def main(words: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="python -m spec.mutants", description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--only", metavar="GLOB", help="changes whose name matches; writes no report")
-    parser.add_argument("--missed", metavar="FILE", help="changes named in a file, one a line; writes no report")
     parser.add_argument("--list", nargs="?", const="*", metavar="GLOB", help="print the names of changes")
     parser.add_argument("--anew", action="store_true", help="do without what earlier runs have found out")
     parser.add_argument("--quick", action="store_true", help="only with the fastest vectors; writes no report")
@@ -830,16 +855,18 @@ def main(words: list[str] | None = None) -> int:
     mutants = [mutant for mutant in changes.mutants if mutant.of_floats < 0 or mutant.of_floats in floats]
     if options.only:
         mutants = [mutant for mutant in mutants if fnmatchcase(mutant.name, options.only)]
-    if options.missed:
-        chosen = set(Path(options.missed).read_text("utf-8").splitlines())
-        mutants = [mutant for mutant in mutants if mutant.name in chosen]
     gc.freeze()  # pages that all processes share
     with tempfile.TemporaryDirectory() as folder:
         fates = Run(changes, vectors, cache, options.jobs).all(mutants, Path(folder), options.quick)
-    missed = [name for name, fate in fates.items() if fate == MISSED]
-    print(*missed, sep="\n")
-    print(f"{len(mutants)} changes, {len(missed)} not caught, {time.monotonic() - begun:.0f} s")
-    return 0
+    if options.only or options.quick:
+        missed = [name for name, fate in fates.items() if fate == MISSED]
+        print(*missed, f"{len(fates)} changes, {len(missed)} not caught", sep="\n")
+        return 0
+    known = reasons()
+    REPORT.write_text(as_markdown(fates, known, len(vectors)), "utf-8")
+    wrong = faults(fates, known)
+    print(*wrong, f"{len(fates)} changes, {len(wrong)} faults, {time.monotonic() - begun:.0f} s", sep="\n")
+    return 1 if wrong else 0
 
 
 if __name__ == "__main__":

@@ -1,8 +1,8 @@
 """A plant of real size for vectors that athcodec writes, and which features of the format a file uses.
 
-Some features exclude each other: an exact rest pose (which lossless files have) is not adaptive, connected, refined or a
-second one, and has no copies; predicted motion has no modes, shapes, learned bases, corrections or joins beyond level 0.
-So there are three files (`OPTIONS`), which together use all of them.
+Some features exclude each other, so there are four files (`OPTIONS`). A rest pose is exact, or adaptive and then
+perhaps connected, refined, with detail. A second rest pose is there where motion is about the mean pose. Predicted
+motion has no modes, shapes, learned bases, corrections, refinements or layers, and joins at level 0 alone.
 """
 
 from __future__ import annotations
@@ -22,6 +22,12 @@ OPTIONS: dict[str, dict[str, Any]] = {
     "exact-rest": {"rel_error": 2e-3, "ladder": (4e-2,), "segment_frames": 16, "exact_rest": True},
     "predicted": {"rel_error": 5e-4, "segment_frames": 24, "ladder": "none"},
 }
+
+FEATURES = set(
+    "several clips,a loop,periodic waves,layers,predicted motion,joins,sloped joins,repeats,learned bases,sheets,"
+    "loose branches,whole subtrees,tubes,rigid branches,detail,several pieces,several roots,exact rest pose,"
+    "adaptive rest pose,connected rest pose,uneven times,mixed faces,attributes".split(",")
+)
 
 
 class Growing:
@@ -189,11 +195,6 @@ def features(data: bytes) -> set[str]:
     file = rd.AthFile(data, strict=True)
     kinds = {rd.KINDS[chunk.kind] for chunk in file.chunks}
     method = file.content(rd.REST)[0]
-    counts = [
-        rd.u16(file.content(rd.STEMS, c.level, c.segment), 2 * (c.level > file.plan.height + 1) + 6)
-        for c in file.chunks
-        if c.kind == rd.STEMS and stems_head(file, c)[5] > 1
-    ]
     heads = [stems_head(file, chunk) for chunk in file.chunks if chunk.kind == rd.STEMS]
     shown = {
         "several clips": len(file.clips) > 1,
