@@ -833,6 +833,8 @@ def test_only_the_level_that_is_looked_at_is_fetched(opened, gusty_ath):
     with HeldServer({"tree.ath": data}, after=len(data) / 7) as line, athcodec.open(gusty_ath) as decoder:
         page = opened(line.page("tree.ath"), "athcodecViewer.motion")
         page.evaluate("athcodecViewer.setLevel('1')")
+        pictures = page.evaluate("athcodecViewer.counters.pictures")
+        page.wait_for_function(f"() => athcodecViewer.counters.pictures > {pictures + 2}")  # the worker knows of it
         line.release()
         page.wait_for_function(
             "() => athcodecViewer.motion.readyLevel >= 1 && athcodecViewer.plants[0].ath.attributes.radius"
@@ -867,8 +869,6 @@ def test_a_truncated_file_plays_to_its_level(opened, sample_ath, ranges):
     data = cut_after(sample_ath, 1) + b"xx"
     with ThrottledServer({"tree.ath": data}, ranges=ranges) as line, athcodec.open(sample_ath) as decoder:
         page = opened(line.page("tree.ath"), "athcodecViewer.motion?.readyLevel === 1")
-        page.keyboard.press("l")
-        page.evaluate("athcodecViewer.setPlaying(true)")  # drawn in software the clip may have ended
         page.wait_for_function("() => athcodecViewer.counters.pictures > 8")
         assert page.evaluate("athcodecViewer.motion.level") == 1
         shown = positions_of(page, "athcodecViewer.decoded(1, 1)")
@@ -905,8 +905,6 @@ def test_the_intact_levels_of_a_damaged_file_play(opened, sample_ath):
         shown = "!document.getElementById('trouble').hidden && athcodecViewer.motion"
         page = opened(line.page("tree.ath"), shown)
         assert "damaged" in page.inner_text("#trouble")
-        page.keyboard.press("l")
-        page.evaluate("athcodecViewer.setPlaying(true)")  # drawn in software the clip may have ended
         page.wait_for_function("() => athcodecViewer.counters.pictures > 20")
         assert page.evaluate("athcodecViewer.motion.level") >= 1
         assert page.is_visible("#trouble")  # as long as the file is open
