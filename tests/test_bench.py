@@ -266,6 +266,7 @@ def test_a_failure_of_a_codec_is_reported_in_its_row(tmp_path, bushy_file):
     assert "\nBROKEN" not in text  # of programs; a baseline that breaks its bound is our own mistake
 
 
+@pytest.mark.slow
 def test_clips_without_branches_are_measured_on_those_that_encoding_finds(tmp_path, sample_clip):
     bare = sample_clip.replace(
         positions=sample_clip.positions[:20], time=sample_clip.time[:20], vertex_branch=None, branch_parent=None
@@ -371,6 +372,7 @@ def test_errors_of_a_growing_prefix_are_those_in_the_table_of_the_file(tmp_path,
     assert cost["bytes"] - cost["AFFINES"] - cost["table"] >= cost["without"] > 0
 
 
+@pytest.mark.slow
 def test_prefixes_are_compared_with_files_of_their_own_at_levels_and_between_them(tmp_path, bushy_file):
     pytest.importorskip("matplotlib")
     picture = tmp_path / "ratios.png"
@@ -395,6 +397,7 @@ def test_prefixes_are_compared_with_files_of_their_own_at_levels_and_between_the
 # ---- beyond one clip and one machine ----
 
 
+@pytest.mark.slow
 def test_a_forest_that_is_played_reads_and_shows_what_the_formula_says(tmp_path):
     _, result = run_bench(
         tmp_path,
@@ -508,6 +511,7 @@ def test_the_papers_number_of_nodes_is_met_by_its_parameters(sample_clip):
     assert abs(nodes - 97) <= 5 and limits.eta == 9  # 15 of 200 frames
 
 
+@pytest.mark.slow
 def test_a_quick_run_leaves_results_a_report_and_pictures(tmp_path, bushy_file):
     folder = tmp_path / "out"
     _, result = run_bench(
