@@ -64,6 +64,17 @@ def test_a_ladder_has_a_layer_for_each_error_that_is_well_above_the_bound():
     assert layer_ratios((), 1e-4, 1.0) == layer_ratios((1e-4, 1e-5), 1e-4, 1.0) == [1]
 
 
+def test_errors_far_above_the_bound_get_layers_in_between(bushy_clip, tmp_path):
+    assert layer_ratios((1e-1, 1e-2), 1e-7, 1.0) == [2_000_000, 200_000, 447, 1]
+    for ladder in ((1e-1,), (1e-2, 1e-3)):
+        made = athcodec.encode(bushy_clip, tmp_path / "a.ath", ladder=ladder, effort="fast", lossless=True)
+        with athcodec.open(made.path) as played:
+            assert np.array_equal(played.positions(), bushy_clip.positions)
+            diagonal = np.linalg.norm(np.ptp(bushy_clip.positions.reshape(-1, 3), axis=0))
+            found = [level.max_error / diagonal for level in played.levels]
+            assert all(any(wanted / 3 < error < 3 * wanted for error in found) for wanted in ladder)
+
+
 @pytest.mark.parametrize("ladder", ["", "some", "1e-2,", (0.0,), (1e-2, 1.0), ("nan",), (None,), 1e-2])
 def test_what_is_no_ladder_is_refused(ladder, bushy_clip, tmp_path):
     with pytest.raises(ValueError, match=r"ladder: got .*; expected none, decades or errors between 0 and 1"):

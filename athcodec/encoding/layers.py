@@ -125,15 +125,22 @@ def layer_ratios(ladder: Sequence[float], bound: float, diagonal: float) -> list
     """Of the step of each layer to that of the last, descending to 1.
 
     ladder: largest errors over the diagonal, descending; those close to the bound, or to each other, make no layer of
-    their own.
+    their own. Between layers that are too far apart for one to refine the other stand more.
     """
     ratios: list[int] = []
     for error in ladder:
-        ratio = round(COARSER * min(error * diagonal / bound, MOST_RATIO**2))
+        ratio = round(min(COARSER * error * diagonal / bound, MOST_RATIO**2))
         if ratio >= LEAST_RATIO and (not ratios or ratios[-1] >= LEAST_RATIO * ratio):
             ratios.append(ratio)
-    ratios.append(1)
-    return [ratio for i, ratio in enumerate(ratios) if i == 0 or ratios[i - 1] <= MOST_RATIO * ratio]
+    return [step for pair in pairwise([*ratios, 1]) for step in _between(*pair)] + [1]
+
+
+def _between(ratio: int, finer: int) -> list[int]:
+    """`ratio` and those before `finer`, each at most MOST_RATIO from the next one."""
+    if ratio <= MOST_RATIO * finer:
+        return [ratio]
+    middle = math.isqrt(ratio * finer)
+    return _between(ratio, middle) + _between(middle, finer)
 
 
 def layers_of(source: Source, prelude: CodedPrelude, choice: Choice, ratios: Sequence[int]) -> Layers:
