@@ -32,17 +32,18 @@ import time
 import tomllib
 import types
 from collections import Counter, defaultdict
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from spec import conformance
+from spec.effects import Effects
 
 HERE = Path(__file__).resolve().parent
 DECODER = HERE / "reference_decoder.py"
@@ -50,9 +51,10 @@ REASONS, REPORT = HERE / "mutants.toml", HERE / "mutants.md"
 CACHE = HERE.parent / "build" / "mutants.pickle"
 LEFT_OUT = {"main", "show", "mesh_in", "Chunk.__str__", "KINDS", "AthError.__init__"}  # of no effect on results
 LONGEST_NAME = 72
-FIRST_SECONDS = 0.3  # of vectors that all changes are tried with before any is with more
+FIRST_SECONDS = 1.0  # of vectors that all changes are tried with before any is with more
 TOGETHER = 40  # changes that a process tries
 LARGEST = 14_000  # bytes of a vector that is tried: those of real size take too long
+SLOWER = 30.0  # times, of a decoder that is watched
 SECONDS, TIMES_AS_LONG = 0.5, 10.0  # of the processor, for a vector; and how many times what the decoder takes
 MEMORY = 3 << 30
 NOT_CHANGED = (
@@ -412,7 +414,11 @@ def joined(node: ast.BoolOp) -> Iterator[Any]:
 def unary(node: ast.UnaryOp) -> Iterator[Any]:
     yield node.operand
     inner = node.operand
-    if isinstance(node.op, ast.Not) and isinstance(inner, ast.Compare) and type(inner.ops[0]) in NEGATED:
+    if (
+        isinstance(node.op, ast.Not)
+        and isinstance(inner, ast.Compare)
+        and [type(op) in NEGATED for op in inner.ops] == [True]
+    ):
         yield ast.Compare(inner.left, [NEGATED[type(inner.ops[0])]()], inner.comparators), False  # differs for NaN
 
 
@@ -580,6 +586,8 @@ class Cache:
     floats: set[int] = field(default_factory=set)  # numbers of expressions
     fates: dict[str, str] = field(default_factory=dict)  # of changes
     passed: dict[str, set[str]] = field(default_factory=dict)  # of changes: vectors that have not caught them
+    without: dict[str, set[str]] = field(default_factory=dict)  # of vectors: changes that make no difference in them
+    compared: dict[str, set[str]] = field(default_factory=dict)  # of vectors: changes that were looked at for that
 
     @staticmethod
     def of(source: str) -> Cache:
@@ -658,6 +666,48 @@ def order_of(item: str) -> tuple:
 MISSED = "missed"
 
 
+def find_effects(changes: Changes, vectors: list[Known], cache: Cache, mutants: list[Mutant], jobs: int) -> None:
+    """Notes in which vectors a change makes no difference where it stands: they cannot catch it."""
+    left = [mutant for mutant in mutants if cache.fates.get(mutant.name, MISSED) == MISSED]
+    effects = Effects(changes.tree, left, parent_of)
+    decoder, waiting, running = Decoder(effects.tree), [], {}
+    waiting = [vector for vector in vectors if effects.names - cache.compared.get(vector.name, set())]
+    with tempfile.TemporaryDirectory() as folder:
+        while waiting or running:
+            while waiting and len(running) < jobs:
+                vector, path = waiting.pop(), Path(folder) / str(len(waiting))
+                running[in_process(partial(write_effects, effects, decoder, vector, path))] = vector, path
+            process, _ = os.wait()
+            vector, path = running.pop(process)
+            differing = pickle.loads(path.read_bytes()) if path.exists() else effects.names
+            cache.compared[vector.name] = set(effects.names)
+            cache.without[vector.name] = effects.names - differing
+    cache.keep()
+
+
+def write_effects(effects: Effects, decoder: Decoder, vector: Known, path: Path) -> None:
+    signal.setitimer(signal.ITIMER_PROF, SLOWER * (1.0 + TIMES_AS_LONG * vector.seconds))
+    watch, found = effects.watched()
+    module, opened = decoder.module(given={"_effect": watch}), {}  # type: ignore[var-annotated]
+    for item, expected in vector.expected.items():
+        assert answer(module, vector, item, opened) == expected, f"{vector.name}, {item}: another result when watched"
+    path.with_suffix(".new").write_bytes(pickle.dumps(found))
+    path.with_suffix(".new").replace(path)
+
+
+def in_process(job: Callable[[], None]) -> int:
+    process = os.fork()
+    if process == 0:
+        resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
+        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+        np.seterr(all="ignore")
+        try:
+            job()
+        finally:
+            os._exit(0)
+    return process
+
+
 @dataclass
 class Found:
     """What became of a change: how it was caught, or MISSED by the vectors tried."""
@@ -700,17 +750,13 @@ class Run:
         self.cache.keep()
 
     def _start(self, batch: list[int], seconds: float) -> int:
-        process = os.fork()
-        if process == 0:
-            resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
-            resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-            np.seterr(all="ignore")
+        def job() -> None:
             with (self.folder / str(os.getpid())).open("wb", buffering=0) as out:
                 for number in batch:
                     out.write(pickle.dumps(Found(number)))
                     out.write(pickle.dumps(self._try(number, seconds)))
-            os._exit(0)
-        return process
+
+        return in_process(job)
 
     def _try(self, number: int, seconds: float) -> Found:
         mutant, tried, at = self.mutants[number], [], "the module"
@@ -732,6 +778,8 @@ class Run:
         first, passed = self.lately[mutant.function][:8], self.cache.passed.get(mutant.name, set())
         for vector in [self.by_name[name] for name in first] + self.vectors:
             if vector.name in passed or (mutant.statements and not mutant.statements & vector.statements):
+                continue
+            if mutant.name in self.cache.without.get(vector.name, ()):
                 continue
             yield vector
             seconds -= vector.seconds
@@ -856,6 +904,7 @@ def main(words: list[str] | None = None) -> int:
     if options.only:
         mutants = [mutant for mutant in mutants if fnmatchcase(mutant.name, options.only)]
     gc.freeze()  # pages that all processes share
+    find_effects(changes, vectors, cache, mutants, options.jobs)
     with tempfile.TemporaryDirectory() as folder:
         fates = Run(changes, vectors, cache, options.jobs).all(mutants, Path(folder), options.quick)
     if options.only or options.quick:
