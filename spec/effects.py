@@ -1,4 +1,4 @@
-"""Where a change of an expression makes a difference at once: the expression is evaluated both ways while vectors are decoded.
+"""Where a change of an expression makes a difference at once: while vectors are decoded, it is evaluated both ways.
 
 A change that gives the same value each time cannot be caught by a vector, and need not be tried with it. That holds for
 expressions without side effects; of others nothing is said.
@@ -20,11 +20,12 @@ PURE_NAMES = frozenset(
     "set sorted str sum tuple zip".split()
 )
 PURE_METHODS = frozenset(
-    "all any argmax argmin argsort astype bit_length copy count cumsum dot endswith from_bytes get index is_integer items "
-    "keys max mean min nonzero ravel repeat reshape startswith sum swapaxes to_bytes tobytes tolist transpose values "
-    "view".split()
+    "all any argmax argmin argsort astype bit_length copy count cumsum dot endswith from_bytes get index "
+    "is_integer items keys max mean min nonzero ravel repeat reshape startswith sum swapaxes to_bytes tobytes tolist "
+    "transpose values view".split()
 )
 PURE_MODULES = frozenset(["math", "np"])
+WITH_SIDE_EFFECTS = ast.AugAssign, ast.Delete, ast.Global, ast.Nonlocal, ast.With, ast.Try
 LAZY = frozenset(["enumerate", "map", "reversed", "zip"])  # calls whose values cannot be compared
 WITHOUT_VALUE = (ast.GeneratorExp, ast.Slice, ast.Starred, ast.Lambda)
 
@@ -48,22 +49,12 @@ class Purity:
             self.functions = more
 
     def _is_pure_function(self, function: ast.FunctionDef) -> bool:
-        local: set[str] = set()
         for node in ast.walk(function):
-            if isinstance(node, ast.Assign):
-                if not all(isinstance(target, (ast.Name, ast.Tuple)) for target in node.targets):
-                    return False
-                local |= {name.id for target in node.targets for name in ast.walk(target) if isinstance(name, ast.Name)}
-            elif (
-                isinstance(node, (ast.AugAssign, ast.Delete, ast.Global, ast.Nonlocal, ast.With, ast.Try))
-                or isinstance(node, (ast.Attribute, ast.Subscript))
-                and not isinstance(node.ctx, ast.Load)
-                or isinstance(node, ast.FunctionDef)
-                and node is not function
-            ):
+            if isinstance(node, WITH_SIDE_EFFECTS) or (isinstance(node, ast.FunctionDef) and node is not function):
                 return False
-        body = [node for statement in function.body for node in ast.walk(statement) if isinstance(node, ast.expr)]
-        return all(self._alone(node) for node in body)
+            if isinstance(node, (ast.Attribute, ast.Subscript)) and not isinstance(node.ctx, ast.Load):
+                return False
+        return all(self(statement) for statement in function.body)
 
     def __call__(self, node: ast.AST) -> bool:
         return all(self._alone(each) for each in ast.walk(node))

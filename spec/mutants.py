@@ -595,7 +595,7 @@ class Cache:
         if CACHE.exists():
             kept = pickle.loads(CACHE.read_bytes())
             if kept.source == own:
-                return kept
+                return Cache(**vars(kept))  # an older one has fewer members
         return Cache(own)
 
     def keep(self) -> None:
