@@ -33,8 +33,9 @@ class BoundOption:
             if not (math.isfinite(value) and value > 0):
                 raise BoundError(f"{name}: got {value}; expected a finite number above 0")
 
-    def in_scene_units(self, source: Source, file_size: Callable[[float], float]) -> float:
-        """The bound for a clip; file_size: bytes of its file at a bound, asked for where a target size is to be met.
+    def in_scene_units(self, source: Source, file_size: Callable[[float], float], filled: float = 0.97) -> float:
+        """The bound for a clip; file_size: bytes of its file at a bound, asked for where a target size is to be met, of
+        which the file is to fill this share.
 
         A fraction is of the diagonal of the bounding box over all frames; where nothing has any extent, of that with
         the rest pose.
@@ -42,7 +43,7 @@ class BoundOption:
         if self.max_error is not None:
             return self.max_error
         if self.target_size is not None:
-            return _bound_for_size(source, file_size, self.target_size)
+            return _bound_for_size(source, file_size, self.target_size, filled)
         diagonal, extent = source.seen.diagonal, source.extent
         least = 2 * least_bound(source)
         if self.rel_error is None and self.lossless:
@@ -56,17 +57,18 @@ def least_bound(source: Source) -> float:
     return qz.least_bound(source.seen.low, source.seen.high, source.clip.dtype)
 
 
-def _bound_for_size(source: Source, file_size: Callable[[float], float], target: int) -> float:
-    """A bound whose file takes 97 to 100 % of `target` bytes, or the finest found that does not exceed it: sizes of
-    small files jump by some percent from one bound to the next. Raises BoundError.
+def _bound_for_size(source: Source, file_size: Callable[[float], float], target: int, filled: float) -> float:
+    """A bound whose file takes a share from `filled` on of `target` bytes, or the finest found that does not exceed it:
+    sizes of small files jump by some percent from one bound to the next. Raises BoundError.
 
-    Size falls about as the square root of the bound; between two known sizes it is interpolated in logarithms.
+    Size falls about as the square root of the bound, where no two known sizes tell how; between two known sizes it is
+    interpolated in logarithms.
     """
     diagonal = source.seen.diagonal or 1.0
     low, high = 1e-7, max(0.1, 2 * least_bound(source) / diagonal)  # low: file too large; high: fits, once tried
     sizes: dict[float, float] = {}
     guess = min(DEFAULT_REL_ERROR, high)
-    while high / low > 1.01 and sizes.get(high, 0) < 0.97 * target:
+    while high / low > 1.01 and sizes.get(high, 0) < filled * target:
         sizes[guess] = file_size(guess * diagonal)
         low, high = (low, guess) if sizes[guess] <= target else (guess, high)
         # rounded, since logarithms differ between C libraries in the last bit
@@ -87,5 +89,15 @@ def _next_guess(low: float, high: float, sizes: dict[float, float], target: int)
     known = low if low in sizes else high
     if not math.isfinite(sizes[known]):
         return math.sqrt(low * high)
-    guess = known * math.exp((math.log(sizes[known]) - wanted) / 0.5)
+    guess = known * math.exp((math.log(sizes[known]) - wanted) / _fall(known, sizes))
     return min(max(guess, low * 1.01), high if high not in sizes else high / 1.01)
+
+
+def _fall(known: float, sizes: dict[float, float]) -> float:
+    """Of the logarithm of the size with that of the bound, beside a known one."""
+    others = [bound for bound, size in sizes.items() if bound != known and math.isfinite(size)]
+    if not others:
+        return 0.5
+    other = min(others, key=lambda bound: abs(math.log(bound / known)))
+    fall = math.log(sizes[other] / sizes[known]) / math.log(known / other)
+    return min(max(fall, 0.15), 0.6)

@@ -21,6 +21,7 @@ from athcodec.hierarchy import hierarchy_of
 from athcodec.options import DEFAULT_SEGMENT
 
 TRIAL_FRAMES = 64
+FILLED = 0.8  # of a target size, at a bound that branches are compared at
 
 
 def best_branches(clip: MotionClip, option: BoundOption, report: Progress, host_rest: bool = False) -> Found:
@@ -71,7 +72,7 @@ class _Trial:
     def _bound_of_target(self, job: EncodingJob) -> BoundOption:
         """The bound at which the branches tried first meet the target size, to judge all others at too."""
         try:
-            bound = self._option.in_scene_units(job.source, lambda bound: self._job_size(job, bound))
+            bound = self._option.in_scene_units(job.source, lambda bound: self._job_size(job, bound), FILLED)
         except BoundError:
             return BoundOption()
         return BoundOption(max_error=bound)
