@@ -130,7 +130,7 @@ class Effects:
     """Which changes make a difference; `mutants`: changes, each with a place and the node that comes there."""
 
     def __init__(self, tree: ast.Module, mutants: list[Any], up: Callable[[ast.AST], ast.AST]):
-        is_pure, self.places = Purity(tree), dict[int, list[str]]()
+        is_pure = Purity(tree)
         ways: dict[int, list[ast.AST]] = defaultdict(list)
         named: dict[int, list[str]] = defaultdict(list)
         for mutant in mutants:
@@ -147,27 +147,30 @@ class Effects:
         self._named = named
         self.tree = BothWays(ways).visit(without_ups(tree))
 
-    def watched(self) -> tuple[Callable, set[str]]:
-        """What the module has to have as `_effect`, and names of the changes that made a difference so far."""
-        found: set[str] = set()
-        left = {number: list(enumerate(names)) for number, names in self._named.items()}
+        self.begin()
 
-        def effect(number: int, value: Callable[[], Any], ways: Callable[[], tuple]) -> Any:
-            if not left[number]:
-                return value()
-            functions, got = ways(), []
-            for i, _ in left[number]:
-                try:
-                    got.append(functions[i]())
-                except Exception:
-                    got.append(NotImplemented)
-            usual = value()
-            kept = [each for each, other in zip(left[number], got) if same(usual, other)]
-            found.update(name for _, name in set(left[number]) - set(kept))
-            left[number] = kept
-            return usual
+    def begin(self) -> None:
+        """From here on, `found` has the names of the changes that make a difference."""
+        self.found: set[str] = set()
+        self._left = {number: list(enumerate(names)) for number, names in self._named.items()}
 
-        return effect, found
+    def watch(self, number: int, value: Callable[[], Any], ways: Callable[[], tuple]) -> Any:
+        """What the tree calls as `_effect`."""
+        left = self._left[number]
+        if not left:
+            return value()
+        functions, got = ways(), []
+        for i, _ in left:
+            try:
+                got.append(functions[i]())
+            except Exception:
+                got.append(NotImplemented)
+        usual = value()
+        kept = [each for each, other in zip(left, got) if same(usual, other)]
+        if len(kept) < len(left):
+            self.found.update(name for _, name in set(left) - set(kept))
+            self._left[number] = kept
+        return usual
 
 
 def without_ups(node: ast.AST) -> Any:

@@ -521,9 +521,13 @@ class Decoder:
             if in_place:
                 exec(self.parts[mutant.top], names)
             sys.modules[self.NAME] = self.usual
-            for value in names.values():
-                if hasattr(value, "cache_clear"):
-                    value.cache_clear()
+            clear_caches(self.usual)
+
+
+def clear_caches(module: types.ModuleType) -> None:
+    for value in module.__dict__.values():
+        if hasattr(value, "cache_clear"):
+            value.cache_clear()
 
 
 def used_at_import(tree: ast.Module) -> set[str]:
@@ -670,29 +674,44 @@ def find_effects(changes: Changes, vectors: list[Known], cache: Cache, mutants: 
     """Notes in which vectors a change makes no difference where it stands: they cannot catch it."""
     left = [mutant for mutant in mutants if cache.fates.get(mutant.name, MISSED) == MISSED]
     effects = Effects(changes.tree, left, parent_of)
-    decoder, waiting, running = Decoder(effects.tree), [], {}
-    waiting = [vector for vector in vectors if effects.names - cache.compared.get(vector.name, set())]
+    decoder, running = Decoder(effects.tree), dict[int, list[Known]]()
+    waiting = batches([each for each in vectors if effects.names - cache.compared.get(each.name, set())], FIRST_SECONDS)
     with tempfile.TemporaryDirectory() as folder:
         while waiting or running:
             while waiting and len(running) < jobs:
-                vector, path = waiting.pop(), Path(folder) / str(len(waiting))
-                running[in_process(partial(write_effects, effects, decoder, vector, path))] = vector, path
+                batch = waiting.pop()
+                running[in_process(partial(write_effects, effects, decoder, batch, Path(folder)))] = batch
             process, _ = os.wait()
-            vector, path = running.pop(process)
-            differing = pickle.loads(path.read_bytes()) if path.exists() else effects.names
-            cache.compared[vector.name] = set(effects.names)
-            cache.without[vector.name] = effects.names - differing
+            path = Path(folder) / str(process)
+            found = dict(unpickled(path.read_bytes())) if path.exists() else {}
+            for vector in running.pop(process):
+                cache.compared[vector.name] = set(effects.names)
+                cache.without[vector.name] = effects.names - found.get(vector.name, effects.names)
     cache.keep()
 
 
-def write_effects(effects: Effects, decoder: Decoder, vector: Known, path: Path) -> None:
-    signal.setitimer(signal.ITIMER_PROF, SLOWER * (1.0 + TIMES_AS_LONG * vector.seconds))
-    watch, found = effects.watched()
-    module, opened = decoder.module(given={"_effect": watch}), {}  # type: ignore[var-annotated]
-    for item, expected in vector.expected.items():
-        assert answer(module, vector, item, opened) == expected, f"{vector.name}, {item}: another result when watched"
-    path.with_suffix(".new").write_bytes(pickle.dumps(found))
-    path.with_suffix(".new").replace(path)
+def batches(vectors: list[Known], seconds: float) -> list[list[Known]]:
+    """Neighbours that together take so long."""
+    found: list[list[Known]] = []
+    for vector in vectors:
+        if not found or sum(each.seconds for each in found[-1]) + vector.seconds > seconds:
+            found.append([])
+        found[-1].append(vector)
+    return found
+
+
+def write_effects(effects: Effects, decoder: Decoder, batch: list[Known], folder: Path) -> None:
+    signal.setitimer(signal.ITIMER_PROF, SLOWER * (1.0 + TIMES_AS_LONG * sum(vector.seconds for vector in batch)))
+    module = decoder.module(given={"_effect": effects.watch})
+    with (folder / str(os.getpid())).open("wb", buffering=0) as out:
+        for vector in batch:
+            clear_caches(module)
+            effects.begin()
+            opened: dict = {}
+            for item, expected in vector.expected.items():
+                if answer(module, vector, item, opened) != expected:
+                    raise AssertionError(f"{vector.name}, {item}: another result when watched")
+            out.write(pickle.dumps((vector.name, effects.found)))
 
 
 def in_process(job: Callable[[], None]) -> int:
@@ -833,37 +852,49 @@ def unpickled(data: bytes) -> Iterator[Any]:
 # ---- reasons and report ------------------------------------------------------------------------------------
 
 
-def reasons() -> dict[str, str]:
-    """Of changes that no vector can catch, by their names."""
+@dataclass
+class Reason:
+    """Why no vector can catch changes: those of these names, and those whose names one of the patterns matches."""
+
+    why: str
+    mutants: list[str] = field(default_factory=list)
+    like: list[str] = field(default_factory=list)  # regular expressions
+
+    def matches(self, name: str) -> bool:
+        return name in self.mutants or any(re.fullmatch(pattern, name) for pattern in self.like)
+
+
+def reasons() -> list[Reason]:
     entries = tomllib.loads(REASONS.read_text("utf-8")).get("reason", [])
-    found: dict[str, str] = {}
-    for entry in entries:
-        for name in entry["mutants"]:
-            if name in found:
-                raise SystemExit(f"{REASONS.name}: {name}: stands there twice")
-            found[name] = " ".join(entry["why"].split())
-    return found
+    return [Reason(**(entry | {"why": " ".join(entry["why"].split())})) for entry in entries]
 
 
-def faults(fates: dict[str, str], known: dict[str, str]) -> list[str]:
+def faults(fates: dict[str, str], known: list[Reason]) -> list[str]:
     """What is missed without a reason, and reasons that are not needed."""
-    lines = [f"not caught: {name}" for name, fate in fates.items() if fate == MISSED and name not in known]
-    for name in known:
-        if name not in fates:
-            lines.append(f"no such change: {name}")
-        elif fates[name] != MISSED:
-            lines.append(f"caught, {fates[name]}: {name}")
+    missed = [name for name, fate in fates.items() if fate == MISSED]
+    lines = [f"not caught: {name}" for name in missed if not any(reason.matches(name) for reason in known)]
+    for reason in known:
+        for name in reason.mutants:
+            if name not in fates:
+                lines.append(f"no such change: {name}")
+            elif fates[name] != MISSED:
+                lines.append(f"caught, {fates[name]}: {name}")
+        lines += [
+            f"no change that is not caught is like: {pattern}"
+            for pattern in reason.like
+            if not any(re.fullmatch(pattern, name) for name in missed)
+        ]
     return lines
 
 
-def as_markdown(fates: dict[str, str], known: dict[str, str], vectors: int) -> str:
+def as_markdown(fates: dict[str, str], known: list[Reason], vectors: int) -> str:
     how = Counter("not caught" if fate == MISSED else fate.split(" of ")[0].split(" in ")[0] for fate in fates.values())
     caught = len(fates) - how["not caught"]
     lines = [
         "# Changes of the reference decoder",
         "",
-        f"Written by `python -m spec.mutants`, with {vectors} vectors. What is not caught cannot be, for reasons that",
-        "stand in `mutants.toml`.",
+        f"Written by `python -m spec.mutants`, with {vectors} vectors. For what is not caught the reasons, of `mutants.toml`,",
+        "follow.",
         "",
         "| what becomes of a change | changes |",
         "|---|---:|",
@@ -876,7 +907,7 @@ def as_markdown(fates: dict[str, str], known: dict[str, str], vectors: int) -> s
     by_reason: dict[str, list[str]] = defaultdict(list)
     for name, fate in fates.items():
         if fate == MISSED:
-            by_reason[known.get(name, "No reason yet.")].append(name)
+            by_reason[next((reason.why for reason in known if reason.matches(name)), "No reason yet.")].append(name)
     for why, names in by_reason.items():
         lines += ["", f"## {why}", "", *(f"- `{name}`" for name in names)]
     return "\n".join(lines) + "\n"

@@ -3,6 +3,7 @@ tell. Here a few of them, the reasons of those that cannot be caught, and the ve
 
 from __future__ import annotations
 
+import re
 import sys
 from pathlib import Path
 
@@ -65,14 +66,22 @@ def test_a_vector_tells_a_changed_decoder_from_the_true_one(name, changes, decod
 def test_every_reason_is_of_a_change_that_there_is(changes):
     names = [mutant.name for mutant in changes.mutants]
     assert len(set(names)) == len(names)
-    assert set(mutants.reasons()) <= set(names)
-    assert all(len(why) > 20 for why in mutants.reasons().values())
+    for reason in mutants.reasons():
+        assert set(reason.mutants) <= set(names) and len(reason.why) > 20
+        assert all(any(re.fullmatch(pattern, name) for name in names) for pattern in reason.like)
 
 
 def test_changes_without_a_reason_and_reasons_without_need_are_faults():
-    fates = {"a": mutants.MISSED, "b": mutants.MISSED, "c": "result of valid/x.ath"}
-    found = mutants.faults(fates, {"a": "cannot be", "c": "cannot be", "d": "cannot be"})
-    assert [line.split(":")[0] for line in found] == ["not caught", "caught, result of valid/x.ath", "no such change"]
+    fates = {"a": mutants.MISSED, "b": mutants.MISSED, "c": "result of valid/x.ath", "e1": mutants.MISSED}
+    known = [mutants.Reason("cannot be", ["a", "c", "d"]), mutants.Reason("never", like=[r"e\d", "f."])]
+    found = mutants.faults(fates, known)
+    assert [line.split(":")[0] for line in found] == [
+        "not caught",
+        "caught, result of valid/x.ath",
+        "no such change",
+        "no change that is not caught is like",
+    ]
+    assert "not caught: b" in found
 
 
 def test_vectors_of_real_size_use_the_features_of_the_format_together():
