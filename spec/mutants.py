@@ -893,8 +893,8 @@ def as_markdown(fates: dict[str, str], known: list[Reason], vectors: int) -> str
     lines = [
         "# Changes of the reference decoder",
         "",
-        f"Written by `python -m spec.mutants`, with {vectors} vectors. For what is not caught the reasons, of `mutants.toml`,",
-        "follow.",
+        f"Written by `python -m spec.mutants`, with {vectors} vectors; for what is not caught the reasons follow, which",
+        "stand in `mutants.toml`.",
         "",
         "| what becomes of a change | changes |",
         "|---|---:|",
