@@ -893,7 +893,7 @@ def as_markdown(fates: dict[str, str], known: list[Reason], vectors: int) -> str
     lines = [
         "# Changes of the reference decoder",
         "",
-        f"Written by `python -m spec.mutants`, with {vectors} vectors; for what is not caught the reasons follow, which",
+        f"Written by `python -m spec.mutants`, with {vectors} vectors; the reasons for what is not caught",
         "stand in `mutants.toml`.",
         "",
         "| what becomes of a change | changes |",
