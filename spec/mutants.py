@@ -48,7 +48,7 @@ from spec.effects import Effects
 HERE = Path(__file__).resolve().parent
 DECODER = HERE / "reference_decoder.py"
 REASONS, REPORT = HERE / "mutants.toml", HERE / "mutants.md"
-CACHE = HERE.parent / "build" / "mutants.pickle"
+CACHES = [HERE.parent / "build" / f"mutants{part}.pickle" for part in ("", "_effects")]
 LEFT_OUT = {"main", "show", "mesh_in", "Chunk.__str__", "KINDS", "AthError.__init__"}  # of no effect on results
 LONGEST_NAME = 72
 FIRST_SECONDS = 1.0  # of vectors that all changes are tried with before any is with more
@@ -596,16 +596,19 @@ class Cache:
     @staticmethod
     def of(source: str) -> Cache:
         own = hashlib.sha256(source.encode()).hexdigest()
-        if CACHE.exists():
-            kept = pickle.loads(CACHE.read_bytes())
-            if kept.source == own:
-                return Cache(**vars(kept))  # an older one has fewer members
-        return Cache(own)
+        kept = {
+            name: value for path in CACHES if path.exists() for name, value in pickle.loads(path.read_bytes()).items()
+        }
+        return Cache(**kept) if kept.get("source") == own else Cache(own)
 
-    def keep(self) -> None:
-        CACHE.parent.mkdir(exist_ok=True)
-        CACHE.with_suffix(".new").write_bytes(pickle.dumps(self))
-        CACHE.with_suffix(".new").replace(CACHE)
+    def keep(self, effects: bool = False) -> None:
+        """What changes all the time, or the rest."""
+        names = "compared", "without"
+        kept = {name: value for name, value in vars(self).items() if (name in names) == effects}
+        path = CACHES[effects]
+        path.parent.mkdir(exist_ok=True)
+        path.with_suffix(".new").write_bytes(pickle.dumps(kept))
+        path.with_suffix(".new").replace(path)
 
 
 class Marked(ast.NodeTransformer):
@@ -687,7 +690,7 @@ def find_effects(changes: Changes, vectors: list[Known], cache: Cache, mutants: 
             for vector in running.pop(process):
                 cache.compared[vector.name] = set(effects.names)
                 cache.without[vector.name] = effects.names - found.get(vector.name, effects.names)
-    cache.keep()
+    cache.keep(effects=True)
 
 
 def batches(vectors: list[Known], seconds: float) -> list[list[Known]]:
