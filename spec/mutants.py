@@ -32,7 +32,7 @@ import time
 import tomllib
 import types
 from collections import Counter, defaultdict
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
@@ -590,8 +590,9 @@ class Cache:
     floats: set[int] = field(default_factory=set)  # numbers of expressions
     fates: dict[str, str] = field(default_factory=dict)  # of changes
     passed: dict[str, set[str]] = field(default_factory=dict)  # of changes: vectors that have not caught them
-    without: dict[str, set[str]] = field(default_factory=dict)  # of vectors: changes that make no difference in them
-    compared: dict[str, set[str]] = field(default_factory=dict)  # of vectors: changes that were looked at for that
+    bits: dict[str, int] = field(default_factory=dict)  # of changes, in the numbers below
+    compared: dict[str, int] = field(default_factory=dict)  # of vectors: changes whose effects are known
+    without: dict[str, int] = field(default_factory=dict)  # of vectors: those that make no difference in them
 
     @staticmethod
     def of(source: str) -> Cache:
@@ -603,12 +604,19 @@ class Cache:
 
     def keep(self, effects: bool = False) -> None:
         """What changes all the time, or the rest."""
-        names = "compared", "without"
+        names = "bits", "compared", "without"
         kept = {name: value for name, value in vars(self).items() if (name in names) == effects}
         path = CACHES[effects]
         path.parent.mkdir(exist_ok=True)
         path.with_suffix(".new").write_bytes(pickle.dumps(kept))
         path.with_suffix(".new").replace(path)
+
+    def mask(self, names: Iterable[str]) -> int:
+        return sum(1 << self.bits.setdefault(name, len(self.bits)) for name in names)
+
+    def is_without_effect(self, mutant: Mutant, vector: Known) -> bool:
+        bit = self.bits.get(mutant.name)
+        return bit is not None and self.without.get(vector.name, 0) >> bit & 1 == 1
 
 
 class Marked(ast.NodeTransformer):
@@ -677,8 +685,8 @@ def find_effects(changes: Changes, vectors: list[Known], cache: Cache, mutants: 
     """Notes in which vectors a change makes no difference where it stands: they cannot catch it."""
     left = [mutant for mutant in mutants if cache.fates.get(mutant.name, MISSED) == MISSED]
     effects = Effects(changes.tree, left, parent_of)
-    decoder, running = Decoder(effects.tree), dict[int, list[Known]]()
-    waiting = batches([each for each in vectors if effects.names - cache.compared.get(each.name, set())], FIRST_SECONDS)
+    decoder, running, every = Decoder(effects.tree), dict[int, list[Known]](), cache.mask(effects.names)
+    waiting = batches([each for each in vectors if every & ~cache.compared.get(each.name, 0)], FIRST_SECONDS)
     with tempfile.TemporaryDirectory() as folder:
         while waiting or running:
             while waiting and len(running) < jobs:
@@ -688,8 +696,8 @@ def find_effects(changes: Changes, vectors: list[Known], cache: Cache, mutants: 
             path = Path(folder) / str(process)
             found = dict(unpickled(path.read_bytes())) if path.exists() else {}
             for vector in running.pop(process):
-                cache.compared[vector.name] = set(effects.names)
-                cache.without[vector.name] = effects.names - found.get(vector.name, effects.names)
+                cache.compared[vector.name] = every
+                cache.without[vector.name] = every & ~cache.mask(found.get(vector.name, effects.names))
     cache.keep(effects=True)
 
 
@@ -801,7 +809,7 @@ class Run:
         for vector in [self.by_name[name] for name in first] + self.vectors:
             if vector.name in passed or (mutant.statements and not mutant.statements & vector.statements):
                 continue
-            if mutant.name in self.cache.without.get(vector.name, ()):
+            if self.cache.is_without_effect(mutant, vector):
                 continue
             yield vector
             seconds -= vector.seconds
