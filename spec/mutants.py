@@ -51,8 +51,8 @@ REASONS, REPORT = HERE / "mutants.toml", HERE / "mutants.md"
 CACHES = [HERE.parent / "build" / f"mutants{part}.pickle" for part in ("", "_effects")]
 LEFT_OUT = {"main", "show", "mesh_in", "Chunk.__str__", "KINDS", "AthError.__init__"}  # of no effect on results
 LONGEST_NAME = 72
-FIRST_SECONDS = 1.0  # of vectors that all changes are tried with before any is with more
-TOGETHER = 40  # changes that a process tries
+TOGETHER = 1.0  # seconds of vectors that a process watches
+ROUNDS = (0.3, 40), (4.0, 10), (math.inf, 1)  # seconds of vectors that a change is tried with; changes of a process
 LARGEST = 14_000  # bytes of a vector that is tried: those of real size take too long
 SLOWER = 30.0  # times, of a decoder that is watched
 SECONDS, TIMES_AS_LONG = 0.5, 10.0  # of the processor, for a vector; and how many times what the decoder takes
@@ -686,7 +686,7 @@ def find_effects(changes: Changes, vectors: list[Known], cache: Cache, mutants: 
     left = [mutant for mutant in mutants if cache.fates.get(mutant.name, MISSED) == MISSED]
     effects = Effects(changes.tree, left, parent_of)
     decoder, running, every = Decoder(effects.tree), dict[int, list[Known]](), cache.mask(effects.names)
-    waiting = batches([each for each in vectors if every & ~cache.compared.get(each.name, 0)], FIRST_SECONDS)
+    waiting = batches([each for each in vectors if every & ~cache.compared.get(each.name, 0)], TOGETHER)
     with tempfile.TemporaryDirectory() as folder:
         while waiting or running:
             while waiting and len(running) < jobs:
@@ -762,9 +762,10 @@ class Run:
         self.mutants, self.folder = mutants, folder
         known = self.cache.fates
         self.fates = {mutant.name: known[mutant.name] for mutant in mutants if known.get(mutant.name, MISSED) != MISSED}
-        rounds = [(FIRST_SECONDS, TOGETHER), (math.inf, 1)]
-        for seconds, count in rounds[: 1 if quick else 2]:
+        for seconds, count in ROUNDS[: 1 if quick else None]:
             left = [i for i, mutant in enumerate(mutants) if self.fates.get(mutant.name, MISSED) == MISSED]
+            if seconds == ROUNDS[0][0]:
+                left = [i for i in left if mutants[i].name not in self.cache.passed]
             self._round([left[i : i + count] for i in range(0, len(left), count)], seconds)
         return self.fates
 
