@@ -272,6 +272,7 @@ OPERATORS: dict[type, list[type]] = {
     ast.Is: [ast.IsNot],
     ast.IsNot: [ast.Is],
 }
+SYMMETRIC = "times", "distances"  # functions of two arguments in any order
 SWAPPED = (ast.Sub, ast.Div, ast.FloorDiv, ast.Mod, ast.LShift, ast.RShift)
 NEGATED = {ast.Lt: ast.GtE, ast.LtE: ast.Gt, ast.Gt: ast.LtE, ast.GtE: ast.Lt}
 
@@ -312,8 +313,8 @@ def constants(node: ast.Constant) -> Iterator[Any]:
     elif isinstance(value, int):
         if is_probability(node):
             yield from (ast.Constant(value + value // 16), ast.Constant(value - value // 16))
-        else:
-            yield from (ast.Constant(value + 1), ast.Constant(value - 1))
+        elif not is_length_left_open(node):
+            yield from (ast.Constant(value + 1), ast.Constant(value - 1))[1 if is_allocated(node) else 0 :]
     elif isinstance(value, float):
         yield from (ast.Constant(value * 1.0625), ast.Constant(value * 0.9375)) if value else [ast.Constant(1.0)]
         if len(repr(value)) > 9:
@@ -333,6 +334,21 @@ def is_probability(node: ast.AST) -> bool:
             return True
         node = parent_of(node)
     return False
+
+
+def is_length_left_open(node: ast.AST) -> bool:
+    """The 1 of -1 where NumPy finds a length out: any negative number does."""
+    call = parent_of(parent_of(node))
+    return isinstance(call, ast.Call) and isinstance(call.func, ast.Attribute) and call.func.attr == "reshape"
+
+
+def is_allocated(node: ast.AST) -> bool:
+    """Whether it is how many there are of something, of which one more would not be used."""
+    up = parent_of(node)
+    if isinstance(up, ast.BinOp) and isinstance(up.op, ast.Mult):
+        return isinstance(up.left, ast.List)
+    above = parent_of(up)
+    return isinstance(above, ast.comprehension) and isinstance(above.target, ast.Name) and above.target.id == "_"
 
 
 def binary(node: ast.BinOp) -> Iterator[Any]:
@@ -436,7 +452,7 @@ def called(node: ast.Call) -> Iterator[Any]:
             yield ast.Call(node.func, [*args[:-1], ast.BinOp(args[-1], change, ast.Constant(1))], [])
     if name == "reversed":
         yield args[0]
-    if name in ("require", "AthError", "range", "min", "max", "isinstance", "print"):
+    if name in ("require", "AthError", "range", "min", "max", "isinstance", "print", *SYMMETRIC):
         return
     for i in range(len(args) - 1):
         if not isinstance(args[i], ast.Starred) and not isinstance(args[i + 1], ast.Starred):
