@@ -6,9 +6,10 @@
 
 A change is one that the author of a decoder could make: another constant, operator, comparison or order of operations,
 a condition that is always true or never, a limit, a call or a statement that is missing, arguments that are swapped.
-It is caught if a vector whose decoding comes by the place has another result than expected.txt says, or the changed
-decoder stops with an exception that is none of its errors, or does not stop at all. What no vector can catch is in
-spec/mutants.toml with the reason. The exit status is 1 if something else is not caught, or a reason is not needed.
+It is caught if a vector has another result than expected.txt says, or the changed decoder stops with an exception that
+is none of its errors, or does not stop at all. It is tried with vectors whose decoding comes by the place and, of an
+expression, has another value there (effects.py), the fastest ones first, up to some seconds. What no vector can catch
+is in spec/mutants.toml with the reason. The exit status is 1 if something else is not caught, or a reason is not needed.
 """
 
 from __future__ import annotations
@@ -52,7 +53,7 @@ CACHES = [HERE.parent / "build" / f"mutants{part}.pickle" for part in ("", "_eff
 LEFT_OUT = {"main", "show", "mesh_in", "Chunk.__str__", "KINDS", "AthError.__init__"}  # of no effect on results
 LONGEST_NAME = 72
 TOGETHER = 1.0  # seconds of vectors that a process watches
-ROUNDS = (0.3, 40), (4.0, 10), (math.inf, 1)  # seconds of vectors that a change is tried with; changes of a process
+FIRST_SECONDS, MOST_SECONDS = 0.3, 2.0  # of vectors that all changes are tried with first; and those that are left
 LARGEST = 14_000  # bytes of a vector that is tried: those of real size take too long
 SLOWER = 30.0  # times, of a decoder that is watched
 SECONDS, TIMES_AS_LONG = 0.5, 10.0  # of the processor, for a vector; and how many times what the decoder takes
@@ -773,14 +774,14 @@ class Run:
         self.mutants: list[Mutant] = []
         self.fates: dict[str, str] = {}
 
-    def all(self, mutants: list[Mutant], folder: Path, quick: bool) -> dict[str, str]:
+    def all(self, mutants: list[Mutant], folder: Path, quick: bool, most: float) -> dict[str, str]:
         """First with the fastest vectors, then those that they miss with the others."""
         self.mutants, self.folder = mutants, folder
         known = self.cache.fates
         self.fates = {mutant.name: known[mutant.name] for mutant in mutants if known.get(mutant.name, MISSED) != MISSED}
-        for seconds, count in ROUNDS[: 1 if quick else None]:
+        for seconds, count in [(FIRST_SECONDS, 40), (most, 10)][: 1 if quick else None]:
             left = [i for i, mutant in enumerate(mutants) if self.fates.get(mutant.name, MISSED) == MISSED]
-            if seconds == ROUNDS[0][0]:
+            if seconds == FIRST_SECONDS:
                 left = [i for i in left if mutants[i].name not in self.cache.passed]
             self._round([left[i : i + count] for i in range(0, len(left), count)], seconds)
         return self.fates
@@ -824,11 +825,12 @@ class Run:
         """First those that caught others in the same function; the fastest ones first."""
         first, passed = self.lately[mutant.function][:8], self.cache.passed.get(mutant.name, set())
         for vector in [self.by_name[name] for name in first] + self.vectors:
-            if vector.name in passed or (mutant.statements and not mutant.statements & vector.statements):
+            if mutant.statements and not mutant.statements & vector.statements:
                 continue
             if self.cache.is_without_effect(mutant, vector):
                 continue
-            yield vector
+            if vector.name not in passed:
+                yield vector
             seconds -= vector.seconds
             if seconds < 0.0:
                 break
@@ -915,14 +917,15 @@ def faults(fates: dict[str, str], known: list[Reason]) -> list[str]:
     return lines
 
 
-def as_markdown(fates: dict[str, str], known: list[Reason], vectors: int) -> str:
+def as_markdown(fates: dict[str, str], known: list[Reason], vectors: int, seconds: float) -> str:
     how = Counter("not caught" if fate == MISSED else fate.split(" of ")[0].split(" in ")[0] for fate in fates.values())
     caught = len(fates) - how["not caught"]
     lines = [
         "# Changes of the reference decoder",
         "",
-        f"Written by `python -m spec.mutants`, with {vectors} vectors; the reasons for what is not caught",
-        "stand in `mutants.toml`.",
+        f"Written by `python -m spec.mutants`. Each change was tried with those of {vectors} vectors in which it makes",
+        f"a difference where it stands, the fastest ones first, up to {seconds:g} s of decoding. Why some are not caught",
+        "is said in `mutants.toml`.",
         "",
         "| what becomes of a change | changes |",
         "|---|---:|",
@@ -947,6 +950,12 @@ def main(words: list[str] | None = None) -> int:
     parser.add_argument("--list", nargs="?", const="*", metavar="GLOB", help="print the names of changes")
     parser.add_argument("--anew", action="store_true", help="do without what earlier runs have found out")
     parser.add_argument("--quick", action="store_true", help="only with the fastest vectors; writes no report")
+    parser.add_argument(
+        "--seconds",
+        type=float,
+        default=MOST_SECONDS,
+        help="of vectors that a change is tried with (default: %(default)s)",
+    )
     parser.add_argument("--jobs", type=int, default=2)
     options = parser.parse_args(words)
     source = DECODER.read_text("utf-8")
@@ -965,13 +974,13 @@ def main(words: list[str] | None = None) -> int:
     gc.freeze()  # pages that all processes share
     find_effects(changes, vectors, cache, mutants, options.jobs)
     with tempfile.TemporaryDirectory() as folder:
-        fates = Run(changes, vectors, cache, options.jobs).all(mutants, Path(folder), options.quick)
+        fates = Run(changes, vectors, cache, options.jobs).all(mutants, Path(folder), options.quick, options.seconds)
     if options.only or options.quick:
         missed = [name for name, fate in fates.items() if fate == MISSED]
         print(*missed, f"{len(fates)} changes, {len(missed)} not caught", sep="\n")
         return 0
     known = reasons()
-    REPORT.write_text(as_markdown(fates, known, len(vectors)), "utf-8")
+    REPORT.write_text(as_markdown(fates, known, len(vectors), options.seconds), "utf-8")
     wrong = faults(fates, known)
     print(*wrong, f"{len(fates)} changes, {len(wrong)} faults, {time.monotonic() - begun:.0f} s", sep="\n")
     return 1 if wrong else 0
