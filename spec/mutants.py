@@ -9,7 +9,7 @@ a condition that is always true or never, a limit, a call or a statement that is
 It is caught if a vector has another result than expected.txt says, or the changed decoder stops with an exception that
 is none of its errors, or does not stop at all. It is tried with vectors whose decoding comes by the place and, of an
 expression, has another value there (effects.py), the fastest ones first, up to some seconds. What no vector can catch
-is in spec/mutants.toml with the reason. The exit status is 1 if something else is not caught, or a reason is not needed.
+is in spec/mutants.toml, with reasons. The exit status is 1 if something else is not caught, or a reason is not needed.
 """
 
 from __future__ import annotations
@@ -924,8 +924,8 @@ def as_markdown(fates: dict[str, str], known: list[Reason], vectors: int, second
         "# Changes of the reference decoder",
         "",
         f"Written by `python -m spec.mutants`. Each change was tried with those of {vectors} vectors in which it makes",
-        f"a difference where it stands, the fastest ones first, up to {seconds:g} s of decoding. Why some are not caught",
-        "is said in `mutants.toml`.",
+        f"a difference where it stands, the fastest ones first, up to {seconds:g} s of decoding. Why some are not",
+        "caught is said in `mutants.toml`.",
         "",
         "| what becomes of a change | changes |",
         "|---|---:|",
