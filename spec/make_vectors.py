@@ -4462,6 +4462,83 @@ invalid(
 )
 
 
+# ---- what no encoder writes, and decoders may take for granted ------------------------------------------------
+
+valid(
+    "faces-of-8-bytes",
+    "vertices and numbers of corners in 8 bytes: behind their largest one is none of 64 bits",
+    lambda: with_static(
+        (rd.FACES, mixed_polygons([[0, 1, 2], [3, 2, 1, 0], [4]], types=("<u8", ">u8"))),
+        (rd.EDGES, polygons(np.array([[0, 1], [4, 3]], ">u8"))),
+    ),
+)
+valid(
+    "faces-of-8-bytes-absolute",
+    "the same by their numbers, and with signs; edges that the hierarchy implies",
+    lambda: with_static(
+        (rd.FACES, mixed_polygons([[0, 1, 2], [3, 2, 1, 0], [4]], types=(">u8", "<i8"), absolute=True)),
+        (rd.EDGES, derived(">u8")),
+    ),
+)
+static(
+    "faces-of-8-bytes-beyond",
+    "vertex 2^30 - 1 by its number, in 8 bytes",
+    faces(polygons(np.array([[0, 1, (1 << 30) - 1]], "<u8"), absolute=True)),
+)
+static(
+    "faces-of-8-bytes-negative",
+    "vertex -1 in 8 bytes without a sign",
+    faces(polygons(np.array([[0, 1, -1]], "<i8")).replace(b"\x07", b"\x03", 1)),
+)
+static(
+    "faces-of-8-bytes-count",
+    "a face of 2^30 - 1 corners, a number of 8 bytes",
+    faces(
+        polygon_head("<u8", 1, 3, ">u8")
+        + write(rd.decode_polygons, [(1 << 30) - 1], rd.PolygonShape(3, 11, False, False, 1, 0, 3), 5)
+    ),
+)
+static("edges-of-8-bytes-beyond", "an edge to vertex 5 of 5", edges(polygons(np.array([[0, 5]], ">u8"))))
+
+
+def with_source(draft: Draft, seed: int) -> Draft:
+    """A last level that is up to 2^22 numbers away from the one before it."""
+    file, level, chance = rd.AthFile(draft.file()), draft.header["level_count"], Chance(seed, large=22)
+
+    def stream(s: int) -> bytes:
+        positions = file._segment(s, level - 1)
+        differences = [chance.answer("signed", 0) for _ in range(positions.size)]
+        return write(rd.decode_exact, [(abs(n), n < 0) for n in differences], positions)
+
+    added = [Entry(rd.EXACT, stream(s), level, s) for s in range(draft.header["segment_count"])]
+    joins_there = draft.joins and (*draft.joins, *joins(*(0,) * len(added)))
+    return replace(draft, joins=joins_there).with_header(level_count=level + 1, full_level_count=level + 1).add(*added)
+
+
+SOURCE_FRAMES = [  # with copies, of the frame before, of earlier ones and of the rest pose
+    [0, 1, *frame_steps(ROOTED, 150)],
+    [1, 1],
+    [0, 0, 1, *frame_steps(ROOTED, 151)],
+    [1, 0, 3],
+    [0, 1, *frame_steps(ROOTED, 152)],
+    [1, 0, 1],
+]
+for name_, more_ in (("", {}), ("-wide", {"is_float64": True, "origin": (3.0, -1e3, 0.1)})):
+    valid(
+        f"predicted-lossless-repeats{name_}",
+        "the source's own numbers, which differ where predicted motion has copies, of frames that are shown for long; "
+        "level 0 is joined",
+        lambda more_=more_: with_source(
+            replace(
+                predicted(ROOTED, SOURCE_FRAMES, 2, scripts={(rd.AFFINES, 0): lambda: Chance(153, large=4)}, **more_),
+                frames=20,
+                repeats=(0, 1, 0, 0, 1, 1, 0, 0, 0, 1) + (0, 0, 0, 1, 0, 0, 1, 0, 1, 1),
+                joins=joins(0, 2.5, 0, 0),
+            ).draft(),
+            154,
+        ),
+    )
+
 # ---- valid: of real size -------------------------------------------------------------------------------------
 
 for name_, what_ in (
