@@ -4682,6 +4682,72 @@ invalid(
 )
 
 
+def meshed(stems: list[Stem], faces: list[list[int]], script: list | Chance, **fields) -> Plant:
+    """An adaptive rest pose by faces, of any sizes."""
+    count, step = sum(stem.count for stem in stems), 0.3
+    content = mixed_polygons(faces, count)
+    shape, stream = rd.parse_polygons(content, rd.FACES, rd.Limits())
+    mesh = rd.build_mesh(*rd.decode_polygons(stream, shape, count), list(range(count)))
+    coded = write(rd.decode_rest, script, branches_of(stems), step, None, True, mesh)
+    bits = rd.REST_ADAPTIVE | rd.REST_CONNECTED
+    return with_rest(stems, rest_chunk(coded, step=step, rest_type=1, reserved=bits >> 2), faces=content, **fields)
+
+
+def hub(first: int, quads: int, edges: int) -> list[list[int]]:
+    """Faces whose last vertex completes so many parallelograms at once, and has so many neighbours more."""
+    chain = list(range(first, first + 2 * quads + edges))
+    middle, across = len(chain) + first + 1, len(chain) + first
+    faces = [[middle, chain[2 * i], across, chain[2 * i + 1]] for i in range(quads)]
+    faces += [[middle, v] for v in chain[2 * quads :]]
+    return faces + [[v, v + 1] for v in chain[:-1]] + ([] if quads else [[chain[-1], across]])
+
+
+def hubs() -> list[list[int]]:
+    first, faces = 0, []
+    for quads, edges in ((1, 0), (2, 0), (2, 2), (3, 0), (3, 2), (4, 0), (5, 0), (6, 1), (7, 0), *((0, n) for n in range(1, 11)), (1, 7)):
+        for _ in range(2):
+            faces += hub(first, quads, edges)
+            first += 2 * quads + edges + 2
+    return faces
+
+
+def crowd(seed: int) -> list[list[int]]:
+    """Triangles and quadrangles by chance that share many sides, and corners."""
+    random = np.random.default_rng(seed)
+    faces = [random.integers(0, 16, 3 + (i % 5 == 4)).tolist() for i in range(31)]
+    return [*faces, [0, 1, 2], [2, 1, 3], [1, 2, 4], [2, 1, 5], [1, 2, 6], [14, 15, 16], [16, 15, 13]]
+
+
+LEAVES = [  # on a stem: of four vertices that are shapes or copies, finer ones, and some that others reach into
+    Stem(-1, 4),
+    *(Stem(0, 4, i % 4, detail=(0, 0, 0, 0, 110, 110, 0, 1, 0, 0)[i]) for i in range(10)),
+]
+
+
+def leaves() -> list[list[int]]:
+    """A triangle or quadrangle of each but for the last, whose first vertex is alone, and faces of several."""
+    faces = [[v, v + 1, v + 2, v + 3] if v % 8 else [v, v + 1, v + 2] for v in range(4, 40, 4)]
+    return [*faces, [41, 42, 43], [4, 6, 7], [15, 12, 20], [20, 15, 21], [24, 26, 27], [33, 37, 38], [0, 1], [39, 38, 41, 43]]
+
+
+HUBS = [Stem(-1, 1 + max(map(max, hubs())), lag=1)]
+valid(
+    "rest-connected-hubs",
+    "vertices that complete up to seven parallelograms, or have up to ten neighbours, and no other way",
+    lambda: meshed(HUBS, hubs(), Chance(210, large=5)),
+)
+valid(
+    "rest-connected-leaves",
+    "by faces shapes, copies, branches that others have begun, and steps of branches of their own",
+    lambda: meshed(LEAVES, leaves(), Chance(236, large=3)),
+)
+valid(
+    "rest-connected-crowd",
+    "triangles and quadrangles of the same sides, and of the same vertex twice",
+    lambda: meshed([Stem(-1, 17)], crowd(211), Chance(212, large=5)),
+)
+
+
 # ---- valid: of real size -------------------------------------------------------------------------------------
 
 for name_, what_ in (
