@@ -4748,6 +4748,42 @@ valid(
 )
 
 
+def cells(seed: int) -> list[list[float]]:
+    """Places of vertices, each of them of two that are less or more than half a cell apart, or beyond all cells."""
+    random, cell = np.random.default_rng(seed), 0.0625 / 256
+    first = random.integers(-3000, 3000, (32, 3))
+    first[29:] *= 10**6
+    second = first + random.choice([-0.7, -0.4, 0.0, 0.0, 0.4], (32, 1)) * random.integers(0, 2, (32, 3))
+    return (cell * np.vstack([first, second])[np.argsort(random.random(64))]).tolist()
+
+
+PAIR, POINTS = [Stem(-1, 2, flags=WHOLE)], [Stem(-1, 1)] * 64
+valid(
+    "predicted-long",
+    "more frames than means are of, and more than vertices are of any line",
+    lambda: predicted(PAIR, swayed(90, 213, PAIR, large=5, still=0.1)),
+)
+valid(
+    "predicted-cells",
+    "vertices that follow others at the same places, unless the entry of their cell has been taken",
+    lambda: predicted(
+        POINTS,
+        swayed(3, 310, POINTS, large=6, still=0.2),
+        rest=exact_rest(POINTS, np.array(cells(223)).ravel().tolist(), True),
+        is_float64=True,
+    ),
+)
+valid(
+    "predicted-copied-rest",
+    "a copy of the rest pose, rounded as it is shown, which others are coded about",
+    lambda: predicted(
+        ROOTED,
+        [[1, 1], *swayed(2, 315), [1, 0, 3], *swayed(2, 317)],
+        origin=(1e6, -3e5, 0.125),
+    ),
+)
+
+
 # ---- valid: of real size -------------------------------------------------------------------------------------
 
 for name_, what_ in (
