@@ -4761,7 +4761,7 @@ PAIR, POINTS = [Stem(-1, 2, flags=WHOLE)], [Stem(-1, 1)] * 64
 valid(
     "predicted-long",
     "more frames than means are of, and more than vertices are of any line",
-    lambda: predicted(PAIR, swayed(90, 213, PAIR, large=5, still=0.1)),
+    lambda: predicted(PAIR, swayed(200, 213, PAIR, large=5, still=0.1)),
 )
 valid(
     "predicted-cells",
@@ -4773,13 +4773,51 @@ valid(
         is_float64=True,
     ),
 )
+LEAVING = [  # both ends of a stem, and those between them: a root that leaves binary32, and others that follow it
+    *([0, 1, 1, 20, 0, 1, 1, move, 1, 0, 0, 0, 0] for move in (20, 1, 0, 0, -1, 0, 0)),
+    *([0, 1, 1, 60, 3, 0, 1, 0, 1, move, 1] for move in (2, 0, 0, 1)),
+    *([0, 0, distance, 0, 1, 0, move, 0, 1] for distance, move in ((8, 1), (0, 2))),
+]
+valid(
+    "predicted-beyond",
+    "a root that leaves binary32, as what is expected of others then does: that they stay, and what follows ends does, too",
+    lambda: predicted([Stem(-1, 4, flags=WHOLE)], LEAVING, predicted=predicted_head(1e36)),
+)
+def turns(seed: int) -> list:
+    """Frames of two vertices that move far, about late and about early ones."""
+    random = np.random.default_rng(seed)
+    return [
+        [0, 0, int(random.integers(0, min(t + 1, 6)) * (t % 3 == 2)), *frame_steps(PAIR, seed + t, large=9, still=0.2)]
+        for t in range(24)
+    ]
+
+
+valid(
+    "predicted-turns",
+    "lines that begin anew in frames that are coded about earlier ones",
+    lambda: predicted(PAIR, turns(330)),
+)
+valid(
+    "predicted-about-copies",
+    "frames that are coded about copies, about copies of copies, and about frames that were coded about these",
+    lambda: predicted(
+        ROOTED,
+        [
+            *swayed(2, 320, still=0.1),
+            *([1, 1], *swayed(1, 322, still=0.1), [1, 1], [1, 1], *swayed(2, 323, still=0.1)),
+            *([0, 0, 3, *frame_steps(ROOTED, 325, still=0.1)], [0, 0, 0, *frame_steps(ROOTED, 326, still=0.1)]),
+            *([1, 0, 6], [0, 0, 0, *frame_steps(ROOTED, 327, still=0.1)], *swayed(2, 328, still=0.1)),
+        ],
+    ),
+)
 valid(
     "predicted-copied-rest",
     "a copy of the rest pose, rounded as it is shown, which others are coded about",
     lambda: predicted(
         ROOTED,
-        [[1, 1], *swayed(2, 315), [1, 0, 3], *swayed(2, 317)],
+        [[1, 1], *swayed(2, 315, still=0.1), [1, 0, 3], *swayed(2, 317, still=0.1)],
         origin=(1e6, -3e5, 0.125),
+        step=0.01,
     ),
 )
 
