@@ -4822,6 +4822,75 @@ valid(
 )
 
 
+class Turns(Chance):
+    """Two frequencies of each row, as large as it takes to turn by up to 360 degrees and back."""
+
+    def answer(self, asked: str, most: int):
+        if asked == "count":
+            return min(2, most)
+        return int(self.random.integers(-130, 131)) if asked == "signed" else super().answer(asked, most)
+
+
+STIFF = [  # in one, two or three layers, with others on them
+    Stem(-1, 4, rigid=1),
+    Stem(0, 3, 2, rigid=2),
+    Stem(1, 2, 1, LOOSE, rigid=3),
+    Stem(2, 3, 0, rigid=3),
+    Stem(0, 3, 1, SHEET, rigid=1),
+    Stem(4, 2, 0, rigid=2),
+    Stem(-1, 3, rigid=2),
+]
+
+
+def stiff(seed: int, **fields) -> Plant:
+    """STIFF in three layers, of which the first has rotations of any size."""
+    plant = refinements(STIFF, seed, large=5, is_float64=True, **fields)
+    plant.scripts |= {(rd.STEMS, level): lambda level=level: Turns(seed + level) for level in range(5)}
+    return plant
+
+
+valid(
+    "layers-rigid-turned",
+    "branches that move as they are, turned by up to 360 degrees, which the next layers go on from",
+    lambda: stiff(
+        217, frames=12, heads={level: stems_head(((8.0,) * 5 + (2.0, 0.5))[level], 3 << 4 | 1) for level in range(7)}
+    ),
+)
+LAST_BASIS = 10, 2, basis_stream([[300, -200], [77, 511]], 10)
+valid(
+    "layers-rigid-ratios",
+    "the step of a rotation is over 65535 times that of the next layer, and that less than the one of the last",
+    lambda: stiff(
+        218,
+        frames=4,
+        segments=2,
+        heads={
+            **{level: stems_head(64.0, 4) for level in range(5)},
+            5: stems_head(1e-4, 1, *LAST_BASIS),
+            6: stems_head(1e-4, 4),
+        },
+    ),
+)
+
+
+HALF_TURNS = (16, 0, 0), (0, 16, 0), (0, 0, 16), (16, 0, 1), (0, -16, 3)
+valid(
+    "layers-rigid-half-turns",
+    "a branch that moves as it is, turned by 180 degrees about each of its axes: whose quaternions begin with 0",
+    lambda: Plant(
+        [Stem(-1, 4, rigid=1)],
+        frames=5,
+        segments=5,
+        layers=2,
+        is_float64=True,
+        rest=exact_rest([Stem(-1, 4)], [0.0, 0, 0, 2, 0, 0, 0, 3, 0, 0, 0, 5], True),
+        heads={0: stems_head(8.0, 4 << 4 | 1), 2: stems_head(0.25, 1)},
+        scripts={(rd.STEMS, 0, s): [*row(), *row(turn)] for s, turn in enumerate(HALF_TURNS)}
+        | {(rd.STEMS, 2, s): [0, *refined_row((3, -5, 2))] for s in range(5)},
+    ),
+)
+
+
 # ---- valid: of real size -------------------------------------------------------------------------------------
 
 for name_, what_ in (
