@@ -4891,6 +4891,36 @@ valid(
 )
 
 
+LAGS = [Stem(-1, 12, lag=4), Stem(0, 17, 2, lag=5), Stem(0, 262, 4, SHEET, lag=256)]
+valid(
+    "rest-adaptive-lags",
+    "lags of 4 and 5, of which one has filters by phase, and of 256, of which a phase has two vertices",
+    lambda: with_rest(LAGS, adaptive_rest(LAGS, Chance(410, large=3, empty=0.0), rest_type=1)),
+)
+valid(
+    "clips-long-segments",
+    "512 frames in two segments, of which all but two are repeats",
+    lambda: lone(clips=(rd.Clip(512, 2, "long"),), repeats=(0, *(1,) * 255) * 2),
+)
+
+
+def errors_by_chance(count: int) -> tuple[int, ...]:
+    """Large and small steps up and down, to both ends of the range."""
+    random, last, errors = np.random.default_rng(411), [4000] * 3, []
+    for _ in range(count):
+        step = random.choice([1, 3, 30, 400, 5000], 3) * random.integers(-2, 3, 3)
+        last = np.clip(np.array(last) + step, 0, rd.SHORT_FLOATS - 1).tolist()
+        errors += last
+    return tuple(errors)
+
+
+valid(
+    "errors-by-chance",
+    "errors of thirty segments by chance, which are announced about those of the one before and of the level before",
+    lambda: replace(predicted(SINGLE, [[1, 1]], 30).draft(), errors=errors_by_chance(60)),
+)
+
+
 # ---- valid: of real size -------------------------------------------------------------------------------------
 
 for name_, what_ in (
