@@ -4539,6 +4539,7 @@ for name_, more_ in (("", {}), ("-wide", {"is_float64": True, "origin": (3.0, -1
         ),
     )
 
+
 def by_chance(count: int, seed: int, most: int = 4) -> list:
     """Script of so many vertices of an adaptive rest pose, whose first numbers are even."""
     random = np.random.default_rng(seed)
@@ -4588,7 +4589,9 @@ def copies_turned() -> Plant:
     for i in range(36):
         place, bent = random.integers(-1, 2, 4) * (random.random(4) < 0.4), int(i % 8 > 4)
         place = np.array([12, -19, 16, 14]) if i < 4 else place - (i in (18, 19)) * np.array([12, -19, 16, 14])
-        script += [copied(int(i > 0), place.tolist(), (0, 0, 0, 1, 1, 3, 2)[i % 7] if i > 7 else 0, int(i % 7 > 4), bent)]
+        script += [
+            copied(int(i > 0), place.tolist(), (0, 0, 0, 1, 1, 3, 2)[i % 7] if i > 7 else 0, int(i % 7 > 4), bent)
+        ]
         script += [by_chance(4 if bent else 1, 164 + i)]
     return with_copies([4] * 38, *script)
 
@@ -4622,7 +4625,9 @@ valid(
     copies_turned,
 )
 valid("rest-copies-of-many", "64 shapes are remembered, and the last of these is copied", copies_of_many)
-valid("rest-copies-of-lengths", "branches of 15, 16 and 17 vertices that are shapes, copies or neither", copies_of_lengths)
+valid(
+    "rest-copies-of-lengths", "branches of 15, 16 and 17 vertices that are shapes, copies or neither", copies_of_lengths
+)
 valid(
     "rest-copies-of-roots",
     "a root that is a copy of a branch, a branch that is one of a root, and a root of a root",
@@ -4674,9 +4679,7 @@ invalid(
     "open",
     "a copy of the shape before the last 64",
     lambda: broken_rest(
-        lambda: with_copies(
-            [1] * 66, [1, 0, 0, 0], *([0, 1, *by_chance(1, 400 + b)] for b in range(64)), copied(64)
-        ),
+        lambda: with_copies([1] * 66, [1, 0, 0, 0], *([0, 1, *by_chance(1, 400 + b)] for b in range(64)), copied(64)),
         goes_on=False,
     ),
 )
@@ -4704,7 +4707,19 @@ def hub(first: int, quads: int, edges: int) -> list[list[int]]:
 
 def hubs() -> list[list[int]]:
     first, faces = 0, []
-    for quads, edges in ((1, 0), (2, 0), (2, 2), (3, 0), (3, 2), (4, 0), (5, 0), (6, 1), (7, 0), *((0, n) for n in range(1, 11)), (1, 7)):
+    for quads, edges in (
+        (1, 0),
+        (2, 0),
+        (2, 2),
+        (3, 0),
+        (3, 2),
+        (4, 0),
+        (5, 0),
+        (6, 1),
+        (7, 0),
+        *((0, n) for n in range(1, 11)),
+        (1, 7),
+    ):
         for _ in range(2):
             faces += hub(first, quads, edges)
             first += 2 * quads + edges + 2
@@ -4727,7 +4742,17 @@ LEAVES = [  # on a stem: of four vertices that are shapes or copies, finer ones,
 def leaves() -> list[list[int]]:
     """A triangle or quadrangle of each but for the last, whose first vertex is alone, and faces of several."""
     faces = [[v, v + 1, v + 2, v + 3] if v % 8 else [v, v + 1, v + 2] for v in range(4, 40, 4)]
-    return [*faces, [41, 42, 43], [4, 6, 7], [15, 12, 20], [20, 15, 21], [24, 26, 27], [33, 37, 38], [0, 1], [39, 38, 41, 43]]
+    return [
+        *faces,
+        [41, 42, 43],
+        [4, 6, 7],
+        [15, 12, 20],
+        [20, 15, 21],
+        [24, 26, 27],
+        [33, 37, 38],
+        [0, 1],
+        [39, 38, 41, 43],
+    ]
 
 
 HUBS = [Stem(-1, 1 + max(map(max, hubs())), lag=1)]
@@ -4780,9 +4805,11 @@ LEAVING = [  # both ends of a stem, and those between them: a root that leaves b
 ]
 valid(
     "predicted-beyond",
-    "a root that leaves binary32, as what is expected of others then does: that they stay, and what follows ends does, too",
+    "a root that leaves binary32: what is expected to go with it stays, and so does what follows ends",
     lambda: predicted([Stem(-1, 4, flags=WHOLE)], LEAVING, predicted=predicted_head(1e36)),
 )
+
+
 def turns(seed: int) -> list:
     """Frames of two vertices that move far, about late and about early ones."""
     random = np.random.default_rng(seed)
@@ -4918,6 +4945,32 @@ valid(
     "errors-by-chance",
     "errors of thirty segments by chance, which are announced about those of the one before and of the level before",
     lambda: replace(predicted(SINGLE, [[1, 1]], 30).draft(), errors=errors_by_chance(60)),
+)
+
+
+valid(
+    "waves-of-nodes-8",
+    "all waves of maps of 8 frames; what the third one is computed from goes to and fro by the last bit, for 32 times",
+    lambda: Plant(
+        FORK,
+        frames=8,
+        is_float64=True,
+        points=[[0, 0, 0], [1, 0, 2], [2, 0, 4], [1, 3, 2], [1, 5, 3]],
+        scripts={(rd.AFFINES, 0): [0, *row(), *row(), *row(*[(k == 2, k == 5, 3 - k) for k in range(8)])]},
+    ),
+)
+
+
+valid(
+    "waves-of-stems-66",
+    "the fourth wave of 66 frames, of which the same is true",
+    lambda: Plant(
+        SINGLE,
+        frames=66,
+        is_float64=True,
+        points=[[0, 0, 0]],
+        scripts={(rd.STEMS, 0): row((0, 0, 0), (0, 0, 0), (0, 0, 0), (1, -3, 7))},
+    ),
 )
 
 
