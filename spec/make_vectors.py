@@ -4462,6 +4462,518 @@ invalid(
 )
 
 
+# ---- what no encoder writes, and decoders may take for granted ------------------------------------------------
+
+valid(
+    "faces-of-8-bytes",
+    "vertices and numbers of corners in 8 bytes: behind their largest one is none of 64 bits",
+    lambda: with_static(
+        (rd.FACES, mixed_polygons([[0, 1, 2], [3, 2, 1, 0], [4]], types=("<u8", ">u8"))),
+        (rd.EDGES, polygons(np.array([[0, 1], [4, 3]], ">u8"))),
+    ),
+)
+valid(
+    "faces-of-8-bytes-absolute",
+    "the same by their numbers, and with signs; edges that the hierarchy implies",
+    lambda: with_static(
+        (rd.FACES, mixed_polygons([[0, 1, 2], [3, 2, 1, 0], [4]], types=(">u8", "<i8"), absolute=True)),
+        (rd.EDGES, derived(">u8")),
+    ),
+)
+static(
+    "faces-of-8-bytes-beyond",
+    "vertex 2^30 - 1 by its number, in 8 bytes",
+    faces(polygons(np.array([[0, 1, (1 << 30) - 1]], "<u8"), absolute=True)),
+)
+static(
+    "faces-of-8-bytes-negative",
+    "vertex -1 in 8 bytes without a sign",
+    faces(polygons(np.array([[0, 1, -1]], "<i8")).replace(b"\x07", b"\x03", 1)),
+)
+static(
+    "faces-of-8-bytes-count",
+    "a face of 2^30 - 1 corners, a number of 8 bytes",
+    faces(
+        polygon_head("<u8", 1, 3, ">u8")
+        + write(rd.decode_polygons, [(1 << 30) - 1], rd.PolygonShape(3, 11, False, False, 1, 0, 3), 5)
+    ),
+)
+static("edges-of-8-bytes-beyond", "an edge to vertex 5 of 5", edges(polygons(np.array([[0, 5]], ">u8"))))
+
+
+def with_source(draft: Draft, seed: int) -> Draft:
+    """A last level that is up to 2^22 numbers away from the one before it."""
+    file, level, chance = rd.AthFile(draft.file()), draft.header["level_count"], Chance(seed, large=22)
+
+    def stream(s: int) -> bytes:
+        positions = file._segment(s, level - 1)
+        differences = [chance.answer("signed", 0) for _ in range(positions.size)]
+        return write(rd.decode_exact, [(abs(n), n < 0) for n in differences], positions)
+
+    added = [Entry(rd.EXACT, stream(s), level, s) for s in range(draft.header["segment_count"])]
+    joins_there = draft.joins and (*draft.joins, *joins(*(0,) * len(added)))
+    return replace(draft, joins=joins_there).with_header(level_count=level + 1, full_level_count=level + 1).add(*added)
+
+
+SOURCE_FRAMES = [  # with copies, of the frame before, of earlier ones and of the rest pose
+    [0, 1, *frame_steps(ROOTED, 150)],
+    [1, 1],
+    [0, 0, 1, *frame_steps(ROOTED, 151)],
+    [1, 0, 3],
+    [0, 1, *frame_steps(ROOTED, 152)],
+    [1, 0, 1],
+]
+for name_, more_ in (("", {}), ("-wide", {"is_float64": True, "origin": (3.0, -1e3, 0.1)})):
+    valid(
+        f"predicted-lossless-repeats{name_}",
+        "the source's own numbers, which differ where predicted motion has copies, of frames that are shown for long; "
+        "level 0 is joined",
+        lambda more_=more_: with_source(
+            replace(
+                predicted(ROOTED, SOURCE_FRAMES, 2, scripts={(rd.AFFINES, 0): lambda: Chance(153, large=4)}, **more_),
+                frames=20,
+                repeats=(0, 1, 0, 0, 1, 1, 0, 0, 0, 1) + (0, 0, 0, 1, 0, 0, 1, 0, 1, 1),
+                joins=joins(0, 2.5, 0, 0),
+            ).draft(),
+            154,
+        ),
+    )
+
+
+def by_chance(count: int, seed: int, most: int = 4) -> list:
+    """Script of so many vertices of an adaptive rest pose, whose first numbers are even."""
+    random = np.random.default_rng(seed)
+    return [n for x, y, z in random.integers(-most, most + 1, (count, 3)).tolist() for n in (2 * x, y, z)]
+
+
+def along(*places: tuple[int, int, int]) -> list:
+    """The same of these numbers, all of them even."""
+    return [n for x, y, z in places for n in (x, y // 2, z // 2)]
+
+
+def copied(rank: int, place: Sequence[int] = (0, 0, 0, 0), largest: int = 0, mirrored: int = 0, bent: int = 0) -> list:
+    """Script of a copy of the shape of that rank: differences of its scale and of the smaller numbers of its turn."""
+    return [1, rank, mirrored, bent, place[0], largest >> 1, largest & 1, *place[1:]]
+
+
+def with_copies(stems: Sequence[int | Stem], *script: list, step: float = 0.3, still: bool = False) -> Plant:
+    """A root of four vertices that is no shape, at one place or not, and branches of so many on it, or others."""
+    branches = [stem if isinstance(stem, Stem) else Stem(0, stem, b % 4) for b, stem in enumerate(stems)]
+    stems = [Stem(-1, 4), *branches]
+    root = [0] * 12 if still else by_chance(4, 160)
+    values = [1, 0, *root, *(value for values in script for value in values)]
+    return with_rest(stems, adaptive_rest(stems, values, step, rest_type=1))
+
+
+def broken_rest(make: Callable[[], Plant], goes_on: bool = True) -> Draft:
+    """The file, whose rest pose is refused, and may go on behind that; all else is as in one that stands still."""
+    kept, rd.require = rd.require, (lambda *_: None) if goes_on else rd.require
+    try:
+        plant = make()
+    finally:
+        rd.require = kept
+    rest = adaptive_rest(plant.stems, [], 0.3, rest_type=1)
+    return replace(plant, rest=rest).draft().change(rd.REST, content=plant.rest)
+
+
+def copy_of(tip: tuple[int, int, int], *places: Sequence[int], largest: int = 0) -> Plant:
+    """Copies of a shape of two vertices that are so far apart, in quarters of a unit."""
+    copies = [value for place in places for value in (*copied(0, place, largest), 0, 0, 0)]
+    return with_copies([2] * (1 + len(places)), [1, *along((0, 0, 0), tip)], copies, still=True)
+
+
+def copies_turned() -> Plant:
+    """Numbers are alike at first, so that they are expected again, and later near 0 again."""
+    random = np.random.default_rng(226)
+    script = [[1, *by_chance(4, 162, 40)], [0, 1, *by_chance(4, 163, 40)]]
+    for i in range(36):
+        place, bent = random.integers(-1, 2, 4) * (random.random(4) < 0.4), int(i % 8 > 4)
+        place = np.array([12, -19, 16, 14]) if i < 4 else place - (i in (18, 19)) * np.array([12, -19, 16, 14])
+        script += [
+            copied(int(i > 0), place.tolist(), (0, 0, 0, 1, 1, 3, 2)[i % 7] if i > 7 else 0, int(i % 7 > 4), bent)
+        ]
+        script += [by_chance(4 if bent else 1, 164 + i)]
+    return with_copies([4] * 38, *script)
+
+
+def copies_of_many() -> Plant:
+    """64 shapes of one vertex behind others, of which one has two vertices."""
+    random, counts, script = np.random.default_rng(165), [1, 1, 2, *[1] * 64], []
+    for b, count in enumerate(counts):
+        script += [[*([0] if b not in (0, 2) else []), 1, *by_chance(count, 166 + b)]]
+    for rank in (63, 63, 0, 1, 63, *random.integers(0, 64, 12).tolist(), 0, 0, 0, 0, 0, 5):
+        script += [copied(rank), by_chance(1, 300 + rank)]
+        counts.append(1)
+    return with_copies([*counts, 2], *script, [1, *by_chance(2, 170)])
+
+
+def copies_of_lengths() -> Plant:
+    """Shapes, copies and branches that are neither: whether one is, is expected of others of its length up to 16."""
+    counts, script = [15, 16, 17, 15, 17, 16, 16, 15, 17, 16, 15, 17], []
+    shapes: list[int] = []
+    for b, (count, what) in enumerate(zip(counts, (1, 1, 0, 2, 1, 2, 0, 0, 2, 1, 2, 0))):
+        script += [[0] if what < 2 and count in shapes else []]
+        script += [copied(0), by_chance(1, 180 + b)] if what == 2 else [[what, *by_chance(count, 180 + b)]]
+        shapes += [count] if what == 1 else []
+    return with_copies(counts, *script)
+
+
+FAR, MOST = ((1 << 30) - 2,) * 3, (1 << 29) - 1
+valid(
+    "rest-copies-turned",
+    "the last turn and scale of a shape, which its next copy is about, of two shapes in turn",
+    copies_turned,
+)
+valid("rest-copies-of-many", "64 shapes are remembered, and the last of these is copied", copies_of_many)
+valid(
+    "rest-copies-of-lengths", "branches of 15, 16 and 17 vertices that are shapes, copies or neither", copies_of_lengths
+)
+valid(
+    "rest-copies-of-roots",
+    "a root that is a copy of a branch, a branch that is one of a root, and a root of a root",
+    lambda: with_copies(
+        [3, Stem(-1, 3), Stem(-1, 2), Stem(3, 2, 1), Stem(-1, 2), Stem(5, 3, 1)],
+        *([1, *by_chance(3, 190, 9)], copied(0, (1, 1, 2, -1)), by_chance(1, 191)),
+        *([1, *by_chance(2, 192, 9)], copied(0, (0, -1, 2, 0)), by_chance(1, 193)),
+        *(copied(0, (1, 0, 0, 1), bent=1), by_chance(2, 194), copied(0), by_chance(1, 195)),
+    ),
+)
+valid(
+    "rest-copies-of-a-point",
+    "a shape of one vertex, whose copies have whole numbers for their scale, up to 999, and for their turn",
+    lambda: with_copies(
+        [1] * 4,
+        *([1, *by_chance(1, 196)], copied(0, (998, 1, 0, 0)), by_chance(1, 197)),
+        *(copied(0, (0, 0, -1, 0), 3), by_chance(1, 198), copied(0, (2, 0, 0, 0), 2), by_chance(1, 199)),
+    ),
+)
+valid("rest-copies-tiny", "a copy of just over 1/1000 of its shape", lambda: copy_of((8, 0, 68), (-19, 0, 0, 0)))
+valid(
+    "rest-copies-far",
+    "numbers of a copy of 29 bits, and what is expected of many behind it",
+    lambda: copy_of(FAR, (MOST, MOST, -MOST, 0), *[(0, 0, 1, 0), (1, -1, 0, 0)] * 25),
+)
+for name_, reason_, tip_, places_ in (
+    ("scale-1000", "a scale of 1000", (0, 0, 0), [(999, 0, 0, 0)]),
+    ("scale-tiny", "a scale of just under 1/1000", (4, 0, 90), [(-25, 0, 0, 0)]),
+    ("number", "a number of 2^29", FAR, [(MOST, MOST + 1, 0, 0)]),
+    ("number-negative", "a number of -2^29", FAR, [(MOST, -MOST - 1, 0, 0)]),
+):
+    invalid(
+        f"rest-copies-{name_}",
+        "BAD_CHUNK",
+        "open",
+        f"{reason_}, of a copy",
+        lambda tip_=tip_, places_=places_: broken_rest(lambda: copy_of(tip_, *places_)),
+    )
+invalid(
+    "rest-copies-rotation-little",
+    "BAD_CHUNK",
+    "open",
+    "a quaternion of little more than 1",
+    lambda: broken_rest(lambda: copy_of((10, 0, 0), (0, 2, 2, 0)), goes_on=False),
+)
+invalid(
+    "rest-copies-of-the-65th",
+    "BAD_CHUNK",
+    "open",
+    "a copy of the shape before the last 64",
+    lambda: broken_rest(
+        lambda: with_copies([1] * 66, [1, 0, 0, 0], *([0, 1, *by_chance(1, 400 + b)] for b in range(64)), copied(64)),
+        goes_on=False,
+    ),
+)
+
+
+def meshed(stems: list[Stem], faces: list[list[int]], script: list | Chance, **fields) -> Plant:
+    """An adaptive rest pose by faces, of any sizes."""
+    count, step = sum(stem.count for stem in stems), 0.3
+    content = mixed_polygons(faces, count)
+    shape, stream = rd.parse_polygons(content, rd.FACES, rd.Limits())
+    mesh = rd.build_mesh(*rd.decode_polygons(stream, shape, count), list(range(count)))
+    coded = write(rd.decode_rest, script, branches_of(stems), step, None, True, mesh)
+    bits = rd.REST_ADAPTIVE | rd.REST_CONNECTED
+    return with_rest(stems, rest_chunk(coded, step=step, rest_type=1, reserved=bits >> 2), faces=content, **fields)
+
+
+def hub(first: int, quads: int, edges: int) -> list[list[int]]:
+    """Faces whose last vertex completes so many parallelograms at once, and has so many neighbours more."""
+    chain = list(range(first, first + 2 * quads + edges))
+    middle, across = len(chain) + first + 1, len(chain) + first
+    faces = [[middle, chain[2 * i], across, chain[2 * i + 1]] for i in range(quads)]
+    faces += [[middle, v] for v in chain[2 * quads :]]
+    return faces + [[v, v + 1] for v in chain[:-1]] + ([] if quads else [[chain[-1], across]])
+
+
+def hubs() -> list[list[int]]:
+    first, faces = 0, []
+    for quads, edges in (
+        (1, 0),
+        (2, 0),
+        (2, 2),
+        (3, 0),
+        (3, 2),
+        (4, 0),
+        (5, 0),
+        (6, 1),
+        (7, 0),
+        *((0, n) for n in range(1, 11)),
+        (1, 7),
+    ):
+        for _ in range(2):
+            faces += hub(first, quads, edges)
+            first += 2 * quads + edges + 2
+    return faces
+
+
+def crowd(seed: int) -> list[list[int]]:
+    """Triangles and quadrangles by chance that share many sides, and corners."""
+    random = np.random.default_rng(seed)
+    faces = [random.integers(0, 16, 3 + (i % 5 == 4)).tolist() for i in range(31)]
+    return [*faces, [0, 1, 2], [2, 1, 3], [1, 2, 4], [2, 1, 5], [1, 2, 6], [14, 15, 16], [16, 15, 13]]
+
+
+LEAVES = [  # on a stem: of four vertices that are shapes or copies, finer ones, and some that others reach into
+    Stem(-1, 4),
+    *(Stem(0, 4, i % 4, detail=(0, 0, 0, 0, 110, 110, 0, 1, 0, 0)[i]) for i in range(10)),
+]
+
+
+def leaves() -> list[list[int]]:
+    """A triangle or quadrangle of each but for the last, whose first vertex is alone, and faces of several."""
+    faces = [[v, v + 1, v + 2, v + 3] if v % 8 else [v, v + 1, v + 2] for v in range(4, 40, 4)]
+    return [
+        *faces,
+        [41, 42, 43],
+        [4, 6, 7],
+        [15, 12, 20],
+        [20, 15, 21],
+        [24, 26, 27],
+        [33, 37, 38],
+        [0, 1],
+        [39, 38, 41, 43],
+    ]
+
+
+HUBS = [Stem(-1, 1 + max(map(max, hubs())), lag=1)]
+valid(
+    "rest-connected-hubs",
+    "vertices that complete up to seven parallelograms, or have up to ten neighbours, and no other way",
+    lambda: meshed(HUBS, hubs(), Chance(210, large=5)),
+)
+valid(
+    "rest-connected-leaves",
+    "by faces shapes, copies, branches that others have begun, and steps of branches of their own",
+    lambda: meshed(LEAVES, leaves(), Chance(236, large=3)),
+)
+valid(
+    "rest-connected-crowd",
+    "triangles and quadrangles of the same sides, and of the same vertex twice",
+    lambda: meshed([Stem(-1, 17)], crowd(211), Chance(212, large=5)),
+)
+
+
+def cells(seed: int) -> list[list[float]]:
+    """Places of vertices, each of them of two that are less or more than half a cell apart, or beyond all cells."""
+    random, cell = np.random.default_rng(seed), 0.0625 / 256
+    first = random.integers(-3000, 3000, (32, 3))
+    first[29:] *= 10**6
+    second = first + random.choice([-0.7, -0.4, 0.0, 0.0, 0.4], (32, 1)) * random.integers(0, 2, (32, 3))
+    return (cell * np.vstack([first, second])[np.argsort(random.random(64))]).tolist()
+
+
+PAIR, POINTS = [Stem(-1, 2, flags=WHOLE)], [Stem(-1, 1)] * 64
+valid(
+    "predicted-long",
+    "more frames than means are of, and more than vertices are of any line",
+    lambda: predicted(PAIR, swayed(200, 213, PAIR, large=5, still=0.1)),
+)
+valid(
+    "predicted-cells",
+    "vertices that follow others at the same places, unless the entry of their cell has been taken",
+    lambda: predicted(
+        POINTS,
+        swayed(3, 310, POINTS, large=6, still=0.2),
+        rest=exact_rest(POINTS, np.array(cells(223)).ravel().tolist(), True),
+        is_float64=True,
+    ),
+)
+LEAVING = [  # both ends of a stem, and those between them: a root that leaves binary32, and others that follow it
+    *([0, 1, 1, 20, 0, 1, 1, move, 1, 0, 0, 0, 0] for move in (20, 1, 0, 0, -1, 0, 0)),
+    *([0, 1, 1, 60, 3, 0, 1, 0, 1, move, 1] for move in (2, 0, 0, 1)),
+    *([0, 0, distance, 0, 1, 0, move, 0, 1] for distance, move in ((8, 1), (0, 2))),
+]
+valid(
+    "predicted-beyond",
+    "a root that leaves binary32: what is expected to go with it stays, and so does what follows ends",
+    lambda: predicted([Stem(-1, 4, flags=WHOLE)], LEAVING, predicted=predicted_head(1e36)),
+)
+
+
+def turns(seed: int) -> list:
+    """Frames of two vertices that move far, about late and about early ones."""
+    random = np.random.default_rng(seed)
+    return [
+        [0, 0, int(random.integers(0, min(t + 1, 6)) * (t % 3 == 2)), *frame_steps(PAIR, seed + t, large=9, still=0.2)]
+        for t in range(24)
+    ]
+
+
+valid(
+    "predicted-turns",
+    "lines that begin anew in frames that are coded about earlier ones",
+    lambda: predicted(PAIR, turns(330)),
+)
+valid(
+    "predicted-about-copies",
+    "frames that are coded about copies, about copies of copies, and about frames that were coded about these",
+    lambda: predicted(
+        ROOTED,
+        [
+            *swayed(2, 320, still=0.1),
+            *([1, 1], *swayed(1, 322, still=0.1), [1, 1], [1, 1], *swayed(2, 323, still=0.1)),
+            *([0, 0, 3, *frame_steps(ROOTED, 325, still=0.1)], [0, 0, 0, *frame_steps(ROOTED, 326, still=0.1)]),
+            *([1, 0, 6], [0, 0, 0, *frame_steps(ROOTED, 327, still=0.1)], *swayed(2, 328, still=0.1)),
+        ],
+    ),
+)
+valid(
+    "predicted-copied-rest",
+    "a copy of the rest pose, rounded as it is shown, which others are coded about",
+    lambda: predicted(
+        ROOTED,
+        [[1, 1], *swayed(2, 315, still=0.1), [1, 0, 3], *swayed(2, 317, still=0.1)],
+        origin=(1e6, -3e5, 0.125),
+        step=0.01,
+    ),
+)
+
+
+class Turns(Chance):
+    """Two frequencies of each row, as large as it takes to turn by up to 360 degrees and back."""
+
+    def answer(self, asked: str, most: int):
+        if asked == "count":
+            return min(2, most)
+        return int(self.random.integers(-130, 131)) if asked == "signed" else super().answer(asked, most)
+
+
+STIFF = [  # in one, two or three layers, with others on them
+    Stem(-1, 4, rigid=1),
+    Stem(0, 3, 2, rigid=2),
+    Stem(1, 2, 1, LOOSE, rigid=3),
+    Stem(2, 3, 0, rigid=3),
+    Stem(0, 3, 1, SHEET, rigid=1),
+    Stem(4, 2, 0, rigid=2),
+    Stem(-1, 3, rigid=2),
+]
+
+
+def stiff(seed: int, **fields) -> Plant:
+    """STIFF in three layers, of which the first has rotations of any size."""
+    plant = refinements(STIFF, seed, large=5, is_float64=True, **fields)
+    plant.scripts |= {(rd.STEMS, level): lambda level=level: Turns(seed + level) for level in range(5)}
+    return plant
+
+
+valid(
+    "layers-rigid-turned",
+    "branches that move as they are, turned by up to 360 degrees, which the next layers go on from",
+    lambda: stiff(
+        217, frames=12, heads={level: stems_head(((8.0,) * 5 + (2.0, 0.5))[level], 3 << 4 | 1) for level in range(7)}
+    ),
+)
+LAST_BASIS = 10, 2, basis_stream([[300, -200], [77, 511]], 10)
+valid(
+    "layers-rigid-ratios",
+    "the step of a rotation is over 65535 times that of the next layer, and that less than the one of the last",
+    lambda: stiff(
+        218,
+        frames=4,
+        segments=2,
+        heads={
+            **{level: stems_head(64.0, 4) for level in range(5)},
+            5: stems_head(1e-4, 1, *LAST_BASIS),
+            6: stems_head(1e-4, 4),
+        },
+    ),
+)
+
+
+HALF_TURNS = (16, 0, 0), (0, 16, 0), (0, 0, 16), (16, 0, 1), (0, -16, 3)
+valid(
+    "layers-rigid-half-turns",
+    "a branch that moves as it is, turned by 180 degrees about each of its axes: whose quaternions begin with 0",
+    lambda: Plant(
+        [Stem(-1, 4, rigid=1)],
+        frames=5,
+        segments=5,
+        layers=2,
+        is_float64=True,
+        rest=exact_rest([Stem(-1, 4)], [0.0, 0, 0, 2, 0, 0, 0, 3, 0, 0, 0, 5], True),
+        heads={0: stems_head(8.0, 4 << 4 | 1), 2: stems_head(0.25, 1)},
+        scripts={(rd.STEMS, 0, s): [*row(), *row(turn)] for s, turn in enumerate(HALF_TURNS)}
+        | {(rd.STEMS, 2, s): [0, *refined_row((3, -5, 2))] for s in range(5)},
+    ),
+)
+
+
+LAGS = [Stem(-1, 12, lag=4), Stem(0, 17, 2, lag=5), Stem(0, 262, 4, SHEET, lag=256)]
+valid(
+    "rest-adaptive-lags",
+    "lags of 4 and 5, of which one has filters by phase, and of 256, of which a phase has two vertices",
+    lambda: with_rest(LAGS, adaptive_rest(LAGS, Chance(410, large=3, empty=0.0), rest_type=1)),
+)
+valid(
+    "clips-long-segments",
+    "512 frames in two segments, of which all but two are repeats",
+    lambda: lone(clips=(rd.Clip(512, 2, "long"),), repeats=(0, *(1,) * 255) * 2),
+)
+
+
+def errors_by_chance(count: int) -> tuple[int, ...]:
+    """Large and small steps up and down, to both ends of the range."""
+    random, last, errors = np.random.default_rng(411), [4000] * 3, []
+    for _ in range(count):
+        step = random.choice([1, 3, 30, 400, 5000], 3) * random.integers(-2, 3, 3)
+        last = np.clip(np.array(last) + step, 0, rd.SHORT_FLOATS - 1).tolist()
+        errors += last
+    return tuple(errors)
+
+
+valid(
+    "errors-by-chance",
+    "errors of thirty segments by chance, which are announced about those of the one before and of the level before",
+    lambda: replace(predicted(SINGLE, [[1, 1]], 30).draft(), errors=errors_by_chance(60)),
+)
+
+
+valid(
+    "waves-of-nodes-8",
+    "all waves of maps of 8 frames; what the third one is computed from goes to and fro by the last bit, for 32 times",
+    lambda: Plant(
+        FORK,
+        frames=8,
+        is_float64=True,
+        points=[[0, 0, 0], [1, 0, 2], [2, 0, 4], [1, 3, 2], [1, 5, 3]],
+        scripts={(rd.AFFINES, 0): [0, *row(), *row(), *row(*[(k == 2, k == 5, 3 - k) for k in range(8)])]},
+    ),
+)
+
+
+valid(
+    "waves-of-stems-66",
+    "the fourth wave of 66 frames, of which the same is true",
+    lambda: Plant(
+        SINGLE,
+        frames=66,
+        is_float64=True,
+        points=[[0, 0, 0]],
+        scripts={(rd.STEMS, 0): row((0, 0, 0), (0, 0, 0), (0, 0, 0), (1, -3, 7))},
+    ),
+)
+
+
 # ---- valid: of real size -------------------------------------------------------------------------------------
 
 for name_, what_ in (
