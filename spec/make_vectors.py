@@ -2403,6 +2403,15 @@ valid(
 # ---- valid: repeats ----------------------------------------------------------------------------------------
 
 TWOS, THREES = (0, 1) * 6, (0, 1, 1) * 4
+
+
+def repeats_by_chance(frames: int) -> tuple[int, ...]:
+    random, repeats = np.random.default_rng(420), list[int]()
+    while len(repeats) < frames:
+        repeats += [0] * random.choice([1, 2, 6]) + [1] * random.choice([1, 1, 2, 3, 10])
+    return (*repeats[: frames - 1], 0)
+
+
 valid(
     "repeats",
     "poses held for one to eleven frames",
@@ -2412,6 +2421,11 @@ valid(
     "repeats-of-one",
     "all frames are alike, and one is coded",
     lambda: moving(FORK, 125, frames=12, repeats=(0, *(1,) * 11)),
+)
+valid(
+    "repeats-by-chance",
+    "now many poses that are held, now few, for one frame to ten",
+    lambda: moving(FORK, 420, frames=160, repeats=repeats_by_chance(160)),
 )
 valid("repeats-joined", "over all coded frames that may be", lambda: joined(FORK, 126, *(0, 1.5) * 3, repeats=TWOS))
 valid(
