@@ -777,12 +777,13 @@ class Run:
     def all(self, mutants: list[Mutant], folder: Path, quick: bool, most: float) -> dict[str, str]:
         """First with the fastest vectors, then those that they miss with the others."""
         self.mutants, self.folder = mutants, folder
-        known = self.cache.fates
+        known, known_reasons = self.cache.fates, reasons()  # what has a reason comes last
         self.fates = {mutant.name: known[mutant.name] for mutant in mutants if known.get(mutant.name, MISSED) != MISSED}
         for seconds, count in [(FIRST_SECONDS, 40), (most, 10)][: 1 if quick else None]:
             left = [i for i, mutant in enumerate(mutants) if self.fates.get(mutant.name, MISSED) == MISSED]
             if seconds == FIRST_SECONDS:
                 left = [i for i in left if mutants[i].name not in self.cache.passed]
+            left.sort(key=lambda i: any(reason.matches(mutants[i].name) for reason in known_reasons))
             self._round([left[i : i + count] for i in range(0, len(left), count)], seconds)
         return self.fates
 
