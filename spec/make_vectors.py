@@ -81,6 +81,9 @@ class Vector:
 VECTORS: list[Vector] = []
 
 
+MADE: dict[str, Plant | Draft | bytes | Callable] = {}  # by the name of the vector
+
+
 def valid(
     name: str,
     reason: str,
@@ -88,6 +91,7 @@ def valid(
     scripted: bool = True,
     mesh: np.ndarray | None = None,
 ) -> None:
+    MADE[name] = make
     VECTORS.append(Vector(name, reason, lambda: bytes_of(make), scripted=scripted, mesh=mesh_bytes(mesh)))
 
 
@@ -4987,6 +4991,36 @@ valid(
     ),
 )
 
+
+# ---- valid: in binary64 --------------------------------------------------------------------------------------
+
+
+def in_binary64(name: str) -> Plant:
+    made = MADE[name]
+    plant = made() if callable(made) else made
+    assert isinstance(plant, Plant)
+    return replace(plant, is_float64=True)
+
+
+for name_ in (
+    "sheet-mode-above",
+    "sheet-thin-below",
+    "shapes-high",
+    "shapes-of-sheets",
+    "tube-function-below",
+    "layers-rigid-turned",
+    "layers-rigid-ratios",
+    "layers-periodic",
+    "source-rest-far",
+    "source-rest-detail",
+    "predicted-references",
+    "predicted-about-copies",
+):
+    valid(
+        f"{name_}-in-binary64",
+        "the same in binary64, which shows the order of every sum and product",
+        lambda name_=name_: in_binary64(name_),
+    )
 
 # ---- valid: of real size -------------------------------------------------------------------------------------
 
