@@ -5011,6 +5011,58 @@ def derived_edges(*counts: int) -> Draft:
     return still([Stem(-1, count) for count in counts]).draft().add(Entry(rd.EDGES, derived("|i1")))
 
 
+def of_range(max_error: int) -> Draft:
+    """Counts after which the range is 2^38 + 56, whose first fault behind the front is a checksum."""
+    clips = [clip_entry(25, 17, "0"), *(clip_entry(1, 1, str(i)) for i in range(1, 25))]
+    return (
+        lone()
+        .draft()
+        .add(Entry(rd.CLIPS, b"".join(clips), checksum=0))
+        .with_header(
+            vertex_count=13,
+            branch_count=2,
+            frame_count=49,
+            segment_count=41,
+            full_level_count=22,
+            level_count=2,
+            clip_count=25,
+            layer_count=4,
+            max_error=rd.from_bits(max_error, 64),
+        )
+    )
+
+
+TURNING = [Stem(0, 100, 0, lag=0)] * 2 + [Stem(0, 3, 0, lag=0)] * 2 + [Stem(4, 2, 2, lag=0)]
+STEERED = ((20000, 0), (10000, 0), (670, 0), (28, 0), (2, 0))
+STEERED_TWICE = ((30000, 54000), (15000, 27000), (1004, 1808), (40, 72), (2, 4))
+
+
+def hardly_apart(step: float, steered: Sequence[tuple[int, int]] = STEERED, x: int = 1, y: int = 0) -> Plant:
+    """A second rest pose about one in which the beam that another one hangs on is shorter than anything that integers
+    say: a copy that is bent for long, but for its place, has taught that to expect it there is worth next to nothing.
+    """
+    script = [
+        *[1, 0, *[0] * 12],
+        *[1, *[0] * 4],  # a shape whose vertices are at one place
+        *[
+            *copied(0, bent=1),
+            0,
+            0,
+            0,
+            *(n for place in steered for n in (place[0], place[1] // 2, 0)),
+            *[0] * (3 * 94),
+        ],
+        *[1, 0],
+        *[*copied(0, bent=1), 4 * x, 2 * y, 0, -2 * x, -y, 0, 0, 0, 0],
+        *[0, *row((3, 1, 0), (0, 2, 5))],
+    ]
+    stems, step = [Stem(-1, 4), *TURNING], float(np.float32(step))
+    rest, branches = adaptive_rest(stems, script, step, rest_type=1), branches_of(stems)
+    reference = np.array(rd.decode_rest(rest[17:], branches, step, None, True).rest)
+    content = write(rd.BentPose, Chance(507, large=6, empty=0.0), branches, step, reference)
+    return still(stems, rest=rest, source_rest=source_rest_chunk(content, step), is_float64=True)
+
+
 def at_their_bounds() -> None:
     valid("predicted-long-runs", "runs of copied frames of up to 12, of which those from 7 on are alike", in_runs)
     valid(
@@ -5051,6 +5103,17 @@ def at_their_bounds() -> None:
         "source-rest-attached-to-0",
         "beams that hang on vertex 0, and on the first vertex of such; runs of 31 and 32; a root of one vertex",
         lambda: attached_rest(503, 504),
+    )
+    for side, step in (("above", 1.238e-29), ("below", 1.2015e-29)):
+        valid(
+            f"source-rest-short-{side}",
+            f"a beam of {side} 1e-100 in the reference pose, which has a direction or none",
+            lambda step=step: hardly_apart(step),
+        )
+    valid(
+        "source-rest-short-exactly",
+        "a beam whose squares add up to 1e-200, which has no direction",
+        lambda: hardly_apart(3.713893830124435e-38, STEERED_TWICE, 121709354, 40038661),
     )
     valid(
         "source-rest-exact-no-bytes",
@@ -5128,6 +5191,13 @@ def at_their_bounds() -> None:
         "open",
         "2^18 + 1 vertices of 128 frames take more than Max_Memory_Bytes",
         lambda: of_memory((1 << 18) + 1),
+    )
+    invalid(
+        "front-range",
+        "BAD_CHECKSUM",
+        "open",
+        "amid Max_Error the range is just 2^32, twice, which is not less: what is wrong is CLIPS",
+        lambda: of_range(7 << 57),
     )
     valid(
         "edges-derived-127",
