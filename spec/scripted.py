@@ -243,6 +243,7 @@ class Entry:
     length: int | None = None
     checksum: int | None = None
     spelt: bool = False  # the Kind by all its bits, although it has a number
+    number: int | None = None  # from OTHER on: what says that all bits of the Kind follow
 
     @property
     def chunk(self) -> rd.Chunk:
@@ -276,9 +277,10 @@ class FrontScript:
         self.bits, self.before, self.was_motion, self.place = [8] * (rd.OTHER + 1), rd.OTHER, False, (0, 0)
 
     def add_chunk(self, entry: Entry) -> None:
-        known = entry.kind in rd.KINDS and not entry.spelt
+        known = entry.kind in rd.KINDS and not entry.spelt and entry.number is None
         index = rd.KIND_LIST.index(entry.kind) if known else rd.OTHER
-        self.values += _bits(index, rd.KIND_BITS) + ([] if known else _bits(entry.kind, 16))
+        number = index if entry.number is None else entry.number
+        self.values += _bits(number, rd.KIND_BITS) + ([] if known else _bits(entry.kind, 16))
         if entry.chunk.is_motion:
             self._add_place(index, (entry.level, entry.segment))
         length = entry.chunk.length
