@@ -4895,6 +4895,7 @@ def stiff(seed: int, **fields) -> Plant:
 
 
 valid(
+    "layers-rigid-turned",
     "branches that move as they are, turned by up to 360 degrees, which the next layers go on from",
     lambda: stiff(
         217, frames=12, heads={level: stems_head(((8.0,) * 5 + (2.0, 0.5))[level], 3 << 4 | 1) for level in range(7)}
@@ -4902,6 +4903,7 @@ valid(
 )
 LAST_BASIS = 10, 2, basis_stream([[300, -200], [77, 511]], 10)
 valid(
+    "layers-rigid-ratios",
     "the step of a rotation is over 65535 times that of the next layer, and that less than the one of the last",
     lambda: stiff(
         218,
