@@ -4826,6 +4826,11 @@ def at_limits_of_rest_poses() -> None:
         "a quadrangle whose corners one and three are the same vertex, behind those between them",
         lambda: meshed([Stem(-1, 5)], [[3, 0, 3, 1], [0, 1, 2], [2, 3, 4]], Chance(530, large=5)),
     )
+    valid(
+        "rest-copies-between",
+        "the last turn of a shape is two and a half steps of the next copy, but for rounding",
+        lambda: copy_of((36, 0, 0), (0, 0, 1, 0), (15, 0, 3, 0), *[(0, 0, 0, 0), (15, 0, 0, 0)] * 3),
+    )
     points = [Stem(-1, 1, lag=2), Stem(-1, 1, lag=2), Stem(-1, 1, lag=2, detail=100), Stem(-1, 1, lag=2, detail=100)]
     far = [10**9, 495 * 10**6, 515 * 10**6]  # units in x, in y and z pairs of them
     valid(
@@ -4836,6 +4841,86 @@ def at_limits_of_rest_poses() -> None:
 
 
 at_limits_of_rest_poses()
+
+
+def of_sizes(*powers: int) -> list[list[float]]:
+    """A stem, and for each power of two three vertices by chance that are as far away from its first one; every second
+    three are flat."""
+    random = np.random.default_rng(531)
+    triples = [
+        math.ldexp(1.0, power - 10) * random.integers(-1024, 1025, (3, 3)) * [1, 1, i % 2]
+        for i, power in enumerate(powers)
+    ]
+    return [[0.0, 0.0, 0.0], [0.0, 1.0, 0.0], *np.vstack(triples).tolist()]
+
+
+def of_any_size(*powers: int) -> Plant:
+    """Rigid branches of these sizes, all turned."""
+    stems = [Stem(-1, 2), *(Stem(0, 3, 0, rigid=1) for _ in powers)]
+    size = [1 << 28 if power > 0 else 1 for power in powers]
+    turned = [row((n * (1 + i % 3), n * (2 - i % 4), n), (i % 2, 3 * n, -n)) for i, n in enumerate(size)]
+    return Plant(
+        stems,
+        frames=2,
+        is_float64=True,
+        rest=exact_rest(stems, [x for point in of_sizes(*powers) for x in point], True),
+        heads={level: stems_head(1e38, 3 << 4 | 4) for level in range(3)},
+        scripts={(rd.STEMS, 1): [*row() * 4, *(value for each in turned for value in each)]},
+    )
+
+
+def shrunk(last: int) -> Plant:
+    """A row that 18 known ones along it leave about 1e-100 of; `last`: an entry of the last of these, in 1/32768."""
+    known = [[6426] * 26] * 17 + [[last] * 26]
+    rows = [[entry / 32768 for entry in entries] for entries in known]
+    in_waves = basis_in_waves(26, -200, *row((1, 0, 0)), rank=19, known=rows)
+    return Plant(
+        [Stem(-1, 3)],
+        frames=26,
+        heads={
+            0: stems_head(0.25, 0, 16, 18, basis_stream(known, 16)),
+            1: stems_head(0.25, 0, 2, 19, in_waves, base=0),
+        },
+        scripts={(rd.STEMS, 1): row(*[(0, 0, 0)] * 18, (50, -30, 10))},
+    )
+
+
+def at_limits_of_algebra() -> None:
+    rounded = (263597123, 32053444), (241475353, 36228921), (79323412, 26324395), (170050111, 70213091)
+    valid(
+        "rigid-tiny",
+        "branches that move as they are, of 1e-78 to 1e-84 and of 1e-160: squares of their moments are 0",
+        lambda: of_any_size(*[*range(-274, -265)] * 2, *[-268] * 12, -279, -276, -260, *[*range(-536, -531)] * 2),
+    )
+    valid(
+        "rigid-huge",
+        "rigid branches of 1e77 to 1e150: squares of their moments are infinite, and nothing is reduced",
+        lambda: of_any_size(250, 257, 258, 259, 260, 300, 400, 500),
+    )
+    for side, last in (("above", 6448), ("below", 6405)):
+        valid(
+            f"basis-short-{side}",
+            f"a row of a basis whose squares add up to {side} 1e-200, since the known rows are no unit vectors",
+            lambda last=last: shrunk(last),
+        )
+    valid(
+        "basis-rounded",
+        "rows of bases, of which an entry is within 2^-56 of the middle between two numbers of binary32",
+        lambda: Plant(
+            [Stem(-1, 2)],
+            frames=8,
+            segments=4,
+            heads={
+                (0, s): stems_head(0.25, 0, 2, 1, basis_in_waves(2, 0, *row((a, 0, 0), (b, 0, 0)), rank=1))
+                for s, (a, b) in enumerate(rounded)
+            },
+            is_float64=True,
+            scripts={(rd.STEMS, 0): [*row((1, 3, 0)), *row((0, 1, 7))]},
+        ),
+    )
+
+
+at_limits_of_algebra()
 
 
 # ---- what no encoder writes, and decoders may take for granted ------------------------------------------------
