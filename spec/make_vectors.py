@@ -2564,7 +2564,7 @@ invalid(
 )
 
 
-def table(name: str, error: str, reason: str, make: Callable[[], Draft]) -> None:
+def table(name: str, error: str, reason: str, make: Callable[[], Draft | bytes]) -> None:
     invalid(f"table-{name}", error, "open", reason, make)
 
 
@@ -4478,6 +4478,467 @@ invalid(
     "a chain of 1300 branches, from whose end others go up by 1200 and then by 1 to 1000",
     deep,
 )
+
+
+# ---- exactly at limits and bounds ------------------------------------------------------------------------------
+
+
+def not_refused(make: Callable[[], Draft]) -> bytes:
+    """The file with streams that go on behind what is refused."""
+    kept, rd.require = rd.require, lambda *_: None
+    try:
+        return make().file()
+    finally:
+        rd.require = kept
+
+
+def front_alone(draft: Draft) -> bytes:
+    data = draft.file()
+    return data[: rd.u32(data, 16)]
+
+
+def at_limits_of_front() -> None:
+    """Limits that are just kept: what else is wrong gives the error."""
+    radius = numbers(np.arange(5.0), name="radius")
+
+    def segments_of_tables() -> Draft:
+        draft = lone().draft().upto(0)
+        first, second, *others = draft.entries
+        count = (1 << 20) - len(draft.entries)
+        return replace(draft, entries=(second, first, *others)).with_header(frame_count=count, segment_count=count)
+
+    invalid("cut-behind-first-byte", "TRUNCATED", "open", "one byte, that of Magic", lambda: first_bytes(1))
+    invalid(
+        "header-alone",
+        "BAD_HEADER",
+        "open",
+        "24 bytes are a header: its Chunk_Count is 0",
+        lambda: lone().draft().with_header(chunk_count=0).file()[:24],
+    )
+    header(
+        "chunks-2-20", "BAD_HEADER", "Chunk_Count 2^20 is allowed, but Front_Length is too small", chunk_count=1 << 20
+    )
+    header("front-length-2-24", "TRUNCATED", "Front_Length 2^24 is allowed, but not there", front_length=1 << 24)
+    invalid(
+        "front-alone-damaged",
+        "BAD_CHECKSUM",
+        "open",
+        "a file that ends with its front, which is damaged",
+        lambda: flipped(front_alone(lone().draft()), 30),
+    )
+    table(
+        "one-chunk",
+        "BAD_CHUNK_TABLE",
+        "Chunk_Count 1 is allowed, but chunks are missing",
+        lambda: replace(lone().draft(), entries=lone().draft().entries[:1]),
+    )
+    table(
+        "longest-and-order",
+        "BAD_CHUNK_TABLE",
+        "as many segments and chunks as Max_Table_Bytes allows, of which the first two are the wrong way round",
+        segments_of_tables,
+    )
+    table(
+        "repeatable-order",
+        "BAD_CHUNK_TABLE",
+        "an attribute behind a chunk whose number is larger",
+        lambda: not_refused(lambda: fork().add(Entry(0x8040, FUTURE), Entry(rd.ATTRIBUTE, radius), sort=False)),
+    )
+    invalid(
+        "table-longest-chunk",
+        "TRUNCATED",
+        "strict",
+        "a last chunk of 2^28 bytes is allowed, but has not arrived",
+        lambda: fork().add(Entry(0x8040, FUTURE, length=1 << 28)),
+    )
+    invalid(
+        "joins-0",
+        "BAD_CHUNK_TABLE",
+        "open",
+        "a segment is joined over 0 frames",
+        lambda: not_refused(lambda: joined(FORK, 500, 0, 0.5, 0, 0, 0, 0).draft()),
+    )
+
+
+at_limits_of_front()
+
+
+def at_limits_of_static_data() -> None:
+    longest, many = 1 << 20, 1 << 25
+
+    def recent(_: bytes) -> None:
+        """A triangle of vertex 0 and of the corner before that."""
+        coder, model = rd.RangeDecoder(b""), rd.PolygonModel()
+        decisions = [(model.guessed[1][0][0], 1), (model.guessed[1][1][2], 0), (model.is_recent[1], 1)]
+        node = 1
+        for bit in (0, 0, 0, 0, 1):
+            decisions.append((model.recent[1][node], bit))
+            node = node << 1 | bit
+        decisions.append((model.guessed[1][2][15], 1))
+        coder.script = Script(*(bit for _, bit in decisions))
+        for context, _ in decisions:
+            coder.bit(context)
+
+    valid(
+        "metadata-longest",
+        "a text of 2^20 bytes",
+        lambda: metadata(
+            frame(
+                b"{" + b" " * (longest - 2) + b"}",
+                checksum=None,
+                blocks=raw_block(b"{", False)
+                + b"".join(run_block(b" ", n, False) for n in [1 << 17] * 7 + [(1 << 17) - 2])
+                + raw_block(b"}", True),
+            ),
+            1,
+        ),
+    )
+    zstd_frame("descriptor-alone", "a frame that ends before its Window_Descriptor", rd.ZSTD_MAGIC + b"\0")
+    zstd_frame(
+        "header-alone",
+        "a frame of a header alone, with the largest window and no size: the window comes first",
+        rd.ZSTD_MAGIC + b"\0\xff",
+        "LIMIT_EXCEEDED",
+    )
+    valid(
+        "faces-none-widest",
+        "no faces of 2^26 corners each",
+        lambda: with_static((rd.FACES, polygon_head("<u4", 0, 1 << 26))),
+    )
+    valid(
+        "faces-of-most-corners",
+        "faces of as many corners as Count_Type holds",
+        lambda: with_static((rd.FACES, mixed_polygons([[0, 1, 2], [i % 5 for i in range(127)]], types=("<u4", "|i1")))),
+    )
+    static(
+        "faces-more-corners-of-many",
+        "the second of two faces has one corner more than are left, of 2^25: none is decoded",
+        faces(
+            polygon_head("<u4", 2, many, "<u4")
+            + write(
+                *(rd.decode_polygons, [42, *[0, 1, 2] * 14, many - 41]),
+                *(rd.PolygonShape(2, 2, False, False, 2, 0, many), 5),
+                lowest=True,
+            )
+        ),
+    )
+    static(
+        "faces-recent-before-first",
+        "the second corner is the one before the first",
+        lambda: with_static((rd.FACES, polygon_head("<u4", 1, 3) + write(recent, []))),
+    )
+    strips = {
+        "up": [[i, i + 1, i + 2] for i in range(18)],
+        "down": [[i, i - 1, i - 2] for i in range(19, 1, -1)] + [[1, 0, 2], [3, 4, 0]],
+    }
+    for name, strip in strips.items():
+        for is_absolute in (False, True):
+            valid(
+                f"faces-{name}-and-on{'-absolute' if is_absolute else ''}",
+                f"triangles {'up to the last vertex' if name == 'up' else 'down to vertex 0'}, beyond which the same "
+                f"ways would lead{'; vertices by their numbers' if is_absolute else ''}",
+                lambda strip=strip, is_absolute=is_absolute: (
+                    moving([Stem(-1, 20)], 501, frames=1)
+                    .draft()
+                    .add(Entry(rd.FACES, polygons(np.array(strip + [[7, 3, 9]], "<u2"), 20, is_absolute)))
+                ),
+            )
+
+
+at_limits_of_static_data()
+
+
+class Counts(Chance):
+    """Rows of 20 to 40 frequencies, most of them of 30 and 31, and empty ones."""
+
+    def answer(self, asked: str, most: int):
+        if asked == "count":
+            return min(most, int(self.random.choice([0, 20, 29, 30, 30, 31, 31, 32, 40])))
+        return int(self.random.integers(-1, 2) * self.random.integers(0, 2))
+
+
+IMPULSES = basis_stream([[128, 0], [0, 128]], 8)  # a learned basis of two frames: each alone
+
+
+def at_limits_of_motion() -> None:
+    base, most = [Stem(-1, 3)], (1 << 30) - 1
+    valid(
+        "predicted-on-vertex-0",
+        "a stem on vertex 0, whose first vertex is no end",
+        lambda: predicted([Stem(-1, 2, flags=WHOLE), Stem(0, 3, 0)], swayed(6, 510, [Stem(-1, 2), Stem(0, 3, 0)])),
+    )
+    valid(
+        "rows-of-30",
+        "rows of 30 and 31 frequencies, which are expected differently",
+        lambda: Plant([Stem(-1, 9)], frames=40, scripts={(rd.STEMS, k): lambda k=k: Counts(511 + k) for k in (0, 1)}),
+    )
+    motion(
+        "frequencies-1023",
+        rd.STEMS,
+        1,
+        "a row codes 1023 frequencies of two: as long as a number of them can be",
+        lambda: stems_head() + write(rd.decode_stems, [1023], forked_plan(), stems_motion(stems_head(), 2), 1),
+    )
+    valid(
+        "basis-exponents",
+        "the exponent of a row of a basis is -200, and 400 more in the next",
+        lambda: Plant(
+            base,
+            frames=2,
+            heads={0: stems_head(0.25, 0, 2, 2, basis_in_waves(2, -200, 400, *row((1, 1, 0), (2, -1, 0)), rank=2))},
+            scripts={(rd.STEMS, 0): lambda: Chance(513)},
+        ),
+    )
+    motion(
+        "basis-length-one-more",
+        rd.STEMS,
+        1,
+        "Basis_Length is one more than the chunk holds",
+        lambda: struct.pack("<fBBHBI", 0.5, 0, 8, 2, 255, 1 + len(IMPULSES)) + IMPULSES,
+    )
+    motion(
+        "basis-length-cut",
+        rd.STEMS,
+        1,
+        "the chunk ends before the last byte of Basis_Length",
+        lambda: stems_head(0.5, 0, 8, 1)[:12],
+    )
+    valid(
+        "basis-of-level-0",
+        "learned bases that begin with that of level 0",
+        lambda: Plant(
+            base,
+            frames=3,
+            heads={
+                0: stems_head(0.25, 0, 8, 1, basis_stream([[99, -128, 3]], 8)),
+                1: stems_head(0.25, 0, 9, 2, basis_stream([[256, 0, -77]], 9), base=0),
+            },
+            scripts={(rd.STEMS, 0): lambda: Chance(514), (rd.STEMS, 1): lambda: Chance(515)},
+        ),
+    )
+    valid(
+        "corrections-of-one-frame",
+        "corrections in a segment of one frame, before which there is none",
+        lambda: Plant(base, scripts={(rd.CORRECTIONS, 1, 0): [1, *(2, 3, 1, 0), 0, 1, *(1, 0, 5, 1)]}),
+    )
+    valid(
+        "gaps-of-62-quarters",
+        "a distance along a stem of 15 times the mean",
+        lambda: placed([Stem(-1, 24)], [[x + 38.2 * (x > 9), 0, 0] for x in range(24)], 516, is_float64=True),
+    )
+    valid(
+        "layers-shapes-of-many-modes",
+        "eight shapes of a piece of 18 modes, the last of which have rows of their own",
+        lambda: Plant(
+            [Stem(-1, 18)],
+            frames=3,
+            layers=2,
+            heads=LAYER_HEADS,
+            scripts={
+                (rd.SHAPES, 0, 0): [6, *(n for i in range(6) for n in row((i, 1, 0), (2, 0, -i)))],
+                (rd.SHAPES, 1, 0): [2, *row((0, 0, 1)), *row((1, 0, 0), (0, 0, 0), (0, 3, 1))],
+                (rd.SHAPES, 2, 0): [8, *(n for i in range(8) for n in refined_row((i % 3, -1, 0)))],
+            }
+            | {(rd.STEMS, level): lambda level=level: Chance(517 + level, large=6, empty=0.1) for level in range(3)},
+        ),
+    )
+    valid(
+        "layers-shapes-largest",
+        "a shape with the largest integers there are, which a refinement of Shift 0 goes back from",
+        lambda: Plant(
+            base,
+            frames=2,
+            layers=2,
+            shift=0,
+            heads=LAYER_HEADS,
+            scripts={
+                (rd.SHAPES, 0, 0): [2, *row((most, 1, 0)), *row((0, -most, 3))],
+                (rd.SHAPES, 2, 0): [2, *refined_row((-most, 0, 0)), *refined_row((0, -most, 0))],
+            }
+            | {(rd.STEMS, level): lambda level=level: Chance(521 + level, large=6, empty=0.0) for level in range(3)},
+        ),
+    )
+    valid(
+        "layers-halves",
+        "what is predicted of one vertex is half the ratio, in another basis than before, and half a step in the same",
+        lambda: Plant(
+            [Stem(-1, 1)],
+            frames=4,
+            segments=2,
+            layers=2,
+            heads={
+                0: stems_head(0.5, 0, 8, 2, IMPULSES),
+                (2, 0): stems_head(0.25, 0, 8, 2, IMPULSES),
+                (2, 1): stems_head(1.0, 0, 9, 2, base=0),
+            },
+            scripts={(rd.STEMS, 0): row((1, 0, -1), (-1, 2, 3)), (rd.STEMS, 2): row()},
+        ),
+    )
+    valid(
+        "layers-rigid-turned-300",
+        "a branch that moves as it is turned by 100, 180, 250 and 300 degrees, one after the other",
+        lambda: Plant(
+            [Stem(-1, 4, rigid=1)],
+            frames=5,
+            layers=2,
+            is_float64=True,
+            rest=exact_rest([Stem(-1, 4)], [0.0, 0, 0, 2, 0, 0, 0, 3, 0, 0, 0, 5], True),
+            heads={
+                0: stems_head(
+                    8.0, 4 << 4 | 1, 8, 5, basis_stream([[128 * (k == t) for t in range(5)] for k in range(5)], 8)
+                ),
+                2: stems_head(0.25, 1),
+            },
+            scripts={
+                (rd.STEMS, 0): [*row(), *row(*((0, 0, n) for n in (0, 7, 16, 31, 60)))],
+                (rd.STEMS, 2): [0, *refined_row((3, -5, 2))],
+            },
+        ),
+    )
+    valid(
+        "layers-rigid-from-a-point",
+        "rigid branches at one place in the first layer, where they have no rotation, and not in the next",
+        lambda: Plant(
+            [Stem(-1, 2), Stem(0, 3, 1, rigid=1), Stem(0, 3, 1, rigid=2)],
+            frames=2,
+            layers=2,
+            points=[[0, 0, 0], *[[1, 2, 3]] * 7],
+            heads=LAYER_HEADS,
+            scripts={(rd.STEMS, level): lambda level=level: Chance(525 + level, large=6) for level in range(4)}
+            | {(rd.REFINED_REST, 3, 0): lambda: Chance(529, large=4, empty=0.0)},
+        ),
+    )
+    ratios = (63000, 0.36065), (67000, 0.34967), (0.45, 0.5)
+    valid(
+        "layers-rigid-ratios-near",
+        "steps of rotations are 63000 and 67000 times those of the next layer, and less than half of them",
+        lambda: Plant(
+            [Stem(-1, 3, rigid=2)],
+            frames=6,
+            segments=3,
+            layers=2,
+            is_float64=True,
+            points=[[0, 0, 0], [3, 0, 0], [1, 4, 0]],
+            heads={0: stems_head(0.125, 1)}
+            | {
+                (2, s): stems_head(0.125 / ratio, 1, 16, 1, basis_stream([[int(size * 32768)] * 2], 16))
+                for s, (ratio, size) in enumerate(ratios)
+            },
+            scripts={(rd.STEMS, 0): [*row(), *row((1, -1, 1))]}
+            | {(rd.STEMS, 2, s): [*row(), *refined_row((1, 0, 2))] for s in range(3)},
+        ),
+    )
+
+
+at_limits_of_motion()
+
+
+def at_limits_of_rest_poses() -> None:
+    valid(
+        "time-uneven-empty",
+        "TIME of Method 2 without a stream: its bits are ones, and the only time is the least that there is",
+        lambda: lone(time=b"\2"),
+    )
+    valid(
+        "rest-connected-own-opposite",
+        "a quadrangle whose corners one and three are the same vertex, behind those between them",
+        lambda: meshed([Stem(-1, 5)], [[3, 0, 3, 1], [0, 1, 2], [2, 3, 4]], Chance(530, large=5)),
+    )
+    valid(
+        "rest-copies-between",
+        "the last turn of a shape is two and a half steps of the next copy, but for rounding",
+        lambda: copy_of((36, 0, 0), (0, 0, 1, 0), (15, 0, 3, 0), *[(0, 0, 0, 0), (15, 0, 0, 0)] * 3),
+    )
+    points = [Stem(-1, 1, lag=2), Stem(-1, 1, lag=2), Stem(-1, 1, lag=2, detail=100), Stem(-1, 1, lag=2, detail=100)]
+    far = [10**9, 495 * 10**6, 515 * 10**6]  # units in x, in y and z pairs of them
+    valid(
+        "rest-adaptive-far",
+        "what is expected by the weights is 10^9 units, a little less, or more than is allowed",
+        lambda: with_rest(points, adaptive_rest(points, [0, *far, 0, 0, 0, *(-n for n in far), 0, 0, 0], rest_type=1)),
+    )
+
+
+at_limits_of_rest_poses()
+
+
+def of_sizes(*powers: int) -> list[list[float]]:
+    """A stem, and for each power of two three vertices by chance that are as far away from its first one; every second
+    three are flat."""
+    random = np.random.default_rng(531)
+    triples = [
+        math.ldexp(1.0, power - 10) * random.integers(-1024, 1025, (3, 3)) * [1, 1, i % 2]
+        for i, power in enumerate(powers)
+    ]
+    return [[0.0, 0.0, 0.0], [0.0, 1.0, 0.0], *np.vstack(triples).tolist()]
+
+
+def of_any_size(*powers: int) -> Plant:
+    """Rigid branches of these sizes, all turned."""
+    stems = [Stem(-1, 2), *(Stem(0, 3, 0, rigid=1) for _ in powers)]
+    size = [1 << 28 if power > 0 else 1 for power in powers]
+    turned = [row((n * (1 + i % 3), n * (2 - i % 4), n), (i % 2, 3 * n, -n)) for i, n in enumerate(size)]
+    return Plant(
+        stems,
+        frames=2,
+        is_float64=True,
+        rest=exact_rest(stems, [x for point in of_sizes(*powers) for x in point], True),
+        heads={level: stems_head(1e38, 3 << 4 | 4) for level in range(3)},
+        scripts={(rd.STEMS, 1): [*row() * 4, *(value for each in turned for value in each)]},
+    )
+
+
+def shrunk(last: int) -> Plant:
+    """A row that 18 known ones along it leave about 1e-100 of; `last`: an entry of the last of these, in 1/32768."""
+    known = [[6426] * 26] * 17 + [[last] * 26]
+    rows = [[entry / 32768 for entry in entries] for entries in known]
+    in_waves = basis_in_waves(26, -200, *row((1, 0, 0)), rank=19, known=rows)
+    return Plant(
+        [Stem(-1, 3)],
+        frames=26,
+        heads={
+            0: stems_head(0.25, 0, 16, 18, basis_stream(known, 16)),
+            1: stems_head(0.25, 0, 2, 19, in_waves, base=0),
+        },
+        scripts={(rd.STEMS, 1): row(*[(0, 0, 0)] * 18, (50, -30, 10))},
+    )
+
+
+def at_limits_of_algebra() -> None:
+    rounded = (263597123, 32053444), (241475353, 36228921), (79323412, 26324395), (170050111, 70213091)
+    valid(
+        "rigid-tiny",
+        "branches that move as they are, of 1e-78 to 1e-84 and of 1e-160: squares of their moments are 0",
+        lambda: of_any_size(*[*range(-274, -265)] * 2, *[-268] * 12, -279, -276, -260, *[*range(-536, -531)] * 2),
+    )
+    valid(
+        "rigid-huge",
+        "rigid branches of 1e77 to 1e150: squares of their moments are infinite, and nothing is reduced",
+        lambda: of_any_size(250, 257, 258, 259, 260, 300, 400, 500),
+    )
+    for side, last in (("above", 6448), ("below", 6405)):
+        valid(
+            f"basis-short-{side}",
+            f"a row of a basis whose squares add up to {side} 1e-200, since the known rows are no unit vectors",
+            lambda last=last: shrunk(last),
+        )
+    valid(
+        "basis-rounded",
+        "rows of bases, of which an entry is within 2^-56 of the middle between two numbers of binary32",
+        lambda: Plant(
+            [Stem(-1, 2)],
+            frames=8,
+            segments=4,
+            heads={
+                (0, s): stems_head(0.25, 0, 2, 1, basis_in_waves(2, 0, *row((a, 0, 0), (b, 0, 0)), rank=1))
+                for s, (a, b) in enumerate(rounded)
+            },
+            is_float64=True,
+            scripts={(rd.STEMS, 0): [*row((1, 3, 0)), *row((0, 1, 7))]},
+        ),
+    )
+
+
+at_limits_of_algebra()
 
 
 # ---- what no encoder writes, and decoders may take for granted ------------------------------------------------

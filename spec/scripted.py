@@ -214,15 +214,15 @@ def scripted(script: Script) -> Iterator[list[ScriptedCoder]]:
             setattr(rd, name, function)
 
 
-def write(function: Callable, script: Script | list, *arguments) -> bytes:
+def write(function: Callable, script: Script | list, *arguments, lowest: bool = False) -> bytes:
     """The stream that `function` of the reference decoder reads as the script.
 
-    It ends at a value that the function refuses."""
+    It ends at a value that the function refuses; `lowest`: who goes on behind that reads ones."""
     script = script if isinstance(script, Script) else Script(*script)
     with scripted(script) as made, np.errstate(all="ignore"):
         with suppress(rd.AthError):
             function(b"", *arguments)
-    return made[0].stream()
+    return made[0].low.to_bytes(made[0].length, "big").rstrip(b"\0") if lowest else made[0].stream()
 
 
 # ---- files in pieces ---------------------------------------------------------------------------------------
@@ -310,11 +310,12 @@ class FrontScript:
             above = errors[start : start + 3]
 
     def add_joins(self, joins: Sequence[rd.Join]) -> None:
-        """One of each level and segment."""
+        """One of each level and segment; a sloped one of width 0 is said, and not valid."""
         last = 16
         for join in joins if self.counts["segment_count"] > 1 else ():
-            self.values.append(int(join.width != 0))
-            if join.width != 0:
+            is_said = join.width != 0 or join.is_sloped
+            self.values.append(int(is_said))
+            if is_said:
                 self.values += [int(join.is_sloped), join.width - last]
                 last = join.width
 
