@@ -35,7 +35,12 @@ class ThreadPool:
         """function(*item) of all items, in order."""
         if self._executor is None or len(items) < 2:
             return [function(*item) for item in items]
-        return list(self._executor.map(lambda item: function(*item), items))
+        started = [self._start(function, *item) for item in items]
+        try:
+            return [future.result() for future in started]
+        finally:
+            for future in started:
+                future.cancel()
 
     def ordered(self, function: Callable[[Any], Any], items: Iterable[Any], ahead: int) -> Iterator[Any]:
         """function(item) of all items, in order; up to `ahead` further items are read and started meanwhile."""
@@ -44,11 +49,28 @@ class ThreadPool:
             return
         pending: deque[Future[Any]] = deque()
         for item in items:
-            pending.append(self._executor.submit(function, item))
+            pending.append(self._start(function, item))
             if len(pending) > ahead:
                 yield pending.popleft().result()
         while pending:
             yield pending.popleft().result()
+
+    def _start(self, function: Callable[..., Any], *words: Any) -> Future[Any]:
+        """The call on another thread or, where there is no memory for one, on the caller's."""
+        if self._executor is not None:
+            try:
+                return self._executor.submit(function, *words)
+            except (
+                RuntimeError
+            ):  # the call may be queued nevertheless: it is done again when no thread is left to do it
+                self._executor.shutdown()
+                self._executor = None
+        done: Future[Any] = Future()
+        try:
+            done.set_result(function(*words))
+        except Exception as error:
+            done.set_exception(error)
+        return done
 
 
 SERIAL = ThreadPool()

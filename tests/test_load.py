@@ -154,3 +154,11 @@ def test_every_array_of_every_call_failing_once_is_a_memory_error_and_nothing_el
 def test_little_address_space_is_a_memory_error(sample_ath):
     row = load.little_space(sample_ath, [0, 0.3, 1, 3, 10])
     assert row.tried == 5 and row.crashes == row.wrong == 0, row.note
+
+
+def test_where_no_thread_can_be_started_the_caller_decodes_all_segments(sample_clip, tmp_path):
+    """A thread takes 8 MB of address space."""
+    path = tmp_path / "segments.ath"
+    athcodec.encode(sample_clip, path, effort="fast", segment_frames=40)
+    row = load.little_space(path, [4, 5, 6, 7])
+    assert row.faults == 0 and row.tried == 4
