@@ -526,9 +526,9 @@ class Decoder:
     @contextmanager
     def changed(self, mutant: Mutant) -> Iterator[types.ModuleType]:
         """The changed module; what only defines a function is changed in the usual module for a while."""
-        there = mutant.place.put(mutant.node)
         node, names = self.tree.body[mutant.top], self.usual.__dict__
         in_place = isinstance(node, ast.FunctionDef) and node.name not in self.at_import
+        there = mutant.place.put(mutant.node)
         try:
             if in_place:
                 exec(compiled(node), names)
