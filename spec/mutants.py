@@ -199,7 +199,7 @@ def assigned(node: ast.stmt) -> list[str]:
 
 
 def uses(tree: ast.Module) -> dict[str, frozenset[int]]:
-    """Statements of functions that use each name of the module or of a class, or what is made of it."""
+    """Statements of functions that use each name of the module or of a class, or what it is part of there."""
     found: dict[str, set[int]] = defaultdict(set)
     made_of: dict[str, set[str]] = defaultdict(set)
     for node in ast.walk(tree):
@@ -211,9 +211,10 @@ def uses(tree: ast.Module) -> dict[str, frozenset[int]]:
             statement = statement.body[0]
         if in_function(statement):
             found[name].add(statement.number)  # type: ignore[attr-defined]
-        made_of[name] |= set(assigned(statement)) - {name}
+        else:
+            made_of[name] |= set(assigned(statement)) - {name}
     while True:
-        more = {name: found[name].union(*(found[other] for other in made_of[name])) for name in made_of}
+        more = {name: found[name].union(*(found[other] for other in made_of[name])) for name in {*found, *made_of}}
         if all(more[name] == found[name] for name in more):
             return defaultdict(frozenset, {name: frozenset(them) for name, them in more.items()})
         found.update(more)
