@@ -14,7 +14,7 @@ import zstandard
 from files import Parts, opened
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from plants import STEADY, awkward_plants, bound_for, clip_of, grow, plant, random_hierarchy, sway
+from plants import STEADY, awkward, awkward_plants, bound_for, clip_of, grow, plant, random_hierarchy, sway
 
 import athcodec
 from athcodec import container as ct
@@ -318,3 +318,16 @@ def test_damage_is_noticed(grown):
     damaged[chunk.offset + chunk.length // 2] ^= 1
     with pytest.raises(AthError, match="checksum"):
         opened(bytes(damaged)).positions(level=1)
+
+
+def test_a_copy_of_the_rest_pose_keeps_the_bound_as_it_is_put_out(tmp_path):
+    """The rest pose is of the decoder's own numbers, and a frame that repeats it is rounded to the output's."""
+    clip = awkward(seed=408505, branches=7, longest=7, frames=3, shape="straight", motion="noise", scale=1e-6)
+    just_below = 2.0**-16 * (1 - 2.0**-22)  # numbers are coarser beyond
+    positions = (clip.positions / np.abs(clip.positions).max() * just_below).astype(np.float32)
+    clip = athcodec.MotionClip(positions, clip.time, clip.vertex_branch, clip.branch_parent)
+    bound = 5.2436314 * float(np.spacing(np.abs(clip.positions).max()))
+    made = athcodec.encode(clip, tmp_path / "a.ath", max_error=bound, effort="fast")
+    with athcodec.open(made.path) as decoder:
+        assert decoder.file.header.is_predicted
+        assert np.linalg.norm(decoder.positions().astype(float) - clip.positions, axis=2).max() <= bound

@@ -317,6 +317,13 @@ static const double *source_of(const prediction *p, const predicted_source *sour
     return source->source + 3 * ((size_t)p->vertex_count * (size_t)p->frame + (size_t)v);
 }
 
+/* A coordinate of the rest pose as a copy of it is put out, less the origin. */
+static double put_back_rest(const prediction *p, size_t at, size_t k)
+{
+    double x = p->rest[at] + p->origin[k];
+    return (p->is_float64 ? x : (double)(float)x) - p->origin[k];
+}
+
 /* Square of the distance of a vertex from where it was in an earlier frame. */
 static double way2_from(const prediction *p, const predicted_source *source, int32_t frame, int32_t v)
 {
@@ -324,7 +331,7 @@ static double way2_from(const prediction *p, const predicted_source *source, int
     size_t from = 3 * (size_t)v, at = 3 * (size_t)p->vertex_count * (size_t)ath_max(frame, 0) + from;
     double way2 = 0.0;
     for (size_t k = 0; k < 3; k++) {
-        double off = (frame < 0 ? p->rest[from + k] : put_back(p, at, k)) - wanted[k];
+        double off = (frame < 0 ? put_back_rest(p, from + k, k) : put_back(p, at, k)) - wanted[k];
         way2 = way2 + off * off;
     }
     return way2;
