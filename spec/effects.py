@@ -100,6 +100,15 @@ def is_about(node: ast.AST, inner: ast.AST) -> bool:
     return isinstance(node, (ast.comprehension, ast.keyword)) and any(each is inner for each in ast.walk(node))
 
 
+def in_function(node: ast.AST, up: Callable[[ast.AST], ast.AST]) -> bool:
+    """What stands elsewhere is evaluated once, before any vector is decoded."""
+    while not isinstance(node, ast.Module):
+        node, before = up(node), node
+        if isinstance(node, ast.FunctionDef) and before in node.body:
+            return True
+    return False
+
+
 def has_value(node: ast.AST) -> bool:
     if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in LAZY:
         return False
@@ -136,7 +145,8 @@ class Effects:
         for mutant in mutants:
             there = mutant.place.put(mutant.node)
             mutant.place.put(there)
-            if (at := place_of_effect(there, mutant.node, is_pure, up)) is None:
+            at = place_of_effect(there, mutant.node, is_pure, up) if in_function(there, up) else None
+            if at is None:
                 continue
             mutant.place.put(mutant.node)
             number = at.number  # type: ignore[attr-defined]
