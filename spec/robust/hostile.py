@@ -37,7 +37,7 @@ from test_damage import CHUNK_FIELDS, corrupted_front, mutations, use  # noqa: E
 
 VECTORS = ROOT / "spec" / "vectors" / "valid"
 SMALL = 4096
-MOST_ENTRIES = 1 << 16
+MOST_ENTRIES, MOST_FRAMES = 1 << 16, 1 << 22
 LIMITS = Limits(memory_bytes=64 << 20, decoded_chunk_bytes=16 << 20)
 
 
@@ -163,9 +163,10 @@ def header_field(data: bytes, change: tuple[str, float]) -> int:
         return within_limits(with_header(data, **{name: value}))
     parts = Parts.of(data)
     header = replace(parts.header, **{name: value})
-    if header.level_count * header.segment_count > MOST_ENTRIES:
+    if header.level_count * header.segment_count > MOST_ENTRIES or header.frame_count > MOST_FRAMES:
         return 0
     shape = header.level_count, header.segment_count
+    header.repeats = np.resize(parts.header.repeats, header.frame_count)
     errors, header.joins = np.resize(parts.errors, (*shape, 3)), np.resize(parts.header.joins, shape)
     return within_limits(Parts(header, errors, parts.chunks).file())
 
