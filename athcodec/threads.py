@@ -60,9 +60,7 @@ class ThreadPool:
         if self._executor is not None:
             try:
                 return self._executor.submit(function, *words)
-            except (
-                RuntimeError
-            ):  # the call may be queued nevertheless: it is done again when no thread is left to do it
+            except RuntimeError:  # the call may be queued all the same, and done twice
                 self._executor.shutdown()
                 self._executor = None
         done: Future[Any] = Future()

@@ -30,6 +30,19 @@ LAZY = frozenset(["enumerate", "map", "reversed", "zip"])  # calls whose values 
 WITHOUT_VALUE = (ast.GeneratorExp, ast.Slice, ast.Starred, ast.Lambda)
 
 
+def parent_of(node: ast.AST) -> ast.AST:
+    return node.up  # type: ignore[attr-defined]
+
+
+def in_function(node: ast.AST) -> bool:
+    """Whether it runs when a function is called; what stands elsewhere does once, before any vector is decoded."""
+    while not isinstance(node, ast.Module):
+        node, before = parent_of(node), node
+        if isinstance(node, ast.FunctionDef) and before in node.body:
+            return True
+    return False
+
+
 def parts(node: ast.AST) -> Iterator[ast.AST]:
     for child in ast.iter_child_nodes(node):
         if not isinstance(child, (ast.expr_context, ast.operator, ast.unaryop, ast.boolop, ast.cmpop)):
@@ -57,9 +70,9 @@ class Purity:
         return all(self(statement) for statement in function.body)
 
     def __call__(self, node: ast.AST) -> bool:
-        return all(self._alone(each) for each in ast.walk(node))
+        return all(self.alone(each) for each in ast.walk(node))
 
-    def _alone(self, node: ast.AST) -> bool:
+    def alone(self, node: ast.AST) -> bool:
         """Whether a node has no side effects but those of its parts."""
         if isinstance(node, (ast.NamedExpr, ast.Yield, ast.YieldFrom, ast.Await, ast.Lambda)):
             return False
@@ -85,10 +98,10 @@ def place_of_effect(
         return None
     found = node if has_value(node) and has_value(changed) else None
     while True:
-        node, before = up(node), node
+        node, before = parent_of(node), node
         if isinstance(node, (ast.comprehension, ast.keyword)):
             continue
-        if not isinstance(node, ast.expr) or not is_pure._alone(node):
+        if not isinstance(node, ast.expr) or not is_pure.alone(node):
             return found
         if not all(is_pure(part) for part in parts(node) if part is not before and not is_about(part, before)):
             return found
@@ -98,15 +111,6 @@ def place_of_effect(
 
 def is_about(node: ast.AST, inner: ast.AST) -> bool:
     return isinstance(node, (ast.comprehension, ast.keyword)) and any(each is inner for each in ast.walk(node))
-
-
-def in_function(node: ast.AST, up: Callable[[ast.AST], ast.AST]) -> bool:
-    """What stands elsewhere is evaluated once, before any vector is decoded."""
-    while not isinstance(node, ast.Module):
-        node, before = up(node), node
-        if isinstance(node, ast.FunctionDef) and before in node.body:
-            return True
-    return False
 
 
 def has_value(node: ast.AST) -> bool:
@@ -138,14 +142,14 @@ def later(node: ast.AST) -> ast.Lambda:
 class Effects:
     """Which changes make a difference; `mutants`: changes, each with a place and the node that comes there."""
 
-    def __init__(self, tree: ast.Module, mutants: list[Any], up: Callable[[ast.AST], ast.AST]):
+    def __init__(self, tree: ast.Module, mutants: list[Any]):
         is_pure = Purity(tree)
         ways: dict[int, list[ast.AST]] = defaultdict(list)
         named: dict[int, list[str]] = defaultdict(list)
         for mutant in mutants:
             there = mutant.place.put(mutant.node)
             mutant.place.put(there)
-            at = place_of_effect(there, mutant.node, is_pure, up) if in_function(there, up) else None
+            at = place_of_effect(there, mutant.node, is_pure) if in_function(there) else None
             if at is None:
                 continue
             mutant.place.put(mutant.node)

@@ -44,7 +44,7 @@ from typing import Any
 import numpy as np
 
 from spec import conformance
-from spec.effects import Effects
+from spec.effects import Effects, in_function, parent_of
 
 HERE = Path(__file__).resolve().parent
 DECODER = HERE / "reference_decoder.py"
@@ -101,10 +101,6 @@ class Mutant:
     statements: frozenset[int]  # of which one has to run; empty: any may do
     function: str
     of_floats: int = -1  # the expression that has to be of floats; -1: any
-
-
-def parent_of(node: ast.AST) -> ast.AST:
-    return node.up  # type: ignore[attr-defined]
 
 
 class Changes:
@@ -175,15 +171,6 @@ class Changes:
             name += f" ({self._names[name]})"
         number = node.number if of_floats else -1  # type: ignore[attr-defined]
         self.mutants.append(Mutant(name, place, replacement, self.top, self.statements, self.function, number))
-
-
-def in_function(node: ast.AST) -> bool:
-    """Whether it runs when a function is called."""
-    while not isinstance(node, ast.Module):
-        node, before = parent_of(node), node
-        if isinstance(node, ast.FunctionDef) and before in node.body:
-            return True
-    return False
 
 
 def statement_of(node: ast.AST) -> ast.stmt:
@@ -702,7 +689,7 @@ MISSED = "missed"
 def find_effects(changes: Changes, vectors: list[Known], cache: Cache, mutants: list[Mutant], jobs: int) -> None:
     """Notes in which vectors a change makes no difference where it stands: they cannot catch it."""
     left = [mutant for mutant in mutants if cache.fates.get(mutant.name, MISSED) == MISSED]
-    effects = Effects(changes.tree, left, parent_of)
+    effects = Effects(changes.tree, left)
     decoder, running, every = Decoder(effects.tree), dict[int, list[Known]](), cache.mask(effects.names)
     waiting = batches([each for each in vectors if every & ~cache.compared.get(each.name, 0)], TOGETHER)
     with tempfile.TemporaryDirectory() as folder:
@@ -736,10 +723,8 @@ def write_effects(effects: Effects, decoder: Decoder, batch: list[Known], folder
         for vector in batch:
             clear_caches(module)
             effects.begin()
-            opened: dict = {}
-            for item, expected in vector.expected.items():
-                if answer(module, vector, item, opened) != expected:
-                    raise AssertionError(f"{vector.name}, {item}: another result when watched")
+            if not is_as_expected(module, vector):
+                raise AssertionError(f"{vector.name}: another result when watched")
             out.write(pickle.dumps((vector.name, effects.found)))
 
 

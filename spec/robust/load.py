@@ -197,7 +197,7 @@ def seeks(path: Path, count: int) -> Row:
 
 ALLOWED_GROWTH = (
     4 << 20
-)  # bytes that allocators of threads may keep; a segment that leaks at each seek takes 25 times that
+)  # bytes that allocators of threads may keep; leaking a segment at each seek takes 25 times that
 
 
 # ---- many at once ----
