@@ -90,9 +90,7 @@ class Purity:
         return function.attr in PURE_METHODS or isinstance(of, ast.Name) and of.id in PURE_MODULES
 
 
-def place_of_effect(
-    node: ast.AST, changed: ast.AST, is_pure: Purity, up: Callable[[ast.AST], ast.AST]
-) -> ast.AST | None:
+def place_of_effect(node: ast.AST, changed: ast.AST, is_pure: Purity) -> ast.AST | None:
     """The largest expression about a changed node that has no side effects beside it; None: there is none."""
     if not isinstance(node, ast.expr) or not isinstance(changed, ast.expr) or not is_pure(changed):
         return None
