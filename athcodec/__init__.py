@@ -18,7 +18,7 @@ if TYPE_CHECKING:  # what __getattr__ finds, for type checkers and the reference
     from athcodec.transitions import endless
     from athcodec.truncation import truncate
 
-__version__ = "1.0.0"
+__version__ = "0.13.0"
 __all__ = [
     "Ath",
     "AthFile",

@@ -25,7 +25,7 @@ from athcodec.clip import ClipRange
 from athcodec.errors import BadChunk, ClipError, FormatError, LimitExceeded
 
 MAGIC = b"\x89ATH\r\n\x1a\n"
-MAJOR, MINOR, FEATURES = 1, 0, 0
+MAJOR, MINOR, FEATURES = 0, 13, 0
 NO_LEVEL = 255
 NODE_WAVES = 1
 ONLY_TIPS = 8  # of Rotation

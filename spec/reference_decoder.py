@@ -92,7 +92,7 @@ def crc32c(data: bytes) -> int:
 # ---- the front: header and chunks ----------------------------------------------------------------------
 
 MAGIC = b"\x89ATH\r\n\x1a\n"
-VERSION, KNOWN_FEATURES = (1, 0), 0x0000
+VERSION, KNOWN_FEATURES = (0, 13), 0x0000
 HEADER_BYTES, CHECKSUM_BYTES, TABLE_BYTES_OF_EACH = 24, 4, 16
 SEGMENT_FRAMES, MOST_LEVELS, MOST_LAYERS, MOST_CLIPS, NO_LEVEL = 256, 32, 8, 255, 255
 
@@ -473,7 +473,7 @@ def check_magic(data: bytes) -> None:
         "NOT_AN_ATH_FILE",
     )
     if len(data) >= 12:
-        require(data[8] == VERSION[0], f"version {data[8]}.{data[9]} is not known", "UNSUPPORTED_VERSION")
+        require((data[8], data[9]) == VERSION, f"version {data[8]}.{data[9]} is not known", "UNSUPPORTED_VERSION")
         features = u16(data, 10)
         require(features & ~KNOWN_FEATURES == 0, f"features {features:#06x} are not all known", "UNSUPPORTED_FEATURE")
 

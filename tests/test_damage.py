@@ -238,7 +238,9 @@ def test_bytes_behind_the_end_are_refused_in_strict_mode_alone(data, played):
 @pytest.mark.parametrize(
     "field, value, error",
     [
-        ("major", 0, UnsupportedVersion),
+        ("major", 1, UnsupportedVersion),
+        ("minor", 12, UnsupportedVersion),
+        ("minor", 14, UnsupportedVersion),
         ("major", 2, UnsupportedVersion),
         ("major", 255, UnsupportedVersion),
         ("features", 1, UnsupportedFeature),

@@ -89,8 +89,8 @@ ATH_API const char *ath_result_name(int result);
 
 /* ---- constants of the format ------------------------------------------------------------------------------------- */
 
-/* Files of any minor version decode whose features are among ATH_FEATURES, which has a bit for each. */
-enum { ATH_FORMAT_MAJOR = 1, ATH_FORMAT_MINOR = 0, ATH_FEATURES = 0 };
+/* Before 1.0 a decoder takes files of its own version alone. ATH_FEATURES has a bit for each known feature. */
+enum { ATH_FORMAT_MAJOR = 0, ATH_FORMAT_MINOR = 13, ATH_FEATURES = 0 };
 
 /* Kinds of chunks. An unknown kind with the bit ATH_OPTIONAL is skipped. */
 enum {

@@ -49,11 +49,11 @@ static uint32_t word_at(const uint8_t *bytes, size_t available, size_t at)
     return word;
 }
 
-/* Any minor version is taken: what it has that is new and cannot be skipped is among the features. */
+/* Before 1.0 any version may change anything, so that both numbers have to be known. */
 static int check_version(uint32_t major, uint32_t minor, uint32_t features, ath_fault_info *fault)
 {
     double known = (double)(ATH_FORMAT_MAJOR << 8 | ATH_FORMAT_MINOR), found = (double)(major << 8 | minor);
-    if (major != ATH_FORMAT_MAJOR)
+    if (found != known)
         return ath_refuse(fault, ATH_UNSUPPORTED_VERSION, ATH_FIELD_VERSION, found, known, known);
     if ((features & ~(uint32_t)ATH_FEATURES) == 0) return ATH_OK;
     return ath_refuse(fault, ATH_UNSUPPORTED_FEATURE, ATH_FIELD_FEATURES, (double)(features & ~(uint32_t)ATH_FEATURES),
