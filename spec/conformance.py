@@ -63,9 +63,6 @@ ERRORS = (
     "WRONG_HOST_MESH",
     "UNSUPPORTED_FEATURE",
 )
-RELEASED = {  # lines of expected.txt when a version of the format was released, and their SHA-256
-    "1.0": (907, "7837ab17a683691209e27a84e737bb55c35c7a229ce6df0c3e955fce25cbf556")
-}
 NO_ANSWER = ("strict", "open")
 SECONDS = 120
 LISTING = """\
