@@ -295,7 +295,7 @@ _ENCODING = {  # core/plan.h, core/motion.h, core/encode.h
     "ath_encode_times": (c_int64, [c_void_p, c_void_p, c_size_t, c_int32, c_void_p]),
     "ath_add_basis_rows": (None, [c_void_p, c_int32, c_int32, c_int32, *[c_void_p] * 3]),
     "ath_encode_basis": (c_int64, [c_void_p, c_void_p, c_size_t, c_int32, c_int32, c_void_p, c_void_p]),
-    "ath_encode_temporal": (c_int64, [c_void_p, c_void_p, c_size_t, c_int32, c_int32, c_int32, c_void_p]),
+    "ath_encode_temporal": (c_int64, [c_void_p, c_void_p, c_size_t, c_int32, c_int32, c_void_p]),
     "ath_mode_weights": (None, [c_void_p, c_void_p]),
     "ath_unit_shapes": (c_int, [c_int32, c_void_p, c_void_p]),
     "ath_encode_shapes": (

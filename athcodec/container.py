@@ -27,7 +27,7 @@ from athcodec.errors import BadChunk, ClipError, FormatError, LimitExceeded
 MAGIC = b"\x89ATH\r\n\x1a\n"
 MAJOR, MINOR, FEATURES = 0, 13, 0
 NO_LEVEL = 255
-NODE_WAVES = 1
+STEM_WAVES, NODE_WAVES, BASIS_IN_WAVES, BASIS_AS_SAMPLES = range(4)  # of Basis
 ONLY_TIPS = 8  # of Rotation
 IS_HOST = 4  # Method of REST
 OPTIONAL, KIND_ID = 0x8000, 0x7FFF
@@ -373,14 +373,13 @@ def pack_time(stream: bytes) -> bytes:
 
 @dataclass
 class StemsHead:
-    """Head of STEMS: step, rotation factor (0, 1, 2, 4, 8), learned time basis (bits, rank, stream) if any, the
-    level of the stream whose basis it begins with, whether pieces that carry others have no rotations, and how many
-    half octaves below 1 the largest step of rigid pieces' rotations is (0: there is none). bits: 0 or NODE_WAVES where
-    the basis is not learned."""
+    """Head of STEMS: step, rotation factor (0, 1, 2, 4, 8), Basis (basis_kind), rank and stream of a learned one,
+    the level of the stream whose basis it begins with, whether pieces that carry others have no rotations, and how
+    many half octaves below 1 the largest step of rigid pieces' rotations is (0: there is none)."""
 
     step: float
     rotation_step_factor: int
-    bits: int = 0
+    basis_kind: int = STEM_WAVES
     rank: int = 0
     basis: bytes = b""
     base: int = NO_LEVEL
@@ -390,8 +389,8 @@ class StemsHead:
 
 def pack_stems(head: StemsHead, stream: bytes) -> bytes:
     rotation = head.rotation_step_factor.bit_length() | ONLY_TIPS * head.only_tips | head.turn << 4
-    data = _STEMS.pack(head.step, rotation, head.bits)
-    if head.bits > NODE_WAVES:
+    data = _STEMS.pack(head.step, rotation, head.basis_kind)
+    if head.basis_kind > NODE_WAVES:
         data += _BASIS.pack(head.rank, head.base, len(head.basis)) + head.basis
     return data + stream
 

@@ -53,8 +53,7 @@ static uint32_t word_at(const uint8_t *bytes, size_t available, size_t at)
 static int check_version(uint32_t major, uint32_t minor, uint32_t features, ath_fault_info *fault)
 {
     double known = (double)(ATH_FORMAT_MAJOR << 8 | ATH_FORMAT_MINOR), found = (double)(major << 8 | minor);
-    if (found != known)
-        return ath_refuse(fault, ATH_UNSUPPORTED_VERSION, ATH_FIELD_VERSION, found, known, known);
+    if (found != known) return ath_refuse(fault, ATH_UNSUPPORTED_VERSION, ATH_FIELD_VERSION, found, known, known);
     if ((features & ~(uint32_t)ATH_FEATURES) == 0) return ATH_OK;
     return ath_refuse(fault, ATH_UNSUPPORTED_FEATURE, ATH_FIELD_FEATURES, (double)(features & ~(uint32_t)ATH_FEATURES),
                       known, found);
@@ -546,11 +545,10 @@ int ath_parse_stems(ath_bytes chunk, int32_t frames, ath_stems_head *head, ath_b
     head->rotation_step_factor = (double)(1 << rotation >> 1);
     head->only_tips = (chunk.bytes[4] & ONLY_TIPS) != 0;
     head->turn = chunk.bytes[4] >> 4;
-    head->bits = chunk.bytes[5];
+    head->basis_kind = chunk.bytes[5];
     *body = rest_of(chunk, 6);
-    if (!is_step(head->step) || rotation > 4) return ATH_BAD_CHUNK;
-    if (head->bits <= ATH_NODE_WAVES) return ATH_OK;
-    if (head->bits != ATH_BASIS_IN_WAVES && (head->bits < 8 || head->bits > 16)) return ATH_BAD_CHUNK;
+    if (!is_step(head->step) || rotation > 4 || head->basis_kind > ATH_BASIS_AS_SAMPLES) return ATH_BAD_CHUNK;
+    if (head->basis_kind <= ATH_NODE_WAVES) return ATH_OK;
     if (body->size < 7) return ATH_BAD_CHUNK;
     head->rank = (int32_t)u16_at(body->bytes);
     head->base = body->bytes[2] == ATH_NO_LEVEL ? -1 : body->bytes[2];

@@ -77,12 +77,14 @@ typedef struct {
 /* 0: first + i * step; 1: first + i / step; 2: stream; 3 as 1 and 4 as 0, by a whole rate, from 0 on */
 typedef int32_t ath_time_method;
 
-/* Bits of a stream in the waves of maps of nodes; of one whose basis is rows that are integers of waves. */
-enum { ATH_NODE_WAVES = 1, ATH_BASIS_IN_WAVES = 2 };
+/* Basis of STEMS: the waves of stems, those of maps of nodes, learned rows that are integers of waves, or samples. */
+enum { ATH_STEM_WAVES, ATH_NODE_WAVES, ATH_BASIS_IN_WAVES, ATH_BASIS_AS_SAMPLES };
+enum { ATH_MOST_SAMPLE = 8192 }; /* stands for 1 */
 
 typedef struct {
     double step, rotation_step_factor;
-    int32_t bits, rank; /* of a learned basis; bits up to ATH_NODE_WAVES: there is none */
+    int32_t basis_kind; /* up to ATH_NODE_WAVES: no basis is learned */
+    int32_t rank;       /* of a learned basis */
     int32_t base;       /* level of the stream whose time basis this one's begins with; -1: none */
     int32_t ratio;      /* of a refinement: the step of the layer before over this one's */
     int32_t turn;       /* half octaves below 1 of the largest step of rigid pieces' rotations; 0: none */

@@ -107,10 +107,9 @@ int ath_decode_times(void *model, const uint8_t *bytes, size_t size, int32_t fra
     return finished(&coder, code_times(&coder, (exact_model *)model, frame_count, times));
 }
 
-int ath_decode_temporal(void *model, const uint8_t *bytes, size_t size, int32_t rank, int32_t frames, int32_t limit,
-                        int32_t *basis)
+int ath_decode_temporal(void *model, const uint8_t *bytes, size_t size, int32_t rank, int32_t frames, int32_t *basis)
 {
     ath_coder coder;
     coder_start(&coder, bytes, size);
-    return finished(&coder, code_temporal(&coder, (number_model *)model, rank, frames, limit, basis));
+    return finished(&coder, code_temporal(&coder, (number_model *)model, rank, frames, basis));
 }

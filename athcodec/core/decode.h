@@ -28,8 +28,7 @@ int ath_decode_faces(void *memory, ath_bytes stream, const ath_polygons *shape, 
                      int32_t vertex_count, uint32_t *counts, int32_t *corners);
 /* All are finite; the caller checks that they increase. */
 int ath_decode_times(void *model, const uint8_t *bytes, size_t size, int32_t frame_count, double *times);
-/* rank x frames integers; `limit` stands for 1. */
-int ath_decode_temporal(void *model, const uint8_t *bytes, size_t size, int32_t rank, int32_t frames, int32_t limit,
-                        int32_t *basis);
+/* rank x frames integers; ATH_MOST_SAMPLE stands for 1. */
+int ath_decode_temporal(void *model, const uint8_t *bytes, size_t size, int32_t rank, int32_t frames, int32_t *basis);
 
 #endif

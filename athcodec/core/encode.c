@@ -153,12 +153,12 @@ int64_t ath_encode_times(void *model, uint8_t *bytes, size_t capacity, int32_t f
     return written(&coder, code_times(&coder, (exact_model *)model, frame_count, (double *)times));
 }
 
-int64_t ath_encode_temporal(void *model, uint8_t *bytes, size_t capacity, int32_t rank, int32_t frames, int32_t limit,
+int64_t ath_encode_temporal(void *model, uint8_t *bytes, size_t capacity, int32_t rank, int32_t frames,
                             const int32_t *basis)
 {
     ath_coder coder;
     coder_start(&coder, bytes, capacity);
-    return written(&coder, code_temporal(&coder, (number_model *)model, rank, frames, limit, (int32_t *)basis));
+    return written(&coder, code_temporal(&coder, (number_model *)model, rank, frames, (int32_t *)basis));
 }
 
 int64_t ath_encode_basis(void *memory, uint8_t *bytes, size_t capacity, int32_t rank, int32_t frames,

@@ -198,7 +198,7 @@ ATH_ENCODER_API int64_t ath_encode_faces(void *memory, uint8_t *bytes, size_t ca
 ATH_ENCODER_API int64_t ath_encode_times(void *model, uint8_t *bytes, size_t capacity, int32_t frame_count,
                                          const double *times);
 ATH_ENCODER_API int64_t ath_encode_temporal(void *model, uint8_t *bytes, size_t capacity, int32_t rank, int32_t frames,
-                                            int32_t limit, const int32_t *basis);
+                                            const int32_t *basis);
 /* Rows of a basis in waves; integers: as many rows of `frames` as rank, and zeros up to a multiple of 3. */
 ATH_ENCODER_API int64_t ath_encode_basis(void *model, uint8_t *bytes, size_t capacity, int32_t rank, int32_t frames,
                                          int32_t *exponents, int32_t *integers);

@@ -137,11 +137,11 @@ def encode_times(time: np.ndarray) -> bytes:
     return encode_stream("ath_encode_times", 1024 + 10 * time.size, time.size, address(time, np.float64, time.size))
 
 
-def encode_temporal(steps: np.ndarray, bits: int) -> bytes:
-    """Rows of a learned temporal basis as stored integers of `bits` bits, (rows, frames) int32."""
+def encode_temporal(steps: np.ndarray) -> bytes:
+    """Rows of a learned temporal basis as stored integers of 14 bits, (rows, frames) int32."""
     rank, frames = steps.shape
     return encode_stream(
-        "ath_encode_temporal", 1024 + 8 * steps.size, rank, frames, 1 << bits - 1, address(steps, np.int32, steps.size)
+        "ath_encode_temporal", 1024 + 8 * steps.size, rank, frames, address(steps, np.int32, steps.size)
     )
 
 
