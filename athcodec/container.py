@@ -409,8 +409,8 @@ def pack_refined_rest(step: float, stream: bytes) -> bytes:
     return _REFINED_REST.pack(step) + stream
 
 
-def pack_predicted(step: float, settings: int, stream: bytes) -> bytes:
-    return _PREDICTED.pack(step, settings) + stream
+def pack_predicted(step: float, lattice: bool, stream: bytes) -> bytes:
+    return _PREDICTED.pack(step, lattice) + stream
 
 
 def pack_corrections(step: float, stream: bytes) -> bytes:

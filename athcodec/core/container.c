@@ -562,8 +562,9 @@ int ath_parse_stems(ath_bytes chunk, int32_t frames, ath_stems_head *head, ath_b
 
 int ath_parse_predicted(ath_bytes chunk, ath_predicted_head *head, ath_bytes *body)
 {
-    if (chunk.size < 5 || chunk.bytes[4] > 31) return ATH_BAD_CHUNK;
-    *head = ath_predicted_head_of((double)f32_at(chunk.bytes), chunk.bytes[4]);
+    if (chunk.size < 5 || chunk.bytes[4] > 1) return ATH_BAD_CHUNK;
+    head->step = (double)f32_at(chunk.bytes);
+    head->lattice = chunk.bytes[4];
     *body = rest_of(chunk, 5);
     return is_step(head->step) ? ATH_OK : ATH_BAD_CHUNK;
 }

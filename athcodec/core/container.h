@@ -67,11 +67,10 @@ typedef struct {
     const uint8_t *seams; /* of a loop: full_level_count floats, see ath_seam */
 } ath_clip_entry;
 
-/* Of PREDICTED: the step, how many samples fits remember, whether the errors of all vertices of a fit count, and whether
- * vertices are points of a lattice. */
+/* Of PREDICTED: the step, and whether vertices are points of a lattice. */
 typedef struct {
     double step;
-    int32_t memory, common, lattice;
+    int32_t lattice;
 } ath_predicted_head;
 
 /* 0: first + i * step; 1: first + i / step; 2: stream; 3 as 1 and 4 as 0, by a whole rate, from 0 on */
@@ -113,11 +112,6 @@ int ath_parse_stems(ath_bytes chunk, int32_t frames, ath_stems_head *head, ath_b
 int ath_parse_refined_stems(ath_bytes chunk, int32_t frames, ath_stems_head *head, ath_bytes *body);
 int ath_parse_refined_rest(ath_bytes chunk, double *step, ath_bytes *body);
 int ath_parse_refined_shapes(ath_bytes chunk, int32_t *shift, ath_bytes *body);
-ATH_INLINE ath_predicted_head ath_predicted_head_of(double step, int32_t settings)
-{
-    ath_predicted_head head = {step, 32 << (settings & 7), settings >> 3 & 1, settings >> 4};
-    return head;
-}
 int ath_parse_predicted(ath_bytes chunk, ath_predicted_head *head, ath_bytes *body);
 int ath_parse_corrections(ath_bytes chunk, double *step, ath_bytes *body);
 

@@ -502,7 +502,7 @@ size_t ath_predicted_memory(int32_t vertex_count)
 }
 
 int64_t ath_encode_predicted(void *memory, uint8_t *bytes, size_t capacity, const ath_plan *plan, const double *origin,
-                             int32_t frames, int is_float64, double step, int settings, const double *source,
+                             int32_t frames, int is_float64, double step, int lattice, const double *source,
                              const double *limits, void *positions)
 {
     ath_coder coder;
@@ -511,7 +511,8 @@ int64_t ath_encode_predicted(void *memory, uint8_t *bytes, size_t capacity, cons
     int valid = 1;
     coder_start(&coder, bytes, capacity);
     carve_prediction(p, plan->vertex_count, (uint8_t *)memory);
-    p->head = ath_predicted_head_of(step, settings);
+    p->head.step = step;
+    p->head.lattice = lattice;
     start_prediction(p, plan, origin, is_float64, positions);
     for (int32_t t = 0; t < frames && valid; t++) valid = encode_frame(&coder, p, &wanted);
     return written(&coder, valid);

@@ -220,12 +220,12 @@ ATH_ENCODER_API int64_t ath_encode_refinement(void *model, uint8_t *bytes, size_
                                               const ath_motion *motion, const ath_integers *integers, int32_t level);
 ATH_ENCODER_API int64_t ath_encode_affines(void *model, uint8_t *bytes, size_t capacity, const ath_plan *plan,
                                            const ath_motion *motion, const ath_integers *integers, int32_t level);
-/* Predicted motion: memory, ath_predicted_memory bytes; settings: as a chunk has them; source: frames x vertex_count x
+/* Predicted motion: memory, ath_predicted_memory bytes; lattice: 1 where vertices are points of it; source: frames x vertex_count x
  * 3, less the origin; limits: of each vertex. Fills positions, as decoded. */
 ATH_ENCODER_API size_t ath_predicted_memory(int32_t vertex_count);
 ATH_ENCODER_API int64_t ath_encode_predicted(void *memory, uint8_t *bytes, size_t capacity, const ath_plan *plan,
                                              const double *origin, int32_t frames, int is_float64, double step,
-                                             int settings, const double *source, const double *limits, void *positions);
+                                             int lattice, const double *source, const double *limits, void *positions);
 ATH_ENCODER_API int64_t ath_encode_corrections(void *model, uint8_t *bytes, size_t capacity, int32_t vertex_count,
                                                int32_t frames, const int32_t *corrections, int64_t count);
 

@@ -245,7 +245,7 @@ def encode_corrections(corrections: np.ndarray, vertex_count: int, frames: int) 
 
 
 def encode_predicted(
-    plan: Plan, origin: np.ndarray, source: np.ndarray, limits: np.ndarray, step: float, settings: int, dtype
+    plan: Plan, origin: np.ndarray, source: np.ndarray, limits: np.ndarray, step: float, lattice: bool, dtype
 ) -> tuple[bytes, np.ndarray] | None:
     """Predicted motion of a segment, and the positions that it decodes to, (T, N, 3) of `dtype`.
 
@@ -266,7 +266,7 @@ def encode_predicted(
             frames,
             positions.dtype == np.float64,
             step,
-            settings,
+            lattice,
             address(source, np.float64, source.size),
             address(limits, np.float64, vertices),
             positions.ctypes.data,
