@@ -246,7 +246,6 @@ class ChunkStore:
 
 # ---- heads of the chunks ----------------------------------------------------------------------------------------
 
-_HIERARCHY = struct.Struct("<HHHH")
 _REST = struct.Struct("<B3ff")
 _SOURCE_REST = struct.Struct("<Bf")
 _MESH_CHECKSUM = struct.Struct("<II")
@@ -270,15 +269,6 @@ def brief(value: object) -> str:
     """What a file holds, as an error message shows it."""
     text = repr(value)
     return text if len(text) <= 100 else text[:97] + "..."
-
-
-def pack_hierarchy(thresholds, stream: bytes) -> bytes:
-    """thresholds: ath.Thresholds or (epsilon, eta, xi, lam); lengths are rounded, counts beyond 65535 are that."""
-    epsilon, eta, xi, lam = thresholds
-    most = from_short_float(SHORT_FLOATS - 1)
-    lengths = np.minimum([epsilon, xi], most).astype(np.float32).view(np.uint32)
-    nearest = np.minimum(lengths + (1 << SHORT_SHIFT - 1) >> SHORT_SHIFT, SHORT_FLOATS - 1)
-    return _HIERARCHY.pack(*nearest, *(min(int(count), 65535) for count in (eta, lam))) + stream
 
 
 @dataclass

@@ -145,7 +145,7 @@ def still_file(
 
 def still_hierarchy(plan: Plan) -> bytes:
     numbers = (np.arange(count, dtype=np.int32) for count in (len(plan.branches), plan.vertex_count))
-    return hierarchy_chunk(streams.encode_hierarchy(plan.branches, *numbers))
+    return streams.encode_hierarchy(plan.branches, *numbers)
 
 
 def still_rest(plan: Plan) -> bytes:
@@ -161,10 +161,6 @@ def add_still_segment(store: ct.ChunkStore, plan: Plan, index: int, frames: int,
             store.add(ct.STEMS, payload if stems is None or level > 0 else stems, level, index)
         if plan.has_affines(level):
             store.add(ct.AFFINES, streams.encode_affines(motion, level), level, index)
-
-
-def hierarchy_chunk(stream: bytes) -> bytes:
-    return ct.pack_hierarchy((0.0, 0, 0.0, 0), stream)
 
 
 def exact_rest_chunk(stream: bytes, dtype) -> bytes:

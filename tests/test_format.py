@@ -21,7 +21,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import zstandard
-from files import Parts, basis_chunk, exact_rest_chunk, hierarchy_chunk, opened, roots, still_file
+from files import Parts, basis_chunk, exact_rest_chunk, opened, roots, still_file
 from plants import plant
 
 import athcodec
@@ -161,12 +161,7 @@ def test_document_describes_the_version_that_is_written():
 
 @pytest.mark.parametrize(
     "title, form",
-    [
-        ("Header", container._HEADER),
-        ("HIERARCHY", container._HIERARCHY),
-        ("CORRECTIONS", container._CORRECTIONS),
-        ("REFINED_REST", container._REFINED_REST),
-    ],
+    [("Header", container._HEADER), ("CORRECTIONS", container._CORRECTIONS), ("REFINED_REST", container._REFINED_REST)],
 )
 def test_field_tables_have_the_offsets_and_types_of_the_code(title, form):
     names = {"s": "bytes", "B": "u8", "H": "u16", "I": "u32", "Q": "u64", "f": "f32", "d": "f64"}
@@ -423,7 +418,7 @@ def played(data: bytes, kind: int) -> Iterator[athcodec.Decoder]:
 
 def read_hierarchy(stream: bytes, like: np.ndarray, fields: list[str]) -> tuple:
     """Fields of the branches, and both permutations, in a file that else fits branches `like` those."""
-    with played(still_file(branches=like, hierarchy=hierarchy_chunk(stream)), container.HIERARCHY) as decoder:
+    with played(still_file(branches=like, hierarchy=stream), container.HIERARCHY) as decoder:
         numbers = decoder.hierarchy
         assert not decoder.positions().any()
         rows = [[int(row[name]) for name in fields] for row in decoder.file.branches]
@@ -970,10 +965,7 @@ class HandMade:
     def _add_prelude(self) -> None:
         counts = len(self.branches), self.vertex_count
         permutations = [self.random.permutation(count).astype(np.int32) for count in counts]
-        self.store.add(
-            container.HIERARCHY,
-            container.pack_hierarchy((0.5, 3, 0.25, 1), streams.encode_hierarchy(self.branches, *permutations)),
-        )
+        self.store.add(container.HIERARCHY, streams.encode_hierarchy(self.branches, *permutations))
         head = container.Rest(self.origin, 0.01, np.dtype(self.exact or np.float32), exact=bool(self.exact))
         times = container.pack_steady_time(np.arange(self.FRAMES) / 24.0)
         if self.exact:

@@ -346,18 +346,6 @@ static ath_bytes rest_of(ath_bytes chunk, size_t head)
     return rest;
 }
 
-int ath_parse_hierarchy(ath_bytes chunk, ath_thresholds *head, ath_bytes *body)
-{
-    if (chunk.size < 8) return ATH_BAD_CHUNK;
-    int32_t epsilon = (int32_t)u16_at(chunk.bytes), xi = (int32_t)u16_at(chunk.bytes + 2);
-    head->epsilon = short_float(epsilon);
-    head->xi = short_float(xi);
-    head->eta = u16_at(chunk.bytes + 4);
-    head->lambda = u16_at(chunk.bytes + 6);
-    *body = rest_of(chunk, 8);
-    return epsilon < ATH_SHORT_FLOATS && xi < ATH_SHORT_FLOATS ? ATH_OK : ATH_BAD_CHUNK;
-}
-
 enum { REST_EXACT = 1, REST_FLOAT64 = 2, REST_HOST = 4, REST_ADAPTIVE = 8, REST_CONNECTED = 16 }; /* bits of Method */
 
 int ath_parse_rest(ath_bytes chunk, ath_rest_head *head, ath_bytes *body)

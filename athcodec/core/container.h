@@ -45,11 +45,6 @@ typedef struct {
 } ath_bytes;
 
 typedef struct {
-    double epsilon, xi;
-    uint32_t eta, lambda;
-} ath_thresholds;
-
-typedef struct {
     double origin[3], step;
     int32_t exact, is_float64, adaptive, is_host, connected;
     uint32_t host_checksum[2]; /* of a mesh of the host's, where that is the rest pose */
@@ -91,7 +86,6 @@ typedef struct {
     ath_bytes basis;
 } ath_stems_head;
 
-int ath_parse_hierarchy(ath_bytes chunk, ath_thresholds *head, ath_bytes *body);
 int ath_parse_rest(ath_bytes chunk, ath_rest_head *head, ath_bytes *body);
 /* Of FACES or EDGES, which have at most so many faces and corners together: else ATH_LIMIT_EXCEEDED. */
 enum { MOST_CORNERS = 1 << 26 };

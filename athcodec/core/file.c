@@ -258,19 +258,13 @@ static int read_hierarchy(ath_file *file, const ath_limits *limits, ath_fault_in
 {
     const ath_header *header = &file->header;
     int32_t branch_count = (int32_t)header->branch_count, vertex_count = (int32_t)header->vertex_count;
-    ath_bytes chunk, body;
-    ath_thresholds thresholds;
+    ath_bytes chunk;
     int result = load(file, ATH_HIERARCHY, &chunk, fault);
-    if (result == ATH_OK) result = ath_parse_hierarchy(chunk, &thresholds, &body);
     if (result != ATH_OK) return result;
     memset(file->branches, 0, (size_t)branch_count * sizeof *file->branches);
-    result = ath_decode_hierarchy(file->scratch, body.bytes, body.size, branch_count, vertex_count, file->branches,
+    result = ath_decode_hierarchy(file->scratch, chunk.bytes, chunk.size, branch_count, vertex_count, file->branches,
                                   file->branch_source, file->vertex_source);
     if (result != ATH_OK) return result;
-    file->info.epsilon = (float)thresholds.epsilon;
-    file->info.xi = (float)thresholds.xi;
-    file->info.eta = thresholds.eta;
-    file->info.lambda = thresholds.lambda;
     return check_depth(file, limits, fault);
 }
 
