@@ -262,7 +262,7 @@ _REFINED_REST = struct.Struct("<f")
 _PREDICTED = struct.Struct("<fB")
 _ARRAY = struct.Struct("<BBHI")
 _POLYGONS = struct.Struct("<II")
-_IS_MIXED, _IS_ABSOLUTE, _IS_DERIVED = 16, 32, 64
+_IS_MIXED, _IS_ABSOLUTE, _IS_DERIVED = 8, 16, 32
 
 
 def brief(value: object) -> str:
@@ -413,19 +413,15 @@ _ZSTD_WINDOW = 8 << 20
 _ZSTD_SINGLE_SEGMENT = 0x20
 
 # Types of static arrays: NumPy's letters in the order of FORMAT.md, and the bytes that an element may have.
-_KINDS = "buifcSV"
-_ANY_SIZE = range(1, (1 << 20) + 1)
+_KINDS = "buifS"
 _INTEGER_SIZES = 1, 2, 4, 8
 _KIND_SIZES: dict[str, Container[int]] = {
     "b": (1,),
     "u": _INTEGER_SIZES,
     "i": _INTEGER_SIZES,
     "f": (2, 4, 8),
-    "c": (8, 16),
-    "S": _ANY_SIZE,
-    "V": _ANY_SIZE,
+    "S": range(1, (1 << 20) + 1),
 }
-_BIG_ENDIAN = 8
 _MOST_DIMENSIONS = 32
 
 
@@ -478,7 +474,7 @@ def pack_derived_edges(index_type: int) -> bytes:
 
 
 def pack_array(name: str, array: np.ndarray) -> bytes:
-    """A named static array of numbers, booleans or bytes, of any shape.
+    """A named static array of numbers, booleans or texts, of any shape.
 
     Raises ClipError for what no reader would accept.
     """
@@ -487,8 +483,7 @@ def pack_array(name: str, array: np.ndarray) -> bytes:
         raise ClipError(f"{what}: got {array.nbytes} bytes; the limit is {limits.decoded_chunk_bytes}")
     with _refusals(what):
         text = name.encode()
-        kind = _KINDS.index(array.dtype.kind) | _BIG_ENDIAN * (array.dtype.str[0] == ">")
-        head = _ARRAY.pack(kind, array.ndim, len(text), array.dtype.itemsize)
+        head = _ARRAY.pack(_KINDS.index(array.dtype.kind), array.ndim, len(text), array.dtype.itemsize)
         shape = struct.pack(f"<{array.ndim}I", *array.shape)
         packed = head + shape + text + (_compress(array) if array.size else b"")
         parse_array(packed, what, limits)
@@ -530,11 +525,9 @@ def parse_array(data: bytes, what: str, limits: Limits) -> tuple[str, np.ndarray
 
 def _array_type(code: int, size: int, what: str) -> np.dtype:
     """Of Type and Item_Bytes."""
-    kind, big_endian = code & ~_BIG_ENDIAN, code & _BIG_ENDIAN
-    sizes = _KIND_SIZES[_KINDS[kind]] if kind < len(_KINDS) else ()
-    if size not in sizes or big_endian and (size == 1 or _KINDS[kind] in "SV"):
-        raise BadChunk(f"{what}: got type {code} of {size} bytes; expected numbers, booleans or bytes")
-    return np.dtype(f"{'>' if big_endian else '<'}{_KINDS[kind]}{size}")
+    if code >= len(_KINDS) or size not in _KIND_SIZES[_KINDS[code]]:
+        raise BadChunk(f"{what}: got type {code} of {size} bytes; expected numbers, booleans or texts")
+    return np.dtype(f"<{_KINDS[code]}{size}")
 
 
 def _array_name(text: bytes, what: str, limits: Limits) -> str:

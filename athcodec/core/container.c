@@ -372,12 +372,7 @@ int ath_parse_rest(ath_bytes chunk, ath_rest_head *head, ath_bytes *body)
 }
 
 /* Bits of Index_Type; those below are the type. */
-enum { IS_MIXED = 16, IS_ABSOLUTE = 32, IS_DERIVED = 64, TYPE_BITS = 15, TYPE_BIG_ENDIAN = 8 };
-
-static int is_integer_type(int32_t type)
-{
-    return type <= TYPE_BITS && (type & (TYPE_BIG_ENDIAN | 3)) != TYPE_BIG_ENDIAN;
-}
+enum { IS_MIXED = 8, IS_ABSOLUTE = 16, IS_DERIVED = 32, TYPE_BITS = 7 };
 
 int32_t ath_vertices_of_type(int32_t type, int32_t vertex_count)
 {
@@ -395,13 +390,12 @@ int ath_parse_polygons(ath_bytes chunk, ath_polygons *shape, int32_t *is_absolut
     shape->is_derived = flags == IS_DERIVED;
     *is_absolute = (flags & IS_ABSOLUTE) != 0;
     *body = rest_of(chunk, 1);
-    if (!is_integer_type(shape->index_type)) return ATH_BAD_CHUNK;
     if (shape->is_derived) return body->size == 0 ? ATH_OK : ATH_BAD_CHUNK;
     if (flags & ~(IS_MIXED | IS_ABSOLUTE) || body->size < 8 + (size_t)shape->is_mixed) return ATH_BAD_CHUNK;
     if (shape->is_mixed) {
         shape->count_type = body->bytes[0];
         *body = rest_of(*body, 1);
-        if (!is_integer_type(shape->count_type)) return ATH_BAD_CHUNK;
+        if (shape->count_type > TYPE_BITS) return ATH_BAD_CHUNK;
     }
     uint64_t faces = u32_at(body->bytes), corners = u32_at(body->bytes + 4);
     if (!shape->is_mixed) {
