@@ -262,7 +262,7 @@ _REFINED_REST = struct.Struct("<f")
 _PREDICTED = struct.Struct("<fB")
 _ARRAY = struct.Struct("<BBHI")
 _POLYGONS = struct.Struct("<II")
-_IS_MIXED, _IS_ABSOLUTE, _IS_DERIVED = 8, 16, 32
+_IS_MIXED, _IS_DERIVED = 8, 16
 
 
 def brief(value: object) -> str:
@@ -461,10 +461,9 @@ def zstd_decompress_exact(data: bytes, expected: int, what: str, limits: Limits)
         raise BadChunk(f"{what}: got a zstd frame that does not decode ({error}); expected {expected} bytes") from None
 
 
-def pack_polygons(shape: CorePolygons, is_absolute: bool, stream: bytes) -> bytes:
+def pack_polygons(shape: CorePolygons, stream: bytes) -> bytes:
     """FACES or EDGES of this shape."""
-    flags = _IS_MIXED * shape.is_mixed | _IS_ABSOLUTE * is_absolute
-    types = bytes([shape.index_type | flags] + [shape.count_type] * shape.is_mixed)
+    types = bytes([shape.index_type | _IS_MIXED * shape.is_mixed] + [shape.count_type] * shape.is_mixed)
     return types + _POLYGONS.pack(shape.face_count, shape.corner_count if shape.is_mixed else shape.columns) + stream
 
 

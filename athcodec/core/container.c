@@ -372,7 +372,7 @@ int ath_parse_rest(ath_bytes chunk, ath_rest_head *head, ath_bytes *body)
 }
 
 /* Bits of Index_Type; those below are the type. */
-enum { IS_MIXED = 8, IS_ABSOLUTE = 16, IS_DERIVED = 32, TYPE_BITS = 7 };
+enum { IS_MIXED = 8, IS_DERIVED = 16, TYPE_BITS = 7 };
 
 int32_t ath_vertices_of_type(int32_t type, int32_t vertex_count)
 {
@@ -380,7 +380,7 @@ int32_t ath_vertices_of_type(int32_t type, int32_t vertex_count)
     return bits < 31 ? ath_min(vertex_count, 1 << bits) : vertex_count;
 }
 
-int ath_parse_polygons(ath_bytes chunk, ath_polygons *shape, int32_t *is_absolute, ath_bytes *body)
+int ath_parse_polygons(ath_bytes chunk, ath_polygons *shape, ath_bytes *body)
 {
     if (chunk.size < 1) return ATH_BAD_CHUNK;
     int32_t flags = chunk.bytes[0] & ~TYPE_BITS;
@@ -388,10 +388,9 @@ int ath_parse_polygons(ath_bytes chunk, ath_polygons *shape, int32_t *is_absolut
     shape->index_type = chunk.bytes[0] & TYPE_BITS;
     shape->is_mixed = (flags & IS_MIXED) != 0;
     shape->is_derived = flags == IS_DERIVED;
-    *is_absolute = (flags & IS_ABSOLUTE) != 0;
     *body = rest_of(chunk, 1);
     if (shape->is_derived) return body->size == 0 ? ATH_OK : ATH_BAD_CHUNK;
-    if (flags & ~(IS_MIXED | IS_ABSOLUTE) || body->size < 8 + (size_t)shape->is_mixed) return ATH_BAD_CHUNK;
+    if (flags & ~IS_MIXED || body->size < 8 + (size_t)shape->is_mixed) return ATH_BAD_CHUNK;
     if (shape->is_mixed) {
         shape->count_type = body->bytes[0];
         *body = rest_of(*body, 1);

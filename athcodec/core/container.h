@@ -94,7 +94,7 @@ ATH_INLINE int32_t ath_bits_of_type(int32_t type) { return (8 << (type & 3)) - (
 
 /* Vertices that the numbers of an integer type can name, at most `vertex_count`. */
 int32_t ath_vertices_of_type(int32_t type, int32_t vertex_count);
-int ath_parse_polygons(ath_bytes chunk, ath_polygons *shape, int32_t *is_absolute, ath_bytes *body);
+int ath_parse_polygons(ath_bytes chunk, ath_polygons *shape, ath_bytes *body);
 int ath_parse_source_rest(ath_bytes chunk, ath_source_rest_head *head, ath_bytes *body);
 /* Parses the entry at the front of `chunk`, and moves `chunk` past it. */
 int ath_parse_clip(ath_bytes *chunk, const ath_header *header, ath_clip_entry *entry);

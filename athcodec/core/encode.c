@@ -136,13 +136,12 @@ int64_t ath_encode_exact_rest(void *model, uint8_t *bytes, size_t capacity, cons
                                            (double *)rest));
 }
 
-int64_t ath_encode_faces(void *memory, uint8_t *bytes, size_t capacity, const ath_polygons *shape, int is_absolute,
-                         int32_t vertex_count, const uint32_t *counts, const int32_t *corners)
+int64_t ath_encode_faces(void *memory, uint8_t *bytes, size_t capacity, const ath_polygons *shape, int32_t vertex_count,
+                         const uint32_t *counts, const int32_t *corners)
 {
     ath_coder coder;
     coder_start(&coder, bytes, capacity);
-    faces_list faces =
-        faces_of((faces_model *)memory, shape, is_absolute, vertex_count, (uint32_t *)counts, (int32_t *)corners);
+    faces_list faces = faces_of((faces_model *)memory, shape, vertex_count, (uint32_t *)counts, (int32_t *)corners);
     return written(&coder, code_faces(&coder, (faces_model *)memory, &faces));
 }
 

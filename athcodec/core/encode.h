@@ -193,8 +193,7 @@ ATH_ENCODER_API int64_t ath_encode_exact_rest(void *model, uint8_t *bytes, size_
                                               const double *rest);
 /* memory: ath_faces_memory bytes. */
 ATH_ENCODER_API int64_t ath_encode_faces(void *memory, uint8_t *bytes, size_t capacity, const ath_polygons *shape,
-                                         int is_absolute, int32_t vertex_count, const uint32_t *counts,
-                                         const int32_t *corners);
+                                         int32_t vertex_count, const uint32_t *counts, const int32_t *corners);
 ATH_ENCODER_API int64_t ath_encode_times(void *model, uint8_t *bytes, size_t capacity, int32_t frame_count,
                                          const double *times);
 ATH_ENCODER_API int64_t ath_encode_temporal(void *model, uint8_t *bytes, size_t capacity, int32_t rank, int32_t frames,
