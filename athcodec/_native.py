@@ -265,10 +265,7 @@ _ENCODING = {  # core/plan.h, core/motion.h, core/encode.h
     "ath_place_mesh": (None, [c_void_p, c_int32, c_int32]),
     "ath_build_mesh": (None, [c_void_p, POINTER(CorePolygons), *[c_void_p] * 3]),
     "ath_faces_memory": (c_size_t, [c_int32]),
-    "ath_encode_faces": (
-        c_int64,
-        [c_void_p, c_void_p, c_size_t, POINTER(CorePolygons), c_int, c_int32, c_void_p, c_void_p],
-    ),
+    "ath_encode_faces": (c_int64, [c_void_p, c_void_p, c_size_t, POINTER(CorePolygons), c_int32, c_void_p, c_void_p]),
     "ath_encode_rest": (
         c_int64,
         [c_void_p, c_void_p, c_size_t, c_void_p, c_int32, c_double, c_int, c_double, *[c_void_p] * 8],
@@ -295,7 +292,7 @@ _ENCODING = {  # core/plan.h, core/motion.h, core/encode.h
     "ath_encode_times": (c_int64, [c_void_p, c_void_p, c_size_t, c_int32, c_void_p]),
     "ath_add_basis_rows": (None, [c_void_p, c_int32, c_int32, c_int32, *[c_void_p] * 3]),
     "ath_encode_basis": (c_int64, [c_void_p, c_void_p, c_size_t, c_int32, c_int32, c_void_p, c_void_p]),
-    "ath_encode_temporal": (c_int64, [c_void_p, c_void_p, c_size_t, c_int32, c_int32, c_int32, c_void_p]),
+    "ath_encode_temporal": (c_int64, [c_void_p, c_void_p, c_size_t, c_int32, c_int32, c_void_p]),
     "ath_mode_weights": (None, [c_void_p, c_void_p]),
     "ath_unit_shapes": (c_int, [c_int32, c_void_p, c_void_p]),
     "ath_encode_shapes": (

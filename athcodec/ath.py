@@ -9,9 +9,10 @@ elsewhere.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+import sys
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -37,6 +38,9 @@ _SMALLEST_EXTENT = 1e-100  # squares of what is smaller have no inverse
 _POINT_EXTENT = 1e-12  # of the plant's: below it a subtree is one point
 _READ_VALUES = 3 << 21  # numbers read from the clip at once
 _WORK_VERTICES = 1 << 17  # vertex-frames in work at once, of one thread
+
+
+THRESHOLDS = "hierarchy_thresholds"  # of metadata
 
 
 @dataclass(frozen=True)
@@ -69,6 +73,21 @@ class Thresholds:
             if not value >= 0:
                 raise ValueError(f"threshold {name}: got {value}, expected a number >= 0")
             object.__setattr__(self, name, kind(value))
+
+    @property
+    def in_metadata(self) -> dict[str, float]:
+        """What a file keeps of them under the name THRESHOLDS; JSON has no infinity."""
+        most = sys.float_info.max
+        return {"epsilon": min(self.epsilon, most), "xi": min(self.xi, most), "eta": self.eta, "lambda": self.lam}
+
+    @classmethod
+    def of_metadata(cls, metadata: Mapping[str, Any]) -> Thresholds | None:
+        """None where a file keeps none, or no numbers."""
+        try:
+            kept = metadata[THRESHOLDS]
+            return cls(kept["epsilon"], kept["eta"], kept["xi"], kept["lambda"])
+        except (KeyError, TypeError, ValueError):
+            return None
 
 
 class CutPiece(NamedTuple):

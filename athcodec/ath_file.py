@@ -20,6 +20,7 @@ import numpy as np
 from athcodec import container as ct
 from athcodec import core_file
 from athcodec._native import WHOLE, as_bytes
+from athcodec.ath import Thresholds
 from athcodec.atomic_files import is_url
 from athcodec.clip import ERROR_WEIGHTS, check_stem_index
 from athcodec.container import Chunk, Limits
@@ -402,13 +403,6 @@ class AthFile:
         """The point that the file's arithmetic is relative to, (3,) float64."""
         return np.array(self.core.info.origin)
 
-    @property
-    def thresholds(self) -> tuple[float, int, float, int]:
-        """epsilon (scene units), eta, xi (scene units) and lambda by which nodes were accepted: lengths to within 2 %,
-        counts above 65,535 as that."""
-        info = self.core.info
-        return info.epsilon, info.eta, info.xi, info.lam
-
     @cached_property
     def clips(self) -> tuple[Clip, ...]:
         """All that the file holds, in its order."""
@@ -608,22 +602,19 @@ class AthFile:
         return self.core.joins()
 
     def table1(self) -> dict[str, float]:
-        """Table 1 of the paper: depth (levels of nodes), nodes, leaves and the four thresholds of the ATH."""
+        """Table 1 of the paper: depth (levels of nodes), nodes, leaves, and thresholds that the encoder was given."""
         branches = self.branches
         whole, inside = branches["flags"] & WHOLE > 0, np.zeros(len(branches) + 1, np.int64)
         np.add.at(inside, np.flatnonzero(whole) + 1, 1)
         np.add.at(inside, (np.arange(len(branches)) + branches["subtree"])[whole], -1)
         is_node = np.cumsum(inside)[:-1] == 0
         leaf = is_node & (whole | (branches["subtree"] == 1))
-        epsilon, eta, xi, lam = self.thresholds
+        thresholds = Thresholds.of_metadata(self.metadata)
         return {
             "depth": int(branches["depth"][is_node].max()) + 1,
             "nodes": self.core.info.node_count,
             "leaves": int(leaf.sum()),
-            "epsilon": epsilon,
-            "eta": eta,
-            "xi": xi,
-            "lam": lam,
+            **(asdict(thresholds) if thresholds else {}),
         }
 
     def info(self) -> dict[str, Any]:

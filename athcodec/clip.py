@@ -20,6 +20,10 @@ LARGEST_COORDINATE = 1e18
 BLOCK_BYTES = 32 << 20
 CLIP_RANGES, NAME_BYTES = 255, 255
 DEFAULT_FPS = 30.0
+NOT_KEPT = {
+    "c": "complex array (store real and imaginary parts as two)",
+    "V": "array of raw bytes (store unsigned integers)",
+}
 ERROR_WEIGHTS = "error_weights"  # metadata: name of the attribute that holds factors on the bound; or that attribute
 RESERVED_NAMES = frozenset(
     ("positions", "rest", "time", "vertex_branch", "branch_parent", "stem_index", "edges", "faces")
@@ -262,7 +266,8 @@ class MotionClip:
         self.time = check_time(self.time, frame_count, self.clip_ranges)
         self._check_branches(vertex_count)
         self.edges = check_indices("edges", self.edges, vertex_count, width=2)
-        self.attributes, self.metadata = check_attributes(self.attributes), dict(self.metadata or {})
+        self.attributes, left_out = check_attributes(self.attributes)
+        self.not_read, self.metadata = {**self.not_read, **left_out}, dict(self.metadata or {})
         self._take_padding_off()
         self.faces = check_indices("faces", self.faces, vertex_count)
         check_polygons(self.polygons, vertex_count)
@@ -587,9 +592,13 @@ def source_stem_index(vertex_branch: np.ndarray) -> np.ndarray:
     return places
 
 
-def check_attributes(attributes: Mapping[str, Any] | None) -> dict[str, np.ndarray]:
-    """Named arrays, without records; ClipError unless the names are free, and the values numbers, booleans or bytes."""
+def check_attributes(attributes: Mapping[str, Any] | None) -> tuple[dict[str, np.ndarray], dict[str, list[str]]]:
+    """Named arrays, little-endian and without records, and the names of those of types that no file holds (`NOT_KEPT`).
+
+    Raises ClipError unless the names are free, and the values numbers, booleans or bytes.
+    """
     checked: dict[str, np.ndarray] = {}
+    left_out: dict[str, list[str]] = {}
     for name, values in (attributes or {}).items():
         if not isinstance(name, str) or not name.strip("/"):
             raise ClipError(f"attributes: got the name {name!r}, expected one that is not empty")
@@ -597,9 +606,12 @@ def check_attributes(attributes: Mapping[str, Any] | None) -> dict[str, np.ndarr
             if column in RESERVED_NAMES or column in checked:
                 raise ClipError(f"attributes: got the name {column!r}, expected one that is free")
             if array.dtype.hasobject or array.dtype.kind not in "biufcSV":
-                raise ClipError(f"attributes: {column} has dtype {array.dtype}, expected numbers, booleans or bytes")
-            checked[column] = array
-    return checked
+                raise ClipError(f"attributes: {column} has dtype {array.dtype}, expected numbers, booleans or texts")
+            if array.dtype.kind in NOT_KEPT:
+                left_out.setdefault(NOT_KEPT[array.dtype.kind], []).append(column)
+            else:
+                checked[column] = array.astype(array.dtype.newbyteorder("<"), copy=False)
+    return checked, left_out
 
 
 def _columns(name: str, array: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:

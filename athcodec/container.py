@@ -27,7 +27,7 @@ from athcodec.errors import BadChunk, ClipError, FormatError, LimitExceeded
 MAGIC = b"\x89ATH\r\n\x1a\n"
 MAJOR, MINOR, FEATURES = 0, 13, 0
 NO_LEVEL = 255
-NODE_WAVES = 1
+STEM_WAVES, NODE_WAVES, BASIS_IN_WAVES, BASIS_AS_SAMPLES = range(4)  # of Basis
 ONLY_TIPS = 8  # of Rotation
 IS_HOST = 4  # Method of REST
 OPTIONAL, KIND_ID = 0x8000, 0x7FFF
@@ -246,7 +246,6 @@ class ChunkStore:
 
 # ---- heads of the chunks ----------------------------------------------------------------------------------------
 
-_HIERARCHY = struct.Struct("<HHHH")
 _REST = struct.Struct("<B3ff")
 _SOURCE_REST = struct.Struct("<Bf")
 _MESH_CHECKSUM = struct.Struct("<II")
@@ -263,22 +262,13 @@ _REFINED_REST = struct.Struct("<f")
 _PREDICTED = struct.Struct("<fB")
 _ARRAY = struct.Struct("<BBHI")
 _POLYGONS = struct.Struct("<II")
-_IS_MIXED, _IS_ABSOLUTE, _IS_DERIVED = 16, 32, 64
+_IS_MIXED, _IS_DERIVED = 8, 16
 
 
 def brief(value: object) -> str:
     """What a file holds, as an error message shows it."""
     text = repr(value)
     return text if len(text) <= 100 else text[:97] + "..."
-
-
-def pack_hierarchy(thresholds, stream: bytes) -> bytes:
-    """thresholds: ath.Thresholds or (epsilon, eta, xi, lam); lengths are rounded, counts beyond 65535 are that."""
-    epsilon, eta, xi, lam = thresholds
-    most = from_short_float(SHORT_FLOATS - 1)
-    lengths = np.minimum([epsilon, xi], most).astype(np.float32).view(np.uint32)
-    nearest = np.minimum(lengths + (1 << SHORT_SHIFT - 1) >> SHORT_SHIFT, SHORT_FLOATS - 1)
-    return _HIERARCHY.pack(*nearest, *(min(int(count), 65535) for count in (eta, lam))) + stream
 
 
 @dataclass
@@ -373,14 +363,13 @@ def pack_time(stream: bytes) -> bytes:
 
 @dataclass
 class StemsHead:
-    """Head of STEMS: step, rotation factor (0, 1, 2, 4, 8), learned time basis (bits, rank, stream) if any, the
-    level of the stream whose basis it begins with, whether pieces that carry others have no rotations, and how many
-    half octaves below 1 the largest step of rigid pieces' rotations is (0: there is none). bits: 0 or NODE_WAVES where
-    the basis is not learned."""
+    """Head of STEMS: step, rotation factor (0, 1, 2, 4, 8), Basis (basis_kind), rank and stream of a learned one,
+    the level of the stream whose basis it begins with, whether pieces that carry others have no rotations, and how
+    many half octaves below 1 the largest step of rigid pieces' rotations is (0: there is none)."""
 
     step: float
     rotation_step_factor: int
-    bits: int = 0
+    basis_kind: int = STEM_WAVES
     rank: int = 0
     basis: bytes = b""
     base: int = NO_LEVEL
@@ -390,8 +379,8 @@ class StemsHead:
 
 def pack_stems(head: StemsHead, stream: bytes) -> bytes:
     rotation = head.rotation_step_factor.bit_length() | ONLY_TIPS * head.only_tips | head.turn << 4
-    data = _STEMS.pack(head.step, rotation, head.bits)
-    if head.bits > NODE_WAVES:
+    data = _STEMS.pack(head.step, rotation, head.basis_kind)
+    if head.basis_kind > NODE_WAVES:
         data += _BASIS.pack(head.rank, head.base, len(head.basis)) + head.basis
     return data + stream
 
@@ -410,8 +399,8 @@ def pack_refined_rest(step: float, stream: bytes) -> bytes:
     return _REFINED_REST.pack(step) + stream
 
 
-def pack_predicted(step: float, settings: int, stream: bytes) -> bytes:
-    return _PREDICTED.pack(step, settings) + stream
+def pack_predicted(step: float, lattice: bool, stream: bytes) -> bytes:
+    return _PREDICTED.pack(step, lattice) + stream
 
 
 def pack_corrections(step: float, stream: bytes) -> bytes:
@@ -424,19 +413,15 @@ _ZSTD_WINDOW = 8 << 20
 _ZSTD_SINGLE_SEGMENT = 0x20
 
 # Types of static arrays: NumPy's letters in the order of FORMAT.md, and the bytes that an element may have.
-_KINDS = "buifcSV"
-_ANY_SIZE = range(1, (1 << 20) + 1)
+_KINDS = "buifS"
 _INTEGER_SIZES = 1, 2, 4, 8
 _KIND_SIZES: dict[str, Container[int]] = {
     "b": (1,),
     "u": _INTEGER_SIZES,
     "i": _INTEGER_SIZES,
     "f": (2, 4, 8),
-    "c": (8, 16),
-    "S": _ANY_SIZE,
-    "V": _ANY_SIZE,
+    "S": range(1, (1 << 20) + 1),
 }
-_BIG_ENDIAN = 8
 _MOST_DIMENSIONS = 32
 
 
@@ -476,10 +461,9 @@ def zstd_decompress_exact(data: bytes, expected: int, what: str, limits: Limits)
         raise BadChunk(f"{what}: got a zstd frame that does not decode ({error}); expected {expected} bytes") from None
 
 
-def pack_polygons(shape: CorePolygons, is_absolute: bool, stream: bytes) -> bytes:
+def pack_polygons(shape: CorePolygons, stream: bytes) -> bytes:
     """FACES or EDGES of this shape."""
-    flags = _IS_MIXED * shape.is_mixed | _IS_ABSOLUTE * is_absolute
-    types = bytes([shape.index_type | flags] + [shape.count_type] * shape.is_mixed)
+    types = bytes([shape.index_type | _IS_MIXED * shape.is_mixed] + [shape.count_type] * shape.is_mixed)
     return types + _POLYGONS.pack(shape.face_count, shape.corner_count if shape.is_mixed else shape.columns) + stream
 
 
@@ -489,7 +473,7 @@ def pack_derived_edges(index_type: int) -> bytes:
 
 
 def pack_array(name: str, array: np.ndarray) -> bytes:
-    """A named static array of numbers, booleans or bytes, of any shape.
+    """A named static array of numbers, booleans or texts, of any shape.
 
     Raises ClipError for what no reader would accept.
     """
@@ -498,8 +482,7 @@ def pack_array(name: str, array: np.ndarray) -> bytes:
         raise ClipError(f"{what}: got {array.nbytes} bytes; the limit is {limits.decoded_chunk_bytes}")
     with _refusals(what):
         text = name.encode()
-        kind = _KINDS.index(array.dtype.kind) | _BIG_ENDIAN * (array.dtype.str[0] == ">")
-        head = _ARRAY.pack(kind, array.ndim, len(text), array.dtype.itemsize)
+        head = _ARRAY.pack(_KINDS.index(array.dtype.kind), array.ndim, len(text), array.dtype.itemsize)
         shape = struct.pack(f"<{array.ndim}I", *array.shape)
         packed = head + shape + text + (_compress(array) if array.size else b"")
         parse_array(packed, what, limits)
@@ -541,11 +524,9 @@ def parse_array(data: bytes, what: str, limits: Limits) -> tuple[str, np.ndarray
 
 def _array_type(code: int, size: int, what: str) -> np.dtype:
     """Of Type and Item_Bytes."""
-    kind, big_endian = code & ~_BIG_ENDIAN, code & _BIG_ENDIAN
-    sizes = _KIND_SIZES[_KINDS[kind]] if kind < len(_KINDS) else ()
-    if size not in sizes or big_endian and (size == 1 or _KINDS[kind] in "SV"):
-        raise BadChunk(f"{what}: got type {code} of {size} bytes; expected numbers, booleans or bytes")
-    return np.dtype(f"{'>' if big_endian else '<'}{_KINDS[kind]}{size}")
+    if code >= len(_KINDS) or size not in _KIND_SIZES[_KINDS[code]]:
+        raise BadChunk(f"{what}: got type {code} of {size} bytes; expected numbers, booleans or texts")
+    return np.dtype(f"<{_KINDS[code]}{size}")
 
 
 def _array_name(text: bytes, what: str, limits: Limits) -> str:

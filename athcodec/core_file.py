@@ -16,7 +16,6 @@ from ctypes import (
     Structure,
     byref,
     c_double,
-    c_float,
     c_int32,
     c_size_t,
     c_uint8,
@@ -81,10 +80,6 @@ class Info(Structure):
         ).split()
     ]
     _fields_ += [
-        ("epsilon", c_float),
-        ("xi", c_float),
-        ("eta", c_uint32),
-        ("lam", c_uint32),
         ("rest_is_float64", c_int32),
         ("rest_is_host", c_int32),
         ("host_checksum", c_uint32 * 2),

@@ -12,17 +12,17 @@ from athcodec._native import CorePolygons
 
 POLYGON_ARRAYS = "face_vertex_counts", "face_vertex_indices"
 """Attributes that stand for faces of different sizes."""
-_SIGNED, _BIG_ENDIAN = 4, 8
+_SIGNED = 4
 
 
 def type_code(dtype: np.dtype) -> int:
     """An integer type as FORMAT.md numbers them."""
     size = dtype.itemsize.bit_length() - 1
-    return size | _SIGNED * (dtype.kind == "i") | _BIG_ENDIAN * (dtype.str[0] == ">")
+    return size | _SIGNED * (dtype.kind == "i")
 
 
 def type_of(code: int) -> np.dtype:
-    return np.dtype(f"{'>' if code & _BIG_ENDIAN else '<'}{'i' if code & _SIGNED else 'u'}{1 << (code & 3)}")
+    return np.dtype(f"<{'i' if code & _SIGNED else 'u'}{1 << (code & 3)}")
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,6 @@ from typing import Any
 import athcodec
 from athcodec.encoding import Draft, code_segments, draft, write
 from athcodec.encoding.features import Feature
-from athcodec.encoding.prediction import LATTICE, MEMORIES
 from athcodec.encoding.segment import SHEET
 from bench.clips import add_ladder, measure
 from bench.suite import SUITES, Case, cases
@@ -128,11 +127,7 @@ def _uses(made: Draft, feature: Feature) -> bool:
     if feature is Feature.CONNECTED:
         return choice.settings.connected_rest
     if choice.predicted is not None:
-        return {
-            Feature.PREDICTED: True,
-            Feature.MEMORIES: choice.predicted % LATTICE != MEMORIES[0],
-            Feature.LATTICE: choice.predicted >= LATTICE,
-        }.get(feature, False)
+        return {Feature.PREDICTED: True, Feature.LATTICE: choice.predicted}.get(feature, False)
     return {
         Feature.ROTATIONS: any(any(own.rotation_step_factors) for own in both),
         Feature.TIPS: any(own.only_tips for own in both),

@@ -20,6 +20,7 @@ from athcodec._native import BRANCH, SEGMENT_FRAMES, crc32c
 from athcodec.ath_file import AthFile
 from athcodec.encoding import streams
 from athcodec.encoding.motion import LevelStream, Plan, SegmentMotion
+from athcodec.encoding.time_bases import MOST_SAMPLE
 from athcodec.segmentation import balanced_segments
 
 sys.path.append(str(Path(__file__).resolve().parent.parent))  # for spec, which is not installed
@@ -144,7 +145,7 @@ def still_file(
 
 def still_hierarchy(plan: Plan) -> bytes:
     numbers = (np.arange(count, dtype=np.int32) for count in (len(plan.branches), plan.vertex_count))
-    return hierarchy_chunk(streams.encode_hierarchy(plan.branches, *numbers))
+    return streams.encode_hierarchy(plan.branches, *numbers)
 
 
 def still_rest(plan: Plan) -> bytes:
@@ -162,21 +163,17 @@ def add_still_segment(store: ct.ChunkStore, plan: Plan, index: int, frames: int,
             store.add(ct.AFFINES, streams.encode_affines(motion, level), level, index)
 
 
-def hierarchy_chunk(stream: bytes) -> bytes:
-    return ct.pack_hierarchy((0.0, 0, 0.0, 0), stream)
-
-
 def exact_rest_chunk(stream: bytes, dtype) -> bytes:
     """REST of Method 1, origin 0."""
     return ct.pack_rest(ct.Rest(np.zeros(3), 1.0, np.dtype(dtype), stream, exact=True))
 
 
-def basis_chunk(stream: bytes, frames: int, bits: int) -> bytes:
+def basis_chunk(stream: bytes, frames: int) -> bytes:
     """STEMS of level 0 of the one vertex, which makes the integers of a learned basis of rank 1 its x."""
     plan = Plan(roots(1), 1)
     plan.set_rest(np.zeros((1, 3)))
     learned = LevelStream(1.0, temporal=np.ones((1, frames)))
     motion = SegmentMotion(plan, frames, [learned, LevelStream(1.0)])
-    motion.tracks[0, 1, 0, 0] = 1 << bits - 1
-    head = ct.StemsHead(1.0, 0, bits, 1, stream)
+    motion.tracks[0, 1, 0, 0] = MOST_SAMPLE
+    head = ct.StemsHead(1.0, 0, ct.BASIS_AS_SAMPLES, 1, stream)
     return ct.pack_stems(head, streams.encode_stems(motion, 0))

@@ -15,7 +15,6 @@ from ctypes import (
     byref,
     c_char_p,
     c_double,
-    c_float,
     c_int,
     c_int32,
     c_size_t,
@@ -63,10 +62,6 @@ class Info(ctypes.Structure):
         ).split()
     ]
     _fields_ += [
-        ("epsilon", c_float),
-        ("xi", c_float),
-        ("eta", c_uint32),
-        ("lambda_", c_uint32),
         ("rest_is_float64", c_int32),
         ("rest_is_host", c_int32),
         ("host_checksum", c_uint32 * 2),

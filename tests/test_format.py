@@ -21,7 +21,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import zstandard
-from files import Parts, basis_chunk, exact_rest_chunk, hierarchy_chunk, opened, roots, still_file
+from files import Parts, basis_chunk, exact_rest_chunk, opened, roots, still_file
 from plants import plant
 
 import athcodec
@@ -30,6 +30,7 @@ from athcodec._native import BRANCH, LOOSE, SHAPE_MODES, SHEET, WHOLE, crc32c, l
 from athcodec.encoding import streams
 from athcodec.encoding.learned_modes import LearnedModes
 from athcodec.encoding.motion import LevelStream, Plan, SegmentMotion
+from athcodec.encoding.time_bases import MOST_SAMPLE
 
 FORMAT = Path(__file__).resolve().parents[1] / "FORMAT.md"
 sys.path.append(str(FORMAT.parent))  # for spec, which is not installed
@@ -160,12 +161,7 @@ def test_document_describes_the_version_that_is_written():
 
 @pytest.mark.parametrize(
     "title, form",
-    [
-        ("Header", container._HEADER),
-        ("HIERARCHY", container._HIERARCHY),
-        ("CORRECTIONS", container._CORRECTIONS),
-        ("REFINED_REST", container._REFINED_REST),
-    ],
+    [("Header", container._HEADER), ("CORRECTIONS", container._CORRECTIONS), ("REFINED_REST", container._REFINED_REST)],
 )
 def test_field_tables_have_the_offsets_and_types_of_the_code(title, form):
     names = {"s": "bytes", "B": "u8", "H": "u16", "I": "u32", "Q": "u64", "f": "f32", "d": "f64"}
@@ -246,7 +242,7 @@ def test_lossless_files_decode_by_the_document(spec, dtype, tmp_path):
 def test_worked_example_decodes_step_by_step(spec):
     text = section("Worked example")
     stream = bytes.fromhex(re.search(r"^ {4}([0-9a-f ]+)$", text, re.M).group(1))
-    values = [int(n) for n in re.search(r"decodes to ([-0-9, ]+)\.", text).group(1).split(",")]
+    values = [int(n) for n in re.search(r"decodes\sto ([-0-9, ]+)\.", text).group(1).split(",")]
     steps: list[dict[str, str]] = []
 
     class Tracing(spec.RangeDecoder):
@@ -272,9 +268,9 @@ def test_worked_example_decodes_step_by_step(spec):
     decode = type(spec.decode_temporal)(
         spec.decode_temporal.__code__, spec.decode_temporal.__globals__ | {"RangeDecoder": Tracing}
     )
-    assert decode(stream, 1, len(values), 8) == [values]
+    assert decode(stream, 1, len(values)) == [values]
     assert steps == table("Worked example", "Probability")
-    assert streams.encode_temporal(np.array([values], np.int32), 8) == stream
+    assert streams.encode_temporal(np.array([values], np.int32)) == stream
 
 
 def traced(spec) -> dict[str, list]:
@@ -318,10 +314,10 @@ def test_trace_of_a_level_is_what_the_code_computes(spec):
 
 @pytest.mark.parametrize("change", [b"\0", b"\1" * 9])
 def test_a_stream_with_bytes_too_many_is_refused_by_the_document_too(spec, change):
-    stream = streams.encode_temporal(np.array([[0, 3, -20]], np.int32), 8)
-    assert spec.decode_temporal(stream, 1, 3, 8) == [read_basis(stream, 3)] == [[0, 3, -20]]
+    stream = streams.encode_temporal(np.array([[0, 3, -20]], np.int32))
+    assert spec.decode_temporal(stream, 1, 3) == [read_basis(stream, 3)] == [[0, 3, -20]]
     with pytest.raises(spec.Invalid):
-        spec.decode_temporal(stream + change, 1, 3, 8)
+        spec.decode_temporal(stream + change, 1, 3)
     with pytest.raises(errors.BadChunk):
         read_basis(stream + change, 3)
 
@@ -422,7 +418,7 @@ def played(data: bytes, kind: int) -> Iterator[athcodec.Decoder]:
 
 def read_hierarchy(stream: bytes, like: np.ndarray, fields: list[str]) -> tuple:
     """Fields of the branches, and both permutations, in a file that else fits branches `like` those."""
-    with played(still_file(branches=like, hierarchy=hierarchy_chunk(stream)), container.HIERARCHY) as decoder:
+    with played(still_file(branches=like, hierarchy=stream), container.HIERARCHY) as decoder:
         numbers = decoder.hierarchy
         assert not decoder.positions().any()
         rows = [[int(row[name]) for name in fields] for row in decoder.file.branches]
@@ -445,9 +441,9 @@ def read_times(stream: bytes, frame_count: int) -> np.ndarray:
         return decoder.time
 
 
-def read_basis(stream: bytes, frames: int, bits: int = 8) -> list[int]:
+def read_basis(stream: bytes, frames: int) -> list[int]:
     """A learned basis of one row, which moves a vertex along x."""
-    with played(still_file(frames, stems=basis_chunk(stream, frames, bits)), container.STEMS) as decoder:
+    with played(still_file(frames, stems=basis_chunk(stream, frames)), container.STEMS) as decoder:
         return decoder.positions()[:, 0, 0].tolist()
 
 
@@ -824,20 +820,20 @@ def test_a_branch_in_a_whole_subtree_may_not_be_whole(spec):
 
 def test_rows_may_not_code_more_frequencies_than_their_learned_basis_has(spec):
     file = HandMade(1, False, None)
-    file.bases = {1: (11, 3)}
+    file.bases = {1: 3}
     assert_same_bits(spec, file.file())
     file = HandMade(1, False, None)
-    file.bases, file.excess = {1: (11, 3)}, 1
+    file.bases, file.excess = {1: 3}, 1
     assert_refused_alike(spec, file.file(), "BAD_CHUNK")
 
 
 @pytest.mark.parametrize(
     "values, valid",
-    [([128, -128], True), ([-128, 128], True), ([129, 0], False), ([0, -129], False), ([0, 1 << 20], False)],
+    [([8192, -8192], True), ([-8192, 8192], True), ([8193, 0], False), ([0, -8193], False), ([0, 1 << 20], False)],
 )
 def test_entries_of_a_learned_basis_are_at_most_1(spec, values, valid):
-    stream = streams.encode_temporal(np.array([values], np.int32), 30)
-    for decode in lambda data: spec.decode_temporal(data, 1, 2, 8), lambda data: [read_basis(data, 2)]:
+    stream = streams.encode_temporal(np.array([values], np.int32))
+    for decode in lambda data: spec.decode_temporal(data, 1, 2), lambda data: [read_basis(data, 2)]:
         assert outcome(spec, decode, stream) == ([values] if valid else "invalid")
 
 
@@ -915,7 +911,7 @@ class HandMade:
     def __init__(self, seed: int, is_float64: bool, exact: type | None, parts=BRANCHES):
         self.random, self.adaptive = np.random.default_rng(seed), seed % 2 == 1
         self.is_float64, self.exact, self.parts = is_float64, exact, parts
-        self.bases = {1: (11, 3), 2: (8, 1), 4: (16, 18)}  # Basis_Bits, Basis_Rank
+        self.bases = {1: 3, 2: 1, 4: 18}  # Basis_Rank
         self.excess = 0  # frequencies that rows code beyond the rank of their learned basis
         self.leave_out = ()
         self.origin = np.array([10.0, -3.5, 0.25])
@@ -969,10 +965,7 @@ class HandMade:
     def _add_prelude(self) -> None:
         counts = len(self.branches), self.vertex_count
         permutations = [self.random.permutation(count).astype(np.int32) for count in counts]
-        self.store.add(
-            container.HIERARCHY,
-            container.pack_hierarchy((0.5, 3, 0.25, 1), streams.encode_hierarchy(self.branches, *permutations)),
-        )
+        self.store.add(container.HIERARCHY, streams.encode_hierarchy(self.branches, *permutations))
         head = container.Rest(self.origin, 0.01, np.dtype(self.exact or np.float32), exact=bool(self.exact))
         times = container.pack_steady_time(np.arange(self.FRAMES) / 24.0)
         if self.exact:
@@ -998,9 +991,9 @@ class HandMade:
         rows.flat[self.random.integers(rows.size, size=9)] = 40_000
         return rows.astype(np.int32)
 
-    def _basis(self, bits: int, rank: int, frames: int) -> np.ndarray:
+    def _basis(self, rank: int, frames: int) -> np.ndarray:
         """Entries up to the ends of their range."""
-        limit = 1 << bits - 1
+        limit = MOST_SAMPLE
         basis = self.random.integers(-limit, limit + 1, (rank, frames)).astype(np.int32)
         basis[0, :3] = limit, -limit, limit
         return basis
@@ -1011,7 +1004,7 @@ class HandMade:
             for level in range(self.plan.level_count)
         ]
         for level, basis in bases.items():
-            streams[level].temporal = basis * 2.0 ** (1 - self.bases[level][0])
+            streams[level].temporal = basis / MOST_SAMPLE
         motion = SegmentMotion(self.plan, frames, streams, self.shapes)
         motion.coefficients[:] = self._rows(*motion.coefficients.shape)
         motion.tracks[:] = self._rows(*motion.tracks.shape)
@@ -1029,14 +1022,14 @@ class HandMade:
     def _add_segment(self, segment: int) -> None:
         start, stop = (self.FRAMES * (segment + i) // self.SEGMENTS for i in (0, 1))
         frames, levels = stop - start, self.plan.level_count
-        bases = {level: self._basis(bits, rank + self.excess, frames) for level, (bits, rank) in self.bases.items()}
+        bases = {level: self._basis(rank + self.excess, frames) for level, rank in self.bases.items()}
         motion = self._motion(frames, bases)
         for level in range(levels):
             if self.plan.has_stems(level):
                 head = container.StemsHead(motion.streams[level].step, int(motion.streams[level].rotation_step_factor))
                 if level in bases:
-                    head.bits, head.rank = self.bases[level]
-                    head.basis = streams.encode_temporal(bases[level][: head.rank], head.bits)
+                    head.basis_kind, head.rank = container.BASIS_AS_SAMPLES, self.bases[level]
+                    head.basis = streams.encode_temporal(bases[level][: head.rank])
                 stream = streams.encode_stems(motion, level)
                 self._add(container.STEMS, container.pack_stems(head, stream), level, segment)
             if self.plan.has_affines(level):

@@ -154,7 +154,7 @@ def test_growth_does_not_twitch(fraction, most, share, eased, tmp_path):
 def test_points_of_the_lattice_tell_noise_in_fewer_bits_than_cubes(monkeypatch, tmp_path):
     clip = ODD["noise"]()
     found = size(clip, tmp_path, 1e-4)
-    monkeypatch.setattr(prediction, "LATTICE", 0)
+    monkeypatch.setattr(prediction, "LATTICE", prediction.CUBES)
     assert 8 * (size(clip, tmp_path, 1e-4).bytes - found.bytes) >= 0.6 * clip.frame_count * clip.vertex_count
 
 

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 import athcodec
-from athcodec.container import STEMS
+from athcodec.container import BASIS_IN_WAVES, STEMS
 from athcodec.encoding.motion import waves_over_time
 from athcodec.encoding.search import Search
-from athcodec.encoding.time_bases import BASIS_IN_WAVES, InWaves, TimeComponents
+from athcodec.encoding.time_bases import InWaves, TimeComponents
 from bench.odd.bending import FPS, Bones, clip_of, gusty
 from bench.trees.plant import grow
 from spec import reference_decoder as rd
@@ -42,7 +42,7 @@ def hit_by_a_gust(seed: int = 5, frames: int = 90) -> athcodec.MotionClip:
 
 
 def stems_heads(data: bytes) -> list[tuple[int, int, int]]:
-    """Basis_Bits, Basis_Level and Basis_Length of each level with STEMS, of files of one segment and layer."""
+    """Basis, Basis_Level and Basis_Length of each level with STEMS, of files of one segment and layer."""
     file = rd.AthFile(data)
     own = [file.content(STEMS, chunk.level) for chunk in file.chunks if chunk.kind == STEMS]
     return [(chunk[5], chunk[8], int.from_bytes(chunk[9:13], "little")) for chunk in own]

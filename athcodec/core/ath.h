@@ -255,9 +255,7 @@ typedef struct ath_info {
     int32_t layer_count;  /* of the full file; 1: no level refines another */
     int32_t depth_levels; /* levels of the first layer: those beyond are refinements */
     int32_t node_count, chunk_count;
-    int32_t is_float64; /* 1: positions are double in the file's own arithmetic, else float */
-    float epsilon, xi;  /* the thresholds by which nodes were accepted */
-    uint32_t eta, lambda;
+    int32_t is_float64;        /* 1: positions are double in the file's own arithmetic, else float */
     int32_t rest_is_float64;   /* 1: the rest pose is double, else float */
     int32_t rest_is_host;      /* 1: the rest pose is a mesh of the host's, for ath_set_host_mesh */
     uint32_t host_checksum[2]; /* of that mesh: CRC-32C of its floats as bytes, little-endian, and of these backwards */

@@ -53,8 +53,7 @@ static uint32_t word_at(const uint8_t *bytes, size_t available, size_t at)
 static int check_version(uint32_t major, uint32_t minor, uint32_t features, ath_fault_info *fault)
 {
     double known = (double)(ATH_FORMAT_MAJOR << 8 | ATH_FORMAT_MINOR), found = (double)(major << 8 | minor);
-    if (found != known)
-        return ath_refuse(fault, ATH_UNSUPPORTED_VERSION, ATH_FIELD_VERSION, found, known, known);
+    if (found != known) return ath_refuse(fault, ATH_UNSUPPORTED_VERSION, ATH_FIELD_VERSION, found, known, known);
     if ((features & ~(uint32_t)ATH_FEATURES) == 0) return ATH_OK;
     return ath_refuse(fault, ATH_UNSUPPORTED_FEATURE, ATH_FIELD_FEATURES, (double)(features & ~(uint32_t)ATH_FEATURES),
                       known, found);
@@ -347,18 +346,6 @@ static ath_bytes rest_of(ath_bytes chunk, size_t head)
     return rest;
 }
 
-int ath_parse_hierarchy(ath_bytes chunk, ath_thresholds *head, ath_bytes *body)
-{
-    if (chunk.size < 8) return ATH_BAD_CHUNK;
-    int32_t epsilon = (int32_t)u16_at(chunk.bytes), xi = (int32_t)u16_at(chunk.bytes + 2);
-    head->epsilon = short_float(epsilon);
-    head->xi = short_float(xi);
-    head->eta = u16_at(chunk.bytes + 4);
-    head->lambda = u16_at(chunk.bytes + 6);
-    *body = rest_of(chunk, 8);
-    return epsilon < ATH_SHORT_FLOATS && xi < ATH_SHORT_FLOATS ? ATH_OK : ATH_BAD_CHUNK;
-}
-
 enum { REST_EXACT = 1, REST_FLOAT64 = 2, REST_HOST = 4, REST_ADAPTIVE = 8, REST_CONNECTED = 16 }; /* bits of Method */
 
 int ath_parse_rest(ath_bytes chunk, ath_rest_head *head, ath_bytes *body)
@@ -385,12 +372,7 @@ int ath_parse_rest(ath_bytes chunk, ath_rest_head *head, ath_bytes *body)
 }
 
 /* Bits of Index_Type; those below are the type. */
-enum { IS_MIXED = 16, IS_ABSOLUTE = 32, IS_DERIVED = 64, TYPE_BITS = 15, TYPE_BIG_ENDIAN = 8 };
-
-static int is_integer_type(int32_t type)
-{
-    return type <= TYPE_BITS && (type & (TYPE_BIG_ENDIAN | 3)) != TYPE_BIG_ENDIAN;
-}
+enum { IS_MIXED = 8, IS_DERIVED = 16, TYPE_BITS = 7 };
 
 int32_t ath_vertices_of_type(int32_t type, int32_t vertex_count)
 {
@@ -398,7 +380,7 @@ int32_t ath_vertices_of_type(int32_t type, int32_t vertex_count)
     return bits < 31 ? ath_min(vertex_count, 1 << bits) : vertex_count;
 }
 
-int ath_parse_polygons(ath_bytes chunk, ath_polygons *shape, int32_t *is_absolute, ath_bytes *body)
+int ath_parse_polygons(ath_bytes chunk, ath_polygons *shape, ath_bytes *body)
 {
     if (chunk.size < 1) return ATH_BAD_CHUNK;
     int32_t flags = chunk.bytes[0] & ~TYPE_BITS;
@@ -406,15 +388,13 @@ int ath_parse_polygons(ath_bytes chunk, ath_polygons *shape, int32_t *is_absolut
     shape->index_type = chunk.bytes[0] & TYPE_BITS;
     shape->is_mixed = (flags & IS_MIXED) != 0;
     shape->is_derived = flags == IS_DERIVED;
-    *is_absolute = (flags & IS_ABSOLUTE) != 0;
     *body = rest_of(chunk, 1);
-    if (!is_integer_type(shape->index_type)) return ATH_BAD_CHUNK;
     if (shape->is_derived) return body->size == 0 ? ATH_OK : ATH_BAD_CHUNK;
-    if (flags & ~(IS_MIXED | IS_ABSOLUTE) || body->size < 8 + (size_t)shape->is_mixed) return ATH_BAD_CHUNK;
+    if (flags & ~IS_MIXED || body->size < 8 + (size_t)shape->is_mixed) return ATH_BAD_CHUNK;
     if (shape->is_mixed) {
         shape->count_type = body->bytes[0];
         *body = rest_of(*body, 1);
-        if (!is_integer_type(shape->count_type)) return ATH_BAD_CHUNK;
+        if (shape->count_type > TYPE_BITS) return ATH_BAD_CHUNK;
     }
     uint64_t faces = u32_at(body->bytes), corners = u32_at(body->bytes + 4);
     if (!shape->is_mixed) {
@@ -546,11 +526,10 @@ int ath_parse_stems(ath_bytes chunk, int32_t frames, ath_stems_head *head, ath_b
     head->rotation_step_factor = (double)(1 << rotation >> 1);
     head->only_tips = (chunk.bytes[4] & ONLY_TIPS) != 0;
     head->turn = chunk.bytes[4] >> 4;
-    head->bits = chunk.bytes[5];
+    head->basis_kind = chunk.bytes[5];
     *body = rest_of(chunk, 6);
-    if (!is_step(head->step) || rotation > 4) return ATH_BAD_CHUNK;
-    if (head->bits <= ATH_NODE_WAVES) return ATH_OK;
-    if (head->bits != ATH_BASIS_IN_WAVES && (head->bits < 8 || head->bits > 16)) return ATH_BAD_CHUNK;
+    if (!is_step(head->step) || rotation > 4 || head->basis_kind > ATH_BASIS_AS_SAMPLES) return ATH_BAD_CHUNK;
+    if (head->basis_kind <= ATH_NODE_WAVES) return ATH_OK;
     if (body->size < 7) return ATH_BAD_CHUNK;
     head->rank = (int32_t)u16_at(body->bytes);
     head->base = body->bytes[2] == ATH_NO_LEVEL ? -1 : body->bytes[2];
@@ -564,8 +543,9 @@ int ath_parse_stems(ath_bytes chunk, int32_t frames, ath_stems_head *head, ath_b
 
 int ath_parse_predicted(ath_bytes chunk, ath_predicted_head *head, ath_bytes *body)
 {
-    if (chunk.size < 5 || chunk.bytes[4] > 31) return ATH_BAD_CHUNK;
-    *head = ath_predicted_head_of((double)f32_at(chunk.bytes), chunk.bytes[4]);
+    if (chunk.size < 5 || chunk.bytes[4] > 1) return ATH_BAD_CHUNK;
+    head->step = (double)f32_at(chunk.bytes);
+    head->lattice = chunk.bytes[4];
     *body = rest_of(chunk, 5);
     return is_step(head->step) ? ATH_OK : ATH_BAD_CHUNK;
 }

@@ -45,11 +45,6 @@ typedef struct {
 } ath_bytes;
 
 typedef struct {
-    double epsilon, xi;
-    uint32_t eta, lambda;
-} ath_thresholds;
-
-typedef struct {
     double origin[3], step;
     int32_t exact, is_float64, adaptive, is_host, connected;
     uint32_t host_checksum[2]; /* of a mesh of the host's, where that is the rest pose */
@@ -67,22 +62,23 @@ typedef struct {
     const uint8_t *seams; /* of a loop: full_level_count floats, see ath_seam */
 } ath_clip_entry;
 
-/* Of PREDICTED: the step, how many samples fits remember, whether the errors of all vertices of a fit count, and whether
- * vertices are points of a lattice. */
+/* Of PREDICTED: the step, and whether vertices are points of a lattice. */
 typedef struct {
     double step;
-    int32_t memory, common, lattice;
+    int32_t lattice;
 } ath_predicted_head;
 
 /* 0: first + i * step; 1: first + i / step; 2: stream; 3 as 1 and 4 as 0, by a whole rate, from 0 on */
 typedef int32_t ath_time_method;
 
-/* Bits of a stream in the waves of maps of nodes; of one whose basis is rows that are integers of waves. */
-enum { ATH_NODE_WAVES = 1, ATH_BASIS_IN_WAVES = 2 };
+/* Basis of STEMS: the waves of stems, those of maps of nodes, learned rows that are integers of waves, or samples. */
+enum { ATH_STEM_WAVES, ATH_NODE_WAVES, ATH_BASIS_IN_WAVES, ATH_BASIS_AS_SAMPLES };
+enum { ATH_MOST_SAMPLE = 8192 }; /* stands for 1 */
 
 typedef struct {
     double step, rotation_step_factor;
-    int32_t bits, rank; /* of a learned basis; bits up to ATH_NODE_WAVES: there is none */
+    int32_t basis_kind; /* up to ATH_NODE_WAVES: no basis is learned */
+    int32_t rank;       /* of a learned basis */
     int32_t base;       /* level of the stream whose time basis this one's begins with; -1: none */
     int32_t ratio;      /* of a refinement: the step of the layer before over this one's */
     int32_t turn;       /* half octaves below 1 of the largest step of rigid pieces' rotations; 0: none */
@@ -90,7 +86,6 @@ typedef struct {
     ath_bytes basis;
 } ath_stems_head;
 
-int ath_parse_hierarchy(ath_bytes chunk, ath_thresholds *head, ath_bytes *body);
 int ath_parse_rest(ath_bytes chunk, ath_rest_head *head, ath_bytes *body);
 /* Of FACES or EDGES, which have at most so many faces and corners together: else ATH_LIMIT_EXCEEDED. */
 enum { MOST_CORNERS = 1 << 26 };
@@ -99,7 +94,7 @@ ATH_INLINE int32_t ath_bits_of_type(int32_t type) { return (8 << (type & 3)) - (
 
 /* Vertices that the numbers of an integer type can name, at most `vertex_count`. */
 int32_t ath_vertices_of_type(int32_t type, int32_t vertex_count);
-int ath_parse_polygons(ath_bytes chunk, ath_polygons *shape, int32_t *is_absolute, ath_bytes *body);
+int ath_parse_polygons(ath_bytes chunk, ath_polygons *shape, ath_bytes *body);
 int ath_parse_source_rest(ath_bytes chunk, ath_source_rest_head *head, ath_bytes *body);
 /* Parses the entry at the front of `chunk`, and moves `chunk` past it. */
 int ath_parse_clip(ath_bytes *chunk, const ath_header *header, ath_clip_entry *entry);
@@ -111,11 +106,6 @@ int ath_parse_stems(ath_bytes chunk, int32_t frames, ath_stems_head *head, ath_b
 int ath_parse_refined_stems(ath_bytes chunk, int32_t frames, ath_stems_head *head, ath_bytes *body);
 int ath_parse_refined_rest(ath_bytes chunk, double *step, ath_bytes *body);
 int ath_parse_refined_shapes(ath_bytes chunk, int32_t *shift, ath_bytes *body);
-ATH_INLINE ath_predicted_head ath_predicted_head_of(double step, int32_t settings)
-{
-    ath_predicted_head head = {step, 32 << (settings & 7), settings >> 3 & 1, settings >> 4};
-    return head;
-}
 int ath_parse_predicted(ath_bytes chunk, ath_predicted_head *head, ath_bytes *body);
 int ath_parse_corrections(ath_bytes chunk, double *step, ath_bytes *body);
 

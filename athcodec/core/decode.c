@@ -91,12 +91,12 @@ size_t ath_faces_memory(int32_t vertex_count)
     return sizeof(faces_model) + 2 * FACE_SIDES * sizeof(int32_t) * (size_t)vertex_count;
 }
 
-int ath_decode_faces(void *memory, ath_bytes stream, const ath_polygons *shape, int32_t is_absolute,
-                     int32_t vertex_count, uint32_t *counts, int32_t *corners)
+int ath_decode_faces(void *memory, ath_bytes stream, const ath_polygons *shape, int32_t vertex_count, uint32_t *counts,
+                     int32_t *corners)
 {
     ath_coder coder;
     coder_start(&coder, stream.bytes, stream.size);
-    faces_list faces = faces_of((faces_model *)memory, shape, is_absolute, vertex_count, counts, corners);
+    faces_list faces = faces_of((faces_model *)memory, shape, vertex_count, counts, corners);
     return finished(&coder, code_faces(&coder, (faces_model *)memory, &faces));
 }
 
@@ -107,10 +107,9 @@ int ath_decode_times(void *model, const uint8_t *bytes, size_t size, int32_t fra
     return finished(&coder, code_times(&coder, (exact_model *)model, frame_count, times));
 }
 
-int ath_decode_temporal(void *model, const uint8_t *bytes, size_t size, int32_t rank, int32_t frames, int32_t limit,
-                        int32_t *basis)
+int ath_decode_temporal(void *model, const uint8_t *bytes, size_t size, int32_t rank, int32_t frames, int32_t *basis)
 {
     ath_coder coder;
     coder_start(&coder, bytes, size);
-    return finished(&coder, code_temporal(&coder, (number_model *)model, rank, frames, limit, basis));
+    return finished(&coder, code_temporal(&coder, (number_model *)model, rank, frames, basis));
 }

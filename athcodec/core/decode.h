@@ -24,12 +24,11 @@ int ath_decode_exact_rest(void *model, const uint8_t *bytes, size_t size, const 
                           int32_t branch_count, const ath_mesh *mesh, int is_float64, double *rest);
 /* Corners in source order. memory: ath_faces_memory bytes; counts: null unless shape->is_mixed. */
 ATH_ENCODER_API size_t ath_faces_memory(int32_t vertex_count);
-int ath_decode_faces(void *memory, ath_bytes stream, const ath_polygons *shape, int32_t is_absolute,
-                     int32_t vertex_count, uint32_t *counts, int32_t *corners);
+int ath_decode_faces(void *memory, ath_bytes stream, const ath_polygons *shape, int32_t vertex_count, uint32_t *counts,
+                     int32_t *corners);
 /* All are finite; the caller checks that they increase. */
 int ath_decode_times(void *model, const uint8_t *bytes, size_t size, int32_t frame_count, double *times);
-/* rank x frames integers; `limit` stands for 1. */
-int ath_decode_temporal(void *model, const uint8_t *bytes, size_t size, int32_t rank, int32_t frames, int32_t limit,
-                        int32_t *basis);
+/* rank x frames integers; ATH_MOST_SAMPLE stands for 1. */
+int ath_decode_temporal(void *model, const uint8_t *bytes, size_t size, int32_t rank, int32_t frames, int32_t *basis);
 
 #endif

@@ -136,13 +136,12 @@ int64_t ath_encode_exact_rest(void *model, uint8_t *bytes, size_t capacity, cons
                                            (double *)rest));
 }
 
-int64_t ath_encode_faces(void *memory, uint8_t *bytes, size_t capacity, const ath_polygons *shape, int is_absolute,
-                         int32_t vertex_count, const uint32_t *counts, const int32_t *corners)
+int64_t ath_encode_faces(void *memory, uint8_t *bytes, size_t capacity, const ath_polygons *shape, int32_t vertex_count,
+                         const uint32_t *counts, const int32_t *corners)
 {
     ath_coder coder;
     coder_start(&coder, bytes, capacity);
-    faces_list faces =
-        faces_of((faces_model *)memory, shape, is_absolute, vertex_count, (uint32_t *)counts, (int32_t *)corners);
+    faces_list faces = faces_of((faces_model *)memory, shape, vertex_count, (uint32_t *)counts, (int32_t *)corners);
     return written(&coder, code_faces(&coder, (faces_model *)memory, &faces));
 }
 
@@ -153,12 +152,12 @@ int64_t ath_encode_times(void *model, uint8_t *bytes, size_t capacity, int32_t f
     return written(&coder, code_times(&coder, (exact_model *)model, frame_count, (double *)times));
 }
 
-int64_t ath_encode_temporal(void *model, uint8_t *bytes, size_t capacity, int32_t rank, int32_t frames, int32_t limit,
+int64_t ath_encode_temporal(void *model, uint8_t *bytes, size_t capacity, int32_t rank, int32_t frames,
                             const int32_t *basis)
 {
     ath_coder coder;
     coder_start(&coder, bytes, capacity);
-    return written(&coder, code_temporal(&coder, (number_model *)model, rank, frames, limit, (int32_t *)basis));
+    return written(&coder, code_temporal(&coder, (number_model *)model, rank, frames, (int32_t *)basis));
 }
 
 int64_t ath_encode_basis(void *memory, uint8_t *bytes, size_t capacity, int32_t rank, int32_t frames,
@@ -502,7 +501,7 @@ size_t ath_predicted_memory(int32_t vertex_count)
 }
 
 int64_t ath_encode_predicted(void *memory, uint8_t *bytes, size_t capacity, const ath_plan *plan, const double *origin,
-                             int32_t frames, int is_float64, double step, int settings, const double *source,
+                             int32_t frames, int is_float64, double step, int lattice, const double *source,
                              const double *limits, void *positions)
 {
     ath_coder coder;
@@ -511,7 +510,8 @@ int64_t ath_encode_predicted(void *memory, uint8_t *bytes, size_t capacity, cons
     int valid = 1;
     coder_start(&coder, bytes, capacity);
     carve_prediction(p, plan->vertex_count, (uint8_t *)memory);
-    p->head = ath_predicted_head_of(step, settings);
+    p->head.step = step;
+    p->head.lattice = lattice;
     start_prediction(p, plan, origin, is_float64, positions);
     for (int32_t t = 0; t < frames && valid; t++) valid = encode_frame(&coder, p, &wanted);
     return written(&coder, valid);

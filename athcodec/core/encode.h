@@ -193,12 +193,11 @@ ATH_ENCODER_API int64_t ath_encode_exact_rest(void *model, uint8_t *bytes, size_
                                               const double *rest);
 /* memory: ath_faces_memory bytes. */
 ATH_ENCODER_API int64_t ath_encode_faces(void *memory, uint8_t *bytes, size_t capacity, const ath_polygons *shape,
-                                         int is_absolute, int32_t vertex_count, const uint32_t *counts,
-                                         const int32_t *corners);
+                                         int32_t vertex_count, const uint32_t *counts, const int32_t *corners);
 ATH_ENCODER_API int64_t ath_encode_times(void *model, uint8_t *bytes, size_t capacity, int32_t frame_count,
                                          const double *times);
 ATH_ENCODER_API int64_t ath_encode_temporal(void *model, uint8_t *bytes, size_t capacity, int32_t rank, int32_t frames,
-                                            int32_t limit, const int32_t *basis);
+                                            const int32_t *basis);
 /* Rows of a basis in waves; integers: as many rows of `frames` as rank, and zeros up to a multiple of 3. */
 ATH_ENCODER_API int64_t ath_encode_basis(void *model, uint8_t *bytes, size_t capacity, int32_t rank, int32_t frames,
                                          int32_t *exponents, int32_t *integers);
@@ -220,12 +219,12 @@ ATH_ENCODER_API int64_t ath_encode_refinement(void *model, uint8_t *bytes, size_
                                               const ath_motion *motion, const ath_integers *integers, int32_t level);
 ATH_ENCODER_API int64_t ath_encode_affines(void *model, uint8_t *bytes, size_t capacity, const ath_plan *plan,
                                            const ath_motion *motion, const ath_integers *integers, int32_t level);
-/* Predicted motion: memory, ath_predicted_memory bytes; settings: as a chunk has them; source: frames x vertex_count x
+/* Predicted motion: memory, ath_predicted_memory bytes; lattice: 1 where vertices are points of it; source: frames x vertex_count x
  * 3, less the origin; limits: of each vertex. Fills positions, as decoded. */
 ATH_ENCODER_API size_t ath_predicted_memory(int32_t vertex_count);
 ATH_ENCODER_API int64_t ath_encode_predicted(void *memory, uint8_t *bytes, size_t capacity, const ath_plan *plan,
                                              const double *origin, int32_t frames, int is_float64, double step,
-                                             int settings, const double *source, const double *limits, void *positions);
+                                             int lattice, const double *source, const double *limits, void *positions);
 ATH_ENCODER_API int64_t ath_encode_corrections(void *model, uint8_t *bytes, size_t capacity, int32_t vertex_count,
                                                int32_t frames, const int32_t *corrections, int64_t count);
 

@@ -42,18 +42,18 @@ typedef struct {
     uint32_t *counts; /* null where all faces are alike */
     int32_t *corners;
     int32_t (*before)[FACE_SIDES], (*after)[FACE_SIDES];
-    int32_t bound, is_absolute;
+    int32_t bound;
     uint32_t most; /* corners that a face may have */
 } faces_list;
 
 /* memory: a model, and the open sides of each vertex. Vertices and counts are those that their types hold. */
-static faces_list faces_of(faces_model *memory, const ath_polygons *shape, int32_t is_absolute, int32_t vertex_count,
-                           uint32_t *counts, int32_t *corners)
+static faces_list faces_of(faces_model *memory, const ath_polygons *shape, int32_t vertex_count, uint32_t *counts,
+                           int32_t *corners)
 {
     int32_t (*before)[FACE_SIDES] = (int32_t (*)[FACE_SIDES])(void *)(memory + 1);
     int32_t bits = ath_bits_of_type(shape->count_type), bound = ath_vertices_of_type(shape->index_type, vertex_count);
     uint32_t most = shape->is_mixed && bits < 31 ? (1u << bits) - 1 : UINT32_MAX;
-    faces_list faces = {shape, counts, corners, before, before + vertex_count, bound, is_absolute, most};
+    faces_list faces = {shape, counts, corners, before, before + vertex_count, bound, most};
     return faces;
 }
 
@@ -119,14 +119,10 @@ static void face_guesses(const faces_model *model, const faces_list *faces, uint
     while (k < FACE_GUESSES) guesses[k++] = -1;
 }
 
-/* By how far it is from another, or where faces are plain by its number. */
+/* By how far it is from another. */
 static int32_t code_far(ath_coder *coder, faces_model *model, const faces_list *faces, int32_t j, int32_t about,
                         int32_t vertex)
 {
-    if (faces->is_absolute) {
-        int32_t found = (int32_t)code_unsigned(coder, &model->far[j], FACE_FAR_MEAN, (uint32_t)vertex);
-        return found < faces->bound ? found : -1;
-    }
     int32_t difference = code_signed(coder, &model->far[j], model->far_mean[j], ENCODING ? vertex - about : 0);
     model->far_mean[j] = model->far_mean[j] - (model->far_mean[j] + 7) / 8 + clipped(difference) * 2;
     return difference < -about || difference >= faces->bound - about ? -1 : about + difference;
@@ -147,7 +143,6 @@ static int32_t code_corner(ath_coder *coder, faces_model *model, const faces_lis
             return expected;
         }
     }
-    if (faces->is_absolute) return code_far(coder, model, faces, 0, 0, vertex);
     face_guesses(model, faces, first, j, previous, face_repeated(faces, i, last), guesses);
     if (j > 1 && guesses[2] >= 0 && guesses[2] == guesses[2 + FACE_SIDES]) place = FACE_PLACES - 1;
     for (int32_t g = 0; g < FACE_GUESSES; g++) {

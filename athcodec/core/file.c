@@ -258,19 +258,13 @@ static int read_hierarchy(ath_file *file, const ath_limits *limits, ath_fault_in
 {
     const ath_header *header = &file->header;
     int32_t branch_count = (int32_t)header->branch_count, vertex_count = (int32_t)header->vertex_count;
-    ath_bytes chunk, body;
-    ath_thresholds thresholds;
+    ath_bytes chunk;
     int result = load(file, ATH_HIERARCHY, &chunk, fault);
-    if (result == ATH_OK) result = ath_parse_hierarchy(chunk, &thresholds, &body);
     if (result != ATH_OK) return result;
     memset(file->branches, 0, (size_t)branch_count * sizeof *file->branches);
-    result = ath_decode_hierarchy(file->scratch, body.bytes, body.size, branch_count, vertex_count, file->branches,
+    result = ath_decode_hierarchy(file->scratch, chunk.bytes, chunk.size, branch_count, vertex_count, file->branches,
                                   file->branch_source, file->vertex_source);
     if (result != ATH_OK) return result;
-    file->info.epsilon = (float)thresholds.epsilon;
-    file->info.xi = (float)thresholds.xi;
-    file->info.eta = thresholds.eta;
-    file->info.lambda = thresholds.lambda;
     return check_depth(file, limits, fault);
 }
 
@@ -415,17 +409,17 @@ static void take_numbers(ath_file *file)
 static int read_mesh(ath_file *file, ath_fault_info *fault)
 {
     ath_mesh *mesh = &file->mesh;
-    int32_t vertex_count = (int32_t)file->header.vertex_count, is_absolute;
+    int32_t vertex_count = (int32_t)file->header.vertex_count;
     size_t vertices = file->header.vertex_count, building = ath_mesh_work(vertices, MESH_CORNERS * vertices);
     ath_bytes chunk, body;
     ath_polygons shape;
     int result = load(file, ATH_FACES, &chunk, fault); /* without which there is no memory for a mesh */
-    if (result == ATH_OK) result = ath_parse_polygons(chunk, &shape, &is_absolute, &body);
+    if (result == ATH_OK) result = ath_parse_polygons(chunk, &shape, &body);
     if (result != ATH_OK) return fault->code = result;
     if (shape.is_derived || !ath_serves_rest(&shape, vertex_count)) return ATH_BAD_CHUNK;
     int32_t *corners = mesh->work + larger(building, (ath_faces_memory(vertex_count) + 3) / 4);
     uint32_t *counts = shape.is_mixed ? (uint32_t *)(void *)(corners + shape.corner_count) : 0;
-    result = ath_decode_faces(mesh->work, body, &shape, is_absolute, vertex_count, counts, corners);
+    result = ath_decode_faces(mesh->work, body, &shape, vertex_count, counts, corners);
     if (result == ATH_OK) ath_build_mesh(mesh, &shape, counts, corners, file->vertex_source);
     return result;
 }
@@ -1039,14 +1033,13 @@ int ath_check_chunk(const ath_file *file, int32_t index, ath_fault_info *fault)
 
 /* ---- polygons ---- */
 
-static int find_polygons(const ath_file *file, int kind, ath_polygons *shape, int32_t *is_absolute, ath_bytes *body,
-                         ath_fault_info *fault)
+static int find_polygons(const ath_file *file, int kind, ath_polygons *shape, ath_bytes *body, ath_fault_info *fault)
 {
     ath_bytes chunk;
     if (!ath_find_chunk(file->chunks, file->header.chunk_count, kind, ATH_NO_LEVEL, 0))
         return ath_refuse(fault, ATH_BAD_ARGUMENT, ATH_FIELD_NONE, 0, 0, 0);
     int result = load(file, kind, &chunk, fault);
-    if (result == ATH_OK) result = ath_parse_polygons(chunk, shape, is_absolute, body);
+    if (result == ATH_OK) result = ath_parse_polygons(chunk, shape, body);
     int too_small = ath_vertices_of_type(shape->index_type, file->info.vertex_count) < file->info.vertex_count;
     if (result == ATH_OK && shape->is_derived && (kind == ATH_FACES || too_small)) result = ATH_BAD_CHUNK;
     if (result == ATH_OK && kind == ATH_EDGES && !shape->is_derived && shape->columns != 2) result = ATH_BAD_CHUNK;
@@ -1057,8 +1050,7 @@ int ath_polygons_of(const ath_file *file, int kind, ath_polygons *shape, ath_fau
 {
     ath_fault_info unwanted;
     ath_bytes body;
-    int32_t is_absolute;
-    return find_polygons(file, kind, shape, &is_absolute, &body, fault ? fault : &unwanted);
+    return find_polygons(file, kind, shape, &body, fault ? fault : &unwanted);
 }
 
 size_t ath_polygons_size(const ath_file *file) { return ath_faces_memory(file->info.vertex_count); }
@@ -1069,12 +1061,11 @@ int ath_read_polygons(const ath_file *file, int kind, void *memory, size_t memor
     ath_fault_info unwanted, *why = fault ? fault : &unwanted;
     ath_polygons shape;
     ath_bytes body;
-    int32_t is_absolute;
-    int result = find_polygons(file, kind, &shape, &is_absolute, &body, why);
+    int result = find_polygons(file, kind, &shape, &body, why);
     if (result != ATH_OK || shape.is_derived) return result;
     if (!ath_fits(memory, memory_bytes, ath_polygons_size(file)))
         return ath_refuse(why, ATH_NO_MEMORY, ATH_FIELD_NONE, 0, 0, 0);
-    return why->code = ath_decode_faces(memory, body, &shape, is_absolute, file->info.vertex_count, counts, corners);
+    return why->code = ath_decode_faces(memory, body, &shape, file->info.vertex_count, counts, corners);
 }
 
 const ath_chunk *ath_file_chunk(const ath_file *file, int32_t kind, int32_t level, int32_t segment)

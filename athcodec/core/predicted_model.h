@@ -8,7 +8,7 @@
 #include "plan.h"
 
 enum { GUESSES = 13, FEATURES = 8, FITS = 3, FITTED = GUESSES - 1, LINE_GUESS = 6 };
-enum { LONGEST_LINE = 24, LONGEST_MEAN = 64, SOLVED_EVERY = 16, RUNS = 8 };
+enum { LONGEST_LINE = 24, LONGEST_MEAN = 64, SOLVED_EVERY = 16, FIT_MEMORY = 256, RUNS = 8 };
 
 /* A vertex from frame to frame. */
 typedef struct {
@@ -28,9 +28,9 @@ typedef struct {
     int32_t leads, followed;      /* of a last vertex: whether its stem has others than ends; these follow it */
 } predicted_vertex;
 
-/* Weights of the features by least squares, and the mean errors of the guesses. */
+/* Weights of the features by least squares. */
 typedef struct {
-    double moments[FEATURES][FEATURES], products[FEATURES], weights[FEATURES], error[GUESSES];
+    double moments[FEATURES][FEATURES], products[FEATURES], weights[FEATURES];
     int32_t count, wait;
 } predicted_fit;
 
@@ -134,14 +134,14 @@ ATH_HOT static void add_sample(predicted_fit *fit, const predicted_way *p, const
     }
 }
 
-static void learn_fit(predicted_fit *fit, const predicted_way *p, const double way[3], double weight, int32_t memory)
+static void learn_fit(predicted_fit *fit, const predicted_way *p, const double way[3], double weight)
 {
     add_sample(fit, p, way, weight);
     fit->count = ath_min(fit->count + 1, 8 * SOLVED_EVERY);
     if (--fit->wait > 0) return;
     solve_fit(fit);
     fit->wait = ath_min(1 + fit->count / 8, SOLVED_EVERY);
-    double keep = 1.0 - (double)fit->wait / (double)memory;
+    double keep = 1.0 - (double)fit->wait / (double)FIT_MEMORY;
     for (int32_t i = 0; i < FEATURES; i++) {
         for (int32_t j = 0; j < FEATURES; j++) fit->moments[i][j] = fit->moments[i][j] * keep;
         fit->products[i] = fit->products[i] * keep;
@@ -241,7 +241,6 @@ static void predict_vertex(const predicted_model *model, const ath_predicted_hea
     for (int32_t i = 0; i < GUESSES; i++) {
         double error = vertex->error[i];
         if (near) error = error + near->error[i];
-        if (head->common) error = error + fit->error[i];
         if (i == 0 || error < best) {
             best = error;
             chosen = i;
@@ -284,11 +283,10 @@ static void learn_vertex(predicted_model *model, const ath_predicted_head *head,
         error[i] =
             absolute(way[0] - p->guess[i][0]) + absolute(way[1] - p->guess[i][1]) + absolute(way[2] - p->guess[i][2]);
         vertex->error[i] = 0.5 * vertex->error[i] + error[i];
-        fit->error[i] = 0.9 * fit->error[i] + 0.1 * error[i];
     }
     double off =
         absolute(way[0] - p->way[0]) + absolute(way[1] - p->way[1]) + absolute(way[2] - p->way[2]) + head->step;
-    learn_fit(fit, p, way, 1.0 / (off * off), head->memory);
+    learn_fit(fit, p, way, 1.0 / (off * off));
     learn_line(vertex, x, frames->last + 3 * (size_t)v, error[LINE_GUESS], head->step);
     vertex->frames = ath_min(vertex->frames + 1, LONGEST_MEAN);
     for (size_t k = 0; k < 3; k++)

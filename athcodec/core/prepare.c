@@ -676,13 +676,13 @@ static int read_waves(ath_work *work, const ath_stems_head *head, int32_t known,
 /* Own rows of a basis by their entries. Integers are decoded into the far half of the rows that they become. */
 static int read_entries(ath_work *work, const ath_stems_head *head, int32_t known, int32_t d)
 {
-    int32_t frames = work->segment->frames, limit = 1 << (head->bits - 1);
+    int32_t frames = work->segment->frames;
     size_t count = (size_t)(head->rank - known) * (size_t)frames;
-    double *rows = work->stems[d].temporal + (size_t)known * (size_t)frames, unit = 1.0 / (double)limit;
+    double *rows = work->stems[d].temporal + (size_t)known * (size_t)frames;
     int32_t *integers = (int32_t *)(void *)rows + count;
     int result = ath_decode_temporal(work->prelude_model, head->basis.bytes, head->basis.size, head->rank - known,
-                                     frames, limit, integers);
-    for (size_t i = 0; result == ATH_OK && i < count; i++) rows[i] = (double)integers[i] * unit;
+                                     frames, integers);
+    for (size_t i = 0; result == ATH_OK && i < count; i++) rows[i] = (double)integers[i] / (double)ATH_MOST_SAMPLE;
     return result;
 }
 
@@ -698,7 +698,8 @@ static int read_temporal(ath_work *work, const ath_stems_head *head, int32_t d)
     stream->temporal = reader->temporal;
     stream->temporal_rank = head->rank;
     stream->root = base ? base->root : d;
-    return head->bits == ATH_BASIS_IN_WAVES ? read_waves(work, head, known, d) : read_entries(work, head, known, d);
+    return head->basis_kind == ATH_BASIS_IN_WAVES ? read_waves(work, head, known, d)
+                                                  : read_entries(work, head, known, d);
 }
 
 static int open_stems(ath_work *work, int32_t d)
@@ -715,9 +716,9 @@ static int open_stems(ath_work *work, int32_t d)
     stream->rotation_step_factor = head.rotation_step_factor;
     stream->only_tips = head.only_tips;
     stream->turn_step = head.turn > 0 ? ath_node_step(-head.turn) : 0.0;
-    if (head.bits == ATH_NODE_WAVES)
+    if (head.basis_kind == ATH_NODE_WAVES)
         set_waves(work, stream, ATH_NODE_ROOT);
-    else if (head.bits > 0)
+    else if (head.basis_kind != ATH_STEM_WAVES)
         result = read_temporal(work, &head, d);
     if (q > 0) {
         work->layers[q].motion.ratio = head.ratio;

@@ -882,9 +882,7 @@ static int code_times(ath_coder *coder, exact_model *model, int32_t frame_count,
 
 /* ---- learned temporal basis ---- */
 
-/* Entries are at most `limit`, which stands for 1. */
-static int code_temporal(ath_coder *coder, number_model *model, int32_t rank, int32_t frames, int32_t limit,
-                         int32_t *basis)
+static int code_temporal(ath_coder *coder, number_model *model, int32_t rank, int32_t frames, int32_t *basis)
 {
     number_model_init(model);
     for (int32_t r = 0; r < rank; r++) {
@@ -894,7 +892,7 @@ static int code_temporal(ath_coder *coder, number_model *model, int32_t rank, in
             int32_t *value = basis + (size_t)r * (size_t)frames + t;
             int32_t rest = code_signed(coder, model, mean, ENCODING ? *value - before - slope : 0);
             *value = before + slope + rest;
-            if (*value < -limit || *value > limit) return 0;
+            if (!ENCODING && (*value < -ATH_MOST_SAMPLE || *value > ATH_MOST_SAMPLE)) return 0;
             slope = t > 0 ? *value - before : 0;
             before = *value;
             mean = mean - (mean + 3) / 4 + clipped(rest) * 4;

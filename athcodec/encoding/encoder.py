@@ -72,7 +72,8 @@ def encode(
         take at most 32 MiB, or 256 where motion is predicted.
     tam : Thresholds, optional
         Acceptance thresholds of the ATH (Song, Yang and Peng 2011, section 3); by default one map per frame stays
-        within the bound. Where they are given, motion is not predicted, which has no such hierarchy.
+        within the bound. Where they are given, the file keeps them in its metadata, and motion is not predicted, which
+        has no such hierarchy.
     exact_rest : bool
         Keep the rest pose bit for bit. Else one that the clip was given comes back within the bound, or within 0.3 % of
         the diagonal where motion is coded about another pose; one that was made is not stored.

@@ -19,7 +19,6 @@ class Feature(Enum):
     FREE_RIGID = "loose rigid parts"
     MEAN_POSE = "motion about the mean pose"
     PREDICTED = "predicted motion"
-    MEMORIES = "predictors of predicted motion but for one"
     LATTICE = "lattice points of predicted motion"
     ADAPTIVE = "adaptive rest poses"
     CONNECTED = "connected rest poses"

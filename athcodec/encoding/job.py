@@ -22,7 +22,7 @@ import numpy as np
 
 from athcodec import container as ct
 from athcodec._native import MEASURES
-from athcodec.ath import Ath, Survey, Thresholds, survey
+from athcodec.ath import THRESHOLDS, Ath, Survey, Thresholds, survey
 from athcodec.clip import ERROR_WEIGHTS, MotionClip
 from athcodec.decoder import Decoder
 from athcodec.decoder import open as open_ath
@@ -500,20 +500,15 @@ class EncodingJob:
         return tuple(seams)
 
     def _add_prelude(self, store: ct.ChunkStore, decided: _Decided) -> None:
-        limits = decided.ath.thresholds
-        store.add(
-            ct.HIERARCHY,
-            ct.pack_hierarchy((limits.epsilon, limits.eta, limits.xi, limits.lam), decided.prelude.hierarchy_stream),
-        )
+        store.add(ct.HIERARCHY, decided.prelude.hierarchy_stream)
         store.add(ct.REST, ct.pack_rest(decided.layers.rest))
         if decided.layers.source_rest:
             store.add(ct.SOURCE_REST, decided.layers.source_rest)
         store.add(ct.TIME, time_chunk(*(self.clip.time[start:stop] for start, stop in self.clip.clip_range_frames)))
-        metadata = (
-            self.clip.metadata
-            if self._keeps_static
-            else {key: self.clip.metadata[key] for key in STATIC_METADATA if key in self.clip.metadata}
-        )
+        kept = self.clip.metadata.keys() - {THRESHOLDS} if self._keeps_static else STATIC_METADATA
+        metadata = {key: value for key, value in self.clip.metadata.items() if key in kept}
+        if self.options.tam is not None:
+            metadata[THRESHOLDS] = self.options.tam.in_metadata
         if metadata:
             store.add(ct.METADATA, ct.pack_metadata(metadata))
         if self.source.polygons is not None:

@@ -16,27 +16,21 @@ CORNERS_OF_REST, FACES_OF_REST = 8, 4  # for each vertex, at most, that a rest p
 
 
 def pack(polygons: Polygons, vertex_count: int) -> bytes:
-    """FACES or EDGES; ClipError where no reader would accept that many. Far corners are coded by their distance or by
-    their number: as is shorter."""
+    """FACES or EDGES; ClipError where no reader would accept that many."""
     count = polygons.face_count + len(polygons.corners)
     if count > ct.Limits.corners:
         raise ClipError(f"faces: got {count} faces and corners; the limit is {ct.Limits.corners}")
     memory = np.empty(lib.ath_faces_memory(vertex_count) // 8 + 1, np.uint64)
-
-    def stream(is_absolute: bool) -> bytes:
-        return encode_stream(
-            "ath_encode_faces",
-            1024 + 6 * count,
-            byref(polygons.shape),
-            is_absolute,
-            vertex_count,
-            None if polygons.counts is None else address(polygons.counts, np.uint32, polygons.face_count),
-            address(polygons.corners, np.int32, len(polygons.corners)),
-            model=memory,
-        )
-
-    absolute = min((False, True), key=lambda is_absolute: len(stream(is_absolute)))
-    return ct.pack_polygons(polygons.shape, absolute, stream(absolute))
+    stream = encode_stream(
+        "ath_encode_faces",
+        1024 + 6 * count,
+        byref(polygons.shape),
+        vertex_count,
+        None if polygons.counts is None else address(polygons.counts, np.uint32, polygons.face_count),
+        address(polygons.corners, np.int32, len(polygons.corners)),
+        model=memory,
+    )
+    return ct.pack_polygons(polygons.shape, stream)
 
 
 class Mesh:

@@ -25,7 +25,7 @@ from athcodec.encoding.segment import CodedPrelude, Settings, Source, with_best_
 from athcodec.encoding.shape import finer_than
 from athcodec.errors import BoundError
 
-MEMORIES, LATTICE = (2, 9, 0, 13), 16  # of the second field of PREDICTED: to choose from, and beside them
+CUBES, LATTICE = False, True  # What positions are rounded to.
 REST_STEPS = (0.5, 0.25, 0.125, 1.15)  # over the bound
 STEPS = (0.999, 0.97, 0.9, 0.75, 0.5, 0.3)  # over the largest that reaches every point within the limit
 TRIAL_SEGMENTS, TRIAL_FRAMES = 3, 64
@@ -60,7 +60,7 @@ def _settings(source: Source, ath: Ath, bound: float, rest_step: float) -> Setti
         bound=bound,
         largest_bound=source.largest_bound(bound),
         limit=source.limit(bound),
-        step=_largest_step(source.limit(bound), MEMORIES[0]),
+        step=_largest_step(source.limit(bound), CUBES),
         level_steps=np.ones(levels),
         rest_step=qz.single(rest_step),
         forms=np.zeros(branches, np.int32),
@@ -99,35 +99,31 @@ def best_prediction(source: Source, bound: float, most_bytes: float) -> FoundPre
     samples = _samples(source)
     preludes = {first.rest_step: CodedPrelude(source, ath, first, predicted=True)}
 
-    def coded(settings: Settings, head: int, error_share: float = 1.0) -> FoundPrediction:
-        own = replace(settings, step=_largest_step(error_share * settings.limit, head))
-        choice = Choice(own, own, None, predicted=head, error_share=error_share)
+    def coded(settings: Settings, lattice: bool = CUBES, error_share: float = 1.0) -> FoundPrediction:
+        own = replace(settings, step=_largest_step(error_share * settings.limit, lattice))
+        choice = Choice(own, own, None, predicted=lattice, error_share=error_share)
         prelude = preludes[settings.rest_step]
         parts = [(sample, *_predicted(prelude, choice, sample.positions)) for sample in samples]
         motion = sum(len(payload) * sample.scale for sample, payload, _ in parts)
         twitches = any(_twitches(shown, sample.positions, settings.limit) for sample, _, shown in parts)
         return FoundPrediction(choice, motion + prelude.prelude_bytes, twitches)
 
-    def best(found: Iterable[FoundPrediction]) -> tuple[FoundPrediction, Settings, int]:
-        one = min(found, key=lambda one: one.bytes)
-        assert one.choice.predicted is not None
-        return one, one.choice.settings, one.choice.predicted
+    def best(found: Iterable[FoundPrediction]) -> FoundPrediction:
+        return min(found, key=lambda one: one.bytes)
 
     try:
         if sum(_begun(preludes[first.rest_step], first, sample) for sample in samples) > TOO_MANY * most_bytes:
             return None
-        memories = MEMORIES[:1] if Feature.MEMORIES in source.without else MEMORIES
-        found, _, memory = best(coded(first, memory) for memory in memories)
         preludes |= {own.rest_step: CodedPrelude(source, ath, own, predicted=True) for own in others}
-        found, settings, _ = best([found, *(coded(own, memory) for own in others)])
+        found = best(coded(own) for own in (first, *others))
         if Feature.LATTICE not in source.without:
-            found, _, _ = best([found, coded(settings, memory | LATTICE)])
+            found = best([found, coded(found.choice.settings, LATTICE)])
         if found.twitches:
             relative = source.smallest_bound(bound) / source.seen.diagonal
             share = _still_share(relative)
-            still, own, _ = best(coded(own, memory, share) for own in (first, *others))
+            still = best(coded(own, CUBES, share) for own in (first, *others))
             if relative < FINE and Feature.LATTICE not in source.without:
-                still, _, _ = best([still, coded(own, memory | LATTICE, share)])
+                still = best([still, coded(still.choice.settings, LATTICE, share)])
             if still.bytes < min(most_bytes, MOST_FOR_STILL * found.bytes):
                 found = still
     except BoundError:
@@ -156,9 +152,9 @@ def _twitches(shown: np.ndarray, positions: np.ndarray, limit: np.ndarray | floa
     return share.max() > max(TWITCHING, 2 * np.median(share)) or seen.max() > TWITCHING
 
 
-def _largest_step(limit: np.ndarray | float, head: int) -> float:
+def _largest_step(limit: np.ndarray | float, lattice: bool) -> float:
     """The largest that reaches every place within the limit."""
-    return qz.single((qz.LATTICE_REST_CAP if head & LATTICE else qz.SAFE_REST_CAP) * float(np.min(limit)))
+    return qz.single((qz.LATTICE_REST_CAP if lattice else qz.SAFE_REST_CAP) * float(np.min(limit)))
 
 
 def _samples(source: Source) -> list[SegmentSample]:
@@ -174,25 +170,25 @@ def _samples(source: Source) -> list[SegmentSample]:
 def _begun(prelude: CodedPrelude, settings: Settings, sample: SegmentSample) -> float:
     """Bytes of the frames that a sample stands for, but for first ones, as far as a few of it tell."""
     some = sample.positions[:, :, :TRIAL_FRAMES]
-    choice = Choice(settings, settings, None, predicted=MEMORIES[0])
+    choice = Choice(settings, settings, None, predicted=CUBES)
     coded, first = (len(_predicted(prelude, choice, part)[0]) for part in (some, some[:, :, :1]))
     return (coded - first) / some.shape[2] * sample.frames
 
 
 def _predicted(prelude: CodedPrelude, choice: Choice, positions: np.ndarray) -> tuple[bytes, np.ndarray]:
     """PREDICTED of a segment and its positions, (N, 3, T). Raises BoundError."""
-    head, settings = choice.predicted, choice.settings
-    assert head is not None
+    lattice, settings = choice.predicted, choice.settings
+    assert lattice is not None
     source = np.ascontiguousarray(positions.transpose(2, 0, 1))
     limits = np.array(np.broadcast_to(settings.limit, len(positions)), np.float64)
     for share in dict.fromkeys((choice.error_share, 1.0)):  # the whole limit where numbers are too coarse for a part
         for factor in STEPS:
-            step = qz.single(factor * _largest_step(share * limits, head))
+            step = qz.single(factor * _largest_step(share * limits, lattice))
             coded = streams.encode_predicted(
-                prelude.plan, prelude.origin, source, share * limits, step, head, prelude.dtype
+                prelude.plan, prelude.origin, source, share * limits, step, lattice, prelude.dtype
             )
             if coded is not None:
-                return ct.pack_predicted(step, head, coded[0]), np.ascontiguousarray(coded[1].transpose(1, 2, 0))
+                return ct.pack_predicted(step, lattice, coded[0]), np.ascontiguousarray(coded[1].transpose(1, 2, 0))
     raise BoundError(
         f"max error: got {settings.bound:.3g}; it cannot be kept in the output's {prelude.dtype.name} numbers"
     )

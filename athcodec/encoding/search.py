@@ -126,7 +126,7 @@ class Choice:
     """Settings of a file: those of its only layer of precision, or of the refinements and of the first layer.
 
     learned_modes: of the last layer. reference: the pose that motion is coded about, (N, 3) float64 less the origin,
-    file order; None: the rest pose. predicted: where the motion is predicted, the second field of PREDICTED;
+    file order; None: the rest pose. predicted: where motion is predicted, whether vertices are points of the lattice;
     error_share: of the limits, that its errors may take.
     """
 
@@ -134,7 +134,7 @@ class Choice:
     first_layer: Settings
     learned_modes: LearnedModes | None
     reference: np.ndarray | None = None
-    predicted: int | None = None
+    predicted: bool | None = None
     error_share: float = 1.0
 
 

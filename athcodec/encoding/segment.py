@@ -694,11 +694,11 @@ def stems_head(settings: Settings, level: int, bases: dict[int, StreamBasis]) ->
         settings.rotation_step_factors[level],
         only_tips=settings.only_tips,
         turn=turn_of(settings.turn_step),
-        bits=ct.NODE_WAVES if settings.is_straight else 0,
+        basis_kind=ct.NODE_WAVES if settings.is_straight else ct.STEM_WAVES,
     )
     if level in bases:
         own = bases[level]
-        head.bits, head.rank, head.base = own.stored.bits, len(own.stored.rows), own.base
+        head.basis_kind, head.rank, head.base = own.stored.kind, len(own.stored.rows), own.base
         head.basis = own.stored.stream(own.known)
     return head
 

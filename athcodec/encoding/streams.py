@@ -137,11 +137,11 @@ def encode_times(time: np.ndarray) -> bytes:
     return encode_stream("ath_encode_times", 1024 + 10 * time.size, time.size, address(time, np.float64, time.size))
 
 
-def encode_temporal(steps: np.ndarray, bits: int) -> bytes:
-    """Rows of a learned temporal basis as stored integers of `bits` bits, (rows, frames) int32."""
+def encode_temporal(steps: np.ndarray) -> bytes:
+    """Rows of a learned temporal basis as stored integers of 14 bits, (rows, frames) int32."""
     rank, frames = steps.shape
     return encode_stream(
-        "ath_encode_temporal", 1024 + 8 * steps.size, rank, frames, 1 << bits - 1, address(steps, np.int32, steps.size)
+        "ath_encode_temporal", 1024 + 8 * steps.size, rank, frames, address(steps, np.int32, steps.size)
     )
 
 
@@ -245,7 +245,7 @@ def encode_corrections(corrections: np.ndarray, vertex_count: int, frames: int) 
 
 
 def encode_predicted(
-    plan: Plan, origin: np.ndarray, source: np.ndarray, limits: np.ndarray, step: float, settings: int, dtype
+    plan: Plan, origin: np.ndarray, source: np.ndarray, limits: np.ndarray, step: float, lattice: bool, dtype
 ) -> tuple[bytes, np.ndarray] | None:
     """Predicted motion of a segment, and the positions that it decodes to, (T, N, 3) of `dtype`.
 
@@ -266,7 +266,7 @@ def encode_predicted(
             frames,
             positions.dtype == np.float64,
             step,
-            settings,
+            lattice,
             address(source, np.float64, source.size),
             address(limits, np.float64, vertices),
             positions.ctypes.data,

@@ -13,11 +13,11 @@ import numpy as np
 
 from athcodec._native import address, lib
 from athcodec.algebra import multiply, principal
+from athcodec.container import BASIS_AS_SAMPLES, BASIS_IN_WAVES
 from athcodec.encoding import streams
 from athcodec.encoding.quantise import half_octaves
 
-BASIS_BITS = 14  # of stored entries
-BASIS_IN_WAVES = 2  # in the place of their number
+MOST_SAMPLE = 8192  # Stands for 1.
 PRECISION = 0.6  # step of a row's integers, over that by which they err as much as those of all tracks in the row
 LEAST_STEP, MOST_STEP = -200, 0  # half octaves
 TOLERANCE = 5e-4  # mean square, in steps, that a basis may leave out
@@ -25,26 +25,26 @@ TOLERANCE = 5e-4  # mean square, in steps, that a basis may leave out
 
 @dataclass(frozen=True)
 class Entries:
-    """Rows of a learned basis as integers of BASIS_BITS bits, (rank, frames) int32."""
+    """Rows of a learned basis as samples, (rank, frames) int32."""
 
-    bits = BASIS_BITS
+    kind = BASIS_AS_SAMPLES
     integers: np.ndarray
 
     @cached_property
     def rows(self) -> np.ndarray:
         """(rank, frames) float64, as a decoder has them."""
-        return self.integers.astype(np.float64) * 2.0 ** -(BASIS_BITS - 1)
+        return self.integers / MOST_SAMPLE
 
     def stream(self, known: int = 0) -> bytes:
         """Of all rows but the `known` first."""
-        return streams.encode_temporal(self.integers[known:], BASIS_BITS)
+        return streams.encode_temporal(self.integers[known:])
 
 
 @dataclass(frozen=True)
 class InWaves:
     """The same by waves, (frames, frames): integers, (rank, frames) int32, of steps in half octaves, (rank,) int32."""
 
-    bits = BASIS_IN_WAVES
+    kind = BASIS_IN_WAVES
     waves: np.ndarray
     exponents: np.ndarray
     integers: np.ndarray
@@ -103,7 +103,7 @@ class TimeComponents:
         return len(self._in_waves(rank, 1.0).stream()) < len(self._entries(rank).stream())
 
     def _entries(self, rank: int) -> Entries:
-        return Entries(np.rint(self._rows[:rank] * 2.0 ** (BASIS_BITS - 1)).astype(np.int32))
+        return Entries(np.rint(self._rows[:rank] * MOST_SAMPLE).astype(np.int32))
 
     def _in_waves(self, rank: int, precision: float) -> InWaves:
         step = PRECISION * precision / np.sqrt(np.maximum(self._energies[:rank], 1e-30))

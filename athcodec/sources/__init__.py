@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from athcodec.clip import MotionClip
+from athcodec.clip import NOT_KEPT, MotionClip
 from athcodec.errors import ClipError, MissingExtra, SourceWarning
 from athcodec.frames import Frames
 from athcodec.options import MAX_MEMORY, SAMPLES
@@ -45,6 +45,7 @@ NO_SHAPES = frozenset(
         "hidden",
         "statement",
         "other",
+        *NOT_KEPT.values(),
     )
 )
 LISTED = 8

@@ -16,11 +16,10 @@ const INFO = {
   fileLength: "u64", preludeLength: "u64", maxError: "f64", originX: "f64", originY: "f64", originZ: "f64",
   vertexCount: "i32", branchCount: "i32", frameCount: "i32", segmentCount: "i32", clipCount: "i32",
   levelCount: "i32", fullLevelCount: "i32", layerCount: "i32", depthLevels: "i32", nodeCount: "i32",
-  chunkCount: "i32", isFloat64: "i32", epsilon: "f32", xi: "f32", eta: "u32", lambda: "u32", restIsFloat64: "i32",
-  restIsHost: "i32", meshForwards: "u32", meshBackwards: "u32",
+  chunkCount: "i32", isFloat64: "i32", restIsFloat64: "i32", restIsHost: "i32", meshForwards: "u32", meshBackwards: "u32",
   isPredicted: "i32",
 };
-const INFO_SIZE = 136;
+const INFO_SIZE = 120;
 const CLIP = {
   name: "u32", duration: "f64", firstFrame: "i32", frameCount: "i32", firstSegment: "i32", segmentCount: "i32",
   loop: "i32",

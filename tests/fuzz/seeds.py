@@ -90,9 +90,9 @@ _ENCODED: dict[str, tuple[Callable[[], MotionClip], dict]] = {
 
 
 def _wave(frames: int) -> bytes:
-    """A learned basis of one row and 8 bits."""
+    """A learned basis of one row."""
     row = np.rint(100 * np.sin(np.arange(frames)))
-    return streams.encode_temporal(row.astype(np.int32)[None], 8)
+    return streams.encode_temporal(row.astype(np.int32)[None])
 
 
 def _bytes_of(clip: MotionClip, folder: Path, **options) -> bytes:
@@ -105,7 +105,7 @@ def valid_files() -> dict[str, bytes]:
     files = {
         "least": still_file(),
         "three_roots": still_file(frames=3, branches=roots(1, 70, 2)),
-        "learned_basis": still_file(frames=9, stems=basis_chunk(_wave(9), 9, 8)),
+        "learned_basis": still_file(frames=9, stems=basis_chunk(_wave(9), 9)),
         "two_segments": still_file(frames=300),
     }
     with TemporaryDirectory() as name:

@@ -73,29 +73,24 @@ struct Cursor {
     }
 };
 
-std::vector<char> Unshuffled(const std::vector<char> &planes, size_t items, size_t item_bytes, bool swapped,
-                             size_t number_bytes)
+std::vector<char> Unshuffled(const std::vector<char> &planes, size_t items, size_t item_bytes)
 {
     std::vector<char> out(planes.size());
-    for (size_t plane = 0; plane < item_bytes; plane++) {
-        const size_t number = plane / number_bytes * number_bytes, low = plane % number_bytes;
-        const size_t to = swapped ? number + number_bytes - 1 - low : plane;
-        for (size_t item = 0; item < items; item++) out[item * item_bytes + to] = planes[plane * items + item];
-    }
+    for (size_t plane = 0; plane < item_bytes; plane++)
+        for (size_t item = 0; item < items; item++) out[item * item_bytes + plane] = planes[plane * items + item];
     return out;
 }
 
 // Whether elements of a kind may be of so many bytes.
-bool IsType(int kind, bool swapped, size_t item_bytes)
+bool IsType(int kind, size_t item_bytes)
 {
     const bool is_power = item_bytes == 1 || item_bytes == 2 || item_bytes == 4 || item_bytes == 8;
     switch (kind) {
-    case 0: return item_bytes == 1 && !swapped;
+    case 0: return item_bytes == 1;
     case 1:
     case 2: return is_power;
     case 3: return is_power && item_bytes > 1;
-    case 4: return item_bytes == 8 || item_bytes == 16;
-    default: return kind < 7 && item_bytes >= 1 && item_bytes <= 1u << 20 && !swapped;
+    default: return kind == 4 && item_bytes >= 1 && item_bytes <= 1u << 20;
     }
 }
 
@@ -108,9 +103,9 @@ Read ReadArray(const ath_chunk &chunk, std::string *name, StaticArray *array)
     uint16_t name_length;
     uint32_t item_bytes;
     if (!cursor.Take(&type, 1) || !cursor.Take(&dimensions, 1) || !cursor.Take(&name_length, 2)
-        || !cursor.Take(&item_bytes, 4) || dimensions > 32 || item_bytes == 0 || item_bytes > 1u << 20)
+        || !cursor.Take(&item_bytes, 4) || dimensions > 32 || !IsType(type, item_bytes))
         return Read::Damaged;
-    array->kind = type & 7;
+    array->kind = type;
     array->item_bytes = item_bytes;
     uint64_t items = 1;
     for (int i = 0; i < dimensions; i++) {
@@ -126,8 +121,7 @@ Read ReadArray(const ath_chunk &chunk, std::string *name, StaticArray *array)
     if (!ZstdOf().IsThere()) return Read::NeedsZstd;
     std::vector<char> planes;
     if (!ZstdOf().Decode(cursor.at, cursor.left, &planes) || planes.size() != items * item_bytes) return Read::Damaged;
-    const size_t number_bytes = array->kind == 4 ? item_bytes / 2 : item_bytes;
-    array->bytes = Unshuffled(planes, size_t(items), item_bytes, type & 8, number_bytes);
+    array->bytes = Unshuffled(planes, size_t(items), item_bytes);
     return Read::Done;
 }
 
