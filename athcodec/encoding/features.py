@@ -21,7 +21,6 @@ class Feature(Enum):
     PREDICTED = "predicted motion"
     MEMORIES = "predictors of predicted motion but for one"
     LATTICE = "lattice points of predicted motion"
-    ADAPTIVE = "adaptive rest poses"
     CONNECTED = "connected rest poses"
     WIDE = "corrections of several frames"
     JOINS = "joins"
