@@ -282,14 +282,12 @@ class Rest:
     source_dtype: np.dtype
     stream: bytes = b""
     exact: bool = False
-    adaptive: bool = False
     is_host: bool = False
     connected: bool = False
 
 
 def pack_rest(rest: Rest) -> bytes:
-    method = int(rest.exact) | int(rest.source_dtype == np.float64) << 1
-    method |= int(rest.adaptive) << 3 | int(rest.connected) << 4
+    method = int(rest.exact) | int(rest.source_dtype == np.float64) << 1 | int(rest.connected) << 3
     return _REST.pack(IS_HOST if rest.is_host else method, *rest.origin, rest.step) + rest.stream
 
 

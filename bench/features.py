@@ -122,8 +122,6 @@ def _uses(made: Draft, feature: Feature) -> bool:
     """Whether a file has the feature, as far as its settings tell."""
     choice = made.choice
     both = choice.settings, choice.first_layer
-    if feature is Feature.ADAPTIVE:
-        return choice.settings.adaptive_rest
     if feature is Feature.CONNECTED:
         return choice.settings.connected_rest
     if choice.predicted is not None:

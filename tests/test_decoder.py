@@ -569,6 +569,6 @@ def test_infinite_positions_have_no_matrices_whatever_the_shape_of_the_plant(cli
 def test_a_rest_pose_beyond_float32_is_infinite_without_a_warning():
     most = float(np.finfo(np.float32).max)
     head = ct.Rest(np.array([most, -most, 0.0]), most, np.dtype(np.float32))
-    head.stream = streams.encode_rest(roots(1), 1.0, np.array([[2.0, -2.0, 0.0]])).stream
+    head.stream = streams.encode_rest(roots(1), 1.0, np.array([[2.5, -2.5, 0.0]])).stream
     with opened(still_file(rest=ct.pack_rest(head))) as decoder:
         assert decoder.rest.tolist() == [[np.inf, -np.inf, 0.0]]

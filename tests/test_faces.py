@@ -18,7 +18,7 @@ from athcodec.errors import AthError
 from athcodec.polygons import Polygons
 from spec import reference_decoder as rd
 
-CONNECTED = 1 << 4  # of Method of REST
+CONNECTED = 1 << 3  # of Method of REST
 
 
 def grid_faces(rows: int, columns: int, quads: bool = False) -> np.ndarray:

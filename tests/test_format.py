@@ -505,7 +505,7 @@ def test_random_decisions_about_refinements_mean_the_same_to_the_document_and_th
     before = spec.Record(plan=plan, motion=motion, placed=spec.pose(plan, motion, level - 1)[0])
     added, step = [], 2.0**-9
     if refines_rest:
-        arguments = branches, step, rest, file.is_adaptive, None
+        arguments = branches, step, rest, None
         stream = random_stream(spec, random, "decode_rest", *arguments)
         added.append((container.REFINED_REST, container.pack_refined_rest(step, stream)))
         made = outcome(spec, lambda stream: spec.decode_rest(stream, *arguments), stream)
@@ -909,7 +909,7 @@ class HandMade:
     )
 
     def __init__(self, seed: int, is_float64: bool, exact: type | None, parts=BRANCHES):
-        self.random, self.adaptive = np.random.default_rng(seed), seed % 2 == 1
+        self.random = np.random.default_rng(seed)
         self.is_float64, self.exact, self.parts = is_float64, exact, parts
         self.bases = {1: 3, 2: 1, 4: 18}  # Basis_Rank
         self.excess = 0  # frequencies that rows code beyond the rank of their learned basis
@@ -974,8 +974,8 @@ class HandMade:
             self.plan.set_rest(pose.astype(np.float64) - self.origin)
             times = container.pack_time(streams.encode_times(self.random.random(self.FRAMES).cumsum()))
         else:
-            coded = streams.encode_rest(self.branches, 0.01, self.rest, None, self.adaptive)
-            head.stream, head.adaptive = coded.stream, coded.adaptive
+            coded = streams.encode_rest(self.branches, 0.01, self.rest)
+            head.stream = coded.stream
             self.plan.set_rest(coded.decoded)
         self.store.add(container.REST, container.pack_rest(head))
         self.store.add(container.TIME, times)

@@ -346,7 +346,7 @@ static ath_bytes rest_of(ath_bytes chunk, size_t head)
     return rest;
 }
 
-enum { REST_EXACT = 1, REST_FLOAT64 = 2, REST_HOST = 4, REST_ADAPTIVE = 8, REST_CONNECTED = 16 }; /* bits of Method */
+enum { REST_EXACT = 1, REST_FLOAT64 = 2, REST_HOST = 4, REST_CONNECTED = 8 }; /* bits of Method */
 
 int ath_parse_rest(ath_bytes chunk, ath_rest_head *head, ath_bytes *body)
 {
@@ -354,12 +354,9 @@ int ath_parse_rest(ath_bytes chunk, ath_rest_head *head, ath_bytes *body)
     int32_t method = chunk.bytes[0];
     head->exact = (method & REST_EXACT) != 0;
     head->is_float64 = (method & REST_FLOAT64) != 0;
-    head->adaptive = (method & REST_ADAPTIVE) != 0;
     head->is_host = method == REST_HOST;
     head->connected = (method & REST_CONNECTED) != 0;
-    if (!head->is_host && method & ~(REST_EXACT | REST_FLOAT64 | REST_ADAPTIVE | REST_CONNECTED)) return ATH_BAD_CHUNK;
-    if (head->exact && head->adaptive) return ATH_BAD_CHUNK;
-    if (head->connected && !head->exact && !head->adaptive) return ATH_BAD_CHUNK;
+    if (!head->is_host && method & ~(REST_EXACT | REST_FLOAT64 | REST_CONNECTED)) return ATH_BAD_CHUNK;
     head->step = (double)f32_at(chunk.bytes + 13);
     *body = rest_of(chunk, 17);
     int valid = is_step(head->step) && (!head->is_host || body->size == sizeof head->host_checksum);

@@ -46,7 +46,7 @@ typedef struct {
 
 typedef struct {
     double origin[3], step;
-    int32_t exact, is_float64, adaptive, is_host, connected;
+    int32_t exact, is_float64, is_host, connected;
     uint32_t host_checksum[2]; /* of a mesh of the host's, where that is the rest pose */
 } ath_rest_head;
 

@@ -59,11 +59,11 @@ int ath_decode_hierarchy(void *model, const uint8_t *bytes, size_t size, int32_t
 }
 
 int ath_decode_rest(void *model, const uint8_t *bytes, size_t size, const ath_branch *branches, int32_t branch_count,
-                    double step, int adaptive, ath_mesh *mesh, const int32_t *coarse, const double *before,
+                    double step, ath_mesh *mesh, const int32_t *coarse, const double *before,
                     int32_t *steps, double *rest)
 {
     ath_coder coder;
-    rest_layer layer = {coarse, before, steps, adaptive, mesh, 0.0, 0, 0};
+    rest_layer layer = {coarse, before, steps, mesh, 0.0, 0, 0};
     coder_start(&coder, bytes, size);
     return finished(&coder, code_rest(&coder, (rest_model *)model, &layer, branches, branch_count, step, 0, rest));
 }

@@ -174,10 +174,10 @@ ATH_ENCODER_API int64_t ath_encode_front(uint8_t *bytes, size_t capacity, const 
 ATH_ENCODER_API int64_t ath_encode_hierarchy(void *model, uint8_t *bytes, size_t capacity, const ath_branch *branches,
                                              int32_t branch_count, int32_t vertex_count, const int32_t *branch_source,
                                              const int32_t *vertex_source);
-/* mesh: null, or of a connected pose; slack: how far from its place a vertex may be put to save bits, where `adaptive`;
+/* mesh: null, or of a connected pose; slack: how far from its place a vertex may be put to save bits;
  * moved: scratch, as large as the source. */
 ATH_ENCODER_API int64_t ath_encode_rest(void *model, uint8_t *bytes, size_t capacity, const ath_branch *branches,
-                                        int32_t branch_count, double step, int adaptive, double slack, ath_mesh *mesh,
+                                        int32_t branch_count, double step, double slack, ath_mesh *mesh,
                                         const int32_t *coarse, const double *before, const int32_t *shape_of,
                                         int32_t *steps, const double *source, double *moved, double *rest);
 /* shape_of: of each branch the one that it is a copy of, itself where others are copies of it, or -1. bend: what copies

@@ -439,7 +439,6 @@ static int read_rest(ath_file *file, ath_fault_info *fault)
     file->connected = head.connected ? &file->mesh : 0;
     memcpy(file->info.origin, head.origin, sizeof head.origin);
     file->info.rest_is_float64 = head.is_float64;
-    file->adaptive_rest = head.adaptive;
     file->info.rest_is_host = head.is_host;
     file->rest_is_exact = head.exact || head.is_host;
     if (file->rest_is_exact && has_source_rest(file)) return ATH_BAD_CHUNK;
@@ -452,7 +451,7 @@ static int read_rest(ath_file *file, ath_fault_info *fault)
         take_numbers(file);
     } else {
         result = ath_decode_rest(file->scratch, body.bytes, body.size, file->branches, (int32_t)header->branch_count,
-                                 head.step, head.adaptive, file->connected, 0, 0, file->rest_steps, file->rest);
+                                 head.step, file->connected, 0, 0, file->rest_steps, file->rest);
         if (!has_source_rest(file)) file->source_rest = 0;
     }
     return result;
@@ -743,8 +742,7 @@ static int decode_layer_rest(ath_file *file, int32_t q, ath_bytes chunk)
     int result = ath_parse_refined_rest(chunk, &step, &body);
     if (result == ATH_OK)
         result = ath_decode_rest(file->scratch, body.bytes, body.size, file->branches, file->info.branch_count, step,
-                                 file->adaptive_rest, file->connected, rest_steps_before(file, q),
-                                 plan_before(file, q)->rest, layer->rest_steps, layer->rest);
+                                 file->connected, rest_steps_before(file, q), plan_before(file, q)->rest, layer->rest_steps, layer->rest);
     return result;
 }
 

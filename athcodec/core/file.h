@@ -40,7 +40,6 @@ struct ath_file {
     uint8_t *gaps;
     void *scratch; /* of opening and building */
     double *bases; /* null until ath_build */
-    int32_t adaptive_rest;
     ath_mesh mesh;                                         /* where there are FACES */
     ath_mesh *connected;                                   /* it, where the rest pose is connected, else null */
     int32_t *rest_steps;                                   /* null where no layer refines the rest pose */

@@ -262,7 +262,6 @@ typedef struct {
     const int32_t *coarse; /* null: nothing is known */
     const double *before;
     int32_t *steps; /* filled for the next layer; may be null */
-    int adaptive;
     ath_mesh *mesh; /* null: not connected; else it gives the order */
     /* An encoder's: how far from its place it may put a vertex to save bits; a copy of the source's pose, in which what
      * has detail goes along with what it hangs on. */
@@ -277,9 +276,8 @@ typedef struct {
 } adaptive_rest;
 
 typedef struct {
-    number_model inner, start;
-    number_model refined[2]; /* where the layer before has 0, and elsewhere */
-    uint32_t mean[2][3];
+    number_model bent; /* of the vertices of SOURCE_REST */
+    uint32_t bent_mean[3];
     union {
         coefficient_model modes;
         refinement_model refined_modes;
@@ -294,10 +292,8 @@ typedef struct {
 
 static void rest_model_init(rest_model *model, int is_refinement)
 {
-    number_model_init(&model->inner);
-    number_model_init(&model->start);
-    for (int32_t i = 0; i < 2; i++) number_model_init(&model->refined[i]);
-    for (int32_t i = 0; i < 6; i++) model->mean[i / 3][i % 3] = 64;
+    number_model_init(&model->bent);
+    for (int32_t k = 0; k < 3; k++) model->bent_mean[k] = 64;
     if (is_refinement)
         refinement_model_init(&model->refined_modes, REST_RUN, model->history);
     else
@@ -366,10 +362,9 @@ static void code_expected_vertex(ath_coder *coder, rest_model *model, const rest
     rest_term(units, expected, source + (out - rest), per_unit);
     nearest_of_lattice(units, branch->detail > 0 ? 0.0 : layer->slack * per_unit, at->phase->mean, integers);
 #endif
-    (void)source;
+    (void)source, (void)layer;
     code_rest_point(coder, &adaptive_of(model, branch)->lattice, &predictor->all, at->phase, integers);
     for (int32_t k = 0; k < 3; k++) out[k] = expected[k] + (double)integers[k] * unit;
-    if (layer->steps) memcpy(layer->steps + (out - rest), integers, sizeof integers);
     rest_learn(predictor, at, per_unit, out, integers);
 }
 
@@ -382,40 +377,6 @@ static void code_adaptive_vertex(ath_coder *coder, rest_model *model, const rest
     rest_guess at;
     rest_look_around(predictor, branch, rest, layer->before, i, 1.0 / unit, &at);
     code_expected_vertex(coder, model, layer, branch, predictor, &at, branch->first + i, unit, source, rest);
-}
-
-/* Vertex i of a stem as steps from where it is expected. */
-static void code_step_vertex(ath_coder *coder, rest_model *model, const rest_layer *layer, const ath_branch *branch,
-                             int32_t i, double step, const double *source, double *rest)
-{
-    double predicted[3], *out = rest + 3 * (size_t)(branch->first + i);
-    int32_t starting = i < 2;
-    uint32_t *mean = model->mean[starting];
-    predict_rest(branch, rest, i, predicted);
-    for (int32_t k = 0; k < 3; k++) {
-        int32_t given = ENCODING ? steps_in(source[out - rest + k] - predicted[k], step, 0.5) : 0;
-        uint32_t expected = (mean[k] + mean[0] + mean[1] + mean[2]) / 4;
-        int32_t steps, about = 0;
-        if (layer->coarse) {
-            int32_t coarse = layer->coarse[out - rest + k];
-            about = coarse ? steps_in(layer->before[out - rest + k] - predicted[k], step, 0.5) : 0;
-            steps = about + code_signed(coder, &model->refined[coarse != 0], expected, given - about);
-        } else {
-            steps = code_signed(coder, starting ? &model->start : &model->inner, expected, given);
-        }
-        out[k] = predicted[k] + (double)steps * step;
-        mean[k] = mean[k] - (mean[k] + 7) / 8 + clipped(steps - about) * 2;
-        if (layer->steps) layer->steps[out - rest + k] = steps;
-    }
-}
-
-static void code_rest_vertex(ath_coder *coder, rest_model *model, const rest_layer *layer, const ath_branch *branch,
-                             int32_t i, double step, const double *source, double *rest)
-{
-    if (layer->adaptive)
-        code_adaptive_vertex(coder, model, layer, branch, i, step, source, rest);
-    else
-        code_step_vertex(coder, model, layer, branch, i, step, source, rest);
 }
 
 /* Vertex i of a copy as a point of a lattice. */
@@ -577,7 +538,7 @@ static void code_rest_beam(ath_coder *coder, rest_model *model, const rest_layer
                            double step, const double *source, double *rest)
 {
     int32_t from = branch->attach < 0, left = branch->count - from, runs = (left + REST_RUN - 1) / REST_RUN;
-    if (from) code_rest_vertex(coder, model, layer, branch, 0, step, source, rest);
+    if (from) code_adaptive_vertex(coder, model, layer, branch, 0, step, source, rest);
     for (int32_t r = 0; r < runs; r++) {
         int32_t start = from + (int32_t)((int64_t)left * r / runs),
                 end = from + (int32_t)((int64_t)left * (r + 1) / runs);
@@ -663,7 +624,7 @@ static void take_along(const ath_branch *branches, const ath_branch *branch, con
 static int code_rest(ath_coder *coder, rest_model *model, const rest_layer *layer, const ath_branch *branches,
                      int32_t branch_count, double step, const double *source, double *rest)
 {
-    int has_copies = layer->adaptive && !layer->coarse;
+    int has_copies = !layer->coarse;
     rest_model_init(model, layer->coarse != 0);
     if (has_copies) has_copies = coder_bit(coder, &model->copies.any, layer->shape_of != 0);
     if (layer->mesh)
@@ -680,7 +641,7 @@ static int code_rest(ath_coder *coder, rest_model *model, const rest_layer *laye
             code_rest_beam(coder, model, layer, branches + b, own, layer->moved, rest);
         else
             for (int32_t i = 0; i < branches[b].count; i++)
-                code_rest_vertex(coder, model, layer, branches + b, i, own, layer->moved, rest);
+                code_adaptive_vertex(coder, model, layer, branches + b, i, own, layer->moved, rest);
     }
     return !model->modes.invalid;
 }
@@ -721,7 +682,7 @@ static void code_bent_vertex(ath_coder *coder, rest_model *model, const bent_pos
     double *out = pose->rest + 3 * (size_t)v, predicted[3], d[3];
     const double *here = pose->reference + 3 * (size_t)v;
     const double *from = pose->reference + 3 * (size_t)(before < 0 ? v : before);
-    uint32_t *mean = model->mean[0];
+    uint32_t *mean = model->bent_mean;
     for (int32_t k = 0; k < 3; k++) d[k] = before < 0 ? 0.0 : here[k] - from[k];
     for (int32_t k = 0; k < 3; k++) {
         double moved = turn[3 * k] * d[0] + turn[3 * k + 1] * d[1] + turn[3 * k + 2] * d[2];
@@ -729,7 +690,7 @@ static void code_bent_vertex(ath_coder *coder, rest_model *model, const bent_pos
     }
     for (int32_t k = 0; k < 3; k++) {
         int32_t given = ENCODING ? steps_in(pose->moved[3 * (size_t)v + (size_t)k] - predicted[k], pose->step, 0.5) : 0;
-        int32_t steps = code_signed(coder, &model->inner, (mean[k] + mean[0] + mean[1] + mean[2]) / 4, given);
+        int32_t steps = code_signed(coder, &model->bent, (mean[k] + mean[0] + mean[1] + mean[2]) / 4, given);
         out[k] = predicted[k] + (double)steps * pose->step;
         mean[k] = mean[k] - (mean[k] + 7) / 8 + clipped(steps) * 2;
     }

@@ -20,7 +20,6 @@ class Feature(Enum):
     MEAN_POSE = "motion about the mean pose"
     PREDICTED = "predicted motion"
     LATTICE = "lattice points of predicted motion"
-    ADAPTIVE = "adaptive rest poses"
     CONNECTED = "connected rest poses"
     WIDE = "corrections of several frames"
     JOINS = "joins"

@@ -209,7 +209,7 @@ def _rests(
         if np.array_equal(rest_steps(branches, step), rest_steps(branches, coded[-1].step)):
             coded.append(coded[-1])
             continue
-        coded.append(streams.encode_rest(branches, step, source.rest, coded[-1], rest.adaptive, mesh=mesh))
+        coded.append(streams.encode_rest(branches, step, source.rest, coded[-1], mesh=mesh))
     stored, of_layers = coded[0], coded[-len(ratios) :]
     rest = replace(rest, step=stored.step, stream=stored.stream)
     level_0 = None if of_layers[0] is stored else stored.decoded
@@ -219,11 +219,11 @@ def _rests(
 
 def _first_rests(prelude: CodedPrelude, step: float, rest: np.ndarray, mesh: Mesh | None) -> list[streams.CodedRest]:
     """The rest pose at the step of the first layer; before it that of level 0, where that takes few bytes more."""
-    plan, adaptive = prelude.plan, prelude.rest_chunk.adaptive
+    plan = prelude.plan
 
     def encode(step: float, before: streams.CodedRest | None = None) -> streams.CodedRest:
         shape_of = prelude.shape_of if before is None else None
-        return streams.encode_rest(plan.branches, step, rest, before, adaptive, mesh=mesh, shape_of=shape_of)
+        return streams.encode_rest(plan.branches, step, rest, before, mesh=mesh, shape_of=shape_of)
 
     at_once = encode(step)
     if not plan.level_0_stands_alone:

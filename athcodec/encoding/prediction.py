@@ -71,7 +71,6 @@ def _settings(source: Source, ath: Ath, bound: float, rest_step: float) -> Setti
         turn_step=0.0,
         lags=np.zeros(branches, np.int32),
         details=finer_than(source.details, bound),
-        adaptive_rest=False,
         connected_rest=False,
         rotation_step_factors=(0,) * levels,
         only_tips=False,

@@ -161,7 +161,6 @@ def first_settings(
         turn_step=TURN_STEP if rigid[source.details > 0].any() else 0.0,
         lags=np.zeros(source.hierarchy.branch_count, np.int32),
         details=source.details if layered else finer_than(source.details, bound),
-        adaptive_rest=False,
         connected_rest=False,
         rotation_step_factors=(0,) * levels,
         only_tips=False,
@@ -470,7 +469,6 @@ class Search:
             settings,
             forms=self._forms_like(settings.forms, other),
             lags=self.start.lags,
-            adaptive_rest=self.start.adaptive_rest,
             connected_rest=self.start.connected_rest,
             shape_of=self.start.shape_of,
             loose=self.start.loose,
@@ -746,7 +744,6 @@ class Search:
         return (
             settings.rest_step,
             settings.rest_slack,
-            settings.adaptive_rest,
             settings.connected_rest,
             settings.lags.tobytes(),
             None if settings.shape_of is None else settings.shape_of.tobytes(),

@@ -79,7 +79,8 @@ class Source:
     _held: WeakValueDictionary[int, np.ndarray] = field(init=False, repr=False, compare=False)  # positions, by segment
 
     def __post_init__(self) -> None:
-        self.origin = qz.nearest_singles((self.seen.low + self.seen.high) / 2)
+        first = self.clip.rest[self.hierarchy.vertex_source[0]]  # of a plant it is rooted: the rest pose begins at 0
+        self.origin = qz.nearest_singles(np.clip(first, self.seen.low, self.seen.high))
         self.source_rest = self.clip.rest[self.hierarchy.vertex_source] - self.origin
         self.rest = self.source_rest if self.reference is None else self.reference
         self.sheet_like = ~_thin_branches(self)
@@ -273,8 +274,7 @@ class Settings:
     turn_step: float  # largest of rotations of rigid pieces
     lags: np.ndarray  # (B,) int32, file order
     details: np.ndarray  # likewise
-    adaptive_rest: bool
-    connected_rest: bool  # then it is adaptive, or exact
+    connected_rest: bool
     rotation_step_factors: tuple[int, ...]  # per level: rotation factors
     learned_bases: tuple[bool, ...]  # per level: whether the time basis is
     common_basis: bool  # these levels share one, else each has its own
@@ -364,7 +364,7 @@ def _coded_rest(source: Source, branches: np.ndarray, settings: Settings) -> tup
         head.stream = streams.encode_exact_rest(branches, pose, source.mesh if head.connected else None)
         return head, pose.astype(np.float64) - source.origin
     coded = _rest_within(source, branches, settings)
-    head.step, head.stream, head.adaptive, head.connected = coded.step, coded.stream, coded.adaptive, coded.connected
+    head.step, head.stream, head.connected = coded.step, coded.stream, coded.connected
     return head, coded.decoded
 
 
@@ -373,8 +373,7 @@ def _rest_within(source: Source, branches: np.ndarray, settings: Settings) -> st
 
     def encode(step: float) -> streams.CodedRest:
         mesh = source.mesh if settings.connected_rest else None
-        given = (settings.adaptive_rest, settings.rest_slack, mesh, settings.shape_of)
-        return streams.encode_rest(branches, step, source.rest, None, *given)
+        return streams.encode_rest(branches, step, source.rest, None, settings.rest_slack, mesh, settings.shape_of)
 
     return _within(settings.bound, source.rest, encode, settings.rest_step)
 
@@ -391,33 +390,25 @@ def _within(
 
 
 def with_best_lags(source: Source, ath: Ath, settings: Settings) -> Settings:
-    """The lags, adaptive, connected or neither, and the copies that make hierarchy and rest pose smallest."""
+    """The lags, connected or not, and the copies that make hierarchy and rest pose smallest."""
     settings = replace(settings, shape_of=None)
     own = lags(source, settings.rest_step, settings.details)
-    candidates = [replace(settings, lags=own, adaptive_rest=False, connected_rest=False)]
-    if not source.reference_is_exact and (Feature.ADAPTIVE not in source.without or settings.details.any()):
+    candidates = [replace(settings, lags=own, connected_rest=False)]
+    if not source.reference_is_exact:
         candidates += _lag_candidates(source, settings, own)
     if source.mesh is not None and not source.host_rest:
-        is_adaptive = not source.reference_is_exact
-        candidates += [
-            replace(settings, lags=lag, adaptive_rest=is_adaptive, connected_rest=True)
-            for lag in (own, np.ones_like(own))
-        ]
-    if settings.details.any():
-        candidates = [own for own in candidates if own.adaptive_rest]
-    candidates += _with_copies(source, ath, candidates)
+        candidates += [replace(settings, lags=lag, connected_rest=True) for lag in (own, np.ones_like(own))]
+    if not source.reference_is_exact:
+        candidates += _with_copies(source, ath, candidates)
     return candidates[0] if len(candidates) == 1 else min(candidates, key=lambda some: _poses_size(source, ath, some))
 
 
 def _with_copies(source: Source, ath: Ath, candidates: list[Settings]) -> list[Settings]:
-    """The adaptive ones of the candidates with branches that are copies of others, where there are any."""
-    adaptive = [settings for settings in candidates if settings.adaptive_rest]
-    if not adaptive:
-        return []
-    own, branches = adaptive[0], branch_records(source.hierarchy, ath, adaptive[0])
+    """The candidates with branches that are copies of others, where there are any."""
+    own, branches = candidates[0], branch_records(source.hierarchy, ath, candidates[0])
     found = [streams.find_copies(branches, own.rest_step, source.rest, own.rest_slack, bend) for bend in COPIES_BENDS]
     shapes = [shape_of for shape_of in found if shape_of is not None]
-    return [replace(settings, shape_of=shape_of) for settings in adaptive for shape_of in shapes]
+    return [replace(settings, shape_of=shape_of) for settings in candidates for shape_of in shapes]
 
 
 def _poses_size(source: Source, ath: Ath, settings: Settings) -> int:
@@ -431,7 +422,7 @@ def with_connected_rest(source: Source, ath: Ath, settings: Settings) -> Setting
     """For layers: a rest pose that goes by faces where that is much smaller at once, or the one given."""
     if source.mesh is None or source.host_rest:
         return settings
-    connected = replace(settings, adaptive_rest=not source.reference_is_exact, connected_rest=True)
+    connected = replace(settings, connected_rest=True)
     share = 1.0 if source.reference_is_exact else CONNECTED_SHARE
     much = _poses_size(source, ath, connected) < share * _poses_size(source, ath, settings)
     return connected if much else settings
@@ -439,19 +430,13 @@ def with_connected_rest(source: Source, ath: Ath, settings: Settings) -> Setting
 
 def _lag_candidates(source: Source, settings: Settings, own: np.ndarray) -> list[Settings]:
     """Beams or not, the lags of stems or one for all; short stems as such whose vertices differ by their numbers."""
-    count, no_beam, beams = source.hierarchy.stem_count, np.maximum(own, 1), np.minimum(own, 1)
-    steps = [np.zeros_like(own), beams]
-    adaptive = [own, beams, no_beam, np.ones_like(own), np.where(count <= qz.SHORT_STEM, count, no_beam)]
+    count, no_beam = source.hierarchy.stem_count, np.maximum(own, 1)
+    some = [np.minimum(own, 1), no_beam, np.ones_like(own), np.where(count <= qz.SHORT_STEM, count, no_beam)]
     if source.still:
-        adaptive += [np.full_like(own, 3), np.full_like(own, 4), np.minimum(2 * no_beam, 65535)]
-    tried = {
-        (lag.astype(np.int32).tobytes(), is_adaptive)
-        for is_adaptive, some in ((False, steps), (True, adaptive))
-        for lag in some
-    }
+        some += [np.full_like(own, 3), np.full_like(own, 4), np.minimum(2 * no_beam, 65535)]
+    tried = {lag.astype(np.int32).tobytes() for lag in some} - {own.tobytes()}
     return [
-        replace(settings, lags=np.frombuffer(lag, np.int32), adaptive_rest=is_adaptive, connected_rest=False)
-        for lag, is_adaptive in sorted(tried)
+        replace(settings, lags=np.frombuffer(lag, np.int32), connected_rest=False) for lag in sorted(tried)
     ]
 
 

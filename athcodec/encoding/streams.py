@@ -41,7 +41,6 @@ class CodedRest:
     stream: bytes
     decoded: np.ndarray
     steps: np.ndarray | None = None
-    adaptive: bool = False
     connected: bool = False
 
 
@@ -50,14 +49,13 @@ def encode_rest(
     step: float,
     rest: np.ndarray,
     coarse: CodedRest | None = None,
-    adaptive: bool = False,
     slack: float = 0.0,
     mesh: Mesh | None = None,
     shape_of: np.ndarray | None = None,
 ) -> CodedRest:
     """A rest pose, (N, 3) float64 less the origin; about that of the layer before, if there is one.
 
-    slack: how far from its place a vertex may be put to save bits, where `adaptive`. mesh: that it goes by, then.
+    slack: how far from its place a vertex may be put to save bits. mesh: that it goes by, if any.
     shape_of: as find_copies gives it; copies that are too far off are coded as other branches are.
     """
     decoded, steps, moved = np.zeros_like(rest), np.zeros(rest.shape, np.int32), np.empty_like(rest)
@@ -68,7 +66,6 @@ def encode_rest(
             address(branches, BRANCH, 1),
             len(branches),
             step,
-            adaptive,
             slack,
             None if mesh is None else mesh.address,
             None if coarse is None else address(coarse.steps, np.int32, rest.size),
@@ -79,7 +76,7 @@ def encode_rest(
             address(moved, np.float64, rest.size),
             address(decoded, np.float64, rest.size),
         )
-    return CodedRest(step, data, decoded, steps, adaptive, mesh is not None)
+    return CodedRest(step, data, decoded, steps, mesh is not None)
 
 
 def find_copies(branches: np.ndarray, step: float, rest: np.ndarray, slack: float, bend: float) -> np.ndarray | None:

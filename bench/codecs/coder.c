@@ -108,13 +108,12 @@ BENCH_API int64_t bench_hierarchy(stream_bytes bytes, int64_t size, int32_t bran
 #ifndef ATH_ENCODING
 /* The pose that athcodec's encoder writes for these branches, vertex_count x 3. */
 BENCH_API int64_t bench_pose(stream_bytes bytes, int64_t size, const ath_branch *branches, int32_t branch_count,
-                             double step, int32_t adaptive, double *pose)
+                             double step, double *pose)
 {
     ath_coder coder;
     rest_layer layer = {0};
     rest_model *model = malloc(sizeof *model);
     if (!model) abort();
-    layer.adaptive = adaptive;
     coder_start(&coder, bytes, (size_t)size);
     int valid = code_rest(&coder, model, &layer, branches, branch_count, step, 0, pose);
     free(model);

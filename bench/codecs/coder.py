@@ -328,11 +328,10 @@ class Writer:
     def pose(self, branches: np.ndarray, lags: Sequence[np.ndarray], step: float, pose: np.ndarray) -> np.ndarray:
         """(N, 3) as athcodec codes a rest pose, by the best of several lags of the branches."""
         coded = []
-        for adaptive, own in ((adaptive, own) for own in lags for adaptive in (False, True)):
+        for own in lags:
             branches["lag"] = own
-            rest = streams.encode_rest(branches, step, pose, adaptive=adaptive)
+            rest = streams.encode_rest(branches, step, pose)
             table = Writer(self.coder)
-            table.count(int(adaptive))
             table.table(own[None])
             coded.append((table.data(), rest))
         head, rest = min(coded, key=lambda some: len(some[0]) + len(some[1].stream))
@@ -400,9 +399,9 @@ class Reader:
 
     def pose(self, branches: np.ndarray, step: float) -> np.ndarray:
         """Sets the lags of the branches."""
-        adaptive, branches["lag"] = self.count(), self.table()[0]
+        branches["lag"] = self.table()[0]
         pose, stream = np.zeros((int(branches["count"].sum()), 3)), self.take(self.count())
-        _read("bench_pose", stream, branches.ctypes.data, len(branches), step, adaptive, pose.ctypes.data)
+        _read("bench_pose", stream, branches.ctypes.data, len(branches), step, pose.ctypes.data)
         return pose
 
     def hierarchy(self) -> Hierarchy:

@@ -118,15 +118,15 @@ static void decode_basis(void *model, ath_bytes stream, int32_t frames, int32_t 
 
 /* A rest pose that is not exact, and one of a refinement about it: the same bytes at a smaller step. */
 static int decode_coarse_pose(void *model, ath_bytes body, const ath_branch *branches, int32_t count, double step,
-                              int adaptive, ath_mesh *mesh, int32_t vertices, double *rest)
+                              ath_mesh *mesh, int32_t vertices, double *rest)
 {
     size_t numbers = 3 * (size_t)vertices;
     int32_t *steps = integers(numbers), *finer_steps = integers(numbers);
     double *finer = fuzz_memory(numbers * sizeof *finer, 0xa5);
     int result =
-        ath_decode_rest(model, body.bytes, body.size, branches, count, step, adaptive, mesh, NULL, NULL, steps, rest);
+        ath_decode_rest(model, body.bytes, body.size, branches, count, step, mesh, NULL, NULL, steps, rest);
     if (result == ATH_OK && all_finite(rest, numbers))
-        ath_decode_rest(model, body.bytes, body.size, branches, count, step / 8.0, adaptive, mesh, steps, rest,
+        ath_decode_rest(model, body.bytes, body.size, branches, count, step / 8.0, mesh, steps, rest,
                         finer_steps, finer);
     free(finer);
     free(finer_steps);
@@ -171,12 +171,12 @@ static int decode_pose(void *model, ath_bytes body, const ath_branch *branches, 
     ath_mesh mesh;
     ath_arena arena = {NULL, 0};
     ath_mesh *connected = decode_mesh(&mesh, body, vertices, head, &arena);
-    int exact = head[6] & 1, adaptive = head[6] & 2, result;
+    int exact = head[6] & 1, is_float64 = head[6] & 2, result;
     if (exact)
-        result = ath_decode_exact_rest(model, body.bytes, body.size, branches, count, connected, adaptive, rest);
+        result = ath_decode_exact_rest(model, body.bytes, body.size, branches, count, connected, is_float64, rest);
     else
-        result = decode_coarse_pose(model, body, branches, count, step_from(head + 6), adaptive,
-                                    adaptive ? connected : NULL, vertices, rest);
+        result = decode_coarse_pose(model, body, branches, count, step_from(head + 6), connected,
+                                    vertices, rest);
     free(arena.base);
     return result;
 }
