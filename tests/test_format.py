@@ -279,7 +279,7 @@ def traced(spec) -> dict[str, list]:
     plan = spec.make_plan([branch], [[0.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 0.0, 2.0]])
     (piece,) = plan.pieces
     motion = spec.no_motion(plan, 4, False)
-    stream = spec.Record(step=0.25, rotation_step_factor=0.0, only_tips=False, waves=motion.waves, root=-1)
+    stream = spec.Record(step=0.25, rotation_step_factor=0.0, waves=motion.waves, root=-1)
     motion.streams = {0: stream, 1: stream}
     zeros = [0, 0, 0, 0]
     motion.coefficients = [[[3, -1, 0, 0], zeros, zeros], [zeros] * 3, [zeros] * 3]
@@ -1000,7 +1000,7 @@ class HandMade:
 
     def _motion(self, frames: int, bases: dict[int, np.ndarray]) -> SegmentMotion:
         streams = [
-            LevelStream(float(np.float32(0.03 + 0.01 * level)), float((0, 1, 4, 8)[level % 4]))
+            LevelStream(float(np.float32(0.03 + 0.01 * level)), float((0, 2, 8)[level % 3]))
             for level in range(self.plan.level_count)
         ]
         for level, basis in bases.items():
