@@ -23,14 +23,19 @@ import numpy as np
 import zstandard
 
 from spec import conformance, real_size
-from spec import reference_decoder as rd
+from spec.document import KIND_NAMES, rules
 from spec.scripted import (
     LOOSE,
+    NO_LEVEL,
+    REST_ADAPTIVE,
+    REST_CONNECTED,
     SHEET,
     WHOLE,
     Chance,
+    Clip,
     Draft,
     Entry,
+    Join,
     Plant,
     Script,
     Stem,
@@ -55,6 +60,7 @@ from spec.scripted import (
     write,
 )
 
+ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
 INFINITY, NAN = math.inf, math.nan
 LOWEST, HIGHEST = -sys.float_info.max, sys.float_info.max
 TINY = 5e-324
@@ -125,11 +131,11 @@ FORK = [Stem(-1, 3), Stem(0, 2, 1)]
 def forked(**fields) -> Plant:
     """A trunk and a branch, four frames in two segments, every kind of motion chunk."""
     scripts = {
-        (rd.SHAPES, 1, 0): [2, *row((3, 0, 4), (0, 1, 0)), *row((0, 0, 1)), 0],
-        (rd.STEMS, 1): lambda: Chance(1),
-        (rd.STEMS, 2): lambda: Chance(2),
-        (rd.AFFINES, 0): [-8, *row((5, -3, 1), (0, 2, 0))],
-        (rd.CORRECTIONS, 2): lambda: Chance(3),
+        (rules.SHAPES, 1, 0): [2, *row((3, 0, 4), (0, 1, 0)), *row((0, 0, 1)), 0],
+        (rules.STEMS, 1): lambda: Chance(1),
+        (rules.STEMS, 2): lambda: Chance(2),
+        (rules.AFFINES, 0): [-8, *row((5, -3, 1), (0, 2, 0))],
+        (rules.CORRECTIONS, 2): lambda: Chance(3),
     }
     return Plant(FORK, **{"frames": 4, "segments": 2, "scripts": scripts} | fields)
 
@@ -147,8 +153,8 @@ def moving(stems: list[Stem], seed: int, frames: int = 3, segments: int = 1, **f
     """Random rows at all levels."""
     scripts = {}
     for level in range(33):
-        scripts[rd.STEMS, level] = lambda level=level: Chance(100 * seed + level)
-        scripts[rd.AFFINES, level] = lambda level=level: Chance(100 * seed + level + 50, large=4)
+        scripts[rules.STEMS, level] = lambda level=level: Chance(100 * seed + level)
+        scripts[rules.AFFINES, level] = lambda level=level: Chance(100 * seed + level + 50, large=4)
     return Plant(stems, frames, segments, **{"scripts": scripts} | fields)
 
 
@@ -204,7 +210,7 @@ def frame_points(stems: list[Stem], seed: int) -> list[int]:
 
 def predicted(stems: list[Stem], frames: list, segments: int = 1, settings: int = 2, **fields) -> Plant:
     """frames: of each segment alike what it is coded about, (copied, 1) or (copied, 0, distance - 1), and its steps."""
-    scripts = {(rd.PREDICTED, 1, s): [x for frame in frames for x in frame] for s in range(segments)}
+    scripts = {(rules.PREDICTED, 1, s): [x for frame in frames for x in frame] for s in range(segments)}
     fields = {"predicted": predicted_head(settings=settings)} | fields
     fields["scripts"] = scripts | fields.get("scripts", {})
     return Plant(stems, len(frames) * segments, segments, **fields)
@@ -307,12 +313,12 @@ valid(
 valid(
     "predicted-segments",
     "two segments, of which one has maps for level 0",
-    lambda: predicted(ROOTED, swayed(5, 13), 2, scripts={(rd.AFFINES, 0, 1): [-8, *row((5, -3, 1), (0, 2, 0))]}),
+    lambda: predicted(ROOTED, swayed(5, 13), 2, scripts={(rules.AFFINES, 0, 1): [-8, *row((5, -3, 1), (0, 2, 0))]}),
 )
 valid(
     "predicted-roots",
     "maps of roots of one vertex, of one stem and of a subtree",
-    lambda: predicted(ROOTS, swayed(3, 14, ROOTS), scripts={(rd.AFFINES, 0, 0): lambda: Chance(15, large=4)}),
+    lambda: predicted(ROOTS, swayed(3, 14, ROOTS), scripts={(rules.AFFINES, 0, 0): lambda: Chance(15, large=4)}),
 )
 valid("predicted-level-0", "shortened: level 0 of 2", lambda: predicted(ROOTED, swayed(2, 16)).draft().upto(0))
 valid(
@@ -322,7 +328,7 @@ valid(
         predicted(ROOTED, swayed(2, 17))
         .draft()
         .with_header(level_count=3, full_level_count=3)
-        .add(Entry(rd.EXACT, b"", 2, 0))
+        .add(Entry(rules.EXACT, b"", 2, 0))
     ),
 )
 
@@ -350,7 +356,7 @@ valid("smallest-wide", "the same with binary64 positions and rest pose", lambda:
 valid(
     "one-vertex-moves",
     "one vertex whose translation has three frequencies in five frames",
-    lambda: lone(frames=5, scripts={(rd.STEMS, 0): row((1, 2, 3), (-40, 5, 0), (7, 0, -1))}),
+    lambda: lone(frames=5, scripts={(rules.STEMS, 0): row((1, 2, 3), (-40, 5, 0), (7, 0, -1))}),
 )
 valid("one-frame", "a bush in a single frame", lambda: moving(FORK, 5, frames=1, heads=HEADS))
 valid(
@@ -467,7 +473,7 @@ valid(
         2,
         points=[[0.0, 0.0, 0.0], [8.0, 0.0, 0.0], [0.0, 8.0, 0.0], [0.0, 0.0, 8.0], [0.0, 0.0, 9.0], [0.0, 0.0, 10.0]],
         scripts={
-            (rd.STEMS, 1): [
+            (rules.STEMS, 1): [
                 *row(),
                 0,
                 *row((0, 0, 0), (-200, 30, 0)),
@@ -484,7 +490,7 @@ valid(
         [Stem(-1, 2), Stem(0, 2, 1)],
         2,
         points=[[0.0, 0.0, 0.0], [0.0, 4.0, 0.0], [0.0, 8.0, 0.0], [0.0, 9.0, 1.0]],
-        scripts={(rd.STEMS, 1): [*row(), *row((0, -60, 0), (0, 60, 0)), *row((0, -9, 1))]},
+        scripts={(rules.STEMS, 1): [*row(), *row((0, -60, 0), (0, 60, 0)), *row((0, -9, 1))]},
     ),
 )
 valid(
@@ -583,7 +589,7 @@ valid(
 valid(
     "frames-256",
     "a segment of as many frames as there can be, with rows that code all of them",
-    lambda: lone(frames=256, scripts={(rd.STEMS, 0): row(*[(1, 0, -1)] * 256), (rd.STEMS, 1): []}),
+    lambda: lone(frames=256, scripts={(rules.STEMS, 0): row(*[(1, 0, -1)] * 256), (rules.STEMS, 1): []}),
 )
 valid(
     "frames-257", "one frame more: segments of 128 and 129", lambda: moving([Stem(-1, 2)], 24, frames=257, segments=2)
@@ -624,7 +630,7 @@ valid(
 valid(
     "kind-spelt",
     "known Kinds by all their bits",
-    lambda: fork().change(rd.STEMS, 1, 1, spelt=True).change(rd.AFFINES, 0, 0, spelt=True),
+    lambda: fork().change(rules.STEMS, 1, 1, spelt=True).change(rules.AFFINES, 0, 0, spelt=True),
 )
 valid("time-whole-rate", "times by a whole rate", lambda: lone(frames=7, time=whole_rates(3)))
 valid(
@@ -652,15 +658,15 @@ valid(
         lone()
         .draft()
         .change(
-            rd.HIERARCHY,
-            content=hierarchy_chunk(lone().draft().content(rd.HIERARCHY)[8:], rd.SHORT_FLOATS - 1, 0, 65535, 0),
+            rules.HIERARCHY,
+            content=hierarchy_chunk(lone().draft().content(rules.HIERARCHY)[8:], rules.SHORT_FLOATS - 1, 0, 65535, 0),
         )
     ),
 )
 
 # ---- valid: clips ------------------------------------------------------------------------------------------
 
-CALM, STORM = rd.Clip(3, 1, "calm"), rd.Clip(4, 2, "storm")
+CALM, STORM = Clip(3, 1, "calm"), Clip(4, 2, "storm")
 
 
 def two_clips(**fields) -> Draft:
@@ -668,60 +674,58 @@ def two_clips(**fields) -> Draft:
     return forked(**{"clips": (CALM, STORM)} | fields).draft()
 
 
-def loop(clip: rd.Clip, *seams: float) -> rd.Clip:
+def loop(clip: Clip, *seams: float) -> Clip:
     return replace(clip, seams=seams)
 
 
-def periodic(clip: rd.Clip, *seams: float) -> rd.Clip:
+def periodic(clip: Clip, *seams: float) -> Clip:
     return replace(loop(clip, *seams), periodic=True)
 
 
 def all_waves(frames: int) -> Callable[[], Plant]:
-    clips = rd.Clip(frames, 1, "once"), periodic(rd.Clip(frames, 1, "again"), 0.0, 0.0)
+    clips = Clip(frames, 1, "once"), periodic(Clip(frames, 1, "again"), 0.0, 0.0)
     rows = row(*(tuple((k + axis) % 5 - 2 for axis in range(3)) for k in range(frames)))
-    return lambda: lone(clips=clips, scripts={(rd.STEMS, 0): rows})
+    return lambda: lone(clips=clips, scripts={(rules.STEMS, 0): rows})
 
 
 def named(*names: str) -> Plant:
     """One vertex with a clip of a frame for each name."""
-    return lone(clips=tuple(rd.Clip(1, 1, name) for name in names))
+    return lone(clips=tuple(Clip(1, 1, name) for name in names))
 
 
 valid("clips-two", "two clips of different lengths, that share the shapes of pieces", two_clips)
 valid(
     "clips-three",
     "13 frames in 6 segments, which without the clips would begin elsewhere",
-    lambda: moving(FORK, 28, heads=HEADS, clips=(rd.Clip(5, 2, "a"), rd.Clip(1, 1, "b"), rd.Clip(7, 3, "c"))),
+    lambda: moving(FORK, 28, heads=HEADS, clips=(Clip(5, 2, "a"), Clip(1, 1, "b"), Clip(7, 3, "c"))),
 )
 valid(
     "clips-of-one-frame",
     "three clips of one frame each, one of them a loop",
     lambda: moving(
-        FORK, 29, heads=HEADS, clips=(rd.Clip(1, 1, "a"), loop(rd.Clip(1, 1, "b"), 0.0, 0.0, 0.0), rd.Clip(1, 1, "c"))
+        FORK, 29, heads=HEADS, clips=(Clip(1, 1, "a"), loop(Clip(1, 1, "b"), 0.0, 0.0, 0.0), Clip(1, 1, "c"))
     ),
 )
 valid(
     "clips-segment-lengths",
     "a segment of as many frames as there can be before shorter ones",
     lambda: lone(
-        clips=(rd.Clip(256, 1, "long"), rd.Clip(257, 2, "longer"), rd.Clip(2, 2, "short")),
-        scripts={(rd.STEMS, 0): row((1, 2, 3))},
+        clips=(Clip(256, 1, "long"), Clip(257, 2, "longer"), Clip(2, 2, "short")),
+        scripts={(rules.STEMS, 0): row((1, 2, 3))},
     ),
 )
 valid(
     "clips-255",
     "as many clips as there can be, the last with a segment more",
     lambda: lone(
-        clips=(*(rd.Clip(1, 1, f"{i}") for i in range(254)), rd.Clip(2, 2, "last")),
-        scripts={(rd.STEMS, 0): row((1, 2, 3))},
+        clips=(*(Clip(1, 1, f"{i}") for i in range(254)), Clip(2, 2, "last")),
+        scripts={(rules.STEMS, 0): row((1, 2, 3))},
     ),
 )
 valid(
     "clips-loops",
     "two loops around a clip that is none: seams at the ends of binary32, and -0.0",
-    lambda: two_clips(
-        clips=(loop(CALM, 0.5, FLOAT_TINY, 0.0), rd.Clip(2, 1, "once"), loop(STORM, FLOAT_MAX, 1.0, -0.0))
-    ),
+    lambda: two_clips(clips=(loop(CALM, 0.5, FLOAT_TINY, 0.0), Clip(2, 1, "once"), loop(STORM, FLOAT_MAX, 1.0, -0.0))),
 )
 valid("clip-named", "a single clip with a name", lambda: two_clips(clips=(CALM,)))
 valid("clip-loop", "a single clip with a name, a loop", lambda: two_clips(clips=(loop(STORM, 3.0, 2.0, 1.0),)))
@@ -734,18 +738,18 @@ valid(
         heads=HEADS,
         clips=(
             periodic(CALM, 0.5, 0.25, 0.0),
-            loop(rd.Clip(3, 1, "jerks"), 0.5, 0.25, 0.0),
-            periodic(rd.Clip(1, 1, "one"), 0.0, 0.0, 0.0),
+            loop(Clip(3, 1, "jerks"), 0.5, 0.25, 0.0),
+            periodic(Clip(1, 1, "one"), 0.0, 0.0, 0.0),
         ),
     ),
 )
 for frames in (2, 3, 4, 7, 33, 255, 256):
     valid(f"waves-{frames}", f"all waves of {frames} frames, once of a beam and once periodic", all_waves(frames))
-valid("clip-unnamed", "a single clip that CLIPS gives an empty name", lambda: two_clips(clips=(rd.Clip(4, 2),)))
+valid("clip-unnamed", "a single clip that CLIPS gives an empty name", lambda: two_clips(clips=(Clip(4, 2),)))
 valid(
     "clip-unnamed-loop",
     "a single loop with an empty name",
-    lambda: two_clips(clips=(loop(rd.Clip(4, 2), 0.25, 0.25, 0.0),)),
+    lambda: two_clips(clips=(loop(Clip(4, 2), 0.25, 0.25, 0.0),)),
 )
 valid(
     "clips-time",
@@ -775,7 +779,7 @@ valid(
 valid(
     "clips-time-step-vanishes",
     "a Step that vanishes, in a clip of one frame",
-    lambda: two_clips(clips=(CALM, rd.Clip(1, 1, "still")), time=steady_times((0.0, 0.5), (1e30, 1.0)), scripts={}),
+    lambda: two_clips(clips=(CALM, Clip(1, 1, "still")), time=steady_times((0.0, 0.5), (1e30, 1.0)), scripts={}),
 )
 valid(
     "clips-steps",
@@ -794,7 +798,7 @@ valid(
 valid(
     "clips-corrections",
     "corrections in the second clip alone",
-    lambda: Plant(FORK, clips=(CALM, STORM), is_float64=True, scripts={(rd.CORRECTIONS, 2, 2): lambda: Chance(58)}),
+    lambda: Plant(FORK, clips=(CALM, STORM), is_float64=True, scripts={(rules.CORRECTIONS, 2, 2): lambda: Chance(58)}),
 )
 valid(
     "clips-truncated",
@@ -807,7 +811,7 @@ valid(
     lambda: (
         two_clips(clips=(loop(CALM, 3.0, 2.0, 1.0, 0.0), loop(STORM, 0.5, 0.25, 0.125, 0.0)))
         .with_header(level_count=4, full_level_count=4)
-        .add(*(Entry(rd.EXACT, b"", 3, s) for s in range(3)))
+        .add(*(Entry(rules.EXACT, b"", 3, s) for s in range(3)))
     ),
 )
 valid(
@@ -858,25 +862,25 @@ AWKWARD_DOUBLES = [-0.0, TINY, -1e300, 1e300, 1.0, -1e-310, 0.0, 1 + 2**-52, -1.
 
 def branches_of(stems: list[Stem]) -> list:
     count = sum(stem.count for stem in stems)
-    return rd.decode_hierarchy(
-        write(rd.decode_hierarchy, hierarchy_script(stems), len(stems), count), len(stems), count
+    return rules.decode_hierarchy(
+        write(rules.decode_hierarchy, hierarchy_script(stems), len(stems), count), len(stems), count
     )[0]
 
 
 def exact_rest(stems: list[Stem], numbers: list, is_float64: bool, **fields) -> bytes:
-    stream = write(rd.decode_exact_rest, numbers, branches_of(stems), is_float64)
+    stream = write(rules.decode_exact_rest, numbers, branches_of(stems), is_float64)
     return rest_chunk(stream, exact=1, rest_type=int(is_float64), **fields)
 
 
 def coded_rest(stems: list[Stem], script: list | Chance, **fields) -> bytes:
-    return rest_chunk(write(rd.decode_rest, script, branches_of(stems), 1.0), **fields)
+    return rest_chunk(write(rules.decode_rest, script, branches_of(stems), 1.0), **fields)
 
 
 def adaptive_rest(
     stems: list[Stem], script: list | Chance, step: float = 0.25, connected: bool = False, **fields
 ) -> bytes:
-    stream = write(rd.decode_rest, script, branches_of(stems), step, None, True)
-    bits = rd.REST_ADAPTIVE | rd.REST_CONNECTED * connected
+    stream = write(rules.decode_rest, script, branches_of(stems), step, None, True)
+    bits = REST_ADAPTIVE | REST_CONNECTED * connected
     return rest_chunk(stream, step=step, reserved=bits >> 2, **fields)
 
 
@@ -975,7 +979,7 @@ valid(
 valid(
     "rest-detail-steps",
     "the same in a rest pose that is not adaptive",
-    lambda: with_rest(DETAILED, rest_chunk(write(rd.decode_rest, Chance(38, large=6), branches_of(DETAILED), 0.25))),
+    lambda: with_rest(DETAILED, rest_chunk(write(rules.decode_rest, Chance(38, large=6), branches_of(DETAILED), 0.25))),
 )
 valid(
     "rest-exact",
@@ -1046,15 +1050,15 @@ DETAILED_BUSH = [replace(stem, detail=detail) for stem, detail in zip(BUSH, (0, 
 
 
 def detailed_rest() -> bytes:
-    return rest_chunk(write(rd.decode_rest, Chance(214, large=6), branches_of(DETAILED_BUSH), 0.25))
+    return rest_chunk(write(rules.decode_rest, Chance(214, large=6), branches_of(DETAILED_BUSH), 0.25))
 
 
 def bent(stems: list[Stem], script: list | Chance, rest: bytes | None = None) -> bytes:
     """SOURCE_REST about the pose of REST, by default that of `still`, at the same step."""
     branches, reference = branches_of(stems), 0.25 * np.array(grown(stems), float)
     if rest is not None:
-        reference = np.array(rd.decode_rest(rest[17:], branches, 0.25).rest)
-    return source_rest_chunk(write(rd.BentPose, script, branches, 0.25, reference))
+        reference = rules.decode_rest(rest[17:], branches, 0.25).rest
+    return source_rest_chunk(write(rules.decode_source_rest, script, branches, 0.25, reference))
 
 
 def bent_bush(script: list | Chance, rest: list | Chance, **fields) -> Plant:
@@ -1127,7 +1131,9 @@ valid(
 valid(
     "numbers-largest",
     "integers at the ends of what a stream can hold",
-    lambda: lone(frames=3, scripts={(rd.STEMS, 0): row((2**30 - 1, 1 - 2**30, 0), (2**29, -1, 1), (2**20 + 1, 0, 9))}),
+    lambda: lone(
+        frames=3, scripts={(rules.STEMS, 0): row((2**30 - 1, 1 - 2**30, 0), (2**29, -1, 1), (2**20 + 1, 0, 9))}
+    ),
 )
 valid(
     "maps-largest",
@@ -1137,7 +1143,7 @@ valid(
         2,
         points=[[float(x), 0.0, 0.0] for x in range(9)],
         scripts={
-            (rd.AFFINES, 0): [
+            (rules.AFFINES, 0): [
                 200,
                 *row((1, 2, 3)),
                 *row((0, 1, 0)),
@@ -1157,7 +1163,7 @@ valid(
     lambda: lone(
         frames=4,
         heads={0: stems_head(0.5, 0, 8, 1, basis_stream([[128, -128, 128, 0]], 8))},
-        scripts={(rd.STEMS, 0): row((3, -1, 70))},
+        scripts={(rules.STEMS, 0): row((3, -1, 70))},
     ),
 )
 valid(
@@ -1239,10 +1245,10 @@ valid(
         [Stem(-1, 4)],
         3,
         scripts={
-            (rd.SHAPES, 0, 0): [6, *(n for i in range(6) for n in row((1, -i, 2), (i, 5, 0), (0, 0, 3)))],
-            (rd.SHAPES, 1, 0): [6, *(n for i in range(6) for n in row((0, 1, i), (0, -i, 0), (2, 2, 2), (9, 9, i)))],
-            (rd.STEMS, 0): lambda: Chance(45),
-            (rd.STEMS, 1): lambda: Chance(46),
+            (rules.SHAPES, 0, 0): [6, *(n for i in range(6) for n in row((1, -i, 2), (i, 5, 0), (0, 0, 3)))],
+            (rules.SHAPES, 1, 0): [6, *(n for i in range(6) for n in row((0, 1, i), (0, -i, 0), (2, 2, 2), (9, 9, i)))],
+            (rules.STEMS, 0): lambda: Chance(45),
+            (rules.STEMS, 1): lambda: Chance(46),
         },
     ),
 )
@@ -1253,10 +1259,10 @@ valid(
         [Stem(-1, 20)],
         3,
         scripts={
-            (rd.SHAPES, 0, 0): [2, *row((2**29, 0, 0)), *row(*[(0, 0, 0)] * 15, (1, 0, 0))],
-            (rd.SHAPES, 1, 0): [],
-            (rd.STEMS, 0): lambda: Chance(47),
-            (rd.STEMS, 1): lambda: Chance(48),
+            (rules.SHAPES, 0, 0): [2, *row((2**29, 0, 0)), *row(*[(0, 0, 0)] * 15, (1, 0, 0))],
+            (rules.SHAPES, 1, 0): [],
+            (rules.STEMS, 0): lambda: Chance(47),
+            (rules.STEMS, 1): lambda: Chance(48),
         },
     ),
 )
@@ -1267,12 +1273,12 @@ valid(
         [Stem(-1, 4, 0, SHEET), Stem(0, 3, 3, WHOLE), Stem(1, 2, 1, SHEET)],
         3,
         scripts={
-            (rd.SHAPES, 1, 0): [3, *row((1, 2, 3)), *row((3, 2, 1), (1, 1, 1)), *row((0, 0, 5))],
-            (rd.SHAPES, 2, 0): [1, *row((4, 0, 0)), 2, *row((0, 7, 0)), *row((0, 0, 7))],
-            (rd.STEMS, 1): lambda: Chance(49),
-            (rd.STEMS, 2): lambda: Chance(50),
-            (rd.AFFINES, 0): lambda: Chance(51, large=3),
-            (rd.AFFINES, 1): lambda: Chance(52, large=3),
+            (rules.SHAPES, 1, 0): [3, *row((1, 2, 3)), *row((3, 2, 1), (1, 1, 1)), *row((0, 0, 5))],
+            (rules.SHAPES, 2, 0): [1, *row((4, 0, 0)), 2, *row((0, 7, 0)), *row((0, 0, 7))],
+            (rules.STEMS, 1): lambda: Chance(49),
+            (rules.STEMS, 2): lambda: Chance(50),
+            (rules.AFFINES, 0): lambda: Chance(51, large=3),
+            (rules.AFFINES, 1): lambda: Chance(52, large=3),
         },
     ),
 )
@@ -1282,13 +1288,13 @@ valid(
     lambda: Plant(
         [Stem(-1, 2), Stem(0, 2, 1, WHOLE), Stem(1, 2, 1)],
         2,
-        scripts={(rd.SHAPES, 2, 0): [2, *row((1, 0, 0)), *row((0, 1, 1))], (rd.STEMS, 2): lambda: Chance(53)},
+        scripts={(rules.SHAPES, 2, 0): [2, *row((1, 0, 0)), *row((0, 1, 1))], (rules.STEMS, 2): lambda: Chance(53)},
     ),
 )
 valid(
     "corrections",
     "corrections on the last level: blocks of 8 frames, the last of 2, and vertices that have none",
-    lambda: Plant([Stem(-1, 6)], 18, scripts={(rd.CORRECTIONS, 1): lambda: Chance(54)}),
+    lambda: Plant([Stem(-1, 6)], 18, scripts={(rules.CORRECTIONS, 1): lambda: Chance(54)}),
 )
 valid(
     "corrections-footprints",
@@ -1297,7 +1303,7 @@ valid(
         [Stem(-1, 2)],
         5,
         scripts={
-            (rd.CORRECTIONS, 1): [
+            (rules.CORRECTIONS, 1): [
                 *(1, 1, *(1, 1), *(1, 0, 3), 0, 0, 0, 0, 0, 1, *(1, 1), *(1, 1, 3), 0, 0),  # 4 and -4 along x
                 *(1, 0, 1, *(1, 0), 0, *(1, 0, 0), 0, 1, 0, 0, 0, *(1, 1), 0, 0),  # 1 along y, -2 along z
             ]
@@ -1307,24 +1313,28 @@ valid(
 valid(
     "corrections-wide",
     "corrections of binary64 positions",
-    lambda: Plant(FORK, 3, is_float64=True, origin=(0.1, 0.2, 0.3), scripts={(rd.CORRECTIONS, 2): lambda: Chance(55)}),
+    lambda: Plant(
+        FORK, 3, is_float64=True, origin=(0.1, 0.2, 0.3), scripts={(rules.CORRECTIONS, 2): lambda: Chance(55)}
+    ),
 )
 valid(
     "corrections-none",
     "a CORRECTIONS chunk that corrects nothing, in one of two segments",
-    lambda: Plant(FORK, 3, 2, scripts={(rd.CORRECTIONS, 2, 1): []}),
+    lambda: Plant(FORK, 3, 2, scripts={(rules.CORRECTIONS, 2, 1): []}),
 )
 valid(
     "corrections-to-infinity",
     "a Correction_Step at the end of binary32",
     lambda: (
-        Plant(FORK, 2, scripts={(rd.CORRECTIONS, 2): lambda: Chance(56)})
+        Plant(FORK, 2, scripts={(rules.CORRECTIONS, 2): lambda: Chance(56)})
         .draft()
         .change(
-            rd.CORRECTIONS,
+            rules.CORRECTIONS,
             2,
             content=struct.pack("<f", FLOAT_MAX)
-            + Plant(FORK, 2, scripts={(rd.CORRECTIONS, 2): lambda: Chance(56)}).draft().content(rd.CORRECTIONS, 2)[4:],
+            + Plant(FORK, 2, scripts={(rules.CORRECTIONS, 2): lambda: Chance(56)})
+            .draft()
+            .content(rules.CORRECTIONS, 2)[4:],
         )
     ),
 )
@@ -1337,7 +1347,9 @@ valid(
         2,
         heads={level: stems_head(FLOAT_MAX, 1) for level in range(4)},
         rest=exact_rest(NOT_A_NUMBER, (1e200 * np.array(grown(NOT_A_NUMBER, 4))).ravel().tolist(), True),
-        scripts={(rd.STEMS, level): lambda level=level: Chance(57 + level, empty=0.1, large=25) for level in range(4)},
+        scripts={
+            (rules.STEMS, level): lambda level=level: Chance(57 + level, empty=0.1, large=25) for level in range(4)
+        },
     ),
 )
 
@@ -1393,7 +1405,7 @@ def frame(
     size = len(content) if stated == -1 else stated
     flags = reserved << 3 | (checksum is not None) << 2 | single_segment << 5
     flags |= (3 << 6 if size is not None else 0) | (1 if dictionary is not None else 0)
-    out = rd.ZSTD_MAGIC + bytes([flags]) + (b"" if single_segment else bytes([window]))
+    out = ZSTD_MAGIC + bytes([flags]) + (b"" if single_segment else bytes([window]))
     out += bytes([dictionary]) if dictionary is not None else b""
     out += struct.pack("<Q", size) if size is not None else b""
     out += raw_block(content, True) if blocks is None else blocks
@@ -1456,10 +1468,25 @@ def polygon_head(type_: str, faces: int, corners: int, count_type: str | None = 
     return bytes([polygon_type(type_) | flags | 16 * len(mixed)]) + mixed + struct.pack("<II", faces, corners)
 
 
+def polygon_shape(
+    index_type: int, count_type: int | None, is_absolute: bool, face_count: int, columns: int, corner_count: int
+):
+    """Head of FACES or EDGES."""
+    return rules.Record(
+        index_type=index_type,
+        count_type=count_type,
+        is_absolute=is_absolute,
+        is_derived=False,
+        face_count=face_count,
+        columns=columns,
+        corner_count=corner_count,
+    )
+
+
 def polygons(rows: np.ndarray, vertex_count: int = 5, absolute: bool = False, script: Script | None = None) -> bytes:
     """FACES or EDGES with as many corners each."""
-    shape = rd.PolygonShape(polygon_type(rows.dtype.str), None, absolute, False, *rows.shape, rows.size)
-    stream = write(rd.decode_polygons, script or rows.reshape(-1).tolist(), shape, vertex_count)
+    shape = polygon_shape(polygon_type(rows.dtype.str), None, absolute, *rows.shape, rows.size)
+    stream = write(rules.decode_polygons, script or rows.reshape(-1).tolist(), shape, vertex_count)
     return polygon_head(rows.dtype.str, *rows.shape, flags=32 * absolute) + stream
 
 
@@ -1473,10 +1500,10 @@ def mixed_polygons(
     """FACES of different sizes; types: of vertices and numbers of corners."""
     corners = sum(map(len, faces)) if corner_count is None else corner_count
     index_type, count_type = map(polygon_type, types)
-    shape = rd.PolygonShape(index_type, count_type, absolute, False, len(faces), 0, corners)
+    shape = polygon_shape(index_type, count_type, absolute, len(faces), 0, corners)
     script = [value for face in faces for value in (len(face), *face)]
     return polygon_head(types[0], len(faces), corners, types[1], 32 * absolute) + write(
-        rd.decode_polygons, script, shape, vertex_count
+        rules.decode_polygons, script, shape, vertex_count
     )
 
 
@@ -1494,11 +1521,11 @@ def with_static(*entries: tuple[int, bytes]) -> Draft:
 
 
 def metadata(text: bytes | str, method: int = 0) -> Draft:
-    return with_static((rd.METADATA, bytes([method]) + (text if isinstance(text, bytes) else text.encode())))
+    return with_static((rules.METADATA, bytes([method]) + (text if isinstance(text, bytes) else text.encode())))
 
 
 def attributes(*contents: bytes) -> Draft:
-    return with_static(*((rd.ATTRIBUTE, content) for content in contents))
+    return with_static(*((rules.ATTRIBUTE, content) for content in contents))
 
 
 # A text of 456 bytes compressed by zstd 1.5 at level 19: literals with a Huffman table, sequences with FSE tables.
@@ -1537,17 +1564,19 @@ valid(
 valid(
     "faces-and-edges",
     "triangles and edges, in integers of different sizes",
-    lambda: with_static((rd.FACES, polygons(FACES_3)), (rd.EDGES, polygons(EDGES_2))),
+    lambda: with_static((rules.FACES, polygons(FACES_3)), (rules.EDGES, polygons(EDGES_2))),
 )
 valid(
     "faces-of-any-width",
     "faces of five columns, big-endian",
-    lambda: with_static((rd.FACES, polygons(np.array([[4, 3, 2, 1, 0]], ">i4")))),
+    lambda: with_static((rules.FACES, polygons(np.array([[4, 3, 2, 1, 0]], ">i4")))),
 )
 valid(
     "faces-none",
     "no faces: three columns, no rows, no data; edges without rows likewise",
-    lambda: with_static((rd.FACES, polygons(np.zeros((0, 3), "|u1"))), (rd.EDGES, polygons(np.zeros((0, 2), "<u4")))),
+    lambda: with_static(
+        (rules.FACES, polygons(np.zeros((0, 3), "|u1"))), (rules.EDGES, polygons(np.zeros((0, 2), "<u4")))
+    ),
 )
 valid(
     "edges-derived",
@@ -1555,13 +1584,13 @@ valid(
     lambda: (
         moving([Stem(-1, 3), Stem(0, 2, 1), Stem(-1, 1)], 61, vertex_source=[5, 0, 3, 1, 4, 2])
         .draft()
-        .add(Entry(rd.EDGES, derived(">i2")))
+        .add(Entry(rules.EDGES, derived(">i2")))
     ),
 )
 valid(
     "edges-derived-least",
     "as numbers of one byte; of one vertex there are none",
-    lambda: lone().draft().add(Entry(rd.EDGES, derived("|i1"))),
+    lambda: lone().draft().add(Entry(rules.EDGES, derived("|i1"))),
 )
 MANY_FACES = {  # of 119 vertices: those of ADAPTIVE
     "by chance": lambda: polygons(np.zeros((150, 3), "<i2"), 120, script=Chance(71)),
@@ -1576,23 +1605,23 @@ valid(
     "faces-mixed",
     "faces of 3, 4, 0, 1, 2 and 5 corners, numbers of one byte and of eight",
     lambda: with_static(
-        (rd.FACES, mixed_polygons([[0, 1, 2], [3, 2, 1, 0], [], [4], [4, 3], [0, 1, 2, 3, 4]], types=(">i8", "|i1")))
+        (rules.FACES, mixed_polygons([[0, 1, 2], [3, 2, 1, 0], [], [4], [4, 3], [0, 1, 2, 3, 4]], types=(">i8", "|i1")))
     ),
 )
 valid(
     "faces-mixed-alike",
     "faces that could be of different sizes, but are triangles; attributes behind them",
-    lambda: with_static((rd.FACES, mixed_polygons([[0, 1, 2], [2, 1, 4]]))).add(
-        Entry(rd.ATTRIBUTE, numbers(np.arange(5.0), name="radius"))
+    lambda: with_static((rules.FACES, mixed_polygons([[0, 1, 2], [2, 1, 4]]))).add(
+        Entry(rules.ATTRIBUTE, numbers(np.arange(5.0), name="radius"))
     ),
 )
-valid("faces-mixed-none", "no faces of different sizes", lambda: with_static((rd.FACES, mixed_polygons([]))))
+valid("faces-mixed-none", "no faces of different sizes", lambda: with_static((rules.FACES, mixed_polygons([]))))
 for name_, make_faces in MANY_FACES.items():
     valid(
         f"faces-many-{name_.replace(' ', '-')}",
         f"faces of 120 vertices: {name_}",
         lambda make_faces=make_faces: (
-            with_rest(ADAPTIVE, adaptive_rest(ADAPTIVE, [])).draft().add(Entry(rd.FACES, make_faces()))
+            with_rest(ADAPTIVE, adaptive_rest(ADAPTIVE, [])).draft().add(Entry(rules.FACES, make_faces()))
         ),
     )
 
@@ -1602,16 +1631,16 @@ def connected(
 ) -> Plant:
     """ADAPTIVE, by faces."""
     content, branches = make_faces(), branches_of(ADAPTIVE)
-    shape, stream = rd.parse_polygons(content, rd.FACES, rd.Limits())
+    shape, stream = rules.parse_polygons(content, rules.FACES)
     count = sum(stem.count for stem in ADAPTIVE)
-    mesh = rd.build_mesh(*rd.decode_polygons(stream, shape, count), order or list(range(count)))
-    script, bits = Chance(seed, large=6), rd.REST_CONNECTED >> 2
+    mesh = rules.build_mesh(*rules.decode_polygons(stream, shape, count), order or list(range(count)))
+    script, bits = Chance(seed, large=6), REST_CONNECTED >> 2
     if exact:
-        stream = write(rd.decode_exact_rest, script, branches, False, mesh)
+        stream = write(rules.decode_exact_rest, script, branches, False, mesh)
         rest = rest_chunk(stream, exact=1, reserved=bits)
     else:
-        stream = write(rd.decode_rest, script, branches, step, None, True, mesh)
-        rest = rest_chunk(stream, step=step, reserved=bits | rd.REST_ADAPTIVE >> 2)
+        stream = write(rules.decode_rest, script, branches, step, None, True, mesh)
+        rest = rest_chunk(stream, step=step, reserved=bits | REST_ADAPTIVE >> 2)
     fields = {} if order is None else {"vertex_source": order}
     return with_rest(ADAPTIVE, rest, faces=content, **fields)
 
@@ -1680,7 +1709,7 @@ valid(
 valid(
     "attributes-256",
     "as many attributes as there can be",
-    lambda: lone().draft().add(*(Entry(rd.ATTRIBUTE, element("|u1", bytes([i]), str(i))) for i in range(256))),
+    lambda: lone().draft().add(*(Entry(rules.ATTRIBUTE, element("|u1", bytes([i]), str(i))) for i in range(256))),
 )
 valid("zstd-checksum", "a frame with a Content_Checksum", lambda: attributes(array_chunk("|u1", (5,), frame(b"plant"))))
 valid(
@@ -1756,7 +1785,7 @@ def everything() -> Draft:
     }
     plant = Plant(
         EVERYTHING,
-        clips=(loop(rd.Clip(5, 1, "up"), 0.5, 0.4, 0.3, 0.2, 0.1, 0.05, 0.0), rd.Clip(5, 1, "down")),
+        clips=(loop(Clip(5, 1, "up"), 0.5, 0.4, 0.3, 0.2, 0.1, 0.05, 0.0), Clip(5, 1, "down")),
         rest=coded_rest(EVERYTHING, Chance(71), rest_type=1, origin=(10.0, -3.5, 0.25), step=0.01),
         source_rest=bent(EVERYTHING, Chance(93, large=9)),
         time=uneven_time(*random.random((2, 5)).cumsum(axis=1).ravel().tolist()),
@@ -1765,12 +1794,12 @@ def everything() -> Draft:
         is_float64=True,
         layers=2,
         heads=HEADS | bases | {5: stems_head(0.01, 3)},
-        scripts={(rd.STEMS, level): lambda level=level: Chance(72 + level) for level in range(6)}
-        | {(rd.AFFINES, level): lambda level=level: Chance(80 + level, large=3) for level in range(5)}
-        | {(rd.CORRECTIONS, level): lambda level=level: Chance(86 + level) for level in (4, 5)}
-        | {(rd.REFINED_REST, 5, 0): lambda: Chance(92, large=4)}
+        scripts={(rules.STEMS, level): lambda level=level: Chance(72 + level) for level in range(6)}
+        | {(rules.AFFINES, level): lambda level=level: Chance(80 + level, large=3) for level in range(5)}
+        | {(rules.CORRECTIONS, level): lambda level=level: Chance(86 + level) for level in (4, 5)}
+        | {(rules.REFINED_REST, 5, 0): lambda: Chance(92, large=4)}
         | {
-            (rd.SHAPES, 1, 0): [
+            (rules.SHAPES, 1, 0): [
                 2,
                 *row((1, 2, -3), (0, 0, 9)),
                 *row((5, 0, 0)),
@@ -1781,23 +1810,23 @@ def everything() -> Draft:
                 9,
                 *(n for i in range(9) for n in row((i, 1, -i), (0, 2, 0))),
             ],
-            (rd.SHAPES, 2, 0): [1, *row((0, 1, 0)), 0, 2, *row((1, 0, 0), (0, 0, 1)), *row((0, 0, 8))],
-            (rd.SHAPES, 5, 0): [2, *refined_row((0, -1, 0)), *refined_row((3, 0, 0), (0, 0, -1))],
+            (rules.SHAPES, 2, 0): [1, *row((0, 1, 0)), 0, 2, *row((1, 0, 0), (0, 0, 1)), *row((0, 0, 8))],
+            (rules.SHAPES, 5, 0): [2, *refined_row((0, -1, 0)), *refined_row((3, 0, 0), (0, 0, -1))],
         },
     )
     return (
         plant.draft()
         .with_header(level_count=7, full_level_count=7)
         .add(
-            Entry(rd.EXACT, b"", 6, 0),
-            Entry(rd.EXACT, b"", 6, 1),
-            Entry(rd.METADATA, b"\1" + WIND_FRAME),
-            Entry(rd.FACES, polygons(FACES_3)),
-            Entry(rd.EDGES, derived("<i2")),
+            Entry(rules.EXACT, b"", 6, 0),
+            Entry(rules.EXACT, b"", 6, 1),
+            Entry(rules.METADATA, b"\1" + WIND_FRAME),
+            Entry(rules.FACES, polygons(FACES_3)),
+            Entry(rules.EDGES, derived("<i2")),
             Entry(0x8009, FUTURE),
             Entry(0x8018, FUTURE, 1, 1),
-            Entry(rd.ATTRIBUTE, numbers(np.arange(6.0).reshape(2, 3), name="b")),
-            Entry(rd.ATTRIBUTE, element("|S3", b"oak", "a")),
+            Entry(rules.ATTRIBUTE, numbers(np.arange(6.0).reshape(2, 3), name="b")),
+            Entry(rules.ATTRIBUTE, element("|S3", b"oak", "a")),
             Entry(0x8040, FUTURE),
         )
     )
@@ -1872,7 +1901,7 @@ def layered(layers: int = 3, *left_out: tuple, **fields) -> Plant:
     """The fork, which is level 0 to 2, and refinements with everything that they may have; `left_out`: scripts."""
     more = {"scripts": {}} | fields
     scripts = forked().scripts | {
-        (rd.SHAPES, 3, 0): [
+        (rules.SHAPES, 3, 0): [
             3,
             *refined_row((1, 0, -2), (0, 3, 0)),
             0,
@@ -1880,13 +1909,13 @@ def layered(layers: int = 3, *left_out: tuple, **fields) -> Plant:
             1,
             *refined_row((2, 0, 0)),
         ],
-        (rd.SHAPES, 4, 0): [2, *refined_row((-1, 1, 0), (0, 0, 7), (1, 0, 0)), *refined_row((0, 0, 1)), 0],
+        (rules.SHAPES, 4, 0): [2, *refined_row((-1, 1, 0), (0, 0, 7), (1, 0, 0)), *refined_row((0, 0, 1)), 0],
     }
     for q in range(1, layers):
         scripts |= {
-            (rd.STEMS, 2 + q): lambda q=q: Chance(10 + q),
-            (rd.CORRECTIONS, 2 + q): lambda q=q: Chance(20 + q),
-            (rd.REFINED_REST, 2 + q, 0): lambda q=q: Chance(30 + q, large=4),
+            (rules.STEMS, 2 + q): lambda q=q: Chance(10 + q),
+            (rules.CORRECTIONS, 2 + q): lambda q=q: Chance(20 + q),
+            (rules.REFINED_REST, 2 + q, 0): lambda q=q: Chance(30 + q, large=4),
         }
     scripts = {place: script for place, script in scripts.items() if place not in left_out}
     return forked(**{"layers": layers, "heads": LAYER_HEADS} | more | {"scripts": scripts | more["scripts"]})
@@ -1928,16 +1957,16 @@ def refinements(stems: list[Stem], seed: int, large: int = 12, **fields) -> Plan
     """Three layers of random rows and rest poses."""
     plant = moving(stems, seed, **{"layers": 3, "heads": LAYER_HEADS} | fields)
     plant.scripts |= {
-        (rd.STEMS, level): lambda level=level: Chance(100 * seed + level, large=large) for level in range(40)
+        (rules.STEMS, level): lambda level=level: Chance(100 * seed + level, large=large) for level in range(40)
     }
     plant.scripts |= {
-        (rd.REFINED_REST, level, 0): lambda level=level: Chance(100 * seed + level + 70, large=6)
+        (rules.REFINED_REST, level, 0): lambda level=level: Chance(100 * seed + level + 70, large=6)
         for level in range(2, 40)
     }
     return plant
 
 
-LEVEL_1_REST = {(rd.REFINED_REST, 1, 0): lambda: Chance(81, large=4)}
+LEVEL_1_REST = {(rules.REFINED_REST, 1, 0): lambda: Chance(81, large=4)}
 
 
 def rest_by_level(stems: list[Stem], seed: int, **fields) -> Plant:
@@ -1964,7 +1993,7 @@ def lossless_layers() -> Draft:
         layered()
         .draft()
         .with_header(level_count=6, full_level_count=6)
-        .add(Entry(rd.EXACT, b"", 5, 0), Entry(rd.EXACT, b"", 5, 1))
+        .add(Entry(rules.EXACT, b"", 5, 0), Entry(rules.EXACT, b"", 5, 1))
     )
 
 
@@ -1973,19 +2002,23 @@ valid("layers-eight", "as many layers as there may be", refinements([Stem(-1, 2)
 valid(
     "layers-two",
     "a refinement of motion alone: the rest pose is that of the layer before, and no piece has shapes",
-    layered(2, (rd.REFINED_REST, 3, 0), (rd.SHAPES, 3, 0), (rd.CORRECTIONS, 3)),
+    layered(2, (rules.REFINED_REST, 3, 0), (rules.SHAPES, 3, 0), (rules.CORRECTIONS, 3)),
 )
 valid("layers-three", "refinements with REFINED_REST, SHAPES and CORRECTIONS", layered())
 valid(
     "layers-rest-of-last",
     "the second refinement refines the rest pose of the layer before the one before",
-    layered(3, (rd.REFINED_REST, 3, 0)),
+    layered(3, (rules.REFINED_REST, 3, 0)),
 )
 valid(
-    "layers-rest-of-first", "the second refinement has the rest pose of the first", layered(3, (rd.REFINED_REST, 4, 0))
+    "layers-rest-of-first",
+    "the second refinement has the rest pose of the first",
+    layered(3, (rules.REFINED_REST, 4, 0)),
 )
-valid("layers-shapes-of-last", "shapes in a refinement alone", layered(3, (rd.SHAPES, 1, 0), (rd.SHAPES, 3, 0)))
-valid("layers-shapes-of-first", "shapes in the first layer alone", layered(3, (rd.SHAPES, 3, 0), (rd.SHAPES, 4, 0)))
+valid("layers-shapes-of-last", "shapes in a refinement alone", layered(3, (rules.SHAPES, 1, 0), (rules.SHAPES, 3, 0)))
+valid(
+    "layers-shapes-of-first", "shapes in the first layer alone", layered(3, (rules.SHAPES, 3, 0), (rules.SHAPES, 4, 0))
+)
 valid(
     "layers-learned-first",
     "learned time bases in the first layer: predictions in waves are of all frequencies",
@@ -2056,7 +2089,14 @@ valid(
 valid(
     "layers-still",
     "refinements whose rows are all predictions",
-    layered(scripts={(rd.STEMS, 3): [], (rd.STEMS, 4): [], (rd.REFINED_REST, 3, 0): [], (rd.REFINED_REST, 4, 0): []}),
+    layered(
+        scripts={
+            (rules.STEMS, 3): [],
+            (rules.STEMS, 4): [],
+            (rules.REFINED_REST, 3, 0): [],
+            (rules.REFINED_REST, 4, 0): [],
+        }
+    ),
 )
 valid(
     "layers-beams",
@@ -2074,7 +2114,7 @@ valid(
         ratio=1,
         heads=learned(2) | {3: stems_head(0.5, 1), 4: stems_head(0.5, 1)},
         segments=2,
-        clips=(rd.Clip(2, 1, "a"), rd.Clip(2, 1, "b")),
+        clips=(Clip(2, 1, "a"), Clip(2, 1, "b")),
     ),
 )
 valid("layers-ratio-largest", "Ratio 65535", layered(ratio=65535, heads=learned(1, 2)))
@@ -2083,7 +2123,7 @@ valid(
     "Shift 15: what it takes beyond 30 bits is kept there",
     layered(
         shift=15,
-        scripts={(rd.SHAPES, 1, 0): [2, *row((1 << 20, 0, -(1 << 14)), (0, -(1 << 29), 0)), *row((0, 0, 1)), 0]},
+        scripts={(rules.SHAPES, 1, 0): [2, *row((1 << 20, 0, -(1 << 14)), (0, -(1 << 29), 0)), *row((0, 0, 1)), 0]},
     ),
 )
 valid(
@@ -2091,8 +2131,8 @@ valid(
     "refinements of an exact rest pose",
     layered(
         3,
-        (rd.REFINED_REST, 3, 0),
-        (rd.REFINED_REST, 4, 0),
+        (rules.REFINED_REST, 3, 0),
+        (rules.REFINED_REST, 4, 0),
         rest=exact_rest(FORK, [float(i * i % 7) for i in range(15)], False),
     ),
 )
@@ -2100,12 +2140,12 @@ valid("layers-wide", "binary64 positions", layered(is_float64=True))
 valid(
     "layers-clips",
     "two clips, one of them a loop",
-    layered(clips=(loop(rd.Clip(3, 1, "up"), 0.5, 0.4, 0.3, 0.2, 0.1), rd.Clip(2, 1, "down"))),
+    layered(clips=(loop(Clip(3, 1, "up"), 0.5, 0.4, 0.3, 0.2, 0.1), Clip(2, 1, "down"))),
 )
 valid(
     "layers-periodic",
     "two clips, one of them periodic",
-    layered(clips=(periodic(rd.Clip(3, 1, "up"), 0.5, 0.4, 0.3, 0.2, 0.1), rd.Clip(2, 1, "down"))),
+    layered(clips=(periodic(Clip(3, 1, "up"), 0.5, 0.4, 0.3, 0.2, 0.1), Clip(2, 1, "down"))),
 )
 valid("layers-lossless", "EXACT behind three layers", lossless_layers)
 for level_ in range(5):
@@ -2118,7 +2158,7 @@ valid("rest-of-level-1", "level 1 refines the rest pose, and so do the refinemen
 valid(
     "rest-of-level-1-alone",
     "level 1 refines the rest pose, which the refinements have, too",
-    layered(3, (rd.REFINED_REST, 3, 0), (rd.REFINED_REST, 4, 0), scripts=LEVEL_1_REST),
+    layered(3, (rules.REFINED_REST, 3, 0), (rules.REFINED_REST, 4, 0), scripts=LEVEL_1_REST),
 )
 for level_ in range(4):
     valid(
@@ -2138,7 +2178,7 @@ valid(
     rest_by_level(
         LOOSE_BEAMS,
         42,
-        rest=rest_chunk(write(rd.decode_rest, Chance(47, large=6), branches_of(LOOSE_BEAMS), 1.0), rest_type=1),
+        rest=rest_chunk(write(rules.decode_rest, Chance(47, large=6), branches_of(LOOSE_BEAMS), 1.0), rest_type=1),
         frames=5,
         segments=2,
         is_float64=True,
@@ -2164,7 +2204,9 @@ valid(
     "adaptive rest poses by level",
     rest_by_level(BEAMS[:3], 47, rest=adaptive_rest(BEAMS[:3], Chance(39, large=4), 1.0)),
 )
-valid("rest-of-level-1-still", "the chunk has no bytes in its stream", layered(scripts={(rd.REFINED_REST, 1, 0): []}))
+valid(
+    "rest-of-level-1-still", "the chunk has no bytes in its stream", layered(scripts={(rules.REFINED_REST, 1, 0): []})
+)
 
 # ---- invalid: the header -----------------------------------------------------------------------------------
 
@@ -2211,7 +2253,7 @@ invalid(
     "TRUNCATED",
     "open",
     "ends inside the checksums",
-    lambda: first_bytes(rd.u32(lone().file(), 16) - 1),
+    lambda: first_bytes(rules.u32(lone().file(), 16) - 1),
 )
 header("major-0", "UNSUPPORTED_VERSION", "Major_Version 0: versions before the first", major=0)
 header("major-2", "UNSUPPORTED_VERSION", "Major_Version 2, which is to come", major=2)
@@ -2310,9 +2352,9 @@ header("memory-limit", "LIMIT_EXCEEDED", "2^22 vertices take more than Max_Memor
 # ---- valid: joins ------------------------------------------------------------------------------------------
 
 
-def joins(*widths: float) -> tuple[rd.Join, ...]:
+def joins(*widths: float) -> tuple[Join, ...]:
     """Of each level and segment; a half more where they are sloped."""
-    return tuple(rd.Join(int(width), width % 1 > 0) for width in widths)
+    return tuple(Join(int(width), width % 1 > 0) for width in widths)
 
 
 def joined(stems: list[Stem], seed: int, *widths: float, **fields) -> Plant:
@@ -2353,14 +2395,14 @@ valid(
         FORK,
         110,
         *(3, 2.5, 4, 0, 4.5, 0, 0, 0, 3, 0, 2, 0),
-        clips=(loop(rd.Clip(18, 3, "loop"), 0.0, 0.0, 0.0), rd.Clip(6, 1, "once")),
+        clips=(loop(Clip(18, 3, "loop"), 0.0, 0.0, 0.0), Clip(6, 1, "once")),
     ),
 )
 valid(
     "joins-clips",
     "a loop of two segments behind a clip that is none",
     lambda: joined(
-        FORK, 111, *(0, 2, 3, 4.5) * 3, clips=(rd.Clip(12, 2, "once"), loop(rd.Clip(11, 2, "loop"), 0.0, 0.0, 0.0))
+        FORK, 111, *(0, 2, 3, 4.5) * 3, clips=(Clip(12, 2, "once"), loop(Clip(11, 2, "loop"), 0.0, 0.0, 0.0))
     ),
 )
 valid(
@@ -2371,10 +2413,10 @@ valid(
         112,
         *(0, 4, 0, 4, 0, 3.5),
         scripts={
-            (rd.STEMS, 1): lambda: Chance(1),
-            (rd.STEMS, 2): lambda: Chance(2),
-            (rd.AFFINES, 0): lambda: Chance(3, large=4),
-            (rd.CORRECTIONS, 2): lambda: Chance(4),
+            (rules.STEMS, 1): lambda: Chance(1),
+            (rules.STEMS, 2): lambda: Chance(2),
+            (rules.AFFINES, 0): lambda: Chance(3, large=4),
+            (rules.CORRECTIONS, 2): lambda: Chance(4),
         },
     ),
 )
@@ -2390,7 +2432,7 @@ valid(
         joined(FORK, 114)
         .draft()
         .with_header(level_count=4, full_level_count=4)
-        .add(*(Entry(rd.EXACT, b"", 3, s) for s in range(2))),
+        .add(*(Entry(rules.EXACT, b"", 3, s) for s in range(2))),
         joins=joins(0, 2, 0, 3, 0, 4.5, 0, 0),
     ),
 )
@@ -2399,7 +2441,7 @@ valid(
     "joins-predicted",
     "maps of level 0 before predicted motion",
     lambda: replace(
-        predicted(ROOTED, swayed(5, 116), segments=2, scripts={(rd.AFFINES, 0): lambda: Chance(116, large=4)}),
+        predicted(ROOTED, swayed(5, 116), segments=2, scripts={(rules.AFFINES, 0): lambda: Chance(116, large=4)}),
         joins=joins(0, 3, 0, 0),
     ),
 )
@@ -2439,7 +2481,7 @@ valid(
         FORK,
         127,
         heads=HEADS,
-        clips=(periodic(rd.Clip(6, 1, "loop"), 0.0, 0.0, 0.0), rd.Clip(12, 2, "once")),
+        clips=(periodic(Clip(6, 1, "loop"), 0.0, 0.0, 0.0), Clip(12, 2, "once")),
         repeats=(*TWOS, *(0,) * 6),
     ),
 )
@@ -2456,7 +2498,7 @@ valid(
         moving(FORK, 130, frames=12, repeats=THREES)
         .draft()
         .with_header(level_count=4, full_level_count=4)
-        .add(Entry(rd.EXACT, b"", 3, 0))
+        .add(Entry(rules.EXACT, b"", 3, 0))
     ),
 )
 
@@ -2483,7 +2525,7 @@ invalid(
     "BAD_CHECKSUM",
     "open",
     "a bit of a checksum is flipped",
-    lambda: flipped(lone().file(), rd.u32(lone().file(), 16) - 2),
+    lambda: flipped(lone().file(), rules.u32(lone().file(), 16) - 2),
 )
 invalid(
     "errors-infinite", "BAD_CHUNK_TABLE", "open", "Level_Max_Error is 8160", lambda: error_table(8160, 0, 0, 0, 0, 0)
@@ -2506,7 +2548,7 @@ invalid(
     "open",
     "a loop of one segment is joined to itself",
     lambda: joined(
-        *(FORK, 121, 2, 0, 0, 0, 0, 0), clips=(loop(rd.Clip(9, 1, "loop"), 0.0, 0.0, 0.0), rd.Clip(3, 1, "once"))
+        *(FORK, 121, 2, 0, 0, 0, 0, 0), clips=(loop(Clip(9, 1, "loop"), 0.0, 0.0, 0.0), Clip(3, 1, "once"))
     ).file(),
 )
 for name, reason, widths, repeats in (
@@ -2530,7 +2572,7 @@ invalid(
         joined(FORK, 122)
         .draft()
         .with_header(level_count=4, full_level_count=4)
-        .add(*(Entry(rd.EXACT, b"", 3, s) for s in range(2))),
+        .add(*(Entry(rules.EXACT, b"", 3, s) for s in range(2))),
         joins=joins(0, 0, 0, 0, 0, 0, 0, 2),
     ).file(),
 )
@@ -2616,18 +2658,18 @@ for kind, level, name in (
         f"{name} with the wrong bit 15",
         lambda kind=kind, level=level: fork().add(Entry(kind, b"", level)),
     )
-table("no-level", "BAD_CHUNK_TABLE", "the last CORRECTIONS with Level 255", lambda: moved(rd.CORRECTIONS, level=255))
+table("no-level", "BAD_CHUNK_TABLE", "the last CORRECTIONS with Level 255", lambda: moved(rules.CORRECTIONS, level=255))
 table(
     "level-beyond",
     "BAD_CHUNK_TABLE",
     "a motion chunk of a level that is not stored",
-    lambda: moved(rd.CORRECTIONS, level=3),
+    lambda: moved(rules.CORRECTIONS, level=3),
 )
 table(
     "segment-beyond",
     "BAD_CHUNK_TABLE",
     "a motion chunk of a segment that is not there",
-    lambda: moved(rd.CORRECTIONS, segment=2),
+    lambda: moved(rules.CORRECTIONS, segment=2),
 )
 table(
     "unknown-without-level",
@@ -2648,26 +2690,26 @@ table(
     "order-attributes",
     "BAD_CHUNK_TABLE",
     "ATTRIBUTE before the motion",
-    lambda: inserted(3, Entry(rd.ATTRIBUTE, element("|u1", b"a"))),
+    lambda: inserted(3, Entry(rules.ATTRIBUTE, element("|u1", b"a"))),
 )
 table(
     "order-behind",
     "BAD_CHUNK_TABLE",
     "METADATA behind the motion",
-    lambda: inserted(len(fork().entries), Entry(rd.METADATA, b"\0{}")),
+    lambda: inserted(len(fork().entries), Entry(rules.METADATA, b"\0{}")),
 )
-table("twice-time", "BAD_CHUNK_TABLE", "TIME twice", lambda: fork().add(Entry(rd.TIME, steady_time())))
+table("twice-time", "BAD_CHUNK_TABLE", "TIME twice", lambda: fork().add(Entry(rules.TIME, steady_time())))
 table(
     "twice-metadata",
     "BAD_CHUNK_TABLE",
     "METADATA twice: only kinds from 32 on may repeat",
-    lambda: fork().add(Entry(rd.METADATA, b"\0{}"), Entry(rd.METADATA, b"\0{}")),
+    lambda: fork().add(Entry(rules.METADATA, b"\0{}"), Entry(rules.METADATA, b"\0{}")),
 )
 table(
     "twice-stems",
     "BAD_CHUNK_TABLE",
     "STEMS of a level and segment twice",
-    lambda: fork().add(Entry(rd.STEMS, fork().content(rd.STEMS, 1, 0), 1, 0)),
+    lambda: fork().add(Entry(rules.STEMS, fork().content(rules.STEMS, 1, 0), 1, 0)),
 )
 table(
     "twice-unknown",
@@ -2699,11 +2741,11 @@ table(
     "the Length is checked before the Level",
     lambda: fork().add(Entry(0x8018, b"", length=2**30 - 1)),
 )
-for kind in (rd.HIERARCHY, rd.REST, rd.TIME):
+for kind in (rules.HIERARCHY, rules.REST, rules.TIME):
     table(
-        f"no-{rd.KINDS[kind].lower()}",
+        f"no-{KIND_NAMES[kind].lower()}",
         "BAD_CHUNK_TABLE",
-        f"{rd.KINDS[kind]} is missing",
+        f"{KIND_NAMES[kind]} is missing",
         lambda kind=kind: fork().without(kind),
     )
 table(
@@ -2712,45 +2754,48 @@ table(
     "a file without motion",
     lambda: replace(fork(), entries=fork().entries[:3]),
 )
-table("no-stems", "BAD_CHUNK_TABLE", "STEMS of a segment is missing", lambda: fork().without(rd.STEMS, 2, 1))
+table("no-stems", "BAD_CHUNK_TABLE", "STEMS of a segment is missing", lambda: fork().without(rules.STEMS, 2, 1))
 table(
     "no-affines",
     "BAD_CHUNK_TABLE",
     "AFFINES of level 0 is missing in one segment",
-    lambda: fork().without(rd.AFFINES, 0, 1),
+    lambda: fork().without(rules.AFFINES, 0, 1),
 )
 table(
     "more-stems",
     "BAD_CHUNK_TABLE",
     "STEMS of a level that has no pieces",
-    lambda: fork().add(Entry(rd.STEMS, stems_head(), 0, 0)),
+    lambda: fork().add(Entry(rules.STEMS, stems_head(), 0, 0)),
 )
 table(
     "more-affines",
     "BAD_CHUNK_TABLE",
     "AFFINES of a level without coded nodes",
-    lambda: fork().add(Entry(rd.AFFINES, b"", 1, 0)),
+    lambda: fork().add(Entry(rules.AFFINES, b"", 1, 0)),
 )
 table(
     "more-corrections",
     "BAD_CHUNK_TABLE",
     "CORRECTIONS of a level that is not the last",
-    lambda: fork().add(Entry(rd.CORRECTIONS, struct.pack("<f", 1.0), 1, 0)),
+    lambda: fork().add(Entry(rules.CORRECTIONS, struct.pack("<f", 1.0), 1, 0)),
 )
 table(
     "corrections-of-short-file",
     "BAD_CHUNK_TABLE",
     "CORRECTIONS on the last level of a shortened file",
-    lambda: fork().upto(1).add(Entry(rd.CORRECTIONS, struct.pack("<f", 1.0), 1, 0)),
+    lambda: fork().upto(1).add(Entry(rules.CORRECTIONS, struct.pack("<f", 1.0), 1, 0)),
 )
 table(
-    "more-shapes", "BAD_CHUNK_TABLE", "SHAPES of a level without STEMS", lambda: fork().add(Entry(rd.SHAPES, b"", 0, 0))
+    "more-shapes",
+    "BAD_CHUNK_TABLE",
+    "SHAPES of a level without STEMS",
+    lambda: fork().add(Entry(rules.SHAPES, b"", 0, 0)),
 )
 table(
     "shapes-of-segment-1",
     "BAD_CHUNK_TABLE",
     "SHAPES stands with segment 0",
-    lambda: fork().add(Entry(rd.SHAPES, b"", 1, 1)),
+    lambda: fork().add(Entry(rules.SHAPES, b"", 1, 1)),
 )
 
 # ---- invalid: ends and checksums ---------------------------------------------------------------------------
@@ -2762,7 +2807,7 @@ def cut(short: Callable[[Draft], int], draft: Draft | None = None) -> bytes:
     return draft.file()[: short(draft)]
 
 
-def end_of(draft: Draft, kind: int, level: int = rd.NO_LEVEL, segment: int = 0) -> int:
+def end_of(draft: Draft, kind: int, level: int = NO_LEVEL, segment: int = 0) -> int:
     behind = draft.entries[draft.index(kind, level, segment) + 1 :]
     return len(draft.file()) - sum(len(entry.content) for entry in behind)
 
@@ -2778,22 +2823,22 @@ invalid(
     "TRUNCATED",
     "open",
     "the last byte of TIME is missing",
-    lambda: cut(lambda d: end_of(d, rd.TIME) - 1),
+    lambda: cut(lambda d: end_of(d, rules.TIME) - 1),
 )
-invalid("cut-behind-prelude", "TRUNCATED", 0, "no motion has arrived", lambda: cut(lambda d: end_of(d, rd.TIME)))
+invalid("cut-behind-prelude", "TRUNCATED", 0, "no motion has arrived", lambda: cut(lambda d: end_of(d, rules.TIME)))
 invalid(
     "cut-in-level-0",
     "TRUNCATED",
     0,
     "one segment of level 0 has arrived",
-    lambda: cut(lambda d: end_of(d, rd.AFFINES, 0, 1) - 1),
+    lambda: cut(lambda d: end_of(d, rules.AFFINES, 0, 1) - 1),
 )
 invalid(
     "cut-behind-level-0",
     "TRUNCATED",
     1,
     "level 0 has arrived and plays",
-    lambda: cut(lambda d: end_of(d, rd.AFFINES, 0, 1)),
+    lambda: cut(lambda d: end_of(d, rules.AFFINES, 0, 1)),
 )
 invalid("cut-in-last-level", "TRUNCATED", 2, "the last byte is missing", lambda: cut(lambda d: len(d.file()) - 1))
 invalid(
@@ -2801,7 +2846,7 @@ invalid(
     "TRUNCATED",
     1,
     "STEMS of level 1 is damaged and SHAPES is missing: what is missing comes first",
-    lambda: flipped(cut(lambda d: end_of(d, rd.SHAPES, 1) - 1), end_of(fork(), rd.STEMS, 1) - 1),
+    lambda: flipped(cut(lambda d: end_of(d, rules.SHAPES, 1) - 1), end_of(fork(), rules.STEMS, 1) - 1),
 )
 invalid(
     "cut-in-source-rest",
@@ -2818,20 +2863,20 @@ invalid(
     cut_static,
 )
 
-for kind, item in ((rd.HIERARCHY, "open"), (rd.REST, "open"), (rd.TIME, "open")):
+for kind, item in ((rules.HIERARCHY, "open"), (rules.REST, "open"), (rules.TIME, "open")):
     invalid(
-        f"damaged-{rd.KINDS[kind].lower()}",
+        f"damaged-{KIND_NAMES[kind].lower()}",
         "BAD_CHECKSUM",
         item,
-        f"a bit of {rd.KINDS[kind]} is flipped",
+        f"a bit of {KIND_NAMES[kind]} is flipped",
         lambda kind=kind: flipped(fork().file(), end_of(fork(), kind) - 1),
     )
-for kind, level in ((rd.AFFINES, 0), (rd.STEMS, 1), (rd.SHAPES, 1), (rd.CORRECTIONS, 2)):
+for kind, level in ((rules.AFFINES, 0), (rules.STEMS, 1), (rules.SHAPES, 1), (rules.CORRECTIONS, 2)):
     invalid(
-        f"damaged-{rd.KINDS[kind].lower()}",
+        f"damaged-{KIND_NAMES[kind].lower()}",
         "BAD_CHECKSUM",
         level,
-        f"a bit of {rd.KINDS[kind]} is flipped",
+        f"a bit of {KIND_NAMES[kind]} is flipped",
         lambda kind=kind, level=level: flipped(fork().file(), end_of(fork(), kind, level) - 1),
     )
 invalid(
@@ -2839,35 +2884,35 @@ invalid(
     "BAD_CHECKSUM",
     "static",
     "a bit of METADATA is flipped; the motion plays",
-    lambda: metadata("{}").change(rd.METADATA, checksum=0),
+    lambda: metadata("{}").change(rules.METADATA, checksum=0),
 )
 invalid(
     "damaged-attribute",
     "BAD_CHECKSUM",
     "static",
     "a bit of an attribute is flipped; the motion plays",
-    lambda: attributes(element("|u1", b"1")).change(rd.ATTRIBUTE, checksum=0),
+    lambda: attributes(element("|u1", b"1")).change(rules.ATTRIBUTE, checksum=0),
 )
 invalid(
     "damaged-before-table",
     "BAD_CHECKSUM",
     "open",
     "HIERARCHY is damaged and STEMS is missing: HIERARCHY comes first",
-    lambda: fork().without(rd.STEMS, 2, 1).change(rd.HIERARCHY, checksum=0),
+    lambda: fork().without(rules.STEMS, 2, 1).change(rules.HIERARCHY, checksum=0),
 )
 invalid(
     "hierarchy-before-rest",
     "BAD_CHUNK",
     "open",
     "HIERARCHY is not valid and REST is damaged: HIERARCHY comes first",
-    lambda: fork().change(rd.HIERARCHY, content=b"").change(rd.REST, checksum=0),
+    lambda: fork().change(rules.HIERARCHY, content=b"").change(rules.REST, checksum=0),
 )
 invalid(
     "table-before-rest",
     "BAD_CHUNK_TABLE",
     "open",
     "STEMS is missing and REST is damaged: the table comes first",
-    lambda: fork().without(rd.STEMS, 2, 1).change(rd.REST, checksum=0),
+    lambda: fork().without(rules.STEMS, 2, 1).change(rules.REST, checksum=0),
 )
 
 # ---- invalid: the prelude's chunks -------------------------------------------------------------------------
@@ -2877,41 +2922,43 @@ def prelude(name: str, kind: int, reason: str, content: bytes | Callable[[], byt
     def make() -> Draft:
         return fork().change(kind, content=content() if callable(content) else content)
 
-    invalid(f"{rd.KINDS[kind].lower()}-{name}", error, "open", reason, make)
+    invalid(f"{KIND_NAMES[kind].lower()}-{name}", error, "open", reason, make)
 
 
 def hierarchy(name: str, reason: str, stems: list[Stem], **sources) -> None:
     """Written for the five vertices and two branches of the fork, or as many branches as there are."""
 
     def make() -> Draft:
-        stream = write(rd.decode_hierarchy, hierarchy_script(stems, **sources), len(stems), 5)
-        return fork().with_header(branch_count=len(stems)).change(rd.HIERARCHY, content=hierarchy_chunk(stream))
+        stream = write(rules.decode_hierarchy, hierarchy_script(stems, **sources), len(stems), 5)
+        return fork().with_header(branch_count=len(stems)).change(rules.HIERARCHY, content=hierarchy_chunk(stream))
 
     invalid(f"hierarchy-{name}", "BAD_CHUNK", "open", reason, make)
 
 
 def corrupted_hierarchy(**fields) -> bytes:
-    return hierarchy_chunk(fork().content(rd.HIERARCHY)[8:], **fields)
+    return hierarchy_chunk(fork().content(rules.HIERARCHY)[8:], **fields)
 
 
-prelude("empty", rd.HIERARCHY, "no bytes", b"")
-prelude("short", rd.HIERARCHY, "7 bytes", bytes(7))
+prelude("empty", rules.HIERARCHY, "no bytes", b"")
+prelude("short", rules.HIERARCHY, "7 bytes", bytes(7))
 for field_name in ("epsilon", "xi"):
-    for what, value in (("infinite", rd.SHORT_FLOATS), ("largest", 65535)):
+    for what, value in (("infinite", rules.SHORT_FLOATS), ("largest", 65535)):
         prelude(
             f"{field_name}-{what}",
-            rd.HIERARCHY,
+            rules.HIERARCHY,
             f"{field_name.capitalize()} is {value}",
             lambda field_name=field_name, value=value: corrupted_hierarchy(**{field_name: value}),
         )
-prelude("zero-behind", rd.HIERARCHY, "a zero byte behind the stream", lambda: corrupted_hierarchy() + b"\0")
-prelude("bytes-behind", rd.HIERARCHY, "bytes behind the stream", lambda: corrupted_hierarchy() + b"\1" * 12)
+prelude("zero-behind", rules.HIERARCHY, "a zero byte behind the stream", lambda: corrupted_hierarchy() + b"\0")
+prelude("bytes-behind", rules.HIERARCHY, "bytes behind the stream", lambda: corrupted_hierarchy() + b"\1" * 12)
 invalid(
     "hierarchy-above-root",
     "BAD_CHUNK",
     "open",
     "a parent above the root",
-    lambda: fork().change(rd.HIERARCHY, content=hierarchy_chunk(write(rd.decode_hierarchy, [2, 0, 0, 0, 1, 2], 2, 5))),
+    lambda: fork().change(
+        rules.HIERARCHY, content=hierarchy_chunk(write(rules.decode_hierarchy, [2, 0, 0, 0, 1, 2], 2, 5))
+    ),
 )
 hierarchy("too-many-vertices", "stems have more vertices than the file", [Stem(-1, 4), Stem(0, 3)])
 hierarchy("too-few-vertices", "stems have fewer vertices than the file", [Stem(-1, 3), Stem(0, 1)])
@@ -2981,7 +3028,7 @@ def adaptive_fork() -> bytes:
 
 
 def corrupted_rest(**fields) -> bytes:
-    return rest_chunk(fork().content(rd.REST)[17:], **fields)
+    return rest_chunk(fork().content(rules.REST)[17:], **fields)
 
 
 def exact_of_fork(numbers_: list, is_float64: bool, **fields) -> bytes:
@@ -2989,17 +3036,20 @@ def exact_of_fork(numbers_: list, is_float64: bool, **fields) -> bytes:
 
 
 INFINITE_BITS = {False: (0xFF << 23, False), True: (0x7FF << 52, False)}  # how far infinity is from 0.0
-prelude("empty", rd.REST, "no bytes", b"")
-prelude("short", rd.REST, "16 bytes", lambda: corrupted_rest()[:16])
+prelude("empty", rules.REST, "no bytes", b"")
+prelude("short", rules.REST, "16 bytes", lambda: corrupted_rest()[:16])
 for bit in (0, 2, 3, 4, 5):
     prelude(
-        f"method-{bit}", rd.REST, f"bit {bit + 2} of Method is set", lambda bit=bit: corrupted_rest(reserved=1 << bit)
+        f"method-{bit}",
+        rules.REST,
+        f"bit {bit + 2} of Method is set",
+        lambda bit=bit: corrupted_rest(reserved=1 << bit),
     )
 prelude(
     "exact-and-adaptive",
-    rd.REST,
+    rules.REST,
     "Method has Is_Exact and Is_Adaptive",
-    lambda: exact_rest(FORK, [0.5] * 15, False, reserved=rd.REST_ADAPTIVE >> 2),
+    lambda: exact_rest(FORK, [0.5] * 15, False, reserved=REST_ADAPTIVE >> 2),
 )
 for name_, seed_, title_ in (
     ("rest-copies-of-no-shape", 2, "a copy of a shape that is not there"),
@@ -3014,7 +3064,7 @@ for name_, seed_, title_ in (
         lambda seed_=seed_: (
             with_rest(COPIED, adaptive_rest(COPIED, Chance(2364, large=3)))
             .draft()
-            .change(rd.REST, content=adaptive_rest(COPIED, Chance(seed_, large=3)))
+            .change(rules.REST, content=adaptive_rest(COPIED, Chance(seed_, large=3)))
         ),
     )
 invalid(
@@ -3036,38 +3086,44 @@ for what, content in (
         "open",
         f"a rest pose by faces that do not serve it: {what}",
         lambda content=content: (
-            with_rest(FORK, adaptive_rest(FORK, [], connected=True)).draft().add(Entry(rd.FACES, content()))
+            with_rest(FORK, adaptive_rest(FORK, [], connected=True)).draft().add(Entry(rules.FACES, content()))
         ),
     )
-prelude("adaptive-zero-behind", rd.REST, "a zero byte behind an adaptive rest pose", lambda: adaptive_fork() + b"\0")
-prelude("adaptive-bytes-behind", rd.REST, "bytes behind an adaptive rest pose", lambda: adaptive_fork() + b"\1" * 12)
+prelude("adaptive-zero-behind", rules.REST, "a zero byte behind an adaptive rest pose", lambda: adaptive_fork() + b"\0")
+prelude("adaptive-bytes-behind", rules.REST, "bytes behind an adaptive rest pose", lambda: adaptive_fork() + b"\1" * 12)
 for what, value in (("nan", NAN), ("infinite", -INFINITY)):
     prelude(
-        f"origin-{what}", rd.REST, f"Origin has {value}", lambda value=value: corrupted_rest(origin=(0.0, 0.0, value))
+        f"origin-{what}",
+        rules.REST,
+        f"Origin has {value}",
+        lambda value=value: corrupted_rest(origin=(0.0, 0.0, value)),
     )
 for what, value in (("zero", 0.0), ("negative", -1.0), ("nan", NAN), ("infinite", INFINITY)):
-    prelude(f"step-{what}", rd.REST, f"Rest_Step is {value}", lambda value=value: corrupted_rest(step=value))
+    prelude(f"step-{what}", rules.REST, f"Rest_Step is {value}", lambda value=value: corrupted_rest(step=value))
 prelude(
     "step-of-exact",
-    rd.REST,
+    rules.REST,
     "Rest_Step is 0 with Method 1, where it has no meaning",
     lambda: exact_of_fork([0.0] * 15, False, step=0.0),
 )
-prelude("zero-behind", rd.REST, "a zero byte behind the stream", lambda: corrupted_rest() + b"\0")
-prelude("bytes-behind", rd.REST, "bytes behind the stream", lambda: corrupted_rest() + b"\1" * 12)
+prelude("zero-behind", rules.REST, "a zero byte behind the stream", lambda: corrupted_rest() + b"\0")
+prelude("bytes-behind", rules.REST, "bytes behind the stream", lambda: corrupted_rest() + b"\1" * 12)
 prelude(
-    "exact-infinite", rd.REST, "an infinite binary32 number", lambda: exact_of_fork([0.0, INFINITE_BITS[False]], False)
+    "exact-infinite",
+    rules.REST,
+    "an infinite binary32 number",
+    lambda: exact_of_fork([0.0, INFINITE_BITS[False]], False),
 )
 prelude(
     "exact-wide-infinite",
-    rd.REST,
+    rules.REST,
     "an infinite binary64 number",
     lambda: exact_of_fork([0.0, INFINITE_BITS[True]], True),
 )
-prelude("exact-nan", rd.REST, "a number that is NaN", lambda: exact_of_fork([((0xFF << 23) + 1, False)], False))
+prelude("exact-nan", rules.REST, "a number that is NaN", lambda: exact_of_fork([((0xFF << 23) + 1, False)], False))
 prelude(
     "exact-zero-behind",
-    rd.REST,
+    rules.REST,
     "a zero byte behind the stream of exact numbers",
     lambda: exact_of_fork([0.5] * 15, False) + b"\0",
 )
@@ -3079,7 +3135,7 @@ invalid(
     lambda: (
         with_rest([Stem(-1, 3, lag=0)], coded_rest([Stem(-1, 3, lag=0)], []))
         .draft()
-        .change(rd.REST, content=coded_rest([Stem(-1, 3, lag=0)], [0, 0, 0, 3]))
+        .change(rules.REST, content=coded_rest([Stem(-1, 3, lag=0)], [0, 0, 0, 3]))
     ),
 )
 
@@ -3128,7 +3184,7 @@ invalid(
     "BAD_CHECKSUM",
     "rest",
     "a bit of SOURCE_REST is flipped",
-    lambda: forked(source_rest=bent(FORK, Chance(206))).draft().change(rd.SOURCE_REST, checksum=0),
+    lambda: forked(source_rest=bent(FORK, Chance(206))).draft().change(rules.SOURCE_REST, checksum=0),
 )
 
 
@@ -3136,48 +3192,53 @@ def steady(first: float, step: float, method: int = 0) -> Callable[[], bytes]:
     return lambda: steady_time(first, step, method)
 
 
-prelude("empty", rd.TIME, "no bytes", b"")
-prelude("method-5", rd.TIME, "Method 5", lambda: whole_rates(1, method=5))
+prelude("empty", rules.TIME, "no bytes", b"")
+prelude("method-5", rules.TIME, "Method 5", lambda: whole_rates(1, method=5))
 for method in (3, 4):
     prelude(
-        f"whole-{method}-0", rd.TIME, f"Rate 0 of Method {method}", lambda method=method: whole_rates(0, method=method)
+        f"whole-{method}-0",
+        rules.TIME,
+        f"Rate 0 of Method {method}",
+        lambda method=method: whole_rates(0, method=method),
     )
-prelude("whole-short", rd.TIME, "half of Rate", lambda: whole_rates(2)[:2])
-prelude("whole-long", rd.TIME, "two Rates of one clip", lambda: whole_rates(2, 2))
-prelude("short", rd.TIME, "First and half of Step", lambda: steady_time()[:13])
-prelude("long", rd.TIME, "a byte behind Step", lambda: steady_time() + b"\0")
+prelude("whole-short", rules.TIME, "half of Rate", lambda: whole_rates(2)[:2])
+prelude("whole-long", rules.TIME, "two Rates of one clip", lambda: whole_rates(2, 2))
+prelude("short", rules.TIME, "First and half of Step", lambda: steady_time()[:13])
+prelude("long", rules.TIME, "a byte behind Step", lambda: steady_time() + b"\0")
 for what, value in (("zero", 0.0), ("negative", -1.0), ("nan", NAN), ("infinite", INFINITY)):
-    prelude(f"step-{what}", rd.TIME, f"Step is {value}", steady(0.0, value))
-    prelude(f"rate-{what}", rd.TIME, f"Step of Method 1 is {value}", steady(0.0, value, 1))
-prelude("first-nan", rd.TIME, "First is NaN", steady(NAN, 1.0))
-prelude("first-infinite", rd.TIME, "First is infinite", steady(-INFINITY, 1.0))
-prelude("stands-still", rd.TIME, "Step vanishes beside First", steady(1e30, 1.0))
-prelude("overflows", rd.TIME, "times beyond binary64", steady(0.0, HIGHEST))
-prelude("rate-overflows", rd.TIME, "a rate so low that times are infinite", steady(0.0, TINY, 1))
-prelude("equal", rd.TIME, "a time twice", lambda: uneven_time(0.0, 1.0, 1.0, 2.0))
-prelude("descends", rd.TIME, "a time before the one before", lambda: uneven_time(0.0, 1.0, 2.0, 1.5))
-prelude("zeros", rd.TIME, "-0.0 is not before 0.0", lambda: uneven_time(-0.0, 0.0, 1.0, 2.0))
+    prelude(f"step-{what}", rules.TIME, f"Step is {value}", steady(0.0, value))
+    prelude(f"rate-{what}", rules.TIME, f"Step of Method 1 is {value}", steady(0.0, value, 1))
+prelude("first-nan", rules.TIME, "First is NaN", steady(NAN, 1.0))
+prelude("first-infinite", rules.TIME, "First is infinite", steady(-INFINITY, 1.0))
+prelude("stands-still", rules.TIME, "Step vanishes beside First", steady(1e30, 1.0))
+prelude("overflows", rules.TIME, "times beyond binary64", steady(0.0, HIGHEST))
+prelude("rate-overflows", rules.TIME, "a rate so low that times are infinite", steady(0.0, TINY, 1))
+prelude("equal", rules.TIME, "a time twice", lambda: uneven_time(0.0, 1.0, 1.0, 2.0))
+prelude("descends", rules.TIME, "a time before the one before", lambda: uneven_time(0.0, 1.0, 2.0, 1.5))
+prelude("zeros", rules.TIME, "-0.0 is not before 0.0", lambda: uneven_time(-0.0, 0.0, 1.0, 2.0))
 prelude(
     "infinite",
-    rd.TIME,
+    rules.TIME,
     "an infinite time at the end",
-    lambda: uneven_time(0.0, 1.0, 2.0, (rd.ordered(0x7FF << 52, 64) - rd.ordered(rd.to_bits(3.0, 64), 64), False)),
+    lambda: uneven_time(
+        0.0, 1.0, 2.0, (rules.ordered(0x7FF << 52, 64) - rules.ordered(rules.to_bits(3.0, 64), 64), False)
+    ),
 )
-prelude("zero-behind", rd.TIME, "a zero byte behind the stream", lambda: uneven_time(0.0, 1.0, 2.5, 3.0) + b"\0")
-prelude("bytes-behind", rd.TIME, "bytes behind the stream", lambda: uneven_time(0.0, 1.0, 2.5, 3.0) + b"\1" * 12)
+prelude("zero-behind", rules.TIME, "a zero byte behind the stream", lambda: uneven_time(0.0, 1.0, 2.5, 3.0) + b"\0")
+prelude("bytes-behind", rules.TIME, "bytes behind the stream", lambda: uneven_time(0.0, 1.0, 2.5, 3.0) + b"\1" * 12)
 invalid(
     "time-code-outside",
     "BAD_CHUNK",
     "open",
     "a stream whose code is outside the final interval",
-    lambda: lone().draft().change(rd.TIME, content=b"\2" + b"\xff" * 8),
+    lambda: lone().draft().change(rules.TIME, content=b"\2" + b"\xff" * 8),
 )
 invalid(
     "time-of-one-infinite",
     "BAD_CHUNK",
     "open",
     "First of a single frame is infinite",
-    lambda: lone().draft().change(rd.TIME, content=steady_time(INFINITY)),
+    lambda: lone().draft().change(rules.TIME, content=steady_time(INFINITY)),
 )
 
 # ---- invalid: clips ----------------------------------------------------------------------------------------
@@ -3192,17 +3253,17 @@ def clips(name: str, reason: str, *entries: bytes, count: int = 2) -> None:
         "BAD_CHUNK",
         "open",
         reason,
-        lambda: two_clips().with_header(clip_count=count).change(rd.CLIPS, content=b"".join(entries)),
+        lambda: two_clips().with_header(clip_count=count).change(rules.CLIPS, content=b"".join(entries)),
     )
 
 
 def lone_clips(frames: int, segments: int, *entries: bytes, **header_fields) -> Draft:
     """One vertex, and any CLIPS."""
-    draft = lone(frames=frames, segments=segments).draft().add(Entry(rd.CLIPS, b"".join(entries)))
+    draft = lone(frames=frames, segments=segments).draft().add(Entry(rules.CLIPS, b"".join(entries)))
     return draft.with_header(clip_count=len(entries), **header_fields)
 
 
-invalid("clips-missing", "BAD_CHUNK_TABLE", "open", "two clips and no CLIPS", lambda: two_clips().without(rd.CLIPS))
+invalid("clips-missing", "BAD_CHUNK_TABLE", "open", "two clips and no CLIPS", lambda: two_clips().without(rules.CLIPS))
 clips("empty", "no bytes")
 clips("cut-in-entry", "ends inside the fields of the first clip", CALM_ENTRY[:9])
 clips("cut-before-name", "ends before the Name of the first clip", CALM_ENTRY[:10])
@@ -3317,18 +3378,18 @@ invalid(
     lambda: two_clips(clips=(CALM, loop(STORM, 1.0, 1.0, NAN))).upto(0),
 )
 
-table("twice-clips", "BAD_CHUNK_TABLE", "CLIPS twice", lambda: two_clips().add(Entry(rd.CLIPS, CALM_ENTRY)))
+table("twice-clips", "BAD_CHUNK_TABLE", "CLIPS twice", lambda: two_clips().add(Entry(rules.CLIPS, CALM_ENTRY)))
 table(
     "order-clips",
     "BAD_CHUNK_TABLE",
     "METADATA behind CLIPS",
-    lambda: inserted(3, Entry(rd.CLIPS, clip_entry(4, 2)), Entry(rd.METADATA, b"\0{}")),
+    lambda: inserted(3, Entry(rules.CLIPS, clip_entry(4, 2)), Entry(rules.METADATA, b"\0{}")),
 )
 table(
     "order-clips-motion",
     "BAD_CHUNK_TABLE",
     "CLIPS behind the first motion chunk",
-    lambda: inserted(4, Entry(rd.CLIPS, clip_entry(4, 2))),
+    lambda: inserted(4, Entry(rules.CLIPS, clip_entry(4, 2))),
 )
 
 invalid(
@@ -3336,42 +3397,42 @@ invalid(
     "BAD_CHECKSUM",
     "open",
     "a bit of CLIPS is flipped",
-    lambda: flipped(two_clips().file(), end_of(two_clips(), rd.CLIPS) - 1),
+    lambda: flipped(two_clips().file(), end_of(two_clips(), rules.CLIPS) - 1),
 )
 invalid(
     "clips-cut",
     "TRUNCATED",
     "open",
     "the file ends inside CLIPS",
-    lambda: two_clips().file()[: end_of(two_clips(), rd.CLIPS) - 1],
+    lambda: two_clips().file()[: end_of(two_clips(), rules.CLIPS) - 1],
 )
 invalid(
     "clips-cut-in-motion",
     "TRUNCATED",
     0,
     "level 0 of the first clip alone has arrived",
-    lambda: two_clips().file()[: end_of(two_clips(), rd.AFFINES, 0, 0)],
+    lambda: two_clips().file()[: end_of(two_clips(), rules.AFFINES, 0, 0)],
 )
 invalid(
     "clips-before-hierarchy",
     "BAD_CHUNK",
     "open",
     "CLIPS is not valid and HIERARCHY is damaged: CLIPS comes first",
-    lambda: two_clips().change(rd.CLIPS, content=CALM_ENTRY).change(rd.HIERARCHY, checksum=0),
+    lambda: two_clips().change(rules.CLIPS, content=CALM_ENTRY).change(rules.HIERARCHY, checksum=0),
 )
 invalid(
     "clips-missing-before-hierarchy",
     "BAD_CHUNK_TABLE",
     "open",
     "CLIPS is missing and HIERARCHY is damaged: CLIPS comes first",
-    lambda: two_clips().without(rd.CLIPS).change(rd.HIERARCHY, checksum=0),
+    lambda: two_clips().without(rules.CLIPS).change(rules.HIERARCHY, checksum=0),
 )
 invalid(
     "clips-damaged-before-hierarchy",
     "BAD_CHECKSUM",
     "open",
     "CLIPS is damaged and HIERARCHY is missing: CLIPS comes first",
-    lambda: two_clips().without(rd.HIERARCHY).change(rd.CLIPS, checksum=0),
+    lambda: two_clips().without(rules.HIERARCHY).change(rules.CLIPS, checksum=0),
 )
 invalid(
     "clips-before-levels",
@@ -3400,7 +3461,7 @@ invalid(
     "BAD_CHECKSUM",
     "open",
     "CLIPS is damaged, and its longest segment takes too much memory",
-    lambda: lone_clips(258, 3, *UNEVEN, vertex_count=1 << 18).change(rd.CLIPS, checksum=0),
+    lambda: lone_clips(258, 3, *UNEVEN, vertex_count=1 << 18).change(rules.CLIPS, checksum=0),
 )
 invalid(
     "clips-memory-of-mean",
@@ -3413,7 +3474,7 @@ invalid(
 
 def clip_times(name: str, reason: str, make: Callable[[], bytes]) -> None:
     """TIME of the two clips."""
-    invalid(f"time-{name}", "BAD_CHUNK", "open", reason, lambda: two_clips().change(rd.TIME, content=make()))
+    invalid(f"time-{name}", "BAD_CHUNK", "open", reason, lambda: two_clips().change(rules.TIME, content=make()))
 
 
 STEADY = (0.0, 0.25)
@@ -3427,7 +3488,7 @@ invalid(
     "BAD_CHUNK",
     "open",
     "First and Step of two clips where one is",
-    lambda: lone().draft().change(rd.TIME, content=steady_times(STEADY, STEADY)),
+    lambda: lone().draft().change(rules.TIME, content=steady_times(STEADY, STEADY)),
 )
 for what, value in (("zero", 0.0), ("negative", -1.0), ("nan", NAN), ("infinite", INFINITY)):
     clip_times(
@@ -3471,39 +3532,41 @@ def motion(
     def make() -> Draft:
         return fork().change(kind, level, segment, content=content() if callable(content) else content)
 
-    invalid(f"{rd.KINDS[kind].lower()}-{name}", "BAD_CHUNK", level, reason, make)
+    invalid(f"{KIND_NAMES[kind].lower()}-{name}", "BAD_CHUNK", level, reason, make)
 
 
 def stems(*head, **fields) -> Callable[[], bytes]:
     """STEMS of level 1 with another head."""
-    return lambda: stems_head(*head, **fields) + fork().content(rd.STEMS, 1, 0)[6:]
+    return lambda: stems_head(*head, **fields) + fork().content(rules.STEMS, 1, 0)[6:]
 
 
 def basis(rank: int, bits: int, stream: bytes) -> Callable[[], bytes]:
     return lambda: stems_head(0.5, 0, bits, rank, stream)
 
 
-motion("empty", rd.STEMS, 1, "no bytes", b"")
-motion("short", rd.STEMS, 1, "5 bytes", bytes(5))
+motion("empty", rules.STEMS, 1, "no bytes", b"")
+motion("short", rules.STEMS, 1, "5 bytes", bytes(5))
 for what, value in (("zero", 0.0), ("negative", -1.0), ("nan", NAN), ("infinite", INFINITY)):
-    motion(f"step-{what}", rd.STEMS, 1, f"Step is {value}", stems(value))
-motion("rotation-5", rd.STEMS, 1, "Rotation 5", stems(0.5, 5))
-motion("rotation-tips-5", rd.STEMS, 1, "Only_Tips and Rotation 5", stems(0.5, 13))
-motion("rotation-turn-5", rd.STEMS, 1, "Turn 1 and Rotation 5", stems(0.5, 21))
-motion("bits-7", rd.STEMS, 1, "Basis_Bits 7", basis(1, 7, basis_stream([[0, 0]], 8)))
-motion("bits-17", rd.STEMS, 1, "Basis_Bits 17", basis(1, 17, basis_stream([[0, 0]], 8)))
-motion("rank-0", rd.STEMS, 1, "Basis_Rank 0 though there is a basis", basis(0, 8, b""))
+    motion(f"step-{what}", rules.STEMS, 1, f"Step is {value}", stems(value))
+motion("rotation-5", rules.STEMS, 1, "Rotation 5", stems(0.5, 5))
+motion("rotation-tips-5", rules.STEMS, 1, "Only_Tips and Rotation 5", stems(0.5, 13))
+motion("rotation-turn-5", rules.STEMS, 1, "Turn 1 and Rotation 5", stems(0.5, 21))
+motion("bits-7", rules.STEMS, 1, "Basis_Bits 7", basis(1, 7, basis_stream([[0, 0]], 8)))
+motion("bits-17", rules.STEMS, 1, "Basis_Bits 17", basis(1, 17, basis_stream([[0, 0]], 8)))
+motion("rank-0", rules.STEMS, 1, "Basis_Rank 0 though there is a basis", basis(0, 8, b""))
 motion(
     "rank-more-than-frames",
-    rd.STEMS,
+    rules.STEMS,
     1,
     "Basis_Rank 3 in a segment of two frames",
     basis(3, 8, basis_stream([[0, 0]] * 3, 8)),
 )
-motion("basis-length-missing", rd.STEMS, 1, "the chunk ends inside Basis_Length", lambda: stems_head(0.5, 0, 8, 1)[:11])
+motion(
+    "basis-length-missing", rules.STEMS, 1, "the chunk ends inside Basis_Length", lambda: stems_head(0.5, 0, 8, 1)[:11]
+)
 motion(
     "basis-length-more",
-    rd.STEMS,
+    rules.STEMS,
     1,
     "Basis_Length is more than the chunk holds",
     lambda: struct.pack("<fBBHBI", 0.5, 0, 8, 1, 255, 100) + basis_stream([[1, 2]], 8),
@@ -3515,7 +3578,12 @@ for name, level, reason, base in (
     ("missing", 2, "Basis_Level is a level without STEMS", 0),
 ):
     motion(
-        f"basis-level-{name}", rd.STEMS, level, reason, lambda base=base: stems_head(0.5, 0, 8, 1, base=base), segment=1
+        f"basis-level-{name}",
+        rules.STEMS,
+        level,
+        reason,
+        lambda base=base: stems_head(0.5, 0, 8, 1, base=base),
+        segment=1,
     )
 invalid(
     "stems-basis-level-rank",
@@ -3525,24 +3593,24 @@ invalid(
     lambda: (
         forked(heads={1: stems_head(0.5, 0, 8, 2, basis_stream([[1, 2], [3, 4]], 8))})
         .draft()
-        .change(rd.STEMS, 2, 0, content=stems_head(0.5, 0, 8, 1, base=1))
+        .change(rules.STEMS, 2, 0, content=stems_head(0.5, 0, 8, 1, base=1))
     ),
 )
 motion(
     "basis-beyond-1",
-    rd.STEMS,
+    rules.STEMS,
     1,
     "an entry of a learned basis of 8 bits is 129",
     basis(1, 8, basis_stream([[128, 129]], 8)),
 )
 motion(
     "basis-below-1",
-    rd.STEMS,
+    rules.STEMS,
     1,
     "an entry of a learned basis of 8 bits is -129",
     basis(1, 8, basis_stream([[-129, 0]], 8)),
 )
-motion("bits-3", rd.STEMS, 1, "Basis_Bits 3", basis(1, 3, basis_stream([[0, 0]], 8)))
+motion("bits-3", rules.STEMS, 1, "Basis_Bits 3", basis(1, 3, basis_stream([[0, 0]], 8)))
 for name, reason, exponents in (
     ("change", "an exponent of a row of a basis changes by 401", (-200, 401)),
     ("high", "an exponent of a row of a basis is 201", (201, 0)),
@@ -3550,83 +3618,100 @@ for name, reason, exponents in (
 ):
     motion(
         f"basis-exponent-{name}",
-        rd.STEMS,
+        rules.STEMS,
         1,
         reason,
         lambda exponents=exponents: basis(2, 2, basis_in_waves(2, *exponents, *row((1, 1, 0)), rank=2))(),
     )
 motion(
     "basis-in-waves-frequencies",
-    rd.STEMS,
+    rules.STEMS,
     1,
     "a row of a basis codes three frequencies of two frames",
     lambda: basis(1, 2, basis_in_waves(2, 0, *row((1, 0, 0), (1, 0, 0), (1, 0, 0)), rank=1))(),
 )
 motion(
     "basis-in-waves-zero-behind",
-    rd.STEMS,
+    rules.STEMS,
     1,
     "a zero byte behind the stream of a basis in waves",
     lambda: basis(1, 2, basis_in_waves(2, 0, *row((1, 0, 0)), rank=1) + b"\0")(),
 )
 motion(
     "basis-zero-behind",
-    rd.STEMS,
+    rules.STEMS,
     1,
     "a zero byte behind the stream of a basis",
     basis(1, 8, basis_stream([[1, 2]], 8) + b"\0"),
 )
 motion(
     "frequencies",
-    rd.STEMS,
+    rules.STEMS,
     1,
     "a row codes three frequencies of two",
-    lambda: stems_head() + write(rd.decode_stems, [3], forked_plan(), stems_motion(stems_head(), 2), 1),
+    lambda: stems_head() + write(rules.decode_stems, [3], forked_plan(), stems_motion(stems_head(), 2), 1),
 )
 motion(
     "frequencies-of-basis",
-    rd.STEMS,
+    rules.STEMS,
     1,
     "a row codes two frequencies of a learned basis of rank 1",
     lambda: (
         basis(1, 8, basis_stream([[1, 2]], 8))()
-        + write(rd.decode_stems, [2], forked_plan(), stems_motion(basis(1, 8, basis_stream([[1, 2]], 8))(), 2), 1)
+        + write(rules.decode_stems, [2], forked_plan(), stems_motion(basis(1, 8, basis_stream([[1, 2]], 8))(), 2), 1)
     ),
 )
-motion("zero-behind", rd.STEMS, 1, "a zero byte behind the stream", lambda: fork().content(rd.STEMS, 1, 0) + b"\0")
+motion(
+    "zero-behind", rules.STEMS, 1, "a zero byte behind the stream", lambda: fork().content(rules.STEMS, 1, 0) + b"\0"
+)
 motion(
     "bytes-behind",
-    rd.STEMS,
+    rules.STEMS,
     2,
     "bytes behind the stream of the second segment",
-    lambda: fork().content(rd.STEMS, 2, 1) + b"\1" * 12,
+    lambda: fork().content(rules.STEMS, 2, 1) + b"\1" * 12,
     1,
 )
 
 
-def forked_plan() -> rd.Plan:
+def forked_plan():
     plant = forked()
     plant.draft()
     return plant.plan
 
 
-def stems_motion(head: bytes, frames: int) -> rd.Motion:
-    made = rd.Motion(frames, False)
-    rd.read_stems_head(head, made, 1)
+def stems_motion(head: bytes, frames: int):
+    made = rules.no_motion(forked_plan(), frames, False)
+    rules.read_stems_head(head, made, 1)
     return made
 
 
 def affines(*script) -> Callable[[], bytes]:
-    return lambda: write(rd.decode_affines, list(script), forked_plan(), rd.Motion(2, False), 0)
+    def make() -> bytes:
+        plan = forked_plan()
+        return write(rules.decode_affines, list(script), plan, rules.no_motion(plan, 2, False), 0)
+
+    return make
 
 
-motion("step-beyond", rd.AFFINES, 0, "the step of a map is 2^100.5", affines(201))
-motion("step-below", rd.AFFINES, 0, "the step of a map is 2^-100.5", affines(-201))
-motion("frequencies", rd.AFFINES, 0, "a row codes three frequencies of two frames", affines(0, 3))
+motion("step-beyond", rules.AFFINES, 0, "the step of a map is 2^100.5", affines(201))
+motion("step-below", rules.AFFINES, 0, "the step of a map is 2^-100.5", affines(-201))
+motion("frequencies", rules.AFFINES, 0, "a row codes three frequencies of two frames", affines(0, 3))
 motion(
-    "zero-behind", rd.AFFINES, 0, "a zero byte behind the stream", lambda: fork().content(rd.AFFINES, 0, 1) + b"\0", 1
+    "zero-behind",
+    rules.AFFINES,
+    0,
+    "a zero byte behind the stream",
+    lambda: fork().content(rules.AFFINES, 0, 1) + b"\0",
+    1,
 )
-motion("bytes-behind", rd.AFFINES, 0, "bytes behind the stream", lambda: fork().content(rd.AFFINES, 0, 0) + b"\1" * 12)
+motion(
+    "bytes-behind",
+    rules.AFFINES,
+    0,
+    "bytes behind the stream",
+    lambda: fork().content(rules.AFFINES, 0, 0) + b"\1" * 12,
+)
 invalid(
     "affines-change",
     "BAD_CHUNK",
@@ -3635,22 +3720,28 @@ invalid(
     lambda: Plant(
         [Stem(-1, 2), Stem(0, 1, 1), Stem(-1, 2), Stem(2, 1, 1)],
         points=[[0.0] * 3] * 6,
-        scripts={(rd.AFFINES, 0): [200, 0, -401]},
+        scripts={(rules.AFFINES, 0): [200, 0, -401]},
     ),
 )
 
 
 def shapes(*script) -> Callable[[], bytes]:
-    return lambda: write(rd.decode_shapes, list(script), forked_plan(), rd.Motion(1, False), 1)
+    def make() -> bytes:
+        plan = forked_plan()
+        return write(rules.decode_shapes, list(script), plan, rules.no_motion(plan, 1, False), 1)
+
+    return make
 
 
-motion("too-many", rd.SHAPES, 1, "a piece of three modes has ten shapes", shapes(10))
-motion("too-many-of-base", rd.SHAPES, 1, "a piece whose base level has two modes has seven shapes there", shapes(0, 7))
-motion("all-zero", rd.SHAPES, 1, "a shape is all 0", shapes(1, *row((0, 0, 0))))
-motion("empty-row", rd.SHAPES, 1, "a shape whose row is empty", shapes(1, 0))
-motion("modes", rd.SHAPES, 1, "a shape has numbers for four modes of three", shapes(1, 4))
-motion("zero-behind", rd.SHAPES, 1, "a zero byte behind the stream", lambda: fork().content(rd.SHAPES, 1) + b"\0")
-motion("bytes-behind", rd.SHAPES, 1, "bytes behind the stream", lambda: fork().content(rd.SHAPES, 1) + b"\1" * 12)
+motion("too-many", rules.SHAPES, 1, "a piece of three modes has ten shapes", shapes(10))
+motion(
+    "too-many-of-base", rules.SHAPES, 1, "a piece whose base level has two modes has seven shapes there", shapes(0, 7)
+)
+motion("all-zero", rules.SHAPES, 1, "a shape is all 0", shapes(1, *row((0, 0, 0))))
+motion("empty-row", rules.SHAPES, 1, "a shape whose row is empty", shapes(1, 0))
+motion("modes", rules.SHAPES, 1, "a shape has numbers for four modes of three", shapes(1, 4))
+motion("zero-behind", rules.SHAPES, 1, "a zero byte behind the stream", lambda: fork().content(rules.SHAPES, 1) + b"\0")
+motion("bytes-behind", rules.SHAPES, 1, "bytes behind the stream", lambda: fork().content(rules.SHAPES, 1) + b"\1" * 12)
 invalid(
     "shapes-too-many-at-last",
     "BAD_CHUNK",
@@ -3658,7 +3749,7 @@ invalid(
     "a level adds more shapes than the other modes have axes",
     lambda: Plant(
         [Stem(-1, 3)],
-        scripts={(rd.SHAPES, 0, 0): [6, *(n for i in range(6) for n in row((1, i, 0)))], (rd.SHAPES, 1, 0): [4]},
+        scripts={(rules.SHAPES, 0, 0): [6, *(n for i in range(6) for n in row((1, i, 0)))], (rules.SHAPES, 1, 0): [4]},
     ),
 )
 
@@ -3668,44 +3759,46 @@ def lossless(first: bytes = b"") -> Draft:
     return (
         fork()
         .with_header(level_count=4, full_level_count=4)
-        .add(Entry(rd.EXACT, first, 3, 0), Entry(rd.EXACT, b"", 3, 1))
+        .add(Entry(rules.EXACT, first, 3, 0), Entry(rules.EXACT, b"", 3, 1))
     )
 
 
-table("exact-missing", "BAD_CHUNK_TABLE", "a segment lacks its EXACT", lambda: lossless().without(rd.EXACT, 3, 1))
-table("exact-too-early", "BAD_CHUNK_TABLE", "EXACT at level h + 1", lambda: fork().add(Entry(rd.EXACT, b"", 2, 0)))
-table("exact-with-stems", "BAD_CHUNK_TABLE", "STEMS at level h + 2", lambda: lossless().add(Entry(rd.STEMS, b"", 3, 0)))
+table("exact-missing", "BAD_CHUNK_TABLE", "a segment lacks its EXACT", lambda: lossless().without(rules.EXACT, 3, 1))
+table("exact-too-early", "BAD_CHUNK_TABLE", "EXACT at level h + 1", lambda: fork().add(Entry(rules.EXACT, b"", 2, 0)))
+table(
+    "exact-with-stems", "BAD_CHUNK_TABLE", "STEMS at level h + 2", lambda: lossless().add(Entry(rules.STEMS, b"", 3, 0))
+)
 table(
     "exact-with-corrections",
     "BAD_CHUNK_TABLE",
     "CORRECTIONS at level h + 2",
-    lambda: lossless().add(Entry(rd.CORRECTIONS, b"", 3, 0)),
+    lambda: lossless().add(Entry(rules.CORRECTIONS, b"", 3, 0)),
 )
 valid("exact-empty", "EXACT without bytes: differences of 32 bits, all of them ones", lossless)
 invalid("exact-bytes-behind", "BAD_CHUNK", 3, "bytes behind the stream of EXACT", lambda: lossless(b"\1" * 400))
 
 
 def corrections(step: float) -> Callable[[], bytes]:
-    return lambda: struct.pack("<f", step) + fork().content(rd.CORRECTIONS, 2, 0)[4:]
+    return lambda: struct.pack("<f", step) + fork().content(rules.CORRECTIONS, 2, 0)[4:]
 
 
-motion("empty", rd.CORRECTIONS, 2, "no bytes", b"")
-motion("short", rd.CORRECTIONS, 2, "3 bytes", bytes(3))
+motion("empty", rules.CORRECTIONS, 2, "no bytes", b"")
+motion("short", rules.CORRECTIONS, 2, "3 bytes", bytes(3))
 for what, value in (("zero", 0.0), ("negative", -1.0), ("nan", NAN), ("infinite", INFINITY)):
-    motion(f"step-{what}", rd.CORRECTIONS, 2, f"Correction_Step is {value}", corrections(value))
+    motion(f"step-{what}", rules.CORRECTIONS, 2, f"Correction_Step is {value}", corrections(value))
 motion(
     "zero-behind",
-    rd.CORRECTIONS,
+    rules.CORRECTIONS,
     2,
     "a zero byte behind the stream",
-    lambda: fork().content(rd.CORRECTIONS, 2, 0) + b"\0",
+    lambda: fork().content(rules.CORRECTIONS, 2, 0) + b"\0",
 )
 motion(
     "bytes-behind",
-    rd.CORRECTIONS,
+    rules.CORRECTIONS,
     2,
     "bytes behind the stream",
-    lambda: fork().content(rd.CORRECTIONS, 2, 1) + b"\1" * 12,
+    lambda: fork().content(rules.CORRECTIONS, 2, 1) + b"\1" * 12,
     1,
 )
 
@@ -3716,7 +3809,7 @@ def swaying() -> Draft:
     return predicted(ROOTED, swayed(3, 18), 2).draft()
 
 
-PREDICTED_PLACE = rd.PREDICTED, 1, 1
+PREDICTED_PLACE = rules.PREDICTED, 1, 1
 invalid(
     "predicted-missing", "BAD_CHUNK_TABLE", "open", "a segment has none", lambda: swaying().without(*PREDICTED_PLACE)
 )
@@ -3725,28 +3818,28 @@ invalid(
     "BAD_CHUNK_TABLE",
     "open",
     "a segment has STEMS too",
-    lambda: swaying().add(Entry(rd.STEMS, stems_head(), 1, 0)),
+    lambda: swaying().add(Entry(rules.STEMS, stems_head(), 1, 0)),
 )
 invalid(
     "predicted-corrections",
     "BAD_CHUNK_TABLE",
     "open",
     "a segment has CORRECTIONS too",
-    lambda: swaying().add(Entry(rd.CORRECTIONS, struct.pack("<f", 0.5), 1, 0)),
+    lambda: swaying().add(Entry(rules.CORRECTIONS, struct.pack("<f", 0.5), 1, 0)),
 )
 invalid(
     "predicted-unsaid",
     "BAD_CHUNK_TABLE",
     "open",
     "PREDICTED where Is_Predicted is 0",
-    lambda: fork().add(Entry(rd.PREDICTED, predicted_head(), 2, 0)),
+    lambda: fork().add(Entry(rules.PREDICTED, predicted_head(), 2, 0)),
 )
 invalid(
     "predicted-at-level-0",
     "BAD_CHUNK_TABLE",
     "open",
     "PREDICTED of level 0",
-    lambda: swaying().add(Entry(rd.PREDICTED, predicted_head(), 0, 0)),
+    lambda: swaying().add(Entry(rules.PREDICTED, predicted_head(), 0, 0)),
 )
 invalid(
     "predicted-layers",
@@ -3807,50 +3900,50 @@ table(
     "layers-no-stems",
     "BAD_CHUNK_TABLE",
     "a refinement lacks the STEMS of a segment",
-    lambda: layered().draft().without(rd.STEMS, 3, 1),
+    lambda: layered().draft().without(rules.STEMS, 3, 1),
 )
 table(
     "layers-affines",
     "BAD_CHUNK_TABLE",
     "AFFINES of a refinement",
-    lambda: layered().draft().add(Entry(rd.AFFINES, b"", 3, 0)),
+    lambda: layered().draft().add(Entry(rules.AFFINES, b"", 3, 0)),
 )
 table(
     "layers-exact-early",
     "BAD_CHUNK_TABLE",
     "EXACT at the level of the last refinement",
-    lambda: layered().draft().add(Entry(rd.EXACT, b"", 4, 0)),
+    lambda: layered().draft().add(Entry(rules.EXACT, b"", 4, 0)),
 )
 table(
     "layers-corrections-low",
     "BAD_CHUNK_TABLE",
     "CORRECTIONS below level h + 1",
-    lambda: layered().draft().add(Entry(rd.CORRECTIONS, struct.pack("<f", 1.0), 1, 0)),
+    lambda: layered().draft().add(Entry(rules.CORRECTIONS, struct.pack("<f", 1.0), 1, 0)),
 )
 table(
     "layers-corrections-exact",
     "BAD_CHUNK_TABLE",
     "CORRECTIONS of the lossless level behind three layers",
-    lambda: lossless_layers().add(Entry(rd.CORRECTIONS, struct.pack("<f", 1.0), 5, 0)),
+    lambda: lossless_layers().add(Entry(rules.CORRECTIONS, struct.pack("<f", 1.0), 5, 0)),
 )
 table(
     "layers-shapes-of-segment-1",
     "BAD_CHUNK_TABLE",
     "SHAPES of a refinement stands with segment 0",
-    lambda: layered().draft().add(Entry(rd.SHAPES, b"\0", 3, 1)),
+    lambda: layered().draft().add(Entry(rules.SHAPES, b"\0", 3, 1)),
 )
 for level_, why in ((0, "level 0"), (2, "a level of the hierarchy above 1"), (5, "the lossless level")):
     table(
         f"refined-rest-{level_}",
         "BAD_CHUNK_TABLE",
         f"REFINED_REST of {why}",
-        lambda level=level_: lossless_layers().add(Entry(rd.REFINED_REST, b"", level, 0)),
+        lambda level=level_: lossless_layers().add(Entry(rules.REFINED_REST, b"", level, 0)),
     )
 table(
     "refined-rest-of-segment-1",
     "BAD_CHUNK_TABLE",
     "REFINED_REST stands with segment 0",
-    lambda: layered(3, (rd.REFINED_REST, 3, 0)).draft().add(Entry(rd.REFINED_REST, b"", 3, 1)),
+    lambda: layered(3, (rules.REFINED_REST, 3, 0)).draft().add(Entry(rules.REFINED_REST, b"", 3, 1)),
 )
 for name, why, plant in (
     ("with-stems", "level 0 has STEMS", rest_by_level([*FORK, Stem(-1, 2)], 44)),
@@ -3877,7 +3970,7 @@ def refinement(name: str, kind: int, reason: str, content: bytes | Callable[[byt
         made = content(draft.content(kind, 3, segment)) if callable(content) else content
         return draft.change(kind, 3, segment, content=made)
 
-    invalid(f"refined-{rd.KINDS[kind].lower().removeprefix('refined_')}-{name}", "BAD_CHUNK", 3, reason, make)
+    invalid(f"refined-{KIND_NAMES[kind].lower().removeprefix('refined_')}-{name}", "BAD_CHUNK", 3, reason, make)
 
 
 def scripted_refinement(name: str, place: tuple, reason: str, *script) -> None:
@@ -3885,48 +3978,54 @@ def scripted_refinement(name: str, place: tuple, reason: str, *script) -> None:
     invalid(name, "BAD_CHUNK", 3, reason, lambda: layered(2, scripts={place: list(script)}).draft())
 
 
-refinement("ratio-0", rd.STEMS, "Ratio is 0", lambda content: bytes(2) + content[2:])
-refinement("empty", rd.STEMS, "STEMS of a refinement without bytes", b"")
-refinement("ratio-alone", rd.STEMS, "nothing behind Ratio", b"\4\0")
-refinement("step-zero", rd.STEMS, "Step of a refinement is 0", lambda content: content[:2] + bytes(4) + content[6:])
-refinement("zero-behind", rd.STEMS, "a zero byte behind the stream of refined stems", lambda content: content + b"\0")
+refinement("ratio-0", rules.STEMS, "Ratio is 0", lambda content: bytes(2) + content[2:])
+refinement("empty", rules.STEMS, "STEMS of a refinement without bytes", b"")
+refinement("ratio-alone", rules.STEMS, "nothing behind Ratio", b"\4\0")
+refinement("step-zero", rules.STEMS, "Step of a refinement is 0", lambda content: content[:2] + bytes(4) + content[6:])
 refinement(
-    "bytes-behind", rd.STEMS, "bytes behind the stream of refined stems", lambda content: content + b"\1" * 12, 1
+    "zero-behind", rules.STEMS, "a zero byte behind the stream of refined stems", lambda content: content + b"\0"
 )
-scripted_refinement("refined-stems-frequencies", (rd.STEMS, 3, 0), "a refined row codes three frequencies of two", 3)
-refinement("empty", rd.SHAPES, "SHAPES of a refinement without bytes", b"")
-refinement("shift-16", rd.SHAPES, "Shift is 16", lambda content: b"\x10" + content[1:])
-refinement("zero-behind", rd.SHAPES, "a zero byte behind the stream of refined shapes", lambda content: content + b"\0")
-refinement("bytes-behind", rd.SHAPES, "bytes behind the stream of refined shapes", lambda content: content + b"\1" * 12)
-scripted_refinement(
-    "refined-shapes-too-many", (rd.SHAPES, 3, 0), "a piece of three modes has ten shapes in a refinement", 10
+refinement(
+    "bytes-behind", rules.STEMS, "bytes behind the stream of refined stems", lambda content: content + b"\1" * 12, 1
 )
-scripted_refinement(
-    "refined-shapes-modes", (rd.SHAPES, 3, 0), "a refined shape has numbers for four modes of three", 1, 4
+scripted_refinement("refined-stems-frequencies", (rules.STEMS, 3, 0), "a refined row codes three frequencies of two", 3)
+refinement("empty", rules.SHAPES, "SHAPES of a refinement without bytes", b"")
+refinement("shift-16", rules.SHAPES, "Shift is 16", lambda content: b"\x10" + content[1:])
+refinement(
+    "zero-behind", rules.SHAPES, "a zero byte behind the stream of refined shapes", lambda content: content + b"\0"
 )
-scripted_refinement(
-    "refined-shapes-all-zero", (rd.SHAPES, 3, 0), "a shape that the layer before lacks is all 0", 3, 0, 0, 0
+refinement(
+    "bytes-behind", rules.SHAPES, "bytes behind the stream of refined shapes", lambda content: content + b"\1" * 12
 )
 scripted_refinement(
-    "refined-shapes-cancelled", (rd.SHAPES, 3, 0), "differences make a shape all 0", 2, 0, *[1, 0, 0, 4, 1]
+    "refined-shapes-too-many", (rules.SHAPES, 3, 0), "a piece of three modes has ten shapes in a refinement", 10
 )
-refinement("short", rd.REFINED_REST, "3 bytes", bytes(3))
+scripted_refinement(
+    "refined-shapes-modes", (rules.SHAPES, 3, 0), "a refined shape has numbers for four modes of three", 1, 4
+)
+scripted_refinement(
+    "refined-shapes-all-zero", (rules.SHAPES, 3, 0), "a shape that the layer before lacks is all 0", 3, 0, 0, 0
+)
+scripted_refinement(
+    "refined-shapes-cancelled", (rules.SHAPES, 3, 0), "differences make a shape all 0", 2, 0, *[1, 0, 0, 4, 1]
+)
+refinement("short", rules.REFINED_REST, "3 bytes", bytes(3))
 for what, value in (("zero", 0.0), ("negative", -1.0), ("nan", NAN), ("infinite", INFINITY)):
     refinement(
         f"step-{what}",
-        rd.REFINED_REST,
+        rules.REFINED_REST,
         f"Rest_Step of a refinement is {value}",
         lambda content, value=value: refined_rest_chunk(content[4:], value),
     )
 refinement(
     "zero-behind",
-    rd.REFINED_REST,
+    rules.REFINED_REST,
     "a zero byte behind the stream of a refined rest pose",
     lambda content: content + b"\0",
 )
 refinement(
     "bytes-behind",
-    rd.REFINED_REST,
+    rules.REFINED_REST,
     "bytes behind the stream of a refined rest pose",
     lambda content: content + b"\1" * 20,
 )
@@ -3936,9 +4035,9 @@ invalid(
     3,
     "REFINED_REST of a rest pose that is exact",
     lambda: (
-        layered(3, (rd.REFINED_REST, 3, 0), (rd.REFINED_REST, 4, 0), rest=exact_rest(FORK, [0.5] * 15, False))
+        layered(3, (rules.REFINED_REST, 3, 0), (rules.REFINED_REST, 4, 0), rest=exact_rest(FORK, [0.5] * 15, False))
         .draft()
-        .add(Entry(rd.REFINED_REST, refined_rest_chunk(b""), 3))
+        .add(Entry(rules.REFINED_REST, refined_rest_chunk(b""), 3))
     ),
 )
 invalid(
@@ -3949,7 +4048,7 @@ invalid(
     lambda: (
         Plant([Stem(-1, 3, lag=0)], rest=coded_rest([Stem(-1, 3, lag=0)], []), layers=2)
         .draft()
-        .add(Entry(rd.REFINED_REST, refined_rest_chunk(refined_run(3)), 2))
+        .add(Entry(rules.REFINED_REST, refined_rest_chunk(refined_run(3)), 2))
     ),
 )
 invalid(
@@ -3957,14 +4056,14 @@ invalid(
     "BAD_CHECKSUM",
     3,
     "the Checksum of REFINED_REST is another",
-    lambda: layered().draft().change(rd.REFINED_REST, 3, checksum=0),
+    lambda: layered().draft().change(rules.REFINED_REST, 3, checksum=0),
 )
 invalid(
     "refined-rest-cut",
     "TRUNCATED",
     3,
     "the file ends inside REFINED_REST",
-    lambda: cut(lambda draft: end_of(draft, rd.REFINED_REST, 3) - 1, layered().draft()),
+    lambda: cut(lambda draft: end_of(draft, rules.REFINED_REST, 3) - 1, layered().draft()),
 )
 for name, why, error, change in (
     ("exact", "of a rest pose that is exact", "BAD_CHUNK", None),
@@ -3984,17 +4083,19 @@ for name, why, error, change in (
 def bad_rest_of_1(change: Callable[[bytes], dict] | None) -> Draft:
     """Level 1 refines a rest pose that is exact, or by a chunk that is changed."""
     if change is None:
-        exact = layered(3, (rd.REFINED_REST, 3, 0), (rd.REFINED_REST, 4, 0), rest=exact_rest(FORK, [0.5] * 15, False))
-        return exact.draft().add(Entry(rd.REFINED_REST, refined_rest_chunk(b""), 1))
+        exact = layered(
+            3, (rules.REFINED_REST, 3, 0), (rules.REFINED_REST, 4, 0), rest=exact_rest(FORK, [0.5] * 15, False)
+        )
+        return exact.draft().add(Entry(rules.REFINED_REST, refined_rest_chunk(b""), 1))
     draft = layered(scripts=LEVEL_1_REST).draft()
-    return draft.change(rd.REFINED_REST, 1, **change(draft.content(rd.REFINED_REST, 1)))
+    return draft.change(rules.REFINED_REST, 1, **change(draft.content(rules.REFINED_REST, 1)))
 
 
 def refined_run(count: int) -> bytes:
     """The stream of a root of three vertices, the last two of which are a run with so many modes."""
     branches = branches_of([Stem(-1, 3, lag=0)])
-    before = rd.RestLayer([[0.0] * 3] * 3, [[0] * 3] * 3)
-    return write(rd.decode_rest, [0, 0, 0, count], branches, 0.0625, before)
+    before = rules.Record(rest=[[0.0] * 3] * 3, steps=[[0] * 3] * 3)
+    return write(rules.decode_rest, [0, 0, 0, count], branches, 0.0625, before)
 
 
 # ---- the host's mesh ---------------------------------------------------------------------------------------
@@ -4023,7 +4124,7 @@ valid(
     mesh=AWKWARD_MESH,
 )
 valid("host-mesh-wide", "binary64 positions about a mesh of binary32", lambda: hosted(is_float64=True), mesh=MESH)
-NO_REFINED_REST = [(rd.REFINED_REST, 3, 0), (rd.REFINED_REST, 4, 0)]
+NO_REFINED_REST = [(rules.REFINED_REST, 3, 0), (rules.REFINED_REST, 4, 0)]
 valid(
     "host-mesh-layers",
     "three layers about the host's mesh, which none refines",
@@ -4051,7 +4152,7 @@ for name, value in (("nan", NAN), ("infinite", -INFINITY)):
         "WRONG_HOST_MESH",
         0,
         f"the file's own mesh has {value}",
-        lambda mesh=INFINITE_MESH: hosted().draft().change(rd.REST, content=host_rest_chunk(mesh)),
+        lambda mesh=INFINITE_MESH: hosted().draft().change(rules.REST, content=host_rest_chunk(mesh)),
         INFINITE_MESH,
     )
 for at, which in ((17, "first"), (21, "second")):
@@ -4060,20 +4161,22 @@ for at, which in ((17, "first"), (21, "second")):
         "WRONG_HOST_MESH",
         0,
         f"a mesh that differs by the {which} checksum alone",
-        lambda at=at: hosted().draft().change(rd.REST, content=flipped(host_rest_chunk(MESH), at)),
+        lambda at=at: hosted().draft().change(rules.REST, content=flipped(host_rest_chunk(MESH), at)),
         MESH,
     )
 for name, why, bits in (("exact", "Is_Exact", {"exact": 1}), ("float64", "Rest_Is_Float64", {"rest_type": 1})):
-    prelude(f"host-{name}", rd.REST, f"{why} beside Is_Host in Method", lambda bits=bits: host_rest_chunk(MESH, **bits))
+    prelude(
+        f"host-{name}", rules.REST, f"{why} beside Is_Host in Method", lambda bits=bits: host_rest_chunk(MESH, **bits)
+    )
 for name, why, change in (
     ("no-checksum", "Is_Host without checksums", lambda chunk: chunk[:17]),
     ("checksum-short", "Is_Host with 7 bytes of checksums", lambda chunk: chunk[:-1]),
     ("checksum-long", "Is_Host with a byte behind the checksums", lambda chunk: chunk + b"\0"),
 ):
-    prelude(f"host-{name}", rd.REST, why, lambda change=change: change(host_rest_chunk(MESH)))
+    prelude(f"host-{name}", rules.REST, why, lambda change=change: change(host_rest_chunk(MESH)))
 prelude(
     "step-of-host",
-    rd.REST,
+    rules.REST,
     "Rest_Step is 0 with Is_Host, where it has no meaning",
     lambda: host_rest_chunk(MESH, step=0.0),
 )
@@ -4085,7 +4188,7 @@ invalid(
     lambda: (
         layered(3, *NO_REFINED_REST, mesh=MESH, vertex_source=ORDER)
         .draft()
-        .add(Entry(rd.REFINED_REST, refined_rest_chunk(b""), 3))
+        .add(Entry(rules.REFINED_REST, refined_rest_chunk(b""), 3))
     ),
     MESH,
 )
@@ -4131,7 +4234,7 @@ for name, why, text in (
     ("white-space", "white space that JSON does not have", b"\x0b{}"),
 ):
     static(f"metadata-{name}", why, lambda text=text: metadata(text))
-static("metadata-empty", "no bytes", lambda: with_static((rd.METADATA, b"")))
+static("metadata-empty", "no bytes", lambda: with_static((rules.METADATA, b"")))
 static("metadata-method-2", "Method 2", lambda: metadata("{}", 2))
 static(
     "metadata-limit",
@@ -4160,11 +4263,11 @@ static("metadata-zstd-behind", "a byte behind the frame", lambda: metadata(plain
 
 
 def faces(content: bytes) -> Callable[[], Draft]:
-    return lambda: with_static((rd.FACES, content))
+    return lambda: with_static((rules.FACES, content))
 
 
 def edges(content: bytes) -> Callable[[], Draft]:
-    return lambda: with_static((rd.EDGES, content))
+    return lambda: with_static((rules.EDGES, content))
 
 
 static("faces-empty", "FACES without bytes", faces(b""))
@@ -4195,7 +4298,7 @@ static(
     lambda: (
         moving([Stem(-1, 64), Stem(-1, 64), Stem(-1, 2)], 2, frames=1)
         .draft()
-        .add(Entry(rd.FACES, polygons(np.array([[0, 127, 128]], "<i2"), 130).replace(b"\x05", b"\x04", 1)))
+        .add(Entry(rules.FACES, polygons(np.array([[0, 127, 128]], "<i2"), 130).replace(b"\x05", b"\x04", 1)))
     ),
 )
 static("faces-zero-behind", "a zero byte behind the stream", faces(polygons(FACES_3) + b"\0"))
@@ -4208,7 +4311,9 @@ static("edges-derived-byte-order-of-a-byte", "derived edges of a big-endian byte
 static(
     "edges-derived-small",
     "130 vertices do not fit |i1",
-    lambda: moving([Stem(-1, 64), Stem(-1, 64), Stem(-1, 2)], 2, frames=1).draft().add(Entry(rd.EDGES, derived("|i1"))),
+    lambda: (
+        moving([Stem(-1, 64), Stem(-1, 64), Stem(-1, 2)], 2, frames=1).draft().add(Entry(rules.EDGES, derived("|i1")))
+    ),
 )
 static("edges-derived-with-data", "data behind derived edges", edges(derived("<i4") + bytes(8)))
 
@@ -4231,7 +4336,7 @@ static(
 static(
     "attributes-257",
     "257 attributes",
-    lambda: lone().draft().add(*(Entry(rd.ATTRIBUTE, element("|u1", b"a", str(i))) for i in range(257))),
+    lambda: lone().draft().add(*(Entry(rules.ATTRIBUTE, element("|u1", b"a", str(i))) for i in range(257))),
     "LIMIT_EXCEEDED",
 )
 for name, why, type_ in (
@@ -4274,7 +4379,7 @@ def zstd_frame(name: str, reason: str, body: bytes, error: str = "BAD_CHUNK", si
 
 
 zstd_frame("none", "no zstd frame", b"plant")
-zstd_frame("magic-alone", "a frame that ends behind its magic number", rd.ZSTD_MAGIC)
+zstd_frame("magic-alone", "a frame that ends behind its magic number", ZSTD_MAGIC)
 zstd_frame("cut", "a frame that ends in its block", plain(b"plant")[:-1])
 zstd_frame("shorter", "a frame of 4 bytes where 5 are", plain(b"plan"))
 zstd_frame("longer", "a frame of 6 bytes where 5 are", plain(b"plants"))
@@ -4336,7 +4441,7 @@ def along_x(*places: float) -> list[list[float]]:
 
 def mode_and_more(share: float) -> list[list[float]]:
     """Two places along x as the first mode of a sheet of two vertices, but for a share of it."""
-    mode = rd.cantilever((4, 4), 0.1, 0.001, 1.0)[0]
+    mode = rules.cantilever((4, 4), 0.1, 0.001, 1.0)[0]
     across = np.array([-mode[1], mode[0]])
     return [[x, 0.0, 0.0] for x in mode + share * across]
 
@@ -4417,7 +4522,7 @@ for side_, size_ in (("above", 1.015), ("below", 0.985)):
             [[0, 0, 0], [0, 1, 0], [0, 1e-50 * (size_**2 / 1.0203) ** 0.25, 0], [0, 0, 0], [0, 1, 1], [0, 2, 1]],
             139,
             is_float64=True,
-            scripts={(rd.STEMS, 1): [*row(), *row((9, -5, 7), (3, 8, -6))]},
+            scripts={(rules.STEMS, 1): [*row(), *row((9, -5, 7), (3, 8, -6))]},
             heads={1: stems_head(0.125, 1)},
         ),
     )
@@ -4452,15 +4557,15 @@ def deep() -> Draft:
 def without_mesh(stems: list[Stem]) -> Draft:
     """A file of which only the hierarchy is decoded: the rest pose is the host's mesh, which is not there."""
     count = sum(stem.count for stem in stems)
-    stream = write(rd.decode_hierarchy, hierarchy_script(stems), len(stems), count)
-    plan = rd.Plan(rd.decode_hierarchy(stream, len(stems), count)[0])
+    stream = write(rules.decode_hierarchy, hierarchy_script(stems), len(stems), count)
+    plan = rules.make_parts(rules.decode_hierarchy(stream, len(stems), count)[0])
     levels, front = range(plan.height + 2), Plant([Stem(-1, 1)], mesh=np.zeros((1, 3), "<f4")).draft()
     return (
         replace(front, entries=front.entries[:3])
         .with_header(vertex_count=count, branch_count=len(stems), level_count=len(levels), full_level_count=len(levels))
-        .change(rd.HIERARCHY, content=hierarchy_chunk(stream))
-        .add(*(Entry(rd.STEMS, b"", level, 0) for level in levels if plan.has_stems(level)))
-        .add(*(Entry(rd.AFFINES, b"", level, 0) for level in levels if plan.has_affines(level, level)))
+        .change(rules.HIERARCHY, content=hierarchy_chunk(stream))
+        .add(*(Entry(rules.STEMS, b"", level, 0) for level in levels if rules.has_stems(plan, level)))
+        .add(*(Entry(rules.AFFINES, b"", level, 0) for level in levels if rules.has_affines(plan, level, level)))
     )
 
 
@@ -4485,167 +4590,165 @@ invalid(
 
 def not_refused(make: Callable[[], Draft]) -> bytes:
     """The file with streams that go on behind what is refused."""
-    kept, rd.require = rd.require, lambda *_: None
+    kept, rules.require = rules.require, lambda *_: None
     try:
         return make().file()
     finally:
-        rd.require = kept
+        rules.require = kept
 
 
 def front_alone(draft: Draft) -> bytes:
     data = draft.file()
-    return data[: rd.u32(data, 16)]
+    return data[: rules.u32(data, 16)]
 
 
-def at_limits_of_front() -> None:
-    """Limits that are just kept: what else is wrong gives the error."""
-    radius = numbers(np.arange(5.0), name="radius")
+"""Limits that are just kept: what else is wrong gives the error."""
+radius = numbers(np.arange(5.0), name="radius")
 
-    def segments_of_tables() -> Draft:
-        draft = lone().draft().upto(0)
-        first, second, *others = draft.entries
-        count = (1 << 20) - len(draft.entries)
-        return replace(draft, entries=(second, first, *others)).with_header(frame_count=count, segment_count=count)
+def segments_of_tables() -> Draft:
+    draft = lone().draft().upto(0)
+    first, second, *others = draft.entries
+    count = (1 << 20) - len(draft.entries)
+    return replace(draft, entries=(second, first, *others)).with_header(frame_count=count, segment_count=count)
 
-    invalid("cut-behind-first-byte", "TRUNCATED", "open", "one byte, that of Magic", lambda: first_bytes(1))
-    invalid(
-        "header-alone",
-        "BAD_HEADER",
-        "open",
-        "24 bytes are a header: its Chunk_Count is 0",
-        lambda: lone().draft().with_header(chunk_count=0).file()[:24],
-    )
-    header(
-        "chunks-2-20", "BAD_HEADER", "Chunk_Count 2^20 is allowed, but Front_Length is too small", chunk_count=1 << 20
-    )
-    header("front-length-2-24", "TRUNCATED", "Front_Length 2^24 is allowed, but not there", front_length=1 << 24)
-    invalid(
-        "front-alone-damaged",
-        "BAD_CHECKSUM",
-        "open",
-        "a file that ends with its front, which is damaged",
-        lambda: flipped(front_alone(lone().draft()), 30),
-    )
-    table(
-        "one-chunk",
-        "BAD_CHUNK_TABLE",
-        "Chunk_Count 1 is allowed, but chunks are missing",
-        lambda: replace(lone().draft(), entries=lone().draft().entries[:1]),
-    )
-    table(
-        "longest-and-order",
-        "BAD_CHUNK_TABLE",
-        "as many segments and chunks as Max_Table_Bytes allows, of which the first two are the wrong way round",
-        segments_of_tables,
-    )
-    table(
-        "repeatable-order",
-        "BAD_CHUNK_TABLE",
-        "an attribute behind a chunk whose number is larger",
-        lambda: not_refused(lambda: fork().add(Entry(0x8040, FUTURE), Entry(rd.ATTRIBUTE, radius), sort=False)),
-    )
-    invalid(
-        "table-longest-chunk",
-        "TRUNCATED",
-        "strict",
-        "a last chunk of 2^28 bytes is allowed, but has not arrived",
-        lambda: fork().add(Entry(0x8040, FUTURE, length=1 << 28)),
-    )
-    invalid(
-        "joins-0",
-        "BAD_CHUNK_TABLE",
-        "open",
-        "a segment is joined over 0 frames",
-        lambda: not_refused(lambda: joined(FORK, 500, 0, 0.5, 0, 0, 0, 0).draft()),
-    )
-
-
-at_limits_of_front()
+invalid("cut-behind-first-byte", "TRUNCATED", "open", "one byte, that of Magic", lambda: first_bytes(1))
+invalid(
+    "header-alone",
+    "BAD_HEADER",
+    "open",
+    "24 bytes are a header: its Chunk_Count is 0",
+    lambda: lone().draft().with_header(chunk_count=0).file()[:24],
+)
+header(
+    "chunks-2-20", "BAD_HEADER", "Chunk_Count 2^20 is allowed, but Front_Length is too small", chunk_count=1 << 20
+)
+header("front-length-2-24", "TRUNCATED", "Front_Length 2^24 is allowed, but not there", front_length=1 << 24)
+invalid(
+    "front-alone-damaged",
+    "BAD_CHECKSUM",
+    "open",
+    "a file that ends with its front, which is damaged",
+    lambda: flipped(front_alone(lone().draft()), 30),
+)
+table(
+    "one-chunk",
+    "BAD_CHUNK_TABLE",
+    "Chunk_Count 1 is allowed, but chunks are missing",
+    lambda: replace(lone().draft(), entries=lone().draft().entries[:1]),
+)
+table(
+    "longest-and-order",
+    "BAD_CHUNK_TABLE",
+    "as many segments and chunks as Max_Table_Bytes allows, of which the first two are the wrong way round",
+    segments_of_tables,
+)
+table(
+    "repeatable-order",
+    "BAD_CHUNK_TABLE",
+    "an attribute behind a chunk whose number is larger",
+    lambda: not_refused(lambda: fork().add(Entry(0x8040, FUTURE), Entry(rules.ATTRIBUTE, radius), sort=False)),
+)
+invalid(
+    "table-longest-chunk",
+    "TRUNCATED",
+    "strict",
+    "a last chunk of 2^28 bytes is allowed, but has not arrived",
+    lambda: fork().add(Entry(0x8040, FUTURE, length=1 << 28)),
+)
+invalid(
+    "joins-0",
+    "BAD_CHUNK_TABLE",
+    "open",
+    "a segment is joined over 0 frames",
+    lambda: not_refused(lambda: joined(FORK, 500, 0, 0.5, 0, 0, 0, 0).draft()),
+)
 
 
-def at_limits_of_static_data() -> None:
-    longest, many = 1 << 20, 1 << 25
 
-    def recent(_: bytes) -> None:
-        """A triangle of vertex 0 and of the corner before that."""
-        coder, model = rd.RangeDecoder(b""), rd.PolygonModel()
-        decisions = [(model.guessed[1][0][0], 1), (model.guessed[1][1][2], 0), (model.is_recent[1], 1)]
-        node = 1
-        for bit in (0, 0, 0, 0, 1):
-            decisions.append((model.recent[1][node], bit))
-            node = node << 1 | bit
-        decisions.append((model.guessed[1][2][15], 1))
-        coder.script = Script(*(bit for _, bit in decisions))
-        for context, _ in decisions:
-            coder.bit(context)
 
-    valid(
-        "metadata-longest",
-        "a text of 2^20 bytes",
-        lambda: metadata(
-            frame(
-                b"{" + b" " * (longest - 2) + b"}",
-                checksum=None,
-                blocks=raw_block(b"{", False)
-                + b"".join(run_block(b" ", n, False) for n in [1 << 17] * 7 + [(1 << 17) - 2])
-                + raw_block(b"}", True),
+longest, many = 1 << 20, 1 << 25
+
+def recent(_: bytes) -> None:
+    """A triangle of vertex 0 and of the corner before that."""
+    coder, model = rules.RangeDecoder(b""), rules.PolygonModel()
+    decisions = [(model.guessed[1][0][0], 1), (model.guessed[1][1][2], 0), (model.is_recent[1], 1)]
+    node = 1
+    for bit in (0, 0, 0, 0, 1):
+        decisions.append((model.recent[1][node], bit))
+        node = node << 1 | bit
+    decisions.append((model.guessed[1][2][15], 1))
+    coder.script = Script(*(bit for _, bit in decisions))
+    for context, _ in decisions:
+        coder.bit(context)
+
+valid(
+    "metadata-longest",
+    "a text of 2^20 bytes",
+    lambda: metadata(
+        frame(
+            b"{" + b" " * (longest - 2) + b"}",
+            checksum=None,
+            blocks=raw_block(b"{", False)
+            + b"".join(run_block(b" ", n, False) for n in [1 << 17] * 7 + [(1 << 17) - 2])
+            + raw_block(b"}", True),
+        ),
+        1,
+    ),
+)
+zstd_frame("descriptor-alone", "a frame that ends before its Window_Descriptor", ZSTD_MAGIC + b"\0")
+zstd_frame(
+    "header-alone",
+    "a frame of a header alone, with the largest window and no size: the window comes first",
+    ZSTD_MAGIC + b"\0\xff",
+    "LIMIT_EXCEEDED",
+)
+valid(
+    "faces-none-widest",
+    "no faces of 2^26 corners each",
+    lambda: with_static((rules.FACES, polygon_head("<u4", 0, 1 << 26))),
+)
+valid(
+    "faces-of-most-corners",
+    "faces of as many corners as Count_Type holds",
+    lambda: with_static(
+        (rules.FACES, mixed_polygons([[0, 1, 2], [i % 5 for i in range(127)]], types=("<u4", "|i1")))
+    ),
+)
+static(
+    "faces-more-corners-of-many",
+    "the second of two faces has one corner more than are left, of 2^25: none is decoded",
+    faces(
+        polygon_head("<u4", 2, many, "<u4")
+        + write(
+            *(rules.decode_polygons, [42, *[0, 1, 2] * 14, many - 41]),
+            *(polygon_shape(2, 2, False, 2, 0, many), 5),
+            lowest=True,
+        )
+    ),
+)
+static(
+    "faces-recent-before-first",
+    "the second corner is the one before the first",
+    lambda: with_static((rules.FACES, polygon_head("<u4", 1, 3) + write(recent, []))),
+)
+strips = {
+    "up": [[i, i + 1, i + 2] for i in range(18)],
+    "down": [[i, i - 1, i - 2] for i in range(19, 1, -1)] + [[1, 0, 2], [3, 4, 0]],
+}
+for name, strip in strips.items():
+    for is_absolute in (False, True):
+        valid(
+            f"faces-{name}-and-on{'-absolute' if is_absolute else ''}",
+            f"triangles {'up to the last vertex' if name == 'up' else 'down to vertex 0'}, beyond which the same "
+            f"ways would lead{'; vertices by their numbers' if is_absolute else ''}",
+            lambda strip=strip, is_absolute=is_absolute: (
+                moving([Stem(-1, 20)], 501, frames=1)
+                .draft()
+                .add(Entry(rules.FACES, polygons(np.array(strip + [[7, 3, 9]], "<u2"), 20, is_absolute)))
             ),
-            1,
-        ),
-    )
-    zstd_frame("descriptor-alone", "a frame that ends before its Window_Descriptor", rd.ZSTD_MAGIC + b"\0")
-    zstd_frame(
-        "header-alone",
-        "a frame of a header alone, with the largest window and no size: the window comes first",
-        rd.ZSTD_MAGIC + b"\0\xff",
-        "LIMIT_EXCEEDED",
-    )
-    valid(
-        "faces-none-widest",
-        "no faces of 2^26 corners each",
-        lambda: with_static((rd.FACES, polygon_head("<u4", 0, 1 << 26))),
-    )
-    valid(
-        "faces-of-most-corners",
-        "faces of as many corners as Count_Type holds",
-        lambda: with_static((rd.FACES, mixed_polygons([[0, 1, 2], [i % 5 for i in range(127)]], types=("<u4", "|i1")))),
-    )
-    static(
-        "faces-more-corners-of-many",
-        "the second of two faces has one corner more than are left, of 2^25: none is decoded",
-        faces(
-            polygon_head("<u4", 2, many, "<u4")
-            + write(
-                *(rd.decode_polygons, [42, *[0, 1, 2] * 14, many - 41]),
-                *(rd.PolygonShape(2, 2, False, False, 2, 0, many), 5),
-                lowest=True,
-            )
-        ),
-    )
-    static(
-        "faces-recent-before-first",
-        "the second corner is the one before the first",
-        lambda: with_static((rd.FACES, polygon_head("<u4", 1, 3) + write(recent, []))),
-    )
-    strips = {
-        "up": [[i, i + 1, i + 2] for i in range(18)],
-        "down": [[i, i - 1, i - 2] for i in range(19, 1, -1)] + [[1, 0, 2], [3, 4, 0]],
-    }
-    for name, strip in strips.items():
-        for is_absolute in (False, True):
-            valid(
-                f"faces-{name}-and-on{'-absolute' if is_absolute else ''}",
-                f"triangles {'up to the last vertex' if name == 'up' else 'down to vertex 0'}, beyond which the same "
-                f"ways would lead{'; vertices by their numbers' if is_absolute else ''}",
-                lambda strip=strip, is_absolute=is_absolute: (
-                    moving([Stem(-1, 20)], 501, frames=1)
-                    .draft()
-                    .add(Entry(rd.FACES, polygons(np.array(strip + [[7, 3, 9]], "<u2"), 20, is_absolute)))
-                ),
-            )
+        )
 
 
-at_limits_of_static_data()
 
 
 class Counts(Chance):
@@ -4660,205 +4763,203 @@ class Counts(Chance):
 IMPULSES = basis_stream([[128, 0], [0, 128]], 8)  # a learned basis of two frames: each alone
 
 
-def at_limits_of_motion() -> None:
-    base, most = [Stem(-1, 3)], (1 << 30) - 1
-    valid(
-        "predicted-on-vertex-0",
-        "a stem on vertex 0, whose first vertex is no end",
-        lambda: predicted([Stem(-1, 2, flags=WHOLE), Stem(0, 3, 0)], swayed(6, 510, [Stem(-1, 2), Stem(0, 3, 0)])),
-    )
-    valid(
-        "rows-of-30",
-        "rows of 30 and 31 frequencies, which are expected differently",
-        lambda: Plant([Stem(-1, 9)], frames=40, scripts={(rd.STEMS, k): lambda k=k: Counts(511 + k) for k in (0, 1)}),
-    )
-    motion(
-        "frequencies-1023",
-        rd.STEMS,
-        1,
-        "a row codes 1023 frequencies of two: as long as a number of them can be",
-        lambda: stems_head() + write(rd.decode_stems, [1023], forked_plan(), stems_motion(stems_head(), 2), 1),
-    )
-    valid(
-        "basis-exponents",
-        "the exponent of a row of a basis is -200, and 400 more in the next",
-        lambda: Plant(
-            base,
-            frames=2,
-            heads={0: stems_head(0.25, 0, 2, 2, basis_in_waves(2, -200, 400, *row((1, 1, 0), (2, -1, 0)), rank=2))},
-            scripts={(rd.STEMS, 0): lambda: Chance(513)},
-        ),
-    )
-    motion(
-        "basis-length-one-more",
-        rd.STEMS,
-        1,
-        "Basis_Length is one more than the chunk holds",
-        lambda: struct.pack("<fBBHBI", 0.5, 0, 8, 2, 255, 1 + len(IMPULSES)) + IMPULSES,
-    )
-    motion(
-        "basis-length-cut",
-        rd.STEMS,
-        1,
-        "the chunk ends before the last byte of Basis_Length",
-        lambda: stems_head(0.5, 0, 8, 1)[:12],
-    )
-    valid(
-        "basis-of-level-0",
-        "learned bases that begin with that of level 0",
-        lambda: Plant(
-            base,
-            frames=3,
-            heads={
-                0: stems_head(0.25, 0, 8, 1, basis_stream([[99, -128, 3]], 8)),
-                1: stems_head(0.25, 0, 9, 2, basis_stream([[256, 0, -77]], 9), base=0),
-            },
-            scripts={(rd.STEMS, 0): lambda: Chance(514), (rd.STEMS, 1): lambda: Chance(515)},
-        ),
-    )
-    valid(
-        "corrections-of-one-frame",
-        "corrections in a segment of one frame, before which there is none",
-        lambda: Plant(base, scripts={(rd.CORRECTIONS, 1, 0): [1, *(2, 3, 1, 0), 0, 1, *(1, 0, 5, 1)]}),
-    )
-    valid(
-        "gaps-of-62-quarters",
-        "a distance along a stem of 15 times the mean",
-        lambda: placed([Stem(-1, 24)], [[x + 38.2 * (x > 9), 0, 0] for x in range(24)], 516, is_float64=True),
-    )
-    valid(
-        "layers-shapes-of-many-modes",
-        "eight shapes of a piece of 18 modes, the last of which have rows of their own",
-        lambda: Plant(
-            [Stem(-1, 18)],
-            frames=3,
-            layers=2,
-            heads=LAYER_HEADS,
-            scripts={
-                (rd.SHAPES, 0, 0): [6, *(n for i in range(6) for n in row((i, 1, 0), (2, 0, -i)))],
-                (rd.SHAPES, 1, 0): [2, *row((0, 0, 1)), *row((1, 0, 0), (0, 0, 0), (0, 3, 1))],
-                (rd.SHAPES, 2, 0): [8, *(n for i in range(8) for n in refined_row((i % 3, -1, 0)))],
-            }
-            | {(rd.STEMS, level): lambda level=level: Chance(517 + level, large=6, empty=0.1) for level in range(3)},
-        ),
-    )
-    valid(
-        "layers-shapes-largest",
-        "a shape with the largest integers there are, which a refinement of Shift 0 goes back from",
-        lambda: Plant(
-            base,
-            frames=2,
-            layers=2,
-            shift=0,
-            heads=LAYER_HEADS,
-            scripts={
-                (rd.SHAPES, 0, 0): [2, *row((most, 1, 0)), *row((0, -most, 3))],
-                (rd.SHAPES, 2, 0): [2, *refined_row((-most, 0, 0)), *refined_row((0, -most, 0))],
-            }
-            | {(rd.STEMS, level): lambda level=level: Chance(521 + level, large=6, empty=0.0) for level in range(3)},
-        ),
-    )
-    valid(
-        "layers-halves",
-        "what is predicted of one vertex is half the ratio, in another basis than before, and half a step in the same",
-        lambda: Plant(
-            [Stem(-1, 1)],
-            frames=4,
-            segments=2,
-            layers=2,
-            heads={
-                0: stems_head(0.5, 0, 8, 2, IMPULSES),
-                (2, 0): stems_head(0.25, 0, 8, 2, IMPULSES),
-                (2, 1): stems_head(1.0, 0, 9, 2, base=0),
-            },
-            scripts={(rd.STEMS, 0): row((1, 0, -1), (-1, 2, 3)), (rd.STEMS, 2): row()},
-        ),
-    )
-    valid(
-        "layers-rigid-turned-300",
-        "a branch that moves as it is turned by 100, 180, 250 and 300 degrees, one after the other",
-        lambda: Plant(
-            [Stem(-1, 4, rigid=1)],
-            frames=5,
-            layers=2,
-            is_float64=True,
-            rest=exact_rest([Stem(-1, 4)], [0.0, 0, 0, 2, 0, 0, 0, 3, 0, 0, 0, 5], True),
-            heads={
-                0: stems_head(
-                    8.0, 4 << 4 | 1, 8, 5, basis_stream([[128 * (k == t) for t in range(5)] for k in range(5)], 8)
-                ),
-                2: stems_head(0.25, 1),
-            },
-            scripts={
-                (rd.STEMS, 0): [*row(), *row(*((0, 0, n) for n in (0, 7, 16, 31, 60)))],
-                (rd.STEMS, 2): [0, *refined_row((3, -5, 2))],
-            },
-        ),
-    )
-    valid(
-        "layers-rigid-from-a-point",
-        "rigid branches at one place in the first layer, where they have no rotation, and not in the next",
-        lambda: Plant(
-            [Stem(-1, 2), Stem(0, 3, 1, rigid=1), Stem(0, 3, 1, rigid=2)],
-            frames=2,
-            layers=2,
-            points=[[0, 0, 0], *[[1, 2, 3]] * 7],
-            heads=LAYER_HEADS,
-            scripts={(rd.STEMS, level): lambda level=level: Chance(525 + level, large=6) for level in range(4)}
-            | {(rd.REFINED_REST, 3, 0): lambda: Chance(529, large=4, empty=0.0)},
-        ),
-    )
-    ratios = (63000, 0.36065), (67000, 0.34967), (0.45, 0.5)
-    valid(
-        "layers-rigid-ratios-near",
-        "steps of rotations are 63000 and 67000 times those of the next layer, and less than half of them",
-        lambda: Plant(
-            [Stem(-1, 3, rigid=2)],
-            frames=6,
-            segments=3,
-            layers=2,
-            is_float64=True,
-            points=[[0, 0, 0], [3, 0, 0], [1, 4, 0]],
-            heads={0: stems_head(0.125, 1)}
-            | {
-                (2, s): stems_head(0.125 / ratio, 1, 16, 1, basis_stream([[int(size * 32768)] * 2], 16))
-                for s, (ratio, size) in enumerate(ratios)
-            },
-            scripts={(rd.STEMS, 0): [*row(), *row((1, -1, 1))]}
-            | {(rd.STEMS, 2, s): [*row(), *refined_row((1, 0, 2))] for s in range(3)},
-        ),
-    )
+base, most = [Stem(-1, 3)], (1 << 30) - 1
+valid(
+    "predicted-on-vertex-0",
+    "a stem on vertex 0, whose first vertex is no end",
+    lambda: predicted([Stem(-1, 2, flags=WHOLE), Stem(0, 3, 0)], swayed(6, 510, [Stem(-1, 2), Stem(0, 3, 0)])),
+)
+valid(
+    "rows-of-30",
+    "rows of 30 and 31 frequencies, which are expected differently",
+    lambda: Plant(
+        [Stem(-1, 9)], frames=40, scripts={(rules.STEMS, k): lambda k=k: Counts(511 + k) for k in (0, 1)}
+    ),
+)
+motion(
+    "frequencies-1023",
+    rules.STEMS,
+    1,
+    "a row codes 1023 frequencies of two: as long as a number of them can be",
+    lambda: stems_head() + write(rules.decode_stems, [1023], forked_plan(), stems_motion(stems_head(), 2), 1),
+)
+valid(
+    "basis-exponents",
+    "the exponent of a row of a basis is -200, and 400 more in the next",
+    lambda: Plant(
+        base,
+        frames=2,
+        heads={0: stems_head(0.25, 0, 2, 2, basis_in_waves(2, -200, 400, *row((1, 1, 0), (2, -1, 0)), rank=2))},
+        scripts={(rules.STEMS, 0): lambda: Chance(513)},
+    ),
+)
+motion(
+    "basis-length-one-more",
+    rules.STEMS,
+    1,
+    "Basis_Length is one more than the chunk holds",
+    lambda: struct.pack("<fBBHBI", 0.5, 0, 8, 2, 255, 1 + len(IMPULSES)) + IMPULSES,
+)
+motion(
+    "basis-length-cut",
+    rules.STEMS,
+    1,
+    "the chunk ends before the last byte of Basis_Length",
+    lambda: stems_head(0.5, 0, 8, 1)[:12],
+)
+valid(
+    "basis-of-level-0",
+    "learned bases that begin with that of level 0",
+    lambda: Plant(
+        base,
+        frames=3,
+        heads={
+            0: stems_head(0.25, 0, 8, 1, basis_stream([[99, -128, 3]], 8)),
+            1: stems_head(0.25, 0, 9, 2, basis_stream([[256, 0, -77]], 9), base=0),
+        },
+        scripts={(rules.STEMS, 0): lambda: Chance(514), (rules.STEMS, 1): lambda: Chance(515)},
+    ),
+)
+valid(
+    "corrections-of-one-frame",
+    "corrections in a segment of one frame, before which there is none",
+    lambda: Plant(base, scripts={(rules.CORRECTIONS, 1, 0): [1, *(2, 3, 1, 0), 0, 1, *(1, 0, 5, 1)]}),
+)
+valid(
+    "gaps-of-62-quarters",
+    "a distance along a stem of 15 times the mean",
+    lambda: placed([Stem(-1, 24)], [[x + 38.2 * (x > 9), 0, 0] for x in range(24)], 516, is_float64=True),
+)
+valid(
+    "layers-shapes-of-many-modes",
+    "eight shapes of a piece of 18 modes, the last of which have rows of their own",
+    lambda: Plant(
+        [Stem(-1, 18)],
+        frames=3,
+        layers=2,
+        heads=LAYER_HEADS,
+        scripts={
+            (rules.SHAPES, 0, 0): [6, *(n for i in range(6) for n in row((i, 1, 0), (2, 0, -i)))],
+            (rules.SHAPES, 1, 0): [2, *row((0, 0, 1)), *row((1, 0, 0), (0, 0, 0), (0, 3, 1))],
+            (rules.SHAPES, 2, 0): [8, *(n for i in range(8) for n in refined_row((i % 3, -1, 0)))],
+        }
+        | {(rules.STEMS, level): lambda level=level: Chance(517 + level, large=6, empty=0.1) for level in range(3)},
+    ),
+)
+valid(
+    "layers-shapes-largest",
+    "a shape with the largest integers there are, which a refinement of Shift 0 goes back from",
+    lambda: Plant(
+        base,
+        frames=2,
+        layers=2,
+        shift=0,
+        heads=LAYER_HEADS,
+        scripts={
+            (rules.SHAPES, 0, 0): [2, *row((most, 1, 0)), *row((0, -most, 3))],
+            (rules.SHAPES, 2, 0): [2, *refined_row((-most, 0, 0)), *refined_row((0, -most, 0))],
+        }
+        | {(rules.STEMS, level): lambda level=level: Chance(521 + level, large=6, empty=0.0) for level in range(3)},
+    ),
+)
+valid(
+    "layers-halves",
+    "what is predicted of one vertex is half the ratio, in another basis than before, and half a step in the same",
+    lambda: Plant(
+        [Stem(-1, 1)],
+        frames=4,
+        segments=2,
+        layers=2,
+        heads={
+            0: stems_head(0.5, 0, 8, 2, IMPULSES),
+            (2, 0): stems_head(0.25, 0, 8, 2, IMPULSES),
+            (2, 1): stems_head(1.0, 0, 9, 2, base=0),
+        },
+        scripts={(rules.STEMS, 0): row((1, 0, -1), (-1, 2, 3)), (rules.STEMS, 2): row()},
+    ),
+)
+valid(
+    "layers-rigid-turned-300",
+    "a branch that moves as it is turned by 100, 180, 250 and 300 degrees, one after the other",
+    lambda: Plant(
+        [Stem(-1, 4, rigid=1)],
+        frames=5,
+        layers=2,
+        is_float64=True,
+        rest=exact_rest([Stem(-1, 4)], [0.0, 0, 0, 2, 0, 0, 0, 3, 0, 0, 0, 5], True),
+        heads={
+            0: stems_head(
+                8.0, 4 << 4 | 1, 8, 5, basis_stream([[128 * (k == t) for t in range(5)] for k in range(5)], 8)
+            ),
+            2: stems_head(0.25, 1),
+        },
+        scripts={
+            (rules.STEMS, 0): [*row(), *row(*((0, 0, n) for n in (0, 7, 16, 31, 60)))],
+            (rules.STEMS, 2): [0, *refined_row((3, -5, 2))],
+        },
+    ),
+)
+valid(
+    "layers-rigid-from-a-point",
+    "rigid branches at one place in the first layer, where they have no rotation, and not in the next",
+    lambda: Plant(
+        [Stem(-1, 2), Stem(0, 3, 1, rigid=1), Stem(0, 3, 1, rigid=2)],
+        frames=2,
+        layers=2,
+        points=[[0, 0, 0], *[[1, 2, 3]] * 7],
+        heads=LAYER_HEADS,
+        scripts={(rules.STEMS, level): lambda level=level: Chance(525 + level, large=6) for level in range(4)}
+        | {(rules.REFINED_REST, 3, 0): lambda: Chance(529, large=4, empty=0.0)},
+    ),
+)
+ratios = (63000, 0.36065), (67000, 0.34967), (0.45, 0.5)
+valid(
+    "layers-rigid-ratios-near",
+    "steps of rotations are 63000 and 67000 times those of the next layer, and less than half of them",
+    lambda: Plant(
+        [Stem(-1, 3, rigid=2)],
+        frames=6,
+        segments=3,
+        layers=2,
+        is_float64=True,
+        points=[[0, 0, 0], [3, 0, 0], [1, 4, 0]],
+        heads={0: stems_head(0.125, 1)}
+        | {
+            (2, s): stems_head(0.125 / ratio, 1, 16, 1, basis_stream([[int(size * 32768)] * 2], 16))
+            for s, (ratio, size) in enumerate(ratios)
+        },
+        scripts={(rules.STEMS, 0): [*row(), *row((1, -1, 1))]}
+        | {(rules.STEMS, 2, s): [*row(), *refined_row((1, 0, 2))] for s in range(3)},
+    ),
+)
 
 
-at_limits_of_motion()
 
 
-def at_limits_of_rest_poses() -> None:
-    valid(
-        "time-uneven-empty",
-        "TIME of Method 2 without a stream: its bits are ones, and the only time is the least that there is",
-        lambda: lone(time=b"\2"),
-    )
-    valid(
-        "rest-connected-own-opposite",
-        "a quadrangle whose corners one and three are the same vertex, behind those between them",
-        lambda: meshed([Stem(-1, 5)], [[3, 0, 3, 1], [0, 1, 2], [2, 3, 4]], Chance(530, large=5)),
-    )
-    valid(
-        "rest-copies-between",
-        "the last turn of a shape is two and a half steps of the next copy, but for rounding",
-        lambda: copy_of((36, 0, 0), (0, 0, 1, 0), (15, 0, 3, 0), *[(0, 0, 0, 0), (15, 0, 0, 0)] * 3),
-    )
-    points = [Stem(-1, 1, lag=2), Stem(-1, 1, lag=2), Stem(-1, 1, lag=2, detail=100), Stem(-1, 1, lag=2, detail=100)]
-    far = [10**9, 495 * 10**6, 515 * 10**6]  # units in x, in y and z pairs of them
-    valid(
-        "rest-adaptive-far",
-        "what is expected by the weights is 10^9 units, a little less, or more than is allowed",
-        lambda: with_rest(points, adaptive_rest(points, [0, *far, 0, 0, 0, *(-n for n in far), 0, 0, 0], rest_type=1)),
-    )
+valid(
+    "time-uneven-empty",
+    "TIME of Method 2 without a stream: its bits are ones, and the only time is the least that there is",
+    lambda: lone(time=b"\2"),
+)
+valid(
+    "rest-connected-own-opposite",
+    "a quadrangle whose corners one and three are the same vertex, behind those between them",
+    lambda: meshed([Stem(-1, 5)], [[3, 0, 3, 1], [0, 1, 2], [2, 3, 4]], Chance(530, large=5)),
+)
+valid(
+    "rest-copies-between",
+    "the last turn of a shape is two and a half steps of the next copy, but for rounding",
+    lambda: copy_of((36, 0, 0), (0, 0, 1, 0), (15, 0, 3, 0), *[(0, 0, 0, 0), (15, 0, 0, 0)] * 3),
+)
+points = [Stem(-1, 1, lag=2), Stem(-1, 1, lag=2), Stem(-1, 1, lag=2, detail=100), Stem(-1, 1, lag=2, detail=100)]
+far = [10**9, 495 * 10**6, 515 * 10**6]  # units in x, in y and z pairs of them
+valid(
+    "rest-adaptive-far",
+    "what is expected by the weights is 10^9 units, a little less, or more than is allowed",
+    lambda: with_rest(points, adaptive_rest(points, [0, *far, 0, 0, 0, *(-n for n in far), 0, 0, 0], rest_type=1)),
+)
 
 
-at_limits_of_rest_poses()
 
 
 def of_sizes(*powers: int) -> list[list[float]]:
@@ -4883,7 +4984,7 @@ def of_any_size(*powers: int) -> Plant:
         is_float64=True,
         rest=exact_rest(stems, [x for point in of_sizes(*powers) for x in point], True),
         heads={level: stems_head(1e38, 3 << 4 | 4) for level in range(3)},
-        scripts={(rd.STEMS, 1): [*row() * 4, *(value for each in turned for value in each)]},
+        scripts={(rules.STEMS, 1): [*row() * 4, *(value for each in turned for value in each)]},
     )
 
 
@@ -4899,46 +5000,44 @@ def shrunk(last: int) -> Plant:
             0: stems_head(0.25, 0, 16, 18, basis_stream(known, 16)),
             1: stems_head(0.25, 0, 2, 19, in_waves, base=0),
         },
-        scripts={(rd.STEMS, 1): row(*[(0, 0, 0)] * 18, (50, -30, 10))},
+        scripts={(rules.STEMS, 1): row(*[(0, 0, 0)] * 18, (50, -30, 10))},
     )
 
 
-def at_limits_of_algebra() -> None:
-    rounded = (263597123, 32053444), (241475353, 36228921), (79323412, 26324395), (170050111, 70213091)
+rounded = (263597123, 32053444), (241475353, 36228921), (79323412, 26324395), (170050111, 70213091)
+valid(
+    "rigid-tiny",
+    "branches that move as they are, of 1e-78 to 1e-84 and of 1e-160: squares of their moments are 0",
+    lambda: of_any_size(*[*range(-274, -265)] * 2, *[-268] * 12, -279, -276, -260, *[*range(-536, -531)] * 2),
+)
+valid(
+    "rigid-huge",
+    "rigid branches of 1e77 to 1e150: squares of their moments are infinite, and nothing is reduced",
+    lambda: of_any_size(250, 257, 258, 259, 260, 300, 400, 500),
+)
+for side, last in (("above", 6448), ("below", 6405)):
     valid(
-        "rigid-tiny",
-        "branches that move as they are, of 1e-78 to 1e-84 and of 1e-160: squares of their moments are 0",
-        lambda: of_any_size(*[*range(-274, -265)] * 2, *[-268] * 12, -279, -276, -260, *[*range(-536, -531)] * 2),
+        f"basis-short-{side}",
+        f"a row of a basis whose squares add up to {side} 1e-200, since the known rows are no unit vectors",
+        lambda last=last: shrunk(last),
     )
-    valid(
-        "rigid-huge",
-        "rigid branches of 1e77 to 1e150: squares of their moments are infinite, and nothing is reduced",
-        lambda: of_any_size(250, 257, 258, 259, 260, 300, 400, 500),
-    )
-    for side, last in (("above", 6448), ("below", 6405)):
-        valid(
-            f"basis-short-{side}",
-            f"a row of a basis whose squares add up to {side} 1e-200, since the known rows are no unit vectors",
-            lambda last=last: shrunk(last),
-        )
-    valid(
-        "basis-rounded",
-        "rows of bases, of which an entry is within 2^-56 of the middle between two numbers of binary32",
-        lambda: Plant(
-            [Stem(-1, 2)],
-            frames=8,
-            segments=4,
-            heads={
-                (0, s): stems_head(0.25, 0, 2, 1, basis_in_waves(2, 0, *row((a, 0, 0), (b, 0, 0)), rank=1))
-                for s, (a, b) in enumerate(rounded)
-            },
-            is_float64=True,
-            scripts={(rd.STEMS, 0): [*row((1, 3, 0)), *row((0, 1, 7))]},
-        ),
-    )
+valid(
+    "basis-rounded",
+    "rows of bases, of which an entry is within 2^-56 of the middle between two numbers of binary32",
+    lambda: Plant(
+        [Stem(-1, 2)],
+        frames=8,
+        segments=4,
+        heads={
+            (0, s): stems_head(0.25, 0, 2, 1, basis_in_waves(2, 0, *row((a, 0, 0), (b, 0, 0)), rank=1))
+            for s, (a, b) in enumerate(rounded)
+        },
+        is_float64=True,
+        scripts={(rules.STEMS, 0): [*row((1, 3, 0)), *row((0, 1, 7))]},
+    ),
+)
 
 
-at_limits_of_algebra()
 
 
 # ---- what no encoder writes, and decoders may take for granted ------------------------------------------------
@@ -4947,16 +5046,16 @@ valid(
     "faces-of-8-bytes",
     "vertices and numbers of corners in 8 bytes: behind their largest one is none of 64 bits",
     lambda: with_static(
-        (rd.FACES, mixed_polygons([[0, 1, 2], [3, 2, 1, 0], [4]], types=("<u8", ">u8"))),
-        (rd.EDGES, polygons(np.array([[0, 1], [4, 3]], ">u8"))),
+        (rules.FACES, mixed_polygons([[0, 1, 2], [3, 2, 1, 0], [4]], types=("<u8", ">u8"))),
+        (rules.EDGES, polygons(np.array([[0, 1], [4, 3]], ">u8"))),
     ),
 )
 valid(
     "faces-of-8-bytes-absolute",
     "the same by their numbers, and with signs; edges that the hierarchy implies",
     lambda: with_static(
-        (rd.FACES, mixed_polygons([[0, 1, 2], [3, 2, 1, 0], [4]], types=(">u8", "<i8"), absolute=True)),
-        (rd.EDGES, derived(">u8")),
+        (rules.FACES, mixed_polygons([[0, 1, 2], [3, 2, 1, 0], [4]], types=(">u8", "<i8"), absolute=True)),
+        (rules.EDGES, derived(">u8")),
     ),
 )
 static(
@@ -4974,7 +5073,7 @@ static(
     "a face of 2^30 - 1 corners, a number of 8 bytes",
     faces(
         polygon_head("<u8", 1, 3, ">u8")
-        + write(rd.decode_polygons, [(1 << 30) - 1], rd.PolygonShape(3, 11, False, False, 1, 0, 3), 5)
+        + write(rules.decode_polygons, [(1 << 30) - 1], polygon_shape(3, 11, False, 1, 0, 3), 5)
     ),
 )
 static("edges-of-8-bytes-beyond", "an edge to vertex 5 of 5", edges(polygons(np.array([[0, 5]], ">u8"))))
@@ -4982,14 +5081,15 @@ static("edges-of-8-bytes-beyond", "an edge to vertex 5 of 5", edges(polygons(np.
 
 def with_source(draft: Draft, seed: int) -> Draft:
     """A last level that is up to 2^22 numbers away from the one before it."""
-    file, level, chance = rd.AthFile(draft.file()), draft.header["level_count"], Chance(seed, large=22)
+    file, level, chance = rules.open_file(draft.file()), draft.header["level_count"], Chance(seed, large=22)
+    plans = rules.shown_plans(file, level - 1)
 
     def stream(s: int) -> bytes:
-        positions = file._segment(s, level - 1)
-        differences = [chance.answer("signed", 0) for _ in range(positions.size)]
-        return write(rd.decode_exact, [(abs(n), n < 0) for n in differences], positions)
+        positions = rules.decode_segment(file, plans, s, level - 1)
+        differences = [chance.answer("signed", 0) for track in positions for x in track for _ in x]
+        return write(rules.decode_exact, [(abs(n), n < 0) for n in differences], positions, file.header.is_float64)
 
-    added = [Entry(rd.EXACT, stream(s), level, s) for s in range(draft.header["segment_count"])]
+    added = [Entry(rules.EXACT, stream(s), level, s) for s in range(draft.header["segment_count"])]
     joins_there = draft.joins and (*draft.joins, *joins(*(0,) * len(added)))
     return replace(draft, joins=joins_there).with_header(level_count=level + 1, full_level_count=level + 1).add(*added)
 
@@ -5009,7 +5109,9 @@ for name_, more_ in (("", {}), ("-wide", {"is_float64": True, "origin": (3.0, -1
         "level 0 is joined",
         lambda more_=more_: with_source(
             replace(
-                predicted(ROOTED, SOURCE_FRAMES, 2, scripts={(rd.AFFINES, 0): lambda: Chance(153, large=4)}, **more_),
+                predicted(
+                    ROOTED, SOURCE_FRAMES, 2, scripts={(rules.AFFINES, 0): lambda: Chance(153, large=4)}, **more_
+                ),
                 frames=20,
                 repeats=(0, 1, 0, 0, 1, 1, 0, 0, 0, 1) + (0, 0, 0, 1, 0, 0, 1, 0, 1, 1),
                 joins=joins(0, 2.5, 0, 0),
@@ -5046,13 +5148,13 @@ def with_copies(stems: Sequence[int | Stem], *script: list, step: float = 0.3, s
 
 def broken_rest(make: Callable[[], Plant], goes_on: bool = True) -> Draft:
     """The file, whose rest pose is refused, and may go on behind that; all else is as in one that stands still."""
-    kept, rd.require = rd.require, (lambda *_: None) if goes_on else rd.require
+    kept, rules.require = rules.require, (lambda *_: None) if goes_on else rules.require
     try:
         plant = make()
     finally:
-        rd.require = kept
+        rules.require = kept
     rest = adaptive_rest(plant.stems, [], 0.3, rest_type=1)
-    return replace(plant, rest=rest).draft().change(rd.REST, content=plant.rest)
+    return replace(plant, rest=rest).draft().change(rules.REST, content=plant.rest)
 
 
 def copy_of(tip: tuple[int, int, int], *places: Sequence[int], largest: int = 0) -> Plant:
@@ -5168,10 +5270,10 @@ def meshed(stems: list[Stem], faces: list[list[int]], script: list | Chance, **f
     """An adaptive rest pose by faces, of any sizes."""
     count, step = sum(stem.count for stem in stems), 0.3
     content = mixed_polygons(faces, count)
-    shape, stream = rd.parse_polygons(content, rd.FACES, rd.Limits())
-    mesh = rd.build_mesh(*rd.decode_polygons(stream, shape, count), list(range(count)))
-    coded = write(rd.decode_rest, script, branches_of(stems), step, None, True, mesh)
-    bits = rd.REST_ADAPTIVE | rd.REST_CONNECTED
+    shape, stream = rules.parse_polygons(content, rules.FACES)
+    mesh = rules.build_mesh(*rules.decode_polygons(stream, shape, count), list(range(count)))
+    coded = write(rules.decode_rest, script, branches_of(stems), step, None, True, mesh)
+    bits = REST_ADAPTIVE | REST_CONNECTED
     return with_rest(stems, rest_chunk(coded, step=step, rest_type=1, reserved=bits >> 2), faces=content, **fields)
 
 
@@ -5351,7 +5453,7 @@ STIFF = [  # in one, two or three layers, with others on them
 def stiff(seed: int, **fields) -> Plant:
     """STIFF in three layers, of which the first has rotations of any size."""
     plant = refinements(STIFF, seed, large=5, is_float64=True, **fields)
-    plant.scripts |= {(rd.STEMS, level): lambda level=level: Turns(seed + level) for level in range(5)}
+    plant.scripts |= {(rules.STEMS, level): lambda level=level: Turns(seed + level) for level in range(5)}
     return plant
 
 
@@ -5391,8 +5493,8 @@ valid(
         is_float64=True,
         rest=exact_rest([Stem(-1, 4)], [0.0, 0, 0, 2, 0, 0, 0, 3, 0, 0, 0, 5], True),
         heads={0: stems_head(8.0, 4 << 4 | 1), 2: stems_head(0.25, 1)},
-        scripts={(rd.STEMS, 0, s): [*row(), *row(turn)] for s, turn in enumerate(HALF_TURNS)}
-        | {(rd.STEMS, 2, s): [0, *refined_row((3, -5, 2))] for s in range(5)},
+        scripts={(rules.STEMS, 0, s): [*row(), *row(turn)] for s, turn in enumerate(HALF_TURNS)}
+        | {(rules.STEMS, 2, s): [0, *refined_row((3, -5, 2))] for s in range(5)},
     ),
 )
 
@@ -5406,7 +5508,7 @@ valid(
 valid(
     "clips-long-segments",
     "512 frames in two segments, of which all but two are repeats",
-    lambda: lone(clips=(rd.Clip(512, 2, "long"),), repeats=(0, *(1,) * 255) * 2),
+    lambda: lone(clips=(Clip(512, 2, "long"),), repeats=(0, *(1,) * 255) * 2),
 )
 
 
@@ -5415,7 +5517,7 @@ def errors_by_chance(count: int) -> tuple[int, ...]:
     random, last, errors = np.random.default_rng(411), [4000] * 3, []
     for _ in range(count):
         step = random.choice([1, 3, 30, 400, 5000], 3) * random.integers(-2, 3, 3)
-        last = np.clip(np.array(last) + step, 0, rd.SHORT_FLOATS - 1).tolist()
+        last = np.clip(np.array(last) + step, 0, rules.SHORT_FLOATS - 1).tolist()
         errors += last
     return tuple(errors)
 
@@ -5435,7 +5537,7 @@ valid(
         frames=8,
         is_float64=True,
         points=[[0, 0, 0], [1, 0, 2], [2, 0, 4], [1, 3, 2], [1, 5, 3]],
-        scripts={(rd.AFFINES, 0): [0, *row(), *row(), *row(*[(k == 2, k == 5, 3 - k) for k in range(8)])]},
+        scripts={(rules.AFFINES, 0): [0, *row(), *row(), *row(*[(k == 2, k == 5, 3 - k) for k in range(8)])]},
     ),
 )
 
@@ -5448,7 +5550,7 @@ valid(
         frames=66,
         is_float64=True,
         points=[[0, 0, 0]],
-        scripts={(rd.STEMS, 0): row((0, 0, 0), (0, 0, 0), (0, 0, 0), (1, -3, 7))},
+        scripts={(rules.STEMS, 0): row((0, 0, 0), (0, 0, 0), (0, 0, 0), (1, -3, 7))},
     ),
 )
 
@@ -5504,18 +5606,18 @@ def in_runs() -> Plant:
 
 def corrected_lone(stream: Callable[[bytes], bytes], **fields) -> Draft:
     """A vertex with other bytes in place of a stream of CORRECTIONS that corrects nothing."""
-    draft = lone(scripts={(rd.CORRECTIONS, 1): [0]}, **fields).draft()
-    content = draft.content(rd.CORRECTIONS, 1, 0)
-    return draft.change(rd.CORRECTIONS, 1, 0, content=content[:4] + stream(content[4:]))
+    draft = lone(scripts={(rules.CORRECTIONS, 1): [0]}, **fields).draft()
+    content = draft.content(rules.CORRECTIONS, 1, 0)
+    return draft.change(rules.CORRECTIONS, 1, 0, content=content[:4] + stream(content[4:]))
 
 
 def of_memory(vertices: int) -> Draft:
     """128 frames, whose first fault behind the front is a checksum."""
-    return lone().draft().with_header(vertex_count=vertices, frame_count=128).change(rd.HIERARCHY, checksum=0)
+    return lone().draft().with_header(vertex_count=vertices, frame_count=128).change(rules.HIERARCHY, checksum=0)
 
 
 def derived_edges(*counts: int) -> Draft:
-    return still([Stem(-1, count) for count in counts]).draft().add(Entry(rd.EDGES, derived("|i1")))
+    return still([Stem(-1, count) for count in counts]).draft().add(Entry(rules.EDGES, derived("|i1")))
 
 
 def of_range(max_error: int) -> Draft:
@@ -5524,7 +5626,7 @@ def of_range(max_error: int) -> Draft:
     return (
         lone()
         .draft()
-        .add(Entry(rd.CLIPS, b"".join(clips), checksum=0))
+        .add(Entry(rules.CLIPS, b"".join(clips), checksum=0))
         .with_header(
             vertex_count=13,
             branch_count=2,
@@ -5534,7 +5636,7 @@ def of_range(max_error: int) -> Draft:
             level_count=2,
             clip_count=25,
             layer_count=4,
-            max_error=rd.from_bits(max_error, 64),
+            max_error=rules.from_bits(max_error, 64),
         )
     )
 
@@ -5565,165 +5667,164 @@ def hardly_apart(step: float, steered: Sequence[tuple[int, int]] = STEERED, x: i
     ]
     stems, step = [Stem(-1, 4), *TURNING], float(np.float32(step))
     rest, branches = adaptive_rest(stems, script, step, rest_type=1), branches_of(stems)
-    reference = np.array(rd.decode_rest(rest[17:], branches, step, None, True).rest)
-    content = write(rd.BentPose, Chance(507, large=6, empty=0.0), branches, step, reference)
+    reference = rules.decode_rest(rest[17:], branches, step, None, True).rest
+    content = write(rules.decode_source_rest, Chance(507, large=6, empty=0.0), branches, step, reference)
     return still(stems, rest=rest, source_rest=source_rest_chunk(content, step), is_float64=True)
 
 
-def at_their_bounds() -> None:
-    valid("predicted-long-runs", "runs of copied frames of up to 12, of which those from 7 on are alike", in_runs)
-    valid(
-        "predicted-settings-16",
-        "points of the lattice, with Memory 0 and Common 0",
-        lambda: predicted(ROOTED, [[0, 1, *frame_points(ROOTED, 530 + t)] for t in range(8)], settings=16),
-    )
-    invalid(
-        "predicted-step-infinite",
-        "BAD_CHUNK",
-        1,
-        "Step is infinite",
-        lambda: swaying().change(*PREDICTED_PLACE, content=predicted_head(INFINITY)),
-    )
-    valid(
-        "predicted-short-exactly",
-        "a step and a way at rest whose squares add up to 1e-60, which is no more than that",
-        lambda: predicted(
-            [Stem(-1, 3, flags=WHOLE)],
-            swayed(6, 140, [Stem(-1, 3, flags=WHOLE)], follow=1.0, still=0.1),
-            rest=exact_rest(
-                [Stem(-1, 3)], [0, 0, 0, 0, 3e-31, 2e-31, 9.50870501981432e-31, 2.9299366694240276e-31, 0], True
-            ),
-            predicted=predicted_head(1e-31),
-            is_float64=True,
+valid("predicted-long-runs", "runs of copied frames of up to 12, of which those from 7 on are alike", in_runs)
+valid(
+    "predicted-settings-16",
+    "points of the lattice, with Memory 0 and Common 0",
+    lambda: predicted(ROOTED, [[0, 1, *frame_points(ROOTED, 530 + t)] for t in range(8)], settings=16),
+)
+invalid(
+    "predicted-step-infinite",
+    "BAD_CHUNK",
+    1,
+    "Step is infinite",
+    lambda: swaying().change(*PREDICTED_PLACE, content=predicted_head(INFINITY)),
+)
+valid(
+    "predicted-short-exactly",
+    "a step and a way at rest whose squares add up to 1e-60, which is no more than that",
+    lambda: predicted(
+        [Stem(-1, 3, flags=WHOLE)],
+        swayed(6, 140, [Stem(-1, 3, flags=WHOLE)], follow=1.0, still=0.1),
+        rest=exact_rest(
+            [Stem(-1, 3)], [0, 0, 0, 0, 3e-31, 2e-31, 9.50870501981432e-31, 2.9299366694240276e-31, 0], True
         ),
-    )
+        predicted=predicted_head(1e-31),
+        is_float64=True,
+    ),
+)
+valid(
+    "tangent-short-exactly",
+    "a stem whose squares add up to 1e-200, which has no direction",
+    lambda: placed(
+        [Stem(-1, 2), Stem(0, 2, 1)],
+        [[0, 0, 0], [2.207934554570487e-101, 9.753205883335675e-101, 0], [0, 1, 1], [0, 2, 1]],
+        138,
+    ),
+)
+valid(
+    "source-rest-attached-to-0",
+    "beams that hang on vertex 0, and on the first vertex of such; runs of 31 and 32; a root of one vertex",
+    lambda: attached_rest(503, 504),
+)
+for side, step in (("above", 1.238e-29), ("below", 1.2015e-29)):
     valid(
-        "tangent-short-exactly",
-        "a stem whose squares add up to 1e-200, which has no direction",
-        lambda: placed(
-            [Stem(-1, 2), Stem(0, 2, 1)],
-            [[0, 0, 0], [2.207934554570487e-101, 9.753205883335675e-101, 0], [0, 1, 1], [0, 2, 1]],
-            138,
-        ),
+        f"source-rest-short-{side}",
+        f"a beam of {side} 1e-100 in the reference pose, which has a direction or none",
+        lambda step=step: hardly_apart(step),
     )
-    valid(
-        "source-rest-attached-to-0",
-        "beams that hang on vertex 0, and on the first vertex of such; runs of 31 and 32; a root of one vertex",
-        lambda: attached_rest(503, 504),
-    )
-    for side, step in (("above", 1.238e-29), ("below", 1.2015e-29)):
-        valid(
-            f"source-rest-short-{side}",
-            f"a beam of {side} 1e-100 in the reference pose, which has a direction or none",
-            lambda step=step: hardly_apart(step),
-        )
-    valid(
-        "source-rest-short-exactly",
-        "a beam whose squares add up to 1e-200, which has no direction",
-        lambda: hardly_apart(3.713893830124435e-38, STEERED_TWICE, 121709354, 40038661),
-    )
-    valid(
-        "source-rest-exact-no-bytes",
-        "the very numbers of the source by a stream of no bytes, whose decisions are all 1",
-        lambda: still(FORK, source_rest=source_rest_chunk(b"", method=1)),
-    )
-    valid(
-        "shapes-of-rigid",
-        "SHAPES of rigid stems, which have no modes: both levels have a number of shapes of each, 0",
-        lambda: moving(
-            LONE_STEMS,
-            505,
-            heads=HEADS,
-            scripts=moving(LONE_STEMS, 505).scripts
-            | {
-                (rd.SHAPES, 0, 0): [0, 6, *(n for i in range(6) for n in row((1, i, 0), (0, 2, 5 - i))), 0],
-                (rd.SHAPES, 1, 0): [0, 2, *row((0, 1, 0)), *row((0, 0, 1), (4, 0, 0)), 0],
-            },
-        ),
-    )
-    valid(
-        "corrections-no-bytes",
-        "a stream of no bytes, whose decisions are all 1: the largest corrections of all frames",
-        lambda: corrected_lone(lambda stream: b"", frames=3),
-    )
-    valid(
-        "corrections-negative-zero",
-        "positions that are -0.0 stay so where nothing is corrected",
-        lambda: Plant(
-            [Stem(-1, 1), Stem(-1, 1)],
-            frames=5,
-            points=[[0.0, 0.0, 0.0]] * 2,
-            default_head=stems_head(FLOAT_TINY),
-            scripts={
-                (rd.STEMS, 0): [*row((-1, -1, 1)), *row((-1, 1, -1))],
-                (rd.CORRECTIONS, 1): [0, 1, 0, 0, 1, 0, 1, 0, 2, 0, 0, 0, 0],
-            },
-        ),
-    )
-    valid(
-        "stream-to-its-end",
-        "a stream of all the bytes that are read, the last ones of which say nothing",
-        lambda: corrected_lone(lambda stream: stream.ljust(7, b"\0") + b"\1"),
-    )
-    invalid(
-        "stream-behind-its-end",
-        "BAD_CHUNK",
-        1,
-        "a stream of one byte more than is read",
-        lambda: corrected_lone(lambda stream: stream.ljust(8, b"\0") + b"\1"),
-    )
-    valid(
-        "unknown-optional-numbers",
-        "chunks whose Kind is written out behind the numbers 17 to 31, which all say that it is",
-        lambda: fork().add(
-            Entry(rd.METADATA, b"\0{}", number=31),
-            Entry(0x8009, FUTURE, number=17),
-            Entry(0x800F, b"", number=30),
-            Entry(0x8018, FUTURE, 0, 1, number=24),
-            Entry(0x801F, FUTURE, 1, 1, number=18),
-            Entry(0x8022, FUTURE, number=31),
-            Entry(0x8022, FUTURE, number=20),
-        ),
-    )
-    invalid(
-        "memory-exactly",
-        "BAD_CHECKSUM",
-        "open",
-        "2^18 vertices of 128 frames take Max_Memory_Bytes: what is wrong is HIERARCHY",
-        lambda: of_memory(1 << 18),
-    )
-    invalid(
-        "memory-of-one-more",
-        "LIMIT_EXCEEDED",
-        "open",
-        "2^18 + 1 vertices of 128 frames take more than Max_Memory_Bytes",
-        lambda: of_memory((1 << 18) + 1),
-    )
-    invalid(
-        "front-range",
-        "BAD_CHECKSUM",
-        "open",
-        "amid Max_Error the range is just 2^32, twice, which is not less: what is wrong is CLIPS",
-        lambda: of_range(7 << 57),
-    )
-    valid(
-        "edges-derived-127",
-        "derived edges of 128 vertices, the last of which is the largest number of |i1",
-        lambda: derived_edges(*[2] * 64),
-    )
-    invalid(
-        "edges-derived-128", "BAD_CHUNK", "static", "129 vertices do not fit |i1", lambda: derived_edges(*[2] * 63, 3)
-    )
-    valid(
-        "rest-connected-most",
-        "a rest pose by four faces and eight corners for each vertex",
-        lambda: meshed(
-            FORK,
-            [[(i + k * (1 + i % 3)) % 5 for k in range(3 if i < 6 else 2 if i < 14 else 1)] for i in range(20)],
-            Chance(506, large=5),
-        ),
-    )
-    refinement("ratio-cut", rd.STEMS, "STEMS of a refinement of 1 byte", b"\4")
+valid(
+    "source-rest-short-exactly",
+    "a beam whose squares add up to 1e-200, which has no direction",
+    lambda: hardly_apart(3.713893830124435e-38, STEERED_TWICE, 121709354, 40038661),
+)
+valid(
+    "source-rest-exact-no-bytes",
+    "the very numbers of the source by a stream of no bytes, whose decisions are all 1",
+    lambda: still(FORK, source_rest=source_rest_chunk(b"", method=1)),
+)
+valid(
+    "shapes-of-rigid",
+    "SHAPES of rigid stems, which have no modes: both levels have a number of shapes of each, 0",
+    lambda: moving(
+        LONE_STEMS,
+        505,
+        heads=HEADS,
+        scripts=moving(LONE_STEMS, 505).scripts
+        | {
+            (rules.SHAPES, 0, 0): [0, 6, *(n for i in range(6) for n in row((1, i, 0), (0, 2, 5 - i))), 0],
+            (rules.SHAPES, 1, 0): [0, 2, *row((0, 1, 0)), *row((0, 0, 1), (4, 0, 0)), 0],
+        },
+    ),
+)
+valid(
+    "corrections-no-bytes",
+    "a stream of no bytes, whose decisions are all 1: the largest corrections of all frames",
+    lambda: corrected_lone(lambda stream: b"", frames=3),
+)
+valid(
+    "corrections-negative-zero",
+    "positions that are -0.0 stay so where nothing is corrected",
+    lambda: Plant(
+        [Stem(-1, 1), Stem(-1, 1)],
+        frames=5,
+        points=[[0.0, 0.0, 0.0]] * 2,
+        default_head=stems_head(FLOAT_TINY),
+        scripts={
+            (rules.STEMS, 0): [*row((-1, -1, 1)), *row((-1, 1, -1))],
+            (rules.CORRECTIONS, 1): [0, 1, 0, 0, 1, 0, 1, 0, 2, 0, 0, 0, 0],
+        },
+    ),
+)
+valid(
+    "stream-to-its-end",
+    "a stream of all the bytes that are read, the last ones of which say nothing",
+    lambda: corrected_lone(lambda stream: stream.ljust(7, b"\0") + b"\1"),
+)
+invalid(
+    "stream-behind-its-end",
+    "BAD_CHUNK",
+    1,
+    "a stream of one byte more than is read",
+    lambda: corrected_lone(lambda stream: stream.ljust(8, b"\0") + b"\1"),
+)
+valid(
+    "unknown-optional-numbers",
+    "chunks whose Kind is written out behind the numbers 17 to 31, which all say that it is",
+    lambda: fork().add(
+        Entry(rules.METADATA, b"\0{}", number=31),
+        Entry(0x8009, FUTURE, number=17),
+        Entry(0x800F, b"", number=30),
+        Entry(0x8018, FUTURE, 0, 1, number=24),
+        Entry(0x801F, FUTURE, 1, 1, number=18),
+        Entry(0x8022, FUTURE, number=31),
+        Entry(0x8022, FUTURE, number=20),
+    ),
+)
+invalid(
+    "memory-exactly",
+    "BAD_CHECKSUM",
+    "open",
+    "2^18 vertices of 128 frames take Max_Memory_Bytes: what is wrong is HIERARCHY",
+    lambda: of_memory(1 << 18),
+)
+invalid(
+    "memory-of-one-more",
+    "LIMIT_EXCEEDED",
+    "open",
+    "2^18 + 1 vertices of 128 frames take more than Max_Memory_Bytes",
+    lambda: of_memory((1 << 18) + 1),
+)
+invalid(
+    "front-range",
+    "BAD_CHECKSUM",
+    "open",
+    "amid Max_Error the range is just 2^32, twice, which is not less: what is wrong is CLIPS",
+    lambda: of_range(7 << 57),
+)
+valid(
+    "edges-derived-127",
+    "derived edges of 128 vertices, the last of which is the largest number of |i1",
+    lambda: derived_edges(*[2] * 64),
+)
+invalid(
+    "edges-derived-128", "BAD_CHUNK", "static", "129 vertices do not fit |i1", lambda: derived_edges(*[2] * 63, 3)
+)
+valid(
+    "rest-connected-most",
+    "a rest pose by four faces and eight corners for each vertex",
+    lambda: meshed(
+        FORK,
+        [[(i + k * (1 + i % 3)) % 5 for k in range(3 if i < 6 else 2 if i < 14 else 1)] for i in range(20)],
+        Chance(506, large=5),
+    ),
+)
+refinement("ratio-cut", rules.STEMS, "STEMS of a refinement of 1 byte", b"\4")
 
 
 def attached_rest(seed: int, reference_seed: int) -> Plant:
@@ -5733,7 +5834,6 @@ def attached_rest(seed: int, reference_seed: int) -> Plant:
     )
 
 
-at_their_bounds()
 
 # ---- valid: of real size -------------------------------------------------------------------------------------
 
