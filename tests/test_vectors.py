@@ -16,7 +16,7 @@ sys.path.append(str(ROOT))  # for spec, which is not installed; athcodec stays t
 
 from athcodec import container, errors  # noqa: E402
 from athcodec.ath_file import AthFile  # noqa: E402
-from spec import conformance, make_vectors  # noqa: E402
+from spec import conformance, make  # noqa: E402
 
 VECTORS = conformance.vectors()
 
@@ -113,13 +113,13 @@ def check_scripts(vectors):
 
 
 def test_some_scripts_still_make_the_very_same_files():
-    check_scripts(make_vectors.VECTORS[::16])
+    check_scripts(make.VECTORS[::16])
 
 
 @pytest.mark.slow
 def test_scripts_still_make_the_very_same_files():
     """How they were made stays true."""
-    check_scripts(make_vectors.VECTORS)
+    check_scripts(make.VECTORS)
 
 
 def test_existing_vectors_are_left_alone(tmp_path):
@@ -128,10 +128,10 @@ def test_existing_vectors_are_left_alone(tmp_path):
     (folder / "valid").mkdir(parents=True)
     (folder / "valid/smallest.ath").write_bytes(b"older")
     others = "\n".join(
-        f"{vector.path} 00000000 # there" for vector in make_vectors.VECTORS if vector.name not in ("smallest", "smallest-wide")
+        f"{vector.path} 00000000 # there" for vector in make.VECTORS if vector.name not in ("smallest", "smallest-wide")
     )
     listed.write_text(f"# head\n{kept}\n{others}\n")
-    assert make_vectors.make(folder=folder) == 1
+    assert make.write(folder=folder) == 1
     assert (folder / "valid/smallest.ath").read_bytes() == b"older" and kept in listed.read_text()
     assert (folder / "valid/smallest-wide.ath").exists() and "valid/smallest-wide.ath" in listed.read_text()
 
