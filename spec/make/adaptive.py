@@ -72,12 +72,15 @@ def adaptive_fork() -> bytes:
 
 prelude("adaptive-zero-behind", rules.REST, "a zero byte behind an adaptive rest pose", lambda: adaptive_fork() + b"\0")
 prelude("adaptive-bytes-behind", rules.REST, "bytes behind an adaptive rest pose", lambda: adaptive_fork() + b"\1" * 12)
-points = [Stem(-1, 1, lag=2), Stem(-1, 1, lag=2), Stem(-1, 1, lag=2, detail=100), Stem(-1, 1, lag=2, detail=100)]
-far = [10**9, 495 * 10**6, 515 * 10**6]  # units in x, in y and z pairs of them
+LONE_POINTS = [Stem(-1, 1, lag=2), Stem(-1, 1, lag=2), Stem(-1, 1, lag=2, detail=100), Stem(-1, 1, lag=2, detail=100)]
+FAR_UNITS = [10**9, 495 * 10**6, 515 * 10**6]  # units in x, in y and z pairs of them
 valid(
     "rest-adaptive-far",
     "what is expected by the weights is 10^9 units, a little less, or more than is allowed",
-    lambda: with_rest(points, adaptive_rest(points, [0, *far, 0, 0, 0, *(-n for n in far), 0, 0, 0], rest_type=1)),
+    lambda: with_rest(
+        LONE_POINTS,
+        adaptive_rest(LONE_POINTS, [0, *FAR_UNITS, 0, 0, 0, *(-n for n in FAR_UNITS), 0, 0, 0], rest_type=1),
+    ),
 )
 LAGS = [Stem(-1, 12, lag=4), Stem(0, 17, 2, lag=5), Stem(0, 262, 4, SHEET, lag=256)]
 valid(

@@ -223,9 +223,9 @@ def not_refused(make: Callable[[], Draft]) -> bytes:
         rules.require = kept
 
 
-longest, many = 1 << 20, 1 << 25
+LONGEST_TEXT, MANY_CORNERS = 1 << 20, 1 << 25
 IMPULSES = basis_stream([[128, 0], [0, 128]], 8)  # a learned basis of two frames: each alone
-base, most = [Stem(-1, 3)], (1 << 30) - 1
+SHORT, LARGEST = [Stem(-1, 3)], (1 << 30) - 1
 
 
 def copied(rank: int, place: Sequence[int] = (0, 0, 0, 0), largest: int = 0, mirrored: int = 0, bent: int = 0) -> list:

@@ -209,7 +209,7 @@ valid(
     "basis-exponents",
     "the exponent of a row of a basis is -200, and 400 more in the next",
     lambda: Plant(
-        base,
+        SHORT,
         frames=2,
         heads={0: stems_head(0.25, 0, 2, 2, basis_in_waves(2, -200, 400, *row((1, 1, 0), (2, -1, 0)), rank=2))},
         scripts={(rules.STEMS, 0): lambda: Chance(513)},
@@ -233,7 +233,7 @@ valid(
     "basis-of-level-0",
     "learned bases that begin with that of level 0",
     lambda: Plant(
-        base,
+        SHORT,
         frames=3,
         heads={
             0: stems_head(0.25, 0, 8, 1, basis_stream([[99, -128, 3]], 8)),
@@ -260,7 +260,7 @@ def shrunk(last: int) -> Plant:
     )
 
 
-rounded = (263597123, 32053444), (241475353, 36228921), (79323412, 26324395), (170050111, 70213091)
+ROUNDED = (263597123, 32053444), (241475353, 36228921), (79323412, 26324395), (170050111, 70213091)
 for side, last in (("above", 6448), ("below", 6405)):
     valid(
         f"basis-short-{side}",
@@ -276,7 +276,7 @@ valid(
         segments=4,
         heads={
             (0, s): stems_head(0.25, 0, 2, 1, basis_in_waves(2, 0, *row((a, 0, 0), (b, 0, 0)), rank=1))
-            for s, (a, b) in enumerate(rounded)
+            for s, (a, b) in enumerate(ROUNDED)
         },
         is_float64=True,
         scripts={(rules.STEMS, 0): [*row((1, 3, 0)), *row((0, 1, 7))]},

@@ -83,7 +83,7 @@ motion(
 valid(
     "corrections-of-one-frame",
     "corrections in a segment of one frame, before which there is none",
-    lambda: Plant(base, scripts={(rules.CORRECTIONS, 1, 0): [1, *(2, 3, 1, 0), 0, 1, *(1, 0, 5, 1)]}),
+    lambda: Plant(SHORT, scripts={(rules.CORRECTIONS, 1, 0): [1, *(2, 3, 1, 0), 0, 1, *(1, 0, 5, 1)]}),
 )
 
 

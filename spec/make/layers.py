@@ -511,14 +511,14 @@ valid(
     "layers-shapes-largest",
     "a shape with the largest integers there are, which a refinement of Shift 0 goes back from",
     lambda: Plant(
-        base,
+        SHORT,
         frames=2,
         layers=2,
         shift=0,
         heads=LAYER_HEADS,
         scripts={
-            (rules.SHAPES, 0, 0): [2, *row((most, 1, 0)), *row((0, -most, 3))],
-            (rules.SHAPES, 2, 0): [2, *refined_row((-most, 0, 0)), *refined_row((0, -most, 0))],
+            (rules.SHAPES, 0, 0): [2, *row((LARGEST, 1, 0)), *row((0, -LARGEST, 3))],
+            (rules.SHAPES, 2, 0): [2, *refined_row((-LARGEST, 0, 0)), *refined_row((0, -LARGEST, 0))],
         }
         | {(rules.STEMS, level): lambda level=level: Chance(521 + level, large=6, empty=0.0) for level in range(3)},
     ),
@@ -573,7 +573,7 @@ valid(
         | {(rules.REFINED_REST, 3, 0): lambda: Chance(529, large=4, empty=0.0)},
     ),
 )
-ratios = (63000, 0.36065), (67000, 0.34967), (0.45, 0.5)
+HALVED_RATIOS = (63000, 0.36065), (67000, 0.34967), (0.45, 0.5)
 valid(
     "layers-rigid-ratios-near",
     "steps of rotations are 63000 and 67000 times those of the next layer, and less than half of them",
@@ -587,7 +587,7 @@ valid(
         heads={0: stems_head(0.125, 1)}
         | {
             (2, s): stems_head(0.125 / ratio, 1, 16, 1, basis_stream([[int(size * 32768)] * 2], 16))
-            for s, (ratio, size) in enumerate(ratios)
+            for s, (ratio, size) in enumerate(HALVED_RATIOS)
         },
         scripts={(rules.STEMS, 0): [*row(), *row((1, -1, 1))]}
         | {(rules.STEMS, 2, s): [*row(), *refined_row((1, 0, 2))] for s in range(3)},

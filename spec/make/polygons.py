@@ -219,10 +219,10 @@ static(
     "faces-more-corners-of-many",
     "the second of two faces has one corner more than are left, of 2^25: none is decoded",
     faces(
-        polygon_head("<u4", 2, many, "<u4")
+        polygon_head("<u4", 2, MANY_CORNERS, "<u4")
         + write(
-            *(rules.decode_polygons, [42, *[0, 1, 2] * 14, many - 41]),
-            *(polygon_shape(2, 2, False, 2, 0, many), 5),
+            *(rules.decode_polygons, [42, *[0, 1, 2] * 14, MANY_CORNERS - 41]),
+            *(polygon_shape(2, 2, False, 2, 0, MANY_CORNERS), 5),
             lowest=True,
         )
     ),
@@ -232,11 +232,11 @@ static(
     "the second corner is the one before the first",
     lambda: with_static((rules.FACES, polygon_head("<u4", 1, 3) + write(recent, []))),
 )
-strips = {
+STRIPS = {
     "up": [[i, i + 1, i + 2] for i in range(18)],
     "down": [[i, i - 1, i - 2] for i in range(19, 1, -1)] + [[1, 0, 2], [3, 4, 0]],
 }
-for name, strip in strips.items():
+for name, strip in STRIPS.items():
     for is_absolute in (False, True):
         valid(
             f"faces-{name}-and-on{'-absolute' if is_absolute else ''}",

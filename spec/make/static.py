@@ -388,7 +388,7 @@ valid(
     "a text of 2^20 bytes",
     lambda: metadata(
         frame(
-            b"{" + b" " * (longest - 2) + b"}",
+            b"{" + b" " * (LONGEST_TEXT - 2) + b"}",
             checksum=None,
             blocks=raw_block(b"{", False)
             + b"".join(run_block(b" ", n, False) for n in [1 << 17] * 7 + [(1 << 17) - 2])

@@ -274,7 +274,7 @@ invalid(
     "STEMS is missing and REST is damaged: the table comes first",
     lambda: fork().without(rules.STEMS, 2, 1).change(rules.REST, checksum=0),
 )
-radius = numbers(np.arange(5.0), name="radius")
+RADIUS = numbers(np.arange(5.0), name="radius")
 
 
 def segments_of_tables() -> Draft:
@@ -300,7 +300,7 @@ table(
     "repeatable-order",
     "BAD_CHUNK_TABLE",
     "an attribute behind a chunk whose number is larger",
-    lambda: not_refused(lambda: fork().add(Entry(0x8040, FUTURE), Entry(rules.ATTRIBUTE, radius), sort=False)),
+    lambda: not_refused(lambda: fork().add(Entry(0x8040, FUTURE), Entry(rules.ATTRIBUTE, RADIUS), sort=False)),
 )
 invalid(
     "table-longest-chunk",
