@@ -72,8 +72,6 @@ class Stream(ctypes.Structure):
         ("temporal_rank", c_int32),
         ("root", c_int32),
         ("turn_step", c_double),
-        ("only_tips", c_int32),
-        ("reserved", c_int32),
     ]
 
 

@@ -28,7 +28,6 @@ MAGIC = b"\x89ATH\r\n\x1a\n"
 MAJOR, MINOR, FEATURES = 0, 13, 0
 NO_LEVEL = 255
 STEM_WAVES, NODE_WAVES, BASIS_IN_WAVES, BASIS_AS_SAMPLES = range(4)  # of Basis
-ONLY_TIPS = 8  # of Rotation
 IS_HOST = 4  # Method of REST
 OPTIONAL, KIND_ID = 0x8000, 0x7FFF
 
@@ -361,9 +360,9 @@ def pack_time(stream: bytes) -> bytes:
 
 @dataclass
 class StemsHead:
-    """Head of STEMS: step, rotation factor (0, 1, 2, 4, 8), Basis (basis_kind), rank and stream of a learned one,
-    the level of the stream whose basis it begins with, whether pieces that carry others have no rotations, and how
-    many half octaves below 1 the largest step of rigid pieces' rotations is (0: there is none)."""
+    """Head of STEMS: step, rotation factor (0, 2, 8), Basis (basis_kind), rank and stream of a learned one, the level
+    of the stream whose basis it begins with, and how many half octaves below 1 the largest step of rigid pieces'
+    rotations is (0: there is none)."""
 
     step: float
     rotation_step_factor: int
@@ -371,12 +370,11 @@ class StemsHead:
     rank: int = 0
     basis: bytes = b""
     base: int = NO_LEVEL
-    only_tips: bool = False
     turn: int = 0
 
 
 def pack_stems(head: StemsHead, stream: bytes) -> bytes:
-    rotation = head.rotation_step_factor.bit_length() | ONLY_TIPS * head.only_tips | head.turn << 4
+    rotation = head.rotation_step_factor.bit_length() // 2 | head.turn << 4
     data = _STEMS.pack(head.step, rotation, head.basis_kind)
     if head.basis_kind > NODE_WAVES:
         data += _BASIS.pack(head.rank, head.base, len(head.basis)) + head.basis

@@ -128,7 +128,6 @@ def _uses(made: Draft, feature: Feature) -> bool:
         return {Feature.PREDICTED: True, Feature.LATTICE: choice.predicted}.get(feature, False)
     return {
         Feature.ROTATIONS: any(any(own.rotation_step_factors) for own in both),
-        Feature.TIPS: any(own.only_tips for own in both),
         Feature.SHAPES: any(own.learned_pieces is not None for own in both),
         Feature.TIME_BASES: any(any(own.learned_bases) for own in both),
         Feature.SHEETS: bool((choice.settings.forms == SHEET).any()),

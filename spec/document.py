@@ -153,8 +153,8 @@ def compiled(*statements: ast.stmt) -> types.CodeType:
     return compile(ast.fix_missing_locations(tree), str(FORMAT), "exec")
 
 
-def run(code: Iterable[types.CodeType]) -> types.ModuleType:
-    """A module in which the code has been executed."""
+def run(code: Iterable[types.CodeType], **more) -> types.ModuleType:
+    """A module in which the code has been executed, which has `more` names."""
     module = types.ModuleType("FORMAT")
     names = module.__dict__
 
@@ -164,7 +164,7 @@ def run(code: Iterable[types.CodeType]) -> types.ModuleType:
         except UnicodeDecodeError:
             raise names["Invalid"]("BAD_CHUNK") from None
 
-    names.update(TAKEN_FOR_GRANTED | KINDS | {"utf8": utf8})
+    names.update(TAKEN_FOR_GRANTED | KINDS | {"utf8": utf8} | more)
     for part in code:
         exec(part, names)
     keep_answers(module)
@@ -278,7 +278,7 @@ class File:
 
 def elements(numbers: list, code: int) -> bytes:
     """Integers of Index_Type or Count_Type."""
-    return np.array(numbers, f"{'>' if code & 8 else '<'}{'i' if code & 4 else 'u'}{1 << (code & 3)}").tobytes()
+    return np.array(numbers, f"<{'i' if code & 4 else 'u'}{1 << (code & 3)}").tobytes()
 
 
 def clip_entry(clip) -> bytes:

@@ -1,7 +1,7 @@
 /* Front and heads of chunks: read with every check that FORMAT.md asks for, in its order. */
 #include "front_model.h"
 
-enum { HEADER_SIZE = 24, CHECKSUM_SIZE = 4, CHECKSUM_AT = 12, TABLE_ENTRY = 16, MOST_SHIFT = 15, ONLY_TIPS = 8 };
+enum { HEADER_SIZE = 24, CHECKSUM_SIZE = 4, CHECKSUM_AT = 12, TABLE_ENTRY = 16, MOST_SHIFT = 15 };
 
 static const uint32_t MOST_COUNT = 1u << 30; /* of anything, whatever the limits are */
 
@@ -518,14 +518,15 @@ int ath_parse_refined_stems(ath_bytes chunk, int32_t frames, ath_stems_head *hea
 int ath_parse_stems(ath_bytes chunk, int32_t frames, ath_stems_head *head, ath_bytes *body)
 {
     if (chunk.size < 6) return ATH_BAD_CHUNK;
-    int32_t rotation = chunk.bytes[4] & 7;
+    static const double factors[] = {0.0, 2.0, 8.0};
+    int32_t rotation = chunk.bytes[4] & 15;
     head->step = (double)f32_at(chunk.bytes);
-    head->rotation_step_factor = (double)(1 << rotation >> 1);
-    head->only_tips = (chunk.bytes[4] & ONLY_TIPS) != 0;
+    if (rotation > 2) return ATH_BAD_CHUNK;
+    head->rotation_step_factor = factors[rotation];
     head->turn = chunk.bytes[4] >> 4;
     head->basis_kind = chunk.bytes[5];
     *body = rest_of(chunk, 6);
-    if (!is_step(head->step) || rotation > 4 || head->basis_kind > ATH_BASIS_AS_SAMPLES) return ATH_BAD_CHUNK;
+    if (!is_step(head->step) || head->basis_kind > ATH_BASIS_AS_SAMPLES) return ATH_BAD_CHUNK;
     if (head->basis_kind <= ATH_NODE_WAVES) return ATH_OK;
     if (body->size < 7) return ATH_BAD_CHUNK;
     head->rank = (int32_t)u16_at(body->bytes);

@@ -82,7 +82,6 @@ typedef struct {
     int32_t base;       /* level of the stream whose time basis this one's begins with; -1: none */
     int32_t ratio;      /* of a refinement: the step of the layer before over this one's */
     int32_t turn;       /* half octaves below 1 of the largest step of rigid pieces' rotations; 0: none */
-    int32_t only_tips;
     ath_bytes basis;
 } ath_stems_head;
 

@@ -16,7 +16,7 @@ typedef struct {
 /* Of ath_stream. The waves of a learned basis follow, temporal_rank x frames floats, which hold them exactly. */
 typedef struct {
     double step, rotation_step_factor, turn_step;
-    int32_t temporal_rank, root, only_tips, reserved;
+    int32_t temporal_rank, root;
 } kept_stream;
 
 typedef struct {

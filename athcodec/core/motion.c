@@ -493,7 +493,6 @@ static double squared_lever(const ath_plan *plan, const ath_piece *piece)
 static double rotation_factor(const ath_piece *piece, const ath_stream *stream)
 {
     int rigid = (piece->flags & ATH_RIGID) != 0;
-    if (stream->only_tips && piece->last_attached >= 0 && !rigid) return 0.0;
     return rigid && !(stream->rotation_step_factor > 0.0) ? 1.0 : stream->rotation_step_factor;
 }
 

@@ -15,9 +15,7 @@ typedef struct ath_stream {
     int32_t temporal_rank;
     int32_t
         root; /* level of the first of the streams whose learned bases begin with the same rows; ath_root: ath_waves */
-    double turn_step;  /* largest step of the rotations of rigid pieces, 0: any */
-    int32_t only_tips; /* 1: of pieces that carry others no rotations are coded */
-    int32_t reserved;
+    double turn_step; /* largest step of the rotations of rigid pieces, 0: any */
 } ath_stream;
 
 /* The layer before, from which a refinement predicts: what all pieces have become there. */

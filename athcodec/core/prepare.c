@@ -294,13 +294,8 @@ static void keep_streams(ath_work *work)
 {
     for (int32_t d = 0; work->keeping.at && d <= work->level; d++) {
         const ath_stream *stream = work->streams + d;
-        kept_stream kept = {stream->step,
-                            stream->rotation_step_factor,
-                            stream->turn_step,
-                            stream->temporal_rank,
-                            stream->root,
-                            stream->only_tips,
-                            0};
+        kept_stream kept = {stream->step, stream->rotation_step_factor, stream->turn_step, stream->temporal_rank,
+                            stream->root};
         size_t learned = learned_numbers(work, stream);
         if (!has_stream(work->file, d)) continue;
         void *at = ath_kept_take(&work->keeping, sizeof kept);
@@ -337,7 +332,6 @@ static void restore_streams(ath_work *work)
         stream->step = kept.step;
         stream->rotation_step_factor = kept.rotation_step_factor;
         stream->turn_step = kept.turn_step;
-        stream->only_tips = kept.only_tips;
         stream->temporal_rank = kept.temporal_rank;
         stream->root = kept.root;
         if (kept.root < 0) set_waves(work, stream, kept.root);
@@ -714,7 +708,6 @@ static int open_stems(ath_work *work, int32_t d)
     if (result != ATH_OK) return result;
     stream->step = head.step;
     stream->rotation_step_factor = head.rotation_step_factor;
-    stream->only_tips = head.only_tips;
     stream->turn_step = head.turn > 0 ? ath_node_step(-head.turn) : 0.0;
     if (head.basis_kind == ATH_NODE_WAVES)
         set_waves(work, stream, ATH_NODE_ROOT);

@@ -9,7 +9,6 @@ class Feature(Enum):
     """What may be left out of all of a file's settings."""
 
     ROTATIONS = "rotations at attach points"
-    TIPS = "rotations of tips alone"
     SHAPES = "learned shapes"
     TIME_BASES = "learned time bases"
     SHEETS = "affine functions first"

@@ -242,7 +242,6 @@ class LevelStream:
     step: float
     rotation_step_factor: float = 0.0
     temporal: np.ndarray | None = None  # (rank, frames) float64; None: waves_over_time, by the root
-    only_tips: bool = False  # pieces that carry others have no rotations
     turn_step: float = 0.0  # largest step of rotations of rigid pieces; 0: any
     root: int = STEM_ROOT  # level of the first of the streams whose learned bases begin with the same rows
 
@@ -323,7 +322,7 @@ class SegmentMotion:
             self._temporal.append(temporal)
             c_stream.step, c_stream.rotation_step_factor = stream.step, stream.rotation_step_factor
             c_stream.temporal, c_stream.temporal_rank = temporal.ctypes.data, len(temporal)
-            c_stream.root, c_stream.only_tips, c_stream.turn_step = stream.root, stream.only_tips, stream.turn_step
+            c_stream.root, c_stream.turn_step = stream.root, stream.turn_step
         self.motion = Motion(
             streams=addressof(self._c_streams),
             waves=self.node_waves.ctypes.data,

@@ -73,7 +73,6 @@ def _settings(source: Source, ath: Ath, bound: float, rest_step: float) -> Setti
         details=finer_than(source.details, bound),
         connected_rest=False,
         rotation_step_factors=(0,) * levels,
-        only_tips=False,
         learned_bases=(False,) * levels,
         common_basis=False,
         learned_pieces=None,

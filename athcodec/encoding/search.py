@@ -58,7 +58,7 @@ MEAN_POSE_WORTH = 6  # trials, to find the mean pose and learned modes about it
 PRELUDES_KEPT = 6  # between trials
 REST_SHARE = 0.25  # of a file, from which on its rest pose is tried with slack
 STILL_STEP = 1024.0  # over what nothing is to be left of
-FIRST_FACTORS, HOPELESS = (0, 2, 8), 1.3  # of rotations; the others, and those of tips, save no more than that
+HOPELESS = 1.3  # over the least bytes, spatial bases that rotations do not save
 MODES_SAVE, LAYERS_SAVE = 1.5, 1.05  # of a single layer's bytes, at most: learned modes, what suits refinements better
 SHORT_STEM = 3  # vertices of a stem whose learned modes are tried in place of rotations and in any basis
 NEAREST, NEAR = 4, 1.12  # other choices that steps are found for, and what they cost before, over the best
@@ -163,7 +163,6 @@ def first_settings(
         details=source.details if layered else finer_than(source.details, bound),
         connected_rest=False,
         rotation_step_factors=(0,) * levels,
-        only_tips=False,
         learned_bases=(False,) * levels,
         common_basis=False,
         learned_pieces=None,
@@ -407,17 +406,15 @@ class Search:
         return self._with_node_steps(first)
 
     def refinements(self, settings: Settings, ratio: int) -> Iterator[Settings]:
-        """Settings that may suit refinements, each of which has one stream: with rotations, of tips alone, and
-        without."""
+        """Settings that may suit refinements, each of which has one stream: with rotations and without."""
         if ratio == 1 or not any(settings.rotation_step_factors):
             yield settings
             if ratio > 1 and self._is_small and settings.learned_pieces is not None:
                 yield replace(settings, learned_pieces=None)
             return
         factor, least = settings.rotation_step_factors[self.prelude(settings).plan.main_level], math.inf
-        tips = settings.only_tips or not self._without(Feature.TIPS)
-        for own, only_tips in dict.fromkeys([(factor, settings.only_tips), (factor, tips), (0, False)]):
-            candidate = replace(settings, rotation_step_factors=(own,) * self.levels, only_tips=only_tips)
+        for own in dict.fromkeys((factor, 0)):
+            candidate = replace(settings, rotation_step_factors=(own,) * self.levels)
             if self.effort != "fast":
                 plain = replace(candidate, learned_pieces=None)
                 if self.cost(plain)[0] > MODES_SAVE * least:
@@ -522,7 +519,6 @@ class Search:
             level_steps=found.level_steps,
             rest_step=found.rest_step,
             rotation_step_factors=found.rotation_step_factors,
-            only_tips=found.only_tips,
             free_rigid=found.free_rigid,
             learned_bases=found.learned_bases,
             common_basis=found.common_basis,
@@ -569,7 +565,6 @@ class Search:
             settings.turn_step,
             *self._prelude_key(settings),
             settings.rotation_step_factors,
-            settings.only_tips,
             settings.periodic,
             settings.learned_bases,
             settings.common_basis,
@@ -638,7 +633,7 @@ class Search:
 
     def _turning(self, settings: Settings) -> tuple:
         """What decides what is left for the modes of a piece."""
-        return settings.rotation_step_factors, settings.only_tips, settings.forms.tobytes()
+        return settings.rotation_step_factors, settings.forms.tobytes()
 
     def learned_modes(self, plan: Plan, settings: Settings, everywhere: bool = False) -> LearnedModes | None:
         """Of the pieces that `settings` gives some, or of all, learned."""
@@ -685,7 +680,7 @@ class Search:
 
     def _in_each_basis(self, settings: Settings) -> list[Settings]:
         """The settings and, on short stems, the same without rotations in each basis."""
-        unturned = replace(settings, rotation_step_factors=(0,) * self.levels, only_tips=False)
+        unturned = replace(settings, rotation_step_factors=(0,) * self.levels)
         bases = [replace(unturned, forms=forms) for forms in self._all_forms()] if self._short_stems() else []
         return list({self._key(own): own for own in (settings, *bases)}.values())
 
@@ -795,25 +790,12 @@ class Search:
         if self._without(Feature.ROTATIONS):
             return settings
 
-        def turning(factors: Sequence[int]) -> dict[int, Settings]:
-            return {k: replace(settings, rotation_step_factors=(k,) * self.levels) for k in factors}
-
-        candidates = turning((0, 2) if self.effort == "fast" else FIRST_FACTORS)
-        unturned, *turned = (cost for cost, _ in self._costs(list(candidates.values())))
-        if self.effort != "fast" and min(turned) <= HOPELESS * unturned:
-            candidates = turning(qz.ROTATION_FACTORS)
-        factors = list(candidates)
-        per_level = np.array([levels for _, levels in self._costs(list(candidates.values()))])
+        factors = (0, 2) if self.effort == "fast" else qz.ROTATION_FACTORS
+        candidates = [replace(settings, rotation_step_factors=(k,) * self.levels) for k in factors]
+        per_level = np.array([levels for _, levels in self._costs(candidates)])
         mixed = replace(settings, rotation_step_factors=tuple(factors[i] for i in per_level.argmin(axis=0)))
         roots = [replace(settings, rotation_step_factors=(k, *[0] * (self.levels - 1))) for k in factors if k]
-        best = self._cheapest([settings, mixed, *roots, *candidates.values()])
-        most = HOPELESS * self.cost(best)[0]
-        tips = [
-            replace(own, only_tips=True)
-            for own in (best, *candidates.values())
-            if any(own.rotation_step_factors) and self.cost(own)[0] <= most and not self._without(Feature.TIPS)
-        ]
-        return self._cheapest([best, *tips])
+        return self._cheapest([settings, mixed, *roots, *candidates])
 
     def _cheapest(self, candidates: list[Settings]) -> Settings:
         return self._cheapest_of(dict(enumerate(candidates)))[1]
@@ -871,9 +853,7 @@ class Search:
 
     def _other_bases(self, plain: Settings) -> Iterator[Settings]:
         """Other spatial bases and rotations."""
-        turned = [
-            replace(plain, rotation_step_factors=(factor,) * self.levels, only_tips=False) for factor in FIRST_FACTORS
-        ]
+        turned = [replace(plain, rotation_step_factors=(factor,) * self.levels) for factor in qz.ROTATION_FACTORS]
         yield from turned
         yield from (replace(own, forms=forms) for own in (plain, turned[0]) for forms in self._all_forms())
 

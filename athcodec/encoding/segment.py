@@ -279,7 +279,6 @@ class Settings:
     learned_bases: tuple[bool, ...]  # per level: whether the time basis is
     common_basis: bool  # these levels share one, else each has its own
     learned_pieces: np.ndarray | None  # (P,) bool: pieces that have learned modes; None: none has
-    only_tips: bool  # pieces that carry others have no rotations
     node_steps: np.ndarray  # (levels,) of the maps of nodes, scene units; see SegmentMotion.analyse_nodes
     rest_slack: float = 0.0  # what the rest pose may be off by, to save bits
     shape_of: np.ndarray | None = None  # (B,) of streams.find_copies; None: the rest pose has no copies
@@ -513,9 +512,7 @@ def level_streams(settings: Settings, levels: int, bases: dict[int, StreamBasis]
     for level in range(levels):
         factor = float(settings.rotation_step_factors[level])
         root = NODE_ROOT if settings.is_straight else STEM_ROOT
-        stream = LevelStream(
-            settings.step_of(level), factor, only_tips=settings.only_tips, turn_step=settings.turn_step, root=root
-        )
+        stream = LevelStream(settings.step_of(level), factor, turn_step=settings.turn_step, root=root)
         if level in bases:
             stream.temporal, stream.root = bases[level].stored.rows, bases[level].root
         found.append(stream)
@@ -677,7 +674,6 @@ def stems_head(settings: Settings, level: int, bases: dict[int, StreamBasis]) ->
     head = ct.StemsHead(
         settings.step_of(level),
         settings.rotation_step_factors[level],
-        only_tips=settings.only_tips,
         turn=turn_of(settings.turn_step),
         basis_kind=ct.NODE_WAVES if settings.is_straight else ct.STEM_WAVES,
     )
