@@ -37,7 +37,6 @@ BEAM = 0  # form of a branch; others are SHEET, or a tube's vertices for each ri
 FINER = 32  # step over that of segments that bases and modes are learned from
 ROWS_AT_ONCE = 1 << 14  # of coefficients
 WORK_BYTES = 1 << 30  # of the segments coded at once, where `jobs` does not say how many these are
-COPIES_BENDS = 0.0, 0.15  # of copies of one shape that are tried
 CONNECTED_SHARE = 0.8  # of a rest pose at once, that one by faces may take where layers refine it
 SAMPLED = 4000  # vertices from which on trials correct a sample
 SEGMENT_WORK = 16  # memory of a segment while it is coded, over its float32 positions
@@ -406,9 +405,8 @@ def with_best_lags(source: Source, ath: Ath, settings: Settings) -> Settings:
 def _with_copies(source: Source, ath: Ath, candidates: list[Settings]) -> list[Settings]:
     """The candidates with branches that are copies of others, where there are any."""
     own, branches = candidates[0], branch_records(source.hierarchy, ath, candidates[0])
-    found = [streams.find_copies(branches, own.rest_step, source.rest, own.rest_slack, bend) for bend in COPIES_BENDS]
-    shapes = [shape_of for shape_of in found if shape_of is not None]
-    return [replace(settings, shape_of=shape_of) for settings in candidates for shape_of in shapes]
+    shape_of = streams.find_copies(branches, own.rest_step, source.rest, own.rest_slack)
+    return [] if shape_of is None else [replace(settings, shape_of=shape_of) for settings in candidates]
 
 
 def _poses_size(source: Source, ath: Ath, settings: Settings) -> int:
