@@ -7,7 +7,6 @@ from collections.abc import Callable
 
 import numpy as np
 
-from spec.document import rules
 from spec.make.base import *
 from spec.make.clips import periodic
 from spec.make.predicted import SINGLE
@@ -16,7 +15,7 @@ from spec.make.predicted import SINGLE
 def all_waves(frames: int) -> Callable[[], Plant]:
     clips = Clip(frames, 1, "once"), periodic(Clip(frames, 1, "again"), 0.0, 0.0)
     rows = row(*(tuple((k + axis) % 5 - 2 for axis in range(3)) for k in range(frames)))
-    return lambda: lone(clips=clips, scripts={(rules.STEMS, 0): rows})
+    return lambda: lone(clips=clips, scripts={(STEMS, 0): rows})
 
 
 for frames in (2, 3, 4, 7, 33, 255, 256):
@@ -27,7 +26,7 @@ valid(
     lambda: lone(
         frames=4,
         heads={0: stems_head(0.5, 0, 8, 1, basis_stream([[128, -128, 128, 0]], 8))},
-        scripts={(rules.STEMS, 0): row((3, -1, 70))},
+        scripts={(STEMS, 0): row((3, -1, 70))},
     ),
 )
 valid(
@@ -112,22 +111,20 @@ def basis(rank: int, bits: int, stream: bytes) -> Callable[[], bytes]:
     return lambda: stems_head(0.5, 0, bits, rank, stream)
 
 
-motion("bits-7", rules.STEMS, 1, "Basis_Bits 7", basis(1, 7, basis_stream([[0, 0]], 8)))
-motion("bits-17", rules.STEMS, 1, "Basis_Bits 17", basis(1, 17, basis_stream([[0, 0]], 8)))
-motion("rank-0", rules.STEMS, 1, "Basis_Rank 0 though there is a basis", basis(0, 8, b""))
+motion("bits-7", STEMS, 1, "Basis_Bits 7", basis(1, 7, basis_stream([[0, 0]], 8)))
+motion("bits-17", STEMS, 1, "Basis_Bits 17", basis(1, 17, basis_stream([[0, 0]], 8)))
+motion("rank-0", STEMS, 1, "Basis_Rank 0 though there is a basis", basis(0, 8, b""))
 motion(
     "rank-more-than-frames",
-    rules.STEMS,
+    STEMS,
     1,
     "Basis_Rank 3 in a segment of two frames",
     basis(3, 8, basis_stream([[0, 0]] * 3, 8)),
 )
-motion(
-    "basis-length-missing", rules.STEMS, 1, "the chunk ends inside Basis_Length", lambda: stems_head(0.5, 0, 8, 1)[:11]
-)
+motion("basis-length-missing", STEMS, 1, "the chunk ends inside Basis_Length", lambda: stems_head(0.5, 0, 8, 1)[:11])
 motion(
     "basis-length-more",
-    rules.STEMS,
+    STEMS,
     1,
     "Basis_Length is more than the chunk holds",
     lambda: struct.pack("<fBBHBI", 0.5, 0, 8, 1, 255, 100) + basis_stream([[1, 2]], 8),
@@ -139,39 +136,33 @@ for name, level, reason, base in (
     ("missing", 2, "Basis_Level is a level without STEMS", 0),
 ):
     motion(
-        f"basis-level-{name}",
-        rules.STEMS,
-        level,
-        reason,
-        lambda base=base: stems_head(0.5, 0, 8, 1, base=base),
-        segment=1,
+        f"basis-level-{name}", STEMS, level, reason, lambda base=base: stems_head(0.5, 0, 8, 1, base=base), segment=1
     )
 invalid(
     "stems-basis-level-rank",
-    "BAD_CHUNK",
-    2,
     "Basis_Rank 1 though Basis_Level has a basis of two rows",
     lambda: (
         forked(heads={1: stems_head(0.5, 0, 8, 2, basis_stream([[1, 2], [3, 4]], 8))})
         .draft()
-        .change(rules.STEMS, 2, 0, content=stems_head(0.5, 0, 8, 1, base=1))
+        .change(STEMS, 2, 0, content=stems_head(0.5, 0, 8, 1, base=1))
     ),
+    item=2,
 )
 motion(
     "basis-beyond-1",
-    rules.STEMS,
+    STEMS,
     1,
     "an entry of a learned basis of 8 bits is 129",
     basis(1, 8, basis_stream([[128, 129]], 8)),
 )
 motion(
     "basis-below-1",
-    rules.STEMS,
+    STEMS,
     1,
     "an entry of a learned basis of 8 bits is -129",
     basis(1, 8, basis_stream([[-129, 0]], 8)),
 )
-motion("bits-3", rules.STEMS, 1, "Basis_Bits 3", basis(1, 3, basis_stream([[0, 0]], 8)))
+motion("bits-3", STEMS, 1, "Basis_Bits 3", basis(1, 3, basis_stream([[0, 0]], 8)))
 for name, reason, exponents in (
     ("change", "an exponent of a row of a basis changes by 401", (-200, 401)),
     ("high", "an exponent of a row of a basis is 201", (201, 0)),
@@ -179,28 +170,28 @@ for name, reason, exponents in (
 ):
     motion(
         f"basis-exponent-{name}",
-        rules.STEMS,
+        STEMS,
         1,
         reason,
         lambda exponents=exponents: basis(2, 2, basis_in_waves(2, *exponents, *row((1, 1, 0)), rank=2))(),
     )
 motion(
     "basis-in-waves-frequencies",
-    rules.STEMS,
+    STEMS,
     1,
     "a row of a basis codes three frequencies of two frames",
     lambda: basis(1, 2, basis_in_waves(2, 0, *row((1, 0, 0), (1, 0, 0), (1, 0, 0)), rank=1))(),
 )
 motion(
     "basis-in-waves-zero-behind",
-    rules.STEMS,
+    STEMS,
     1,
     "a zero byte behind the stream of a basis in waves",
     lambda: basis(1, 2, basis_in_waves(2, 0, *row((1, 0, 0)), rank=1) + b"\0")(),
 )
 motion(
     "basis-zero-behind",
-    rules.STEMS,
+    STEMS,
     1,
     "a zero byte behind the stream of a basis",
     basis(1, 8, basis_stream([[1, 2]], 8) + b"\0"),
@@ -212,19 +203,19 @@ valid(
         SHORT,
         frames=2,
         heads={0: stems_head(0.25, 0, 2, 2, basis_in_waves(2, -200, 400, *row((1, 1, 0), (2, -1, 0)), rank=2))},
-        scripts={(rules.STEMS, 0): lambda: Chance(513)},
+        scripts={(STEMS, 0): lambda: Chance(513)},
     ),
 )
 motion(
     "basis-length-one-more",
-    rules.STEMS,
+    STEMS,
     1,
     "Basis_Length is one more than the chunk holds",
     lambda: struct.pack("<fBBHBI", 0.5, 0, 8, 2, 255, 1 + len(IMPULSES)) + IMPULSES,
 )
 motion(
     "basis-length-cut",
-    rules.STEMS,
+    STEMS,
     1,
     "the chunk ends before the last byte of Basis_Length",
     lambda: stems_head(0.5, 0, 8, 1)[:12],
@@ -239,7 +230,7 @@ valid(
             0: stems_head(0.25, 0, 8, 1, basis_stream([[99, -128, 3]], 8)),
             1: stems_head(0.25, 0, 9, 2, basis_stream([[256, 0, -77]], 9), base=0),
         },
-        scripts={(rules.STEMS, 0): lambda: Chance(514), (rules.STEMS, 1): lambda: Chance(515)},
+        scripts={(STEMS, 0): lambda: Chance(514), (STEMS, 1): lambda: Chance(515)},
     ),
 )
 
@@ -256,7 +247,7 @@ def shrunk(last: int) -> Plant:
             0: stems_head(0.25, 0, 16, 18, basis_stream(known, 16)),
             1: stems_head(0.25, 0, 2, 19, in_waves, base=0),
         },
-        scripts={(rules.STEMS, 1): row(*[(0, 0, 0)] * 18, (50, -30, 10))},
+        scripts={(STEMS, 1): row(*[(0, 0, 0)] * 18, (50, -30, 10))},
     )
 
 
@@ -279,7 +270,7 @@ valid(
             for s, (a, b) in enumerate(ROUNDED)
         },
         is_float64=True,
-        scripts={(rules.STEMS, 0): [*row((1, 3, 0)), *row((0, 1, 7))]},
+        scripts={(STEMS, 0): [*row((1, 3, 0)), *row((0, 1, 7))]},
     ),
 )
 valid(
@@ -290,7 +281,7 @@ valid(
         frames=8,
         is_float64=True,
         points=[[0, 0, 0], [1, 0, 2], [2, 0, 4], [1, 3, 2], [1, 5, 3]],
-        scripts={(rules.AFFINES, 0): [0, *row(), *row(), *row(*[(k == 2, k == 5, 3 - k) for k in range(8)])]},
+        scripts={(AFFINES, 0): [0, *row(), *row(), *row(*[(k == 2, k == 5, 3 - k) for k in range(8)])]},
     ),
 )
 valid(
@@ -301,6 +292,6 @@ valid(
         frames=66,
         is_float64=True,
         points=[[0, 0, 0]],
-        scripts={(rules.STEMS, 0): row((0, 0, 0), (0, 0, 0), (0, 0, 0), (1, -3, 7))},
+        scripts={(STEMS, 0): row((0, 0, 0), (0, 0, 0), (0, 0, 0), (1, -3, 7))},
     ),
 )
