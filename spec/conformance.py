@@ -1,7 +1,7 @@
 """Tests a decoder of .ath files against the vectors of spec/vectors.
 
     python -m spec.conformance DECODER-COMMAND...          any program
-    python -m spec.conformance --own c|wasm|reference      those of this repository
+    python -m spec.conformance --own c|wasm|document       those of this repository
 
 A program is called as `DECODER-COMMAND... FILE ITEM` for every item of every vector, and with one argument more,
 `MESH`, where a file of the vector's name ends in .mesh: the positions of the host's mesh, binary32, little-endian, in
@@ -39,11 +39,11 @@ from fnmatch import fnmatch
 from functools import lru_cache
 from io import BytesIO
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 
-from spec import reference_decoder as rd
-from spec.reference_decoder import crc32c
+from spec.document import File, clip_entry, crc32c, rules
 
 FOLDER = Path(__file__).resolve().parent / "vectors"
 DECODER_MODULE = Path(__file__).resolve().parent.parent / "athcodec" / "viewer" / "ath_decoder.mjs"
@@ -151,7 +151,7 @@ def checksum_of(data: bytes, item: str, answer: bytes) -> str:
 @lru_cache(maxsize=8)
 def positions_type(data: bytes) -> str:
     """That of a file whose front is whole."""
-    return "<f8" if rd.read_front(data, rd.Limits())[0].is_float64 else "<f4"
+    return "<f8" if rules.read_front(data)[0].is_float64 else "<f4"
 
 
 def with_quiet_nans(answer: bytes, kind: str) -> bytes:
@@ -190,8 +190,8 @@ def result_of(data: bytes, item: str, answer: bytes | Exception) -> str:
 def items(data: bytes) -> list[str]:
     """The items of a file; if it cannot be opened, only those without an answer."""
     try:
-        file = rd.AthFile(data)
-    except rd.AthError:
+        file = File(data)
+    except rules.Invalid:
         return list(NO_ANSWER)
     return [*NO_ANSWER, *map(str, range(file.header.level_count)), "rest", "time", "clips", "static"]
 
@@ -248,18 +248,16 @@ def needs_rest(item: str) -> bool:
 
 
 @lru_cache(maxsize=1)
-def opened(data: bytes, strict: bool, mesh: bytes | None) -> rd.AthFile:
-    file = rd.AthFile(data, strict=strict)
-    if mesh is not None:
-        file.set_host_mesh(mesh)
-    return file
+def opened(data: bytes, strict: bool, mesh: bytes | None) -> File:
+    return File(data, strict, mesh)
 
 
-def reference(data: bytes, item: str, mesh: bytes | None = None) -> bytes:
+def document(data: bytes, item: str, mesh: bytes | None = None) -> bytes:
+    """The code of FORMAT.md."""
     try:
-        return rd.raw(opened(data, item == "strict", mesh if needs_rest(item) else None), item)
-    except rd.AthError as error:
-        raise Refused(error.name) from None
+        return opened(data, item == "strict", mesh if needs_rest(item) else None).answer(item)
+    except rules.Invalid as error:
+        raise Refused(str(error)) from None
 
 
 def package(data: bytes, item: str, mesh: bytes | None = None) -> bytes:
@@ -284,7 +282,7 @@ def ask_package(decoder, item: str) -> bytes:
     if item == "rest":
         return decoder.file.rest_at(0).tobytes()
     if item == "clips":
-        return b"".join(clip_entry(clip) for clip in decoder.clips)
+        return b"".join(clip_entry(by_document(clip)) for clip in decoder.clips)
     if item != "static":
         played = (decoder.play(clip.name) for clip in decoder.clips)
         return b"".join((clip.time if item == "time" else clip.positions(level=int(item))).tobytes() for clip in played)
@@ -292,9 +290,10 @@ def ask_package(decoder, item: str) -> bytes:
     return metadata_text(decoder) + b"".join(array.tobytes() for array in arrays if array is not None)
 
 
-def clip_entry(clip) -> bytes:
+def by_document(clip) -> SimpleNamespace:
+    """A clip of the package as the document has it."""
     seams = clip.seam_errors if clip.loop else None
-    return rd.Clip(clip.frame_count, clip.segment_count, clip.name, seams).entry()
+    return SimpleNamespace(frames=clip.frame_count, segments=clip.segment_count, name=clip.name, seams=seams)
 
 
 def metadata_text(decoder) -> bytes:
@@ -305,7 +304,7 @@ def metadata_text(decoder) -> bytes:
     if chunk is None:
         return b""
     content = decoder.file.payload(chunk)
-    return rd.parse_metadata(content, rd.Limits())
+    return rules.parse_metadata(content)
 
 
 NODE_SCRIPT = """
@@ -398,7 +397,7 @@ class Own:
 OWN = {
     "c": Own(one_by_one(package)),
     "wasm": Own(web_assembly, ("strict", "static")),
-    "reference": Own(one_by_one(reference)),
+    "document": Own(one_by_one(document)),
 }
 
 

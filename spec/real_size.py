@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from spec import reference_decoder as rd
+from spec.document import KIND_NAMES, File, rules
 
 SIDES, LEAF = 6, 12  # vertices of a ring, of a leaf
 OPTIONS: dict[str, dict[str, Any]] = {
@@ -192,41 +192,41 @@ def encoded(name: str) -> bytes:
 
 def features(data: bytes) -> set[str]:
     """What a file uses of the format."""
-    file = rd.AthFile(data, strict=True)
-    kinds = {rd.KINDS[chunk.kind] for chunk in file.chunks}
-    method = file.content(rd.REST)[0]
-    heads = [stems_head(file, chunk) for chunk in file.chunks if chunk.kind == rd.STEMS]
+    opened = File(data, strict=True)
+    file, header = opened.file, opened.header
+    of_refinements = file.parts.height + 1  # above it STEMS begin with Ratio
+    method, heads = opened.content(rules.REST)[0], []
+    for (kind, level, _), chunk in file.chunks.items():
+        if kind == rules.STEMS:
+            heads.append(chunk.bytes[2 if level > of_refinements else 0 :])
+    joins = [join for row in header.joins for join in row]
     shown = {
         "several clips": len(file.clips) > 1,
-        "a loop": any(c.seams is not None for c in file.clips),
-        "periodic waves": any(c.periodic for c in file.clips),
-        "layers": file.header.layer_count > 1,
-        "predicted motion": file.header.is_predicted,
-        "joins": any(join.width for row in file.joins for join in row),
-        "sloped joins": any(join.is_sloped for row in file.joins for join in row),
-        "repeats": any(file.repeats),
+        "a loop": any(clip.seams is not None for clip in file.clips),
+        "periodic waves": any(clip.periodic for clip in file.clips),
+        "layers": header.layer_count > 1,
+        "predicted motion": header.is_predicted,
+        "joins": any(join.width for join in joins),
+        "sloped joins": any(join.is_sloped for join in joins),
+        "repeats": any(header.repeats),
         "learned bases": any(head[5] > 1 for head in heads),
         "shared bases": any(head[5] > 1 and head[8] != 255 for head in heads),
         "waves of nodes": any(head[5] == 1 for head in heads),
         "tips alone": any(head[4] & 8 for head in heads),
-        "sheets": any(branch.flags & rd.SHEET for branch in file.branches),
-        "loose branches": any(branch.flags & rd.LOOSE for branch in file.branches),
-        "whole subtrees": any(branch.flags & rd.WHOLE for branch in file.branches),
+        "sheets": any(branch.flags & rules.SHEET for branch in file.branches),
+        "loose branches": any(branch.flags & rules.LOOSE for branch in file.branches),
+        "whole subtrees": any(branch.flags & rules.WHOLE for branch in file.branches),
         "tubes": any(branch.ring for branch in file.branches),
         "rigid branches": any(branch.rigid for branch in file.branches),
         "detail": any(branch.detail for branch in file.branches),
-        "several pieces": any(rd.piece_count(branch) > 1 for branch in file.branches),
+        "several pieces": any(rules.piece_count(branch) > 1 for branch in file.branches),
         "several roots": sum(branch.parent < 0 for branch in file.branches) > 1,
-        "exact rest pose": bool(method & rd.REST_EXACT),
-        "adaptive rest pose": bool(method & rd.REST_ADAPTIVE),
-        "connected rest pose": bool(method & rd.REST_CONNECTED),
-        "uneven times": file.content(rd.TIME)[0] == 2,
-        "mixed faces": bool(file._mixed_faces()),
-        "attributes": len(file.attributes()) > 2,
+        "exact rest pose": method & 1,
+        "adaptive rest pose": method & 8,
+        "connected rest pose": method & 16,
+        "uneven times": opened.content(rules.TIME)[0] == 2,
+        "mixed faces": opened.content(rules.FACES)[0] & 16,
+        "attributes": bool(file.attributes),
     }
+    kinds = {KIND_NAMES[kind] for kind, _, _ in file.chunks} | ({"ATTRIBUTE"} if file.attributes else set())
     return {what for what, there in shown.items() if there} | kinds
-
-
-def stems_head(file: rd.AthFile, chunk: rd.Chunk) -> bytes:
-    """Without Ratio."""
-    return file.bytes_of(chunk)[2 if chunk.level > file.plan.height + 1 else 0 :]

@@ -1,6 +1,6 @@
 """Streams and files with exactly the values of a script, for vectors that no encoder would write.
 
-Every function of the reference decoder that reads a stream also writes it here: it runs with a coder that encodes each
+Every function of FORMAT.md's code that reads a stream also writes it here: it runs with a coder that encodes each
 decision instead of decoding it, with the value taken from a script. So a stream can hold any numbers in the order of
 FORMAT.md, valid or not, and athcodec is not needed. `Plant` makes complete files of such streams; `Draft` is a file in
 pieces that can be corrupted.
@@ -17,8 +17,11 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from spec import reference_decoder as rd
-from spec.reference_decoder import LOOSE, SHEET, WHOLE, crc32c  # noqa: F401 (flags, for scripts)
+from spec.document import crc32c, rules
+
+LOOSE, SHEET, WHOLE = rules.LOOSE, rules.SHEET, rules.WHOLE
+REST_EXACT, REST_FLOAT64, IS_HOST, REST_ADAPTIVE, REST_CONNECTED = 1, 2, 4, 8, 16  # of REST's Method
+NO_LEVEL = 255  # of a chunk that is not of motion
 
 RECENT = 32  # corners that a vertex may be said by
 
@@ -71,12 +74,12 @@ def magnitude_bits(magnitude: int, longest: int) -> list[int]:
     return [1] * length + [0] * (length < longest) + [int(bit) for bit in f"{magnitude:b}"[1:]]
 
 
-class ScriptedCoder(rd.RangeDecoder):
+class ScriptedCoder(rules.RangeDecoder):
     """Tracks the interval of its decisions, as an encoder does."""
 
     def __init__(self, script: Script):
         self.script, self.decisions = script, deque()
-        self.low, self.range, self.length = 0, rd.MASK, 8
+        self.low, self.range, self.length = 0, rules.MASK, 8
 
     def narrow(self, bound: int) -> int:
         bit = int(self.decisions.popleft() if self.decisions else self.script.answer("bit", 1))
@@ -99,7 +102,7 @@ class ScriptedCoder(rd.RangeDecoder):
 
 def scripted_unsigned(original: Callable):
     def code(coder, model, c):
-        coder.decisions.extend(magnitude_bits(coder.script.answer("unsigned", 1 << 30), rd.LONGEST))
+        coder.decisions.extend(magnitude_bits(coder.script.answer("unsigned", 1 << 30), 30))
         return original(coder, model, c)
 
     return code
@@ -108,10 +111,10 @@ def scripted_unsigned(original: Callable):
 def scripted_signed(original_unsigned: Callable):
     def code(coder, model, c, sign=None):
         value = coder.script.answer("signed", 1 << 30)
-        coder.decisions.extend(magnitude_bits(abs(value), rd.LONGEST))
+        coder.decisions.extend(magnitude_bits(abs(value), 30))
         if original_unsigned(coder, model, c):
             coder.decisions.append(value < 0)
-            rd.code_sign(coder, sign)
+            rules.code_sign(coder, sign)
         return value
 
     return code
@@ -131,9 +134,9 @@ def scripted_exact(original: Callable):
         """The script has the number, or (magnitude, negative) of its difference from the predicted one."""
         value = coder.script.answer("exact", 0)
         if not isinstance(value, tuple):
-            likely = rd.single(expected) if n == 32 else expected
-            likely = likely if rd.finite(likely) else 0.0
-            difference = rd.ordered(rd.to_bits(value, n), n) - rd.ordered(rd.to_bits(likely, n), n)
+            likely = rules.single(expected) if n == 32 else expected
+            likely = likely if rules.finite(likely) else 0.0
+            difference = rules.ordered(rules.to_bits(value, n), n) - rules.ordered(rules.to_bits(likely, n), n)
             value = abs(difference), difference < 0
         coder.decisions.extend(magnitude_bits(value[0], n) + ([value[1]] if value[0] else []))
         return original(coder, model, n, expected, before)
@@ -156,12 +159,12 @@ def scripted_corner(original: Callable):
 
 def corner_decisions(model, shape, bound, corners, first, j, previous, vertex) -> list[int]:
     """Up to the number of a vertex that is said by its distance."""
-    followed = [rd.follow(model, corners, table, length) for table, length in ((0, 12), (1, 3))]
-    expected, bits = rd.repeated(corners, model.followed or followed[0], bound), []
+    followed = [rules.follow(model, corners, table, length) for table, length in ((0, 12), (1, 3))]
+    expected, bits = rules.repeated(corners, model.followed or followed[0], bound), []
     if shape.is_absolute:
         return [] if expected is None else [int(expected == vertex)]
-    guesses = [rd.repeated(corners, followed[1], bound), model.next if model.next < bound else None]
-    guesses += rd.guesses_of_sides(model, corners, first, j, previous)
+    guesses = [rules.repeated(corners, followed[1], bound), model.next if model.next < bound else None]
+    guesses += rules.guesses_of_sides(model, corners, first, j, previous)
     for guess in dict.fromkeys([expected, *guesses]):
         if guess is not None:
             bits.append(int(guess == vertex))
@@ -188,7 +191,7 @@ def scripted_face_count(original: Callable):
 
 @contextmanager
 def scripted(script: Script) -> Iterator[list[ScriptedCoder]]:
-    """The reference decoder as a writer; the coder that it makes is put into the list."""
+    """FORMAT.md's code as a writer; the coder that it makes is put into the list."""
     made: list[ScriptedCoder] = []
 
     def coder(_: bytes) -> ScriptedCoder:
@@ -197,31 +200,30 @@ def scripted(script: Script) -> Iterator[list[ScriptedCoder]]:
 
     replaced = {
         "RangeDecoder": coder,
-        "code_in_class": scripted_unsigned(rd.code_in_class),
-        "code_signed_in_class": scripted_signed(rd.code_in_class),
-        "decode_count": scripted_count(rd.decode_count),
-        "code_exact": scripted_exact(rd.code_exact),
-        "decode_corner": scripted_corner(rd.decode_corner),
-        "decode_face_count": scripted_face_count(rd.decode_face_count),
+        "code_in_class": scripted_unsigned(rules.code_in_class),
+        "code_signed_in_class": scripted_signed(rules.code_in_class),
+        "decode_count": scripted_count(rules.decode_count),
+        "code_exact": scripted_exact(rules.code_exact),
+        "decode_corner": scripted_corner(rules.decode_corner),
+        "decode_face_count": scripted_face_count(rules.decode_face_count),
     }
-    kept = {name: getattr(rd, name) for name in replaced}
+    kept = {name: getattr(rules, name) for name in replaced}
     try:
         for name, function in replaced.items():
-            setattr(rd, name, function)
+            setattr(rules, name, function)
         yield made
     finally:
         for name, function in kept.items():
-            setattr(rd, name, function)
+            setattr(rules, name, function)
 
 
 def write(function: Callable, script: Script | list, *arguments, lowest: bool = False) -> bytes:
-    """The stream that `function` of the reference decoder reads as the script.
+    """The stream that `function` of FORMAT.md's code reads as the script.
 
     It ends at a value that the function refuses; `lowest`: who goes on behind that reads ones."""
     script = script if isinstance(script, Script) else Script(*script)
-    with scripted(script) as made, np.errstate(all="ignore"):
-        with suppress(rd.AthError):
-            function(b"", *arguments)
+    with scripted(script) as made, suppress(rules.Invalid):
+        function(b"", *arguments)
     return made[0].low.to_bytes(made[0].length, "big").rstrip(b"\0") if lowest else made[0].stream()
 
 
@@ -233,12 +235,34 @@ MOST_ENTRIES = 4096  # of an error table that is written
 
 
 @dataclass(frozen=True)
+class Clip:
+    frames: int
+    segments: int
+    name: str = ""
+    seams: tuple[float, ...] | None = None  # of a loop: Seam_Errors, one for each level
+    periodic: bool = False  # a loop of one segment, in periodic waves
+
+    def entry(self) -> bytes:
+        """What CLIPS says of it."""
+        flags = (self.seams is not None) | (self.periodic << 1)
+        return clip_entry(self.frames, self.segments, self.name, self.seams, flags=flags)
+
+
+@dataclass(frozen=True)
+class Join:
+    """How a segment goes on from the end of the one before it."""
+
+    width: int  # frames; 0: it does not
+    is_sloped: bool = False
+
+
+@dataclass(frozen=True)
 class Entry:
     """A chunk and what the front says of it; None: the true value."""
 
     kind: int
     content: bytes
-    level: int = rd.NO_LEVEL
+    level: int = NO_LEVEL
     segment: int = 0
     length: int | None = None
     checksum: int | None = None
@@ -246,14 +270,16 @@ class Entry:
     number: int | None = None  # from OTHER on: what says that all bits of the Kind follow
 
     @property
-    def chunk(self) -> rd.Chunk:
-        length = len(self.content) if self.length is None else self.length
-        checksum = crc32c(self.content) if self.checksum is None else self.checksum
-        return rd.Chunk(self.kind, self.level, self.segment, length, checksum, 0)
+    def is_motion(self) -> bool:
+        return 16 <= self.kind & 0x7FFF < 32
 
     @property
     def key(self) -> tuple:
-        return self.chunk.key
+        """What grows along the file."""
+        kind_id = self.kind & 0x7FFF
+        if self.is_motion:
+            return (1, self.level, self.segment, self.kind)
+        return (0, kind_id) if kind_id < 16 else (2, kind_id)
 
 
 class FrontScript:
@@ -272,21 +298,21 @@ class FrontScript:
             counts["layer_count"] - 1,
             int(counts["is_float64"]),
             int(counts["is_predicted"]),
-            *_bits(rd.to_bits(counts["max_error"], 64), 63),
+            *_bits(rules.to_bits(counts["max_error"], 64), 63),
         ]
-        self.bits, self.before, self.was_motion, self.place = [8] * (rd.OTHER + 1), rd.OTHER, False, (0, 0)
+        self.bits, self.before, self.was_motion, self.place = [8] * (rules.OTHER + 1), rules.OTHER, False, (0, 0)
 
     def add_chunk(self, entry: Entry) -> None:
-        known = entry.kind in rd.KINDS and not entry.spelt and entry.number is None
-        index = rd.KIND_LIST.index(entry.kind) if known else rd.OTHER
+        known = entry.kind in rules.KINDS and not entry.spelt and entry.number is None
+        index = rules.KINDS.index(entry.kind) if known else rules.OTHER
         number = index if entry.number is None else entry.number
-        self.values += _bits(number, rd.KIND_BITS) + ([] if known else _bits(entry.kind, 16))
-        if entry.chunk.is_motion:
+        self.values += _bits(number, 5) + ([] if known else _bits(entry.kind, 16))
+        if entry.is_motion:
             self._add_place(index, (entry.level, entry.segment))
-        length = entry.chunk.length
+        length = len(entry.content) if entry.length is None else entry.length
         size = length.bit_length()
         self.values += [size - self.bits[index], *_bits(length, size)[1:]]
-        self.bits[index], self.before, self.was_motion = size, index, entry.chunk.is_motion
+        self.bits[index], self.before, self.was_motion = size, index, entry.is_motion
 
     def _add_place(self, index: int, place: tuple[int, int]) -> None:
         level, segment = usual = self.place
@@ -298,8 +324,7 @@ class FrontScript:
 
     def add_errors(self, errors: Sequence[int]) -> None:
         """Stored numbers, three of each level and segment."""
-        with np.errstate(over="ignore"):
-            first = min(rd.to_bits(rd.single(self.counts["max_error"]), 32) >> 18, rd.SHORT_FLOATS - 1)
+        first = min(rules.to_bits(rules.single(self.counts["max_error"]), 32) >> 18, rules.SHORT_FLOATS - 1)
         row, above = 3 * self.counts["segment_count"], [first] * 3
         for start in range(0, len(errors), row):
             before = above
@@ -309,7 +334,7 @@ class FrontScript:
                 before = errors[at : at + 3]
             above = errors[start : start + 3]
 
-    def add_joins(self, joins: Sequence[rd.Join]) -> None:
+    def add_joins(self, joins: Sequence[Join]) -> None:
         """One of each level and segment; a sloped one of width 0 is said, and not valid."""
         last = 16
         for join in joins if self.counts["segment_count"] > 1 else ():
@@ -336,16 +361,16 @@ class Draft:
     header: dict
     entries: tuple[Entry, ...]
     errors: tuple[int, ...] | None = None  # the error table as stored
-    joins: tuple[rd.Join, ...] | None = None  # of each level and segment
+    joins: tuple[Join, ...] | None = None  # of each level and segment
     repeats: tuple[int, ...] = ()  # of each frame
     stream: Callable[[bytes], bytes] | None = None  # what becomes of the front stream
 
     def file(self) -> bytes:
         fields = (
             dict(
-                magic=rd.MAGIC,
-                major=rd.VERSION[0],
-                minor=rd.VERSION[1],
+                magic=rules.MAGIC,
+                major=rules.MAJOR,
+                minor=0,
                 features=0,
                 checksum=None,
                 front_length=None,
@@ -359,7 +384,10 @@ class Draft:
             | self.header
         )
         stream = self._stream(fields)
-        checksums = b"".join(struct.pack("<I", entry.chunk.checksum) for entry in self.entries)
+        checksums = b"".join(
+            struct.pack("<I", crc32c(entry.content) if entry.checksum is None else entry.checksum)
+            for entry in self.entries
+        )
         if fields["front_length"] is None:
             fields["front_length"] = HEADER.size + len(stream) + len(checksums)
         if fields["checksum"] is None:
@@ -375,26 +403,26 @@ class Draft:
         entries = fields["level_count"] * fields["segment_count"]
         if entries <= MOST_ENTRIES:
             script.add_errors((0,) * (3 * entries) if self.errors is None else self.errors)
-            script.add_joins((rd.Join(0),) * entries if self.joins is None else self.joins)
+            script.add_joins((Join(0),) * entries if self.joins is None else self.joins)
             script.add_repeats(self.repeats)
-        stream = write(rd.decode_front, script.values, 0, [0] * len(self.entries), rd.Limits())
+        stream = write(rules.decode_front, script.values, len(self.entries))
         return self.stream(stream) if self.stream else stream
 
     def with_header(self, **fields) -> Draft:
         return replace(self, header=self.header | fields)
 
-    def index(self, kind: int, level: int = rd.NO_LEVEL, segment: int = 0) -> int:
+    def index(self, kind: int, level: int = NO_LEVEL, segment: int = 0) -> int:
         return next(i for i, e in enumerate(self.entries) if (e.kind, e.level, e.segment) == (kind, level, segment))
 
-    def content(self, kind: int, level: int = rd.NO_LEVEL, segment: int = 0) -> bytes:
+    def content(self, kind: int, level: int = NO_LEVEL, segment: int = 0) -> bytes:
         return self.entries[self.index(kind, level, segment)].content
 
-    def change(self, kind: int, level: int = rd.NO_LEVEL, segment: int = 0, **fields) -> Draft:
+    def change(self, kind: int, level: int = NO_LEVEL, segment: int = 0, **fields) -> Draft:
         """The file with another content, or another entry in the table, for one chunk."""
         i = self.index(kind, level, segment)
         return replace(self, entries=(*self.entries[:i], replace(self.entries[i], **fields), *self.entries[i + 1 :]))
 
-    def without(self, kind: int, level: int = rd.NO_LEVEL, segment: int = 0) -> Draft:
+    def without(self, kind: int, level: int = NO_LEVEL, segment: int = 0) -> Draft:
         i = self.index(kind, level, segment)
         return replace(self, entries=self.entries[:i] + self.entries[i + 1 :])
 
@@ -489,7 +517,7 @@ def permutation_script(source: list | None, stems: list[Stem], of_vertices: bool
                 step = value - before[-1]
             if known is not None:
                 step_beside = value - known
-            if i < rd.PLACES:
+            if i < rules.PLACES:
                 beside[i] = value
             before.append(value)
     return script
@@ -500,7 +528,7 @@ def rest_script(branches: list, points: list) -> list:
     script = []
     for branch in branches:
         for i in range(branch.count):
-            predicted = rd.predict_rest(branch, points, i)
+            predicted = rules.predict_rest(branch, points, i)
             script += [int(points[branch.first + i][k] - predicted[k]) for k in range(3)]
     return script
 
@@ -531,8 +559,8 @@ def rest_chunk(
 
 def host_rest_chunk(mesh: np.ndarray, origin=(0.0, 0.0, 0.0), **fields) -> bytes:
     data = (mesh + np.float32(0)).tobytes()  # 0.0 for -0.0
-    checksums = struct.pack("<II", rd.crc32c(data), rd.crc32c(data[::-1]))
-    return rest_chunk(checksums, **{"origin": origin, "step": 1.0, "reserved": rd.IS_HOST >> 2} | fields)
+    checksums = struct.pack("<II", crc32c(data), crc32c(data[::-1]))
+    return rest_chunk(checksums, **{"origin": origin, "step": 1.0, "reserved": IS_HOST >> 2} | fields)
 
 
 def refined_rest_chunk(stream: bytes, step: float = 0.0625) -> bytes:
@@ -574,7 +602,7 @@ def whole_rates(*rates: int, method: int = 3) -> bytes:
 
 
 def uneven_time(*times: float | tuple) -> bytes:
-    return b"\2" + write(rd.decode_times, list(times), len(times))
+    return b"\2" + write(rules.decode_times, list(times), len(times))
 
 
 def stems_head(
@@ -596,19 +624,17 @@ def basis_stream(rows: list[list[int]], bits: int) -> bytes:
         for t, value in enumerate(integers):
             script.append(value - before - slope)
             slope, before = value - before if t > 0 else 0, value
-    return write(rd.decode_temporal, script, len(rows), len(rows[0]), bits)
+    return write(rules.decode_temporal, script, len(rows), len(rows[0]), bits)
 
 
 def basis_in_waves(frames: int, *script: int, rank: int, known: list[list[float]] | None = None) -> bytes:
     """A learned basis in waves: of three rows at a time the changes of their exponents, then the script of a row."""
-    rows = np.array(known, float) if known else np.empty((0, frames))
-    return write(rd.decode_basis, list(script), rows, rank, frames, rd.waves_over_time(frames, False))
+    return write(rules.decode_basis, list(script), known or [], rank, frames, rules.waves_over_time(frames, False))
 
 
-def _no_motion(frames: int, periodic: bool = False, shapes: rd.Motion | None = None) -> rd.Motion:
-    motion = rd.Motion(frames, periodic)
-    if shapes:
-        motion.shapes, motion.shape_rows = shapes.shapes, shapes.shape_rows
+def _no_motion(plan, frames: int, periodic: bool, shapes):
+    motion = rules.no_motion(plan, frames, periodic)
+    motion.shapes, motion.shape_rows = shapes.shapes, shapes.shape_rows
     return motion
 
 
@@ -620,7 +646,7 @@ class Plant:
     stems: list[Stem]
     frames: int = 1
     segments: int = 1
-    clips: tuple[rd.Clip, ...] = ()  # of CLIPS; none: one of `frames` and `segments`, without the chunk
+    clips: tuple[Clip, ...] = ()  # of CLIPS; none: one of `frames` and `segments`, without the chunk
     points: list | None = None  # integers in units of Rest_Step; None: `grown`
     rest: bytes | None = None  # REST
     faces: bytes | None = None  # FACES that it goes by
@@ -638,46 +664,45 @@ class Plant:
     layers: int = 1
     ratio: int = 4  # of the steps of layers, as STEMS and REFINED_REST have it
     shift: int = 2  # of SHAPES
-    joins: tuple[rd.Join, ...] | None = None
+    joins: tuple[Join, ...] | None = None
     repeats: tuple[int, ...] = ()  # of each frame, of one clip; none: no frame is one
     predicted: bytes | None = None  # of predicted motion, Step and Settings; then AFFINES are there only with a script
 
     def draft(self) -> Draft:
         vertices = sum(stem.count for stem in self.stems)
         stream = write(
-            rd.decode_hierarchy,
+            rules.decode_hierarchy,
             hierarchy_script(self.stems, self.branch_source, self.vertex_source),
             len(self.stems),
             vertices,
         )
-        branches, _, vertex_source = rd.decode_hierarchy(stream, len(self.stems), vertices)
+        branches, _, vertex_source = rules.decode_hierarchy(stream, len(self.stems), vertices)
         rest = self._rest(branches)
         self.branches, predicted = branches, self.predicted is not None
-        self.plan = self.level_0 = rd.Plan(branches, predicted)
-        rests = self._set_rest(branches, rest, vertex_source)
-        clips = self.clips or (rd.Clip(self.frames, self.segments),)
+        rests = [self._decoded_rest(branches, rest, vertex_source)]
+        self.plan = self.level_0 = rules.make_plan(branches, rests[-1].rest, predicted)
+        clips = self.clips or (Clip(self.frames, self.segments),)
         entries = [
-            Entry(rd.HIERARCHY, hierarchy_chunk(stream)),
-            Entry(rd.REST, rest),
-            Entry(rd.TIME, self.time or steady_times(*[(0.0, 0.25)] * len(clips))),
+            Entry(rules.HIERARCHY, hierarchy_chunk(stream)),
+            Entry(rules.REST, rest),
+            Entry(rules.TIME, self.time or steady_times(*[(0.0, 0.25)] * len(clips))),
         ]
         if self.clips:
-            entries.append(Entry(rd.CLIPS, b"".join(clip.entry() for clip in clips)))
+            entries.append(Entry(rules.CLIPS, b"".join(clip.entry() for clip in clips)))
         if self.source_rest is not None:
-            entries.append(Entry(rd.SOURCE_REST, self.source_rest))
+            entries.append(Entry(rules.SOURCE_REST, self.source_rest))
         if self.faces is not None:
-            entries.append(Entry(rd.FACES, self.faces))
-        if (rd.REFINED_REST, 1, 0) in self.scripts:
+            entries.append(Entry(rules.FACES, self.faces))
+        if (rules.REFINED_REST, 1, 0) in self.scripts:
             entries.append(self._refined_rest(branches, 1, self.step / 2, rests))
-            self.plan = rd.Plan(branches)
-            self.plan.rest = np.array(rests[-1].rest)
-        self.plans, self.shapes = [self.plan], [_no_motion(1)]
+            self.plan = rules.make_plan(branches, rests[-1].rest)
+        self.plans, self.shapes = [self.plan], [rules.no_motion(self.plan, 1, False)]
         for level in range(self.plan.height + 2):
-            if (rd.SHAPES, level, 0) in self.scripts:
-                entries.append(Entry(rd.SHAPES, self._shapes(level), level))
+            if (rules.SHAPES, level, 0) in self.scripts:
+                entries.append(Entry(rules.SHAPES, self._shapes(level), level))
         for q in range(1, self.layers):
             entries += self._layer(branches, q, rests)
-        segments, start = [(frames, clip.periodic) for clip in clips for frames in clip.segment_lengths], 0
+        segments, start = [(n, clip.periodic) for clip in clips for n in rules.segment_lengths([clip])], 0
         for s, (frames, periodic) in enumerate(segments):
             entries += self._segment(s, frames - sum(self.repeats[start : start + frames]), periodic)
             start += frames
@@ -712,112 +737,108 @@ class Plant:
         points = grown(self.stems) if self.points is None else self.points
         script = rest_script(branches, points)
         return rest_chunk(
-            write(rd.decode_rest, script, branches, 1.0),
+            write(rules.decode_rest, script, branches, 1.0),
             origin=self.origin,
             step=self.step,
             rest_type=int(self.is_float64),
         )
 
-    def _set_rest(self, branches: list, chunk: bytes, vertex_source: list) -> list[rd.RestLayer]:
-        """The rest pose of REST, for those that refine it; none where it is exact or the host's."""
+    def _decoded_rest(self, branches: list, chunk: bytes, vertex_source: list):
+        """The rest pose of REST; `steps` is None where it is exact or the host's."""
         self.connectivity = None if self.faces is None else self._mesh(vertex_source)
-        with np.errstate(all="ignore"):
-            if self.mesh is not None:
-                self.plan.rest = (self.mesh[vertex_source] + np.float32(0)).astype(float) - np.float32(
-                    self.origin
-                ).astype(float)
-                return []
-            if chunk[0] & 1:
-                points = rd.decode_exact_rest(chunk[17:], branches, bool(chunk[0] & 2), self.connectivity)
-                self.plan.rest = np.array(points) - np.array(struct.unpack_from("<3f", chunk, 1), float)
-                return []
-            self.is_adaptive = chunk[0] & rd.REST_ADAPTIVE != 0
-            coded = rd.decode_rest(chunk[17:], branches, rd.f32(chunk, 13), None, self.is_adaptive, self.connectivity)
-            self.plan.rest = np.array(coded.rest)
-            return [coded]
+        origin, self.is_adaptive = struct.unpack_from("<3f", chunk, 1), chunk[0] & REST_ADAPTIVE != 0
+        if self.mesh is None and not chunk[0] & REST_EXACT:
+            return rules.decode_rest(
+                chunk[17:], branches, rules.f32(chunk, 13), None, self.is_adaptive, self.connectivity
+            )
+        if self.mesh is not None:
+            points = (self.mesh[vertex_source] + np.float32(0)).tolist()
+        else:
+            points = rules.decode_exact_rest(chunk[17:], branches, bool(chunk[0] & REST_FLOAT64), self.connectivity)
+        return rules.Record(rest=[[x[k] - origin[k] for k in range(3)] for x in points], steps=None)
 
-    def _mesh(self, vertex_source: list) -> rd.Mesh:
-        shape, stream = rd.parse_polygons(self.faces, rd.FACES, rd.Limits())
-        return rd.build_mesh(*rd.decode_polygons(stream, shape, len(vertex_source)), list(vertex_source))
+    def _mesh(self, vertex_source: list):
+        shape, stream = rules.parse_polygons(self.faces, rules.FACES)
+        return rules.build_mesh(*rules.decode_polygons(stream, shape, len(vertex_source)), vertex_source)
 
     def _shapes(self, level: int) -> bytes:
         """SHAPES by its script; its values are used by the streams of STEMS."""
-        return self._write(rd.decode_shapes, (rd.SHAPES, level, 0), self.plan, self.shapes[0], level)
+        return self._write(rules.decode_shapes, (rules.SHAPES, level, 0), self.plan, self.shapes[0], level)
 
-    def _layer(self, branches: list, q: int, rests: list[rd.RestLayer]) -> list[Entry]:
+    def _layer(self, branches: list, q: int, rests: list) -> list[Entry]:
         """What all segments share of a refinement."""
         level, entries = self.plan.height + 1 + q, []
-        plan, shapes = self.plans[-1].refined(branches, level, q), _no_motion(1)
-        if (rd.REFINED_REST, level, 0) in self.scripts:
+        if (rules.REFINED_REST, level, 0) in self.scripts:
             entries.append(self._refined_rest(branches, level, self.step / self.ratio**q, rests))
-            plan.rest = np.array(rests[-1].rest)
-        if (rd.SHAPES, level, 0) in self.scripts:
+        plan = rules.refined_plan(branches, rests[-1].rest, level, q)
+        shapes = rules.no_motion(plan, 1, False)
+        if (rules.SHAPES, level, 0) in self.scripts:
             stream = self._write(
-                rd.decode_refined_shapes, (rd.SHAPES, level, 0), plan, shapes, self.shapes[-1], self.shift
+                rules.decode_refined_shapes, (rules.SHAPES, level, 0), plan, shapes, self.shapes[-1], self.shift
             )
-            entries.append(Entry(rd.SHAPES, bytes([self.shift]) + stream, level))
+            entries.append(Entry(rules.SHAPES, bytes([self.shift]) + stream, level))
         self.plans.append(plan)
         self.shapes.append(shapes)
         return entries
 
-    def _refined_rest(self, branches: list, level: int, step: float, rests: list[rd.RestLayer]) -> Entry:
+    def _refined_rest(self, branches: list, level: int, step: float, rests: list) -> Entry:
         """The rest pose of a level, which is added to those before."""
         arguments = branches, step, rests[-1], self.is_adaptive, self.connectivity
-        stream = self._write(rd.decode_rest, (rd.REFINED_REST, level, 0), *arguments)
-        rests.append(rd.decode_rest(stream, *arguments))
-        return Entry(rd.REFINED_REST, refined_rest_chunk(stream, step), level)
+        stream = self._write(rules.decode_rest, (rules.REFINED_REST, level, 0), *arguments)
+        rests.append(rules.decode_rest(stream, *arguments))
+        return Entry(rules.REFINED_REST, refined_rest_chunk(stream, step), level)
 
     def _segment(self, s: int, frames: int, periodic: bool) -> list[Entry]:
-        motion = _no_motion(frames, periodic, self.shapes[0])
+        motion = _no_motion(self.plan, frames, periodic, self.shapes[0])
         entries, last = [], self.plan.height + 1
         for level in range(last + 1):
-            if self.plan.has_stems(level):
+            if rules.has_stems(self.plan, level):
                 head = self._head(level, s, motion)
-                stream = self._write(rd.decode_stems, (rd.STEMS, level, s), self.plan, motion, level)
-                entries.append(Entry(rd.STEMS, head + stream, level, s))
-            scripted = self.predicted is None or (rd.AFFINES, level, s) in self.scripts
-            if self.plan.has_affines(level, level) and scripted:
+                stream = self._write(rules.decode_stems, (rules.STEMS, level, s), self.plan, motion, level)
+                entries.append(Entry(rules.STEMS, head + stream, level, s))
+            scripted = self.predicted is None or (rules.AFFINES, level, s) in self.scripts
+            if rules.has_affines(self.plan, level, level) and scripted:
                 plan = self.level_0 if level == 0 else self.plan
-                stream = self._write(rd.decode_affines, (rd.AFFINES, level, s), plan, motion, level)
-                entries.append(Entry(rd.AFFINES, stream, level, s))
+                stream = self._write(rules.decode_affines, (rules.AFFINES, level, s), plan, motion, level)
+                entries.append(Entry(rules.AFFINES, stream, level, s))
         if self.predicted is not None:
-            stream = self._write(self._predict, (rd.PREDICTED, 1, s), frames)
-            entries.append(Entry(rd.PREDICTED, self.predicted + stream, 1, s))
+            stream = self._write(self._predict, (rules.PREDICTED, 1, s), frames)
+            entries.append(Entry(rules.PREDICTED, self.predicted + stream, 1, s))
         if self.layers > 1:
             entries += self._refinements(s, motion, periodic)
         for level in range(last, last + self.layers):
-            place = (rd.CORRECTIONS, level, s)
+            place = (rules.CORRECTIONS, level, s)
             if place in self.scripts or place[:2] in self.scripts:
-                stream = self._write(rd.decode_corrections, place, sum(stem.count for stem in self.stems), frames)
-                entries.append(Entry(rd.CORRECTIONS, struct.pack("<f", 0.5) + stream, *place[1:]))
+                stream = self._write(rules.decode_corrections, place, sum(stem.count for stem in self.stems), frames)
+                entries.append(Entry(rules.CORRECTIONS, struct.pack("<f", 0.5) + stream, *place[1:]))
         return entries
 
     def _predict(self, stream: bytes, frames: int) -> None:
-        number = np.dtype("<f8" if self.is_float64 else "<f4")
-        coded = rd.Prediction(self.predicted + stream, self.branches, self.plan.rest, np.array(self.origin), number)
-        coded.decode(frames)
+        chunk, rest = self.predicted + stream, self.plan.rest
+        rules.decode_predicted(chunk, self.branches, rest, self.origin, frames, self.is_float64)
 
-    def _head(self, level: int, s: int, motion: rd.Motion) -> bytes:
+    def _head(self, level: int, s: int, motion) -> bytes:
         """Of STEMS; the motion gets its steps and waves."""
         head = self.heads.get((level, s), self.heads.get(level, self.default_head))
-        rd.read_stems_head(head, motion, level)
+        rules.read_stems_head(head, motion, level)
         return head
 
-    def _refinements(self, s: int, motion: rd.Motion, periodic: bool) -> list[Entry]:
+    def _refinements(self, s: int, motion, periodic: bool) -> list[Entry]:
         """STEMS of further layers, from the motion of the first."""
-        entries, pose = [], rd.Pose(self.plan, motion)
-        with np.errstate(all="ignore"):
-            pose.place_level(self.plan.height + 1)
+        placed, _, kept = rules.pose(self.plan, motion, self.plan.height + 1)
+        entries, layers = [], [rules.Record(plan=self.plan, motion=motion, placed=placed, kept=kept)]
+
+        def decode(stream: bytes, *arguments) -> None:
+            layers.append(rules.decode_refined_stems(stream, *arguments))
+
         for q in range(1, self.layers):
-            level, before = self.plan.height + 1 + q, pose
-            motion = _no_motion(motion.frames, periodic, self.shapes[q])
-            motion.streams |= before.motion.streams
+            level, before = self.plan.height + 1 + q, layers[-1]
+            motion = _no_motion(self.plans[q], motion.frames, periodic, self.shapes[q])
+            motion.streams.update(before.motion.streams)
             head = struct.pack("<H", self.ratio) + self._head(level, s, motion)
-            pose = rd.Refinement(self.plans[q], motion, before)
+            arguments = self.plans[q], motion, before, level, self.ratio
             entries.append(
-                Entry(
-                    rd.STEMS, head + self._write(pose.decode_stems, (rd.STEMS, level, s), level, self.ratio), level, s
-                )
+                Entry(rules.STEMS, head + self._write(decode, (rules.STEMS, level, s), *arguments), level, s)
             )
         return entries
 

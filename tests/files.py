@@ -24,8 +24,7 @@ from athcodec.segmentation import balanced_segments
 
 sys.path.append(str(Path(__file__).resolve().parent.parent))  # for spec, which is not installed
 
-from spec.reference_decoder import Join  # noqa: E402
-from spec.scripted import Draft, Entry  # noqa: E402
+from spec.scripted import Draft, Entry, Join  # noqa: E402
 
 COUNTS = (
     "vertex_count branch_count frame_count segment_count full_level_count level_count clip_count layer_count "

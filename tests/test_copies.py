@@ -11,7 +11,7 @@ from athcodec import MotionClip, container
 from athcodec._native import BRANCH
 from athcodec.encoding import streams
 from athcodec.errors import AthError
-from spec import reference_decoder as rd
+from spec.document import File, rules
 
 STEP = 0.02
 REACH = 0.6989 * STEP  # of an adaptive rest pose at most
@@ -93,16 +93,12 @@ def test_needles_take_two_directions_and_no_twist():
 
 @pytest.mark.parametrize("shape", [LEAF, LEAF[:2], np.zeros((3, 3))])
 @pytest.mark.parametrize("bend", [0.0, 0.3])
-def test_copies_mean_the_same_to_encoder_and_reference(shape, bend):
+def test_copies_mean_the_same_to_encoder_and_document(shape, bend):
     random = np.random.default_rng(2)
     branches, pose = parts([shape + 0.5 * bend * random.normal(size=shape.shape) / 3 for _ in range(40)], 3, 0.2, True)
     rest = coded(branches, pose, bend=bend)
-    records = []
-    for branch in branches:
-        own = rd.Branch(*(int(branch[name]) for name in ("parent", "depth", "first", "count", "flags", "lag")))
-        own.attach = int(branch["attach"])
-        records.append(own)
-    assert np.array(rd.decode_rest(rest.stream, records, STEP, None, True).rest).tobytes() == rest.decoded.tobytes()
+    records = [rules.Record(**{name: int(branch[name]) for name in BRANCH.names}) for branch in branches]
+    assert np.array(rules.decode_rest(rest.stream, records, STEP, None, True).rest).tobytes() == rest.decoded.tobytes()
 
 
 @pytest.mark.parametrize("seed", range(20))
@@ -117,18 +113,18 @@ def test_damaged_copies_are_the_same_positions_to_all_or_refused(scratch, seed):
         faces=faces.astype(np.int32),
     )
     athcodec.encode(clip, scratch / "leaves.ath", rel_error=1e-3, attributes="none", ladder="none")
-    reference = rd.AthFile((scratch / "leaves.ath").read_bytes())
+    document = File((scratch / "leaves.ath").read_bytes())
     with athcodec.open(scratch / "leaves.ath") as decoder:
-        assert decoder.positions().tobytes() == reference.positions(len(decoder.levels) - 1).tobytes()
+        assert decoder.positions().tobytes() == document.positions(len(decoder.levels) - 1).tobytes()
     outcomes = []
     parts_of_file, random = Parts.of((scratch / "leaves.ath").read_bytes()), np.random.default_rng(seed)
     rest = bytearray(parts_of_file.payload(container.REST))
     for place in random.integers(17, len(rest), 3):
         rest[place] = random.integers(1, 256)
     data = parts_of_file.with_payload(container.REST, bytes(rest))
-    for play in (lambda: opened(data).positions(), lambda: rd.AthFile(data).positions()):
+    for play in (lambda: opened(data).positions(), lambda: File(data).positions()):
         try:
             outcomes.append(play().tobytes())
-        except (AthError, rd.AthError):
+        except (AthError, rules.Invalid):
             outcomes.append(None)
     assert outcomes[0] == outcomes[1]

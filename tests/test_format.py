@@ -16,7 +16,7 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import fields, replace
 from pathlib import Path
-from types import SimpleNamespace
+from types import ModuleType
 
 import numpy as np
 import pytest
@@ -33,30 +33,9 @@ from athcodec.encoding.motion import LevelStream, Plan, SegmentMotion
 
 FORMAT = Path(__file__).resolve().parents[1] / "FORMAT.md"
 sys.path.append(str(FORMAT.parent))  # for spec, which is not installed
-from spec import conformance, reference_decoder  # noqa: E402
+from spec.document import TEXT, rules, section, table  # noqa: E402
 
 VECTORS = FORMAT.parent / "spec" / "vectors" / "valid"
-TEXT = FORMAT.read_text(encoding="utf-8")
-
-
-def section(title: str) -> str:
-    """The text under a heading, up to the next of the same or a higher rank."""
-    heading = re.search(rf"^(#+) {re.escape(title)}\n", TEXT, re.M)
-    rest = TEXT[heading.end() :]
-    following = re.search(rf"^#{{1,{len(heading[1])}}} ", rest, re.M)
-    return rest[: following.start()] if following else rest
-
-
-def table(title: str, first_column: str) -> list[dict[str, str]]:
-    """Rows of the first table of a section whose first column has this name."""
-    lines = section(title).splitlines()
-    start = next(i for i, line in enumerate(lines) if line.startswith(f"| {first_column} |"))
-    rows = []
-    for line in lines[start:]:
-        if not line.startswith("|"):
-            break
-        rows.append([cell.strip() for cell in line.strip("|").split("|")])
-    return [dict(zip(rows[0], row)) for row in rows[2:]]
 
 
 def dump(text: str) -> bytes:
@@ -68,67 +47,13 @@ def dump(text: str) -> bytes:
     return data
 
 
-def reader(code: str):
-    return lambda data, at: struct.unpack_from(code, data, at)[0]
-
-
-FLOATS = {32: "<f", 64: "<d"}
-
-
-def single(x: float) -> float:
-    with np.errstate(over="ignore"):
-        return float(np.float32(x))
-
-
-def is_json_object(text: bytes) -> bool:
-    try:
-        reference_decoder.parse_json(text, "METADATA")
-    except reference_decoder.AthError:
-        return False
-    return True
-
-
-def zstd_frame(data: bytes) -> SimpleNamespace:
-    frame = SimpleNamespace(window_size=reference_decoder.zstd_window(data), content_size=None, content=None)
-    with suppress(zstandard.ZstdError):
-        frame.content_size = zstandard.frame_content_size(data)
-        if 0 < frame.content_size < 1 << 28:
-            frame.content = zstandard.ZstdDecompressor().decompress(data, allow_extra_data=False)
-    return frame
-
-
 @pytest.fixture(scope="module")
-def spec() -> SimpleNamespace:
-    """The decoder that FORMAT.md's Python blocks make, given only what its Conventions take for granted."""
-
-    def utf8(data: bytes) -> str:
-        try:
-            return data.decode()
-        except UnicodeDecodeError:
-            raise names["Invalid"]("BAD_CHUNK") from None
-
-    names = {
-        "u8": reader("<B"),
-        "u16": reader("<H"),
-        "u32": reader("<I"),
-        "f32": reader("<f"),
-        "f64": reader("<d"),
-        "sqrt": math.sqrt,
-        "single": single,
-        "to_bits": lambda x, n: int.from_bytes(struct.pack(FLOATS[n], x), "little"),
-        "from_bits": lambda b, n: struct.unpack(FLOATS[n], b.to_bytes(n // 8, "little"))[0],
-        "utf8": utf8,
-        "limit": {row["Limit"]: int(row["Value"]) for row in table("Limits", "Limit")}.__getitem__,
-        "is_json_object": is_json_object,
-        "zstd_frame": zstd_frame,
-        **{row["Name"]: int(row["Kind"], 16) for row in table("Chunk table", "Name")},
-    }
-    for block in re.findall(r"^```python\n(.*?)^```", TEXT, re.M | re.S):
-        exec(block, names)
-    return SimpleNamespace(**names)
+def spec() -> ModuleType:
+    """The decoder that FORMAT.md's Python blocks make."""
+    return rules
 
 
-def assert_same_bits(spec: SimpleNamespace, data: bytes) -> None:
+def assert_same_bits(spec: ModuleType, data: bytes) -> None:
     with athcodec.open(io.BytesIO(data), strict=True) as decoder:
         played = [decoder.play(clip.name) for clip in decoder.clips]
         for level in range(decoder.level_count):
@@ -346,11 +271,6 @@ def test_pseudo_code_decodes_every_feature(spec, seed, is_float64, exact):
     assert_same_bits(spec, HandMade(seed, is_float64, exact).file())
 
 
-@pytest.mark.parametrize("path", sorted(VECTORS.glob("layers-*.ath")), ids=lambda path: path.stem)
-def test_pseudo_code_decodes_layers(spec, path):
-    assert_same_bits(spec, path.read_bytes())
-
-
 def test_pseudo_code_decodes_layers_that_the_encoder_writes(spec, tmp_path):
     clip = plant(seed=14, branches=6, longest=5, frames=18, rough=1e-3)
     athcodec.encode(clip, tmp_path / "layers.ath", rel_error=1e-4, ladder=(1e-2, 1e-3))
@@ -359,11 +279,6 @@ def test_pseudo_code_decodes_layers_that_the_encoder_writes(spec, tmp_path):
 
 def test_pseudo_code_decodes_several_clips(spec, medley_ath):
     assert_same_bits(spec, medley_ath.read_bytes())
-
-
-@pytest.mark.parametrize("path", sorted(VECTORS.glob("clip*.ath")), ids=lambda path: path.stem)
-def test_pseudo_code_decodes_clips_of_every_sort(spec, path):
-    assert_same_bits(spec, path.read_bytes())
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -454,7 +369,7 @@ def read_basis(stream: bytes, frames: int, bits: int = 8) -> list[int]:
 # ---- decisions made by chance ----
 
 
-def assert_same_on_levels(spec: SimpleNamespace, data: bytes, levels: Iterable[int]) -> list[object]:
+def assert_same_on_levels(spec: ModuleType, data: bytes, levels: Iterable[int]) -> list[object]:
     """The positions that they have, or that they are invalid; returns what the document makes of them."""
     documents = [outcome(spec, lambda data, level=level: spec.decode(data, level), data) for level in levels]
     for level, document in zip(levels, documents):
@@ -478,7 +393,7 @@ def test_random_decisions_about_motion_mean_the_same_to_the_document_and_the_cod
         assert_same_on_levels(spec, data, range(chunk.level, parts.header.level_count))
 
 
-def motion_function(spec: SimpleNamespace, parts: Parts, chunk: container.Chunk) -> tuple:
+def motion_function(spec: ModuleType, parts: Parts, chunk: container.Chunk) -> tuple:
     """The name of the document's function that reads a chunk's stream, and its other arguments."""
     frames = parts.header.frame_count
     if chunk.kind == container.CORRECTIONS:
@@ -539,13 +454,13 @@ def assert_same_numbers(document: object, code: object) -> None:
         assert np.nan_to_num(expected, nan=0.0).tobytes() == np.nan_to_num(code, nan=0.0).tobytes()
 
 
-def random_stream(spec: SimpleNamespace, random: np.random.Generator, name: str, *arguments: object) -> bytes:
+def random_stream(spec: ModuleType, random: np.random.Generator, name: str, *arguments: object) -> bytes:
     """What a function of the document reads as decisions made by chance, up to the first invalid one."""
     chance = random.uniform(0.15, 0.85)
     return stream_of(spec, lambda: int(random.random() < chance), name, *arguments)
 
 
-def stream_of(spec: SimpleNamespace, decide: Callable[[], int], name: str, *arguments: object) -> bytes:
+def stream_of(spec: ModuleType, decide: Callable[[], int], name: str, *arguments: object) -> bytes:
     """What a function of the document reads as these decisions, up to the first invalid one."""
     made = []
 
@@ -593,7 +508,7 @@ def awkward_numbers(random: np.random.Generator, count: int, dtype: type) -> np.
     return np.where(np.isfinite(numbers) & (random.random(count) < 0.5), numbers, near)
 
 
-def stems(spec: SimpleNamespace, branches: np.ndarray) -> list:
+def stems(spec: ModuleType, branches: np.ndarray) -> list:
     return [spec.Record(**{name: int(row[name]) for name in BRANCH.names}) for row in branches]
 
 
@@ -655,7 +570,7 @@ def test_random_decisions_about_exact_numbers_mean_the_same_to_the_document_and_
         )
 
 
-def assert_same_outcome(spec: SimpleNamespace, stream: bytes, *decoders: Callable) -> None:
+def assert_same_outcome(spec: ModuleType, stream: bytes, *decoders: Callable) -> None:
     document, code = (outcome(spec, lambda data: decode(data).tobytes(), stream) for decode in decoders)
     assert document == code
 
@@ -667,13 +582,13 @@ def decisions(n: int, magnitude: int, negative: bool = False) -> list[int]:
     return unary + [int(bit) for bit in f"{magnitude:b}"[1:]] + [int(negative)] * (length > 0)
 
 
-def exact_stream(spec: SimpleNamespace, n: int, *differences: tuple[int, bool]) -> bytes:
+def exact_stream(spec: ModuleType, n: int, *differences: tuple[int, bool]) -> bytes:
     """An exact rest pose of one vertex, whose numbers are each 0.0 moved by a difference."""
     made = iter(sum((decisions(n, *difference) for difference in differences), []))
     return stream_of(spec, lambda: next(made, 0), "decode_exact_rest", one_vertex(spec), n == 64, None)
 
 
-def one_vertex(spec: SimpleNamespace) -> list:
+def one_vertex(spec: ModuleType) -> list:
     return [spec.Record(first=0, count=1, attach=-1, lag=1)]
 
 
@@ -709,13 +624,13 @@ def test_differences_wrap_around(spec):
         assert two_numbers(spec, from_zero(spec, number), back) == [number, 1.0]
 
 
-def from_zero(spec: SimpleNamespace, number: float) -> list[int]:
+def from_zero(spec: ModuleType, number: float) -> list[int]:
     """Decisions of a number where 0.0 is expected."""
     at, zero = (spec.ordered(spec.to_bits(x, 64), 64) for x in (number, 0.0))
     return decisions(64, abs(at - zero), at < zero)
 
 
-def two_numbers(spec: SimpleNamespace, first: list[int], second: list[int]) -> list[float]:
+def two_numbers(spec: ModuleType, first: list[int], second: list[int]) -> list[float]:
     """What document and code make of these decisions: x of a stem's two vertices, and times that ascend."""
     made = iter(first + second)
     stream = stream_of(spec, lambda: next(made), "decode_times", 2)
@@ -730,7 +645,7 @@ def two_numbers(spec: SimpleNamespace, first: list[int], second: list[int]) -> l
     return numbers
 
 
-def outcome(spec: SimpleNamespace, decode, stream: bytes) -> object:
+def outcome(spec: ModuleType, decode, stream: bytes) -> object:
     try:
         return decode(stream)
     except (spec.Invalid, errors.BadChunk):
@@ -739,74 +654,8 @@ def outcome(spec: SimpleNamespace, decode, stream: bytes) -> object:
 
 # ---- what the document and the code refuse ----
 
-INVALID = [vector for vector in conformance.vectors() if not vector.valid and vector.path.stat().st_size < 100_000]
 
-AT_ONCE = [
-    vector
-    for vector in INVALID
-    if vector.mesh is not None or {vector.results["strict"], vector.results["open"]} & set(conformance.ERRORS)
-]
-
-
-@pytest.mark.parametrize("vector", AT_ONCE, ids=lambda vector: vector.name)
-def test_the_document_opens_and_refuses_files_as_the_vectors_have_it(spec, vector):
-    for item in ("strict", "open"):
-        try:
-            spec.open_file(vector.path.read_bytes(), strict=item == "strict")
-            result = "ok"
-        except spec.Invalid as error:
-            result = str(error)
-        assert result == vector.results[item], item
-
-
-ASKED = [
-    (vector, item)
-    for vector in INVALID
-    for item, result in vector.results.items()
-    if result in conformance.ERRORS and (item in ("rest", "static") or item.isdecimal()) and vector.mesh is None
-]
-
-
-@pytest.mark.parametrize("vector, item", ASKED, ids=lambda part: getattr(part, "name", part))
-def test_the_document_refuses_what_is_asked_for_as_the_vectors_have_it(spec, vector, item):
-    try:
-        data = vector.path.read_bytes()
-        if item.isdecimal():
-            spec.decode(data, int(item))
-        elif item == "rest":
-            read_rest(spec, spec.open_file(data))
-        else:
-            read_static(spec, spec.open_file(data))
-        result = "ok"
-    except spec.Invalid as error:
-        result = str(error)
-    assert result == vector.results[item]
-
-
-def read_rest(spec: SimpleNamespace, file: SimpleNamespace) -> None:
-    spec.require(file.rest.rest is not None, "NEEDS_HOST_MESH")
-    if (container.SOURCE_REST, None, 0) in file.chunks:
-        spec.source_rest(file, spec.shown_plans(file, 0))
-
-
-def read_static(spec: SimpleNamespace, file: SimpleNamespace) -> None:
-    of_faces = {}
-    for kind in (container.FACES, container.EDGES):
-        if (kind, None, 0) in file.chunks:
-            shape, stream = spec.parse_polygons(spec.content(file.chunks, kind), kind)
-            if shape.is_derived:
-                spec.derived_edges(file, shape.index_type)
-                continue
-            counts, corners = spec.decode_polygons(stream, shape, file.header.vertex_count)
-            if shape.count_type is not None:
-                of_faces["face_vertex_counts"] = bytes(len(counts) << (shape.count_type & 3))
-                of_faces["face_vertex_indices"] = bytes(len(corners) << (shape.index_type & 3))
-    spec.read_attributes(file, of_faces)
-    if (container.METADATA, None, 0) in file.chunks:
-        spec.parse_metadata(spec.content(file.chunks, container.METADATA))
-
-
-def assert_refused_alike(spec: SimpleNamespace, data: bytes, error: str) -> None:
+def assert_refused_alike(spec: ModuleType, data: bytes, error: str) -> None:
     with pytest.raises(spec.Invalid, match=f"^{error}$"):
         spec.decode(data, 1)
     with pytest.raises(errors.FormatError) as caught, athcodec.open(io.BytesIO(data)) as decoder:

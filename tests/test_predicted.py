@@ -26,7 +26,7 @@ from athcodec.metrics import SmoothnessMeter
 sys.path.append(str(Path(__file__).resolve().parent.parent))  # for bench and spec, which are not installed
 
 from bench.odd.growing import unfolding_leaves  # noqa: E402
-from spec import reference_decoder as rd  # noqa: E402
+from spec.document import File  # noqa: E402
 
 FRAMES = 60
 
@@ -198,7 +198,7 @@ def test_any_clip_keeps_the_bound_and_decodes_as_the_document_says(scratch, clip
             assert error <= decoder.levels[level].max_error * (1 + 1e-9)
         assert error <= bound
         if found.choices["motion"] == "predicted" and positions.size < 30_000:
-            assert np.array_equal(rd.AthFile(path.read_bytes()).positions(), shown)
+            assert np.array_equal(File(path.read_bytes()).positions(), shown)
 
 
 def test_every_vertex_keeps_its_own_bound(always, tmp_path):

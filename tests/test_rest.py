@@ -15,7 +15,7 @@ from athcodec import container
 from athcodec._native import BRANCH
 from athcodec.encoding import streams
 from athcodec.errors import AthError
-from spec import reference_decoder as rd
+from spec.document import File, rules
 
 ADAPTIVE = 1 << 3  # of Method of REST
 
@@ -135,25 +135,24 @@ def test_a_still_mesh_is_encoded_without_a_search(scratch):
 
 
 @pytest.mark.parametrize("ladder", ["none", "decades"])
-def test_the_reference_decoder_plays_the_same_still_mesh(scratch, ladder):
+def test_the_document_plays_the_same_still_mesh(scratch, ladder):
     athcodec.encode(still(terrain(12, 9, 0.1, 7), 2), scratch / "still.ath", rel_error=1e-4, ladder=ladder)
     data = (scratch / "still.ath").read_bytes()
     with athcodec.open(scratch / "still.ath") as decoder:
         for level in range(decoder.level_count):
-            assert decoder.positions(level=level).tobytes() == rd.AthFile(data).positions(level).tobytes()
+            assert decoder.positions(level=level).tobytes() == File(data).positions(level).tobytes()
 
 
 @pytest.mark.parametrize("lag", [1, 2, 3, 4, 5, 30, 65535])
-def test_adaptive_rest_poses_mean_the_same_to_encoder_and_reference(lag):
+def test_adaptive_rest_poses_mean_the_same_to_encoder_and_document(lag):
     random = np.random.default_rng(lag)
     branches = two_stems(60, 20, lag)
     points = random.normal(size=(80, 3)).cumsum(axis=0)
     coarse = streams.encode_rest(branches, 0.5, points, None, True)
     fine = streams.encode_rest(branches, 0.0625, points, coarse, True, 0.04)
-    records = [rd.Branch(-1, 0, 0, 60, 0, lag), rd.Branch(0, 1, 60, 20, 0, lag)]
-    records[1].attach = 7
-    first = rd.decode_rest(coarse.stream, records, 0.5, None, True)
-    second = rd.decode_rest(fine.stream, records, 0.0625, first, True)
+    records = [rules.Record(**{name: int(branch[name]) for name in BRANCH.names}) for branch in branches]
+    first = rules.decode_rest(coarse.stream, records, 0.5, None, True)
+    second = rules.decode_rest(fine.stream, records, 0.0625, first, True)
     assert np.array(first.rest).tobytes() == coarse.decoded.tobytes()
     assert np.array(second.rest).tobytes() == fine.decoded.tobytes()
 
@@ -183,10 +182,10 @@ def test_random_bytes_as_an_adaptive_rest_pose_are_the_same_positions_to_all_or_
     stream = random.integers(1, 256, len(rest) - 17, np.uint8).tobytes()
     data = parts.with_payload(container.REST, bytes([rest[0] | ADAPTIVE]) + rest[1:17] + stream)
     outcomes = []
-    for play in (lambda: opened(data).positions(), lambda: rd.AthFile(data).positions()):
+    for play in (lambda: opened(data).positions(), lambda: File(data).positions()):
         try:
             outcomes.append(play().tobytes())
-        except (AthError, rd.AthError):
+        except (AthError, rules.Invalid):
             outcomes.append(None)
     assert outcomes[0] == outcomes[1]
 

@@ -10,7 +10,7 @@ from plants import diagonal
 import athcodec
 from athcodec.cli import main
 from athcodec.errors import BoundError
-from spec import reference_decoder as rd
+from spec.document import File
 
 
 @pytest.fixture(scope="module")
@@ -86,13 +86,14 @@ def test_every_level_and_its_reference_pose_keep_the_shape_of_cards(tree, scratc
     "size, options",
     [(0.115, {"rel_error": 1e-2, "ladder": "none"}), (0.115, {"rel_error": 1e-4}), (0.8, {"rel_error": 1e-3})],
 )
-def test_the_reference_decoder_plays_the_same_cards(scratch, size, options):
+def test_the_document_plays_the_same_cards(scratch, size, options):
     athcodec.encode(leafed_tree(cards=30, frames=8, size=size), scratch / "tree.ath", attributes="none", **options)
-    reference = rd.AthFile((scratch / "tree.ath").read_bytes())
-    assert any(branch.rigid for branch in reference.branches) and any(branch.detail for branch in reference.branches)
+    document = File((scratch / "tree.ath").read_bytes())
+    branches = document.file.branches
+    assert any(branch.rigid for branch in branches) and any(branch.detail for branch in branches)
     with athcodec.open(scratch / "tree.ath") as decoder:
         for level in range(len(decoder.levels)):
-            assert decoder.positions(level=level).tobytes() == reference.positions(level).tobytes()
+            assert decoder.positions(level=level).tobytes() == document.positions(level).tobytes()
 
 
 def test_a_rest_pose_of_the_bound_takes_fewer_bytes_and_loses_shape(tree, scratch):

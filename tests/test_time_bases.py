@@ -15,7 +15,7 @@ from athcodec.encoding.search import Search
 from athcodec.encoding.time_bases import BASIS_IN_WAVES, InWaves, TimeComponents
 from bench.odd.bending import FPS, Bones, clip_of, gusty
 from bench.trees.plant import grow
-from spec import reference_decoder as rd
+from spec.document import File, rules
 
 FRAMES = 96
 
@@ -43,30 +43,27 @@ def hit_by_a_gust(seed: int = 5, frames: int = 90) -> athcodec.MotionClip:
 
 def stems_heads(data: bytes) -> list[tuple[int, int, int]]:
     """Basis_Bits, Basis_Level and Basis_Length of each level with STEMS, of files of one segment and layer."""
-    file = rd.AthFile(data)
-    own = [file.content(STEMS, chunk.level) for chunk in file.chunks if chunk.kind == STEMS]
+    file = File(data)
+    own = [file.content(*key) for key in file.chunks if key[0] == STEMS]
     return [(chunk[5], chunk[8], int.from_bytes(chunk[9:13], "little")) for chunk in own]
 
 
-def assert_same_as_reference(data: bytes) -> None:
-    reference = rd.AthFile(data)
+def assert_same_as_document(data: bytes) -> None:
+    document = File(data)
     with athcodec.open(io.BytesIO(data)) as decoder:
         for level in range(decoder.level_count):
-            assert np.array_equal(
-                reference.positions(level), decoder.play(decoder.clips[0].name).positions(level=level)
-            )
+            assert np.array_equal(document.positions(level), decoder.play(decoder.clips[0].name).positions(level=level))
 
 
 @pytest.mark.parametrize("rank", [1, 2, 3, 4, 7])
-def test_rows_in_waves_are_orthonormal_and_those_of_the_reference_decoder(rank):
+def test_rows_in_waves_are_orthonormal_and_those_of_the_document(rank):
     waves, rng = waves_over_time(FRAMES), np.random.default_rng(rank)
     integers = rng.integers(-300, 300, (rank, FRAMES)).astype(np.int32)
     stored = InWaves(waves, rng.integers(-20, 0, rank).astype(np.int32), integers)
     assert abs(stored.rows @ stored.rows.T - np.eye(rank)).max() < 1e-5
-    nothing = np.empty((0, FRAMES))
-    assert rd.decode_basis(stored.stream(), nothing, rank, FRAMES, waves).tobytes() == stored.rows.tobytes()
-    known = stored.rows[: rank // 2]
-    assert rd.decode_basis(stored.stream(rank // 2), known, rank, FRAMES, waves).tobytes() == stored.rows.tobytes()
+    for known in (0, rank // 2):
+        rows = rules.decode_basis(stored.stream(known), stored.rows[:known].tolist(), rank, FRAMES, waves.tolist())
+        assert np.array(rows).tobytes() == stored.rows.tobytes()
 
 
 def test_a_basis_leaves_less_of_its_tracks_than_their_steps_do():
@@ -92,7 +89,7 @@ def test_levels_share_a_basis_that_lies_with_the_first_of_them(tmp_path):
     with athcodec.open(path) as decoder:
         errors = np.linalg.norm(decoder.play(decoder.clips[0].name).positions() - clip.positions, axis=2)
     assert errors.max() <= summary.max_error_bound
-    assert_same_as_reference(path.read_bytes())
+    assert_same_as_document(path.read_bytes())
 
 
 def test_a_shared_basis_makes_files_smaller(tmp_path, monkeypatch):
@@ -107,11 +104,11 @@ def test_a_shared_basis_makes_files_smaller(tmp_path, monkeypatch):
     assert shared < 0.9 * athcodec.encode(clip, tmp_path / "waves.ath", **options).bytes
 
 
-def test_layers_in_learned_bases_are_decoded_as_the_reference_decoder_does(tmp_path, monkeypatch):
+def test_layers_in_learned_bases_are_decoded_as_the_document_does(tmp_path, monkeypatch):
     def learned(search, settings):
         return replace(settings, learned_bases=(True,) * search.levels)
 
     monkeypatch.setattr(Search, "_with_learned_bases", learned)
     path = tmp_path / "layers.ath"
     athcodec.encode(hit_by_a_gust(), path, rel_error=1e-4, attributes="none", ladder=(1e-2, 1e-3))
-    assert_same_as_reference(path.read_bytes())
+    assert_same_as_document(path.read_bytes())

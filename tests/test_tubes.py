@@ -18,7 +18,7 @@ from athcodec.encoding.rings import ring_sizes
 
 sys.path.append(str(Path(__file__).resolve().parent.parent))  # for spec, which is not installed
 
-from spec import reference_decoder as rd  # noqa: E402
+from spec.document import File  # noqa: E402
 
 SIDES, RINGS, TWIGS = 6, 12, 9
 RADIUS = 0.004
@@ -114,13 +114,13 @@ def test_twigs_keep_their_thickness_at_loose_bounds(scratch, bound, options):
 
 
 @pytest.mark.parametrize("options", [{"rel_error": 1e-3, "ladder": "none"}, {"rel_error": 1e-5}])
-def test_the_reference_decoder_plays_the_same_tubes(scratch, options):
+def test_the_document_plays_the_same_tubes(scratch, options):
     athcodec.encode(twigs(12), scratch / "twigs.ath", attributes="none", **options)
-    reference = rd.AthFile((scratch / "twigs.ath").read_bytes())
-    assert any(branch.ring for branch in reference.branches)
+    document = File((scratch / "twigs.ath").read_bytes())
+    assert any(branch.ring for branch in document.file.branches)
     with athcodec.open(scratch / "twigs.ath") as decoder:
         for level in range(len(decoder.levels)):
-            assert decoder.positions(level=level).tobytes() == reference.positions(level).tobytes()
+            assert decoder.positions(level=level).tobytes() == document.positions(level).tobytes()
 
 
 def test_leaves_that_turn_by_more_than_a_right_angle_between_frames_do_not_tumble(scratch):

@@ -1,5 +1,5 @@
 """The vectors of spec/vectors: whole, of every rule, and decoded as expected.txt says by the C core, the
-WebAssembly decoder and the reference decoder; and the program that tests the decoders of others."""
+WebAssembly decoder and the code of FORMAT.md; and the program that tests the decoders of others."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ sys.path.append(str(ROOT))  # for spec, which is not installed; athcodec stays t
 
 from athcodec import container, errors  # noqa: E402
 from athcodec.ath_file import AthFile  # noqa: E402
-from spec import conformance, make_vectors  # noqa: E402
+from spec import conformance, make  # noqa: E402
 
 VECTORS = conformance.vectors()
 
@@ -113,13 +113,13 @@ def check_scripts(vectors):
 
 
 def test_some_scripts_still_make_the_very_same_files():
-    check_scripts(make_vectors.VECTORS[::16])
+    check_scripts(make.VECTORS[::16])
 
 
 @pytest.mark.slow
 def test_scripts_still_make_the_very_same_files():
     """How they were made stays true."""
-    check_scripts(make_vectors.VECTORS)
+    check_scripts(make.VECTORS)
 
 
 def test_existing_vectors_are_left_alone(tmp_path):
@@ -128,12 +128,10 @@ def test_existing_vectors_are_left_alone(tmp_path):
     (folder / "valid").mkdir(parents=True)
     (folder / "valid/smallest.ath").write_bytes(b"older")
     others = "\n".join(
-        f"{vector.path} 00000000 # there"
-        for vector in make_vectors.VECTORS
-        if vector.name not in ("smallest", "smallest-wide")
+        f"{vector.path} 00000000 # there" for vector in make.VECTORS if vector.name not in ("smallest", "smallest-wide")
     )
     listed.write_text(f"# head\n{kept}\n{others}\n")
-    assert make_vectors.make(folder=folder) == 1
+    assert make.write(folder=folder) == 1
     assert (folder / "valid/smallest.ath").read_bytes() == b"older" and kept in listed.read_text()
     assert (folder / "valid/smallest-wide.ath").exists() and "valid/smallest-wide.ath" in listed.read_text()
 
@@ -151,15 +149,15 @@ def test_own_decoders_answer_as_expected(name):
 
 # ---- the decoders of others --------------------------------------------------------------------------------
 
-REFERENCE = [sys.executable, str(ROOT / "spec" / "reference_decoder.py"), "--raw"]
+DOCUMENT = [sys.executable, str(ROOT / "spec" / "document.py")]
 
 
 def decoder_that(tmp_path, body: str) -> list[str]:
-    """A program that asks the reference decoder, then does something of its own with `data` or `error`."""
+    """A program that asks the document, then does something of its own with `data` or `error`."""
     script = tmp_path / "decoder.py"
     script.write_text(f"""
 import sys, subprocess, os
-done = subprocess.run({REFERENCE!r} + sys.argv[1:], capture_output=True)
+done = subprocess.run({DOCUMENT!r} + sys.argv[1:], capture_output=True)
 item, data, error = sys.argv[2], done.stdout, done.stderr
 {body}
 sys.stdout.buffer.write(data)
@@ -170,7 +168,7 @@ sys.exit(done.returncode)
 
 
 def test_a_program_that_decodes_well_passes(tmp_path):
-    assert "1 vectors, 0 wrong" in run("--only", "invalid/cut-in-attributes.ath", *REFERENCE)
+    assert "1 vectors, 0 wrong" in run("--only", "invalid/cut-in-attributes.ath", *DOCUMENT)
 
 
 @pytest.mark.parametrize(
@@ -222,4 +220,4 @@ def test_a_nan_is_a_nan_whatever_its_bits():
 
 
 def test_no_vector_at_all_is_a_failure():
-    assert "0 vectors" in run("--only", "no such name", "--own", "reference", code=1)
+    assert "0 vectors" in run("--only", "no such name", "--own", "document", code=1)

@@ -23,7 +23,7 @@ from athcodec._native import crc32c
 from athcodec.ath_file import AthFile
 from athcodec.container import Limits
 from athcodec.errors import FormatError, NotAnAthFile, TrailingBytes, Truncated
-from spec import reference_decoder as rd
+from spec.document import rules
 from spec.robust import Row, _cases
 from spec.robust._cases import Cases, Wrong
 
@@ -140,15 +140,18 @@ def _flipped(data: bytes, bit: int) -> bytes:
 
 def repaired(data: bytes) -> bytes:
     """The file with correct checksums, as far as the front can be read."""
-    *_, length, _ = ct._HEADER.unpack_from(data) if len(data) >= ct._HEADER.size else (0, 0)
-    if not ct._HEADER.size <= length <= len(data):
+    *_, length, count = ct._HEADER.unpack_from(data) if len(data) >= ct._HEADER.size else (0, 0)
+    if not ct._HEADER.size + 4 * count <= length <= len(data):
         return data
     front, behind = with_checksum(data[:length]), data[length:]
     try:
-        _, chunks, *_ = rd.read_front(front + behind, rd.Limits())
-    except rd.AthError:
+        _, table = rules.decode_front(front[ct._HEADER.size : length - 4 * count], count)
+    except rules.Invalid:
         return front + behind
-    checksums = b"".join(struct.pack("<I", crc32c(data[c.offset : c.offset + c.length])) for c in chunks)
+    checksums, at = b"", length
+    for *_, size in table:
+        checksums += struct.pack("<I", crc32c(data[at : at + size]))
+        at += size
     return with_checksum(front[: length - len(checksums)] + checksums) + behind
 
 

@@ -1,0 +1,307 @@
+"""The decoder that FORMAT.md's Python blocks are, with what they take for granted, and a command line.
+
+    python -m spec.document FILE [ITEM [MESH]]     answers as spec/conformance.py asks; ITEM is `open` if left out
+
+The blocks run as they stand but for two things that change no result: a quotient by zero is what IEEE 754 says, where
+Python would stop, and pure functions that are asked the same again keep their answers.
+"""
+
+from __future__ import annotations
+
+import argparse
+import ast
+import json
+import math
+import re
+import struct
+import sys
+import types
+from collections.abc import Iterable
+from contextlib import suppress
+from functools import cached_property, lru_cache
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import zstandard
+
+FORMAT = Path(__file__).resolve().parent.parent / "FORMAT.md"
+TEXT = FORMAT.read_text(encoding="utf-8")
+KEPT = {"crc32c": 256, "waves_over_time": 64, "node_waves_over_time": 64, "cantilever": 1024}  # answers, by function
+
+# ---- what the document takes for granted ---------------------------------------------------------------------
+
+
+def section(title: str) -> str:
+    """The text under a heading, up to the next of the same or a higher rank."""
+    heading = re.search(rf"^(#+) {re.escape(title)}\n", TEXT, re.M)
+    assert heading, title
+    rest = TEXT[heading.end() :]
+    following = re.search(rf"^#{{1,{len(heading[1])}}} ", rest, re.M)
+    return rest[: following.start()] if following else rest
+
+
+def table(title: str, first_column: str) -> list[dict[str, str]]:
+    """Rows of the first table of a section whose first column has this name."""
+    lines = section(title).splitlines()
+    start = next(i for i, line in enumerate(lines) if line.startswith(f"| {first_column} |"))
+    rows = []
+    for line in lines[start:]:
+        if not line.startswith("|"):
+            break
+        rows.append([cell.strip() for cell in line.strip("|").split("|")])
+    return [dict(zip(rows[0], row)) for row in rows[2:]]
+
+
+def reader(code: str):
+    form = struct.Struct("<" + code)
+    return lambda data, at: form.unpack_from(data, at)[0]
+
+
+def sqrt(x: float) -> float:
+    return math.sqrt(x) if x >= 0.0 else math.nan
+
+
+def quotient(a: float, b: float) -> float:
+    try:
+        return a / b
+    except ZeroDivisionError:
+        return math.nan if a == 0 or a != a else math.copysign(math.inf, a) * math.copysign(1.0, b)
+
+
+SINGLE = struct.Struct("<f")
+FLOATS = {32: "<f", 64: "<d"}
+
+
+def single(x: float) -> float:
+    try:
+        return SINGLE.unpack(SINGLE.pack(x))[0]
+    except OverflowError:
+        return math.copysign(math.inf, x)
+
+
+def is_json_object(text: bytes) -> bool:
+    """Whether it is a JSON object as of FORMAT.md, "JSON"."""
+
+    def unique(pairs: list) -> dict:
+        if len(dict(pairs)) < len(pairs):
+            raise ValueError("an object has a member twice")
+        return dict(pairs)
+
+    def number(literal: str) -> float:
+        if not math.isfinite(float(literal)):
+            raise ValueError("a number is not finite")
+        return float(literal)
+
+    try:
+        value = json.loads(text.decode("utf-8"), object_pairs_hook=unique, parse_float=number, parse_constant=number)
+        json.dumps(value, ensure_ascii=False).encode("utf-8")  # refuses halves of surrogate pairs
+    except (ValueError, RecursionError):
+        return False
+    return isinstance(value, dict)
+
+
+def zstd_frame(data: bytes) -> SimpleNamespace:
+    frame = SimpleNamespace(window_size=0, content_size=None, content=None)
+    if len(data) >= 6 and not data[4] & 0x20:  # without Single_Segment_flag: RFC 8878, 3.1.1.1.2
+        least = 1 << (10 + (data[5] >> 3))
+        frame.window_size = least + (least >> 3) * (data[5] & 7)
+    with suppress(zstandard.ZstdError, MemoryError):
+        frame.content_size = zstandard.frame_content_size(data)
+        if 0 < frame.content_size < 1 << 28:
+            frame.content = zstandard.ZstdDecompressor().decompress(data, allow_extra_data=False)
+    return frame
+
+
+TAKEN_FOR_GRANTED = {
+    **{name: reader(code) for name, code in {"u8": "B", "u16": "H", "u32": "I", "f32": "f", "f64": "d"}.items()},
+    "sqrt": sqrt,
+    "quotient": quotient,
+    "single": single,
+    "to_bits": lambda x, n: int.from_bytes(struct.pack(FLOATS[n], x), "little"),
+    "from_bits": lambda b, n: struct.unpack(FLOATS[n], b.to_bytes(n // 8, "little"))[0],
+    "limit": {row["Limit"]: int(row["Value"]) for row in table("Limits", "Limit")}.__getitem__,
+    "is_json_object": is_json_object,
+    "zstd_frame": zstd_frame,
+}
+KINDS = {row["Name"]: int(row["Kind"], 16) for row in table("Chunk table", "Name")}
+
+# ---- the code ------------------------------------------------------------------------------------------------
+
+
+class Divisions(ast.NodeTransformer):
+    """Turns a / b into quotient(a, b), unless b is a number."""
+
+    def visit_BinOp(self, node: ast.BinOp) -> ast.AST:
+        self.generic_visit(node)
+        if isinstance(node.op, ast.Div) and not isinstance(node.right, ast.Constant):
+            return ast.copy_location(ast.Call(ast.Name("quotient", ast.Load()), [node.left, node.right], []), node)
+        return node
+
+
+def parse() -> ast.Module:
+    """The blocks, one behind the other; line numbers are those of FORMAT.md."""
+    lines, is_code = [], False
+    for line in TEXT.splitlines():
+        is_code = line == "```python" or (is_code and line != "```")
+        lines.append(line if is_code and line != "```python" else "")
+    return ast.parse("\n".join(lines), str(FORMAT))
+
+
+def compiled(*statements: ast.stmt) -> types.CodeType:
+    tree = Divisions().visit(ast.Module([*statements], []))
+    return compile(ast.fix_missing_locations(tree), str(FORMAT), "exec")
+
+
+def run(code: Iterable[types.CodeType], **more) -> types.ModuleType:
+    """A module in which the code has been executed, which has `more` names."""
+    module = types.ModuleType("FORMAT")
+    names = module.__dict__
+
+    def utf8(data: bytes) -> str:
+        try:
+            return data.decode()
+        except UnicodeDecodeError:
+            raise names["Invalid"]("BAD_CHUNK") from None
+
+    names.update(TAKEN_FOR_GRANTED | KINDS | {"utf8": utf8} | more)
+    for part in code:
+        exec(part, names)
+    keep_answers(module)
+    return module
+
+
+def keep_answers(module: types.ModuleType) -> None:
+    for name, size in KEPT.items():
+        kept = lru_cache(size)(module.__dict__[name])
+        setattr(module, name, lambda *given, kept=kept: kept(*(tuple(x) if isinstance(x, list) else x for x in given)))
+
+
+rules = run([compiled(*parse().body)])
+KIND_NAMES = {number: name for name, number in KINDS.items()}
+REMAINDERS = [rules.crc32c(bytes([255 ^ byte])) ^ 0xFF000000 for byte in range(256)]
+
+
+def crc32c(data: bytes) -> int:
+    """FORMAT.md, "Checksums", a byte at a time instead of a bit at a time."""
+    crc = 0xFFFFFFFF
+    for byte in data:
+        crc = (crc >> 8) ^ REMAINDERS[(crc ^ byte) & 255]
+    return crc ^ 0xFFFFFFFF
+
+
+# ---- a file --------------------------------------------------------------------------------------------------
+
+
+class File:
+    """An opened file. What is wrong with it is `Invalid` of the rules, when it is opened or asked."""
+
+    def __init__(self, data: bytes, strict: bool = False, mesh: bytes | None = None, rules: types.ModuleType = rules):
+        self.rules, self.mesh, self.file = rules, mesh, rules.open_file(bytes(data), strict)
+        self.header, self.chunks = self.file.header, self.file.chunks
+        if mesh is not None and self.file.is_host:
+            given = self.file.rest.checksums, mesh, self.file.vertex_source, self.file.origin
+            self.file.rest.rest = rules.host_rest(*given)
+
+    def content(self, kind: int, level: int | None = None, segment: int = 0) -> bytes:
+        return self.rules.content(self.chunks, kind, level, segment)
+
+    @cached_property
+    def deepest(self) -> int:
+        """The deepest complete level."""
+        late = [key[1] for key, chunk in self.chunks.items() if key[1] is not None and not chunk.is_there]
+        self.rules.require(0 not in late, "TRUNCATED")
+        return min(late, default=self.header.level_count) - 1
+
+    def positions(self, level: int | None = None) -> np.ndarray:
+        """(frames, vertices, 3) in source order, the frames of all clips."""
+        level = self.deepest if level is None else level
+        if not 0 <= level < self.header.level_count:
+            raise ValueError(f"level {level}: the file has 0 to {self.header.level_count - 1}")
+        return np.array(self.rules.decode_level(self.file, level), "<f8" if self.header.is_float64 else "<f4")
+
+    def rest(self, level: int = 0) -> np.ndarray:
+        """(vertices, 3) of Rest_Type in source order: the rest pose, as a level's reference pose gives it."""
+        file, rules = self.file, self.rules
+        number, origin = np.dtype("<f8" if file.rest_is_float64 else "<f4"), np.array(file.origin)
+        rules.require(file.rest.rest is not None, "NEEDS_HOST_MESH")
+        if file.is_host:
+            return np.frombuffer(self.mesh, number).reshape(-1, 3) + np.float32(0)  # 0.0 for -0.0
+        plans = rules.shown_plans(file, min(level, file.lossy - 1))
+        method = self.content(rules.REST)[0]
+        if (rules.SOURCE_REST, None, 0) in self.chunks:
+            points, is_exact = rules.source_rest(file, plans), self.content(rules.SOURCE_REST)[0] == 1
+        elif is_exact := method & 1:
+            mesh = rules.mesh_of_faces(self.chunks, file.vertex_source) if method & 16 else None
+            body = self.content(rules.REST)[17:]
+            points = rules.decode_exact_rest(body, file.branches, file.rest_is_float64, mesh)
+        else:
+            points = file.rest.rest if level == 0 else plans[-1].rest
+        with np.errstate(all="ignore"):
+            shown = np.array(points, float) if is_exact else np.array(points, float) + origin
+            out = np.empty(shown.shape, number)
+            out[file.vertex_source] = shown.astype(number)
+        return out
+
+    def arrays(self) -> list[bytes]:
+        """Elements of FACES, of EDGES and of all attributes."""
+        arrays, of_faces, rules = [], {}, self.rules
+        for kind in (rules.FACES, rules.EDGES):
+            if (kind, None, 0) not in self.chunks:
+                continue
+            shape, stream = rules.parse_polygons(self.content(kind), kind)
+            if shape.is_derived:
+                arrays.append(elements(rules.derived_edges(self.file, shape.index_type), shape.index_type))
+                continue
+            counts, corners = rules.decode_polygons(stream, shape, self.header.vertex_count)
+            if shape.count_type is None:
+                arrays.append(elements(corners, shape.index_type))
+            else:
+                of_faces["face_vertex_counts"] = elements(counts, shape.count_type)
+                of_faces["face_vertex_indices"] = elements(corners, shape.index_type)
+        return arrays + list(rules.read_attributes(self.file, of_faces).values())
+
+    def answer(self, item: str) -> bytes:
+        """The answer to an item of conformance.py."""
+        if item in ("strict", "open"):
+            return b""
+        if item == "time":
+            return b"".join(struct.pack(f"<{len(times)}d", *times) for times in self.file.times)
+        if item == "clips":
+            return b"".join(clip_entry(clip) for clip in self.file.clips)
+        if item != "static":
+            return (self.rest() if item == "rest" else self.positions(int(item))).tobytes()
+        arrays, metadata = self.arrays(), (self.rules.METADATA, None, 0)
+        text = self.rules.parse_metadata(self.content(*metadata)) if metadata in self.chunks else b""
+        return b"".join([text, *arrays])
+
+
+def elements(numbers: list, code: int) -> bytes:
+    """Integers of Index_Type or Count_Type."""
+    return np.array(numbers, f"{'>' if code & 8 else '<'}{'i' if code & 4 else 'u'}{1 << (code & 3)}").tobytes()
+
+
+def clip_entry(clip) -> bytes:
+    """What CLIPS says of a clip; Periodic, which is how it is coded, is left at 0."""
+    name, seams = clip.name.encode(), clip.seams or ()
+    head = struct.pack("<IIBB", clip.frames, clip.segments, clip.seams is not None, len(name))
+    return head + name + struct.pack(f"<{len(seams)}f", *seams)
+
+
+def main(words: list[str] | None = None) -> int:
+    parser = argparse.ArgumentParser(prog="python -m spec.document", description="Decodes a file as FORMAT.md says.")
+    parser.add_argument("file", type=Path)
+    parser.add_argument("item", nargs="?", default="open", help="what is written to standard output, raw: a level, ...")
+    parser.add_argument("mesh", nargs="?", type=Path, help="positions of the host's mesh, binary32")
+    options = parser.parse_args(words)
+    try:
+        mesh = options.mesh and options.mesh.read_bytes()
+        sys.stdout.buffer.write(File(options.file.read_bytes(), options.item == "strict", mesh).answer(options.item))
+    except (rules.Invalid, OSError, ValueError) as error:
+        print(error, file=sys.stderr)
+        return 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

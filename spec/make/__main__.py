@@ -1,0 +1,3 @@
+from spec import make
+
+print(f"{make.write()} vectors made, {len(make.VECTORS)} in all")

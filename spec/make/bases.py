@@ -1,0 +1,297 @@
+"""Waves over time and learned bases."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable
+
+import numpy as np
+
+from spec.make.base import *
+from spec.make.clips import periodic
+from spec.make.predicted import SINGLE
+
+
+def all_waves(frames: int) -> Callable[[], Plant]:
+    clips = Clip(frames, 1, "once"), periodic(Clip(frames, 1, "again"), 0.0, 0.0)
+    rows = row(*(tuple((k + axis) % 5 - 2 for axis in range(3)) for k in range(frames)))
+    return lambda: lone(clips=clips, scripts={(STEMS, 0): rows})
+
+
+for frames in (2, 3, 4, 7, 33, 255, 256):
+    valid(f"waves-{frames}", f"all waves of {frames} frames, once of a beam and once periodic", all_waves(frames))
+valid(
+    "learned-basis",
+    "a learned basis of one row, 8 bits, at the ends of its range",
+    lambda: lone(
+        frames=4,
+        heads={0: stems_head(0.5, 0, 8, 1, basis_stream([[128, -128, 128, 0]], 8))},
+        scripts={(STEMS, 0): row((3, -1, 70))},
+    ),
+)
+valid(
+    "learned-basis-full",
+    "a learned basis of as many rows as frames, 16 bits, beside waves on other levels",
+    lambda: moving(
+        FORK,
+        43,
+        heads={1: stems_head(0.5, 2, 16, 3, basis_stream([[32768, 1, -5], [-32768, 32768, -32768], [0, 0, 77]], 16))},
+    ),
+)
+valid(
+    "learned-basis-zero",
+    "a learned basis of zeros, of no bytes but the stream's",
+    lambda: moving([Stem(-1, 3)], 44, heads={0: stems_head(0.5, 1, 12, 2, basis_stream([[0] * 3] * 2, 12))}),
+)
+WAVE_ROWS = (  # of four rows over four frames: exponents, integers; the axes without a use of the last row are not 0
+    *(-6, 3, -1),
+    *row((9, 0, 1), (-4, 60, 0), (0, 2, 700)),
+    -200 + 4,
+    *row((1, 2, 3), (5, 0, 0)),
+)
+valid(
+    "basis-in-waves",
+    "a learned basis of four rows in waves, one of them of the least step",
+    lambda: moving(FORK, 45, frames=4, heads={1: stems_head(0.5, 2, 2, 4, basis_in_waves(4, *WAVE_ROWS, rank=4))}),
+)
+valid(
+    "basis-in-waves-zero",
+    "a learned basis of two rows in waves: one of zeros, and one like the first of its level before",
+    lambda: moving(
+        FORK,
+        46,
+        frames=4,
+        heads={
+            1: stems_head(0.5, 2, 2, 2, basis_in_waves(4, 0, 0, *row((1, 0, 0), (2, 0, 0)), rank=2)),
+            2: stems_head(0.25, 0, 2, 3, basis_in_waves(4, 8, *row((1, 0, 0), (2, 0, 0)), rank=1), base=1),
+        },
+    ),
+)
+valid(
+    "basis-shared",
+    "levels that share a learned basis, which lies with the first of them",
+    lambda: moving(
+        FORK,
+        47,
+        frames=4,
+        heads={
+            1: stems_head(0.5, 2, 2, 4, basis_in_waves(4, *WAVE_ROWS, rank=4)),
+            2: stems_head(0.25, 0, 2, 4, b"", base=1),
+        },
+    ),
+)
+valid(
+    "basis-of-both-kinds",
+    "learned bases in waves that begin with rows by their entries, and the other way round",
+    lambda: moving(
+        FORK,
+        48,
+        frames=4,
+        segments=1,
+        heads={
+            1: stems_head(0.5, 2, 9, 1, basis_stream([[256, -256, 256, 200]], 9)),
+            2: stems_head(0.25, 0, 2, 3, basis_in_waves(4, -3, 2, *row((3, 1, 0), (0, 2, 0)), rank=2), base=1),
+            3: stems_head(0.25, 0, 9, 4, basis_stream([[5, 6, 7, -200]], 9), base=2),
+        },
+    ),
+)
+valid(
+    "node-waves",
+    "stems in the waves of maps beside those of stems: Basis_Bits 1",
+    lambda: moving(FORK, 45, heads={1: stems_head(0.5, 2, 1)}),
+)
+
+
+def basis_by_chance(random: np.random.Generator, rank: int, frames: int, bits: int) -> bytes:
+    most = 1 << bits - 1
+    return basis_stream(random.integers(-most, most + 1, (rank, frames)).tolist(), bits)
+
+
+def basis(rank: int, bits: int, stream: bytes) -> Callable[[], bytes]:
+    return lambda: stems_head(0.5, 0, bits, rank, stream)
+
+
+motion("bits-7", STEMS, 1, "Basis_Bits 7", basis(1, 7, basis_stream([[0, 0]], 8)))
+motion("bits-17", STEMS, 1, "Basis_Bits 17", basis(1, 17, basis_stream([[0, 0]], 8)))
+motion("rank-0", STEMS, 1, "Basis_Rank 0 though there is a basis", basis(0, 8, b""))
+motion(
+    "rank-more-than-frames",
+    STEMS,
+    1,
+    "Basis_Rank 3 in a segment of two frames",
+    basis(3, 8, basis_stream([[0, 0]] * 3, 8)),
+)
+motion("basis-length-missing", STEMS, 1, "the chunk ends inside Basis_Length", lambda: stems_head(0.5, 0, 8, 1)[:11])
+motion(
+    "basis-length-more",
+    STEMS,
+    1,
+    "Basis_Length is more than the chunk holds",
+    lambda: struct.pack("<fBBHBI", 0.5, 0, 8, 1, 255, 100) + basis_stream([[1, 2]], 8),
+)
+for name, level, reason, base in (
+    ("own", 1, "Basis_Level is the level itself", 1),
+    ("later", 1, "Basis_Level is a later level", 2),
+    ("waves", 2, "Basis_Level is a level in waves", 1),
+    ("missing", 2, "Basis_Level is a level without STEMS", 0),
+):
+    motion(
+        f"basis-level-{name}", STEMS, level, reason, lambda base=base: stems_head(0.5, 0, 8, 1, base=base), segment=1
+    )
+invalid(
+    "stems-basis-level-rank",
+    "Basis_Rank 1 though Basis_Level has a basis of two rows",
+    lambda: (
+        forked(heads={1: stems_head(0.5, 0, 8, 2, basis_stream([[1, 2], [3, 4]], 8))})
+        .draft()
+        .change(STEMS, 2, 0, content=stems_head(0.5, 0, 8, 1, base=1))
+    ),
+    item=2,
+)
+motion(
+    "basis-beyond-1",
+    STEMS,
+    1,
+    "an entry of a learned basis of 8 bits is 129",
+    basis(1, 8, basis_stream([[128, 129]], 8)),
+)
+motion(
+    "basis-below-1",
+    STEMS,
+    1,
+    "an entry of a learned basis of 8 bits is -129",
+    basis(1, 8, basis_stream([[-129, 0]], 8)),
+)
+motion("bits-3", STEMS, 1, "Basis_Bits 3", basis(1, 3, basis_stream([[0, 0]], 8)))
+for name, reason, exponents in (
+    ("change", "an exponent of a row of a basis changes by 401", (-200, 401)),
+    ("high", "an exponent of a row of a basis is 201", (201, 0)),
+    ("low", "an exponent of a row of a basis is -201", (0, -201)),
+):
+    motion(
+        f"basis-exponent-{name}",
+        STEMS,
+        1,
+        reason,
+        lambda exponents=exponents: basis(2, 2, basis_in_waves(2, *exponents, *row((1, 1, 0)), rank=2))(),
+    )
+motion(
+    "basis-in-waves-frequencies",
+    STEMS,
+    1,
+    "a row of a basis codes three frequencies of two frames",
+    lambda: basis(1, 2, basis_in_waves(2, 0, *row((1, 0, 0), (1, 0, 0), (1, 0, 0)), rank=1))(),
+)
+motion(
+    "basis-in-waves-zero-behind",
+    STEMS,
+    1,
+    "a zero byte behind the stream of a basis in waves",
+    lambda: basis(1, 2, basis_in_waves(2, 0, *row((1, 0, 0)), rank=1) + b"\0")(),
+)
+motion(
+    "basis-zero-behind",
+    STEMS,
+    1,
+    "a zero byte behind the stream of a basis",
+    basis(1, 8, basis_stream([[1, 2]], 8) + b"\0"),
+)
+valid(
+    "basis-exponents",
+    "the exponent of a row of a basis is -200, and 400 more in the next",
+    lambda: Plant(
+        SHORT,
+        frames=2,
+        heads={0: stems_head(0.25, 0, 2, 2, basis_in_waves(2, -200, 400, *row((1, 1, 0), (2, -1, 0)), rank=2))},
+        scripts={(STEMS, 0): lambda: Chance(513)},
+    ),
+)
+motion(
+    "basis-length-one-more",
+    STEMS,
+    1,
+    "Basis_Length is one more than the chunk holds",
+    lambda: struct.pack("<fBBHBI", 0.5, 0, 8, 2, 255, 1 + len(IMPULSES)) + IMPULSES,
+)
+motion(
+    "basis-length-cut",
+    STEMS,
+    1,
+    "the chunk ends before the last byte of Basis_Length",
+    lambda: stems_head(0.5, 0, 8, 1)[:12],
+)
+valid(
+    "basis-of-level-0",
+    "learned bases that begin with that of level 0",
+    lambda: Plant(
+        SHORT,
+        frames=3,
+        heads={
+            0: stems_head(0.25, 0, 8, 1, basis_stream([[99, -128, 3]], 8)),
+            1: stems_head(0.25, 0, 9, 2, basis_stream([[256, 0, -77]], 9), base=0),
+        },
+        scripts={(STEMS, 0): lambda: Chance(514), (STEMS, 1): lambda: Chance(515)},
+    ),
+)
+
+
+def shrunk(last: int) -> Plant:
+    """A row that 18 known ones along it leave about 1e-100 of; `last`: an entry of the last of these, in 1/32768."""
+    known = [[6426] * 26] * 17 + [[last] * 26]
+    rows = [[entry / 32768 for entry in entries] for entries in known]
+    in_waves = basis_in_waves(26, -200, *row((1, 0, 0)), rank=19, known=rows)
+    return Plant(
+        [Stem(-1, 3)],
+        frames=26,
+        heads={
+            0: stems_head(0.25, 0, 16, 18, basis_stream(known, 16)),
+            1: stems_head(0.25, 0, 2, 19, in_waves, base=0),
+        },
+        scripts={(STEMS, 1): row(*[(0, 0, 0)] * 18, (50, -30, 10))},
+    )
+
+
+ROUNDED = (263597123, 32053444), (241475353, 36228921), (79323412, 26324395), (170050111, 70213091)
+for side, last in (("above", 6448), ("below", 6405)):
+    valid(
+        f"basis-short-{side}",
+        f"a row of a basis whose squares add up to {side} 1e-200, since the known rows are no unit vectors",
+        lambda last=last: shrunk(last),
+    )
+valid(
+    "basis-rounded",
+    "rows of bases, of which an entry is within 2^-56 of the middle between two numbers of binary32",
+    lambda: Plant(
+        [Stem(-1, 2)],
+        frames=8,
+        segments=4,
+        heads={
+            (0, s): stems_head(0.25, 0, 2, 1, basis_in_waves(2, 0, *row((a, 0, 0), (b, 0, 0)), rank=1))
+            for s, (a, b) in enumerate(ROUNDED)
+        },
+        is_float64=True,
+        scripts={(STEMS, 0): [*row((1, 3, 0)), *row((0, 1, 7))]},
+    ),
+)
+valid(
+    "waves-of-nodes-8",
+    "all waves of maps of 8 frames; what the third one is computed from goes to and fro by the last bit, for 32 times",
+    lambda: Plant(
+        FORK,
+        frames=8,
+        is_float64=True,
+        points=[[0, 0, 0], [1, 0, 2], [2, 0, 4], [1, 3, 2], [1, 5, 3]],
+        scripts={(AFFINES, 0): [0, *row(), *row(), *row(*[(k == 2, k == 5, 3 - k) for k in range(8)])]},
+    ),
+)
+valid(
+    "waves-of-stems-66",
+    "the fourth wave of 66 frames, of which the same is true",
+    lambda: Plant(
+        SINGLE,
+        frames=66,
+        is_float64=True,
+        points=[[0, 0, 0]],
+        scripts={(STEMS, 0): row((0, 0, 0), (0, 0, 0), (0, 0, 0), (1, -3, 7))},
+    ),
+)

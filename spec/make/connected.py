@@ -1,0 +1,171 @@
+"""REST: connected rest poses, which follow FACES."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from spec.document import rules
+from spec.make.adaptive import ADAPTIVE, adaptive_rest
+from spec.make.base import *
+from spec.make.polygons import FACES_3, MANY_FACES, derived, mixed_polygons, polygons
+from spec.make.rest import with_rest
+
+
+def connected(
+    make_faces: Callable[[], bytes], seed: int = 73, step: float = 0.25, exact: bool = False, order: list | None = None
+) -> Plant:
+    """ADAPTIVE, by faces."""
+    content, branches = make_faces(), branches_of(ADAPTIVE)
+    shape, stream = rules.parse_polygons(content, FACES)
+    count = sum(stem.count for stem in ADAPTIVE)
+    mesh = rules.build_mesh(*rules.decode_polygons(stream, shape, count), order or list(range(count)))
+    script, bits = Chance(seed, large=6), REST_CONNECTED >> 2
+    if exact:
+        stream = write(rules.decode_exact_rest, script, branches, False, mesh)
+        rest = rest_chunk(stream, exact=1, reserved=bits)
+    else:
+        stream = write(rules.decode_rest, script, branches, step, None, True, mesh)
+        rest = rest_chunk(stream, step=step, reserved=bits | REST_ADAPTIVE >> 2)
+    fields = {} if order is None else {"vertex_source": order}
+    return with_rest(ADAPTIVE, rest, faces=content, **fields)
+
+
+for name_, make_faces in MANY_FACES.items():
+    valid(
+        f"rest-connected-{name_.replace(' ', '-')}",
+        f"a rest pose by faces: {name_}",
+        lambda make_faces=make_faces: connected(make_faces),
+    )
+valid(
+    "rest-connected-order",
+    "a rest pose by faces of vertices that stand the other way round",
+    lambda: connected(MANY_FACES["strip"], order=list(range(119, -1, -1))),
+)
+valid("rest-connected-tiny", "the same, a subnormal Rest_Step", lambda: connected(MANY_FACES["strip"], 74, FLOAT_TINY))
+valid("rest-connected-exact", "an exact rest pose by faces", lambda: connected(MANY_FACES["quads"], exact=True))
+valid(
+    "rest-connected-none", "a rest pose by no faces", lambda: connected(lambda: polygons(np.zeros((0, 3), "<u2"), 120))
+)
+invalid(
+    "rest-connected-without-faces",
+    "Method has Is_Connected, and there are no FACES",
+    lambda: with_rest(FORK, adaptive_rest(FORK, [], connected=True)),
+    "BAD_CHUNK_TABLE",
+)
+for what, content in (
+    ("broken", lambda: polygons(FACES_3) + b"\0"),
+    ("derived", lambda: derived("<i4")),
+    ("many-corners", lambda: polygons(np.zeros((1, 41), "<i4"))),
+    ("many-faces", lambda: polygons(np.zeros((21, 1), "<i4"))),
+):
+    invalid(
+        f"rest-connected-{what}-faces",
+        f"a rest pose by faces that do not serve it: {what}",
+        lambda content=content: (
+            with_rest(FORK, adaptive_rest(FORK, [], connected=True)).draft().add(Entry(FACES, content()))
+        ),
+    )
+valid(
+    "rest-connected-own-opposite",
+    "a quadrangle whose corners one and three are the same vertex, behind those between them",
+    lambda: meshed([Stem(-1, 5)], [[3, 0, 3, 1], [0, 1, 2], [2, 3, 4]], Chance(530, large=5)),
+)
+
+
+def meshed(stems: list[Stem], faces: list[list[int]], script: list | Chance, **fields) -> Plant:
+    """An adaptive rest pose by faces, of any sizes."""
+    count, step = sum(stem.count for stem in stems), 0.3
+    content = mixed_polygons(faces, count)
+    shape, stream = rules.parse_polygons(content, FACES)
+    mesh = rules.build_mesh(*rules.decode_polygons(stream, shape, count), list(range(count)))
+    coded = write(rules.decode_rest, script, branches_of(stems), step, None, True, mesh)
+    bits = REST_ADAPTIVE | REST_CONNECTED
+    return with_rest(stems, rest_chunk(coded, step=step, rest_type=1, reserved=bits >> 2), faces=content, **fields)
+
+
+def hub(first: int, quads: int, edges: int) -> list[list[int]]:
+    """Faces whose last vertex completes so many parallelograms at once, and has so many neighbours more."""
+    chain = list(range(first, first + 2 * quads + edges))
+    middle, across = len(chain) + first + 1, len(chain) + first
+    faces = [[middle, chain[2 * i], across, chain[2 * i + 1]] for i in range(quads)]
+    faces += [[middle, v] for v in chain[2 * quads :]]
+    return faces + [[v, v + 1] for v in chain[:-1]] + ([] if quads else [[chain[-1], across]])
+
+
+def hubs() -> list[list[int]]:
+    first, faces = 0, []
+    for quads, edges in (
+        (1, 0),
+        (2, 0),
+        (2, 2),
+        (3, 0),
+        (3, 2),
+        (4, 0),
+        (5, 0),
+        (6, 1),
+        (7, 0),
+        *((0, n) for n in range(1, 11)),
+        (1, 7),
+    ):
+        for _ in range(2):
+            faces += hub(first, quads, edges)
+            first += 2 * quads + edges + 2
+    return faces
+
+
+def crowd(seed: int) -> list[list[int]]:
+    """Triangles and quadrangles by chance that share many sides, and corners."""
+    random = np.random.default_rng(seed)
+    faces = [random.integers(0, 16, 3 + (i % 5 == 4)).tolist() for i in range(31)]
+    return [*faces, [0, 1, 2], [2, 1, 3], [1, 2, 4], [2, 1, 5], [1, 2, 6], [14, 15, 16], [16, 15, 13]]
+
+
+LEAVES = [  # on a stem: of four vertices that are shapes or copies, finer ones, and some that others reach into
+    Stem(-1, 4),
+    *(Stem(0, 4, i % 4, detail=(0, 0, 0, 0, 110, 110, 0, 1, 0, 0)[i]) for i in range(10)),
+]
+
+
+def leaves() -> list[list[int]]:
+    """A triangle or quadrangle of each but for the last, whose first vertex is alone, and faces of several."""
+    faces = [[v, v + 1, v + 2, v + 3] if v % 8 else [v, v + 1, v + 2] for v in range(4, 40, 4)]
+    return [
+        *faces,
+        [41, 42, 43],
+        [4, 6, 7],
+        [15, 12, 20],
+        [20, 15, 21],
+        [24, 26, 27],
+        [33, 37, 38],
+        [0, 1],
+        [39, 38, 41, 43],
+    ]
+
+
+HUBS = [Stem(-1, 1 + max(map(max, hubs())), lag=1)]
+valid(
+    "rest-connected-hubs",
+    "vertices that complete up to seven parallelograms, or have up to ten neighbours, and no other way",
+    lambda: meshed(HUBS, hubs(), Chance(210, large=5)),
+)
+valid(
+    "rest-connected-leaves",
+    "by faces shapes, copies, branches that others have begun, and steps of branches of their own",
+    lambda: meshed(LEAVES, leaves(), Chance(236, large=3)),
+)
+valid(
+    "rest-connected-crowd",
+    "triangles and quadrangles of the same sides, and of the same vertex twice",
+    lambda: meshed([Stem(-1, 17)], crowd(211), Chance(212, large=5)),
+)
+valid(
+    "rest-connected-most",
+    "a rest pose by four faces and eight corners for each vertex",
+    lambda: meshed(
+        FORK,
+        [[(i + k * (1 + i % 3)) % 5 for k in range(3 if i < 6 else 2 if i < 14 else 1)] for i in range(20)],
+        Chance(506, large=5),
+    ),
+)

@@ -1,0 +1,179 @@
+"""REST: copies of shapes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from spec.document import rules
+from spec.make.adaptive import adaptive_rest
+from spec.make.base import *
+from spec.make.rest import with_rest
+
+COPIED = [  # a shape and its copies, of branches that have detail and that have none
+    Stem(-1, 8, lag=2),
+    Stem(0, 4, 3, lag=2),
+    Stem(0, 4, 5, SHEET, lag=2, detail=118),
+    Stem(0, 4, 0, lag=1),
+    Stem(0, 8, 2, lag=2),
+]
+for name_, seed_, title_ in (
+    ("rest-copies", 2364, "copies of shapes: one that is mirrored and scaled, one that is bent"),
+    ("rest-copies-bent", 2949, "copies of shapes that are bent, mirrored and scaled"),
+):
+    valid(name_, title_, lambda seed_=seed_: with_rest(COPIED, adaptive_rest(COPIED, Chance(seed_, large=3))))
+for name_, seed_, title_ in (
+    ("rest-copies-of-no-shape", 2, "a copy of a shape that is not there"),
+    ("rest-copies-scale", 15, "the scale of a copy is not above 0"),
+    ("rest-copies-rotation", 89, "a quaternion of more than 1"),
+):
+    invalid(
+        name_,
+        title_,
+        lambda seed_=seed_: (
+            with_rest(COPIED, adaptive_rest(COPIED, Chance(2364, large=3)))
+            .draft()
+            .change(REST, content=adaptive_rest(COPIED, Chance(seed_, large=3)))
+        ),
+    )
+valid(
+    "rest-copies-between",
+    "the last turn of a shape is two and a half steps of the next copy, but for rounding",
+    lambda: copy_of((36, 0, 0), (0, 0, 1, 0), (15, 0, 3, 0), *[(0, 0, 0, 0), (15, 0, 0, 0)] * 3),
+)
+
+
+def by_chance(count: int, seed: int, most: int = 4) -> list:
+    """Script of so many vertices of an adaptive rest pose, whose first numbers are even."""
+    random = np.random.default_rng(seed)
+    return [n for x, y, z in random.integers(-most, most + 1, (count, 3)).tolist() for n in (2 * x, y, z)]
+
+
+def along(*places: tuple[int, int, int]) -> list:
+    """The same of these numbers, all of them even."""
+    return [n for x, y, z in places for n in (x, y // 2, z // 2)]
+
+
+def with_copies(stems: Sequence[int | Stem], *script: list, step: float = 0.3, still: bool = False) -> Plant:
+    """A root of four vertices that is no shape, at one place or not, and branches of so many on it, or others."""
+    branches = [stem if isinstance(stem, Stem) else Stem(0, stem, b % 4) for b, stem in enumerate(stems)]
+    stems = [Stem(-1, 4), *branches]
+    root = [0] * 12 if still else by_chance(4, 160)
+    values = [1, 0, *root, *(value for values in script for value in values)]
+    return with_rest(stems, adaptive_rest(stems, values, step, rest_type=1))
+
+
+def broken_rest(make: Callable[[], Plant], goes_on: bool = True) -> Draft:
+    """The file, whose rest pose is refused, and may go on behind that; all else is as in one that stands still."""
+    kept, rules.require = rules.require, (lambda *_: None) if goes_on else rules.require
+    try:
+        plant = make()
+    finally:
+        rules.require = kept
+    rest = adaptive_rest(plant.stems, [], 0.3, rest_type=1)
+    return replace(plant, rest=rest).draft().change(REST, content=plant.rest)
+
+
+def copy_of(tip: tuple[int, int, int], *places: Sequence[int], largest: int = 0) -> Plant:
+    """Copies of a shape of two vertices that are so far apart, in quarters of a unit."""
+    copies = [value for place in places for value in (*copied(0, place, largest), 0, 0, 0)]
+    return with_copies([2] * (1 + len(places)), [1, *along((0, 0, 0), tip)], copies, still=True)
+
+
+def copies_turned() -> Plant:
+    """Numbers are alike at first, so that they are expected again, and later near 0 again."""
+    random = np.random.default_rng(226)
+    script = [[1, *by_chance(4, 162, 40)], [0, 1, *by_chance(4, 163, 40)]]
+    for i in range(36):
+        place, bent = random.integers(-1, 2, 4) * (random.random(4) < 0.4), int(i % 8 > 4)
+        place = np.array([12, -19, 16, 14]) if i < 4 else place - (i in (18, 19)) * np.array([12, -19, 16, 14])
+        script += [
+            copied(int(i > 0), place.tolist(), (0, 0, 0, 1, 1, 3, 2)[i % 7] if i > 7 else 0, int(i % 7 > 4), bent)
+        ]
+        script += [by_chance(4 if bent else 1, 164 + i)]
+    return with_copies([4] * 38, *script)
+
+
+def copies_of_many() -> Plant:
+    """64 shapes of one vertex behind others, of which one has two vertices."""
+    random, counts, script = np.random.default_rng(165), [1, 1, 2, *[1] * 64], []
+    for b, count in enumerate(counts):
+        script += [[*([0] if b not in (0, 2) else []), 1, *by_chance(count, 166 + b)]]
+    for rank in (63, 63, 0, 1, 63, *random.integers(0, 64, 12).tolist(), 0, 0, 0, 0, 0, 5):
+        script += [copied(rank), by_chance(1, 300 + rank)]
+        counts.append(1)
+    return with_copies([*counts, 2], *script, [1, *by_chance(2, 170)])
+
+
+def copies_of_lengths() -> Plant:
+    """Shapes, copies and branches that are neither: whether one is, is expected of others of its length up to 16."""
+    counts, script = [15, 16, 17, 15, 17, 16, 16, 15, 17, 16, 15, 17], []
+    shapes: list[int] = []
+    for b, (count, what) in enumerate(zip(counts, (1, 1, 0, 2, 1, 2, 0, 0, 2, 1, 2, 0))):
+        script += [[0] if what < 2 and count in shapes else []]
+        script += [copied(0), by_chance(1, 180 + b)] if what == 2 else [[what, *by_chance(count, 180 + b)]]
+        shapes += [count] if what == 1 else []
+    return with_copies(counts, *script)
+
+
+FAR, MOST = ((1 << 30) - 2,) * 3, (1 << 29) - 1
+valid(
+    "rest-copies-turned",
+    "the last turn and scale of a shape, which its next copy is about, of two shapes in turn",
+    copies_turned,
+)
+valid("rest-copies-of-many", "64 shapes are remembered, and the last of these is copied", copies_of_many)
+valid(
+    "rest-copies-of-lengths", "branches of 15, 16 and 17 vertices that are shapes, copies or neither", copies_of_lengths
+)
+valid(
+    "rest-copies-of-roots",
+    "a root that is a copy of a branch, a branch that is one of a root, and a root of a root",
+    lambda: with_copies(
+        [3, Stem(-1, 3), Stem(-1, 2), Stem(3, 2, 1), Stem(-1, 2), Stem(5, 3, 1)],
+        *([1, *by_chance(3, 190, 9)], copied(0, (1, 1, 2, -1)), by_chance(1, 191)),
+        *([1, *by_chance(2, 192, 9)], copied(0, (0, -1, 2, 0)), by_chance(1, 193)),
+        *(copied(0, (1, 0, 0, 1), bent=1), by_chance(2, 194), copied(0), by_chance(1, 195)),
+    ),
+)
+valid(
+    "rest-copies-of-a-point",
+    "a shape of one vertex, whose copies have whole numbers for their scale, up to 999, and for their turn",
+    lambda: with_copies(
+        [1] * 4,
+        *([1, *by_chance(1, 196)], copied(0, (998, 1, 0, 0)), by_chance(1, 197)),
+        *(copied(0, (0, 0, -1, 0), 3), by_chance(1, 198), copied(0, (2, 0, 0, 0), 2), by_chance(1, 199)),
+    ),
+)
+valid("rest-copies-tiny", "a copy of just over 1/1000 of its shape", lambda: copy_of((8, 0, 68), (-19, 0, 0, 0)))
+valid(
+    "rest-copies-far",
+    "numbers of a copy of 29 bits, and what is expected of many behind it",
+    lambda: copy_of(FAR, (MOST, MOST, -MOST, 0), *[(0, 0, 1, 0), (1, -1, 0, 0)] * 25),
+)
+for name_, reason_, tip_, places_ in (
+    ("scale-1000", "a scale of 1000", (0, 0, 0), [(999, 0, 0, 0)]),
+    ("scale-tiny", "a scale of just under 1/1000", (4, 0, 90), [(-25, 0, 0, 0)]),
+    ("number", "a number of 2^29", FAR, [(MOST, MOST + 1, 0, 0)]),
+    ("number-negative", "a number of -2^29", FAR, [(MOST, -MOST - 1, 0, 0)]),
+):
+    invalid(
+        f"rest-copies-{name_}",
+        f"{reason_}, of a copy",
+        lambda tip_=tip_, places_=places_: broken_rest(lambda: copy_of(tip_, *places_)),
+    )
+invalid(
+    "rest-copies-rotation-little",
+    "a quaternion of little more than 1",
+    lambda: broken_rest(lambda: copy_of((10, 0, 0), (0, 2, 2, 0)), goes_on=False),
+)
+invalid(
+    "rest-copies-of-the-65th",
+    "a copy of the shape before the last 64",
+    lambda: broken_rest(
+        lambda: with_copies([1] * 66, [1, 0, 0, 0], *([0, 1, *by_chance(1, 400 + b)] for b in range(64)), copied(64)),
+        goes_on=False,
+    ),
+)

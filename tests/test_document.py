@@ -1,0 +1,140 @@
+"""FORMAT.md's code as a whole against the C core, bit for bit: on what the encoder writes of plants of all sorts, and
+on damaged files; and its command line. Vectors and files by hand: test_vectors.py, test_format.py."""
+
+from __future__ import annotations
+
+import io
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from files import Parts, opened
+from plants import awkward, bush, chain_plant, plant, tube
+
+import athcodec
+from athcodec.errors import FormatError
+
+ROOT = Path(__file__).resolve().parent.parent
+VECTORS = ROOT / "spec" / "vectors" / "valid"
+sys.path.append(str(ROOT))  # for spec, which is not installed; athcodec stays the installed one
+
+from spec.document import File, rules  # noqa: E402
+
+WITH_MODES = athcodec.Thresholds(0, 0, 0, 0)  # whatever is smaller
+LAYERS = {"rel_error": 1e-4, "ladder": (1e-2, 1e-3), "tam": WITH_MODES}
+
+
+def assert_same_bits(data: bytes) -> None:
+    """Every level, the rest pose of the last, the times and the static data; NaN only as such."""
+    file = File(data, strict=True)
+    with athcodec.open(io.BytesIO(data), strict=True) as decoder:
+        played = [decoder.play(clip.name) for clip in decoder.clips]
+        for level in range(decoder.level_count):
+            assert_same_numbers(file.positions(level), np.concatenate([clip.positions(level=level) for clip in played]))
+        assert_same_numbers(file.rest(decoder.level_count - 1), decoder.rest)
+        assert [list(clip.time) for clip in played] == file.file.times
+        arrays = [decoder.faces, decoder.edges, *decoder.attributes.values()]
+        assert [array.tobytes() for array in arrays if array is not None] == file.arrays()
+
+
+def assert_same_numbers(got: np.ndarray, expected: np.ndarray) -> None:
+    assert got.dtype == expected.dtype and got.shape == expected.shape
+    assert np.array_equal(np.isnan(got), np.isnan(expected))
+    assert np.nan_to_num(got, nan=0.0).tobytes() == np.nan_to_num(expected, nan=0.0).tobytes()
+
+
+def outcome(call) -> object:
+    """What a call gives, or the name of what it refuses a file for."""
+    try:
+        return call()
+    except FormatError as error:
+        return error.name
+    except rules.Invalid as error:
+        return str(error)
+
+
+@pytest.mark.parametrize(
+    "make, options",
+    [
+        (lambda: awkward(seed=8, branches=5, dtype=np.float64, offset=1e3, motion="sway"), {"rel_error": 1e-6}),
+        (lambda: plant(seed=2, roots=2, branches=5, offset=50.0), {"exact_rest": True}),
+        (lambda: plant(seed=3, branches=5, dtype=np.float64), {"exact_rest": True, "segment_frames": 16}),
+        (lambda: tube(rings=6, around=6, frames=8), {}),
+        (lambda: awkward(seed=4, shape="flat", motion="spin", longest=9), {}),
+        (lambda: awkward(seed=5, motion="mirror", longest=30, shuffled=True), {}),
+        (lambda: awkward(seed=6, shape="coincident", motion="teleport"), {}),
+        (lambda: chain_plant(branches=6, longest=3), {"segment_frames": 16}),
+        (lambda: bush(branches=10), {"rel_error": 1e-2}),
+    ],
+    ids=["wide", "exact rest", "wide exact rest", "tube", "sheets", "mirrored", "coincident", "chain", "bush"],
+)
+@pytest.mark.parametrize("layers", [{}, LAYERS], ids=["one layer", "layers"])
+def test_plants_of_all_sorts_have_the_same_bits(make, options, layers, tmp_path):
+    athcodec.encode(make(), tmp_path / "clip.ath", **{"effort": "fast"} | layers | options)
+    assert_same_bits((tmp_path / "clip.ath").read_bytes())
+
+
+@pytest.mark.parametrize("lossless", [False, True])
+def test_several_clips_have_the_same_bits(medley_clips, lossless, tmp_path):
+    athcodec.encode(athcodec.join(medley_clips), tmp_path / "clips.ath", effort="fast", lossless=lossless, **LAYERS)
+    assert_same_bits((tmp_path / "clips.ath").read_bytes())
+
+
+def with_a_bit_changed(parts, random):
+    """A file with one bit of a chunk of the prelude or of motion changed, and a checksum that fits; that chunk."""
+    chosen = [i for i, (chunk, content) in enumerate(parts.chunks) if content and (chunk.is_motion or chunk.kind < 16)]
+    i, chunks = int(random.choice(chosen)), list(parts.chunks)
+    content = bytearray(chunks[i][1])
+    content[random.integers(len(content))] ^= 1 << random.integers(8)
+    chunks[i] = chunks[i][0], bytes(content)
+    return parts.with_chunks(chunks), chunks[i][0]
+
+
+@pytest.mark.parametrize("name", ["layers-mixed", "layers-three", "clips-loops", "clips-time-uneven", "tubes"])
+def test_corrupted_chunks_are_refused_alike_or_mean_the_same(name):
+    parts, random = Parts.of((VECTORS / f"{name}.ath").read_bytes()), np.random.default_rng(6)
+    refused = 0
+    for _ in range(40):
+        data, chunk = with_a_bit_changed(parts, random)
+        level = chunk.level if chunk.is_motion else parts.header.level_count - 1
+        got = outcome(lambda data=data, level=level: File(data).positions(level))
+        expected = outcome(lambda data=data, level=level: all_positions(data, level))
+        refused += isinstance(expected, str)
+        if isinstance(expected, str) or isinstance(got, str):
+            assert isinstance(got, str) and got == expected
+        else:
+            assert_same_numbers(got, expected)
+    assert 2 < refused < 40
+
+
+def all_positions(data: bytes, level: int) -> np.ndarray:
+    with opened(data) as decoder:
+        return np.concatenate([decoder.play(clip.name).positions(level=level) for clip in decoder.clips])
+
+
+def test_a_prefix_plays_as_far_as_it_goes():
+    data = (VECTORS / "layers-mixed.ath").read_bytes()
+    for size in np.random.default_rng(1).integers(0, len(data), 12).tolist():
+        got = outcome(lambda size=size: File(data[:size]).positions())
+        expected = outcome(lambda size=size: athcodec.open(io.BytesIO(data[:size])).positions())
+        assert type(got) is type(expected)
+        assert got == expected if isinstance(got, str) else np.array_equal(got, expected)
+        with pytest.raises(rules.Invalid, match=r"TRUNCATED|NOT_AN_ATH_FILE"):
+            File(data[:size], strict=True)
+
+
+def run(*words) -> subprocess.CompletedProcess:
+    command = [sys.executable, "-m", "spec.document", *map(str, words)]
+    return subprocess.run(command, cwd=ROOT, capture_output=True, timeout=120)
+
+
+def test_the_command_answers_items_and_names_what_is_wrong(tmp_path):
+    path = VECTORS / "layers-mixed.ath"
+    done = run(path, 1)
+    assert done.returncode == 0 and done.stdout == all_positions(path.read_bytes(), 1).tobytes()
+    (tmp_path / "cut.ath").write_bytes(path.read_bytes()[:-1])
+    done = run(tmp_path / "cut.ath", "strict")
+    assert done.returncode == 1 and done.stdout == b"" and done.stderr == b"TRUNCATED\n"
+    assert run(tmp_path / "none.ath").returncode == 1 and run(path, 99).returncode == 1
