@@ -53,8 +53,7 @@ static uint32_t word_at(const uint8_t *bytes, size_t available, size_t at)
 static int check_version(uint32_t major, uint32_t minor, uint32_t features, ath_fault_info *fault)
 {
     double known = (double)(ATH_FORMAT_MAJOR << 8 | ATH_FORMAT_MINOR), found = (double)(major << 8 | minor);
-    if (found != known)
-        return ath_refuse(fault, ATH_UNSUPPORTED_VERSION, ATH_FIELD_VERSION, found, known, known);
+    if (found != known) return ath_refuse(fault, ATH_UNSUPPORTED_VERSION, ATH_FIELD_VERSION, found, known, known);
     if ((features & ~(uint32_t)ATH_FEATURES) == 0) return ATH_OK;
     return ath_refuse(fault, ATH_UNSUPPORTED_FEATURE, ATH_FIELD_FEATURES, (double)(features & ~(uint32_t)ATH_FEATURES),
                       known, found);

@@ -72,9 +72,8 @@ int64_t ath_encode_hierarchy(void *model, uint8_t *bytes, size_t capacity, const
 }
 
 int64_t ath_encode_rest(void *model, uint8_t *bytes, size_t capacity, const ath_branch *branches, int32_t branch_count,
-                        double step, double slack, ath_mesh *mesh, const int32_t *coarse,
-                        const double *before, const int32_t *shape_of, int32_t *steps, const double *source,
-                        double *moved, double *rest)
+                        double step, double slack, ath_mesh *mesh, const int32_t *coarse, const double *before,
+                        const int32_t *shape_of, int32_t *steps, const double *source, double *moved, double *rest)
 {
     ath_coder coder;
     rest_layer layer = {coarse, before, steps, mesh, slack, moved, shape_of};

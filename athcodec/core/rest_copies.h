@@ -110,10 +110,7 @@ static double copy_lever(const ath_branch *shape, const double *rest)
 }
 
 /* What one is to a copy's integers. */
-ATH_INLINE double copy_quantum(double lever, double unit)
-{
-    return lever > 0.0 ? COPY_TURN * unit / lever : 1.0;
-}
+ATH_INLINE double copy_quantum(double lever, double unit) { return lever > 0.0 ? COPY_TURN * unit / lever : 1.0; }
 
 ATH_INLINE int is_copy_scale(double s) { return s > 1e-3 && s < 1e3; }
 

@@ -433,9 +433,7 @@ def _lag_candidates(source: Source, settings: Settings, own: np.ndarray) -> list
     if source.still:
         some += [np.full_like(own, 3), np.full_like(own, 4), np.minimum(2 * no_beam, 65535)]
     tried = {lag.astype(np.int32).tobytes() for lag in some} - {own.tobytes()}
-    return [
-        replace(settings, lags=np.frombuffer(lag, np.int32), connected_rest=False) for lag in sorted(tried)
-    ]
+    return [replace(settings, lags=np.frombuffer(lag, np.int32), connected_rest=False) for lag in sorted(tried)]
 
 
 def code_source_rest(source: Source, branches: np.ndarray, reference: np.ndarray, bound: float) -> bytes:
