@@ -268,7 +268,7 @@ _ENCODING = {  # core/plan.h, core/motion.h, core/encode.h
         c_int64,
         [c_void_p, c_void_p, c_size_t, c_void_p, c_int32, c_double, c_double, *[c_void_p] * 8],
     ),
-    "ath_find_copies": (c_int32, [c_void_p, c_int32, c_void_p, c_double, c_double, c_double, c_void_p, c_void_p]),
+    "ath_find_copies": (c_int32, [c_void_p, c_int32, c_void_p, c_double, c_double, c_void_p, c_void_p]),
     "ath_encode_refined_shapes": (
         c_int64,
         [

@@ -17,8 +17,6 @@ from athcodec.encoding import streams
 from athcodec.errors import AthError
 from spec.document import File, rules
 
-ADAPTIVE = 1 << 3  # of Method of REST
-
 
 def terrain(rows: int, columns: int, rough: float, seed: int) -> np.ndarray:
     """Vertices of a height field, row by row, off their places by chance."""
@@ -144,15 +142,15 @@ def test_the_document_plays_the_same_still_mesh(scratch, ladder):
 
 
 @pytest.mark.parametrize("lag", [1, 2, 3, 4, 5, 30, 65535])
-def test_adaptive_rest_poses_mean_the_same_to_encoder_and_document(lag):
+def test_rest_poses_mean_the_same_to_encoder_and_document(lag):
     random = np.random.default_rng(lag)
     branches = two_stems(60, 20, lag)
     points = random.normal(size=(80, 3)).cumsum(axis=0)
-    coarse = streams.encode_rest(branches, 0.5, points, None, True)
-    fine = streams.encode_rest(branches, 0.0625, points, coarse, True, 0.04)
+    coarse = streams.encode_rest(branches, 0.5, points)
+    fine = streams.encode_rest(branches, 0.0625, points, coarse, 0.04)
     records = [rules.Record(**{name: int(branch[name]) for name in BRANCH.names}) for branch in branches]
-    first = rules.decode_rest(coarse.stream, records, 0.5, None, True)
-    second = rules.decode_rest(fine.stream, records, 0.0625, first, True)
+    first = rules.decode_rest(coarse.stream, records, 0.5)
+    second = rules.decode_rest(fine.stream, records, 0.0625, first)
     assert np.array(first.rest).tobytes() == coarse.decoded.tobytes()
     assert np.array(second.rest).tobytes() == fine.decoded.tobytes()
 
@@ -160,7 +158,7 @@ def test_adaptive_rest_poses_mean_the_same_to_encoder_and_document(lag):
 def test_the_lattice_is_never_further_away_than_its_step_says():
     random = np.random.default_rng(9)
     points = 5.0 * random.normal(size=(4000, 3))
-    coded = streams.encode_rest(two_stems(3999, 1, 1), 0.1, points, None, True)
+    coded = streams.encode_rest(two_stems(3999, 1, 1), 0.1, points)
     errors = np.linalg.norm(coded.decoded - points, axis=1)
     assert 0.06 < errors.max() <= 0.1 * 5**0.5 / 3.2
 
@@ -168,19 +166,19 @@ def test_the_lattice_is_never_further_away_than_its_step_says():
 def test_slack_saves_bytes_and_is_kept():
     points = terrain(30, 30, 0.02, 8).astype(float)
     branches = two_stems(899, 1, 30)
-    tight, loose = (streams.encode_rest(branches, 0.1, points, None, True, slack) for slack in (0.0, 0.0699))
+    tight, loose = (streams.encode_rest(branches, 0.1, points, None, slack) for slack in (0.0, 0.0699))
     assert len(loose.stream) < 0.97 * len(tight.stream)
     assert np.linalg.norm(loose.decoded - points, axis=1).max() <= 0.0699
 
 
 @pytest.mark.parametrize("seed", range(8))
-def test_random_bytes_as_an_adaptive_rest_pose_are_the_same_positions_to_all_or_refused(scratch, seed):
+def test_random_bytes_as_a_rest_pose_are_the_same_positions_to_all_or_refused(scratch, seed):
     random = np.random.default_rng(seed)
     athcodec.encode(still(terrain(9, 9, 0.1, seed)), scratch / "file.ath", attributes="none", ladder="none")
     parts = Parts.of((scratch / "file.ath").read_bytes())
     rest = parts.payload(container.REST)
     stream = random.integers(1, 256, len(rest) - 17, np.uint8).tobytes()
-    data = parts.with_payload(container.REST, bytes([rest[0] | ADAPTIVE]) + rest[1:17] + stream)
+    data = parts.with_payload(container.REST, rest[:17] + stream)
     outcomes = []
     for play in (lambda: opened(data).positions(), lambda: File(data).positions()):
         try:

@@ -59,8 +59,8 @@ int ath_decode_hierarchy(void *model, const uint8_t *bytes, size_t size, int32_t
 }
 
 int ath_decode_rest(void *model, const uint8_t *bytes, size_t size, const ath_branch *branches, int32_t branch_count,
-                    double step, ath_mesh *mesh, const int32_t *coarse, const double *before,
-                    int32_t *steps, double *rest)
+                    double step, ath_mesh *mesh, const int32_t *coarse, const double *before, int32_t *steps,
+                    double *rest)
 {
     ath_coder coder;
     rest_layer layer = {coarse, before, steps, mesh, 0.0, 0, 0};

@@ -14,8 +14,8 @@ int ath_decode_hierarchy(void *model, const uint8_t *bytes, size_t size, int32_t
                          ath_branch *branches, int32_t *branch_source, int32_t *vertex_source);
 /* mesh: of a connected pose, else null; coarse, before: integers and positions of the layer before, null for the first layer; steps: those of this one, null where none are wanted. */
 int ath_decode_rest(void *model, const uint8_t *bytes, size_t size, const ath_branch *branches, int32_t branch_count,
-                    double step, ath_mesh *mesh, const int32_t *coarse, const double *before,
-                    int32_t *steps, double *rest);
+                    double step, ath_mesh *mesh, const int32_t *coarse, const double *before, int32_t *steps,
+                    double *rest);
 /* The rest pose of the source about the reference pose, both less the origin; turns: scratch, branch_count x 9. */
 int ath_decode_source_rest(void *model, const uint8_t *bytes, size_t size, const ath_branch *branches,
                            int32_t branch_count, double step, const double *reference, double *turns, double *rest);

@@ -72,9 +72,8 @@ int64_t ath_encode_hierarchy(void *model, uint8_t *bytes, size_t capacity, const
 }
 
 int64_t ath_encode_rest(void *model, uint8_t *bytes, size_t capacity, const ath_branch *branches, int32_t branch_count,
-                        double step, double slack, ath_mesh *mesh, const int32_t *coarse,
-                        const double *before, const int32_t *shape_of, int32_t *steps, const double *source,
-                        double *moved, double *rest)
+                        double step, double slack, ath_mesh *mesh, const int32_t *coarse, const double *before,
+                        const int32_t *shape_of, int32_t *steps, const double *source, double *moved, double *rest)
 {
     ath_coder coder;
     rest_layer layer = {coarse, before, steps, mesh, slack, moved, shape_of};
@@ -84,7 +83,7 @@ int64_t ath_encode_rest(void *model, uint8_t *bytes, size_t capacity, const ath_
 }
 
 int32_t ath_find_copies(const ath_branch *branches, int32_t branch_count, const double *pose, double step, double slack,
-                        double bend, int32_t *uses, int32_t *shape_of)
+                        int32_t *uses, int32_t *shape_of)
 {
     int32_t recent[REST_SHAPES], count = 0, copies = 0;
     memset(uses, 0, (size_t)branch_count * sizeof *uses);
@@ -96,7 +95,7 @@ int32_t ath_find_copies(const ath_branch *branches, int32_t branch_count, const 
         if (branch->count < 2) continue;
         for (int32_t i = 0; i < count && found < 0; i++) {
             const ath_branch *shape = branches + recent[i];
-            if (shape->count == branch->count && looks_like_copy(shape, branch, pose, tolerance, bend)) found = i;
+            if (shape->count == branch->count && looks_like_copy(shape, branch, pose, tolerance)) found = i;
         }
         if (found < 0) {
             if (count < REST_SHAPES) count++;

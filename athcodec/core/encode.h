@@ -180,10 +180,10 @@ ATH_ENCODER_API int64_t ath_encode_rest(void *model, uint8_t *bytes, size_t capa
                                         int32_t branch_count, double step, double slack, ath_mesh *mesh,
                                         const int32_t *coarse, const double *before, const int32_t *shape_of,
                                         int32_t *steps, const double *source, double *moved, double *rest);
-/* shape_of: of each branch the one that it is a copy of, itself where others are copies of it, or -1. bend: what copies
- * may be bent by, over their size; uses: scratch. Returns the number of copies. */
+/* shape_of: of each branch the one that it is a copy of, itself where others are copies of it, or -1. uses:
+ * scratch. Returns the number of copies. */
 ATH_ENCODER_API int32_t ath_find_copies(const ath_branch *branches, int32_t branch_count, const double *pose,
-                                        double step, double slack, double bend, int32_t *uses, int32_t *shape_of);
+                                        double step, double slack, int32_t *uses, int32_t *shape_of);
 /* turns: scratch, branch_count x 9. */
 ATH_ENCODER_API int64_t ath_encode_source_rest(void *model, uint8_t *bytes, size_t capacity, const ath_branch *branches,
                                                int32_t branch_count, double step, const double *reference,

@@ -38,8 +38,8 @@ struct ath_file {
     ath_piece *pieces;
     ath_node *nodes;
     uint8_t *gaps;
-    void *scratch; /* of opening and building */
-    double *bases; /* null until ath_build */
+    void *scratch;                                         /* of opening and building */
+    double *bases;                                         /* null until ath_build */
     ath_mesh mesh;                                         /* where there are FACES */
     ath_mesh *connected;                                   /* it, where the rest pose is connected, else null */
     int32_t *rest_steps;                                   /* null where no layer refines the rest pose */

@@ -86,10 +86,10 @@ static void rest_look_beside(rest_predictor *predictor, const ath_mesh *mesh, co
     for (int32_t k = 0; k < 3; k++) {
         double sum = 0.0;
         for (int32_t j = 0; j < at->term_count; j++) sum = sum + at->filter->weight[j] * at->terms[j][k];
-        at->guesses[0][k] = 0.0;
+        at->guesses[0][k] = 0.5 * (at->terms[0][k] + at->terms[2][k]);
         for (int32_t g = 0; g < 4; g++) at->guesses[1 + g][k] = at->terms[g][k];
         at->guesses[5][k] = rest_is_far(sum) ? 0.0 : sum;
-        at->guesses[6][k] = 0.5 * (at->terms[0][k] + at->terms[2][k]);
+        at->guesses[6][k] = 0.0;
         for (int32_t g = 0; g < 2; g++) at->guesses[7 + g][k] = before ? at->terms[own + g][k] : 0.0;
     }
 }

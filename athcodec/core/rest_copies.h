@@ -11,7 +11,6 @@ enum { PLAIN_PART, SHAPE_PART, COPY_PART, PART_ROLES };
 #define SHAPE_FINER 0.25 /* steps of a shape, over those of other branches */
 #define COPY_PLACE 0.5   /* units of a copy's first vertex, likewise */
 #define COPY_TURN 0.9    /* units that the furthest vertex moves by where a quaternion's number changes by 1, halved */
-#define BENT_TURN 2.0    /* the same of copies whose other vertices are coded as well */
 
 /* Mean magnitudes of an integer, and of its difference from the one before. */
 typedef struct {
@@ -26,19 +25,19 @@ typedef struct {
 } rest_shape;
 
 typedef struct {
-    ath_context any, copied[PART_ROLES], is_shape[PART_ROLES], mirrored[2], bent[2], largest[3];
+    ath_context any, copied[PART_ROLES], is_shape[PART_ROLES], mirrored[2], largest[3];
     number_model rank, turn, scale;
     uint32_t mean_rank;
     lattice_model lattice;
-    rest_memory first, others;                        /* of the vertices of copies */
-    double increment[3];                              /* of the last copy, to its first vertex */
-    int32_t shape_count, are_bent, role[COPY_COUNTS]; /* role: of the last branch of so many vertices */
-    rest_shape shapes[REST_SHAPES];                   /* the one used last comes first */
+    rest_memory first;                      /* of the first vertices of copies */
+    double increment[3];                    /* of the last copy, to its first vertex */
+    int32_t shape_count, role[COPY_COUNTS]; /* role: of the last branch of so many vertices */
+    rest_shape shapes[REST_SHAPES];         /* the one used last comes first */
 } copy_model;
 
 /* Where a copy is. */
 typedef struct {
-    int32_t mirrored, bent, largest, scale, turns[4];
+    int32_t mirrored, largest, scale, turns[4];
     double R[9]; /* rotation, scale and mirror in one */
 } copy_place;
 
@@ -50,10 +49,7 @@ static void copy_model_init(copy_model *model)
         context_init(&model->copied[role], 32768);
         context_init(&model->is_shape[role], 4096);
     }
-    for (int32_t i = 0; i < 2; i++) {
-        context_init(&model->mirrored[i], 8192);
-        context_init(&model->bent[i], 8192);
-    }
+    for (int32_t i = 0; i < 2; i++) context_init(&model->mirrored[i], 8192);
     for (int32_t i = 0; i < 3; i++) context_init(&model->largest[i], 32768);
     number_model_init(&model->rank);
     number_model_init(&model->turn);
@@ -61,7 +57,6 @@ static void copy_model_init(copy_model *model)
     model->mean_rank = 16;
     lattice_model_init(&model->lattice);
     rest_memory_init(&model->first);
-    rest_memory_init(&model->others);
 }
 
 /* Shape number `rank` of those with so many vertices, by when they were used last; -1: there are not so many. */
@@ -115,10 +110,7 @@ static double copy_lever(const ath_branch *shape, const double *rest)
 }
 
 /* What one is to a copy's integers. */
-ATH_INLINE double copy_quantum(const copy_place *place, double lever, double unit)
-{
-    return lever > 0.0 ? (place->bent ? BENT_TURN : COPY_TURN) * unit / lever : 1.0;
-}
+ATH_INLINE double copy_quantum(double lever, double unit) { return lever > 0.0 ? COPY_TURN * unit / lever : 1.0; }
 
 ATH_INLINE int is_copy_scale(double s) { return s > 1e-3 && s < 1e3; }
 
@@ -154,38 +146,35 @@ ATH_INLINE void copy_way(const double R[9], const double from[3], const double t
     for (int32_t k = 0; k < 3; k++) way[k] = R[3 * k] * x + R[3 * k + 1] * y + R[3 * k + 2] * z;
 }
 
-/* What is expected of vertex i of a copy: at its first vertex, the attach vertex, the last copy's offset from that,
- * or the shape's; of the others of one that is bent, the place in the shape from the first vertex or from the last. */
+/* What is expected of a copy's first vertex: to be at the attach vertex, as far from it as the last copy's, or as the
+ * shape's. */
 static void copy_guess(const copy_model *model, const ath_branch *branch, const ath_branch *shape,
-                       const copy_place *place, const double *rest, int32_t i, double per_unit, rest_guess *at)
+                       const copy_place *place, const double *rest, double per_unit, rest_guess *at)
 {
-    static const double origin[3] = {0.0, 0.0, 0.0};
-    const double *base = rest_on_stem(branch, rest, i - 1), *there = rest_on_stem(shape, rest, i);
-    const double *from = rest_on_stem(shape, rest, i - 1);
-    if (!base) base = origin;
-    memset(at->guesses, 0, sizeof at->guesses);
-    memcpy(at->base, base, sizeof at->base);
-    double *turned = at->guesses[i == 0 ? 2 : 1];
-    if (from && (i > 0 || branch->attach >= 0)) copy_way(place->R, from, there, turned);
-    if (i == 0) {
-        memcpy(at->guesses[1], model->increment, sizeof model->increment);
-        at->guess_count = 3;
-    } else {
-        const double *first = rest_on_stem(branch, rest, 0);
-        copy_way(place->R, rest_on_stem(shape, rest, 0), there, at->guesses[0]);
-        for (int32_t k = 0; k < 3; k++) at->guesses[0][k] = first[k] + at->guesses[0][k] - base[k];
-        at->guess_count = 2;
-    }
+    const double *base = rest_on_stem(branch, rest, -1), *from = rest_on_stem(shape, rest, -1);
+    memset(at, 0, sizeof *at);
+    if (base) memcpy(at->base, base, sizeof at->base);
+    memcpy(at->guesses[1], model->increment, sizeof model->increment);
+    if (from && base) copy_way(place->R, from, rest_on_stem(shape, rest, 0), at->guesses[2]);
+    at->guess_count = 3;
     for (int32_t g = 0; g < 3; g++)
         for (int32_t k = 0; k < 3; k++) at->guesses[g][k] = at->guesses[g][k] * per_unit;
+}
+
+/* Where it is expected, then. */
+static void copy_start(const copy_model *model, const ath_branch *branch, const ath_branch *shape,
+                       const copy_place *place, const double *rest, double own, rest_guess *at, double expected[3])
+{
+    copy_guess(model, branch, shape, place, rest, 1.0 / own, at);
+    at->phase = (rest_memory *)&model->first;
+    for (int32_t k = 0; k < 3; k++) expected[k] = at->base[k] + rest_expected(&model->first, at, k) * own;
 }
 
 static int code_copy_place(ath_coder *coder, copy_model *model, rest_shape *shape, double lever, double unit,
                            copy_place *place)
 {
     place->mirrored = coder_bit(coder, &model->mirrored[shape->mirrored], place->mirrored);
-    place->bent = model->are_bent = coder_bit(coder, &model->bent[model->are_bent], place->bent);
-    double quantum = copy_quantum(place, lever, unit), s;
+    double quantum = copy_quantum(lever, unit), s;
     if (!code_copy_number(coder, &model->scale, &shape->scales, steps_in(shape->scale, quantum, 0.5), &place->scale))
         return 0;
     s = 1.0 + (double)place->scale * quantum;
@@ -301,13 +290,11 @@ static void fit_copy(const double *from, const double *to, int32_t count, int mi
     fit->off = left > 0.0 ? ath_sqrt(left / (double)count) : 0.0;
 }
 
-/* Is a branch a copy of a shape, but for so much, or bent by no more than such a part of its size? */
-static int looks_like_copy(const ath_branch *shape, const ath_branch *branch, const double *pose, double tolerance,
-                           double bend)
+/* Is a branch a copy of a shape, but for so much? */
+static int looks_like_copy(const ath_branch *shape, const ath_branch *branch, const double *pose, double tolerance)
 {
     const double *from = pose + 3 * (size_t)shape->first, *to = pose + 3 * (size_t)branch->first;
     double lever = copy_lever(shape, pose), size = copy_lever(branch, pose), most = OF_TOLERANCE * tolerance;
-    if (bend * size > most) most = bend * size;
     for (int32_t i = 1; i < branch->count && lever > 0.0; i++) {
         double a = 0.0, b = 0.0;
         for (int32_t k = 0; k < 3; k++) {
@@ -361,16 +348,6 @@ static double copy_error(const copy_place *place, const double *shape, const dou
     return ath_sqrt(most);
 }
 
-/* Where the first vertex of a copy is expected. */
-static void copy_start(const copy_model *model, const ath_branch *branch, const ath_branch *shape,
-                       const copy_place *place, const double *rest, double own, double expected[3])
-{
-    rest_guess at;
-    copy_guess(model, branch, shape, place, rest, 0, 1.0 / own, &at);
-    at.phase = (rest_memory *)&model->first;
-    for (int32_t k = 0; k < 3; k++) expected[k] = at.base[k] + rest_expected(&model->first, &at, k) * own;
-}
-
 /* Where the first vertex of a copy is to be; returns how far from there it may be. */
 static double copy_target(const ath_branch *branch, const ath_branch *shape, const copy_place *place, double unit,
                           double slack, const double expected[3], const double *source, const double *rest,
@@ -378,8 +355,7 @@ static double copy_target(const ath_branch *branch, const ath_branch *shape, con
 {
     const double *points = rest + 3 * (size_t)shape->first, *wanted = source + 3 * (size_t)branch->first;
     double tolerance = copy_tolerance(branch, unit, slack), middle[3], mean[3], way[3];
-    memcpy(target, place->bent ? wanted : expected, 3 * sizeof *target);
-    if (place->bent) return branch->detail > 0 ? 0.0 : slack;
+    memcpy(target, expected, 3 * sizeof *target);
     if (copy_error(place, points, expected, wanted, branch->count) <= tolerance) return 0.0;
     mean_point(points, shape->count, mean);
     mean_point(wanted, branch->count, middle);
@@ -396,7 +372,8 @@ static double copy_cost(const copy_model *model, const ath_branch *branch, const
     double tolerance = copy_tolerance(branch, unit, slack), expected[3], target[3], units[3], own = COPY_PLACE * unit;
     int32_t integers[3];
     double cost = 1.0, error;
-    copy_start(model, branch, shape, place, rest, own, expected);
+    rest_guess at;
+    copy_start(model, branch, shape, place, rest, own, &at, expected);
     double left = copy_target(branch, shape, place, unit, slack, expected, source, rest, target);
     rest_term(units, expected, target, 1.0 / own);
     nearest_of_lattice(units, left / own, model->first.mean, integers);
@@ -404,7 +381,6 @@ static double copy_cost(const copy_model *model, const ath_branch *branch, const
         target[k] = expected[k] + (double)integers[k] * own;
         cost *= 1.0 + magnitude_of(integers[k]);
     }
-    if (place->bent) return cost;
     error =
         copy_error(place, rest + 3 * (size_t)shape->first, target, source + 3 * (size_t)branch->first, branch->count);
     return error <= tolerance ? cost + 0.01 * error / tolerance : 1e300;
@@ -425,8 +401,8 @@ static int choose_copy(const copy_model *model, const ath_branch *branches, cons
     fit = fits + start.mirrored;
     double change = (fit->scale - 1.0) * lever;
     if (change * change < 0.04 * tolerance * tolerance) fit->scale = 1.0;
-    start.bent = fit->off > tolerance;
-    double quantum = copy_quantum(&start, lever, unit);
+    if (fit->off > tolerance) return 0;
+    double quantum = copy_quantum(lever, unit);
     if (!copy_integers(fit, quantum, &start)) return 0;
     for (int32_t choice = 0; choice < 27 && cheapest > 1.1; choice++) {
         copy_place tried = start;
@@ -442,7 +418,6 @@ static int choose_copy(const copy_model *model, const ath_branch *branches, cons
         if (cost >= cheapest) continue;
         cheapest = cost;
         *best = tried;
-        if (tried.bent) break;
     }
     return cheapest < 1e299;
 }

@@ -379,55 +379,34 @@ static void code_adaptive_vertex(ath_coder *coder, rest_model *model, const rest
     code_expected_vertex(coder, model, layer, branch, predictor, &at, branch->first + i, unit, source, rest);
 }
 
-/* Vertex i of a copy as a point of a lattice. */
-static void code_copy_vertex(ath_coder *coder, copy_model *model, rest_memory *memory, rest_guess *at, double unit,
-                             double slack, const double *source, double *out)
-{
-    double expected[3], offset[3], per_unit = 1.0 / unit;
-    int32_t integers[3] = {0, 0, 0};
-    at->phase = memory;
-    for (int32_t k = 0; k < 3; k++) expected[k] = at->base[k] + rest_expected(memory, at, k) * unit;
-#ifdef ATH_ENCODING
-    double units[3];
-    rest_term(units, expected, source, per_unit);
-    nearest_of_lattice(units, slack * per_unit, memory->mean, integers);
-#endif
-    (void)source;
-    (void)slack;
-    code_rest_point(coder, &model->lattice, memory, memory, integers);
-    for (int32_t k = 0; k < 3; k++) out[k] = expected[k] + (double)integers[k] * unit;
-    rest_term(offset, at->base, out, per_unit);
-    rest_note(memory, at, offset, integers, 0.1);
-}
-
 /* A branch as a copy of the shape used last; `place`: what an encoder has chosen. */
 static int code_copy(ath_coder *coder, copy_model *model, const rest_layer *layer, const ath_branch *branches,
                      const ath_branch *branch, double step, copy_place *place, const double *source, double *rest)
 {
     const ath_branch *shape = branches + model->shapes[0].branch;
     const double *from = rest + 3 * (size_t)shape->first;
-    double unit = LATTICE_UNIT * step, own = COPY_PLACE * unit, slack = 0.0, target[3] = {0.0, 0.0, 0.0};
+    double unit = LATTICE_UNIT * step, own = COPY_PLACE * unit, offset[3], expected[3];
     double *out = rest + 3 * (size_t)branch->first;
+    int32_t integers[3] = {0, 0, 0};
     rest_guess at;
     if (!code_copy_place(coder, model, model->shapes, copy_lever(shape, rest), unit, place)) return 0;
-    copy_guess(model, branch, shape, place, rest, 0, 1.0 / own, &at);
+    copy_start(model, branch, shape, place, rest, own, &at, expected);
 #ifdef ATH_ENCODING
-    double expected[3];
-    copy_start(model, branch, shape, place, rest, own, expected);
-    slack = copy_target(branch, shape, place, unit, layer->slack, expected, source, rest, target);
+    double target[3], units[3];
+    double slack = copy_target(branch, shape, place, unit, layer->slack, expected, source, rest, target);
+    rest_term(units, expected, target, 1.0 / own);
+    nearest_of_lattice(units, slack / own, model->first.mean, integers);
 #endif
-    code_copy_vertex(coder, model, &model->first, &at, own, slack, target, out);
+    (void)source;
+    code_rest_point(coder, &model->lattice, &model->first, &model->first, integers);
+    for (int32_t k = 0; k < 3; k++) out[k] = expected[k] + (double)integers[k] * own;
     rest_term(model->increment, at.base, out, 1.0);
+    rest_term(offset, at.base, out, 1.0 / own);
+    rest_note(&model->first, &at, offset, integers, 0.1);
     for (int32_t i = 1; i < branch->count; i++) {
-        if (place->bent) {
-            copy_guess(model, branch, shape, place, rest, i, 1.0 / unit, &at);
-            code_copy_vertex(coder, model, &model->others, &at, unit, branch->detail > 0 ? 0.0 : layer->slack,
-                             ENCODING ? source + (out - rest) + 3 * i : target, out + 3 * i);
-        } else {
-            double way[3];
-            copy_way(place->R, from, from + 3 * i, way);
-            for (int32_t k = 0; k < 3; k++) out[3 * i + k] = out[k] + way[k];
-        }
+        double way[3];
+        copy_way(place->R, from, from + 3 * i, way);
+        for (int32_t k = 0; k < 3; k++) out[3 * i + k] = out[k] + way[k];
     }
     if (layer->steps) memset(layer->steps + (out - rest), 0, 3 * (size_t)branch->count * sizeof *layer->steps);
     return 1;

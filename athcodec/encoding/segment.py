@@ -37,7 +37,6 @@ BEAM = 0  # form of a branch; others are SHEET, or a tube's vertices for each ri
 FINER = 32  # step over that of segments that bases and modes are learned from
 ROWS_AT_ONCE = 1 << 14  # of coefficients
 WORK_BYTES = 1 << 30  # of the segments coded at once, where `jobs` does not say how many these are
-COPIES_BENDS = 0.0, 0.15  # of copies of one shape that are tried
 CONNECTED_SHARE = 0.8  # of a rest pose at once, that one by faces may take where layers refine it
 SAMPLED = 4000  # vertices from which on trials correct a sample
 SEGMENT_WORK = 16  # memory of a segment while it is coded, over its float32 positions
@@ -405,9 +404,8 @@ def with_best_lags(source: Source, ath: Ath, settings: Settings) -> Settings:
 def _with_copies(source: Source, ath: Ath, candidates: list[Settings]) -> list[Settings]:
     """The candidates with branches that are copies of others, where there are any."""
     own, branches = candidates[0], branch_records(source.hierarchy, ath, candidates[0])
-    found = [streams.find_copies(branches, own.rest_step, source.rest, own.rest_slack, bend) for bend in COPIES_BENDS]
-    shapes = [shape_of for shape_of in found if shape_of is not None]
-    return [replace(settings, shape_of=shape_of) for settings in candidates for shape_of in shapes]
+    shape_of = streams.find_copies(branches, own.rest_step, source.rest, own.rest_slack)
+    return [] if shape_of is None else [replace(settings, shape_of=shape_of) for settings in candidates]
 
 
 def _poses_size(source: Source, ath: Ath, settings: Settings) -> int:
@@ -434,9 +432,7 @@ def _lag_candidates(source: Source, settings: Settings, own: np.ndarray) -> list
     if source.still:
         some += [np.full_like(own, 3), np.full_like(own, 4), np.minimum(2 * no_beam, 65535)]
     tried = {lag.astype(np.int32).tobytes() for lag in some} - {own.tobytes()}
-    return [
-        replace(settings, lags=np.frombuffer(lag, np.int32), connected_rest=False) for lag in sorted(tried)
-    ]
+    return [replace(settings, lags=np.frombuffer(lag, np.int32), connected_rest=False) for lag in sorted(tried)]
 
 
 def code_source_rest(source: Source, branches: np.ndarray, reference: np.ndarray, bound: float) -> bytes:

@@ -79,7 +79,7 @@ def encode_rest(
     return CodedRest(step, data, decoded, steps, mesh is not None)
 
 
-def find_copies(branches: np.ndarray, step: float, rest: np.ndarray, slack: float, bend: float) -> np.ndarray | None:
+def find_copies(branches: np.ndarray, step: float, rest: np.ndarray, slack: float) -> np.ndarray | None:
     """(B,) int32, of each branch the one that it is a copy of, itself where others are copies of it, or -1; None: there
     are no copies."""
     shape_of, uses = np.empty((2, len(branches)), np.int32)
@@ -89,7 +89,6 @@ def find_copies(branches: np.ndarray, step: float, rest: np.ndarray, slack: floa
         address(rest, np.float64, rest.size),
         step,
         slack,
-        bend,
         address(uses, np.int32, len(branches)),
         address(shape_of, np.int32, len(branches)),
     )

@@ -70,8 +70,8 @@ def adaptive_fork() -> bytes:
     return adaptive_rest(FORK, Chance(37, large=4))
 
 
-prelude("adaptive-zero-behind", rules.REST, "a zero byte behind an adaptive rest pose", lambda: adaptive_fork() + b"\0")
-prelude("adaptive-bytes-behind", rules.REST, "bytes behind an adaptive rest pose", lambda: adaptive_fork() + b"\1" * 12)
+prelude("adaptive-zero-behind", REST, "a zero byte behind an adaptive rest pose", lambda: adaptive_fork() + b"\0")
+prelude("adaptive-bytes-behind", REST, "bytes behind an adaptive rest pose", lambda: adaptive_fork() + b"\1" * 12)
 LONE_POINTS = [Stem(-1, 1, lag=2), Stem(-1, 1, lag=2), Stem(-1, 1, lag=2, detail=100), Stem(-1, 1, lag=2, detail=100)]
 FAR_UNITS = [10**9, 495 * 10**6, 515 * 10**6]  # units in x, in y and z pairs of them
 valid(

@@ -50,7 +50,7 @@ valid(
         2,
         points=[[float(x), 0.0, 0.0] for x in range(9)],
         scripts={
-            (rules.AFFINES, 0): [
+            (AFFINES, 0): [
                 200,
                 *row((1, 2, 3)),
                 *row((0, 1, 0)),
@@ -74,34 +74,20 @@ def affines(*script) -> Callable[[], bytes]:
     return make
 
 
-motion("step-beyond", rules.AFFINES, 0, "the step of a map is 2^100.5", affines(201))
-motion("step-below", rules.AFFINES, 0, "the step of a map is 2^-100.5", affines(-201))
-motion("frequencies", rules.AFFINES, 0, "a row codes three frequencies of two frames", affines(0, 3))
-motion(
-    "zero-behind",
-    rules.AFFINES,
-    0,
-    "a zero byte behind the stream",
-    lambda: fork().content(rules.AFFINES, 0, 1) + b"\0",
-    1,
-)
-motion(
-    "bytes-behind",
-    rules.AFFINES,
-    0,
-    "bytes behind the stream",
-    lambda: fork().content(rules.AFFINES, 0, 0) + b"\1" * 12,
-)
+motion("step-beyond", AFFINES, 0, "the step of a map is 2^100.5", affines(201))
+motion("step-below", AFFINES, 0, "the step of a map is 2^-100.5", affines(-201))
+motion("frequencies", AFFINES, 0, "a row codes three frequencies of two frames", affines(0, 3))
+motion("zero-behind", AFFINES, 0, "a zero byte behind the stream", lambda: fork().content(AFFINES, 0, 1) + b"\0", 1)
+motion("bytes-behind", AFFINES, 0, "bytes behind the stream", lambda: fork().content(AFFINES, 0, 0) + b"\1" * 12)
 invalid(
     "affines-change",
-    "BAD_CHUNK",
-    0,
     "a step changes by more than 400",
     lambda: Plant(
         [Stem(-1, 2), Stem(0, 1, 1), Stem(-1, 2), Stem(2, 1, 1)],
         points=[[0.0] * 3] * 6,
-        scripts={(rules.AFFINES, 0): [200, 0, -401]},
+        scripts={(AFFINES, 0): [200, 0, -401]},
     ),
+    item=0,
 )
 for side_, width_ in (("above", 203), ("below", 197)):
     valid(

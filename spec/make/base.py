@@ -9,9 +9,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from spec.document import KIND_NAMES, rules
+from spec.document import KIND_NAMES, KINDS, rules
 from spec.scripted import *  # noqa: F403
 
+globals().update(KINDS)  # STEMS, AFFINES and so on
 ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
 INFINITY, NAN = math.inf, math.nan
 LOWEST, HIGHEST = -sys.float_info.max, sys.float_info.max
@@ -52,7 +53,12 @@ def valid(
 
 
 def invalid(
-    name: str, error: str, item: str | int, reason: str, make: Draft | bytes | Callable, mesh: np.ndarray | None = None
+    name: str,
+    reason: str,
+    make: Draft | bytes | Callable,
+    error: str = "BAD_CHUNK",
+    item: str | int = "open",
+    mesh: np.ndarray | None = None,
 ) -> None:
     VECTORS.append(Vector(name, reason, lambda: bytes_of(make), error, str(item), mesh=mesh_bytes(mesh)))
 
@@ -78,11 +84,11 @@ FORK = [Stem(-1, 3), Stem(0, 2, 1)]
 def forked(**fields) -> Plant:
     """A trunk and a branch, four frames in two segments, every kind of motion chunk."""
     scripts = {
-        (rules.SHAPES, 1, 0): [2, *row((3, 0, 4), (0, 1, 0)), *row((0, 0, 1)), 0],
-        (rules.STEMS, 1): lambda: Chance(1),
-        (rules.STEMS, 2): lambda: Chance(2),
-        (rules.AFFINES, 0): [-8, *row((5, -3, 1), (0, 2, 0))],
-        (rules.CORRECTIONS, 2): lambda: Chance(3),
+        (SHAPES, 1, 0): [2, *row((3, 0, 4), (0, 1, 0)), *row((0, 0, 1)), 0],
+        (STEMS, 1): lambda: Chance(1),
+        (STEMS, 2): lambda: Chance(2),
+        (AFFINES, 0): [-8, *row((5, -3, 1), (0, 2, 0))],
+        (CORRECTIONS, 2): lambda: Chance(3),
     }
     return Plant(FORK, **{"frames": 4, "segments": 2, "scripts": scripts} | fields)
 
@@ -100,8 +106,8 @@ def moving(stems: list[Stem], seed: int, frames: int = 3, segments: int = 1, **f
     """Random rows at all levels."""
     scripts = {}
     for level in range(33):
-        scripts[rules.STEMS, level] = lambda level=level: Chance(100 * seed + level)
-        scripts[rules.AFFINES, level] = lambda level=level: Chance(100 * seed + level + 50, large=4)
+        scripts[STEMS, level] = lambda level=level: Chance(100 * seed + level)
+        scripts[AFFINES, level] = lambda level=level: Chance(100 * seed + level + 50, large=4)
     return Plant(stems, frames, segments, **{"scripts": scripts} | fields)
 
 
@@ -144,17 +150,16 @@ def refinements(stems: list[Stem], seed: int, large: int = 12, **fields) -> Plan
     """Three layers of random rows and rest poses."""
     plant = moving(stems, seed, **{"layers": 3, "heads": LAYER_HEADS} | fields)
     plant.scripts |= {
-        (rules.STEMS, level): lambda level=level: Chance(100 * seed + level, large=large) for level in range(40)
+        (STEMS, level): lambda level=level: Chance(100 * seed + level, large=large) for level in range(40)
     }
     plant.scripts |= {
-        (rules.REFINED_REST, level, 0): lambda level=level: Chance(100 * seed + level + 70, large=6)
-        for level in range(2, 40)
+        (REFINED_REST, level, 0): lambda level=level: Chance(100 * seed + level + 70, large=6) for level in range(2, 40)
     }
     return plant
 
 
-def header(name: str, error: str, reason: str, **fields) -> None:
-    invalid(f"header-{name}", error, "open", reason, lambda: lone().draft().with_header(**fields))
+def header(name: str, reason: str, error: str = "BAD_HEADER", **fields) -> None:
+    invalid(f"header-{name}", reason, lambda: lone().draft().with_header(**fields), error)
 
 
 def joins(*widths: float) -> tuple[Join, ...]:
@@ -166,8 +171,8 @@ def flipped(data: bytes, place: int) -> bytes:
     return data[:place] + bytes([data[place] ^ 0x10]) + data[place + 1 :]
 
 
-def table(name: str, error: str, reason: str, make: Callable[[], Draft | bytes]) -> None:
-    invalid(f"table-{name}", error, "open", reason, make)
+def table(name: str, reason: str, make: Callable[[], Draft | bytes], error: str = "BAD_CHUNK_TABLE") -> None:
+    invalid(f"table-{name}", reason, make, error)
 
 
 def inserted(at: int, *entries: Entry) -> Draft:
@@ -190,7 +195,7 @@ def prelude(name: str, kind: int, reason: str, content: bytes | Callable[[], byt
     def make() -> Draft:
         return fork().change(kind, content=content() if callable(content) else content)
 
-    invalid(f"{KIND_NAMES[kind].lower()}-{name}", error, "open", reason, make)
+    invalid(f"{KIND_NAMES[kind].lower()}-{name}", reason, make, error)
 
 
 def motion(
@@ -199,7 +204,7 @@ def motion(
     def make() -> Draft:
         return fork().change(kind, level, segment, content=content() if callable(content) else content)
 
-    invalid(f"{KIND_NAMES[kind].lower()}-{name}", "BAD_CHUNK", level, reason, make)
+    invalid(f"{KIND_NAMES[kind].lower()}-{name}", reason, make, item=level)
 
 
 def forked_plan():

@@ -7,7 +7,6 @@ from collections.abc import Callable
 
 import numpy as np
 
-from spec.document import rules
 from spec.make.base import *
 from spec.make.clips import periodic
 from spec.make.predicted import SINGLE
@@ -16,7 +15,7 @@ from spec.make.predicted import SINGLE
 def all_waves(frames: int) -> Callable[[], Plant]:
     clips = Clip(frames, 1, "once"), periodic(Clip(frames, 1, "again"), 0.0, 0.0)
     rows = row(*(tuple((k + axis) % 5 - 2 for axis in range(3)) for k in range(frames)))
-    return lambda: lone(clips=clips, scripts={(rules.STEMS, 0): rows})
+    return lambda: lone(clips=clips, scripts={(STEMS, 0): rows})
 
 
 for frames in (2, 3, 4, 7, 33, 255, 256):
@@ -27,7 +26,7 @@ valid(
     lambda: lone(
         frames=4,
         heads={0: stems_head(0.5, 0, 3, 1, basis_stream([[8192, -8192, 8192, 0]]))},
-        scripts={(rules.STEMS, 0): row((3, -1, 70))},
+        scripts={(STEMS, 0): row((3, -1, 70))},
     ),
 )
 valid(
@@ -109,22 +108,20 @@ def basis(rank: int, kind: int, stream: bytes) -> Callable[[], bytes]:
     return lambda: stems_head(0.5, 0, kind, rank, stream)
 
 
-motion("basis-4", rules.STEMS, 1, "Basis 4", basis(1, 4, basis_stream([[0, 0]])))
-motion("basis-255", rules.STEMS, 1, "Basis 255", basis(1, 255, basis_stream([[0, 0]])))
-motion("rank-0", rules.STEMS, 1, "Basis_Rank 0 though there is a basis", basis(0, 3, b""))
+motion("basis-4", STEMS, 1, "Basis 4", basis(1, 4, basis_stream([[0, 0]])))
+motion("basis-255", STEMS, 1, "Basis 255", basis(1, 255, basis_stream([[0, 0]])))
+motion("rank-0", STEMS, 1, "Basis_Rank 0 though there is a basis", basis(0, 3, b""))
 motion(
     "rank-more-than-frames",
-    rules.STEMS,
+    STEMS,
     1,
     "Basis_Rank 3 in a segment of two frames",
     basis(3, 3, basis_stream([[0, 0]] * 3)),
 )
-motion(
-    "basis-length-missing", rules.STEMS, 1, "the chunk ends inside Basis_Length", lambda: stems_head(0.5, 0, 3, 1)[:11]
-)
+motion("basis-length-missing", STEMS, 1, "the chunk ends inside Basis_Length", lambda: stems_head(0.5, 0, 3, 1)[:11])
 motion(
     "basis-length-more",
-    rules.STEMS,
+    STEMS,
     1,
     "Basis_Length is more than the chunk holds",
     lambda: struct.pack("<fBBHBI", 0.5, 0, 3, 1, 255, 100) + basis_stream([[64, 128]]),
@@ -136,28 +133,20 @@ for name, level, reason, base in (
     ("missing", 2, "Basis_Level is a level without STEMS", 0),
 ):
     motion(
-        f"basis-level-{name}",
-        rules.STEMS,
-        level,
-        reason,
-        lambda base=base: stems_head(0.5, 0, 3, 1, base=base),
-        segment=1,
+        f"basis-level-{name}", STEMS, level, reason, lambda base=base: stems_head(0.5, 0, 3, 1, base=base), segment=1
     )
 invalid(
     "stems-basis-level-rank",
-    "BAD_CHUNK",
-    2,
     "Basis_Rank 1 though Basis_Level has a basis of two rows",
     lambda: (
         forked(heads={1: stems_head(0.5, 0, 3, 2, basis_stream([[64, 128], [192, 256]]))})
         .draft()
-        .change(rules.STEMS, 2, 0, content=stems_head(0.5, 0, 3, 1, base=1))
+        .change(STEMS, 2, 0, content=stems_head(0.5, 0, 3, 1, base=1))
     ),
+    item=2,
 )
-motion(
-    "basis-beyond-1", rules.STEMS, 1, "an entry of a learned basis is 8193", basis(1, 3, basis_stream([[8192, 8193]]))
-)
-motion("basis-below-1", rules.STEMS, 1, "an entry of a learned basis is -8193", basis(1, 3, basis_stream([[-8193, 0]])))
+motion("basis-beyond-1", STEMS, 1, "an entry of a learned basis is 8193", basis(1, 3, basis_stream([[8192, 8193]])))
+motion("basis-below-1", STEMS, 1, "an entry of a learned basis is -8193", basis(1, 3, basis_stream([[-8193, 0]])))
 for name, reason, exponents in (
     ("change", "an exponent of a row of a basis changes by 401", (-200, 401)),
     ("high", "an exponent of a row of a basis is 201", (201, 0)),
@@ -165,28 +154,28 @@ for name, reason, exponents in (
 ):
     motion(
         f"basis-exponent-{name}",
-        rules.STEMS,
+        STEMS,
         1,
         reason,
         lambda exponents=exponents: basis(2, 2, basis_in_waves(2, *exponents, *row((1, 1, 0)), rank=2))(),
     )
 motion(
     "basis-in-waves-frequencies",
-    rules.STEMS,
+    STEMS,
     1,
     "a row of a basis codes three frequencies of two frames",
     lambda: basis(1, 2, basis_in_waves(2, 0, *row((1, 0, 0), (1, 0, 0), (1, 0, 0)), rank=1))(),
 )
 motion(
     "basis-in-waves-zero-behind",
-    rules.STEMS,
+    STEMS,
     1,
     "a zero byte behind the stream of a basis in waves",
     lambda: basis(1, 2, basis_in_waves(2, 0, *row((1, 0, 0)), rank=1) + b"\0")(),
 )
 motion(
     "basis-zero-behind",
-    rules.STEMS,
+    STEMS,
     1,
     "a zero byte behind the stream of a basis",
     basis(1, 3, basis_stream([[64, 128]]) + b"\0"),
@@ -198,19 +187,19 @@ valid(
         SHORT,
         frames=2,
         heads={0: stems_head(0.25, 0, 2, 2, basis_in_waves(2, -200, 400, *row((1, 1, 0), (2, -1, 0)), rank=2))},
-        scripts={(rules.STEMS, 0): lambda: Chance(513)},
+        scripts={(STEMS, 0): lambda: Chance(513)},
     ),
 )
 motion(
     "basis-length-one-more",
-    rules.STEMS,
+    STEMS,
     1,
     "Basis_Length is one more than the chunk holds",
     lambda: struct.pack("<fBBHBI", 0.5, 0, 3, 2, 255, 1 + len(IMPULSES)) + IMPULSES,
 )
 motion(
     "basis-length-cut",
-    rules.STEMS,
+    STEMS,
     1,
     "the chunk ends before the last byte of Basis_Length",
     lambda: stems_head(0.5, 0, 3, 1)[:12],
@@ -225,7 +214,7 @@ valid(
             0: stems_head(0.25, 0, 3, 1, basis_stream([[6336, -8192, 192]])),
             1: stems_head(0.25, 0, 3, 2, basis_stream([[8192, 0, -2464]]), base=0),
         },
-        scripts={(rules.STEMS, 0): lambda: Chance(514), (rules.STEMS, 1): lambda: Chance(515)},
+        scripts={(STEMS, 0): lambda: Chance(514), (STEMS, 1): lambda: Chance(515)},
     ),
 )
 
@@ -239,7 +228,7 @@ def shrunk(last: int) -> Plant:
         [Stem(-1, 3)],
         frames=44,
         heads={0: stems_head(0.25, 0, 3, 15, basis_stream(known)), 1: stems_head(0.25, 0, 2, 16, in_waves, base=0)},
-        scripts={(rules.STEMS, 1): row(*[(0, 0, 0)] * 15, (50, -30, 10))},
+        scripts={(STEMS, 1): row(*[(0, 0, 0)] * 15, (50, -30, 10))},
     )
 
 
@@ -262,7 +251,7 @@ valid(
             for s, (a, b) in enumerate(ROUNDED)
         },
         is_float64=True,
-        scripts={(rules.STEMS, 0): [*row((1, 3, 0)), *row((0, 1, 7))]},
+        scripts={(STEMS, 0): [*row((1, 3, 0)), *row((0, 1, 7))]},
     ),
 )
 valid(
@@ -273,7 +262,7 @@ valid(
         frames=8,
         is_float64=True,
         points=[[0, 0, 0], [1, 0, 2], [2, 0, 4], [1, 3, 2], [1, 5, 3]],
-        scripts={(rules.AFFINES, 0): [0, *row(), *row(), *row(*[(k == 2, k == 5, 3 - k) for k in range(8)])]},
+        scripts={(AFFINES, 0): [0, *row(), *row(), *row(*[(k == 2, k == 5, 3 - k) for k in range(8)])]},
     ),
 )
 valid(
@@ -284,6 +273,6 @@ valid(
         frames=66,
         is_float64=True,
         points=[[0, 0, 0]],
-        scripts={(rules.STEMS, 0): row((0, 0, 0), (0, 0, 0), (0, 0, 0), (1, -3, 7))},
+        scripts={(STEMS, 0): row((0, 0, 0), (0, 0, 0), (0, 0, 0), (1, -3, 7))},
     ),
 )

@@ -61,7 +61,7 @@ for side_, size_ in (("above", 1.015), ("below", 0.985)):
             [[0, 0, 0], [0, 1, 0], [0, 1e-50 * (size_**2 / 1.0203) ** 0.25, 0], [0, 0, 0], [0, 1, 1], [0, 2, 1]],
             139,
             is_float64=True,
-            scripts={(rules.STEMS, 1): [*row(), *row((9, -5, 7), (3, 8, -6))]},
+            scripts={(STEMS, 1): [*row(), *row((9, -5, 7), (3, 8, -6))]},
             heads={1: stems_head(0.125, 1)},
         ),
     )

@@ -18,7 +18,7 @@ def connected(
 ) -> Plant:
     """ADAPTIVE, by faces."""
     content, branches = make_faces(), branches_of(ADAPTIVE)
-    shape, stream = rules.parse_polygons(content, rules.FACES)
+    shape, stream = rules.parse_polygons(content, FACES)
     count = sum(stem.count for stem in ADAPTIVE)
     mesh = rules.build_mesh(*rules.decode_polygons(stream, shape, count), order or list(range(count)))
     script, bits = Chance(seed, large=6), REST_CONNECTED >> 2
@@ -50,10 +50,9 @@ valid(
 )
 invalid(
     "rest-connected-without-faces",
-    "BAD_CHUNK_TABLE",
-    "open",
     "Method has Is_Connected, and there are no FACES",
     lambda: with_rest(FORK, adaptive_rest(FORK, [], connected=True)),
+    "BAD_CHUNK_TABLE",
 )
 for what, content in (
     ("broken", lambda: polygons(FACES_3) + b"\0"),
@@ -63,11 +62,9 @@ for what, content in (
 ):
     invalid(
         f"rest-connected-{what}-faces",
-        "BAD_CHUNK",
-        "open",
         f"a rest pose by faces that do not serve it: {what}",
         lambda content=content: (
-            with_rest(FORK, adaptive_rest(FORK, [], connected=True)).draft().add(Entry(rules.FACES, content()))
+            with_rest(FORK, adaptive_rest(FORK, [], connected=True)).draft().add(Entry(FACES, content()))
         ),
     )
 valid(
@@ -81,7 +78,7 @@ def meshed(stems: list[Stem], faces: list[list[int]], script: list | Chance, **f
     """An adaptive rest pose by faces, of any sizes."""
     count, step = sum(stem.count for stem in stems), 0.3
     content = mixed_polygons(faces, count)
-    shape, stream = rules.parse_polygons(content, rules.FACES)
+    shape, stream = rules.parse_polygons(content, FACES)
     mesh = rules.build_mesh(*rules.decode_polygons(stream, shape, count), list(range(count)))
     coded = write(rules.decode_rest, script, branches_of(stems), step, None, True, mesh)
     bits = REST_ADAPTIVE | REST_CONNECTED

@@ -31,13 +31,11 @@ for name_, seed_, title_ in (
 ):
     invalid(
         name_,
-        "BAD_CHUNK",
-        "open",
         title_,
         lambda seed_=seed_: (
             with_rest(COPIED, adaptive_rest(COPIED, Chance(2364, large=3)))
             .draft()
-            .change(rules.REST, content=adaptive_rest(COPIED, Chance(seed_, large=3)))
+            .change(REST, content=adaptive_rest(COPIED, Chance(seed_, large=3)))
         ),
     )
 valid(
@@ -75,7 +73,7 @@ def broken_rest(make: Callable[[], Plant], goes_on: bool = True) -> Draft:
     finally:
         rules.require = kept
     rest = adaptive_rest(plant.stems, [], 0.3, rest_type=1)
-    return replace(plant, rest=rest).draft().change(rules.REST, content=plant.rest)
+    return replace(plant, rest=rest).draft().change(REST, content=plant.rest)
 
 
 def copy_of(tip: tuple[int, int, int], *places: Sequence[int], largest: int = 0) -> Plant:
@@ -163,22 +161,16 @@ for name_, reason_, tip_, places_ in (
 ):
     invalid(
         f"rest-copies-{name_}",
-        "BAD_CHUNK",
-        "open",
         f"{reason_}, of a copy",
         lambda tip_=tip_, places_=places_: broken_rest(lambda: copy_of(tip_, *places_)),
     )
 invalid(
     "rest-copies-rotation-little",
-    "BAD_CHUNK",
-    "open",
     "a quaternion of little more than 1",
     lambda: broken_rest(lambda: copy_of((10, 0, 0), (0, 2, 2, 0)), goes_on=False),
 )
 invalid(
     "rest-copies-of-the-65th",
-    "BAD_CHUNK",
-    "open",
     "a copy of the shape before the last 64",
     lambda: broken_rest(
         lambda: with_copies([1] * 66, [1, 0, 0, 0], *([0, 1, *by_chance(1, 400 + b)] for b in range(64)), copied(64)),

@@ -5,13 +5,12 @@ from __future__ import annotations
 import struct
 from collections.abc import Callable
 
-from spec.document import rules
 from spec.make.base import *
 
 valid(
     "corrections",
     "corrections on the last level: blocks of 8 frames, the last of 2, and vertices that have none",
-    lambda: Plant([Stem(-1, 6)], 18, scripts={(rules.CORRECTIONS, 1): lambda: Chance(54)}),
+    lambda: Plant([Stem(-1, 6)], 18, scripts={(CORRECTIONS, 1): lambda: Chance(54)}),
 )
 valid(
     "corrections-footprints",
@@ -20,7 +19,7 @@ valid(
         [Stem(-1, 2)],
         5,
         scripts={
-            (rules.CORRECTIONS, 1): [
+            (CORRECTIONS, 1): [
                 *(1, 1, *(1, 1), *(1, 0, 3), 0, 0, 0, 0, 0, 1, *(1, 1), *(1, 1, 3), 0, 0),  # 4 and -4 along x
                 *(1, 0, 1, *(1, 0), 0, *(1, 0, 0), 0, 1, 0, 0, 0, *(1, 1), 0, 0),  # 1 along y, -2 along z
             ]
@@ -30,68 +29,55 @@ valid(
 valid(
     "corrections-wide",
     "corrections of binary64 positions",
-    lambda: Plant(
-        FORK, 3, is_float64=True, origin=(0.1, 0.2, 0.3), scripts={(rules.CORRECTIONS, 2): lambda: Chance(55)}
-    ),
+    lambda: Plant(FORK, 3, is_float64=True, origin=(0.1, 0.2, 0.3), scripts={(CORRECTIONS, 2): lambda: Chance(55)}),
 )
 valid(
     "corrections-none",
     "a CORRECTIONS chunk that corrects nothing, in one of two segments",
-    lambda: Plant(FORK, 3, 2, scripts={(rules.CORRECTIONS, 2, 1): []}),
+    lambda: Plant(FORK, 3, 2, scripts={(CORRECTIONS, 2, 1): []}),
 )
 valid(
     "corrections-to-infinity",
     "a Correction_Step at the end of binary32",
     lambda: (
-        Plant(FORK, 2, scripts={(rules.CORRECTIONS, 2): lambda: Chance(56)})
+        Plant(FORK, 2, scripts={(CORRECTIONS, 2): lambda: Chance(56)})
         .draft()
         .change(
-            rules.CORRECTIONS,
+            CORRECTIONS,
             2,
             content=struct.pack("<f", FLOAT_MAX)
-            + Plant(FORK, 2, scripts={(rules.CORRECTIONS, 2): lambda: Chance(56)})
-            .draft()
-            .content(rules.CORRECTIONS, 2)[4:],
+            + Plant(FORK, 2, scripts={(CORRECTIONS, 2): lambda: Chance(56)}).draft().content(CORRECTIONS, 2)[4:],
         )
     ),
 )
 
 
 def corrections(step: float) -> Callable[[], bytes]:
-    return lambda: struct.pack("<f", step) + fork().content(rules.CORRECTIONS, 2, 0)[4:]
+    return lambda: struct.pack("<f", step) + fork().content(CORRECTIONS, 2, 0)[4:]
 
 
-motion("empty", rules.CORRECTIONS, 2, "no bytes", b"")
-motion("short", rules.CORRECTIONS, 2, "3 bytes", bytes(3))
+motion("empty", CORRECTIONS, 2, "no bytes", b"")
+motion("short", CORRECTIONS, 2, "3 bytes", bytes(3))
 for what, value in (("zero", 0.0), ("negative", -1.0), ("nan", NAN), ("infinite", INFINITY)):
-    motion(f"step-{what}", rules.CORRECTIONS, 2, f"Correction_Step is {value}", corrections(value))
+    motion(f"step-{what}", CORRECTIONS, 2, f"Correction_Step is {value}", corrections(value))
 motion(
-    "zero-behind",
-    rules.CORRECTIONS,
-    2,
-    "a zero byte behind the stream",
-    lambda: fork().content(rules.CORRECTIONS, 2, 0) + b"\0",
+    "zero-behind", CORRECTIONS, 2, "a zero byte behind the stream", lambda: fork().content(CORRECTIONS, 2, 0) + b"\0"
 )
 motion(
-    "bytes-behind",
-    rules.CORRECTIONS,
-    2,
-    "bytes behind the stream",
-    lambda: fork().content(rules.CORRECTIONS, 2, 1) + b"\1" * 12,
-    1,
+    "bytes-behind", CORRECTIONS, 2, "bytes behind the stream", lambda: fork().content(CORRECTIONS, 2, 1) + b"\1" * 12, 1
 )
 valid(
     "corrections-of-one-frame",
     "corrections in a segment of one frame, before which there is none",
-    lambda: Plant(SHORT, scripts={(rules.CORRECTIONS, 1, 0): [1, *(2, 3, 1, 0), 0, 1, *(1, 0, 5, 1)]}),
+    lambda: Plant(SHORT, scripts={(CORRECTIONS, 1, 0): [1, *(2, 3, 1, 0), 0, 1, *(1, 0, 5, 1)]}),
 )
 
 
 def corrected_lone(stream: Callable[[bytes], bytes], **fields) -> Draft:
     """A vertex with other bytes in place of a stream of CORRECTIONS that corrects nothing."""
-    draft = lone(scripts={(rules.CORRECTIONS, 1): [0]}, **fields).draft()
-    content = draft.content(rules.CORRECTIONS, 1, 0)
-    return draft.change(rules.CORRECTIONS, 1, 0, content=content[:4] + stream(content[4:]))
+    draft = lone(scripts={(CORRECTIONS, 1): [0]}, **fields).draft()
+    content = draft.content(CORRECTIONS, 1, 0)
+    return draft.change(CORRECTIONS, 1, 0, content=content[:4] + stream(content[4:]))
 
 
 valid(
@@ -108,8 +94,8 @@ valid(
         points=[[0.0, 0.0, 0.0]] * 2,
         default_head=stems_head(FLOAT_TINY),
         scripts={
-            (rules.STEMS, 0): [*row((-1, -1, 1)), *row((-1, 1, -1))],
-            (rules.CORRECTIONS, 1): [0, 1, 0, 0, 1, 0, 1, 0, 2, 0, 0, 0, 0],
+            (STEMS, 0): [*row((-1, -1, 1)), *row((-1, 1, -1))],
+            (CORRECTIONS, 1): [0, 1, 0, 0, 1, 0, 1, 0, 2, 0, 0, 0, 0],
         },
     ),
 )

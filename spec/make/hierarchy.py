@@ -107,17 +107,14 @@ valid(
 )
 invalid(
     "hierarchy-31-deep",
-    "BAD_HEADER",
-    "open",
     "32 branches, each on the one before: no Full_Level_Count can say 33",
     lambda: moving(chain(32), 1).draft().upto(31).with_header(full_level_count=32),
+    "BAD_HEADER",
 )
 invalid(
     "hierarchy-before-rest",
-    "BAD_CHUNK",
-    "open",
     "HIERARCHY is not valid and REST is damaged: HIERARCHY comes first",
-    lambda: fork().change(rules.HIERARCHY, content=b"").change(rules.REST, checksum=0),
+    lambda: fork().change(HIERARCHY, content=b"").change(REST, checksum=0),
 )
 
 
@@ -126,24 +123,18 @@ def hierarchy(name: str, reason: str, stems: list[Stem], **sources) -> None:
 
     def make() -> Draft:
         stream = write(rules.decode_hierarchy, hierarchy_script(stems, **sources), len(stems), 5)
-        return fork().with_header(branch_count=len(stems)).change(rules.HIERARCHY, content=stream)
+        return fork().with_header(branch_count=len(stems)).change(HIERARCHY, content=stream)
 
-    invalid(f"hierarchy-{name}", "BAD_CHUNK", "open", reason, make)
+    invalid(f"hierarchy-{name}", reason, make)
 
 
-prelude("empty", rules.HIERARCHY, "no bytes", b"")
-prelude(
-    "zero-behind", rules.HIERARCHY, "a zero byte behind the stream", lambda: fork().content(rules.HIERARCHY) + b"\0"
-)
-prelude(
-    "bytes-behind", rules.HIERARCHY, "bytes behind the stream", lambda: fork().content(rules.HIERARCHY) + b"\1" * 12
-)
+prelude("empty", HIERARCHY, "no bytes", b"")
+prelude("zero-behind", HIERARCHY, "a zero byte behind the stream", lambda: fork().content(HIERARCHY) + b"\0")
+prelude("bytes-behind", HIERARCHY, "bytes behind the stream", lambda: fork().content(HIERARCHY) + b"\1" * 12)
 invalid(
     "hierarchy-above-root",
-    "BAD_CHUNK",
-    "open",
     "a parent above the root",
-    lambda: fork().change(rules.HIERARCHY, content=write(rules.decode_hierarchy, [2, 0, 0, 0, 1, 2], 2, 5)),
+    lambda: fork().change(HIERARCHY, content=write(rules.decode_hierarchy, [2, 0, 0, 0, 1, 2], 2, 5)),
 )
 hierarchy("too-many-vertices", "stems have more vertices than the file", [Stem(-1, 4), Stem(0, 3)])
 hierarchy("too-few-vertices", "stems have fewer vertices than the file", [Stem(-1, 3), Stem(0, 1)])
@@ -197,12 +188,11 @@ for what, vertex_source in (
     )
 invalid(
     "hierarchy-depth-limit",
-    "LIMIT_EXCEEDED",
-    "open",
     "4097 branches, each on the one before",
     lambda: (
         still([replace(s, flags=WHOLE if b == 0 else 0) for b, s in enumerate(chain(4097))], points=[[0.0] * 3] * 4097)
         .draft()
         .upto(0)
     ),
+    "LIMIT_EXCEEDED",
 )

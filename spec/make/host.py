@@ -35,7 +35,7 @@ valid(
     mesh=AWKWARD_MESH,
 )
 valid("host-mesh-wide", "binary64 positions about a mesh of binary32", lambda: hosted(is_float64=True), mesh=MESH)
-NO_REFINED_REST = [(rules.REFINED_REST, 3, 0), (rules.REFINED_REST, 4, 0)]
+NO_REFINED_REST = [(REFINED_REST, 3, 0), (REFINED_REST, 4, 0)]
 valid(
     "host-mesh-layers",
     "three layers about the host's mesh, which none refines",
@@ -50,58 +50,55 @@ valid(
     lambda: moving(HOSTED_STEMS, 71, frames=3, mesh=HOSTED_MESH, heads=HEADS),
     mesh=HOSTED_MESH,
 )
-invalid("host-mesh-none", "NEEDS_HOST_MESH", 0, "no mesh is given", hosted)
-invalid("host-mesh-short", "WRONG_HOST_MESH", 0, "a mesh with one vertex less", hosted, MESH[:-1])
+invalid("host-mesh-none", "no mesh is given", hosted, "NEEDS_HOST_MESH", 0)
+invalid("host-mesh-short", "a mesh with one vertex less", hosted, "WRONG_HOST_MESH", 0, MESH[:-1])
 invalid(
-    "host-mesh-long", "WRONG_HOST_MESH", 0, "a mesh with one vertex more", hosted, np.append(MESH, MESH[:1], axis=0)
+    "host-mesh-long", "a mesh with one vertex more", hosted, "WRONG_HOST_MESH", 0, np.append(MESH, MESH[:1], axis=0)
 )
-invalid("host-mesh-in-file-order", "WRONG_HOST_MESH", 0, "the mesh in file order", hosted, MESH[ORDER])
+invalid("host-mesh-in-file-order", "the mesh in file order", hosted, "WRONG_HOST_MESH", 0, MESH[ORDER])
 for name, value in (("nan", NAN), ("infinite", -INFINITY)):
     INFINITE_MESH = np.append(MESH[:-1], [[0.0, np.float32(value), 0.0]], axis=0).astype("<f4")
     invalid(
         f"host-mesh-{name}",
+        f"the file's own mesh has {value}",
+        lambda mesh=INFINITE_MESH: hosted().draft().change(REST, content=host_rest_chunk(mesh)),
         "WRONG_HOST_MESH",
         0,
-        f"the file's own mesh has {value}",
-        lambda mesh=INFINITE_MESH: hosted().draft().change(rules.REST, content=host_rest_chunk(mesh)),
         INFINITE_MESH,
     )
 for at, which in ((17, "first"), (21, "second")):
     invalid(
         f"host-mesh-{which}-checksum",
+        f"a mesh that differs by the {which} checksum alone",
+        lambda at=at: hosted().draft().change(REST, content=flipped(host_rest_chunk(MESH), at)),
         "WRONG_HOST_MESH",
         0,
-        f"a mesh that differs by the {which} checksum alone",
-        lambda at=at: hosted().draft().change(rules.REST, content=flipped(host_rest_chunk(MESH), at)),
         MESH,
     )
 for name, why, bits in (("exact", "Is_Exact", {"exact": 1}), ("float64", "Rest_Is_Float64", {"rest_type": 1})):
-    prelude(
-        f"host-{name}", rules.REST, f"{why} beside Is_Host in Method", lambda bits=bits: host_rest_chunk(MESH, **bits)
-    )
+    prelude(f"host-{name}", REST, f"{why} beside Is_Host in Method", lambda bits=bits: host_rest_chunk(MESH, **bits))
 for name, why, change in (
     ("no-checksum", "Is_Host without checksums", lambda chunk: chunk[:17]),
     ("checksum-short", "Is_Host with 7 bytes of checksums", lambda chunk: chunk[:-1]),
     ("checksum-long", "Is_Host with a byte behind the checksums", lambda chunk: chunk + b"\0"),
 ):
-    prelude(f"host-{name}", rules.REST, why, lambda change=change: change(host_rest_chunk(MESH)))
+    prelude(f"host-{name}", REST, why, lambda change=change: change(host_rest_chunk(MESH)))
 prelude(
     "step-of-host",
-    rules.REST,
+    REST,
     "Rest_Step is 0 with Is_Host, where it has no meaning",
     lambda: host_rest_chunk(MESH, step=0.0),
 )
 invalid(
     "refined-rest-of-host",
-    "BAD_CHUNK",
-    3,
     "REFINED_REST of the host's mesh",
     lambda: (
         layered(3, *NO_REFINED_REST, mesh=MESH, vertex_source=ORDER)
         .draft()
-        .add(Entry(rules.REFINED_REST, refined_rest_chunk(b""), 3))
+        .add(Entry(REFINED_REST, refined_rest_chunk(b""), 3))
     ),
-    MESH,
+    item=3,
+    mesh=MESH,
 )
 
 
@@ -129,23 +126,23 @@ def without_mesh(stems: list[Stem]) -> Draft:
     return (
         replace(front, entries=front.entries[:3])
         .with_header(vertex_count=count, branch_count=len(stems), level_count=len(levels), full_level_count=len(levels))
-        .change(rules.HIERARCHY, content=stream)
-        .add(*(Entry(rules.STEMS, b"", level, 0) for level in levels if rules.has_stems(plan, level)))
-        .add(*(Entry(rules.AFFINES, b"", level, 0) for level in levels if rules.has_affines(plan, level, level)))
+        .change(HIERARCHY, content=stream)
+        .add(*(Entry(STEMS, b"", level, 0) for level in levels if rules.has_stems(plan, level)))
+        .add(*(Entry(AFFINES, b"", level, 0) for level in levels if rules.has_affines(plan, level, level)))
     )
 
 
 invalid(
     "host-mesh-tall",
-    "NEEDS_HOST_MESH",
-    0,
     "of a stem of 2^17 vertices among short ones only 2^16 count for how many others have",
     lambda: tall(1 << 17, *range(1, 17)),
+    "NEEDS_HOST_MESH",
+    0,
 )
 invalid(
     "host-mesh-deep",
-    "NEEDS_HOST_MESH",
-    0,
     "a chain of 1300 branches, from whose end others go up by 1200 and then by 1 to 1000",
     deep,
+    "NEEDS_HOST_MESH",
+    0,
 )

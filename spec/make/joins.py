@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from spec.document import rules
 from spec.make.base import *
 from spec.make.clips import loop
 from spec.make.predicted import ROOTED, predicted, swayed
@@ -66,10 +65,10 @@ valid(
         112,
         *(0, 4, 0, 4, 0, 3.5),
         scripts={
-            (rules.STEMS, 1): lambda: Chance(1),
-            (rules.STEMS, 2): lambda: Chance(2),
-            (rules.AFFINES, 0): lambda: Chance(3, large=4),
-            (rules.CORRECTIONS, 2): lambda: Chance(4),
+            (STEMS, 1): lambda: Chance(1),
+            (STEMS, 2): lambda: Chance(2),
+            (AFFINES, 0): lambda: Chance(3, large=4),
+            (CORRECTIONS, 2): lambda: Chance(4),
         },
     ),
 )
@@ -85,7 +84,7 @@ valid(
         joined(FORK, 114)
         .draft()
         .with_header(level_count=4, full_level_count=4)
-        .add(*(Entry(rules.EXACT, b"", 3, s) for s in range(2))),
+        .add(*(Entry(EXACT, b"", 3, s) for s in range(2))),
         joins=joins(0, 2, 0, 3, 0, 4.5, 0, 0),
     ),
 )
@@ -94,7 +93,7 @@ valid(
     "joins-predicted",
     "maps of level 0 before predicted motion",
     lambda: replace(
-        predicted(ROOTED, swayed(5, 116), segments=2, scripts={(rules.AFFINES, 0): lambda: Chance(116, large=4)}),
+        predicted(ROOTED, swayed(5, 116), segments=2, scripts={(AFFINES, 0): lambda: Chance(116, large=4)}),
         joins=joins(0, 3, 0, 0),
     ),
 )
@@ -105,40 +104,36 @@ for name, reason, of in (
     ("negative", "over -1 frames", (0, -1)),
     ("largest", "over 2^29 frames", (0, 1 << 29)),
 ):
-    invalid(f"joins-{name}", "BAD_CHUNK_TABLE", "open", reason, lambda of=of: joined(FORK, 120, 0, 0, *of, 0, 0).file())
+    invalid(f"joins-{name}", reason, lambda of=of: joined(FORK, 120, 0, 0, *of, 0, 0).file(), "BAD_CHUNK_TABLE")
 invalid(
     "joins-lone-loop",
-    "BAD_CHUNK_TABLE",
-    "open",
     "a loop of one segment is joined to itself",
     lambda: joined(
         *(FORK, 121, 2, 0, 0, 0, 0, 0), clips=(loop(Clip(9, 1, "loop"), 0.0, 0.0, 0.0), Clip(3, 1, "once"))
     ).file(),
+    "BAD_CHUNK_TABLE",
 )
 invalid(
     "joins-exact",
-    "BAD_CHUNK_TABLE",
-    "open",
     "the source's own numbers are joined",
     lambda: replace(
         joined(FORK, 122)
         .draft()
         .with_header(level_count=4, full_level_count=4)
-        .add(*(Entry(rules.EXACT, b"", 3, s) for s in range(2))),
+        .add(*(Entry(EXACT, b"", 3, s) for s in range(2))),
         joins=joins(0, 0, 0, 0, 0, 0, 0, 2),
     ).file(),
+    "BAD_CHUNK_TABLE",
 )
 invalid(
     "joins-of-predicted-motion",
-    "BAD_CHUNK_TABLE",
-    "open",
     "predicted motion is joined",
     lambda: replace(predicted(ROOTED, swayed(5, 123), segments=2), joins=joins(0, 0, 0, 2)).file(),
+    "BAD_CHUNK_TABLE",
 )
 invalid(
     "joins-0",
-    "BAD_CHUNK_TABLE",
-    "open",
     "a segment is joined over 0 frames",
     lambda: not_refused(lambda: joined(FORK, 500, 0, 0.5, 0, 0, 0, 0).draft()),
+    "BAD_CHUNK_TABLE",
 )

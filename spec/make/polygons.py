@@ -69,19 +69,17 @@ EDGES_2 = np.array([[0, 1], [4, 3]], "<i8")
 valid(
     "faces-and-edges",
     "triangles and edges, in integers of different sizes",
-    lambda: with_static((rules.FACES, polygons(FACES_3)), (rules.EDGES, polygons(EDGES_2))),
+    lambda: with_static((FACES, polygons(FACES_3)), (EDGES, polygons(EDGES_2))),
 )
 valid(
     "faces-of-any-width",
     "faces of five columns",
-    lambda: with_static((rules.FACES, polygons(np.array([[4, 3, 2, 1, 0]], "<i4")))),
+    lambda: with_static((FACES, polygons(np.array([[4, 3, 2, 1, 0]], "<i4")))),
 )
 valid(
     "faces-none",
     "no faces: three columns, no rows, no data; edges without rows likewise",
-    lambda: with_static(
-        (rules.FACES, polygons(np.zeros((0, 3), "|u1"))), (rules.EDGES, polygons(np.zeros((0, 2), "<u4")))
-    ),
+    lambda: with_static((FACES, polygons(np.zeros((0, 3), "|u1"))), (EDGES, polygons(np.zeros((0, 2), "<u4")))),
 )
 valid(
     "edges-derived",
@@ -89,13 +87,13 @@ valid(
     lambda: (
         moving([Stem(-1, 3), Stem(0, 2, 1), Stem(-1, 1)], 61, vertex_source=[5, 0, 3, 1, 4, 2])
         .draft()
-        .add(Entry(rules.EDGES, derived("<i2")))
+        .add(Entry(EDGES, derived("<i2")))
     ),
 )
 valid(
     "edges-derived-least",
     "as numbers of one byte; of one vertex there are none",
-    lambda: lone().draft().add(Entry(rules.EDGES, derived("|i1"))),
+    lambda: lone().draft().add(Entry(EDGES, derived("|i1"))),
 )
 MANY_FACES = {  # of 119 vertices: those of ADAPTIVE
     "by chance": lambda: polygons(np.zeros((150, 3), "<i2"), 120, script=Chance(71)),
@@ -109,33 +107,33 @@ valid(
     "faces-mixed",
     "faces of 3, 4, 0, 1, 2 and 5 corners, numbers of one byte and of eight",
     lambda: with_static(
-        (rules.FACES, mixed_polygons([[0, 1, 2], [3, 2, 1, 0], [], [4], [4, 3], [0, 1, 2, 3, 4]], types=("<i8", "|i1")))
+        (FACES, mixed_polygons([[0, 1, 2], [3, 2, 1, 0], [], [4], [4, 3], [0, 1, 2, 3, 4]], types=("<i8", "|i1")))
     ),
 )
 valid(
     "faces-mixed-alike",
     "faces that could be of different sizes, but are triangles; attributes behind them",
-    lambda: with_static((rules.FACES, mixed_polygons([[0, 1, 2], [2, 1, 4]]))).add(
-        Entry(rules.ATTRIBUTE, numbers(np.arange(5.0), name="radius"))
+    lambda: with_static((FACES, mixed_polygons([[0, 1, 2], [2, 1, 4]]))).add(
+        Entry(ATTRIBUTE, numbers(np.arange(5.0), name="radius"))
     ),
 )
-valid("faces-mixed-none", "no faces of different sizes", lambda: with_static((rules.FACES, mixed_polygons([]))))
+valid("faces-mixed-none", "no faces of different sizes", lambda: with_static((FACES, mixed_polygons([]))))
 for name_, make_faces in MANY_FACES.items():
     valid(
         f"faces-many-{name_.replace(' ', '-')}",
         f"faces of 120 vertices: {name_}",
         lambda make_faces=make_faces: (
-            with_rest(ADAPTIVE, adaptive_rest(ADAPTIVE, [])).draft().add(Entry(rules.FACES, make_faces()))
+            with_rest(ADAPTIVE, adaptive_rest(ADAPTIVE, [])).draft().add(Entry(FACES, make_faces()))
         ),
     )
 
 
 def faces(content: bytes) -> Callable[[], Draft]:
-    return lambda: with_static((rules.FACES, content))
+    return lambda: with_static((FACES, content))
 
 
 def edges(content: bytes) -> Callable[[], Draft]:
-    return lambda: with_static((rules.EDGES, content))
+    return lambda: with_static((EDGES, content))
 
 
 static("faces-empty", "FACES without bytes", faces(b""))
@@ -165,7 +163,7 @@ static(
     lambda: (
         moving([Stem(-1, 64), Stem(-1, 64), Stem(-1, 2)], 2, frames=1)
         .draft()
-        .add(Entry(rules.FACES, polygons(np.array([[0, 127, 128]], "<i2"), 130).replace(b"\x05", b"\x04", 1)))
+        .add(Entry(FACES, polygons(np.array([[0, 127, 128]], "<i2"), 130).replace(b"\x05", b"\x04", 1)))
     ),
 )
 static("faces-zero-behind", "a zero byte behind the stream", faces(polygons(FACES_3) + b"\0"))
@@ -178,9 +176,7 @@ static("edges-derived-reserved", "derived edges, and bit 5 is set", edges(bytes(
 static(
     "edges-derived-small",
     "130 vertices do not fit |i1",
-    lambda: (
-        moving([Stem(-1, 64), Stem(-1, 64), Stem(-1, 2)], 2, frames=1).draft().add(Entry(rules.EDGES, derived("|i1")))
-    ),
+    lambda: moving([Stem(-1, 64), Stem(-1, 64), Stem(-1, 2)], 2, frames=1).draft().add(Entry(EDGES, derived("|i1"))),
 )
 static("edges-derived-with-data", "data behind derived edges", edges(derived("<i4") + bytes(8)))
 
@@ -200,14 +196,12 @@ def recent(_: bytes) -> None:
 
 
 valid(
-    "faces-none-widest",
-    "no faces of 2^26 corners each",
-    lambda: with_static((rules.FACES, polygon_head("<u4", 0, 1 << 26))),
+    "faces-none-widest", "no faces of 2^26 corners each", lambda: with_static((FACES, polygon_head("<u4", 0, 1 << 26)))
 )
 valid(
     "faces-of-most-corners",
     "faces of as many corners as Count_Type holds",
-    lambda: with_static((rules.FACES, mixed_polygons([[0, 1, 2], [i % 5 for i in range(127)]], types=("<u4", "|i1")))),
+    lambda: with_static((FACES, mixed_polygons([[0, 1, 2], [i % 5 for i in range(127)]], types=("<u4", "|i1")))),
 )
 static(
     "faces-more-corners-of-many",
@@ -224,7 +218,7 @@ static(
 static(
     "faces-recent-before-first",
     "the second corner is the one before the first",
-    lambda: with_static((rules.FACES, polygon_head("<u4", 1, 3) + write(recent, []))),
+    lambda: with_static((FACES, polygon_head("<u4", 1, 3) + write(recent, []))),
 )
 STRIPS = {
     "up": [[i, i + 1, i + 2] for i in range(18)],
@@ -238,23 +232,22 @@ for name, strip in STRIPS.items():
         lambda strip=strip: (
             moving([Stem(-1, 20)], 501, frames=1)
             .draft()
-            .add(Entry(rules.FACES, polygons(np.array(strip + [[7, 3, 9]], "<u2"), 20)))
+            .add(Entry(FACES, polygons(np.array(strip + [[7, 3, 9]], "<u2"), 20)))
         ),
     )
 valid(
     "faces-of-8-bytes",
     "vertices and numbers of corners in 8 bytes: behind their largest one is none of 64 bits",
     lambda: with_static(
-        (rules.FACES, mixed_polygons([[0, 1, 2], [3, 2, 1, 0], [4]], types=("<u8", "<u8"))),
-        (rules.EDGES, polygons(np.array([[0, 1], [4, 3]], "<u8"))),
+        (FACES, mixed_polygons([[0, 1, 2], [3, 2, 1, 0], [4]], types=("<u8", "<u8"))),
+        (EDGES, polygons(np.array([[0, 1], [4, 3]], "<u8"))),
     ),
 )
 valid(
     "faces-of-8-bytes-signed",
     "the same with signs; edges that the hierarchy implies",
     lambda: with_static(
-        (rules.FACES, mixed_polygons([[0, 1, 2], [3, 2, 1, 0], [4]], types=("<u8", "<i8"))),
-        (rules.EDGES, derived("<u8")),
+        (FACES, mixed_polygons([[0, 1, 2], [3, 2, 1, 0], [4]], types=("<u8", "<i8"))), (EDGES, derived("<u8"))
     ),
 )
 static(
@@ -277,7 +270,7 @@ static("edges-of-8-bytes-beyond", "an edge to vertex 5 of 5", edges(polygons(np.
 
 
 def derived_edges(*counts: int) -> Draft:
-    return still([Stem(-1, count) for count in counts]).draft().add(Entry(rules.EDGES, derived("|i1")))
+    return still([Stem(-1, count) for count in counts]).draft().add(Entry(EDGES, derived("|i1")))
 
 
 valid(
@@ -285,4 +278,4 @@ valid(
     "derived edges of 128 vertices, the last of which is the largest number of |i1",
     lambda: derived_edges(*[2] * 64),
 )
-invalid("edges-derived-128", "BAD_CHUNK", "static", "129 vertices do not fit |i1", lambda: derived_edges(*[2] * 63, 3))
+invalid("edges-derived-128", "129 vertices do not fit |i1", lambda: derived_edges(*[2] * 63, 3), item="static")

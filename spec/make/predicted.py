@@ -62,7 +62,7 @@ def frame_points(stems: list[Stem], seed: int) -> list[int]:
 
 def predicted(stems: list[Stem], frames: list, segments: int = 1, lattice: int = 0, **fields) -> Plant:
     """frames: of each segment alike what it is coded about, (copied, 1) or (copied, 0, distance - 1), and its steps."""
-    scripts = {(rules.PREDICTED, 1, s): [x for frame in frames for x in frame] for s in range(segments)}
+    scripts = {(PREDICTED, 1, s): [x for frame in frames for x in frame] for s in range(segments)}
     fields = {"predicted": predicted_head(lattice=lattice)} | fields
     fields["scripts"] = scripts | fields.get("scripts", {})
     return Plant(stems, len(frames) * segments, segments, **fields)
@@ -157,12 +157,12 @@ valid(
 valid(
     "predicted-segments",
     "two segments, of which one has maps for level 0",
-    lambda: predicted(ROOTED, swayed(5, 13), 2, scripts={(rules.AFFINES, 0, 1): [-8, *row((5, -3, 1), (0, 2, 0))]}),
+    lambda: predicted(ROOTED, swayed(5, 13), 2, scripts={(AFFINES, 0, 1): [-8, *row((5, -3, 1), (0, 2, 0))]}),
 )
 valid(
     "predicted-roots",
     "maps of roots of one vertex, of one stem and of a subtree",
-    lambda: predicted(ROOTS, swayed(3, 14, ROOTS), scripts={(rules.AFFINES, 0, 0): lambda: Chance(15, large=4)}),
+    lambda: predicted(ROOTS, swayed(3, 14, ROOTS), scripts={(AFFINES, 0, 0): lambda: Chance(15, large=4)}),
 )
 valid("predicted-level-0", "shortened: level 0 of 2", lambda: predicted(ROOTED, swayed(2, 16)).draft().upto(0))
 valid(
@@ -172,7 +172,7 @@ valid(
         predicted(ROOTED, swayed(2, 17))
         .draft()
         .with_header(level_count=3, full_level_count=3)
-        .add(Entry(rules.EXACT, b"", 2, 0))
+        .add(Entry(EXACT, b"", 2, 0))
     ),
 )
 
@@ -181,51 +181,40 @@ def swaying() -> Draft:
     return predicted(ROOTED, swayed(3, 18), 2).draft()
 
 
-PREDICTED_PLACE = rules.PREDICTED, 1, 1
-invalid(
-    "predicted-missing", "BAD_CHUNK_TABLE", "open", "a segment has none", lambda: swaying().without(*PREDICTED_PLACE)
-)
+PREDICTED_PLACE = PREDICTED, 1, 1
+invalid("predicted-missing", "a segment has none", lambda: swaying().without(*PREDICTED_PLACE), "BAD_CHUNK_TABLE")
 invalid(
     "predicted-stems",
-    "BAD_CHUNK_TABLE",
-    "open",
     "a segment has STEMS too",
-    lambda: swaying().add(Entry(rules.STEMS, stems_head(), 1, 0)),
+    lambda: swaying().add(Entry(STEMS, stems_head(), 1, 0)),
+    "BAD_CHUNK_TABLE",
 )
 invalid(
     "predicted-corrections",
-    "BAD_CHUNK_TABLE",
-    "open",
     "a segment has CORRECTIONS too",
-    lambda: swaying().add(Entry(rules.CORRECTIONS, struct.pack("<f", 0.5), 1, 0)),
+    lambda: swaying().add(Entry(CORRECTIONS, struct.pack("<f", 0.5), 1, 0)),
+    "BAD_CHUNK_TABLE",
 )
 invalid(
     "predicted-unsaid",
-    "BAD_CHUNK_TABLE",
-    "open",
     "PREDICTED where Is_Predicted is 0",
-    lambda: fork().add(Entry(rules.PREDICTED, predicted_head(), 2, 0)),
+    lambda: fork().add(Entry(PREDICTED, predicted_head(), 2, 0)),
+    "BAD_CHUNK_TABLE",
 )
 invalid(
     "predicted-at-level-0",
-    "BAD_CHUNK_TABLE",
-    "open",
     "PREDICTED of level 0",
-    lambda: swaying().add(Entry(rules.PREDICTED, predicted_head(), 0, 0)),
+    lambda: swaying().add(Entry(PREDICTED, predicted_head(), 0, 0)),
+    "BAD_CHUNK_TABLE",
 )
 invalid(
-    "predicted-layers",
-    "BAD_HEADER",
-    "open",
-    "Layer_Count 2",
-    lambda: swaying().with_header(layer_count=2, full_level_count=3),
+    "predicted-layers", "Layer_Count 2", lambda: swaying().with_header(layer_count=2, full_level_count=3), "BAD_HEADER"
 )
 invalid(
     "predicted-nodes",
-    "BAD_HEADER",
-    "open",
     "h is 1",
     lambda: predicted(FORKED, swayed(1, 19, FORKED)).draft().with_header(full_level_count=3, level_count=2),
+    "BAD_HEADER",
 )
 for name, reason, content in (
     ("short", "4 bytes", predicted_head()[:4]),
@@ -236,18 +225,13 @@ for name, reason, content in (
     ("zero", "a stream that ends in 0", predicted_head() + b"\1\0"),
 ):
     invalid(
-        f"predicted-{name}",
-        "BAD_CHUNK",
-        1,
-        reason,
-        lambda content=content: swaying().change(*PREDICTED_PLACE, content=content),
+        f"predicted-{name}", reason, lambda content=content: swaying().change(*PREDICTED_PLACE, content=content), item=1
     )
 invalid(
     "predicted-before-first",
-    "BAD_CHUNK",
-    1,
     "a frame is coded about one before the rest pose",
     lambda: predicted(ROOTED, [RESTING, [0, 0, 2]]),
+    item=1,
 )
 valid(
     "predicted-on-vertex-0",
@@ -266,7 +250,7 @@ def with_source(draft: Draft, seed: int) -> Draft:
         differences = [chance.answer("signed", 0) for track in positions for x in track for _ in x]
         return write(rules.decode_exact, [(abs(n), n < 0) for n in differences], positions, file.header.is_float64)
 
-    added = [Entry(rules.EXACT, stream(s), level, s) for s in range(draft.header["segment_count"])]
+    added = [Entry(EXACT, stream(s), level, s) for s in range(draft.header["segment_count"])]
     joins_there = draft.joins and (*draft.joins, *joins(*(0,) * len(added)))
     return replace(draft, joins=joins_there).with_header(level_count=level + 1, full_level_count=level + 1).add(*added)
 
@@ -286,9 +270,7 @@ for name_, more_ in (("", {}), ("-wide", {"is_float64": True, "origin": (3.0, -1
         "level 0 is joined",
         lambda more_=more_: with_source(
             replace(
-                predicted(
-                    ROOTED, SOURCE_FRAMES, 2, scripts={(rules.AFFINES, 0): lambda: Chance(153, large=4)}, **more_
-                ),
+                predicted(ROOTED, SOURCE_FRAMES, 2, scripts={(AFFINES, 0): lambda: Chance(153, large=4)}, **more_),
                 frames=20,
                 repeats=(0, 1, 0, 0, 1, 1, 0, 0, 0, 1) + (0, 0, 0, 1, 0, 0, 1, 0, 1, 1),
                 joins=joins(0, 2.5, 0, 0),
@@ -386,10 +368,9 @@ def in_runs() -> Plant:
 valid("predicted-long-runs", "runs of copied frames of up to 12, of which those from 7 on are alike", in_runs)
 invalid(
     "predicted-step-infinite",
-    "BAD_CHUNK",
-    1,
     "Step is infinite",
     lambda: swaying().change(*PREDICTED_PLACE, content=predicted_head(INFINITY)),
+    item=1,
 )
 valid(
     "predicted-short-exactly",

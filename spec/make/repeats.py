@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from spec.document import rules
 from spec.make.base import *
 from spec.make.clips import periodic
 from spec.make.joins import joined
@@ -62,7 +61,7 @@ valid(
         moving(FORK, 130, frames=12, repeats=THREES)
         .draft()
         .with_header(level_count=4, full_level_count=4)
-        .add(Entry(rules.EXACT, b"", 3, 0))
+        .add(Entry(EXACT, b"", 3, 0))
     ),
 )
 for name, reason, widths, repeats in (
@@ -72,8 +71,7 @@ for name, reason, widths, repeats in (
 ):
     invalid(
         f"repeats-{name}",
-        "BAD_CHUNK_TABLE",
-        "open",
         reason,
         lambda widths=widths, repeats=repeats: joined(FORK, 136, *widths * 3, repeats=repeats).file(),
+        "BAD_CHUNK_TABLE",
     )

@@ -105,7 +105,7 @@ valid(
 
 
 def corrupted_rest(**fields) -> bytes:
-    return rest_chunk(fork().content(rules.REST)[17:], **fields)
+    return rest_chunk(fork().content(REST)[17:], **fields)
 
 
 def exact_of_fork(numbers_: list, is_float64: bool, **fields) -> bytes:
@@ -113,65 +113,47 @@ def exact_of_fork(numbers_: list, is_float64: bool, **fields) -> bytes:
 
 
 INFINITE_BITS = {False: (0xFF << 23, False), True: (0x7FF << 52, False)}  # how far infinity is from 0.0
-prelude("empty", rules.REST, "no bytes", b"")
-prelude("short", rules.REST, "16 bytes", lambda: corrupted_rest()[:16])
+prelude("empty", REST, "no bytes", b"")
+prelude("short", REST, "16 bytes", lambda: corrupted_rest()[:16])
 for bit in (0, 2, 3, 4, 5):
-    prelude(
-        f"method-{bit}",
-        rules.REST,
-        f"bit {bit + 2} of Method is set",
-        lambda bit=bit: corrupted_rest(reserved=1 << bit),
-    )
+    prelude(f"method-{bit}", REST, f"bit {bit + 2} of Method is set", lambda bit=bit: corrupted_rest(reserved=1 << bit))
 prelude(
     "exact-and-adaptive",
-    rules.REST,
+    REST,
     "Method has Is_Exact and Is_Adaptive",
     lambda: exact_rest(FORK, [0.5] * 15, False, reserved=REST_ADAPTIVE >> 2),
 )
 for what, value in (("nan", NAN), ("infinite", -INFINITY)):
-    prelude(
-        f"origin-{what}",
-        rules.REST,
-        f"Origin has {value}",
-        lambda value=value: corrupted_rest(origin=(0.0, 0.0, value)),
-    )
+    prelude(f"origin-{what}", REST, f"Origin has {value}", lambda value=value: corrupted_rest(origin=(0.0, 0.0, value)))
 for what, value in (("zero", 0.0), ("negative", -1.0), ("nan", NAN), ("infinite", INFINITY)):
-    prelude(f"step-{what}", rules.REST, f"Rest_Step is {value}", lambda value=value: corrupted_rest(step=value))
+    prelude(f"step-{what}", REST, f"Rest_Step is {value}", lambda value=value: corrupted_rest(step=value))
 prelude(
     "step-of-exact",
-    rules.REST,
+    REST,
     "Rest_Step is 0 with Method 1, where it has no meaning",
     lambda: exact_of_fork([0.0] * 15, False, step=0.0),
 )
-prelude("zero-behind", rules.REST, "a zero byte behind the stream", lambda: corrupted_rest() + b"\0")
-prelude("bytes-behind", rules.REST, "bytes behind the stream", lambda: corrupted_rest() + b"\1" * 12)
+prelude("zero-behind", REST, "a zero byte behind the stream", lambda: corrupted_rest() + b"\0")
+prelude("bytes-behind", REST, "bytes behind the stream", lambda: corrupted_rest() + b"\1" * 12)
 prelude(
-    "exact-infinite",
-    rules.REST,
-    "an infinite binary32 number",
-    lambda: exact_of_fork([0.0, INFINITE_BITS[False]], False),
+    "exact-infinite", REST, "an infinite binary32 number", lambda: exact_of_fork([0.0, INFINITE_BITS[False]], False)
 )
 prelude(
-    "exact-wide-infinite",
-    rules.REST,
-    "an infinite binary64 number",
-    lambda: exact_of_fork([0.0, INFINITE_BITS[True]], True),
+    "exact-wide-infinite", REST, "an infinite binary64 number", lambda: exact_of_fork([0.0, INFINITE_BITS[True]], True)
 )
-prelude("exact-nan", rules.REST, "a number that is NaN", lambda: exact_of_fork([((0xFF << 23) + 1, False)], False))
+prelude("exact-nan", REST, "a number that is NaN", lambda: exact_of_fork([((0xFF << 23) + 1, False)], False))
 prelude(
     "exact-zero-behind",
-    rules.REST,
+    REST,
     "a zero byte behind the stream of exact numbers",
     lambda: exact_of_fork([0.5] * 15, False) + b"\0",
 )
 invalid(
     "rest-beam-frequencies",
-    "BAD_CHUNK",
-    "open",
     "a run of two vertices codes three frequencies",
     lambda: (
         with_rest([Stem(-1, 3, lag=0)], coded_rest([Stem(-1, 3, lag=0)], []))
         .draft()
-        .change(rules.REST, content=coded_rest([Stem(-1, 3, lag=0)], [0, 0, 0, 3]))
+        .change(REST, content=coded_rest([Stem(-1, 3, lag=0)], [0, 0, 0, 3]))
     ),
 )

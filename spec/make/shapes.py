@@ -15,10 +15,10 @@ valid(
         [Stem(-1, 4)],
         3,
         scripts={
-            (rules.SHAPES, 0, 0): [6, *(n for i in range(6) for n in row((1, -i, 2), (i, 5, 0), (0, 0, 3)))],
-            (rules.SHAPES, 1, 0): [6, *(n for i in range(6) for n in row((0, 1, i), (0, -i, 0), (2, 2, 2), (9, 9, i)))],
-            (rules.STEMS, 0): lambda: Chance(45),
-            (rules.STEMS, 1): lambda: Chance(46),
+            (SHAPES, 0, 0): [6, *(n for i in range(6) for n in row((1, -i, 2), (i, 5, 0), (0, 0, 3)))],
+            (SHAPES, 1, 0): [6, *(n for i in range(6) for n in row((0, 1, i), (0, -i, 0), (2, 2, 2), (9, 9, i)))],
+            (STEMS, 0): lambda: Chance(45),
+            (STEMS, 1): lambda: Chance(46),
         },
     ),
 )
@@ -29,10 +29,10 @@ valid(
         [Stem(-1, 20)],
         3,
         scripts={
-            (rules.SHAPES, 0, 0): [2, *row((2**29, 0, 0)), *row(*[(0, 0, 0)] * 15, (1, 0, 0))],
-            (rules.SHAPES, 1, 0): [],
-            (rules.STEMS, 0): lambda: Chance(47),
-            (rules.STEMS, 1): lambda: Chance(48),
+            (SHAPES, 0, 0): [2, *row((2**29, 0, 0)), *row(*[(0, 0, 0)] * 15, (1, 0, 0))],
+            (SHAPES, 1, 0): [],
+            (STEMS, 0): lambda: Chance(47),
+            (STEMS, 1): lambda: Chance(48),
         },
     ),
 )
@@ -43,12 +43,12 @@ valid(
         [Stem(-1, 4, 0, SHEET), Stem(0, 3, 3, WHOLE), Stem(1, 2, 1, SHEET)],
         3,
         scripts={
-            (rules.SHAPES, 1, 0): [3, *row((1, 2, 3)), *row((3, 2, 1), (1, 1, 1)), *row((0, 0, 5))],
-            (rules.SHAPES, 2, 0): [1, *row((4, 0, 0)), 2, *row((0, 7, 0)), *row((0, 0, 7))],
-            (rules.STEMS, 1): lambda: Chance(49),
-            (rules.STEMS, 2): lambda: Chance(50),
-            (rules.AFFINES, 0): lambda: Chance(51, large=3),
-            (rules.AFFINES, 1): lambda: Chance(52, large=3),
+            (SHAPES, 1, 0): [3, *row((1, 2, 3)), *row((3, 2, 1), (1, 1, 1)), *row((0, 0, 5))],
+            (SHAPES, 2, 0): [1, *row((4, 0, 0)), 2, *row((0, 7, 0)), *row((0, 0, 7))],
+            (STEMS, 1): lambda: Chance(49),
+            (STEMS, 2): lambda: Chance(50),
+            (AFFINES, 0): lambda: Chance(51, large=3),
+            (AFFINES, 1): lambda: Chance(52, large=3),
         },
     ),
 )
@@ -58,7 +58,7 @@ valid(
     lambda: Plant(
         [Stem(-1, 2), Stem(0, 2, 1, WHOLE), Stem(1, 2, 1)],
         2,
-        scripts={(rules.SHAPES, 2, 0): [2, *row((1, 0, 0)), *row((0, 1, 1))], (rules.STEMS, 2): lambda: Chance(53)},
+        scripts={(SHAPES, 2, 0): [2, *row((1, 0, 0)), *row((0, 1, 1))], (STEMS, 2): lambda: Chance(53)},
     ),
 )
 
@@ -71,24 +71,21 @@ def shapes(*script) -> Callable[[], bytes]:
     return make
 
 
-motion("too-many", rules.SHAPES, 1, "a piece of three modes has ten shapes", shapes(10))
-motion(
-    "too-many-of-base", rules.SHAPES, 1, "a piece whose base level has two modes has seven shapes there", shapes(0, 7)
-)
-motion("all-zero", rules.SHAPES, 1, "a shape is all 0", shapes(1, *row((0, 0, 0))))
-motion("empty-row", rules.SHAPES, 1, "a shape whose row is empty", shapes(1, 0))
-motion("modes", rules.SHAPES, 1, "a shape has numbers for four modes of three", shapes(1, 4))
-motion("zero-behind", rules.SHAPES, 1, "a zero byte behind the stream", lambda: fork().content(rules.SHAPES, 1) + b"\0")
-motion("bytes-behind", rules.SHAPES, 1, "bytes behind the stream", lambda: fork().content(rules.SHAPES, 1) + b"\1" * 12)
+motion("too-many", SHAPES, 1, "a piece of three modes has ten shapes", shapes(10))
+motion("too-many-of-base", SHAPES, 1, "a piece whose base level has two modes has seven shapes there", shapes(0, 7))
+motion("all-zero", SHAPES, 1, "a shape is all 0", shapes(1, *row((0, 0, 0))))
+motion("empty-row", SHAPES, 1, "a shape whose row is empty", shapes(1, 0))
+motion("modes", SHAPES, 1, "a shape has numbers for four modes of three", shapes(1, 4))
+motion("zero-behind", SHAPES, 1, "a zero byte behind the stream", lambda: fork().content(SHAPES, 1) + b"\0")
+motion("bytes-behind", SHAPES, 1, "bytes behind the stream", lambda: fork().content(SHAPES, 1) + b"\1" * 12)
 invalid(
     "shapes-too-many-at-last",
-    "BAD_CHUNK",
-    1,
     "a level adds more shapes than the other modes have axes",
     lambda: Plant(
         [Stem(-1, 3)],
-        scripts={(rules.SHAPES, 0, 0): [6, *(n for i in range(6) for n in row((1, i, 0)))], (rules.SHAPES, 1, 0): [4]},
+        scripts={(SHAPES, 0, 0): [6, *(n for i in range(6) for n in row((1, i, 0)))], (SHAPES, 1, 0): [4]},
     ),
+    item=1,
 )
 LONE_STEMS = [Stem(-1, 3, rigid=1), Stem(-1, 3), Stem(-1, 3, flags=SHEET, rigid=1)]
 valid(
@@ -100,8 +97,8 @@ valid(
         heads=HEADS,
         scripts=moving(LONE_STEMS, 505).scripts
         | {
-            (rules.SHAPES, 0, 0): [0, 6, *(n for i in range(6) for n in row((1, i, 0), (0, 2, 5 - i))), 0],
-            (rules.SHAPES, 1, 0): [0, 2, *row((0, 1, 0)), *row((0, 0, 1), (4, 0, 0)), 0],
+            (SHAPES, 0, 0): [0, 6, *(n for i in range(6) for n in row((1, i, 0), (0, 2, 5 - i))), 0],
+            (SHAPES, 1, 0): [0, 2, *row((0, 1, 0)), *row((0, 0, 1), (4, 0, 0)), 0],
         },
     ),
 )

@@ -108,7 +108,7 @@ def source_rest(
     def make() -> Plant:
         return plant(source_rest=content() if callable(content) else content)
 
-    invalid(f"source-rest-{name}", "BAD_CHUNK", item, reason, make)
+    invalid(f"source-rest-{name}", reason, make, item=item)
 
 
 source_rest("empty", "no bytes", b"")
@@ -139,10 +139,10 @@ source_rest(
 )
 invalid(
     "source-rest-damaged",
+    "a bit of SOURCE_REST is flipped",
+    lambda: forked(source_rest=bent(FORK, Chance(206))).draft().change(SOURCE_REST, checksum=0),
     "BAD_CHECKSUM",
     "rest",
-    "a bit of SOURCE_REST is flipped",
-    lambda: forked(source_rest=bent(FORK, Chance(206))).draft().change(rules.SOURCE_REST, checksum=0),
 )
 ATTACHED_TO_0 = [
     Stem(-1, 3, lag=0),

@@ -8,7 +8,6 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import zstandard
 
-from spec.document import rules
 from spec.make.base import *
 
 
@@ -91,11 +90,11 @@ def with_static(*entries: tuple[int, bytes]) -> Draft:
 
 
 def metadata(text: bytes | str, method: int = 0) -> Draft:
-    return with_static((rules.METADATA, bytes([method]) + (text if isinstance(text, bytes) else text.encode())))
+    return with_static((METADATA, bytes([method]) + (text if isinstance(text, bytes) else text.encode())))
 
 
 def attributes(*contents: bytes) -> Draft:
-    return with_static(*((rules.ATTRIBUTE, content) for content in contents))
+    return with_static(*((ATTRIBUTE, content) for content in contents))
 
 
 # A text of 456 bytes compressed by zstd 1.5 at level 19: literals with a Huffman table, sequences with FSE tables.
@@ -172,7 +171,7 @@ valid(
 valid(
     "attributes-256",
     "as many attributes as there can be",
-    lambda: lone().draft().add(*(Entry(rules.ATTRIBUTE, element("|u1", bytes([i]), str(i))) for i in range(256))),
+    lambda: lone().draft().add(*(Entry(ATTRIBUTE, element("|u1", bytes([i]), str(i))) for i in range(256))),
 )
 valid("zstd-checksum", "a frame with a Content_Checksum", lambda: attributes(array_chunk("|u1", (5,), frame(b"plant"))))
 valid(
@@ -210,7 +209,7 @@ valid(
 
 
 def static(name: str, reason: str, make: Draft | Callable[[], Draft], error: str = "BAD_CHUNK") -> None:
-    invalid(name, error, "static", reason, make)
+    invalid(name, reason, make, error, "static")
 
 
 for name, why, text in (
@@ -246,7 +245,7 @@ for name, why, text in (
     ("white-space", "white space that JSON does not have", b"\x0b{}"),
 ):
     static(f"metadata-{name}", why, lambda text=text: metadata(text))
-static("metadata-empty", "no bytes", lambda: with_static((rules.METADATA, b"")))
+static("metadata-empty", "no bytes", lambda: with_static((METADATA, b"")))
 static("metadata-method-2", "Method 2", lambda: metadata("{}", 2))
 static(
     "metadata-limit",
@@ -292,7 +291,7 @@ static(
 static(
     "attributes-257",
     "257 attributes",
-    lambda: lone().draft().add(*(Entry(rules.ATTRIBUTE, element("|u1", b"a", str(i))) for i in range(257))),
+    lambda: lone().draft().add(*(Entry(ATTRIBUTE, element("|u1", b"a", str(i))) for i in range(257))),
     "LIMIT_EXCEEDED",
 )
 for name, why, type_ in (

@@ -15,7 +15,7 @@ valid("smallest-wide", "the same with binary64 positions and rest pose", lambda:
 valid(
     "one-vertex-moves",
     "one vertex whose translation has three frequencies in five frames",
-    lambda: lone(frames=5, scripts={(rules.STEMS, 0): row((1, 2, 3), (-40, 5, 0), (7, 0, -1))}),
+    lambda: lone(frames=5, scripts={(STEMS, 0): row((1, 2, 3), (-40, 5, 0), (7, 0, -1))}),
 )
 valid("one-frame", "a bush in a single frame", lambda: moving(FORK, 5, frames=1, heads=HEADS))
 valid(
@@ -77,7 +77,7 @@ valid(
         2,
         points=[[0.0, 0.0, 0.0], [8.0, 0.0, 0.0], [0.0, 8.0, 0.0], [0.0, 0.0, 8.0], [0.0, 0.0, 9.0], [0.0, 0.0, 10.0]],
         scripts={
-            (rules.STEMS, 1): [
+            (STEMS, 1): [
                 *row(),
                 0,
                 *row((0, 0, 0), (-200, 30, 0)),
@@ -94,7 +94,7 @@ valid(
         [Stem(-1, 2), Stem(0, 2, 1)],
         2,
         points=[[0.0, 0.0, 0.0], [0.0, 4.0, 0.0], [0.0, 8.0, 0.0], [0.0, 9.0, 1.0]],
-        scripts={(rules.STEMS, 1): [*row(), *row((0, -60, 0), (0, 60, 0)), *row((0, -9, 1))]},
+        scripts={(STEMS, 1): [*row(), *row((0, -60, 0), (0, 60, 0)), *row((0, -9, 1))]},
     ),
 )
 valid(
@@ -114,7 +114,7 @@ valid(
 valid(
     "frames-256",
     "a segment of as many frames as there can be, with rows that code all of them",
-    lambda: lone(frames=256, scripts={(rules.STEMS, 0): row(*[(1, 0, -1)] * 256), (rules.STEMS, 1): []}),
+    lambda: lone(frames=256, scripts={(STEMS, 0): row(*[(1, 0, -1)] * 256), (STEMS, 1): []}),
 )
 valid(
     "frames-257", "one frame more: segments of 128 and 129", lambda: moving([Stem(-1, 2)], 24, frames=257, segments=2)
@@ -147,9 +147,7 @@ valid(
 valid(
     "numbers-largest",
     "integers at the ends of what a stream can hold",
-    lambda: lone(
-        frames=3, scripts={(rules.STEMS, 0): row((2**30 - 1, 1 - 2**30, 0), (2**29, -1, 1), (2**20 + 1, 0, 9))}
-    ),
+    lambda: lone(frames=3, scripts={(STEMS, 0): row((2**30 - 1, 1 - 2**30, 0), (2**29, -1, 1), (2**20 + 1, 0, 9))}),
 )
 NOT_A_NUMBER = [Stem(-1, 3), Stem(0, 2, 2), Stem(1, 1, 1, SHEET)]
 valid(
@@ -160,35 +158,33 @@ valid(
         2,
         heads={level: stems_head(FLOAT_MAX, 1) for level in range(4)},
         rest=exact_rest(NOT_A_NUMBER, (1e200 * np.array(grown(NOT_A_NUMBER, 4))).ravel().tolist(), True),
-        scripts={
-            (rules.STEMS, level): lambda level=level: Chance(57 + level, empty=0.1, large=25) for level in range(4)
-        },
+        scripts={(STEMS, level): lambda level=level: Chance(57 + level, empty=0.1, large=25) for level in range(4)},
     ),
 )
 
 
 def stems(*head, **fields) -> Callable[[], bytes]:
     """STEMS of level 1 with another head."""
-    return lambda: stems_head(*head, **fields) + fork().content(rules.STEMS, 1, 0)[6:]
+    return lambda: stems_head(*head, **fields) + fork().content(STEMS, 1, 0)[6:]
 
 
-motion("empty", rules.STEMS, 1, "no bytes", b"")
-motion("short", rules.STEMS, 1, "5 bytes", bytes(5))
+motion("empty", STEMS, 1, "no bytes", b"")
+motion("short", STEMS, 1, "5 bytes", bytes(5))
 for what, value in (("zero", 0.0), ("negative", -1.0), ("nan", NAN), ("infinite", INFINITY)):
-    motion(f"step-{what}", rules.STEMS, 1, f"Step is {value}", stems(value))
-motion("rotation-3", rules.STEMS, 1, "Rotation 3", stems(0.5, 3))
-motion("rotation-8", rules.STEMS, 1, "bit 3 of Rotation", stems(0.5, 8))
-motion("rotation-turn-3", rules.STEMS, 1, "Turn 1 and Rotation 3", stems(0.5, 19))
+    motion(f"step-{what}", STEMS, 1, f"Step is {value}", stems(value))
+motion("rotation-3", STEMS, 1, "Rotation 3", stems(0.5, 3))
+motion("rotation-8", STEMS, 1, "bit 3 of Rotation", stems(0.5, 8))
+motion("rotation-turn-3", STEMS, 1, "Turn 1 and Rotation 3", stems(0.5, 19))
 motion(
     "frequencies",
-    rules.STEMS,
+    STEMS,
     1,
     "a row codes three frequencies of two",
     lambda: stems_head() + write(rules.decode_stems, [3], forked_plan(), stems_motion(stems_head(), 2), 1),
 )
 motion(
     "frequencies-of-basis",
-    rules.STEMS,
+    STEMS,
     1,
     "a row codes two frequencies of a learned basis of rank 1",
     lambda: (
@@ -196,15 +192,13 @@ motion(
         + write(rules.decode_stems, [2], forked_plan(), stems_motion(basis(1, 3, basis_stream([[64, 128]]))(), 2), 1)
     ),
 )
-motion(
-    "zero-behind", rules.STEMS, 1, "a zero byte behind the stream", lambda: fork().content(rules.STEMS, 1, 0) + b"\0"
-)
+motion("zero-behind", STEMS, 1, "a zero byte behind the stream", lambda: fork().content(STEMS, 1, 0) + b"\0")
 motion(
     "bytes-behind",
-    rules.STEMS,
+    STEMS,
     2,
     "bytes behind the stream of the second segment",
-    lambda: fork().content(rules.STEMS, 2, 1) + b"\1" * 12,
+    lambda: fork().content(STEMS, 2, 1) + b"\1" * 12,
     1,
 )
 
@@ -242,11 +236,11 @@ class Counts(Chance):
 valid(
     "rows-of-30",
     "rows of 30 and 31 frequencies, which are expected differently",
-    lambda: Plant([Stem(-1, 9)], frames=40, scripts={(rules.STEMS, k): lambda k=k: Counts(511 + k) for k in (0, 1)}),
+    lambda: Plant([Stem(-1, 9)], frames=40, scripts={(STEMS, k): lambda k=k: Counts(511 + k) for k in (0, 1)}),
 )
 motion(
     "frequencies-1023",
-    rules.STEMS,
+    STEMS,
     1,
     "a row codes 1023 frequencies of two: as long as a number of them can be",
     lambda: stems_head() + write(rules.decode_stems, [1023], forked_plan(), stems_motion(stems_head(), 2), 1),

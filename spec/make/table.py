@@ -7,14 +7,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from spec.document import KIND_NAMES, rules
+from spec.document import KIND_NAMES
 from spec.make.base import *
 from spec.make.static import attributes, element, metadata, numbers
 
 valid(
     "kind-spelt",
     "known Kinds by all their bits",
-    lambda: fork().change(rules.STEMS, 1, 1, spelt=True).change(rules.AFFINES, 0, 0, spelt=True),
+    lambda: fork().change(STEMS, 1, 1, spelt=True).change(AFFINES, 0, 0, spelt=True),
 )
 valid(
     "unknown-optional",
@@ -66,9 +66,9 @@ for kind, level, why in (
 ):
     table(
         f"unknown-{kind:04x}",
-        "UNKNOWN_CHUNK",
         f"a required kind that is not known, {why}",
         lambda kind=kind, level=level: fork().add(Entry(kind, b"", level)),
+        "UNKNOWN_CHUNK",
     )
 for kind, level, name in (
     (0x8001, 255, "HIERARCHY"),
@@ -82,192 +82,123 @@ for kind, level, name in (
 ):
     table(
         f"twin-{kind:04x}",
-        "UNKNOWN_CHUNK",
         f"{name} with the wrong bit 15",
         lambda kind=kind, level=level: fork().add(Entry(kind, b"", level)),
+        "UNKNOWN_CHUNK",
     )
-table("no-level", "BAD_CHUNK_TABLE", "the last CORRECTIONS with Level 255", lambda: moved(rules.CORRECTIONS, level=255))
-table(
-    "level-beyond",
-    "BAD_CHUNK_TABLE",
-    "a motion chunk of a level that is not stored",
-    lambda: moved(rules.CORRECTIONS, level=3),
-)
-table(
-    "segment-beyond",
-    "BAD_CHUNK_TABLE",
-    "a motion chunk of a segment that is not there",
-    lambda: moved(rules.CORRECTIONS, segment=2),
-)
-table(
-    "unknown-without-level",
-    "BAD_CHUNK_TABLE",
-    "an unknown optional motion kind with Level 255",
-    lambda: fork().add(Entry(0x8018, b"")),
-)
-table("order-prelude", "BAD_CHUNK_TABLE", "REST before HIERARCHY", lambda: swapped(0, 1))
-table("order-motion-first", "BAD_CHUNK_TABLE", "a motion chunk before TIME", lambda: swapped(2, 3))
-table("order-kinds", "BAD_CHUNK_TABLE", "SHAPES before STEMS", lambda: swapped(5, 6))
+table("no-level", "the last CORRECTIONS with Level 255", lambda: moved(CORRECTIONS, level=255))
+table("level-beyond", "a motion chunk of a level that is not stored", lambda: moved(CORRECTIONS, level=3))
+table("segment-beyond", "a motion chunk of a segment that is not there", lambda: moved(CORRECTIONS, segment=2))
+table("unknown-without-level", "an unknown optional motion kind with Level 255", lambda: fork().add(Entry(0x8018, b"")))
+table("order-prelude", "REST before HIERARCHY", lambda: swapped(0, 1))
+table("order-motion-first", "a motion chunk before TIME", lambda: swapped(2, 3))
+table("order-kinds", "SHAPES before STEMS", lambda: swapped(5, 6))
 table(
     "order-optional",
-    "BAD_CHUNK_TABLE",
     "an unknown optional motion kind before the known ones of its level: bit 15 counts",
     lambda: inserted(3, Entry(0x8018, b"", 0, 0)),
 )
-table(
-    "order-attributes",
-    "BAD_CHUNK_TABLE",
-    "ATTRIBUTE before the motion",
-    lambda: inserted(3, Entry(rules.ATTRIBUTE, element("|u1", b"a"))),
-)
-table(
-    "order-behind",
-    "BAD_CHUNK_TABLE",
-    "METADATA behind the motion",
-    lambda: inserted(len(fork().entries), Entry(rules.METADATA, b"\0{}")),
-)
-table("twice-time", "BAD_CHUNK_TABLE", "TIME twice", lambda: fork().add(Entry(rules.TIME, steady_time())))
+table("order-attributes", "ATTRIBUTE before the motion", lambda: inserted(3, Entry(ATTRIBUTE, element("|u1", b"a"))))
+table("order-behind", "METADATA behind the motion", lambda: inserted(len(fork().entries), Entry(METADATA, b"\0{}")))
+table("twice-time", "TIME twice", lambda: fork().add(Entry(TIME, steady_time())))
 table(
     "twice-metadata",
-    "BAD_CHUNK_TABLE",
     "METADATA twice: only kinds from 32 on may repeat",
-    lambda: fork().add(Entry(rules.METADATA, b"\0{}"), Entry(rules.METADATA, b"\0{}")),
+    lambda: fork().add(Entry(METADATA, b"\0{}"), Entry(METADATA, b"\0{}")),
 )
 table(
     "twice-stems",
-    "BAD_CHUNK_TABLE",
     "STEMS of a level and segment twice",
-    lambda: fork().add(Entry(rules.STEMS, fork().content(rules.STEMS, 1, 0), 1, 0)),
+    lambda: fork().add(Entry(STEMS, fork().content(STEMS, 1, 0), 1, 0)),
 )
 table(
     "twice-unknown",
-    "BAD_CHUNK_TABLE",
     "an unknown optional kind of the prelude twice",
     lambda: fork().add(Entry(0x8009, b""), Entry(0x8009, b"")),
 )
 table(
     "twice-unknown-motion",
-    "BAD_CHUNK_TABLE",
     "an unknown optional motion kind twice",
     lambda: fork().add(Entry(0x8018, b"", 0, 0), Entry(0x8018, b"", 0, 0)),
 )
 table(
     "length-limit",
-    "LIMIT_EXCEEDED",
     "a chunk of 2^28 + 1 bytes",
     lambda: fork().add(Entry(0x8009, b"", length=(1 << 28) + 1)),
+    "LIMIT_EXCEEDED",
 )
 table(
     "length-limit-of-unknown",
-    "UNKNOWN_CHUNK",
     "the Kind is checked before the Length",
     lambda: fork().add(Entry(9, b"", length=2**30 - 1)),
+    "UNKNOWN_CHUNK",
 )
 table(
     "length-limit-before-place",
-    "LIMIT_EXCEEDED",
     "the Length is checked before the Level",
     lambda: fork().add(Entry(0x8018, b"", length=2**30 - 1)),
+    "LIMIT_EXCEEDED",
 )
-for kind in (rules.HIERARCHY, rules.REST, rules.TIME):
-    table(
-        f"no-{KIND_NAMES[kind].lower()}",
-        "BAD_CHUNK_TABLE",
-        f"{KIND_NAMES[kind]} is missing",
-        lambda kind=kind: fork().without(kind),
-    )
-table(
-    "no-chunk-of-motion",
-    "BAD_CHUNK_TABLE",
-    "a file without motion",
-    lambda: replace(fork(), entries=fork().entries[:3]),
-)
-table("no-stems", "BAD_CHUNK_TABLE", "STEMS of a segment is missing", lambda: fork().without(rules.STEMS, 2, 1))
-table(
-    "no-affines",
-    "BAD_CHUNK_TABLE",
-    "AFFINES of level 0 is missing in one segment",
-    lambda: fork().without(rules.AFFINES, 0, 1),
-)
-table(
-    "more-stems",
-    "BAD_CHUNK_TABLE",
-    "STEMS of a level that has no pieces",
-    lambda: fork().add(Entry(rules.STEMS, stems_head(), 0, 0)),
-)
-table(
-    "more-affines",
-    "BAD_CHUNK_TABLE",
-    "AFFINES of a level without coded nodes",
-    lambda: fork().add(Entry(rules.AFFINES, b"", 1, 0)),
-)
+for kind in (HIERARCHY, REST, TIME):
+    table(f"no-{KIND_NAMES[kind].lower()}", f"{KIND_NAMES[kind]} is missing", lambda kind=kind: fork().without(kind))
+table("no-chunk-of-motion", "a file without motion", lambda: replace(fork(), entries=fork().entries[:3]))
+table("no-stems", "STEMS of a segment is missing", lambda: fork().without(STEMS, 2, 1))
+table("no-affines", "AFFINES of level 0 is missing in one segment", lambda: fork().without(AFFINES, 0, 1))
+table("more-stems", "STEMS of a level that has no pieces", lambda: fork().add(Entry(STEMS, stems_head(), 0, 0)))
+table("more-affines", "AFFINES of a level without coded nodes", lambda: fork().add(Entry(AFFINES, b"", 1, 0)))
 table(
     "more-corrections",
-    "BAD_CHUNK_TABLE",
     "CORRECTIONS of a level that is not the last",
-    lambda: fork().add(Entry(rules.CORRECTIONS, struct.pack("<f", 1.0), 1, 0)),
+    lambda: fork().add(Entry(CORRECTIONS, struct.pack("<f", 1.0), 1, 0)),
 )
 table(
     "corrections-of-short-file",
-    "BAD_CHUNK_TABLE",
     "CORRECTIONS on the last level of a shortened file",
-    lambda: fork().upto(1).add(Entry(rules.CORRECTIONS, struct.pack("<f", 1.0), 1, 0)),
+    lambda: fork().upto(1).add(Entry(CORRECTIONS, struct.pack("<f", 1.0), 1, 0)),
 )
-table(
-    "more-shapes",
-    "BAD_CHUNK_TABLE",
-    "SHAPES of a level without STEMS",
-    lambda: fork().add(Entry(rules.SHAPES, b"", 0, 0)),
-)
-table(
-    "shapes-of-segment-1",
-    "BAD_CHUNK_TABLE",
-    "SHAPES stands with segment 0",
-    lambda: fork().add(Entry(rules.SHAPES, b"", 1, 1)),
-)
-for kind, item in ((rules.HIERARCHY, "open"), (rules.REST, "open"), (rules.TIME, "open")):
+table("more-shapes", "SHAPES of a level without STEMS", lambda: fork().add(Entry(SHAPES, b"", 0, 0)))
+table("shapes-of-segment-1", "SHAPES stands with segment 0", lambda: fork().add(Entry(SHAPES, b"", 1, 1)))
+for kind, item in ((HIERARCHY, "open"), (REST, "open"), (TIME, "open")):
     invalid(
         f"damaged-{KIND_NAMES[kind].lower()}",
-        "BAD_CHECKSUM",
-        item,
         f"a bit of {KIND_NAMES[kind]} is flipped",
         lambda kind=kind: flipped(fork().file(), end_of(fork(), kind) - 1),
+        "BAD_CHECKSUM",
+        item,
     )
-for kind, level in ((rules.AFFINES, 0), (rules.STEMS, 1), (rules.SHAPES, 1), (rules.CORRECTIONS, 2)):
+for kind, level in ((AFFINES, 0), (STEMS, 1), (SHAPES, 1), (CORRECTIONS, 2)):
     invalid(
         f"damaged-{KIND_NAMES[kind].lower()}",
-        "BAD_CHECKSUM",
-        level,
         f"a bit of {KIND_NAMES[kind]} is flipped",
         lambda kind=kind, level=level: flipped(fork().file(), end_of(fork(), kind, level) - 1),
+        "BAD_CHECKSUM",
+        level,
     )
 invalid(
     "damaged-metadata",
+    "a bit of METADATA is flipped; the motion plays",
+    lambda: metadata("{}").change(METADATA, checksum=0),
     "BAD_CHECKSUM",
     "static",
-    "a bit of METADATA is flipped; the motion plays",
-    lambda: metadata("{}").change(rules.METADATA, checksum=0),
 )
 invalid(
     "damaged-attribute",
+    "a bit of an attribute is flipped; the motion plays",
+    lambda: attributes(element("|u1", b"1")).change(ATTRIBUTE, checksum=0),
     "BAD_CHECKSUM",
     "static",
-    "a bit of an attribute is flipped; the motion plays",
-    lambda: attributes(element("|u1", b"1")).change(rules.ATTRIBUTE, checksum=0),
 )
 invalid(
     "damaged-before-table",
-    "BAD_CHECKSUM",
-    "open",
     "HIERARCHY is damaged and STEMS is missing: HIERARCHY comes first",
-    lambda: fork().without(rules.STEMS, 2, 1).change(rules.HIERARCHY, checksum=0),
+    lambda: fork().without(STEMS, 2, 1).change(HIERARCHY, checksum=0),
+    "BAD_CHECKSUM",
 )
 invalid(
     "table-before-rest",
-    "BAD_CHUNK_TABLE",
-    "open",
     "STEMS is missing and REST is damaged: the table comes first",
-    lambda: fork().without(rules.STEMS, 2, 1).change(rules.REST, checksum=0),
+    lambda: fork().without(STEMS, 2, 1).change(REST, checksum=0),
+    "BAD_CHUNK_TABLE",
 )
 RADIUS = numbers(np.arange(5.0), name="radius")
 
@@ -281,34 +212,31 @@ def segments_of_tables() -> Draft:
 
 table(
     "one-chunk",
-    "BAD_CHUNK_TABLE",
     "Chunk_Count 1 is allowed, but chunks are missing",
     lambda: replace(lone().draft(), entries=lone().draft().entries[:1]),
 )
 table(
     "longest-and-order",
-    "BAD_CHUNK_TABLE",
     "as many segments and chunks as Max_Table_Bytes allows, of which the first two are the wrong way round",
     segments_of_tables,
 )
 table(
     "repeatable-order",
-    "BAD_CHUNK_TABLE",
     "an attribute behind a chunk whose number is larger",
-    lambda: not_refused(lambda: fork().add(Entry(0x8040, FUTURE), Entry(rules.ATTRIBUTE, RADIUS), sort=False)),
+    lambda: not_refused(lambda: fork().add(Entry(0x8040, FUTURE), Entry(ATTRIBUTE, RADIUS), sort=False)),
 )
 invalid(
     "table-longest-chunk",
-    "TRUNCATED",
-    "strict",
     "a last chunk of 2^28 bytes is allowed, but has not arrived",
     lambda: fork().add(Entry(0x8040, FUTURE, length=1 << 28)),
+    "TRUNCATED",
+    "strict",
 )
 valid(
     "unknown-optional-numbers",
     "chunks whose Kind is written out behind the numbers 17 to 31, which all say that it is",
     lambda: fork().add(
-        Entry(rules.METADATA, b"\0{}", number=31),
+        Entry(METADATA, b"\0{}", number=31),
         Entry(0x8009, FUTURE, number=17),
         Entry(0x800F, b"", number=30),
         Entry(0x8018, FUTURE, 0, 1, number=24),

@@ -33,59 +33,52 @@ def steady(first: float, step: float, method: int = 0) -> Callable[[], bytes]:
     return lambda: steady_time(first, step, method)
 
 
-prelude("empty", rules.TIME, "no bytes", b"")
-prelude("method-5", rules.TIME, "Method 5", lambda: whole_rates(1, method=5))
+prelude("empty", TIME, "no bytes", b"")
+prelude("method-5", TIME, "Method 5", lambda: whole_rates(1, method=5))
 for method in (3, 4):
     prelude(
-        f"whole-{method}-0",
-        rules.TIME,
-        f"Rate 0 of Method {method}",
-        lambda method=method: whole_rates(0, method=method),
+        f"whole-{method}-0", TIME, f"Rate 0 of Method {method}", lambda method=method: whole_rates(0, method=method)
     )
-prelude("whole-short", rules.TIME, "half of Rate", lambda: whole_rates(2)[:2])
-prelude("whole-long", rules.TIME, "two Rates of one clip", lambda: whole_rates(2, 2))
-prelude("short", rules.TIME, "First and half of Step", lambda: steady_time()[:13])
-prelude("long", rules.TIME, "a byte behind Step", lambda: steady_time() + b"\0")
+prelude("whole-short", TIME, "half of Rate", lambda: whole_rates(2)[:2])
+prelude("whole-long", TIME, "two Rates of one clip", lambda: whole_rates(2, 2))
+prelude("short", TIME, "First and half of Step", lambda: steady_time()[:13])
+prelude("long", TIME, "a byte behind Step", lambda: steady_time() + b"\0")
 for what, value in (("zero", 0.0), ("negative", -1.0), ("nan", NAN), ("infinite", INFINITY)):
-    prelude(f"step-{what}", rules.TIME, f"Step is {value}", steady(0.0, value))
-    prelude(f"rate-{what}", rules.TIME, f"Step of Method 1 is {value}", steady(0.0, value, 1))
-prelude("first-nan", rules.TIME, "First is NaN", steady(NAN, 1.0))
-prelude("first-infinite", rules.TIME, "First is infinite", steady(-INFINITY, 1.0))
-prelude("stands-still", rules.TIME, "Step vanishes beside First", steady(1e30, 1.0))
-prelude("overflows", rules.TIME, "times beyond binary64", steady(0.0, HIGHEST))
-prelude("rate-overflows", rules.TIME, "a rate so low that times are infinite", steady(0.0, TINY, 1))
-prelude("equal", rules.TIME, "a time twice", lambda: uneven_time(0.0, 1.0, 1.0, 2.0))
-prelude("descends", rules.TIME, "a time before the one before", lambda: uneven_time(0.0, 1.0, 2.0, 1.5))
-prelude("zeros", rules.TIME, "-0.0 is not before 0.0", lambda: uneven_time(-0.0, 0.0, 1.0, 2.0))
+    prelude(f"step-{what}", TIME, f"Step is {value}", steady(0.0, value))
+    prelude(f"rate-{what}", TIME, f"Step of Method 1 is {value}", steady(0.0, value, 1))
+prelude("first-nan", TIME, "First is NaN", steady(NAN, 1.0))
+prelude("first-infinite", TIME, "First is infinite", steady(-INFINITY, 1.0))
+prelude("stands-still", TIME, "Step vanishes beside First", steady(1e30, 1.0))
+prelude("overflows", TIME, "times beyond binary64", steady(0.0, HIGHEST))
+prelude("rate-overflows", TIME, "a rate so low that times are infinite", steady(0.0, TINY, 1))
+prelude("equal", TIME, "a time twice", lambda: uneven_time(0.0, 1.0, 1.0, 2.0))
+prelude("descends", TIME, "a time before the one before", lambda: uneven_time(0.0, 1.0, 2.0, 1.5))
+prelude("zeros", TIME, "-0.0 is not before 0.0", lambda: uneven_time(-0.0, 0.0, 1.0, 2.0))
 prelude(
     "infinite",
-    rules.TIME,
+    TIME,
     "an infinite time at the end",
     lambda: uneven_time(
         0.0, 1.0, 2.0, (rules.ordered(0x7FF << 52, 64) - rules.ordered(rules.to_bits(3.0, 64), 64), False)
     ),
 )
-prelude("zero-behind", rules.TIME, "a zero byte behind the stream", lambda: uneven_time(0.0, 1.0, 2.5, 3.0) + b"\0")
-prelude("bytes-behind", rules.TIME, "bytes behind the stream", lambda: uneven_time(0.0, 1.0, 2.5, 3.0) + b"\1" * 12)
+prelude("zero-behind", TIME, "a zero byte behind the stream", lambda: uneven_time(0.0, 1.0, 2.5, 3.0) + b"\0")
+prelude("bytes-behind", TIME, "bytes behind the stream", lambda: uneven_time(0.0, 1.0, 2.5, 3.0) + b"\1" * 12)
 invalid(
     "time-code-outside",
-    "BAD_CHUNK",
-    "open",
     "a stream whose code is outside the final interval",
-    lambda: lone().draft().change(rules.TIME, content=b"\2" + b"\xff" * 8),
+    lambda: lone().draft().change(TIME, content=b"\2" + b"\xff" * 8),
 )
 invalid(
     "time-of-one-infinite",
-    "BAD_CHUNK",
-    "open",
     "First of a single frame is infinite",
-    lambda: lone().draft().change(rules.TIME, content=steady_time(INFINITY)),
+    lambda: lone().draft().change(TIME, content=steady_time(INFINITY)),
 )
 
 
 def clip_times(name: str, reason: str, make: Callable[[], bytes]) -> None:
     """TIME of the two clips."""
-    invalid(f"time-{name}", "BAD_CHUNK", "open", reason, lambda: two_clips().change(rules.TIME, content=make()))
+    invalid(f"time-{name}", reason, lambda: two_clips().change(TIME, content=make()))
 
 
 STEADY = (0.0, 0.25)
@@ -96,10 +89,8 @@ clip_times(
 clip_times("without-last-step", "First of the second clip without its Step", lambda: steady_times(STEADY, STEADY)[:-8])
 invalid(
     "time-of-two-clips",
-    "BAD_CHUNK",
-    "open",
     "First and Step of two clips where one is",
-    lambda: lone().draft().change(rules.TIME, content=steady_times(STEADY, STEADY)),
+    lambda: lone().draft().change(TIME, content=steady_times(STEADY, STEADY)),
 )
 for what, value in (("zero", 0.0), ("negative", -1.0), ("nan", NAN), ("infinite", INFINITY)):
     clip_times(

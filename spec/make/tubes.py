@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from spec.document import rules
 from spec.make.base import *
 
 RIGID = [replace(stem, rigid=q % 4, detail=q % 3 * 120) for q, stem in enumerate(MIXED)]
@@ -75,7 +74,7 @@ def of_any_size(*powers: int) -> Plant:
         is_float64=True,
         rest=exact_rest(stems, [x for point in of_sizes(*powers) for x in point], True),
         heads={level: stems_head(1e38, 3 << 4 | 2) for level in range(3)},
-        scripts={(rules.STEMS, 1): [*row() * 4, *(value for each in turned for value in each)]},
+        scripts={(STEMS, 1): [*row() * 4, *(value for each in turned for value in each)]},
     )
 
 

@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 
 from spec import real_size
-from spec.document import rules
 from spec.make.base import *
 from spec.make.bases import basis_by_chance
 from spec.make.clips import loop
@@ -57,12 +56,12 @@ def everything() -> Draft:
         is_float64=True,
         layers=2,
         heads=HEADS | bases | {5: stems_head(0.01, 2)},
-        scripts={(rules.STEMS, level): lambda level=level: Chance(72 + level) for level in range(6)}
-        | {(rules.AFFINES, level): lambda level=level: Chance(80 + level, large=3) for level in range(5)}
-        | {(rules.CORRECTIONS, level): lambda level=level: Chance(86 + level) for level in (4, 5)}
-        | {(rules.REFINED_REST, 5, 0): lambda: Chance(92, large=4)}
+        scripts={(STEMS, level): lambda level=level: Chance(72 + level) for level in range(6)}
+        | {(AFFINES, level): lambda level=level: Chance(80 + level, large=3) for level in range(5)}
+        | {(CORRECTIONS, level): lambda level=level: Chance(86 + level) for level in (4, 5)}
+        | {(REFINED_REST, 5, 0): lambda: Chance(92, large=4)}
         | {
-            (rules.SHAPES, 1, 0): [
+            (SHAPES, 1, 0): [
                 2,
                 *row((1, 2, -3), (0, 0, 9)),
                 *row((5, 0, 0)),
@@ -73,23 +72,23 @@ def everything() -> Draft:
                 9,
                 *(n for i in range(9) for n in row((i, 1, -i), (0, 2, 0))),
             ],
-            (rules.SHAPES, 2, 0): [1, *row((0, 1, 0)), 0, 2, *row((1, 0, 0), (0, 0, 1)), *row((0, 0, 8))],
-            (rules.SHAPES, 5, 0): [2, *refined_row((0, -1, 0)), *refined_row((3, 0, 0), (0, 0, -1))],
+            (SHAPES, 2, 0): [1, *row((0, 1, 0)), 0, 2, *row((1, 0, 0), (0, 0, 1)), *row((0, 0, 8))],
+            (SHAPES, 5, 0): [2, *refined_row((0, -1, 0)), *refined_row((3, 0, 0), (0, 0, -1))],
         },
     )
     return (
         plant.draft()
         .with_header(level_count=7, full_level_count=7)
         .add(
-            Entry(rules.EXACT, b"", 6, 0),
-            Entry(rules.EXACT, b"", 6, 1),
-            Entry(rules.METADATA, b"\1" + WIND_FRAME),
-            Entry(rules.FACES, polygons(FACES_3)),
-            Entry(rules.EDGES, derived("<i2")),
+            Entry(EXACT, b"", 6, 0),
+            Entry(EXACT, b"", 6, 1),
+            Entry(METADATA, b"\1" + WIND_FRAME),
+            Entry(FACES, polygons(FACES_3)),
+            Entry(EDGES, derived("<i2")),
             Entry(0x8009, FUTURE),
             Entry(0x8018, FUTURE, 1, 1),
-            Entry(rules.ATTRIBUTE, numbers(np.arange(6.0).reshape(2, 3), name="b")),
-            Entry(rules.ATTRIBUTE, element("|S3", b"oak", "a")),
+            Entry(ATTRIBUTE, numbers(np.arange(6.0).reshape(2, 3), name="b")),
+            Entry(ATTRIBUTE, element("|S3", b"oak", "a")),
             Entry(0x8040, FUTURE),
         )
     )

@@ -123,11 +123,10 @@ static int decode_coarse_pose(void *model, ath_bytes body, const ath_branch *bra
     size_t numbers = 3 * (size_t)vertices;
     int32_t *steps = integers(numbers), *finer_steps = integers(numbers);
     double *finer = fuzz_memory(numbers * sizeof *finer, 0xa5);
-    int result =
-        ath_decode_rest(model, body.bytes, body.size, branches, count, step, mesh, NULL, NULL, steps, rest);
+    int result = ath_decode_rest(model, body.bytes, body.size, branches, count, step, mesh, NULL, NULL, steps, rest);
     if (result == ATH_OK && all_finite(rest, numbers))
-        ath_decode_rest(model, body.bytes, body.size, branches, count, step / 8.0, mesh, steps, rest,
-                        finer_steps, finer);
+        ath_decode_rest(model, body.bytes, body.size, branches, count, step / 8.0, mesh, steps, rest, finer_steps,
+                        finer);
     free(finer);
     free(finer_steps);
     free(steps);
@@ -175,8 +174,7 @@ static int decode_pose(void *model, ath_bytes body, const ath_branch *branches, 
     if (exact)
         result = ath_decode_exact_rest(model, body.bytes, body.size, branches, count, connected, is_float64, rest);
     else
-        result = decode_coarse_pose(model, body, branches, count, step_from(head + 6), connected,
-                                    vertices, rest);
+        result = decode_coarse_pose(model, body, branches, count, step_from(head + 6), connected, vertices, rest);
     free(arena.base);
     return result;
 }
