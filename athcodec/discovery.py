@@ -214,7 +214,8 @@ def save(found: Found, path: str | os.PathLike[str]) -> None:
     ----------
     found : Found
     path : str or path
-        The file: of each branch its parent, and its vertices from base to tip as runs, "0-5 9".
+        The file: of each branch its parent, and its vertices from base to tip as runs, "0-5 9". Older JSON is replaced,
+        no other file.
 
     Raises
     ------

@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from athcodec.atomic_files import FileId
 from athcodec.clip import ClipRange, MotionClip, check_clip_ranges, clip_range_frames
 from athcodec.errors import ClipError
 from athcodec.frames import Frames
@@ -68,7 +69,7 @@ def join(clips: Mapping[str, MotionClip]) -> MotionClip:
         stem_index=first.stem_index,
         clip_ranges=clip_ranges,
         resource=closing,
-        unchanged=_all_unchanged(parts),
+        unchanged=_AllUnchanged(parts),
         skin=first.skin,
         not_read=first.not_read,
     )
@@ -257,9 +258,15 @@ def _common_metadata(clips: Mapping[str, MotionClip]) -> dict[str, Any]:
     return common | {OWN: own} if own else common
 
 
-def _all_unchanged(clips: Sequence[MotionClip]) -> Any:
-    checks = [clip.unchanged for clip in clips if clip.unchanged is not None]
-    return (lambda: all(check() for check in checks)) if checks else None
+class _AllUnchanged:
+    """Whether the files of several clips are as they were."""
+
+    def __init__(self, clips: Sequence[MotionClip]):
+        self._checks = [clip.unchanged for clip in clips if clip.unchanged is not None]
+        self.files = frozenset[FileId]().union(*(clip.inputs for clip in clips))
+
+    def __call__(self) -> bool:
+        return all(check() for check in self._checks)
 
 
 def _joined(parts: Sequence[Any]) -> Frames:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from athcodec import container as ct
 from athcodec.ath_file import AthFile
-from athcodec.atomic_files import new_file
+from athcodec.atomic_files import check_target, keeping, new_file
 from athcodec.errors import ClipError, LevelUnavailable, Truncated
 
 
@@ -62,7 +62,8 @@ def truncate(
     """
     if sum(option is not None for option in (level, max_error, target_size)) != 1:
         raise TypeError("truncate: expected one of level, max_error and target_size")
-    with AthFile(source, gltf_motion=gltf_motion) as file:
+    with AthFile(source, gltf_motion=gltf_motion) as file, keeping(file.inputs):
+        check_target(target, ".glb" if Path(target).suffix.lower() == ".glb" else ".ath")
         if max_error is not None:
             last = file.level_within(max_error)
         elif target_size is not None:

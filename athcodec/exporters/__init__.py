@@ -14,7 +14,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from athcodec.atomic_files import check_target
+from athcodec.atomic_files import check_target, keeping
 from athcodec.errors import ClipError
 from athcodec.sources import Format, format_by_suffix, format_named
 
@@ -125,7 +125,8 @@ def write(
     motion : MotionClip or ClipView
         A clip, or frames of an .ath file at some level.
     path : str or path
-        The file to write; formats of one file per frame number their files by it.
+        The file to write; formats of one file per frame number their files by it. An older file of the same kind, or
+        an empty one, is replaced, unless `motion` reads it.
     format : str, optional
         Name of one of `athcodec.exporters.FORMATS`; known by the suffix by default.
     progress : callable, optional
@@ -160,10 +161,11 @@ def write(
         raise ClipError(f"nanite: got {kind.name}, expected usd")
     if wanted.rig is None:
         _check_clips(motion, kind)
-    check_target(path)
     report = progress or (lambda stage, fraction: None)
-    module = importlib.import_module(kind.module)
-    facts = dict(module.write_clip(motion, path, wanted, lambda done: report("export", done)) or {})
+    with keeping(getattr(motion, "inputs", ())):
+        check_target(path, kind.suffixes[0])
+        module = importlib.import_module(kind.module)
+        facts = dict(module.write_clip(motion, path, wanted, lambda done: report("export", done)) or {})
     names = facts.pop(FILES, [Path(path).name])
     return Written(tuple(Path(path).with_name(name) for name in names), facts)
 
