@@ -39,6 +39,7 @@ from athcodec.errors import (
 from athcodec.hierarchy import Hierarchy, derived_edges
 from athcodec.host_mesh import HostMesh, mesh_positions
 from athcodec.joining import HEADING, STRENGTH, metadata_of, wind_of
+from athcodec.options import whole
 from athcodec.plain_files import open_plain
 from athcodec.polygons import Polygons
 from athcodec.threads import ThreadPool, default_jobs
@@ -480,7 +481,7 @@ class AthFile:
         level : int
             0 is the coarsest.
         """
-        return level < self._first_lacking
+        return whole("level", level) < self._first_lacking
 
     @cached_property
     def _first_lacking(self) -> int:

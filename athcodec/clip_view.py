@@ -15,6 +15,7 @@ from athcodec.atomic_files import FileId
 from athcodec.clip import ClipRange, clip_range_frames, polygons
 from athcodec.decoder import Affines, Decoder
 from athcodec.errors import LevelUnavailable
+from athcodec.options import whole
 
 
 class ClipView:
@@ -45,7 +46,7 @@ class ClipView:
         self, decoder: Decoder, level: int | None = None, frames: range | None = None, *, all_clips: bool = False
     ):
         self.decoder = decoder
-        self.level = decoder.deepest if level is None else level
+        self.level = decoder.deepest if level is None else whole("level", level)
         if not 0 <= self.level < decoder.level_count:
             raise LevelUnavailable(f"level: got {level}; expected 0 to {decoder.level_count - 1}")
         played = [decoder.play(clip.name) for clip in decoder.clips] if all_clips else [decoder]

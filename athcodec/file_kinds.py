@@ -42,8 +42,11 @@ def kind_by_suffix(suffix: str) -> str | None:
 
 def kind_of(path: str | os.PathLike[str]) -> str:
     """The kind of a file by its content; TEXT for other text, UNKNOWN for anything else. Raises ClipError, OSError."""
-    with open_plain(path) as file:
-        head, length = file.read(HEAD_BYTES), os.fstat(file.fileno()).st_size
+    try:
+        with open_plain(path) as file:
+            head, length = file.read(HEAD_BYTES), os.fstat(file.fileno()).st_size
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, os.fspath(path)) from None
     found = next((kind for kind, pattern in _PATTERNS.items() if pattern.match(head)), None)
     if found is None and len(head) >= _MDD_HEADER.size:
         frames, vertices = _MDD_HEADER.unpack_from(head)

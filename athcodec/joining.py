@@ -19,6 +19,7 @@ from athcodec.atomic_files import FileId
 from athcodec.clip import ClipRange, MotionClip, check_clip_ranges, clip_range_frames
 from athcodec.errors import ClipError
 from athcodec.frames import Frames
+from athcodec.options import whole
 
 BLEND = "loop_blend"  # metadata: frames that were blended
 OWN = "clips"  # metadata: by name, what one of several clips has of its own
@@ -171,7 +172,7 @@ def looped(clip: MotionClip, blend: int = 0) -> MotionClip:
         Where the clip is several clips, or has too few frames to blend.
     """
     clip_range = _only_clip_range("", clip)
-    if not 0 <= blend <= clip.frame_count // 3:
+    if not 0 <= whole("blend", blend) <= clip.frame_count // 3:
         raise ClipError(
             f"loop: got {blend} frames to blend, expected 0 to {clip.frame_count // 3}, a third of the clip"
         )

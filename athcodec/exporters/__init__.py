@@ -16,6 +16,7 @@ from typing import Any
 
 from athcodec.atomic_files import check_target, keeping
 from athcodec.errors import ClipError
+from athcodec.options import whole
 from athcodec.sources import Format, format_by_suffix, format_named
 
 Report = Callable[[str, float], None]
@@ -60,7 +61,7 @@ class WriteOptions:
     nanite: bool = False
 
     def __post_init__(self) -> None:
-        if self.rig is not None and not 1 <= self.rig <= MOST_RIGGED:
+        if self.rig is not None and not 1 <= whole("rig", self.rig) <= MOST_RIGGED:
             raise ValueError(f"rig: got {self.rig!r}, expected 1 to {MOST_RIGGED} joints")
         if self.nanite and self.rig is None:
             raise ValueError("nanite: got no rig, expected one too")
