@@ -12,7 +12,7 @@ from pathlib import Path
 from urllib.parse import quote
 
 from athcodec import picture
-from athcodec.atomic_files import file_ids, is_url, keeping, new_file
+from athcodec.atomic_files import check_target, file_ids, is_url, keeping, new_file
 from athcodec.decoder import open as open_ath
 from athcodec.errors import AthError
 from athcodec.view import WEB, file_name
@@ -69,6 +69,8 @@ def export_gallery(paths: Sequence[str | os.PathLike[str]], folder: str | os.Pat
     for part in ("viewer", "plants", *(["stills"] if stills else [])):
         (out / part).mkdir(parents=True, exist_ok=True)
     with keeping(file_ids(*paths)):
+        for target in (out / "index.html", *(out / "plants" / name for name in names)):
+            check_target(target, target.suffix)
         for name in VIEWER:
             _write(out / "viewer" / name, (WEB / name).read_bytes())
         for path, name in zip(paths, names, strict=True):

@@ -19,6 +19,7 @@ from urllib.parse import urlsplit
 
 from athcodec.atomic_files import is_url
 from athcodec.batch.settings import Settings, check_settings, settings_of
+from athcodec.container import MAGIC
 from athcodec.errors import ClipError, MissingExtra, RemoteError
 from athcodec.remote import _one_line, guarded
 from athcodec.shown import without_secrets
@@ -234,8 +235,14 @@ def download(url: str, path: str) -> str:
 
 
 def upload(path: str, url: str) -> dict[str, Any]:
-    """Stores a file, whole; its identity there. Raises RemoteError, OSError."""
+    """Stores an .ath file, whole, in place of one at most; its identity there. Raises RemoteError, OSError."""
     system, target = file_system(url)
+    try:
+        others = system.exists(target) and system.cat_file(target, 0, len(MAGIC)) not in (b"", MAGIC)
+    except Exception as error:
+        raise RemoteError(f"{without_secrets(url)}: {type(error).__name__}: {_one_line(error)}") from None
+    if others:
+        raise RemoteError(f"{without_secrets(url)}: is there already and no .ath file; choose another --out")
     try:
         system.makedirs(system._parent(target), exist_ok=True)
         system.put_file(path, target)

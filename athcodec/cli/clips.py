@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import argparse
-import os
 import shlex
 import warnings
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -337,14 +336,17 @@ def check_name(output: str, suffix: str, inputs: Sequence[str] = ()) -> None:
     several names and is a source like these `inputs`."""
     if output.lower().endswith(suffix):
         return
-    if not inputs or not os.path.exists(output):
+    is_source = False
+    with suppress(ClipError, OSError):
+        is_source = bool(inputs) and find_format(output) is not None
+    if not is_source:
         raise ClipError(f"{output}: got this name for the output, expected one that ends in {suffix}")
     paths = [path for path, _ in each_once([*inputs, output])]
     words = " ".join(map(shlex.quote, paths if len(paths) <= LISTED else [*paths[:2], "...", paths[-1]]))
     raise ClipError(
-        f"{output}: is there already and no {suffix} file, expected the output as the last name or after -o. For one "
-        f"file of all inputs, where numbered files are one: athcodec encode {words} -o OUT{suffix}; for a file of "
-        f"each: athcodec batch {words} --out DIR"
+        f"{output}: is a source, expected an output that ends in {suffix} as the last name or after -o. For one file "
+        f"of all inputs, where numbered files are one: athcodec encode {words} -o OUT{suffix}; for a file of each: "
+        f"athcodec batch {words} --out DIR"
     )
 
 
