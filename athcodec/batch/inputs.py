@@ -238,7 +238,7 @@ def upload(path: str, url: str) -> dict[str, Any]:
     """Stores an .ath file, whole, in place of one at most; its identity there. Raises RemoteError, OSError."""
     system, target = file_system(url)
     try:
-        others = system.exists(target) and system.cat_file(target, 0, len(MAGIC)) not in (b"", MAGIC)
+        others = system.exists(target) and system.cat_file(target, start=0, end=len(MAGIC)) not in (b"", MAGIC)
     except Exception as error:
         raise RemoteError(f"{without_secrets(url)}: {type(error).__name__}: {_one_line(error)}") from None
     if others:

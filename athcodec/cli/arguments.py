@@ -593,8 +593,8 @@ def _view_arguments(verb: argparse.ArgumentParser) -> None:
         "--export",
         metavar="PAGE.html|DIR",
         help="write one page with the file and the viewer inside, in place of an older HTML page alone, and serve "
-        "nothing; or a folder for a web host with a gallery of all FILEs, with still pictures where athcodec[picture] is "
-        "installed",
+        "nothing; or a folder for a web host with a gallery of all FILEs, with still pictures where athcodec[picture] "
+        "is installed",
     )
 
 
