@@ -18,6 +18,7 @@ import numpy as np
 from athcodec._native import address, lib
 from athcodec.algebra import decompose, determinant, length, multiply, principal
 from athcodec.hierarchy import Hierarchy, hierarchy_of
+from athcodec.options import whole
 from athcodec.threads import SERIAL, ThreadPool
 
 if TYPE_CHECKING:
@@ -68,7 +69,7 @@ class Thresholds:
             value = getattr(self, name)
             if not value >= 0:
                 raise ValueError(f"threshold {name}: got {value}, expected a number >= 0")
-            object.__setattr__(self, name, kind(value))
+            object.__setattr__(self, name, float(value) if kind is float else whole(f"threshold {name}", value))
 
 
 class CutPiece(NamedTuple):

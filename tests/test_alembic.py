@@ -224,13 +224,13 @@ def test_broken_files_are_refused_in_one_line(tmp_path, capfd):
 
 
 def test_a_write_that_fails_leaves_what_was_there(tmp_path, sample_clip):
-    (tmp_path / "a.abc").write_bytes(b"old")
+    (tmp_path / "a.abc").write_bytes(b"Ogawa, old")
     broken = sample_clip.block(0, 3).copy()
     broken[2, 5] = np.inf
     clip = athcodec.MotionClip(broken, np.arange(3.0), rest=broken[0])
     with pytest.raises(ClipError, match="frame 2"):
         athcodec.write(clip, tmp_path / "a.abc")
-    assert os.listdir(tmp_path) == ["a.abc"] and (tmp_path / "a.abc").read_bytes() == b"old"
+    assert os.listdir(tmp_path) == ["a.abc"] and (tmp_path / "a.abc").read_bytes() == b"Ogawa, old"
 
 
 # ---- Blender ----

@@ -12,10 +12,12 @@ from plants import chain_plant, clip_of, plant
 import athcodec
 from athcodec import MotionClip
 from athcodec import clip as clip_module
-from athcodec.container import Limits
+from athcodec.container import MAGIC, Limits
 from athcodec.encoding.motion import SegmentMotion
 from athcodec.errors import BoundError, ClipError
 from athcodec.segmentation import decoding_bytes, split_segments
+
+OLDER = MAGIC + b"older"
 
 
 @pytest.fixture
@@ -210,15 +212,15 @@ def test_an_interruption_leaves_the_old_file_and_no_other(stage, error, small, t
             raise error("enough")
 
     target = tmp_path / "s.ath"
-    target.write_bytes(b"older")
+    target.write_bytes(OLDER)
     with pytest.raises(error):
         athcodec.encode(small, target, segment_frames=16, effort="fast", progress=interrupt)
-    assert target.read_bytes() == b"older" and list(tmp_path.iterdir()) == [target]
+    assert target.read_bytes() == OLDER and list(tmp_path.iterdir()) == [target]
 
 
 def test_an_existing_file_is_there_until_the_new_one_is_whole(small, tmp_path):
     target = tmp_path / "s.ath"
-    target.write_bytes(b"older")
+    target.write_bytes(OLDER)
     seen = set()
 
     def look(stage: str, fraction: float) -> None:
@@ -226,7 +228,7 @@ def test_an_existing_file_is_there_until_the_new_one_is_whole(small, tmp_path):
             seen.add(target.read_bytes())
 
     summary = athcodec.encode(small, target, effort="fast", progress=look)
-    assert seen == {b"older"} and list(tmp_path.iterdir()) == [target]
+    assert seen == {OLDER} and list(tmp_path.iterdir()) == [target]
     with athcodec.open(target, strict=True) as decoder:
         decoder.file.check()
         assert decoder.file.file_length == summary.bytes

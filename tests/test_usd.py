@@ -651,13 +651,13 @@ def test_memory_does_not_grow_with_the_number_of_frames(tmp_path):
 
 
 def test_an_export_that_fails_leaves_what_was_there(tmp_path, sample_clip):
-    (tmp_path / "a.usdc").write_bytes(b"old")
+    (tmp_path / "a.usdc").write_bytes(b"PXR-USDC, old")
     broken = Frames(lambda start, stop: np.full((stop - start, 4, 3), np.inf if start else 1, np.float32), 9, 4)
     clip = MotionClip(broken, np.arange(9.0), rest=np.zeros((4, 3)))
     clip._block_length = lambda most: 3
     with pytest.raises(ClipError, match="frame 3"):
         athcodec.write(clip, tmp_path / "a.usdc")
-    assert os.listdir(tmp_path) == ["a.usdc"] and (tmp_path / "a.usdc").read_bytes() == b"old"
+    assert os.listdir(tmp_path) == ["a.usdc"] and (tmp_path / "a.usdc").read_bytes() == b"PXR-USDC, old"
 
 
 # ---- broken files ----

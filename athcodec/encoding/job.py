@@ -49,7 +49,7 @@ from athcodec.encoding.shape import RestPrecision
 from athcodec.encoding.summary import Seam, Summary
 from athcodec.errors import BoundError, ClipError
 from athcodec.hierarchy import Hierarchy, derived_edges, hierarchy_of
-from athcodec.options import DEFAULT_LADDER, EFFORTS, MAX_SEGMENT, MIN_SEGMENT, ladder_of
+from athcodec.options import DEFAULT_LADDER, EFFORTS, MAX_SEGMENT, MIN_SEGMENT, ladder_of, whole
 from athcodec.polygons import POLYGON_ARRAYS, Polygons, type_code
 from athcodec.threads import ThreadPool, default_jobs
 from athcodec.units import Length
@@ -95,6 +95,9 @@ class EncodingOptions:
         return cls(ladder=ladder_of(ladder), rest_precision=RestPrecision.of(rest_error), **options)
 
     def __post_init__(self) -> None:
+        for name in ("segment_frames", "jobs"):
+            if getattr(self, name) is not None:
+                whole(name, getattr(self, name))
         if self.segment_frames is not None and not MIN_SEGMENT <= self.segment_frames <= MAX_SEGMENT:
             raise ValueError(f"segment_frames: got {self.segment_frames}; expected {MIN_SEGMENT} to {MAX_SEGMENT}")
         if self.exact_rest and self.host_rest:
