@@ -579,9 +579,9 @@ class Search:
         )
 
     def _try(self, settings: Settings) -> tuple[float, np.ndarray]:
-        prelude = self.prelude(settings)
-        learned_modes = self.learned_modes(prelude.plan, settings)
         try:
+            prelude = self.prelude(settings)
+            learned_modes = self.learned_modes(prelude.plan, settings)
             levels = sum(self._level_bytes(prelude, settings, learned_modes, i) for i in range(len(self.samples)))
         except BoundError:
             return math.inf, np.full(self.levels, math.inf)
@@ -721,8 +721,9 @@ class Search:
     def _costs(self, candidates: list[Settings]) -> list[tuple[float, np.ndarray]]:
         some = {self._prelude_key(settings): settings for settings in candidates}  # by prelude, each to be made once
         with ThreadPoolExecutor(thread_count(self.jobs, self.source)) as pool:
-            list(pool.map(self.prelude, some.values()))
-            for settings in candidates:  # one after the other: what the first one sees serves all like it
+            list(pool.map(self._make_prelude, some.values()))
+            # One after the other, because what the first one sees serves all like it.
+            for settings in filter(self._make_prelude, candidates):
                 if any(settings.learned_bases):
                     self._learn_time(settings)
                 if settings.learned_pieces is not None:
@@ -741,6 +742,14 @@ class Search:
         while len(self._preludes) > PRELUDES_KEPT:
             self._preludes.pop(next(iter(self._preludes)))
         return prelude
+
+    def _make_prelude(self, settings: Settings) -> bool:
+        """Whether there is a prelude that keeps the bound; it is there for later calls."""
+        try:
+            self.prelude(settings)
+        except BoundError:
+            return False
+        return True
 
     def _prelude_key(self, settings: Settings) -> tuple:
         return (
