@@ -582,7 +582,8 @@ class EncodingJob:
 
         def predict(taken: tuple[int, list[np.ndarray]]) -> CodedSegment:
             positions, exact = self._positions(taken[1].pop())  # not held any longer
-            chunks, errors = code_predicted_segment(decided.prelude, decided.choice, positions, exact)
+            shown_times = source.shown_times(taken[0])
+            chunks, errors = code_predicted_segment(decided.prelude, decided.choice, positions, exact, shown_times)
             return CodedSegment(taken[0], chunks, errors, np.zeros(len(errors), int))
 
         def code(taken: tuple[int, list[np.ndarray]]) -> tuple[int, CodedMotion, list[End | None]]:
@@ -606,8 +607,8 @@ class EncodingJob:
 
     def _motion(self, decided: _Decided, index: int, positions: np.ndarray, exact: np.ndarray | None) -> CodedMotion:
         layers = decided.layers.of_segment(decided.source.is_whole_loop(index))
-        goes_on = decided.source.goes_on(index)
-        return CodedMotion(decided.prelude, layers, self.segment_count, positions, exact, goes_on)
+        goes_on, shown_times = decided.source.goes_on(index), decided.source.shown_times(index)
+        return CodedMotion(decided.prelude, layers, self.segment_count, positions, exact, goes_on, shown_times)
 
     @staticmethod
     def _with_those_before(source: Source, segments: Sequence[int]) -> Iterator[int]:

@@ -304,7 +304,9 @@ class _SegmentCoder:
         positions: np.ndarray,
         goes_on: bool,
         keeps_last: bool,
+        shown_times: np.ndarray,
     ):
+        self._shown_times = shown_times
         self._output, self._origin, self.positions = prelude.output, prelude.origin, positions
         self._pool, self._layered = prelude.plan.pool, len(layers.each) > 1
         self._level_0 = layers.level_0
@@ -516,7 +518,7 @@ class _SegmentCoder:
         return shown.pose(level, *self._output)
 
     def error(self, decoded: np.ndarray) -> tuple[float, ...]:
-        return position_errors(decoded, self.positions, self._origin, self._pool)
+        return position_errors(decoded, self.positions, self._origin, self._pool, self._shown_times)
 
 
 class _EvenLevels:
@@ -577,7 +579,7 @@ class CodedMotion:
     """The motion of one segment in layers, all but how it goes on from the segment before it.
 
     layers: with the settings of the segment (see Layers.of_segment). exact: the source's own numbers (see
-    Source.exact), which one more level is to give. goes_on: in the segment behind it.
+    Source.exact), which one more level is to give. goes_on: in the segment behind it. shown_times: as Source has them.
     """
 
     def __init__(
@@ -586,10 +588,11 @@ class CodedMotion:
         layers: Layers,
         segment_count: int,
         positions: np.ndarray,
-        exact: np.ndarray | None = None,
-        goes_on: bool = False,
+        exact: np.ndarray | None,
+        goes_on: bool,
+        shown_times: np.ndarray,
     ):
-        coder = _SegmentCoder(prelude, layers, segment_count, positions, goes_on, exact is not None)
+        coder = _SegmentCoder(prelude, layers, segment_count, positions, goes_on, exact is not None, shown_times)
         self._coder: _SegmentCoder | None = coder
         self._exact, self._largest_bound = exact, layers.each[-1].settings.largest_bound
         segment = coder.first(layers.each[0])

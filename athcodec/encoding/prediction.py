@@ -206,15 +206,16 @@ def _predicted(prelude: CodedPrelude, choice: Choice, positions: np.ndarray) -> 
 
 
 def code_predicted_segment(
-    prelude: CodedPrelude, choice: Choice, positions: np.ndarray, exact: np.ndarray | None = None
+    prelude: CodedPrelude, choice: Choice, positions: np.ndarray, exact: np.ndarray | None, shown_times: np.ndarray
 ) -> tuple[dict[tuple[int, int], bytes], np.ndarray]:
-    """Chunks and errors as CodedMotion.joined_to gives them; predicted motion is not joined."""
+    """Chunks and errors as CodedMotion.joined_to gives them; predicted motion is not joined. shown_times: as Source has
+    them."""
     assert choice.predicted is not None
     plan, settings = prelude.plan, choice.settings
     payload, decoded = _predicted(prelude, choice, positions)
 
     def error(shown: np.ndarray) -> tuple[float, ...]:
-        return position_errors(shown, positions, prelude.origin, plan.pool)
+        return position_errors(shown, positions, prelude.origin, plan.pool, shown_times)
 
     last = plan.level_count - 1
     chunks, level_0 = {(last, ct.PREDICTED): payload}, _still(prelude, positions.shape[2])

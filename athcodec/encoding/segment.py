@@ -228,6 +228,11 @@ class Source:
         """Coded frames of a segment, T."""
         return int((~self.repeats[slice(*self.segments[segment])]).sum())
 
+    def shown_times(self, segment: int) -> np.ndarray:
+        """(T,) int32: how many frames of the clip show each coded frame of a segment."""
+        repeats = self.repeats[slice(*self.segments[segment])]
+        return np.diff(np.append(np.flatnonzero(~repeats), len(repeats))).astype(np.int32)
+
     def block(self, segment: int) -> np.ndarray:
         """(T, N, 3) positions of a segment as the clip has them, of the frames that are coded."""
         block, repeats = self.clip.block(*self.segments[segment]), self.repeats[slice(*self.segments[segment])]
