@@ -13,6 +13,7 @@ from ctypes import POINTER, c_char_p, c_double, c_int, c_int32, c_int64, c_size_
 import numpy as np
 
 from athcodec._library import load_library
+from athcodec.errors import BoundError
 from athcodec.options import MAX_SEGMENT
 
 PIECE_VERTICES = 64
@@ -378,5 +379,7 @@ def encode_stream(function_name: str, capacity: int, *arguments, model: np.ndarr
         if size >= 0:
             return buffer[:size].tobytes()
         if size < -1:
-            raise ValueError(f"{function_name}: got integers that the stream cannot hold")
+            raise BoundError(
+                f"{function_name}: got integers that the stream cannot hold; expected a larger error bound"
+            )
         capacity *= 4
