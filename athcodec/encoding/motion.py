@@ -469,10 +469,16 @@ def gather(block: np.ndarray, vertex_source: np.ndarray, origin: np.ndarray, poo
 
 
 def position_errors(
-    positions: np.ndarray, source: np.ndarray, origin: np.ndarray, pool: ThreadPool, shown: np.ndarray | None = None
+    positions: np.ndarray,
+    source: np.ndarray,
+    origin: np.ndarray,
+    pool: ThreadPool,
+    shown: np.ndarray | None = None,
+    rounding: float = 0.0,
 ) -> tuple[float, float, float]:
     """Distance of decoded positions from the source by each of MEASURES, the second rounded up as files store it.
-    shown: how many frames of the clip show each frame, (T,) int32; None: one."""
+    shown: how many frames of the clip show each frame, (T,) int32; None: one. rounding: what a decoder may be further
+    off than the positions are."""
     vertices, _, frames = positions.shape
     shown = np.ones(frames, np.int32) if shown is None else shown
 
@@ -486,6 +492,7 @@ def position_errors(
             address(part, part.dtype, 0),
             address(source[start:stop], np.float64, part.size),
             address(origin, np.float64, 3),
+            rounding,
             result[:1].ctypes.data,
             result[1:].ctypes.data,
             histogram.ctypes.data,
@@ -497,4 +504,4 @@ def position_errors(
     count = vertices * int(shown.sum())
     within = np.cumsum(np.sum(histograms, axis=0, dtype=np.int64))
     p99 = int(np.searchsorted(within, count - count // 100))
-    return float(largest.max()), from_short_float(p99), math.sqrt(float(sum(squares)) / count)
+    return float(largest.max()) + rounding, from_short_float(p99), math.sqrt(float(sum(squares)) / count) + rounding
