@@ -93,7 +93,7 @@ def test_what_stands_in_front_of_the_chunks_of_a_small_file_is_small(ladder, mos
 )
 def test_a_bound_finer_than_the_sources_numbers_is_refused_with_the_least_possible(dtype, offset, bound, tmp_path):
     clip = plant(seed=1, branches=3, frames=16, dtype=dtype, offset=offset)
-    with pytest.raises(BoundError, match=rf"expected more than .* spacing of the source's {np.dtype(dtype).name}"):
+    with pytest.raises(BoundError, match=rf"expected at least .* spacing of the source's {np.dtype(dtype).name}"):
         athcodec.encode(clip, tmp_path / "s.ath", max_error=bound, effort="fast")
     assert not list(tmp_path.iterdir())
 
