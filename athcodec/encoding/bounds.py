@@ -12,7 +12,7 @@ from athcodec.errors import BoundError
 from athcodec.options import DEFAULT_REL_ERROR, LOSSLESS_REL_ERROR
 
 GUESSED_SIZES = 16  # Files whose bounds are guessed from the sizes of those before; later bounds halve what is left.
-SIZE_ROUNDS = GUESSED_SIZES + 12  # Files that are coded at most: as many halvings end within 1.01 from any start.
+SIZE_ROUNDS = GUESSED_SIZES + 14  # Files that are coded at most. As many halvings end within 1.01 of any size of clips.
 
 
 @dataclass(frozen=True)
