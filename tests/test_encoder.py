@@ -13,7 +13,10 @@ import athcodec
 from athcodec import MotionClip
 from athcodec import clip as clip_module
 from athcodec.container import MAGIC, Limits
+from athcodec.encoding import job
+from athcodec.encoding.bounds import BoundOption
 from athcodec.encoding.motion import SegmentMotion
+from athcodec.encoding.progress import silent
 from athcodec.errors import BoundError, ClipError
 from athcodec.segmentation import decoding_bytes, split_segments
 
@@ -48,6 +51,20 @@ def test_a_target_size_that_no_bound_reaches_is_refused_with_the_least_size(smal
     least = int(str(caught.value).split("at least ")[1].split()[0])
     assert 100 < least < 5000
     assert athcodec.encode(small, tmp_path / "s.ath", target_size=least, effort="fast").bytes <= least
+
+
+@pytest.mark.parametrize("too_large", [1.002, 1e9])
+@pytest.mark.parametrize("fits_from", [2e-7, 1e-3, 0.09])
+def test_a_target_size_is_looked_for_with_a_counted_number_of_files(too_large, fits_from, small):
+    """Where files shrink to just above the target and then jump below it, the next bound was a few per cent away."""
+    source, tried = job.EncodingJob.begin(small, None, job.EncodingOptions(), silent).source, []
+
+    def file_size(bound):
+        tried.append(bound)
+        return 1000 * too_large if bound < fits_from * source.seen.diagonal else 500
+
+    found = BoundOption(target_size=1000).in_scene_units(source, file_size)
+    assert len(tried) <= 30 and fits_from <= found / source.seen.diagonal <= 1.02 * fits_from
 
 
 def test_a_generous_target_size_gives_a_fine_file(small, tmp_path):
@@ -95,7 +112,7 @@ def test_what_stands_in_front_of_the_chunks_of_a_small_file_is_small(ladder, mos
 )
 def test_a_bound_finer_than_the_sources_numbers_is_refused_with_the_least_possible(dtype, offset, bound, tmp_path):
     clip = plant(seed=1, branches=3, frames=16, dtype=dtype, offset=offset)
-    with pytest.raises(BoundError, match=rf"expected more than .* spacing of the source's {np.dtype(dtype).name}"):
+    with pytest.raises(BoundError, match=rf"expected at least .* spacing of the source's {np.dtype(dtype).name}"):
         athcodec.encode(clip, tmp_path / "s.ath", max_error=bound, effort="fast")
     assert not list(tmp_path.iterdir())
 

@@ -137,8 +137,9 @@ def encode(
         check_target(path, ".ath")  # before any work
         job, bound = _begin(clip, option, options, _weighted_progress(clip, progress, option, options))
         with new_file(path) as out, clip.watched(), tempfile.SpooledTemporaryFile(SPOOL_BYTES) as spool:
-            decided = job.decide(bound)
-            return job.write(path, out, spool, decided, job.coded(decided, range(decided.segment_count)))
+            with job.refusing(bound):
+                decided = job.decide(bound)
+                return job.write(path, out, spool, decided, job.coded(decided, range(decided.segment_count)))
 
 
 def draft(
@@ -161,7 +162,8 @@ def draft(
     option = BoundOption(max_error, rel_error, target_size, checked.lossless)
     with clip.watched():
         job, bound = _begin(clip, option, checked, _weighted_progress(clip, progress, option, checked, draft=True))
-        return job.draft(job.decide(bound))
+        with job.refusing(bound):
+            return job.draft(job.decide(bound))
 
 
 def code_segments(
@@ -189,7 +191,7 @@ def code_segments(
         Where the clip is another than that of the draft, as far as its hierarchy and rest pose show.
     """
     job = EncodingJob.resume(clip, draft, jobs=jobs)
-    with clip.watched():
+    with clip.watched(), job.refusing(draft.choice.settings.bound):
         yield from job.coded(job.decided(draft), list(segments))
 
 
