@@ -27,6 +27,8 @@ from bench import charts, codec_registry, compare, paper, plots, rd, tables  # n
 from bench.curves import Curve, mean_saving  # noqa: E402
 from bench.store import Store, read  # noqa: E402
 
+pytestmark = pytest.mark.tools
+
 KINDS = {*KIND_NAMES.values(), "HEADER"}
 MEMORY_PARTS = ("file", "opened", "bases", "work", "segments")
 

@@ -15,6 +15,8 @@ from fuzz import coverage, seeds, sources, targets
 
 import athcodec
 
+pytestmark = pytest.mark.tools
+
 RUNS = 1000
 SEED = 1
 ROOT = Path(__file__).resolve().parent.parent
