@@ -30,6 +30,8 @@ from athcodec.batch import manifest, runs
 from athcodec.batch.manifest import Manifest, ManifestError
 from athcodec.errors import ClipError, MissingExtra
 
+pytestmark = pytest.mark.tools
+
 FAST = {"effort": "fast", "segment_frames": 16}
 BATCH = [sys.executable, "-m", "athcodec", "batch"]
 WORDS = ["--effort", "fast", "--segment-frames", "16"]

@@ -39,6 +39,21 @@ VECTORS = FORMAT.parent / "spec" / "vectors" / "valid"
 TEXT = FORMAT.read_text(encoding="utf-8")
 
 
+SMALLEST = sorted((vector.path for vector in conformance.vectors()), key=lambda path: path.stat().st_size)[:200]
+
+
+def tiered(cases: Iterable[tuple]) -> list:
+    """Cases, each behind the path of its vector, as parameters; the tier `vectors` has all but the smallest vectors."""
+    return [
+        pytest.param(
+            *case,
+            id="-".join([path.stem, *(part for part in case if isinstance(part, str))]),
+            marks=() if path in SMALLEST else pytest.mark.vectors,
+        )
+        for path, *case in cases
+    ]
+
+
 def section(title: str) -> str:
     """The text under a heading, up to the next of the same or a higher rank."""
     heading = re.search(rf"^(#+) {re.escape(title)}\n", TEXT, re.M)
@@ -347,7 +362,7 @@ def test_pseudo_code_decodes_every_feature(spec, seed, is_float64, exact):
     assert_same_bits(spec, HandMade(seed, is_float64, exact).file())
 
 
-@pytest.mark.parametrize("path", sorted(VECTORS.glob("layers-*.ath")), ids=lambda path: path.stem)
+@pytest.mark.parametrize("path", tiered((path, path) for path in sorted(VECTORS.glob("layers-*.ath"))))
 def test_pseudo_code_decodes_layers(spec, path):
     assert_same_bits(spec, path.read_bytes())
 
@@ -362,7 +377,7 @@ def test_pseudo_code_decodes_several_clips(spec, medley_ath):
     assert_same_bits(spec, medley_ath.read_bytes())
 
 
-@pytest.mark.parametrize("path", sorted(VECTORS.glob("clip*.ath")), ids=lambda path: path.stem)
+@pytest.mark.parametrize("path", tiered((path, path) for path in sorted(VECTORS.glob("clip*.ath"))))
 def test_pseudo_code_decodes_clips_of_every_sort(spec, path):
     assert_same_bits(spec, path.read_bytes())
 
@@ -741,18 +756,6 @@ def outcome(spec: SimpleNamespace, decode, stream: bytes) -> object:
 # ---- what the document and the code refuse ----
 
 INVALID = [vector for vector in conformance.vectors() if not vector.valid and vector.path.stat().st_size < 100_000]
-SMALLEST = {vector.name for vector in sorted(INVALID, key=lambda vector: vector.path.stat().st_size)[:200]}
-
-
-def tiered(*cases: tuple) -> list:
-    """Cases that start with a vector, as parameters; all but the smallest vectors are left to the tier `vectors`."""
-    return [
-        pytest.param(
-            *case, id="-".join([case[0].name, *case[1:]]), marks=() if case[0].name in SMALLEST else pytest.mark.vectors
-        )
-        for case in cases
-    ]
-
 
 AT_ONCE = [
     vector
@@ -761,7 +764,7 @@ AT_ONCE = [
 ]
 
 
-@pytest.mark.parametrize("vector", tiered(*((vector,) for vector in AT_ONCE)))
+@pytest.mark.parametrize("vector", tiered((vector.path, vector) for vector in AT_ONCE))
 def test_the_document_opens_and_refuses_files_as_the_vectors_have_it(spec, vector):
     for item in ("strict", "open"):
         try:
@@ -780,7 +783,7 @@ ASKED = [
 ]
 
 
-@pytest.mark.parametrize("vector, item", tiered(*ASKED))
+@pytest.mark.parametrize("vector, item", tiered((case[0].path, *case) for case in ASKED))
 def test_the_document_refuses_what_is_asked_for_as_the_vectors_have_it(spec, vector, item):
     try:
         data = vector.path.read_bytes()

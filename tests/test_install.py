@@ -20,6 +20,8 @@ from fuzz.targets import CORE, decoder_sources
 import athcodec
 from athcodec._native import crc32c
 
+pytestmark = pytest.mark.formats
+
 HEADERS = "ath.h", "ath_gpu.h", "ath_player.h"
 SLOW = pytest.mark.slow
 C_COMPILERS = [name for name in ("gcc", "clang") if shutil.which(name)] or ["cc"]
