@@ -356,7 +356,13 @@ def test_pseudo_code_decodes_what_the_encoder_writes(spec, forked_clip, tmp_path
 
 
 @pytest.mark.parametrize(
-    "seed, is_float64, exact", [(1, False, None), (2, True, None), (3, False, np.float32), (4, True, np.float64)]
+    "seed, is_float64, exact",
+    [
+        (1, False, None),
+        pytest.param(2, True, None, marks=pytest.mark.slow),
+        pytest.param(3, False, np.float32, marks=pytest.mark.slow),
+        (4, True, np.float64),
+    ],
 )
 def test_pseudo_code_decodes_every_feature(spec, seed, is_float64, exact):
     assert_same_bits(spec, HandMade(seed, is_float64, exact).file())
@@ -373,6 +379,7 @@ def test_pseudo_code_decodes_layers_that_the_encoder_writes(spec, tmp_path):
     assert_same_bits(spec, (tmp_path / "layers.ath").read_bytes())
 
 
+@pytest.mark.slow
 def test_pseudo_code_decodes_several_clips(spec, medley_ath):
     assert_same_bits(spec, medley_ath.read_bytes())
 
