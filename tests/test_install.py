@@ -156,6 +156,7 @@ def test_the_single_file_may_hold_the_gpu_form(compiler, single):
     assert "ath_gpu_record" in run("nm", single / "ath.o")
 
 
+@SLOW
 def test_no_instruction_of_the_decoder_rounds_once_for_two_operations(single):
     """Compiled for processors that have such instructions, by a compiler that takes them where it is let."""
     fused = re.compile(r"\b(vfn?m(?:add|sub)|fn?m(?:add|sub)\b|fml[as]\b|vfm[as]|fmadd\.|m[as][ed]br)")

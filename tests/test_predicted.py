@@ -153,6 +153,7 @@ def test_growth_does_not_twitch(fraction, most, share, eased, tmp_path):
     assert meter.max_error_acceleration <= most and meter.worst_share <= share
 
 
+@SLOW
 def test_points_of_the_lattice_tell_noise_in_fewer_bits_than_cubes(monkeypatch, tmp_path):
     clip = ODD["noise"]()
     found = size(clip, tmp_path, 1e-4)
