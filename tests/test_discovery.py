@@ -121,7 +121,7 @@ def test_centre_lines_give_their_stems():
         assert branch_orders(found.branch_parent).max() == branch_orders(sample.branch_parent).max()
 
 
-def walker(frames: int = 40) -> MotionClip:
+def walker(frames: int = 20) -> MotionClip:
     """One closed mesh, a body on four legs, whose legs swing: no pieces, no edges, no names."""
     rings, around = 60, 24
     angle = 2 * np.pi * np.arange(around) / around
@@ -150,7 +150,7 @@ def walker(frames: int = 40) -> MotionClip:
 
 
 def test_a_mesh_of_one_piece_gets_patches_that_move_rigidly(tmp_path):
-    clip = walker(frames=20)
+    clip = walker()
     found = athcodec.find_branches(clip)
     assert found.method == "motion"
     assert 1 < len(found.branch_parent) < clip.vertex_count / 10
@@ -362,6 +362,7 @@ def test_candidates_for_branches_of_a_lossless_file_are_tried_lossless(loose_poi
     assert max(lossless) < 0.1 * min(lossy)
 
 
+@pytest.mark.slow
 def test_candidates_for_branches_are_tried_at_a_bound_that_meets_the_target_size(loose_points, tmp_path, monkeypatch):
     tried = []
     for bound in (0.1, 0.001):

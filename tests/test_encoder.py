@@ -397,6 +397,7 @@ def peak_memory(clip: MotionClip, folder) -> int:
         tracemalloc.stop()
 
 
+@pytest.mark.slow
 def test_memory_does_not_grow_with_the_number_of_frames(tmp_path, monkeypatch):
     monkeypatch.setattr(clip_module, "BLOCK_BYTES", 32 * 200 * 12)
     monkeypatch.setattr("athcodec.encoding.encoder.SPOOL_BYTES", 1 << 16)
