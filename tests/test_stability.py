@@ -29,7 +29,7 @@ def check_sizes(clip, bounds, path) -> None:
         largest = max(largest, size)
 
 
-@pytest.mark.parametrize("seed", [1, 11])
+@pytest.mark.parametrize("seed", [1, pytest.param(11, marks=pytest.mark.slow)])
 def test_a_looser_bound_does_not_make_a_larger_file(seed, tmp_path):
     check_sizes(blown_tree(seed, branches=70, frames=60), (1e-3, 4e-4, 1.5e-4, 8e-5, 5e-5, 2e-5), tmp_path / "a.ath")
 
