@@ -15,6 +15,8 @@ from test_usd import GRID, QUADS, assert_same, awkward_clip, sway, whole_plant
 import athcodec
 from athcodec.errors import ClipError, SourceWarning
 
+pytestmark = pytest.mark.formats
+
 FPS = float(Fraction(24000, 1001))
 Y_UP = np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]])  # of rows whose Z is up
 TURN = np.array([[0, 1, 0], [-1, 0, 0], [0, 0, 1]])  # by a right angle about Z, of rows

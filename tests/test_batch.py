@@ -31,6 +31,8 @@ from athcodec.batch.manifest import Manifest, ManifestError
 from athcodec.container import MAGIC
 from athcodec.errors import ClipError, MissingExtra
 
+pytestmark = pytest.mark.tools
+
 FAST = {"effort": "fast", "segment_frames": 16}
 BATCH = [sys.executable, "-m", "athcodec", "batch"]
 WORDS = ["--effort", "fast", "--segment-frames", "16"]

@@ -25,10 +25,12 @@ from athcodec.encoding.segment import SAMPLED
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.append(str(ROOT))  # for bench, which is not installed; athcodec stays the installed one
 
-from bench import charts, codec_registry, compare, paper, plots, progressive, rd, tables  # noqa: E402
+from bench import codec_registry, compare, paper, plots, progressive, rd, tables  # noqa: E402
 from bench.clips import encoded  # noqa: E402
 from bench.curves import Curve, mean_saving  # noqa: E402
 from bench.store import Store, read  # noqa: E402
+
+pytestmark = pytest.mark.tools
 
 KINDS = {*KIND_NAMES.values(), "HEADER"}
 MEMORY_PARTS = ("file", "opened", "bases", "work", "segments")
@@ -512,13 +514,6 @@ def test_a_batch_under_fault_injection_encodes_every_clip_once(tmp_path):
 
 
 # ---- the whole of it ----
-
-
-@pytest.mark.parametrize("verb", charts.CHARTS)
-def test_results_of_the_repository_have_pictures(verb, tmp_path):
-    result = json.loads((ROOT / "bench" / "results" / f"{verb}.json").read_text())
-    [picture] = charts.draw(verb, verb, result, tmp_path)
-    assert picture.read_bytes().startswith(b"\x89PNG")
 
 
 def test_the_papers_number_of_nodes_is_met_by_its_parameters(sample_clip):

@@ -29,7 +29,7 @@ sys.path.append(str(ROOT))  # for spec, which is not installed; athcodec stays t
 from spec.robust.bound import ACTIONS, LARGE, Attack, attacks, broken_promises  # noqa: E402
 
 
-@settings(STEADY, max_examples=50)
+@settings(STEADY, max_examples=25)
 @given(attacks())
 def test_no_attack_breaks_a_promise(scratch, attack):
     assert broken_promises(attack, scratch) == []

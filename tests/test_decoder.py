@@ -562,7 +562,7 @@ def test_a_wrong_byte_in_a_chunk_is_met_when_it_is_read_and_not_before(bushy_ath
         decoder.positions()
 
 
-@settings(STEADY, max_examples=60)
+@settings(STEADY, max_examples=30)
 @given(awkward_plants(dtype=np.float64, frames=18, offset=0.0))
 def test_maps_hang_together_on_degenerate_plants(scratch, clip):
     size = size_of(clip.positions) or 1.0

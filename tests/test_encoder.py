@@ -95,12 +95,12 @@ def test_a_looser_bound_gives_a_smaller_file(sample_clip, tmp_path):
 
 
 def test_the_sample_is_coded_in_a_fiftieth_of_its_size(sample_clip, tmp_path):
-    assert athcodec.encode(sample_clip, tmp_path / "s.ath").ratio > 50
+    assert athcodec.encode(sample_clip, tmp_path / "s.ath", effort="fast").ratio > 50
 
 
 @pytest.mark.parametrize("ladder, most", [("none", 140), ("decades", 190)])
 def test_what_stands_in_front_of_the_chunks_of_a_small_file_is_small(ladder, most, sample_clip, tmp_path):
-    athcodec.encode(sample_clip, tmp_path / "out.ath", ladder=ladder)
+    athcodec.encode(sample_clip, tmp_path / "out.ath", ladder=ladder, effort="fast")
     with athcodec.open(tmp_path / "out.ath") as decoder:
         chunks = decoder.file.chunks
     assert chunks[0].offset < most
@@ -416,6 +416,7 @@ def peak_memory(clip: MotionClip, folder) -> int:
         tracemalloc.stop()
 
 
+@pytest.mark.slow
 def test_memory_does_not_grow_with_the_number_of_frames(tmp_path, monkeypatch):
     monkeypatch.setattr(clip_module, "BLOCK_BYTES", 32 * 200 * 12)
     monkeypatch.setattr("athcodec.encoding.encoder.SPOOL_BYTES", 1 << 16)

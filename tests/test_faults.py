@@ -28,6 +28,8 @@ sys.path.append(str(ROOT))  # for spec, which is not installed; athcodec stays t
 
 from spec.robust import _io_errors, faults  # noqa: E402
 
+pytestmark = pytest.mark.tools
+
 DEAD = ".target.ath.0123abcd.part"
 
 

@@ -39,6 +39,25 @@ VECTORS = FORMAT.parent / "spec" / "vectors" / "valid"
 TEXT = FORMAT.read_text(encoding="utf-8")
 
 
+SMALLEST = sorted((vector.path for vector in conformance.vectors()), key=lambda path: path.stat().st_size)[:200]
+
+
+def tiered(cases: Iterable[tuple]) -> list:
+    """Cases, each behind the path of its vector, as parameters; the tier `vectors` has all but the smallest vectors."""
+    return [
+        pytest.param(
+            *case,
+            id="-".join([path.stem, *(part for part in case if isinstance(part, str))]),
+            marks=() if path in SMALLEST else pytest.mark.vectors,
+        )
+        for path, *case in cases
+    ]
+
+
+def seeds(few: int, many: int) -> list:
+    return [*range(few), *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(few, many))]
+
+
 def section(title: str) -> str:
     """The text under a heading, up to the next of the same or a higher rank."""
     heading = re.search(rf"^(#+) {re.escape(title)}\n", TEXT, re.M)
@@ -340,13 +359,19 @@ def test_pseudo_code_decodes_what_the_encoder_writes(spec, forked_clip, tmp_path
 
 
 @pytest.mark.parametrize(
-    "seed, is_float64, exact", [(1, False, None), (2, True, None), (3, False, np.float32), (4, True, np.float64)]
+    "seed, is_float64, exact",
+    [
+        (1, False, None),
+        pytest.param(2, True, None, marks=pytest.mark.slow),
+        pytest.param(3, False, np.float32, marks=pytest.mark.slow),
+        (4, True, np.float64),
+    ],
 )
 def test_pseudo_code_decodes_every_feature(spec, seed, is_float64, exact):
     assert_same_bits(spec, HandMade(seed, is_float64, exact).file())
 
 
-@pytest.mark.parametrize("path", sorted(VECTORS.glob("layers-*.ath")), ids=lambda path: path.stem)
+@pytest.mark.parametrize("path", tiered((path, path) for path in sorted(VECTORS.glob("layers-*.ath"))))
 def test_pseudo_code_decodes_layers(spec, path):
     assert_same_bits(spec, path.read_bytes())
 
@@ -357,11 +382,12 @@ def test_pseudo_code_decodes_layers_that_the_encoder_writes(spec, tmp_path):
     assert_same_bits(spec, (tmp_path / "layers.ath").read_bytes())
 
 
+@pytest.mark.slow
 def test_pseudo_code_decodes_several_clips(spec, medley_ath):
     assert_same_bits(spec, medley_ath.read_bytes())
 
 
-@pytest.mark.parametrize("path", sorted(VECTORS.glob("clip*.ath")), ids=lambda path: path.stem)
+@pytest.mark.parametrize("path", tiered((path, path) for path in sorted(VECTORS.glob("clip*.ath"))))
 def test_pseudo_code_decodes_clips_of_every_sort(spec, path):
     assert_same_bits(spec, path.read_bytes())
 
@@ -465,7 +491,7 @@ def assert_same_on_levels(spec: SimpleNamespace, data: bytes, levels: Iterable[i
 
 
 @pytest.mark.parametrize("kind", [container.STEMS, container.AFFINES, container.CORRECTIONS, container.SHAPES])
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", seeds(2, 6))
 def test_random_decisions_about_motion_mean_the_same_to_the_document_and_the_code(spec, seed, kind):
     parts = Parts.of(Sapling(seed).file())
     random = np.random.default_rng(seed)
@@ -497,7 +523,7 @@ def motion_function(spec: SimpleNamespace, parts: Parts, chunk: container.Chunk)
 
 
 @pytest.mark.parametrize("refines_rest", [False, True])
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", seeds(4, 12))
 def test_random_decisions_about_refinements_mean_the_same_to_the_document_and_the_code(spec, seed, refines_rest):
     """A layer behind those of a sapling: its rest pose, shapes and stems."""
     parts, random = Parts.of(Sapling(seed).file()), np.random.default_rng(seed)
@@ -748,7 +774,7 @@ AT_ONCE = [
 ]
 
 
-@pytest.mark.parametrize("vector", AT_ONCE, ids=lambda vector: vector.name)
+@pytest.mark.parametrize("vector", tiered((vector.path, vector) for vector in AT_ONCE))
 def test_the_document_opens_and_refuses_files_as_the_vectors_have_it(spec, vector):
     for item in ("strict", "open"):
         try:
@@ -767,7 +793,7 @@ ASKED = [
 ]
 
 
-@pytest.mark.parametrize("vector, item", ASKED, ids=lambda part: getattr(part, "name", part))
+@pytest.mark.parametrize("vector, item", tiered((case[0].path, *case) for case in ASKED))
 def test_the_document_refuses_what_is_asked_for_as_the_vectors_have_it(spec, vector, item):
     try:
         data = vector.path.read_bytes()

@@ -299,6 +299,7 @@ def test_an_engine_gives_its_vertex_buffer(hosted, mesh):
 
 
 @pytest.mark.skipif(shutil.which("node") is None, reason="no Node.js")
+@pytest.mark.web
 def test_web_assembly_needs_and_takes_the_mesh_too(hosted, mesh, tmp_path):
     (tmp_path / "a.ath").write_bytes(hosted)
     (tmp_path / "mesh").write_bytes(mesh.tobytes())
@@ -374,6 +375,7 @@ def test_verify_compares_checksums_without_the_mesh_and_decodes_with_it(hosted_s
     assert run(capsys, "verify", tmp_path / "damaged.ath")[0] == 1
 
 
+@pytest.mark.tools
 def test_a_batch_leaves_rest_poses_to_the_host_and_verifies_with_them(source, tmp_path):
     folder = tmp_path / "in"
     folder.mkdir()

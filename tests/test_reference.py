@@ -79,8 +79,11 @@ def chunk_kinds(data: bytes) -> set[str]:
 
 @pytest.mark.parametrize(
     "options",
-    [{"effort": "fast"}, {"rel_error": 1e-3, "segment_frames": 256}, {"max_error": 1e-5, "effort": "fast"}],
-    ids=["default bound", "coarse, one segment", "fine"],
+    [
+        pytest.param({"effort": "fast"}, id="default bound"),
+        pytest.param({"rel_error": 1e-3, "segment_frames": 256}, id="coarse, one segment", marks=pytest.mark.slow),
+        pytest.param({"max_error": 1e-5, "effort": "fast"}, id="fine", marks=pytest.mark.slow),
+    ],
 )
 def test_the_sample_has_the_same_bits(options, sample_clip, tmp_path):
     assert_same_bits(encoded(sample_clip, tmp_path, **options))
@@ -191,7 +194,7 @@ def test_corrupted_refinements_are_refused_alike_or_mean_the_same(name):
         i for i, (chunk, content) in enumerate(parts.chunks) if chunk.is_motion and chunk.level > h + 1 and content
     ]
     refused = 0
-    for _ in range(40):
+    for _ in range(15):
         data, chunk = with_a_bit_changed(parts, chosen, random)
         level = chunk.level
         got = outcome(lambda data=data, level=level: reference.AthFile(data).positions(level))
@@ -201,7 +204,7 @@ def test_corrupted_refinements_are_refused_alike_or_mean_the_same(name):
             assert isinstance(got, str) and got == expected
         else:
             assert_same_numbers(got, expected)
-    assert 2 < refused < 40
+    assert 0 < refused < 15
 
 
 def test_several_clips_have_the_same_bits(medley_ath):
@@ -247,14 +250,14 @@ def test_corrupted_clips_and_times_are_refused_alike_or_mean_the_same(name):
         data = parts.with_payload(kind, content)
         outcomes.append(outcome(lambda data=data: assert_same_bits(data)))
         assert outcomes[-1] == outcome(lambda data=data: opened(data).file.check())
-    assert 50 < outcomes.count("BAD_CHUNK") < 199
+    assert 15 < outcomes.count("BAD_CHUNK") < 59
 
 
 def changed_contents(parts: Parts, names: set[str]) -> Iterator[tuple[int, bytes]]:
     """Contents of chunks of these kinds, each with a bit flipped, a byte less or a byte more."""
     random = np.random.default_rng(5)
     chunks = [(c.kind, content) for c, content in parts.chunks if athcodec.container.KIND_NAMES[c.kind] in names]
-    for i in range(200):
+    for i in range(60):
         kind, content = chunks[i % len(chunks)]
         at, changed = int(random.integers(len(content))), bytearray(content)
         way = random.integers(6)

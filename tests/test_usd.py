@@ -19,6 +19,8 @@ from athcodec.clip import MotionClip
 from athcodec.errors import ClipError, SourceWarning
 from athcodec.frames import Frames
 
+pytestmark = pytest.mark.formats
+
 GRID = np.array([[x, y, 0] for y in range(4) for x in range(3)], np.float32)
 QUADS = np.array([[0, 1, 4, 3], [1, 2, 5, 4], [3, 4, 7, 6], [4, 5, 8, 7], [6, 7, 10, 9], [7, 8, 11, 10]], np.int32)
 FPS = float(Fraction(24000, 1001))

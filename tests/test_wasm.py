@@ -20,6 +20,8 @@ from plants import awkward, clip_of, grow, plant, random_hierarchy
 import athcodec
 from athcodec._library import load_library
 
+pytestmark = pytest.mark.web
+
 VIEWER = Path(__file__).resolve().parent.parent / "athcodec" / "viewer"
 MODULE = VIEWER / "ath_decoder.mjs"
 MOST_BYTES = 170_000
