@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import cached_property
+from threading import Lock
 from typing import Any, cast
 
 import numpy as np
@@ -282,6 +283,7 @@ class Search:
         self._components: dict[tuple, Components] = {}
         self._time_components: dict[tuple, tuple[float, list[dict[int, TimeComponents]]]] = {}
         self._preludes: dict[tuple, CodedPrelude] = {}
+        self._kept = Lock()  # Threads that cost candidates share the preludes.
         self._ratios, self._layered = ratios, len(ratios) > 1
         keeps_shape = start.turn_step > 0  # which a few bytes less would cost
         self._is_small = is_small(source.clip.vertex_count, source.segments, effort) and not keeps_shape
@@ -738,10 +740,13 @@ class Search:
     def prelude(self, settings: Settings) -> CodedPrelude:
         """As in earlier trials, where one had it."""
         key = self._prelude_key(settings)
-        prelude = self._preludes.pop(key, None) or CodedPrelude(self.source, self.ath, settings)
-        self._preludes[key] = prelude  # the last one used
-        while len(self._preludes) > PRELUDES_KEPT:
-            self._preludes.pop(next(iter(self._preludes)))
+        with self._kept:
+            prelude = self._preludes.pop(key, None)
+        prelude = prelude or CodedPrelude(self.source, self.ath, settings)
+        with self._kept:
+            self._preludes[key] = prelude  # The prelude used last stands last.
+            while len(self._preludes) > PRELUDES_KEPT:
+                self._preludes.pop(next(iter(self._preludes)))
         return prelude
 
     def _make_prelude(self, settings: Settings) -> bool:
