@@ -205,7 +205,9 @@ def named_grass(tmp_path_factory) -> int:
     return athcodec.encode(clip, path, rel_error=1e-3, attributes="none").bytes
 
 
-@pytest.mark.parametrize("order", ORDERS)
+@pytest.mark.parametrize(
+    "order", [pytest.param(order, marks=() if order == "shuffled" else pytest.mark.slow) for order in ORDERS]
+)
 def test_unnamed_blades_take_hardly_more_than_named_ones(order, named_grass, tmp_path):
     clip = grass(seed=1, blades=150, frames=48, named=False, order=order)
     result = athcodec.encode(clip, tmp_path / "a.ath", rel_error=1e-3, attributes="none")
