@@ -149,6 +149,7 @@ def walker(frames: int = 20) -> MotionClip:
     return MotionClip(positions.astype(np.float32), time, faces=faces)
 
 
+@pytest.mark.slow
 def test_a_mesh_of_one_piece_gets_patches_that_move_rigidly(tmp_path):
     clip = walker()
     found = athcodec.find_branches(clip)
