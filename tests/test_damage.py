@@ -629,7 +629,7 @@ def test_a_corrupted_chunk_with_a_good_checksum_is_refused_or_plays_with_no_more
     parts, rng, outcomes, works = parts_with(name), np.random.default_rng(KINDS[name]), [], []
     expected = opened(parts.file()).positions()
     places = [i for i, (c, _) in enumerate(parts.chunks) if c.kind == KINDS[name]]
-    for _ in range(30):
+    for _ in range(40):
         i, chunks = int(rng.choice(places)), list(parts.chunks)
         chunks[i] = chunks[i][0], mutations(rng, chunks[i][1])
         data = parts.with_chunks(chunks)

@@ -149,6 +149,7 @@ def walker(frames: int = 20) -> MotionClip:
     return MotionClip(positions.astype(np.float32), time, faces=faces)
 
 
+@pytest.mark.slow
 def test_a_mesh_of_one_piece_gets_patches_that_move_rigidly(tmp_path):
     clip = walker()
     found = athcodec.find_branches(clip)
@@ -205,7 +206,9 @@ def named_grass(tmp_path_factory) -> int:
     return athcodec.encode(clip, path, rel_error=1e-3, attributes="none").bytes
 
 
-@pytest.mark.parametrize("order", ORDERS)
+@pytest.mark.parametrize(
+    "order", [pytest.param(order, marks=() if order == "shuffled" else pytest.mark.slow) for order in ORDERS]
+)
 def test_unnamed_blades_take_hardly_more_than_named_ones(order, named_grass, tmp_path):
     clip = grass(seed=1, blades=150, frames=48, named=False, order=order)
     result = athcodec.encode(clip, tmp_path / "a.ath", rel_error=1e-3, attributes="none")

@@ -491,7 +491,7 @@ def assert_same_on_levels(spec: SimpleNamespace, data: bytes, levels: Iterable[i
 
 
 @pytest.mark.parametrize("kind", [container.STEMS, container.AFFINES, container.CORRECTIONS, container.SHAPES])
-@pytest.mark.parametrize("seed", seeds(2, 6))
+@pytest.mark.parametrize("seed", seeds(1, 6))
 def test_random_decisions_about_motion_mean_the_same_to_the_document_and_the_code(spec, seed, kind):
     parts = Parts.of(Sapling(seed).file())
     random = np.random.default_rng(seed)
@@ -523,7 +523,7 @@ def motion_function(spec: SimpleNamespace, parts: Parts, chunk: container.Chunk)
 
 
 @pytest.mark.parametrize("refines_rest", [False, True])
-@pytest.mark.parametrize("seed", seeds(4, 12))
+@pytest.mark.parametrize("seed", seeds(2, 12))
 def test_random_decisions_about_refinements_mean_the_same_to_the_document_and_the_code(spec, seed, refines_rest):
     """A layer behind those of a sapling: its rest pose, shapes and stems."""
     parts, random = Parts.of(Sapling(seed).file()), np.random.default_rng(seed)

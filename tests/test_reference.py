@@ -185,7 +185,7 @@ def with_a_bit_changed(parts, chosen, random):
     return parts.with_chunks(chunks), chunks[i][0]
 
 
-@pytest.mark.parametrize("name", ["layers-mixed", "layers-three"])
+@pytest.mark.parametrize("name", [pytest.param("layers-mixed", marks=pytest.mark.slow), "layers-three"])
 def test_corrupted_refinements_are_refused_alike_or_mean_the_same(name):
     """One byte of a chunk of a refinement is another, and its checksum fits."""
     parts, random = Parts.of((VECTORS / f"{name}.ath").read_bytes()), np.random.default_rng(6)
