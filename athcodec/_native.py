@@ -13,6 +13,7 @@ from ctypes import POINTER, c_char_p, c_double, c_int, c_int32, c_int64, c_size_
 import numpy as np
 
 from athcodec._library import load_library
+from athcodec.errors import BoundError
 from athcodec.options import MAX_SEGMENT
 
 PIECE_VERTICES = 64
@@ -247,7 +248,7 @@ _ENCODING = {  # core/plan.h, core/motion.h, core/encode.h
     "ath_multiply": (None, [*[c_int64] * 4, c_void_p, c_int64, c_void_p, c_int64, c_void_p]),
     "ath_decompose": (None, [c_int64, *[c_void_p] * 4]),
     "ath_solve": (None, [c_int32, c_int32, c_void_p, c_void_p]),
-    "ath_error": (None, [c_int32, c_int32, c_int, *[c_void_p] * 6]),
+    "ath_error": (None, [c_int32, c_int32, c_void_p, c_int, *[c_void_p] * 3, c_double, *[c_void_p] * 3]),
     "ath_find_corrections": (
         c_int64,
         [c_int32, c_int32, c_int, *[c_void_p] * 5, c_double, POINTER(CoreMetEnds), c_void_p, c_int64],
@@ -373,5 +374,7 @@ def encode_stream(function_name: str, capacity: int, *arguments, model: np.ndarr
         if size >= 0:
             return buffer[:size].tobytes()
         if size < -1:
-            raise ValueError(f"{function_name}: got integers that the stream cannot hold")
+            raise BoundError(
+                f"{function_name}: got integers that the stream cannot hold; expected a larger error bound"
+            )
         capacity *= 4

@@ -19,6 +19,7 @@ import numpy as np
 from athcodec._native import address, lib
 from athcodec.algebra import decompose, determinant, length, multiply, principal
 from athcodec.hierarchy import Hierarchy, hierarchy_of
+from athcodec.options import whole
 from athcodec.threads import SERIAL, ThreadPool
 
 if TYPE_CHECKING:
@@ -72,7 +73,7 @@ class Thresholds:
             value = getattr(self, name)
             if not value >= 0:
                 raise ValueError(f"threshold {name}: got {value}, expected a number >= 0")
-            object.__setattr__(self, name, kind(value))
+            object.__setattr__(self, name, float(value) if kind is float else whole(f"threshold {name}", value))
 
     @property
     def in_metadata(self) -> dict[str, float]:

@@ -21,7 +21,7 @@ from athcodec import container as ct
 from athcodec import core_file
 from athcodec._native import WHOLE, as_bytes
 from athcodec.ath import Thresholds
-from athcodec.atomic_files import is_url
+from athcodec.atomic_files import file_ids, is_url
 from athcodec.clip import ERROR_WEIGHTS, check_stem_index
 from athcodec.container import Chunk, Limits
 from athcodec.errors import (
@@ -40,6 +40,7 @@ from athcodec.errors import (
 from athcodec.hierarchy import Hierarchy, derived_edges
 from athcodec.host_mesh import HostMesh, mesh_positions
 from athcodec.joining import HEADING, STRENGTH, metadata_of, wind_of
+from athcodec.options import whole
 from athcodec.plain_files import open_plain
 from athcodec.polygons import Polygons
 from athcodec.threads import ThreadPool, default_jobs
@@ -140,6 +141,8 @@ class AthFile:
     ----------
     limits : Limits
         What the file may ask for.
+    inputs : frozenset
+        The files that are read, by device and inode: this one, and those of the host mesh.
     core : core_file.File
         The file as the C core has opened it.
     available_length : int
@@ -174,6 +177,7 @@ class AthFile:
         self._rest_read = -1, np.empty(0)  # the level that gave it
         self._owned = not hasattr(path, "read")
         self._source = _opened(path, gltf_motion) if self._owned else cast(Any, path)
+        self.inputs = file_ids(cast(Any, path) if self._owned else getattr(path, "name", None))
         try:
             self.available_length: int = self._source.seek(0, os.SEEK_END)
             self.core = self._open_core()
@@ -471,7 +475,7 @@ class AthFile:
         level : int
             0 is the coarsest.
         """
-        return level < self._first_lacking
+        return whole("level", level) < self._first_lacking
 
     @cached_property
     def _first_lacking(self) -> int:
@@ -863,7 +867,8 @@ class AthFile:
             Where the mesh cannot be read, or is none.
         """
         if self.needs_host_mesh:
-            positions = mesh_positions(mesh, self.metadata)
+            positions, files = mesh_positions(mesh, self.metadata)
+            self.inputs |= files
             try:
                 with self._lock:
                     self.core.set_host_mesh(positions)

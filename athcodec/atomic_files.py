@@ -1,5 +1,7 @@
 """Files that take their name only when they are whole, and what dead writers have left of theirs.
 
+An older file is replaced only where it holds what the new one holds, or nothing, and is no input.
+
 A file is written beside its target as `.NAME.XXXXXXXX.part`, under a lock that the system drops when the
 writer dies, and then renamed. Whoever next writes to the same target removes the pending files that nobody holds any
 more. Where a file system has no locks, those of dead writers stay: one of a living writer is never removed.
@@ -16,23 +18,50 @@ import shutil
 import stat
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
+from contextvars import ContextVar
 from typing import BinaryIO
+
+from athcodec.file_kinds import UNKNOWN, kind_by_suffix, kind_of
 
 try:
     import fcntl
 except ImportError:  # Windows, where nobody can remove a file that another has open
     fcntl = None
 
+FileId = tuple[int, int]
 NAME_CHARACTERS = 50  # of the target in the pending file's name: a name of the longest length has room for the rest too
 PLAIN_OPEN = getattr(os, "O_CLOEXEC", 0) | getattr(os, "O_BINARY", 0)
 
 _PENDING_NAME = re.compile(r"(\..*\.)[0-9a-f]{8}\.part", re.DOTALL)
 _URL = re.compile(r"[a-z][a-z0-9+.-]+(://|::)", re.IGNORECASE)
+_inputs: ContextVar[frozenset[FileId]] = ContextVar("_inputs", default=frozenset())
 
 
-def check_target(path: str | os.PathLike[str]) -> str:
+def file_id(file: str | os.PathLike[str] | int) -> FileId:
+    """What a file has in common under all its names: device and inode. Raises OSError."""
+    status = os.stat(file)
+    return status.st_dev, status.st_ino
+
+
+def file_ids(*paths: str | os.PathLike[str] | None) -> frozenset[FileId]:
+    """The same of those paths that are files; URLs and others are left out."""
+    return frozenset(file_id(path) for path in paths if path is not None and os.path.isfile(path))
+
+
+@contextmanager
+def keeping(inputs: Iterable[FileId]) -> Iterator[None]:
+    """Refuse to replace these files in the block, under whatever name."""
+    token = _inputs.set(_inputs.get().union(inputs))
+    try:
+        yield
+    finally:
+        _inputs.reset(token)
+
+
+def check_target(path: str | os.PathLike[str], suffix: str = "") -> str:
     """The file that `path` names, behind any links. Raises OSError where nothing can be written there: the
-    directory is missing or read-only, `path` is one, no plain file, or a read-only one."""
+    directory is missing or read-only, `path` is one, no plain file, a read-only one, an input, or not of the kind that
+    this suffix promises."""
     path = os.fspath(path)
     target = os.path.realpath(path)
     directory = os.path.dirname(target if os.path.islink(path) else path) or "."
@@ -50,7 +79,22 @@ def check_target(path: str | os.PathLike[str]) -> str:
         raise FileExistsError(f"{path}: got a device, pipe or socket, expected a plain file")
     if not os.access(target, os.W_OK):
         raise PermissionError(f"{path}: is read-only")
+    _check_replaceable(path, kind_by_suffix(suffix))
     return target
+
+
+def _check_replaceable(path: str, kind: str | None) -> None:
+    """FileExistsError where a file is there that is an input, or that holds anything but this kind; None: any kind."""
+    if not os.path.exists(path):
+        return
+    if file_id(path) in _inputs.get():
+        raise FileExistsError(f"{path}: is the input, or a file that belongs to it; choose another output name")
+    found = kind_of(path) if kind is not None and os.path.getsize(path) else kind
+    if found != kind or found == UNKNOWN:
+        raise FileExistsError(
+            f"{path}: is there already and holds {found}, expected {kind}; choose another output name, or remove it "
+            "first"
+        )
 
 
 def is_url(path: object) -> bool:
@@ -77,6 +121,7 @@ class PendingFile:
 
     def complete(self) -> None:
         """Gives the file its name, in place of an older one, once its bytes are on the disk."""
+        _check_replaceable(self.path, kind_of(self.name))
         try:
             os.fsync(self.descriptor)
             if fcntl is None:
@@ -149,6 +194,8 @@ def new_files(path: str | os.PathLike[str], named: bool = True) -> Iterator[str]
         made = sorted(os.listdir(folder), key=lambda file: (file == name, file))
         if named and name not in made:
             raise FileNotFoundError(f"{path}: the writer has made no such file")
+        for file in made:
+            _check_replaceable(os.path.join(directory, file), kind_of(os.path.join(folder, file)))
         for file in made:
             os.replace(os.path.join(folder, file), os.path.join(directory, file))
         _sync_folder(directory)

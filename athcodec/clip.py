@@ -14,6 +14,7 @@ from typing import Any, cast
 
 import numpy as np
 
+from athcodec.atomic_files import FileId
 from athcodec.errors import ClipError
 
 LARGEST_COORDINATE = 1e18
@@ -288,6 +289,11 @@ class MotionClip:
         finally:
             if self.unchanged is not None and not self.unchanged():
                 raise ClipError("positions: the file was changed while it was read, expected it to stay as it is")
+
+    @property
+    def inputs(self) -> frozenset[FileId]:
+        """The files behind the positions, by device and inode, as far as `unchanged` knows them."""
+        return getattr(self.unchanged, "files", frozenset())
 
     def block(self, start: int, stop: int) -> np.ndarray:
         """Positions of frames `start` to `stop` - 1.

@@ -11,9 +11,11 @@ from typing import Any
 
 import numpy as np
 
+from athcodec.atomic_files import FileId
 from athcodec.clip import ClipRange, clip_range_frames, polygons
 from athcodec.decoder import Affines, Decoder
 from athcodec.errors import LevelUnavailable
+from athcodec.options import whole
 
 
 class ClipView:
@@ -44,11 +46,16 @@ class ClipView:
         self, decoder: Decoder, level: int | None = None, frames: range | None = None, *, all_clips: bool = False
     ):
         self.decoder = decoder
-        self.level = decoder.deepest if level is None else level
+        self.level = decoder.deepest if level is None else whole("level", level)
         if not 0 <= self.level < decoder.level_count:
             raise LevelUnavailable(f"level: got {level}; expected 0 to {decoder.level_count - 1}")
         played = [decoder.play(clip.name) for clip in decoder.clips] if all_clips else [decoder]
         self._runs = [(clip, _checked(frames, clip.frame_count)) for clip in played]
+
+    @property
+    def inputs(self) -> frozenset[FileId]:
+        """The files that it is read from, by device and inode."""
+        return self.decoder.file.inputs
 
     @property
     def clip_ranges(self) -> tuple[ClipRange, ...]:

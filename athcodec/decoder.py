@@ -25,6 +25,7 @@ from athcodec.container import Limits
 from athcodec.errors import BadChunk, LevelUnavailable
 from athcodec.host_mesh import HostMesh
 from athcodec.joining import metadata_of, wind_of
+from athcodec.options import whole
 from athcodec.transitions import EndlessPlay
 
 SHOWN_TYPES = (np.dtype(np.float32), np.dtype(np.float64))
@@ -617,7 +618,7 @@ class Decoder:
     def _checked_level(self, level: int | None) -> int:
         if level is None:
             return self.deepest
-        if not 0 <= level < self.level_count:
+        if not 0 <= (level := whole("level", level)) < self.level_count:
             raise LevelUnavailable(f"level: got {level}; expected 0 to {self.level_count - 1}")
         return level
 
@@ -629,7 +630,7 @@ class Decoder:
             if step != 1:
                 raise LevelUnavailable(f"frames: got a step of {step}; expected 1")
             return start, max(stop, start)
-        index = int(frames) + (self.frame_count if frames < 0 else 0)
+        index = whole("frame", frames) + (self.frame_count if frames < 0 else 0)
         if not 0 <= index < self.frame_count:
             raise LevelUnavailable(f"frame: got {frames}; expected 0 to {self.frame_count - 1}")
         return index, index + 1

@@ -23,7 +23,7 @@ from athcodec.atomic_files import new_file
 from athcodec.clip import MotionClip, check_branches, check_stem_index, source_stem_index, stands_still
 from athcodec.errors import ClipError
 from athcodec.hierarchy import branch_orders, branches_from_edges
-from athcodec.options import METHODS
+from athcodec.options import METHODS, whole
 from athcodec.point_runs import base_points, run_links, scipy_module
 
 LABEL_NAMES = ("vertex_branch", "branch", "branch_id", "branchid", "branch_index", "branchindex", "branch_number")
@@ -140,6 +140,7 @@ def find_branches(clip: MotionClip, method: str = "auto", root: int | None = Non
     """
     if method != "auto" and method not in METHODS:
         raise ValueError(f"method: got {method!r}, expected auto or one of {', '.join(METHODS)}")
+    root = None if root is None else whole("root", root)
     found = _first_found(_Seen(clip), METHODS if method == "auto" else (method,), root)
     if found is None:
         raise ClipError(f"branches: the clip has nothing to find them by {method}, expected {_EXPECTED[method]}")
@@ -214,7 +215,8 @@ def save(found: Found, path: str | os.PathLike[str]) -> None:
     ----------
     found : Found
     path : str or path
-        The file: of each branch its parent, and its vertices from base to tip as runs, "0-5 9".
+        The file: of each branch its parent, and its vertices from base to tip as runs, "0-5 9". Older JSON is replaced,
+        no other file.
 
     Raises
     ------

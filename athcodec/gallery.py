@@ -7,13 +7,12 @@ from __future__ import annotations
 
 import html
 import os
-import shutil
 from collections.abc import Sequence
 from pathlib import Path
 from urllib.parse import quote
 
 from athcodec import picture
-from athcodec.atomic_files import is_url
+from athcodec.atomic_files import check_target, file_ids, is_url, keeping, new_file
 from athcodec.decoder import open as open_ath
 from athcodec.errors import AthError
 from athcodec.view import WEB, file_name
@@ -42,7 +41,7 @@ def export_gallery(paths: Sequence[str | os.PathLike[str]], folder: str | os.Pat
     paths : sequence of str or path-like
         The .ath files, whose names differ.
     folder : str or path-like
-        Made where it is not there; files in it are replaced.
+        Made where it is not there; files in it are replaced by files of their kind.
     stills : bool
         Whether to draw a still picture of each plant, which is seen until the plant moves. Takes athcodec[picture] and
         Chromium.
@@ -69,15 +68,22 @@ def export_gallery(paths: Sequence[str | os.PathLike[str]], folder: str | os.Pat
     out = Path(folder)
     for part in ("viewer", "plants", *(["stills"] if stills else [])):
         (out / part).mkdir(parents=True, exist_ok=True)
-    for name in VIEWER:
-        shutil.copyfile(WEB / name, out / "viewer" / name)
-    for path, name in zip(paths, names, strict=True):
-        shutil.copyfile(path, out / "plants" / name)
-        if stills:
-            (out / _still(name)).write_bytes(picture.still(path))
-    text = PAGE.read_text("utf-8").replace("CARDS", "\n".join(cards))
-    (out / "index.html").write_text(text, "utf-8")
+    with keeping(file_ids(*paths)):
+        for target in (out / "index.html", *(out / "plants" / name for name in names)):
+            check_target(target, target.suffix)
+        for name in VIEWER:
+            _write(out / "viewer" / name, (WEB / name).read_bytes())
+        for path, name in zip(paths, names, strict=True):
+            _write(out / "plants" / name, Path(path).read_bytes())
+            if stills:
+                _write(out / _still(name), picture.still(path))
+        _write(out / "index.html", PAGE.read_text("utf-8").replace("CARDS", "\n".join(cards)).encode())
     return sum(file.stat().st_size for file in out.rglob("*") if file.is_file())
+
+
+def _write(path: Path, data: bytes) -> None:
+    with new_file(path) as out:
+        out.write(data)
 
 
 def facts_of(path: str | os.PathLike[str]) -> str:

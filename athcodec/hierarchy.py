@@ -16,6 +16,7 @@ import numpy as np
 
 from athcodec.clip import MotionClip, check_branches, check_indices, check_stem_index
 from athcodec.errors import ClipError
+from athcodec.options import whole
 
 MAX_VERTICES = 2**31 - 1
 
@@ -304,7 +305,8 @@ class _EulerTour:
 
 def _choose_roots(part: np.ndarray, rest: np.ndarray, root: int | Sequence[int] | None, up_axis: str) -> np.ndarray:
     axis, sign = _parse_axis(up_axis)
-    given = np.atleast_1d(np.asarray([] if root is None else root, np.int64))
+    vertices = np.atleast_1d([] if root is None else root)
+    given = np.array([whole("root", vertex) for vertex in vertices], np.int64)
     if ((given < 0) | (given >= len(part))).any():
         raise ClipError(f"root: got {given.tolist()}, expected vertices 0 to {len(part) - 1}")
     if len(np.unique(part[given])) < len(given):

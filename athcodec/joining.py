@@ -15,9 +15,11 @@ from typing import Any
 
 import numpy as np
 
+from athcodec.atomic_files import FileId
 from athcodec.clip import ClipRange, MotionClip, check_clip_ranges, clip_range_frames
 from athcodec.errors import ClipError
 from athcodec.frames import Frames
+from athcodec.options import whole
 
 BLEND = "loop_blend"  # metadata: frames that were blended
 OWN = "clips"  # metadata: by name, what one of several clips has of its own
@@ -68,7 +70,7 @@ def join(clips: Mapping[str, MotionClip]) -> MotionClip:
         stem_index=first.stem_index,
         clip_ranges=clip_ranges,
         resource=closing,
-        unchanged=_all_unchanged(parts),
+        unchanged=_AllUnchanged(parts),
         skin=first.skin,
         not_read=first.not_read,
     )
@@ -170,7 +172,7 @@ def looped(clip: MotionClip, blend: int = 0) -> MotionClip:
         Where the clip is several clips, or has too few frames to blend.
     """
     clip_range = _only_clip_range("", clip)
-    if not 0 <= blend <= clip.frame_count // 3:
+    if not 0 <= whole("blend", blend) <= clip.frame_count // 3:
         raise ClipError(
             f"loop: got {blend} frames to blend, expected 0 to {clip.frame_count // 3}, a third of the clip"
         )
@@ -257,9 +259,15 @@ def _common_metadata(clips: Mapping[str, MotionClip]) -> dict[str, Any]:
     return common | {OWN: own} if own else common
 
 
-def _all_unchanged(clips: Sequence[MotionClip]) -> Any:
-    checks = [clip.unchanged for clip in clips if clip.unchanged is not None]
-    return (lambda: all(check() for check in checks)) if checks else None
+class _AllUnchanged:
+    """Whether the files of several clips are as they were."""
+
+    def __init__(self, clips: Sequence[MotionClip]):
+        self._checks = [clip.unchanged for clip in clips if clip.unchanged is not None]
+        self.files = frozenset[FileId]().union(*(clip.inputs for clip in clips))
+
+    def __call__(self) -> bool:
+        return all(check() for check in self._checks)
 
 
 def _joined(parts: Sequence[Any]) -> Frames:

@@ -4,7 +4,9 @@ explain itself."""
 from __future__ import annotations
 
 import math
+import operator
 from collections.abc import Sequence
+from typing import SupportsIndex
 
 DEFAULT_REL_ERROR = 1e-4
 LOSSLESS_REL_ERROR = 4e-7  # about where a lossless file is smallest
@@ -18,6 +20,14 @@ MAX_MEMORY = 4 << 30  # bytes that reading a source may take
 RIG_JOINTS = 256  # of a rig, where none are asked for
 HOST = "host"
 """The word for a rest pose that whoever plays the file has: `--rest host`."""
+
+
+def whole(what: str, number: SupportsIndex) -> int:
+    """The number as an int, NumPy's integers too. TypeError for any other, such as 3.5 or 3.0."""
+    try:
+        return operator.index(number)
+    except TypeError:
+        raise TypeError(f"{what}: got {number!r}, expected a whole number of type int") from None
 
 
 def ladder_of(ladder: str | Sequence[float]) -> tuple[float, ...]:

@@ -14,7 +14,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from athcodec.atomic_files import new_file
+from athcodec.atomic_files import check_target, new_file
 from athcodec.decoder import open as open_ath
 from athcodec.errors import MissingExtra
 from athcodec.host_mesh import HostMesh
@@ -74,7 +74,7 @@ def save_picture(
     path : str or path-like
         The .ath file, or its URL.
     out : str or path-like
-        The picture; it appears when it is complete.
+        The picture; it appears when it is complete. An older one of this kind is replaced, no other file.
     kind : str
         "gif" and "webp" move, over one round of the clip; "png" stands still.
     clip : str, optional
@@ -100,6 +100,7 @@ def save_picture(
     AthError, OSError
         As `athcodec.view.export_page`.
     """
+    check_target(out, f".{kind}")
     image = _packages()
     pictures = [
         image.open(io.BytesIO(data)).convert("RGB") for data in _drawn(path, kind, clip, size, fps, time, host_mesh)

@@ -15,6 +15,7 @@ import numpy as np
 
 from athcodec.clip import MotionClip
 from athcodec.errors import ClipError
+from athcodec.options import whole
 
 if TYPE_CHECKING:
     from athcodec.decoder import Decoder
@@ -105,7 +106,7 @@ class EndlessPlay:
         self._ways = [
             _Way(time[a], time[b], min(time[a + n] - time[a], time[b + n] - time[b]), time[b + n]) for a, b, n in found
         ]
-        self._state = (seed * 2654435761 + 1) % 2**32 or 1
+        self._state = (whole("seed", seed) * 2654435761 + 1) % 2**32 or 1
         self._begins = [0.0]  # when each run of the clip begins
         self._runs = [_Way(0.0, 0.0, 0.0, 0.0)]  # what led to it
         self._next = self._drawn(0.0)

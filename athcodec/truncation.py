@@ -5,11 +5,13 @@ from __future__ import annotations
 import os
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from athcodec import container as ct
 from athcodec.ath_file import AthFile
-from athcodec.atomic_files import new_file
+from athcodec.atomic_files import check_target, new_file
 from athcodec.errors import ClipError, LevelUnavailable, Truncated
+from athcodec.options import whole
 
 
 def truncate(
@@ -63,6 +65,7 @@ def truncate(
     if sum(option is not None for option in (level, max_error, target_size)) != 1:
         raise TypeError("truncate: expected one of level, max_error and target_size")
     with AthFile(source, gltf_motion=gltf_motion) as file:
+        check_target(target, ".glb" if Path(target).suffix.lower() == ".glb" else ".ath")
         if max_error is not None:
             last = file.level_within(max_error)
         elif target_size is not None:
@@ -105,10 +108,10 @@ def _shortened(file: AthFile, level: int) -> tuple[bytes, list[ct.Chunk]]:
     return ct.pack_front(header, chunks, file.errors[: level + 1]), chunks
 
 
-def _present(file: AthFile, level: int | None) -> int:
-    if level is None or not 0 <= level < file.level_count:
+def _present(file: AthFile, level: Any) -> int:
+    if not 0 <= (last := whole("level", level)) < file.level_count:
         raise LevelUnavailable(f"level: got {level}; expected 0 to {file.level_count - 1}")
-    return level
+    return last
 
 
 def _last_within(file: AthFile, target_size: int) -> int:

@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote, urlsplit
 
-from athcodec.atomic_files import is_url, new_file
+from athcodec.atomic_files import check_target, file_ids, is_url, keeping, new_file
 from athcodec.decoder import open as open_ath
 from athcodec.errors import AthError, ClipError, MissingExtra
 from athcodec.host_mesh import HostMesh
@@ -52,7 +52,7 @@ def export_page(
     path : str or path-like
         The .ath file, or its URL.
     page : str or path-like
-        The HTML file to write; it appears when it is complete.
+        The HTML file to write; it appears when it is complete. An older page is replaced, no other file.
     clip : str, optional
         The name of the clip to begin with; by default the first.
     host_mesh : array, MotionClip, str or path-like, optional
@@ -72,12 +72,15 @@ def export_page(
     OSError
         Where a file cannot be read or written.
     """
-    data = _read(path)
-    _refuse_glb(data[:4])
-    mesh = _checked(io.BytesIO(data), clip, host_mesh)
-    text = self_contained(data, file_name(path), clip, mesh, _read_floor(floor)).encode()
-    with new_file(page) as out:
-        out.write(text)
+    mesh_file = host_mesh if isinstance(host_mesh, (str, os.PathLike)) else None
+    with keeping(file_ids(path, mesh_file, *(floor or ()))):
+        check_target(page, ".html")
+        data = _read(path)
+        _refuse_glb(data[:4])
+        mesh = _checked(io.BytesIO(data), clip, host_mesh)
+        text = self_contained(data, file_name(path), clip, mesh, _read_floor(floor)).encode()
+        with new_file(page) as out:
+            out.write(text)
     return len(text)
 
 

@@ -11,6 +11,7 @@ modes in one stream per segment, no maps of nodes, a table of one level.
 from __future__ import annotations
 
 import io
+import tempfile
 from collections.abc import Iterable
 from dataclasses import replace
 from math import sqrt
@@ -19,11 +20,12 @@ from typing import Any
 
 import athcodec
 from athcodec import container as ct
-from athcodec.ath import Thresholds, survey
-from athcodec.encoding.search import Search
-from athcodec.encoding.segment import Coded, CodedPrelude, Settings, Source, code_stems
+from athcodec.encoding import Draft, code_segments, draft, write
+from athcodec.encoding.job import EncodingJob
+from athcodec.encoding.progress import silent
+from athcodec.encoding.search import Search, samples_of
+from athcodec.encoding.segment import Coded, CodedPrelude, Settings, code_stems
 from athcodec.encoding.streams import encode_learned_modes
-from athcodec.hierarchy import hierarchy_of
 from athcodec.metrics import ErrorMeter
 from bench.clips import Encoded, encoded, measure
 
@@ -153,54 +155,36 @@ def _pooled(parts: Iterable[tuple[float, float, int]], diagonal: float) -> tuple
 
 def cost(clip_path: Path, rel_error: float) -> dict[str, Any] | None:
     """One row: bytes of a file, bytes of each part that serves its levels, and bytes without them. None for a file
-    whose levels have no streams, such as one of predicted motion, and for a short one without coarse levels."""
-    with encoded(clip_path, rel_error) as result:
-        chunks, sizes = result.decoder.file.chunks, result.summary.chunk_bytes
-        levels, segments = result.decoder.level_count, len(result.decoder.segments)
-        if not any(sizes.get(kind) for kind in STREAMS):
+    whose levels have no streams, such as one of predicted motion."""
+    with tempfile.TemporaryDirectory() as folder, athcodec.read_hdf5(clip_path) as clip:
+        plan = draft(clip, rel_error=rel_error, attributes="none", rest_error="bound", ladder=())
+        coded = code_segments(clip, plan, range(plan.segment_count))
+        summary = write(clip, plan, coded, Path(folder) / "clip.ath")
+        if not any(summary.chunk_bytes.get(kind) for kind in STREAMS):
             return None
-        clip = result.clip if result.clip.has_branches else _with_those_of(result.decoder, result.clip)
-        recoding = _Recoding(clip, rel_error)
-        if recoding.level_count != levels:
-            return None
-        return _cost(recoding, chunks, sizes, levels, segments, result.summary.bytes)
+        with athcodec.open(summary.path, strict=True) as decoder:
+            return _cost(_Recoding(clip, plan), decoder, summary)
 
 
-def _with_those_of(decoder: athcodec.Decoder, clip: athcodec.MotionClip) -> athcodec.MotionClip:
-    """The clip on the branches that encoding found for it."""
-    return clip.replace(
-        vertex_branch=decoder.vertex_branch, branch_parent=decoder.branch_parent, stem_index=decoder.stem_index
-    )
-
-
-def _cost(
-    recoding: _Recoding, chunks: list[ct.Chunk], sizes: dict[str, int], levels: int, segments: int, bytes_: int
-) -> dict[str, Any]:
-    stored = recoding.streams(recoding.settings)
-    in_file = sum(sizes.get(kind, 0) for kind in STREAMS)
-    if stored != in_file:
-        raise RuntimeError(
-            f"{recoding.name}: got {stored} bytes of motion when coding again; expected the {in_file} of the file"
-        )
-    uniform = recoding.of_one_level()
-    split = min(stored, *(recoding.streams(settings) for settings in uniform))
+def _cost(recoding: _Recoding, decoder: athcodec.Decoder, summary: athcodec.Summary) -> dict[str, Any]:
+    uniform, levels = recoding.of_one_level(), decoder.level_count
+    split = min(recoding.streams(settings) for settings in (recoding.settings, *uniform))
     unsplit = min(recoding.streams(settings, split=False) for settings in (recoding.settings, *uniform))
     merged = min(recoding.streams(settings, split=False, one_level=True) for settings in uniform)
-    table = (
-        TABLE_ENTRY * sum(1 for chunk in chunks if _serves_levels(chunk, levels - 1))
-        + ERROR_ENTRY * (levels - 1) * segments
-    )
-    affines = sizes.get("AFFINES", 0)
-    without = bytes_ - affines - table - (split - min(split, unsplit, merged))
+    table = TABLE_ENTRY * sum(1 for chunk in decoder.file.chunks if _serves_levels(chunk, levels - 1)) + ERROR_ENTRY * (
+        levels - 1
+    ) * len(decoder.segments)
+    affines = summary.chunk_bytes.get("AFFINES", 0)
+    without = summary.bytes - affines - table - (split - min(split, unsplit, merged))
     return {
-        "bytes": bytes_,
+        "bytes": summary.bytes,
         "levels": levels,
         "AFFINES": affines,
         "table": table,
         "early split": split - unsplit,
         "one stream": split - merged,
         "without": without,
-        "cost %": 100 * (bytes_ / without - 1),
+        "cost %": 100 * (summary.bytes / without - 1),
     }
 
 
@@ -215,24 +199,16 @@ def _bytes_of(coded: Coded) -> int:
 
 
 class _Recoding:
-    """The clip coded by the encoder's own stages, at the settings that the encoder finds."""
+    """The motion of a file coded by the encoder's own stages, at the file's settings and at others. Its sizes are
+    compared with each other alone, because they are not those of the file: trials correct a sample of the vertices."""
 
-    def __init__(self, clip: athcodec.MotionClip, rel_error: float) -> None:
-        hierarchy = hierarchy_of(clip)
-        seen = survey(clip, hierarchy)
-        bound = rel_error * seen.diagonal
-        self.name = str(clip)
-        source = Source(clip, hierarchy, seen, None, False)
-        self._ath = seen.ath(Thresholds(bound, 0, bound, 0))
-        search = Search.of(source, self._ath, bound, "default", lambda stage, done: None)
-        self._search = search.about_best_reference()
-        self._source = self._search.source
-        self._positions = [self._source.positions(i) for i in range(len(self._source.segments))]
-        _, (self.settings,) = self._search.found()
-
-    @property
-    def level_count(self) -> int:
-        return len(self.settings.rotation_step_factors)
+    def __init__(self, clip: athcodec.MotionClip, plan: Draft) -> None:
+        decided = EncodingJob.resume(clip, plan).decided(plan)
+        self.settings, self._source, self._ath = plan.choice.settings, decided.source, decided.ath
+        self._search = Search(
+            self._source, self._ath, self.settings, samples_of(self._source), plan.options.effort, silent
+        )
+        self._positions = [self._source.positions(i) for i in range(plan.segment_count)]
 
     def of_one_level(self) -> list[Settings]:
         """Settings for a single stream: those of each level in turn, applied to all levels."""

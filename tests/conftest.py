@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import re
 import sys
+from itertools import combinations
 from pathlib import Path
 
 import numpy as np
@@ -24,6 +26,46 @@ sys.path.append(
 )  # for bench, which is not installed; athcodec stays the installed one
 
 SLOWEST = 240_000  # ms, of waiting for a page that draws in software
+
+
+class Marks(set):
+    """Marks as the names of a marker expression: True for those that are in the set."""
+
+    __getitem__ = set.__contains__
+
+
+def tiers(config) -> list[str]:
+    """The tiers that pyproject.toml leaves out of the default, in their order."""
+    return re.findall(r"\bnot (\w+)", " ".join(config.getini("addopts")))
+
+
+def pytest_configure(config):
+    """Leave out tests that belong to a later tier than those that the marker expression names."""
+    expression, names = config.option.markexpr, tiers(config)
+    last = max((place for place, name in enumerate(names) if re.search(rf"\b{name}\b", expression)), default=None)
+    if last is not None:
+        config.option.markexpr = " and not ".join([f"({expression})", *names[last + 1 :]])
+
+
+def pytest_ignore_collect(collection_path, config):
+    """Do not import a module of which the marker expression selects no test: the libraries that it needs take seconds.
+
+    `pytestmark` holds for all tests of a module; any other mark that the module names may stand on some of them.
+    """
+    if collection_path.suffix != ".py" or not config.option.markexpr:
+        return None
+    text = collection_path.read_text("utf-8")
+    marks = [re.findall(r"mark\.(\w+)", line) for line in re.findall(r"^pytestmark = (.*)", text, re.M)]
+    common = {name for line in marks for name in line}
+    others = (set(re.findall(r"mark\.(\w+)", text)) & set(tiers(config))) - common
+    possible = [Marks(common.union(some)) for count in range(len(others) + 1) for some in combinations(others, count)]
+    return None if any(eval(config.option.markexpr, {}, marks) for marks in possible) else True
+
+
+def pytest_terminal_summary(terminalreporter):
+    """Print the processor time of the run, which other work on the machine changes little."""
+    seconds = sum(os.times()[:4])  # of this process, and of those that it waited for: workers, and what they started
+    terminalreporter.write_line(f"processor time: {seconds:.0f} s, with workers and the programs that tests started")
 
 
 @pytest.fixture(scope="module")

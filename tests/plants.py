@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from hypothesis import settings
+from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
 
 from athcodec import MotionClip
@@ -99,8 +99,10 @@ def tube(rings: int, around: int, frames: int, seed: int = 0) -> MotionClip:
 SHAPES = ("stem", "point", "straight", "flat", "stuttering", "coincident")
 MOTIONS = ("static", "sway", "noise", "teleport", "mirror", "flatten", "drift", "spin")
 
-STEADY = settings(derandomize=True, deadline=None, database=None)
-"""Hypothesis with the same examples in every run."""
+STEADY = settings(derandomize=True, deadline=None, database=None, suppress_health_check=[HealthCheck.too_slow])
+"""Hypothesis with the same examples in every run, and without limits of time, which a busy machine exceeds."""
+settings.register_profile("steady", STEADY)
+settings.load_profile("steady")
 
 
 def awkward(

@@ -8,8 +8,6 @@ import sys
 import time
 from pathlib import Path
 
-import fsspec
-
 BUCKET = "plants"
 
 
@@ -50,6 +48,8 @@ class S3Server:
         return f"s3://{BUCKET}"
 
     def system(self):
+        import fsspec
+
         return fsspec.filesystem("s3", skip_instance_cache=True, use_listings_cache=False)
 
     def answers(self) -> list[str]:

@@ -15,6 +15,8 @@ from test_usd import GRID, QUADS, assert_same, awkward_clip, sway, whole_plant
 import athcodec
 from athcodec.errors import ClipError, SourceWarning
 
+pytestmark = pytest.mark.formats
+
 FPS = float(Fraction(24000, 1001))
 Y_UP = np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]])  # of rows whose Z is up
 TURN = np.array([[0, 1, 0], [-1, 0, 0], [0, 0, 1]])  # by a right angle about Z, of rows
@@ -224,13 +226,13 @@ def test_broken_files_are_refused_in_one_line(tmp_path, capfd):
 
 
 def test_a_write_that_fails_leaves_what_was_there(tmp_path, sample_clip):
-    (tmp_path / "a.abc").write_bytes(b"old")
+    (tmp_path / "a.abc").write_bytes(b"Ogawa, old")
     broken = sample_clip.block(0, 3).copy()
     broken[2, 5] = np.inf
     clip = athcodec.MotionClip(broken, np.arange(3.0), rest=broken[0])
     with pytest.raises(ClipError, match="frame 2"):
         athcodec.write(clip, tmp_path / "a.abc")
-    assert os.listdir(tmp_path) == ["a.abc"] and (tmp_path / "a.abc").read_bytes() == b"old"
+    assert os.listdir(tmp_path) == ["a.abc"] and (tmp_path / "a.abc").read_bytes() == b"Ogawa, old"
 
 
 # ---- Blender ----

@@ -28,7 +28,10 @@ import athcodec
 from athcodec import batch, cli
 from athcodec.batch import manifest, runs
 from athcodec.batch.manifest import Manifest, ManifestError
+from athcodec.container import MAGIC
 from athcodec.errors import ClipError, MissingExtra
+
+pytestmark = pytest.mark.tools
 
 FAST = {"effort": "fast", "segment_frames": 16}
 BATCH = [sys.executable, "-m", "athcodec", "batch"]
@@ -432,10 +435,18 @@ def test_clips_in_an_object_store_become_files_there_and_a_second_run_does_what_
     assert [path.name for path in notes.parent.iterdir()] == ["n.jsonl"]
     assert run() == (0, 4)
     store.rm_file("plants/out/a.ath")
-    store.pipe_file("plants/out/b.ath", b"something else")
+    store.pipe_file("plants/out/b.ath", MAGIC + b"something else")
     store.put_file(str(clips / "a.h5"), "plants/in/sub/c.h5")
     assert run() == (3, 1) and run() == (0, 4)
     assert store.cat_file("plants/out/sub/c.ath") == store.cat_file("plants/out/a.ath")
+
+
+def test_what_is_no_ath_file_in_an_object_store_stays(clips, s3, tmp_path):
+    url, store = s3.put({"out/a.ath": b"something else"}), s3.system()
+    words = [str(clips / "a.h5"), "--out", f"{url}/out", "--manifest", str(tmp_path / "n.jsonl"), "--workers", "1"]
+    done = subprocess.run([*BATCH, *words, *WORDS], capture_output=True, text=True, timeout=120)
+    assert done.returncode == 1 and "a.ath: is there already and no .ath file" in done.stderr
+    assert store.cat_file("plants/out/a.ath") == b"something else"
 
 
 def test_clips_in_an_object_store_become_local_files(clips, s3, tmp_path):

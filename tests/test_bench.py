@@ -13,19 +13,24 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from plants import plant
 
 import athcodec
 from athcodec import encoding
 from athcodec._native import crc32c
 from athcodec.container import KIND_NAMES
 from athcodec.encoding.features import Feature
+from athcodec.encoding.segment import SAMPLED
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.append(str(ROOT))  # for bench, which is not installed; athcodec stays the installed one
 
-from bench import charts, codec_registry, compare, paper, plots, rd, tables  # noqa: E402
+from bench import codec_registry, compare, paper, plots, progressive, rd, tables  # noqa: E402
+from bench.clips import encoded  # noqa: E402
 from bench.curves import Curve, mean_saving  # noqa: E402
 from bench.store import Store, read  # noqa: E402
+
+pytestmark = pytest.mark.tools
 
 KINDS = {*KIND_NAMES.values(), "HEADER"}
 MEMORY_PARTS = ("file", "opened", "bases", "work", "segments")
@@ -373,6 +378,19 @@ def test_errors_of_a_growing_prefix_are_those_in_the_table_of_the_file(tmp_path,
 
 
 @pytest.mark.slow
+def test_what_levels_cost_is_measured_of_meshes_whose_trials_correct_a_sample(tmp_path):
+    """The sizes of trials, which hold estimates there, were expected to be those of the file."""
+    clip = plant(seed=3, branches=900, longest=9, frames=4, rough=0.02)
+    assert clip.vertex_count >= SAMPLED
+    athcodec.write_hdf5(clip, tmp_path / "large.h5")
+    cost = progressive.cost(tmp_path / "large.h5", 1e-3)
+    with encoded(tmp_path / "large.h5", 1e-3) as result:
+        assert cost["bytes"] == result.summary.bytes
+        assert cost["AFFINES"] == result.summary.chunk_bytes["AFFINES"]
+    assert cost["bytes"] >= cost["without"] > 0
+
+
+@pytest.mark.slow
 def test_prefixes_are_compared_with_files_of_their_own_at_levels_and_between_them(tmp_path, bushy_file):
     pytest.importorskip("matplotlib")
     picture = tmp_path / "ratios.png"
@@ -496,13 +514,6 @@ def test_a_batch_under_fault_injection_encodes_every_clip_once(tmp_path):
 
 
 # ---- the whole of it ----
-
-
-@pytest.mark.parametrize("verb", charts.CHARTS)
-def test_results_of_the_repository_have_pictures(verb, tmp_path):
-    result = json.loads((ROOT / "bench" / "results" / f"{verb}.json").read_text())
-    [picture] = charts.draw(verb, verb, result, tmp_path)
-    assert picture.read_bytes().startswith(b"\x89PNG")
 
 
 def test_the_papers_number_of_nodes_is_met_by_its_parameters(sample_clip):

@@ -21,6 +21,8 @@ from bench.codecs.lengyel import Parts, _rotation_vectors, _rotations
 from bench.codecs.ours import Athcodec
 from bench.codecs.tree import VertexOrder, differences, sums, vertex_order
 
+pytestmark = pytest.mark.tools
+
 ROOT = Path(__file__).resolve().parent.parent
 BOUND = 3e-4  # over the diagonal
 CODERS = [RangeCoder(), Zstd()]

@@ -26,6 +26,8 @@ from bench.trees.refine import refine  # noqa: E402
 from bench.trees.ride import Skeleton, rotations, smallest_turns, sway  # noqa: E402
 from bench.trees.wind import DIRECTION, Wind  # noqa: E402
 
+pytestmark = pytest.mark.tools
+
 SMALL = data.Simulated(nodes=100, orders=2, frames=20, height=4.0, wind_speed=10.0, seed=1)
 BREEZE = Wind(8.0, 8.0, seed=2)
 CANOPY = data.Canopy(nodes=120, orders=1, frames=40, height=5.0, wind_speed=8.0, leaves=80, species="poplar", seed=3)

@@ -27,6 +27,8 @@ from bench.odd.others import captured_stem, still_mesh, tumbling_cube  # noqa: E
 from bench.store import read  # noqa: E402
 from bench.trees.plant import grow  # noqa: E402
 
+pytestmark = pytest.mark.tools
+
 SHAPES = {
     "growth": (120, 1001),
     "growth_in_wind": (120, 1001),

@@ -21,6 +21,8 @@ from bench.codecs import BoundBroken, Source, check  # noqa: E402
 from bench.codecs.program import CannotKeep, Grid  # noqa: E402
 from bench.codecs.programs import CLASSES, PROGRAMS, lossless  # noqa: E402
 
+pytestmark = pytest.mark.tools
+
 MODULES = {kind.module: kind.package for kind in CLASSES}
 FRAMES, BRANCHES = slice(30, 46), 16
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]

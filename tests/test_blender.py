@@ -14,6 +14,8 @@ from test_gltf_motion import check_schemas, structure
 import athcodec
 from athcodec.blender import build
 
+pytestmark = pytest.mark.formats
+
 UP_IS_Z = np.array([[1, 0, 0], [0, 0, 1], [0, -1, 0]], np.float32)  # in the sample's file it is y
 
 PLAY = """

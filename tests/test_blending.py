@@ -242,6 +242,7 @@ answer({
 """
 
 
+@pytest.mark.web
 def test_webassembly_blends_to_the_same_bits(tree_ath, tmp_path):
     shown = run_node(tmp_path, BLEND_IN_NODE, tree_ath)
     with athcodec.open(tree_ath) as decoder:

@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 import athcodec
-from athcodec import cli
+from athcodec import batch, cli
 from athcodec.cli.clips import tick_ratios
 from athcodec.metrics import compare_clips
 from athcodec.sources import read_hdf5, sample_path
@@ -409,13 +409,97 @@ FAILURES = {
 def test_a_failure_is_one_line_and_leaves_no_file(encoded, tmp_path, capsys, monkeypatch, line, message):
     monkeypatch.chdir(tmp_path)
     before = encoded.read_bytes()
-    words = {"FILE": str(encoded), "SOURCE": SAMPLE, "OUT": "out"}
+    words = {"FILE": str(encoded), "SOURCE": SAMPLE, "OUT": "out.ath"}
     assert run(*(words.get(word, word) for word in line.split())) == 1
     err = capsys.readouterr().err
     for word, path in words.items():
         message = message.replace(word, re.escape(path))
     assert re.fullmatch(f"athcodec: error: .*{message}.*\n", err)
     assert list(tmp_path.iterdir()) == [] and encoded.read_bytes() == before
+
+
+OTHERS = {  # what is there already, by the verb that would replace it
+    "encode": ("encode SOURCE OUT.ath --effort fast", "HDF5"),
+    "decode": ("decode FILE OUT.usda", "HDF5"),
+    "decode to a format that is named": ("decode FILE OUT.dat --format npz", "HDF5"),
+    "decode to numbered files": ("decode FILE OUT.obj --frames 0:1", "HDF5"),
+    "truncate": ("truncate FILE OUT.ath --level 0", "HDF5"),
+    "hierarchy": ("hierarchy SOURCE --save OUT.json", "HDF5"),
+    "view": ("view FILE --export OUT.html", "HDF5"),
+    "picture": ("picture FILE --png OUT.png", "HDF5"),
+}
+
+
+@pytest.mark.parametrize("line, kind", OTHERS.values(), ids=OTHERS)
+def test_a_file_of_another_kind_is_never_replaced(encoded, tmp_path, capsys, line, kind):
+    words = [{"FILE": encoded, "SOURCE": SAMPLE}.get(word, word) for word in line.split()]
+    place = next(i for i, word in enumerate(words) if str(word).startswith("OUT"))
+    words[place] = out = tmp_path / words[place]
+    shutil.copy(SAMPLE, out)
+    assert run(*words) == 1
+    message = f"athcodec: error: {re.escape(str(out))}: is there already and holds {kind}, expected .*another output"
+    assert re.match(message, capsys.readouterr().err)
+    assert list(tmp_path.iterdir()) == [out] and out.read_bytes() == Path(SAMPLE).read_bytes()
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "encode SOURCE OUT.ath --effort fast --rel-error 1e-2",
+        *(f"decode FILE OUT.{suffix} --frames 0:2" for suffix in "h5 npz usda glb mdd xdmf pvd".split()),
+        "decode FILE OUT.ply --frames 0:1",
+        "truncate FILE OUT.ath --level 0",
+        "hierarchy SOURCE --save OUT.json",
+        "view FILE --export OUT.html",
+    ],
+)
+def test_a_file_of_the_same_kind_and_an_empty_one_are_replaced(encoded, tmp_path, line):
+    words = [{"FILE": encoded, "SOURCE": SAMPLE}.get(word, word) for word in line.split()]
+    place = next(i for i, word in enumerate(words) if str(word).startswith("OUT"))
+    words[place] = out = tmp_path / words[place]
+    out.touch()
+    for _ in range(2):
+        assert run(*words) == 0
+
+
+def test_two_sources_without_an_output_are_an_error_that_shows_what_may_have_been_meant(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    for name in ("calm.h5", "gale wind.h5"):
+        shutil.copy(SAMPLE, name)
+    assert run("encode", "calm.h5", "gale wind.h5") == 1
+    error = capsys.readouterr().err
+    assert "athcodec encode calm.h5 'gale wind.h5' -o OUT.ath" in error
+    assert "athcodec batch calm.h5 'gale wind.h5' --out DIR" in error
+    assert run("encode", "calm.h5", "x.foo") == 1
+    assert "x.foo: got this name for the output, expected one that ends in .ath" in capsys.readouterr().err
+    assert Path("gale wind.h5").read_bytes() == Path(SAMPLE).read_bytes() and not Path("x.foo").exists()
+
+
+def test_the_files_of_a_shell_pattern_are_one_sequence(encoded, tmp_path, capsys):
+    for name in ("calm", "gale"):
+        (tmp_path / name).mkdir()
+        assert run("decode", encoded, tmp_path / name / f"{name}.obj", "--frames", "9:12") == 0
+    calm, gale = (sorted((tmp_path / name).iterdir()) for name in ("calm", "gale"))
+    before = [path.read_bytes() for path in (*calm, *gale)]
+    capsys.readouterr()
+    assert run("encode", *calm) == 1
+    assert f"athcodec encode {calm[0]} -o OUT.ath" in capsys.readouterr().err
+    assert run("encode", *calm[:2], tmp_path / "part.ath") == 1
+    assert "got 2 names of a sequence of 3 files" in capsys.readouterr().err
+    out, how = tmp_path / "out.ath", ("--effort", "fast", "--rel-error", "1e-2")
+    for words in ([*calm, out], ["-o", out, *calm]):
+        assert run("encode", *words, *how) == 0
+        with athcodec.open(out) as decoder:
+            assert [(clip.name, clip.frame_count) for clip in decoder.clips] == [("", 3)]
+    assert run("encode", *calm, *gale, out, *how) == 0
+    with athcodec.open(out) as decoder:
+        assert [(clip.name, clip.frame_count) for clip in decoder.clips] == [("calm", 3), ("gale", 3)]
+    items = batch.find([*calm, str(tmp_path / "gale" / "*.obj")], tmp_path / "many")
+    assert [(Path(item.input), Path(item.output).name) for item in items] == [
+        (calm[0], "calm.ath"),
+        (gale[0], "gale.ath"),
+    ]
+    assert [path.read_bytes() for path in (*calm, *gale)] == before
 
 
 def test_a_unit_without_one_in_the_clip_is_an_error(tmp_path, capsys):
@@ -428,15 +512,15 @@ def test_a_unit_without_one_in_the_clip_is_an_error(tmp_path, capsys):
     assert run("encode", source, tmp_path / "a.ath", "--max-error", "0.1", "--effort", "fast") == 0
 
 
-def test_a_failure_on_the_way_leaves_the_older_file_alone(tmp_path, capsys):
+def test_a_failure_on_the_way_leaves_the_older_file_alone(encoded, tmp_path, capsys):
     source, out = tmp_path / "bad.h5", tmp_path / "a.ath"
     shutil.copy(SAMPLE, source)
-    out.write_bytes(b"older")
+    out.write_bytes(encoded.read_bytes())
     with h5py.File(source, "a") as file:
         file["positions"][119, 7, 1] = np.nan
     assert run("encode", source, out) == 1
     assert re.search(r"bad\.h5: positions: frame 119, vertex 7 is \(", capsys.readouterr().err)
-    assert out.read_bytes() == b"older" and set(tmp_path.iterdir()) == {source, out}
+    assert out.read_bytes() == encoded.read_bytes() and set(tmp_path.iterdir()) == {source, out}
 
 
 @pytest.mark.parametrize("line", ["--debug info none.ath", "info --debug none.ath", "info none.ath --debug"])

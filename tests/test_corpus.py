@@ -31,6 +31,7 @@ def test_every_file_plays(path):
     assert use(path.read_bytes())
 
 
+@pytest.mark.tools
 @pytest.mark.parametrize("target", targets.TARGETS)
 def test_every_input_goes_through_the_targets(target):
     paths = sorted([*CORPUS.glob("*.ath"), *CORPUS.glob(f"*.{target}")])
@@ -78,6 +79,7 @@ def test_the_bytes_of_a_segment_are_found_without_looking_at_those_of_others(wor
     assert ask(8_000) < 2 * ask(250), "32 times the chunks"
 
 
+@pytest.mark.tools
 def test_integers_are_not_looked_at_before_they_are_written():
     """The permutation of the vertices entered a sum before it was decoded, which overflowed where memory held the least
     integer. The target prelude.c fills it with that, under a sanitizer: the test above on all inputs runs it."""

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import struct
 import sys
-import time
 import tracemalloc
 from collections.abc import Sequence
 from contextlib import suppress
@@ -405,25 +404,28 @@ def test_announced_errors_must_be_lengths(value, place, data):
         {"frame_count": 1 << 18, "segment_count": 1 << 17, "level_count": 3},
     ],
 )
-def test_a_small_front_that_claims_much_is_refused_at_once(claim, data):
-    small = with_header(data, **claim)
-    start = time.perf_counter()
-    with pytest.raises(FormatError):
-        opened(small)
-    assert time.perf_counter() - start < 1
+def test_a_small_front_that_claims_much_is_refused_at_once(claim, data, work_of):
+    assert_refused_soon(with_header(data, **claim), data, work_of)
 
 
-def test_a_million_errors_from_no_bytes_cost_little(parts):
+def assert_refused_soon(bad: bytes, good: bytes, work_of) -> None:
+    """Refusing the bad file takes less work than opening the good one, which is small."""
+
+    def refuse() -> None:
+        with pytest.raises(FormatError):
+            opened(bad)
+
+    assert work_of(refuse) < work_of(lambda: opened(good))
+
+
+def test_a_million_errors_from_no_bytes_cost_little(parts, work_of):
     """As many as the limit allows, all 0: they are decoded before a chunk is found to be missing."""
     entries = (1 << 19) - len(parts.chunks)
     counts = {"frame_count": entries, "segment_count": entries, "level_count": 2}
     header = replace(parts.header, **counts, max_error=0.0, joins=None)
     front = ct.pack_front(header, [chunk for chunk, _ in parts.chunks], np.zeros((2, entries, 3)))
     assert len(front) < 2000
-    start = time.perf_counter()
-    with pytest.raises(FormatError):
-        opened(front + b"".join(payload for _, payload in parts.chunks))
-    assert time.perf_counter() - start < 2
+    assert_refused_soon(front + b"".join(payload for _, payload in parts.chunks), parts.file(), work_of)
 
 
 # ---- fronts, read twice ----
@@ -634,14 +636,14 @@ def test_a_corrupted_chunk_with_a_good_checksum_is_refused_or_plays_with_no_more
     parts, rng, outcomes, works = parts_with(name), np.random.default_rng(KINDS[name]), [], []
     expected = opened(parts.file()).positions()
     places = [i for i, (c, _) in enumerate(parts.chunks) if c.kind == KINDS[name]]
-    for _ in range(90):
+    for _ in range(40):
         i, chunks = int(rng.choice(places)), list(parts.chunks)
         chunks[i] = chunks[i][0], mutations(rng, chunks[i][1])
         data = parts.with_chunks(chunks)
         works.append(work_of(lambda data=data: outcomes.append(use(data))))
         if name in STATIC:
             assert np.array_equal(opened(data).positions(), expected), "the motion plays whatever they are"
-    assert_refused_or_played(name, outcomes, 5)
+    assert_refused_or_played(name, outcomes, 2)
     assert max(works) < 2 * work_of(lambda: use(parts.file()))
 
 

@@ -21,6 +21,7 @@ from athcodec._native import LOOSE
 from athcodec.encoding import streams
 from athcodec.encoding.motion import Plan
 from athcodec.errors import BadChecksum, BadChunk, FormatError, LevelUnavailable
+from athcodec.hierarchy import branches_from_edges
 
 
 @pytest.fixture(scope="module")
@@ -231,6 +232,40 @@ def test_any_frames_alone_equal_those_of_the_whole(played):
             assert np.array_equal(decoder.positions(chosen, level), whole[chosen])
         for frame in (0, boundary - 1, boundary, count - 1, -1, -count, np.int64(3)):
             assert np.array_equal(decoder.positions(frame, level), whole[frame])
+
+
+@pytest.mark.parametrize("number", [1.5, 1.0, np.float64(1.0)])
+def test_a_number_that_is_not_whole_names_no_frame_level_or_vertex(number, bushy_ath, bushy_clip, tmp_path):
+    with athcodec.open(bushy_ath) as decoder:
+        view = athcodec.ClipView(decoder)
+        for call in (
+            lambda: decoder.positions(number),
+            lambda: decoder.positions(0, number),
+            lambda: decoder.positions(slice(0, number)),
+            lambda: list(decoder.blocks(frames=number)),
+            lambda: decoder.affines(number),
+            lambda: decoder.blended({"": 1.0}, 0.0, number),
+            lambda: decoder.file.available(number),
+            lambda: athcodec.ClipView(decoder, number),
+            lambda: view.block(0, number),
+            lambda: view.affines(number),
+            lambda: bushy_clip.block(0, number),
+            lambda: athcodec.truncate(bushy_ath, tmp_path / "a.ath", number),
+            lambda: athcodec.looped(bushy_clip, number),
+            lambda: athcodec.find_branches(bushy_clip, root=number),
+            lambda: branches_from_edges(np.array([[0, 1], [1, 2]]), 3, np.eye(3), [number]),
+            lambda: athcodec.encode(bushy_clip, tmp_path / "a.ath", segment_frames=number + 30),
+            lambda: athcodec.write(view, tmp_path / "a.glb", rig=number),
+            lambda: Thresholds(1.0, number, 1.0, 1),
+        ):
+            with pytest.raises(TypeError):
+                call()
+        assert list(tmp_path.iterdir()) == []
+        with pytest.raises(TypeError, match=r"frame: got 3\.5, expected a whole number"):
+            decoder.positions(3.5)
+        expected = decoder.positions(3, 1)
+        for kind in (np.int64, np.uint8, np.int32):
+            assert np.array_equal(decoder.positions(kind(3), kind(1)), expected)
 
 
 @pytest.mark.parametrize("segment_frames", [40, 120])
@@ -527,7 +562,7 @@ def test_a_wrong_byte_in_a_chunk_is_met_when_it_is_read_and_not_before(bushy_ath
         decoder.positions()
 
 
-@settings(STEADY, max_examples=60)
+@settings(STEADY, max_examples=30)
 @given(awkward_plants(dtype=np.float64, frames=18, offset=0.0))
 def test_maps_hang_together_on_degenerate_plants(scratch, clip):
     size = size_of(clip.positions) or 1.0

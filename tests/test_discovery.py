@@ -85,8 +85,8 @@ def test_a_mesh_that_was_split_along_its_seams_hangs_together(dressed):
 
 
 def test_the_hierarchy_found_costs_no_more_than_the_true_one(dressed, tmp_path):
-    known = athcodec.encode(dressed, tmp_path / "a.ath", rel_error=1e-4)
-    found = athcodec.encode(bare(dressed), tmp_path / "b.ath", rel_error=1e-4)
+    known = athcodec.encode(dressed, tmp_path / "a.ath", rel_error=1e-4, effort="fast")
+    found = athcodec.encode(bare(dressed), tmp_path / "b.ath", rel_error=1e-4, effort="fast")
     assert found.bytes < 1.05 * known.bytes
 
 
@@ -121,7 +121,7 @@ def test_centre_lines_give_their_stems():
         assert branch_orders(found.branch_parent).max() == branch_orders(sample.branch_parent).max()
 
 
-def walker(frames: int = 40) -> MotionClip:
+def walker(frames: int = 20) -> MotionClip:
     """One closed mesh, a body on four legs, whose legs swing: no pieces, no edges, no names."""
     rings, around = 60, 24
     angle = 2 * np.pi * np.arange(around) / around
@@ -149,12 +149,13 @@ def walker(frames: int = 40) -> MotionClip:
     return MotionClip(positions.astype(np.float32), time, faces=faces)
 
 
+@pytest.mark.slow
 def test_a_mesh_of_one_piece_gets_patches_that_move_rigidly(tmp_path):
     clip = walker()
     found = athcodec.find_branches(clip)
     assert found.method == "motion"
     assert 1 < len(found.branch_parent) < clip.vertex_count / 10
-    result = athcodec.encode(clip, tmp_path / "a.ath", rel_error=1e-3)
+    result = athcodec.encode(clip, tmp_path / "a.ath", rel_error=1e-3, effort="fast")
     assert result.bytes < clip.frame_count * clip.vertex_count * 12 / 50
     with athcodec.open(tmp_path / "a.ath") as decoder:
         apart = np.linalg.norm(decoder.positions(dtype=np.float64) - clip.block(0, clip.frame_count), axis=2)
@@ -205,7 +206,9 @@ def named_grass(tmp_path_factory) -> int:
     return athcodec.encode(clip, path, rel_error=1e-3, attributes="none").bytes
 
 
-@pytest.mark.parametrize("order", ORDERS)
+@pytest.mark.parametrize(
+    "order", [pytest.param(order, marks=() if order == "shuffled" else pytest.mark.slow) for order in ORDERS]
+)
 def test_unnamed_blades_take_hardly_more_than_named_ones(order, named_grass, tmp_path):
     clip = grass(seed=1, blades=150, frames=48, named=False, order=order)
     result = athcodec.encode(clip, tmp_path / "a.ath", rel_error=1e-3, attributes="none")
@@ -362,6 +365,7 @@ def test_candidates_for_branches_of_a_lossless_file_are_tried_lossless(loose_poi
     assert max(lossless) < 0.1 * min(lossy)
 
 
+@pytest.mark.slow
 def test_candidates_for_branches_are_tried_at_a_bound_that_meets_the_target_size(loose_points, tmp_path, monkeypatch):
     tried = []
     for bound in (0.1, 0.001):

@@ -15,7 +15,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from test_usd import add_grid, add_leaves, new_stage
 
 import athcodec
 from athcodec import cli
@@ -36,6 +35,8 @@ def blocks(page: Path, *languages: str) -> list[tuple[str, str]]:
 @pytest.fixture(scope="module")
 def files(tmp_path_factory):
     """The files that the examples start from."""
+    from test_usd import add_grid, add_leaves, new_stage  # here, because USD takes long to import
+
     folder = tmp_path_factory.mktemp("examples")
     shutil.copy(sample_path(), folder / "tree.h5")
     with read_hdf5(sample_path()) as clip:

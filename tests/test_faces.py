@@ -142,7 +142,7 @@ def test_faces_are_not_stored_without_attributes():
 @pytest.mark.parametrize(
     "options", [{"ladder": "none"}, {}, {"exact_rest": True}], ids=["one layer", "layers", "exact"]
 )
-@pytest.mark.parametrize("frames", [1, 9])
+@pytest.mark.parametrize("frames", [1, pytest.param(9, marks=pytest.mark.slow)])
 def test_the_document_reads_the_same_connected_rest_pose(options, frames):
     points, faces = shuffled(terrain(9, 11, 0.05, 4), grid_faces(9, 11, frames > 1), 4)
     time = np.arange(frames) / 10

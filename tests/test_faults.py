@@ -28,6 +28,8 @@ sys.path.append(str(ROOT))  # for spec, which is not installed; athcodec stays t
 
 from spec.robust import _io_errors, faults  # noqa: E402
 
+pytestmark = pytest.mark.tools
+
 DEAD = ".target.ath.0123abcd.part"
 
 
@@ -139,12 +141,12 @@ def test_hdf5_is_written_where_the_environment_insists_on_its_locks(place, tmp_p
     ids=["pipe", "device", "endless link"],
 )
 def test_what_is_no_plain_file_is_refused_before_any_work(make, tmp_path, capsys):
-    odd = tmp_path / "odd"
+    odd = tmp_path / "odd.ath"
     make(odd)
     before = _looks(odd)
     assert cli.main(["encode", str(sample_path()), str(odd)]) == 1
     assert faults.ONE_LINE.fullmatch(capsys.readouterr().err)
-    assert _looks(odd) == before and names(tmp_path) == {"odd"} and stat.S_ISCHR(os.stat("/dev/null").st_mode)
+    assert _looks(odd) == before and names(tmp_path) == {"odd.ath"} and stat.S_ISCHR(os.stat("/dev/null").st_mode)
 
 
 def _looks(path) -> tuple:
@@ -181,13 +183,13 @@ def test_a_batch_whose_calls_fail_is_finished_by_the_next_run(tmp_path):
 
 @pytest.mark.parametrize("mode", [0o600, 0o640, 0o664])
 def test_a_file_that_is_replaced_keeps_its_permissions(mode, bushy_ath, tmp_path):
-    target = tmp_path / "target.ath"
-    target.write_bytes(b"older")
-    target.chmod(mode)
-    athcodec.truncate(bushy_ath, target, 0)
-    assert stat.S_IMODE(target.stat().st_mode) == mode
-    athcodec.write_hdf5(plant(frames=3), target)
-    assert stat.S_IMODE(target.stat().st_mode) == mode
+    for suffix in (".ath", ".h5"):
+        target = tmp_path / f"target{suffix}"
+        target.write_bytes(faults.OLDER[suffix])
+        target.chmod(mode)
+    athcodec.truncate(bushy_ath, tmp_path / "target.ath", 0)
+    athcodec.write_hdf5(plant(frames=3), tmp_path / "target.h5")
+    assert {stat.S_IMODE(path.stat().st_mode) for path in tmp_path.iterdir()} == {mode}
 
 
 def test_a_new_file_has_the_permissions_of_any_new_file(bushy_ath, tmp_path):
@@ -218,7 +220,7 @@ def test_names_of_the_longest_length_can_be_written(bushy_ath, tmp_path):
 @pytest.mark.parametrize("verb", faults.VERBS)
 def test_the_input_is_not_replaced_by_the_output_under_another_name_either(verb, link, place, tmp_path, capsys):
     source = place.source if verb == "encode" else place.encoded
-    before, alias = source.read_bytes(), tmp_path / "alias"
+    before, alias = source.read_bytes(), tmp_path / "alias.ath"
     link(source, alias)
     assert cli.main(place.words(verb, alias)) == 1
     assert "is the input" in capsys.readouterr().err and source.read_bytes() == before

@@ -25,6 +25,8 @@ from athcodec.clip import MotionClip
 from athcodec.clip_view import ClipView
 from athcodec.errors import ClipError
 
+pytestmark = pytest.mark.formats
+
 TIMES = np.arange(5) / 24
 CUBE = np.array([[x, y, z] for z in (0, 1, 2) for y in (0, 1) for x in (0, 1)], float)
 HEXES = np.array([[0, 1, 3, 2, 4, 5, 7, 6], [4, 5, 7, 6, 8, 9, 11, 10]])

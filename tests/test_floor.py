@@ -18,6 +18,8 @@ sys.path.append(str(Path(__file__).parents[1]))  # for bench, which is not insta
 from bench.throttled_server import ThrottledServer  # noqa: E402
 from bench.trees.tufts import fern, grass  # noqa: E402
 
+pytestmark = pytest.mark.web
+
 FLOOR = ["fern", "grass"]
 MAKERS = {
     "fern": lambda seed=7: fern(12, 6, 0.8, 20, {"calm": 2.5, "gale": 10.0}, seed, 30.0),

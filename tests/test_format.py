@@ -39,6 +39,10 @@ from spec.document import TEXT, rules, section, table  # noqa: E402
 VECTORS = FORMAT.parent / "spec" / "vectors" / "valid"
 
 
+def seeds(few: int, many: int) -> list:
+    return [*range(few), *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(few, many))]
+
+
 def dump(text: str) -> bytes:
     """The bytes of an annotated hex dump; checks that its offsets leave no hole."""
     data = b""
@@ -261,7 +265,13 @@ def test_pseudo_code_decodes_what_the_encoder_writes(spec, forked_clip, tmp_path
 
 
 @pytest.mark.parametrize(
-    "seed, is_float64, exact", [(1, False, None), (2, True, None), (3, False, np.float32), (4, True, np.float64)]
+    "seed, is_float64, exact",
+    [
+        (1, False, None),
+        pytest.param(2, True, None, marks=pytest.mark.slow),
+        pytest.param(3, False, np.float32, marks=pytest.mark.slow),
+        (4, True, np.float64),
+    ],
 )
 def test_pseudo_code_decodes_every_feature(spec, seed, is_float64, exact):
     assert_same_bits(spec, HandMade(seed, is_float64, exact).file())
@@ -273,6 +283,7 @@ def test_pseudo_code_decodes_layers_that_the_encoder_writes(spec, tmp_path):
     assert_same_bits(spec, (tmp_path / "layers.ath").read_bytes())
 
 
+@pytest.mark.slow
 def test_pseudo_code_decodes_several_clips(spec, medley_ath):
     assert_same_bits(spec, medley_ath.read_bytes())
 
@@ -376,7 +387,7 @@ def assert_same_on_levels(spec: ModuleType, data: bytes, levels: Iterable[int]) 
 
 
 @pytest.mark.parametrize("kind", [container.STEMS, container.AFFINES, container.CORRECTIONS, container.SHAPES])
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", seeds(1, 6))
 def test_random_decisions_about_motion_mean_the_same_to_the_document_and_the_code(spec, seed, kind):
     parts = Parts.of(Sapling(seed).file())
     random = np.random.default_rng(seed)
@@ -408,7 +419,7 @@ def motion_function(spec: ModuleType, parts: Parts, chunk: container.Chunk) -> t
 
 
 @pytest.mark.parametrize("refines_rest", [False, True])
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", seeds(2, 12))
 def test_random_decisions_about_refinements_mean_the_same_to_the_document_and_the_code(spec, seed, refines_rest):
     """A layer behind those of a sapling: its rest pose, shapes and stems."""
     parts, random = Parts.of(Sapling(seed).file()), np.random.default_rng(seed)

@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 
+pytestmark = pytest.mark.formats
+
 WRITE = """
 import resource, signal, sys
 import athcodec

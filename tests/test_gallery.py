@@ -17,6 +17,8 @@ import athcodec
 from athcodec import cli, gallery, picture
 from athcodec.viewer.build_viewer import modules
 
+pytestmark = pytest.mark.web
+
 DOCS = Path(__file__).parents[1] / "docs"
 
 

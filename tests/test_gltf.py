@@ -23,6 +23,8 @@ from athcodec.exporters import gltf as gltf_exporter
 from athcodec.exporters import write
 from athcodec.sources import read
 
+pytestmark = pytest.mark.formats
+
 COMPONENTS = {"int8": 5120, "uint8": 5121, "int16": 5122, "uint16": 5123, "uint32": 5125, "float32": 5126}
 TYPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4", 16: "MAT4"}
 CUBE = np.array([[x, y, z] for x in (0, 1) for y in (0, 2) for z in (0, 3)], np.float32)

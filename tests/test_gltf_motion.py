@@ -23,6 +23,8 @@ from athcodec.sources import read
 from athcodec.sources.gltf_file import GltfFile
 from athcodec.sources.gltf_scene import Scene
 
+pytestmark = pytest.mark.formats
+
 SCHEMAS = Path(__file__).resolve().parent.parent / "spec" / "gltf" / "schema"
 BOUND = 1e-4
 

@@ -25,7 +25,7 @@ from bench.browser import chromium
 
 VIEWER = Path(__file__).resolve().parent.parent / "athcodec" / "viewer"
 ENGINES = ["three", "babylon"]
-programs = pytest.mark.programs
+pytestmark = pytest.mark.programs
 
 
 def assert_valid(node, path):  # noqa: F811
@@ -69,7 +69,6 @@ def start_of(kind):
 KINDS = ["three", "joints", "morphs", "seams"]
 
 
-@programs
 @pytest.mark.parametrize("kind", KINDS)
 def test_files_are_valid_and_engines_show_what_the_text_says(kind, sources, node, played, tmp_path):  # noqa: F811
     out = encoded(sources[kind], tmp_path / "out.glb")
@@ -84,7 +83,6 @@ def test_files_are_valid_and_engines_show_what_the_text_says(kind, sources, node
         assert facts["warnings"] == [] and [animation[0] for animation in facts["animations"]] == [name]
 
 
-@programs
 @pytest.mark.parametrize("kind", KINDS)
 def test_what_is_decoded_into_the_file_is_valid_and_three_plays_it(kind, sources, node, tmp_path):  # noqa: F811
     out = encoded(sources[kind], tmp_path / "out.glb")
@@ -97,7 +95,6 @@ def test_what_is_decoded_into_the_file_is_valid_and_three_plays_it(kind, sources
     assert far(shown, wanted[12 if kind == "three" else 15]) < 1e-5 * np.abs(wanted).max()
 
 
-@programs
 @pytest.mark.parametrize("engine", ENGINES)
 def test_clips_play_by_their_names_at_their_times(engine, seasons, played, tmp_path):  # noqa: F811
     write(athcodec.join(seasons), tmp_path / "source.glb", animation="joints")
@@ -111,7 +108,6 @@ def test_clips_play_by_their_names_at_their_times(engine, seasons, played, tmp_p
         assert sorted(animation[0] for animation in facts["animations"]) == sorted(seasons)
 
 
-@programs
 @pytest.mark.parametrize("engine", ENGINES)
 def test_a_skin_that_was_kept_is_not_applied_to_the_motion(engine, sources, played, tmp_path):
     out = encoded(sources["joints"], tmp_path / "out.glb", "--keep-animation")
@@ -120,7 +116,6 @@ def test_a_skin_that_was_kept_is_not_applied_to_the_motion(engine, sources, play
     assert far(shown, wanted[15:16]) < 1e-5 * np.abs(wanted).max()
 
 
-@programs
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("fault", ["version", "vertices", "mesh"])
 def test_a_motion_that_cannot_be_played_leaves_the_fallback(engine, fault, sources, played, tmp_path):
@@ -145,7 +140,6 @@ def test_a_motion_that_cannot_be_played_leaves_the_fallback(engine, fault, sourc
         assert facts["skeletons"] == 1
 
 
-@programs
 @pytest.mark.parametrize("kind", ["three", "seams"])
 @pytest.mark.parametrize(
     "steps",
@@ -173,7 +167,6 @@ def test_gltf_transform_leaves_motions_whole(steps, kind, sources, node, played,
     assert far(shown[0], after[12 if kind == "three" else 15]) < 1e-5 * np.abs(after).max()
 
 
-@programs
 def test_vertices_that_carry_their_numbers_may_be_put_in_another_order(sources, node, tmp_path):  # noqa: F811
     out = encoded(sources["seams"], tmp_path / "out.glb")
     said = json.loads(
@@ -184,7 +177,6 @@ def test_vertices_that_carry_their_numbers_may_be_put_in_another_order(sources, 
     assert before.shape == after.shape and np.allclose(before, after)
 
 
-@programs
 @pytest.mark.parametrize("step", ["quantize", "reorder", "meshopt"])
 def test_gltf_transform_refuses_to_write_vertices_that_were_changed_and_names_them(step, sources, node, tmp_path):  # noqa: F811
     out = encoded(sources["three"], tmp_path / "out.glb")

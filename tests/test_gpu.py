@@ -25,6 +25,8 @@ sys.path.append(str(Path(__file__).parents[1]))  # for bench and spec; athcodec 
 from bench.browser import WEBGPU_FLAGS, chromium  # noqa: E402
 from spec.robust.hostile import repaired  # noqa: E402
 
+pytestmark = pytest.mark.web
+
 ADDRESS = "http://localhost/"
 VECTORS = Path(__file__).parents[1] / "spec" / "vectors" / "valid"
 SHARE_OF_BOUND, SHARE_OF_DIAGONAL, SHARE_OF_AWKWARD = 0.05, 1e-6, 1e-4

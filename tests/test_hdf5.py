@@ -241,12 +241,12 @@ def test_frames_are_written_as_they_come(forked, forked_clip, tmp_path):
     ],
 )
 def test_a_failed_write_leaves_what_was_there_before(forked, tmp_path, blocks, message):
-    (tmp_path / "a.h5").write_bytes(b"old")
+    (tmp_path / "a.h5").write_bytes(b"\x89HDF\r\n\x1a\nold")
     with pytest.raises(ClipError, match=message):
         with Hdf5Writer(tmp_path / "a.h5", **writer_arguments(forked)) as writer:
             for block in blocks:
                 writer.add(block)
-    assert os.listdir(tmp_path) == ["a.h5"] and (tmp_path / "a.h5").read_bytes() == b"old"
+    assert os.listdir(tmp_path) == ["a.h5"] and (tmp_path / "a.h5").read_bytes() == b"\x89HDF\r\n\x1a\nold"
 
 
 def test_nothing_is_left_where_the_source_breaks_or_cannot_be_stored(forked, forked_clip, tmp_path):

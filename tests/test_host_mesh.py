@@ -7,7 +7,9 @@ import ctypes
 import hashlib
 import io
 import json
+import os
 import shutil
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -297,6 +299,7 @@ def test_an_engine_gives_its_vertex_buffer(hosted, mesh):
 
 
 @pytest.mark.skipif(shutil.which("node") is None, reason="no Node.js")
+@pytest.mark.web
 def test_web_assembly_needs_and_takes_the_mesh_too(hosted, mesh, tmp_path):
     (tmp_path / "a.ath").write_bytes(hosted)
     (tmp_path / "mesh").write_bytes(mesh.tobytes())
@@ -372,6 +375,7 @@ def test_verify_compares_checksums_without_the_mesh_and_decodes_with_it(hosted_s
     assert run(capsys, "verify", tmp_path / "damaged.ath")[0] == 1
 
 
+@pytest.mark.tools
 def test_a_batch_leaves_rest_poses_to_the_host_and_verifies_with_them(source, tmp_path):
     folder = tmp_path / "in"
     folder.mkdir()
@@ -383,6 +387,33 @@ def test_a_batch_leaves_rest_poses_to_the_host_and_verifies_with_them(source, tm
         assert not outcome.failed and len(outcome.done) == 1
         with athcodec.open(tmp_path / "out" / "a.ath", host_mesh=source) as decoder:
             assert_kept(decoder, source)
+
+
+@pytest.mark.parametrize(
+    "host, mesh, output",
+    [
+        ("host.h5", "host.h5", "host.h5"),
+        ("host.xdmf", "host.xdmf", "host.xdmf.h5"),
+        ("host.obj", "host_0000.obj", "host_0001.obj"),
+        ("host.usda", "top.usda", "host.usda"),
+        ("host.pvd", "host.pvd", "host_0001.vtu"),
+    ],
+)
+@pytest.mark.parametrize("link", [None, os.symlink, os.link], ids=["by name", "symbolic link", "hard link"])
+def test_no_file_of_the_host_mesh_is_replaced(hosted_sample, tmp_path, capsys, host, mesh, output, link):
+    if output.endswith(".usda"):
+        pytest.importorskip("pxr")
+        (tmp_path / "top.usda").write_text('#usda 1.0\n(\n subLayers = [@host.usda@]\n defaultPrim = "clip"\n)\n')
+    with athcodec.read_hdf5(SAMPLE) as clip:
+        pose = np.asarray(clip.rest, np.float32)
+        athcodec.write(MotionClip(np.stack([pose, pose + 1]), np.arange(2.0), rest=pose), tmp_path / host)
+    if link is not None:
+        link(tmp_path / output, tmp_path / f"link_0000{Path(output).suffix}")
+        output = f"link_0000{Path(output).suffix}"
+    before = {path: path.read_bytes() for path in tmp_path.iterdir()}
+    code, _, error = run(capsys, "decode", hosted_sample, tmp_path / output, "--host-mesh", tmp_path / mesh)
+    assert code == 1 and "is the input, or a file that belongs to it; choose another output name" in error
+    assert {path: path.read_bytes() for path in tmp_path.iterdir()} == before
 
 
 def test_an_exported_page_carries_the_mesh(hosted_sample, tmp_path):

@@ -20,6 +20,8 @@ from fuzz.targets import CORE, decoder_sources
 import athcodec
 from athcodec._native import crc32c
 
+pytestmark = pytest.mark.formats
+
 HEADERS = "ath.h", "ath_gpu.h", "ath_player.h"
 SLOW = pytest.mark.slow
 C_COMPILERS = [name for name in ("gcc", "clang") if shutil.which(name)] or ["cc"]
@@ -81,7 +83,7 @@ add_executable(cxx consumer.cpp)
 target_compile_features(cxx PRIVATE cxx_std_17)
 target_link_libraries(cxx PRIVATE athcodec::ath_static)
 add_executable(play "{core}/examples/play.c")
-target_link_libraries(play PRIVATE athcodec::ath m)
+target_link_libraries(play PRIVATE athcodec::ath)
 """
 
 
@@ -154,6 +156,7 @@ def test_the_single_file_may_hold_the_gpu_form(compiler, single):
     assert "ath_gpu_record" in run("nm", single / "ath.o")
 
 
+@SLOW
 def test_no_instruction_of_the_decoder_rounds_once_for_two_operations(single):
     """Compiled for processors that have such instructions, by a compiler that takes them where it is let."""
     fused = re.compile(r"\b(vfn?m(?:add|sub)|fn?m(?:add|sub)\b|fml[as]\b|vfm[as]|fmadd\.|m[as][ed]br)")
@@ -280,7 +283,7 @@ def test_a_program_that_finds_the_package_decodes_what_python_does(program, engi
 
 
 @pytest.mark.parametrize("compiler", C_COMPILERS)
-def test_a_program_compiled_through_pkg_config_decodes_what_python_does(
+def test_programs_compiled_through_pkg_config_link_and_decode_what_python_does(
     compiler, installed, sample_ath, expected, tmp_path
 ):
     folder = library_folder(installed)
@@ -288,8 +291,10 @@ def test_a_program_compiled_through_pkg_config_decodes_what_python_does(
     flags = run("pkg-config", "--cflags", "--libs", "athcodec", env=environment).split()
     assert run("pkg-config", "--modversion", "athcodec", env=environment).strip() == athcodec.__version__
     (tmp_path / "consumer.c").write_text(CONSUMER)
-    run(compiler, tmp_path / "consumer.c", *flags, f"-Wl,-rpath,{folder}", "-o", tmp_path / "consumer")
+    for source in (tmp_path / "consumer.c", CORE / "examples" / "play.c"):
+        run(compiler, source, *flags, f"-Wl,-rpath,{folder}", "-o", tmp_path / source.stem)
     assert run(tmp_path / "consumer", sample_ath) == expected
+    assert "ranges missing at the end: 0" in run(tmp_path / "play", sample_ath)
 
 
 def test_a_project_that_holds_the_sources_uses_them_under_the_same_name(sample_ath, expected, tmp_path):

@@ -176,7 +176,7 @@ def test_poses_are_as_precise_as_the_deepest_level_that_is_there(layered_ath, bu
 def in_steps(tmp_path_factory):
     """The sample, whose level 1 refines the rest pose, and its clip."""
     path, clip = tmp_path_factory.mktemp("steps") / "sample.ath", athcodec.read_hdf5(athcodec.sample_path())
-    athcodec.encode(clip, path, rel_error=1e-4, attributes="none")
+    athcodec.encode(clip, path, rel_error=1e-4, attributes="none", effort="fast")
     return path, clip
 
 

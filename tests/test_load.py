@@ -24,6 +24,8 @@ sys.path.append(str(ROOT))  # for spec, which is not installed; athcodec stays t
 
 from spec.robust import load  # noqa: E402
 
+pytestmark = pytest.mark.tools
+
 
 @pytest.fixture(scope="module")
 def thread_program(tmp_path_factory):

@@ -27,6 +27,8 @@ sys.path.append(str(ROOT))  # for bench, which is not installed; athcodec stays 
 
 from bench.throttled_server import WEB, ThrottledServer  # noqa: E402
 
+pytestmark = pytest.mark.web
+
 NODE = ROOT / "tests" / "node"
 
 

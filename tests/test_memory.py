@@ -11,6 +11,8 @@ import pytest
 import athcodec
 from athcodec.exporters import FORMATS
 
+pytestmark = pytest.mark.formats
+
 VERTICES, FRAMES, TIMES = 12_000, 96, 5
 EXPORT = """
 import resource, sys

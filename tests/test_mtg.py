@@ -10,6 +10,8 @@ from athcodec.clip import MotionClip
 from athcodec.errors import ClipError
 from athcodec.sources.mtg import mtg_branches, read_mtg
 
+pytestmark = pytest.mark.formats
+
 HEADER = """# a plant
 CODE :\tFORM-A
 

@@ -13,6 +13,8 @@ sys.path.append(str(Path(__file__).resolve().parent.parent))  # for spec, which 
 
 from spec import conformance, document, mutants, real_size  # noqa: E402
 
+pytestmark = pytest.mark.tools
+
 CAUGHT = {  # a change, and a vector that tells it
     "quarters_of_mean: 64 if quarters >= 64.0 else int(quarters) if quarters >= 1.0 else 1 -> "
     "65 if quarters >= 64.0 else int(quarters) if quarters >= 1.0 else 1": "gaps",

@@ -16,6 +16,8 @@ import athcodec
 from athcodec.cli import main
 from athcodec.errors import ClipError
 
+pytestmark = pytest.mark.formats
+
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory) -> Path:

@@ -20,6 +20,8 @@ from athcodec import container as ct
 from athcodec import core_file
 from athcodec.core_file import Fault
 
+pytestmark = pytest.mark.formats
+
 CLAMP, LOOP, PING_PONG, AS_MARKED = range(4)
 FILE_ORDER, SOURCE_ORDER = range(2)
 OK, BAD_CHUNK, MORE, MISSING, NO_MEMORY, BAD_ARGUMENT = 0, 9, 64, 66, 68, 69

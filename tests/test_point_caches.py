@@ -15,6 +15,8 @@ from athcodec.clip_view import ClipView
 from athcodec.errors import ClipError
 from athcodec.sources import raw
 
+pytestmark = pytest.mark.formats
+
 MOTION = np.arange(4 * 5 * 3, dtype=np.float32).reshape(4, 5, 3) / 7
 
 

@@ -57,6 +57,7 @@ def test_a_rest_pose_that_was_given_comes_back_within_its_tolerance(bushy_clip, 
             assert distance(moved, decoder.positions(3, level)[vertices]) <= 1e-5 * size
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("fraction", "most"), [(1e-3, 1.0), (1e-5, 0.95)])
 def test_the_pose_that_is_chosen_makes_the_smaller_file(fraction, most, tmp_path, monkeypatch):
     def size() -> int:

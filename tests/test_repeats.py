@@ -42,6 +42,7 @@ def repeats_of(decoder: athcodec.Decoder) -> list[bool]:
     return decoder.file.header.repeats.tolist()
 
 
+@pytest.mark.slow
 def test_held_poses_take_few_bytes_more_than_the_poses(poses, tmp_path):
     once = encoded(poses, tmp_path / "once.ath").bytes
     threes = encoded(held(poses, 3), tmp_path / "threes.ath").bytes

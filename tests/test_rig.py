@@ -14,6 +14,8 @@ from athcodec import ClipView, cli
 from athcodec.errors import ClipError
 from athcodec.exporters.rig import fit_rig
 
+pytestmark = pytest.mark.formats
+
 
 @pytest.mark.parametrize("name", ["a.usda", "a.usdc", "a.glb"])
 def test_a_rig_is_as_far_off_as_it_says(sample_ath, tmp_path, name):

@@ -17,6 +17,8 @@ from bad_cases import behave  # noqa: E402
 from spec import robustness  # noqa: E402
 from spec.robust import Row, _cases  # noqa: E402
 
+pytestmark = pytest.mark.tools
+
 
 def test_crashes_hangs_floods_and_wrong_results_are_counted_and_the_rest_goes_on():
     ways = ["well", "crash", "be wrong", "well", "hang", "flood", "crash", "well"]

@@ -33,6 +33,8 @@ import athcodec
 from athcodec import ClipView, MotionClip
 from athcodec.errors import ClipError, SourceWarning
 
+pytestmark = pytest.mark.formats
+
 COLUMNS = ("order", "names", "materials", "UVs", "instances", "clips", "unit", "axes", "frame rate", "first frame")
 YES, NO = "yes", "no"
 PAGE = Path(__file__).resolve().parent.parent / "docs" / "formats.md"

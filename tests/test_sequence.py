@@ -17,6 +17,8 @@ from athcodec.errors import ClipError, SourceWarning
 from athcodec.sources.mesh import parse_mesh
 from athcodec.sources.opening import Budget
 
+pytestmark = pytest.mark.formats
+
 TRIANGLE = "v 0 0 {}\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
 
 

@@ -74,6 +74,7 @@ def test_arguments_warnings_and_logs_cannot_either(tmp_path, capsys, monkeypatch
     assert is_plain(err) and err.count("owned") == 2 and "abcdef" not in err and "pass" not in err
 
 
+@pytest.mark.tools
 def test_a_batch_shows_and_keeps_neither(tmp_path):
     names = [f"{HOSTILE}.h5", f"{HOSTILE}2.h5"]
     athcodec.write_hdf5(plant(seed=1, branches=2, frames=4), tmp_path / names[0])

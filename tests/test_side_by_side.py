@@ -23,6 +23,8 @@ sys.path.append(str(ROOT))  # for bench, which is not installed; athcodec stays 
 from bench.__main__ import main  # noqa: E402
 from bench.browser import chromium  # noqa: E402
 
+pytestmark = pytest.mark.tools
+
 CLIP = str(sample_path())
 
 

@@ -21,6 +21,8 @@ import pytest
 import athcodec
 from athcodec.errors import ClipError
 
+pytestmark = pytest.mark.formats
+
 BUDGET = 64 << 20
 READER = 512 << 20  # a process that reads: Python, USD, and the stacks of threads
 READ = """

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
+import tomllib
+from fnmatch import fnmatch
+from pathlib import Path
 
 import pytest
 
+ROOT = Path(__file__).resolve().parent.parent
 DECODING = ("athcodec", "athcodec.decoder", "athcodec.container", "athcodec.truncation", "athcodec.exporters")
 
 
@@ -42,3 +47,11 @@ print([name for name in athcodec.__all__ if getattr(athcodec, name, None) is Non
 """
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
+
+
+def test_the_benchmark_imports_nothing_that_a_wheel_leaves_out():
+    """`python -m bench` measures the athcodec that is installed, which need not be an editable one."""
+    settings = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["tool"]["scikit-build"]["wheel"]
+    code = "".join(path.read_text("utf-8") for path in (ROOT / "bench").rglob("*.py"))
+    files = {name.replace(".", "/") + ".py" for name in re.findall(r"^ *(?:from|import) (athcodec[\w.]*)", code, re.M)}
+    assert {file for file in files if any(fnmatch(file, pattern) for pattern in settings["exclude"])} == set()

@@ -9,6 +9,7 @@ import pytest
 
 import athcodec
 from athcodec import truncate
+from athcodec.container import MAGIC
 from athcodec.errors import BadChecksum, FormatError, LevelUnavailable, NotAnAthFile, Truncated
 
 
@@ -266,10 +267,10 @@ def test_truncating_what_cannot_be_truncated_raises_and_leaves_nothing(make, lev
 def test_a_failed_truncation_leaves_the_older_target_alone(bushy, tmp_path):
     source, target = tmp_path / "source.ath", tmp_path / "target.ath"
     source.write_bytes(damaged(bushy, flip(bushy.prelude + 3)))
-    target.write_bytes(b"older")
+    target.write_bytes(MAGIC + b"older")
     with pytest.raises(BadChecksum):
         truncate(source, target, 2)
-    assert target.read_bytes() == b"older" and len(list(tmp_path.iterdir())) == 2
+    assert target.read_bytes() == MAGIC + b"older" and len(list(tmp_path.iterdir())) == 2
 
 
 def test_damage_in_a_level_that_is_left_out_does_no_harm(bushy, tmp_path):

@@ -19,6 +19,8 @@ from athcodec.clip import MotionClip
 from athcodec.errors import ClipError, SourceWarning
 from athcodec.frames import Frames
 
+pytestmark = pytest.mark.formats
+
 GRID = np.array([[x, y, 0] for y in range(4) for x in range(3)], np.float32)
 QUADS = np.array([[0, 1, 4, 3], [1, 2, 5, 4], [3, 4, 7, 6], [4, 5, 8, 7], [6, 7, 10, 9], [7, 8, 11, 10]], np.int32)
 FPS = float(Fraction(24000, 1001))
@@ -651,13 +653,13 @@ def test_memory_does_not_grow_with_the_number_of_frames(tmp_path):
 
 
 def test_an_export_that_fails_leaves_what_was_there(tmp_path, sample_clip):
-    (tmp_path / "a.usdc").write_bytes(b"old")
+    (tmp_path / "a.usdc").write_bytes(b"PXR-USDC, old")
     broken = Frames(lambda start, stop: np.full((stop - start, 4, 3), np.inf if start else 1, np.float32), 9, 4)
     clip = MotionClip(broken, np.arange(9.0), rest=np.zeros((4, 3)))
     clip._block_length = lambda most: 3
     with pytest.raises(ClipError, match="frame 3"):
         athcodec.write(clip, tmp_path / "a.usdc")
-    assert os.listdir(tmp_path) == ["a.usdc"] and (tmp_path / "a.usdc").read_bytes() == b"old"
+    assert os.listdir(tmp_path) == ["a.usdc"] and (tmp_path / "a.usdc").read_bytes() == b"PXR-USDC, old"
 
 
 # ---- broken files ----

@@ -22,6 +22,8 @@ from athcodec.errors import ClipError
 from athcodec.exporters import openvat, vat, write
 from athcodec.sources import read
 
+pytestmark = pytest.mark.formats
+
 
 def exr(path):
     """(height, width, channels) in the type of the file."""

@@ -15,7 +15,7 @@ sys.path.append(str(ROOT))  # for spec, which is not installed; athcodec stays t
 
 from athcodec import container, errors  # noqa: E402
 from athcodec.ath_file import AthFile  # noqa: E402
-from spec import conformance, make  # noqa: E402
+from spec import conformance  # noqa: E402
 
 VECTORS = conformance.vectors()
 
@@ -98,23 +98,20 @@ def test_every_field_has_a_vector_that_breaks_its_range():
     assert missing == set()
 
 
-def check_scripts(vectors):
-    for vector in vectors:
+@pytest.mark.vectors
+def test_scripts_still_make_the_very_same_files():
+    """How they were made stays true."""
+    from spec import make
+
+    for vector in make.VECTORS:
         if vector.scripted:
             assert vector.make() == (conformance.FOLDER / vector.path).read_bytes(), vector.path
 
 
-def test_some_scripts_still_make_the_very_same_files():
-    check_scripts(make.VECTORS[::16])
-
-
-@pytest.mark.slow
-def test_scripts_still_make_the_very_same_files():
-    """How they were made stays true."""
-    check_scripts(make.VECTORS)
-
-
+@pytest.mark.vectors
 def test_existing_vectors_are_left_alone(tmp_path):
+    from spec import make
+
     folder = tmp_path / "vectors"
     kept, listed = "valid/smallest.ath 00000000 strict=ok # an older one", folder / "expected.txt"
     (folder / "valid").mkdir(parents=True)
@@ -131,12 +128,19 @@ def test_existing_vectors_are_left_alone(tmp_path):
 # ---- the decoders of this repository -----------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", conformance.OWN)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=() if name == "c" else pytest.mark.vectors) for name in conformance.OWN]
+)
 def test_own_decoders_answer_as_expected(name):
     own = conformance.OWN[name]
     if name == "wasm" and conformance.shutil.which("node") is None:
         pytest.fail("node: got none on PATH, expected Node.js 18 or newer to test the WebAssembly decoder in")
     assert list(conformance.failures(own.decoder, VECTORS, own.without)) == []
+
+
+def test_the_document_decodes_the_smallest_vectors():
+    own, smallest = conformance.OWN["document"], sorted(VECTORS, key=lambda vector: vector.path.stat().st_size)[:200]
+    assert list(conformance.failures(own.decoder, smallest, own.without)) == []
 
 
 # ---- the decoders of others --------------------------------------------------------------------------------
@@ -159,10 +163,12 @@ sys.exit(done.returncode)
     return [sys.executable, str(script)]
 
 
+@pytest.mark.tools
 def test_a_program_that_decodes_well_passes(tmp_path):
     assert "1 vectors, 0 wrong" in run("--only", "invalid/cut-in-attributes.ath", *DOCUMENT)
 
 
+@pytest.mark.tools
 @pytest.mark.parametrize(
     "body, only, complaint",
     [
@@ -185,12 +191,14 @@ def test_a_wrong_answer_of_a_program_is_reported(body, only, complaint, tmp_path
     assert complaint in printed and only in printed and "0 wrong" not in printed
 
 
+@pytest.mark.tools
 def test_what_a_decoder_leaves_out_is_not_asked_for(tmp_path):
     broken = decoder_that(tmp_path, "if item in ('static', 'strict'): os.abort()")
     left_out = ["--without", "static", "--without", "strict", "--without", "levels"]
     assert "0 wrong" in run("--only", "valid/all-at-origin.ath", *left_out, *broken)
 
 
+@pytest.mark.tools
 def test_limits_of_a_decoder_s_own_can_be_left_out(tmp_path):
     unlimited = decoder_that(tmp_path, "if b'LIMIT_EXCEEDED' in error: error, done.returncode = b'', 0")
     chosen = ["--only", "invalid/header-vertices-limit.ath"]

@@ -35,6 +35,8 @@ from bench import throttled_server  # noqa: E402
 from bench.throttled_server import WEB, ThrottledServer  # noqa: E402
 from bench.trees.plant import grow  # noqa: E402
 
+pytestmark = pytest.mark.web
+
 VIEWER = ROOT / "athcodec" / "viewer"
 
 

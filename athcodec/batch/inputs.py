@@ -19,13 +19,13 @@ from urllib.parse import urlsplit
 
 from athcodec.atomic_files import is_url
 from athcodec.batch.settings import Settings, check_settings, settings_of
+from athcodec.container import MAGIC
 from athcodec.errors import ClipError, MissingExtra, RemoteError
 from athcodec.remote import _one_line, guarded
 from athcodec.shown import without_secrets
 from athcodec.sources import FORMATS, NUMBER_PATTERN, is_pattern
-from athcodec.sources.sequence import sequence_files
+from athcodec.sources.sequence import FRAME_SUFFIXES, each_once, sequence_files
 
-FRAME_SUFFIXES = (".obj", ".ply", ".vtu", ".vtk")  # of formats that have one file per frame
 SUFFIXES = tuple(suffix for form in FORMATS for suffix in form.suffixes if suffix not in FRAME_SUFFIXES)
 TAGS = (
     "ETag",
@@ -137,9 +137,8 @@ def _stem(name: str, path: str) -> str:
 
 
 def _named(inputs: Iterable[str | os.PathLike[str]]) -> Iterator[tuple[str, str]]:
-    for given in inputs:
-        given = os.fspath(given)
-        pairs = list(_remote(given) if is_url(given) else _local(given))
+    for given, called in each_once(map(os.fspath, inputs)):
+        pairs = list(_remote(given) if is_url(given) else _local(given, called))
         yield from pairs
         if not pairs:
             raise ClipError(
@@ -147,7 +146,8 @@ def _named(inputs: Iterable[str | os.PathLike[str]]) -> Iterator[tuple[str, str]
             )
 
 
-def _local(given: str) -> Iterator[tuple[str, str]]:
+def _local(given: str, called: str) -> Iterator[tuple[str, str]]:
+    """called: the name of a plain file without its suffix."""
     if os.path.isdir(given):
         yield from _below(
             given,
@@ -160,7 +160,7 @@ def _local(given: str) -> Iterator[tuple[str, str]]:
             ),
         )
     elif os.path.exists(given) or is_pattern(given):
-        yield os.path.basename(given), os.path.abspath(given)
+        yield called + Path(given).suffix, os.path.abspath(given)
     elif glob.has_magic(given):
         yield from _below(
             _fixed_part(given, os.sep),
@@ -171,8 +171,9 @@ def _local(given: str) -> Iterator[tuple[str, str]]:
 
 
 def _below(folder: str, paths: Iterable[str]) -> Iterator[tuple[str, str]]:
-    for path in paths:
-        yield Path(os.path.relpath(path, folder or ".")).as_posix(), os.path.abspath(path)
+    for path, called in each_once(paths):
+        name = Path(os.path.relpath(path, folder or "."))
+        yield name.with_name(called + name.suffix).as_posix(), os.path.abspath(path)
 
 
 def _is_clip(name: str) -> bool:
@@ -234,8 +235,14 @@ def download(url: str, path: str) -> str:
 
 
 def upload(path: str, url: str) -> dict[str, Any]:
-    """Stores a file, whole; its identity there. Raises RemoteError, OSError."""
+    """Stores an .ath file, whole, in place of one at most; its identity there. Raises RemoteError, OSError."""
     system, target = file_system(url)
+    try:
+        others = system.exists(target) and system.cat_file(target, start=0, end=len(MAGIC)) not in (b"", MAGIC)
+    except Exception as error:
+        raise RemoteError(f"{without_secrets(url)}: {type(error).__name__}: {_one_line(error)}") from None
+    if others:
+        raise RemoteError(f"{without_secrets(url)}: is there already and no .ath file; choose another --out")
     try:
         system.makedirs(system._parent(target), exist_ok=True)
         system.put_file(path, target)

@@ -20,7 +20,7 @@ from typing import Any
 import athcodec
 from athcodec import container as ct
 from athcodec import discovery, encoding
-from athcodec.atomic_files import is_url
+from athcodec.atomic_files import check_target, is_url, keeping
 from athcodec.batch.inputs import Item, download, identity, is_telling, sha256, upload
 from athcodec.batch.settings import coding_options, loop_frames, reading_options
 from athcodec.clip import MotionClip
@@ -79,7 +79,8 @@ def _begin(
     source = _source(item, folder)
     if known is not None and source.get("sha256") == known["source"].get("sha256"):
         return {"kept": True, "source": source}
-    with _opened(item, folder, source) as clip:
+    with _opened(item, folder, source) as clip, keeping(clip.inputs):
+        check_target(_target(item, folder), ".ath")
         options = coding_options(item.settings, clip.metadata.get("unit"))
         if _segment_count(clip, options) <= split:
             summary = athcodec.encode(clip, _target(item, folder), jobs=1, progress=report, **options)

@@ -31,7 +31,10 @@ DEMO_FLOOR = {"fern": 4.0, "grass": 9.0}
 """Samples on the floor of the demo's forest, and how many of each around a tree."""
 
 TRACEBACK = "show the traceback of an error"
-WRITTEN = "file to write; replaced when the new one is complete; - is standard output, with encode and decode"
+WRITTEN = (
+    "file to write, which replaces an older one of its kind when it is complete, and never an input or any other file; "
+    "- is standard output, with encode and decode"
+)
 READ = (
     "a file, - for standard input (decode and info), or a URL, http://, https:// or another that fsspec knows "
     '(pip install "athcodec[remote]")'
@@ -135,7 +138,7 @@ def _encode_arguments(verb: argparse.ArgumentParser) -> None:
         "input",
         metavar="IN",
         help="a clip in one of the formats that `athcodec formats` lists, - for standard input; several "
-        "of one plant share their hierarchy and rest pose in the file",
+        "of one plant share their hierarchy and rest pose in the file; numbered files of one name are one clip",
     )
     verb.add_argument("paths", metavar="OUT.ath", nargs="+", help=WRITTEN)
     verb.add_argument(
@@ -589,8 +592,9 @@ def _view_arguments(verb: argparse.ArgumentParser) -> None:
     what.add_argument(
         "--export",
         metavar="PAGE.html|DIR",
-        help="write one page with the file and the viewer inside, and serve nothing; or a folder for a web host with a "
-        "gallery of all FILEs, with still pictures where athcodec[picture] is installed",
+        help="write one page with the file and the viewer inside, in place of an older HTML page alone, and serve "
+        "nothing; or a folder for a web host with a gallery of all FILEs, with still pictures where athcodec[picture] "
+        "is installed",
     )
 
 

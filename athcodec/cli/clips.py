@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import argparse
-import os
+import shlex
 import warnings
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,7 +14,7 @@ import athcodec
 from athcodec import discovery
 from athcodec.ath import Thresholds
 from athcodec.ath_file import Level
-from athcodec.atomic_files import check_target, is_url
+from athcodec.atomic_files import check_target, file_ids, is_url, keeping
 from athcodec.cli.printing import counted, progress, say
 from athcodec.clip import MotionClip
 from athcodec.clip_view import ClipView
@@ -23,8 +23,9 @@ from athcodec.errors import AthError, ClipError, LevelUnavailable, NeedsHostMesh
 from athcodec.joining import BLEND, in_wind
 from athcodec.metrics import ErrorMeter, MotionMeter, SmoothnessMeter, compare_clips, level_meters
 from athcodec.options import HOST, MAX_MEMORY
-from athcodec.sources import ReadOptions, find_format, listed
+from athcodec.sources import LISTED, ReadOptions, find_format, listed
 from athcodec.sources.opening import naming_file
+from athcodec.sources.sequence import each_once
 from athcodec.units import Length
 
 if TYPE_CHECKING:
@@ -40,11 +41,11 @@ def clip_to_encode(
     """The clip in a file, or all of several files and of their takes, as one; `read` opens one (default read_clip)."""
     with ExitStack() as opened:
         parts = []
-        for path in paths:
+        for path, called in each_once(paths):
             whole = opened.enter_context(read(path) if read else read_clip(args, path))
             if read is None:
                 _say_takes(whole, path, args)
-            parts += [(name, Path(path).stem, part) for name, part in athcodec.split(whole).items()]
+            parts += [(name, called, part) for name, part in athcodec.split(whole).items()]
         names = args.names or [name or (stem if len(parts) > 1 else "") for name, stem, _ in parts]
         loops, endless = _checked_names(names, len(parts), args)
         winds = _checked_winds(len(parts), args)
@@ -323,11 +324,30 @@ def decode_and_measure(decoder: Decoder, clip: MotionClip, encoded: Path, level:
         return compare_clips(clip, again)
 
 
-def check_output(path: str, source: str) -> None:
-    """Refuse, before any work, what can only fail after it, and what would destroy the input."""
-    check_target(path)
-    if os.path.exists(path) and os.path.exists(source) and os.path.samefile(path, source):
-        raise FileExistsError(f"{path}: is the input, expected another file name")
+def check_output(path: str, *inputs: str | None, suffix: str | None = None) -> None:
+    """Refuse, before any work, what can only fail after it, and what would destroy another file: an input, or one that
+    is not of the kind that the suffix promises (default: that of `path`)."""
+    with keeping(file_ids(*inputs)):
+        check_target(path, Path(path).suffix if suffix is None else suffix)
+
+
+def check_name(output: str, suffix: str, inputs: Sequence[str] = ()) -> None:
+    """ClipError where an output has another suffix; with the commands that may have been meant where it was the last of
+    several names and is a source like these `inputs`."""
+    if output.lower().endswith(suffix):
+        return
+    is_source = False
+    with suppress(ClipError, OSError):
+        is_source = bool(inputs) and find_format(output) is not None
+    if not is_source:
+        raise ClipError(f"{output}: got this name for the output, expected one that ends in {suffix}")
+    paths = [path for path, _ in each_once([*inputs, output])]
+    words = " ".join(map(shlex.quote, paths if len(paths) <= LISTED else [*paths[:2], "...", paths[-1]]))
+    raise ClipError(
+        f"{output}: is a source, expected an output that ends in {suffix} as the last name or after -o. For one file "
+        f"of all inputs, where numbered files are one: athcodec encode {words} -o OUT{suffix}; for a file of each: "
+        f"athcodec batch {words} --out DIR"
+    )
 
 
 def _stats(decoder: Decoder) -> str:

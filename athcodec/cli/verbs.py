@@ -20,6 +20,7 @@ from athcodec.atomic_files import scratch_folder
 from athcodec.cli.arguments import DEMO_FLOOR, DEMO_PAGE
 from athcodec.cli.clips import (
     bound,
+    check_name,
     check_output,
     clip_to_encode,
     decode_and_measure,
@@ -53,7 +54,7 @@ from athcodec.cli.printing import (
     say,
     say_seam,
 )
-from athcodec.cli.streams import STREAM, standard_streams
+from athcodec.cli.streams import ATH, STREAM, standard_streams
 from athcodec.clip import MotionClip
 from athcodec.clip_view import ClipView
 from athcodec.errors import AthError, ClipError
@@ -67,12 +68,15 @@ if TYPE_CHECKING:
 def encode(args: argparse.Namespace) -> int:
     paths = [args.input, *(args.paths or ())]
     output = args.into or args.output or paths.pop()
+    if args.into:
+        check_name(output, ".glb")
+    elif output != STREAM:
+        check_name(output, ATH, () if args.output else paths)
     with standard_streams() as streams:
         paths = [streams.source(path, args.source_format) for path in paths]
         if not args.into:
             output = streams.target(output, None)
-        for path in paths:
-            check_output(output, path)
+        check_output(output, *paths)
         if args.into:
             _encode_into(paths, args)
         else:
@@ -178,7 +182,7 @@ def _batch_settings(args: argparse.Namespace) -> dict[str, Any]:
 
 def hierarchy(args: argparse.Namespace) -> int:
     if args.save:
-        check_output(args.save, args.input)
+        check_output(args.save, args.input, suffix=".json")
     with read_clip(args, args.input) as clip, naming(args.input), progress() as report:
         if report:
             report("branches", 0.0)
@@ -221,7 +225,7 @@ def decode(args: argparse.Namespace) -> int:
 
 
 def _decode(args: argparse.Namespace, quiet: bool) -> int:
-    check_output(args.output, args.input)
+    check_output(args.output, args.input, args.host_mesh, suffix="" if args.format else None)
     how = {"clip": args.clip, "allow_partial": args.allow_partial, "host_mesh": args.host_mesh}
     with ExitStack() as opened:
         names = motions_of(args.input, args) if _goes_back(args) else [args.gltf_motion]
@@ -316,6 +320,8 @@ def _verified(args: argparse.Namespace, name: str | None) -> dict[str, Any]:
 
 
 def truncate(args: argparse.Namespace) -> int:
+    if not args.output.lower().endswith(".glb"):
+        check_name(args.output, ATH)
     check_output(args.output, args.input)
     with naming(args.input):
         max_error = args.max_error
@@ -384,7 +390,7 @@ def view(args: argparse.Namespace) -> int:
     floor = dict(args.floor or [])
     with naming(file):
         if args.export:
-            check_output(args.export, file)
+            check_output(args.export, file, args.host_mesh, *floor)
             size = view.export_page(file, args.export, args.clip, args.host_mesh, floor)
             echo(f"{args.export}: {size:,} bytes, opens in any browser")
             return 0
@@ -423,7 +429,7 @@ def picture(args: argparse.Namespace) -> int:
     kind = next(name for name in picture.FORMATS if getattr(args, name))
     out = getattr(args, kind)
     with naming(args.file):
-        check_output(out, args.file)
+        check_output(out, args.file, args.host_mesh, suffix=f".{kind}")
         size = picture.save_picture(args.file, out, kind, args.clip, args.size, args.fps, args.time, args.host_mesh)
     echo(f"{out}: {size:,} bytes")
     return 0

@@ -129,11 +129,12 @@ ATH_ENCODER_API void ath_decompose(int64_t count, const double *matrices, double
 /* rows, n x columns, become what a positive definite n x n matrix, which is destroyed, takes to them. */
 ATH_ENCODER_API void ath_solve(int32_t n, int32_t columns, double *matrix, double *rows);
 
-/* Largest distance and sum of squared distances between positions and source (plus origin). histogram:
- * ATH_SHORT_FLOATS counts, to which each distance is added, rounded up as in the error table. */
-ATH_ENCODER_API void ath_error(int32_t vertex_count, int32_t frames, int is_float64, const void *positions,
-                               const double *source, const double origin[3], double *max_error, double *sum_squares,
-                               uint32_t *histogram);
+/* Largest distance and sum of squared distances between positions and source (plus origin). shown: how many frames of
+ * the clip show each frame. rounding: what a decoder may be further off. histogram: ATH_SHORT_FLOATS counts, to which
+ * each distance is added, rounded up as in the error table. */
+ATH_ENCODER_API void ath_error(int32_t vertex_count, int32_t frames, const int32_t *shown, int is_float64,
+                               const void *positions, const double *source, const double origin[3], double rounding,
+                               double *max_error, double *sum_squares, uint32_t *histogram);
 
 enum { ATH_CORRECTION_ROW = 6 }; /* numbers */
 

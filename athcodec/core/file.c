@@ -950,7 +950,8 @@ double ath_level_error(const ath_file *file, int32_t level, int32_t first, int32
     const double *errors = file->errors + ATH_MEASURES * (size_t)level * (size_t)file->info.segment_count + measure;
     double largest = 0.0, squares = 0.0, frames = 0.0;
     for (int32_t s = first; s <= last; s++) {
-        double error = errors[ATH_MEASURES * s], count = (double)ath_file_frames(file, s);
+        double error = errors[ATH_MEASURES * s];
+        double count = (double)(ath_segment_start(file, s + 1) - ath_segment_start(file, s)); /* repeats included */
         if (error > largest) largest = error;
         squares = squares + error * error * count;
         frames = frames + count;

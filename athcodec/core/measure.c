@@ -150,10 +150,10 @@ static void square_distances(int32_t count, size_t stride, int is_float64, const
 
 /* Lengths of the error table (ATH_SHORT_FLOATS), not below the distances as far as there are such. */
 ATH_HOT
-static void shorts_above(int32_t count, const double *squares, int32_t *shorts)
+static void shorts_above(int32_t count, const double *squares, double rounding, int32_t *shorts)
 {
     for (int32_t t = 0; t < count; t++) {
-        double distance = ath_sqrt(squares[t]);
+        double distance = ath_sqrt(squares[t]) + rounding;
         float narrow = (float)distance;
         int32_t bits;
         memcpy(&bits, &narrow, sizeof bits);
@@ -162,8 +162,9 @@ static void shorts_above(int32_t count, const double *squares, int32_t *shorts)
     }
 }
 
-void ath_error(int32_t vertex_count, int32_t frames, int is_float64, const void *positions, const double *source,
-               const double origin[3], double *max_error, double *sum_squares, uint32_t *histogram)
+void ath_error(int32_t vertex_count, int32_t frames, const int32_t *shown, int is_float64, const void *positions,
+               const double *source, const double origin[3], double rounding, double *max_error, double *sum_squares,
+               uint32_t *histogram)
 {
     double largest = 0.0, sum = 0.0, squares[ATH_SEGMENT_FRAMES];
     int32_t shorts[ATH_SEGMENT_FRAMES];
@@ -173,11 +174,11 @@ void ath_error(int32_t vertex_count, int32_t frames, int is_float64, const void 
             int32_t count = ath_min(frames - start, ATH_SEGMENT_FRAMES);
             square_distances(count, T, is_float64, positions, v * 3 * T + (size_t)start, source, origin, squares);
             for (int32_t t = 0; t < count; t++) {
-                sum += squares[t];
+                sum += shown[start + t] * squares[t];
                 if (squares[t] > largest) largest = squares[t];
             }
-            shorts_above(count, squares, shorts);
-            for (int32_t t = 0; t < count; t++) histogram[shorts[t]]++;
+            shorts_above(count, squares, rounding, shorts);
+            for (int32_t t = 0; t < count; t++) histogram[shorts[t]] += (uint32_t)shown[start + t];
         }
     *max_error = ath_sqrt(largest);
     *sum_squares = sum;

@@ -16,7 +16,7 @@ import numpy as np
 
 from athcodec import container as ct
 from athcodec.ath import Thresholds
-from athcodec.atomic_files import check_target, new_file
+from athcodec.atomic_files import check_target, keeping, new_file
 from athcodec.clip import MotionClip
 from athcodec.encoding.bounds import BoundOption
 from athcodec.encoding.branch_trials import best_branches
@@ -60,7 +60,7 @@ def encode(
         A clip without branches gets those that `find_branches` proposes, whichever make the smallest file. Several
         clips of one plant go into one file when they have been joined (`join`).
     path : str or path-like
-        The file; an older one is replaced.
+        The file; an older .ath file, unless `clip` reads it, or an empty file is replaced, any other one refused.
     max_error : float, optional
         Bound in scene units on the distance of every vertex in every frame from the source.
     rel_error : float, optional
@@ -134,11 +134,13 @@ def encode(
         jobs=jobs,
         ladder=ladder,
     )
-    check_target(path)  # before any work
-    job, bound = _begin(clip, option, options, _weighted_progress(clip, progress, option, options))
-    with new_file(path) as out, clip.watched(), tempfile.SpooledTemporaryFile(SPOOL_BYTES) as spool:
-        decided = job.decide(bound)
-        return job.write(path, out, spool, decided, job.coded(decided, range(decided.segment_count)))
+    with keeping(clip.inputs):
+        check_target(path, ".ath")  # before any work
+        job, bound = _begin(clip, option, options, _weighted_progress(clip, progress, option, options))
+        with new_file(path) as out, clip.watched(), tempfile.SpooledTemporaryFile(SPOOL_BYTES) as spool:
+            with job.refusing(bound):
+                decided = job.decide(bound)
+                return job.write(path, out, spool, decided, job.coded(decided, range(decided.segment_count)))
 
 
 def draft(
@@ -161,7 +163,8 @@ def draft(
     option = BoundOption(max_error, rel_error, target_size, checked.lossless)
     with clip.watched():
         job, bound = _begin(clip, option, checked, _weighted_progress(clip, progress, option, checked, draft=True))
-        return job.draft(job.decide(bound))
+        with job.refusing(bound):
+            return job.draft(job.decide(bound))
 
 
 def code_segments(
@@ -189,7 +192,7 @@ def code_segments(
         Where the clip is another than that of the draft, as far as its hierarchy and rest pose show.
     """
     job = EncodingJob.resume(clip, draft, jobs=jobs)
-    with clip.watched():
+    with clip.watched(), job.refusing(draft.choice.settings.bound):
         yield from job.coded(job.decided(draft), list(segments))
 
 
@@ -227,7 +230,8 @@ def write(
     OSError
         Where the file cannot be written.
     """
-    check_target(path)
+    with keeping(clip.inputs):
+        check_target(path, ".ath")
     job = EncodingJob.resume(clip, draft, WeightedProgress(progress, {"motion": 1.0}))
     with new_file(path) as out, clip.watched(), tempfile.SpooledTemporaryFile(SPOOL_BYTES) as spool:
         return job.write(path, out, spool, job.decided(draft), coded)

@@ -13,6 +13,7 @@ import hashlib
 import math
 import tempfile
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
@@ -49,7 +50,7 @@ from athcodec.encoding.shape import RestPrecision
 from athcodec.encoding.summary import Seam, Summary
 from athcodec.errors import BoundError, ClipError
 from athcodec.hierarchy import Hierarchy, derived_edges, hierarchy_of
-from athcodec.options import DEFAULT_LADDER, EFFORTS, MAX_SEGMENT, MIN_SEGMENT, ladder_of
+from athcodec.options import DEFAULT_LADDER, EFFORTS, MAX_SEGMENT, MIN_SEGMENT, ladder_of, whole
 from athcodec.polygons import POLYGON_ARRAYS, Polygons, type_code
 from athcodec.threads import ThreadPool, default_jobs
 from athcodec.units import Length
@@ -57,6 +58,7 @@ from athcodec.units import Length
 SPOOL_BYTES = 64 << 20
 CHUNK_BYTES, LEVEL_BYTES = 6, 6  # of the front for a chunk, and for the errors of a level and segment
 PREDICTED_SHARE = 0.8  # of a file with layers, that one with predicted motion, which has none, may take
+REFUSAL_ROUNDS = 12  # Files, at most, that are coded to find the smallest bound that can be kept.
 FEW_BYTES = 2000  # of a small clip's file, which may do without coarse levels
 SEARCH_SAVES = 0.5  # of the bytes at the settings that a search starts with, at most
 STATIC_METADATA = ("unit", "up_axis")
@@ -95,6 +97,9 @@ class EncodingOptions:
         return cls(ladder=ladder_of(ladder), rest_precision=RestPrecision.of(rest_error), **options)
 
     def __post_init__(self) -> None:
+        for name in ("segment_frames", "jobs"):
+            if getattr(self, name) is not None:
+                whole(name, getattr(self, name))
         if self.segment_frames is not None and not MIN_SEGMENT <= self.segment_frames <= MAX_SEGMENT:
             raise ValueError(f"segment_frames: got {self.segment_frames}; expected {MIN_SEGMENT} to {MAX_SEGMENT}")
         if self.exact_rest and self.host_rest:
@@ -290,11 +295,37 @@ class EncodingJob:
     def thresholds(self, bound: float) -> Thresholds:
         return self.options.tam or Thresholds(bound, 0, bound, 0)
 
+    def _check(self, bound: float) -> None:
+        smallest = self.source.smallest_bound(bound)
+        qz.check_bound(smallest, self.seen.low, self.seen.high, self.clip.dtype, self.source.extent)
+
+    @contextmanager
+    def refusing(self, bound: float) -> Iterator[None]:
+        """Lets a BoundError of coding at a bound name the smallest bound that was found to be kept."""
+        try:
+            yield
+        except BoundError:
+            self._check(bound)
+            least = self._smallest_kept(bound)
+            if least == math.inf:
+                raise
+            raise BoundError(
+                f"max error: got {bound:.3g}; expected at least {least:.3g}, the smallest that this clip can keep"
+            ) from None
+
+    def _smallest_kept(self, low: float) -> float:
+        """The smallest bound found that a file keeps, above `low`, which none does."""
+        high = math.inf
+        for _ in range(REFUSAL_ROUNDS):
+            tried = qz.rounded_up(4 * low if high == math.inf else math.sqrt(low * high))
+            if tried >= high:
+                break
+            low, high = (tried, high) if self.file_size(tried) == math.inf else (low, tried)
+        return high
+
     def decide(self, bound: float) -> _Decided:
         """Searches for settings."""
-        qz.check_bound(
-            self.source.smallest_bound(bound), self.seen.low, self.seen.high, self.clip.dtype, self.source.extent
-        )
+        self._check(bound)
         ath = self.seen.ath(self.thresholds(bound))
         ratios = self._layer_ratios(ath, bound)
         ratio = ratios[0]
@@ -307,12 +338,16 @@ class EncodingJob:
         prediction = None if search.start.rigid.any() else self._best_prediction(bound, unsearched)
         if prediction is not None and prediction.bytes < SEARCH_SAVES * unsearched:
             return self._predicted(prediction.choice)
-        best = self._found_by(search, ratio)
-        if self._is_short(best):
-            best = min(best, self._without_levels(bound), key=self._estimated_bytes)
-        if prediction is not None and prediction.bytes < share * self._estimated_bytes(best):
-            return self._predicted(prediction.choice)
-        return best
+        try:
+            best = self._found_by(search, ratio)
+            if self._is_short(best):
+                best = min(best, self._without_levels(bound), key=self._estimated_bytes)
+            if prediction is None or prediction.bytes >= share * self._estimated_bytes(best):
+                return best
+        except BoundError:
+            if prediction is None:
+                raise
+        return self._predicted(prediction.choice)
 
     def _found_by(self, search: Search, ratio: int) -> _Decided:
         """The best of what a search has found."""
@@ -545,7 +580,8 @@ class EncodingJob:
 
         def predict(taken: tuple[int, list[np.ndarray]]) -> CodedSegment:
             positions, exact = self._positions(taken[1].pop())  # not held any longer
-            chunks, errors = code_predicted_segment(decided.prelude, decided.choice, positions, exact)
+            shown_times = source.shown_times(taken[0])
+            chunks, errors = code_predicted_segment(decided.prelude, decided.choice, positions, exact, shown_times)
             return CodedSegment(taken[0], chunks, errors, np.zeros(len(errors), int))
 
         def code(taken: tuple[int, list[np.ndarray]]) -> tuple[int, CodedMotion, list[End | None]]:
@@ -569,8 +605,8 @@ class EncodingJob:
 
     def _motion(self, decided: _Decided, index: int, positions: np.ndarray, exact: np.ndarray | None) -> CodedMotion:
         layers = decided.layers.of_segment(decided.source.is_whole_loop(index))
-        goes_on = decided.source.goes_on(index)
-        return CodedMotion(decided.prelude, layers, self.segment_count, positions, exact, goes_on)
+        goes_on, shown_times = decided.source.goes_on(index), decided.source.shown_times(index)
+        return CodedMotion(decided.prelude, layers, self.segment_count, positions, exact, goes_on, shown_times)
 
     @staticmethod
     def _with_those_before(source: Source, segments: Sequence[int]) -> Iterator[int]:

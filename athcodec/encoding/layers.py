@@ -22,6 +22,7 @@ from athcodec.encoding import streams
 from athcodec.encoding.joins import (
     END_FRAMES,
     NO_CORRECTIONS,
+    SLOPED,
     CorrectionPrice,
     End,
     ErrorPrice,
@@ -304,7 +305,9 @@ class _SegmentCoder:
         positions: np.ndarray,
         goes_on: bool,
         keeps_last: bool,
+        shown_times: np.ndarray,
     ):
+        self._shown_times = shown_times
         self._output, self._origin, self.positions = prelude.output, prelude.origin, positions
         self._pool, self._layered = prelude.plan.pool, len(layers.each) > 1
         self._level_0 = layers.level_0
@@ -333,7 +336,7 @@ class _SegmentCoder:
         shown = [self._at_level_0(segment, settings), *[segment] * (plan.level_count - 2)]
         self.errors = _EvenLevels(self, shown, settings).errors
         self._shown = [
-            _ShownLevel(partial(own.pose, level, *self._output)) for level, own in enumerate(shown)
+            _ShownLevel(partial(self._pose_to_join, own, level)) for level, own in enumerate(shown)
         ] + self._shown
         self._keep_last_level_best(layer, plan.level_count - 1, self._shown[-1].pose())
         for level, nodes in enumerate(shown):
@@ -455,9 +458,11 @@ class _SegmentCoder:
         self.joins[level] = join
         apply_join(end, positions, join)
         if layer is None:
-            rounding = 2 * float(np.spacing(np.abs(positions).max()))  # of maps, which are what is joined
-            largest, p99, rms = self.error(positions)
-            self.errors[level] = largest + rounding, p99, rms + rounding
+            positions = positions.astype(self._output[1])
+            size = np.abs(positions).max()
+            # A decoder joins maps. It may round a position to the other side, and slopes make last bits larger.
+            last_bits = 16 * (1 + join % SLOPED) * float(np.spacing(np.float64(size)))
+            self.errors[level] = self.error(positions, 2 * float(np.spacing(size)) + last_bits)
         else:
             if layer.ratio == 1 and positions.shape[2] >= LEAST_MEETING:
                 self._meet(end.corrections)
@@ -515,8 +520,17 @@ class _SegmentCoder:
         """As it is put out, neither joined nor corrected."""
         return shown.pose(level, *self._output)
 
-    def error(self, decoded: np.ndarray) -> tuple[float, ...]:
-        return position_errors(decoded, self.positions, self._origin, self._pool)
+    def _pose_to_join(self, shown: SegmentMotion, level: int) -> np.ndarray:
+        """A level without corrections as float64, to be joined: what stems place is rounded before and after that, what
+        maps place only after it."""
+        origin, dtype = self._output
+        positions, pieces = shown.pose(level, origin, np.float64), shown.plan.pieces
+        of_stems = np.repeat(pieces["level"] <= level, pieces["count"])
+        positions[of_stems] = positions[of_stems].astype(dtype)
+        return positions
+
+    def error(self, decoded: np.ndarray, rounding: float = 0.0) -> tuple[float, ...]:
+        return position_errors(decoded, self.positions, self._origin, self._pool, self._shown_times, rounding)
 
 
 class _EvenLevels:
@@ -577,7 +591,7 @@ class CodedMotion:
     """The motion of one segment in layers, all but how it goes on from the segment before it.
 
     layers: with the settings of the segment (see Layers.of_segment). exact: the source's own numbers (see
-    Source.exact), which one more level is to give. goes_on: in the segment behind it.
+    Source.exact), which one more level is to give. goes_on: in the segment behind it. shown_times: as Source has them.
     """
 
     def __init__(
@@ -586,10 +600,11 @@ class CodedMotion:
         layers: Layers,
         segment_count: int,
         positions: np.ndarray,
-        exact: np.ndarray | None = None,
-        goes_on: bool = False,
+        exact: np.ndarray | None,
+        goes_on: bool,
+        shown_times: np.ndarray,
     ):
-        coder = _SegmentCoder(prelude, layers, segment_count, positions, goes_on, exact is not None)
+        coder = _SegmentCoder(prelude, layers, segment_count, positions, goes_on, exact is not None, shown_times)
         self._coder: _SegmentCoder | None = coder
         self._exact, self._largest_bound = exact, layers.each[-1].settings.largest_bound
         segment = coder.first(layers.each[0])

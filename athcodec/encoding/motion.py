@@ -468,20 +468,30 @@ def gather(block: np.ndarray, vertex_source: np.ndarray, origin: np.ndarray, poo
 
 
 def position_errors(
-    positions: np.ndarray, source: np.ndarray, origin: np.ndarray, pool: ThreadPool = SERIAL
+    positions: np.ndarray,
+    source: np.ndarray,
+    origin: np.ndarray,
+    pool: ThreadPool,
+    shown: np.ndarray | None = None,
+    rounding: float = 0.0,
 ) -> tuple[float, float, float]:
-    """Distance of decoded positions from the source by each of MEASURES, the second rounded up as files store it."""
+    """Distance of decoded positions from the source by each of MEASURES, the second rounded up as files store it.
+    shown: how many frames of the clip show each frame, (T,) int32; None: one. rounding: what a decoder may be further
+    off than the positions are."""
     vertices, _, frames = positions.shape
+    shown = np.ones(frames, np.int32) if shown is None else shown
 
     def measured(start: int, stop: int) -> tuple[np.ndarray, np.ndarray]:
         result, histogram, part = np.empty(2), np.zeros(SHORT_FLOATS, np.uint32), positions[start:stop]
         lib.ath_error(
             stop - start,
             frames,
+            address(shown, np.int32, frames),
             part.dtype == np.float64,
             address(part, part.dtype, 0),
             address(source[start:stop], np.float64, part.size),
             address(origin, np.float64, 3),
+            rounding,
             result[:1].ctypes.data,
             result[1:].ctypes.data,
             histogram.ctypes.data,
@@ -490,7 +500,7 @@ def position_errors(
 
     results, histograms = zip(*pool.map(measured, ranges(vertices, 3 * frames)))
     largest, squares = np.transpose(results)
-    count = vertices * frames
+    count = vertices * int(shown.sum())
     within = np.cumsum(np.sum(histograms, axis=0, dtype=np.int64))
     p99 = int(np.searchsorted(within, count - count // 100))
-    return float(largest.max()), from_short_float(p99), math.sqrt(float(sum(squares)) / count)
+    return float(largest.max()) + rounding, from_short_float(p99), math.sqrt(float(sum(squares)) / count) + rounding

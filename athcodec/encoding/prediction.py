@@ -95,13 +95,21 @@ def best_prediction(source: Source, bound: float, most_bytes: float) -> FoundPre
     ath = one_map_each(source.seen)
     first, *others = (_settings(source, ath, bound, ratio * source.smallest_bound(bound)) for ratio in REST_STEPS)
     samples = _samples(source)
-    preludes = {first.rest_step: CodedPrelude(source, ath, first, predicted=True)}
+    preludes: dict[float, CodedPrelude] = {}
+
+    def prelude_of(settings: Settings) -> CodedPrelude:
+        if settings.rest_step not in preludes:
+            preludes[settings.rest_step] = CodedPrelude(source, ath, settings, predicted=True)
+        return preludes[settings.rest_step]
 
     def coded(settings: Settings, lattice: bool = CUBES, error_share: float = 1.0) -> FoundPrediction:
         own = replace(settings, step=_largest_step(error_share * settings.limit, lattice))
         choice = Choice(own, own, None, predicted=lattice, error_share=error_share)
-        prelude = preludes[settings.rest_step]
-        parts = [(sample, *_predicted(prelude, choice, sample.positions)) for sample in samples]
+        try:
+            prelude = prelude_of(settings)
+            parts = [(sample, *_predicted(prelude, choice, sample.positions)) for sample in samples]
+        except BoundError:
+            return FoundPrediction(choice, math.inf, False)
         motion = sum(len(payload) * sample.scale for sample, payload, _ in parts)
         twitches = any(_twitches(shown, sample.positions, settings.limit) for sample, _, shown in parts)
         return FoundPrediction(choice, motion + prelude.prelude_bytes, twitches)
@@ -110,22 +118,21 @@ def best_prediction(source: Source, bound: float, most_bytes: float) -> FoundPre
         return min(found, key=lambda one: one.bytes)
 
     try:
-        if sum(_begun(preludes[first.rest_step], first, sample) for sample in samples) > TOO_MANY * most_bytes:
+        if sum(_begun(prelude_of(first), first, sample) for sample in samples) > TOO_MANY * most_bytes:
             return None
-        preludes |= {own.rest_step: CodedPrelude(source, ath, own, predicted=True) for own in others}
-        found = best(coded(own) for own in (first, *others))
-        if Feature.LATTICE not in source.without:
-            found = best([found, coded(found.choice.settings, LATTICE)])
-        if found.twitches:
-            relative = source.smallest_bound(bound) / source.seen.diagonal
-            share = _still_share(relative)
-            still = best(coded(own, CUBES, share) for own in (first, *others))
-            if relative < FINE and Feature.LATTICE not in source.without:
-                still = best([still, coded(still.choice.settings, LATTICE, share)])
-            if still.bytes < min(most_bytes, MOST_FOR_STILL * found.bytes):
-                found = still
     except BoundError:
         return None
+    found = best(coded(own) for own in (first, *others))
+    if Feature.LATTICE not in source.without:
+        found = best([found, coded(found.choice.settings, LATTICE)])
+    if found.twitches:
+        relative = source.smallest_bound(bound) / source.seen.diagonal
+        share = _still_share(relative)
+        still = best(coded(own, CUBES, share) for own in (first, *others))
+        if relative < FINE and Feature.LATTICE not in source.without:
+            still = best([still, coded(still.choice.settings, LATTICE, share)])
+        if still.bytes < min(most_bytes, MOST_FOR_STILL * found.bytes):
+            found = still
     return found if found.bytes < most_bytes else None
 
 
@@ -193,15 +200,16 @@ def _predicted(prelude: CodedPrelude, choice: Choice, positions: np.ndarray) -> 
 
 
 def code_predicted_segment(
-    prelude: CodedPrelude, choice: Choice, positions: np.ndarray, exact: np.ndarray | None = None
+    prelude: CodedPrelude, choice: Choice, positions: np.ndarray, exact: np.ndarray | None, shown_times: np.ndarray
 ) -> tuple[dict[tuple[int, int], bytes], np.ndarray]:
-    """Chunks and errors as CodedMotion.joined_to gives them; predicted motion is not joined."""
+    """Chunks and errors as CodedMotion.joined_to gives them; predicted motion is not joined. shown_times: as Source has
+    them."""
     assert choice.predicted is not None
     plan, settings = prelude.plan, choice.settings
     payload, decoded = _predicted(prelude, choice, positions)
 
     def error(shown: np.ndarray) -> tuple[float, ...]:
-        return position_errors(shown, positions, prelude.origin, plan.pool)
+        return position_errors(shown, positions, prelude.origin, plan.pool, shown_times)
 
     last = plan.level_count - 1
     chunks, level_0 = {(last, ct.PREDICTED): payload}, _still(prelude, positions.shape[2])

@@ -57,7 +57,19 @@ def end_weights(usual_change: float) -> tuple[float, ...]:
 
 def error_limit(bound: float, diagonal: float) -> float:
     """What decoded positions are held to: the bound less a margin for how others measure."""
-    return bound - min(1e-6 * diagonal, 0.01 * bound)
+    return bound - max(min(1e-6 * diagonal, 0.01 * bound), 1e-15 * bound)
+
+
+def rounded_up(bound: float) -> float:
+    """A number of three digits that is the bound or a little more, so that what an error names is accepted."""
+    return next(near for near in (float(f"{part * bound:.3g}") for part in (1.0, 1.01)) if near >= bound)
+
+
+def origin_of(point: np.ndarray, low: np.ndarray, high: np.ndarray, is_exact: bool) -> np.ndarray:
+    """The point, kept within a box, (3,) in numbers of float32. Where `is_exact`, taking it off and adding it again
+    gives every number in the box to the last bit, because what is left of a number is never larger than the number."""
+    origin = nearest_singles(np.clip(point, low, high))
+    return np.where(is_exact & (np.abs(origin) < 2.001 * (high - low)), 0.0, origin)
 
 
 def least_bound(low: np.ndarray, high: np.ndarray, dtype: np.dtype) -> float:
@@ -68,18 +80,18 @@ def least_bound(low: np.ndarray, high: np.ndarray, dtype: np.dtype) -> float:
 
 
 def check_bound(bound: float, low: np.ndarray, high: np.ndarray, dtype: np.dtype, extent: float) -> None:
-    """Raises BoundError for a bound not above least_bound, or too small for the file's integers to span `extent`."""
+    """Raises BoundError for a bound below least_bound, or too small for the file's integers to span `extent`."""
     least = least_bound(low, high, dtype)
-    if not (np.isfinite(bound) and bound > least):
+    if not (np.isfinite(bound) and bound >= least):
         reason = (
             "the smallest that a file can hold"
             if least == SMALLEST_BOUND
             else f"twice the spacing of the source's {np.dtype(dtype).name} coordinates"
         )
-        raise BoundError(f"max error: got {bound:.3g}; expected more than {least:.3g}, {reason}")
+        raise BoundError(f"max error: got {bound:.3g}; expected at least {rounded_up(least):.3g}, {reason}")
     if extent > LARGEST_EXTENT * bound:
         raise BoundError(
-            f"max error: got {bound:.3g}; expected at least {extent / LARGEST_EXTENT:.3g} for positions "
+            f"max error: got {bound:.3g}; expected at least {rounded_up(extent / LARGEST_EXTENT):.3g} for positions "
             f"and a rest pose that are up to {extent:.3g} apart"
         )
 

@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import cached_property
+from threading import Lock
 from typing import Any, cast
 
 import numpy as np
@@ -62,7 +63,9 @@ HOPELESS = 1.3  # over the least bytes, spatial bases that rotations do not save
 MODES_SAVE, LAYERS_SAVE = 1.5, 1.05  # of a single layer's bytes, at most: learned modes, what suits refinements better
 SHORT_STEM = 3  # vertices of a stem whose learned modes are tried in place of rotations and in any basis
 NEAREST, NEAR = 4, 1.12  # other choices that steps are found for, and what they cost before, over the best
+SETTLING_ROUNDS = 64  # Choices of one kind that settings of a small clip are changed for at most.
 CALM_STEP, CALM_COST = 1.15, 1.03  # of small rigid parts: how much finer a step at a time, for how much in all
+CALM_ROUNDS = 32  # Steps finer than the first that are tried at most: the last is 1/87 of it.
 CALM_SHARE = 1e-4  # of their vertices over time, that may be corrected
 WORTH = {
     "_with_learned_bases": 2,
@@ -278,6 +281,7 @@ class Search:
         self._components: dict[tuple, Components] = {}
         self._time_components: dict[tuple, tuple[float, list[dict[int, TimeComponents]]]] = {}
         self._preludes: dict[tuple, CodedPrelude] = {}
+        self._kept = Lock()  # Threads that cost candidates share the preludes.
         self._ratios, self._layered = ratios, len(ratios) > 1
         keeps_shape = start.turn_step > 0  # which a few bytes less would cost
         self._is_small = is_small(source.clip.vertex_count, source.segments, effort) and not keeps_shape
@@ -572,15 +576,14 @@ class Search:
         )
 
     def _try(self, settings: Settings) -> tuple[float, np.ndarray]:
-        prelude = self.prelude(settings)
-        learned_modes = self.learned_modes(prelude.plan, settings)
         try:
+            prelude = self.prelude(settings)
+            learned_modes = self.learned_modes(prelude.plan, settings)
             levels = sum(self._level_bytes(prelude, settings, learned_modes, i) for i in range(len(self.samples)))
+            modes = streams.encode_learned_modes(prelude.plan, learned_modes)
         except BoundError:
             return math.inf, np.full(self.levels, math.inf)
-        mode_bytes = 0.0
-        for level, data in streams.encode_learned_modes(prelude.plan, learned_modes).items():
-            mode_bytes += len(data) * self.extrapolation.rows[level]
+        mode_bytes = sum(len(data) * self.extrapolation.rows[level] for level, data in modes.items())
         return levels.sum() + mode_bytes + self._prelude_bytes(prelude), levels
 
     def _level_bytes(
@@ -714,8 +717,9 @@ class Search:
     def _costs(self, candidates: list[Settings]) -> list[tuple[float, np.ndarray]]:
         some = {self._prelude_key(settings): settings for settings in candidates}  # by prelude, each to be made once
         with ThreadPoolExecutor(thread_count(self.jobs, self.source)) as pool:
-            list(pool.map(self.prelude, some.values()))
-            for settings in candidates:  # one after the other: what the first one sees serves all like it
+            list(pool.map(self._make_prelude, some.values()))
+            # One after the other, because what the first one sees serves all like it.
+            for settings in filter(self._make_prelude, candidates):
                 if any(settings.learned_bases):
                     self._learn_time(settings)
                 if settings.learned_pieces is not None:
@@ -729,11 +733,22 @@ class Search:
     def prelude(self, settings: Settings) -> CodedPrelude:
         """As in earlier trials, where one had it."""
         key = self._prelude_key(settings)
-        prelude = self._preludes.pop(key, None) or CodedPrelude(self.source, self.ath, settings)
-        self._preludes[key] = prelude  # the last one used
-        while len(self._preludes) > PRELUDES_KEPT:
-            self._preludes.pop(next(iter(self._preludes)))
+        with self._kept:
+            prelude = self._preludes.pop(key, None)
+        prelude = prelude or CodedPrelude(self.source, self.ath, settings)
+        with self._kept:
+            self._preludes[key] = prelude  # The prelude used last stands last.
+            while len(self._preludes) > PRELUDES_KEPT:
+                self._preludes.pop(next(iter(self._preludes)))
         return prelude
+
+    def _make_prelude(self, settings: Settings) -> bool:
+        """Whether there is a prelude that keeps the bound; it is there for later calls."""
+        try:
+            self.prelude(settings)
+        except BoundError:
+            return False
+        return True
 
     def _prelude_key(self, settings: Settings) -> tuple:
         return (
@@ -839,7 +854,7 @@ class Search:
     def _settled(self, settings: Settings) -> Settings:
         """Of small clips those that no other choice of one kind makes smaller, each with steps of its own: what was
         chosen first was chosen at other steps, and sizes jump from bound to bound where the worse one of two stays."""
-        while self._is_small:
+        for _ in range(SETTLING_ROUNDS if self._is_small else 0):
             plain = replace(settings, learned_pieces=None)
             bases = self._nearest(plain, list(self._other_bases(plain)))
             others = self._nearest(
@@ -882,7 +897,9 @@ class Search:
         """A finer step, of all or of turns, where corrections bend and twitch many small rigid parts, as far as it is
         cheap."""
         most, share = CALM_COST * self.cost(settings)[0], self._corrected_parts(settings)
-        while share > CALM_SHARE:
+        for _ in range(CALM_ROUNDS):
+            if share <= CALM_SHARE:
+                break
             finer = (
                 replace(settings, step=qz.single(settings.step / CALM_STEP)),
                 replace(settings, turn_step=finer_turn(settings.turn_step)),

@@ -6,6 +6,7 @@ predicted from what the decoder will have, corrections are found on what it will
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -35,6 +36,7 @@ from athcodec.threads import SERIAL, ThreadPool, default_jobs
 
 BEAM = 0  # form of a branch; others are SHEET, or a tube's vertices for each ring
 FINER = 32  # step over that of segments that bases and modes are learned from
+REST_ROUNDS = 16  # Steps of a rest pose that are tried until one keeps the bound; the last is 1/28 of the first.
 ROWS_AT_ONCE = 1 << 14  # of coefficients
 WORK_BYTES = 1 << 30  # of the segments coded at once, where `jobs` does not say how many these are
 CONNECTED_SHARE = 0.8  # of a rest pose at once, that one by faces may take where layers refine it
@@ -78,8 +80,10 @@ class Source:
     _held: WeakValueDictionary[int, np.ndarray] = field(init=False, repr=False, compare=False)  # positions, by segment
 
     def __post_init__(self) -> None:
-        first = self.clip.rest[self.hierarchy.vertex_source[0]]  # of a plant it is rooted: the rest pose begins at 0
-        self.origin = qz.nearest_singles(np.clip(first, self.seen.low, self.seen.high))
+        stays_in_place = self.exact_rest and self.seen.repeats[1:].all()  # then its error may be 0 to the last bit
+        is_exact = self.clip.dtype == np.float64 or stays_in_place
+        first = self.clip.rest[self.hierarchy.vertex_source[0]]  # The rest pose of a rooted plant begins at 0.
+        self.origin = qz.origin_of(first, self.seen.low, self.seen.high, is_exact)
         self.source_rest = self.clip.rest[self.hierarchy.vertex_source] - self.origin
         self.rest = self.source_rest if self.reference is None else self.reference
         self.sheet_like = ~_thin_branches(self)
@@ -223,6 +227,11 @@ class Source:
     def frames_of(self, segment: int) -> int:
         """Coded frames of a segment, T."""
         return int((~self.repeats[slice(*self.segments[segment])]).sum())
+
+    def shown_times(self, segment: int) -> np.ndarray:
+        """(T,) int32: how many frames of the clip show each coded frame of a segment."""
+        repeats = self.repeats[slice(*self.segments[segment])]
+        return np.diff(np.append(np.flatnonzero(~repeats), len(repeats))).astype(np.int32)
 
     def block(self, segment: int) -> np.ndarray:
         """(T, N, 3) positions of a segment as the clip has them, of the frames that are coded."""
@@ -379,12 +388,14 @@ def _rest_within(source: Source, branches: np.ndarray, settings: Settings) -> st
 def _within(
     limit: float, pose: np.ndarray, encode: Callable[[float], streams.CodedRest], step: float
 ) -> streams.CodedRest:
-    """At a step, or the first finer one by which no vertex is further from the pose than the limit."""
-    coded = encode(step)
-    while not np.linalg.norm(coded.decoded - pose, axis=1).max() <= limit:
-        step = qz.single(0.8 * step)
+    """At a step, or the first finer one by which no vertex is further from the pose than the limit. Raises BoundError
+    where none is: integers of steps that fine do not reach all places."""
+    for _ in range(REST_ROUNDS):
         coded = encode(step)
-    return coded
+        if np.linalg.norm(coded.decoded - pose, axis=1).max() <= limit:
+            return coded
+        step = qz.single(0.8 * step)
+    raise BoundError(f"max error: got {limit:.3g}; the rest pose cannot be kept within it")
 
 
 def with_best_lags(source: Source, ath: Ath, settings: Settings) -> Settings:
@@ -408,11 +419,14 @@ def _with_copies(source: Source, ath: Ath, candidates: list[Settings]) -> list[S
     return [] if shape_of is None else [replace(settings, shape_of=shape_of) for settings in candidates]
 
 
-def _poses_size(source: Source, ath: Ath, settings: Settings) -> int:
-    """Bytes of hierarchy and rest pose."""
+def _poses_size(source: Source, ath: Ath, settings: Settings) -> float:
+    """Bytes of hierarchy and rest pose; infinite where the pose cannot be kept within the bound."""
     hierarchy, branches = source.hierarchy, branch_records(source.hierarchy, ath, settings)
     stream = streams.encode_hierarchy(branches, hierarchy.branch_source, hierarchy.vertex_source)
-    return len(stream) + len(_coded_rest(source, branches, settings)[0].stream)
+    try:
+        return len(stream) + len(_coded_rest(source, branches, settings)[0].stream)
+    except BoundError:
+        return math.inf
 
 
 def with_connected_rest(source: Source, ath: Ath, settings: Settings) -> Settings:

@@ -14,8 +14,9 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from athcodec.atomic_files import check_target
+from athcodec.atomic_files import check_target, keeping
 from athcodec.errors import ClipError
+from athcodec.options import whole
 from athcodec.sources import Format, format_by_suffix, format_named
 
 Report = Callable[[str, float], None]
@@ -60,7 +61,7 @@ class WriteOptions:
     nanite: bool = False
 
     def __post_init__(self) -> None:
-        if self.rig is not None and not 1 <= self.rig <= MOST_RIGGED:
+        if self.rig is not None and not 1 <= whole("rig", self.rig) <= MOST_RIGGED:
             raise ValueError(f"rig: got {self.rig!r}, expected 1 to {MOST_RIGGED} joints")
         if self.nanite and self.rig is None:
             raise ValueError("nanite: got no rig, expected one too")
@@ -125,7 +126,8 @@ def write(
     motion : MotionClip or ClipView
         A clip, or frames of an .ath file at some level.
     path : str or path
-        The file to write; formats of one file per frame number their files by it.
+        The file to write; formats of one file per frame number their files by it. An older file of the same kind, or
+        an empty one, is replaced, unless `motion` reads it.
     format : str, optional
         Name of one of `athcodec.exporters.FORMATS`; known by the suffix by default.
     progress : callable, optional
@@ -160,10 +162,11 @@ def write(
         raise ClipError(f"nanite: got {kind.name}, expected usd")
     if wanted.rig is None:
         _check_clips(motion, kind)
-    check_target(path)
     report = progress or (lambda stage, fraction: None)
-    module = importlib.import_module(kind.module)
-    facts = dict(module.write_clip(motion, path, wanted, lambda done: report("export", done)) or {})
+    with keeping(getattr(motion, "inputs", ())):
+        check_target(path, kind.suffixes[0])
+        module = importlib.import_module(kind.module)
+        facts = dict(module.write_clip(motion, path, wanted, lambda done: report("export", done)) or {})
     names = facts.pop(FILES, [Path(path).name])
     return Written(tuple(Path(path).with_name(name) for name in names), facts)
 

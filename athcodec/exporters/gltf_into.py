@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from athcodec.ath_file import AthFile
-from athcodec.atomic_files import new_file
+from athcodec.atomic_files import file_ids, keeping, new_file
 from athcodec.clip import ClipRange, MotionClip
 from athcodec.clip_view import ClipView
 from athcodec.errors import ClipError
@@ -122,7 +122,7 @@ class Into:
             if all(name.startswith(KNOWN) and name not in POINTING for name in self._json["extensionsUsed"]):
                 _prune(self._json, used, self._needless)
             data = binary.packed(self._json)
-        with new_file(path) as out:
+        with keeping(file_ids(self.path)), new_file(path) as out:
             out.write(_glb(self._json, data))
 
     def _check_unchanged(self) -> None:
@@ -264,7 +264,7 @@ def write_back(path: str | os.PathLike[str], views: Sequence[ClipView], out: str
         if all(name.startswith(KNOWN) and name not in POINTING for name in gltf.get("extensionsUsed", ())):
             _prune(gltf, used, needless)
         data = binary.packed(gltf)
-    with new_file(out) as written:
+    with keeping(file_ids(path)), new_file(out) as written:
         written.write(_glb(gltf, data))
 
 

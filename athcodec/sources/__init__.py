@@ -22,13 +22,13 @@ import numpy as np
 
 from athcodec.clip import NOT_KEPT, MotionClip
 from athcodec.errors import ClipError, MissingExtra, SourceWarning
+from athcodec.file_kinds import HEAD_BYTES
 from athcodec.frames import Frames
 from athcodec.options import MAX_MEMORY, SAMPLES
 from athcodec.plain_files import open_plain
 from athcodec.sources.opening import closing_on_failure, naming_file
 from athcodec.units import METRES, unit_symbol
 
-HEAD_BYTES = 4096
 # what is not read of a scene and is no shape
 NO_SHAPES = frozenset(
     (

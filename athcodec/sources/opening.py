@@ -11,11 +11,13 @@ from os import PathLike, fspath
 from pathlib import Path
 from typing import Protocol
 
+from athcodec.atomic_files import FileId
 from athcodec.errors import ClipError
 from athcodec.options import MAX_MEMORY
 from athcodec.plain_files import open_plain
 
 File = str | PathLike[str] | int
+Stamp = tuple[int, int, int, int]  # size, time of change, device, inode
 
 
 class Closable(Protocol):
@@ -65,12 +67,12 @@ class FileWatch:
     """
 
     def __init__(self, *files: File):
-        self.stamps: dict[File, tuple[int, int]] = {}
+        self.stamps: dict[File, Stamp] = {}
         for file in files:
             self.add(file)
 
     @classmethod
-    def of(cls, stamps: dict[File, tuple[int, int]]) -> FileWatch:
+    def of(cls, stamps: dict[File, Stamp]) -> FileWatch:
         """One that goes on from the `stamps` of another."""
         watch = cls()
         watch.stamps = stamps
@@ -82,9 +84,14 @@ class FileWatch:
 
     def __call__(self) -> bool:
         try:
-            return all(_stamp(file) == stamp for file, stamp in self.stamps.items())
+            return all(_stamp(file)[:2] == stamp[:2] for file, stamp in self.stamps.items())
         except OSError:
             return False
+
+    @property
+    def files(self) -> frozenset[FileId]:
+        """What the files are on their disk, under whatever name."""
+        return frozenset(stamp[2:] for stamp in self.stamps.values())
 
 
 def file_beside(folder: str | PathLike[str], name: str, allow_outside: bool = False) -> Path:
@@ -111,9 +118,9 @@ def check_inside(folder: str | PathLike[str], path: str | PathLike[str], allow_o
         )
 
 
-def _stamp(file: File) -> tuple[int, int]:
+def _stamp(file: File) -> Stamp:
     now = os.stat(file)
-    return now.st_size, now.st_mtime_ns
+    return now.st_size, now.st_mtime_ns, now.st_dev, now.st_ino
 
 
 @contextmanager

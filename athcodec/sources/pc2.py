@@ -2,7 +2,7 @@
 
 PC2 says at which frame the cache starts and how many frames there are from sample to sample, but no rate: that is
 options.fps. Without it frames come DEFAULT_FPS (30) a second, and the clip states a rate only where samples are not one
-frame apart. The faces come from a mesh beside it (see cached_mesh). Coordinates are taken as they are: Blender's own
+frame apart. The faces come from a mesh beside it (see _mesh_beside). Coordinates are taken as they are: Blender's own
 OBJ export turns its axes unless an option says otherwise, its point caches have the axes of the object.
 """
 
@@ -70,7 +70,8 @@ def open_cache(path: str | PathLike[str], options: ReadOptions, read_header: Any
     file = open_plain(path)
     with naming(path), closing_on_failure(file):
         fields = read_header(file, options)
-        mesh = cached_mesh(path, options, fields["positions"].shape[1])
+        mesh_path = options.mesh or _mesh_beside(Path(path))
+        mesh = cached_mesh(mesh_path, path, options, fields["positions"].shape[1])
         metadata = mesh.metadata | fields.pop("metadata")
         return MotionClip(
             **fields,
@@ -81,15 +82,17 @@ def open_cache(path: str | PathLike[str], options: ReadOptions, read_header: Any
             attributes=mesh.attributes,
             rest_pose="mean" if options.rest == "mean" else "first",
             resource=file,
-            unchanged=FileWatch(file.fileno()),
+            unchanged=FileWatch(file.fileno(), *([] if mesh_path is None else [mesh_path])),
         )
 
 
-def cached_mesh(path: str | PathLike[str], options: ReadOptions, vertex_count: int) -> Mesh:
-    """The mesh whose vertices a cache moves: options.mesh, else the OBJ or PLY file of the cache's name beside it, else
-    points alone. OBJ and PLY are read here, any other format as `read` does; the mesh's own positions are not used:
-    they may be in other units or axes."""
-    found = options.mesh or _mesh_beside(Path(path))
+def cached_mesh(
+    found: str | PathLike[str] | None, path: str | PathLike[str], options: ReadOptions, vertex_count: int
+) -> Mesh:
+    """The mesh whose vertices the cache `path` moves, in the file `found`, or where that is None points alone.
+
+    OBJ and PLY are read here, any other format as `read` does; the mesh's own positions are not used: they may be in
+    other units or axes."""
     if found is None:
         metadata = {
             "part_names": [Path(path).stem],
@@ -115,6 +118,7 @@ def cached_mesh(path: str | PathLike[str], options: ReadOptions, vertex_count: i
 
 
 def _mesh_beside(path: Path) -> Path | None:
+    """The OBJ or PLY file of the cache's name beside it."""
     for suffix in (*MESH_SUFFIXES, *(suffix.upper() for suffix in MESH_SUFFIXES)):
         if path.with_suffix(suffix).is_file():
             return path.with_suffix(suffix)

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from os import PathLike, fspath
 from pathlib import Path
@@ -29,6 +29,7 @@ from athcodec.sources.timing import numbered_times
 _NUMBERED = re.compile(r"(.*?)(\d+)", re.DOTALL)
 _ELEMENTS = frozenset((b"f ", b"f\t", b"l ", b"l\t"))
 LARGEST_NUMBER = 10**9
+FRAME_SUFFIXES = (".obj", ".ply", ".vtu", ".vtk")  # of formats that have one file per frame
 
 
 @dataclass(frozen=True)
@@ -99,6 +100,31 @@ def sequence_files(path: str | PathLike[str]) -> dict[int | None, Path]:
     elif Path(path) not in files.values():
         return {None: Path(path)}
     return files
+
+
+def each_once(paths: Iterable[str]) -> list[tuple[str, str]]:
+    """Paths, and what the clip in each is called by its file. Of the files of a sequence, as a shell makes them of a
+    pattern, only the first stays, called by their prefix. Raises ClipError where only some of a sequence are named."""
+    sequence_of: dict[Path, tuple[Path, ...]] = {}
+    named: dict[tuple[Path, ...] | str, list[str]] = {}
+    for path in paths:
+        if Path(path).suffix.lower() in FRAME_SUFFIXES and os.path.isfile(path) and Path(path) not in sequence_of:
+            files = tuple(sequence_files(path).values())
+            sequence_of |= dict.fromkeys(files, files)
+        named.setdefault(sequence_of.get(Path(path), path), []).append(path)
+    found = []
+    for files, names in named.items():
+        numbering = numbering_of(names[0]) if len(names) > 1 and isinstance(files, tuple) else None
+        if numbering is None:
+            found += [(path, Path(path).stem) for path in names]
+            continue
+        if len(set(names)) != len(files):
+            raise ClipError(
+                f"{names[0]}: got {len(names)} names of a sequence of {len(files)} files, expected one or all of "
+                "them; to encode some of its frames, put their files into a folder of their own"
+            )
+        found.append((names[0], numbering.prefix.rstrip("_-. ") or numbering.folder.resolve().name))
+    return found
 
 
 def read_clip(path: str | PathLike[str], options: ReadOptions) -> MotionClip:

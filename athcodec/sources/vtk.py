@@ -76,6 +76,8 @@ def read_clip(path: str | PathLike[str], options: ReadOptions) -> MotionClip:
     try:
         files, time, metadata = _files(Path(path), options)
         steps = _Steps(files, options.max_memory // GRIDS)
+        if Path(path).is_file():  # an index, or one of the files
+            steps.unchanged.add(path)
         name = re.sub(r"[_.\-]*\d+$", "", files[0].stem) or files[0].stem
         said = steps.said | metadata
         return clip_of_steps(steps, time, said, name, options, steps.static(), unchanged=steps.unchanged)

@@ -22,12 +22,11 @@ from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 
 from spec.robust import Row
-from spec.robust.faults import ONE_LINE, Place, is_whole
+from spec.robust.faults import OLDER, ONE_LINE, Place, is_whole
 
 HERE = Path(__file__).resolve().parent
 VERBS = {"encode": "target.ath", "decode": "target.h5", "decode npz": "target.npz", "truncate": "target.ath"}
 ERRORS = (errno.EIO, errno.ENOSPC)
-OLDER = b"older"
 DEAD = 70
 """Exit code of a run that says nothing of itself."""
 
@@ -105,7 +104,7 @@ def _runs(verb: str, place: Place, sample: int, lasts: bool, deadline: float) ->
 
 def _run(verb: str, place: Place, n: int, lasts: bool) -> dict:
     target = place.folder / VERBS[verb]
-    target.write_bytes(OLDER)
+    target.write_bytes(OLDER[target.suffix])
     ends, start = os.pipe()
     child = os.fork()
     if child == 0:
@@ -117,7 +116,7 @@ def _run(verb: str, place: Place, n: int, lasts: bool) -> dict:
     if not said:
         return {"kind": "crash", "note": f"ended by {status}"}
     result = json.loads(said)
-    kept = target.read_bytes() == OLDER
+    kept = target.read_bytes() == OLDER[target.suffix]
     refused = result["code"] == 1 and ONE_LINE.fullmatch(result["err"]) and str(place.source.parent) in result["err"]
     fine = (refused or result["code"] == 0 and not kept) and (kept or is_whole(target))
     _next_run(place, target)
@@ -153,7 +152,7 @@ def _next_run(place: Place, target: Path) -> None:
     from athcodec.atomic_files import new_file
 
     with new_file(target) as file:
-        file.write(b"next")
+        file.write(OLDER[target.suffix])
 
 
 def rows(budget: float) -> list[Row]:

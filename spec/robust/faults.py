@@ -30,6 +30,12 @@ from spec.robust import Row
 TIMEOUT = 120.0  # seconds after which a command counts as hung
 ONE_LINE = re.compile(r"athcodec: error: [^\n]+\n")
 VERBS = ("encode", "decode", "decode --gzip", "truncate")
+OLDER = {
+    ".ath": b"\x89ATH\r\n\x1a\nolder",
+    ".h5": b"\x89HDF\r\n\x1a\nolder",
+    ".npz": b"PK\x03\x04" + bytes(26) + b"older.npy",
+}
+"""By suffix, the first bytes of a file that the next one of its kind replaces."""
 
 
 @dataclass
@@ -105,7 +111,7 @@ def kill_while_writing(place: Place, rounds: int, seed: int, until: float = floa
     while row.tried < rounds and time.monotonic() < until:
         verb = VERBS[row.tried % len(VERBS)]
         target = place.folder / ("target.h5" if verb.startswith("decode") else "target.ath")
-        older = rng.choice([None, b"older"])
+        older = rng.choice([None, OLDER[target.suffix]])
         target.unlink(missing_ok=True)
         if older:
             target.write_bytes(older)
@@ -163,12 +169,12 @@ def fill_disk(place: Place, verbs: tuple[str, ...], sizes: list[int], until: flo
 def _judge_refusal(place: Place, verb: str, row: Row, prepare: Callable[[], None]) -> None:
     """Checks for one line, exit code 1 and an unchanged older file; or a complete file, if it fitted."""
     target = place.folder / ("target.h5" if verb.startswith("decode") else "target.ath")
-    target.write_bytes(b"older")
+    target.write_bytes(OLDER[target.suffix])
     code, err = finished(place.words(verb, target), prepare)
     row.tried += 1
     row.hangs += code == -signal.SIGKILL
     row.crashes += code < 0 and code != -signal.SIGKILL
-    refused = code == 1 and ONE_LINE.fullmatch(err) and target.read_bytes() == b"older"
+    refused = code == 1 and ONE_LINE.fullmatch(err) and target.read_bytes() == OLDER[target.suffix]
     row.wrong += not (refused or (code == 0 and is_whole(target))) or bool(place.left_over(target))
     target.unlink()
 
@@ -217,14 +223,14 @@ def write_where_not_allowed(place: Place, verbs: tuple[str, ...]) -> Row:
     for verb in verbs:
         target = place.folder / ("target.h5" if verb.startswith("decode") else "target.ath")
         for locked in (place.folder, target):
-            target.write_bytes(b"older")
+            target.write_bytes(OLDER[target.suffix])
             mode = locked.stat().st_mode
             locked.chmod(0o555 if locked.is_dir() else 0o444)
             code, err = finished(place.words(verb, target), obey_permissions)
             locked.chmod(mode)
             row.tried += 1
             row.wrong += code != 1 or not ONE_LINE.fullmatch(err) or "read-only" not in err
-            row.wrong += target.read_bytes() != b"older" or bool(place.left_over(target))
+            row.wrong += target.read_bytes() != OLDER[target.suffix] or bool(place.left_over(target))
             target.unlink()
     return row
 
