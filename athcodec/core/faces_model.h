@@ -116,6 +116,7 @@ static void face_guesses(const faces_model *model, const faces_list *faces, uint
         for (int32_t s = 0; s < FACE_SIDES; s++) guesses[k++] = faces->after[start][s];
         for (int32_t s = 0; s < FACE_SIDES; s++) guesses[k++] = faces->before[start][s];
     }
+    if (ENCODING && faces->is_absolute < 0) k = ath_min(k, j > 0 ? 2 : 5); /* measured without open sides */
     while (k < FACE_GUESSES) guesses[k++] = -1;
 }
 
@@ -123,7 +124,7 @@ static void face_guesses(const faces_model *model, const faces_list *faces, uint
 static int32_t code_far(ath_coder *coder, faces_model *model, const faces_list *faces, int32_t j, int32_t about,
                         int32_t vertex)
 {
-    if (faces->is_absolute) {
+    if (faces->is_absolute > 0) {
         int32_t found = (int32_t)code_unsigned(coder, &model->far[j], FACE_FAR_MEAN, (uint32_t)vertex);
         return found < faces->bound ? found : -1;
     }
@@ -147,7 +148,7 @@ static int32_t code_corner(ath_coder *coder, faces_model *model, const faces_lis
             return expected;
         }
     }
-    if (faces->is_absolute) return code_far(coder, model, faces, 0, 0, vertex);
+    if (faces->is_absolute > 0) return code_far(coder, model, faces, 0, 0, vertex);
     face_guesses(model, faces, first, j, previous, face_repeated(faces, i, last), guesses);
     if (j > 1 && guesses[2] >= 0 && guesses[2] == guesses[2 + FACE_SIDES]) place = FACE_PLACES - 1;
     for (int32_t g = 0; g < FACE_GUESSES; g++) {

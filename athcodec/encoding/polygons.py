@@ -15,15 +15,15 @@ from athcodec.polygons import Polygons
 CORNERS_OF_REST, FACES_OF_REST = 8, 4  # for each vertex, at most, that a rest pose goes by
 
 
-def pack(polygons: Polygons, vertex_count: int) -> bytes:
+def pack(polygons: Polygons, vertex_count: int, sides: bool = True) -> bytes:
     """FACES or EDGES; ClipError where no reader would accept that many. Far corners are coded by their distance or by
-    their number: as is shorter."""
+    their number: as is shorter. sides: whether open sides are guesses; without them no reader reads it."""
     count = polygons.face_count + len(polygons.corners)
     if count > ct.Limits.corners:
         raise ClipError(f"faces: got {count} faces and corners; the limit is {ct.Limits.corners}")
     memory = np.empty(lib.ath_faces_memory(vertex_count) // 8 + 1, np.uint64)
 
-    def stream(is_absolute: bool) -> bytes:
+    def stream(is_absolute: int) -> bytes:
         return encode_stream(
             "ath_encode_faces",
             1024 + 6 * count,
@@ -35,8 +35,8 @@ def pack(polygons: Polygons, vertex_count: int) -> bytes:
             model=memory,
         )
 
-    absolute = min((False, True), key=lambda is_absolute: len(stream(is_absolute)))
-    return ct.pack_polygons(polygons.shape, absolute, stream(absolute))
+    absolute = min((0 if sides else -1, 1), key=lambda is_absolute: len(stream(is_absolute)))
+    return ct.pack_polygons(polygons.shape, absolute > 0, stream(absolute))
 
 
 class Mesh:

@@ -25,7 +25,8 @@ from athcodec.encoding.segment import CodedPrelude, Settings, Source, with_best_
 from athcodec.encoding.shape import finer_than
 from athcodec.errors import BoundError
 
-MEMORIES, LATTICE = (2, 9, 0, 13), 16  # of the second field of PREDICTED: to choose from, and beside them
+MEMORIES, COMMON, LATTICE = (2, 9, 0, 13), 8, 16  # of the second field of PREDICTED: to choose from; its flags
+ONE_MEMORY, NOT_COMMON = (2, 10), (2, 1, 0, 5)  # the same without Feature.MEMORY, and without Feature.COMMON
 REST_STEPS = (0.5, 0.25, 0.125, 1.15)  # over the bound
 STEPS = (0.999, 0.97, 0.9, 0.75, 0.5, 0.3)  # over the largest that reaches every point within the limit
 TRIAL_SEGMENTS, TRIAL_FRAMES = 3, 64
@@ -116,8 +117,7 @@ def best_prediction(source: Source, bound: float, most_bytes: float) -> FoundPre
     try:
         if sum(_begun(preludes[first.rest_step], first, sample) for sample in samples) > TOO_MANY * most_bytes:
             return None
-        memories = MEMORIES[:1] if Feature.MEMORIES in source.without else MEMORIES
-        found, _, memory = best(coded(first, memory) for memory in memories)
+        found, _, memory = best(coded(first, memory) for memory in _memories(source.without))
         preludes |= {own.rest_step: CodedPrelude(source, ath, own, predicted=True) for own in others}
         found, settings, _ = best([found, *(coded(own, memory) for own in others)])
         if Feature.LATTICE not in source.without:
@@ -133,6 +133,13 @@ def best_prediction(source: Source, bound: float, most_bytes: float) -> FoundPre
     except BoundError:
         return None
     return found if found.bytes < most_bytes else None
+
+
+def _memories(without: frozenset[Feature]) -> tuple[int, ...]:
+    """Return the settings of PREDICTED to choose from."""
+    if Feature.MEMORY in without:
+        return ONE_MEMORY
+    return NOT_COMMON if Feature.COMMON in without else MEMORIES
 
 
 def _still_share(relative: float) -> float:

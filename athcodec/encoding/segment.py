@@ -211,7 +211,7 @@ class Source:
     def repeats(self) -> np.ndarray:
         """(frames,) bool: frames of the clip that are not coded, because the one before in their segment is the same.
         Where all are the rest pose none is: that takes no bytes either."""
-        repeats = self.seen.repeats & (not self.still)
+        repeats = self.seen.repeats & (not self.still and Feature.REPEATS not in self.without)
         repeats[[start for start, _ in self.segments]] = False
         return repeats
 
@@ -285,7 +285,7 @@ class Settings:
     shape_of: np.ndarray | None = None  # (B,) of streams.find_copies; None: the rest pose has no copies
     periodic: bool = False  # waves over time are, of loops that are one segment
     usual_change: float = np.inf  # of velocity, in length per frame squared, where segments meet
-    narrow: bool = False  # corrections are of one frame
+    without: frozenset[Feature] = frozenset()  # features that the file does without
 
     @property
     def learning_levels(self) -> list[int]:
@@ -305,7 +305,7 @@ class Settings:
     @property
     def is_straight(self) -> bool:
         """Whether rows end in straight lines, as modes of a beam do, and not in parabolas."""
-        return self._relative_change < qz.STRAIGHT
+        return self._relative_change < qz.STRAIGHT and Feature.STRAIGHT not in self.without
 
     def step_of(self, level: int) -> float:
         """Of the stems of a level."""
@@ -403,7 +403,7 @@ def with_best_lags(source: Source, ath: Ath, settings: Settings) -> Settings:
             replace(settings, lags=lag, adaptive_rest=is_adaptive, connected_rest=True)
             for lag in (own, np.ones_like(own))
         ]
-    if settings.details.any():
+    if settings.details.any() or (Feature.PLAIN_REST in source.without and not source.reference_is_exact):
         candidates = [own for own in candidates if own.adaptive_rest]
     candidates += _with_copies(source, ath, candidates)
     return candidates[0] if len(candidates) == 1 else min(candidates, key=lambda some: _poses_size(source, ath, some))
@@ -412,10 +412,11 @@ def with_best_lags(source: Source, ath: Ath, settings: Settings) -> Settings:
 def _with_copies(source: Source, ath: Ath, candidates: list[Settings]) -> list[Settings]:
     """The adaptive ones of the candidates with branches that are copies of others, where there are any."""
     adaptive = [settings for settings in candidates if settings.adaptive_rest]
-    if not adaptive:
+    if not adaptive or Feature.COPIES in source.without:
         return []
     own, branches = adaptive[0], branch_records(source.hierarchy, ath, adaptive[0])
-    found = [streams.find_copies(branches, own.rest_step, source.rest, own.rest_slack, bend) for bend in COPIES_BENDS]
+    bends = COPIES_BENDS[:1] if Feature.BENT in source.without else COPIES_BENDS
+    found = [streams.find_copies(branches, own.rest_step, source.rest, own.rest_slack, bend) for bend in bends]
     shapes = [shape_of for shape_of in found if shape_of is not None]
     return [replace(settings, shape_of=shape_of) for settings in adaptive for shape_of in shapes]
 
@@ -583,7 +584,8 @@ def time_components(
     if not levels:
         return {}
     segment = analyse_finely(plan, settings, positions)
-    return {level: TimeComponents(*_level_moments(segment, level), segment.waves) for level in levels}
+    may_be_in_waves = Feature.WAVE_BASES not in settings.without
+    return {level: TimeComponents(*_level_moments(segment, level), segment.waves, may_be_in_waves) for level in levels}
 
 
 def level_bases(
@@ -735,15 +737,16 @@ def find_corrections(
     unless each vertex of a rigid part is to keep the limit, it has none. ends: what they meet; in the step of
     correction_step. Raises BoundError."""
     factor, is_rigid = 1.0, np.repeat(plan.is_rigid, plan.pieces["count"])
+    is_narrow = Feature.WIDE in settings.without
     parts = _parts_that_keep_their_shape(plan)
     limit = settings.limit if keeps_all else np.where(is_rigid, np.inf, settings.limit)
     while True:
         step = qz.single(correction_step(settings.limit) * factor)
         moves = streams.find_rigid_corrections(
-            parts, decoded, positions, origin, settings.limit, step, plan.pool, settings.narrow, ends.closed
+            parts, decoded, positions, origin, settings.limit, step, plan.pool, is_narrow, ends.closed
         )
         met = ends.with_moves(moves)
-        rows = streams.find_corrections(decoded, positions, origin, limit, step, plan.pool, settings.narrow, met)
+        rows = streams.find_corrections(decoded, positions, origin, limit, step, plan.pool, is_narrow, met)
         if rows is not None:
             return Corrections(rows, step, decoded.shape)
         factor, ends = 0.5 * factor, streams.FREE_ENDS
