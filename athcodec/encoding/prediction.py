@@ -26,7 +26,7 @@ from athcodec.encoding.shape import finer_than
 from athcodec.errors import BoundError
 
 MEMORIES, COMMON, LATTICE = (2, 9, 0, 13), 8, 16  # of the second field of PREDICTED: to choose from; its flags
-ONE_MEMORY, NOT_COMMON = (2, 10), (2, 1, 0, 5)  # the same without Feature.MEMORY, and without Feature.COMMON
+ONE_MEMORY, NOT_COMMON = (3, 11), (2, 1, 0, 5)  # the same without Feature.MEMORY, and without Feature.COMMON
 REST_STEPS = (0.5, 0.25, 0.125, 1.15)  # over the bound
 STEPS = (0.999, 0.97, 0.9, 0.75, 0.5, 0.3)  # over the largest that reaches every point within the limit
 TRIAL_SEGMENTS, TRIAL_FRAMES = 3, 64
