@@ -155,7 +155,8 @@ SUITES = {
     "odd": tuple(odd.CLIPS),
     "odd-quick": odd.FEW,
 }
-RECIPES |= odd.CLIPS
+RECIPES |= odd.CLIPS | odd.MESHES
+RECIPES["canopy_1k_60f"] = Canopy(120, 2, 60, 4.0, 8.0, 80, "broadleaf", seed=15)
 
 
 def clips(suite: str, folder: Path | None = None) -> list[tuple[str, Path, str]]:

@@ -1,165 +1,286 @@
-"""What each feature of the format saves: files of the bench's clips that do without it, one feature at a time.
+"""What each feature of the format saves: files of many clips that do without it, one feature at a time.
 
 The encoder searches its settings anew without the feature (athcodec.encoding.features), so that others may stand in for
-it. A feature that a file does not use costs nothing when it is left out; that file is not made again.
+it. A feature that a file does not use costs nothing when it is left out; that file is not made again. Every figure is
+saved as it is measured, and is not measured again.
 """
 
 from __future__ import annotations
 
 import argparse
+import sys
 import tempfile
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-import athcodec
-from athcodec.encoding import Draft, code_segments, draft, write
-from athcodec.encoding.features import Feature
-from athcodec.encoding.segment import SHEET
-from bench.clips import add_ladder, measure
-from bench.suite import SUITES, Case, cases
-from bench.tables import table
+import numpy as np
 
-BOUNDS = (1e-3, 1e-4, 1e-5)
-CLIPS = ("sample", "mj_1k_200f", "canopy_4k_60f", "grass", "scanned", "growth_carried", "cube", "morph")
-OPTIONS: Mapping[Feature, dict[str, Any]] = {  # of files that can have the feature, beside those of all
+import athcodec
+from athcodec.discovery import with_branches
+from athcodec.encoding import Draft, code_segments, draft, write
+from athcodec.encoding.bounds import BoundOption
+from athcodec.encoding.branch_trials import best_branches
+from athcodec.encoding.features import Feature
+from athcodec.encoding.progress import silent
+from athcodec.encoding.segment import SHEET
+from athcodec.polygons import Polygons
+from bench.clips import add_ladder, measure
+from bench.store import Store, read
+from bench.suite import SUITES, cases
+from bench.tables import environment, table
+
+RESULTS = Path(__file__).parent / "results" / "features.json"
+DOCUMENT = Path(__file__).parent.parent / "spec" / "rationale.md"
+MARKERS = "<!-- features: printed by python -m bench features -->\n", "<!-- end of features -->\n"
+KEYS = {"sizes": ("clip", "bound", "ladder", "feature")}
+BOUNDS = (1e-3, 1e-4)
+SHORT_SEGMENT = 32  # Frames of the segments of files that are to meet.
+OPTIONS: Mapping[Feature, dict[str, Any]] = {  # Options, beside those of all files, that make a file have the feature.
     Feature.RIGID: {"rest_error": None},
     Feature.FREE_RIGID: {"rest_error": None},
+    Feature.TURN: {"rest_error": None},
     Feature.CONNECTED: {"attributes": "all"},
-    Feature.JOINS: {"segment_frames": 32},
+    Feature.ATTRIBUTES: {"attributes": "all"},
+    Feature.JOINS: {"segment_frames": SHORT_SEGMENT},
+    Feature.STRAIGHT: {"segment_frames": SHORT_SEGMENT},
+    Feature.HOST: {"host_rest": True},
 }
-LEAST = 1.0  # per cent that a feature has to save somewhere
+# Options of the file without a feature that no search omits.
+OPTIONS_WITHOUT: Mapping[Feature, dict[str, Any]] = {Feature.HOST: {}, Feature.ATTRIBUTES: {}}
+GONE = {  # Features that a format before this one had, by their names among the figures.
+    "factors": "rotation factors 1 and 4 beside 2 and 8",
+    "tips": "rotations of tips alone",
+    "memory": "memories of predicted motion but for one",
+    "common": "the flag Common of predicted motion",
+    "memory+common": "both",
+    "adaptive": "adaptive vertices of rest poses",
+    "plain_rest": "plain vertices of rest poses",
+    "bent": "bent copies in rest poses",
+}
+OTHERS = {"sides": "open sides as guesses of faces"}  # Measured by an encoder that was changed for it.
+LEAST = 1.0  # Per cent that a feature has to save on some file.
+LEAST_BYTES = 500  # Of the files in the table: of smaller ones a few bytes are many per cent.
 
 NOTE = f"""
-How many per cent larger a file is without the feature; 0 where it does not use it, below 0 where the search does
-better without. Files have no attributes and a rest pose of the bound; those for {Feature.RIGID.value} and
-{Feature.FREE_RIGID.value} a rest pose that keeps faces, those for {Feature.CONNECTED.value} all attributes, those for
-{Feature.JOINS.value} segments of 32 frames. What saves less than {LEAST:g} % everywhere is marked.
+How many per cent larger files are without the feature: the mean of all files, the mean of those that use it, the least
+and the most. A file that does not use a feature counts as 0; below 0 the search ends in a smaller file without. Files
+have no attributes, a rest pose of the bound and, unless they are named as such, no layers. Those for
+{Feature.RIGID.value}, {Feature.FREE_RIGID.value} and {Feature.TURN.value} have rest poses that keep faces, those for
+{Feature.CONNECTED.value}, {OTHERS["sides"]} and {Feature.ATTRIBUTES.value} all attributes, those for
+{Feature.JOINS.value} and {Feature.STRAIGHT.value} segments of {SHORT_SEGMENT} frames. Files below {LEAST_BYTES} bytes,
+of which a byte is many per cent, are left out. What saves less than {LEAST:g} % everywhere is marked. What has left the
+format was measured by the last encoder that had it, and so were the others.
+"""
+
+SOURCES = """
+Clips that `python -m bench data` does not make were given by their paths: `leaves_373x121f`; `growing_front`, the
+sample tree along whose branches a front runs, what it has not reached standing at its tip; `sample_loop`, the sample
+with 20 frames of its end blended into its start; `bean_8_days`, a bean plant that the Helios simulator grew; `utm`, a
+scanned stem in UTM coordinates.
 """
 
 NOT_JUDGED = """
-Not judged by bytes: exact rest poses, lossless levels, uneven times, loops with their periodic time bases, rest poses
-that the host has, weights, joins, which smooth motion over seams, and rigid parts, which keep the shape of faces. Not
-to be left out by an encoder alone: modes of a free beam in place of cosines, gaps in bases, the sheet's own rotation
-(part of affine functions first), twins and repeats in the hierarchy, both kinds of maps.
+Not judged by bytes: lossless levels, uneven times, loops, weights, joins, which smooth motion over seams, and rigid
+parts, which keep the shape of faces. Not to be left out by an encoder alone: modes of a free beam for maps, gaps in
+bases, the sheet's own rotation, ends first and copies in predicted motion, both kinds of maps.
 """
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "clips", nargs="*", metavar="CLIP", help=f"files CLIP.h5, or names (default: {', '.join(CLIPS)})"
-    )
+    parser.add_argument("clips", nargs="*", metavar="CLIP", help="files, or names of clips; none: print what is saved")
     parser.add_argument("--suite", choices=SUITES, help="all clips of a suite")
     parser.add_argument(
         "--bounds", type=float, nargs="+", default=list(BOUNDS), metavar="FRACTION", help="error bounds"
     )
     parser.add_argument(
-        "--features", nargs="+", choices=[own.name.lower() for own in Feature], metavar="NAME", help="these alone"
+        "--features", nargs="+", type=_features, metavar="NAME", help="these alone; A+B leaves out both at once"
     )
+    parser.add_argument("--results", type=Path, default=RESULTS, metavar="FILE", help="where figures are kept")
+    parser.add_argument("--document", type=Path, default=DOCUMENT, metavar="FILE", help="where the table is written")
     add_ladder(parser, "none")
 
 
 def run(args: argparse.Namespace) -> dict[str, Any]:
-    wanted = [own for own in Feature if args.features is None or own.name.lower() in args.features]
-    chosen = cases([] if args.suite else args.clips or CLIPS, args.suite or "quick")
-    growth: dict[Feature, dict[str, float]] = {feature: {} for feature in wanted}
-    broken: list[str] = []
-    with tempfile.TemporaryDirectory() as folder:
-        for case in chosen:
-            if case.path is None:
+    wanted = args.features or [(feature,) for feature in Feature]
+    store, broken = Store(args.results, environment(args.argv), KEYS), []
+    chosen = cases(args.clips, args.suite or "quick") if args.clips or args.suite else []
+    for case in chosen:
+        for bound in args.bounds:
+            key = {"clip": case.name, "bound": bound, "ladder": " ".join(f"{error:g}" for error in args.ladder)}
+            missing = [own for own in wanted if not store.find("sizes", key | {"feature": _name(own)})]
+            if case.path is None or not missing:
                 continue
-            for bound in args.bounds:
-                clip = _Sizes(case, bound, args.ladder, Path(folder), broken)
-                for feature in wanted:
-                    growth[feature][f"{case.name} {bound:g}"] = clip.growth(feature)
-    return {
-        "tables": [
-            table("Features", [_summary_row(*own) for own in growth.items()], NOTE, NOT_JUDGED),
-            table("Features by clip", _clip_rows(growth), NOTE),
-        ],
-        "broken": broken,
-    }
+            with tempfile.TemporaryDirectory() as folder, athcodec.read(case.path) as clip:
+                files = _Files(clip, bound, args.ladder, Path(folder) / "clip.ath")
+                for features in missing:
+                    sizes = dict(zip(("with", "without"), files.sizes(features)))
+                    store.add("sizes", key | {"feature": _name(features)} | sizes)
+                    growth = 100 * (sizes["without"] / sizes["with"] - 1)
+                    print(f"{case.name} {bound:g} {_name(features)} {growth:.2f}", file=sys.stderr, flush=True)
+                broken += [f"{case.name} at {bound:g} without {name}" for name in files.broken]
+    sizes = store.contents()["sizes"]
+    write_table(sizes, args.document)
+    return {"tables": [table("Features", summary(sizes), NOTE, NOT_JUDGED)], "broken": broken}
 
 
-@dataclass(frozen=True)
-class _File:
-    draft: Draft
-    bytes: int
+def _features(word: str) -> tuple[Feature, ...]:
+    """Return the features whose names are joined by +."""
+    known = {feature.name.lower(): feature for feature in Feature}
+    if unknown := set(word.split("+")) - known.keys():
+        raise argparse.ArgumentTypeError(f"got {', '.join(unknown)}; expected {', '.join(known)}")
+    return tuple(known[name] for name in word.split("+"))
 
 
-class _Sizes:
+def _name(features: tuple[Feature, ...]) -> str:
+    return "+".join(feature.name.lower() for feature in features)
+
+
+class _Files:
     """Files of one clip at one bound."""
 
-    def __init__(self, case: Case, bound: float, ladder: tuple[float, ...], folder: Path, broken: list[str]):
-        self._case, self._bound, self._ladder, self._folder, self._broken = case, bound, ladder, folder, broken
-        self._whole: dict[str, _File] = {}
+    def __init__(self, clip: athcodec.MotionClip, bound: float, ladder: tuple[float, ...], path: Path):
+        if not clip.has_branches:
+            clip = with_branches(clip, best_branches(clip, BoundOption(rel_error=bound), silent))
+        self._clip, self._bound, self._ladder, self._path = clip, bound, ladder, path
+        self._polygons = Polygons.of_attributes(clip.attributes) if clip.faces is None else Polygons.of_rows(clip.faces)
+        self._whole: dict[str, tuple[Draft, int]] = {}
+        self.broken: list[str] = []
 
-    def growth(self, feature: Feature) -> float:
-        """Per cent of the bytes with all features."""
-        options = OPTIONS.get(feature, {})
+    def sizes(self, features: tuple[Feature, ...]) -> tuple[int, int]:
+        """Return the bytes with some features, by the options of the first one, and without them."""
+        feature, options = features[0], OPTIONS.get(features[0], {})
+        if self._polygons is None and "rest_error" in options:
+            options = {}
+        plan, size = self._with_all(options)
+        if not any(self._uses(plan, feature) for feature in features):
+            return size, size
+        if feature in OPTIONS_WITHOUT:
+            return size, self._with_all(OPTIONS_WITHOUT[feature])[1]
+        return size, self._made(options, frozenset(features))[1]
+
+    def _with_all(self, options: dict[str, Any]) -> tuple[Draft, int]:
+        """Return the file that has all features, made once."""
         if repr(options) not in self._whole:
             self._whole[repr(options)] = self._made(options, frozenset())
-        whole = self._whole[repr(options)]
-        if not _uses(whole.draft, feature):
-            return 0.0
-        return 100 * (self._made(options, frozenset({feature})).bytes / whole.bytes - 1)
+        return self._whole[repr(options)]
 
-    def _made(self, options: dict[str, Any], without: frozenset[Feature]) -> _File:
+    def _made(self, options: dict[str, Any], without: frozenset[Feature]) -> tuple[Draft, int]:
         given = {"attributes": "none", "rest_error": "bound", "ladder": self._ladder, "without": without} | options
-        path = self._folder / "clip.ath"
-        with athcodec.read_hdf5(self._case.path) as clip:
-            plan = draft(clip, rel_error=self._bound, **given)
-            summary = write(clip, plan, code_segments(clip, plan, range(plan.segment_count)), path)
-            with athcodec.open(path, strict=True) as decoder:
-                if measure(clip, decoder).max_error > summary.max_error_bound:
-                    left_out = ", ".join(own.value for own in without)
-                    self._broken.append(f"{self._case.name} at {self._bound:g} without {left_out or 'nothing'}")
-        return _File(plan, summary.bytes)
+        plan = draft(self._clip, rel_error=self._bound, **given)
+        coded = code_segments(self._clip, plan, range(plan.segment_count))
+        summary = write(self._clip, plan, coded, self._path)
+        with athcodec.open(self._path, strict=True, host_mesh=self._clip) as decoder:
+            if measure(self._clip, decoder).max_error > summary.max_error_bound:
+                self.broken.append(", ".join(feature.value for feature in without) or "nothing")
+        return plan, summary.bytes
+
+    def _uses(self, plan: Draft, feature: Feature) -> bool:
+        """Return whether a file has the feature, as far as its settings tell."""
+        choice, is_host = plan.choice, plan.options.host_rest
+        settings, both = choice.settings, (choice.settings, choice.first_layer)
+        layered = choice.first_layer.bound > settings.bound
+        of_all = {
+            Feature.HOST: is_host,
+            Feature.ATTRIBUTES: bool(self._clip.attributes) or self._polygons is not None,
+            Feature.CONNECTED: settings.connected_rest,
+            Feature.COPIES: settings.shape_of is not None,
+            Feature.REPEATS: bool(np.any(plan.seen.repeats)),
+            Feature.PREDICTED: choice.predicted is not None,
+        }
+        if feature in of_all:
+            return of_all[feature]
+        if choice.predicted is not None:
+            return feature is Feature.LATTICE and choice.predicted
+        learned = any(any(own.learned_bases) for own in both)
+        return {
+            Feature.ROTATIONS: any(any(own.rotation_step_factors) for own in both),
+            Feature.SHAPES: any(own.learned_pieces is not None for own in both),
+            Feature.TIME_BASES: learned,
+            Feature.COMMON_BASIS: any(own.common_basis for own in both),
+            Feature.WAVE_BASES: learned,
+            Feature.SHEETS: bool((settings.forms == SHEET).any()),
+            Feature.RINGS: bool((settings.forms > SHEET).any()),
+            Feature.LOOSE: bool(settings.loose.any()),
+            Feature.RIGID: bool(settings.rigid.any()),
+            Feature.FREE_RIGID: settings.free_rigid,
+            Feature.TURN: settings.turn_step > 0,
+            Feature.MEAN_POSE: choice.reference is not None,
+            Feature.LEVEL_0_REST: layered,
+            Feature.REFINED_REST: layered,
+            Feature.WIDE: True,
+            Feature.JOINS: plan.segment_count > 1,
+            Feature.STRAIGHT: settings.is_straight,
+            Feature.PERIODIC: settings.periodic,
+        }.get(feature, False)
 
 
-def _uses(made: Draft, feature: Feature) -> bool:
-    """Whether a file has the feature, as far as its settings tell."""
-    choice = made.choice
-    both = choice.settings, choice.first_layer
-    if feature is Feature.CONNECTED:
-        return choice.settings.connected_rest
-    if choice.predicted is not None:
-        return {Feature.PREDICTED: True, Feature.LATTICE: choice.predicted}.get(feature, False)
-    return {
-        Feature.ROTATIONS: any(any(own.rotation_step_factors) for own in both),
-        Feature.SHAPES: any(own.learned_pieces is not None for own in both),
-        Feature.TIME_BASES: any(any(own.learned_bases) for own in both),
-        Feature.SHEETS: bool((choice.settings.forms == SHEET).any()),
-        Feature.RINGS: bool((choice.settings.forms > SHEET).any()),
-        Feature.LOOSE: bool(choice.settings.loose.any()),
-        Feature.RIGID: bool(choice.settings.rigid.any()),
-        Feature.FREE_RIGID: choice.settings.free_rigid,
-        Feature.MEAN_POSE: choice.reference is not None,
-        Feature.WIDE: True,
-        Feature.JOINS: made.segment_count > 1,
-        Feature.PERIODIC: choice.settings.periodic,
-    }.get(feature, False)
+def summary(sizes: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """Return a row for each feature that was measured, in per cent of the bytes with it."""
+    growth: dict[str, dict[str, float]] = {}
+    for own in sizes:
+        if own["with"] < LEAST_BYTES:
+            continue
+        name = f"`{own['clip']}` at {own['bound']:g}" + (" in layers" if own["ladder"] else "")
+        growth.setdefault(own["feature"], {})[name] = 100 * (own["without"] / own["with"] - 1)
+    rows = []
+    titles = {feature.name.lower(): feature.value for feature in Feature} | OTHERS
+    titles |= {name: f"{title} (gone)" for name, title in GONE.items()}
+    for name in [name for name in titles if name in growth] + sorted(growth.keys() - titles.keys()):
+        values = growth[name]
+        used, most = [value for value in values.values() if value], max(values, key=lambda file: values[file])
+        rows.append(
+            {
+                "without": titles.get(name) or " and ".join(titles[part] for part in name.split("+")),
+                "files": len(values),
+                "use it": len(used),
+                "mean %": _rounded(np.mean(list(values.values()))),
+                "mean of these %": _rounded(np.mean(used)) if used else None,
+                "least %": _rounded(min(values.values())),
+                "most %": _rounded(values[most]),
+                "most of": most if values[most] > 0 else "",
+                f"below {LEAST:g} %": "" if values[most] >= LEAST else "x",
+            }
+        )
+    return rows
 
 
-def _summary_row(feature: Feature, growth: dict[str, float]) -> dict[str, Any]:
-    values = list(growth.values())
-    most = max(growth, key=lambda name: growth[name])
-    return {
-        "feature": feature.value,
-        "name": feature.name.lower(),
-        "mean %": round(sum(values) / len(values), 2),
-        "least %": round(min(values), 2),
-        "most %": round(max(values), 2),
-        "most of": most if growth[most] > 0 else None,
-        "used in": sum(value != 0 for value in values),
-        "earns less": "" if max(values) >= LEAST else "x",
-    }
+def _rounded(value: float) -> str:
+    return f"{round(value, 2) + 0.0:.2f}"
 
 
-def _clip_rows(growth: dict[Feature, dict[str, float]]) -> list[dict[str, Any]]:
-    files = next(iter(growth.values()))
-    return [
-        {"file": name} | {feature.name.lower(): round(own[name], 2) for feature, own in growth.items()}
-        for name in files
-    ]
+def table_text(sizes: Iterable[Mapping[str, Any]]) -> str:
+    """Return the table of spec/rationale.md between its markers: Markdown, with the clips that were measured below."""
+    sizes = list(sizes)
+    rows = summary(sizes)
+    lines = ["| " + " | ".join(rows[0]) + " |", "|---|--:|--:|--:|--:|--:|--:|---|---|"] if rows else []
+    lines += ["| " + " | ".join("-" if cell is None else str(cell) for cell in row.values()) + " |" for row in rows]
+    files: dict[str, list[str]] = {}
+    for own in sizes:
+        if own["with"] < LEAST_BYTES:
+            continue
+        bounds = files.setdefault(own["clip"], [])
+        name = f"{own['bound']:g}" + (" in layers" if own["ladder"] else "")
+        if name not in bounds:
+            bounds.append(name)
+    clips = "; ".join(f"`{clip}` at {', '.join(bounds)}" for clip, bounds in sorted(files.items()))
+    paragraphs = [" ".join(text.split()) for text in (f"Files: {clips}.", SOURCES, NOTE, NOT_JUDGED)]
+    return "\n\n".join(["\n".join(lines), *paragraphs]) + "\n"
+
+
+def write_table(sizes: Iterable[Mapping[str, Any]], document: Path) -> None:
+    """Put the table between the markers of a document."""
+    before, _, after = parted(document.read_text())
+    document.write_text(f"{before}{MARKERS[0]}\n{table_text(sizes)}\n{MARKERS[1]}{after}")
+
+
+def parted(text: str) -> tuple[str, str, str]:
+    """Return what a document has before, between and behind the markers."""
+    before, rest = text.split(MARKERS[0])
+    inside, after = rest.split(MARKERS[1])
+    return before, inside, after
+
+
+def stored() -> list[dict[str, Any]]:
+    """Return the figures of the repository."""
+    return read(RESULTS)["sizes"]

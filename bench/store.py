@@ -30,7 +30,8 @@ class Store:
     def find(self, name: str, wanted: dict[str, Any], depends: dict[str, Any] | None = None) -> dict[str, Any] | None:
         """The result with these keys, if it depends on exactly `depends` (None: on anything)."""
         result = self._results[name].get(self._key(name, wanted))
-        return result if result is not None and depends in (None, result["depends"]) else None
+        is_right = result is not None and (depends is None or depends == result["depends"])
+        return result if is_right else None
 
     def add(self, name: str, result: dict[str, Any]) -> dict[str, Any]:
         """Adds or replaces a result of this command, and replaces the file in one step."""

@@ -25,7 +25,7 @@ from athcodec.encoding.segment import SAMPLED
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.append(str(ROOT))  # for bench, which is not installed; athcodec stays the installed one
 
-from bench import codec_registry, compare, paper, plots, progressive, rd, tables  # noqa: E402
+from bench import codec_registry, compare, features, paper, plots, progressive, rd, tables  # noqa: E402
 from bench.clips import encoded  # noqa: E402
 from bench.curves import Curve, mean_saving  # noqa: E402
 from bench.store import Store, read  # noqa: E402
@@ -84,18 +84,33 @@ def test_sizes_come_with_a_bound_that_was_measured_and_kept(sizes):
 
 
 def test_what_a_feature_saves_is_what_a_file_without_it_takes_more(tmp_path, sample_clip):
+    store, document = tmp_path / "features.json", tmp_path / "table.md"
+    document.write_text("above\n" + "".join(features.MARKERS) + "below\n")
     words = ["features", "sample", "--bounds", "1e-4", "--features", "shapes", "loose"]
-    text, result = run_bench(tmp_path, *words)
-    rows = {row["name"]: row for row in result["tables"][0]["rows"]}
-    assert rows["loose"]["mean %"] == 0  # nothing of this tree leaves its place
+    text, result = run_bench(tmp_path, *words, "--results", store, "--document", document)
+    rows = {row["without"]: row for row in result["tables"][0]["rows"]}
+    assert rows["loose branches"]["use it"] == 0  # nothing of this tree leaves its place
     sizes = []
     for without in (frozenset(), frozenset({Feature.SHAPES})):
         options = {"attributes": "none", "rest_error": "bound", "ladder": "none", "without": without}
         plan = encoding.draft(sample_clip, rel_error=1e-4, **options)
         coded = encoding.code_segments(sample_clip, plan, range(plan.segment_count))
         sizes.append(encoding.write(sample_clip, plan, coded, tmp_path / "a.ath").bytes)
-    assert rows["shapes"]["mean %"] == pytest.approx(100 * (sizes[1] / sizes[0] - 1), abs=0.005)
-    assert rows["shapes"]["mean %"] > 1 and "learned shapes" in text
+    growth = float(rows["learned shapes"]["mean %"])
+    assert growth == pytest.approx(100 * (sizes[1] / sizes[0] - 1), abs=0.005) and growth > 1
+    assert "learned shapes" in text and f"| {growth:.2f} |" in document.read_text()
+    saved = read(store)["sizes"]
+    assert {(own["feature"], own["with"], own["without"]) for own in saved} >= {("shapes", *sizes)}
+    store.write_text(store.read_text().replace(f",{sizes[1]},", f",{2 * sizes[0]},"))
+    _, result = run_bench(tmp_path, *words, "--results", store, "--document", document)
+    again = {row["without"]: row["mean %"] for row in result["tables"][0]["rows"]}
+    assert again["learned shapes"] == "100.00", "what is saved is not measured again"
+    assert document.read_text().startswith("above\n") and document.read_text().endswith("below\n")
+
+
+def test_the_table_of_features_is_that_of_the_saved_figures():
+    _, inside, _ = features.parted(features.DOCUMENT.read_text("utf-8"))
+    assert inside == f"\n{features.table_text(features.stored())}\n"
 
 
 def test_levels_end_within_the_bound_and_have_no_gaps_where_the_papers_have(tmp_path):

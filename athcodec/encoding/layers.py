@@ -19,6 +19,7 @@ from athcodec import container as ct
 from athcodec._native import MEASURES
 from athcodec.encoding import quantise as qz
 from athcodec.encoding import streams
+from athcodec.encoding.features import Feature
 from athcodec.encoding.joins import (
     END_FRAMES,
     NO_CORRECTIONS,
@@ -200,12 +201,12 @@ def _rests(
     """The content of REST; what it decodes to, where the first layer refines that; of each layer the decoded pose and
     what refines one."""
     rest = prelude.rest_chunk
-    if source.exact_rest or len(ratios) == 1:
+    if source.exact_rest or len(ratios) == 1 or Feature.REFINED_REST in source.without:
         return rest, None, [(prelude.plan.rest, None)] * len(ratios)
     first_step = qz.first_rest_step(rest.step, bound, ratios[0])
     steps = [qz.single(rest.step * max(1.0, ratio / 2)) for ratio in ratios[1:]]
     branches, mesh = prelude.plan.branches, source.mesh if rest.connected else None
-    coded = _first_rests(prelude, first_step, source.rest, mesh)
+    coded = _first_rests(prelude, first_step, source, mesh)
     for step in steps:
         if np.array_equal(rest_steps(branches, step), rest_steps(branches, coded[-1].step)):
             coded.append(coded[-1])
@@ -218,16 +219,16 @@ def _rests(
     return rest, level_0, [(own.decoded, None if own is last else own) for own, last in zip(of_layers, before)]
 
 
-def _first_rests(prelude: CodedPrelude, step: float, rest: np.ndarray, mesh: Mesh | None) -> list[streams.CodedRest]:
+def _first_rests(prelude: CodedPrelude, step: float, source: Source, mesh: Mesh | None) -> list[streams.CodedRest]:
     """The rest pose at the step of the first layer; before it that of level 0, where that takes few bytes more."""
     plan = prelude.plan
 
     def encode(step: float, before: streams.CodedRest | None = None) -> streams.CodedRest:
         shape_of = prelude.shape_of if before is None else None
-        return streams.encode_rest(plan.branches, step, rest, before, mesh=mesh, shape_of=shape_of)
+        return streams.encode_rest(plan.branches, step, source.rest, before, mesh=mesh, shape_of=shape_of)
 
     at_once = encode(step)
-    if not plan.level_0_stands_alone:
+    if not plan.level_0_stands_alone or Feature.LEVEL_0_REST in source.without:
         return [at_once]
     level_0 = encode(LEVEL_0_STEP * step)
     refined = encode(step, level_0)

@@ -161,7 +161,7 @@ def first_settings(
         rigid=rigid,
         layer=len(ratios) - 1,
         free_rigid=False,
-        turn_step=TURN_STEP if rigid[source.details > 0].any() else 0.0,
+        turn_step=TURN_STEP if rigid[source.details > 0].any() and Feature.TURN not in source.without else 0.0,
         lags=np.zeros(source.hierarchy.branch_count, np.int32),
         details=source.details if layered else finer_than(source.details, bound),
         connected_rest=False,
@@ -171,7 +171,7 @@ def first_settings(
         learned_pieces=None,
         node_steps=np.full(levels, step),
         usual_change=usual_change(samples) if source.has_seams else np.inf,
-        narrow=Feature.WIDE in source.without,
+        without=source.without,
     )
     if layered and not settings.details.any():  # adaptive rest poses are worth less to those that refine them
         return with_connected_rest(source, ath, replace(settings, lags=lags(source, rest_step, settings.details)))
@@ -829,7 +829,7 @@ class Search:
         common = replace(own, common_basis=True)
         (_, plain), (_, learned), _ = self._costs([unlearned, own, common])
         mixed = replace(own, learned_bases=tuple((learned < plain).tolist()))
-        return self._cheapest([unlearned, mixed, common])
+        return self._cheapest([unlearned, mixed, *([] if self._without(Feature.COMMON_BASIS) else [common])])
 
     def _with_waves_if_smaller(self, settings: Settings) -> Settings:
         """Learned time bases, or none: they take more bytes the finer the steps are. As a file will have them, learned
@@ -884,7 +884,8 @@ class Search:
         yield _in_waves(settings)
         if not self._without(Feature.TIME_BASES):
             own = replace(settings, learned_bases=(True,) * self.levels)
-            yield from (replace(own, common_basis=common) for common in (False, True))
+            commons = (False,) if self._without(Feature.COMMON_BASIS) else (False, True)
+            yield from (replace(own, common_basis=common) for common in commons)
 
     def _nearest(self, settings: Settings, others: list[Settings]) -> list[Settings]:
         """The few of the others that are the cheapest, and hardly dearer than the cheapest of all."""

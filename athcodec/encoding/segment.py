@@ -215,7 +215,7 @@ class Source:
     def repeats(self) -> np.ndarray:
         """(frames,) bool: frames of the clip that are not coded, because the one before in their segment is the same.
         Where all are the rest pose none is: that takes no bytes either."""
-        repeats = self.seen.repeats & (not self.still)
+        repeats = self.seen.repeats & (not self.still and Feature.REPEATS not in self.without)
         repeats[[start for start, _ in self.segments]] = False
         return repeats
 
@@ -292,7 +292,7 @@ class Settings:
     shape_of: np.ndarray | None = None  # (B,) of streams.find_copies; None: the rest pose has no copies
     periodic: bool = False  # waves over time are, of loops that are one segment
     usual_change: float = np.inf  # of velocity, in length per frame squared, where segments meet
-    narrow: bool = False  # corrections are of one frame
+    without: frozenset[Feature] = frozenset()  # features that the file does without
 
     @property
     def learning_levels(self) -> list[int]:
@@ -312,7 +312,7 @@ class Settings:
     @property
     def is_straight(self) -> bool:
         """Whether rows end in straight lines, as modes of a beam do, and not in parabolas."""
-        return self._relative_change < qz.STRAIGHT
+        return self._relative_change < qz.STRAIGHT and Feature.STRAIGHT not in self.without
 
     def step_of(self, level: int) -> float:
         """Of the stems of a level."""
@@ -414,6 +414,8 @@ def with_best_lags(source: Source, ath: Ath, settings: Settings) -> Settings:
 
 def _with_copies(source: Source, ath: Ath, candidates: list[Settings]) -> list[Settings]:
     """The candidates with branches that are copies of others, where there are any."""
+    if Feature.COPIES in source.without:
+        return []
     own, branches = candidates[0], branch_records(source.hierarchy, ath, candidates[0])
     shape_of = streams.find_copies(branches, own.rest_step, source.rest, own.rest_slack)
     return [] if shape_of is None else [replace(settings, shape_of=shape_of) for settings in candidates]
@@ -575,7 +577,8 @@ def time_components(
     if not levels:
         return {}
     segment = analyse_finely(plan, settings, positions)
-    return {level: TimeComponents(*_level_moments(segment, level), segment.waves) for level in levels}
+    may_be_in_waves = Feature.WAVE_BASES not in settings.without
+    return {level: TimeComponents(*_level_moments(segment, level), segment.waves, may_be_in_waves) for level in levels}
 
 
 def level_bases(
@@ -726,15 +729,16 @@ def find_corrections(
     unless each vertex of a rigid part is to keep the limit, it has none. ends: what they meet; in the step of
     correction_step. Raises BoundError."""
     factor, is_rigid = 1.0, np.repeat(plan.is_rigid, plan.pieces["count"])
+    is_narrow = Feature.WIDE in settings.without
     parts = _parts_that_keep_their_shape(plan)
     limit = settings.limit if keeps_all else np.where(is_rigid, np.inf, settings.limit)
     while True:
         step = qz.single(correction_step(settings.limit) * factor)
         moves = streams.find_rigid_corrections(
-            parts, decoded, positions, origin, settings.limit, step, plan.pool, settings.narrow, ends.closed
+            parts, decoded, positions, origin, settings.limit, step, plan.pool, is_narrow, ends.closed
         )
         met = ends.with_moves(moves)
-        rows = streams.find_corrections(decoded, positions, origin, limit, step, plan.pool, settings.narrow, met)
+        rows = streams.find_corrections(decoded, positions, origin, limit, step, plan.pool, is_narrow, met)
         if rows is not None:
             return Corrections(rows, step, decoded.shape)
         factor, ends = 0.5 * factor, streams.FREE_ENDS

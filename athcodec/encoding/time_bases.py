@@ -76,12 +76,12 @@ class TimeComponents:
     moments: (frames, frames), their second moments in units of their steps; waves: (frames, frames), those of the clip.
     """
 
-    def __init__(self, moments: np.ndarray, count: int, waves: np.ndarray):
+    def __init__(self, moments: np.ndarray, count: int, waves: np.ndarray, may_be_in_waves: bool = True):
         values, vectors = principal(moments[None])
         self._energies = np.maximum(values[0], 0.0)
         self._left_out = np.cumsum(self._energies[::-1])  # by leaving out the last i + 1
         self._rows, self._waves = vectors[0], waves
-        self._count = count
+        self._count, self._may_be_in_waves = count, may_be_in_waves
 
     def basis(self, ratio: float = 1.0, precision: float = 1.0) -> Entries | InWaves | None:
         """The rows that tracks in steps `ratio` times as large need, or None where no basis smaller than waves would
@@ -100,7 +100,7 @@ class TimeComponents:
     def _suits_waves(self) -> bool:
         """Whether the rows are smaller so."""
         rank = max(self._rank(1.0), 1)
-        return len(self._in_waves(rank, 1.0).stream()) < len(self._entries(rank).stream())
+        return self._may_be_in_waves and len(self._in_waves(rank, 1.0).stream()) < len(self._entries(rank).stream())
 
     def _entries(self, rank: int) -> Entries:
         return Entries(np.rint(self._rows[:rank] * MOST_SAMPLE).astype(np.int32))

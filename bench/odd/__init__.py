@@ -53,6 +53,7 @@ MAKERS: dict[str, Callable[..., MotionClip]] = {
         others.morph_targets,
         others.one_vertex,
         others.tumbling_cube,
+        others.triangulated_leaf,
     )
 }
 
@@ -95,6 +96,8 @@ CLIPS: dict[str, Odd] = {
     "vertex": _odd("one_vertex", "one vertex", plant=False, frames=100),
     "cube": _odd("tumbling_cube", "thrown cube, rigid", plant=False, frames=127),
 }
+
+MESHES = {"triangles": _odd("triangulated_leaf", "a leaf of irregular triangles", frames=60, points=2000)}
 
 SLOW = (*("growth_eased", "grass_unnamed", "grass_interleaved", "grass_shuffled"), *("capture_long", "few_7", "still"))
 FEW = tuple(name for name in CLIPS if name not in SLOW)  # which are measured in a few minutes

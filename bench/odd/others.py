@@ -91,6 +91,24 @@ def tumbling_cube(seed: int, frames: int) -> MotionClip:
     return _unnamed(positions, faces=np.arange(24, dtype=np.int32).reshape(6, 4))
 
 
+def triangulated_leaf(seed: int, frames: int, points: int) -> MotionClip:
+    """Return a leaf that sways, a mesh of irregular triangles as scans and decimated meshes have them."""
+    from scipy.spatial import Delaunay
+
+    rng = np.random.default_rng(seed)
+    plane = rng.random((points, 2)) * [1.0, 0.4]
+    corners = Delaunay(plane).simplices
+    centres = plane[corners].mean(axis=1)
+    corners = corners[np.lexsort((centres[:, 1], np.floor(0.7 * np.sqrt(points) * centres[:, 0])))]
+    used, first = np.unique(corners, return_index=True)
+    order = used[np.argsort(first)]  # Vertices are numbered as faces use them first.
+    along, across = plane[order].T
+    sway = 0.2 * np.sin(np.arange(frames)[:, None] / 5.0) + 0.1 * np.sin(np.arange(frames)[:, None] / 3.0 + 4.0 * along)
+    height = 0.05 * np.sin(9.0 * along) * np.cos(11.0 * across) + sway * along**2
+    positions = np.stack(np.broadcast_arrays(along, height, across), axis=-1)
+    return _unnamed(positions, faces=np.argsort(order)[corners].astype(np.int32))
+
+
 def _unnamed(positions: np.ndarray, **more: np.ndarray) -> MotionClip:
     """A clip without branches; its rest pose is the first frame."""
     return MotionClip(
