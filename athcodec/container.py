@@ -28,6 +28,7 @@ MAGIC = b"\x89ATH\r\n\x1a\n"
 MAJOR, MINOR, FEATURES = 0, 13, 0
 NO_LEVEL = 255
 STEM_WAVES, NODE_WAVES, BASIS_IN_WAVES, BASIS_AS_SAMPLES = range(4)  # of Basis
+ROTATION_FACTORS = (0, 1, 8)  # by Rotation
 IS_HOST = 4  # Method of REST
 OPTIONAL, KIND_ID = 0x8000, 0x7FFF
 
@@ -360,7 +361,7 @@ def pack_time(stream: bytes) -> bytes:
 
 @dataclass
 class StemsHead:
-    """Head of STEMS: step, rotation factor (0, 2, 8), Basis (basis_kind), rank and stream of a learned one, the level
+    """Head of STEMS: step, rotation factor (0, 1, 8), Basis (basis_kind), rank and stream of a learned one, the level
     of the stream whose basis it begins with, and how many half octaves below 1 the largest step of rigid pieces'
     rotations is (0: there is none)."""
 
@@ -374,7 +375,7 @@ class StemsHead:
 
 
 def pack_stems(head: StemsHead, stream: bytes) -> bytes:
-    rotation = head.rotation_step_factor.bit_length() // 2 | head.turn << 4
+    rotation = ROTATION_FACTORS.index(head.rotation_step_factor) | head.turn << 4
     data = _STEMS.pack(head.step, rotation, head.basis_kind)
     if head.basis_kind > NODE_WAVES:
         data += _BASIS.pack(head.rank, head.base, len(head.basis)) + head.basis

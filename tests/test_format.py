@@ -860,7 +860,7 @@ class HandMade:
 
     def _motion(self, frames: int, bases: dict[int, np.ndarray]) -> SegmentMotion:
         streams = [
-            LevelStream(float(np.float32(0.03 + 0.01 * level)), float((0, 2, 8)[level % 3]))
+            LevelStream(float(np.float32(0.03 + 0.01 * level)), float(container.ROTATION_FACTORS[level % 3]))
             for level in range(self.plan.level_count)
         ]
         for level, basis in bases.items():

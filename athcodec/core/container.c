@@ -518,7 +518,7 @@ int ath_parse_refined_stems(ath_bytes chunk, int32_t frames, ath_stems_head *hea
 int ath_parse_stems(ath_bytes chunk, int32_t frames, ath_stems_head *head, ath_bytes *body)
 {
     if (chunk.size < 6) return ATH_BAD_CHUNK;
-    static const double factors[] = {0.0, 2.0, 8.0};
+    static const double factors[] = {0.0, 1.0, 8.0};
     int32_t rotation = chunk.bytes[4] & 15;
     head->step = (double)f32_at(chunk.bytes);
     if (rotation > 2) return ATH_BAD_CHUNK;

@@ -29,7 +29,6 @@ LATTICE_REST_CAP = 3.2 / 5**0.5  # and for that to a point of the lattice
 SOURCE_REST_TOLERANCE = 3e-3  # over the diagonal: how far a rest pose that is no reference pose may be off
 SOURCE_REST_STEP = 2.0  # over that, at first
 CORRECTION_STEP = 1.12  # over the limit: rounding a correction leaves at most sqrt(3)/2 of its step
-ROTATION_FACTORS = (0, 2, 8)
 
 WEIGHT_PARTS = (0.0, 0.05, 0.2)  # of a level's vertices that may have weights below that of its step
 

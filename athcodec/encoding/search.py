@@ -17,6 +17,7 @@ from typing import Any, cast
 import numpy as np
 
 from athcodec.ath import Ath
+from athcodec.container import ROTATION_FACTORS
 from athcodec.encoding import quantise as qz
 from athcodec.encoding import streams
 from athcodec.encoding.features import Feature
@@ -775,7 +776,7 @@ class Search:
         if not any(settings.rotation_step_factors) and not self._without(Feature.ROTATIONS):
             costs = [cost for cost, _ in self._costs(plain)]
             candidates += [
-                replace(own, rotation_step_factors=(2,) * self.levels)
+                replace(own, rotation_step_factors=(1,) * self.levels)
                 for own, cost in zip(plain, costs)
                 if cost <= HOPELESS * min(costs)
             ]
@@ -805,7 +806,7 @@ class Search:
         if self._without(Feature.ROTATIONS):
             return settings
 
-        factors = (0, 2) if self.effort == "fast" else qz.ROTATION_FACTORS
+        factors = ROTATION_FACTORS[:2] if self.effort == "fast" else ROTATION_FACTORS
         candidates = [replace(settings, rotation_step_factors=(k,) * self.levels) for k in factors]
         per_level = np.array([levels for _, levels in self._costs(candidates)])
         mixed = replace(settings, rotation_step_factors=tuple(factors[i] for i in per_level.argmin(axis=0)))
@@ -868,7 +869,7 @@ class Search:
 
     def _other_bases(self, plain: Settings) -> Iterator[Settings]:
         """Other spatial bases and rotations."""
-        turned = [replace(plain, rotation_step_factors=(factor,) * self.levels) for factor in qz.ROTATION_FACTORS]
+        turned = [replace(plain, rotation_step_factors=(factor,) * self.levels) for factor in ROTATION_FACTORS]
         yield from turned
         yield from (replace(own, forms=forms) for own in (plain, turned[0]) for forms in self._all_forms())
 

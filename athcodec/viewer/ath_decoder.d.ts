@@ -91,11 +91,6 @@ export interface AthInfo {
    * digits, else null. */
   readonly restIsHost: boolean;
   readonly hostChecksum: string | null;
-  /** Thresholds by which nodes were accepted. */
-  readonly epsilon: number;
-  readonly xi: number;
-  readonly eta: number;
-  readonly lambda: number;
 }
 
 /** A motion of the plant: frames firstFrame to firstFrame + frameCount - 1 of the file, segments likewise. */

@@ -108,7 +108,7 @@ valid(
 )
 valid(
     "rotations",
-    "every rotation factor there is: 0, 2, 8",
+    "every rotation factor there is: 0, 1, 8",
     lambda: moving([Stem(-1, 3), *(Stem(b, 2, 1) for b in range(4))], 21, frames=4, heads=HEADS),
 )
 valid(
