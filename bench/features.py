@@ -54,11 +54,13 @@ GONE = {  # Features that a format before this one had, by their names among the
     "memory": "memories of predicted motion but for one",
     "common": "the flag Common of predicted motion",
     "memory+common": "both",
-    "adaptive": "adaptive vertices of rest poses",
     "plain_rest": "plain vertices of rest poses",
     "bent": "bent copies in rest poses",
 }
-OTHERS = {"sides": "open sides as guesses of faces"}  # Measured by an encoder that was changed for it.
+OTHERS = {  # What no encoder leaves out; measured by one that was changed for it.
+    "sides": "open sides as guesses of faces",
+    "adaptive": "adaptive vertices of rest poses",
+}
 LEAST = 1.0  # Per cent that a feature has to save on some file.
 LEAST_BYTES = 500  # Of the files in the table: of smaller ones a few bytes are many per cent.
 
