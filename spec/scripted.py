@@ -12,7 +12,7 @@ import struct
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
-from copy import deepcopy
+from copy import copy
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -148,7 +148,9 @@ def scripted_corner(original: Callable):
     def code(coder, model, bound, corners, first, j, previous):
         """The script has the vertex. It is coded as the first thing that says it."""
         vertex, script = coder.script.answer("corner", bound - 1), coder.script
-        coder.decisions.extend(corner_decisions(deepcopy(model), bound, corners, first, j, previous, vertex))
+        seen = copy(model)
+        seen.places = [dict(table) for table in model.places]
+        coder.decisions.extend(corner_decisions(seen, bound, corners, first, j, previous, vertex))
         about = corners[-1 if j > 0 else previous] if corners else 0
         coder.script = Script(vertex - about)
         original(coder, model, bound, corners, first, j, previous)

@@ -146,7 +146,7 @@ static ath_mesh *decode_mesh(ath_mesh *mesh, ath_bytes body, int32_t vertices, c
     void *memory = fuzz_memory(ath_faces_memory(vertices), 0xa5);
     int32_t *order = integers((size_t)vertices);
     for (int32_t v = 0; v < vertices; v++) order[v] = vertices - 1 - v;
-    int result = ath_decode_faces(memory, body, &shape, head[7] >> 1 & 1, vertices, counts, corners);
+    int result = ath_decode_faces(memory, body, &shape, vertices, counts, corners);
     for (uint32_t i = 0; result == ATH_OK && i < shape.corner_count; i++)
         REQUIRE(corners[i] >= 0 && corners[i] < vertices, "corners are vertices");
     if (result == ATH_OK) {
