@@ -351,10 +351,8 @@ def called(node: ast.Call) -> Iterator[Any]:
     if name in ("min", "max") and len(args) > 1:
         yield from args
         yield ast.Call(ast.Name("max" if name == "min" else "min", ast.Load()), args, node.keywords)
-    if name in ("abs", "sorted", "clipped", "divided_up", "single", "divide_to_zero"):
+    if name in ("abs", "sorted", "clipped", "divided_up", "single"):
         yield args[0]
-    if name == "divide_to_zero":
-        yield ast.BinOp(args[0], ast.FloorDiv(), args[1])
     if name == "range" and not isinstance(args[-1], ast.Constant):
         for change in (ast.Add(), ast.Sub()):
             yield ast.Call(node.func, [*args[:-1], ast.BinOp(args[-1], change, ast.Constant(1))], [])

@@ -121,9 +121,8 @@ ATH_INLINE int32_t row_number(const row_surroundings *row, int32_t axis, int32_t
 
 ATH_INLINE void note_magnitude(row_surroundings *row, int32_t axis, int32_t k, uint32_t magnitude)
 {
-    uint32_t *history = row->history[axis] + k;
-    *history = *history - (*history + 7) / 8 + 2 * magnitude;
-    row->run[axis] = row->run[axis] - (row->run[axis] + 4) / 8 + 2 * magnitude;
+    row->history[axis][k] = averaged(row->history[axis][k], (int32_t)magnitude);
+    row->run[axis] = averaged(row->run[axis], (int32_t)magnitude);
     row->near[axis] = magnitude;
     row->beside += magnitude;
 }
@@ -135,7 +134,7 @@ static void finish_row(coefficient_model *model, const row_surroundings *row, in
 {
     for (int32_t axis = 0; axis < 3; axis++) {
         uint32_t *history = row->history[axis];
-        for (int32_t k = count; k < model->history_reach[slot]; k++) history[k] = history[k] - (history[k] + 7) / 8;
+        for (int32_t k = count; k < model->history_reach[slot]; k++) history[k] = averaged(history[k], 0);
     }
     model->history_count[slot] = count;
     model->history_reach[slot] = ath_max(model->history_reach[slot], count);

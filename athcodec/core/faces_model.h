@@ -124,7 +124,7 @@ static int32_t code_far(ath_coder *coder, faces_model *model, const faces_list *
                         int32_t vertex)
 {
     int32_t difference = code_signed(coder, &model->far[j], model->far_mean[j], ENCODING ? vertex - about : 0);
-    model->far_mean[j] = model->far_mean[j] - (model->far_mean[j] + 7) / 8 + clipped(difference) * 2;
+    model->far_mean[j] = averaged(model->far_mean[j], difference);
     return difference < -about || difference >= faces->bound - about ? -1 : about + difference;
 }
 
@@ -241,7 +241,7 @@ static uint32_t code_face_count(ath_coder *coder, faces_model *model, uint32_t b
     model->counts_seen = (model->counts_seen << 1 | (uint32_t)same) & ((1u << FACE_COUNTS_BITS) - 1);
     if (same) return before;
     count = code_unsigned(coder, &model->count, model->count_mean, count);
-    model->count_mean = model->count_mean - (model->count_mean + 7) / 8 + clipped((int32_t)count) * 2;
+    model->count_mean = averaged(model->count_mean, (int32_t)count);
     return count;
 }
 

@@ -25,7 +25,7 @@ typedef struct {
 
 typedef struct {
     number_model number;
-    int32_t mean[2][ATH_MEASURES]; /* magnitudes in 1/16: along a level, and from level to level */
+    uint32_t mean[2][ATH_MEASURES]; /* magnitudes in 1/16: along a level, and from level to level */
 } error_model;
 
 static uint64_t code_raw_bits(ath_coder *coder, int32_t count, uint64_t value)
@@ -149,10 +149,11 @@ static void error_model_init(error_model *model)
 /* The errors of a level in a segment, from those before; 0: what was decoded is no such number. */
 static int code_errors(ath_coder *coder, error_model *model, int first_segment, const int32_t *before, int32_t *errors)
 {
-    int32_t *mean = model->mean[first_segment], change = 0;
+    uint32_t *mean = model->mean[first_segment];
+    int32_t change = 0;
     for (int32_t i = 0; i < ATH_MEASURES; i++) {
-        int32_t further = code_change(coder, &model->number, (uint32_t)mean[i], errors[i] - before[i] - change);
-        mean[i] += ((int32_t)clipped(further) * 16 - mean[i]) / 2;
+        int32_t further = code_change(coder, &model->number, mean[i], errors[i] - before[i] - change);
+        mean[i] = averaged(mean[i], further);
         change += further;
         errors[i] = before[i] + change;
         if (errors[i] < 0 || errors[i] >= ATH_SHORT_FLOATS) return 0;

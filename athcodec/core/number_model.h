@@ -32,6 +32,9 @@ ATH_INLINE uint32_t clipped(int32_t value)
     return magnitude < MAGNITUDE_CLIP ? magnitude : (uint32_t)MAGNITUDE_CLIP;
 }
 
+/* A running mean of magnitudes, in 1/16, after one more number. */
+ATH_INLINE uint32_t averaged(uint32_t mean, int32_t value) { return mean - (mean + 4) / 8 + 2 * clipped(value); }
+
 /* Half-octave classes of an expected magnitude in 1/16: 0, 1, 2, 3, 4, 6, 8, 12, 16, ... */
 ATH_INLINE int32_t number_class(uint32_t expected)
 {

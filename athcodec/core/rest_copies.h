@@ -91,8 +91,7 @@ static int code_copy_number(ath_coder *coder, number_model *model, copy_number *
     int64_t coded = (int64_t)about + code_signed(coder, model, known->mean[repeated], ENCODING ? *value - about : 0);
     if (coded <= -(1 << 29) || coded >= 1 << 29) return 0;
     *value = (int32_t)coded;
-    for (int32_t i = 0; i < 2; i++)
-        known->mean[i] = known->mean[i] - (known->mean[i] + 7) / 8 + clipped(*value - (i ? last : 0)) * 2;
+    for (int32_t i = 0; i < 2; i++) known->mean[i] = averaged(known->mean[i], *value - (i ? last : 0));
     return 1;
 }
 

@@ -187,7 +187,7 @@ static void rest_note(rest_memory *memory, const rest_guess *at, const double of
             double error = offset[k] - at->guesses[g][k];
             rest_note_error(&memory->error[g][k], error * error, rate);
         }
-        memory->mean[k] = memory->mean[k] - (memory->mean[k] + 7) / 8 + clipped(integers[k]) * 2;
+        memory->mean[k] = averaged(memory->mean[k], integers[k]);
     }
 }
 

@@ -92,7 +92,7 @@ static int32_t code_parent(ath_coder *coder, hierarchy_model *model, const ath_b
 }
 
 static int code_branch(ath_coder *coder, hierarchy_model *model, ath_branch *branches, int32_t b, int32_t vertices_left,
-                       int32_t *last_up, int32_t *mean_count)
+                       int32_t *last_up, uint32_t *mean_count)
 {
     static const ath_branch none = {0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0};
     ath_branch *branch = branches + b;
@@ -101,10 +101,10 @@ static int code_branch(ath_coder *coder, hierarchy_model *model, ath_branch *bra
     if (branch->parent < -1) return 0;
     int32_t depth = branch->parent < 0 ? 0 : branches[branch->parent].depth + 1, kind = ath_min(depth, 15);
     branch->depth = depth;
-    uint32_t more = code_unsigned(coder, &model->count, (uint32_t)mean_count[kind], (uint32_t)(branch->count - 1));
+    uint32_t more = code_unsigned(coder, &model->count, mean_count[kind], (uint32_t)(branch->count - 1));
     if (more >= (uint32_t)vertices_left) return 0;
     branch->count = (int32_t)more + 1;
-    mean_count[kind] += (ath_min((int32_t)more, 1 << 16) * 16 - mean_count[kind]) / 4;
+    mean_count[kind] = averaged(mean_count[kind], (int32_t)more);
     branch->flags = code_flags(coder, model, before->flags, branch->flags);
     branch->lag = code_signed(coder, &model->lag, 0, branch->lag - before->lag) + before->lag;
     if (branch->lag < 0 || branch->lag > 65535 || (branch->parent < 0 && branch->flags & ATH_LOOSE)) return 0;
@@ -121,7 +121,7 @@ static int code_attach(ath_coder *coder, hierarchy_model *model, ath_branch *bra
     if (step < -(1 << 28) || step > 1 << 28 || place < 0 || place >= parent->count) return 0;
     branch->attach = parent->first + place;
     parent->subtree = place;
-    *mean = *mean - (*mean + 3) / 4 + clipped(step) * 4;
+    *mean = averaged(*mean, step);
     return 1;
 }
 
@@ -143,7 +143,7 @@ static int code_source_number(ath_coder *coder, permutation_model *model, int32_
         value = beside;
     } else {
         int32_t difference = code_signed(coder, &model->difference, model->mean, (int32_t)(given - following));
-        model->mean = model->mean - (model->mean + 3) / 4 + clipped(difference) * 4;
+        model->mean = averaged(model->mean, difference);
         value = following + difference;
     }
     if (value < 0 || value >= count) return 0;
@@ -228,8 +228,8 @@ static int code_of_branches(ath_coder *coder, branch_number_model *model, int32_
 static int code_hierarchy(ath_coder *coder, hierarchy_model *model, int32_t branch_count, int32_t vertex_count,
                           ath_branch *branches, int32_t *branch_source, int32_t *vertex_source)
 {
-    int32_t last_up = 0, left = vertex_count, mean_count[16];
-    uint32_t mean_attach = 64;
+    int32_t last_up = 0, left = vertex_count;
+    uint32_t mean_attach = 64, mean_count[16];
     hierarchy_model_init(model);
     for (int32_t i = 0; i < 16; i++) mean_count[i] = 128;
     for (int32_t b = 0; b < branch_count; b++) {
@@ -448,7 +448,7 @@ static int32_t code_part(ath_coder *coder, rest_model *model, const rest_layer *
         rank = (int32_t)code_unsigned(coder, &copies->rank, copies->mean_rank, (uint32_t)rank);
         int32_t index = shape_of_rank(copies, branches, branch->count, rank);
         if (index < 0) return -1;
-        copies->mean_rank = copies->mean_rank - (copies->mean_rank + 7) / 8 + clipped(rank) * 2;
+        copies->mean_rank = averaged(copies->mean_rank, rank);
         move_to_front(copies, index);
         return code_copy(coder, copies, layer, branches, branch, step, &place, source, rest) ? COPY_PART : -1;
     }
@@ -671,7 +671,7 @@ static void code_bent_vertex(ath_coder *coder, rest_model *model, const bent_pos
         int32_t given = ENCODING ? steps_in(pose->moved[3 * (size_t)v + (size_t)k] - predicted[k], pose->step, 0.5) : 0;
         int32_t steps = code_signed(coder, &model->bent, (mean[k] + mean[0] + mean[1] + mean[2]) / 4, given);
         out[k] = predicted[k] + (double)steps * pose->step;
-        mean[k] = mean[k] - (mean[k] + 7) / 8 + clipped(steps) * 2;
+        mean[k] = averaged(mean[k], steps);
     }
 }
 
@@ -835,7 +835,7 @@ static int code_temporal(ath_coder *coder, number_model *model, int32_t rank, in
             if (!ENCODING && (*value < -ATH_MOST_SAMPLE || *value > ATH_MOST_SAMPLE)) return 0;
             slope = t > 0 ? *value - before : 0;
             before = *value;
-            mean = mean - (mean + 3) / 4 + clipped(rest) * 4;
+            mean = averaged(mean, rest);
         }
     }
     return 1;
