@@ -27,7 +27,8 @@ import zstandard
 
 FORMAT = Path(__file__).resolve().parent.parent / "FORMAT.md"
 TEXT = FORMAT.read_text(encoding="utf-8")
-KEPT = {"crc32c": 256, "waves_over_time": 64, "node_waves_over_time": 64, "cantilever": 1024}  # answers, by function
+# How many answers each of these pure functions keeps.
+KEPT = {"crc32c": 256, "waves_over_time": 64, "node_waves_over_time": 64, "cantilever": 1024}
 
 # ---- what the document takes for granted ---------------------------------------------------------------------
 
@@ -140,7 +141,7 @@ class Divisions(ast.NodeTransformer):
 
 
 def parse() -> ast.Module:
-    """The blocks, one behind the other; line numbers are those of FORMAT.md."""
+    """The syntax tree of all blocks, one behind the other; line numbers are those of FORMAT.md."""
     lines, is_code = [], False
     for line in TEXT.splitlines():
         is_code = line == "```python" or (is_code and line != "```")
@@ -167,14 +168,10 @@ def run(code: Iterable[types.CodeType], **more) -> types.ModuleType:
     names.update(TAKEN_FOR_GRANTED | KINDS | {"utf8": utf8} | more)
     for part in code:
         exec(part, names)
-    keep_answers(module)
-    return module
-
-
-def keep_answers(module: types.ModuleType) -> None:
     for name, size in KEPT.items():
-        kept = lru_cache(size)(module.__dict__[name])
-        setattr(module, name, lambda *given, kept=kept: kept(*(tuple(x) if isinstance(x, list) else x for x in given)))
+        kept = lru_cache(size)(names[name])
+        names[name] = lambda *given, kept=kept: kept(*(tuple(x) if isinstance(x, list) else x for x in given))
+    return module
 
 
 rules = run([compiled(*parse().body)])

@@ -418,7 +418,8 @@ class Decoder:
 
 
 def compiled(node: ast.stmt) -> types.CodeType:
-    return document.compiled(copy.deepcopy(node))
+    """The code of a statement, by its text: to compile a tree changes it, and nodes know what is above them."""
+    return document.compiled(*ast.parse(ast.unparse(node)).body)
 
 
 class Marked(ast.NodeTransformer):

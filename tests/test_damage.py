@@ -513,17 +513,24 @@ def both_readings(data: bytes, limits: Limits) -> str:
 
 def front_by_document(data: bytes, limits: Limits) -> tuple[SimpleNamespace, list[tuple]]:
     """Counts and tables, and kind, level, segment, length, checksum and offset of all known chunks."""
+    decode, tables = rules.decode_front, []
+
+    def decode_front(*arguments):
+        header, table = decode(*arguments)
+        tables.append(table)
+        return header, table
+
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(rules, "limit", lambda name: getattr(limits, name.removeprefix("Max_").lower()))
+        patch.setattr(rules, "decode_front", decode_front)
         header, _, _, prelude_length, _ = rules.read_front(data)
         rules.require(len(data) >= prelude_length, "TRUNCATED")
-        front_length, chunk_count = struct.unpack_from("<II", data, 16)
-        at, chunks, checksums = front_length, [], front_length - 4 * chunk_count
-        for i, (kind, level, segment, length) in enumerate(rules.decode_front(data[24:checksums], chunk_count)[1]):
-            checksum = struct.unpack_from("<I", data, checksums + 4 * i)[0]
-            if kind in rules.KINDS:
-                chunks.append((kind, 255 if level is None else level, segment, length, checksum, at))
-            at += length
+    at, chunk_count = struct.unpack_from("<II", data, 16)
+    checksums, chunks = struct.unpack_from(f"<{chunk_count}I", data, at - 4 * chunk_count), []
+    for (kind, level, segment, length), checksum in zip(tables[0], checksums):
+        if kind in rules.KINDS:
+            chunks.append((kind, 255 if level is None else level, segment, length, checksum, at))
+        at += length
     return header, chunks
 
 
