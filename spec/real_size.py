@@ -1,6 +1,6 @@
 """A plant of real size for vectors that athcodec writes, and which features of the format a file uses.
 
-Some features exclude each other, so there are four files (`OPTIONS`). A rest pose is exact, or adaptive and then
+Some features exclude each other, so there are four files (`OPTIONS`). A rest pose is exact, or coded and then
 perhaps connected, refined, with detail. A second rest pose is there where motion is about the mean pose. Predicted
 motion has no modes, shapes, learned bases, corrections, refinements or layers, and joins at level 0 alone.
 """
@@ -26,7 +26,7 @@ OPTIONS: dict[str, dict[str, Any]] = {
 FEATURES = set(
     "several clips,a loop,periodic waves,layers,predicted motion,joins,sloped joins,repeats,learned bases,sheets,"
     "loose branches,whole subtrees,tubes,rigid branches,detail,several pieces,several roots,exact rest pose,"
-    "adaptive rest pose,connected rest pose,uneven times,mixed faces,attributes".split(",")
+    "connected rest pose,uneven times,mixed faces,attributes".split(",")
 )
 
 
@@ -222,8 +222,7 @@ def features(data: bytes) -> set[str]:
         "several pieces": any(rules.piece_count(branch) > 1 for branch in file.branches),
         "several roots": sum(branch.parent < 0 for branch in file.branches) > 1,
         "exact rest pose": method & 1,
-        "adaptive rest pose": method & 8,
-        "connected rest pose": method & 16,
+        "connected rest pose": method & 8,
         "uneven times": opened.content(rules.TIME)[0] == 2,
         "mixed faces": opened.content(rules.FACES)[0] & 16,
         "attributes": bool(file.attributes),

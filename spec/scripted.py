@@ -20,7 +20,7 @@ import numpy as np
 from spec.document import crc32c, rules
 
 LOOSE, SHEET, WHOLE = rules.LOOSE, rules.SHEET, rules.WHOLE
-REST_EXACT, REST_FLOAT64, IS_HOST, REST_ADAPTIVE, REST_CONNECTED = 1, 2, 4, 8, 16  # of REST's Method
+REST_EXACT, REST_FLOAT64, IS_HOST, REST_CONNECTED = 1, 2, 4, 8  # of REST's Method
 NO_LEVEL = 255  # of a chunk that is not of motion
 
 RECENT = 32  # corners that a vertex may be said by
@@ -39,13 +39,15 @@ class Script:
 
 
 class Chance(Script):
-    """Random values: bits, small and sometimes large numbers, rows of any length."""
+    """Random values behind those given: bits, small and sometimes large numbers, rows of any length."""
 
-    def __init__(self, seed: int, empty: float = 0.3, large: int = 12):
-        super().__init__()
+    def __init__(self, seed: int, empty: float = 0.3, large: int = 12, begin: Sequence[int] = ()):
+        super().__init__(*begin)
         self.random, self.empty, self.large = np.random.default_rng(seed), empty, large
 
     def answer(self, asked: str, most: int):
+        if self.values:
+            return self.values.popleft()
         if asked == "count":
             return 0 if self.random.random() < self.empty else int(self.random.integers(1, most + 1))
         if asked == "bit":
@@ -523,16 +525,6 @@ def permutation_script(source: list | None, stems: list[Stem], of_vertices: bool
     return script
 
 
-def rest_script(branches: list, points: list) -> list:
-    """Steps to integer positions, for stems whose Lag is not 0."""
-    script = []
-    for branch in branches:
-        for i in range(branch.count):
-            predicted = rules.predict_rest(branch, points, i)
-            script += [int(points[branch.first + i][k] - predicted[k]) for k in range(3)]
-    return script
-
-
 def grown(stems: list[Stem], seed: int = 0, size: int = 4) -> list[list[float]]:
     """Integer positions of stems that are random walks."""
     random, points, first = np.random.default_rng(seed), [], []
@@ -729,28 +721,25 @@ class Plant:
             return host_rest_chunk(self.mesh, self.origin)
         if self.rest is not None:
             return self.rest
-        points = grown(self.stems) if self.points is None else self.points
-        script = rest_script(branches, points)
-        return rest_chunk(
-            write(rules.decode_rest, script, branches, 1.0),
-            origin=self.origin,
-            step=self.step,
-            rest_type=int(self.is_float64),
-        )
+        fields = {"origin": self.origin, "step": self.step, "rest_type": int(self.is_float64)}
+        is_refined = any(kind == rules.REFINED_REST for kind, *_ in self.scripts)
+        if self.points is None or is_refined:
+            script = Chance(len(branches), large=4, begin=[0]) if self.points is None else []
+            return rest_chunk(write(rules.decode_rest, script, branches, self.step), **fields)
+        numbers = [x for point in self.points for x in point]
+        return rest_chunk(write(rules.decode_exact_rest, numbers, branches, self.is_float64), exact=1, **fields)
 
     def _decoded_rest(self, branches: list, chunk: bytes, vertex_source: list):
-        """The rest pose of REST; `steps` is None where it is exact or the host's."""
+        """The rest pose of REST; `rows` is None where it is exact or the host's."""
         self.connectivity = None if self.faces is None else self._mesh(vertex_source)
-        origin, self.is_adaptive = struct.unpack_from("<3f", chunk, 1), chunk[0] & REST_ADAPTIVE != 0
+        origin = struct.unpack_from("<3f", chunk, 1)
         if self.mesh is None and not chunk[0] & REST_EXACT:
-            return rules.decode_rest(
-                chunk[17:], branches, rules.f32(chunk, 13), None, self.is_adaptive, self.connectivity
-            )
+            return rules.decode_rest(chunk[17:], branches, rules.f32(chunk, 13), None, self.connectivity)
         if self.mesh is not None:
             points = (self.mesh[vertex_source] + np.float32(0)).tolist()
         else:
             points = rules.decode_exact_rest(chunk[17:], branches, bool(chunk[0] & REST_FLOAT64), self.connectivity)
-        return rules.Record(rest=[[x[k] - origin[k] for k in range(3)] for x in points], steps=None)
+        return rules.Record(rest=[[x[k] - origin[k] for k in range(3)] for x in points], rows=None)
 
     def _mesh(self, vertex_source: list):
         shape, stream = rules.parse_polygons(self.faces, rules.FACES)
@@ -778,7 +767,7 @@ class Plant:
 
     def _refined_rest(self, branches: list, level: int, step: float, rests: list) -> Entry:
         """The rest pose of a level, which is added to those before."""
-        arguments = branches, step, rests[-1], self.is_adaptive, self.connectivity
+        arguments = branches, step, rests[-1], self.connectivity
         stream = self._write(rules.decode_rest, (rules.REFINED_REST, level, 0), *arguments)
         rests.append(rules.decode_rest(stream, *arguments))
         return Entry(rules.REFINED_REST, refined_rest_chunk(stream, step), level)

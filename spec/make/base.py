@@ -233,6 +233,6 @@ IMPULSES = basis_stream([[8192, 0], [0, 8192]])  # a learned basis of two frames
 SHORT, LARGEST = [Stem(-1, 3)], (1 << 30) - 1
 
 
-def copied(rank: int, place: Sequence[int] = (0, 0, 0, 0), largest: int = 0, mirrored: int = 0, bent: int = 0) -> list:
+def copied(rank: int, place: Sequence[int] = (0, 0, 0, 0), largest: int = 0, mirrored: int = 0) -> list:
     """Script of a copy of the shape of that rank: differences of its scale and of the smaller numbers of its turn."""
-    return [1, rank, mirrored, bent, place[0], largest >> 1, largest & 1, *place[1:]]
+    return [1, rank, mirrored, place[0], largest >> 1, largest & 1, *place[1:]]

@@ -7,29 +7,28 @@ from collections.abc import Callable
 import numpy as np
 
 from spec.document import rules
-from spec.make.adaptive import ADAPTIVE, adaptive_rest
 from spec.make.base import *
 from spec.make.polygons import FACES_3, MANY_FACES, derived, mixed_polygons, polygons
-from spec.make.rest import with_rest
+from spec.make.rest import BY_VERTEX, coded_rest, with_rest
 
 
 def connected(
     make_faces: Callable[[], bytes], seed: int = 73, step: float = 0.25, exact: bool = False, order: list | None = None
 ) -> Plant:
-    """ADAPTIVE, by faces."""
-    content, branches = make_faces(), branches_of(ADAPTIVE)
+    """BY_VERTEX, by faces."""
+    content, branches = make_faces(), branches_of(BY_VERTEX)
     shape, stream = rules.parse_polygons(content, FACES)
-    count = sum(stem.count for stem in ADAPTIVE)
+    count = sum(stem.count for stem in BY_VERTEX)
     mesh = rules.build_mesh(*rules.decode_polygons(stream, shape, count), order or list(range(count)))
     script, bits = Chance(seed, large=6), REST_CONNECTED >> 2
     if exact:
         stream = write(rules.decode_exact_rest, script, branches, False, mesh)
         rest = rest_chunk(stream, exact=1, reserved=bits)
     else:
-        stream = write(rules.decode_rest, script, branches, step, None, True, mesh)
-        rest = rest_chunk(stream, step=step, reserved=bits | REST_ADAPTIVE >> 2)
+        stream = write(rules.decode_rest, script, branches, step, None, mesh)
+        rest = rest_chunk(stream, step=step, reserved=bits)
     fields = {} if order is None else {"vertex_source": order}
-    return with_rest(ADAPTIVE, rest, faces=content, **fields)
+    return with_rest(BY_VERTEX, rest, faces=content, **fields)
 
 
 for name_, make_faces in MANY_FACES.items():
@@ -51,7 +50,7 @@ valid(
 invalid(
     "rest-connected-without-faces",
     "Method has Is_Connected, and there are no FACES",
-    lambda: with_rest(FORK, adaptive_rest(FORK, [], connected=True)),
+    lambda: with_rest(FORK, coded_rest(FORK, [], reserved=REST_CONNECTED >> 2)),
     "BAD_CHUNK_TABLE",
 )
 for what, content in (
@@ -64,7 +63,7 @@ for what, content in (
         f"rest-connected-{what}-faces",
         f"a rest pose by faces that do not serve it: {what}",
         lambda content=content: (
-            with_rest(FORK, adaptive_rest(FORK, [], connected=True)).draft().add(Entry(FACES, content()))
+            with_rest(FORK, coded_rest(FORK, [], reserved=REST_CONNECTED >> 2)).draft().add(Entry(FACES, content()))
         ),
     )
 valid(
@@ -75,14 +74,14 @@ valid(
 
 
 def meshed(stems: list[Stem], faces: list[list[int]], script: list | Chance, **fields) -> Plant:
-    """An adaptive rest pose by faces, of any sizes."""
+    """A rest pose by faces, of any sizes."""
     count, step = sum(stem.count for stem in stems), 0.3
     content = mixed_polygons(faces, count)
     shape, stream = rules.parse_polygons(content, FACES)
     mesh = rules.build_mesh(*rules.decode_polygons(stream, shape, count), list(range(count)))
-    coded = write(rules.decode_rest, script, branches_of(stems), step, None, True, mesh)
-    bits = REST_ADAPTIVE | REST_CONNECTED
-    return with_rest(stems, rest_chunk(coded, step=step, rest_type=1, reserved=bits >> 2), faces=content, **fields)
+    coded = write(rules.decode_rest, script, branches_of(stems), step, None, mesh)
+    chunk = rest_chunk(coded, step=step, rest_type=1, reserved=REST_CONNECTED >> 2)
+    return with_rest(stems, chunk, faces=content, **fields)
 
 
 def hub(first: int, quads: int, edges: int) -> list[list[int]]:

@@ -8,9 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from spec.document import rules
-from spec.make.adaptive import adaptive_rest
 from spec.make.base import *
-from spec.make.rest import with_rest
+from spec.make.rest import coded_rest, with_rest
 
 COPIED = [  # a shape and its copies, of branches that have detail and that have none
     Stem(-1, 8, lag=2),
@@ -19,11 +18,11 @@ COPIED = [  # a shape and its copies, of branches that have detail and that have
     Stem(0, 4, 0, lag=1),
     Stem(0, 8, 2, lag=2),
 ]
-for name_, seed_, title_ in (
-    ("rest-copies", 2364, "copies of shapes: one that is mirrored and scaled, one that is bent"),
-    ("rest-copies-bent", 2949, "copies of shapes that are bent, mirrored and scaled"),
-):
-    valid(name_, title_, lambda seed_=seed_: with_rest(COPIED, adaptive_rest(COPIED, Chance(seed_, large=3))))
+valid(
+    "rest-copies",
+    "copies of shapes that are mirrored and scaled",
+    lambda: with_rest(COPIED, coded_rest(COPIED, Chance(2364, large=3))),
+)
 for name_, seed_, title_ in (
     ("rest-copies-of-no-shape", 2, "a copy of a shape that is not there"),
     ("rest-copies-scale", 15, "the scale of a copy is not above 0"),
@@ -33,9 +32,9 @@ for name_, seed_, title_ in (
         name_,
         title_,
         lambda seed_=seed_: (
-            with_rest(COPIED, adaptive_rest(COPIED, Chance(2364, large=3)))
+            with_rest(COPIED, coded_rest(COPIED, Chance(2364, large=3)))
             .draft()
-            .change(REST, content=adaptive_rest(COPIED, Chance(seed_, large=3)))
+            .change(REST, content=coded_rest(COPIED, Chance(seed_, large=3)))
         ),
     )
 valid(
@@ -46,7 +45,7 @@ valid(
 
 
 def by_chance(count: int, seed: int, most: int = 4) -> list:
-    """Script of so many vertices of an adaptive rest pose, whose first numbers are even."""
+    """Script of so many vertices of a rest pose, whose first numbers are even."""
     random = np.random.default_rng(seed)
     return [n for x, y, z in random.integers(-most, most + 1, (count, 3)).tolist() for n in (2 * x, y, z)]
 
@@ -62,7 +61,7 @@ def with_copies(stems: Sequence[int | Stem], *script: list, step: float = 0.3, s
     stems = [Stem(-1, 4), *branches]
     root = [0] * 12 if still else by_chance(4, 160)
     values = [1, 0, *root, *(value for values in script for value in values)]
-    return with_rest(stems, adaptive_rest(stems, values, step, rest_type=1))
+    return with_rest(stems, coded_rest(stems, values, step, rest_type=1))
 
 
 def broken_rest(make: Callable[[], Plant], goes_on: bool = True) -> Draft:
@@ -72,7 +71,7 @@ def broken_rest(make: Callable[[], Plant], goes_on: bool = True) -> Draft:
         plant = make()
     finally:
         rules.require = kept
-    rest = adaptive_rest(plant.stems, [], 0.3, rest_type=1)
+    rest = coded_rest(plant.stems, [], 0.3, rest_type=1)
     return replace(plant, rest=rest).draft().change(REST, content=plant.rest)
 
 
@@ -87,12 +86,10 @@ def copies_turned() -> Plant:
     random = np.random.default_rng(226)
     script = [[1, *by_chance(4, 162, 40)], [0, 1, *by_chance(4, 163, 40)]]
     for i in range(36):
-        place, bent = random.integers(-1, 2, 4) * (random.random(4) < 0.4), int(i % 8 > 4)
+        place = random.integers(-1, 2, 4) * (random.random(4) < 0.4)
         place = np.array([12, -19, 16, 14]) if i < 4 else place - (i in (18, 19)) * np.array([12, -19, 16, 14])
-        script += [
-            copied(int(i > 0), place.tolist(), (0, 0, 0, 1, 1, 3, 2)[i % 7] if i > 7 else 0, int(i % 7 > 4), bent)
-        ]
-        script += [by_chance(4 if bent else 1, 164 + i)]
+        largest = (0, 0, 0, 1, 1, 3, 2)[i % 7] if i > 7 else 0
+        script += [copied(int(i > 0), place.tolist(), largest, int(i % 7 > 4)), by_chance(1, 164 + i)]
     return with_copies([4] * 38, *script)
 
 
@@ -135,7 +132,7 @@ valid(
         [3, Stem(-1, 3), Stem(-1, 2), Stem(3, 2, 1), Stem(-1, 2), Stem(5, 3, 1)],
         *([1, *by_chance(3, 190, 9)], copied(0, (1, 1, 2, -1)), by_chance(1, 191)),
         *([1, *by_chance(2, 192, 9)], copied(0, (0, -1, 2, 0)), by_chance(1, 193)),
-        *(copied(0, (1, 0, 0, 1), bent=1), by_chance(2, 194), copied(0), by_chance(1, 195)),
+        *(copied(0, (1, 0, 0, 1)), by_chance(1, 194), copied(0), by_chance(1, 195)),
     ),
 )
 valid(

@@ -8,13 +8,12 @@ from collections.abc import Callable
 import numpy as np
 
 from spec.document import KIND_NAMES, rules
-from spec.make.adaptive import ADAPTIVE, adaptive_rest
 from spec.make.base import *
 from spec.make.bases import basis_by_chance
 from spec.make.clips import loop, periodic
 from spec.make.connected import connected
 from spec.make.polygons import MANY_FACES
-from spec.make.rest import coded_rest
+from spec.make.rest import BY_VERTEX, coded_rest
 from spec.make.tubes import RIGID, TUBES
 
 
@@ -223,7 +222,7 @@ valid(
     rest_by_level(
         LOOSE_BEAMS,
         42,
-        rest=rest_chunk(write(rules.decode_rest, Chance(47, large=6), branches_of(LOOSE_BEAMS), 1.0), rest_type=1),
+        rest=coded_rest(LOOSE_BEAMS, Chance(47, large=6, begin=[0]), rest_type=1),
         frames=5,
         segments=2,
         is_float64=True,
@@ -235,19 +234,19 @@ valid(
     rest_by_level([Stem(-1, 4, 0, WHOLE), Stem(0, 3, 2)], 43),
 )
 valid(
-    "layers-adaptive-rest",
-    "adaptive rest poses of all layers",
-    refinements(ADAPTIVE, 46, rest=adaptive_rest(ADAPTIVE, Chance(38, large=4), 1.0)),
+    "layers-rest-vertices",
+    "single vertices of all layers",
+    refinements(BY_VERTEX, 46, rest=coded_rest(BY_VERTEX, Chance(38, large=4), 1.0)),
 )
 valid(
     "layers-connected-rest",
     "rest poses of all layers by faces",
-    refinements(ADAPTIVE, 46, rest=connected(MANY_FACES["strip"]).rest, faces=MANY_FACES["strip"]()),
+    refinements(BY_VERTEX, 46, rest=connected(MANY_FACES["strip"]).rest, faces=MANY_FACES["strip"]()),
 )
 valid(
-    "rest-of-level-1-adaptive",
-    "adaptive rest poses by level",
-    rest_by_level(BEAMS[:3], 47, rest=adaptive_rest(BEAMS[:3], Chance(39, large=4), 1.0)),
+    "rest-of-level-1-vertices",
+    "single vertices by level",
+    rest_by_level(BEAMS[:3], 47, rest=coded_rest(BEAMS[:3], Chance(39, large=4), 1.0)),
 )
 valid("rest-of-level-1-still", "the chunk has no bytes in its stream", layered(scripts={(REFINED_REST, 1, 0): []}))
 header("layers-9", "Layer_Count 9", layer_count=9, level_count=10, full_level_count=10)

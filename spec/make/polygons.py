@@ -8,9 +8,8 @@ from collections.abc import Callable
 import numpy as np
 
 from spec.document import rules
-from spec.make.adaptive import ADAPTIVE, adaptive_rest
 from spec.make.base import *
-from spec.make.rest import with_rest
+from spec.make.rest import BY_VERTEX, coded_rest, with_rest
 from spec.make.static import numbers, static, with_static
 
 
@@ -95,7 +94,7 @@ valid(
     "as numbers of one byte; of one vertex there are none",
     lambda: lone().draft().add(Entry(EDGES, derived("|i1"))),
 )
-MANY_FACES = {  # of 119 vertices: those of ADAPTIVE
+MANY_FACES = {  # of 119 vertices: those of BY_VERTEX
     "by chance": lambda: polygons(np.zeros((150, 3), "<i2"), 120, script=Chance(71)),
     "strip": lambda: polygons(np.array([[i, i + 1, i + 2] for i in range(118)], "<i4"), 120),
     "quads": lambda: polygons(np.array([[i, i + 1, i + 11, i + 10] for i in range(109)], "<i8"), 120),
@@ -123,7 +122,7 @@ for name_, make_faces in MANY_FACES.items():
         f"faces-many-{name_.replace(' ', '-')}",
         f"faces of 120 vertices: {name_}",
         lambda make_faces=make_faces: (
-            with_rest(ADAPTIVE, adaptive_rest(ADAPTIVE, [])).draft().add(Entry(FACES, make_faces()))
+            with_rest(BY_VERTEX, coded_rest(BY_VERTEX, [])).draft().add(Entry(FACES, make_faces()))
         ),
     )
 

@@ -9,34 +9,20 @@ AWKWARD_FLOATS = [-0.0, FLOAT_TINY, -FLOAT_MAX, FLOAT_MAX, 1.0, -1e-40, 0.0, 1 +
 AWKWARD_DOUBLES = [-0.0, TINY, -1e300, 1e300, 1.0, -1e-310, 0.0, 1 + 2**-52, -1.0]
 
 
-def coded_rest(stems: list[Stem], script: list | Chance, **fields) -> bytes:
-    return rest_chunk(write(rules.decode_rest, script, branches_of(stems), 1.0), **fields)
+def coded_rest(stems: list[Stem], script: Script | list, step: float = 0.25, **fields) -> bytes:
+    return rest_chunk(write(rules.decode_rest, script, branches_of(stems), step), step=step, **fields)
 
 
 def with_rest(stems: list[Stem], rest: bytes, **fields) -> Plant:
     return Plant(stems, rest=rest, **fields)
 
 
-valid(
-    "rest-lags",
-    "rest poses by steps, predicted from 1, 2 and 3 vertices before",
-    lambda: still(
-        [Stem(-1, 7, lag=1), Stem(0, 6, 3, lag=2), Stem(1, 8, 5, lag=3)],
-        points=grown([Stem(-1, 7), Stem(0, 6, 3), Stem(1, 8, 5)], 3),
-    ),
-)
-valid(
-    "rest-lag-65535",
-    "the largest Lag: every vertex is expected where the one before is",
-    lambda: still([Stem(-1, 3, lag=65535)]),
-)
+valid("rest-lag-65535", "the largest Lag: no vertex is a row behind another", lambda: still([Stem(-1, 3, lag=65535)]))
+RUNS = [Stem(-1, 2, lag=0), Stem(0, 33, 1, lag=0), Stem(0, 32, 0, lag=0), Stem(-1, 1, lag=0)]
 valid(
     "rest-beams",
     "beams: runs of 1, 16 and 17 and of 32 vertices, from roots and from attach vertices",
-    lambda: with_rest(
-        [Stem(-1, 2, lag=0), Stem(0, 33, 1, lag=0), Stem(0, 32, 0, lag=0), Stem(-1, 1, lag=0)],
-        coded_rest([Stem(-1, 2, lag=0), Stem(0, 33, 1, lag=0), Stem(0, 32, 0, lag=0), Stem(-1, 1, lag=0)], Chance(31)),
-    ),
+    lambda: with_rest(RUNS, coded_rest(RUNS, Chance(31, begin=[0]))),
 )
 valid(
     "rest-beams-and-steps",
@@ -45,7 +31,7 @@ valid(
         [Stem(-1, 5, lag=0), Stem(0, 3, 1, lag=1), Stem(0, 4, 4, lag=0)],
         coded_rest(
             [Stem(-1, 5, lag=0), Stem(0, 3, 1, lag=1), Stem(0, 4, 4, lag=0)],
-            Chance(32),
+            Chance(32, begin=[0]),
             rest_type=1,
             origin=(1e6, -0.5, 3.0),
         ),
@@ -117,12 +103,6 @@ prelude("empty", REST, "no bytes", b"")
 prelude("short", REST, "16 bytes", lambda: corrupted_rest()[:16])
 for bit in (0, 2, 3, 4, 5):
     prelude(f"method-{bit}", REST, f"bit {bit + 2} of Method is set", lambda bit=bit: corrupted_rest(reserved=1 << bit))
-prelude(
-    "exact-and-adaptive",
-    REST,
-    "Method has Is_Exact and Is_Adaptive",
-    lambda: exact_rest(FORK, [0.5] * 15, False, reserved=REST_ADAPTIVE >> 2),
-)
 for what, value in (("nan", NAN), ("infinite", -INFINITY)):
     prelude(f"origin-{what}", REST, f"Origin has {value}", lambda value=value: corrupted_rest(origin=(0.0, 0.0, value)))
 for what, value in (("zero", 0.0), ("negative", -1.0), ("nan", NAN), ("infinite", INFINITY)):
@@ -154,6 +134,73 @@ invalid(
     lambda: (
         with_rest([Stem(-1, 3, lag=0)], coded_rest([Stem(-1, 3, lag=0)], []))
         .draft()
-        .change(REST, content=coded_rest([Stem(-1, 3, lag=0)], [0, 0, 0, 3]))
+        .change(REST, content=coded_rest([Stem(-1, 3, lag=0)], [0, 0, 0, 0, 3]))
     ),
+)
+
+
+BY_VERTEX = [  # every filter, phases within lags and across stems, rows of several vertices, a beam among them
+    Stem(-1, 30, lag=1),
+    Stem(0, 12, 3, lag=2),
+    Stem(0, 12, 4, lag=3),
+    Stem(2, 14, 5, SHEET, lag=4),
+    Stem(0, 40, 9, SHEET, lag=7),
+    Stem(-1, 9, lag=0),
+    Stem(5, 3, 2, lag=65535),
+]
+valid(
+    "rest-vertices",
+    "vertices one by one",
+    lambda: with_rest(BY_VERTEX, coded_rest(BY_VERTEX, Chance(33, large=6), rest_type=1)),
+)
+valid(
+    "rest-vertices-phases",
+    "a lag of more vertices than there are phases",
+    lambda: with_rest([Stem(-1, 900, lag=300)], coded_rest([Stem(-1, 900, lag=300)], Chance(34, large=3))),
+)
+valid(
+    "rest-vertices-still",
+    "a rest pose without bytes, which is a point",
+    lambda: with_rest(BY_VERTEX, coded_rest(BY_VERTEX, [])),
+)
+valid(
+    "rest-vertices-vast",
+    "integers of 30 bits under the largest Rest_Step: weighted guesses are out of range",
+    lambda: with_rest(BY_VERTEX, coded_rest(BY_VERTEX, Chance(35, large=29), FLOAT_MAX)),
+)
+valid(
+    "rest-vertices-tiny",
+    "a subnormal Rest_Step",
+    lambda: with_rest(BY_VERTEX, coded_rest(BY_VERTEX, Chance(36, large=9), FLOAT_TINY)),
+)
+DETAILED = [  # finer and coarser than the step, the largest and the smallest, alike and unlike by lag
+    replace(stem, detail=detail) for stem, detail in zip(BY_VERTEX, (0, 121, 118, 0, 255, 110, 1))
+]
+valid(
+    "rest-detail",
+    "steps of branches of their own, of single vertices and of beams",
+    lambda: with_rest(DETAILED, coded_rest(DETAILED, Chance(37, large=6))),
+)
+
+
+def vertices_of_fork() -> bytes:
+    return coded_rest(FORK, Chance(37, large=4))
+
+
+prelude("vertices-zero-behind", REST, "a zero byte behind single vertices", lambda: vertices_of_fork() + b"\0")
+prelude("vertices-bytes-behind", REST, "bytes behind single vertices", lambda: vertices_of_fork() + b"\1" * 12)
+LONE_POINTS = [Stem(-1, 1, lag=2), Stem(-1, 1, lag=2), Stem(-1, 1, lag=2, detail=100), Stem(-1, 1, lag=2, detail=100)]
+FAR_UNITS = [10**9, 495 * 10**6, 515 * 10**6]  # units in x, in y and z pairs of them
+valid(
+    "rest-vertices-far",
+    "what is expected by the weights is 10^9 units, a little less, or more than is allowed",
+    lambda: with_rest(
+        LONE_POINTS, coded_rest(LONE_POINTS, [0, *FAR_UNITS, 0, 0, 0, *(-n for n in FAR_UNITS), 0, 0, 0], rest_type=1)
+    ),
+)
+LAGS = [Stem(-1, 12, lag=4), Stem(0, 17, 2, lag=5), Stem(0, 262, 4, SHEET, lag=256)]
+valid(
+    "rest-vertices-lags",
+    "lags of 4 and 5, of which one has filters by phase, and of 256, of which a phase has two vertices",
+    lambda: with_rest(LAGS, coded_rest(LAGS, Chance(410, large=3, empty=0.0), rest_type=1)),
 )

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 
 from spec.document import rules
-from spec.make.adaptive import adaptive_rest
 from spec.make.base import *
 from spec.make.layers import layered
 from spec.make.rest import AWKWARD_DOUBLES, AWKWARD_FLOATS, INFINITE_BITS, coded_rest, exact_of_fork
@@ -151,52 +150,12 @@ ATTACHED_TO_0 = [
     Stem(1, 31, 5, lag=0),
     Stem(-1, 1, lag=0),
 ]
-TURNING = [Stem(0, 100, 0, lag=0)] * 2 + [Stem(0, 3, 0, lag=0)] * 2 + [Stem(4, 2, 2, lag=0)]
-STEERED = ((20000, 0), (10000, 0), (670, 0), (28, 0), (2, 0))
-STEERED_TWICE = ((30000, 54000), (15000, 27000), (1004, 1808), (40, 72), (2, 4))
-
-
-def hardly_apart(step: float, steered: Sequence[tuple[int, int]] = STEERED, x: int = 1, y: int = 0) -> Plant:
-    """A second rest pose about one in which the beam that another one hangs on is shorter than anything that integers
-    say: a copy that is bent for long, but for its place, has taught that to expect it there is worth next to nothing.
-    """
-    script = [
-        *[1, 0, *[0] * 12],
-        *[1, *[0] * 4],  # a shape whose vertices are at one place
-        *[
-            *copied(0, bent=1),
-            0,
-            0,
-            0,
-            *(n for place in steered for n in (place[0], place[1] // 2, 0)),
-            *[0] * (3 * 94),
-        ],
-        *[1, 0],
-        *[*copied(0, bent=1), 4 * x, 2 * y, 0, -2 * x, -y, 0, 0, 0, 0],
-        *[0, *row((3, 1, 0), (0, 2, 5))],
-    ]
-    stems, step = [Stem(-1, 4), *TURNING], float(np.float32(step))
-    rest, branches = adaptive_rest(stems, script, step, rest_type=1), branches_of(stems)
-    reference = rules.decode_rest(rest[17:], branches, step, None, True).rest
-    content = write(rules.decode_source_rest, Chance(507, large=6, empty=0.0), branches, step, reference)
-    return still(stems, rest=rest, source_rest=source_rest_chunk(content, step), is_float64=True)
 
 
 valid(
     "source-rest-attached-to-0",
     "beams that hang on vertex 0, and on the first vertex of such; runs of 31 and 32; a root of one vertex",
     lambda: attached_rest(503, 504),
-)
-for side, step in (("above", 1.238e-29), ("below", 1.2015e-29)):
-    valid(
-        f"source-rest-short-{side}",
-        f"a beam of {side} 1e-100 in the reference pose, which has a direction or none",
-        lambda step=step: hardly_apart(step),
-    )
-valid(
-    "source-rest-short-exactly",
-    "a beam whose squares add up to 1e-200, which has no direction",
-    lambda: hardly_apart(3.713893830124435e-38, STEERED_TWICE, 121709354, 40038661),
 )
 valid(
     "source-rest-exact-no-bytes",

@@ -161,7 +161,7 @@ for name_, what_ in (
         "faces, edges, attributes, every bit of the source",
     ),
     ("refined-rest", "the same with joins, loose branches and a rest pose that layers refine"),
-    ("exact-rest", "the same about an exact rest pose, which excludes adaptive, connected and refined ones"),
+    ("exact-rest", "the same about an exact rest pose, which excludes refined ones"),
     ("predicted", "the same in predicted motion, which excludes modes, shapes, bases, corrections, joins and layers"),
 ):
     valid(
