@@ -1,4 +1,4 @@
-/* Parts of an adaptive rest pose that are copies of one shape: turned, scaled and mirrored (FORMAT.md, "Copies").
+/* Parts of a rest pose that are copies of one shape: turned, scaled and mirrored (FORMAT.md, "Copies").
  * Compiled once for each direction. */
 #ifndef ATH_REST_COPIES_H
 #define ATH_REST_COPIES_H

@@ -1,5 +1,5 @@
-/* Where the vertices of an adaptive rest pose are expected, learned from those before (FORMAT.md, "Adaptive rest
- * poses"). Offsets are in units of the lattice, from the vertex before. */
+/* Where the vertices that are coded one by one are expected, learned from those before (FORMAT.md, "Single
+ * vertices"). Offsets are in units of the lattice, from the vertex before. */
 #ifndef ATH_REST_PREDICTOR_H
 #define ATH_REST_PREDICTOR_H
 

@@ -273,7 +273,7 @@ typedef struct {
 typedef struct {
     lattice_model lattice;
     rest_predictor predictor, connected;
-} adaptive_rest;
+} rest_vertices;
 
 typedef struct {
     number_model bent; /* of the vertices of SOURCE_REST */
@@ -286,7 +286,7 @@ typedef struct {
     double bases[REST_BASES]; /* of runs of 1, 2, ... REST_RUN vertices, each made when it is first needed */
     double work[2 * REST_RUN * REST_RUN];
     uint8_t made[REST_RUN + 1];
-    adaptive_rest adaptive[2]; /* of branches without detail, and with it */
+    rest_vertices single[2]; /* of branches without detail, and with it */
     copy_model copies;
 } rest_model;
 
@@ -300,9 +300,9 @@ static void rest_model_init(rest_model *model, int is_refinement)
         coefficient_model_init(&model->modes, REST_RUN, model->history);
     memset(model->made, 0, sizeof model->made);
     for (int32_t i = 0; i < 2; i++) {
-        lattice_model_init(&model->adaptive[i].lattice);
-        rest_predictor_init(&model->adaptive[i].predictor);
-        rest_connected_init(&model->adaptive[i].connected);
+        lattice_model_init(&model->single[i].lattice);
+        rest_predictor_init(&model->single[i].predictor);
+        rest_connected_init(&model->single[i].connected);
     }
     copy_model_init(&model->copies);
 }
@@ -331,9 +331,9 @@ static void predict_rest(const ath_branch *branch, const double *rest, int32_t i
     }
 }
 
-static adaptive_rest *adaptive_of(rest_model *model, const ath_branch *branch)
+static rest_vertices *single_of(rest_model *model, const ath_branch *branch)
 {
-    return model->adaptive + (branch->detail > 0);
+    return model->single + (branch->detail > 0);
 }
 
 /* A point of the lattice, of about the size of the last ones, of all and of those of the phase. */
@@ -363,16 +363,16 @@ static void code_expected_vertex(ath_coder *coder, rest_model *model, const rest
     nearest_of_lattice(units, branch->detail > 0 ? 0.0 : layer->slack * per_unit, at->phase->mean, integers);
 #endif
     (void)source, (void)layer;
-    code_rest_point(coder, &adaptive_of(model, branch)->lattice, &predictor->all, at->phase, integers);
+    code_rest_point(coder, &single_of(model, branch)->lattice, &predictor->all, at->phase, integers);
     for (int32_t k = 0; k < 3; k++) out[k] = expected[k] + (double)integers[k] * unit;
     rest_learn(predictor, at, per_unit, out, integers);
 }
 
 /* Vertex i of a stem, by those before it on the stem. */
-static void code_adaptive_vertex(ath_coder *coder, rest_model *model, const rest_layer *layer, const ath_branch *branch,
-                                 int32_t i, double step, const double *source, double *rest)
+static void code_single_vertex(ath_coder *coder, rest_model *model, const rest_layer *layer, const ath_branch *branch,
+                               int32_t i, double step, const double *source, double *rest)
 {
-    rest_predictor *predictor = &adaptive_of(model, branch)->predictor;
+    rest_predictor *predictor = &single_of(model, branch)->predictor;
     double unit = LATTICE_UNIT * step;
     rest_guess at;
     rest_look_around(predictor, branch, rest, layer->before, i, 1.0 / unit, &at);
@@ -517,7 +517,7 @@ static void code_rest_beam(ath_coder *coder, rest_model *model, const rest_layer
                            double step, const double *source, double *rest)
 {
     int32_t from = branch->attach < 0, left = branch->count - from, runs = (left + REST_RUN - 1) / REST_RUN;
-    if (from) code_adaptive_vertex(coder, model, layer, branch, 0, step, source, rest);
+    if (from) code_single_vertex(coder, model, layer, branch, 0, step, source, rest);
     for (int32_t r = 0; r < runs; r++) {
         int32_t start = from + (int32_t)((int64_t)left * r / runs),
                 end = from + (int32_t)((int64_t)left * (r + 1) / runs);
@@ -561,7 +561,7 @@ static int code_connected_rest(ath_coder *coder, rest_model *model, const rest_l
         int32_t v = mesh->order[t];
         if (mesh->from[v] == OF_COPY) continue;
         const ath_branch *branch = branch_of(branches, branch_count, v);
-        rest_predictor *predictor = &adaptive_of(model, branch)->connected;
+        rest_predictor *predictor = &single_of(model, branch)->connected;
         double step_here = rest_step(branch, step);
         rest_ring ring;
         rest_guess at;
@@ -578,7 +578,7 @@ static int code_connected_rest(ath_coder *coder, rest_model *model, const rest_l
         double unit = LATTICE_UNIT * step_here;
         mesh->from[v] = ring.base;
         if (ring.base < 0) {
-            code_adaptive_vertex(coder, model, layer, branch, v - branch->first, step_here, source, rest);
+            code_single_vertex(coder, model, layer, branch, v - branch->first, step_here, source, rest);
             continue;
         }
         rest_look_beside(predictor, mesh, &ring, rest, layer->before, v, 1.0 / unit, &at);
@@ -620,7 +620,7 @@ static int code_rest(ath_coder *coder, rest_model *model, const rest_layer *laye
             code_rest_beam(coder, model, layer, branches + b, own, layer->moved, rest);
         else
             for (int32_t i = 0; i < branches[b].count; i++)
-                code_adaptive_vertex(coder, model, layer, branches + b, i, own, layer->moved, rest);
+                code_single_vertex(coder, model, layer, branches + b, i, own, layer->moved, rest);
     }
     return !model->modes.invalid;
 }

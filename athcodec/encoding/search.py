@@ -174,7 +174,7 @@ def first_settings(
         usual_change=usual_change(samples) if source.has_seams else np.inf,
         without=source.without,
     )
-    if layered and not settings.details.any():  # adaptive rest poses are worth less to those that refine them
+    if layered and not settings.details.any():  # lags that are best at once are worse where layers refine them
         return with_connected_rest(source, ath, replace(settings, lags=lags(source, rest_step, settings.details)))
     return with_best_lags(source, ath, settings)
 

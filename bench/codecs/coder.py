@@ -75,7 +75,7 @@ def library(writes: bool) -> ctypes.CDLL:
     }
     if not writes:
         arguments["bench_corrections"] = [c_int32, c_int32, c_double, c_int32, c_void_p]
-        arguments["bench_pose"] = [c_void_p, c_int32, c_double, c_int32, c_void_p]
+        arguments["bench_pose"] = [c_void_p, c_int32, c_double, c_void_p]
     for name, rest in arguments.items():
         function = getattr(loaded, name)
         function.restype, function.argtypes = c_int64, [c_void_p, c_int64, *rest]
