@@ -152,7 +152,7 @@ valid(
 valid(
     "rest-connected-leaves",
     "by faces shapes, copies, branches that others have begun, and steps of branches of their own",
-    lambda: meshed(LEAVES, leaves(), Chance(236, large=3)),
+    lambda: meshed(LEAVES, leaves(), Chance(230, large=3, begin=[1])),
 )
 valid(
     "rest-connected-crowd",

@@ -420,7 +420,7 @@ def bad_rest_of_1(change: Callable[[bytes], dict] | None) -> Draft:
 def refined_run(count: int) -> bytes:
     """The stream of a root of three vertices, the last two of which are a run with so many modes."""
     branches = branches_of([Stem(-1, 3, lag=0)])
-    before = rules.Record(rest=[[0.0] * 3] * 3, steps=[[0] * 3] * 3)
+    before = rules.Record(rest=[[0.0] * 3] * 3, rows={})
     return write(rules.decode_rest, [0, 0, 0, count], branches, 0.0625, before)
 
 

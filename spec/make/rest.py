@@ -101,7 +101,8 @@ def exact_of_fork(numbers_: list, is_float64: bool, **fields) -> bytes:
 INFINITE_BITS = {False: (0xFF << 23, False), True: (0x7FF << 52, False)}  # how far infinity is from 0.0
 prelude("empty", REST, "no bytes", b"")
 prelude("short", REST, "16 bytes", lambda: corrupted_rest()[:16])
-for bit in (0, 2, 3, 4, 5):
+prelude("method-0", REST, "bit 2 of Method is set", lambda: corrupted_rest(reserved=1) + b"\1")
+for bit in (2, 3, 4, 5):
     prelude(f"method-{bit}", REST, f"bit {bit + 2} of Method is set", lambda bit=bit: corrupted_rest(reserved=1 << bit))
 for what, value in (("nan", NAN), ("infinite", -INFINITY)):
     prelude(f"origin-{what}", REST, f"Origin has {value}", lambda value=value: corrupted_rest(origin=(0.0, 0.0, value)))

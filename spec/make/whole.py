@@ -48,7 +48,7 @@ def everything() -> Draft:
     plant = Plant(
         EVERYTHING,
         clips=(loop(Clip(5, 1, "up"), 0.5, 0.4, 0.3, 0.2, 0.1, 0.05, 0.0), Clip(5, 1, "down")),
-        rest=coded_rest(EVERYTHING, Chance(71), rest_type=1, origin=(10.0, -3.5, 0.25), step=0.01),
+        rest=coded_rest(EVERYTHING, Chance(71, begin=[0]), rest_type=1, origin=(10.0, -3.5, 0.25), step=0.01),
         source_rest=bent(EVERYTHING, Chance(93, large=9)),
         time=uneven_time(*random.random((2, 5)).cumsum(axis=1).ravel().tolist()),
         branch_source=random.permutation(len(EVERYTHING)).tolist(),
