@@ -122,7 +122,7 @@ header("front-length-0", "BAD_HEADER", "Front_Length 0", front_length=0)
 header("front-length-limit", "LIMIT_EXCEEDED", "Front_Length above Max_Table_Bytes", front_length=(1 << 24) + 1)
 header("front-length-more", "TRUNCATED", "Front_Length is behind the end of the file", front_length=1 << 20)
 header("chunks-more", "BAD_HEADER", "more chunks announced than the front has room for", chunk_count=1000)
-header("chunks-less", "BAD_CHUNK_TABLE", "a chunk less than there are: the front stream is longer", chunk_count=4)
+header("chunks-less", "BAD_CHUNK_TABLE", "two chunks less than there are: the front stream is longer", chunk_count=3)
 header(
     "tables-limit",
     "LIMIT_EXCEEDED",
