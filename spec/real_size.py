@@ -212,7 +212,6 @@ def features(data: bytes) -> set[str]:
         "learned bases": any(head[5] > 1 for head in heads),
         "shared bases": any(head[5] > 1 and head[8] != 255 for head in heads),
         "waves of nodes": any(head[5] == 1 for head in heads),
-        "tips alone": any(head[4] & 8 for head in heads),
         "sheets": any(branch.flags & rules.SHEET for branch in file.branches),
         "loose branches": any(branch.flags & rules.LOOSE for branch in file.branches),
         "whole subtrees": any(branch.flags & rules.WHOLE for branch in file.branches),
@@ -224,7 +223,7 @@ def features(data: bytes) -> set[str]:
         "exact rest pose": method & 1,
         "connected rest pose": method & 8,
         "uneven times": opened.content(rules.TIME)[0] == 2,
-        "mixed faces": opened.content(rules.FACES)[0] & 16,
+        "mixed faces": opened.content(rules.FACES)[0] & 8,
         "attributes": bool(file.attributes),
     }
     kinds = {KIND_NAMES[kind] for kind, _, _ in file.chunks} | ({"ATTRIBUTE"} if file.attributes else set())

@@ -441,7 +441,7 @@ def test_random_decisions_about_refinements_mean_the_same_to_the_document_and_th
     if seed % 3:
         stream = random_stream(spec, random, "decode_refined_shapes", refined, motion, before.motion, shift)
         added.append((container.SHAPES, container.pack_refined_shapes(shift, stream)))
-    head = container.StemsHead(0.02 / min(ratio, 16), (0, 1, 4)[seed % 3])
+    head = container.StemsHead(0.02 / min(ratio, 16), container.ROTATION_FACTORS[seed % 3])
     spec.read_stems_head(container.pack_stems(head, b""), motion, level)
     stream = random_stream(spec, random, "decode_refined_stems", refined, motion, before, level, ratio)
     added.append((container.STEMS, container.pack_refined_stems(ratio, head, stream)))

@@ -114,7 +114,7 @@ header("front-length-0", "Front_Length 0", front_length=0)
 header("front-length-limit", "Front_Length above Max_Table_Bytes", "LIMIT_EXCEEDED", front_length=(1 << 24) + 1)
 header("front-length-more", "Front_Length is behind the end of the file", "TRUNCATED", front_length=1 << 20)
 header("chunks-more", "more chunks announced than the front has room for", chunk_count=1000)
-header("chunks-less", "a chunk less than there are: the front stream is longer", "BAD_CHUNK_TABLE", chunk_count=4)
+header("chunks-less", "two chunks less than there are: the front stream is longer", "BAD_CHUNK_TABLE", chunk_count=3)
 header(
     "tables-limit",
     "2^20 segments at two levels: more than Max_Table_Bytes, and not there",
