@@ -701,7 +701,7 @@ void ath_add_basis_rows(const double *waves, int32_t T, int32_t known, int32_t c
 
 ath_stream ath_node_stream(const ath_motion *motion, double step)
 {
-    ath_stream stream = {step, 0.0, motion->waves, motion->frames, -1, 0.0, 0, 0};
+    ath_stream stream = {step, 0.0, motion->waves, motion->frames, -1, 0.0};
     return stream;
 }
 

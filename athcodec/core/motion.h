@@ -13,8 +13,7 @@ typedef struct ath_stream {
     double rotation_step_factor; /* of rotation tracks; 0: none are coded */
     const double *temporal;      /* temporal_rank x frames, orthonormal rows */
     int32_t temporal_rank;
-    int32_t
-        root; /* level of the first of the streams whose learned bases begin with the same rows; ath_root: ath_waves */
+    int32_t root;     /* level of the first stream whose learned basis begins with the same rows, or an ath_root */
     double turn_step; /* largest step of the rotations of rigid pieces, 0: any */
 } ath_stream;
 
