@@ -297,7 +297,7 @@ class AthFile:
         Parameters
         ----------
         kind : int
-            As in the chunk table (FORMAT.md, "Chunks").
+            As in the chunk table (FORMAT.md, "Chunk table").
 
         Returns
         -------

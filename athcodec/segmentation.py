@@ -1,4 +1,4 @@
-"""How a clip is cut into segments, each of which can be decoded on its own (FORMAT.md, "Segments" and "Limits")."""
+"""How a clip is cut into segments, each of which can be decoded on its own (FORMAT.md, "Counts" and "Limits")."""
 
 from __future__ import annotations
 

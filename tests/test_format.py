@@ -219,8 +219,6 @@ def traced(spec) -> dict[str, list]:
         "gaps": spec.piece_gaps(plan, piece),
         "tip_weight": [spec.tip_weight(plan, piece)],
         "mode 0": piece.basis[0],
-        "mode 1": piece.basis[1],
-        "mode 2": piece.basis[2],
         "wave 0": motion.waves[0],
         "wave 1": motion.waves[1],
         "row, x": motion.coefficients[0][0],

@@ -3,7 +3,7 @@
 A piece bends in few ways, which its stiffness, its load and its neighbours determine. Cantilever modes are the same for
 all pieces; principal components of a piece's modes over time (Lengyel 1999; by clusters: Sattler et al. 2005) represent
 its motion in fewer tracks, at the price of storing the components. They are learned once for a clip, so their cost per
-frame falls with the number of frames. FORMAT.md, "Shapes stream".
+frame falls with the number of frames. FORMAT.md, "SHAPES".
 """
 
 from __future__ import annotations
