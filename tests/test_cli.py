@@ -196,6 +196,7 @@ def test_a_truncated_file_is_a_whole_one_of_fewer_levels(encoded, tmp_path, caps
         assert np.array_equal(decoder.positions(30), whole.positions(30, level=1))
 
 
+@pytest.mark.slow
 def test_the_demo_shows_every_depth_of_the_sample_and_keeps_files_on_demand(tmp_path, capsys):
     assert run("demo", "--keep", tmp_path / "new") == 0
     assert "ath-file" in (tmp_path / "new" / "athcodec_demo.html").read_text("utf-8")

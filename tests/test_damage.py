@@ -560,6 +560,7 @@ ALL_READINGS = {
 }
 
 
+@pytest.mark.vectors
 def test_the_core_reads_a_front_as_the_document_does(data, parts):
     assert both_readings(data, Limits()) == "opened"
     still = parts.with_chunks([entry for entry in parts.chunks if not entry[0].is_motion])

@@ -162,7 +162,7 @@ def test_a_mesh_of_one_piece_gets_patches_that_move_rigidly(tmp_path):
         assert apart.max() <= result.max_error_bound
 
 
-@pytest.mark.parametrize("vertices", [1, 2, 5, 40])
+@pytest.mark.parametrize("vertices", [1, 2, *(pytest.param(count, marks=pytest.mark.slow) for count in (5, 40))])
 def test_points_without_any_mesh_are_compressed_too(tmp_path, vertices):
     rng = np.random.default_rng(vertices)
     clip = MotionClip(rng.normal(size=(6, vertices, 3)).astype(np.float32), np.arange(6.0))

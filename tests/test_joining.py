@@ -78,6 +78,7 @@ def test_one_file_is_smaller_than_one_for_each_clip(sample_clip, tmp_path):
     assert together.bytes < 0.6 * sum(apart)
 
 
+@pytest.mark.slow
 def test_the_size_does_not_depend_on_the_order_of_the_clips(medley_clips, tmp_path):
     names = list(medley_clips)
     orders = (names, names[::-1], names[1:] + names[:1])
@@ -343,6 +344,7 @@ def test_a_float32_rest_pose_made_for_several_clips_is_stored_as_float32(sources
             assert np.array_equal(decoder.rest, first.source_rest)
 
 
+@pytest.mark.slow
 def test_the_output_may_stand_behind_the_inputs_or_between_options(sources, tmp_path):
     for place, words in enumerate(
         ([*sources, "{}"], [sources[0], "--effort", "fast", "{}"], ["-o", "{}", *sources], [sources[0], "-o", "{}"])

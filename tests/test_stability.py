@@ -102,6 +102,7 @@ def test_what_hangs_on_a_stem_that_has_turned_over_costs_no_more_than_on_one_tha
     assert swaying(angle) <= 1.25 * swaying(0.0)
 
 
+@pytest.mark.slow
 def test_a_plant_in_a_pot_that_turns_takes_little_more_than_one_that_stands(tmp_path):
     """The trunk of the sample is upright, so that it hardly shows by itself how it turns."""
     with athcodec.read_hdf5(athcodec.sample_path()) as sample:

@@ -104,6 +104,7 @@ def test_a_shared_basis_makes_files_smaller(tmp_path, monkeypatch):
     assert shared < 0.9 * athcodec.encode(clip, tmp_path / "waves.ath", **options).bytes
 
 
+@pytest.mark.vectors
 def test_layers_in_learned_bases_are_decoded_as_the_document_does(tmp_path, monkeypatch):
     def learned(search, settings):
         return replace(settings, learned_bases=(True,) * search.levels)

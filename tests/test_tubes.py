@@ -113,7 +113,9 @@ def test_twigs_keep_their_thickness_at_loose_bounds(scratch, bound, options):
     assert np.quantile(stretch, 0.999) < 0.06
 
 
-@pytest.mark.parametrize("options", [{"rel_error": 1e-3, "ladder": "none"}, {"rel_error": 1e-5}])
+@pytest.mark.parametrize(
+    "options", [{"rel_error": 1e-3, "ladder": "none"}, pytest.param({"rel_error": 1e-5}, marks=pytest.mark.vectors)]
+)
 def test_the_document_plays_the_same_tubes(scratch, options):
     athcodec.encode(twigs(12), scratch / "twigs.ath", attributes="none", **options)
     document = File((scratch / "twigs.ath").read_bytes())
