@@ -12,7 +12,7 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 import zstandard
-from files import Parts, roots, still_file, with_header
+from files import Parts, exact_rest_chunk, roots, still_file, with_header
 from plants import awkward
 
 import athcodec
@@ -75,8 +75,8 @@ def stems_with_gaps(gaps: np.ndarray) -> bytes:
     rest = np.zeros((1 + gaps.size, 3))
     rest[1:, 0] = np.cumsum(gaps, axis=1).ravel()
     plan = Plan(branches, len(rest))
-    stream = streams.encode_rest(plan.branches, 1.0, rest).stream
-    return still_file(branches=branches, rest=ct.pack_rest(ct.Rest(np.zeros(3), 1.0, np.dtype(np.float32), stream)))
+    stream = streams.encode_exact_rest(plan.branches, rest.astype(np.float32))
+    return still_file(branches=branches, rest=exact_rest_chunk(stream, np.float32))
 
 
 # ---- made to be slow ----

@@ -57,7 +57,14 @@ def files(tmp_path_factory):
     return folder
 
 
-@pytest.mark.parametrize("page", [page for page in PAGES if blocks(page, "sh", "python")], ids=lambda page: page.stem)
+@pytest.mark.parametrize(
+    "page",
+    [
+        pytest.param(page, id=page.stem, marks=[pytest.mark.formats] if page.stem in ("formats", "gltf") else [])
+        for page in PAGES
+        if blocks(page, "sh", "python")
+    ],
+)
 def test_commands_and_python_of_a_page_run(page, files, tmp_path, monkeypatch):
     shutil.copytree(files, tmp_path, dirs_exist_ok=True)
     monkeypatch.chdir(tmp_path)

@@ -262,9 +262,9 @@ def test_nothing_is_left_where_the_source_breaks_or_cannot_be_stored(forked, for
     assert os.listdir(tmp_path) == []
 
 
-def test_a_clip_can_be_written_over_the_file_that_it_is_read_from(forked, tmp_path):
+def test_a_clip_is_not_written_over_the_file_that_it_is_read_from(forked, tmp_path):
     path = write_source(tmp_path / "a.h5", forked)
-    with read_hdf5(path) as clip:
+    with read_hdf5(path) as clip, pytest.raises(FileExistsError, match="is the input"):
         write_hdf5(clip, path, gzip=True)
     with read_hdf5(path) as clip:
         assert np.array_equal(clip.block(0, 5), forked["positions"])

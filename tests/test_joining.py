@@ -170,6 +170,7 @@ def test_the_file_is_the_same_when_coded_in_steps_or_with_any_number_of_jobs(med
     assert one == some == steps
 
 
+@pytest.mark.slow
 def test_a_target_size_is_that_of_all_clips_and_branches_are_found_for_all(medley_clips, tmp_path):
     bare = {
         name: clip.replace(vertex_branch=None, branch_parent=None, stem_index=None)

@@ -30,6 +30,7 @@ from typing import Any
 import h5py
 import numpy as np
 
+from athcodec.ath import THRESHOLDS
 from athcodec.clip import RESERVED_NAMES, MotionClip
 from athcodec.errors import ClipError
 from athcodec.plain_files import open_plain
@@ -109,8 +110,9 @@ def _read(file: h5py.File, options: ReadOptions) -> MotionClip:
     frame = positions.nbytes // max(positions.shape[0], 1) if positions.shape else 0
     budget.need(4 * frame + chunk_bytes(positions), "positions: a frame")  # read, converted, checked, and the rest pose
     metadata = {name: _to_python(value) for name, value in file.attrs.items()}
-    if isinstance(metadata.get("domains"), str):
-        metadata["domains"] = _parsed("domains", metadata["domains"])
+    for name in ("domains", THRESHOLDS):
+        if isinstance(metadata.get(name), str):
+            metadata[name] = _parsed(name, metadata[name])
     attributes = _static_arrays(file, options.skip, budget)
     return clip_of_arrays(
         positions,
