@@ -17,12 +17,12 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
-from athcodec.atomic_files import is_url
 from athcodec.batch.settings import Settings, check_settings, settings_of
-from athcodec.container import MAGIC
+from athcodec.decoding.container import MAGIC
 from athcodec.errors import ClipError, MissingExtra, RemoteError
-from athcodec.remote import _one_line, guarded
-from athcodec.shown import without_secrets
+from athcodec.files.atomic import is_url
+from athcodec.files.remote import _one_line, guarded
+from athcodec.files.shown import without_secrets
 from athcodec.sources import FORMATS, NUMBER_PATTERN, is_pattern
 from athcodec.sources.sequence import FRAME_SUFFIXES, each_once, sequence_files
 

@@ -23,14 +23,14 @@ from pathlib import Path
 from typing import Any
 
 import athcodec
-from athcodec.atomic_files import is_url, remove_leftovers_of, scratch_folder
 from athcodec.batch import tasks
 from athcodec.batch.inputs import Item, identity, is_telling, remote_identity, sha256
 from athcodec.batch.manifest import Manifest, ManifestError, Record, read_records
 from athcodec.batch.show import Show
 from athcodec.batch.tasks import Result, one_line
 from athcodec.errors import AthError, MissingExtra
-from athcodec.shown import without_secrets
+from athcodec.files.atomic import is_url, remove_leftovers_of, scratch_folder
+from athcodec.files.shown import without_secrets
 
 MANIFEST = "athcodec-batch.jsonl"
 SCRATCH = "athcodec-batch"

@@ -21,13 +21,13 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-from athcodec.ath import Thresholds
-from athcodec.atomic_files import is_url
 from athcodec.encoding.shape import RestPrecision
 from athcodec.errors import ClipError
+from athcodec.files.atomic import is_url
+from athcodec.motion.thresholds import Thresholds
+from athcodec.motion.units import parse_length, parse_size
 from athcodec.options import EFFORTS, HOST, MAX_SEGMENT, METHODS, MIN_SEGMENT, ladder_of
 from athcodec.sources import FORMATS, format_named
-from athcodec.units import parse_length, parse_size
 
 BOUNDS = ("max_error", "rel_error", "target_size")  # of which a clip has one
 READING = (

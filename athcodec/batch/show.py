@@ -16,7 +16,7 @@ from rich.text import Text
 
 if TYPE_CHECKING:
     from athcodec.batch.inputs import Item
-from athcodec.shown import shown
+from athcodec.files.shown import shown
 
 ROWS = 20  # of the live table
 ENDED = ("done", "failed", "kept")

@@ -15,7 +15,7 @@ import zipfile
 from collections.abc import Sequence
 from pathlib import Path
 
-from athcodec.atomic_files import new_file
+from athcodec.files.atomic import new_file
 
 PYTHONS = ("3.11", "3.13")  # of Blender 4.2 to 5.0, and from 5.1
 NEEDED = ("zstandard",)

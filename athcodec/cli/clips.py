@@ -11,22 +11,23 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import athcodec
-from athcodec import discovery
-from athcodec.ath import Thresholds
-from athcodec.ath_file import Level
-from athcodec.atomic_files import check_target, file_ids, is_url, keeping
 from athcodec.cli.printing import counted, progress, say
-from athcodec.clip import MotionClip
-from athcodec.clip_view import ClipView
-from athcodec.decoder import Decoder
+from athcodec.decoding.ath_file import Level
+from athcodec.decoding.clip_view import ClipView
+from athcodec.decoding.decoder import Decoder
 from athcodec.errors import AthError, ClipError, LevelUnavailable, NeedsHostMesh, RemoteError, SourceWarning
-from athcodec.joining import BLEND, in_wind
+from athcodec.files.atomic import check_target, file_ids, is_url, keeping
+from athcodec.files.reading import naming_file
 from athcodec.metrics import ErrorMeter, MotionMeter, SmoothnessMeter, compare_clips, level_meters
+from athcodec.motion import discovery
+from athcodec.motion.clip import MotionClip
+from athcodec.motion.joining import BLEND, in_wind
+from athcodec.motion.thresholds import Thresholds
+from athcodec.motion.units import Length
 from athcodec.options import HOST, MAX_MEMORY
 from athcodec.sources import LISTED, ReadOptions, find_format, listed
-from athcodec.sources.opening import naming_file
+from athcodec.sources.branches import find_or_load
 from athcodec.sources.sequence import each_once
-from athcodec.units import Length
 
 if TYPE_CHECKING:
     from athcodec.exporters.gltf_into import Into
@@ -152,7 +153,7 @@ def with_sources(
 
 def _source_of(decoder: Decoder, args: argparse.Namespace, path: str) -> MotionClip:
     """The clip in `path`; of a GLB that a motion was put into, what moves in it as the motion has it."""
-    from athcodec.sources.gltf_motion import GltfMotion
+    from athcodec.files.gltf.motion import GltfMotion
 
     if not isinstance(decoder.file.source, GltfMotion) or find_format(path).name != "gltf":
         return read_clip(args, path)
@@ -193,7 +194,7 @@ def read_clip(args: argparse.Namespace, path: str) -> MotionClip:
 
 def motions_of(path: str, args: argparse.Namespace) -> list[str | None]:
     """The names of the motions to open, one after the other; [None] where there is nothing to choose."""
-    from athcodec.sources.gltf_motion import motions_in
+    from athcodec.files.gltf.motion import motions_in
 
     if args.gltf_motion is not None or is_url(path):
         return [args.gltf_motion]
@@ -229,7 +230,7 @@ def with_branches(clip: MotionClip, hierarchy: str | None) -> MotionClip:
     """The clip on the branches that --hierarchy asks for; as it is without it: encoding finds what is missing."""
     if hierarchy is None:
         return clip
-    found = discovery.find_or_load(clip, hierarchy)
+    found = find_or_load(clip, hierarchy)
     say("hierarchy", str(found))
     return discovery.with_branches(clip, found)
 

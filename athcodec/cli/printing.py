@@ -18,15 +18,15 @@ from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, T
 from rich.table import Table
 from rich.text import Text
 
-from athcodec.decoder import Decoder
+from athcodec.decoding.decoder import Decoder
 from athcodec.errors import AthError
+from athcodec.files.shown import redacted, shown
 from athcodec.metrics import ErrorMeter
 from athcodec.options import DEFAULT_REL_ERROR
-from athcodec.shown import redacted, shown
 
 if TYPE_CHECKING:
-    from athcodec.ath_file import Level
-    from athcodec.clip_view import ClipView
+    from athcodec.decoding.ath_file import Level
+    from athcodec.decoding.clip_view import ClipView
     from athcodec.encoding import Seam
     from athcodec.exporters import Written
 

@@ -14,7 +14,7 @@ from contextlib import contextmanager
 
 from athcodec.errors import ClipError
 from athcodec.exporters import FORMATS as WRITTEN
-from athcodec.file_kinds import HEAD_BYTES
+from athcodec.files.kinds import HEAD_BYTES
 from athcodec.sources import FORMATS as READ
 from athcodec.sources import format_named
 

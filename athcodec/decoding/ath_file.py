@@ -17,13 +17,11 @@ from typing import Any, BinaryIO, cast
 
 import numpy as np
 
-from athcodec import container as ct
-from athcodec import core_file
 from athcodec._native import WHOLE, as_bytes
-from athcodec.ath import Thresholds
-from athcodec.atomic_files import file_ids, is_url
-from athcodec.clip import ERROR_WEIGHTS, check_stem_index
-from athcodec.container import Chunk, Limits
+from athcodec.decoding import container as ct
+from athcodec.decoding import core_file
+from athcodec.decoding.container import Chunk, Limits
+from athcodec.decoding.host_mesh import HostMesh, mesh_positions
 from athcodec.errors import (
     BadChecksum,
     BadChunk,
@@ -37,14 +35,16 @@ from athcodec.errors import (
     Truncated,
     error_class,
 )
-from athcodec.hierarchy import Hierarchy, derived_edges
-from athcodec.host_mesh import HostMesh, mesh_positions
-from athcodec.joining import HEADING, STRENGTH, metadata_of, wind_of
+from athcodec.files.atomic import file_ids, is_url
+from athcodec.files.plain import open_plain
+from athcodec.files.threads import ThreadPool, default_jobs
+from athcodec.motion.clip import ERROR_WEIGHTS, check_stem_index
+from athcodec.motion.hierarchy import Hierarchy, derived_edges
+from athcodec.motion.joining import HEADING, STRENGTH, metadata_of, wind_of
+from athcodec.motion.polygons import Polygons
+from athcodec.motion.thresholds import Thresholds
+from athcodec.motion.transitions import transitions_of
 from athcodec.options import whole
-from athcodec.plain_files import open_plain
-from athcodec.polygons import Polygons
-from athcodec.threads import ThreadPool, default_jobs
-from athcodec.transitions import transitions_of
 
 CHUNK_FIELDS = ("kind", "level", "segment", "length", "checksum", "offset")
 
@@ -132,7 +132,7 @@ class AthFile:
         Read all of the file now; a damaged level hides itself and those after it instead of raising.
     limits : Limits, optional
         What the file may ask for; by default those of FORMAT.md.
-    host_mesh : array, MotionClip, str or path-like, optional
+    host_mesh : array or MotionClip, optional
         The mesh that is the rest pose, for files that do not hold one: see `set_host_mesh`.
     gltf_motion : str, optional
         Of a GLB that has several motions, the name of the one to open; "motion 0" and so on where they have none.
@@ -854,20 +854,19 @@ class AthFile:
 
         Parameters
         ----------
-        mesh : (N, 3) array, MotionClip, str or path-like
-            Positions in the source's order, scene units and axes, which are used as float32, bit for bit; a clip that
-            has them as its rest pose; or a file of any format that `read` knows, of which the rest pose, or else the
-            first frame, is brought to the unit and axes of this file.
+        mesh : (N, 3) array or MotionClip
+            Positions in the source's order, scene units and axes, which are used as float32, bit for bit; or a clip
+            that has them as its rest pose.
 
         Raises
         ------
         WrongHostMesh
             Where it is another one, by its number of vertices or its checksum.
-        ClipError, OSError
-            Where the mesh cannot be read, or is none.
+        ClipError
+            Where it is no mesh.
         """
         if self.needs_host_mesh:
-            positions, files = mesh_positions(mesh, self.metadata)
+            positions, files = mesh_positions(mesh)
             self.inputs |= files
             try:
                 with self._lock:
@@ -1099,7 +1098,7 @@ class AthFile:
 
 def _opened(path: Any, gltf_motion: str | None) -> Any:
     if is_url(path):
-        from athcodec.remote import Remote  # what it needs takes long to import
+        from athcodec.files.remote import Remote  # what it needs takes long to import
 
         return Remote(path)
     file = open_plain(os.fspath(path), -1)
@@ -1110,7 +1109,7 @@ def _opened(path: Any, gltf_motion: str | None) -> Any:
                 raise ClipError(f"gltf_motion: got {gltf_motion!r} of a file that is no GLB, expected a GLB")
             unread.pop_all()
             return file
-    from athcodec.sources.gltf_motion import GltfMotion  # a decoder reads no sources otherwise
+    from athcodec.files.gltf.motion import GltfMotion  # takes long to import
 
     return GltfMotion(path, gltf_motion)
 

@@ -11,10 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from athcodec.atomic_files import FileId
-from athcodec.clip import ClipRange, clip_range_frames, polygons
-from athcodec.decoder import Affines, Decoder
+from athcodec.decoding.decoder import Affines, Decoder
 from athcodec.errors import LevelUnavailable
+from athcodec.files.atomic import FileId
+from athcodec.motion.clip import ClipRange, clip_range_frames, polygons
 from athcodec.options import whole
 
 

@@ -21,8 +21,8 @@ import zstandard
 
 from athcodec import _native
 from athcodec._native import MEASURES, SHORT_FLOATS, SHORT_SHIFT, CorePolygons, address, crc32c, lib
-from athcodec.clip import ClipRange
 from athcodec.errors import BadChunk, ClipError, FormatError, LimitExceeded
+from athcodec.motion.clip import ClipRange
 
 MAGIC = b"\x89ATH\r\n\x1a\n"
 MAJOR, MINOR, FEATURES = 0, 13, 0

@@ -28,10 +28,10 @@ from ctypes import (
 import numpy as np
 import numpy.typing as npt
 
-from athcodec import container
 from athcodec._native import BRANCH, CHUNK, MEASURES, CorePolygons, as_bytes, lib
+from athcodec.decoding import container
 from athcodec.errors import LimitExceeded
-from athcodec.polygons import Polygons, type_of
+from athcodec.motion.polygons import Polygons, type_of
 
 ALIGNMENT = 16
 MOST_STEPS = 2**31 - 1

@@ -6,27 +6,24 @@ decode segments. Only the segments and levels that frames ask for are read.
 
 from __future__ import annotations
 
-import os
 import threading
 from bisect import bisect_right
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, BinaryIO, Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
-from athcodec import core_file
-from athcodec.ath import stem_maps
-from athcodec.ath_file import AthFile, Clip, Level, median_rate
-from athcodec.container import Limits
+from athcodec.decoding import core_file
+from athcodec.decoding.ath_file import AthFile, Clip, Level, median_rate
+from athcodec.decoding.endless_play import EndlessPlay
 from athcodec.errors import BadChunk, LevelUnavailable
-from athcodec.host_mesh import HostMesh
-from athcodec.joining import metadata_of, wind_of
+from athcodec.motion.affine_fit import stem_maps
+from athcodec.motion.joining import metadata_of, wind_of
 from athcodec.options import whole
-from athcodec.transitions import EndlessPlay
 
 SHOWN_TYPES = (np.dtype(np.float32), np.dtype(np.float64))
 
@@ -55,63 +52,6 @@ class Affines:
     vertex_count: np.ndarray
     is_stem: np.ndarray
     matrices: np.ndarray
-
-
-def open(
-    path: str | os.PathLike[str] | BinaryIO,
-    *,
-    clip: str | None = None,
-    strict: bool = False,
-    allow_partial: bool = False,
-    limits: Limits | None = None,
-    host_mesh: HostMesh | None = None,
-    gltf_motion: str | None = None,
-) -> Decoder:
-    """Opens an .ath file for playing one of its clips.
-
-    Parameters
-    ----------
-    path : str, path-like or binary file object
-        A path, a URL (`pip install "athcodec[remote]"`), or a seekable file object, which stays open when the decoder
-        is closed.
-    clip : str, optional
-        The name of the clip to play; by default the first.
-    strict : bool
-        Refuse a file that is shorter or longer than its header says.
-    allow_partial : bool
-        Read all of the file now; a damaged level hides itself and those after it instead of raising.
-    limits : Limits, optional
-        What the file may ask for; by default those of FORMAT.md.
-    host_mesh : (N, 3) array, MotionClip, str or path-like, optional
-        The mesh that is the rest pose, for files that do not hold one (`encode`, host_rest): positions in the source's
-        order, or what has them; see AthFile.set_host_mesh. Without it such a file opens, and says what it holds.
-    gltf_motion : str, optional
-        Of a GLB that has several motions, the name of the one to open; "motion 0" and so on where they have none.
-
-    Returns
-    -------
-    Decoder
-        To be closed, or used in a `with` statement.
-
-    Raises
-    ------
-    FormatError
-        Where the file cannot be decoded: Truncated, BadChecksum, LimitExceeded ...
-    ClipUnavailable
-        Where no clip has that name.
-    ClipError
-        Where a GLB has no such motion.
-    RemoteError, OSError
-        Where it cannot be read.
-    """
-    file = AthFile(
-        path, strict=strict, allow_partial=allow_partial, limits=limits, host_mesh=host_mesh, gltf_motion=gltf_motion
-    )
-    try:
-        return Decoder(file, clip, closes_file=True)
-    except BaseException:
-        file.close()
-        raise
 
 
 class _OfFile(Generic[T]):

@@ -34,8 +34,8 @@ from athcodec._native import (
     address,
     lib,
 )
-from athcodec.container import from_short_float
-from athcodec.threads import SERIAL, ThreadPool, ranges
+from athcodec.decoding.container import from_short_float
+from athcodec.files.threads import SERIAL, ThreadPool, ranges
 
 if TYPE_CHECKING:
     from athcodec.encoding.learned_modes import LearnedModes

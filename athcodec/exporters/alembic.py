@@ -17,10 +17,10 @@ from typing import Any
 
 import numpy as np
 
-from athcodec.atomic_files import new_files
 from athcodec.exporters import WriteOptions
 from athcodec.exporters.copies import cost_of, fit_copies
 from athcodec.exporters.scene_objects import objects_of
+from athcodec.files.atomic import new_files
 
 STATIC = (
     "frame_count",

@@ -18,8 +18,8 @@ from typing import Any
 
 import numpy as np
 
-from athcodec.clip_view import ClipView
-from athcodec.hierarchy import build_hierarchy, hierarchy_of
+from athcodec.decoding.clip_view import ClipView
+from athcodec.motion.hierarchy import build_hierarchy, hierarchy_of
 
 ROUNDS = 8
 CONVERGED = 1e-5

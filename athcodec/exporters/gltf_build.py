@@ -18,14 +18,14 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from athcodec import __version__
-from athcodec.clip import ClipRange, stated_fps
 from athcodec.errors import ClipError
 from athcodec.exporters.scene_objects import face_materials
 from athcodec.exporters.timing import start_frame_of
-from athcodec.joining import metadata_of
+from athcodec.motion.clip import ClipRange, stated_fps
+from athcodec.motion.joining import metadata_of
+from athcodec.motion.units import METRES, unit_symbol
 from athcodec.sources.scene_objects import FACE_MATERIAL
 from athcodec.sources.timing import whole
-from athcodec.units import METRES, unit_symbol
 
 COMPONENTS = {"int8": 5120, "uint8": 5121, "int16": 5122, "uint16": 5123, "uint32": 5125, "float32": 5126}
 TYPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4", 16: "MAT4"}

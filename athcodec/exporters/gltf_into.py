@@ -20,20 +20,15 @@ from typing import Any
 
 import numpy as np
 
-from athcodec.ath_file import AthFile
-from athcodec.atomic_files import file_ids, keeping, new_file
-from athcodec.clip import ClipRange, MotionClip
-from athcodec.clip_view import ClipView
+from athcodec.decoding.ath_file import AthFile
+from athcodec.decoding.clip_view import ClipView
 from athcodec.errors import ClipError
 from athcodec.exporters.gltf import check_morphs
 from athcodec.exporters.gltf_build import COMPONENTS, TYPES, VERTICES, takes
-from athcodec.frames import Frames
-from athcodec.joining import split
-from athcodec.sources import ReadOptions
-from athcodec.sources.gltf import GltfNode, read_moving
-from athcodec.sources.gltf_file import HARMLESS, MESHOPT, GltfFile
-from athcodec.sources.gltf_json import BROKEN, entries
-from athcodec.sources.gltf_motion import (
+from athcodec.files.atomic import file_ids, keeping, new_file
+from athcodec.files.gltf.document import HARMLESS, MESHOPT, GltfFile
+from athcodec.files.gltf.json import BROKEN, entries
+from athcodec.files.gltf.motion import (
     EXTENSION,
     MAGIC,
     VERTEX_ATTRIBUTE,
@@ -42,7 +37,12 @@ from athcodec.sources.gltf_motion import (
     motion_names,
     places_of,
 )
-from athcodec.sources.opening import naming
+from athcodec.files.reading import naming
+from athcodec.motion.clip import ClipRange, MotionClip
+from athcodec.motion.frames import Frames
+from athcodec.motion.joining import split
+from athcodec.sources import ReadOptions
+from athcodec.sources.gltf import GltfNode, read_moving
 
 SHARE_OF_TWINS = 1 / 8  # of the vertices: from there on the motion holds twins once, and meshes number its vertices
 ALIGNMENT = 8  # of what is left of the bytes

@@ -20,12 +20,12 @@ from typing import Any
 
 import numpy as np
 
-from athcodec.clip_view import ClipView
-from athcodec.discovery import find_branches, with_branches
+from athcodec.decoding.clip_view import ClipView
 from athcodec.exporters.fitting import allowed_error, portions, quaternions, rotation_matrices
 from athcodec.exporters.gltf_joints import Joints
 from athcodec.exporters.scene_objects import distinct
-from athcodec.hierarchy import Hierarchy, hierarchy_of
+from athcodec.motion.discovery import find_branches, with_branches
+from athcodec.motion.hierarchy import Hierarchy, hierarchy_of
 from athcodec.options import RIG_JOINTS
 
 LONGEST_CHAIN = 32

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from athcodec.clip import stated_fps
 from athcodec.errors import ClipError
+from athcodec.motion.clip import stated_fps
 
 
 def frame_rate_of(motion: Any) -> float:

@@ -20,11 +20,11 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from athcodec.atomic_files import check_target, new_files
 from athcodec.exporters import FILES, WriteOptions
 from athcodec.exporters.cells import cell_and_point_data, cells_of
 from athcodec.exporters.scene_objects import said_scene
 from athcodec.exporters.sequence import file_names, write_frames
+from athcodec.files.atomic import check_target, new_files
 from athcodec.sources.scene_objects import OWN
 
 _HEAD = (

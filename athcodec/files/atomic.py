@@ -21,7 +21,7 @@ from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from typing import BinaryIO
 
-from athcodec.file_kinds import UNKNOWN, kind_by_suffix, kind_of
+from athcodec.files.kinds import UNKNOWN, kind_by_suffix, kind_of
 
 try:
     import fcntl

@@ -6,7 +6,7 @@ import os
 import re
 import struct
 
-from athcodec.plain_files import open_plain
+from athcodec.files.plain import open_plain
 
 HEAD_BYTES = 4096
 TEXT, UNKNOWN = "text", "something else"

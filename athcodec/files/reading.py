@@ -11,10 +11,10 @@ from os import PathLike, fspath
 from pathlib import Path
 from typing import Protocol
 
-from athcodec.atomic_files import FileId
 from athcodec.errors import ClipError
+from athcodec.files.atomic import FileId
+from athcodec.files.plain import open_plain
 from athcodec.options import MAX_MEMORY
-from athcodec.plain_files import open_plain
 
 File = str | PathLike[str] | int
 Stamp = tuple[int, int, int, int]  # size, time of change, device, inode

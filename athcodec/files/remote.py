@@ -18,7 +18,7 @@ from collections import OrderedDict
 from urllib.parse import urljoin, urlsplit
 
 from athcodec.errors import RemoteError
-from athcodec.shown import redacted, without_secrets
+from athcodec.files.shown import redacted, without_secrets
 
 READ_AHEAD = 64 << 10
 GAP = 16 << 10  # bytes that nobody asked for and that cost less than another request

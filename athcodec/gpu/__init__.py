@@ -11,9 +11,9 @@ from pathlib import Path
 
 import numpy as np
 
-from athcodec import core_file
 from athcodec._native import as_bytes, lib
-from athcodec.container import Limits
+from athcodec.decoding import core_file
+from athcodec.decoding.container import Limits
 
 SHADERS = Path(__file__).parent
 

@@ -14,8 +14,8 @@ from typing import Any, cast
 
 import numpy as np
 
-from athcodec.atomic_files import FileId
 from athcodec.errors import ClipError
+from athcodec.files.atomic import FileId
 
 LARGEST_COORDINATE = 1e18
 BLOCK_BYTES = 32 << 20

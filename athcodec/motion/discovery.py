@@ -19,12 +19,12 @@ from typing import Any
 
 import numpy as np
 
-from athcodec.atomic_files import new_file
-from athcodec.clip import MotionClip, check_branches, check_stem_index, source_stem_index, stands_still
 from athcodec.errors import ClipError
-from athcodec.hierarchy import branch_orders, branches_from_edges
+from athcodec.files.atomic import new_file
+from athcodec.motion.clip import MotionClip, check_branches, check_stem_index, source_stem_index, stands_still
+from athcodec.motion.hierarchy import branch_orders, branches_from_edges
+from athcodec.motion.point_runs import base_points, run_links, scipy_module
 from athcodec.options import METHODS, whole
-from athcodec.point_runs import base_points, run_links, scipy_module
 
 LABEL_NAMES = ("vertex_branch", "branch", "branch_id", "branchid", "branch_index", "branchindex", "branch_number")
 PARENT_NAMES = ("branch_parent", "branchparent", "branch_parents", "parent_branch", "parent")
@@ -278,17 +278,6 @@ def load(path: str | os.PathLike[str]) -> Found:
     stem_index = np.empty(vertex_count, np.int64)
     stem_index[order] = place
     return _found(vertex_branch, parent, stem_index, "file")
-
-
-def find_or_load(clip: MotionClip, hierarchy: str) -> Found:
-    """Branches by "auto" or one of METHODS, or from a file of `save` or in MTG. Raises ClipError, OSError."""
-    if hierarchy == "auto" or hierarchy in METHODS:
-        return find_branches(clip, hierarchy)
-    if hierarchy.lower().endswith(".mtg"):
-        from athcodec.sources.mtg import mtg_branches
-
-        return Found(*mtg_branches(hierarchy, clip), "file")
-    return load(hierarchy)
 
 
 def _runs(vertices: np.ndarray) -> str:

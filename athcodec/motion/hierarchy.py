@@ -14,8 +14,8 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from athcodec.clip import MotionClip, check_branches, check_indices, check_stem_index
 from athcodec.errors import ClipError
+from athcodec.motion.clip import MotionClip, check_branches, check_indices, check_stem_index
 from athcodec.options import whole
 
 MAX_VERTICES = 2**31 - 1

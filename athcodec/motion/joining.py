@@ -15,10 +15,10 @@ from typing import Any
 
 import numpy as np
 
-from athcodec.atomic_files import FileId
-from athcodec.clip import ClipRange, MotionClip, check_clip_ranges, clip_range_frames
 from athcodec.errors import ClipError
-from athcodec.frames import Frames
+from athcodec.files.atomic import FileId
+from athcodec.motion.clip import ClipRange, MotionClip, check_clip_ranges, clip_range_frames
+from athcodec.motion.frames import Frames
 from athcodec.options import whole
 
 BLEND = "loop_blend"  # metadata: frames that were blended

@@ -30,12 +30,12 @@ from typing import Any
 import h5py
 import numpy as np
 
-from athcodec.ath import THRESHOLDS
-from athcodec.clip import RESERVED_NAMES, MotionClip
 from athcodec.errors import ClipError
-from athcodec.plain_files import open_plain
+from athcodec.files.plain import open_plain
+from athcodec.files.reading import Budget, FileWatch, closing_on_failure, naming
+from athcodec.motion.clip import RESERVED_NAMES, MotionClip
+from athcodec.motion.thresholds import THRESHOLDS
 from athcodec.sources import ReadOptions
-from athcodec.sources.opening import Budget, FileWatch, closing_on_failure, naming
 from athcodec.sources.reader_process import read_apart
 from athcodec.sources.schema import clip_of_arrays
 

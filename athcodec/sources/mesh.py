@@ -18,9 +18,9 @@ from typing import Any
 
 import numpy as np
 
-from athcodec.clip import RESERVED_NAMES, polygons
 from athcodec.errors import ClipError
-from athcodec.sources.opening import Budget, read_plain
+from athcodec.files.reading import Budget, read_plain
+from athcodec.motion.clip import RESERVED_NAMES, polygons
 from athcodec.sources.scene_objects import FACE_MATERIAL, OWN, scene_of_json, scene_said
 
 FLOAT32_DIGITS = 9

@@ -20,9 +20,9 @@ from typing import Any
 
 import numpy as np
 
-from athcodec.clip import MotionClip
 from athcodec.errors import ClipError
-from athcodec.plain_files import open_plain
+from athcodec.files.plain import open_plain
+from athcodec.motion.clip import MotionClip
 
 MAX_FILE_BYTES = 1 << 28
 MAX_ENTITIES = 1 << 22

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from athcodec.clip import MotionClip, frame_rate
-from athcodec.hierarchy import branch_orders, branches_from_edges
-from athcodec.joining import read_clip_metadata
+from athcodec.motion.clip import MotionClip, frame_rate
+from athcodec.motion.hierarchy import branch_orders, branches_from_edges
+from athcodec.motion.joining import read_clip_metadata
 from athcodec.sources import ReadOptions
 
 BRANCHES = ("vertex_branch", "branch_parent", "stem_index")

@@ -18,12 +18,12 @@ from pathlib import Path
 
 import numpy as np
 
-from athcodec.clip import MotionClip, stated_fps
 from athcodec.errors import ClipError
-from athcodec.frames import Frames
+from athcodec.files.reading import Budget, FileWatch, naming, read_plain
+from athcodec.motion.clip import MotionClip, stated_fps
+from athcodec.motion.frames import Frames
 from athcodec.sources import NUMBER_PATTERN, ReadOptions, is_pattern
 from athcodec.sources.mesh import Mesh, obj_lines, obj_points, parse_mesh, ply_header, ply_points
-from athcodec.sources.opening import Budget, FileWatch, naming, read_plain
 from athcodec.sources.timing import numbered_times
 
 _NUMBERED = re.compile(r"(.*?)(\d+)", re.DOTALL)

@@ -25,13 +25,13 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from athcodec.clip import MotionClip
 from athcodec.errors import ClipError, MissingExtra
-from athcodec.plain_files import open_plain
+from athcodec.files.plain import open_plain
+from athcodec.files.reading import Budget, FileWatch, check_inside, naming, read_plain
+from athcodec.motion.clip import MotionClip
 from athcodec.sources import ReadOptions
 from athcodec.sources.cells import NODE_BYTES, VTK_NAMES, VTK_NUMBERS, blocks_of, topology_of
 from athcodec.sources.fields import clip_of_steps
-from athcodec.sources.opening import Budget, FileWatch, check_inside, naming, read_plain
 from athcodec.sources.scene_objects import OWN, scene_of_json
 from athcodec.sources.sequence import sequence_files
 from athcodec.sources.timing import numbered_times, times_in_seconds

@@ -19,13 +19,13 @@ from xml.etree import ElementTree
 import h5py
 import numpy as np
 
-from athcodec.clip import MotionClip, frame_rate
 from athcodec.errors import ClipError
+from athcodec.files.reading import Budget, FileWatch, closing_on_failure, file_beside, naming, no_room, read_plain
+from athcodec.motion.clip import MotionClip, frame_rate
 from athcodec.sources import ReadOptions
 from athcodec.sources.cells import NODE_BYTES, NODES, Block, blocks_of, topology_of
 from athcodec.sources.fields import clip_of_steps
 from athcodec.sources.hdf5 import check_own, chunk_bytes, unpacks_to_more
-from athcodec.sources.opening import Budget, FileWatch, closing_on_failure, file_beside, naming, no_room, read_plain
 from athcodec.sources.scene_objects import MATERIAL_NAMES
 from athcodec.sources.timing import times_in_seconds, whole
 

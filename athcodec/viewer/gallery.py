@@ -1,6 +1,6 @@
 """A gallery: a folder with a page of several plants, each alive on its card as long as it is in view.
 
-The folder goes onto any web host: the page, the viewer, the files, and a still picture of each (athcodec.picture).
+The folder goes onto any web host: the page, the viewer, the files, and a still picture of each.
 """
 
 from __future__ import annotations
@@ -11,11 +11,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from urllib.parse import quote
 
-from athcodec import picture
-from athcodec.atomic_files import check_target, file_ids, is_url, keeping, new_file
-from athcodec.decoder import open as open_ath
 from athcodec.errors import AthError
-from athcodec.view import WEB, file_name
+from athcodec.files.atomic import check_target, file_ids, is_url, keeping, new_file
+from athcodec.opening import open as open_ath
+from athcodec.viewer import picture
+from athcodec.viewer.view import WEB, file_name
 
 PAGE = WEB / "gallery.html"
 VIEWER = (

@@ -14,11 +14,11 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from athcodec.atomic_files import check_target, new_file
-from athcodec.decoder import open as open_ath
+from athcodec.decoding.host_mesh import HostMesh
 from athcodec.errors import MissingExtra
-from athcodec.host_mesh import HostMesh
-from athcodec.view import export_page
+from athcodec.files.atomic import check_target, new_file
+from athcodec.opening import open as open_ath
+from athcodec.viewer.view import export_page
 
 INSTALL = 'pip install "athcodec[picture]"'
 BROWSER_VARIABLE = "ATHCODEC_CHROMIUM"
@@ -86,7 +86,7 @@ def save_picture(
     time : float
         Seconds from the clip's first frame, of what stands still.
     host_mesh : array, MotionClip, str or path-like, optional
-        As `athcodec.view.export_page`.
+        As `athcodec.viewer.view.export_page`.
 
     Returns
     -------
@@ -98,7 +98,7 @@ def save_picture(
     MissingExtra
         Where Playwright, Pillow or Chromium is not there.
     AthError, OSError
-        As `athcodec.view.export_page`.
+        As `athcodec.viewer.view.export_page`.
     """
     check_target(out, f".{kind}")
     image = _packages()

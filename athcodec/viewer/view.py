@@ -20,12 +20,12 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote, urlsplit
 
-from athcodec.atomic_files import check_target, file_ids, is_url, keeping, new_file
-from athcodec.decoder import open as open_ath
+from athcodec.decoding.host_mesh import HostMesh
 from athcodec.errors import AthError, ClipError, MissingExtra
-from athcodec.host_mesh import HostMesh
+from athcodec.files.atomic import check_target, file_ids, is_url, keeping, new_file
+from athcodec.opening import open as open_ath
 
-WEB = Path(__file__).parent / "viewer" / "web"
+WEB = Path(__file__).parent / "web"
 PAGE = WEB / "index.html"
 INSTALL = 'pip install "athcodec[view]"'
 Floor = Mapping[str | os.PathLike[str], float]
@@ -110,7 +110,7 @@ def _refuse_glb(head: bytes) -> None:
 def _read(path: str | os.PathLike[str]) -> bytes:
     if not is_url(path):
         return Path(path).read_bytes()
-    from athcodec.remote import Remote  # what it needs takes long to import
+    from athcodec.files.remote import Remote  # what it needs takes long to import
 
     with Remote(path) as file:
         return file.read()

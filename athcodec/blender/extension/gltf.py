@@ -152,8 +152,8 @@ class glTF2ExportUserExtension:
         return np.frombuffer(accessor.buffer_view.data, np.float32).reshape(accessor.count, -1)
 
     def _encoded(self, recording, used, rest, export_settings) -> bytes:
-        from athcodec.clip import ClipRange
-        from athcodec.frames import Frames
+        from athcodec.motion.clip import ClipRange
+        from athcodec.motion.frames import Frames
 
         clip = recording.clip(bpy.context.scene)
         source, is_y_up = clip.positions, export_settings["gltf_yup"]

@@ -151,7 +151,7 @@ def _set_scene(scene, decoder, first: float, rate: float) -> None:
 
 
 def _place(obj, decoder, scene) -> None:
-    from athcodec.units import METRES, unit_symbol
+    from athcodec.motion.units import METRES, unit_symbol
 
     up_axis = str(decoder.metadata.get("up_axis", "z")).lower()
     obj.rotation_euler = {"y": (math.pi / 2, 0, 0), "x": (0, -math.pi / 2, 0)}.get(up_axis, (0, 0, 0))
@@ -160,7 +160,7 @@ def _place(obj, decoder, scene) -> None:
 
 
 def _mesh(name: str, decoder):
-    from athcodec.clip import polygons
+    from athcodec.motion.clip import polygons
 
     mesh = bpy.data.meshes.new(name)
     mesh.vertices.add(decoder.vertex_count)

@@ -20,11 +20,11 @@ from urllib.parse import unquote
 import numpy as np
 
 from athcodec.errors import ClipError
+from athcodec.files.gltf.json import brief, entries, entry, integer, looked_up
+from athcodec.files.gltf.meshopt import unpack, unpacked_size
+from athcodec.files.plain import open_plain
+from athcodec.files.reading import Budget, FileWatch, closing_on_failure
 from athcodec.options import MAX_MEMORY
-from athcodec.plain_files import open_plain
-from athcodec.sources.gltf_json import brief, entries, entry, integer, looked_up
-from athcodec.sources.gltf_meshopt import unpack, unpacked_size
-from athcodec.sources.opening import Budget, FileWatch, closing_on_failure
 
 COMPONENTS = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}

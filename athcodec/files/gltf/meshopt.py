@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from athcodec.errors import ClipError, MissingExtra
-from athcodec.sources.gltf_json import integer
+from athcodec.files.gltf.json import integer
 
 STRIDES = {"OCTAHEDRAL": (4, 8), "QUATERNION": (8,), "EXPONENTIAL": range(4, 257, 4), "NONE": range(1, 257)}
 MOST_PER_BYTE = 2048  # bytes that the codec makes of one at most: more is refused before memory is allocated

@@ -14,10 +14,11 @@ from typing import Any
 import numpy as np
 
 from athcodec.errors import ClipError
-from athcodec.plain_files import open_plain
-from athcodec.sources.gltf_file import GltfFile
-from athcodec.sources.gltf_json import BROKEN, brief, entries, entry, integer
-from athcodec.sources.opening import closing_on_failure, naming
+from athcodec.files.gltf.document import GltfFile
+from athcodec.files.gltf.json import BROKEN, brief, entries, entry, integer
+from athcodec.files.gltf.primitives import triangles
+from athcodec.files.plain import open_plain
+from athcodec.files.reading import closing_on_failure, naming
 
 EXTENSION = "ATH_motion"
 VERTEX_ATTRIBUTE = "_ATH_VERTEX"
@@ -134,8 +135,6 @@ class GltfMotion:
 
     @cached_property
     def faces(self) -> np.ndarray | None:
-        from athcodec.sources.gltf import triangles  # which itself looks for the extension
-
         with naming(self.path, *BROKEN):
             found = [vertices[triangles(self._gltf, primitive, len(vertices))] for primitive, vertices in self._places]
             return np.concatenate(found).astype(np.int32) if any(map(len, found)) else None

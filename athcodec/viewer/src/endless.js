@@ -1,5 +1,5 @@
 // Play without an end: which places of a clip are shown when, by the transitions between like frames that the encoder has found.
-// The same seed gives the same play as in athcodec/transitions.py, which is where they come from.
+// The same seed gives the same play as in athcodec/motion/transitions.py, which is where they come from.
 
 const TAKEN = 0.5; // of the transitions that are come to
 const LONGEST = 1e7; // seconds of a play
