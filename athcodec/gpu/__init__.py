@@ -1,4 +1,4 @@
-"""The GPU form of a file (core/ath_gpu.h): blocks of words that shaders compute positions from. See docs/gpu.md.
+"""The GPU form of a file (core/include/ath_gpu.h): blocks of words that shaders compute positions from. See docs/gpu.md.
 
 `GpuFile` makes the blocks; evaluate.py computes with them in NumPy what the shaders beside it, *.wgsl, do on a GPU.
 """
@@ -24,7 +24,7 @@ class Room(ctypes.Structure):
     _fields_ = [(name, c_uint32) for name in "rows values shapes turns corrected corrections waves".split()]
 
 
-_FUNCTIONS = {  # core/ath_gpu.h
+_FUNCTIONS = {  # core/include/ath_gpu.h
     "ath_gpu_level_size": (c_size_t, [c_void_p, c_int32]),
     "ath_gpu_build_level": (c_int, [c_void_p, c_int32, c_void_p, c_size_t]),
     "ath_gpu_record_size": (c_size_t, [c_void_p, c_int32, POINTER(Room)]),

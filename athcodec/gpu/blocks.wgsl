@@ -1,4 +1,4 @@
-// The blocks of a level and of a segment, as core/ath_gpu.h lays them out. This text stands in front of time, hierarchy and finish.
+// The blocks of a level and of a segment, as core/include/ath_gpu.h lays them out. This text stands in front of time, hierarchy and finish.
 
 @group(0) @binding(0) var<storage, read> level: array<u32>;
 @group(0) @binding(1) var<storage, read> segments: array<u32>; // blocks one behind the other

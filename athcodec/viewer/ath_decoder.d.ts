@@ -369,7 +369,7 @@ export class AthFile {
   /** parts().exactCount positions of 3 numbers, in file order. */
   exact(segments: Segments, frame: number, options?: { out?: Float32Array; fade?: Fading | null }): Float32Array | null;
 
-  /** The GPU form of a level (core/ath_gpu.h, docs/gpu.md): a block of words that goes to the GPU as it is. */
+  /** The GPU form of a level (core/include/ath_gpu.h, docs/gpu.md): a block of words that goes to the GPU as it is. */
   gpuLevel(level: number): Uint32Array;
   /** The same of a segment at a level; its bytes have to be here. */
   gpuSegment(segment: number, level: number): Uint32Array;

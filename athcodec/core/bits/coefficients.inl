@@ -8,8 +8,8 @@
 #ifndef ATH_COEFFICIENT_MODEL_H
 #define ATH_COEFFICIENT_MODEL_H
 
-#include "motion.h"
-#include "number_model.h"
+#include "model/motion.h"
+#include "bits/numbers.inl"
 
 enum { COUNT_CLASSES = 6, COUNT_BINS = 10, BANDS = 4, ROW_NUMBERS = 2 * BANDS, HISTORY_ROWS = 3 * ATH_SLOTS };
 

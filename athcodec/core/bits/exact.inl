@@ -3,7 +3,7 @@
 #ifndef ATH_EXACT_MODEL_H
 #define ATH_EXACT_MODEL_H
 
-#include "number_model.h"
+#include "bits/numbers.inl"
 
 enum { EXACT_BITS = 64 };
 

@@ -3,7 +3,7 @@
 #ifndef ATH_LATTICE_H
 #define ATH_LATTICE_H
 
-#include "number_model.h"
+#include "bits/numbers.inl"
 
 #define LATTICE_UNIT 0.625              /* over the step: the lattice has as many points as cubes of a step */
 #define LATTICE_REACH 1.118033988749895 /* units from any place to a point at most: the root of 5, halved */

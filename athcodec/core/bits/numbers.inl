@@ -2,7 +2,7 @@
 #ifndef ATH_NUMBER_MODEL_H
 #define ATH_NUMBER_MODEL_H
 
-#include "range_coder.h"
+#include "bits/range_coder.inl"
 
 enum { NUMBER_CLASSES = 28, NUMBER_BINS = 30, MAGNITUDE_CLIP = 1 << 20 };
 

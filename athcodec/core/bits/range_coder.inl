@@ -6,7 +6,7 @@
 #ifndef ATH_RANGE_CODER_H
 #define ATH_RANGE_CODER_H
 
-#include "internal.h"
+#include "bits/internal.h"
 
 typedef struct {
     uint16_t one;        /* probability of a 1, in 1/65536 */

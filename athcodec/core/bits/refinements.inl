@@ -5,7 +5,7 @@
 #ifndef ATH_REFINEMENT_MODEL_H
 #define ATH_REFINEMENT_MODEL_H
 
-#include "coefficient_model.h"
+#include "bits/coefficients.inl"
 
 enum { REFINED_SIGNS = 3 };
 

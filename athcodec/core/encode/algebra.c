@@ -1,6 +1,6 @@
 /* Products and decompositions of small matrices for the encoder, summed in one order: BLAS and LAPACK give other bits with
  * other processors and threads. */
-#include "encode.h"
+#include "encode/encode.h"
 
 enum { MOST_SWEEPS = 40 };
 

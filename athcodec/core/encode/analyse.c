@@ -1,7 +1,7 @@
 /* From positions to quantised coefficients, piece by piece in closed loop: every piece is predicted from what the
  * decoder will have of its parent. Encoder only. */
-#include "encode.h"
-#include "lanes.h"
+#include "encode/encode.h"
+#include "model/lanes.h"
 
 enum { FIRST_ROTATION_STEPS = 30, ROTATION_STEPS = 5 };
 enum { WAVES = 8 }; /* that a row is projected on at once */

@@ -1,6 +1,6 @@
 /* Finds the corrections that keep the error bound, on the positions that a decoder will have: as few as do, and such
  * that what is left of the error moves as little from frame to frame as it can. */
-#include "encode.h"
+#include "encode/encode.h"
 #include <float.h>
 
 /* How many bits it is worth that the squared second differences of a vertex's error do not grow by as much as they are

@@ -1,11 +1,11 @@
 /* Encodes streams: streams.h compiled for encoding. */
 #define ATH_ENCODING
-#include "encode.h"
-#include "faces_model.h"
-#include "front_model.h"
-#include "motion_streams.h"
-#include "predicted_model.h"
-#include "streams.h"
+#include "encode/encode.h"
+#include "streams/polygons.inl"
+#include "streams/front.inl"
+#include "streams/motion_streams.inl"
+#include "streams/predicted.inl"
+#include "streams/prelude.inl"
 
 /* Of a pose of all branches' vertices. */
 static void copy_pose(const ath_branch *branches, int32_t branch_count, const double *pose, double *copy)

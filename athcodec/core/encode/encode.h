@@ -6,9 +6,9 @@
 #ifndef ATH_ENCODE_H
 #define ATH_ENCODE_H
 
-#include "container.h"
-#include "mesh.h"
-#include "motion.h"
+#include "file/container.h"
+#include "model/mesh.h"
+#include "model/motion.h"
 
 /* The integers of one segment; with them come ath_motion's streams. */
 typedef struct ath_integers {

@@ -1,5 +1,5 @@
 /* How the encoder decodes and measures what it has coded. */
-#include "encode.h"
+#include "encode/encode.h"
 
 enum { TILE = 16 }; /* of what is worked on at once */
 

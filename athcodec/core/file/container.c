@@ -1,5 +1,5 @@
 /* Front and heads of chunks: read with every check that FORMAT.md asks for, in its order. */
-#include "front_model.h"
+#include "streams/front.inl"
 
 enum { HEADER_SIZE = 24, CHECKSUM_SIZE = 4, CHECKSUM_AT = 12, TABLE_ENTRY = 16, MOST_SHIFT = 15 };
 

@@ -3,7 +3,7 @@
 #ifndef ATH_CONTAINER_H
 #define ATH_CONTAINER_H
 
-#include "internal.h"
+#include "bits/internal.h"
 
 typedef struct ath_header {
     uint64_t file_length, front_length;

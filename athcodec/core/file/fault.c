@@ -1,5 +1,5 @@
 /* Text for people: why a file was refused, the numbers and the sentence that is written from them; what a level is. */
-#include "file.h"
+#include "file/file.h"
 
 const char *ath_result_name(int result)
 {

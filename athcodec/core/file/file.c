@@ -1,6 +1,6 @@
 /* Opening a file, and what is known once it is open (ath.h). */
-#include "file.h"
-#include "decode.h"
+#include "file/file.h"
+#include "streams/decode.h"
 
 enum { NAME_BYTES = 256 }; /* of a clip's name, with the zero behind it */
 enum { LEAST_PIECE = 32 }; /* vertices of those of a long stem: of rings, as many as make no more than 64 */

@@ -2,9 +2,9 @@
 #ifndef ATH_FILE_H
 #define ATH_FILE_H
 
-#include "container.h"
-#include "mesh.h"
-#include "plan.h"
+#include "file/container.h"
+#include "model/mesh.h"
+#include "model/plan.h"
 
 /* The plant about a finer rest pose: the first layer, from level 1 on, or a refinement, whose pieces are all of its level. A
  * refinement without a rest pose of its own has that of the layer before, and its bases. */

@@ -1,6 +1,6 @@
 /* The GPU form of levels and segments (ath_gpu.h): what a preparation places pieces and nodes with, as words. */
 #include "ath_gpu.h"
-#include "watch.h"
+#include "play/watch.h"
 
 enum { SMALL_MAP = 24, STEM_WAVES = 0, NODE_WAVES = 1, LEARNED_WAVES = 2, INT16_MOST = 32767 };
 

@@ -3,7 +3,7 @@
 #ifndef ATH_LANES_H
 #define ATH_LANES_H
 
-#include "internal.h"
+#include "bits/internal.h"
 
 enum { ATH_LANES = 4 };
 

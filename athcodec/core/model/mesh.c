@@ -1,4 +1,4 @@
-#include "mesh.h"
+#include "model/mesh.h"
 
 enum { MESH_STACKS = 4, UNTOUCHED = 255 };
 

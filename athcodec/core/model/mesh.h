@@ -2,7 +2,7 @@
 #ifndef ATH_MESH_H
 #define ATH_MESH_H
 
-#include "internal.h"
+#include "bits/internal.h"
 
 /* Faces of at most so many corners and faces for each vertex serve a rest pose: what opening takes stays linear. */
 enum { MESH_CORNERS = 8, MESH_FACES = 4 };

@@ -1,7 +1,7 @@
 /* From quantised coefficients to positions: FORMAT.md, "Reconstruction". One piece after the other, parents first;
  * what hangs on a piece is placed from that piece's decoded vertices, in doubles, in the order written here. */
-#include "lanes.h"
-#include "motion.h"
+#include "model/lanes.h"
+#include "model/motion.h"
 
 enum { POLAR_ITERATIONS = 4, TURN_LANES = 16, ATH_TERMS = ATH_SHAPE_NUMBERS + ATH_PIECE_VERTICES - ATH_SHAPE_MODES };
 enum { PLACED_VERTICES = 2 * ATH_LANES, PLACED_FRAMES = 2 * ATH_LANES, PROJECTED_NUMBERS = 8 * ATH_LANES };

@@ -2,7 +2,7 @@
 #ifndef ATH_MOTION_H
 #define ATH_MOTION_H
 
-#include "plan.h"
+#include "model/plan.h"
 
 /* Of streams in no learned basis: the waves of stems, those of nodes. */
 enum ath_root { ATH_STEM_ROOT = -1, ATH_NODE_ROOT = -2 };

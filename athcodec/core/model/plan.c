@@ -1,5 +1,5 @@
 /* From branches to pieces and nodes: how stems are cut, what hangs where, which level's stream holds what. */
-#include "plan.h"
+#include "model/plan.h"
 
 /* Smallest second moment that counts as a direction, relative to the largest. */
 #define RANK_TOLERANCE 1e-4

@@ -2,7 +2,7 @@
 #ifndef ATH_PLAN_H
 #define ATH_PLAN_H
 
-#include "internal.h"
+#include "bits/internal.h"
 
 enum { ATH_RIGID = 8 }; /* of a piece: it turns and moves as it is */
 

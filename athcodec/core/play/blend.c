@@ -1,7 +1,7 @@
 /* Several clips at once: what each shows is taken apart into edges of stems and turned sheets, these are blended, and put
  * together again from the roots on. */
-#include "motion.h"
-#include "segment.h"
+#include "model/motion.h"
+#include "play/segment.h"
 
 enum { SHEET_TURNS = 12 };
 

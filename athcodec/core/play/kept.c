@@ -1,5 +1,5 @@
 /* Integers are kept as bytes of seven bits, low ones first, the sign below them. */
-#include "kept.h"
+#include "play/kept.h"
 
 void *ath_kept_take(kept_writer *to, size_t size)
 {

@@ -4,7 +4,7 @@
 #ifndef ATH_KEPT_H
 #define ATH_KEPT_H
 
-#include "internal.h"
+#include "bits/internal.h"
 
 enum { KEPT_NUMBER = 5 }; /* bytes that a number takes at most */
 

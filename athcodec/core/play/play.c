@@ -1,5 +1,5 @@
 /* What a prepared segment shows: positions and matrices at any time, and which level a distance asks for. */
-#include "segment.h"
+#include "play/segment.h"
 
 /* ---- time ---- */
 

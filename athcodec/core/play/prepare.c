@@ -1,13 +1,13 @@
 /* Decodes the chunks of a segment into what is played: the streams of all levels side by side, piece by piece. A
  * piece is placed as soon as its integers are decoded, so that only attach caches are kept. */
-#include "decode.h"
-#include "exact_model.h"
-#include "kept.h"
-#include "lanes.h"
-#include "motion_streams.h"
-#include "predict.h"
-#include "segment.h"
-#include "watch.h"
+#include "streams/decode.h"
+#include "bits/exact.inl"
+#include "play/kept.h"
+#include "model/lanes.h"
+#include "streams/motion_streams.inl"
+#include "streams/predict.h"
+#include "play/segment.h"
+#include "play/watch.h"
 
 enum { CHECKSUM_STEP = 1 << 16, TILE = 8, CACHE_LINE = 16 /* floats */, MOST_SHAPES = ATH_SHAPE_NUMBERS };
 

@@ -2,7 +2,7 @@
 #ifndef ATH_PREPARED_H
 #define ATH_PREPARED_H
 
-#include "file.h"
+#include "file/file.h"
 
 enum { ATH_MAP = 12 }; /* doubles of a map x = c + R (x0 - a): R row by row, c relative to the origin */
 

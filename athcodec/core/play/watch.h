@@ -2,8 +2,8 @@
 #ifndef ATH_WATCH_H
 #define ATH_WATCH_H
 
-#include "motion.h"
-#include "segment.h"
+#include "model/motion.h"
+#include "play/segment.h"
 
 typedef struct ath_watcher ath_watcher;
 

@@ -1,7 +1,7 @@
 /* Decodes the streams of the prelude: streams.h compiled for decoding. */
-#include "decode.h"
-#include "faces_model.h"
-#include "streams.h"
+#include "streams/decode.h"
+#include "streams/polygons.inl"
+#include "streams/prelude.inl"
 
 size_t ath_prelude_model_size(void)
 {

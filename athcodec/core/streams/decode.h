@@ -2,9 +2,9 @@
 #ifndef ATH_DECODE_H
 #define ATH_DECODE_H
 
-#include "container.h"
-#include "mesh.h"
-#include "plan.h"
+#include "file/container.h"
+#include "model/mesh.h"
+#include "model/plan.h"
 
 /* Bytes of scratch memory that any of these needs as `model`. */
 size_t ath_prelude_model_size(void);

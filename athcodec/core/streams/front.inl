@@ -3,8 +3,8 @@
 #ifndef ATH_FRONT_MODEL_H
 #define ATH_FRONT_MODEL_H
 
-#include "container.h"
-#include "number_model.h"
+#include "file/container.h"
+#include "bits/numbers.inl"
 
 enum { KNOWN_KINDS = 16, KIND_BITS = 5, SIZE_BITS = 30 };
 

@@ -3,7 +3,7 @@
 #ifndef ATH_MOTION_STREAMS_H
 #define ATH_MOTION_STREAMS_H
 
-#include "refinement_model.h"
+#include "bits/refinements.inl"
 
 /* ---- shapes ---- */
 

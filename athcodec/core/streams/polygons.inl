@@ -2,9 +2,9 @@
 #ifndef ATH_FACES_MODEL_H
 #define ATH_FACES_MODEL_H
 
-#include "container.h"
-#include "mesh.h"
-#include "number_model.h"
+#include "file/container.h"
+#include "model/mesh.h"
+#include "bits/numbers.inl"
 
 enum {
     FACE_LONG = 12, /* ways that have to be alike before what followed them is expected again */

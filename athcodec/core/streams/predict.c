@@ -1,6 +1,6 @@
 /* Decodes predicted motion: predicted_model.h compiled for decoding. */
-#include "predict.h"
-#include "predicted_model.h"
+#include "streams/predict.h"
+#include "streams/predicted.inl"
 
 enum { STEP_VERTICES = 1024 };
 

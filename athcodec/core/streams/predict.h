@@ -2,8 +2,8 @@
 #ifndef ATH_PREDICT_H
 #define ATH_PREDICT_H
 
-#include "container.h"
-#include "plan.h"
+#include "file/container.h"
+#include "model/plan.h"
 
 typedef struct ath_prediction ath_prediction;
 

@@ -3,9 +3,9 @@
 #ifndef ATH_PREDICTED_MODEL_H
 #define ATH_PREDICTED_MODEL_H
 
-#include "container.h"
-#include "lattice.h"
-#include "plan.h"
+#include "file/container.h"
+#include "bits/lattice.inl"
+#include "model/plan.h"
 
 enum { GUESSES = 13, FEATURES = 8, FITS = 3, FITTED = GUESSES - 1, LINE_GUESS = 6 };
 enum { LONGEST_LINE = 24, LONGEST_MEAN = 64, SOLVED_EVERY = 16, FIT_MEMORY = 256, RUNS = 8 };

@@ -4,11 +4,11 @@
 #ifndef ATH_STREAMS_H
 #define ATH_STREAMS_H
 
-#include "exact_model.h"
-#include "motion.h"
-#include "refinement_model.h"
-#include "rest_connected.h"
-#include "rest_copies.h"
+#include "bits/exact.inl"
+#include "model/motion.h"
+#include "bits/refinements.inl"
+#include "streams/rest_connected.inl"
+#include "streams/rest_copies.inl"
 
 /* ---- hierarchy ---- */
 

@@ -3,8 +3,8 @@
 #ifndef ATH_REST_CONNECTED_H
 #define ATH_REST_CONNECTED_H
 
-#include "mesh.h"
-#include "rest_predictor.h"
+#include "model/mesh.h"
+#include "streams/rest_predictor.inl"
 
 enum { CONNECTED_TERMS = 6, CONNECTED_GUESSES = 7, CONNECTED_CLASS = 4 };
 

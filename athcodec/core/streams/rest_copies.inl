@@ -3,7 +3,7 @@
 #ifndef ATH_REST_COPIES_H
 #define ATH_REST_COPIES_H
 
-#include "rest_predictor.h"
+#include "streams/rest_predictor.inl"
 
 enum { REST_SHAPES = 64, COPY_COUNTS = 16 };
 enum { PLAIN_PART, SHAPE_PART, COPY_PART, PART_ROLES };

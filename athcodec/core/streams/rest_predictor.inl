@@ -3,7 +3,7 @@
 #ifndef ATH_REST_PREDICTOR_H
 #define ATH_REST_PREDICTOR_H
 
-#include "lattice.h"
+#include "bits/lattice.inl"
 
 #define REST_FORGET (1.0 / 2048.0)
 
