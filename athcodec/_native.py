@@ -1,6 +1,6 @@
 """The C core as Python sees it: record layouts, signatures, and one checked wrapper per function.
 
-Mirrors core/include/ath.h, the public API that players use (core_file.py), and core/model/plan.h, motion.h and encode.h, which only
+Mirrors core/include/ath.h, which players use (core_file.py), and core/model/plan.h, motion.h and encode.h, which only
 encoding uses (athcodec.encoding). Wrappers check dtypes, shapes and contiguity, so that no call can write outside an
 array; they release the GIL, and hold no state.
 """

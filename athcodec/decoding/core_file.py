@@ -1,6 +1,7 @@
 """ath.h in Python: a file opened by the C core, its prepared segments, and what they show.
 
-Every member mirrors a function of core/include/ath.h, where its contract stands; this module owns the memory, checks sizes and
+Every member mirrors a function of core/include/ath.h, where its contract stands; this module owns the memory, checks
+sizes and
 turns result codes into exceptions. It reads no file: whoever uses it feeds the bytes (ath_file.py does).
 Vertices are in file order unless said otherwise; positions are in scene units.
 """

@@ -1,4 +1,4 @@
-"""The GPU form of a file (core/include/ath_gpu.h): blocks of words that shaders compute positions from. See docs/gpu.md.
+"""The GPU form of a file (ath_gpu.h, docs/gpu.md): blocks of words that shaders compute positions from.
 
 `GpuFile` makes the blocks; evaluate.py computes with them in NumPy what the shaders beside it, *.wgsl, do on a GPU.
 """
