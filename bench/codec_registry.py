@@ -107,7 +107,7 @@ def _version(name: str) -> str:
 def _athcodec_files() -> set[Path]:
     """Python of the encoder and decoder, and the compiled core, of the installed package."""
     package = Path(athcodec.__file__).parent
-    return {library_path(), *package.glob("*.py"), *package.glob("encoding/*.py")}
+    return {library_path(), *package.glob("*.py"), *package.glob("encoding/**/*.py")}
 
 
 def _bench_files(module: str) -> set[Path]:

@@ -22,10 +22,11 @@ import athcodec
 from athcodec.decoding import container as ct
 from athcodec.encoding import Draft, code_segments, draft, write
 from athcodec.encoding.job import EncodingJob
-from athcodec.encoding.progress import silent
-from athcodec.encoding.search import Search, samples_of
-from athcodec.encoding.segment import Coded, CodedPrelude, Settings, code_stems
+from athcodec.encoding.segment import Coded, CodedPrelude, code_stems
+from athcodec.encoding.segment_samples import samples_of
+from athcodec.encoding.settings import Settings
 from athcodec.encoding.streams import encode_learned_modes
+from athcodec.encoding.trials import Trials
 from athcodec.metrics import ErrorMeter
 from bench.clips import Encoded, encoded, measure
 
@@ -205,9 +206,7 @@ class _Recoding:
     def __init__(self, clip: athcodec.MotionClip, plan: Draft) -> None:
         decided = EncodingJob.resume(clip, plan).decided(plan)
         self.settings, self._source, self._ath = plan.choice.settings, decided.source, decided.ath
-        self._search = Search(
-            self._source, self._ath, self.settings, samples_of(self._source), plan.options.effort, silent
-        )
+        self._trials = Trials(self._source, self._ath, self.settings, samples_of(self._source))
         self._positions = [self._source.positions(i) for i in range(plan.segment_count)]
 
     def of_one_level(self) -> list[Settings]:
@@ -227,7 +226,7 @@ class _Recoding:
             pieces["low_level"], pieces["low_modes"] = -1, 0
         if one_level:
             pieces["level"] = prelude.plan.level_count - 1
-        learned_modes = self._search.learned_modes(prelude.plan, settings)
+        learned_modes = self._trials.learned_modes(prelude.plan, settings)
         of_shapes = sum(map(len, encode_learned_modes(prelude.plan, learned_modes).values()))
         coded = (code_stems(prelude, settings, positions, learned_modes) for positions in self._positions)
         return of_shapes + sum(map(_bytes_of, coded))

@@ -12,7 +12,8 @@ from plants import plant
 import athcodec
 from athcodec.decoding import ath_file, core_file
 from athcodec.decoding.container import Limits
-from athcodec.encoding import encoder, joins
+from athcodec.encoding import encoder
+from athcodec.encoding.choices import joins
 from athcodec.errors import BadChecksum, LimitExceeded
 from athcodec.motion.joining import looped
 from athcodec.sources import read_hdf5, sample_path

@@ -19,7 +19,8 @@ from plants import STEADY, awkward, awkward_plants, bound_for, clip_of, grow, pl
 import athcodec
 from athcodec import encoding
 from athcodec.decoding import container as ct
-from athcodec.encoding import prediction, search
+from athcodec.encoding import search
+from athcodec.encoding.choices import prediction
 from athcodec.errors import AthError, BadChunk, BadChunkTable
 from athcodec.metrics import SmoothnessMeter
 

@@ -13,7 +13,7 @@ from plants import clip_of, tube
 
 import athcodec
 from athcodec.encoding import streams
-from athcodec.encoding.rings import ring_sizes
+from athcodec.encoding.choices.rings import ring_sizes
 from athcodec.motion.clip import MotionClip
 
 sys.path.append(str(Path(__file__).resolve().parent.parent))  # for spec, which is not installed

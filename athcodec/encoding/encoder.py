@@ -20,7 +20,7 @@ from athcodec.encoding.branch_trials import best_branches
 from athcodec.encoding.job import SPOOL_BYTES, CodedSegment, Draft, EncodingJob, EncodingOptions
 from athcodec.encoding.layers import layer_ratios
 from athcodec.encoding.progress import Progress, WeightedProgress, stage_weights
-from athcodec.encoding.search import SAMPLES
+from athcodec.encoding.segment_samples import SAMPLES
 from athcodec.encoding.segmentation import split_segments
 from athcodec.encoding.summary import Summary
 from athcodec.files.atomic import check_target, keeping, new_file

@@ -21,29 +21,33 @@ from typing import IO, Any, BinaryIO
 
 import numpy as np
 
-from athcodec._native import MEASURES
+from athcodec._native import MEASURES, SHEET
 from athcodec.decoding import container as ct
 from athcodec.decoding.ath_file import AthFile
 from athcodec.decoding.decoder import Decoder
 from athcodec.encoding import polygons, streams
 from athcodec.encoding import quantise as qz
+from athcodec.encoding.choices.joins import End
+from athcodec.encoding.choices.prediction import FoundPrediction, best_prediction, code_predicted_segment, one_map_each
 from athcodec.encoding.features import Feature
-from athcodec.encoding.joins import End
 from athcodec.encoding.layers import (
     MOST_LAYERS,
     MOST_LEVELS,
     CodedMotion,
+    Layer,
     Layers,
     layer_chunks,
     layer_ratios,
     layers_of,
 )
-from athcodec.encoding.prediction import FoundPrediction, best_prediction, code_predicted_segment, predicted_layers
 from athcodec.encoding.progress import Progress, silent
 from athcodec.encoding.sample import is_small
-from athcodec.encoding.search import Choice, Search, still_choice, typical_segments
-from athcodec.encoding.segment import SHEET, CodedPrelude, Source, thread_count
+from athcodec.encoding.search import Search
+from athcodec.encoding.segment import CodedPrelude, Source, thread_count
+from athcodec.encoding.segment_samples import typical_segments
+from athcodec.encoding.settings import Choice
 from athcodec.encoding.shape import RestPrecision
+from athcodec.encoding.start import still_choice
 from athcodec.encoding.summary import Seam, Summary
 from athcodec.encoding.survey import Ath, Survey, survey
 from athcodec.errors import BoundError, ClipError
@@ -336,11 +340,11 @@ class EncodingJob:
         share = PREDICTED_SHARE if ratio > 1 else 1.0
         search = Search.of(self.source, ath, bound, self.options.effort, self.report, self.options.jobs, ratios)
         unsearched = share * search.first_cost()
-        prediction = None if search.start.rigid.any() else self._best_prediction(bound, unsearched)
+        prediction = None if search.trials.start.rigid.any() else self._best_prediction(bound, unsearched)
         if prediction is not None and prediction.bytes < SEARCH_SAVES * unsearched:
             return self._predicted(prediction.choice)
         try:
-            best = self._found_by(search, ratio)
+            best = self._found_by(search)
             if self._is_short(best):
                 best = min(best, self._without_levels(bound), key=self._estimated_bytes)
             if prediction is None or prediction.bytes >= share * self._estimated_bytes(best):
@@ -350,10 +354,10 @@ class EncodingJob:
                 raise
         return self._predicted(prediction.choice)
 
-    def _found_by(self, search: Search, ratio: int) -> _Decided:
+    def _found_by(self, search: Search) -> _Decided:
         """The best of what a search has found."""
-        choices, prelude = search.decide(ratio)
-        layered = [self._layered(search.ath, choice, prelude) for choice in choices]
+        choices, prelude = search.decide()
+        layered = [self._layered(search.trials.ath, choice, prelude) for choice in choices]
         return layered[0] if len(layered) == 1 else min(layered, key=self._estimated_bytes)
 
     def _is_short(self, decided: _Decided) -> bool:
@@ -368,7 +372,7 @@ class EncodingJob:
     def _without_levels(self, bound: float) -> _Decided:
         """With one node for the whole plant, whatever its error."""
         ath = self.seen.ath(Thresholds(bound, self.clip.frame_count, self.seen.largest_distance.max(), 0))
-        return self._found_by(Search.of(self.source, ath, bound, self.options.effort, silent, self.options.jobs), 1)
+        return self._found_by(Search.of(self.source, ath, bound, self.options.effort, silent, self.options.jobs))
 
     def _best_prediction(self, bound: float, most_bytes: float) -> FoundPrediction | None:
         """None for one who asks for a hierarchy of maps, which predicted motion has not."""
@@ -381,7 +385,10 @@ class EncodingJob:
 
     def _predicted(self, choice: Choice) -> _Decided:
         source = self._long_segments
-        ath, prelude, layers = predicted_layers(source, choice)
+        ath = one_map_each(source.seen)
+        prelude = CodedPrelude(source, ath, choice.settings, predicted=True)
+        only = Layer(prelude.plan, choice.settings, None)
+        layers = Layers(prelude.rest_chunk, prelude.source_rest, prelude.plan, [only])
         return _Decided(ath, choice, prelude, layers, source)
 
     def _estimated_bytes(self, decided: _Decided) -> float:

@@ -19,8 +19,7 @@ from athcodec._native import MEASURES
 from athcodec.decoding import container as ct
 from athcodec.encoding import quantise as qz
 from athcodec.encoding import streams
-from athcodec.encoding.features import Feature
-from athcodec.encoding.joins import (
+from athcodec.encoding.choices.joins import (
     END_FRAMES,
     NO_CORRECTIONS,
     SLOPED,
@@ -33,14 +32,13 @@ from athcodec.encoding.joins import (
     end_of,
     seen,
 )
+from athcodec.encoding.features import Feature
 from athcodec.encoding.learned_modes import LearnedModes, nested
 from athcodec.encoding.motion import Plan, SegmentMotion, position_errors
 from athcodec.encoding.polygons import Mesh
-from athcodec.encoding.search import Choice
 from athcodec.encoding.segment import (
     CodedPrelude,
     Corrections,
-    Settings,
     Source,
     StreamBasis,
     analyse,
@@ -53,6 +51,7 @@ from athcodec.encoding.segment import (
     stems_head,
     time_components,
 )
+from athcodec.encoding.settings import Choice, Settings
 from athcodec.encoding.shape import rest_steps
 
 COARSER = 2.0  # steps of layers before the last than those of a file of their own with the same bound

@@ -24,9 +24,31 @@ def silent(stage: str, fraction: float) -> None:
     """Reports to nobody."""
 
 
-def trials(effort: str, layered: bool, small: bool) -> int:
-    """That a search is worth."""
+def expected_trials(effort: str, layered: bool, small: bool) -> int:
+    """Return the number of trials that a search takes as long as."""
     return TRIALS[effort] + LAYER_TRIALS[effort] * layered + SMALL_TRIALS * small
+
+
+class TrialCount:
+    """Counts the trials of a search, and other work that takes as long, and reports them.
+
+    Attributes
+    ----------
+    expected : int
+        About what the whole search counts.
+    """
+
+    def __init__(self, report: Progress = silent):
+        self.expected, self._report, self._made = 1, report, 0
+
+    def add(self, trials: int) -> None:
+        """Report that so many more trials have been made."""
+        self._made += trials
+        self._report("search", min(self._made / self.expected, 0.99))
+
+    def finish(self) -> None:
+        """Report the end of the search."""
+        self._report("search", 1.0)
 
 
 class WeightedProgress:
@@ -65,7 +87,7 @@ def stage_weights(
     some = vertices if (part := sample_vertices(vertices, len(segments), effort)) is None else part
     work = {
         "survey": SURVEY * vertices * frames,
-        "search": TRIAL * trials(effort, layers > 1, small) * samples * some * longest,
+        "search": TRIAL * expected_trials(effort, layers > 1, small) * samples * some * longest,
         "motion": MOTION * (1 + layers) / 2 * vertices * frames,
     }
     before = {"branches": BRANCHES * sum(work.values())} if branches else {}

@@ -11,15 +11,9 @@ import numpy as np
 from athcodec.errors import BoundError
 
 DEAD_ZONE = 0.55
-NODE_QUALITIES = (0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0)  # of maps: step over the error that is theirs
-NODE_SHARE, NODE_BYTES = 0.02, 320  # of the file that the maps may take, whichever is more
-SMALL_NODE_SHARE = 0.04  # that they may take of a file without layers where that is less than NODE_BYTES
-FEW_ROOTS, ROOT_QUALITIES = 4, (0.7, 1.4, 2.8)  # whose maps are a few bytes, mostly
-NODE_ERROR_TOLERANCE = 1.08  # times a level's own error that cheaper maps may have
 MODE_STEP = 0.1  # precision of a learned mode: what it moves in a frame (RMS), in steps
 LEAST_MODE = 0.12  # what a learned mode that is kept moves in a frame (RMS), in steps
 LARGEST_MODE = 2.0**20
-REQUIRED_SAVINGS = (1.0, 1.25)  # by which factor a piece's estimated bits must shrink for learned modes
 SMALLEST_BOUND = 1e-35  # steps, in float32, are smaller still; squares of errors must not vanish
 LARGEST_EXTENT = 2.0**28  # extent over bound that corrections alone can still express
 REST_CAP = 1.6  # rest pose step over bound at which its own error reaches the bound
@@ -29,8 +23,6 @@ LATTICE_REST_CAP = 3.2 / 5**0.5  # and for that to a point of the lattice
 SOURCE_REST_TOLERANCE = 3e-3  # over the diagonal: how far a rest pose that is no reference pose may be off
 SOURCE_REST_STEP = 2.0  # over that, at first
 CORRECTION_STEP = 1.12  # over the limit: rounding a correction leaves at most sqrt(3)/2 of its step
-
-WEIGHT_PARTS = (0.0, 0.05, 0.2)  # of a level's vertices that may have weights below that of its step
 
 # What the value, the slope and the bend of a row weigh at its ends, in squared steps: at least; where segments meet, at
 # most, and where the velocity changes by one bound in a usual frame. Less by the square of that: who moves hides its
@@ -112,6 +104,11 @@ def half_octaves(exponents: np.ndarray) -> np.ndarray:
     return np.ldexp(np.where(odd, half_octave(1), 1.0), (exponents - odd) // 2)
 
 
+def turn_of(turn_step: float) -> int:
+    """Return the largest step of rotations in half octaves below 1 radian; 0: any step."""
+    return round(-2 * np.log2(turn_step)) if turn_step else 0
+
+
 def nearest_singles(values: np.ndarray) -> np.ndarray:
     """The same in numbers of float32, as float64."""
     most = float(np.finfo(np.float32).max)
@@ -139,7 +136,6 @@ def bits(numbers: np.ndarray) -> np.ndarray:
     return np.rint(BIT_PARTS * np.log2(1 + numbers)) / BIT_PARTS
 
 
-REST_SLACKS = (0.5, 0.65, 0.8, 0.95)  # over the bound
 BIT_PARTS = 2.0**16  # of a bit, that estimates are made of
 LONGEST_LAG, LONGEST_ROW = 40, 600  # of stems, and of those that may be whole meshes
 MESH = 1000  # vertices

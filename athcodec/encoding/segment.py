@@ -22,8 +22,8 @@ from athcodec.encoding.features import Feature
 from athcodec.encoding.learned_modes import LearnedModes
 from athcodec.encoding.motion import NODE_ROOT, STEM_ROOT, LevelStream, Plan, PlanSample, SegmentMotion, gather
 from athcodec.encoding.polygons import Mesh
-from athcodec.encoding.rigid import turn_of
 from athcodec.encoding.segmentation import split_segments
+from athcodec.encoding.settings import BEAM, Settings
 from athcodec.encoding.shape import RestPrecision
 from athcodec.encoding.survey import Ath, Survey
 from athcodec.encoding.time_bases import Entries, InWaves, TimeComponents
@@ -34,7 +34,6 @@ from athcodec.motion.clip import MotionClip, stands_still
 from athcodec.motion.hierarchy import Hierarchy
 from athcodec.motion.polygons import Polygons
 
-BEAM = 0  # form of a branch; others are SHEET, or a tube's vertices for each ring
 FINER = 32  # step over that of segments that bases and modes are learned from
 REST_ROUNDS = 16  # Steps of a rest pose that are tried until one keeps the bound; the last is 1/28 of the first.
 ROWS_AT_ONCE = 1 << 14  # of coefficients
@@ -264,65 +263,6 @@ class Source:
         return positions
 
 
-@dataclass(frozen=True)
-class Settings:
-    """What a trial varies; steps in scene units."""
-
-    bound: float
-    largest_bound: float  # of any vertex
-    limit: float | np.ndarray  # what the positions of each vertex, (N,), are held to
-    step: float
-    level_steps: np.ndarray  # (levels,) factors on it
-    rest_step: float
-    forms: np.ndarray  # (B,) int32, file order: BEAM, SHEET, or the vertices of each ring of a tube
-    loose: np.ndarray  # (B,) bool, file order
-    rigid: np.ndarray  # (B,) int32: in how many layers, from the first on, branches are rigid
-    layer: int  # that these settings are of
-    free_rigid: bool  # rigid branches are loose
-    turn_step: float  # largest of rotations of rigid pieces
-    lags: np.ndarray  # (B,) int32, file order
-    details: np.ndarray  # likewise
-    connected_rest: bool
-    rotation_step_factors: tuple[int, ...]  # per level: rotation factors
-    learned_bases: tuple[bool, ...]  # per level: whether the time basis is
-    common_basis: bool  # these levels share one, else each has its own
-    learned_pieces: np.ndarray | None  # (P,) bool: pieces that have learned modes; None: none has
-    node_steps: np.ndarray  # (levels,) of the maps of nodes, scene units; see SegmentMotion.analyse_nodes
-    rest_slack: float = 0.0  # what the rest pose may be off by, to save bits
-    shape_of: np.ndarray | None = None  # (B,) of streams.find_copies; None: the rest pose has no copies
-    periodic: bool = False  # waves over time are, of loops that are one segment
-    usual_change: float = np.inf  # of velocity, in length per frame squared, where segments meet
-    without: frozenset[Feature] = frozenset()  # features that the file does without
-
-    @property
-    def learning_levels(self) -> list[int]:
-        """Levels that learn their time bases."""
-        return [level for level, learned in enumerate(self.learned_bases) if learned]
-
-    @property
-    def rounding(self) -> Rounding:
-        """How numbers become integers."""
-        return Rounding(qz.DEAD_ZONE, qz.end_weights(self._relative_change))
-
-    @property
-    def _relative_change(self) -> float:
-        """usual_change over the bound."""
-        return self.usual_change / float(np.min(self.limit))
-
-    @property
-    def is_straight(self) -> bool:
-        """Whether rows end in straight lines, as modes of a beam do, and not in parabolas."""
-        return self._relative_change < qz.STRAIGHT and Feature.STRAIGHT not in self.without
-
-    def step_of(self, level: int) -> float:
-        """Of the stems of a level."""
-        return qz.single(self.step * self.level_steps[level])
-
-    def of_segment(self, whole_loop: bool) -> Settings:
-        """The same for a segment, which is all of a loop or not."""
-        return replace(self, periodic=self.periodic and whole_loop)
-
-
 def branch_records(hierarchy: Hierarchy, ath: Ath, settings: Settings) -> np.ndarray:
     """(B,) of _native.BRANCH."""
     branches = np.zeros(hierarchy.branch_count, BRANCH)
@@ -398,30 +338,7 @@ def _within(
     raise BoundError(f"max error: got {limit:.3g}; the rest pose cannot be kept within it")
 
 
-def with_best_lags(source: Source, ath: Ath, settings: Settings) -> Settings:
-    """The lags, connected or not, and the copies that make hierarchy and rest pose smallest."""
-    settings = replace(settings, shape_of=None)
-    own = lags(source, settings.rest_step, settings.details)
-    candidates = [replace(settings, lags=own, connected_rest=False)]
-    if not source.reference_is_exact:
-        candidates += _lag_candidates(source, settings, own)
-    if source.mesh is not None and not source.host_rest:
-        candidates += [replace(settings, lags=lag, connected_rest=True) for lag in (own, np.ones_like(own))]
-    if not source.reference_is_exact:
-        candidates += _with_copies(source, ath, candidates)
-    return candidates[0] if len(candidates) == 1 else min(candidates, key=lambda some: _poses_size(source, ath, some))
-
-
-def _with_copies(source: Source, ath: Ath, candidates: list[Settings]) -> list[Settings]:
-    """The candidates with branches that are copies of others, where there are any."""
-    if Feature.COPIES in source.without:
-        return []
-    own, branches = candidates[0], branch_records(source.hierarchy, ath, candidates[0])
-    shape_of = streams.find_copies(branches, own.rest_step, source.rest, own.rest_slack)
-    return [] if shape_of is None else [replace(settings, shape_of=shape_of) for settings in candidates]
-
-
-def _poses_size(source: Source, ath: Ath, settings: Settings) -> float:
+def poses_size(source: Source, ath: Ath, settings: Settings) -> float:
     """Bytes of hierarchy and rest pose; infinite where the pose cannot be kept within the bound."""
     hierarchy, branches = source.hierarchy, branch_records(source.hierarchy, ath, settings)
     stream = streams.encode_hierarchy(branches, hierarchy.branch_source, hierarchy.vertex_source)
@@ -429,26 +346,6 @@ def _poses_size(source: Source, ath: Ath, settings: Settings) -> float:
         return len(stream) + len(_coded_rest(source, branches, settings)[0].stream)
     except BoundError:
         return math.inf
-
-
-def with_connected_rest(source: Source, ath: Ath, settings: Settings) -> Settings:
-    """For layers: a rest pose that goes by faces where that is much smaller at once, or the one given."""
-    if source.mesh is None or source.host_rest:
-        return settings
-    connected = replace(settings, connected_rest=True)
-    share = 1.0 if source.reference_is_exact else CONNECTED_SHARE
-    much = _poses_size(source, ath, connected) < share * _poses_size(source, ath, settings)
-    return connected if much else settings
-
-
-def _lag_candidates(source: Source, settings: Settings, own: np.ndarray) -> list[Settings]:
-    """Beams or not, the lags of stems or one for all; short stems as such whose vertices differ by their numbers."""
-    count, no_beam = source.hierarchy.stem_count, np.maximum(own, 1)
-    some = [np.minimum(own, 1), no_beam, np.ones_like(own), np.where(count <= qz.SHORT_STEM, count, no_beam)]
-    if source.still:
-        some += [np.full_like(own, 3), np.full_like(own, 4), np.minimum(2 * no_beam, 65535)]
-    tried = {lag.astype(np.int32).tobytes() for lag in some} - {own.tobytes()}
-    return [replace(settings, lags=np.frombuffer(lag, np.int32), connected_rest=False) for lag in sorted(tried)]
 
 
 def code_source_rest(source: Source, branches: np.ndarray, reference: np.ndarray, bound: float) -> bytes:
@@ -468,30 +365,7 @@ def code_source_rest(source: Source, branches: np.ndarray, reference: np.ndarray
     return ct.pack_source_rest(coded.step, coded.stream)
 
 
-def lags(source: Source, step: float, details: np.ndarray) -> np.ndarray:
-    """Predictors of the rest pose, (B,): 0, a beam's modes, or the lag that does best elsewhere."""
-    hierarchy = source.hierarchy
-    lags = np.zeros(hierarchy.branch_count, np.int32)
-    for b in np.flatnonzero((source.sheet_like | (details > 0)) & (not source.host_rest)):
-        first, count = hierarchy.first_vertex[b], hierarchy.stem_count[b]
-        attach = hierarchy.attach[b]
-        lags[b] = qz.rest_lag(source.rest[first : first + count], source.rest[attach] if attach >= 0 else None, step)
-    return lags
-
-
-def loose_branches(source: Source, sample: np.ndarray) -> np.ndarray:
-    """Branches whose base leaves its attach point by more than their own size: fallen leaves, separate parts."""
-    if Feature.LOOSE in source.without:
-        return np.zeros(source.hierarchy.branch_count, bool)
-    hierarchy, rest = source.hierarchy, source.rest
-    first, attach = hierarchy.first_vertex, np.maximum(hierarchy.attach, 0)
-    gap = np.linalg.norm(sample[first] - sample[attach], axis=1)
-    rest_gap = np.linalg.norm(rest[first] - rest[attach], axis=1)
-    stretch = np.abs(gap - rest_gap[:, None]).max(axis=1)
-    return (hierarchy.attach >= 0) & (stretch > np.maximum(_stem_sizes(source), rest_gap))
-
-
-def _stem_sizes(source: Source) -> np.ndarray:
+def stem_sizes(source: Source) -> np.ndarray:
     """Diagonals of the stems' bounding boxes in the rest pose, (B,)."""
     first = source.hierarchy.first_vertex
     return np.linalg.norm(np.maximum.reduceat(source.rest, first) - np.minimum.reduceat(source.rest, first), axis=1)
@@ -505,7 +379,7 @@ def _thin_branches(source: Source) -> np.ndarray:
     steps[1:] = np.linalg.norm(np.diff(rest, axis=0), axis=1)
     steps[first] = 0.0
     way = np.add.reduceat(steps, first)
-    return way <= 1.3 * _stem_sizes(source)
+    return way <= 1.3 * stem_sizes(source)
 
 
 @dataclass(frozen=True)
@@ -687,7 +561,7 @@ def stems_head(settings: Settings, level: int, bases: dict[int, StreamBasis]) ->
     head = ct.StemsHead(
         settings.step_of(level),
         settings.rotation_step_factors[level],
-        turn=turn_of(settings.turn_step),
+        turn=qz.turn_of(settings.turn_step),
         basis_kind=ct.NODE_WAVES if settings.is_straight else ct.STEM_WAVES,
     )
     if level in bases:

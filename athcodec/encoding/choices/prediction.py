@@ -16,11 +16,12 @@ from athcodec._native import Rounding
 from athcodec.decoding import container as ct
 from athcodec.encoding import quantise as qz
 from athcodec.encoding import streams
+from athcodec.encoding.choices.rest import with_best_rest
 from athcodec.encoding.features import Feature
-from athcodec.encoding.layers import Layer, Layers
 from athcodec.encoding.motion import LevelStream, SegmentMotion, position_errors
-from athcodec.encoding.search import Choice, SegmentSample, typical_segments
-from athcodec.encoding.segment import CodedPrelude, Settings, Source, with_best_lags
+from athcodec.encoding.segment import CodedPrelude, Source
+from athcodec.encoding.segment_samples import SegmentSample, typical_segments
+from athcodec.encoding.settings import Choice, Settings
 from athcodec.encoding.shape import finer_than
 from athcodec.encoding.survey import Ath, Survey
 from athcodec.errors import BoundError
@@ -44,14 +45,6 @@ def one_map_each(seen: Survey) -> Ath:
     """The ATH in which each root's subtree moves as one."""
     epsilon, xi = (float(errors.max(initial=0.0)) for errors in (seen.largest_gads, seen.largest_distance))
     return replace(seen, xi=None).ath(Thresholds(epsilon, 0, xi, 0))
-
-
-def predicted_layers(source: Source, choice: Choice) -> tuple[Ath, CodedPrelude, Layers]:
-    """What the segments share."""
-    ath = one_map_each(source.seen)
-    prelude = CodedPrelude(source, ath, choice.settings, predicted=True)
-    only = Layer(prelude.plan, choice.settings, None)
-    return ath, prelude, Layers(prelude.rest_chunk, prelude.source_rest, prelude.plan, [only])
 
 
 def _settings(source: Source, ath: Ath, bound: float, rest_step: float) -> Settings:
@@ -79,7 +72,7 @@ def _settings(source: Source, ath: Ath, bound: float, rest_step: float) -> Setti
         learned_pieces=None,
         node_steps=np.ones(levels),
     )
-    return with_best_lags(source, ath, settings)
+    return with_best_rest(source, ath, settings)
 
 
 @dataclass(frozen=True)

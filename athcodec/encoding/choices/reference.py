@@ -12,14 +12,16 @@ import numpy as np
 
 from athcodec.encoding import quantise as qz
 from athcodec.encoding.motion import Plan, SegmentMotion
-from athcodec.encoding.segment import FINER, Settings, Source, analyse_finely, branch_records, level_streams
+from athcodec.encoding.segment import FINER, Source, analyse_finely, branch_records, level_streams
+from athcodec.encoding.settings import Settings
 from athcodec.encoding.survey import Ath
 
-SEGMENTS = 4  # that the mean is taken of
+SEGMENTS = 4  # Largest number of segments whose mean is taken.
+MEAN_POSE_TRIALS = 6  # Finding the mean pose, and learned modes about it, takes as long as this many trials.
 
 
 def mean_pose(source: Source, ath: Ath, settings: Settings) -> np.ndarray:
-    """(N, 3) float64 less the origin, file order; settings: the start of a search."""
+    """Return the mean pose, (N, 3) float64 less the origin, in file order. settings: the start of a search."""
     settings = replace(settings, forms=source.sheet_like.astype(np.int32))
     plan = Plan(branch_records(source.hierarchy, ath, settings), source.clip.vertex_count, source.pool)
     plan.set_rest(source.rest)
@@ -27,7 +29,7 @@ def mean_pose(source: Source, ath: Ath, settings: Settings) -> np.ndarray:
     coefficients, tracks, frames = 0.0, 0.0, 0
     for segment in some:
         motion = analyse_finely(plan, settings, source.positions(segment))
-        of_sum = np.sqrt(motion.frames)  # what the mean wave's coefficient has to be multiplied by
+        of_sum = np.sqrt(motion.frames)  # Factor from the coefficient of the mean wave to the sum over frames.
         coefficients = coefficients + of_sum * motion.coefficients[:, :, 0]
         tracks = tracks + of_sum * motion.tracks[:, :, :, 0]
         frames += motion.frames

@@ -1,0 +1,52 @@
+"""Time bases: which levels have one learned from their tracks, and whether waves are periodic (FORMAT.md)."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from athcodec.encoding.features import Feature
+from athcodec.encoding.settings import Settings
+from athcodec.encoding.trials import Trials
+
+EXTRA_TRIALS = 2  # Learning time bases takes as long as this many trials.
+
+
+def candidates(settings: Settings, trials: Trials) -> list[Settings]:
+    """Return the settings with learned time bases at all levels, each level's own or one for all."""
+    if trials.without(Feature.TIME_BASES):
+        return []
+    each = replace(settings.in_waves(), learned_bases=(True,) * settings.levels)
+    return [each] if trials.without(Feature.COMMON_BASIS) else [each, replace(each, common_basis=True)]
+
+
+def best_bases(settings: Settings, trials: Trials) -> Settings:
+    """Return the settings with learned time bases, one for all levels or one for each whose stream it shortens, or with
+    waves if the file as a whole gets no shorter."""
+    if trials.without(Feature.TIME_BASES):
+        return settings
+    waves = settings.in_waves()
+    each, *common = candidates(settings, trials)
+    trials.costs([waves, each, *common])
+    shorter = trials.level_costs(each) < trials.level_costs(waves)
+    mixed = replace(each, learned_bases=tuple(shorter.tolist()))
+    best = trials.cheapest([waves, mixed, *common])
+    trials.spend(EXTRA_TRIALS)
+    return best
+
+
+def waves_if_smaller(settings: Settings, trials: Trials) -> Settings:
+    """Return the settings with waves if learned time bases no longer pay: they take more bytes the finer the steps are.
+    They are learned at their own step, as the file will have them, because a component that is just left out may be
+    kept at another step."""
+    if not any(settings.learned_bases):
+        return settings
+    trials.forget(settings)
+    return trials.cheapest([settings, settings.in_waves()])
+
+
+def best_waves(settings: Settings, trials: Trials) -> Settings:
+    """Return the settings with periodic waves for loops that are one segment, or without: a motion that does not go on
+    smoothly across the seam takes more bytes so."""
+    if trials.without(Feature.PERIODIC) or not any(sample.whole_loop for sample in trials.samples):
+        return settings
+    return trials.cheapest([replace(settings, periodic=True), settings])

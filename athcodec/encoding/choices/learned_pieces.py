@@ -1,0 +1,65 @@
+"""Learned modes: which pieces have modes learned from their motion in place of a beam's (FORMAT.md, "SHAPES")."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from athcodec.encoding.choices.forms import in_each_basis
+from athcodec.encoding.features import Feature
+from athcodec.encoding.learned_modes import estimated_bits
+from athcodec.encoding.settings import Settings
+from athcodec.encoding.trials import Trials
+
+EXTRA_TRIALS = 6  # Learning modes and estimating their bits takes as long as this many trials.
+REQUIRED_SAVINGS = (1.0, 1.25)  # Factors by which a piece's estimated bits have to shrink for learned modes.
+
+
+def candidates(settings: Settings, trials: Trials) -> list[Settings]:
+    """Return the settings with learned modes for the pieces that take fewer bits with them."""
+    if trials.without(Feature.SHAPES):
+        return []
+    plain = replace(settings, learned_pieces=None)
+    pieces = pieces_that_save(plain, trials, REQUIRED_SAVINGS)
+    return [
+        replace(plain, learned_pieces=some, learned_saving=saving)
+        for saving, some in zip(REQUIRED_SAVINGS, pieces)
+        if some.any()
+    ]
+
+
+def best_pieces(settings: Settings, trials: Trials) -> Settings:
+    """Return the settings with learned modes, or without if the file as a whole gets no shorter."""
+    plain = replace(settings, learned_pieces=None, learned_saving=None)
+    return plain if trials.without(Feature.SHAPES) else trials.cheapest([plain, *candidates(plain, trials)])
+
+
+def best_pieces_in_any_basis(settings: Settings, trials: Trials) -> Settings:
+    """Return the settings with learned modes beside what was chosen without them, or in its place. On stems of few
+    vertices learned modes serve the motion that rotations and affine functions serve."""
+    starts = in_each_basis(settings, trials)
+    if any(settings.learned_bases):  # Time bases were chosen before learned modes were known, too.
+        starts.append(settings.in_waves())
+    chosen = min((best_pieces(start, trials) for start in starts), key=trials.cost)
+    trials.spend(EXTRA_TRIALS)
+    return chosen
+
+
+def pieces_that_save(plain: Settings, trials: Trials, required_savings: Sequence[float]) -> list[np.ndarray]:
+    """Return (P,) bool for each required saving: pieces whose estimated bits shrink by that factor."""
+    plan = trials.prelude(plain).plan
+    modes = trials.learned_modes(plan, plain, everywhere=True)
+    piece_count = len(modes.counts)
+    piece_of_vertex = np.repeat(np.arange(piece_count), plan.pieces["count"])
+    bits_without, bits_with = (
+        sum(
+            estimated_bits(trials.analysed(plain, number, tried).coefficients, piece_of_vertex, piece_count)
+            * sample.scale
+            for number, sample in enumerate(trials.samples)
+        )
+        for tried in (None, modes)
+    )
+    price = estimated_bits(modes.integers, np.repeat(np.arange(piece_count), modes.counts), piece_count)
+    return [(modes.counts > 0) & ((bits_with + price) * saving < bits_without) for saving in required_savings]

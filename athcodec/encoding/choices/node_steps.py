@@ -1,0 +1,116 @@
+"""Steps of the maps of inner nodes, which show the coarse levels (FORMAT.md, Affines stream)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from athcodec.encoding import streams
+from athcodec.encoding.motion import Plan, SegmentMotion, position_errors
+from athcodec.encoding.segment import CodedPrelude, Source
+from athcodec.encoding.settings import Settings
+from athcodec.encoding.survey import Ath
+from athcodec.encoding.trials import Trials
+
+EXTRA_TRIALS = 4  # Analysing maps at several steps takes as long as this many trials.
+QUALITIES = (0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0)  # Steps that are tried, over the error of a level.
+FEW_ROOTS, ROOT_QUALITIES = 4, (0.7, 1.4, 2.8)  # The same for up to so many roots, whose maps are mostly a few bytes.
+FILE_SHARE, FEW_BYTES = 0.02, 320  # The maps may take this share of the file, or these bytes if that is more.
+SMALL_FILE_SHARE = 0.04  # A file without layers may give its maps this share if that is less than FEW_BYTES.
+ERROR_TOLERANCE = 1.08  # Cheaper maps may err by this much more than the finest ones.
+FRAMES = 8  # Frames by which the error of a level is measured.
+
+
+def best_node_steps(settings: Settings, trials: Trials) -> Settings:
+    """Return the settings with maps that keep to their share of the file, no finer than the levels' errors ask for."""
+    prelude, errors = trials.prelude(settings), _level_errors(trials, settings.bound)
+    sample = trials.samples[trials.middle].positions
+    segment = trials.analysed(settings, trials.middle, trials.learned_modes(prelude.plan, settings))
+    rest = trials.level_costs(settings).sum() + trials.prelude_bytes(settings)
+    least = min(FEW_BYTES, SMALL_FILE_SHARE * rest) if _is_played_whole(trials) else FEW_BYTES
+    allowed = max(least, FILE_SHARE / (1 - FILE_SHARE) * rest)
+    qualities = _qualities(trials)
+    chosen = limits = None
+    for quality in qualities:
+        steps = quality * errors
+        segment.clear_nodes()
+        segment.analyse_nodes(sample, steps, settings.rounding)
+        if limits is None:
+            if _map_bytes(segment, trials) > allowed and quality is not qualities[-1]:
+                continue
+            chosen, limits = steps, _errors_of_maps(prelude, segment, sample)
+            limits[1:] = np.minimum(ERROR_TOLERANCE * limits[1:], limits[:-1])  # Deeper levels stay better.
+        elif (_errors_of_maps(prelude, segment, sample) <= limits).all():
+            chosen = steps
+        else:
+            break
+    trials.spend(EXTRA_TRIALS)
+    return replace(settings, node_steps=chosen)
+
+
+def cost_with_maps(settings: Settings, trials: Trials) -> float:
+    """Return the bytes of a whole file with the maps of nodes; of layers without, because others choose their steps."""
+    if trials.is_layered:
+        return trials.cost(settings)
+    settings = best_node_steps(settings, trials)
+    modes = trials.learned_modes(trials.prelude(settings).plan, settings)
+    segment = trials.analysed(settings, trials.middle, modes)
+    segment.analyse_nodes(trials.samples[trials.middle].positions, settings.node_steps, settings.rounding)
+    return trials.cost(settings) + _map_bytes(segment, trials)
+
+
+def inner_nodes(source: Source, ath: Ath, levels: int) -> np.ndarray:
+    """Return the number of nodes of more than one branch, per level."""
+    hierarchy, branches = source.hierarchy, ath.node_branch
+    branches = branches[hierarchy.subtree_branches[branches] > 1]
+    return np.bincount(hierarchy.branch_depth[branches], minlength=levels)
+
+
+def _level_errors(trials: Trials, bound: float) -> np.ndarray:
+    """Return per level the error in all vertices of one node together that would double the level's own, (levels,). The
+    level's own is the RMS that independent least-squares maps leave in a few frames, or the bound if that is more."""
+    source, ath, sample = trials.source, trials.ath, trials.samples[trials.middle].positions
+    some = np.linspace(0, sample.shape[2] - 1, min(FRAMES, sample.shape[2])).astype(int)
+    frames = np.empty((len(some), *sample.shape[:2]))
+    frames[:, source.hierarchy.vertex_source] = np.moveaxis(sample[:, :, some], 2, 0) + source.origin
+    nodes = inner_nodes(source, ath, trials.levels)
+    errors = np.full(trials.levels, bound)
+    for level in np.flatnonzero(nodes):
+        away = ath.approximation(frames, int(level)) - frames
+        whole = max(bound, math.sqrt((away**2).sum() / (frames.size / 3)))
+        errors[level] = whole * math.sqrt(source.clip.vertex_count / nodes[level])
+    return errors
+
+
+def _map_bytes(segment: SegmentMotion, trials: Trials) -> float:
+    """Return the bytes of the maps of nodes in a whole file whose segments are like this one."""
+    nodes = trials.extrapolation.nodes
+    size = sum(len(streams.encode_affines(segment, level)) * nodes[level] for level in _map_levels(segment.plan))
+    return size * trials.source.coded_frames / segment.frames
+
+
+def _is_played_whole(trials: Trials) -> bool:
+    """Return whether the file has one layer and segment: its coarse levels are hardly shown and need not meet."""
+    return not trials.is_layered and not trials.source.has_seams
+
+
+def _qualities(trials: Trials) -> list[np.ndarray]:
+    """Return the qualities to try, (levels,) each, from fine to coarse. That of a few roots rises last, if at all."""
+    qualities = [np.full(trials.levels, quality) for quality in QUALITIES]
+    if (trials.source.hierarchy.branch_parent < 0).sum() > FEW_ROOTS:
+        return qualities
+    fine, *coarser = ROOT_QUALITIES if _is_played_whole(trials) else ROOT_QUALITIES[:1]
+    roots, coarsest = [fine] * len(qualities) + coarser, qualities[-1:] * len(coarser)
+    return [np.append(root, quality[1:]) for root, quality in zip(roots, qualities + coarsest)]
+
+
+def _map_levels(plan: Plan) -> list[int]:
+    return [level for level in range(plan.level_count) if plan.has_affines(level)]
+
+
+def _errors_of_maps(prelude: CodedPrelude, segment: SegmentMotion, sample: np.ndarray) -> np.ndarray:
+    """Return the RMS errors of a sample at the levels that have maps."""
+    poses = (segment.pose(level, prelude.origin, prelude.dtype) for level in _map_levels(prelude.plan))
+    return np.array([position_errors(pose, sample, prelude.origin, prelude.plan.pool)[2] for pose in poses])

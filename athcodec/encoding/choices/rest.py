@@ -1,0 +1,102 @@
+"""The rest pose: how its vertices are predicted, whether it goes by faces, what is copied, and how precise it is
+(FORMAT.md, "REST")."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from athcodec.encoding import quantise as qz
+from athcodec.encoding import streams
+from athcodec.encoding.features import Feature
+from athcodec.encoding.segment import Source, branch_records, poses_size
+from athcodec.encoding.settings import Settings
+from athcodec.encoding.survey import Ath
+from athcodec.encoding.trials import Trials
+
+CONNECTED_SHARE = 0.8  # Largest share of the size without faces at which layers refine a rest pose that goes by faces.
+REST_SHARE = 0.25  # Share of a file from which on slack is tried for its rest pose.
+REST_SLACKS = (0.5, 0.65, 0.8, 0.95)  # Distances, over the limit, by which a rest pose may be off.
+
+
+def lags(source: Source, step: float, details: np.ndarray) -> np.ndarray:
+    """Return the predictors of the rest pose, (B,) int32: 0 for a beam's modes, or the lag that does best."""
+    hierarchy = source.hierarchy
+    lags = np.zeros(hierarchy.branch_count, np.int32)
+    for b in np.flatnonzero((source.sheet_like | (details > 0)) & (not source.host_rest)):
+        first, count = hierarchy.first_vertex[b], hierarchy.stem_count[b]
+        attach = hierarchy.attach[b]
+        lags[b] = qz.rest_lag(source.rest[first : first + count], source.rest[attach] if attach >= 0 else None, step)
+    return lags
+
+
+def candidates(source: Source, ath: Ath, settings: Settings) -> list[Settings]:
+    """Return the settings with all predictors of the rest pose, connected or not, with copies and without."""
+    best = lags(source, settings.rest_step, settings.details)
+    settings = replace(settings, shape_of=None, lags=best, connected_rest=False)
+    if source.reference_is_exact:
+        return [settings, *_connected(source, settings)]
+    tried = [settings, *_other_lags(source, settings), *_connected(source, settings)]
+    return tried + _with_copies(source, ath, tried)
+
+
+def with_best_rest(source: Source, ath: Ath, settings: Settings) -> Settings:
+    """Return the settings that make hierarchy and rest pose smallest."""
+    tried = candidates(source, ath, settings)
+    return tried[0] if len(tried) == 1 else min(tried, key=lambda some: poses_size(source, ath, some))
+
+
+def connected_if_smaller(source: Source, ath: Ath, settings: Settings) -> Settings:
+    """Return the settings for layers: with a rest pose that goes by faces if that is much smaller."""
+    if source.mesh is None or source.host_rest:
+        return settings
+    connected = replace(settings, connected_rest=True)
+    share = 1.0 if source.reference_is_exact else CONNECTED_SHARE
+    is_smaller = poses_size(source, ath, connected) < share * poses_size(source, ath, settings)
+    return connected if is_smaller else settings
+
+
+def with_slack(source: Source, ath: Ath, settings: Settings, slack: float) -> Settings:
+    """Return the settings with a rest pose that may be off by a distance, at the coarsest step that allows it."""
+    rest_step = qz.single(0.9999 * qz.LATTICE_REST_CAP * slack)
+    return with_best_rest(source, ath, replace(settings, rest_step=rest_step, rest_slack=slack))
+
+
+def best_slack(settings: Settings, trials: Trials) -> Settings:
+    """Return the settings with a rest pose as far off as the motion leaves room for, if it is much of the file."""
+    source, limit = trials.source, float(np.min(settings.limit))
+    if source.reference_is_exact or trials.is_layered:
+        return settings
+    if trials.prelude_bytes(settings) < REST_SHARE * trials.cost(settings):
+        return settings
+    looser = (with_slack(source, trials.ath, settings, part * limit) for part in REST_SLACKS)
+    return trials.cheapest([settings, *looser])
+
+
+def _other_lags(source: Source, settings: Settings) -> list[Settings]:
+    """Return the settings with beams or not, and with the lags of stems or one for all. Short stems are also told apart
+    by their number of vertices."""
+    best, count = settings.lags, source.hierarchy.stem_count
+    no_beam = np.maximum(best, 1)
+    others = [np.minimum(best, 1), no_beam, np.ones_like(best), np.where(count <= qz.SHORT_STEM, count, no_beam)]
+    if source.still:
+        others += [np.full_like(best, 3), np.full_like(best, 4), np.minimum(2 * no_beam, 65535)]
+    tried = {lag.astype(np.int32).tobytes() for lag in others} - {best.tobytes()}
+    return [replace(settings, lags=np.frombuffer(lag, np.int32)) for lag in sorted(tried)]
+
+
+def _connected(source: Source, settings: Settings) -> list[Settings]:
+    if source.mesh is None or source.host_rest:
+        return []
+    tried = (settings.lags, np.ones_like(settings.lags))
+    return [replace(settings, lags=lag, connected_rest=True) for lag in tried]
+
+
+def _with_copies(source: Source, ath: Ath, tried: list[Settings]) -> list[Settings]:
+    """Return the candidates with branches that are copies of others, if there are any."""
+    if Feature.COPIES in source.without:
+        return []
+    first, branches = tried[0], branch_records(source.hierarchy, ath, tried[0])
+    shape_of = streams.find_copies(branches, first.rest_step, source.rest, first.rest_slack)
+    return [] if shape_of is None else [replace(settings, shape_of=shape_of) for settings in tried]

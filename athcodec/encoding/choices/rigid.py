@@ -1,0 +1,148 @@
+"""Rigid parts: which branches move without bending, which are loose, and how finely they turn (FORMAT.md, Rigid).
+
+A card that is smaller than the bound is noise after affine functions and modes have been quantised to it. As a rigid
+part it keeps its shape whatever the bound, and takes three rows in place of nine.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from athcodec._native import PIECE_VERTICES
+from athcodec.encoding import quantise as qz
+from athcodec.encoding.features import Feature
+from athcodec.encoding.segment import Source, stem_sizes
+from athcodec.encoding.segment_samples import SegmentSample
+from athcodec.encoding.settings import Settings
+from athcodec.encoding.trials import Trials
+from athcodec.motion.algebra import decompose, determinant, multiply
+
+MOST_BEND = 0.3  # Distance, in bounds, by which a rigid part may bend in the source.
+STIFF_BEND = 0.05  # Distance, in bounds, up to which a part of any size is rigid.
+LARGEST = 20.0  # Size of a part, in bounds, up to which the bound would spoil its shape.
+FRAMES = 12  # Frames of a segment by which rigid parts are found.
+TURN_STEP = qz.half_octave(-7)  # Largest step of rotations, in radians: their errors are 1 to 2 degrees.
+MOST_TURN = 15  # Half octaves below 1 radian of the finest largest step.
+CALM_STEP, CALM_COST = 1.15, 1.03  # A calmer step is finer by this factor; all calmer steps cost at most this factor.
+CALM_ROUNDS = 32  # Steps finer than the first that are tried at most: the last is 1/87 of it.
+CALM_SHARE = 1e-4  # Share of the vertices of small rigid parts, over all frames, that may be corrected.
+
+
+def first_rigid(
+    source: Source, bound: float, samples: Sequence[SegmentSample], ratios: Sequence[int]
+) -> tuple[np.ndarray, float]:
+    """Return in how many of the layers branches that are to keep their shape move rigidly, (B,) int32, and the largest
+    step of rotations. ratios: of the steps of the layers to that of the last."""
+    hierarchy, least = source.hierarchy, source.smallest_bound(bound)
+    if Feature.RIGID in source.without:
+        return np.zeros(hierarchy.branch_count, np.int32), 0.0
+    rigid = rigid_layers(
+        hierarchy.first_vertex,
+        hierarchy.stem_count,
+        source.sheet_like | (source.details > 0),
+        source.rest,
+        [sample.positions for sample in samples],
+        [ratio * least for ratio in ratios],
+    )
+    turns = rigid[source.details > 0].any() and Feature.TURN not in source.without
+    return rigid, TURN_STEP if turns else 0.0
+
+
+def loose_branches(source: Source, sample: np.ndarray) -> np.ndarray:
+    """Return (B,) bool: branches whose base leaves its attach point by more than their own size, such as fallen leaves
+    and separate parts."""
+    if Feature.LOOSE in source.without:
+        return np.zeros(source.hierarchy.branch_count, bool)
+    hierarchy, rest = source.hierarchy, source.rest
+    first, attach = hierarchy.first_vertex, np.maximum(hierarchy.attach, 0)
+    gap = np.linalg.norm(sample[first] - sample[attach], axis=1)
+    rest_gap = np.linalg.norm(rest[first] - rest[attach], axis=1)
+    stretch = np.abs(gap - rest_gap[:, None]).max(axis=1)
+    return (hierarchy.attach >= 0) & (stretch > np.maximum(stem_sizes(source), rest_gap))
+
+
+def best_freedom(settings: Settings, trials: Trials) -> Settings:
+    """Return the settings with rigid branches that move away from what they hang on, or not."""
+    if trials.without(Feature.FREE_RIGID) or not (settings.rigid > settings.layer).any():
+        return settings
+    return trials.cheapest([settings, replace(settings, free_rigid=True)])
+
+
+def calm_parts(settings: Settings, trials: Trials) -> Settings:
+    """Return the settings with a finer step, of all or of turns, as far as that is cheap, if corrections bend and
+    twitch many small rigid parts."""
+    most, share = CALM_COST * trials.cost(settings), _corrected_parts(settings, trials)
+    for _ in range(CALM_ROUNDS):
+        if share <= CALM_SHARE:
+            break
+        finer = (
+            replace(settings, step=qz.single(settings.step / CALM_STEP)),
+            replace(settings, turn_step=_finer_turn(settings.turn_step)),
+        )
+        calmer = {_corrected_parts(tried, trials): tried for tried in finer if trials.cost(tried) <= most}
+        if min(calmer, default=share) >= share:
+            break
+        share = min(calmer)
+        settings = calmer[share]
+    return settings
+
+
+def _corrected_parts(settings: Settings, trials: Trials) -> float:
+    """Return the share of the vertices, over all frames, that is corrected, of rigid parts whose turns are finer than
+    their step asks for."""
+    if not settings.turn_step:
+        return 0.0
+    plan = trials.prelude(settings).plan
+    small = plan.is_rigid & (plan.levers() * settings.turn_step < settings.step)
+    is_small = np.repeat(small, plan.pieces["count"])
+    if not is_small.any():
+        return 0.0
+    coded = trials.coded(settings, trials.middle, trials.learned_modes(plan, settings))
+    return is_small[coded.corrected].sum() / (max(1, is_small[coded.sample].sum()) * coded.segment.frames)
+
+
+def _finer_turn(turn_step: float) -> float:
+    """Return the next finer largest step of rotations, or the finest."""
+    return qz.half_octave(-min(qz.turn_of(turn_step) + 1, MOST_TURN))
+
+
+def rigid_layers(
+    first: np.ndarray,
+    count: np.ndarray,
+    wanted: np.ndarray,
+    rest: np.ndarray,
+    samples: Sequence[np.ndarray],
+    bounds: Sequence[float],
+) -> np.ndarray:
+    """Return how many of the layers of such bounds, descending, see a branch as rigid, (B,) int32.
+
+    first, count, wanted: (B,) vertices of the branches, and which may be; rest: (N, 3); samples: (N, 3, T) each.
+    """
+    layers = np.zeros(len(count), np.int32)
+    for size in np.unique(count[wanted & (count > 2) & (count <= PIECE_VERTICES)]).tolist():
+        branches = np.flatnonzero(wanted & (count == size))
+        vertices = first[branches, None] + np.arange(size)
+        bend = np.max([_bends(rest[vertices], sample, vertices) for sample in samples], axis=0)
+        extent = np.linalg.norm(np.ptp(rest[vertices], axis=1), axis=1)
+        for bound in bounds:  # Refined rotations cost more than refined modes, so only parts that need them have them.
+            stiff = bend <= STIFF_BEND * bound
+            layers[branches] += (bend <= MOST_BEND * bound) & ((extent <= LARGEST * bound) | stiff)
+    return layers
+
+
+def _bends(shapes: np.ndarray, sample: np.ndarray, vertices: np.ndarray) -> np.ndarray:
+    """Return how far any vertex of a part is at most from where the nearest rigid motion takes it, (B,). shapes: (B, n,
+    3)."""
+    d = shapes - shapes.mean(axis=1, keepdims=True)
+    worst = np.zeros(len(shapes))
+    for t in np.unique(np.linspace(0, sample.shape[2] - 1, FRAMES).astype(int)):
+        x = sample[:, :, t][vertices]
+        x = x - x.mean(axis=1, keepdims=True)
+        u, _, v = decompose(multiply(x.transpose(0, 2, 1), d))
+        u[:, :, 2] *= np.sign(determinant(u) * determinant(v))[:, None]
+        away = x - multiply(d, multiply(u, v).transpose(0, 2, 1))
+        worst = np.maximum(worst, np.linalg.norm(away, axis=2).max(axis=1))
+    return worst

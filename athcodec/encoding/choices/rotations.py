@@ -1,0 +1,32 @@
+"""Rotations: whether stems are predicted as turned with what they are attached to, and how finely (FORMAT.md)."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from athcodec.decoding.container import ROTATION_FACTORS
+from athcodec.encoding.features import Feature
+from athcodec.encoding.settings import Settings
+from athcodec.encoding.trials import Trials
+
+FAST_FACTORS = ROTATION_FACTORS[:2]  # The factors that a fast search tries.
+
+
+def candidates(settings: Settings, factors: tuple[int, ...] = ROTATION_FACTORS) -> list[Settings]:
+    """Return the settings with each rotation factor at all levels."""
+    return [settings.with_rotations(factor) for factor in factors]
+
+
+def best_rotations(settings: Settings, trials: Trials, factors: tuple[int, ...] = ROTATION_FACTORS) -> Settings:
+    """Return the settings with the best factor: one for all levels, one for each level, or one for the roots alone."""
+    if trials.without(Feature.ROTATIONS):
+        return settings
+    uniform = candidates(settings, factors)
+    trials.costs(uniform)
+    per_level = np.array([trials.level_costs(candidate) for candidate in uniform])
+    mixed = replace(settings, rotation_step_factors=tuple(factors[i] for i in per_level.argmin(axis=0)))
+    others = (0,) * (settings.levels - 1)
+    roots = [replace(settings, rotation_step_factors=(factor, *others)) for factor in factors if factor]
+    return trials.cheapest([settings, mixed, *roots, *uniform])

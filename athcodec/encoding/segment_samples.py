@@ -1,0 +1,84 @@
+"""The segments that a search codes in place of all of them: one of each kind of clip, from calm to wild."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from athcodec.encoding.sample import PlantSample
+from athcodec.encoding.segment import Source
+from athcodec.options import DEFAULT_SEGMENT
+
+SAMPLES = 3  # Largest number of segments that stand for several clips.
+
+
+@dataclass(frozen=True, eq=False)
+class SegmentSample:
+    """A segment that stands for others.
+
+    Attributes
+    ----------
+    positions : (N, 3, T) array
+        In file order.
+    frames : float
+        The number of frames of the clip that the segment stands for.
+    whole_loop : bool
+        Whether the segment is all of a loop.
+    """
+
+    positions: np.ndarray
+    frames: float
+    whole_loop: bool = False
+
+    @property
+    def scale(self) -> float:
+        """The frames that the segment stands for, over its own."""
+        return self.frames / self.positions.shape[2]
+
+    def of_plant(self, sample: PlantSample) -> SegmentSample:
+        """Return the segment of a part of the plant."""
+        return replace(self, positions=self.positions[sample.vertices])
+
+
+def samples_of(source: Source) -> list[SegmentSample]:
+    """Return the typical segments with their positions."""
+    return [
+        SegmentSample(_middle(source.positions(segment)), frames, source.is_whole_loop(segment))
+        for segment, frames in typical_segments(source)
+    ]
+
+
+def typical_segments(source: Source) -> list[tuple[int, int]]:
+    """Return the middle segment of a clip, or those of a few of several clips, from calm to wild. Each has the number
+    of frames of the file that it stands for."""
+    ranges = source.clip_range_segments
+    middles = [start + len(segments) // 2 for start, segments in zip(source.clip_range_starts, ranges)]
+    if len(middles) == 1:
+        return [(middles[0], source.coded_frames)]
+    lengths = np.array([(~source.repeats[segments[0][0] : segments[-1][1]]).sum() for segments in ranges])
+    groups = np.array_split(
+        np.argsort([_moved(source, segment) for segment in middles], kind="stable"), min(SAMPLES, len(middles))
+    )
+    return [(middles[group[len(group) // 2]], int(lengths[group].sum())) for group in groups]
+
+
+def usual_change(samples: Sequence[SegmentSample]) -> float:
+    """Return the RMS change of velocity, in length per frame squared; infinite if all samples are too short."""
+    changes = [np.diff(sample.positions, 2, axis=2) for sample in samples if sample.positions.shape[2] > 2]
+    return float(np.sqrt(np.mean([(change**2).sum(axis=1).mean() for change in changes]))) if changes else np.inf
+
+
+def _middle(positions: np.ndarray) -> np.ndarray:
+    """Return at most DEFAULT_SEGMENT frames of a segment, so that longer segments do not slow the search."""
+    first = max(0, positions.shape[2] - DEFAULT_SEGMENT) // 2
+    return np.ascontiguousarray(positions[:, :, first : first + DEFAULT_SEGMENT])
+
+
+def _moved(source: Source, segment: int) -> float:
+    """Return the RMS displacement of the vertices from the first frame of a segment to its middle."""
+    start, stop = source.segments[segment]
+    first, middle = (source.clip.block(frame, frame + 1).astype(np.float64) for frame in (start, (start + stop) // 2))
+    return math.sqrt(((middle - first) ** 2).sum() / source.clip.vertex_count)

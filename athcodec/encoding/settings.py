@@ -1,0 +1,152 @@
+"""What an encoder decides about a file: the settings of a layer of precision, and those of a whole file."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from athcodec._native import Rounding
+from athcodec.encoding import quantise as qz
+from athcodec.encoding.features import Feature
+from athcodec.encoding.learned_modes import LearnedModes
+
+BEAM = 0  # Form of a branch whose modes are those of a beam; other forms are SHEET, or the vertices in a tube's ring.
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What a trial varies. Steps are in scene units; arrays of branches, (B,), are in file order."""
+
+    bound: float
+    largest_bound: float  # The bound of the vertex with the largest weight.
+    limit: float | np.ndarray  # What positions are held to: one distance, or one for each vertex, (N,).
+    step: float
+    level_steps: np.ndarray  # (levels,) factors on the step.
+    rest_step: float
+    forms: np.ndarray  # (B,) int32: BEAM, SHEET, or the vertices of each ring of a tube.
+    loose: np.ndarray  # (B,) bool
+    rigid: np.ndarray  # (B,) int32: the number of layers, from the first on, in which a branch is rigid.
+    layer: int  # Number of the layer of precision that the settings are for.
+    free_rigid: bool  # Whether rigid branches are loose.
+    turn_step: float  # Largest step of rotations of rigid pieces, in radians; 0: none.
+    lags: np.ndarray  # (B,) int32
+    details: np.ndarray  # (B,) int32
+    connected_rest: bool
+    rotation_step_factors: tuple[int, ...]  # The rotation factor of each level.
+    learned_bases: tuple[bool, ...]  # Whether each level has a learned time basis.
+    common_basis: bool  # Whether the levels with learned time bases share one.
+    learned_pieces: np.ndarray | None  # (P,) bool: pieces that have learned modes; None: no piece has.
+    node_steps: np.ndarray  # (levels,) steps of the maps of nodes, as SegmentMotion.analyse_nodes takes them.
+    rest_slack: float = 0.0  # Distance by which the rest pose may be off to save bits.
+    shape_of: np.ndarray | None = None  # (B,) as streams.find_copies returns it; None: the rest pose has no copies.
+    periodic: bool = False  # Whether waves over time are periodic, in loops that are one segment.
+    usual_change: float = np.inf  # Change of velocity in a usual frame where segments meet, length per frame squared.
+    without: frozenset[Feature] = frozenset()  # Features that the file does without.
+    learned_saving: float | None = None  # Factor by which the bits of pieces had to shrink for learned modes.
+
+    @property
+    def key(self) -> tuple:
+        """What distinguishes these settings from others of the same search."""
+        return (
+            self.step,
+            self.level_steps.tobytes(),
+            self.turn_step,
+            *self.prelude_key,
+            self.rotation_step_factors,
+            self.periodic,
+            self.learned_bases,
+            self.common_basis,
+            self.learned_pieces is not None and self.learned_pieces.tobytes(),
+        )
+
+    @property
+    def prelude_key(self) -> tuple:
+        """The part of the key that decides hierarchy and rest pose."""
+        return (
+            self.rest_step,
+            self.rest_slack,
+            self.connected_rest,
+            self.lags.tobytes(),
+            None if self.shape_of is None else self.shape_of.tobytes(),
+            self.forms.tobytes(),
+            self.layer,
+            self.free_rigid,
+        )
+
+    @property
+    def levels(self) -> int:
+        """The number of levels of the branch hierarchy."""
+        return len(self.level_steps)
+
+    @property
+    def learning_levels(self) -> list[int]:
+        """Levels that learn their time bases."""
+        return [level for level, learned in enumerate(self.learned_bases) if learned]
+
+    @property
+    def rounding(self) -> Rounding:
+        """How numbers become integers."""
+        return Rounding(qz.DEAD_ZONE, qz.end_weights(self._relative_change))
+
+    @property
+    def _relative_change(self) -> float:
+        """The change of velocity in a usual frame, in bounds."""
+        return self.usual_change / float(np.min(self.limit))
+
+    @property
+    def is_straight(self) -> bool:
+        """Whether rows end in straight lines, as modes of a beam do, and not in parabolas."""
+        return self._relative_change < qz.STRAIGHT and Feature.STRAIGHT not in self.without
+
+    def step_of(self, level: int) -> float:
+        """Return the step of the stems of a level."""
+        return qz.single(self.step * self.level_steps[level])
+
+    def of_segment(self, whole_loop: bool) -> Settings:
+        """Return the settings of a segment, which is all of a loop or not."""
+        return replace(self, periodic=self.periodic and whole_loop)
+
+    def with_rotations(self, factor: int) -> Settings:
+        """Return the settings with one rotation factor for all levels."""
+        return replace(self, rotation_step_factors=(factor,) * self.levels)
+
+    def in_waves(self) -> Settings:
+        """Return the settings without learned time bases."""
+        return replace(self, learned_bases=(False,) * self.levels, common_basis=False)
+
+    def coarser(self, ratio: int) -> Settings:
+        """Return the settings of a first layer whose step is `ratio` times as large."""
+        return replace(
+            self,
+            bound=ratio * self.bound,
+            largest_bound=ratio * self.largest_bound,
+            limit=ratio * self.limit,
+            step=qz.single(ratio * self.step),
+            rest_step=qz.first_rest_step(self.rest_step, self.bound, ratio),
+            layer=0,
+        )
+
+
+@dataclass(frozen=True)
+class Choice:
+    """Settings of a file: those of its only layer of precision, or of its refinements and of its first layer.
+
+    Attributes
+    ----------
+    learned_modes : LearnedModes or None
+        Those of the last layer.
+    reference : (N, 3) float64 array or None
+        The pose that motion is coded about, less the origin, in file order; None: the rest pose.
+    predicted : bool or None
+        Whether vertices are points of the lattice, where motion is predicted.
+    error_share : float
+        Share of the limits that the errors of predicted motion may take.
+    """
+
+    settings: Settings
+    first_layer: Settings
+    learned_modes: LearnedModes | None
+    reference: np.ndarray | None = None
+    predicted: bool | None = None
+    error_share: float = 1.0

@@ -1,0 +1,70 @@
+"""The settings that a search starts with, and those of a clip that stands still, which needs no search."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from athcodec.encoding import quantise as qz
+from athcodec.encoding.choices import rest
+from athcodec.encoding.choices.forms import first_forms
+from athcodec.encoding.choices.rigid import first_rigid, loose_branches
+from athcodec.encoding.segment import Source
+from athcodec.encoding.segment_samples import SegmentSample, usual_change
+from athcodec.encoding.settings import Choice, Settings
+from athcodec.encoding.shape import finer_than
+from athcodec.encoding.survey import Ath
+
+STILL_STEP = 1024.0  # Quantisation step, in bounds, that rounds every coefficient of a still stem to zero.
+
+
+def first_settings(
+    source: Source, ath: Ath, bound: float, samples: Sequence[SegmentSample], ratios: Sequence[int] = (1,)
+) -> Settings:
+    """Return the start of a search for the last of layers; ratios: of their steps to that of the last, descending."""
+    is_layered, (rigid, turn_step) = len(ratios) > 1, first_rigid(source, bound, samples, ratios)
+    relative = bound / source.seen.diagonal if source.seen.diagonal > 0 else 1e-4
+    step, rest_step = bound * qz.first_step_ratio(relative), bound * qz.rest_step_ratio(relative)
+    levels = ath.height + 2
+    settings = Settings(
+        bound=bound,
+        largest_bound=source.largest_bound(bound),
+        limit=source.limit(bound),
+        step=qz.single(step),
+        level_steps=np.ones(levels),
+        rest_step=qz.single(rest_step),
+        forms=first_forms(source, samples),
+        loose=loose_branches(source, samples[-1].positions),
+        rigid=rigid,
+        layer=len(ratios) - 1,
+        free_rigid=False,
+        turn_step=turn_step,
+        lags=np.zeros(source.hierarchy.branch_count, np.int32),
+        details=source.details if is_layered else finer_than(source.details, bound),
+        connected_rest=False,
+        rotation_step_factors=(0,) * levels,
+        learned_bases=(False,) * levels,
+        common_basis=False,
+        learned_pieces=None,
+        node_steps=np.full(levels, step),
+        usual_change=usual_change(samples) if source.has_seams else np.inf,
+        without=source.without,
+    )
+    if is_layered and not settings.details.any():  # Lags that are best at once are worse where layers refine them.
+        best = replace(settings, lags=rest.lags(source, rest_step, settings.details))
+        return rest.connected_if_smaller(source, ath, best)
+    return rest.with_best_rest(source, ath, settings)
+
+
+def still_choice(source: Source, ath: Ath, bound: float, ratio: int) -> Choice:
+    """Return the choice for a clip all of whose frames are the rest pose: no motion, and a rest pose of the bound's
+    precision. ratio: of the first layer's step to that of the last."""
+    step, least = STILL_STEP * source.smallest_bound(bound), 0.5 * source.smallest_bound(bound)
+    settings = first_settings(source, ath, bound, [SegmentSample(source.positions(0), source.coded_frames)])
+    slack = float(np.min(settings.limit)) - float(np.spacing(source.largest_number))
+    settings = rest.with_slack(source, ath, settings, max(slack, least))
+    node_steps = np.full(settings.levels, STILL_STEP * source.seen.diagonal + step)
+    settings = replace(settings, step=qz.single(step), node_steps=node_steps)
+    return Choice(settings, settings.coarser(ratio), None)

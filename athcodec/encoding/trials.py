@@ -1,0 +1,273 @@
+"""Trials: candidates code samples of the segments, and the bytes of the whole file are estimated from theirs.
+
+`Trials` remembers what every candidate costs. It is all that a coding choice (choices/) sees of a search.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from threading import Lock
+
+import numpy as np
+
+from athcodec.encoding import streams
+from athcodec.encoding.features import Feature
+from athcodec.encoding.learned_modes import Components, LearnedModes, components, learn
+from athcodec.encoding.motion import Plan, SegmentMotion
+from athcodec.encoding.progress import TrialCount
+from athcodec.encoding.sample import ExtrapolationFactors
+from athcodec.encoding.segment import (
+    Coded,
+    CodedPrelude,
+    Source,
+    StreamBasis,
+    analyse,
+    analyse_finely,
+    basis_ratio,
+    code_stems,
+    level_bases,
+    thread_count,
+    time_components,
+)
+from athcodec.encoding.segment_samples import SegmentSample
+from athcodec.encoding.settings import Settings
+from athcodec.encoding.survey import Ath
+from athcodec.encoding.time_bases import TimeComponents
+from athcodec.errors import BoundError
+
+LEARNING_SEGMENTS = 4  # Largest number of segments of a clip that modes are learned from.
+PRELUDES_KEPT = 6  # Hierarchies and rest poses that are kept between trials.
+
+
+class Trials:
+    """What settings cost in one plant, or in a sample of it.
+
+    Attributes
+    ----------
+    source : Source
+    ath : Ath
+    start : Settings
+        Those that the search starts with.
+    samples : list of SegmentSample
+        From calm to wild.
+    extrapolation : ExtrapolationFactors
+        What the plant has over its sample.
+    levels : int
+        Levels of the branch hierarchy.
+    count : TrialCount
+        What is reported of the whole search.
+    """
+
+    def __init__(
+        self,
+        source: Source,
+        ath: Ath,
+        start: Settings,
+        samples: Sequence[SegmentSample],
+        jobs: int | None = None,
+        count: TrialCount | None = None,
+        extrapolation: ExtrapolationFactors | None = None,
+    ):
+        self.source, self.ath, self.start, self.samples, self.levels = source, ath, start, samples, start.levels
+        self.extrapolation = extrapolation or ExtrapolationFactors.everything(self.levels)
+        self.count, self._jobs, self._counted = count or TrialCount(), jobs, 0
+        self._known: dict[tuple, tuple[float, np.ndarray]] = {}
+        self._components: dict[tuple, Components] = {}
+        self._time_components: dict[tuple, tuple[float, list[dict[int | None, TimeComponents]]]] = {}
+        self._preludes: dict[tuple, CodedPrelude] = {}
+        self._lock = Lock()  # Threads that try candidates share the preludes.
+
+    def beside(
+        self,
+        source: Source,
+        ath: Ath,
+        start: Settings,
+        samples: Sequence[SegmentSample],
+        extrapolation: ExtrapolationFactors | None = None,
+    ) -> Trials:
+        """Return trials of another source in the same search."""
+        return Trials(source, ath, start, samples, self._jobs, self.count, extrapolation)
+
+    @property
+    def is_layered(self) -> bool:
+        """Whether the file has several layers of precision."""
+        return self.start.layer > 0
+
+    @property
+    def middle(self) -> int:
+        """Number of the sample between the calm and the wild ones."""
+        return len(self.samples) // 2
+
+    def without(self, feature: Feature) -> bool:
+        """Return whether the file does without a feature."""
+        return feature in self.source.without
+
+    def spend(self, trials: int = 0) -> None:
+        """Report progress: the trials since the last report, and other work that takes as long as so many trials."""
+        made, self._counted = len(self._known) - self._counted, len(self._known)
+        self.count.add(made + trials)
+
+    def cost(self, settings: Settings) -> float:
+        """Return the bytes of a whole file, without maps of nodes; infinite if the bound cannot be kept."""
+        return self._tried(settings)[0]
+
+    def level_costs(self, settings: Settings) -> np.ndarray:
+        """Return the bytes of each level's streams in a whole file, (levels,)."""
+        return self._tried(settings)[1]
+
+    def costs(self, candidates: Sequence[Settings]) -> list[float]:
+        """Return what each candidate costs; several are tried at once."""
+        by_prelude = {settings.prelude_key: settings for settings in candidates}
+        with ThreadPoolExecutor(thread_count(self._jobs, self.source)) as pool:
+            list(pool.map(self._keeps_bound, by_prelude.values()))
+            # Learning is done in order, because the first candidate of a kind decides what all like it learn.
+            for settings in filter(self._keeps_bound, candidates):
+                if any(settings.learned_bases):
+                    self._learn_time(settings)
+                if settings.learned_pieces is not None:
+                    self._learn_modes(settings)
+            costs = []
+            for cost in pool.map(self.cost, candidates):
+                costs.append(cost)
+                self.spend()
+            return costs
+
+    def cheapest(self, candidates: Sequence[Settings]) -> Settings:
+        """Return the candidate that makes the smallest file, the first of several."""
+        return candidates[int(np.argmin(self.costs(candidates)))]
+
+    def prelude(self, settings: Settings) -> CodedPrelude:
+        """Return hierarchy and rest pose as coded, from an earlier trial if there was one. Raises BoundError."""
+        key = settings.prelude_key
+        with self._lock:
+            prelude = self._preludes.pop(key, None)
+            if prelude is not None:
+                self._preludes[key] = prelude  # The prelude used last stands last.
+                return prelude
+        prelude = CodedPrelude(self.source, self.ath, settings)
+        with self._lock:
+            self._preludes[key] = prelude
+            while len(self._preludes) > PRELUDES_KEPT:
+                self._preludes.pop(next(iter(self._preludes)))
+        return prelude
+
+    def prelude_bytes(self, settings: Settings) -> float:
+        """Return the bytes of hierarchy and rest pose of the whole plant."""
+        return self.prelude(settings).prelude_bytes * self.extrapolation.vertices
+
+    def learned_modes(self, plan: Plan, settings: Settings, everywhere: bool = False) -> LearnedModes | None:
+        """Return the modes of the pieces that the settings name, or of all pieces."""
+        if settings.learned_pieces is None and not everywhere:
+            return None
+        seen = self._learn_modes(settings)
+        return learn(plan, seen, settings.step, None if everywhere else settings.learned_pieces)
+
+    def analysed(self, settings: Settings, number: int, modes: LearnedModes | None) -> SegmentMotion:
+        """Return a sample in its integers."""
+        prelude, sample = self.prelude(settings), self.samples[number]
+        of_sample = settings.of_segment(sample.whole_loop)
+        bases = self._bases(settings, number)
+        return analyse(prelude.plan, prelude.output, of_sample, sample.positions, modes, bases)[0]
+
+    def coded(self, settings: Settings, number: int, modes: LearnedModes | None) -> Coded:
+        """Return the streams of a sample."""
+        sample = self.samples[number]
+        of_sample = settings.of_segment(sample.whole_loop)
+        return code_stems(self.prelude(settings), of_sample, sample.positions, modes, self._bases(settings, number))
+
+    def forget(self, settings: Settings) -> None:
+        """Forget all learned time bases and what the settings cost, so that they are learned at their own step."""
+        self._time_components.clear()
+        self._known.pop(settings.key, None)
+
+    def forget_modes(self) -> None:
+        """Free the components of learned modes, which take as much memory as a segment."""
+        self._components.clear()
+
+    def _tried(self, settings: Settings) -> tuple[float, np.ndarray]:
+        key = settings.key
+        if key not in self._known:
+            self._known[key] = self._try(settings)
+        return self._known[key]
+
+    def _try(self, settings: Settings) -> tuple[float, np.ndarray]:
+        try:
+            plan = self.prelude(settings).plan
+            modes = self.learned_modes(plan, settings)
+            levels = sum(self._level_bytes(settings, modes, number) for number in range(len(self.samples)))
+        except BoundError:
+            return math.inf, np.full(self.levels, math.inf)
+        stored = streams.encode_learned_modes(plan, modes)
+        mode_bytes = sum(len(stream) * self.extrapolation.rows[level] for level, stream in stored.items())
+        return levels.sum() + mode_bytes + self.prelude_bytes(settings), levels
+
+    def _level_bytes(self, settings: Settings, modes: LearnedModes | None, number: int) -> np.ndarray:
+        """Return the bytes of the streams of all that a sample stands for, (levels,)."""
+        coded = self.coded(settings, number, modes)
+        levels, heads = np.zeros(self.levels), np.zeros(self.levels)
+        for level, stream in coded.stems.items():
+            levels[level], heads[level] = len(stream), coded.heads[level]
+        corrections = len(coded.corrections.chunk) / coded.sample_share
+        if corrections:
+            levels += corrections * self._corrected(coded.segment.plan, coded.corrected)
+        levels += (levels - heads) * (self.extrapolation.rows - 1)
+        return levels * self.samples[number].scale
+
+    def _corrected(self, plan: Plan, vertices: np.ndarray) -> np.ndarray:
+        """Return the share of the corrections of such vertices that falls on the pieces of each level, (levels,)."""
+        level_of_vertex = np.repeat(plan.base_level, plan.pieces["count"])
+        counts = np.bincount(level_of_vertex[vertices], minlength=self.levels)
+        return counts / counts.sum()
+
+    def _keeps_bound(self, settings: Settings) -> bool:
+        """Return whether a rest pose keeps the bound; its prelude is there for later calls."""
+        try:
+            self.prelude(settings)
+        except BoundError:
+            return False
+        return True
+
+    def _bases(self, settings: Settings, number: int) -> dict[int, StreamBasis]:
+        """Return the time bases of the levels that learn theirs."""
+        if not any(settings.learned_bases):
+            return {}
+        step, learned = self._learn_time(settings)
+        plan = self.prelude(settings).plan
+        return level_bases(plan, settings, learned[number], basis_ratio(plan, settings, settings.step / step))
+
+    def _learn_time(self, settings: Settings) -> tuple[float, list[dict[int | None, TimeComponents]]]:
+        """Return the components of the samples over time, of each level and of all, and the step of the trial that
+        asked first for them: they hardly depend on the step."""
+        key = *_before_modes(settings), settings.level_steps.tobytes(), settings.periodic
+        if key not in self._time_components:
+            plan = self.prelude(settings).plan
+            levels = [*(level for level in range(self.levels) if plan.has_stems(level)), None]
+            learned = [
+                time_components(plan, settings.of_segment(sample.whole_loop), sample.positions, levels)
+                for sample in self.samples
+            ]
+            self._time_components[key] = settings.step, learned
+        return self._time_components[key]
+
+    def _learn_modes(self, settings: Settings) -> Components:
+        """Return the components of segments spread over the clip, in the steps of the trial that asked first."""
+        key = _before_modes(settings)
+        if key not in self._components:
+            plan, count = self.prelude(settings).plan, len(self.source.segments)
+            chosen = np.unique(np.linspace(0, count - 1, LEARNING_SEGMENTS).astype(int))
+            self._components[key] = components(
+                plan, (analyse_finely(plan, settings, self.source.positions(segment)) for segment in chosen)
+            )
+        return self._components[key]
+
+
+def distinct(candidates: Iterable[Settings]) -> list[Settings]:
+    """Return the candidates without those that are the same as others."""
+    return list({settings.key: settings for settings in candidates}.values())
+
+
+def _before_modes(settings: Settings) -> tuple:
+    """Return what decides the motion that is left for the modes of a piece."""
+    return settings.rotation_step_factors, settings.forms.tobytes()
