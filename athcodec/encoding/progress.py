@@ -30,13 +30,7 @@ def expected_trials(effort: str, layered: bool, small: bool) -> int:
 
 
 class TrialCount:
-    """Counts the trials of a search, and other work that takes as long, and reports them.
-
-    Attributes
-    ----------
-    expected : int
-        About what the whole search counts.
-    """
+    """Counts the trials of a search, and other work that takes as long, and reports them; expected: about how many."""
 
     def __init__(self, report: Progress = silent):
         self.expected, self._report, self._made = 1, report, 0

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 
 import numpy as np
@@ -61,23 +61,19 @@ def _nearest(settings: Settings, others: list[Settings], trials: Trials) -> list
     return [others[i] for i in np.argsort(costs, kind="stable")[:NEAREST] if costs[i] <= most]
 
 
+@dataclass(eq=False)
 class Search:
-    """Finds the settings of a file.
+    """Finds the settings of a file; ratios: of the steps of its layers to that of the last, descending to 1."""
 
-    Attributes
-    ----------
-    trials : Trials
-    effort : str
-    ratios : sequence of int
-        Of the steps of the layers of precision to that of the last, descending to 1.
-    """
+    trials: Trials
+    effort: str
+    ratios: Sequence[int] = (1,)
 
-    def __init__(self, trials: Trials, effort: str, ratios: Sequence[int] = (1,)):
-        self.trials, self.effort, self.ratios = trials, effort, ratios
-        source, keeps_shape = trials.source, trials.start.turn_step > 0  # A few bytes less would cost the shape.
-        self._is_small = is_small(source.clip.vertex_count, source.segments, effort) and not keeps_shape
-        self._forms: np.ndarray | None = None  # The forms of all of a plant that is sampled.
-        trials.count.expected = expected_trials(effort, trials.is_layered, self._is_small)
+    def __post_init__(self) -> None:
+        source, keeps_shape = self.trials.source, self.trials.start.turn_step > 0  # A few bytes less cost the shape.
+        self._forms: np.ndarray | None = None
+        self._is_small = is_small(source.clip.vertex_count, source.segments, self.effort) and not keeps_shape
+        self.trials.count.expected = expected_trials(self.effort, self.trials.is_layered, self._is_small)
 
     @classmethod
     def of(
@@ -212,7 +208,7 @@ class Search:
         source = trials.source.about(mean_pose(trials.source, trials.ath, trials.start))
         ath = replace(trials.ath, rest=source.rest + source.origin)
         start = first_settings(source, ath, trials.start.bound, trials.samples, self.ratios)
-        return Search(trials.beside(source, ath, start, trials.samples), self.effort, self.ratios)
+        return Search(replace(trials, source=source, ath=ath, start=start), self.effort, self.ratios)
 
     def _like(self, other: Search, settings: Settings) -> Settings:
         """Return settings that were chosen about another reference pose, about this one."""
@@ -279,16 +275,12 @@ class Search:
             forms=forms.forms_like(chosen.forms, of_sample.source, trials),
             node_steps=chosen.node_steps * np.where(inner > 0, fewer, 1.0),
         )
-        settings = replace(settings, forms=self._forms_of_plant(settings))
+        if self._forms is None:  # The forms of all of the plant are chosen once.
+            self._forms = settings.forms if self.effort == "fast" else forms.best_of_plant(settings, trials)
+        settings = replace(settings, forms=self._forms)
         if chosen.rest_slack > 0:
             settings = with_slack(trials.source, trials.ath, settings, chosen.rest_slack)
         if chosen.learned_saving is None:
             return settings
         [pieces] = learned_pieces.pieces_that_save(settings, trials, [chosen.learned_saving])
         return replace(settings, learned_pieces=pieces)
-
-    def _forms_of_plant(self, settings: Settings) -> np.ndarray:
-        """Return the forms of all of a sampled plant, which are chosen once."""
-        if self._forms is None:
-            self._forms = settings.forms if self.effort == "fast" else forms.best_of_plant(settings, self.trials)
-        return self._forms

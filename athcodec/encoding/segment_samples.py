@@ -17,21 +17,11 @@ SAMPLES = 3  # Largest number of segments that stand for several clips.
 
 @dataclass(frozen=True, eq=False)
 class SegmentSample:
-    """A segment that stands for others.
+    """A segment that stands for others."""
 
-    Attributes
-    ----------
-    positions : (N, 3, T) array
-        In file order.
-    frames : float
-        The number of frames of the clip that the segment stands for.
-    whole_loop : bool
-        Whether the segment is all of a loop.
-    """
-
-    positions: np.ndarray
-    frames: float
-    whole_loop: bool = False
+    positions: np.ndarray  # (N, 3, T), in file order.
+    frames: float  # Number of frames of the clip that the segment stands for.
+    whole_loop: bool = False  # Whether the segment is all of a loop.
 
     @property
     def scale(self) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,6 +13,11 @@ from athcodec.encoding.features import Feature
 from athcodec.encoding.learned_modes import LearnedModes
 
 BEAM = 0  # Form of a branch whose modes are those of a beam; other forms are SHEET, or the vertices in a tube's ring.
+OF_PRELUDE = "rest_step", "rest_slack", "connected_rest", "lags", "shape_of", "forms", "layer", "free_rigid"
+OF_MOTION = (
+    *("step", "level_steps", "turn_step", "rotation_step_factors"),
+    *("periodic", "learned_bases", "common_basis", "learned_pieces"),
+)
 
 
 @dataclass(frozen=True)
@@ -27,52 +33,37 @@ class Settings:
     forms: np.ndarray  # (B,) int32: BEAM, SHEET, or the vertices of each ring of a tube.
     loose: np.ndarray  # (B,) bool
     rigid: np.ndarray  # (B,) int32: the number of layers, from the first on, in which a branch is rigid.
-    layer: int  # Number of the layer of precision that the settings are for.
-    free_rigid: bool  # Whether rigid branches are loose.
-    turn_step: float  # Largest step of rotations of rigid pieces, in radians; 0: none.
     lags: np.ndarray  # (B,) int32
     details: np.ndarray  # (B,) int32
-    connected_rest: bool
     rotation_step_factors: tuple[int, ...]  # The rotation factor of each level.
     learned_bases: tuple[bool, ...]  # Whether each level has a learned time basis.
-    common_basis: bool  # Whether the levels with learned time bases share one.
-    learned_pieces: np.ndarray | None  # (P,) bool: pieces that have learned modes; None: no piece has.
     node_steps: np.ndarray  # (levels,) steps of the maps of nodes, as SegmentMotion.analyse_nodes takes them.
+    layer: int = 0  # Number of the layer of precision that the settings are for.
+    free_rigid: bool = False  # Whether rigid branches are loose.
+    turn_step: float = 0.0  # Largest step of rotations of rigid pieces, in radians; 0: none.
+    connected_rest: bool = False
     rest_slack: float = 0.0  # Distance by which the rest pose may be off to save bits.
     shape_of: np.ndarray | None = None  # (B,) as streams.find_copies returns it; None: the rest pose has no copies.
+    common_basis: bool = False  # Whether the levels with learned time bases share one.
+    learned_pieces: np.ndarray | None = None  # (P,) bool: pieces that have learned modes; None: no piece has.
+    learned_saving: float | None = None  # Factor by which the bits of pieces had to shrink for learned modes.
     periodic: bool = False  # Whether waves over time are periodic, in loops that are one segment.
     usual_change: float = np.inf  # Change of velocity in a usual frame where segments meet, length per frame squared.
     without: frozenset[Feature] = frozenset()  # Features that the file does without.
-    learned_saving: float | None = None  # Factor by which the bits of pieces had to shrink for learned modes.
 
     @property
     def key(self) -> tuple:
         """What distinguishes these settings from others of the same search."""
-        return (
-            self.step,
-            self.level_steps.tobytes(),
-            self.turn_step,
-            *self.prelude_key,
-            self.rotation_step_factors,
-            self.periodic,
-            self.learned_bases,
-            self.common_basis,
-            self.learned_pieces is not None and self.learned_pieces.tobytes(),
-        )
+        return self.prelude_key + self._values(OF_MOTION)
 
     @property
     def prelude_key(self) -> tuple:
         """The part of the key that decides hierarchy and rest pose."""
-        return (
-            self.rest_step,
-            self.rest_slack,
-            self.connected_rest,
-            self.lags.tobytes(),
-            None if self.shape_of is None else self.shape_of.tobytes(),
-            self.forms.tobytes(),
-            self.layer,
-            self.free_rigid,
-        )
+        return self._values(OF_PRELUDE)
+
+    def _values(self, names: Sequence[str]) -> tuple:
+        values = (getattr(self, name) for name in names)
+        return tuple(value.tobytes() if isinstance(value, np.ndarray) else value for value in values)
 
     @property
     def levels(self) -> int:
@@ -130,23 +121,11 @@ class Settings:
 
 @dataclass(frozen=True)
 class Choice:
-    """Settings of a file: those of its only layer of precision, or of its refinements and of its first layer.
-
-    Attributes
-    ----------
-    learned_modes : LearnedModes or None
-        Those of the last layer.
-    reference : (N, 3) float64 array or None
-        The pose that motion is coded about, less the origin, in file order; None: the rest pose.
-    predicted : bool or None
-        Whether vertices are points of the lattice, where motion is predicted.
-    error_share : float
-        Share of the limits that the errors of predicted motion may take.
-    """
+    """Settings of a file: those of its only layer of precision, or of its refinements and of its first layer."""
 
     settings: Settings
     first_layer: Settings
-    learned_modes: LearnedModes | None
-    reference: np.ndarray | None = None
-    predicted: bool | None = None
-    error_share: float = 1.0
+    learned_modes: LearnedModes | None  # Those of the last layer.
+    reference: np.ndarray | None = None  # (N, 3) pose that motion is coded about, less the origin; None: the rest pose.
+    predicted: bool | None = None  # Whether vertices are points of the lattice, where motion is predicted.
+    error_share: float = 1.0  # Share of the limits that the errors of predicted motion may take.

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
 from threading import Lock
 
 import numpy as np
@@ -41,54 +42,27 @@ LEARNING_SEGMENTS = 4  # Largest number of segments of a clip that modes are lea
 PRELUDES_KEPT = 6  # Hierarchies and rest poses that are kept between trials.
 
 
+@dataclass(eq=False)
 class Trials:
-    """What settings cost in one plant, or in a sample of it.
+    """What settings cost in one plant, or in a sample of it."""
 
-    Attributes
-    ----------
-    source : Source
-    ath : Ath
-    start : Settings
-        Those that the search starts with.
-    samples : list of SegmentSample
-        From calm to wild.
-    extrapolation : ExtrapolationFactors
-        What the plant has over its sample.
-    levels : int
-        Levels of the branch hierarchy.
-    count : TrialCount
-        What is reported of the whole search.
-    """
+    source: Source
+    ath: Ath
+    start: Settings  # Those that the search starts with.
+    samples: Sequence[SegmentSample]  # From calm to wild.
+    jobs: int | None = None
+    count: TrialCount = field(default_factory=TrialCount)  # What is reported of the whole search.
+    extrapolation: ExtrapolationFactors | None = None  # What the plant has over its sample; None: it is all there.
+    _counted: int = field(init=False, default=0)  # Trials that have been reported.
+    _known: dict[tuple, tuple[float, np.ndarray]] = field(init=False, default_factory=dict)
+    _components: dict[tuple, Components] = field(init=False, default_factory=dict)
+    _time_components: dict[tuple, tuple[float, list]] = field(init=False, default_factory=dict)
+    _preludes: dict[tuple, CodedPrelude] = field(init=False, default_factory=dict)
+    _lock: Lock = field(init=False, default_factory=Lock)  # Threads that try candidates share the preludes.
 
-    def __init__(
-        self,
-        source: Source,
-        ath: Ath,
-        start: Settings,
-        samples: Sequence[SegmentSample],
-        jobs: int | None = None,
-        count: TrialCount | None = None,
-        extrapolation: ExtrapolationFactors | None = None,
-    ):
-        self.source, self.ath, self.start, self.samples, self.levels = source, ath, start, samples, start.levels
-        self.extrapolation = extrapolation or ExtrapolationFactors.everything(self.levels)
-        self.count, self._jobs, self._counted = count or TrialCount(), jobs, 0
-        self._known: dict[tuple, tuple[float, np.ndarray]] = {}
-        self._components: dict[tuple, Components] = {}
-        self._time_components: dict[tuple, tuple[float, list[dict[int | None, TimeComponents]]]] = {}
-        self._preludes: dict[tuple, CodedPrelude] = {}
-        self._lock = Lock()  # Threads that try candidates share the preludes.
-
-    def beside(
-        self,
-        source: Source,
-        ath: Ath,
-        start: Settings,
-        samples: Sequence[SegmentSample],
-        extrapolation: ExtrapolationFactors | None = None,
-    ) -> Trials:
-        """Return trials of another source in the same search."""
-        return Trials(source, ath, start, samples, self._jobs, self.count, extrapolation)
+    def __post_init__(self) -> None:
+        self.levels = self.start.levels
+        self.extrapolation = self.extrapolation or ExtrapolationFactors.everything(self.levels)
 
     @property
     def is_layered(self) -> bool:
@@ -120,7 +94,7 @@ class Trials:
     def costs(self, candidates: Sequence[Settings]) -> list[float]:
         """Return what each candidate costs; several are tried at once."""
         by_prelude = {settings.prelude_key: settings for settings in candidates}
-        with ThreadPoolExecutor(thread_count(self._jobs, self.source)) as pool:
+        with ThreadPoolExecutor(thread_count(self.jobs, self.source)) as pool:
             list(pool.map(self._keeps_bound, by_prelude.values()))
             # Learning is done in order, because the first candidate of a kind decides what all like it learn.
             for settings in filter(self._keeps_bound, candidates):
@@ -211,15 +185,11 @@ class Trials:
             levels[level], heads[level] = len(stream), coded.heads[level]
         corrections = len(coded.corrections.chunk) / coded.sample_share
         if corrections:
-            levels += corrections * self._corrected(coded.segment.plan, coded.corrected)
+            level_of_vertex = np.repeat(coded.segment.plan.base_level, coded.segment.plan.pieces["count"])
+            counts = np.bincount(level_of_vertex[coded.corrected], minlength=self.levels)
+            levels += corrections * (counts / counts.sum())
         levels += (levels - heads) * (self.extrapolation.rows - 1)
         return levels * self.samples[number].scale
-
-    def _corrected(self, plan: Plan, vertices: np.ndarray) -> np.ndarray:
-        """Return the share of the corrections of such vertices that falls on the pieces of each level, (levels,)."""
-        level_of_vertex = np.repeat(plan.base_level, plan.pieces["count"])
-        counts = np.bincount(level_of_vertex[vertices], minlength=self.levels)
-        return counts / counts.sum()
 
     def _keeps_bound(self, settings: Settings) -> bool:
         """Return whether a rest pose keeps the bound; its prelude is there for later calls."""

@@ -60,16 +60,10 @@ def _settings(source: Source, ath: Ath, bound: float, rest_step: float) -> Setti
         forms=np.zeros(branches, np.int32),
         loose=none,
         rigid=np.zeros(branches, np.int32),
-        layer=0,
-        free_rigid=False,
-        turn_step=0.0,
         lags=np.zeros(branches, np.int32),
         details=finer_than(source.details, bound),
-        connected_rest=False,
         rotation_step_factors=(0,) * levels,
         learned_bases=(False,) * levels,
-        common_basis=False,
-        learned_pieces=None,
         node_steps=np.ones(levels),
     )
     return with_best_rest(source, ath, settings)

@@ -39,14 +39,8 @@ def first_rigid(
     hierarchy, least = source.hierarchy, source.smallest_bound(bound)
     if Feature.RIGID in source.without:
         return np.zeros(hierarchy.branch_count, np.int32), 0.0
-    rigid = rigid_layers(
-        hierarchy.first_vertex,
-        hierarchy.stem_count,
-        source.sheet_like | (source.details > 0),
-        source.rest,
-        [sample.positions for sample in samples],
-        [ratio * least for ratio in ratios],
-    )
+    wanted = source.sheet_like | (source.details > 0)
+    rigid = _rigid_layers(source, wanted, [sample.positions for sample in samples], [ratio * least for ratio in ratios])
     turns = rigid[source.details > 0].any() and Feature.TURN not in source.without
     return rigid, TURN_STEP if turns else 0.0
 
@@ -109,18 +103,12 @@ def _finer_turn(turn_step: float) -> float:
     return qz.half_octave(-min(qz.turn_of(turn_step) + 1, MOST_TURN))
 
 
-def rigid_layers(
-    first: np.ndarray,
-    count: np.ndarray,
-    wanted: np.ndarray,
-    rest: np.ndarray,
-    samples: Sequence[np.ndarray],
-    bounds: Sequence[float],
+def _rigid_layers(
+    source: Source, wanted: np.ndarray, samples: Sequence[np.ndarray], bounds: Sequence[float]
 ) -> np.ndarray:
-    """Return how many of the layers of such bounds, descending, see a branch as rigid, (B,) int32.
-
-    first, count, wanted: (B,) vertices of the branches, and which may be; rest: (N, 3); samples: (N, 3, T) each.
-    """
+    """Return how many of the layers of such bounds, descending, see a branch as rigid, (B,) int32. wanted: (B,) which
+    may be; samples: (N, 3, T) each."""
+    first, count, rest = source.hierarchy.first_vertex, source.hierarchy.stem_count, source.rest
     layers = np.zeros(len(count), np.int32)
     for size in np.unique(count[wanted & (count > 2) & (count <= PIECE_VERTICES)]).tolist():
         branches = np.flatnonzero(wanted & (count == size))
