@@ -11,7 +11,7 @@ from athcodec.encoding.segment import Source
 from athcodec.errors import BoundError
 from athcodec.options import DEFAULT_REL_ERROR, LOSSLESS_REL_ERROR
 
-GUESSED_SIZES = 16  # Files whose bounds are guessed from the sizes of those before; later bounds halve what is left.
+GUESSED_SIZES = 16  # Files whose bounds are guessed from earlier sizes; later bounds halve the interval.
 SIZE_ROUNDS = GUESSED_SIZES + 14  # Files that are coded at most. As many halvings end within 1.01 of any size of clips.
 
 
@@ -29,19 +29,18 @@ class BoundOption:
 
     def __post_init__(self) -> None:
         names = ("max_error", "rel_error", "target_size")
-        given = {name: value for name in names if (value := getattr(self, name)) is not None}
-        if len(given) > 1:
-            raise ValueError(f"got {' and '.join(given)}; expected one of them")
-        for name, value in given.items():
+        options = {name: value for name in names if (value := getattr(self, name)) is not None}
+        if len(options) > 1:
+            raise ValueError(f"got {' and '.join(options)}; expected one of them")
+        for name, value in options.items():
             if not (math.isfinite(value) and value > 0):
                 raise BoundError(f"{name}: got {value}; expected a finite number above 0")
 
     def in_scene_units(self, source: Source, file_size: Callable[[float], float], filled: float = 0.97) -> float:
-        """The bound for a clip; file_size: bytes of its file at a bound, asked for where a target size is to be met, of
-        which the file is to fill this share.
+        """Return the bound for a clip. A fraction is of the diagonal of the box around all frames, or of the box with the
+        rest pose if the frames have no extent.
 
-        A fraction is of the diagonal of the bounding box over all frames; where nothing has any extent, of that with
-        the rest pose.
+        file_size: returns the bytes of the file at a bound; filled: share of a target size that the file is to fill.
         """
         if self.max_error is not None:
             return self.max_error
@@ -56,19 +55,21 @@ class BoundOption:
 
 
 def least_bound(source: Source) -> float:
-    """See quantise.least_bound."""
+    """Return the smallest bound that a file can hold."""
     return qz.least_bound(source.seen.low, source.seen.high, source.clip.dtype)
 
 
 def _bound_for_size(source: Source, file_size: Callable[[float], float], target: int, filled: float) -> float:
-    """A bound whose file takes a share from `filled` on of `target` bytes, or the finest found that does not exceed it:
+    """Return a bound whose file fills a share from `filled` on of `target` bytes, or the finest that fits:
     sizes of small files jump by some percent from one bound to the next. Raises BoundError.
 
-    Size falls about as the square root of the bound, where no two known sizes tell how; between two known sizes it is
-    interpolated in logarithms.
+    Between two known sizes the size is interpolated in logarithms. Elsewhere it falls about as the square root.
     """
     diagonal = source.seen.diagonal or 1.0
-    low, high = 1e-7, max(0.1, 2 * least_bound(source) / diagonal)  # low: file too large; high: fits, once tried
+    low, high = (
+        1e-7,
+        max(0.1, 2 * least_bound(source) / diagonal),
+    )  # Files at `low` are too large; `high` fits once it has been tried.
     sizes: dict[float, float] = {}
     guess = min(DEFAULT_REL_ERROR, high)
     for attempt in range(SIZE_ROUNDS):
@@ -76,7 +77,7 @@ def _bound_for_size(source: Source, file_size: Callable[[float], float], target:
             break
         sizes[guess] = file_size(guess * diagonal)
         low, high = (low, guess) if sizes[guess] <= target else (guess, high)
-        # rounded, since logarithms differ between C libraries in the last bit
+        # Guesses are rounded, because logarithms differ between C libraries in the last bit.
         halving = high if high not in sizes else math.sqrt(low * high)
         guess = qz.single(_next_guess(low, high, sizes, target) if attempt < GUESSED_SIZES else halving)
     if sizes.get(high, target + 1) > target:
@@ -86,7 +87,7 @@ def _bound_for_size(source: Source, file_size: Callable[[float], float], target:
 
 
 def _next_guess(low: float, high: float, sizes: dict[float, float], target: int) -> float:
-    """Where in [low, high] the size is expected to be just below the target."""
+    """Return where in [low, high] the size is expected to be just below the target."""
     wanted = math.log(0.985 * target)
     if low in sizes and high in sizes and math.isfinite(sizes[low]):
         a, b = math.log(sizes[low]), math.log(sizes[high])
@@ -100,7 +101,7 @@ def _next_guess(low: float, high: float, sizes: dict[float, float], target: int)
 
 
 def _fall(known: float, sizes: dict[float, float]) -> float:
-    """Of the logarithm of the size with that of the bound, beside a known one."""
+    """Return how much the logarithm of the size falls as that of the bound rises, beside a known one."""
     others = [bound for bound, size in sizes.items() if bound != known and math.isfinite(size)]
     if not others:
         return 0.5

@@ -1,4 +1,4 @@
-"""Which of the branches that discovery.py proposes make the smallest file; each is tried on a few frames."""
+"""Which of the branches that discovery.py proposes make the smallest file. Each proposal is tried on a few frames."""
 
 from __future__ import annotations
 
@@ -20,29 +20,29 @@ from athcodec.motion.discovery import Found, candidates, with_branches
 from athcodec.motion.hierarchy import hierarchy_of
 from athcodec.options import DEFAULT_SEGMENT
 
-TRIAL_FRAMES = 64
-FILLED = 0.8  # of a target size, at a bound that branches are compared at
+TRIAL_FRAMES = 64  # Frames of a clip that branches are tried on.
+FILLED = 0.8  # Share of a target size that a file fills at the bound at which branches are compared.
 
 
 def best_branches(clip: MotionClip, option: BoundOption, report: Progress, host_rest: bool = False) -> Found:
-    """The candidate that makes the smallest file of a few frames at the bound that is asked for."""
-    found = candidates(clip)
-    if len(found) == 1:
-        return found[0]
+    """Return the candidate that makes the smallest file of a few frames at the bound."""
+    proposals = candidates(clip)
+    if len(proposals) == 1:
+        return proposals[0]
     trial = _Trial(clip, option, host_rest)
     sizes = []
-    for branches in found:
+    for branches in proposals:
         sizes.append(trial.size(branches))
-        report("branches", len(sizes) / (len(found) + 2))
-    best = found[int(np.argmin(sizes))]
+        report("branches", len(sizes) / (len(proposals) + 2))
+    best = proposals[int(np.argmin(sizes))]
     if best.stem_index is None or best.method != "motion":
         return best
-    unordered = dataclasses.replace(best, stem_index=None)  # the source's order of vertices costs no bytes
+    unordered = dataclasses.replace(best, stem_index=None)  # The source's order of vertices costs no bytes.
     return unordered if trial.size(unordered) < min(sizes) else best
 
 
 class _Trial:
-    """Frames from the middle of a clip, coded on different branches; sizes are extrapolated to the whole clip."""
+    """Frames from the middle of a clip, coded on different branches. Sizes are extrapolated to the whole clip."""
 
     def __init__(self, clip: MotionClip, option: BoundOption, host_rest: bool):
         start = max(0, (clip.frame_count - TRIAL_FRAMES) // 2)
@@ -53,7 +53,7 @@ class _Trial:
         self._option, self._host_rest = option, host_rest
 
     def size(self, branches: Found) -> float:
-        """Bytes of the whole clip's file on these branches; infinite where the bound cannot be kept."""
+        """Return the bytes of the whole clip's file on these branches; infinite if the bound cannot be kept."""
         clip, lossless, host_rest = with_branches(self._clip, branches), self._option.lossless, self._host_rest
         hierarchy = hierarchy_of(clip)
         source = Source(
@@ -70,7 +70,7 @@ class _Trial:
         return self._job_size(job, self._option.in_scene_units(source, job.file_size))
 
     def _bound_of_target(self, job: EncodingJob) -> BoundOption:
-        """The bound at which the branches tried first meet the target size, to judge all others at too."""
+        """Return the bound at which the branches tried first meet the target size; all are tried at it."""
         try:
             bound = self._option.in_scene_units(job.source, lambda bound: self._job_size(job, bound), FILLED)
         except BoundError:

@@ -1,4 +1,4 @@
-"""Features of the format that an encoder can do without, so that what each of them is worth can be measured."""
+"""Features of the format that an encoder can do without, so that the bytes that each saves can be measured."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from enum import Enum
 
 
 class Feature(Enum):
-    """What may be left out of all of a file's settings."""
+    """A feature that all settings of a file can leave out."""
 
     ROTATIONS = "rotations at attach points"
     SHAPES = "learned shapes"

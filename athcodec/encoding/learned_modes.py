@@ -18,22 +18,22 @@ from athcodec.encoding import quantise as qz
 from athcodec.encoding.motion import Plan, SegmentMotion
 from athcodec.motion.algebra import multiply, principal, solve
 
-NUMBERS = 3 * SHAPE_MODES
-FAINT = 0.15  # steps that a shape bends rings by, which stretches them where they turn
+NUMBERS = 3 * SHAPE_MODES  # Numbers of a learned mode.
+FAINT = 0.15  # Bend of rings, in steps, below which a learned mode drops it: it would stretch rings that turn.
 
 
 @dataclass(frozen=True)
 class LearnedModes:
-    """The learned modes of all pieces, those of a piece behind each other; a row holds NUMBERS."""
+    """The learned modes of all pieces, a row each; the modes of a piece follow each other."""
 
-    counts: np.ndarray  # (P,) int32; 0: the piece keeps its modes
-    first: np.ndarray  # (P,) int64
-    integers: np.ndarray  # (K, NUMBERS) int32, as streams hold them: axis a of mode m at SHAPE_MODES a + m
-    units: np.ndarray  # (K, NUMBERS) float64 of unit length: axis a of mode m at 3 m + a
-    duals: np.ndarray  # likewise: maps a piece's cantilever modes to the tracks of its learned modes
+    counts: np.ndarray  # (P,) int32, how many each piece has; 0: it keeps its cantilever modes.
+    first: np.ndarray  # (P,) int64, row of each piece's first mode.
+    integers: np.ndarray  # (K, NUMBERS) int32, as streams hold them: axis a of mode m at SHAPE_MODES a + m.
+    units: np.ndarray  # (K, NUMBERS) float64 of unit length: axis a of mode m at 3 m + a.
+    duals: np.ndarray  # Like units: map a piece's cantilever modes to the tracks of its learned modes.
 
     def levels(self, plan: Plan) -> np.ndarray:
-        """Levels whose streams hold some of them."""
+        """Return the levels whose streams hold tracks of learned modes."""
         pieces, learned = plan.pieces, self.counts > 0
         full = learned & (pieces["low_level"] >= 0) & (self.counts >= 3 * pieces["low_modes"])
         return np.union1d(plan.base_level[learned], pieces["level"][full])
@@ -41,10 +41,10 @@ class LearnedModes:
 
 @dataclass(frozen=True)
 class Components:
-    """Principal components of pieces' first modes over all frames seen, in scene units.
+    """Principal components of pieces' first modes over all frames analysed, in scene units.
 
-    By groups of pieces that have as many modes: pieces (G,), lengths (G, 3 modes) in descending order, unit vectors
-    (G, 3 modes, 3 modes), a row each.
+    A group holds pieces with the same number of modes: pieces (G,), lengths (G, 3 modes) in descending order, and unit
+    vectors (G, 3 modes, 3 modes), a row each.
     """
 
     frames: int
@@ -52,7 +52,8 @@ class Components:
 
 
 def components(plan: Plan, segments: Iterable[SegmentMotion]) -> Components:
-    """Of segments that were analysed with a fine step, in nothing learned."""
+    """Return the components of segments that were analysed with a fine step and without learned modes, so that they
+    describe the motion and not its rounding."""
     sizes = np.minimum(plan.pieces["rank"], SHAPE_MODES)
     groups = [
         (pieces, np.zeros((len(pieces), 3 * size, 3 * size)))
@@ -66,7 +67,7 @@ def components(plan: Plan, segments: Iterable[SegmentMotion]) -> Components:
             for part in _parts(pieces, segment.frames * total.shape[1]):
                 rows = _tracks(plan, segment, pieces[part], total.shape[1] // 3)
                 total[part] += multiply(rows, rows.transpose(0, 2, 1))
-        del segment  # before the next one is made
+        del segment  # The next segment is made after this one has been freed.
     return Components(frames, [(pieces, *_principal(total)) for pieces, total in groups])
 
 
@@ -76,22 +77,22 @@ def _principal(moments: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _parts(pieces: np.ndarray, row_bytes: int) -> Iterator[slice]:
-    """Few enough pieces at a time for memory not to follow their number."""
+    """Yield few enough pieces at a time that memory does not grow with their number."""
     count = max(1, (16 << 20) // (8 * row_bytes))
     return (slice(at, at + count) for at in range(0, len(pieces), count))
 
 
 def _mode_weights(pieces: np.ndarray) -> np.ndarray:
-    """(P, SHAPE_MODES) of pieces, (P,) of _native.PIECE."""
+    """Return the weights of the modes of pieces, (P, SHAPE_MODES)."""
     kinds, kind = np.unique(pieces[["flags", "count", "ring"]], return_index=True, return_inverse=True)[1:]
     weights = np.empty((len(kinds), SHAPE_MODES))
-    for own, piece in zip(weights, pieces[kinds]):
-        lib.ath_mode_weights(np.array(piece).ctypes.data, address(own, np.float64, SHAPE_MODES))
+    for row, piece in zip(weights, pieces[kinds]):
+        lib.ath_mode_weights(np.array(piece).ctypes.data, address(row, np.float64, SHAPE_MODES))
     return weights[kind]
 
 
 def _tracks(plan: Plan, segment: SegmentMotion, pieces: np.ndarray, size: int) -> np.ndarray:
-    """Tracks of the first modes over temporal frequency, (pieces, 3 size, frames) float64 in scene units."""
+    """Return the tracks of the first modes over temporal frequency, (pieces, 3 size, frames) float64 in scene units."""
     slots = plan.pieces["first"][pieces][:, None] + np.arange(size)
     steps = np.array([stream.step for stream in segment.streams])
     weight = _mode_weights(plan.pieces[pieces])[:, :size]
@@ -101,13 +102,13 @@ def _tracks(plan: Plan, segment: SegmentMotion, pieces: np.ndarray, size: int) -
 
 
 def _across(pieces: np.ndarray, size: int) -> np.ndarray:
-    """(P, size) bool: which numbers of a shape are of modes that bend rings."""
+    """Return (P, size) bool: which numbers of a learned mode belong to modes that bend rings."""
     rings = -(-pieces["count"] // np.maximum(pieces["ring"], 1))
     return (pieces["ring"] > 0)[:, None] & (np.arange(size) // 3 >= rings[:, None])
 
 
 def learn(plan: Plan, seen: Components, step: float, wanted: np.ndarray | None = None) -> LearnedModes:
-    """The modes that a motion step makes worth storing, of the pieces `wanted`, (P,) bool, or of all."""
+    """Return the modes that a motion step makes worth storing, of the pieces `wanted`, (P,) bool, or of all."""
     counts = np.zeros(len(plan.pieces), np.int32)
     rows: dict[int, np.ndarray] = {}
     least = step * np.sqrt(seen.frames)
@@ -125,16 +126,18 @@ def learn(plan: Plan, seen: Components, step: float, wanted: np.ndarray | None =
 
 
 def nested(plan: Plan, modes: LearnedModes, wanted: np.ndarray, digits: int) -> LearnedModes:
-    """The same modes of the pieces `wanted`, (P,) bool, with so many binary digits less; those of a piece end before
+    """Return the modes of the pieces `wanted`, (P,) bool, with so many binary digits less. Those of a piece end before
     the first that vanishes."""
     integers = np.sign(modes.integers) * (np.abs(modes.integers) + (1 << digits - 1) >> digits)
     counts, rows = np.zeros_like(modes.counts), []
     for piece in np.flatnonzero(wanted & (modes.counts > 0)):
-        own = integers[modes.first[piece] : modes.first[piece] + modes.counts[piece]]
-        counts[piece] = count = np.cumprod(own.any(axis=1)).sum()
+        numbers = integers[modes.first[piece] : modes.first[piece] + modes.counts[piece]]
+        counts[piece] = count = np.cumprod(numbers.any(axis=1)).sum()
         size = min(int(plan.pieces["rank"][piece]), SHAPE_MODES)
         if count:
-            rows.append(own[:count].reshape(count, 3, SHAPE_MODES)[:, :, :size].transpose(0, 2, 1).reshape(count, -1))
+            rows.append(
+                numbers[:count].reshape(count, 3, SHAPE_MODES)[:, :, :size].transpose(0, 2, 1).reshape(count, -1)
+            )
     return _packed(counts, rows)
 
 
@@ -151,14 +154,15 @@ def _packed(counts: np.ndarray, rows: list[np.ndarray]) -> LearnedModes:
     lib.ath_unit_shapes(len(integers), address(integers, np.int32, 0), address(units, np.float64, 0))
     at = 0
     for numbers in rows:
-        own = units[at : at + len(numbers)]
-        duals[at : at + len(own)] = solve(multiply(own, own.T) + 1e-4 * np.eye(len(own)), own)  # few are nearly alike
-        at += len(own)
+        of_piece = units[at : at + len(numbers)]
+        products = multiply(of_piece, of_piece.T) + 1e-4 * np.eye(len(of_piece))  # A few modes are nearly alike.
+        duals[at : at + len(of_piece)] = solve(products, of_piece)
+        at += len(of_piece)
     return LearnedModes(counts, first, integers, units, duals)
 
 
 def estimated_bits(integers: np.ndarray, pieces: np.ndarray, piece_count: int) -> np.ndarray:
-    """About what integers (K, ...) take in a stream, summed by piece: pieces (K,); returns (piece_count,)."""
+    """Return about how many bits integers (K, ...) of pieces (K,) take in a stream, (piece_count,)."""
     magnitudes = np.abs(integers).astype(np.float64)
     bits = (2.0 * qz.bits(magnitudes) + (magnitudes > 0)).sum(axis=tuple(range(1, integers.ndim)))
     return np.bincount(pieces, bits, piece_count)

@@ -40,20 +40,20 @@ from athcodec.files.threads import SERIAL, ThreadPool, ranges
 if TYPE_CHECKING:
     from athcodec.encoding.learned_modes import LearnedModes
 
-STEM_ROOT, NODE_ROOT = -1, -2  # core/model/motion.h: of streams in waves that are not learned, of stems and of nodes
-RANGES, LEAST_RANGE = 24, 1024  # of a plant's vertices per thread and call
-RUN, RUNS = 64, 2  # vertices of a run, and how many runs there are for each in a sample
+STEM_ROOT, NODE_ROOT = -1, -2  # Roots of streams in waves that are not learned (core/model/motion.h).
+RANGES, LEAST_RANGE = 24, 1024  # Parts of a plant that threads take at a time, and their least number of vertices.
+RUN, RUNS = 64, 2  # Vertices of a run; one of so many runs is in a sample.
 
 
 class Waves(IntEnum):  # core/model/plan.h
-    """Eigenvectors of third differences, a Fourier series, modes of a free beam."""
+    """Kinds of waves: eigenvectors of third differences, a Fourier series, modes of a free beam."""
 
     SMOOTH, PERIODIC, BEAM = range(3)
 
 
 @lru_cache(16)
 def waves_over_time(frames: int, kind: Waves = Waves.SMOOTH) -> np.ndarray:
-    """Orthonormal rows, (frames, frames) float64, bit for bit those of the decoder."""
+    """Return orthonormal rows, (frames, frames) float64, with the decoder's bits."""
     waves = np.empty((frames, frames))
     lib.ath_waves(frames, kind, waves.ctypes.data)
     waves.setflags(write=False)
@@ -112,7 +112,7 @@ class Plan:
         return self.height + 2
 
     def set_rest(self, rest: np.ndarray) -> None:
-        """Builds the bases on a decoded rest pose, (N, 3) float64."""
+        """Build the bases on a decoded rest pose, (N, 3) float64."""
         vertices, pieces = self.vertex_count, len(self.pieces)
         self.rest = np.ascontiguousarray(rest, np.float64)
         self.core.rest = at = address(self.rest, np.float64, 3 * vertices)
@@ -167,7 +167,7 @@ class Plan:
 
     @cached_property
     def sample(self) -> PlanSample:
-        """Of the pieces in short runs all along the plant."""
+        """The pieces in short runs all along the plant."""
         pieces = self.pieces[self.pieces["first"] // RUN % RUNS == 0]
         first, count = np.cumsum(pieces["count"]) - pieces["count"], pieces["count"]
         vertices = np.arange(count.sum()) + np.repeat(pieces["first"] - first, count)
@@ -190,7 +190,7 @@ class Plan:
         return self.pieces["flags"] & RIGID > 0
 
     def levers(self) -> np.ndarray:
-        """(P,) by how much a turn by one radian moves a piece: the root of its mean moment of inertia."""
+        """Return how far a turn by one radian moves each piece, (P,): the root of its mean moment of inertia."""
         pieces = self.pieces
         at = np.where(pieces["attach"] >= 0, pieces["attach"], pieces["first"])
         away = self.rest - np.repeat(self.rest[at], pieces["count"], axis=0)
@@ -204,21 +204,17 @@ class Plan:
         return int((rows + np.bincount(self.pieces["level"], self.ranks - low, self.level_count)).argmax())
 
     def has_stems(self, level: int) -> bool:
-        """Whether the level has a coefficient stream."""
+        """Return whether the level has a coefficient stream."""
         return bool(((self.pieces["level"] == level) | (self.pieces["low_level"] == level)).any())
 
     def has_affines(self, level: int) -> bool:
-        """Whether nodes of the level have maps of their own."""
+        """Return whether nodes of the level have maps of their own."""
         return bool(((self.nodes["level"] == level) & (self.nodes["coded"] == 1)).any())
 
     @property
     def level_0_stands_alone(self) -> bool:
         """Whether nothing of level 0 serves other levels, so that level 1 may refine the rest pose."""
         return not self.has_stems(0) and not (self.nodes["last"][self.nodes["level"] == 0] > 0).any()
-
-    def exact_branches(self, level: int) -> np.ndarray:
-        """Branches whose stems are exact at `level`."""
-        return np.unique(self.pieces["branch"][self.pieces["level"] <= level])
 
 
 @dataclass(frozen=True)
@@ -231,7 +227,7 @@ class PlanSample:
 
     @property
     def is_rigid(self) -> np.ndarray:
-        """As Plan has it."""
+        """Per piece whether it turns and moves as it is, (P,)."""
         return self.pieces["flags"] & RIGID > 0
 
 
@@ -241,9 +237,9 @@ class LevelStream:
 
     step: float
     rotation_step_factor: float = 0.0
-    temporal: np.ndarray | None = None  # (rank, frames) float64; None: waves_over_time, by the root
-    turn_step: float = 0.0  # largest step of rotations of rigid pieces; 0: any
-    root: int = STEM_ROOT  # level of the first of the streams whose learned bases begin with the same rows
+    temporal: np.ndarray | None = None  # (rank, frames) float64; None: waves, by the root.
+    turn_step: float = 0.0  # Largest step of rotations of rigid pieces; 0: any.
+    root: int = STEM_ROOT  # Level of the first stream whose learned basis begins with the same rows.
 
 
 class SegmentMotion:
@@ -283,8 +279,8 @@ class SegmentMotion:
             if before is None:
                 self.placed = np.zeros((plan.vertex_count, 3, frames))
                 self.placed_tracks = np.zeros(self.tracks.shape)
-                self.placed_frames = np.zeros((core.piece_count, 12, frames))  # those of rigid pieces are touched
-            else:  # piece by piece, each read before it is replaced
+                self.placed_frames = np.zeros((core.piece_count, 12, frames))  # Only rigid pieces use theirs.
+            else:  # A piece is read before it is replaced.
                 self.placed, self.placed_tracks = before.placed, before.placed_tracks
                 self.placed_frames = before.placed_frames
             self.extents = np.zeros((core.piece_count, 2), np.int32)
@@ -302,21 +298,21 @@ class SegmentMotion:
         self._bind()
 
     def _known(self, before: SegmentMotion) -> np.ndarray:
-        """(P,) uint8: pieces whose integers in the layer before stand for the same functions of time as here."""
+        """Return the pieces whose integers in the layer before stand for the same functions of time as here, (P,) uint8."""
         same = np.array([stream.root == self.streams[-1].root for stream in before.streams])
         pieces = before.plan.pieces
         all_at_base = before.plan.ranks <= pieces["low_modes"]
         return (same[before.plan.base_level] & (same[pieces["level"]] | all_at_base)).astype(np.uint8)
 
     def waves_of(self, stream: LevelStream) -> np.ndarray:
-        """Those over time, or what is learned in their place, (rank, frames)."""
+        """Return the waves of a stream, or what is learned in their place, (rank, frames)."""
         if stream.temporal is not None:
             return stream.temporal
         return self.node_waves if stream.root == NODE_ROOT else self.waves
 
     def _bind(self) -> None:
         self._c_streams = (Stream * len(self.streams))()
-        self._temporal = []  # keeps what the C structs point to
+        self._temporal = []  # Arrays that the C structs point to.
         for c_stream, stream in zip(self._c_streams, self.streams):
             temporal = self.waves_of(stream)
             self._temporal.append(temporal)
@@ -351,11 +347,11 @@ class SegmentMotion:
                 setattr(self.integers, name, array.ctypes.data)
 
     def forget_caches(self) -> None:
-        """Lets go of what `analyse` and `pose` leave for `analyse_nodes`."""
+        """Free what `analyse` and `pose` leave for `analyse_nodes`."""
         self._attach_caches = None
 
     def forget_before(self) -> None:
-        """Lets go of the layer before, which is predicted from no more, and of what is predicted from it."""
+        """Free the layer before, which nothing more is predicted from, and what is predicted from it."""
         before, self.before = self.before, None
         before.coarse = before.placed = before.placed_tracks = before.placed_frames = None
         self.predicted = self.predicted_tracks = None
@@ -369,9 +365,9 @@ class SegmentMotion:
         origin: np.ndarray | None = None,
         positions: np.ndarray | None = None,
     ) -> None:
-        """Fills coefficients and tracks from positions, (N, 3, frames) float64 less the origin, in closed loop.
+        """Fill coefficients and tracks from positions, (N, 3, frames) float64 less the origin, in closed loop.
 
-        positions: is filled with what `pose` gives at the last level, which the closed loop has at hand.
+        positions: filled with what `pose` returns at the last level, which the closed loop has at hand.
         """
         at, into = self._source(source), (None, False, None)
         if positions is not None:
@@ -385,7 +381,7 @@ class SegmentMotion:
     def analyse_nodes(
         self, source: np.ndarray, level_steps: np.ndarray, rounding: Rounding, level: int | None = None
     ) -> None:
-        """Fills the maps of the nodes, or those of one level; after `analyse` or `pose`, but for level 0.
+        """Fill the maps of the nodes, or those of one level, after `analyse` or `pose` unless it is level 0.
 
         A map's step is that of its level, (level_count,) float64 in scene units, over the root of its vertex count.
         """
@@ -398,12 +394,12 @@ class SegmentMotion:
         )
 
     def clear_nodes(self) -> None:
-        """Sets the maps of the nodes to zero."""
+        """Set the maps of the nodes to zero."""
         self.node_tracks.fill(0)
         self.node_steps.fill(0)
 
     def _piecewise(self, call: Callable[[Motion, int, int], None]) -> None:
-        """Calls with a motion and each range of pieces, those that others hang on first."""
+        """Call with a motion and each range of pieces, those that others hang on first."""
         if self._attach_caches is None:
             self._attach_caches = np.empty(lib.ath_attach_cache_size(self.plan.core.attach_cache_rows, self.frames))
             self.motion.attach_caches = self._attach_caches.ctypes.data
@@ -414,11 +410,11 @@ class SegmentMotion:
 
     def _nodewise(self, call: Callable[[Motion, int, int], None], level: int | None = None) -> None:
         plan = self.plan
-        own = [(n, n + 1) for n in np.flatnonzero(plan.nodes["level"] == level).tolist()]
-        plan.pool.map(self._with_scratch(call), plan.node_ranges if level is None else own)
+        of_level = [(n, n + 1) for n in np.flatnonzero(plan.nodes["level"] == level).tolist()]
+        plan.pool.map(self._with_scratch(call), plan.node_ranges if level is None else of_level)
 
     def _with_scratch(self, call: Callable[[Motion, int, int], None]) -> Callable[[int, int], None]:
-        """The call with scratch memory of its own."""
+        """Return the call with scratch memory of its own."""
 
         def run(first: int, stop: int) -> None:
             motion = Motion.from_buffer_copy(self.motion)
@@ -432,7 +428,7 @@ class SegmentMotion:
         return address(source, np.float64, self.plan.vertex_count * 3 * self.frames)
 
     def pose(self, level: int, origin: np.ndarray, dtype) -> np.ndarray:
-        """Positions at `level`, corrections not included: (N, 3, frames) float32 or float64, origin added."""
+        """Return positions at `level` without corrections, (N, 3, frames) float32 or float64, origin added."""
         positions = np.empty((self.plan.vertex_count, 3, self.frames), dtype)
         into = level, address(origin, np.float64, 3), positions.dtype == np.float64, positions.ctypes.data
         self._piecewise(
@@ -445,8 +441,8 @@ class SegmentMotion:
 
 
 def gather(block: np.ndarray, vertex_source: np.ndarray, origin: np.ndarray, pool: ThreadPool = SERIAL) -> np.ndarray:
-    """Source positions, (T, M, 3) float32 or float64 in the source's order, as (N, 3, T) float64 less the origin;
-    vertex_source (N,) int32: the N of its M vertices that are wanted."""
+    """Return source positions, (T, M, 3) float32 or float64 in the source's order, as (N, 3, T) float64 less the origin.
+    vertex_source: (N,) int32, the N of its M vertices that are wanted."""
     frames, vertices = len(block), len(vertex_source)
     block = np.ascontiguousarray(block)
     out = np.empty((vertices, 3, frames))
@@ -475,9 +471,9 @@ def position_errors(
     shown: np.ndarray | None = None,
     rounding: float = 0.0,
 ) -> tuple[float, float, float]:
-    """Distance of decoded positions from the source by each of MEASURES, the second rounded up as files store it.
-    shown: how many frames of the clip show each frame, (T,) int32; None: one. rounding: what a decoder may be further
-    off than the positions are."""
+    """Return the distance of decoded positions from the source by each of MEASURES, the second rounded up as files store
+    it. shown: how many frames of the clip show each frame, (T,) int32; None: one. rounding: added for a decoder that
+    rounds to the other side."""
     vertices, _, frames = positions.shape
     shown = np.ones(frames, np.int32) if shown is None else shown
 

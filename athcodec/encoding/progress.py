@@ -1,6 +1,6 @@
-"""How far the encoding of a clip has come, as one fraction from 0 to 1 that is about the part of the time.
+"""Progress of an encoding as one fraction from 0 to 1, which is about the part of the time that has passed.
 
-Stages count from 0 to 1 each; what each is worth follows from the numbers that they will have to work on.
+Each stage counts from 0 to 1; how much it weighs follows from the vertices and frames that it works on.
 """
 
 from __future__ import annotations
@@ -11,17 +11,17 @@ from athcodec.encoding.sample import is_small, sample_vertices
 
 Progress = Callable[[str, float], None]
 
-# Microseconds of one thread for a vertex in a frame, as `python -m bench large` has them; only their ratios matter.
+# Microseconds of one thread for a vertex in a frame, as `python -m bench large` prints them; only ratios matter.
 SURVEY, TRIAL, MOTION = 0.11, 0.13, 0.24
-TRIALS = {"fast": 7, "default": 31, "best": 50}  # that a search is worth, for the effort
-LAYER_TRIALS = {"fast": 3, "default": 24, "best": 10}  # beyond these where there are layers of precision
-SMALL_TRIALS = 100  # and of a small clip, whose choices are made again
-BRANCHES = 0.5  # of all the rest, to find branches for a clip without
-SIZES = 6  # files that are made to meet a target size
+TRIALS = {"fast": 7, "default": 31, "best": 50}  # Trials that a search takes as long as, by effort.
+LAYER_TRIALS = {"fast": 3, "default": 24, "best": 10}  # The same for layers of precision in addition.
+SMALL_TRIALS = 100  # The same for a small clip in addition, whose choices are made again.
+BRANCHES = 0.5  # Work of finding branches, over all other work.
+SIZES = 6  # Files that are made to meet a target size.
 
 
 def silent(stage: str, fraction: float) -> None:
-    """Reports to nobody."""
+    """Report to nobody."""
 
 
 def expected_trials(effort: str, layered: bool, small: bool) -> int:
@@ -74,8 +74,8 @@ def stage_weights(
     motion: bool,
     layers: int,
 ) -> dict[str, float]:
-    """The estimated work of each stage. samples: segments that each trial codes; branches: they have to be found first;
-    sizes: a target is to be met; motion: it is coded too, after the search; layers: of precision, about."""
+    """Return the estimated work of each stage. samples: segments that a trial codes; branches: whether they have to be
+    found; sizes: whether a target size is to be met; motion: whether motion is coded too."""
     longest, frames = max(stop - start for start, stop in segments), segments[-1][1]
     small = is_small(vertices, segments, effort)
     some = vertices if (part := sample_vertices(vertices, len(segments), effort)) is None else part

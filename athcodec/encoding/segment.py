@@ -24,7 +24,7 @@ from athcodec.encoding.motion import NODE_ROOT, STEM_ROOT, LevelStream, Plan, Pl
 from athcodec.encoding.polygons import Mesh
 from athcodec.encoding.segmentation import split_segments
 from athcodec.encoding.settings import BEAM, Settings
-from athcodec.encoding.shape import RestPrecision
+from athcodec.encoding.shape import RestPrecision, finer_than
 from athcodec.encoding.survey import Ath, Survey
 from athcodec.encoding.time_bases import Entries, InWaves, TimeComponents
 from athcodec.errors import BoundError
@@ -34,52 +34,47 @@ from athcodec.motion.clip import MotionClip, stands_still
 from athcodec.motion.hierarchy import Hierarchy
 from athcodec.motion.polygons import Polygons
 
-FINER = 32  # step over that of segments that bases and modes are learned from
+FINER = 32  # Step of a layer over the step at which bases and modes are learned.
 REST_ROUNDS = 16  # Steps of a rest pose that are tried until one keeps the bound; the last is 1/28 of the first.
-ROWS_AT_ONCE = 1 << 14  # of coefficients
-WORK_BYTES = 1 << 30  # of the segments coded at once, where `jobs` does not say how many these are
-CONNECTED_SHARE = 0.8  # of a rest pose at once, that one by faces may take where layers refine it
-SAMPLED = 4000  # vertices from which on trials correct a sample
-SEGMENT_WORK = 16  # memory of a segment while it is coded, over its float32 positions
+ROWS_AT_ONCE = 1 << 14  # Rows of coefficients whose moments are added at once.
+WORK_BYTES = 1 << 30  # Memory of the segments coded at once, unless `jobs` says how many.
+SAMPLED = 4000  # Vertices from which on trials correct a sample.
+SEGMENT_WORK = 16  # Memory of a segment while it is coded, over its float32 positions.
 
 
 def thread_count(jobs: int | None, source: Source) -> int:
-    """Segments, or candidates, that are coded at once: `jobs`, or one per core, at most 4 and within WORK_BYTES."""
+    """Return how many segments are coded at once: `jobs`, or one per core, at most 4 and within WORK_BYTES."""
     fit = WORK_BYTES // (SEGMENT_WORK * source.segment_bytes)
     return jobs or max(1, min(default_jobs(), fit))
 
 
 @dataclass
 class Source:
-    """A clip in file order, relative to an origin, cut into segments, and the reference pose of its motion.
-
-    exact_rest: the numbers of its rest pose are to come back. reference: (N, 3) float64 less the origin, file order;
-    None: the rest pose. polygons: what the file stores as FACES. without: features that the file is to do without.
-    """
+    """A clip in file order, relative to an origin, cut into segments, and the reference pose of its motion."""
 
     clip: MotionClip
     hierarchy: Hierarchy
     seen: Survey
     segment_frames: int | None
-    exact_rest: bool
-    weights: np.ndarray | None = None  # (N,) float64, factors on the bound; file order
+    exact_rest: bool  # Whether the rest pose comes back bit for bit.
+    weights: np.ndarray | None = None  # (N,) float64 factors on the bound.
     pool: ThreadPool = SERIAL
     host_rest: bool = False
     rest_precision: RestPrecision = RestPrecision()
-    reference: np.ndarray | None = None
-    polygons: Polygons | None = None
-    without: frozenset[Feature] = frozenset()
-    source_rest: np.ndarray = field(init=False)  # (N, 3) float64, less the origin
-    rest: np.ndarray = field(init=False)  # likewise: the reference pose
+    reference: np.ndarray | None = None  # (N, 3) float64 less the origin; None: the rest pose.
+    polygons: Polygons | None = None  # What the file stores as FACES.
+    without: frozenset[Feature] = frozenset()  # Features that the file does without.
+    source_rest: np.ndarray = field(init=False)  # (N, 3) float64 less the origin.
+    rest: np.ndarray = field(init=False)  # (N, 3) float64 less the origin: the reference pose.
     origin: np.ndarray = field(init=False)  # (3,) float64
-    details: np.ndarray = field(init=False)  # (B,) int32: of the branches, FORMAT.md, Detail
-    sheet_like: np.ndarray = field(init=False)  # (B,) bool: branches that do not look like beams
-    clip_range_segments: list[list[tuple[int, int]]] = field(init=False)  # per clip of the file
-    segments: list[tuple[int, int]] = field(init=False)  # of all of them
-    _held: WeakValueDictionary[int, np.ndarray] = field(init=False, repr=False, compare=False)  # positions, by segment
+    details: np.ndarray = field(init=False)  # (B,) int32 (FORMAT.md, Detail).
+    sheet_like: np.ndarray = field(init=False)  # (B,) bool: branches that do not look like beams.
+    clip_range_segments: list[list[tuple[int, int]]] = field(init=False)  # Those of each clip of the file.
+    segments: list[tuple[int, int]] = field(init=False)  # Those of all clips.
+    _held: WeakValueDictionary[int, np.ndarray] = field(init=False, repr=False, compare=False)  # Positions by segment.
 
     def __post_init__(self) -> None:
-        stays_in_place = self.exact_rest and self.seen.repeats[1:].all()  # then its error may be 0 to the last bit
+        stays_in_place = self.exact_rest and self.seen.repeats[1:].all()  # Then the error may be 0 to the last bit.
         is_exact = self.clip.dtype == np.float64 or stays_in_place
         first = self.clip.rest[self.hierarchy.vertex_source[0]]  # The rest pose of a rooted plant begins at 0.
         self.origin = qz.origin_of(first, self.seen.low, self.seen.high, is_exact)
@@ -107,7 +102,7 @@ class Source:
         return len(self.segments) > len(self.clip_range_segments)
 
     def about(self, reference: np.ndarray | None) -> Source:
-        """The same about another reference pose."""
+        """Return the source about another reference pose."""
         if reference is None and self.reference is None:
             return self
         source = self._changed(reference=reference)
@@ -116,12 +111,12 @@ class Source:
         return source
 
     def in_segments(self, frames: int) -> Source:
-        """The same in other segments, of at most so many frames."""
+        """Return the source in segments of at most so many frames."""
         return self._changed(segment_frames=frames)
 
     def _changed(self, **fields) -> Source:
         source = replace(self, **fields)
-        source.still = self.still  # for which frames are read
+        source.still = self.still  # Frames would have to be read for it again.
         if len(self.segments) == len(source.segments) == 1:
             source._all_positions = self._all_positions
         return source
@@ -133,7 +128,7 @@ class Source:
 
     @property
     def has_source_rest(self) -> bool:
-        """Whether the rest pose is to come back, and is another than the reference pose."""
+        """Whether the rest pose comes back and differs from the reference pose."""
         return self.reference is not None and (self.clip.rest_given or self.exact_rest)
 
     @property
@@ -142,21 +137,21 @@ class Source:
         return np.cumsum([0, *map(len, self.clip_range_segments[:-1])]).tolist()
 
     def segment_before(self, segment: int) -> int | None:
-        """The one before it in its clip; before the first of a loop of several, the last."""
-        for i, (start, own) in enumerate(zip(self.clip_range_starts, self.clip_range_segments)):
+        """Return the segment before one in its clip; before the first of a loop of several, the last."""
+        for i, (start, segments) in enumerate(zip(self.clip_range_starts, self.clip_range_segments)):
             if start == segment:
-                loop = len(own) > 1 and bool(self.clip.clip_ranges) and self.clip.clip_ranges[i].loop
-                return start + len(own) - 1 if loop else None
+                loop = len(segments) > 1 and bool(self.clip.clip_ranges) and self.clip.clip_ranges[i].loop
+                return start + len(segments) - 1 if loop else None
         return segment - 1
 
     def goes_on(self, segment: int) -> bool:
-        """Whether a segment of the same clip is behind it."""
+        """Return whether a segment of the same clip follows."""
         following = {segment + 1, *self.clip_range_starts} - {len(self.segments)}
         return any(self.segment_before(other) == segment for other in following)
 
     @cached_property
     def mesh(self) -> Mesh | None:
-        """What rest poses may go by."""
+        """Faces that rest poses may go by."""
         if Feature.CONNECTED in self.without:
             return None
         return Mesh.of(self.polygons, self.hierarchy.vertex_source)
@@ -168,85 +163,85 @@ class Source:
 
     @property
     def largest_number(self) -> np.floating:
-        """Of the coordinates, in the source's type."""
+        """The largest coordinate, in the source's type."""
         return np.abs([self.seen.low, self.seen.high]).max().astype(self.clip.dtype)
 
     @property
     def extent(self) -> float:
-        """Diagonal of the box around all frames and the rest pose: the longest way a vertex can be from its place."""
+        """Diagonal of the box around all frames and the rest pose: the furthest that a vertex can be from its place."""
         low = np.minimum(self.seen.low, self.source_rest.min(axis=0) + self.origin)
         high = np.maximum(self.seen.high, self.source_rest.max(axis=0) + self.origin)
         return length(high - low)
 
     def limit(self, bound: float) -> float | np.ndarray:
-        """What decoded positions are held to: one for all vertices, or one each, (N,) in file order."""
+        """Return what decoded positions are held to: one distance for all vertices, or one each, (N,) in file order."""
         if self.weights is None:
             return qz.error_limit(bound, self.seen.diagonal)
         return np.array([qz.error_limit(limit, self.seen.diagonal) for limit in bound * self.weights])
 
     def smallest_bound(self, bound: float) -> float:
-        """Of any vertex."""
+        """Return the smallest bound of any vertex."""
         return bound if self.weights is None else bound * float(self.weights.min())
 
     def largest_bound(self, bound: float) -> float:
-        """Of any vertex."""
+        """Return the largest bound of any vertex."""
         return bound if self.weights is None else bound * float(self.weights.max())
 
     def level_weights(self, levels: int, part: float) -> np.ndarray:
-        """(levels,) of the vertices of each level and those below it the weight that such a part of them falls short
-        of; a level without vertices has that of the one above."""
+        """Return for each level the weight that such a part of its vertices and those below fall short of, (levels,). A
+        level without vertices has the weight of the one above."""
         level = self.hierarchy.branch_depth[self.hierarchy.vertex_branch()]
         below = [self.weights[level >= first] for first in range(levels)]
         quantiles = [float(np.quantile(weights, part)) if len(weights) else 0.0 for weights in below]
         return np.maximum.accumulate(quantiles)
 
     def is_whole_loop(self, segment: int) -> bool:
-        """Whether the segment is all of a clip that is a loop."""
+        """Return whether the segment is all of a clip that is a loop."""
         of_clips = zip(self.clip.clip_ranges, self.clip_range_segments)
-        return any(clip_range.loop and own == [self.segments[segment]] for clip_range, own in of_clips)
+        return any(clip_range.loop and segments == [self.segments[segment]] for clip_range, segments in of_clips)
 
     @property
     def segment_bytes(self) -> int:
-        """Of the float32 positions of the longest segment."""
+        """Bytes of the float32 positions of the longest segment."""
         return 12 * self.clip.vertex_count * max(stop - start for start, stop in self.segments)
 
     @cached_property
     def repeats(self) -> np.ndarray:
-        """(frames,) bool: frames of the clip that are not coded, because the one before in their segment is the same.
-        Where all are the rest pose none is: that takes no bytes either."""
+        """(frames,) bool: frames of the clip that are not coded, because they repeat the one before in their segment. If
+        all are the rest pose none is left out, because they take no bytes either."""
         repeats = self.seen.repeats & (not self.still and Feature.REPEATS not in self.without)
         repeats[[start for start, _ in self.segments]] = False
         return repeats
 
     @property
     def coded_frames(self) -> int:
-        """Of the clip."""
+        """Number of frames of the clip that are coded."""
         return int((~self.repeats).sum())
 
     def frames_of(self, segment: int) -> int:
-        """Coded frames of a segment, T."""
+        """Return the number of coded frames of a segment, T."""
         return int((~self.repeats[slice(*self.segments[segment])]).sum())
 
     def shown_times(self, segment: int) -> np.ndarray:
-        """(T,) int32: how many frames of the clip show each coded frame of a segment."""
+        """Return how many frames of the clip show each coded frame of a segment, (T,) int32."""
         repeats = self.repeats[slice(*self.segments[segment])]
         return np.diff(np.append(np.flatnonzero(~repeats), len(repeats))).astype(np.int32)
 
     def block(self, segment: int) -> np.ndarray:
-        """(T, N, 3) positions of a segment as the clip has them, of the frames that are coded."""
+        """Return the coded frames of a segment as the clip has them, (T, N, 3)."""
         block, repeats = self.clip.block(*self.segments[segment]), self.repeats[slice(*self.segments[segment])]
         return block[~repeats] if repeats.any() else block
 
     def exact(self, block: np.ndarray) -> np.ndarray:
-        """(N, 3, T) of a block in file order, its very numbers."""
+        """Return a block in file order with its very numbers, (N, 3, T)."""
         return np.ascontiguousarray(block[:, self.hierarchy.vertex_source].transpose(1, 2, 0))
 
     def relative(self, block: np.ndarray) -> np.ndarray:
-        """(N, 3, T) float64 of a block in file order, less the origin."""
+        """Return a block in file order less the origin, (N, 3, T) float64."""
         return gather(block, self.hierarchy.vertex_source, self.origin, self.pool)
 
     def positions(self, segment: int) -> np.ndarray:
-        """(N, 3, T) float64 positions of a segment, less the origin: made once for all who hold them at a time."""
+        """Return the positions of a segment less the origin, (N, 3, T) float64; all callers share them."""
         if len(self.segments) == 1:
             return self._all_positions
         positions = self._held.get(segment)
@@ -257,14 +252,14 @@ class Source:
 
     @cached_property
     def _all_positions(self) -> np.ndarray:
-        """Of the only segment, which a search asks for again and again."""
+        """Positions of the only segment, which a search asks for again and again."""
         positions = self.relative(self.block(0))
         positions.setflags(write=False)
         return positions
 
 
 def branch_records(hierarchy: Hierarchy, ath: Ath, settings: Settings) -> np.ndarray:
-    """(B,) of _native.BRANCH."""
+    """Return the branches as the core reads them, (B,) of _native.BRANCH."""
     branches = np.zeros(hierarchy.branch_count, BRANCH)
     branches["parent"], branches["count"] = hierarchy.branch_parent, hierarchy.stem_count
     branches["attach"], branches["first"] = hierarchy.attach, hierarchy.first_vertex
@@ -276,6 +271,28 @@ def branch_records(hierarchy: Hierarchy, ath: Ath, settings: Settings) -> np.nda
     branches["lag"], branches["detail"] = settings.lags, settings.details
     branches["ring"] = np.where(settings.forms > SHEET, settings.forms, 0)
     return branches
+
+
+def plain_settings(source: Source, levels: int, bound: float, step: float, rest_step: float) -> Settings:
+    """Return settings in which nothing is chosen."""
+    none = np.zeros(source.hierarchy.branch_count, np.int32)
+    return Settings(
+        bound=bound,
+        largest_bound=source.largest_bound(bound),
+        limit=source.limit(bound),
+        step=qz.single(step),
+        level_steps=np.ones(levels),
+        rest_step=qz.single(rest_step),
+        forms=none,
+        loose=none > 0,
+        rigid=none,
+        lags=none,
+        details=finer_than(source.details, bound),
+        rotation_step_factors=(0,) * levels,
+        learned_bases=(False,) * levels,
+        node_steps=np.full(levels, step),
+        without=source.without,
+    )
 
 
 class CodedPrelude:
@@ -300,7 +317,7 @@ class CodedPrelude:
 
 
 def _coded_rest(source: Source, branches: np.ndarray, settings: Settings) -> tuple[ct.Rest, np.ndarray]:
-    """REST, and the rest pose as decoded."""
+    """Return REST, and the rest pose as decoded."""
     head = ct.Rest(source.origin, settings.rest_step, source.clip.rest_dtype)
     if source.host_rest:
         head.is_host, head.step, head.stream = True, 1.0, ct.mesh_checksum(source.clip.source_rest)
@@ -316,7 +333,7 @@ def _coded_rest(source: Source, branches: np.ndarray, settings: Settings) -> tup
 
 
 def _rest_within(source: Source, branches: np.ndarray, settings: Settings) -> streams.CodedRest:
-    """At the step of the settings, or the first finer one that keeps the bound."""
+    """Return the rest pose at the step of the settings, or at the first finer one that keeps the bound."""
 
     def encode(step: float) -> streams.CodedRest:
         mesh = source.mesh if settings.connected_rest else None
@@ -328,8 +345,8 @@ def _rest_within(source: Source, branches: np.ndarray, settings: Settings) -> st
 def _within(
     limit: float, pose: np.ndarray, encode: Callable[[float], streams.CodedRest], step: float
 ) -> streams.CodedRest:
-    """At a step, or the first finer one by which no vertex is further from the pose than the limit. Raises BoundError
-    where none is: integers of steps that fine do not reach all places."""
+    """Return a pose at a step, or at the first finer one by which no vertex is further off than the limit. Raises
+    BoundError if there is none: integers of steps that fine do not reach all places."""
     for _ in range(REST_ROUNDS):
         coded = encode(step)
         if np.linalg.norm(coded.decoded - pose, axis=1).max() <= limit:
@@ -339,7 +356,7 @@ def _within(
 
 
 def poses_size(source: Source, ath: Ath, settings: Settings) -> float:
-    """Bytes of hierarchy and rest pose; infinite where the pose cannot be kept within the bound."""
+    """Return the bytes of hierarchy and rest pose; infinite if the pose cannot keep the bound."""
     hierarchy, branches = source.hierarchy, branch_records(source.hierarchy, ath, settings)
     stream = streams.encode_hierarchy(branches, hierarchy.branch_source, hierarchy.vertex_source)
     try:
@@ -349,7 +366,7 @@ def poses_size(source: Source, ath: Ath, settings: Settings) -> float:
 
 
 def code_source_rest(source: Source, branches: np.ndarray, reference: np.ndarray, bound: float) -> bytes:
-    """SOURCE_REST about the reference pose as decoded, (N, 3) float64 less the origin; empty where none is needed."""
+    """Return SOURCE_REST about the reference pose as decoded, (N, 3) float64 less the origin; empty if not needed."""
     if not source.has_source_rest:
         return b""
     if source.exact_rest:
@@ -366,13 +383,13 @@ def code_source_rest(source: Source, branches: np.ndarray, reference: np.ndarray
 
 
 def stem_sizes(source: Source) -> np.ndarray:
-    """Diagonals of the stems' bounding boxes in the rest pose, (B,)."""
+    """Return the diagonals of the stems' bounding boxes in the rest pose, (B,)."""
     first = source.hierarchy.first_vertex
     return np.linalg.norm(np.maximum.reduceat(source.rest, first) - np.minimum.reduceat(source.rest, first), axis=1)
 
 
 def _thin_branches(source: Source) -> np.ndarray:
-    """Branches that look like beams: the way along their vertices is not much longer than they are wide."""
+    """Return which branches look like beams, (B,): the way along their vertices is not much longer than their size."""
     hierarchy, rest = source.hierarchy, source.rest
     first = hierarchy.first_vertex
     steps = np.zeros(len(rest))
@@ -384,8 +401,7 @@ def _thin_branches(source: Source) -> np.ndarray:
 
 @dataclass(frozen=True)
 class StreamBasis:
-    """The learned time basis of a stream; root as in LevelStream. It begins with the `known` rows of the stream of
-    another level, if any."""
+    """The learned time basis of a stream, which begins with `known` rows of the stream of level `base`, if any."""
 
     stored: Entries | InWaves
     root: int
@@ -394,21 +410,20 @@ class StreamBasis:
 
 
 def level_streams(settings: Settings, levels: int, bases: dict[int, StreamBasis]) -> list[LevelStream]:
-    found = []
+    level_streams = []
     for level in range(levels):
         factor = float(settings.rotation_step_factors[level])
         root = NODE_ROOT if settings.is_straight else STEM_ROOT
         stream = LevelStream(settings.step_of(level), factor, turn_step=settings.turn_step, root=root)
         if level in bases:
             stream.temporal, stream.root = bases[level].stored.rows, bases[level].root
-        found.append(stream)
-    return found
+        level_streams.append(stream)
+    return level_streams
 
 
 def _level_moments(segment: SegmentMotion, level: int | None) -> tuple[np.ndarray, int]:
-    """Second moments over time, (T, T), of those tracks of one level's stream, or of all, that do not quantise to
-    nothing, in units of their steps, and how many they are; of a segment that was analysed finely, in no learned
-    basis."""
+    """Return the second moments over time, (T, T), of those tracks of one level's stream, or of all, that do not
+    quantise to nothing, in units of their steps, and the number of these tracks. The segment was analysed finely."""
     if level is None:
         return _moments(segment, [segment.coefficients, segment.tracks])
     pieces, slots = segment.plan.pieces, []
@@ -447,7 +462,7 @@ def analyse_finely(plan: Plan, settings: Settings, positions: np.ndarray) -> Seg
 def time_components(
     plan: Plan, settings: Settings, positions: np.ndarray, levels: Sequence[int | None]
 ) -> dict[int | None, TimeComponents]:
-    """Of some levels, None: of all that moves, from a finer pass."""
+    """Return the components of some levels, or of all that moves (None), from a finer pass."""
     if not levels:
         return {}
     segment = analyse_finely(plan, settings, positions)
@@ -458,8 +473,8 @@ def time_components(
 def level_bases(
     plan: Plan, settings: Settings, components: dict[int | None, TimeComponents], ratio: float = 1.0
 ) -> dict[int, StreamBasis]:
-    """Of the levels that learn theirs, for steps `ratio` times those of the components: each its own, or that of all,
-    which lies with the first of them."""
+    """Return the time bases of the levels that learn theirs, for steps `ratio` times those of the components: each
+    level's own, or that of all, which lies with the first of them."""
     levels = [level for level in settings.learning_levels if plan.has_stems(level)]
     if not settings.common_basis:
         bases = {level: components[level].basis(ratio, ratio) for level in levels}
@@ -474,8 +489,8 @@ def level_bases(
 
 
 def basis_ratio(plan: Plan, settings: Settings, ratio: float) -> float:
-    """By how much rows may be coarser than where a time basis was learned, at steps `ratio` times as fine: by less
-    where the turns of rigid pieces have a largest step."""
+    """Return by how much rows may be coarser than where a time basis was learned, at steps `ratio` times as fine: by
+    less if the turns of rigid pieces have a largest step."""
     levers = plan.levers()[plan.is_rigid]
     if not settings.turn_step or not levers.any():
         return ratio
@@ -485,14 +500,14 @@ def basis_ratio(plan: Plan, settings: Settings, ratio: float) -> float:
 
 
 def learned_bases(plan: Plan, settings: Settings, positions: np.ndarray) -> dict[int, StreamBasis]:
-    """Of the levels that learn theirs."""
+    """Return the time bases of the levels that learn theirs."""
     levels = [None] if settings.common_basis and any(settings.learned_bases) else settings.learning_levels
     return level_bases(plan, settings, time_components(plan, settings, positions, levels))
 
 
 @dataclass(frozen=True)
 class Corrections:
-    """Those of positions of a shape, (N, 3, T): rows (K, 6) int32, and their step."""
+    """Corrections of positions of a shape, (N, 3, T): rows (K, 6) int32, and their step."""
 
     rows: np.ndarray
     step: float
@@ -500,13 +515,13 @@ class Corrections:
 
     @cached_property
     def chunk(self) -> bytes:
-        """CORRECTIONS; empty where there are none."""
+        """CORRECTIONS; empty if there are none."""
         if not len(self.rows):
             return b""
         return ct.pack_corrections(self.step, streams.encode_corrections(self.rows, self.shape[0], self.shape[2]))
 
     def applied(self, decoded: np.ndarray) -> np.ndarray:
-        """The positions as they are with them."""
+        """Return the corrected positions."""
         corrected = decoded.copy()
         streams.apply_corrections(corrected, self.rows, self.step)
         return corrected
@@ -519,17 +534,17 @@ class Coded:
     segment: SegmentMotion
     stems: dict[int, bytes]
     corrections: Corrections
-    sample: np.ndarray  # (n,) vertices, in whose numbers the corrections are
-    heads: dict[int, int]  # bytes of each stream that are the same for few pieces and for many: its time basis
+    sample: np.ndarray  # (n,) vertices that the corrections number.
+    heads: dict[int, int]  # Bytes of the time basis of each stream, which do not grow with the pieces.
 
     @property
     def corrected(self) -> np.ndarray:
-        """(K,) the vertex of each correction."""
+        """The vertex of each correction, (K,)."""
         return self.sample[self.corrections.rows[:, 0]]
 
     @property
     def sample_share(self) -> float:
-        """Of the vertices."""
+        """Share of the vertices that are in the sample."""
         return len(self.sample) / self.segment.plan.vertex_count
 
 
@@ -544,20 +559,20 @@ def analyse(
     ratio: int = 1,
     layered: bool = False,
 ) -> tuple[SegmentMotion, np.ndarray]:
-    """The integers of the stems, and the positions at the last level without corrections; output: the origin and the
-    type of these. bases: of the levels that learn theirs; before, ratio, layered: as SegmentMotion has them."""
-    own = level_streams(settings, plan.level_count, bases)
-    segment = SegmentMotion(plan, positions.shape[2], own, learned_modes, before, ratio, layered, settings.periodic)
+    """Return the integers of the stems, and the positions at the last level without corrections; output: origin and
+    type of the positions. bases: of the levels that learn theirs; before, ratio, layered: as SegmentMotion has them."""
+    levels = level_streams(settings, plan.level_count, bases)
+    segment = SegmentMotion(plan, positions.shape[2], levels, learned_modes, before, ratio, layered, settings.periodic)
     origin, dtype = output
     decoded = np.empty(positions.shape, dtype)
     segment.analyse(positions, settings.rounding, origin, decoded)
     if before is not None:
-        segment.forget_caches()  # a refinement has no nodes
+        segment.forget_caches()  # A refinement has no nodes.
     return segment, decoded
 
 
 def stems_head(settings: Settings, level: int, bases: dict[int, StreamBasis]) -> ct.StemsHead:
-    """Of the stems of a level, whose time basis is among `bases` where it is learned."""
+    """Return the head of the stems of a level, whose time basis is among `bases` if it is learned."""
     head = ct.StemsHead(
         settings.step_of(level),
         settings.rotation_step_factors[level],
@@ -565,14 +580,14 @@ def stems_head(settings: Settings, level: int, bases: dict[int, StreamBasis]) ->
         basis_kind=ct.NODE_WAVES if settings.is_straight else ct.STEM_WAVES,
     )
     if level in bases:
-        own = bases[level]
-        head.basis_kind, head.rank, head.base = own.stored.kind, len(own.stored.rows), own.base
-        head.basis = own.stored.stream(own.known)
+        basis = bases[level]
+        head.basis_kind, head.rank, head.base = basis.stored.kind, len(basis.stored.rows), basis.base
+        head.basis = basis.stored.stream(basis.known)
     return head
 
 
 def stem_streams(segment: SegmentMotion, settings: Settings, bases: dict[int, StreamBasis]) -> tuple[dict, dict]:
-    """STEMS of the levels of a first layer, and the bytes of their time bases."""
+    """Return STEMS of the levels of a first layer, and the bytes of their time bases."""
     plan = segment.plan
 
     def stem_stream(level: int) -> tuple[bytes, int]:
@@ -586,7 +601,7 @@ def stem_streams(segment: SegmentMotion, settings: Settings, bases: dict[int, St
 
 
 def correction_step(limit: float | np.ndarray) -> float:
-    """That is tried first."""
+    """Return the step of corrections that is tried first."""
     return qz.single(qz.CORRECTION_STEP * float(np.min(limit)))
 
 
@@ -599,9 +614,9 @@ def find_corrections(
     keeps_all: bool = True,
     ends: streams.MetEnds = streams.FREE_ENDS,
 ) -> Corrections:
-    """Those that keep the limit; those of a rigid part, or of a ring, move all of it where that serves, and else,
-    unless each vertex of a rigid part is to keep the limit, it has none. ends: what they meet; in the step of
-    correction_step. Raises BoundError."""
+    """Return corrections that keep the limit. If it serves, they move all of a rigid part or of a ring; else a rigid
+    part has none unless each vertex is to keep the limit. ends: what they meet, in correction_step. Raises
+    BoundError."""
     factor, is_rigid = 1.0, np.repeat(plan.is_rigid, plan.pieces["count"])
     is_narrow = Feature.WIDE in settings.without
     parts = _parts_that_keep_their_shape(plan)
@@ -623,7 +638,7 @@ def find_corrections(
 
 
 def _parts_that_keep_their_shape(plan: Plan | PlanSample) -> tuple[np.ndarray, np.ndarray]:
-    """First vertices and numbers of vertices of rigid pieces, and of the rings of others."""
+    """Return first vertices and numbers of vertices of rigid pieces, and of the rings of others."""
     rigid, tubes = plan.pieces[plan.is_rigid], plan.pieces[~plan.is_rigid & (plan.pieces["ring"] > 0)]
     count = -(-tubes["count"] // np.maximum(tubes["ring"], 1))
     rings, number = np.repeat(tubes, count), np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
@@ -639,8 +654,8 @@ def code_stems(
     learned_modes: LearnedModes | None,
     bases: dict[int, StreamBasis] | None = None,
 ) -> Coded:
-    """Streams of the stems of a single layer and the corrections that keep the limit, of a sample where there are many
-    vertices. bases: None: to be learned."""
+    """Return the streams of the stems of a single layer and the corrections that keep the limit, of a sample if there
+    are many vertices. bases: None: to be learned."""
     if bases is None:
         bases = learned_bases(prelude.plan, settings, positions)
     segment, decoded = analyse(prelude.plan, prelude.output, settings, positions, learned_modes, bases)
@@ -650,6 +665,6 @@ def code_stems(
         corrections = find_corrections(decoded, positions, prelude.origin, settings, prelude.plan)
         return Coded(segment, stems, corrections, np.arange(len(decoded)), heads)
     at, limit = some.vertices, settings.limit
-    own = replace(settings, limit=limit if np.isscalar(limit) else limit[at])
-    corrections = find_corrections(decoded[at], positions[at], prelude.origin, own, some)
+    of_sample = replace(settings, limit=limit if np.isscalar(limit) else limit[at])
+    corrections = find_corrections(decoded[at], positions[at], prelude.origin, of_sample, some)
     return Coded(segment, stems, corrections, at, heads)

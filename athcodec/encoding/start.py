@@ -11,10 +11,9 @@ from athcodec.encoding import quantise as qz
 from athcodec.encoding.choices import rest
 from athcodec.encoding.choices.forms import first_forms
 from athcodec.encoding.choices.rigid import first_rigid, loose_branches
-from athcodec.encoding.segment import Source
+from athcodec.encoding.segment import Source, plain_settings
 from athcodec.encoding.segment_samples import SegmentSample, usual_change
 from athcodec.encoding.settings import Choice, Settings
-from athcodec.encoding.shape import finer_than
 from athcodec.encoding.survey import Ath
 
 STILL_STEP = 1024.0  # Quantisation step, in bounds, that rounds every coefficient of a still stem to zero.
@@ -27,26 +26,16 @@ def first_settings(
     is_layered, (rigid, turn_step) = len(ratios) > 1, first_rigid(source, bound, samples, ratios)
     relative = bound / source.seen.diagonal if source.seen.diagonal > 0 else 1e-4
     step, rest_step = bound * qz.first_step_ratio(relative), bound * qz.rest_step_ratio(relative)
-    levels = ath.height + 2
-    settings = Settings(
-        bound=bound,
-        largest_bound=source.largest_bound(bound),
-        limit=source.limit(bound),
-        step=qz.single(step),
-        level_steps=np.ones(levels),
-        rest_step=qz.single(rest_step),
+    settings = plain_settings(source, ath.height + 2, bound, step, rest_step)
+    settings = replace(
+        settings,
         forms=first_forms(source, samples),
         loose=loose_branches(source, samples[-1].positions),
         rigid=rigid,
         layer=len(ratios) - 1,
         turn_step=turn_step,
-        lags=np.zeros(source.hierarchy.branch_count, np.int32),
-        details=source.details if is_layered else finer_than(source.details, bound),
-        rotation_step_factors=(0,) * levels,
-        learned_bases=(False,) * levels,
-        node_steps=np.full(levels, step),
+        details=source.details if is_layered else settings.details,
         usual_change=usual_change(samples) if source.has_seams else np.inf,
-        without=source.without,
     )
     if is_layered and not settings.details.any():  # Lags that are best at once are worse where layers refine them.
         best = replace(settings, lags=rest.lags(source, rest_step, settings.details))

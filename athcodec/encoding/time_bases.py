@@ -17,10 +17,10 @@ from athcodec.encoding import streams
 from athcodec.encoding.quantise import half_octaves
 from athcodec.motion.algebra import multiply, principal
 
-MOST_SAMPLE = 8192  # Stands for 1.
-PRECISION = 0.6  # step of a row's integers, over that by which they err as much as those of all tracks in the row
-LEAST_STEP, MOST_STEP = -200, 0  # half octaves
-TOLERANCE = 5e-4  # mean square, in steps, that a basis may leave out
+MOST_SAMPLE = 8192  # Integer that stands for 1.
+PRECISION = 0.6  # Step of a row's integers, over the step at which they err as much as all tracks in the row.
+LEAST_STEP, MOST_STEP = -200, 0  # Smallest and largest step of a row, in half octaves.
+TOLERANCE = 5e-4  # Mean square, in squared steps, that a basis may leave out.
 
 
 @dataclass(frozen=True)
@@ -32,17 +32,18 @@ class Entries:
 
     @cached_property
     def rows(self) -> np.ndarray:
-        """(rank, frames) float64, as a decoder has them."""
+        """The rows with a decoder's bits, (rank, frames) float64."""
         return self.integers / MOST_SAMPLE
 
     def stream(self, known: int = 0) -> bytes:
-        """Of all rows but the `known` first."""
+        """Return the stream of all rows but the first `known`."""
         return streams.encode_temporal(self.integers[known:])
 
 
 @dataclass(frozen=True)
 class InWaves:
-    """The same by waves, (frames, frames): integers, (rank, frames) int32, of steps in half octaves, (rank,) int32."""
+    """Rows of a learned basis in waves, (frames, frames): integers, (rank, frames) int32, and the steps of the rows in
+    half octaves, (rank,) int32."""
 
     kind = BASIS_IN_WAVES
     waves: np.ndarray
@@ -51,7 +52,7 @@ class InWaves:
 
     @cached_property
     def rows(self) -> np.ndarray:
-        """(rank, frames) float64, as a decoder has them."""
+        """The rows with a decoder's bits, (rank, frames) float64."""
         rows = np.empty(self.integers.shape)
         rank, frames = rows.shape
         lib.ath_add_basis_rows(
@@ -66,26 +67,26 @@ class InWaves:
         return rows
 
     def stream(self, known: int = 0) -> bytes:
-        """Of all rows but the `known` first."""
+        """Return the stream of all rows but the first `known`."""
         return streams.encode_basis(self.exponents[known:], self.integers[known:])
 
 
 class TimeComponents:
     """Principal components over time, in descending order, of `count` tracks.
 
-    moments: (frames, frames), their second moments in units of their steps; waves: (frames, frames), those of the clip.
+    moments: (frames, frames) second moments of the tracks in units of their steps; waves: (frames, frames).
     """
 
     def __init__(self, moments: np.ndarray, count: int, waves: np.ndarray, may_be_in_waves: bool = True):
         values, vectors = principal(moments[None])
         self._energies = np.maximum(values[0], 0.0)
-        self._left_out = np.cumsum(self._energies[::-1])  # by leaving out the last i + 1
+        self._left_out = np.cumsum(self._energies[::-1])  # Energies of the last i + 1 components.
         self._rows, self._waves = vectors[0], waves
         self._count, self._may_be_in_waves = count, may_be_in_waves
 
     def basis(self, ratio: float = 1.0, precision: float = 1.0) -> Entries | InWaves | None:
-        """The rows that tracks in steps `ratio` times as large need, or None where no basis smaller than waves would
-        do; precision: how many times as large the steps are that they are precise enough for."""
+        """Return the rows that tracks in steps `ratio` times as large need; None: no basis is smaller than waves.
+        precision: how many times as large the steps are that the rows are precise enough for."""
         rank = self._rank(ratio)
         if self._count <= 1 or not 1 <= rank <= len(self._rows) // 2:
             return None
@@ -98,7 +99,7 @@ class TimeComponents:
 
     @cached_property
     def _suits_waves(self) -> bool:
-        """Whether the rows are smaller so."""
+        """Whether the rows are smaller in waves."""
         rank = max(self._rank(1.0), 1)
         return self._may_be_in_waves and len(self._in_waves(rank, 1.0).stream()) < len(self._entries(rank).stream())
 

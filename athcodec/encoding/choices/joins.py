@@ -15,29 +15,30 @@ import numpy as np
 
 from athcodec.files.threads import ranges
 
-END_FRAMES = 2  # of a segment, that the next one looks at
-WIDTHS = (1, 2, 3, 4, 5, 6, 8, 10, 12, 14, 16, 20, 24, 28, 32, 40, 48, 64, 96)  # frames
-SLOPED = 128
-TURN = 0.5**0.5  # where the share of a slope stops to fall faster
-SEEN = 1 << 12  # vertices by which joins are chosen, about
-END_FOOTPRINTS = {2: (5, 16, 27, 32), 1: (0, 0, 16, 32)}  # by width, in the last frames of what stands in the last one
+END_FRAMES = 2  # Last frames of a segment that a join starts from.
+WIDTHS = (1, 2, 3, 4, 5, 6, 8, 10, 12, 14, 16, 20, 24, 28, 32, 40, 48, 64, 96)  # Frames that a join moves.
+SLOPED = 128  # Added to the width of a join that joins slopes too.
+TURN = 0.5**0.5  # Part of a join at which the share of a slope stops falling faster.
+SEEN = 1 << 12  # About how many vertices joins are chosen by.
+# Shares, in 32nds, of a correction in the last frame that reach the last four frames, by its width.
+END_FOOTPRINTS = {2: (5, 16, 27, 32), 1: (0, 0, 16, 32)}
 AXES = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 0], [1, 0, 1], [0, 1, 1], [1, 1, 1]])
 NO_CORRECTIONS = np.empty((0, 6), np.int32)
-# Ticks, changes of velocity at a seam over those of a usual frame: up to the first nobody sees them, beyond the second
-# they weigh more.
+# Ticks are changes of velocity at a seam over those of a usual frame. Up to SMOOTH they are invisible, and beyond ROUGH
+# each weighs ROUGH_WORTH more.
 SMOOTH, ROUGH, ROUGH_WORTH = 1.2, 1.4, 30.0
-ERROR_WORTH = 8.0  # ticks that an error twice as large weighs
-ORDER_WORTH = 400.0  # likewise, of one that is twice that of the level before
-BYTES_WORTH = 40.0  # likewise twice as many bytes
-CORRECTION_BYTES = 0.3  # that each position beyond the limit takes: a correction reaches over frames
+ERROR_WORTH = 8.0  # Ticks that an error twice as large weighs.
+ORDER_WORTH = 400.0  # Ticks that an error of twice that of the level before weighs.
+BYTES_WORTH = 40.0  # Ticks that twice as many bytes weigh.
+CORRECTION_BYTES = 0.3  # Bytes of each position beyond the limit: a correction reaches over frames.
 
 
 @dataclass(frozen=True)
 class End:
-    """What a level of the segment behind goes on from.
+    """What a level of the next segment goes on from.
 
     positions, source: (N, 3, END_FRAMES), decoded and wanted. usual: the change of velocity in a usual frame.
-    corrections: (K, 6) in the last frame, which stand in the first one of the segment behind as well.
+    corrections: (K, 6) in the last frame, which stand in the first frame of the next segment as well.
     """
 
     positions: np.ndarray
@@ -46,12 +47,12 @@ class End:
     corrections: np.ndarray
 
     def of(self, some: slice) -> End:
-        """Of some of the vertices, as far as a join is chosen and made by it."""
+        """Return the end of some of the vertices, as far as a join is chosen and made by it."""
         return replace(self, positions=self.positions[some], source=self.source[some])
 
 
 def end_of(positions: np.ndarray, source: np.ndarray, corrections: np.ndarray = NO_CORRECTIONS) -> End | None:
-    """The end of a level; None: the segment is too short."""
+    """Return the end of a level; None: the segment is too short."""
     if positions.shape[2] <= END_FRAMES:
         return None
     ends = (numbers[:, :, -END_FRAMES:].copy() for numbers in (positions, source))
@@ -59,33 +60,33 @@ def end_of(positions: np.ndarray, source: np.ndarray, corrections: np.ndarray = 
 
 
 def end_corrections(away: np.ndarray, limit: float | np.ndarray, step: float, frame: int) -> np.ndarray:
-    """Corrections (K, 6) of `frame`, the last one, for vertices that are beyond their limits there or right before, of
-    as few axes as do. away: (N, 3, 4) how far they are off in the last frames."""
+    """Return corrections (K, 6) of `frame`, the last one, for vertices beyond their limits there or right before, of as
+    few axes as possible. away: (N, 3, 4) errors in the last frames."""
     limits = np.broadcast_to(limit, len(away))
-    own = np.flatnonzero((_squares(away[:, :, -2:]) > limits[:, None] ** 2).any(axis=1))
-    away, limits = away[own], limits[own]
+    vertices = np.flatnonzero((_squares(away[:, :, -2:]) > limits[:, None] ** 2).any(axis=1))
+    away, limits = away[vertices], limits[vertices]
     whole = np.rint(-away[:, :, -1] / step)
     whole = np.where(whole == 0, np.where(away[:, :, -1] < 0, 1, -1), whole)
-    rows, found = np.zeros((len(own), 6), np.int32), np.zeros(len(own), bool)
-    rows[:, 0], rows[:, 1] = own, frame
+    rows, done = np.zeros((len(vertices), 6), np.int32), np.zeros(len(vertices), bool)
+    rows[:, 0], rows[:, 1] = vertices, frame
     for axes, (width, parts), shorter in product(AXES, END_FOOTPRINTS.items(), (0, 1)):
         tried = axes * (whole - shorter * np.sign(whole))
         left = away + tried[:, :, None] * (step * np.array(parts) / 32)
-        good = ~found & (_squares(left) <= limits[:, None] ** 2).all(axis=1)
+        good = ~done & (_squares(left) <= limits[:, None] ** 2).all(axis=1)
         rows[good, 2:5], rows[good, 5] = tried[good], width
-        found |= good
-    return rows[found]
+        done |= good
+    return rows[done]
 
 
 def _ways(end: End, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The jump and the change of slope from an end to the positions behind it, (N, 3) float64 each."""
+    """Return the jump and the change of slope from an end to the positions after it, (N, 3) float64 each."""
     start, last = (end.positions[:, :, i].astype(np.float64) for i in range(END_FRAMES))
     first, second = (positions[:, :, i].astype(np.float64) for i in range(2))
     return 0.5 * (3.0 * (last - first) - (start - second)), (last - start) - (second - first)
 
 
 def _shares(join: int) -> tuple[np.ndarray, np.ndarray]:
-    """Of the ways, that a join adds to its frames, (width,) each."""
+    """Return the shares of the jump and of the change of slope that a join adds to its frames, (width,) each."""
     width, is_sloped = join % SLOPED, join >= SLOPED
     u = (np.arange(width) + 0.5) / width if width else np.empty(0)
     left = 1.0 - u
@@ -95,13 +96,13 @@ def _shares(join: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def offsets(end: End, positions: np.ndarray, join: int) -> np.ndarray:
-    """What a join adds to its frames, (N, 3, width) float64."""
+    """Return what a join adds to its frames, (N, 3, width) float64."""
     (jump, slope), (jumps, slopes) = _ways(end, positions), _shares(join)
     return jump[:, :, None] * jumps + slope[:, :, None] * slopes
 
 
 def apply_join(end: End, positions: np.ndarray, join: int) -> None:
-    """Joins the positions in place, as a decoder does, bit for bit but where maps of nodes make them."""
+    """Join the positions in place, as a decoder does, bit for bit unless maps of nodes make them."""
     width = join % SLOPED
     for part in (slice(*some) for some in ranges(len(positions), 3 * width)):
         moved = positions[part, :, :width]
@@ -109,14 +110,14 @@ def apply_join(end: End, positions: np.ndarray, join: int) -> None:
 
 
 class ErrorPrice:
-    """What a larger error costs a level without corrections, in ticks; rms: the level's own, over so many frames,
-    most_rms: that of the level before."""
+    """What a larger error costs a level without corrections, in ticks. rms: the level's error over so many frames;
+    most_rms: the error of the level before."""
 
     def __init__(self, rms: float, most_rms: float, frames: int):
         self._rms, self._most_rms, self._frames = rms, most_rms, frames
 
     def __call__(self, before: np.ndarray, after: np.ndarray) -> float:
-        """Of squared errors in some frames, (N, frames), that become others."""
+        """Return the cost of squared errors in some frames, (N, frames), that become others."""
         if self._rms == 0:
             return 0.0
         more = float(after.sum() - before.sum()) / (len(before) * self._frames)
@@ -126,14 +127,14 @@ class ErrorPrice:
 
 
 class CorrectionPrice:
-    """What is beyond a limit, one or (N,), costs in corrections, in ticks; bytes_: of those vertices, up to the
+    """What positions beyond a limit, one or (N,), cost in corrections, in ticks; bytes_: of those vertices, up to the
     level."""
 
     def __init__(self, limit: float | np.ndarray, bytes_: float):
         self._squared_limit, self._bytes = np.reshape(np.square(limit), (-1, 1)), bytes_
 
     def __call__(self, before: np.ndarray, after: np.ndarray) -> float:
-        """As ErrorPrice."""
+        """Return the cost, like ErrorPrice."""
         known, now = ((squares > self._squared_limit).sum(dtype=int) for squares in (before, after))
         return BYTES_WORTH * max(0.0, CORRECTION_BYTES * (now - known) / self._bytes)
 
@@ -147,16 +148,16 @@ class _Moved:
         self._ways = [(a * b).sum(axis=1, keepdims=True) for a, b in ((jump, jump), (jump, slope), (slope, slope))]
 
     def mean(self) -> _Moved:
-        """Those of all vertices."""
+        """Return the means over vertices."""
         means = copy.copy(self)
         means.squares = self.squares.mean(axis=0)
-        means._along, means._ways = ([own.mean(axis=0) for own in some] for some in (self._along, self._ways))
+        means._along, means._ways = ([array.mean(axis=0) for array in arrays] for arrays in (self._along, self._ways))
         return means
 
     def by(self, jumps: np.ndarray, slopes: np.ndarray) -> np.ndarray:
-        """(N, width) of the first frames."""
+        """Return the squared lengths in the first frames after the move, (N, width)."""
         width, (jump2, both, slope2) = len(jumps), self._ways
-        of_jump, of_slope = (own[..., :width] for own in self._along)
+        of_jump, of_slope = (along[..., :width] for along in self._along)
         moved = jumps * (2.0 * of_jump + jumps * jump2)
         if slopes.any():
             moved += slopes * (2.0 * of_slope + 2.0 * jumps * both + slopes * slope2)
@@ -164,34 +165,34 @@ class _Moved:
 
 
 def seen(vertices: int) -> slice:
-    """Those of so many vertices by which joins are chosen: each of a card with 4 comes in turn."""
+    """Return the vertices by which joins are chosen. The stride is odd, so that each corner of a card comes in turn."""
     return slice(None, None, vertices // SEEN | 1)
 
 
 def _squares(away: np.ndarray) -> np.ndarray:
-    """Of the lengths of vectors, (N, frames)."""
+    """Return the squared lengths of vectors, (N, frames)."""
     return np.square(away, dtype=np.float64).sum(axis=1)
 
 
 def _changes(positions: np.ndarray) -> np.ndarray:
-    """RMS over vertices of the change of velocity at each frame but the first and the last."""
+    """Return the RMS over vertices of the change of velocity at each frame but the first and the last."""
     return np.sqrt(_squares(np.diff(positions.astype(np.float64), 2, axis=2)).mean(axis=0))
 
 
 def _usual(changes: np.ndarray) -> float:
-    """Those of a usual frame; of motion between keys, most frames of which have none, half the RMS."""
+    """Return the change in a usual frame. If most frames have none, as between keys, it is half the RMS."""
     return max(float(np.median(changes)), 0.5 * float(np.sqrt((changes**2).mean())))
 
 
 def best_join(end: End, positions: np.ndarray, source: np.ndarray, price: ErrorPrice | CorrectionPrice) -> int:
-    """How to join a level of a segment to the end of the one before: over how many frames, SLOPED above that where
-    slopes are joined too; 0: not at all. source: (N, 3, T) what is coded, in the coordinates of the positions; of those
-    vertices that are `seen`."""
-    own = _changes(positions)
-    usual = 0.5 * (end.usual + _usual(own))  # of both: one alone may move in straight lines
+    """Return how to join a level of a segment to the end of the one before: over how many frames, SLOPED more if slopes
+    are joined too; 0: not at all. source: (N, 3, T) of those vertices that are `seen`, in the coordinates of
+    `positions`."""
+    decoded = _changes(positions)
+    usual = 0.5 * (end.usual + _usual(decoded))  # One side alone may move in straight lines.
     wanted = _changes(np.concatenate([end.source, source[:, :, : END_FRAMES + 1]], axis=2))
     wanted *= usual / max(_usual(_changes(source)), 1e-300)
-    natural = np.maximum(np.concatenate([wanted, own[1:]]), usual)  # from the last frame before the seam on
+    natural = np.maximum(np.concatenate([wanted, decoded[1:]]), usual)  # From the last frame before the seam on.
 
     width = min(max(WIDTHS), positions.shape[2] - END_FRAMES)
     ways, away = _ways(end, positions), positions[:, :, :width] - source[:, :, :width]
@@ -201,9 +202,9 @@ def best_join(end: End, positions: np.ndarray, source: np.ndarray, price: ErrorP
 
     def cost(join: int) -> float:
         shares = _shares(join)
-        moves = [np.diff(np.pad(own, 2), 2) for own in shares]
-        found = np.sqrt(changes.by(*moves))
-        tick = float((found / natural[: len(found)]).max()) if usual > 0 else 0.0
+        moves = [np.diff(np.pad(share, 2), 2) for share in shares]
+        joined = np.sqrt(changes.by(*moves))
+        tick = float((joined / natural[: len(joined)]).max()) if usual > 0 else 0.0
         price_of_errors = price(errors.squares[:, : len(shares[0])], errors.by(*shares))
         return max(tick, SMOOTH) + ROUGH_WORTH * max(0.0, tick - ROUGH) + price_of_errors
 

@@ -19,53 +19,36 @@ from athcodec.encoding import streams
 from athcodec.encoding.choices.rest import with_best_rest
 from athcodec.encoding.features import Feature
 from athcodec.encoding.motion import LevelStream, SegmentMotion, position_errors
-from athcodec.encoding.segment import CodedPrelude, Source
+from athcodec.encoding.segment import CodedPrelude, Source, plain_settings
 from athcodec.encoding.segment_samples import SegmentSample, typical_segments
 from athcodec.encoding.settings import Choice, Settings
-from athcodec.encoding.shape import finer_than
 from athcodec.encoding.survey import Ath, Survey
 from athcodec.errors import BoundError
 from athcodec.motion.thresholds import Thresholds
 
 CUBES, LATTICE = False, True  # What positions are rounded to.
-REST_STEPS = (0.5, 0.25, 0.125, 1.15)  # over the bound
-STEPS = (0.999, 0.97, 0.9, 0.75, 0.5, 0.3)  # over the largest that reaches every point within the limit
-TRIAL_SEGMENTS, TRIAL_FRAMES = 3, 64
-STILL, FINE_STILL = 0.35, 0.25  # over the limit, errors whose second differences are at most 1.4 limits, or one
-FINE = 9e-4  # over the diagonal, bounds below which it is to be one
-UNSEEN, INVISIBLE = 1e-5, 1e-6  # over the diagonal, bounds from which on twitches count for less, and for nothing
-TWITCHING = 0.02  # of the vertices, which may twitch in any frame
-MOST_FOR_STILL = 2.0  # over the bytes without, that errors without twitches may take
-TOO_MANY = 1.2  # over the bytes wanted, that a few frames may promise
-MAP_SHARE, MAP_STEPS = 0.02, (0.1, 0.25, 0.5, 1.0)  # of the bytes, for level 0; over the error of the rest pose
-LESS_ERROR = 0.9  # of level 0, with maps that are worth their bytes
+REST_STEPS = (0.5, 0.25, 0.125, 1.15)  # Steps of the rest pose that are tried, in bounds.
+STEPS = (0.999, 0.97, 0.9, 0.75, 0.5, 0.3)  # Steps tried, over the largest that reaches every point in the limit.
+TRIAL_SEGMENTS, TRIAL_FRAMES = 3, 64  # Segments of a trial, and frames of each that show whether it may pay.
+STILL, FINE_STILL = 0.35, 0.25  # Errors, in limits, whose second differences are at most 1.4 limits, or one.
+FINE = 9e-4  # Bound, in diagonals, below which second differences are held to one limit.
+UNSEEN, INVISIBLE = 1e-5, 1e-6  # Bounds, in diagonals, below which twitches count for less, and for nothing.
+TWITCHING = 0.02  # Share of the vertices that may twitch in any frame.
+MOST_FOR_STILL = 2.0  # Factor on the bytes that errors without twitches may cost.
+TOO_MANY = 1.2  # Predicted motion is given up if a few frames promise more than this factor on the bytes allowed.
+MAP_SHARE = 0.02  # Share of the bytes that the maps of level 0 may take.
+MAP_STEPS = (0.1, 0.25, 0.5, 1.0)  # Steps of these maps that are tried, over the error of the rest pose.
+LESS_ERROR = 0.9  # Largest error of level 0 with maps, over that without, that is worth their bytes.
 
 
 def one_map_each(seen: Survey) -> Ath:
-    """The ATH in which each root's subtree moves as one."""
+    """Return the ATH in which each root's subtree moves as one."""
     epsilon, xi = (float(errors.max(initial=0.0)) for errors in (seen.largest_gads, seen.largest_distance))
     return replace(seen, xi=None).ath(Thresholds(epsilon, 0, xi, 0))
 
 
 def _settings(source: Source, ath: Ath, bound: float, rest_step: float) -> Settings:
-    branches, levels = source.hierarchy.branch_count, ath.height + 2
-    none = np.zeros(branches, bool)
-    settings = Settings(
-        bound=bound,
-        largest_bound=source.largest_bound(bound),
-        limit=source.limit(bound),
-        step=_largest_step(source.limit(bound), CUBES),
-        level_steps=np.ones(levels),
-        rest_step=qz.single(rest_step),
-        forms=np.zeros(branches, np.int32),
-        loose=none,
-        rigid=np.zeros(branches, np.int32),
-        lags=np.zeros(branches, np.int32),
-        details=finer_than(source.details, bound),
-        rotation_step_factors=(0,) * levels,
-        learned_bases=(False,) * levels,
-        node_steps=np.ones(levels),
-    )
+    settings = plain_settings(source, ath.height + 2, bound, _largest_step(source.limit(bound), CUBES), rest_step)
     return with_best_rest(source, ath, settings)
 
 
@@ -79,7 +62,7 @@ class FoundPrediction:
 
 
 def best_prediction(source: Source, bound: float, most_bytes: float) -> FoundPrediction | None:
-    """None where that is above `most_bytes`, or the bound cannot be kept."""
+    """Return the best prediction; None: it takes more than `most_bytes`, or cannot keep the bound."""
     ath = one_map_each(source.seen)
     first, *others = (_settings(source, ath, bound, ratio * source.smallest_bound(bound)) for ratio in REST_STEPS)
     samples = _samples(source)
@@ -91,8 +74,8 @@ def best_prediction(source: Source, bound: float, most_bytes: float) -> FoundPre
         return preludes[settings.rest_step]
 
     def coded(settings: Settings, lattice: bool = CUBES, error_share: float = 1.0) -> FoundPrediction:
-        own = replace(settings, step=_largest_step(error_share * settings.limit, lattice))
-        choice = Choice(own, own, None, predicted=lattice, error_share=error_share)
+        stepped = replace(settings, step=_largest_step(error_share * settings.limit, lattice))
+        choice = Choice(stepped, stepped, None, predicted=lattice, error_share=error_share)
         try:
             prelude = prelude_of(settings)
             parts = [(sample, *_predicted(prelude, choice, sample.positions)) for sample in samples]
@@ -125,7 +108,7 @@ def best_prediction(source: Source, bound: float, most_bytes: float) -> FoundPre
 
 
 def _still_share(relative: float) -> float:
-    """Of the limit, for errors that do not twitch; it grows by less than the bound, over the diagonal, falls."""
+    """Return the share of the limit for errors that do not twitch. It grows by less than the bound falls."""
     if relative >= FINE:
         return STILL
     unseen = math.log(UNSEEN / relative) / math.log(UNSEEN / INVISIBLE)
@@ -133,9 +116,8 @@ def _still_share(relative: float) -> float:
 
 
 def _twitches(shown: np.ndarray, positions: np.ndarray, limit: np.ndarray | float) -> bool:
-    """Whether second differences of the error over frames, (N, 3, T), are seen to be above the limit: of many vertices
-    in some frames only, or of vertices that hardly jerk themselves.
-    """
+    """Return whether second differences of the error over frames, (N, 3, T), are visibly above the limit: those of many
+    vertices in some frames only, or of vertices that hardly jerk themselves."""
     if positions.shape[2] < 3:
         return False
     moved = np.linalg.norm(np.diff(positions, 2, axis=2), axis=1)
@@ -146,22 +128,22 @@ def _twitches(shown: np.ndarray, positions: np.ndarray, limit: np.ndarray | floa
 
 
 def _largest_step(limit: np.ndarray | float, lattice: bool) -> float:
-    """The largest that reaches every place within the limit."""
+    """Return the largest step that reaches every place within the limit."""
     return qz.single((qz.LATTICE_REST_CAP if lattice else qz.SAFE_REST_CAP) * float(np.min(limit)))
 
 
 def _samples(source: Source) -> list[SegmentSample]:
-    """A few segments spread over a clip; of several clips those that are typical."""
+    """Return a few segments spread over a clip, or the typical segments of several clips."""
     if len(source.clip_range_segments) > 1:
         return [SegmentSample(source.positions(segment), frames) for segment, frames in typical_segments(source)]
     some = np.unique(np.linspace(0, len(source.segments) - 1, TRIAL_SEGMENTS).astype(int))
     positions = [source.positions(segment) for segment in some]
-    scale = source.coded_frames / sum(own.shape[2] for own in positions)
-    return [SegmentSample(own, scale * own.shape[2]) for own in positions]
+    scale = source.coded_frames / sum(block.shape[2] for block in positions)
+    return [SegmentSample(block, scale * block.shape[2]) for block in positions]
 
 
 def _begun(prelude: CodedPrelude, settings: Settings, sample: SegmentSample) -> float:
-    """Bytes of the frames that a sample stands for, but for first ones, as far as a few of it tell."""
+    """Return the bytes of the frames that a sample stands for, without first frames, as far as a few frames tell."""
     some = sample.positions[:, :, :TRIAL_FRAMES]
     choice = Choice(settings, settings, None, predicted=CUBES)
     coded, first = (len(_predicted(prelude, choice, part)[0]) for part in (some, some[:, :, :1]))
@@ -169,12 +151,12 @@ def _begun(prelude: CodedPrelude, settings: Settings, sample: SegmentSample) -> 
 
 
 def _predicted(prelude: CodedPrelude, choice: Choice, positions: np.ndarray) -> tuple[bytes, np.ndarray]:
-    """PREDICTED of a segment and its positions, (N, 3, T). Raises BoundError."""
+    """Return PREDICTED of a segment and its positions, (N, 3, T). Raises BoundError."""
     lattice, settings = choice.predicted, choice.settings
     assert lattice is not None
     source = np.ascontiguousarray(positions.transpose(2, 0, 1))
     limits = np.array(np.broadcast_to(settings.limit, len(positions)), np.float64)
-    for share in dict.fromkeys((choice.error_share, 1.0)):  # the whole limit where numbers are too coarse for a part
+    for share in dict.fromkeys((choice.error_share, 1.0)):  # A part may need too fine numbers.
         for factor in STEPS:
             step = qz.single(factor * _largest_step(share * limits, lattice))
             coded = streams.encode_predicted(
@@ -190,8 +172,7 @@ def _predicted(prelude: CodedPrelude, choice: Choice, positions: np.ndarray) -> 
 def code_predicted_segment(
     prelude: CodedPrelude, choice: Choice, positions: np.ndarray, exact: np.ndarray | None, shown_times: np.ndarray
 ) -> tuple[dict[tuple[int, int], bytes], np.ndarray]:
-    """Chunks and errors as CodedMotion.joined_to gives them; predicted motion is not joined. shown_times: as Source has
-    them."""
+    """Return chunks and errors like CodedMotion.joined_to; predicted motion is not joined."""
     assert choice.predicted is not None
     plan, settings = prelude.plan, choice.settings
     payload, decoded = _predicted(prelude, choice, positions)
@@ -204,9 +185,9 @@ def code_predicted_segment(
     errors = [error(level_0.pose(level, prelude.origin, prelude.dtype)) for level in range(last)]
     for moved in _with_maps(prelude, positions, errors[0][-1]):
         maps = streams.encode_affines(moved, 0)
-        own = error(moved.pose(0, prelude.origin, prelude.dtype))
-        if len(maps) <= MAP_SHARE * len(payload) and own[-1] < LESS_ERROR * errors[0][-1]:
-            chunks[0, ct.AFFINES], errors[0] = maps, own
+        with_maps = error(moved.pose(0, prelude.origin, prelude.dtype))
+        if len(maps) <= MAP_SHARE * len(payload) and with_maps[-1] < LESS_ERROR * errors[0][-1]:
+            chunks[0, ct.AFFINES], errors[0] = maps, with_maps
             break
     errors.append(error(decoded))
     if errors[-1][0] > settings.largest_bound:
@@ -218,12 +199,12 @@ def code_predicted_segment(
 
 
 def _still(prelude: CodedPrelude, frames: int) -> SegmentMotion:
-    """A segment that shows the rest pose where no maps move it."""
+    """Return a segment that shows the rest pose where no maps move it."""
     return SegmentMotion(prelude.plan, frames, [LevelStream(1.0)] * prelude.plan.level_count)
 
 
 def _with_maps(prelude: CodedPrelude, positions: np.ndarray, error: float) -> Iterator[SegmentMotion]:
-    """Segments with maps of the roots, from fine to coarse; error: that of the rest pose standing still (RMS)."""
+    """Yield segments with maps of the roots, from fine to coarse; error: RMS of the rest pose standing still."""
     plan = prelude.plan
     for part in MAP_STEPS:
         moved = _still(prelude, positions.shape[2])

@@ -12,34 +12,34 @@ import numpy as np
 
 from athcodec.encoding.quantise import bits
 
-LEAST_RING, LARGEST_RING = 2, 32
-LEAST_RINGS = 4  # of a tube
-FINE = 1e-3  # over a stem's length, of what a period is looked for in
-WITHIN = 0.1  # of what a stem's vertices move, squared, the most that is within rings
-FRAMES = 12  # of a segment that are looked at
+LEAST_RING, LARGEST_RING = 2, 32  # Vertices of a ring.
+LEAST_RINGS = 4  # Rings of a tube.
+FINE = 1e-3  # Unit, in lengths of a stem, of the differences by which a period is found.
+WITHIN = 0.1  # Largest share of the squared motion of a tube that is within its rings.
+FRAMES = 12  # Frames of a segment by which rings are judged.
 
 
 def ring_sizes(
     first: np.ndarray, count: np.ndarray, wanted: np.ndarray, rest: np.ndarray, samples: Sequence[np.ndarray]
 ) -> np.ndarray:
-    """(B,) int32: vertices of the rings of each branch, 0 where it has none that move alike.
+    """Return the vertices of the rings of each branch, (B,) int32; 0: it has no rings that move alike.
 
     first, count, wanted: (B,) vertices of the branches, and which may have rings; rest: (N, 3); samples: (N, 3, T)
     each.
     """
     rings = np.zeros(len(count), np.int32)
     for size in np.unique(count[wanted & (count >= LEAST_RINGS * LEAST_RING)]).tolist():
-        own = np.flatnonzero(wanted & (count == size))
-        vertices = first[own, None] + np.arange(size)
-        rings[own] = _periods(rest[vertices])
-        for ring in np.unique(rings[own][rings[own] > 0]).tolist():
-            some = rings[own] == ring
-            rings[own[some]] *= _move_alike(rest[vertices[some]], vertices[some], samples, ring)
+        branches = np.flatnonzero(wanted & (count == size))
+        vertices = first[branches, None] + np.arange(size)
+        rings[branches] = periods = _periods(rest[vertices])
+        for ring in np.unique(periods[periods > 0]).tolist():
+            some = periods == ring
+            rings[branches[some]] *= _move_alike(rest[vertices[some]], vertices[some], samples, ring)
     return rings
 
 
 def _periods(stems: np.ndarray) -> np.ndarray:
-    """(B,) after how many vertices the steps of (B, n, 3) stems repeat best; 0 where they do not, or the last ring
+    """Return after how many vertices the steps of (B, n, 3) stems repeat best, (B,); 0: they do not, or the last ring
     would have more than a tip and less than the others."""
     size = stems.shape[1]
     steps = np.diff(stems, axis=1)
@@ -58,7 +58,7 @@ def _cost(steps: np.ndarray, lag: int, unit: np.ndarray) -> np.ndarray:
 
 
 def _move_alike(stems: np.ndarray, vertices: np.ndarray, samples: Sequence[np.ndarray], ring: int) -> np.ndarray:
-    """(B,) bool: whether the vertices of a ring move as one, but for a little."""
+    """Return (B,) bool: whether the vertices of each ring almost move as one."""
     starts = np.arange(0, stems.shape[1], ring)
     sizes = np.diff(np.append(starts, stems.shape[1]))
     within, all_in_all = np.zeros(len(stems)), np.zeros(len(stems))
