@@ -37,8 +37,8 @@ class BoundOption:
                 raise BoundError(f"{name}: got {value}; expected a finite number above 0")
 
     def in_scene_units(self, source: Source, file_size: Callable[[float], float], filled: float = 0.97) -> float:
-        """Return the bound for a clip. A fraction is of the diagonal of the box around all frames, or of the box with the
-        rest pose if the frames have no extent.
+        """Return the bound for a clip. Fractions are of the diagonal of all frames, or with the rest pose if these have
+        no extent.
 
         file_size: returns the bytes of the file at a bound; filled: share of a target size that the file is to fill.
         """

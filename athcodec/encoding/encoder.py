@@ -135,7 +135,7 @@ def encode(
         ladder=ladder,
     )
     with keeping(clip.inputs):
-        check_target(path, ".ath")  # before any work
+        check_target(path, ".ath")  # Refused targets cost no work.
         job, bound = _begin(clip, option, options, _weighted_progress(clip, progress, option, options))
         with new_file(path) as out, clip.watched(), tempfile.SpooledTemporaryFile(SPOOL_BYTES) as spool:
             with job.refusing(bound):

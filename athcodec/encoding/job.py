@@ -60,12 +60,12 @@ from athcodec.motion.thresholds import THRESHOLDS, Thresholds
 from athcodec.motion.units import Length
 from athcodec.options import DEFAULT_LADDER, EFFORTS, MAX_SEGMENT, MIN_SEGMENT, ladder_of, whole
 
-SPOOL_BYTES = 64 << 20
-CHUNK_BYTES, LEVEL_BYTES = 6, 6  # of the front for a chunk, and for the errors of a level and segment
-PREDICTED_SHARE = 0.8  # of a file with layers, that one with predicted motion, which has none, may take
-REFUSAL_ROUNDS = 12  # Files, at most, that are coded to find the smallest bound that can be kept.
-FEW_BYTES = 2000  # of a small clip's file, which may do without coarse levels
-SEARCH_SAVES = 0.5  # of the bytes at the settings that a search starts with, at most
+SPOOL_BYTES = 64 << 20  # Bytes of chunks that are held in memory and not in a temporary file.
+CHUNK_BYTES, LEVEL_BYTES = 6, 6  # Bytes of the front for a chunk, and for the errors of a level and segment.
+PREDICTED_SHARE = 0.8  # Largest share of the bytes of layers at which predicted motion, which has none, is better.
+REFUSAL_ROUNDS = 12  # Largest number of files that are coded to find the smallest bound that can be kept.
+FEW_BYTES = 2000  # Bytes up to which the file of a small clip may do without coarse levels.
+SEARCH_SAVES = 0.5  # Largest share of the bytes at its first settings that a search has saved.
 STATIC_METADATA = ("unit", "up_axis")
 
 
@@ -73,7 +73,7 @@ STATIC_METADATA = ("unit", "up_axis")
 class EncodingOptions:
     """The options of `encode` that are not the bound, checked. Raises ValueError."""
 
-    segment_frames: int | None = None  # as split_segments has it
+    segment_frames: int | None = None  # Longest segment, as split_segments takes it.
     tam: Thresholds | None = None
     exact_rest: bool = False
     host_rest: bool = False
@@ -83,9 +83,9 @@ class EncodingOptions:
     attributes: str = "all"
     effort: str = "default"
     jobs: int | None = None
-    ladder: tuple[float, ...] = ()  # largest errors over the diagonal, descending; (): a single layer
-    predicted_frames: int = MAX_SEGMENT  # longest segment of predicted motion
-    without: frozenset[Feature] = frozenset()  # features that the file is to do without
+    ladder: tuple[float, ...] = ()  # Largest errors over the diagonal, descending; (): a single layer.
+    predicted_frames: int = MAX_SEGMENT  # Longest segment of predicted motion.
+    without: frozenset[Feature] = frozenset()  # Features that the file does without.
 
     @classmethod
     def of(
@@ -96,7 +96,7 @@ class EncodingOptions:
         rest_error: float | str | Length | None = None,
         **options,
     ) -> EncodingOptions:
-        """None for segment_frames is its default; ladder, rest_error: as `ladder_of`, `RestPrecision.of` take them."""
+        """Return checked options; ladder, rest_error: as `ladder_of` and `RestPrecision.of` take them."""
         if segment_frames is not None:
             options |= {"segment_frames": segment_frames, "predicted_frames": segment_frames}
         return cls(ladder=ladder_of(ladder), rest_precision=RestPrecision.of(rest_error), **options)
@@ -119,16 +119,16 @@ class EncodingOptions:
 
 @dataclass(frozen=True)
 class Draft:
-    """All that is decided about a file before its motion is coded, without the motion. It can be pickled.
+    """All that is decided about a file before its motion is coded. It can be pickled.
 
-    With the same clip, which may have been opened again elsewhere, it goes to `code_segments` and `write`. By
-    `fingerprint` a process notices that it found another hierarchy or rest pose than the one that made the draft.
+    With the same clip, which may have been opened again elsewhere, it goes to `code_segments` and `write`. The
+    `fingerprint` tells a process that its hierarchy or rest pose differs from those of the draft.
     """
 
     choice: Choice
     seen: Survey
     segment_count: int
-    found: Found | None  # branches, for a clip without
+    found: Found | None  # Branches for a clip without.
     options: EncodingOptions
     fingerprint: str
     thresholds: Thresholds
@@ -136,8 +136,8 @@ class Draft:
 
 @dataclass(frozen=True)
 class CodedSegment:
-    """One segment: chunks {(level, kind): payload}, (levels, 3) errors of stopping at each level, (levels,) how each is
-    joined to the segment before."""
+    """One segment: chunks {(level, kind): payload}, (levels, 3) errors of stopping at each level, and (levels,) joins
+    to the segment before."""
 
     index: int
     chunks: dict[tuple[int, int], bytes]
@@ -146,7 +146,7 @@ class CodedSegment:
 
 
 def _check_limits(clip: MotionClip, hierarchy: Hierarchy) -> None:
-    """Raises ClipError for counts that decoders refuse."""
+    """Raise ClipError for counts that decoders refuse."""
     limits = ct.Limits()
     for name, value, limit in (
         ("vertices", clip.vertex_count, limits.vertices),
@@ -159,8 +159,7 @@ def _check_limits(clip: MotionClip, hierarchy: Hierarchy) -> None:
 
 
 def _completed(clip: MotionClip, found: Found | None, options: EncodingOptions) -> tuple[MotionClip, np.ndarray | None]:
-    """The clip on branches that were found for it, with the rest pose as a host has it; its weights, which it then
-    names."""
+    """Return the clip on branches that were found for it, with the rest pose as a host has it, and its weights."""
     if found is not None:
         clip = with_branches(clip, found)
     if options.host_rest:
@@ -169,7 +168,7 @@ def _completed(clip: MotionClip, found: Found | None, options: EncodingOptions) 
 
 
 def _weighted(clip: MotionClip, weights: str | np.ndarray) -> tuple[MotionClip, np.ndarray]:
-    """The clip, which says where its weights are, and these as (N,) float64. Raises ClipError."""
+    """Return the clip, which then names its weights, and these as (N,) float64. Raises ClipError."""
     name = weights if isinstance(weights, str) else ERROR_WEIGHTS
     attributes = clip.attributes if isinstance(weights, str) else clip.attributes | {name: np.asarray(weights)}
     if name not in attributes:
@@ -188,8 +187,7 @@ def _weighted(clip: MotionClip, weights: str | np.ndarray) -> tuple[MotionClip, 
 
 
 def time_chunk(*times: np.ndarray) -> bytes:
-    """Content of TIME for times in seconds, (T,) for each clip, exactly: by rules where these give the very same
-    numbers."""
+    """Return TIME for times in seconds, (T,) for each clip, exactly: by rules if these give the very same numbers."""
     steady = ct.pack_steady_time(*times)
     return steady or ct.pack_time(streams.encode_times(np.concatenate(times).astype(np.float64)))
 
@@ -203,7 +201,7 @@ class _Decided:
     prelude: CodedPrelude
     layers: Layers
     source: Source
-    tried: dict[int, CodedSegment] = field(default_factory=dict)  # segments that were coded to compare
+    tried: dict[int, CodedSegment] = field(default_factory=dict)  # Segments that were coded to compare.
 
     @property
     def segment_count(self) -> int:
@@ -211,7 +209,7 @@ class _Decided:
 
     @property
     def shared_bytes(self) -> int:
-        """Of hierarchy, rest poses and learned modes."""
+        """Bytes of hierarchy, rest poses and learned modes."""
         return self.prelude.prelude_bytes + sum(map(len, layer_chunks(self.layers).values()))
 
     @property
@@ -233,7 +231,7 @@ class _Result:
 
 @dataclass
 class EncodingJob:
-    """One clip on its way into a file: what does not depend on the bound. `report`: by stages, see progress.py."""
+    """One clip on its way into a file: what does not depend on the bound."""
 
     source: Source
     options: EncodingOptions
@@ -242,7 +240,7 @@ class EncodingJob:
 
     @classmethod
     def begin(cls, clip: MotionClip, found: Found | None, options: EncodingOptions, report: Progress) -> EncodingJob:
-        """Reads all frames. found: branches for a clip without."""
+        """Return the job for a clip, all of whose frames are read. found: branches for a clip without."""
         clip, factors = _completed(clip, found, options)
         hierarchy = hierarchy_of(clip)
         _check_limits(clip, hierarchy)
@@ -253,7 +251,7 @@ class EncodingJob:
 
     @classmethod
     def resume(cls, clip: MotionClip, draft: Draft, report: Progress = silent, jobs: int | None = None) -> EncodingJob:
-        """The state that the job had which made the draft. Raises ClipError."""
+        """Return the job in the state in which it made the draft. Raises ClipError."""
         seen = draft.seen
         got, expected = (clip.frame_count, clip.vertex_count), (seen.frame_count, seen.hierarchy.vertex_count)
         if got != expected:
@@ -306,7 +304,7 @@ class EncodingJob:
 
     @contextmanager
     def refusing(self, bound: float) -> Iterator[None]:
-        """Lets a BoundError of coding at a bound name the smallest bound that was found to be kept."""
+        """Let a BoundError of coding at a bound name the smallest bound that can be kept."""
         try:
             yield
         except BoundError:
@@ -319,7 +317,7 @@ class EncodingJob:
             ) from None
 
     def _smallest_kept(self, low: float) -> float:
-        """The smallest bound found that a file keeps, above `low`, which none does."""
+        """Return the smallest bound above `low` that a file was found to keep."""
         high = math.inf
         for _ in range(REFUSAL_ROUNDS):
             tried = qz.rounded_up(4 * low if high == math.inf else math.sqrt(low * high))
@@ -329,7 +327,7 @@ class EncodingJob:
         return high
 
     def decide(self, bound: float) -> _Decided:
-        """Searches for settings."""
+        """Search for settings."""
         self._check(bound)
         ath = self.seen.ath(self.thresholds(bound))
         ratios = self._layer_ratios(ath, bound)
@@ -355,13 +353,13 @@ class EncodingJob:
         return self._predicted(prediction.choice)
 
     def _found_by(self, search: Search) -> _Decided:
-        """The best of what a search has found."""
+        """Return the best candidate of a search."""
         choices, prelude = search.decide()
         layered = [self._layered(search.trials.ath, choice, prelude) for choice in choices]
         return layered[0] if len(layered) == 1 else min(layered, key=self._estimated_bytes)
 
     def _is_short(self, decided: _Decided) -> bool:
-        """Whether a file is loaded and played whole, so that its coarse levels are hardly ever shown."""
+        """Return whether a file is loaded and played whole, so that its coarse levels are hardly ever shown."""
         options = self.options
         is_whole = len(decided.layers.each) == 1
         if not is_whole or decided.ath.height == 0 or options.tam is not None:
@@ -370,12 +368,12 @@ class EncodingJob:
         return small and self._estimated_bytes(decided) <= FEW_BYTES
 
     def _without_levels(self, bound: float) -> _Decided:
-        """With one node for the whole plant, whatever its error."""
+        """Return the best file with one node for the whole plant, whatever its error."""
         ath = self.seen.ath(Thresholds(bound, self.clip.frame_count, self.seen.largest_distance.max(), 0))
         return self._found_by(Search.of(self.source, ath, bound, self.options.effort, silent, self.options.jobs))
 
     def _best_prediction(self, bound: float, most_bytes: float) -> FoundPrediction | None:
-        """None for one who asks for a hierarchy of maps, which predicted motion has not."""
+        """Return the best prediction; None: it is too large, or a hierarchy of maps is asked for, which it lacks."""
         is_out = self.options.tam or Feature.PREDICTED in self.options.without
         return None if is_out else best_prediction(self._long_segments, bound, most_bytes)
 
@@ -392,7 +390,7 @@ class EncodingJob:
         return _Decided(ath, choice, prelude, layers, source)
 
     def _estimated_bytes(self, decided: _Decided) -> float:
-        """Of the motion of a file whose segments are like typical ones."""
+        """Return the bytes of the motion of a file whose segments are like typical ones."""
         total = float(decided.shared_bytes)
         for segment, frames in typical_segments(self.source):
             if segment not in decided.tried:
@@ -405,8 +403,8 @@ class EncodingJob:
         return total
 
     def _layer_ratios(self, ath: Ath, bound: float) -> list[int]:
-        """Of as many layers, the last ones, as there is room for behind the levels of the hierarchy; of one where the
-        clip stands still: a rest pose in layers takes up to two thirds more."""
+        """Return the ratios of as many of the last layers as there is room for behind the levels of the hierarchy. A
+        still clip has one layer: a rest pose in layers takes up to two thirds more."""
         if self.source.still:
             return [1]
         ratios = layer_ratios(self.options.ladder, bound, self.seen.diagonal)
@@ -429,7 +427,7 @@ class EncodingJob:
         )
 
     def decided(self, draft: Draft) -> _Decided:
-        """What the draft's maker had decided, made again. Raises ClipError where it is not the same."""
+        """Return what the maker of the draft decided. Raises ClipError if it is not the same here."""
         settings = draft.choice.settings
         if draft.choice.predicted is not None:
             decided = self._predicted(draft.choice)
@@ -449,7 +447,7 @@ class EncodingJob:
         return self.fill(store, decided, self.coded(decided, range(decided.segment_count)))
 
     def file_size(self, bound: float) -> float:
-        """Bytes of the file at a bound; infinite where it cannot be kept."""
+        """Return the bytes of the file at a bound; infinite if it cannot be kept."""
         with tempfile.SpooledTemporaryFile(SPOOL_BYTES) as spool:
             try:
                 result = dataclasses.replace(self, report=silent).encode(bound, ct.ChunkStore(spool))
@@ -465,7 +463,7 @@ class EncodingJob:
         decided: _Decided,
         coded: Iterable[CodedSegment],
     ) -> Summary:
-        """The whole file into `out`, which is to become `path`."""
+        """Write the whole file into `out`, which is to become `path`."""
         result = self.fill(ct.ChunkStore(spool), decided, coded)
         chunks = result.store.write(out, result.header, result.errors)
         if any(clip_range.loop for clip_range in self.clip.clip_ranges):
@@ -474,13 +472,13 @@ class EncodingJob:
                 result.store.replace(ct.CLIPS, self._clips(decided, self._seam_errors(decoder)))
             out.seek(0)
             chunks = result.store.write(out, result.header, result.errors)
-        with AthFile(out, strict=True) as file, Decoder(file) as decoder:  # before the file gets its name
+        with AthFile(out, strict=True) as file, Decoder(file) as decoder:  # The file gets its name after this check.
             summary = _summary(Path(path), self, decided, result, chunks, decoder)
         self.report("done", 1.0)
         return summary
 
     def fill(self, store: ct.ChunkStore, decided: _Decided, coded: Iterable[CodedSegment]) -> _Result:
-        """All chunks of a file."""
+        """Add all chunks of a file to a store."""
         layers = decided.layers
         self._add_prelude(store, decided)
         for (level, kind), content in layer_chunks(layers).items():
@@ -511,7 +509,7 @@ class EncodingJob:
         return ct.pack_clips(self.clip.clip_ranges, segment_counts, seam_errors, decided.choice.settings.periodic)
 
     def _seam_errors(self, decoder: Decoder) -> list[list[float] | None]:
-        """Of each clip, if it is a loop: how far off its step from the last frame to the first is, per level."""
+        """Return for each loop how far off its step from the last frame to the first is, per level."""
         return [
             self._seam_errors_of(decoder.play(clip.name), self._step(stop - 1, start)) if clip.loop else None
             for clip, (start, stop) in zip(decoder.clips, self.clip.clip_range_frames)
@@ -526,12 +524,12 @@ class EncodingJob:
         return errors
 
     def _step(self, frame: int, following: int) -> np.ndarray:
-        """Ways of the vertices from one frame of the source to another, (N, 3) float64."""
+        """Return how far the vertices move from one frame of the source to another, (N, 3) float64."""
         before, after = (self.clip.block(frame, frame + 1)[0].astype(np.float64) for frame in (frame, following))
         return after - before
 
     def seams(self, decoder: Decoder) -> tuple[Seam, ...]:
-        """Of the loops of the file just written."""
+        """Return the seams of the loops of the file just written."""
         seams = []
         for clip, (start, stop) in zip(decoder.clips, self.clip.clip_range_frames):
             if clip.loop:
@@ -576,7 +574,7 @@ class EncodingJob:
                 store.add(ct.ATTRIBUTE, ct.pack_array(name, array))
 
     def coded(self, decided: _Decided, segments: Sequence[int]) -> Iterator[CodedSegment]:
-        """Some segments, as many at a time as there is memory for."""
+        """Yield coded segments, as many at a time as there is memory for."""
         source = decided.source
         if len(source.segments) == 1 and decided.tried:
             return iter(decided.tried.values())
@@ -587,7 +585,7 @@ class EncodingJob:
             return ((index, [source.block(index)]) for index in some)
 
         def predict(taken: tuple[int, list[np.ndarray]]) -> CodedSegment:
-            positions, exact = self._positions(taken[1].pop())  # not held any longer
+            positions, exact = self._positions(taken[1].pop())  # The list no longer holds the block.
             shown_times = source.shown_times(taken[0])
             chunks, errors = code_predicted_segment(decided.prelude, decided.choice, positions, exact, shown_times)
             return CodedSegment(taken[0], chunks, errors, np.zeros(len(errors), int))
@@ -606,7 +604,7 @@ class EncodingJob:
         return pool.ordered(join, _beside_ends(source, self._halfway(coded), frozenset(segments)), 0)
 
     def _halfway(self, coded: Iterable[Any]) -> Iterator[Any]:
-        """Reports each segment that is coded, but not yet joined."""
+        """Report each segment that is coded, but not yet joined."""
         for done, one in enumerate(coded):
             self.report("motion", min((done + 0.5) / self.segment_count, 1.0))
             yield one
@@ -618,7 +616,7 @@ class EncodingJob:
 
     @staticmethod
     def _with_those_before(source: Source, segments: Sequence[int]) -> Iterator[int]:
-        """The segments, each right behind the one that it is joined to."""
+        """Yield the segments, each right after the one that it is joined to."""
         last = None
         for index in segments:
             before = source.segment_before(index)
@@ -628,7 +626,7 @@ class EncodingJob:
             last = index
 
     def _positions(self, block: np.ndarray) -> tuple[np.ndarray, np.ndarray | None]:
-        """What is coded of a block, and its own numbers where these are to come back."""
+        """Return what is coded of a block, and its very numbers if these are to come back."""
         return self.source.relative(block), self.source.exact(block) if self.options.lossless else None
 
     def _exact(self, segment: int) -> np.ndarray | None:
@@ -637,8 +635,8 @@ class EncodingJob:
     def _add_motion(
         self, store: ct.ChunkStore, decided: _Decided, coded: Iterable[CodedSegment]
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Returns (levels, segments, 3) errors and (levels, segments) joins. Raises ValueError unless each segment
-        comes once."""
+        """Return (levels, segments, 3) errors and (levels, segments) joins. Raises ValueError unless each segment comes
+        once."""
         levels, count = decided.layers.level_count + self.options.lossless, decided.segment_count
         errors, joins = np.zeros((levels, count, len(MEASURES))), np.zeros((levels, count), np.uint8)
         missing = set(range(count))
@@ -658,7 +656,7 @@ class EncodingJob:
 def _beside_ends(
     source: Source, coded: Iterable[tuple[int, CodedMotion, list[End | None]]], wanted: frozenset[int]
 ) -> Iterator[tuple[int, CodedMotion, list[End | None]]]:
-    """Those that are wanted, with the ends that they go on from in place of their own."""
+    """Yield the segments that are wanted, each with the ends that it goes on from."""
     last, last_ends = None, []
     for index, motion, ends in coded:
         before = source.segment_before(index)
@@ -668,7 +666,7 @@ def _beside_ends(
 
 
 def _polygons(clip: MotionClip, options: EncodingOptions) -> Polygons | None:
-    """What is stored as FACES."""
+    """Return what is stored as FACES."""
     if options.attributes == "none":
         return None
     return Polygons.of_attributes(clip.attributes) if clip.faces is None else Polygons.of_rows(clip.faces)

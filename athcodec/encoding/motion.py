@@ -298,7 +298,7 @@ class SegmentMotion:
         self._bind()
 
     def _known(self, before: SegmentMotion) -> np.ndarray:
-        """Return the pieces whose integers in the layer before stand for the same functions of time as here, (P,) uint8."""
+        """Return which pieces have integers in the layer before for the same functions of time as here, (P,) uint8."""
         same = np.array([stream.root == self.streams[-1].root for stream in before.streams])
         pieces = before.plan.pieces
         all_at_base = before.plan.ranks <= pieces["low_modes"]
@@ -441,7 +441,7 @@ class SegmentMotion:
 
 
 def gather(block: np.ndarray, vertex_source: np.ndarray, origin: np.ndarray, pool: ThreadPool = SERIAL) -> np.ndarray:
-    """Return source positions, (T, M, 3) float32 or float64 in the source's order, as (N, 3, T) float64 less the origin.
+    """Return source positions, (T, M, 3) float32 or float64 in source order, as (N, 3, T) float64 less the origin.
     vertex_source: (N,) int32, the N of its M vertices that are wanted."""
     frames, vertices = len(block), len(vertex_source)
     block = np.ascontiguousarray(block)
@@ -471,8 +471,8 @@ def position_errors(
     shown: np.ndarray | None = None,
     rounding: float = 0.0,
 ) -> tuple[float, float, float]:
-    """Return the distance of decoded positions from the source by each of MEASURES, the second rounded up as files store
-    it. shown: how many frames of the clip show each frame, (T,) int32; None: one. rounding: added for a decoder that
+    """Return the distance of decoded positions from the source by each of MEASURES, the second rounded up for files.
+    shown: how many frames of the clip show each frame, (T,) int32; None: one. rounding: added for a decoder that
     rounds to the other side."""
     vertices, _, frames = positions.shape
     shown = np.ones(frames, np.int32) if shown is None else shown

@@ -12,11 +12,11 @@ from athcodec.decoding import container as ct
 from athcodec.errors import ClipError
 from athcodec.motion.polygons import Polygons
 
-CORNERS_OF_REST, FACES_OF_REST = 8, 4  # for each vertex, at most, that a rest pose goes by
+CORNERS_OF_REST, FACES_OF_REST = 8, 4  # Corners and faces per vertex up to which a rest pose goes by faces.
 
 
 def pack(polygons: Polygons, vertex_count: int) -> bytes:
-    """FACES or EDGES; ClipError where no reader would accept that many."""
+    """Return FACES or EDGES. Raises ClipError if no reader would accept that many."""
     count = polygons.face_count + len(polygons.corners)
     if count > ct.Limits.corners:
         raise ClipError(f"faces: got {count} faces and corners; the limit is {ct.Limits.corners}")
@@ -53,7 +53,7 @@ class Mesh:
 
     @classmethod
     def of(cls, polygons: Polygons | None, vertex_source: np.ndarray) -> Mesh | None:
-        """None where there are no polygons, or more than a decoder would go by."""
+        """Return the mesh of polygons; None: there are none, or more than a decoder goes by."""
         vertex_count = len(vertex_source)
         if polygons is None or len(polygons.corners) == 0:
             return None

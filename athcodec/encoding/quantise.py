@@ -92,14 +92,12 @@ def single(value: float) -> float:
 
 def half_octave(exponent: int) -> float:
     """Return 2 to the power of half the exponent, with a decoder's bits (FORMAT.md, Affines stream)."""
-    odd = exponent & 1
-    return (1.4142135623730951 if odd else 1.0) * 2.0 ** ((exponent - odd) // 2)
+    return float(half_octaves(np.array(exponent)))
 
 
 def half_octaves(exponents: np.ndarray) -> np.ndarray:
     """Return the half octaves of an array of exponents."""
-    odd = exponents & 1
-    return np.ldexp(np.where(odd, half_octave(1), 1.0), (exponents - odd) // 2)
+    return np.ldexp(np.where(exponents & 1, 1.4142135623730951, 1.0), exponents >> 1)
 
 
 def turn_of(turn_step: float) -> int:

@@ -17,23 +17,18 @@ from athcodec.motion.clip import MotionClip
 from athcodec.motion.frames import Frames
 from athcodec.motion.hierarchy import Hierarchy
 
-LARGE = 5_000  # vertices: smaller plants are not sampled
-LEAST_SAMPLE, ENOUGH, MOST_SAMPLE = 3_500, 6_000, 1 << 16  # vertices of a sample; between the first two its share
-LEAST_SHARE = 0.4  # of the plant
-SEGMENT_SHARE = 1 / 64  # of the plant that each segment of the clip adds to a sample
-SMALL = 1 << 18  # vertices times frames of a clip, up to which trials are so cheap that choices are made again
-SUBTREES = 8  # of a sample, at least
+LARGE = 5_000  # Vertices up to which a plant is not sampled.
+LEAST_SAMPLE, ENOUGH, MOST_SAMPLE = 3_500, 6_000, 1 << 16  # Vertices of a sample; LEAST_SHARE up to ENOUGH.
+LEAST_SHARE = 0.4  # Least share of the plant in a sample.
+SEGMENT_SHARE = 1 / 64  # Share of the plant that each segment of the clip adds to a sample.
+SMALL = 1 << 18  # Vertices times frames up to which trials are so cheap that choices are made again.
+SUBTREES = 8  # Least number of subtrees in a sample.
 
 
 class PlantSample:
     """Some branches of a plant and all their ancestors, as a source of their own with the plant's segments.
 
-    Attributes
-    ----------
-    branches, vertices : (B',) and (N',) integer arrays
-        Those of the plant that are in the sample, ascending in file order.
-    source : Source
-    ath : Ath
+    branches, vertices: those of the plant that are in the sample, ascending in file order.
     """
 
     def __init__(self, source: Source, ath: Ath, branches: np.ndarray):
@@ -93,30 +88,21 @@ class PlantSample:
 
 @dataclass(frozen=True)
 class ExtrapolationFactors:
-    """What a plant has over what its sample has.
-
-    Attributes
-    ----------
-    vertices : float
-    rows, nodes : (levels,) float64
-        Rows of each level's stream, and nodes that have maps.
-    rest_cap : float
-        The largest step of the rest pose to be tried, over the bound.
-    """
+    """What a plant has over what its sample has."""
 
     vertices: float
-    rows: np.ndarray
-    nodes: np.ndarray
-    rest_cap: float
+    rows: np.ndarray  # (levels,) rows of each level's stream.
+    nodes: np.ndarray  # (levels,) nodes that have maps.
+    rest_cap: float  # Largest step of the rest pose that is tried, in bounds.
 
     @classmethod
     def everything(cls, levels: int) -> ExtrapolationFactors:
-        """Of a plant that is not sampled."""
+        """Return the factors of a plant that is not sampled."""
         return cls(1.0, np.ones(levels), np.ones(levels), qz.REST_CAP)
 
     @classmethod
     def of(cls, whole: np.ndarray, sample: np.ndarray) -> ExtrapolationFactors:
-        """Of branches, (B,) of _native.BRANCH."""
+        """Return the factors for the branches of a plant and of its sample, (B,) of _native.BRANCH."""
         plans = [Plan(branches, int(branches["count"].sum())) for branches in (whole, sample)]
         rows, nodes = (
             np.divide(*counts, out=np.ones(plans[0].level_count), where=counts[1] > 0)
@@ -126,7 +112,7 @@ class ExtrapolationFactors:
 
 
 def _counts(plan: Plan) -> tuple[np.ndarray, np.ndarray]:
-    """Rows of stems, and nodes with maps, per level."""
+    """Return the rows of stems, and the nodes with maps, per level."""
     pieces, levels = plan.pieces, plan.level_count
     low = np.bincount(plan.base_level, pieces["low_modes"], levels)
     high = np.bincount(pieces["level"], pieces["count"] - pieces["low_modes"], levels)
@@ -134,11 +120,8 @@ def _counts(plan: Plan) -> tuple[np.ndarray, np.ndarray]:
 
 
 def sample_plant(source: Source, ath: Ath, effort: str) -> PlantSample | None:
-    """A sample that represents a large plant, with a branch of every level; None where the plant is small or effort is
-    "best".
-
-    It grows with the clip, so that the search keeps its share of the work.
-    """
+    """Return a sample of a large plant with a branch of every level; None: the plant is small, or effort is "best". The
+    sample grows with the clip, so that the search keeps its share of the work."""
     wanted = sample_vertices(source.clip.vertex_count, len(source.segments), effort)
     if wanted is None:
         return None
@@ -148,13 +131,13 @@ def sample_plant(source: Source, ath: Ath, effort: str) -> PlantSample | None:
 
 
 def is_small(vertices: int, segments: list[tuple[int, int]], effort: str) -> bool:
-    """Whether what a search has chosen is tried again when the rest is known: not where segments meet, since bytes do
-    not count what is seen there."""
+    """Return whether what a search has chosen is tried again when the rest is known. Where segments meet it is not,
+    because bytes do not count what is seen there."""
     return vertices * segments[-1][1] <= SMALL and len(segments) == 1 and effort != "fast"
 
 
 def sample_vertices(vertices: int, segments: int, effort: str) -> int | None:
-    """About how many vertices a sample has; None: the plant is not sampled."""
+    """Return about how many vertices a sample has; None: the plant is not sampled."""
     if vertices <= LARGE or effort == "best":
         return None
     least = min(max(int(vertices * LEAST_SHARE), LEAST_SAMPLE), ENOUGH)
@@ -162,7 +145,7 @@ def sample_vertices(vertices: int, segments: int, effort: str) -> int | None:
 
 
 def _even_branches(hierarchy: Hierarchy, wanted: int, deepest: int) -> np.ndarray:
-    """Branches with about `wanted` vertices in all, `deepest` among them."""
+    """Return branches with about `wanted` vertices in all, `deepest` among them."""
     vertices = np.append(hierarchy.first_vertex, hierarchy.vertex_count).tolist()
     after = (np.arange(hierarchy.branch_count) + hierarchy.subtree_branches).tolist()
     kept = np.zeros(hierarchy.branch_count, bool)

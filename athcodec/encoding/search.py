@@ -35,8 +35,8 @@ SETTLING_ROUNDS = 64  # Largest number of times that the choices of a small clip
 
 
 def settled(settings: Settings, trials: Trials) -> Settings:
-    """Return settings that no other choice of one kind makes smaller, each with steps of its own. What was chosen first
-    was chosen at other steps, and sizes jump from bound to bound where the worse one of two stays."""
+    """Return settings that no other choice of one kind makes smaller, each with steps of its own. Earlier choices were
+    made at other steps, and sizes jump from bound to bound if the worse one of two stays."""
     saving = settings.learned_saving
     for _ in range(SETTLING_ROUNDS):
         plain = replace(settings, learned_pieces=None)

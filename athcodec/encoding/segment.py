@@ -207,8 +207,8 @@ class Source:
 
     @cached_property
     def repeats(self) -> np.ndarray:
-        """(frames,) bool: frames of the clip that are not coded, because they repeat the one before in their segment. If
-        all are the rest pose none is left out, because they take no bytes either."""
+        """(frames,) bool: frames of the clip that are not coded, because they repeat the one before in their segment.
+        None is left out if all are the rest pose: they take no bytes either."""
         repeats = self.seen.repeats & (not self.still and Feature.REPEATS not in self.without)
         repeats[[start for start, _ in self.segments]] = False
         return repeats

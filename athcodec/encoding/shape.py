@@ -18,11 +18,11 @@ from athcodec.motion.hierarchy import Hierarchy
 from athcodec.motion.units import Length, parse_length
 
 OF_BOUND = "bound"
-EDGE_STEP, HEIGHT_STEP = 0.025, 0.05  # largest step of a branch, over the lengths of its edges and heights of its faces
-SMALL_FACES = 0.05  # part of a branch's faces that may be smaller than those that its step is made for
-LEAST_SIZE = 1e-5  # of edges and heights that count, over the diagonal
-LENGTH_STEP = 0.85  # largest step over the error that is asked for
-WHOLE_DETAIL, MOST_DETAIL = 128, 255  # FORMAT.md, Detail
+EDGE_STEP, HEIGHT_STEP = 0.025, 0.05  # Largest step of a branch, over the lengths of edges and heights of faces.
+SMALL_FACES = 0.05  # Share of a branch's faces that may be smaller than those that its step is made for.
+LEAST_SIZE = 1e-5  # Least size, in diagonals, of edges and heights that count.
+LENGTH_STEP = 0.85  # Largest step over the error that is asked for.
+WHOLE_DETAIL, MOST_DETAIL = 128, 255  # Detail of a step of 1, and the largest (FORMAT.md, Detail).
 
 
 @dataclass(frozen=True)
@@ -42,22 +42,22 @@ class RestPrecision:
             return cls(of_bound=True)
         length = parse_length(option) if isinstance(option, str) else option if isinstance(option, Length) else None
         if length is not None and length.unit:
-            value, found = length.value, cls(length=length)
+            value, precision = length.value, cls(length=length)
         else:
             value = float(option if length is None else length.value)
-            found = cls(fraction=value)
+            precision = cls(fraction=value)
         if not (math.isfinite(value) and value > 0):
             raise BoundError(f"rest error: got {option}; expected a length or a fraction above 0, or {OF_BOUND!r}")
-        return found
+        return precision
 
     def error(self, clip: MotionClip, diagonal: float) -> float:
-        """Largest error that is asked for, in scene units; infinite where none is."""
+        """Return the largest error that is asked for, in scene units; infinite: none is."""
         if self.length is not None:
             return self.length.in_scene_units(clip.metadata.get("unit"))
         return math.inf if self.fraction is None else self.fraction * diagonal
 
     def details(self, clip: MotionClip, hierarchy: Hierarchy, diagonal: float) -> np.ndarray:
-        """Detail of every branch, (B,) int32, file order."""
+        """Return the detail of every branch, (B,) int32, in file order."""
         if self.of_bound:
             return np.zeros(hierarchy.branch_count, np.int32)
         error = self.error(clip, diagonal)
@@ -67,14 +67,14 @@ class RestPrecision:
 
 
 def detail_of(steps: np.ndarray) -> np.ndarray:
-    """Details of the steps next to these; infinite ones have none."""
+    """Return the details of the nearest steps; infinite ones have none."""
     octaves = np.log2(steps, out=np.full(len(steps), np.inf), where=np.isfinite(steps))
     nearest = np.clip(np.rint(2 * np.where(np.isfinite(octaves), octaves, 0)) + WHOLE_DETAIL, 1, MOST_DETAIL)
     return np.where(np.isfinite(octaves), nearest, 0).astype(np.int32)
 
 
 def finer_than(details: np.ndarray, step: float) -> np.ndarray:
-    """Those of branches whose largest step is below the given one; 0 for others."""
+    """Return the details of branches whose largest step is below `step`; 0 for others."""
     return np.where((details > 0) & (_most(details) < step), details, 0).astype(np.int32)
 
 
@@ -83,12 +83,12 @@ def _most(details: np.ndarray) -> np.ndarray:
 
 
 def rest_steps(branches: np.ndarray, step: float) -> np.ndarray:
-    """(B,) of branches, _native.BRANCH, that of the rest pose where `step` is that of branches without detail."""
+    """Return the step of the rest pose of branches, (B,); step: that of branches without detail."""
     return np.where(branches["detail"] > 0, np.minimum(_most(branches["detail"]), step), step)
 
 
 def shape_steps(clip: MotionClip, hierarchy: Hierarchy, diagonal: float) -> np.ndarray:
-    """(B,) of every branch, in file order, the largest step at which its faces keep their shape; infinite without."""
+    """Return the largest step at which the faces of each branch keep their shape, (B,) in file order."""
     steps = np.full(hierarchy.branch_count, np.inf)
     polygons = clip.polygons
     if polygons is None or not len(polygons[0]):
@@ -103,14 +103,14 @@ def shape_steps(clip: MotionClip, hierarchy: Hierarchy, diagonal: float) -> np.n
     lengths = np.linalg.norm(edges, axis=1)
     sizes = np.minimum(EDGE_STEP * lengths, HEIGHT_STEP * _heights(edges, lengths, faces, len(counts), corners, points))
     counted = np.where(lengths > LEAST_SIZE * diagonal, np.maximum(sizes, EDGE_STEP * LEAST_SIZE * diagonal), np.inf)
-    branch = hierarchy.vertex_branch()[np.argsort(hierarchy.vertex_source)]  # of the source's vertices
+    branch = hierarchy.vertex_branch()[np.argsort(hierarchy.vertex_source)]  # In the order of the source's vertices.
     return _low_quantiles(branch[corners], counted, hierarchy.branch_count)
 
 
 def _heights(
     edges: np.ndarray, lengths: np.ndarray, faces: np.ndarray, count: int, corners: np.ndarray, points: np.ndarray
 ) -> np.ndarray:
-    """Of every corner's face, its area over its longest edge."""
+    """Return the area of every corner's face over its longest edge."""
     doubled, longest = np.zeros((count, 3)), np.zeros(count)
     centre = np.zeros((count, 3))
     np.add.at(centre, faces, points[corners])
@@ -121,7 +121,7 @@ def _heights(
 
 
 def _low_quantiles(group: np.ndarray, values: np.ndarray, count: int) -> np.ndarray:
-    """(count,) of each group the value that a small part of its finite ones fall short of; infinite without any."""
+    """Return the value that a small share of each group's finite values fall short of, (count,); infinite: none."""
     group, values = group[np.isfinite(values)], values[np.isfinite(values)]
     order = np.lexsort((values, group))
     numbers = np.bincount(group, minlength=count)

@@ -113,8 +113,7 @@ def encode_source_rest(branches: np.ndarray, step: float, reference: np.ndarray,
 
 
 def encode_exact_rest(branches: np.ndarray, pose: np.ndarray, mesh: Mesh | None = None) -> bytes:
-    """Code a rest pose that comes back bit for bit, (N, 3) float32 or float64, origin included. mesh: faces that it goes
-    by."""
+    """Code a rest pose that comes back bit for bit, (N, 3) float32 or float64 with the origin. mesh: its faces."""
     numbers = pose.astype(np.float64, order="C")
     return encode_stream(
         "ath_encode_exact_rest",
@@ -309,9 +308,25 @@ def find_corrections(
     of_one_frame = np.array(np.broadcast_to(narrow, vertices), np.uint8)
 
     def find(start: int, stop: int) -> np.ndarray | None:
-        some = slice(start, stop)
-        met = ends.of_vertices(start, stop)
-        rows = _corrections(positions[some], source[some], origin, limits[some], of_one_frame[some], step, met)
+        met, part = ends.of_vertices(start, stop), positions[start:stop]
+        decided = np.ascontiguousarray(met.decided, np.int32)
+        rows = _rows(
+            (stop - start) * frames,
+            lambda rows, capacity: lib.ath_find_corrections(
+                stop - start,
+                frames,
+                positions.dtype == np.float64,
+                address(part, part.dtype, part.size),
+                address(source[start:stop], np.float64, part.size),
+                address(origin, np.float64, 3),
+                address(limits[start:stop], np.float64, stop - start),
+                address(of_one_frame[start:stop], np.uint8, stop - start),
+                step,
+                CoreMetEnds(decided.ctypes.data, len(decided), met.closed),
+                rows,
+                capacity,
+            ),
+        )
         if rows is not None:
             rows[:, 0] += start
         return rows
@@ -389,34 +404,3 @@ def _rows(most: int, find: Callable[[int, int], int]) -> np.ndarray | None:
     rows = np.empty((most, 6), np.int32)
     count = find(rows.ctypes.data, most)
     return None if count < 0 else rows[:count].copy()
-
-
-def _corrections(
-    positions: np.ndarray,
-    source: np.ndarray,
-    origin: np.ndarray,
-    limits: np.ndarray,
-    narrow: np.ndarray,
-    step: float,
-    ends: MetEnds,
-) -> np.ndarray | None:
-    vertices, _, frames = positions.shape
-    decided = np.ascontiguousarray(ends.decided, np.int32)
-    met = CoreMetEnds(decided.ctypes.data, len(decided), ends.closed)
-    return _rows(
-        vertices * frames,
-        lambda rows, capacity: lib.ath_find_corrections(
-            vertices,
-            frames,
-            positions.dtype == np.float64,
-            address(positions, positions.dtype, positions.size),
-            address(source, np.float64, positions.size),
-            address(origin, np.float64, 3),
-            address(limits, np.float64, vertices),
-            address(narrow, np.uint8, vertices),
-            step,
-            met,
-            rows,
-            capacity,
-        ),
-    )

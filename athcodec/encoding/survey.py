@@ -22,10 +22,10 @@ from athcodec.motion.thresholds import Thresholds
 if TYPE_CHECKING:
     from athcodec.motion.clip import MotionClip
 
-MAX_DEPTH = 29
+MAX_DEPTH = 29  # Depth from which on nodes are accepted whatever their errors are.
 
-_READ_VALUES = 3 << 21  # numbers read from the clip at once
-_WORK_VERTICES = 1 << 17  # vertex-frames in work at once, of one thread
+_READ_VALUES = 3 << 21  # Numbers that are read from the clip at once.
+_WORK_VERTICES = 1 << 17  # Vertices times frames that one thread works on at once.
 
 
 class CutPiece(NamedTuple):
@@ -296,7 +296,7 @@ class Ath:
         return Pieces.subtrees(self.hierarchy, self.rest, branches, order - 1, order), len(path) - 1
 
     def _cut_pieces(self, level: int) -> tuple[Pieces, np.ndarray, np.ndarray]:
-        """All pieces the cut's maps depend on, the cut's own by first vertex, which of those are stems."""
+        """Return all pieces that the cut's maps depend on, those of the cut by first vertex, and which are stems."""
         if level < 0:
             raise ValueError(f"level of a cut: got {level}, expected 0 to {self.height}")
         hierarchy = self.hierarchy
@@ -480,7 +480,7 @@ def survey(
         gads.add(how.gads)
         if progress is not None:
             progress(extent.frame_count / clip.frame_count)
-    assert extent is not None and differences is not None  # a clip has frames
+    assert extent is not None and differences is not None  # Every clip has frames.
     return Survey(
         hierarchy=hierarchy,
         rest=rest,
@@ -570,7 +570,7 @@ class _Extent:
 
     @classmethod
     def of(cls, frames: np.ndarray, rest: np.ndarray) -> _Extent:
-        """Of frames (3,k,N) in the scene's coordinates, rest (N,3)."""
+        """Return the extent of frames (3,k,N) in the scene's coordinates; rest: (N,3)."""
         moved = frames - rest.T[:, None]
         moved *= moved
         low, high = (corner.astype(float) for corner in (frames.min(axis=(1, 2)), frames.max(axis=(1, 2))))
@@ -605,13 +605,13 @@ class _Largest:
             self._held = self._count
 
     def rows(self) -> np.ndarray:
-        """(count or fewer, columns), each column descending."""
+        """Return the largest numbers, (count or fewer, columns), each column descending."""
         ascending = np.sort(np.concatenate(self._parts), axis=0)
         return ascending[::-1][: self._count].copy()
 
 
 def _tested_pieces(hierarchy: Hierarchy, rest: np.ndarray, branches: np.ndarray) -> Pieces:
-    """The subtrees of the given branches, which hold the parent of each."""
+    """Return the subtrees of the branches, which hold the parent of each."""
     index = np.full(hierarchy.branch_count + 1, -1)
     index[branches] = np.arange(len(branches))
     parent = index[hierarchy.branch_parent[branches]]
@@ -634,13 +634,13 @@ def _prune(hierarchy: Hierarchy, thresholds: Thresholds, rest: np.ndarray, accep
 def _file_order_frames(
     positions: MotionClip | np.ndarray, hierarchy: Hierarchy, origin: np.ndarray
 ) -> Iterator[np.ndarray]:
-    """Frames in working portions: (3,k,N) float64, vertices in file order, seen from `origin`."""
+    """Yield frames in working portions: (3,k,N) float64, vertices in file order, seen from `origin`."""
     for portion in _portions(positions, hierarchy.vertex_count):
         yield seen_from(origin, _in_file_order(portion, hierarchy))
 
 
 def _portions(positions: MotionClip | np.ndarray, vertex_count: int) -> Iterator[np.ndarray]:
-    """Frames in working portions as they are, (k,N,3)."""
+    """Yield frames in working portions as they are, (k,N,3)."""
     at_once = max(1, _WORK_VERTICES // vertex_count)
     for block in _blocks(positions, vertex_count):
         for start in range(0, len(block), at_once):
@@ -648,7 +648,7 @@ def _portions(positions: MotionClip | np.ndarray, vertex_count: int) -> Iterator
 
 
 def _noting_repeats(portions: Iterable[np.ndarray], repeats: list[bool]) -> Iterator[np.ndarray]:
-    """The portions; as they pass, notes of each frame whether it has the bits of the one before it."""
+    """Yield the portions, and note of each frame whether it has the bits of the one before it."""
     before = None
     for portion in portions:
         for frame in portion:
@@ -658,12 +658,12 @@ def _noting_repeats(portions: Iterable[np.ndarray], repeats: list[bool]) -> Iter
 
 
 def _same_bits(one: np.ndarray, other: np.ndarray) -> bool:
-    last = one[-1].tobytes() == other[-1].tobytes()  # mostly says it all
+    last = one[-1].tobytes() == other[-1].tobytes()  # Different frames mostly differ there.
     return last and np.ascontiguousarray(one).tobytes() == np.ascontiguousarray(other).tobytes()
 
 
 def _in_file_order(portion: np.ndarray, hierarchy: Hierarchy) -> np.ndarray:
-    """(3,k,N) of a portion in the source's dtype, vertices in file order."""
+    """Return a portion in the source's dtype, (3,k,N), vertices in file order."""
     return np.take(np.moveaxis(portion, 2, 0), hierarchy.vertex_source, axis=2)
 
 

@@ -62,8 +62,7 @@ def in_each_basis(settings: Settings, trials: Trials) -> list[Settings]:
 
 
 def forms_like(forms: np.ndarray, source: Source, trials: Trials) -> np.ndarray:
-    """Return for the branches of the trials what was chosen for those of another source: tubes or none, and for other
-    branches by how they look, or one form for all."""
+    """Return forms that were chosen for another source, for these branches: tubes or none, else by looks or alike."""
     plain, tubes = forms <= SHEET, trials.start.forms
     if np.array_equal(forms[plain], source.sheet_like[plain]):
         others = trials.source.sheet_like.astype(np.int32)
@@ -73,8 +72,8 @@ def forms_like(forms: np.ndarray, source: Source, trials: Trials) -> np.ndarray:
 
 
 def best_of_plant(settings: Settings, trials: Trials) -> np.ndarray:
-    """Return which branches of a sampled plant are sheets: as in the sample, by form, or by form or all if some were in
-    the sample. A sample holds more than its share of what carries others, and errs there by more than elsewhere."""
+    """Return the forms of all of a sampled plant: as first, or all sheets that are no tubes if the sample has sheets. A
+    sample holds more than its share of what carries others, and errs there by more than elsewhere."""
     start = trials.start.forms
     other = np.maximum(settings.forms, SHEET) if settings.forms.any() else settings.forms
     if np.array_equal(start, other):

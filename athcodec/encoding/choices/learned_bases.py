@@ -20,8 +20,7 @@ def candidates(settings: Settings, trials: Trials) -> list[Settings]:
 
 
 def best_bases(settings: Settings, trials: Trials) -> Settings:
-    """Return the settings with learned time bases, one for all levels or one for each whose stream it shortens, or with
-    waves if the file as a whole gets no shorter."""
+    """Return the settings with a learned time basis for all levels, or where it is shorter, or with waves."""
     if trials.without(Feature.TIME_BASES):
         return settings
     waves = settings.in_waves()
@@ -35,9 +34,8 @@ def best_bases(settings: Settings, trials: Trials) -> Settings:
 
 
 def waves_if_smaller(settings: Settings, trials: Trials) -> Settings:
-    """Return the settings with waves if learned time bases no longer pay: they take more bytes the finer the steps are.
-    They are learned at their own step, as the file will have them, because a component that is just left out may be
-    kept at another step."""
+    """Return the settings with waves if learned time bases no longer pay at the final steps. They are learned again at
+    these steps, as for the file: a component that is just left out may be kept at another step."""
     if not any(settings.learned_bases):
         return settings
     trials.forget(settings)
@@ -45,8 +43,7 @@ def waves_if_smaller(settings: Settings, trials: Trials) -> Settings:
 
 
 def best_waves(settings: Settings, trials: Trials) -> Settings:
-    """Return the settings with periodic waves for loops that are one segment, or without: a motion that does not go on
-    smoothly across the seam takes more bytes so."""
+    """Return the settings with periodic waves for loops of one segment, unless the motion jumps across the seam."""
     if trials.without(Feature.PERIODIC) or not any(sample.whole_loop for sample in trials.samples):
         return settings
     return trials.cheapest([replace(settings, periodic=True), settings])

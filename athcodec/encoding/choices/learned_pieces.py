@@ -37,7 +37,7 @@ def best_pieces(settings: Settings, trials: Trials) -> Settings:
 
 
 def best_pieces_in_any_basis(settings: Settings, trials: Trials) -> Settings:
-    """Return the settings with learned modes beside what was chosen without them, or in its place. On stems of few
+    """Return the settings with learned modes beside what was chosen without them, or in its place: on stems of few
     vertices learned modes serve the motion that rotations and affine functions serve."""
     starts = in_each_basis(settings, trials)
     if any(settings.learned_bases):  # Time bases were chosen before learned modes were known, too.

@@ -69,8 +69,8 @@ def inner_nodes(source: Source, ath: Ath, levels: int) -> np.ndarray:
 
 
 def _level_errors(trials: Trials, bound: float) -> np.ndarray:
-    """Return per level the error in all vertices of one node together that would double the level's own, (levels,). The
-    level's own is the RMS that independent least-squares maps leave in a few frames, or the bound if that is more."""
+    """Return the error in all vertices of a node together that would double the error of its level, (levels,). A level
+    errs by the RMS that independent least-squares maps leave in a few frames, or by the bound if that is more."""
     source, ath, sample = trials.source, trials.ath, trials.samples[trials.middle].positions
     some = np.linspace(0, sample.shape[2] - 1, min(FRAMES, sample.shape[2])).astype(int)
     frames = np.empty((len(some), *sample.shape[:2]))

@@ -1,5 +1,4 @@
-"""The rest pose: how its vertices are predicted, whether it goes by faces, what is copied, and how precise it is
-(FORMAT.md, "REST")."""
+"""The rest pose: how vertices are predicted, whether it goes by faces, what is copied, how precise it is."""
 
 from __future__ import annotations
 
@@ -75,8 +74,7 @@ def best_slack(settings: Settings, trials: Trials) -> Settings:
 
 
 def _other_lags(source: Source, settings: Settings) -> list[Settings]:
-    """Return the settings with beams or not, and with the lags of stems or one for all. Short stems are also told apart
-    by their number of vertices."""
+    """Return the settings with other lags: no beams, one for all, or short stems told apart by their vertices."""
     best, count = settings.lags, source.hierarchy.stem_count
     no_beam = np.maximum(best, 1)
     others = [np.minimum(best, 1), no_beam, np.ones_like(best), np.where(count <= qz.SHORT_STEM, count, no_beam)]

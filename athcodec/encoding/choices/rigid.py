@@ -46,8 +46,7 @@ def first_rigid(
 
 
 def loose_branches(source: Source, sample: np.ndarray) -> np.ndarray:
-    """Return (B,) bool: branches whose base leaves its attach point by more than their own size, such as fallen leaves
-    and separate parts."""
+    """Return (B,) bool: branches whose base leaves its attach point by more than their size, such as fallen leaves."""
     if Feature.LOOSE in source.without:
         return np.zeros(source.hierarchy.branch_count, bool)
     hierarchy, rest = source.hierarchy, source.rest
@@ -66,8 +65,7 @@ def best_freedom(settings: Settings, trials: Trials) -> Settings:
 
 
 def calm_parts(settings: Settings, trials: Trials) -> Settings:
-    """Return the settings with a finer step, of all or of turns, as far as that is cheap, if corrections bend and
-    twitch many small rigid parts."""
+    """Return the settings with cheap finer steps, of all or of turns, if corrections twitch many small rigid parts."""
     most, share = CALM_COST * trials.cost(settings), _corrected_parts(settings, trials)
     for _ in range(CALM_ROUNDS):
         if share <= CALM_SHARE:
@@ -85,8 +83,7 @@ def calm_parts(settings: Settings, trials: Trials) -> Settings:
 
 
 def _corrected_parts(settings: Settings, trials: Trials) -> float:
-    """Return the share of the vertices, over all frames, that is corrected, of rigid parts whose turns are finer than
-    their step asks for."""
+    """Return the corrected share of the vertices of rigid parts whose turns are finer than their step asks for."""
     if not settings.turn_step:
         return 0.0
     plan = trials.prelude(settings).plan

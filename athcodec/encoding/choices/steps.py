@@ -19,8 +19,7 @@ WEIGHT_POWERS = (0.5, 1.0)  # Powers of a level's weight that are tried as the f
 
 
 def best_level_steps(settings: Settings, trials: Trials) -> Settings:
-    """Return the settings with coarser steps for levels whose vertices, and those that hang on them, have larger
-    weights."""
+    """Return the settings with coarser steps for levels whose vertices and those below have larger weights."""
     if trials.source.weights is None:
         return settings
     weights = [trials.source.level_weights(settings.levels, part) for part in WEIGHT_PARTS]
