@@ -18,7 +18,7 @@ import athcodec
 from athcodec._native import BRANCH, SEGMENT_FRAMES, crc32c
 from athcodec.decoding import container as ct
 from athcodec.decoding.ath_file import AthFile
-from athcodec.encoding import streams
+from athcodec.encoding import streams, writing
 from athcodec.encoding.motion import LevelStream, Plan, SegmentMotion
 from athcodec.encoding.segmentation import balanced_segments
 from athcodec.encoding.time_bases import MOST_SAMPLE
@@ -129,10 +129,10 @@ def still_file(
     branches = roots(1) if branches is None else branches
     plan = Plan(branches, int(branches["count"].sum()))
     plan.set_rest(np.zeros((plan.vertex_count, 3)))
-    store = ct.ChunkStore(BytesIO())
+    store = writing.ChunkStore(BytesIO())
     store.add(ct.HIERARCHY, still_hierarchy(plan) if hierarchy is None else hierarchy)
     store.add(ct.REST, still_rest(plan) if rest is None else rest)
-    store.add(ct.TIME, ct.pack_steady_time(np.arange(frames, dtype=float)) if time is None else time)
+    store.add(ct.TIME, writing.pack_steady_time(np.arange(frames, dtype=float)) if time is None else time)
     levels, segments = plan.level_count, balanced_segments(frames, -(-frames // SEGMENT_FRAMES))
     for index, (start, stop) in enumerate(segments):
         add_still_segment(store, plan, index, stop - start, stems)
@@ -149,14 +149,14 @@ def still_hierarchy(plan: Plan) -> bytes:
 
 def still_rest(plan: Plan) -> bytes:
     coded = streams.encode_rest(plan.branches, 1.0, plan.rest)
-    return ct.pack_rest(ct.Rest(np.zeros(3), 1.0, np.dtype(np.float32), coded.stream))
+    return writing.pack_rest(writing.Rest(np.zeros(3), 1.0, np.dtype(np.float32), coded.stream))
 
 
-def add_still_segment(store: ct.ChunkStore, plan: Plan, index: int, frames: int, stems: bytes | None) -> None:
+def add_still_segment(store: writing.ChunkStore, plan: Plan, index: int, frames: int, stems: bytes | None) -> None:
     motion = SegmentMotion(plan, frames, [LevelStream(1.0)] * plan.level_count)
     for level in range(plan.level_count):
         if plan.has_stems(level):
-            payload = ct.pack_stems(ct.StemsHead(1.0, 0), streams.encode_stems(motion, level))
+            payload = writing.pack_stems(writing.StemsHead(1.0, 0), streams.encode_stems(motion, level))
             store.add(ct.STEMS, payload if stems is None or level > 0 else stems, level, index)
         if plan.has_affines(level):
             store.add(ct.AFFINES, streams.encode_affines(motion, level), level, index)
@@ -164,7 +164,7 @@ def add_still_segment(store: ct.ChunkStore, plan: Plan, index: int, frames: int,
 
 def exact_rest_chunk(stream: bytes, dtype) -> bytes:
     """REST of Method 1, origin 0."""
-    return ct.pack_rest(ct.Rest(np.zeros(3), 1.0, np.dtype(dtype), stream, exact=True))
+    return writing.pack_rest(writing.Rest(np.zeros(3), 1.0, np.dtype(dtype), stream, exact=True))
 
 
 def basis_chunk(stream: bytes, frames: int) -> bytes:
@@ -174,5 +174,5 @@ def basis_chunk(stream: bytes, frames: int) -> bytes:
     learned = LevelStream(1.0, temporal=np.ones((1, frames)))
     motion = SegmentMotion(plan, frames, [learned, LevelStream(1.0)])
     motion.tracks[0, 1, 0, 0] = MOST_SAMPLE
-    head = ct.StemsHead(1.0, 0, ct.BASIS_AS_SAMPLES, 1, stream)
-    return ct.pack_stems(head, streams.encode_stems(motion, 0))
+    head = writing.StemsHead(1.0, 0, ct.BASIS_AS_SAMPLES, 1, stream)
+    return writing.pack_stems(head, streams.encode_stems(motion, 0))

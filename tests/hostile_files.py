@@ -18,7 +18,7 @@ from plants import awkward
 import athcodec
 from athcodec._native import BRANCH
 from athcodec.decoding import container as ct
-from athcodec.encoding import streams
+from athcodec.encoding import streams, writing
 from athcodec.encoding.motion import Plan
 
 SHEET, WHOLE = 1, 4
@@ -83,10 +83,10 @@ def stems_with_gaps(gaps: np.ndarray) -> bytes:
 
 
 def segments_of_one_frame(count: int) -> bytes:
-    parts, store = Parts.of(still_file()), ct.ChunkStore(BytesIO())
+    parts, store = Parts.of(still_file()), writing.ChunkStore(BytesIO())
     for chunk, payload in parts.chunks:
         if chunk.kind == ct.TIME:
-            payload = ct.pack_steady_time(np.arange(count, dtype=float))
+            payload = writing.pack_steady_time(np.arange(count, dtype=float))
         for segment in range(count if chunk.is_motion else 1):
             store.add(chunk.kind, payload, chunk.level, segment)
     out = BytesIO()

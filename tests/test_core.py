@@ -35,8 +35,9 @@ import athcodec
 from athcodec import errors
 from athcodec._library import load_library
 from athcodec.decoding import container as ct
-from athcodec.encoding.search import Search
-from athcodec.encoding.segment import Settings
+from athcodec.encoding.choices import learned_bases
+from athcodec.encoding.settings import Settings
+from athcodec.encoding.trials import Trials
 
 OK, BAD_CHECKSUM, BAD_CHUNK, LIMIT_EXCEEDED = 0, 5, 9, 10
 MORE, HELD, MISSING, NOT_PREPARED, NO_MEMORY, BAD_ARGUMENT = range(64, 70)
@@ -986,8 +987,8 @@ def distant_clip():
     return awkward(seed=8, branches=9, frames=40, dtype=np.float64, offset=1e3, motion="sway")
 
 
-def all_learned(search: Search, settings: Settings) -> Settings:
-    return replace(settings, learned_bases=(True,) * search.levels)
+def all_learned(settings: Settings, trials: Trials) -> Settings:
+    return replace(settings, learned_bases=(True,) * settings.levels)
 
 
 @pytest.fixture(scope="module", params=REFINED)
@@ -998,7 +999,7 @@ def refined(request, scratch) -> Player:
     clip = athcodec.join(clip) if isinstance(clip, dict) else clip
     with pytest.MonkeyPatch.context() as patch:
         if request.param == "time bases":
-            patch.setattr(Search, "_with_learned_bases", all_learned)
+            patch.setattr(learned_bases, "best_bases", all_learned)
         athcodec.encode(clip, path, **GIVEN | options)
     return Player(path.read_bytes())
 

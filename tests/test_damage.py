@@ -30,7 +30,7 @@ from athcodec.decoding import container as ct
 from athcodec.decoding import core_file
 from athcodec.decoding.ath_file import AthFile
 from athcodec.decoding.container import Limits
-from athcodec.encoding import streams
+from athcodec.encoding import streams, writing
 from athcodec.errors import (
     BadChecksum,
     BadChunk,
@@ -345,7 +345,7 @@ def test_a_file_with_unknown_optional_chunks_can_be_truncated(parts, played, tmp
 
 @pytest.mark.parametrize("kind", [9, 15, 40, 0x7FFF])
 def test_an_unknown_required_chunk_is_refused_by_its_number(kind, parts):
-    chunks = sorted([*parts.chunks, unknown(kind)], key=lambda entry: ct._order(entry[0]))
+    chunks = sorted([*parts.chunks, unknown(kind)], key=lambda entry: writing._order(entry[0]))
     with pytest.raises(UnknownChunk, match=f"{kind:#06x}"):
         opened(parts.with_chunks(chunks))
 
@@ -683,7 +683,7 @@ INFINITE_FLOAT, INFINITE_DOUBLE = bytes.fromhex("0f347680f4"), bytes.fromhex("00
 
 
 def times(*values: float) -> bytes:
-    return ct.pack_time(streams.encode_times(np.array(values, np.float64)))
+    return writing.pack_time(streams.encode_times(np.array(values, np.float64)))
 
 
 def zstd(data: bytes, **options) -> bytes:
@@ -806,8 +806,8 @@ def test_an_exact_rest_pose_that_is_not_whole_is_refused_or_another(dtype, parts
     pose = np.random.default_rng(5).normal(size=(decoder.vertex_count, 3)).astype(dtype)
 
     def decode(stream):
-        head = ct.Rest(decoder.file.origin, 1.0, pose.dtype, stream, exact=True)
-        return opened(parts.with_payload(ct.REST, ct.pack_rest(head))).rest[decoder.hierarchy.vertex_source]
+        head = writing.Rest(decoder.file.origin, 1.0, pose.dtype, stream, exact=True)
+        return opened(parts.with_payload(ct.REST, writing.pack_rest(head))).rest[decoder.hierarchy.vertex_source]
 
     assert_whole_or_not_it(streams.encode_exact_rest(decoder.file.branches, pose), pose, decode)
 
@@ -817,7 +817,7 @@ def test_uneven_times_that_are_not_whole_are_refused_or_others(parts):
     assert_whole_or_not_it(
         streams.encode_times(uneven),
         uneven,
-        lambda stream: opened(parts.with_payload(ct.TIME, ct.pack_time(stream))).time,
+        lambda stream: opened(parts.with_payload(ct.TIME, writing.pack_time(stream))).time,
     )
 
 

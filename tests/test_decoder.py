@@ -19,7 +19,7 @@ from athcodec import Thresholds
 from athcodec._native import LOOSE
 from athcodec.decoding import container as ct
 from athcodec.decoding import core_file
-from athcodec.encoding import streams
+from athcodec.encoding import streams, writing
 from athcodec.encoding.motion import Plan
 from athcodec.errors import BadChecksum, BadChunk, FormatError, LevelUnavailable
 from athcodec.motion.hierarchy import branches_from_edges
@@ -605,7 +605,7 @@ def test_infinite_positions_have_no_matrices_whatever_the_shape_of_the_plant(cli
 
 def test_a_rest_pose_beyond_float32_is_infinite_without_a_warning():
     most = float(np.finfo(np.float32).max)
-    head = ct.Rest(np.array([most, -most, 0.0]), most, np.dtype(np.float32))
+    head = writing.Rest(np.array([most, -most, 0.0]), most, np.dtype(np.float32))
     head.stream = streams.encode_rest(roots(1), 1.0, np.array([[2.5, -2.5, 0.0]])).stream
-    with opened(still_file(rest=ct.pack_rest(head))) as decoder:
+    with opened(still_file(rest=writing.pack_rest(head))) as decoder:
         assert decoder.rest.tolist() == [[np.inf, -np.inf, 0.0]]

@@ -28,7 +28,7 @@ import athcodec
 from athcodec import MotionClip, errors
 from athcodec._native import BRANCH, LOOSE, SHAPE_MODES, SHEET, WHOLE, crc32c, lib
 from athcodec.decoding import container
-from athcodec.encoding import streams
+from athcodec.encoding import streams, writing
 from athcodec.encoding.learned_modes import LearnedModes
 from athcodec.encoding.motion import LevelStream, Plan, SegmentMotion
 from athcodec.encoding.time_bases import MOST_SAMPLE
@@ -252,7 +252,7 @@ def test_a_stream_with_bytes_too_many_is_refused_by_the_document_too(spec, chang
 
 def test_shuffle_of_the_document_restores_an_array(spec):
     array = np.arange(30, dtype="<i4").reshape(10, 3) * 70_001
-    data = container.pack_array("numbers", array)
+    data = writing.pack_array("numbers", array)
     body = data[8 + 4 * array.ndim + len("numbers") :]
     assert spec.unshuffle(zstandard.decompress(body), array.size, 4) == array.tobytes()
 
@@ -362,7 +362,7 @@ def read_exact_rest(stream: bytes, branches: np.ndarray, dtype: type) -> np.ndar
 
 
 def read_times(stream: bytes, frame_count: int) -> np.ndarray:
-    with played(still_file(frame_count, time=container.pack_time(stream)), container.TIME) as decoder:
+    with played(still_file(frame_count, time=writing.pack_time(stream)), container.TIME) as decoder:
         return decoder.time
 
 
@@ -432,18 +432,18 @@ def test_random_decisions_about_refinements_mean_the_same_to_the_document_and_th
     if refines_rest:
         arguments = branches, step, rest, None
         stream = random_stream(spec, random, "decode_rest", *arguments)
-        added.append((container.REFINED_REST, container.pack_refined_rest(step, stream)))
+        added.append((container.REFINED_REST, writing.pack_refined_rest(step, stream)))
         made = outcome(spec, lambda stream: spec.decode_rest(stream, *arguments), stream)
         rest = rest if made == "invalid" else made
     motion = spec.no_motion(plan, parts.header.frame_count, False)
     refined = spec.refined_plan(branches, rest.rest, level, 1)
     if seed % 3:
         stream = random_stream(spec, random, "decode_refined_shapes", refined, motion, before.motion, shift)
-        added.append((container.SHAPES, container.pack_refined_shapes(shift, stream)))
-    head = container.StemsHead(0.02 / min(ratio, 16), container.ROTATION_FACTORS[seed % 3])
-    spec.read_stems_head(container.pack_stems(head, b""), motion, level)
+        added.append((container.SHAPES, writing.pack_refined_shapes(shift, stream)))
+    head = writing.StemsHead(0.02 / min(ratio, 16), container.ROTATION_FACTORS[seed % 3])
+    spec.read_stems_head(writing.pack_stems(head, b""), motion, level)
     stream = random_stream(spec, random, "decode_refined_stems", refined, motion, before, level, ratio)
-    added.append((container.STEMS, container.pack_refined_stems(ratio, head, stream)))
+    added.append((container.STEMS, writing.pack_refined_stems(ratio, head, stream)))
     header = replace(parts.header, level_count=level + 1, full_level_count=level + 1, layer_count=2, joins=None)
     new = [(container.Chunk(kind, level, 0, 0, 0, 0), payload) for kind, payload in sorted(added)]
     data = Parts(header, np.zeros((level + 1, 1, 3)), parts.chunks + new).file()
@@ -564,7 +564,7 @@ def test_random_decisions_about_exact_numbers_mean_the_same_to_the_document_and_
         assert_same_outcome(
             spec,
             random_stream(spec, random, "decode_times", count),
-            lambda stream: np.array(spec.frame_times(container.pack_time(stream), [spec.Record(frames=count)])),
+            lambda stream: np.array(spec.frame_times(writing.pack_time(stream), [spec.Record(frames=count)])),
             lambda stream: read_times(stream, count),
         )
     for dtype, n in NUMBERS.items():
@@ -776,7 +776,7 @@ class HandMade:
         self.origin = np.array([10.0, -3.5, 0.25])
         self.branches, self.rest = self._skeleton()
         self.vertex_count = len(self.rest)
-        self.store = container.ChunkStore(io.BytesIO())
+        self.store = writing.ChunkStore(io.BytesIO())
         self.plan = Plan(self.branches, self.vertex_count)
         self.shapes = None
 
@@ -825,18 +825,18 @@ class HandMade:
         counts = len(self.branches), self.vertex_count
         permutations = [self.random.permutation(count).astype(np.int32) for count in counts]
         self.store.add(container.HIERARCHY, streams.encode_hierarchy(self.branches, *permutations))
-        head = container.Rest(self.origin, 0.01, np.dtype(self.exact or np.float32), exact=bool(self.exact))
-        times = container.pack_steady_time(np.arange(self.FRAMES) / 24.0)
+        head = writing.Rest(self.origin, 0.01, np.dtype(self.exact or np.float32), exact=bool(self.exact))
+        times = writing.pack_steady_time(np.arange(self.FRAMES) / 24.0)
         if self.exact:
             pose = (self.rest + self.origin).astype(self.exact)
             head.stream = streams.encode_exact_rest(self.branches, pose)
             self.plan.set_rest(pose.astype(np.float64) - self.origin)
-            times = container.pack_time(streams.encode_times(self.random.random(self.FRAMES).cumsum()))
+            times = writing.pack_time(streams.encode_times(self.random.random(self.FRAMES).cumsum()))
         else:
             coded = streams.encode_rest(self.branches, 0.01, self.rest)
             head.stream = coded.stream
             self.plan.set_rest(coded.decoded)
-        self.store.add(container.REST, container.pack_rest(head))
+        self.store.add(container.REST, writing.pack_rest(head))
         self.store.add(container.TIME, times)
         self.shapes = self._some_shapes()
         for level, stream in streams.encode_learned_modes(self.plan, self.shapes).items():
@@ -885,16 +885,16 @@ class HandMade:
         motion = self._motion(frames, bases)
         for level in range(levels):
             if self.plan.has_stems(level):
-                head = container.StemsHead(motion.streams[level].step, int(motion.streams[level].rotation_step_factor))
+                head = writing.StemsHead(motion.streams[level].step, int(motion.streams[level].rotation_step_factor))
                 if level in bases:
                     head.basis_kind, head.rank = container.BASIS_AS_SAMPLES, self.bases[level]
                     head.basis = streams.encode_temporal(bases[level][: head.rank])
                 stream = streams.encode_stems(motion, level)
-                self._add(container.STEMS, container.pack_stems(head, stream), level, segment)
+                self._add(container.STEMS, writing.pack_stems(head, stream), level, segment)
             if self.plan.has_affines(level):
                 self._add(container.AFFINES, streams.encode_affines(motion, level), level, segment)
         self._add(
-            container.CORRECTIONS, container.pack_corrections(0.125, self._corrections(frames)), levels - 1, segment
+            container.CORRECTIONS, writing.pack_corrections(0.125, self._corrections(frames)), levels - 1, segment
         )
 
     def _add(self, kind: int, payload: bytes, level: int, segment: int) -> None:

@@ -14,7 +14,7 @@ from plants import MOTIONS, SHAPES, STEADY, awkward, awkward_plants, bound_for, 
 import athcodec
 from athcodec import MotionClip, Thresholds
 from athcodec.decoding import container as ct
-from athcodec.encoding import streams
+from athcodec.encoding import streams, writing
 from athcodec.encoding.job import time_chunk
 from athcodec.encoding.quantise import SOURCE_REST_TOLERANCE
 from athcodec.motion.clip import NOT_KEPT
@@ -205,7 +205,7 @@ def test_vertices_and_branches_numbered_at_random_come_back_in_their_order(scrat
 def test_times_come_back_exactly(times):
     time = np.unique(times)
     assert np.array_equal(opened(still_file(len(time), time=time_chunk(time))).time, time)
-    number_by_number = ct.pack_time(streams.encode_times(time))
+    number_by_number = writing.pack_time(streams.encode_times(time))
     assert opened(still_file(len(time), time=number_by_number)).time.tobytes() == time.tobytes()
 
 

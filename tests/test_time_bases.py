@@ -10,8 +10,8 @@ import pytest
 
 import athcodec
 from athcodec.decoding.container import BASIS_IN_WAVES, STEMS
+from athcodec.encoding.choices import learned_bases
 from athcodec.encoding.motion import waves_over_time
-from athcodec.encoding.search import Search
 from athcodec.encoding.time_bases import InWaves, TimeComponents
 from bench.odd.bending import FPS, Bones, clip_of, gusty
 from bench.trees.plant import grow
@@ -96,20 +96,17 @@ def test_a_shared_basis_makes_files_smaller(tmp_path, monkeypatch):
     clip, options = hit_by_a_gust(), {"rel_error": 1e-3, "ladder": "none", "attributes": "none"}
     shared = athcodec.encode(clip, tmp_path / "shared.ath", **options).bytes
 
-    def unlearned(search, settings):
-        return replace(settings, learned_bases=(False,) * search.levels)
-
-    monkeypatch.setattr(Search, "_with_learned_bases", unlearned)
-    monkeypatch.setattr(Search, "_other_waves", lambda search, settings: iter(()))
+    monkeypatch.setattr(learned_bases, "best_bases", lambda settings, trials: settings)
+    monkeypatch.setattr(learned_bases, "candidates", lambda settings, trials: [])
     assert shared < 0.9 * athcodec.encode(clip, tmp_path / "waves.ath", **options).bytes
 
 
 @pytest.mark.vectors
 def test_layers_in_learned_bases_are_decoded_as_the_document_does(tmp_path, monkeypatch):
-    def learned(search, settings):
-        return replace(settings, learned_bases=(True,) * search.levels)
+    def learned(settings, trials):
+        return replace(settings, learned_bases=(True,) * settings.levels)
 
-    monkeypatch.setattr(Search, "_with_learned_bases", learned)
+    monkeypatch.setattr(learned_bases, "best_bases", learned)
     path = tmp_path / "layers.ath"
     athcodec.encode(hit_by_a_gust(), path, rel_error=1e-4, attributes="none", ladder=(1e-2, 1e-3))
     assert_same_as_document(path.read_bytes())

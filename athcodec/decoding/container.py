@@ -1,9 +1,8 @@
-"""Writing an .ath file (FORMAT.md, "File"), and its static data, both ways.
+"""The front of an .ath file (FORMAT.md, "File"), as it is written, and its static data, as they are read.
 
 A file is its front, which says what it holds, then the chunks in table order without gaps, so that offsets are never
-stored and cannot disagree. Chunks of the prelude come first, those of the motion by (level, segment, kind),
-other attributes last. The streams inside are written by encoding/streams.py. The C core parses files; only static
-arrays and metadata, which it hands over as stored, are parsed here.
+stored and cannot disagree. encoding/writing.py makes the chunks. The C core parses files; only static arrays and
+metadata, which it hands over as stored, are parsed here.
 """
 
 from __future__ import annotations
@@ -11,25 +10,22 @@ from __future__ import annotations
 import json
 import math
 import struct
-from collections.abc import Container, Iterator, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
-from typing import Any, BinaryIO
+from collections.abc import Container
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 import zstandard
 
 from athcodec import _native
-from athcodec._native import MEASURES, SHORT_FLOATS, SHORT_SHIFT, CorePolygons, address, crc32c, lib
-from athcodec.errors import BadChunk, ClipError, FormatError, LimitExceeded
-from athcodec.motion.clip import ClipRange
+from athcodec._native import MEASURES, SHORT_FLOATS, SHORT_SHIFT, address, crc32c, lib
+from athcodec.errors import BadChunk, LimitExceeded
 
 MAGIC = b"\x89ATH\r\n\x1a\n"
 MAJOR, MINOR, FEATURES = 0, 13, 0
 NO_LEVEL = 255
 STEM_WAVES, NODE_WAVES, BASIS_IN_WAVES, BASIS_AS_SAMPLES = range(4)  # of Basis
 ROTATION_FACTORS = (0, 1, 8)  # by Rotation
-IS_HOST = 4  # Method of REST
 OPTIONAL, KIND_ID = 0x8000, 0x7FFF
 
 HIERARCHY, REST, TIME = 1, 2, 3
@@ -189,7 +185,7 @@ def _front_stream(header: Header, chunks: list[Chunk], errors: np.ndarray) -> by
 
 def short_floats(lengths: np.ndarray) -> np.ndarray:
     """What the error table stores of lengths, int32: the top bits of binary32, rounded up."""
-    bits = np.ascontiguousarray(_round_up(lengths), np.float32).view(np.uint32)
+    bits = np.ascontiguousarray(round_up_singles(lengths), np.float32).view(np.uint32)
     return np.minimum(bits + (1 << SHORT_SHIFT) - 1 >> SHORT_SHIFT, SHORT_FLOATS - 1).astype(np.int32)
 
 
@@ -198,71 +194,10 @@ def from_short_float(stored: int) -> float:
     return float(np.uint32(stored << SHORT_SHIFT).view(np.float32))
 
 
-def _round_up(values: np.ndarray) -> np.ndarray:
+def round_up_singles(values: np.ndarray) -> np.ndarray:
     values = np.asarray(values, np.float64)
     single = values.astype(np.float32)
     return np.where(single < values, np.nextafter(single, np.float32(np.inf)), single)
-
-
-def _order(chunk: Chunk) -> tuple[int, ...]:
-    if chunk.is_motion:
-        return (1, chunk.level, chunk.segment, chunk.kind)
-    return (0 if is_prelude(chunk.kind) else 2, chunk.kind & KIND_ID)
-
-
-@dataclass
-class ChunkStore:
-    """Chunks on their way into a file: payloads in a spool, in any order."""
-
-    spool: BinaryIO
-    entries: list[tuple[Chunk, int]] = field(default_factory=list)
-
-    def add(self, kind: int, payload: bytes, level: int = NO_LEVEL, segment: int = 0) -> None:
-        place = self.spool.seek(0, 2)
-        self.spool.write(payload)
-        self.entries.append((Chunk(kind, level, segment, len(payload), crc32c(payload)), place))
-
-    def replace(self, kind: int, payload: bytes) -> None:
-        """Another content for the one chunk of this kind."""
-        self.entries = [(chunk, place) for chunk, place in self.entries if chunk.kind != kind]
-        self.add(kind, payload)
-
-    def size(self, header: Header, errors: np.ndarray) -> int:
-        """Bytes of the whole file."""
-        pack_front(header, sorted((chunk for chunk, _ in self.entries), key=_order), errors)
-        return header.file_length
-
-    def write(self, out: BinaryIO, header: Header, errors: np.ndarray) -> list[Chunk]:
-        """Writes the whole file in its order and returns its chunks."""
-        entries = sorted(self.entries, key=lambda entry: _order(entry[0]))
-        out.write(pack_front(header, [chunk for chunk, _ in entries], errors))
-        chunks = []
-        for chunk, place in entries:
-            chunks.append(replace(chunk, offset=out.tell()))
-            self.spool.seek(place)
-            out.write(self.spool.read(chunk.length))
-        return chunks
-
-
-# ---- heads of the chunks ----------------------------------------------------------------------------------------
-
-_REST = struct.Struct("<B3ff")
-_SOURCE_REST = struct.Struct("<Bf")
-_MESH_CHECKSUM = struct.Struct("<II")
-_TIME = struct.Struct("<B")
-_STEADY = struct.Struct("<dd")
-_RATE = struct.Struct("<H")
-_CLIP = struct.Struct("<IIBB")
-_STEMS = struct.Struct("<fBB")
-_BASIS = struct.Struct("<HBI")
-_CORRECTIONS = struct.Struct("<f")
-_RATIO = struct.Struct("<H")
-_SHIFT = struct.Struct("<B")
-_REFINED_REST = struct.Struct("<f")
-_PREDICTED = struct.Struct("<fB")
-_ARRAY = struct.Struct("<BBHI")
-_POLYGONS = struct.Struct("<II")
-_IS_MIXED, _IS_DERIVED = 8, 16
 
 
 def brief(value: object) -> str:
@@ -271,146 +206,12 @@ def brief(value: object) -> str:
     return text if len(text) <= 100 else text[:97] + "..."
 
 
-@dataclass
-class Rest:
-    """Head of REST and its stream, which holds the very numbers of the source where `exact`, else steps; where the rest
-    pose `is_host`, a mesh of the host's, its checksum. Where it is `connected` it goes by FACES. Origin and step are
-    numbers of float32."""
-
-    origin: np.ndarray
-    step: float
-    source_dtype: np.dtype
-    stream: bytes = b""
-    exact: bool = False
-    is_host: bool = False
-    connected: bool = False
-
-
-def pack_rest(rest: Rest) -> bytes:
-    method = int(rest.exact) | int(rest.source_dtype == np.float64) << 1 | int(rest.connected) << 3
-    return _REST.pack(IS_HOST if rest.is_host else method, *rest.origin, rest.step) + rest.stream
-
-
-def pack_source_rest(step: float, stream: bytes) -> bytes:
-    return _SOURCE_REST.pack(0, step) + stream
-
-
-def pack_exact_source_rest(stream: bytes) -> bytes:
-    return b"\1" + stream
-
-
-def mesh_checksum(mesh: np.ndarray) -> bytes:
-    """By which a file knows the mesh of a host, (N, 3) in source order."""
-    data = (mesh.astype("<f4") + np.float32(0)).tobytes()  # -0.0 is 0.0
-    return _MESH_CHECKSUM.pack(crc32c(data), crc32c(data[::-1]))
-
-
-def pack_steady_time(*times: np.ndarray) -> bytes | None:
-    """TIME by the rule that gives the very same times in seconds, (T,) float64 for each clip; None where none does."""
-    for method, code in ((3, _RATE), (4, _RATE), (0, _STEADY), (1, _STEADY)):
-        rules = [_steady_rule(method, time) for time in times]
-        if None not in rules:
-            return _TIME.pack(method) + b"".join(code.pack(*rule) for rule in rules)
-    return None
-
-
-def _steady_rule(method: int, time: np.ndarray) -> tuple[float, ...] | None:
-    """What the method stores of the times, if they are these."""
-    if method < 2:
-        step = _steady_step(method, time)
-        return None if step is None else (float(time[0]), step)
-    rate = round(1 / float(time[1])) if len(time) > 1 and float(time[1]) > 1e-5 else 1
-    index = np.arange(len(time))
-    same = 0 < rate < 65536 and ((index / rate if method == 3 else index * (1 / rate)) == time).all()
-    return (rate,) if same else None
-
-
-def _steady_step(method: int, time: np.ndarray) -> float | None:
-    if len(time) == 1:
-        return 1.0
-    index, first = np.arange(len(time)), float(time[0])
-    steps = {(float(time[-1]) - first) / (len(time) - 1), float(time[1]) - first}
-    if method == 1:
-        steps = {round(1 / step * 1000) / 1000 for step in steps if step > 1e-300} - {0.0}
-    with np.errstate(over="ignore", invalid="ignore"):  # a rule that overflows does not give the times
-        fit = (step for step in steps if (first + (index / step if method else index * step) == time).all())
-        return next(fit, None)
-
-
-def pack_clips(
-    clip_ranges: Sequence[ClipRange],
-    segment_counts: Sequence[int],
-    seams: Sequence[Sequence[float] | None],
-    periodic: bool = False,
-) -> bytes:
-    """CLIPS; seams: for a loop the error at the seam of each level, scene units, rounded up to float32. periodic:
-    whether loops of one segment are coded by periodic waves."""
-    entries = []
-    for clip_range, segments, errors in zip(clip_ranges, segment_counts, seams):
-        name = clip_range.name.encode()
-        flags = clip_range.loop | (clip_range.loop and periodic and segments == 1) << 1
-        entries.append(_CLIP.pack(clip_range.frame_count, segments, flags, len(name)) + name)
-        if clip_range.loop:
-            entries.append(_round_up(errors).astype("<f4").tobytes())
-    return b"".join(entries)
-
-
-def pack_time(stream: bytes) -> bytes:
-    return _TIME.pack(2) + stream
-
-
-@dataclass
-class StemsHead:
-    """Head of STEMS: step, rotation factor (0, 1, 8), Basis (basis_kind), rank and stream of a learned one, the level
-    of the stream whose basis it begins with, and how many half octaves below 1 the largest step of rigid pieces'
-    rotations is (0: there is none)."""
-
-    step: float
-    rotation_step_factor: int
-    basis_kind: int = STEM_WAVES
-    rank: int = 0
-    basis: bytes = b""
-    base: int = NO_LEVEL
-    turn: int = 0
-
-
-def pack_stems(head: StemsHead, stream: bytes) -> bytes:
-    rotation = ROTATION_FACTORS.index(head.rotation_step_factor) | head.turn << 4
-    data = _STEMS.pack(head.step, rotation, head.basis_kind)
-    if head.basis_kind > NODE_WAVES:
-        data += _BASIS.pack(head.rank, head.base, len(head.basis)) + head.basis
-    return data + stream
-
-
-def pack_refined_stems(ratio: int, head: StemsHead, stream: bytes) -> bytes:
-    """ratio: the step of the layer before over that of this one."""
-    return _RATIO.pack(ratio) + pack_stems(head, stream)
-
-
-def pack_refined_shapes(shift: int, stream: bytes) -> bytes:
-    """shift: binary digits that this layer's integers have more than those of the layer before."""
-    return _SHIFT.pack(shift) + stream
-
-
-def pack_refined_rest(step: float, stream: bytes) -> bytes:
-    return _REFINED_REST.pack(step) + stream
-
-
-def pack_predicted(step: float, lattice: bool, stream: bytes) -> bytes:
-    return _PREDICTED.pack(step, lattice) + stream
-
-
-def pack_corrections(step: float, stream: bytes) -> bytes:
-    return _CORRECTIONS.pack(step) + stream
-
-
-# ---- static data --------------------------------------------------------------------------------------------------
-
-_ZSTD_WINDOW = 8 << 20
+ARRAY_HEAD = struct.Struct("<BBHI")  # Type, Dimensions, Name_Length and Item_Bytes of ATTRIBUTE.
+_ZSTD_WINDOW = 8 << 20  # Largest window of a zstd frame, in bytes.
 _ZSTD_SINGLE_SEGMENT = 0x20
 
 # Types of static arrays: NumPy's letters in the order of FORMAT.md, and the bytes that an element may have.
-_KINDS = "buifS"
+ARRAY_KINDS = "buifS"
 _INTEGER_SIZES = 1, 2, 4, 8
 _KIND_SIZES: dict[str, Container[int]] = {
     "b": (1,),
@@ -420,13 +221,6 @@ _KIND_SIZES: dict[str, Container[int]] = {
     "S": range(1, (1 << 20) + 1),
 }
 _MOST_DIMENSIONS = 32
-
-
-def _compress(array: np.ndarray) -> bytes:
-    """zstd over the array's bytes, shuffled: all first bytes of the items, then all second bytes, ..."""
-    array = np.ascontiguousarray(array)
-    shuffled = np.frombuffer(array.tobytes(), np.uint8).reshape(-1, array.dtype.itemsize).T.tobytes()
-    return zstandard.ZstdCompressor(level=19, write_content_size=True, write_checksum=False).compress(shuffled)
 
 
 def _decompress(data: bytes, dtype: np.dtype, shape: tuple[int, ...], what: str, limits: Limits) -> np.ndarray:
@@ -458,55 +252,16 @@ def zstd_decompress_exact(data: bytes, expected: int, what: str, limits: Limits)
         raise BadChunk(f"{what}: got a zstd frame that does not decode ({error}); expected {expected} bytes") from None
 
 
-def pack_polygons(shape: CorePolygons, stream: bytes) -> bytes:
-    """FACES or EDGES of this shape."""
-    types = bytes([shape.index_type | _IS_MIXED * shape.is_mixed] + [shape.count_type] * shape.is_mixed)
-    return types + _POLYGONS.pack(shape.face_count, shape.corner_count if shape.is_mixed else shape.columns) + stream
-
-
-def pack_derived_edges(index_type: int) -> bytes:
-    """EDGES that follow from the branches, of an integer type (polygons.type_code)."""
-    return bytes([index_type | _IS_DERIVED])
-
-
-def pack_array(name: str, array: np.ndarray) -> bytes:
-    """A named static array of numbers, booleans or texts, of any shape.
-
-    Raises ClipError for what no reader would accept.
-    """
-    what, limits = f"array {brief(name)}", Limits()
-    if array.nbytes > limits.decoded_chunk_bytes:  # before it is compressed
-        raise ClipError(f"{what}: got {array.nbytes} bytes; the limit is {limits.decoded_chunk_bytes}")
-    with _refusals(what):
-        text = name.encode()
-        head = _ARRAY.pack(_KINDS.index(array.dtype.kind), array.ndim, len(text), array.dtype.itemsize)
-        shape = struct.pack(f"<{array.ndim}I", *array.shape)
-        packed = head + shape + text + (_compress(array) if array.size else b"")
-        parse_array(packed, what, limits)
-    return packed
-
-
-@contextmanager
-def _refusals(what: str) -> Iterator[None]:
-    """What a reader would refuse of something that is being written is the source's fault: ClipError."""
-    try:
-        yield
-    except FormatError as error:
-        raise ClipError(str(error)) from None
-    except (TypeError, ValueError, RecursionError, struct.error) as error:
-        raise ClipError(f"{what}: {error}; expected plain data that a file can hold") from None
-
-
 def parse_array(data: bytes, what: str, limits: Limits) -> tuple[str, np.ndarray]:
     """Name and array of ATTRIBUTE."""
-    if len(data) < _ARRAY.size:
-        raise BadChunk(f"{what}: got {len(data)} bytes; expected at least {_ARRAY.size}")
-    code, dimensions, length, size = _ARRAY.unpack_from(data)
-    start = _ARRAY.size + 4 * dimensions
+    if len(data) < ARRAY_HEAD.size:
+        raise BadChunk(f"{what}: got {len(data)} bytes; expected at least {ARRAY_HEAD.size}")
+    code, dimensions, length, size = ARRAY_HEAD.unpack_from(data)
+    start = ARRAY_HEAD.size + 4 * dimensions
     if start + length > len(data):
         raise BadChunk(f"{what}: got a head of {start + length} bytes; expected at most what the chunk holds")
     dtype = _array_type(code, size, what)
-    shape, body = struct.unpack_from(f"<{dimensions}I", data, _ARRAY.size), data[start + length :]
+    shape, body = struct.unpack_from(f"<{dimensions}I", data, ARRAY_HEAD.size), data[start + length :]
     name = _array_name(data[start : start + length], what, limits)
     if dimensions > _MOST_DIMENSIONS:
         raise BadChunk(f"{what}: got {dimensions} dimensions; expected at most {_MOST_DIMENSIONS}")
@@ -521,9 +276,9 @@ def parse_array(data: bytes, what: str, limits: Limits) -> tuple[str, np.ndarray
 
 def _array_type(code: int, size: int, what: str) -> np.dtype:
     """Of Type and Item_Bytes."""
-    if code >= len(_KINDS) or size not in _KIND_SIZES[_KINDS[code]]:
+    if code >= len(ARRAY_KINDS) or size not in _KIND_SIZES[ARRAY_KINDS[code]]:
         raise BadChunk(f"{what}: got type {code} of {size} bytes; expected numbers, booleans or texts")
-    return np.dtype(f"<{_KINDS[code]}{size}")
+    return np.dtype(f"<{ARRAY_KINDS[code]}{size}")
 
 
 def _array_name(text: bytes, what: str, limits: Limits) -> str:
@@ -536,16 +291,6 @@ def _array_name(text: bytes, what: str, limits: Limits) -> str:
     if not name:
         raise BadChunk(f"{what}: got name {brief(text)}; expected text")
     return name
-
-
-def pack_metadata(metadata: dict) -> bytes:
-    """JSON, zstd-compressed where that is shorter. Raises ClipError for what no reader would accept."""
-    with _refusals("metadata"):
-        text = json.dumps(metadata, separators=(",", ":"), ensure_ascii=False, allow_nan=False).encode()
-        shorter = zstandard.ZstdCompressor(level=19, write_content_size=True).compress(text)
-        packed = b"\1" + shorter if len(shorter) < len(text) else b"\0" + text
-        parse_metadata(packed, Limits())
-    return packed
 
 
 def parse_metadata(data: bytes, limits: Limits) -> dict:

@@ -9,6 +9,7 @@ import tempfile
 import numpy as np
 
 from athcodec.decoding import container as ct
+from athcodec.encoding import writing
 from athcodec.encoding.bounds import BoundOption
 from athcodec.encoding.job import SPOOL_BYTES, EncodingJob, EncodingOptions
 from athcodec.encoding.progress import Progress
@@ -80,7 +81,7 @@ class _Trial:
     def _job_size(self, job: EncodingJob, bound: float) -> float:
         with tempfile.SpooledTemporaryFile(SPOOL_BYTES) as spool:
             try:
-                entries = job.encode(bound, ct.ChunkStore(spool)).store.entries
+                entries = job.encode(bound, writing.ChunkStore(spool)).store.entries
             except BoundError:
                 return math.inf
         return sum(

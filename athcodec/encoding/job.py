@@ -25,7 +25,7 @@ from athcodec._native import MEASURES, SHEET
 from athcodec.decoding import container as ct
 from athcodec.decoding.ath_file import AthFile
 from athcodec.decoding.decoder import Decoder
-from athcodec.encoding import polygons, streams
+from athcodec.encoding import polygons, streams, writing
 from athcodec.encoding import quantise as qz
 from athcodec.encoding.choices.joins import End
 from athcodec.encoding.choices.prediction import FoundPrediction, best_prediction, code_predicted_segment, one_map_each
@@ -188,8 +188,8 @@ def _weighted(clip: MotionClip, weights: str | np.ndarray) -> tuple[MotionClip, 
 
 def time_chunk(*times: np.ndarray) -> bytes:
     """Return TIME for times in seconds, (T,) for each clip, exactly: by rules if these give the very same numbers."""
-    steady = ct.pack_steady_time(*times)
-    return steady or ct.pack_time(streams.encode_times(np.concatenate(times).astype(np.float64)))
+    steady = writing.pack_steady_time(*times)
+    return steady or writing.pack_time(streams.encode_times(np.concatenate(times).astype(np.float64)))
 
 
 @dataclass
@@ -224,7 +224,7 @@ class _Decided:
 
 @dataclass
 class _Result:
-    store: ct.ChunkStore
+    store: writing.ChunkStore
     header: ct.Header
     errors: np.ndarray
 
@@ -442,7 +442,7 @@ class EncodingJob:
             )
         return decided
 
-    def encode(self, bound: float, store: ct.ChunkStore) -> _Result:
+    def encode(self, bound: float, store: writing.ChunkStore) -> _Result:
         decided = self.decide(bound)
         return self.fill(store, decided, self.coded(decided, range(decided.segment_count)))
 
@@ -450,7 +450,7 @@ class EncodingJob:
         """Return the bytes of the file at a bound; infinite if it cannot be kept."""
         with tempfile.SpooledTemporaryFile(SPOOL_BYTES) as spool:
             try:
-                result = dataclasses.replace(self, report=silent).encode(bound, ct.ChunkStore(spool))
+                result = dataclasses.replace(self, report=silent).encode(bound, writing.ChunkStore(spool))
             except BoundError:
                 return math.inf
         return result.store.size(result.header, result.errors)
@@ -464,7 +464,7 @@ class EncodingJob:
         coded: Iterable[CodedSegment],
     ) -> Summary:
         """Write the whole file into `out`, which is to become `path`."""
-        result = self.fill(ct.ChunkStore(spool), decided, coded)
+        result = self.fill(writing.ChunkStore(spool), decided, coded)
         chunks = result.store.write(out, result.header, result.errors)
         if any(clip_range.loop for clip_range in self.clip.clip_ranges):
             mesh = self.clip.source_rest if self.options.host_rest else None
@@ -477,7 +477,7 @@ class EncodingJob:
         self.report("done", 1.0)
         return summary
 
-    def fill(self, store: ct.ChunkStore, decided: _Decided, coded: Iterable[CodedSegment]) -> _Result:
+    def fill(self, store: writing.ChunkStore, decided: _Decided, coded: Iterable[CodedSegment]) -> _Result:
         """Add all chunks of a file to a store."""
         layers = decided.layers
         self._add_prelude(store, decided)
@@ -506,7 +506,7 @@ class EncodingJob:
 
     def _clips(self, decided: _Decided, seam_errors: Sequence[Sequence[float] | None]) -> bytes:
         segment_counts = [len(segments) for segments in decided.source.clip_range_segments]
-        return ct.pack_clips(self.clip.clip_ranges, segment_counts, seam_errors, decided.choice.settings.periodic)
+        return writing.pack_clips(self.clip.clip_ranges, segment_counts, seam_errors, decided.choice.settings.periodic)
 
     def _seam_errors(self, decoder: Decoder) -> list[list[float] | None]:
         """Return for each loop how far off its step from the last frame to the first is, per level."""
@@ -540,9 +540,9 @@ class EncodingJob:
                 seams.append(Seam(clip.name, float(step), float(max(steps)), clip.seam_errors[-1]))
         return tuple(seams)
 
-    def _add_prelude(self, store: ct.ChunkStore, decided: _Decided) -> None:
+    def _add_prelude(self, store: writing.ChunkStore, decided: _Decided) -> None:
         store.add(ct.HIERARCHY, decided.prelude.hierarchy_stream)
-        store.add(ct.REST, ct.pack_rest(decided.layers.rest))
+        store.add(ct.REST, writing.pack_rest(decided.layers.rest))
         if decided.layers.source_rest:
             store.add(ct.SOURCE_REST, decided.layers.source_rest)
         store.add(ct.TIME, time_chunk(*(self.clip.time[start:stop] for start, stop in self.clip.clip_range_frames)))
@@ -551,7 +551,7 @@ class EncodingJob:
         if self.options.tam is not None:
             metadata[THRESHOLDS] = self.options.tam.in_metadata
         if metadata:
-            store.add(ct.METADATA, ct.pack_metadata(metadata))
+            store.add(ct.METADATA, writing.pack_metadata(metadata))
         if self.source.polygons is not None:
             store.add(ct.FACES, polygons.pack(self.source.polygons, self.clip.vertex_count))
         if self._keeps_static and self.clip.edges is not None:
@@ -560,10 +560,10 @@ class EncodingJob:
     def _edges(self) -> bytes:
         derived = derived_edges(self.source.hierarchy)
         if derived.shape == self.clip.edges.shape and (derived == self.clip.edges).all():
-            return ct.pack_derived_edges(type_code(self.clip.edges.dtype))
+            return writing.pack_derived_edges(type_code(self.clip.edges.dtype))
         return polygons.pack(Polygons.of_rows(self.clip.edges), self.clip.vertex_count)
 
-    def _add_static(self, store: ct.ChunkStore) -> None:
+    def _add_static(self, store: writing.ChunkStore) -> None:
         if self._keeps_static and len(self.clip.attributes) > ct.Limits.attributes:
             raise ClipError(f"attributes: got {len(self.clip.attributes)}; expected at most {ct.Limits.attributes}")
         in_faces = POLYGON_ARRAYS if self.source.polygons is not None and self.clip.faces is None else ()
@@ -571,7 +571,7 @@ class EncodingJob:
             for name, array in self.clip.attributes.items():
                 if name in in_faces:
                     continue
-                store.add(ct.ATTRIBUTE, ct.pack_array(name, array))
+                store.add(ct.ATTRIBUTE, writing.pack_array(name, array))
 
     def coded(self, decided: _Decided, segments: Sequence[int]) -> Iterator[CodedSegment]:
         """Yield coded segments, as many at a time as there is memory for."""
@@ -633,7 +633,7 @@ class EncodingJob:
         return self.source.exact(self.source.block(segment)) if self.options.lossless else None
 
     def _add_motion(
-        self, store: ct.ChunkStore, decided: _Decided, coded: Iterable[CodedSegment]
+        self, store: writing.ChunkStore, decided: _Decided, coded: Iterable[CodedSegment]
     ) -> tuple[np.ndarray, np.ndarray]:
         """Return (levels, segments, 3) errors and (levels, segments) joins. Raises ValueError unless each segment comes
         once."""

@@ -18,7 +18,7 @@ import numpy as np
 from athcodec._native import MEASURES
 from athcodec.decoding import container as ct
 from athcodec.encoding import quantise as qz
-from athcodec.encoding import streams
+from athcodec.encoding import streams, writing
 from athcodec.encoding.choices.joins import (
     END_FRAMES,
     NO_CORRECTIONS,
@@ -87,7 +87,7 @@ class Layer:
 class Layers:
     """The layers of a file, and the contents of REST and SOURCE_REST (empty: none)."""
 
-    rest: ct.Rest
+    rest: writing.Rest
     source_rest: bytes
     level_0: Plan  # On the pose of REST, which level 0 is shown with.
     each: list[Layer]
@@ -184,7 +184,7 @@ def _uniform(plan: Plan, settings: Settings) -> Settings:
 
 def _rests(
     source: Source, prelude: CodedPrelude, ratios: Sequence[int], bound: float
-) -> tuple[ct.Rest, np.ndarray | None, list[tuple[np.ndarray, streams.CodedRest | None]]]:
+) -> tuple[writing.Rest, np.ndarray | None, list[tuple[np.ndarray, streams.CodedRest | None]]]:
     """Return the content of REST, what it decodes to if the first layer refines it, and of each layer the decoded pose
     and what refines the pose before."""
     rest = prelude.rest_chunk
@@ -235,11 +235,11 @@ def layer_chunks(layers: Layers) -> dict[tuple[int, int], bytes]:
         digits = _binary_digits(before.ratio) - _binary_digits(layer.ratio)
         modes = streams.encode_refined_modes(layer.plan, layer.modes, before.modes, digits)
         if modes is not None:
-            chunks[level, ct.SHAPES] = ct.pack_refined_shapes(digits, modes)
+            chunks[level, ct.SHAPES] = writing.pack_refined_shapes(digits, modes)
         before = layer
     for level, layer in [(1, first), *enumerate(finer, first.plan.level_count)]:
         if layer.rest is not None:
-            chunks[level, ct.REFINED_REST] = ct.pack_refined_rest(layer.rest.step, layer.rest.stream)
+            chunks[level, ct.REFINED_REST] = writing.pack_refined_rest(layer.rest.step, layer.rest.stream)
     return chunks
 
 
@@ -369,7 +369,7 @@ class CodedMotion:
             layer.plan, self._output, settings, self.positions, layer.modes, bases, before, ratio, layered=not is_last
         )
         head = stems_head(settings, last, bases)
-        self.chunks[level, ct.STEMS] = ct.pack_refined_stems(ratio, head, streams.encode_refinement(segment, last))
+        self.chunks[level, ct.STEMS] = writing.pack_refined_stems(ratio, head, streams.encode_refinement(segment, last))
         segment.forget_before()
         self._finish_with(decoded, layer, level)
         return segment

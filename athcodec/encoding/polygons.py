@@ -9,6 +9,7 @@ import numpy as np
 
 from athcodec._native import address, encode_stream, lib
 from athcodec.decoding import container as ct
+from athcodec.encoding import writing
 from athcodec.errors import ClipError
 from athcodec.motion.polygons import Polygons
 
@@ -30,7 +31,7 @@ def pack(polygons: Polygons, vertex_count: int) -> bytes:
         address(polygons.corners, np.int32, len(polygons.corners)),
         model=memory,
     )
-    return ct.pack_polygons(polygons.shape, stream)
+    return writing.pack_polygons(polygons.shape, stream)
 
 
 class Mesh:

@@ -17,7 +17,7 @@ import numpy as np
 from athcodec._native import BRANCH, LOOSE, SHEET, WHOLE, Rounding, address, lib
 from athcodec.decoding import container as ct
 from athcodec.encoding import quantise as qz
-from athcodec.encoding import streams
+from athcodec.encoding import streams, writing
 from athcodec.encoding.features import Feature
 from athcodec.encoding.learned_modes import LearnedModes
 from athcodec.encoding.motion import NODE_ROOT, STEM_ROOT, LevelStream, Plan, PlanSample, SegmentMotion, gather
@@ -316,11 +316,11 @@ class CodedPrelude:
         return self.origin, self.dtype
 
 
-def _coded_rest(source: Source, branches: np.ndarray, settings: Settings) -> tuple[ct.Rest, np.ndarray]:
+def _coded_rest(source: Source, branches: np.ndarray, settings: Settings) -> tuple[writing.Rest, np.ndarray]:
     """Return REST, and the rest pose as decoded."""
-    head = ct.Rest(source.origin, settings.rest_step, source.clip.rest_dtype)
+    head = writing.Rest(source.origin, settings.rest_step, source.clip.rest_dtype)
     if source.host_rest:
-        head.is_host, head.step, head.stream = True, 1.0, ct.mesh_checksum(source.clip.source_rest)
+        head.is_host, head.step, head.stream = True, 1.0, writing.mesh_checksum(source.clip.source_rest)
         return head, source.rest
     if source.reference_is_exact:
         pose = source.clip.source_rest[source.hierarchy.vertex_source]
@@ -371,7 +371,7 @@ def code_source_rest(source: Source, branches: np.ndarray, reference: np.ndarray
         return b""
     if source.exact_rest:
         pose = source.clip.source_rest[source.hierarchy.vertex_source]
-        return ct.pack_exact_source_rest(streams.encode_exact_rest(branches, pose))
+        return writing.pack_exact_source_rest(streams.encode_exact_rest(branches, pose))
     tolerance = max(bound, qz.SOURCE_REST_TOLERANCE * source.seen.diagonal)
     pose = source.source_rest
 
@@ -379,7 +379,7 @@ def code_source_rest(source: Source, branches: np.ndarray, reference: np.ndarray
         return streams.encode_source_rest(branches, step, reference, pose)
 
     coded = _within(tolerance, pose, encode, qz.single(qz.SOURCE_REST_STEP * tolerance))
-    return ct.pack_source_rest(coded.step, coded.stream)
+    return writing.pack_source_rest(coded.step, coded.stream)
 
 
 def stem_sizes(source: Source) -> np.ndarray:
@@ -518,7 +518,7 @@ class Corrections:
         """CORRECTIONS; empty if there are none."""
         if not len(self.rows):
             return b""
-        return ct.pack_corrections(self.step, streams.encode_corrections(self.rows, self.shape[0], self.shape[2]))
+        return writing.pack_corrections(self.step, streams.encode_corrections(self.rows, self.shape[0], self.shape[2]))
 
     def applied(self, decoded: np.ndarray) -> np.ndarray:
         """Return the corrected positions."""
@@ -571,9 +571,9 @@ def analyse(
     return segment, decoded
 
 
-def stems_head(settings: Settings, level: int, bases: dict[int, StreamBasis]) -> ct.StemsHead:
+def stems_head(settings: Settings, level: int, bases: dict[int, StreamBasis]) -> writing.StemsHead:
     """Return the head of the stems of a level, whose time basis is among `bases` if it is learned."""
-    head = ct.StemsHead(
+    head = writing.StemsHead(
         settings.step_of(level),
         settings.rotation_step_factors[level],
         turn=qz.turn_of(settings.turn_step),
@@ -592,7 +592,7 @@ def stem_streams(segment: SegmentMotion, settings: Settings, bases: dict[int, St
 
     def stem_stream(level: int) -> tuple[bytes, int]:
         head = stems_head(settings, level, bases)
-        return ct.pack_stems(head, streams.encode_stems(segment, level)), len(head.basis)
+        return writing.pack_stems(head, streams.encode_stems(segment, level)), len(head.basis)
 
     levels = [level for level in range(plan.level_count) if plan.has_stems(level)]
     coded = plan.pool.map(stem_stream, [(level,) for level in levels])

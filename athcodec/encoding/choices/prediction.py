@@ -15,7 +15,7 @@ import numpy as np
 from athcodec._native import Rounding
 from athcodec.decoding import container as ct
 from athcodec.encoding import quantise as qz
-from athcodec.encoding import streams
+from athcodec.encoding import streams, writing
 from athcodec.encoding.choices.rest import with_best_rest
 from athcodec.encoding.features import Feature
 from athcodec.encoding.motion import LevelStream, SegmentMotion, position_errors
@@ -163,7 +163,9 @@ def _predicted(prelude: CodedPrelude, choice: Choice, positions: np.ndarray) -> 
                 prelude.plan, prelude.origin, source, share * limits, step, lattice, prelude.dtype
             )
             if coded is not None:
-                return ct.pack_predicted(step, lattice, coded[0]), np.ascontiguousarray(coded[1].transpose(1, 2, 0))
+                return writing.pack_predicted(step, lattice, coded[0]), np.ascontiguousarray(
+                    coded[1].transpose(1, 2, 0)
+                )
     raise BoundError(
         f"max error: got {settings.bound:.3g}; it cannot be kept in the output's {prelude.dtype.name} numbers"
     )
