@@ -66,10 +66,8 @@ def _bound_for_size(source: Source, file_size: Callable[[float], float], target:
     Between two known sizes the size is interpolated in logarithms. Elsewhere it falls about as the square root.
     """
     diagonal = source.seen.diagonal or 1.0
-    low, high = (
-        1e-7,
-        max(0.1, 2 * least_bound(source) / diagonal),
-    )  # Files at `low` are too large; `high` fits once it has been tried.
+    # Files at `low` are too large; `high` fits once it has been tried.
+    low, high = 1e-7, max(0.1, 2 * least_bound(source) / diagonal)
     sizes: dict[float, float] = {}
     guess = min(DEFAULT_REL_ERROR, high)
     for attempt in range(SIZE_ROUNDS):
@@ -88,15 +86,15 @@ def _bound_for_size(source: Source, file_size: Callable[[float], float], target:
 
 def _next_guess(low: float, high: float, sizes: dict[float, float], target: int) -> float:
     """Return where in [low, high] the size is expected to be just below the target."""
-    wanted = math.log(0.985 * target)
+    goal = math.log(0.985 * target)
     if low in sizes and high in sizes and math.isfinite(sizes[low]):
         a, b = math.log(sizes[low]), math.log(sizes[high])
-        part = (a - wanted) / (a - b) if a > b else 0.5
+        part = (a - goal) / (a - b) if a > b else 0.5
         return low * (high / low) ** min(max(part, 0.05), 0.95)
     known = low if low in sizes else high
     if not math.isfinite(sizes[known]):
         return math.sqrt(low * high)
-    guess = known * math.exp((math.log(sizes[known]) - wanted) / _fall(known, sizes))
+    guess = known * math.exp((math.log(sizes[known]) - goal) / _fall(known, sizes))
     return min(max(guess, low * 1.01), high if high not in sizes else high / 1.01)
 
 

@@ -242,11 +242,11 @@ def _begin(
 ) -> tuple[EncodingJob, float]:
     """The job, whose clip has branches by then, and its bound in scene units."""
     clip.check()
-    found = None
+    branches = None
     if not clip.has_branches:
         report("branches", 0.0)
-        found = best_branches(clip, option, report, options.host_rest)
-    job = EncodingJob.begin(clip, found, options, report)
+        branches = best_branches(clip, option, report, options.host_rest)
+    job = EncodingJob.begin(clip, branches, options, report)
     attempts = itertools.count(1)
 
     def file_size(bound: float) -> float:

@@ -128,7 +128,7 @@ class Draft:
     choice: Choice
     seen: Survey
     segment_count: int
-    found: Found | None  # Branches for a clip without.
+    branches: Found | None  # Branches for a clip without.
     options: EncodingOptions
     fingerprint: str
     thresholds: Thresholds
@@ -158,10 +158,12 @@ def _check_limits(clip: MotionClip, hierarchy: Hierarchy) -> None:
             raise ClipError(f"clip: got {value} {name}; expected at most {limit}")
 
 
-def _completed(clip: MotionClip, found: Found | None, options: EncodingOptions) -> tuple[MotionClip, np.ndarray | None]:
+def _completed(
+    clip: MotionClip, branches: Found | None, options: EncodingOptions
+) -> tuple[MotionClip, np.ndarray | None]:
     """Return the clip on branches that were found for it, with the rest pose as a host has it, and its weights."""
-    if found is not None:
-        clip = with_branches(clip, found)
+    if branches is not None:
+        clip = with_branches(clip, branches)
     if options.host_rest:
         clip = clip.replace(rest=clip.rest.astype(np.float32) + np.float32(0))  # -0.0 is 0.0
     return (clip, None) if options.weights is None else _weighted(clip, options.weights)
@@ -236,18 +238,18 @@ class EncodingJob:
     source: Source
     options: EncodingOptions
     report: Progress = silent
-    found: Found | None = None
+    branches: Found | None = None
 
     @classmethod
-    def begin(cls, clip: MotionClip, found: Found | None, options: EncodingOptions, report: Progress) -> EncodingJob:
-        """Return the job for a clip, all of whose frames are read. found: branches for a clip without."""
-        clip, factors = _completed(clip, found, options)
+    def begin(cls, clip: MotionClip, branches: Found | None, options: EncodingOptions, report: Progress) -> EncodingJob:
+        """Return the job for a clip, all of whose frames are read. branches: those found for a clip without."""
+        clip, factors = _completed(clip, branches, options)
         hierarchy = hierarchy_of(clip)
         _check_limits(clip, hierarchy)
         pool = ThreadPool(options.jobs or default_jobs())
         thresholds = {} if options.tam is None else {name: getattr(options.tam, name) for name in ("lam", "xi", "eta")}
         seen = survey(clip, hierarchy, progress=lambda f: report("survey", f), pool=pool, **thresholds)
-        return cls(cls._source(clip, seen, factors, options, pool), options, report, found)
+        return cls(cls._source(clip, seen, factors, options, pool), options, report, branches)
 
     @classmethod
     def resume(cls, clip: MotionClip, draft: Draft, report: Progress = silent, jobs: int | None = None) -> EncodingJob:
@@ -257,9 +259,9 @@ class EncodingJob:
         if got != expected:
             raise ClipError(f"clip: got {got} frames and vertices, expected {expected} as in the draft")
         options = dataclasses.replace(draft.options, jobs=jobs)
-        clip, factors = _completed(clip, draft.found, options)
+        clip, factors = _completed(clip, draft.branches, options)
         source = cls._source(clip, seen, factors, options, ThreadPool(jobs or default_jobs()))
-        return cls(source, options, report, draft.found)
+        return cls(source, options, report, draft.branches)
 
     @staticmethod
     def _source(
@@ -320,10 +322,10 @@ class EncodingJob:
         """Return the smallest bound above `low` that a file was found to keep."""
         high = math.inf
         for _ in range(REFUSAL_ROUNDS):
-            tried = qz.rounded_up(4 * low if high == math.inf else math.sqrt(low * high))
-            if tried >= high:
+            bound = qz.rounded_up(4 * low if high == math.inf else math.sqrt(low * high))
+            if bound >= high:
                 break
-            low, high = (tried, high) if self.file_size(tried) == math.inf else (low, tried)
+            low, high = (bound, high) if self.file_size(bound) == math.inf else (low, bound)
         return high
 
     def decide(self, bound: float) -> _Decided:
@@ -420,7 +422,7 @@ class EncodingJob:
             decided.choice,
             self.seen,
             decided.segment_count,
-            self.found,
+            self.branches,
             self.options,
             decided.fingerprint,
             decided.ath.thresholds,
@@ -584,18 +586,20 @@ class EncodingJob:
         def read(some: Iterable[int]) -> Iterator[tuple[int, list[np.ndarray]]]:
             return ((index, [source.block(index)]) for index in some)
 
-        def predict(taken: tuple[int, list[np.ndarray]]) -> CodedSegment:
-            positions, exact = self._positions(taken[1].pop())  # The list no longer holds the block.
-            shown_times = source.shown_times(taken[0])
+        def predict(numbered: tuple[int, list[np.ndarray]]) -> CodedSegment:
+            index, block = numbered
+            positions, exact = self._positions(block.pop())  # The list no longer holds the block.
+            shown_times = source.shown_times(index)
             chunks, errors = code_predicted_segment(decided.prelude, decided.choice, positions, exact, shown_times)
-            return CodedSegment(taken[0], chunks, errors, np.zeros(len(errors), int))
+            return CodedSegment(index, chunks, errors, np.zeros(len(errors), int))
 
-        def code(taken: tuple[int, list[np.ndarray]]) -> tuple[int, CodedMotion, list[End | None]]:
-            motion = self._motion(decided, taken[0], *self._positions(taken[1].pop()))
-            return taken[0], motion, motion.ends() if len(source.segments) > 1 else []
+        def code(numbered: tuple[int, list[np.ndarray]]) -> tuple[int, CodedMotion, list[End | None]]:
+            index, block = numbered
+            motion = self._motion(decided, index, *self._positions(block.pop()))
+            return index, motion, motion.ends() if len(source.segments) > 1 else []
 
-        def join(taken: tuple[int, CodedMotion, list[End | None]]) -> CodedSegment:
-            index, motion, ends = taken
+        def join(coded: tuple[int, CodedMotion, list[End | None]]) -> CodedSegment:
+            index, motion, ends = coded
             return CodedSegment(index, *motion.joined_to([] if Feature.JOINS in source.without else ends))
 
         if decided.choice.predicted is not None:
@@ -705,6 +709,6 @@ def _summary(
         sizes,
         choices,
         job.seams(decoder),
-        None if job.found is None else str(job.found),
+        None if job.branches is None else str(job.branches),
         job.clip.not_read,
     )

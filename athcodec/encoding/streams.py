@@ -276,8 +276,8 @@ class MetEnds:
 
     def with_moves(self, moves: np.ndarray) -> MetEnds:
         """Return the ends with corrections that move parts as a whole, (K, 6), unless others stand there."""
-        taken, wanted = (rows[:, 0].astype(np.int64) << 32 | rows[:, 1] for rows in (self.decided, moves))
-        moves = moves[~np.isin(wanted, taken)]
+        places, moved = (rows[:, 0].astype(np.int64) << 32 | rows[:, 1] for rows in (self.decided, moves))
+        moves = moves[~np.isin(moved, places)]
         return replace(self, decided=ascending(np.concatenate([self.decided, moves])))
 
     def of_vertices(self, start: int, stop: int) -> MetEnds:
