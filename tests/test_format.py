@@ -91,7 +91,7 @@ def test_document_describes_the_version_that_is_written():
 
 @pytest.mark.parametrize(
     "title, form",
-    [("Header", container._HEADER), ("CORRECTIONS", container._CORRECTIONS), ("REFINED_REST", container._REFINED_REST)],
+    [("Header", container._HEADER), ("CORRECTIONS", writing._CORRECTIONS), ("REFINED_REST", writing._REFINED_REST)],
 )
 def test_field_tables_have_the_offsets_and_types_of_the_code(title, form):
     names = {"s": "bytes", "B": "u8", "H": "u16", "I": "u32", "Q": "u64", "f": "f32", "d": "f64"}
