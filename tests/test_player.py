@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from files import Parts
 from fuzz.targets import CORE
+from header import Fade
 from moving_meshes import leafed_tree, mixed_clip
 from test_install import C_COMPILERS, CXX_COMPILERS, run
 
@@ -34,10 +35,6 @@ Release = ctypes.CFUNCTYPE(None, c_void_p, c_void_p)
 class Options(ctypes.Structure):
     _fields_ = [("allocate", Allocate), ("release", Release), ("context", c_void_p), ("cache_bytes", c_size_t)]
     _fields_ += [("limits", c_void_p), ("host_mesh", c_void_p), ("host_stride", c_size_t), ("host_vertices", c_int32)]
-
-
-class Fade(ctypes.Structure):
-    _fields_ = [("count", c_int32), ("level", c_int32 * 4), ("weight", c_double * 4), ("passed", c_double * 4)]
 
 
 class Share(ctypes.Structure):
