@@ -228,17 +228,8 @@ def test_the_size_at_an_error_is_interpolated_between_points_that_nothing_beats(
 
 
 def point(codec, kind, bound, size, kg, status="ok"):
-    return {
-        "clip": "tree",
-        "codec": codec,
-        "kind": kind,
-        "bound": bound,
-        "status": status,
-        "bytes": size,
-        "max": bound,
-        "rms": bound / 2,
-        "kg": kg,
-    }
+    whose = {"clip": "tree", "codec": codec, "kind": kind, "status": status}
+    return whose | {"bound": bound, "bytes": size, "max": bound, "rms": bound / 2, "kg": kg}
 
 
 def test_ratios_take_the_best_of_each_kind_and_the_best_pca_at_equal_rms():
@@ -267,14 +258,9 @@ def test_a_failure_of_a_codec_is_reported_in_its_row(tmp_path, bushy_file):
         tmp_path, "rd", bushy_file, "--bounds", "1e-3", "--codecs", *(f"bench_codecs:{name}" for name in names)
     )
     points = {point["codec"]: point for point in result["points"]}
-    assert {name: point["status"] for name, point in points.items()} == {
-        "rounded": "ok",
-        "too coarse": "bound broken",
-        "aborting": "failed",
-        "raising": "failed",
-        "remembering": "failed",
-        "absent": "missing",
-    }
+    expected = {"rounded": "ok", "too coarse": "bound broken", "absent": "missing"}
+    expected |= dict.fromkeys(("aborting", "raising", "remembering"), "failed")
+    assert {name: point["status"] for name, point in points.items()} == expected
     assert 0 < points["rounded"]["max"] <= 1e-3 < points["too coarse"]["max"]
     assert 0 < points["rounded"]["looks"]["rms_second_difference"] < 4
     assert points["too coarse"]["looks"]["max_second_difference"] > points["rounded"]["looks"]["max_second_difference"]
@@ -433,21 +419,7 @@ def test_prefixes_are_compared_with_files_of_their_own_at_levels_and_between_the
 @pytest.mark.slow
 def test_a_forest_that_is_played_reads_and_shows_what_the_formula_says(tmp_path):
     _, result = run_bench(
-        tmp_path,
-        "forest",
-        "--instances",
-        "1",
-        "900",
-        "--clips",
-        "1",
-        "3",
-        "--phases",
-        "2",
-        "0",
-        "--frames",
-        "600",
-        "--rounds",
-        "1",
+        tmp_path, *"forest --instances 1 900 --clips 1 3 --phases 2 0 --frames 600 --rounds 1".split()
     )
     forests, parts, units = tables_of(result)
     assert result["broken"] == []
@@ -471,21 +443,8 @@ def test_a_forest_that_is_played_reads_and_shows_what_the_formula_says(tmp_path)
 def test_clips_of_few_segments_stay_and_read_nothing_more(tmp_path, bushy_file):
     _, result = run_bench(
         tmp_path,
-        "forest",
-        "--of",
+        *"forest --instances 20 --clips 2 --ladder none --phases 3 --frames 300 --rounds 1 --of".split(),
         bushy_file,
-        "--instances",
-        "20",
-        "--clips",
-        "2",
-        "--ladder",
-        "none",
-        "--phases",
-        "3",
-        "--frames",
-        "300",
-        "--rounds",
-        "1",
     )
     [row] = tables_of(result)[0]
     assert row["kB/s"] == row["predicted kB/s"] == 0 and result["broken"] == []
@@ -493,21 +452,7 @@ def test_clips_of_few_segments_stay_and_read_nothing_more(tmp_path, bushy_file):
 
 def test_requests_and_bytes_of_a_frame_behind_a_url_are_counted_and_limited(tmp_path, bushy_file):
     _, result = run_bench(
-        tmp_path,
-        "remote",
-        "--of",
-        bushy_file,
-        "--plants",
-        "1",
-        "20",
-        "--frames",
-        "300",
-        "--frame",
-        "250",
-        "--rounds",
-        "1",
-        "--latency",
-        "0.01",
+        tmp_path, *"remote --plants 1 20 --frames 300 --frame 250 --rounds 1 --latency 0.01 --of".split(), bushy_file
     )
     [rows] = tables_of(result)
     assert result["broken"] == []
@@ -544,13 +489,7 @@ def test_a_quick_run_leaves_results_a_report_and_pictures(tmp_path, bushy_file):
         tmp_path,
         "quick",
         bushy_file,
-        "--codecs",
-        "athcodec",
-        "bench_codecs:Rounded",
-        "--bounds",
-        "1e-2",
-        "1e-3",
-        "--out",
+        *"--codecs athcodec bench_codecs:Rounded --bounds 1e-2 1e-3 --out".split(),
         str(folder),
     )
     steps = [row["step"] for row in result["tables"][0]["rows"]]
