@@ -21,14 +21,12 @@ from athcodec._native import crc32c
 from athcodec.container import KIND_NAMES
 from athcodec.encoding.features import Feature
 from athcodec.encoding.segment import SAMPLED
+from bench import codec_registry, compare, features, paper, plots, progressive, rd, tables
+from bench.clips import encoded
+from bench.curves import Curve, mean_saving
+from bench.store import Store, read
 
 ROOT = Path(__file__).resolve().parent.parent
-sys.path.append(str(ROOT))  # for bench, which is not installed; athcodec stays the installed one
-
-from bench import codec_registry, compare, features, paper, plots, progressive, rd, tables  # noqa: E402
-from bench.clips import encoded  # noqa: E402
-from bench.curves import Curve, mean_saving  # noqa: E402
-from bench.store import Store, read  # noqa: E402
 
 pytestmark = pytest.mark.tools
 

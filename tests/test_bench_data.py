@@ -12,19 +12,17 @@ import numpy as np
 import pytest
 
 import athcodec
+from bench import data
+from bench.trees import beams
+from bench.trees import simulate as simulation
+from bench.trees.leaves import SPECIES, Leaves, Plates, sheltered
+from bench.trees.mesh import SIDES, dress
+from bench.trees.plant import grow
+from bench.trees.refine import refine
+from bench.trees.ride import Skeleton, rotations, smallest_turns, sway
+from bench.trees.wind import DIRECTION, Wind
 
 ROOT = Path(__file__).resolve().parent.parent
-sys.path.append(str(ROOT))  # for bench, which is not installed; athcodec stays the installed one
-
-from bench import data  # noqa: E402
-from bench.trees import beams  # noqa: E402
-from bench.trees import simulate as simulation  # noqa: E402
-from bench.trees.leaves import SPECIES, Leaves, Plates, sheltered  # noqa: E402
-from bench.trees.mesh import SIDES, dress  # noqa: E402
-from bench.trees.plant import grow  # noqa: E402
-from bench.trees.refine import refine  # noqa: E402
-from bench.trees.ride import Skeleton, rotations, smallest_turns, sway  # noqa: E402
-from bench.trees.wind import DIRECTION, Wind  # noqa: E402
 
 pytestmark = pytest.mark.tools
 

@@ -12,20 +12,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-ROOT = Path(__file__).resolve().parent.parent
-sys.path.append(str(ROOT))  # for bench, which is not installed; athcodec stays the installed one
+import athcodec
+from athcodec.hierarchy import hierarchy_of
+from bench import compare, data, odd, rd
+from bench.codecs import Source, check, simple
+from bench.codecs.program import CannotKeep
+from bench.odd import growing
+from bench.odd.bending import Bones, moved_tree, scanned_tree, swaying_tree
+from bench.odd.grass import grass
+from bench.odd.others import captured_stem, still_mesh, tumbling_cube
+from bench.store import read
+from bench.trees.plant import grow
 
-import athcodec  # noqa: E402
-from athcodec.hierarchy import hierarchy_of  # noqa: E402
-from bench import compare, data, odd, rd  # noqa: E402
-from bench.codecs import Source, check, simple  # noqa: E402
-from bench.codecs.program import CannotKeep  # noqa: E402
-from bench.odd import growing  # noqa: E402
-from bench.odd.bending import Bones, moved_tree, scanned_tree, swaying_tree  # noqa: E402
-from bench.odd.grass import grass  # noqa: E402
-from bench.odd.others import captured_stem, still_mesh, tumbling_cube  # noqa: E402
-from bench.store import read  # noqa: E402
-from bench.trees.plant import grow  # noqa: E402
+ROOT = Path(__file__).resolve().parent.parent
 
 pytestmark = pytest.mark.tools
 

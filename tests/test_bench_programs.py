@@ -13,13 +13,11 @@ import pytest
 
 from athcodec.clip import MotionClip
 from athcodec.sources import read_hdf5, sample_path
+from bench.codecs import BoundBroken, Source, check
+from bench.codecs.program import CannotKeep, Grid
+from bench.codecs.programs import CLASSES, PROGRAMS, lossless
 
 ROOT = Path(__file__).resolve().parent.parent
-sys.path.append(str(ROOT))  # for bench, which is not installed; athcodec stays the installed one
-
-from bench.codecs import BoundBroken, Source, check  # noqa: E402
-from bench.codecs.program import CannotKeep, Grid  # noqa: E402
-from bench.codecs.programs import CLASSES, PROGRAMS, lossless  # noqa: E402
 
 pytestmark = pytest.mark.tools
 

@@ -8,8 +8,6 @@ from __future__ import annotations
 
 import dataclasses
 import re
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -22,11 +20,7 @@ from athcodec.encoding import job, streams
 from athcodec.encoding import quantise as qz
 from athcodec.errors import BoundError, ClipError
 from athcodec.metrics import ErrorMeter
-
-ROOT = Path(__file__).resolve().parent.parent
-sys.path.append(str(ROOT))  # for spec, which is not installed; athcodec stays the installed one
-
-from spec.robust.bound import ACTIONS, LARGE, Attack, attacks, broken_promises  # noqa: E402
+from spec.robust.bound import ACTIONS, LARGE, Attack, attacks, broken_promises
 
 
 @settings(STEADY, max_examples=25)

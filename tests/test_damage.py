@@ -15,7 +15,6 @@ from contextlib import suppress
 from dataclasses import astuple, fields, replace
 from io import BytesIO
 from itertools import product
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -45,10 +44,7 @@ from athcodec.errors import (
     UnsupportedFeature,
     UnsupportedVersion,
 )
-
-sys.path.append(str(Path(__file__).resolve().parent.parent))  # for spec, which is not installed
-
-from spec.document import rules  # noqa: E402
+from spec.document import rules
 
 REFUSED = (FormatError, LevelUnavailable)
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 import io
 import os
 import stat
-import sys
 from contextlib import nullcontext
 from pathlib import Path
 
@@ -22,11 +21,7 @@ import athcodec
 from athcodec import atomic_files, cli
 from athcodec.atomic_files import PendingFile, new_file
 from athcodec.sources import sample_path
-
-ROOT = Path(__file__).resolve().parent.parent
-sys.path.append(str(ROOT))  # for spec, which is not installed; athcodec stays the installed one
-
-from spec.robust import _io_errors, faults  # noqa: E402
+from spec.robust import _io_errors, faults
 
 pytestmark = pytest.mark.tools
 

@@ -4,19 +4,14 @@ from __future__ import annotations
 
 import base64
 import re
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 import athcodec
 from athcodec import cli, view
-
-sys.path.append(str(Path(__file__).parents[1]))  # for bench, which is not installed; athcodec stays the installed one
-
-from bench.throttled_server import ThrottledServer  # noqa: E402
-from bench.trees.tufts import fern, grass  # noqa: E402
+from bench.throttled_server import ThrottledServer
+from bench.trees.tufts import fern, grass
 
 pytestmark = pytest.mark.web
 

@@ -5,7 +5,6 @@ In Chromium, Debian's, without a graphics card; marker `browser`.
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -13,16 +12,13 @@ import pytest
 from plants import bending_tube, blown_tree
 
 import athcodec
-
-sys.path.append(str(Path(__file__).parents[1]))  # for bench, which is not installed; athcodec stays the installed one
-
-from athcodec.core_file import FILE_ORDER  # noqa: E402
-from athcodec.gpu import GpuFile  # noqa: E402
-from athcodec.gpu.evaluate import Passes, Source  # noqa: E402
-from athcodec.joining import in_wind  # noqa: E402
-from athcodec.viewer.build_viewer import modules  # noqa: E402
-from bench.browser import WEBGPU_FLAGS, chromium  # noqa: E402
-from bench.throttled_server import ThrottledServer  # noqa: E402
+from athcodec.core_file import FILE_ORDER
+from athcodec.gpu import GpuFile
+from athcodec.gpu.evaluate import Passes, Source
+from athcodec.joining import in_wind
+from athcodec.viewer.build_viewer import modules
+from bench.browser import WEBGPU_FLAGS, chromium
+from bench.throttled_server import ThrottledServer
 
 pytestmark = pytest.mark.browser
 FINEST = "athcodecForest.forest.levels.length === athcodecForest.ath.motion.levelCount"

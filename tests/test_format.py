@@ -11,7 +11,6 @@ import io
 import math
 import re
 import struct
-import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import fields, replace
@@ -31,11 +30,9 @@ from athcodec.encoding import streams
 from athcodec.encoding.learned_modes import LearnedModes
 from athcodec.encoding.motion import LevelStream, Plan, SegmentMotion
 from athcodec.encoding.time_bases import MOST_SAMPLE
+from spec.document import TEXT, rules, section, table
 
 FORMAT = Path(__file__).resolve().parents[1] / "FORMAT.md"
-sys.path.append(str(FORMAT.parent))  # for spec, which is not installed
-from spec.document import TEXT, rules, section, table  # noqa: E402
-
 VECTORS = FORMAT.parent / "spec" / "vectors" / "valid"
 
 

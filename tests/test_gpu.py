@@ -4,7 +4,6 @@ NumPy and, with the marker `browser`, by the shaders in Chromium (Debian's, with
 from __future__ import annotations
 
 import base64
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -20,10 +19,8 @@ from athcodec.core_file import FILE_ORDER, CoreError
 from athcodec.gpu import SHADERS, GpuFile, Room, corners_of
 from athcodec.gpu.evaluate import BODY, LEVEL, SEGMENT, Passes, Source, head, section
 from athcodec.sources import sample_path
-
-sys.path.append(str(Path(__file__).parents[1]))  # for bench and spec; athcodec stays the installed one
-from bench.browser import WEBGPU_FLAGS, chromium  # noqa: E402
-from spec.robust.hostile import repaired  # noqa: E402
+from bench.browser import WEBGPU_FLAGS, chromium
+from spec.robust.hostile import repaired
 
 pytestmark = pytest.mark.web
 

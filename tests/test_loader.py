@@ -11,7 +11,6 @@ import json
 import re
 import shutil
 import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -21,11 +20,9 @@ from programs import CACHE, install_once
 
 import athcodec
 from athcodec.joining import in_wind
+from bench.throttled_server import WEB, ThrottledServer
 
 ROOT = Path(__file__).resolve().parent.parent
-sys.path.append(str(ROOT))  # for bench, which is not installed; athcodec stays the installed one
-
-from bench.throttled_server import WEB, ThrottledServer  # noqa: E402
 
 pytestmark = pytest.mark.web
 

@@ -4,14 +4,10 @@ tell. Here a few of them, the reasons of those that cannot be caught, and the ve
 from __future__ import annotations
 
 import re
-import sys
-from pathlib import Path
 
 import pytest
 
-sys.path.append(str(Path(__file__).resolve().parent.parent))  # for spec, which is not installed
-
-from spec import conformance, document, mutants, real_size  # noqa: E402
+from spec import conformance, document, mutants, real_size
 
 pytestmark = pytest.mark.tools
 

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import sys
 from io import BytesIO
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,10 +13,7 @@ from athcodec.encoding import encoder
 from athcodec.encoding.quantise import SOURCE_REST_TOLERANCE
 from athcodec.encoding.search import Search
 from athcodec.errors import BadChecksum, Truncated
-
-sys.path.append(str(Path(__file__).resolve().parent.parent))  # for bench, which is not installed
-
-from bench.odd.bending import scanned_tree  # noqa: E402
+from bench.odd.bending import scanned_tree
 
 OPTIONS = {"rel_error": 1e-4, "segment_frames": 16, "tam": athcodec.Thresholds(0, 0, 0, 0)}  # not predicted
 

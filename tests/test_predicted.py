@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import pickle
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -22,11 +21,8 @@ from athcodec import encoding
 from athcodec.encoding import prediction, search
 from athcodec.errors import AthError, BadChunk, BadChunkTable
 from athcodec.metrics import SmoothnessMeter
-
-sys.path.append(str(Path(__file__).resolve().parent.parent))  # for bench and spec, which are not installed
-
-from bench.odd.growing import unfolding_leaves  # noqa: E402
-from spec.document import File  # noqa: E402
+from bench.odd.growing import unfolding_leaves
+from spec.document import File
 
 FRAMES = 60
 

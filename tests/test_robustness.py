@@ -8,14 +8,12 @@ import sys
 from pathlib import Path
 
 import pytest
+from bad_cases import behave
+
+from spec import robustness
+from spec.robust import Row, _cases
 
 ROOT = Path(__file__).resolve().parent.parent
-sys.path.append(str(ROOT))  # for spec, which is not installed
-
-from bad_cases import behave  # noqa: E402
-
-from spec import robustness  # noqa: E402
-from spec.robust import Row, _cases  # noqa: E402
 
 pytestmark = pytest.mark.tools
 

@@ -7,7 +7,6 @@ from __future__ import annotations
 import base64
 import json
 import re
-import sys
 import zlib
 from pathlib import Path
 
@@ -16,12 +15,8 @@ import pytest
 
 import athcodec
 from athcodec.sources import sample_path
-
-ROOT = Path(__file__).resolve().parent.parent
-sys.path.append(str(ROOT))  # for bench, which is not installed; athcodec stays the installed one
-
-from bench.__main__ import main  # noqa: E402
-from bench.browser import chromium  # noqa: E402
+from bench.__main__ import main
+from bench.browser import chromium
 
 pytestmark = pytest.mark.tools
 

@@ -3,9 +3,6 @@ everywhere. And leaves that turn far from frame to frame."""
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
 from moving_meshes import leafed_tree
@@ -15,10 +12,7 @@ import athcodec
 from athcodec.clip import MotionClip
 from athcodec.encoding import streams
 from athcodec.encoding.rings import ring_sizes
-
-sys.path.append(str(Path(__file__).resolve().parent.parent))  # for spec, which is not installed
-
-from spec.document import File  # noqa: E402
+from spec.document import File
 
 SIDES, RINGS, TWIGS = 6, 12, 9
 RADIUS = 0.004

@@ -10,13 +10,11 @@ from pathlib import Path
 
 import pytest
 
+from athcodec import container, errors
+from athcodec.ath_file import AthFile
+from spec import conformance
+
 ROOT = Path(__file__).resolve().parent.parent
-sys.path.append(str(ROOT))  # for spec, which is not installed; athcodec stays the installed one
-
-from athcodec import container, errors  # noqa: E402
-from athcodec.ath_file import AthFile  # noqa: E402
-from spec import conformance  # noqa: E402
-
 VECTORS = conformance.vectors()
 
 

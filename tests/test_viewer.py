@@ -27,13 +27,11 @@ import athcodec
 from athcodec import cli, view
 from athcodec import container as ct
 from athcodec.viewer.build_viewer import MOST_BYTES, own_bytes
+from bench import throttled_server
+from bench.throttled_server import WEB, ThrottledServer
+from bench.trees.plant import grow
 
 ROOT = Path(__file__).resolve().parent.parent
-sys.path.append(str(ROOT))  # for bench, which is not installed; athcodec stays the installed one
-
-from bench import throttled_server  # noqa: E402
-from bench.throttled_server import WEB, ThrottledServer  # noqa: E402
-from bench.trees.plant import grow  # noqa: E402
 
 pytestmark = pytest.mark.web
 
