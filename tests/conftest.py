@@ -172,16 +172,14 @@ def bushy_clip():
 def bushy_ath(bushy_clip, tmp_path_factory):
     """The bushy clip in four segments."""
     path = tmp_path_factory.mktemp("bushy") / "bushy.ath"
-    athcodec.encode(bushy_clip, path, rel_error=1e-3, segment_frames=16, ladder="none")
-    return path
+    return athcodec.encode(bushy_clip, path, rel_error=1e-3, segment_frames=16, ladder="none").path
 
 
 @pytest.fixture(scope="session")
 def layered_ath(bushy_clip, tmp_path_factory):
     """The bushy clip in four segments and three layers of precision, each with a rest pose of its own."""
     path = tmp_path_factory.mktemp("layered") / "layered.ath"
-    athcodec.encode(bushy_clip, path, rel_error=1e-4, ladder=(1e-2, 1e-3), segment_frames=16)
-    return path
+    return athcodec.encode(bushy_clip, path, rel_error=1e-4, ladder=(1e-2, 1e-3), segment_frames=16).path
 
 
 def full_clip_of(seed: int):

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 
-import athcodec
 from athcodec.clip import MotionClip
 from athcodec.errors import ClipError
 
@@ -101,12 +100,6 @@ def assert_same_mesh(got: MotionClip, wanted: MotionClip) -> None:
 def on_one_branch(clip: MotionClip) -> MotionClip:
     """The clip as the encoder takes it."""
     return clip.replace(vertex_branch=np.zeros(clip.vertex_count, np.int32), branch_parent=np.array([-1]))
-
-
-def coded(clip: MotionClip, folder: Path, rel_error: float = 1e-4) -> Path:
-    path = folder / "coded.ath"
-    athcodec.encode(on_one_branch(clip), path, rel_error=rel_error)
-    return path
 
 
 def damaged(data: bytes, seed: int = 0, cuts: int = 25, changes: int = 40) -> Iterator[bytes]:

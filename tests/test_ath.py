@@ -439,12 +439,6 @@ def test_a_survey_measures_the_extent_and_the_motion_of_all_frames(sample_clip):
     assert surveyed.frame_count == sample_clip.frame_count
 
 
-def test_the_extent_does_not_depend_on_the_depth_limit(sample_clip):
-    shallow, deep = survey(sample_clip, max_depth=0), survey(sample_clip)
-    assert (shallow.diagonal, shallow.rms_motion) == (deep.diagonal, deep.rms_motion)
-    assert shallow.ath(Thresholds(0.0, 0, 0.0, 0)).node_count == 1
-
-
 def test_thresholds_that_were_not_surveyed_are_refused():
     clip = bushy_clip(noise=0.1)
     plain, wide = survey(clip), survey(clip, lam=2, xi=0.2, eta=3)
@@ -470,11 +464,3 @@ def test_surveys_of_unusable_thresholds_are_refused_before_anything_is_read(argu
     with pytest.raises(ValueError, match="got"):
         survey(clip, **arguments)
     assert not clip.positions.reads.any()
-
-
-def test_progress_of_a_survey_rises_to_one(sample_clip, monkeypatch):
-    monkeypatch.setattr("athcodec.ath._WORK_VERTICES", 7 * 1001)
-    fractions = []
-    survey(sample_clip, progress=fractions.append)
-    assert len(fractions) > 10 and fractions[-1] == 1.0
-    assert fractions == sorted(fractions) and fractions[0] > 0.0

@@ -692,28 +692,6 @@ def test_a_full_disk_is_reported_and_a_second_run_does_what_is_missing(limit, ma
 
 
 @pytest.mark.slow
-def test_a_full_tmpfs_is_reported_and_a_second_run_does_what_is_missing(many, tmp_path):
-    """A tmpfs in a mount namespace of its own, which the system has to allow."""
-    out, kept = tmp_path / "out", tmp_path / "kept"
-    out.mkdir()
-    script = (
-        'mount -t tmpfs -o size=40k none "$1"; out="$1"; kept="$2"; shift 2; "$@"; code=$?; '
-        'cp -a "$out" "$kept"; exit $code'
-    )
-    command = [*BATCH, str(many), "--out", str(out), *WORDS, "--workers", "2"]
-    done = subprocess.run(
-        ["unshare", "-rm", "sh", "-c", script, "sh", str(out), str(kept), *command],
-        capture_output=True,
-        text=True,
-        timeout=120,
-    )
-    assert done.returncode == 1 and "No space left" in done.stderr and "Traceback" not in done.stderr, done.stderr
-    assert not leftovers(kept) and done_once(kept) < ALL
-    code, err = finished(start(many, kept))
-    assert code == 0 and done_once(kept) == ALL, err
-
-
-@pytest.mark.slow
 def test_the_benchmark_compares_numbers_of_workers_and_every_file(tmp_path):
     words = "-m bench batch --clips 4 --frames 20 --effort fast --json".split()
     command = [sys.executable, *words, str(tmp_path / "b.json")]

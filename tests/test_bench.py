@@ -21,10 +21,10 @@ from athcodec._native import crc32c
 from athcodec.container import KIND_NAMES
 from athcodec.encoding.features import Feature
 from athcodec.encoding.segment import SAMPLED
-from bench import codec_registry, compare, features, paper, plots, progressive, rd, tables
+from bench import compare, features, paper, plots, progressive, rd, tables
 from bench.clips import encoded
 from bench.curves import Curve, mean_saving
-from bench.store import Store, read
+from bench.store import read
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -326,42 +326,6 @@ def test_results_of_a_codec_stay_when_it_is_no_longer_installed(tmp_path, bushy_
     [point] = run_bench(tmp_path, *words)[1]["points"]
     assert point["status"] == "ok"
     assert run_bench(tmp_path, *words, UNINSTALLED="1")[1]["points"] == [point]
-
-
-def test_results_are_saved_at_once_and_are_invalid_when_code_has_changed(tmp_path):
-    file = tmp_path / "results.json"
-    store = Store(file, {"command": "rd"}, {"points": ("clip",)})
-    store.add("points", {"clip": "tree", "bytes": 3, "depends": {"zip": "1.0"}})
-    later = Store(file, {"command": "rd"}, {"points": ("clip",)})
-    assert later.find("points", {"clip": "tree"}, {"zip": "1.0"})["bytes"] == 3
-    assert later.find("points", {"clip": "tree"}, {"zip": "1.1"}) is None
-    assert later.find("points", {"clip": "bush"}, {"zip": "1.0"}) is None
-
-
-def test_results_read_back_as_they_were_saved_one_row_each(tmp_path):
-    file = tmp_path / "results.json"
-    store = Store(file, {"command": "rd"}, {"points": ("clip", "bound")})
-    depends = {"zip": "1.0"}
-    points = [
-        store.add("points", {"clip": clip, "bound": bound, "settings": "coarse " * 9, "depends": depends} | more)
-        for clip in ("tree", "bush")
-        for bound, more in ((0.5, {"bytes": 3, "max": 0.1}), (1, {"why": "1"}))
-    ]
-    assert read(file) == {"command": "rd", "points": points}
-    text = file.read_text()
-    assert text.count("coarse " * 9) == text.count('"zip"') == 1 and text.count("[0,0.5,") == 1
-
-
-def test_fingerprints_of_code_ignore_comments_and_layout_alone(tmp_path):
-    def code(name, text):
-        file = tmp_path / name
-        file.write_text(text)
-        return codec_registry._code(file)
-
-    plain = code("a.py", "def f(x):\n    return (x + 1)\n")
-    assert plain == code("b.py", '"""Adds."""\nimport os\n\ndef f( x ):  # one\n    return x + 1')
-    assert plain != code("c.py", "def f(x):\n    return x + 2\n")
-    assert code("a.c", "int f;") == code("b.c", "/* one */ int  f;\n// two\n") != code("c.c", "int g;")
 
 
 def test_errors_of_a_growing_prefix_are_those_in_the_table_of_the_file(tmp_path, bushy_file):

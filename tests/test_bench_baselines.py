@@ -14,12 +14,10 @@ import pytest
 from athcodec.clip import MotionClip
 from bench.codecs import Source, check
 from bench.codecs.acl import SEGMENT, SkeletalTracks, _Track
-from bench.codecs.baseline import Choice, Ladder, Search
 from bench.codecs.baselines import BASELINES
-from bench.codecs.coder import DamagedStream, RangeCoder, Reader, Writer, Zstd, read_varint, varint
+from bench.codecs.coder import DamagedStream, RangeCoder, Reader, Writer, Zstd
 from bench.codecs.lengyel import Parts, _rotation_vectors, _rotations
 from bench.codecs.ours import Athcodec
-from bench.codecs.tree import VertexOrder, differences, sums, vertex_order
 
 pytestmark = pytest.mark.tools
 
@@ -223,27 +221,7 @@ def test_a_hierarchy_decodes_as_it_was_encoded(bushy_clip):
             np.testing.assert_array_equal(getattr(found, name), getattr(hierarchy, name))
 
 
-def test_varints_read_back_as_written():
-    for value in (0, 127, 128, 2**40):
-        assert read_varint(varint(value), 0) == (value, len(varint(value)))
-    with pytest.raises(DamagedStream):
-        read_varint(b"\x80", 0)
-
-
 # ---- parts ----
-
-
-@pytest.mark.parametrize("name", ("source", "hierarchy"))
-@pytest.mark.parametrize("degree", (0, 1, 2))
-def test_sums_invert_differences(bushy_clip, name, degree):
-    order = vertex_order(Source(bushy_clip), name)
-    q = np.random.default_rng(0).integers(-1000, 1000, (len(order.source), 3, 4))
-    np.testing.assert_array_equal(sums(differences(q, order, degree), order, degree), q)
-
-
-def test_straight_motion_has_no_second_differences():
-    q = np.arange(12)[:, None] * np.array([[3, -1, 2]])
-    assert not differences(q, VertexOrder(np.arange(12)), 2)[2:].any()
 
 
 def test_rigid_parts_are_placed_by_their_tracks():
@@ -255,11 +233,3 @@ def test_rigid_parts_are_placed_by_their_tracks():
     parts = Parts(np.zeros(20, int), pose)
     np.testing.assert_allclose(parts.place_rigid(parts.fit_rigid(positions)), positions, atol=0.02)
     np.testing.assert_allclose(parts.place_affine(parts.fit_affine(positions)), positions, atol=1e-12)
-
-
-def test_a_search_finds_the_minimum_of_a_convex_cost():
-    grid = {"x": Ladder(tuple(range(20)), 3), "name": Choice(("a", "b")), "y": Ladder.geometric(0.1, 10, 1)}
-    search = Search(lambda s: (s["x"] - 14) ** 2 + (s["name"] == "a") + np.log(s["y"] / 5) ** 2, grid)
-    best = search.run(3)[0]
-    assert best["x"] == 14 and best["name"] == "b" and 4 < best["y"] < 6.5
-    assert len(search.known) < 40

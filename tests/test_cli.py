@@ -244,14 +244,6 @@ def test_a_cut_off_file_decodes_to_its_deepest_level_with_one_warning(encoded, f
         assert np.array_equal(clip.block(0, 120), decoder.positions(level=4))
 
 
-def test_every_cut_behind_level_0_decodes(encoded, facts, tmp_path, capsys):
-    first = facts["levels"][0]["bytes"]
-    for size in np.linspace(first, facts["bytes"] - 1, 12).astype(int):
-        part = cut(encoded, tmp_path / "cut.ath", size)
-        assert run("decode", part, tmp_path / "a.h5", "--frames", ":1") == 0
-        assert capsys.readouterr().err.count("\n") == 1
-
-
 def test_info_of_a_cut_off_file_says_what_is_missing(encoded, facts, tmp_path, capsys):
     part = cut(encoded, tmp_path / "cut.ath", facts["levels"][2]["bytes"])
     assert run("info", part, "--json") == 0

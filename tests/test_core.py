@@ -264,11 +264,6 @@ def player(data) -> Player:
     return Player(data)
 
 
-@pytest.fixture(scope="module")
-def uneven(full_ath) -> Player:
-    return Player(full_ath.read_bytes())
-
-
 # ---- results and memory ----
 
 
@@ -1229,11 +1224,6 @@ def test_clips_are_found_by_name_and_follow_each_other(player):
     assert (frame, segment) == (player.info.frame_count, player.info.segment_count)
     for nobody in (b"nobody", b"calm ", b"cal"):
         assert core.ath_clip_named(player.address, nobody) == -1
-
-
-def test_the_times_of_the_uneven_clip_are_uneven(uneven):
-    times = uneven.times_of(uneven.clips[0])
-    assert np.ptp(np.diff(times)) > 1e-4
 
 
 def test_a_loop_blends_the_last_frame_into_the_first(player):

@@ -7,6 +7,7 @@ import tracemalloc
 import h5py
 import numpy as np
 import pytest
+from files import coded
 from plants import chain_plant, clip_of, plant
 
 import athcodec
@@ -100,8 +101,7 @@ def test_the_sample_is_coded_in_a_fiftieth_of_its_size(sample_clip, tmp_path):
 
 @pytest.mark.parametrize("ladder, most", [("none", 140), ("decades", 190)])
 def test_what_stands_in_front_of_the_chunks_of_a_small_file_is_small(ladder, most, sample_clip, tmp_path):
-    athcodec.encode(sample_clip, tmp_path / "out.ath", ladder=ladder, effort="fast")
-    with athcodec.open(tmp_path / "out.ath") as decoder:
+    with coded(sample_clip, tmp_path / "out.ath", ladder=ladder, effort="fast") as decoder:
         chunks = decoder.file.chunks
     assert chunks[0].offset < most
     assert chunks[0].offset < 60 + 9 * len(chunks), "of each chunk and its share of the errors"
@@ -354,8 +354,7 @@ def test_plain_lists_can_be_encoded(tmp_path):
         vertex_branch=[0, 0, 0],
         branch_parent=[-1],
     )
-    athcodec.encode(clip, tmp_path / "s.ath", rel_error=1e-3)
-    with athcodec.open(tmp_path / "s.ath", strict=True) as decoder:
+    with coded(clip, tmp_path / "s.ath", rel_error=1e-3) as decoder:
         assert np.abs(decoder.positions() - clip.positions).max() <= decoder.max_error_bound
 
 
@@ -438,14 +437,13 @@ def test_the_work_of_decoding_is_proportional_to_the_length_of_a_clip(tmp_path, 
 
     def work(frames: int) -> int:
         wave = np.zeros((frames, 1, 3)) + np.sin(np.arange(frames) / 9)[:, None, None]
-        athcodec.encode(
+        with coded(
             clip_of(wave, np.zeros((1, 3)), [0], [-1]),
             tmp_path / "s.ath",
             rel_error=1e-2,
             segment_frames=16,
             effort="fast",
-        )
-        with athcodec.open(tmp_path / "s.ath") as decoder:
+        ) as decoder:
             return work_of(decoder.positions)
 
     assert work(16_000) < 1.2 * 8 * work(2_000)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from files import coded
 
 import athcodec
 from athcodec.cli import main
@@ -35,8 +36,7 @@ def tree():
 @pytest.fixture(scope="module")
 def tree_ath(tree, tmp_path_factory):
     path = tmp_path_factory.mktemp("endless") / "tree.ath"
-    athcodec.encode(athcodec.endless(tree), path, rel_error=1e-4)
-    return path
+    return athcodec.encode(athcodec.endless(tree), path, rel_error=1e-4).path
 
 
 def _jerk(positions) -> float:
@@ -118,8 +118,7 @@ def test_a_motion_that_does_not_come_back_is_refused():
 def test_each_clip_of_a_file_has_its_own(tree, tmp_path):
     path = tmp_path / "two.ath"
     shorter = tree.replace(positions=tree.positions[:150], time=tree.time[:150])
-    athcodec.encode(athcodec.join({"calm": shorter, "storm": athcodec.endless(tree)}), path, rel_error=1e-2)
-    with athcodec.open(path) as decoder:
+    with coded(athcodec.join({"calm": shorter, "storm": athcodec.endless(tree)}), path, rel_error=1e-2) as decoder:
         assert [clip["transitions"] > 0 for clip in decoder.file.info()["clips"]] == [False, True]
         with pytest.raises(ValueError, match="transitions"):
             decoder.play("calm").endless()

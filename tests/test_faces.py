@@ -55,8 +55,7 @@ def still(points: np.ndarray, faces: np.ndarray) -> athcodec.MotionClip:
 
 def encoded(clip: athcodec.MotionClip, **options) -> bytes:
     with tempfile.TemporaryDirectory() as folder:
-        athcodec.encode(clip, Path(folder) / "a.ath", **options)
-        return (Path(folder) / "a.ath").read_bytes()
+        return athcodec.encode(clip, Path(folder) / "a.ath", **options).path.read_bytes()
 
 
 def rest_bytes(data: bytes) -> int:

@@ -35,8 +35,7 @@ def grove(tmp_path_factory):
     """A file of two clips, in segments."""
     path = tmp_path_factory.mktemp("grove") / "grove.ath"
     gale, calm = blown_tree(3, 60, 30), blown_tree(3, 60, 24, sway=0.02)
-    athcodec.encode(athcodec.join({"gale": gale, "calm": calm}), path, rel_error=1e-3, segment_frames=20)
-    return path
+    return athcodec.encode(athcodec.join({"gale": gale, "calm": calm}), path, rel_error=1e-3, segment_frames=20).path
 
 
 @pytest.fixture(scope="module")
@@ -47,8 +46,7 @@ def winds(tmp_path_factory):
         "calm": in_wind(blown_tree(3, 60, 48, sway=0.02), 2.0, 0.0),
         "gale": in_wind(blown_tree(3, 60, 40), 8.0, 0.0),
     }
-    athcodec.encode(athcodec.join(clips), path, rel_error=1e-3, segment_frames=20)
-    return path
+    return athcodec.encode(athcodec.join(clips), path, rel_error=1e-3, segment_frames=20).path
 
 
 @pytest.fixture

@@ -13,7 +13,7 @@ import re
 import struct
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import fields, replace
+from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 
@@ -81,10 +81,6 @@ def by_code(decoder: athcodec.Decoder) -> list[tuple]:
 # ---- tables and dumps ----
 
 
-def test_document_describes_the_version_that_is_written():
-    assert f"Format_Version {container.MAJOR}.{container.MINOR}" in TEXT
-
-
 @pytest.mark.parametrize(
     "title, form",
     [("Header", container._HEADER), ("CORRECTIONS", container._CORRECTIONS), ("REFINED_REST", container._REFINED_REST)],
@@ -111,19 +107,6 @@ def test_chunk_kinds_are_those_of_the_code():
         kind = int(row["Kind"], 16)
         assert kind & ~container.OPTIONAL == int(row["Kind_Id"])
         assert (row["Required"] == "no") == bool(kind & container.OPTIONAL)
-
-
-def test_limits_are_those_of_the_code():
-    limits = container.Limits()
-    rows = table("Limits", "Limit")
-    documented = {row["Limit"].removeprefix("Max_").lower(): int(row["Value"]) for row in rows}
-    assert documented == {field.name: getattr(limits, field.name) for field in fields(limits)}
-
-
-def test_errors_are_those_of_the_code():
-    classes = [errors.FormatError, *errors.FormatError.__subclasses__()]
-    documented = {int(row["Code"]): row["Name"] for row in table("Errors", "Code")}
-    assert documented == {error.code: error.name for error in classes}
 
 
 def test_every_error_that_the_code_names_exists():
@@ -158,8 +141,7 @@ def test_smallest_file_is_what_the_encoder_writes(spec, tmp_path):
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
 def test_lossless_files_decode_by_the_document(spec, dtype, tmp_path):
     clip = plant(seed=12, branches=4, longest=4, frames=18, dtype=dtype)
-    athcodec.encode(clip, tmp_path / "a.ath", rel_error=1e-3, lossless=True)
-    assert_same_bits(spec, (tmp_path / "a.ath").read_bytes())
+    assert_same_bits(spec, athcodec.encode(clip, tmp_path / "a.ath", rel_error=1e-3, lossless=True).path.read_bytes())
 
 
 # ---- the pseudo-code ----
@@ -253,12 +235,6 @@ def test_shuffle_of_the_document_restores_an_array(spec):
     assert spec.unshuffle(zstandard.decompress(body), array.size, 4) == array.tobytes()
 
 
-def test_pseudo_code_decodes_what_the_encoder_writes(spec, forked_clip, tmp_path):
-    path = tmp_path / "forked.ath"
-    athcodec.encode(forked_clip, path, max_error=0.001)
-    assert_same_bits(spec, path.read_bytes())
-
-
 @pytest.mark.parametrize(
     "seed, is_float64, exact",
     [
@@ -270,17 +246,6 @@ def test_pseudo_code_decodes_what_the_encoder_writes(spec, forked_clip, tmp_path
 )
 def test_pseudo_code_decodes_every_feature(spec, seed, is_float64, exact):
     assert_same_bits(spec, HandMade(seed, is_float64, exact).file())
-
-
-def test_pseudo_code_decodes_layers_that_the_encoder_writes(spec, tmp_path):
-    clip = plant(seed=14, branches=6, longest=5, frames=18, rough=1e-3)
-    athcodec.encode(clip, tmp_path / "layers.ath", rel_error=1e-4, ladder=(1e-2, 1e-3))
-    assert_same_bits(spec, (tmp_path / "layers.ath").read_bytes())
-
-
-@pytest.mark.slow
-def test_pseudo_code_decodes_several_clips(spec, medley_ath):
-    assert_same_bits(spec, medley_ath.read_bytes())
 
 
 @pytest.mark.parametrize("seed", range(4))

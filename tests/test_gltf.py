@@ -634,8 +634,7 @@ def leafy():
 @pytest.fixture(scope="module")
 def leafy_ath(leafy, tmp_path_factory):
     path = tmp_path_factory.mktemp("leafy") / "a.ath"
-    athcodec.encode(leafy, path, rel_error=1e-4)
-    return path
+    return athcodec.encode(leafy, path, rel_error=1e-4).path
 
 
 def accessor_of(gltf, index):
@@ -851,8 +850,7 @@ def seasons():
 @pytest.fixture(scope="module")
 def seasons_ath(seasons, tmp_path_factory):
     path = tmp_path_factory.mktemp("seasons") / "seasons.ath"
-    athcodec.encode(athcodec.join(seasons), path, rel_error=1e-4, segment_frames=16)
-    return path
+    return athcodec.encode(athcodec.join(seasons), path, rel_error=1e-4, segment_frames=16).path
 
 
 def same_clips(path, wanted, error):

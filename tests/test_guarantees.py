@@ -61,9 +61,13 @@ def clip() -> MotionClip:
     )
 
 
+def write(clip, path) -> None:
+    athcodec.write(clip, path, **({"animation": "morphs"} if path.suffix == ".glb" else {}))
+
+
 def there_and_back(clip, folder, name: str) -> MotionClip:
     path = folder / FORMATS[name]
-    athcodec.write(clip, path, **({"animation": "morphs"} if name == "gltf" else {}))
+    write(clip, path)
     given = {"fps": RATE} if name in NO_RATE else {}
     return athcodec.read(min(folder.glob("a_*.*")) if name in NUMBERED else path, **given)
 
@@ -139,6 +143,15 @@ def test_changing_topology_is_refused_by_the_number_of_its_frame(clip, tmp_path,
     with pytest.raises(ClipError, match=rf"a_1004.{kind}: got .*topology that changes"):
         with athcodec.read(tmp_path / f"a_1001.{kind}") as again:
             again.block(0, 9)
+
+
+@pytest.mark.parametrize("name", tiered(FORMATS))
+def test_a_failed_write_leaves_no_file(clip, tmp_path, name):
+    positions = clip.block(0, 9).copy()
+    positions[5, 0, 0] = np.nan
+    with pytest.raises(ClipError, match="frame 5"):
+        write(clip.replace(positions=positions), tmp_path / FORMATS[name])
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_every_format_of_the_table_is_tried_here():

@@ -30,8 +30,7 @@ FAST = {"effort": "fast", "attributes": "none", "host_rest": True}
 
 
 def encode(clip: MotionClip, path, **options) -> bytes:
-    athcodec.encode(clip, path, **FAST | options)
-    return path.read_bytes()
+    return athcodec.encode(clip, path, **FAST | options).path.read_bytes()
 
 
 @pytest.fixture(scope="module")

@@ -15,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from files import coded
 from plants import bending_tube, tube
 from programs import CACHE, install_once
 
@@ -54,8 +55,7 @@ def mesh_ath(tmp_path_factory):
     clip.faces = np.stack(corners, axis=-1).reshape(-1, 4).astype(np.int32)
     clip.check()
     path = tmp_path_factory.mktemp("mesh") / "mesh.ath"
-    athcodec.encode(clip, path, rel_error=1e-3, segment_frames=16)
-    return path
+    return athcodec.encode(clip, path, rel_error=1e-3, segment_frames=16).path
 
 
 # ---- it never stops for good ----
@@ -164,8 +164,7 @@ def test_endless_play_shows_what_the_decoder_in_python_does(sample_clip, tmp_pat
     path = tmp_path / "endless.ath"
     transitions = [[30, 2, 6], [50, 10, 8], [50, 20, 6], [40, 31, 7]]
     clip = sample_clip.replace(metadata=sample_clip.metadata | {"transitions": transitions})
-    athcodec.encode(clip, path, rel_error=1e-3, segment_frames=16)
-    with athcodec.open(path) as decoder:
+    with coded(clip, path, rel_error=1e-3, segment_frames=16) as decoder:
         play = decoder.endless(7)
         seconds = [float(t) for t in np.arange(0, 40, 0.63)]
         wanted = [hashlib.sha256(play.positions(t)).hexdigest() for t in seconds]

@@ -358,25 +358,17 @@ def test_attributes_none_keeps_the_motion_and_the_units_alone(full_clip, scratch
     assert apart <= 2 * bare.max_error_bound and bare.file.file_length < full.file.file_length
 
 
-@pytest.mark.parametrize(
-    "more",
-    [
-        {"attributes": {f"a{i}": np.zeros(1) for i in range(257)}},
-        {"attributes": {"n" * 5000: np.zeros(1)}},
-        {"attributes": {"wide": np.zeros(1, "S2000000")}},
-        {"metadata": {"text": "x" * (1 << 20)}},
-        {"metadata": {"object": {1, 2}}},
-        {"metadata": {"text": "\ud800"}},
-    ],
-    ids=[
-        "257 attributes",
-        "a name of 5000 bytes",
-        "items of 2 MB",
-        "1 MiB of metadata",
-        "metadata that is no JSON",
-        "metadata that is no UTF-8",
-    ],
-)
+TOO_MUCH = {
+    "257 attributes": {"attributes": {f"a{i}": np.zeros(1) for i in range(257)}},
+    "a name of 5000 bytes": {"attributes": {"n" * 5000: np.zeros(1)}},
+    "items of 2 MB": {"attributes": {"wide": np.zeros(1, "S2000000")}},
+    "1 MiB of metadata": {"metadata": {"text": "x" * (1 << 20)}},
+    "metadata that is no JSON": {"metadata": {"object": {1, 2}}},
+    "metadata that is no UTF-8": {"metadata": {"text": "\ud800"}},
+}
+
+
+@pytest.mark.parametrize("more", TOO_MUCH.values(), ids=TOO_MUCH)
 def test_static_data_beyond_what_a_decoder_accepts_are_refused_when_encoding(more, tmp_path):
     with pytest.raises(athcodec.errors.ClipError):
         athcodec.encode(with_static(plant(frames=3), **more), tmp_path / "refused.ath", effort="fast")

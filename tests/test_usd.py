@@ -447,17 +447,6 @@ def test_a_topology_that_changes_is_refused_with_its_frame(tmp_path, change):
             clip.block(0, clip.frame_count)
 
 
-def test_missing_layers_are_named_and_the_rest_is_read(tmp_path):
-    stage = new_stage(tmp_path / "a.usda")
-    add_grid(stage)
-    stage.DefinePrim("/gone").GetReferences().AddReference("./none.usda")
-    stage.Save()
-    del stage
-    with pytest.warns(UserWarning, match="none.usda"):
-        clip, _ = read_all(tmp_path / "a.usda")
-    assert clip.metadata["part_names"] == ["grid"]
-
-
 def test_a_file_that_changes_while_it_is_read_is_noticed_and_read_afresh_the_next_time(tmp_path):
     path = tmp_path / "a.usda"
     stage = new_stage(path)
