@@ -219,15 +219,8 @@ def medley_clips():
     clip = awkward(seed=7, branches=9, longest=8, frames=90, roots=1, shape="stem", motion="sway")
 
     def part(start, stop, time):
-        return MotionClip(
-            clip.block(start, stop),
-            time,
-            clip.vertex_branch,
-            clip.branch_parent,
-            stem_index=clip.stem_index,
-            rest=clip.source_rest,
-            metadata={"unit": "m", "from": start},
-        )
+        metadata = {"unit": "m", "from": start}
+        return clip.replace(positions=clip.block(start, stop), time=time, metadata=metadata)
 
     return {
         "calm": athcodec.looped(part(0, 20, np.arange(20) / 30)),
@@ -253,6 +246,14 @@ def full_ath(full_clip, tmp_path_factory):
     tam = athcodec.Thresholds(0, 0, 0, 0)  # with modes, whatever is smaller
     athcodec.encode(full_clip, path, rel_error=1e-4, segment_frames=16, tam=tam, ladder="none", rest_error="bound")
     return path
+
+
+@pytest.fixture(scope="session")
+def predicted_ath(full_clip, tmp_path_factory):
+    """The full clip in two segments of predicted motion."""
+    path = tmp_path_factory.mktemp("predicted") / "full.ath"
+    options = {"segment_frames": 16, "ladder": "none", "rest_error": "bound"}
+    return athcodec.encode(full_clip, path, rel_error=1e-4, **options).path
 
 
 @pytest.fixture(scope="session")

@@ -29,26 +29,11 @@ def mixed_clip(frames: int = 6, dtype: object = np.float32, fps: float = 24.0, s
         "part_vertex_counts": np.array([5, 3], np.int32),
         "uv": np.random.default_rng(1).random((len(corners), 2)).astype(np.float32),
     }
-    domains = {
-        "face_vertex_counts": "face",
-        "face_vertex_indices": "corner",
-        "uv": "corner",
-        "part_vertex_counts": "constant",
-    }
-    metadata = {
-        "fps": fps,
-        "start_frame": start,
-        "part_names": ["leaf", "twig"],
-        "part_kinds": ["mesh", "curves"],
-        "domains": domains,
-    }
-    return MotionClip(
-        swaying(POINTS, frames, dtype),
-        np.arange(frames) / fps,
-        edges=np.array([[5, 6], [6, 7]]),
-        attributes=attributes,
-        metadata=metadata,
-    )
+    domains = {"face_vertex_counts": "face", "face_vertex_indices": "corner", "uv": "corner"}
+    metadata = {"fps": fps, "start_frame": start, "part_names": ["leaf", "twig"], "part_kinds": ["mesh", "curves"]}
+    metadata["domains"] = domains | {"part_vertex_counts": "constant"}
+    more = {"edges": np.array([[5, 6], [6, 7]]), "attributes": attributes, "metadata": metadata}
+    return MotionClip(swaying(POINTS, frames, dtype), np.arange(frames) / fps, **more)
 
 
 def quad_clip(frames: int = 6, dtype: object = np.float32, rings: int = 6) -> MotionClip:

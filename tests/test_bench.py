@@ -21,7 +21,7 @@ from athcodec._native import crc32c
 from athcodec.container import KIND_NAMES
 from athcodec.encoding.features import Feature
 from athcodec.encoding.segment import SAMPLED
-from bench import compare, features, paper, plots, progressive, rd, tables
+from bench import compare, features, paper, plots, progressive
 from bench.clips import encoded
 from bench.curves import Curve, mean_saving
 from bench.store import read
@@ -280,15 +280,6 @@ def test_clips_without_branches_are_measured_on_those_that_encoding_finds(tmp_pa
         assert not clip.has_branches
     text, result = run_bench(tmp_path, "rd", tmp_path / "bare.h5", "--bounds", "1e-4", "--codecs", "athcodec")
     assert "What levels cost: bare" in text and result["costs"][0]["levels"] > 1
-
-
-def test_results_from_before_a_measure_print_without_it():
-    old = point("athcodec", "athcodec", 1e-3, 100, 0.1) | {"clip": "oak", "cpu": "any", "settings": "", "bits": 1.0}
-    times = {"encode_s": 1.0, "encode_runs": 1, "encode_peak_bytes": 1, "decode_s": 1.0, "decode_peak_bytes": 1}
-    contents = {"clips": [], "points": [old | times | {"motion": 0.1}], "curves": [], "costs": []}
-    text = tables.as_text({"command": "", "machine": {}, "versions": {}} | rd.summary(contents, ["oak"], None))
-    row = cells_of(text, rd.title("oak"))
-    assert [row[name] for name in rd.LOOKS] == ["-"] * len(rd.LOOKS) and row["bytes"] == "100"
 
 
 def test_a_baseline_that_breaks_its_bound_fails_the_run(tmp_path, bushy_file):

@@ -19,7 +19,7 @@ from bench.trees.leaves import SPECIES, Leaves, Plates, sheltered
 from bench.trees.mesh import SIDES, dress
 from bench.trees.plant import grow
 from bench.trees.refine import refine
-from bench.trees.ride import Skeleton, rotations, smallest_turns, sway
+from bench.trees.ride import Skeleton
 from bench.trees.wind import DIRECTION, Wind
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -279,20 +279,6 @@ def test_leaves_behind_others_get_less_wind():
     left = sheltered(points, np.full(3, 0.05), 0.5)
     assert left[0] == 1 and 1 > left[1] > left[2] > 0.5
     assert sheltered(points + [[0, 0, 0], [0, 2, 0], [0, 4, 0]], np.full(3, 0.05), 0.5).min() == 1
-
-
-def test_rotations_turn_by_the_angle_about_the_axis():
-    quarter = rotations(np.array([0.0, 0.0, np.pi / 2]))
-    assert np.allclose(quarter @ [1, 0, 0], [0, 1, 0])
-    assert np.allclose(smallest_turns(np.array([1.0, 0, 0]), np.array([0.0, 1, 0])), quarter)
-
-
-def test_sway_follows_a_step_with_an_overshoot_and_settles():
-    drive = np.ones((300, 1, 1))
-    drive[0] = 0
-    response = sway(drive, np.array([1.0]), 0.1, 1 / 30)[:, 0, 0]
-    assert response[0] == 0 and 1.6 < response.max() < 1.8
-    assert response.argmax() == pytest.approx(16, abs=1) and response[-1] == pytest.approx(1, abs=0.02)
 
 
 def test_a_clip_is_made_once_and_again_where_its_recipe_changed(recipes, tmp_path):

@@ -28,22 +28,10 @@ ROOT = Path(__file__).resolve().parent.parent
 
 pytestmark = pytest.mark.tools
 
-SHAPES = {
-    "growth": (120, 1001),
-    "growth_in_wind": (120, 1001),
-    "unfolding": (120, 1141),
-    "grass": (160, 5600),
-    "grass_shuffled": (160, 5600),
-    "capture": (2000, 31),
-    "capture_long": (6000, 31),
-    "calm": (100, 4000),
-    "few_7": (7, 11666),
-    "few_9": (9, 7207),
-    "one_frame": (1, 8322),
-    "morph": (225, 1528),
-    "vertex": (100, 1),
-    "cube": (127, 24),
-}
+SHAPES = {"growth": (120, 1001), "growth_in_wind": (120, 1001), "unfolding": (120, 1141), "grass": (160, 5600)}
+SHAPES |= {"grass_shuffled": (160, 5600), "capture": (2000, 31), "capture_long": (6000, 31), "calm": (100, 4000)}
+SHAPES |= {"few_7": (7, 11666), "few_9": (9, 7207), "one_frame": (1, 8322), "morph": (225, 1528)}
+SHAPES |= {"vertex": (100, 1), "cube": (127, 24)}
 
 
 def digest(clip):

@@ -90,10 +90,8 @@ def lossless_parts(full_clip, tmp_path_factory) -> Parts:
 
 
 @pytest.fixture(scope="module")
-def predicted_parts(full_clip, tmp_path_factory) -> Parts:
-    path = tmp_path_factory.mktemp("predicted") / "full.ath"
-    athcodec.encode(full_clip, path, rel_error=1e-4, segment_frames=16, ladder="none", rest_error="bound")
-    return Parts.of(path.read_bytes())
+def predicted_parts(predicted_ath) -> Parts:
+    return Parts.of(predicted_ath.read_bytes())
 
 
 @pytest.fixture(scope="module")

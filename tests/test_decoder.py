@@ -20,7 +20,7 @@ from athcodec import container as ct
 from athcodec._native import LOOSE
 from athcodec.encoding import streams
 from athcodec.encoding.motion import Plan
-from athcodec.errors import BadChecksum, BadChunk, FormatError, LevelUnavailable
+from athcodec.errors import BadChunk, FormatError, LevelUnavailable
 from athcodec.hierarchy import branches_from_edges
 
 
@@ -341,15 +341,6 @@ def chunks_read(file: Recorder, decoder) -> set:
     return read
 
 
-def test_the_last_level_reads_no_maps_of_subtrees(plants):
-    file = Recorder(plants["sample"][0].read_bytes())
-    decoder = athcodec.open(file)
-    file.ranges.clear()
-    decoder.positions(0)
-    kinds = {chunk.kind for chunk in chunks_read(file, decoder)}
-    assert ct.STEMS in kinds and ct.AFFINES not in kinds
-
-
 def test_the_frames_of_a_segment_in_turn_read_and_decode_it_once(played, monkeypatch):
     """Forwards, backwards, as maps, in any type of numbers; another segment, or level, is prepared anew."""
     decoder, _ = played
@@ -522,27 +513,6 @@ def test_allow_partial_changes_nothing_about_an_intact_file(bushy_ath):
         assert np.array_equal(partial.positions(), plain.positions())
         plain.file.check()
         partial.file.check()
-
-
-def test_checking_reads_every_byte_behind_the_tables(full_ath):
-    file = Recorder(full_ath.read_bytes())
-    decoder = athcodec.open(file)
-    decoder.file.check()
-    covered = np.zeros(decoder.file.file_length, bool)
-    for start, stop in file.ranges:
-        covered[start:stop] = True
-    assert covered.all()
-
-
-def test_a_wrong_byte_in_a_chunk_is_met_when_it_is_read_and_not_before(bushy_ath):
-    data = bytearray(bushy_ath.read_bytes())
-    with athcodec.open(bushy_ath) as decoder:
-        last = [chunk for chunk in decoder.file.chunks if chunk.is_motion][-1]
-    data[last.offset + last.length // 2] ^= 1
-    decoder = athcodec.open(BytesIO(bytes(data)), strict=True)
-    decoder.positions(level=decoder.level_count - 2)
-    with pytest.raises(BadChecksum, match="CORRECTIONS of level 5, segment 3"):
-        decoder.positions()
 
 
 @settings(STEADY, max_examples=30)

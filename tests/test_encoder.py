@@ -209,13 +209,7 @@ class Fading:
 @pytest.mark.parametrize("error", [None, OSError])
 @pytest.mark.parametrize("good_reads", [0, 1])
 def test_a_source_that_fails_while_it_is_coded_leaves_no_file(error, good_reads, small, tmp_path):
-    fading = MotionClip(
-        positions=Fading(small.positions, good_reads, error),
-        rest=small.rest,
-        time=small.time,
-        vertex_branch=small.vertex_branch,
-        branch_parent=small.branch_parent,
-    )
+    fading = small.replace(positions=Fading(small.positions, good_reads, error))
     with pytest.raises(ClipError, match="positions: frame|positions: frames"):
         athcodec.encode(fading, tmp_path / "s.ath", segment_frames=16, effort="fast")
     assert not list(tmp_path.iterdir())
@@ -336,14 +330,7 @@ def test_arrays_of_any_layout_and_byte_order_give_the_same_file(dtype, tmp_path)
     strided = np.asfortranarray(source.positions)
     files = []
     for positions in (source.positions, swapped, strided):
-        clip = MotionClip(
-            positions=positions,
-            rest=source.rest,
-            time=source.time,
-            vertex_branch=source.vertex_branch,
-            branch_parent=source.branch_parent,
-        )
-        files.append(encoded(clip, tmp_path))
+        files.append(encoded(source.replace(positions=positions), tmp_path))
     assert files[0] == files[1] == files[2]
 
 

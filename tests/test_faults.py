@@ -291,13 +291,7 @@ class Restless:
 
 def restless(factor: float) -> athcodec.MotionClip:
     source = plant(seed=1, branches=5, longest=4, frames=40)
-    return athcodec.MotionClip(
-        positions=Restless(source.positions, factor),
-        rest=source.rest,
-        time=source.time,
-        vertex_branch=source.vertex_branch,
-        branch_parent=source.branch_parent,
-    )
+    return source.replace(positions=Restless(source.positions, factor))
 
 
 def test_arrays_that_change_a_little_between_two_readings_give_an_intact_file(tmp_path):

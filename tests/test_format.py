@@ -161,14 +161,8 @@ def test_worked_example_decodes_step_by_step(spec):
             return super().bit(context)
 
         def narrow(self, bound):
-            steps.append(
-                {
-                    "Probability": self.probability,
-                    "range": f"{self.range:016x}",
-                    "bound": f"{bound:016x}",
-                    "code": f"{self.code:016x}",
-                }
-            )
+            numbers = {"range": self.range, "bound": bound, "code": self.code}
+            steps.append({"Probability": self.probability} | {name: f"{x:016x}" for name, x in numbers.items()})
             self.probability = "raw"
             steps[-1]["Bit"] = str(super().narrow(bound))
             return int(steps[-1]["Bit"])
@@ -707,26 +701,9 @@ class HandMade:
     SEGMENTS, FRAMES = 2, 37
     # parent, vertices of the stem, flags; the stem of 70 makes two pieces. Nodes that are loose and have maps
     # of their own: 2, 3, and 16, which is whole. Loose and no nodes: 14, 17
-    BRANCHES = (
-        (-1, 6, 0),
-        (0, 1, 0),
-        (0, 70, LOOSE),
-        (2, 5, SHEET | LOOSE),
-        (3, 3, LOOSE),
-        (2, 9, WHOLE),
-        (5, 4, SHEET),
-        (-1, 7, SHEET),
-        (7, 2, SHEET | WHOLE),
-        (7, 5, SHEET),
-        (7, 4, 0),
-        (10, 2, 0),
-        (-1, 1, WHOLE),
-        (12, 2, 0),
-        (12, 3, LOOSE),
-        (-1, 3, 0),
-        (15, 4, LOOSE | WHOLE),
-        (16, 2, LOOSE),
-    )
+    BRANCHES = (-1, 6, 0), (0, 1, 0), (0, 70, LOOSE), (2, 5, SHEET | LOOSE), (3, 3, LOOSE), (2, 9, WHOLE)
+    BRANCHES += (5, 4, SHEET), (-1, 7, SHEET), (7, 2, SHEET | WHOLE), (7, 5, SHEET), (7, 4, 0), (10, 2, 0)
+    BRANCHES += (-1, 1, WHOLE), (12, 2, 0), (12, 3, LOOSE), (-1, 3, 0), (15, 4, LOOSE | WHOLE), (16, 2, LOOSE)
 
     def __init__(self, seed: int, is_float64: bool, exact: type | None, parts=BRANCHES):
         self.random = np.random.default_rng(seed)

@@ -14,20 +14,8 @@ from athcodec import ClipView, MotionClip
 from athcodec.errors import ClipError
 
 RATE = 24000 / 1001
-FORMATS = {
-    "hdf5": "a.h5",
-    "npz": "a.npz",
-    "usdc": "a.usdc",
-    "usda": "a.usda",
-    "alembic": "a.abc",
-    "gltf": "a.glb",
-    "pc2": "a.pc2",
-    "mdd": "a.mdd",
-    "obj": "a.obj",
-    "ply": "a.ply",
-    "xdmf": "a.xdmf",
-    "pvd": "a.pvd",
-}
+FORMATS = {"hdf5": "a.h5", "npz": "a.npz", "usdc": "a.usdc", "usda": "a.usda", "alembic": "a.abc", "gltf": "a.glb"}
+FORMATS |= {name: f"a.{name}" for name in ("pc2", "mdd", "obj", "ply", "xdmf", "pvd")}
 NUMBERED = {"obj", "ply"}  # a file per frame
 
 NO_RATE = {"pc2", "obj", "ply", "pvd"}  # frames have numbers or times there, but no rate: who reads has to give it

@@ -13,7 +13,6 @@ from plants import STEADY, awkward_plants, bound_for, chain_plant, plant
 import athcodec
 from athcodec import Thresholds
 from athcodec import container as ct
-from athcodec.encoding import encoder
 from athcodec.encoding.layers import layer_ratios
 from athcodec.encoding.quantise import SOURCE_REST_TOLERANCE
 from athcodec.errors import BadChecksum, LevelUnavailable, LimitExceeded
@@ -224,13 +223,6 @@ def test_a_damaged_rest_pose_hides_the_levels_of_its_layer(layered_ath):
         assert np.array_equal(part.positions(20), coarse) and np.array_equal(part.rest, rest)
     with athcodec.open(BytesIO(data)) as strict, pytest.raises(BadChecksum, match=str(chunk)):
         strict.positions(20)
-
-
-def test_three_steps_of_encoding_make_the_same_file(bushy_clip, layered, tmp_path):
-    draft = encoder.draft(bushy_clip, rel_error=1e-5, segment_frames=16, ladder=LADDER)
-    coded = list(encoder.code_segments(bushy_clip, draft, range(draft.segment_count)))
-    encoder.write(bushy_clip, draft, coded, tmp_path / "steps.ath")
-    assert (tmp_path / "steps.ath").read_bytes() == layered.read_bytes()
 
 
 @pytest.mark.parametrize("options", [{"lossless": True}, {"exact_rest": True}, {"effort": "best"}, {"weights": "all"}])

@@ -35,7 +35,7 @@ class Whole:
         return min(late, default=len(self.levels)) - 1
 
 
-@pytest.fixture(scope="module", params=["sample_ath", "bushy_ath", "full_ath", "layered_ath"])
+@pytest.fixture(scope="module", params=["sample_ath", "bushy_ath", "full_ath", "layered_ath", "predicted_ath"])
 def whole(request):
     return Whole(request.getfixturevalue(request.param))
 
@@ -92,11 +92,6 @@ def test_files_cut_inside_the_prelude_are_refused(bushy, full):
             with pytest.raises((Truncated, NotAnAthFile)) as caught:
                 whole.cut(size)
             assert "\n" not in str(caught.value)
-
-
-def test_an_empty_file_is_no_ath_file():
-    with pytest.raises(NotAnAthFile):
-        athcodec.open(BytesIO(b""))
 
 
 def test_every_prefix_fails_in_strict_opening(full):

@@ -260,15 +260,8 @@ def gusty_tree():
         swing = gust * np.sin(rng.uniform(3, 9) * time_ + rng.uniform(0, 6))
         along = np.linspace(0, 1, len(mine)) ** 2
         positions[:, mine] += swing[:, None, None] * along[:, None] * rng.normal(size=3) * 0.15
-    return clip_of(
-        positions,
-        plant.position,
-        plant.branch,
-        plant.branch_parent,
-        edges=plant.edges,
-        attributes={"radius": plant.radius.astype(np.float32)},
-        metadata={"unit": "m", "up_axis": "y"},
-    )
+    more = {"attributes": {"radius": plant.radius.astype(np.float32)}, "metadata": {"unit": "m", "up_axis": "y"}}
+    return clip_of(positions, plant.position, plant.branch, plant.branch_parent, edges=plant.edges, **more)
 
 
 @pytest.fixture(scope="module")
@@ -282,16 +275,9 @@ def windy_ath(gusty_tree, tmp_path_factory):
     """Three clips of that tree: a calm that was blended into a loop, a gust, and a storm that is one."""
 
     def part(start: int, stop: int, force: float):
-        rest = gusty_tree.rest
-        return clip_of(
-            rest + force * (gusty_tree.block(start, stop) - rest),
-            rest,
-            gusty_tree.vertex_branch,
-            gusty_tree.branch_parent,
-            edges=gusty_tree.edges,
-            attributes=gusty_tree.attributes,
-            metadata=gusty_tree.metadata,
-        )
+        rest, moved = gusty_tree.rest, gusty_tree.block(start, stop)
+        positions = (rest + force * (moved - rest)).astype(np.float32)
+        return gusty_tree.replace(positions=positions, time=np.arange(len(moved)) / 30)
 
     clips = {
         "calm": athcodec.looped(part(0, 40, 0.3), blend=8),
