@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
+from plants import ring_quads
 
 from athcodec.clip import MotionClip
 from athcodec.errors import ClipError
@@ -40,27 +41,10 @@ def quad_clip(frames: int = 6, dtype: object = np.float32, rings: int = 6) -> Mo
     """A tube of quads, one object."""
     angle = np.linspace(0, 2 * np.pi, 5)[:-1]
     rest = np.array([[np.cos(a), 0.7 * ring, np.sin(a)] for ring in range(rings) for a in angle])
-    faces = np.array(
-        [
-            [4 * r + i, 4 * r + (i + 1) % 4, 4 * r + 4 + (i + 1) % 4, 4 * r + 4 + i]
-            for r in range(rings - 1)
-            for i in range(4)
-        ],
-        np.int32,
-    )
-    return MotionClip(
-        swaying(rest, frames, dtype),
-        np.arange(frames) / 24,
-        faces=faces,
-        attributes={"part_vertex_counts": np.array([len(rest)], np.int32)},
-        metadata={
-            "fps": 24.0,
-            "start_frame": 1,
-            "part_names": ["tube"],
-            "part_kinds": ["mesh"],
-            "domains": {"part_vertex_counts": "constant"},
-        },
-    )
+    parts = {"part_names": ["tube"], "part_kinds": ["mesh"], "domains": {"part_vertex_counts": "constant"}}
+    more = {"attributes": {"part_vertex_counts": np.array([len(rest)], np.int32)}, "faces": ring_quads(rings, 4)}
+    metadata = {"fps": 24.0, "start_frame": 1} | parts
+    return MotionClip(swaying(rest, frames, dtype), np.arange(frames) / 24, metadata=metadata, **more)
 
 
 def assert_same_motion(got: MotionClip, wanted: MotionClip, tolerance: float = 0.0) -> None:

@@ -38,14 +38,8 @@ def run_bench(tmp_path, *words, code=0, **environment):
     """(printed text, contents of the JSON file) of one run, on the sample where no clip is named."""
     file = tmp_path / "result.json"
     path = {"PYTHONPATH": str(ROOT / "tests")}
-    done = subprocess.run(
-        [sys.executable, "-m", "bench", *words, "--json", str(file)],
-        cwd=ROOT,
-        text=True,
-        capture_output=True,
-        timeout=300,
-        env=os.environ | path | environment,
-    )
+    how = {"cwd": ROOT, "text": True, "capture_output": True, "timeout": 300, "env": os.environ | path | environment}
+    done = subprocess.run([sys.executable, "-m", "bench", *words, "--json", str(file)], **how)
     assert done.returncode == code, done.stderr
     return done.stdout, read(file)
 

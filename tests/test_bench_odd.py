@@ -305,14 +305,9 @@ def test_the_best_of_all_others_is_named_and_files_that_broke_their_bound_do_not
 def test_the_suite_prints_one_table_of_its_clips_with_sizes_that_were_checked(tmp_path):
     file = tmp_path / "result.json"
     words = ["rd", "vertex", "--suite", "odd-quick", "--bounds", "1e-3", "--json", str(file)]
-    done = subprocess.run(
-        [sys.executable, "-m", "bench", *words],
-        cwd=ROOT,
-        text=True,
-        capture_output=True,
-        timeout=300,
-        env=os.environ | {data.FOLDER_VARIABLE: str(tmp_path)},
-    )
+    environment = os.environ | {data.FOLDER_VARIABLE: str(tmp_path)}
+    command = [sys.executable, "-m", "bench", *words]
+    done = subprocess.run(command, cwd=ROOT, text=True, capture_output=True, timeout=300, env=environment)
     assert done.returncode == 0, done.stderr
     sizes = {point["codec"]: point["bytes"] for point in read(file)["points"]}
     assert set(sizes) == set(rd.CODECS["odd-quick"])

@@ -6,7 +6,7 @@ from __future__ import annotations
 import ctypes
 import itertools
 import re
-import threading
+from concurrent.futures import ThreadPoolExecutor
 from ctypes import byref, c_int32, c_size_t, c_void_p
 from dataclasses import replace
 
@@ -156,11 +156,9 @@ class Player:
 
     def try_to_prepare(self, segment: int, level: int, work: Memory, into: Memory, call=core.ath_prepare) -> int:
         refined = self.refine(level)
-        return (
-            refined
-            if refined != OK
-            else call(work.address, work.size, self.address, segment, level, into.address, into.size)
-        )
+        if refined != OK:
+            return refined
+        return call(work.address, work.size, self.address, segment, level, into.address, into.size)
 
     def start(self, segment: int, level: int, work: Memory, into: Memory) -> int:
         return self.try_to_prepare(segment, level, work, into, core.ath_prepare_start)
@@ -197,16 +195,8 @@ class Player:
     def start_onward(self, before: tuple[Memory, Memory], level: int, work: Memory, into: Memory) -> int:
         assert self.refine(level) == OK
         shown, kept = before
-        return core.ath_prepare_onward(
-            work.address,
-            work.size,
-            self.address,
-            shown.address,
-            kept.size and kept.address,
-            level,
-            into.address,
-            into.size,
-        )
+        before = shown.address, kept.size and kept.address
+        return core.ath_prepare_onward(work.address, work.size, self.address, *before, level, into.address, into.size)
 
     def go_on(
         self, before: tuple[Memory, Memory], level: int, joined_to: Memory | None = None
@@ -317,15 +307,9 @@ def test_memory_that_is_too_small_or_not_aligned_is_refused_and_not_touched(data
 
 def test_levels_and_segments_that_a_file_does_not_have_are_bad_arguments(player):
     work, segment = player.work(), Memory(max(player.room(level).size for level in player.levels))
-    for index, level in (
-        (-1, 0),
-        (player.info.segment_count, 0),
-        (2**31 - 1, 0),
-        (0, -1),
-        (0, player.info.level_count),
-        (0, 255),
-        (-(2**31), -(2**31)),
-    ):
+    no_segment = [(index, 0) for index in (-1, player.info.segment_count, 2**31 - 1)]
+    no_level = [(0, level) for level in (-1, player.info.level_count, 255)]
+    for index, level in (*no_segment, *no_level, (-(2**31), -(2**31))):
         assert player.start(index, level, work, segment) == BAD_ARGUMENT
 
 
@@ -705,18 +689,13 @@ def test_the_number_of_steps_is_known_before(player):
 def test_threads_prepare_from_one_file_at_the_same_time(player):
     jobs = [(segment, level) for level in player.levels for segment in player.segments]
     alone = {job: player.prepare(*job) for job in jobs}
-    together: list[dict] = [{}, {}]
 
-    def prepare(results, order):
+    def prepare(order) -> dict:
         work = player.work()
-        for job in order:
-            results[job] = player.prepare(*job, work)
+        return {job: player.prepare(*job, work) for job in order}
 
-    threads = [threading.Thread(target=prepare, args=(together[i], jobs[:: 1 - 2 * i])) for i in range(2)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
+    with ThreadPoolExecutor(2) as threads:
+        together = list(threads.map(prepare, (jobs, jobs[::-1])))
     for segment, level in jobs:
         for frame in range(player.start_of(segment), player.start_of(segment + 1)):
             one, *others = [player.frame([done[segment, level]], frame) for done in (alone, *together)]

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from moving_meshes import leafed_tree
-from plants import blown_tree, bush, chain_plant
+from plants import blown_tree, bush, chain_plant, distance
 from test_blending import simulated
 from test_tubes import twigs
 
@@ -59,10 +59,6 @@ class Checked:
         corners = np.array([np.min(every, axis=(0, 1)), np.max(every, axis=(0, 1))])
         diagonal = float(np.linalg.norm(corners[1] - corners[0]))
         return max(SHARE_OF_BOUND * self.info.max_error, SHARE_OF_DIAGONAL * diagonal)
-
-
-def distance(a: np.ndarray, b: np.ndarray) -> float:
-    return float(np.sqrt(((a - b) ** 2).sum(-1)).max())
 
 
 def loaded(path_or_clip, path: Path, **options) -> Checked:

@@ -7,7 +7,7 @@ import re
 
 import numpy as np
 import pytest
-from plants import tube
+from plants import ring_quads, tube
 
 import athcodec
 from athcodec import ClipView, MotionClip
@@ -35,14 +35,11 @@ def tiered(names) -> list:
 def clip() -> MotionClip:
     """A tube in centimetres with z up at 23.976 frames per second, whose first frame is number 1001."""
     made = tube(rings=8, around=6, frames=9)
-    ring, side = 6 * np.arange(7)[:, None], np.arange(6)
-    corners = [ring + side, ring + (side + 1) % 6, ring + 6 + (side + 1) % 6, ring + 6 + side]
-    quads = np.stack(corners, axis=2).reshape(-1, 4).astype(np.int32)
     weights = np.linspace(1, 2, made.vertex_count).astype(np.float32)
     return dataclasses.replace(
         made,
         time=np.arange(9) / RATE,
-        faces=quads,
+        faces=ring_quads(8, 6),
         rest=made.rest.astype(np.float32),
         attributes={"uv": np.random.default_rng(0).random((made.vertex_count, 2)).astype(np.float32), "slack": weights},
         metadata={"unit": "cm", "up_axis": "z", "fps": RATE, "start_frame": 1001},

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from plants import distance
 
 import athcodec
 from athcodec import exporters
@@ -13,10 +14,6 @@ from athcodec.clip import ClipRange
 from athcodec.clip_view import ClipView
 from athcodec.encoding import code_segments, draft, write
 from athcodec.errors import BoundError, ClipError, ClipUnavailable
-
-
-def distance(a: np.ndarray, b: np.ndarray) -> float:
-    return float(np.linalg.norm(np.float64(a) - b, axis=-1).max())
 
 
 def part(clip: athcodec.MotionClip, start: int, stop: int) -> athcodec.MotionClip:

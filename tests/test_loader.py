@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from files import coded
-from plants import bending_tube, tube
+from plants import bending_tube, ring_quads, tube
 from programs import CACHE, install_once
 
 import athcodec
@@ -49,10 +49,7 @@ def run_node(case: str, path: Path, *words):
 def mesh_ath(tmp_path_factory):
     """A tube of quads in three segments."""
     clip = tube(20, 8, 40)
-    rings = np.arange(19)[:, None] * 8
-    around = np.arange(8)[None]
-    corners = [rings + around, rings + (around + 1) % 8, rings + 8 + (around + 1) % 8, rings + 8 + around]
-    clip.faces = np.stack(corners, axis=-1).reshape(-1, 4).astype(np.int32)
+    clip.faces = ring_quads(20, 8)
     clip.check()
     path = tmp_path_factory.mktemp("mesh") / "mesh.ath"
     return athcodec.encode(clip, path, rel_error=1e-3, segment_frames=16).path

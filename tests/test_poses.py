@@ -7,6 +7,7 @@ from io import BytesIO
 import numpy as np
 import pytest
 from files import coded
+from plants import diagonal, distance
 
 import athcodec
 from athcodec import container as ct
@@ -23,14 +24,6 @@ OPTIONS = {"rel_error": 1e-4, "segment_frames": 16, "tam": athcodec.Thresholds(0
 def about_mean(monkeypatch):
     """Files are made about the mean pose, whether it pays or not."""
     monkeypatch.setattr(Search, "about_best_reference", Search.about_mean_pose)
-
-
-def diagonal(clip):
-    return float(np.linalg.norm(np.ptp(clip.block(0, clip.frame_count).reshape(-1, 3), axis=0)))
-
-
-def distance(a, b):
-    return float(np.linalg.norm(np.asarray(a, float) - b, axis=-1).max())
 
 
 @pytest.mark.parametrize("ladder", ["none", "decades"])

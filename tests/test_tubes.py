@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from files import coded
 from moving_meshes import leafed_tree
-from plants import clip_of, tube
+from plants import clip_of, ring_quads, tube
 
 import athcodec
 from athcodec.clip import MotionClip
@@ -46,11 +46,8 @@ def twigs(frames: int = 40) -> MotionClip:
 
 def quads() -> np.ndarray:
     """(F, 4) of the twigs."""
-    lower = np.concatenate([RINGS + SIDES * (RINGS * twig + np.arange(RINGS - 1)) for twig in range(TWIGS)])[:, None]
-    side, following = np.arange(SIDES), (np.arange(SIDES) + 1) % SIDES
-    upper = lower + SIDES
-    faces = np.stack([lower + side, lower + following, upper + following, upper + side], axis=2)
-    return faces.reshape(-1, 4).astype(np.int32)
+    first = RINGS + RINGS * SIDES * np.arange(TWIGS)
+    return (ring_quads(RINGS, SIDES) + first[:, None, None]).reshape(-1, 4).astype(np.int32)
 
 
 def around_rings(frames: np.ndarray) -> np.ndarray:
