@@ -225,16 +225,10 @@ def test_zeros_and_half_lines_at_the_end_of_a_manifest_are_removed(rest, tmp_pat
     assert path.read_bytes() == b'{"output": "a", "status": "done"}\n'
 
 
-@pytest.mark.parametrize(
-    "content",
-    [
-        b"[1, 2]",
-        b'{"name": "package"}',
-        b"text\nmore\n",
-        b'{"output": 3}\n{}\n',
-        b'{"output": "a"}\nnotes\n{"output": "b"}\n',
-    ],
-)
+NO_MANIFESTS = [b"[1, 2]", b'{"name": "package"}', b"text\nmore\n", b'{"output": 3}\n{}\n']
+
+
+@pytest.mark.parametrize("content", [*NO_MANIFESTS, b'{"output": "a"}\nnotes\n{"output": "b"}\n'])
 def test_a_file_that_is_no_manifest_is_refused_and_left_alone(content, tmp_path):
     path = tmp_path / "notes.txt"
     path.write_bytes(content)

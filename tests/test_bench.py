@@ -432,13 +432,8 @@ def test_the_papers_number_of_nodes_is_met_by_its_parameters(sample_clip):
 @pytest.mark.slow
 def test_a_quick_run_leaves_results_a_report_and_pictures(tmp_path, bushy_file):
     folder = tmp_path / "out"
-    _, result = run_bench(
-        tmp_path,
-        "quick",
-        bushy_file,
-        *"--codecs athcodec bench_codecs:Rounded --bounds 1e-2 1e-3 --out".split(),
-        str(folder),
-    )
+    words = "--codecs athcodec bench_codecs:Rounded --bounds 1e-2 1e-3 --out".split()
+    _, result = run_bench(tmp_path, "quick", bushy_file, *words, str(folder))
     steps = [row["step"] for row in result["tables"][0]["rows"]]
     assert steps == ["rd", "decode", "paper", "scale", "forest", "remote", "report", "all"]
     text = (folder / "report.md").read_text()

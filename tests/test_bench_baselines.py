@@ -11,7 +11,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from athcodec.clip import MotionClip
 from bench.codecs import Source, check
 from bench.codecs.acl import SEGMENT, SkeletalTracks, _Track
 from bench.codecs.baselines import BASELINES
@@ -37,11 +36,7 @@ def piece():
     from athcodec.sources import read_hdf5, sample_path
 
     with read_hdf5(sample_path()) as clip:
-        return Source(
-            MotionClip(
-                clip.block(40, 56), clip.time[40:56], clip.vertex_branch, clip.branch_parent, clip.rest, clip.edges
-            )
-        )
+        return Source(clip.replace(positions=clip.block(40, 56), time=clip.time[40:56]))
 
 
 @pytest.fixture(scope="module")
@@ -85,11 +80,9 @@ def test_vertices_numbered_at_random_decode_in_the_order_of_the_source(codec, bu
 def test_clips_longer_than_a_segment_are_coded_in_parts(piece):
     some = np.linspace(0, 15, 270)
     start = np.minimum(some.astype(int), 14)
-    frames = piece.positions[start] + (some - start)[:, None, None] * (
-        piece.positions[start + 1] - piece.positions[start]
-    )
-    clip = piece.clip
-    longer = MotionClip(frames.astype(np.float32), np.arange(270.0), clip.vertex_branch, clip.branch_parent, clip.rest)
+    step = piece.positions[start + 1] - piece.positions[start]
+    frames = piece.positions[start] + (some - start)[:, None, None] * step
+    longer = piece.clip.replace(positions=frames.astype(np.float32), time=np.arange(270.0))
     source = Source(longer)
     codec = BASELINES[0]
     settings = {name: axis.values[axis.start] for name, axis in codec.grid(source, 1.0).items()}

@@ -36,13 +36,7 @@ def interleaved(clip, seed):
     order = np.empty(len(branch), int)
     order[np.argsort(labels, kind="stable")] = np.argsort(branch, kind="stable")
     positions = clip.block(FRAMES.start, FRAMES.stop)[:, kept][:, order]
-    return MotionClip(
-        positions=positions,
-        time=clip.time[FRAMES],
-        vertex_branch=labels,
-        branch_parent=clip.branch_parent[:BRANCHES],
-        rest=clip.rest[kept][order],
-    )
+    return MotionClip(positions, clip.time[FRAMES], labels, clip.branch_parent[:BRANCHES], clip.rest[kept][order])
 
 
 @pytest.fixture(scope="module")

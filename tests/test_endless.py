@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from files import coded
+from test_blending import beams
 
 import athcodec
 from athcodec.cli import main
 from athcodec.errors import ClipError
 from athcodec.transitions import EndlessPlay, transitions_of
-from bench.trees.beams import bend
 from bench.trees.plant import grow
 from bench.trees.wind import Wind
 
@@ -21,16 +21,7 @@ HOUR = 3600.0
 @pytest.fixture(scope="module")
 def tree():
     """A small tree of beams in wind."""
-    plant = grow(300, 2, 8.0, seed=3)
-    return athcodec.MotionClip(
-        bend(plant, Wind(6.0, 8.0, seed=3), FRAMES, FPS),
-        np.arange(FRAMES) / FPS,
-        plant.branch,
-        plant.branch_parent,
-        rest=plant.position.astype(np.float32),
-        edges=plant.edges,
-        attributes={"radius": plant.radius.astype(np.float32)},
-    )
+    return beams(grow(300, 2, 8.0, seed=3), Wind(6.0, 8.0, seed=3), FRAMES)
 
 
 @pytest.fixture(scope="module")

@@ -37,17 +37,14 @@ def moved(points):
 
 
 def write_xdmf(path, points, cells, displacement, name="u", data_format="HDF", **more):
-    before = os.getcwd()
-    os.chdir(path.parent)  # meshio puts the data where the process is
-    try:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(path.parent)  # meshio puts the data where the process is
         with meshio.xdmf.TimeSeriesWriter(path.name, data_format) as writer:
             writer.write_points_cells(points, cells)
             for time, moved in zip(TIMES, displacement):
                 writer.write_data(
                     float(time), point_data={name: moved, **more.get("point_data", {})}, cell_data=more.get("cell_data")
                 )
-    finally:
-        os.chdir(before)
     return path
 
 
@@ -135,14 +132,8 @@ def test_a_motion_comes_back_from_xdmf_pvd_and_vtu(tmp_path, make, dtype, name, 
 
 @pytest.mark.parametrize("name", ["a.xdmf", "a.pvd"])
 def test_volumes_and_data_per_cell_survive(tmp_path, name):
-    first = write_vtu(
-        tmp_path,
-        moved(CUBE)[0],
-        [("hexahedron", HEXES)],
-        cell_data={"material": [np.array([3, 4])]},
-        point_data={"mass": np.arange(12.0)},
-    )
-    with athcodec.read(first) as clip:
+    data = {"cell_data": {"material": [np.array([3, 4])]}, "point_data": {"mass": np.arange(12.0)}}
+    with athcodec.read(write_vtu(tmp_path, moved(CUBE)[0], [("hexahedron", HEXES)], **data)) as clip:
         assert clip.attributes["material"].tolist() == [3, 4] and clip.metadata["domains"]["material"] == "cell"
         athcodec.write(clip, tmp_path / name)
         with athcodec.read(tmp_path / name) as again:

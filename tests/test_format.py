@@ -22,11 +22,11 @@ import pytest
 import test_document
 import zstandard
 from files import Parts, basis_chunk, exact_rest_chunk, opened, roots, still_file
-from plants import plant
+from plants import clip_of, plant
 from test_document import assert_same_bits
 
 import athcodec
-from athcodec import MotionClip, container, errors
+from athcodec import container, errors
 from athcodec._native import BRANCH, LOOSE, SHAPE_MODES, SHEET, WHOLE, crc32c, lib
 from athcodec.encoding import streams
 from athcodec.encoding.learned_modes import LearnedModes
@@ -113,13 +113,7 @@ def test_checksum_has_the_check_value_of_the_document(spec):
 
 
 def test_smallest_file_is_what_the_encoder_writes(spec, tmp_path):
-    clip = MotionClip(
-        positions=np.array([[[1, 2, 3]]], np.float32),
-        time=np.zeros(1),
-        vertex_branch=np.zeros(1, np.int32),
-        branch_parent=np.array([-1], np.int32),
-        rest=np.array([[1.0, 2.0, 3.0]]),
-    )
+    clip = clip_of([[[1, 2, 3]]], [[1, 2, 3]], [0], [-1])
     athcodec.encode(clip, tmp_path / "smallest.ath", max_error=2**-7, attributes="none")
     data = dump(section("Smallest file"))
     assert (tmp_path / "smallest.ath").read_bytes() == data

@@ -56,15 +56,8 @@ class Maker:
         return len(self.gltf.bufferViews) - 1
 
     def accessor(self, view, dtype, shape, **more):
-        self.gltf.accessors.append(
-            pygltflib.Accessor(
-                bufferView=view,
-                componentType=COMPONENTS[np.dtype(dtype).name],
-                count=shape[0],
-                type=TYPES[shape[1]],
-                **more,
-            )
-        )
+        kind = {"componentType": COMPONENTS[np.dtype(dtype).name], "type": TYPES[shape[1]]}
+        self.gltf.accessors.append(pygltflib.Accessor(bufferView=view, count=shape[0], **kind, **more))
         return len(self.gltf.accessors) - 1
 
     def mesh(self, attributes, name=None, indices=None, mode=4, targets=None, weights=None):
@@ -244,23 +237,14 @@ def test_skins_move_vertices_by_their_weights_and_ignore_their_own_node(tmp_path
 def test_morph_targets_are_added_also_sparse_ones(tmp_path):
     made = Maker()
     dense = made.array(np.full((8, 3), 0.25))
-    made.gltf.accessors.append(
-        pygltflib.Accessor(
-            componentType=5126,
-            count=8,
-            type="VEC3",
-            bufferView=None,
-            sparse=pygltflib.Sparse(
-                count=2,
-                indices=pygltflib.AccessorSparseIndices(
-                    bufferView=made.view(np.array([1, 6], np.uint8).tobytes()), componentType=5121
-                ),
-                values=pygltflib.AccessorSparseValues(
-                    bufferView=made.view(np.array([[1, 2, 3], [4, 5, 6]], np.float32).tobytes())
-                ),
-            ),
-        )
+    rows = made.view(np.array([1, 6], np.uint8).tobytes())
+    numbers = made.view(np.array([[1, 2, 3], [4, 5, 6]], np.float32).tobytes())
+    sparse = pygltflib.Sparse(
+        count=2,
+        indices=pygltflib.AccessorSparseIndices(bufferView=rows, componentType=5121),
+        values=pygltflib.AccessorSparseValues(bufferView=numbers),
     )
+    made.accessor(None, np.float32, (8, 3), sparse=sparse)
     mesh = made.mesh(
         {"POSITION": made.array(CUBE)},
         mode=0,
@@ -477,6 +461,7 @@ def cube_json(**changes):
 
 
 ACCESSOR = {"bufferView": 0, "componentType": 5126, "count": 8, "type": "VEC3"}
+SPARSE = {"count": 1, "indices": {"bufferView": 0, "componentType": 5121}, "values": {}}
 REFUSED = {
     "version 1": ({"asset": {"version": "1.0"}}, "version"),
     "no meshes": ({"nodes": [{}]}, "expected at least one"),
@@ -490,14 +475,7 @@ REFUSED = {
         {"bufferViews": [{"buffer": 0, "byteLength": 2**50}], "accessors": [ACCESSOR | {"count": 9000}]},
         "buffer of 96",
     ),
-    "sparse values nowhere": (
-        {
-            "accessors": [
-                ACCESSOR | {"sparse": {"count": 1, "indices": {"bufferView": 0, "componentType": 5121}, "values": {}}}
-            ]
-        },
-        "got index None",
-    ),
+    "sparse values nowhere": ({"accessors": [ACCESSOR | {"sparse": SPARSE}]}, "got index None"),
     "a type": ({"accessors": [ACCESSOR | {"type": "VEC9"}]}, "VEC9"),
     "a fraction": ({"accessors": [ACCESSOR | {"count": 7.5}]}, "7.5"),
     "no number": ({"nodes": [{"mesh": "0"}]}, "'0'"),
@@ -604,13 +582,8 @@ def with_faces(clip, **metadata):
         "normals": np.tile(np.float32([0, 0, 1]), (clip.vertex_count, 1)),
         "per_branch": np.arange(3.0),
     }
-    return dataclasses.replace(
-        clip,
-        faces=faces,
-        attributes=attributes,
-        rest=clip.rest.astype(np.float32),
-        metadata={"unit": "m", "up_axis": "y", "fps": 30, "start_frame": 0} | metadata,
-    )
+    metadata = {"unit": "m", "up_axis": "y", "fps": 30, "start_frame": 0} | metadata
+    return clip.replace(faces=faces, attributes=attributes, rest=clip.rest.astype(np.float32), metadata=metadata)
 
 
 @pytest.fixture(scope="module")
@@ -732,12 +705,8 @@ def test_axes_and_units_are_turned_by_a_node_and_vertices_keep_their_numbers(tmp
 @pytest.mark.parametrize("fps", [24, 24000 / 1001, 29.97, 60, 12.5])
 def test_frames_keep_their_numbers_and_times(fps, tmp_path):
     clip = plant(seed=2, frames=30)
-    clip = dataclasses.replace(
-        clip,
-        time=5.0 / fps + np.arange(30) / fps,
-        rest=clip.rest.astype(np.float32),
-        metadata={"fps": fps, "start_frame": 100},
-    )
+    metadata = {"fps": fps, "start_frame": 100}
+    clip = clip.replace(time=5.0 / fps + np.arange(30) / fps, rest=clip.rest.astype(np.float32), metadata=metadata)
     for animation in ("joints", "morphs"):
         write(clip, tmp_path / "a.glb", animation=animation)
         with read(tmp_path / "a.glb") as back:
@@ -749,17 +718,12 @@ def test_objects_stay_apart_and_corners_split_only_where_they_differ(tmp_path):
     rest = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [5, 0, 0], [6, 0, 0]], np.float32)
     counts, indices = np.array([4, 3]), np.array([0, 1, 2, 3, 0, 2, 3])
     uv = np.array([[0, 0], [1, 0], [1, 1], [0, 1], [0, 0], [1, 1], [9, 9]], np.float32)
+    attributes = {"face_vertex_counts": counts, "face_vertex_indices": indices, "uv": uv}
     clip = MotionClip(
-        positions=rest + np.arange(3, dtype=np.float32)[:, None, None],
-        time=np.arange(3) / 24,
-        rest=rest,
+        rest + np.arange(3, dtype=np.float32)[:, None, None],
+        np.arange(3) / 24,
         edges=np.array([[4, 5]]),
-        attributes={
-            "face_vertex_counts": counts,
-            "face_vertex_indices": indices,
-            "uv": uv,
-            "part_vertex_counts": np.array([4, 2]),
-        },
+        attributes=attributes | {"part_vertex_counts": np.array([4, 2])},
         metadata={"part_names": ["leaf", "twig"], "domains": {"uv": "corner"}},
     )
     write(clip, tmp_path / "a.glb", animation="morphs")
@@ -818,13 +782,8 @@ def seasons():
 
     def part(start, stop, fps, number=0):
         held = whole.block(start, start + 1).repeat(5, axis=0) if stop == start else whole.block(start, stop)
-        return dataclasses.replace(
-            whole,
-            positions=held,
-            time=np.arange(len(held)) / fps,
-            rest=whole.rest.astype(np.float32),
-            metadata=whole.metadata | {"fps": fps, "start_frame": number},
-        )
+        metadata = whole.metadata | {"fps": fps, "start_frame": number}
+        return whole.replace(positions=held, time=np.arange(len(held)) / fps, metadata=metadata)
 
     return {
         "calm": athcodec.looped(part(0, 30, 30), 6),
@@ -880,9 +839,7 @@ def test_every_clip_moves_all_that_any_moves_over_one_skin(seasons_ath, tmp_path
 
 def test_clips_that_all_stand_still_become_animations(seasons, tmp_path):
     held = seasons["held"]
-    still = dataclasses.replace(
-        held, positions=held.rest.astype(np.float32)[None].repeat(5, axis=0), rest=held.rest.astype(np.float32)
-    )
+    still = held.replace(positions=held.rest[None].repeat(5, axis=0).astype(np.float32))
     write(athcodec.join({"a": still, "b": still}), tmp_path / "a.glb", animation="joints")
     with read(tmp_path / "a.glb", takes="all") as clip:
         assert [(clip_range.name, clip_range.frame_count) for clip_range in clip.clip_ranges] == [("a", 5), ("b", 5)]

@@ -28,17 +28,9 @@ from athcodec.sources import read
 
 pytestmark = pytest.mark.programs
 SCRIPTS = Path(__file__).resolve().parent / "node"
-PACKAGES = [
-    "three@0.187.0",
-    "gltf-validator@2.0.0-dev.3.10",
-    "@gltf-transform/core@4.5.1",
-    "@gltf-transform/extensions@4.5.1",
-    "@gltf-transform/functions@4.5.1",
-    "meshoptimizer@1.3.0",
-    "@babylonjs/core@8.56.2",
-    "@babylonjs/loaders@8.56.2",
-    "esbuild@0.28.2",
-]
+PACKAGES = [f"@gltf-transform/{part}@4.5.1" for part in ("core", "extensions", "functions")]
+PACKAGES += "three@0.187.0 gltf-validator@2.0.0-dev.3.10 meshoptimizer@1.3.0 esbuild@0.28.2".split()
+PACKAGES += "@babylonjs/core@8.56.2 @babylonjs/loaders@8.56.2".split()
 
 
 @pytest.fixture(scope="session")
@@ -48,9 +40,8 @@ def node(request):
 
     def install():
         (folder / "package.json").write_text('{"name": "checks", "private": true, "type": "module"}')
-        subprocess.run(
-            ["npm", "install", "--no-audit", "--no-fund", *PACKAGES], cwd=folder, check=True, capture_output=True
-        )
+        command = ["npm", "install", "--no-audit", "--no-fund", *PACKAGES]
+        subprocess.run(command, cwd=folder, check=True, capture_output=True)
         for script in SCRIPTS.glob("*.mjs"):
             shutil.copy(script, folder)
 

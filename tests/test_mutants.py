@@ -65,11 +65,6 @@ def test_vectors_of_real_size_use_the_features_of_the_format_together():
     }
     assert set().union(*uses.values()) >= real_size.FEATURES
     assert set().union(*uses.values()) >= set(document.KINDS)
-    assert real_size.FEATURES - uses["all"] <= {
-        "joins",
-        "sloped joins",
-        "loose branches",
-        "exact rest pose",
-        "predicted motion",
-    }
+    others = {"joins", "sloped joins", "loose branches", "exact rest pose", "predicted motion"}
+    assert real_size.FEATURES - uses["all"] <= others
     assert 50_000 < (conformance.FOLDER / "valid/real-size-all.ath").stat().st_size < 160_000

@@ -70,6 +70,8 @@ POSITIONS = np.stack(
 @pytest.fixture(scope="module")
 def clip() -> MotionClip:
     """A bough that bends and three leaves of one shape, in centimetres with z up, at 23.976 from frame 1001."""
+    names = {"part_names": NAMES, "part_kinds": ["mesh", "mesh"], "material_names": ["bark", "green"]}
+    domains = {"part_vertex_counts": "constant", "part_copies": "constant", "face_material": "face"}
     return MotionClip(
         POSITIONS,
         np.arange(FRAMES) / RATE,
@@ -83,16 +85,7 @@ def clip() -> MotionClip:
             "part_copies": np.array([1, COPIES], np.int32),
             "face_material": np.repeat(np.array([0, 1], np.int32), [len(QUADS), COPIES]),
         },
-        metadata={
-            "unit": "cm",
-            "up_axis": "z",
-            "fps": RATE,
-            "start_frame": START,
-            "part_names": NAMES,
-            "part_kinds": ["mesh", "mesh"],
-            "material_names": ["bark", "green"],
-            "domains": {"part_vertex_counts": "constant", "part_copies": "constant", "face_material": "face"},
-        },
+        metadata={"unit": "cm", "up_axis": "z", "fps": RATE, "start_frame": START, "domains": domains} | names,
     )
 
 
