@@ -24,7 +24,7 @@ from athcodec.encoding.segment import SAMPLED
 from bench import compare, features, paper, plots, progressive
 from bench.clips import encoded
 from bench.curves import Curve, mean_saving
-from bench.store import read
+from bench.store import Store, read
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -311,6 +311,16 @@ def test_results_of_a_codec_stay_when_it_is_no_longer_installed(tmp_path, bushy_
     [point] = run_bench(tmp_path, *words)[1]["points"]
     assert point["status"] == "ok"
     assert run_bench(tmp_path, *words, UNINSTALLED="1")[1]["points"] == [point]
+
+
+def test_results_are_saved_at_once_and_are_invalid_when_code_has_changed(tmp_path):
+    file = tmp_path / "results.json"
+    store = Store(file, {"command": "rd"}, {"points": ("clip",)})
+    store.add("points", {"clip": "tree", "bytes": 3, "depends": {"zip": "1.0"}})
+    later = Store(file, {"command": "rd"}, {"points": ("clip",)})
+    assert later.find("points", {"clip": "tree"}, {"zip": "1.0"})["bytes"] == 3
+    assert later.find("points", {"clip": "tree"}, {"zip": "1.1"}) is None
+    assert later.find("points", {"clip": "bush"}, {"zip": "1.0"}) is None
 
 
 def test_errors_of_a_growing_prefix_are_those_in_the_table_of_the_file(tmp_path, bushy_file):
