@@ -290,7 +290,7 @@ def distance(a: np.ndarray, b: np.ndarray) -> float:
 
 
 def diagonal(clip: MotionClip) -> float:
-    return float(np.linalg.norm(np.ptp(clip.positions.reshape(-1, 3).astype(np.float64), axis=0)))
+    return float(np.linalg.norm(np.ptp(clip.block(0, clip.frame_count).reshape(-1, 3).astype(np.float64), axis=0)))
 
 
 def bound_for(clip: MotionClip, fraction: float) -> float:
