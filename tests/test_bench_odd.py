@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import athcodec
-from athcodec.hierarchy import hierarchy_of
+from athcodec.motion.hierarchy import hierarchy_of
 from bench import compare, data, odd, rd
 from bench.codecs import Source, check, simple
 from bench.codecs.program import CannotKeep

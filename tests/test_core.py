@@ -17,8 +17,8 @@ from header import Chunk, Clip, Fade, Fault, Info, Limits, Part, Range, core
 from plants import awkward
 
 import athcodec
-from athcodec import container as ct
 from athcodec import errors
+from athcodec.decoding import container as ct
 from athcodec.encoding.search import Search
 from athcodec.encoding.segment import Settings
 

@@ -11,8 +11,8 @@ import pytest
 from moving_meshes import POINTS, assert_same_mesh, assert_same_motion, mixed_clip, quad_clip, survives_damage, swaying
 
 import athcodec
-from athcodec.clip import MotionClip
 from athcodec.errors import ClipError
+from athcodec.motion.clip import MotionClip
 
 pytestmark = pytest.mark.formats
 

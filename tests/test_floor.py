@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 import athcodec
-from athcodec import cli, view
+from athcodec import cli
+from athcodec.viewer import view
 from bench.throttled_server import ThrottledServer
 from bench.trees.tufts import fern, grass
 

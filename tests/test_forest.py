@@ -12,10 +12,10 @@ import pytest
 from plants import bending_tube, blown_tree
 
 import athcodec
-from athcodec.core_file import FILE_ORDER
+from athcodec.decoding.core_file import FILE_ORDER
 from athcodec.gpu import GpuFile
 from athcodec.gpu.evaluate import Passes, Source
-from athcodec.joining import in_wind
+from athcodec.motion.joining import in_wind
 from athcodec.viewer.build_viewer import modules
 from bench.browser import WEBGPU_FLAGS, chromium
 from bench.throttled_server import ThrottledServer

@@ -26,8 +26,9 @@ from plants import clip_of, plant
 from test_document import assert_same_bits
 
 import athcodec
-from athcodec import container, errors
+from athcodec import errors
 from athcodec._native import BRANCH, LOOSE, SHAPE_MODES, SHEET, WHOLE, crc32c, lib
+from athcodec.decoding import container
 from athcodec.encoding import streams
 from athcodec.encoding.learned_modes import LearnedModes
 from athcodec.encoding.motion import LevelStream, Plan, SegmentMotion

@@ -10,10 +10,10 @@ from plants import distance
 import athcodec
 from athcodec import exporters
 from athcodec.cli import main
-from athcodec.clip import ClipRange
-from athcodec.clip_view import ClipView
+from athcodec.decoding.clip_view import ClipView
 from athcodec.encoding import code_segments, draft, write
 from athcodec.errors import BoundError, ClipError, ClipUnavailable
+from athcodec.motion.clip import ClipRange
 
 
 def part(clip: athcodec.MotionClip, start: int, stop: int) -> athcodec.MotionClip:

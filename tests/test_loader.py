@@ -20,7 +20,7 @@ from plants import bending_tube, ring_quads, tube
 from programs import CACHE, install_once
 
 import athcodec
-from athcodec.joining import in_wind
+from athcodec.motion.joining import in_wind
 from bench.throttled_server import WEB, ThrottledServer
 
 ROOT = Path(__file__).resolve().parent.parent

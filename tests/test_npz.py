@@ -12,8 +12,8 @@ from moving_meshes import mixed_clip, quad_clip, survives_damage
 from test_hdf5 import assert_same_clip
 
 import athcodec
-from athcodec.clip import MotionClip
 from athcodec.errors import ClipError
+from athcodec.motion.clip import MotionClip
 from athcodec.sources import raw
 
 

@@ -11,10 +11,10 @@ import trimesh
 from moving_meshes import assert_same_mesh, assert_same_motion, mixed_clip, quad_clip, survives_damage
 
 import athcodec
-from athcodec.clip import MotionClip
 from athcodec.errors import ClipError, SourceWarning
+from athcodec.files.reading import Budget
+from athcodec.motion.clip import MotionClip
 from athcodec.sources.mesh import parse_mesh
-from athcodec.sources.opening import Budget
 
 pytestmark = pytest.mark.formats
 

@@ -10,9 +10,9 @@ from moving_meshes import leafed_tree
 from plants import clip_of, ring_quads, tube
 
 import athcodec
-from athcodec.clip import MotionClip
 from athcodec.encoding import streams
 from athcodec.encoding.rings import ring_sizes
+from athcodec.motion.clip import MotionClip
 from spec.document import File
 
 SIDES, RINGS, TWIGS = 6, 12, 9

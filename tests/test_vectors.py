@@ -10,8 +10,9 @@ from pathlib import Path
 
 import pytest
 
-from athcodec import container, errors
-from athcodec.ath_file import AthFile
+from athcodec import errors
+from athcodec.decoding import container
+from athcodec.decoding.ath_file import AthFile
 from spec import conformance
 
 ROOT = Path(__file__).resolve().parent.parent

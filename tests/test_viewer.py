@@ -24,8 +24,9 @@ import pytest
 from plants import bending_tube, clip_of
 
 import athcodec
-from athcodec import cli, view
-from athcodec import container as ct
+from athcodec import cli
+from athcodec.decoding import container as ct
+from athcodec.viewer import view
 from athcodec.viewer.build_viewer import MOST_BYTES, own_bytes
 from bench import throttled_server
 from bench.throttled_server import WEB, ThrottledServer
