@@ -1,6 +1,7 @@
 """Tests the vectors: changes the code of FORMAT.md in one place at a time, and looks whether a vector tells.
 
     python -m spec.mutants                    all changes; writes spec/mutants.md
+    python -m spec.mutants --draw N --seed S  N of them, drawn at random; writes spec/mutants.md
     python -m spec.mutants --only GLOB        those whose name matches; prints what no vector tells
     python -m spec.mutants --list [GLOB]      their names
 
@@ -22,6 +23,7 @@ import hashlib
 import math
 import os
 import pickle
+import random
 import re
 import resource
 import signal
@@ -82,14 +84,6 @@ class Mutant:
     line: int  # of FORMAT.md, which has to run; 0: any may do
     of_floats: int  # the number of the expression that has to be of floats; -1: any
 
-    @property
-    def heading(self) -> str:
-        """The section of FORMAT.md that it is in."""
-        above = document.TEXT.splitlines()[: self.place_line]
-        return next(line.lstrip("# ") for line in reversed(above) if re.match(r"#{2,4} [A-Z]", line))
-
-    place_line: int = 0
-
 
 def parent_of(node: ast.AST) -> ast.AST:
     return node.up  # type: ignore[attr-defined]
@@ -146,8 +140,7 @@ class Changes:
         if self._names[name] > 1:
             name += f" ({self._names[name]})"
         number = node.number if of_floats else -1  # type: ignore[attr-defined]
-        place_line = self.tree.body[self.top].lineno
-        self.mutants.append(Mutant(name, place, replacement, self.top, self.function, self.line, number, place_line))
+        self.mutants.append(Mutant(name, place, replacement, self.top, self.function, self.line, number))
 
 
 def shown_with(node: ast.AST) -> ast.AST:
@@ -600,6 +593,11 @@ class Reason:
 
     why: str
     like: list[str]
+    gap: bool = False  # A vector could tell the changes, but none does.
+
+    @property
+    def sentence(self) -> str:
+        return ("*Gap.* " if self.gap else "") + " ".join(self.why.split())
 
     def matches(self, name: str) -> bool:
         return any(re.fullmatch(pattern, name) for pattern in self.like)
@@ -609,34 +607,50 @@ def reasons() -> list[Reason]:
     return [Reason(**entry) for entry in tomllib.loads(REASONS.read_text("utf-8"))["reason"]]
 
 
-def faults(fates: dict[str, str], known: list[Reason]) -> list[str]:
-    """What is missed without a reason, and reasons that are not needed."""
+def faults(fates: dict[str, str], known: list[Reason], is_complete: bool = True) -> list[str]:
+    """Return what is missed without a reason and, if all changes were tried, the reasons that are not needed."""
     missed = [name for name, fate in fates.items() if fate == MISSED]
     lines = [f"not caught: {name}" for name in missed if not any(reason.matches(name) for reason in known)]
-    patterns = [pattern for reason in known for pattern in reason.like]
+    patterns = [pattern for reason in known for pattern in reason.like if is_complete]
     unneeded = [pattern for pattern in patterns if not any(re.fullmatch(pattern, name) for name in missed)]
     return lines + [f"no change that is not caught is like: {pattern}" for pattern in unneeded]
 
 
-def as_markdown(mutants: list[Mutant], fates: dict[str, str], vectors: int, seconds: float) -> str:
-    found: dict[str, Counter] = defaultdict(Counter)
-    for mutant in mutants:
-        fate = fates[mutant.name]
-        found[mutant.heading]["missed" if fate == MISSED else fate.split()[0]] += 1
-    total = sum(found.values(), Counter())
+def as_markdown(drawn: dict[str, str], changes: int, how: str, vectors: int, seconds: float) -> str:
+    """Return the page about the changes that were tried: `drawn` has what became of each of them."""
+    fates = Counter(MISSED if fate == MISSED else fate.split()[0] for fate in drawn.values())
+    known = reasons()
+    survivors: dict[str, list[str]] = defaultdict(list)
+    for name, fate in drawn.items():
+        if fate == MISSED:
+            reason = next((reason for reason in known if reason.matches(name)), None)
+            survivors[reason.sentence if reason else "Nobody has looked at these changes yet."].append(name)
+    caught = len(drawn) - fates[MISSED]
     lines = [
-        "# Changes of the document's code",
+        "# Mistakes that the vectors find",
         "",
-        f"Written by `python -m spec.mutants`. Each change was tried with those of {vectors} vectors that run what",
-        f"it changes, the fastest first, up to {seconds:g} s of decoding. It is caught by another result, an exception",
-        "that is no error of the format, or because decoding does not end. `mutants.toml` says why some are missed.",
+        f"`python -m spec.mutants {how}".rstrip() + "` wrote this page. The command makes one mistake at a time in the",
+        "Python code of [FORMAT.md](../FORMAT.md), which is a complete decoder: another constant, operator, comparison",
+        "or order of operations, a condition that is always true or never, a missing statement, swapped arguments. It",
+        "decodes the vectors that run the changed line, the fastest first, until one tells the changed decoder from",
+        f"the true one or {seconds:g} s of decoding have passed. A change survives if none of them does.",
         "",
-        "| Section of FORMAT.md | changes | result | exception | no end | not caught |",
-        "|---|---:|---:|---:|---:|---:|",
+        "| | changes |",
+        "|---|---:|",
+        f"| possible | {changes} |",
+        f"| tried with up to {vectors} vectors | {len(drawn)} |",
+        f"| told apart by another result | {fates['result']} |",
+        f"| told apart by an exception that is no error of the format | {fates['exception']} |",
+        f"| told apart because decoding does not end | {fates['no']} |",
+        f"| **told apart in all** | **{caught} ({100 * caught / len(drawn):.1f} %)** |",
+        f"| survived | {fates[MISSED]} |",
+        "",
+        "## Survivors",
+        "",
+        "`spec/mutants.toml` has the reasons. *Gap* marks changes that a vector could tell, but none does.",
     ]
-    for heading, how in [*found.items(), ("**all**", total)]:
-        numbers = [how.total(), how["result"], how["exception"], how["no"], how["missed"]]
-        lines.append(f"| {heading} | {' | '.join(map(str, numbers))} |")
+    for sentence, names in survivors.items():
+        lines += ["", sentence, "", *(f"- `{name}`" for name in names)]
     return "\n".join(lines) + "\n"
 
 
@@ -644,6 +658,10 @@ def main(words: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="python -m spec.mutants", description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--only", metavar="GLOB", default="*", help="changes whose name matches; writes no report")
     parser.add_argument("--list", nargs="?", const="*", metavar="GLOB", help="print the names of changes")
+    parser.add_argument("--draw", type=int, metavar="N", help="try N changes, drawn at random")
+    parser.add_argument(
+        "--seed", type=int, default=0, help="of the draw; a larger N adds to the same draw (%(default)s)"
+    )
     parser.add_argument("--quick", action="store_true", help="only with the fastest vectors; writes no report")
     parser.add_argument(
         "--seconds", type=float, default=MOST_SECONDS, help="of vectors that a change is tried with (%(default)s)"
@@ -658,8 +676,11 @@ def main(words: list[str] | None = None) -> int:
     cache = Cache.of(changes.tree)
     vectors = measure(changes, cache)
     print(f"{len(vectors)} vectors in {sum(known.seconds for known in vectors):.0f} s", flush=True)
-    mutants = [mutant for mutant in changes.mutants if mutant.of_floats < 0 or mutant.of_floats in cache.floats]
-    mutants = [mutant for mutant in mutants if fnmatchcase(mutant.name, options.only)]
+    possible = [mutant for mutant in changes.mutants if mutant.of_floats < 0 or mutant.of_floats in cache.floats]
+    mutants = [mutant for mutant in possible if fnmatchcase(mutant.name, options.only)]
+    if options.draw is not None:
+        random.Random(options.seed).shuffle(mutants)
+        mutants = mutants[: options.draw]
     gc.freeze()  # pages that all processes share
     seconds = QUICK_SECONDS if options.quick else options.seconds
     fates = Run(changes, vectors, cache, seconds).all(mutants, options.jobs)
@@ -667,8 +688,9 @@ def main(words: list[str] | None = None) -> int:
         missed = [name for name, fate in fates.items() if fate == MISSED]
         print(*missed, f"{len(fates)} changes, {len(missed)} not caught", sep="\n")
         return 0
-    REPORT.write_text(as_markdown(mutants, fates, len(vectors), seconds), "utf-8")
-    wrong = faults(fates, reasons())
+    how = "" if options.draw is None else f"--draw {options.draw} --seed {options.seed}"
+    REPORT.write_text(as_markdown(fates, len(possible), how, len(vectors), seconds), "utf-8")
+    wrong = faults(fates, reasons(), is_complete=options.draw is None)
     print(*wrong, f"{len(fates)} changes, {len(wrong)} faults, {time.monotonic() - begun:.0f} s", sep="\n")
     return 1 if wrong else 0
 
