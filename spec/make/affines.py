@@ -8,8 +8,7 @@ from spec.document import rules
 from spec.make.base import *
 
 valid(
-    "whitening",
-    "nodes whose subtrees extend in 0, 1, 2 and 3 directions",
+    "whitening: nodes whose subtrees extend in 0, 1, 2 and 3 directions",
     lambda: moving(
         [
             Stem(-1, 2),
@@ -43,8 +42,7 @@ valid(
     ),
 )
 valid(
-    "maps-largest",
-    "maps whose steps are 2^100 and 2^-100 in turn",
+    "maps-largest: maps whose steps are 2^100 and 2^-100 in turn",
     lambda: Plant(
         [Stem(-1, 2), Stem(0, 1, 1), Stem(-1, 2), Stem(2, 1, 1), Stem(-1, 2), Stem(4, 1, 1)],
         2,
@@ -74,14 +72,13 @@ def affines(*script) -> Callable[[], bytes]:
     return make
 
 
-motion("step-beyond", AFFINES, 0, "the step of a map is 2^100.5", affines(201))
-motion("step-below", AFFINES, 0, "the step of a map is 2^-100.5", affines(-201))
-motion("frequencies", AFFINES, 0, "a row codes three frequencies of two frames", affines(0, 3))
-motion("zero-behind", AFFINES, 0, "a zero byte behind the stream", lambda: fork().content(AFFINES, 0, 1) + b"\0", 1)
-motion("bytes-behind", AFFINES, 0, "bytes behind the stream", lambda: fork().content(AFFINES, 0, 0) + b"\1" * 12)
+motion(AFFINES, 0, "step-beyond: the step of a map is 2^100.5", affines(201))
+motion(AFFINES, 0, "step-below: the step of a map is 2^-100.5", affines(-201))
+motion(AFFINES, 0, "frequencies: a row codes three frequencies of two frames", affines(0, 3))
+motion(AFFINES, 0, "zero-behind: a zero byte behind the stream", lambda: fork().content(AFFINES, 0, 1) + b"\0", 1)
+motion(AFFINES, 0, "bytes-behind: bytes behind the stream", lambda: fork().content(AFFINES, 0, 0) + b"\1" * 12)
 invalid(
-    "affines-change",
-    "a step changes by more than 400",
+    "affines-change: a step changes by more than 400",
     lambda: Plant(
         [Stem(-1, 2), Stem(0, 1, 1), Stem(-1, 2), Stem(2, 1, 1)],
         points=[[0.0] * 3] * 6,
@@ -91,7 +88,6 @@ invalid(
 )
 for side_, width_ in (("above", 203), ("below", 197)):
     valid(
-        f"whitening-{side_}",
-        f"a node that extends {side_} 1/100 as far in its second direction as in its first",
+        f"whitening-{side_}: a node that extends {side_} 1/100 as far in its second direction as in its first",
         lambda width_=width_: placed([Stem(-1, 2), Stem(0, 1, 1)], [[0, 0, 0], [10000, 0, 0], [10000, width_, 0]], 134),
     )

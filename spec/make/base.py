@@ -42,25 +42,22 @@ MADE: dict[str, Plant | Draft | bytes | Callable] = {}  # by the name of the vec
 
 
 def valid(
-    name: str,
-    reason: str,
-    make: Plant | Draft | bytes | Callable,
-    scripted: bool = True,
-    mesh: np.ndarray | None = None,
+    title: str, make: Plant | Draft | bytes | Callable, scripted: bool = True, mesh: np.ndarray | None = None
 ) -> None:
+    """Declare a valid vector by "NAME: REASON"."""
+    name, reason = title.split(": ", 1)
     MADE[name] = make
     VECTORS.append(Vector(name, reason, lambda: bytes_of(make), scripted=scripted, mesh=mesh_bytes(mesh)))
 
 
 def invalid(
-    name: str,
-    reason: str,
+    title: str,
     make: Draft | bytes | Callable,
     error: str = "BAD_CHUNK",
     item: str | int = "open",
     mesh: np.ndarray | None = None,
 ) -> None:
-    VECTORS.append(Vector(name, reason, lambda: bytes_of(make), error, str(item), mesh=mesh_bytes(mesh)))
+    VECTORS.append(Vector(*title.split(": ", 1), lambda: bytes_of(make), error, str(item), mesh=mesh_bytes(mesh)))
 
 
 def mesh_bytes(mesh: np.ndarray | None) -> bytes | None:
@@ -158,8 +155,8 @@ def refinements(stems: list[Stem], seed: int, large: int = 12, **fields) -> Plan
     return plant
 
 
-def header(name: str, reason: str, error: str = "BAD_HEADER", **fields) -> None:
-    invalid(f"header-{name}", reason, lambda: lone().draft().with_header(**fields), error)
+def header(title: str, error: str = "BAD_HEADER", **fields) -> None:
+    invalid(f"header-{title}", lambda: lone().draft().with_header(**fields), error)
 
 
 def joins(*widths: float) -> tuple[Join, ...]:
@@ -171,8 +168,8 @@ def flipped(data: bytes, place: int) -> bytes:
     return data[:place] + bytes([data[place] ^ 0x10]) + data[place + 1 :]
 
 
-def table(name: str, reason: str, make: Callable[[], Draft | bytes], error: str = "BAD_CHUNK_TABLE") -> None:
-    invalid(f"table-{name}", reason, make, error)
+def table(title: str, make: Callable[[], Draft | bytes], error: str = "BAD_CHUNK_TABLE") -> None:
+    invalid(f"table-{title}", make, error)
 
 
 def inserted(at: int, *entries: Entry) -> Draft:
@@ -191,20 +188,18 @@ def end_of(draft: Draft, kind: int, level: int = NO_LEVEL, segment: int = 0) -> 
     return len(draft.file()) - sum(len(entry.content) for entry in behind)
 
 
-def prelude(name: str, kind: int, reason: str, content: bytes | Callable[[], bytes], error: str = "BAD_CHUNK") -> None:
+def prelude(kind: int, title: str, content: bytes | Callable[[], bytes], error: str = "BAD_CHUNK") -> None:
     def make() -> Draft:
         return fork().change(kind, content=content() if callable(content) else content)
 
-    invalid(f"{KIND_NAMES[kind].lower()}-{name}", reason, make, error)
+    invalid(f"{KIND_NAMES[kind].lower()}-{title}", make, error)
 
 
-def motion(
-    name: str, kind: int, level: int, reason: str, content: bytes | Callable[[], bytes], segment: int = 0
-) -> None:
+def motion(kind: int, level: int, title: str, content: bytes | Callable[[], bytes], segment: int = 0) -> None:
     def make() -> Draft:
         return fork().change(kind, level, segment, content=content() if callable(content) else content)
 
-    invalid(f"{KIND_NAMES[kind].lower()}-{name}", reason, make, item=level)
+    invalid(f"{KIND_NAMES[kind].lower()}-{title}", make, item=level)
 
 
 def forked_plan():

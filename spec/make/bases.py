@@ -19,10 +19,9 @@ def all_waves(frames: int) -> Callable[[], Plant]:
 
 
 for frames in (2, 3, 4, 7, 33, 255, 256):
-    valid(f"waves-{frames}", f"all waves of {frames} frames, once of a beam and once periodic", all_waves(frames))
+    valid(f"waves-{frames}: all waves of {frames} frames, once of a beam and once periodic", all_waves(frames))
 valid(
-    "learned-basis",
-    "a learned basis of one row, at the ends of its range",
+    "learned-basis: a learned basis of one row, at the ends of its range",
     lambda: lone(
         frames=4,
         heads={0: stems_head(0.5, 0, 3, 1, basis_stream([[8192, -8192, 8192, 0]]))},
@@ -30,15 +29,13 @@ valid(
     ),
 )
 valid(
-    "learned-basis-full",
-    "a learned basis of as many rows as frames, beside waves on other levels",
+    "learned-basis-full: a learned basis of as many rows as frames, beside waves on other levels",
     lambda: moving(
         FORK, 43, heads={1: stems_head(0.5, 1, 3, 3, basis_stream([[8192, 1, -5], [-8192, 8192, -8192], [0, 0, 77]]))}
     ),
 )
 valid(
-    "learned-basis-zero",
-    "a learned basis of zeros, of no bytes but the stream's",
+    "learned-basis-zero: a learned basis of zeros, of no bytes but the stream's",
     lambda: moving([Stem(-1, 3)], 44, heads={0: stems_head(0.5, 1, 3, 2, basis_stream([[0] * 3] * 2))}),
 )
 WAVE_ROWS = (  # of four rows over four frames: exponents, integers; the axes without a use of the last row are not 0
@@ -48,13 +45,12 @@ WAVE_ROWS = (  # of four rows over four frames: exponents, integers; the axes wi
     *row((1, 2, 3), (5, 0, 0)),
 )
 valid(
-    "basis-in-waves",
-    "a learned basis of four rows in waves, one of them of the least step",
+    "basis-in-waves: a learned basis of four rows in waves, one of them of the least step",
     lambda: moving(FORK, 45, frames=4, heads={1: stems_head(0.5, 1, 2, 4, basis_in_waves(4, *WAVE_ROWS, rank=4))}),
 )
 valid(
-    "basis-in-waves-zero",
-    "a learned basis of two rows in waves: one of zeros, and one like the first of its level before",
+    "basis-in-waves-zero: a learned basis of two rows in waves: one of zeros, and one like the first of its level "
+    "before",
     lambda: moving(
         FORK,
         46,
@@ -66,8 +62,7 @@ valid(
     ),
 )
 valid(
-    "basis-shared",
-    "levels that share a learned basis, which lies with the first of them",
+    "basis-shared: levels that share a learned basis, which lies with the first of them",
     lambda: moving(
         FORK,
         47,
@@ -79,8 +74,7 @@ valid(
     ),
 )
 valid(
-    "basis-of-both-kinds",
-    "learned bases in waves that begin with rows by their entries, and the other way round",
+    "basis-of-both-kinds: learned bases in waves that begin with rows by their entries, and the other way round",
     lambda: moving(
         FORK,
         48,
@@ -94,8 +88,7 @@ valid(
     ),
 )
 valid(
-    "node-waves",
-    "stems in the waves of maps beside those of stems",
+    "node-waves: stems in the waves of maps beside those of stems",
     lambda: moving(FORK, 45, heads={1: stems_head(0.5, 1, 1)}),
 )
 
@@ -108,22 +101,17 @@ def basis(rank: int, kind: int, stream: bytes) -> Callable[[], bytes]:
     return lambda: stems_head(0.5, 0, kind, rank, stream)
 
 
-motion("basis-4", STEMS, 1, "Basis 4", basis(1, 4, basis_stream([[0, 0]])))
-motion("basis-255", STEMS, 1, "Basis 255", basis(1, 255, basis_stream([[0, 0]])))
-motion("rank-0", STEMS, 1, "Basis_Rank 0 though there is a basis", basis(0, 3, b""))
+motion(STEMS, 1, "basis-4: Basis 4", basis(1, 4, basis_stream([[0, 0]])))
+motion(STEMS, 1, "basis-255: Basis 255", basis(1, 255, basis_stream([[0, 0]])))
+motion(STEMS, 1, "rank-0: Basis_Rank 0 though there is a basis", basis(0, 3, b""))
 motion(
-    "rank-more-than-frames",
-    STEMS,
-    1,
-    "Basis_Rank 3 in a segment of two frames",
-    basis(3, 3, basis_stream([[0, 0]] * 3)),
+    STEMS, 1, "rank-more-than-frames: Basis_Rank 3 in a segment of two frames", basis(3, 3, basis_stream([[0, 0]] * 3))
 )
-motion("basis-length-missing", STEMS, 1, "the chunk ends inside Basis_Length", lambda: stems_head(0.5, 0, 3, 1)[:11])
+motion(STEMS, 1, "basis-length-missing: the chunk ends inside Basis_Length", lambda: stems_head(0.5, 0, 3, 1)[:11])
 motion(
-    "basis-length-more",
     STEMS,
     1,
-    "Basis_Length is more than the chunk holds",
+    "basis-length-more: Basis_Length is more than the chunk holds",
     lambda: struct.pack("<fBBHBI", 0.5, 0, 3, 1, 255, 100) + basis_stream([[64, 128]]),
 )
 for name, level, reason, base in (
@@ -133,11 +121,10 @@ for name, level, reason, base in (
     ("missing", 2, "Basis_Level is a level without STEMS", 0),
 ):
     motion(
-        f"basis-level-{name}", STEMS, level, reason, lambda base=base: stems_head(0.5, 0, 3, 1, base=base), segment=1
+        STEMS, level, f"basis-level-{name}: {reason}", lambda base=base: stems_head(0.5, 0, 3, 1, base=base), segment=1
     )
 invalid(
-    "stems-basis-level-rank",
-    "Basis_Rank 1 though Basis_Level has a basis of two rows",
+    "stems-basis-level-rank: Basis_Rank 1 though Basis_Level has a basis of two rows",
     lambda: (
         forked(heads={1: stems_head(0.5, 0, 3, 2, basis_stream([[64, 128], [192, 256]]))})
         .draft()
@@ -145,44 +132,39 @@ invalid(
     ),
     item=2,
 )
-motion("basis-beyond-1", STEMS, 1, "an entry of a learned basis is 8193", basis(1, 3, basis_stream([[8192, 8193]])))
-motion("basis-below-1", STEMS, 1, "an entry of a learned basis is -8193", basis(1, 3, basis_stream([[-8193, 0]])))
+motion(STEMS, 1, "basis-beyond-1: an entry of a learned basis is 8193", basis(1, 3, basis_stream([[8192, 8193]])))
+motion(STEMS, 1, "basis-below-1: an entry of a learned basis is -8193", basis(1, 3, basis_stream([[-8193, 0]])))
 for name, reason, exponents in (
     ("change", "an exponent of a row of a basis changes by 401", (-200, 401)),
     ("high", "an exponent of a row of a basis is 201", (201, 0)),
     ("low", "an exponent of a row of a basis is -201", (0, -201)),
 ):
     motion(
-        f"basis-exponent-{name}",
         STEMS,
         1,
-        reason,
+        f"basis-exponent-{name}: {reason}",
         lambda exponents=exponents: basis(2, 2, basis_in_waves(2, *exponents, *row((1, 1, 0)), rank=2))(),
     )
 motion(
-    "basis-in-waves-frequencies",
     STEMS,
     1,
-    "a row of a basis codes three frequencies of two frames",
+    "basis-in-waves-frequencies: a row of a basis codes three frequencies of two frames",
     lambda: basis(1, 2, basis_in_waves(2, 0, *row((1, 0, 0), (1, 0, 0), (1, 0, 0)), rank=1))(),
 )
 motion(
-    "basis-in-waves-zero-behind",
     STEMS,
     1,
-    "a zero byte behind the stream of a basis in waves",
+    "basis-in-waves-zero-behind: a zero byte behind the stream of a basis in waves",
     lambda: basis(1, 2, basis_in_waves(2, 0, *row((1, 0, 0)), rank=1) + b"\0")(),
 )
 motion(
-    "basis-zero-behind",
     STEMS,
     1,
-    "a zero byte behind the stream of a basis",
+    "basis-zero-behind: a zero byte behind the stream of a basis",
     basis(1, 3, basis_stream([[64, 128]]) + b"\0"),
 )
 valid(
-    "basis-exponents",
-    "the exponent of a row of a basis is -200, and 400 more in the next",
+    "basis-exponents: the exponent of a row of a basis is -200, and 400 more in the next",
     lambda: Plant(
         SHORT,
         frames=2,
@@ -191,22 +173,19 @@ valid(
     ),
 )
 motion(
-    "basis-length-one-more",
     STEMS,
     1,
-    "Basis_Length is one more than the chunk holds",
+    "basis-length-one-more: Basis_Length is one more than the chunk holds",
     lambda: struct.pack("<fBBHBI", 0.5, 0, 3, 2, 255, 1 + len(IMPULSES)) + IMPULSES,
 )
 motion(
-    "basis-length-cut",
     STEMS,
     1,
-    "the chunk ends before the last byte of Basis_Length",
+    "basis-length-cut: the chunk ends before the last byte of Basis_Length",
     lambda: stems_head(0.5, 0, 3, 1)[:12],
 )
 valid(
-    "basis-of-level-0",
-    "learned bases that begin with that of level 0",
+    "basis-of-level-0: learned bases that begin with that of level 0",
     lambda: Plant(
         SHORT,
         frames=3,
@@ -235,13 +214,12 @@ def shrunk(last: int) -> Plant:
 ROUNDED = (263597123, 32053444), (241475353, 36228921), (79323412, 26324395), (170050111, 70213091)
 for side, last in (("above", 1237), ("below", 1236)):
     valid(
-        f"basis-short-{side}",
-        f"a row of a basis whose squares add up to {side} 1e-200, since the known rows are no unit vectors",
+        f"basis-short-{side}: a row of a basis whose squares add up to {side} 1e-200, since the known rows are no unit "
+        "vectors",
         lambda last=last: shrunk(last),
     )
 valid(
-    "basis-rounded",
-    "rows of bases, of which an entry is within 2^-56 of the middle between two numbers of binary32",
+    "basis-rounded: rows of bases, of which an entry is within 2^-56 of the middle between two numbers of binary32",
     lambda: Plant(
         [Stem(-1, 2)],
         frames=8,
@@ -255,8 +233,8 @@ valid(
     ),
 )
 valid(
-    "waves-of-nodes-8",
-    "all waves of maps of 8 frames; what the third one is computed from goes to and fro by the last bit, for 32 times",
+    "waves-of-nodes-8: all waves of maps of 8 frames; what the third one is computed from goes to and fro by the "
+    "last bit, for 32 times",
     lambda: Plant(
         FORK,
         frames=8,
@@ -266,8 +244,7 @@ valid(
     ),
 )
 valid(
-    "waves-of-stems-66",
-    "the fourth wave of 66 frames, of which the same is true",
+    "waves-of-stems-66: the fourth wave of 66 frames, of which the same is true",
     lambda: Plant(
         SINGLE,
         frames=66,

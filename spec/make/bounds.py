@@ -20,8 +20,7 @@ def mode_and_more(share: float) -> list[list[float]]:
 
 for side_, size_ in (("above", 1.015), ("below", 0.985)):
     valid(
-        f"sheet-thin-{side_}",
-        f"a sheet that is {side_} 1/100 as wide as long, once turned",
+        f"sheet-thin-{side_}: a sheet that is {side_} 1/100 as wide as long, once turned",
         lambda size_=size_: placed(
             [Stem(-1, 1), Stem(0, 4, 0, SHEET)],
             [[0, 0, 0], *([x, x + y * 0.01 * size_, 0] for x, y in ((1, 1), (1, -1), (-1, 1), (-1, -1)))],
@@ -29,13 +28,11 @@ for side_, size_ in (("above", 1.015), ("below", 0.985)):
         ),
     )
     valid(
-        f"sheet-mode-{side_}",
-        f"a sheet whose places leave {side_} 1/100000 of a mode",
+        f"sheet-mode-{side_}: a sheet whose places leave {side_} 1/100000 of a mode",
         lambda size_=size_: placed([Stem(-1, 1), Stem(0, 2, 0, SHEET)], [[0, 0, 0], *mode_and_more(1e-5 * size_)], 136),
     )
     valid(
-        f"tube-function-{side_}",
-        f"a tube whose rings leave {side_} 1/100000 of a function",
+        f"tube-function-{side_}: a tube whose rings leave {side_} 1/100000 of a function",
         lambda size_=size_: placed(
             [Stem(-1, 6, flags=SHEET, ring=2)],
             [
@@ -47,15 +44,13 @@ for side_, size_ in (("above", 1.015), ("below", 0.985)):
         ),
     )
     valid(
-        f"tangent-short-{side_}",
-        f"a stem of {side_} 1e-100, which has a direction or none",
+        f"tangent-short-{side_}: a stem of {side_} 1e-100, which has a direction or none",
         lambda size_=size_: placed(
             [Stem(-1, 2), Stem(0, 2, 1)], [[0, 0, 0], [0, 1e-100 * size_, 0], [0, 1, 1], [0, 2, 1]], 138
         ),
     )
     valid(
-        f"sheet-short-{side_}",
-        f"a sheet whose matrix to turn by has squares that add up to {side_} 1e-200",
+        f"sheet-short-{side_}: a sheet whose matrix to turn by has squares that add up to {side_} 1e-200",
         lambda size_=size_: placed(
             [Stem(-1, 2), Stem(0, 2, 0, SHEET), Stem(1, 2, 1)],
             [[0, 0, 0], [0, 1, 0], [0, 1e-50 * (size_**2 / 1.0203) ** 0.25, 0], [0, 0, 0], [0, 1, 1], [0, 2, 1]],
@@ -66,8 +61,7 @@ for side_, size_ in (("above", 1.015), ("below", 0.985)):
         ),
     )
     valid(
-        f"predicted-short-{side_}",
-        f"a step and a way at rest whose squares add up to {side_} 1e-60",
+        f"predicted-short-{side_}: a step and a way at rest whose squares add up to {side_} 1e-60",
         lambda size_=size_: predicted(
             [Stem(-1, 3, flags=WHOLE)],
             swayed(6, 140, [Stem(-1, 3, flags=WHOLE)], follow=1.0, still=0.1),
@@ -98,7 +92,6 @@ for name_ in (
     "predicted-about-copies",
 ):
     valid(
-        f"{name_}-in-binary64",
-        "the same in binary64, which shows the order of every sum and product",
+        f"{name_}-in-binary64: the same in binary64, which shows the order of every sum and product",
         lambda name_=name_: in_binary64(name_),
     )

@@ -8,13 +8,12 @@ from collections.abc import Callable
 from spec.make.base import *
 
 valid(
-    "corrections",
-    "corrections on the last level: blocks of 8 frames, the last of 2, and vertices that have none",
+    "corrections: corrections on the last level: blocks of 8 frames, the last of 2, and vertices that have none",
     lambda: Plant([Stem(-1, 6)], 18, scripts={(CORRECTIONS, 1): lambda: Chance(54)}),
 )
 valid(
-    "corrections-footprints",
-    "corrections of all widths that overlap, are cut off at both ends of a segment, and sum up to 0 in a frame",
+    "corrections-footprints: corrections of all widths that overlap, are cut off at both ends of a segment, and sum "
+    "up to 0 in a frame",
     lambda: Plant(
         [Stem(-1, 2)],
         5,
@@ -27,18 +26,15 @@ valid(
     ),
 )
 valid(
-    "corrections-wide",
-    "corrections of binary64 positions",
+    "corrections-wide: corrections of binary64 positions",
     lambda: Plant(FORK, 3, is_float64=True, origin=(0.1, 0.2, 0.3), scripts={(CORRECTIONS, 2): lambda: Chance(55)}),
 )
 valid(
-    "corrections-none",
-    "a CORRECTIONS chunk that corrects nothing, in one of two segments",
+    "corrections-none: a CORRECTIONS chunk that corrects nothing, in one of two segments",
     lambda: Plant(FORK, 3, 2, scripts={(CORRECTIONS, 2, 1): []}),
 )
 valid(
-    "corrections-to-infinity",
-    "a Correction_Step at the end of binary32",
+    "corrections-to-infinity: a Correction_Step at the end of binary32",
     lambda: (
         Plant(FORK, 2, scripts={(CORRECTIONS, 2): lambda: Chance(56)})
         .draft()
@@ -56,19 +52,16 @@ def corrections(step: float) -> Callable[[], bytes]:
     return lambda: struct.pack("<f", step) + fork().content(CORRECTIONS, 2, 0)[4:]
 
 
-motion("empty", CORRECTIONS, 2, "no bytes", b"")
-motion("short", CORRECTIONS, 2, "3 bytes", bytes(3))
+motion(CORRECTIONS, 2, "empty: no bytes", b"")
+motion(CORRECTIONS, 2, "short: 3 bytes", bytes(3))
 for what, value in (("zero", 0.0), ("negative", -1.0), ("nan", NAN), ("infinite", INFINITY)):
-    motion(f"step-{what}", CORRECTIONS, 2, f"Correction_Step is {value}", corrections(value))
+    motion(CORRECTIONS, 2, f"step-{what}: Correction_Step is {value}", corrections(value))
+motion(CORRECTIONS, 2, "zero-behind: a zero byte behind the stream", lambda: fork().content(CORRECTIONS, 2, 0) + b"\0")
 motion(
-    "zero-behind", CORRECTIONS, 2, "a zero byte behind the stream", lambda: fork().content(CORRECTIONS, 2, 0) + b"\0"
-)
-motion(
-    "bytes-behind", CORRECTIONS, 2, "bytes behind the stream", lambda: fork().content(CORRECTIONS, 2, 1) + b"\1" * 12, 1
+    CORRECTIONS, 2, "bytes-behind: bytes behind the stream", lambda: fork().content(CORRECTIONS, 2, 1) + b"\1" * 12, 1
 )
 valid(
-    "corrections-of-one-frame",
-    "corrections in a segment of one frame, before which there is none",
+    "corrections-of-one-frame: corrections in a segment of one frame, before which there is none",
     lambda: Plant(SHORT, scripts={(CORRECTIONS, 1, 0): [1, *(2, 3, 1, 0), 0, 1, *(1, 0, 5, 1)]}),
 )
 
@@ -81,13 +74,11 @@ def corrected_lone(stream: Callable[[bytes], bytes], **fields) -> Draft:
 
 
 valid(
-    "corrections-no-bytes",
-    "a stream of no bytes, whose decisions are all 1: the largest corrections of all frames",
+    "corrections-no-bytes: a stream of no bytes, whose decisions are all 1: the largest corrections of all frames",
     lambda: corrected_lone(lambda stream: b"", frames=3),
 )
 valid(
-    "corrections-negative-zero",
-    "positions that are -0.0 stay so where nothing is corrected",
+    "corrections-negative-zero: positions that are -0.0 stay so where nothing is corrected",
     lambda: Plant(
         [Stem(-1, 1), Stem(-1, 1)],
         frames=5,

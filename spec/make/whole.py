@@ -94,7 +94,7 @@ def everything() -> Draft:
     )
 
 
-valid("everything", "every kind of chunk, flag, method and stream in one file", everything)
+valid("everything: every kind of chunk, flag, method and stream in one file", everything)
 
 
 def encoded(name: str) -> bytes:
@@ -153,7 +153,7 @@ for name, why in (
     ("encoded-layers", "three layers of precision"),
     ("encoded-layers-lossless", "three layers of precision, then every bit of the source"),
 ):
-    valid(name, f"what athcodec wrote: {why}", lambda name=name: encoded(name), scripted=False)
+    valid(f"{name}: what athcodec wrote: {why}", lambda name=name: encoded(name), scripted=False)
 for name_, what_ in (
     (
         "all",
@@ -165,8 +165,7 @@ for name_, what_ in (
     ("predicted", "the same in predicted motion, which excludes modes, shapes, bases, corrections, joins and layers"),
 ):
     valid(
-        f"real-size-{name_}",
-        f"what athcodec wrote of a tree with leaves: {what_}",
+        f"real-size-{name_}: what athcodec wrote of a tree with leaves: {what_}",
         lambda name_=name_: real_size.encoded(name_),
         scripted=False,
     )
