@@ -625,6 +625,10 @@ def _no_motion(plan, frames: int, periodic: bool, shapes):
     return motion
 
 
+def _of_draft(name: str) -> Callable:
+    return lambda plant, *arguments, **fields: getattr(plant.draft(), name)(*arguments, **fields)
+
+
 @dataclass
 class Plant:
     """A file of scripts, by (kind, level, segment) or (kind, level). Streams without a script hold empty rows; SHAPES,
@@ -713,8 +717,8 @@ class Plant:
             repeats=self.repeats,
         )
 
-    def file(self) -> bytes:
-        return self.draft().file()
+    file, add, change, without = map(_of_draft, ("file", "add", "change", "without"))
+    with_header, upto = map(_of_draft, ("with_header", "upto"))
 
     def _rest(self, branches: list) -> bytes:
         if self.mesh is not None:

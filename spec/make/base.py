@@ -6,6 +6,7 @@ import math
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -41,12 +42,10 @@ VECTORS: list[Vector] = []
 MADE: dict[str, Plant | Draft | bytes | Callable] = {}  # by the name of the vector
 
 
-def valid(
-    title: str, make: Plant | Draft | bytes | Callable, scripted: bool = True, mesh: np.ndarray | None = None
-) -> None:
-    """Declare a valid vector by "NAME: REASON"."""
+def valid(title: str, make: Plant | Draft | bytes | Callable, *arguments, scripted=True, mesh=None, **fields) -> None:
+    """Declare a valid vector by "NAME: REASON", and what makes it, which may get arguments."""
     name, reason = title.split(": ", 1)
-    MADE[name] = make
+    MADE[name] = make = partial(make, *arguments, **fields) if arguments or fields else make
     VECTORS.append(Vector(name, reason, lambda: bytes_of(make), scripted=scripted, mesh=mesh_bytes(mesh)))
 
 
@@ -156,7 +155,7 @@ def refinements(stems: list[Stem], seed: int, large: int = 12, **fields) -> Plan
 
 
 def header(title: str, error: str = "BAD_HEADER", **fields) -> None:
-    invalid(f"header-{title}", lambda: lone().draft().with_header(**fields), error)
+    invalid(f"header-{title}", lambda: lone().with_header(**fields), error)
 
 
 def joins(*widths: float) -> tuple[Join, ...]:

@@ -22,11 +22,10 @@ for frames in (2, 3, 4, 7, 33, 255, 256):
     valid(f"waves-{frames}: all waves of {frames} frames, once of a beam and once periodic", all_waves(frames))
 valid(
     "learned-basis: a learned basis of one row, at the ends of its range",
-    lambda: lone(
-        frames=4,
-        heads={0: stems_head(0.5, 0, 3, 1, basis_stream([[8192, -8192, 8192, 0]]))},
-        scripts={(STEMS, 0): row((3, -1, 70))},
-    ),
+    lone,
+    frames=4,
+    heads={0: stems_head(0.5, 0, 3, 1, basis_stream([[8192, -8192, 8192, 0]]))},
+    scripts={(STEMS, 0): row((3, -1, 70))},
 )
 valid(
     "learned-basis-full: a learned basis of as many rows as frames, beside waves on other levels",
@@ -51,45 +50,41 @@ valid(
 valid(
     "basis-in-waves-zero: a learned basis of two rows in waves: one of zeros, and one like the first of its level "
     "before",
-    lambda: moving(
-        FORK,
-        46,
-        frames=4,
-        heads={
-            1: stems_head(0.5, 1, 2, 2, basis_in_waves(4, 0, 0, *row((1, 0, 0), (2, 0, 0)), rank=2)),
-            2: stems_head(0.25, 0, 2, 3, basis_in_waves(4, 8, *row((1, 0, 0), (2, 0, 0)), rank=1), base=1),
-        },
-    ),
+    moving,
+    FORK,
+    46,
+    frames=4,
+    heads={
+        1: stems_head(0.5, 1, 2, 2, basis_in_waves(4, 0, 0, *row((1, 0, 0), (2, 0, 0)), rank=2)),
+        2: stems_head(0.25, 0, 2, 3, basis_in_waves(4, 8, *row((1, 0, 0), (2, 0, 0)), rank=1), base=1),
+    },
 )
 valid(
     "basis-shared: levels that share a learned basis, which lies with the first of them",
-    lambda: moving(
-        FORK,
-        47,
-        frames=4,
-        heads={
-            1: stems_head(0.5, 1, 2, 4, basis_in_waves(4, *WAVE_ROWS, rank=4)),
-            2: stems_head(0.25, 0, 2, 4, b"", base=1),
-        },
-    ),
+    moving,
+    FORK,
+    47,
+    frames=4,
+    heads={
+        1: stems_head(0.5, 1, 2, 4, basis_in_waves(4, *WAVE_ROWS, rank=4)),
+        2: stems_head(0.25, 0, 2, 4, b"", base=1),
+    },
 )
 valid(
     "basis-of-both-kinds: learned bases in waves that begin with rows by their entries, and the other way round",
-    lambda: moving(
-        FORK,
-        48,
-        frames=4,
-        segments=1,
-        heads={
-            1: stems_head(0.5, 1, 3, 1, basis_stream([[8192, -8192, 8192, 6400]])),
-            2: stems_head(0.25, 0, 2, 3, basis_in_waves(4, -3, 2, *row((3, 1, 0), (0, 2, 0)), rank=2), base=1),
-            3: stems_head(0.25, 0, 3, 4, basis_stream([[160, 192, 224, -6400]]), base=2),
-        },
-    ),
+    moving,
+    FORK,
+    48,
+    frames=4,
+    segments=1,
+    heads={
+        1: stems_head(0.5, 1, 3, 1, basis_stream([[8192, -8192, 8192, 6400]])),
+        2: stems_head(0.25, 0, 2, 3, basis_in_waves(4, -3, 2, *row((3, 1, 0), (0, 2, 0)), rank=2), base=1),
+        3: stems_head(0.25, 0, 3, 4, basis_stream([[160, 192, 224, -6400]]), base=2),
+    },
 )
 valid(
-    "node-waves: stems in the waves of maps beside those of stems",
-    lambda: moving(FORK, 45, heads={1: stems_head(0.5, 1, 1)}),
+    "node-waves: stems in the waves of maps beside those of stems", moving, FORK, 45, heads={1: stems_head(0.5, 1, 1)}
 )
 
 
@@ -125,10 +120,8 @@ for name, level, reason, base in (
     )
 invalid(
     "stems-basis-level-rank: Basis_Rank 1 though Basis_Level has a basis of two rows",
-    lambda: (
-        forked(heads={1: stems_head(0.5, 0, 3, 2, basis_stream([[64, 128], [192, 256]]))})
-        .draft()
-        .change(STEMS, 2, 0, content=stems_head(0.5, 0, 3, 1, base=1))
+    lambda: forked(heads={1: stems_head(0.5, 0, 3, 2, basis_stream([[64, 128], [192, 256]]))}).change(
+        STEMS, 2, 0, content=stems_head(0.5, 0, 3, 1, base=1)
     ),
     item=2,
 )
@@ -165,12 +158,11 @@ motion(
 )
 valid(
     "basis-exponents: the exponent of a row of a basis is -200, and 400 more in the next",
-    lambda: Plant(
-        SHORT,
-        frames=2,
-        heads={0: stems_head(0.25, 0, 2, 2, basis_in_waves(2, -200, 400, *row((1, 1, 0), (2, -1, 0)), rank=2))},
-        scripts={(STEMS, 0): lambda: Chance(513)},
-    ),
+    Plant,
+    SHORT,
+    frames=2,
+    heads={0: stems_head(0.25, 0, 2, 2, basis_in_waves(2, -200, 400, *row((1, 1, 0), (2, -1, 0)), rank=2))},
+    scripts={(STEMS, 0): lambda: Chance(513)},
 )
 motion(
     STEMS,
@@ -186,15 +178,14 @@ motion(
 )
 valid(
     "basis-of-level-0: learned bases that begin with that of level 0",
-    lambda: Plant(
-        SHORT,
-        frames=3,
-        heads={
-            0: stems_head(0.25, 0, 3, 1, basis_stream([[6336, -8192, 192]])),
-            1: stems_head(0.25, 0, 3, 2, basis_stream([[8192, 0, -2464]]), base=0),
-        },
-        scripts={(STEMS, 0): lambda: Chance(514), (STEMS, 1): lambda: Chance(515)},
-    ),
+    Plant,
+    SHORT,
+    frames=3,
+    heads={
+        0: stems_head(0.25, 0, 3, 1, basis_stream([[6336, -8192, 192]])),
+        1: stems_head(0.25, 0, 3, 2, basis_stream([[8192, 0, -2464]]), base=0),
+    },
+    scripts={(STEMS, 0): lambda: Chance(514), (STEMS, 1): lambda: Chance(515)},
 )
 
 
@@ -220,36 +211,33 @@ for side, last in (("above", 1237), ("below", 1236)):
     )
 valid(
     "basis-rounded: rows of bases, of which an entry is within 2^-56 of the middle between two numbers of binary32",
-    lambda: Plant(
-        [Stem(-1, 2)],
-        frames=8,
-        segments=4,
-        heads={
-            (0, s): stems_head(0.25, 0, 2, 1, basis_in_waves(2, 0, *row((a, 0, 0), (b, 0, 0)), rank=1))
-            for s, (a, b) in enumerate(ROUNDED)
-        },
-        is_float64=True,
-        scripts={(STEMS, 0): [*row((1, 3, 0)), *row((0, 1, 7))]},
-    ),
+    Plant,
+    [Stem(-1, 2)],
+    frames=8,
+    segments=4,
+    heads={
+        (0, s): stems_head(0.25, 0, 2, 1, basis_in_waves(2, 0, *row((a, 0, 0), (b, 0, 0)), rank=1))
+        for s, (a, b) in enumerate(ROUNDED)
+    },
+    is_float64=True,
+    scripts={(STEMS, 0): [*row((1, 3, 0)), *row((0, 1, 7))]},
 )
 valid(
     "waves-of-nodes-8: all waves of maps of 8 frames; what the third one is computed from goes to and fro by the "
     "last bit, for 32 times",
-    lambda: Plant(
-        FORK,
-        frames=8,
-        is_float64=True,
-        points=[[0, 0, 0], [1, 0, 2], [2, 0, 4], [1, 3, 2], [1, 5, 3]],
-        scripts={(AFFINES, 0): [0, *row(), *row(), *row(*[(k == 2, k == 5, 3 - k) for k in range(8)])]},
-    ),
+    Plant,
+    FORK,
+    frames=8,
+    is_float64=True,
+    points=[[0, 0, 0], [1, 0, 2], [2, 0, 4], [1, 3, 2], [1, 5, 3]],
+    scripts={(AFFINES, 0): [0, *row(), *row(), *row(*[(k == 2, k == 5, 3 - k) for k in range(8)])]},
 )
 valid(
     "waves-of-stems-66: the fourth wave of 66 frames, of which the same is true",
-    lambda: Plant(
-        SINGLE,
-        frames=66,
-        is_float64=True,
-        points=[[0, 0, 0]],
-        scripts={(STEMS, 0): row((0, 0, 0), (0, 0, 0), (0, 0, 0), (1, -3, 7))},
-    ),
+    Plant,
+    SINGLE,
+    frames=66,
+    is_float64=True,
+    points=[[0, 0, 0]],
+    scripts={(STEMS, 0): row((0, 0, 0), (0, 0, 0), (0, 0, 0), (1, -3, 7))},
 )

@@ -58,21 +58,18 @@ valid("clip-named: a single clip with a name", lambda: two_clips(clips=(CALM,)))
 valid("clip-loop: a single clip with a name, a loop", lambda: two_clips(clips=(loop(STORM, 3.0, 2.0, 1.0),)))
 valid(
     "clips-periodic: of three loops of one segment the first and the last are periodic",
-    lambda: moving(
-        FORK,
-        30,
-        heads=HEADS,
-        clips=(
-            periodic(CALM, 0.5, 0.25, 0.0),
-            loop(Clip(3, 1, "jerks"), 0.5, 0.25, 0.0),
-            periodic(Clip(1, 1, "one"), 0.0, 0.0, 0.0),
-        ),
+    moving,
+    FORK,
+    30,
+    heads=HEADS,
+    clips=(
+        periodic(CALM, 0.5, 0.25, 0.0),
+        loop(Clip(3, 1, "jerks"), 0.5, 0.25, 0.0),
+        periodic(Clip(1, 1, "one"), 0.0, 0.0, 0.0),
     ),
 )
 valid("clip-unnamed: a single clip that CLIPS gives an empty name", lambda: two_clips(clips=(Clip(4, 2),)))
-valid(
-    "clip-unnamed-loop: a single loop with an empty name", lambda: two_clips(clips=(loop(Clip(4, 2), 0.25, 0.25, 0.0),))
-)
+valid("clip-unnamed-loop: a single loop with an empty name", two_clips, clips=(loop(Clip(4, 2), 0.25, 0.25, 0.0),))
 valid(
     "clips-time: First and Step of each clip: the second begins before the first and overlaps it",
     lambda: two_clips(time=steady_times((10.0, 0.5), (-1.0, 0.25))),
@@ -99,16 +96,15 @@ valid(
 )
 valid(
     "clips-steps: segments with steps, rotations and bases of their own, of as many rows as each has frames",
-    lambda: moving(
-        FORK,
-        30,
-        clips=(CALM, STORM),
-        heads={
-            (1, 0): stems_head(0.5, 2, 3, 3, basis_stream([[6400, -6400, 6400], [8192, 0, -8192], [64, 128, 192]])),
-            (1, 1): stems_head(0.001, 0, 3, 2, basis_stream([[32, 64], [8192, -8192]])),
-            (2, 2): stems_head(0.25, 1),
-        },
-    ),
+    moving,
+    FORK,
+    30,
+    clips=(CALM, STORM),
+    heads={
+        (1, 0): stems_head(0.5, 2, 3, 3, basis_stream([[6400, -6400, 6400], [8192, 0, -8192], [64, 128, 192]])),
+        (1, 1): stems_head(0.001, 0, 3, 2, basis_stream([[32, 64], [8192, -8192]])),
+        (2, 2): stems_head(0.25, 1),
+    },
 )
 valid(
     "clips-corrections: corrections in the second clip alone",
@@ -128,39 +124,37 @@ valid(
 )
 valid(
     "clips-names: names that differ in case, in accents, in their ends, by spaces alone",
-    lambda: named(
-        "wind",
-        "Wind",
-        "WIND",
-        "win",
-        "winds",
-        " ",
-        "  ",
-        "B\u00f6e",
-        "Bo\u0308e",
-        "\u98ce",
-        "\U0001f333",
-        '"\\/',
-        "a.b/c",
-    ),
+    named,
+    "wind",
+    "Wind",
+    "WIND",
+    "win",
+    "winds",
+    " ",
+    "  ",
+    "B\u00f6e",
+    "Bo\u0308e",
+    "\u98ce",
+    "\U0001f333",
+    '"\\/',
+    "a.b/c",
 )
 valid(
     "clips-names-ends: characters at the ends of the ranges of UTF-8",
-    lambda: named(
-        " ",
-        "~",
-        "\x80",
-        "\x9f",
-        "\u07ff",
-        "\u0800",
-        "\ud7ff",
-        "\ue000",
-        "\ufeff",
-        "\ufffe",
-        "\uffff",
-        "\U00010000",
-        "\U0010ffff",
-    ),
+    named,
+    " ",
+    "~",
+    "\x80",
+    "\x9f",
+    "\u07ff",
+    "\u0800",
+    "\ud7ff",
+    "\ue000",
+    "\ufeff",
+    "\ufffe",
+    "\uffff",
+    "\U00010000",
+    "\U0010ffff",
 )
 valid("clips-names-longest: names of 255 bytes", lambda: named("n" * 255, "n" * 254 + "m", "\u98ce" * 85))
 CALM_ENTRY, STORM_ENTRY = CALM.entry(), STORM.entry()
@@ -175,7 +169,7 @@ def clips(title: str, *entries: bytes, count: int = 2) -> None:
 
 def lone_clips(frames: int, segments: int, *entries: bytes, **header_fields) -> Draft:
     """One vertex, and any CLIPS."""
-    draft = lone(frames=frames, segments=segments).draft().add(Entry(CLIPS, b"".join(entries)))
+    draft = lone(frames=frames, segments=segments).add(Entry(CLIPS, b"".join(entries)))
     return draft.with_header(clip_count=len(entries), **header_fields)
 
 
@@ -325,7 +319,7 @@ invalid(
 )
 invalid(
     "clips-memory-of-mean: 2^22 vertices are too many, before CLIPS is missed",
-    lambda: lone(frames=2, segments=2).draft().with_header(vertex_count=1 << 22, clip_count=2),
+    lambda: lone(frames=2, segments=2).with_header(vertex_count=1 << 22, clip_count=2),
     "LIMIT_EXCEEDED",
 )
 valid(

@@ -32,10 +32,7 @@ def connected(
 
 
 for name_, make_faces in MANY_FACES.items():
-    valid(
-        f"rest-connected-{name_.replace(' ', '-')}: a rest pose by faces: {name_}",
-        lambda make_faces=make_faces: connected(make_faces),
-    )
+    valid(f"rest-connected-{name_.replace(' ', '-')}: a rest pose by faces: {name_}", connected, make_faces)
 valid(
     "rest-connected-order: a rest pose by faces of vertices that stand the other way round",
     lambda: connected(MANY_FACES["strip"], order=list(range(119, -1, -1))),
@@ -56,8 +53,8 @@ for what, content in (
 ):
     invalid(
         f"rest-connected-{what}-faces: a rest pose by faces that do not serve it: {what}",
-        lambda content=content: (
-            with_rest(FORK, coded_rest(FORK, [], reserved=REST_CONNECTED >> 2)).draft().add(Entry(FACES, content()))
+        lambda content=content: with_rest(FORK, coded_rest(FORK, [], reserved=REST_CONNECTED >> 2)).add(
+            Entry(FACES, content())
         ),
     )
 valid(

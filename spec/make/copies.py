@@ -29,10 +29,8 @@ for name_, seed_, title_ in (
 ):
     invalid(
         f"{name_}: {title_}",
-        lambda seed_=seed_: (
-            with_rest(COPIED, coded_rest(COPIED, Chance(3, large=3, begin=[1])))
-            .draft()
-            .change(REST, content=coded_rest(COPIED, Chance(seed_, large=3, begin=[1])))
+        lambda seed_=seed_: with_rest(COPIED, coded_rest(COPIED, Chance(3, large=3, begin=[1]))).change(
+            REST, content=coded_rest(COPIED, Chance(seed_, large=3, begin=[1]))
         ),
     )
 valid(
@@ -69,7 +67,7 @@ def broken_rest(make: Callable[[], Plant], goes_on: bool = True) -> Draft:
     finally:
         rules.require = kept
     rest = coded_rest(plant.stems, [], 0.3, rest_type=1)
-    return replace(plant, rest=rest).draft().change(REST, content=plant.rest)
+    return replace(plant, rest=rest).change(REST, content=plant.rest)
 
 
 def copy_of(tip: tuple[int, int, int], *places: Sequence[int], largest: int = 0) -> Plant:

@@ -35,15 +35,11 @@ valid(
 )
 valid(
     "corrections-to-infinity: a Correction_Step at the end of binary32",
-    lambda: (
-        Plant(FORK, 2, scripts={(CORRECTIONS, 2): lambda: Chance(56)})
-        .draft()
-        .change(
-            CORRECTIONS,
-            2,
-            content=struct.pack("<f", FLOAT_MAX)
-            + Plant(FORK, 2, scripts={(CORRECTIONS, 2): lambda: Chance(56)}).draft().content(CORRECTIONS, 2)[4:],
-        )
+    lambda: Plant(FORK, 2, scripts={(CORRECTIONS, 2): lambda: Chance(56)}).change(
+        CORRECTIONS,
+        2,
+        content=struct.pack("<f", FLOAT_MAX)
+        + Plant(FORK, 2, scripts={(CORRECTIONS, 2): lambda: Chance(56)}).draft().content(CORRECTIONS, 2)[4:],
     ),
 )
 
@@ -79,14 +75,13 @@ valid(
 )
 valid(
     "corrections-negative-zero: positions that are -0.0 stay so where nothing is corrected",
-    lambda: Plant(
-        [Stem(-1, 1), Stem(-1, 1)],
-        frames=5,
-        points=[[0.0, 0.0, 0.0]] * 2,
-        default_head=stems_head(FLOAT_TINY),
-        scripts={
-            (STEMS, 0): [*row((-1, -1, 1)), *row((-1, 1, -1))],
-            (CORRECTIONS, 1): [0, 1, 0, 0, 1, 0, 1, 0, 2, 0, 0, 0, 0],
-        },
-    ),
+    Plant,
+    [Stem(-1, 1), Stem(-1, 1)],
+    frames=5,
+    points=[[0.0, 0.0, 0.0]] * 2,
+    default_head=stems_head(FLOAT_TINY),
+    scripts={
+        (STEMS, 0): [*row((-1, -1, 1)), *row((-1, 1, -1))],
+        (CORRECTIONS, 1): [0, 1, 0, 0, 1, 0, 1, 0, 2, 0, 0, 0, 0],
+    },
 )

@@ -23,17 +23,14 @@ def documented() -> bytes:
 
 
 valid("documented: the smallest file, as FORMAT.md has it", documented)
-valid(
-    "uneven-segments: 7 frames in 3 segments, of 2, 2 and 3",
-    lambda: moving(FORK, 25, frames=7, segments=3, heads=HEADS),
-)
+valid("uneven-segments: 7 frames in 3 segments, of 2, 2 and 3", moving, FORK, 25, frames=7, segments=3, heads=HEADS)
 valid("segment-per-frame: as many segments as frames", lambda: moving(FORK, 26, frames=3, segments=3, heads=HEADS))
 valid("level-0-alone: shortened: level 0 of 3", lambda: fork().upto(0))
 valid("level-1-of-3: shortened: without the last level and its corrections", lambda: fork().upto(1))
 valid(
     "errors-announced: an error table with the largest and the smallest numbers; those of the deepest level are "
     "above Max_Error 0",
-    lambda: replace(lone().draft().with_header(max_error=0.0), errors=(8159, 0, 4000, 0, 1, 8159)),
+    lambda: replace(lone().with_header(max_error=0.0), errors=(8159, 0, 4000, 0, 1, 8159)),
 )
 valid(
     "max-error-largest: the largest Max_Error, and errors of segments up and down",
@@ -212,7 +209,7 @@ def front_alone(draft: Draft) -> bytes:
 invalid("cut-behind-first-byte: one byte, that of Magic", lambda: first_bytes(1), "TRUNCATED")
 invalid(
     "header-alone: 24 bytes are a header: its Chunk_Count is 0",
-    lambda: lone().draft().with_header(chunk_count=0).file()[:24],
+    lambda: lone().with_header(chunk_count=0).file()[:24],
     "BAD_HEADER",
 )
 header("chunks-2-20: Chunk_Count 2^20 is allowed, but Front_Length is too small", chunk_count=1 << 20)
@@ -243,7 +240,7 @@ valid(
 
 def of_memory(vertices: int) -> Draft:
     """128 frames, whose first fault behind the front is a checksum."""
-    return lone().draft().with_header(vertex_count=vertices, frame_count=128).change(HIERARCHY, checksum=0)
+    return lone().with_header(vertex_count=vertices, frame_count=128).change(HIERARCHY, checksum=0)
 
 
 def of_range(max_error: int) -> Draft:
@@ -251,7 +248,6 @@ def of_range(max_error: int) -> Draft:
     clips = [clip_entry(25, 17, "0"), *(clip_entry(1, 1, str(i)) for i in range(1, 25))]
     return (
         lone()
-        .draft()
         .add(Entry(CLIPS, b"".join(clips), checksum=0))
         .with_header(
             vertex_count=13,

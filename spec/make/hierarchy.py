@@ -31,32 +31,26 @@ valid(
 )
 valid(
     "depth-4096: branches as deep as the limit allows, of which level 0 is stored",
-    lambda: (
-        still([replace(s, flags=WHOLE if b == 0 else 0) for b, s in enumerate(chain(4096))], points=[[0.0] * 3] * 4096)
-        .draft()
-        .upto(0)
-    ),
+    lambda: still(
+        [replace(s, flags=WHOLE if b == 0 else 0) for b, s in enumerate(chain(4096))], points=[[0.0] * 3] * 4096
+    ).upto(0),
 )
 valid(
     "whole: WHOLE subtrees: a root's, a branch's, and that of a branch alone, shown till the last level",
-    lambda: moving(
-        [
-            Stem(-1, 3),
-            Stem(0, 2, 1),
-            Stem(1, 2, 1, WHOLE),
-            Stem(2, 1),
-            Stem(0, 2, 2, WHOLE),
-            Stem(-1, 2, 0, WHOLE),
-            Stem(5, 3, 1),
-        ],
-        11,
-        heads=HEADS,
-    ),
+    moving,
+    [
+        Stem(-1, 3),
+        Stem(0, 2, 1),
+        Stem(1, 2, 1, WHOLE),
+        Stem(2, 1),
+        Stem(0, 2, 2, WHOLE),
+        Stem(-1, 2, 0, WHOLE),
+        Stem(5, 3, 1),
+    ],
+    11,
+    heads=HEADS,
 )
-valid(
-    "whole-alone: a root that is WHOLE and all there is: h is 0",
-    lambda: moving([Stem(-1, 3, 0, WHOLE)], 12, heads=HEADS),
-)
+valid("whole-alone: a root that is WHOLE and all there is: h is 0", moving, [Stem(-1, 3, 0, WHOLE)], 12, heads=HEADS)
 BLADES = [Stem(-1, 3), Stem(-1, 4), Stem(-1, 2), Stem(-1, 3)]
 
 
@@ -94,7 +88,7 @@ valid(
 )
 invalid(
     "hierarchy-31-deep: 32 branches, each on the one before: no Full_Level_Count can say 33",
-    lambda: moving(chain(32), 1).draft().upto(31).with_header(full_level_count=32),
+    lambda: moving(chain(32), 1).upto(31).with_header(full_level_count=32),
     "BAD_HEADER",
 )
 invalid(
@@ -165,10 +159,8 @@ for what, vertex_source in (
     )
 invalid(
     "hierarchy-depth-limit: 4097 branches, each on the one before",
-    lambda: (
-        still([replace(s, flags=WHOLE if b == 0 else 0) for b, s in enumerate(chain(4097))], points=[[0.0] * 3] * 4097)
-        .draft()
-        .upto(0)
-    ),
+    lambda: still(
+        [replace(s, flags=WHOLE if b == 0 else 0) for b, s in enumerate(chain(4097))], points=[[0.0] * 3] * 4097
+    ).upto(0),
     "LIMIT_EXCEEDED",
 )

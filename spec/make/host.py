@@ -54,7 +54,7 @@ for name, value in (("nan", NAN), ("infinite", -INFINITY)):
     INFINITE_MESH = np.append(MESH[:-1], [[0.0, np.float32(value), 0.0]], axis=0).astype("<f4")
     invalid(
         f"host-mesh-{name}: the file's own mesh has {value}",
-        lambda mesh=INFINITE_MESH: hosted().draft().change(REST, content=host_rest_chunk(mesh)),
+        lambda mesh=INFINITE_MESH: hosted().change(REST, content=host_rest_chunk(mesh)),
         "WRONG_HOST_MESH",
         0,
         INFINITE_MESH,
@@ -62,7 +62,7 @@ for name, value in (("nan", NAN), ("infinite", -INFINITY)):
 for at, which in ((17, "first"), (21, "second")):
     invalid(
         f"host-mesh-{which}-checksum: a mesh that differs by the {which} checksum alone",
-        lambda at=at: hosted().draft().change(REST, content=flipped(host_rest_chunk(MESH), at)),
+        lambda at=at: hosted().change(REST, content=flipped(host_rest_chunk(MESH), at)),
         "WRONG_HOST_MESH",
         0,
         MESH,
@@ -80,10 +80,8 @@ prelude(
 )
 invalid(
     "refined-rest-of-host: REFINED_REST of the host's mesh",
-    lambda: (
-        layered(3, *NO_REFINED_REST, mesh=MESH, vertex_source=ORDER)
-        .draft()
-        .add(Entry(REFINED_REST, refined_rest_chunk(b""), 3))
+    lambda: layered(3, *NO_REFINED_REST, mesh=MESH, vertex_source=ORDER).add(
+        Entry(REFINED_REST, refined_rest_chunk(b""), 3)
     ),
     item=3,
     mesh=MESH,

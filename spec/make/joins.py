@@ -20,10 +20,9 @@ valid("joins-of-some: at one level alone", lambda: joined(FORK, 103, 0, 0, 0, 3.
 valid("joins-float64: positions of binary64", lambda: joined(FORK, 104, 0, 2.5, 0, 4, 0, 3, is_float64=True))
 valid(
     "joins-forms: sheets, loose branches, several pieces and roots",
-    lambda: joined(
-        [Stem(-1, 4), Stem(0, 3, 2, SHEET), Stem(1, 2, 1, LOOSE), Stem(0, 70, 3), Stem(-1, 6, 0, SHEET)],
-        *(105, 0, 3, 0, 4.5, 0, 2, 0, 1.5),
-    ),
+    joined,
+    [Stem(-1, 4), Stem(0, 3, 2, SHEET), Stem(1, 2, 1, LOOSE), Stem(0, 70, 3), Stem(-1, 6, 0, SHEET)],
+    *(105, 0, 3, 0, 4.5, 0, 2, 0, 1.5),
 )
 valid(
     "joins-whole: nodes whose maps serve several levels",
@@ -37,12 +36,11 @@ valid("joins-longest: over 127 frames", lambda: joined([Stem(-1, 2)], 108, 0, 12
 valid("joins-of-three-frames: the shortest segment that is joined", lambda: joined(FORK, 109, *(0, 1.5) * 3, frames=6))
 valid(
     "joins-loop: the first segment of a loop goes on from its last",
-    lambda: joined(
-        FORK,
-        110,
-        *(3, 2.5, 4, 0, 4.5, 0, 0, 0, 3, 0, 2, 0),
-        clips=(loop(Clip(18, 3, "loop"), 0.0, 0.0, 0.0), Clip(6, 1, "once")),
-    ),
+    joined,
+    FORK,
+    110,
+    *(3, 2.5, 4, 0, 4.5, 0, 0, 0, 3, 0, 2, 0),
+    clips=(loop(Clip(18, 3, "loop"), 0.0, 0.0, 0.0), Clip(6, 1, "once")),
 )
 valid(
     "joins-clips: a loop of two segments behind a clip that is none",
@@ -52,17 +50,16 @@ valid(
 )
 valid(
     "joins-corrections: corrections are added to what is joined, and what is joined goes on from what is not corrected",
-    lambda: joined(
-        FORK,
-        112,
-        *(0, 4, 0, 4, 0, 3.5),
-        scripts={
-            (STEMS, 1): lambda: Chance(1),
-            (STEMS, 2): lambda: Chance(2),
-            (AFFINES, 0): lambda: Chance(3, large=4),
-            (CORRECTIONS, 2): lambda: Chance(4),
-        },
-    ),
+    joined,
+    FORK,
+    112,
+    *(0, 4, 0, 4, 0, 3.5),
+    scripts={
+        (STEMS, 1): lambda: Chance(1),
+        (STEMS, 2): lambda: Chance(2),
+        (AFFINES, 0): lambda: Chance(3, large=4),
+        (CORRECTIONS, 2): lambda: Chance(4),
+    },
 )
 valid(
     "joins-layers: three layers, of which each is joined and none predicts from that",
@@ -72,13 +69,12 @@ valid(
     "joins-lossless: the source's own numbers about positions that are joined",
     lambda: replace(
         joined(FORK, 114)
-        .draft()
         .with_header(level_count=4, full_level_count=4)
         .add(*(Entry(EXACT, b"", 3, s) for s in range(2))),
         joins=joins(0, 2, 0, 3, 0, 4.5, 0, 0),
     ),
 )
-valid("joins-truncated: shortened: level 1 of 3", lambda: joined(FORK, 115, *(0, 4) * 3).draft().upto(1))
+valid("joins-truncated: shortened: level 1 of 3", lambda: joined(FORK, 115, *(0, 4) * 3).upto(1))
 valid(
     "joins-predicted: maps of level 0 before predicted motion",
     lambda: replace(
@@ -105,7 +101,6 @@ invalid(
     "joins-exact: the source's own numbers are joined",
     lambda: replace(
         joined(FORK, 122)
-        .draft()
         .with_header(level_count=4, full_level_count=4)
         .add(*(Entry(EXACT, b"", 3, s) for s in range(2))),
         joins=joins(0, 0, 0, 0, 0, 0, 0, 2),

@@ -78,10 +78,7 @@ def learned(*levels: int) -> dict:
 def lossless_layers() -> Draft:
     """An additional last level with empty streams."""
     return (
-        layered()
-        .draft()
-        .with_header(level_count=6, full_level_count=6)
-        .add(Entry(EXACT, b"", 5, 0), Entry(EXACT, b"", 5, 1))
+        layered().with_header(level_count=6, full_level_count=6).add(Entry(EXACT, b"", 5, 0), Entry(EXACT, b"", 5, 1))
     )
 
 
@@ -181,7 +178,7 @@ valid("layers-lossless: EXACT behind three layers", lossless_layers)
 for level_ in range(5):
     valid(
         f"layers-upto-{level_}: three layers, shortened after level {level_}",
-        lambda level=level_: layered().draft().upto(level),
+        lambda level=level_: layered().upto(level),
     )
 valid("rest-of-level-1: level 1 refines the rest pose, and so do the refinements", layered(scripts=LEVEL_1_REST))
 valid(
@@ -191,7 +188,7 @@ valid(
 for level_ in range(4):
     valid(
         f"rest-of-level-1-upto-{level_}: level 1 refines the rest pose, and the file is shortened after level {level_}",
-        lambda level=level_: layered(scripts=LEVEL_1_REST).draft().upto(level),
+        lambda level=level_: layered(scripts=LEVEL_1_REST).upto(level),
     )
 valid(
     "rest-of-level-1-of-point: the rest pose of level 0 is a point: its maps have no directions, those of level 1 have",
@@ -231,22 +228,19 @@ header("layers-not-those: Layer_Count 4: a file of h = 0 has 5 levels, or 6 with
 for count in (1, 4):
     invalid(
         f"layers-count-{count}: Layer_Count {count}, Full_Level_Count is that of 3 layers",
-        lambda count=count: layered().draft().with_header(layer_count=count),
+        lambda count=count: layered().with_header(layer_count=count),
         "BAD_HEADER",
     )
 table(
     "layers-exact-taken: Layer_Count 2 makes the last level the lossless one: EXACT is missing",
-    lambda: layered().draft().with_header(layer_count=2),
+    lambda: layered().with_header(layer_count=2),
 )
-table("layers-no-stems: a refinement lacks the STEMS of a segment", lambda: layered().draft().without(STEMS, 3, 1))
-table("layers-affines: AFFINES of a refinement", lambda: layered().draft().add(Entry(AFFINES, b"", 3, 0)))
-table(
-    "layers-exact-early: EXACT at the level of the last refinement",
-    lambda: layered().draft().add(Entry(EXACT, b"", 4, 0)),
-)
+table("layers-no-stems: a refinement lacks the STEMS of a segment", lambda: layered().without(STEMS, 3, 1))
+table("layers-affines: AFFINES of a refinement", lambda: layered().add(Entry(AFFINES, b"", 3, 0)))
+table("layers-exact-early: EXACT at the level of the last refinement", lambda: layered().add(Entry(EXACT, b"", 4, 0)))
 table(
     "layers-corrections-low: CORRECTIONS below level h + 1",
-    lambda: layered().draft().add(Entry(CORRECTIONS, struct.pack("<f", 1.0), 1, 0)),
+    lambda: layered().add(Entry(CORRECTIONS, struct.pack("<f", 1.0), 1, 0)),
 )
 table(
     "layers-corrections-exact: CORRECTIONS of the lossless level behind three layers",
@@ -254,7 +248,7 @@ table(
 )
 table(
     "layers-shapes-of-segment-1: SHAPES of a refinement stands with segment 0",
-    lambda: layered().draft().add(Entry(SHAPES, b"\0", 3, 1)),
+    lambda: layered().add(Entry(SHAPES, b"\0", 3, 1)),
 )
 for level_, why in ((0, "level 0"), (2, "a level of the hierarchy above 1"), (5, "the lossless level")):
     table(
@@ -263,7 +257,7 @@ for level_, why in ((0, "level 0"), (2, "a level of the hierarchy above 1"), (5,
     )
 table(
     "refined-rest-of-segment-1: REFINED_REST stands with segment 0",
-    lambda: layered(3, (REFINED_REST, 3, 0)).draft().add(Entry(REFINED_REST, b"", 3, 1)),
+    lambda: layered(3, (REFINED_REST, 3, 0)).add(Entry(REFINED_REST, b"", 3, 1)),
 )
 for name, why, plant in (
     ("with-stems", "level 0 has STEMS", rest_by_level([*FORK, Stem(-1, 2)], 44)),
@@ -325,25 +319,21 @@ refinement(
 )
 invalid(
     "refined-rest-of-exact: REFINED_REST of a rest pose that is exact",
-    lambda: (
-        layered(3, (REFINED_REST, 3, 0), (REFINED_REST, 4, 0), rest=exact_rest(FORK, [0.5] * 15, False))
-        .draft()
-        .add(Entry(REFINED_REST, refined_rest_chunk(b""), 3))
+    lambda: layered(3, (REFINED_REST, 3, 0), (REFINED_REST, 4, 0), rest=exact_rest(FORK, [0.5] * 15, False)).add(
+        Entry(REFINED_REST, refined_rest_chunk(b""), 3)
     ),
     item=3,
 )
 invalid(
     "refined-rest-modes: a refined run of two vertices has three modes",
-    lambda: (
-        Plant([Stem(-1, 3, lag=0)], rest=coded_rest([Stem(-1, 3, lag=0)], []), layers=2)
-        .draft()
-        .add(Entry(REFINED_REST, refined_rest_chunk(refined_run(3)), 2))
+    lambda: Plant([Stem(-1, 3, lag=0)], rest=coded_rest([Stem(-1, 3, lag=0)], []), layers=2).add(
+        Entry(REFINED_REST, refined_rest_chunk(refined_run(3)), 2)
     ),
     item=2,
 )
 invalid(
     "refined-rest-checksum: the Checksum of REFINED_REST is another",
-    lambda: layered().draft().change(REFINED_REST, 3, checksum=0),
+    lambda: layered().change(REFINED_REST, 3, checksum=0),
     "BAD_CHECKSUM",
     3,
 )
@@ -368,7 +358,7 @@ def bad_rest_of_1(change: Callable[[bytes], dict] | None) -> Draft:
     """Level 1 refines a rest pose that is exact, or by a chunk that is changed."""
     if change is None:
         exact = layered(3, (REFINED_REST, 3, 0), (REFINED_REST, 4, 0), rest=exact_rest(FORK, [0.5] * 15, False))
-        return exact.draft().add(Entry(REFINED_REST, refined_rest_chunk(b""), 1))
+        return exact.add(Entry(REFINED_REST, refined_rest_chunk(b""), 1))
     draft = layered(scripts=LEVEL_1_REST).draft()
     return draft.change(REFINED_REST, 1, **change(draft.content(REFINED_REST, 1)))
 
@@ -382,101 +372,95 @@ def refined_run(count: int) -> bytes:
 
 valid(
     "layers-shapes-of-many-modes: eight shapes of a piece of 18 modes, the last of which have rows of their own",
-    lambda: Plant(
-        [Stem(-1, 18)],
-        frames=3,
-        layers=2,
-        heads=LAYER_HEADS,
-        scripts={
-            (SHAPES, 0, 0): [6, *(n for i in range(6) for n in row((i, 1, 0), (2, 0, -i)))],
-            (SHAPES, 1, 0): [2, *row((0, 0, 1)), *row((1, 0, 0), (0, 0, 0), (0, 3, 1))],
-            (SHAPES, 2, 0): [8, *(n for i in range(8) for n in refined_row((i % 3, -1, 0)))],
-        }
-        | {(STEMS, level): lambda level=level: Chance(517 + level, large=6, empty=0.1) for level in range(3)},
-    ),
+    Plant,
+    [Stem(-1, 18)],
+    frames=3,
+    layers=2,
+    heads=LAYER_HEADS,
+    scripts={
+        (SHAPES, 0, 0): [6, *(n for i in range(6) for n in row((i, 1, 0), (2, 0, -i)))],
+        (SHAPES, 1, 0): [2, *row((0, 0, 1)), *row((1, 0, 0), (0, 0, 0), (0, 3, 1))],
+        (SHAPES, 2, 0): [8, *(n for i in range(8) for n in refined_row((i % 3, -1, 0)))],
+    }
+    | {(STEMS, level): lambda level=level: Chance(517 + level, large=6, empty=0.1) for level in range(3)},
 )
 valid(
     "layers-shapes-largest: a shape with the largest integers there are, which a refinement of Shift 0 goes back from",
-    lambda: Plant(
-        SHORT,
-        frames=2,
-        layers=2,
-        shift=0,
-        heads=LAYER_HEADS,
-        scripts={
-            (SHAPES, 0, 0): [2, *row((LARGEST, 1, 0)), *row((0, -LARGEST, 3))],
-            (SHAPES, 2, 0): [2, *refined_row((-LARGEST, 0, 0)), *refined_row((0, -LARGEST, 0))],
-        }
-        | {(STEMS, level): lambda level=level: Chance(521 + level, large=6, empty=0.0) for level in range(3)},
-    ),
+    Plant,
+    SHORT,
+    frames=2,
+    layers=2,
+    shift=0,
+    heads=LAYER_HEADS,
+    scripts={
+        (SHAPES, 0, 0): [2, *row((LARGEST, 1, 0)), *row((0, -LARGEST, 3))],
+        (SHAPES, 2, 0): [2, *refined_row((-LARGEST, 0, 0)), *refined_row((0, -LARGEST, 0))],
+    }
+    | {(STEMS, level): lambda level=level: Chance(521 + level, large=6, empty=0.0) for level in range(3)},
 )
 valid(
     "layers-halves: what is predicted of one vertex is half the ratio, in another basis than before, and half a "
     "step in the same",
-    lambda: Plant(
-        [Stem(-1, 1)],
-        frames=4,
-        segments=2,
-        layers=2,
-        heads={
-            0: stems_head(0.5, 0, 3, 2, IMPULSES),
-            (2, 0): stems_head(0.25, 0, 3, 2, IMPULSES),
-            (2, 1): stems_head(1.0, 0, 3, 2, base=0),
-        },
-        scripts={(STEMS, 0): row((1, 0, -1), (-1, 2, 3)), (STEMS, 2): row()},
-    ),
+    Plant,
+    [Stem(-1, 1)],
+    frames=4,
+    segments=2,
+    layers=2,
+    heads={
+        0: stems_head(0.5, 0, 3, 2, IMPULSES),
+        (2, 0): stems_head(0.25, 0, 3, 2, IMPULSES),
+        (2, 1): stems_head(1.0, 0, 3, 2, base=0),
+    },
+    scripts={(STEMS, 0): row((1, 0, -1), (-1, 2, 3)), (STEMS, 2): row()},
 )
 valid(
     "layers-rigid-turned-300: a branch that moves as it is turned by 100, 180, 250 and 300 degrees, one after the "
     "other",
-    lambda: Plant(
-        [Stem(-1, 4, rigid=1)],
-        frames=5,
-        layers=2,
-        is_float64=True,
-        rest=exact_rest([Stem(-1, 4)], [0.0, 0, 0, 2, 0, 0, 0, 3, 0, 0, 0, 5], True),
-        heads={
-            0: stems_head(8.0, 4 << 4, 3, 5, basis_stream([[8192 * (k == t) for t in range(5)] for k in range(5)])),
-            2: stems_head(0.25),
-        },
-        scripts={
-            (STEMS, 0): [*row(), *row(*((0, 0, n) for n in (0, 7, 16, 31, 60)))],
-            (STEMS, 2): [0, *refined_row((3, -5, 2))],
-        },
-    ),
+    Plant,
+    [Stem(-1, 4, rigid=1)],
+    frames=5,
+    layers=2,
+    is_float64=True,
+    rest=exact_rest([Stem(-1, 4)], [0.0, 0, 0, 2, 0, 0, 0, 3, 0, 0, 0, 5], True),
+    heads={
+        0: stems_head(8.0, 4 << 4, 3, 5, basis_stream([[8192 * (k == t) for t in range(5)] for k in range(5)])),
+        2: stems_head(0.25),
+    },
+    scripts={
+        (STEMS, 0): [*row(), *row(*((0, 0, n) for n in (0, 7, 16, 31, 60)))],
+        (STEMS, 2): [0, *refined_row((3, -5, 2))],
+    },
 )
 valid(
     "layers-rigid-from-a-point: rigid branches at one place in the first layer, where they have no rotation, and "
     "not in the next",
-    lambda: Plant(
-        [Stem(-1, 2), Stem(0, 3, 1, rigid=1), Stem(0, 3, 1, rigid=2)],
-        frames=2,
-        layers=2,
-        points=[[0, 0, 0], *[[1, 2, 3]] * 7],
-        heads=LAYER_HEADS,
-        scripts={(STEMS, level): lambda level=level: Chance(525 + level, large=6) for level in range(4)}
-        | {(REFINED_REST, 3, 0): lambda: Chance(529, large=4, empty=0.0)},
-    ),
+    Plant,
+    [Stem(-1, 2), Stem(0, 3, 1, rigid=1), Stem(0, 3, 1, rigid=2)],
+    frames=2,
+    layers=2,
+    points=[[0, 0, 0], *[[1, 2, 3]] * 7],
+    heads=LAYER_HEADS,
+    scripts={(STEMS, level): lambda level=level: Chance(525 + level, large=6) for level in range(4)}
+    | {(REFINED_REST, 3, 0): lambda: Chance(529, large=4, empty=0.0)},
 )
 HALVED_RATIOS = (63000, 0.36065), (67000, 0.34967), (0.45, 0.5)
 valid(
     "layers-rigid-ratios-near: steps of rotations are 63000 and 67000 times those of the next layer, and less than "
     "half of them",
-    lambda: Plant(
-        [Stem(-1, 3, rigid=2)],
-        frames=6,
-        segments=3,
-        layers=2,
-        is_float64=True,
-        points=[[0, 0, 0], [3, 0, 0], [1, 4, 0]],
-        heads={0: stems_head(0.125)}
-        | {
-            (2, s): stems_head(0.125 / ratio, 0, 3, 1, basis_stream([[int(size * 8192)] * 2]))
-            for s, (ratio, size) in enumerate(HALVED_RATIOS)
-        },
-        scripts={(STEMS, 0): [*row(), *row((1, -1, 1))]}
-        | {(STEMS, 2, s): [*row(), *refined_row((1, 0, 2))] for s in range(3)},
-    ),
+    Plant,
+    [Stem(-1, 3, rigid=2)],
+    frames=6,
+    segments=3,
+    layers=2,
+    is_float64=True,
+    points=[[0, 0, 0], [3, 0, 0], [1, 4, 0]],
+    heads={0: stems_head(0.125)}
+    | {
+        (2, s): stems_head(0.125 / ratio, 0, 3, 1, basis_stream([[int(size * 8192)] * 2]))
+        for s, (ratio, size) in enumerate(HALVED_RATIOS)
+    },
+    scripts={(STEMS, 0): [*row(), *row((1, -1, 1))]}
+    | {(STEMS, 2, s): [*row(), *refined_row((1, 0, 2))] for s in range(3)},
 )
 
 
@@ -518,31 +502,29 @@ LAST_BASIS = 3, 2, basis_stream([[4800, -3200], [1232, 8176]])
 valid(
     "layers-rigid-ratios: the step of a rotation is over 65535 times that of the next layer, and that less than the "
     "one of the last",
-    lambda: stiff(
-        218,
-        frames=4,
-        segments=2,
-        heads={
-            **{level: stems_head(64.0, 2) for level in range(5)},
-            5: stems_head(1e-4, 0, *LAST_BASIS),
-            6: stems_head(1e-4, 2),
-        },
-    ),
+    stiff,
+    218,
+    frames=4,
+    segments=2,
+    heads={
+        **{level: stems_head(64.0, 2) for level in range(5)},
+        5: stems_head(1e-4, 0, *LAST_BASIS),
+        6: stems_head(1e-4, 2),
+    },
 )
 HALF_TURNS = (16, 0, 0), (0, 16, 0), (0, 0, 16), (16, 0, 1), (0, -16, 3)
 valid(
     "layers-rigid-half-turns: a branch that moves as it is, turned by 180 degrees about each of its axes: whose "
     "quaternions begin with 0",
-    lambda: Plant(
-        [Stem(-1, 4, rigid=1)],
-        frames=5,
-        segments=5,
-        layers=2,
-        is_float64=True,
-        rest=exact_rest([Stem(-1, 4)], [0.0, 0, 0, 2, 0, 0, 0, 3, 0, 0, 0, 5], True),
-        heads={0: stems_head(8.0, 4 << 4), 2: stems_head(0.25)},
-        scripts={(STEMS, 0, s): [*row(), *row(turn)] for s, turn in enumerate(HALF_TURNS)}
-        | {(STEMS, 2, s): [0, *refined_row((3, -5, 2))] for s in range(5)},
-    ),
+    Plant,
+    [Stem(-1, 4, rigid=1)],
+    frames=5,
+    segments=5,
+    layers=2,
+    is_float64=True,
+    rest=exact_rest([Stem(-1, 4)], [0.0, 0, 0, 2, 0, 0, 0, 3, 0, 0, 0, 5], True),
+    heads={0: stems_head(8.0, 4 << 4), 2: stems_head(0.25)},
+    scripts={(STEMS, 0, s): [*row(), *row(turn)] for s, turn in enumerate(HALF_TURNS)}
+    | {(STEMS, 2, s): [0, *refined_row((3, -5, 2))] for s in range(5)},
 )
 refinement(STEMS, "ratio-cut: STEMS of a refinement of 1 byte", b"\4")

@@ -69,25 +69,20 @@ valid(
     "faces-and-edges: triangles and edges, in integers of different sizes",
     lambda: with_static((FACES, polygons(FACES_3)), (EDGES, polygons(EDGES_2))),
 )
-valid(
-    "faces-of-any-width: faces of five columns",
-    lambda: with_static((FACES, polygons(np.array([[4, 3, 2, 1, 0]], "<i4")))),
-)
+valid("faces-of-any-width: faces of five columns", with_static, (FACES, polygons(np.array([[4, 3, 2, 1, 0]], "<i4"))))
 valid(
     "faces-none: no faces: three columns, no rows, no data; edges without rows likewise",
     lambda: with_static((FACES, polygons(np.zeros((0, 3), "|u1"))), (EDGES, polygons(np.zeros((0, 2), "<u4")))),
 )
 valid(
     "edges-derived: edges that the hierarchy implies, in a file with permutations",
-    lambda: (
-        moving([Stem(-1, 3), Stem(0, 2, 1), Stem(-1, 1)], 61, vertex_source=[5, 0, 3, 1, 4, 2])
-        .draft()
-        .add(Entry(EDGES, derived("<i2")))
+    lambda: moving([Stem(-1, 3), Stem(0, 2, 1), Stem(-1, 1)], 61, vertex_source=[5, 0, 3, 1, 4, 2]).add(
+        Entry(EDGES, derived("<i2"))
     ),
 )
 valid(
     "edges-derived-least: as numbers of one byte; of one vertex there are none",
-    lambda: lone().draft().add(Entry(EDGES, derived("|i1"))),
+    lambda: lone().add(Entry(EDGES, derived("|i1"))),
 )
 MANY_FACES = {  # of 119 vertices: those of BY_VERTEX
     "by chance": lambda: polygons(np.zeros((150, 3), "<i2"), 120, script=Chance(71)),
@@ -113,9 +108,7 @@ valid("faces-mixed-none: no faces of different sizes", lambda: with_static((FACE
 for name_, make_faces in MANY_FACES.items():
     valid(
         f"faces-many-{name_.replace(' ', '-')}: faces of 120 vertices: {name_}",
-        lambda make_faces=make_faces: (
-            with_rest(BY_VERTEX, coded_rest(BY_VERTEX, [])).draft().add(Entry(FACES, make_faces()))
-        ),
+        lambda make_faces=make_faces: with_rest(BY_VERTEX, coded_rest(BY_VERTEX, [])).add(Entry(FACES, make_faces())),
     )
 
 
@@ -149,10 +142,8 @@ static(
 )
 static(
     "faces-beyond-type: a face of vertex 128, which |i1 does not hold",
-    lambda: (
-        moving([Stem(-1, 64), Stem(-1, 64), Stem(-1, 2)], 2, frames=1)
-        .draft()
-        .add(Entry(FACES, polygons(np.array([[0, 127, 128]], "<i2"), 130).replace(b"\x05", b"\x04", 1)))
+    lambda: moving([Stem(-1, 64), Stem(-1, 64), Stem(-1, 2)], 2, frames=1).add(
+        Entry(FACES, polygons(np.array([[0, 127, 128]], "<i2"), 130).replace(b"\x05", b"\x04", 1))
     ),
 )
 static("faces-zero-behind: a zero byte behind the stream", faces(polygons(FACES_3) + b"\0"))
@@ -164,7 +155,7 @@ static("edges-derived-mixed: Is_Derived with Is_Mixed", edges(bytes([2 | 16 | 8]
 static("edges-derived-reserved: derived edges, and bit 5 is set", edges(bytes([16 | 32])))
 static(
     "edges-derived-small: 130 vertices do not fit |i1",
-    lambda: moving([Stem(-1, 64), Stem(-1, 64), Stem(-1, 2)], 2, frames=1).draft().add(Entry(EDGES, derived("|i1"))),
+    lambda: moving([Stem(-1, 64), Stem(-1, 64), Stem(-1, 2)], 2, frames=1).add(Entry(EDGES, derived("|i1"))),
 )
 static("edges-derived-with-data: data behind derived edges", edges(derived("<i4") + bytes(8)))
 
@@ -211,10 +202,8 @@ for name, strip in STRIPS.items():
     valid(
         f"faces-{name}-and-on: triangles {'up to the last vertex' if name == 'up' else 'down to vertex 0'}, beyond "
         "which the same ways would lead",
-        lambda strip=strip: (
-            moving([Stem(-1, 20)], 501, frames=1)
-            .draft()
-            .add(Entry(FACES, polygons(np.array(strip + [[7, 3, 9]], "<u2"), 20)))
+        lambda strip=strip: moving([Stem(-1, 20)], 501, frames=1).add(
+            Entry(FACES, polygons(np.array(strip + [[7, 3, 9]], "<u2"), 20))
         ),
     )
 valid(
@@ -248,7 +237,7 @@ static("edges-of-8-bytes-beyond: an edge to vertex 5 of 5", edges(polygons(np.ar
 
 
 def derived_edges(*counts: int) -> Draft:
-    return still([Stem(-1, count) for count in counts]).draft().add(Entry(EDGES, derived("|i1")))
+    return still([Stem(-1, count) for count in counts]).add(Entry(EDGES, derived("|i1")))
 
 
 valid(

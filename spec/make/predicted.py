@@ -91,14 +91,13 @@ valid(
 )
 valid(
     "predicted-lattice-huge: the largest points of the lattice, even and odd",
-    lambda: predicted(
-        SINGLE,
-        [
-            [0, 1, 1, -((1 << 30) - 1), 1, (1 << 30) - 1, 0, (1 << 30) - 1],
-            [0, 1, 1, (1 << 30) - 2, (1 << 30) - 1, -((1 << 30) - 1)],
-        ],
-        predicted=predicted_head(FLOAT_MAX, 1),
-    ),
+    predicted,
+    SINGLE,
+    [
+        [0, 1, 1, -((1 << 30) - 1), 1, (1 << 30) - 1, 0, (1 << 30) - 1],
+        [0, 1, 1, (1 << 30) - 2, (1 << 30) - 1, -((1 << 30) - 1)],
+    ],
+    predicted=predicted_head(FLOAT_MAX, 1),
 )
 valid(
     "predicted-references: frames that are copies of earlier ones, of the rest pose, and coded about earlier ones",
@@ -116,9 +115,7 @@ valid(
         ],
     ),
 )
-valid(
-    "predicted-all-copied: every frame is the rest pose", lambda: predicted(ROOTED, [[1, 1]] + [[1, 0, 0], [1, 0, 2]])
-)
+valid("predicted-all-copied: every frame is the rest pose", predicted, ROOTED, [[1, 1]] + [[1, 0, 0], [1, 0, 2]])
 valid(
     "predicted-twins: vertices that rest at the same places, and a stem as long as another",
     lambda: predicted(
@@ -133,9 +130,7 @@ valid(
     "predicted-huge: the largest integers and steps: positions leave the range of binary32",
     lambda: predicted(SINGLE, [[0, 1, 1, (1 << 30) - 1, -((1 << 30) - 1), 1]] * 5, predicted=predicted_head(FLOAT_MAX)),
 )
-valid(
-    "predicted-tiny: a subnormal Step", lambda: predicted(ROOTED, swayed(4, 10), predicted=predicted_head(FLOAT_TINY))
-)
+valid("predicted-tiny: a subnormal Step", predicted, ROOTED, swayed(4, 10), predicted=predicted_head(FLOAT_TINY))
 valid(
     "predicted-wide: binary64 positions far from the origin",
     lambda: predicted(ROOTED, swayed(7, 11), is_float64=True, origin=(1e6, -3e5, 0.125)),
@@ -152,14 +147,11 @@ valid(
     "predicted-roots: maps of roots of one vertex, of one stem and of a subtree",
     lambda: predicted(ROOTS, swayed(3, 14, ROOTS), scripts={(AFFINES, 0, 0): lambda: Chance(15, large=4)}),
 )
-valid("predicted-level-0: shortened: level 0 of 2", lambda: predicted(ROOTED, swayed(2, 16)).draft().upto(0))
+valid("predicted-level-0: shortened: level 0 of 2", lambda: predicted(ROOTED, swayed(2, 16)).upto(0))
 valid(
     "predicted-lossless: the source's own numbers behind it",
     lambda: (
-        predicted(ROOTED, swayed(2, 17))
-        .draft()
-        .with_header(level_count=3, full_level_count=3)
-        .add(Entry(EXACT, b"", 2, 0))
+        predicted(ROOTED, swayed(2, 17)).with_header(level_count=3, full_level_count=3).add(Entry(EXACT, b"", 2, 0))
     ),
 )
 
@@ -195,7 +187,7 @@ invalid(
 )
 invalid(
     "predicted-nodes: h is 1",
-    lambda: predicted(FORKED, swayed(1, 19, FORKED)).draft().with_header(full_level_count=3, level_count=2),
+    lambda: predicted(FORKED, swayed(1, 19, FORKED)).with_header(full_level_count=3, level_count=2),
     "BAD_HEADER",
 )
 for name, reason, content in (
@@ -324,12 +316,11 @@ valid(
 )
 valid(
     "predicted-copied-rest: a copy of the rest pose, rounded as it is shown, which others are coded about",
-    lambda: predicted(
-        ROOTED,
-        [[1, 1], *swayed(2, 315, still=0.1), [1, 0, 3], *swayed(2, 317, still=0.1)],
-        origin=(1e6, -3e5, 0.125),
-        step=0.01,
-    ),
+    predicted,
+    ROOTED,
+    [[1, 1], *swayed(2, 315, still=0.1), [1, 0, 3], *swayed(2, 317, still=0.1)],
+    origin=(1e6, -3e5, 0.125),
+    step=0.01,
 )
 RUNS_OF_COPIES = (3, 9, 8, 12, 7, 10, 6, 8, 9, 7, 11, 8, 0, 8, 1, 9)
 
@@ -350,13 +341,10 @@ invalid(
 )
 valid(
     "predicted-short-exactly: a step and a way at rest whose squares add up to 1e-60, which is no more than that",
-    lambda: predicted(
-        [Stem(-1, 3, flags=WHOLE)],
-        swayed(6, 140, [Stem(-1, 3, flags=WHOLE)], follow=1.0, still=0.1),
-        rest=exact_rest(
-            [Stem(-1, 3)], [0, 0, 0, 0, 3e-31, 2e-31, 9.50870501981432e-31, 2.9299366694240276e-31, 0], True
-        ),
-        predicted=predicted_head(1e-31),
-        is_float64=True,
-    ),
+    predicted,
+    [Stem(-1, 3, flags=WHOLE)],
+    swayed(6, 140, [Stem(-1, 3, flags=WHOLE)], follow=1.0, still=0.1),
+    rest=exact_rest([Stem(-1, 3)], [0, 0, 0, 0, 3e-31, 2e-31, 9.50870501981432e-31, 2.9299366694240276e-31, 0], True),
+    predicted=predicted_head(1e-31),
+    is_float64=True,
 )

@@ -22,13 +22,9 @@ def repeats_by_chance(frames: int) -> tuple[int, ...]:
 
 
 valid(
-    "repeats: poses held for one to eleven frames",
-    lambda: moving(FORK, 124, frames=14, repeats=(0, 0, *(0, 1), *(1,) * 9, 0)),
+    "repeats: poses held for one to eleven frames", moving, FORK, 124, frames=14, repeats=(0, 0, *(0, 1), *(1,) * 9, 0)
 )
-valid(
-    "repeats-of-one: all frames are alike, and one is coded",
-    lambda: moving(FORK, 125, frames=12, repeats=(0, *(1,) * 11)),
-)
+valid("repeats-of-one: all frames are alike, and one is coded", moving, FORK, 125, frames=12, repeats=(0, *(1,) * 11))
 valid(
     "repeats-by-chance: now many poses that are held, now few, for one frame to ten",
     lambda: moving(FORK, 420, frames=160, repeats=repeats_by_chance(160)),
@@ -36,13 +32,12 @@ valid(
 valid("repeats-joined: over all coded frames that may be", lambda: joined(FORK, 126, *(0, 1.5) * 3, repeats=TWOS))
 valid(
     "repeats-clips: a periodic loop, and a clip of which a segment has no repeats",
-    lambda: moving(
-        FORK,
-        127,
-        heads=HEADS,
-        clips=(periodic(Clip(6, 1, "loop"), 0.0, 0.0, 0.0), Clip(12, 2, "once")),
-        repeats=(*TWOS, *(0,) * 6),
-    ),
+    moving,
+    FORK,
+    127,
+    heads=HEADS,
+    clips=(periodic(Clip(6, 1, "loop"), 0.0, 0.0, 0.0), Clip(12, 2, "once")),
+    repeats=(*TWOS, *(0,) * 6),
 )
 valid("repeats-layers: two layers", lambda: refinements(MIXED, 128, frames=12, repeats=THREES))
 valid(
@@ -52,7 +47,6 @@ valid(
     "repeats-lossless: the source's own numbers",
     lambda: (
         moving(FORK, 130, frames=12, repeats=THREES)
-        .draft()
         .with_header(level_count=4, full_level_count=4)
         .add(Entry(EXACT, b"", 3, 0))
     ),

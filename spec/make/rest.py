@@ -45,13 +45,12 @@ valid(
 )
 valid(
     "rest-exact-predicted: exact numbers expected from vertices before; the expectation overflows to infinity",
-    lambda: with_rest(
+    with_rest,
+    [Stem(-1, 4), Stem(0, 3, 2)],
+    exact_rest(
         [Stem(-1, 4), Stem(0, 3, 2)],
-        exact_rest(
-            [Stem(-1, 4), Stem(0, 3, 2)],
-            [1.0, 2.0, -3e38, 2.0, 4.0, 1e38, 3.0, 6.0, 3e38, 4.0, 8.0, 0.0] + [0.5] * 9,
-            False,
-        ),
+        [1.0, 2.0, -3e38, 2.0, 4.0, 1e38, 3.0, 6.0, 3e38, 4.0, 8.0, 0.0] + [0.5] * 9,
+        False,
     ),
 )
 valid(
@@ -115,10 +114,8 @@ prelude(
 )
 invalid(
     "rest-beam-frequencies: a run of two vertices codes three frequencies",
-    lambda: (
-        with_rest([Stem(-1, 3, lag=0)], coded_rest([Stem(-1, 3, lag=0)], []))
-        .draft()
-        .change(REST, content=coded_rest([Stem(-1, 3, lag=0)], [0, 0, 0, 0, 3]))
+    lambda: with_rest([Stem(-1, 3, lag=0)], coded_rest([Stem(-1, 3, lag=0)], [])).change(
+        REST, content=coded_rest([Stem(-1, 3, lag=0)], [0, 0, 0, 0, 3])
     ),
 )
 

@@ -122,7 +122,7 @@ source_rest(
 )
 invalid(
     "source-rest-damaged: a bit of SOURCE_REST is flipped",
-    lambda: forked(source_rest=bent(FORK, Chance(206))).draft().change(SOURCE_REST, checksum=0),
+    lambda: forked(source_rest=bent(FORK, Chance(206))).change(SOURCE_REST, checksum=0),
     "BAD_CHECKSUM",
     "rest",
 )

@@ -21,17 +21,14 @@ valid(
     "all-equal: all vertices at one point: no length, no extent, no rotations, no maps",
     lambda: moving([Stem(-1, 4), Stem(0, 2, 1), Stem(0, 2, 3, SHEET)], 6, points=[[1.0, 1.0, 1.0]] * 8, heads=HEADS),
 )
-valid(
-    "all-at-origin: all vertices at the origin, and the origin 0", lambda: still([Stem(-1, 3)], points=[[0.0] * 3] * 3)
-)
+valid("all-at-origin: all vertices at the origin, and the origin 0", still, [Stem(-1, 3)], points=[[0.0] * 3] * 3)
 valid("empty-streams: streams all of whose decisions are 1 and that have no bytes", lambda: still(FORK, frames=3))
 valid(
     "loose: LOOSE branches: a node by its modes, one with a map of its own, one inside a WHOLE subtree",
-    lambda: moving(
-        [Stem(-1, 3), Stem(0, 2, 1, LOOSE), Stem(0, 3, 2, LOOSE), Stem(2, 2, 1, WHOLE), Stem(3, 2, 0, LOOSE)],
-        13,
-        heads=HEADS,
-    ),
+    moving,
+    [Stem(-1, 3), Stem(0, 2, 1, LOOSE), Stem(0, 3, 2, LOOSE), Stem(2, 2, 1, WHOLE), Stem(3, 2, 0, LOOSE)],
+    13,
+    heads=HEADS,
 )
 valid(
     "loose-long: a LOOSE stem of two pieces: only its first has a translation",
@@ -44,17 +41,16 @@ valid(
 valid("stem-of-64: a stem of 64 vertices: one piece, by its modes", lambda: moving([Stem(-1, 64)], 16, frames=2))
 valid(
     "sheet: SHEET branches that others hang on: flat, of one vertex, of two, in a line",
-    lambda: moving(
-        [Stem(-1, 9, 0, SHEET), Stem(0, 1, 4, SHEET), Stem(1, 2, 0, SHEET), Stem(0, 5, 8, SHEET), Stem(3, 2, 4)],
-        17,
-        frames=4,
-        heads=HEADS,
-        points=[[float(i % 3), float(i // 3), 0.0] for i in range(9)]
-        + [[5.0, 1.0, 1.0]]
-        + [[6.0, 1.0, 1.0], [6.0, 2.0, 1.0]]
-        + [[2.0 + i, 2.0, 0.0] for i in range(5)]
-        + [[7.0, 2.0, 1.0], [8.0, 2.0, 1.0]],
-    ),
+    moving,
+    [Stem(-1, 9, 0, SHEET), Stem(0, 1, 4, SHEET), Stem(1, 2, 0, SHEET), Stem(0, 5, 8, SHEET), Stem(3, 2, 4)],
+    17,
+    frames=4,
+    heads=HEADS,
+    points=[[float(i % 3), float(i // 3), 0.0] for i in range(9)]
+    + [[5.0, 1.0, 1.0]]
+    + [[6.0, 1.0, 1.0], [6.0, 2.0, 1.0]]
+    + [[2.0 + i, 2.0, 0.0] for i in range(5)]
+    + [[7.0, 2.0, 1.0], [8.0, 2.0, 1.0]],
 )
 valid(
     "sheet-long: a SHEET of 70 vertices in two pieces, and a branch on the second",
@@ -62,37 +58,34 @@ valid(
 )
 valid(
     "sheet-mirrored: a sheet that is turned inside out: the gradient is followed, not Newton's step",
-    lambda: Plant(
-        [Stem(-1, 4, 0, SHEET), Stem(0, 2, 3)],
-        2,
-        points=[[0.0, 0.0, 0.0], [8.0, 0.0, 0.0], [0.0, 8.0, 0.0], [0.0, 0.0, 8.0], [0.0, 0.0, 9.0], [0.0, 0.0, 10.0]],
-        scripts={
-            (STEMS, 1): [
-                *row(),
-                0,
-                *row((0, 0, 0), (-200, 30, 0)),
-                *row((0, 0, 0), (0, -170, 0)),
-                *row((3, 3, -160), (0, 0, 40)),
-            ]
-        },
-    ),
+    Plant,
+    [Stem(-1, 4, 0, SHEET), Stem(0, 2, 3)],
+    2,
+    points=[[0.0, 0.0, 0.0], [8.0, 0.0, 0.0], [0.0, 8.0, 0.0], [0.0, 0.0, 8.0], [0.0, 0.0, 9.0], [0.0, 0.0, 10.0]],
+    scripts={
+        (STEMS, 1): [
+            *row(),
+            0,
+            *row((0, 0, 0), (-200, 30, 0)),
+            *row((0, 0, 0), (0, -170, 0)),
+            *row((3, 3, -160), (0, 0, 40)),
+        ]
+    },
 )
 valid(
     "tangent-opposed: a parent that folds back on itself: the kept rotation is not turned",
-    lambda: Plant(
-        [Stem(-1, 2), Stem(0, 2, 1)],
-        2,
-        points=[[0.0, 0.0, 0.0], [0.0, 4.0, 0.0], [0.0, 8.0, 0.0], [0.0, 9.0, 1.0]],
-        scripts={(STEMS, 1): [*row(), *row((0, -60, 0), (0, 60, 0)), *row((0, -9, 1))]},
-    ),
+    Plant,
+    [Stem(-1, 2), Stem(0, 2, 1)],
+    2,
+    points=[[0.0, 0.0, 0.0], [0.0, 4.0, 0.0], [0.0, 8.0, 0.0], [0.0, 9.0, 1.0]],
+    scripts={(STEMS, 1): [*row(), *row((0, -60, 0), (0, 60, 0)), *row((0, -9, 1))]},
 )
 valid(
     "tangent-none: coincident vertices: no tangent to follow, at rest and in motion",
-    lambda: moving(
-        [Stem(-1, 3), Stem(0, 2, 1), Stem(0, 2, 2)],
-        19,
-        points=[[1.0, 2.0, 3.0]] * 3 + [[1.0, 3.0, 3.0], [1.0, 4.0, 3.0], [1.0, 2.0, 3.0], [2.0, 2.0, 3.0]],
-    ),
+    moving,
+    [Stem(-1, 3), Stem(0, 2, 1), Stem(0, 2, 2)],
+    19,
+    points=[[1.0, 2.0, 3.0]] * 3 + [[1.0, 3.0, 3.0], [1.0, 4.0, 3.0], [1.0, 2.0, 3.0], [2.0, 2.0, 3.0]],
 )
 valid(
     "rotations: every rotation factor there is: 0, 1, 8",
@@ -105,17 +98,16 @@ valid(
 valid("frames-257: one frame more: segments of 128 and 129", lambda: moving([Stem(-1, 2)], 24, frames=257, segments=2))
 valid(
     "steps-per-segment: segments with steps, rotations and bases of their own",
-    lambda: moving(
-        FORK,
-        27,
-        frames=6,
-        segments=2,
-        heads={
-            (1, 0): stems_head(0.5, 2),
-            (1, 1): stems_head(0.001, 0),
-            (2, 1): stems_head(0.25, 1, 3, 2, basis_stream([[6400, -6400, 6400], [8192, 0, -8192]])),
-        },
-    ),
+    moving,
+    FORK,
+    27,
+    frames=6,
+    segments=2,
+    heads={
+        (1, 0): stems_head(0.5, 2),
+        (1, 1): stems_head(0.001, 0),
+        (2, 1): stems_head(0.25, 1, 3, 2, basis_stream([[6400, -6400, 6400], [8192, 0, -8192]])),
+    },
 )
 valid(
     "steps-largest: Step at the end of binary32: infinities and NaN as the arithmetic yields them",
@@ -224,9 +216,8 @@ valid(
 )
 valid(
     "tangent-short-exactly: a stem whose squares add up to 1e-200, which has no direction",
-    lambda: placed(
-        [Stem(-1, 2), Stem(0, 2, 1)],
-        [[0, 0, 0], [2.207934554570487e-101, 9.753205883335675e-101, 0], [0, 1, 1], [0, 2, 1]],
-        138,
-    ),
+    placed,
+    [Stem(-1, 2), Stem(0, 2, 1)],
+    [[0, 0, 0], [2.207934554570487e-101, 9.753205883335675e-101, 0], [0, 1, 1], [0, 2, 1]],
+    138,
 )

@@ -181,7 +181,7 @@ RADIUS = numbers(np.arange(5.0), name="radius")
 
 
 def segments_of_tables() -> Draft:
-    draft = lone().draft().upto(0)
+    draft = lone().upto(0)
     first, second, *others = draft.entries
     count = (1 << 20) - len(draft.entries)
     return replace(draft, entries=(second, first, *others)).with_header(frame_count=count, segment_count=count)

@@ -9,15 +9,10 @@ from spec.make.base import *
 from spec.make.clips import two_clips
 
 valid("time-whole-rate: times by a whole rate", lambda: lone(frames=7, time=whole_rates(3)))
-valid(
-    "time-whole-step: times by a step that is one over a whole rate",
-    lambda: lone(frames=7, time=whole_rates(49, method=4)),
-)
+valid("time-whole-step: times by a step that is one over a whole rate", lone, frames=7, time=whole_rates(49, method=4))
 valid("time-largest-rate: Rate 65535", lambda: lone(frames=7, time=whole_rates(65535)))
 valid("time-rate: times by their rate, First below 0", lambda: lone(frames=4, time=steady_time(-2.0, 24.0, 1)))
-valid(
-    "time-wide: times far from 0, with a Step that just counts", lambda: lone(frames=3, time=steady_time(2.0**52, 1.0))
-)
+valid("time-wide: times far from 0, with a Step that just counts", lone, frames=3, time=steady_time(2.0**52, 1.0))
 valid(
     "time-uneven: times one by one, -0.0 and subnormal ones among them",
     lambda: lone(frames=6, time=uneven_time(-1e300, -1.0, -0.0, TINY, 1 / 3, HIGHEST)),
@@ -59,11 +54,11 @@ prelude(TIME, "zero-behind: a zero byte behind the stream", lambda: uneven_time(
 prelude(TIME, "bytes-behind: bytes behind the stream", lambda: uneven_time(0.0, 1.0, 2.5, 3.0) + b"\1" * 12)
 invalid(
     "time-code-outside: a stream whose code is outside the final interval",
-    lambda: lone().draft().change(TIME, content=b"\2" + b"\xff" * 8),
+    lambda: lone().change(TIME, content=b"\2" + b"\xff" * 8),
 )
 invalid(
     "time-of-one-infinite: First of a single frame is infinite",
-    lambda: lone().draft().change(TIME, content=steady_time(INFINITY)),
+    lambda: lone().change(TIME, content=steady_time(INFINITY)),
 )
 
 
@@ -78,7 +73,7 @@ clip_times("of-three-clips: First and Step of three clips where two are", lambda
 clip_times("without-last-step: First of the second clip without its Step", lambda: steady_times(STEADY, STEADY)[:-8])
 invalid(
     "time-of-two-clips: First and Step of two clips where one is",
-    lambda: lone().draft().change(TIME, content=steady_times(STEADY, STEADY)),
+    lambda: lone().change(TIME, content=steady_times(STEADY, STEADY)),
 )
 for what, value in (("zero", 0.0), ("negative", -1.0), ("nan", NAN), ("infinite", INFINITY)):
     clip_times(

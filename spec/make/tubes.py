@@ -32,19 +32,17 @@ valid(
 )
 valid(
     "tube-gaps: the same of the rings of a tube",
-    lambda: placed(
-        [Stem(-1, 40, flags=SHEET, ring=2)],
-        [[1000.0 * (i > 17) + i, j, 0.1 * i * j] for i in range(20) for j in (0, 1)],
-        132,
-    ),
+    placed,
+    [Stem(-1, 40, flags=SHEET, ring=2)],
+    [[1000.0 * (i > 17) + i, j, 0.1 * i * j] for i in range(20) for j in (0, 1)],
+    132,
 )
 valid(
     "rigid-diagonal: rigid branches whose inertia has no products: nothing to reduce, axes that are equally long",
-    lambda: placed(
-        [Stem(-1, 2), Stem(0, 3, 1, rigid=1), Stem(0, 3, 0, rigid=1), Stem(0, 2, 1, rigid=1)],
-        [[0, 0, 0], [1, 0, 0], [5, 0, 0], [1, 8, 0], [1, 0, 2], [0, 0, 3], [0, 3, 0], [3, 0, 0], [1, 4, 0], [1, 5, 0]],
-        133,
-    ),
+    placed,
+    [Stem(-1, 2), Stem(0, 3, 1, rigid=1), Stem(0, 3, 0, rigid=1), Stem(0, 2, 1, rigid=1)],
+    [[0, 0, 0], [1, 0, 0], [5, 0, 0], [1, 8, 0], [1, 0, 2], [0, 0, 3], [0, 3, 0], [3, 0, 0], [1, 4, 0], [1, 5, 0]],
+    133,
 )
 
 

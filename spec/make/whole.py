@@ -76,21 +76,17 @@ def everything() -> Draft:
             (SHAPES, 5, 0): [2, *refined_row((0, -1, 0)), *refined_row((3, 0, 0), (0, 0, -1))],
         },
     )
-    return (
-        plant.draft()
-        .with_header(level_count=7, full_level_count=7)
-        .add(
-            Entry(EXACT, b"", 6, 0),
-            Entry(EXACT, b"", 6, 1),
-            Entry(METADATA, b"\1" + WIND_FRAME),
-            Entry(FACES, polygons(FACES_3)),
-            Entry(EDGES, derived("<i2")),
-            Entry(0x8009, FUTURE),
-            Entry(0x8018, FUTURE, 1, 1),
-            Entry(ATTRIBUTE, numbers(np.arange(6.0).reshape(2, 3), name="b")),
-            Entry(ATTRIBUTE, element("|S3", b"oak", "a")),
-            Entry(0x8040, FUTURE),
-        )
+    return plant.with_header(level_count=7, full_level_count=7).add(
+        Entry(EXACT, b"", 6, 0),
+        Entry(EXACT, b"", 6, 1),
+        Entry(METADATA, b"\1" + WIND_FRAME),
+        Entry(FACES, polygons(FACES_3)),
+        Entry(EDGES, derived("<i2")),
+        Entry(0x8009, FUTURE),
+        Entry(0x8018, FUTURE, 1, 1),
+        Entry(ATTRIBUTE, numbers(np.arange(6.0).reshape(2, 3), name="b")),
+        Entry(ATTRIBUTE, element("|S3", b"oak", "a")),
+        Entry(0x8040, FUTURE),
     )
 
 
