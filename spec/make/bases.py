@@ -20,23 +20,21 @@ def all_waves(frames: int) -> Callable[[], Plant]:
 
 for frames in (2, 3, 4, 7, 33, 255, 256):
     valid(f"waves-{frames}: all waves of {frames} frames, once of a beam and once periodic", all_waves(frames))
-valid(
-    "learned-basis: a learned basis of one row, at the ends of its range",
-    lone,
-    frames=4,
-    heads={0: stems_head(0.5, 0, 3, 1, basis_stream([[8192, -8192, 8192, 0]]))},
-    scripts={(STEMS, 0): row((3, -1, 70))},
-)
-valid(
-    "learned-basis-full: a learned basis of as many rows as frames, beside waves on other levels",
-    lambda: moving(
+for title, make in {
+    "learned-basis: a learned basis of one row, at the ends of its range": lambda: lone(
+        frames=4,
+        heads={0: stems_head(0.5, 0, 3, 1, basis_stream([[8192, -8192, 8192, 0]]))},
+        scripts={(STEMS, 0): row((3, -1, 70))},
+    ),
+    "learned-basis-full: a learned basis of as many rows as frames, beside waves on other levels": lambda: moving(
         FORK, 43, heads={1: stems_head(0.5, 1, 3, 3, basis_stream([[8192, 1, -5], [-8192, 8192, -8192], [0, 0, 77]]))}
     ),
-)
-valid(
-    "learned-basis-zero: a learned basis of zeros, of no bytes but the stream's",
-    lambda: moving([Stem(-1, 3)], 44, heads={0: stems_head(0.5, 1, 3, 2, basis_stream([[0] * 3] * 2))}),
-)
+    "learned-basis-zero: a learned basis of zeros, of no bytes but the stream's": lambda: moving(
+        [Stem(-1, 3)], 44, heads={0: stems_head(0.5, 1, 3, 2, basis_stream([[0] * 3] * 2))}
+    ),
+}.items():
+    valid(title, make)
+
 WAVE_ROWS = (  # of four rows over four frames: exponents, integers; the axes without a use of the last row are not 0
     *(-6, 3, -1),
     *row((9, 0, 1), (-4, 60, 0), (0, 2, 700)),
@@ -138,24 +136,17 @@ for name, reason, exponents in (
         f"basis-exponent-{name}: {reason}",
         lambda exponents=exponents: basis(2, 2, basis_in_waves(2, *exponents, *row((1, 1, 0)), rank=2))(),
     )
-motion(
-    STEMS,
-    1,
-    "basis-in-waves-frequencies: a row of a basis codes three frequencies of two frames",
-    lambda: basis(1, 2, basis_in_waves(2, 0, *row((1, 0, 0), (1, 0, 0), (1, 0, 0)), rank=1))(),
-)
-motion(
-    STEMS,
-    1,
-    "basis-in-waves-zero-behind: a zero byte behind the stream of a basis in waves",
-    lambda: basis(1, 2, basis_in_waves(2, 0, *row((1, 0, 0)), rank=1) + b"\0")(),
-)
-motion(
-    STEMS,
-    1,
-    "basis-zero-behind: a zero byte behind the stream of a basis",
-    basis(1, 3, basis_stream([[64, 128]]) + b"\0"),
-)
+for title, make in {
+    "basis-in-waves-frequencies: a row of a basis codes three frequencies of two frames": lambda: basis(
+        1, 2, basis_in_waves(2, 0, *row((1, 0, 0), (1, 0, 0), (1, 0, 0)), rank=1)
+    )(),
+    "basis-in-waves-zero-behind: a zero byte behind the stream of a basis in waves": lambda: basis(
+        1, 2, basis_in_waves(2, 0, *row((1, 0, 0)), rank=1) + b"\0"
+    )(),
+    "basis-zero-behind: a zero byte behind the stream of a basis": basis(1, 3, basis_stream([[64, 128]]) + b"\0"),
+}.items():
+    motion(STEMS, 1, title, make)
+
 valid(
     "basis-exponents: the exponent of a row of a basis is -200, and 400 more in the next",
     Plant,

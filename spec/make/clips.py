@@ -27,136 +27,114 @@ def named(*names: str) -> Plant:
     return lone(clips=tuple(Clip(1, 1, name) for name in names))
 
 
-valid("clips-two: two clips of different lengths, that share the shapes of pieces", two_clips)
-valid(
-    "clips-three: 13 frames in 6 segments, which without the clips would begin elsewhere",
-    lambda: moving(FORK, 28, heads=HEADS, clips=(Clip(5, 2, "a"), Clip(1, 1, "b"), Clip(7, 3, "c"))),
-)
-valid(
-    "clips-of-one-frame: three clips of one frame each, one of them a loop",
-    lambda: moving(
+for title, make in {
+    "clips-two: two clips of different lengths, that share the shapes of pieces": two_clips,
+    "clips-three: 13 frames in 6 segments, which without the clips would begin elsewhere": lambda: moving(
+        FORK, 28, heads=HEADS, clips=(Clip(5, 2, "a"), Clip(1, 1, "b"), Clip(7, 3, "c"))
+    ),
+    "clips-of-one-frame: three clips of one frame each, one of them a loop": lambda: moving(
         FORK, 29, heads=HEADS, clips=(Clip(1, 1, "a"), loop(Clip(1, 1, "b"), 0.0, 0.0, 0.0), Clip(1, 1, "c"))
     ),
-)
-valid(
-    "clips-segment-lengths: a segment of as many frames as there can be before shorter ones",
-    lambda: lone(
+    "clips-segment-lengths: a segment of as many frames as there can be before shorter ones": lambda: lone(
         clips=(Clip(256, 1, "long"), Clip(257, 2, "longer"), Clip(2, 2, "short")), scripts={(STEMS, 0): row((1, 2, 3))}
     ),
-)
-valid(
-    "clips-255: as many clips as there can be, the last with a segment more",
-    lambda: lone(
+    "clips-255: as many clips as there can be, the last with a segment more": lambda: lone(
         clips=(*(Clip(1, 1, f"{i}") for i in range(254)), Clip(2, 2, "last")), scripts={(STEMS, 0): row((1, 2, 3))}
     ),
-)
-valid(
-    "clips-loops: two loops around a clip that is none: seams at the ends of binary32, and -0.0",
-    lambda: two_clips(clips=(loop(CALM, 0.5, FLOAT_TINY, 0.0), Clip(2, 1, "once"), loop(STORM, FLOAT_MAX, 1.0, -0.0))),
-)
-valid("clip-named: a single clip with a name", lambda: two_clips(clips=(CALM,)))
-valid("clip-loop: a single clip with a name, a loop", lambda: two_clips(clips=(loop(STORM, 3.0, 2.0, 1.0),)))
-valid(
-    "clips-periodic: of three loops of one segment the first and the last are periodic",
-    moving,
-    FORK,
-    30,
-    heads=HEADS,
-    clips=(
-        periodic(CALM, 0.5, 0.25, 0.0),
-        loop(Clip(3, 1, "jerks"), 0.5, 0.25, 0.0),
-        periodic(Clip(1, 1, "one"), 0.0, 0.0, 0.0),
+    "clips-loops: two loops around a clip that is none: seams at the ends of binary32, and -0.0": lambda: two_clips(
+        clips=(loop(CALM, 0.5, FLOAT_TINY, 0.0), Clip(2, 1, "once"), loop(STORM, FLOAT_MAX, 1.0, -0.0))
     ),
-)
-valid("clip-unnamed: a single clip that CLIPS gives an empty name", lambda: two_clips(clips=(Clip(4, 2),)))
-valid("clip-unnamed-loop: a single loop with an empty name", two_clips, clips=(loop(Clip(4, 2), 0.25, 0.25, 0.0),))
-valid(
-    "clips-time: First and Step of each clip: the second begins before the first and overlaps it",
-    lambda: two_clips(time=steady_times((10.0, 0.5), (-1.0, 0.25))),
-)
-valid(
-    "clips-time-rate: First and rate of each clip, which all begin at 0",
-    lambda: two_clips(time=steady_times((0.0, 24.0), (0.0, 30.0), method=1)),
-)
-valid(
-    "clips-time-uneven: times one by one, that descend and repeat from clip to clip",
-    lambda: two_clips(time=uneven_time(0.0, 0.5, 2.0, -1.0, 0.5, 0.75, 2.0)),
-)
-valid(
-    "clips-time-of-one-frame: clips of one frame, all at the same time, one by one",
-    lambda: replace(named("a", "b", "c"), time=uneven_time(1.5, 1.5, 1.5)),
-)
-valid(
-    "clips-time-vast: what a time is expected to be, from clips before, overflows to infinity",
-    lambda: replace(named("a", "b", "c", "d"), time=uneven_time(LOWEST, HIGHEST, LOWEST, 0.0)),
-)
-valid(
-    "clips-time-step-vanishes: a Step that vanishes, in a clip of one frame",
-    lambda: two_clips(clips=(CALM, Clip(1, 1, "still")), time=steady_times((0.0, 0.5), (1e30, 1.0)), scripts={}),
-)
-valid(
-    "clips-steps: segments with steps, rotations and bases of their own, of as many rows as each has frames",
-    moving,
-    FORK,
-    30,
-    clips=(CALM, STORM),
-    heads={
-        (1, 0): stems_head(0.5, 2, 3, 3, basis_stream([[6400, -6400, 6400], [8192, 0, -8192], [64, 128, 192]])),
-        (1, 1): stems_head(0.001, 0, 3, 2, basis_stream([[32, 64], [8192, -8192]])),
-        (2, 2): stems_head(0.25, 1),
-    },
-)
-valid(
-    "clips-corrections: corrections in the second clip alone",
-    lambda: Plant(FORK, clips=(CALM, STORM), is_float64=True, scripts={(CORRECTIONS, 2, 2): lambda: Chance(58)}),
-)
-valid(
-    "clips-truncated: shortened: level 0 of 3, seams of all three",
-    lambda: two_clips(clips=(CALM, loop(STORM, 3.0, 2.0, 1.0))).upto(0),
-)
-valid(
-    "clips-lossless: two loops whose last level is the source's own numbers: seams of four levels",
-    lambda: (
+    "clip-named: a single clip with a name": lambda: two_clips(clips=(CALM,)),
+    "clip-loop: a single clip with a name, a loop": lambda: two_clips(clips=(loop(STORM, 3.0, 2.0, 1.0),)),
+    "clips-periodic: of three loops of one segment the first and the last are periodic": lambda: moving(
+        FORK,
+        30,
+        heads=HEADS,
+        clips=(
+            periodic(CALM, 0.5, 0.25, 0.0),
+            loop(Clip(3, 1, "jerks"), 0.5, 0.25, 0.0),
+            periodic(Clip(1, 1, "one"), 0.0, 0.0, 0.0),
+        ),
+    ),
+    "clip-unnamed: a single clip that CLIPS gives an empty name": lambda: two_clips(clips=(Clip(4, 2),)),
+    "clip-unnamed-loop: a single loop with an empty name": lambda: two_clips(
+        clips=(loop(Clip(4, 2), 0.25, 0.25, 0.0),)
+    ),
+    "clips-time: First and Step of each clip: the second begins before the first and overlaps it": lambda: two_clips(
+        time=steady_times((10.0, 0.5), (-1.0, 0.25))
+    ),
+    "clips-time-rate: First and rate of each clip, which all begin at 0": lambda: two_clips(
+        time=steady_times((0.0, 24.0), (0.0, 30.0), method=1)
+    ),
+    "clips-time-uneven: times one by one, that descend and repeat from clip to clip": lambda: two_clips(
+        time=uneven_time(0.0, 0.5, 2.0, -1.0, 0.5, 0.75, 2.0)
+    ),
+    "clips-time-of-one-frame: clips of one frame, all at the same time, one by one": lambda: replace(
+        named("a", "b", "c"), time=uneven_time(1.5, 1.5, 1.5)
+    ),
+    "clips-time-vast: what a time is expected to be, from clips before, overflows to infinity": lambda: replace(
+        named("a", "b", "c", "d"), time=uneven_time(LOWEST, HIGHEST, LOWEST, 0.0)
+    ),
+    "clips-time-step-vanishes: a Step that vanishes, in a clip of one frame": lambda: two_clips(
+        clips=(CALM, Clip(1, 1, "still")), time=steady_times((0.0, 0.5), (1e30, 1.0)), scripts={}
+    ),
+    "clips-steps: segments with steps, rotations and bases of their own, of as many rows as each has frames": lambda: (
+        moving(
+            FORK,
+            30,
+            clips=(CALM, STORM),
+            heads={
+                (1, 0): stems_head(0.5, 2, 3, 3, basis_stream([[6400, -6400, 6400], [8192, 0, -8192], [64, 128, 192]])),
+                (1, 1): stems_head(0.001, 0, 3, 2, basis_stream([[32, 64], [8192, -8192]])),
+                (2, 2): stems_head(0.25, 1),
+            },
+        )
+    ),
+    "clips-corrections: corrections in the second clip alone": lambda: Plant(
+        FORK, clips=(CALM, STORM), is_float64=True, scripts={(CORRECTIONS, 2, 2): lambda: Chance(58)}
+    ),
+    "clips-truncated: shortened: level 0 of 3, seams of all three": lambda: two_clips(
+        clips=(CALM, loop(STORM, 3.0, 2.0, 1.0))
+    ).upto(0),
+    "clips-lossless: two loops whose last level is the source's own numbers: seams of four levels": lambda: (
         two_clips(clips=(loop(CALM, 3.0, 2.0, 1.0, 0.0), loop(STORM, 0.5, 0.25, 0.125, 0.0)))
         .with_header(level_count=4, full_level_count=4)
         .add(*(Entry(EXACT, b"", 3, s) for s in range(3)))
     ),
-)
-valid(
-    "clips-names: names that differ in case, in accents, in their ends, by spaces alone",
-    named,
-    "wind",
-    "Wind",
-    "WIND",
-    "win",
-    "winds",
-    " ",
-    "  ",
-    "B\u00f6e",
-    "Bo\u0308e",
-    "\u98ce",
-    "\U0001f333",
-    '"\\/',
-    "a.b/c",
-)
-valid(
-    "clips-names-ends: characters at the ends of the ranges of UTF-8",
-    named,
-    " ",
-    "~",
-    "\x80",
-    "\x9f",
-    "\u07ff",
-    "\u0800",
-    "\ud7ff",
-    "\ue000",
-    "\ufeff",
-    "\ufffe",
-    "\uffff",
-    "\U00010000",
-    "\U0010ffff",
-)
-valid("clips-names-longest: names of 255 bytes", lambda: named("n" * 255, "n" * 254 + "m", "\u98ce" * 85))
+    "clips-names: names that differ in case, in accents, in their ends, by spaces alone": lambda: named(
+        "wind",
+        "Wind",
+        "WIND",
+        "win",
+        "winds",
+        " ",
+        "  ",
+        "B\u00f6e",
+        "Bo\u0308e",
+        "\u98ce",
+        "\U0001f333",
+        '"\\/',
+        "a.b/c",
+    ),
+    "clips-names-ends: characters at the ends of the ranges of UTF-8": lambda: named(
+        " ",
+        "~",
+        "\x80",
+        "\x9f",
+        "\u07ff",
+        "\u0800",
+        "\ud7ff",
+        "\ue000",
+        "\ufeff",
+        "\ufffe",
+        "\uffff",
+        "\U00010000",
+        "\U0010ffff",
+    ),
+    "clips-names-longest: names of 255 bytes": lambda: named("n" * 255, "n" * 254 + "m", "\u98ce" * 85),
+}.items():
+    valid(title, make)
+
 CALM_ENTRY, STORM_ENTRY = CALM.entry(), STORM.entry()
 
 
@@ -268,44 +246,40 @@ table(
     "order-clips: METADATA behind CLIPS", lambda: inserted(3, Entry(CLIPS, clip_entry(4, 2)), Entry(METADATA, b"\0{}"))
 )
 table("order-clips-motion: CLIPS behind the first motion chunk", lambda: inserted(4, Entry(CLIPS, clip_entry(4, 2))))
-invalid(
-    "clips-damaged: a bit of CLIPS is flipped",
-    lambda: flipped(two_clips().file(), end_of(two_clips(), CLIPS) - 1),
-    "BAD_CHECKSUM",
-)
-invalid(
-    "clips-cut: the file ends inside CLIPS", lambda: two_clips().file()[: end_of(two_clips(), CLIPS) - 1], "TRUNCATED"
-)
-invalid(
-    "clips-cut-in-motion: level 0 of the first clip alone has arrived",
-    lambda: two_clips().file()[: end_of(two_clips(), AFFINES, 0, 0)],
-    "TRUNCATED",
-    0,
-)
-invalid(
-    "clips-before-hierarchy: CLIPS is not valid and HIERARCHY is damaged: CLIPS comes first",
-    lambda: two_clips().change(CLIPS, content=CALM_ENTRY).change(HIERARCHY, checksum=0),
-)
-invalid(
-    "clips-missing-before-hierarchy: CLIPS is missing and HIERARCHY is damaged: CLIPS comes first",
-    lambda: two_clips().without(CLIPS).change(HIERARCHY, checksum=0),
-    "BAD_CHUNK_TABLE",
-)
-invalid(
-    "clips-damaged-before-hierarchy: CLIPS is damaged and HIERARCHY is missing: CLIPS comes first",
-    lambda: two_clips().without(HIERARCHY).change(CLIPS, checksum=0),
-    "BAD_CHECKSUM",
-)
-invalid(
+for title, how in {
+    "clips-damaged: a bit of CLIPS is flipped": (
+        lambda: flipped(two_clips().file(), end_of(two_clips(), CLIPS) - 1),
+        "BAD_CHECKSUM",
+    ),
+    "clips-cut: the file ends inside CLIPS": (
+        lambda: two_clips().file()[: end_of(two_clips(), CLIPS) - 1],
+        "TRUNCATED",
+    ),
+    "clips-cut-in-motion: level 0 of the first clip alone has arrived": (
+        lambda: two_clips().file()[: end_of(two_clips(), AFFINES, 0, 0)],
+        "TRUNCATED",
+        0,
+    ),
+    "clips-before-hierarchy: CLIPS is not valid and HIERARCHY is damaged: CLIPS comes first": (
+        lambda: two_clips().change(CLIPS, content=CALM_ENTRY).change(HIERARCHY, checksum=0),
+    ),
+    "clips-missing-before-hierarchy: CLIPS is missing and HIERARCHY is damaged: CLIPS comes first": (
+        lambda: two_clips().without(CLIPS).change(HIERARCHY, checksum=0),
+        "BAD_CHUNK_TABLE",
+    ),
+    "clips-damaged-before-hierarchy: CLIPS is damaged and HIERARCHY is missing: CLIPS comes first": (
+        lambda: two_clips().without(HIERARCHY).change(CLIPS, checksum=0),
+        "BAD_CHECKSUM",
+    ),
     "clips-before-levels: Seam_Errors of the three levels of the hierarchy, while Full_Level_Count says 5: CLIPS "
-    "comes first",
-    lambda: two_clips(clips=(CALM, loop(STORM, 1.0, 1.0, 1.0))).with_header(full_level_count=5),
-)
-invalid(
-    "clips-levels: Full_Level_Count 5, and as many Seam_Errors; the hierarchy has 3",
-    lambda: two_clips(clips=(CALM, loop(STORM, *[1.0] * 5))).with_header(full_level_count=5),
-    "BAD_HEADER",
-)
+    "comes first": (lambda: two_clips(clips=(CALM, loop(STORM, 1.0, 1.0, 1.0))).with_header(full_level_count=5),),
+    "clips-levels: Full_Level_Count 5, and as many Seam_Errors; the hierarchy has 3": (
+        lambda: two_clips(clips=(CALM, loop(STORM, *[1.0] * 5))).with_header(full_level_count=5),
+        "BAD_HEADER",
+    ),
+}.items():
+    invalid(title, *how)
+
 UNEVEN = clip_entry(256, 1, "long"), clip_entry(2, 2, "short")
 invalid(
     "clips-memory: 2^18 vertices and a segment of 256 frames, though the mean is 86",

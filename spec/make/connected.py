@@ -135,25 +135,18 @@ def leaves() -> list[list[int]]:
 
 
 HUBS = [Stem(-1, 1 + max(map(max, hubs())), lag=1)]
-valid(
+for title, make in {
     "rest-connected-hubs: vertices that complete up to seven parallelograms, or have up to ten neighbours, and no "
-    "other way",
-    lambda: meshed(HUBS, hubs(), Chance(210, large=5)),
-)
-valid(
+    "other way": lambda: meshed(HUBS, hubs(), Chance(210, large=5)),
     "rest-connected-leaves: by faces shapes, copies, branches that others have begun, and steps of branches of "
-    "their own",
-    lambda: meshed(LEAVES, leaves(), Chance(230, large=3, begin=[1])),
-)
-valid(
-    "rest-connected-crowd: triangles and quadrangles of the same sides, and of the same vertex twice",
-    lambda: meshed([Stem(-1, 17)], crowd(211), Chance(212, large=5)),
-)
-valid(
-    "rest-connected-most: a rest pose by four faces and eight corners for each vertex",
-    lambda: meshed(
+    "their own": lambda: meshed(LEAVES, leaves(), Chance(230, large=3, begin=[1])),
+    "rest-connected-crowd: triangles and quadrangles of the same sides, and of the same vertex twice": lambda: meshed(
+        [Stem(-1, 17)], crowd(211), Chance(212, large=5)
+    ),
+    "rest-connected-most: a rest pose by four faces and eight corners for each vertex": lambda: meshed(
         FORK,
         [[(i + k * (1 + i % 3)) % 5 for k in range(3 if i < 6 else 2 if i < 14 else 1)] for i in range(20)],
         Chance(506, large=5),
     ),
-)
+}.items():
+    valid(title, make)

@@ -111,37 +111,31 @@ def copies_of_lengths() -> Plant:
 
 
 FAR, MOST = ((1 << 30) - 2,) * 3, (1 << 29) - 1
-valid(
-    "rest-copies-turned: the last turn and scale of a shape, which its next copy is about, of two shapes in turn",
-    copies_turned,
-)
-valid("rest-copies-of-many: 64 shapes are remembered, and the last of these is copied", copies_of_many)
-valid(
-    "rest-copies-of-lengths: branches of 15, 16 and 17 vertices that are shapes, copies or neither", copies_of_lengths
-)
-valid(
-    "rest-copies-of-roots: a root that is a copy of a branch, a branch that is one of a root, and a root of a root",
-    lambda: with_copies(
+for title, make in {
+    "rest-copies-turned: the last turn and scale of a shape, which its next copy is about, of two "
+    "shapes in turn": copies_turned,
+    "rest-copies-of-many: 64 shapes are remembered, and the last of these is copied": copies_of_many,
+    "rest-copies-of-lengths: branches of 15, 16 and 17 vertices that are shapes, copies or neither": copies_of_lengths,
+    "rest-copies-of-roots: a root that is a copy of a branch, a branch that is one of a root, and a "
+    "root of a root": lambda: with_copies(
         [3, Stem(-1, 3), Stem(-1, 2), Stem(3, 2, 1), Stem(-1, 2), Stem(5, 3, 1)],
         *([1, *by_chance(3, 190, 9)], copied(0, (1, 1, 2, -1)), by_chance(1, 191)),
         *([1, *by_chance(2, 192, 9)], copied(0, (0, -1, 2, 0)), by_chance(1, 193)),
         *(copied(0, (1, 0, 0, 1)), by_chance(1, 194), copied(0), by_chance(1, 195)),
     ),
-)
-valid(
     "rest-copies-of-a-point: a shape of one vertex, whose copies have whole numbers for their scale, up to 999, and "
-    "for their turn",
-    lambda: with_copies(
+    "for their turn": lambda: with_copies(
         [1] * 4,
         *([1, *by_chance(1, 196)], copied(0, (998, 1, 0, 0)), by_chance(1, 197)),
         *(copied(0, (0, 0, -1, 0), 3), by_chance(1, 198), copied(0, (2, 0, 0, 0), 2), by_chance(1, 199)),
     ),
-)
-valid("rest-copies-tiny: a copy of just over 1/1000 of its shape", lambda: copy_of((8, 0, 68), (-19, 0, 0, 0)))
-valid(
-    "rest-copies-far: numbers of a copy of 29 bits, and what is expected of many behind it",
-    lambda: copy_of(FAR, (MOST, MOST, -MOST, 0), *[(0, 0, 1, 0), (1, -1, 0, 0)] * 25),
-)
+    "rest-copies-tiny: a copy of just over 1/1000 of its shape": lambda: copy_of((8, 0, 68), (-19, 0, 0, 0)),
+    "rest-copies-far: numbers of a copy of 29 bits, and what is expected of many behind it": lambda: copy_of(
+        FAR, (MOST, MOST, -MOST, 0), *[(0, 0, 1, 0), (1, -1, 0, 0)] * 25
+    ),
+}.items():
+    valid(title, make)
+
 for name_, reason_, tip_, places_ in (
     ("scale-1000", "a scale of 1000", (0, 0, 0), [(999, 0, 0, 0)]),
     ("scale-tiny", "a scale of just under 1/1000", (4, 0, 90), [(-25, 0, 0, 0)]),

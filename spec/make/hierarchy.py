@@ -9,48 +9,45 @@ import numpy as np
 from spec.document import rules
 from spec.make.base import *
 
-valid(
-    "two-roots: two plants: a root in the middle of the file",
-    lambda: moving([Stem(-1, 3), Stem(0, 2, 1), Stem(-1, 4), Stem(2, 1, 3)], 7, heads=HEADS),
-)
-valid(
-    "many-roots: roots alone, each a node by its first modes",
-    lambda: moving([Stem(-1, 1), Stem(-1, 2), Stem(-1, 3), Stem(-1, 1, 0, SHEET)], 8, heads=HEADS),
-)
-valid(
-    "chain: the deepest hierarchy of nodes that there can be: 31 branches, each on the one before, 32 levels",
-    lambda: moving(chain(31), 9, heads=HEADS),
-)
-valid(
-    "chain-in-whole: a chain of 40 branches in a WHOLE subtree: nodes end where it begins",
-    lambda: moving(
+for title, make in {
+    "two-roots: two plants: a root in the middle of the file": lambda: moving(
+        [Stem(-1, 3), Stem(0, 2, 1), Stem(-1, 4), Stem(2, 1, 3)], 7, heads=HEADS
+    ),
+    "many-roots: roots alone, each a node by its first modes": lambda: moving(
+        [Stem(-1, 1), Stem(-1, 2), Stem(-1, 3), Stem(-1, 1, 0, SHEET)], 8, heads=HEADS
+    ),
+    "chain: the deepest hierarchy of nodes that there can be: 31 branches, each on the one before, 32 levels": lambda: (
+        moving(chain(31), 9, heads=HEADS)
+    ),
+    "chain-in-whole: a chain of 40 branches in a WHOLE subtree: nodes end where it begins": lambda: moving(
         [Stem(-1, 2), *(replace(s, parent=b, flags=WHOLE if b == 0 else 0) for b, s in enumerate(chain(40)))],
         10,
         heads=HEADS,
     ),
-)
-valid(
-    "depth-4096: branches as deep as the limit allows, of which level 0 is stored",
-    lambda: still(
+    "depth-4096: branches as deep as the limit allows, of which level 0 is stored": lambda: still(
         [replace(s, flags=WHOLE if b == 0 else 0) for b, s in enumerate(chain(4096))], points=[[0.0] * 3] * 4096
     ).upto(0),
-)
-valid(
-    "whole: WHOLE subtrees: a root's, a branch's, and that of a branch alone, shown till the last level",
-    moving,
-    [
-        Stem(-1, 3),
-        Stem(0, 2, 1),
-        Stem(1, 2, 1, WHOLE),
-        Stem(2, 1),
-        Stem(0, 2, 2, WHOLE),
-        Stem(-1, 2, 0, WHOLE),
-        Stem(5, 3, 1),
-    ],
-    11,
-    heads=HEADS,
-)
-valid("whole-alone: a root that is WHOLE and all there is: h is 0", moving, [Stem(-1, 3, 0, WHOLE)], 12, heads=HEADS)
+    "whole: WHOLE subtrees: a root's, a branch's, and that of a branch alone, shown till the last level": lambda: (
+        moving(
+            [
+                Stem(-1, 3),
+                Stem(0, 2, 1),
+                Stem(1, 2, 1, WHOLE),
+                Stem(2, 1),
+                Stem(0, 2, 2, WHOLE),
+                Stem(-1, 2, 0, WHOLE),
+                Stem(5, 3, 1),
+            ],
+            11,
+            heads=HEADS,
+        )
+    ),
+    "whole-alone: a root that is WHOLE and all there is: h is 0": lambda: moving(
+        [Stem(-1, 3, 0, WHOLE)], 12, heads=HEADS
+    ),
+}.items():
+    valid(title, make)
+
 BLADES = [Stem(-1, 3), Stem(-1, 4), Stem(-1, 2), Stem(-1, 3)]
 
 
@@ -60,32 +57,28 @@ def interleaved(stems: list[Stem]) -> list[int]:
     return np.argsort(sorted(range(len(places)), key=places.__getitem__)).tolist()
 
 
-valid(
-    "permutations: branches and vertices numbered otherwise in the source",
-    lambda: moving(
+for title, make in {
+    "permutations: branches and vertices numbered otherwise in the source": lambda: moving(
         [Stem(-1, 3), Stem(0, 2, 1), Stem(0, 1, 2)], 22, branch_source=[2, 0, 1], vertex_source=[5, 0, 3, 1, 4, 2]
     ),
-)
-valid(
-    "permutation-of-branches: branches numbered otherwise, vertices as that lets one expect",
-    lambda: moving(FORK, 23, branch_source=[1, 0]),
-)
-valid(
-    "permutations-said: numbers as expected, but said one by one",
-    lambda: still(FORK, branch_source=[0, 1], vertex_source=[0, 1, 2, 3, 4]),
-)
-valid(
-    "permutation-interleaved: all first vertices in front of all second ones, of stems of different lengths",
-    lambda: still(BLADES, vertex_source=interleaved(BLADES)),
-)
-valid(
-    "permutation-interleaved-long: the same of two stems of more vertices than numbers are remembered of",
-    lambda: still([Stem(-1, 259), Stem(-1, 260)], vertex_source=interleaved([Stem(-1, 259), Stem(-1, 260)])),
-)
-valid(
-    "permutation-turned: stems from tip to base",
-    lambda: still(BLADES, vertex_source=[v for a, b in ((0, 3), (3, 7), (7, 9), (9, 12)) for v in range(a, b)[::-1]]),
-)
+    "permutation-of-branches: branches numbered otherwise, vertices as that lets one expect": lambda: moving(
+        FORK, 23, branch_source=[1, 0]
+    ),
+    "permutations-said: numbers as expected, but said one by one": lambda: still(
+        FORK, branch_source=[0, 1], vertex_source=[0, 1, 2, 3, 4]
+    ),
+    "permutation-interleaved: all first vertices in front of all second ones, of stems of different lengths": lambda: (
+        still(BLADES, vertex_source=interleaved(BLADES))
+    ),
+    "permutation-interleaved-long: the same of two stems of more vertices than numbers are remembered of": lambda: (
+        still([Stem(-1, 259), Stem(-1, 260)], vertex_source=interleaved([Stem(-1, 259), Stem(-1, 260)]))
+    ),
+    "permutation-turned: stems from tip to base": lambda: still(
+        BLADES, vertex_source=[v for a, b in ((0, 3), (3, 7), (7, 9), (9, 12)) for v in range(a, b)[::-1]]
+    ),
+}.items():
+    valid(title, make)
+
 invalid(
     "hierarchy-31-deep: 32 branches, each on the one before: no Full_Level_Count can say 33",
     lambda: moving(chain(32), 1).upto(31).with_header(full_level_count=32),

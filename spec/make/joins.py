@@ -61,27 +61,24 @@ valid(
         (CORRECTIONS, 2): lambda: Chance(4),
     },
 )
-valid(
-    "joins-layers: three layers, of which each is joined and none predicts from that",
-    lambda: refinements(MIXED, 113, frames=12, segments=2, joins=joins(*(0, 4.5) * 6)),
-)
-valid(
-    "joins-lossless: the source's own numbers about positions that are joined",
-    lambda: replace(
+for title, make in {
+    "joins-layers: three layers, of which each is joined and none predicts from that": lambda: refinements(
+        MIXED, 113, frames=12, segments=2, joins=joins(*(0, 4.5) * 6)
+    ),
+    "joins-lossless: the source's own numbers about positions that are joined": lambda: replace(
         joined(FORK, 114)
         .with_header(level_count=4, full_level_count=4)
         .add(*(Entry(EXACT, b"", 3, s) for s in range(2))),
         joins=joins(0, 2, 0, 3, 0, 4.5, 0, 0),
     ),
-)
-valid("joins-truncated: shortened: level 1 of 3", lambda: joined(FORK, 115, *(0, 4) * 3).upto(1))
-valid(
-    "joins-predicted: maps of level 0 before predicted motion",
-    lambda: replace(
+    "joins-truncated: shortened: level 1 of 3": lambda: joined(FORK, 115, *(0, 4) * 3).upto(1),
+    "joins-predicted: maps of level 0 before predicted motion": lambda: replace(
         predicted(ROOTED, swayed(5, 116), segments=2, scripts={(AFFINES, 0): lambda: Chance(116, large=4)}),
         joins=joins(0, 3, 0, 0),
     ),
-)
+}.items():
+    valid(title, make)
+
 for name, reason, of in (
     ("first", "the first segment of a clip that is no loop is joined", (1, 0)),
     ("too-long", "over more frames than the segment has, less two", (0, 5)),

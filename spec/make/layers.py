@@ -82,64 +82,49 @@ def lossless_layers() -> Draft:
     )
 
 
-valid("layers-smallest: one vertex in two layers, all of it empty", lone(layers=2))
-valid("layers-eight: as many layers as there may be", refinements([Stem(-1, 2), Stem(0, 2, 1)], 31, layers=8))
-valid(
-    "layers-two: a refinement of motion alone: the rest pose is that of the layer before, and no piece has shapes",
-    layered(2, (REFINED_REST, 3, 0), (SHAPES, 3, 0), (CORRECTIONS, 3)),
-)
-valid("layers-three: refinements with REFINED_REST, SHAPES and CORRECTIONS", layered())
-valid(
-    "layers-rest-of-last: the second refinement refines the rest pose of the layer before the one before",
-    layered(3, (REFINED_REST, 3, 0)),
-)
-valid("layers-rest-of-first: the second refinement has the rest pose of the first", layered(3, (REFINED_REST, 4, 0)))
-valid("layers-shapes-of-last: shapes in a refinement alone", layered(3, (SHAPES, 1, 0), (SHAPES, 3, 0)))
-valid("layers-shapes-of-first: shapes in the first layer alone", layered(3, (SHAPES, 3, 0), (SHAPES, 4, 0)))
-valid(
-    "layers-learned-first: learned time bases in the first layer: predictions in waves are of all frequencies",
-    layered(heads=learned(1, 2)),
-)
-valid("layers-learned-one: a learned time basis in one refinement", layered(heads=learned(3)))
-valid(
-    "layers-learned-low: a learned time basis of a level that holds the first modes of a piece",
-    layered(heads=learned(1)),
-)
-valid("layers-learned-all: learned time bases in all layers", layered(heads=learned(1, 2, 3, 4)))
-valid(
-    "layers-learned-shared: learned time bases that begin with those of earlier layers: some with further rows",
-    layered(heads=LAYER_HEADS | SHARED_BASES),
-)
-valid(
+for title, make in {
+    "layers-smallest: one vertex in two layers, all of it empty": lone(layers=2),
+    "layers-eight: as many layers as there may be": refinements([Stem(-1, 2), Stem(0, 2, 1)], 31, layers=8),
+    "layers-two: a refinement of motion alone: the rest pose is that of the layer before, and no "
+    "piece has shapes": layered(2, (REFINED_REST, 3, 0), (SHAPES, 3, 0), (CORRECTIONS, 3)),
+    "layers-three: refinements with REFINED_REST, SHAPES and CORRECTIONS": layered(),
+    "layers-rest-of-last: the second refinement refines the rest pose of the layer before the one before": layered(
+        3, (REFINED_REST, 3, 0)
+    ),
+    "layers-rest-of-first: the second refinement has the rest pose of the first": layered(3, (REFINED_REST, 4, 0)),
+    "layers-shapes-of-last: shapes in a refinement alone": layered(3, (SHAPES, 1, 0), (SHAPES, 3, 0)),
+    "layers-shapes-of-first: shapes in the first layer alone": layered(3, (SHAPES, 3, 0), (SHAPES, 4, 0)),
+    "layers-learned-first: learned time bases in the first layer: predictions in waves are of all frequencies": layered(
+        heads=learned(1, 2)
+    ),
+    "layers-learned-one: a learned time basis in one refinement": layered(heads=learned(3)),
+    "layers-learned-low: a learned time basis of a level that holds the first modes of a piece": layered(
+        heads=learned(1)
+    ),
+    "layers-learned-all: learned time bases in all layers": layered(heads=learned(1, 2, 3, 4)),
+    "layers-learned-shared: learned time bases that begin with those of earlier layers: some with "
+    "further rows": layered(heads=LAYER_HEADS | SHARED_BASES),
     "layers-learned-apart: two roots of learned time bases: predictions of pieces of level 1 alone are of all "
-    "frequencies",
-    layered(heads=LAYER_HEADS | SHARED_BASES | {2: stems_head(0.5, 1, 3, 1, basis_stream([[192, 6336]]))}),
-)
-valid(
-    "layers-rigid: branches that move as they are in the first layers",
-    refinements(
+    "frequencies": layered(
+        heads=LAYER_HEADS | SHARED_BASES | {2: stems_head(0.5, 1, 3, 1, basis_stream([[192, 6336]]))}
+    ),
+    "layers-rigid: branches that move as they are in the first layers": refinements(
         RIGID,
         40,
         heads={level: stems_head(0.5 / 4 ** max(level - 2, 0), 16 * level | level % 3) for level in range(12)},
     ),
-)
-valid("layers-tubes: the same in layers", refinements(TUBES, 42, frames=9, segments=2))
-valid(
-    "layers-mixed: rotations, loose stems, sheets, a stem of two pieces and a subtree that is whole",
-    refinements(MIXED, 32, frames=9, segments=2),
-)
-valid(
-    "layers-still: refinements whose rows are all predictions",
-    layered(scripts={(STEMS, 3): [], (STEMS, 4): [], (REFINED_REST, 3, 0): [], (REFINED_REST, 4, 0): []}),
-)
-valid(
-    "layers-beams: runs of beams, some of two, and steps, in all rest poses",
-    refinements(BEAMS, 33, rest=coded_rest(BEAMS, Chance(61, large=4))),
-)
-valid("layers-large: large integers in all streams", refinements(MIXED[:3], 34, large=29, frames=5, is_float64=True))
-valid(
-    "layers-ratio-1: Ratio 1",
-    refinements(
+    "layers-tubes: the same in layers": refinements(TUBES, 42, frames=9, segments=2),
+    "layers-mixed: rotations, loose stems, sheets, a stem of two pieces and a subtree that is whole": refinements(
+        MIXED, 32, frames=9, segments=2
+    ),
+    "layers-still: refinements whose rows are all predictions": layered(
+        scripts={(STEMS, 3): [], (STEMS, 4): [], (REFINED_REST, 3, 0): [], (REFINED_REST, 4, 0): []}
+    ),
+    "layers-beams: runs of beams, some of two, and steps, in all rest poses": refinements(
+        BEAMS, 33, rest=coded_rest(BEAMS, Chance(61, large=4))
+    ),
+    "layers-large: large integers in all streams": refinements(MIXED[:3], 34, large=29, frames=5, is_float64=True),
+    "layers-ratio-1: Ratio 1": refinements(
         MIXED[:3],
         35,
         frames=5,
@@ -148,33 +133,27 @@ valid(
         segments=2,
         clips=(Clip(2, 1, "a"), Clip(2, 1, "b")),
     ),
-)
-valid("layers-ratio-largest: Ratio 65535", layered(ratio=65535, heads=learned(1, 2)))
-valid(
-    "layers-shift-15: Shift 15: what it takes beyond 30 bits is kept there",
-    layered(
+    "layers-ratio-largest: Ratio 65535": layered(ratio=65535, heads=learned(1, 2)),
+    "layers-shift-15: Shift 15: what it takes beyond 30 bits is kept there": layered(
         shift=15, scripts={(SHAPES, 1, 0): [2, *row((1 << 20, 0, -(1 << 14)), (0, -(1 << 29), 0)), *row((0, 0, 1)), 0]}
     ),
-)
-valid(
-    "layers-exact-rest: refinements of an exact rest pose",
-    layered(
+    "layers-exact-rest: refinements of an exact rest pose": layered(
         3,
         (REFINED_REST, 3, 0),
         (REFINED_REST, 4, 0),
         rest=exact_rest(FORK, [float(i * i % 7) for i in range(15)], False),
     ),
-)
-valid("layers-wide: binary64 positions", layered(is_float64=True))
-valid(
-    "layers-clips: two clips, one of them a loop",
-    layered(clips=(loop(Clip(3, 1, "up"), 0.5, 0.4, 0.3, 0.2, 0.1), Clip(2, 1, "down"))),
-)
-valid(
-    "layers-periodic: two clips, one of them periodic",
-    layered(clips=(periodic(Clip(3, 1, "up"), 0.5, 0.4, 0.3, 0.2, 0.1), Clip(2, 1, "down"))),
-)
-valid("layers-lossless: EXACT behind three layers", lossless_layers)
+    "layers-wide: binary64 positions": layered(is_float64=True),
+    "layers-clips: two clips, one of them a loop": layered(
+        clips=(loop(Clip(3, 1, "up"), 0.5, 0.4, 0.3, 0.2, 0.1), Clip(2, 1, "down"))
+    ),
+    "layers-periodic: two clips, one of them periodic": layered(
+        clips=(periodic(Clip(3, 1, "up"), 0.5, 0.4, 0.3, 0.2, 0.1), Clip(2, 1, "down"))
+    ),
+    "layers-lossless: EXACT behind three layers": lossless_layers,
+}.items():
+    valid(title, make)
+
 for level_ in range(5):
     valid(
         f"layers-upto-{level_}: three layers, shortened after level {level_}",
@@ -195,9 +174,8 @@ valid(
     rest_by_level([Stem(-1, 3), Stem(0, 2, 1), Stem(1, 2, 1)], 41, points=[(0, 0, 0)] * 7),
 )
 LOOSE_BEAMS = [*BEAMS[:3], Stem(0, 9, 30, LOOSE), Stem(-1, 70, lag=0)]
-valid(
-    "rest-of-level-1-beams: runs of beams, loose stems, a root of two pieces and two roots",
-    rest_by_level(
+for title, make in {
+    "rest-of-level-1-beams: runs of beams, loose stems, a root of two pieces and two roots": rest_by_level(
         LOOSE_BEAMS,
         42,
         rest=coded_rest(LOOSE_BEAMS, Chance(47, large=6, begin=[0]), rest_type=1),
@@ -205,24 +183,22 @@ valid(
         segments=2,
         is_float64=True,
     ),
-)
-valid(
-    "rest-of-level-1-whole: all that level 0 moves is shown exactly at level 1",
-    rest_by_level([Stem(-1, 4, 0, WHOLE), Stem(0, 3, 2)], 43),
-)
-valid(
-    "layers-rest-vertices: single vertices of all layers",
-    refinements(BY_VERTEX, 46, rest=coded_rest(BY_VERTEX, Chance(38, large=4), 1.0)),
-)
-valid(
-    "layers-connected-rest: rest poses of all layers by faces",
-    refinements(BY_VERTEX, 46, rest=connected(MANY_FACES["strip"]).rest, faces=MANY_FACES["strip"]()),
-)
-valid(
-    "rest-of-level-1-vertices: single vertices by level",
-    rest_by_level(BEAMS[:3], 47, rest=coded_rest(BEAMS[:3], Chance(39, large=4), 1.0)),
-)
-valid("rest-of-level-1-still: the chunk has no bytes in its stream", layered(scripts={(REFINED_REST, 1, 0): []}))
+    "rest-of-level-1-whole: all that level 0 moves is shown exactly at level 1": rest_by_level(
+        [Stem(-1, 4, 0, WHOLE), Stem(0, 3, 2)], 43
+    ),
+    "layers-rest-vertices: single vertices of all layers": refinements(
+        BY_VERTEX, 46, rest=coded_rest(BY_VERTEX, Chance(38, large=4), 1.0)
+    ),
+    "layers-connected-rest: rest poses of all layers by faces": refinements(
+        BY_VERTEX, 46, rest=connected(MANY_FACES["strip"]).rest, faces=MANY_FACES["strip"]()
+    ),
+    "rest-of-level-1-vertices: single vertices by level": rest_by_level(
+        BEAMS[:3], 47, rest=coded_rest(BEAMS[:3], Chance(39, large=4), 1.0)
+    ),
+    "rest-of-level-1-still: the chunk has no bytes in its stream": layered(scripts={(REFINED_REST, 1, 0): []}),
+}.items():
+    valid(title, make)
+
 header("layers-9: Layer_Count 9", layer_count=9, level_count=10, full_level_count=10)
 header("layers-not-those: Layer_Count 4: a file of h = 0 has 5 levels, or 6 with EXACT", layer_count=4)
 for count in (1, 4):
@@ -370,79 +346,75 @@ def refined_run(count: int) -> bytes:
     return write(rules.decode_rest, [0, 0, 0, count], branches, 0.0625, before)
 
 
-valid(
-    "layers-shapes-of-many-modes: eight shapes of a piece of 18 modes, the last of which have rows of their own",
-    Plant,
-    [Stem(-1, 18)],
-    frames=3,
-    layers=2,
-    heads=LAYER_HEADS,
-    scripts={
-        (SHAPES, 0, 0): [6, *(n for i in range(6) for n in row((i, 1, 0), (2, 0, -i)))],
-        (SHAPES, 1, 0): [2, *row((0, 0, 1)), *row((1, 0, 0), (0, 0, 0), (0, 3, 1))],
-        (SHAPES, 2, 0): [8, *(n for i in range(8) for n in refined_row((i % 3, -1, 0)))],
-    }
-    | {(STEMS, level): lambda level=level: Chance(517 + level, large=6, empty=0.1) for level in range(3)},
-)
-valid(
-    "layers-shapes-largest: a shape with the largest integers there are, which a refinement of Shift 0 goes back from",
-    Plant,
-    SHORT,
-    frames=2,
-    layers=2,
-    shift=0,
-    heads=LAYER_HEADS,
-    scripts={
-        (SHAPES, 0, 0): [2, *row((LARGEST, 1, 0)), *row((0, -LARGEST, 3))],
-        (SHAPES, 2, 0): [2, *refined_row((-LARGEST, 0, 0)), *refined_row((0, -LARGEST, 0))],
-    }
-    | {(STEMS, level): lambda level=level: Chance(521 + level, large=6, empty=0.0) for level in range(3)},
-)
-valid(
+for title, make in {
+    "layers-shapes-of-many-modes: eight shapes of a piece of 18 modes, the last of which have rows "
+    "of their own": lambda: Plant(
+        [Stem(-1, 18)],
+        frames=3,
+        layers=2,
+        heads=LAYER_HEADS,
+        scripts={
+            (SHAPES, 0, 0): [6, *(n for i in range(6) for n in row((i, 1, 0), (2, 0, -i)))],
+            (SHAPES, 1, 0): [2, *row((0, 0, 1)), *row((1, 0, 0), (0, 0, 0), (0, 3, 1))],
+            (SHAPES, 2, 0): [8, *(n for i in range(8) for n in refined_row((i % 3, -1, 0)))],
+        }
+        | {(STEMS, level): lambda level=level: Chance(517 + level, large=6, empty=0.1) for level in range(3)},
+    ),
+    "layers-shapes-largest: a shape with the largest integers there are, which a refinement of "
+    "Shift 0 goes back from": lambda: Plant(
+        SHORT,
+        frames=2,
+        layers=2,
+        shift=0,
+        heads=LAYER_HEADS,
+        scripts={
+            (SHAPES, 0, 0): [2, *row((LARGEST, 1, 0)), *row((0, -LARGEST, 3))],
+            (SHAPES, 2, 0): [2, *refined_row((-LARGEST, 0, 0)), *refined_row((0, -LARGEST, 0))],
+        }
+        | {(STEMS, level): lambda level=level: Chance(521 + level, large=6, empty=0.0) for level in range(3)},
+    ),
     "layers-halves: what is predicted of one vertex is half the ratio, in another basis than before, and half a "
-    "step in the same",
-    Plant,
-    [Stem(-1, 1)],
-    frames=4,
-    segments=2,
-    layers=2,
-    heads={
-        0: stems_head(0.5, 0, 3, 2, IMPULSES),
-        (2, 0): stems_head(0.25, 0, 3, 2, IMPULSES),
-        (2, 1): stems_head(1.0, 0, 3, 2, base=0),
-    },
-    scripts={(STEMS, 0): row((1, 0, -1), (-1, 2, 3)), (STEMS, 2): row()},
-)
-valid(
+    "step in the same": lambda: Plant(
+        [Stem(-1, 1)],
+        frames=4,
+        segments=2,
+        layers=2,
+        heads={
+            0: stems_head(0.5, 0, 3, 2, IMPULSES),
+            (2, 0): stems_head(0.25, 0, 3, 2, IMPULSES),
+            (2, 1): stems_head(1.0, 0, 3, 2, base=0),
+        },
+        scripts={(STEMS, 0): row((1, 0, -1), (-1, 2, 3)), (STEMS, 2): row()},
+    ),
     "layers-rigid-turned-300: a branch that moves as it is turned by 100, 180, 250 and 300 degrees, one after the "
-    "other",
-    Plant,
-    [Stem(-1, 4, rigid=1)],
-    frames=5,
-    layers=2,
-    is_float64=True,
-    rest=exact_rest([Stem(-1, 4)], [0.0, 0, 0, 2, 0, 0, 0, 3, 0, 0, 0, 5], True),
-    heads={
-        0: stems_head(8.0, 4 << 4, 3, 5, basis_stream([[8192 * (k == t) for t in range(5)] for k in range(5)])),
-        2: stems_head(0.25),
-    },
-    scripts={
-        (STEMS, 0): [*row(), *row(*((0, 0, n) for n in (0, 7, 16, 31, 60)))],
-        (STEMS, 2): [0, *refined_row((3, -5, 2))],
-    },
-)
-valid(
+    "other": lambda: Plant(
+        [Stem(-1, 4, rigid=1)],
+        frames=5,
+        layers=2,
+        is_float64=True,
+        rest=exact_rest([Stem(-1, 4)], [0.0, 0, 0, 2, 0, 0, 0, 3, 0, 0, 0, 5], True),
+        heads={
+            0: stems_head(8.0, 4 << 4, 3, 5, basis_stream([[8192 * (k == t) for t in range(5)] for k in range(5)])),
+            2: stems_head(0.25),
+        },
+        scripts={
+            (STEMS, 0): [*row(), *row(*((0, 0, n) for n in (0, 7, 16, 31, 60)))],
+            (STEMS, 2): [0, *refined_row((3, -5, 2))],
+        },
+    ),
     "layers-rigid-from-a-point: rigid branches at one place in the first layer, where they have no rotation, and "
-    "not in the next",
-    Plant,
-    [Stem(-1, 2), Stem(0, 3, 1, rigid=1), Stem(0, 3, 1, rigid=2)],
-    frames=2,
-    layers=2,
-    points=[[0, 0, 0], *[[1, 2, 3]] * 7],
-    heads=LAYER_HEADS,
-    scripts={(STEMS, level): lambda level=level: Chance(525 + level, large=6) for level in range(4)}
-    | {(REFINED_REST, 3, 0): lambda: Chance(529, large=4, empty=0.0)},
-)
+    "not in the next": lambda: Plant(
+        [Stem(-1, 2), Stem(0, 3, 1, rigid=1), Stem(0, 3, 1, rigid=2)],
+        frames=2,
+        layers=2,
+        points=[[0, 0, 0], *[[1, 2, 3]] * 7],
+        heads=LAYER_HEADS,
+        scripts={(STEMS, level): lambda level=level: Chance(525 + level, large=6) for level in range(4)}
+        | {(REFINED_REST, 3, 0): lambda: Chance(529, large=4, empty=0.0)},
+    ),
+}.items():
+    valid(title, make)
+
 HALVED_RATIOS = (63000, 0.36065), (67000, 0.34967), (0.45, 0.5)
 valid(
     "layers-rigid-ratios-near: steps of rotations are 63000 and 67000 times those of the next layer, and less than "

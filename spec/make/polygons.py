@@ -219,21 +219,18 @@ valid(
         (FACES, mixed_polygons([[0, 1, 2], [3, 2, 1, 0], [4]], types=("<u8", "<i8"))), (EDGES, derived("<u8"))
     ),
 )
-static(
-    "faces-of-8-bytes-beyond: vertex 2^30 - 1, in 8 bytes", faces(polygons(np.array([[0, 1, (1 << 30) - 1]], "<u8")))
-)
-static(
-    "faces-of-8-bytes-negative: vertex -1 in 8 bytes without a sign",
-    faces(polygons(np.array([[0, 1, -1]], "<i8")).replace(b"\x07", b"\x03", 1)),
-)
-static(
-    "faces-of-8-bytes-count: a face of 2^30 - 1 corners, a number of 8 bytes",
-    faces(
+for title, make in {
+    "faces-of-8-bytes-beyond: vertex 2^30 - 1, in 8 bytes": faces(polygons(np.array([[0, 1, (1 << 30) - 1]], "<u8"))),
+    "faces-of-8-bytes-negative: vertex -1 in 8 bytes without a sign": faces(
+        polygons(np.array([[0, 1, -1]], "<i8")).replace(b"\x07", b"\x03", 1)
+    ),
+    "faces-of-8-bytes-count: a face of 2^30 - 1 corners, a number of 8 bytes": faces(
         polygon_head("<u8", 1, 3, "<u8")
         + write(rules.decode_polygons, [(1 << 30) - 1], polygon_shape(3, 3, 1, 0, 3), 5)
     ),
-)
-static("edges-of-8-bytes-beyond: an edge to vertex 5 of 5", edges(polygons(np.array([[0, 5]], "<u8"))))
+    "edges-of-8-bytes-beyond: an edge to vertex 5 of 5": edges(polygons(np.array([[0, 5]], "<u8"))),
+}.items():
+    static(title, make)
 
 
 def derived_edges(*counts: int) -> Draft:

@@ -72,36 +72,29 @@ def swayed(frames: int, seed: int, stems: list[Stem] = ROOTED, **options) -> lis
     return [[0, 1, *frame_steps(stems, seed + t, **options)] for t in range(frames)]
 
 
-valid("predicted-still: nothing moves", lambda: predicted(ROOTED, [RESTING] * 3))
-valid("predicted-smallest: one vertex, one frame", lambda: predicted(SINGLE, [[0, 1]]))
-valid("predicted: vertices move at random, longer than any line", lambda: predicted(ROOTED, swayed(30, 1, large=5)))
-valid(
-    "predicted-following: most stems follow their ends, for long and then for a while not",
-    lambda: predicted(ROOTED, swayed(8, 21, follow=0.9) + swayed(4, 40, follow=0.1) + swayed(8, 50, follow=0.9)),
-)
-valid(
-    "predicted-following-huge: what follows leaves the range of binary32, and of binary64",
-    lambda: predicted(
+for title, make in {
+    "predicted-still: nothing moves": lambda: predicted(ROOTED, [RESTING] * 3),
+    "predicted-smallest: one vertex, one frame": lambda: predicted(SINGLE, [[0, 1]]),
+    "predicted: vertices move at random, longer than any line": lambda: predicted(ROOTED, swayed(30, 1, large=5)),
+    "predicted-following: most stems follow their ends, for long and then for a while not": lambda: predicted(
+        ROOTED, swayed(8, 21, follow=0.9) + swayed(4, 40, follow=0.1) + swayed(8, 50, follow=0.9)
+    ),
+    "predicted-following-huge: what follows leaves the range of binary32, and of binary64": lambda: predicted(
         LONG, swayed(6, 60, LONG, large=30, follow=1.0), predicted=predicted_head(FLOAT_MAX), is_float64=True
     ),
-)
-valid(
-    "predicted-lattice: vertices are points of the lattice",
-    lambda: predicted(ROOTED, [[0, 1, *frame_points(ROOTED, 30 + t)] for t in range(20)], lattice=1),
-)
-valid(
-    "predicted-lattice-huge: the largest points of the lattice, even and odd",
-    predicted,
-    SINGLE,
-    [
-        [0, 1, 1, -((1 << 30) - 1), 1, (1 << 30) - 1, 0, (1 << 30) - 1],
-        [0, 1, 1, (1 << 30) - 2, (1 << 30) - 1, -((1 << 30) - 1)],
-    ],
-    predicted=predicted_head(FLOAT_MAX, 1),
-)
-valid(
-    "predicted-references: frames that are copies of earlier ones, of the rest pose, and coded about earlier ones",
-    lambda: predicted(
+    "predicted-lattice: vertices are points of the lattice": lambda: predicted(
+        ROOTED, [[0, 1, *frame_points(ROOTED, 30 + t)] for t in range(20)], lattice=1
+    ),
+    "predicted-lattice-huge: the largest points of the lattice, even and odd": lambda: predicted(
+        SINGLE,
+        [
+            [0, 1, 1, -((1 << 30) - 1), 1, (1 << 30) - 1, 0, (1 << 30) - 1],
+            [0, 1, 1, (1 << 30) - 2, (1 << 30) - 1, -((1 << 30) - 1)],
+        ],
+        predicted=predicted_head(FLOAT_MAX, 1),
+    ),
+    "predicted-references: frames that are copies of earlier ones, of the rest pose, and coded "
+    "about earlier ones": lambda: predicted(
         ROOTED,
         [
             [0, 1, *frame_steps(ROOTED, 3)],
@@ -114,46 +107,35 @@ valid(
             [0, 0, 0, *frame_steps(ROOTED, 7)],
         ],
     ),
-)
-valid("predicted-all-copied: every frame is the rest pose", predicted, ROOTED, [[1, 1]] + [[1, 0, 0], [1, 0, 2]])
-valid(
-    "predicted-twins: vertices that rest at the same places, and a stem as long as another",
-    lambda: predicted(
+    "predicted-all-copied: every frame is the rest pose": lambda: predicted(ROOTED, [[1, 1]] + [[1, 0, 0], [1, 0, 2]]),
+    "predicted-twins: vertices that rest at the same places, and a stem as long as another": lambda: predicted(
         TWINS, swayed(9, 8, TWINS, large=6), points=[[4.0 * (i % 3), float(i % 2), 1.0] for i in range(14)]
     ),
-)
-valid(
-    "predicted-collapsed: all vertices rest at one place",
-    lambda: predicted(ROOTED, swayed(6, 9), points=[[2.0, 2.0, 2.0]] * 12),
-)
-valid(
-    "predicted-huge: the largest integers and steps: positions leave the range of binary32",
-    lambda: predicted(SINGLE, [[0, 1, 1, (1 << 30) - 1, -((1 << 30) - 1), 1]] * 5, predicted=predicted_head(FLOAT_MAX)),
-)
-valid("predicted-tiny: a subnormal Step", predicted, ROOTED, swayed(4, 10), predicted=predicted_head(FLOAT_TINY))
-valid(
-    "predicted-wide: binary64 positions far from the origin",
-    lambda: predicted(ROOTED, swayed(7, 11), is_float64=True, origin=(1e6, -3e5, 0.125)),
-)
-valid(
-    "predicted-rounded: binary32 positions far from the origin, a step below their spacing",
-    lambda: predicted(ROOTED, swayed(7, 12), origin=(1e6, -3e5, 0.125)),
-)
-valid(
-    "predicted-segments: two segments, of which one has maps for level 0",
-    lambda: predicted(ROOTED, swayed(5, 13), 2, scripts={(AFFINES, 0, 1): [-8, *row((5, -3, 1), (0, 2, 0))]}),
-)
-valid(
-    "predicted-roots: maps of roots of one vertex, of one stem and of a subtree",
-    lambda: predicted(ROOTS, swayed(3, 14, ROOTS), scripts={(AFFINES, 0, 0): lambda: Chance(15, large=4)}),
-)
-valid("predicted-level-0: shortened: level 0 of 2", lambda: predicted(ROOTED, swayed(2, 16)).upto(0))
-valid(
-    "predicted-lossless: the source's own numbers behind it",
-    lambda: (
+    "predicted-collapsed: all vertices rest at one place": lambda: predicted(
+        ROOTED, swayed(6, 9), points=[[2.0, 2.0, 2.0]] * 12
+    ),
+    "predicted-huge: the largest integers and steps: positions leave the range of binary32": lambda: predicted(
+        SINGLE, [[0, 1, 1, (1 << 30) - 1, -((1 << 30) - 1), 1]] * 5, predicted=predicted_head(FLOAT_MAX)
+    ),
+    "predicted-tiny: a subnormal Step": lambda: predicted(ROOTED, swayed(4, 10), predicted=predicted_head(FLOAT_TINY)),
+    "predicted-wide: binary64 positions far from the origin": lambda: predicted(
+        ROOTED, swayed(7, 11), is_float64=True, origin=(1e6, -3e5, 0.125)
+    ),
+    "predicted-rounded: binary32 positions far from the origin, a step below their spacing": lambda: predicted(
+        ROOTED, swayed(7, 12), origin=(1e6, -3e5, 0.125)
+    ),
+    "predicted-segments: two segments, of which one has maps for level 0": lambda: predicted(
+        ROOTED, swayed(5, 13), 2, scripts={(AFFINES, 0, 1): [-8, *row((5, -3, 1), (0, 2, 0))]}
+    ),
+    "predicted-roots: maps of roots of one vertex, of one stem and of a subtree": lambda: predicted(
+        ROOTS, swayed(3, 14, ROOTS), scripts={(AFFINES, 0, 0): lambda: Chance(15, large=4)}
+    ),
+    "predicted-level-0: shortened: level 0 of 2": lambda: predicted(ROOTED, swayed(2, 16)).upto(0),
+    "predicted-lossless: the source's own numbers behind it": lambda: (
         predicted(ROOTED, swayed(2, 17)).with_header(level_count=3, full_level_count=3).add(Entry(EXACT, b"", 2, 0))
     ),
-)
+}.items():
+    valid(title, make)
 
 
 def swaying() -> Draft:
@@ -161,35 +143,32 @@ def swaying() -> Draft:
 
 
 PREDICTED_PLACE = PREDICTED, 1, 1
-invalid("predicted-missing: a segment has none", lambda: swaying().without(*PREDICTED_PLACE), "BAD_CHUNK_TABLE")
-invalid(
-    "predicted-stems: a segment has STEMS too",
-    lambda: swaying().add(Entry(STEMS, stems_head(), 1, 0)),
-    "BAD_CHUNK_TABLE",
-)
-invalid(
-    "predicted-corrections: a segment has CORRECTIONS too",
-    lambda: swaying().add(Entry(CORRECTIONS, struct.pack("<f", 0.5), 1, 0)),
-    "BAD_CHUNK_TABLE",
-)
-invalid(
-    "predicted-unsaid: PREDICTED where Is_Predicted is 0",
-    lambda: fork().add(Entry(PREDICTED, predicted_head(), 2, 0)),
-    "BAD_CHUNK_TABLE",
-)
-invalid(
-    "predicted-at-level-0: PREDICTED of level 0",
-    lambda: swaying().add(Entry(PREDICTED, predicted_head(), 0, 0)),
-    "BAD_CHUNK_TABLE",
-)
-invalid(
-    "predicted-layers: Layer_Count 2", lambda: swaying().with_header(layer_count=2, full_level_count=3), "BAD_HEADER"
-)
-invalid(
-    "predicted-nodes: h is 1",
-    lambda: predicted(FORKED, swayed(1, 19, FORKED)).with_header(full_level_count=3, level_count=2),
-    "BAD_HEADER",
-)
+for title, how in {
+    "predicted-missing: a segment has none": (lambda: swaying().without(*PREDICTED_PLACE), "BAD_CHUNK_TABLE"),
+    "predicted-stems: a segment has STEMS too": (
+        lambda: swaying().add(Entry(STEMS, stems_head(), 1, 0)),
+        "BAD_CHUNK_TABLE",
+    ),
+    "predicted-corrections: a segment has CORRECTIONS too": (
+        lambda: swaying().add(Entry(CORRECTIONS, struct.pack("<f", 0.5), 1, 0)),
+        "BAD_CHUNK_TABLE",
+    ),
+    "predicted-unsaid: PREDICTED where Is_Predicted is 0": (
+        lambda: fork().add(Entry(PREDICTED, predicted_head(), 2, 0)),
+        "BAD_CHUNK_TABLE",
+    ),
+    "predicted-at-level-0: PREDICTED of level 0": (
+        lambda: swaying().add(Entry(PREDICTED, predicted_head(), 0, 0)),
+        "BAD_CHUNK_TABLE",
+    ),
+    "predicted-layers: Layer_Count 2": (lambda: swaying().with_header(layer_count=2, full_level_count=3), "BAD_HEADER"),
+    "predicted-nodes: h is 1": (
+        lambda: predicted(FORKED, swayed(1, 19, FORKED)).with_header(full_level_count=3, level_count=2),
+        "BAD_HEADER",
+    ),
+}.items():
+    invalid(title, *how)
+
 for name, reason, content in (
     ("short", "4 bytes", predicted_head()[:4]),
     ("lattice-2", "Is_Lattice is 2", predicted_head(lattice=2)),

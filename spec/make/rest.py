@@ -19,13 +19,11 @@ def with_rest(stems: list[Stem], rest: bytes, **fields) -> Plant:
 
 valid("rest-lag-65535: the largest Lag: no vertex is a row behind another", lambda: still([Stem(-1, 3, lag=65535)]))
 RUNS = [Stem(-1, 2, lag=0), Stem(0, 33, 1, lag=0), Stem(0, 32, 0, lag=0), Stem(-1, 1, lag=0)]
-valid(
-    "rest-beams: beams: runs of 1, 16 and 17 and of 32 vertices, from roots and from attach vertices",
-    lambda: with_rest(RUNS, coded_rest(RUNS, Chance(31, begin=[0]))),
-)
-valid(
-    "rest-beams-and-steps: stems of both kinds that share their models",
-    lambda: with_rest(
+for title, make in {
+    "rest-beams: beams: runs of 1, 16 and 17 and of 32 vertices, from roots and from attach vertices": lambda: (
+        with_rest(RUNS, coded_rest(RUNS, Chance(31, begin=[0])))
+    ),
+    "rest-beams-and-steps: stems of both kinds that share their models": lambda: with_rest(
         [Stem(-1, 5, lag=0), Stem(0, 3, 1, lag=1), Stem(0, 4, 4, lag=0)],
         coded_rest(
             [Stem(-1, 5, lag=0), Stem(0, 3, 1, lag=1), Stem(0, 4, 4, lag=0)],
@@ -34,47 +32,40 @@ valid(
             origin=(1e6, -0.5, 3.0),
         ),
     ),
-)
-valid(
-    "rest-exact: binary32 bit for bit: -0.0, subnormal and largest numbers",
-    lambda: with_rest([Stem(-1, 3)], exact_rest([Stem(-1, 3)], AWKWARD_FLOATS, False)),
-)
-valid(
-    "rest-exact-wide: binary64 bit for bit, in a file whose positions are binary32",
-    lambda: with_rest([Stem(-1, 3)], exact_rest([Stem(-1, 3)], AWKWARD_DOUBLES, True, origin=(1.0, -0.0, FLOAT_TINY))),
-)
-valid(
-    "rest-exact-predicted: exact numbers expected from vertices before; the expectation overflows to infinity",
-    with_rest,
-    [Stem(-1, 4), Stem(0, 3, 2)],
-    exact_rest(
-        [Stem(-1, 4), Stem(0, 3, 2)],
-        [1.0, 2.0, -3e38, 2.0, 4.0, 1e38, 3.0, 6.0, 3e38, 4.0, 8.0, 0.0] + [0.5] * 9,
-        False,
+    "rest-exact: binary32 bit for bit: -0.0, subnormal and largest numbers": lambda: with_rest(
+        [Stem(-1, 3)], exact_rest([Stem(-1, 3)], AWKWARD_FLOATS, False)
     ),
-)
-valid(
-    "rest-exact-wraps: differences beyond half of all numbers wrap around",
-    lambda: with_rest([Stem(-1, 2)], exact_rest([Stem(-1, 2)], [1.0, 0.0, 0.0, (2**64 - 1, True), 0.0, 0.0], True)),
-)
-valid(
-    "rest-steps-vast: Rest_Step at the end of binary32: positions are infinite",
-    lambda: moving([Stem(-1, 3), Stem(0, 2, 1)], 33, step=FLOAT_MAX, heads=HEADS),
-)
-valid(
-    "rest-vast: an exact rest pose at 1e300: distances overflow, nothing has a length",
-    lambda: moving(FORK, 33, rest=exact_rest(FORK, [1e300 * (i * i % 7) for i in range(15)], True), heads=HEADS),
-)
-valid("rest-steps-tiny: a subnormal Rest_Step", lambda: moving(FORK, 34, step=FLOAT_TINY, heads=HEADS))
-valid(
-    "rest-tiny: an exact rest pose of subnormal numbers: squares of distances vanish",
-    lambda: moving(FORK, 34, rest=exact_rest(FORK, [TINY * (i * i % 7) for i in range(15)], True), heads=HEADS),
-)
-valid("origin-far: an origin that eats what the rest pose adds", lambda: moving(FORK, 35, origin=(1e9, -1e9, 2.0**60)))
-valid(
-    "origin-overflows: binary32 positions beyond its range are infinite",
-    lambda: still(FORK, rest=exact_rest(FORK, [1e39, -1e39, 0.0] * 5, True, origin=(FLOAT_MAX, -FLOAT_MAX, 0.0))),
-)
+    "rest-exact-wide: binary64 bit for bit, in a file whose positions are binary32": lambda: with_rest(
+        [Stem(-1, 3)], exact_rest([Stem(-1, 3)], AWKWARD_DOUBLES, True, origin=(1.0, -0.0, FLOAT_TINY))
+    ),
+    "rest-exact-predicted: exact numbers expected from vertices before; the expectation overflows "
+    "to infinity": lambda: with_rest(
+        [Stem(-1, 4), Stem(0, 3, 2)],
+        exact_rest(
+            [Stem(-1, 4), Stem(0, 3, 2)],
+            [1.0, 2.0, -3e38, 2.0, 4.0, 1e38, 3.0, 6.0, 3e38, 4.0, 8.0, 0.0] + [0.5] * 9,
+            False,
+        ),
+    ),
+    "rest-exact-wraps: differences beyond half of all numbers wrap around": lambda: with_rest(
+        [Stem(-1, 2)], exact_rest([Stem(-1, 2)], [1.0, 0.0, 0.0, (2**64 - 1, True), 0.0, 0.0], True)
+    ),
+    "rest-steps-vast: Rest_Step at the end of binary32: positions are infinite": lambda: moving(
+        [Stem(-1, 3), Stem(0, 2, 1)], 33, step=FLOAT_MAX, heads=HEADS
+    ),
+    "rest-vast: an exact rest pose at 1e300: distances overflow, nothing has a length": lambda: moving(
+        FORK, 33, rest=exact_rest(FORK, [1e300 * (i * i % 7) for i in range(15)], True), heads=HEADS
+    ),
+    "rest-steps-tiny: a subnormal Rest_Step": lambda: moving(FORK, 34, step=FLOAT_TINY, heads=HEADS),
+    "rest-tiny: an exact rest pose of subnormal numbers: squares of distances vanish": lambda: moving(
+        FORK, 34, rest=exact_rest(FORK, [TINY * (i * i % 7) for i in range(15)], True), heads=HEADS
+    ),
+    "origin-far: an origin that eats what the rest pose adds": lambda: moving(FORK, 35, origin=(1e9, -1e9, 2.0**60)),
+    "origin-overflows: binary32 positions beyond its range are infinite": lambda: still(
+        FORK, rest=exact_rest(FORK, [1e39, -1e39, 0.0] * 5, True, origin=(FLOAT_MAX, -FLOAT_MAX, 0.0))
+    ),
+}.items():
+    valid(title, make)
 
 
 def corrupted_rest(**fields) -> bytes:
@@ -95,23 +86,21 @@ for what, value in (("nan", NAN), ("infinite", -INFINITY)):
     prelude(REST, f"origin-{what}: Origin has {value}", lambda value=value: corrupted_rest(origin=(0.0, 0.0, value)))
 for what, value in (("zero", 0.0), ("negative", -1.0), ("nan", NAN), ("infinite", INFINITY)):
     prelude(REST, f"step-{what}: Rest_Step is {value}", lambda value=value: corrupted_rest(step=value))
-prelude(
-    REST,
-    "step-of-exact: Rest_Step is 0 with Method 1, where it has no meaning",
-    lambda: exact_of_fork([0.0] * 15, False, step=0.0),
-)
-prelude(REST, "zero-behind: a zero byte behind the stream", lambda: corrupted_rest() + b"\0")
-prelude(REST, "bytes-behind: bytes behind the stream", lambda: corrupted_rest() + b"\1" * 12)
-prelude(REST, "exact-infinite: an infinite binary32 number", lambda: exact_of_fork([0.0, INFINITE_BITS[False]], False))
-prelude(
-    REST, "exact-wide-infinite: an infinite binary64 number", lambda: exact_of_fork([0.0, INFINITE_BITS[True]], True)
-)
-prelude(REST, "exact-nan: a number that is NaN", lambda: exact_of_fork([((0xFF << 23) + 1, False)], False))
-prelude(
-    REST,
-    "exact-zero-behind: a zero byte behind the stream of exact numbers",
-    lambda: exact_of_fork([0.5] * 15, False) + b"\0",
-)
+for title, make in {
+    "step-of-exact: Rest_Step is 0 with Method 1, where it has no meaning": lambda: exact_of_fork(
+        [0.0] * 15, False, step=0.0
+    ),
+    "zero-behind: a zero byte behind the stream": lambda: corrupted_rest() + b"\0",
+    "bytes-behind: bytes behind the stream": lambda: corrupted_rest() + b"\1" * 12,
+    "exact-infinite: an infinite binary32 number": lambda: exact_of_fork([0.0, INFINITE_BITS[False]], False),
+    "exact-wide-infinite: an infinite binary64 number": lambda: exact_of_fork([0.0, INFINITE_BITS[True]], True),
+    "exact-nan: a number that is NaN": lambda: exact_of_fork([((0xFF << 23) + 1, False)], False),
+    "exact-zero-behind: a zero byte behind the stream of exact numbers": lambda: (
+        exact_of_fork([0.5] * 15, False) + b"\0"
+    ),
+}.items():
+    prelude(REST, title, make)
+
 invalid(
     "rest-beam-frequencies: a run of two vertices codes three frequencies",
     lambda: with_rest([Stem(-1, 3, lag=0)], coded_rest([Stem(-1, 3, lag=0)], [])).change(

@@ -41,51 +41,39 @@ def bent_bush(script: list | Chance, rest: list | Chance, **fields) -> Plant:
     return still(BUSH, rest=reference, source_rest=bent(BUSH, script, reference), **fields)
 
 
-valid(
-    "source-rest: a rest pose about the reference pose: beams of several runs, stems that are none, roots",
-    lambda: bent_bush(Chance(201, large=6), Chance(211, large=9)),
-)
-valid("source-rest-same: the same pose once more: a stream of no bytes", lambda: bent_bush([], Chance(212, large=9)))
-valid(
-    "source-rest-detail: steps of branches of their own",
-    lambda: still(
+for title, make in {
+    "source-rest: a rest pose about the reference pose: beams of several runs, stems that are none, roots": lambda: (
+        bent_bush(Chance(201, large=6), Chance(211, large=9))
+    ),
+    "source-rest-same: the same pose once more: a stream of no bytes": lambda: bent_bush([], Chance(212, large=9)),
+    "source-rest-detail: steps of branches of their own": lambda: still(
         DETAILED_BUSH, source_rest=bent(DETAILED_BUSH, Chance(204, large=6), detailed_rest()), rest=detailed_rest()
     ),
-)
-valid(
-    "source-rest-far: steps as large as the plant: tangents are opposed and vanish",
-    lambda: bent_bush(Chance(202, large=12), Chance(213, large=9)),
-)
-valid(
-    "source-rest-point: a reference pose that is one point: no tangents, no turns",
-    lambda: bent_bush(Chance(203, large=4), []),
-)
-valid(
-    "source-rest-wide: with a pose of binary64",
-    lambda: bent_bush(Chance(204, large=9), Chance(214, large=9), is_float64=True, origin=(FLOAT_MAX, 0.0, -FLOAT_MAX)),
-)
-valid(
-    "source-rest-largest-step: Rest_Step is the largest number: positions beyond binary32",
-    lambda: still(FORK, source_rest=source_rest_chunk(bent(FORK, Chance(205))[5:], FLOAT_MAX)),
-)
-valid(
-    "source-rest-exact: the very numbers of the source, the reference pose at a step",
-    lambda: still(
+    "source-rest-far: steps as large as the plant: tangents are opposed and vanish": lambda: bent_bush(
+        Chance(202, large=12), Chance(213, large=9)
+    ),
+    "source-rest-point: a reference pose that is one point: no tangents, no turns": lambda: bent_bush(
+        Chance(203, large=4), []
+    ),
+    "source-rest-wide: with a pose of binary64": lambda: bent_bush(
+        Chance(204, large=9), Chance(214, large=9), is_float64=True, origin=(FLOAT_MAX, 0.0, -FLOAT_MAX)
+    ),
+    "source-rest-largest-step: Rest_Step is the largest number: positions beyond binary32": lambda: still(
+        FORK, source_rest=source_rest_chunk(bent(FORK, Chance(205))[5:], FLOAT_MAX)
+    ),
+    "source-rest-exact: the very numbers of the source, the reference pose at a step": lambda: still(
         FORK, source_rest=source_rest_chunk(exact_rest(FORK, [*AWKWARD_FLOATS, *[1.5] * 6], False)[17:], method=1)
     ),
-)
-valid(
-    "source-rest-exact-wide: the same in binary64",
-    lambda: still(
+    "source-rest-exact-wide: the same in binary64": lambda: still(
         FORK,
         is_float64=True,
         source_rest=source_rest_chunk(exact_rest(FORK, [*AWKWARD_DOUBLES, *[1.5] * 6], True)[17:], method=1),
     ),
-)
-valid(
-    "source-rest-layers: a rest pose about the reference poses of all layers",
-    lambda: layered(source_rest=bent(FORK, Chance(207, large=9))),
-)
+    "source-rest-layers: a rest pose about the reference poses of all layers": lambda: layered(
+        source_rest=bent(FORK, Chance(207, large=9))
+    ),
+}.items():
+    valid(title, make)
 
 
 def source_rest(

@@ -79,51 +79,47 @@ for kind, level, name in (
         lambda kind=kind, level=level: fork().add(Entry(kind, b"", level)),
         "UNKNOWN_CHUNK",
     )
-table("no-level: the last CORRECTIONS with Level 255", lambda: moved(CORRECTIONS, level=255))
-table("level-beyond: a motion chunk of a level that is not stored", lambda: moved(CORRECTIONS, level=3))
-table("segment-beyond: a motion chunk of a segment that is not there", lambda: moved(CORRECTIONS, segment=2))
-table("unknown-without-level: an unknown optional motion kind with Level 255", lambda: fork().add(Entry(0x8018, b"")))
-table("order-prelude: REST before HIERARCHY", lambda: swapped(0, 1))
-table("order-motion-first: a motion chunk before TIME", lambda: swapped(2, 3))
-table("order-kinds: SHAPES before STEMS", lambda: swapped(5, 6))
-table(
-    "order-optional: an unknown optional motion kind before the known ones of its level: bit 15 counts",
-    lambda: inserted(3, Entry(0x8018, b"", 0, 0)),
-)
-table("order-attributes: ATTRIBUTE before the motion", lambda: inserted(3, Entry(ATTRIBUTE, element("|u1", b"a"))))
-table("order-behind: METADATA behind the motion", lambda: inserted(len(fork().entries), Entry(METADATA, b"\0{}")))
-table("twice-time: TIME twice", lambda: fork().add(Entry(TIME, steady_time())))
-table(
-    "twice-metadata: METADATA twice: only kinds from 32 on may repeat",
-    lambda: fork().add(Entry(METADATA, b"\0{}"), Entry(METADATA, b"\0{}")),
-)
-table(
-    "twice-stems: STEMS of a level and segment twice",
-    lambda: fork().add(Entry(STEMS, fork().content(STEMS, 1, 0), 1, 0)),
-)
-table(
-    "twice-unknown: an unknown optional kind of the prelude twice",
-    lambda: fork().add(Entry(0x8009, b""), Entry(0x8009, b"")),
-)
-table(
-    "twice-unknown-motion: an unknown optional motion kind twice",
-    lambda: fork().add(Entry(0x8018, b"", 0, 0), Entry(0x8018, b"", 0, 0)),
-)
-table(
-    "length-limit: a chunk of 2^28 + 1 bytes",
-    lambda: fork().add(Entry(0x8009, b"", length=(1 << 28) + 1)),
-    "LIMIT_EXCEEDED",
-)
-table(
-    "length-limit-of-unknown: the Kind is checked before the Length",
-    lambda: fork().add(Entry(9, b"", length=2**30 - 1)),
-    "UNKNOWN_CHUNK",
-)
-table(
-    "length-limit-before-place: the Length is checked before the Level",
-    lambda: fork().add(Entry(0x8018, b"", length=2**30 - 1)),
-    "LIMIT_EXCEEDED",
-)
+for title, how in {
+    "no-level: the last CORRECTIONS with Level 255": (lambda: moved(CORRECTIONS, level=255),),
+    "level-beyond: a motion chunk of a level that is not stored": (lambda: moved(CORRECTIONS, level=3),),
+    "segment-beyond: a motion chunk of a segment that is not there": (lambda: moved(CORRECTIONS, segment=2),),
+    "unknown-without-level: an unknown optional motion kind with Level 255": (lambda: fork().add(Entry(0x8018, b"")),),
+    "order-prelude: REST before HIERARCHY": (lambda: swapped(0, 1),),
+    "order-motion-first: a motion chunk before TIME": (lambda: swapped(2, 3),),
+    "order-kinds: SHAPES before STEMS": (lambda: swapped(5, 6),),
+    "order-optional: an unknown optional motion kind before the known ones of its level: bit 15 counts": (
+        lambda: inserted(3, Entry(0x8018, b"", 0, 0)),
+    ),
+    "order-attributes: ATTRIBUTE before the motion": (lambda: inserted(3, Entry(ATTRIBUTE, element("|u1", b"a"))),),
+    "order-behind: METADATA behind the motion": (lambda: inserted(len(fork().entries), Entry(METADATA, b"\0{}")),),
+    "twice-time: TIME twice": (lambda: fork().add(Entry(TIME, steady_time())),),
+    "twice-metadata: METADATA twice: only kinds from 32 on may repeat": (
+        lambda: fork().add(Entry(METADATA, b"\0{}"), Entry(METADATA, b"\0{}")),
+    ),
+    "twice-stems: STEMS of a level and segment twice": (
+        lambda: fork().add(Entry(STEMS, fork().content(STEMS, 1, 0), 1, 0)),
+    ),
+    "twice-unknown: an unknown optional kind of the prelude twice": (
+        lambda: fork().add(Entry(0x8009, b""), Entry(0x8009, b"")),
+    ),
+    "twice-unknown-motion: an unknown optional motion kind twice": (
+        lambda: fork().add(Entry(0x8018, b"", 0, 0), Entry(0x8018, b"", 0, 0)),
+    ),
+    "length-limit: a chunk of 2^28 + 1 bytes": (
+        lambda: fork().add(Entry(0x8009, b"", length=(1 << 28) + 1)),
+        "LIMIT_EXCEEDED",
+    ),
+    "length-limit-of-unknown: the Kind is checked before the Length": (
+        lambda: fork().add(Entry(9, b"", length=2**30 - 1)),
+        "UNKNOWN_CHUNK",
+    ),
+    "length-limit-before-place: the Length is checked before the Level": (
+        lambda: fork().add(Entry(0x8018, b"", length=2**30 - 1)),
+        "LIMIT_EXCEEDED",
+    ),
+}.items():
+    table(title, *how)
+
 for kind in (HIERARCHY, REST, TIME):
     table(f"no-{KIND_NAMES[kind].lower()}: {KIND_NAMES[kind]} is missing", lambda kind=kind: fork().without(kind))
 table("no-chunk-of-motion: a file without motion", lambda: replace(fork(), entries=fork().entries[:3]))

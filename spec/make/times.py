@@ -84,24 +84,19 @@ for what, value in (("zero", 0.0), ("negative", -1.0), ("nan", NAN), ("infinite"
         f"second-rate-{what}: Step of the second clip, by Method 1, is {value}",
         lambda value=value: steady_times(STEADY, (0.0, value), method=1),
     )
-clip_times("second-first-nan: First of the second clip is NaN", lambda: steady_times(STEADY, (NAN, 1.0)))
-clip_times(
-    "second-stands-still: Step of the second clip vanishes beside its First", lambda: steady_times(STEADY, (1e30, 1.0))
-)
-clip_times(
-    "first-stands-still: Step of the first clip vanishes beside its First", lambda: steady_times((1e30, 1.0), STEADY)
-)
-clip_times("second-overflows: times of the second clip beyond binary64", lambda: steady_times(STEADY, (0.0, HIGHEST)))
-clip_times(
-    "uneven-second-equal: a time twice in the second clip", lambda: uneven_time(0.0, 1.0, 2.0, 0.0, 1.0, 1.0, 2.0)
-)
-clip_times(
-    "uneven-first-descends: a time of the first clip before the one before",
-    lambda: uneven_time(0.0, 2.0, 1.0, 3.0, 4.0, 5.0, 6.0),
-)
-clip_times(
-    "uneven-more: a time more than there are frames", lambda: uneven_time(0.0, 1.5, 2.0, 0.0, 1.0, 2.0, 3.0, 1e-9)
-)
+for title, make in {
+    "second-first-nan: First of the second clip is NaN": lambda: steady_times(STEADY, (NAN, 1.0)),
+    "second-stands-still: Step of the second clip vanishes beside its First": lambda: steady_times(STEADY, (1e30, 1.0)),
+    "first-stands-still: Step of the first clip vanishes beside its First": lambda: steady_times((1e30, 1.0), STEADY),
+    "second-overflows: times of the second clip beyond binary64": lambda: steady_times(STEADY, (0.0, HIGHEST)),
+    "uneven-second-equal: a time twice in the second clip": lambda: uneven_time(0.0, 1.0, 2.0, 0.0, 1.0, 1.0, 2.0),
+    "uneven-first-descends: a time of the first clip before the one before": lambda: uneven_time(
+        0.0, 2.0, 1.0, 3.0, 4.0, 5.0, 6.0
+    ),
+    "uneven-more: a time more than there are frames": lambda: uneven_time(0.0, 1.5, 2.0, 0.0, 1.0, 2.0, 3.0, 1e-9),
+}.items():
+    clip_times(title, make)
+
 valid(
     "time-uneven-empty: TIME of Method 2 without a stream: its bits are ones, and the only time is the least that "
     "there is",
