@@ -631,8 +631,8 @@ def _of_draft(name: str) -> Callable:
 
 @dataclass
 class Plant:
-    """A file of scripts, by (kind, level, segment) or (kind, level). Streams without a script hold empty rows; SHAPES,
-    CORRECTIONS and REFINED_REST are there only with one."""
+    """A file of scripts, or seeds of random ones, by (kind, level, segment) or (kind, level). Streams without a script
+    hold empty rows; SHAPES, CORRECTIONS and REFINED_REST are there only with one."""
 
     stems: list[Stem]
     frames: int = 1
@@ -832,4 +832,5 @@ class Plant:
 
     def _write(self, function: Callable, place: tuple, *arguments) -> bytes:
         script = self.scripts.get(place, self.scripts.get(place[:2], []))
-        return write(function, script() if callable(script) else script, *arguments)
+        script = Chance(script) if isinstance(script, int) else script() if callable(script) else script
+        return write(function, script, *arguments)

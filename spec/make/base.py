@@ -69,6 +69,22 @@ def bytes_of(made: Plant | Draft | bytes | Callable) -> bytes:
     return made if isinstance(made, bytes) else made.file()
 
 
+def stems_of(text: str) -> list[Stem]:
+    """Return stems, separated by commas: parent, vertices and place, then flags and other fields by their names."""
+    stems = []
+    for words in map(str.split, text.split(",")):
+        named = dict(word.split("=") for word in words if "=" in word)
+        flags = sum(getattr(rules, word) for word in words if word.isupper())
+        numbers = [int(word) for word in words if word.lstrip("-").isdigit()]
+        stems.append(Stem(*numbers, flags=flags, **{name: int(value) for name, value in named.items()}))
+    return stems
+
+
+def points_of(text: str) -> list[list[float]]:
+    """Return points, three numbers each."""
+    return np.array(text.replace(",", " ").split(), float).reshape(-1, 3).tolist()
+
+
 def lone(**fields) -> Plant:
     """One vertex, one frame."""
     return Plant([Stem(-1, 1)], points=[[4.0, 8.0, 12.0]], **fields)
@@ -81,10 +97,10 @@ def forked(**fields) -> Plant:
     """A trunk and a branch, four frames in two segments, every kind of motion chunk."""
     scripts = {
         (SHAPES, 1, 0): [2, *row((3, 0, 4), (0, 1, 0)), *row((0, 0, 1)), 0],
-        (STEMS, 1): lambda: Chance(1),
-        (STEMS, 2): lambda: Chance(2),
+        (STEMS, 1): 1,
+        (STEMS, 2): 2,
         (AFFINES, 0): [-8, *row((5, -3, 1), (0, 2, 0))],
-        (CORRECTIONS, 2): lambda: Chance(3),
+        (CORRECTIONS, 2): 3,
     }
     return Plant(FORK, **{"frames": 4, "segments": 2, "scripts": scripts} | fields)
 
@@ -102,7 +118,7 @@ def moving(stems: list[Stem], seed: int, frames: int = 3, segments: int = 1, **f
     """Random rows at all levels."""
     scripts = {}
     for level in range(33):
-        scripts[STEMS, level] = lambda level=level: Chance(100 * seed + level)
+        scripts[STEMS, level] = 100 * seed + level
         scripts[AFFINES, level] = lambda level=level: Chance(100 * seed + level + 50, large=4)
     return Plant(stems, frames, segments, **{"scripts": scripts} | fields)
 
@@ -130,16 +146,7 @@ def exact_rest(stems: list[Stem], numbers: list, is_float64: bool, **fields) -> 
 
 FUTURE = b"from the future"
 LAYER_HEADS = {level: stems_head(0.5 / 4 ** max(level - 2, 0), level % 3) for level in range(12)}
-MIXED = [
-    Stem(-1, 4),
-    Stem(0, 3, 2, SHEET),
-    Stem(1, 2, 1, LOOSE),
-    Stem(0, 70, 3),
-    Stem(3, 5, 66, SHEET | LOOSE),
-    Stem(-1, 6, 0, SHEET),
-    Stem(5, 3, 4, WHOLE),
-    Stem(6, 2, 1),
-]
+MIXED = stems_of("-1 4, 0 3 2 SHEET, 1 2 1 LOOSE, 0 70 3, 3 5 66 SHEET LOOSE, -1 6 0 SHEET, 5 3 4 WHOLE, 6 2 1")
 
 
 def refinements(stems: list[Stem], seed: int, large: int = 12, **fields) -> Plant:

@@ -153,20 +153,16 @@ valid(
     SHORT,
     frames=2,
     heads={0: stems_head(0.25, 0, 2, 2, basis_in_waves(2, -200, 400, *row((1, 1, 0), (2, -1, 0)), rank=2))},
-    scripts={(STEMS, 0): lambda: Chance(513)},
+    scripts={(STEMS, 0): 513},
 )
-motion(
-    STEMS,
-    1,
-    "basis-length-one-more: Basis_Length is one more than the chunk holds",
-    lambda: struct.pack("<fBBHBI", 0.5, 0, 3, 2, 255, 1 + len(IMPULSES)) + IMPULSES,
-)
-motion(
-    STEMS,
-    1,
-    "basis-length-cut: the chunk ends before the last byte of Basis_Length",
-    lambda: stems_head(0.5, 0, 3, 1)[:12],
-)
+for title, make in {
+    "basis-length-one-more: Basis_Length is one more than the chunk holds": lambda: (
+        struct.pack("<fBBHBI", 0.5, 0, 3, 2, 255, 1 + len(IMPULSES)) + IMPULSES
+    ),
+    "basis-length-cut: the chunk ends before the last byte of Basis_Length": lambda: stems_head(0.5, 0, 3, 1)[:12],
+}.items():
+    motion(STEMS, 1, title, make)
+
 valid(
     "basis-of-level-0: learned bases that begin with that of level 0",
     Plant,
@@ -176,7 +172,7 @@ valid(
         0: stems_head(0.25, 0, 3, 1, basis_stream([[6336, -8192, 192]])),
         1: stems_head(0.25, 0, 3, 2, basis_stream([[8192, 0, -2464]]), base=0),
     },
-    scripts={(STEMS, 0): lambda: Chance(514), (STEMS, 1): lambda: Chance(515)},
+    scripts={(STEMS, 0): 514, (STEMS, 1): 515},
 )
 
 

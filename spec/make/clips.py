@@ -91,7 +91,7 @@ for title, make in {
         )
     ),
     "clips-corrections: corrections in the second clip alone": lambda: Plant(
-        FORK, clips=(CALM, STORM), is_float64=True, scripts={(CORRECTIONS, 2, 2): lambda: Chance(58)}
+        FORK, clips=(CALM, STORM), is_float64=True, scripts={(CORRECTIONS, 2, 2): 58}
     ),
     "clips-truncated: shortened: level 0 of 3, seams of all three": lambda: two_clips(
         clips=(CALM, loop(STORM, 3.0, 2.0, 1.0))

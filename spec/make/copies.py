@@ -11,13 +11,9 @@ from spec.document import rules
 from spec.make.base import *
 from spec.make.rest import coded_rest, with_rest
 
-COPIED = [  # a shape and its copies, of branches that have detail and that have none
-    Stem(-1, 8, lag=2),
-    Stem(0, 4, 3, lag=2),
-    Stem(0, 4, 5, SHEET, lag=2, detail=118),
-    Stem(0, 4, 0, lag=1),
-    Stem(0, 8, 2, lag=2),
-]
+COPIED = stems_of(  # a shape and its copies, of branches that have detail and that have none
+    "-1 8 lag=2, 0 4 3 lag=2, 0 4 5 SHEET lag=2 detail=118, 0 4 0 lag=1, 0 8 2 lag=2"
+)
 valid(
     "rest-copies: copies of shapes that are mirrored and scaled",
     lambda: with_rest(COPIED, coded_rest(COPIED, Chance(3, large=3, begin=[1]))),

@@ -9,7 +9,7 @@ from spec.make.base import *
 
 valid(
     "corrections: corrections on the last level: blocks of 8 frames, the last of 2, and vertices that have none",
-    lambda: Plant([Stem(-1, 6)], 18, scripts={(CORRECTIONS, 1): lambda: Chance(54)}),
+    lambda: Plant([Stem(-1, 6)], 18, scripts={(CORRECTIONS, 1): 54}),
 )
 valid(
     "corrections-footprints: corrections of all widths that overlap, are cut off at both ends of a segment, and sum "
@@ -27,7 +27,7 @@ valid(
 )
 valid(
     "corrections-wide: corrections of binary64 positions",
-    lambda: Plant(FORK, 3, is_float64=True, origin=(0.1, 0.2, 0.3), scripts={(CORRECTIONS, 2): lambda: Chance(55)}),
+    lambda: Plant(FORK, 3, is_float64=True, origin=(0.1, 0.2, 0.3), scripts={(CORRECTIONS, 2): 55}),
 )
 valid(
     "corrections-none: a CORRECTIONS chunk that corrects nothing, in one of two segments",
@@ -35,11 +35,11 @@ valid(
 )
 valid(
     "corrections-to-infinity: a Correction_Step at the end of binary32",
-    lambda: Plant(FORK, 2, scripts={(CORRECTIONS, 2): lambda: Chance(56)}).change(
+    lambda: Plant(FORK, 2, scripts={(CORRECTIONS, 2): 56}).change(
         CORRECTIONS,
         2,
         content=struct.pack("<f", FLOAT_MAX)
-        + Plant(FORK, 2, scripts={(CORRECTIONS, 2): lambda: Chance(56)}).draft().content(CORRECTIONS, 2)[4:],
+        + Plant(FORK, 2, scripts={(CORRECTIONS, 2): 56}).draft().content(CORRECTIONS, 2)[4:],
     ),
 )
 

@@ -28,19 +28,7 @@ for title, make in {
         [replace(s, flags=WHOLE if b == 0 else 0) for b, s in enumerate(chain(4096))], points=[[0.0] * 3] * 4096
     ).upto(0),
     "whole: WHOLE subtrees: a root's, a branch's, and that of a branch alone, shown till the last level": lambda: (
-        moving(
-            [
-                Stem(-1, 3),
-                Stem(0, 2, 1),
-                Stem(1, 2, 1, WHOLE),
-                Stem(2, 1),
-                Stem(0, 2, 2, WHOLE),
-                Stem(-1, 2, 0, WHOLE),
-                Stem(5, 3, 1),
-            ],
-            11,
-            heads=HEADS,
-        )
+        moving(stems_of("-1 3, 0 2 1, 1 2 1 WHOLE, 2 1, 0 2 2 WHOLE, -1 2 0 WHOLE, 5 3 1"), 11, heads=HEADS)
     ),
     "whole-alone: a root that is WHOLE and all there is: h is 0": lambda: moving(
         [Stem(-1, 3, 0, WHOLE)], 12, heads=HEADS

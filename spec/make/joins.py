@@ -54,12 +54,7 @@ valid(
     FORK,
     112,
     *(0, 4, 0, 4, 0, 3.5),
-    scripts={
-        (STEMS, 1): lambda: Chance(1),
-        (STEMS, 2): lambda: Chance(2),
-        (AFFINES, 0): lambda: Chance(3, large=4),
-        (CORRECTIONS, 2): lambda: Chance(4),
-    },
+    scripts={(STEMS, 1): 1, (STEMS, 2): 2, (AFFINES, 0): lambda: Chance(3, large=4), (CORRECTIONS, 2): 4},
 )
 for title, make in {
     "joins-layers: three layers, of which each is joined and none predicts from that": lambda: refinements(

@@ -33,8 +33,8 @@ def layered(layers: int = 3, *left_out: tuple, **fields) -> Plant:
     }
     for q in range(1, layers):
         scripts |= {
-            (STEMS, 2 + q): lambda q=q: Chance(10 + q),
-            (CORRECTIONS, 2 + q): lambda q=q: Chance(20 + q),
+            (STEMS, 2 + q): 10 + q,
+            (CORRECTIONS, 2 + q): 20 + q,
             (REFINED_REST, 2 + q, 0): lambda q=q: Chance(30 + q, large=4),
         }
     scripts = {place: script for place, script in scripts.items() if place not in left_out}
@@ -47,13 +47,7 @@ SHARED_BASES = {
     3: stems_head(0.125, 2, 3, 2, basis_stream([[-4800, 8192]]), base=2),
     4: stems_head(0.03125, 2, 3, 2, base=3),
 }
-BEAMS = [
-    Stem(-1, 36, lag=0),
-    Stem(0, 5, 20, lag=0),
-    Stem(0, 1, 35, lag=0),
-    Stem(0, 40, 7, SHEET, lag=2),
-    Stem(-1, 1, lag=0),
-]
+BEAMS = stems_of("-1 36 lag=0, 0 5 20 lag=0, 0 1 35 lag=0, 0 40 7 SHEET lag=2, -1 1 lag=0")
 LEVEL_1_REST = {(REFINED_REST, 1, 0): lambda: Chance(81, large=4)}
 
 
@@ -445,15 +439,9 @@ class Turns(Chance):
         return int(self.random.integers(-130, 131)) if asked == "signed" else super().answer(asked, most)
 
 
-STIFF = [  # in one, two or three layers, with others on them
-    Stem(-1, 4, rigid=1),
-    Stem(0, 3, 2, rigid=2),
-    Stem(1, 2, 1, LOOSE, rigid=3),
-    Stem(2, 3, 0, rigid=3),
-    Stem(0, 3, 1, SHEET, rigid=1),
-    Stem(4, 2, 0, rigid=2),
-    Stem(-1, 3, rigid=2),
-]
+STIFF = stems_of(  # in one, two or three layers, with others on them
+    "-1 4 rigid=1, 0 3 2 rigid=2, 1 2 1 LOOSE rigid=3, 2 3 0 rigid=3, 0 3 1 SHEET rigid=1, 4 2 0 rigid=2, -1 3 rigid=2"
+)
 
 
 def stiff(seed: int, **fields) -> Plant:

@@ -109,15 +109,9 @@ invalid(
 )
 
 
-BY_VERTEX = [  # every filter, phases within lags and across stems, rows of several vertices, a beam among them
-    Stem(-1, 30, lag=1),
-    Stem(0, 12, 3, lag=2),
-    Stem(0, 12, 4, lag=3),
-    Stem(2, 14, 5, SHEET, lag=4),
-    Stem(0, 40, 9, SHEET, lag=7),
-    Stem(-1, 9, lag=0),
-    Stem(5, 3, 2, lag=65535),
-]
+BY_VERTEX = stems_of(  # every filter, phases within lags and across stems, rows of several vertices, a beam among them
+    "-1 30 lag=1, 0 12 3 lag=2, 0 12 4 lag=3, 2 14 5 SHEET lag=4, 0 40 9 SHEET lag=7, -1 9 lag=0, 5 3 2 lag=65535"
+)
 valid(
     "rest-vertices: vertices one by one",
     lambda: with_rest(BY_VERTEX, coded_rest(BY_VERTEX, Chance(33, large=6), rest_type=1)),

@@ -15,8 +15,8 @@ for title, make in {
         scripts={
             (SHAPES, 0, 0): [6, *(n for i in range(6) for n in row((1, -i, 2), (i, 5, 0), (0, 0, 3)))],
             (SHAPES, 1, 0): [6, *(n for i in range(6) for n in row((0, 1, i), (0, -i, 0), (2, 2, 2), (9, 9, i)))],
-            (STEMS, 0): lambda: Chance(45),
-            (STEMS, 1): lambda: Chance(46),
+            (STEMS, 0): 45,
+            (STEMS, 1): 46,
         },
     ),
     "shapes-few: a shape less than its mode has axes, and none at the level that completes the piece": lambda: Plant(
@@ -25,8 +25,8 @@ for title, make in {
         scripts={
             (SHAPES, 0, 0): [2, *row((2**29, 0, 0)), *row(*[(0, 0, 0)] * 15, (1, 0, 0))],
             (SHAPES, 1, 0): [],
-            (STEMS, 0): lambda: Chance(47),
-            (STEMS, 1): lambda: Chance(48),
+            (STEMS, 0): 47,
+            (STEMS, 1): 48,
         },
     ),
     "shapes-of-sheets: shapes of a sheet, and of pieces inside a WHOLE subtree": lambda: Plant(
@@ -35,8 +35,8 @@ for title, make in {
         scripts={
             (SHAPES, 1, 0): [3, *row((1, 2, 3)), *row((3, 2, 1), (1, 1, 1)), *row((0, 0, 5))],
             (SHAPES, 2, 0): [1, *row((4, 0, 0)), 2, *row((0, 7, 0)), *row((0, 0, 7))],
-            (STEMS, 1): lambda: Chance(49),
-            (STEMS, 2): lambda: Chance(50),
+            (STEMS, 1): 49,
+            (STEMS, 2): 50,
             (AFFINES, 0): lambda: Chance(51, large=3),
             (AFFINES, 1): lambda: Chance(52, large=3),
         },
@@ -44,7 +44,7 @@ for title, make in {
     "shapes-in-one-level: shapes at the last level alone, of pieces that begin there": lambda: Plant(
         [Stem(-1, 2), Stem(0, 2, 1, WHOLE), Stem(1, 2, 1)],
         2,
-        scripts={(SHAPES, 2, 0): [2, *row((1, 0, 0)), *row((0, 1, 1))], (STEMS, 2): lambda: Chance(53)},
+        scripts={(SHAPES, 2, 0): [2, *row((1, 0, 0)), *row((0, 1, 1))], (STEMS, 2): 53},
     ),
 }.items():
     valid(title, make)

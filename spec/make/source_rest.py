@@ -12,15 +12,9 @@ from spec.make.base import *
 from spec.make.layers import layered
 from spec.make.rest import AWKWARD_DOUBLES, AWKWARD_FLOATS, INFINITE_BITS, coded_rest, exact_of_fork
 
-BUSH = [
-    Stem(-1, 70, lag=0),
-    Stem(0, 5, 3, SHEET, lag=1),
-    Stem(1, 4, 4, lag=0),
-    Stem(0, 33, 69, LOOSE, lag=0),
-    Stem(3, 1, 32, lag=0),
-    Stem(-1, 6, lag=2),
-    Stem(5, 3, 0, lag=0),
-]
+BUSH = stems_of(
+    "-1 70 lag=0, 0 5 3 SHEET lag=1, 1 4 4 lag=0, 0 33 69 LOOSE lag=0, 3 1 32 lag=0, -1 6 lag=2, 5 3 0 lag=0"
+)
 DETAILED_BUSH = [replace(stem, detail=detail) for stem, detail in zip(BUSH, (0, 120, 119, 0, 121, 0, 118))]
 
 
@@ -114,13 +108,7 @@ invalid(
     "BAD_CHECKSUM",
     "rest",
 )
-ATTACHED_TO_0 = [
-    Stem(-1, 3, lag=0),
-    Stem(0, 32, 0, lag=0),
-    Stem(1, 2, 0, lag=0),
-    Stem(1, 31, 5, lag=0),
-    Stem(-1, 1, lag=0),
-]
+ATTACHED_TO_0 = stems_of("-1 3 lag=0, 0 32 0 lag=0, 1 2 0 lag=0, 1 31 5 lag=0, -1 1 lag=0")
 
 
 valid(

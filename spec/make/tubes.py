@@ -15,17 +15,10 @@ valid(
     "rigid-turn: the same with a largest step of rotations",
     refinements(RIGID, 39, layers=1, default_head=stems_head(0.5, 161)),
 )
-TUBES = [
-    Stem(-1, 13, 0, SHEET, lag=4, ring=4),
-    Stem(0, 70, 5, SHEET, lag=6, ring=6),
-    Stem(1, 8, 69, SHEET | LOOSE, ring=2),
-    Stem(1, 5, 30),
-    Stem(0, 62, 3, SHEET, ring=30),
-    Stem(0, 20, 1, SHEET, ring=32),
-    Stem(-1, 9, 0, SHEET, rigid=1, ring=3),
-    Stem(6, 12, 4, SHEET | WHOLE, ring=3),
-    Stem(7, 6, 2, SHEET, ring=2),
-]
+TUBES = stems_of(
+    "-1 13 0 SHEET lag=4 ring=4, 0 70 5 SHEET lag=6 ring=6, 1 8 69 SHEET LOOSE ring=2, 1 5 30, 0 62 3 SHEET "
+    "ring=30, 0 20 1 SHEET ring=32, -1 9 0 SHEET rigid=1 ring=3, 6 12 4 SHEET WHOLE ring=3, 7 6 2 SHEET ring=2"
+)
 valid(
     "tubes: tubes: with a tip, of two pieces, loose, of a ring that is none, rigid, and what hangs on them",
     refinements(TUBES, 41, layers=1),

@@ -16,26 +16,11 @@ from spec.make.rest import coded_rest
 from spec.make.source_rest import bent
 from spec.make.static import WIND_FRAME, element, numbers
 
-EVERYTHING = [
-    Stem(-1, 6, lag=1),
-    Stem(0, 1, 3, lag=2),
-    Stem(0, 66, 5, LOOSE),
-    Stem(2, 5, 60, SHEET | LOOSE),
-    Stem(3, 3, 0, LOOSE),
-    Stem(2, 4, 1, WHOLE, lag=0),
-    Stem(5, 4, 3, SHEET, lag=0),
-    Stem(-1, 7, 0, SHEET),
-    Stem(7, 2, 3, SHEET | WHOLE),
-    Stem(7, 5, 6, SHEET, lag=0),
-    Stem(7, 4, 1),
-    Stem(10, 2, 2),
-    Stem(-1, 1, 0, WHOLE),
-    Stem(12, 2),
-    Stem(12, 3, 0, LOOSE),
-    Stem(-1, 3),
-    Stem(15, 3, 2, LOOSE | WHOLE),
-    Stem(16, 2, 1, LOOSE),
-]
+EVERYTHING = stems_of(
+    "-1 6 lag=1, 0 1 3 lag=2, 0 66 5 LOOSE, 2 5 60 SHEET LOOSE, 3 3 0 LOOSE, 2 4 1 WHOLE lag=0, 5 4 3 SHEET "
+    "lag=0, -1 7 0 SHEET, 7 2 3 SHEET WHOLE, 7 5 6 SHEET lag=0, 7 4 1, 10 2 2, -1 1 0 WHOLE, 12 2, 12 3 0 "
+    "LOOSE, -1 3, 15 3 2 LOOSE WHOLE, 16 2 1 LOOSE"
+)
 
 
 def everything() -> Draft:
@@ -56,9 +41,9 @@ def everything() -> Draft:
         is_float64=True,
         layers=2,
         heads=HEADS | bases | {5: stems_head(0.01, 2)},
-        scripts={(STEMS, level): lambda level=level: Chance(72 + level) for level in range(6)}
+        scripts={(STEMS, level): 72 + level for level in range(6)}
         | {(AFFINES, level): lambda level=level: Chance(80 + level, large=3) for level in range(5)}
-        | {(CORRECTIONS, level): lambda level=level: Chance(86 + level) for level in (4, 5)}
+        | {(CORRECTIONS, level): 86 + level for level in (4, 5)}
         | {(REFINED_REST, 5, 0): lambda: Chance(92, large=4)}
         | {
             (SHAPES, 1, 0): [
