@@ -53,13 +53,12 @@ motion(AFFINES, 0, "frequencies: a row codes three frequencies of two frames", a
 motion(AFFINES, 0, "zero-behind: a zero byte behind the stream", lambda: fork().content(AFFINES, 0, 1) + b"\0", 1)
 motion(AFFINES, 0, "bytes-behind: bytes behind the stream", lambda: fork().content(AFFINES, 0, 0) + b"\1" * 12)
 invalid(
-    "affines-change: a step changes by more than 400",
+    "affines-change BAD_CHUNK 0: a step changes by more than 400",
     lambda: Plant(
         [Stem(-1, 2), Stem(0, 1, 1), Stem(-1, 2), Stem(2, 1, 1)],
         points=[[0.0] * 3] * 6,
         scripts={(AFFINES, 0): [200, 0, -401]},
     ),
-    item=0,
 )
 for side_, width_ in (("above", 203), ("below", 197)):
     valid(

@@ -49,14 +49,12 @@ def valid(title: str, make: Plant | Draft | bytes | Callable, *arguments, script
     VECTORS.append(Vector(name, reason, lambda: bytes_of(make), scripted=scripted, mesh=mesh_bytes(mesh)))
 
 
-def invalid(
-    title: str,
-    make: Draft | bytes | Callable,
-    error: str = "BAD_CHUNK",
-    item: str | int = "open",
-    mesh: np.ndarray | None = None,
-) -> None:
-    VECTORS.append(Vector(*title.split(": ", 1), lambda: bytes_of(make), error, str(item), mesh=mesh_bytes(mesh)))
+def invalid(title: str, make: Draft | bytes | Callable, error="BAD_CHUNK", item: str | int = "open", mesh=None) -> None:
+    """Declare an invalid vector by "NAME: REASON", or by "NAME ERROR ITEM: REASON" where these are others."""
+    head, reason = title.split(": ", 1)
+    name, *expected = head.split()
+    expected += [error, str(item)][len(expected) :]
+    VECTORS.append(Vector(name, reason, lambda: bytes_of(make), *expected, mesh=mesh_bytes(mesh)))
 
 
 def mesh_bytes(mesh: np.ndarray | None) -> bytes | None:
@@ -161,8 +159,8 @@ def refinements(stems: list[Stem], seed: int, large: int = 12, **fields) -> Plan
     return plant
 
 
-def header(title: str, error: str = "BAD_HEADER", **fields) -> None:
-    invalid(f"header-{title}", lambda: lone().with_header(**fields), error)
+def header(title: str, **fields) -> None:
+    invalid(f"header-{title}", lambda: lone().with_header(**fields), "BAD_HEADER")
 
 
 def joins(*widths: float) -> tuple[Join, ...]:
@@ -174,8 +172,8 @@ def flipped(data: bytes, place: int) -> bytes:
     return data[:place] + bytes([data[place] ^ 0x10]) + data[place + 1 :]
 
 
-def table(title: str, make: Callable[[], Draft | bytes], error: str = "BAD_CHUNK_TABLE") -> None:
-    invalid(f"table-{title}", make, error)
+def table(title: str, make: Callable[[], Draft | bytes]) -> None:
+    invalid(f"table-{title}", make, "BAD_CHUNK_TABLE")
 
 
 def inserted(at: int, *entries: Entry) -> Draft:
@@ -194,11 +192,11 @@ def end_of(draft: Draft, kind: int, level: int = NO_LEVEL, segment: int = 0) -> 
     return len(draft.file()) - sum(len(entry.content) for entry in behind)
 
 
-def prelude(kind: int, title: str, content: bytes | Callable[[], bytes], error: str = "BAD_CHUNK") -> None:
+def prelude(kind: int, title: str, content: bytes | Callable[[], bytes]) -> None:
     def make() -> Draft:
         return fork().change(kind, content=content() if callable(content) else content)
 
-    invalid(f"{KIND_NAMES[kind].lower()}-{title}", make, error)
+    invalid(f"{KIND_NAMES[kind].lower()}-{title}", make)
 
 
 def motion(kind: int, level: int, title: str, content: bytes | Callable[[], bytes], segment: int = 0) -> None:

@@ -117,11 +117,10 @@ for name, level, reason, base in (
         STEMS, level, f"basis-level-{name}: {reason}", lambda base=base: stems_head(0.5, 0, 3, 1, base=base), segment=1
     )
 invalid(
-    "stems-basis-level-rank: Basis_Rank 1 though Basis_Level has a basis of two rows",
+    "stems-basis-level-rank BAD_CHUNK 2: Basis_Rank 1 though Basis_Level has a basis of two rows",
     lambda: forked(heads={1: stems_head(0.5, 0, 3, 2, basis_stream([[64, 128], [192, 256]]))}).change(
         STEMS, 2, 0, content=stems_head(0.5, 0, 3, 1, base=1)
     ),
-    item=2,
 )
 motion(STEMS, 1, "basis-beyond-1: an entry of a learned basis is 8193", basis(1, 3, basis_stream([[8192, 8193]])))
 motion(STEMS, 1, "basis-below-1: an entry of a learned basis is -8193", basis(1, 3, basis_stream([[-8193, 0]])))

@@ -151,7 +151,7 @@ def lone_clips(frames: int, segments: int, *entries: bytes, **header_fields) -> 
     return draft.with_header(clip_count=len(entries), **header_fields)
 
 
-invalid("clips-missing: two clips and no CLIPS", lambda: two_clips().without(CLIPS), "BAD_CHUNK_TABLE")
+invalid("clips-missing BAD_CHUNK_TABLE: two clips and no CLIPS", lambda: two_clips().without(CLIPS))
 clips("empty: no bytes")
 clips("cut-in-entry: ends inside the fields of the first clip", CALM_ENTRY[:9])
 clips("cut-before-name: ends before the Name of the first clip", CALM_ENTRY[:10])
@@ -246,55 +246,41 @@ table(
     "order-clips: METADATA behind CLIPS", lambda: inserted(3, Entry(CLIPS, clip_entry(4, 2)), Entry(METADATA, b"\0{}"))
 )
 table("order-clips-motion: CLIPS behind the first motion chunk", lambda: inserted(4, Entry(CLIPS, clip_entry(4, 2))))
-for title, how in {
-    "clips-damaged: a bit of CLIPS is flipped": (
-        lambda: flipped(two_clips().file(), end_of(two_clips(), CLIPS) - 1),
-        "BAD_CHECKSUM",
+for title, make in {
+    "clips-damaged BAD_CHECKSUM: a bit of CLIPS is flipped": lambda: flipped(
+        two_clips().file(), end_of(two_clips(), CLIPS) - 1
     ),
-    "clips-cut: the file ends inside CLIPS": (
-        lambda: two_clips().file()[: end_of(two_clips(), CLIPS) - 1],
-        "TRUNCATED",
+    "clips-cut TRUNCATED: the file ends inside CLIPS": lambda: two_clips().file()[: end_of(two_clips(), CLIPS) - 1],
+    "clips-cut-in-motion TRUNCATED 0: level 0 of the first clip alone has arrived": lambda: two_clips().file()[
+        : end_of(two_clips(), AFFINES, 0, 0)
+    ],
+    "clips-before-hierarchy: CLIPS is not valid and HIERARCHY is damaged: CLIPS comes first": lambda: (
+        two_clips().change(CLIPS, content=CALM_ENTRY).change(HIERARCHY, checksum=0)
     ),
-    "clips-cut-in-motion: level 0 of the first clip alone has arrived": (
-        lambda: two_clips().file()[: end_of(two_clips(), AFFINES, 0, 0)],
-        "TRUNCATED",
-        0,
-    ),
-    "clips-before-hierarchy: CLIPS is not valid and HIERARCHY is damaged: CLIPS comes first": (
-        lambda: two_clips().change(CLIPS, content=CALM_ENTRY).change(HIERARCHY, checksum=0),
-    ),
-    "clips-missing-before-hierarchy: CLIPS is missing and HIERARCHY is damaged: CLIPS comes first": (
-        lambda: two_clips().without(CLIPS).change(HIERARCHY, checksum=0),
-        "BAD_CHUNK_TABLE",
-    ),
-    "clips-damaged-before-hierarchy: CLIPS is damaged and HIERARCHY is missing: CLIPS comes first": (
-        lambda: two_clips().without(HIERARCHY).change(CLIPS, checksum=0),
-        "BAD_CHECKSUM",
-    ),
+    "clips-missing-before-hierarchy BAD_CHUNK_TABLE: CLIPS is missing and HIERARCHY is damaged: "
+    "CLIPS comes first": lambda: two_clips().without(CLIPS).change(HIERARCHY, checksum=0),
+    "clips-damaged-before-hierarchy BAD_CHECKSUM: CLIPS is damaged and HIERARCHY is missing: "
+    "CLIPS comes first": lambda: two_clips().without(HIERARCHY).change(CLIPS, checksum=0),
     "clips-before-levels: Seam_Errors of the three levels of the hierarchy, while Full_Level_Count says 5: CLIPS "
-    "comes first": (lambda: two_clips(clips=(CALM, loop(STORM, 1.0, 1.0, 1.0))).with_header(full_level_count=5),),
-    "clips-levels: Full_Level_Count 5, and as many Seam_Errors; the hierarchy has 3": (
-        lambda: two_clips(clips=(CALM, loop(STORM, *[1.0] * 5))).with_header(full_level_count=5),
-        "BAD_HEADER",
-    ),
+    "comes first": lambda: two_clips(clips=(CALM, loop(STORM, 1.0, 1.0, 1.0))).with_header(full_level_count=5),
+    "clips-levels BAD_HEADER: Full_Level_Count 5, and as many Seam_Errors; the hierarchy has 3": lambda: two_clips(
+        clips=(CALM, loop(STORM, *[1.0] * 5))
+    ).with_header(full_level_count=5),
 }.items():
-    invalid(title, *how)
+    invalid(title, make)
 
 UNEVEN = clip_entry(256, 1, "long"), clip_entry(2, 2, "short")
 invalid(
-    "clips-memory: 2^18 vertices and a segment of 256 frames, though the mean is 86",
+    "clips-memory LIMIT_EXCEEDED: 2^18 vertices and a segment of 256 frames, though the mean is 86",
     lambda: lone_clips(258, 3, *UNEVEN, vertex_count=1 << 18),
-    "LIMIT_EXCEEDED",
 )
 invalid(
-    "clips-before-memory: CLIPS is damaged, and its longest segment takes too much memory",
+    "clips-before-memory BAD_CHECKSUM: CLIPS is damaged, and its longest segment takes too much memory",
     lambda: lone_clips(258, 3, *UNEVEN, vertex_count=1 << 18).change(CLIPS, checksum=0),
-    "BAD_CHECKSUM",
 )
 invalid(
-    "clips-memory-of-mean: 2^22 vertices are too many, before CLIPS is missed",
+    "clips-memory-of-mean LIMIT_EXCEEDED: 2^22 vertices are too many, before CLIPS is missed",
     lambda: lone(frames=2, segments=2).with_header(vertex_count=1 << 22, clip_count=2),
-    "LIMIT_EXCEEDED",
 )
 valid(
     "clips-long-segments: 512 frames in two segments, of which all but two are repeats",

@@ -41,9 +41,8 @@ valid("rest-connected-tiny: the same, a subnormal Rest_Step", lambda: connected(
 valid("rest-connected-exact: an exact rest pose by faces", lambda: connected(MANY_FACES["quads"], exact=True))
 valid("rest-connected-none: a rest pose by no faces", lambda: connected(lambda: polygons(np.zeros((0, 3), "<u2"), 120)))
 invalid(
-    "rest-connected-without-faces: Method has Is_Connected, and there are no FACES",
+    "rest-connected-without-faces BAD_CHUNK_TABLE: Method has Is_Connected, and there are no FACES",
     lambda: with_rest(FORK, coded_rest(FORK, [], reserved=REST_CONNECTED >> 2)),
-    "BAD_CHUNK_TABLE",
 )
 for what, content in (
     ("broken", lambda: polygons(FACES_3) + b"\0"),

@@ -15,4 +15,4 @@ table("exact-too-early: EXACT at level h + 1", lambda: fork().add(Entry(EXACT, b
 table("exact-with-stems: STEMS at level h + 2", lambda: lossless().add(Entry(STEMS, b"", 3, 0)))
 table("exact-with-corrections: CORRECTIONS at level h + 2", lambda: lossless().add(Entry(CORRECTIONS, b"", 3, 0)))
 valid("exact-empty: EXACT without bytes: differences of 32 bits, all of them ones", lossless)
-invalid("exact-bytes-behind: bytes behind the stream of EXACT", lambda: lossless(b"\1" * 400), item=3)
+invalid("exact-bytes-behind BAD_CHUNK 3: bytes behind the stream of EXACT", lambda: lossless(b"\1" * 400))

@@ -68,9 +68,8 @@ for title, make in {
     valid(title, make)
 
 invalid(
-    "hierarchy-31-deep: 32 branches, each on the one before: no Full_Level_Count can say 33",
+    "hierarchy-31-deep BAD_HEADER: 32 branches, each on the one before: no Full_Level_Count can say 33",
     lambda: moving(chain(32), 1).upto(31).with_header(full_level_count=32),
-    "BAD_HEADER",
 )
 invalid(
     "hierarchy-before-rest: HIERARCHY is not valid and REST is damaged: HIERARCHY comes first",
@@ -139,9 +138,8 @@ for what, vertex_source in (
         f"vertex-{what}: a number out of range, as expected", [Stem(-1, 3), Stem(0, 2, 1)], vertex_source=vertex_source
     )
 invalid(
-    "hierarchy-depth-limit: 4097 branches, each on the one before",
+    "hierarchy-depth-limit LIMIT_EXCEEDED: 4097 branches, each on the one before",
     lambda: still(
         [replace(s, flags=WHOLE if b == 0 else 0) for b, s in enumerate(chain(4097))], points=[[0.0] * 3] * 4097
     ).upto(0),
-    "LIMIT_EXCEEDED",
 )

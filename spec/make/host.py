@@ -46,7 +46,7 @@ valid(
     lambda: moving(HOSTED_STEMS, 71, frames=3, mesh=HOSTED_MESH, heads=HEADS),
     mesh=HOSTED_MESH,
 )
-invalid("host-mesh-none: no mesh is given", hosted, "NEEDS_HOST_MESH", 0)
+invalid("host-mesh-none NEEDS_HOST_MESH 0: no mesh is given", hosted)
 invalid("host-mesh-short: a mesh with one vertex less", hosted, "WRONG_HOST_MESH", 0, MESH[:-1])
 invalid("host-mesh-long: a mesh with one vertex more", hosted, "WRONG_HOST_MESH", 0, np.append(MESH, MESH[:1], axis=0))
 invalid("host-mesh-in-file-order: the mesh in file order", hosted, "WRONG_HOST_MESH", 0, MESH[ORDER])
@@ -79,11 +79,10 @@ prelude(
     REST, "step-of-host: Rest_Step is 0 with Is_Host, where it has no meaning", lambda: host_rest_chunk(MESH, step=0.0)
 )
 invalid(
-    "refined-rest-of-host: REFINED_REST of the host's mesh",
+    "refined-rest-of-host BAD_CHUNK 3: REFINED_REST of the host's mesh",
     lambda: layered(3, *NO_REFINED_REST, mesh=MESH, vertex_source=ORDER).add(
         Entry(REFINED_REST, refined_rest_chunk(b""), 3)
     ),
-    item=3,
     mesh=MESH,
 )
 
@@ -118,15 +117,10 @@ def without_mesh(stems: list[Stem]) -> Draft:
     )
 
 
-invalid(
-    "host-mesh-tall: of a stem of 2^17 vertices among short ones only 2^16 count for how many others have",
-    lambda: tall(1 << 17, *range(1, 17)),
-    "NEEDS_HOST_MESH",
-    0,
-)
-invalid(
-    "host-mesh-deep: a chain of 1300 branches, from whose end others go up by 1200 and then by 1 to 1000",
-    deep,
-    "NEEDS_HOST_MESH",
-    0,
-)
+for title, make in {
+    "host-mesh-tall NEEDS_HOST_MESH 0: of a stem of 2^17 vertices among short ones only 2^16 count for how many "
+    "others have": lambda: tall(1 << 17, *range(1, 17)),
+    "host-mesh-deep NEEDS_HOST_MESH 0: a chain of 1300 branches, from whose end others go up by 1200 and then by "
+    "1 to 1000": deep,
+}.items():
+    invalid(title, make)

@@ -81,31 +81,22 @@ for name, reason, of in (
     ("negative", "over -1 frames", (0, -1)),
     ("largest", "over 2^29 frames", (0, 1 << 29)),
 ):
-    invalid(f"joins-{name}: {reason}", lambda of=of: joined(FORK, 120, 0, 0, *of, 0, 0).file(), "BAD_CHUNK_TABLE")
-invalid(
-    "joins-lone-loop: a loop of one segment is joined to itself",
-    lambda: joined(
+    invalid(f"joins-{name} BAD_CHUNK_TABLE: {reason}", lambda of=of: joined(FORK, 120, 0, 0, *of, 0, 0).file())
+for title, make in {
+    "joins-lone-loop BAD_CHUNK_TABLE: a loop of one segment is joined to itself": lambda: joined(
         *(FORK, 121, 2, 0, 0, 0, 0, 0), clips=(loop(Clip(9, 1, "loop"), 0.0, 0.0, 0.0), Clip(3, 1, "once"))
     ).file(),
-    "BAD_CHUNK_TABLE",
-)
-invalid(
-    "joins-exact: the source's own numbers are joined",
-    lambda: replace(
+    "joins-exact BAD_CHUNK_TABLE: the source's own numbers are joined": lambda: replace(
         joined(FORK, 122)
         .with_header(level_count=4, full_level_count=4)
         .add(*(Entry(EXACT, b"", 3, s) for s in range(2))),
         joins=joins(0, 0, 0, 0, 0, 0, 0, 2),
     ).file(),
-    "BAD_CHUNK_TABLE",
-)
-invalid(
-    "joins-of-predicted-motion: predicted motion is joined",
-    lambda: replace(predicted(ROOTED, swayed(5, 123), segments=2), joins=joins(0, 0, 0, 2)).file(),
-    "BAD_CHUNK_TABLE",
-)
-invalid(
-    "joins-0: a segment is joined over 0 frames",
-    lambda: not_refused(lambda: joined(FORK, 500, 0, 0.5, 0, 0, 0, 0).draft()),
-    "BAD_CHUNK_TABLE",
-)
+    "joins-of-predicted-motion BAD_CHUNK_TABLE: predicted motion is joined": lambda: replace(
+        predicted(ROOTED, swayed(5, 123), segments=2), joins=joins(0, 0, 0, 2)
+    ).file(),
+    "joins-0 BAD_CHUNK_TABLE: a segment is joined over 0 frames": lambda: not_refused(
+        lambda: joined(FORK, 500, 0, 0.5, 0, 0, 0, 0).draft()
+    ),
+}.items():
+    invalid(title, make)

@@ -197,9 +197,8 @@ header("layers-9: Layer_Count 9", layer_count=9, level_count=10, full_level_coun
 header("layers-not-those: Layer_Count 4: a file of h = 0 has 5 levels, or 6 with EXACT", layer_count=4)
 for count in (1, 4):
     invalid(
-        f"layers-count-{count}: Layer_Count {count}, Full_Level_Count is that of 3 layers",
+        f"layers-count-{count} BAD_HEADER: Layer_Count {count}, Full_Level_Count is that of 3 layers",
         lambda count=count: layered().with_header(layer_count=count),
-        "BAD_HEADER",
     )
 table(
     "layers-exact-taken: Layer_Count 2 makes the last level the lossless one: EXACT is missing",
@@ -287,32 +286,22 @@ refinement(
 refinement(
     REFINED_REST, "bytes-behind: bytes behind the stream of a refined rest pose", lambda content: content + b"\1" * 20
 )
-invalid(
-    "refined-rest-of-exact: REFINED_REST of a rest pose that is exact",
-    lambda: layered(3, (REFINED_REST, 3, 0), (REFINED_REST, 4, 0), rest=exact_rest(FORK, [0.5] * 15, False)).add(
-        Entry(REFINED_REST, refined_rest_chunk(b""), 3)
+for title, make in {
+    "refined-rest-of-exact BAD_CHUNK 3: REFINED_REST of a rest pose that is exact": lambda: layered(
+        3, (REFINED_REST, 3, 0), (REFINED_REST, 4, 0), rest=exact_rest(FORK, [0.5] * 15, False)
+    ).add(Entry(REFINED_REST, refined_rest_chunk(b""), 3)),
+    "refined-rest-modes BAD_CHUNK 2: a refined run of two vertices has three modes": lambda: Plant(
+        [Stem(-1, 3, lag=0)], rest=coded_rest([Stem(-1, 3, lag=0)], []), layers=2
+    ).add(Entry(REFINED_REST, refined_rest_chunk(refined_run(3)), 2)),
+    "refined-rest-checksum BAD_CHECKSUM 3: the Checksum of REFINED_REST is another": lambda: layered().change(
+        REFINED_REST, 3, checksum=0
     ),
-    item=3,
-)
-invalid(
-    "refined-rest-modes: a refined run of two vertices has three modes",
-    lambda: Plant([Stem(-1, 3, lag=0)], rest=coded_rest([Stem(-1, 3, lag=0)], []), layers=2).add(
-        Entry(REFINED_REST, refined_rest_chunk(refined_run(3)), 2)
+    "refined-rest-cut TRUNCATED 3: the file ends inside REFINED_REST": lambda: cut(
+        lambda draft: end_of(draft, REFINED_REST, 3) - 1, layered().draft()
     ),
-    item=2,
-)
-invalid(
-    "refined-rest-checksum: the Checksum of REFINED_REST is another",
-    lambda: layered().change(REFINED_REST, 3, checksum=0),
-    "BAD_CHECKSUM",
-    3,
-)
-invalid(
-    "refined-rest-cut: the file ends inside REFINED_REST",
-    lambda: cut(lambda draft: end_of(draft, REFINED_REST, 3) - 1, layered().draft()),
-    "TRUNCATED",
-    3,
-)
+}.items():
+    invalid(title, make)
+
 for name, why, error, change in (
     ("exact", "of a rest pose that is exact", "BAD_CHUNK", None),
     ("step", "whose Rest_Step is 0", "BAD_CHUNK", lambda content: dict(content=bytes(4) + content[4:])),

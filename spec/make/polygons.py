@@ -130,10 +130,10 @@ static("faces-count-type: Count_Type has bit 3 set", faces(bytes([8, 8]) + bytes
 static("faces-count-reserved: Count_Type has bit 4 set", faces(bytes([8, 16]) + bytes(8)))
 static("faces-beyond: a face of a vertex behind the last", faces(polygons(np.array([[0, 1, 5]], "<u4"))))
 static("faces-negative: a face of vertex -1", faces(polygons(np.array([[0, 1, -1]], "<i2"))))
-static("faces-too-many: 2^32 - 1 faces", faces(polygon_head("<i4", 2**32 - 1, 3)), "LIMIT_EXCEEDED")
-static("faces-too-wide: 2^26 + 1 columns of no rows", faces(polygon_head("<i4", 0, 2**26 + 1)), "LIMIT_EXCEEDED")
-static("faces-too-large: 2^13 faces of 2^13 corners", faces(polygon_head("<i4", 2**13, 2**13)), "LIMIT_EXCEEDED")
-static("faces-mixed-too-many: a face and 2^26 corners", faces(polygon_head("<i4", 1, 2**26, "<i4")), "LIMIT_EXCEEDED")
+static("faces-too-many LIMIT_EXCEEDED: 2^32 - 1 faces", faces(polygon_head("<i4", 2**32 - 1, 3)))
+static("faces-too-wide LIMIT_EXCEEDED: 2^26 + 1 columns of no rows", faces(polygon_head("<i4", 0, 2**26 + 1)))
+static("faces-too-large LIMIT_EXCEEDED: 2^13 faces of 2^13 corners", faces(polygon_head("<i4", 2**13, 2**13)))
+static("faces-mixed-too-many LIMIT_EXCEEDED: a face and 2^26 corners", faces(polygon_head("<i4", 1, 2**26, "<i4")))
 static("faces-more-corners: a face of more corners than are left", faces(mixed_polygons([[0, 1, 2]], corner_count=2)))
 static("faces-fewer-corners: corners of no face", faces(mixed_polygons([[0, 1, 2]], corner_count=4)))
 static(
@@ -241,4 +241,4 @@ valid(
     "edges-derived-127: derived edges of 128 vertices, the last of which is the largest number of |i1",
     lambda: derived_edges(*[2] * 64),
 )
-invalid("edges-derived-128: 129 vertices do not fit |i1", lambda: derived_edges(*[2] * 63, 3), item="static")
+invalid("edges-derived-128 BAD_CHUNK static: 129 vertices do not fit |i1", lambda: derived_edges(*[2] * 63, 3))

@@ -143,31 +143,24 @@ def swaying() -> Draft:
 
 
 PREDICTED_PLACE = PREDICTED, 1, 1
-for title, how in {
-    "predicted-missing: a segment has none": (lambda: swaying().without(*PREDICTED_PLACE), "BAD_CHUNK_TABLE"),
-    "predicted-stems: a segment has STEMS too": (
-        lambda: swaying().add(Entry(STEMS, stems_head(), 1, 0)),
-        "BAD_CHUNK_TABLE",
+for title, make in {
+    "predicted-missing BAD_CHUNK_TABLE: a segment has none": lambda: swaying().without(*PREDICTED_PLACE),
+    "predicted-stems BAD_CHUNK_TABLE: a segment has STEMS too": lambda: swaying().add(Entry(STEMS, stems_head(), 1, 0)),
+    "predicted-corrections BAD_CHUNK_TABLE: a segment has CORRECTIONS too": lambda: swaying().add(
+        Entry(CORRECTIONS, struct.pack("<f", 0.5), 1, 0)
     ),
-    "predicted-corrections: a segment has CORRECTIONS too": (
-        lambda: swaying().add(Entry(CORRECTIONS, struct.pack("<f", 0.5), 1, 0)),
-        "BAD_CHUNK_TABLE",
+    "predicted-unsaid BAD_CHUNK_TABLE: PREDICTED where Is_Predicted is 0": lambda: fork().add(
+        Entry(PREDICTED, predicted_head(), 2, 0)
     ),
-    "predicted-unsaid: PREDICTED where Is_Predicted is 0": (
-        lambda: fork().add(Entry(PREDICTED, predicted_head(), 2, 0)),
-        "BAD_CHUNK_TABLE",
+    "predicted-at-level-0 BAD_CHUNK_TABLE: PREDICTED of level 0": lambda: swaying().add(
+        Entry(PREDICTED, predicted_head(), 0, 0)
     ),
-    "predicted-at-level-0: PREDICTED of level 0": (
-        lambda: swaying().add(Entry(PREDICTED, predicted_head(), 0, 0)),
-        "BAD_CHUNK_TABLE",
-    ),
-    "predicted-layers: Layer_Count 2": (lambda: swaying().with_header(layer_count=2, full_level_count=3), "BAD_HEADER"),
-    "predicted-nodes: h is 1": (
-        lambda: predicted(FORKED, swayed(1, 19, FORKED)).with_header(full_level_count=3, level_count=2),
-        "BAD_HEADER",
+    "predicted-layers BAD_HEADER: Layer_Count 2": lambda: swaying().with_header(layer_count=2, full_level_count=3),
+    "predicted-nodes BAD_HEADER: h is 1": lambda: predicted(FORKED, swayed(1, 19, FORKED)).with_header(
+        full_level_count=3, level_count=2
     ),
 }.items():
-    invalid(title, *how)
+    invalid(title, make)
 
 for name, reason, content in (
     ("short", "4 bytes", predicted_head()[:4]),
@@ -178,14 +171,12 @@ for name, reason, content in (
     ("zero", "a stream that ends in 0", predicted_head() + b"\1\0"),
 ):
     invalid(
-        f"predicted-{name}: {reason}",
+        f"predicted-{name} BAD_CHUNK 1: {reason}",
         lambda content=content: swaying().change(*PREDICTED_PLACE, content=content),
-        item=1,
     )
 invalid(
-    "predicted-before-first: a frame is coded about one before the rest pose",
+    "predicted-before-first BAD_CHUNK 1: a frame is coded about one before the rest pose",
     lambda: predicted(ROOTED, [RESTING, [0, 0, 2]]),
-    item=1,
 )
 valid(
     "predicted-on-vertex-0: a stem on vertex 0, whose first vertex is no end",
@@ -314,9 +305,8 @@ def in_runs() -> Plant:
 
 valid("predicted-long-runs: runs of copied frames of up to 12, of which those from 7 on are alike", in_runs)
 invalid(
-    "predicted-step-infinite: Step is infinite",
+    "predicted-step-infinite BAD_CHUNK 1: Step is infinite",
     lambda: swaying().change(*PREDICTED_PLACE, content=predicted_head(INFINITY)),
-    item=1,
 )
 valid(
     "predicted-short-exactly: a step and a way at rest whose squares add up to 1e-60, which is no more than that",

@@ -57,7 +57,6 @@ for name, reason, widths, repeats in (
     ("join-to-one", "a segment goes on from one with a single coded frame", (0, 2), (0, *(1,) * 5, *(0,) * 6)),
 ):
     invalid(
-        f"repeats-{name}: {reason}",
+        f"repeats-{name} BAD_CHUNK_TABLE: {reason}",
         lambda widths=widths, repeats=repeats: joined(FORK, 136, *widths * 3, repeats=repeats).file(),
-        "BAD_CHUNK_TABLE",
     )

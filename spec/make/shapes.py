@@ -66,12 +66,11 @@ motion(SHAPES, 1, "modes: a shape has numbers for four modes of three", shapes(1
 motion(SHAPES, 1, "zero-behind: a zero byte behind the stream", lambda: fork().content(SHAPES, 1) + b"\0")
 motion(SHAPES, 1, "bytes-behind: bytes behind the stream", lambda: fork().content(SHAPES, 1) + b"\1" * 12)
 invalid(
-    "shapes-too-many-at-last: a level adds more shapes than the other modes have axes",
+    "shapes-too-many-at-last BAD_CHUNK 1: a level adds more shapes than the other modes have axes",
     lambda: Plant(
         [Stem(-1, 3)],
         scripts={(SHAPES, 0, 0): [6, *(n for i in range(6) for n in row((1, i, 0)))], (SHAPES, 1, 0): [4]},
     ),
-    item=1,
 )
 LONE_STEMS = [Stem(-1, 3, rigid=1), Stem(-1, 3), Stem(-1, 3, flags=SHEET, rigid=1)]
 valid(

@@ -103,10 +103,8 @@ source_rest(
     "open",
 )
 invalid(
-    "source-rest-damaged: a bit of SOURCE_REST is flipped",
+    "source-rest-damaged BAD_CHECKSUM rest: a bit of SOURCE_REST is flipped",
     lambda: forked(source_rest=bent(FORK, Chance(206))).change(SOURCE_REST, checksum=0),
-    "BAD_CHECKSUM",
-    "rest",
 )
 ATTACHED_TO_0 = stems_of("-1 3 lag=0, 0 32 0 lag=0, 1 2 0 lag=0, 1 31 5 lag=0, -1 1 lag=0")
 
