@@ -7,6 +7,15 @@ from collections.abc import Callable
 from spec.document import rules
 from spec.make.base import *
 
+
+def affines(*script) -> Callable[[], bytes]:
+    def make() -> bytes:
+        plan = forked_plan()
+        return write(rules.decode_affines, list(script), plan, rules.no_motion(plan, 2, False), 0)
+
+    return make
+
+
 valid(
     "whitening: nodes whose subtrees extend in 0, 1, 2 and 3 directions",
     moving,
@@ -37,16 +46,6 @@ valid(
         ]
     },
 )
-
-
-def affines(*script) -> Callable[[], bytes]:
-    def make() -> bytes:
-        plan = forked_plan()
-        return write(rules.decode_affines, list(script), plan, rules.no_motion(plan, 2, False), 0)
-
-    return make
-
-
 motion(AFFINES, 0, "step-beyond: the step of a map is 2^100.5", affines(201))
 motion(AFFINES, 0, "step-below: the step of a map is 2^-100.5", affines(-201))
 motion(AFFINES, 0, "frequencies: a row codes three frequencies of two frames", affines(0, 3))

@@ -18,6 +18,38 @@ def all_waves(frames: int) -> Callable[[], Plant]:
     return lambda: lone(clips=clips, scripts={(STEMS, 0): rows})
 
 
+WAVE_ROWS = (  # of four rows over four frames: exponents, integers; the axes without a use of the last row are not 0
+    *(-6, 3, -1),
+    *row((9, 0, 1), (-4, 60, 0), (0, 2, 700)),
+    -200 + 4,
+    *row((1, 2, 3), (5, 0, 0)),
+)
+
+
+def basis_by_chance(random: np.random.Generator, rank: int, frames: int) -> bytes:
+    return basis_stream(random.integers(-8192, 8193, (rank, frames)).tolist())
+
+
+def basis(rank: int, kind: int, stream: bytes) -> Callable[[], bytes]:
+    return lambda: stems_head(0.5, 0, kind, rank, stream)
+
+
+def shrunk(last: int) -> Plant:
+    """A row that 15 known ones along it leave about 1e-100 of; `last`: an entry of the last of these, in 1/8192."""
+    known = [[1235] * 44] * 14 + [[last] * 44]
+    rows = [[entry / 8192 for entry in entries] for entries in known]
+    in_waves = basis_in_waves(44, -200, *row((1, 0, 0)), rank=16, known=rows)
+    return Plant(
+        [Stem(-1, 3)],
+        frames=44,
+        heads={0: stems_head(0.25, 0, 3, 15, basis_stream(known)), 1: stems_head(0.25, 0, 2, 16, in_waves, base=0)},
+        scripts={(STEMS, 1): row(*[(0, 0, 0)] * 15, (50, -30, 10))},
+    )
+
+
+ROUNDED = (263597123, 32053444), (241475353, 36228921), (79323412, 26324395), (170050111, 70213091)
+
+
 for frames in (2, 3, 4, 7, 33, 255, 256):
     valid(f"waves-{frames}: all waves of {frames} frames, once of a beam and once periodic", all_waves(frames))
 for title, make in {
@@ -32,67 +64,45 @@ for title, make in {
     "learned-basis-zero: a learned basis of zeros, of no bytes but the stream's": lambda: moving(
         [Stem(-1, 3)], 44, heads={0: stems_head(0.5, 1, 3, 2, basis_stream([[0] * 3] * 2))}
     ),
+    "basis-in-waves: a learned basis of four rows in waves, one of them of the least step": lambda: moving(
+        FORK, 45, frames=4, heads={1: stems_head(0.5, 1, 2, 4, basis_in_waves(4, *WAVE_ROWS, rank=4))}
+    ),
+    "basis-in-waves-zero: a learned basis of two rows in waves: one of zeros, and one like the first of its level "
+    "before": lambda: moving(
+        FORK,
+        46,
+        frames=4,
+        heads={
+            1: stems_head(0.5, 1, 2, 2, basis_in_waves(4, 0, 0, *row((1, 0, 0), (2, 0, 0)), rank=2)),
+            2: stems_head(0.25, 0, 2, 3, basis_in_waves(4, 8, *row((1, 0, 0), (2, 0, 0)), rank=1), base=1),
+        },
+    ),
+    "basis-shared: levels that share a learned basis, which lies with the first of them": lambda: moving(
+        FORK,
+        47,
+        frames=4,
+        heads={
+            1: stems_head(0.5, 1, 2, 4, basis_in_waves(4, *WAVE_ROWS, rank=4)),
+            2: stems_head(0.25, 0, 2, 4, b"", base=1),
+        },
+    ),
+    "basis-of-both-kinds: learned bases in waves that begin with rows by their entries, and the "
+    "other way round": lambda: moving(
+        FORK,
+        48,
+        frames=4,
+        segments=1,
+        heads={
+            1: stems_head(0.5, 1, 3, 1, basis_stream([[8192, -8192, 8192, 6400]])),
+            2: stems_head(0.25, 0, 2, 3, basis_in_waves(4, -3, 2, *row((3, 1, 0), (0, 2, 0)), rank=2), base=1),
+            3: stems_head(0.25, 0, 3, 4, basis_stream([[160, 192, 224, -6400]]), base=2),
+        },
+    ),
+    "node-waves: stems in the waves of maps beside those of stems": lambda: moving(
+        FORK, 45, heads={1: stems_head(0.5, 1, 1)}
+    ),
 }.items():
     valid(title, make)
-
-WAVE_ROWS = (  # of four rows over four frames: exponents, integers; the axes without a use of the last row are not 0
-    *(-6, 3, -1),
-    *row((9, 0, 1), (-4, 60, 0), (0, 2, 700)),
-    -200 + 4,
-    *row((1, 2, 3), (5, 0, 0)),
-)
-valid(
-    "basis-in-waves: a learned basis of four rows in waves, one of them of the least step",
-    lambda: moving(FORK, 45, frames=4, heads={1: stems_head(0.5, 1, 2, 4, basis_in_waves(4, *WAVE_ROWS, rank=4))}),
-)
-valid(
-    "basis-in-waves-zero: a learned basis of two rows in waves: one of zeros, and one like the first of its level "
-    "before",
-    moving,
-    FORK,
-    46,
-    frames=4,
-    heads={
-        1: stems_head(0.5, 1, 2, 2, basis_in_waves(4, 0, 0, *row((1, 0, 0), (2, 0, 0)), rank=2)),
-        2: stems_head(0.25, 0, 2, 3, basis_in_waves(4, 8, *row((1, 0, 0), (2, 0, 0)), rank=1), base=1),
-    },
-)
-valid(
-    "basis-shared: levels that share a learned basis, which lies with the first of them",
-    moving,
-    FORK,
-    47,
-    frames=4,
-    heads={
-        1: stems_head(0.5, 1, 2, 4, basis_in_waves(4, *WAVE_ROWS, rank=4)),
-        2: stems_head(0.25, 0, 2, 4, b"", base=1),
-    },
-)
-valid(
-    "basis-of-both-kinds: learned bases in waves that begin with rows by their entries, and the other way round",
-    moving,
-    FORK,
-    48,
-    frames=4,
-    segments=1,
-    heads={
-        1: stems_head(0.5, 1, 3, 1, basis_stream([[8192, -8192, 8192, 6400]])),
-        2: stems_head(0.25, 0, 2, 3, basis_in_waves(4, -3, 2, *row((3, 1, 0), (0, 2, 0)), rank=2), base=1),
-        3: stems_head(0.25, 0, 3, 4, basis_stream([[160, 192, 224, -6400]]), base=2),
-    },
-)
-valid(
-    "node-waves: stems in the waves of maps beside those of stems", moving, FORK, 45, heads={1: stems_head(0.5, 1, 1)}
-)
-
-
-def basis_by_chance(random: np.random.Generator, rank: int, frames: int) -> bytes:
-    return basis_stream(random.integers(-8192, 8193, (rank, frames)).tolist())
-
-
-def basis(rank: int, kind: int, stream: bytes) -> Callable[[], bytes]:
-    return lambda: stems_head(0.5, 0, kind, rank, stream)
-
 
 motion(STEMS, 1, "basis-4: Basis 4", basis(1, 4, basis_stream([[0, 0]])))
 motion(STEMS, 1, "basis-255: Basis 255", basis(1, 255, basis_stream([[0, 0]])))
@@ -173,22 +183,6 @@ valid(
     },
     scripts={(STEMS, 0): 514, (STEMS, 1): 515},
 )
-
-
-def shrunk(last: int) -> Plant:
-    """A row that 15 known ones along it leave about 1e-100 of; `last`: an entry of the last of these, in 1/8192."""
-    known = [[1235] * 44] * 14 + [[last] * 44]
-    rows = [[entry / 8192 for entry in entries] for entries in known]
-    in_waves = basis_in_waves(44, -200, *row((1, 0, 0)), rank=16, known=rows)
-    return Plant(
-        [Stem(-1, 3)],
-        frames=44,
-        heads={0: stems_head(0.25, 0, 3, 15, basis_stream(known)), 1: stems_head(0.25, 0, 2, 16, in_waves, base=0)},
-        scripts={(STEMS, 1): row(*[(0, 0, 0)] * 15, (50, -30, 10))},
-    )
-
-
-ROUNDED = (263597123, 32053444), (241475353, 36228921), (79323412, 26324395), (170050111, 70213091)
 for side, last in (("above", 1237), ("below", 1236)):
     valid(
         f"basis-short-{side}: a row of a basis whose squares add up to {side} 1e-200, since the known rows are no unit "

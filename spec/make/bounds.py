@@ -18,6 +18,13 @@ def mode_and_more(share: float) -> list[list[float]]:
     return [[x, 0.0, 0.0] for x in mode + share * across]
 
 
+def in_binary64(name: str) -> Plant:
+    made = MADE[name]
+    plant = made() if callable(made) else made
+    assert isinstance(plant, Plant)
+    return replace(plant, is_float64=True)
+
+
 for side_, size_ in (("above", 1.015), ("below", 0.985)):
     valid(
         f"sheet-thin-{side_}: a sheet that is {side_} 1/100 as wide as long, once turned",
@@ -62,15 +69,6 @@ for side_, size_ in (("above", 1.015), ("below", 0.985)):
         predicted=predicted_head(1e-33),
         is_float64=True,
     )
-
-
-def in_binary64(name: str) -> Plant:
-    made = MADE[name]
-    plant = made() if callable(made) else made
-    assert isinstance(plant, Plant)
-    return replace(plant, is_float64=True)
-
-
 for name_ in (
     "sheet-mode-above",
     "sheet-thin-below",

@@ -27,6 +27,25 @@ def named(*names: str) -> Plant:
     return lone(clips=tuple(Clip(1, 1, name) for name in names))
 
 
+CALM_ENTRY, STORM_ENTRY = CALM.entry(), STORM.entry()
+
+
+def clips(title: str, *entries: bytes, count: int = 2) -> None:
+    """The two clips with another CLIPS."""
+    invalid(
+        f"clips-{title}", lambda: two_clips().with_header(clip_count=count).change(CLIPS, content=b"".join(entries))
+    )
+
+
+def lone_clips(frames: int, segments: int, *entries: bytes, **header_fields) -> Draft:
+    """One vertex, and any CLIPS."""
+    draft = lone(frames=frames, segments=segments).add(Entry(CLIPS, b"".join(entries)))
+    return draft.with_header(clip_count=len(entries), **header_fields)
+
+
+UNEVEN = clip_entry(256, 1, "long"), clip_entry(2, 2, "short")
+
+
 for title, make in {
     "clips-two: two clips of different lengths, that share the shapes of pieces": two_clips,
     "clips-three: 13 frames in 6 segments, which without the clips would begin elsewhere": lambda: moving(
@@ -134,22 +153,6 @@ for title, make in {
     "clips-names-longest: names of 255 bytes": lambda: named("n" * 255, "n" * 254 + "m", "\u98ce" * 85),
 }.items():
     valid(title, make)
-
-CALM_ENTRY, STORM_ENTRY = CALM.entry(), STORM.entry()
-
-
-def clips(title: str, *entries: bytes, count: int = 2) -> None:
-    """The two clips with another CLIPS."""
-    invalid(
-        f"clips-{title}", lambda: two_clips().with_header(clip_count=count).change(CLIPS, content=b"".join(entries))
-    )
-
-
-def lone_clips(frames: int, segments: int, *entries: bytes, **header_fields) -> Draft:
-    """One vertex, and any CLIPS."""
-    draft = lone(frames=frames, segments=segments).add(Entry(CLIPS, b"".join(entries)))
-    return draft.with_header(clip_count=len(entries), **header_fields)
-
 
 invalid("clips-missing BAD_CHUNK_TABLE: two clips and no CLIPS", lambda: two_clips().without(CLIPS))
 clips("empty: no bytes")
@@ -266,22 +269,18 @@ for title, make in {
     "clips-levels BAD_HEADER: Full_Level_Count 5, and as many Seam_Errors; the hierarchy has 3": lambda: two_clips(
         clips=(CALM, loop(STORM, *[1.0] * 5))
     ).with_header(full_level_count=5),
+    "clips-memory LIMIT_EXCEEDED: 2^18 vertices and a segment of 256 frames, though the mean is 86": lambda: lone_clips(
+        258, 3, *UNEVEN, vertex_count=1 << 18
+    ),
+    "clips-before-memory BAD_CHECKSUM: CLIPS is damaged, and its longest segment takes too much memory": lambda: (
+        lone_clips(258, 3, *UNEVEN, vertex_count=1 << 18).change(CLIPS, checksum=0)
+    ),
+    "clips-memory-of-mean LIMIT_EXCEEDED: 2^22 vertices are too many, before CLIPS is missed": lambda: lone(
+        frames=2, segments=2
+    ).with_header(vertex_count=1 << 22, clip_count=2),
 }.items():
     invalid(title, make)
 
-UNEVEN = clip_entry(256, 1, "long"), clip_entry(2, 2, "short")
-invalid(
-    "clips-memory LIMIT_EXCEEDED: 2^18 vertices and a segment of 256 frames, though the mean is 86",
-    lambda: lone_clips(258, 3, *UNEVEN, vertex_count=1 << 18),
-)
-invalid(
-    "clips-before-memory BAD_CHECKSUM: CLIPS is damaged, and its longest segment takes too much memory",
-    lambda: lone_clips(258, 3, *UNEVEN, vertex_count=1 << 18).change(CLIPS, checksum=0),
-)
-invalid(
-    "clips-memory-of-mean LIMIT_EXCEEDED: 2^22 vertices are too many, before CLIPS is missed",
-    lambda: lone(frames=2, segments=2).with_header(vertex_count=1 << 22, clip_count=2),
-)
 valid(
     "clips-long-segments: 512 frames in two segments, of which all but two are repeats",
     lambda: lone(clips=(Clip(512, 2, "long"),), repeats=(0, *(1,) * 255) * 2),

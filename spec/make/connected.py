@@ -31,38 +31,6 @@ def connected(
     return with_rest(BY_VERTEX, rest, faces=content, **fields)
 
 
-for name_, make_faces in MANY_FACES.items():
-    valid(f"rest-connected-{name_.replace(' ', '-')}: a rest pose by faces: {name_}", connected, make_faces)
-valid(
-    "rest-connected-order: a rest pose by faces of vertices that stand the other way round",
-    lambda: connected(MANY_FACES["strip"], order=list(range(119, -1, -1))),
-)
-valid("rest-connected-tiny: the same, a subnormal Rest_Step", lambda: connected(MANY_FACES["strip"], 74, FLOAT_TINY))
-valid("rest-connected-exact: an exact rest pose by faces", lambda: connected(MANY_FACES["quads"], exact=True))
-valid("rest-connected-none: a rest pose by no faces", lambda: connected(lambda: polygons(np.zeros((0, 3), "<u2"), 120)))
-invalid(
-    "rest-connected-without-faces BAD_CHUNK_TABLE: Method has Is_Connected, and there are no FACES",
-    lambda: with_rest(FORK, coded_rest(FORK, [], reserved=REST_CONNECTED >> 2)),
-)
-for what, content in (
-    ("broken", lambda: polygons(FACES_3) + b"\0"),
-    ("derived", lambda: derived("<i4")),
-    ("many-corners", lambda: polygons(np.zeros((1, 41), "<i4"))),
-    ("many-faces", lambda: polygons(np.zeros((21, 1), "<i4"))),
-):
-    invalid(
-        f"rest-connected-{what}-faces: a rest pose by faces that do not serve it: {what}",
-        lambda content=content: with_rest(FORK, coded_rest(FORK, [], reserved=REST_CONNECTED >> 2)).add(
-            Entry(FACES, content())
-        ),
-    )
-valid(
-    "rest-connected-own-opposite: a quadrangle whose corners one and three are the same vertex, behind those "
-    "between them",
-    lambda: meshed([Stem(-1, 5)], [[3, 0, 3, 1], [0, 1, 2], [2, 3, 4]], Chance(530, large=5)),
-)
-
-
 def meshed(stems: list[Stem], faces: list[list[int]], script: list | Chance, **fields) -> Plant:
     """A rest pose by faces, of any sizes."""
     count, step = sum(stem.count for stem in stems), 0.3
@@ -134,7 +102,36 @@ def leaves() -> list[list[int]]:
 
 
 HUBS = [Stem(-1, 1 + max(map(max, hubs())), lag=1)]
+
+
+for name_, make_faces in MANY_FACES.items():
+    valid(f"rest-connected-{name_.replace(' ', '-')}: a rest pose by faces: {name_}", connected, make_faces)
+valid(
+    "rest-connected-order: a rest pose by faces of vertices that stand the other way round",
+    lambda: connected(MANY_FACES["strip"], order=list(range(119, -1, -1))),
+)
+valid("rest-connected-tiny: the same, a subnormal Rest_Step", lambda: connected(MANY_FACES["strip"], 74, FLOAT_TINY))
+valid("rest-connected-exact: an exact rest pose by faces", lambda: connected(MANY_FACES["quads"], exact=True))
+valid("rest-connected-none: a rest pose by no faces", lambda: connected(lambda: polygons(np.zeros((0, 3), "<u2"), 120)))
+invalid(
+    "rest-connected-without-faces BAD_CHUNK_TABLE: Method has Is_Connected, and there are no FACES",
+    lambda: with_rest(FORK, coded_rest(FORK, [], reserved=REST_CONNECTED >> 2)),
+)
+for what, content in (
+    ("broken", lambda: polygons(FACES_3) + b"\0"),
+    ("derived", lambda: derived("<i4")),
+    ("many-corners", lambda: polygons(np.zeros((1, 41), "<i4"))),
+    ("many-faces", lambda: polygons(np.zeros((21, 1), "<i4"))),
+):
+    invalid(
+        f"rest-connected-{what}-faces: a rest pose by faces that do not serve it: {what}",
+        lambda content=content: with_rest(FORK, coded_rest(FORK, [], reserved=REST_CONNECTED >> 2)).add(
+            Entry(FACES, content())
+        ),
+    )
 for title, make in {
+    "rest-connected-own-opposite: a quadrangle whose corners one and three are the same vertex, behind those "
+    "between them": lambda: meshed([Stem(-1, 5)], [[3, 0, 3, 1], [0, 1, 2], [2, 3, 4]], Chance(530, large=5)),
     "rest-connected-hubs: vertices that complete up to seven parallelograms, or have up to ten neighbours, and no "
     "other way": lambda: meshed(HUBS, hubs(), Chance(210, large=5)),
     "rest-connected-leaves: by faces shapes, copies, branches that others have begun, and steps of branches of "

@@ -14,25 +14,6 @@ from spec.make.rest import coded_rest, with_rest
 COPIED = stems_of(  # a shape and its copies, of branches that have detail and that have none
     "-1 8 lag=2, 0 4 3 lag=2, 0 4 5 SHEET lag=2 detail=118, 0 4 0 lag=1, 0 8 2 lag=2"
 )
-valid(
-    "rest-copies: copies of shapes that are mirrored and scaled",
-    lambda: with_rest(COPIED, coded_rest(COPIED, Chance(3, large=3, begin=[1]))),
-)
-for name_, seed_, title_ in (
-    ("rest-copies-of-no-shape", 5, "a copy of a shape that is not there"),
-    ("rest-copies-scale", 4, "the scale of a copy is not above 0"),
-    ("rest-copies-rotation", 40, "a quaternion of more than 1"),
-):
-    invalid(
-        f"{name_}: {title_}",
-        lambda seed_=seed_: with_rest(COPIED, coded_rest(COPIED, Chance(3, large=3, begin=[1]))).change(
-            REST, content=coded_rest(COPIED, Chance(seed_, large=3, begin=[1]))
-        ),
-    )
-valid(
-    "rest-copies-between: the last turn of a shape is two and a half steps of the next copy, but for rounding",
-    lambda: copy_of((36, 0, 0), (0, 0, 1, 0), (15, 0, 3, 0), *[(0, 0, 0, 0), (15, 0, 0, 0)] * 3),
-)
 
 
 def by_chance(count: int, seed: int, most: int = 4) -> list:
@@ -107,13 +88,32 @@ def copies_of_lengths() -> Plant:
 
 
 FAR, MOST = ((1 << 30) - 2,) * 3, (1 << 29) - 1
+
+
+valid(
+    "rest-copies: copies of shapes that are mirrored and scaled",
+    lambda: with_rest(COPIED, coded_rest(COPIED, Chance(3, large=3, begin=[1]))),
+)
+for name_, seed_, title_ in (
+    ("rest-copies-of-no-shape", 5, "a copy of a shape that is not there"),
+    ("rest-copies-scale", 4, "the scale of a copy is not above 0"),
+    ("rest-copies-rotation", 40, "a quaternion of more than 1"),
+):
+    invalid(
+        f"{name_}: {title_}",
+        lambda seed_=seed_: with_rest(COPIED, coded_rest(COPIED, Chance(3, large=3, begin=[1]))).change(
+            REST, content=coded_rest(COPIED, Chance(seed_, large=3, begin=[1]))
+        ),
+    )
 for title, make in {
-    "rest-copies-turned: the last turn and scale of a shape, which its next copy is about, of two "
-    "shapes in turn": copies_turned,
+    "rest-copies-between: the last turn of a shape is two and a half steps of the next copy, "
+    "but for rounding": lambda: copy_of((36, 0, 0), (0, 0, 1, 0), (15, 0, 3, 0), *[(0, 0, 0, 0), (15, 0, 0, 0)] * 3),
+    "rest-copies-turned: the last turn and scale of a shape, which its next copy is about, of "
+    "two shapes in turn": copies_turned,
     "rest-copies-of-many: 64 shapes are remembered, and the last of these is copied": copies_of_many,
     "rest-copies-of-lengths: branches of 15, 16 and 17 vertices that are shapes, copies or neither": copies_of_lengths,
-    "rest-copies-of-roots: a root that is a copy of a branch, a branch that is one of a root, and a "
-    "root of a root": lambda: with_copies(
+    "rest-copies-of-roots: a root that is a copy of a branch, a branch that is one of a root, "
+    "and a root of a root": lambda: with_copies(
         [3, Stem(-1, 3), Stem(-1, 2), Stem(3, 2, 1), Stem(-1, 2), Stem(5, 3, 1)],
         *([1, *by_chance(3, 190, 9)], copied(0, (1, 1, 2, -1)), by_chance(1, 191)),
         *([1, *by_chance(2, 192, 9)], copied(0, (0, -1, 2, 0)), by_chance(1, 193)),

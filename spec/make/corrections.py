@@ -7,6 +7,18 @@ from collections.abc import Callable
 
 from spec.make.base import *
 
+
+def corrections(step: float) -> Callable[[], bytes]:
+    return lambda: struct.pack("<f", step) + fork().content(CORRECTIONS, 2, 0)[4:]
+
+
+def corrected_lone(stream: Callable[[bytes], bytes], **fields) -> Draft:
+    """A vertex with other bytes in place of a stream of CORRECTIONS that corrects nothing."""
+    draft = lone(scripts={(CORRECTIONS, 1): [0]}, **fields).draft()
+    content = draft.content(CORRECTIONS, 1, 0)
+    return draft.change(CORRECTIONS, 1, 0, content=content[:4] + stream(content[4:]))
+
+
 valid(
     "corrections: corrections on the last level: blocks of 8 frames, the last of 2, and vertices that have none",
     lambda: Plant([Stem(-1, 6)], 18, scripts={(CORRECTIONS, 1): 54}),
@@ -42,12 +54,6 @@ valid(
         + Plant(FORK, 2, scripts={(CORRECTIONS, 2): 56}).draft().content(CORRECTIONS, 2)[4:],
     ),
 )
-
-
-def corrections(step: float) -> Callable[[], bytes]:
-    return lambda: struct.pack("<f", step) + fork().content(CORRECTIONS, 2, 0)[4:]
-
-
 motion(CORRECTIONS, 2, "empty: no bytes", b"")
 motion(CORRECTIONS, 2, "short: 3 bytes", bytes(3))
 for what, value in (("zero", 0.0), ("negative", -1.0), ("nan", NAN), ("infinite", INFINITY)):
@@ -60,15 +66,6 @@ valid(
     "corrections-of-one-frame: corrections in a segment of one frame, before which there is none",
     lambda: Plant(SHORT, scripts={(CORRECTIONS, 1, 0): [1, *(2, 3, 1, 0), 0, 1, *(1, 0, 5, 1)]}),
 )
-
-
-def corrected_lone(stream: Callable[[bytes], bytes], **fields) -> Draft:
-    """A vertex with other bytes in place of a stream of CORRECTIONS that corrects nothing."""
-    draft = lone(scripts={(CORRECTIONS, 1): [0]}, **fields).draft()
-    content = draft.content(CORRECTIONS, 1, 0)
-    return draft.change(CORRECTIONS, 1, 0, content=content[:4] + stream(content[4:]))
-
-
 valid(
     "corrections-no-bytes: a stream of no bytes, whose decisions are all 1: the largest corrections of all frames",
     lambda: corrected_lone(lambda stream: b"", frames=3),

@@ -22,6 +22,63 @@ def documented() -> bytes:
     return bytes.fromhex("".join(re.findall(r"^ {4}[0-9a-f]{8}  ((?:[0-9a-f]{2} ?)+)", dump, re.M)))
 
 
+def first_bytes(count: int, change: bytes = b"") -> bytes:
+    data = lone().file()[:count]
+    return data[: len(data) - len(change)] + change
+
+
+def error_table(*values: int) -> Draft:
+    return replace(lone().draft(), errors=values)
+
+
+def front_stream(change: Callable[[bytes], bytes]) -> Draft:
+    return replace(fork(), stream=change)
+
+
+def cut_static() -> bytes:
+    return attributes(element("|u1", b"1", "a"), element("|u1", b"2", "b")).file()[:-1]
+
+
+def front_alone(draft: Draft) -> bytes:
+    data = draft.file()
+    return data[: rules.u32(data, 16)]
+
+
+def errors_by_chance(count: int) -> tuple[int, ...]:
+    """Large and small steps up and down, to both ends of the range."""
+    random, last, errors = np.random.default_rng(411), [4000] * 3, []
+    for _ in range(count):
+        step = random.choice([1, 3, 30, 400, 5000], 3) * random.integers(-2, 3, 3)
+        last = np.clip(np.array(last) + step, 0, rules.SHORT_FLOATS - 1).tolist()
+        errors += last
+    return tuple(errors)
+
+
+def of_memory(vertices: int) -> Draft:
+    """128 frames, whose first fault behind the front is a checksum."""
+    return lone().with_header(vertex_count=vertices, frame_count=128).change(HIERARCHY, checksum=0)
+
+
+def of_range(max_error: int) -> Draft:
+    """Counts after which the range is 2^38 + 56, whose first fault behind the front is a checksum."""
+    clips = [clip_entry(25, 17, "0"), *(clip_entry(1, 1, str(i)) for i in range(1, 25))]
+    return (
+        lone()
+        .add(Entry(CLIPS, b"".join(clips), checksum=0))
+        .with_header(
+            vertex_count=13,
+            branch_count=2,
+            frame_count=49,
+            segment_count=41,
+            full_level_count=22,
+            level_count=2,
+            clip_count=25,
+            layer_count=4,
+            max_error=rules.from_bits(max_error, 64),
+        )
+    )
+
+
 valid("documented: the smallest file, as FORMAT.md has it", documented)
 valid("uneven-segments: 7 frames in 3 segments, of 2, 2 and 3", moving, FORK, 25, frames=7, segments=3, heads=HEADS)
 valid("segment-per-frame: as many segments as frames", lambda: moving(FORK, 26, frames=3, segments=3, heads=HEADS))
@@ -36,13 +93,6 @@ valid(
     "max-error-largest: the largest Max_Error, and errors of segments up and down",
     lambda: replace(fork().with_header(max_error=HIGHEST), errors=tuple(range(8000, 8018))),
 )
-
-
-def first_bytes(count: int, change: bytes = b"") -> bytes:
-    data = lone().file()[:count]
-    return data[: len(data) - len(change)] + change
-
-
 invalid("empty NOT_AN_ATH_FILE: a file of no bytes", b"")
 invalid(
     "magic-other NOT_AN_ATH_FILE: something else", b"PK\x03\x04 something else entirely, longer than a header would be"
@@ -117,124 +167,55 @@ header("max-error-nan: Max_Error is NaN", max_error=NAN)
 header("max-error-infinite: Max_Error is infinite", max_error=INFINITY)
 header("checksum BAD_CHECKSUM: Front_Checksum is another", checksum=0)
 header("memory-limit LIMIT_EXCEEDED: 2^22 vertices take more than Max_Memory_Bytes", vertex_count=1 << 22)
+for title, make in {
+    "checksums-damaged BAD_CHECKSUM: a bit of a checksum is flipped": lambda: flipped(
+        lone().file(), rules.u32(lone().file(), 16) - 2
+    ),
+    "errors-infinite BAD_CHUNK_TABLE: Level_Max_Error is 8160": lambda: error_table(8160, 0, 0, 0, 0, 0),
+    "errors-negative BAD_CHUNK_TABLE: Level_P99_Error is -1": lambda: error_table(0, -1, 0, 0, 0, 0),
+    "errors-largest BAD_CHUNK_TABLE: the last error is 2^29": lambda: error_table(0, 0, 0, 0, 0, 1 << 29),
+    "front-zero-behind BAD_CHUNK_TABLE: a zero byte behind the front stream": lambda: front_stream(
+        lambda stream: stream + b"\0"
+    ),
+    "front-bytes-behind BAD_CHUNK_TABLE: bytes behind the front stream": lambda: front_stream(
+        lambda stream: stream + b"\1" * 12
+    ),
+    "front-nothing LIMIT_EXCEEDED: a front stream of no bytes, whose decisions are all 1: 2^30 vertices": lambda: (
+        front_stream(lambda stream: b"")
+    ),
+    "trailing-byte TRAILING_BYTES strict: a byte behind the end": lambda: fork().file() + b"\0",
+    "trailing-file TRAILING_BYTES strict: the file twice": lambda: fork().file() * 2,
+    "cut-in-prelude TRUNCATED: the last byte of TIME is missing": lambda: cut(lambda d: end_of(d, TIME) - 1),
+    "cut-behind-prelude TRUNCATED 0: no motion has arrived": lambda: cut(lambda d: end_of(d, TIME)),
+    "cut-in-level-0 TRUNCATED 0: one segment of level 0 has arrived": lambda: cut(
+        lambda d: end_of(d, AFFINES, 0, 1) - 1
+    ),
+    "cut-behind-level-0 TRUNCATED 1: level 0 has arrived and plays": lambda: cut(lambda d: end_of(d, AFFINES, 0, 1)),
+    "cut-in-last-level TRUNCATED 2: the last byte is missing": lambda: cut(lambda d: len(d.file()) - 1),
+    "cut-behind-damage TRUNCATED 1: STEMS of level 1 is damaged and SHAPES is missing: what is "
+    "missing comes first": lambda: flipped(cut(lambda d: end_of(d, SHAPES, 1) - 1), end_of(fork(), STEMS, 1) - 1),
+    "cut-in-source-rest TRUNCATED rest: all motion has arrived and plays, the rest pose of the "
+    "source has not": lambda: forked(source_rest=bent(FORK, Chance(206))).file()[:-1],
+    "cut-in-attributes TRUNCATED strict: all motion has arrived and plays, one of two attributes has": cut_static,
+    "cut-behind-first-byte TRUNCATED: one byte, that of Magic": lambda: first_bytes(1),
+    "header-alone BAD_HEADER: 24 bytes are a header: its Chunk_Count is 0": lambda: (
+        lone().with_header(chunk_count=0).file()[:24]
+    ),
+}.items():
+    invalid(title, make)
 
 
-def error_table(*values: int) -> Draft:
-    return replace(lone().draft(), errors=values)
-
-
-def front_stream(change: Callable[[bytes], bytes]) -> Draft:
-    return replace(fork(), stream=change)
-
-
-invalid(
-    "checksums-damaged BAD_CHECKSUM: a bit of a checksum is flipped",
-    lambda: flipped(lone().file(), rules.u32(lone().file(), 16) - 2),
-)
-invalid("errors-infinite BAD_CHUNK_TABLE: Level_Max_Error is 8160", lambda: error_table(8160, 0, 0, 0, 0, 0))
-invalid("errors-negative BAD_CHUNK_TABLE: Level_P99_Error is -1", lambda: error_table(0, -1, 0, 0, 0, 0))
-invalid("errors-largest BAD_CHUNK_TABLE: the last error is 2^29", lambda: error_table(0, 0, 0, 0, 0, 1 << 29))
-invalid(
-    "front-zero-behind BAD_CHUNK_TABLE: a zero byte behind the front stream",
-    lambda: front_stream(lambda stream: stream + b"\0"),
-)
-invalid(
-    "front-bytes-behind BAD_CHUNK_TABLE: bytes behind the front stream",
-    lambda: front_stream(lambda stream: stream + b"\1" * 12),
-)
-invalid(
-    "front-nothing LIMIT_EXCEEDED: a front stream of no bytes, whose decisions are all 1: 2^30 vertices",
-    lambda: front_stream(lambda stream: b""),
-)
-
-
-def cut_static() -> bytes:
-    return attributes(element("|u1", b"1", "a"), element("|u1", b"2", "b")).file()[:-1]
-
-
-invalid("trailing-byte TRAILING_BYTES strict: a byte behind the end", lambda: fork().file() + b"\0")
-invalid("trailing-file TRAILING_BYTES strict: the file twice", lambda: fork().file() * 2)
-invalid("cut-in-prelude TRUNCATED: the last byte of TIME is missing", lambda: cut(lambda d: end_of(d, TIME) - 1))
-invalid("cut-behind-prelude TRUNCATED 0: no motion has arrived", lambda: cut(lambda d: end_of(d, TIME)))
-invalid(
-    "cut-in-level-0 TRUNCATED 0: one segment of level 0 has arrived",
-    lambda: cut(lambda d: end_of(d, AFFINES, 0, 1) - 1),
-)
-invalid(
-    "cut-behind-level-0 TRUNCATED 1: level 0 has arrived and plays", lambda: cut(lambda d: end_of(d, AFFINES, 0, 1))
-)
-invalid("cut-in-last-level TRUNCATED 2: the last byte is missing", lambda: cut(lambda d: len(d.file()) - 1))
-invalid(
-    "cut-behind-damage TRUNCATED 1: STEMS of level 1 is damaged and SHAPES is missing: what is missing comes first",
-    lambda: flipped(cut(lambda d: end_of(d, SHAPES, 1) - 1), end_of(fork(), STEMS, 1) - 1),
-)
-invalid(
-    "cut-in-source-rest TRUNCATED rest: all motion has arrived and plays, the rest pose of the source has not",
-    lambda: forked(source_rest=bent(FORK, Chance(206))).file()[:-1],
-)
-invalid("cut-in-attributes TRUNCATED strict: all motion has arrived and plays, one of two attributes has", cut_static)
-
-
-def front_alone(draft: Draft) -> bytes:
-    data = draft.file()
-    return data[: rules.u32(data, 16)]
-
-
-invalid("cut-behind-first-byte TRUNCATED: one byte, that of Magic", lambda: first_bytes(1))
-invalid(
-    "header-alone BAD_HEADER: 24 bytes are a header: its Chunk_Count is 0",
-    lambda: lone().with_header(chunk_count=0).file()[:24],
-)
 header("chunks-2-20: Chunk_Count 2^20 is allowed, but Front_Length is too small", chunk_count=1 << 20)
 header("front-length-2-24 TRUNCATED: Front_Length 2^24 is allowed, but not there", front_length=1 << 24)
 invalid(
     "front-alone-damaged BAD_CHECKSUM: a file that ends with its front, which is damaged",
     lambda: flipped(front_alone(lone().draft()), 30),
 )
-
-
-def errors_by_chance(count: int) -> tuple[int, ...]:
-    """Large and small steps up and down, to both ends of the range."""
-    random, last, errors = np.random.default_rng(411), [4000] * 3, []
-    for _ in range(count):
-        step = random.choice([1, 3, 30, 400, 5000], 3) * random.integers(-2, 3, 3)
-        last = np.clip(np.array(last) + step, 0, rules.SHORT_FLOATS - 1).tolist()
-        errors += last
-    return tuple(errors)
-
-
 valid(
     "errors-by-chance: errors of thirty segments by chance, which are announced about those of the one before and "
     "of the level before",
     lambda: replace(predicted(SINGLE, [[1, 1]], 30).draft(), errors=errors_by_chance(60)),
 )
-
-
-def of_memory(vertices: int) -> Draft:
-    """128 frames, whose first fault behind the front is a checksum."""
-    return lone().with_header(vertex_count=vertices, frame_count=128).change(HIERARCHY, checksum=0)
-
-
-def of_range(max_error: int) -> Draft:
-    """Counts after which the range is 2^38 + 56, whose first fault behind the front is a checksum."""
-    clips = [clip_entry(25, 17, "0"), *(clip_entry(1, 1, str(i)) for i in range(1, 25))]
-    return (
-        lone()
-        .add(Entry(CLIPS, b"".join(clips), checksum=0))
-        .with_header(
-            vertex_count=13,
-            branch_count=2,
-            frame_count=49,
-            segment_count=41,
-            full_level_count=22,
-            level_count=2,
-            clip_count=25,
-            layer_count=4,
-            max_error=rules.from_bits(max_error, 64),
-        )
-    )
-
-
 valid(
     "stream-to-its-end: a stream of all the bytes that are read, the last ones of which say nothing",
     lambda: corrected_lone(lambda stream: stream.ljust(7, b"\0") + b"\1"),

@@ -9,6 +9,25 @@ import numpy as np
 from spec.document import rules
 from spec.make.base import *
 
+BLADES = [Stem(-1, 3), Stem(-1, 4), Stem(-1, 2), Stem(-1, 3)]
+
+
+def interleaved(stems: list[Stem]) -> list[int]:
+    """Numbers of the vertices in a source that holds all first vertices, then all second ones."""
+    places = [(i, b) for b, stem in enumerate(stems) for i in range(stem.count)]
+    return np.argsort(sorted(range(len(places)), key=places.__getitem__)).tolist()
+
+
+def hierarchy(title: str, stems: list[Stem], **sources) -> None:
+    """Written for the five vertices and two branches of the fork, or as many branches as there are."""
+
+    def make() -> Draft:
+        stream = write(rules.decode_hierarchy, hierarchy_script(stems, **sources), len(stems), 5)
+        return fork().with_header(branch_count=len(stems)).change(HIERARCHY, content=stream)
+
+    invalid(f"hierarchy-{title}", make)
+
+
 for title, make in {
     "two-roots: two plants: a root in the middle of the file": lambda: moving(
         [Stem(-1, 3), Stem(0, 2, 1), Stem(-1, 4), Stem(2, 1, 3)], 7, heads=HEADS
@@ -33,19 +52,6 @@ for title, make in {
     "whole-alone: a root that is WHOLE and all there is: h is 0": lambda: moving(
         [Stem(-1, 3, 0, WHOLE)], 12, heads=HEADS
     ),
-}.items():
-    valid(title, make)
-
-BLADES = [Stem(-1, 3), Stem(-1, 4), Stem(-1, 2), Stem(-1, 3)]
-
-
-def interleaved(stems: list[Stem]) -> list[int]:
-    """Numbers of the vertices in a source that holds all first vertices, then all second ones."""
-    places = [(i, b) for b, stem in enumerate(stems) for i in range(stem.count)]
-    return np.argsort(sorted(range(len(places)), key=places.__getitem__)).tolist()
-
-
-for title, make in {
     "permutations: branches and vertices numbered otherwise in the source": lambda: moving(
         [Stem(-1, 3), Stem(0, 2, 1), Stem(0, 1, 2)], 22, branch_source=[2, 0, 1], vertex_source=[5, 0, 3, 1, 4, 2]
     ),
@@ -75,18 +81,6 @@ invalid(
     "hierarchy-before-rest: HIERARCHY is not valid and REST is damaged: HIERARCHY comes first",
     lambda: fork().change(HIERARCHY, content=b"").change(REST, checksum=0),
 )
-
-
-def hierarchy(title: str, stems: list[Stem], **sources) -> None:
-    """Written for the five vertices and two branches of the fork, or as many branches as there are."""
-
-    def make() -> Draft:
-        stream = write(rules.decode_hierarchy, hierarchy_script(stems, **sources), len(stems), 5)
-        return fork().with_header(branch_count=len(stems)).change(HIERARCHY, content=stream)
-
-    invalid(f"hierarchy-{title}", make)
-
-
 prelude(HIERARCHY, "empty: no bytes", b"")
 prelude(HIERARCHY, "zero-behind: a zero byte behind the stream", lambda: fork().content(HIERARCHY) + b"\0")
 prelude(HIERARCHY, "bytes-behind: bytes behind the stream", lambda: fork().content(HIERARCHY) + b"\1" * 12)

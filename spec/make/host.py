@@ -20,27 +20,59 @@ def hosted(mesh: np.ndarray = MESH, **fields) -> Plant:
     return forked(**{"mesh": mesh, "vertex_source": ORDER} | fields)
 
 
+AWKWARD_MESH = np.array([*AWKWARD_FLOATS, 0.0, -0.0, 0.0, 1.0, -2.0, -0.5], "<f4").reshape(5, 3)
+NO_REFINED_REST = [(REFINED_REST, 3, 0), (REFINED_REST, 4, 0)]
+HOSTED_STEMS = [Stem(-1, 70), Stem(0, 9, 60, SHEET), Stem(1, 4, 8)]
+HOSTED_MESH = np.array(grown(HOSTED_STEMS, 6), "<f4")
+
+
+def tall(*counts: int) -> Draft:
+    """Roots of so many vertices."""
+    return without_mesh([Stem(-1, count, lag=1) for count in counts])
+
+
+def deep() -> Draft:
+    stems = chain(1300, 1, flags=0)
+    for up in (1200, 1, 20, 98):
+        parent = len(stems) - 1
+        for _ in range(up):
+            parent = stems[parent].parent
+        stems.append(Stem(parent, 1))
+    return without_mesh([replace(stem, flags=WHOLE if b == 0 else 0) for b, stem in enumerate(stems)])
+
+
+def without_mesh(stems: list[Stem]) -> Draft:
+    """A file of which only the hierarchy is decoded: the rest pose is the host's mesh, which is not there."""
+    count = sum(stem.count for stem in stems)
+    stream = write(rules.decode_hierarchy, hierarchy_script(stems), len(stems), count)
+    plan = rules.make_parts(rules.decode_hierarchy(stream, len(stems), count)[0])
+    levels, front = range(plan.height + 2), Plant([Stem(-1, 1)], mesh=np.zeros((1, 3), "<f4")).draft()
+    return (
+        replace(front, entries=front.entries[:3])
+        .with_header(vertex_count=count, branch_count=len(stems), level_count=len(levels), full_level_count=len(levels))
+        .change(HIERARCHY, content=stream)
+        .add(*(Entry(STEMS, b"", level, 0) for level in levels if rules.has_stems(plan, level)))
+        .add(*(Entry(AFFINES, b"", level, 0) for level in levels if rules.has_affines(plan, level, level)))
+    )
+
+
 valid("host-mesh: the rest pose is the host's mesh, in source order", hosted, mesh=MESH)
 valid(
     "host-mesh-far: a mesh far from 0, less an origin",
     lambda: hosted(MESH * np.float32(1e5), origin=(2e5, -1e5, 0.1)),
     mesh=MESH * np.float32(1e5),
 )
-AWKWARD_MESH = np.array([*AWKWARD_FLOATS, 0.0, -0.0, 0.0, 1.0, -2.0, -0.5], "<f4").reshape(5, 3)
 valid(
     "host-mesh-awkward: -0.0, which counts as 0.0, subnormal and largest numbers in the host's mesh",
     lambda: hosted(AWKWARD_MESH),
     mesh=AWKWARD_MESH,
 )
 valid("host-mesh-wide: binary64 positions about a mesh of binary32", lambda: hosted(is_float64=True), mesh=MESH)
-NO_REFINED_REST = [(REFINED_REST, 3, 0), (REFINED_REST, 4, 0)]
 valid(
     "host-mesh-layers: three layers about the host's mesh, which none refines",
     lambda: layered(3, *NO_REFINED_REST, mesh=MESH, vertex_source=ORDER),
     mesh=MESH,
 )
-HOSTED_STEMS = [Stem(-1, 70), Stem(0, 9, 60, SHEET), Stem(1, 4, 8)]
-HOSTED_MESH = np.array(grown(HOSTED_STEMS, 6), "<f4")
 valid(
     "host-mesh-sheets: sheets and long stems of the host's mesh",
     lambda: moving(HOSTED_STEMS, 71, frames=3, mesh=HOSTED_MESH, heads=HEADS),
@@ -85,38 +117,6 @@ invalid(
     ),
     mesh=MESH,
 )
-
-
-def tall(*counts: int) -> Draft:
-    """Roots of so many vertices."""
-    return without_mesh([Stem(-1, count, lag=1) for count in counts])
-
-
-def deep() -> Draft:
-    stems = chain(1300, 1, flags=0)
-    for up in (1200, 1, 20, 98):
-        parent = len(stems) - 1
-        for _ in range(up):
-            parent = stems[parent].parent
-        stems.append(Stem(parent, 1))
-    return without_mesh([replace(stem, flags=WHOLE if b == 0 else 0) for b, stem in enumerate(stems)])
-
-
-def without_mesh(stems: list[Stem]) -> Draft:
-    """A file of which only the hierarchy is decoded: the rest pose is the host's mesh, which is not there."""
-    count = sum(stem.count for stem in stems)
-    stream = write(rules.decode_hierarchy, hierarchy_script(stems), len(stems), count)
-    plan = rules.make_parts(rules.decode_hierarchy(stream, len(stems), count)[0])
-    levels, front = range(plan.height + 2), Plant([Stem(-1, 1)], mesh=np.zeros((1, 3), "<f4")).draft()
-    return (
-        replace(front, entries=front.entries[:3])
-        .with_header(vertex_count=count, branch_count=len(stems), level_count=len(levels), full_level_count=len(levels))
-        .change(HIERARCHY, content=stream)
-        .add(*(Entry(STEMS, b"", level, 0) for level in levels if rules.has_stems(plan, level)))
-        .add(*(Entry(AFFINES, b"", level, 0) for level in levels if rules.has_affines(plan, level, level)))
-    )
-
-
 for title, make in {
     "host-mesh-tall NEEDS_HOST_MESH 0: of a stem of 2^17 vertices among short ones only 2^16 count for how many "
     "others have": lambda: tall(1 << 17, *range(1, 17)),

@@ -76,11 +76,74 @@ def lossless_layers() -> Draft:
     )
 
 
+LOOSE_BEAMS = [*BEAMS[:3], Stem(0, 9, 30, LOOSE), Stem(-1, 70, lag=0)]
+
+
+def refinement(kind: int, title: str, content: bytes | Callable[[bytes], bytes], segment: int = 0) -> None:
+    """Other content for a chunk of level 3; a function gets what it has."""
+
+    def make() -> Draft:
+        draft = layered().draft()
+        made = content(draft.content(kind, 3, segment)) if callable(content) else content
+        return draft.change(kind, 3, segment, content=made)
+
+    invalid(f"refined-{KIND_NAMES[kind].lower().removeprefix('refined_')}-{title}", make, item=3)
+
+
+def scripted_refinement(place: tuple, title: str, *script) -> None:
+    """Another script for a stream of level 3, of which it is the last that is written."""
+    invalid(title, lambda: layered(2, scripts={place: list(script)}).draft(), item=3)
+
+
+def bad_rest_of_1(change: Callable[[bytes], dict] | None) -> Draft:
+    """Level 1 refines a rest pose that is exact, or by a chunk that is changed."""
+    if change is None:
+        exact = layered(3, (REFINED_REST, 3, 0), (REFINED_REST, 4, 0), rest=exact_rest(FORK, [0.5] * 15, False))
+        return exact.add(Entry(REFINED_REST, refined_rest_chunk(b""), 1))
+    draft = layered(scripts=LEVEL_1_REST).draft()
+    return draft.change(REFINED_REST, 1, **change(draft.content(REFINED_REST, 1)))
+
+
+def refined_run(count: int) -> bytes:
+    """The stream of a root of three vertices, the last two of which are a run with so many modes."""
+    branches = branches_of([Stem(-1, 3, lag=0)])
+    before = rules.Record(rest=[[0.0] * 3] * 3, rows={})
+    return write(rules.decode_rest, [0, 0, 0, count], branches, 0.0625, before)
+
+
+HALVED_RATIOS = (63000, 0.36065), (67000, 0.34967), (0.45, 0.5)
+
+
+class Turns(Chance):
+    """Two frequencies of each row, as large as it takes to turn by up to 360 degrees and back."""
+
+    def answer(self, asked: str, most: int):
+        if asked == "count":
+            return min(2, most)
+        return int(self.random.integers(-130, 131)) if asked == "signed" else super().answer(asked, most)
+
+
+STIFF = stems_of(  # in one, two or three layers, with others on them
+    "-1 4 rigid=1, 0 3 2 rigid=2, 1 2 1 LOOSE rigid=3, 2 3 0 rigid=3, 0 3 1 SHEET rigid=1, 4 2 0 rigid=2, -1 3 rigid=2"
+)
+
+
+def stiff(seed: int, **fields) -> Plant:
+    """STIFF in three layers, of which the first has rotations of any size."""
+    plant = refinements(STIFF, seed, large=5, is_float64=True, **fields)
+    plant.scripts |= {(STEMS, level): lambda level=level: Turns(seed + level) for level in range(5)}
+    return plant
+
+
+LAST_BASIS = 3, 2, basis_stream([[4800, -3200], [1232, 8176]])
+HALF_TURNS = (16, 0, 0), (0, 16, 0), (0, 0, 16), (16, 0, 1), (0, -16, 3)
+
+
 for title, make in {
     "layers-smallest: one vertex in two layers, all of it empty": lone(layers=2),
     "layers-eight: as many layers as there may be": refinements([Stem(-1, 2), Stem(0, 2, 1)], 31, layers=8),
-    "layers-two: a refinement of motion alone: the rest pose is that of the layer before, and no "
-    "piece has shapes": layered(2, (REFINED_REST, 3, 0), (SHAPES, 3, 0), (CORRECTIONS, 3)),
+    "layers-two: a refinement of motion alone: the rest pose is that of the layer before, and "
+    "no piece has shapes": layered(2, (REFINED_REST, 3, 0), (SHAPES, 3, 0), (CORRECTIONS, 3)),
     "layers-three: refinements with REFINED_REST, SHAPES and CORRECTIONS": layered(),
     "layers-rest-of-last: the second refinement refines the rest pose of the layer before the one before": layered(
         3, (REFINED_REST, 3, 0)
@@ -96,8 +159,8 @@ for title, make in {
         heads=learned(1)
     ),
     "layers-learned-all: learned time bases in all layers": layered(heads=learned(1, 2, 3, 4)),
-    "layers-learned-shared: learned time bases that begin with those of earlier layers: some with "
-    "further rows": layered(heads=LAYER_HEADS | SHARED_BASES),
+    "layers-learned-shared: learned time bases that begin with those of earlier layers: some "
+    "with further rows": layered(heads=LAYER_HEADS | SHARED_BASES),
     "layers-learned-apart: two roots of learned time bases: predictions of pieces of level 1 alone are of all "
     "frequencies": layered(
         heads=LAYER_HEADS | SHARED_BASES | {2: stems_head(0.5, 1, 3, 1, basis_stream([[192, 6336]]))}
@@ -163,12 +226,11 @@ for level_ in range(4):
         f"rest-of-level-1-upto-{level_}: level 1 refines the rest pose, and the file is shortened after level {level_}",
         lambda level=level_: layered(scripts=LEVEL_1_REST).upto(level),
     )
-valid(
-    "rest-of-level-1-of-point: the rest pose of level 0 is a point: its maps have no directions, those of level 1 have",
-    rest_by_level([Stem(-1, 3), Stem(0, 2, 1), Stem(1, 2, 1)], 41, points=[(0, 0, 0)] * 7),
-)
-LOOSE_BEAMS = [*BEAMS[:3], Stem(0, 9, 30, LOOSE), Stem(-1, 70, lag=0)]
 for title, make in {
+    "rest-of-level-1-of-point: the rest pose of level 0 is a point: its maps have no "
+    "directions, those of level 1 have": rest_by_level(
+        [Stem(-1, 3), Stem(0, 2, 1), Stem(1, 2, 1)], 41, points=[(0, 0, 0)] * 7
+    ),
     "rest-of-level-1-beams: runs of beams, loose stems, a root of two pieces and two roots": rest_by_level(
         LOOSE_BEAMS,
         42,
@@ -238,24 +300,6 @@ for name, why, plant in (
     ("of-one-layer", "Layer_Count is 1", Plant(FORK, scripts=LEVEL_1_REST)),
 ):
     table(f"refined-rest-1-{name}: REFINED_REST of level 1, though {why}", lambda plant=plant: plant.draft())
-
-
-def refinement(kind: int, title: str, content: bytes | Callable[[bytes], bytes], segment: int = 0) -> None:
-    """Other content for a chunk of level 3; a function gets what it has."""
-
-    def make() -> Draft:
-        draft = layered().draft()
-        made = content(draft.content(kind, 3, segment)) if callable(content) else content
-        return draft.change(kind, 3, segment, content=made)
-
-    invalid(f"refined-{KIND_NAMES[kind].lower().removeprefix('refined_')}-{title}", make, item=3)
-
-
-def scripted_refinement(place: tuple, title: str, *script) -> None:
-    """Another script for a stream of level 3, of which it is the last that is written."""
-    invalid(title, lambda: layered(2, scripts={place: list(script)}).draft(), item=3)
-
-
 refinement(STEMS, "ratio-0: Ratio is 0", lambda content: bytes(2) + content[2:])
 refinement(STEMS, "empty: STEMS of a refinement without bytes", b"")
 refinement(STEMS, "ratio-alone: nothing behind Ratio", b"\4\0")
@@ -311,27 +355,9 @@ for name, why, error, change in (
     invalid(
         f"refined-rest-1-{name}: REFINED_REST of level 1 {why}", lambda change=change: bad_rest_of_1(change), error, 1
     )
-
-
-def bad_rest_of_1(change: Callable[[bytes], dict] | None) -> Draft:
-    """Level 1 refines a rest pose that is exact, or by a chunk that is changed."""
-    if change is None:
-        exact = layered(3, (REFINED_REST, 3, 0), (REFINED_REST, 4, 0), rest=exact_rest(FORK, [0.5] * 15, False))
-        return exact.add(Entry(REFINED_REST, refined_rest_chunk(b""), 1))
-    draft = layered(scripts=LEVEL_1_REST).draft()
-    return draft.change(REFINED_REST, 1, **change(draft.content(REFINED_REST, 1)))
-
-
-def refined_run(count: int) -> bytes:
-    """The stream of a root of three vertices, the last two of which are a run with so many modes."""
-    branches = branches_of([Stem(-1, 3, lag=0)])
-    before = rules.Record(rest=[[0.0] * 3] * 3, rows={})
-    return write(rules.decode_rest, [0, 0, 0, count], branches, 0.0625, before)
-
-
 for title, make in {
-    "layers-shapes-of-many-modes: eight shapes of a piece of 18 modes, the last of which have rows "
-    "of their own": lambda: Plant(
+    "layers-shapes-of-many-modes: eight shapes of a piece of 18 modes, the last of which have "
+    "rows of their own": lambda: Plant(
         [Stem(-1, 18)],
         frames=3,
         layers=2,
@@ -395,85 +421,51 @@ for title, make in {
         scripts={(STEMS, level): lambda level=level: Chance(525 + level, large=6) for level in range(4)}
         | {(REFINED_REST, 3, 0): lambda: Chance(529, large=4, empty=0.0)},
     ),
+    "layers-rigid-ratios-near: steps of rotations are 63000 and 67000 times those of the next layer, and less than "
+    "half of them": lambda: Plant(
+        [Stem(-1, 3, rigid=2)],
+        frames=6,
+        segments=3,
+        layers=2,
+        is_float64=True,
+        points=[[0, 0, 0], [3, 0, 0], [1, 4, 0]],
+        heads={0: stems_head(0.125)}
+        | {
+            (2, s): stems_head(0.125 / ratio, 0, 3, 1, basis_stream([[int(size * 8192)] * 2]))
+            for s, (ratio, size) in enumerate(HALVED_RATIOS)
+        },
+        scripts={(STEMS, 0): [*row(), *row((1, -1, 1))]}
+        | {(STEMS, 2, s): [*row(), *refined_row((1, 0, 2))] for s in range(3)},
+    ),
+    "layers-rigid-turned: branches that move as they are, turned by up to 360 degrees, which the next layers go on "
+    "from": lambda: stiff(
+        217, frames=12, heads={level: stems_head(((8.0,) * 5 + (2.0, 0.5))[level], 3 << 4) for level in range(7)}
+    ),
+    "layers-rigid-ratios: the step of a rotation is over 65535 times that of the next layer, and that less than the "
+    "one of the last": lambda: stiff(
+        218,
+        frames=4,
+        segments=2,
+        heads={
+            **{level: stems_head(64.0, 2) for level in range(5)},
+            5: stems_head(1e-4, 0, *LAST_BASIS),
+            6: stems_head(1e-4, 2),
+        },
+    ),
+    "layers-rigid-half-turns: a branch that moves as it is, turned by 180 degrees about each of its axes: whose "
+    "quaternions begin with 0": lambda: Plant(
+        [Stem(-1, 4, rigid=1)],
+        frames=5,
+        segments=5,
+        layers=2,
+        is_float64=True,
+        rest=exact_rest([Stem(-1, 4)], [0.0, 0, 0, 2, 0, 0, 0, 3, 0, 0, 0, 5], True),
+        heads={0: stems_head(8.0, 4 << 4), 2: stems_head(0.25)},
+        scripts={(STEMS, 0, s): [*row(), *row(turn)] for s, turn in enumerate(HALF_TURNS)}
+        | {(STEMS, 2, s): [0, *refined_row((3, -5, 2))] for s in range(5)},
+    ),
 }.items():
     valid(title, make)
 
-HALVED_RATIOS = (63000, 0.36065), (67000, 0.34967), (0.45, 0.5)
-valid(
-    "layers-rigid-ratios-near: steps of rotations are 63000 and 67000 times those of the next layer, and less than "
-    "half of them",
-    Plant,
-    [Stem(-1, 3, rigid=2)],
-    frames=6,
-    segments=3,
-    layers=2,
-    is_float64=True,
-    points=[[0, 0, 0], [3, 0, 0], [1, 4, 0]],
-    heads={0: stems_head(0.125)}
-    | {
-        (2, s): stems_head(0.125 / ratio, 0, 3, 1, basis_stream([[int(size * 8192)] * 2]))
-        for s, (ratio, size) in enumerate(HALVED_RATIOS)
-    },
-    scripts={(STEMS, 0): [*row(), *row((1, -1, 1))]}
-    | {(STEMS, 2, s): [*row(), *refined_row((1, 0, 2))] for s in range(3)},
-)
 
-
-class Turns(Chance):
-    """Two frequencies of each row, as large as it takes to turn by up to 360 degrees and back."""
-
-    def answer(self, asked: str, most: int):
-        if asked == "count":
-            return min(2, most)
-        return int(self.random.integers(-130, 131)) if asked == "signed" else super().answer(asked, most)
-
-
-STIFF = stems_of(  # in one, two or three layers, with others on them
-    "-1 4 rigid=1, 0 3 2 rigid=2, 1 2 1 LOOSE rigid=3, 2 3 0 rigid=3, 0 3 1 SHEET rigid=1, 4 2 0 rigid=2, -1 3 rigid=2"
-)
-
-
-def stiff(seed: int, **fields) -> Plant:
-    """STIFF in three layers, of which the first has rotations of any size."""
-    plant = refinements(STIFF, seed, large=5, is_float64=True, **fields)
-    plant.scripts |= {(STEMS, level): lambda level=level: Turns(seed + level) for level in range(5)}
-    return plant
-
-
-valid(
-    "layers-rigid-turned: branches that move as they are, turned by up to 360 degrees, which the next layers go on "
-    "from",
-    lambda: stiff(
-        217, frames=12, heads={level: stems_head(((8.0,) * 5 + (2.0, 0.5))[level], 3 << 4) for level in range(7)}
-    ),
-)
-LAST_BASIS = 3, 2, basis_stream([[4800, -3200], [1232, 8176]])
-valid(
-    "layers-rigid-ratios: the step of a rotation is over 65535 times that of the next layer, and that less than the "
-    "one of the last",
-    stiff,
-    218,
-    frames=4,
-    segments=2,
-    heads={
-        **{level: stems_head(64.0, 2) for level in range(5)},
-        5: stems_head(1e-4, 0, *LAST_BASIS),
-        6: stems_head(1e-4, 2),
-    },
-)
-HALF_TURNS = (16, 0, 0), (0, 16, 0), (0, 0, 16), (16, 0, 1), (0, -16, 3)
-valid(
-    "layers-rigid-half-turns: a branch that moves as it is, turned by 180 degrees about each of its axes: whose "
-    "quaternions begin with 0",
-    Plant,
-    [Stem(-1, 4, rigid=1)],
-    frames=5,
-    segments=5,
-    layers=2,
-    is_float64=True,
-    rest=exact_rest([Stem(-1, 4)], [0.0, 0, 0, 2, 0, 0, 0, 3, 0, 0, 0, 5], True),
-    heads={0: stems_head(8.0, 4 << 4), 2: stems_head(0.25)},
-    scripts={(STEMS, 0, s): [*row(), *row(turn)] for s, turn in enumerate(HALF_TURNS)}
-    | {(STEMS, 2, s): [0, *refined_row((3, -5, 2))] for s in range(5)},
-)
 refinement(STEMS, "ratio-cut: STEMS of a refinement of 1 byte", b"\4")

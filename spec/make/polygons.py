@@ -65,25 +65,6 @@ def derived(type_: str) -> bytes:
 
 FACES_3 = np.array([[0, 1, 2], [2, 1, 4]], "<u2")
 EDGES_2 = np.array([[0, 1], [4, 3]], "<i8")
-valid(
-    "faces-and-edges: triangles and edges, in integers of different sizes",
-    lambda: with_static((FACES, polygons(FACES_3)), (EDGES, polygons(EDGES_2))),
-)
-valid("faces-of-any-width: faces of five columns", with_static, (FACES, polygons(np.array([[4, 3, 2, 1, 0]], "<i4"))))
-valid(
-    "faces-none: no faces: three columns, no rows, no data; edges without rows likewise",
-    lambda: with_static((FACES, polygons(np.zeros((0, 3), "|u1"))), (EDGES, polygons(np.zeros((0, 2), "<u4")))),
-)
-valid(
-    "edges-derived: edges that the hierarchy implies, in a file with permutations",
-    lambda: moving([Stem(-1, 3), Stem(0, 2, 1), Stem(-1, 1)], 61, vertex_source=[5, 0, 3, 1, 4, 2]).add(
-        Entry(EDGES, derived("<i2"))
-    ),
-)
-valid(
-    "edges-derived-least: as numbers of one byte; of one vertex there are none",
-    lambda: lone().add(Entry(EDGES, derived("|i1"))),
-)
 MANY_FACES = {  # of 119 vertices: those of BY_VERTEX
     "by chance": lambda: polygons(np.zeros((150, 3), "<i2"), 120, script=Chance(71)),
     "strip": lambda: polygons(np.array([[i, i + 1, i + 2] for i in range(118)], "<i4"), 120),
@@ -92,24 +73,6 @@ MANY_FACES = {  # of 119 vertices: those of BY_VERTEX
         [[(7 * i + k * k) % 120 for k in range((3, 4, 3, 5, 0, 1, 4, 2, 40)[i % 9])] for i in range(60)], 120
     ),
 }
-valid(
-    "faces-mixed: faces of 3, 4, 0, 1, 2 and 5 corners, numbers of one byte and of eight",
-    lambda: with_static(
-        (FACES, mixed_polygons([[0, 1, 2], [3, 2, 1, 0], [], [4], [4, 3], [0, 1, 2, 3, 4]], types=("<i8", "|i1")))
-    ),
-)
-valid(
-    "faces-mixed-alike: faces that could be of different sizes, but are triangles; attributes behind them",
-    lambda: with_static((FACES, mixed_polygons([[0, 1, 2], [2, 1, 4]]))).add(
-        Entry(ATTRIBUTE, numbers(np.arange(5.0), name="radius"))
-    ),
-)
-valid("faces-mixed-none: no faces of different sizes", lambda: with_static((FACES, mixed_polygons([]))))
-for name_, make_faces in MANY_FACES.items():
-    valid(
-        f"faces-many-{name_.replace(' ', '-')}: faces of 120 vertices: {name_}",
-        lambda make_faces=make_faces: with_rest(BY_VERTEX, coded_rest(BY_VERTEX, [])).add(Entry(FACES, make_faces())),
-    )
 
 
 def faces(content: bytes) -> Callable[[], Draft]:
@@ -120,6 +83,64 @@ def edges(content: bytes) -> Callable[[], Draft]:
     return lambda: with_static((EDGES, content))
 
 
+def recent(_: bytes) -> None:
+    """A triangle of vertex 0 and of the corner before that."""
+    coder, model = rules.RangeDecoder(b""), rules.PolygonModel()
+    decisions = [(model.guessed[1][0][0], 1), (model.guessed[1][1][2], 0), (model.is_recent[1], 1)]
+    node = 1
+    for bit in (0, 0, 0, 0, 1):
+        decisions.append((model.recent[1][node], bit))
+        node = node << 1 | bit
+    decisions.append((model.guessed[1][2][15], 1))
+    coder.script = Script(*(bit for _, bit in decisions))
+    for context, _ in decisions:
+        coder.bit(context)
+
+
+STRIPS = {
+    "up": [[i, i + 1, i + 2] for i in range(18)],
+    "down": [[i, i - 1, i - 2] for i in range(19, 1, -1)] + [[1, 0, 2], [3, 4, 0]],
+}
+
+
+def derived_edges(*counts: int) -> Draft:
+    return still([Stem(-1, count) for count in counts]).add(Entry(EDGES, derived("|i1")))
+
+
+for title, make in {
+    "faces-and-edges: triangles and edges, in integers of different sizes": lambda: with_static(
+        (FACES, polygons(FACES_3)), (EDGES, polygons(EDGES_2))
+    ),
+    "faces-of-any-width: faces of five columns": lambda: with_static(
+        (FACES, polygons(np.array([[4, 3, 2, 1, 0]], "<i4")))
+    ),
+    "faces-none: no faces: three columns, no rows, no data; edges without rows likewise": lambda: with_static(
+        (FACES, polygons(np.zeros((0, 3), "|u1"))), (EDGES, polygons(np.zeros((0, 2), "<u4")))
+    ),
+    "edges-derived: edges that the hierarchy implies, in a file with permutations": lambda: moving(
+        [Stem(-1, 3), Stem(0, 2, 1), Stem(-1, 1)], 61, vertex_source=[5, 0, 3, 1, 4, 2]
+    ).add(Entry(EDGES, derived("<i2"))),
+    "edges-derived-least: as numbers of one byte; of one vertex there are none": lambda: lone().add(
+        Entry(EDGES, derived("|i1"))
+    ),
+    "faces-mixed: faces of 3, 4, 0, 1, 2 and 5 corners, numbers of one byte and of eight": lambda: with_static(
+        (FACES, mixed_polygons([[0, 1, 2], [3, 2, 1, 0], [], [4], [4, 3], [0, 1, 2, 3, 4]], types=("<i8", "|i1")))
+    ),
+    "faces-mixed-alike: faces that could be of different sizes, but are triangles; attributes behind them": lambda: (
+        with_static((FACES, mixed_polygons([[0, 1, 2], [2, 1, 4]]))).add(
+            Entry(ATTRIBUTE, numbers(np.arange(5.0), name="radius"))
+        )
+    ),
+    "faces-mixed-none: no faces of different sizes": lambda: with_static((FACES, mixed_polygons([]))),
+}.items():
+    valid(title, make)
+
+
+for name_, make_faces in MANY_FACES.items():
+    valid(
+        f"faces-many-{name_.replace(' ', '-')}: faces of 120 vertices: {name_}",
+        lambda make_faces=make_faces: with_rest(BY_VERTEX, coded_rest(BY_VERTEX, [])).add(Entry(FACES, make_faces())),
+    )
 static("faces-empty: FACES without bytes", faces(b""))
 static("faces-short: FACES of 8 bytes", faces(polygon_head("<i4", 0, 3)[:8]))
 static("faces-mixed-short: FACES of 9 bytes with Is_Mixed", faces(polygon_head("<i4", 0, 0, "<i4")[:9]))
@@ -158,22 +179,6 @@ static(
     lambda: moving([Stem(-1, 64), Stem(-1, 64), Stem(-1, 2)], 2, frames=1).add(Entry(EDGES, derived("|i1"))),
 )
 static("edges-derived-with-data: data behind derived edges", edges(derived("<i4") + bytes(8)))
-
-
-def recent(_: bytes) -> None:
-    """A triangle of vertex 0 and of the corner before that."""
-    coder, model = rules.RangeDecoder(b""), rules.PolygonModel()
-    decisions = [(model.guessed[1][0][0], 1), (model.guessed[1][1][2], 0), (model.is_recent[1], 1)]
-    node = 1
-    for bit in (0, 0, 0, 0, 1):
-        decisions.append((model.recent[1][node], bit))
-        node = node << 1 | bit
-    decisions.append((model.guessed[1][2][15], 1))
-    coder.script = Script(*(bit for _, bit in decisions))
-    for context, _ in decisions:
-        coder.bit(context)
-
-
 valid("faces-none-widest: no faces of 2^26 corners each", lambda: with_static((FACES, polygon_head("<u4", 0, 1 << 26))))
 valid(
     "faces-of-most-corners: faces of as many corners as Count_Type holds",
@@ -194,10 +199,6 @@ static(
     "faces-recent-before-first: the second corner is the one before the first",
     lambda: with_static((FACES, polygon_head("<u4", 1, 3) + write(recent, []))),
 )
-STRIPS = {
-    "up": [[i, i + 1, i + 2] for i in range(18)],
-    "down": [[i, i - 1, i - 2] for i in range(19, 1, -1)] + [[1, 0, 2], [3, 4, 0]],
-}
 for name, strip in STRIPS.items():
     valid(
         f"faces-{name}-and-on: triangles {'up to the last vertex' if name == 'up' else 'down to vertex 0'}, beyond "
@@ -231,11 +232,6 @@ for title, make in {
     "edges-of-8-bytes-beyond: an edge to vertex 5 of 5": edges(polygons(np.array([[0, 5]], "<u8"))),
 }.items():
     static(title, make)
-
-
-def derived_edges(*counts: int) -> Draft:
-    return still([Stem(-1, count) for count in counts]).add(Entry(EDGES, derived("|i1")))
-
 
 valid(
     "edges-derived-127: derived edges of 128 vertices, the last of which is the largest number of |i1",

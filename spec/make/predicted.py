@@ -72,6 +72,75 @@ def swayed(frames: int, seed: int, stems: list[Stem] = ROOTED, **options) -> lis
     return [[0, 1, *frame_steps(stems, seed + t, **options)] for t in range(frames)]
 
 
+def swaying() -> Draft:
+    return predicted(ROOTED, swayed(3, 18), 2).draft()
+
+
+PREDICTED_PLACE = PREDICTED, 1, 1
+
+
+def with_source(draft: Draft, seed: int) -> Draft:
+    """A last level that is up to 2^22 numbers away from the one before it."""
+    file, level, chance = rules.open_file(draft.file()), draft.header["level_count"], Chance(seed, large=22)
+    plans = rules.shown_plans(file, level - 1)
+
+    def stream(s: int) -> bytes:
+        positions = rules.decode_segment(file, plans, s, level - 1)
+        differences = [chance.answer("signed", 0) for track in positions for x in track for _ in x]
+        return write(rules.decode_exact, [(abs(n), n < 0) for n in differences], positions, file.header.is_float64)
+
+    added = [Entry(EXACT, stream(s), level, s) for s in range(draft.header["segment_count"])]
+    joins_there = draft.joins and (*draft.joins, *joins(*(0,) * len(added)))
+    return replace(draft, joins=joins_there).with_header(level_count=level + 1, full_level_count=level + 1).add(*added)
+
+
+SOURCE_FRAMES = [  # with copies, of the frame before, of earlier ones and of the rest pose
+    [0, 1, *frame_steps(ROOTED, 150)],
+    [1, 1],
+    [0, 0, 1, *frame_steps(ROOTED, 151)],
+    [1, 0, 3],
+    [0, 1, *frame_steps(ROOTED, 152)],
+    [1, 0, 1],
+]
+
+
+def cells(seed: int) -> list[list[float]]:
+    """Places of vertices, each of them of two that are less or more than half a cell apart, or beyond all cells."""
+    random, cell = np.random.default_rng(seed), 0.0625 / 256
+    first = random.integers(-3000, 3000, (32, 3))
+    first[29:] *= 10**6
+    second = first + random.choice([-0.7, -0.4, 0.0, 0.0, 0.4], (32, 1)) * random.integers(0, 2, (32, 3))
+    return (cell * np.vstack([first, second])[np.argsort(random.random(64))]).tolist()
+
+
+PAIR, POINTS = [Stem(-1, 2, flags=WHOLE)], [Stem(-1, 1)] * 64
+LEAVING = [  # both ends of a stem, and those between them: a root that leaves binary32, and others that follow it
+    *([0, 1, 1, 20, 0, 1, 1, move, 1, 0, 0, 0, 0] for move in (20, 1, 0, 0, -1, 0, 0)),
+    *([0, 1, 1, 60, 3, 0, 1, 0, 1, move, 1] for move in (2, 0, 0, 1)),
+    *([0, 0, distance, 0, 1, 0, move, 0, 1] for distance, move in ((8, 1), (0, 2))),
+]
+
+
+def turns(seed: int) -> list:
+    """Frames of two vertices that move far, about late and about early ones."""
+    random = np.random.default_rng(seed)
+    return [
+        [0, 0, int(random.integers(0, min(t + 1, 6)) * (t % 3 == 2)), *frame_steps(PAIR, seed + t, large=9, still=0.2)]
+        for t in range(24)
+    ]
+
+
+RUNS_OF_COPIES = (3, 9, 8, 12, 7, 10, 6, 8, 9, 7, 11, 8, 0, 8, 1, 9)
+
+
+def in_runs() -> Plant:
+    """Each frame that is no copy is followed by so many copies."""
+    frames = []
+    for seed, copies in enumerate(RUNS_OF_COPIES):
+        frames += [[0, 1, *frame_steps(SINGLE, 500 + seed)], *[[1, 1]] * copies]
+    return predicted(SINGLE, frames)
+
+
 for title, make in {
     "predicted-still: nothing moves": lambda: predicted(ROOTED, [RESTING] * 3),
     "predicted-smallest: one vertex, one frame": lambda: predicted(SINGLE, [[0, 1]]),
@@ -137,12 +206,6 @@ for title, make in {
 }.items():
     valid(title, make)
 
-
-def swaying() -> Draft:
-    return predicted(ROOTED, swayed(3, 18), 2).draft()
-
-
-PREDICTED_PLACE = PREDICTED, 1, 1
 for title, make in {
     "predicted-missing BAD_CHUNK_TABLE: a segment has none": lambda: swaying().without(*PREDICTED_PLACE),
     "predicted-stems BAD_CHUNK_TABLE: a segment has STEMS too": lambda: swaying().add(Entry(STEMS, stems_head(), 1, 0)),
@@ -182,31 +245,6 @@ valid(
     "predicted-on-vertex-0: a stem on vertex 0, whose first vertex is no end",
     lambda: predicted([Stem(-1, 2, flags=WHOLE), Stem(0, 3, 0)], swayed(6, 510, [Stem(-1, 2), Stem(0, 3, 0)])),
 )
-
-
-def with_source(draft: Draft, seed: int) -> Draft:
-    """A last level that is up to 2^22 numbers away from the one before it."""
-    file, level, chance = rules.open_file(draft.file()), draft.header["level_count"], Chance(seed, large=22)
-    plans = rules.shown_plans(file, level - 1)
-
-    def stream(s: int) -> bytes:
-        positions = rules.decode_segment(file, plans, s, level - 1)
-        differences = [chance.answer("signed", 0) for track in positions for x in track for _ in x]
-        return write(rules.decode_exact, [(abs(n), n < 0) for n in differences], positions, file.header.is_float64)
-
-    added = [Entry(EXACT, stream(s), level, s) for s in range(draft.header["segment_count"])]
-    joins_there = draft.joins and (*draft.joins, *joins(*(0,) * len(added)))
-    return replace(draft, joins=joins_there).with_header(level_count=level + 1, full_level_count=level + 1).add(*added)
-
-
-SOURCE_FRAMES = [  # with copies, of the frame before, of earlier ones and of the rest pose
-    [0, 1, *frame_steps(ROOTED, 150)],
-    [1, 1],
-    [0, 0, 1, *frame_steps(ROOTED, 151)],
-    [1, 0, 3],
-    [0, 1, *frame_steps(ROOTED, 152)],
-    [1, 0, 1],
-]
 for name_, more_ in (("", {}), ("-wide", {"is_float64": True, "origin": (3.0, -1e3, 0.1)})):
     valid(
         f"predicted-lossless-repeats{name_}: the source's own numbers, which differ where predicted motion has copies, "
@@ -221,60 +259,24 @@ for name_, more_ in (("", {}), ("-wide", {"is_float64": True, "origin": (3.0, -1
             154,
         ),
     )
-
-
-def cells(seed: int) -> list[list[float]]:
-    """Places of vertices, each of them of two that are less or more than half a cell apart, or beyond all cells."""
-    random, cell = np.random.default_rng(seed), 0.0625 / 256
-    first = random.integers(-3000, 3000, (32, 3))
-    first[29:] *= 10**6
-    second = first + random.choice([-0.7, -0.4, 0.0, 0.0, 0.4], (32, 1)) * random.integers(0, 2, (32, 3))
-    return (cell * np.vstack([first, second])[np.argsort(random.random(64))]).tolist()
-
-
-PAIR, POINTS = [Stem(-1, 2, flags=WHOLE)], [Stem(-1, 1)] * 64
-valid(
-    "predicted-long: more frames than means are of, and more than vertices are of any line",
-    lambda: predicted(PAIR, swayed(200, 213, PAIR, large=5, still=0.1)),
-)
-valid(
-    "predicted-cells: vertices that follow others at the same places, unless the entry of their cell has been taken",
-    lambda: predicted(
+for title, make in {
+    "predicted-long: more frames than means are of, and more than vertices are of any line": lambda: predicted(
+        PAIR, swayed(200, 213, PAIR, large=5, still=0.1)
+    ),
+    "predicted-cells: vertices that follow others at the same places, unless the entry of their "
+    "cell has been taken": lambda: predicted(
         POINTS,
         swayed(3, 310, POINTS, large=6, still=0.2),
         rest=exact_rest(POINTS, np.array(cells(223)).ravel().tolist(), True),
         is_float64=True,
     ),
-)
-LEAVING = [  # both ends of a stem, and those between them: a root that leaves binary32, and others that follow it
-    *([0, 1, 1, 20, 0, 1, 1, move, 1, 0, 0, 0, 0] for move in (20, 1, 0, 0, -1, 0, 0)),
-    *([0, 1, 1, 60, 3, 0, 1, 0, 1, move, 1] for move in (2, 0, 0, 1)),
-    *([0, 0, distance, 0, 1, 0, move, 0, 1] for distance, move in ((8, 1), (0, 2))),
-]
-valid(
     "predicted-beyond: a root that leaves binary32: what is expected to go with it stays, and so does what follows "
-    "ends",
-    lambda: predicted([Stem(-1, 4, flags=WHOLE)], LEAVING, predicted=predicted_head(1e36)),
-)
-
-
-def turns(seed: int) -> list:
-    """Frames of two vertices that move far, about late and about early ones."""
-    random = np.random.default_rng(seed)
-    return [
-        [0, 0, int(random.integers(0, min(t + 1, 6)) * (t % 3 == 2)), *frame_steps(PAIR, seed + t, large=9, still=0.2)]
-        for t in range(24)
-    ]
-
-
-valid(
-    "predicted-turns: lines that begin anew in frames that are coded about earlier ones",
-    lambda: predicted(PAIR, turns(330)),
-)
-valid(
+    "ends": lambda: predicted([Stem(-1, 4, flags=WHOLE)], LEAVING, predicted=predicted_head(1e36)),
+    "predicted-turns: lines that begin anew in frames that are coded about earlier ones": lambda: predicted(
+        PAIR, turns(330)
+    ),
     "predicted-about-copies: frames that are coded about copies, about copies of copies, and about frames that were "
-    "coded about these",
-    lambda: predicted(
+    "coded about these": lambda: predicted(
         ROOTED,
         [
             *swayed(2, 320, still=0.1),
@@ -283,27 +285,19 @@ valid(
             *([1, 0, 6], [0, 0, 0, *frame_steps(ROOTED, 327, still=0.1)], *swayed(2, 328, still=0.1)),
         ],
     ),
-)
-valid(
-    "predicted-copied-rest: a copy of the rest pose, rounded as it is shown, which others are coded about",
-    predicted,
-    ROOTED,
-    [[1, 1], *swayed(2, 315, still=0.1), [1, 0, 3], *swayed(2, 317, still=0.1)],
-    origin=(1e6, -3e5, 0.125),
-    step=0.01,
-)
-RUNS_OF_COPIES = (3, 9, 8, 12, 7, 10, 6, 8, 9, 7, 11, 8, 0, 8, 1, 9)
+    "predicted-copied-rest: a copy of the rest pose, rounded as it is shown, which others are coded about": lambda: (
+        predicted(
+            ROOTED,
+            [[1, 1], *swayed(2, 315, still=0.1), [1, 0, 3], *swayed(2, 317, still=0.1)],
+            origin=(1e6, -3e5, 0.125),
+            step=0.01,
+        )
+    ),
+    "predicted-long-runs: runs of copied frames of up to 12, of which those from 7 on are alike": in_runs,
+}.items():
+    valid(title, make)
 
 
-def in_runs() -> Plant:
-    """Each frame that is no copy is followed by so many copies."""
-    frames = []
-    for seed, copies in enumerate(RUNS_OF_COPIES):
-        frames += [[0, 1, *frame_steps(SINGLE, 500 + seed)], *[[1, 1]] * copies]
-    return predicted(SINGLE, frames)
-
-
-valid("predicted-long-runs: runs of copied frames of up to 12, of which those from 7 on are alike", in_runs)
 invalid(
     "predicted-step-infinite BAD_CHUNK 1: Step is infinite",
     lambda: swaying().change(*PREDICTED_PLACE, content=predicted_head(INFINITY)),

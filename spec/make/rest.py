@@ -17,9 +17,39 @@ def with_rest(stems: list[Stem], rest: bytes, **fields) -> Plant:
     return Plant(stems, rest=rest, **fields)
 
 
-valid("rest-lag-65535: the largest Lag: no vertex is a row behind another", lambda: still([Stem(-1, 3, lag=65535)]))
 RUNS = [Stem(-1, 2, lag=0), Stem(0, 33, 1, lag=0), Stem(0, 32, 0, lag=0), Stem(-1, 1, lag=0)]
+
+
+def corrupted_rest(**fields) -> bytes:
+    return rest_chunk(fork().content(REST)[17:], **fields)
+
+
+def exact_of_fork(numbers_: list, is_float64: bool, **fields) -> bytes:
+    return exact_rest(FORK, numbers_, is_float64, **fields)
+
+
+INFINITE_BITS = {False: (0xFF << 23, False), True: (0x7FF << 52, False)}  # how far infinity is from 0.0
+
+
+BY_VERTEX = stems_of(  # every filter, phases within lags and across stems, rows of several vertices, a beam among them
+    "-1 30 lag=1, 0 12 3 lag=2, 0 12 4 lag=3, 2 14 5 SHEET lag=4, 0 40 9 SHEET lag=7, -1 9 lag=0, 5 3 2 lag=65535"
+)
+DETAILED = [  # finer and coarser than the step, the largest and the smallest, alike and unlike by lag
+    replace(stem, detail=detail) for stem, detail in zip(BY_VERTEX, (0, 121, 118, 0, 255, 110, 1))
+]
+
+
+def vertices_of_fork() -> bytes:
+    return coded_rest(FORK, Chance(37, large=4))
+
+
+LONE_POINTS = [Stem(-1, 1, lag=2), Stem(-1, 1, lag=2), Stem(-1, 1, lag=2, detail=100), Stem(-1, 1, lag=2, detail=100)]
+FAR_UNITS = [10**9, 495 * 10**6, 515 * 10**6]  # units in x, in y and z pairs of them
+LAGS = [Stem(-1, 12, lag=4), Stem(0, 17, 2, lag=5), Stem(0, 262, 4, SHEET, lag=256)]
+
+
 for title, make in {
+    "rest-lag-65535: the largest Lag: no vertex is a row behind another": lambda: still([Stem(-1, 3, lag=65535)]),
     "rest-beams: beams: runs of 1, 16 and 17 and of 32 vertices, from roots and from attach vertices": lambda: (
         with_rest(RUNS, coded_rest(RUNS, Chance(31, begin=[0])))
     ),
@@ -38,8 +68,8 @@ for title, make in {
     "rest-exact-wide: binary64 bit for bit, in a file whose positions are binary32": lambda: with_rest(
         [Stem(-1, 3)], exact_rest([Stem(-1, 3)], AWKWARD_DOUBLES, True, origin=(1.0, -0.0, FLOAT_TINY))
     ),
-    "rest-exact-predicted: exact numbers expected from vertices before; the expectation overflows "
-    "to infinity": lambda: with_rest(
+    "rest-exact-predicted: exact numbers expected from vertices before; the expectation "
+    "overflows to infinity": lambda: with_rest(
         [Stem(-1, 4), Stem(0, 3, 2)],
         exact_rest(
             [Stem(-1, 4), Stem(0, 3, 2)],
@@ -67,16 +97,6 @@ for title, make in {
 }.items():
     valid(title, make)
 
-
-def corrupted_rest(**fields) -> bytes:
-    return rest_chunk(fork().content(REST)[17:], **fields)
-
-
-def exact_of_fork(numbers_: list, is_float64: bool, **fields) -> bytes:
-    return exact_rest(FORK, numbers_, is_float64, **fields)
-
-
-INFINITE_BITS = {False: (0xFF << 23, False), True: (0x7FF << 52, False)}  # how far infinity is from 0.0
 prelude(REST, "empty: no bytes", b"")
 prelude(REST, "short: 16 bytes", lambda: corrupted_rest()[:16])
 prelude(REST, "method-0: bit 2 of Method is set", lambda: corrupted_rest(reserved=1) + b"\1")
@@ -107,55 +127,37 @@ invalid(
         REST, content=coded_rest([Stem(-1, 3, lag=0)], [0, 0, 0, 0, 3])
     ),
 )
-
-
-BY_VERTEX = stems_of(  # every filter, phases within lags and across stems, rows of several vertices, a beam among them
-    "-1 30 lag=1, 0 12 3 lag=2, 0 12 4 lag=3, 2 14 5 SHEET lag=4, 0 40 9 SHEET lag=7, -1 9 lag=0, 5 3 2 lag=65535"
-)
-valid(
-    "rest-vertices: vertices one by one",
-    lambda: with_rest(BY_VERTEX, coded_rest(BY_VERTEX, Chance(33, large=6), rest_type=1)),
-)
-valid(
-    "rest-vertices-phases: a lag of more vertices than there are phases",
-    lambda: with_rest([Stem(-1, 900, lag=300)], coded_rest([Stem(-1, 900, lag=300)], Chance(34, large=3))),
-)
-valid(
-    "rest-vertices-still: a rest pose without bytes, which is a point",
-    lambda: with_rest(BY_VERTEX, coded_rest(BY_VERTEX, [])),
-)
-valid(
-    "rest-vertices-vast: integers of 30 bits under the largest Rest_Step: weighted guesses are out of range",
-    lambda: with_rest(BY_VERTEX, coded_rest(BY_VERTEX, Chance(35, large=29), FLOAT_MAX)),
-)
-valid(
-    "rest-vertices-tiny: a subnormal Rest_Step",
-    lambda: with_rest(BY_VERTEX, coded_rest(BY_VERTEX, Chance(36, large=9), FLOAT_TINY)),
-)
-DETAILED = [  # finer and coarser than the step, the largest and the smallest, alike and unlike by lag
-    replace(stem, detail=detail) for stem, detail in zip(BY_VERTEX, (0, 121, 118, 0, 255, 110, 1))
-]
-valid(
-    "rest-detail: steps of branches of their own, of single vertices and of beams",
-    lambda: with_rest(DETAILED, coded_rest(DETAILED, Chance(37, large=6))),
-)
-
-
-def vertices_of_fork() -> bytes:
-    return coded_rest(FORK, Chance(37, large=4))
+for title, make in {
+    "rest-vertices: vertices one by one": lambda: with_rest(
+        BY_VERTEX, coded_rest(BY_VERTEX, Chance(33, large=6), rest_type=1)
+    ),
+    "rest-vertices-phases: a lag of more vertices than there are phases": lambda: with_rest(
+        [Stem(-1, 900, lag=300)], coded_rest([Stem(-1, 900, lag=300)], Chance(34, large=3))
+    ),
+    "rest-vertices-still: a rest pose without bytes, which is a point": lambda: with_rest(
+        BY_VERTEX, coded_rest(BY_VERTEX, [])
+    ),
+    "rest-vertices-vast: integers of 30 bits under the largest Rest_Step: weighted guesses are out of range": lambda: (
+        with_rest(BY_VERTEX, coded_rest(BY_VERTEX, Chance(35, large=29), FLOAT_MAX))
+    ),
+    "rest-vertices-tiny: a subnormal Rest_Step": lambda: with_rest(
+        BY_VERTEX, coded_rest(BY_VERTEX, Chance(36, large=9), FLOAT_TINY)
+    ),
+    "rest-detail: steps of branches of their own, of single vertices and of beams": lambda: with_rest(
+        DETAILED, coded_rest(DETAILED, Chance(37, large=6))
+    ),
+}.items():
+    valid(title, make)
 
 
 prelude(REST, "vertices-zero-behind: a zero byte behind single vertices", lambda: vertices_of_fork() + b"\0")
 prelude(REST, "vertices-bytes-behind: bytes behind single vertices", lambda: vertices_of_fork() + b"\1" * 12)
-LONE_POINTS = [Stem(-1, 1, lag=2), Stem(-1, 1, lag=2), Stem(-1, 1, lag=2, detail=100), Stem(-1, 1, lag=2, detail=100)]
-FAR_UNITS = [10**9, 495 * 10**6, 515 * 10**6]  # units in x, in y and z pairs of them
 valid(
     "rest-vertices-far: what is expected by the weights is 10^9 units, a little less, or more than is allowed",
     lambda: with_rest(
         LONE_POINTS, coded_rest(LONE_POINTS, [0, *FAR_UNITS, 0, 0, 0, *(-n for n in FAR_UNITS), 0, 0, 0], rest_type=1)
     ),
 )
-LAGS = [Stem(-1, 12, lag=4), Stem(0, 17, 2, lag=5), Stem(0, 262, 4, SHEET, lag=256)]
 valid(
     "rest-vertices-lags: lags of 4 and 5, of which one has filters by phase, and of 256, of which a phase has two "
     "vertices",

@@ -7,6 +7,18 @@ from collections.abc import Callable
 from spec.document import rules
 from spec.make.base import *
 
+
+def shapes(*script) -> Callable[[], bytes]:
+    def make() -> bytes:
+        plan = forked_plan()
+        return write(rules.decode_shapes, list(script), plan, rules.no_motion(plan, 1, False), 1)
+
+    return make
+
+
+LONE_STEMS = [Stem(-1, 3, rigid=1), Stem(-1, 3), Stem(-1, 3, flags=SHEET, rigid=1)]
+
+
 for title, make in {
     "shapes: learned shapes at base levels and at the levels that complete a piece, in both segments": fork,
     "shapes-high: as many shapes as there can be: of the first modes, then of the others": lambda: Plant(
@@ -49,15 +61,6 @@ for title, make in {
 }.items():
     valid(title, make)
 
-
-def shapes(*script) -> Callable[[], bytes]:
-    def make() -> bytes:
-        plan = forked_plan()
-        return write(rules.decode_shapes, list(script), plan, rules.no_motion(plan, 1, False), 1)
-
-    return make
-
-
 motion(SHAPES, 1, "too-many: a piece of three modes has ten shapes", shapes(10))
 motion(SHAPES, 1, "too-many-of-base: a piece whose base level has two modes has seven shapes there", shapes(0, 7))
 motion(SHAPES, 1, "all-zero: a shape is all 0", shapes(1, *row((0, 0, 0))))
@@ -72,7 +75,6 @@ invalid(
         scripts={(SHAPES, 0, 0): [6, *(n for i in range(6) for n in row((1, i, 0)))], (SHAPES, 1, 0): [4]},
     ),
 )
-LONE_STEMS = [Stem(-1, 3, rigid=1), Stem(-1, 3), Stem(-1, 3, flags=SHEET, rigid=1)]
 valid(
     "shapes-of-rigid: SHAPES of rigid stems, which have no modes: both levels have a number of shapes of each, 0",
     lambda: moving(

@@ -35,6 +35,26 @@ def bent_bush(script: list | Chance, rest: list | Chance, **fields) -> Plant:
     return still(BUSH, rest=reference, source_rest=bent(BUSH, script, reference), **fields)
 
 
+def source_rest(
+    title: str, content: bytes | Callable[[], bytes], plant: Callable[..., Plant] = forked, item: str = "rest"
+) -> None:
+    def make() -> Plant:
+        return plant(source_rest=content() if callable(content) else content)
+
+    invalid(f"source-rest-{title}", make, item=item)
+
+
+TWO = [Stem(-1, 2, lag=0)]
+ATTACHED_TO_0 = stems_of("-1 3 lag=0, 0 32 0 lag=0, 1 2 0 lag=0, 1 31 5 lag=0, -1 1 lag=0")
+
+
+def attached_rest(seed: int, reference_seed: int) -> Plant:
+    reference = coded_rest(ATTACHED_TO_0, Chance(reference_seed, large=9))
+    return still(
+        ATTACHED_TO_0, rest=reference, source_rest=bent(ATTACHED_TO_0, Chance(seed, large=6, empty=0.0), reference)
+    )
+
+
 for title, make in {
     "source-rest: a rest pose about the reference pose: beams of several runs, stems that are none, roots": lambda: (
         bent_bush(Chance(201, large=6), Chance(211, large=9))
@@ -69,16 +89,6 @@ for title, make in {
 }.items():
     valid(title, make)
 
-
-def source_rest(
-    title: str, content: bytes | Callable[[], bytes], plant: Callable[..., Plant] = forked, item: str = "rest"
-) -> None:
-    def make() -> Plant:
-        return plant(source_rest=content() if callable(content) else content)
-
-    invalid(f"source-rest-{title}", make, item=item)
-
-
 source_rest("empty: no bytes", b"")
 source_rest("method: Method 2", b"\2" + bytes(8))
 source_rest("short: 3 bytes of Rest_Step", bytes(4))
@@ -86,7 +96,6 @@ for what, value in (("zero", 0.0), ("negative", -1.0), ("nan", NAN), ("infinite"
     source_rest(f"step-{what}: Rest_Step is {value}", lambda value=value: source_rest_chunk(b"", value))
 source_rest("zero-behind: a zero byte behind the stream", lambda: bent(FORK, Chance(206)) + b"\0")
 source_rest("bytes-behind: bytes behind the stream", lambda: bent(FORK, Chance(206)) + b"\1" * 12)
-TWO = [Stem(-1, 2, lag=0)]
 source_rest(
     "frequencies: a run of one vertex codes two modes",
     lambda: bent(TWO, [0, 0, 0, 2], coded_rest(TWO, [])),
@@ -106,9 +115,6 @@ invalid(
     "source-rest-damaged BAD_CHECKSUM rest: a bit of SOURCE_REST is flipped",
     lambda: forked(source_rest=bent(FORK, Chance(206))).change(SOURCE_REST, checksum=0),
 )
-ATTACHED_TO_0 = stems_of("-1 3 lag=0, 0 32 0 lag=0, 1 2 0 lag=0, 1 31 5 lag=0, -1 1 lag=0")
-
-
 valid(
     "source-rest-attached-to-0: beams that hang on vertex 0, and on the first vertex of such; runs of 31 and 32; a "
     "root of one vertex",
@@ -118,10 +124,3 @@ valid(
     "source-rest-exact-no-bytes: the very numbers of the source by a stream of no bytes, whose decisions are all 1",
     lambda: still(FORK, source_rest=source_rest_chunk(b"", method=1)),
 )
-
-
-def attached_rest(seed: int, reference_seed: int) -> Plant:
-    reference = coded_rest(ATTACHED_TO_0, Chance(reference_seed, large=9))
-    return still(
-        ATTACHED_TO_0, rest=reference, source_rest=bent(ATTACHED_TO_0, Chance(seed, large=6, empty=0.0), reference)
-    )

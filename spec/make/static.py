@@ -102,6 +102,23 @@ WIND_FRAME = bytes.fromhex(
     "28b52ffd60c800ad020022451011a0ed1eed626666b605a3aadb6d42a28a6b759b222fa48e0e364efd01138aae2035fb"
     "a691439684d741439ee7d467ee9d9ba6e65e2cb76b7bb06c2fb6558b4b0305004e05f0d550b2ea0815558a6bb10205"
 )
+
+
+def static(title: str, make: Draft | Callable[[], Draft]) -> None:
+    invalid(title, make, item="static")
+
+
+def attribute(title: str, content: bytes) -> None:
+    static(f"attribute-{title}", lambda: attributes(content))
+
+
+FOUR = plain(bytes(16))
+
+
+def zstd_frame(title: str, body: bytes, size: int = 5) -> None:
+    attribute(f"zstd-{title}", array_chunk("|u1", (size,), body))
+
+
 for title, make in {
     "metadata-plain: METADATA as plain text, with white space around it": lambda: metadata(
         '\t\r\n {"unit": "m", "up_axis": "y", "more": [1, -0, 2.5e-3, true, false, null]} \n'
@@ -170,11 +187,6 @@ for title, make in {
 }.items():
     valid(title, make)
 
-
-def static(title: str, make: Draft | Callable[[], Draft]) -> None:
-    invalid(title, make, item="static")
-
-
 for name, why, text in (
     ("empty-text", "no text", b""),
     ("array", "an array, not an object", b"[1]"),
@@ -231,13 +243,6 @@ static("metadata-zstd-empty: a frame of no bytes", lambda: metadata(plain(b""), 
 static("metadata-zstd-none: no zstd frame", lambda: metadata("{}", 1))
 static("metadata-zstd-text: a frame whose text is no object", lambda: metadata(plain(b"[]"), 1))
 static("metadata-zstd-behind: a byte behind the frame", lambda: metadata(plain(b"{}") + b"\0", 1))
-
-
-def attribute(title: str, content: bytes) -> None:
-    static(f"attribute-{title}", lambda: attributes(content))
-
-
-FOUR = plain(bytes(16))
 attribute("short: seven bytes", array_chunk("<f4", ())[:7])
 attribute("shape-short: a chunk that ends in its Shape", array_chunk("<f4", (4,), name="")[:-1])
 attribute("name-short: a chunk that ends in its Name", array_chunk("<f4", ())[:-1])
@@ -275,12 +280,6 @@ attribute(
 )
 attribute("data-of-none: no elements, but data", array_chunk("<f4", (0,), plain(b"")))
 attribute("no-data: elements, but no data", array_chunk("<f4", (4,)))
-
-
-def zstd_frame(title: str, body: bytes, size: int = 5) -> None:
-    attribute(f"zstd-{title}", array_chunk("|u1", (size,), body))
-
-
 for title, make in {
     "none: no zstd frame": b"plant",
     "magic-alone: a frame that ends behind its magic number": ZSTD_MAGIC,

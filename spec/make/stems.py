@@ -10,6 +10,33 @@ from spec.document import rules
 from spec.make.base import *
 from spec.make.bases import basis
 
+NOT_A_NUMBER = [Stem(-1, 3), Stem(0, 2, 2), Stem(1, 1, 1, SHEET)]
+
+
+def stems(*head, **fields) -> Callable[[], bytes]:
+    """STEMS of level 1 with another head."""
+    return lambda: stems_head(*head, **fields) + fork().content(STEMS, 1, 0)[6:]
+
+
+def stems_motion(head: bytes, frames: int):
+    made = rules.no_motion(forked_plan(), frames, False)
+    rules.read_stems_head(head, made, 1)
+    return made
+
+
+def along_x(*places: float) -> list[list[float]]:
+    return [[x, 0.5 * (i % 2), 0.0] for i, x in enumerate(places)]
+
+
+class Counts(Chance):
+    """Rows of 20 to 40 frequencies, most of them of 30 and 31, and empty ones."""
+
+    def answer(self, asked: str, most: int):
+        if asked == "count":
+            return min(most, int(self.random.choice([0, 20, 29, 30, 30, 31, 31, 32, 40])))
+        return int(self.random.integers(-1, 2) * self.random.integers(0, 2))
+
+
 for title, make in {
     "smallest: one vertex, one frame, nothing moves": lone,
     "smallest-wide: the same with binary64 positions and rest pose": lambda: lone(is_float64=True),
@@ -100,26 +127,15 @@ for title, make in {
     "numbers-largest: integers at the ends of what a stream can hold": lambda: lone(
         frames=3, scripts={(STEMS, 0): row((2**30 - 1, 1 - 2**30, 0), (2**29, -1, 1), (2**20 + 1, 0, 9))}
     ),
-}.items():
-    valid(title, make)
-
-NOT_A_NUMBER = [Stem(-1, 3), Stem(0, 2, 2), Stem(1, 1, 1, SHEET)]
-valid(
-    "not-a-number: vertices at NaN, others hang on them",
-    lambda: Plant(
+    "not-a-number: vertices at NaN, others hang on them": lambda: Plant(
         NOT_A_NUMBER,
         2,
         heads={level: stems_head(FLOAT_MAX, 1) for level in range(4)},
         rest=exact_rest(NOT_A_NUMBER, (1e200 * np.array(grown(NOT_A_NUMBER, 4))).ravel().tolist(), True),
         scripts={(STEMS, level): lambda level=level: Chance(57 + level, empty=0.1, large=25) for level in range(4)},
     ),
-)
-
-
-def stems(*head, **fields) -> Callable[[], bytes]:
-    """STEMS of level 1 with another head."""
-    return lambda: stems_head(*head, **fields) + fork().content(STEMS, 1, 0)[6:]
-
+}.items():
+    valid(title, make)
 
 motion(STEMS, 1, "empty: no bytes", b"")
 motion(STEMS, 1, "short: 5 bytes", bytes(5))
@@ -147,18 +163,6 @@ motion(
     lambda: fork().content(STEMS, 2, 1) + b"\1" * 12,
     1,
 )
-
-
-def stems_motion(head: bytes, frames: int):
-    made = rules.no_motion(forked_plan(), frames, False)
-    rules.read_stems_head(head, made, 1)
-    return made
-
-
-def along_x(*places: float) -> list[list[float]]:
-    return [[x, 0.5 * (i % 2), 0.0] for i, x in enumerate(places)]
-
-
 valid(
     "gaps: distances along stems of under 1/4 to over 16 of their mean, of which 1 to 64 quarters are told apart",
     lambda: placed(
@@ -167,17 +171,6 @@ valid(
         131,
     ),
 )
-
-
-class Counts(Chance):
-    """Rows of 20 to 40 frequencies, most of them of 30 and 31, and empty ones."""
-
-    def answer(self, asked: str, most: int):
-        if asked == "count":
-            return min(most, int(self.random.choice([0, 20, 29, 30, 30, 31, 31, 32, 40])))
-        return int(self.random.integers(-1, 2) * self.random.integers(0, 2))
-
-
 valid(
     "rows-of-30: rows of 30 and 31 frequencies, which are expected differently",
     lambda: Plant([Stem(-1, 9)], frames=40, scripts={(STEMS, k): lambda k=k: Counts(511 + k) for k in (0, 1)}),

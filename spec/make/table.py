@@ -11,6 +11,31 @@ from spec.document import KIND_NAMES
 from spec.make.base import *
 from spec.make.static import attributes, element, metadata, numbers
 
+
+def swapped(i: int, j: int) -> Draft:
+    draft = fork()
+    entries = list(draft.entries)
+    entries[i], entries[j] = entries[j], entries[i]
+    return replace(draft, entries=tuple(entries))
+
+
+def moved(kind: int, **place: int) -> Draft:
+    """The last chunk of a kind, with another level or segment in the table."""
+    draft = fork()
+    i = max(i for i, entry in enumerate(draft.entries) if entry.kind == kind)
+    return replace(draft, entries=(*draft.entries[:i], replace(draft.entries[i], **place), *draft.entries[i + 1 :]))
+
+
+RADIUS = numbers(np.arange(5.0), name="radius")
+
+
+def segments_of_tables() -> Draft:
+    draft = lone().upto(0)
+    first, second, *others = draft.entries
+    count = (1 << 20) - len(draft.entries)
+    return replace(draft, entries=(second, first, *others)).with_header(frame_count=count, segment_count=count)
+
+
 valid(
     "kind-spelt: known Kinds by all their bits",
     lambda: fork().change(STEMS, 1, 1, spelt=True).change(AFFINES, 0, 0, spelt=True),
@@ -36,22 +61,6 @@ valid(
     lambda: fork().add(Entry(0x8009, FUTURE, checksum=0), Entry(0x8064, FUTURE, checksum=0)),
 )
 table("damaged BAD_CHECKSUM: a bit of the front stream is flipped", lambda: flipped(lone().file(), 30))
-
-
-def swapped(i: int, j: int) -> Draft:
-    draft = fork()
-    entries = list(draft.entries)
-    entries[i], entries[j] = entries[j], entries[i]
-    return replace(draft, entries=tuple(entries))
-
-
-def moved(kind: int, **place: int) -> Draft:
-    """The last chunk of a kind, with another level or segment in the table."""
-    draft = fork()
-    i = max(i for i, entry in enumerate(draft.entries) if entry.kind == kind)
-    return replace(draft, entries=(*draft.entries[:i], replace(draft.entries[i], **place), *draft.entries[i + 1 :]))
-
-
 for kind, level, why in (
     (0x0000, 255, "kind 0"),
     (0x0009, 255, "in the prelude"),
@@ -162,16 +171,6 @@ invalid(
     "table-before-rest BAD_CHUNK_TABLE: STEMS is missing and REST is damaged: the table comes first",
     lambda: fork().without(STEMS, 2, 1).change(REST, checksum=0),
 )
-RADIUS = numbers(np.arange(5.0), name="radius")
-
-
-def segments_of_tables() -> Draft:
-    draft = lone().upto(0)
-    first, second, *others = draft.entries
-    count = (1 << 20) - len(draft.entries)
-    return replace(draft, entries=(second, first, *others)).with_header(frame_count=count, segment_count=count)
-
-
 table(
     "one-chunk: Chunk_Count 1 is allowed, but chunks are missing",
     lambda: replace(lone().draft(), entries=lone().draft().entries[:1]),

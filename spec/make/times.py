@@ -8,6 +8,19 @@ from spec.document import rules
 from spec.make.base import *
 from spec.make.clips import two_clips
 
+
+def steady(first: float, step: float, method: int = 0) -> Callable[[], bytes]:
+    return lambda: steady_time(first, step, method)
+
+
+def clip_times(title: str, make: Callable[[], bytes]) -> None:
+    """TIME of the two clips."""
+    invalid(f"time-{title}", lambda: two_clips().change(TIME, content=make()))
+
+
+STEADY = (0.0, 0.25)
+
+
 valid("time-whole-rate: times by a whole rate", lambda: lone(frames=7, time=whole_rates(3)))
 valid("time-whole-step: times by a step that is one over a whole rate", lone, frames=7, time=whole_rates(49, method=4))
 valid("time-largest-rate: Rate 65535", lambda: lone(frames=7, time=whole_rates(65535)))
@@ -18,12 +31,6 @@ valid(
     lambda: lone(frames=6, time=uneven_time(-1e300, -1.0, -0.0, TINY, 1 / 3, HIGHEST)),
 )
 valid("time-one-uneven: a single time by Method 2", lambda: lone(time=uneven_time(1.5)))
-
-
-def steady(first: float, step: float, method: int = 0) -> Callable[[], bytes]:
-    return lambda: steady_time(first, step, method)
-
-
 prelude(TIME, "empty: no bytes", b"")
 prelude(TIME, "method-5: Method 5", lambda: whole_rates(1, method=5))
 for method in (3, 4):
@@ -60,14 +67,6 @@ invalid(
     "time-of-one-infinite: First of a single frame is infinite",
     lambda: lone().change(TIME, content=steady_time(INFINITY)),
 )
-
-
-def clip_times(title: str, make: Callable[[], bytes]) -> None:
-    """TIME of the two clips."""
-    invalid(f"time-{title}", lambda: two_clips().change(TIME, content=make()))
-
-
-STEADY = (0.0, 0.25)
 clip_times("of-one-clip: First and Step of one clip of two", lambda: steady_times(STEADY))
 clip_times("of-three-clips: First and Step of three clips where two are", lambda: steady_times(STEADY, STEADY, STEADY))
 clip_times("without-last-step: First of the second clip without its Step", lambda: steady_times(STEADY, STEADY)[:-8])

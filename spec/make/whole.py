@@ -75,9 +75,6 @@ def everything() -> Draft:
     )
 
 
-valid("everything: every kind of chunk, flag, method and stream in one file", everything)
-
-
 def encoded(name: str) -> bytes:
     """A small plant encoded by athcodec."""
     import athcodec
@@ -123,6 +120,7 @@ def encoded(name: str) -> bytes:
         return target.read_bytes()
 
 
+valid("everything: every kind of chunk, flag, method and stream in one file", everything)
 for name, why in (
     ("encoded-tree", "a small tree in wind"),
     ("encoded-wide", "binary64 positions"),
