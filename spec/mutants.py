@@ -32,7 +32,7 @@ import time
 import tomllib
 import types
 from collections import Counter, defaultdict
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
 from pathlib import Path
@@ -164,29 +164,11 @@ def as_line(node: ast.AST) -> str:
 
 # ---- what a node can be replaced by ------------------------------------------------------------------------
 
-OPERATORS: dict[type, list[type]] = {
-    ast.Add: [ast.Sub],
-    ast.Sub: [ast.Add],
-    ast.Mult: [ast.Add],
-    ast.Div: [ast.Mult],
-    ast.Mod: [ast.FloorDiv],
-    ast.LShift: [ast.RShift],
-    ast.RShift: [ast.LShift],
-    ast.BitAnd: [ast.BitOr],
-    ast.BitOr: [ast.BitAnd],
-    ast.BitXor: [ast.BitOr],
-    ast.Pow: [ast.Mult],
-    ast.Lt: [ast.LtE],
-    ast.LtE: [ast.Lt],
-    ast.Gt: [ast.GtE],
-    ast.GtE: [ast.Gt],
-    ast.Eq: [ast.NotEq],
-    ast.NotEq: [ast.Eq],
-    ast.In: [ast.NotIn],
-    ast.NotIn: [ast.In],
-    ast.Is: [ast.IsNot],
-    ast.IsNot: [ast.Is],
-}
+CHANGED_TO = (
+    "Add Sub, Sub Add, Mult Add, Div Mult, Mod FloorDiv, LShift RShift, RShift LShift, BitAnd BitOr, BitOr BitAnd, "
+    "BitXor BitOr, Pow Mult, Lt LtE, LtE Lt, Gt GtE, GtE Gt, Eq NotEq, NotEq Eq, In NotIn, NotIn In, Is IsNot, IsNot Is"
+)
+OPERATORS = {getattr(ast, old): getattr(ast, new) for old, new in map(str.split, CHANGED_TO.split(","))}
 SYMMETRIC = "times", "distance"  # functions of two arguments in any order
 SWAPPED = (ast.Sub, ast.Div, ast.FloorDiv, ast.Mod, ast.LShift, ast.RShift)
 NEGATED = {ast.Lt: ast.GtE, ast.LtE: ast.Gt, ast.Gt: ast.LtE, ast.GtE: ast.Lt}
@@ -194,10 +176,8 @@ NEGATED = {ast.Lt: ast.GtE, ast.LtE: ast.Gt, ast.Gt: ast.LtE, ast.GtE: ast.Lt}
 
 def replacements(node: ast.AST) -> Iterator[tuple[ast.AST, bool]]:
     """And whether it makes a difference for floats alone."""
-    makers = BY_TYPE.get(type(node), ())
-    for make in makers:
-        for made in make(node):
-            yield made if isinstance(made, tuple) else (made, False)
+    for made in BY_TYPE[type(node)](node) if type(node) in BY_TYPE else ():
+        yield made if isinstance(made, tuple) else (made, False)
     if is_condition(node):
         yield ast.Constant(True), False
         if not is_required(node):
@@ -262,7 +242,8 @@ def binary(node: ast.BinOp) -> Iterator[Any]:
     left, op, right = node.left, node.op, node.right
     if isinstance(getattr(left, "value", 0), (str, bytes)):
         return
-    yield from (ast.BinOp(left, new(), right) for new in OPERATORS.get(type(op), ()))
+    if type(op) in OPERATORS:
+        yield ast.BinOp(left, OPERATORS[type(op)](), right)
     if isinstance(op, SWAPPED):
         yield ast.BinOp(right, op, left)
     if isinstance(op, ast.FloorDiv):
@@ -286,12 +267,8 @@ def other_roundings(node: ast.BinOp) -> Iterator[ast.AST]:
     if isinstance(op, ast.Div) and not is_power_of_two(left) and not is_power_of_two(right):
         yield ast.BinOp(left, ast.Mult(), ast.BinOp(one, op, right))
     by_reciprocal = isinstance(op, ast.Mult) and isinstance(right, ast.BinOp) and isinstance(right.op, ast.Div)
-    if by_reciprocal and is_one(right.left):
+    if by_reciprocal and isinstance(right.left, ast.Constant) and right.left.value == 1.0:
         yield ast.BinOp(left, ast.Div(), right.right)
-
-
-def is_one(node: ast.AST) -> bool:
-    return isinstance(node, ast.Constant) and node.value == 1.0
 
 
 def is_power_of_two(node: ast.AST) -> bool:
@@ -301,7 +278,8 @@ def is_power_of_two(node: ast.AST) -> bool:
 
 
 def augmented(node: ast.AugAssign) -> Iterator[Any]:
-    yield from (ast.AugAssign(node.target, new(), node.value) for new in OPERATORS.get(type(node.op), ()))
+    if type(node.op) in OPERATORS:
+        yield ast.AugAssign(node.target, OPERATORS[type(node.op)](), node.value)
     yield ast.Pass()
 
 
@@ -309,8 +287,8 @@ def compared(node: ast.Compare) -> Iterator[Any]:
     if chooses_one_of_them(node):  # which are the same where they are equal
         return
     for i, op in enumerate(node.ops):
-        for new in OPERATORS[type(op)]:
-            yield ast.Compare(node.left, [*node.ops[:i], new(), *node.ops[i + 1 :]], node.comparators)
+        ops = [*node.ops[:i], OPERATORS[type(op)](), *node.ops[i + 1 :]]
+        yield ast.Compare(node.left, ops, node.comparators)
     if len(node.ops) > 1:
         yield ast.Compare(node.left, node.ops[:-1], node.comparators[:-1])
         yield ast.Compare(node.comparators[0], node.ops[1:], node.comparators[1:])
@@ -375,20 +353,10 @@ def missing_expression(node: ast.Expr) -> Iterator[Any]:
         yield ast.Pass()
 
 
-BY_TYPE: dict[type, tuple] = {
-    ast.Constant: (constants,),
-    ast.BinOp: (binary,),
-    ast.AugAssign: (augmented,),
-    ast.Compare: (compared,),
-    ast.BoolOp: (joined,),
-    ast.UnaryOp: (unary,),
-    ast.Call: (called,),
-    ast.Continue: (missing,),
-    ast.Break: (missing,),
-    ast.Assign: (missing,),
-    ast.Raise: (missing,),
-    ast.Return: (missing_return,),
-    ast.Expr: (missing_expression,),
+BY_TYPE: dict[type, Callable[[Any], Iterator[Any]]] = {
+    ast.Constant: constants, ast.BinOp: binary, ast.AugAssign: augmented, ast.Compare: compared, ast.BoolOp: joined,
+    ast.UnaryOp: unary, ast.Call: called, ast.Return: missing_return, ast.Expr: missing_expression,
+    **dict.fromkeys((ast.Continue, ast.Break, ast.Assign, ast.Raise), missing),
 }
 
 

@@ -290,10 +290,7 @@ class FrontScript:
     def __init__(self, counts: dict):
         self.counts = counts
         self.values = [
-            counts["vertex_count"] - 1,
-            counts["branch_count"] - 1,
-            counts["frame_count"] - 1,
-            counts["segment_count"] - 1,
+            *(counts[f"{name}_count"] - 1 for name in ("vertex", "branch", "frame", "segment")),
             counts["full_level_count"] - 2,
             counts["full_level_count"] - counts["level_count"],
             counts["clip_count"] - 1,
@@ -473,9 +470,11 @@ def hierarchy_script(stems: list[Stem], branch_source: list | None = None, verte
             last_place[stem.parent] = stem.place
     return (
         script
-        + numbers_script([(stem.lag, stem.rigid) for stem in stems])
-        + numbers_script([(stem.lag, stem.detail) for stem in stems])
-        + numbers_script([(stem.lag, stem.ring) for stem in stems])
+        + [
+            n
+            for name in ("rigid", "detail", "ring")
+            for n in numbers_script([(s.lag, getattr(s, name)) for s in stems])
+        ]
         + permutation_script(branch_source, stems, False)
         + permutation_script(vertex_source, stems, True, branch_source)
     )

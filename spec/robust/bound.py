@@ -30,21 +30,8 @@ from spec.robust import Row
 
 HIERARCHIES = ("random", "chain", "bush", "roots", "one")
 RESTS = ("grown", "unrelated", "point", "line", "plane", "lattice", "scales")
-ACTIONS = (
-    "spike",
-    "flicker",
-    "step",
-    "explode",
-    "collapse",
-    "shuffle",
-    "walk",
-    "lattice",
-    "leave",
-    "mirror",
-    "flatten",
-    "noise",
-    "spin",
-    "swap axes",
+ACTIONS = tuple(
+    "spike,flicker,step,explode,collapse,shuffle,walk,lattice,leave,mirror,flatten,noise,spin,swap axes".split(",")
 )
 
 
