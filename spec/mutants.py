@@ -354,8 +354,15 @@ def missing_expression(node: ast.Expr) -> Iterator[Any]:
 
 
 BY_TYPE: dict[type, Callable[[Any], Iterator[Any]]] = {
-    ast.Constant: constants, ast.BinOp: binary, ast.AugAssign: augmented, ast.Compare: compared, ast.BoolOp: joined,
-    ast.UnaryOp: unary, ast.Call: called, ast.Return: missing_return, ast.Expr: missing_expression,
+    ast.Constant: constants,
+    ast.BinOp: binary,
+    ast.AugAssign: augmented,
+    ast.Compare: compared,
+    ast.BoolOp: joined,
+    ast.UnaryOp: unary,
+    ast.Call: called,
+    ast.Return: missing_return,
+    ast.Expr: missing_expression,
     **dict.fromkeys((ast.Continue, ast.Break, ast.Assign, ast.Raise), missing),
 }
 

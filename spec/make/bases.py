@@ -2,11 +2,6 @@
 
 from __future__ import annotations
 
-import struct
-from collections.abc import Callable
-
-import numpy as np
-
 from spec.make.base import *
 from spec.make.clips import periodic
 from spec.make.predicted import SINGLE

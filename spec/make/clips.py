@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from spec.make.base import *
 
 CALM, STORM = Clip(3, 1, "calm"), Clip(4, 2, "storm")

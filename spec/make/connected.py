@@ -2,11 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
-import numpy as np
-
-from spec.document import rules
 from spec.make.base import *
 from spec.make.polygons import FACES_3, MANY_FACES, derived, mixed_polygons, polygons
 from spec.make.rest import BY_VERTEX, coded_rest, with_rest

@@ -3,10 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
-from dataclasses import replace
-
-import numpy as np
 
 from spec.document import rules, section
 from spec.make.base import *

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from spec.make.base import *
 from spec.make.clips import loop
 from spec.make.predicted import ROOTED, predicted, swayed

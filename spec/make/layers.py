@@ -2,12 +2,6 @@
 
 from __future__ import annotations
 
-import struct
-from collections.abc import Callable
-
-import numpy as np
-
-from spec.document import KIND_NAMES, rules
 from spec.make.base import *
 from spec.make.bases import basis_by_chance
 from spec.make.clips import loop, periodic

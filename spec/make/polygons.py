@@ -2,12 +2,6 @@
 
 from __future__ import annotations
 
-import struct
-from collections.abc import Callable
-
-import numpy as np
-
-from spec.document import rules
 from spec.make.base import *
 from spec.make.rest import BY_VERTEX, coded_rest, with_rest
 from spec.make.static import numbers, static, with_static

@@ -2,14 +2,6 @@
 
 from __future__ import annotations
 
-import math
-import struct
-from collections.abc import Callable
-from dataclasses import replace
-
-import numpy as np
-
-from spec.document import rules
 from spec.make.base import *
 
 ROOTED = [Stem(-1, 4, flags=WHOLE), Stem(0, 3, 2), Stem(1, 2, 2), Stem(0, 3, 3)]

@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
-import numpy as np
-
 from spec.make.base import *
 from spec.make.clips import periodic
 from spec.make.joins import joined

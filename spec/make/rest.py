@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from spec.document import rules
 from spec.make.base import *
 
 AWKWARD_FLOATS = [-0.0, FLOAT_TINY, -FLOAT_MAX, FLOAT_MAX, 1.0, -1e-40, 0.0, 1 + 2**-23, -1.0]

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
-from spec.document import rules
 from spec.make.base import *
 
 

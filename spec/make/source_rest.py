@@ -2,12 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import replace
-
-import numpy as np
-
-from spec.document import rules
 from spec.make.base import *
 from spec.make.layers import layered
 from spec.make.rest import AWKWARD_DOUBLES, AWKWARD_FLOATS, INFINITE_BITS, coded_rest, exact_of_fork

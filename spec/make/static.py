@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-import struct
-from collections.abc import Callable, Sequence
-
-import numpy as np
 import zstandard
 
 from spec.make.base import *

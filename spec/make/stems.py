@@ -2,11 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
-import numpy as np
-
-from spec.document import rules
 from spec.make.base import *
 from spec.make.bases import basis
 

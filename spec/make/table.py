@@ -2,12 +2,6 @@
 
 from __future__ import annotations
 
-import struct
-from dataclasses import replace
-
-import numpy as np
-
-from spec.document import KIND_NAMES
 from spec.make.base import *
 from spec.make.static import attributes, element, metadata, numbers
 

@@ -2,11 +2,6 @@
 
 from __future__ import annotations
 
-import math
-from dataclasses import replace
-
-import numpy as np
-
 from spec.make.base import *
 
 RIGID = [replace(stem, rigid=q % 4, detail=q % 3 * 120) for q, stem in enumerate(MIXED)]

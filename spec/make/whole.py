@@ -5,8 +5,6 @@ from __future__ import annotations
 import tempfile
 from pathlib import Path
 
-import numpy as np
-
 from spec import real_size
 from spec.make.base import *
 from spec.make.bases import basis_by_chance
