@@ -1,4 +1,4 @@
-"""Vectors and how they are declared, the files that most others are derived from, and the names that all modules use."""
+"""Vectors and how they are declared, files that others are derived from, and the names that all modules use."""
 
 from __future__ import annotations
 
