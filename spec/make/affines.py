@@ -1,7 +1,5 @@
 """AFFINES: maps of nodes."""
 
-from __future__ import annotations
-
 from spec.make.base import *
 
 

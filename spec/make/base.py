@@ -1,7 +1,5 @@
 """Vectors and how they are declared, files that others are derived from, and the names that all modules use."""
 
-from __future__ import annotations
-
 import math
 import sys
 from collections.abc import Callable, Sequence

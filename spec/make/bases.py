@@ -1,7 +1,5 @@
 """Waves over time and learned bases."""
 
-from __future__ import annotations
-
 from spec.make.base import *
 from spec.make.clips import periodic
 from spec.make.predicted import SINGLE

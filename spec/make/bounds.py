@@ -1,7 +1,5 @@
 """Numbers just above and below those that rules compare with."""
 
-from __future__ import annotations
-
 from spec.make.base import *
 from spec.make.predicted import predicted, swayed
 

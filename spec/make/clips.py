@@ -1,7 +1,5 @@
 """CLIPS: several motions, loops, periodic waves."""
 
-from __future__ import annotations
-
 from spec.make.base import *
 
 CALM, STORM = Clip(3, 1, "calm"), Clip(4, 2, "storm")

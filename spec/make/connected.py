@@ -1,7 +1,5 @@
 """REST: connected rest poses, which follow FACES."""
 
-from __future__ import annotations
-
 from spec.make.base import *
 from spec.make.polygons import FACES_3, MANY_FACES, derived, mixed_polygons, polygons
 from spec.make.rest import BY_VERTEX, coded_rest, with_rest

@@ -1,7 +1,5 @@
 """REST: copies of shapes."""
 
-from __future__ import annotations
-
 from spec.make.base import *
 from spec.make.rest import coded_rest, with_rest
 

@@ -1,7 +1,5 @@
 """CORRECTIONS."""
 
-from __future__ import annotations
-
 from spec.make.base import *
 
 

@@ -1,7 +1,5 @@
 """EXACT: the source's own numbers."""
 
-from __future__ import annotations
-
 from spec.make.base import *
 
 

@@ -1,7 +1,5 @@
 """Header, counts, error table, and files that end early."""
 
-from __future__ import annotations
-
 import re
 
 from spec.document import rules, section

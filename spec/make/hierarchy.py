@@ -1,7 +1,5 @@
 """HIERARCHY: branches, permutations."""
 
-from __future__ import annotations
-
 from spec.make.base import *
 
 BLADES = [Stem(-1, 3), Stem(-1, 4), Stem(-1, 2), Stem(-1, 3)]

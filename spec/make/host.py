@@ -1,7 +1,5 @@
 """REST: the host's mesh as the rest pose."""
 
-from __future__ import annotations
-
 from spec.make.base import *
 from spec.make.layers import layered
 from spec.make.rest import AWKWARD_FLOATS

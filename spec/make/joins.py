@@ -1,7 +1,5 @@
 """Joins of segments."""
 
-from __future__ import annotations
-
 from spec.make.base import *
 from spec.make.clips import loop
 from spec.make.predicted import ROOTED, predicted, swayed

@@ -1,7 +1,5 @@
 """Layers: refined stems, shapes and rest poses."""
 
-from __future__ import annotations
-
 from spec.make.base import *
 from spec.make.bases import basis_by_chance
 from spec.make.clips import loop, periodic

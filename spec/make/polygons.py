@@ -1,7 +1,5 @@
 """FACES and EDGES."""
 
-from __future__ import annotations
-
 from spec.make.base import *
 from spec.make.rest import BY_VERTEX, coded_rest, with_rest
 from spec.make.static import numbers, static, with_static

@@ -1,7 +1,5 @@
 """PREDICTED: motion without modes."""
 
-from __future__ import annotations
-
 from spec.make.base import *
 
 ROOTED = [Stem(-1, 4, flags=WHOLE), Stem(0, 3, 2), Stem(1, 2, 2), Stem(0, 3, 3)]

@@ -1,7 +1,5 @@
 """Repeats of frames."""
 
-from __future__ import annotations
-
 from spec.make.base import *
 from spec.make.clips import periodic
 from spec.make.joins import joined

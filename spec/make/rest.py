@@ -1,7 +1,5 @@
 """REST: the reference pose by steps, beams and exact numbers."""
 
-from __future__ import annotations
-
 from spec.make.base import *
 
 AWKWARD_FLOATS = [-0.0, FLOAT_TINY, -FLOAT_MAX, FLOAT_MAX, 1.0, -1e-40, 0.0, 1 + 2**-23, -1.0]

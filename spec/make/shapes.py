@@ -1,7 +1,5 @@
 """SHAPES: learned shapes."""
 
-from __future__ import annotations
-
 from spec.make.base import *
 
 

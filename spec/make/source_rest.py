@@ -1,7 +1,5 @@
 """SOURCE_REST: a rest pose beside the reference pose."""
 
-from __future__ import annotations
-
 from spec.make.base import *
 from spec.make.layers import layered
 from spec.make.rest import AWKWARD_DOUBLES, AWKWARD_FLOATS, INFINITE_BITS, coded_rest, exact_of_fork

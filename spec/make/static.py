@@ -1,7 +1,5 @@
 """METADATA and ATTRIBUTE, and their zstd frames."""
 
-from __future__ import annotations
-
 import zstandard
 
 from spec.make.base import *

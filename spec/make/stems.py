@@ -1,7 +1,5 @@
 """STEMS: pieces, their modes, sheets, tangents."""
 
-from __future__ import annotations
-
 from spec.make.base import *
 from spec.make.bases import basis
 

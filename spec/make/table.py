@@ -1,7 +1,5 @@
 """The chunk table and chunks that are skipped, missing or damaged."""
 
-from __future__ import annotations
-
 from spec.make.base import *
 from spec.make.static import attributes, element, metadata, numbers
 

@@ -1,7 +1,5 @@
 """TIME."""
 
-from __future__ import annotations
-
 from spec.make.base import *
 from spec.make.clips import two_clips
 

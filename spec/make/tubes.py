@@ -1,7 +1,5 @@
 """Tubes and rigid branches."""
 
-from __future__ import annotations
-
 from spec.make.base import *
 
 RIGID = [replace(stem, rigid=q % 4, detail=q % 3 * 120) for q, stem in enumerate(MIXED)]

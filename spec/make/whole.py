@@ -1,7 +1,5 @@
 """All features in one file, what the encoder writes, and the same rules in binary64."""
 
-from __future__ import annotations
-
 import tempfile
 from pathlib import Path
 
