@@ -446,6 +446,7 @@ class Cache:
     known: dict[str, Known] = field(default_factory=dict)  # by the name of the vector
     floats: set[int] = field(default_factory=set)  # numbers of expressions
     fates: dict[str, str] = field(default_factory=dict)  # of changes
+    missed: dict[str, float] = field(default_factory=dict)  # Seconds of all these vectors that a change was tried with.
 
     @staticmethod
     def of(tree: ast.Module) -> Cache:
@@ -472,6 +473,8 @@ def measure(changes: Changes, cache: Cache) -> list[Known]:
 
     marked = Marked({mutant.of_floats for mutant in changes.mutants}).visit(copy.deepcopy(changes.tree))
     parts = [compiled(node) for node in marked.body] if missing else []
+    if missing:
+        cache.missed.clear()
     for vector in missing:
         ran.clear()
         rules = document.run(parts, _ran=ran, _typed=typed)
@@ -495,8 +498,10 @@ class Run:
         self.lately: dict[str, list[str]] = defaultdict(list)  # of a function: vectors that caught changes, last first
 
     def all(self, mutants: list[Mutant], jobs: int) -> dict[str, str]:
-        """What becomes of each change; what is known to be caught is not tried again."""
-        waiting = [mutant for mutant in mutants if self.cache.fates.get(mutant.name, MISSED) == MISSED][::-1]
+        """Return what becomes of each change. What is known to be caught, or missed for as long, is not tried again."""
+        caught = {name for name, fate in self.cache.fates.items() if fate != MISSED}
+        known = caught | {name for name, seconds in self.cache.missed.items() if seconds >= self.seconds}
+        waiting = [mutant for mutant in mutants if mutant.name not in known][::-1]
         running, told = {}, time.monotonic()
         while waiting or running:
             while waiting and len(running) < jobs:
@@ -552,6 +557,8 @@ class Run:
 
     def _note(self, mutant: Mutant, fate: str) -> None:
         self.cache.fates[mutant.name] = fate
+        if fate == MISSED:
+            self.cache.missed[mutant.name] = self.seconds
         if fate.startswith("result of "):
             name, names = fate.removeprefix("result of "), self.lately[mutant.function]
             if name in names:
