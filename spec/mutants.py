@@ -51,6 +51,7 @@ SECONDS, TIMES_AS_LONG = 1.0, 10.0  # of the processor, for a vector; and how ma
 MEMORY = 3 << 30
 NOT_CHANGED = (ast.operator, ast.unaryop, ast.boolop, ast.cmpop, ast.expr_context)
 MISSED = "missed"
+UNEXPLAINED = "*Unexplained.* A vector that is slower than the seconds above may tell these changes, or none does."
 
 
 # ---- changes -----------------------------------------------------------------------------------------------
@@ -606,7 +607,7 @@ def as_markdown(drawn: dict[str, str], changes: int, how: str, vectors: int, sec
     for name, fate in drawn.items():
         if fate == MISSED:
             reason = next((reason for reason in known if reason.matches(name)), None)
-            survivors[reason.sentence if reason else "Nobody has looked at these changes yet."].append(name)
+            survivors[reason.sentence if reason else UNEXPLAINED].append(name)
     caught = len(drawn) - fates[MISSED]
     lines = [
         "# Mistakes that the vectors find",
