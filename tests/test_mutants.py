@@ -21,7 +21,6 @@ CAUGHT = {  # a change, and a vector that tells it
     "tridiagonalise: continue -> pass": "rigid-diagonal",
     "append_orthonormal: if after > before * keep -> if True": "sheet-mode-below",
     "attach_frame: if not squared(tangent) > 1e-200 -> if not squared(tangent) > 1.0625e-200": "tangent-short-above",
-    "attach_frame: if not squared(tangent) > 1e-200 -> if not squared(tangent) > 9.375e-201": "tangent-short-below",
     "RangeDecoder.narrow: if self.range < 1 << 32 -> if self.range < 1 << 31": "smallest",
 }
 
