@@ -51,7 +51,7 @@ from typing import Any
 import numpy as np
 
 import athcodec
-from athcodec import container as ct
+from athcodec.decoding import container as ct
 from athcodec.options import DEFAULT_SEGMENT, LADDERS
 from bench.clips import add_effort, add_rel_error, add_source
 from bench.decode import compile_program

@@ -14,8 +14,9 @@ from pathlib import Path
 from typing import Any
 
 import athcodec
-from athcodec.ath import Thresholds, survey
-from athcodec.hierarchy import hierarchy_of
+from athcodec.encoding.survey import survey
+from athcodec.motion.hierarchy import hierarchy_of
+from athcodec.motion.thresholds import Thresholds
 from bench.clips import measure
 from bench.data import SAMPLE
 from bench.decode import Case, compile_program, memory_rows

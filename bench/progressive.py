@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any
 
 import athcodec
-from athcodec import container as ct
+from athcodec.decoding import container as ct
 from athcodec.encoding import Draft, code_segments, draft, write
 from athcodec.encoding.job import EncodingJob
 from athcodec.encoding.progress import silent

@@ -18,7 +18,7 @@ from plants import plant
 import athcodec
 from athcodec import encoding
 from athcodec._native import crc32c
-from athcodec.container import KIND_NAMES
+from athcodec.decoding.container import KIND_NAMES
 from athcodec.encoding.features import Feature
 from athcodec.encoding.segment import SAMPLED
 

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 
 import athcodec
-from athcodec.ath import Thresholds
 from athcodec.errors import BoundError
+from athcodec.motion.thresholds import Thresholds
 from bench.codecs import Source
 from bench.codecs.program import CannotKeep
 

@@ -12,8 +12,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from athcodec.ath import Ath, Thresholds, stem_maps, survey
-from athcodec.hierarchy import Hierarchy
+from athcodec.encoding.survey import Ath, survey
+from athcodec.motion.affine_fit import stem_maps
+from athcodec.motion.hierarchy import Hierarchy
+from athcodec.motion.thresholds import Thresholds
 from bench.codecs import Source
 from bench.codecs.baseline import Baseline, Choice, Ladder, Settings, Split, quantised
 from bench.codecs.coder import Reader, Writer
