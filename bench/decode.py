@@ -188,13 +188,13 @@ class Case:
         return lines
 
 
-def compile_program(folder: Path, name: str = "decode") -> Path:
-    """Compiles NAME.c of this folder with the decoder's sources and flags of CMakeLists.txt."""
+def compile_program(folder: Path) -> Path:
+    """Compiles decode.c with the decoder's sources and flags of CMakeLists.txt."""
     sources = re.search(r"set\(ATH_DECODER_SOURCES\s+([^)]*)\)", (CORE / "CMakeLists.txt").read_text())
     if sources is None:
         raise SystemExit("CMakeLists.txt: got no ATH_DECODER_SOURCES, expected the decoder's source files")
-    program = folder / name
-    compile_c(program, [Path(__file__).with_name(f"{name}.c"), *(CORE / source for source in sources[1].split())])
+    program = folder / "decode"
+    compile_c(program, [Path(__file__).with_suffix(".c"), *(CORE / source for source in sources[1].split())])
     return program
 
 

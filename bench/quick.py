@@ -1,4 +1,4 @@
-"""A short run of the main verbs, two minutes: codecs, decoder, the paper's table, scaling, forests, URLs, report.
+"""A short run of the main verbs, two minutes: codecs, decoder, URLs, report.
 
 Each step is a separate command; its JSON and the report go to one folder. What takes long is left out: most codecs,
 most bounds, large clips. It checks that everything works; figures to quote come from the full runs.
@@ -79,10 +79,7 @@ def _steps(args: argparse.Namespace) -> Iterator[tuple[str, list[str]]]:
     steps = {
         "rd": [*clips, "--codecs", *args.codecs, "--bounds", *bounds],
         "decode": [*files, *few],
-        "paper": [*files, "--rel-error", "1e-4"],
-        "scale": ["--encodes", "1", *made],
-        "forest": ["--instances", "1", "100", "--clips", "1", "4", "--rounds", "1", *made],
-        "remote": ["--plants", "1", "--frames", "240", "--frame", "200", "--rounds", "1", *made],
+        "remote": [*"--plants 1 --frames 240 --frame 200 --rounds 1".split(), *made],
     }
     for verb, words in steps.items():
         yield verb, [*words, "--json", str(out / f"{verb}.json")]
