@@ -18,7 +18,7 @@ from bench.tables import table
 
 ROOT = Path(__file__).resolve().parent.parent
 CLIPS = ("sample", "mj_1k_200f")
-CODECS = ("athcodec", "float16 or integers + zstd", "pcodec", "trajectory PCA + hierarchy (CoDDyAC), range coder")
+CODECS = ("athcodec", "float16 or integers + zstd", "pcodec", "trajectory PCA + hierarchy (CoDDyAC)")
 BOUNDS = (1e-3, 1e-4)
 
 NOTE = "Seconds of each step, including the start of Python."
