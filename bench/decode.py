@@ -30,7 +30,7 @@ import athcodec
 from athcodec import ath_file
 from athcodec._native import crc32c
 from athcodec.metrics import ErrorMeter
-from bench.clips import add_ladder, add_rel_error
+from bench.clips import add_ladder, add_number, add_rel_error
 from bench.codecs.coder import CORE, compile_c
 from bench.codecs.program import arrays_of, from_arrays
 from bench.tables import table
@@ -105,12 +105,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_rel_error(parser)
     add_ladder(parser, "decades")
-    for name, count, what in (
-        ("rounds", ROUNDS, "runs of everything"),
-        ("seeks", SEEKS, "random frames"),
-        ("instances", INSTANCES, "plants shown at once"),
-    ):
-        parser.add_argument(f"--{name}", type=int, default=count, metavar="N", help=f"{what} (default %(default)s)")
+    add_number(parser, "--rounds", ROUNDS, "runs of everything")
+    add_number(parser, "--seeks", SEEKS, "random frames")
+    add_number(parser, "--instances", INSTANCES, "plants shown at once")
 
 
 def run(args: argparse.Namespace) -> dict[str, Any]:

@@ -14,6 +14,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from bench.clips import add_number
 from bench.tables import table
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -35,14 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--codecs", nargs="+", metavar="NAME", default=list(CODECS), help="codecs to compare (default: %(default)s)"
     )
-    parser.add_argument(
-        "--bounds",
-        type=float,
-        nargs="+",
-        metavar="FRACTION",
-        default=list(BOUNDS),
-        help="error bounds over the bounding box's diagonal",
-    )
+    add_number(parser, "--bounds", BOUNDS, "error bounds over the bounding box's diagonal", "FRACTION")
     parser.add_argument(
         "--out",
         type=Path,

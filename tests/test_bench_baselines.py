@@ -145,12 +145,11 @@ def test_the_first_tier_of_skeletal_tracks_shows_every_other_frame(piece):
     assert not np.array_equal(one, both)
 
 
-@pytest.mark.parametrize("single_depth", (False, True))
-def test_athcodec_is_compared_as_a_codec_like_others(piece, single_depth):
-    codec = Athcodec(single_depth)
+def test_athcodec_is_compared_as_a_codec_like_others(piece):
+    codec = Athcodec()
     data, _ = check(codec, piece, BOUND * piece.diagonal)
     assert 0 < len(data) < piece.positions.nbytes / 3 and codec.kind == "athcodec"
-    assert len(codec.settings["rotations"]) == (2 if single_depth else 4)
+    assert len(codec.settings["rotations"]) == 4
 
 
 @pytest.mark.parametrize("codec", BASELINES, ids=lambda codec: codec.name)
