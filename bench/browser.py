@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
-from athcodec.picture import BROWSER_VARIABLE, FLAGS, browser_path
+from athcodec.viewer.picture import BROWSER_VARIABLE, FLAGS, browser_path
 
 WEBGPU_FLAGS = [
     "--no-sandbox",

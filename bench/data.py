@@ -21,7 +21,7 @@ import h5py
 import numpy as np
 
 import athcodec
-from athcodec.hierarchy import branch_orders
+from athcodec.motion.hierarchy import branch_orders
 from bench import odd
 from bench.tables import table
 from bench.trees.beams import bend

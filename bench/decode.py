@@ -27,8 +27,8 @@ import h5py
 import numpy as np
 
 import athcodec
-from athcodec import ath_file
 from athcodec._native import crc32c
+from athcodec.decoding import ath_file
 from athcodec.metrics import ErrorMeter
 from bench.clips import add_ladder, add_number, add_rel_error
 from bench.codecs.coder import CORE, compile_c

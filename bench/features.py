@@ -17,14 +17,14 @@ from typing import Any
 import numpy as np
 
 import athcodec
-from athcodec.discovery import with_branches
 from athcodec.encoding import Draft, code_segments, draft, write
 from athcodec.encoding.bounds import BoundOption
 from athcodec.encoding.branch_trials import best_branches
 from athcodec.encoding.features import Feature
 from athcodec.encoding.progress import silent
 from athcodec.encoding.segment import SHEET
-from athcodec.polygons import Polygons
+from athcodec.motion.discovery import with_branches
+from athcodec.motion.polygons import Polygons
 from bench.clips import add_ladder, measure
 from bench.store import Store, read
 from bench.suite import SUITES, cases

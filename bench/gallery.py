@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import athcodec
-from athcodec import picture, view
+from athcodec.viewer import picture, view
 from bench import data
 from bench.browser import chromium
 from bench.tables import table

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 import athcodec
-from athcodec import discovery
+from athcodec.motion import discovery
 from bench.clips import add_rel_error
 from bench.data import path_of
 from bench.tables import table

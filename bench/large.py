@@ -22,7 +22,7 @@ import numpy as np
 
 import athcodec
 from athcodec import MotionClip
-from athcodec.frames import Frames
+from athcodec.motion.frames import Frames
 from bench.tables import table
 
 STEM = 100  # vertices

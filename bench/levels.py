@@ -1,6 +1,6 @@
 """Levels of detail: bytes, errors and gaps at the joints, compared with the paper's approximation A^d.
 
-Both sides use the same nodes. The paper's side (Song, Yang and Peng 2011, sections 3 and 4) is athcodec.ath:
+Both sides use the same nodes. The paper's side (Song, Yang and Peng 2011, sections 3 and 4) is athcodec.encoding.survey:
 one independent least-squares affine map per piece and frame, as exact matrices, never quantised. Ours is the
 decoder's output for the bytes of that level.
 """
@@ -15,8 +15,8 @@ import numpy as np
 
 import athcodec
 from athcodec._native import LOOSE
-from athcodec.ath import Ath, Gaps
-from athcodec.ath_file import Level
+from athcodec.decoding.ath_file import Level
+from athcodec.encoding.survey import Ath, Gaps
 from athcodec.metrics import ErrorMeter
 from bench.clips import Encoded, add_clips, add_rel_error, encoded, measure
 from bench.tables import table

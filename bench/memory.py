@@ -16,8 +16,8 @@ from pathlib import Path
 from typing import Any
 
 import athcodec
+from athcodec.encoding.segmentation import split_segments
 from athcodec.options import MIN_SEGMENT
-from athcodec.segmentation import split_segments
 from bench.clips import add_clips, add_number, add_rel_error
 from bench.tables import table
 

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 import athcodec
-from athcodec.remote import READ_AHEAD
+from athcodec.files.remote import READ_AHEAD
 from bench.clips import ReplicatedPlants, add_effort, add_number, add_rel_error, add_source, replicated_plants
 from bench.tables import table
 from bench.throttled_server import ThrottledServer

@@ -294,7 +294,7 @@ def by_document(clip) -> SimpleNamespace:
 
 
 def metadata_text(decoder) -> bytes:
-    from athcodec import container
+    from athcodec.decoding import container
 
     _ = decoder.metadata  # refuses what is no JSON object
     chunk = decoder.file.find(container.METADATA)

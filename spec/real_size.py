@@ -134,7 +134,7 @@ def rotations(b: int, time: np.ndarray, wind: float, turns: float, flutters: boo
 def clip(name: str) -> Any:
     """A wind in which poses are held, at times of their own, and a loop."""
     import athcodec
-    from athcodec.clip import MotionClip
+    from athcodec.motion.clip import MotionClip
 
     plant = tree()
     rest = np.concatenate(plant.points)

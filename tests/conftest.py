@@ -17,8 +17,8 @@ from programs import blender_python
 from s3 import S3Server
 
 import athcodec
-from athcodec import ath_file, core_file
-from athcodec.clip import MotionClip
+from athcodec.decoding import ath_file, core_file
+from athcodec.motion.clip import MotionClip
 from athcodec.sources import read_hdf5, sample_path
 
 sys.path.append(

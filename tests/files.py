@@ -15,13 +15,13 @@ from pathlib import Path
 import numpy as np
 
 import athcodec
-from athcodec import container as ct
 from athcodec._native import BRANCH, SEGMENT_FRAMES, crc32c
-from athcodec.ath_file import AthFile
+from athcodec.decoding import container as ct
+from athcodec.decoding.ath_file import AthFile
 from athcodec.encoding import streams
 from athcodec.encoding.motion import LevelStream, Plan, SegmentMotion
+from athcodec.encoding.segmentation import balanced_segments
 from athcodec.encoding.time_bases import MOST_SAMPLE
-from athcodec.segmentation import balanced_segments
 
 sys.path.append(str(Path(__file__).resolve().parent.parent))  # for spec, which is not installed
 

@@ -16,8 +16,8 @@ from files import Parts, exact_rest_chunk, roots, still_file, with_header
 from plants import awkward
 
 import athcodec
-from athcodec import container as ct
 from athcodec._native import BRANCH
+from athcodec.decoding import container as ct
 from athcodec.encoding import streams
 from athcodec.encoding.motion import Plan
 

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 
 import athcodec
-from athcodec.clip import MotionClip
 from athcodec.errors import ClipError
+from athcodec.motion.clip import MotionClip
 
 POINTS = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0.5, 0.5, 2], [0, 3, 0], [0, 4, 0], [0.25, 5, 0.125]])
 

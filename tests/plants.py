@@ -7,8 +7,8 @@ from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
 
 from athcodec import MotionClip
-from athcodec.clip import source_stem_index
 from athcodec.encoding.quantise import least_bound
+from athcodec.motion.clip import source_stem_index
 
 
 def random_hierarchy(rng: np.random.Generator, branches: int, longest: int, roots: int = 1):

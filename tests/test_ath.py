@@ -9,10 +9,11 @@ from itertools import product
 import numpy as np
 import pytest
 
-from athcodec import ath as ath_module
-from athcodec.ath import Ath, Gaps, Thresholds, build_ath, survey
-from athcodec.clip import MotionClip
+from athcodec.encoding import survey as ath_module
+from athcodec.encoding.survey import Ath, Gaps, build_ath, survey
 from athcodec.errors import ClipError
+from athcodec.motion.clip import MotionClip
+from athcodec.motion.thresholds import Thresholds
 
 FRAMES = 12
 BUSHY = (np.tile(np.arange(6), 8), [-1, 0, 0, 1, 1, 2])
@@ -334,8 +335,8 @@ def test_several_roots_are_nodes_of_depth_zero():
 )
 def test_the_result_does_not_depend_on_how_the_frames_are_read(sample_clip, monkeypatch, thresholds):
     whole = build_ath(sample_clip, *thresholds)
-    monkeypatch.setattr("athcodec.ath._READ_VALUES", 3 * 1001 * 7)
-    monkeypatch.setattr("athcodec.ath._WORK_VERTICES", 3 * 1001)
+    monkeypatch.setattr("athcodec.encoding.survey._READ_VALUES", 3 * 1001 * 7)
+    monkeypatch.setattr("athcodec.encoding.survey._WORK_VERTICES", 3 * 1001)
     portions = build_ath(sample_clip, *thresholds)
     assert 1 < whole.node_count < sample_clip.branch_count
     np.testing.assert_array_equal(whole.node_branch, portions.node_branch)
@@ -389,7 +390,9 @@ def tam(distances: list[np.ndarray], thresholds: Thresholds) -> list[bool]:
 
 @pytest.mark.parametrize(("xi", "lam"), [(np.inf, 0), (0.36, 0), (0.25, 2), (0.2, 6), (0.1, 48)])
 def test_a_survey_accepts_what_tam_accepts_by_its_definition(xi, lam, monkeypatch):
-    monkeypatch.setattr("athcodec.ath._WORK_VERTICES", 5 * 48)  # frames in several portions, the worst within
+    monkeypatch.setattr(
+        "athcodec.encoding.survey._WORK_VERTICES", 5 * 48
+    )  # frames in several portions, the worst within
     clip = bushy_clip(noise=0.1)
     swell = np.sin(np.linspace(0, np.pi, FRAMES))
     clip.positions[:] = clip.rest + (clip.positions - clip.rest) * swell[:, None, None]
@@ -473,7 +476,7 @@ def test_surveys_of_unusable_thresholds_are_refused_before_anything_is_read(argu
 
 
 def test_progress_of_a_survey_rises_to_one(sample_clip, monkeypatch):
-    monkeypatch.setattr("athcodec.ath._WORK_VERTICES", 7 * 1001)
+    monkeypatch.setattr("athcodec.encoding.survey._WORK_VERTICES", 7 * 1001)
     fractions = []
     survey(sample_clip, progress=fractions.append)
     assert len(fractions) > 10 and fractions[-1] == 1.0

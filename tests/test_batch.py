@@ -28,7 +28,7 @@ import athcodec
 from athcodec import batch, cli
 from athcodec.batch import manifest, runs
 from athcodec.batch.manifest import Manifest, ManifestError
-from athcodec.container import MAGIC
+from athcodec.decoding.container import MAGIC
 from athcodec.errors import ClipError, MissingExtra
 
 pytestmark = pytest.mark.tools

@@ -15,7 +15,7 @@ import pytest
 import athcodec
 from athcodec import encoding
 from athcodec._native import crc32c
-from athcodec.container import KIND_NAMES
+from athcodec.decoding.container import KIND_NAMES
 from athcodec.encoding.features import Feature
 
 ROOT = Path(__file__).resolve().parent.parent

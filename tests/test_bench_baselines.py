@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from athcodec.clip import MotionClip
+from athcodec.motion.clip import MotionClip
 from bench.codecs import Source, check
 from bench.codecs.acl import SEGMENT, SkeletalTracks, _Track
 from bench.codecs.baseline import Choice, Ladder, Search

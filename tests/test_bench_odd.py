@@ -16,7 +16,7 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path.append(str(ROOT))  # for bench, which is not installed; athcodec stays the installed one
 
 import athcodec  # noqa: E402
-from athcodec.hierarchy import hierarchy_of  # noqa: E402
+from athcodec.motion.hierarchy import hierarchy_of  # noqa: E402
 from bench import compare, data, odd, rd  # noqa: E402
 from bench.codecs import Source, check, simple  # noqa: E402
 from bench.codecs.program import CannotKeep  # noqa: E402

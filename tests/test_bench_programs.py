@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from athcodec.clip import MotionClip
+from athcodec.motion.clip import MotionClip
 from athcodec.sources import read_hdf5, sample_path
 
 ROOT = Path(__file__).resolve().parent.parent

@@ -8,7 +8,7 @@ from moving_meshes import assert_same_mesh, coded, quad_clip
 from programs import blender_python, run_script
 
 import athcodec
-from athcodec.clip_view import ClipView
+from athcodec.decoding.clip_view import ClipView
 
 pytestmark = pytest.mark.programs
 

@@ -10,10 +10,10 @@ import pytest
 from test_wasm import digest, run_node
 
 import athcodec
-from athcodec import core_file
 from athcodec.cli import main
+from athcodec.decoding import core_file
 from athcodec.errors import ClipError, ClipUnavailable
-from athcodec.joining import in_wind
+from athcodec.motion.joining import in_wind
 from bench.trees import wind as winds
 from bench.trees.beams import bend
 from bench.trees.mesh import dress

@@ -105,7 +105,7 @@ def test_a_broken_promise_would_be_seen(scratch, monkeypatch):
         re.match(r"frame 7, vertex 1: [12]\.\d+ bounds off", found) for found in broken_promises(attack, scratch)
     )
     monkeypatch.undo()
-    monkeypatch.setattr(athcodec.container, "_round_up", lambda values: 0.5 * np.asarray(values))
+    monkeypatch.setattr(athcodec.decoding.container, "_round_up", lambda values: 0.5 * np.asarray(values))
     assert re.match(r"level 0, segment 0: stated", broken_promises(attack, scratch)[0])
 
 

@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from athcodec import clip as clip_module
-from athcodec.clip import MotionClip
 from athcodec.errors import ClipError
+from athcodec.motion import clip as clip_module
+from athcodec.motion.clip import MotionClip
 
 
 class CountingPositions:

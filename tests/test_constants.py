@@ -9,10 +9,11 @@ from pathlib import Path
 
 import pytest
 
-from athcodec import _native, container, core_file, errors
+from athcodec import _native, errors
 from athcodec._native import lib
+from athcodec.decoding import container, core_file
 from athcodec.encoding import layers
-from athcodec.segmentation import decoding_bytes
+from athcodec.encoding.segmentation import decoding_bytes
 
 ROOT = Path(__file__).resolve().parent.parent
 CORE, VIEWER = ROOT / "athcodec" / "core", ROOT / "athcodec" / "viewer"

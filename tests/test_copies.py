@@ -7,8 +7,9 @@ import pytest
 from files import Parts, opened
 
 import athcodec
-from athcodec import MotionClip, container
+from athcodec import MotionClip
 from athcodec._native import BRANCH
+from athcodec.decoding import container
 from athcodec.encoding import streams
 from athcodec.errors import AthError
 from spec.document import File, rules

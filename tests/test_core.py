@@ -32,9 +32,9 @@ from files import Parts, draft_of, with_header
 from plants import awkward
 
 import athcodec
-from athcodec import container as ct
 from athcodec import errors
 from athcodec._library import load_library
+from athcodec.decoding import container as ct
 from athcodec.encoding.search import Search
 from athcodec.encoding.segment import Settings
 

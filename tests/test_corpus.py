@@ -16,7 +16,7 @@ from hostile_files import colliding_gaps, random_gaps, segments_of_one_frame, st
 from test_damage import use
 
 import athcodec
-from athcodec import core_file
+from athcodec.decoding import core_file
 
 CORPUS = Path(__file__).resolve().parent / "corpus"
 TESTED = {"colliding_gaps.ath", "connected_rest_without_faces.player", "integers_not_yet_written.prelude"}

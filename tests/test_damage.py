@@ -25,10 +25,11 @@ from files import COUNTS, Parts, draft_of, opened, with_checksum, with_header
 from hostile_files import segments_of_one_frame
 
 import athcodec
-from athcodec import container as ct
-from athcodec import core_file, errors
-from athcodec.ath_file import AthFile
-from athcodec.container import Limits
+from athcodec import errors
+from athcodec.decoding import container as ct
+from athcodec.decoding import core_file
+from athcodec.decoding.ath_file import AthFile
+from athcodec.decoding.container import Limits
 from athcodec.encoding import streams
 from athcodec.errors import (
     BadChecksum,

@@ -15,13 +15,14 @@ from hypothesis import given, settings
 from plants import STEADY, awkward_plants, chain_plant, plant, tube
 
 import athcodec
-from athcodec import Thresholds, core_file
-from athcodec import container as ct
+from athcodec import Thresholds
 from athcodec._native import LOOSE
+from athcodec.decoding import container as ct
+from athcodec.decoding import core_file
 from athcodec.encoding import streams
 from athcodec.encoding.motion import Plan
 from athcodec.errors import BadChecksum, BadChunk, FormatError, LevelUnavailable
-from athcodec.hierarchy import branches_from_edges
+from athcodec.motion.hierarchy import branches_from_edges
 
 
 @pytest.fixture(scope="module")

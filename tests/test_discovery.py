@@ -12,12 +12,13 @@ import pytest
 from plants import plant, runs_of_points
 
 import athcodec
-from athcodec import MotionClip, discovery
+from athcodec import MotionClip
 from athcodec.cli import main
-from athcodec.clip import Skin, source_stem_index
 from athcodec.encoding.job import EncodingJob
 from athcodec.errors import ClipError
-from athcodec.hierarchy import branch_orders
+from athcodec.motion import discovery
+from athcodec.motion.clip import Skin, source_stem_index
+from athcodec.motion.hierarchy import branch_orders
 from bench.odd.grass import ORDERS, grass
 from bench.trees.mesh import dress
 from bench.trees.wind import Wind

@@ -11,14 +11,14 @@ from plants import chain_plant, clip_of, plant
 
 import athcodec
 from athcodec import MotionClip
-from athcodec import clip as clip_module
-from athcodec.container import MAGIC, Limits
+from athcodec.decoding.container import MAGIC, Limits
 from athcodec.encoding import job
 from athcodec.encoding.bounds import BoundOption
 from athcodec.encoding.motion import SegmentMotion
 from athcodec.encoding.progress import silent
+from athcodec.encoding.segmentation import decoding_bytes, split_segments
 from athcodec.errors import BoundError, ClipError
-from athcodec.segmentation import decoding_bytes, split_segments
+from athcodec.motion import clip as clip_module
 
 OLDER = MAGIC + b"older"
 

@@ -7,8 +7,9 @@ import pytest
 
 import athcodec
 from athcodec.cli import main
+from athcodec.decoding.endless_play import EndlessPlay
 from athcodec.errors import ClipError
-from athcodec.transitions import EndlessPlay, transitions_of
+from athcodec.motion.transitions import transitions_of
 from bench.trees.beams import bend
 from bench.trees.plant import grow
 from bench.trees.wind import Wind

@@ -12,10 +12,10 @@ from files import Parts, opened
 from test_rest import cards, simple_bytes, terrain, tubes
 
 import athcodec
-from athcodec import container as ct
+from athcodec.decoding import container as ct
 from athcodec.encoding import polygons
 from athcodec.errors import AthError
-from athcodec.polygons import Polygons
+from athcodec.motion.polygons import Polygons
 from spec.document import File, rules
 
 CONNECTED = 1 << 3  # of Method of REST

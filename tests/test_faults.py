@@ -19,8 +19,9 @@ import pytest
 from plants import plant
 
 import athcodec
-from athcodec import atomic_files, cli
-from athcodec.atomic_files import PendingFile, new_file
+from athcodec import cli
+from athcodec.files import atomic as atomic_files
+from athcodec.files.atomic import PendingFile, new_file
 from athcodec.sources import sample_path
 
 ROOT = Path(__file__).resolve().parent.parent

@@ -21,9 +21,9 @@ from moving_meshes import (
 )
 
 import athcodec
-from athcodec.clip import MotionClip
-from athcodec.clip_view import ClipView
+from athcodec.decoding.clip_view import ClipView
 from athcodec.errors import ClipError
+from athcodec.motion.clip import MotionClip
 
 pytestmark = pytest.mark.formats
 

@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 import athcodec
-from athcodec import cli, view
+from athcodec import cli
+from athcodec.viewer import view
 
 sys.path.append(str(Path(__file__).parents[1]))  # for bench, which is not installed; athcodec stays the installed one
 

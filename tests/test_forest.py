@@ -16,10 +16,10 @@ import athcodec
 
 sys.path.append(str(Path(__file__).parents[1]))  # for bench, which is not installed; athcodec stays the installed one
 
-from athcodec.core_file import FILE_ORDER  # noqa: E402
+from athcodec.decoding.core_file import FILE_ORDER  # noqa: E402
 from athcodec.gpu import GpuFile  # noqa: E402
 from athcodec.gpu.evaluate import Passes, Source  # noqa: E402
-from athcodec.joining import in_wind  # noqa: E402
+from athcodec.motion.joining import in_wind  # noqa: E402
 from athcodec.viewer.build_viewer import modules  # noqa: E402
 from bench.browser import WEBGPU_FLAGS, chromium  # noqa: E402
 from bench.throttled_server import ThrottledServer  # noqa: E402

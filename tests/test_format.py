@@ -25,8 +25,9 @@ from files import Parts, basis_chunk, exact_rest_chunk, opened, roots, still_fil
 from plants import plant
 
 import athcodec
-from athcodec import MotionClip, container, errors
+from athcodec import MotionClip, errors
 from athcodec._native import BRANCH, LOOSE, SHAPE_MODES, SHEET, WHOLE, crc32c, lib
+from athcodec.decoding import container
 from athcodec.encoding import streams
 from athcodec.encoding.learned_modes import LearnedModes
 from athcodec.encoding.motion import LevelStream, Plan, SegmentMotion

@@ -14,7 +14,8 @@ import pytest
 from conftest import SLOWEST
 
 import athcodec
-from athcodec import cli, gallery, picture
+from athcodec import cli
+from athcodec.viewer import gallery, picture
 from athcodec.viewer.build_viewer import modules
 
 pytestmark = pytest.mark.web

@@ -16,11 +16,11 @@ from plants import plant
 
 import athcodec
 from athcodec.cli import main
-from athcodec.clip import ClipRange, MotionClip
-from athcodec.clip_view import ClipView
+from athcodec.decoding.clip_view import ClipView
 from athcodec.errors import ClipError, MissingExtra
 from athcodec.exporters import gltf as gltf_exporter
 from athcodec.exporters import write
+from athcodec.motion.clip import ClipRange, MotionClip
 from athcodec.sources import read
 
 pytestmark = pytest.mark.formats

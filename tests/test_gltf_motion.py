@@ -19,8 +19,8 @@ import athcodec
 from athcodec.cli import main
 from athcodec.errors import AthError, ClipError, WrongHostMesh
 from athcodec.exporters import write
+from athcodec.files.gltf.document import GltfFile
 from athcodec.sources import read
-from athcodec.sources.gltf_file import GltfFile
 from athcodec.sources.gltf_scene import Scene
 
 pytestmark = pytest.mark.formats

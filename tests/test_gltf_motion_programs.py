@@ -19,8 +19,8 @@ from test_gltf_programs import node, three_file  # noqa: F401, fixtures
 
 import athcodec
 from athcodec.cli import main
-from athcodec.clip import MotionClip
 from athcodec.exporters import write
+from athcodec.motion.clip import MotionClip
 from bench.browser import chromium
 
 VIEWER = Path(__file__).resolve().parent.parent / "athcodec" / "viewer"

@@ -21,7 +21,7 @@ from test_vat import exr
 
 import athcodec
 from athcodec import MotionClip
-from athcodec.clip_view import ClipView
+from athcodec.decoding.clip_view import ClipView
 from athcodec.exporters import write
 from athcodec.exporters.fitting import quaternions
 from athcodec.sources import read

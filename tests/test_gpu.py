@@ -16,7 +16,7 @@ from test_blending import simulated
 from test_tubes import twigs
 
 import athcodec
-from athcodec.core_file import FILE_ORDER, CoreError
+from athcodec.decoding.core_file import FILE_ORDER, CoreError
 from athcodec.gpu import SHADERS, GpuFile, Room, corners_of
 from athcodec.gpu.evaluate import BODY, LEVEL, SEGMENT, Passes, Source, head, section
 from athcodec.sources import sample_path

@@ -12,12 +12,12 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import athcodec
-from athcodec import clip as clip_module
-from athcodec.clip import MotionClip
 from athcodec.errors import ClipError
 from athcodec.exporters import write_hdf5
 from athcodec.exporters.hdf5 import Hdf5Writer
-from athcodec.hierarchy import hierarchy_of
+from athcodec.motion import clip as clip_module
+from athcodec.motion.clip import MotionClip
+from athcodec.motion.hierarchy import hierarchy_of
 from athcodec.sources import read_hdf5
 
 STATIC_DTYPES = ["u1", "i2", "<i8", ">i4", "f2", "f4", ">f8", "?", "S5", "c16"]

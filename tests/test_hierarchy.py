@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from athcodec.errors import ClipError
-from athcodec.hierarchy import (
+from athcodec.motion.hierarchy import (
     Hierarchy,
     branch_orders,
     branches_from_edges,

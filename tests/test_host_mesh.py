@@ -19,10 +19,11 @@ from test_core import FILE_ORDER, OK, Fault, Memory, Player, core, text_of
 from test_wasm import run_node
 
 import athcodec
-from athcodec import batch, cli, encoding, view
-from athcodec import container as ct
-from athcodec.clip import MotionClip
+from athcodec import batch, cli, encoding
+from athcodec.decoding import container as ct
 from athcodec.errors import BadChunk, ClipError, NeedsHostMesh, WrongHostMesh
+from athcodec.motion.clip import MotionClip
+from athcodec.viewer import view
 
 SAMPLE = str(athcodec.sample_path())
 NEEDS_HOST_MESH, WRONG_HOST_MESH = 12, 13

@@ -9,10 +9,10 @@ import pytest
 import athcodec
 from athcodec import exporters
 from athcodec.cli import main
-from athcodec.clip import ClipRange
-from athcodec.clip_view import ClipView
+from athcodec.decoding.clip_view import ClipView
 from athcodec.encoding import code_segments, draft, write
 from athcodec.errors import BoundError, ClipError, ClipUnavailable
+from athcodec.motion.clip import ClipRange
 
 
 def distance(a: np.ndarray, b: np.ndarray) -> float:

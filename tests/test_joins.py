@@ -10,11 +10,11 @@ from files import Parts
 from plants import plant
 
 import athcodec
-from athcodec import ath_file, core_file
-from athcodec.container import Limits
+from athcodec.decoding import ath_file, core_file
+from athcodec.decoding.container import Limits
 from athcodec.encoding import encoder, joins
 from athcodec.errors import BadChecksum, LimitExceeded
-from athcodec.joining import looped
+from athcodec.motion.joining import looped
 from athcodec.sources import read_hdf5, sample_path
 
 SEGMENT = 40

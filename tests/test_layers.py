@@ -12,7 +12,7 @@ from plants import STEADY, awkward_plants, bound_for, chain_plant, plant
 
 import athcodec
 from athcodec import Thresholds
-from athcodec import container as ct
+from athcodec.decoding import container as ct
 from athcodec.encoding import encoder
 from athcodec.encoding.layers import layer_ratios
 from athcodec.encoding.quantise import SOURCE_REST_TOLERANCE

@@ -15,8 +15,8 @@ import numpy as np
 import pytest
 
 import athcodec
-from athcodec import core_file
-from athcodec.container import Limits
+from athcodec.decoding import core_file
+from athcodec.decoding.container import Limits
 from athcodec.errors import LimitExceeded
 
 ROOT = Path(__file__).resolve().parent.parent

@@ -20,7 +20,7 @@ from plants import bending_tube, tube
 from programs import CACHE, install_once
 
 import athcodec
-from athcodec.joining import in_wind
+from athcodec.motion.joining import in_wind
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.append(str(ROOT))  # for bench, which is not installed; athcodec stays the installed one

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from athcodec.clip import MotionClip
 from athcodec.metrics import MotionMeter, ShapeMeter, SmoothnessMeter, Spread, edges_of
+from athcodec.motion.clip import MotionClip
 
 SQUARE = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], float)
 """A card in the plane z = 0, whose normal is the z axis."""

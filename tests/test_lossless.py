@@ -6,8 +6,8 @@ from files import Parts, opened
 from plants import clip_of, plant
 
 import athcodec
-from athcodec import container as ct
 from athcodec.cli import main
+from athcodec.decoding import container as ct
 from athcodec.errors import BadChunk, BadChunkTable, BadHeader
 
 

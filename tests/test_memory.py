@@ -17,7 +17,7 @@ VERTICES, FRAMES, TIMES = 12_000, 96, 5
 EXPORT = """
 import resource, sys
 import athcodec
-from athcodec.clip_view import ClipView
+from athcodec.decoding.clip_view import ClipView
 
 with athcodec.open(sys.argv[1]) as decoder:
     athcodec.write(ClipView(decoder), sys.argv[2], sys.argv[3], animation="morphs")

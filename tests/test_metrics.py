@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from athcodec.clip import MotionClip
 from athcodec.errors import ClipError
 from athcodec.metrics import ErrorMeter, blocks, compare_clips
+from athcodec.motion.clip import MotionClip
 
 
 @given(st.integers(0, 2**32), st.integers(1, 12), st.integers(1, 9), st.integers(1, 12), st.integers(3, 60))

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import athcodec
-from athcodec.clip import MotionClip
 from athcodec.errors import ClipError
+from athcodec.motion.clip import MotionClip
 from athcodec.sources.mtg import mtg_branches, read_mtg
 
 pytestmark = pytest.mark.formats

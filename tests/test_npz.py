@@ -12,9 +12,9 @@ from moving_meshes import coded, mixed_clip, quad_clip, survives_damage
 from test_hdf5 import assert_same_clip
 
 import athcodec
-from athcodec.clip import MotionClip
-from athcodec.clip_view import ClipView
+from athcodec.decoding.clip_view import ClipView
 from athcodec.errors import ClipError
+from athcodec.motion.clip import MotionClip
 from athcodec.sources import raw
 
 

@@ -16,9 +16,9 @@ from moving_meshes import leafed_tree, mixed_clip
 from test_install import C_COMPILERS, CXX_COMPILERS, run
 
 import athcodec
-from athcodec import container as ct
-from athcodec import core_file
-from athcodec.core_file import Fault
+from athcodec.decoding import container as ct
+from athcodec.decoding import core_file
+from athcodec.decoding.core_file import Fault
 
 pytestmark = pytest.mark.formats
 

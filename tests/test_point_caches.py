@@ -10,9 +10,9 @@ import pytest
 from moving_meshes import assert_same_mesh, assert_same_motion, coded, mixed_clip, quad_clip, survives_damage
 
 import athcodec
-from athcodec.clip import MotionClip
-from athcodec.clip_view import ClipView
+from athcodec.decoding.clip_view import ClipView
 from athcodec.errors import ClipError
+from athcodec.motion.clip import MotionClip
 from athcodec.sources import raw
 
 pytestmark = pytest.mark.formats

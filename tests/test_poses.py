@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import athcodec
-from athcodec import container as ct
+from athcodec.decoding import container as ct
 from athcodec.encoding import encoder
 from athcodec.encoding.quantise import SOURCE_REST_TOLERANCE
 from athcodec.encoding.search import Search

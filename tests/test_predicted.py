@@ -17,8 +17,8 @@ from hypothesis import strategies as st
 from plants import STEADY, awkward, awkward_plants, bound_for, clip_of, grow, plant, random_hierarchy, sway
 
 import athcodec
-from athcodec import container as ct
 from athcodec import encoding
+from athcodec.decoding import container as ct
 from athcodec.encoding import prediction, search
 from athcodec.errors import AthError, BadChunk, BadChunkTable
 from athcodec.metrics import SmoothnessMeter

@@ -22,9 +22,10 @@ from files import Parts
 from plants import plant
 
 import athcodec
-from athcodec import cli, remote
+from athcodec import cli
 from athcodec.errors import BadChecksum, LevelUnavailable, NotAnAthFile, RemoteError, Truncated
-from athcodec.remote import GAP, READ_AHEAD, Remote
+from athcodec.files import remote
+from athcodec.files.remote import GAP, READ_AHEAD, Remote
 
 pytestmark = pytest.mark.formats
 

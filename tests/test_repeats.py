@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import athcodec
-from athcodec.clip import ClipRange
 from athcodec.metrics import ErrorMeter
+from athcodec.motion.clip import ClipRange
 
 BOUND = 1e-3
 FEW = dict(rel_error=BOUND, attributes="none", ladder="none")

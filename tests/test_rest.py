@@ -11,8 +11,8 @@ from files import Parts, opened
 from plants import diagonal
 
 import athcodec
-from athcodec import container
 from athcodec._native import BRANCH
+from athcodec.decoding import container
 from athcodec.encoding import streams
 from athcodec.errors import AthError
 from spec.document import File, rules

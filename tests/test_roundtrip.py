@@ -13,12 +13,12 @@ from plants import MOTIONS, SHAPES, STEADY, awkward, awkward_plants, bound_for, 
 
 import athcodec
 from athcodec import MotionClip, Thresholds
-from athcodec import container as ct
-from athcodec.clip import NOT_KEPT
+from athcodec.decoding import container as ct
 from athcodec.encoding import streams
 from athcodec.encoding.job import time_chunk
 from athcodec.encoding.quantise import SOURCE_REST_TOLERANCE
-from athcodec.hierarchy import derived_edges, hierarchy_of
+from athcodec.motion.clip import NOT_KEPT
+from athcodec.motion.hierarchy import derived_edges, hierarchy_of
 
 
 def largest_error(decoded: np.ndarray, clip: MotionClip) -> float:

@@ -11,11 +11,11 @@ import trimesh
 from moving_meshes import assert_same_mesh, assert_same_motion, coded, mixed_clip, quad_clip, survives_damage
 
 import athcodec
-from athcodec.clip import MotionClip
-from athcodec.clip_view import ClipView
+from athcodec.decoding.clip_view import ClipView
 from athcodec.errors import ClipError, SourceWarning
+from athcodec.files.reading import Budget
+from athcodec.motion.clip import MotionClip
 from athcodec.sources.mesh import parse_mesh
-from athcodec.sources.opening import Budget
 
 pytestmark = pytest.mark.formats
 

@@ -13,7 +13,7 @@ from plants import plant
 
 import athcodec
 from athcodec import cli
-from athcodec.shown import redacted, shown
+from athcodec.files.shown import redacted, shown
 
 HOSTILE = "\x1b]0;owned\x07\x9b31m\u202ename"
 URL = "https://ann:pass%40word@host.example/a/tree.ath?X-Amz-Signature=abcdef&n=2#t=abcdef"

@@ -12,7 +12,13 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
-DECODING = ("athcodec", "athcodec.decoder", "athcodec.container", "athcodec.truncation", "athcodec.exporters")
+DECODING = (
+    "athcodec",
+    "athcodec.decoding.decoder",
+    "athcodec.decoding.container",
+    "athcodec.truncation",
+    "athcodec.exporters",
+)
 
 
 @pytest.mark.parametrize("module", DECODING)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import athcodec
-from athcodec.container import BASIS_IN_WAVES, STEMS
+from athcodec.decoding.container import BASIS_IN_WAVES, STEMS
 from athcodec.encoding.motion import waves_over_time
 from athcodec.encoding.search import Search
 from athcodec.encoding.time_bases import InWaves, TimeComponents

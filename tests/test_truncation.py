@@ -9,7 +9,7 @@ import pytest
 
 import athcodec
 from athcodec import truncate
-from athcodec.container import MAGIC
+from athcodec.decoding.container import MAGIC
 from athcodec.errors import BadChecksum, FormatError, LevelUnavailable, NotAnAthFile, Truncated
 
 
@@ -114,7 +114,7 @@ def test_what_is_missing_is_named(bushy, full):
         last = [chunk for chunk in file.chunks if chunk.is_motion][-1]
         rest = (
             "; rest pose of the source"
-            if any(chunk.kind == athcodec.container.SOURCE_REST for chunk in file.chunks)
+            if any(chunk.kind == athcodec.decoding.container.SOURCE_REST for chunk in file.chunks)
             else ""
         )
         missing = file.cut(last.offset + last.length - 1).missing

@@ -12,9 +12,9 @@ from moving_meshes import leafed_tree
 from plants import clip_of, tube
 
 import athcodec
-from athcodec.clip import MotionClip
 from athcodec.encoding import streams
 from athcodec.encoding.rings import ring_sizes
+from athcodec.motion.clip import MotionClip
 
 sys.path.append(str(Path(__file__).resolve().parent.parent))  # for spec, which is not installed
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from athcodec.errors import BoundError
-from athcodec.units import METRES, parse_length, parse_size
+from athcodec.motion.units import METRES, parse_length, parse_size
 
 
 @pytest.mark.parametrize(

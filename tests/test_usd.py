@@ -15,9 +15,9 @@ from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade, UsdSkel, UsdValidation, Vt
 
 import athcodec
 from athcodec import cli
-from athcodec.clip import MotionClip
 from athcodec.errors import ClipError, SourceWarning
-from athcodec.frames import Frames
+from athcodec.motion.clip import MotionClip
+from athcodec.motion.frames import Frames
 
 pytestmark = pytest.mark.formats
 
@@ -622,8 +622,8 @@ def test_a_clip_from_usd_through_ath_to_usd_keeps_the_bound(tmp_path):
 
 MEASURE = """
 import sys, json, numpy as np, athcodec
-from athcodec.clip import MotionClip
-from athcodec.frames import Frames
+from athcodec.motion.clip import MotionClip
+from athcodec.motion.frames import Frames
 frames = int(sys.argv[1])
 most = 0
 def note(done=None):

@@ -10,8 +10,8 @@ from moving_meshes import mixed_clip
 from programs import run_script, usd_plugin_python
 
 import athcodec
-from athcodec import container as ct
 from athcodec.cli import main
+from athcodec.decoding import container as ct
 
 pytestmark = pytest.mark.programs
 

@@ -16,10 +16,10 @@ from plants import plant
 from test_gltf import accessor_of, far, leafy, leafy_ath  # noqa: F401, the fixtures too
 
 import athcodec
-from athcodec.clip import MotionClip
-from athcodec.clip_view import ClipView
+from athcodec.decoding.clip_view import ClipView
 from athcodec.errors import ClipError
 from athcodec.exporters import openvat, vat, write
+from athcodec.motion.clip import MotionClip
 from athcodec.sources import read
 
 pytestmark = pytest.mark.formats

@@ -13,8 +13,9 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.append(str(ROOT))  # for spec, which is not installed; athcodec stays the installed one
 
-from athcodec import container, errors  # noqa: E402
-from athcodec.ath_file import AthFile  # noqa: E402
+from athcodec import errors
+from athcodec.decoding import container  # noqa: E402
+from athcodec.decoding.ath_file import AthFile  # noqa: E402
 from spec import conformance  # noqa: E402
 
 VECTORS = conformance.vectors()

@@ -24,8 +24,9 @@ import pytest
 from plants import clip_of, tube
 
 import athcodec
-from athcodec import cli, view
-from athcodec import container as ct
+from athcodec import cli
+from athcodec.decoding import container as ct
+from athcodec.viewer import view
 from athcodec.viewer.build_viewer import MOST_BYTES, own_bytes
 
 ROOT = Path(__file__).resolve().parent.parent

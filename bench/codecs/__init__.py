@@ -15,7 +15,7 @@ from typing import Protocol
 import numpy as np
 
 import athcodec
-from athcodec.hierarchy import Hierarchy, hierarchy_of
+from athcodec.motion.hierarchy import Hierarchy, hierarchy_of
 
 BLOCK = 1 << 20  # numbers
 RUNS = 16  # of branches in a part of a clip

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from athcodec.hierarchy import Hierarchy
+from athcodec.motion.hierarchy import Hierarchy
 from bench.codecs import Source
 from bench.codecs.baseline import Baseline, Choice, Ladder, Settings
 from bench.codecs.coder import Reader, Writer

@@ -26,7 +26,7 @@ import numpy as np
 
 from athcodec._native import BRANCH, SEGMENT_FRAMES
 from athcodec.encoding import quantise, streams
-from athcodec.hierarchy import Hierarchy
+from athcodec.motion.hierarchy import Hierarchy
 
 CORE = Path(__file__).resolve().parents[2] / "athcodec" / "core"
 CORE_SOURCES = [CORE / name for name in ("basis.c", "motion.c")]

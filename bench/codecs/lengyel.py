@@ -14,7 +14,7 @@ from __future__ import annotations
 import numpy as np
 
 from athcodec.encoding.motion import waves_over_time
-from athcodec.hierarchy import Hierarchy
+from athcodec.motion.hierarchy import Hierarchy
 from bench.codecs import Source
 from bench.codecs.baseline import Baseline, Choice, Ladder, Settings, Split, quantised
 from bench.codecs.coder import Reader, Writer

@@ -14,7 +14,7 @@ import numpy as np
 
 from athcodec._native import BRANCH
 from athcodec.encoding import quantise
-from athcodec.hierarchy import Hierarchy
+from athcodec.motion.hierarchy import Hierarchy
 from bench.codecs import Source
 from bench.codecs.coder import Reader, Writer, core_branches
 

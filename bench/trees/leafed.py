@@ -13,8 +13,8 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from athcodec import MotionClip, join
-from athcodec.clip import ClipRange
-from athcodec.joining import in_wind
+from athcodec.motion.clip import ClipRange
+from athcodec.motion.joining import in_wind
 from bench.trees.beams import bend
 from bench.trees.leaves import Leaves, Species, sheet
 from bench.trees.mesh import Tubes, bark_uv

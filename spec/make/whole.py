@@ -100,7 +100,7 @@ valid("everything", "every kind of chunk, flag, method and stream in one file", 
 def encoded(name: str) -> bytes:
     """A small plant encoded by athcodec."""
     import athcodec
-    from athcodec.clip import MotionClip
+    from athcodec.motion.clip import MotionClip
 
     stems = {
         "encoded-tree": [Stem(-1, 9), Stem(0, 6, 4), Stem(1, 5, 3), Stem(0, 5, 8), Stem(3, 3, 2)],

@@ -22,10 +22,10 @@ from hypothesis import strategies as st
 
 import athcodec
 from athcodec import MotionClip, Thresholds
-from athcodec.clip import LARGEST_COORDINATE
-from athcodec.container import SOURCE_REST
+from athcodec.decoding.container import SOURCE_REST
 from athcodec.encoding.quantise import SOURCE_REST_TOLERANCE
 from athcodec.errors import BoundError
+from athcodec.motion.clip import LARGEST_COORDINATE
 from spec.robust import Row
 
 HIERARCHIES = ("random", "chain", "bush", "roots", "one")

@@ -18,10 +18,10 @@ from pathlib import Path
 import numpy as np
 
 import athcodec
-from athcodec import container as ct
 from athcodec._native import crc32c
-from athcodec.ath_file import AthFile
-from athcodec.container import Limits
+from athcodec.decoding import container as ct
+from athcodec.decoding.ath_file import AthFile
+from athcodec.decoding.container import Limits
 from athcodec.errors import FormatError, NotAnAthFile, TrailingBytes, Truncated
 from spec.document import rules
 from spec.robust import Row, _cases

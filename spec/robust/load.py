@@ -26,7 +26,7 @@ from pathlib import Path
 import numpy as np
 
 import athcodec
-from athcodec.container import Limits
+from athcodec.decoding.container import Limits
 from athcodec.errors import AthError, LimitExceeded
 from athcodec.sources import sample_path
 from spec.robust import Row

@@ -17,7 +17,7 @@ from plants import awkward, bush, clip_of, plant, tube
 
 import athcodec
 from athcodec import MotionClip
-from athcodec import container as ct
+from athcodec.decoding import container as ct
 from athcodec.encoding import streams
 from athcodec.sources import read_hdf5, sample_path
 
