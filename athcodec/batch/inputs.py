@@ -37,7 +37,7 @@ TAGS = (
     "md5Hash",
     "generation",
     "created",
-)  # what file systems say of a file that changes with it
+)  # File systems report these fields differently once a file has changed.
 
 
 @dataclass(frozen=True)
@@ -229,7 +229,7 @@ def download(url: str, path: str) -> str:
         system.get_file(source, path)
     except Exception as error:
         if isinstance(error, OSError) and error.errno and error.filename == path:
-            raise  # of the local disk
+            raise  # The local disk failed, which no retry mends.
         raise RemoteError(f"{without_secrets(url)}: {type(error).__name__}: {_one_line(error)}") from None
     return sha256(path)
 

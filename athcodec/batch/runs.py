@@ -293,7 +293,7 @@ def _client(workers: int | None, scheduler: str | None) -> Iterator[Any]:
     """A client of Dask: of a scheduler that is there, or of processes of our own, which go with it."""
     import distributed
 
-    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # of workers that die the manifest has a record
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # The manifest records workers that die.
     if scheduler is None:
         with _cluster(workers or os.cpu_count() or 1) as cluster, distributed.Client(cluster) as client:
             yield client

@@ -29,7 +29,7 @@ from athcodec.motion.units import parse_length, parse_size
 from athcodec.options import EFFORTS, HOST, MAX_SEGMENT, METHODS, MIN_SEGMENT, ladder_of
 from athcodec.sources import FORMATS, format_named
 
-BOUNDS = ("max_error", "rel_error", "target_size")  # of which a clip has one
+BOUNDS = ("max_error", "rel_error", "target_size")  # A clip is encoded with exactly one of these.
 READING = (
     "source_format",
     "rest",
@@ -50,7 +50,7 @@ SHAPING = (
     "endless",
     "strength",
     "heading",
-)  # what is made of a clip before it is coded
+)  # These settings change a clip before it is encoded.
 
 Settings = dict[str, Any]
 

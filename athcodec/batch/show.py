@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from athcodec.batch.inputs import Item
 from athcodec.files.shown import shown
 
-ROWS = 20  # of the live table
+ROWS = 20  # Rows that the live table shows.
 ENDED = ("done", "failed", "kept")
 
 

@@ -17,7 +17,7 @@ from pathlib import Path
 
 from athcodec.files.atomic import new_file
 
-PYTHONS = ("3.11", "3.13")  # of Blender 4.2 to 5.0, and from 5.1
+PYTHONS = ("3.11", "3.13")  # Blender 4.2 to 5.0 has the first, Blender 5.1 and later the second.
 NEEDED = ("zstandard",)
 EXTENSION = Path(__file__).resolve().parent / "extension"
 PLATFORMS = {"linux": "linux", "manylinux": "linux", "win": "windows", "macosx": "macos"}

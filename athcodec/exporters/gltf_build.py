@@ -163,7 +163,9 @@ def meshes_of(motion: Any, name: str, more: Mapping[str, np.ndarray] | None = No
     labels, names = face_materials(motion) or (np.full(0 if faces is None else len(faces[0]), -1), [])
     labels = np.where((labels >= 0) & (labels < len(names)), labels, -1)
     if faces is not None:
-        labels = np.repeat(labels, np.maximum(np.asarray(faces[0], np.int64) - 2, 0))  # of each triangle
+        labels = np.repeat(
+            labels, np.maximum(np.asarray(faces[0], np.int64) - 2, 0)
+        )  # One label for each triangle of a polygon.
     made = []
     for part_name, start, stop in _objects(motion, name, corner_vertex[triangles], edges):
         rows = np.flatnonzero((source >= start) & (source < stop))

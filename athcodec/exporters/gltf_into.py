@@ -44,11 +44,13 @@ from athcodec.motion.joining import split
 from athcodec.sources import ReadOptions
 from athcodec.sources.gltf import GltfNode, read_moving
 
-SHARE_OF_TWINS = 1 / 8  # of the vertices: from there on the motion holds twins once, and meshes number its vertices
-ALIGNMENT = 8  # of what is left of the bytes
+SHARE_OF_TWINS = (
+    1 / 8
+)  # Share of duplicate vertices from which the motion holds each once and meshes number its vertices.
+ALIGNMENT = 8  # Bytes to which the parts of the remaining buffer are aligned.
 INSTANCES = "EXT_mesh_gpu_instancing"
 DRACO = "KHR_draco_mesh_compression"
-KNOWN = (*HARMLESS, INSTANCES, DRACO, "FB_ngon_encoding")  # of whose indices _references has all
+KNOWN = (*HARMLESS, INSTANCES, DRACO, "FB_ngon_encoding")  # _references lists every index that these extensions hold.
 POINTING = ("KHR_animation_pointer",)  # to places in the file, as text
 Reference = tuple[str, Any, Any]
 """An array of the file ("accessors" ...), and the holder and key of an index into it."""
@@ -156,7 +158,7 @@ class Into:
                 node["mesh"] = len(gltf["meshes"]) - 1
             if not self._keep:
                 mesh.pop("weights", None)
-                mesh.get("extras", {}).pop("targetNames", None)  # of morph targets, by custom
+                mesh.get("extras", {}).pop("targetNames", None)  # By custom this member names morph targets.
                 for key in ("weights", "skin"):
                     node.pop(key, None)
         for part in self._nodes:

@@ -47,7 +47,7 @@ GROWTH = {
     h5py.h5z.FILTER_LZF: 90,
 }
 """How many bytes a filter makes of one at most; DEFLATE unpacks all that there is, whatever size a chunk has."""
-MOST_GROWTH = 1 << 20  # of a filter that is not known
+MOST_GROWTH = 1 << 20  # Largest growth that is expected of an unknown filter.
 BROKEN = (OSError, RuntimeError, KeyError, ValueError, TypeError, OverflowError, UnicodeError, MemoryError)
 _OWN = "expected numbers in the file itself; --allow-outside (allow_outside=True) reads others"
 

@@ -49,7 +49,7 @@ class glTF2ExportUserExtension:
 
         self._extensions, self._binary = extensions, BinaryData
         self._recordings, self._primitives, self._open = {}, [], ExitStack()
-        self._first = {}  # of primitives whose vertices are numbered as those of the motion, by id
+        self._first = {}  # By id: primitives whose vertices are numbered as the motion numbers them.
 
     def pre_export_hook(self, export_settings):
         """Evaluates the frames of all objects that may move."""
