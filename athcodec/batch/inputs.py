@@ -61,7 +61,7 @@ class Item:
 
     @property
     def fingerprint(self) -> str:
-        """Of the output: short, and of plain characters whatever the names have."""
+        """Return a name for the output: short, and of plain characters whatever the inputs' names have."""
         return hashlib.sha256(os.fsencode(self.output)).hexdigest()[:16]
 
     @property
@@ -283,7 +283,7 @@ def _files_identity(paths: list[str]) -> dict[str, Any]:
 
 
 def remote_identity(url: str) -> dict[str, Any]:
-    """What the file system says of a file now: listings may be old, or tell times more exactly. Raises RemoteError."""
+    """Return present facts of a file: listings may be old, or tell times more exactly. Raises RemoteError."""
     system, path = file_system(url)
     system.invalidate_cache()
     try:
@@ -294,6 +294,6 @@ def remote_identity(url: str) -> dict[str, Any]:
 
 
 def sha256(path: str | os.PathLike[str]) -> str:
-    """Of a file's content. Raises OSError."""
+    """Return the digest of a file's content. Raises OSError."""
     with open(path, "rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()

@@ -132,7 +132,7 @@ def check_settings(
 
 
 def settings_of(names: tuple[str, ...], default: Settings, patterns: Mapping[str, Settings]) -> Settings:
-    """Those of a clip that is called any of `names`: what all patterns say that one of them fits."""
+    """Return the settings of a clip that is called any of `names`: those of all patterns that fit one of them."""
     merged = dict(default)
     for pattern, settings in patterns.items():
         if any(fnmatchcase(name, pattern) for name in names):

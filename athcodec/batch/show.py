@@ -23,7 +23,7 @@ ENDED = ("done", "failed", "kept")
 
 
 class Show:
-    """What a run reports; this base class shows nothing. `stage` is called by another thread than the others."""
+    """Receiver of a run's reports; this base class shows nothing. Another thread calls `stage` than the others."""
 
     def begin(self, items: Sequence[Item], kept: int) -> None:
         """Before the first clip; the files of `kept` further ones are up to date."""

@@ -101,7 +101,8 @@ def _fetched(wheels: Sequence[Path], folder: Path) -> list[Path]:
 
 
 def _pip_platforms(tag: str) -> list[str]:
-    """What pip may choose for a platform: a wheel that was built here is for "linux", published ones for manylinux."""
+    """Return the tags that pip may choose for a platform: a wheel that was built here is for "linux", published ones
+    for manylinux."""
     machine = tag.removeprefix("linux_")
     if machine != tag:
         return [f"manylinux2014_{machine}", f"manylinux_2_17_{machine}", f"manylinux_2_28_{machine}"]

@@ -240,7 +240,7 @@ class Take:
     extras: dict[str, Any]
 
     def of(self, values: np.ndarray) -> np.ndarray:
-        """What the keys are, of values (T, ...) per frame of the motion."""
+        """Return the keys of values (T, ...), one per frame of the motion."""
         own = values[self.start : self.stop]
         return np.concatenate([own, own[:1]]) if self.is_loop else own
 
@@ -284,7 +284,7 @@ def _clock(metadata: Mapping[str, Any], time: np.ndarray, fps: float) -> dict[st
 
 
 def branch_extras(motion: Any) -> dict[str, Any]:
-    """What extras say of the branches of a motion."""
+    """Return the extras that describe the branches of a motion."""
     parent = getattr(motion, "branch_parent", None)
     return {} if parent is None else {"branch_parent": np.asarray(parent).tolist()}
 

@@ -76,7 +76,7 @@ class _Parts:
 def _cut(
     hierarchy: Hierarchy, branch: int, stop: int, chain: int, excess: float, left: int
 ) -> list[tuple[int, int, int]]:
-    """What becomes of a part, of `left` joints more at most."""
+    """Return the joints of a part, at most `left` more."""
     if chain:
         room = min(LONGEST_CHAIN, int(hierarchy.stem_count[branch]), chain + left)
         return [(branch, stop, max(min(int(np.ceil(chain * min(np.sqrt(excess), 2.0))), room), chain))]

@@ -175,7 +175,7 @@ class Source:
 
 
 class Passes:
-    """What the blocks of a level and of its segments show: frames of one segment, or of several, blended.
+    """Positions that the blocks of a level and of its segments give: frames of one segment, or of several, blended.
 
     Parameters
     ----------

@@ -129,7 +129,7 @@ class SmoothnessMeter:
 
     @property
     def tick_ratio(self) -> float | None:
-        """What is decoded near seams, see `tick_ratio`."""
+        """Frames near seams, see `tick_ratio`."""
         return tick_ratio(self.acceleration, self.seams)
 
     @property

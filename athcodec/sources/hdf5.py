@@ -142,7 +142,7 @@ def check_own(file: h5py.File, name: str, allow_outside: bool) -> None:
 
 
 def _names(file: h5py.File) -> list[str]:
-    """Of all that hangs in the file, links to other files among it, which are not followed."""
+    """Return the names in the file, among them links to other files, which are not followed."""
     names, groups, seen = [], [("", file["/"])], set()
     while groups:
         within, group = groups.pop()
@@ -168,7 +168,7 @@ def _dataset(file: h5py.File, name: str) -> h5py.Dataset | None:
 
 
 def chunk_bytes(dataset: h5py.Dataset) -> int:
-    """What is unpacked at once of a dataset."""
+    """Return how many bytes of a dataset are unpacked at once."""
     return int(np.prod(dataset.chunks or (0,), dtype=object)) * dataset.dtype.itemsize
 
 

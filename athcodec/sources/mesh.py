@@ -53,7 +53,7 @@ PLY_TYPES = {
 
 @dataclass
 class Mesh:
-    """What a mesh file holds: points (N, 3), and the rest as in MotionClip."""
+    """Content of a mesh file: points (N, 3), and the rest as in MotionClip."""
 
     points: np.ndarray
     faces: np.ndarray | None = None
@@ -104,7 +104,7 @@ def parse_mesh(data: bytes, path: str | PathLike[str], budget: Budget) -> Mesh:
 
 
 def kind_of(faces: object, edges: object) -> str:
-    """What metadata["part_kinds"] calls an object with these faces and edges, None for none."""
+    """Return the kind in metadata["part_kinds"] of an object with these faces and edges, None for none."""
     return "mesh" if faces is not None else "points" if edges is None else "curves"
 
 
@@ -448,7 +448,7 @@ class _Text:
 
 
 class _Binary:
-    """The same for bytes of one order."""
+    """Read values of one byte order."""
 
     def __init__(self, data: bytes, at: int, order: str):
         self._data, self._at, self._order = data, at, order

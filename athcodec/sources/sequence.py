@@ -43,7 +43,7 @@ class Numbering:
 
     @classmethod
     def of_pattern(cls, path: Path) -> Numbering | None:
-        """That of a name with # or %04d in it; None where there is none."""
+        """Return the pattern of a name with # or %04d in it; None where there is none."""
         found = NUMBER_PATTERN.fullmatch(path.name)
         if found is None:
             return None

@@ -41,7 +41,7 @@ class AthGltfSettings(bpy.types.PropertyGroup):
 
 
 class glTF2ExportUserExtension:
-    """What Blender's exporter calls; one for each export."""
+    """Receiver of the calls of Blender's exporter; one for each export."""
 
     def __init__(self):
         from io_scene_gltf2.io.com import gltf2_io_extensions as extensions
@@ -73,7 +73,7 @@ class glTF2ExportUserExtension:
         return self._open.enter_context(tempfile.TemporaryFile())
 
     def _objects(self, export_settings):
-        """Those that are exported as meshes without a skin."""
+        """Return the objects that are exported as meshes without a skin."""
         for obj in bpy.context.view_layer.objects:
             has_skin = export_settings["gltf_skins"] and any(each.type == "ARMATURE" for each in obj.modifiers)
             chosen = not export_settings["gltf_selected"] or obj.select_get()
