@@ -29,7 +29,7 @@ from athcodec.encoding import quantise, streams
 from athcodec.motion.hierarchy import Hierarchy
 
 CORE = Path(__file__).resolve().parents[2] / "athcodec" / "core"
-CORE_SOURCES = [CORE / name for name in ("basis.c", "motion.c")]
+CORE_SOURCES = [CORE / name for name in ("model/basis.c", "model/motion.c")]
 LARGEST = 1 << 30
 LOW_BITS = 24
 
@@ -53,7 +53,7 @@ def compile_c(target: Path, sources: Sequence[Path], *options: str) -> None:
     if command is None:
         raise SystemExit("C compiler: found none of cc, gcc and clang; expected one, or its name in CC")
     flags = re.findall(r"^\s*(-f[\w=-]+)", (CORE / "CMakeLists.txt").read_text(), re.MULTILINE)
-    command += ["-std=c11", "-O3", *flags, f"-I{CORE}", *options]
+    command += ["-std=c11", "-O3", *flags, f"-I{CORE}", f"-I{CORE / 'include'}", *options]
     subprocess.run([*command, "-o", target, *sources, "-lm"], check=True)
 
 

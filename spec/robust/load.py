@@ -94,6 +94,7 @@ def thread_program(folder: Path) -> Path:
         "-fsanitize=thread",
         *flags,
         "-DATH_STATIC",
+        f"-I{CORE / 'include'}",
         f"-I{CORE}",
     )
 
