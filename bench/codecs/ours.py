@@ -9,7 +9,6 @@ import numpy as np
 
 import athcodec
 from athcodec.errors import BoundError
-from athcodec.motion.thresholds import Thresholds
 from bench.codecs import Source
 from bench.codecs.program import CannotKeep
 
