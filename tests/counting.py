@@ -35,6 +35,7 @@ class CountedCore:
                 "-O1",
                 "-g0",
                 f"-I{CORE}",
+                f"-I{CORE / 'include'}",
                 "-fPIC",
                 "-shared",
                 "-fsanitize-coverage=trace-pc",

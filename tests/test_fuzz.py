@@ -55,12 +55,24 @@ def test_every_seed_is_a_valid_file_and_small():
 @pytest.mark.parametrize(
     "file, correct, mistaken, target, kind",
     [
-        ("container.c", "if (length > body->size - 4) return ATH_BAD_CHUNK;", "", "motion", "crash"),
+        ("file/container.c", "if (length > body->size - 4) return ATH_BAD_CHUNK;", "", "motion", "crash"),
         ("streams.h", "if (value < 0 || value >= count) return 0;", "if (value < 0) return 0;", "prelude", "crash"),
-        ("prepare.c", "    memset(work->node.rows, 0,", "    if (0) memset(work->node.rows, 0,", "motion", "wrong"),
-        ("container.c", "return available < *needed ? ATH_MISSING : ATH_OK;", "return ATH_OK;", "container", "wrong"),
         (
-            "play.c",
+            "play/prepare.c",
+            "    memset(work->node.rows, 0,",
+            "    if (0) memset(work->node.rows, 0,",
+            "motion",
+            "wrong",
+        ),
+        (
+            "file/container.c",
+            "return available < *needed ? ATH_MISSING : ATH_OK;",
+            "return ATH_OK;",
+            "container",
+            "wrong",
+        ),
+        (
+            "play/play.c",
             "if (!(frame > 0.0) || frame >= (double)file->info.frame_count) frame = 0.0;",
             "",
             "decode",

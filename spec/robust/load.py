@@ -85,7 +85,8 @@ def thread_program(folder: Path) -> Path:
     names = re.search(r"set\(ATH_DECODER_SOURCES\s+([^)]*)\)", cmake)[1].split()
     flags = re.findall(r"^\s*(-f[\w=-]+)", cmake, re.MULTILINE)
     sources = [HERE / "threads.c", *(CORE / name for name in names)]
-    return compiled(folder, sources, "-fsanitize=thread", *flags, "-DATH_STATIC", f"-I{CORE}")
+    folders = f"-I{CORE}", f"-I{CORE / 'include'}"
+    return compiled(folder, sources, "-fsanitize=thread", *flags, "-DATH_STATIC", *folders)
 
 
 def race(program: Path, *words: object) -> tuple[int, str, dict]:
