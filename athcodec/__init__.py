@@ -5,17 +5,19 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:  # what __getattr__ finds, for type checkers and the reference
     from athcodec import errors, metrics
-    from athcodec.ath import Ath, Thresholds, build_ath
-    from athcodec.ath_file import AthFile
-    from athcodec.clip import MotionClip
-    from athcodec.clip_view import ClipView
-    from athcodec.decoder import Decoder, open
-    from athcodec.discovery import Found, find_branches
+    from athcodec.decoding.ath_file import AthFile
+    from athcodec.decoding.clip_view import ClipView
+    from athcodec.decoding.decoder import Decoder
     from athcodec.encoding import Summary, encode
+    from athcodec.encoding.survey import Ath, build_ath
     from athcodec.exporters import write, write_hdf5
-    from athcodec.joining import in_wind, join, looped, split
+    from athcodec.motion.clip import MotionClip
+    from athcodec.motion.discovery import Found, find_branches
+    from athcodec.motion.joining import in_wind, join, looped, split
+    from athcodec.motion.thresholds import Thresholds
+    from athcodec.motion.transitions import endless
+    from athcodec.opening import open
     from athcodec.sources import read, read_hdf5, sample_path
-    from athcodec.transitions import endless
     from athcodec.truncation import truncate
 
 __version__ = "0.13.0"
@@ -47,17 +49,19 @@ __all__ = [
     "write_hdf5",
 ]
 _LAZY = {  # by module: to import the package loads none, so that a command or a program pays for what it uses
-    "ath": ("Ath", "Thresholds", "build_ath"),
-    "ath_file": ("AthFile",),
-    "clip": ("MotionClip",),
-    "clip_view": ("ClipView",),
-    "decoder": ("Decoder", "open"),
-    "discovery": ("Found", "find_branches"),
+    "encoding.survey": ("Ath", "build_ath"),
+    "motion.thresholds": ("Thresholds",),
+    "decoding.ath_file": ("AthFile",),
+    "motion.clip": ("MotionClip",),
+    "decoding.clip_view": ("ClipView",),
+    "decoding.decoder": ("Decoder",),
+    "opening": ("open",),
+    "motion.discovery": ("Found", "find_branches"),
     "encoding": ("Summary", "encode"),
     "exporters": ("write", "write_hdf5"),
-    "joining": ("in_wind", "join", "looped", "split"),
+    "motion.joining": ("in_wind", "join", "looped", "split"),
     "sources": ("read", "read_hdf5", "sample_path"),
-    "transitions": ("endless",),
+    "motion.transitions": ("endless",),
     "truncation": ("truncate",),
 }
 _MODULES = ("errors", "metrics")

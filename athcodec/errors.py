@@ -1,6 +1,7 @@
 """Every error that athcodec raises on purpose, one class per cause.
 
-The codes are those of FORMAT.md, "Errors", and of core/ath.h; they never change once released. A message is one line:
+The codes are those of FORMAT.md, "Errors", and of core/include/ath.h; they never change once released. A message is
+one line:
 what is wrong, where, what was found and what was expected.
 """
 

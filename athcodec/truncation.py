@@ -7,10 +7,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from athcodec import container as ct
-from athcodec.ath_file import AthFile
-from athcodec.atomic_files import check_target, new_file
+from athcodec.decoding import container as ct
+from athcodec.decoding.ath_file import AthFile
 from athcodec.errors import ClipError, LevelUnavailable, Truncated
+from athcodec.files.atomic import check_target, new_file
 from athcodec.options import whole
 
 
@@ -81,7 +81,7 @@ def truncate(
                 )
         if Path(target).suffix.lower() == ".glb":
             from athcodec.exporters.gltf_into import put_motion  # which takes long to import
-            from athcodec.sources.gltf_motion import GltfMotion
+            from athcodec.files.gltf.motion import GltfMotion
 
             if not isinstance(file.source, GltfMotion):
                 raise ClipError(f"{target}: got an .ath file to cut, expected a GLB with a motion to write another one")

@@ -1,8 +1,8 @@
 """Levels of detail: bytes, errors and gaps at the joints, compared with the paper's approximation A^d.
 
-Both sides use the same nodes. The paper's side (Song, Yang and Peng 2011, sections 3 and 4) is athcodec.encoding.survey:
-one independent least-squares affine map per piece and frame, as exact matrices, never quantised. Ours is the
-decoder's output for the bytes of that level.
+Both sides use the same nodes. The paper's side (Song, Yang and Peng 2011, sections 3 and 4) is
+athcodec.encoding.survey: one independent least-squares affine map per piece and frame, as exact matrices, never
+quantised. Ours is the decoder's output for the bytes of that level.
 """
 
 from __future__ import annotations

@@ -33,9 +33,9 @@ SHOWN = (
     "athcodec/gpu/*.wgsl",
     "athcodec/gpu/*.mjs",
     "athcodec/gpu/*.py",
-    "athcodec/core/ath.h",
-    "athcodec/core/ath_gpu.h",
-    "athcodec/core/ath_player.h",
+    "athcodec/core/include/ath.h",
+    "athcodec/core/include/ath_gpu.h",
+    "athcodec/core/include/ath_player.h",
     "athcodec/core/examples/play.c",
 )
 

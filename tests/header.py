@@ -14,7 +14,7 @@ from fuzz.targets import CORE
 
 from athcodec._library import load_library
 
-TEXT = re.sub(r"/\*.*?\*/", "", (CORE / "ath.h").read_text("utf-8"), flags=re.S).replace("const ", "")
+TEXT = re.sub(r"/\*.*?\*/", "", (CORE / "include" / "ath.h").read_text("utf-8"), flags=re.S).replace("const ", "")
 NUMBERS = dict(re.findall(r"(ATH_\w+) = (\d+)", TEXT))
 TYPES = {"void": None} | {name: getattr(ctypes, f"c_{name}") for name in ("int", "size_t", "float", "double")}
 TYPES |= {f"{name}_t": getattr(ctypes, f"c_{name}") for name in set(re.findall(r"\b(u?int\d+)_t\b", TEXT))}

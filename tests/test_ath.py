@@ -341,9 +341,9 @@ def test_of_a_chain_of_two_thousand_branches_only_the_subtrees_above_the_depth_l
     rest = np.cumsum(0.01 * rng.normal(size=(4000, 3)) + (0, 0.05, 0), axis=0)
     positions = rest + np.cumsum(0.001 * rng.normal(size=(20, 4000, 3)), axis=1)
     clip = make_clip(rest, positions, np.repeat(np.arange(2000), 2), list(range(-1, 1999)))
-    fitted, fit = [], ath_module._Pieces.fit
+    fitted, fit = [], ath_module.Pieces.fit
     monkeypatch.setattr(
-        ath_module._Pieces,
+        ath_module.Pieces,
         "fit",
         lambda pieces, frames: (fitted.append(pieces.counts.sum() * frames.shape[1]), fit(pieces, frames))[1],
     )

@@ -91,7 +91,10 @@ def c_program(tmp_path):
 
     def run_it(number: int, path: Path) -> str:
         (tmp_path / "example.c").write_text(blocks(ROOT / "docs" / "c-api.md", "c")[number][1])
-        library, flags = library_path(), ("-std=c11", "-Wall", "-Wextra", "-Werror", "-I", ROOT / "athcodec" / "core")
+        library, flags = (
+            library_path(),
+            ("-std=c11", "-Wall", "-Wextra", "-Werror", "-I", ROOT / "athcodec" / "core" / "include"),
+        )
         linked = (library, f"-Wl,-rpath,{library.parent}", "-lm")
         run("cc", *flags, "example.c", *linked, "-o", "example", cwd=tmp_path)
         return run(tmp_path / "example", path, text=True)

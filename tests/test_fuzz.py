@@ -56,11 +56,11 @@ LENGTH, NUMBER = "if (length > body->size - 4) return ATH_BAD_CHUNK;", "if (valu
 ROWS = "    memset(work->node.rows, 0,"
 ALL_THERE = "return available < *needed ? ATH_MISSING : ATH_OK;"
 MISTAKES = {
-    "a length that is not checked": ("container.c", LENGTH, "", "motion", "crash"),
-    "a number that is not checked": ("streams.h", NUMBER, "if (value < 0)", "prelude", "crash"),
-    "memory that is not cleared": ("prepare.c", ROWS, ROWS.replace("memset", "if (0) memset"), "motion", "wrong"),
-    "a prefix that is not checked": ("container.c", ALL_THERE, "return ATH_OK;", "container", "wrong"),
-    "a time that is not checked": ("play.c", CLOCK, "", "decode", "crash"),
+    "a length that is not checked": ("file/container.c", LENGTH, "", "motion", "crash"),
+    "a number that is not checked": ("streams/prelude.inl", NUMBER, "if (value < 0)", "prelude", "crash"),
+    "memory that is not cleared": ("play/prepare.c", ROWS, ROWS.replace("memset", "if (0) memset"), "motion", "wrong"),
+    "a prefix that is not checked": ("file/container.c", ALL_THERE, "return ATH_OK;", "container", "wrong"),
+    "a time that is not checked": ("play/play.c", CLOCK, "", "decode", "crash"),
 }
 
 

@@ -291,11 +291,10 @@ def test_an_animal_goes_through_ath_and_is_played_within_the_bound(panda, node, 
 def test_an_animal_without_its_joints_is_smaller_than_by_pca(panda, tmp_path, bound):
     """Against principal components of all trajectories, tuned, with the same entropy coder and corrections."""
     from bench.codecs import Source
-    from bench.codecs.coder import RangeCoder
     from bench.codecs.pca import GlobalPca
 
     positions = panda["positions"].astype(np.float32)
     clip = MotionClip(positions, np.arange(len(positions)) / 30, faces=panda["faces"])
     ours = athcodec.encode(clip, tmp_path / "panda.ath", rel_error=bound, attributes="none").bytes
     source = Source(MotionClip(positions, clip.time, np.zeros(positions.shape[1], int), np.array([-1])))
-    assert ours < len(GlobalPca(RangeCoder()).encode(source, bound * source.diagonal))
+    assert ours < len(GlobalPca().encode(source, bound * source.diagonal))

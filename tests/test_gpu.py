@@ -1,4 +1,4 @@
-"""The GPU form (core/ath_gpu.h, docs/gpu.md): positions computed from its blocks alone are those of the decoder, in
+"""The GPU form (ath_gpu.h, docs/gpu.md): positions computed from its blocks alone are those of the decoder, in
 NumPy and, with the marker `browser`, by the shaders in Chromium (Debian's, without a graphics card)."""
 
 from __future__ import annotations

@@ -56,7 +56,7 @@ def decoded(command: list[str], vectors: list[conformance.Vector]) -> dict[str, 
 def test_every_vector_has_the_same_bits_on_every_machine(machine, sources, tmp_path):
     program = tmp_path / "decode"
     compiler = [sys.executable, "-m", "ziglang", "cc", "-target", *TARGETS[machine].split(), *OPTIONS]
-    subprocess.run([*compiler, "-I", CORE, *sources, "-o", program], check=True)
+    subprocess.run([*compiler, "-I", CORE / "include", *sources, "-o", program], check=True)
     vectors = conformance.vectors()
     found = decoded([emulator(machine), str(program)], vectors)
     wrong = [

@@ -16,8 +16,7 @@ CAUGHT = {  # a change, and a vector that tells it
     "65 if quarters >= 64.0 else int(quarters) if quarters >= 1.0 else 1": "gaps",
     "tridiagonalise: continue -> pass": "rigid-diagonal",
     "append_orthonormal: if after > before * keep -> if True": "sheet-mode-below",
-    "attach_frame: if not length2 > 1e-200 -> if not length2 > 1.0625e-200": "tangent-short-above",
-    "attach_frame: if not length2 > 1e-200 -> if not length2 > 9.375e-201": "tangent-short-below",
+    "attach_frame: if not squared(tangent) > 1e-200 -> if not squared(tangent) > 1.0625e-200": "tangent-short-above",
     "RangeDecoder.narrow: if self.range < 1 << 32 -> if self.range < 1 << 31": "smallest",
 }
 

@@ -56,7 +56,7 @@ def lib(tmp_path_factory):
     folder = tmp_path_factory.mktemp("player")
     (folder / "player.c").write_text(IMPLEMENTATION)
     run(sys.executable, CORE / "amalgamate.py", folder / "ath.c")
-    flags = ["-O2", "-g", "-shared", "-fPIC", "-DATH_STATIC", "-fvisibility=default", "-I", CORE]
+    flags = ["-O2", "-g", "-shared", "-fPIC", "-DATH_STATIC", "-fvisibility=default", "-I", CORE / "include"]
     run("cc", *flags, folder / "ath.c", folder / "player.c", "-lm", "-o", folder / "player.so")
     loaded = ctypes.CDLL(str(folder / "player.so"))
     for name in ("begin", "file", "fault"):
@@ -147,7 +147,7 @@ class Player:
 )
 def test_it_compiles_without_warnings(command, tmp_path):
     (tmp_path / "player.c").write_text(IMPLEMENTATION)
-    strict = ["-O2", "-Wall", "-Wextra", "-Wconversion", "-Werror", "-DATH_STATIC", "-I", CORE]
+    strict = ["-O2", "-Wall", "-Wextra", "-Wconversion", "-Werror", "-DATH_STATIC", "-I", CORE / "include"]
     run(*command, *strict, "-c", tmp_path / "player.c", "-o", tmp_path / "player.o")
 
 
@@ -536,7 +536,17 @@ def test_it_runs_clean_under_sanitizers(sample_ath, tmp_path):
     (tmp_path / "program.c").write_text(IMPLEMENTATION + PROGRAM)
     run(sys.executable, CORE / "amalgamate.py", tmp_path / "ath.c")
     flags = "-g -O1 -fsanitize=address,undefined -fno-sanitize-recover -DATH_STATIC".split()
-    run("cc", *flags, "-I", CORE, tmp_path / "ath.c", tmp_path / "program.c", "-lm", "-o", tmp_path / "program")
+    run(
+        "cc",
+        *flags,
+        "-I",
+        CORE / "include",
+        tmp_path / "ath.c",
+        tmp_path / "program.c",
+        "-lm",
+        "-o",
+        tmp_path / "program",
+    )
     done = subprocess.run([str(tmp_path / "program"), str(sample_ath)], capture_output=True, text=True)
     assert (done.returncode, done.stdout, done.stderr) == (0, "90 shown\n", "")
 

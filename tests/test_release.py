@@ -108,7 +108,17 @@ def test_a_library_for_another_machine_decodes_there_what_python_does_here(name,
     (tmp_path / machine.library).write_bytes(zipfile.ZipFile(wheel).read(f"athcodec/{machine.library}"))
     (tmp_path / "consumer.c").write_text(CONSUMER)
     program = tmp_path / "consumer.exe"
-    zig("cc", "-target", machine.target, "-I", CORE, tmp_path / "consumer.c", machine.linked(tmp_path), "-o", program)
+    zig(
+        "cc",
+        "-target",
+        machine.target,
+        "-I",
+        CORE / "include",
+        tmp_path / "consumer.c",
+        machine.linked(tmp_path),
+        "-o",
+        program,
+    )
     shutil.copy(sample_ath, tmp_path / "sample.ath")
     environment = os.environ | {"WINEPREFIX": str(tmp_path / "wine"), "WINEDEBUG": "-all"}
     done = subprocess.run(

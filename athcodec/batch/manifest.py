@@ -11,8 +11,8 @@ import json
 import os
 from typing import Any
 
-from athcodec.atomic_files import PLAIN_OPEN
 from athcodec.errors import AthError
+from athcodec.files.atomic import PLAIN_OPEN
 
 try:
     import fcntl

@@ -1,4 +1,4 @@
-"""What workers do: encode a clip, or the three steps of a long one, and return the result as plain dictionaries.
+"""Tasks of the workers: encode a clip, or the three steps of a long one, and return the result as plain dictionaries.
 
 `begin` encodes a clip of few segments, and of others makes the draft, `code` some of its segments, `finish` the file.
 Draft and coded segments lie as files in the run's scratch folder, beside the outputs, which all workers see under the
@@ -18,18 +18,20 @@ from contextlib import contextmanager, suppress
 from typing import Any
 
 import athcodec
-from athcodec import container as ct
-from athcodec import discovery, encoding
-from athcodec.atomic_files import check_target, is_url, keeping
+from athcodec import encoding
 from athcodec.batch.inputs import Item, download, identity, is_telling, sha256, upload
 from athcodec.batch.settings import coding_options, loop_frames, reading_options
-from athcodec.clip import MotionClip
+from athcodec.decoding import container as ct
 from athcodec.encoding import CodedSegment, Draft
+from athcodec.encoding.segmentation import split_segments
 from athcodec.errors import AthError, ClipError, SourceWarning
-from athcodec.joining import in_wind
-from athcodec.segmentation import split_segments
-from athcodec.shown import redacted
+from athcodec.files.atomic import check_target, is_url, keeping
+from athcodec.files.shown import redacted
+from athcodec.motion import discovery
+from athcodec.motion.clip import MotionClip
+from athcodec.motion.joining import in_wind
 from athcodec.sources import listed
+from athcodec.sources.branches import find_or_load
 
 BETWEEN_REPORTS = 0.3  # seconds
 
@@ -160,7 +162,7 @@ def _opened(item: Item, folder: str, source: dict[str, Any]) -> Iterator[MotionC
         clip = clip if blend is None else athcodec.looped(clip, blend)
         clip = athcodec.endless(clip) if item.settings.get("endless") else clip
         hierarchy = item.settings.get("hierarchy")
-        yield clip if hierarchy is None else discovery.with_branches(clip, discovery.find_or_load(clip, hierarchy))
+        yield clip if hierarchy is None else discovery.with_branches(clip, find_or_load(clip, hierarchy))
     _check_source(item, source)
 
 

@@ -22,7 +22,7 @@ from contextlib import contextmanager
 from importlib import import_module
 
 from athcodec.cli.arguments import make_parser
-from athcodec.shown import shown
+from athcodec.files.shown import shown
 
 INTERRUPTED, BROKEN_PIPE, TERMINATED = 130, 141, 143
 """Exit codes: 128 and the number of the signal, as shells have it."""

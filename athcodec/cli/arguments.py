@@ -9,6 +9,8 @@ from collections.abc import Callable
 from typing import Any
 
 import athcodec
+from athcodec.files.shown import shown
+from athcodec.motion.units import METRES, Length, parse_length, parse_size
 from athcodec.options import (
     DEFAULT_LADDER,
     DEFAULT_REL_ERROR,
@@ -23,8 +25,6 @@ from athcodec.options import (
     SAMPLES,
     ladder_of,
 )
-from athcodec.shown import shown
-from athcodec.units import METRES, Length, parse_length, parse_size
 
 DEMO_PAGE = "athcodec_demo.html"
 DEMO_FLOOR = {"fern": 4.0, "grass": 9.0}

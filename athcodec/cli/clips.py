@@ -11,22 +11,23 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import athcodec
-from athcodec import discovery
-from athcodec.ath import Thresholds
-from athcodec.ath_file import Level
-from athcodec.atomic_files import check_target, file_ids, is_url, keeping
 from athcodec.cli.printing import counted, progress, say
-from athcodec.clip import MotionClip
-from athcodec.clip_view import ClipView
-from athcodec.decoder import Decoder
+from athcodec.decoding.ath_file import Level
+from athcodec.decoding.clip_view import ClipView
+from athcodec.decoding.decoder import Decoder
 from athcodec.errors import AthError, ClipError, LevelUnavailable, NeedsHostMesh, RemoteError, SourceWarning
-from athcodec.joining import BLEND, in_wind
+from athcodec.files.atomic import check_target, file_ids, is_url, keeping
+from athcodec.files.reading import naming_file
 from athcodec.metrics import ErrorMeter, MotionMeter, SmoothnessMeter, compare_clips, level_meters
+from athcodec.motion import discovery
+from athcodec.motion.clip import MotionClip
+from athcodec.motion.joining import BLEND, in_wind
+from athcodec.motion.thresholds import Thresholds
+from athcodec.motion.units import Length
 from athcodec.options import HOST, MAX_MEMORY
 from athcodec.sources import LISTED, ReadOptions, find_format, listed
-from athcodec.sources.opening import naming_file
+from athcodec.sources.branches import find_or_load
 from athcodec.sources.sequence import each_once
-from athcodec.units import Length
 
 if TYPE_CHECKING:
     from athcodec.exporters.gltf_into import Into
@@ -84,7 +85,7 @@ def _endless(name: str, clip: MotionClip) -> MotionClip:
 def _checked_names(
     names: Sequence[str], clip_count: int, args: argparse.Namespace
 ) -> tuple[Sequence[str], Sequence[str]]:
-    """Those of the loops, and of the clips without an end. ClipError where they do not fit the clips."""
+    """Return the names of the loops and of the clips without an end. ClipError where they do not fit the clips."""
     if len(names) != clip_count:
         raise ClipError(f"--names: got {len(names)}, expected {clip_count}, one for each clip")
     loops, endless = (names if given == ["all"] else given or [] for given in (args.loop, args.endless))
@@ -120,7 +121,7 @@ def _say_takes(clip: MotionClip, path: str, args: argparse.Namespace) -> None:
 
 
 def view_to_decode(decoder: Decoder, args: argparse.Namespace) -> ClipView:
-    """What of a file is decoded: frames of a clip, or all clips."""
+    """Return the part of a file to decode: frames of a clip, or all clips."""
     level, of_one = args.level, args.clip is not None or len(decoder.clips) == 1
     if args.max_error is not None:
         length = args.max_error.in_scene_units(decoder.metadata.get("unit"))
@@ -152,7 +153,7 @@ def with_sources(
 
 def _source_of(decoder: Decoder, args: argparse.Namespace, path: str) -> MotionClip:
     """The clip in `path`; of a GLB that a motion was put into, what moves in it as the motion has it."""
-    from athcodec.sources.gltf_motion import GltfMotion
+    from athcodec.files.gltf.motion import GltfMotion
 
     if not isinstance(decoder.file.source, GltfMotion) or find_format(path).name != "gltf":
         return read_clip(args, path)
@@ -193,7 +194,7 @@ def read_clip(args: argparse.Namespace, path: str) -> MotionClip:
 
 def motions_of(path: str, args: argparse.Namespace) -> list[str | None]:
     """The names of the motions to open, one after the other; [None] where there is nothing to choose."""
-    from athcodec.sources.gltf_motion import motions_in
+    from athcodec.files.gltf.motion import motions_in
 
     if args.gltf_motion is not None or is_url(path):
         return [args.gltf_motion]
@@ -229,7 +230,7 @@ def with_branches(clip: MotionClip, hierarchy: str | None) -> MotionClip:
     """The clip on the branches that --hierarchy asks for; as it is without it: encoding finds what is missing."""
     if hierarchy is None:
         return clip
-    found = discovery.find_or_load(clip, hierarchy)
+    found = find_or_load(clip, hierarchy)
     say("hierarchy", str(found))
     return discovery.with_branches(clip, found)
 
@@ -283,7 +284,7 @@ def measure_against(decoder: Decoder, source: str, clip: MotionClip) -> list[dic
 
 
 def tick_ratios(decoder: Decoder) -> list[list[float | None]]:
-    """Of each clip, at each level that is complete, how much more it jerks near seams than in its median frame."""
+    """Return how much more each clip jerks near seams than in its median frame, at each complete level."""
     ratios: list[list[float | None]] = []
     with progress() as report:
         for clip in decoder.clips:
@@ -351,7 +352,7 @@ def check_name(output: str, suffix: str, inputs: Sequence[str] = ()) -> None:
 
 
 def _stats(decoder: Decoder) -> str:
-    """What was read of a file, and what that asked of a server."""
+    """Return how much of a file was read, and by how many requests."""
     requests = getattr(decoder.file.source, "requests", None)
     if requests is None:
         return f"{decoder.file.bytes_read:,} bytes read of {decoder.file.file_length:,}"

@@ -1,4 +1,4 @@
-"""What each verb of the command line does: a function that takes the parsed arguments and returns the exit code."""
+"""The verbs of the command line: each is a function that takes the parsed arguments and returns the exit code."""
 
 from __future__ import annotations
 
@@ -15,8 +15,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 import athcodec
-from athcodec import discovery
-from athcodec.atomic_files import scratch_folder
 from athcodec.cli.arguments import DEMO_FLOOR, DEMO_PAGE
 from athcodec.cli.clips import (
     bound,
@@ -55,10 +53,12 @@ from athcodec.cli.printing import (
     say_seam,
 )
 from athcodec.cli.streams import ATH, STREAM, standard_streams
-from athcodec.clip import MotionClip
-from athcodec.clip_view import ClipView
+from athcodec.decoding.clip_view import ClipView
 from athcodec.errors import AthError, ClipError
-from athcodec.hierarchy import branch_orders
+from athcodec.files.atomic import scratch_folder
+from athcodec.motion import discovery
+from athcodec.motion.clip import MotionClip
+from athcodec.motion.hierarchy import branch_orders
 from athcodec.options import DEFAULT_LADDER, DEFAULT_REL_ERROR, HOST, ladder_of
 
 if TYPE_CHECKING:
@@ -89,7 +89,7 @@ def encode(args: argparse.Namespace) -> int:
 
 
 def _last_motion(path: str) -> str:
-    from athcodec.sources.gltf_motion import motions_in
+    from athcodec.files.gltf.motion import motions_in
 
     return motions_in(path)[-1]
 
@@ -249,7 +249,7 @@ def _goes_back(args: argparse.Namespace) -> bool:
 def _write_decoded(motions: list[ClipView], args: argparse.Namespace) -> Written:
     """In the format that is asked for; several are those of a GLB, to go back into it."""
     from athcodec import exporters, sources
-    from athcodec.sources.gltf_motion import GltfMotion
+    from athcodec.files.gltf.motion import GltfMotion
 
     motion = motions[0]
     if _goes_back(args) and isinstance(motion.decoder.file.source, GltfMotion):
@@ -380,7 +380,7 @@ def _needs(row: dict[str, Any]) -> str:
 
 
 def view(args: argparse.Namespace) -> int:
-    from athcodec import view
+    from athcodec.viewer import view
 
     if args.export and Path(args.export).suffix.lower() not in (".html", ".htm"):
         return _export_gallery(args)
@@ -400,7 +400,7 @@ def view(args: argparse.Namespace) -> int:
 
 
 def _export_gallery(args: argparse.Namespace) -> int:
-    from athcodec import gallery, picture
+    from athcodec.viewer import gallery, picture
 
     if args.clip or args.host_mesh or args.floor:
         raise ValueError("--export DIR: got --clip, --host-mesh or --floor, which are of pages with one file")
@@ -416,7 +416,7 @@ def _export_gallery(args: argparse.Namespace) -> int:
 
 
 def _say_where(address: str, no_browser: bool) -> None:
-    from athcodec import view
+    from athcodec.viewer import view
 
     print(f"{address} (Ctrl-C ends it)", flush=True)  # our own, with the key that the page asks for
     if not no_browser:
@@ -424,7 +424,7 @@ def _say_where(address: str, no_browser: bool) -> None:
 
 
 def picture(args: argparse.Namespace) -> int:
-    from athcodec import picture
+    from athcodec.viewer import picture
 
     kind = next(name for name in picture.FORMATS if getattr(args, name))
     out = getattr(args, kind)
@@ -458,7 +458,7 @@ def demo(args: argparse.Namespace) -> int:
 
 
 def _export_demo(encoded: Path, page: Path, floor: Mapping[Path, float] | None = None) -> None:
-    from athcodec import view
+    from athcodec.viewer import view
 
     try:
         view.export_page(encoded, page, floor=floor)

@@ -11,7 +11,7 @@ import sys
 from pathlib import Path
 
 CORE = Path(__file__).parent
-INCLUDE = re.compile(r'^#include "(\w+\.h)".*\n', re.MULTILINE)
+INCLUDE = re.compile(r'^#include "([\w/]+\.(?:h|inl))".*\n', re.MULTILINE)
 PUBLIC = "ath.h", "ath_gpu.h"
 
 
@@ -35,7 +35,7 @@ def amalgamation(gpu: bool = False) -> str:
     def whole(name: str) -> str:
         if name in PUBLIC:
             return f'#include "{name}"\n'
-        if name.endswith(".h") and name in seen:
+        if not name.endswith(".c") and name in seen:
             return ""
         seen.add(name)
         return f"/* ---- {name} ---- */\n\n" + INCLUDE.sub(

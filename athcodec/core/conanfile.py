@@ -14,7 +14,7 @@ class Athcodec(ConanFile):
     description = "Decoder of .ath files, which hold the motion of plants"
     license = "MIT"
     settings = "os", "arch", "compiler", "build_type"
-    exports_sources = "*.c", "*.h", "CMakeLists.txt", "cmake/*", "examples/*"
+    exports_sources = "*.c", "*.h", "*.inl", "CMakeLists.txt", "cmake/*", "examples/*"
 
     def set_version(self):
         package = Path(self.recipe_folder).parent / "__init__.py"  # the one place that names it

@@ -8,16 +8,16 @@ import tempfile
 
 import numpy as np
 
-from athcodec import container as ct
-from athcodec.ath import survey
-from athcodec.clip import MotionClip
-from athcodec.discovery import Found, candidates, with_branches
+from athcodec.decoding import container as ct
 from athcodec.encoding.bounds import BoundOption
 from athcodec.encoding.job import SPOOL_BYTES, EncodingJob, EncodingOptions
 from athcodec.encoding.progress import Progress
 from athcodec.encoding.segment import Source
+from athcodec.encoding.survey import survey
 from athcodec.errors import BoundError
-from athcodec.hierarchy import hierarchy_of
+from athcodec.motion.clip import MotionClip
+from athcodec.motion.discovery import Found, candidates, with_branches
+from athcodec.motion.hierarchy import hierarchy_of
 from athcodec.options import DEFAULT_SEGMENT
 
 TRIAL_FRAMES = 64

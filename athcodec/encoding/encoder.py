@@ -14,20 +14,20 @@ from typing import Any
 
 import numpy as np
 
-from athcodec import container as ct
-from athcodec.ath import Thresholds
-from athcodec.atomic_files import check_target, keeping, new_file
-from athcodec.clip import MotionClip
+from athcodec.decoding import container as ct
 from athcodec.encoding.bounds import BoundOption
 from athcodec.encoding.branch_trials import best_branches
 from athcodec.encoding.job import SPOOL_BYTES, CodedSegment, Draft, EncodingJob, EncodingOptions
 from athcodec.encoding.layers import layer_ratios
 from athcodec.encoding.progress import Progress, WeightedProgress, stage_weights
 from athcodec.encoding.search import SAMPLES
+from athcodec.encoding.segmentation import split_segments
 from athcodec.encoding.summary import Summary
+from athcodec.files.atomic import check_target, keeping, new_file
+from athcodec.motion.clip import MotionClip
+from athcodec.motion.thresholds import Thresholds
+from athcodec.motion.units import Length
 from athcodec.options import DEFAULT_LADDER, DEFAULT_REL_ERROR
-from athcodec.segmentation import split_segments
-from athcodec.units import Length
 
 
 def encode(

@@ -21,13 +21,10 @@ from typing import IO, Any, BinaryIO
 
 import numpy as np
 
-from athcodec import container as ct
 from athcodec._native import MEASURES
-from athcodec.ath import THRESHOLDS, Ath, Survey, Thresholds, survey
-from athcodec.clip import ERROR_WEIGHTS, MotionClip
-from athcodec.decoder import Decoder
-from athcodec.decoder import open as open_ath
-from athcodec.discovery import Found, with_branches
+from athcodec.decoding import container as ct
+from athcodec.decoding.ath_file import AthFile
+from athcodec.decoding.decoder import Decoder
 from athcodec.encoding import polygons, streams
 from athcodec.encoding import quantise as qz
 from athcodec.encoding.features import Feature
@@ -48,12 +45,16 @@ from athcodec.encoding.search import Choice, Search, still_choice, typical_segme
 from athcodec.encoding.segment import SHEET, CodedPrelude, Source, thread_count
 from athcodec.encoding.shape import RestPrecision
 from athcodec.encoding.summary import Seam, Summary
+from athcodec.encoding.survey import Ath, Survey, survey
 from athcodec.errors import BoundError, ClipError
-from athcodec.hierarchy import Hierarchy, derived_edges, hierarchy_of
+from athcodec.files.threads import ThreadPool, default_jobs
+from athcodec.motion.clip import ERROR_WEIGHTS, MotionClip
+from athcodec.motion.discovery import Found, with_branches
+from athcodec.motion.hierarchy import Hierarchy, derived_edges, hierarchy_of
+from athcodec.motion.polygons import POLYGON_ARRAYS, Polygons, type_code
+from athcodec.motion.thresholds import THRESHOLDS, Thresholds
+from athcodec.motion.units import Length
 from athcodec.options import DEFAULT_LADDER, EFFORTS, MAX_SEGMENT, MIN_SEGMENT, ladder_of, whole
-from athcodec.polygons import POLYGON_ARRAYS, Polygons, type_code
-from athcodec.threads import ThreadPool, default_jobs
-from athcodec.units import Length
 
 SPOOL_BYTES = 64 << 20
 CHUNK_BYTES, LEVEL_BYTES = 6, 6  # of the front for a chunk, and for the errors of a level and segment
@@ -462,11 +463,11 @@ class EncodingJob:
         chunks = result.store.write(out, result.header, result.errors)
         if any(clip_range.loop for clip_range in self.clip.clip_ranges):
             mesh = self.clip.source_rest if self.options.host_rest else None
-            with open_ath(out, strict=True, host_mesh=mesh) as decoder:
+            with AthFile(out, strict=True, host_mesh=mesh) as file, Decoder(file) as decoder:
                 result.store.replace(ct.CLIPS, self._clips(decided, self._seam_errors(decoder)))
             out.seek(0)
             chunks = result.store.write(out, result.header, result.errors)
-        with open_ath(out, strict=True) as decoder:  # before the file gets its name
+        with AthFile(out, strict=True) as file, Decoder(file) as decoder:  # before the file gets its name
             summary = _summary(Path(path), self, decided, result, chunks, decoder)
         self.report("done", 1.0)
         return summary

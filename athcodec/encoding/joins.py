@@ -13,7 +13,7 @@ from itertools import product
 
 import numpy as np
 
-from athcodec.threads import ranges
+from athcodec.files.threads import ranges
 
 END_FRAMES = 2  # of a segment, that the next one looks at
 WIDTHS = (1, 2, 3, 4, 5, 6, 8, 10, 12, 14, 16, 20, 24, 28, 32, 40, 48, 64, 96)  # frames

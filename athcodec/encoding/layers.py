@@ -15,8 +15,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from athcodec import container as ct
 from athcodec._native import MEASURES
+from athcodec.decoding import container as ct
 from athcodec.encoding import quantise as qz
 from athcodec.encoding import streams
 from athcodec.encoding.features import Feature

@@ -14,9 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from athcodec._native import SHAPE_MODES, address, lib
-from athcodec.algebra import multiply, principal, solve
 from athcodec.encoding import quantise as qz
 from athcodec.encoding.motion import Plan, SegmentMotion
+from athcodec.motion.algebra import multiply, principal, solve
 
 NUMBERS = 3 * SHAPE_MODES
 FAINT = 0.15  # steps that a shape bends rings by, which stretches them where they turn

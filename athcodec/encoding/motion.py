@@ -34,18 +34,18 @@ from athcodec._native import (
     address,
     lib,
 )
-from athcodec.container import from_short_float
-from athcodec.threads import SERIAL, ThreadPool, ranges
+from athcodec.decoding.container import from_short_float
+from athcodec.files.threads import SERIAL, ThreadPool, ranges
 
 if TYPE_CHECKING:
     from athcodec.encoding.learned_modes import LearnedModes
 
-STEM_ROOT, NODE_ROOT = -1, -2  # core/motion.h: of streams in waves that are not learned, of stems and of nodes
+STEM_ROOT, NODE_ROOT = -1, -2  # core/model/motion.h: of streams in waves that are not learned, of stems and of nodes
 RANGES, LEAST_RANGE = 24, 1024  # of a plant's vertices per thread and call
 RUN, RUNS = 64, 2  # vertices of a run, and how many runs there are for each in a sample
 
 
-class Waves(IntEnum):  # core/plan.h
+class Waves(IntEnum):  # core/model/plan.h
     """Eigenvectors of third differences, a Fourier series, modes of a free beam."""
 
     SMOOTH, PERIODIC, BEAM = range(3)

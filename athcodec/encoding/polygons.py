@@ -7,10 +7,10 @@ from ctypes import byref
 
 import numpy as np
 
-from athcodec import container as ct
 from athcodec._native import address, encode_stream, lib
+from athcodec.decoding import container as ct
 from athcodec.errors import ClipError
-from athcodec.polygons import Polygons
+from athcodec.motion.polygons import Polygons
 
 CORNERS_OF_REST, FACES_OF_REST = 8, 4  # for each vertex, at most, that a rest pose goes by
 

@@ -12,9 +12,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from athcodec import container as ct
 from athcodec._native import Rounding
-from athcodec.ath import Ath, Survey, Thresholds
+from athcodec.decoding import container as ct
 from athcodec.encoding import quantise as qz
 from athcodec.encoding import streams
 from athcodec.encoding.features import Feature
@@ -23,7 +22,9 @@ from athcodec.encoding.motion import LevelStream, SegmentMotion, position_errors
 from athcodec.encoding.search import Choice, SegmentSample, typical_segments
 from athcodec.encoding.segment import CodedPrelude, Settings, Source, with_best_lags
 from athcodec.encoding.shape import finer_than
+from athcodec.encoding.survey import Ath, Survey
 from athcodec.errors import BoundError
+from athcodec.motion.thresholds import Thresholds
 
 CUBES, LATTICE = False, True  # What positions are rounded to.
 REST_STEPS = (0.5, 0.25, 0.125, 1.15)  # over the bound

@@ -10,10 +10,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from athcodec.ath import Ath
 from athcodec.encoding import quantise as qz
 from athcodec.encoding.motion import Plan, SegmentMotion
 from athcodec.encoding.segment import FINER, Settings, Source, analyse_finely, branch_records, level_streams
+from athcodec.encoding.survey import Ath
 
 SEGMENTS = 4  # that the mean is taken of
 

@@ -11,8 +11,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from athcodec._native import PIECE_VERTICES
-from athcodec.algebra import decompose, determinant, multiply
 from athcodec.encoding.quantise import half_octave
+from athcodec.motion.algebra import decompose, determinant, multiply
 
 OWN_BEND = 0.3  # what a rigid part may bend by in the source, over the bound
 STIFF_BEND = 0.05  # the same of one that is rigid at any bound

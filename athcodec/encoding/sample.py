@@ -9,13 +9,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from athcodec.ath import Ath
-from athcodec.clip import MotionClip
 from athcodec.encoding import quantise as qz
 from athcodec.encoding.motion import Plan
 from athcodec.encoding.segment import Source
-from athcodec.frames import Frames
-from athcodec.hierarchy import Hierarchy
+from athcodec.encoding.survey import Ath
+from athcodec.motion.clip import MotionClip
+from athcodec.motion.frames import Frames
+from athcodec.motion.hierarchy import Hierarchy
 
 LARGE = 5_000  # vertices: smaller plants are not sampled
 LEAST_SAMPLE, ENOUGH, MOST_SAMPLE = 3_500, 6_000, 1 << 16  # vertices of a sample; between the first two its share

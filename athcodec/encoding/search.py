@@ -16,8 +16,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from athcodec.ath import Ath
-from athcodec.container import ROTATION_FACTORS
+from athcodec.decoding.container import ROTATION_FACTORS
 from athcodec.encoding import quantise as qz
 from athcodec.encoding import streams
 from athcodec.encoding.features import Feature
@@ -49,6 +48,7 @@ from athcodec.encoding.segment import (
     with_connected_rest,
 )
 from athcodec.encoding.shape import finer_than
+from athcodec.encoding.survey import Ath
 from athcodec.encoding.time_bases import TimeComponents
 from athcodec.errors import BoundError
 from athcodec.options import DEFAULT_SEGMENT

@@ -14,11 +14,8 @@ from weakref import WeakValueDictionary
 
 import numpy as np
 
-from athcodec import container as ct
 from athcodec._native import BRANCH, LOOSE, SHEET, WHOLE, Rounding, address, lib
-from athcodec.algebra import length, multiply
-from athcodec.ath import Ath, Survey
-from athcodec.clip import MotionClip, stands_still
+from athcodec.decoding import container as ct
 from athcodec.encoding import quantise as qz
 from athcodec.encoding import streams
 from athcodec.encoding.features import Feature
@@ -26,13 +23,16 @@ from athcodec.encoding.learned_modes import LearnedModes
 from athcodec.encoding.motion import NODE_ROOT, STEM_ROOT, LevelStream, Plan, PlanSample, SegmentMotion, gather
 from athcodec.encoding.polygons import Mesh
 from athcodec.encoding.rigid import turn_of
+from athcodec.encoding.segmentation import split_segments
 from athcodec.encoding.shape import RestPrecision
+from athcodec.encoding.survey import Ath, Survey
 from athcodec.encoding.time_bases import Entries, InWaves, TimeComponents
 from athcodec.errors import BoundError
-from athcodec.hierarchy import Hierarchy
-from athcodec.polygons import Polygons
-from athcodec.segmentation import split_segments
-from athcodec.threads import SERIAL, ThreadPool, default_jobs
+from athcodec.files.threads import SERIAL, ThreadPool, default_jobs
+from athcodec.motion.algebra import length, multiply
+from athcodec.motion.clip import MotionClip, stands_still
+from athcodec.motion.hierarchy import Hierarchy
+from athcodec.motion.polygons import Polygons
 
 BEAM = 0  # form of a branch; others are SHEET, or a tube's vertices for each ring
 FINER = 32  # step over that of segments that bases and modes are learned from

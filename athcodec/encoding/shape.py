@@ -11,11 +11,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from athcodec.clip import MotionClip
 from athcodec.encoding.quantise import half_octaves
 from athcodec.errors import BoundError
-from athcodec.hierarchy import Hierarchy
-from athcodec.units import Length, parse_length
+from athcodec.motion.clip import MotionClip
+from athcodec.motion.hierarchy import Hierarchy
+from athcodec.motion.units import Length, parse_length
 
 OF_BOUND = "bound"
 EDGE_STEP, HEIGHT_STEP = 0.025, 0.05  # largest step of a branch, over the lengths of its edges and heights of its faces

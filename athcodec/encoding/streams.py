@@ -16,7 +16,7 @@ from athcodec._native import BRANCH, CoreMetEnds, address, encode_stream, lib
 from athcodec.encoding.learned_modes import LearnedModes
 from athcodec.encoding.motion import Plan, SegmentMotion
 from athcodec.encoding.polygons import Mesh
-from athcodec.threads import SERIAL, ThreadPool, ranges
+from athcodec.files.threads import SERIAL, ThreadPool, ranges
 
 
 def encode_hierarchy(branches: np.ndarray, branch_source: np.ndarray, vertex_source: np.ndarray) -> bytes:

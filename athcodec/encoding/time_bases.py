@@ -12,10 +12,10 @@ from functools import cached_property
 import numpy as np
 
 from athcodec._native import address, lib
-from athcodec.algebra import multiply, principal
-from athcodec.container import BASIS_AS_SAMPLES, BASIS_IN_WAVES
+from athcodec.decoding.container import BASIS_AS_SAMPLES, BASIS_IN_WAVES
 from athcodec.encoding import streams
 from athcodec.encoding.quantise import half_octaves
+from athcodec.motion.algebra import multiply, principal
 
 MOST_SAMPLE = 8192  # Stands for 1.
 PRECISION = 0.6  # step of a row's integers, over that by which they err as much as those of all tracks in the row

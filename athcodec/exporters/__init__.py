@@ -14,8 +14,8 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from athcodec.atomic_files import check_target, keeping
 from athcodec.errors import ClipError
+from athcodec.files.atomic import check_target, keeping
 from athcodec.options import whole
 from athcodec.sources import Format, format_by_suffix, format_named
 
@@ -101,7 +101,7 @@ FORMATS = (
 
 @dataclass(frozen=True)
 class Written:
-    """What `write` has written.
+    """The result of `write`.
 
     Parameters
     ----------

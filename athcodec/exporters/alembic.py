@@ -17,10 +17,10 @@ from typing import Any
 
 import numpy as np
 
-from athcodec.atomic_files import new_files
 from athcodec.exporters import WriteOptions
 from athcodec.exporters.copies import cost_of, fit_copies
 from athcodec.exporters.scene_objects import objects_of
+from athcodec.files.atomic import new_files
 
 STATIC = (
     "frame_count",
@@ -72,7 +72,7 @@ def write_clip(
 
 
 def _send(process: subprocess.Popen, head: Any, motion: Any, report: Callable[[float], None]) -> bytes:
-    """What the process says in the end."""
+    """Return the final answer of the process."""
     try:
         pickle.dump(head, process.stdin, pickle.HIGHEST_PROTOCOL)
         for start, block in motion.blocks():

@@ -26,8 +26,7 @@ from typing import Any
 
 import numpy as np
 
-from athcodec.atomic_files import new_file
-from athcodec.clip_view import ClipView
+from athcodec.decoding.clip_view import ClipView
 from athcodec.errors import ClipError
 from athcodec.exporters import WriteOptions
 from athcodec.exporters.fitting import allowed_error
@@ -48,6 +47,7 @@ from athcodec.exporters.gltf_build import (
 from athcodec.exporters.gltf_copies import PATHS, GltfCopies, Movers, unit_quaternion, with_copies
 from athcodec.exporters.gltf_joints import Joints, fit_joints
 from athcodec.exporters.rig import fit_rig
+from athcodec.files.atomic import new_file
 
 MOST_JOINTS = 65536
 SHORT_FRAMES, SHORT_BYTES = 300, 256 << 20
@@ -106,7 +106,7 @@ def _write(
 def _writer(
     motion: Any, options: WriteOptions, found: list[GltfMesh | GltfCopies], report: Callable[[float], None]
 ) -> _Joined | _Morphed:
-    """What moves the meshes as the options say."""
+    """Return what moves the meshes, as the options ask."""
     if options.rig is not None:
         return _Joined(motion, fit_rig(motion, options.rig, report))
     chosen = np.zeros(motion.vertex_count, bool)

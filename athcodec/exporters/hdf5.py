@@ -16,12 +16,12 @@ from typing import Any
 import h5py
 import numpy as np
 
-from athcodec.atomic_files import PendingFile
-from athcodec.clip import RESERVED_NAMES, check_branches, check_float_dtype, check_time
 from athcodec.errors import ClipError
 from athcodec.exporters import WriteOptions
-from athcodec.hierarchy import branch_orders
-from athcodec.joining import clip_metadata
+from athcodec.files.atomic import PendingFile
+from athcodec.motion.clip import RESERVED_NAMES, check_branches, check_float_dtype, check_time
+from athcodec.motion.hierarchy import branch_orders
+from athcodec.motion.joining import clip_metadata
 
 CHUNK_BYTES = 1 << 20
 

@@ -15,12 +15,12 @@ from typing import Any
 
 import numpy as np
 
-from athcodec.atomic_files import new_file
-from athcodec.clip import RESERVED_NAMES
 from athcodec.errors import ClipError
 from athcodec.exporters import WriteOptions
-from athcodec.hierarchy import branch_orders
-from athcodec.joining import clip_metadata
+from athcodec.files.atomic import new_file
+from athcodec.motion.clip import RESERVED_NAMES
+from athcodec.motion.hierarchy import branch_orders
+from athcodec.motion.joining import clip_metadata
 from athcodec.sources.npz import METADATA
 
 

@@ -16,13 +16,13 @@ from typing import Any
 
 import numpy as np
 
-from athcodec.atomic_files import new_folder
 from athcodec.errors import ClipError
 from athcodec.exporters import WriteOptions
 from athcodec.exporters.fitting import portions
 from athcodec.exporters.gltf import write_rest
 from athcodec.exporters.gltf_build import branch_extras
 from athcodec.exporters.textures import WIDEST, facts_of, write_exr, write_json, write_png
+from athcodec.files.atomic import new_folder
 
 NARROWEST = 64
 HIGHEST = 16384

@@ -17,13 +17,13 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
-from athcodec.atomic_files import check_target, new_files
 from athcodec.errors import ClipError
 from athcodec.exporters import WriteOptions
 from athcodec.exporters.mesh import ObjWriter, has_mesh
 from athcodec.exporters.timing import frame_numbers
+from athcodec.files.atomic import check_target, new_files
+from athcodec.files.reading import Budget
 from athcodec.sources.mesh import Mesh, read_mesh
-from athcodec.sources.opening import Budget
 from athcodec.sources.pc2 import HEADER, MAGIC
 
 STEP_TOLERANCE = 1e-4

@@ -17,11 +17,11 @@ from typing import Any
 
 import numpy as np
 
-from athcodec.atomic_files import check_target, new_files
 from athcodec.errors import ClipError
 from athcodec.exporters import FILES, WriteOptions
 from athcodec.exporters.mesh import WRITERS
 from athcodec.exporters.timing import frame_numbers
+from athcodec.files.atomic import check_target, new_files
 from athcodec.sources.sequence import LARGEST_NUMBER, Numbering, numbering_of
 
 DIGITS = 4

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from athcodec.clip_view import ClipView
+from athcodec.decoding.clip_view import ClipView
 from athcodec.exporters.gltf_build import clock
 
 WIDEST = 4096  # pixels of a side that all devices support

@@ -20,7 +20,6 @@ from typing import Any
 import numpy as np
 from pxr import Sdf, Tf, Usd, UsdGeom, UsdShade, UsdSkel, Vt
 
-from athcodec.atomic_files import new_files
 from athcodec.exporters import WriteOptions
 from athcodec.exporters import usd_nanite as nanite
 from athcodec.exporters.copies import Copies, cost_of, fit_copies, one_copy, rows_of_one
@@ -40,8 +39,9 @@ from athcodec.exporters.scene_objects import (
 )
 from athcodec.exporters.timing import distinct_frame_numbers, frame_rate_of
 from athcodec.exporters.usd_rig import write_rig
+from athcodec.files.atomic import new_files
+from athcodec.motion.units import METRES, unit_symbol
 from athcodec.sources.scene_objects import FACE_MATERIAL, OWN
-from athcodec.units import METRES, unit_symbol
 
 SAVE_BYTES = 16 << 20
 PRIMVARS = {"uv": "st", "colors": "displayColor"}
@@ -427,7 +427,7 @@ def _vt(values: np.ndarray, type_name: Sdf.ValueTypeName, dtype: str) -> Any:
 
 
 def _own_arrays(root: Usd.Prim, motion: Any, left: dict[str, tuple[np.ndarray, str]]) -> None:
-    """What has no place in the prims, byte for byte."""
+    """Return the data that has no place in the prims, byte for byte."""
     for descriptor, raw in own_arrays(motion, left):
         attribute = root.CreateAttribute(
             f"{OWN}:{_identifier(descriptor.name)}", Sdf.ValueTypeNames.UCharArray, True, Sdf.VariabilityUniform

@@ -18,13 +18,13 @@ from typing import Any
 import numpy as np
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdSkel, Vt
 
-from athcodec.clip import MotionClip
 from athcodec.errors import ClipError
 from athcodec.exporters.copies import Copies, fit_copies
 from athcodec.exporters.fitting import allowed_error, portions, rotation_matrices
 from athcodec.exporters.gltf_joints import Joints
 from athcodec.exporters.rig import hierarchy_to_rig
 from athcodec.exporters.scene_objects import SceneObject
+from athcodec.motion.clip import MotionClip
 
 ROOT_PRIM, BASE = "/clip", "/clip/base"
 ROOT_SCHEMA, BINDING_SCHEMA = "NaniteAssemblyRootAPI", "NaniteAssemblySkelBindingAPI"
@@ -40,7 +40,7 @@ class Part:
 
 
 def parts_of(motion: Any, objects: list[SceneObject], joints: Joints) -> dict[int, Part]:
-    """Those objects that are copies of one shape at rest, by their number. ClipError where no base is left."""
+    """Return the objects that are copies of one shape at rest, by their number. ClipError where no base is left."""
     rest = np.asarray(motion.rest)
     still = MotionClip(rest[None], np.zeros(1), rest=rest)
     found = {

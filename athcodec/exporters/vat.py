@@ -16,13 +16,13 @@ from typing import Any
 
 import numpy as np
 
-from athcodec.atomic_files import new_folder
 from athcodec.errors import ClipError
 from athcodec.exporters import WriteOptions
 from athcodec.exporters.fitting import Mapped, Moving, allowed_error, fit
 from athcodec.exporters.gltf import write_rest
 from athcodec.exporters.gltf_build import branch_extras
 from athcodec.exporters.textures import WIDEST, facts_of, write_exr, write_json
+from athcodec.files.atomic import new_folder
 
 PER_ROW = WIDEST // 3
 MOST_NODES = PER_ROW * WIDEST
@@ -106,7 +106,7 @@ class _Grid:
         self.per_row = min(nodes, PER_ROW)
         self.rows_per_frame = -(-nodes // self.per_row)
         self.width = 3 * self.per_row
-        self.frames = min(frames, WIDEST // self.rows_per_frame)  # of one texture
+        self.frames = min(frames, WIDEST // self.rows_per_frame)  # Frames that one texture holds.
         self.height = self.frames * self.rows_per_frame
 
     def textures(self, rows: np.ndarray, name: str) -> Iterator[tuple[dict[str, Any], np.ndarray]]:

@@ -20,11 +20,11 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from athcodec.atomic_files import check_target, new_files
 from athcodec.exporters import FILES, WriteOptions
 from athcodec.exporters.cells import cell_and_point_data, cells_of
 from athcodec.exporters.scene_objects import said_scene
 from athcodec.exporters.sequence import file_names, write_frames
+from athcodec.files.atomic import check_target, new_files
 from athcodec.sources.scene_objects import OWN
 
 _HEAD = (
@@ -53,7 +53,7 @@ def write_clip(
 
 
 def _stem(target: Path) -> str:
-    """Of the index: the name of the series without what stands for its numbers."""
+    """Return the index's name: that of the series without the place of its numbers."""
     if target.suffix.lower() == ".pvd":
         return target.stem
     bare = target.stem.rstrip("0123456789").partition("#")[0].partition("%")[0].rstrip("_-. ")

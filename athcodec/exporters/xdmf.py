@@ -19,11 +19,11 @@ from xml.etree import ElementTree
 import h5py
 import numpy as np
 
-from athcodec.atomic_files import check_target, new_files
 from athcodec.exporters import WriteOptions
 from athcodec.exporters.cells import Cells, cell_and_point_data, cells_of
 from athcodec.exporters.hdf5 import Sink
 from athcodec.exporters.scene_objects import said_names
+from athcodec.files.atomic import check_target, new_files
 from athcodec.sources.cells import VTK_NAMES, VTK_NUMBERS
 from athcodec.sources.xdmf import MIXED
 

@@ -1,4 +1,4 @@
-"""The GPU form of a file (core/ath_gpu.h): blocks of words that shaders compute positions from. See docs/gpu.md.
+"""The GPU form of a file (ath_gpu.h, docs/gpu.md): blocks of words that shaders compute positions from.
 
 `GpuFile` makes the blocks; evaluate.py computes with them in NumPy what the shaders beside it, *.wgsl, do on a GPU.
 """
@@ -11,9 +11,9 @@ from pathlib import Path
 
 import numpy as np
 
-from athcodec import core_file
 from athcodec._native import as_bytes, lib
-from athcodec.container import Limits
+from athcodec.decoding import core_file
+from athcodec.decoding.container import Limits
 
 SHADERS = Path(__file__).parent
 
@@ -24,7 +24,7 @@ class Room(ctypes.Structure):
     _fields_ = [(name, c_uint32) for name in "rows values shapes turns corrected corrections waves".split()]
 
 
-_FUNCTIONS = {  # core/ath_gpu.h
+_FUNCTIONS = {  # core/include/ath_gpu.h
     "ath_gpu_level_size": (c_size_t, [c_void_p, c_int32]),
     "ath_gpu_build_level": (c_int, [c_void_p, c_int32, c_void_p, c_size_t]),
     "ath_gpu_record_size": (c_size_t, [c_void_p, c_int32, POINTER(Room)]),
@@ -122,8 +122,9 @@ class GpuFile:
 
 
 def corners_of(triangles: np.ndarray, vertex_count: int) -> np.ndarray:
-    """What vertices.wgsl takes normals from, uint32: where the corners of each vertex begin, and one behind the last;
-    then the two other corners of each triangle at a vertex, in the order of its turn. triangles: (F, 3), file order."""
+    """Return the corners that vertices.wgsl takes normals from, uint32: where the corners of each vertex begin, and
+    one behind the last; then the two other corners of each triangle at a vertex, in the order of its turn. triangles:
+    (F, 3), file order."""
     turns = np.concatenate([np.roll(triangles, -turn, axis=1) for turn in range(3)]).astype(np.uint32)
     turns = turns[np.argsort(turns[:, 0], kind="stable")]
     first = np.searchsorted(turns[:, 0], np.arange(vertex_count + 1))

@@ -8,7 +8,7 @@
 //                                 previousWeight}], pass 3: each a plant at a time
 //     await passes.read(shows)    the same shows, read back
 //
-// `level` and `words` are the blocks of core/ath_gpu.h, as Uint32Array.
+// `level` and `words` are the blocks of core/include/ath_gpu.h, as Uint32Array.
 
 const STORAGE = 0x80 | 4 | 8; // GPUBufferUsage.STORAGE | COPY_SRC | COPY_DST
 const UNIFORM = 0x40 | 8;

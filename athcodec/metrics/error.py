@@ -10,9 +10,9 @@ from math import frexp, inf, sqrt
 
 import numpy as np
 
-from athcodec.clip import MotionClip
 from athcodec.errors import ClipError
 from athcodec.metrics.blocks import paired
+from athcodec.motion.clip import MotionClip
 
 
 class ErrorMeter:

@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from athcodec.clip import MotionClip
 from athcodec.metrics.error import ErrorMeter
 from athcodec.metrics.shape import ShapeMeter, edges_of, stem_links
 from athcodec.metrics.smoothness import SmoothnessMeter
+from athcodec.motion.clip import MotionClip
 
 if TYPE_CHECKING:
-    from athcodec.decoder import Decoder
+    from athcodec.decoding.decoder import Decoder
 
 TAIL = 0.999
 """The quantile of edges and faces that is given: one in a thousand is worse."""
@@ -76,7 +76,7 @@ class MotionMeter:
             meter.add(reference, decoded)
 
     def figures(self) -> dict[str, Any]:
-        """What was measured, by names that JSON uses: "smoothness" and "shape" are dictionaries of their own.
+        """The measurements, by names that JSON uses: "smoothness" and "shape" are dictionaries of their own.
 
         Second differences of the error are in bounds, angles in degrees. What a clip has no seams, edges or faces for
         is None.

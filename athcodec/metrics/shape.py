@@ -1,11 +1,11 @@
-"""What decoding does to shapes: how edges stretch, how faces turn, which of them collapse."""
+"""Effects of decoding on shapes: how edges stretch, how faces turn, which of them collapse."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from athcodec.clip import MotionClip, source_stem_index
 from athcodec.metrics.blocks import Spread, paired
+from athcodec.motion.clip import MotionClip, source_stem_index
 
 DEGENERATE_SHARE = 1e-3
 """Of a face's area in the source: a decoded face that has less is degenerate."""

@@ -20,16 +20,16 @@ from typing import Any
 
 import numpy as np
 
-from athcodec.clip import NOT_KEPT, MotionClip
 from athcodec.errors import ClipError, MissingExtra, SourceWarning
-from athcodec.file_kinds import HEAD_BYTES
-from athcodec.frames import Frames
+from athcodec.files.kinds import HEAD_BYTES
+from athcodec.files.plain import open_plain
+from athcodec.files.reading import closing_on_failure, naming_file
+from athcodec.motion.clip import NOT_KEPT, MotionClip
+from athcodec.motion.frames import Frames
+from athcodec.motion.units import METRES, unit_symbol
 from athcodec.options import MAX_MEMORY, SAMPLES
-from athcodec.plain_files import open_plain
-from athcodec.sources.opening import closing_on_failure, naming_file
-from athcodec.units import METRES, unit_symbol
 
-# what is not read of a scene and is no shape
+# Parts of a scene that are not read and are no shapes.
 NO_SHAPES = frozenset(
     (
         "Material",

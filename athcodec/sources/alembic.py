@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from os import PathLike
 
-from athcodec.clip import MotionClip
+from athcodec.motion.clip import MotionClip
 from athcodec.sources import ReadOptions
 from athcodec.sources.reader_process import read_apart
 

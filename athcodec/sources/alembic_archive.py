@@ -21,10 +21,10 @@ from typing import Any
 import numpy as np
 from alembic3d import Abc, AbcGeom
 
-from athcodec.clip import MotionClip
 from athcodec.errors import ClipError
+from athcodec.files.reading import FileWatch
+from athcodec.motion.clip import MotionClip
 from athcodec.sources import ReadOptions
-from athcodec.sources.opening import FileWatch
 from athcodec.sources.scene_objects import (
     DESCRIPTOR,
     OWN,

@@ -9,7 +9,7 @@ import zipfile
 from typing import BinaryIO
 
 from athcodec.errors import ClipError
-from athcodec.plain_files import open_plain
+from athcodec.files.plain import open_plain
 
 MAGIC = b"PXR-USDC"
 LARGEST_EXPANSION = 1024  # integers per compressed byte: two bits each at least, and LZ4 makes at most 255 bytes of one

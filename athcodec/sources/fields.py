@@ -14,9 +14,9 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from athcodec.clip import RESERVED_NAMES, MotionClip
 from athcodec.errors import ClipError
-from athcodec.frames import Frames
+from athcodec.motion.clip import RESERVED_NAMES, MotionClip
+from athcodec.motion.frames import Frames
 from athcodec.sources import ReadOptions
 from athcodec.sources.cells import Topology
 from athcodec.sources.mesh import kind_of

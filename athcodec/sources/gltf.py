@@ -22,16 +22,17 @@ from typing import Any
 
 import numpy as np
 
-from athcodec.clip import DEFAULT_FPS, RESERVED_NAMES, ClipRange, MotionClip, Skin
 from athcodec.errors import ClipError
-from athcodec.frames import Frames
-from athcodec.joining import join
+from athcodec.files.gltf.document import GltfFile
+from athcodec.files.gltf.json import BROKEN, brief, entries, entry, indices, integer
+from athcodec.files.gltf.motion import EXTENSION, extension_of
+from athcodec.files.gltf.primitives import corners, rows_of
+from athcodec.files.reading import closing_on_failure, naming
+from athcodec.motion.clip import DEFAULT_FPS, RESERVED_NAMES, ClipRange, MotionClip, Skin
+from athcodec.motion.frames import Frames
+from athcodec.motion.joining import join
 from athcodec.sources import ReadOptions
-from athcodec.sources.gltf_file import GltfFile
-from athcodec.sources.gltf_json import BROKEN, brief, entries, entry, indices, integer
-from athcodec.sources.gltf_motion import EXTENSION, extension_of
 from athcodec.sources.gltf_scene import Scene, key_rate, on_grid, rotation_matrices
-from athcodec.sources.opening import closing_on_failure, naming
 from athcodec.sources.scene_objects import FACE_MATERIAL, MATERIAL_NAMES
 
 WORK_BYTES = 64 << 20
@@ -759,7 +760,7 @@ def _connections(
                 continue
             count = node.shape_count if primitive.get("indices") is None else file.count(primitive["indices"])
             file.budget.take(CORNER_BYTES * count * (node.count // max(node.shape_count, 1)), f"mesh {node.name!r}")
-            rows = _rows(_corners(file, primitive, node.shape_count, f"mesh {node.name!r}"), mode)
+            rows = rows_of(corners(file, primitive, node.shape_count, f"mesh {node.name!r}"), mode)
             own[rows.shape[1]].append(rows)
             if rows.shape[1] == 3:
                 label = integer(primitive, "material", -1, low=-1, stop=len(file.items("materials")))
@@ -779,42 +780,6 @@ def _connections(
 def _material_names(file: GltfFile) -> list[str]:
     names = [item.get("name") for item in file.items("materials")]
     return [name if isinstance(name, str) and name else f"material {number}" for number, name in enumerate(names)]
-
-
-def triangles(file: GltfFile, primitive: dict, count: int) -> np.ndarray:
-    """(F, 3) a primitive's triangles of its `count` vertices; none where it draws points or lines. Raises ClipError."""
-    mode = integer(primitive, "mode", 4, stop=7)
-    return _rows(_corners(file, primitive, count, "primitive"), mode) if mode >= 4 else np.zeros((0, 3), np.int64)
-
-
-def _corners(file: GltfFile, primitive: dict, count: int, name: str) -> np.ndarray:
-    if primitive.get("indices") is None:
-        return np.arange(count)
-    values = file.array(primitive["indices"])
-    if values.shape[1] != 1 or values.dtype.kind != "u" or int(values.max()) >= count:
-        raise ClipError(f"{name}: got indices up to {values.max()}, expected those of {count} vertices")
-    return values[:, 0].astype(np.int64)
-
-
-def _rows(corners: np.ndarray, mode: int) -> np.ndarray:
-    """Corners of LINES (1), LINE_LOOP, LINE_STRIP, TRIANGLES (4), TRIANGLE_STRIP or TRIANGLE_FAN (6) as rows."""
-    if mode == 1:
-        return corners[: len(corners) // 2 * 2].reshape(-1, 2)
-    if mode in (2, 3):
-        ends = corners[1:] if mode == 3 else np.roll(corners, -1)
-        return np.stack([corners[: len(ends)], ends], axis=1)
-    if mode == 4:
-        return corners[: len(corners) // 3 * 3].reshape(-1, 3)
-    count = max(len(corners) - 2, 0)
-    if mode == 6:
-        rows = np.stack([corners[1:-1], corners[2:], np.broadcast_to(corners[:1], count)], axis=1) if count else None
-    else:
-        rows = np.stack([corners[:-2], corners[1:-1], corners[2:]], axis=1) if count else None
-        if count:
-            rows[1::2, 1:] = rows[1::2, :0:-1]
-    if rows is None:
-        return np.zeros((0, 3), np.int64)
-    return rows[(rows[:, 0] != rows[:, 1]) & (rows[:, 1] != rows[:, 2]) & (rows[:, 0] != rows[:, 2])]
 
 
 def _attributes(

@@ -12,8 +12,8 @@ from functools import cached_property
 import numpy as np
 
 from athcodec.errors import ClipError
-from athcodec.sources.gltf_file import GltfFile
-from athcodec.sources.gltf_json import brief, entries, entry, indices, integer, vector
+from athcodec.files.gltf.document import GltfFile
+from athcodec.files.gltf.json import brief, entries, entry, indices, integer, vector
 
 TRS = {"translation": [0.0, 0.0, 0.0], "rotation": [0.0, 0.0, 0.0, 1.0], "scale": [1.0, 1.0, 1.0]}
 INTERPOLATIONS = ("STEP", "LINEAR", "CUBICSPLINE")

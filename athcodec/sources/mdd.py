@@ -14,8 +14,8 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
-from athcodec.clip import MotionClip
 from athcodec.errors import ClipError
+from athcodec.motion.clip import MotionClip
 from athcodec.sources import ReadOptions
 from athcodec.sources.pc2 import check_size, open_cache
 from athcodec.sources.raw import raw_frames, read_exactly

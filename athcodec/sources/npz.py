@@ -20,12 +20,12 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
-from athcodec.clip import RESERVED_NAMES, MotionClip, check_float_dtype
 from athcodec.errors import ClipError
-from athcodec.frames import Frames
-from athcodec.plain_files import open_plain
+from athcodec.files.plain import open_plain
+from athcodec.files.reading import Budget, FileWatch, closing_on_failure, naming
+from athcodec.motion.clip import RESERVED_NAMES, MotionClip, check_float_dtype
+from athcodec.motion.frames import Frames
 from athcodec.sources import ReadOptions
-from athcodec.sources.opening import Budget, FileWatch, closing_on_failure, naming
 from athcodec.sources.raw import raw_frames, read_exactly
 from athcodec.sources.schema import clip_of_arrays
 

@@ -17,12 +17,12 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
-from athcodec.clip import MotionClip
 from athcodec.errors import ClipError
-from athcodec.plain_files import open_plain
+from athcodec.files.plain import open_plain
+from athcodec.files.reading import Budget, FileWatch, closing_on_failure, naming
+from athcodec.motion.clip import MotionClip
 from athcodec.sources import ReadOptions, read
 from athcodec.sources.mesh import Mesh, read_mesh
-from athcodec.sources.opening import Budget, FileWatch, closing_on_failure, naming
 from athcodec.sources.raw import raw_frames, read_exactly
 from athcodec.sources.timing import numbered_times
 

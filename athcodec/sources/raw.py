@@ -9,7 +9,7 @@ from typing import BinaryIO
 import numpy as np
 
 from athcodec.errors import ClipError
-from athcodec.frames import Frames
+from athcodec.motion.frames import Frames
 
 
 def raw_frames(file: BinaryIO, offset: int, frame_count: int, vertex_count: int, dtype: object) -> Frames:

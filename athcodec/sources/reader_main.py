@@ -21,10 +21,10 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
-from athcodec.clip import MotionClip
 from athcodec.errors import ClipError
+from athcodec.files.reading import no_room
+from athcodec.motion.clip import MotionClip
 from athcodec.sources import ReadOptions
-from athcodec.sources.opening import no_room
 from athcodec.sources.reader_process import ARRAYS
 
 try:

@@ -18,12 +18,12 @@ from typing import Any
 
 import numpy as np
 
-from athcodec.clip import MotionClip, Skin
 from athcodec.errors import ClipError
-from athcodec.frames import Frames
-from athcodec.plain_files import open_plain
+from athcodec.files.plain import open_plain
+from athcodec.files.reading import FileWatch, closing_on_failure, naming
+from athcodec.motion.clip import MotionClip, Skin
+from athcodec.motion.frames import Frames
 from athcodec.sources import ReadOptions
-from athcodec.sources.opening import FileWatch, closing_on_failure, naming
 
 ARRAYS = ("vertex_branch", "branch_parent", "stem_index", "edges", "faces")
 MAIN = "athcodec.sources.reader_main"
@@ -87,7 +87,7 @@ class _Process:
             self.described = self.ask(json.dumps(wanted))
 
     def ask(self, line: str) -> bytes:
-        """What the process answers. Raises ClipError where it says what is wrong, or has ended."""
+        """Return the answer of the process. Raises ClipError where it reports a fault, or has ended."""
         if not self._end.alive:
             raise ClipError("positions: the clip is closed")
         with self._lock:

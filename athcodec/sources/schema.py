@@ -1,4 +1,4 @@
-"""What the formats with the names of athcodec's schema have in common: HDF5 (see hdf5.py) and NumPy archives (npz.py).
+"""Parts that the formats with the names of athcodec's schema share: HDF5 (see hdf5.py) and NumPy archives (npz.py).
 It opens no files.
 """
 
@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from athcodec.clip import MotionClip, frame_rate
-from athcodec.hierarchy import branch_orders, branches_from_edges
-from athcodec.joining import read_clip_metadata
+from athcodec.motion.clip import MotionClip, frame_rate
+from athcodec.motion.hierarchy import branch_orders, branches_from_edges
+from athcodec.motion.joining import read_clip_metadata
 from athcodec.sources import ReadOptions
 
 BRANCHES = ("vertex_branch", "branch_parent", "stem_index")
@@ -52,7 +52,7 @@ def clip_of_arrays(
 def _branches(
     positions: Any, array: Callable[[str], np.ndarray | None], metadata: dict[str, Any], options: ReadOptions
 ) -> dict[str, np.ndarray | None]:
-    """Those of the file, else those that its edges make."""
+    """Return the branches of the file, else those that its edges make."""
     found = {name: array(name) for name in BRANCHES}
     edges = array("edges")
     if found["vertex_branch"] is not None or found["branch_parent"] is not None:

@@ -18,18 +18,18 @@ from pathlib import Path
 
 import numpy as np
 
-from athcodec.clip import MotionClip, stated_fps
 from athcodec.errors import ClipError
-from athcodec.frames import Frames
+from athcodec.files.reading import Budget, FileWatch, naming, read_plain
+from athcodec.motion.clip import MotionClip, stated_fps
+from athcodec.motion.frames import Frames
 from athcodec.sources import NUMBER_PATTERN, ReadOptions, is_pattern
 from athcodec.sources.mesh import Mesh, obj_lines, obj_points, parse_mesh, ply_header, ply_points
-from athcodec.sources.opening import Budget, FileWatch, naming, read_plain
 from athcodec.sources.timing import numbered_times
 
 _NUMBERED = re.compile(r"(.*?)(\d+)", re.DOTALL)
 _ELEMENTS = frozenset((b"f ", b"f\t", b"l ", b"l\t"))
 LARGEST_NUMBER = 10**9
-FRAME_SUFFIXES = (".obj", ".ply", ".vtu", ".vtk")  # of formats that have one file per frame
+FRAME_SUFFIXES = (".obj", ".ply", ".vtu", ".vtk")  # Formats that have one file per frame.
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class Numbering:
 
     @classmethod
     def of_pattern(cls, path: Path) -> Numbering | None:
-        """That of a name with # or %04d in it; None where there is none."""
+        """Return the pattern of a name with # or %04d in it; None where there is none."""
         found = NUMBER_PATTERN.fullmatch(path.name)
         if found is None:
             return None

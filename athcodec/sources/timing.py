@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from athcodec.clip import DEFAULT_FPS
+from athcodec.motion.clip import DEFAULT_FPS
 
 DROP_FRAME = 1000 / 1001
 

@@ -28,12 +28,13 @@ from typing import Any
 import numpy as np
 from pxr import Ar, Gf, Sdf, Tf, Usd, UsdGeom, UsdShade, UsdSkel, Vt
 
-from athcodec.clip import MotionClip, Skin
 from athcodec.errors import ClipError
-from athcodec.plain_files import open_plain
+from athcodec.files.plain import open_plain
+from athcodec.files.reading import FileWatch, check_inside
+from athcodec.motion.clip import MotionClip, Skin
+from athcodec.motion.units import METRES
 from athcodec.sources import ReadOptions
 from athcodec.sources.crate import check_crates
-from athcodec.sources.opening import FileWatch, check_inside
 from athcodec.sources.scene_objects import (
     OWN,
     ArrayDescriptor,
@@ -44,7 +45,6 @@ from athcodec.sources.scene_objects import (
     own_metadata,
     transformed,
 )
-from athcodec.units import METRES
 
 MAX_FRAMES = 1 << 24
 READ = frozenset(("", "Xform", "Scope", "SkelRoot", "Skeleton", "SkelAnimation", "BlendShape"))  # what is no loss

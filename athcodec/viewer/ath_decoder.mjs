@@ -1,5 +1,5 @@
 // Plays .ath files: the C decoder of athcodec as WebAssembly, and a wrapper around it. ath_decoder.d.ts
-// documents what is exported, athcodec/core/ath.h what happens below. No dependencies, no fetch; browsers,
+// documents what is exported, athcodec/core/include/ath.h what happens below. No dependencies, no fetch; browsers,
 // workers, Node. ath_decoder.mjs is made from ath_decoder.template.mjs by build_decoder.py: edit the
 // template.
 

@@ -57,7 +57,7 @@ class BuildError(Exception):
 
 def decoder_sources() -> list[Path]:
     """The C files that a player needs, as core/CMakeLists.txt lists them."""
-    found = re.findall(r"set\(ATH_(?:DECODER|GPU)_SOURCES ([^)]*)\)", (CORE / "CMakeLists.txt").read_text("utf-8"))
+    found = re.findall(r"set\(ATH_(?:DECODER|GPU)_SOURCES\s([^)]*)\)", (CORE / "CMakeLists.txt").read_text("utf-8"))
     if len(found) != 2:
         raise BuildError(f"{CORE / 'CMakeLists.txt'}: got {len(found)} lists of C files, expected decoder and GPU form")
     return [CORE / name for names in found for name in names.split()]
@@ -100,7 +100,7 @@ def compile_decoder(template: str) -> bytes:
 
 
 def _zig(folder: str, *arguments: str) -> None:
-    command = [sys.executable, "-m", "ziglang", "cc", *FLAGS, "-I", str(CORE), *arguments]
+    command = [sys.executable, "-m", "ziglang", "cc", *FLAGS, "-I", str(CORE), "-I", str(CORE / "include"), *arguments]
     done = subprocess.run(command, cwd=folder, capture_output=True, text=True)
     if done.returncode != 0:
         raise BuildError(f"zig cc: got exit status {done.returncode}, expected 0:\n{done.stderr}")

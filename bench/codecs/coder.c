@@ -6,8 +6,9 @@
 #include <stdint.h>
 #include <stdlib.h>
 
-#include "motion_streams.h"
-#include "streams.h"
+#include "file/container.h"
+#include "streams/motion_streams.inl"
+#include "streams/prelude.inl"
 
 #ifdef _WIN32
 #define BENCH_API __declspec(dllexport)

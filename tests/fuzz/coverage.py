@@ -86,10 +86,16 @@ def _parse(lcov: str) -> list[Covered]:
     files = []
     for record in lcov.split("end_of_record"):
         path = re.search(r"^SF:(.*)$", record, re.M)
-        if path is None or Path(path[1]).parent.resolve() != targets.CORE:
+        if path is None or not Path(path[1]).resolve().is_relative_to(targets.CORE):
             continue
         lines = [(int(line), int(count)) for line, count in re.findall(r"^DA:(\d+),(\d+)", record, re.M)]
-        files.append(Covered(Path(path[1]).name, len(lines), tuple(line for line, count in lines if count == 0)))
+        files.append(
+            Covered(
+                Path(path[1]).resolve().relative_to(targets.CORE).as_posix(),
+                len(lines),
+                tuple(line for line, count in lines if count == 0),
+            )
+        )
     return files
 
 

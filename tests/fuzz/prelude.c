@@ -1,7 +1,7 @@
 /* Fuzz target: the streams of the prelude, each from bytes of its own, and the plan that follows from them. The counts
  * come from the first bytes, so that no header stands between the fuzzer and the streams. */
 #include "harness.h"
-#include "decode.h"
+#include "streams/decode.h"
 
 enum { HEAD = 16, MOST_VERTICES = 512, MOST_FRAMES = 1024 };
 

@@ -88,7 +88,7 @@ def compiler() -> Compiler:
 
 def decoder_sources(core: Path = CORE) -> list[Path]:
     """With the GPU form."""
-    lists = re.findall(r"set\(ATH_(?:DECODER|GPU)_SOURCES ([^)]*)\)", (core / "CMakeLists.txt").read_text())
+    lists = re.findall(r"set\(ATH_(?:DECODER|GPU)_SOURCES\s([^)]*)\)", (core / "CMakeLists.txt").read_text())
     return [core / name for names in lists for name in names.split()]
 
 
@@ -100,14 +100,16 @@ def _run(command: list) -> None:
 
 def _digest(words: list[str], core: Path) -> str:
     digest = hashlib.sha256("\0".join(words).encode())
-    for path in sorted([*core.glob("*.[ch]"), *HERE.glob("*.[ch]")]):
+    for path in sorted([*core.rglob("*.c"), *core.rglob("*.h"), *core.rglob("*.inl"), *HERE.glob("*.[ch]")]):
         digest.update(path.name.encode() + path.read_bytes())
     return digest.hexdigest()[:16]
 
 
 def build(target: str, used: Compiler, sanitizer: str = "address", folder: Path = BUILD, core: Path = CORE) -> Path:
     """The program of a target, with the decoder in `core`. Raises BuildError."""
-    flags = [*COMMON, f"-I{core}"] + (ADDRESS if sanitizer == "address" and not used.fuzzer else SANITIZERS[sanitizer])
+    flags = [*COMMON, f"-I{core}", f"-I{core / 'include'}"] + (
+        ADDRESS if sanitizer == "address" and not used.fuzzer else SANITIZERS[sanitizer]
+    )
     parts = folder / f"{sanitizer}-{_digest([used.path, *flags], core)}"
     parts.mkdir(parents=True, exist_ok=True)
     engine = "-fsanitize=fuzzer" if used.fuzzer else str(HERE / "replay.c")

@@ -115,7 +115,7 @@ def write_object(
 def encoded(clip, path: str, **options):
     """athcodec.encode, with the pieces of the mesh as branches where none are named and none can be found."""
     import athcodec
-    from athcodec import discovery
+    from athcodec.motion import discovery
 
     if not clip.has_branches and find_spec("scipy") is None:
         clip = discovery.with_branches(clip, discovery.pieces(clip))
@@ -159,7 +159,7 @@ class Recording:
 
     def clip(self, scene):
         """The MotionClip of the frames."""
-        from athcodec.clip import MotionClip
+        from athcodec.motion.clip import MotionClip
 
         self._spool.flush()
         positions = np.memmap(self._spool, np.float32, "r", shape=(len(self._frames), self.vertex_count, 3))
@@ -178,7 +178,8 @@ class Recording:
 
 
 def _shape(mesh) -> tuple[int, int, int, int]:
-    """What has to stay: numbers of vertices, edges, faces, and a hash of which vertices the corners are."""
+    """Return what has to stay the same over all frames: numbers of vertices, edges, faces, and a hash of which
+    vertices the corners are."""
     corners = np.empty(len(mesh.loops), np.int32)
     mesh.loops.foreach_get("vertex_index", corners)
     return len(mesh.vertices), len(mesh.edges), len(mesh.polygons), hash(corners.tobytes())
@@ -195,7 +196,7 @@ def _positions(mesh, matrix) -> np.ndarray:
 
 
 def _unit(scene, world: bool) -> dict:
-    from athcodec.units import METRES
+    from athcodec.motion.units import METRES
 
     if scene.unit_settings.system == "NONE" or not world:
         return {}
@@ -230,7 +231,7 @@ def _static(mesh, obj) -> dict:
 
 
 def _add_attributes(mesh, arrays: dict, domains: dict) -> None:
-    from athcodec.clip import RESERVED_NAMES
+    from athcodec.motion.clip import RESERVED_NAMES
 
     uv_names = {layer.name for layer in mesh.uv_layers}
     kept = ("vertex_branch", "stem_index")
@@ -263,7 +264,7 @@ def _take_branches(obj, arrays: dict, found: dict) -> None:
 
 def _skin(obj, vertex_count: int):
     """The armature that moves the object, for finding its branches."""
-    from athcodec.clip import Skin
+    from athcodec.motion.clip import Skin
 
     armatures = (modifier.object for modifier in obj.modifiers if modifier.type == "ARMATURE")
     armature = next(filter(None, armatures), None)

@@ -81,7 +81,7 @@ class IMPORT_OT_ath(bpy.types.Operator, ImportHelper):
                 obj = add_object(
                     context, path, self.level, self.loop, self.set_scene, self.use_relative, self.clip, self.host_mesh
                 )
-            except Exception as error:  # of the file, reported in one line
+            except Exception as error:  # Any fault of the file is reported in one line.
                 self.report({"ERROR"}, " ".join(f"{path}: {error}".split()))
                 return {"CANCELLED"}
             for selected in context.selected_objects:
@@ -151,7 +151,7 @@ def _set_scene(scene, decoder, first: float, rate: float) -> None:
 
 
 def _place(obj, decoder, scene) -> None:
-    from athcodec.units import METRES, unit_symbol
+    from athcodec.motion.units import METRES, unit_symbol
 
     up_axis = str(decoder.metadata.get("up_axis", "z")).lower()
     obj.rotation_euler = {"y": (math.pi / 2, 0, 0), "x": (0, -math.pi / 2, 0)}.get(up_axis, (0, 0, 0))
@@ -160,7 +160,7 @@ def _place(obj, decoder, scene) -> None:
 
 
 def _mesh(name: str, decoder):
-    from athcodec.clip import polygons
+    from athcodec.motion.clip import polygons
 
     mesh = bpy.data.meshes.new(name)
     mesh.vertices.add(decoder.vertex_count)

@@ -1,0 +1,105 @@
+/* Adaptive codes for integers (FORMAT.md, "Numbers"), compiled once for each direction. */
+#ifndef ATH_NUMBER_MODEL_H
+#define ATH_NUMBER_MODEL_H
+
+#include "bits/range_coder.inl"
+
+enum { NUMBER_CLASSES = 28, NUMBER_BINS = 30, MAGNITUDE_CLIP = 1 << 20 };
+
+typedef struct {
+    ath_context size[NUMBER_CLASSES][NUMBER_BINS];
+    ath_context mantissa[NUMBER_BINS][4];
+} number_model;
+
+/* Bits in x: 0 for 0, 1 for 1, 2 for 2 and 3, ... */
+ATH_INLINE int32_t bit_length(uint32_t x)
+{
+#if defined(__GNUC__)
+    return x == 0 ? 0 : 32 - __builtin_clz(x);
+#else
+    int32_t length = 0;
+    for (; x; x >>= 1) length++;
+    return length;
+#endif
+}
+
+ATH_INLINE uint32_t magnitude_of(int32_t value) { return (uint32_t)(value < 0 ? -value : value); }
+
+/* The magnitude that contexts use. */
+ATH_INLINE uint32_t clipped(int32_t value)
+{
+    uint32_t magnitude = magnitude_of(value);
+    return magnitude < MAGNITUDE_CLIP ? magnitude : (uint32_t)MAGNITUDE_CLIP;
+}
+
+/* A running mean of magnitudes, in 1/16, after one more number. */
+ATH_INLINE uint32_t averaged(uint32_t mean, int32_t value) { return mean - (mean + 4) / 8 + 2 * clipped(value); }
+
+/* Half-octave classes of an expected magnitude in 1/16: 0, 1, 2, 3, 4, 6, 8, 12, 16, ... */
+ATH_INLINE int32_t number_class(uint32_t expected)
+{
+    int32_t length = bit_length(expected);
+    if (length < 2) return length;
+    int32_t half_octave = 2 * length - 2 + (int32_t)(expected >> (length - 2) & 1);
+    return half_octave < NUMBER_CLASSES ? half_octave : NUMBER_CLASSES - 1;
+}
+
+/* Starting probabilities are those of a geometric distribution with the class's mean. */
+static void number_model_init(number_model *model)
+{
+    for (int32_t c = 0; c < NUMBER_CLASSES; c++) {
+        uint32_t mean =
+            c < 2 ? (uint32_t)(c * 2 + 1) : (uint32_t)(5 + (c & 1) * 2) << (c / 2 - 1); /* in 1/32, mid of c */
+        uint32_t more = (uint32_t)(((uint64_t)mean << 16) / (mean + 32));
+        for (int32_t bin = 0; bin < NUMBER_BINS; bin++) {
+            context_init(&model->size[c][bin], more);
+            if (bin > 0) more = (uint32_t)(((uint64_t)more * more) >> 16);
+        }
+    }
+    for (int32_t bin = 0; bin < NUMBER_BINS; bin++)
+        for (int32_t i = 0; i < 4; i++) context_init(&model->mantissa[bin][i], 30000);
+}
+
+/* A number of `length` bits, 1 or more, from the bits below its leading one; the first two are modelled. */
+ATH_INLINE uint64_t code_mantissa(ath_coder *coder, ath_context contexts[4], int32_t length, uint64_t value)
+{
+    uint64_t built = 1;
+    for (int32_t bit = length - 2; bit >= 0; bit--) {
+        int given = (int)(value >> bit & 1);
+        int32_t taken = length - 2 - bit;
+        int coded = taken < 2 ? coder_even_bit(coder, &contexts[taken ? 1 + (built & 1) : 0], given)
+                              : coder_raw_bit(coder, given);
+        built = built << 1 | (uint64_t)coded;
+    }
+    return built;
+}
+
+/* One number below 2^30 under a class of expected magnitudes. */
+ATH_INLINE uint32_t code_in_class(ath_coder *coder, number_model *model, int32_t about, uint32_t value)
+{
+    ath_context *size = model->size[about];
+    int32_t length = bit_length(value), coded = 0;
+    while (coded < NUMBER_BINS && coder_bit(coder, &size[coded], coded < length)) coded++;
+    if (coded == 0) return 0;
+    return (uint32_t)code_mantissa(coder, model->mantissa[coded - 1], coded, value);
+}
+
+/* The same under an expected magnitude in 1/16. */
+ATH_INLINE uint32_t code_unsigned(ath_coder *coder, number_model *model, uint32_t expected, uint32_t value)
+{
+    return code_in_class(coder, model, number_class(expected), value);
+}
+
+ATH_INLINE int32_t code_signed_in_class(ath_coder *coder, number_model *model, int32_t about, int32_t value)
+{
+    uint32_t magnitude = code_in_class(coder, model, about, magnitude_of(value));
+    if (magnitude == 0) return 0;
+    return coder_raw_bit(coder, value < 0) ? -(int32_t)magnitude : (int32_t)magnitude;
+}
+
+ATH_INLINE int32_t code_signed(ath_coder *coder, number_model *model, uint32_t expected, int32_t value)
+{
+    return code_signed_in_class(coder, model, number_class(expected), value);
+}
+
+#endif

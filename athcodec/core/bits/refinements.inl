@@ -1,0 +1,151 @@
+/* The context model of refined tracks (FORMAT.md, "Refined rows"), compiled once for each direction.
+ *
+ * A refinement knows from the layer before what each integer is about: where that is not 0, the integer is spread over the
+ * ratio of the steps around it; where it is 0, the integer is small, the more so the quieter its surroundings are. */
+#ifndef ATH_REFINEMENT_MODEL_H
+#define ATH_REFINEMENT_MODEL_H
+
+#include "bits/coefficients.inl"
+
+enum { REFINED_SIGNS = 3 };
+
+typedef struct {
+    coefficient_model rows; /* of the differences; its numbers are those of integers that are 0 in the layer before */
+    number_model known;     /* of others */
+    ath_context sign[REFINED_SIGNS];
+} refinement_model;
+
+/* `history`: history_size(frames) bytes. */
+static void refinement_model_init(refinement_model *model, int32_t frames, uint32_t *history)
+{
+    coefficient_model_init(&model->rows, frames, history);
+    number_model_init(&model->known);
+    for (int32_t i = 0; i < REFINED_SIGNS; i++) context_init(&model->sign[i], 32768);
+}
+
+/* An integer of the layer before in steps of this one; what is too large for that is kept from overflowing. */
+ATH_INLINE int32_t shifted(int32_t coarse, int32_t shift)
+{
+    int32_t most = 0x3fffffff >> shift;
+    return (coarse > most ? most : coarse < -most ? -most : coarse) * (1 << shift);
+}
+
+/* Steps of the layer before that a prediction stands for, as contexts see them. */
+ATH_INLINE uint32_t coarse_steps(int32_t predicted, uint32_t ratio)
+{
+    uint32_t steps = (magnitude_of(predicted) + ratio / 2) / ratio;
+    return steps < MAGNITUDE_CLIP ? steps : (uint32_t)MAGNITUDE_CLIP;
+}
+
+/* Predictions of a row and of the one that follows it, null: none, in steps of the layer before. */
+typedef struct {
+    const int32_t *row, *coarse, *below;
+    int32_t frames;
+    uint32_t ratio[3]; /* of the axes */
+} row_prediction;
+
+/* What the layer before has around the integers of a row: magnitudes in its own steps, sums of them over the axes, and
+ * likewise those of the row that follows; zeros behind the last. */
+typedef struct {
+    uint32_t steps[3][ATH_SEGMENT_FRAMES + 2], all[ATH_SEGMENT_FRAMES + 2];
+    uint32_t below[3][ATH_SEGMENT_FRAMES + 2], all_below[ATH_SEGMENT_FRAMES + 2];
+} coarse_surroundings;
+
+/* Sums over the axes of the first `count` magnitudes of a row, and the magnitudes. */
+static void coarse_magnitudes(const row_prediction *p, const int32_t *row, int32_t count,
+                              uint32_t steps[3][ATH_SEGMENT_FRAMES + 2], uint32_t *all)
+{
+    int32_t known = ath_min(count, p->frames);
+    memset(all, 0, (size_t)count * sizeof *all);
+    for (int32_t axis = 0; axis < 3; axis++) {
+        const int32_t *from = row + axis * p->frames;
+        for (int32_t k = 0; k < known; k++) {
+            steps[axis][k] = p->coarse ? clipped(from[k]) : coarse_steps(from[k], p->ratio[axis]);
+            all[k] += steps[axis][k];
+        }
+        for (int32_t k = known; k < count; k++) steps[axis][k] = 0;
+    }
+}
+
+/* Of the first `count` frequencies. */
+static void look_around(const row_prediction *p, int32_t count, coarse_surroundings *around)
+{
+    if (count == 0) return;
+    coarse_magnitudes(p, p->coarse ? p->coarse : p->row, count + 2, around->steps, around->all);
+    if (p->below) coarse_magnitudes(p, p->below, count + 1, around->below, around->all_below);
+}
+
+/* How loud the layer before is around an integer, where that is not known otherwise yet. */
+ATH_INLINE uint32_t loudness(const row_prediction *p, const coarse_surroundings *around, int32_t axis, int32_t k)
+{
+    uint32_t loud = 2 * (2 * around->steps[axis][k + 1] + around->steps[axis][k + 2]) + around->all[k + 1];
+    for (int32_t other = axis + 1; other < 3; other++) loud += around->steps[other][k];
+    return p->below ? loud + 2 * around->all_below[k] + around->below[axis][k + 1] : loud;
+}
+
+static int32_t differing_frequencies(const int32_t *row, const int32_t *predicted, int32_t frames)
+{
+    int32_t count = 0;
+    for (int32_t axis = 0; axis < 3; axis++)
+        for (int32_t k = frames; k > count; k--)
+            if (row[axis * frames + k - 1] != predicted[axis * frames + k - 1]) count = k;
+    return count;
+}
+
+/* differences: those around this one. */
+ATH_INLINE int32_t code_refined_difference(ath_coder *coder, refinement_model *model, const row_prediction *prediction,
+                                           const coarse_surroundings *around, const row_surroundings *differences,
+                                           int32_t axis, int32_t k, int32_t difference)
+{
+    int32_t predicted = prediction->row[axis * prediction->frames + k];
+    int known = around->steps[axis][k] > 0;
+    number_model *number = known ? &model->known : model->rows.numbers + row_number(differences, axis, k);
+    uint32_t ratio = prediction->ratio[axis];
+    uint32_t expected = known && ratio > 1 ? 4 * ratio : expected_magnitude(differences, axis, k);
+    if (!known) expected += 2 * loudness(prediction, around, axis, k);
+    uint32_t magnitude = code_unsigned(coder, number, expected, magnitude_of(difference));
+    if (magnitude == 0) return 0;
+    int negative = predicted < 0;
+    if (predicted == 0)
+        negative = coder_raw_bit(coder, difference < 0);
+    else
+        negative ^= coder_bit(coder,
+                              &model->sign[magnitude == 1  ? 0
+                                           : magnitude < 4 ? 1
+                                                           : 2],
+                              (difference < 0) != negative);
+    return negative ? -(int32_t)magnitude : (int32_t)magnitude;
+}
+
+/* As code_row; the row becomes its prediction and the differences that are coded. */
+static int32_t code_refined_row(ath_coder *coder, refinement_model *refinement, int32_t rank, int32_t slot,
+                                int32_t above_count, const row_prediction *prediction, int32_t *row)
+{
+    coefficient_model *model = &refinement->rows;
+    int32_t frames = prediction->frames;
+    const int32_t *predicted = prediction->row;
+    row_surroundings differences = start_row(model, frames, slot, above_count);
+    int32_t count = code_count(coder, model, model->history_count[slot], ath_max(above_count, 0), rank,
+                               ENCODING ? differing_frequencies(row, predicted, frames) : 0);
+    coarse_surroundings around;
+    look_around(prediction, count, &around);
+    ath_coder own_coder = *coder; /* as in code_row */
+    for (int32_t k = 0; k < count; k++) {
+        start_frequency(&differences, k);
+        for (int32_t axis = 0; axis < 3; axis++) {
+            int32_t at = axis * frames + k;
+            int32_t difference = code_refined_difference(&own_coder, refinement, prediction, &around, &differences,
+                                                         axis, k, row[at] - predicted[at]);
+            if (!ENCODING) row[at] = predicted[at] + difference;
+            note_magnitude(&differences, axis, k, clipped(difference));
+        }
+        finish_frequency(&differences, k);
+    }
+    *coder = own_coder;
+    for (int32_t axis = 0; axis < 3 && !ENCODING; axis++)
+        memcpy(row + axis * frames + count, predicted + axis * frames + count, (size_t)(frames - count) * sizeof *row);
+    finish_row(model, &differences, slot, count);
+    return count;
+}
+
+#endif

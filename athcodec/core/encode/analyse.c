@@ -1,0 +1,550 @@
+/* From positions to quantised coefficients, piece by piece in closed loop: every piece is predicted from what the
+ * decoder will have of its parent. Encoder only. */
+#include "encode/encode.h"
+#include "model/lanes.h"
+
+enum { FIRST_ROTATION_STEPS = 30, ROTATION_STEPS = 5 };
+enum { WAVES = 8 }; /* that a row is projected on at once */
+
+static double absolute(double x) { return x < 0.0 ? -x : x; }
+
+/* Uniform quantiser with a dead zone: zero below `dead_zone` steps, rounding biased towards zero by as much. */
+static int32_t quantise(double value, double dead_zone)
+{
+    double units = absolute(value) + (1.0 - dead_zone);
+    int32_t magnitude = units >= 1.0 ? units > 1073741823.0 ? 1073741823 : (int32_t)units : 0;
+    return value < 0.0 ? -magnitude : magnitude;
+}
+
+/* units = the row times `count` waves, in units of a step. */
+ATH_INLINE void project_waves(const double *waves, int32_t count, int32_t T, const double *row, double inverse,
+                              double *units)
+{
+    ath_lanes sums[WAVES];
+    for (int32_t k = 0; k < count; k++) lanes_set(sums + k, 0.0);
+    int32_t t = 0;
+    for (; t + ATH_LANES <= T; t += ATH_LANES)
+        for (int32_t k = 0; k < count; k++) lanes_add_product(sums + k, waves + (size_t)k * (size_t)T + t, row + t);
+    for (int32_t k = 0; k < count; k++) {
+        double sum[ATH_LANES];
+        lanes_store(sum, sums + k);
+        for (int32_t i = t; i < T; i++) sum[0] += waves[(size_t)k * (size_t)T + i] * row[i];
+        units[k] = ((sum[0] + sum[1]) + (sum[2] + sum[3])) * inverse;
+    }
+}
+
+/* Transforms one axis over time into units of `step`; returns how many coefficients were needed: at least `known`, and all
+ * that are beyond the dead zone. The waves are orthonormal, so that none of the rest is where its whole length is not. */
+ATH_HOT static int32_t forward_temporal(const ath_stream *stream, int32_t T, double step, double dead_zone,
+                                        int32_t known, const double *row, double *units)
+{
+    double length2 = 0.0, inverse = 1.0 / step;
+    for (int32_t t = 0; t < T; t++) length2 += row[t] * row[t];
+    length2 *= inverse * inverse;
+    double least = 0.9 * dead_zone * dead_zone, left = length2;
+    int is_sharp = stream->temporal_rank == T && 1e-12 * length2 < 0.01 * least; /* a learned basis has rounded rows */
+    for (int32_t k = 0; k < stream->temporal_rank;) {
+        if (k >= known && (k == 0 || is_sharp) && !(left > least)) return k;
+        const double *waves = stream->temporal + (size_t)k * (size_t)T;
+        int32_t count = k + WAVES <= stream->temporal_rank ? WAVES : 1;
+        if (count == WAVES)
+            project_waves(waves, WAVES, T, row, inverse, units + k);
+        else
+            project_waves(waves, 1, T, row, inverse, units + k);
+        for (int32_t stop = k + count; k < stop; k++) left -= units[k] * units[k];
+    }
+    return stream->temporal_rank;
+}
+
+/* How many integers near (axis, k) are not zero. */
+static int32_t busy_neighbours(const int32_t *quantised, int32_t T, int32_t rank, int32_t axis, int32_t k)
+{
+    int32_t count = 0;
+    for (int32_t a = 0; a < 3; a++)
+        for (int32_t j = ath_max(k - 2, 0); j <= ath_min(k + 2, rank - 1); j++)
+            count += quantised[a * T + j] != 0 && (a != axis || j != k);
+    return count;
+}
+
+/* An isolated 1 costs many bits and removes little error: its threshold is higher than that of one with neighbours. */
+static void drop_lone_ones(int32_t T, int32_t rank, double units[3][ATH_SEGMENT_FRAMES], const int32_t *predicted,
+                           int32_t *quantised)
+{
+    static const double least[2] = {1.1, 0.9};
+    for (int32_t axis = 0; axis < 3; axis++)
+        for (int32_t k = rank - 1; k >= 0; k--) {
+            int32_t *q = quantised + axis * T + k;
+            if ((*q != 1 && *q != -1) || (predicted && predicted[axis * T + k] != 0)) continue;
+            int32_t busy = busy_neighbours(quantised, T, rank, axis, k);
+            if (busy < 2 && absolute(units[axis][k]) < least[busy]) *q = 0;
+        }
+}
+
+/* Where the zeros at the end of a row begin. */
+static int32_t row_extent(const int32_t *row, int32_t count)
+{
+    while (count > 0 && row[count - 1] == 0) count--;
+    return count;
+}
+
+/* What a row amounts to at its first frame (side 1) or its last (side -1): its value, slope and bend there. */
+static void end_parts(const double *row, int32_t T, int32_t side, double parts[ATH_END_PARTS])
+{
+    const double *end = side > 0 ? row : row + T - 1;
+    parts[0] = end[0];
+    parts[1] = end[side] - end[0];
+    parts[2] = end[0] - 2.0 * end[side] + end[2 * side];
+}
+
+static void both_ends(const double *row, int32_t T, double parts[2 * ATH_END_PARTS])
+{
+    end_parts(row, T, 1, parts);
+    end_parts(row, T, -1, parts + ATH_END_PARTS);
+}
+
+/* An integer of a row that may be rounded the other way: its parts at the ends, these by what errors there weigh, and what a
+ * step more or less costs by itself. */
+typedef struct {
+    int32_t k;
+    double parts[2 * ATH_END_PARTS], pull[2 * ATH_END_PARTS], cost;
+} end_integer;
+
+/* Rounds integers of a row the other way where that brings its ends nearer, whose errors are the largest and are seen where
+ * segments meet. units: what they stand for, less what is predicted; row: what they are to become. What it is worth, in
+ * squared steps, is the change of the error of its own and of those of the ends. */
+static void settle_ends(const ath_stream *stream, int32_t T, double step, const ath_rounding *rounding,
+                        const double *row, const double *units, const int32_t *predicted, int32_t *quantised)
+{
+    enum { LEAST_FRAMES = 8 };
+    static const double least = 1e-3, emptied = 0.25; /* for an integer that becomes 0 */
+    end_integer found[ATH_SEGMENT_FRAMES];
+    double left[2 * ATH_END_PARTS];
+    int32_t rank = row_extent(quantised, stream->temporal_rank), count = 0;
+    if (T < LEAST_FRAMES || rank == 0 || rounding->ends[0] == 0.0) return;
+    both_ends(row, T, left);
+    for (int32_t i = 0; i < 2 * ATH_END_PARTS; i++) left[i] /= step;
+    for (int32_t k = 0; k < stream->temporal_rank; k++) {
+        double value = (double)(quantised[k] + (predicted ? predicted[k] : 0));
+        if (quantised[k] == 0 && value == 0.0) continue;
+        end_integer *own = found + count;
+        *own = (end_integer){.k = k, .cost = 1.0};
+        both_ends(stream->temporal + (size_t)k * (size_t)T, T, own->parts);
+        for (int32_t i = 0; i < 2 * ATH_END_PARTS; i++) {
+            left[i] -= value * own->parts[i];
+            own->pull[i] = rounding->ends[i % ATH_END_PARTS] * own->parts[i];
+            own->cost += own->pull[i] * own->parts[i];
+        }
+        count += quantised[k] != 0;
+    }
+    for (int32_t turned = 0; turned < rank; turned++) {
+        double most = least;
+        const end_integer *chosen = 0;
+        int32_t by = 0;
+        for (const end_integer *own = found; own < found + count; own++) {
+            int32_t q = quantised[own->k];
+            if (q == 0) continue;
+            double lean = units[own->k] - (double)q;
+            for (int32_t i = 0; i < 2 * ATH_END_PARTS; i++) lean += own->pull[i] * left[i];
+            for (int32_t d = -1; d <= 1; d += 2) {
+                double worth = 2.0 * d * lean - own->cost + (q + d == 0 ? emptied : 0.0);
+                if (worth <= most) continue;
+                most = worth;
+                chosen = own;
+                by = d;
+            }
+        }
+        if (!chosen) return;
+        quantised[chosen->k] += by;
+        for (int32_t i = 0; i < 2 * ATH_END_PARTS; i++) left[i] -= by * chosen->parts[i];
+    }
+}
+
+/* Quantises a track of three axes about its prediction, if there is one, and replaces it by what the decoder will have. */
+static void code_track(const ath_stream *stream, int32_t T, const double steps[3], const ath_rounding *rounding,
+                       double *track, const int32_t *predicted, int32_t *quantised)
+{
+    double units[3][ATH_SEGMENT_FRAMES];
+    int32_t longest = 0;
+    memset(quantised, 0, 3 * (size_t)T * sizeof *quantised);
+    for (int32_t axis = 0; axis < 3; axis++) {
+        const int32_t *about = predicted ? predicted + axis * T : 0;
+        int32_t known = about ? row_extent(about, stream->temporal_rank) : 0;
+        int32_t count =
+            forward_temporal(stream, T, steps[axis], rounding->dead_zone, known, track + axis * T, units[axis]);
+        for (int32_t k = 0; k < known; k++) units[axis][k] -= (double)about[k];
+        for (int32_t k = 0; k < count; k++)
+            quantised[axis * T + k] = quantise(units[axis][k], k < known && about[k] ? 0.5 : rounding->dead_zone);
+        longest = ath_max(longest, count);
+    }
+    drop_lone_ones(T, longest, units, predicted, quantised);
+    for (int32_t axis = 0; axis < 3; axis++)
+        settle_ends(stream, T, steps[axis], rounding, track + axis * T, units[axis],
+                    predicted ? predicted + axis * T : 0, quantised + axis * T);
+    for (int32_t i = 0; predicted && i < 3 * T; i++) quantised[i] += predicted[i];
+    for (int32_t axis = 0; axis < 3; axis++)
+        ath_inverse_temporal(stream, T, longest, steps[axis], quantised + axis * T, track + axis * T);
+}
+
+static void code_even_track(const ath_stream *stream, int32_t T, double step, const ath_rounding *rounding,
+                            double *track, const int32_t *predicted, int32_t *quantised)
+{
+    double steps[3] = {step, step, step};
+    code_track(stream, T, steps, rounding, track, predicted, quantised);
+}
+
+static void rest_centre(const ath_plan *plan, const ath_piece *piece, double centre[3])
+{
+    centre[0] = centre[1] = centre[2] = 0.0;
+    for (int32_t i = 0; i < piece->count; i++)
+        for (int32_t k = 0; k < 3; k++) centre[k] += ath_rest_of(plan, piece->first + i)[k] / (double)piece->count;
+}
+
+/* How many vertices, from its first on, tell how a piece turns: of a root that is one piece those of all its tree, since
+ * an upright stem hardly says how it turns about itself, and what hangs on it turns along. */
+static int32_t turned_vertices(const ath_plan *plan, const ath_piece *piece)
+{
+    const ath_branch *branch = plan->branches + piece->branch;
+    if (piece->parent >= 0 || piece->count < branch->count || piece->flags & ATH_RIGID) return piece->count;
+    int32_t next = piece->branch + branch->subtree;
+    return (next < plan->branch_count ? plan->branches[next].first : plan->vertex_count) - piece->first;
+}
+
+/* Adds the products of what hangs on a root with its rest pose in frame t, which count as much as the root's own in all.
+ * source: of the whole plant; own2: squared distances of the root's vertices from its base. */
+static void add_carried(const ath_plan *plan, int32_t T, const ath_piece *root, int32_t t, const double *source,
+                        double own2, double H[9])
+{
+    const double *a = ath_rest_attach(plan, root), *first = source + (size_t)root->first * 3 * (size_t)T;
+    double products[9] = {0}, carried2 = 0.0;
+    for (int32_t i = root->count, count = turned_vertices(plan, root); i < count; i++) {
+        const double *x0 = ath_rest_of(plan, root->first + i), *x = first + (size_t)i * 3 * (size_t)T;
+        for (int32_t k = 0; k < 3; k++) {
+            double d = x0[k] - a[k];
+            carried2 += d * d;
+            for (int32_t j = 0; j < 3; j++) products[3 * j + k] += (x[j * T + t] - first[j * T + t]) * d;
+        }
+    }
+    for (int32_t i = 0; i < 9 && carried2 > 0.0; i++) H[i] += own2 / carried2 * products[i];
+}
+
+/* The rotation nearest to H, wherever it is: the quaternion is the first eigenvector of a matrix (Horn, "Closed-form
+ * solution of absolute orientation using unit quaternions", J. Opt. Soc. Am. A 4(4), 1987). */
+static void nearest_rotation(const double H[9], double R[9])
+{
+    double matrix[16], work[16], values[4], q[16];
+    matrix[0] = H[0] + H[4] + H[8];
+    matrix[5] = H[0] - H[4] - H[8];
+    matrix[10] = H[4] - H[0] - H[8];
+    matrix[15] = H[8] - H[0] - H[4];
+    matrix[1] = matrix[4] = H[7] - H[5];
+    matrix[2] = matrix[8] = H[2] - H[6];
+    matrix[3] = matrix[12] = H[3] - H[1];
+    matrix[6] = matrix[9] = H[1] + H[3];
+    matrix[7] = matrix[13] = H[2] + H[6];
+    matrix[11] = matrix[14] = H[5] + H[7];
+    ath_principal(1, 4, matrix, work, values, q);
+    for (int32_t i = 0; i < 3; i++)
+        for (int32_t k = 0; k < 3; k++) {
+            int32_t other = 3 - i - k;
+            double turn = (k - i + 3) % 3 == 1 ? -q[0] : q[0];
+            R[3 * i + k] = 2.0 * (q[i + 1] * q[k + 1] + (i == k ? q[0] * q[0] - 0.5 : turn * q[other + 1]));
+        }
+}
+
+/* The piece's own rotation against its predicted one, as rotation vectors over time, unwrapped. `local`: its
+ * vertices relative to the attach point, in the predicted frame. What they say no more of than an error of `step` would,
+ * such as the twist of a straight stem, stays as in the frame before. `carried`: the source, where what hangs on a root tells
+ * more; else 0. That of a rigid piece is about its centre: an error of
+ * what it hangs on does not turn it. */
+static void fit_rotation(const ath_plan *plan, int32_t T, const ath_piece *piece, double step, const double *local,
+                         const double *carried, double *omega)
+{
+    int rigid = (piece->flags & ATH_RIGID) != 0;
+    double a[3], q[4] = {1.0, 0.0, 0.0, 0.0}, R[9] = {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0};
+    memcpy(a, ath_rest_attach(plan, piece), sizeof a);
+    if (rigid) rest_centre(plan, piece, a);
+    for (int32_t t = 0; t < T; t++) {
+        double H[9] = {0}, size2 = 0.0, own[3];
+        for (int32_t i = 0; i < piece->count; i++) {
+            const double *x0 = ath_rest_of(plan, piece->first + i), *x = local + (size_t)i * 3 * (size_t)T;
+            for (int32_t k = 0; k < 3; k++) {
+                double d = x0[k] - a[k];
+                size2 += d * d;
+                for (int32_t j = 0; j < 3; j++) H[3 * j + k] += x[j * T + t] * d;
+            }
+        }
+        if (carried) add_carried(plan, T, piece, t, carried, size2, H);
+        double prior = 1e-6 * size2 + (rigid ? 0.0 : step * step * (double)piece->count);
+        for (int32_t k = 0; k < 9; k++) H[k] += prior * R[k];
+        if (rigid)
+            nearest_rotation(H, R);
+        else
+            ath_turn_to(H, t == 0 ? FIRST_ROTATION_STEPS : ROTATION_STEPS, R);
+        ath_rotation_vector(R, q, own);
+        for (int32_t k = 0; k < 3; k++) omega[k * T + t] = own[k];
+    }
+}
+
+/* Replaces the tracks of the first modes by those of the shapes, and sets the remaining rows to 0. */
+static void to_shapes(int32_t T, const ath_piece *piece, int32_t shape_count, const double *duals,
+                      const ath_scratch *scratch)
+{
+    size_t frames = (size_t)T, rows = 3 * (size_t)ath_shape_modes(piece);
+    double *tracks = scratch->placed; /* its vertices are no longer needed */
+    memset(tracks, 0, rows * frames * sizeof *tracks);
+    for (int32_t s = 0; s < shape_count; s++)
+        for (size_t j = 0; j < rows; j++) {
+            double weight = duals[s * ATH_SHAPE_NUMBERS + (int32_t)j], *track = tracks + (size_t)s * frames;
+            const double *row = scratch->rows + j * frames;
+            for (int32_t t = 0; t < T; t++) track[t] += weight * row[t];
+        }
+    memcpy(scratch->rows, tracks, rows * frames * sizeof *tracks);
+}
+
+static void to_local(int32_t T, const ath_piece *piece, const ath_frames *at, const double *source, double *local)
+{
+    for (int32_t i = 0; i < piece->count; i++)
+        ath_into_rest_space(T, at, source + (size_t)(piece->first + i) * 3 * (size_t)T,
+                            local + (size_t)i * 3 * (size_t)T);
+}
+
+static void code_shift(const ath_motion *motion, const ath_piece *piece, const ath_piece_before *before,
+                       ath_piece_rows *rows, const ath_scratch *scratch, const ath_rounding *rounding)
+{
+    const ath_stream *base = ath_base_stream(motion, piece);
+    int32_t T = motion->frames;
+    if (before) ath_predict_shift(motion, piece, before, scratch, rows);
+    code_even_track(base, T, ath_shift_step(piece, base), rounding, scratch->track, rows->predicted_shift, rows->shift);
+    ath_move_point(T, scratch->track, scratch->at.point);
+    if (motion->decoded) memcpy(scratch->shift, scratch->track, 3 * (size_t)T * sizeof(double));
+}
+
+/* How far the first vertex is from where the piece hangs. */
+static void shift_of_first(const ath_plan *plan, int32_t T, const ath_piece *piece, const ath_scratch *scratch,
+                           const double *source)
+{
+    const double *x = source + (size_t)piece->first * 3 * (size_t)T;
+    const double *a = ath_rest_attach(plan, piece), *x0 = ath_rest_of(plan, piece->first);
+    for (int32_t i = 0; i < 3 * T; i++) scratch->track[i] = x[i] - (x0[i / T] - a[i / T]) - scratch->at.point[i];
+}
+
+/* How far the vertices of a rigid piece are, on average, from where it would put them. */
+static void shift_of_all(const ath_plan *plan, int32_t T, const ath_piece *piece, const ath_scratch *scratch,
+                         const double *source)
+{
+    const double *a = ath_rest_attach(plan, piece), *R = scratch->at.rotation;
+    double d[3], weight = 1.0 / (double)piece->count;
+    rest_centre(plan, piece, d);
+    for (int32_t k = 0; k < 3; k++) d[k] -= a[k];
+    for (int32_t k = 0; k < 3; k++)
+        for (int32_t t = 0; t < T; t++) {
+            double sum = 0.0;
+            for (int32_t i = 0; i < piece->count; i++)
+                sum += source[((size_t)(piece->first + i) * 3 + (size_t)k) * (size_t)T + (size_t)t];
+            scratch->track[k * T + t] =
+                sum * weight - scratch->at.point[k * T + t]
+                - (R[3 * k * T + t] * d[0] + R[(3 * k + 1) * T + t] * d[1] + R[(3 * k + 2) * T + t] * d[2]);
+        }
+}
+
+/* Codes the piece's own translation and rotation; leaves its vertices in the turned frame in `local`. A rigid piece
+ * is turned first, so that the one does not stand for the other. */
+static void analyse_tracks(const ath_plan *plan, const ath_motion *motion, const ath_piece *piece,
+                           const ath_piece_before *before, ath_piece_rows *rows, const ath_scratch *scratch,
+                           const double *source, const ath_rounding *rounding, double *local)
+{
+    const ath_stream *base = ath_base_stream(motion, piece);
+    int32_t T = motion->frames;
+    int rigid = (piece->flags & ATH_RIGID) != 0;
+    ath_attach(plan, motion, piece, scratch->at);
+    if (ath_has_shift(piece) && !rigid) {
+        shift_of_first(plan, T, piece, scratch, source);
+        code_shift(motion, piece, before, rows, scratch, rounding);
+    }
+    to_local(T, piece, &scratch->at, source, local);
+    if (ath_has_rotation(plan, piece, base)) {
+        ath_turning turning = ath_turning_of(plan, piece, base);
+        int carries = turned_vertices(plan, piece) > piece->count;
+        fit_rotation(plan, T, piece, base->step, local, carries ? source : 0, scratch->track);
+        ath_into_axes(T, &turning, scratch->track);
+        if (before) ath_predict_rotation(plan, motion, piece, before, scratch, rows);
+        code_track(base, T, turning.steps, rounding, scratch->track, rows->predicted_rotation, rows->rotation);
+        ath_out_of_axes(T, &turning, scratch->track);
+        ath_turn(T, scratch->track, scratch->at.rotation);
+        if (motion->decoded) memcpy(scratch->rotation, scratch->track, 3 * (size_t)T * sizeof(double));
+    }
+    if (ath_has_shift(piece) && rigid) {
+        shift_of_all(plan, T, piece, scratch, source);
+        code_shift(motion, piece, before, rows, scratch, rounding);
+    }
+}
+
+/* What the next layer predicts from. */
+static void note_piece(const ath_plan *plan, const ath_motion *motion, const ath_piece *piece, int32_t p,
+                       const ath_piece_rows *rows, const ath_scratch *scratch, const double *placed)
+{
+    const ath_coarse *decoded = motion->decoded;
+    size_t T = (size_t)motion->frames;
+    memcpy(decoded->placed + (size_t)piece->first * 3 * T, placed, (size_t)piece->count * 3 * T * sizeof(double));
+    memcpy(decoded->tracks + (size_t)p * 6 * T, scratch->rotation, 3 * T * sizeof(double));
+    memcpy(decoded->tracks + (size_t)p * 6 * T + 3 * T, scratch->shift, 3 * T * sizeof(double));
+    if (piece->flags & ATH_RIGID) {
+        ath_turning turning = ath_turning_of(plan, piece, ath_base_stream(motion, piece));
+        memcpy(decoded->turn_steps + 3 * (size_t)p, turning.steps, sizeof turning.steps);
+        memcpy(decoded->frames + (size_t)p * 12 * T, scratch->at.point, 3 * T * sizeof(double));
+        memcpy(decoded->frames + (size_t)p * 12 * T + 3 * T, scratch->at.rotation, 9 * T * sizeof(double));
+    }
+    int32_t *extents = decoded->extents + 2 * p;
+    extents[0] = ath_max(ath_row_extent(rows->shift, motion->frames, motion->frames),
+                         ath_row_extent(rows->rotation, motion->frames, motion->frames));
+    extents[1] = 0;
+    for (int32_t r = 0; r < ath_rank(piece); r++) {
+        int32_t count = ath_row_extent(ath_row(rows->modes, r, motion->frames), motion->frames, motion->frames);
+        extents[0] = ath_max(extents[0], count);
+        if (count > 0) extents[1] = rows->shape_count > 0 ? ath_max(ath_shape_modes(piece), r + 1) : r + 1;
+    }
+}
+
+static ath_piece_before piece_before(const ath_plan *plan, const ath_motion *motion, int32_t p)
+{
+    const ath_coarse *layer = motion->before;
+    size_t T = (size_t)motion->frames;
+    ath_piece_before before = {layer->placed + (size_t)plan->pieces[p].first * 3 * T,
+                               layer->tracks + (size_t)p * 6 * T,
+                               layer->tracks + (size_t)p * 6 * T + 3 * T,
+                               layer->turn_steps[3 * p] >= 0.0 ? layer->frames + (size_t)p * 12 * T : 0,
+                               layer->extents[2 * p],
+                               layer->extents[2 * p + 1]};
+    if (!motion->known[p] && before.frequencies > 0) before.frequencies = motion->frames;
+    return before;
+}
+
+/* Returns the vertices as decoded. */
+static const double *analyse_piece(const ath_plan *plan, const ath_motion *motion, const ath_integers *integers,
+                                   int32_t p, const ath_scratch *scratch, const double *source,
+                                   const ath_rounding *rounding)
+{
+    const ath_piece *piece = plan->pieces + p;
+    ath_piece_rows rows = ath_rows_of_piece(plan, integers, motion->frames, p);
+    ath_piece_before before;
+    int32_t T = motion->frames;
+    if (motion->before) {
+        before = piece_before(plan, motion, p);
+        ath_coarse_rows(motion, piece, p, &rows);
+    }
+    if (motion->decoded) memset(scratch->rotation, 0, 6 * (size_t)T * sizeof(double));
+    analyse_tracks(plan, motion, piece, motion->before ? &before : 0, &rows, scratch, source, rounding,
+                   scratch->placed);
+    if (motion->before) ath_predict_modes(plan, motion, piece, &before, scratch, &rows);
+    ath_to_local(plan, T, piece, &scratch->at, source + (size_t)piece->first * 3 * (size_t)T, scratch->placed);
+    ath_project(plan, T, piece, ath_rank(piece), scratch->placed, scratch->rows);
+    if (rows.shape_count > 0)
+        to_shapes(T, piece, rows.shape_count, integers->duals + integers->shape_first[p] * ATH_SHAPE_NUMBERS, scratch);
+    for (int32_t r = 0; r < ath_rank(piece); r++)
+        code_even_track(ath_mode_stream(motion, piece, r), T, ath_row_step(motion, piece, &rows, r), rounding,
+                        scratch->rows + (size_t)r * 3 * (size_t)T,
+                        rows.predicted_modes ? ath_row(rows.predicted_modes, r, T) : 0, ath_row(rows.modes, r, T));
+    const double *placed = ath_pose_rows(plan, motion, p, &rows, scratch);
+    if (motion->decoded) note_piece(plan, motion, piece, p, &rows, scratch, placed);
+    return placed;
+}
+
+void ath_analyse(const ath_plan *plan, const ath_motion *motion, const ath_integers *integers, int32_t first,
+                 int32_t stop, const double *source, const ath_rounding *rounding, const double origin[3],
+                 int is_float64, void *positions)
+{
+    ath_scratch scratch = ath_motion_scratch(plan, motion);
+    for (int32_t p = first; p < stop; p++) {
+        const ath_piece *piece = plan->pieces + p;
+        const double *placed = analyse_piece(plan, motion, integers, p, &scratch, source, rounding);
+        if (positions)
+            ath_store_positions(placed, piece->first, piece->count, motion->frames, origin, is_float64, positions);
+    }
+}
+
+void ath_mode_weights(const ath_piece *piece, double weights[ATH_SHAPE_MODES])
+{
+    for (int32_t m = 0; m < ATH_SHAPE_MODES; m++) weights[m] = ath_mode_weight(piece, m);
+}
+
+/* Means over the subtree of the residual in the attach frame, e = R'(x - c) - d: tracks r < rank become the mean of
+ * e * w_r, track 3 the mean of e, `centre` the mean of w. */
+static void node_moments(const ath_plan *plan, const ath_node *node, int32_t T, const ath_scratch *scratch,
+                         const double *source, double *tracks, double centre[3])
+{
+    const double *a = ath_rest_attach(plan, plan->pieces + node->piece);
+    double *local = scratch->placed, weight = 1.0 / (double)node->count;
+    memset(tracks, 0, 12 * (size_t)T * sizeof *tracks);
+    centre[0] = centre[1] = centre[2] = 0.0;
+    for (int32_t v = node->first; v < node->first + node->count; v++) {
+        const double *x0 = ath_rest_of(plan, v);
+        double d[3] = {x0[0] - a[0], x0[1] - a[1], x0[2] - a[2]};
+        ath_into_rest_space(T, &scratch->at, source + (size_t)v * 3 * (size_t)T, local);
+        for (int32_t axis = 0; axis < 3; axis++)
+            for (int32_t t = axis * T; t < (axis + 1) * T; t++) {
+                local[t] -= d[axis];
+                tracks[9 * T + t] += local[t] * weight;
+            }
+        for (int32_t r = 0; r < node->rank; r++) {
+            const double *w = node->whitening + 3 * r;
+            double value = (w[0] * d[0] + w[1] * d[1] + w[2] * d[2]) * weight, *track = tracks + r * 3 * T;
+            centre[r] += value;
+            for (int32_t i = 0; i < 3 * T; i++) track[i] += value * local[i];
+        }
+    }
+}
+
+/* Turns the moments into the least-squares map: e = Y w, which they are already, for attached nodes, and e = s + Y w
+ * for roots and loose parts. */
+static void fit_node(const ath_node *node, int free_base, int32_t T, double *tracks, const double centre[3])
+{
+    double *shift = tracks + 9 * T, left = 1.0;
+    for (int32_t r = 0; r < node->rank; r++) left -= centre[r] * centre[r];
+    for (int32_t i = 0; i < 3 * T; i++) {
+        double mean = shift[i];
+        for (int32_t r = 0; r < node->rank; r++) mean -= tracks[3 * r * T + i] * centre[r];
+        shift[i] = free_base && left > 1e-6 ? mean / left : 0.0;
+        for (int32_t r = 0; r < node->rank; r++) tracks[3 * r * T + i] -= shift[i] * centre[r];
+    }
+}
+
+/* The largest half-octave step that is not above `step`. */
+static int32_t half_octaves(double step)
+{
+    int32_t exponent = 0;
+    if (!(step > 1e-30)) return -200;
+    if (step > 1e30) return 200;
+    for (; step >= 2.0; exponent += 2) step *= 0.5;
+    for (; step < 1.0; exponent -= 2) step *= 2.0;
+    return step >= 1.4142135623730951 ? exponent + 1 : exponent;
+}
+
+static void analyse_node(const ath_plan *plan, const ath_motion *motion, const ath_node *node,
+                         const ath_node_rows *rows, const ath_scratch *scratch, const double *source, double level_step,
+                         const ath_rounding *rounding)
+{
+    const ath_piece *piece = plan->pieces + node->piece;
+    int32_t T = motion->frames;
+    double *tracks = scratch->rows, centre[3];
+    int free_base = ath_has_shift(piece);
+    ath_attach(plan, motion, piece, scratch->at);
+    node_moments(plan, node, T, scratch, source, tracks, centre);
+    fit_node(node, free_base, T, tracks, centre);
+    *rows->step = half_octaves(level_step / ath_sqrt((double)node->count));
+    double step = ath_node_step(*rows->step);
+    ath_stream stream = ath_node_stream(motion, step);
+    for (int32_t r = 0; r < node->rank; r++)
+        code_even_track(&stream, T, step, rounding, tracks + r * 3 * T, 0, ath_row(rows->rows, r, T));
+    if (free_base) code_even_track(&stream, T, step, rounding, tracks + 9 * T, 0, ath_row(rows->rows, 3, T));
+}
+
+void ath_analyse_nodes(const ath_plan *plan, const ath_motion *motion, const ath_integers *integers, int32_t first,
+                       int32_t stop, const double *source, const double *level_steps, const ath_rounding *rounding)
+{
+    ath_scratch scratch = ath_motion_scratch(plan, motion);
+    for (int32_t n = first; n < stop; n++) {
+        const ath_node *node = plan->nodes + n;
+        ath_node_rows rows = ath_rows_of_node(integers, motion->frames, n);
+        if (node->coded) analyse_node(plan, motion, node, &rows, &scratch, source, level_steps[node->level], rounding);
+    }
+}

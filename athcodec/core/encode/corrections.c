@@ -1,0 +1,517 @@
+/* Finds the corrections that keep the error bound, on the positions that a decoder will have: as few as do, and such
+ * that what is left of the error moves as little from frame to frame as it can. */
+#include "encode/encode.h"
+#include <float.h>
+
+/* How many bits it is worth that the squared second differences of a vertex's error do not grow by as much as they are
+ * on average over its frames. It shows where little moves otherwise: LEAST_BEND, over limit^2, counts as moving. */
+static const double BEND_BITS = 0.5, LEAST_BEND = 1.0 / 16;
+
+/* One vertex over time: as decoded and as wanted, what corrections add so far, and the error that is left. */
+typedef struct {
+    int32_t frames, is_float64;
+    int32_t closed; /* of its ends, as ath_met_ends has it */
+    int32_t worst;  /* the frame that is farthest beyond the limit; -1: none is */
+    double step, limit2;
+    double decoded[ATH_SEGMENT_FRAMES][3], wanted[ATH_SEGMENT_FRAMES][3], error[ATH_SEGMENT_FRAMES][3];
+    double squares[ATH_SEGMENT_FRAMES];  /* of the errors' lengths */
+    double bends[ATH_SEGMENT_FRAMES][3]; /* second differences of the error; 0 in the first and the last frame */
+    double bend_bits;                    /* for each unit of their squares */
+    ath_corrected_parts parts;
+    ath_correction own[ATH_SEGMENT_FRAMES]; /* all zero: none */
+} track;
+
+typedef struct {
+    int32_t frame;
+    ath_correction own;
+    double cost; /* bits for each frame that it brings within the limit */
+} candidate;
+
+static double number_at(int is_float64, const void *positions, size_t at)
+{
+    return is_float64 ? ((const double *)positions)[at] : (double)((const float *)positions)[at];
+}
+
+static double square(const double e[3]) { return e[0] * e[0] + e[1] * e[1] + e[2] * e[2]; }
+
+static int32_t length_of(int32_t steps) { return steps < 0 ? -steps : steps; }
+
+static int is_any(const ath_correction *own) { return own->q[0] != 0 || own->q[1] != 0 || own->q[2] != 0; }
+
+static int32_t first_frame(int32_t frame, int32_t away) { return ath_max(0, frame - away); }
+
+static int32_t last_frame(const track *track, int32_t frame, int32_t away)
+{
+    return ath_min(track->frames - 1, frame + away);
+}
+
+/* The error of a frame with `more` of a correction than its corrections so far. */
+static void error_with(const track *track, int32_t t, const int32_t q[3], int32_t more, double error[3])
+{
+    for (int32_t k = 0; k < 3; k++) {
+        double parts = track->parts[t][k] + (double)q[k] * more, sum = track->decoded[t][k];
+        if (parts != 0.0) sum = ath_corrected(sum, parts, track->step);
+        error[k] = (track->is_float64 ? sum : ath_single(sum)) - track->wanted[t][k];
+    }
+}
+
+static void bend_frames(track *track, int32_t from, int32_t to)
+{
+    for (int32_t t = ath_max(1, from); t <= ath_min(track->frames - 2, to); t++)
+        for (int32_t k = 0; k < 3; k++)
+            track->bends[t][k] = track->error[t - 1][k] - 2.0 * track->error[t][k] + track->error[t + 1][k];
+}
+
+static void find_worst(track *track)
+{
+    double most = track->limit2;
+    track->worst = -1;
+    for (int32_t t = 0; t < track->frames; t++)
+        if (track->squares[t] > most) {
+            most = track->squares[t];
+            track->worst = t;
+        }
+}
+
+static void open_track(track *track, int32_t v, const void *positions, const double *source, const double origin[3],
+                       double limit)
+{
+    size_t T = (size_t)track->frames;
+    track->limit2 = limit * limit;
+    for (size_t k = 0; k < 3; k++)
+        for (size_t t = 0; t < T; t++) {
+            size_t at = ((size_t)v * 3 + k) * T + t;
+            track->decoded[t][k] = number_at(track->is_float64, positions, at);
+            track->wanted[t][k] = source[at] + origin[k];
+            track->error[t][k] = track->decoded[t][k] - track->wanted[t][k];
+        }
+    for (size_t t = 0; t < T; t++) track->squares[t] = square(track->error[t]);
+    memset(track->parts, 0, T * sizeof track->parts[0]);
+    memset(track->own, 0, T * sizeof track->own[0]);
+    find_worst(track);
+}
+
+/* Whether all frames of a vertex are within the limit, as those of most are. */
+ATH_HOT static int is_within(int32_t frames, int is_float64, const void *positions, const double *source,
+                             const double origin[3], double limit, size_t first)
+{
+    double squares[ATH_SEGMENT_FRAMES] = {0.0};
+    int beyond = 0;
+    for (size_t k = 0; k < 3; k++) {
+        size_t row = first + k * (size_t)frames;
+        for (int32_t t = 0; t < frames; t++) {
+            double error = number_at(is_float64, positions, row + (size_t)t) - (source[row + (size_t)t] + origin[k]);
+            squares[t] += error * error;
+        }
+    }
+    for (int32_t t = 0; t < frames; t++) beyond |= squares[t] > limit * limit;
+    return !beyond;
+}
+
+/* How much the error moves before it is corrected. */
+static void weigh_bends(track *track)
+{
+    double sum = 0.0;
+    bend_frames(track, 0, track->frames - 1);
+    for (int32_t t = 1; t < track->frames - 1; t++) sum += square(track->bends[t]);
+    track->bend_bits = BEND_BITS / (sum / track->frames + LEAST_BEND * track->limit2);
+}
+
+/* ---- candidates ---- */
+
+/* About what the stream takes for it; like: that of the vertex before in the same frame. */
+static double estimated_bits(const ath_correction *own, const ath_correction *like)
+{
+    double bits = 2.0 + 3.0 * (like->width != own->width);
+    if (is_any(like)) {
+        for (int32_t k = 0; k < 3; k++) bits += 3.0 * (like->q[k] != own->q[k]);
+        return bits;
+    }
+    bits = 8.0;
+    for (int32_t k = 0; k < 3; k++)
+        if (own->q[k] != 0) bits += 2.0 + 0.5 * ath_min(8, length_of(own->q[k]) - 1);
+    return bits;
+}
+
+/* Where a correction may stand, and what it does to the sum of squared bends: with the vector x in parts of a step,
+ * 2 x * slope + x * x * curve. */
+typedef struct {
+    int32_t frame, width, beyond; /* beyond: frames in reach that are beyond the limit */
+    double slope[3], curve;
+} place;
+
+/* What is there of a footprint, which an end cuts off. */
+static int32_t shown_part(const track *track, int32_t frame, int32_t width, int32_t t)
+{
+    return t >= 0 && t < track->frames ? ath_footprint_part(width, t - frame) : 0;
+}
+
+static int32_t footprint_bend(const track *track, int32_t frame, int32_t width, int32_t t)
+{
+    return shown_part(track, frame, width, t - 1) - 2 * shown_part(track, frame, width, t)
+           + shown_part(track, frame, width, t + 1);
+}
+
+static int has_bend(const track *track, int32_t t) { return t > 0 && t < track->frames - 1; }
+
+/* Behind a closed end the error goes on as it comes, and nothing stands of a correction. */
+static place place_at(const track *track, int32_t frame, int32_t width)
+{
+    place place = {frame, width, 0, {0.0, 0.0, 0.0}, 0.0};
+    int32_t reach = ath_footprint_reach[width] + 1, stop = last_frame(track, frame, reach - 1);
+    for (int32_t t = first_frame(frame, reach - 1); t <= stop; t++) place.beyond += track->squares[t] > track->limit2;
+    int32_t first = track->closed & 1 ? -1 : 1, last = track->closed & 2 ? track->frames : track->frames - 2;
+    for (int32_t t = ath_max(first, frame - reach); t <= ath_min(last, frame + reach); t++) {
+        double bend = footprint_bend(track, frame, width, t);
+        for (int32_t k = 0; k < 3 && has_bend(track, t); k++) place.slope[k] += bend * track->bends[t][k];
+        place.curve += bend * bend;
+    }
+    return place;
+}
+
+/* Whether a closed end would cut off more of a footprint than its faint end. */
+static int is_cut(int32_t frames, int32_t closed, int32_t frame, int32_t width)
+{
+    enum { FAINT = 5 };
+    int32_t reach = ath_footprint_reach[width], behind = frames - frame;
+    if (closed & 1 && frame + 1 <= reach && ath_footprint_part(width, frame + 1) > FAINT) return 1;
+    return closed & 2 && behind <= reach && ath_footprint_part(width, behind) > FAINT;
+}
+
+static double more_bends(const track *track, const place *place, const int32_t q[3])
+{
+    double sum = 0.0, part = track->step / ATH_FOOTPRINT_PARTS;
+    for (int32_t k = 0; k < 3; k++) {
+        double x = q[k] * part;
+        sum += x * (2.0 * place->slope[k] + x * place->curve);
+    }
+    return sum;
+}
+
+/* The squared error of a frame with a candidate. */
+static double square_with(const track *track, const candidate *tried, int32_t t)
+{
+    double error[3];
+    error_with(track, t, tried->own.q, ath_footprint_part(tried->own.width, t - tried->frame), error);
+    return square(error);
+}
+
+/* Whether a candidate may cost less than `most`, brings the worst frame within the limit, and moves none away that is beyond
+ * it then; its cost. */
+static int try_candidate(const track *track, const ath_correction *above, const place *place, double most,
+                         candidate *tried)
+{
+    int32_t at = place->frame, reach = ath_footprint_reach[place->width], fixed = 0;
+    double bits = estimated_bits(&tried->own, above + at) + track->bend_bits * more_bends(track, place, tried->own.q);
+    if (bits >= most * (bits > 0.0 ? place->beyond : 1)) return 0;
+    if (square_with(track, tried, track->worst) > track->limit2) return 0;
+    for (int32_t t = first_frame(at, reach); t <= last_frame(track, at, reach); t++) {
+        double after = square_with(track, tried, t), before = track->squares[t];
+        if (after > track->limit2 && after > before) return 0;
+        fixed += before > track->limit2 && after <= track->limit2;
+    }
+    tried->cost = bits / fixed;
+    return 1;
+}
+
+static int32_t to_steps(double value) { return value < 0.0 ? -(int32_t)(0.5 - value) : (int32_t)(value + 0.5); }
+
+/* The correction that takes most of an error away, no axis of which is 0; 0: there is none. */
+static int whole_correction(const double error[3], double scale, int32_t whole[3])
+{
+    for (int32_t k = 0; k < 3; k++) {
+        double units = -error[k] / scale;
+        if (!(units > -1e9 && units < 1e9)) return 0;
+        whole[k] = to_steps(units);
+        if (whole[k] == 0) whole[k] = units < 0.0 ? -1 : 1;
+    }
+    return 1;
+}
+
+/* Tries the axes of a mask: the whole correction, and up to two that are shorter by a step each. Whether one serves that may
+ * be chosen. */
+static int try_axes(const track *track, const ath_correction *above, const place *place, int32_t mask,
+                    const int32_t whole[3], candidate *best)
+{
+    enum { SIZES = 3 };
+    candidate tried = {place->frame, {{0, 0, 0}, place->width}, 0.0};
+    int32_t longest = 0, found = 0;
+    for (int32_t k = 0; k < 3; k++)
+        if (mask >> k & 1) longest = ath_max(longest, length_of(whole[k]));
+    for (int32_t size = longest; size > ath_max(0, longest - SIZES); size--) {
+        for (int32_t k = 0; k < 3; k++)
+            tried.own.q[k] = mask >> k & 1 ? to_steps((double)whole[k] * size / longest) : 0;
+        if (!try_candidate(track, above, place, best->cost, &tried)) continue;
+        found = 1;
+        if (tried.cost < best->cost) *best = tried;
+    }
+    return found;
+}
+
+/* The cheapest correction of a width in a frame for the worst one, of as few axes as do; 0: there is none. */
+static int try_frame(const track *track, const ath_correction *above, int32_t frame, int32_t width, candidate *best)
+{
+    static const int32_t masks[7] = {1, 2, 4, 3, 5, 6, 7}, stop_of[3] = {3, 6, 7}; /* by the number of axes */
+    double scale = track->step * ath_footprint_part(width, track->worst - frame) / ATH_FOOTPRINT_PARTS;
+    int32_t whole[3], found = 0;
+    if (is_any(track->own + frame) || is_cut(track->frames, track->closed, frame, width)) return 0;
+    if (!whole_correction(track->error[track->worst], scale, whole)) return 0;
+    const place place = place_at(track, frame, width);
+    for (int32_t axes = 0, i = 0; axes < 3 && !found; axes++)
+        for (; i < stop_of[axes]; i++) found |= try_axes(track, above, &place, masks[i], whole, best);
+    return found;
+}
+
+/* ---- vertices ---- */
+
+static void apply(track *track, const candidate *chosen)
+{
+    static const int32_t none[3] = {0};
+    int32_t at = chosen->frame, reach = ath_footprint_reach[chosen->own.width];
+    track->own[at] = chosen->own;
+    ath_add_correction(track->frames, at, &chosen->own, track->parts);
+    for (int32_t t = first_frame(at, reach); t <= last_frame(track, at, reach); t++) {
+        error_with(track, t, none, 0, track->error[t]);
+        track->squares[t] = square(track->error[t]);
+    }
+    bend_frames(track, at - reach - 1, at + reach + 1);
+}
+
+/* One correction after the other, for the frame that is worst then. Each leaves fewer frames beyond the limit. 0: one
+ * cannot be brought within it. */
+static int correct_track(track *track, const ath_correction *above, int32_t widest)
+{
+    if (track->worst >= 0) weigh_bends(track);
+    for (; track->worst >= 0; find_worst(track)) {
+        candidate best = {.cost = DBL_MAX};
+        int found = 0;
+        for (int32_t width = 0; width <= widest; width++) {
+            int32_t reach = ath_footprint_reach[width], last = last_frame(track, track->worst, reach);
+            for (int32_t t = first_frame(track->worst, reach); t <= last; t++)
+                found |= try_frame(track, above, t, width, &best);
+        }
+        if (!found) return 0;
+        apply(track, &best);
+    }
+    return 1;
+}
+
+/* Applies what is decided of a vertex. */
+static void decide(track *track, const ath_met_ends *ends, int64_t first, int64_t stop)
+{
+    for (int64_t i = first; i < stop; i++) {
+        const int32_t *row = ends->decided + ATH_CORRECTION_ROW * i;
+        candidate chosen = {.frame = row[1]};
+        memcpy(&chosen.own, row + 2, sizeof chosen.own);
+        apply(track, &chosen);
+    }
+    find_worst(track);
+}
+
+int64_t ath_find_corrections(int32_t vertex_count, int32_t frames, int is_float64, const void *positions,
+                             const double *source, const double origin[3], const double *limits, const uint8_t *narrow,
+                             double step, const ath_met_ends *ends, int32_t *corrections, int64_t capacity)
+{
+    track track = {.frames = frames, .is_float64 = is_float64, .step = step};
+    ath_correction above[ATH_SEGMENT_FRAMES] = {{{0}, 0}};
+    int64_t count = 0, decided = 0, next = 0;
+    for (int32_t v = 0; v < vertex_count; v++, decided = next) {
+        while (next < ends->count && ends->decided[ATH_CORRECTION_ROW * next] == v) next++;
+        if (decided == next
+            && is_within(frames, is_float64, positions, source, origin, limits[v], (size_t)v * 3 * (size_t)frames)) {
+            memset(above, 0, (size_t)frames * sizeof above[0]);
+            continue;
+        }
+        int32_t widest = narrow[v] ? 0 : ATH_FOOTPRINTS - 1; /* those of one frame cannot be in each other's way */
+        track.closed = ends->closed;
+        for (int corrected = 0; !corrected; widest--) {
+            if (widest < 0 && decided == next) return -1;
+            if (widest < 0) {
+                decided = next;
+                widest = 0;
+            }
+            open_track(&track, v, positions, source, origin, limits[v]);
+            decide(&track, ends, decided, next);
+            corrected = correct_track(&track, above, widest);
+        }
+        for (int32_t t = 0; t < frames; t++) {
+            if (!is_any(track.own + t)) continue;
+            if (count < capacity) {
+                int32_t *row = corrections + ATH_CORRECTION_ROW * count;
+                row[0] = v;
+                row[1] = t;
+                memcpy(row + 2, track.own + t, sizeof track.own[t]);
+            }
+            count++;
+        }
+        memcpy(above, track.own, (size_t)frames * sizeof above[0]);
+    }
+    return count;
+}
+
+/* ---- rigid parts ---- */
+
+/* A part whose vertices are corrected together, so that it keeps its shape. */
+typedef struct {
+    int32_t first, count, frames, is_float64;
+    const void *positions;
+    const double *source, *origin, *limits;
+    double step;
+    double beyond[ATH_SEGMENT_FRAMES]; /* the largest square of an error over that of its limit; 0: left as it is */
+    ath_corrected_parts middle;        /* between the least and the most that vertices are off, without corrections */
+    ath_corrected_parts parts;
+    ath_correction own[ATH_SEGMENT_FRAMES]; /* all zero: none */
+} rigid_part;
+
+static void raise_to(double value, double *most)
+{
+    if (value > *most) *most = value;
+}
+
+ATH_HOT static void open_part(rigid_part *part)
+{
+    double least[3][ATH_SEGMENT_FRAMES], most[3][ATH_SEGMENT_FRAMES], squares[ATH_SEGMENT_FRAMES];
+    int32_t frames = part->frames;
+    memset(part->beyond, 0, (size_t)frames * sizeof part->beyond[0]);
+    for (int32_t v = part->first; v < part->first + part->count; v++) {
+        memset(squares, 0, (size_t)frames * sizeof *squares);
+        for (size_t k = 0; k < 3; k++) {
+            size_t row = ((size_t)v * 3 + k) * (size_t)frames;
+            for (int32_t t = 0; t < frames; t++) {
+                double decoded = number_at(part->is_float64, part->positions, row + (size_t)t);
+                double away = part->source[row + (size_t)t] + part->origin[k] - decoded;
+                least[k][t] = v == part->first || away < least[k][t] ? away : least[k][t];
+                most[k][t] = v == part->first || away > most[k][t] ? away : most[k][t];
+                squares[t] += away * away;
+            }
+        }
+        for (int32_t t = 0; t < frames; t++)
+            raise_to(squares[t] / (part->limits[v] * part->limits[v]), part->beyond + t);
+    }
+    for (int32_t t = 0; t < frames; t++)
+        for (int32_t k = 0; k < 3; k++) part->middle[t][k] = 0.5 * (least[k][t] + most[k][t]);
+    memset(part->parts, 0, (size_t)frames * sizeof part->parts[0]);
+    memset(part->own, 0, (size_t)frames * sizeof part->own[0]);
+}
+
+/* What `beyond` is in a frame with `more` of a further correction. */
+static double beyond_with(const rigid_part *part, int32_t t, const int32_t q[3], int32_t more)
+{
+    double most = 0.0;
+    for (int32_t v = part->first; v < part->first + part->count; v++) {
+        double error[3];
+        for (int32_t k = 0; k < 3; k++) {
+            size_t at = ((size_t)v * 3 + (size_t)k) * (size_t)part->frames + (size_t)t;
+            double sum = number_at(part->is_float64, part->positions, at);
+            double parts = part->parts[t][k] + (double)q[k] * more;
+            if (parts != 0.0) sum = ath_corrected(sum, parts, part->step);
+            error[k] = (part->is_float64 ? sum : ath_single(sum)) - (part->source[at] + part->origin[k]);
+        }
+        raise_to(square(error) / (part->limits[v] * part->limits[v]), &most);
+    }
+    return most;
+}
+
+/* Moves a part by the middle of what its vertices are off in a frame, if that brings all of them within their limits there
+ * and takes none farther beyond it in the frames around. Whether it does. */
+static int move_part(rigid_part *part, int32_t closed, int32_t frame, int32_t width)
+{
+    ath_correction own = {{0, 0, 0}, width};
+    double after[2 * ATH_FOOTPRINT_REACH + 1];
+    int32_t reach = ath_footprint_reach[width];
+    int32_t start = first_frame(frame, reach), stop = ath_min(part->frames - 1, frame + reach);
+    for (int32_t k = 0; k < 3; k++) {
+        double units = part->middle[frame][k] / part->step - part->parts[frame][k] / ATH_FOOTPRINT_PARTS;
+        own.q[k] = units > -1e9 && units < 1e9 ? to_steps(units) : 0;
+    }
+    if (!is_any(&own) || is_any(part->own + frame) || is_cut(part->frames, closed, frame, width)) return 0;
+    for (int32_t t = start; t <= stop; t++) {
+        after[t - start] = beyond_with(part, t, own.q, ath_footprint_part(width, t - frame));
+        if (after[t - start] > 1.0 && (t == frame || after[t - start] > part->beyond[t])) return 0;
+    }
+    memcpy(part->beyond + start, after, (size_t)(stop - start + 1) * sizeof after[0]);
+    part->own[frame] = own;
+    ath_add_correction(part->frames, frame, &own, part->parts);
+    return 1;
+}
+
+/* The frame that is farthest beyond a limit; -1: none is. */
+static int32_t worst_of(const rigid_part *part)
+{
+    int32_t worst = -1;
+    double most = 1.0;
+    for (int32_t t = 0; t < part->frames; t++)
+        if (part->beyond[t] > most) {
+            most = part->beyond[t];
+            worst = t;
+        }
+    return worst;
+}
+
+/* Each frame in turn, over as many frames as serve: what moves in one alone pops. */
+static void correct_part(rigid_part *part, int32_t closed, int32_t widest)
+{
+    for (int32_t t = worst_of(part); t >= 0; t = worst_of(part)) {
+        int32_t width = widest;
+        while (width >= 0 && !move_part(part, closed, t, width)) width--;
+        if (width < 0) part->beyond[t] = 0.0;
+    }
+}
+
+int64_t ath_find_rigid_corrections(int32_t part_count, const int32_t *first, const int32_t *counts, int32_t frames,
+                                   int is_float64, const void *positions, const double *source, const double origin[3],
+                                   const double *limits, int is_narrow, double step, int32_t closed,
+                                   int32_t *corrections, int64_t capacity)
+{
+    rigid_part part = {.frames = frames, .is_float64 = is_float64, .positions = positions, .source = source};
+    int64_t count = 0;
+    part.origin = origin;
+    part.limits = limits;
+    part.step = step;
+    for (int32_t p = 0; p < part_count; p++) {
+        part.first = first[p];
+        part.count = counts[p];
+        open_part(&part);
+        correct_part(&part, closed, is_narrow ? 0 : ATH_FOOTPRINTS - 1);
+        for (int32_t t = 0; t < frames; t++)
+            for (int32_t v = first[p]; v < first[p] + counts[p] && is_any(part.own + t); v++, count++) {
+                if (count >= capacity) continue;
+                int32_t *row = corrections + ATH_CORRECTION_ROW * count;
+                row[0] = v;
+                row[1] = t;
+                memcpy(row + 2, part.own + t, sizeof part.own[t]);
+            }
+    }
+    return count;
+}
+
+static void apply_to_vertex(int32_t frames, int is_float64, void *positions, size_t first, const double parts[][3],
+                            double step)
+{
+    for (size_t k = 0; k < 3; k++)
+        for (size_t t = 0; t < (size_t)frames; t++) {
+            size_t at = first + k * (size_t)frames + t;
+            if (parts[t][k] == 0.0) continue;
+            double sum = ath_corrected(number_at(is_float64, positions, at), parts[t][k], step);
+            if (is_float64)
+                ((double *)positions)[at] = sum;
+            else
+                ((float *)positions)[at] = (float)sum;
+        }
+}
+
+void ath_apply_corrections(int32_t frames, int is_float64, void *positions, double step, const int32_t *corrections,
+                           int64_t count)
+{
+    ath_corrected_parts parts;
+    for (const int32_t *row = corrections, *stop = row + ATH_CORRECTION_ROW * count; row < stop;) {
+        int32_t v = row[0];
+        memset(parts, 0, (size_t)frames * sizeof parts[0]);
+        for (; row < stop && row[0] == v; row += ATH_CORRECTION_ROW) {
+            ath_correction own;
+            memcpy(&own, row + 2, sizeof own);
+            ath_add_correction(frames, row[1], &own, parts);
+        }
+        apply_to_vertex(frames, is_float64, positions, (size_t)v * 3 * (size_t)frames, parts, step);
+    }
+}

@@ -1,0 +1,232 @@
+/* What an encoder needs of the core: athcodec's Python side is its only user, and players leave it out. Segments are
+ * analysed, measured and written stage by stage; ath.h reads what comes out.
+ *
+ * Motion arrays are vertex-major: element (vertex v, axis, frame t) of a segment of T frames stands at
+ * (v * 3 + axis) * T + t. Vertices are in file order. */
+#ifndef ATH_ENCODE_H
+#define ATH_ENCODE_H
+
+#include "file/container.h"
+#include "model/mesh.h"
+#include "model/motion.h"
+
+/* The integers of one segment; with them come ath_motion's streams. */
+typedef struct ath_integers {
+    int32_t *coefficients; /* vertex_count x 3 x frames: mode m of a piece at slot first + m */
+    int32_t *tracks;       /* piece_count x 2 x 3 x frames: rotation, translation */
+    int32_t *node_tracks;  /* node_count x 4 x 3 x frames: columns of the map, translation */
+    int32_t *node_steps;   /* node_count: exponents of half-octave steps */
+    int32_t *predicted;    /* of a refinement, as large as coefficients and tracks; else null */
+    int32_t *predicted_tracks;
+    const int32_t *shape_counts; /* piece_count; null: no piece has shapes */
+    const int64_t *shape_first;  /* piece_count: where its shapes stand in those below */
+    const double *shapes;        /* ATH_SHAPE_NUMBERS of each */
+    const double *duals;         /* likewise: what takes modes to a shape's track */
+} ath_integers;
+
+ATH_INLINE ath_piece_rows ath_rows_of_piece(const ath_plan *plan, const ath_integers *integers, int32_t frames,
+                                            int32_t p)
+{
+    ath_piece_rows rows;
+    rows.modes = ath_row(integers->coefficients, plan->pieces[p].first, frames);
+    rows.rotation = ath_row(integers->tracks, 2 * p, frames);
+    rows.shift = ath_row(integers->tracks, 2 * p + 1, frames);
+    rows.counts = 0;
+    rows.predicted_modes = integers->predicted ? ath_row(integers->predicted, plan->pieces[p].first, frames) : 0;
+    rows.predicted_rotation = integers->predicted ? ath_row(integers->predicted_tracks, 2 * p, frames) : 0;
+    rows.predicted_shift = integers->predicted ? ath_row(integers->predicted_tracks, 2 * p + 1, frames) : 0;
+    rows.shape_count = integers->shape_counts ? integers->shape_counts[p] : 0;
+    rows.shapes = rows.shape_count > 0 ? integers->shapes + integers->shape_first[p] * ATH_SHAPE_NUMBERS : 0;
+    return rows;
+}
+
+ATH_INLINE void ath_coarse_rows(const ath_motion *motion, const ath_piece *piece, int32_t p, ath_piece_rows *rows)
+{
+    const ath_coarse *before = motion->before;
+    size_t T = (size_t)motion->frames;
+    int known = motion->known[p];
+    int alike = (before->shape_counts && before->shape_counts[p] > 0) == (rows->shape_count > 0);
+    rows->coarse_turn_steps = before->turn_steps[3 * p] >= 0.0 ? before->turn_steps + 3 * (size_t)p : 0;
+    rows->coarse_modes = known && alike ? before->integers + (size_t)piece->first * 3 * T : 0;
+    rows->coarse_rotation = known ? before->integer_tracks + (size_t)p * 6 * T : 0;
+    rows->coarse_shift = known ? before->integer_tracks + (size_t)p * 6 * T + 3 * T : 0;
+}
+
+ATH_INLINE ath_node_rows ath_rows_of_node(const ath_integers *integers, int32_t frames, int32_t n)
+{
+    ath_node_rows rows;
+    rows.rows = ath_row(integers->node_tracks, 4 * n, frames);
+    rows.step = integers->node_steps + n;
+    return rows;
+}
+
+/* Bytes of scratch memory that any of the writers below needs as `model`. */
+ATH_ENCODER_API size_t ath_model_size(void);
+
+/* How far the residuals of pieces, ranges of vertices that each move by one affine map, are from their base places:
+ * the mean of each piece in each frame, its largest distance, and the most vertices beyond xi in a frame.
+ * rest: 3 x vertices; positions: 3 x frames x vertices; inverse, offset: 3 x 3 and 3 for each frame and piece, which
+ * take a position to its residual. */
+ATH_ENCODER_API void ath_differences(int32_t vertex_count, int32_t frames, int32_t piece_count, const int64_t *first,
+                                     const int64_t *stop, const double *inverse, const double *offset,
+                                     const double *rest, const double *positions, double xi, double *mean,
+                                     double *largest, int32_t *most_beyond);
+
+/* Some of the source's positions, (frames, source_count, 3) in its order, float or (is_float64) double, to vertex-major
+ * doubles less the origin. */
+ATH_ENCODER_API void ath_gather(int32_t vertex_count, int32_t frames, const int32_t *vertex_source,
+                                int32_t source_count, int is_float64, const void *source, const double origin[3],
+                                double *out);
+
+enum { ATH_END_PARTS = 3 };
+
+/* How numbers become integers: below `dead_zone` steps they are 0, and what is left of a row's value, slope and bend at
+ * either end weighs as many squared steps as `ends` says; 0: it does not. */
+typedef struct ath_rounding {
+    double dead_zone, ends[ATH_END_PARTS];
+} ath_rounding;
+
+/* Quantised coefficients and tracks of all pieces in closed loop, then the maps of the nodes in between. source:
+ * vertex-major doubles less the origin. A map's step is that of its level (height + 2 lengths) over the root of its
+ * number of vertices: the same error in all of them together costs the same everywhere. Attach caches are to be kept
+ * (ath_build_plan). Only pieces, or nodes, first to stop - 1: several threads may work on ranges of one segment,
+ * each with scratch memory of its own, once the pieces that theirs hang on are done. positions: where those of
+ * the last level go, as ath_pose has them; 0: nowhere. */
+ATH_ENCODER_API void ath_analyse(const ath_plan *plan, const ath_motion *motion, const ath_integers *integers,
+                                 int32_t first, int32_t stop, const double *source, const ath_rounding *rounding,
+                                 const double origin[3], int is_float64, void *positions);
+ATH_ENCODER_API void ath_analyse_nodes(const ath_plan *plan, const ath_motion *motion, const ath_integers *integers,
+                                       int32_t first, int32_t stop, const double *source, const double *level_steps,
+                                       const ath_rounding *rounding);
+
+/* Puts decoded vertices, less the origin, into positions as ath_pose has them. */
+void ath_store_positions(const double *placed, int32_t first, int32_t count, int32_t frames, const double origin[3],
+                         int is_float64, void *positions);
+
+/* Positions at `level` as a decoder has them before corrections: origin added, vertex-major, float or (is_float64)
+ * double. By ranges of pieces, which keep the rule above, and then of nodes. */
+ATH_ENCODER_API void ath_pose(const ath_plan *plan, const ath_motion *motion, const ath_integers *integers,
+                              int32_t first, int32_t stop, int32_t level, const double origin[3], int is_float64,
+                              void *positions);
+ATH_ENCODER_API void ath_pose_nodes(const ath_plan *plan, const ath_motion *motion, const ath_integers *integers,
+                                    int32_t first, int32_t stop, int32_t level, const double origin[3], int is_float64,
+                                    void *positions);
+
+/* Steps of the first ATH_SHAPE_MODES modes of a branch with such flags, over that of their stream. */
+ATH_ENCODER_API void ath_mode_weights(const ath_piece *piece, double weights[ATH_SHAPE_MODES]);
+
+/* Adds the second moments over time of rows of integers, each of `frames`, to the lower half of `moments`, frames x frames:
+ * of the rows whose squares add up to more than `least`. Returns how many these are. */
+ATH_ENCODER_API int64_t ath_add_moments(int64_t count, int32_t frames, const int32_t *rows, double least,
+                                        double *moments);
+
+/* Products of `count` pairs of matrices, rows x inner and inner x columns; a_step, b_step: numbers from one to the next,
+ * 0: they share one. */
+ATH_ENCODER_API void ath_multiply(int64_t count, int64_t rows, int64_t inner, int64_t columns, const double *a,
+                                  int64_t a_step, const double *b, int64_t b_step, double *out);
+/* Singular values, 3 each, in descending order, of 3 x 3 matrices: left, columns, times these, times right, rows. */
+ATH_ENCODER_API void ath_decompose(int64_t count, const double *matrices, double *left, double *stretch, double *right);
+/* rows, n x columns, become what a positive definite n x n matrix, which is destroyed, takes to them. */
+ATH_ENCODER_API void ath_solve(int32_t n, int32_t columns, double *matrix, double *rows);
+
+/* Largest distance and sum of squared distances between positions and source (plus origin). shown: how many frames of
+ * the clip show each frame. rounding: what a decoder may be further off. histogram: ATH_SHORT_FLOATS counts, to which
+ * each distance is added, rounded up as in the error table. */
+ATH_ENCODER_API void ath_error(int32_t vertex_count, int32_t frames, const int32_t *shown, int is_float64,
+                               const void *positions, const double *source, const double origin[3], double rounding,
+                               double *max_error, double *sum_squares, uint32_t *histogram);
+
+enum { ATH_CORRECTION_ROW = 6 }; /* numbers */
+
+/* How the corrections of a segment meet those of the segments beside it: at ends that are closed (1: its first frame, 2: its
+ * last) no footprint is cut off, but for its faint end. count: of the vertices and frames, of either end, whose corrections
+ * are decided, rows as below in ascending order, since they stand in the first frame of one segment like in the last
+ * of the other. They are given up where a vertex cannot be corrected with them. */
+typedef struct ath_met_ends {
+    const int32_t *decided;
+    int64_t count;
+    int32_t closed, reserved;
+} ath_met_ends;
+
+/* Finds the corrections that bring every vertex within its own limit: up to `capacity` rows of vertex, frame and
+ * ath_correction. narrow: of each vertex whether its corrections are to be of one frame. Returns how many there are; -1:
+ * the step cannot express them. */
+ATH_ENCODER_API int64_t ath_find_corrections(int32_t vertex_count, int32_t frames, int is_float64,
+                                             const void *positions, const double *source, const double origin[3],
+                                             const double *limits, const uint8_t *narrow, double step,
+                                             const ath_met_ends *ends, int32_t *corrections, int64_t capacity);
+/* Those that move all vertices of a part, first and counts, together, where one is beyond its limit and all are within it
+ * then; over several frames where that serves, unless is_narrow. closed: of ath_met_ends; as many rows as there are. */
+ATH_ENCODER_API int64_t ath_find_rigid_corrections(int32_t part_count, const int32_t *first, const int32_t *counts,
+                                                   int32_t frames, int is_float64, const void *positions,
+                                                   const double *source, const double origin[3], const double *limits,
+                                                   int is_narrow, double step, int32_t closed, int32_t *corrections,
+                                                   int64_t capacity);
+/* Rows of one vertex stand together, in the order of their frames. */
+ATH_ENCODER_API void ath_apply_corrections(int32_t frames, int is_float64, void *positions, double step,
+                                           const int32_t *corrections, int64_t count);
+
+/* Writers of the streams: the size written, -1 when `capacity` is too small, -2 when the input cannot be expressed. */
+/* errors: of each level and segment ATH_MEASURES stored numbers; joins: one, read where there are several segments;
+ * repeats: one of each frame, or null. */
+ATH_ENCODER_API int64_t ath_encode_front(uint8_t *bytes, size_t capacity, const ath_header *header,
+                                         const ath_chunk *chunks, const int32_t *errors, const uint8_t *joins,
+                                         const uint8_t *repeats);
+ATH_ENCODER_API int64_t ath_encode_hierarchy(void *model, uint8_t *bytes, size_t capacity, const ath_branch *branches,
+                                             int32_t branch_count, int32_t vertex_count, const int32_t *branch_source,
+                                             const int32_t *vertex_source);
+/* mesh: null, or of a connected pose; slack: how far from its place a vertex may be put to save bits;
+ * moved: scratch, as large as the source. */
+ATH_ENCODER_API int64_t ath_encode_rest(void *model, uint8_t *bytes, size_t capacity, const ath_branch *branches,
+                                        int32_t branch_count, double step, double slack, ath_mesh *mesh,
+                                        const int32_t *coarse, const double *before, const int32_t *shape_of,
+                                        int32_t *steps, const double *source, double *moved, double *rest);
+/* shape_of: of each branch the one that it is a copy of, itself where others are copies of it, or -1. uses:
+ * scratch. Returns the number of copies. */
+ATH_ENCODER_API int32_t ath_find_copies(const ath_branch *branches, int32_t branch_count, const double *pose,
+                                        double step, double slack, int32_t *uses, int32_t *shape_of);
+/* turns: scratch, branch_count x 9. */
+ATH_ENCODER_API int64_t ath_encode_source_rest(void *model, uint8_t *bytes, size_t capacity, const ath_branch *branches,
+                                               int32_t branch_count, double step, const double *reference,
+                                               const double *source, double *moved, double *turns, double *rest);
+ATH_ENCODER_API int64_t ath_encode_exact_rest(void *model, uint8_t *bytes, size_t capacity, const ath_branch *branches,
+                                              int32_t branch_count, const ath_mesh *mesh, int is_float64,
+                                              const double *rest);
+/* memory: ath_faces_memory bytes. */
+ATH_ENCODER_API int64_t ath_encode_faces(void *memory, uint8_t *bytes, size_t capacity, const ath_polygons *shape,
+                                         int32_t vertex_count, const uint32_t *counts, const int32_t *corners);
+ATH_ENCODER_API int64_t ath_encode_times(void *model, uint8_t *bytes, size_t capacity, int32_t frame_count,
+                                         const double *times);
+ATH_ENCODER_API int64_t ath_encode_temporal(void *model, uint8_t *bytes, size_t capacity, int32_t rank, int32_t frames,
+                                            const int32_t *basis);
+/* Rows of a basis in waves; integers: as many rows of `frames` as rank, and zeros up to a multiple of 3. */
+ATH_ENCODER_API int64_t ath_encode_basis(void *model, uint8_t *bytes, size_t capacity, int32_t rank, int32_t frames,
+                                         int32_t *exponents, int32_t *integers);
+/* integers: as streams hold them, ATH_SHAPE_NUMBERS of each shape. */
+ATH_ENCODER_API int64_t ath_encode_shapes(void *model, uint8_t *bytes, size_t capacity, const ath_plan *plan,
+                                          const int32_t *shape_counts, const int64_t *shape_first, int32_t *integers,
+                                          int32_t level);
+/* The same of a refinement; coarse_counts: null where the layer before has no shapes. */
+ATH_ENCODER_API int64_t ath_encode_refined_shapes(void *model, uint8_t *bytes, size_t capacity, const ath_plan *plan,
+                                                  const int32_t *shape_counts, const int64_t *shape_first,
+                                                  int32_t *integers, const int32_t *coarse_counts,
+                                                  const int64_t *coarse_first, const int32_t *coarse, int32_t shift);
+/* positions, source: vertex-major, float or (is_float64) double. */
+ATH_ENCODER_API int64_t ath_encode_exact(void *model, uint8_t *bytes, size_t capacity, int32_t vertex_count,
+                                         int32_t frames, int is_float64, const void *positions, const void *source);
+ATH_ENCODER_API int64_t ath_encode_stems(void *model, uint8_t *bytes, size_t capacity, const ath_plan *plan,
+                                         const ath_motion *motion, const ath_integers *integers, int32_t level);
+ATH_ENCODER_API int64_t ath_encode_refinement(void *model, uint8_t *bytes, size_t capacity, const ath_plan *plan,
+                                              const ath_motion *motion, const ath_integers *integers, int32_t level);
+ATH_ENCODER_API int64_t ath_encode_affines(void *model, uint8_t *bytes, size_t capacity, const ath_plan *plan,
+                                           const ath_motion *motion, const ath_integers *integers, int32_t level);
+/* Predicted motion: memory, ath_predicted_memory bytes; lattice: 1 where vertices are points of it; source: frames x vertex_count x
+ * 3, less the origin; limits: of each vertex. Fills positions, as decoded. */
+ATH_ENCODER_API size_t ath_predicted_memory(int32_t vertex_count);
+ATH_ENCODER_API int64_t ath_encode_predicted(void *memory, uint8_t *bytes, size_t capacity, const ath_plan *plan,
+                                             const double *origin, int32_t frames, int is_float64, double step,
+                                             int lattice, const double *source, const double *limits, void *positions);
+ATH_ENCODER_API int64_t ath_encode_corrections(void *model, uint8_t *bytes, size_t capacity, int32_t vertex_count,
+                                               int32_t frames, const int32_t *corrections, int64_t count);
+
+#endif

@@ -1,0 +1,617 @@
+/* The orthonormal bases of the motion model: cantilever modes along a piece, affine functions of a sheet, waves in
+ * time. FORMAT.md, "Bases", states the same operations in the same order; nothing here may be reordered. */
+#include "model/plan.h"
+
+#define PI 3.14159265358979323846
+#define HALF_ROOT_3 0.86602540378443864676
+
+/* Of a function's squared length, what those before it must leave of it to go on with. */
+#define LEFT 1e-10
+
+enum { MOST_PROBES = 64, MOST_ROWS = ATH_SEGMENT_FRAMES, MODE_STEPS = 32 };
+
+/* Householder reduction of the symmetric n x n matrix `a` to tridiagonal form; on return row i of `q` is the i-th
+ * basis vector in which the matrix is tridiagonal (diagonal d, subdiagonal e[1..n-1]). Rounding makes the matrix
+ * unsymmetric: `a` has its columns one behind the other, so that sums of a row each run side by side. */
+ATH_HOT static void tridiagonalise(int32_t n, double *ATH_RESTRICT a, double *ATH_RESTRICT q, double *d, double *e)
+{
+    double v[MOST_ROWS], p[MOST_ROWS], sums[MOST_ROWS];
+    for (int32_t i = 0; i < n; i++)
+        for (int32_t j = 0; j < n; j++) q[i * n + j] = i == j ? 1.0 : 0.0;
+    for (int32_t k = 0; k + 2 < n; k++) {
+        double norm2 = 0.0, *column = a + k * n;
+        for (int32_t i = k + 1; i < n; i++) norm2 = norm2 + column[i] * column[i];
+        double below2 = norm2 - column[k + 1] * column[k + 1];
+        if (!(below2 > norm2 * 1e-30)) continue;
+        double norm = ath_sqrt(norm2), head = column[k + 1];
+        double alpha = head > 0.0 ? -norm : norm;
+        double scale = 1.0 / (norm2 - head * alpha); /* 2 / v.v, halved: v.v = 2 (norm2 - head alpha) */
+        v[k + 1] = head - alpha;
+        for (int32_t i = k + 2; i < n; i++) v[i] = column[i];
+        double vp = 0.0;
+        for (int32_t i = k + 1; i < n; i++) p[i] = 0.0;
+        for (int32_t j = k + 1; j < n; j++)
+            for (int32_t i = k + 1; i < n; i++) p[i] = p[i] + a[j * n + i] * v[j];
+        for (int32_t i = k + 1; i < n; i++) p[i] = p[i] * scale;
+        for (int32_t i = k + 1; i < n; i++) vp = vp + v[i] * p[i];
+        double half = 0.5 * scale * vp;
+        for (int32_t i = k + 1; i < n; i++) p[i] = p[i] - half * v[i];
+        for (int32_t j = k + 1; j < n; j++)
+            for (int32_t i = k + 1; i < n; i++) a[j * n + i] = a[j * n + i] - v[i] * p[j] - p[i] * v[j];
+        a[(k + 1) * n + k] = alpha;
+        column[k + 1] = alpha;
+        for (int32_t i = k + 2; i < n; i++) a[i * n + k] = column[i] = 0.0;
+        for (int32_t j = 0; j < n; j++) sums[j] = 0.0;
+        for (int32_t i = k + 1; i < n; i++)
+            for (int32_t j = 0; j < n; j++) sums[j] = sums[j] + v[i] * q[i * n + j];
+        for (int32_t j = 0; j < n; j++) sums[j] = sums[j] * scale;
+        for (int32_t i = k + 1; i < n; i++)
+            for (int32_t j = 0; j < n; j++) q[i * n + j] = q[i * n + j] - sums[j] * v[i];
+    }
+    for (int32_t i = 0; i < n; i++) {
+        d[i] = a[i * n + i];
+        e[i] = i > 0 ? a[(i - 1) * n + i] : 0.0;
+    }
+}
+
+/* Turns two rows into each other. */
+ATH_INLINE void rotate_rows(int32_t n, double c, double s, double *ATH_RESTRICT low, double *ATH_RESTRICT high)
+{
+    for (int32_t k = 0; k < n; k++) {
+        double h = high[k], w = low[k];
+        high[k] = s * w + c * h;
+        low[k] = c * w - s * h;
+    }
+}
+
+/* Implicit QL on the tridiagonal matrix; rotates the rows of q into eigenvectors. The iteration count is capped, so
+ * that the time is bounded for every input; the cap is never reached by the matrices of cantilever(). */
+ATH_HOT static void diagonalise(int32_t n, double *d, double *e, double *q)
+{
+    for (int32_t i = 1; i < n; i++) e[i - 1] = e[i];
+    e[n - 1] = 0.0;
+    for (int32_t l = 0; l < n; l++) {
+        for (int32_t iteration = 0; iteration < 50; iteration++) {
+            int32_t m = l;
+            for (; m < n - 1; m++) {
+                double size = (d[m] < 0 ? -d[m] : d[m]) + (d[m + 1] < 0 ? -d[m + 1] : d[m + 1]);
+                double off = e[m] < 0 ? -e[m] : e[m];
+                if (!(off > size * 1e-16)) break;
+            }
+            if (m == l) break;
+            double g = (d[l + 1] - d[l]) / (2.0 * e[l]);
+            double r = ath_sqrt(g * g + 1.0);
+            g = d[m] - d[l] + e[l] / (g >= 0.0 ? g + r : g - r);
+            double s = 1.0, c = 1.0, p = 0.0;
+            int32_t i = m - 1;
+            for (; i >= l; i--) {
+                double f = s * e[i], b = c * e[i];
+                r = ath_sqrt(f * f + g * g);
+                e[i + 1] = r;
+                if (r == 0.0) {
+                    d[i + 1] = d[i + 1] - p;
+                    e[m] = 0.0;
+                    break;
+                }
+                s = f / r;
+                c = g / r;
+                g = d[i + 1] - p;
+                r = (d[i] - g) * s + 2.0 * c * b;
+                p = s * r;
+                d[i + 1] = g + p;
+                g = c * r - b;
+                rotate_rows(n, c, s, q + i * n, q + (i + 1) * n);
+            }
+            if (r == 0.0 && i >= l) continue;
+            d[l] = d[l] - p;
+            e[l] = g;
+            e[m] = 0.0;
+        }
+    }
+}
+
+/* Eigenvalues in descending order, and a row for the vector of each, its last number not negative. Destroys `a`. */
+static void eigenvectors(int32_t n, double *a, double *q, double *values, double *vectors)
+{
+    double d[MOST_ROWS], e[MOST_ROWS];
+    tridiagonalise(n, a, q, d, e);
+    diagonalise(n, d, e, q);
+    for (int32_t m = 0; m < n; m++) {
+        int32_t best = 0;
+        for (int32_t i = 1; i < n; i++)
+            if (d[i] > d[best]) best = i;
+        double sign = q[best * n + n - 1] < 0.0 ? -1.0 : 1.0;
+        for (int32_t i = 0; i < n; i++) vectors[m * n + i] = sign * q[best * n + i];
+        values[m] = d[best];
+        d[best] = -1e300;
+    }
+}
+
+/* Eigenvectors, largest eigenvalue first, of the covariance of a randomly bent cantilever at the arc lengths that
+ * `gaps` (small positive integers) add up to: an integrated Wiener process, free rotation by `turn`, roughness. They are
+ * orthonormal where the last vertex counts `tip` times. */
+static void cantilever(int32_t n, const uint8_t *gaps, double turn, double rough, double tip, double *basis,
+                       double *work)
+{
+    double s[ATH_PIECE_VERTICES], *a = work, *q = work + n * n, root = ath_sqrt(tip);
+    int32_t total = 0, along = 0;
+    for (int32_t i = 0; i < n; i++) total += gaps[i];
+    for (int32_t i = 0; i < n; i++) {
+        along += gaps[i];
+        s[i] = (double)along / (double)total;
+    }
+    for (int32_t i = 0; i < n; i++)
+        for (int32_t j = 0; j <= i; j++) {
+            double low = s[j], high = s[i];
+            double bend = low * low * (3.0 * high - low) / 6.0;
+            a[i * n + j] = a[j * n + i] = bend + turn * (low * high) + rough * low;
+        }
+    for (int32_t i = 0; i < n; i++) a[i * n + n - 1] = a[i * n + n - 1] * root;
+    for (int32_t i = 0; i < n; i++) a[(n - 1) * n + i] = a[(n - 1) * n + i] * root;
+    eigenvectors(n, a, q, s, basis);
+    for (int32_t m = 0; m < n; m++) basis[m * n + n - 1] = basis[m * n + n - 1] / root;
+}
+
+void ath_principal(int32_t count, int32_t n, double *matrices, double *work, double *values, double *vectors)
+{
+    for (int32_t i = 0; i < count; i++, matrices += n * n, values += n, vectors += n * n)
+        eigenvectors(n, matrices, work, values, vectors);
+}
+
+void ath_rest_basis(int32_t n, double *basis, double *work)
+{
+    uint8_t even[ATH_PIECE_VERTICES];
+    memset(even, 1, sizeof even);
+    cantilever(n, even, 100.0, 0.0, 1.0, basis, work);
+}
+
+/* Adds `candidate` to the `count` orthonormal rows of `basis`, its projections on them subtracted, twice for
+ * accuracy. Returns the new count: unchanged where less than `keep` of its squared length remains. */
+static int32_t append_orthonormal(int32_t n, double *basis, int32_t count, double *candidate, double keep)
+{
+    double before = 0.0, after = 0.0;
+    for (int32_t i = 0; i < n; i++) before = before + candidate[i] * candidate[i];
+    for (int32_t pass = 0; pass < 2; pass++)
+        for (int32_t m = 0; m < count; m++) {
+            double dot = 0.0;
+            for (int32_t i = 0; i < n; i++) dot = dot + basis[m * n + i] * candidate[i];
+            for (int32_t i = 0; i < n; i++) candidate[i] = candidate[i] - dot * basis[m * n + i];
+        }
+    for (int32_t i = 0; i < n; i++) after = after + candidate[i] * candidate[i];
+    if (!(after > before * keep)) return count;
+    double scale = 1.0 / ath_sqrt(after);
+    for (int32_t i = 0; i < n; i++) basis[count * n + i] = candidate[i] * scale;
+    return count + 1;
+}
+
+static double distance(const double *a, const double *b)
+{
+    double x = a[0] - b[0], y = a[1] - b[1], z = a[2] - b[2];
+    return ath_sqrt(x * x + y * y + z * z);
+}
+
+/* Lengths in quarters of their mean, rounded, 1 to 64: coarse enough that evenly meshed stems share one basis, and never 0,
+ * so that coincident vertices do no harm. */
+static void quarters_of_mean(int32_t count, const double *lengths, uint8_t *gaps)
+{
+    double total = 0.0;
+    for (int32_t i = 0; i < count; i++) total = total + lengths[i];
+    for (int32_t i = 0; i < count; i++) {
+        double quarters = total > 0.0 ? 4.0 * lengths[i] * (double)count / total + 0.5 : 4.0;
+        gaps[i] = (uint8_t)(quarters >= 64.0 ? 64 : quarters >= 1.0 ? (int32_t)quarters : 1);
+    }
+}
+
+enum { MOST_RINGS = ATH_PIECE_VERTICES / 2 };
+
+/* Of a piece's rings: their centres, and the modes of a cantilever along these, rings x rings. */
+static void modes_of_rings(const ath_piece *piece, const double *rest, double centres[][3], double *modes)
+{
+    int32_t rings = ath_rings(piece);
+    const double *before = rest + 3 * (size_t)(piece->attach >= 0 ? piece->attach : piece->first);
+    double lengths[MOST_RINGS] = {0.0}, work[2 * MOST_RINGS * MOST_RINGS];
+    uint8_t gaps[MOST_RINGS] = {0};
+    for (int32_t r = 0; r < rings; r++) {
+        int32_t from = r * piece->ring, to = ath_min(from + piece->ring, piece->count);
+        for (int32_t k = 0; k < 3; k++) {
+            double sum = 0.0;
+            for (int32_t i = from; i < to; i++) sum = sum + rest[3 * (size_t)(piece->first + i) + (size_t)k];
+            centres[r][k] = sum / (double)(to - from);
+        }
+        lengths[r] = distance(centres[r], before);
+        before = centres[r];
+    }
+    quarters_of_mean(rings, lengths, gaps);
+    cantilever(rings, gaps, 0.1, 0.001, 1.0, modes, work);
+}
+
+/* Rings that move as they are along a cantilever first, then as affine functions of all, then each ring so, then what is left of
+ * the modes of an evenly spaced cantilever. Returns the rank. */
+static int32_t tube(const ath_piece *piece, const double *rest, const double *modes, double *basis)
+{
+    int32_t n = piece->count, rank = 0, rings = ath_rings(piece);
+    double centres[MOST_RINGS][3], along[MOST_RINGS * MOST_RINGS], across[3][ATH_PIECE_VERTICES];
+    double candidate[ATH_PIECE_VERTICES];
+    modes_of_rings(piece, rest, centres, along);
+    for (int32_t m = 0; m < rings; m++) {
+        for (int32_t i = 0; i < n; i++) candidate[i] = along[m * rings + i / piece->ring];
+        rank = append_orthonormal(n, basis, rank, candidate, LEFT);
+    }
+    for (int32_t k = 0; k < 3; k++) {
+        for (int32_t i = 0; i < n; i++)
+            across[k][i] = rest[3 * (size_t)(piece->first + i) + (size_t)k] - centres[i / piece->ring][k];
+        memcpy(candidate, across[k], (size_t)n * sizeof(double));
+        if (rank < n) rank = append_orthonormal(n, basis, rank, candidate, LEFT);
+    }
+    for (int32_t m = 0; m < rings; m++)
+        for (int32_t k = 0; k < 3 && rank < n; k++) {
+            for (int32_t i = 0; i < n; i++) candidate[i] = along[m * rings + i / piece->ring] * across[k][i];
+            rank = append_orthonormal(n, basis, rank, candidate, LEFT);
+        }
+    for (int32_t m = 0; m < n && rank < n; m++) {
+        memcpy(candidate, modes + m * n, (size_t)n * sizeof(double));
+        rank = append_orthonormal(n, basis, rank, candidate, LEFT);
+    }
+    return rank;
+}
+
+/* The functions x0 - a over the piece's vertices first (flat and straight pieces have fewer than three), then what is
+ * left of the modes of an evenly spaced cantilever. Returns the rank. */
+static int32_t sheet(const ath_piece *piece, const double *rest, const double *modes, double *basis)
+{
+    int32_t n = piece->count, rank = 0;
+    double column[3][ATH_PIECE_VERTICES], length2[3], candidate[ATH_PIECE_VERTICES];
+    const double *origin = rest + 3 * (size_t)(piece->attach >= 0 ? piece->attach : piece->first);
+    for (int32_t k = 0; k < 3; k++) {
+        length2[k] = 0.0;
+        for (int32_t i = 0; i < n; i++) {
+            column[k][i] = rest[3 * (size_t)(piece->first + i) + (size_t)k] - origin[k];
+            length2[k] = length2[k] + column[k][i] * column[k][i];
+        }
+    }
+    for (int32_t taken = 0; taken < 3; taken++) {
+        int32_t best = 0;
+        for (int32_t k = 1; k < 3; k++)
+            if (length2[k] > length2[best]) best = k;
+        if (length2[best] > 0.0 && rank < n) rank = append_orthonormal(n, basis, rank, column[best], 1e-4);
+        length2[best] = -1.0;
+    }
+    for (int32_t m = 0; m < n && rank < n; m++) {
+        memcpy(candidate, modes + m * n, (size_t)n * sizeof(double));
+        rank = append_orthonormal(n, basis, rank, candidate, LEFT);
+    }
+    return rank;
+}
+
+/* Distances along the piece; a sheet is taken for evenly spaced. */
+static void piece_gaps(const ath_piece *piece, const double *rest, uint8_t *gaps)
+{
+    double length[ATH_PIECE_VERTICES];
+    const double *before = rest + 3 * (size_t)(piece->attach >= 0 ? piece->attach : piece->first);
+    for (int32_t i = 0; i < piece->count; i++) {
+        const double *here = rest + 3 * (size_t)(piece->first + i);
+        length[i] = piece->flags & ATH_SHEET ? 0.0 : distance(here, before);
+        before = here;
+    }
+    quarters_of_mean(piece->count, length, gaps);
+}
+
+static uint32_t gaps_hash(const uint8_t *gaps, int32_t n)
+{
+    uint32_t hash = 2166136261u;
+    for (int32_t i = 0; i < n; i++) hash = (hash ^ gaps[i]) * 16777619u;
+    return hash ^ (hash >> 15);
+}
+
+static int same_gaps(const uint8_t *a, const uint8_t *b, int32_t n)
+{
+    for (int32_t i = 0; i < n; i++)
+        if (a[i] != b[i]) return 0;
+    return 1;
+}
+
+double ath_tip_weight(const ath_piece *piece, const double *rest)
+{
+    const double *base = rest + 3 * (size_t)(piece->attach >= 0 ? piece->attach : piece->first), *before = base;
+    double way = 0.0;
+    for (int32_t i = 0; i < piece->count; i++) {
+        const double *here = rest + 3 * (size_t)(piece->first + i);
+        way = way + distance(here, before);
+        before = here;
+    }
+    return !(piece->flags & ATH_SHEET) && piece->count > 1 && 2.0 * way <= 3.0 * distance(before, base) ? 2.0 : 1.0;
+}
+
+/* Pieces with equal gaps and weights share one basis. `table` is an open-addressing hash of pieces that own theirs. A file may be
+ * made so that all of them collide: after MOST_PROBES a piece gets a basis to itself, which holds the same numbers. */
+static int32_t owner_of_basis(const ath_piece *pieces, int32_t p, const double *rest, const uint8_t *gaps,
+                              int32_t *table, uint32_t mask)
+{
+    const uint8_t *mine = gaps + pieces[p].first;
+    double tip = ath_tip_weight(pieces + p, rest);
+    uint32_t at = gaps_hash(mine, pieces[p].count) & mask;
+    for (int32_t probe = 0; table[at] >= 0; probe++) {
+        const ath_piece *other = pieces + table[at];
+        if (other->count == pieces[p].count && same_gaps(mine, gaps + other->first, other->count)
+            && ath_tip_weight(other, rest) == tip)
+            return table[at];
+        if (probe == MOST_PROBES) return p;
+        at = (at + 1) & mask;
+    }
+    table[at] = p;
+    return p;
+}
+
+size_t ath_basis_table_size(int32_t piece_count)
+{
+    size_t size = 16;
+    while (size < 2 * (size_t)piece_count) size *= 2;
+    return size;
+}
+
+int64_t ath_basis_layout(ath_piece *pieces, int32_t piece_count, const double *rest, uint8_t *gaps, int32_t *table)
+{
+    int64_t next = 0;
+    size_t size = ath_basis_table_size(piece_count);
+    for (size_t i = 0; i < size; i++) table[i] = -1;
+    for (int32_t p = 0; p < piece_count; p++) {
+        ath_piece *piece = pieces + p;
+        piece_gaps(piece, rest, gaps + piece->first);
+        int32_t owner = owner_of_basis(pieces, p, rest, gaps, table, (uint32_t)size - 1);
+        piece->rank = piece->count;
+        piece->modes = owner == p ? next : pieces[owner].modes;
+        if (owner == p) next += (int64_t)piece->count * piece->count;
+        piece->basis = piece->modes;
+        if (piece->flags & ATH_SHEET) {
+            piece->basis = next;
+            next += (int64_t)piece->count * piece->count;
+        }
+    }
+    return next;
+}
+
+/* Modes of a piece by those that it has in another plan, where they are the same. */
+static int take_modes(const ath_plan *before, int32_t p, const ath_piece *piece, const double *rest,
+                      const uint8_t *gaps, double *modes)
+{
+    uint8_t known[ATH_PIECE_VERTICES];
+    if (!before) return 0;
+    const ath_piece *other = before->pieces + p;
+    piece_gaps(other, before->rest, known);
+    if (!same_gaps(known, gaps, piece->count) || ath_tip_weight(other, before->rest) != ath_tip_weight(piece, rest))
+        return 0;
+    memcpy(modes, before->bases + other->modes, (size_t)piece->count * (size_t)piece->count * sizeof *modes);
+    return 1;
+}
+
+static void fill_modes(const ath_piece *pieces, int32_t first, int32_t stop, const double *rest, const uint8_t *gaps,
+                       const ath_plan *before, double *work, double *bases)
+{
+    int64_t laid_out = 0; /* up to here by the pieces before: modes that stand further back are the piece's own */
+    for (int32_t p = 0; p < stop; p++) {
+        const ath_piece *piece = pieces + p;
+        int64_t last = piece->flags & ATH_SHEET ? piece->basis : piece->modes;
+        if (p >= first && piece->modes >= laid_out
+            && !take_modes(before, p, piece, rest, gaps + piece->first, bases + piece->modes))
+            cantilever(piece->count, gaps + piece->first, 0.1, 0.001, ath_tip_weight(piece, rest), bases + piece->modes,
+                       work);
+        last += (int64_t)piece->count * piece->count;
+        if (last > laid_out) laid_out = last;
+    }
+}
+
+void ath_basis_modes(const ath_piece *pieces, int32_t first, int32_t stop, const double *rest, const uint8_t *gaps,
+                     double *work, double *bases)
+{
+    fill_modes(pieces, first, stop, rest, gaps, 0, work, bases);
+}
+
+void ath_basis_sheets(ath_piece *pieces, int32_t first, int32_t stop, const double *rest, double *bases)
+{
+    for (ath_piece *piece = pieces + first; piece < pieces + stop; piece++)
+        if (piece->flags & ATH_SHEET) {
+            const double *modes = bases + piece->modes;
+            double *basis = bases + piece->basis;
+            piece->rank = piece->ring > 0 ? tube(piece, rest, modes, basis) : sheet(piece, rest, modes, basis);
+        }
+}
+
+void ath_basis_fill(ath_piece *pieces, int32_t piece_count, const double *rest, const uint8_t *gaps,
+                    const ath_plan *before, double *work, double *bases)
+{
+    fill_modes(pieces, 0, piece_count, rest, gaps, before, work, bases);
+    ath_basis_sheets(pieces, 0, piece_count, rest, bases);
+}
+
+/* cos(x) and sin(x) for 0 <= x <= pi/4 by their series. */
+static double cos_series(double x)
+{
+    double x2 = x * x, sum = 1.0;
+    for (int32_t k = 18; k >= 2; k -= 2) sum = 1.0 - sum * x2 / (double)(k * (k - 1));
+    return sum;
+}
+
+static double sin_series(double x)
+{
+    double x2 = x * x, sum = 1.0;
+    for (int32_t k = 19; k >= 3; k -= 2) sum = 1.0 - sum * x2 / (double)(k * (k - 1));
+    return x * sum;
+}
+
+/* cos(pi j / (2 T)), by symmetry from the first eighth of the circle. */
+static double cos_of_fraction(int64_t j, int64_t T)
+{
+    j = j % (4 * T);
+    if (j > 2 * T) j = 4 * T - j;
+    double sign = 1.0;
+    if (j > T) {
+        j = 2 * T - j;
+        sign = -1.0;
+    }
+    double value =
+        2 * j <= T ? cos_series(PI * (double)j / (double)(2 * T)) : sin_series(PI * (double)(T - j) / (double)(2 * T));
+    return sign * value;
+}
+
+/* Real Fourier series: a sine is a cosine a quarter of a turn later. */
+static void periodic_waves(int32_t frames, double *waves)
+{
+    double once = ath_sqrt(1.0 / (double)frames), twice = ath_sqrt(2.0 / (double)frames);
+    for (int32_t k = 0; k < frames; k++) {
+        int64_t turns = (k + 1) / 2, later = k > 0 && k % 2 == 0 ? 3 * frames : 0;
+        double size = k == 0 || 2 * turns == frames ? once : twice;
+        for (int32_t t = 0; t < frames; t++)
+            waves[k * frames + t] = size * cos_of_fraction(4 * turns * t + later, frames);
+    }
+}
+
+/* For 0 <= x <= pi / 2. */
+static double cos_of(double x) { return x <= 0.25 * PI ? cos_series(x) : sin_series(0.5 * PI - x); }
+
+static double sin_of(double x) { return x <= 0.25 * PI ? sin_series(x) : cos_series(0.5 * PI - x); }
+
+/* For x >= 0, by the series at a quarter of the angle. */
+static double atan_of(double x)
+{
+    if (x > 1.0) return 0.5 * PI - atan_of(1.0 / x);
+    double half = x / (1.0 + ath_sqrt(1.0 + x * x)), quarter = half / (1.0 + ath_sqrt(1.0 + half * half)), sum = 0.0;
+    for (int32_t k = 25; k > 0; k -= 2) sum = 1.0 / (double)k - sum * (quarter * quarter);
+    return 4.0 * (quarter * sum);
+}
+
+typedef struct {
+    double re, im;
+} complex_number;
+
+static complex_number times(complex_number a, complex_number b)
+{
+    complex_number product = {a.re * b.re - a.im * b.im, a.re * b.im + a.im * b.re};
+    return product;
+}
+
+static complex_number power(complex_number x, int32_t n)
+{
+    complex_number product = {1.0, 0.0};
+    for (; n > 0; n /= 2) {
+        if (n % 2 == 1) product = times(product, x);
+        x = times(x, x);
+    }
+    return product;
+}
+
+/* What tells the modes of second differences from those of third ones. */
+typedef struct {
+    complex_number root; /* of the wave number, over that of the cosine: what falls from the ends */
+    complex_number edge; /* what falls, at the end: over the sine of the phase */
+    complex_number turn; /* edge / root^2 */
+} mode_order;
+
+static const mode_order SECOND = {{1.0, 0.0}, {1.0, 0.0}, {1.0, 0.0}},
+                        THIRD = {{HALF_ROOT_3, -0.5}, {2.0 * HALF_ROOT_3, 1.0}, {0.0, 2.0}};
+
+/* A mode, cos((2 t + 1) h + phase) and what falls from either end, by `decay` in half a frame. */
+typedef struct {
+    double sine, cosine, slope; /* of h; tan(phase) */
+    complex_number decay;
+    complex_number apart; /* 1 / (1 - what is left of it at the other end) */
+} mode;
+
+/* Mode k, its h taken as right; even modes are even about the middle, odd ones odd. */
+static mode mode_at(int32_t frames, int32_t k, double h, const mode_order *order)
+{
+    mode own = {sin_of(h), cos_of(h), 0.0, {0.0, 0.0}, {0.0, 0.0}};
+    complex_number falls = {own.sine * order->root.re, own.sine * order->root.im}, square = times(falls, falls), root;
+    double re = 1.0 + square.re, length = ath_sqrt(re * re + square.im * square.im);
+    root.re = ath_sqrt(0.5 * (length + re));
+    root.im = 0.5 * square.im / root.re;
+    own.decay.re = root.re - falls.re;
+    own.decay.im = root.im - falls.im;
+
+    complex_number far = power(own.decay, 2 * frames);
+    if (k % 2 == 1) far.re = -far.re, far.im = -far.im;
+    double left = 1.0 - far.re, scale = 1.0 / (left * left + far.im * far.im);
+    own.apart.re = left * scale;
+    own.apart.im = far.im * scale;
+    far.re = 1.0 + far.re;
+    own.slope = own.cosine / times(times(order->turn, root), times(far, own.apart)).re;
+    return own;
+}
+
+/* h solves 2 frames h = pi k - 2 phase(h): most steps take ten bits off the error, those of few frames two. */
+static mode find_mode(int32_t frames, int32_t k, const mode_order *order)
+{
+    double h = PI * ((double)k - 0.5) / (double)(2 * frames);
+    mode own = mode_at(frames, k, h, order);
+    for (int32_t step = 0; step < MODE_STEPS; step++) {
+        double next = (0.5 * PI * (double)k - atan_of(own.slope)) / (double)frames;
+        if (next == h) break;
+        h = next;
+        own = mode_at(frames, k, h, order);
+    }
+    return own;
+}
+
+static void unit_length(int32_t frames, double *wave)
+{
+    double length2 = 0.0;
+    for (int32_t t = 0; t < frames; t++) length2 = length2 + wave[t] * wave[t];
+    double scale = 1.0 / ath_sqrt(length2);
+    for (int32_t t = 0; t < frames; t++) wave[t] = wave[t] * scale;
+}
+
+static void mode_wave(int32_t frames, int32_t k, const mode_order *order, double *wave)
+{
+    mode own = find_mode(frames, k, order);
+    double sign = k % 2 == 0 ? 1.0 : -1.0, cosine = 1.0 / ath_sqrt(1.0 + own.slope * own.slope);
+    double sine = own.slope * cosine;
+    double c = own.cosine * cosine - own.sine * sine, s = own.sine * cosine + own.cosine * sine;
+    double turn_c = 1.0 - 2.0 * own.sine * own.sine, turn_s = 2.0 * own.sine * own.cosine;
+    complex_number edge = {sine * order->edge.re, sine * order->edge.im}, decay = times(own.decay, own.decay);
+    edge = times(times(edge, own.apart), own.decay);
+    for (int32_t t = 0; t < frames; t++) {
+        wave[t] = edge.re;
+        edge = times(edge, decay);
+    }
+    for (int32_t t = 0; 2 * t < frames; t++) {
+        double x = c + (wave[t] + sign * wave[frames - 1 - t]), turned = c * turn_c - s * turn_s;
+        wave[frames - 1 - t] = sign * x;
+        wave[t] = x;
+        s = s * turn_c + c * turn_s;
+        c = turned;
+    }
+    unit_length(frames, wave);
+}
+
+/* Wave k of the polynomials that do not bend: 1, t and what t^2 has beyond them, about the middle. */
+static void polynomial_wave(int32_t frames, int32_t k, double *wave)
+{
+    double mean = (double)(frames * frames - 1) / 12.0;
+    for (int32_t t = 0; t < frames; t++) {
+        double way = 0.5 * (double)(frames - 1) - (double)t;
+        wave[t] = k == 0 ? 1.0 : k == 1 ? way : way * way - mean;
+    }
+    unit_length(frames, wave);
+}
+
+void ath_waves(int32_t frames, int32_t kind, double *waves)
+{
+    if (kind == ATH_PERIODIC) {
+        periodic_waves(frames, waves);
+        return;
+    }
+    int32_t polynomials = kind == ATH_BEAM ? 2 : 3;
+    for (int32_t k = 0; k < frames; k++) {
+        if (k < polynomials)
+            polynomial_wave(frames, k, waves + k * frames);
+        else
+            mode_wave(frames, k, kind == ATH_BEAM ? &SECOND : &THIRD, waves + k * frames);
+    }
+}
+
+double ath_tan_of_half(double x)
+{
+    double half = 0.5 * x;
+    if (half <= 0.25 * PI) return sin_series(half) / cos_series(half);
+    double rest = 0.5 * PI - half;
+    return cos_series(rest) / sin_series(rest);
+}

@@ -1,0 +1,1301 @@
+/* Decodes the chunks of a segment into what is played: the streams of all levels side by side, piece by piece. A
+ * piece is placed as soon as its integers are decoded, so that only attach caches are kept. */
+#include "streams/decode.h"
+#include "bits/exact.inl"
+#include "play/kept.h"
+#include "model/lanes.h"
+#include "streams/motion_streams.inl"
+#include "streams/predict.h"
+#include "play/segment.h"
+#include "play/watch.h"
+
+enum { CHECKSUM_STEP = 1 << 16, TILE = 8, CACHE_LINE = 16 /* floats */, MOST_SHAPES = ATH_SHAPE_NUMBERS };
+
+typedef enum { BEFORE, CHECKSUMS, HEADS, FRAMES, PIECES, DONE, FAILED } prepare_phase;
+
+typedef struct {
+    ath_coder coder;
+    shape_model *model;
+    refined_shape_model *refined; /* of a refinement, in its place */
+    int32_t shift;                /* of a refinement */
+    const ath_chunk *chunk;       /* null: no piece of the level has shapes */
+} shapes_reader;
+
+typedef struct {
+    ath_coder coder;
+    coefficient_model *model;
+    refinement_model *refined; /* of a refinement, in its place */
+    uint32_t *history;
+    double *temporal;
+    const ath_chunk *chunk; /* null: the level has none, or it is not wanted */
+} stems_reader;
+
+typedef struct {
+    ath_coder coder;
+    affine_model *model;
+    uint32_t *history;
+    const ath_chunk *chunk;
+} affines_reader;
+
+typedef struct {
+    ath_coder coder;
+    correction_model *model;
+    double step;
+    const ath_chunk *chunk;
+} corrections_reader;
+
+typedef struct {
+    ath_coder coder;
+    exact_model *model;
+    int32_t length[3];
+    const ath_chunk *chunk;
+} exact_reader;
+
+/* A layer of precision while one piece after the other passes through it. */
+typedef struct {
+    const ath_plan *plan;
+    ath_motion motion;
+    ath_scratch scratch;
+    ath_piece_rows rows;
+    int32_t counts[ATH_SLOTS];
+    int32_t *shape_integers; /* of the piece, 0 between pieces */
+    double *unit_shapes;
+    ath_piece_before before; /* the piece as the layer before has it */
+    double turn_steps[3];    /* of its rotations there */
+} layer_work;
+
+/* What is prepared, and from what. */
+typedef struct {
+    const ath_file *file;
+    void *memory;    /* of the segment */
+    void *positions; /* where they go; null: to that memory */
+    int32_t index, level;
+    const ath_segment *from; /* the same segment at an earlier level; null: none */
+    const void *kept;        /* of that; null: nothing */
+    kept_head *keeps;        /* what this preparation keeps, written at `keeping`; null: nothing */
+    kept_writer keeping;
+    ath_watcher *watcher; /* null: none */
+} preparation;
+
+/* How a segment goes on where the one before it ends. */
+typedef struct {
+    double *maps;                                           /* ATH_END_FRAMES x nodes x ATH_MAP: the end of that one */
+    void *positions;                                        /* ATH_END_FRAMES x exact vertices x 3: likewise */
+    int32_t width;                                          /* frames; 0: it does not */
+    double jumps[ATH_JOIN_SLOPED], slopes[ATH_JOIN_SLOPED]; /* what is left of either at each of them */
+} ath_join;
+
+struct ath_work {
+    const ath_file *file;
+    ath_segment *segment;
+    preparation asked;
+    ath_join join;
+    int32_t only_end; /* what is in preparation is the segment before the one asked for */
+    shapes_reader shapes[ATH_LEVELS];
+    stems_reader stems[ATH_LEVELS];
+    affines_reader affines[ATH_LEVELS];
+    corrections_reader corrections;
+    exact_reader exact_level;
+    ath_prediction *prediction;
+    const ath_chunk *predicted; /* null: there is none, or it is not wanted */
+    ath_stream streams[ATH_LEVELS];
+    layer_work layers[ATH_LAYERS];
+    ath_node_rows node;
+    void *prelude_model;
+    prepare_phase phase;
+    const ath_segment *shown_before; /* whose positions are those before make_exact; null: none */
+    const uint8_t *kept;             /* what the next piece is restored from; null: it is decoded */
+    kept_head *keeps;                /* of `asked`, while that is in preparation */
+    kept_writer keeping;
+    int32_t index, level;       /* of the segment in preparation */
+    int32_t first_level;        /* whose chunks are read: those before serve what was prepared before */
+    int32_t first_layer, layer; /* that it takes */
+    int32_t next;               /* level of CHECKSUMS and HEADS, piece of PIECES */
+    int32_t next_kind;          /* of CHECKSUMS */
+    uint32_t crc, crc_at;
+    int32_t next_node, exact, shown;
+    ath_fault_info fault;
+    int32_t node_step;
+};
+
+/* ---- memory ---- */
+
+static uint32_t levels_with_affines(const ath_file *file)
+{
+    uint32_t levels = 0;
+    for (int32_t level = 0; level < file->info.level_count; level++) levels |= file->affine_levels[level];
+    return levels;
+}
+
+static void carve_stems(ath_work *work, const ath_file *file, int32_t d, int32_t frames, ath_arena *arena)
+{
+    shapes_reader *shapes = work->shapes + d;
+    stems_reader *stems = work->stems + d;
+    int has_shapes = ath_file_chunk(file, ATH_SHAPES, d, 0) != 0;
+    if (ath_layer_of(file, d) > 0) {
+        if (has_shapes) shapes->refined = (refined_shape_model *)ath_take(arena, sizeof(refined_shape_model));
+        stems->refined = (refinement_model *)ath_take(arena, sizeof(refinement_model));
+        stems->history = (uint32_t *)ath_take(arena, history_size(frames));
+    } else {
+        if (has_shapes) shapes->model = (shape_model *)ath_take(arena, sizeof(shape_model));
+        stems->model = (coefficient_model *)ath_take(arena, sizeof(coefficient_model));
+        stems->history = (uint32_t *)ath_take(arena, history_size(frames));
+    }
+    stems->temporal = (double *)ath_take(arena, (uint64_t)frames * (uint64_t)frames * sizeof(double));
+}
+
+static void carve_layer(layer_work *layer, const ath_file *file, int32_t q, int32_t frames, ath_arena *arena)
+{
+    uint64_t T = (uint64_t)frames, row = 3 * T * sizeof(int32_t), rows = (uint64_t)file->plan.longest * row;
+    layer->shape_integers = (int32_t *)ath_take(arena, MOST_SHAPES * ATH_SHAPE_NUMBERS * sizeof(int32_t));
+    layer->unit_shapes = (double *)ath_take(arena, MOST_SHAPES * ATH_SHAPE_NUMBERS * sizeof(double));
+    layer->rows.modes = (int32_t *)ath_take(arena, rows);
+    layer->rows.rotation = (int32_t *)ath_take(arena, row);
+    layer->rows.shift = (int32_t *)ath_take(arena, row);
+    if (q > 0) {
+        layer->rows.predicted_modes = (int32_t *)ath_take(arena, rows);
+        layer->rows.predicted_rotation = (int32_t *)ath_take(arena, row);
+        layer->rows.predicted_shift = (int32_t *)ath_take(arena, row);
+    }
+    layer->motion.work = (double *)ath_take(arena, ath_motion_work(file->plan.longest, frames) * sizeof(double));
+    layer->motion.attach_caches =
+        (double *)ath_take(arena, (uint64_t)file->plan.attach_cache_rows * 3 * T * sizeof(double));
+}
+
+static size_t number_size(const ath_file *file) { return file->info.is_float64 ? sizeof(double) : sizeof(float); }
+
+/* Of any level. */
+static void carve_end(ath_join *join, const ath_file *file, ath_arena *arena)
+{
+    uint64_t nodes = (uint64_t)file->plan.node_count, vertices = (uint64_t)file->plan.vertex_count;
+    join->maps = (double *)ath_take(arena, ATH_END_FRAMES * nodes * ATH_MAP * sizeof(double));
+    join->positions = ath_take(arena, ATH_END_FRAMES * vertices * 3 * number_size(file));
+}
+
+static uint64_t carve_work(ath_work *work, const ath_file *file, int32_t frames, uint8_t *base)
+{
+    ath_arena arena = {base, 0};
+    uint64_t row = 3 * (uint64_t)frames * sizeof(int32_t);
+    uint32_t affines = levels_with_affines(file);
+    ath_take(&arena, sizeof *work);
+    if (file->has_joins) carve_end(&work->join, file, &arena);
+    for (int32_t d = 0; d < file->info.level_count; d++) {
+        if (file->stems_levels >> d & 1) carve_stems(work, file, d, frames, &arena);
+        if (affines >> d & 1) {
+            work->affines[d].model = (affine_model *)ath_take(&arena, sizeof(affine_model));
+            work->affines[d].history = (uint32_t *)ath_take(&arena, history_size(frames));
+        }
+    }
+    work->corrections.model = (correction_model *)ath_take(&arena, sizeof(correction_model));
+    if (ath_file_is_lossless(file)) work->exact_level.model = (exact_model *)ath_take(&arena, sizeof(exact_model));
+    if (file->header.is_predicted)
+        work->prediction = (ath_prediction *)ath_take(&arena, ath_prediction_size(file->plan.vertex_count));
+    work->prelude_model = ath_take(&arena, ath_prelude_model_size());
+    work->node.rows = (int32_t *)ath_take(&arena, 4 * row);
+    for (int32_t q = 0; q <= ath_layer_of(file, file->info.level_count - 1); q++)
+        carve_layer(work->layers + q, file, q, frames, &arena);
+    return arena.used;
+}
+
+static uint64_t carve_segment(ath_segment *segment, const ath_file *file, int32_t level, int32_t frames, uint8_t *base)
+{
+    ath_arena arena = {base, 0};
+    uint64_t T = (uint64_t)frames, number = number_size(file);
+    segment->frames = frames;
+    segment->is_float64 = file->info.is_float64;
+    ath_cut_size(file, level, &segment->part_count, &segment->node_count, &segment->exact_vertices);
+    ath_take(&arena, sizeof *segment);
+    segment->parts = (ath_part *)ath_take(&arena, (uint64_t)segment->part_count * sizeof(ath_part));
+    segment->maps = (double *)ath_take(&arena, T * (uint64_t)segment->node_count * ATH_MAP * sizeof(double));
+    segment->positions = ath_take(&arena, T * (uint64_t)segment->exact_vertices * 3 * number);
+    if (file->has_joins)
+        segment->end = ath_take(&arena, ATH_END_FRAMES * (uint64_t)segment->exact_vertices * 3 * number);
+    return arena.used;
+}
+
+size_t ath_work_size(const ath_file *file)
+{
+    ath_work counted;
+    return ath_size_or_most(carve_work(&counted, file, file->longest, 0));
+}
+
+size_t ath_segment_size(const ath_file *file, int32_t level)
+{
+    ath_segment counted;
+    return ath_size_or_most(carve_segment(&counted, file, level, file->longest, 0));
+}
+
+/* ---- what is kept ---- */
+
+static int has_stream(const ath_file *file, int32_t d) { return file->stems_levels >> d & 1; }
+
+/* All of the plant at a precision that a stored level refines. */
+static int can_be_kept(const ath_file *file, int32_t level)
+{
+    return level > file->plan.height && level < ath_min(file->info.level_count, ath_lossy_levels(file)) - 1;
+}
+
+size_t ath_keep_size(const ath_file *file, int32_t level)
+{
+    const ath_plan *plan = &file->plan;
+    if (!can_be_kept(file, level)) return 0;
+    uint64_t T = (uint64_t)file->longest, pieces = (uint64_t)plan->piece_count, size = sizeof(kept_head);
+    size += ((uint64_t)plan->vertex_count + 2 * pieces) * kept_row_most(file->longest) + pieces * KEPT_NUMBER;
+    for (int32_t d = 0; d <= level; d++) {
+        if (!has_stream(file, d)) continue;
+        size += sizeof(kept_stream) + T * T * sizeof(float);
+        if (ath_file_chunk(file, ATH_SHAPES, d, 0)) size += pieces * MOST_SHAPES * kept_row_most(ATH_SHAPE_MODES);
+    }
+    return ath_size_or_most(size);
+}
+
+int ath_keep(ath_work *work, void *memory, size_t memory_bytes)
+{
+    kept_head *head = (kept_head *)memory;
+    if (!ath_fits(memory, memory_bytes, sizeof *head)) return ATH_NO_MEMORY;
+    head->bytes = 0;
+    if (!can_be_kept(work->file, work->level)) return ATH_OK;
+    head->segment = work->index;
+    head->level = work->level;
+    work->asked.keeps = work->keeps = head;
+    work->keeping.at = (uint8_t *)(head + 1);
+    work->keeping.end = (uint8_t *)memory + memory_bytes;
+    work->asked.keeping = work->keeping;
+    return ATH_OK;
+}
+
+void ath_watch(ath_work *work, ath_watcher *watcher) { work->asked.watcher = watcher; }
+
+const ath_file *ath_watched_file(const ath_work *work) { return work->file; }
+
+int32_t ath_watched_level(const ath_work *work) { return work->asked.level; }
+
+/* Of the segment asked for, not of the one before it. */
+static ath_watcher *watcher_of(const ath_work *work) { return work->only_end ? 0 : work->asked.watcher; }
+
+size_t ath_kept_size(const void *kept) { return (size_t)((const kept_head *)kept)->bytes; }
+
+/* Waves that are not learned, by their root. */
+static void set_waves(const ath_work *work, ath_stream *stream, int32_t root)
+{
+    stream->temporal =
+        root == ATH_NODE_ROOT ? ath_file_node_waves(work->file, work->index) : ath_file_waves(work->file, work->index);
+    stream->temporal_rank = work->segment->frames;
+    stream->root = root;
+}
+
+/* Of the waves of a basis that is learned. */
+static size_t learned_numbers(const ath_work *work, const ath_stream *stream)
+{
+    return stream->root < 0 ? 0 : (size_t)stream->temporal_rank * (size_t)work->segment->frames;
+}
+
+static void keep_streams(ath_work *work)
+{
+    for (int32_t d = 0; work->keeping.at && d <= work->level; d++) {
+        const ath_stream *stream = work->streams + d;
+        kept_stream kept = {stream->step, stream->rotation_step_factor, stream->turn_step, stream->temporal_rank,
+                            stream->root};
+        size_t learned = learned_numbers(work, stream);
+        if (!has_stream(work->file, d)) continue;
+        void *at = ath_kept_take(&work->keeping, sizeof kept);
+        if (at) memcpy(at, &kept, sizeof kept);
+        ath_keep_waves(&work->keeping, stream->temporal, learned);
+    }
+}
+
+static void keep_piece(ath_work *work, const ath_piece *piece)
+{
+    const layer_work *layer = work->layers + work->layer;
+    const ath_piece_rows *rows = &layer->rows;
+    int32_t T = layer->motion.frames, shapes = rows->shape_count;
+    ath_keep_number(&work->keeping, shapes);
+    for (int32_t s = 0; s < shapes; s++)
+        ath_keep_row(&work->keeping, layer->shape_integers + s * ATH_SHAPE_NUMBERS, ATH_SHAPE_MODES, ATH_SHAPE_MODES);
+    ath_keep_row(&work->keeping, rows->shift, T, layer->counts[SHIFT_SLOT]);
+    ath_keep_row(&work->keeping, rows->rotation, T, layer->counts[ROTATION_SLOT]);
+    for (int32_t m = 0; m < piece->count; m++)
+        ath_keep_row(&work->keeping, ath_row(rows->modes, m, T), T, layer->counts[m]);
+}
+
+/* Pieces follow. */
+static void restore_streams(ath_work *work)
+{
+    work->kept += sizeof(kept_head);
+    for (int32_t d = 0; d < work->first_level; d++) {
+        kept_stream kept;
+        ath_stream *stream = work->streams + d;
+        double *waves = work->stems[d].temporal;
+        if (!has_stream(work->file, d)) continue;
+        memcpy(&kept, work->kept, sizeof kept);
+        work->kept += sizeof kept;
+        stream->step = kept.step;
+        stream->rotation_step_factor = kept.rotation_step_factor;
+        stream->turn_step = kept.turn_step;
+        stream->temporal_rank = kept.temporal_rank;
+        stream->root = kept.root;
+        if (kept.root < 0) set_waves(work, stream, kept.root);
+        size_t learned = learned_numbers(work, stream);
+        work->kept = ath_kept_waves(work->kept, waves, learned);
+        if (learned > 0) stream->temporal = waves;
+    }
+}
+
+static void restore_piece(ath_work *work, const ath_piece *piece)
+{
+    layer_work *layer = work->layers + work->first_layer;
+    ath_piece_rows *rows = &layer->rows;
+    int32_t T = layer->motion.frames, count;
+    work->kept = ath_kept_number(work->kept, &rows->shape_count);
+    for (int32_t s = 0; s < rows->shape_count; s++)
+        work->kept = ath_kept_row(work->kept, layer->shape_integers + s * ATH_SHAPE_NUMBERS, ATH_SHAPE_MODES, &count);
+    ath_unit_shapes(rows->shape_count, layer->shape_integers, layer->unit_shapes);
+    work->kept = ath_kept_row(work->kept, rows->shift, T, layer->counts + SHIFT_SLOT);
+    work->kept = ath_kept_row(work->kept, rows->rotation, T, layer->counts + ROTATION_SLOT);
+    for (int32_t m = 0; m < piece->count; m++)
+        work->kept = ath_kept_row(work->kept, ath_row(rows->modes, m, T), T, layer->counts + m);
+}
+
+/* ---- start ---- */
+
+static const ath_chunk *wanted_chunk(const ath_file *file, int32_t segment, int32_t level, int32_t kind, int32_t d)
+{
+    return ath_file_needs(file, kind, d, level) ? ath_file_chunk(file, kind, d, segment) : 0;
+}
+
+static const ath_chunk *chunk_of(const ath_work *work, int32_t kind, int32_t d)
+{
+    if (d < work->first_level || (work->only_end && !ath_shapes_end(kind))) return 0;
+    return wanted_chunk(work->file, work->index, work->level, kind, d);
+}
+
+static int32_t checksum_steps(const ath_chunk *chunk)
+{
+    return chunk && chunk->length > 0 ? (int32_t)((chunk->length - 1) / CHECKSUM_STEP) + 1 : 1;
+}
+
+/* Rest poses have been read. */
+static int32_t kind_after(int32_t kind) { return kind == ATH_EXACT ? ATH_PREDICTED : kind + 1; }
+
+static int32_t steps_of(const ath_file *file, int32_t segment, int32_t level)
+{
+    int32_t checks = 0, heads = level + 2;
+    for (int32_t d = 0; d <= level; d++)
+        for (int32_t kind = ATH_STEMS; kind <= ATH_PREDICTED; kind = kind_after(kind))
+            checks += checksum_steps(wanted_chunk(file, segment, level, kind, d));
+    int32_t predictions = file->header.is_predicted && level > 0
+                              ? ath_prediction_steps(file->plan.vertex_count, ath_file_frames(file, segment))
+                              : 0;
+    return checks + heads + predictions + file->plan.piece_count + 1;
+}
+
+int32_t ath_prepare_steps(const ath_file *file, int32_t segment, int32_t level)
+{
+    int32_t before = ath_joined_to(file, segment, level);
+    return steps_of(file, segment, level) + (before < 0 ? 0 : 1 + steps_of(file, before, level));
+}
+
+static int refuse(ath_work *work, int code, ath_field field, const ath_chunk *chunk, double found, double expected)
+{
+    ath_refuse(&work->fault, code, field, found, expected, expected);
+    return ath_fault_at(&work->fault, chunk, (int32_t)(chunk - work->file->chunks));
+}
+
+/* Notes the chunk whose content is not valid, if it is not. */
+static int blame(ath_work *work, const ath_chunk *chunk, int result)
+{
+    return result == ATH_OK ? ATH_OK : refuse(work, result, ATH_FIELD_CONTENT, chunk, 0, 0);
+}
+
+/* Null for a chunk that the segment does without. */
+static int check_fed(ath_work *work, const ath_chunk *chunk)
+{
+    return !chunk || chunk->bytes ? ATH_OK : refuse(work, ATH_MISSING, ATH_FIELD_CHUNK_SIZE, chunk, 0, chunk->length);
+}
+
+/* ATH_MISSING unless all have been fed. */
+static int find_chunks(ath_work *work)
+{
+    int result = ATH_OK;
+    for (int32_t d = 0; d <= work->level; d++) {
+        const ath_chunk *stems = chunk_of(work, ATH_STEMS, d);
+        const ath_chunk *affines = chunk_of(work, ATH_AFFINES, d);
+        const ath_chunk *shapes = chunk_of(work, ATH_SHAPES, d);
+        work->shapes[d].chunk = shapes;
+        work->stems[d].chunk = stems;
+        work->affines[d].chunk = affines;
+        if (result == ATH_OK) result = check_fed(work, stems);
+        if (result == ATH_OK) result = check_fed(work, affines);
+        if (result == ATH_OK) result = check_fed(work, shapes);
+    }
+    work->corrections.chunk = chunk_of(work, ATH_CORRECTIONS, ath_min(work->level, ath_lossy_levels(work->file) - 1));
+    work->exact_level.chunk = chunk_of(work, ATH_EXACT, work->level);
+    work->predicted = chunk_of(work, ATH_PREDICTED, ath_min(work->level, ath_lossy_levels(work->file) - 1));
+    if (result == ATH_OK) result = check_fed(work, work->predicted);
+    if (result == ATH_OK) result = check_fed(work, work->corrections.chunk);
+    return result == ATH_OK ? check_fed(work, work->exact_level.chunk) : result;
+}
+
+static void ready_layer(ath_work *work, int32_t q)
+{
+    layer_work *layer = work->layers + q;
+    size_t row = 3 * (size_t)work->segment->frames * sizeof(int32_t);
+    layer->plan = ath_layer_plan(work->file, q, work->level);
+    layer->motion.frames = work->segment->frames;
+    layer->motion.streams = work->streams;
+    layer->motion.waves = ath_file_node_waves(work->file, work->index);
+    layer->motion.ratio = 1;
+    layer->scratch = ath_motion_scratch(layer->plan, &layer->motion);
+    layer->rows.counts = layer->counts;
+    layer->rows.shapes = layer->unit_shapes;
+    memset(layer->shape_integers, 0, MOST_SHAPES * ATH_SHAPE_NUMBERS * sizeof(int32_t));
+    memset(layer->rows.modes, 0, (size_t)work->file->plan.longest * row);
+    memset(layer->rows.rotation, 0, row);
+    memset(layer->rows.shift, 0, row);
+}
+
+static void ready_motion(ath_work *work)
+{
+    work->layer = ath_layer_of(work->file, work->level);
+    for (int32_t q = work->first_layer; q <= work->layer; q++) ready_layer(work, q);
+    work->node.step = &work->node_step;
+    memset(work->node.rows, 0, 4 * 3 * (size_t)work->segment->frames * sizeof *work->node.rows);
+    for (int32_t d = 0; d < ATH_LEVELS; d++) {
+        work->streams[d].step = 1.0;
+        set_waves(work, work->streams + d, ATH_STEM_ROOT);
+    }
+}
+
+/* Begins with a segment: the one asked for, or for its end the one before that. */
+static int begin(ath_work *work, const preparation *asked, int32_t index, int32_t level)
+{
+    const ath_file *file = asked->file;
+    ath_segment *segment = (ath_segment *)asked->memory;
+    int32_t frames = ath_file_frames(file, index);
+    ath_join join = work->join;
+    memset(work, 0, sizeof *work);
+    memset(segment, 0, sizeof *segment);
+    carve_work(work, file, frames, (uint8_t *)work);
+    carve_segment(segment, file, level, frames, (uint8_t *)segment);
+    segment->index = segment->level = -1;
+    work->file = file;
+    work->segment = segment;
+    work->asked = *asked;
+    work->only_end = index != asked->index;
+    work->index = index;
+    work->level = level;
+    work->next_kind = ATH_STEMS;
+    if (!work->only_end) {
+        join.maps = work->join.maps;
+        join.positions = work->join.positions;
+        work->join = join;
+        work->keeps = asked->keeps;
+        work->keeping = asked->keeping;
+        if (asked->positions) segment->positions = asked->positions;
+    }
+    if (asked->from && !work->only_end) {
+        work->first_level = asked->from->level + 1;
+        work->first_layer = ath_layer_of(file, asked->from->level);
+        work->shown_before = asked->kept ? 0 : asked->from;
+        work->kept = (const uint8_t *)asked->kept;
+    }
+    ready_motion(work);
+    if (work->kept) restore_streams(work);
+    int result = find_chunks(work);
+    work->phase = result == ATH_OK ? CHECKSUMS : FAILED;
+    return result;
+}
+
+/* Shares of a jump and of a slope, from 1 to 0 with level ends, that bend as little as any over so many frames: parabolas,
+ * which turn where half of the way is left, or where 1 - sqrt(1/2) is. */
+static void set_join(ath_join *join, int32_t how)
+{
+    const double turn = 0.70710678118654752440, bend = 0.5 + turn;
+    join->width = how % ATH_JOIN_SLOPED;
+    for (int32_t t = 0; t < join->width; t++) {
+        double w = (double)join->width, u = ((double)t + 0.5) / w, left = 1.0 - u;
+        join->jumps[t] = u < 0.5 ? 1.0 - 2.0 * u * u : 2.0 * left * left;
+        join->slopes[t] = how < ATH_JOIN_SLOPED ? 0.0 : w * (u < turn ? u - bend * u * u : bend * left * left);
+    }
+}
+
+/* `before` and `kept`: what was prepared before, null: nothing. */
+static int start(void *memory, size_t work_bytes, const ath_file *file, int32_t index, int32_t level,
+                 void *segment_memory, size_t segment_bytes, const ath_segment *before, const void *kept)
+{
+    ath_work *work = (ath_work *)memory;
+    preparation asked;
+    if (index < 0 || index >= file->info.segment_count || level < 0 || level >= file->info.level_count)
+        return ATH_BAD_ARGUMENT;
+    if (!file->rest_known) return ATH_NEEDS_HOST_MESH;
+    if (!file->bases || !ath_level_plan(file, level)->bases || !ath_fits(memory, work_bytes, ath_work_size(file))
+        || !ath_fits(segment_memory, segment_bytes, ath_segment_size(file, level)))
+        return ATH_NO_MEMORY;
+    memset(&asked, 0, sizeof asked);
+    asked.file = file;
+    asked.memory = segment_memory;
+    asked.index = index;
+    asked.level = level;
+    asked.from = before;
+    asked.kept = kept;
+    memset(work, 0, sizeof *work);
+    int result = begin(work, &asked, index, level), join = ath_join_at(file, index, level);
+    if (result != ATH_OK || join == 0 || work->shown_before) return result; /* that is joined */
+    set_join(&work->join, join);
+    work->phase = BEFORE;
+    return ATH_OK;
+}
+
+int ath_prepare_start(void *memory, size_t work_bytes, const ath_file *file, int32_t index, int32_t level,
+                      void *segment_memory, size_t segment_bytes)
+{
+    return start(memory, work_bytes, file, index, level, segment_memory, segment_bytes, 0, 0);
+}
+
+/* The end of a prepared segment, for the one that is joined to it. */
+static void take_end(ath_join *join, const ath_segment *before)
+{
+    size_t maps = ATH_END_FRAMES * (size_t)before->node_count * ATH_MAP;
+    size_t all_maps = (size_t)before->frames * (size_t)before->node_count * ATH_MAP;
+    size_t number = before->is_float64 ? sizeof(double) : sizeof(float);
+    memcpy(join->maps, before->maps + (all_maps - maps), maps * sizeof(double));
+    memcpy(join->positions, before->end, ATH_END_FRAMES * 3 * (size_t)before->exact_vertices * number);
+}
+
+int ath_follow(ath_work *work, const ath_segment *before)
+{
+    if (work->phase != BEFORE) return ATH_OK;
+    if (before->index != ath_segment_before(work->file, work->index) || before->level != work->level)
+        return ATH_BAD_ARGUMENT;
+    take_end(&work->join, before);
+    work->phase = CHECKSUMS;
+    return ATH_OK;
+}
+
+static int is_in_source_order(const ath_file *file)
+{
+    int32_t vertex = 0;
+    while (vertex < file->plan.vertex_count && file->vertex_source[vertex] == vertex) vertex++;
+    return vertex == file->plan.vertex_count;
+}
+
+int ath_prepare_to(ath_work *work, void *positions)
+{
+    const ath_file *file = work->file;
+    int32_t index = work->asked.index, shown = ath_segment_start(file, index + 1) - ath_segment_start(file, index);
+    if (work->segment->exact_vertices < file->plan.vertex_count || shown != work->segment->frames
+        || !is_in_source_order(file))
+        return ATH_BAD_ARGUMENT;
+    work->asked.positions = work->segment->positions = positions;
+    return ATH_OK;
+}
+
+/* The segment before is prepared in the memory of the one asked for. */
+static int go_back(ath_work *work)
+{
+    preparation asked = work->asked;
+    return begin(work, &asked, ath_segment_before(work->file, asked.index),
+                 ath_min(asked.level, ath_lossy_levels(work->file) - 1));
+}
+
+static int go_on(ath_work *work)
+{
+    preparation asked = work->asked;
+    take_end(&work->join, work->segment);
+    set_join(&work->join, ath_join_at(work->file, asked.index, asked.level));
+    return begin(work, &asked, asked.index, asked.level);
+}
+
+/* ---- steps ---- */
+
+static ath_bytes bytes_of(const ath_chunk *chunk)
+{
+    ath_bytes bytes = {chunk->bytes, chunk->length};
+    return bytes;
+}
+
+static const ath_chunk *chunk_to_check(const ath_work *work) { return chunk_of(work, work->next_kind, work->next); }
+
+static void next_phase(ath_work *work, prepare_phase phase)
+{
+    work->phase = phase;
+    work->next = 0;
+}
+
+/* A level's chunks, then the next level's. */
+static void next_to_check(ath_work *work)
+{
+    work->crc = work->crc_at = 0;
+    work->next_kind = kind_after(work->next_kind);
+    if (work->next_kind <= ATH_PREDICTED) return;
+    work->next_kind = ATH_STEMS;
+    if (work->next++ == work->level) next_phase(work, HEADS);
+}
+
+static int check_some(ath_work *work)
+{
+    const ath_chunk *chunk = chunk_to_check(work);
+    if (chunk && work->crc_at < chunk->length) {
+        uint32_t left = chunk->length - work->crc_at,
+                 size = left < (uint32_t)CHECKSUM_STEP ? left : (uint32_t)CHECKSUM_STEP;
+        work->crc = ath_crc32c(work->crc, chunk->bytes + work->crc_at, size);
+        work->crc_at += size;
+    }
+    if (chunk && work->crc_at < chunk->length) return ATH_OK;
+    if (chunk && work->crc != chunk->checksum)
+        return refuse(work, ATH_BAD_CHECKSUM, ATH_FIELD_CHUNK_CHECKSUM, chunk, work->crc, chunk->checksum);
+    next_to_check(work);
+    return ATH_OK;
+}
+
+/* Own rows of a basis in waves. */
+static int read_waves(ath_work *work, const ath_stems_head *head, int32_t known, int32_t d)
+{
+    stems_reader *reader = work->stems + d;
+    coefficient_model *rows = reader->refined ? &reader->refined->rows : reader->model;
+    int32_t frames = work->segment->frames, exponents[BASIS_AXES], integers[BASIS_AXES * ATH_SEGMENT_FRAMES];
+    basis_model model = basis_model_of(rows, (number_model *)work->prelude_model, frames, reader->history);
+    ath_coder coder;
+    coder_start(&coder, head->basis.bytes, head->basis.size);
+    for (int32_t count; known < head->rank; known += count) {
+        count = ath_min(head->rank - known, BASIS_AXES);
+        memset(integers, 0, BASIS_AXES * (size_t)frames * sizeof *integers);
+        if (!code_basis_rows(&coder, &model, frames, count, exponents, integers)) return ATH_BAD_CHUNK;
+        ath_add_basis_rows(ath_file_waves(work->file, work->index), frames, known, count, exponents, integers,
+                           reader->temporal);
+    }
+    return coder_finish(&coder) ? ATH_OK : ATH_BAD_CHUNK;
+}
+
+/* Own rows of a basis by their entries. Integers are decoded into the far half of the rows that they become. */
+static int read_entries(ath_work *work, const ath_stems_head *head, int32_t known, int32_t d)
+{
+    int32_t frames = work->segment->frames;
+    size_t count = (size_t)(head->rank - known) * (size_t)frames;
+    double *rows = work->stems[d].temporal + (size_t)known * (size_t)frames;
+    int32_t *integers = (int32_t *)(void *)rows + count;
+    int result = ath_decode_temporal(work->prelude_model, head->basis.bytes, head->basis.size, head->rank - known,
+                                     frames, integers);
+    for (size_t i = 0; result == ATH_OK && i < count; i++) rows[i] = (double)integers[i] / (double)ATH_MOST_SAMPLE;
+    return result;
+}
+
+/* Rows of a basis: those of the one that it begins with, then its own. */
+static int read_temporal(ath_work *work, const ath_stems_head *head, int32_t d)
+{
+    stems_reader *reader = work->stems + d;
+    ath_stream *stream = work->streams + d;
+    const ath_stream *base = head->base >= 0 && head->base < d ? work->streams + head->base : 0;
+    if (head->base >= 0 && (!base || base->root < 0 || base->temporal_rank > head->rank)) return ATH_BAD_CHUNK;
+    int32_t known = base ? base->temporal_rank : 0;
+    if (base) memcpy(reader->temporal, base->temporal, (size_t)known * (size_t)work->segment->frames * sizeof(double));
+    stream->temporal = reader->temporal;
+    stream->temporal_rank = head->rank;
+    stream->root = base ? base->root : d;
+    return head->basis_kind == ATH_BASIS_IN_WAVES ? read_waves(work, head, known, d)
+                                                  : read_entries(work, head, known, d);
+}
+
+static int open_stems(ath_work *work, int32_t d)
+{
+    stems_reader *reader = work->stems + d;
+    ath_stream *stream = work->streams + d;
+    ath_stems_head head;
+    ath_bytes body;
+    int32_t frames = work->segment->frames, q = ath_layer_of(work->file, d);
+    int result = q > 0 ? ath_parse_refined_stems(bytes_of(reader->chunk), frames, &head, &body)
+                       : ath_parse_stems(bytes_of(reader->chunk), frames, &head, &body);
+    if (result != ATH_OK) return result;
+    stream->step = head.step;
+    stream->rotation_step_factor = head.rotation_step_factor;
+    stream->turn_step = head.turn > 0 ? ath_node_step(-head.turn) : 0.0;
+    if (head.basis_kind == ATH_NODE_WAVES)
+        set_waves(work, stream, ATH_NODE_ROOT);
+    else if (head.basis_kind != ATH_STEM_WAVES)
+        result = read_temporal(work, &head, d);
+    if (q > 0) {
+        work->layers[q].motion.ratio = head.ratio;
+        refinement_model_init(reader->refined, frames, reader->history);
+    } else {
+        coefficient_model_init(reader->model, frames, reader->history);
+    }
+    coder_start(&reader->coder, body.bytes, body.size);
+    return result;
+}
+
+static int open_shapes(shapes_reader *reader)
+{
+    ath_bytes body = bytes_of(reader->chunk);
+    if (reader->refined) {
+        int result = ath_parse_refined_shapes(body, &reader->shift, &body);
+        if (result != ATH_OK) return result;
+        refined_shape_model_init(reader->refined);
+    } else {
+        shape_model_init(reader->model);
+    }
+    coder_start(&reader->coder, body.bytes, body.size);
+    return ATH_OK;
+}
+
+static int open_corrections(corrections_reader *reader)
+{
+    ath_bytes body;
+    int result = ath_parse_corrections(bytes_of(reader->chunk), &reader->step, &body);
+    if (result != ATH_OK) return result;
+    correction_model_init(reader->model);
+    coder_start(&reader->coder, body.bytes, body.size);
+    return ATH_OK;
+}
+
+static int open_predicted(ath_work *work)
+{
+    const ath_segment *segment = work->segment;
+    return blame(work, work->predicted,
+                 ath_prediction_start(work->prediction, &work->file->plan, work->file->info.origin, segment->frames,
+                                      segment->is_float64, bytes_of(work->predicted), segment->positions));
+}
+
+/* The streams of one level. */
+static int open_level(ath_work *work)
+{
+    int32_t d = work->next++, result = ATH_OK;
+    if (d > work->level) {
+        const ath_chunk *chunk = work->corrections.chunk;
+        if (work->exact_level.chunk) {
+            exact_model_init(work->exact_level.model);
+            coder_start(&work->exact_level.coder, work->exact_level.chunk->bytes, work->exact_level.chunk->length);
+        }
+        next_phase(work, work->predicted ? FRAMES : PIECES);
+        keep_streams(work);
+        if (work->predicted) return open_predicted(work);
+        return chunk ? blame(work, chunk, open_corrections(&work->corrections)) : ATH_OK;
+    }
+    affines_reader *affines = work->affines + d;
+    if (affines->chunk) {
+        affine_model_init(affines->model, work->segment->frames, affines->history);
+        coder_start(&affines->coder, affines->chunk->bytes, affines->chunk->length);
+    }
+    const ath_chunk *shapes = work->shapes[d].chunk, *stems = work->stems[d].chunk;
+    if (shapes && (result = open_shapes(work->shapes + d)) != ATH_OK) return blame(work, shapes, result);
+    return stems ? blame(work, stems, open_stems(work, d)) : ATH_OK;
+}
+
+/* ---- pieces ---- */
+
+static void clear_row(int32_t *row, int32_t frames, int32_t *count)
+{
+    for (int32_t axis = 0; axis < 3 && *count > 0; axis++) memset(row + axis * frames, 0, (size_t)*count * sizeof *row);
+    *count = 0;
+}
+
+/* Rows are zero on entry to code_row. */
+static void clear_piece(layer_work *layer, const ath_piece *piece)
+{
+    int32_t T = layer->motion.frames;
+    for (int32_t m = 0; m < piece->count; m++) clear_row(ath_row(layer->rows.modes, m, T), T, layer->counts + m);
+    memset(layer->shape_integers, 0, (size_t)layer->rows.shape_count * ATH_SHAPE_NUMBERS * sizeof(int32_t));
+    layer->rows.shape_count = 0;
+    clear_row(layer->rows.shift, T, layer->counts + SHIFT_SLOT);
+    clear_row(layer->rows.rotation, T, layer->counts + ROTATION_SLOT);
+}
+
+/* The shapes that the level adds to those of the piece. */
+static int read_shapes(ath_work *work, const ath_piece *piece, int32_t level)
+{
+    shapes_reader *reader = work->shapes + level;
+    layer_work *layer = work->layers;
+    int32_t known = layer->rows.shape_count;
+    int32_t count = code_shapes(&reader->coder, reader->model, piece, level, known, layer->shape_integers);
+    if (count < 0) return blame(work, reader->chunk, ATH_BAD_CHUNK);
+    size_t from = (size_t)known * ATH_SHAPE_NUMBERS;
+    if (!ath_unit_shapes(count - known, layer->shape_integers + from, layer->unit_shapes + from))
+        return blame(work, reader->chunk, ATH_BAD_CHUNK);
+    layer->rows.shape_count = count;
+    return ATH_OK;
+}
+
+static int read_piece(ath_work *work, int32_t p, int32_t level)
+{
+    stems_reader *reader = work->stems + level;
+    ath_coder coder = reader->coder;
+    layer_work *layer = work->layers;
+    if (work->shapes[level].chunk && read_shapes(work, layer->plan->pieces + p, level) != ATH_OK) return ATH_BAD_CHUNK;
+    code_piece(&coder, reader->model, layer->plan, work->streams + level, layer->motion.frames, p, level, &layer->rows);
+    reader->coder = coder;
+    return blame(work, reader->chunk, reader->model->invalid ? ATH_BAD_CHUNK : ATH_OK);
+}
+
+static int read_first_layer(ath_work *work, int32_t p)
+{
+    const ath_piece *piece = work->file->plan.pieces + p;
+    int result = ATH_OK;
+    if (piece->low_level >= 0 && piece->low_level <= work->level) result = read_piece(work, p, piece->low_level);
+    if (piece->level <= work->level && result == ATH_OK) result = read_piece(work, p, piece->level);
+    return result;
+}
+
+/* ---- refinements ---- */
+
+static int refine_shapes(ath_work *work, int32_t q, const ath_piece *piece)
+{
+    shapes_reader *reader = work->shapes + piece->level;
+    layer_work *layer = work->layers + q, *before = layer - 1;
+    if (!reader->chunk) return ATH_OK;
+    int32_t count = code_refined_shapes(&reader->coder, reader->refined, piece, before->rows.shape_count,
+                                        before->shape_integers, reader->shift, 0, layer->shape_integers);
+    if (count < 0 || !ath_unit_shapes(count, layer->shape_integers, layer->unit_shapes))
+        return blame(work, reader->chunk, ATH_BAD_CHUNK);
+    layer->rows.shape_count = count;
+    return ATH_OK;
+}
+
+/* What the layer before, whose piece is at `placed`, tells this one. */
+static void look_before(ath_work *work, int32_t q, int32_t p, const double *placed)
+{
+    layer_work *layer = work->layers + q;
+    const layer_work *coarse = layer - 1;
+    const ath_piece *piece = coarse->plan->pieces + p;
+    ath_piece_before *before = &layer->before;
+    int32_t T = layer->motion.frames, root = work->streams[layer->plan->pieces[p].level].root;
+    int same = ath_base_stream(&coarse->motion, piece)->root == root;
+    before->placed = placed;
+    before->rotation = coarse->scratch.rotation;
+    before->shift = coarse->scratch.shift;
+    before->frames = 0;
+    layer->rows.coarse_turn_steps = 0;
+    if (piece->flags & ATH_RIGID) {
+        ath_turning turning = ath_turning_of(coarse->plan, piece, ath_base_stream(&coarse->motion, piece));
+        memcpy(layer->turn_steps, turning.steps, sizeof turning.steps);
+        before->frames = coarse->scratch.at.point;
+        layer->rows.coarse_turn_steps = layer->turn_steps;
+    }
+    before->modes = 0;
+    before->frequencies = ath_max(ath_row_extent(coarse->rows.shift, T, coarse->counts[SHIFT_SLOT]),
+                                  ath_row_extent(coarse->rows.rotation, T, coarse->counts[ROTATION_SLOT]));
+    for (int32_t r = 0; r < ath_rank(piece); r++) {
+        int32_t count = ath_row_extent(ath_row(coarse->rows.modes, r, T), T, coarse->counts[r]);
+        before->frequencies = ath_max(before->frequencies, count);
+        same = same && ath_mode_stream(&coarse->motion, piece, r)->root == root;
+        if (count > 0) before->modes = coarse->rows.shape_count > 0 ? ath_max(ath_shape_modes(piece), r + 1) : r + 1;
+    }
+    if (!same && before->frequencies > 0) before->frequencies = T;
+    int alike = (coarse->rows.shape_count > 0) == (layer->rows.shape_count > 0);
+    layer->rows.coarse_modes = same && alike ? coarse->rows.modes : 0;
+    layer->rows.coarse_rotation = same ? coarse->rows.rotation : 0;
+    layer->rows.coarse_shift = same ? coarse->rows.shift : 0;
+}
+
+static int refine_piece(ath_work *work, int32_t q, int32_t p, const double **placed)
+{
+    layer_work *layer = work->layers + q;
+    const ath_piece *piece = layer->plan->pieces + p;
+    const ath_stream *stream = work->streams + piece->level;
+    stems_reader *reader = work->stems + piece->level;
+    ath_coder coder = reader->coder;
+    if (refine_shapes(work, q, piece) != ATH_OK) return ATH_BAD_CHUNK;
+    look_before(work, q, p, *placed);
+    ath_predict_tracks(layer->plan, &layer->motion, piece, &layer->before, &layer->scratch, &layer->rows);
+    code_refined_tracks(&coder, reader->refined, layer->plan, stream, &layer->motion, piece, &layer->rows);
+    ath_turned_attach(layer->plan, &layer->motion, p, &layer->rows, &layer->scratch);
+    ath_predict_modes(layer->plan, &layer->motion, piece, &layer->before, &layer->scratch, &layer->rows);
+    code_refined_modes(&coder, reader->refined, stream, &layer->motion, piece, &layer->rows);
+    reader->coder = coder;
+    if (reader->refined->rows.invalid) return blame(work, reader->chunk, ATH_BAD_CHUNK);
+    *placed = ath_pose_turned(layer->plan, &layer->motion, p, &layer->rows, &layer->scratch);
+    return ATH_OK;
+}
+
+/* The memory behind a piece in some frames, which the next one fills: fetched while that is decoded. */
+ATH_INLINE void expect_next(float *next, int32_t rows, int32_t start, int32_t stop, size_t frame_size)
+{
+    for (int32_t r = 0; r < rows; r += CACHE_LINE)
+        for (int32_t t = start; t < stop; t++)
+            ath_expect_write((uintptr_t)next + ((size_t)t * frame_size + (size_t)(r + CACHE_LINE - 1)) * sizeof *next);
+}
+
+/* Transposes rows over time into frames. */
+ATH_HOT static void store_floats(const double *placed, int32_t rows, int32_t T, const double origin[3], float *out,
+                                 size_t frame_size)
+{
+    double added[3 + ATH_LANES];
+    int32_t whole = rows - rows % ATH_LANES;
+    for (int32_t i = 0; i < 3 + ATH_LANES; i++) added[i] = origin[i % 3];
+    for (int32_t start = 0; start < T; start += TILE) {
+        int32_t stop = ath_min(start + TILE, T), squares = start + (stop - start) / ATH_LANES * ATH_LANES;
+        expect_next(out + rows, rows, start, stop, frame_size);
+        for (int32_t r = 0; r < rows; r += ATH_LANES) {
+            const double *from = placed + (size_t)r * (size_t)T;
+            float *to = out + r;
+            int32_t t = start;
+            for (; r < whole && t < squares; t += ATH_LANES)
+                lanes_transpose(from + t, (size_t)T, added + r % 3, to + (size_t)t * frame_size, frame_size);
+            for (; t < stop; t++)
+                for (int32_t i = 0; i < ath_min(ATH_LANES, rows - r); i++)
+                    to[(size_t)t * frame_size + (size_t)i] = (float)(from[i * T + t] + added[r % 3 + i]);
+        }
+    }
+}
+
+static void store_doubles(const double *placed, int32_t rows, int32_t T, const double origin[3], double *out,
+                          size_t frame_size)
+{
+    for (int32_t r = 0; r < rows; r++)
+        for (int32_t t = 0; t < T; t++)
+            out[(size_t)t * frame_size + (size_t)r] = placed[(size_t)r * (size_t)T + (size_t)t] + origin[r % 3];
+}
+
+static void store_piece(ath_work *work, const ath_piece *piece, const double *placed)
+{
+    ath_segment *segment = work->segment;
+    size_t at = 3 * (size_t)work->exact, frame_size = 3 * (size_t)segment->exact_vertices;
+    const double *origin = work->file->info.origin;
+    if (segment->is_float64)
+        store_doubles(placed, 3 * piece->count, segment->frames, origin, (double *)segment->positions + at, frame_size);
+    else
+        store_floats(placed, 3 * piece->count, segment->frames, origin, (float *)segment->positions + at, frame_size);
+}
+
+static void correct(ath_segment *segment, size_t at, double parts, double step)
+{
+    if (parts == 0.0) return;
+    if (segment->is_float64) {
+        double *position = (double *)segment->positions + at;
+        *position = ath_corrected(*position, parts, step);
+    } else {
+        float *position = (float *)segment->positions + at;
+        *position = (float)ath_corrected((double)*position, parts, step);
+    }
+}
+
+static void correct_vertex(const corrections_reader *reader, const correction_row *row, ath_segment *segment,
+                           size_t vertex)
+{
+    ath_corrected_parts parts;
+    correction_parts(row, segment->frames, parts);
+    for (int32_t t = 0; t < segment->frames; t++) {
+        if (!is_reached(row, t)) {
+            t += CORRECTION_BLOCK - 1;
+            continue;
+        }
+        for (size_t k = 0; k < 3; k++)
+            correct(segment, ((size_t)t * (size_t)segment->exact_vertices + vertex) * 3 + k, parts[t][k], reader->step);
+    }
+}
+
+static void watch_corrections(const ath_work *work, const correction_row *row, int32_t position)
+{
+    ath_watcher *watcher = watcher_of(work);
+    for (int32_t t = 0; t < work->segment->frames; t++)
+        if (has_correction(row, t)) watcher->correction(watcher, position, t, row->of + t, work->corrections.step);
+}
+
+static void correct_piece(ath_work *work, const ath_piece *piece)
+{
+    corrections_reader *reader = &work->corrections;
+    ath_coder coder = reader->coder;
+    for (int32_t i = 0; i < piece->count; i++) {
+        const correction_row *row = code_vertex(&coder, reader->model, work->segment->frames, 0);
+        if (row) correct_vertex(reader, row, work->segment, (size_t)(work->exact + i));
+        if (row && watcher_of(work)) watch_corrections(work, row, work->exact + i);
+    }
+    reader->coder = coder;
+}
+
+static int read_exact_point(ath_work *work, size_t at)
+{
+    exact_reader *reader = &work->exact_level;
+    double known[3], number[3];
+    for (size_t k = 0; k < 3; k++)
+        known[k] = work->segment->is_float64 ? ((const double *)work->segment->positions)[at + k]
+                                             : (double)((const float *)work->segment->positions)[at + k];
+    if (!code_exact_point(&reader->coder, reader->model, work->segment->is_float64, known, reader->length, number))
+        return 0;
+    for (size_t k = 0; k < 3; k++) {
+        if (work->segment->is_float64)
+            ((double *)work->segment->positions)[at + k] = number[k];
+        else
+            ((float *)work->segment->positions)[at + k] = (float)number[k];
+    }
+    return 1;
+}
+
+/* The source's own positions in place of those that the levels before give. */
+static int make_exact(ath_work *work, const ath_piece *piece)
+{
+    size_t vertices = (size_t)work->segment->exact_vertices;
+    for (int32_t i = 0; i < piece->count; i++)
+        for (size_t t = 0; t < (size_t)work->segment->frames; t++)
+            if (!read_exact_point(work, (t * vertices + (size_t)(work->exact + i)) * 3))
+                return blame(work, work->exact_level.chunk, ATH_BAD_CHUNK);
+    return ATH_OK;
+}
+
+/* Of frames of exact vertices, as many as the segment has. */
+static void *vertex_at(const ath_segment *segment, void *frames, size_t t, size_t vertex)
+{
+    size_t at = 3 * (t * (size_t)segment->exact_vertices + vertex);
+    return (uint8_t *)frames + at * (segment->is_float64 ? sizeof(double) : sizeof(float));
+}
+
+/* Keeps the end of the piece as it is placed. */
+static void keep_end(ath_work *work, const ath_piece *piece)
+{
+    ath_segment *segment = work->segment;
+    size_t vertex = (size_t)work->exact, frames = (size_t)segment->frames;
+    size_t size = 3 * (size_t)piece->count * number_size(work->file);
+    if (!segment->end || frames < ATH_END_FRAMES) return;
+    for (size_t t = 0; t < ATH_END_FRAMES; t++)
+        memcpy(vertex_at(segment, segment->end, t, vertex),
+               vertex_at(segment, segment->positions, frames - ATH_END_FRAMES + t, vertex), size);
+}
+
+/* How far numbers are off where the two that end the segment before go on to, in value and in slope, midway between that
+ * and their own first two. */
+ATH_INLINE void set_off(double start, double end, double first, double second, double off[2])
+{
+    off[0] = 0.5 * (3.0 * (end - first) - (start - second));
+    off[1] = (end - start) - (second - first);
+}
+
+ATH_INLINE double joined(const ath_join *join, int32_t t, double x, const double off[2])
+{
+    return x + (off[0] * join->jumps[t] + off[1] * join->slopes[t]);
+}
+
+ATH_HOT static void join_floats(const ath_join *join, const float *start, const float *end, float *x, size_t count,
+                                size_t frame_size)
+{
+    double off[3 * ATH_PIECE_VERTICES][2];
+    for (size_t i = 0; i < count; i++)
+        set_off((double)start[i], (double)end[i], (double)x[i], (double)x[frame_size + i], off[i]);
+    for (int32_t t = 0; t < join->width; t++, x += frame_size)
+        for (size_t i = 0; i < count; i++) x[i] = (float)joined(join, t, (double)x[i], off[i]);
+}
+
+static void join_doubles(const ath_join *join, const double *start, const double *end, double *x, size_t count,
+                         size_t frame_size)
+{
+    double off[3 * ATH_PIECE_VERTICES][2];
+    for (size_t i = 0; i < count; i++) set_off(start[i], end[i], x[i], x[frame_size + i], off[i]);
+    for (int32_t t = 0; t < join->width; t++, x += frame_size)
+        for (size_t i = 0; i < count; i++) x[i] = joined(join, t, x[i], off[i]);
+}
+
+static double join_number(const void *numbers, size_t at, int is_float64)
+{
+    return is_float64 ? ((const double *)numbers)[at] : (double)((const float *)numbers)[at];
+}
+
+static void watch_join(const ath_work *work, const void *start, const void *end, const void *x, size_t count,
+                       size_t frame_size, int is_float64)
+{
+    double off[3 * ATH_PIECE_VERTICES][2];
+    ath_watcher *watcher = watcher_of(work);
+    const ath_join *join = &work->join;
+    if (!watcher) return;
+    for (size_t i = 0; i < count; i++)
+        set_off(join_number(start, i, is_float64), join_number(end, i, is_float64), join_number(x, i, is_float64),
+                join_number(x, frame_size + i, is_float64), off[i]);
+    watcher->join(watcher, join->width, join->jumps, join->slopes, (int32_t)count, off);
+}
+
+static void join_piece(ath_work *work, const ath_piece *piece)
+{
+    ath_segment *segment = work->segment;
+    const ath_join *join = &work->join;
+    size_t vertex = (size_t)work->exact, count = 3 * (size_t)piece->count,
+           frame_size = 3 * (size_t)segment->exact_vertices;
+    const void *start = vertex_at(segment, join->positions, 0, vertex);
+    const void *end = vertex_at(segment, join->positions, 1, vertex);
+    watch_join(work, start, end, vertex_at(segment, segment->positions, 0, vertex), count, frame_size,
+               segment->is_float64);
+    if (segment->is_float64)
+        join_doubles(join, (const double *)start, (const double *)end, (double *)segment->positions + 3 * vertex, count,
+                     frame_size);
+    else
+        join_floats(join, (const float *)start, (const float *)end, (float *)segment->positions + 3 * vertex, count,
+                    frame_size);
+}
+
+/* The piece as the level before, the last lossy one, shows it. */
+static void copy_piece(ath_work *work, const ath_piece *piece)
+{
+    const ath_segment *from = work->shown_before;
+    size_t number = from->is_float64 ? sizeof(double) : sizeof(float), row = 3 * number;
+    for (size_t t = 0; t < (size_t)from->frames; t++) {
+        size_t at = (t * (size_t)from->exact_vertices + (size_t)work->exact) * row;
+        memcpy((uint8_t *)work->segment->positions + at, (const uint8_t *)from->positions + at,
+               (size_t)piece->count * row);
+    }
+    for (size_t t = 0; from->end && t < ATH_END_FRAMES; t++)
+        memcpy(vertex_at(from, work->segment->end, t, (size_t)work->exact),
+               vertex_at(from, from->end, t, (size_t)work->exact), (size_t)piece->count * row);
+}
+
+static int do_frames(ath_work *work)
+{
+    int result = ath_prediction_step(work->prediction);
+    if (result == ATH_OK) next_phase(work, PIECES);
+    return result == ATH_MORE ? ATH_OK : blame(work, work->predicted, result);
+}
+
+static void watch_piece(const ath_work *work, int32_t p)
+{
+    ath_watcher *watcher = watcher_of(work);
+    const layer_work *layer = work->layers + work->layer;
+    watcher->piece(watcher, layer->plan, &layer->motion, p, &layer->rows);
+}
+
+/* The piece at the first layer, then as each further one refines it. */
+static int place_piece(ath_work *work, int32_t p)
+{
+    const ath_piece *piece = work->file->plan.pieces + p;
+    layer_work *layer = work->layers + work->first_layer;
+    const double *placed = ath_pose_piece(layer->plan, &layer->motion, p, &layer->rows, &layer->scratch);
+    for (int32_t q = work->first_layer + 1; q <= work->layer; q++)
+        if (refine_piece(work, q, p, &placed) != ATH_OK) return ATH_BAD_CHUNK;
+    if (work->keeping.at) keep_piece(work, piece);
+    if (watcher_of(work)) watch_piece(work, p);
+    store_piece(work, piece, placed);
+    keep_end(work, piece);
+    if (work->join.width > 0) join_piece(work, piece);
+    if (work->corrections.chunk) correct_piece(work, piece);
+    return ATH_OK;
+}
+
+static int show_piece(ath_work *work, int32_t p)
+{
+    const ath_piece *piece = work->file->plan.pieces + p;
+    if (work->shown_before)
+        copy_piece(work, piece);
+    else if (!work->predicted && place_piece(work, p) != ATH_OK)
+        return ATH_BAD_CHUNK;
+    int result = work->exact_level.chunk ? make_exact(work, piece) : ATH_OK;
+    work->exact += piece->count;
+    return result;
+}
+
+static void show_node(ath_work *work, int32_t n)
+{
+    ath_segment *segment = work->segment;
+    size_t T = (size_t)segment->frames, nodes = (size_t)segment->node_count;
+    double *maps = segment->maps + ATH_MAP * (size_t)work->shown++;
+    layer_work *layer = work->layers;
+    ath_watcher *watcher = watcher_of(work);
+    if (watcher) watcher->node(watcher, layer->plan, &layer->motion, n, &layer->rows, &work->node);
+    ath_node_map(layer->plan, &layer->motion, n, &layer->rows, &work->node, &layer->scratch);
+    for (size_t t = 0; t < T; t++) {
+        double *map = maps + t * nodes * ATH_MAP;
+        for (size_t k = 0; k < 9; k++) map[k] = layer->scratch.at.rotation[k * T + t];
+        for (size_t k = 0; k < 3; k++) map[9 + k] = layer->scratch.at.point[k * T + t];
+    }
+    if (work->join.width == 0) return;
+    const double *end = work->join.maps + (maps - segment->maps);
+    watch_join(work, end, end + nodes * ATH_MAP, maps, ATH_MAP, nodes * ATH_MAP, 1);
+    join_doubles(&work->join, end, end + nodes * ATH_MAP, maps, ATH_MAP, nodes * ATH_MAP);
+}
+
+static int read_node(ath_work *work, int32_t n)
+{
+    const ath_node *node = work->file->plan.nodes + n;
+    affines_reader *reader = work->affines + node->level;
+    if (!node->coded || node->level > work->level || !reader->chunk) return ATH_OK;
+    memset(work->node.rows, 0, 4 * 3 * (size_t)work->segment->frames * sizeof *work->node.rows);
+    int valid = code_node(&reader->coder, reader->model, work->layers->plan, work->segment->frames, n, &work->node);
+    return blame(work, reader->chunk, valid ? ATH_OK : ATH_BAD_CHUNK);
+}
+
+static int finish_level(ath_work *work, int32_t d)
+{
+    const stems_reader *stems = work->stems + d;
+    const affines_reader *affines = work->affines + d;
+    const shapes_reader *shapes = work->shapes + d;
+    if (shapes->chunk && !coder_finish(&shapes->coder)) return blame(work, shapes->chunk, ATH_BAD_CHUNK);
+    if (stems->chunk && !coder_finish(&stems->coder)) return blame(work, stems->chunk, ATH_BAD_CHUNK);
+    if (affines->chunk && !coder_finish(&affines->coder)) return blame(work, affines->chunk, ATH_BAD_CHUNK);
+    return ATH_OK;
+}
+
+static int finish(ath_work *work)
+{
+    const corrections_reader *corrections = &work->corrections;
+    for (int32_t d = 0; d <= work->level; d++)
+        if (finish_level(work, d) != ATH_OK) return ATH_BAD_CHUNK;
+    if (work->only_end) return go_on(work);
+    if (corrections->chunk && !coder_finish(&corrections->coder)) return blame(work, corrections->chunk, ATH_BAD_CHUNK);
+    if (work->exact_level.chunk && !coder_finish(&work->exact_level.coder))
+        return blame(work, work->exact_level.chunk, ATH_BAD_CHUNK);
+    ath_cut(work->file, work->level, work->segment->parts);
+    work->segment->index = work->index;
+    work->segment->level = work->level;
+    if (watcher_of(work)) watcher_of(work)->done(watcher_of(work), &work->layers[work->layer].motion, work->segment);
+    if (work->keeping.at) work->keeps->bytes = (uint64_t)(work->keeping.at - (uint8_t *)work->keeps);
+    work->phase = DONE;
+    return ATH_OK;
+}
+
+/* One piece, and the node that begins with it. */
+static int do_piece(ath_work *work)
+{
+    const ath_plan *plan = &work->file->plan;
+    int32_t p = work->next++, result = ATH_OK;
+    if (p == plan->piece_count) return finish(work);
+    const ath_piece *piece = plan->pieces + p;
+    if (work->first_level == 0 && !work->file->header.is_predicted) result = read_first_layer(work, p);
+    if (work->kept) restore_piece(work, piece);
+    if (result == ATH_OK && work->next_node < plan->node_count && plan->nodes[work->next_node].piece == p) {
+        int32_t n = work->next_node++;
+        result = read_node(work, n);
+        if (result == ATH_OK && ath_is_shown(plan->nodes + n, work->level)) show_node(work, n);
+    }
+    if (result == ATH_OK && piece->level <= work->level) result = show_piece(work, p);
+    for (int32_t q = work->first_layer; q <= work->layer; q++) clear_piece(work->layers + q, piece);
+    return result;
+}
+
+int ath_prepare_step(ath_work *work, int32_t steps)
+{
+    int result = ATH_OK;
+    if (work->phase == FAILED) return ATH_BAD_ARGUMENT;
+    for (; steps > 0 && work->phase != DONE && result == ATH_OK; steps--)
+        result = work->phase == BEFORE      ? go_back(work)
+                 : work->phase == CHECKSUMS ? check_some(work)
+                 : work->phase == HEADS     ? open_level(work)
+                 : work->phase == FRAMES    ? do_frames(work)
+                                            : do_piece(work);
+    if (result != ATH_OK) work->phase = FAILED;
+    return result != ATH_OK || work->phase == DONE ? result : ATH_MORE;
+}
+
+int ath_prepare(void *work, size_t work_bytes, const ath_file *file, int32_t segment, int32_t level, void *memory,
+                size_t memory_bytes)
+{
+    int result = ath_prepare_start(work, work_bytes, file, segment, level, memory, memory_bytes);
+    if (result == ATH_OK) result = ATH_MORE;
+    while (result == ATH_MORE) result = ath_prepare_step((ath_work *)work, INT32_MAX);
+    return result;
+}
+
+static int is_last_lossy(const ath_file *file, int32_t level) { return level == ath_lossy_levels(file) - 1; }
+
+int ath_goes_on(const ath_file *file, const ath_segment *from, const void *kept, int32_t level)
+{
+    const kept_head *head = (const kept_head *)kept;
+    if (from->level < 0 || from->level >= level || level >= file->info.level_count) return 0;
+    if (is_last_lossy(file, from->level)) return 1;
+    return head && head->bytes > 0 && head->segment == from->index && head->level == from->level;
+}
+
+int ath_prepare_onward(void *work, size_t work_bytes, const ath_file *file, const ath_segment *from, const void *kept,
+                       int32_t level, void *memory, size_t memory_bytes)
+{
+    if (!ath_goes_on(file, from, kept, level)) return ATH_BAD_ARGUMENT;
+    return start(work, work_bytes, file, from->index, level, memory, memory_bytes, from,
+                 is_last_lossy(file, from->level) ? 0 : kept);
+}
+
+void ath_work_fault(const ath_work *work, ath_fault_info *fault) { *fault = work->fault; }
+
+int32_t ath_segment_index(const ath_segment *segment) { return segment->index; }
+
+int32_t ath_segment_level(const ath_segment *segment) { return segment->level; }

@@ -1,0 +1,115 @@
+/* Decodes the streams of the prelude: streams.h compiled for decoding. */
+#include "streams/decode.h"
+#include "streams/polygons.inl"
+#include "streams/prelude.inl"
+
+size_t ath_prelude_model_size(void)
+{
+    size_t larger = sizeof(hierarchy_model) > sizeof(exact_model) ? sizeof(hierarchy_model) : sizeof(exact_model);
+    return larger > sizeof(rest_model) ? larger : sizeof(rest_model);
+}
+
+static int finished(const ath_coder *coder, int valid) { return valid && coder_finish(coder) ? ATH_OK : ATH_BAD_CHUNK; }
+
+/* Marks every value seen by the sign of the entry that it names, and clears the marks. */
+static int is_permutation(int32_t count, int32_t *source)
+{
+    int distinct = 1;
+    for (int32_t i = 0; i < count && distinct; i++) {
+        int32_t value = source[i] < 0 ? -source[i] - 1 : source[i];
+        distinct = source[value] >= 0;
+        source[value] = distinct ? -source[value] - 1 : source[value];
+    }
+    for (int32_t i = 0; i < count; i++)
+        if (source[i] < 0) source[i] = -source[i] - 1;
+    return distinct;
+}
+
+/* Inside the subtree of a whole node there are no nodes, so nothing there may be whole. */
+static int whole_are_nodes(const ath_branch *branches, int32_t branch_count)
+{
+    int32_t inside_until = 0;
+    for (int32_t b = 0; b < branch_count; b++) {
+        if (!(branches[b].flags & ATH_WHOLE)) continue;
+        if (b < inside_until) return 0;
+        inside_until = b + branches[b].subtree;
+    }
+    return 1;
+}
+
+static int rings_are_tubes(const ath_branch *branches, int32_t branch_count)
+{
+    for (int32_t b = 0; b < branch_count; b++)
+        if (branches[b].ring > 0 && (branches[b].ring < 2 || !(branches[b].flags & ATH_SHEET))) return 0;
+    return 1;
+}
+
+int ath_decode_hierarchy(void *model, const uint8_t *bytes, size_t size, int32_t branch_count, int32_t vertex_count,
+                         ath_branch *branches, int32_t *branch_source, int32_t *vertex_source)
+{
+    ath_coder coder;
+    coder_start(&coder, bytes, size);
+    int valid = code_hierarchy(&coder, (hierarchy_model *)model, branch_count, vertex_count, branches, branch_source,
+                               vertex_source);
+    valid = valid && is_permutation(branch_count, branch_source) && is_permutation(vertex_count, vertex_source);
+    valid = valid && rings_are_tubes(branches, branch_count);
+    valid = valid && ath_count_pieces(branches, branch_count, vertex_count) > 0;
+    valid = valid && whole_are_nodes(branches, branch_count);
+    return finished(&coder, valid);
+}
+
+int ath_decode_rest(void *model, const uint8_t *bytes, size_t size, const ath_branch *branches, int32_t branch_count,
+                    double step, ath_mesh *mesh, const int32_t *coarse, const double *before, int32_t *steps,
+                    double *rest)
+{
+    ath_coder coder;
+    rest_layer layer = {coarse, before, steps, mesh, 0.0, 0, 0};
+    coder_start(&coder, bytes, size);
+    return finished(&coder, code_rest(&coder, (rest_model *)model, &layer, branches, branch_count, step, 0, rest));
+}
+
+int ath_decode_source_rest(void *model, const uint8_t *bytes, size_t size, const ath_branch *branches,
+                           int32_t branch_count, double step, const double *reference, double *turns, double *rest)
+{
+    ath_coder coder;
+    bent_pose pose = {reference, 0, 0, rest, turns, step};
+    coder_start(&coder, bytes, size);
+    return finished(&coder, code_source_rest(&coder, (rest_model *)model, &pose, branches, branch_count));
+}
+
+int ath_decode_exact_rest(void *model, const uint8_t *bytes, size_t size, const ath_branch *branches,
+                          int32_t branch_count, const ath_mesh *mesh, int is_float64, double *rest)
+{
+    ath_coder coder;
+    coder_start(&coder, bytes, size);
+    return finished(&coder,
+                    code_exact_rest(&coder, (exact_model *)model, branches, branch_count, mesh, is_float64, rest));
+}
+
+size_t ath_faces_memory(int32_t vertex_count)
+{
+    return sizeof(faces_model) + 2 * FACE_SIDES * sizeof(int32_t) * (size_t)vertex_count;
+}
+
+int ath_decode_faces(void *memory, ath_bytes stream, const ath_polygons *shape, int32_t vertex_count, uint32_t *counts,
+                     int32_t *corners)
+{
+    ath_coder coder;
+    coder_start(&coder, stream.bytes, stream.size);
+    faces_list faces = faces_of((faces_model *)memory, shape, vertex_count, counts, corners);
+    return finished(&coder, code_faces(&coder, (faces_model *)memory, &faces));
+}
+
+int ath_decode_times(void *model, const uint8_t *bytes, size_t size, int32_t frame_count, double *times)
+{
+    ath_coder coder;
+    coder_start(&coder, bytes, size);
+    return finished(&coder, code_times(&coder, (exact_model *)model, frame_count, times));
+}
+
+int ath_decode_temporal(void *model, const uint8_t *bytes, size_t size, int32_t rank, int32_t frames, int32_t *basis)
+{
+    ath_coder coder;
+    coder_start(&coder, bytes, size);
+    return finished(&coder, code_temporal(&coder, (number_model *)model, rank, frames, basis));
+}

@@ -1,0 +1,565 @@
+/* What PREDICTED holds of a segment (FORMAT.md, "Predicted motion"): frame by frame, each vertex about a prediction from
+ * what is decoded. Compiled once for each direction, as streams.h is. */
+#ifndef ATH_PREDICTED_MODEL_H
+#define ATH_PREDICTED_MODEL_H
+
+#include "file/container.h"
+#include "bits/lattice.inl"
+#include "model/plan.h"
+
+enum { GUESSES = 13, FEATURES = 8, FITS = 3, FITTED = GUESSES - 1, LINE_GUESS = 6 };
+enum { LONGEST_LINE = 24, LONGEST_MEAN = 64, SOLVED_EVERY = 16, FIT_MEMORY = 256, RUNS = 8 };
+
+/* A vertex from frame to frame. */
+typedef struct {
+    double line[3], slope[3]; /* the line through its last positions */
+    double older[3];          /* the slope before it last turned */
+    double mean[3];
+    double error[GUESSES], noise; /* noise: error of the line while it does not turn */
+    int32_t age, frames;          /* positions that make the line, the mean */
+    int32_t steps[3];             /* its integers when they were last not 0 */
+    uint32_t size[2];             /* of its integers in the last frames */
+    int32_t before, above;        /* the vertex that it follows, the one that this follows; -1: none */
+    int32_t base;                 /* where its stem is attached, or begins; -1: it is there itself */
+    int32_t like;                 /* its place on an earlier stem that is as long, -1: none */
+    int32_t near;                 /* whose errors and integers tell of its own, -1: none */
+    int32_t tip;                  /* the last vertex of its stem, -1: it is an end itself */
+    int32_t earlier, next;        /* in the order of coding, -1: none */
+    int32_t leads, followed;      /* of a last vertex: whether its stem has others than ends; these follow it */
+} predicted_vertex;
+
+/* Weights of the features by least squares. */
+typedef struct {
+    double moments[FEATURES][FEATURES], products[FEATURES], weights[FEATURES];
+    int32_t count, wait;
+} predicted_fit;
+
+typedef struct {
+    lattice_model lattice;
+    number_model distance;
+    ath_context moved[4][4][3], sign[3][3], copied[RUNS][RUNS], usual[2], followed[2][2];
+    predicted_fit fits[FITS];
+    int32_t run, last_run, last_distance, last_followed;
+} predicted_model;
+
+/* Positions around the frame that is coded, less the origin, vertex_count x 3 each. */
+typedef struct {
+    const double *rest;
+    const double *was[3]; /* the frame that it is coded about, what that is coded about, and so on */
+    const double *last;   /* the frame before it */
+    double *now;
+} predicted_frames;
+
+/* What a vertex is expected to do: ways from where it was. */
+typedef struct {
+    double guess[GUESSES][3], features[3][FEATURES], way[3];
+    int32_t fit;
+} predicted_way;
+
+static void predicted_model_init(predicted_model *model)
+{
+    memset(model, 0, sizeof *model);
+    lattice_model_init(&model->lattice);
+    number_model_init(&model->distance);
+    for (int32_t own = 0; own < 4; own++)
+        for (int32_t near = 0; near < 4; near++)
+            for (int32_t beside = 0; beside < 3; beside++)
+                context_init(&model->moved[own][near][beside], own + near == 0 ? 6000 : 32768);
+    for (int32_t near = 0; near < 3; near++)
+        for (int32_t own = 0; own < 3; own++) context_init(&model->sign[near][own], 32768);
+    for (int32_t run = 0; run < RUNS; run++)
+        for (int32_t last = 0; last < RUNS; last++) context_init(&model->copied[run][last], 6000);
+    for (int32_t copied = 0; copied < 2; copied++) context_init(&model->usual[copied], 60000);
+    for (int32_t own = 0; own < 2; own++)
+        for (int32_t last = 0; last < 2; last++) context_init(&model->followed[own][last], 32768);
+    for (int32_t f = 0; f < FITS; f++) model->fits[f].wait = 1;
+    model->last_distance = 1;
+}
+
+/* ---- frames ---- */
+
+/* Whether a frame is a copy, and of or about how many frames before it is. 0: there is no such frame. */
+ATH_INLINE int code_reference(ath_coder *coder, predicted_model *model, int32_t frame, int *copied, int32_t *distance)
+{
+    int32_t run = ath_min(model->run, RUNS - 1), last = ath_min(model->last_run, RUNS - 1);
+    *copied = coder_bit(coder, &model->copied[run][last], *copied);
+    int usual = coder_bit(coder, &model->usual[*copied], *distance == model->last_distance);
+    if (usual)
+        *distance = model->last_distance;
+    else
+        *distance = (int32_t)code_unsigned(coder, &model->distance, 64, (uint32_t)(*distance - 1)) + 1;
+    if (*distance > frame + 1) return 0;
+    model->last_distance = *distance;
+    if (*copied) {
+        model->run++;
+    } else {
+        model->last_run = model->run;
+        model->run = 0;
+    }
+    return 1;
+}
+
+/* ---- least squares ---- */
+
+/* By Cholesky's factors. */
+static void solve_fit(predicted_fit *fit)
+{
+    double lower[FEATURES][FEATURES], y[FEATURES];
+    for (int32_t i = 0; i < FEATURES; i++) {
+        double sum = fit->products[i];
+        for (int32_t j = 0; j <= i; j++) {
+            double a = fit->moments[i][j];
+            if (i == j) a = a + (1.0 + a * 1e-6);
+            for (int32_t k = 0; k < j; k++) a = a - lower[i][k] * lower[j][k];
+            lower[i][j] = i < j ? 0.0 : i == j ? ath_sqrt(a > 0.5 ? a : 0.5) : a / lower[j][j];
+        }
+        for (int32_t k = 0; k < i; k++) sum = sum - lower[i][k] * y[k];
+        y[i] = sum / lower[i][i];
+    }
+    for (int32_t i = FEATURES - 1; i >= 0; i--) {
+        double sum = y[i];
+        for (int32_t k = i + 1; k < FEATURES; k++) sum = sum - lower[k][i] * fit->weights[k];
+        fit->weights[i] = sum / lower[i][i];
+    }
+}
+
+ATH_HOT static void add_sample(predicted_fit *fit, const predicted_way *p, const double way[3], double weight)
+{
+    const double *x = p->features[0], *y = p->features[1], *z = p->features[2];
+    for (int32_t i = 0; i < FEATURES; i++) {
+        double wx = weight * x[i], wy = weight * y[i], wz = weight * z[i];
+        for (int32_t j = 0; j < FEATURES; j++)
+            fit->moments[i][j] = fit->moments[i][j] + (wx * x[j] + wy * y[j] + wz * z[j]);
+        fit->products[i] = fit->products[i] + (wx * way[0] + wy * way[1] + wz * way[2]);
+    }
+}
+
+static void learn_fit(predicted_fit *fit, const predicted_way *p, const double way[3], double weight)
+{
+    add_sample(fit, p, way, weight);
+    fit->count = ath_min(fit->count + 1, 8 * SOLVED_EVERY);
+    if (--fit->wait > 0) return;
+    solve_fit(fit);
+    fit->wait = ath_min(1 + fit->count / 8, SOLVED_EVERY);
+    double keep = 1.0 - (double)fit->wait / (double)FIT_MEMORY;
+    for (int32_t i = 0; i < FEATURES; i++) {
+        for (int32_t j = 0; j < FEATURES; j++) fit->moments[i][j] = fit->moments[i][j] * keep;
+        fit->products[i] = fit->products[i] * keep;
+    }
+}
+
+/* ---- vertices ---- */
+
+ATH_INLINE int is_number(double x) { return x - x == 0.0; }
+
+ATH_INLINE double absolute(double x) { return x < 0.0 ? -x : x; }
+
+/* How far apart two vertices are along the way between them at rest, over that; near 1 where a step is more. */
+ATH_INLINE double grown(const double *rest, const double *now, int32_t from, int32_t to, double step)
+{
+    double along = step * step, length2 = along;
+    if (from < 0 || to < 0) return 1.0;
+    size_t p = 3 * (size_t)from, u = 3 * (size_t)to;
+    for (size_t k = 0; k < 3; k++) {
+        double edge = rest[u + k] - rest[p + k];
+        along = along + edge * (now[u + k] - now[p + k]);
+        length2 = length2 + edge * edge;
+    }
+    return length2 > 1e-60 ? along / length2 : 1.0;
+}
+
+/* That of its stem, as far as it is coded; of an end as it was and changed. */
+ATH_INLINE double stem_scale(const predicted_frames *frames, const predicted_vertex *vertex, int32_t v, double step)
+{
+    if (vertex->tip >= 0) return grown(frames->rest, frames->now, vertex->base, vertex->tip, step);
+    double was = grown(frames->rest, frames->was[0], vertex->base, v, step);
+    return was + (was - grown(frames->rest, frames->was[1], vertex->base, v, step));
+}
+
+ATH_INLINE void guess_axis(const predicted_vertex *vertex, const predicted_frames *frames, size_t v, size_t k,
+                           const double scales[2], const double *weights, predicted_way *p)
+{
+    const double *now = frames->now, *was = frames->was[0], *was2 = frames->was[1];
+    size_t at = 3 * v + k;
+    double x = was[at], own = x - was2[at], before = 0.0, before2 = 0.0, above = 0.0, above2 = 0.0;
+    double joined = 0.0, edge = 0.0, stem = 0.0, like = 0.0, waits = 0.0;
+    if (vertex->before >= 0) {
+        size_t u = 3 * (size_t)vertex->before + k;
+        before = now[u] - was[u];
+        before2 = was[u] - was2[u];
+        joined = now[u] - x;
+        edge = joined + scales[0] * (frames->rest[at] - frames->rest[u]);
+    }
+    if (vertex->above >= 0) {
+        size_t u = 3 * (size_t)vertex->above + k;
+        above = now[u] - was[u];
+        above2 = was[u] - was2[u];
+    }
+    if (vertex->base >= 0) {
+        size_t u = 3 * (size_t)vertex->base + k;
+        waits = frames->rest[u] - x;
+        stem = (now[u] - x) + scales[1] * (frames->rest[at] - frames->rest[u]);
+    }
+    if (vertex->like >= 0) {
+        size_t u = 3 * (size_t)vertex->like + k;
+        like = now[u] - was[u];
+    }
+    double features[FEATURES] = {own,
+                                 was2[at] - frames->was[2][at],
+                                 before,
+                                 before2,
+                                 above,
+                                 above2,
+                                 (vertex->line[k] + vertex->slope[k]) - x,
+                                 vertex->mean[k] - x};
+    double fitted = 0.0;
+    for (int32_t i = 0; i < FEATURES; i++) {
+        p->features[k][i] = features[i];
+        fitted = fitted + weights[i] * features[i];
+    }
+    double guesses[GUESSES] = {0.0,         own,         before, own + (before - before2), edge, joined,
+                               features[6], features[7], like,   vertex->older[k],         stem, waits,
+                               fitted};
+    for (int32_t i = 0; i < GUESSES; i++) p->guess[i][k] = guesses[i];
+}
+
+static void predict_vertex(const predicted_model *model, const ath_predicted_head *head,
+                           const predicted_vertex *vertices, const predicted_frames *frames, int32_t v,
+                           predicted_way *p)
+{
+    const predicted_vertex *vertex = vertices + v, *near = vertex->near >= 0 ? vertices + vertex->near : 0;
+    int32_t inner = vertex->before >= 0 && vertex->near == vertex->before;
+    p->fit = inner ? 2 : vertex->before < 0 ? 0 : 1;
+    const predicted_fit *fit = model->fits + p->fit;
+    double scales[2] = {1.0, 1.0}, best = 0.0;
+    int32_t chosen = 0;
+    if (inner) {
+        scales[0] = grown(frames->rest, frames->now, vertex->above, vertex->before, head->step);
+    }
+    scales[1] = stem_scale(frames, vertex, v, head->step);
+    for (size_t k = 0; k < 3; k++) guess_axis(vertex, frames, (size_t)v, k, scales, fit->weights, p);
+    for (int32_t i = 0; i < GUESSES; i++) {
+        double error = vertex->error[i];
+        if (near) error = error + near->error[i];
+        if (i == 0 || error < best) {
+            best = error;
+            chosen = i;
+        }
+    }
+    for (size_t k = 0; k < 3; k++) p->way[k] = is_number(p->guess[chosen][k]) ? p->guess[chosen][k] : 0.0;
+}
+
+/* The line through the last positions begins anew where the vertex turns. */
+ATH_INLINE void learn_line(predicted_vertex *vertex, const double *x, const double *last, double off, double step)
+{
+    int turned = off > 4.0 * step + 3.0 * vertex->noise;
+    if (!turned) vertex->noise = vertex->noise + (off - vertex->noise) * 0.125;
+    vertex->age = turned ? 1 : ath_min(vertex->age + 1, LONGEST_LINE);
+    double n = (double)vertex->age, more = (n + 1.0) * (n + 2.0);
+    double at = (4.0 * n + 2.0) / more, along = 6.0 / more;
+    for (size_t k = 0; k < 3; k++) {
+        double ahead = vertex->line[k] + vertex->slope[k], miss = x[k] - ahead;
+        if (turned) {
+            vertex->older[k] = vertex->slope[k];
+            vertex->line[k] = x[k];
+            vertex->slope[k] = x[k] - last[k];
+        } else {
+            vertex->line[k] = ahead + at * miss;
+            vertex->slope[k] = vertex->slope[k] + along * miss;
+        }
+    }
+}
+
+/* What its position in this frame tells. */
+static void learn_vertex(predicted_model *model, const ath_predicted_head *head, predicted_vertex *vertices,
+                         const predicted_frames *frames, int32_t v, const predicted_way *p)
+{
+    predicted_vertex *vertex = vertices + v;
+    predicted_fit *fit = model->fits + p->fit;
+    const double *x = frames->now + 3 * (size_t)v, *was = frames->was[0] + 3 * (size_t)v;
+    double way[3], error[GUESSES];
+    for (size_t k = 0; k < 3; k++) way[k] = x[k] - was[k];
+    for (int32_t i = 0; i < GUESSES; i++) {
+        error[i] =
+            absolute(way[0] - p->guess[i][0]) + absolute(way[1] - p->guess[i][1]) + absolute(way[2] - p->guess[i][2]);
+        vertex->error[i] = 0.5 * vertex->error[i] + error[i];
+    }
+    double off =
+        absolute(way[0] - p->way[0]) + absolute(way[1] - p->way[1]) + absolute(way[2] - p->way[2]) + head->step;
+    learn_fit(fit, p, way, 1.0 / (off * off));
+    learn_line(vertex, x, frames->last + 3 * (size_t)v, error[LINE_GUESS], head->step);
+    vertex->frames = ath_min(vertex->frames + 1, LONGEST_MEAN);
+    for (size_t k = 0; k < 3; k++)
+        vertex->mean[k] = vertex->mean[k] + (x[k] - vertex->mean[k]) / (double)vertex->frames;
+}
+
+ATH_INLINE int32_t size_class(uint32_t size) { return size == 0 ? 0 : size < 2 ? 1 : size < 6 ? 2 : 3; }
+
+/* The magnitude in 1/16 that is expected of its integers; near, beside: sizes of others in this frame. */
+ATH_INLINE uint32_t expected_size(const predicted_vertex *vertices, int32_t v, uint32_t *near, uint32_t *beside)
+{
+    const predicted_vertex *vertex = vertices + v;
+    *near = vertex->near >= 0 ? vertices[vertex->near].size[0] : 0;
+    *beside = vertex->earlier >= 0 ? vertices[vertex->earlier].size[0] : 0;
+    if (vertex->before >= 0 && vertices[vertex->before].size[0] > *beside) *beside = vertices[vertex->before].size[0];
+    return (2 * vertex->size[0] + vertex->size[1] + 2 * *near + *beside) * 8 / 9;
+}
+
+ATH_INLINE int32_t sign_class(int32_t steps) { return steps < 0 ? 0 : steps > 0 ? 2 : 1; }
+
+/* Its integers, under contexts of those around. */
+ATH_INLINE void code_steps(ath_coder *coder, predicted_model *model, int32_t lattice, predicted_vertex *vertices,
+                           int32_t v, int32_t steps[3])
+{
+    static const int32_t none[3] = {0, 0, 0};
+    predicted_vertex *vertex = vertices + v;
+    const int32_t *signs = vertex->near >= 0 ? vertices[vertex->near].steps : none;
+    uint32_t near, beside, sum = 0, expected = expected_size(vertices, v, &near, &beside);
+    ath_context *moved =
+        &model->moved[size_class(vertex->size[0] + vertex->size[1] / 2)][size_class(near)][beside == 0  ? 0
+                                                                                           : beside < 4 ? 1
+                                                                                                        : 2];
+    if (coder_bit(coder, moved, steps[0] || steps[1] || steps[2])) {
+        for (int32_t k = 0; k < 3; k++) {
+            uint32_t about = k == 0 ? expected : (2 * expected + sum * 16 / (uint32_t)k) / 3;
+            ath_context *sign = &model->sign[sign_class(signs[k])][sign_class(vertex->steps[k])];
+            int32_t parity = lattice ? parity_of(steps, k) : ANY_INTEGER;
+            steps[k] = code_integer(coder, &model->lattice, parity, number_class(about), sign, steps[k]);
+            sum += clipped(steps[k]);
+        }
+        memcpy(vertex->steps, steps, sizeof vertex->steps);
+    } else {
+        steps[0] = steps[1] = steps[2] = 0;
+    }
+    vertex->size[1] = vertex->size[0];
+    vertex->size[0] = sum;
+}
+
+/* Whether the vertices of a stem follow its last one. */
+ATH_INLINE void code_followed(ath_coder *coder, predicted_model *model, predicted_vertex *tip, int followed)
+{
+    tip->followed = coder_bit(coder, &model->followed[tip->followed][model->last_followed], followed);
+    model->last_followed = tip->followed;
+}
+
+/* ---- what follows what ---- */
+
+/* Of the table of vertices by where they are at rest: a power of two. */
+ATH_INLINE uint32_t twin_places(int32_t vertex_count)
+{
+    uint32_t places = 16;
+    while (places < 2 * (uint32_t)vertex_count) places *= 2;
+    return places;
+}
+
+/* The vertex that was last seen in this one's cell, -1: none; from now on it is this one. */
+static int32_t take_place(const double *rest, int32_t *last, uint32_t places, double width, int32_t v)
+{
+    int32_t cell[3], same = 1;
+    for (size_t k = 0; k < 3; k++) cell[k] = steps_in(rest[3 * (size_t)v + k], width, 0.5);
+    uint32_t hash = (uint32_t)cell[0] * 73856093u + (uint32_t)cell[1] * 19349663u + (uint32_t)cell[2] * 83492791u;
+    int32_t *place = last + ((hash ^ hash >> 15) & (places - 1)), before = *place;
+    *place = v;
+    if (before < 0) return -1;
+    for (size_t k = 0; k < 3; k++) same = same && steps_in(rest[3 * (size_t)before + k], width, 0.5) == cell[k];
+    return same ? before : -1;
+}
+
+/* ---- a segment ---- */
+
+enum { AROUND = 5 };
+
+/* A segment on its way. Positions: frames x vertex_count x 3 as they are put out, float or (is_float64) double. */
+typedef struct {
+    predicted_model model;
+    ath_predicted_head head;
+    predicted_vertex *vertices;
+    double *memory[AROUND];
+    int32_t *last; /* vertices by their cells, or the first ones of stems by how long these are */
+    const double *rest, *origin;
+    void *positions;
+    int32_t is_float64, vertex_count, frame;
+    int32_t about[ATH_SEGMENT_FRAMES]; /* the frame that each was coded about, -1: the rest pose */
+    predicted_frames around;
+} prediction;
+
+static uint64_t carve_prediction(prediction *p, int32_t vertex_count, uint8_t *base)
+{
+    ath_arena arena = {base, 0};
+    uint64_t vertices = (uint64_t)vertex_count;
+    ath_take(&arena, sizeof *p);
+    p->vertices = (predicted_vertex *)ath_take(&arena, vertices * sizeof(predicted_vertex));
+    for (int32_t i = 0; i < AROUND; i++) p->memory[i] = (double *)ath_take(&arena, vertices * 3 * sizeof(double));
+    p->last = (int32_t *)ath_take(&arena, twin_places(vertex_count) * sizeof(int32_t));
+    return arena.used;
+}
+
+/* Stems in file order, the ends of each before the others: the first vertex of a stem that hangs on nothing, the last of
+ * any. A vertex follows the one before it, the first and the last one the attach vertex. */
+static void follow_stems(prediction *p, const ath_branch *branches, int32_t branch_count)
+{
+    int32_t tip_before = -1, first_before = -1, earlier = -1;
+    for (int32_t i = 0; i <= p->vertex_count; i++) p->last[i] = -1;
+    for (int32_t b = 0; b < branch_count; b++) {
+        const ath_branch *branch = branches + b;
+        int32_t like = p->last[branch->count], first = branch->first, tip = first + branch->count - 1;
+        int32_t ends = branch->attach < 0 && tip > first ? 2 : 1, base = ends == 2 ? first : branch->attach;
+        p->last[branch->count] = first;
+        for (int32_t i = 0; i < branch->count; i++) {
+            int32_t v = i == ends - 1 ? tip : i < ends ? first : first + i - 1;
+            predicted_vertex *vertex = p->vertices + v;
+            vertex->before = v == first ? branch->attach : i < ends ? base : v - 1;
+            vertex->near = i < ends ? tip_before : v == first ? first_before : v - 1;
+            vertex->tip = i < ends ? -1 : tip;
+            vertex->base = v == base ? -1 : base;
+            vertex->like = like >= 0 ? like + (v - first) : -1;
+            vertex->earlier = earlier;
+            vertex->next = -1;
+            if (earlier >= 0) p->vertices[earlier].next = v;
+            earlier = v;
+        }
+        p->vertices[tip].leads = branch->count > ends;
+        tip_before = tip;
+        if (branch->count > 1) first_before = first;
+    }
+}
+
+/* A vertex that lies where an earlier one does, and not where the one that it follows does, follows that. */
+static void follow_twins(prediction *p)
+{
+    double width = p->head.step * 0.00390625;
+    uint32_t places = twin_places(p->vertex_count);
+    for (uint32_t i = 0; i < places; i++) p->last[i] = -1;
+    for (int32_t v = 0; v >= 0; v = p->vertices[v].next) {
+        predicted_vertex *vertex = p->vertices + v;
+        int32_t twin = take_place(p->rest, p->last, places, width, v), joined = vertex->before >= 0;
+        for (size_t k = 0; k < 3 && joined; k++)
+            joined = steps_in(p->rest[3 * (size_t)vertex->before + k], width, 0.5)
+                     == steps_in(p->rest[3 * (size_t)v + k], width, 0.5);
+        if (twin >= 0 && !joined) vertex->before = vertex->near = twin;
+    }
+}
+
+/* Its arrays and its head are there. */
+static void start_prediction(prediction *p, const ath_plan *plan, const double *origin, int is_float64, void *positions)
+{
+    p->rest = plan->rest;
+    p->origin = origin;
+    p->positions = positions;
+    p->is_float64 = is_float64;
+    p->vertex_count = plan->vertex_count;
+    predicted_model_init(&p->model);
+    p->frame = 0;
+    memset(p->vertices, 0, (size_t)p->vertex_count * sizeof *p->vertices);
+    follow_stems(p, plan->branches, plan->branch_count);
+    follow_twins(p);
+    for (int32_t v = 0; v < p->vertex_count; v++) {
+        predicted_vertex *vertex = p->vertices + v;
+        vertex->above = vertex->before >= 0 ? p->vertices[vertex->before].before : -1;
+        memcpy(vertex->line, p->rest + 3 * (size_t)v, sizeof vertex->line);
+        memcpy(vertex->mean, p->rest + 3 * (size_t)v, sizeof vertex->mean);
+    }
+}
+
+/* Positions of a frame, -1 and before: the rest pose. */
+static const double *known_frame(const prediction *p, int32_t frame, double *memory)
+{
+    size_t numbers = 3 * (size_t)p->vertex_count, at = numbers * (size_t)ath_max(frame, 0);
+    if (frame < 0) return p->rest;
+    for (size_t i = 0; i < numbers; i++) {
+        double x =
+            p->is_float64 ? ((const double *)p->positions)[at + i] : (double)((const float *)p->positions)[at + i];
+        memory[i] = x - p->origin[i % 3];
+    }
+    return memory;
+}
+
+static void put_out(const prediction *p, size_t at, size_t k, double x)
+{
+    if (p->is_float64)
+        ((double *)p->positions)[at + k] = x + p->origin[k];
+    else
+        ((float *)p->positions)[at + k] = (float)(x + p->origin[k]);
+}
+
+ATH_INLINE double put_back(const prediction *p, size_t at, size_t k)
+{
+    double x = p->is_float64 ? ((const double *)p->positions)[at + k] : (double)((const float *)p->positions)[at + k];
+    return x - p->origin[k];
+}
+
+static void copy_frame(prediction *p, int32_t from)
+{
+    size_t numbers = 3 * (size_t)p->vertex_count, at = numbers * (size_t)p->frame;
+    size_t number = p->is_float64 ? sizeof(double) : sizeof(float);
+    uint8_t *positions = (uint8_t *)p->positions;
+    if (from >= 0) {
+        memcpy(positions + at * number, positions + numbers * (size_t)from * number, numbers * number);
+        return;
+    }
+    for (size_t i = 0; i < numbers; i++) put_out(p, at + i - i % 3, i % 3, p->rest[i]);
+}
+
+static int32_t about(const prediction *p, int32_t frame) { return frame < 0 ? -1 : p->about[frame]; }
+
+/* What a frame is coded about. Returns 0 where that is not valid; `copied`: then it has no vertices coded. */
+static int start_frame(ath_coder *coder, prediction *p, int *copied, int32_t distance)
+{
+    if (!code_reference(coder, &p->model, p->frame, copied, &distance)) return 0;
+    int32_t from = p->frame - distance;
+    p->about[p->frame] = *copied ? about(p, from) : from;
+    if (*copied) {
+        copy_frame(p, from);
+        return 1;
+    }
+    for (int32_t i = 0; i < 3; i++, from = about(p, from)) p->around.was[i] = known_frame(p, from, p->memory[i]);
+    p->around.last = distance == 1 ? p->around.was[0] : known_frame(p, p->frame - 1, p->memory[3]);
+    p->around.rest = p->rest;
+    p->around.now = p->memory[4];
+    return 1;
+}
+
+/* What an integer counts. */
+ATH_INLINE double unit_of(const ath_predicted_head *head)
+{
+    return head->lattice ? LATTICE_UNIT * head->step : head->step;
+}
+
+/* Where so many steps take a vertex, put out and in `now`. */
+static void place_vertex(prediction *p, int32_t v, const predicted_way *way, const int32_t steps[3])
+{
+    size_t from = 3 * (size_t)v, at = 3 * (size_t)p->vertex_count * (size_t)p->frame + from;
+    double unit = unit_of(&p->head);
+    for (size_t k = 0; k < 3; k++) {
+        put_out(p, at, k, p->around.was[0][from + k] + way->way[k] + (double)steps[k] * unit);
+        p->around.now[from + k] = put_back(p, at, k);
+    }
+}
+
+ATH_INLINE int follows(const prediction *p, int32_t v)
+{
+    int32_t tip = p->vertices[v].tip;
+    return tip >= 0 && p->vertices[tip].followed;
+}
+
+/* Puts out a vertex that lies between the ends of its stem as it does at rest. */
+static void follow_ends(prediction *p, int32_t v, double scale)
+{
+    size_t from = 3 * (size_t)v, u = 3 * (size_t)p->vertices[v].base;
+    size_t at = 3 * (size_t)p->vertex_count * (size_t)p->frame + from;
+    for (size_t k = 0; k < 3; k++) {
+        double x = p->around.now[u + k] + scale * (p->rest[from + k] - p->rest[u + k]);
+        put_out(p, at, k, is_number(x) ? x : p->around.was[0][from + k]);
+        p->around.now[from + k] = put_back(p, at, k);
+    }
+}
+
+static void follow(prediction *p, int32_t v)
+{
+    predicted_vertex *vertex = p->vertices + v;
+    follow_ends(p, v, stem_scale(&p->around, vertex, v, p->head.step));
+    vertex->size[1] = vertex->size[0];
+    vertex->size[0] = 0;
+}
+
+#endif

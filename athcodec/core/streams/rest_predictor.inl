@@ -1,0 +1,215 @@
+/* Where the vertices that are coded one by one are expected, learned from those before (FORMAT.md, "Single
+ * vertices"). Offsets are in units of the lattice, from the vertex before. */
+#ifndef ATH_REST_PREDICTOR_H
+#define ATH_REST_PREDICTOR_H
+
+#include "bits/lattice.inl"
+
+#define REST_FORGET (1.0 / 2048.0)
+
+enum {
+    REST_TERMS = 10,
+    REST_OWN_TERMS = 8,
+    REST_GUESSES = 9,
+    REST_OWN_GUESSES = 7,
+    REST_PHASES = 256,
+    REST_FILTERS = 6
+};
+
+/* Weights of the terms, found by recursive least squares, the same for all axes. */
+typedef struct {
+    double weight[REST_TERMS], spread[REST_TERMS][REST_TERMS], noise;
+} rest_filter;
+
+/* What the last vertices of a kind left: mean squared errors of the guesses, mean magnitudes of the integers. */
+typedef struct {
+    double error[REST_GUESSES][3];
+    uint32_t mean[3];
+} rest_memory;
+
+typedef struct {
+    rest_filter filters[REST_FILTERS];
+    rest_memory all, phases[REST_PHASES]; /* of all vertices, and by their place within the lag */
+    double increments[REST_PHASES][3];
+} rest_predictor;
+
+/* Of one vertex. */
+typedef struct {
+    rest_filter *filter;
+    rest_memory *phase;
+    double *increment;
+    double base[3], terms[REST_TERMS][3], guesses[REST_GUESSES][3];
+    int32_t term_count, guess_count;
+} rest_guess;
+
+/* The last but two of the guesses is a bad one, as a rule, and the last two know the layer before. */
+static void rest_memory_init(rest_memory *memory)
+{
+    for (int32_t k = 0; k < 3; k++) {
+        for (int32_t g = 0; g < REST_GUESSES; g++) memory->error[g][k] = g < 6 ? 32.0 : g == 6 ? 128.0 : 4.0;
+        memory->mean[k] = 128;
+    }
+}
+
+static void rest_predictor_init(rest_predictor *predictor)
+{
+    memset(predictor, 0, sizeof *predictor);
+    for (int32_t f = 0; f < REST_FILTERS; f++) {
+        for (int32_t j = 0; j < REST_TERMS; j++) predictor->filters[f].spread[j][j] = 1.0;
+        predictor->filters[f].weight[3] = 1.0;
+        predictor->filters[f].noise = 16.0;
+    }
+    rest_memory_init(&predictor->all);
+    for (int32_t p = 0; p < REST_PHASES; p++) rest_memory_init(&predictor->phases[p]);
+}
+
+/* Vertex j of a stem; -1 is its attach vertex. Null where there is none. */
+ATH_INLINE const double *rest_on_stem(const ath_branch *branch, const double *rest, int32_t j)
+{
+    if (j >= 0) return rest + 3 * (size_t)(branch->first + j);
+    return j == -1 && branch->attach >= 0 ? rest + 3 * (size_t)branch->attach : 0;
+}
+
+ATH_INLINE void rest_term(double term[3], const double *from, const double *to, double per_unit)
+{
+    for (int32_t k = 0; k < 3; k++) term[k] = from && to ? (to[k] - from[k]) * per_unit : 0.0;
+}
+
+ATH_INLINE int rest_is_far(double units) { return !(units > -1e9 && units < 1e9); }
+
+static void rest_guess_all(const rest_filter *filter, rest_guess *at)
+{
+    for (int32_t k = 0; k < 3; k++) {
+        double sum = 0.0;
+        for (int32_t j = 0; j < at->term_count; j++) sum = sum + filter->weight[j] * at->terms[j][k];
+        at->guesses[0][k] = 0.0;
+        at->guesses[1][k] = at->terms[0][k];
+        at->guesses[2][k] = at->terms[3][k];
+        at->guesses[3][k] = at->terms[5][k];
+        at->guesses[4][k] = at->terms[5][k] + at->terms[6][k];
+        at->guesses[5][k] = rest_is_far(sum) ? 0.0 : sum;
+        at->guesses[6][k] = at->terms[7][k];
+        at->guesses[7][k] = at->terms[8][k];
+        at->guesses[8][k] = at->terms[9][k];
+    }
+}
+
+/* `before`: the rest pose of the layer before, or null. */
+static void rest_look_around(rest_predictor *predictor, const ath_branch *branch, const double *rest,
+                             const double *before, int32_t i, double per_unit, rest_guess *at)
+{
+    static const double origin[3] = {0.0, 0.0, 0.0};
+    int32_t lag = branch->lag > 1 ? branch->lag : 1, back = i >= lag && lag > 1 ? i - lag : -2,
+            phase = i % lag % (REST_PHASES - 1);
+    const double *base = rest_on_stem(branch, rest, i - 1), *row = rest_on_stem(branch, rest, back);
+    at->filter = predictor->filters + (i == 0 ? 0 : lag <= 4 ? 1 + i % lag : REST_FILTERS - 1);
+    at->phase = predictor->phases + (i == 0 ? 0 : 1 + phase);
+    at->increment = predictor->increments[i == 0 ? 0 : 1 + phase];
+    for (int32_t j = 0; j < 3; j++)
+        rest_term(at->terms[j], rest_on_stem(branch, rest, i - j - 2), rest_on_stem(branch, rest, i - j - 1), per_unit);
+    if (i >= lag)
+        rest_term(at->terms[3], rest_on_stem(branch, rest, i - lag - 1), row, per_unit);
+    else
+        memcpy(at->terms[3], at->increment, sizeof at->terms[3]);
+    if (!base) base = origin;
+    rest_term(at->terms[4], row, lag > 1 ? rest_on_stem(branch, rest, back + 1) : 0, per_unit);
+    rest_term(at->terms[5], base, row, per_unit);
+    rest_term(at->terms[6], row && i >= 2 * (int64_t)lag ? rest_on_stem(branch, rest, i - 2 * lag) : 0, row, per_unit);
+    rest_term(at->terms[7], base, origin, per_unit);
+    if (before) {
+        const double *known = rest_on_stem(branch, before, i), *known_base = rest_on_stem(branch, before, i - 1);
+        rest_term(at->terms[8], base, known, per_unit);
+        rest_term(at->terms[9], known_base ? known_base : origin, known, per_unit);
+    } else {
+        memset(at->terms + REST_OWN_TERMS, 0, sizeof at->terms[0] * (REST_TERMS - REST_OWN_TERMS));
+    }
+    at->term_count = before ? REST_TERMS : REST_OWN_TERMS;
+    at->guess_count = before ? REST_GUESSES : REST_OWN_GUESSES;
+    memcpy(at->base, base, sizeof at->base);
+    rest_guess_all(at->filter, at);
+}
+
+/* A mean of the guesses in which those that were good hereabouts count by far the most; on each axis of its own. */
+static double rest_expected(const rest_memory *all, const rest_guess *at, int32_t k)
+{
+    double sum = 0.0, weights = 0.0, error[REST_GUESSES], least = 0.0;
+    for (int32_t g = 0; g < at->guess_count; g++) {
+        error[g] = (all->error[g][k] + 0.05) * (at->phase->error[g][k] + 0.05);
+        if (g == 0 || error[g] < least) least = error[g];
+    }
+    for (int32_t g = 0; g < at->guess_count; g++) {
+        double weight = least / error[g];
+        weight = weight * weight;
+        weight = weight * weight;
+        sum = sum + weight * at->guesses[g][k];
+        weights = weights + weight;
+    }
+    return sum / weights;
+}
+
+/* A large error counts as a larger one than usual. */
+ATH_INLINE void rest_note_error(double *mean, double error, double rate)
+{
+    double most = 4.0 * *mean + 16.0;
+    *mean = *mean + ((error < most ? error : most) - *mean) * rate;
+}
+
+/* A step of recursive least squares. What is older counts less, but only in the direction that is learned from. */
+static void rest_learn_axis(rest_filter *filter, const rest_guess *at, int32_t k, double noise, double offset)
+{
+    double gain[REST_TERMS], known = 0.0, error = offset;
+    int32_t n = at->term_count;
+    for (int32_t j = 0; j < n; j++) {
+        gain[j] = 0.0;
+        for (int32_t l = 0; l < n; l++) gain[j] = gain[j] + filter->spread[j][l] * at->terms[l][k];
+        known = known + gain[j] * at->terms[j][k];
+        error = error - filter->weight[j] * at->terms[j][k];
+    }
+    if (!(known > 0.0)) return;
+    double step = error / (noise + known);
+    double less = (known - REST_FORGET * noise) / (known * (noise + known));
+    for (int32_t j = 0; j < n; j++) {
+        double part = gain[j] * less;
+        filter->weight[j] = filter->weight[j] + gain[j] * step;
+        for (int32_t l = 0; l <= j; l++) {
+            filter->spread[j][l] = filter->spread[j][l] - part * gain[l];
+            filter->spread[l][j] = filter->spread[j][l];
+        }
+    }
+}
+
+/* Notes how good the guesses of a vertex were, which is at `offset`; integers: what was coded for it. */
+static void rest_note(rest_memory *memory, const rest_guess *at, const double offset[3], const int32_t integers[3],
+                      double rate)
+{
+    for (int32_t k = 0; k < 3; k++) {
+        for (int32_t g = 0; g < at->guess_count; g++) {
+            double error = offset[k] - at->guesses[g][k];
+            rest_note_error(&memory->error[g][k], error * error, rate);
+        }
+        memory->mean[k] = averaged(memory->mean[k], integers[k]);
+    }
+}
+
+/* `point`: where the vertex is; `integers`: what was coded for it. */
+static void rest_learn(rest_predictor *predictor, rest_guess *at, double per_unit, const double point[3],
+                       const int32_t integers[3])
+{
+    double offset[3], squares = 0.0, usual, noise;
+    rest_term(offset, at->base, point, per_unit);
+    rest_note(&predictor->all, at, offset, integers, 0.06);
+    rest_note(at->phase, at, offset, integers, 0.1);
+    for (int32_t k = 0; k < 3; k++) {
+        double error = offset[k] - at->guesses[5][k];
+        squares = squares + error * error;
+    }
+    squares = squares / 3.0;
+    usual = 0.3 + at->filter->noise;
+    noise = usual + squares + 0.1 * squares * (squares / usual);
+    for (int32_t k = 0; k < 3; k++) rest_learn_axis(at->filter, at, k, noise, offset[k]);
+    double most = 8.0 * at->filter->noise + 4.0;
+    at->filter->noise = at->filter->noise + ((squares < most ? squares : most) - at->filter->noise) * 0.1;
+    memcpy(at->increment, offset, sizeof offset);
+}
+
+#endif

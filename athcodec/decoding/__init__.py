@@ -1,0 +1,1 @@
+"""Reading of .ath files, which knows nothing of encoding."""

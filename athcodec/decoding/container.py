@@ -1,0 +1,595 @@
+"""Writing an .ath file (FORMAT.md, "File"), and its static data, both ways.
+
+A file is its front, which says what it holds, then the chunks in table order without gaps, so that offsets are never
+stored and cannot disagree. Chunks of the prelude come first, those of the motion by (level, segment, kind),
+other attributes last. The streams inside are written by encoding/streams.py. The C core parses files; only static
+arrays and metadata, which it hands over as stored, are parsed here.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import struct
+from collections.abc import Container, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from typing import Any, BinaryIO
+
+import numpy as np
+import zstandard
+
+from athcodec import _native
+from athcodec._native import MEASURES, SHORT_FLOATS, SHORT_SHIFT, CorePolygons, address, crc32c, lib
+from athcodec.errors import BadChunk, ClipError, FormatError, LimitExceeded
+from athcodec.motion.clip import ClipRange
+
+MAGIC = b"\x89ATH\r\n\x1a\n"
+MAJOR, MINOR, FEATURES = 0, 13, 0
+NO_LEVEL = 255
+STEM_WAVES, NODE_WAVES, BASIS_IN_WAVES, BASIS_AS_SAMPLES = range(4)  # of Basis
+ROTATION_FACTORS = (0, 1, 8)  # by Rotation
+IS_HOST = 4  # Method of REST
+OPTIONAL, KIND_ID = 0x8000, 0x7FFF
+
+HIERARCHY, REST, TIME = 1, 2, 3
+METADATA, FACES, EDGES = OPTIONAL | 4, OPTIONAL | 5, OPTIONAL | 6
+CLIPS = 7
+STEMS, AFFINES, CORRECTIONS, SHAPES, EXACT, REFINED_REST, PREDICTED = 16, 17, 18, 19, 20, 21, 22
+ATTRIBUTE, SOURCE_REST = OPTIONAL | 32, 33
+KIND_NAMES = {
+    HIERARCHY: "HIERARCHY",
+    REST: "REST",
+    TIME: "TIME",
+    METADATA: "METADATA",
+    FACES: "FACES",
+    EDGES: "EDGES",
+    CLIPS: "CLIPS",
+    SOURCE_REST: "SOURCE_REST",
+    STEMS: "STEMS",
+    AFFINES: "AFFINES",
+    CORRECTIONS: "CORRECTIONS",
+    SHAPES: "SHAPES",
+    EXACT: "EXACT",
+    REFINED_REST: "REFINED_REST",
+    PREDICTED: "PREDICTED",
+    ATTRIBUTE: "ATTRIBUTE",
+}
+
+_HEADER = struct.Struct("<8sBBHIII")
+_CHECKSUM = struct.Struct("<I")
+_FRONT_BYTES, _FRONT_BYTES_OF_EACH, _FRONT_BYTES_OF_FRAME = 512, 128, 2
+"""Space for the front stream, of each chunk, each entry of the error table and each frame too: more than it ever takes.
+"""
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What a reader accepts; FORMAT.md, "Limits".
+
+    Attributes
+    ----------
+    chunks, vertices, branches, frames, attributes : int
+        Largest numbers of them.
+    hierarchy_depth : int
+        Branches on each other.
+    table_bytes, metadata_bytes, string_bytes, chunk_bytes, decoded_chunk_bytes : int
+        Largest sizes: of the front and of both tables, of metadata, of a name, of a chunk as stored, of a static array.
+    memory_bytes : int
+        What preparing a segment may take.
+    corners : int
+        Faces and corners of FACES together, and of EDGES.
+    """
+
+    chunks: int = 1 << 20
+    table_bytes: int = 16 << 20
+    metadata_bytes: int = 1 << 20
+    vertices: int = 1 << 26
+    branches: int = 1 << 20
+    frames: int = 1 << 20
+    hierarchy_depth: int = 4096
+    attributes: int = 256
+    string_bytes: int = 4096
+    chunk_bytes: int = 256 << 20
+    decoded_chunk_bytes: int = 256 << 20
+    memory_bytes: int = 2 << 30
+    corners: int = 1 << 26
+
+
+@dataclass
+class Header:
+    """The counts at the front. `max_error` is the promise of the deepest stored level, in scene units; frames and
+    segments are those of all clips."""
+
+    vertex_count: int
+    branch_count: int
+    frame_count: int
+    segment_count: int
+    level_count: int
+    full_level_count: int
+    max_error: float
+    is_float64: bool = False
+    clip_count: int = 1
+    layer_count: int = 1
+    is_predicted: bool = False
+    chunk_count: int = 0
+    file_length: int = 0
+    joins: np.ndarray | None = field(default=None, compare=False)  # (levels, segments) uint8; None: all are 0
+    repeats: np.ndarray | None = field(default=None, compare=False)  # (frames,) bool: like the one before; None: none
+
+
+def is_prelude(kind: Any) -> Any:
+    """Whether chunks of a kind, or of an array of kinds, stand in front of those of the motion."""
+    return (kind & KIND_ID) < 16
+
+
+def is_motion(kind: Any) -> Any:
+    """Whether chunks of a kind, or of an array of kinds, are of a level and a segment: known and reserved ones."""
+    return (kind & KIND_ID) // 16 == 1
+
+
+@dataclass(frozen=True)
+class Chunk:
+    """One entry of the chunk table, with the offset that follows from those before it, and its index in the table of a
+    file that is read."""
+
+    kind: int
+    level: int
+    segment: int
+    length: int
+    checksum: int
+    offset: int = 0
+    index: int = -1
+
+    @property
+    def is_motion(self) -> bool:
+        """Whether the chunk is of a level and a segment."""
+        return bool(is_motion(self.kind))
+
+    def __str__(self) -> str:
+        name = KIND_NAMES.get(self.kind, f"kind {self.kind:#06x}")
+        place = f" of level {self.level}, segment {self.segment}" if self.is_motion else ""
+        return f"chunk {name}{place} at byte {self.offset}"
+
+
+def pack_front(header: Header, chunks: list[Chunk], errors: np.ndarray) -> bytes:
+    """All in front of the chunks; the header gets their count and File_Length.
+
+    errors: (levels, segments, 3) in scene units, of the measures in their order; they are rounded up.
+    """
+    header.chunk_count = len(chunks)
+    stream = _front_stream(header, chunks, short_floats(errors))
+    checksums = b"".join(_CHECKSUM.pack(chunk.checksum) for chunk in chunks)
+    length = _HEADER.size + len(stream) + len(checksums)
+    header.file_length = length + sum(chunk.length for chunk in chunks)
+    blank = _HEADER.pack(MAGIC, MAJOR, MINOR, FEATURES, 0, length, len(chunks))
+    checksum = crc32c(blank + stream + checksums)
+    return _HEADER.pack(MAGIC, MAJOR, MINOR, FEATURES, checksum, length, len(chunks)) + stream + checksums
+
+
+def _front_stream(header: Header, chunks: list[Chunk], errors: np.ndarray) -> bytes:
+    """FORMAT.md, "Front stream"."""
+    names = (name for name, _ in _native.Header._fields_ if hasattr(header, name))
+    counts = _native.Header(**{name: getattr(header, name) for name in names})
+    table = np.zeros(len(chunks), _native.CHUNK)
+    for name in ("length", "segment", "kind", "level"):
+        table[name] = [getattr(chunk, name) for chunk in chunks]
+    space = _FRONT_BYTES + _FRONT_BYTES_OF_EACH * (len(chunks) + errors.size // len(MEASURES))
+    data = np.empty(space + _FRONT_BYTES_OF_FRAME * header.frame_count, np.uint8)
+    entries = header.level_count * header.segment_count
+    announced = address(errors, np.int32, entries * len(MEASURES))
+    joins = np.zeros(entries, np.uint8) if header.joins is None else np.ascontiguousarray(header.joins)
+    widths = address(joins, np.uint8, entries)
+    flags = None if header.repeats is None or not header.repeats.any() else header.repeats.astype(np.uint8)
+    repeats = None if flags is None else address(flags, np.uint8, header.frame_count)
+    size = lib.ath_encode_front(data.ctypes.data, len(data), counts, table.ctypes.data, announced, widths, repeats)
+    assert size >= 0, "every front has a stream, and space enough"
+    return data[:size].tobytes()
+
+
+def short_floats(lengths: np.ndarray) -> np.ndarray:
+    """What the error table stores of lengths, int32: the top bits of binary32, rounded up."""
+    bits = np.ascontiguousarray(_round_up(lengths), np.float32).view(np.uint32)
+    return np.minimum(bits + (1 << SHORT_SHIFT) - 1 >> SHORT_SHIFT, SHORT_FLOATS - 1).astype(np.int32)
+
+
+def from_short_float(stored: int) -> float:
+    """The length of which the error table stores this, scene units."""
+    return float(np.uint32(stored << SHORT_SHIFT).view(np.float32))
+
+
+def _round_up(values: np.ndarray) -> np.ndarray:
+    values = np.asarray(values, np.float64)
+    single = values.astype(np.float32)
+    return np.where(single < values, np.nextafter(single, np.float32(np.inf)), single)
+
+
+def _order(chunk: Chunk) -> tuple[int, ...]:
+    if chunk.is_motion:
+        return (1, chunk.level, chunk.segment, chunk.kind)
+    return (0 if is_prelude(chunk.kind) else 2, chunk.kind & KIND_ID)
+
+
+@dataclass
+class ChunkStore:
+    """Chunks on their way into a file: payloads in a spool, in any order."""
+
+    spool: BinaryIO
+    entries: list[tuple[Chunk, int]] = field(default_factory=list)
+
+    def add(self, kind: int, payload: bytes, level: int = NO_LEVEL, segment: int = 0) -> None:
+        place = self.spool.seek(0, 2)
+        self.spool.write(payload)
+        self.entries.append((Chunk(kind, level, segment, len(payload), crc32c(payload)), place))
+
+    def replace(self, kind: int, payload: bytes) -> None:
+        """Another content for the one chunk of this kind."""
+        self.entries = [(chunk, place) for chunk, place in self.entries if chunk.kind != kind]
+        self.add(kind, payload)
+
+    def size(self, header: Header, errors: np.ndarray) -> int:
+        """Bytes of the whole file."""
+        pack_front(header, sorted((chunk for chunk, _ in self.entries), key=_order), errors)
+        return header.file_length
+
+    def write(self, out: BinaryIO, header: Header, errors: np.ndarray) -> list[Chunk]:
+        """Writes the whole file in its order and returns its chunks."""
+        entries = sorted(self.entries, key=lambda entry: _order(entry[0]))
+        out.write(pack_front(header, [chunk for chunk, _ in entries], errors))
+        chunks = []
+        for chunk, place in entries:
+            chunks.append(replace(chunk, offset=out.tell()))
+            self.spool.seek(place)
+            out.write(self.spool.read(chunk.length))
+        return chunks
+
+
+# ---- heads of the chunks ----------------------------------------------------------------------------------------
+
+_REST = struct.Struct("<B3ff")
+_SOURCE_REST = struct.Struct("<Bf")
+_MESH_CHECKSUM = struct.Struct("<II")
+_TIME = struct.Struct("<B")
+_STEADY = struct.Struct("<dd")
+_RATE = struct.Struct("<H")
+_CLIP = struct.Struct("<IIBB")
+_STEMS = struct.Struct("<fBB")
+_BASIS = struct.Struct("<HBI")
+_CORRECTIONS = struct.Struct("<f")
+_RATIO = struct.Struct("<H")
+_SHIFT = struct.Struct("<B")
+_REFINED_REST = struct.Struct("<f")
+_PREDICTED = struct.Struct("<fB")
+_ARRAY = struct.Struct("<BBHI")
+_POLYGONS = struct.Struct("<II")
+_IS_MIXED, _IS_DERIVED = 8, 16
+
+
+def brief(value: object) -> str:
+    """What a file holds, as an error message shows it."""
+    text = repr(value)
+    return text if len(text) <= 100 else text[:97] + "..."
+
+
+@dataclass
+class Rest:
+    """Head of REST and its stream, which holds the very numbers of the source where `exact`, else steps; where the rest
+    pose `is_host`, a mesh of the host's, its checksum. Where it is `connected` it goes by FACES. Origin and step are
+    numbers of float32."""
+
+    origin: np.ndarray
+    step: float
+    source_dtype: np.dtype
+    stream: bytes = b""
+    exact: bool = False
+    is_host: bool = False
+    connected: bool = False
+
+
+def pack_rest(rest: Rest) -> bytes:
+    method = int(rest.exact) | int(rest.source_dtype == np.float64) << 1 | int(rest.connected) << 3
+    return _REST.pack(IS_HOST if rest.is_host else method, *rest.origin, rest.step) + rest.stream
+
+
+def pack_source_rest(step: float, stream: bytes) -> bytes:
+    return _SOURCE_REST.pack(0, step) + stream
+
+
+def pack_exact_source_rest(stream: bytes) -> bytes:
+    return b"\1" + stream
+
+
+def mesh_checksum(mesh: np.ndarray) -> bytes:
+    """By which a file knows the mesh of a host, (N, 3) in source order."""
+    data = (mesh.astype("<f4") + np.float32(0)).tobytes()  # -0.0 is 0.0
+    return _MESH_CHECKSUM.pack(crc32c(data), crc32c(data[::-1]))
+
+
+def pack_steady_time(*times: np.ndarray) -> bytes | None:
+    """TIME by the rule that gives the very same times in seconds, (T,) float64 for each clip; None where none does."""
+    for method, code in ((3, _RATE), (4, _RATE), (0, _STEADY), (1, _STEADY)):
+        rules = [_steady_rule(method, time) for time in times]
+        if None not in rules:
+            return _TIME.pack(method) + b"".join(code.pack(*rule) for rule in rules)
+    return None
+
+
+def _steady_rule(method: int, time: np.ndarray) -> tuple[float, ...] | None:
+    """What the method stores of the times, if they are these."""
+    if method < 2:
+        step = _steady_step(method, time)
+        return None if step is None else (float(time[0]), step)
+    rate = round(1 / float(time[1])) if len(time) > 1 and float(time[1]) > 1e-5 else 1
+    index = np.arange(len(time))
+    same = 0 < rate < 65536 and ((index / rate if method == 3 else index * (1 / rate)) == time).all()
+    return (rate,) if same else None
+
+
+def _steady_step(method: int, time: np.ndarray) -> float | None:
+    if len(time) == 1:
+        return 1.0
+    index, first = np.arange(len(time)), float(time[0])
+    steps = {(float(time[-1]) - first) / (len(time) - 1), float(time[1]) - first}
+    if method == 1:
+        steps = {round(1 / step * 1000) / 1000 for step in steps if step > 1e-300} - {0.0}
+    with np.errstate(over="ignore", invalid="ignore"):  # a rule that overflows does not give the times
+        fit = (step for step in steps if (first + (index / step if method else index * step) == time).all())
+        return next(fit, None)
+
+
+def pack_clips(
+    clip_ranges: Sequence[ClipRange],
+    segment_counts: Sequence[int],
+    seams: Sequence[Sequence[float] | None],
+    periodic: bool = False,
+) -> bytes:
+    """CLIPS; seams: for a loop the error at the seam of each level, scene units, rounded up to float32. periodic:
+    whether loops of one segment are coded by periodic waves."""
+    entries = []
+    for clip_range, segments, errors in zip(clip_ranges, segment_counts, seams):
+        name = clip_range.name.encode()
+        flags = clip_range.loop | (clip_range.loop and periodic and segments == 1) << 1
+        entries.append(_CLIP.pack(clip_range.frame_count, segments, flags, len(name)) + name)
+        if clip_range.loop:
+            entries.append(_round_up(errors).astype("<f4").tobytes())
+    return b"".join(entries)
+
+
+def pack_time(stream: bytes) -> bytes:
+    return _TIME.pack(2) + stream
+
+
+@dataclass
+class StemsHead:
+    """Head of STEMS: step, rotation factor (0, 1, 8), Basis (basis_kind), rank and stream of a learned one, the level
+    of the stream whose basis it begins with, and how many half octaves below 1 the largest step of rigid pieces'
+    rotations is (0: there is none)."""
+
+    step: float
+    rotation_step_factor: int
+    basis_kind: int = STEM_WAVES
+    rank: int = 0
+    basis: bytes = b""
+    base: int = NO_LEVEL
+    turn: int = 0
+
+
+def pack_stems(head: StemsHead, stream: bytes) -> bytes:
+    rotation = ROTATION_FACTORS.index(head.rotation_step_factor) | head.turn << 4
+    data = _STEMS.pack(head.step, rotation, head.basis_kind)
+    if head.basis_kind > NODE_WAVES:
+        data += _BASIS.pack(head.rank, head.base, len(head.basis)) + head.basis
+    return data + stream
+
+
+def pack_refined_stems(ratio: int, head: StemsHead, stream: bytes) -> bytes:
+    """ratio: the step of the layer before over that of this one."""
+    return _RATIO.pack(ratio) + pack_stems(head, stream)
+
+
+def pack_refined_shapes(shift: int, stream: bytes) -> bytes:
+    """shift: binary digits that this layer's integers have more than those of the layer before."""
+    return _SHIFT.pack(shift) + stream
+
+
+def pack_refined_rest(step: float, stream: bytes) -> bytes:
+    return _REFINED_REST.pack(step) + stream
+
+
+def pack_predicted(step: float, lattice: bool, stream: bytes) -> bytes:
+    return _PREDICTED.pack(step, lattice) + stream
+
+
+def pack_corrections(step: float, stream: bytes) -> bytes:
+    return _CORRECTIONS.pack(step) + stream
+
+
+# ---- static data --------------------------------------------------------------------------------------------------
+
+_ZSTD_WINDOW = 8 << 20
+_ZSTD_SINGLE_SEGMENT = 0x20
+
+# Types of static arrays: NumPy's letters in the order of FORMAT.md, and the bytes that an element may have.
+_KINDS = "buifS"
+_INTEGER_SIZES = 1, 2, 4, 8
+_KIND_SIZES: dict[str, Container[int]] = {
+    "b": (1,),
+    "u": _INTEGER_SIZES,
+    "i": _INTEGER_SIZES,
+    "f": (2, 4, 8),
+    "S": range(1, (1 << 20) + 1),
+}
+_MOST_DIMENSIONS = 32
+
+
+def _compress(array: np.ndarray) -> bytes:
+    """zstd over the array's bytes, shuffled: all first bytes of the items, then all second bytes, ..."""
+    array = np.ascontiguousarray(array)
+    shuffled = np.frombuffer(array.tobytes(), np.uint8).reshape(-1, array.dtype.itemsize).T.tobytes()
+    return zstandard.ZstdCompressor(level=19, write_content_size=True, write_checksum=False).compress(shuffled)
+
+
+def _decompress(data: bytes, dtype: np.dtype, shape: tuple[int, ...], what: str, limits: Limits) -> np.ndarray:
+    size = math.prod(shape) * dtype.itemsize
+    raw = np.frombuffer(zstd_decompress_exact(data, size, what, limits), np.uint8)
+    return np.frombuffer(raw.reshape(dtype.itemsize, -1).T.tobytes(), dtype).reshape(shape)
+
+
+def _check_window(data: bytes, expected: int, what: str) -> None:
+    """Reads Window_Descriptor (RFC 8878, 3.1.1.1.2) itself: zstd does not tell the largest windows from no frame, and
+    max_window_size does not bind where all is decompressed in one call."""
+    if data[:4] == zstandard.FRAME_HEADER and len(data) > 5 and not data[4] & _ZSTD_SINGLE_SEGMENT:
+        exponent, mantissa = data[5] >> 3, data[5] & 7
+        window = (8 + mantissa) << 7 + exponent
+        if window > max(_ZSTD_WINDOW, expected):
+            raise LimitExceeded(f"{what}: got a zstd window of {window} bytes; the limit is {_ZSTD_WINDOW}")
+
+
+def zstd_decompress_exact(data: bytes, expected: int, what: str, limits: Limits) -> bytes:
+    """One zstd frame that says it holds `expected` bytes and does; anything else raises BadChunk or LimitExceeded."""
+    if expected > limits.decoded_chunk_bytes:
+        raise LimitExceeded(f"{what}: got {expected} bytes; the limit is {limits.decoded_chunk_bytes}")
+    _check_window(data, expected, what)
+    try:
+        if expected == 0 or zstandard.frame_content_size(data) != expected:
+            raise BadChunk(f"{what}: got a zstd frame of another size; expected {expected} bytes")
+        return zstandard.ZstdDecompressor(max_window_size=_ZSTD_WINDOW).decompress(data, allow_extra_data=False)
+    except (zstandard.ZstdError, MemoryError) as error:
+        raise BadChunk(f"{what}: got a zstd frame that does not decode ({error}); expected {expected} bytes") from None
+
+
+def pack_polygons(shape: CorePolygons, stream: bytes) -> bytes:
+    """FACES or EDGES of this shape."""
+    types = bytes([shape.index_type | _IS_MIXED * shape.is_mixed] + [shape.count_type] * shape.is_mixed)
+    return types + _POLYGONS.pack(shape.face_count, shape.corner_count if shape.is_mixed else shape.columns) + stream
+
+
+def pack_derived_edges(index_type: int) -> bytes:
+    """EDGES that follow from the branches, of an integer type (polygons.type_code)."""
+    return bytes([index_type | _IS_DERIVED])
+
+
+def pack_array(name: str, array: np.ndarray) -> bytes:
+    """A named static array of numbers, booleans or texts, of any shape.
+
+    Raises ClipError for what no reader would accept.
+    """
+    what, limits = f"array {brief(name)}", Limits()
+    if array.nbytes > limits.decoded_chunk_bytes:  # before it is compressed
+        raise ClipError(f"{what}: got {array.nbytes} bytes; the limit is {limits.decoded_chunk_bytes}")
+    with _refusals(what):
+        text = name.encode()
+        head = _ARRAY.pack(_KINDS.index(array.dtype.kind), array.ndim, len(text), array.dtype.itemsize)
+        shape = struct.pack(f"<{array.ndim}I", *array.shape)
+        packed = head + shape + text + (_compress(array) if array.size else b"")
+        parse_array(packed, what, limits)
+    return packed
+
+
+@contextmanager
+def _refusals(what: str) -> Iterator[None]:
+    """What a reader would refuse of something that is being written is the source's fault: ClipError."""
+    try:
+        yield
+    except FormatError as error:
+        raise ClipError(str(error)) from None
+    except (TypeError, ValueError, RecursionError, struct.error) as error:
+        raise ClipError(f"{what}: {error}; expected plain data that a file can hold") from None
+
+
+def parse_array(data: bytes, what: str, limits: Limits) -> tuple[str, np.ndarray]:
+    """Name and array of ATTRIBUTE."""
+    if len(data) < _ARRAY.size:
+        raise BadChunk(f"{what}: got {len(data)} bytes; expected at least {_ARRAY.size}")
+    code, dimensions, length, size = _ARRAY.unpack_from(data)
+    start = _ARRAY.size + 4 * dimensions
+    if start + length > len(data):
+        raise BadChunk(f"{what}: got a head of {start + length} bytes; expected at most what the chunk holds")
+    dtype = _array_type(code, size, what)
+    shape, body = struct.unpack_from(f"<{dimensions}I", data, _ARRAY.size), data[start + length :]
+    name = _array_name(data[start : start + length], what, limits)
+    if dimensions > _MOST_DIMENSIONS:
+        raise BadChunk(f"{what}: got {dimensions} dimensions; expected at most {_MOST_DIMENSIONS}")
+    if math.prod(n or 1 for n in shape) * size > limits.decoded_chunk_bytes:
+        raise LimitExceeded(f"{what}: got shape {shape}; the limit is {limits.decoded_chunk_bytes} bytes")
+    if math.prod(shape):
+        return name, _decompress(body, dtype, shape, what, limits)
+    if body:
+        raise BadChunk(f"{what}: got {len(body)} bytes behind an array without elements; expected none")
+    return name, np.zeros(shape, dtype)
+
+
+def _array_type(code: int, size: int, what: str) -> np.dtype:
+    """Of Type and Item_Bytes."""
+    if code >= len(_KINDS) or size not in _KIND_SIZES[_KINDS[code]]:
+        raise BadChunk(f"{what}: got type {code} of {size} bytes; expected numbers, booleans or texts")
+    return np.dtype(f"<{_KINDS[code]}{size}")
+
+
+def _array_name(text: bytes, what: str, limits: Limits) -> str:
+    if len(text) > limits.string_bytes:
+        raise LimitExceeded(f"{what}: got a name of {len(text)} bytes; the limit is {limits.string_bytes}")
+    try:
+        name = text.decode()
+    except UnicodeDecodeError:
+        name = ""
+    if not name:
+        raise BadChunk(f"{what}: got name {brief(text)}; expected text")
+    return name
+
+
+def pack_metadata(metadata: dict) -> bytes:
+    """JSON, zstd-compressed where that is shorter. Raises ClipError for what no reader would accept."""
+    with _refusals("metadata"):
+        text = json.dumps(metadata, separators=(",", ":"), ensure_ascii=False, allow_nan=False).encode()
+        shorter = zstandard.ZstdCompressor(level=19, write_content_size=True).compress(text)
+        packed = b"\1" + shorter if len(shorter) < len(text) else b"\0" + text
+        parse_metadata(packed, Limits())
+    return packed
+
+
+def parse_metadata(data: bytes, limits: Limits) -> dict:
+    if not data or data[0] > 1:
+        raise BadChunk("METADATA: got an unknown method; expected 0 or 1")
+    text = data[1:]
+    if data[0] == 1:
+        _check_window(text, 0, "METADATA")
+        try:
+            size = zstandard.frame_content_size(text)
+        except zstandard.ZstdError:
+            size = 0
+        if size <= 0:
+            raise BadChunk("METADATA: got a zstd frame that does not say its size; expected one that does")
+        if size > limits.metadata_bytes:
+            raise LimitExceeded(f"METADATA: got {size} bytes; the limit is {limits.metadata_bytes}")
+        text = zstd_decompress_exact(text, size, "METADATA", limits)
+    if len(text) > limits.metadata_bytes:
+        raise LimitExceeded(f"METADATA: got {len(text)} bytes; the limit is {limits.metadata_bytes}")
+    return _parse_json(text, "METADATA")
+
+
+def _parse_json(text: bytes, what: str) -> dict:
+    try:
+        value = json.loads(text.decode(), object_pairs_hook=_unique, parse_constant=_refuse, parse_float=_finite)
+        json.dumps(value, ensure_ascii=False).encode()  # lone surrogates
+    except (ValueError, RecursionError):
+        value = None
+    if not isinstance(value, dict):
+        raise BadChunk(f"{what}: got {text[:40]!r}; expected a JSON object")
+    return value
+
+
+def _unique(pairs: list) -> dict:
+    if len(dict(pairs)) < len(pairs):
+        raise ValueError("a key twice")
+    return dict(pairs)
+
+
+def _refuse(constant: str):
+    raise ValueError(constant)
+
+
+def _finite(number: str) -> float:
+    if not math.isfinite(float(number)):
+        raise ValueError(number)
+    return float(number)

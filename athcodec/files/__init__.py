@@ -1,0 +1,1 @@
+"""Files as bytes: opening, replacing, fetching; it knows nothing of plants."""

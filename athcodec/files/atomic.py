@@ -1,0 +1,332 @@
+"""Files that take their name only when they are whole, and what dead writers have left of theirs.
+
+An older file is replaced only where it holds what the new one holds, or nothing, and is no input.
+
+A file is written beside its target as `.NAME.XXXXXXXX.part`, under a lock that the system drops when the
+writer dies, and then renamed. Whoever next writes to the same target removes the pending files that nobody holds any
+more. Where a file system has no locks, those of dead writers stay: one of a living writer is never removed.
+"""
+
+from __future__ import annotations
+
+import errno
+import io
+import os
+import re
+import secrets
+import shutil
+import stat
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager, suppress
+from contextvars import ContextVar
+from typing import BinaryIO
+
+from athcodec.files.kinds import UNKNOWN, kind_by_suffix, kind_of
+
+try:
+    import fcntl
+except ImportError:  # Windows, where nobody can remove a file that another has open
+    fcntl = None
+
+FileId = tuple[int, int]
+NAME_CHARACTERS = 50  # of the target in the pending file's name: a name of the longest length has room for the rest too
+PLAIN_OPEN = getattr(os, "O_CLOEXEC", 0) | getattr(os, "O_BINARY", 0)
+
+_PENDING_NAME = re.compile(r"(\..*\.)[0-9a-f]{8}\.part", re.DOTALL)
+_URL = re.compile(r"[a-z][a-z0-9+.-]+(://|::)", re.IGNORECASE)
+_inputs: ContextVar[frozenset[FileId]] = ContextVar("_inputs", default=frozenset())
+
+
+def file_id(file: str | os.PathLike[str] | int) -> FileId:
+    """What a file has in common under all its names: device and inode. Raises OSError."""
+    status = os.stat(file)
+    return status.st_dev, status.st_ino
+
+
+def file_ids(*paths: str | os.PathLike[str] | None) -> frozenset[FileId]:
+    """The same of those paths that are files; URLs and others are left out."""
+    return frozenset(file_id(path) for path in paths if path is not None and os.path.isfile(path))
+
+
+@contextmanager
+def keeping(inputs: Iterable[FileId]) -> Iterator[None]:
+    """Refuse to replace these files in the block, under whatever name."""
+    token = _inputs.set(_inputs.get().union(inputs))
+    try:
+        yield
+    finally:
+        _inputs.reset(token)
+
+
+def check_target(path: str | os.PathLike[str], suffix: str = "") -> str:
+    """The file that `path` names, behind any links. Raises OSError where nothing can be written there: the
+    directory is missing or read-only, `path` is one, no plain file, a read-only one, an input, or not of the kind that
+    this suffix promises."""
+    path = os.fspath(path)
+    target = os.path.realpath(path)
+    directory = os.path.dirname(target if os.path.islink(path) else path) or "."
+    if not os.path.isdir(directory):
+        raise FileNotFoundError(f"{path}: the directory {directory} does not exist")
+    if not os.access(directory, os.W_OK | os.X_OK):
+        raise PermissionError(f"{path}: the directory {directory} is read-only")
+    try:
+        mode = os.stat(target).st_mode
+    except FileNotFoundError:
+        return target
+    if stat.S_ISDIR(mode):
+        raise IsADirectoryError(f"{path}: got a directory, expected a file name")
+    if not stat.S_ISREG(mode):
+        raise FileExistsError(f"{path}: got a device, pipe or socket, expected a plain file")
+    if not os.access(target, os.W_OK):
+        raise PermissionError(f"{path}: is read-only")
+    _check_replaceable(path, kind_by_suffix(suffix))
+    return target
+
+
+def _check_replaceable(path: str, kind: str | None) -> None:
+    """FileExistsError where a file is there that is an input, or that holds anything but this kind; None: any kind."""
+    if not os.path.exists(path):
+        return
+    if file_id(path) in _inputs.get():
+        raise FileExistsError(f"{path}: is the input, or a file that belongs to it; choose another output name")
+    found = kind_of(path) if kind is not None and os.path.getsize(path) else kind
+    if found != kind or found == UNKNOWN:
+        raise FileExistsError(
+            f"{path}: is there already and holds {found}, expected {kind}; choose another output name, or remove it "
+            "first"
+        )
+
+
+def is_url(path: object) -> bool:
+    """Whether a path is one for remote.py."""
+    return isinstance(path, str) and _URL.match(path) is not None
+
+
+class PendingFile:
+    """A file on its way to `path`: it is written as `name`, beside it, until it is complete; `descriptor` is
+    open.
+
+    It has the permissions of the file that it replaces, or those of any new file. Raises OSError.
+    """
+
+    def __init__(self, path: str | os.PathLike[str]):
+        self.path = check_target(path)
+        remove_leftovers(self.path)
+        self.name, self.descriptor = _locked_new_file(self.path)
+        try:
+            _take_permissions(self.path, self.descriptor)
+        except BaseException:
+            self.discard()
+            raise
+
+    def complete(self) -> None:
+        """Gives the file its name, in place of an older one, once its bytes are on the disk."""
+        _check_replaceable(self.path, kind_of(self.name))
+        try:
+            os.fsync(self.descriptor)
+            if fcntl is None:
+                self._close()  # Windows renames no open files
+            os.replace(self.name, self.path)
+        except OSError as error:
+            raise OSError(error.errno, error.strerror, self.path) from None
+        with suppress(OSError):  # its bytes are on the disk, under its name
+            self._close()
+        _sync_folder(os.path.dirname(self.path))
+
+    def discard(self) -> None:
+        """Removes what has been written."""
+        if fcntl is None:
+            self._close()
+        with suppress(OSError):  # it is gone, or the next writer removes it
+            os.unlink(self.name)
+        with suppress(OSError):
+            self._close()
+
+    def _close(self) -> None:
+        descriptor, self.descriptor = self.descriptor, -1
+        if descriptor >= 0:
+            os.close(descriptor)
+
+
+class _Naming(io.FileIO):
+    """The bytes of a pending file, whose errors name the file that it becomes."""
+
+    def __init__(self, pending: PendingFile):
+        super().__init__(pending.descriptor, "w+", closefd=False)
+        self._path = pending.path
+
+    def write(self, data) -> int | None:
+        try:
+            return super().write(data)
+        except OSError as error:
+            raise OSError(error.errno, error.strerror, self._path) from None
+
+    def truncate(self, size: int | None = None) -> int:
+        try:
+            return super().truncate(size)
+        except OSError as error:
+            raise OSError(error.errno, error.strerror, self._path) from None
+
+
+@contextmanager
+def new_file(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
+    """A file that replaces `path` when the block ends, and leaves nothing behind when it raises. Raises
+    OSError."""
+    pending = PendingFile(path)
+    try:
+        with io.BufferedRandom(_Naming(pending)) as out:
+            yield out
+        pending.complete()
+    except BaseException:
+        pending.discard()
+        raise
+
+
+@contextmanager
+def new_files(path: str | os.PathLike[str], named: bool = True) -> Iterator[str]:
+    """A folder for files that belong together. When the block ends they move beside `path`, the one of that name last,
+    in place of older ones; nothing is left behind when it raises. One of them must have that name, unless `named` is
+    False. Raises OSError."""
+    path = check_target(path)
+    directory, name = os.path.split(path)
+    with scratch_folder(path) as folder:
+        yield folder
+        made = sorted(os.listdir(folder), key=lambda file: (file == name, file))
+        if named and name not in made:
+            raise FileNotFoundError(f"{path}: the writer has made no such file")
+        for file in made:
+            _check_replaceable(os.path.join(directory, file), kind_of(os.path.join(folder, file)))
+        for file in made:
+            os.replace(os.path.join(folder, file), os.path.join(directory, file))
+        _sync_folder(directory)
+
+
+@contextmanager
+def new_folder(path: str | os.PathLike[str]) -> Iterator[str]:
+    """A folder that becomes `path` when the block ends, whole; nothing is left behind when it raises. Nothing that
+    exists is replaced. Raises OSError."""
+    path = check_target(path)
+    if os.path.lexists(path):
+        raise FileExistsError(f"{path}: exists, expected the name of a new folder")
+    with scratch_folder(path) as folder:
+        yield folder
+        os.rename(folder, path)
+        _sync_folder(os.path.dirname(path))
+
+
+@contextmanager
+def scratch_folder(path: str) -> Iterator[str]:
+    """A locked folder beside `path`, removed with all that is still in it when the block ends. An OSError that names no
+    file names `path`."""
+    remove_leftovers(path)
+    directory, name = os.path.split(path)
+    folder = os.path.join(directory, f"{_prefix(name)}{secrets.token_hex(4)}.part")
+    os.mkdir(folder)
+    lock = _locked_folder(folder)
+    try:
+        yield folder
+    except OSError as error:
+        if error.filename is not None or error.errno is None:
+            raise
+        raise OSError(error.errno, error.strerror, path) from None
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+        if lock >= 0:
+            os.close(lock)
+
+
+def _sync_folder(folder: str) -> None:
+    """A name that was given is kept where the power fails: it is on the disk once its folder is."""
+    if fcntl is None:
+        return  # Windows opens no folders
+    with suppress(OSError):  # a folder that cannot be read, a file system that syncs none: the file itself is whole
+        descriptor = os.open(folder or ".", os.O_RDONLY | PLAIN_OPEN)
+        try:
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)
+
+
+def _locked_folder(folder: str) -> int:
+    if fcntl is None:
+        return -1
+    descriptor = os.open(folder, os.O_RDONLY | PLAIN_OPEN)
+    with suppress(OSError):  # a file system without locks
+        fcntl.flock(descriptor, fcntl.LOCK_EX)
+    return descriptor
+
+
+def remove_leftovers(path: str) -> None:
+    """Removes what writers that have died, and only those, left of files on their way to `path`."""
+    directory, name = os.path.split(path)
+    remove_leftovers_of(directory, [name])
+
+
+def remove_leftovers_of(directory: str, names: Iterable[str]) -> None:
+    """The same for many files of a directory, which is listed once."""
+    prefixes = {_prefix(name) for name in names}
+    with suppress(OSError):  # a directory that can be written to but not listed
+        for found in os.listdir(directory):
+            match = _PENDING_NAME.fullmatch(found)
+            if match and match[1] in prefixes:
+                _remove_if_dead(os.path.join(directory, found))
+
+
+def _prefix(name: str) -> str:
+    return f".{name[:NAME_CHARACTERS]}."
+
+
+def _locked_new_file(path: str) -> tuple[str, int]:
+    directory, name = os.path.split(path)
+    while True:
+        pending = os.path.join(directory, f"{_prefix(name)}{secrets.token_hex(4)}.part")
+        try:
+            descriptor = os.open(pending, os.O_RDWR | os.O_CREAT | os.O_EXCL | PLAIN_OPEN, 0o666)
+        except FileExistsError:
+            continue
+        if fcntl is None:
+            return pending, descriptor
+        with suppress(OSError):  # a file system without locks
+            fcntl.flock(descriptor, fcntl.LOCK_EX)
+        if os.fstat(descriptor).st_nlink:
+            return pending, descriptor
+        os.close(descriptor)  # another took it for a leftover before it was locked
+
+
+def _remove_if_dead(name: str) -> None:
+    with suppress(OSError):  # held by its writer, gone by now, or not ours
+        if fcntl is None:
+            shutil.rmtree(name) if os.path.isdir(name) else os.unlink(name)
+            return
+        is_folder = stat.S_ISDIR(os.lstat(name).st_mode)
+        access = os.O_RDONLY if is_folder else os.O_RDWR
+        descriptor = os.open(name, access | os.O_NOFOLLOW | os.O_NONBLOCK | PLAIN_OPEN)
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            if is_folder:
+                shutil.rmtree(name)
+            elif stat.S_ISREG(os.fstat(descriptor).st_mode):
+                os.unlink(name)
+        finally:
+            os.close(descriptor)
+
+
+def _take_permissions(path: str, descriptor: int) -> None:
+    """Owner, where that is allowed, group and mode of an older file: what was private stays so."""
+    if fcntl is None:
+        return
+    try:
+        older = os.stat(path)
+    except FileNotFoundError:
+        return
+    mode = older.st_mode & 0o777
+    for owner in (older.st_uid, -1):
+        try:
+            os.fchown(descriptor, owner, older.st_gid)
+            break
+        except OSError as error:
+            if error.errno not in (errno.EPERM, errno.EINVAL, errno.ENOSYS, errno.ENOTSUP):
+                raise
+    else:
+        mode &= ~0o070  # for another group than it was meant for
+    os.fchmod(descriptor, mode)

@@ -1,0 +1,62 @@
+"""Buffer views of EXT_meshopt_compression, decoded by the package meshoptimizer. It reads no files."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from athcodec.errors import ClipError, MissingExtra
+from athcodec.files.gltf.json import integer
+
+STRIDES = {"OCTAHEDRAL": (4, 8), "QUATERNION": (8,), "EXPONENTIAL": range(4, 257, 4), "NONE": range(1, 257)}
+MOST_PER_BYTE = 2048  # bytes that the codec makes of one at most: more is refused before memory is allocated
+
+
+def unpacked_size(packed: Mapping) -> int:
+    """Bytes that the buffer view has. Raises ClipError."""
+    return integer(packed, "count", low=1) * integer(packed, "byteStride", low=1, stop=257)
+
+
+def unpack(raw: bytes, packed: Mapping) -> bytes:
+    """The bytes of a buffer view whose extension object is `packed`. Raises ClipError, MissingExtra."""
+    try:
+        import meshoptimizer as library
+    except ImportError:
+        raise MissingExtra(
+            'glTF compressed by EXT_meshopt_compression: needs meshoptimizer: pip install "athcodec[gltf]"'
+        ) from None
+    count, stride = integer(packed, "count", low=1), integer(packed, "byteStride", low=1, stop=257)
+    if count * stride > MOST_PER_BYTE * len(raw):
+        raise ClipError(f"meshopt: got {count} elements of {stride} bytes in {len(raw)}, expected fewer")
+    mode, filtered = packed.get("mode"), packed.get("filter", "NONE")
+    if (
+        mode not in ("ATTRIBUTES", "TRIANGLES", "INDICES")
+        or stride not in STRIDES.get(filtered, ())
+        or (stride % 4 if mode == "ATTRIBUTES" else stride not in (2, 4) or filtered != "NONE")
+        or (mode == "TRIANGLES" and count % 3)
+    ):
+        raise ClipError(
+            f"meshopt: got mode {mode!r}, filter {filtered!r}, {count} elements of {stride} bytes; "
+            "expected what the extension defines"
+        )
+    try:
+        if mode == "ATTRIBUTES":
+            values = library.decode_vertex_buffer(count, stride, raw)
+        else:
+            decode = library.decode_index_buffer if mode == "TRIANGLES" else library.decode_index_sequence
+            values = decode(count, stride, raw)
+        values = np.frombuffer(np.ascontiguousarray(values).tobytes()[: count * stride], np.uint8).copy()
+        filters = {
+            "OCTAHEDRAL": library.decode_filter_oct,
+            "QUATERNION": library.decode_filter_quat,
+            "EXPONENTIAL": library.decode_filter_exp,
+        }
+        if filtered in filters:
+            values = filters[filtered](values, count, stride)
+    except (RuntimeError, ValueError, TypeError) as error:
+        raise ClipError(f"meshopt: got bytes that do not decode: {str(error)[:80]}") from None
+    data = np.ascontiguousarray(values).tobytes()
+    if len(data) != count * stride:
+        raise ClipError(f"meshopt: got {len(data)} bytes, expected {count * stride}")
+    return data

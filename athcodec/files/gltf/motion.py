@@ -1,0 +1,163 @@
+"""ATH_motion in a GLB: where the .ath file lies, and what the meshes around it are to it: rest pose and faces.
+
+The extension is described in spec/gltf/README.md. Its motions are the bytes of buffer views; a primitive names one and
+says which vertices of it its own are.
+"""
+
+from __future__ import annotations
+
+import os
+from contextlib import closing
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from athcodec.errors import ClipError
+from athcodec.files.gltf.document import GltfFile
+from athcodec.files.gltf.json import BROKEN, brief, entries, entry, integer
+from athcodec.files.gltf.primitives import triangles
+from athcodec.files.plain import open_plain
+from athcodec.files.reading import closing_on_failure, naming
+
+EXTENSION = "ATH_motion"
+VERTEX_ATTRIBUTE = "_ATH_VERTEX"
+MAGIC = b"glTF"
+GltfPlace = tuple[dict, np.ndarray]
+"""A primitive, and the motion's vertex of each of its vertices."""
+
+
+def extension_of(holder: dict) -> dict | None:
+    """What the extension says of a part of the file, None where that is nothing. Raises ClipError."""
+    extensions = holder.get("extensions")
+    return entry(extensions, EXTENSION) if isinstance(extensions, dict) and EXTENSION in extensions else None
+
+
+def motion_names(gltf: dict) -> list[str]:
+    """What the motions of a file are called, each by another name. Raises ClipError."""
+    found: list[str] = []
+    for number, motion in enumerate(entries(extension_of(gltf) or {}, "motions")):
+        said = motion.get("name")
+        name = said if isinstance(said, str) and said else f"motion {number}"
+        found.append(f"{name}.{number}" if name in found else name)
+    return found
+
+
+def motions_in(path: str | os.PathLike[str]) -> list[str]:
+    """The names of the motions in a GLB; none of another file. Raises ClipError, OSError."""
+    with open_plain(path) as file:
+        if file.read(4) != MAGIC:
+            return []
+    with naming(path, *BROKEN), closing(GltfFile(path)) as gltf:
+        return motion_names(gltf.json)
+
+
+class GltfMotion:
+    """An .ath file in a GLB, by its name where there are several, as a file object to read; close it. Raises ClipError.
+
+    `number` is its place among the motions; host_mesh (N, 3) float32 the rest pose, faces (F, 3) int32 or None.
+    """
+
+    def __init__(self, path: str | os.PathLike[str], name: str | None = None):
+        self.path = os.fspath(path)
+        with naming(path, *BROKEN):
+            self._gltf = GltfFile(path)
+            with closing_on_failure(self._gltf):
+                self.number = self._chosen(name)
+                motion = entries(extension_of(self._gltf.json) or {}, "motions")[self.number]
+                self._bytes, self._start, self._size = self._gltf.part(motion, "bufferView")
+        self._place = 0
+
+    def _chosen(self, name: str | None) -> int:
+        names = motion_names(self._gltf.json)
+        if not names:
+            raise ClipError(f"{EXTENSION}: got no motion, expected one at least")
+        if name is None and len(names) > 1:
+            raise ClipError(
+                f"{EXTENSION}: got {len(names)} motions, expected the name of one (gltf_motion): {brief(names)}"
+            )
+        if name is not None and name not in names:
+            raise ClipError(f"gltf_motion: got {brief(name)}, expected one of {brief(names)}")
+        return 0 if name is None else names.index(name)
+
+    # ---- the bytes ----
+
+    def seek(self, place: int, whence: int = os.SEEK_SET) -> int:
+        self._place = max(place + (0, self._place, self._size)[whence], 0)
+        return self._place
+
+    def tell(self) -> int:
+        return self._place
+
+    def read(self, size: int = -1) -> bytes:
+        left = max(self._size - self._place, 0)
+        size = left if size < 0 else min(size, left)
+        data: bytes = self._bytes.read(self._start + self._place, size) if size else b""
+        self._place += len(data)
+        return data
+
+    def close(self) -> None:
+        self._gltf.close()
+
+    # ---- the meshes ----
+
+    @cached_property
+    def _places(self) -> list[GltfPlace]:
+        found = places_of(self._gltf, self.number)
+        if not found:
+            raise ClipError(f"{EXTENSION}: got no primitive that a motion moves, expected at least one")
+        return found
+
+    @cached_property
+    def host_mesh(self) -> np.ndarray:
+        with naming(self.path, *BROKEN):
+            return self._rest()
+
+    def _rest(self) -> np.ndarray:
+        total = sum(len(vertices) for _, vertices in self._places)
+        count = 1 + max(int(vertices.max()) for _, vertices in self._places)
+        if count > total:
+            raise ClipError(
+                f"{EXTENSION}: got vertex {count - 1} of {total} in all primitives, expected each one there"
+            )
+        rest, seen = np.empty((count, 3), np.float32), np.zeros(count, bool)
+        for primitive, vertices in self._places:
+            positions = self._gltf.floats(entry(primitive, "attributes")["POSITION"])
+            if positions.dtype != np.float32 or positions.shape != (len(vertices), 3):
+                raise ClipError(f"{EXTENSION}: got POSITION as {positions.dtype} {positions.shape}, expected float32")
+            rest[vertices], seen[vertices] = positions, True
+        for primitive, vertices in self._places:
+            if not np.array_equal(rest[vertices], self._gltf.floats(primitive["attributes"]["POSITION"])):
+                raise ClipError(f"{EXTENSION}: got places that differ for one vertex of the motion, expected the same")
+        if not seen.all():
+            raise ClipError(f"{EXTENSION}: got no place for vertex {int(seen.argmin())}, expected one for each")
+        return rest
+
+    @cached_property
+    def faces(self) -> np.ndarray | None:
+        with naming(self.path, *BROKEN):
+            found = [vertices[triangles(self._gltf, primitive, len(vertices))] for primitive, vertices in self._places]
+            return np.concatenate(found).astype(np.int32) if any(map(len, found)) else None
+
+
+def places_of(file: GltfFile, number: int) -> list[GltfPlace]:
+    """The primitives that one of the file's motions moves. Raises ClipError."""
+    found, count = [], len(motion_names(file.json))
+    for mesh in file.items("meshes"):
+        for primitive in entries(mesh, "primitives"):
+            said = extension_of(primitive)
+            if said is not None and integer(said, "motion", stop=count) == number:
+                found.append((primitive, _vertices(file, primitive, said)))
+    return found
+
+
+def _vertices(file: GltfFile, primitive: dict, said: dict) -> np.ndarray:
+    """(n,) the motion's vertex of each vertex of a primitive."""
+    attributes: dict[str, Any] = entry(primitive, "attributes")
+    count = len(file.array(integer(attributes, "POSITION")))  # those that the file has bytes for
+    if VERTEX_ATTRIBUTE not in attributes:
+        return integer(said, "firstVertex", 0) + np.arange(count)
+    values = file.array(integer(attributes, VERTEX_ATTRIBUTE))[:, 0]
+    if len(values) != count or not np.isfinite(values).all() or values.min() < 0 or (values % 1).any():
+        raise ClipError(f"{VERTEX_ATTRIBUTE}: got what numbers no vertices, expected {count} whole numbers")
+    return values.astype(np.int64)

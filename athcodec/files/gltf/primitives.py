@@ -1,0 +1,45 @@
+"""Faces and lines of a primitive, of any mode that glTF has."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from athcodec.errors import ClipError
+from athcodec.files.gltf.document import GltfFile
+from athcodec.files.gltf.json import integer
+
+
+def triangles(file: GltfFile, primitive: dict, count: int) -> np.ndarray:
+    """(F, 3) a primitive's triangles of its `count` vertices; none where it draws points or lines. Raises ClipError."""
+    mode = integer(primitive, "mode", 4, stop=7)
+    return rows_of(corners(file, primitive, count, "primitive"), mode) if mode >= 4 else np.zeros((0, 3), np.int64)
+
+
+def corners(file: GltfFile, primitive: dict, count: int, name: str) -> np.ndarray:
+    if primitive.get("indices") is None:
+        return np.arange(count)
+    values = file.array(primitive["indices"])
+    if values.shape[1] != 1 or values.dtype.kind != "u" or int(values.max()) >= count:
+        raise ClipError(f"{name}: got indices up to {values.max()}, expected those of {count} vertices")
+    return values[:, 0].astype(np.int64)
+
+
+def rows_of(corners: np.ndarray, mode: int) -> np.ndarray:
+    """Corners of LINES (1), LINE_LOOP, LINE_STRIP, TRIANGLES (4), TRIANGLE_STRIP or TRIANGLE_FAN (6) as rows."""
+    if mode == 1:
+        return corners[: len(corners) // 2 * 2].reshape(-1, 2)
+    if mode in (2, 3):
+        ends = corners[1:] if mode == 3 else np.roll(corners, -1)
+        return np.stack([corners[: len(ends)], ends], axis=1)
+    if mode == 4:
+        return corners[: len(corners) // 3 * 3].reshape(-1, 3)
+    count = max(len(corners) - 2, 0)
+    if mode == 6:
+        rows = np.stack([corners[1:-1], corners[2:], np.broadcast_to(corners[:1], count)], axis=1) if count else None
+    else:
+        rows = np.stack([corners[:-2], corners[1:-1], corners[2:]], axis=1) if count else None
+        if count:
+            rows[1::2, 1:] = rows[1::2, :0:-1]
+    if rows is None:
+        return np.zeros((0, 3), np.int64)
+    return rows[(rows[:, 0] != rows[:, 1]) & (rows[:, 1] != rows[:, 2]) & (rows[:, 0] != rows[:, 2])]

@@ -1,0 +1,158 @@
+"""What readers do with the files that they open: take plain files alone, watch them for changes, close them where
+reading fails, say in errors which file it was, and count the memory that it takes. It knows no file format.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from os import PathLike, fspath
+from pathlib import Path
+from typing import Protocol
+
+from athcodec.errors import ClipError
+from athcodec.files.atomic import FileId
+from athcodec.files.plain import open_plain
+from athcodec.options import MAX_MEMORY
+
+File = str | PathLike[str] | int
+Stamp = tuple[int, int, int, int]  # size, time of change, device, inode
+
+
+class Closable(Protocol):
+    def close(self) -> None: ...
+
+
+def read_plain(path: str | PathLike[str], budget: Budget) -> bytes:
+    """All bytes of a plain file. Raises ClipError, OSError."""
+    with open_plain(path) as file:
+        budget.need(os.fstat(file.fileno()).st_size, fspath(path))
+        return file.read()
+
+
+class Budget:
+    """The memory that reading a source may take, bytes, of which arrays that stay take their part.
+
+    What is counted are the arrays and texts of the file, as they are unpacked, not what libraries need besides.
+    """
+
+    def __init__(self, limit: int = MAX_MEMORY):
+        self.limit, self.left = limit, limit
+
+    def need(self, size: int, what: str) -> None:
+        """Raises ClipError where there is no room for so many bytes, which do not stay."""
+        if size > self.left:
+            raise ClipError(f"{what}: got {size:,} bytes to read, but {no_room(self.limit)}")
+
+    def need_for(self, text: bytes, marks: bytes, each: int, what: str) -> None:
+        """Room for the objects, each of so many bytes, that are made of a text: one before each of these marks."""
+        self.need(len(text) + each * (1 + len(text) - len(text.translate(None, marks))), what)
+
+    def take(self, size: int, what: str) -> None:
+        """The same for bytes that stay."""
+        self.need(size, what)
+        self.left -= size
+
+
+def no_room(limit: int) -> str:
+    """What messages say of memory that is not to be had."""
+    return f"expected at most {limit:,} bytes of memory for the whole source; --max-memory (max_memory=) allows more"
+
+
+class FileWatch:
+    """Files, by path or by open descriptor, whose size and time of change are remembered.
+
+    Called, it says whether all of them are as they were when they were added; one that is gone is not.
+    """
+
+    def __init__(self, *files: File):
+        self.stamps: dict[File, Stamp] = {}
+        for file in files:
+            self.add(file)
+
+    @classmethod
+    def of(cls, stamps: dict[File, Stamp]) -> FileWatch:
+        """One that goes on from the `stamps` of another."""
+        watch = cls()
+        watch.stamps = stamps
+        return watch
+
+    def add(self, file: File) -> None:
+        """Raises OSError where there is no such file."""
+        self.stamps.setdefault(file, _stamp(file))
+
+    def __call__(self) -> bool:
+        try:
+            return all(_stamp(file)[:2] == stamp[:2] for file, stamp in self.stamps.items())
+        except OSError:
+            return False
+
+    @property
+    def files(self) -> frozenset[FileId]:
+        """What the files are on their disk, under whatever name."""
+        return frozenset(stamp[2:] for stamp in self.stamps.values())
+
+
+def file_beside(folder: str | PathLike[str], name: str, allow_outside: bool = False) -> Path:
+    """A file that a source names, by a path from its own folder.
+
+    Raises ClipError where it is no plain file and, unless `allow_outside`, where it lies outside of that folder: a
+    source that is not trusted must not reach other files on the disk.
+    """
+    if not name or "\0" in name:
+        raise ClipError(f"got the file name {name[:80]!r}, expected a path")
+    path = Path(folder, name)
+    check_inside(folder, path, allow_outside)
+    if path.exists() and not path.is_file():
+        raise ClipError(f"{name[:80]}: got a folder, device or pipe, expected a plain file")
+    return path
+
+
+def check_inside(folder: str | PathLike[str], path: str | PathLike[str], allow_outside: bool) -> None:
+    """Raises ClipError for a path outside of a folder. Links inside the folder lead where they lead."""
+    if not allow_outside and not Path(os.path.abspath(path)).is_relative_to(os.path.abspath(folder)):
+        raise ClipError(
+            f"got the file {fspath(path)[-80:]!r}, expected one in the folder of the source or below it; "
+            "--allow-outside (allow_outside=True) reads others"
+        )
+
+
+def _stamp(file: File) -> Stamp:
+    now = os.stat(file)
+    return now.st_size, now.st_mtime_ns, now.st_dev, now.st_ino
+
+
+@contextmanager
+def naming(path: str | PathLike[str], *errors: type[Exception]) -> Iterator[None]:
+    """Errors of the block that are ClipErrors, or of these further types, become ClipErrors that begin with `path`."""
+    try:
+        yield
+    except ClipError as error:
+        if str(error).startswith(f"{fspath(path)}: "):
+            raise
+        raise ClipError(f"{fspath(path)}: {error}") from error
+    except errors as error:
+        text = " ".join(str(error).split())[:200] or type(error).__name__
+        raise ClipError(f"{fspath(path)}: cannot be read: {text}") from error
+
+
+@contextmanager
+def naming_file(path: str | PathLike[str]) -> Iterator[None]:
+    """Errors of the system that name no file, such as those of reading, name this one."""
+    try:
+        yield
+    except OSError as error:
+        if error.filename is not None or error.errno is None:
+            raise
+        raise OSError(error.errno, error.strerror, fspath(path)) from error
+
+
+@contextmanager
+def closing_on_failure(resource: Closable) -> Iterator[None]:
+    """Closes the resource where the block raises; else it stays open."""
+    try:
+        yield
+    except BaseException:
+        resource.close()
+        raise

@@ -1,0 +1,1 @@
+"""A clip of a plant in motion: frames, branches, polygons, units."""

@@ -1,0 +1,59 @@
+"""The parameters of the acceptance test TAM (Song, Yang and Peng 2011, section 3)."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from athcodec.options import whole
+
+THRESHOLDS = "hierarchy_thresholds"  # of metadata
+
+
+@dataclass(frozen=True)
+class Thresholds:
+    """The parameters of the acceptance test TAM (Song, Yang and Peng 2011, section 3).
+
+    Parameters
+    ----------
+    epsilon, xi : float
+        Scene units, at least 0.
+    eta : int
+        Frames, at least 0.
+    lam : int
+        Vertices, at least 0 (lambda in the paper).
+
+    Raises
+    ------
+    ValueError
+        For a negative threshold.
+    """
+
+    epsilon: float
+    eta: int
+    xi: float
+    lam: int
+
+    def __post_init__(self) -> None:
+        for name, kind in (("epsilon", float), ("eta", int), ("xi", float), ("lam", int)):
+            value = getattr(self, name)
+            if not value >= 0:
+                raise ValueError(f"threshold {name}: got {value}, expected a number >= 0")
+            object.__setattr__(self, name, float(value) if kind is float else whole(f"threshold {name}", value))
+
+    @property
+    def in_metadata(self) -> dict[str, float]:
+        """What a file keeps of them under the name THRESHOLDS; JSON has no infinity."""
+        most = sys.float_info.max
+        return {"epsilon": min(self.epsilon, most), "xi": min(self.xi, most), "eta": self.eta, "lambda": self.lam}
+
+    @classmethod
+    def of_metadata(cls, metadata: Mapping[str, Any]) -> Thresholds | None:
+        """None where a file keeps none, or no numbers."""
+        try:
+            kept = metadata[THRESHOLDS]
+            return cls(kept["epsilon"], kept["eta"], kept["xi"], kept["lambda"])
+        except (KeyError, TypeError, ValueError):
+            return None

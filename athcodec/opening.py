@@ -1,0 +1,83 @@
+"""Opening of .ath files: `athcodec.open`."""
+
+from __future__ import annotations
+
+import os
+from typing import BinaryIO, cast
+
+from athcodec.decoding.ath_file import AthFile
+from athcodec.decoding.container import Limits
+from athcodec.decoding.decoder import Decoder
+from athcodec.decoding.host_mesh import HostMesh
+
+
+def open(
+    path: str | os.PathLike[str] | BinaryIO,
+    *,
+    clip: str | None = None,
+    strict: bool = False,
+    allow_partial: bool = False,
+    limits: Limits | None = None,
+    host_mesh: HostMesh | str | os.PathLike[str] | None = None,
+    gltf_motion: str | None = None,
+) -> Decoder:
+    """Opens an .ath file for playing one of its clips.
+
+    Parameters
+    ----------
+    path : str, path-like or binary file object
+        A path, a URL (`pip install "athcodec[remote]"`), or a seekable file object, which stays open when the decoder
+        is closed.
+    clip : str, optional
+        The name of the clip to play; by default the first.
+    strict : bool
+        Refuse a file that is shorter or longer than its header says.
+    allow_partial : bool
+        Read all of the file now; a damaged level hides itself and those after it instead of raising.
+    limits : Limits, optional
+        What the file may ask for; by default those of FORMAT.md.
+    host_mesh : (N, 3) array, MotionClip, str or path-like, optional
+        The mesh that is the rest pose, for files that do not hold one (`encode`, host_rest): positions in the source's
+        order (see AthFile.set_host_mesh), or a file of any format that `read` knows, of which the rest pose, or else
+        the first frame, is brought to the unit and axes of this file. Without it such a file opens, and says what it
+        holds.
+    gltf_motion : str, optional
+        Of a GLB that has several motions, the name of the one to open; "motion 0" and so on where they have none.
+
+    Returns
+    -------
+    Decoder
+        To be closed, or used in a `with` statement.
+
+    Raises
+    ------
+    FormatError
+        Where the file cannot be decoded: Truncated, BadChecksum, LimitExceeded ...
+    ClipUnavailable
+        Where no clip has that name.
+    ClipError
+        Where a GLB has no such motion.
+    RemoteError, OSError
+        Where it cannot be read.
+    """
+    mesh_path = host_mesh if isinstance(host_mesh, (str, os.PathLike)) else None
+    mesh = None if mesh_path is not None else cast(HostMesh | None, host_mesh)
+    file = AthFile(
+        path, strict=strict, allow_partial=allow_partial, limits=limits, host_mesh=mesh, gltf_motion=gltf_motion
+    )
+    try:
+        if mesh_path is not None and file.needs_host_mesh:
+            set_host_mesh_of(file, mesh_path)
+        return Decoder(file, clip, closes_file=True)
+    except BaseException:
+        file.close()
+        raise
+
+
+def set_host_mesh_of(file: AthFile, path: str | os.PathLike[str]) -> None:
+    """Read a mesh in the unit and axes of an .ath file and hand it over. Raises ClipError, WrongHostMesh, OSError."""
+    from athcodec.sources import read  # takes long to import, and most files need no mesh
+
+    units = {name: file.metadata[name] for name in ("unit", "up_axis") if isinstance(file.metadata.get(name), str)}
+    with read(path, **units) as clip:
+        file.set_host_mesh(clip)

@@ -1,0 +1,1 @@
+"""The viewer: pages and pictures of .ath files."""

@@ -1,0 +1,171 @@
+"""Pictures of a file: still ones and moving ones, drawn by the viewer's page in Chromium.
+
+Takes Playwright, Pillow and Chromium, Debian's or any that ATHCODEC_CHROMIUM names.
+"""
+
+from __future__ import annotations
+
+import base64
+import io
+import os
+import shutil
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from athcodec.decoding.host_mesh import HostMesh
+from athcodec.errors import MissingExtra
+from athcodec.files.atomic import check_target, new_file
+from athcodec.opening import open as open_ath
+from athcodec.viewer.view import export_page
+
+INSTALL = 'pip install "athcodec[picture]"'
+BROWSER_VARIABLE = "ATHCODEC_CHROMIUM"
+FLAGS = [
+    "--no-sandbox",
+    "--use-gl=angle",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+    "--ignore-gpu-blocklist",
+]
+"""Of Chromium, so that it draws in software."""
+
+SIZE = (640, 480)
+FRAMES_PER_SECOND = 15
+FORMATS = {"png": "PNG", "gif": "GIF", "webp": "WEBP"}
+
+_STILL_QUALITY = 78
+_STILL_AT = 0.7  # Time of a still picture, over the clip's duration.
+_TIMEOUT = 120_000  # ms
+_WHOLE = "() => globalThis.athcodecViewer?.motion?.complete"
+_ALONE = """() => {
+  document.body.classList.add("no-panel");
+  athcodecViewer.stage.fit();
+  athcodecViewer.frameView();
+}"""
+_DRAWN = """async (seconds) => {
+  const { motion, stage } = athcodecViewer;
+  await athcodecViewer.shown(seconds, motion.levelCount - 1);
+  stage.render();
+  return stage.canvas.toDataURL("image/png").split(",")[1];
+}"""
+
+
+def browser_path() -> str | None:
+    """Chromium's program; None where none is found."""
+    return os.environ.get(BROWSER_VARIABLE) or shutil.which("chromium") or shutil.which("chromium-browser")
+
+
+def save_picture(
+    path: str | os.PathLike[str],
+    out: str | os.PathLike[str],
+    kind: str = "gif",
+    clip: str | None = None,
+    size: tuple[int, int] = SIZE,
+    fps: float = FRAMES_PER_SECOND,
+    time: float = 0.0,
+    host_mesh: HostMesh | None = None,
+) -> int:
+    """Writes a picture of a plant at full detail.
+
+    Parameters
+    ----------
+    path : str or path-like
+        The .ath file, or its URL.
+    out : str or path-like
+        The picture; it appears when it is complete. An older one of this kind is replaced, no other file.
+    kind : str
+        "gif" and "webp" move, over one round of the clip; "png" stands still.
+    clip : str, optional
+        The name of a clip; by default the first.
+    size : tuple of int
+        Width and height in pixels.
+    fps : float
+        Pictures a second of what moves.
+    time : float
+        Seconds from the clip's first frame, of what stands still.
+    host_mesh : array, MotionClip, str or path-like, optional
+        As `athcodec.viewer.view.export_page`.
+
+    Returns
+    -------
+    int
+        Size of the picture, bytes.
+
+    Raises
+    ------
+    MissingExtra
+        Where Playwright, Pillow or Chromium is not there.
+    AthError, OSError
+        As `athcodec.viewer.view.export_page`.
+    """
+    check_target(out, f".{kind}")
+    image = _packages()
+    pictures = [
+        image.open(io.BytesIO(data)).convert("RGB") for data in _drawn(path, kind, clip, size, fps, time, host_mesh)
+    ]
+    data = io.BytesIO()
+    moving = {"save_all": True, "append_images": pictures[1:], "duration": round(1000 / fps), "loop": 0}
+    pictures[0].save(data, FORMATS[kind], **({} if kind == "png" else moving))
+    with new_file(out) as file:
+        file.write(data.getvalue())
+    return data.tell()
+
+
+def still(path: str | os.PathLike[str], size: tuple[int, int] = SIZE) -> bytes:
+    """A plant as WebP, with all of the viewer's scenery, late in its clip, when it has grown where it grows; raises as
+    `save_picture`."""
+    image = _packages()
+    with open_ath(path) as decoder:
+        time = _STILL_AT * decoder.clip.duration
+    (png,) = _drawn(path, "png", None, size, FRAMES_PER_SECOND, time, None, "?quality=full")
+    data = io.BytesIO()
+    image.open(io.BytesIO(png)).convert("RGB").save(data, "WEBP", quality=_STILL_QUALITY, method=6)
+    return data.getvalue()
+
+
+def can_draw() -> bool:
+    """Whether all is there that pictures take."""
+    try:
+        _packages()
+    except MissingExtra:
+        return False
+    return True
+
+
+def _packages() -> Any:
+    """Pillow's module of images, once all that is needed is there."""
+    try:
+        import playwright.sync_api  # noqa: F401
+        from PIL import Image
+    except ImportError as error:
+        raise MissingExtra(f"athcodec picture: needs {error.name}: {INSTALL}") from None
+    if browser_path() is None:
+        raise MissingExtra(
+            f"athcodec picture: needs Chromium on PATH or in {BROWSER_VARIABLE}: apt-get install chromium"
+        )
+    return Image
+
+
+def _drawn(path, kind, clip, size, fps, time, host_mesh, asked="") -> Iterator[bytes]:
+    """Each picture as PNG."""
+    from playwright.sync_api import sync_playwright
+
+    with open_ath(path, clip=clip, host_mesh=host_mesh) as decoder:
+        playing = decoder.clip
+        steps = max(playing.frame_count - 1, 1)
+        seconds = playing.duration * ((steps + 1) / steps if playing.loop else 1)
+    times = [time] if kind == "png" else [i / fps for i in range(max(1, round(seconds * fps)))]
+    with tempfile.TemporaryDirectory() as folder, sync_playwright() as playwright:
+        export_page(path, Path(folder) / "page.html", clip, host_mesh)
+        browser = playwright.chromium.launch(executable_path=browser_path(), args=FLAGS)
+        try:
+            page = browser.new_page(viewport={"width": size[0], "height": size[1]})
+            page.goto((Path(folder) / "page.html").as_uri() + asked)
+            page.wait_for_function(_WHOLE, timeout=_TIMEOUT)
+            page.evaluate(_ALONE)
+            for at in times:
+                yield base64.b64decode(page.evaluate(_DRAWN, at))
+        finally:
+            browser.close()

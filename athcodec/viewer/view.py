@@ -1,0 +1,301 @@
+"""The viewer in a browser: a local server for one file, and pages that carry a file inside.
+
+`athcodec/viewer/web` holds the page as it is served anywhere; nothing is made here but what joins it with a file. The
+server answers on 127.0.0.1 only, and to nobody but who has the address. Remote files are passed on range by range.
+"""
+
+from __future__ import annotations
+
+import base64
+import html
+import io
+import json
+import os
+import re
+import secrets
+import webbrowser
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote, urlsplit
+
+from athcodec.decoding.host_mesh import HostMesh
+from athcodec.errors import AthError, ClipError, MissingExtra
+from athcodec.files.atomic import check_target, file_ids, is_url, keeping, new_file
+from athcodec.opening import open as open_ath
+
+WEB = Path(__file__).parent / "web"
+PAGE = WEB / "index.html"
+INSTALL = 'pip install "athcodec[view]"'
+Floor = Mapping[str | os.PathLike[str], float]
+PASSED_ON = ("Content-Length", "Content-Range", "Content-Type", "ETag", "Last-Modified", "Accept-Ranges")
+
+_MAP = re.compile(r'<script type="importmap">(.*?)</script>', re.DOTALL)
+_POLICY = (
+    "default-src 'none'; script-src 'unsafe-inline' 'wasm-unsafe-eval' data:; style-src 'unsafe-inline'; "
+    "img-src data: blob:; worker-src blob:; connect-src 'none'; base-uri 'none'; form-action 'none'"
+)
+
+
+def export_page(
+    path: str | os.PathLike[str],
+    page: str | os.PathLike[str],
+    clip: str | None = None,
+    host_mesh: HostMesh | None = None,
+    floor: Floor | None = None,
+) -> int:
+    """Writes one page that plays an .ath file without any other file or server.
+
+    Parameters
+    ----------
+    path : str or path-like
+        The .ath file, or its URL.
+    page : str or path-like
+        The HTML file to write; it appears when it is complete. An older page is replaced, no other file.
+    clip : str, optional
+        The name of the clip to begin with; by default the first.
+    host_mesh : array, MotionClip, str or path-like, optional
+        The mesh that is the rest pose, for a file that does not hold one: see AthFile.set_host_mesh.
+    floor : mapping of str or path-like to float, optional
+        Files of plants for the floor of the page's forest, and how many of each stand around a tree.
+
+    Returns
+    -------
+    int
+        Size of the page, bytes.
+
+    Raises
+    ------
+    AthError
+        Where `path` is no .ath file, has no such clip, or needs another mesh.
+    OSError
+        Where a file cannot be read or written.
+    """
+    mesh_file = host_mesh if isinstance(host_mesh, (str, os.PathLike)) else None
+    with keeping(file_ids(path, mesh_file, *(floor or ()))):
+        check_target(page, ".html")
+        data = _read(path)
+        _refuse_glb(data[:4])
+        mesh = _checked(io.BytesIO(data), clip, host_mesh)
+        text = self_contained(data, file_name(path), clip, mesh, _read_floor(floor)).encode()
+        with new_file(page) as out:
+            out.write(text)
+    return len(text)
+
+
+def _read_floor(floor: Floor | None) -> list[tuple[bytes, float]]:
+    files = [(_read(path), each) for path, each in (floor or {}).items()]
+    for data, _ in files:
+        _refuse_glb(data[:4])
+        _checked(io.BytesIO(data), None, None)
+    return files
+
+
+def _checked(path: Any, clip: str | None, host_mesh: HostMesh | None) -> bytes | None:
+    """Opens the file as the page will; gives the host's mesh as the page takes it, float32, for a file that needs one.
+    Raises AthError, OSError."""
+    with open_ath(path, clip=clip, host_mesh=host_mesh) as decoder:
+        return None if decoder.file.host_checksum is None else decoder.level_rest(0).astype("<f4").tobytes()
+
+
+def _refuse_glb(head: bytes) -> None:
+    if head == b"glTF":
+        raise ClipError(
+            "got a GLB, expected an .ath file: pages with the plugins of athcodec-three show it; decode to .npz and "
+            "encode make an .ath file of it"
+        )
+
+
+def _read(path: str | os.PathLike[str]) -> bytes:
+    if not is_url(path):
+        return Path(path).read_bytes()
+    from athcodec.files.remote import Remote  # Its requirements take long to import.
+
+    with Remote(path) as file:
+        return file.read()
+
+
+def self_contained(
+    data: bytes,
+    name: str,
+    clip: str | None = None,
+    mesh: bytes | None = None,
+    floor: Sequence[tuple[bytes, float]] = (),
+) -> str:
+    """The page with everything inside: styles, modules as data URLs, the worker and the file as text."""
+    text = PAGE.read_text("utf-8")
+    modules = json.loads(_MAP.search(text)[1])["imports"]
+    inside = json.dumps({"imports": {name: _data_url(WEB / file) for name, file in modules.items()}})
+    main = _script((WEB / "viewer.js").read_text("utf-8"))
+    worker = _script((WEB / "ath_worker.js").read_text("utf-8"))
+    first = "" if clip is None else f' data-clip="{html.escape(clip)}"'
+    file = (
+        f'<script type="text/plain" id="ath-file" data-name="{html.escape(name)}"{first}>'
+        f"{base64.b64encode(data).decode()}</script>"
+    )
+    if mesh is not None:
+        file += f'\n<script type="text/plain" id="ath-mesh">{base64.b64encode(mesh).decode()}</script>'
+    for plant, each in floor:
+        plain = base64.b64encode(plant).decode()
+        file += f'\n<script type="text/plain" class="ath-floor" data-each="{each:g}">{plain}</script>'
+    for old, new in (
+        (r'content="default-src[^"]*"', f'content="{_POLICY}"'),
+        (r'<link rel="modulepreload"[^>]*>\n', ""),
+        (r'<link rel="stylesheet"[^>]*>', f"<style>{(WEB / 'viewer.css').read_text('utf-8')}</style>"),
+        (_MAP.pattern, f'<script type="importmap">{inside}</script>'),
+        (r'<script type="module" src="viewer.js"></script>', ""),
+        (
+            r"</body>",
+            f'<script type="text/plain" id="ath-worker">{worker}</script>\n{file}\n'
+            f'<script type="module">{main}</script>\n</body>',
+        ),
+    ):
+        text = re.sub(old, lambda _, new=new: new, text, flags=re.DOTALL)
+    return text
+
+
+def _data_url(path: Path) -> str:
+    return f"data:text/javascript;base64,{base64.b64encode(path.read_bytes()).decode()}"
+
+
+def _script(text: str) -> str:
+    """Text that cannot end the script element that it is put into."""
+    return text.replace("</script", "<\\/script").replace("<!--", "<\\!--")
+
+
+def file_name(path: str | os.PathLike[str]) -> str:
+    path = urlsplit(os.fspath(path)).path if is_url(path) else os.fspath(path)
+    return path.replace("\\", "/").rstrip("/").rpartition("/")[2] or "file.ath"
+
+
+def serve(
+    path: str | os.PathLike[str],
+    port: int = 0,
+    ready: Callable[[str], None] = print,
+    clip: str | None = None,
+    host_mesh: HostMesh | None = None,
+    forest: bool = False,
+    floor: Floor | None = None,
+) -> None:
+    """Serves the viewer with an .ath file on 127.0.0.1 until it is interrupted.
+
+    Parameters
+    ----------
+    path : str or path-like
+        The .ath file, or its URL.
+    port : int
+        0: a free one.
+    ready : callable
+        Called with the page's address when it can be opened.
+    clip : str, optional
+        The name of the clip to begin with; by default the first.
+    host_mesh : array, MotionClip, str or path-like, optional
+        As `export_page`.
+    forest : bool
+        Whether the address is that of the page that shows many plants, on WebGPU.
+    floor : mapping, optional
+        As `export_page`; files on this computer.
+
+    Raises
+    ------
+    MissingExtra
+        Where aiohttp is not installed.
+    AthError, OSError
+        As `export_page`.
+    """
+    _check_server(path)
+    if not is_url(path):
+        with open(path, "rb") as file:
+            _refuse_glb(file.read(4))
+    mesh = _checked(path, clip, host_mesh)
+    grown = _read_floor(floor)
+    import asyncio
+
+    from aiohttp import web
+
+    async def run() -> None:
+        place = f"file/{secrets.token_urlsafe(12)}/{file_name(path)}"
+        beside = {} if mesh is None else {f"{place}.mesh": mesh}
+        beside |= {f"{place}.floor{i}": data for i, (data, _) in enumerate(grown)}
+        runner = web.AppRunner(application(path, place, beside), access_log=None)
+        await runner.setup()
+        try:
+            site = web.TCPSite(runner, "127.0.0.1", port)
+            await site.start()
+            address = f"http://127.0.0.1:{site._server.sockets[0].getsockname()[1]}"
+            more = ("" if clip is None else f"&clip={quote(clip, safe='')}") + (
+                "" if mesh is None else f"&mesh={quote(place)}.mesh"
+            )
+            more += "".join(f"&floor={quote(place)}.floor{i}&each={each:g}" for i, (_, each) in enumerate(grown))
+            ready(f"{address}/{'forest.html' if forest else ''}?file={quote(place)}{more}")
+            await asyncio.Event().wait()
+        finally:
+            await runner.cleanup()
+
+    asyncio.run(run())
+
+
+def _check_server(path: str | os.PathLike[str]) -> None:
+    try:
+        import aiohttp  # noqa: F401
+    except ImportError:
+        raise MissingExtra(f"athcodec view: needs aiohttp: {INSTALL}; --export PAGE works without") from None
+    _refuse_other_urls(path)
+
+
+def _refuse_other_urls(path: str | os.PathLike[str]) -> None:
+    """The server passes on what http and https have; for others there is --export."""
+    if is_url(path) and urlsplit(path).scheme.lower() not in ("http", "https"):
+        scheme = urlsplit(path).scheme
+        raise AthError(f"{path}: got {scheme}://, expected http:// or https://; --export PAGE reads others")
+
+
+def application(path: str | os.PathLike[str], place: str, beside: Mapping[str, bytes] | None = None):
+    """The aiohttp application: the page, and the file at `place`, which only the page's address tells; at other such
+    places what goes with it, such as the host's mesh."""
+    from aiohttp import ClientSession, web
+
+    async def page(request):
+        return web.FileResponse(PAGE)
+
+    def at_once(data):
+        async def answer(request):
+            return web.Response(body=data, content_type="application/octet-stream")
+
+        return answer
+
+    async def local(request):
+        return web.FileResponse(path, headers={"Content-Type": "application/octet-stream", "Cache-Control": "no-cache"})
+
+    async def remote(request):
+        asked = {name: request.headers[name] for name in ("Range",) if name in request.headers}
+        async with request.app[session].get(os.fspath(path), headers=asked) as answer:
+            passed = {name: answer.headers[name] for name in PASSED_ON if name in answer.headers}
+            response = web.StreamResponse(status=answer.status, headers=passed)
+            await response.prepare(request)
+            async for piece in answer.content.iter_any():
+                await response.write(piece)
+            return response
+
+    async def client(app):
+        app[session] = ClientSession(auto_decompress=False, headers={"Accept-Encoding": "identity"})
+        yield
+        await app[session].close()
+
+    session = web.AppKey("session", ClientSession)
+    app = web.Application()
+    app.router.add_get("/", page)
+    if is_url(path):
+        app.cleanup_ctx.append(client)
+    app.router.add_get(f"/{quote(place)}", remote if is_url(path) else local)
+    for name, data in (beside or {}).items():
+        app.router.add_get(f"/{quote(name)}", at_once(data))
+    app.router.add_static("/", WEB)
+    return app
+
+
+def open_browser(address: str) -> None:
+    """Opens the page where there is a browser; where there is none, its address has been printed."""
+    with suppress(webbrowser.Error):
+        webbrowser.open(address)
