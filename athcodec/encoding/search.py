@@ -23,7 +23,7 @@ from athcodec.encoding.progress import Progress, TrialCount, expected_trials
 from athcodec.encoding.sample import ExtrapolationFactors, is_small, sample_plant
 from athcodec.encoding.segment import CodedPrelude, Source, branch_records
 from athcodec.encoding.segment_samples import samples_of
-from athcodec.encoding.settings import Choice, Settings
+from athcodec.encoding.settings import OF_BRANCHES, OF_SAMPLE, Choice, Settings
 from athcodec.encoding.start import first_settings
 from athcodec.encoding.survey import Ath
 from athcodec.encoding.trials import Trials, distinct
@@ -231,14 +231,9 @@ class Search:
         sample = sample_plant(trials.source, trials.ath, self.effort)
         if sample is None:
             return None
-        kept = sample.branches
         some = replace(
             start,
-            forms=start.forms[kept],
-            loose=start.loose[kept],
-            lags=start.lags[kept],
-            details=start.details[kept],
-            rigid=start.rigid[kept],
+            **{name: getattr(start, name)[sample.branches] for name in OF_BRANCHES},
             limit=start.limit if np.isscalar(start.limit) else start.limit[sample.vertices],
             shape_of=None,
         )
@@ -247,7 +242,8 @@ class Search:
             branch_records(sample.source.hierarchy, sample.ath, some),
         )
         samples = [segment.of_plant(sample) for segment in trials.samples]
-        return Search(trials.beside(sample.source, sample.ath, some, samples, extrapolation), self.effort, self.ratios)
+        of_sample = Trials(sample.source, sample.ath, some, samples, trials.jobs, trials.count, extrapolation)
+        return Search(of_sample, self.effort, self.ratios)
 
     def _candidates_of_sample(self, sample: Search) -> tuple[Settings, list[Settings]]:
         """Return the candidates of a sample for all of the plant. Pieces with learned modes are chosen in all of it."""
@@ -264,14 +260,7 @@ class Search:
         fewer = np.sqrt(of_sample.extrapolation.vertices * inner / np.maximum(all_inner, 1))
         settings = replace(
             start,
-            step=chosen.step,
-            level_steps=chosen.level_steps,
-            rest_step=chosen.rest_step,
-            rotation_step_factors=chosen.rotation_step_factors,
-            free_rigid=chosen.free_rigid,
-            learned_bases=chosen.learned_bases,
-            common_basis=chosen.common_basis,
-            periodic=chosen.periodic,
+            **{name: getattr(chosen, name) for name in OF_SAMPLE},
             forms=forms.forms_like(chosen.forms, of_sample.source, trials),
             node_steps=chosen.node_steps * np.where(inner > 0, fewer, 1.0),
         )

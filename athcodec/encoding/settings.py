@@ -13,11 +13,14 @@ from athcodec.encoding.features import Feature
 from athcodec.encoding.learned_modes import LearnedModes
 
 BEAM = 0  # Form of a branch whose modes are those of a beam; other forms are SHEET, or the vertices in a tube's ring.
-OF_PRELUDE = "rest_step", "rest_slack", "connected_rest", "lags", "shape_of", "forms", "layer", "free_rigid"
+# Fields that distinguish settings of a search: by hierarchy and rest pose, and by motion.
+OF_PRELUDE = "rest_step rest_slack connected_rest lags shape_of forms layer free_rigid".split()
 OF_MOTION = (
-    *("step", "level_steps", "turn_step", "rotation_step_factors"),
-    *("periodic", "learned_bases", "common_basis", "learned_pieces"),
+    "step level_steps turn_step rotation_step_factors periodic learned_bases common_basis learned_pieces".split()
 )
+# Fields that a large plant takes from its sample as they are.
+OF_SAMPLE = "step level_steps rest_step rotation_step_factors free_rigid learned_bases common_basis periodic".split()
+OF_BRANCHES = "forms loose lags details rigid".split()  # Arrays with an entry for each branch.
 
 
 @dataclass(frozen=True)
