@@ -31,6 +31,7 @@ from athcodec.encoding.segment import (
     level_bases,
     thread_count,
     time_components,
+    uncoded_plan,
 )
 from athcodec.encoding.segment_samples import SegmentSample
 from athcodec.encoding.settings import Settings
@@ -225,7 +226,7 @@ class Trials:
         """Return the components of segments spread over the clip, in the steps of the trial that asked first."""
         key = _before_modes(settings)
         if key not in self._components:
-            plan, count = self.prelude(settings).plan, len(self.source.segments)
+            plan, count = uncoded_plan(self.source, self.ath, settings), len(self.source.segments)
             chosen = np.unique(np.linspace(0, count - 1, LEARNING_SEGMENTS).astype(int))
             self._components[key] = components(
                 plan, (analyse_finely(plan, settings, self.source.positions(segment)) for segment in chosen)
