@@ -5,10 +5,10 @@
  * its decoded neighbours lead one to expect: the frequencies before it, the other axes, the row before, and the same
  * row of the units before; further by how high its frequency is, and by whether the axis is louder than it was in the
  * units before. */
-#ifndef ATH_COEFFICIENT_MODEL_H
-#define ATH_COEFFICIENT_MODEL_H
+#ifndef ATH_BITS_COEFFICIENTS_INL
+#define ATH_BITS_COEFFICIENTS_INL
 
-#include "model/motion.h"
+#include "bits/format.h"
 #include "bits/numbers.inl"
 
 enum { COUNT_CLASSES = 6, COUNT_BINS = 10, BANDS = 4, ROW_NUMBERS = 2 * BANDS, HISTORY_ROWS = 3 * ATH_SLOTS };

@@ -1,6 +1,6 @@
 /* CRC-32C (Castagnoli, reflected polynomial 0x82F63B78), four bits at a time, or eight times four side by side: small,
  * no table to build. */
-#include "bits/internal.h"
+#include "bits/platform.h"
 
 /* A row for all values of four bits, from those of each of them. */
 #define CRC_ROW(a, b, c, d)                                                                                            \

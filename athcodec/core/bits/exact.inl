@@ -1,7 +1,7 @@
 /* Exact numbers, coded as differences from a prediction (FORMAT.md, "Exact numbers"). Compiled once for
  * each direction. */
-#ifndef ATH_EXACT_MODEL_H
-#define ATH_EXACT_MODEL_H
+#ifndef ATH_BITS_EXACT_INL
+#define ATH_BITS_EXACT_INL
 
 #include "bits/numbers.inl"
 

@@ -1,7 +1,7 @@
 /* Points of a body-centred cubic lattice, three integers, all even or all odd (FORMAT.md, "Lattice points"). Compiled
  * once for each direction. */
-#ifndef ATH_LATTICE_H
-#define ATH_LATTICE_H
+#ifndef ATH_BITS_LATTICE_INL
+#define ATH_BITS_LATTICE_INL
 
 #include "bits/numbers.inl"
 

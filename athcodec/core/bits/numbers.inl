@@ -1,6 +1,6 @@
 /* Adaptive codes for integers (FORMAT.md, "Numbers"), compiled once for each direction. */
-#ifndef ATH_NUMBER_MODEL_H
-#define ATH_NUMBER_MODEL_H
+#ifndef ATH_BITS_NUMBERS_INL
+#define ATH_BITS_NUMBERS_INL
 
 #include "bits/range_coder.inl"
 

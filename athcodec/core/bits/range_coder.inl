@@ -3,10 +3,10 @@
  *
  * Models that use it are written once and compiled twice: `coder_bit` returns the bit it decoded, or encodes the bit
  * it is given and returns that. A file that defines ATH_ENCODING before including this header gets the encoder. */
-#ifndef ATH_RANGE_CODER_H
-#define ATH_RANGE_CODER_H
+#ifndef ATH_BITS_RANGE_CODER_INL
+#define ATH_BITS_RANGE_CODER_INL
 
-#include "bits/internal.h"
+#include "bits/platform.h"
 
 typedef struct {
     uint16_t one;        /* probability of a 1, in 1/65536 */

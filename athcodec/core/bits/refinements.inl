@@ -2,8 +2,8 @@
  *
  * A refinement knows from the layer before what each integer is about: where that is not 0, the integer is spread over the
  * ratio of the steps around it; where it is 0, the integer is small, the more so the quieter its surroundings are. */
-#ifndef ATH_REFINEMENT_MODEL_H
-#define ATH_REFINEMENT_MODEL_H
+#ifndef ATH_BITS_REFINEMENTS_INL
+#define ATH_BITS_REFINEMENTS_INL
 
 #include "bits/coefficients.inl"
 

@@ -2,10 +2,13 @@
 #define ATH_ENCODING
 #include "encode/encode.h"
 #include "streams/polygons.inl"
-#include "streams/front.inl"
+#include "container/front.inl"
 #include "streams/motion_streams.inl"
 #include "streams/predicted.inl"
-#include "streams/prelude.inl"
+#include "streams/hierarchy.inl"
+#include "streams/rest_exact.inl"
+#include "streams/series.inl"
+#include "streams/source_rest.inl"
 
 /* Of a pose of all branches' vertices. */
 static void copy_pose(const ath_branch *branches, int32_t branch_count, const double *pose, double *copy)

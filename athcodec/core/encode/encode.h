@@ -3,12 +3,16 @@
  *
  * Motion arrays are vertex-major: element (vertex v, axis, frame t) of a segment of T frames stands at
  * (v * 3 + axis) * T + t. Vertices are in file order. */
-#ifndef ATH_ENCODE_H
-#define ATH_ENCODE_H
+#ifndef ATH_ENCODE_ENCODE_H
+#define ATH_ENCODE_ENCODE_H
 
-#include "file/container.h"
+#include "container/container.h"
 #include "model/mesh.h"
-#include "model/motion.h"
+#include "model/basis.h"
+#include "model/corrections.h"
+#include "model/maps.h"
+#include "model/refine.h"
+#include "model/rotations.h"
 
 /* The integers of one segment; with them come ath_motion's streams. */
 typedef struct ath_integers {

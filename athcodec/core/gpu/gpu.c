@@ -1,6 +1,8 @@
 /* The GPU form of levels and segments (ath_gpu.h): what a preparation places pieces and nodes with, as words. */
 #include "ath_gpu.h"
-#include "play/watch.h"
+#include "model/maps.h"
+#include "model/refine.h"
+#include "play/prepare.h"
 
 enum { SMALL_MAP = 24, STEM_WAVES = 0, NODE_WAVES = 1, LEARNED_WAVES = 2, INT16_MOST = 32767 };
 

@@ -1,6 +1,6 @@
 /* The orthonormal bases of the motion model: cantilever modes along a piece, affine functions of a sheet, waves in
  * time. FORMAT.md, "Bases", states the same operations in the same order; nothing here may be reordered. */
-#include "model/plan.h"
+#include "model/basis.h"
 
 #define PI 3.14159265358979323846
 #define HALF_ROOT_3 0.86602540378443864676

@@ -1,9 +1,9 @@
 /* Four doubles at a time. Every lane does what a scalar would, each operation rounded once, so that it makes no
  * difference how many lanes the machine has. */
-#ifndef ATH_LANES_H
-#define ATH_LANES_H
+#ifndef ATH_MODEL_LANES_H
+#define ATH_MODEL_LANES_H
 
-#include "bits/internal.h"
+#include "bits/platform.h"
 
 enum { ATH_LANES = 4 };
 

@@ -1,8 +1,8 @@
 /* Polygons, and what a rest pose that is coded by them needs to know (FORMAT.md, "Connected rest poses"). */
-#ifndef ATH_MESH_H
-#define ATH_MESH_H
+#ifndef ATH_MODEL_MESH_H
+#define ATH_MODEL_MESH_H
 
-#include "bits/internal.h"
+#include "bits/platform.h"
 
 /* Faces of at most so many corners and faces for each vertex serve a rest pose: what opening takes stays linear. */
 enum { MESH_CORNERS = 8, MESH_FACES = 4 };

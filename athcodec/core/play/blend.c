@@ -1,6 +1,7 @@
 /* Several clips at once: what each shows is taken apart into edges of stems and turned sheets, these are blended, and put
  * together again from the roots on. */
-#include "model/motion.h"
+#include "model/plan.h"
+#include "model/rotations.h"
 #include "play/segment.h"
 
 enum { SHEET_TURNS = 12 };

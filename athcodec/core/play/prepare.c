@@ -1,15 +1,18 @@
 /* Decodes the chunks of a segment into what is played: the streams of all levels side by side, piece by piece. A
  * piece is placed as soon as its integers are decoded, so that only attach caches are kept. */
-#include "streams/decode.h"
+#include "play/prepare.h"
 #include "bits/exact.inl"
-#include "play/kept.h"
-#include "model/lanes.h"
+#include "file/build.h"
+#include "model/maps.h"
+#include "model/refine.h"
+#include "play/join.h"
+#include "play/keep.h"
+#include "play/store.h"
+#include "streams/decode.h"
 #include "streams/motion_streams.inl"
 #include "streams/predict.h"
-#include "play/segment.h"
-#include "play/watch.h"
 
-enum { CHECKSUM_STEP = 1 << 16, TILE = 8, CACHE_LINE = 16 /* floats */, MOST_SHAPES = ATH_SHAPE_NUMBERS };
+enum { CHECKSUM_STEP = 1 << 16 };
 
 typedef enum { BEFORE, CHECKSUMS, HEADS, FRAMES, PIECES, DONE, FAILED } prepare_phase;
 
@@ -77,14 +80,6 @@ typedef struct {
     ath_watcher *watcher; /* null: none */
 } preparation;
 
-/* How a segment goes on where the one before it ends. */
-typedef struct {
-    double *maps;                                           /* ATH_END_FRAMES x nodes x ATH_MAP: the end of that one */
-    void *positions;                                        /* ATH_END_FRAMES x exact vertices x 3: likewise */
-    int32_t width;                                          /* frames; 0: it does not */
-    double jumps[ATH_JOIN_SLOPED], slopes[ATH_JOIN_SLOPED]; /* what is left of either at each of them */
-} ath_join;
-
 struct ath_work {
     const ath_file *file;
     ath_segment *segment;
@@ -147,8 +142,8 @@ static void carve_stems(ath_work *work, const ath_file *file, int32_t d, int32_t
 static void carve_layer(layer_work *layer, const ath_file *file, int32_t q, int32_t frames, ath_arena *arena)
 {
     uint64_t T = (uint64_t)frames, row = 3 * T * sizeof(int32_t), rows = (uint64_t)file->plan.longest * row;
-    layer->shape_integers = (int32_t *)ath_take(arena, MOST_SHAPES * ATH_SHAPE_NUMBERS * sizeof(int32_t));
-    layer->unit_shapes = (double *)ath_take(arena, MOST_SHAPES * ATH_SHAPE_NUMBERS * sizeof(double));
+    layer->shape_integers = (int32_t *)ath_take(arena, ATH_MOST_SHAPES * ATH_SHAPE_NUMBERS * sizeof(int32_t));
+    layer->unit_shapes = (double *)ath_take(arena, ATH_MOST_SHAPES * ATH_SHAPE_NUMBERS * sizeof(double));
     layer->rows.modes = (int32_t *)ath_take(arena, rows);
     layer->rows.rotation = (int32_t *)ath_take(arena, row);
     layer->rows.shift = (int32_t *)ath_take(arena, row);
@@ -162,23 +157,13 @@ static void carve_layer(layer_work *layer, const ath_file *file, int32_t q, int3
         (double *)ath_take(arena, (uint64_t)file->plan.attach_cache_rows * 3 * T * sizeof(double));
 }
 
-static size_t number_size(const ath_file *file) { return file->info.is_float64 ? sizeof(double) : sizeof(float); }
-
-/* Of any level. */
-static void carve_end(ath_join *join, const ath_file *file, ath_arena *arena)
-{
-    uint64_t nodes = (uint64_t)file->plan.node_count, vertices = (uint64_t)file->plan.vertex_count;
-    join->maps = (double *)ath_take(arena, ATH_END_FRAMES * nodes * ATH_MAP * sizeof(double));
-    join->positions = ath_take(arena, ATH_END_FRAMES * vertices * 3 * number_size(file));
-}
-
 static uint64_t carve_work(ath_work *work, const ath_file *file, int32_t frames, uint8_t *base)
 {
     ath_arena arena = {base, 0};
     uint64_t row = 3 * (uint64_t)frames * sizeof(int32_t);
     uint32_t affines = levels_with_affines(file);
     ath_take(&arena, sizeof *work);
-    if (file->has_joins) carve_end(&work->join, file, &arena);
+    if (file->has_joins) ath_carve_end(&work->join, file, &arena);
     for (int32_t d = 0; d < file->info.level_count; d++) {
         if (file->stems_levels >> d & 1) carve_stems(work, file, d, frames, &arena);
         if (affines >> d & 1) {
@@ -200,7 +185,7 @@ static uint64_t carve_work(ath_work *work, const ath_file *file, int32_t frames,
 static uint64_t carve_segment(ath_segment *segment, const ath_file *file, int32_t level, int32_t frames, uint8_t *base)
 {
     ath_arena arena = {base, 0};
-    uint64_t T = (uint64_t)frames, number = number_size(file);
+    uint64_t T = (uint64_t)frames, number = ath_number_size(file->info.is_float64);
     segment->frames = frames;
     segment->is_float64 = file->info.is_float64;
     ath_cut_size(file, level, &segment->part_count, &segment->node_count, &segment->exact_vertices);
@@ -225,36 +210,12 @@ size_t ath_segment_size(const ath_file *file, int32_t level)
     return ath_size_or_most(carve_segment(&counted, file, level, file->longest, 0));
 }
 
-/* ---- what is kept ---- */
-
-static int has_stream(const ath_file *file, int32_t d) { return file->stems_levels >> d & 1; }
-
-/* All of the plant at a precision that a stored level refines. */
-static int can_be_kept(const ath_file *file, int32_t level)
-{
-    return level > file->plan.height && level < ath_min(file->info.level_count, ath_lossy_levels(file)) - 1;
-}
-
-size_t ath_keep_size(const ath_file *file, int32_t level)
-{
-    const ath_plan *plan = &file->plan;
-    if (!can_be_kept(file, level)) return 0;
-    uint64_t T = (uint64_t)file->longest, pieces = (uint64_t)plan->piece_count, size = sizeof(kept_head);
-    size += ((uint64_t)plan->vertex_count + 2 * pieces) * kept_row_most(file->longest) + pieces * KEPT_NUMBER;
-    for (int32_t d = 0; d <= level; d++) {
-        if (!has_stream(file, d)) continue;
-        size += sizeof(kept_stream) + T * T * sizeof(float);
-        if (ath_file_chunk(file, ATH_SHAPES, d, 0)) size += pieces * MOST_SHAPES * kept_row_most(ATH_SHAPE_MODES);
-    }
-    return ath_size_or_most(size);
-}
-
 int ath_keep(ath_work *work, void *memory, size_t memory_bytes)
 {
     kept_head *head = (kept_head *)memory;
     if (!ath_fits(memory, memory_bytes, sizeof *head)) return ATH_NO_MEMORY;
     head->bytes = 0;
-    if (!can_be_kept(work->file, work->level)) return ATH_OK;
+    if (!ath_can_be_kept(work->file, work->level)) return ATH_OK;
     head->segment = work->index;
     head->level = work->level;
     work->asked.keeps = work->keeps = head;
@@ -273,8 +234,6 @@ int32_t ath_watched_level(const ath_work *work) { return work->asked.level; }
 /* Of the segment asked for, not of the one before it. */
 static ath_watcher *watcher_of(const ath_work *work) { return work->only_end ? 0 : work->asked.watcher; }
 
-size_t ath_kept_size(const void *kept) { return (size_t)((const kept_head *)kept)->bytes; }
-
 /* Waves that are not learned, by their root. */
 static void set_waves(const ath_work *work, ath_stream *stream, int32_t root)
 {
@@ -284,76 +243,16 @@ static void set_waves(const ath_work *work, ath_stream *stream, int32_t root)
     stream->root = root;
 }
 
-/* Of the waves of a basis that is learned. */
-static size_t learned_numbers(const ath_work *work, const ath_stream *stream)
-{
-    return stream->root < 0 ? 0 : (size_t)stream->temporal_rank * (size_t)work->segment->frames;
-}
-
-static void keep_streams(ath_work *work)
-{
-    for (int32_t d = 0; work->keeping.at && d <= work->level; d++) {
-        const ath_stream *stream = work->streams + d;
-        kept_stream kept = {stream->step, stream->rotation_step_factor, stream->turn_step, stream->temporal_rank,
-                            stream->root};
-        size_t learned = learned_numbers(work, stream);
-        if (!has_stream(work->file, d)) continue;
-        void *at = ath_kept_take(&work->keeping, sizeof kept);
-        if (at) memcpy(at, &kept, sizeof kept);
-        ath_keep_waves(&work->keeping, stream->temporal, learned);
-    }
-}
-
-static void keep_piece(ath_work *work, const ath_piece *piece)
-{
-    const layer_work *layer = work->layers + work->layer;
-    const ath_piece_rows *rows = &layer->rows;
-    int32_t T = layer->motion.frames, shapes = rows->shape_count;
-    ath_keep_number(&work->keeping, shapes);
-    for (int32_t s = 0; s < shapes; s++)
-        ath_keep_row(&work->keeping, layer->shape_integers + s * ATH_SHAPE_NUMBERS, ATH_SHAPE_MODES, ATH_SHAPE_MODES);
-    ath_keep_row(&work->keeping, rows->shift, T, layer->counts[SHIFT_SLOT]);
-    ath_keep_row(&work->keeping, rows->rotation, T, layer->counts[ROTATION_SLOT]);
-    for (int32_t m = 0; m < piece->count; m++)
-        ath_keep_row(&work->keeping, ath_row(rows->modes, m, T), T, layer->counts[m]);
-}
-
-/* Pieces follow. */
+/* Pieces follow the streams. */
 static void restore_streams(ath_work *work)
 {
     work->kept += sizeof(kept_head);
     for (int32_t d = 0; d < work->first_level; d++) {
-        kept_stream kept;
         ath_stream *stream = work->streams + d;
-        double *waves = work->stems[d].temporal;
-        if (!has_stream(work->file, d)) continue;
-        memcpy(&kept, work->kept, sizeof kept);
-        work->kept += sizeof kept;
-        stream->step = kept.step;
-        stream->rotation_step_factor = kept.rotation_step_factor;
-        stream->turn_step = kept.turn_step;
-        stream->temporal_rank = kept.temporal_rank;
-        stream->root = kept.root;
-        if (kept.root < 0) set_waves(work, stream, kept.root);
-        size_t learned = learned_numbers(work, stream);
-        work->kept = ath_kept_waves(work->kept, waves, learned);
-        if (learned > 0) stream->temporal = waves;
+        if (!ath_has_stream(work->file, d)) continue;
+        work->kept = ath_kept_stream(work->kept, stream, work->stems[d].temporal, work->segment->frames);
+        if (stream->root < 0) set_waves(work, stream, stream->root);
     }
-}
-
-static void restore_piece(ath_work *work, const ath_piece *piece)
-{
-    layer_work *layer = work->layers + work->first_layer;
-    ath_piece_rows *rows = &layer->rows;
-    int32_t T = layer->motion.frames, count;
-    work->kept = ath_kept_number(work->kept, &rows->shape_count);
-    for (int32_t s = 0; s < rows->shape_count; s++)
-        work->kept = ath_kept_row(work->kept, layer->shape_integers + s * ATH_SHAPE_NUMBERS, ATH_SHAPE_MODES, &count);
-    ath_unit_shapes(rows->shape_count, layer->shape_integers, layer->unit_shapes);
-    work->kept = ath_kept_row(work->kept, rows->shift, T, layer->counts + SHIFT_SLOT);
-    work->kept = ath_kept_row(work->kept, rows->rotation, T, layer->counts + ROTATION_SLOT);
-    for (int32_t m = 0; m < piece->count; m++)
-        work->kept = ath_kept_row(work->kept, ath_row(rows->modes, m, T), T, layer->counts + m);
 }
 
 /* ---- start ---- */
@@ -448,7 +347,7 @@ static void ready_layer(ath_work *work, int32_t q)
     layer->scratch = ath_motion_scratch(layer->plan, &layer->motion);
     layer->rows.counts = layer->counts;
     layer->rows.shapes = layer->unit_shapes;
-    memset(layer->shape_integers, 0, MOST_SHAPES * ATH_SHAPE_NUMBERS * sizeof(int32_t));
+    memset(layer->shape_integers, 0, ATH_MOST_SHAPES * ATH_SHAPE_NUMBERS * sizeof(int32_t));
     memset(layer->rows.modes, 0, (size_t)work->file->plan.longest * row);
     memset(layer->rows.rotation, 0, row);
     memset(layer->rows.shift, 0, row);
@@ -506,19 +405,6 @@ static int begin(ath_work *work, const preparation *asked, int32_t index, int32_
     return result;
 }
 
-/* Shares of a jump and of a slope, from 1 to 0 with level ends, that bend as little as any over so many frames: parabolas,
- * which turn where half of the way is left, or where 1 - sqrt(1/2) is. */
-static void set_join(ath_join *join, int32_t how)
-{
-    const double turn = 0.70710678118654752440, bend = 0.5 + turn;
-    join->width = how % ATH_JOIN_SLOPED;
-    for (int32_t t = 0; t < join->width; t++) {
-        double w = (double)join->width, u = ((double)t + 0.5) / w, left = 1.0 - u;
-        join->jumps[t] = u < 0.5 ? 1.0 - 2.0 * u * u : 2.0 * left * left;
-        join->slopes[t] = how < ATH_JOIN_SLOPED ? 0.0 : w * (u < turn ? u - bend * u * u : bend * left * left);
-    }
-}
-
 /* `before` and `kept`: what was prepared before, null: nothing. */
 static int start(void *memory, size_t work_bytes, const ath_file *file, int32_t index, int32_t level,
                  void *segment_memory, size_t segment_bytes, const ath_segment *before, const void *kept)
@@ -541,7 +427,7 @@ static int start(void *memory, size_t work_bytes, const ath_file *file, int32_t 
     memset(work, 0, sizeof *work);
     int result = begin(work, &asked, index, level), join = ath_join_at(file, index, level);
     if (result != ATH_OK || join == 0 || work->shown_before) return result; /* that is joined */
-    set_join(&work->join, join);
+    ath_set_join(&work->join, join);
     work->phase = BEFORE;
     return ATH_OK;
 }
@@ -552,22 +438,12 @@ int ath_prepare_start(void *memory, size_t work_bytes, const ath_file *file, int
     return start(memory, work_bytes, file, index, level, segment_memory, segment_bytes, 0, 0);
 }
 
-/* The end of a prepared segment, for the one that is joined to it. */
-static void take_end(ath_join *join, const ath_segment *before)
-{
-    size_t maps = ATH_END_FRAMES * (size_t)before->node_count * ATH_MAP;
-    size_t all_maps = (size_t)before->frames * (size_t)before->node_count * ATH_MAP;
-    size_t number = before->is_float64 ? sizeof(double) : sizeof(float);
-    memcpy(join->maps, before->maps + (all_maps - maps), maps * sizeof(double));
-    memcpy(join->positions, before->end, ATH_END_FRAMES * 3 * (size_t)before->exact_vertices * number);
-}
-
 int ath_follow(ath_work *work, const ath_segment *before)
 {
     if (work->phase != BEFORE) return ATH_OK;
     if (before->index != ath_segment_before(work->file, work->index) || before->level != work->level)
         return ATH_BAD_ARGUMENT;
-    take_end(&work->join, before);
+    ath_take_end(&work->join, before);
     work->phase = CHECKSUMS;
     return ATH_OK;
 }
@@ -601,8 +477,8 @@ static int go_back(ath_work *work)
 static int go_on(ath_work *work)
 {
     preparation asked = work->asked;
-    take_end(&work->join, work->segment);
-    set_join(&work->join, ath_join_at(work->file, asked.index, asked.level));
+    ath_take_end(&work->join, work->segment);
+    ath_set_join(&work->join, ath_join_at(work->file, asked.index, asked.level));
     return begin(work, &asked, asked.index, asked.level);
 }
 
@@ -766,7 +642,9 @@ static int open_level(ath_work *work)
             coder_start(&work->exact_level.coder, work->exact_level.chunk->bytes, work->exact_level.chunk->length);
         }
         next_phase(work, work->predicted ? FRAMES : PIECES);
-        keep_streams(work);
+        for (int32_t k = 0; work->keeping.at && k <= work->level; k++)
+            if (ath_has_stream(work->file, k))
+                ath_keep_stream(&work->keeping, work->streams + k, work->segment->frames);
         if (work->predicted) return open_predicted(work);
         return chunk ? blame(work, chunk, open_corrections(&work->corrections)) : ATH_OK;
     }
@@ -905,56 +783,6 @@ static int refine_piece(ath_work *work, int32_t q, int32_t p, const double **pla
     return ATH_OK;
 }
 
-/* The memory behind a piece in some frames, which the next one fills: fetched while that is decoded. */
-ATH_INLINE void expect_next(float *next, int32_t rows, int32_t start, int32_t stop, size_t frame_size)
-{
-    for (int32_t r = 0; r < rows; r += CACHE_LINE)
-        for (int32_t t = start; t < stop; t++)
-            ath_expect_write((uintptr_t)next + ((size_t)t * frame_size + (size_t)(r + CACHE_LINE - 1)) * sizeof *next);
-}
-
-/* Transposes rows over time into frames. */
-ATH_HOT static void store_floats(const double *placed, int32_t rows, int32_t T, const double origin[3], float *out,
-                                 size_t frame_size)
-{
-    double added[3 + ATH_LANES];
-    int32_t whole = rows - rows % ATH_LANES;
-    for (int32_t i = 0; i < 3 + ATH_LANES; i++) added[i] = origin[i % 3];
-    for (int32_t start = 0; start < T; start += TILE) {
-        int32_t stop = ath_min(start + TILE, T), squares = start + (stop - start) / ATH_LANES * ATH_LANES;
-        expect_next(out + rows, rows, start, stop, frame_size);
-        for (int32_t r = 0; r < rows; r += ATH_LANES) {
-            const double *from = placed + (size_t)r * (size_t)T;
-            float *to = out + r;
-            int32_t t = start;
-            for (; r < whole && t < squares; t += ATH_LANES)
-                lanes_transpose(from + t, (size_t)T, added + r % 3, to + (size_t)t * frame_size, frame_size);
-            for (; t < stop; t++)
-                for (int32_t i = 0; i < ath_min(ATH_LANES, rows - r); i++)
-                    to[(size_t)t * frame_size + (size_t)i] = (float)(from[i * T + t] + added[r % 3 + i]);
-        }
-    }
-}
-
-static void store_doubles(const double *placed, int32_t rows, int32_t T, const double origin[3], double *out,
-                          size_t frame_size)
-{
-    for (int32_t r = 0; r < rows; r++)
-        for (int32_t t = 0; t < T; t++)
-            out[(size_t)t * frame_size + (size_t)r] = placed[(size_t)r * (size_t)T + (size_t)t] + origin[r % 3];
-}
-
-static void store_piece(ath_work *work, const ath_piece *piece, const double *placed)
-{
-    ath_segment *segment = work->segment;
-    size_t at = 3 * (size_t)work->exact, frame_size = 3 * (size_t)segment->exact_vertices;
-    const double *origin = work->file->info.origin;
-    if (segment->is_float64)
-        store_doubles(placed, 3 * piece->count, segment->frames, origin, (double *)segment->positions + at, frame_size);
-    else
-        store_floats(placed, 3 * piece->count, segment->frames, origin, (float *)segment->positions + at, frame_size);
-}
-
 static void correct(ath_segment *segment, size_t at, double parts, double step)
 {
     if (parts == 0.0) return;
@@ -1006,8 +834,7 @@ static int read_exact_point(ath_work *work, size_t at)
     exact_reader *reader = &work->exact_level;
     double known[3], number[3];
     for (size_t k = 0; k < 3; k++)
-        known[k] = work->segment->is_float64 ? ((const double *)work->segment->positions)[at + k]
-                                             : (double)((const float *)work->segment->positions)[at + k];
+        known[k] = ath_number_at(work->segment->positions, at + k, work->segment->is_float64);
     if (!code_exact_point(&reader->coder, reader->model, work->segment->is_float64, known, reader->length, number))
         return 0;
     for (size_t k = 0; k < 3; k++) {
@@ -1030,108 +857,6 @@ static int make_exact(ath_work *work, const ath_piece *piece)
     return ATH_OK;
 }
 
-/* Of frames of exact vertices, as many as the segment has. */
-static void *vertex_at(const ath_segment *segment, void *frames, size_t t, size_t vertex)
-{
-    size_t at = 3 * (t * (size_t)segment->exact_vertices + vertex);
-    return (uint8_t *)frames + at * (segment->is_float64 ? sizeof(double) : sizeof(float));
-}
-
-/* Keeps the end of the piece as it is placed. */
-static void keep_end(ath_work *work, const ath_piece *piece)
-{
-    ath_segment *segment = work->segment;
-    size_t vertex = (size_t)work->exact, frames = (size_t)segment->frames;
-    size_t size = 3 * (size_t)piece->count * number_size(work->file);
-    if (!segment->end || frames < ATH_END_FRAMES) return;
-    for (size_t t = 0; t < ATH_END_FRAMES; t++)
-        memcpy(vertex_at(segment, segment->end, t, vertex),
-               vertex_at(segment, segment->positions, frames - ATH_END_FRAMES + t, vertex), size);
-}
-
-/* How far numbers are off where the two that end the segment before go on to, in value and in slope, midway between that
- * and their own first two. */
-ATH_INLINE void set_off(double start, double end, double first, double second, double off[2])
-{
-    off[0] = 0.5 * (3.0 * (end - first) - (start - second));
-    off[1] = (end - start) - (second - first);
-}
-
-ATH_INLINE double joined(const ath_join *join, int32_t t, double x, const double off[2])
-{
-    return x + (off[0] * join->jumps[t] + off[1] * join->slopes[t]);
-}
-
-ATH_HOT static void join_floats(const ath_join *join, const float *start, const float *end, float *x, size_t count,
-                                size_t frame_size)
-{
-    double off[3 * ATH_PIECE_VERTICES][2];
-    for (size_t i = 0; i < count; i++)
-        set_off((double)start[i], (double)end[i], (double)x[i], (double)x[frame_size + i], off[i]);
-    for (int32_t t = 0; t < join->width; t++, x += frame_size)
-        for (size_t i = 0; i < count; i++) x[i] = (float)joined(join, t, (double)x[i], off[i]);
-}
-
-static void join_doubles(const ath_join *join, const double *start, const double *end, double *x, size_t count,
-                         size_t frame_size)
-{
-    double off[3 * ATH_PIECE_VERTICES][2];
-    for (size_t i = 0; i < count; i++) set_off(start[i], end[i], x[i], x[frame_size + i], off[i]);
-    for (int32_t t = 0; t < join->width; t++, x += frame_size)
-        for (size_t i = 0; i < count; i++) x[i] = joined(join, t, x[i], off[i]);
-}
-
-static double join_number(const void *numbers, size_t at, int is_float64)
-{
-    return is_float64 ? ((const double *)numbers)[at] : (double)((const float *)numbers)[at];
-}
-
-static void watch_join(const ath_work *work, const void *start, const void *end, const void *x, size_t count,
-                       size_t frame_size, int is_float64)
-{
-    double off[3 * ATH_PIECE_VERTICES][2];
-    ath_watcher *watcher = watcher_of(work);
-    const ath_join *join = &work->join;
-    if (!watcher) return;
-    for (size_t i = 0; i < count; i++)
-        set_off(join_number(start, i, is_float64), join_number(end, i, is_float64), join_number(x, i, is_float64),
-                join_number(x, frame_size + i, is_float64), off[i]);
-    watcher->join(watcher, join->width, join->jumps, join->slopes, (int32_t)count, off);
-}
-
-static void join_piece(ath_work *work, const ath_piece *piece)
-{
-    ath_segment *segment = work->segment;
-    const ath_join *join = &work->join;
-    size_t vertex = (size_t)work->exact, count = 3 * (size_t)piece->count,
-           frame_size = 3 * (size_t)segment->exact_vertices;
-    const void *start = vertex_at(segment, join->positions, 0, vertex);
-    const void *end = vertex_at(segment, join->positions, 1, vertex);
-    watch_join(work, start, end, vertex_at(segment, segment->positions, 0, vertex), count, frame_size,
-               segment->is_float64);
-    if (segment->is_float64)
-        join_doubles(join, (const double *)start, (const double *)end, (double *)segment->positions + 3 * vertex, count,
-                     frame_size);
-    else
-        join_floats(join, (const float *)start, (const float *)end, (float *)segment->positions + 3 * vertex, count,
-                    frame_size);
-}
-
-/* The piece as the level before, the last lossy one, shows it. */
-static void copy_piece(ath_work *work, const ath_piece *piece)
-{
-    const ath_segment *from = work->shown_before;
-    size_t number = from->is_float64 ? sizeof(double) : sizeof(float), row = 3 * number;
-    for (size_t t = 0; t < (size_t)from->frames; t++) {
-        size_t at = (t * (size_t)from->exact_vertices + (size_t)work->exact) * row;
-        memcpy((uint8_t *)work->segment->positions + at, (const uint8_t *)from->positions + at,
-               (size_t)piece->count * row);
-    }
-    for (size_t t = 0; from->end && t < ATH_END_FRAMES; t++)
-        memcpy(vertex_at(from, work->segment->end, t, (size_t)work->exact),
-               vertex_at(from, from->end, t, (size_t)work->exact), (size_t)piece->count * row);
-}
-
 static int do_frames(ath_work *work)
 {
     int result = ath_prediction_step(work->prediction);
@@ -1151,14 +876,18 @@ static int place_piece(ath_work *work, int32_t p)
 {
     const ath_piece *piece = work->file->plan.pieces + p;
     layer_work *layer = work->layers + work->first_layer;
+    size_t vertex = (size_t)work->exact;
     const double *placed = ath_pose_piece(layer->plan, &layer->motion, p, &layer->rows, &layer->scratch);
     for (int32_t q = work->first_layer + 1; q <= work->layer; q++)
         if (refine_piece(work, q, p, &placed) != ATH_OK) return ATH_BAD_CHUNK;
-    if (work->keeping.at) keep_piece(work, piece);
+    layer = work->layers + work->layer;
+    if (work->keeping.at)
+        ath_keep_piece(&work->keeping, piece, &layer->rows, layer->shape_integers, layer->motion.frames);
     if (watcher_of(work)) watch_piece(work, p);
-    store_piece(work, piece, placed);
-    keep_end(work, piece);
-    if (work->join.width > 0) join_piece(work, piece);
+    ath_store_vertices(work->segment, work->file->info.origin, vertex, piece->count, placed);
+    ath_keep_end(work->segment, vertex, (size_t)piece->count);
+    if (work->join.width > 0)
+        ath_join_vertices(&work->join, work->segment, vertex, (size_t)piece->count, watcher_of(work));
     if (work->corrections.chunk) correct_piece(work, piece);
     return ATH_OK;
 }
@@ -1167,7 +896,7 @@ static int show_piece(ath_work *work, int32_t p)
 {
     const ath_piece *piece = work->file->plan.pieces + p;
     if (work->shown_before)
-        copy_piece(work, piece);
+        ath_copy_vertices(work->segment, work->shown_before, (size_t)work->exact, (size_t)piece->count);
     else if (!work->predicted && place_piece(work, p) != ATH_OK)
         return ATH_BAD_CHUNK;
     int result = work->exact_level.chunk ? make_exact(work, piece) : ATH_OK;
@@ -1189,10 +918,7 @@ static void show_node(ath_work *work, int32_t n)
         for (size_t k = 0; k < 9; k++) map[k] = layer->scratch.at.rotation[k * T + t];
         for (size_t k = 0; k < 3; k++) map[9 + k] = layer->scratch.at.point[k * T + t];
     }
-    if (work->join.width == 0) return;
-    const double *end = work->join.maps + (maps - segment->maps);
-    watch_join(work, end, end + nodes * ATH_MAP, maps, ATH_MAP, nodes * ATH_MAP, 1);
-    join_doubles(&work->join, end, end + nodes * ATH_MAP, maps, ATH_MAP, nodes * ATH_MAP);
+    if (work->join.width > 0) ath_join_map(&work->join, segment, (size_t)(work->shown - 1), watcher);
 }
 
 static int read_node(ath_work *work, int32_t n)
@@ -1241,8 +967,11 @@ static int do_piece(ath_work *work)
     int32_t p = work->next++, result = ATH_OK;
     if (p == plan->piece_count) return finish(work);
     const ath_piece *piece = plan->pieces + p;
+    layer_work *first = work->layers + work->first_layer;
     if (work->first_level == 0 && !work->file->header.is_predicted) result = read_first_layer(work, p);
-    if (work->kept) restore_piece(work, piece);
+    if (work->kept)
+        work->kept = ath_kept_piece(work->kept, piece, &first->rows, first->shape_integers, first->unit_shapes,
+                                    first->motion.frames);
     if (result == ATH_OK && work->next_node < plan->node_count && plan->nodes[work->next_node].piece == p) {
         int32_t n = work->next_node++;
         result = read_node(work, n);

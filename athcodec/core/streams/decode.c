@@ -1,7 +1,10 @@
 /* Decodes the streams of the prelude: streams.h compiled for decoding. */
 #include "streams/decode.h"
+#include "streams/hierarchy.inl"
 #include "streams/polygons.inl"
-#include "streams/prelude.inl"
+#include "streams/rest_exact.inl"
+#include "streams/series.inl"
+#include "streams/source_rest.inl"
 
 size_t ath_prelude_model_size(void)
 {

@@ -1,8 +1,8 @@
 /* Decodes the streams of the prelude and of a learned time basis. */
-#ifndef ATH_DECODE_H
-#define ATH_DECODE_H
+#ifndef ATH_STREAMS_DECODE_H
+#define ATH_STREAMS_DECODE_H
 
-#include "file/container.h"
+#include "container/container.h"
 #include "model/mesh.h"
 #include "model/plan.h"
 

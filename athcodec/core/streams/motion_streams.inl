@@ -1,9 +1,11 @@
 /* What the streams of a segment hold, in which order: stems, maps of nodes, corrections. Compiled once for each
  * direction, as streams.h is; a unit at a time, so that a decoder reads all levels side by side, piece by piece. */
-#ifndef ATH_MOTION_STREAMS_H
-#define ATH_MOTION_STREAMS_H
+#ifndef ATH_STREAMS_MOTION_STREAMS_INL
+#define ATH_STREAMS_MOTION_STREAMS_INL
 
 #include "bits/refinements.inl"
+#include "model/corrections.h"
+#include "model/refine.h"
 
 /* ---- shapes ---- */
 

@@ -1,8 +1,8 @@
 /* The corners of polygons, or the ends of edges (FORMAT.md, "Polygon stream"). Compiled once for each direction. */
-#ifndef ATH_FACES_MODEL_H
-#define ATH_FACES_MODEL_H
+#ifndef ATH_STREAMS_POLYGONS_INL
+#define ATH_STREAMS_POLYGONS_INL
 
-#include "file/container.h"
+#include "container/container.h"
 #include "model/mesh.h"
 #include "bits/numbers.inl"
 

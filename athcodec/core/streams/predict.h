@@ -1,8 +1,8 @@
 /* Predicted motion: PREDICTED of a segment, decoded in steps. */
-#ifndef ATH_PREDICT_H
-#define ATH_PREDICT_H
+#ifndef ATH_STREAMS_PREDICT_H
+#define ATH_STREAMS_PREDICT_H
 
-#include "file/container.h"
+#include "container/container.h"
 #include "model/plan.h"
 
 typedef struct ath_prediction ath_prediction;

@@ -1,9 +1,9 @@
 /* What PREDICTED holds of a segment (FORMAT.md, "Predicted motion"): frame by frame, each vertex about a prediction from
  * what is decoded. Compiled once for each direction, as streams.h is. */
-#ifndef ATH_PREDICTED_MODEL_H
-#define ATH_PREDICTED_MODEL_H
+#ifndef ATH_STREAMS_PREDICTED_INL
+#define ATH_STREAMS_PREDICTED_INL
 
-#include "file/container.h"
+#include "container/container.h"
 #include "bits/lattice.inl"
 #include "model/plan.h"
 

@@ -1,7 +1,7 @@
 /* Where a vertex of a connected rest pose is expected, from those beside it in its faces (FORMAT.md, "Connected rest
  * poses"). Guesses are weighed and learned as elsewhere (rest_predictor.h). */
-#ifndef ATH_REST_CONNECTED_H
-#define ATH_REST_CONNECTED_H
+#ifndef ATH_STREAMS_REST_CONNECTED_INL
+#define ATH_STREAMS_REST_CONNECTED_INL
 
 #include "model/mesh.h"
 #include "streams/rest_predictor.inl"

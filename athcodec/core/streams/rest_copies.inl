@@ -1,7 +1,7 @@
 /* Parts of a rest pose that are copies of one shape: turned, scaled and mirrored (FORMAT.md, "Copies").
  * Compiled once for each direction. */
-#ifndef ATH_REST_COPIES_H
-#define ATH_REST_COPIES_H
+#ifndef ATH_STREAMS_REST_COPIES_INL
+#define ATH_STREAMS_REST_COPIES_INL
 
 #include "streams/rest_predictor.inl"
 

@@ -1,7 +1,7 @@
 /* Where the vertices that are coded one by one are expected, learned from those before (FORMAT.md, "Single
  * vertices"). Offsets are in units of the lattice, from the vertex before. */
-#ifndef ATH_REST_PREDICTOR_H
-#define ATH_REST_PREDICTOR_H
+#ifndef ATH_STREAMS_REST_PREDICTOR_INL
+#define ATH_STREAMS_REST_PREDICTOR_INL
 
 #include "bits/lattice.inl"
 

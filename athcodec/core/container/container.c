@@ -1,5 +1,5 @@
 /* Front and heads of chunks: read with every check that FORMAT.md asks for, in its order. */
-#include "streams/front.inl"
+#include "container/front.inl"
 
 enum { HEADER_SIZE = 24, CHECKSUM_SIZE = 4, CHECKSUM_AT = 12, TABLE_ENTRY = 16, MOST_SHIFT = 15 };
 
@@ -165,6 +165,29 @@ int ath_read_header(const uint8_t *bytes, size_t available, const ath_limits *li
 static int32_t kind_id(const ath_chunk *chunk) { return chunk->kind & ~ATH_OPTIONAL; }
 
 int ath_is_motion(const ath_chunk *chunk) { return kind_id(chunk) >= 16 && kind_id(chunk) < 32; }
+
+const char *ath_kind_name(int kind)
+{
+    switch (kind) {
+    case ATH_HIERARCHY: return "HIERARCHY";
+    case ATH_REST: return "REST";
+    case ATH_TIME: return "TIME";
+    case ATH_METADATA: return "METADATA";
+    case ATH_FACES: return "FACES";
+    case ATH_EDGES: return "EDGES";
+    case ATH_CLIPS: return "CLIPS";
+    case ATH_SOURCE_REST: return "SOURCE_REST";
+    case ATH_STEMS: return "STEMS";
+    case ATH_AFFINES: return "AFFINES";
+    case ATH_CORRECTIONS: return "CORRECTIONS";
+    case ATH_SHAPES: return "SHAPES";
+    case ATH_EXACT: return "EXACT";
+    case ATH_REFINED_REST: return "REFINED_REST";
+    case ATH_PREDICTED: return "PREDICTED";
+    case ATH_ATTRIBUTE: return "ATTRIBUTE";
+    default: return 0;
+    }
+}
 
 static int is_refused(int kind)
 {

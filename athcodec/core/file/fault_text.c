@@ -1,4 +1,4 @@
-/* Text for people: why a file was refused, the numbers and the sentence that is written from them; what a level is. */
+/* Text for people: names of results and levels, and the sentence that says why a file is refused. */
 #include "file/file.h"
 
 const char *ath_result_name(int result)
@@ -22,52 +22,6 @@ const char *ath_result_name(int result)
     if (result >= 0 && result < (int)(sizeof errors / sizeof *errors)) return errors[result];
     int call = result - ATH_MORE;
     return call >= 0 && call < (int)(sizeof calls / sizeof *calls) ? calls[call] : "UNKNOWN";
-}
-
-int ath_refuse(ath_fault_info *fault, int code, ath_field field, double found, double least, double most)
-{
-    memset(fault, 0, sizeof *fault);
-    fault->code = code;
-    fault->field = (int32_t)field;
-    fault->chunk = -1;
-    fault->level = ATH_NO_LEVEL;
-    fault->found = found;
-    fault->least = least;
-    fault->most = most;
-    return code;
-}
-
-int ath_fault_at(ath_fault_info *fault, const ath_chunk *chunk, int32_t index)
-{
-    fault->chunk = index;
-    fault->kind = chunk->kind;
-    fault->level = chunk->level;
-    fault->segment = chunk->segment;
-    fault->offset = chunk->offset;
-    return fault->code;
-}
-
-const char *ath_kind_name(int kind)
-{
-    switch (kind) {
-    case ATH_HIERARCHY: return "HIERARCHY";
-    case ATH_REST: return "REST";
-    case ATH_TIME: return "TIME";
-    case ATH_METADATA: return "METADATA";
-    case ATH_FACES: return "FACES";
-    case ATH_EDGES: return "EDGES";
-    case ATH_CLIPS: return "CLIPS";
-    case ATH_SOURCE_REST: return "SOURCE_REST";
-    case ATH_STEMS: return "STEMS";
-    case ATH_AFFINES: return "AFFINES";
-    case ATH_CORRECTIONS: return "CORRECTIONS";
-    case ATH_SHAPES: return "SHAPES";
-    case ATH_EXACT: return "EXACT";
-    case ATH_REFINED_REST: return "REFINED_REST";
-    case ATH_PREDICTED: return "PREDICTED";
-    case ATH_ATTRIBUTE: return "ATTRIBUTE";
-    default: return 0;
-    }
 }
 
 /* ---- writing ---- */

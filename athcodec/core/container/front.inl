@@ -1,9 +1,9 @@
 /* The stream at the front of a file (FORMAT.md, "Front stream"): counts, keys and lengths of chunks, announced errors.
  * Compiled once for each direction. */
-#ifndef ATH_FRONT_MODEL_H
-#define ATH_FRONT_MODEL_H
+#ifndef ATH_CONTAINER_FRONT_INL
+#define ATH_CONTAINER_FRONT_INL
 
-#include "file/container.h"
+#include "container/container.h"
 #include "bits/numbers.inl"
 
 enum { KNOWN_KINDS = 16, KIND_BITS = 5, SIZE_BITS = 30 };

@@ -1,9 +1,9 @@
 /* The bytes of an .ath file (FORMAT.md, "File"): with container.py, which writes them, the only place that knows
  * offsets. */
-#ifndef ATH_CONTAINER_H
-#define ATH_CONTAINER_H
+#ifndef ATH_CONTAINER_CONTAINER_H
+#define ATH_CONTAINER_CONTAINER_H
 
-#include "bits/internal.h"
+#include "container/refuse.h"
 
 typedef struct ath_header {
     uint64_t file_length, front_length;
@@ -15,10 +15,6 @@ typedef struct ath_header {
 
 /* Announced errors: so many floats without sign, of which the top bits of binary32 are stored, shifted. */
 enum { ATH_SHORT_SHIFT = 18, ATH_SHORT_FLOATS = 255 << 5 };
-
-/* Fills in a fault, and the chunk that it is about. Both return its code. */
-int ath_refuse(ath_fault_info *fault, int code, ath_field field, double found, double least, double most);
-int ath_fault_at(ath_fault_info *fault, const ath_chunk *chunk, int32_t index);
 
 /* Both fill *needed: bytes wanted from the front on ATH_MISSING, on ATH_OK those up to the first chunk, or the
  * prelude. */

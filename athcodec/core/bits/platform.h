@@ -2,8 +2,8 @@
  *
  * Every sum runs in the order that FORMAT.md states, over doubles, with contraction to FMA off, so that all decoders
  * agree bit for bit. Hot loops run over frames: lanes are independent, and any SIMD width gives the same result. */
-#ifndef ATH_INTERNAL_H
-#define ATH_INTERNAL_H
+#ifndef ATH_BITS_PLATFORM_H
+#define ATH_BITS_PLATFORM_H
 
 #include "ath.h"
 
@@ -78,14 +78,8 @@ void *memset(void *to, int value, size_t size);
 #define ath_sqrt sqrt
 #endif
 
-enum {
-    ATH_PIECE_VERTICES = 64,  /* longest piece of a stem */
-    ATH_SEGMENT_FRAMES = 256, /* longest segment */
-    ATH_LEVELS = 32,          /* most levels */
-    ATH_LAYERS = 8            /* most layers of precision */
-};
-
 ATH_INLINE int32_t ath_min(int32_t a, int32_t b) { return a < b ? a : b; }
+ATH_INLINE uint64_t ath_larger(uint64_t a, uint64_t b) { return a > b ? a : b; }
 ATH_INLINE int32_t ath_max(int32_t a, int32_t b) { return a > b ? a : b; }
 
 /* Rounded to float. GCC 12 at -O2 puts two of these side by side into one vector and forgets to round; volatile

@@ -1,0 +1,11 @@
+/* Faults: what was found where, and what was expected. */
+#ifndef ATH_CONTAINER_REFUSE_H
+#define ATH_CONTAINER_REFUSE_H
+
+#include "bits/format.h"
+
+/* Each fills in the fault, or the chunk that it is about, and returns its code. */
+int ath_refuse(ath_fault_info *fault, int code, ath_field field, double found, double least, double most);
+int ath_fault_at(ath_fault_info *fault, const ath_chunk *chunk, int32_t index);
+
+#endif
