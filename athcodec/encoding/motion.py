@@ -45,7 +45,7 @@ RANGES, LEAST_RANGE = 24, 1024  # of a plant's vertices per thread and call
 RUN, RUNS = 64, 2  # vertices of a run, and how many runs there are for each in a sample
 
 
-class Waves(IntEnum):  # core/model/plan.h
+class Waves(IntEnum):  # core/model/basis.h
     """Eigenvectors of third differences, a Fourier series, modes of a free beam."""
 
     SMOOTH, PERIODIC, BEAM = range(3)

@@ -1,4 +1,5 @@
 /* Front and heads of chunks: read with every check that FORMAT.md asks for, in its order. */
+#include "container/container.h"
 #include "container/front.inl"
 
 enum { HEADER_SIZE = 24, CHECKSUM_SIZE = 4, CHECKSUM_AT = 12, TABLE_ENTRY = 16, MOST_SHIFT = 15 };
@@ -162,10 +163,6 @@ int ath_read_header(const uint8_t *bytes, size_t available, const ath_limits *li
 
 /* ---- tables ---- */
 
-static int32_t kind_id(const ath_chunk *chunk) { return chunk->kind & ~ATH_OPTIONAL; }
-
-int ath_is_motion(const ath_chunk *chunk) { return kind_id(chunk) >= 16 && kind_id(chunk) < 32; }
-
 const char *ath_kind_name(int kind)
 {
     switch (kind) {
@@ -199,7 +196,7 @@ static uint64_t key_of(const ath_chunk *chunk)
 {
     if (ath_is_motion(chunk))
         return (uint64_t)1 << 62 | (uint64_t)chunk->level << 48 | (uint64_t)chunk->segment << 16 | chunk->kind;
-    return (uint64_t)(kind_id(chunk) < 16 ? 0 : 2) << 62 | (uint64_t)kind_id(chunk);
+    return (uint64_t)(ath_kind_id(chunk) < 16 ? 0 : 2) << 62 | (uint64_t)ath_kind_id(chunk);
 }
 
 static int is_bad_chunk(const ath_limits *limits, const ath_header *header, const ath_chunk *chunk, int32_t level,
@@ -233,7 +230,7 @@ static int read_chunks(ath_coder *coder, const uint8_t *checksums, const ath_lim
         chunk.level = (uint8_t)(ath_is_motion(&chunk) ? ath_min(model.level, ATH_NO_LEVEL) : (int32_t)ATH_NO_LEVEL);
         chunk.bytes = chunk.length == 0 ? checksums : 0; /* there is nothing to wait for */
         uint64_t key = key_of(&chunk);
-        int repeatable = chunk.kind & ATH_OPTIONAL && kind_id(&chunk) >= 32;
+        int repeatable = chunk.kind & ATH_OPTIONAL && ath_kind_id(&chunk) >= 32;
         int in_order = i == 0 || key > key_before || (key == key_before && repeatable);
         if (is_bad_chunk(limits, header, &chunk, model.level, fault)
             || is_outside(fault, ATH_BAD_CHUNK_TABLE, ATH_FIELD_CHUNK_PLACE, i, 0, in_order ? i : i - 1.0))

@@ -3,18 +3,8 @@
 #ifndef ATH_CONTAINER_CONTAINER_H
 #define ATH_CONTAINER_CONTAINER_H
 
+#include "container/header.h"
 #include "container/refuse.h"
-
-typedef struct ath_header {
-    uint64_t file_length, front_length;
-    double max_error;
-    uint32_t chunk_count, vertex_count, branch_count, frame_count, segment_count;
-    int32_t level_count, full_level_count, clip_count, layer_count, is_float64, is_predicted;
-    int32_t has_faces; /* of the chunk table */
-} ath_header;
-
-/* Announced errors: so many floats without sign, of which the top bits of binary32 are stored, shifted. */
-enum { ATH_SHORT_SHIFT = 18, ATH_SHORT_FLOATS = 255 << 5 };
 
 /* Both fill *needed: bytes wanted from the front on ATH_MISSING, on ATH_OK those up to the first chunk, or the
  * prelude. */
@@ -31,7 +21,6 @@ uint32_t ath_first_chunk(const ath_chunk *chunks, uint32_t chunk_count, int32_t 
 /* The chunk of this kind, or null. Level ATH_NO_LEVEL and segment 0 for those of the prelude. */
 const ath_chunk *ath_find_chunk(const ath_chunk *chunks, uint32_t chunk_count, int32_t kind, int32_t level,
                                 uint32_t segment);
-int ath_is_motion(const ath_chunk *chunk);
 
 /* ---- heads of chunks: ATH_OK or ATH_BAD_CHUNK; `body` is what follows the head ---- */
 

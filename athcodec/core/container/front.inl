@@ -3,7 +3,7 @@
 #ifndef ATH_CONTAINER_FRONT_INL
 #define ATH_CONTAINER_FRONT_INL
 
-#include "container/container.h"
+#include "container/header.h"
 #include "bits/numbers.inl"
 
 enum { KNOWN_KINDS = 16, KIND_BITS = 5, SIZE_BITS = 30 };
