@@ -1,10 +1,10 @@
-/* Front and heads of chunks: read with every check that FORMAT.md asks for, in its order. */
+/* Reads the front and the heads of chunks, with the checks of FORMAT.md in its order. */
 #include "container/container.h"
 #include "container/front.inl"
 
 enum { HEADER_SIZE = 24, CHECKSUM_SIZE = 4, CHECKSUM_AT = 12, TABLE_ENTRY = 16, MOST_SHIFT = 15 };
 
-static const uint32_t MOST_COUNT = 1u << 30; /* of anything, whatever the limits are */
+static const uint32_t MOST_COUNT = 1u << 30; /* largest count of anything, whatever the limits are */
 
 static const double LARGEST = 1.7976931348623157e308;
 
@@ -50,7 +50,7 @@ static uint32_t word_at(const uint8_t *bytes, size_t available, size_t at)
     return word;
 }
 
-/* Before 1.0 any version may change anything, so that both numbers have to be known. */
+/* In format 0.x a minor version may change anything, so both numbers have to match. */
 static int check_version(uint32_t major, uint32_t minor, uint32_t features, ath_fault_info *fault)
 {
     double known = (double)(ATH_FORMAT_MAJOR << 8 | ATH_FORMAT_MINOR), found = (double)(major << 8 | minor);
@@ -73,7 +73,7 @@ static int check_magic(const uint8_t *bytes, size_t available, ath_fault_info *f
     return check_version(bytes[8], bytes[9], u16_at(bytes + 10), fault);
 }
 
-/* Whether the value is none of those allowed: then the fault is filled in. */
+/* Returns the code, and fills in the fault, if the value is out of range; else 0. */
 static int is_outside(ath_fault_info *fault, int code, ath_field field, double found, double least, double most)
 {
     return !(found >= least && found <= most) && ath_refuse(fault, code, field, found, least, most);
@@ -117,7 +117,7 @@ static uint32_t front_checksum(const uint8_t *bytes, uint64_t size)
     return ath_crc32c(crc, bytes + CHECKSUM_AT + 4, (size_t)size - CHECKSUM_AT - 4);
 }
 
-/* Front_Length and Chunk_Count, and all of the front by its checksum. */
+/* Checks Front_Length, Chunk_Count and the checksum of the front. */
 static int check_front(const uint8_t *bytes, size_t available, const ath_limits *limits, const ath_header *header,
                        ath_fault_info *fault)
 {
@@ -191,7 +191,7 @@ static int is_refused(int kind)
     return !ath_kind_name(kind) && (!(kind & ATH_OPTIONAL) || ath_kind_name(kind ^ ATH_OPTIONAL));
 }
 
-/* Grows along the file. */
+/* Returns a key that grows along the file. */
 static uint64_t key_of(const ath_chunk *chunk)
 {
     if (ath_is_motion(chunk))
@@ -211,7 +211,7 @@ static int is_bad_chunk(const ath_limits *limits, const ath_header *header, cons
                                  (double)header->segment_count - 1)));
 }
 
-/* *prelude: where the first chunk behind it begins. */
+/* *prelude: offset of the first chunk behind the prelude. */
 static int read_chunks(ath_coder *coder, const uint8_t *checksums, const ath_limits *limits, ath_header *header,
                        uint64_t *prelude, ath_chunk *chunks, ath_fault_info *fault)
 {
@@ -228,7 +228,7 @@ static int read_chunks(ath_coder *coder, const uint8_t *checksums, const ath_lim
         code_chunk(coder, &model, header->segment_count, &chunk);
         chunk.checksum = u32_at(checksums + CHECKSUM_SIZE * (size_t)i);
         chunk.level = (uint8_t)(ath_is_motion(&chunk) ? ath_min(model.level, ATH_NO_LEVEL) : (int32_t)ATH_NO_LEVEL);
-        chunk.bytes = chunk.length == 0 ? checksums : 0; /* there is nothing to wait for */
+        chunk.bytes = chunk.length == 0 ? checksums : 0; /* an empty chunk needs no feeding */
         uint64_t key = key_of(&chunk);
         int repeatable = chunk.kind & ATH_OPTIONAL && ath_kind_id(&chunk) >= 32;
         int in_order = i == 0 || key > key_before || (key == key_before && repeatable);
@@ -254,7 +254,6 @@ static double short_float(int32_t value)
     return (double)number;
 }
 
-/* The table needs no more than the entry before on the way: what an entry is coded about is kept per level. */
 static int read_errors(ath_coder *coder, const ath_header *header, double *errors, ath_fault_info *fault)
 {
     error_model model;
@@ -388,7 +387,7 @@ int ath_parse_rest(ath_bytes chunk, ath_rest_head *head, ath_bytes *body)
     return valid ? ATH_OK : ATH_BAD_CHUNK;
 }
 
-/* Bits of Index_Type; those below are the type. */
+/* Bits of Index_Type above the type itself. */
 enum { IS_MIXED = 8, IS_DERIVED = 16, TYPE_BITS = 7 };
 
 int32_t ath_vertices_of_type(int32_t type, int32_t vertex_count)
@@ -435,7 +434,7 @@ int ath_parse_source_rest(ath_bytes chunk, ath_source_rest_head *head, ath_bytes
     return head->exact ? ATH_OK : ath_parse_refined_rest(*body, &head->step, body);
 }
 
-/* Bytes of the character at the front; 0 where it is not UTF-8 (RFC 3629), or a control character. */
+/* Returns the bytes of the character at the front; 0 if it is not UTF-8 (RFC 3629), or a control character. */
 static size_t character_size(ath_bytes text)
 {
     static const uint8_t least[4] = {0x20, 0xc2, 0xe0, 0xf0}, most[4] = {0x7e, 0xdf, 0xef, 0xf4};
@@ -448,7 +447,7 @@ static size_t character_size(ath_bytes text)
         uint8_t second = more > 0 ? text.bytes[1] : 0;
         int overlong = (first == 0xe0 && second < 0xa0) || (first == 0xf0 && second < 0x90);
         int beyond =
-            (first == 0xed && second > 0x9f) || (first == 0xf4 && second > 0x8f); /* surrogates, no character */
+            (first == 0xed && second > 0x9f) || (first == 0xf4 && second > 0x8f); /* surrogates; beyond Unicode */
         return overlong || beyond ? 0 : more + 1;
     }
     return 0;

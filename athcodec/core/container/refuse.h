@@ -4,7 +4,7 @@
 
 #include "bits/format.h"
 
-/* Each fills in the fault, or the chunk that it is about, and returns its code. */
+/* Fill in a fault, and the chunk that it is about. Both return the fault's code. */
 int ath_refuse(ath_fault_info *fault, int code, ath_field field, double found, double least, double most);
 int ath_fault_at(ath_fault_info *fault, const ath_chunk *chunk, int32_t index);
 
