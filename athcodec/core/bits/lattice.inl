@@ -5,7 +5,7 @@
 
 #include "bits/numbers.inl"
 
-#define LATTICE_UNIT 0.625 /* steps: the lattice has as many points as there are cubes of a step */
+#define LATTICE_UNIT 0.625              /* steps: the lattice has as many points as there are cubes of a step */
 #define LATTICE_REACH 1.118033988749895 /* units: largest distance from a point of the lattice, half the root of 5 */
 
 /* Knowledge of an integer before it is coded. */

@@ -8,8 +8,8 @@ enum { ATH_FOOTPRINTS = 3, ATH_FOOTPRINT_REACH = 3, ATH_FOOTPRINT_PARTS = 32 };
 
 static const int32_t ath_footprint_reach[ATH_FOOTPRINTS] = {0, 1, 3};
 
-/* What a correction of a width adds so many frames from its own, in parts of itself; nothing one and two frames beyond
- * its reach. */
+/* Returns the share, in ATH_FOOTPRINT_PARTS, that a correction adds `away` frames from its own. One and two frames
+ * beyond its reach it adds 0. */
 ATH_INLINE int32_t ath_footprint_part(int32_t width, int32_t away)
 {
     static const int32_t parts[ATH_FOOTPRINTS][ATH_FOOTPRINT_REACH + 3] = {{32}, {32, 16}, {32, 27, 16, 5}};
@@ -21,7 +21,7 @@ typedef struct ath_correction {
     int32_t q[3], width;
 } ath_correction;
 
-/* What all corrections of a vertex add to its frames, in parts: whole numbers, so that their order does not matter. */
+/* Sums of a vertex's corrections per frame, in parts. They are whole numbers, so their order does not matter. */
 typedef double ath_corrected_parts[ATH_SEGMENT_FRAMES][3];
 
 ATH_INLINE void ath_add_correction(int32_t frames, int32_t t, const ath_correction *own, ath_corrected_parts parts)
@@ -31,7 +31,6 @@ ATH_INLINE void ath_add_correction(int32_t frames, int32_t t, const ath_correcti
         for (int32_t k = 0; k < 3; k++) parts[i][k] += (double)own->q[k] * ath_footprint_part(own->width, i - t);
 }
 
-/* Adds corrections to a position; nothing else does. */
 ATH_INLINE double ath_corrected(double position, double parts, double step)
 {
     return position + parts * (step / (double)ATH_FOOTPRINT_PARTS);

@@ -61,7 +61,7 @@ static void map_of_modes(const ath_plan *plan, const ath_motion *motion, const a
     }
 }
 
-/* The affine part of a shape: that of its modes. */
+/* The affine part of a shape sums those of its modes. */
 static void map_of_shape(int32_t modes, double functionals[][3], const double *numbers, double G[9])
 {
     for (int32_t k = 0; k < 9; k++) G[k] = 0.0;

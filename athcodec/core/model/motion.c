@@ -1,5 +1,5 @@
-/* From quantised coefficients to positions: FORMAT.md, "Reconstruction". One piece after the other, parents first;
- * what hangs on a piece is placed from that piece's decoded vertices, in doubles, in the order written here. */
+/* From quantised coefficients to positions (FORMAT.md, "Reconstruction"), piece by piece, parents first. A piece is
+ * placed from the decoded vertices that it hangs on, in doubles, in the order written here. */
 #include "model/motion.h"
 #include "model/basis.h"
 #include "model/lanes.h"
@@ -8,9 +8,10 @@
 enum { POLAR_ITERATIONS = 4, ATH_TERMS = ATH_SHAPE_NUMBERS + ATH_PIECE_VERTICES - ATH_SHAPE_MODES };
 enum { PLACED_VERTICES = 2 * ATH_LANES, PLACED_FRAMES = 2 * ATH_LANES };
 
-static const double LEAST_MOMENT = 0.0009765625; /* of inertia, that a rotation's step is made for, over all of them */
+static const double LEAST_MOMENT =
+    0.0009765625; /* smallest moment of inertia that sets a rotation step, over the sum of all moments */
 
-/* A map takes four rows. */
+/* A map needs four rows. */
 static size_t scratch_rows(int32_t longest, int32_t frames) { return (size_t)ath_max(longest, 4) * 3 * (size_t)frames; }
 
 size_t ath_motion_work(int32_t longest, int32_t frames)
@@ -99,7 +100,7 @@ void ath_attach(const ath_plan *plan, const ath_motion *motion, const ath_piece 
     copy_rows(at.rotation, base.rotation, 9 * (size_t)T);
 }
 
-/* row = sum over k of quantised[k] * step * temporal[k], k ascending, those of 0 left out. */
+/* The sum runs over k ascending and leaves out integers of 0. */
 ATH_HOT void ath_inverse_temporal(const ath_stream *stream, int32_t T, int32_t count, double step,
                                   const int32_t *quantised, double *row)
 {
@@ -107,7 +108,7 @@ ATH_HOT void ath_inverse_temporal(const ath_stream *stream, int32_t T, int32_t c
     const double *wave[ATH_SEGMENT_FRAMES];
     int32_t used = 0;
     for (int32_t k = 0; k < count; k++) {
-        value[used] = (double)quantised[k] * step; /* without a branch, which would be guessed wrong */
+        value[used] = (double)quantised[k] * step; /* no branch, which would be mispredicted */
         wave[used] = stream->temporal + (size_t)k * (size_t)T;
         used += quantised[k] != 0;
     }
@@ -119,7 +120,6 @@ void ath_move_point(int32_t T, const double *track, double *point)
     for (int32_t i = 0; i < 3 * T; i++) point[i] = point[i] + track[i];
 }
 
-/* x := c + R x */
 ATH_HOT void ath_move(int32_t T, const ath_frames *at, double *ATH_RESTRICT out)
 {
     const double *R = at->rotation, *c = at->point;
@@ -138,11 +138,11 @@ static int any_nonzero(const double *row, int32_t count)
     return 0;
 }
 
-/* What a piece is placed by: tracks over time, of modes three, one behind the other. */
+/* The tracks over time that place a piece. A mode has three, one behind the other. */
 typedef struct {
     const double *track[ATH_TERMS];
-    int32_t shape[ATH_TERMS]; /* of the first shape_count terms, which are the same for all axes */
-    int32_t mode[ATH_TERMS];  /* of those behind */
+    int32_t shape[ATH_TERMS]; /* shapes of the first shape_count terms, which have one track for all axes */
+    int32_t mode[ATH_TERMS];  /* modes of the other terms */
     int32_t shape_count, count, frames;
 } placing_terms;
 
@@ -168,12 +168,11 @@ static placing_terms terms_of(const ath_piece *piece, const ath_piece_rows *rows
     return terms;
 }
 
-/* A few vertices side by side: where they are at rest, less the attach point, and how far each term moves them. */
+/* A few vertices side by side: rest positions less the attach point, and how far each term moves them. */
 typedef struct {
-    double rest[3][PLACED_VERTICES], weight[ATH_TERMS][3][PLACED_VERTICES]; /* of modes the same for all axes */
+    double rest[3][PLACED_VERTICES], weight[ATH_TERMS][3][PLACED_VERTICES]; /* modes: axis 0 only */
 } placed_vertices;
 
-/* `mode`: of each of a shape's modes the numbers of the vertices. */
 ATH_INLINE void weigh_shape(int32_t modes, const double *shape, double mode[][PLACED_VERTICES],
                             double weight[3][PLACED_VERTICES])
 {
@@ -212,7 +211,7 @@ ATH_INLINE void weigh_terms(const ath_plan *plan, const ath_piece *piece, const 
         for (int32_t i = 0; i < count; i++) vertices->weight[j][0][i] = basis[terms->mode[j] * piece->count + i];
 }
 
-/* What the terms make of vertex v in PLACED_FRAMES frames from t on. */
+/* Sums the terms of vertex v in PLACED_FRAMES frames from t on. */
 ATH_INLINE void add_terms(int32_t t, const placing_terms *terms, const placed_vertices *vertices, int32_t v,
                           double sum[3][PLACED_FRAMES])
 {
@@ -251,7 +250,7 @@ ATH_INLINE void add_terms(int32_t t, const placing_terms *terms, const placed_ve
     lanes_store(sum[2] + ATH_LANES, &z1);
 }
 
-/* x := c + R x of `count` vertices in ATH_LANES frames, T frames apart. */
+/* x := c + R x for `count` vertices in ATH_LANES frames */
 ATH_INLINE void move_vertices(int32_t T, int32_t count, const double *R, const double *c,
                               double sums[][3][PLACED_FRAMES], int32_t from, double *out)
 {
@@ -266,7 +265,6 @@ ATH_INLINE void move_vertices(int32_t T, int32_t count, const double *R, const d
     }
 }
 
-/* Vertex v at one frame. */
 ATH_INLINE void place_frame(int32_t t, const placing_terms *terms, const placed_vertices *vertices, int32_t v,
                             const ath_frames *at, double *out)
 {
@@ -283,7 +281,7 @@ ATH_INLINE void place_frame(int32_t t, const placing_terms *terms, const placed_
         out[k * T + t] = c[k * T] + (R[0] * x[0] + R[T] * x[1] + R[2 * T] * x[2]);
 }
 
-/* placed = c + R (x0 - a + sum over terms of weight * track), shapes first, tracks of zeros left out. A few vertices
+/* placed = c + R (x0 - a + sum over terms of weight * track), shapes first, without tracks of zeros. A few vertices
  * pass through a few frames at a time, while tracks and attach frames stay in the innermost cache. */
 ATH_HOT static void place(const ath_plan *plan, const ath_motion *motion, const ath_piece *piece,
                           const ath_piece_rows *rows, const uint8_t *used, const ath_scratch *scratch)
@@ -307,7 +305,7 @@ ATH_HOT static void place(const ath_plan *plan, const ath_motion *motion, const 
     }
 }
 
-/* How a sheet as a whole has turned: the rotation nearest to its decoded vertices, its own R as the prior. */
+/* Fills the rotation nearest to a sheet's decoded vertices, with its own R as the prior. */
 static void turn_with_sheet(const ath_plan *plan, int32_t T, const ath_piece *piece, const ath_scratch *scratch,
                             double *rotation)
 {
@@ -345,7 +343,7 @@ static void carry(const ath_plan *plan, const ath_motion *motion, const ath_piec
         copy_rows(at.rotation, scratch->at.rotation, 9 * (size_t)T);
 }
 
-/* Squared distances of a piece's vertices from where it hangs. */
+/* Returns the sum of the vertices' squared distances from the attach point. */
 static double squared_lever(const ath_plan *plan, const ath_piece *piece)
 {
     const double *a = ath_rest_attach(plan, piece);
@@ -368,7 +366,7 @@ int ath_has_rotation(const ath_plan *plan, const ath_piece *piece, const ath_str
     return rotation_factor(piece, stream) > 0.0 && squared_lever(plan, piece) > 0.0;
 }
 
-/* Of inertia about the point that a piece hangs on, the largest moment first. */
+/* Fills the principal axes and moments of inertia about the attach point, the largest moment first. */
 static void axes_of_inertia(const ath_plan *plan, const ath_piece *piece, double lever2, double moments[3],
                             double axes[9])
 {
@@ -383,7 +381,8 @@ static void axes_of_inertia(const ath_plan *plan, const ath_piece *piece, double
     ath_principal(1, 3, M, work, moments, axes);
 }
 
-/* Rotations are weighted by their lever, so that an error moves the piece's vertices like any other coefficient's. */
+/* A rotation's step is divided by its lever, so that its error moves the vertices as far as that of other
+ * coefficients. */
 ath_turning ath_turning_of(const ath_plan *plan, const ath_piece *piece, const ath_stream *stream)
 {
     ath_turning turning = {{0.0}, {0.0}, (piece->flags & ATH_RIGID) != 0};
@@ -537,7 +536,7 @@ const double *ath_pose_turned(const ath_plan *plan, const ath_motion *motion, in
 
 /* ---- learned bases and shapes ---- */
 
-/* At right angles to the rows before it, of length 1, in floats. */
+/* Makes a row orthogonal to those before, of length 1, and rounds it to floats. */
 static void make_orthonormal(const double *rows, int32_t before, int32_t T, double *row)
 {
     double length2 = 0.0;

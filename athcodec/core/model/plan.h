@@ -1,4 +1,5 @@
-/* The plan that all segments share (FORMAT.md, "Plan"): branches cut into pieces, nodes, the rest pose and its bases. */
+/* The plan that all segments share (FORMAT.md, "Plan"): branches cut into pieces, nodes, the rest pose and its
+ * bases. */
 #ifndef ATH_MODEL_PLAN_H
 #define ATH_MODEL_PLAN_H
 
@@ -54,9 +55,9 @@ enum { ATH_ATTACH_CACHE_FRAMES = 4 };
 ATH_ENCODER_API int32_t ath_count_pieces(ath_branch *branches, int32_t branch_count, int32_t vertex_count);
 ATH_ENCODER_API int32_t ath_count_nodes(const ath_branch *branches, int32_t branch_count);
 
-/* Fills pieces and nodes, and height, longest and attach_cache_rows of a plan whose branches and counts are set.
- * If `keep` is 1, attach caches last for the whole pass over the pieces, else until the last piece that hangs on them
- * has been attached. memory: vertex_count, scratch. */
+/* Fills pieces and nodes, and height, longest and attach_cache_rows of a plan whose branches and counts are set. If
+ * `keep` is 1, attach caches last for the whole pass over the pieces, else until the last piece that hangs on them has
+ * been attached. memory: vertex_count, scratch. */
 ATH_ENCODER_API void ath_build_plan(ath_plan *plan, ath_piece *pieces, ath_node *nodes, int32_t *memory, int keep);
 
 /* Marks the pieces of branches that are rigid in a layer. */

@@ -6,7 +6,7 @@
 
 enum { PROJECTED_NUMBERS = 8 * ATH_LANES };
 
-/* Products of one track with waves k to k + PREDICTED - 1: each sum runs over the frames in order, side by side. */
+/* A track is projected on PREDICTED waves at once. Each sum runs over the frames in order. */
 enum { PREDICTED = 8 };
 
 ATH_HOT static void project_waves(int32_t T, const double *waves, const double *track, double sums[PREDICTED])
@@ -104,7 +104,7 @@ ATH_HOT void ath_to_local(const ath_plan *plan, int32_t T, const ath_piece *piec
     }
 }
 
-/* row = sum over the vertices of what each counts in a mode times its track. */
+/* row = sum over the vertices of weight in the mode * track */
 ATH_HOT static void project_modes(const ath_plan *plan, int32_t T, const ath_piece *piece, int32_t first, int32_t stop,
                                   const double *local, double *ATH_RESTRICT rows)
 {
@@ -176,7 +176,7 @@ void ath_predict_tracks(const ath_plan *plan, const ath_motion *motion, const at
         ath_predict_rotation(plan, motion, piece, before, scratch, rows);
 }
 
-/* Three tracks of shapes at a time: the products of the modes with each. */
+/* Fills the tracks of three shapes from those of the modes. */
 ATH_HOT static void shape_tracks(int32_t T, const ath_piece *piece, const ath_piece_rows *rows, int32_t r,
                                  const double *modes, double *track)
 {

@@ -3,8 +3,7 @@
 
 enum { TURN_LANES = 16 };
 
-/* The rotation by the least angle that takes the parent's rest tangent, turned by R, to its tangent now; beyond a right
- * angle by less and less, so that it is R itself where they are opposed, and where the tangent vanishes. */
+/* Beyond a right angle the turn shrinks, so that the result is R itself where the directions are opposed. */
 ATH_INLINE void turn_lanes(int32_t count, int32_t T, const double *tangent, const double *from, const double *to,
                            const double *parent, double turned[9][TURN_LANES])
 {
@@ -29,7 +28,7 @@ ATH_INLINE void turn_lanes(int32_t count, int32_t T, const double *tangent, cons
         double cosine = ux * vx + uy * vy + uz * vz;
         double x = uy * vz - uz * vy, y = uz * vx - ux * vz, z = ux * vy - uy * vx;
         double w = 1.0 + (cosine > 0.0 ? cosine : 0.0),
-               sine2 = x * x + y * y + z * z; /* a quaternion, not of length 1 */
+               sine2 = x * x + y * y + z * z; /* w, x, y, z: a quaternion, not normalised */
         double h = 2.0 / (w * w + sine2), g = w * h, c = 1.0 - h * sine2;
         double b0 = c + h * x * x, b1 = h * x * y - g * z, b2 = h * x * z + g * y;
         double b3 = h * x * y + g * z, b4 = c + h * y * y, b5 = h * y * z - g * x;
@@ -49,7 +48,7 @@ ATH_INLINE void turn_lanes(int32_t count, int32_t T, const double *tangent, cons
 ATH_HOT void ath_follow_tangents(int32_t T, const double *tangent, const double *from, const double *to,
                                  const double *parent, double *out)
 {
-    double turned[9][TURN_LANES]; /* a local copy, which no pointer aliases: else compilers would not use SIMD */
+    double turned[9][TURN_LANES]; /* a local copy is not aliased, so that compilers use SIMD */
     int32_t count;
     for (int32_t start = 0; start < T; start += count, from += count, to += count, parent += count, out += count) {
         count = ath_min(TURN_LANES, T - start);
@@ -65,7 +64,7 @@ void ath_follow_tangent(const double tangent[3], const double from[3], const dou
     ath_follow_tangents(1, tangent, from, to, R, turned);
 }
 
-/* The rotation (row-major) of the quaternion normalize(1, x, y, z) squared. */
+/* Fills the rotation of the quaternion normalize(1, x, y, z) squared. */
 ATH_INLINE void rational_rotation(double x, double y, double z, double q[9])
 {
     double n2 = x * x + y * y + z * z, scale = 1.0 / (1.0 + n2);
@@ -84,7 +83,6 @@ ATH_INLINE void rational_rotation(double x, double y, double z, double q[9])
     q[8] = 1.0 - 2.0 * (x * x + y * y);
 }
 
-/* R := R Q(omega), Q being the rotation of the quaternion normalize(1, omega / 4) squared. */
 ATH_HOT void ath_turn(int32_t T, const double *omega, double *ATH_RESTRICT R)
 {
     for (int32_t t = 0; t < T; t++) {
@@ -100,9 +98,9 @@ ATH_HOT void ath_turn(int32_t T, const double *omega, double *ATH_RESTRICT R)
     }
 }
 
-/* One step of Newton's method from R towards the rotation nearest to H, which has a Frobenius norm of 1 (column k: what
- * rest axis k became): with C = H R', the turn omega solves (trace(C) - sym(C)) omega = axial(C). Far from that rotation
- * the trace is small, and 1 in its place keeps the matrix positive definite. */
+/* Takes one step of Newton's method from R towards the rotation nearest to H, which has a Frobenius norm of 1. With C =
+ * H R', the turn omega solves (trace(C) - sym(C)) omega = axial(C). Far from that rotation the trace is small, and 1 in
+ * its place keeps the matrix positive definite. */
 static void turn_towards(const double H[9], double R[9])
 {
     double C[9];
@@ -138,7 +136,6 @@ void ath_turn_to(const double H[9], int32_t steps, double R[9])
     for (int32_t step = 0; step < steps; step++) turn_towards(unit, R);
 }
 
-/* The unit quaternion of a rotation matrix, of the two the one nearer to the last. */
 static void to_quaternion(const double R[9], double q[4])
 {
     double size[4] = {1.0 + R[0] + R[4] + R[8], 1.0 + R[0] - R[4] - R[8], 1.0 - R[0] + R[4] - R[8],
@@ -161,7 +158,7 @@ static void to_quaternion(const double R[9], double q[4])
 void ath_rotation_vector(const double R[9], double q[4], double omega[3])
 {
     to_quaternion(R, q);
-    if (q[0] < -0.9) /* beyond about 310 degrees: the same rotation the other way round */
+    if (q[0] < -0.9) /* beyond about 310 degrees, turn the other way round */
         for (int32_t i = 0; i < 4; i++) q[i] = -q[i];
     for (int32_t k = 0; k < 3; k++) omega[k] = 4.0 * q[k + 1] / (1.0 + q[0]);
 }
