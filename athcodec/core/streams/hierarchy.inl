@@ -1,6 +1,6 @@
-/* The stream of branches: parents, vertices, and their numbers in the source (FORMAT.md, "HIERARCHY"). Compiled once for each
- * direction, which ENCODING tells: a value handed to a coding function is ignored when decoding. Functions return 0 when
- * what they decoded is not valid. */
+/* The stream of branches: parents, vertices, and their numbers in the source (FORMAT.md, "HIERARCHY"). Compiled once
+ * for each direction, which ENCODING tells: a value handed to a coding function is ignored when decoding. Functions
+ * return 0 when what they decoded is not valid. */
 #ifndef ATH_STREAMS_HIERARCHY_INL
 #define ATH_STREAMS_HIERARCHY_INL
 
@@ -9,13 +9,13 @@
 
 enum { PLACES = 256, MOST_DETAIL = 255, MOST_RING = 32 };
 
-/* Of numbers in an order of their own: each is expected one step after the number before it, or else one step after that
- * at the same place of the last run that has one there, as in a source that holds all first vertices, then all second. */
+/* Model of a permutation. A number is expected one step after the number before it, or else one step after the number
+ * at the same place of an earlier run, as in a source that holds all first vertices, then all second ones. */
 typedef struct {
     number_model difference;
     ath_context permuted,
-        expected[2][2][3]; /* by expectation; whether a run begins; which one was right before, 2: none */
-    int32_t beside[PLACES], step[2], last; /* beside: -1: none yet */
+        expected[2][2][3]; /* by expectation, whether a run begins, and which expectation was right before (2: none) */
+    int32_t beside[PLACES], step[2], last; /* beside: the last number at each place of a run; -1: none */
     uint32_t mean;
 } permutation_model;
 
@@ -70,8 +70,8 @@ static int32_t code_flags(ath_coder *coder, hierarchy_model *model, int32_t befo
     return coded;
 }
 
-/* How far up from branch b - 1 the parent of b lies: 0 = child of b - 1, its depth + 1 = a root. Returns the parent,
- * or -2 when it lies beyond a root. */
+/* Codes how far up from branch b - 1 the parent of b lies: 0 for a child of b - 1, its depth + 1 for a root. Returns
+ * the parent; -2: it lies beyond a root. */
 static int32_t code_parent(ath_coder *coder, hierarchy_model *model, const ath_branch *branches, int32_t b,
                            int32_t *last_up)
 {
@@ -107,7 +107,7 @@ static int code_branch(ath_coder *coder, hierarchy_model *model, ath_branch *bra
     return 1;
 }
 
-/* Attach points relative to that of the sibling before; `subtree` serves as memory of it while coding. */
+/* Codes an attach point relative to that of the sibling before, which the parent's `subtree` holds meanwhile. */
 static int code_attach(ath_coder *coder, hierarchy_model *model, ath_branch *branches, int32_t b, uint32_t *mean)
 {
     ath_branch *branch = branches + b, *parent = branches + branch->parent;
@@ -120,12 +120,12 @@ static int code_attach(ath_coder *coder, hierarchy_model *model, ath_branch *bra
     return 1;
 }
 
-/* The number at `place` of a run that is expected to begin with `start`; `source` points at it, behind those before. */
+/* Codes the number at `place` of a run that is expected to begin with `start`. `source` points to it in the run. */
 static int code_source_number(ath_coder *coder, permutation_model *model, int32_t start, int32_t place, int32_t count,
                               int32_t *source)
 {
     int32_t known = place < PLACES ? model->beside[place] : -1, right = 2;
-    int64_t given = ENCODING ? *source : 0, value; /* when decoding, it is not initialised */
+    int64_t given = ENCODING ? *source : 0, value; /* not initialised when decoding */
     int64_t following = place == 0 ? start : (int64_t)source[-1] + 1;
     int64_t along = place == 0 ? start : (int64_t)source[-1] + model->step[0];
     int64_t beside = (int64_t)known + model->step[1];
@@ -166,7 +166,7 @@ static int code_branch_numbers(ath_coder *coder, hierarchy_model *model, int32_t
     return 1;
 }
 
-/* Where each stem starts in a source that is sorted by branch; `subtree` of the branches serves as memory. */
+/* Leaves in `subtree` where each stem starts in a source that is sorted by branch. */
 static void expect_starts(ath_branch *branches, int32_t branch_count, const int32_t *branch_source)
 {
     int32_t start = 0;
@@ -203,7 +203,7 @@ static int code_vertex_numbers(ath_coder *coder, hierarchy_model *model, ath_bra
     return 1;
 }
 
-/* A number that most branches have none of, each expected to be that of the last branch of such a lag. */
+/* Codes a number per branch, which is mostly 0, about that of the last branch with the same lag. */
 static int code_of_branches(ath_coder *coder, branch_number_model *model, int32_t branch_count, ath_branch *branches,
                             int32_t *number, int32_t most)
 {

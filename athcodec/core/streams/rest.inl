@@ -1,4 +1,4 @@
-/* The reference pose by steps, and its refinements (FORMAT.md, "Rest pose"). Compiled once for each direction. */
+/* The reference pose by steps, and its refinements (FORMAT.md, "REST"). Compiled once for each direction. */
 #ifndef ATH_STREAMS_REST_INL
 #define ATH_STREAMS_REST_INL
 
@@ -8,21 +8,21 @@
 #include "streams/rest_connected.inl"
 #include "streams/rest_copies.inl"
 
-enum { WHOLE_DETAIL = 128 }; /* detail of a step of 1 */
-enum { OF_COPY = -2 };       /* in place of the vertex that one was seen from */
+enum { WHOLE_DETAIL = 128 }; /* the detail whose step is 1 */
+enum { OF_COPY = -2 };       /* stands in `from` for a vertex that a copy has placed */
 enum { REST_RUN = 32, REST_BASES = REST_RUN * (REST_RUN + 1) * (2 * REST_RUN + 1) / 6 };
 
-/* The rest pose of the layer before, which a refinement is coded about: positions, and integers, three for each vertex; those of
- * a run's modes stand with its vertices. */
+/* A layer's rest pose and what it is coded about. A refinement knows the integers (`coarse`) and positions (`before`)
+ * of the layer before, three per vertex. Integers of a run's modes stand with its vertices. */
 typedef struct {
-    const int32_t *coarse; /* null: nothing is known */
+    const int32_t *coarse; /* null: this is no refinement */
     const double *before;
     int32_t *steps; /* filled for the next layer; may be null */
-    ath_mesh *mesh; /* null: not connected; else it gives the order */
-    /* An encoder's: how far from its place it may put a vertex to save bits; a copy of the source's pose, in which what
-     * has detail goes along with what it hangs on. */
+    ath_mesh *mesh; /* order of a connected pose, else null */
+    /* For the encoder: how far it may move a vertex to save bits, and a copy of the source's pose, in which parts with
+     * detail follow what they hang on. */
     double slack, *moved;
-    /* Likewise: of each branch the one that it is a copy of, itself where others are copies of it, -1: neither. */
+    /* For the encoder: the branch that each branch copies, itself if others copy it; -1: neither. */
     const int32_t *shape_of;
 } rest_layer;
 
@@ -32,17 +32,17 @@ typedef struct {
 } rest_vertices;
 
 typedef struct {
-    number_model bent; /* of the vertices of SOURCE_REST */
+    number_model bent; /* steps of single vertices of SOURCE_REST */
     uint32_t bent_mean[3];
     union {
         coefficient_model modes;
         refinement_model refined_modes;
     };
     uint32_t history[HISTORY_ROWS * REST_RUN];
-    double bases[REST_BASES]; /* of runs of 1, 2, ... REST_RUN vertices, each made when it is first needed */
+    double bases[REST_BASES]; /* for runs of 1, 2, ... REST_RUN vertices, made when first needed */
     double work[2 * REST_RUN * REST_RUN];
     uint8_t made[REST_RUN + 1];
-    rest_vertices single[2]; /* of branches without detail, and with it */
+    rest_vertices single[2]; /* for branches without detail, and with detail */
     copy_model copies;
 } rest_model;
 
@@ -63,7 +63,7 @@ static void rest_model_init(rest_model *model, int is_refinement)
     copy_model_init(&model->copies);
 }
 
-/* The step of a branch's rest pose, where `step` is that of others. */
+/* Returns the step of a branch, which its detail may make finer than `step`. */
 static double rest_step(const ath_branch *branch, double step)
 {
     double most = branch->detail > 0 ? ath_node_step(branch->detail - WHOLE_DETAIL) : step;
@@ -75,7 +75,7 @@ static rest_vertices *single_of(rest_model *model, const ath_branch *branch)
     return model->single + (branch->detail > 0);
 }
 
-/* A point of the lattice, of about the size of the last ones, of all and of those of the phase. */
+/* Codes a point of the lattice under the mean size of the last points, of all and of those of the phase. */
 static void code_rest_point(ath_coder *coder, lattice_model *lattice, const rest_memory *all, const rest_memory *phase,
                             int32_t integers[3])
 {
@@ -88,7 +88,7 @@ static void code_rest_point(ath_coder *coder, lattice_model *lattice, const rest
     }
 }
 
-/* A vertex of a branch as a point of a lattice about where it is expected; what has detail has no slack. */
+/* Codes a vertex as a point of a lattice about its prediction. Branches with detail have no slack. */
 static void code_expected_vertex(ath_coder *coder, rest_model *model, const rest_layer *layer, const ath_branch *branch,
                                  rest_predictor *predictor, rest_guess *at, int32_t v, double unit,
                                  const double *source, double *rest)
@@ -107,7 +107,7 @@ static void code_expected_vertex(ath_coder *coder, rest_model *model, const rest
     rest_learn(predictor, at, per_unit, out, integers);
 }
 
-/* Vertex i of a stem, by those before it on the stem. */
+/* Codes vertex i of a stem about those before it. */
 static void code_single_vertex(ath_coder *coder, rest_model *model, const rest_layer *layer, const ath_branch *branch,
                                int32_t i, double step, const double *source, double *rest)
 {
@@ -118,7 +118,7 @@ static void code_single_vertex(ath_coder *coder, rest_model *model, const rest_l
     code_expected_vertex(coder, model, layer, branch, predictor, &at, branch->first + i, unit, source, rest);
 }
 
-/* A branch as a copy of the shape used last; `place`: what an encoder has chosen. */
+/* Codes a branch as a copy of the shape used last. place: the encoder's choice. */
 static int code_copy(ath_coder *coder, copy_model *model, const rest_layer *layer, const ath_branch *branches,
                      const ath_branch *branch, double step, copy_place *place, const double *source, double *rest)
 {
@@ -151,7 +151,7 @@ static int code_copy(ath_coder *coder, copy_model *model, const rest_layer *laye
     return 1;
 }
 
-/* An encoder's choice: is branch b a copy of a shape, and which one, by `rank` among those of as many vertices? */
+/* The encoder's choice of a branch's role, and of a shape by its rank among those with as many vertices. */
 static int32_t wanted_role(const copy_model *model, const rest_layer *layer, const ath_branch *branches, int32_t b,
                            double step, const double *source, const double *rest, int32_t *rank, copy_place *place)
 {
@@ -171,7 +171,7 @@ static int32_t wanted_role(const copy_model *model, const rest_layer *layer, con
     return PLAIN_PART;
 }
 
-/* What branch b is: a copy, which is coded at once, a shape, or neither. -1: not valid. */
+/* Codes the role of branch b, and the branch if it is a copy. Returns the role; -1: it is not valid. */
 static int32_t code_part(ath_coder *coder, rest_model *model, const rest_layer *layer, const ath_branch *branches,
                          int32_t b, double step, const double *source, double *rest)
 {
@@ -229,7 +229,7 @@ static void refine_rest_row(ath_coder *coder, rest_model *model, const rest_laye
     code_refined_row(coder, &model->refined_modes, n, 0, -1, &prediction, row);
 }
 
-/* `n` vertices of a beam from `first` on, by the modes of a beam that hangs on `base`. */
+/* Codes `n` vertices of a beam from `first` on, by the modes of a beam that hangs on `base`. */
 static void code_rest_run(ath_coder *coder, rest_model *model, const rest_layer *layer, int32_t first, int32_t n,
                           const double base[3], double step, const double *source, double *rest)
 {
@@ -251,7 +251,7 @@ static void code_rest_run(ath_coder *coder, rest_model *model, const rest_layer 
         }
 }
 
-/* A beam is cut into runs of like length, each of which hangs on the vertex before it. */
+/* Cuts a beam into runs of nearly equal length. Each hangs on the vertex before it. */
 static void code_rest_beam(ath_coder *coder, rest_model *model, const rest_layer *layer, const ath_branch *branch,
                            double step, const double *source, double *rest)
 {
@@ -266,7 +266,7 @@ static void code_rest_beam(ath_coder *coder, rest_model *model, const rest_layer
     }
 }
 
-/* That of a vertex, of branches in the order of their vertices. */
+/* Finds the branch of a vertex by bisection. */
 static const ath_branch *branch_of(const ath_branch *branches, int32_t branch_count, int32_t v)
 {
     int32_t low = 0, high = branch_count;
@@ -280,7 +280,7 @@ static const ath_branch *branch_of(const ath_branch *branches, int32_t branch_co
     return branches + low;
 }
 
-/* Are all vertices of a branch, of which `v` comes first, to be coded from place t of the mesh's order on? */
+/* Returns whether v begins a branch that is not coded yet at place t of the mesh's order. */
 static int is_untouched(const ath_mesh *mesh, const ath_branch *branch, int32_t v, int32_t t)
 {
     if (v != branch->first) return 0;
@@ -289,12 +289,13 @@ static int is_untouched(const ath_mesh *mesh, const ath_branch *branch, int32_t 
     return 1;
 }
 
-/* Vertices in the order of their mesh, by their neighbours; those without as elsewhere: all below them are known. */
+/* Codes vertices in the order of the mesh about their neighbours. A vertex without known neighbours is coded as on a
+ * stem, since all vertices before it on the stem are known. */
 static int code_connected_rest(ath_coder *coder, rest_model *model, const rest_layer *layer, const ath_branch *branches,
                                int32_t branch_count, int has_copies, double step, const double *source, double *rest)
 {
     ath_mesh *mesh = layer->mesh;
-    int32_t shape = -1; /* the last branch that is one */
+    int32_t shape = -1; /* the last branch whose role is a shape */
     for (int32_t v = 0; v < mesh->vertex_count; v++) mesh->from[v] = -1;
     for (int32_t t = 0; t < mesh->vertex_count; t++) {
         int32_t v = mesh->order[t];
@@ -326,8 +327,8 @@ static int code_connected_rest(ath_coder *coder, rest_model *model, const rest_l
     return 1;
 }
 
-/* What has detail keeps its shape: it goes where the stem is that it hangs on, of less detail, and with it what hangs
- * on it in turn. */
+/* A branch with detail keeps its shape: it moves with the coarser stem that it hangs on, and all that hangs on it
+ * follows. */
 static void take_along(const ath_branch *branches, const ath_branch *branch, const double *source, double *moved,
                        const double *rest)
 {

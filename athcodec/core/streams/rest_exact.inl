@@ -5,7 +5,7 @@
 #include "bits/exact.inl"
 #include "streams/rest_connected.inl"
 
-/* Where vertex i of a stem is expected: the last step, or the one `lag` vertices ago, is taken again. */
+/* Predicts vertex i of a stem by repeating the last step, or the step `lag` vertices ago. */
 static void predict_rest(const ath_branch *branch, const double *rest, int32_t i, double predicted[3])
 {
     const double *stem = rest + 3 * (size_t)branch->first;
@@ -22,8 +22,8 @@ static void predict_rest(const ath_branch *branch, const double *rest, int32_t i
     }
 }
 
-/* The vertices of a connected pose in the order of their mesh: the mean of its parallelograms, or else of its
- * neighbours, is expected; without any, what is elsewhere. */
+/* Codes vertices in the order of their mesh about the mean of their parallelograms or, without any, of their
+ * neighbours, or else as on a stem. */
 static int code_connected_exact_rest(ath_coder *coder, exact_model *model, const ath_branch *branches,
                                      const ath_mesh *mesh, int is_float64, double *rest)
 {
@@ -44,7 +44,7 @@ static int code_connected_exact_rest(ath_coder *coder, exact_model *model, const
     return 1;
 }
 
-/* mesh: null, or of a connected pose. */
+/* mesh: null unless the pose is connected. */
 static int code_exact_rest(ath_coder *coder, exact_model *model, const ath_branch *branches, int32_t branch_count,
                            const ath_mesh *mesh, int is_float64, double *rest)
 {

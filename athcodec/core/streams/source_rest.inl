@@ -5,15 +5,15 @@
 #include "model/rotations.h"
 #include "streams/rest.inl"
 
-/* The poses less the origin; turns: of each branch the rotation that takes it from the one to the other. */
+/* Poses are less the origin. turns: the rotation of each branch from the reference pose to the source's. */
 typedef struct {
     const double *reference, *source;
-    double *moved; /* as rest_layer has it */
+    double *moved; /* see rest_layer */
     double *rest, *turns;
     double step;
 } bent_pose;
 
-/* The rotation of what hangs on vertex v of a stem, whose vertices up to `last` are placed. */
+/* Fills the rotation of a branch that hangs on vertex v of a stem, whose vertices up to `last` are placed. */
 static void turn_at(const bent_pose *pose, const ath_branch *stem, int32_t v, int32_t last, const double turn[9],
                     double turned[9])
 {
@@ -32,7 +32,8 @@ static void turn_at(const bent_pose *pose, const ath_branch *stem, int32_t v, in
     ath_follow_tangent(tangent, pose->rest + 3 * (size_t)before, pose->rest + 3 * (size_t)after, turned, turned);
 }
 
-/* Vertex v as steps from where the one before it, turned with the stem, lets it be expected; before: -1, none. */
+/* Codes vertex v about the vertex before it plus their reference edge, turned with the stem. before: -1 if there is
+ * none. */
 static void code_bent_vertex(ath_coder *coder, rest_model *model, const bent_pose *pose, int32_t v, int32_t before,
                              const double turn[9])
 {
@@ -53,7 +54,7 @@ static void code_bent_vertex(ath_coder *coder, rest_model *model, const bent_pos
     }
 }
 
-/* A stem that is no beam turns as its vertices so far did, the last ones above all. */
+/* A stem that is no beam turns as its vertices did so far, the last ones above all. */
 static void code_bent_sheet(ath_coder *coder, rest_model *model, const bent_pose *pose, const ath_branch *stem,
                             double turn[9])
 {
@@ -76,7 +77,7 @@ static void code_bent_sheet(ath_coder *coder, rest_model *model, const bent_pose
     }
 }
 
-/* `n` vertices of a beam from `first` on, by the modes of a beam that leaves `before` in any direction. */
+/* Codes `n` vertices of a beam from `first` on, by the modes of a beam that leaves `before` in any direction. */
 static void code_bent_run(ath_coder *coder, rest_model *model, const bent_pose *pose, int32_t first, int32_t n,
                           int32_t before, const double R[9])
 {
