@@ -35,7 +35,7 @@ int ath_build(ath_file *file, void *memory, size_t memory_bytes)
     if (!file->rest_known) return ATH_NEEDS_HOST_MESH;
     if (!ath_fits(memory, memory_bytes, carve_build(&counted, 0))) return ATH_NO_MEMORY;
     carve_build(file, (uint8_t *)memory);
-    if (file->bases_count > 0) { /* laid out again: the gaps may be a layer's since */
+    if (file->bases_count > 0) { /* lay out again, since a layer may have overwritten the gaps */
         ath_basis_layout(file->pieces, file->plan.piece_count, file->rest, file->gaps, (int32_t *)file->scratch);
         ath_basis_fill(file->pieces, file->plan.piece_count, file->rest, file->gaps, 0, (double *)file->scratch,
                        file->bases);
@@ -59,13 +59,13 @@ const double *ath_file_node_waves(const ath_file *file, int32_t segment)
 
 /* ---- refinements ---- */
 
-/* What a layer refines. */
+/* Returns the plan that a layer refines. */
 static const ath_plan *plan_before(const ath_file *file, int32_t q)
 {
     return q > file->first_layer ? &file->layers[q - 1].plan : &file->plan;
 }
 
-/* What a layer refines, if that has bases. */
+/* Returns the plan that a layer refines if that has bases, else null. */
 static const ath_plan *known_bases(const ath_file *file, int32_t q)
 {
     return q > file->first_layer || file->bases_count > 0 ? plan_before(file, q) : 0;
@@ -89,7 +89,7 @@ static int decode_layer_rest(ath_file *file, int32_t q, ath_bytes chunk)
     return result;
 }
 
-/* The layer's rest pose, once that of the layer before is known. */
+/* Reads a layer's rest pose. That of the layer before is known. */
 static int read_layer_rest(ath_file *file, int32_t q, ath_fault_info *fault)
 {
     ath_layer *layer = &file->layers[q];

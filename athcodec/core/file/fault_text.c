@@ -28,7 +28,7 @@ const char *ath_result_name(int result)
 
 typedef struct {
     char *text;
-    size_t capacity, length; /* the length may go beyond the capacity: what does not fit is only counted */
+    size_t capacity, length; /* the length also counts characters that do not fit */
 } writer;
 
 static void put_character(writer *out, char character)
@@ -42,7 +42,7 @@ static void write_text(writer *out, const char *text)
     while (*text) put_character(out, *text++);
 }
 
-/* Puts the zero behind the text; its length. */
+/* Terminates the text and returns its length. */
 static size_t ended(writer *out)
 {
     if (out->capacity > 0) out->text[out->length < out->capacity ? out->length : out->capacity - 1] = 0;
@@ -61,7 +61,7 @@ static void put_hex(writer *out, uint32_t value, int digits)
     while (digits-- > 0) put_character(out, "0123456789abcdef"[value >> 4 * digits & 15]);
 }
 
-/* Six digits and an exponent, of a positive number; the last digit may be off by one. */
+/* Writes six digits and an exponent of a positive number. The last digit may be off by one. */
 static void put_scientific(writer *out, double value)
 {
     int exponent = 0;
@@ -97,9 +97,9 @@ static void put_number(writer *out, double value)
 
 /* ---- sentences ---- */
 
-/* By field. %f: the value found; %a: the values allowed; %p: the chunk and its place; %k: kind, level and segment;
- * %l: level and segment; %m: the most that is allowed, and %c: the least, as a checksum;
- * %n: the file's version and the features that are not known. */
+/* Sentences by field. %f: the value found; %a: the values allowed; %p: the chunk and its place; %k: kind, level and
+ * segment; %l: level and segment; %m: the largest value allowed; %c: the smallest one, as a checksum; %n: the file's
+ * version and unknown features. */
 static const char *const sentences[] = {
     0,
     "file: got first bytes %f%a",
@@ -149,7 +149,7 @@ static void put_version(writer *out, uint32_t version)
     put_integer(out, version & 0xff);
 }
 
-/* "format 1.3 with feature 2, 5" */
+/* Writes "format 1.3 with feature 2, 5". */
 static void put_features(writer *out, const ath_fault_info *fault)
 {
     const char *before = " with feature ";

@@ -65,15 +65,15 @@ double ath_seam_error(const ath_file *file, int32_t clip, int32_t level)
     return (double)file->seams[clip * file->header.full_level_count + level];
 }
 
-/* Of segments together: what at most a hundredth of each exceeds, at most a hundredth of all does; squares are weighted
- * by the frames of their segments. */
+/* The largest error and the largest percentile hold for all segments together. Mean squares are weighted by the
+ * frames. */
 double ath_level_error(const ath_file *file, int32_t level, int32_t first, int32_t last, ath_measure measure)
 {
     const double *errors = file->errors + ATH_MEASURES * (size_t)level * (size_t)file->info.segment_count + measure;
     double largest = 0.0, squares = 0.0, frames = 0.0;
     for (int32_t s = first; s <= last; s++) {
         double error = errors[ATH_MEASURES * s];
-        double count = (double)(ath_segment_start(file, s + 1) - ath_segment_start(file, s)); /* repeats included */
+        double count = (double)(ath_segment_start(file, s + 1) - ath_segment_start(file, s)); /* with repeats */
         if (error > largest) largest = error;
         squares = squares + error * error * count;
         frames = frames + count;
@@ -227,7 +227,7 @@ int ath_read_polygons(const ath_file *file, int kind, void *memory, size_t memor
 
 /* ---- parts of a level ---- */
 
-/* Walks over the parts in order; `parts` may be null. */
+/* Counts the parts, nodes and exact vertices of a level, and fills the parts unless `parts` is null. */
 static void walk_cut(const ath_file *file, int32_t level, ath_part *parts, int32_t count[3])
 {
     const ath_plan *plan = &file->plan;

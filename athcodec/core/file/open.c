@@ -2,8 +2,8 @@
 #include "file/rest.h"
 #include "streams/decode.h"
 
-enum { NAME_BYTES = 256 }; /* of a clip's name, with the zero behind it */
-enum { LEAST_PIECE = 32 }; /* vertices of those of a long stem: of rings, as many as make no more than 64 */
+enum { NAME_BYTES = 256 }; /* bytes of a clip's name with its terminating zero */
+enum { LEAST_PIECE = 32 }; /* fewest vertices of a long stem's pieces: whole rings, at most 64 vertices */
 
 /* ---- memory ---- */
 
@@ -19,7 +19,7 @@ static uint64_t scratch_size(const ath_header *header)
     return ath_larger(size, ATH_BASIS_WORK * sizeof(double));
 }
 
-/* The rest poses of layers are there where the file has any, whether all of them are stored or not. */
+/* If the file has layers, all of them get memory for a rest pose, stored or not. */
 static void carve_layers(ath_file *file, const ath_header *header, ath_arena *arena)
 {
     uint64_t vertices = header->vertex_count;
@@ -33,7 +33,7 @@ static void carve_layers(ath_file *file, const ath_header *header, ath_arena *ar
     }
 }
 
-/* FACES as read, and what reading and building them needs. */
+/* Returns the bytes of FACES as read, and of scratch memory to read and build them. */
 static uint64_t mesh_work(uint64_t vertices)
 {
     uint64_t read = (MESH_CORNERS + MESH_FACES) * vertices * sizeof(int32_t);
@@ -41,7 +41,7 @@ static uint64_t mesh_work(uint64_t vertices)
     return read + ath_larger(building, ath_faces_memory((int32_t)vertices));
 }
 
-/* Places the file's arrays behind its struct; with a null base it only counts. Returns the bytes that they take. */
+/* Places the file's arrays behind its struct, or only counts them if the base is null. Returns the bytes of all. */
 static uint64_t carve_file(ath_file *file, const ath_header *header, uint8_t *base)
 {
     ath_arena arena = {base, 0};
@@ -72,7 +72,7 @@ static uint64_t carve_file(ath_file *file, const ath_header *header, uint8_t *ba
     return arena.used;
 }
 
-/* FORMAT.md, "Limits": what a segment may take, whatever the decoder. */
+/* Checks the memory of a segment, which does not depend on the decoder (FORMAT.md, "Limits"). */
 static int check_memory(const ath_header *header, const ath_limits *limits, uint64_t frames, ath_fault_info *fault)
 {
     uint64_t needed = header->vertex_count * (ATH_BYTES_PER_FRAME * frames + ATH_BYTES_PER_VERTEX);
@@ -118,7 +118,7 @@ int ath_front(const uint8_t *bytes, size_t available, const ath_limits *limits, 
 
 /* ---- the chunks of the prelude ---- */
 
-/* Frames and segments of the clip behind those before it; ATH_BAD_CHUNK where there are no more of them. */
+/* Gives a clip the frames and segments after those before it; ATH_BAD_CHUNK: there are not enough left. */
 static int place_clip(ath_file *file, int32_t index, uint32_t frames, uint32_t segments)
 {
     ath_clip *clip = file->clips + index;
@@ -169,7 +169,7 @@ static int read_clips(ath_file *file, ath_fault_info *fault)
     return whole ? ATH_OK : ATH_BAD_CHUNK;
 }
 
-/* The first frame of a segment has nothing to repeat that the segment has. */
+/* Counts coded frames. The first frame of a segment cannot repeat, since the segment lacks the frame before. */
 static int count_coded(ath_file *file, ath_fault_info *fault)
 {
     for (int32_t s = 0, i = 0; s < file->info.segment_count; s++) {
@@ -226,7 +226,7 @@ static void build_plan(ath_file *file)
     if (file->header.is_predicted) ath_without_stems(plan, file->pieces, file->nodes);
 }
 
-/* A refinement's pieces come all with its level. */
+/* All pieces of a refinement belong to its level. */
 static void plan_layers(ath_file *file)
 {
     file->first_layer = ath_file_chunk(file, ATH_REFINED_REST, 1, 0) ? 0 : 1;
@@ -247,7 +247,7 @@ static void plan_layers(ath_file *file)
     file->layers[0].plan.nodes = file->layers[0].nodes;
 }
 
-/* Which levels have which chunks. */
+/* Notes which levels have which chunks. */
 static void plan_levels(ath_file *file)
 {
     const ath_plan *plan = &file->plan;
@@ -279,7 +279,7 @@ static int refuse_first_missing(const ath_file *file, int32_t kind, int32_t leve
     return ath_refuse_missing(fault, kind, level, (uint32_t)segment);
 }
 
-/* The table has the motion chunks that the hierarchy asks for, and no others. */
+/* Checks that the table has the motion chunks that the hierarchy asks for, and no others. */
 static int check_motion_chunks(const ath_file *file, ath_fault_info *fault)
 {
     static const int32_t kinds[] = {ATH_STEMS, ATH_EXACT, ATH_PREDICTED, ATH_AFFINES};
@@ -303,7 +303,7 @@ static int check_motion_chunks(const ath_file *file, ath_fault_info *fault)
 static int check_joins(ath_file *file, ath_fault_info *fault)
 {
     int32_t segments = file->info.segment_count, lossy = ath_lossy_levels(file);
-    if (file->header.is_predicted) lossy = 1; /* what is predicted is not joined, the maps before it may be */
+    if (file->header.is_predicted) lossy = 1; /* only maps are joined, not predicted motion */
     for (int32_t i = 0; i < file->info.level_count * segments; i++) {
         int32_t level = i / segments, segment = i % segments, width = file->joins[i] % ATH_JOIN_SLOPED;
         if (width == 0) continue;
@@ -366,7 +366,7 @@ static void set_info(ath_file *file, uint64_t prelude)
     info->is_predicted = header->is_predicted;
 }
 
-/* One level more than the lossy ones gives the very positions of the source. */
+/* A file may have one level beyond the lossy ones, which is exact. */
 static int check_levels(const ath_file *file, ath_fault_info *fault)
 {
     int32_t lossy = ath_lossy_levels(file), found = file->info.full_level_count;
@@ -396,7 +396,7 @@ static int read_prelude(ath_file *file, const ath_limits *limits, ath_fault_info
     return ATH_OK;
 }
 
-/* Parses the front into the file, once these are known to fit into the memory. */
+/* Parses the front into the file after checking that it fits into the memory. */
 static int read_front(ath_file *file, size_t memory_bytes, const uint8_t *bytes, size_t available,
                       const ath_limits *limits, ath_fault_info *fault)
 {
@@ -405,7 +405,7 @@ static int read_front(ath_file *file, size_t memory_bytes, const uint8_t *bytes,
     uint64_t needed;
     int result = ath_read_header(bytes, available, limits, &header, &needed, fault);
     if (result != ATH_OK) return result;
-    header.has_faces = 0; /* not known before the table is read, which needs memory; what they need comes last */
+    header.has_faces = 0; /* known once the table is read, which needs memory; the mesh's memory comes last */
     if (memory_bytes < carve_file(file, &header, 0)) return ath_refuse(fault, ATH_NO_MEMORY, ATH_FIELD_NONE, 0, 0, 0);
     memset(file, 0, sizeof *file);
     carve_file(file, &header, (uint8_t *)file);

@@ -1,7 +1,7 @@
 /* Which bytes segments need, and which of them are there. */
 #include "file/file.h"
 
-/* First chunk that ends behind `offset`. */
+/* Returns the first chunk that ends behind `offset`. */
 static uint32_t chunk_at(const ath_file *file, uint64_t offset)
 {
     uint32_t low = 0, high = file->header.chunk_count;
@@ -32,16 +32,16 @@ void ath_drop(ath_file *file, uint64_t offset, uint64_t size)
         if (file->chunks[i].length > 0) file->chunks[i].bytes = 0;
 }
 
-/* Ranges in the making, of what is asked for. */
+/* The ranges found so far, and which chunks are wanted. */
 typedef struct {
     const ath_file *file;
     int32_t level, all;
-    uint64_t end; /* of the chunk written or counted last */
+    uint64_t end; /* end of the last chunk in the list */
     ath_range *ranges;
     int32_t capacity, count;
 } range_list;
 
-/* Nothing where the chunk is null, empty, or there and not asked for. */
+/* Ignores a chunk that is null, empty, or fed and so not wanted. */
 static void add_range(range_list *list, const ath_chunk *chunk, int all)
 {
     if (!chunk || chunk->length == 0 || (chunk->bytes && !all)) return;
@@ -53,15 +53,15 @@ static void add_range(range_list *list, const ath_chunk *chunk, int all)
     list->ranges[list->count - 1].size = list->end - list->ranges[list->count - 1].offset;
 }
 
-/* As ath_file_needs; not, unless `all` are asked for, of a rest pose that has been read. */
+/* Returns ath_file_needs but, unless `all` is 1, not for rest poses that have been read. */
 static int is_used(const ath_file *file, int32_t kind, int32_t d, int32_t level, int all)
 {
     if (!ath_file_needs(file, kind, d, level)) return 0;
     return all || kind != ATH_REFINED_REST || !file->layers[ath_layer_of(file, d)].rest_known;
 }
 
-/* Looks at the chunks of these segments alone: who asks for one segment after the other must not look at all chunks for
- * each. only_end: what those joined to them need of them. */
+/* Visits the chunks of these segments only, so that asking for segments one by one takes linear time. only_end: adds
+ * only what a joined segment needs. */
 static void add_segments(range_list *list, int32_t d, int32_t first, int32_t last, int only_end)
 {
     const ath_file *file = list->file;
@@ -74,7 +74,7 @@ static void add_segments(range_list *list, int32_t d, int32_t first, int32_t las
     }
 }
 
-/* What all segments share, where it does not stand with segments that are looked at. */
+/* Adds the chunks that all segments share, unless the visited segments include segment 0. */
 static void add_shared(range_list *list, int32_t d)
 {
     for (int32_t kind = ATH_SHAPES; kind <= ATH_REFINED_REST; kind++)
@@ -100,7 +100,7 @@ int32_t ath_ranges(const ath_file *file, int32_t level, int32_t first_segment, i
     const ath_clip *last = ath_segment_clip(file, last_segment);
     int32_t of_loop = last->first_segment < first_segment ? -1 : ath_joined_to(file, last->first_segment, level);
     int32_t before = ath_joined_to(file, first_segment, level);
-    if (before > first_segment) before = -1; /* a loop's */
+    if (before > first_segment) before = -1; /* the end of a loop, which comes last */
     for (int32_t d = 0; d <= level; d++) {
         if (before != 0 && first_segment > 0) add_shared(&list, d);
         if (before >= 0) add_segments(&list, d, before, before, 1);

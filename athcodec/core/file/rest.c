@@ -9,7 +9,7 @@ static int has_source_rest(const ath_file *file)
     return ath_find_chunk(file->chunks, file->header.chunk_count, ATH_SOURCE_REST, ATH_NO_LEVEL, 0) != 0;
 }
 
-/* The rest pose from the source's very numbers. */
+/* Derives the reference pose from the source's own numbers. */
 static void take_numbers(ath_file *file)
 {
     size_t numbers = 3 * (size_t)file->header.vertex_count;
@@ -17,7 +17,6 @@ static void take_numbers(ath_file *file)
     if (file->rest_steps) memset(file->rest_steps, 0, numbers * sizeof *file->rest_steps);
 }
 
-/* The mesh that a rest pose is connected by. */
 static int read_mesh(ath_file *file, ath_fault_info *fault)
 {
     ath_mesh *mesh = &file->mesh;
@@ -25,7 +24,7 @@ static int read_mesh(ath_file *file, ath_fault_info *fault)
     size_t vertices = file->header.vertex_count, building = ath_mesh_work(vertices, MESH_CORNERS * vertices);
     ath_bytes chunk, body;
     ath_polygons shape;
-    int result = ath_load(file, ATH_FACES, &chunk, fault); /* without which there is no memory for a mesh */
+    int result = ath_load(file, ATH_FACES, &chunk, fault); /* without FACES there is no memory for a mesh */
     if (result == ATH_OK) result = ath_parse_polygons(chunk, &shape, &body);
     if (result != ATH_OK) return fault->code = result;
     if (shape.is_derived || !ath_serves_rest(&shape, vertex_count)) return ATH_BAD_CHUNK;
@@ -81,7 +80,7 @@ void ath_know_rest(ath_file *file)
 
 /* ---- the host's mesh ---- */
 
-/* The bits of a vertex's numbers, of which -0.0 counts as 0.0. */
+/* Gets the bits of a vertex's numbers, with -0.0 as 0.0. */
 static void mesh_bits(const uint8_t *xyz, uint32_t bits[3])
 {
     memcpy(bits, xyz, 3 * sizeof *bits);
@@ -89,7 +88,7 @@ static void mesh_bits(const uint8_t *xyz, uint32_t bits[3])
         if (bits[k] == 0x80000000) bits[k] = 0;
 }
 
-/* FORMAT.md, "REST": of the bytes from the first to the last, and from the last to the first. */
+/* Fills the checksums of the mesh's bytes, forwards and backwards (FORMAT.md, "REST"). */
 static void mesh_checksums(const uint8_t *xyz, size_t stride, size_t count, uint32_t checksum[2])
 {
     checksum[0] = checksum[1] = 0;
@@ -107,7 +106,7 @@ static void mesh_checksums(const uint8_t *xyz, size_t stride, size_t count, uint
     }
 }
 
-/* The first vertex with a number that is infinite or NaN; count: none. */
+/* Returns the first vertex with a number that is infinite or NaN; `count` if there is none. */
 static size_t first_not_finite(const uint8_t *xyz, size_t stride, size_t count)
 {
     for (size_t v = 0; v < count; v++) {
@@ -149,7 +148,7 @@ int ath_set_host_mesh(ath_file *file, const void *xyz, size_t stride, int32_t ve
         if (found[k] != info->host_checksum[k])
             return ath_refuse(why, ATH_WRONG_HOST_MESH, ATH_FIELD_HOST_CHECKSUM, found[k], info->host_checksum[k],
                               info->host_checksum[k]);
-    if (file->rest_known) return ATH_OK; /* it is this one */
+    if (file->rest_known) return ATH_OK; /* the mesh is known already */
     copy_mesh(file, bytes, stride);
     take_numbers(file);
     ath_know_rest(file);
@@ -178,7 +177,6 @@ int ath_level_rest(const ath_file *file, int32_t level, ath_order order, double 
     return ATH_OK;
 }
 
-/* The finest reference pose that has been read. */
 static const double *finest_reference(const ath_file *file)
 {
     const double *reference = file->rest;
@@ -187,7 +185,7 @@ static const double *finest_reference(const ath_file *file)
     return reference;
 }
 
-/* The rest pose of the source, of which SOURCE_REST says how the reference pose bends into it. */
+/* SOURCE_REST says how the reference pose bends into the source's rest pose. */
 static int read_source_rest(ath_file *file, ath_fault_info *fault)
 {
     ath_bytes chunk, body;
@@ -216,7 +214,6 @@ int ath_read_rest(ath_file *file, ath_fault_info *fault)
     return why->code;
 }
 
-/* ATH_OK where ath_rest can give it. */
 static int rest_is_there(const ath_file *file)
 {
     if (!file->rest_known) return ATH_NEEDS_HOST_MESH;

@@ -17,8 +17,8 @@ void ath_take_end(ath_join *join, const ath_segment *before)
     memcpy(join->positions, before->end, ATH_END_FRAMES * 3 * (size_t)before->exact_vertices * number);
 }
 
-/* Shares of a jump and of a slope, from 1 to 0 with level ends, that bend as little as any over so many frames: parabolas,
- * which turn where half of the way is left, or where 1 - sqrt(1/2) is. */
+/* The shares of a jump and of a slope fall to 0 with level ends and the least bending: they are parabolas, which turn
+ * halfway (jumps), or where 1 - sqrt(1/2) of the frames are left (slopes). */
 void ath_set_join(ath_join *join, int32_t how)
 {
     const double turn = 0.70710678118654752440, bend = 0.5 + turn;
@@ -30,8 +30,8 @@ void ath_set_join(ath_join *join, int32_t how)
     }
 }
 
-/* How far numbers are off where the two that end the segment before go on to, in value and in slope, midway between that
- * and their own first two. */
+/* Fills how far a number is off, in value and in slope, midway between the last frame before the seam and the first
+ * frame behind it. start, end: the last two frames before; first, second: the first two behind. */
 ATH_INLINE void set_off(double start, double end, double first, double second, double off[2])
 {
     off[0] = 0.5 * (3.0 * (end - first) - (start - second));

@@ -24,8 +24,8 @@ void ath_keep_stream(kept_writer *to, const ath_stream *stream, int32_t frames);
 void ath_keep_piece(kept_writer *to, const ath_piece *piece, const ath_piece_rows *rows, const int32_t *shape_integers,
                     int32_t frames);
 
-/* Each reads what stands at `at` and returns where the next begins. A stream without a learned basis is left without its
- * waves, else these go to `learned`. The rows and shapes of a piece are zero on entry. */
+/* Each reads what stands at `at` and returns where the next begins. A stream without a learned basis is left without
+ * its waves, else these go to `learned`. The rows and shapes of a piece are zero on entry. */
 const uint8_t *ath_kept_stream(const uint8_t *at, ath_stream *stream, double *learned, int32_t frames);
 const uint8_t *ath_kept_piece(const uint8_t *at, const ath_piece *piece, ath_piece_rows *rows, int32_t *shape_integers,
                               double *unit_shapes, int32_t frames);

@@ -1,4 +1,4 @@
-/* Decodes the chunks of a segment into what is played: the streams of all levels side by side, piece by piece. A
+/* Decodes the chunks of a segment into positions and maps: the streams of all levels side by side, piece by piece. A
  * piece is placed as soon as its integers are decoded, so that only attach caches are kept. */
 #include "play/prepare.h"
 #include "bits/exact.inl"
@@ -19,18 +19,18 @@ typedef enum { BEFORE, CHECKSUMS, HEADS, FRAMES, PIECES, DONE, FAILED } prepare_
 typedef struct {
     ath_coder coder;
     shape_model *model;
-    refined_shape_model *refined; /* of a refinement, in its place */
-    int32_t shift;                /* of a refinement */
+    refined_shape_model *refined; /* replaces `model` in a refinement */
+    int32_t shift;                /* see ath_parse_refined_shapes */
     const ath_chunk *chunk;       /* null: no piece of the level has shapes */
 } shapes_reader;
 
 typedef struct {
     ath_coder coder;
     coefficient_model *model;
-    refinement_model *refined; /* of a refinement, in its place */
+    refinement_model *refined; /* replaces `model` in a refinement */
     uint32_t *history;
     double *temporal;
-    const ath_chunk *chunk; /* null: the level has none, or it is not wanted */
+    const ath_chunk *chunk; /* null: the level has none, or this preparation does not need it */
 } stems_reader;
 
 typedef struct {
@@ -54,28 +54,28 @@ typedef struct {
     const ath_chunk *chunk;
 } exact_reader;
 
-/* A layer of precision while one piece after the other passes through it. */
+/* A layer of precision, which one piece after the other passes through. */
 typedef struct {
     const ath_plan *plan;
     ath_motion motion;
     ath_scratch scratch;
     ath_piece_rows rows;
     int32_t counts[ATH_SLOTS];
-    int32_t *shape_integers; /* of the piece, 0 between pieces */
+    int32_t *shape_integers; /* all 0 between pieces */
     double *unit_shapes;
-    ath_piece_before before; /* the piece as the layer before has it */
-    double turn_steps[3];    /* of its rotations there */
+    ath_piece_before before; /* the piece in the layer before */
+    double turn_steps[3];    /* rotation steps in the layer before */
 } layer_work;
 
-/* What is prepared, and from what. */
+/* The segment that is asked for, and what its preparation starts from. */
 typedef struct {
     const ath_file *file;
-    void *memory;    /* of the segment */
-    void *positions; /* where they go; null: to that memory */
+    void *memory;    /* memory of the segment */
+    void *positions; /* destination of the positions; null: that memory */
     int32_t index, level;
     const ath_segment *from; /* the same segment at an earlier level; null: none */
-    const void *kept;        /* of that; null: nothing */
-    kept_head *keeps;        /* what this preparation keeps, written at `keeping`; null: nothing */
+    const void *kept;        /* integers of `from`; null: none */
+    kept_head *keeps;        /* what this preparation keeps, written by `keeping`; null: nothing */
     kept_writer keeping;
     ath_watcher *watcher; /* null: none */
 } preparation;
@@ -85,28 +85,28 @@ struct ath_work {
     ath_segment *segment;
     preparation asked;
     ath_join join;
-    int32_t only_end; /* what is in preparation is the segment before the one asked for */
+    int32_t only_end; /* 1: the segment before the one asked for is in preparation */
     shapes_reader shapes[ATH_LEVELS];
     stems_reader stems[ATH_LEVELS];
     affines_reader affines[ATH_LEVELS];
     corrections_reader corrections;
     exact_reader exact_level;
     ath_prediction *prediction;
-    const ath_chunk *predicted; /* null: there is none, or it is not wanted */
+    const ath_chunk *predicted; /* null: there is none, or this preparation does not need it */
     ath_stream streams[ATH_LEVELS];
     layer_work layers[ATH_LAYERS];
     ath_node_rows node;
     void *prelude_model;
     prepare_phase phase;
-    const ath_segment *shown_before; /* whose positions are those before make_exact; null: none */
-    const uint8_t *kept;             /* what the next piece is restored from; null: it is decoded */
-    kept_head *keeps;                /* of `asked`, while that is in preparation */
+    const ath_segment *shown_before; /* the level whose positions make_exact starts from; null: none */
+    const uint8_t *kept;             /* where the next piece is restored from; null: pieces are decoded */
+    kept_head *keeps;                /* that of `asked`, while the segment asked for is in preparation */
     kept_writer keeping;
-    int32_t index, level;       /* of the segment in preparation */
-    int32_t first_level;        /* whose chunks are read: those before serve what was prepared before */
-    int32_t first_layer, layer; /* that it takes */
-    int32_t next;               /* level of CHECKSUMS and HEADS, piece of PIECES */
-    int32_t next_kind;          /* of CHECKSUMS */
+    int32_t index, level;       /* the segment in preparation */
+    int32_t first_level;        /* first level whose chunks are read */
+    int32_t first_layer, layer; /* first and last layer that pieces pass through */
+    int32_t next;               /* next level of CHECKSUMS and HEADS, next piece of PIECES */
+    int32_t next_kind;          /* next kind of CHECKSUMS */
     uint32_t crc, crc_at;
     int32_t next_node, exact, shown;
     ath_fault_info fault;
@@ -231,10 +231,9 @@ const ath_file *ath_watched_file(const ath_work *work) { return work->file; }
 
 int32_t ath_watched_level(const ath_work *work) { return work->asked.level; }
 
-/* Of the segment asked for, not of the one before it. */
+/* The observer follows the segment asked for, not the one before it. */
 static ath_watcher *watcher_of(const ath_work *work) { return work->only_end ? 0 : work->asked.watcher; }
 
-/* Waves that are not learned, by their root. */
 static void set_waves(const ath_work *work, ath_stream *stream, int32_t root)
 {
     stream->temporal =
@@ -243,7 +242,6 @@ static void set_waves(const ath_work *work, ath_stream *stream, int32_t root)
     stream->root = root;
 }
 
-/* Pieces follow the streams. */
 static void restore_streams(ath_work *work)
 {
     work->kept += sizeof(kept_head);
@@ -273,7 +271,7 @@ static int32_t checksum_steps(const ath_chunk *chunk)
     return chunk && chunk->length > 0 ? (int32_t)((chunk->length - 1) / CHECKSUM_STEP) + 1 : 1;
 }
 
-/* Rest poses have been read. */
+/* Skips REFINED_REST, which has been read. */
 static int32_t kind_after(int32_t kind) { return kind == ATH_EXACT ? ATH_PREDICTED : kind + 1; }
 
 static int32_t steps_of(const ath_file *file, int32_t segment, int32_t level)
@@ -300,19 +298,19 @@ static int refuse(ath_work *work, int code, ath_field field, const ath_chunk *ch
     return ath_fault_at(&work->fault, chunk, (int32_t)(chunk - work->file->chunks));
 }
 
-/* Notes the chunk whose content is not valid, if it is not. */
+/* Notes the chunk if the result says that its content is not valid. */
 static int blame(ath_work *work, const ath_chunk *chunk, int result)
 {
     return result == ATH_OK ? ATH_OK : refuse(work, result, ATH_FIELD_CONTENT, chunk, 0, 0);
 }
 
-/* Null for a chunk that the segment does without. */
+/* chunk: null if the segment has none. */
 static int check_fed(ath_work *work, const ath_chunk *chunk)
 {
     return !chunk || chunk->bytes ? ATH_OK : refuse(work, ATH_MISSING, ATH_FIELD_CHUNK_SIZE, chunk, 0, chunk->length);
 }
 
-/* ATH_MISSING unless all have been fed. */
+/* Returns ATH_MISSING unless all chunks have been fed. */
 static int find_chunks(ath_work *work)
 {
     int result = ATH_OK;
@@ -365,7 +363,7 @@ static void ready_motion(ath_work *work)
     }
 }
 
-/* Begins with a segment: the one asked for, or for its end the one before that. */
+/* Begins to prepare the segment asked for or, for its end, the one before that. */
 static int begin(ath_work *work, const preparation *asked, int32_t index, int32_t level)
 {
     const ath_file *file = asked->file;
@@ -405,7 +403,6 @@ static int begin(ath_work *work, const preparation *asked, int32_t index, int32_
     return result;
 }
 
-/* `before` and `kept`: what was prepared before, null: nothing. */
 static int start(void *memory, size_t work_bytes, const ath_file *file, int32_t index, int32_t level,
                  void *segment_memory, size_t segment_bytes, const ath_segment *before, const void *kept)
 {
@@ -426,7 +423,7 @@ static int start(void *memory, size_t work_bytes, const ath_file *file, int32_t 
     asked.kept = kept;
     memset(work, 0, sizeof *work);
     int result = begin(work, &asked, index, level), join = ath_join_at(file, index, level);
-    if (result != ATH_OK || join == 0 || work->shown_before) return result; /* that is joined */
+    if (result != ATH_OK || join == 0 || work->shown_before) return result; /* `before` is joined already */
     ath_set_join(&work->join, join);
     work->phase = BEFORE;
     return ATH_OK;
@@ -466,7 +463,7 @@ int ath_prepare_to(ath_work *work, void *positions)
     return ATH_OK;
 }
 
-/* The segment before is prepared in the memory of the one asked for. */
+/* Prepares the segment before in the memory of the one asked for. */
 static int go_back(ath_work *work)
 {
     preparation asked = work->asked;
@@ -498,7 +495,7 @@ static void next_phase(ath_work *work, prepare_phase phase)
     work->next = 0;
 }
 
-/* A level's chunks, then the next level's. */
+/* Moves on to the next chunk of the level, or to the next level. */
 static void next_to_check(ath_work *work)
 {
     work->crc = work->crc_at = 0;
@@ -524,7 +521,7 @@ static int check_some(ath_work *work)
     return ATH_OK;
 }
 
-/* Own rows of a basis in waves. */
+/* Reads the rows from `known` on, as integers of waves. */
 static int read_waves(ath_work *work, const ath_stems_head *head, int32_t known, int32_t d)
 {
     stems_reader *reader = work->stems + d;
@@ -543,7 +540,7 @@ static int read_waves(ath_work *work, const ath_stems_head *head, int32_t known,
     return coder_finish(&coder) ? ATH_OK : ATH_BAD_CHUNK;
 }
 
-/* Own rows of a basis by their entries. Integers are decoded into the far half of the rows that they become. */
+/* Reads the rows from `known` on as samples. Their integers are decoded into the far half of the rows' memory. */
 static int read_entries(ath_work *work, const ath_stems_head *head, int32_t known, int32_t d)
 {
     int32_t frames = work->segment->frames;
@@ -556,7 +553,7 @@ static int read_entries(ath_work *work, const ath_stems_head *head, int32_t know
     return result;
 }
 
-/* Rows of a basis: those of the one that it begins with, then its own. */
+/* A basis begins with the rows of another one, if it has a base, and goes on with its own rows. */
 static int read_temporal(ath_work *work, const ath_stems_head *head, int32_t d)
 {
     stems_reader *reader = work->stems + d;
@@ -631,7 +628,7 @@ static int open_predicted(ath_work *work)
                                       segment->is_float64, bytes_of(work->predicted), segment->positions));
 }
 
-/* The streams of one level. */
+/* Opens the streams of one level. */
 static int open_level(ath_work *work)
 {
     int32_t d = work->next++, result = ATH_OK;
@@ -666,7 +663,7 @@ static void clear_row(int32_t *row, int32_t frames, int32_t *count)
     *count = 0;
 }
 
-/* Rows are zero on entry to code_row. */
+/* code_row needs rows of zeros. */
 static void clear_piece(layer_work *layer, const ath_piece *piece)
 {
     int32_t T = layer->motion.frames;
@@ -677,7 +674,7 @@ static void clear_piece(layer_work *layer, const ath_piece *piece)
     clear_row(layer->rows.rotation, T, layer->counts + ROTATION_SLOT);
 }
 
-/* The shapes that the level adds to those of the piece. */
+/* Reads the shapes that a level adds to the piece. */
 static int read_shapes(ath_work *work, const ath_piece *piece, int32_t level)
 {
     shapes_reader *reader = work->shapes + level;
@@ -727,7 +724,7 @@ static int refine_shapes(ath_work *work, int32_t q, const ath_piece *piece)
     return ATH_OK;
 }
 
-/* What the layer before, whose piece is at `placed`, tells this one. */
+/* Sets what the layer before, which has put the piece at `placed`, tells this one. */
 static void look_before(ath_work *work, int32_t q, int32_t p, const double *placed)
 {
     layer_work *layer = work->layers + q;
@@ -846,7 +843,7 @@ static int read_exact_point(ath_work *work, size_t at)
     return 1;
 }
 
-/* The source's own positions in place of those that the levels before give. */
+/* Replaces the positions of the last lossy level by the source's own. */
 static int make_exact(ath_work *work, const ath_piece *piece)
 {
     size_t vertices = (size_t)work->segment->exact_vertices;
@@ -871,7 +868,7 @@ static void watch_piece(const ath_work *work, int32_t p)
     watcher->piece(watcher, layer->plan, &layer->motion, p, &layer->rows);
 }
 
-/* The piece at the first layer, then as each further one refines it. */
+/* Places the piece at the first layer, then refines it layer by layer. */
 static int place_piece(ath_work *work, int32_t p)
 {
     const ath_piece *piece = work->file->plan.pieces + p;
@@ -960,7 +957,7 @@ static int finish(ath_work *work)
     return ATH_OK;
 }
 
-/* One piece, and the node that begins with it. */
+/* Prepares one piece, and the node that begins with it. */
 static int do_piece(ath_work *work)
 {
     const ath_plan *plan = &work->file->plan;

@@ -4,7 +4,7 @@
 
 enum { TILE = 8, CACHE_LINE = 16 /* floats */ };
 
-/* The memory behind a piece in some frames, which the next one fills: fetched while that is decoded. */
+/* Prefetches the memory behind a piece, which the next piece fills. */
 ATH_INLINE void expect_next(float *next, int32_t rows, int32_t start, int32_t stop, size_t frame_size)
 {
     for (int32_t r = 0; r < rows; r += CACHE_LINE)
@@ -12,7 +12,6 @@ ATH_INLINE void expect_next(float *next, int32_t rows, int32_t start, int32_t st
             ath_expect_write((uintptr_t)next + ((size_t)t * frame_size + (size_t)(r + CACHE_LINE - 1)) * sizeof *next);
 }
 
-/* Transposes rows over time into frames. */
 ATH_HOT static void store_floats(const double *placed, int32_t rows, int32_t T, const double origin[3], float *out,
                                  size_t frame_size)
 {
