@@ -47,8 +47,7 @@ ATH_INLINE int32_t count_class(int32_t count)
     return count == 0 ? 0 : count <= 2 ? 1 : count <= 6 ? 2 : count <= 14 ? 3 : count <= 30 ? 4 : 5;
 }
 
-/* Codes how many frequencies a row has. history, above: those of the same row of the unit before, and of the row
- * before. */
+/* Codes how many frequencies a row has. history: those of the same row of the unit before. */
 static int32_t code_count(ath_coder *coder, coefficient_model *model, int32_t history, int32_t above, int32_t limit,
                           int32_t count)
 {

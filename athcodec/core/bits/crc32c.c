@@ -1,5 +1,4 @@
-/* CRC-32C (Castagnoli, reflected polynomial 0x82F63B78) with tables of four bits, which are small enough to be
- * constants. */
+/* CRC-32C (Castagnoli, reflected polynomial 0x82F63B78) with constant tables of four bits. */
 #include "bits/platform.h"
 
 /* Makes the row of all 16 values from those of the single bits. */
@@ -7,8 +6,7 @@
     {0,   (a),       (b),       (a) ^ (b),       (c),       (a) ^ (c),       (b) ^ (c),       (a) ^ (b) ^ (c),         \
      (d), (a) ^ (d), (b) ^ (d), (a) ^ (b) ^ (d), (c) ^ (d), (a) ^ (c) ^ (d), (b) ^ (c) ^ (d), (a) ^ (b) ^ (c) ^ (d)}
 
-/* Row k belongs to bits 4 k to 4 k + 3 of a word. A WebAssembly module, which travels with its page, has the last row
- * only. */
+/* Row k belongs to bits 4 k to 4 k + 3 of a word. WebAssembly, which travels with its page, has only the last row. */
 #if defined(__wasm__)
 enum { CRC_ROWS = 1 };
 #define CRC_ROWS_BEFORE

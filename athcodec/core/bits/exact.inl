@@ -1,5 +1,4 @@
-/* Exact numbers, coded as differences from a prediction (FORMAT.md, "Exact numbers"). Compiled once for each
- * direction. */
+/* Exact numbers, coded as differences from a prediction (FORMAT.md, "Exact numbers"). Compiled for each direction. */
 #ifndef ATH_BITS_EXACT_INL
 #define ATH_BITS_EXACT_INL
 
@@ -77,8 +76,7 @@ static uint64_t code_difference(ath_coder *coder, exact_model *model, int32_t bi
     return coder_raw_bit(coder, negative) ? 0 - magnitude : magnitude;
 }
 
-/* Codes a number by its difference from `expected`. `length` holds the bits of the difference before, then of this
- * one. */
+/* Codes a number by its difference from `expected`. length: bits of the last difference. */
 static int code_exact(ath_coder *coder, exact_model *model, int is_float64, double expected, int32_t *length,
                       double *number)
 {

@@ -1,5 +1,5 @@
 /* Points of a body-centred cubic lattice, three integers, all even or all odd (FORMAT.md, "Lattice points"). Compiled
- * once for each direction. */
+ * for each direction. */
 #ifndef ATH_BITS_LATTICE_INL
 #define ATH_BITS_LATTICE_INL
 

@@ -88,6 +88,20 @@ ATH_INLINE double ath_single(double x)
     return (double)rounded;
 }
 
+/* Numbers of positions are doubles if is_float64 is 1, else floats. */
+ATH_INLINE size_t ath_number_size(int is_float64) { return is_float64 ? sizeof(double) : sizeof(float); }
+ATH_INLINE double ath_number_at(const void *numbers, size_t at, int is_float64)
+{
+    return is_float64 ? ((const double *)numbers)[at] : (double)((const float *)numbers)[at];
+}
+ATH_INLINE void ath_put_number(void *numbers, size_t at, int is_float64, double number)
+{
+    if (is_float64)
+        ((double *)numbers)[at] = number;
+    else
+        ((float *)numbers)[at] = (float)number;
+}
+
 ATH_INLINE size_t ath_size_or_most(uint64_t size) { return size < SIZE_MAX ? (size_t)size : SIZE_MAX; }
 
 /* Cuts one block of memory into parts aligned to 16. If the base is null, it only counts. */

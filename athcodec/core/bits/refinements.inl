@@ -1,8 +1,7 @@
 /* The context model of refined tracks (FORMAT.md, "Refined rows"), compiled once for each direction.
  *
  * A refinement knows from the layer before what each integer is about: where that is not 0, the integer is spread over
- * the ratio of the steps around it; where it is 0, the integer is small, the more so the quieter its surroundings
- * are. */
+ * the ratio of the steps around it; where it is 0, the integer is the smaller the quieter its surroundings. */
 #ifndef ATH_BITS_REFINEMENTS_INL
 #define ATH_BITS_REFINEMENTS_INL
 
@@ -107,11 +106,7 @@ ATH_INLINE int32_t code_refined_difference(ath_coder *coder, refinement_model *m
     if (predicted == 0)
         negative = coder_raw_bit(coder, difference < 0);
     else
-        negative ^= coder_bit(coder,
-                              &model->sign[magnitude == 1  ? 0
-                                           : magnitude < 4 ? 1
-                                                           : 2],
-                              (difference < 0) != negative);
+        negative ^= coder_bit(coder, &model->sign[(magnitude > 1) + (magnitude > 3)], (difference < 0) != negative);
     return negative ? -(int32_t)magnitude : (int32_t)magnitude;
 }
 

@@ -9,9 +9,7 @@ static const uint32_t MOST_COUNT = 1u << 30; /* largest count of anything, whate
 static const double LARGEST = 1.7976931348623157e308;
 
 static uint32_t u16_at(const uint8_t *at) { return (uint32_t)at[0] | (uint32_t)at[1] << 8; }
-
 static uint32_t u32_at(const uint8_t *at) { return u16_at(at) | u16_at(at + 2) << 16; }
-
 static uint64_t u64_at(const uint8_t *at) { return u32_at(at) | (uint64_t)u32_at(at + 4) << 32; }
 
 static float f32_at(const uint8_t *at)
@@ -31,7 +29,6 @@ static double f64_at(const uint8_t *at)
 }
 
 int ath_is_finite(double value) { return value - value == 0.0; }
-
 static int is_step(double value) { return ath_is_finite(value) && value > 0.0; }
 
 void ath_default_limits(ath_limits *limits)
@@ -265,12 +262,8 @@ static int read_errors(ath_coder *coder, const ath_header *header, double *error
         double most = level == header->level_count - 1 ? header->max_error : LARGEST;
         memcpy(entry, first, sizeof entry);
         for (uint32_t segment = 0; segment < header->segment_count; segment++) {
-            if (!code_errors(coder, &model, segment == 0, entry, entry)) {
-                ath_refuse(fault, ATH_BAD_CHUNK_TABLE, ATH_FIELD_ERROR, 0, 0, 0);
-                fault->level = (uint8_t)level;
-                fault->segment = segment;
-                return ATH_BAD_CHUNK_TABLE;
-            }
+            if (!code_errors(coder, &model, segment == 0, entry, entry))
+                return ath_refuse_entry(fault, ATH_FIELD_ERROR, level, segment, 0);
             if (segment == 0) memcpy(first, entry, sizeof first);
             for (int32_t i = 0; errors && i < ATH_MEASURES; i++) {
                 double error = short_float(entry[i]);
@@ -289,12 +282,7 @@ static int read_joins(ath_coder *coder, const ath_header *header, uint8_t *joins
         int32_t width = -1;
         for (uint32_t segment = 0; segment < header->segment_count; segment++) {
             width = header->segment_count > 1 ? code_join(coder, &model, width, 0) : 0;
-            if (width < 0) {
-                ath_refuse(fault, ATH_BAD_CHUNK_TABLE, ATH_FIELD_JOIN, 0, 0, 0);
-                fault->level = (uint8_t)level;
-                fault->segment = segment;
-                return ATH_BAD_CHUNK_TABLE;
-            }
+            if (width < 0) return ath_refuse_entry(fault, ATH_FIELD_JOIN, level, segment, 0);
             if (joins) *joins++ = (uint8_t)width;
         }
     }
@@ -330,11 +318,7 @@ int ath_read_tables(const uint8_t *bytes, size_t available, const ath_limits *li
 
 uint32_t ath_first_chunk(const ath_chunk *chunks, uint32_t chunk_count, int32_t kind, int32_t level, uint32_t segment)
 {
-    ath_chunk wanted;
-    memset(&wanted, 0, sizeof wanted);
-    wanted.kind = (uint16_t)kind;
-    wanted.level = (uint8_t)level;
-    wanted.segment = segment;
+    const ath_chunk wanted = {0, 0, 0, 0, segment, (uint16_t)kind, (uint8_t)level, 0};
     uint64_t key = key_of(&wanted);
     uint32_t low = 0, high = chunk_count;
     while (low < high) {
@@ -359,9 +343,7 @@ const ath_chunk *ath_find_chunk(const ath_chunk *chunks, uint32_t chunk_count, i
 
 static ath_bytes rest_of(ath_bytes chunk, size_t head)
 {
-    ath_bytes rest;
-    rest.bytes = chunk.bytes + head;
-    rest.size = chunk.size - head;
+    ath_bytes rest = {chunk.bytes + head, chunk.size - head};
     return rest;
 }
 

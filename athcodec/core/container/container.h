@@ -1,5 +1,4 @@
-/* The bytes of an .ath file (FORMAT.md, "File"). Only this parser, and container.py, which writes them, know
- * offsets. */
+/* The bytes of an .ath file (FORMAT.md, "File"). Only this parser and container.py know offsets. */
 #ifndef ATH_CONTAINER_CONTAINER_H
 #define ATH_CONTAINER_CONTAINER_H
 

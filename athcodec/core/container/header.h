@@ -16,7 +16,6 @@ typedef struct ath_header {
 enum { ATH_SHORT_SHIFT = 18, ATH_SHORT_FLOATS = 255 << 5 };
 
 ATH_INLINE int32_t ath_kind_id(const ath_chunk *chunk) { return chunk->kind & ~ATH_OPTIONAL; }
-
 ATH_INLINE int ath_is_motion(const ath_chunk *chunk) { return ath_kind_id(chunk) >= 16 && ath_kind_id(chunk) < 32; }
 
 #endif

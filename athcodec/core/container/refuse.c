@@ -23,3 +23,11 @@ int ath_fault_at(ath_fault_info *fault, const ath_chunk *chunk, int32_t index)
     fault->offset = chunk->offset;
     return fault->code;
 }
+
+int ath_refuse_entry(ath_fault_info *fault, ath_field field, int32_t level, uint32_t segment, double found)
+{
+    ath_refuse(fault, ATH_BAD_CHUNK_TABLE, field, found, 0, 0);
+    fault->level = (uint8_t)level;
+    fault->segment = segment;
+    return ATH_BAD_CHUNK_TABLE;
+}

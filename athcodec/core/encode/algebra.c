@@ -70,8 +70,7 @@ static void any_across(const double *a, double *out)
     for (int32_t i = 0; i < 3; i++) out[i] /= length;
 }
 
-/* Normalises rows of falling length. A row too short to have a direction is replaced by one that completes the
- * others. */
+/* Normalises rows of falling length. A row that is too short is replaced by one that completes the others. */
 static void make_units(double *w, double stretch[3])
 {
     double least = 1e-14 * stretch[0];

@@ -117,8 +117,6 @@ static void weigh_bends(track *track)
     track->bend_bits = BEND_BITS / (sum / track->frames + LEAST_BEND * track->limit2);
 }
 
-/* ---- candidates ---- */
-
 /* Estimates the bits of a correction. like: that of the vertex before in the same frame. */
 static double estimated_bits(const ath_correction *own, const ath_correction *like)
 {
@@ -133,8 +131,8 @@ static double estimated_bits(const ath_correction *own, const ath_correction *li
     return bits;
 }
 
-/* Where a correction may stand, and what it does to the sum of squared bends: with the vector x in parts of a step, 2 x
- * * slope + x * x * curve. */
+/* A place of a correction. With the vector x in parts of a step, it adds x * (2 * slope + x * curve) to the squared
+ * bends. */
 typedef struct {
     int32_t frame, width, beyond; /* beyond: frames in reach that are beyond the limit */
     double slope[3], curve;
@@ -228,7 +226,7 @@ static int whole_correction(const double error[3], double scale, int32_t whole[3
     return 1;
 }
 
-/* Tries the axes of a mask: the whole correction, and up to two that are shorter by a step each. Returns whether one
+/* Tries the axes of a mask: the whole correction, and up to two that are shorter by a step each. Returns 1 if one
  * serves. */
 static int try_axes(const track *track, const ath_correction *above, const place *place, int32_t mask,
                     const int32_t whole[3], candidate *best)
@@ -248,8 +246,8 @@ static int try_axes(const track *track, const ath_correction *above, const place
     return found;
 }
 
-/* Finds the cheapest correction of a width in a frame for the worst frame, with as few axes as possible. Returns 0 if
- * there is none. */
+/* Finds the cheapest correction of a width in a frame for the worst frame, with few axes. Returns 0 if there is
+ * none. */
 static int try_frame(const track *track, const ath_correction *above, int32_t frame, int32_t width, candidate *best)
 {
     static const int32_t masks[7] = {1, 2, 4, 3, 5, 6, 7}, stop_of[3] = {3, 6, 7}; /* by the number of axes */
@@ -262,8 +260,6 @@ static int try_frame(const track *track, const ath_correction *above, int32_t fr
         for (; i < stop_of[axes]; i++) found |= try_axes(track, above, &place, masks[i], whole, best);
     return found;
 }
-
-/* ---- vertices ---- */
 
 static void apply(track *track, const candidate *chosen)
 {
@@ -349,8 +345,6 @@ int64_t ath_find_corrections(int32_t vertex_count, int32_t frames, int is_float6
     }
     return count;
 }
-
-/* ---- rigid parts ---- */
 
 /* A part whose vertices are corrected together, so that it keeps its shape. */
 typedef struct {

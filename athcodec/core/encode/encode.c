@@ -303,8 +303,6 @@ int64_t ath_encode_corrections(void *memory, uint8_t *bytes, size_t capacity, in
     return coder_finish(&coder);
 }
 
-/* ---- predicted motion ---- */
-
 /* The input: frames x vertex_count x 3 source positions less the origin, and the limit of each vertex. */
 typedef struct {
     const double *source, *limits;
@@ -403,8 +401,8 @@ static void shorten(const double left[3], double limit2, int32_t steps[3])
     }
 }
 
-/* Finds the point of the lattice within the limit that is likely to take the fewest bits. The limit is at least the
- * reach. */
+/* Finds the point of the lattice within the limit that is likely to take the fewest bits. Its reach is within the
+ * limit. */
 static void cheapest_of_lattice(const double left[3], double limit, uint32_t expected, int32_t steps[3])
 {
     double spare = limit - LATTICE_REACH, length2 = 0.0, nearer[3];

@@ -69,8 +69,7 @@ ATH_ENCODER_API size_t ath_model_size(void);
 
 /* Measures the residuals of pieces, ranges of vertices that each move by one affine map: the mean distance of each
  * piece in each frame, the largest distance, and the most vertices beyond xi in a frame. rest: 3 x vertices; positions:
- * 3 x frames x vertices; inverse, offset: 3 x 3 and 3 for each frame and piece, which take a position to its
- * residual. */
+ * 3 x frames x vertices; inverse, offset: 3 x 3 and 3 for each frame and piece, which make residuals of positions. */
 ATH_ENCODER_API void ath_differences(int32_t vertex_count, int32_t frames, int32_t piece_count, const int64_t *first,
                                      const int64_t *stop, const double *inverse, const double *offset,
                                      const double *rest, const double *positions, double xi, double *mean,
@@ -94,8 +93,7 @@ typedef struct ath_rounding {
  * less the origin. A map's step is that of its level (height + 2 lengths) over the root of its number of vertices, so
  * that equal errors of all vertices together cost the same everywhere. Attach caches have to be kept (ath_build_plan).
  * Only pieces, or nodes, first to stop - 1 are analysed: several threads may work on ranges of one segment, each with
- * its own scratch memory, once the pieces that theirs hang on are done. positions: filled as ath_pose does; 0: not
- * filled. */
+ * its own scratch memory, once the pieces that theirs hang on are done. positions: see ath_pose; may be null. */
 ATH_ENCODER_API void ath_analyse(const ath_plan *plan, const ath_motion *motion, const ath_integers *integers,
                                  int32_t first, int32_t stop, const double *source, const ath_rounding *rounding,
                                  const double origin[3], int is_float64, void *positions);
@@ -130,7 +128,7 @@ ATH_ENCODER_API void ath_multiply(int64_t count, int64_t rows, int64_t inner, in
                                   int64_t a_step, const double *b, int64_t b_step, double *out);
 /* Decomposes 3 x 3 matrices: left (columns) times the 3 singular values, in descending order, times right (rows). */
 ATH_ENCODER_API void ath_decompose(int64_t count, const double *matrices, double *left, double *stretch, double *right);
-/* Replaces rows, n x columns, by the solution of matrix * x = rows. The n x n matrix is positive definite; it is
+/* Replaces rows, n x columns, by the solution of matrix * x = rows. The matrix is positive definite and is
  * destroyed. */
 ATH_ENCODER_API void ath_solve(int32_t n, int32_t columns, double *matrix, double *rows);
 
@@ -145,8 +143,8 @@ enum { ATH_CORRECTION_ROW = 6 }; /* int32_t per row */
 
 /* How the corrections of a segment meet those of the segments beside it. At closed ends (1: first frame, 2: last frame)
  * no footprint is cut off, except for its faint end. decided: `count` rows as below, in ascending order, of corrections
- * at either end that are decided, since the segment beside shares them. They are given up for a vertex that cannot be
- * corrected with them. */
+ * at either end that are decided, since the segment beside shares them. A vertex that they do not serve gives them
+ * up. */
 typedef struct ath_met_ends {
     const int32_t *decided;
     int64_t count;
@@ -154,8 +152,8 @@ typedef struct ath_met_ends {
 } ath_met_ends;
 
 /* Finds corrections that bring every vertex within its limit: up to `capacity` rows of vertex, frame and
- * ath_correction. narrow: whether a vertex's corrections must have one frame. Returns their number; -1: the step cannot
- * express them. */
+ * ath_correction. narrow: whether a vertex's corrections must have one frame. Returns their number; -1: not with this
+ * step. */
 ATH_ENCODER_API int64_t ath_find_corrections(int32_t vertex_count, int32_t frames, int is_float64,
                                              const void *positions, const double *source, const double origin[3],
                                              const double *limits, const uint8_t *narrow, double step,
@@ -180,14 +178,14 @@ ATH_ENCODER_API int64_t ath_encode_front(uint8_t *bytes, size_t capacity, const 
 ATH_ENCODER_API int64_t ath_encode_hierarchy(void *model, uint8_t *bytes, size_t capacity, const ath_branch *branches,
                                              int32_t branch_count, int32_t vertex_count, const int32_t *branch_source,
                                              const int32_t *vertex_source);
-/* mesh: null unless the pose is connected. slack: how far a vertex may be moved to save bits. moved: scratch, as large
- * as the source. */
+/* mesh: null unless the pose is connected. slack: how far a vertex may be moved to save bits. moved: scratch like
+ * source. */
 ATH_ENCODER_API int64_t ath_encode_rest(void *model, uint8_t *bytes, size_t capacity, const ath_branch *branches,
                                         int32_t branch_count, double step, double slack, ath_mesh *mesh,
                                         const int32_t *coarse, const double *before, const int32_t *shape_of,
                                         int32_t *steps, const double *source, double *moved, double *rest);
-/* Fills shape_of: the branch that each branch copies, itself if others copy it, or -1. uses: scratch. Returns the
- * number of copies. */
+/* Fills shape_of: the branch that each branch copies, itself if others copy it, or -1. uses: scratch. Returns their
+ * number. */
 ATH_ENCODER_API int32_t ath_find_copies(const ath_branch *branches, int32_t branch_count, const double *pose,
                                         double step, double slack, int32_t *uses, int32_t *shape_of);
 /* turns: scratch, branch_count x 9. */

@@ -1,5 +1,5 @@
-/* What the segments share at each level: bases, waves, refined rest poses. */
-#include "file/build.h"
+/* Builds what the segments share at each level: bases, waves, refined rest poses. */
+#include "file/file.h"
 #include "streams/decode.h"
 
 static int32_t wave_kind(const ath_file *file, int32_t segment, int32_t of_nodes)
@@ -56,8 +56,6 @@ const double *ath_file_node_waves(const ath_file *file, int32_t segment)
 {
     return file->waves[wave_kind(file, segment, 1)][ath_file_frames(file, segment)];
 }
-
-/* ---- refinements ---- */
 
 /* Returns the plan that a layer refines. */
 static const ath_plan *plan_before(const ath_file *file, int32_t q)

@@ -24,8 +24,6 @@ const char *ath_result_name(int result)
     return call >= 0 && call < (int)(sizeof calls / sizeof *calls) ? calls[call] : "UNKNOWN";
 }
 
-/* ---- writing ---- */
-
 typedef struct {
     char *text;
     size_t capacity, length; /* the length also counts characters that do not fit */
@@ -94,8 +92,6 @@ static void put_number(writer *out, double value)
     else
         put_scientific(out, value);
 }
-
-/* ---- sentences ---- */
 
 /* Sentences by field. %f: the value found; %a: the values allowed; %p: the chunk and its place; %k: kind, level and
  * segment; %l: level and segment; %m: the largest value allowed; %c: the smallest one, as a checksum; %n: the file's

@@ -1,4 +1,4 @@
-/* What an opened file holds: clips, segments, chunks, polygons, parts of a level. */
+/* The contents of an opened file: clips, segments, chunks, polygons, parts of a level. */
 #include "file/file.h"
 #include "streams/decode.h"
 
@@ -8,8 +8,7 @@ static int same_name(const char *a, const char *b)
     return *a == *b;
 }
 
-/* Returns the last clip that begins at or before a frame or segment. `first` is the offset of first_frame or
- * first_segment in ath_clip. */
+/* Returns the last clip that begins at or before a frame or segment. `first`: offset in ath_clip. */
 static const ath_clip *clip_at(const ath_file *file, size_t first, int32_t place)
 {
     int32_t low = 0, high = file->info.clip_count;
@@ -28,24 +27,14 @@ const ath_clip *ath_segment_clip(const ath_file *file, int32_t segment)
     return clip_at(file, offsetof(ath_clip, first_segment), segment);
 }
 
-/* ---- what a file holds ---- */
-
 void ath_get_info(const ath_file *file, ath_info *info) { *info = file->info; }
-
 const double *ath_errors(const ath_file *file) { return file->errors; }
-
 const uint8_t *ath_joins(const ath_file *file) { return file->joins; }
-
 const uint8_t *ath_repeats(const ath_file *file) { return file->repeats; }
-
 const ath_branch *ath_branches(const ath_file *file) { return file->branches; }
-
 const int32_t *ath_vertex_source(const ath_file *file) { return file->vertex_source; }
-
 const int32_t *ath_branch_source(const ath_file *file) { return file->branch_source; }
-
 const double *ath_times(const ath_file *file) { return file->times; }
-
 const ath_clip *ath_clips(const ath_file *file) { return file->clips; }
 
 int32_t ath_clip_among(const ath_file *file, int32_t count, const char *name)
@@ -65,8 +54,7 @@ double ath_seam_error(const ath_file *file, int32_t clip, int32_t level)
     return (double)file->seams[clip * file->header.full_level_count + level];
 }
 
-/* The largest error and the largest percentile hold for all segments together. Mean squares are weighted by the
- * frames. */
+/* The largest error and the largest percentile hold for all segments together. Mean squares are weighted by frames. */
 double ath_level_error(const ath_file *file, int32_t level, int32_t first, int32_t last, ath_measure measure)
 {
     const double *errors = file->errors + ATH_MEASURES * (size_t)level * (size_t)file->info.segment_count + measure;
@@ -125,8 +113,6 @@ int32_t ath_segment_of(const ath_file *file, int32_t frame)
         segment++;
     return segment;
 }
-
-/* ---- chunks ---- */
 
 const ath_chunk *ath_chunks(const ath_file *file) { return file->chunks; }
 
@@ -188,8 +174,6 @@ int ath_file_needs(const ath_file *file, int32_t kind, int32_t d, int32_t level)
     return kind == ATH_EXACT && d == level && d > shown;
 }
 
-/* ---- polygons ---- */
-
 static int find_polygons(const ath_file *file, int kind, ath_polygons *shape, ath_bytes *body, ath_fault_info *fault)
 {
     ath_bytes chunk;
@@ -224,8 +208,6 @@ int ath_read_polygons(const ath_file *file, int kind, void *memory, size_t memor
         return ath_refuse(why, ATH_NO_MEMORY, ATH_FIELD_NONE, 0, 0, 0);
     return why->code = ath_decode_faces(memory, body, &shape, file->info.vertex_count, counts, corners);
 }
-
-/* ---- parts of a level ---- */
 
 /* Counts the parts, nodes and exact vertices of a level, and fills the parts unless `parts` is null. */
 static void walk_cut(const ath_file *file, int32_t level, ath_part *parts, int32_t count[3])

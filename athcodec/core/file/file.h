@@ -88,6 +88,18 @@ ATH_INLINE int ath_is_shared(int32_t kind) { return kind == ATH_SHAPES || kind =
 /* Returns whether a segment's end, as the segment joined to it takes it, depends on chunks of this kind. */
 ATH_INLINE int ath_shapes_end(int32_t kind) { return kind != ATH_CORRECTIONS && kind != ATH_EXACT; }
 
+/* ---- rest poses and waves ---- */
+
+/* Returns where in the scratch memory, behind the models, the rotations of branches stand. */
+size_t ath_turns_place(void);
+/* Reads REST: the reference pose, or which mesh of the host's it is. */
+int ath_read_reference(ath_file *file, ath_fault_info *fault);
+/* Completes what follows from the reference pose. */
+void ath_know_rest(ath_file *file);
+/* Return the waves of a segment's stems, and those of the maps of its nodes. */
+const double *ath_file_waves(const ath_file *file, int32_t segment);
+const double *ath_file_node_waves(const ath_file *file, int32_t segment);
+
 /* ---- levels and layers ---- */
 
 ATH_INLINE int ath_has_stream(const ath_file *file, int32_t level) { return file->stems_levels >> level & 1; }

@@ -1,11 +1,9 @@
 /* Opening a file: its memory, and the chunks of the prelude. */
-#include "file/rest.h"
+#include "file/file.h"
 #include "streams/decode.h"
 
 enum { NAME_BYTES = 256 }; /* bytes of a clip's name with its terminating zero */
 enum { LEAST_PIECE = 32 }; /* fewest vertices of a long stem's pieces: whole rings, at most 64 vertices */
-
-/* ---- memory ---- */
 
 static int32_t most_pieces(const ath_header *header)
 {
@@ -116,8 +114,6 @@ int ath_front(const uint8_t *bytes, size_t available, const ath_limits *limits, 
     return limit;
 }
 
-/* ---- the chunks of the prelude ---- */
-
 /* Gives a clip the frames and segments after those before it; ATH_BAD_CHUNK: there are not enough left. */
 static int place_clip(ath_file *file, int32_t index, uint32_t frames, uint32_t segments)
 {
@@ -179,9 +175,7 @@ static int count_coded(ath_file *file, ath_fault_info *fault)
             file->coded[i] = (uint8_t)coded;
         }
         if (!file->repeats[start]) continue;
-        ath_refuse(fault, ATH_BAD_CHUNK_TABLE, ATH_FIELD_REPEAT, start, 0, 0);
-        fault->segment = (uint32_t)s;
-        return ATH_BAD_CHUNK_TABLE;
+        return ath_refuse_entry(fault, ATH_FIELD_REPEAT, ATH_NO_LEVEL, (uint32_t)s, start);
     }
     return ATH_OK;
 }
@@ -311,10 +305,7 @@ static int check_joins(ath_file *file, ath_fault_info *fault)
         int goes_on = before >= 0 && ath_file_frames(file, before) >= ATH_END_FRAMES;
         file->has_joins = 1;
         if (goes_on && level < lossy && width <= ath_file_frames(file, segment) - 2) continue;
-        ath_refuse(fault, ATH_BAD_CHUNK_TABLE, ATH_FIELD_JOIN, 0, 0, 0);
-        fault->level = (uint8_t)level;
-        fault->segment = (uint32_t)segment;
-        return ATH_BAD_CHUNK_TABLE;
+        return ath_refuse_entry(fault, ATH_FIELD_JOIN, level, (uint32_t)segment, 0);
     }
     return ATH_OK;
 }
@@ -344,8 +335,6 @@ static int read_time(ath_file *file, ath_fault_info *fault)
     for (int32_t i = 0; result == ATH_OK && i < file->info.clip_count; i++) result = time_clip(file, i, method, body);
     return result;
 }
-
-/* ---- opening ---- */
 
 static void set_info(ath_file *file, uint64_t prelude)
 {

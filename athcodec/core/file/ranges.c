@@ -1,4 +1,4 @@
-/* Which bytes segments need, and which of them are there. */
+/* The bytes that segments need, and whether they are there. */
 #include "file/file.h"
 
 /* Returns the first chunk that ends behind `offset`. */

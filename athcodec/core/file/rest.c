@@ -1,5 +1,5 @@
 /* The reference pose, the host's mesh, and the rest pose of the source. */
-#include "file/rest.h"
+#include "file/file.h"
 #include "streams/decode.h"
 
 size_t ath_turns_place(void) { return (ath_prelude_model_size() + 15) & ~(size_t)15; }
@@ -78,8 +78,6 @@ void ath_know_rest(ath_file *file)
     ath_plan_nodes(&file->plan, file->nodes);
 }
 
-/* ---- the host's mesh ---- */
-
 /* Gets the bits of a vertex's numbers, with -0.0 as 0.0. */
 static void mesh_bits(const uint8_t *xyz, uint32_t bits[3])
 {
@@ -155,8 +153,6 @@ int ath_set_host_mesh(ath_file *file, const void *xyz, size_t stride, int32_t ve
     return ATH_OK;
 }
 
-/* ---- rest poses for the caller ---- */
-
 static size_t place_of(const ath_file *file, ath_order order, size_t v)
 {
     return order == ATH_SOURCE_ORDER ? (size_t)file->vertex_source[v] : v;
@@ -225,26 +221,24 @@ static double rest_number(const ath_file *file, const double *reference, size_t 
     return file->source_rest ? file->source_rest[i] : reference[i] + file->info.origin[i % 3];
 }
 
-int ath_rest(const ath_file *file, ath_order order, float *xyz, size_t stride)
+static int put_rest(const ath_file *file, ath_order order, void *xyz, size_t stride, int is_float64)
 {
     int result = rest_is_there(file);
     if (result != ATH_OK) return result;
     const double *reference = finest_reference(file);
-    for (size_t v = 0; v < file->header.vertex_count; v++) {
-        float *out = (float *)(void *)((char *)xyz + place_of(file, order, v) * stride);
-        for (size_t k = 0; k < 3; k++) out[k] = (float)rest_number(file, reference, 3 * v + k);
-    }
+    for (size_t v = 0; v < file->header.vertex_count; v++)
+        for (size_t k = 0; k < 3; k++)
+            ath_put_number((char *)xyz + place_of(file, order, v) * stride, k, is_float64,
+                           rest_number(file, reference, 3 * v + k));
     return ATH_OK;
+}
+
+int ath_rest(const ath_file *file, ath_order order, float *xyz, size_t stride)
+{
+    return put_rest(file, order, xyz, stride, 0);
 }
 
 int ath_rest_float64(const ath_file *file, ath_order order, double *xyz, size_t stride)
 {
-    int result = rest_is_there(file);
-    if (result != ATH_OK) return result;
-    const double *reference = finest_reference(file);
-    for (size_t v = 0; v < file->header.vertex_count; v++) {
-        double *out = (double *)(void *)((char *)xyz + place_of(file, order, v) * stride);
-        for (size_t k = 0; k < 3; k++) out[k] = rest_number(file, reference, 3 * v + k);
-    }
-    return ATH_OK;
+    return put_rest(file, order, xyz, stride, 1);
 }

@@ -1,5 +1,4 @@
-/* The GPU form of levels and segments (ath_gpu.h). An observer of the preparation records its pieces and nodes as
- * words. */
+/* The GPU form of levels and segments (ath_gpu.h). An observer records pieces and nodes as words. */
 #include "ath_gpu.h"
 #include "model/maps.h"
 #include "model/refine.h"
@@ -96,7 +95,7 @@ static uint64_t most_basis_numbers(const ath_file *file, int32_t level)
     return count;
 }
 
-/* Of the parts that stay, the bases come last, since their size is known only once they are written. */
+/* The bases are the last part that stays, since their size is known only once they are written. */
 static uint64_t carve_level(level_writer *writer, const ath_file *file, int32_t level, uint8_t *base)
 {
     ath_arena arena = {base, 0};
@@ -602,11 +601,8 @@ static void record_baked(recorder *record, const ath_segment *segment)
 {
     size_t count = 3 * (size_t)segment->frames * (size_t)segment->exact_vertices;
     const double *origin = record->file->info.origin;
-    for (size_t i = 0; i < count; i++) {
-        double x = segment->is_float64 ? ((const double *)segment->positions)[i]
-                                       : (double)((const float *)segment->positions)[i];
-        push_float(record, BAKED, x - origin[i % 3]);
-    }
+    for (size_t i = 0; i < count; i++)
+        push_float(record, BAKED, ath_number_at(segment->positions, i, segment->is_float64) - origin[i % 3]);
 }
 
 static void record_waves(recorder *record, uint32_t first[ATH_GPU_WAVE_SETS])
@@ -747,11 +743,8 @@ static void widen_positions(const ath_file *file, const ath_segment *segment, do
     const double *origin = file->info.origin;
     for (size_t i = 0; i < (size_t)segment->frames * (size_t)segment->exact_vertices; i++) {
         double x[3];
-        for (size_t k = 0; k < 3; k++) {
-            double number = segment->is_float64 ? ((const double *)segment->positions)[3 * i + k]
-                                                : (double)((const float *)segment->positions)[3 * i + k];
-            x[k] = number - origin[k];
-        }
+        for (size_t k = 0; k < 3; k++)
+            x[k] = ath_number_at(segment->positions, 3 * i + k, segment->is_float64) - origin[k];
         widen(box, x);
     }
 }

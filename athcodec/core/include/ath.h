@@ -59,8 +59,7 @@ extern "C" {
 
 /* ---- results ---------------------------------------------------------------------------------------------------- */
 
-/* Codes below 64 are errors of a file, as listed in FORMAT.md, "Errors". They never change. Codes from 64 on are about
- * a call. */
+/* Codes below 64 are errors of a file (FORMAT.md, "Errors"). They never change. Codes from 64 on are about a call. */
 typedef enum ath_result {
     ATH_OK = 0,
     ATH_INVALID = 1,
@@ -182,7 +181,7 @@ typedef struct ath_fault_info {
 } ath_fault_info;
 
 /* Writes the fault as one line of English, "where: got this; expected that", with a terminating zero, into at most
- * `capacity` bytes. Returns the length without the zero, even if the text does not fit. ATH_FAULT_TEXT bytes always
+ * `capacity` bytes. Returns the length without the zero, even if it does not fit. ATH_FAULT_TEXT bytes always
  * suffice. */
 enum { ATH_FAULT_TEXT = 256 };
 ATH_API size_t ath_fault_text(const ath_fault_info *fault, char *text, size_t capacity);
@@ -445,8 +444,8 @@ ATH_API int ath_follow(ath_work *work, const ath_segment *before);
 /* Call ath_prepare_to before the first step to have the segment's positions written to `positions`: frame by frame, 3
  * floats (doubles if info.is_float64 is 1) per vertex, as ath_positions would copy them. Leave them in place while you
  * use the segment. Their part of the segment's own memory stays unused. Returns ATH_BAD_ARGUMENT, and changes nothing,
- * if ath_positions would not merely copy: the file's order is not the source's, frames of the segment repeat, or the
- * level has nodes. */
+ * if ath_positions would not just copy: the file's order differs from the source's, frames repeat, or the level has
+ * nodes. */
 ATH_API int ath_prepare_to(ath_work *work, void *positions);
 ATH_API int32_t ath_joined_to(const ath_file *file, int32_t segment, int32_t level);
 /* Returns level_count x segment_count numbers of frames over which segments are joined; 0: not joined. ATH_JOIN_SLOPED
@@ -454,8 +453,7 @@ ATH_API int32_t ath_joined_to(const ath_file *file, int32_t segment, int32_t lev
 enum { ATH_JOIN_SLOPED = 128 };
 ATH_API const uint8_t *ath_joins(const ath_file *file);
 
-/* Returns frame_count flags: 1 if the frame shows the same positions as the frame before at all levels. Such frames
- * take no bytes. */
+/* Returns frame_count flags: 1 if the frame shows the positions of the frame before. Such frames take no bytes. */
 ATH_API const uint8_t *ath_repeats(const ath_file *file);
 /* Fills the fault behind an error of ath_prepare_step, or of ath_prepare_start once the memory sufficed. After
  * ATH_MISSING it names the chunk whose bytes are missing. */
@@ -535,8 +533,7 @@ ATH_API int ath_exact(const ath_file *file, const ath_segment *const *segments, 
                       float *xyz, size_t stride);
 ATH_API int ath_exact_float64(const ath_file *file, const ath_segment *const *segments, int32_t segment_count,
                               double frame, double *xyz, size_t stride);
-/* Returns the level that the functions above show, and so the number of matrices and exact vertices; -1: none has the
- * frame. */
+/* Returns the level that the functions above show, whose cut has the matrices; -1: no segment has the frame. */
 ATH_API int32_t ath_shown_level(const ath_file *file, const ath_segment *const *segments, int32_t segment_count,
                                 double frame);
 
@@ -577,8 +574,8 @@ ATH_API int ath_faded_exact(const ath_file *file, const ath_segment *const *segm
 
 /* Up to four clips of a file can be blended, each at its own frame and level: from calm to storm, or between headings
  * of the wind. The blend runs along the hierarchy. Edges of stems are blended by direction and length, sheets by
- * rotation and by shape, roots by position. So branches stay attached, and an edge has the weighted mean length of the
- * clips'. */
+ * rotation and by shape, roots by position. So branches stay attached, and an edge has the clips' weighted mean
+ * length. */
 enum { ATH_BLEND_CLIPS = 4 };
 typedef struct ath_share {
     const ath_segment *const *segments; /* see ath_positions */
@@ -594,8 +591,7 @@ ATH_API size_t ath_blend_size(const ath_file *file);
 ATH_API int ath_blended_positions(const ath_file *file, const ath_share *shares, int32_t share_count, ath_order order,
                                   float *xyz, size_t stride, void *memory, size_t memory_bytes);
 
-/* The wind of a clip, as its metadata name it; the heading is in degrees. If the strength is not finite, it has
- * none. */
+/* The wind of a clip, as its metadata name it; the heading is in degrees. A strength that is not finite: none. */
 typedef struct ath_wind {
     double strength, heading;
 } ath_wind;

@@ -132,8 +132,8 @@ ATH_API size_t ath_gpu_record_size(const ath_file *file, int32_t level, const at
  * leave that unchanged until the last step. Returns ATH_OK or ATH_NO_MEMORY. */
 ATH_API int ath_gpu_record(ath_work *work, const ath_gpu_room *room, void *memory, size_t memory_bytes);
 /* Call ath_gpu_recorded once ath_prepare_step has returned ATH_OK. Returns the segment's block; null: there was too
- * little room. Then prepare the segment again with the room in `needed`; to find that out, start with a room of zeros.
- * `needed` may be null. */
+ * little room. Then prepare the segment again with the room in `needed`; to find it, start with zeros. `needed` may be
+ * null. */
 ATH_API const ath_gpu_segment *ath_gpu_recorded(const void *memory, ath_gpu_room *needed);
 
 /* Fills the box of all that a prepared segment shows, relative to the origin: least x, y, z, then largest x, y, z. */

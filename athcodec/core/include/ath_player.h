@@ -47,8 +47,8 @@ typedef struct ath_player_options {
     int32_t host_vertex_count;
 } ath_player_options;
 
-/* Opens a file, of which `size` bytes are there: at least its prelude. options, fault: may be null. Unless it returns
- * ATH_OK, *player is null, and the result is an error of the file, ATH_MISSING, ATH_NO_MEMORY, ATH_NEEDS_HOST_MESH or
+/* Opens a file, of which `size` bytes are there: at least its prelude. options, fault: may be null. If it fails,
+ * *player is null, and the result is an error of the file, ATH_MISSING, ATH_NO_MEMORY, ATH_NEEDS_HOST_MESH or
  * ATH_WRONG_HOST_MESH. */
 int ath_player_open(ath_player **player, const uint8_t *bytes, size_t size, const ath_player_options *options,
                     ath_fault_info *fault);
@@ -92,7 +92,7 @@ typedef struct ath_player_share {
 } ath_player_share;
 
 /* Calls ath_blended_positions for clips, up to ATH_BLEND_CLIPS of which have a weight. Only these are prepared, now and
- * ahead. Scratch memory lasts until the player is closed. Returns the codes of ath_player_show and of
+ * ahead. Scratch memory lasts until the player is closed. Returns codes of ath_player_show and
  * ath_blended_positions. */
 int ath_player_blended_positions(ath_player *player, const ath_player_share *shares, int32_t share_count,
                                  ath_order order, float *xyz, size_t stride);
@@ -127,8 +127,7 @@ int ath_player_endless_positions(ath_player *player, ath_player_endless *play, d
                                  ath_order order, float *xyz, size_t stride);
 
 /* Prepares what comes after what was shown last, in the direction and with the wrap of that, for `steps` steps (see
- * ath_prepare_step). Returns ATH_MORE; ATH_OK: nothing is left to do until time goes on; or an error of
- * ath_player_show. */
+ * ath_prepare_step). Returns ATH_MORE; ATH_OK: nothing is left to do until time goes on; or an error. */
 int ath_player_ahead(ath_player *player, int32_t steps);
 
 /* Returns that preparation as a job; null: nothing is left to do, or there is no memory. */
@@ -354,7 +353,6 @@ void ath_player_close(ath_player *player)
 }
 
 const ath_file *ath_player_file(const ath_player *player) { return player->file; }
-
 const ath_fault_info *ath_player_fault(const ath_player *player) { return &player->fault; }
 
 /* ---- prepared segments ---- */
@@ -552,12 +550,7 @@ static int ath_player_move(ath_player *p, const ath_player_share *shares, int32_
 
 static int ath_player_move_one(ath_player *p, int32_t clip, double seconds, ath_wrap wrap, int32_t level, double *frame)
 {
-    ath_player_share share;
-    share.clip = clip;
-    share.level = level;
-    share.wrap = wrap;
-    share.seconds = seconds;
-    share.weight = 1.0;
+    ath_player_share share = {clip, level, wrap, seconds, 1.0};
     int result = ath_player_move(p, &share, 1);
     *frame = result == ATH_OK ? p->tracks[0].frame : 0.0;
     return result;
@@ -639,10 +632,8 @@ int ath_player_blended_positions(ath_player *player, const ath_player_share *sha
     for (int32_t i = 0; i < count; i++) {
         result = ath_player_moment_at(player, player->tracks[i].frame, used[i].level, moments + i);
         if (result != ATH_OK) return result;
-        blended[i].segments = moments[i].segments;
-        blended[i].segment_count = moments[i].segment_count;
-        blended[i].frame = moments[i].frame;
-        blended[i].weight = used[i].weight;
+        ath_share share = {moments[i].segments, moments[i].segment_count, moments[i].frame, used[i].weight};
+        blended[i] = share;
     }
     return ath_blended_positions(player->file, blended, count, order, xyz, stride, player->blending,
                                  player->blending ? size : 0);
@@ -658,11 +649,8 @@ int ath_player_wind_positions(ath_player *player, const ath_wind *winds, double 
     ath_wind_weights(winds, player->info.clip_count, strength, heading, player->weights);
     for (int32_t i = 0; i < player->info.clip_count && count < ATH_BLEND_CLIPS; i++) {
         if (!(player->weights[i] > 0.0)) continue;
-        shares[count].clip = i;
-        shares[count].level = level;
-        shares[count].wrap = wrap;
-        shares[count].seconds = seconds;
-        shares[count++].weight = player->weights[i];
+        ath_player_share share = {i, level, wrap, seconds, player->weights[i]};
+        shares[count++] = share;
     }
     return ath_player_blended_positions(player, shares, count, order, xyz, stride);
 }
@@ -798,24 +786,18 @@ static void ath_player_go(const ath_player *p, ath_player_endless *play, double 
 int ath_player_endless_positions(ath_player *player, ath_player_endless *play, double seconds, int32_t level,
                                  ath_order order, float *xyz, size_t stride)
 {
-    ath_player_share shares[2];
     if (!(seconds >= 0.0 && seconds <= ATH_PLAYER_LONGEST)) return ATH_BAD_ARGUMENT;
     ath_player_go(player, play, seconds);
-    double passed = seconds - play->begins, weight = 1.0;
-    for (int32_t i = 0; i < 2; i++) {
-        shares[i].clip = play->clip;
-        shares[i].level = level;
-        shares[i].wrap = ATH_AS_MARKED;
-    }
-    shares[0].seconds = shares[1].seconds = ath_player_enters(player, play) + passed;
+    double passed = seconds - play->begins, weight = 1.0, entered = ath_player_enters(player, play) + passed;
+    double left = entered;
     if (play->run >= 0) {
         const ath_player_transition *way = play->transitions + play->run;
         double lasts = ath_player_lasts(player, play->clip, way), share = passed / lasts;
-        shares[0].seconds = ath_player_since(player, play->clip, way->leave) + passed;
+        left = ath_player_since(player, play->clip, way->leave) + passed;
         if (passed < lasts) weight = share * share * (3.0 - 2.0 * share);
     }
-    shares[0].weight = 1.0 - weight;
-    shares[1].weight = weight;
+    ath_player_share shares[2] = {{play->clip, level, ATH_AS_MARKED, left, 1.0 - weight},
+                                  {play->clip, level, ATH_AS_MARKED, entered, weight}};
     return ath_player_blended_positions(player, shares, 2, order, xyz, stride);
 }
 
@@ -999,8 +981,8 @@ void ath_player_normals(const uint32_t *triangles, size_t count, const float *xy
     for (int32_t i = 0; i < vertex_count; i++) ath_player_normalise(normals + 3 * (size_t)i);
 }
 
-/* Adds the surface's derivative by u to the tangents of the corners, and to their fourth number the signed area in
- * uv. */
+/* Adds the surface's derivative by u to the tangents of the corners, and the signed area in uv to their fourth
+ * number. */
 static void ath_player_add_tangent(const uint32_t *corner, const float *xyz, size_t stride, const float *uv,
                                    size_t uv_stride, float *tangents)
 {

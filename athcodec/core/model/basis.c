@@ -109,8 +109,7 @@ ATH_HOT static void diagonalise(int32_t n, double *d, double *e, double *q)
     }
 }
 
-/* Fills the eigenvalues in descending order, and a row per eigenvector, whose last number is not negative. Destroys
- * `a`. */
+/* Fills the eigenvalues in descending order, and a row per eigenvector, with a last number >= 0. Destroys `a`. */
 static void eigenvectors(int32_t n, double *a, double *q, double *values, double *vectors)
 {
     double d[MOST_ROWS], e[MOST_ROWS];
@@ -226,8 +225,7 @@ static void modes_of_rings(const ath_piece *piece, const double *rest, double ce
 }
 
 /* Fills the basis of a tube: rings that move without deforming along a cantilever, then affine functions across all
- * rings, then those across single rings, then what is left of the modes of an evenly spaced cantilever. Returns the
- * rank. */
+ * rings, then those across single rings, then the modes of an evenly spaced cantilever. Returns the rank. */
 static int32_t tube(const ath_piece *piece, const double *rest, const double *modes, double *basis)
 {
     int32_t n = piece->count, rank = 0, rings = ath_rings(piece);
@@ -469,7 +467,6 @@ static void periodic_waves(int32_t frames, double *waves)
 
 /* 0 <= x <= pi / 2 */
 static double cos_of(double x) { return x <= 0.25 * PI ? cos_series(x) : sin_series(0.5 * PI - x); }
-
 static double sin_of(double x) { return x <= 0.25 * PI ? sin_series(x) : cos_series(0.5 * PI - x); }
 
 /* x >= 0. The series runs at a quarter of the angle. */

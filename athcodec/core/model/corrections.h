@@ -8,8 +8,8 @@ enum { ATH_FOOTPRINTS = 3, ATH_FOOTPRINT_REACH = 3, ATH_FOOTPRINT_PARTS = 32 };
 
 static const int32_t ath_footprint_reach[ATH_FOOTPRINTS] = {0, 1, 3};
 
-/* Returns the share, in ATH_FOOTPRINT_PARTS, that a correction adds `away` frames from its own. One and two frames
- * beyond its reach it adds 0. */
+/* Returns the share, in ATH_FOOTPRINT_PARTS, that a correction adds `away` frames from its own. It is 0 one and two
+ * frames beyond its reach. */
 ATH_INLINE int32_t ath_footprint_part(int32_t width, int32_t away)
 {
     static const int32_t parts[ATH_FOOTPRINTS][ATH_FOOTPRINT_REACH + 3] = {{32}, {32, 16}, {32, 27, 16, 5}};

@@ -23,8 +23,6 @@ void ath_carve_mesh(ath_mesh *mesh, ath_arena *arena, uint64_t vertex_count, uin
     mesh->work = (int32_t *)ath_take(arena, work_bytes);
 }
 
-/* ---- connectivity ---- */
-
 static void place_face(ath_mesh *mesh, uint32_t first, uint32_t count)
 {
     uint8_t *place = mesh->place + first;
@@ -96,8 +94,6 @@ static void join_triangles(ath_mesh *mesh)
         i++;
     }
 }
-
-/* ---- order ---- */
 
 /* Vertices beside placed ones, by the parallelograms that they complete: none, one, two, more. */
 typedef struct {

@@ -381,8 +381,7 @@ static void axes_of_inertia(const ath_plan *plan, const ath_piece *piece, double
     ath_principal(1, 3, M, work, moments, axes);
 }
 
-/* A rotation's step is divided by its lever, so that its error moves the vertices as far as that of other
- * coefficients. */
+/* A rotation's step is divided by its lever, so that its error moves vertices like any coefficient's. */
 ath_turning ath_turning_of(const ath_plan *plan, const ath_piece *piece, const ath_stream *stream)
 {
     ath_turning turning = {{0.0}, {0.0}, (piece->flags & ATH_RIGID) != 0};
@@ -533,8 +532,6 @@ const double *ath_pose_turned(const ath_plan *plan, const ath_motion *motion, in
     }
     return place_used(plan, motion, piece, rows, used, scratch);
 }
-
-/* ---- learned bases and shapes ---- */
 
 /* Makes a row orthogonal to those before, of length 1, and rounds it to floats. */
 static void make_orthonormal(const double *rows, int32_t before, int32_t T, double *row)

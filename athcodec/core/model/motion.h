@@ -28,7 +28,7 @@ typedef struct ath_coarse {
     double *turn_steps; /* piece_count x 3: rotation steps; below 0 where a piece is not rigid */
 } ath_coarse;
 
-/* What the pieces and nodes of one segment are placed with. */
+/* The inputs and memory from which the pieces and nodes of one segment are placed. */
 typedef struct ath_motion {
     const ath_stream *streams; /* one per level, 0 to height + 1 */
     const double *waves;       /* frames x frames, see ath_waves: the basis of node maps */
@@ -60,7 +60,7 @@ typedef struct {
     const double *placed;           /* count x 3 x frames */
     const double *rotation, *shift; /* 3 x frames */
     const double *frames;           /* attach point and rotation once moved and turned; null: it was not rigid */
-    int32_t frequencies, modes;     /* that its rows reach; 0 frequencies: nothing is predicted from it */
+    int32_t frequencies, modes;     /* reached by its rows; 0 frequencies: nothing is predicted */
 } ath_piece_before;
 
 /* The integers of one node: columns of its map, translation; exponent of its half-octave step. */
@@ -77,7 +77,7 @@ typedef struct {
 /* The scratch memory of one piece, carved out of ath_motion.work. */
 typedef struct {
     double *rows;   /* longest piece (or a map) x 3 x frames: coefficients over time */
-    double *placed; /* as large as `rows`: positions */
+    double *placed; /* positions, as large as `rows` */
     ath_frames at;
     double *track;            /* 3 x frames */
     double *rotation, *shift; /* 3 x frames each, contiguous: the tracks that a refinement predicts from */

@@ -1,5 +1,4 @@
-/* The plan that all segments share (FORMAT.md, "Plan"): branches cut into pieces, nodes, the rest pose and its
- * bases. */
+/* The plan that all segments share (FORMAT.md, "Plan"): pieces of branches, nodes, the rest pose, its bases. */
 #ifndef ATH_MODEL_PLAN_H
 #define ATH_MODEL_PLAN_H
 
@@ -12,7 +11,7 @@ enum { ATH_RIGID = 8 }; /* flag of a piece that turns and moves without bending 
 typedef struct ath_piece {
     int64_t modes;        /* offset of its cantilever modes in the bases */
     int64_t basis;        /* offset of its basis in the bases: `rank` rows of `count` */
-    int64_t attach_cache; /* where its frames are kept for the pieces that hang on it, in vertices; -1: none does */
+    int64_t attach_cache; /* place, in vertices, of its frames for the pieces that hang on it; -1: none does */
     int32_t first, count; /* vertices */
     int32_t parent;       /* piece, -1 for a root */
     int32_t attach;       /* vertex, -1 for a root */
@@ -89,7 +88,6 @@ ATH_INLINE int32_t ath_rank(const ath_piece *piece) { return piece->flags & ATH_
 
 /* Returns the rings of a piece that has some. The last one may lack vertices. */
 ATH_INLINE int32_t ath_rings(const ath_piece *piece) { return (piece->count + piece->ring - 1) / piece->ring; }
-
 ATH_INLINE int ath_has_shift(const ath_piece *piece) { return piece->parent < 0 || (piece->flags & ATH_LOOSE); }
 
 #endif

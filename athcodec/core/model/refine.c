@@ -45,8 +45,10 @@ static int is_zero(const int32_t *integers, int32_t count)
     return 1;
 }
 
-void ath_predict_track(const ath_stream *stream, int32_t T, int32_t frequencies, const double steps[3],
-                       const uint32_t ratios[3], const double *track, const int32_t *coarse, int32_t *predicted)
+/* Fills the nearest integers, by `steps` of the three axes, of a track over temporal frequency. Integers below half of
+ * the axis's ratio (the step of the layer before over this one's) are 0, and so are those from `frequencies` on. */
+static void predict_track(const ath_stream *stream, int32_t T, int32_t frequencies, const double steps[3],
+                          const uint32_t ratios[3], const double *track, const int32_t *coarse, int32_t *predicted)
 {
     int32_t count = ath_min(frequencies, stream->temporal_rank);
     memset(predicted, 0, 3 * (size_t)T * sizeof *predicted);
@@ -133,7 +135,7 @@ static void predict_evenly(const ath_stream *stream, const ath_motion *motion, i
 {
     uint32_t ratio = (uint32_t)motion->ratio, ratios[3] = {ratio, ratio, ratio};
     double steps[3] = {step, step, step};
-    ath_predict_track(stream, motion->frames, frequencies, steps, ratios, track, coarse, predicted);
+    predict_track(stream, motion->frames, frequencies, steps, ratios, track, coarse, predicted);
 }
 
 void ath_predict_shift(const ath_motion *motion, const ath_piece *piece, const ath_piece_before *before,
@@ -163,8 +165,8 @@ void ath_predict_rotation(const ath_plan *plan, const ath_motion *motion, const 
         ath_into_axes(T, &turning, scratch->rotation);
         track = scratch->rotation;
     }
-    ath_predict_track(stream, T, before->frequencies, turning.steps, ratios, track, rows->coarse_rotation,
-                      rows->predicted_rotation);
+    predict_track(stream, T, before->frequencies, turning.steps, ratios, track, rows->coarse_rotation,
+                  rows->predicted_rotation);
 }
 
 void ath_predict_tracks(const ath_plan *plan, const ath_motion *motion, const ath_piece *piece,

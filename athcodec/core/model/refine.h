@@ -7,10 +7,6 @@
 
 /* Returns the number of frequencies, at most `most`, up to which a row is not all 0. */
 int32_t ath_row_extent(const int32_t *row, int32_t frames, int32_t most);
-/* Fills the nearest integers, by `steps` of the three axes, of a track over temporal frequency. Integers below half of
- * the axis's ratio (the step of the layer before over this one's) are 0, and so are those from `frequencies` on. */
-void ath_predict_track(const ath_stream *stream, int32_t frames, int32_t frequencies, const double steps[3],
-                       const uint32_t ratios[3], const double *track, const int32_t *coarse, int32_t *predicted);
 /* Predict the integers of a piece's translation and of its rotation. For pieces that were rigid in the layer before,
  * scratch->at is the attach frame, before this track is applied. */
 void ath_predict_shift(const ath_motion *motion, const ath_piece *piece, const ath_piece_before *before,

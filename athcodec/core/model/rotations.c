@@ -58,12 +58,6 @@ ATH_HOT void ath_follow_tangents(int32_t T, const double *tangent, const double 
     }
 }
 
-void ath_follow_tangent(const double tangent[3], const double from[3], const double to[3], const double R[9],
-                        double turned[9])
-{
-    ath_follow_tangents(1, tangent, from, to, R, turned);
-}
-
 /* Fills the rotation of the quaternion normalize(1, x, y, z) squared. */
 ATH_INLINE void rational_rotation(double x, double y, double z, double q[9])
 {

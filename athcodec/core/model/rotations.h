@@ -5,12 +5,9 @@
 #include "bits/format.h"
 
 /* Composes each rotation R with the least rotation that takes `tangent`, turned by R, to the direction from `from` to
- * `to`. Both are 3 x frames. Where a direction vanishes, the result is R. */
+ * `to`. Both are 3 x frames. Where a direction vanishes, the result is R. A single rotation may be turned in place. */
 void ath_follow_tangents(int32_t frames, const double *tangent, const double *from, const double *to, const double *R,
                          double *turned);
-/* Does the same for one rotation of 9 numbers, which may be turned in place. */
-void ath_follow_tangent(const double tangent[3], const double from[3], const double to[3], const double R[9],
-                        double turned[9]);
 /* R := R Q(omega), where Q is the rotation of the quaternion normalize(1, omega / 4) squared. */
 void ath_turn(int32_t frames, const double *omega, double *R);
 /* Turns R towards the rotation nearest to H, whose column k is what rest axis k became. Leaves R if H vanishes. */

@@ -19,7 +19,6 @@ typedef struct {
 } blending;
 
 static const double *vertex_of(const double *positions, int32_t vertex) { return positions + 3 * (size_t)vertex; }
-
 static double length_of(const double v[3]) { return ath_sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]); }
 
 /* A blended edge has the mean length and the mean direction of the clips' edges. */
@@ -188,8 +187,6 @@ int ath_blended_positions(const ath_file *file, const ath_share *shares, int32_t
     }
     return held;
 }
-
-/* ---- wind ---- */
 
 /* Returns the degrees from one heading to another, 0 to 360. */
 static double turn_between(double from, double to)

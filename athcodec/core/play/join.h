@@ -8,7 +8,8 @@ typedef struct {
     double *maps;    /* ATH_END_FRAMES x nodes x ATH_MAP: the end of the segment before */
     void *positions; /* ATH_END_FRAMES x exact vertices x 3: the end of the segment before */
     int32_t width;   /* frames; 0: the segment is not joined */
-    double jumps[ATH_JOIN_SLOPED], slopes[ATH_JOIN_SLOPED]; /* what is left of a jump and of a slope at each frame */
+    double jumps[ATH_JOIN_SLOPED],
+        slopes[ATH_JOIN_SLOPED]; /* shares of a jump and of a slope that are left at each frame */
 } ath_join;
 
 /* Carves room for the end of a segment at any level. */

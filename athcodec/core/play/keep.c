@@ -32,8 +32,6 @@ size_t ath_keep_size(const ath_file *file, int32_t level)
 
 size_t ath_kept_size(const void *kept) { return (size_t)((const kept_head *)kept)->bytes; }
 
-/* ---- writing ---- */
-
 /* Returns where the next `size` bytes go; null: nowhere. */
 static void *take(kept_writer *to, size_t size)
 {
@@ -89,8 +87,6 @@ void ath_keep_piece(kept_writer *to, const ath_piece *piece, const ath_piece_row
     keep_row(to, rows->rotation, frames, rows->counts[ROTATION_SLOT]);
     for (int32_t m = 0; m < piece->count; m++) keep_row(to, ath_row(rows->modes, m, frames), frames, rows->counts[m]);
 }
-
-/* ---- reading ---- */
 
 static const uint8_t *kept_number(const uint8_t *at, int32_t *number)
 {

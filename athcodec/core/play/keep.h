@@ -1,6 +1,6 @@
-/* What is kept of a prepared segment for a layer that refines it: bytes without pointers, so that their owner may move
- * them. First a head, then the streams of all levels so far (later streams may begin with their bases), then, piece by
- * piece, the integers of the layer's rows, most of which are small. */
+/* Keeps a prepared segment for a layer that refines it, as bytes without pointers, so that their owner may move them.
+ * First a head, then the streams of all levels so far (later streams may begin with their bases), then, piece by piece,
+ * the integers of the layer's rows, most of which are small. */
 #ifndef ATH_PLAY_KEEP_H
 #define ATH_PLAY_KEEP_H
 

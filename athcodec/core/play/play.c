@@ -292,8 +292,7 @@ static void put_exact(const shown_frames *shown, size_t index, size_t count, siz
         put_floats(shown, index, count, vertex, to);
 }
 
-/* Puts vertices first to first + count - 1 of one part at `vertex` and those behind it. Nodes move the rest pose of
- * `posed`. */
+/* Puts vertices first to first + count - 1 of one part at `vertex` and those behind it. Nodes move `posed`. */
 static void put_part(const ath_file *file, const shown_frames *shown, const ath_part *part, const ath_plan *posed,
                      size_t first, size_t count, size_t vertex, const target *to)
 {
@@ -324,12 +323,7 @@ static int positions(const ath_file *file, const ath_segment *const *segments, i
 
 static target target_of(const ath_file *file, ath_order order, void *out, size_t stride, int is_float64)
 {
-    target to;
-    to.out = (char *)out;
-    to.stride = stride;
-    to.place = order == ATH_SOURCE_ORDER ? file->vertex_source : 0;
-    to.is_float64 = is_float64;
-    to.share = 1.0f;
+    target to = {(char *)out, stride, order == ATH_SOURCE_ORDER ? file->vertex_source : 0, is_float64, 1.0f};
     return to;
 }
 
@@ -386,10 +380,7 @@ static int matrices(const ath_file *file, const ath_segment *const *segments, in
         char *at = (char *)out + (size_t)part->index * stride;
         blend_map(&shown, part->index, map);
         matrix_of(file, plan, part, map, matrix);
-        if (is_float64)
-            memcpy(at, matrix, sizeof matrix);
-        else
-            for (int32_t k = 0; k < 12; k++) ((float *)(void *)at)[k] = (float)matrix[k];
+        for (size_t k = 0; k < 12; k++) ath_put_number(at, k, is_float64, matrix[k]);
     }
     return result;
 }
@@ -521,8 +512,7 @@ int ath_faded_matrices(const ath_file *file, const ath_segment *const *segments,
     return found.result;
 }
 
-/* Shows the exact vertices of a deeper level. Nodes of any level move some of them, from the rest pose of the levels
- * above level 0. */
+/* Shows the exact vertices of a deeper level. Nodes of any level move some of them, from the rest pose of level 1. */
 static void fade_exact(const ath_file *file, const shown_frames *shown, const ath_segment *cut, const target *to)
 {
     const ath_part *moves = shown->segment[0]->parts;

@@ -2,7 +2,6 @@
  * piece is placed as soon as its integers are decoded, so that only attach caches are kept. */
 #include "play/prepare.h"
 #include "bits/exact.inl"
-#include "file/build.h"
 #include "model/maps.h"
 #include "model/refine.h"
 #include "play/join.h"
@@ -73,9 +72,9 @@ typedef struct {
     void *memory;    /* memory of the segment */
     void *positions; /* destination of the positions; null: that memory */
     int32_t index, level;
-    const ath_segment *from; /* the same segment at an earlier level; null: none */
+    const ath_segment *from; /* this segment at an earlier level; null: none */
     const void *kept;        /* integers of `from`; null: none */
-    kept_head *keeps;        /* what this preparation keeps, written by `keeping`; null: nothing */
+    kept_head *keeps;        /* memory of what is kept, written by `keeping`; null: none */
     kept_writer keeping;
     ath_watcher *watcher; /* null: none */
 } preparation;
@@ -99,8 +98,8 @@ struct ath_work {
     void *prelude_model;
     prepare_phase phase;
     const ath_segment *shown_before; /* the level whose positions make_exact starts from; null: none */
-    const uint8_t *kept;             /* where the next piece is restored from; null: pieces are decoded */
-    kept_head *keeps;                /* that of `asked`, while the segment asked for is in preparation */
+    const uint8_t *kept;             /* the next piece to restore; null: pieces are decoded */
+    kept_head *keeps;                /* asked.keeps while the segment asked for is in preparation */
     kept_writer keeping;
     int32_t index, level;       /* the segment in preparation */
     int32_t first_level;        /* first level whose chunks are read */
@@ -226,9 +225,7 @@ int ath_keep(ath_work *work, void *memory, size_t memory_bytes)
 }
 
 void ath_watch(ath_work *work, ath_watcher *watcher) { work->asked.watcher = watcher; }
-
 const ath_file *ath_watched_file(const ath_work *work) { return work->file; }
-
 int32_t ath_watched_level(const ath_work *work) { return work->asked.level; }
 
 /* The observer follows the segment asked for, not the one before it. */
@@ -304,33 +301,27 @@ static int blame(ath_work *work, const ath_chunk *chunk, int result)
     return result == ATH_OK ? ATH_OK : refuse(work, result, ATH_FIELD_CONTENT, chunk, 0, 0);
 }
 
-/* chunk: null if the segment has none. */
-static int check_fed(ath_work *work, const ath_chunk *chunk)
+/* Returns a chunk of the segment, null if it has none, and notes the first that has not been fed. */
+static const ath_chunk *fed_chunk(ath_work *work, int32_t kind, int32_t d)
 {
-    return !chunk || chunk->bytes ? ATH_OK : refuse(work, ATH_MISSING, ATH_FIELD_CHUNK_SIZE, chunk, 0, chunk->length);
+    const ath_chunk *chunk = chunk_of(work, kind, d);
+    if (chunk && !chunk->bytes && work->fault.code == ATH_OK)
+        refuse(work, ATH_MISSING, ATH_FIELD_CHUNK_SIZE, chunk, 0, chunk->length);
+    return chunk;
 }
 
-/* Returns ATH_MISSING unless all chunks have been fed. */
 static int find_chunks(ath_work *work)
 {
-    int result = ATH_OK;
+    int32_t shown = ath_min(work->level, ath_lossy_levels(work->file) - 1);
     for (int32_t d = 0; d <= work->level; d++) {
-        const ath_chunk *stems = chunk_of(work, ATH_STEMS, d);
-        const ath_chunk *affines = chunk_of(work, ATH_AFFINES, d);
-        const ath_chunk *shapes = chunk_of(work, ATH_SHAPES, d);
-        work->shapes[d].chunk = shapes;
-        work->stems[d].chunk = stems;
-        work->affines[d].chunk = affines;
-        if (result == ATH_OK) result = check_fed(work, stems);
-        if (result == ATH_OK) result = check_fed(work, affines);
-        if (result == ATH_OK) result = check_fed(work, shapes);
+        work->stems[d].chunk = fed_chunk(work, ATH_STEMS, d);
+        work->affines[d].chunk = fed_chunk(work, ATH_AFFINES, d);
+        work->shapes[d].chunk = fed_chunk(work, ATH_SHAPES, d);
     }
-    work->corrections.chunk = chunk_of(work, ATH_CORRECTIONS, ath_min(work->level, ath_lossy_levels(work->file) - 1));
-    work->exact_level.chunk = chunk_of(work, ATH_EXACT, work->level);
-    work->predicted = chunk_of(work, ATH_PREDICTED, ath_min(work->level, ath_lossy_levels(work->file) - 1));
-    if (result == ATH_OK) result = check_fed(work, work->predicted);
-    if (result == ATH_OK) result = check_fed(work, work->corrections.chunk);
-    return result == ATH_OK ? check_fed(work, work->exact_level.chunk) : result;
+    work->predicted = fed_chunk(work, ATH_PREDICTED, shown);
+    work->corrections.chunk = fed_chunk(work, ATH_CORRECTIONS, shown);
+    work->exact_level.chunk = fed_chunk(work, ATH_EXACT, work->level);
+    return work->fault.code;
 }
 
 static void ready_layer(ath_work *work, int32_t q)
@@ -407,20 +398,13 @@ static int start(void *memory, size_t work_bytes, const ath_file *file, int32_t 
                  void *segment_memory, size_t segment_bytes, const ath_segment *before, const void *kept)
 {
     ath_work *work = (ath_work *)memory;
-    preparation asked;
+    preparation asked = {file, segment_memory, 0, index, level, before, kept, 0, {0, 0}, 0};
     if (index < 0 || index >= file->info.segment_count || level < 0 || level >= file->info.level_count)
         return ATH_BAD_ARGUMENT;
     if (!file->rest_known) return ATH_NEEDS_HOST_MESH;
     if (!file->bases || !ath_level_plan(file, level)->bases || !ath_fits(memory, work_bytes, ath_work_size(file))
         || !ath_fits(segment_memory, segment_bytes, ath_segment_size(file, level)))
         return ATH_NO_MEMORY;
-    memset(&asked, 0, sizeof asked);
-    asked.file = file;
-    asked.memory = segment_memory;
-    asked.index = index;
-    asked.level = level;
-    asked.from = before;
-    asked.kept = kept;
     memset(work, 0, sizeof *work);
     int result = begin(work, &asked, index, level), join = ath_join_at(file, index, level);
     if (result != ATH_OK || join == 0 || work->shown_before) return result; /* `before` is joined already */
@@ -783,13 +767,8 @@ static int refine_piece(ath_work *work, int32_t q, int32_t p, const double **pla
 static void correct(ath_segment *segment, size_t at, double parts, double step)
 {
     if (parts == 0.0) return;
-    if (segment->is_float64) {
-        double *position = (double *)segment->positions + at;
-        *position = ath_corrected(*position, parts, step);
-    } else {
-        float *position = (float *)segment->positions + at;
-        *position = (float)ath_corrected((double)*position, parts, step);
-    }
+    double position = ath_number_at(segment->positions, at, segment->is_float64);
+    ath_put_number(segment->positions, at, segment->is_float64, ath_corrected(position, parts, step));
 }
 
 static void correct_vertex(const corrections_reader *reader, const correction_row *row, ath_segment *segment,
@@ -834,12 +813,8 @@ static int read_exact_point(ath_work *work, size_t at)
         known[k] = ath_number_at(work->segment->positions, at + k, work->segment->is_float64);
     if (!code_exact_point(&reader->coder, reader->model, work->segment->is_float64, known, reader->length, number))
         return 0;
-    for (size_t k = 0; k < 3; k++) {
-        if (work->segment->is_float64)
-            ((double *)work->segment->positions)[at + k] = number[k];
-        else
-            ((float *)work->segment->positions)[at + k] = (float)number[k];
-    }
+    for (size_t k = 0; k < 3; k++)
+        ath_put_number(work->segment->positions, at + k, work->segment->is_float64, number[k]);
     return 1;
 }
 
@@ -928,26 +903,22 @@ static int read_node(ath_work *work, int32_t n)
     return blame(work, reader->chunk, valid ? ATH_OK : ATH_BAD_CHUNK);
 }
 
-static int finish_level(ath_work *work, int32_t d)
+static int finish_stream(ath_work *work, const ath_chunk *chunk, const ath_coder *coder)
 {
-    const stems_reader *stems = work->stems + d;
-    const affines_reader *affines = work->affines + d;
-    const shapes_reader *shapes = work->shapes + d;
-    if (shapes->chunk && !coder_finish(&shapes->coder)) return blame(work, shapes->chunk, ATH_BAD_CHUNK);
-    if (stems->chunk && !coder_finish(&stems->coder)) return blame(work, stems->chunk, ATH_BAD_CHUNK);
-    if (affines->chunk && !coder_finish(&affines->coder)) return blame(work, affines->chunk, ATH_BAD_CHUNK);
-    return ATH_OK;
+    return blame(work, chunk, !chunk || coder_finish(coder) ? ATH_OK : ATH_BAD_CHUNK);
 }
 
 static int finish(ath_work *work)
 {
-    const corrections_reader *corrections = &work->corrections;
     for (int32_t d = 0; d <= work->level; d++)
-        if (finish_level(work, d) != ATH_OK) return ATH_BAD_CHUNK;
+        if (finish_stream(work, work->shapes[d].chunk, &work->shapes[d].coder)
+            || finish_stream(work, work->stems[d].chunk, &work->stems[d].coder)
+            || finish_stream(work, work->affines[d].chunk, &work->affines[d].coder))
+            return ATH_BAD_CHUNK;
     if (work->only_end) return go_on(work);
-    if (corrections->chunk && !coder_finish(&corrections->coder)) return blame(work, corrections->chunk, ATH_BAD_CHUNK);
-    if (work->exact_level.chunk && !coder_finish(&work->exact_level.coder))
-        return blame(work, work->exact_level.chunk, ATH_BAD_CHUNK);
+    if (finish_stream(work, work->corrections.chunk, &work->corrections.coder)
+        || finish_stream(work, work->exact_level.chunk, &work->exact_level.coder))
+        return ATH_BAD_CHUNK;
     ath_cut(work->file, work->level, work->segment->parts);
     work->segment->index = work->index;
     work->segment->level = work->level;
@@ -1021,7 +992,5 @@ int ath_prepare_onward(void *work, size_t work_bytes, const ath_file *file, cons
 }
 
 void ath_work_fault(const ath_work *work, ath_fault_info *fault) { *fault = work->fault; }
-
 int32_t ath_segment_index(const ath_segment *segment) { return segment->index; }
-
 int32_t ath_segment_level(const ath_segment *segment) { return segment->level; }

@@ -17,13 +17,6 @@ struct ath_segment {
     void *end;       /* ATH_END_FRAMES x exact_vertices x 3: the last frames before corrections */
 };
 
-ATH_INLINE size_t ath_number_size(int is_float64) { return is_float64 ? sizeof(double) : sizeof(float); }
-
-ATH_INLINE double ath_number_at(const void *numbers, size_t at, int is_float64)
-{
-    return is_float64 ? ((const double *)numbers)[at] : (double)((const float *)numbers)[at];
-}
-
 /* Returns where an exact vertex stands in `frames`, which hold as many vertices as the segment. */
 ATH_INLINE void *ath_vertex_at(const ath_segment *segment, void *frames, size_t t, size_t vertex)
 {

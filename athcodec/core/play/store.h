@@ -4,8 +4,7 @@
 
 #include "play/segment.h"
 
-/* Puts `count` placed vertices (3 x frames each, relative to the origin) at exact vertex `vertex` and those behind
- * it. */
+/* Puts `count` placed vertices (3 x frames each, relative to the origin) from exact vertex `vertex` on. */
 void ath_store_vertices(ath_segment *segment, const double origin[3], size_t vertex, int32_t count,
                         const double *placed);
 /* Copies exact vertices, and their end, from the same segment at another level. */

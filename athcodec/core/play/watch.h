@@ -8,7 +8,7 @@
 
 typedef struct ath_watcher ath_watcher;
 
-/* Bodies (the pieces and nodes that a level shows) come in file order. A join or a correction belongs to the last
+/* Bodies (the pieces and nodes that a level shows) come in file order. Joins and corrections belong to the last
  * body. */
 struct ath_watcher {
     void (*piece)(ath_watcher *watcher, const ath_plan *plan, const ath_motion *motion, int32_t p,

@@ -14,7 +14,7 @@ enum { PLACES = 256, MOST_DETAIL = 255, MOST_RING = 32 };
 typedef struct {
     number_model difference;
     ath_context permuted,
-        expected[2][2][3]; /* by expectation, whether a run begins, and which expectation was right before (2: none) */
+        expected[2][2][3]; /* index: expectation, whether a run begins, which expectation was right before (2: none) */
     int32_t beside[PLACES], step[2], last; /* beside: the last number at each place of a run; -1: none */
     uint32_t mean;
 } permutation_model;

@@ -215,11 +215,7 @@ static basis_model basis_model_of(coefficient_model *rows, number_model *steps, 
 {
     coefficient_model_init(rows, frames, history);
     number_model_init(steps);
-    basis_model model;
-    model.rows = rows;
-    model.steps = steps;
-    model.step_before = 0;
-    model.above_count = -1;
+    basis_model model = {rows, steps, 0, -1};
     return model;
 }
 
@@ -336,8 +332,7 @@ static void code_corrected_frames(ath_coder *coder, correction_model *model, int
 /* An encoder fills this row before code_vertex. */
 static correction_row *next_row(correction_model *model) { return &model->row[model->turn]; }
 
-/* Codes the corrections of the next vertex. Returns its row, which stays valid until the vertex after it; null: it has
- * none. */
+/* Codes the corrections of the next vertex. Returns its row, valid until the vertex after it; null: it has none. */
 static const correction_row *code_vertex(ath_coder *coder, correction_model *model, int32_t frames, int any)
 {
     correction_row *row = next_row(model), *above = &model->row[1 - model->turn];

@@ -36,8 +36,8 @@ typedef struct {
     int32_t next, way;      /* highest vertex so far + 1; how the last corner was coded */
 } faces_model;
 
-/* The polygons that are coded. Vertices are 0 to bound - 1. before, after: the ends of each vertex's open sides, newest
- * first; -1: none. */
+/* The polygons that are coded. Vertices are 0 to bound - 1. before, after: the ends of each vertex's open sides; -1:
+ * none. */
 typedef struct {
     const ath_polygons *shape;
     uint32_t *counts; /* null if all faces have as many corners */

@@ -20,8 +20,8 @@ typedef struct {
     int32_t steps[3];             /* the last integers that were not all 0 */
     uint32_t size[2];             /* sums of the integers' magnitudes in the last two frames */
     int32_t before, above;        /* the vertex that this one follows, and the one that that follows; -1: none */
-    int32_t base;                 /* where the stem is attached, or begins; -1: this is that vertex */
-    int32_t like;                 /* the same place on an earlier stem of equal length; -1: none */
+    int32_t base;                 /* attach vertex, or first vertex, of the stem; -1: this is that vertex */
+    int32_t like;                 /* corresponding vertex of an earlier stem of equal length; -1: none */
     int32_t near;                 /* the vertex whose errors and integers are likely to be similar; -1: none */
     int32_t tip;                  /* the last vertex of the stem; -1: this is an end */
     int32_t earlier, next;        /* neighbours in the order of coding; -1: none */
@@ -76,8 +76,6 @@ static void predicted_model_init(predicted_model *model)
     model->last_distance = 1;
 }
 
-/* ---- frames ---- */
-
 /* Codes whether a frame is a copy, and how many frames before it the frame is that it copies or is coded about. Returns
  * 0 if there is no such frame. */
 ATH_INLINE int code_reference(ath_coder *coder, predicted_model *model, int32_t frame, int *copied, int32_t *distance)
@@ -99,8 +97,6 @@ ATH_INLINE int code_reference(ath_coder *coder, predicted_model *model, int32_t 
     }
     return 1;
 }
-
-/* ---- least squares ---- */
 
 /* Solves by Cholesky factorisation. */
 static void solve_fit(predicted_fit *fit)
@@ -149,14 +145,10 @@ static void learn_fit(predicted_fit *fit, const predicted_way *p, const double w
     }
 }
 
-/* ---- vertices ---- */
-
 ATH_INLINE int is_number(double x) { return x - x == 0.0; }
-
 ATH_INLINE double absolute(double x) { return x < 0.0 ? -x : x; }
 
-/* Returns the extent of two vertices along their rest edge, over its length; near 1 if the step is longer than the
- * edge. */
+/* Returns the extent of two vertices along their rest edge, over its length; near 1 if the step is longer. */
 ATH_INLINE double grown(const double *rest, const double *now, int32_t from, int32_t to, double step)
 {
     double along = step * step, length2 = along;
@@ -235,9 +227,7 @@ static void predict_vertex(const predicted_model *model, const ath_predicted_hea
     const predicted_fit *fit = model->fits + p->fit;
     double scales[2] = {1.0, 1.0}, best = 0.0;
     int32_t chosen = 0;
-    if (inner) {
-        scales[0] = grown(frames->rest, frames->now, vertex->above, vertex->before, head->step);
-    }
+    if (inner) scales[0] = grown(frames->rest, frames->now, vertex->above, vertex->before, head->step);
     scales[1] = stem_scale(frames, vertex, v, head->step);
     for (size_t k = 0; k < 3; k++) guess_axis(vertex, frames, (size_t)v, k, scales, fit->weights, p);
     for (int32_t i = 0; i < GUESSES; i++) {
@@ -296,8 +286,7 @@ static void learn_vertex(predicted_model *model, const ath_predicted_head *head,
 
 ATH_INLINE int32_t size_class(uint32_t size) { return size == 0 ? 0 : size < 2 ? 1 : size < 6 ? 2 : 3; }
 
-/* Returns the expected magnitude of a vertex's integers in 1/16. near, beside: sizes of other vertices in this
- * frame. */
+/* Returns the expected magnitude of a vertex's integers in 1/16. near, beside: sizes of other vertices. */
 ATH_INLINE uint32_t expected_size(const predicted_vertex *vertices, int32_t v, uint32_t *near, uint32_t *beside)
 {
     const predicted_vertex *vertex = vertices + v;
@@ -316,10 +305,8 @@ ATH_INLINE void code_steps(ath_coder *coder, predicted_model *model, int32_t lat
     predicted_vertex *vertex = vertices + v;
     const int32_t *signs = vertex->near >= 0 ? vertices[vertex->near].steps : none;
     uint32_t near, beside, sum = 0, expected = expected_size(vertices, v, &near, &beside);
-    ath_context *moved =
-        &model->moved[size_class(vertex->size[0] + vertex->size[1] / 2)][size_class(near)][beside == 0  ? 0
-                                                                                           : beside < 4 ? 1
-                                                                                                        : 2];
+    int32_t own = size_class(vertex->size[0] + vertex->size[1] / 2), louder = (beside > 0) + (beside > 3);
+    ath_context *moved = &model->moved[own][size_class(near)][louder];
     if (coder_bit(coder, moved, steps[0] || steps[1] || steps[2])) {
         for (int32_t k = 0; k < 3; k++) {
             uint32_t about = k == 0 ? expected : (2 * expected + sum * 16 / (uint32_t)k) / 3;
@@ -343,8 +330,6 @@ ATH_INLINE void code_followed(ath_coder *coder, predicted_model *model, predicte
     model->last_followed = tip->followed;
 }
 
-/* ---- what follows what ---- */
-
 /* Returns the size of the table of vertices by rest position, a power of two. */
 ATH_INLINE uint32_t twin_places(int32_t vertex_count)
 {
@@ -365,8 +350,6 @@ static int32_t take_place(const double *rest, int32_t *last, uint32_t places, do
     for (size_t k = 0; k < 3; k++) same = same && steps_in(rest[3 * (size_t)before + k], width, 0.5) == cell[k];
     return same ? before : -1;
 }
-
-/* ---- a segment ---- */
 
 enum { AROUND = 5 };
 
@@ -466,32 +449,25 @@ static const double *known_frame(const prediction *p, int32_t frame, double *mem
 {
     size_t numbers = 3 * (size_t)p->vertex_count, at = numbers * (size_t)ath_max(frame, 0);
     if (frame < 0) return p->rest;
-    for (size_t i = 0; i < numbers; i++) {
-        double x =
-            p->is_float64 ? ((const double *)p->positions)[at + i] : (double)((const float *)p->positions)[at + i];
-        memory[i] = x - p->origin[i % 3];
-    }
+    for (size_t i = 0; i < numbers; i++)
+        memory[i] = ath_number_at(p->positions, at + i, p->is_float64) - p->origin[i % 3];
     return memory;
 }
 
 static void put_out(const prediction *p, size_t at, size_t k, double x)
 {
-    if (p->is_float64)
-        ((double *)p->positions)[at + k] = x + p->origin[k];
-    else
-        ((float *)p->positions)[at + k] = (float)(x + p->origin[k]);
+    ath_put_number(p->positions, at + k, p->is_float64, x + p->origin[k]);
 }
 
 ATH_INLINE double put_back(const prediction *p, size_t at, size_t k)
 {
-    double x = p->is_float64 ? ((const double *)p->positions)[at + k] : (double)((const float *)p->positions)[at + k];
-    return x - p->origin[k];
+    return ath_number_at(p->positions, at + k, p->is_float64) - p->origin[k];
 }
 
 static void copy_frame(prediction *p, int32_t from)
 {
     size_t numbers = 3 * (size_t)p->vertex_count, at = numbers * (size_t)p->frame;
-    size_t number = p->is_float64 ? sizeof(double) : sizeof(float);
+    size_t number = ath_number_size(p->is_float64);
     uint8_t *positions = (uint8_t *)p->positions;
     if (from >= 0) {
         memcpy(positions + at * number, positions + numbers * (size_t)from * number, numbers * number);

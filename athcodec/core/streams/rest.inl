@@ -327,7 +327,7 @@ static int code_connected_rest(ath_coder *coder, rest_model *model, const rest_l
     return 1;
 }
 
-/* A branch with detail keeps its shape: it moves with the coarser stem that it hangs on, and all that hangs on it
+/* A branch with detail keeps its shape: it moves with the coarser stem that it hangs on, and what hangs on it
  * follows. */
 static void take_along(const ath_branch *branches, const ath_branch *branch, const double *source, double *moved,
                        const double *rest)

@@ -1,5 +1,5 @@
-/* Parts of a rest pose that are copies of one shape: turned, scaled and mirrored (FORMAT.md, "Copies"). Compiled once
- * for each direction. */
+/* Parts of a rest pose that are copies of one shape: turned, scaled and mirrored (FORMAT.md, "Copies"). Compiled for
+ * each direction. */
 #ifndef ATH_STREAMS_REST_COPIES_INL
 #define ATH_STREAMS_REST_COPIES_INL
 
@@ -109,7 +109,6 @@ static double copy_lever(const ath_branch *shape, const double *rest)
 }
 
 ATH_INLINE double copy_quantum(double lever, double unit) { return lever > 0.0 ? COPY_TURN * unit / lever : 1.0; }
-
 ATH_INLINE int is_copy_scale(double s) { return s > 1e-3 && s < 1e3; }
 
 /* Makes the matrix of a copy from its integers and notes it in `shape`. Returns 0 if it is not valid. */
@@ -144,7 +143,7 @@ ATH_INLINE void copy_way(const double R[9], const double from[3], const double t
     for (int32_t k = 0; k < 3; k++) way[k] = R[3 * k] * x + R[3 * k + 1] * y + R[3 * k + 2] * z;
 }
 
-/* Fills the guesses of a copy's first vertex: the attach vertex, and as far from it as that of the last copy, or of the
+/* Fills the guesses of a copy's first vertex: the attach vertex, and as far from it as on the last copy or the
  * shape. */
 static void copy_guess(const copy_model *model, const ath_branch *branch, const ath_branch *shape,
                        const copy_place *place, const double *rest, double per_unit, rest_guess *at)
@@ -187,8 +186,6 @@ static int code_copy_place(ath_coder *coder, copy_model *model, rest_shape *shap
 }
 
 #ifdef ATH_ENCODING
-
-/* ---- how an encoder finds them ---- */
 
 enum { JACOBI_SWEEPS = 12, LEAST_COPIES = 2 };
 #define OF_TOLERANCE 0.4 /* largest RMS error of a copy before rounding, over the tolerance */
@@ -383,8 +380,7 @@ static double copy_cost(const copy_model *model, const ath_branch *branch, const
     return error <= tolerance ? cost + 0.01 * error / tolerance : 1e300;
 }
 
-/* Finds the integers of a copy within the tolerance that are likely to take the fewest bits. Returns 0 if there are
- * none. */
+/* Finds the integers of a copy within the tolerance that are likely to take the fewest bits. Returns 0 if none do. */
 static int choose_copy(const copy_model *model, const ath_branch *branches, const ath_branch *branch, int32_t index,
                        double unit, double slack, const double *source, const double *rest, copy_place *best)
 {

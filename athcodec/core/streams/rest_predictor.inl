@@ -129,8 +129,7 @@ static void rest_look_around(rest_predictor *predictor, const ath_branch *branch
     rest_guess_all(at->filter, at);
 }
 
-/* Returns the weighted mean of the guesses on one axis. Guesses that were good nearby have by far the largest
- * weights. */
+/* Returns the weighted mean of the guesses on one axis. Guesses that were good nearby weigh by far the most. */
 static double rest_expected(const rest_memory *all, const rest_guess *at, int32_t k)
 {
     double sum = 0.0, weights = 0.0, error[REST_GUESSES], least = 0.0;

@@ -29,11 +29,10 @@ static void turn_at(const bent_pose *pose, const ath_branch *stem, int32_t v, in
     if (!(length2 > 1e-200)) return;
     double inverse = 1.0 / ath_sqrt(length2);
     for (int32_t k = 0; k < 3; k++) tangent[k] = tangent[k] * inverse;
-    ath_follow_tangent(tangent, pose->rest + 3 * (size_t)before, pose->rest + 3 * (size_t)after, turned, turned);
+    ath_follow_tangents(1, tangent, pose->rest + 3 * (size_t)before, pose->rest + 3 * (size_t)after, turned, turned);
 }
 
-/* Codes vertex v about the vertex before it plus their reference edge, turned with the stem. before: -1 if there is
- * none. */
+/* Codes vertex v about the vertex before it plus their reference edge, turned with the stem. before: -1: none. */
 static void code_bent_vertex(ath_coder *coder, rest_model *model, const bent_pose *pose, int32_t v, int32_t before,
                              const double turn[9])
 {
