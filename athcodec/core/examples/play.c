@@ -1,12 +1,11 @@
-/* Plays an .ath file as an engine would, without the screen: the file arrives slice by slice, a camera walks up to the
- * plant and back, and every drawn frame gets what a GPU needs, at the level of detail that the distance asks for; where
- * that changes it fades over.
+/* Plays an .ath file as an engine would, without the screen. The file arrives slice by slice, a camera walks up to the
+ * plant and back, and every drawn frame gets what a GPU needs, at the level of detail that the distance asks for. A new
+ * level fades in.
  *
  *     play FILE [--clip NAME] [--slices N] [--seconds S] [--fps F]
  *
- * It prints the same on every machine, but for the microseconds. What it leaves out: threads (each has an ath_work of
- * its own), more than a few segments in memory, and range requests (ath_ranges) instead of a download from the
- * front. */
+ * It prints the same on every machine, except for the microseconds. It leaves out threads (each needs an ath_work), more
+ * than a few segments in memory, and range requests (ath_ranges) instead of a download from the front. */
 #include <ath.h>
 
 #include <math.h>
@@ -249,8 +248,8 @@ static void take_over(player *p, int32_t now)
     p->next_kept = NULL;
 }
 
-/* Some steps per drawn frame. All at once where there would be nothing to show: at the start, after a jump in time.
- * What has begun is finished, so that a fast camera cannot starve it. */
+/* Runs some steps per drawn frame, or all at once if nothing could be shown otherwise: at the start, or after a jump in
+ * time. A preparation that has begun is finished, so that a fast camera cannot starve it. */
 static void prepare(player *p, double place)
 {
     int32_t now = ath_blend_at(p->file, place).segment[0];
