@@ -1,6 +1,6 @@
 """The C core as Python sees it: record layouts, signatures, and one checked wrapper per function.
 
-Mirrors core/include/ath.h, which players use (core_file.py), and core/model/plan.h, motion.h and encode.h, which only
+Mirrors core/include/ath.h, which players use (core_file.py), and core/model/*.h and core/encode/encode.h, which only
 encoding uses (athcodec.encoding). Wrappers check dtypes, shapes and contiguity, so that no call can write outside an
 array; they release the GIL, and hold no state.
 """
@@ -200,7 +200,7 @@ _PLAYING = {  # core/include/ath.h
     "ath_level_for": (c_int32, [c_void_p, c_int32, c_int32, c_int, c_double, c_double, c_double, c_double]),
     "ath_crc32c": (c_uint32, [c_uint32, c_void_p, c_size_t]),
 }
-_ENCODING = {  # core/model/plan.h, core/model/motion.h, core/encode/encode.h
+_ENCODING = {  # core/model/*.h, core/encode/encode.h
     "ath_count_pieces": (c_int32, [c_void_p, c_int32, c_int32]),
     "ath_count_nodes": (c_int32, [c_void_p, c_int32]),
     "ath_build_plan": (None, [POINTER(CorePlan), c_void_p, c_void_p, c_void_p, c_int]),

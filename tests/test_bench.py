@@ -172,7 +172,7 @@ def test_the_timed_decoder_decodes_what_athcodec_decodes_and_coarse_levels_cost_
 
 
 def test_the_timed_decoder_goes_on_from_each_level_of_all_vertices_to_each_deeper_one(tmp_path, layered_ath):
-    quick = ("--rounds", "1", "--seeks", "1", "--instances", "1")
+    quick = ("--rounds", "5", "--seeks", "1", "--instances", "1")
     text, result = run_bench(tmp_path, "decode", str(layered_ath), *quick)
     onward = tables_of(result)[3]
     with athcodec.open(layered_ath) as decoder:

@@ -34,7 +34,7 @@ def c_constants(*headers: str) -> dict[str, int]:
     return found
 
 
-C = c_constants("include/ath.h", "bits/internal.h", "model/motion.h", "file/container.h")
+C = c_constants("include/ath.h", "bits/format.h", "model/motion.h", "container/container.h", "container/header.h")
 
 
 def js_constants(path: str) -> dict[str, int]:

@@ -52,14 +52,19 @@ def test_every_seed_is_a_valid_file_and_small():
 
 
 CLOCK = "if (!(frame > 0.0) || frame >= (double)file->info.frame_count) frame = 0.0;"
-LENGTH, NUMBER = "if (length > body->size - 4) return ATH_BAD_CHUNK;", "if (value < 0 || value >= count)"
-ROWS = "    memset(work->node.rows, 0,"
-ALL_THERE = "return available < *needed ? ATH_MISSING : ATH_OK;"
+ALL_THERE = "return result != ATH_OK ? result : check_size(available, *needed, ATH_FIELD_PRELUDE_SIZE, fault);"
+ROWS = "* sizeof *work->node.rows);\n    int valid"
 MISTAKES = {
-    "a length that is not checked": ("file/container.c", LENGTH, "", "motion", "crash"),
-    "a number that is not checked": ("streams/prelude.inl", NUMBER, "if (value < 0)", "prelude", "crash"),
-    "memory that is not cleared": ("play/prepare.c", ROWS, ROWS.replace("memset", "if (0) memset"), "motion", "wrong"),
-    "a prefix that is not checked": ("file/container.c", ALL_THERE, "return ATH_OK;", "container", "wrong"),
+    "a length that is not checked": ("container/container.c", " || length > body->size - 7", "", "motion", "crash"),
+    "a number that is not checked": (
+        "streams/hierarchy.inl",
+        "if (value < 0 || value >= count) return 0;",
+        "if (value < 0) return 0;",
+        "prelude",
+        "crash",
+    ),
+    "memory that is not cleared": ("play/prepare.c", ROWS, "* 0);\n    int valid", "motion", "wrong"),
+    "a prefix that is not checked": ("container/container.c", ALL_THERE, "return result;", "container", "wrong"),
     "a time that is not checked": ("play/play.c", CLOCK, "", "decode", "crash"),
 }
 

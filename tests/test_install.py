@@ -105,10 +105,11 @@ def run(*command, env=TOOLS) -> str:
 )
 def test_decoding_compiles_freestanding_without_warnings_and_needs_only_memory_functions(command, tmp_path):
     strict = "-O2 -ffreestanding -fno-math-errno -ffp-contract=off -Wall -Wextra -Wconversion -Werror".split()
+    folders = f"-I{CORE}", f"-I{CORE / 'include'}"
     objects = []
     for source in decoder_sources():
         objects.append(tmp_path / f"{source.stem}.o")
-        run(*command, *strict, "-c", source, "-o", objects[-1])
+        run(*command, *strict, *folders, "-c", source, "-o", objects[-1])
     whole = tmp_path / "decoder.o"
     run(command[0], "-nostdlib", "-r", *objects, "-o", whole)
     undefined = run("nm", "-u", whole).split()

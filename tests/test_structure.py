@@ -8,6 +8,7 @@ import subprocess
 import sys
 import tomllib
 from fnmatch import fnmatch
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 import pytest
@@ -61,6 +62,76 @@ def test_an_import_of_a_floor_above_or_in_a_circle_breaks_the_contract_of_the_fo
     )
     done = subprocess.run([sys.executable, "-c", program], cwd=tmp_path, capture_output=True, text=True)
     assert done.returncode == (module is not None), done.stdout + done.stderr
+
+
+CORE = ROOT / "athcodec" / "core"
+FLOORS = ("include", "bits", "container", "model", "streams", "file", "play", "gpu", "encode")
+"""Folders of the C core. Each may include, and call, only itself and those before it."""
+DECLARATION = re.compile(r"^\w[^(\n]*\b(ath_\w+)\([^;{}]*\);", re.M)
+SHARED_HEADERS = ("encode/encode.h", "file/file.h")  # Each declares functions of several C files of its folder.
+
+
+def broken_rules_of_the_core(core: Path) -> list[str]:
+    """What a copy of the core breaks: floors, cycles between files, places of functions, include guards.
+
+    A C file and its header count as one. Calls count as includes do, so that ath.h hides no cycle.
+    """
+    broken, uses, defined, declared = [], {}, {}, []
+    names = [str(path.relative_to(core)) for folder in FLOORS for path in sorted((core / folder).rglob("*.*"))]
+    texts = {name: re.sub(r"/\*.*?\*/", "", (core / name).read_text("utf-8"), flags=re.S) for name in names}
+    texts = {name: text.split("#ifdef ATH_PLAYER_IMPLEMENTATION")[0] for name, text in texts.items()}
+
+    def unit(name: str) -> str:
+        return name if name in SHARED_HEADERS or name.endswith(".inl") else re.sub(r"\.[ch]$", "", name)
+
+    for name, text in texts.items():
+        uses.setdefault(unit(name), set())
+        defined |= dict.fromkeys(re.findall(r"^\w(?![^(\n]*=)[^(\n]*\b(ath_\w+)\([^;{}]*\)\s*\{", text, re.M), name)
+        if not name.endswith(".c"):
+            declared += [(function, name) for function in re.findall(DECLARATION, text)]
+            guard = (
+                "ATH_" + re.sub(r"\W", "_", name).upper() if "include/" not in name else Path(name).stem.upper() + "_H"
+            )
+            broken += [f"{name}: no guard {guard}"] * (f"#ifndef {guard}\n#define {guard}\n" not in text)
+    for name, text in texts.items():
+        for header in re.findall(r'^#include "([\w/]+\.\w+)"', text, re.M):
+            uses[unit(name)].add(unit(header if "/" in header else f"include/{header}"))
+        calls = re.findall(r"\b(ath_\w+)\(", re.sub(DECLARATION, "", text))
+        uses[unit(name)] |= {unit(defined[call]) for call in calls if call in defined}
+    for user, used in uses.items():
+        used.discard(user)
+        floor = FLOORS.index(user.split("/")[0])
+        broken += [f"{user} uses {other}" for other in used if FLOORS.index(other.split("/")[0]) > floor]
+    for function, header in declared:
+        if header.startswith("include/"):
+            continue
+        file, wanted = defined.get(function, ""), Path(header)
+        here = Path(file).parent == wanted.parent if header in SHARED_HEADERS else file == str(wanted.with_suffix(".c"))
+        broken += [f"{header} declares {function} of {file or 'no file'}"] * (not here)
+    try:
+        TopologicalSorter(uses).prepare()
+    except CycleError as error:
+        broken.append(" uses ".join(reversed(error.args[1])))
+    return broken
+
+
+FORBIDDEN_IN_C = {
+    "bits/crc32c.c": '#include "model/plan.h"',
+    "container/refuse.c": "int f(void) { return ath_prepare_step(0, 0); }",
+    "model/plan.c": "void f(void) { ath_move(0, 0, 0); }",
+    "model/mesh.h": "void ath_move(int frames);",
+    "streams/rest.inl": '#include "streams/source_rest.inl"',
+}
+
+
+@pytest.mark.parametrize("file", [None, *FORBIDDEN_IN_C])
+def test_a_file_of_the_core_that_uses_a_floor_above_or_stands_in_a_circle_breaks_its_rules(file, tmp_path):
+    core = tmp_path / "core"
+    shutil.copytree(CORE, core)
+    if file is not None:
+        with open(core / file, "a", encoding="utf-8") as text:
+            text.write(f"\n{FORBIDDEN_IN_C[file]}\n")
+    assert bool(broken_rules_of_the_core(core)) == (file is not None), broken_rules_of_the_core(core)
 
 
 @pytest.mark.parametrize("words", [["--version"], ["--help"], ["encode", "--help"]])

@@ -574,7 +574,7 @@ def test_a_module_that_the_sources_do_not_make_is_noticed(tmp_path):
     copy = tmp_path / "athcodec"
     for name in ("core", "viewer"):
         shutil.copytree(VIEWER.parent / name, copy / name)
-    source = copy / "core" / "file" / "fault.c"
+    source = copy / "core" / "file" / "fault_text.c"
     source.write_text(source.read_text("utf-8").replace('"INVALID"', '"DAMAGED"'), "utf-8")
     done = check_build(copy / "viewer")
     assert done.returncode == 1 and "WebAssembly" in done.stderr and "build_decoder.py" in done.stderr

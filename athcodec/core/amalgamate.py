@@ -2,8 +2,8 @@
 
     python athcodec/core/amalgamate.py ath.c
 
-The file needs ath.h beside it, and nothing else: ``cc -O2 -c ath.c``. With --gpu it holds the functions of ath_gpu.h,
-too, and needs that as well. What a compiler must not do to its arithmetic it says itself.
+The file needs only ath.h beside it: ``cc -O2 -c ath.c``. With --gpu it also holds the functions of ath_gpu.h, and needs
+that header, too. Its pragmas keep compilers from changing its arithmetic.
 """
 
 import re
@@ -16,20 +16,22 @@ PUBLIC = "ath.h", "ath_gpu.h"
 
 
 def listed(name: str) -> list[str]:
-    """Names of C files, as the build lists them."""
+    """Return the C files of a list in CMakeLists.txt."""
     found = re.search(rf"set\({name}([^)]*)\)", (CORE / "CMakeLists.txt").read_text())
     assert found is not None
     return found.group(1).split()
 
 
 def decoder_sources() -> list[str]:
-    """Names of the decoder's C files."""
+    """Return the names of the decoder's C files."""
     return listed("ATH_DECODER_SOURCES")
 
 
 def amalgamation(gpu: bool = False) -> str:
-    """The decoder's C files, with `gpu` those of ath_gpu.h, too, one after the other, each header in front of the first
-    that includes it."""
+    """Return the decoder's C files as one text, each header in front of the first file that includes it.
+
+    With `gpu`, the files of ath_gpu.h follow.
+    """
     seen: set[str] = set()
 
     def whole(name: str) -> str:

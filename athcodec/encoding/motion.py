@@ -45,7 +45,7 @@ RANGES, LEAST_RANGE = 24, 1024  # Parts of a plant that threads take at a time, 
 RUN, RUNS = 64, 2  # Vertices of a run; one of so many runs is in a sample.
 
 
-class Waves(IntEnum):  # core/model/plan.h
+class Waves(IntEnum):  # core/model/basis.h
     """Kinds of waves: eigenvectors of third differences, a Fourier series, modes of a free beam."""
 
     SMOOTH, PERIODIC, BEAM = range(3)

@@ -26,7 +26,21 @@ ZIG = "0.17.1"
 """Version of the package ziglang that the committed module was built with."""
 
 STACK_BYTES = 64 << 10
-SMALL = ("container.c", "decode.c", "fault.c", "file.c", "gpu.c", "kept.c", "mesh.c", "plan.c")
+SMALL = (
+    "build.c",
+    "container.c",
+    "decode.c",
+    "fault_text.c",
+    "file.c",
+    "gpu.c",
+    "keep.c",
+    "mesh.c",
+    "open.c",
+    "plan.c",
+    "ranges.c",
+    "refuse.c",
+    "rest.c",
+)
 """Run once per file, or little: compiled for size, all else for speed."""
 FLAGS = [
     "-target",

@@ -6,9 +6,9 @@
 #include <stdint.h>
 #include <stdlib.h>
 
-#include "file/container.h"
+#include "streams/hierarchy.inl"
 #include "streams/motion_streams.inl"
-#include "streams/prelude.inl"
+#include "streams/rest.inl"
 
 #ifdef _WIN32
 #define BENCH_API __declspec(dllexport)

@@ -29,7 +29,7 @@ from athcodec.encoding import quantise, streams
 from athcodec.motion.hierarchy import Hierarchy
 
 CORE = Path(__file__).resolve().parents[2] / "athcodec" / "core"
-CORE_SOURCES = [CORE / name for name in ("model/basis.c", "model/motion.c")]
+CORE_SOURCES = [CORE / "model" / name for name in ("basis.c", "motion.c", "refine.c", "rotations.c")]
 LARGEST = 1 << 30
 LOW_BITS = 24
 

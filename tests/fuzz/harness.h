@@ -5,8 +5,8 @@
 #ifndef FUZZ_HARNESS_H
 #define FUZZ_HARNESS_H
 
-#include "file.h"
-#include "segment.h"
+#include "file/file.h"
+#include "play/segment.h"
 
 #include <stdio.h>
 #include <stdlib.h>

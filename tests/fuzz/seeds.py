@@ -159,9 +159,9 @@ def _prelude_inputs(data: bytes) -> Iterator[bytes]:
     hierarchy, rest, time = (parts.payload(kind) for kind in (ct.HIERARCHY, ct.REST, ct.TIME))
     counts = header.vertex_count, header.branch_count, header.frame_count
     step = struct.pack("<d", *struct.unpack_from("<f", rest, 13))
-    yield _prelude_head(*counts, rest[0], step, len(hierarchy) - 8) + hierarchy[8:] + rest[17:]
+    yield _prelude_head(*counts, rest[0], step, len(hierarchy)) + hierarchy + rest[17:]
     if time[0] == 2:
-        yield _prelude_head(*counts, 4, step, len(hierarchy) - 8) + hierarchy[8:] + time[1:]
+        yield _prelude_head(*counts, 4, step, len(hierarchy)) + hierarchy + time[1:]
     for chunk, payload in parts.chunks:
         if chunk.kind == ct.STEMS and payload[5] >= 8:
             bits, (length,) = payload[5], struct.unpack_from("<I", payload, 8)

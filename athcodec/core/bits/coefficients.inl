@@ -5,10 +5,10 @@
  * its decoded neighbours lead one to expect: the frequencies before it, the other axes, the row before, and the same
  * row of the units before; further by how high its frequency is, and by whether the axis is louder than it was in the
  * units before. */
-#ifndef ATH_COEFFICIENT_MODEL_H
-#define ATH_COEFFICIENT_MODEL_H
+#ifndef ATH_BITS_COEFFICIENTS_INL
+#define ATH_BITS_COEFFICIENTS_INL
 
-#include "model/motion.h"
+#include "bits/format.h"
 #include "bits/numbers.inl"
 
 enum { COUNT_CLASSES = 6, COUNT_BINS = 10, BANDS = 4, ROW_NUMBERS = 2 * BANDS, HISTORY_ROWS = 3 * ATH_SLOTS };
@@ -19,7 +19,7 @@ typedef struct {
     ath_context count_size[COUNT_CLASSES][COUNT_BINS];
     ath_context count_mantissa[COUNT_BINS][4];
     uint32_t *history; /* HISTORY_ROWS x frames: running mean magnitude of a row's integers, in 1/16 */
-    int32_t history_count[ATH_SLOTS], history_reach[ATH_SLOTS]; /* of the last row; of all, 0 behind */
+    int32_t history_count[ATH_SLOTS], history_reach[ATH_SLOTS]; /* frequencies of the last row in a slot; of all rows */
     uint32_t sums[2][ATH_SEGMENT_FRAMES]; /* magnitudes of the last row and of this one, summed over the axes */
     int32_t turn;
     int invalid; /* a row said that it codes more frequencies than there are */
@@ -27,7 +27,6 @@ typedef struct {
 
 ATH_INLINE size_t history_size(int32_t frames) { return HISTORY_ROWS * (size_t)frames * sizeof(uint32_t); }
 
-/* `history`: history_size(frames) bytes. */
 static void coefficient_model_init(coefficient_model *model, int32_t frames, uint32_t *history)
 {
     memset(model, 0, sizeof *model);
@@ -48,7 +47,7 @@ ATH_INLINE int32_t count_class(int32_t count)
     return count == 0 ? 0 : count <= 2 ? 1 : count <= 6 ? 2 : count <= 14 ? 3 : count <= 30 ? 4 : 5;
 }
 
-/* How many frequencies a row codes, given how many the same row of the unit before and the row before coded. */
+/* Codes how many frequencies a row has. history: those of the same row of the unit before. */
 static int32_t code_count(ath_coder *coder, coefficient_model *model, int32_t history, int32_t above, int32_t limit,
                           int32_t count)
 {
@@ -75,14 +74,14 @@ static int32_t used_frequencies(const int32_t *row, int32_t frames)
     return count;
 }
 
-/* What tells how large the integers of a row are, while it passes. */
+/* The surroundings of an integer, which tell how large it is likely to be. */
 typedef struct {
     uint32_t *history[3], *sums;
     const uint32_t *above;
     int32_t above_count;
-    uint32_t near[3], run[3]; /* of each axis: the last magnitude, and a running mean of them in 1/16 */
+    uint32_t near[3], run[3]; /* by axis: the last magnitude, and a running mean in 1/16 */
     uint32_t before, beside;  /* magnitudes summed over the axes, at the frequency before and at this one */
-    uint32_t over, mean;      /* of this frequency: in the row above, and in units before over the axes */
+    uint32_t over, mean;      /* magnitudes of this frequency: in the row above, and the mean of earlier units */
     int32_t band;
 } row_surroundings;
 
@@ -106,7 +105,7 @@ ATH_INLINE void start_frequency(row_surroundings *row, int32_t k)
     row->band = ath_min(bit_length((uint32_t)k + 1) - 1, BANDS - 1);
 }
 
-/* Of the magnitude, in 1/16: beside is of one or two axes. */
+/* Returns a magnitude in 1/16. `beside` sums one or two axes. */
 ATH_INLINE uint32_t expected_magnitude(const row_surroundings *row, int32_t axis, int32_t k)
 {
     uint32_t around = axis == 0 ? row->mean : ((row->beside * 16 >> (axis - 1)) + row->mean) / 2;
@@ -129,7 +128,7 @@ ATH_INLINE void note_magnitude(row_surroundings *row, int32_t axis, int32_t k, u
 
 ATH_INLINE void finish_frequency(row_surroundings *row, int32_t k) { row->before = row->sums[k] = row->beside; }
 
-/* The frequencies that the row does not code are all 0. */
+/* Averages the frequencies that the row does not code as zeros. */
 static void finish_row(coefficient_model *model, const row_surroundings *row, int32_t slot, int32_t count)
 {
     for (int32_t axis = 0; axis < 3; axis++) {
@@ -140,16 +139,16 @@ static void finish_row(coefficient_model *model, const row_surroundings *row, in
     model->history_reach[slot] = ath_max(model->history_reach[slot], count);
 }
 
-/* One row: three axes of `frames` integers, of which the first `rank` may be coded. `above_count`: frequencies of the
- * unit's row before, which was the last to be coded, or -1 where this is its first. `slot` names the row in the
- * history. When decoding, `row` is zero on entry. Returns how many frequencies are coded. */
+/* Codes three axes of `frames` integers, of which the first `rank` may be coded. above_count: frequencies of the unit's
+ * row before, the last to be coded; -1: this is its first row. `slot` names the row in the history. When decoding,
+ * `row` is zero on entry. Returns how many frequencies are coded. */
 static int32_t code_row(ath_coder *coder, coefficient_model *model, int32_t frames, int32_t rank, int32_t slot,
                         int32_t above_count, int32_t *row)
 {
     row_surroundings around = start_row(model, frames, slot, above_count);
     int32_t count = code_count(coder, model, model->history_count[slot], ath_max(above_count, 0), rank,
                                ENCODING ? used_frequencies(row, frames) : 0);
-    ath_coder own_coder = *coder; /* in registers: nothing below takes its address */
+    ath_coder own_coder = *coder; /* a local copy stays in registers */
     for (int32_t k = 0; k < count; k++) {
         start_frequency(&around, k);
         for (int32_t axis = 0; axis < 3; axis++) {

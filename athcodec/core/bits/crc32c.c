@@ -1,14 +1,12 @@
-/* CRC-32C (Castagnoli, reflected polynomial 0x82F63B78), four bits at a time, or eight times four side by side: small,
- * no table to build. */
-#include "bits/internal.h"
+/* CRC-32C (Castagnoli, reflected polynomial 0x82F63B78) with constant tables of four bits. */
+#include "bits/platform.h"
 
-/* A row for all values of four bits, from those of each of them. */
+/* Makes the row of all 16 values from those of the single bits. */
 #define CRC_ROW(a, b, c, d)                                                                                            \
     {0,   (a),       (b),       (a) ^ (b),       (c),       (a) ^ (c),       (b) ^ (c),       (a) ^ (b) ^ (c),         \
      (d), (a) ^ (d), (b) ^ (d), (a) ^ (b) ^ (d), (c) ^ (d), (a) ^ (c) ^ (d), (b) ^ (c) ^ (d), (a) ^ (b) ^ (c) ^ (d)}
 
-/* What four bits become: the first row of the lowest of a word, the last one of those at its top. A WebAssembly module,
- * which travels with its page, has that one alone. */
+/* Row k belongs to bits 4 k to 4 k + 3 of a word. WebAssembly, which travels with its page, has only the last row. */
 #if defined(__wasm__)
 enum { CRC_ROWS = 1 };
 #define CRC_ROWS_BEFORE

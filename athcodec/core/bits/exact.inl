@@ -1,14 +1,13 @@
-/* Exact numbers, coded as differences from a prediction (FORMAT.md, "Exact numbers"). Compiled once for
- * each direction. */
-#ifndef ATH_EXACT_MODEL_H
-#define ATH_EXACT_MODEL_H
+/* Exact numbers, coded as differences from a prediction (FORMAT.md, "Exact numbers"). Compiled for each direction. */
+#ifndef ATH_BITS_EXACT_INL
+#define ATH_BITS_EXACT_INL
 
 #include "bits/numbers.inl"
 
 enum { EXACT_BITS = 64 };
 
 typedef struct {
-    ath_context size[EXACT_BITS + 1][EXACT_BITS]; /* by the length before */
+    ath_context size[EXACT_BITS + 1][EXACT_BITS]; /* by the length of the difference before */
     ath_context mantissa[EXACT_BITS][4];
 } exact_model;
 
@@ -20,7 +19,6 @@ static void exact_model_init(exact_model *model)
         for (int32_t i = 0; i < 4; i++) context_init(&model->mantissa[bin][i], 30000);
 }
 
-/* The bits of a number, as a double where `is_float64`, else as a float. */
 static uint64_t bits_of(double number, int is_float64)
 {
     uint64_t bits;
@@ -54,7 +52,7 @@ static int is_finite(uint64_t bits, int is_float64)
     return (bits & exponent) != exponent;
 }
 
-/* Integers in the order of the numbers, -0 right below 0; and back. `sign`: the top bit. */
+/* Maps bits to integers in the order of the numbers, with -0 right below 0, and back. `sign` is the top bit. */
 static uint64_t ordered_of(uint64_t bits, uint64_t sign)
 {
     return bits & sign ? ~bits & (sign | (sign - 1)) : bits | sign;
@@ -78,7 +76,7 @@ static uint64_t code_difference(ath_coder *coder, exact_model *model, int32_t bi
     return coder_raw_bit(coder, negative) ? 0 - magnitude : magnitude;
 }
 
-/* Codes a number by its difference from `expected`; `length`: bits of the difference before. */
+/* Codes a number by its difference from `expected`. length: bits of the last difference. */
 static int code_exact(ath_coder *coder, exact_model *model, int is_float64, double expected, int32_t *length,
                       double *number)
 {
@@ -93,7 +91,6 @@ static int code_exact(ath_coder *coder, exact_model *model, int is_float64, doub
     return is_finite(bits, is_float64);
 }
 
-/* A point's three numbers. */
 static int code_exact_point(ath_coder *coder, exact_model *model, int is_float64, const double expected[3],
                             int32_t length[3], double number[3])
 {

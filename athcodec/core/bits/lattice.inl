@@ -1,14 +1,14 @@
 /* Points of a body-centred cubic lattice, three integers, all even or all odd (FORMAT.md, "Lattice points"). Compiled
- * once for each direction. */
-#ifndef ATH_LATTICE_H
-#define ATH_LATTICE_H
+ * for each direction. */
+#ifndef ATH_BITS_LATTICE_INL
+#define ATH_BITS_LATTICE_INL
 
 #include "bits/numbers.inl"
 
-#define LATTICE_UNIT 0.625              /* over the step: the lattice has as many points as cubes of a step */
-#define LATTICE_REACH 1.118033988749895 /* units from any place to a point at most: the root of 5, halved */
+#define LATTICE_UNIT 0.625              /* steps: the lattice has as many points as there are cubes of a step */
+#define LATTICE_REACH 1.118033988749895 /* units: largest distance from a point of the lattice, half the root of 5 */
 
-/* What is known of an integer: nothing, or that it is even or odd. */
+/* Knowledge of an integer before it is coded. */
 enum { ANY_INTEGER, EVEN_INTEGER, ODD_INTEGER, PARITIES };
 
 typedef struct {
@@ -20,13 +20,13 @@ static void lattice_model_init(lattice_model *model)
     for (int32_t parity = 0; parity < PARITIES; parity++) number_model_init(&model->parities[parity]);
 }
 
-/* Of integer k of a point. */
+/* The parity of the first integer of a point is that of the others. */
 ATH_INLINE int32_t parity_of(const int32_t point[3], int32_t k)
 {
     return k == 0 ? ANY_INTEGER : point[0] & 1 ? ODD_INTEGER : EVEN_INTEGER;
 }
 
-/* A value in steps, rounded; fractions of at least `half` (0.5: to the nearest) count as a step. */
+/* Rounds a value to steps. Fractions of at least `half` round away from 0; 0.5 rounds to the nearest. */
 ATH_INLINE int32_t steps_in(double value, double step, double half)
 {
     double units = value / step;
@@ -37,7 +37,7 @@ ATH_INLINE int32_t steps_in(double value, double step, double half)
 
 #ifdef ATH_ENCODING
 
-/* Of the points of the lattice within the slack, the one that is likely to take the fewest bits; else the nearest. */
+/* Finds the point within the slack that is likely to take the fewest bits, else the nearest point. */
 static void nearest_of_lattice(const double units[3], double slack, const uint32_t mean[3], int32_t integers[3])
 {
     double cheapest = 0.0, nearest = 0.0;
@@ -66,13 +66,13 @@ static void nearest_of_lattice(const double units[3], double slack, const uint32
 
 #endif
 
-/* The sign of a number, under a context, null: of which nothing is known. */
+/* sign: null if nothing is known of it. */
 ATH_INLINE int code_sign(ath_coder *coder, ath_context *sign, int negative)
 {
     return sign ? coder_bit(coder, sign, negative) : coder_raw_bit(coder, negative);
 }
 
-/* An integer of a parity, about: class of its expected magnitude. */
+/* about: class of the expected magnitude. */
 static int32_t code_integer(ath_coder *coder, lattice_model *model, int32_t parity, int32_t about, ath_context *sign,
                             int32_t value)
 {

@@ -1,6 +1,6 @@
 /* Adaptive codes for integers (FORMAT.md, "Numbers"), compiled once for each direction. */
-#ifndef ATH_NUMBER_MODEL_H
-#define ATH_NUMBER_MODEL_H
+#ifndef ATH_BITS_NUMBERS_INL
+#define ATH_BITS_NUMBERS_INL
 
 #include "bits/range_coder.inl"
 
@@ -11,7 +11,7 @@ typedef struct {
     ath_context mantissa[NUMBER_BINS][4];
 } number_model;
 
-/* Bits in x: 0 for 0, 1 for 1, 2 for 2 and 3, ... */
+/* Returns the bits in x: 0 for 0, 1 for 1, 2 for 2 and 3, ... */
 ATH_INLINE int32_t bit_length(uint32_t x)
 {
 #if defined(__GNUC__)
@@ -25,17 +25,17 @@ ATH_INLINE int32_t bit_length(uint32_t x)
 
 ATH_INLINE uint32_t magnitude_of(int32_t value) { return (uint32_t)(value < 0 ? -value : value); }
 
-/* The magnitude that contexts use. */
+/* Returns the magnitude that contexts see. */
 ATH_INLINE uint32_t clipped(int32_t value)
 {
     uint32_t magnitude = magnitude_of(value);
     return magnitude < MAGNITUDE_CLIP ? magnitude : (uint32_t)MAGNITUDE_CLIP;
 }
 
-/* A running mean of magnitudes, in 1/16, after one more number. */
+/* Returns a running mean of magnitudes, in 1/16, after one more number. */
 ATH_INLINE uint32_t averaged(uint32_t mean, int32_t value) { return mean - (mean + 4) / 8 + 2 * clipped(value); }
 
-/* Half-octave classes of an expected magnitude in 1/16: 0, 1, 2, 3, 4, 6, 8, 12, 16, ... */
+/* Returns the half-octave class of an expected magnitude in 1/16. Classes begin at 0, 1, 2, 3, 4, 6, 8, 12, 16, ... */
 ATH_INLINE int32_t number_class(uint32_t expected)
 {
     int32_t length = bit_length(expected);
@@ -49,7 +49,7 @@ static void number_model_init(number_model *model)
 {
     for (int32_t c = 0; c < NUMBER_CLASSES; c++) {
         uint32_t mean =
-            c < 2 ? (uint32_t)(c * 2 + 1) : (uint32_t)(5 + (c & 1) * 2) << (c / 2 - 1); /* in 1/32, mid of c */
+            c < 2 ? (uint32_t)(c * 2 + 1) : (uint32_t)(5 + (c & 1) * 2) << (c / 2 - 1); /* in 1/32, middle of class c */
         uint32_t more = (uint32_t)(((uint64_t)mean << 16) / (mean + 32));
         for (int32_t bin = 0; bin < NUMBER_BINS; bin++) {
             context_init(&model->size[c][bin], more);
@@ -60,7 +60,7 @@ static void number_model_init(number_model *model)
         for (int32_t i = 0; i < 4; i++) context_init(&model->mantissa[bin][i], 30000);
 }
 
-/* A number of `length` bits, 1 or more, from the bits below its leading one; the first two are modelled. */
+/* Codes the bits of a number below its leading one. The first two have contexts. length: at least 1. */
 ATH_INLINE uint64_t code_mantissa(ath_coder *coder, ath_context contexts[4], int32_t length, uint64_t value)
 {
     uint64_t built = 1;
@@ -74,7 +74,7 @@ ATH_INLINE uint64_t code_mantissa(ath_coder *coder, ath_context contexts[4], int
     return built;
 }
 
-/* One number below 2^30 under a class of expected magnitudes. */
+/* Codes a number below 2^30 under a class of expected magnitudes. */
 ATH_INLINE uint32_t code_in_class(ath_coder *coder, number_model *model, int32_t about, uint32_t value)
 {
     ath_context *size = model->size[about];
@@ -84,7 +84,6 @@ ATH_INLINE uint32_t code_in_class(ath_coder *coder, number_model *model, int32_t
     return (uint32_t)code_mantissa(coder, model->mantissa[coded - 1], coded, value);
 }
 
-/* The same under an expected magnitude in 1/16. */
 ATH_INLINE uint32_t code_unsigned(ath_coder *coder, number_model *model, uint32_t expected, uint32_t value)
 {
     return code_in_class(coder, model, number_class(expected), value);

@@ -1,12 +1,12 @@
 /* The adaptive binary range coder of FORMAT.md, "Range coder": 64-bit interval, 32-bit renormalisation, 16-bit
  * probabilities whose rate of adaptation falls from 2/5 to 1/95 as a context gathers experience.
  *
- * Models that use it are written once and compiled twice: `coder_bit` returns the bit it decoded, or encodes the bit
- * it is given and returns that. A file that defines ATH_ENCODING before including this header gets the encoder. */
-#ifndef ATH_RANGE_CODER_H
-#define ATH_RANGE_CODER_H
+ * Models that use it are written once and compiled twice: `coder_bit` returns the bit it decoded, or encodes the bit it
+ * is given and returns that. A file that defines ATH_ENCODING before including this header gets the encoder. */
+#ifndef ATH_BITS_RANGE_CODER_INL
+#define ATH_BITS_RANGE_CODER_INL
 
-#include "bits/internal.h"
+#include "bits/platform.h"
 
 typedef struct {
     uint16_t one;        /* probability of a 1, in 1/65536 */
@@ -104,7 +104,7 @@ ATH_INLINE int coder_bit(ath_coder *coder, ath_context *context, int bit)
     return bit;
 }
 
-/* Of about as many zeros as ones. */
+/* Codes a bit that is 0 about as often as 1. */
 ATH_INLINE int coder_even_bit(ath_coder *coder, ath_context *context, int bit)
 {
     return coder_bit(coder, context, bit);
@@ -116,14 +116,14 @@ ATH_INLINE int coder_raw_bit(ath_coder *coder, int bit)
     return bit;
 }
 
-/* The shortest bytes that name a number of the last interval; zeros at the end are left out. Returns the size, or -1
- * when the bytes did not fit. */
+/* Writes the shortest bytes that name a number of the last interval, without zeros at the end. Returns the size; -1:
+ * the bytes did not fit. */
 static int64_t coder_finish(ath_coder *coder)
 {
     uint64_t last = coder->low + (coder->range - 1), value = last;
     for (int keep = 0; keep < 64; keep++) {
         uint64_t mask = keep == 0 ? 0 : ~(uint64_t)0 << (64 - keep);
-        if (last < coder->low) { /* the interval crosses the carry: its lower end of the next turn is 0 */
+        if (last < coder->low) { /* the interval wraps around, and 0 is in it */
             value = 0;
             coder_carry(coder);
             break;
@@ -148,7 +148,7 @@ typedef struct {
     size_t size, at;
 } ath_coder;
 
-/* The next four bytes; those behind the end are 0. */
+/* Returns the next four bytes. Bytes behind the end are 0. */
 ATH_INLINE uint32_t coder_word(ath_coder *coder)
 {
     uint32_t word = 0;
@@ -197,7 +197,7 @@ ATH_INLINE int coder_bit(ath_coder *coder, ath_context *context, int ignored)
     return bit;
 }
 
-/* As context_learn, without a branch on the bit. */
+/* Does what context_learn does without a branch on the bit. */
 ATH_INLINE void context_learn_either(ath_context *context, uint32_t bit)
 {
     uint32_t rate = ath_rate[context->experience], one = context->one, unless = bit - 1;
@@ -209,7 +209,7 @@ ATH_INLINE void context_learn_either(ath_context *context, uint32_t bit)
     context->experience = (uint16_t)(context->experience + (context->experience < RATE_LIMIT));
 }
 
-/* Of about as many zeros as ones: a branch on them would be guessed wrong. */
+/* Decodes a bit that is 0 about as often as 1, without a branch, which would be mispredicted. */
 ATH_INLINE int coder_even_bit(ath_coder *coder, ath_context *context, int ignored)
 {
     uint64_t bound = (coder->range >> 16) * context->one, bit = coder->code < bound, unless = bit - 1;
@@ -231,8 +231,8 @@ ATH_INLINE int coder_raw_bit(ath_coder *coder, int ignored)
     return (int)bit;
 }
 
-/* A stream is whole when its bytes were all read, nothing beyond them was needed except the zeros left out at the
- * end, and it does not end in a zero that should have been left out. */
+/* A stream is whole when its bytes were all read, nothing beyond them was needed except the zeros left out at the end,
+ * and it does not end in a zero that should have been left out. */
 static int coder_finish(const ath_coder *coder)
 {
     if (coder->size > 0 && coder->bytes[coder->size - 1] == 0) return 0;

@@ -1,21 +1,20 @@
 /* The context model of refined tracks (FORMAT.md, "Refined rows"), compiled once for each direction.
  *
- * A refinement knows from the layer before what each integer is about: where that is not 0, the integer is spread over the
- * ratio of the steps around it; where it is 0, the integer is small, the more so the quieter its surroundings are. */
-#ifndef ATH_REFINEMENT_MODEL_H
-#define ATH_REFINEMENT_MODEL_H
+ * A refinement knows from the layer before what each integer is about: where that is not 0, the integer is spread over
+ * the ratio of the steps around it; where it is 0, the integer is the smaller the quieter its surroundings. */
+#ifndef ATH_BITS_REFINEMENTS_INL
+#define ATH_BITS_REFINEMENTS_INL
 
 #include "bits/coefficients.inl"
 
 enum { REFINED_SIGNS = 3 };
 
 typedef struct {
-    coefficient_model rows; /* of the differences; its numbers are those of integers that are 0 in the layer before */
-    number_model known;     /* of others */
+    coefficient_model rows; /* model of the differences; its numbers code integers that are 0 in the layer before */
+    number_model known;     /* codes the other integers */
     ath_context sign[REFINED_SIGNS];
 } refinement_model;
 
-/* `history`: history_size(frames) bytes. */
 static void refinement_model_init(refinement_model *model, int32_t frames, uint32_t *history)
 {
     coefficient_model_init(&model->rows, frames, history);
@@ -23,35 +22,35 @@ static void refinement_model_init(refinement_model *model, int32_t frames, uint3
     for (int32_t i = 0; i < REFINED_SIGNS; i++) context_init(&model->sign[i], 32768);
 }
 
-/* An integer of the layer before in steps of this one; what is too large for that is kept from overflowing. */
+/* Returns an integer of the layer before in steps of this one, clamped so that it does not overflow. */
 ATH_INLINE int32_t shifted(int32_t coarse, int32_t shift)
 {
     int32_t most = 0x3fffffff >> shift;
     return (coarse > most ? most : coarse < -most ? -most : coarse) * (1 << shift);
 }
 
-/* Steps of the layer before that a prediction stands for, as contexts see them. */
+/* Returns the steps of the layer before that a prediction stands for, as contexts see them. */
 ATH_INLINE uint32_t coarse_steps(int32_t predicted, uint32_t ratio)
 {
     uint32_t steps = (magnitude_of(predicted) + ratio / 2) / ratio;
     return steps < MAGNITUDE_CLIP ? steps : (uint32_t)MAGNITUDE_CLIP;
 }
 
-/* Predictions of a row and of the one that follows it, null: none, in steps of the layer before. */
+/* Predictions of a row, in steps of this layer. coarse, below: integers of the layer before, or null: of this row, and
+ * of the row that follows it. */
 typedef struct {
     const int32_t *row, *coarse, *below;
     int32_t frames;
-    uint32_t ratio[3]; /* of the axes */
+    uint32_t ratio[3]; /* step of the layer before over this one's, by axis */
 } row_prediction;
 
-/* What the layer before has around the integers of a row: magnitudes in its own steps, sums of them over the axes, and
- * likewise those of the row that follows; zeros behind the last. */
+/* Magnitudes of the layer before around a row, in its own steps, and their sums over the axes; then those of the row
+ * that follows. Zeros stand behind the last frequency. */
 typedef struct {
     uint32_t steps[3][ATH_SEGMENT_FRAMES + 2], all[ATH_SEGMENT_FRAMES + 2];
     uint32_t below[3][ATH_SEGMENT_FRAMES + 2], all_below[ATH_SEGMENT_FRAMES + 2];
 } coarse_surroundings;
 
-/* Sums over the axes of the first `count` magnitudes of a row, and the magnitudes. */
 static void coarse_magnitudes(const row_prediction *p, const int32_t *row, int32_t count,
                               uint32_t steps[3][ATH_SEGMENT_FRAMES + 2], uint32_t *all)
 {
@@ -67,7 +66,6 @@ static void coarse_magnitudes(const row_prediction *p, const int32_t *row, int32
     }
 }
 
-/* Of the first `count` frequencies. */
 static void look_around(const row_prediction *p, int32_t count, coarse_surroundings *around)
 {
     if (count == 0) return;
@@ -75,7 +73,7 @@ static void look_around(const row_prediction *p, int32_t count, coarse_surroundi
     if (p->below) coarse_magnitudes(p, p->below, count + 1, around->below, around->all_below);
 }
 
-/* How loud the layer before is around an integer, where that is not known otherwise yet. */
+/* Returns how loud the layer before is around an integer, at places that this layer has not coded yet. */
 ATH_INLINE uint32_t loudness(const row_prediction *p, const coarse_surroundings *around, int32_t axis, int32_t k)
 {
     uint32_t loud = 2 * (2 * around->steps[axis][k + 1] + around->steps[axis][k + 2]) + around->all[k + 1];
@@ -92,7 +90,6 @@ static int32_t differing_frequencies(const int32_t *row, const int32_t *predicte
     return count;
 }
 
-/* differences: those around this one. */
 ATH_INLINE int32_t code_refined_difference(ath_coder *coder, refinement_model *model, const row_prediction *prediction,
                                            const coarse_surroundings *around, const row_surroundings *differences,
                                            int32_t axis, int32_t k, int32_t difference)
@@ -109,15 +106,11 @@ ATH_INLINE int32_t code_refined_difference(ath_coder *coder, refinement_model *m
     if (predicted == 0)
         negative = coder_raw_bit(coder, difference < 0);
     else
-        negative ^= coder_bit(coder,
-                              &model->sign[magnitude == 1  ? 0
-                                           : magnitude < 4 ? 1
-                                                           : 2],
-                              (difference < 0) != negative);
+        negative ^= coder_bit(coder, &model->sign[(magnitude > 1) + (magnitude > 3)], (difference < 0) != negative);
     return negative ? -(int32_t)magnitude : (int32_t)magnitude;
 }
 
-/* As code_row; the row becomes its prediction and the differences that are coded. */
+/* Does what code_row does for the differences from the prediction, and adds them to it. */
 static int32_t code_refined_row(ath_coder *coder, refinement_model *refinement, int32_t rank, int32_t slot,
                                 int32_t above_count, const row_prediction *prediction, int32_t *row)
 {
@@ -129,7 +122,7 @@ static int32_t code_refined_row(ath_coder *coder, refinement_model *refinement, 
                                ENCODING ? differing_frequencies(row, predicted, frames) : 0);
     coarse_surroundings around;
     look_around(prediction, count, &around);
-    ath_coder own_coder = *coder; /* as in code_row */
+    ath_coder own_coder = *coder; /* a local copy stays in registers */
     for (int32_t k = 0; k < count; k++) {
         start_frequency(&differences, k);
         for (int32_t axis = 0; axis < 3; axis++) {

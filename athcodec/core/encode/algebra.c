@@ -1,5 +1,5 @@
-/* Products and decompositions of small matrices for the encoder, summed in one order: BLAS and LAPACK give other bits with
- * other processors and threads. */
+/* Products and decompositions of small matrices for the encoder, summed in one order: BLAS and LAPACK give other bits
+ * with other processors and threads. */
 #include "encode/encode.h"
 
 enum { MOST_SWEEPS = 40 };
@@ -35,7 +35,7 @@ static void turn_rows(double c, double s, double *a, double *b)
     }
 }
 
-/* Makes two rows of w orthogonal, the same turn applied to v. 0: they were. */
+/* Makes two rows of w orthogonal and turns the rows of v alike. Returns 0 if they were orthogonal. */
 static int make_orthogonal(double *w, double *v, int32_t p, int32_t q)
 {
     double *a = w + 3 * p, *b = w + 3 * q, both = dot3(a, b), a2 = dot3(a, a), b2 = dot3(b, b);
@@ -57,7 +57,7 @@ static void swap_rows(double *a, double *b)
     }
 }
 
-/* A unit vector at right angles to a unit vector. */
+/* Fills a unit vector at right angles to a unit vector. */
 static void any_across(const double *a, double *out)
 {
     int32_t least = 0;
@@ -70,7 +70,7 @@ static void any_across(const double *a, double *out)
     for (int32_t i = 0; i < 3; i++) out[i] /= length;
 }
 
-/* Rows of falling length become unit vectors; those too short to have a direction, whatever completes the others. */
+/* Normalises rows of falling length. A row that is too short is replaced by one that completes the others. */
 static void make_units(double *w, double stretch[3])
 {
     double least = 1e-14 * stretch[0];
@@ -93,7 +93,7 @@ static void decompose(const double *matrix, double *left, double stretch[3], dou
         right[i] = i % 4 == 0 ? 1.0 : 0.0;
         if (magnitude(w[i]) > most) most = magnitude(w[i]);
     }
-    double scale = most > 0.0 ? most : 1.0; /* so that squares neither vanish nor overflow */
+    double scale = most > 0.0 ? most : 1.0; /* keeps squares from vanishing or overflowing */
     for (int32_t i = 0; i < 9; i++) w[i] /= scale;
     for (int32_t sweep = 0, turned = 1; turned && sweep < MOST_SWEEPS; sweep++) {
         turned = make_orthogonal(w, right, 0, 1);
@@ -120,7 +120,7 @@ void ath_decompose(int64_t count, const double *matrices, double *left, double *
     for (int64_t i = 0; i < count; i++) decompose(matrices + 9 * i, left + 9 * i, stretch + 3 * i, right + 9 * i);
 }
 
-/* The lower triangle of a positive definite matrix becomes its Cholesky factor. */
+/* Replaces the lower triangle of a positive definite matrix by its Cholesky factor. */
 static void factorise(int32_t n, double *matrix)
 {
     for (int32_t i = 0; i < n; i++)

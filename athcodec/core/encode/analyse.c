@@ -4,7 +4,7 @@
 #include "model/lanes.h"
 
 enum { FIRST_ROTATION_STEPS = 30, ROTATION_STEPS = 5 };
-enum { WAVES = 8 }; /* that a row is projected on at once */
+enum { WAVES = 8 }; /* waves that a row is projected on at once */
 
 static double absolute(double x) { return x < 0.0 ? -x : x; }
 
@@ -33,8 +33,8 @@ ATH_INLINE void project_waves(const double *waves, int32_t count, int32_t T, con
     }
 }
 
-/* Transforms one axis over time into units of `step`; returns how many coefficients were needed: at least `known`, and all
- * that are beyond the dead zone. The waves are orthonormal, so that none of the rest is where its whole length is not. */
+/* Transforms one axis over time into units of `step`. Returns the number of coefficients: at least `known`, and all
+ * beyond the dead zone. The waves are orthonormal, so that no other coefficient exceeds the length of the remainder. */
 ATH_HOT static int32_t forward_temporal(const ath_stream *stream, int32_t T, double step, double dead_zone,
                                         int32_t known, const double *row, double *units)
 {
@@ -56,7 +56,7 @@ ATH_HOT static int32_t forward_temporal(const ath_stream *stream, int32_t T, dou
     return stream->temporal_rank;
 }
 
-/* How many integers near (axis, k) are not zero. */
+/* Counts the integers near (axis, k) that are not 0. */
 static int32_t busy_neighbours(const int32_t *quantised, int32_t T, int32_t rank, int32_t axis, int32_t k)
 {
     int32_t count = 0;
@@ -66,7 +66,7 @@ static int32_t busy_neighbours(const int32_t *quantised, int32_t T, int32_t rank
     return count;
 }
 
-/* An isolated 1 costs many bits and removes little error: its threshold is higher than that of one with neighbours. */
+/* An isolated 1 costs many bits and removes little error, so its threshold is higher than with neighbours. */
 static void drop_lone_ones(int32_t T, int32_t rank, double units[3][ATH_SEGMENT_FRAMES], const int32_t *predicted,
                            int32_t *quantised)
 {
@@ -80,14 +80,14 @@ static void drop_lone_ones(int32_t T, int32_t rank, double units[3][ATH_SEGMENT_
         }
 }
 
-/* Where the zeros at the end of a row begin. */
+/* Returns where the zeros at the end of a row begin. */
 static int32_t row_extent(const int32_t *row, int32_t count)
 {
     while (count > 0 && row[count - 1] == 0) count--;
     return count;
 }
 
-/* What a row amounts to at its first frame (side 1) or its last (side -1): its value, slope and bend there. */
+/* Fills the value, slope and bend of a row at its first frame (side 1) or its last (side -1). */
 static void end_parts(const double *row, int32_t T, int32_t side, double parts[ATH_END_PARTS])
 {
     const double *end = side > 0 ? row : row + T - 1;
@@ -102,21 +102,20 @@ static void both_ends(const double *row, int32_t T, double parts[2 * ATH_END_PAR
     end_parts(row, T, -1, parts + ATH_END_PARTS);
 }
 
-/* An integer of a row that may be rounded the other way: its parts at the ends, these by what errors there weigh, and what a
- * step more or less costs by itself. */
+/* An integer that may be rounded the other way: its parts at the ends, plain and weighted, and the cost of a step. */
 typedef struct {
     int32_t k;
     double parts[2 * ATH_END_PARTS], pull[2 * ATH_END_PARTS], cost;
 } end_integer;
 
-/* Rounds integers of a row the other way where that brings its ends nearer, whose errors are the largest and are seen where
- * segments meet. units: what they stand for, less what is predicted; row: what they are to become. What it is worth, in
- * squared steps, is the change of the error of its own and of those of the ends. */
+/* Rounds integers of a row the other way if that brings its ends closer, whose errors are the largest and are seen
+ * where segments meet. units: the exact values less the prediction; row: the integers. The gain, in squared steps, is
+ * the change of the integer's own error and of those of the ends. */
 static void settle_ends(const ath_stream *stream, int32_t T, double step, const ath_rounding *rounding,
                         const double *row, const double *units, const int32_t *predicted, int32_t *quantised)
 {
     enum { LEAST_FRAMES = 8 };
-    static const double least = 1e-3, emptied = 0.25; /* for an integer that becomes 0 */
+    static const double least = 1e-3, emptied = 0.25; /* extra gain for an integer that becomes 0 */
     end_integer found[ATH_SEGMENT_FRAMES];
     double left[2 * ATH_END_PARTS];
     int32_t rank = row_extent(quantised, stream->temporal_rank), count = 0;
@@ -159,7 +158,7 @@ static void settle_ends(const ath_stream *stream, int32_t T, double step, const 
     }
 }
 
-/* Quantises a track of three axes about its prediction, if there is one, and replaces it by what the decoder will have. */
+/* Quantises a track of three axes about its prediction, if there is one, and replaces it by the decoded track. */
 static void code_track(const ath_stream *stream, int32_t T, const double steps[3], const ath_rounding *rounding,
                        double *track, const int32_t *predicted, int32_t *quantised)
 {
@@ -199,8 +198,8 @@ static void rest_centre(const ath_plan *plan, const ath_piece *piece, double cen
         for (int32_t k = 0; k < 3; k++) centre[k] += ath_rest_of(plan, piece->first + i)[k] / (double)piece->count;
 }
 
-/* How many vertices, from its first on, tell how a piece turns: of a root that is one piece those of all its tree, since
- * an upright stem hardly says how it turns about itself, and what hangs on it turns along. */
+/* Returns how many vertices, from a piece's first on, tell its rotation. For a root that is one piece, they are all of
+ * its tree, since an upright stem hardly tells how it turns about itself, and what hangs on it turns along. */
 static int32_t turned_vertices(const ath_plan *plan, const ath_piece *piece)
 {
     const ath_branch *branch = plan->branches + piece->branch;
@@ -209,8 +208,8 @@ static int32_t turned_vertices(const ath_plan *plan, const ath_piece *piece)
     return (next < plan->branch_count ? plan->branches[next].first : plan->vertex_count) - piece->first;
 }
 
-/* Adds the products of what hangs on a root with its rest pose in frame t, which count as much as the root's own in all.
- * source: of the whole plant; own2: squared distances of the root's vertices from its base. */
+/* Adds the products of the branches on a root with their rest pose in frame t, with the same total weight as the root's
+ * own. source: the whole plant. own2: squared distances of the root's vertices from its base. */
 static void add_carried(const ath_plan *plan, int32_t T, const ath_piece *root, int32_t t, const double *source,
                         double own2, double H[9])
 {
@@ -227,8 +226,8 @@ static void add_carried(const ath_plan *plan, int32_t T, const ath_piece *root, 
     for (int32_t i = 0; i < 9 && carried2 > 0.0; i++) H[i] += own2 / carried2 * products[i];
 }
 
-/* The rotation nearest to H, wherever it is: the quaternion is the first eigenvector of a matrix (Horn, "Closed-form
- * solution of absolute orientation using unit quaternions", J. Opt. Soc. Am. A 4(4), 1987). */
+/* Fills the rotation nearest to H: its quaternion is the first eigenvector of a matrix (Horn, "Closed-form solution of
+ * absolute orientation using unit quaternions", J. Opt. Soc. Am. A 4(4), 1987). */
 static void nearest_rotation(const double H[9], double R[9])
 {
     double matrix[16], work[16], values[4], q[16];
@@ -251,11 +250,11 @@ static void nearest_rotation(const double H[9], double R[9])
         }
 }
 
-/* The piece's own rotation against its predicted one, as rotation vectors over time, unwrapped. `local`: its
- * vertices relative to the attach point, in the predicted frame. What they say no more of than an error of `step` would,
- * such as the twist of a straight stem, stays as in the frame before. `carried`: the source, where what hangs on a root tells
- * more; else 0. That of a rigid piece is about its centre: an error of
- * what it hangs on does not turn it. */
+/* Fills the piece's own rotation relative to its predicted one, as rotation vectors over time, unwrapped. local: its
+ * vertices relative to the attach point, in the predicted frame. A turn that they show no better than an error of
+ * `step` does, such as the twist of a straight stem, stays as in the frame before. carried: the source, if the branches
+ * on a root tell more; else 0. A rigid piece turns about its centre, so that an error of its attach point does not turn
+ * it. */
 static void fit_rotation(const ath_plan *plan, int32_t T, const ath_piece *piece, double step, const double *local,
                          const double *carried, double *omega)
 {
@@ -285,7 +284,7 @@ static void fit_rotation(const ath_plan *plan, int32_t T, const ath_piece *piece
     }
 }
 
-/* Replaces the tracks of the first modes by those of the shapes, and sets the remaining rows to 0. */
+/* Replaces the tracks of the first modes by those of the shapes and sets the other rows to 0. */
 static void to_shapes(int32_t T, const ath_piece *piece, int32_t shape_count, const double *duals,
                       const ath_scratch *scratch)
 {
@@ -319,7 +318,7 @@ static void code_shift(const ath_motion *motion, const ath_piece *piece, const a
     if (motion->decoded) memcpy(scratch->shift, scratch->track, 3 * (size_t)T * sizeof(double));
 }
 
-/* How far the first vertex is from where the piece hangs. */
+/* Fills the first vertex less the attach point. */
 static void shift_of_first(const ath_plan *plan, int32_t T, const ath_piece *piece, const ath_scratch *scratch,
                            const double *source)
 {
@@ -328,7 +327,7 @@ static void shift_of_first(const ath_plan *plan, int32_t T, const ath_piece *pie
     for (int32_t i = 0; i < 3 * T; i++) scratch->track[i] = x[i] - (x0[i / T] - a[i / T]) - scratch->at.point[i];
 }
 
-/* How far the vertices of a rigid piece are, on average, from where it would put them. */
+/* Fills the mean distance of a rigid piece's vertices from where it would put them. */
 static void shift_of_all(const ath_plan *plan, int32_t T, const ath_piece *piece, const ath_scratch *scratch,
                          const double *source)
 {
@@ -347,8 +346,8 @@ static void shift_of_all(const ath_plan *plan, int32_t T, const ath_piece *piece
         }
 }
 
-/* Codes the piece's own translation and rotation; leaves its vertices in the turned frame in `local`. A rigid piece
- * is turned first, so that the one does not stand for the other. */
+/* Codes the piece's own translation and rotation; leaves its vertices in the turned frame in `local`. A rigid piece is
+ * turned first, so that the one does not stand for the other. */
 static void analyse_tracks(const ath_plan *plan, const ath_motion *motion, const ath_piece *piece,
                            const ath_piece_before *before, ath_piece_rows *rows, const ath_scratch *scratch,
                            const double *source, const ath_rounding *rounding, double *local)
@@ -379,7 +378,7 @@ static void analyse_tracks(const ath_plan *plan, const ath_motion *motion, const
     }
 }
 
-/* What the next layer predicts from. */
+/* Stores what the next layer predicts from. */
 static void note_piece(const ath_plan *plan, const ath_motion *motion, const ath_piece *piece, int32_t p,
                        const ath_piece_rows *rows, const ath_scratch *scratch, const double *placed)
 {
@@ -467,8 +466,8 @@ void ath_mode_weights(const ath_piece *piece, double weights[ATH_SHAPE_MODES])
     for (int32_t m = 0; m < ATH_SHAPE_MODES; m++) weights[m] = ath_mode_weight(piece, m);
 }
 
-/* Means over the subtree of the residual in the attach frame, e = R'(x - c) - d: tracks r < rank become the mean of
- * e * w_r, track 3 the mean of e, `centre` the mean of w. */
+/* Averages the residual in the attach frame, e = R'(x - c) - d, over the subtree. Tracks r < rank become the mean of e
+ * * w_r, track 3 the mean of e, `centre` the mean of w. */
 static void node_moments(const ath_plan *plan, const ath_node *node, int32_t T, const ath_scratch *scratch,
                          const double *source, double *tracks, double centre[3])
 {
@@ -508,7 +507,7 @@ static void fit_node(const ath_node *node, int free_base, int32_t T, double *tra
     }
 }
 
-/* The largest half-octave step that is not above `step`. */
+/* Returns the exponent of the largest half-octave step that is not above `step`. */
 static int32_t half_octaves(double step)
 {
     int32_t exponent = 0;

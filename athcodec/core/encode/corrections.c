@@ -1,22 +1,22 @@
-/* Finds the corrections that keep the error bound, on the positions that a decoder will have: as few as do, and such
- * that what is left of the error moves as little from frame to frame as it can. */
+/* Finds corrections of decoded positions that keep the error bound: as few as possible, and such that the remaining
+ * error moves as little as possible from frame to frame. */
 #include "encode/encode.h"
 #include <float.h>
 
-/* How many bits it is worth that the squared second differences of a vertex's error do not grow by as much as they are
- * on average over its frames. It shows where little moves otherwise: LEAST_BEND, over limit^2, counts as moving. */
+/* Bits that are worth saving the mean squared second difference of a vertex's error. Bends show if little else moves:
+ * LEAST_BEND, over limit^2, is the least that counts as moving. */
 static const double BEND_BITS = 0.5, LEAST_BEND = 1.0 / 16;
 
-/* One vertex over time: as decoded and as wanted, what corrections add so far, and the error that is left. */
+/* One vertex over time: decoded and wanted positions, corrections so far, and the remaining error. */
 typedef struct {
     int32_t frames, is_float64;
-    int32_t closed; /* of its ends, as ath_met_ends has it */
-    int32_t worst;  /* the frame that is farthest beyond the limit; -1: none is */
+    int32_t closed; /* see ath_met_ends */
+    int32_t worst;  /* the frame farthest beyond the limit; -1: none */
     double step, limit2;
     double decoded[ATH_SEGMENT_FRAMES][3], wanted[ATH_SEGMENT_FRAMES][3], error[ATH_SEGMENT_FRAMES][3];
-    double squares[ATH_SEGMENT_FRAMES];  /* of the errors' lengths */
+    double squares[ATH_SEGMENT_FRAMES];  /* squared lengths of the errors */
     double bends[ATH_SEGMENT_FRAMES][3]; /* second differences of the error; 0 in the first and the last frame */
-    double bend_bits;                    /* for each unit of their squares */
+    double bend_bits;                    /* bits per unit of squared bends */
     ath_corrected_parts parts;
     ath_correction own[ATH_SEGMENT_FRAMES]; /* all zero: none */
 } track;
@@ -45,7 +45,7 @@ static int32_t last_frame(const track *track, int32_t frame, int32_t away)
     return ath_min(track->frames - 1, frame + away);
 }
 
-/* The error of a frame with `more` of a correction than its corrections so far. */
+/* Returns the error of a frame with `more` parts of a correction added. */
 static void error_with(const track *track, int32_t t, const int32_t q[3], int32_t more, double error[3])
 {
     for (int32_t k = 0; k < 3; k++) {
@@ -91,7 +91,7 @@ static void open_track(track *track, int32_t v, const void *positions, const dou
     find_worst(track);
 }
 
-/* Whether all frames of a vertex are within the limit, as those of most are. */
+/* Most vertices are within the limit in all frames. */
 ATH_HOT static int is_within(int32_t frames, int is_float64, const void *positions, const double *source,
                              const double origin[3], double limit, size_t first)
 {
@@ -108,7 +108,7 @@ ATH_HOT static int is_within(int32_t frames, int is_float64, const void *positio
     return !beyond;
 }
 
-/* How much the error moves before it is corrected. */
+/* Measures how much the error moves before it is corrected. */
 static void weigh_bends(track *track)
 {
     double sum = 0.0;
@@ -117,9 +117,7 @@ static void weigh_bends(track *track)
     track->bend_bits = BEND_BITS / (sum / track->frames + LEAST_BEND * track->limit2);
 }
 
-/* ---- candidates ---- */
-
-/* About what the stream takes for it; like: that of the vertex before in the same frame. */
+/* Estimates the bits of a correction. like: that of the vertex before in the same frame. */
 static double estimated_bits(const ath_correction *own, const ath_correction *like)
 {
     double bits = 2.0 + 3.0 * (like->width != own->width);
@@ -133,14 +131,14 @@ static double estimated_bits(const ath_correction *own, const ath_correction *li
     return bits;
 }
 
-/* Where a correction may stand, and what it does to the sum of squared bends: with the vector x in parts of a step,
- * 2 x * slope + x * x * curve. */
+/* A place of a correction. With the vector x in parts of a step, it adds x * (2 * slope + x * curve) to the squared
+ * bends. */
 typedef struct {
     int32_t frame, width, beyond; /* beyond: frames in reach that are beyond the limit */
     double slope[3], curve;
 } place;
 
-/* What is there of a footprint, which an end cuts off. */
+/* Fills the frames of a footprint, which an end may cut off. */
 static int32_t shown_part(const track *track, int32_t frame, int32_t width, int32_t t)
 {
     return t >= 0 && t < track->frames ? ath_footprint_part(width, t - frame) : 0;
@@ -154,7 +152,7 @@ static int32_t footprint_bend(const track *track, int32_t frame, int32_t width, 
 
 static int has_bend(const track *track, int32_t t) { return t > 0 && t < track->frames - 1; }
 
-/* Behind a closed end the error goes on as it comes, and nothing stands of a correction. */
+/* Beyond a closed end the error continues, and corrections add nothing. */
 static place place_at(const track *track, int32_t frame, int32_t width)
 {
     place place = {frame, width, 0, {0.0, 0.0, 0.0}, 0.0};
@@ -188,7 +186,7 @@ static double more_bends(const track *track, const place *place, const int32_t q
     return sum;
 }
 
-/* The squared error of a frame with a candidate. */
+/* Returns the squared error of a frame with a candidate. */
 static double square_with(const track *track, const candidate *tried, int32_t t)
 {
     double error[3];
@@ -196,8 +194,8 @@ static double square_with(const track *track, const candidate *tried, int32_t t)
     return square(error);
 }
 
-/* Whether a candidate may cost less than `most`, brings the worst frame within the limit, and moves none away that is beyond
- * it then; its cost. */
+/* Returns whether a candidate costs less than `most`, brings the worst frame within the limit, and worsens no frame
+ * beyond it. Fills the cost. */
 static int try_candidate(const track *track, const ath_correction *above, const place *place, double most,
                          candidate *tried)
 {
@@ -216,7 +214,7 @@ static int try_candidate(const track *track, const ath_correction *above, const 
 
 static int32_t to_steps(double value) { return value < 0.0 ? -(int32_t)(0.5 - value) : (int32_t)(value + 0.5); }
 
-/* The correction that takes most of an error away, no axis of which is 0; 0: there is none. */
+/* Finds the correction that removes most of an error with all its axes. Returns 0 if an axis would be 0. */
 static int whole_correction(const double error[3], double scale, int32_t whole[3])
 {
     for (int32_t k = 0; k < 3; k++) {
@@ -228,8 +226,8 @@ static int whole_correction(const double error[3], double scale, int32_t whole[3
     return 1;
 }
 
-/* Tries the axes of a mask: the whole correction, and up to two that are shorter by a step each. Whether one serves that may
- * be chosen. */
+/* Tries the axes of a mask: the whole correction, and up to two that are shorter by a step each. Returns 1 if one
+ * serves. */
 static int try_axes(const track *track, const ath_correction *above, const place *place, int32_t mask,
                     const int32_t whole[3], candidate *best)
 {
@@ -248,7 +246,8 @@ static int try_axes(const track *track, const ath_correction *above, const place
     return found;
 }
 
-/* The cheapest correction of a width in a frame for the worst one, of as few axes as do; 0: there is none. */
+/* Finds the cheapest correction of a width in a frame for the worst frame, with few axes. Returns 0 if there is
+ * none. */
 static int try_frame(const track *track, const ath_correction *above, int32_t frame, int32_t width, candidate *best)
 {
     static const int32_t masks[7] = {1, 2, 4, 3, 5, 6, 7}, stop_of[3] = {3, 6, 7}; /* by the number of axes */
@@ -261,8 +260,6 @@ static int try_frame(const track *track, const ath_correction *above, int32_t fr
         for (; i < stop_of[axes]; i++) found |= try_axes(track, above, &place, masks[i], whole, best);
     return found;
 }
-
-/* ---- vertices ---- */
 
 static void apply(track *track, const candidate *chosen)
 {
@@ -277,8 +274,8 @@ static void apply(track *track, const candidate *chosen)
     bend_frames(track, at - reach - 1, at + reach + 1);
 }
 
-/* One correction after the other, for the frame that is worst then. Each leaves fewer frames beyond the limit. 0: one
- * cannot be brought within it. */
+/* Adds corrections one by one for the frame that is worst then. Each leaves fewer frames beyond the limit. Returns 0 if
+ * a frame cannot be brought within it. */
 static int correct_track(track *track, const ath_correction *above, int32_t widest)
 {
     if (track->worst >= 0) weigh_bends(track);
@@ -296,7 +293,7 @@ static int correct_track(track *track, const ath_correction *above, int32_t wide
     return 1;
 }
 
-/* Applies what is decided of a vertex. */
+/* Applies the corrections of a vertex that are decided already. */
 static void decide(track *track, const ath_met_ends *ends, int64_t first, int64_t stop)
 {
     for (int64_t i = first; i < stop; i++) {
@@ -322,7 +319,7 @@ int64_t ath_find_corrections(int32_t vertex_count, int32_t frames, int is_float6
             memset(above, 0, (size_t)frames * sizeof above[0]);
             continue;
         }
-        int32_t widest = narrow[v] ? 0 : ATH_FOOTPRINTS - 1; /* those of one frame cannot be in each other's way */
+        int32_t widest = narrow[v] ? 0 : ATH_FOOTPRINTS - 1; /* corrections of one frame cannot conflict */
         track.closed = ends->closed;
         for (int corrected = 0; !corrected; widest--) {
             if (widest < 0 && decided == next) return -1;
@@ -349,16 +346,14 @@ int64_t ath_find_corrections(int32_t vertex_count, int32_t frames, int is_float6
     return count;
 }
 
-/* ---- rigid parts ---- */
-
 /* A part whose vertices are corrected together, so that it keeps its shape. */
 typedef struct {
     int32_t first, count, frames, is_float64;
     const void *positions;
     const double *source, *origin, *limits;
     double step;
-    double beyond[ATH_SEGMENT_FRAMES]; /* the largest square of an error over that of its limit; 0: left as it is */
-    ath_corrected_parts middle;        /* between the least and the most that vertices are off, without corrections */
+    double beyond[ATH_SEGMENT_FRAMES]; /* largest squared error over the squared limit; 0: the frame stays as it is */
+    ath_corrected_parts middle;        /* middle of the vertices' errors before corrections */
     ath_corrected_parts parts;
     ath_correction own[ATH_SEGMENT_FRAMES]; /* all zero: none */
 } rigid_part;
@@ -394,7 +389,7 @@ ATH_HOT static void open_part(rigid_part *part)
     memset(part->own, 0, (size_t)frames * sizeof part->own[0]);
 }
 
-/* What `beyond` is in a frame with `more` of a further correction. */
+/* Returns `beyond` in a frame with `more` of a further correction. */
 static double beyond_with(const rigid_part *part, int32_t t, const int32_t q[3], int32_t more)
 {
     double most = 0.0;
@@ -412,8 +407,8 @@ static double beyond_with(const rigid_part *part, int32_t t, const int32_t q[3],
     return most;
 }
 
-/* Moves a part by the middle of what its vertices are off in a frame, if that brings all of them within their limits there
- * and takes none farther beyond it in the frames around. Whether it does. */
+/* Moves a part by the middle of its vertices' errors in a frame, if that brings all of them within their limits and
+ * worsens no frame around. Returns whether it does. */
 static int move_part(rigid_part *part, int32_t closed, int32_t frame, int32_t width)
 {
     ath_correction own = {{0, 0, 0}, width};
@@ -435,7 +430,7 @@ static int move_part(rigid_part *part, int32_t closed, int32_t frame, int32_t wi
     return 1;
 }
 
-/* The frame that is farthest beyond a limit; -1: none is. */
+/* Returns the frame farthest beyond a limit; -1: none. */
 static int32_t worst_of(const rigid_part *part)
 {
     int32_t worst = -1;
@@ -448,7 +443,7 @@ static int32_t worst_of(const rigid_part *part)
     return worst;
 }
 
-/* Each frame in turn, over as many frames as serve: what moves in one alone pops. */
+/* Corrects frame by frame, each over as many frames as possible, since a part that moves in a single frame pops. */
 static void correct_part(rigid_part *part, int32_t closed, int32_t widest)
 {
     for (int32_t t = worst_of(part); t >= 0; t = worst_of(part)) {

@@ -1,20 +1,22 @@
-/* Encodes streams: streams.h compiled for encoding. */
+/* All streams, compiled for encoding. */
 #define ATH_ENCODING
 #include "encode/encode.h"
 #include "streams/polygons.inl"
-#include "streams/front.inl"
+#include "container/front.inl"
 #include "streams/motion_streams.inl"
 #include "streams/predicted.inl"
-#include "streams/prelude.inl"
+#include "streams/hierarchy.inl"
+#include "streams/rest_exact.inl"
+#include "streams/series.inl"
+#include "streams/source_rest.inl"
 
-/* Of a pose of all branches' vertices. */
 static void copy_pose(const ath_branch *branches, int32_t branch_count, const double *pose, double *copy)
 {
     const ath_branch *last = branches + branch_count - 1;
     memcpy(copy, pose, 3 * (size_t)(last->first + last->count) * sizeof *copy);
 }
 
-/* The size written; -1: no space, -2: the input is not something that the stream can hold. */
+/* Returns the size written; -1: there is no space; -2: the stream cannot hold the input. */
 static int64_t written(ath_coder *coder, int valid) { return valid ? coder_finish(coder) : -2; }
 
 int64_t ath_encode_front(uint8_t *bytes, size_t capacity, const ath_header *header, const ath_chunk *chunks,
@@ -301,28 +303,26 @@ int64_t ath_encode_corrections(void *memory, uint8_t *bytes, size_t capacity, in
     return coder_finish(&coder);
 }
 
-/* ---- predicted motion ---- */
-
-/* What is coded: frames x vertex_count x 3 source positions less the origin, and the limit of each vertex. */
+/* The input: frames x vertex_count x 3 source positions less the origin, and the limit of each vertex. */
 typedef struct {
     const double *source, *limits;
 } predicted_source;
 
-enum { LOOKED_AT = 32 }; /* vertices that tell which frame is like another */
+enum { LOOKED_AT = 32 }; /* sampled vertices that tell which frames are similar */
 
 static const double *source_of(const prediction *p, const predicted_source *source, int32_t v)
 {
     return source->source + 3 * ((size_t)p->vertex_count * (size_t)p->frame + (size_t)v);
 }
 
-/* A coordinate of the rest pose as a copy of it is put out, less the origin. */
+/* Returns a coordinate of the rest pose as a copied frame gets it, less the origin. */
 static double put_back_rest(const prediction *p, size_t at, size_t k)
 {
     double x = p->rest[at] + p->origin[k];
     return (p->is_float64 ? x : (double)(float)x) - p->origin[k];
 }
 
-/* Square of the distance of a vertex from where it was in an earlier frame. */
+/* Returns the squared distance of a vertex from its position in an earlier frame. */
 static double way2_from(const prediction *p, const predicted_source *source, int32_t frame, int32_t v)
 {
     const double *wanted = source_of(p, source, v);
@@ -358,7 +358,7 @@ static double unlike(const prediction *p, const predicted_source *source, int32_
     return sum;
 }
 
-/* How many frames ago the one is that a frame is a copy of, or else the one that it is like, if much more than the last. */
+/* Returns how many frames ago the frame was that this one copies or, if much more similar than the last, resembles. */
 static int32_t find_reference(const prediction *p, const predicted_source *source, int *copied)
 {
     int32_t last = p->model.last_distance, best = 1;
@@ -378,7 +378,7 @@ static int32_t find_reference(const prediction *p, const predicted_source *sourc
     return best;
 }
 
-/* Steps towards 0 while the vertex stays within its limit, those that take it least away first. */
+/* Moves steps towards 0 while the vertex stays within its limit, those that move it least first. */
 static void shorten(const double left[3], double limit2, int32_t steps[3])
 {
     for (;;) {
@@ -401,7 +401,8 @@ static void shorten(const double left[3], double limit2, int32_t steps[3])
     }
 }
 
-/* The point of the lattice that is likely to take the fewest bits of those within a limit that is no less than its reach. */
+/* Finds the point of the lattice within the limit that is likely to take the fewest bits. Its reach is within the
+ * limit. */
 static void cheapest_of_lattice(const double left[3], double limit, uint32_t expected, int32_t steps[3])
 {
     double spare = limit - LATTICE_REACH, length2 = 0.0, nearer[3];
@@ -422,7 +423,7 @@ static void nearest_point(const prediction *p, const double left[3], int32_t ste
     for (size_t k = 0; k < 3; k++) steps[k] = steps_in(left[k], 1.0, 0.5);
 }
 
-/* The smallest integers that keep a vertex within its limit; left: units that it is from where it is expected. */
+/* Finds the smallest integers that keep a vertex within its limit. left: distance from the prediction, in units. */
 static void cheapest_point(const prediction *p, int32_t v, const double left[3], double limit, int32_t steps[3])
 {
     uint32_t near, beside;
@@ -436,7 +437,7 @@ static void cheapest_point(const prediction *p, int32_t v, const double left[3],
     }
 }
 
-/* 0: there are no integers that keep a vertex within its limit. */
+/* Returns 0 if no integers keep the vertex within its limit. */
 static int choose_steps(prediction *p, const predicted_source *source, int32_t v, const predicted_way *way,
                         int32_t steps[3])
 {
@@ -454,7 +455,7 @@ static int choose_steps(prediction *p, const predicted_source *source, int32_t v
     return is_within(p, source, p->frame, v);
 }
 
-/* Whether those that follow the last vertex of a stem keep their limits. */
+/* Returns whether the vertices that would follow the ends of a stem keep their limits. */
 static int may_follow(prediction *p, const predicted_source *source, int32_t tip)
 {
     double scale = stem_scale(&p->around, p->vertices + p->vertices[tip].next, tip, p->head.step);
@@ -465,7 +466,7 @@ static int may_follow(prediction *p, const predicted_source *source, int32_t tip
     return 1;
 }
 
-/* 0: there are no integers that keep the vertex within its limit. */
+/* Returns 0 if no integers keep the vertex within its limit. */
 static int encode_vertex(ath_coder *coder, prediction *p, const predicted_source *source, int32_t v)
 {
     predicted_vertex *vertex = p->vertices + v;
@@ -518,9 +519,9 @@ int64_t ath_encode_predicted(void *memory, uint8_t *bytes, size_t capacity, cons
 
 size_t ath_model_size(void)
 {
-    size_t size = sizeof(refinement_model) + history_size(ATH_SEGMENT_FRAMES); /* larger than that of maps */
+    size_t size = sizeof(refinement_model) + history_size(ATH_SEGMENT_FRAMES); /* larger than the model of maps */
     if (size < sizeof(correction_model)) size = sizeof(correction_model);
-    if (size < sizeof(refined_shape_model)) size = sizeof(refined_shape_model); /* larger than that of shapes */
+    if (size < sizeof(refined_shape_model)) size = sizeof(refined_shape_model); /* larger than the model of shapes */
     if (size < sizeof(exact_model)) size = sizeof(exact_model);
-    return size < sizeof(rest_model) ? sizeof(rest_model) : size; /* the others are smaller */
+    return size < sizeof(rest_model) ? sizeof(rest_model) : size; /* the other models are smaller */
 }

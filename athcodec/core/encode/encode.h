@@ -1,27 +1,31 @@
-/* What an encoder needs of the core: athcodec's Python side is its only user, and players leave it out. Segments are
- * analysed, measured and written stage by stage; ath.h reads what comes out.
+/* The encoder's part of the core. The Python package is its only user, and players leave it out. Segments are analysed,
+ * measured and written stage by stage.
  *
- * Motion arrays are vertex-major: element (vertex v, axis, frame t) of a segment of T frames stands at
- * (v * 3 + axis) * T + t. Vertices are in file order. */
-#ifndef ATH_ENCODE_H
-#define ATH_ENCODE_H
+ * Motion arrays are vertex-major: element (vertex v, axis, frame t) of a segment of T frames stands at (v * 3 + axis) *
+ * T + t. Vertices are in file order. */
+#ifndef ATH_ENCODE_ENCODE_H
+#define ATH_ENCODE_ENCODE_H
 
-#include "file/container.h"
+#include "container/container.h"
 #include "model/mesh.h"
-#include "model/motion.h"
+#include "model/basis.h"
+#include "model/corrections.h"
+#include "model/maps.h"
+#include "model/refine.h"
+#include "model/rotations.h"
 
-/* The integers of one segment; with them come ath_motion's streams. */
+/* The integers of one segment, which belong to the streams of an ath_motion. */
 typedef struct ath_integers {
     int32_t *coefficients; /* vertex_count x 3 x frames: mode m of a piece at slot first + m */
     int32_t *tracks;       /* piece_count x 2 x 3 x frames: rotation, translation */
     int32_t *node_tracks;  /* node_count x 4 x 3 x frames: columns of the map, translation */
     int32_t *node_steps;   /* node_count: exponents of half-octave steps */
-    int32_t *predicted;    /* of a refinement, as large as coefficients and tracks; else null */
+    int32_t *predicted;    /* null unless this is a refinement; as large as coefficients and tracks */
     int32_t *predicted_tracks;
     const int32_t *shape_counts; /* piece_count; null: no piece has shapes */
-    const int64_t *shape_first;  /* piece_count: where its shapes stand in those below */
+    const int64_t *shape_first;  /* piece_count: where a piece's shapes begin in `shapes` */
     const double *shapes;        /* ATH_SHAPE_NUMBERS of each */
-    const double *duals;         /* likewise: what takes modes to a shape's track */
+    const double *duals;         /* ATH_SHAPE_NUMBERS of each: take the modes' tracks to the shape's */
 } ath_integers;
 
 ATH_INLINE ath_piece_rows ath_rows_of_piece(const ath_plan *plan, const ath_integers *integers, int32_t frames,
@@ -60,38 +64,36 @@ ATH_INLINE ath_node_rows ath_rows_of_node(const ath_integers *integers, int32_t 
     return rows;
 }
 
-/* Bytes of scratch memory that any of the writers below needs as `model`. */
+/* Returns the bytes of scratch memory that any of the writers below needs as `model`. */
 ATH_ENCODER_API size_t ath_model_size(void);
 
-/* How far the residuals of pieces, ranges of vertices that each move by one affine map, are from their base places:
- * the mean of each piece in each frame, its largest distance, and the most vertices beyond xi in a frame.
- * rest: 3 x vertices; positions: 3 x frames x vertices; inverse, offset: 3 x 3 and 3 for each frame and piece, which
- * take a position to its residual. */
+/* Measures the residuals of pieces, ranges of vertices that each move by one affine map: the mean distance of each
+ * piece in each frame, the largest distance, and the most vertices beyond xi in a frame. rest: 3 x vertices; positions:
+ * 3 x frames x vertices; inverse, offset: 3 x 3 and 3 for each frame and piece, which make residuals of positions. */
 ATH_ENCODER_API void ath_differences(int32_t vertex_count, int32_t frames, int32_t piece_count, const int64_t *first,
                                      const int64_t *stop, const double *inverse, const double *offset,
                                      const double *rest, const double *positions, double xi, double *mean,
                                      double *largest, int32_t *most_beyond);
 
-/* Some of the source's positions, (frames, source_count, 3) in its order, float or (is_float64) double, to vertex-major
- * doubles less the origin. */
+/* Gathers some of the source's positions, (frames, source_count, 3) in its order, float or (is_float64) double, into
+ * vertex-major doubles less the origin. */
 ATH_ENCODER_API void ath_gather(int32_t vertex_count, int32_t frames, const int32_t *vertex_source,
                                 int32_t source_count, int is_float64, const void *source, const double origin[3],
                                 double *out);
 
 enum { ATH_END_PARTS = 3 };
 
-/* How numbers become integers: below `dead_zone` steps they are 0, and what is left of a row's value, slope and bend at
- * either end weighs as many squared steps as `ends` says; 0: it does not. */
+/* How numbers become integers. Below `dead_zone` steps they are 0. `ends` weighs the errors of a row's value, slope and
+ * bend at either end, in squared steps; 0: they do not count. */
 typedef struct ath_rounding {
     double dead_zone, ends[ATH_END_PARTS];
 } ath_rounding;
 
-/* Quantised coefficients and tracks of all pieces in closed loop, then the maps of the nodes in between. source:
- * vertex-major doubles less the origin. A map's step is that of its level (height + 2 lengths) over the root of its
- * number of vertices: the same error in all of them together costs the same everywhere. Attach caches are to be kept
- * (ath_build_plan). Only pieces, or nodes, first to stop - 1: several threads may work on ranges of one segment,
- * each with scratch memory of its own, once the pieces that theirs hang on are done. positions: where those of
- * the last level go, as ath_pose has them; 0: nowhere. */
+/* Quantise the coefficients and tracks of pieces in closed loop, and the maps of nodes. source: vertex-major doubles
+ * less the origin. A map's step is that of its level (height + 2 lengths) over the root of its number of vertices, so
+ * that equal errors of all vertices together cost the same everywhere. Attach caches have to be kept (ath_build_plan).
+ * Only pieces, or nodes, first to stop - 1 are analysed: several threads may work on ranges of one segment, each with
+ * its own scratch memory, once the pieces that theirs hang on are done. positions: see ath_pose; may be null. */
 ATH_ENCODER_API void ath_analyse(const ath_plan *plan, const ath_motion *motion, const ath_integers *integers,
                                  int32_t first, int32_t stop, const double *source, const ath_rounding *rounding,
                                  const double origin[3], int is_float64, void *positions);
@@ -99,12 +101,12 @@ ATH_ENCODER_API void ath_analyse_nodes(const ath_plan *plan, const ath_motion *m
                                        int32_t first, int32_t stop, const double *source, const double *level_steps,
                                        const ath_rounding *rounding);
 
-/* Puts decoded vertices, less the origin, into positions as ath_pose has them. */
+/* Puts decoded vertices, less the origin, into positions as ath_pose does. */
 void ath_store_positions(const double *placed, int32_t first, int32_t count, int32_t frames, const double origin[3],
                          int is_float64, void *positions);
 
-/* Positions at `level` as a decoder has them before corrections: origin added, vertex-major, float or (is_float64)
- * double. By ranges of pieces, which keep the rule above, and then of nodes. */
+/* Fill positions at `level` as a decoder has them before corrections: with the origin, vertex-major, float or
+ * (is_float64) double. First call ranges of pieces, under the rule above, then ranges of nodes. */
 ATH_ENCODER_API void ath_pose(const ath_plan *plan, const ath_motion *motion, const ath_integers *integers,
                               int32_t first, int32_t stop, int32_t level, const double origin[3], int is_float64,
                               void *positions);
@@ -112,77 +114,78 @@ ATH_ENCODER_API void ath_pose_nodes(const ath_plan *plan, const ath_motion *moti
                                     int32_t first, int32_t stop, int32_t level, const double origin[3], int is_float64,
                                     void *positions);
 
-/* Steps of the first ATH_SHAPE_MODES modes of a branch with such flags, over that of their stream. */
+/* Fills the steps of a piece's first ATH_SHAPE_MODES modes over that of their stream. */
 ATH_ENCODER_API void ath_mode_weights(const ath_piece *piece, double weights[ATH_SHAPE_MODES]);
 
-/* Adds the second moments over time of rows of integers, each of `frames`, to the lower half of `moments`, frames x frames:
- * of the rows whose squares add up to more than `least`. Returns how many these are. */
+/* Adds the second moments over time of rows of integers to the lower half of `moments`, frames x frames. Only rows
+ * whose squares add up to more than `least` count. Returns their number. */
 ATH_ENCODER_API int64_t ath_add_moments(int64_t count, int32_t frames, const int32_t *rows, double least,
                                         double *moments);
 
-/* Products of `count` pairs of matrices, rows x inner and inner x columns; a_step, b_step: numbers from one to the next,
- * 0: they share one. */
+/* Multiplies `count` pairs of matrices, rows x inner and inner x columns. a_step, b_step: numbers from one matrix to
+ * the next; 0: all pairs share one. */
 ATH_ENCODER_API void ath_multiply(int64_t count, int64_t rows, int64_t inner, int64_t columns, const double *a,
                                   int64_t a_step, const double *b, int64_t b_step, double *out);
-/* Singular values, 3 each, in descending order, of 3 x 3 matrices: left, columns, times these, times right, rows. */
+/* Decomposes 3 x 3 matrices: left (columns) times the 3 singular values, in descending order, times right (rows). */
 ATH_ENCODER_API void ath_decompose(int64_t count, const double *matrices, double *left, double *stretch, double *right);
-/* rows, n x columns, become what a positive definite n x n matrix, which is destroyed, takes to them. */
+/* Replaces rows, n x columns, by the solution of matrix * x = rows. The matrix is positive definite and is
+ * destroyed. */
 ATH_ENCODER_API void ath_solve(int32_t n, int32_t columns, double *matrix, double *rows);
 
-/* Largest distance and sum of squared distances between positions and source (plus origin). shown: how many frames of
- * the clip show each frame. rounding: what a decoder may be further off. histogram: ATH_SHORT_FLOATS counts, to which
- * each distance is added, rounded up as in the error table. */
+/* Measures the largest distance and the sum of squared distances between positions and source (plus origin). shown: how
+ * many frames of the clip show each frame. rounding: error that a decoder may add. histogram: ATH_SHORT_FLOATS counts
+ * of distances, rounded up as in the error table, which are added to. */
 ATH_ENCODER_API void ath_error(int32_t vertex_count, int32_t frames, const int32_t *shown, int is_float64,
                                const void *positions, const double *source, const double origin[3], double rounding,
                                double *max_error, double *sum_squares, uint32_t *histogram);
 
-enum { ATH_CORRECTION_ROW = 6 }; /* numbers */
+enum { ATH_CORRECTION_ROW = 6 }; /* int32_t per row */
 
-/* How the corrections of a segment meet those of the segments beside it: at ends that are closed (1: its first frame, 2: its
- * last) no footprint is cut off, but for its faint end. count: of the vertices and frames, of either end, whose corrections
- * are decided, rows as below in ascending order, since they stand in the first frame of one segment like in the last
- * of the other. They are given up where a vertex cannot be corrected with them. */
+/* How the corrections of a segment meet those of the segments beside it. At closed ends (1: first frame, 2: last frame)
+ * no footprint is cut off, except for its faint end. decided: `count` rows as below, in ascending order, of corrections
+ * at either end that are decided, since the segment beside shares them. A vertex that they do not serve gives them
+ * up. */
 typedef struct ath_met_ends {
     const int32_t *decided;
     int64_t count;
     int32_t closed, reserved;
 } ath_met_ends;
 
-/* Finds the corrections that bring every vertex within its own limit: up to `capacity` rows of vertex, frame and
- * ath_correction. narrow: of each vertex whether its corrections are to be of one frame. Returns how many there are; -1:
- * the step cannot express them. */
+/* Finds corrections that bring every vertex within its limit: up to `capacity` rows of vertex, frame and
+ * ath_correction. narrow: whether a vertex's corrections must have one frame. Returns their number; -1: not with this
+ * step. */
 ATH_ENCODER_API int64_t ath_find_corrections(int32_t vertex_count, int32_t frames, int is_float64,
                                              const void *positions, const double *source, const double origin[3],
                                              const double *limits, const uint8_t *narrow, double step,
                                              const ath_met_ends *ends, int32_t *corrections, int64_t capacity);
-/* Those that move all vertices of a part, first and counts, together, where one is beyond its limit and all are within it
- * then; over several frames where that serves, unless is_narrow. closed: of ath_met_ends; as many rows as there are. */
+/* Finds corrections that move all vertices of a part together, if one is beyond its limit and all are within it then;
+ * over several frames if that serves, unless is_narrow is 1. closed: see ath_met_ends. Returns the number of rows. */
 ATH_ENCODER_API int64_t ath_find_rigid_corrections(int32_t part_count, const int32_t *first, const int32_t *counts,
                                                    int32_t frames, int is_float64, const void *positions,
                                                    const double *source, const double origin[3], const double *limits,
                                                    int is_narrow, double step, int32_t closed, int32_t *corrections,
                                                    int64_t capacity);
-/* Rows of one vertex stand together, in the order of their frames. */
+/* The rows of one vertex must stand together, in the order of their frames. */
 ATH_ENCODER_API void ath_apply_corrections(int32_t frames, int is_float64, void *positions, double step,
                                            const int32_t *corrections, int64_t count);
 
-/* Writers of the streams: the size written, -1 when `capacity` is too small, -2 when the input cannot be expressed. */
-/* errors: of each level and segment ATH_MEASURES stored numbers; joins: one, read where there are several segments;
- * repeats: one of each frame, or null. */
+/* Writers of the streams return the size written; -1: `capacity` is too small; -2: the stream cannot hold the input. */
+/* errors: ATH_MEASURES stored numbers per level and segment; joins: one per level and segment, ignored if there is one
+ * segment; repeats: one per frame, or null. */
 ATH_ENCODER_API int64_t ath_encode_front(uint8_t *bytes, size_t capacity, const ath_header *header,
                                          const ath_chunk *chunks, const int32_t *errors, const uint8_t *joins,
                                          const uint8_t *repeats);
 ATH_ENCODER_API int64_t ath_encode_hierarchy(void *model, uint8_t *bytes, size_t capacity, const ath_branch *branches,
                                              int32_t branch_count, int32_t vertex_count, const int32_t *branch_source,
                                              const int32_t *vertex_source);
-/* mesh: null, or of a connected pose; slack: how far from its place a vertex may be put to save bits;
- * moved: scratch, as large as the source. */
+/* mesh: null unless the pose is connected. slack: how far a vertex may be moved to save bits. moved: scratch like
+ * source. */
 ATH_ENCODER_API int64_t ath_encode_rest(void *model, uint8_t *bytes, size_t capacity, const ath_branch *branches,
                                         int32_t branch_count, double step, double slack, ath_mesh *mesh,
                                         const int32_t *coarse, const double *before, const int32_t *shape_of,
                                         int32_t *steps, const double *source, double *moved, double *rest);
-/* shape_of: of each branch the one that it is a copy of, itself where others are copies of it, or -1. uses:
- * scratch. Returns the number of copies. */
+/* Fills shape_of: the branch that each branch copies, itself if others copy it, or -1. uses: scratch. Returns their
+ * number. */
 ATH_ENCODER_API int32_t ath_find_copies(const ath_branch *branches, int32_t branch_count, const double *pose,
                                         double step, double slack, int32_t *uses, int32_t *shape_of);
 /* turns: scratch, branch_count x 9. */
@@ -199,14 +202,14 @@ ATH_ENCODER_API int64_t ath_encode_times(void *model, uint8_t *bytes, size_t cap
                                          const double *times);
 ATH_ENCODER_API int64_t ath_encode_temporal(void *model, uint8_t *bytes, size_t capacity, int32_t rank, int32_t frames,
                                             const int32_t *basis);
-/* Rows of a basis in waves; integers: as many rows of `frames` as rank, and zeros up to a multiple of 3. */
+/* integers: `rank` rows of `frames` integers of waves, and rows of zeros up to a multiple of 3. */
 ATH_ENCODER_API int64_t ath_encode_basis(void *model, uint8_t *bytes, size_t capacity, int32_t rank, int32_t frames,
                                          int32_t *exponents, int32_t *integers);
-/* integers: as streams hold them, ATH_SHAPE_NUMBERS of each shape. */
+/* integers: ATH_SHAPE_NUMBERS of each shape, as streams hold them. */
 ATH_ENCODER_API int64_t ath_encode_shapes(void *model, uint8_t *bytes, size_t capacity, const ath_plan *plan,
                                           const int32_t *shape_counts, const int64_t *shape_first, int32_t *integers,
                                           int32_t level);
-/* The same of a refinement; coarse_counts: null where the layer before has no shapes. */
+/* coarse_counts: null if the layer before has no shapes. */
 ATH_ENCODER_API int64_t ath_encode_refined_shapes(void *model, uint8_t *bytes, size_t capacity, const ath_plan *plan,
                                                   const int32_t *shape_counts, const int64_t *shape_first,
                                                   int32_t *integers, const int32_t *coarse_counts,
@@ -220,8 +223,8 @@ ATH_ENCODER_API int64_t ath_encode_refinement(void *model, uint8_t *bytes, size_
                                               const ath_motion *motion, const ath_integers *integers, int32_t level);
 ATH_ENCODER_API int64_t ath_encode_affines(void *model, uint8_t *bytes, size_t capacity, const ath_plan *plan,
                                            const ath_motion *motion, const ath_integers *integers, int32_t level);
-/* Predicted motion: memory, ath_predicted_memory bytes; lattice: 1 where vertices are points of it; source: frames x vertex_count x
- * 3, less the origin; limits: of each vertex. Fills positions, as decoded. */
+/* memory: ath_predicted_memory bytes. lattice: 1 if vertices are points of the lattice. source: frames x vertex_count x
+ * 3, less the origin. limits: one per vertex. Fills positions, as decoded. */
 ATH_ENCODER_API size_t ath_predicted_memory(int32_t vertex_count);
 ATH_ENCODER_API int64_t ath_encode_predicted(void *memory, uint8_t *bytes, size_t capacity, const ath_plan *plan,
                                              const double *origin, int32_t frames, int is_float64, double step,

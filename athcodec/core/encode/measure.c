@@ -1,9 +1,9 @@
 /* How the encoder decodes and measures what it has coded. */
 #include "encode/encode.h"
 
-enum { TILE = 16 }; /* of what is worked on at once */
+enum { TILE = 16 }; /* vertices that are processed at once */
 
-/* Distances of up to TILE vertices. */
+/* Fills the distances of up to TILE vertices. */
 static void residual_distances(int32_t count, const double A[9], const double o[3], const double *rest[3],
                                const double *x[3], double distance[TILE])
 {
@@ -131,7 +131,7 @@ void ath_pose_nodes(const ath_plan *plan, const ath_motion *motion, const ath_in
             pose_node(plan, motion, integers, n, &scratch, origin, is_float64, positions);
 }
 
-/* A vertex's squared distances, frame by frame. `stride`: from axis to axis. */
+/* Fills a vertex's squared distances, frame by frame. stride: numbers from axis to axis. */
 ATH_HOT
 static void square_distances(int32_t count, size_t stride, int is_float64, const void *positions, size_t first,
                              const double *source, const double origin[3], double *squares)
@@ -148,7 +148,7 @@ static void square_distances(int32_t count, size_t stride, int is_float64, const
     }
 }
 
-/* Lengths of the error table (ATH_SHORT_FLOATS), not below the distances as far as there are such. */
+/* Rounds distances up to numbers of the error table, as far as it has them. */
 ATH_HOT
 static void shorts_above(int32_t count, const double *squares, double rounding, int32_t *shorts)
 {

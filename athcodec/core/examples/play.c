@@ -1,12 +1,11 @@
-/* Plays an .ath file as an engine would, without the screen: the file arrives slice by slice, a camera walks up
- * to the plant and back, and every drawn frame gets what a GPU needs, at the level of detail that the distance
- * asks for; where that changes it fades over.
+/* Plays an .ath file as an engine would, without the screen. The file arrives slice by slice, a camera walks up to the
+ * plant and back, and every drawn frame gets what a GPU needs, at the level of detail that the distance asks for. A new
+ * level fades in.
  *
  *     play FILE [--clip NAME] [--slices N] [--seconds S] [--fps F]
  *
- * It prints the same on every machine, but for the microseconds. What it leaves out: threads (each has an
- * ath_work of its own), more than a few segments in memory, and range requests (ath_ranges) instead of a download
- * from the front. */
+ * It prints the same on every machine, except for the microseconds. It leaves out threads (each needs an ath_work), more
+ * than a few segments in memory, and range requests (ath_ranges) instead of a download from the front. */
 #include <ath.h>
 
 #include <math.h>
@@ -15,35 +14,35 @@
 #include <string.h>
 #include <time.h>
 
-static const double FOV = 1.0, SCREEN = 1080.0; /* vertical, in radians and in pixels */
-static const double PIXELS = 1.0;               /* an error above this on the screen asks for a finer level */
-static const double COMFORTABLE = 0.7;          /* a coarser level stays below this, or it would flicker */
-static const double FADE = 0.2;                 /* seconds from a level to the next */
+static const double FOV = 1.0, SCREEN = 1080.0; /* vertical field of view, radians; height, pixels */
+static const double PIXELS = 1.0;               /* an error above this many pixels asks for a finer level */
+static const double COMFORTABLE = 0.7; /* a coarser level must stay below this many pixels, or it would flicker */
+static const double FADE = 0.2;        /* seconds that a change of level takes */
 
 typedef struct {
     FILE *download;
-    uint8_t *bytes; /* room for the whole file: bytes that were fed must not move */
+    uint8_t *bytes; /* room for the whole file, since bytes that were fed must not move */
     size_t length, there, slice;
     ath_file *file;
     ath_info info;
     int32_t clip_index, first_segment, last_segment;
-    const ath_clip *clip;  /* the one that is played */
-    void *bases, **layers; /* of ath_build; of ath_refine, `layer_count` of them */
+    const ath_clip *clip;  /* the clip that is played */
+    void *bases, **layers; /* memory of ath_build; memory of ath_refine, by level */
     int32_t layer_count;
     ath_work *work;
     size_t file_size, build_size, layers_size, work_size, segments_size;
-    ath_segment *playing, *next; /* null: none. `next` is prepared while `playing` plays */
-    ath_segment *before;         /* the same as `playing` at the level that fades out; null: none does */
+    ath_segment *playing, *next; /* null: none. `next` is prepared during `playing` */
+    ath_segment *before;         /* `playing` at the level that fades out; null: none */
     ath_fade fade;
-    double fade_frames;     /* that it takes, drawn ones */
-    void *kept, *next_kept; /* what deeper levels of these go on from */
+    double fade_frames;     /* drawn frames that a fade takes */
+    void *kept, *next_kept; /* integers from which deeper levels go on */
     int preparing;
-    int32_t steps, spread;      /* of the preparation in all, and over how many drawn frames it is spread */
-    int32_t level, bound_level; /* that the camera asks for; that `binding` is for */
-    int32_t nodes;              /* of that one: its matrices */
+    int32_t steps, spread;      /* steps of the preparation, and drawn frames that they are spread over */
+    int32_t level, bound_level; /* level that the camera asks for; level of `binding` */
+    int32_t nodes;              /* matrices of bound_level */
     int32_t *binding;
     float *matrices, *positions;
-    double drawn_per_frame; /* frames on the screen for one of the file */
+    double drawn_per_frame; /* drawn frames per frame of the file */
     long drawn, held;
     double preparing_time, playing_time, longest;
 } player;
@@ -67,7 +66,7 @@ static void check_fault(const ath_fault_info *fault, const char *where)
     fail(where, text);
 }
 
-/* malloc aligns to 16 on 64-bit systems. Where it does not, athcodec says NO_MEMORY: take an aligned allocator. */
+/* malloc aligns to 16 on 64-bit systems. If it does not, athcodec returns ATH_NO_MEMORY: use an aligned allocator. */
 static void *allocate(size_t size)
 {
     void *memory = malloc(size > 0 ? size : 1);
@@ -77,7 +76,7 @@ static void *allocate(size_t size)
 
 /* ---- the file ---- */
 
-/* One more slice of the download; 0 when there is none. */
+/* Receives one more slice of the download; 0: there is none. */
 static size_t receive(player *p)
 {
     size_t left = p->length - p->there;
@@ -86,7 +85,7 @@ static size_t receive(player *p)
     return got;
 }
 
-/* Header, hierarchy and rest pose come first: with them all sizes are known, and the plant can be shown. */
+/* The header, hierarchy and rest pose come first. Then all sizes are known, and the plant can be shown. */
 static void open_file(player *p, const char *path, size_t slices)
 {
     size_t front;
@@ -117,7 +116,7 @@ static void open_file(player *p, const char *path, size_t slices)
     p->bound_level = -1;
 }
 
-/* Segments of the other clips are never asked for. */
+/* Other clips are never requested. */
 static void choose_clip(player *p, const char *name)
 {
     p->clip_index = name ? ath_clip_named(p->file, name) : 0;
@@ -148,7 +147,7 @@ static void choose_level(player *p, double distance)
     if (p->level > at_most) p->level = at_most;
 }
 
-/* That level, or the best that has arrived; -1: nothing has. */
+/* Returns the level that is wanted, or the deepest that has arrived; -1: none has. */
 static int32_t level_for(const player *p, int32_t segment)
 {
     int32_t ready = ath_ready_level(p->file, segment);
@@ -160,7 +159,7 @@ static int32_t level_for(const player *p, int32_t segment)
 static int32_t index_of(const ath_segment *segment) { return segment ? ath_segment_index(segment) : -1; }
 static int32_t level_of(const ath_segment *segment) { return segment ? ath_segment_level(segment) : -1; }
 
-/* What the segments of a level above 0 share, as soon as the first of them can be prepared. */
+/* Builds what the segments of a level share, as soon as the first of them can be prepared. */
 static void refine(player *p, int32_t level)
 {
     size_t size;
@@ -172,7 +171,7 @@ static void refine(player *p, int32_t level)
     p->layers_size += size;
 }
 
-/* Room for the most that may be kept: pages that nobody writes to cost nothing. */
+/* Takes room for the most that may be kept, since pages that nobody writes to cost nothing. */
 static void keep(player *p, int32_t level)
 {
     size_t room = ath_keep_size(p->file, level) + 16;
@@ -188,7 +187,7 @@ static void keep_no_more_than_there_is(player *p)
     if (shrunk) p->next_kept = shrunk;
 }
 
-/* A finer level of what is playing goes on from there. */
+/* A finer level of the playing segment goes on from its integers. */
 static int begin(player *p, int32_t segment, int32_t level, size_t size)
 {
     if (index_of(p->playing) == segment && ath_goes_on(p->file, p->playing, p->kept, level))
@@ -201,7 +200,7 @@ static size_t room_of(const player *p, const ath_segment *segment)
     return segment ? ath_segment_size(p->file, level_of(segment)) : 0;
 }
 
-/* Memory is for the level, so that a plant far away takes little. */
+/* Memory depends on the level, so that a distant plant takes little. */
 static int start(player *p, int32_t segment, int32_t level)
 {
     size_t size = ath_segment_size(p->file, level);
@@ -212,14 +211,14 @@ static int start(player *p, int32_t segment, int32_t level)
     refine(p, level);
     check(begin(p, segment, level, size), "preparing");
     keep(p, level);
-    if (p->playing) ath_follow(p->work, p->playing); /* if that is what it is joined to */
+    if (p->playing) ath_follow(p->work, p->playing); /* ignored unless it is joined to this one */
     p->steps = ath_prepare_steps(p->file, segment, level);
     return p->preparing = 1;
 }
 
-/* First a segment to show now, then a new level for it, then what comes after it, at the level of this one: where they
- * meet no level changes. A new level waits for the next segment where this one is over before it has faded in, and goes
- * ahead of a segment of which less has arrived. `left`: drawn frames until then. */
+/* Chooses what to prepare: a segment to show now, then a new level for it, then the next segment at the same level, so
+ * that no level changes at the seam. A new level waits for the next segment if this one ends before it has faded in,
+ * and goes ahead of a segment of which less has arrived. left: drawn frames until the next segment. */
 static int start_next(player *p, int32_t now, double left)
 {
     int32_t count = p->clip->segment_count, after = now < p->last_segment ? now + 1 : p->first_segment;
@@ -236,7 +235,7 @@ static int start_next(player *p, int32_t now, double left)
     return 0;
 }
 
-/* Plays what is prepared for this segment: its time has come, or it is a new level, which fades in. */
+/* Plays what is prepared, if its time has come, or fades in a new level. */
 static void take_over(player *p, int32_t now)
 {
     if (p->preparing || index_of(p->next) != now) return;
@@ -249,8 +248,8 @@ static void take_over(player *p, int32_t now)
     p->next_kept = NULL;
 }
 
-/* Some steps per drawn frame. All at once where there would be nothing to show: at the start, after a jump in
- * time. What has begun is finished, so that a fast camera cannot starve it. */
+/* Runs some steps per drawn frame, or all at once if nothing could be shown otherwise: at the start, or after a jump in
+ * time. A preparation that has begun is finished, so that a fast camera cannot starve it. */
 static void prepare(player *p, double place)
 {
     int32_t now = ath_blend_at(p->file, place).segment[0];
@@ -271,7 +270,7 @@ static void prepare(player *p, double place)
     take_over(p, now);
 }
 
-/* A quarter of the time that a segment plays will do to prepare the next. */
+/* A segment is prepared during a quarter of the time that the one before plays. */
 static void set_pace(player *p, double fps)
 {
     double frame_time = p->clip->duration / fmax(1.0, p->clip->frame_count - 1);
@@ -283,7 +282,7 @@ static void set_pace(player *p, double fps)
 
 /* ---- drawing ---- */
 
-/* Once per level: a vertex attribute, with which the vertex shader places a vertex of the rest pose at
+/* Fills a vertex attribute once per level. With it, the vertex shader places a vertex of the rest pose at
  *     binding < 0 ? positions[-1 - binding] : matrices[binding] * rest */
 static void bind_vertices(player *p, int32_t level)
 {
@@ -298,7 +297,7 @@ static void bind_vertices(player *p, int32_t level)
     p->bound_level = level;
 }
 
-/* What is faded out is let go of once it is; at once where it is another segment's. */
+/* Frees the segment that has faded out, or that belongs to another time. */
 static void fade(player *p)
 {
     ath_fade_to(&p->fade, level_of(p->playing), 1.0 / p->fade_frames);
@@ -310,13 +309,13 @@ static void fade(player *p)
 
 static int draw(player *p, double place)
 {
-    if (!p->playing) return ATH_NOT_PREPARED; /* the rest pose is shown until there is motion */
+    if (!p->playing) return ATH_NOT_PREPARED; /* show the rest pose until there is motion */
     fade(p);
     const ath_segment *segments[3] = {p->playing, p->next, p->before};
     size_t matrix = 12 * sizeof(float), vertex = 3 * sizeof(float);
     int32_t level = ath_fade_cut(&p->fade);
     if (level != p->bound_level) bind_vertices(p, level);
-    if (p->nodes == 0) /* without a GPU this is the call for all levels */
+    if (p->nodes == 0) /* without a GPU, call this at all levels */
         return ath_faded_positions(p->file, segments, 3, place, &p->fade, ATH_FILE_ORDER, p->positions, vertex);
     ath_faded_matrices(p->file, segments, 3, place, &p->fade, p->matrices, matrix);
     return ath_faded_exact(p->file, segments, 3, place, &p->fade, p->positions, vertex);
@@ -324,7 +323,7 @@ static int draw(player *p, double place)
 
 /* ---- the walk ---- */
 
-/* From where level 0 will do, to where none but the last will, and back: a third of the time close up. */
+/* Walks from where level 0 suffices to where only the last level does, and back, with a third of the time close up. */
 static double camera(const player *p, double progress)
 {
     double unit = SCREEN / (2.0 * tan(FOV / 2.0)); /* pixels of a length of 1 from a distance of 1 */

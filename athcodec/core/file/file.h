@@ -1,20 +1,20 @@
 /* An opened file, as opening, preparing and playing see it. */
-#ifndef ATH_FILE_H
-#define ATH_FILE_H
+#ifndef ATH_FILE_FILE_H
+#define ATH_FILE_FILE_H
 
-#include "file/container.h"
+#include "container/container.h"
+#include "model/basis.h"
 #include "model/mesh.h"
-#include "model/plan.h"
 
-/* The plant about a finer rest pose: the first layer, from level 1 on, or a refinement, whose pieces are all of its level. A
- * refinement without a rest pose of its own has that of the layer before, and its bases. */
+/* The plant about a finer rest pose: the first layer, from level 1 on, or a refinement, whose pieces are all of its
+ * level. A refinement without a rest pose of its own has the rest pose and the bases of the layer before. */
 typedef struct {
     ath_plan plan; /* plan.bases null: not built yet */
     ath_piece *pieces;
-    ath_node *nodes; /* of the first layer */
-    double *rest;    /* null: that of the layer before */
+    ath_node *nodes; /* first layer only */
+    double *rest;    /* null: it has the rest pose of the layer before */
     int32_t *rest_steps;
-    uint64_t bases_count; /* 0: those of the layer before, or not known yet */
+    uint64_t bases_count; /* 0: it has the bases of the layer before, or they are not known yet */
     int32_t rest_known;
 } ath_layer;
 
@@ -26,25 +26,26 @@ struct ath_file {
     double *errors;   /* level_count x segment_count x ATH_MEASURES */
     uint8_t *joins;   /* level_count x segment_count, see ath_joins */
     uint8_t *repeats; /* frame_count, see ath_repeats */
-    uint8_t *coded;   /* of each frame, which of the coded frames of its segment it shows */
+    uint8_t *coded;   /* frame_count: the coded frame of its segment that each frame shows */
     ath_clip *clips;
-    char *names;  /* of the clips, NAME_BYTES each */
+    char *names;  /* clip_count x NAME_BYTES */
     float *seams; /* clip_count x full_level_count */
     ath_branch *branches;
     int32_t *branch_source, *vertex_source;
     double *times;
     double *rest;        /* the reference pose, relative to the origin */
-    double *source_rest; /* the rest pose, where it is another or exact numbers, the file's or the host's, else null */
+    double *source_rest; /* the rest pose; null where it is the reference pose, not exact */
     ath_piece *pieces;
     ath_node *nodes;
     uint8_t *gaps;
-    void *scratch;                                         /* of opening and building */
-    double *bases;                                         /* null until ath_build */
-    ath_mesh mesh;                                         /* where there are FACES */
-    ath_mesh *connected;                                   /* it, where the rest pose is connected, else null */
-    int32_t *rest_steps;                                   /* null where no layer refines the rest pose */
-    ath_layer layers[ATH_LAYERS];                          /* first_layer to layer_count - 1 */
-    double *waves[ATH_WAVE_KINDS][ATH_SEGMENT_FRAMES + 1]; /* of so many frames; null: no segment has any */
+    void *scratch;                /* for opening and building */
+    double *bases;                /* null until ath_build */
+    ath_mesh mesh;                /* only where the file has FACES */
+    ath_mesh *connected;          /* &mesh where the rest pose is connected, else null */
+    int32_t *rest_steps;          /* null where no layer refines the rest pose */
+    ath_layer layers[ATH_LAYERS]; /* first_layer to layer_count - 1 */
+    double
+        *waves[ATH_WAVE_KINDS][ATH_SEGMENT_FRAMES + 1]; /* by kind and number of frames; null: no segment needs them */
     uint64_t bases_count;
     int32_t rest_known;        /* 0 until the host gives it */
     int32_t source_rest_known; /* 0 until SOURCE_REST has been read */
@@ -56,32 +57,60 @@ struct ath_file {
     uint32_t affine_levels[ATH_LEVELS]; /* bit d of entry L: AFFINES of level d serve to show level L */
 };
 
-enum { ATH_END_FRAMES = 2 }; /* of a segment, that the next one is joined to */
+enum { ATH_END_FRAMES = 2 }; /* frames at the end of a segment that the next one is joined to */
 
-/* Frames of a segment that are coded: that do not repeat the one before. */
-int32_t ath_file_frames(const ath_file *file, int32_t segment);
-/* The one before a segment in its clip; before the first of a loop of several its last; -1: none. */
-int32_t ath_segment_before(const ath_file *file, int32_t segment);
-/* How the positions that a level shows are joined: an entry of ath_joins. */
-int32_t ath_join_at(const ath_file *file, int32_t segment, int32_t level);
+/* ---- clips and segments ---- */
+
+/* Returns the first of `count` clips with a name; -1: none has it. */
+int32_t ath_clip_among(const ath_file *file, int32_t count, const char *name);
 const ath_clip *ath_file_clip(const ath_file *file, int32_t frame);
-/* Of the stems of a segment, and of the maps of its nodes. */
-const double *ath_file_waves(const ath_file *file, int32_t segment);
-const double *ath_file_node_waves(const ath_file *file, int32_t segment);
+const ath_clip *ath_segment_clip(const ath_file *file, int32_t segment);
+/* Returns how many frames of a segment are coded: all that do not repeat the frame before. */
+int32_t ath_file_frames(const ath_file *file, int32_t segment);
+/* Returns the segment before one in its clip. For the first segment of a loop of several it is the last; -1: none. */
+int32_t ath_segment_before(const ath_file *file, int32_t segment);
+/* Returns how the positions that a level shows are joined: an entry of ath_joins. */
+int32_t ath_join_at(const ath_file *file, int32_t segment, int32_t level);
+
+/* ---- chunks ---- */
+
 const ath_chunk *ath_file_chunk(const ath_file *file, int32_t kind, int32_t level, int32_t segment);
-/* Kinds whose one chunk of a level stands with segment 0 and serves all segments. */
+/* Returns whether decoding a segment at `level` takes the chunk of this kind and level d. */
+int ath_file_needs(const ath_file *file, int32_t kind, int32_t d, int32_t level);
+int ath_refuse_missing(ath_fault_info *fault, int32_t kind, int32_t level, uint32_t segment);
+/* Checks a chunk of the prelude and gives its bytes. Until the next chunk is loaded, the fault is that the content of
+ * this one is not valid. */
+int ath_load(const ath_file *file, int32_t kind, ath_bytes *content, ath_fault_info *fault);
+
+/* Returns whether the one chunk of a level stands with segment 0 and serves all segments. */
 ATH_INLINE int ath_is_shared(int32_t kind) { return kind == ATH_SHAPES || kind == ATH_REFINED_REST; }
 
-/* Kinds that the end of a segment depends on, as what is joined to it takes it. */
+/* Returns whether a segment's end, as the segment joined to it takes it, depends on chunks of this kind. */
 ATH_INLINE int ath_shapes_end(int32_t kind) { return kind != ATH_CORRECTIONS && kind != ATH_EXACT; }
 
-/* Levels that are not the source's very numbers. */
+/* ---- rest poses and waves ---- */
+
+/* Returns where in the scratch memory, behind the models, the rotations of branches stand. */
+size_t ath_turns_place(void);
+/* Reads REST: the reference pose, or which mesh of the host's it is. */
+int ath_read_reference(ath_file *file, ath_fault_info *fault);
+/* Completes what follows from the reference pose. */
+void ath_know_rest(ath_file *file);
+/* Return the waves of a segment's stems, and those of the maps of its nodes. */
+const double *ath_file_waves(const ath_file *file, int32_t segment);
+const double *ath_file_node_waves(const ath_file *file, int32_t segment);
+
+/* ---- levels and layers ---- */
+
+ATH_INLINE int ath_has_stream(const ath_file *file, int32_t level) { return file->stems_levels >> level & 1; }
+
+/* Returns the number of levels that are not exact. */
 ATH_INLINE int32_t ath_lossy_levels(const ath_file *file) { return file->plan.height + 1 + file->header.layer_count; }
 
-/* Whether it stores the level behind the last lossy one. */
+/* Returns whether the file stores the level behind the last lossy one. */
 ATH_INLINE int ath_file_is_lossless(const ath_file *file) { return file->header.level_count > ath_lossy_levels(file); }
 
-/* The layer of precision of a level: 0 for those of the branch hierarchy. */
+/* Returns the layer of precision of a level: 0 for the levels of the branch hierarchy. */
 ATH_INLINE int32_t ath_layer_of(const ath_file *file, int32_t level)
 {
     return ath_max(0, ath_min(level, ath_lossy_levels(file) - 1) - file->plan.height - 1);
@@ -89,7 +118,7 @@ ATH_INLINE int32_t ath_layer_of(const ath_file *file, int32_t level)
 
 ATH_INLINE int32_t ath_level_of_layer(const ath_file *file, int32_t layer) { return file->plan.height + 1 + layer; }
 
-/* Of a layer, as it serves to show `level`. */
+/* Returns the plan of a layer as it serves to show `level`. */
 ATH_INLINE const ath_plan *ath_layer_plan(const ath_file *file, int32_t layer, int32_t level)
 {
     return level > 0 && layer >= file->first_layer ? &file->layers[layer].plan : &file->plan;
@@ -99,7 +128,5 @@ ATH_INLINE const ath_plan *ath_level_plan(const ath_file *file, int32_t level)
 {
     return ath_layer_plan(file, ath_layer_of(file, level), level);
 }
-/* Whether decoding a segment at `level` takes the chunk of this kind and level d. */
-int ath_file_needs(const ath_file *file, int32_t kind, int32_t d, int32_t level);
 
 #endif

@@ -1,12 +1,14 @@
-/* The GPU form of levels and segments (ath_gpu.h): what a preparation places pieces and nodes with, as words. */
+/* The GPU form of levels and segments (ath_gpu.h). An observer records pieces and nodes as words. */
 #include "ath_gpu.h"
-#include "play/watch.h"
+#include "model/maps.h"
+#include "model/refine.h"
+#include "play/prepare.h"
 
 enum { SMALL_MAP = 24, STEM_WAVES = 0, NODE_WAVES = 1, LEARNED_WAVES = 2, INT16_MOST = 32767 };
 
 static uint32_t to_words(size_t bytes) { return (uint32_t)(bytes / sizeof(uint32_t)); }
 
-/* Motion that has no rows: the source's own numbers, and predicted motion. */
+/* Exact levels and predicted motion have no rows. */
 static int is_baked(const ath_file *file, int32_t level)
 {
     return level >= ath_lossy_levels(file) || (file->header.is_predicted && level > 0);
@@ -14,13 +16,13 @@ static int is_baked(const ath_file *file, int32_t level)
 
 /* ---- bodies of a level ---- */
 
-/* One body after the other: the nodes and pieces that a level shows, in file order. */
+/* A walk over the bodies of a level, its nodes and pieces, in file order. */
 typedef struct {
     const ath_file *file;
     const ath_plan *plan;
     int32_t level, p, n; /* the next piece and node */
     const ath_piece *piece;
-    const ath_node *node; /* null: it is the piece */
+    const ath_node *node; /* null: the body is the piece */
 } body_walk;
 
 static body_walk walk_bodies(const ath_file *file, int32_t level)
@@ -47,7 +49,7 @@ static int next_body(body_walk *walk)
     return 0;
 }
 
-/* Modes that its rows may hold. */
+/* Returns the most modes that rows of the body may hold. */
 static int32_t modes_of(const body_walk *walk)
 {
     if (!walk->node) return ath_rank(walk->piece);
@@ -65,7 +67,7 @@ static int32_t body_count(const ath_file *file, int32_t level)
 
 /* ---- the block of a level ---- */
 
-/* Where the basis of a piece stands among those of the file, and where in the block. */
+/* The place of a basis among those of the file, and in the block. */
 typedef struct {
     int64_t from;
     uint32_t to;
@@ -77,8 +79,8 @@ typedef struct {
     ath_gpu_body *bodies;
     uint32_t *order, *depths;
     float *bases;
-    int32_t *body_of; /* each piece, -1: it is none */
-    int32_t *depth;   /* of each body */
+    int32_t *body_of; /* body of each piece; -1: none */
+    int32_t *depth;   /* depth of each body */
     known_basis *known;
     int32_t known_count;
     uint32_t bases_used;
@@ -93,7 +95,7 @@ static uint64_t most_basis_numbers(const ath_file *file, int32_t level)
     return count;
 }
 
-/* The bases come last of what stays, as their number is only known when they are written. */
+/* The bases are the last part that stays, since their size is known only once they are written. */
 static uint64_t carve_level(level_writer *writer, const ath_file *file, int32_t level, uint8_t *base)
 {
     ath_arena arena = {base, 0};
@@ -116,7 +118,7 @@ size_t ath_gpu_level_size(const ath_file *file, int32_t level)
     return ath_size_or_most(carve_level(&counted, file, level, 0));
 }
 
-/* Where a basis is known to stand, or should: most pieces come in the order of their bases. */
+/* Finds a known basis, or its place, by bisection: most pieces come in the order of their bases. */
 static int32_t place_of_basis(const level_writer *writer, int64_t from)
 {
     int32_t low = 0, high = writer->known_count;
@@ -166,7 +168,7 @@ static void set_floats(float out[3], const double x[3])
     for (int32_t k = 0; k < 3; k++) out[k] = (float)x[k];
 }
 
-/* Differences of modes, as those of positions would not be fine enough as floats. */
+/* The shader adds differences of modes, since differences of positions would lose precision as floats. */
 static void set_tangent(level_writer *writer, const ath_plan *plan, const ath_piece *piece, ath_gpu_body *body)
 {
     const ath_piece *parent = plan->pieces + piece->parent;
@@ -225,7 +227,7 @@ static void put_body(level_writer *writer, const body_walk *walk, int32_t b)
     writer->body_of[walk->p - 1] = b;
 }
 
-/* Bodies by depth, in file order within one. */
+/* Sorts bodies by depth, and within a depth in file order. */
 static void put_order(level_writer *writer, int32_t count)
 {
     uint32_t depths = 0;
@@ -296,7 +298,7 @@ int ath_gpu_build_level(const ath_file *file, int32_t level, void *memory, size_
 
 /* ---- recording a segment ---- */
 
-/* A part of the block while it is written: of what there is no room for only the size is kept. */
+/* A section while it is written. Without room, only its size is counted. */
 typedef struct {
     uint32_t *at;
     uint64_t used, room; /* words */
@@ -326,7 +328,7 @@ typedef struct {
     section sections[SECTIONS];
     const double *waves[ATH_GPU_WAVE_SETS];
     int32_t waves_used[ATH_GPU_WAVE_SETS];
-    ath_gpu_move move; /* of the last body */
+    ath_gpu_move move; /* the last body's */
     int32_t level, frames, bodies, matrices, corrected_before, is_node;
     int32_t fits;
 } recorder;
@@ -366,7 +368,7 @@ size_t ath_gpu_record_size(const ath_file *file, int32_t level, const ath_gpu_ro
     return ath_size_or_most(carve_record(&counted, file, level, room, 0));
 }
 
-/* Room for so many words; null: there is none. */
+/* Returns room for `words` words; null: there is none. */
 static uint32_t *push(recorder *record, int32_t index, uint32_t words)
 {
     section *own = record->sections + index;
@@ -451,7 +453,6 @@ static void end_body(recorder *record)
     if (at) memcpy(at, &record->move, sizeof record->move);
 }
 
-/* Where it hangs: moved and turned. */
 static void put_tracks(recorder *record, const ath_plan *plan, const ath_motion *motion, const ath_piece *piece,
                        const ath_piece_rows *rows)
 {
@@ -466,7 +467,6 @@ static void put_tracks(recorder *record, const ath_plan *plan, const ath_motion 
     put_turn(record, &turning);
 }
 
-/* The first `modes` rows, and `shapes` shapes. */
 static void put_modes(recorder *record, const ath_motion *motion, const ath_piece *piece, const ath_piece_rows *rows,
                       int32_t modes, int32_t shapes)
 {
@@ -533,7 +533,7 @@ static void record_curve(recorder *record, int32_t width, const double *jumps, c
 
 static int32_t nearest(double x)
 {
-    if (!(x > -INT16_MOST)) return -INT16_MOST; /* those that are no numbers, too */
+    if (!(x > -INT16_MOST)) return -INT16_MOST; /* also for NaN */
     if (x > (double)INT16_MOST) return INT16_MOST;
     return x < 0.0 ? -(int32_t)(0.5 - x) : (int32_t)(x + 0.5);
 }
@@ -571,7 +571,7 @@ static void push_correction(recorder *record, int32_t frame, const int32_t q[3],
     if (at) memcpy(at, &own, sizeof own);
 }
 
-/* What does not fit 16 bits is two corrections. */
+/* A correction that does not fit 16 bits becomes two. */
 static void record_correction(ath_watcher *watcher, int32_t position, int32_t frame, const ath_correction *own,
                               double step)
 {
@@ -601,11 +601,8 @@ static void record_baked(recorder *record, const ath_segment *segment)
 {
     size_t count = 3 * (size_t)segment->frames * (size_t)segment->exact_vertices;
     const double *origin = record->file->info.origin;
-    for (size_t i = 0; i < count; i++) {
-        double x = segment->is_float64 ? ((const double *)segment->positions)[i]
-                                       : (double)((const float *)segment->positions)[i];
-        push_float(record, BAKED, x - origin[i % 3]);
-    }
+    for (size_t i = 0; i < count; i++)
+        push_float(record, BAKED, ath_number_at(segment->positions, i, segment->is_float64) - origin[i % 3]);
 }
 
 static void record_waves(recorder *record, uint32_t first[ATH_GPU_WAVE_SETS])
@@ -617,7 +614,7 @@ static void record_waves(recorder *record, uint32_t first[ATH_GPU_WAVE_SETS])
     }
 }
 
-/* Sections move up to each other. Returns where each begins. */
+/* Moves the sections together and fills where each begins. */
 static void close_gaps(recorder *record, uint32_t begins[SECTIONS])
 {
     uint32_t *to = (uint32_t *)(void *)(record->head + 1), *start = (uint32_t *)(void *)record->head;
@@ -724,7 +721,6 @@ static void widen(double box[6], const double x[3])
     }
 }
 
-/* The vertices of a node in all frames. */
 static void widen_node(const ath_file *file, const ath_segment *segment, const ath_part *part, double box[6])
 {
     const ath_plan *plan = ath_level_plan(file, segment->level);
@@ -747,16 +743,13 @@ static void widen_positions(const ath_file *file, const ath_segment *segment, do
     const double *origin = file->info.origin;
     for (size_t i = 0; i < (size_t)segment->frames * (size_t)segment->exact_vertices; i++) {
         double x[3];
-        for (size_t k = 0; k < 3; k++) {
-            double number = segment->is_float64 ? ((const double *)segment->positions)[3 * i + k]
-                                                : (double)((const float *)segment->positions)[3 * i + k];
-            x[k] = number - origin[k];
-        }
+        for (size_t k = 0; k < 3; k++)
+            x[k] = ath_number_at(segment->positions, 3 * i + k, segment->is_float64) - origin[k];
         widen(box, x);
     }
 }
 
-/* Of the box: what its own numbers and those of a GPU are rounded by. */
+/* Share of the box's size, for rounding here and on the GPU. */
 static const double BOX_MARGIN = 1e-6;
 
 void ath_gpu_bounds(const ath_file *file, const ath_segment *segment, float box[6])

@@ -1,26 +1,28 @@
-/* athcodec: plays an .ath file that is in memory. One optional file on top of ath.h: it allocates, keeps prepared
- * segments, and prepares the next one ahead.
+/* athcodec: plays an .ath file that is in memory. This optional header on top of ath.h allocates memory, caches
+ * prepared segments, and prepares the next one ahead.
  *
  *     #define ATH_PLAYER_IMPLEMENTATION      in one C or C++ file, before the include
  *     #include "ath_player.h"
  *
- *     ath_player_open, ath_player_close      bytes, all of a file or a prefix of it
- *     ath_player_positions, _matrices        what to draw of a clip at a time and level
- *     ath_player_faded_positions             the same of a fade from level to level
- *     ath_player_blended_positions           several clips by weights; ath_player_wind_positions: by the wind
- *     ath_player_show                        the segments of a moment, for any other function of ath.h
- *     ath_player_endless_positions           a clip without an end, over transitions between its like frames
- *     ath_player_ahead                       prepares the next segment, a bounded piece of work for each drawn frame;
- *     ath_player_begin, _run, _end           or on any thread: a job for the engine's own job system
- *     ath_player_triangles, _lines           topology; ath_player_normals, ath_player_tangents
+ *     ath_player_open, ath_player_close      open all of a file or a prefix of it
+ *     ath_player_positions, _matrices        get what to draw of a clip at a time and level
+ *     ath_player_faded_positions             do the same during a fade from level to level
+ *     ath_player_blended_positions           blend several clips by weights
+ *     ath_player_wind_positions              blend several clips by the wind
+ *     ath_player_show                        get the segments of a moment, for any other function of ath.h
+ *     ath_player_endless_positions           play a clip endlessly, over transitions between similar frames
+ *     ath_player_ahead                       prepare the next segment, a bounded piece of work per drawn frame
+ *     ath_player_begin, _run, _end           prepare it as a job of your own job system, on any thread
+ *     ath_player_triangles, _lines           get the topology
+ *     ath_player_normals, _tangents          compute what shading needs
  *
- * Memory comes from malloc or from the caller's functions. The bytes of the file stay where they are until the player is
- * closed. For downloads that grow, and for what decides by itself what is in memory, ath.h has the functions.
+ * Memory comes from malloc or from your functions. Leave the bytes of the file in place until you close the player. For
+ * downloads that grow, and to decide yourself what is in memory, use ath.h.
  *
- * Threads. One thread at a time uses a player; ath_player_run alone may run on any thread meanwhile, each job on one.
- * Handing the job over there and back is the engine's: by the queue that it has for that.
+ * Threads. Use a player from one thread at a time. Only ath_player_run may run on other threads meanwhile, each job on
+ * one. Hand the job over and back by a queue of yours.
  *
- * Results are those of ath.h; where bytes are to blame ath_player_fault says why. C11 or C++17. */
+ * Results are those of ath.h; ath_player_fault tells more. C11 or C++17. */
 #ifndef ATH_PLAYER_H
 #define ATH_PLAYER_H
 
@@ -31,120 +33,124 @@ extern "C" {
 #endif
 
 typedef struct ath_player ath_player;
-typedef struct ath_player_job ath_player_job; /* one segment that is prepared ahead */
+typedef struct ath_player_job ath_player_job; /* the preparation of one segment ahead of its time */
 
-/* Zeros are the defaults. */
+/* Options; zeros are the defaults. */
 typedef struct ath_player_options {
-    void *(*allocate)(void *context, size_t size); /* aligned to 16; null: none is left. Null: malloc */
-    void (*release)(void *context, void *memory);  /* of `allocate`; null: nothing is freed */
+    void *(*allocate)(void *context, size_t size); /* returns memory aligned to 16, or null. Null: malloc */
+    void (*release)(void *context, void *memory);  /* frees memory of `allocate`; null: nothing is freed */
     void *context;
-    size_t cache_bytes;       /* of prepared segments; what is shown stays, whatever it takes. 0: 64 MiB */
-    const ath_limits *limits; /* null: those of ath_default_limits */
-    const void *host_mesh;    /* as for ath_set_host_mesh; null: none */
+    size_t cache_bytes;       /* memory of prepared segments, beyond those shown; 0: 64 MiB */
+    const ath_limits *limits; /* null: see ath_default_limits */
+    const void *host_mesh;    /* see ath_set_host_mesh; null: none */
     size_t host_stride;
     int32_t host_vertex_count;
 } ath_player_options;
 
-/* Opens a file, of which `size` bytes are there: at least its prelude. options, fault: null, or as for ath_open.
- * Errors of the file; ATH_MISSING, ATH_NO_MEMORY, ATH_NEEDS_HOST_MESH, ATH_WRONG_HOST_MESH: *player is null. */
+/* Opens a file, of which `size` bytes are there: at least its prelude. options, fault: may be null. If it fails,
+ * *player is null, and the result is an error of the file, ATH_MISSING, ATH_NO_MEMORY, ATH_NEEDS_HOST_MESH or
+ * ATH_WRONG_HOST_MESH. */
 int ath_player_open(ath_player **player, const uint8_t *bytes, size_t size, const ath_player_options *options,
                     ath_fault_info *fault);
-/* Jobs are ended before. Null is passed over. */
+/* Closes a player, which may be null. End its jobs before. */
 void ath_player_close(ath_player *player);
-/* For ath_get_info, ath_clips, ath_level_for, ath_cut and all else that takes a const file. */
+/* Returns the file, for ath_get_info, ath_clips, ath_level_for, ath_cut and all functions that take a const file. */
 const ath_file *ath_player_file(const ath_player *player);
-/* What the last error was about. */
+/* Returns the fault behind the last error. */
 const ath_fault_info *ath_player_fault(const ath_player *player);
 
-/* A moment: segments that show it, all at one level. They stay until the next call that shows something. */
+/* The segments that show a moment, all at one level. They last until the next call that shows something. */
 typedef struct ath_player_moment {
-    double frame; /* for ath_positions, ath_matrices and the like */
+    double frame; /* pass it to ath_positions, ath_matrices and the like */
     int32_t level, segment_count;
     const ath_segment *segments[2];
 } ath_player_moment;
 
-/* What shows a clip at a time, in seconds since its first frame. level: -1 for the deepest; where bytes of one are not
- * there, the deepest that is. What is not prepared is prepared at once. ATH_OK; ATH_MISSING: not even level 0 is there;
- * ATH_BAD_CHECKSUM, ATH_BAD_CHUNK; ATH_BAD_ARGUMENT: no such clip; ATH_NO_MEMORY. */
+/* Gets the segments that show a clip at a time in seconds since its first frame, and prepares those that are not ready.
+ * level: -1 for the deepest. If bytes of the level are missing, the deepest level that is there is shown. Returns
+ * ATH_OK, ATH_MISSING: not even level 0 is there, ATH_BAD_CHECKSUM, ATH_BAD_CHUNK, ATH_BAD_ARGUMENT: there is no such
+ * clip, or ATH_NO_MEMORY. */
 int ath_player_show(ath_player *player, int32_t clip, double seconds, ath_wrap wrap, int32_t level,
                     ath_player_moment *moment);
-/* The same, and then ath_positions. */
+/* Calls ath_player_show and then ath_positions. */
 int ath_player_positions(ath_player *player, int32_t clip, double seconds, ath_wrap wrap, int32_t level,
                          ath_order order, float *xyz, size_t stride);
-/* The same, and then ath_matrices and ath_exact, of 12 and 3 floats without gaps. *shown, which may be null, is the level
- * whose ath_cut they are of. There is room for as many as ath_cut_size says of any level up to `level`. */
+/* Calls ath_player_show and then ath_matrices and ath_exact, of 12 and 3 floats without gaps. `matrices` and `exact`
+ * need room for the largest counts that ath_cut_size gives for levels up to `level`. *shown is the level whose ath_cut
+ * they belong to; `shown` may be null. */
 int ath_player_matrices(ath_player *player, int32_t clip, double seconds, ath_wrap wrap, int32_t level, float *matrices,
                         float *exact, int32_t *shown);
-/* ath_faded_positions of all levels of a fade. ATH_NOT_PREPARED: bytes of one of them are not there. */
+/* Calls ath_faded_positions for all levels of a fade. ATH_NOT_PREPARED: bytes of one of the levels are missing. */
 int ath_player_faded_positions(ath_player *player, int32_t clip, double seconds, ath_wrap wrap, const ath_fade *fade,
                                ath_order order, float *xyz, size_t stride);
 
-/* One of the clips of a blend, at its own time and level, with a weight as that of an ath_share. */
+/* One clip of a blend, at its own time and level, with a weight as in ath_share. */
 typedef struct ath_player_share {
     int32_t clip, level;
     ath_wrap wrap;
     double seconds, weight;
 } ath_player_share;
 
-/* ath_blended_positions of clips, up to ATH_BLEND_CLIPS of which have a weight. Only of these is anything prepared, now and
- * ahead. Scratch memory stays until the player is closed. Errors of ath_player_show and of ath_blended_positions. */
+/* Calls ath_blended_positions for clips, up to ATH_BLEND_CLIPS of which have a weight. Only these are prepared, now and
+ * ahead. Scratch memory lasts until the player is closed. Returns codes of ath_player_show and
+ * ath_blended_positions. */
 int ath_player_blended_positions(ath_player *player, const ath_player_share *shares, int32_t share_count,
                                  ath_order order, float *xyz, size_t stride);
-/* The same of the clips that ath_wind_weights chooses for a wind, all at one time. winds: of each clip of the file. */
+/* Blends the clips that ath_wind_weights chooses for a wind, all at one time. winds: one for each clip of the file. */
 int ath_player_wind_positions(ath_player *player, const ath_wind *winds, double strength, double heading,
                               double seconds, ath_wrap wrap, int32_t level, ath_order order, float *xyz, size_t stride);
 
-/* From frame `leave` on, numbered from the clip's first, a clip goes over into what begins at frame `enter`, over so many frames:
- * what the metadata's "transitions" name. */
+/* A transition from the frames of a clip that begin at `leave` to those that begin at `enter`, over `frames` frames, as
+ * the metadata's "transitions" name them. Frames are numbered from the clip's first. */
 typedef struct ath_player_transition {
     int32_t leave, enter, frames;
 } ath_player_transition;
 
-/* A clip that is played without an end: whenever it comes to transitions chance decides whether one is taken. The same seed
- * gives the same play, also that of Decoder.endless in Python. */
+/* The state of endless play. Whenever the clip comes to transitions, chance decides whether one is taken. Equal seeds
+ * give equal plays, also in Decoder.endless of the Python package. */
 typedef struct ath_player_endless {
-    const ath_player_transition *transitions; /* stay where they are */
+    const ath_player_transition *transitions; /* leave them in place while the play lasts */
     int32_t transition_count, clip;
     uint32_t seed, state;
-    int32_t run, next; /* the transition that led to where it is (-1: none has) and the one that comes */
-    double begins;     /* when that was; seconds */
+    int32_t run, next; /* the last transition that was taken (-1: none) and the next one */
+    double begins;     /* seconds from the start of the play to the last transition */
 } ath_player_endless;
 
-/* Begins at the clip's first frame. ATH_BAD_ARGUMENT: no such clip; no transitions, one beyond the clip, or one that is not over
- * before the last of them leaves. */
+/* Begins a play at the clip's first frame. Returns ATH_OK or ATH_BAD_ARGUMENT: there is no such clip, there are no
+ * transitions, one goes beyond the clip, or one is not over before the last of them leaves. */
 int ath_player_endless_begin(const ath_player *player, ath_player_endless *play, int32_t clip,
                              const ath_player_transition *transitions, int32_t transition_count, uint32_t seed);
-/* The positions of a time since the play began, of 0 or more: in a transition a blend along the branches. Time that goes back
- * behind the last transition takes as long as playing again from the beginning. Errors of ath_player_blended_positions;
- * ATH_BAD_ARGUMENT: below 0, or above 1e7. */
+/* Writes the positions at a time of 0 to 1e7 seconds since the play began, during transitions a blend along the
+ * branches. If time goes back beyond the last transition, the play is replayed from its beginning. Returns the codes of
+ * ath_player_blended_positions; ATH_BAD_ARGUMENT also for other times. */
 int ath_player_endless_positions(ath_player *player, ath_player_endless *play, double seconds, int32_t level,
                                  ath_order order, float *xyz, size_t stride);
 
-/* Goes on with preparing what comes after what was shown last, in the direction and with the wrap that it was shown in,
- * for `steps` steps (ath_prepare_step). ATH_MORE; ATH_OK: nothing is left to do until time goes on; errors as above. */
+/* Prepares what comes after what was shown last, in the direction and with the wrap of that, for `steps` steps (see
+ * ath_prepare_step). Returns ATH_MORE; ATH_OK: nothing is left to do until time goes on; or an error. */
 int ath_player_ahead(ath_player *player, int32_t steps);
 
-/* The same as a job: null where nothing is left to do, or there is no memory. */
+/* Returns that preparation as a job; null: nothing is left to do, or there is no memory. */
 ath_player_job *ath_player_begin(ath_player *player);
-/* Goes on for `steps` steps: ATH_MORE until it is done. On any thread. */
+/* Runs `steps` steps of a job on any thread. Returns ATH_MORE until it is done. */
 int ath_player_run(ath_player_job *job, int32_t steps);
-/* Takes over what a job has prepared; what is not done is dropped. The job is gone. */
+/* Takes over the segment of a job, if that is done, and frees the job. */
 void ath_player_end(ath_player *player, ath_player_job *job);
 
-/* Triangles of the faces, those of more corners as fans: three vertices each, in file or in source order. *count is
- * their number; triangles: null, or room for that many. ATH_BAD_ARGUMENT: the file has no faces; the errors of
- * ath_read_polygons. */
+/* Writes the triangles of the faces, three vertices each, numbered in file or source order. Faces of more corners
+ * become fans. *count is the number of triangles; `triangles` may be null. Returns the codes of ath_read_polygons;
+ * ATH_BAD_ARGUMENT: the file has no faces. */
 int ath_player_triangles(ath_player *player, ath_order order, uint32_t *triangles, size_t *count);
-/* The same of edges, two vertices each: those of the source, or along its stems. */
+/* Writes the edges, two vertices each: those of the source, or else those along its stems. */
 int ath_player_lines(ath_player *player, ath_order order, uint32_t *lines, size_t *count);
 
-/* Normals of vertices: of the triangles around each, weighted by their areas; zeros where there are none. xyz: positions of
- * three floats, `stride` bytes apart; normals: three floats each without gaps. */
+/* Computes the normals of vertices: those of the triangles around each, weighted by area; zeros for vertices without
+ * triangles. xyz: positions of three floats, `stride` bytes apart; normals: three floats each, without gaps. */
 void ath_player_normals(const uint32_t *triangles, size_t count, const float *xyz, size_t stride, int32_t vertex_count,
                         float *normals);
-/* Tangents, along which u grows, at right angles to the normals: four floats each, the last of them 1 or -1, so that the
- * bitangent is it times the cross product of normal and tangent, as glTF has it. uv: two floats for each vertex, `uv_stride`
- * bytes apart. Zeros where there are none. */
+/* Computes the tangents, along which u grows, at right angles to the normals. Each has four floats as in glTF: the
+ * fourth, 1 or -1, times the cross product of normal and tangent is the bitangent. Vertices without triangles get
+ * zeros. uv: two floats per vertex, `uv_stride` bytes apart. */
 void ath_player_tangents(const uint32_t *triangles, size_t count, const float *xyz, size_t stride, const float *uv,
                          size_t uv_stride, const float *normals, int32_t vertex_count, float *tangents);
 
@@ -167,11 +173,11 @@ extern "C" {
 
 enum { ATH_PLAYER_ALL_STEPS = 0x7fffffff };
 
-/* A prepared segment, or one that a job prepares. Its memory stands behind it. */
+/* A segment that is prepared, or that a job prepares. Its memory stands behind the entry. */
 typedef struct ath_player_entry {
     struct ath_player_entry *next;
     size_t size;
-    uint64_t used; /* when it was shown last, in calls */
+    uint64_t used; /* the call that showed it last */
     int32_t segment, level;
 } ath_player_entry;
 
@@ -182,12 +188,12 @@ struct ath_player_job {
     int result;
 };
 
-/* Memory that is freed when the player is closed. */
+/* Memory that lasts as long as the player. */
 typedef struct ath_player_block {
     struct ath_player_block *next;
 } ath_player_block;
 
-/* A clip that is shown, from which follows what is prepared ahead. */
+/* A clip that is shown; what is prepared ahead follows from it. */
 typedef struct ath_player_track {
     int32_t clip, segment, level, direction;
     double frame;
@@ -201,20 +207,20 @@ struct ath_player {
     ath_fault_info fault;
     ath_player_block *blocks;
     ath_player_entry *entries;
-    ath_player_job *jobs, *idle; /* that run; whose work memory waits for the next one */
-    ath_player_job *own;         /* of ath_player_ahead: one of `jobs` */
+    ath_player_job *jobs, *idle; /* running jobs; jobs whose work memory waits for the next segment */
+    ath_player_job *own;         /* the job of ath_player_ahead, one of `jobs` */
     size_t cached;
     uint64_t calls;
-    int32_t deepest; /* level that is built */
+    int32_t deepest; /* deepest level that is built */
     int32_t track_count;
     ath_player_track tracks[ATH_BLEND_CLIPS];
-    void *blending;  /* scratch memory of blends; null: none was shown */
-    double *weights; /* of winds, of each clip */
+    void *blending;  /* scratch memory of blends; null: no blend was shown */
+    double *weights; /* by the wind, one per clip */
 };
 
-enum { ATH_PLAYER_HEAD = 64 }; /* bytes in front of aligned memory: the structs above fit */
+enum { ATH_PLAYER_HEAD = 64 }; /* bytes in front of aligned memory, which hold any of the structs above */
 
-/* malloc's memory, aligned to 16 where it is not; the pointer that it gave stands in front. */
+/* Aligns memory of malloc to 16 and puts malloc's pointer in front of it. */
 static void *ath_player_aligned(size_t size)
 {
     const size_t extra = 16 + sizeof(void *);
@@ -243,7 +249,6 @@ static void ath_player_give(const ath_player_options *options, void *memory)
     free(given);
 }
 
-/* Memory that lasts as long as the player. */
 static void *ath_player_block_of(ath_player *p, size_t size)
 {
     char *memory = (char *)ath_player_take(&p->options, ATH_PLAYER_HEAD + size);
@@ -258,7 +263,7 @@ static void *ath_player_memory_of(ath_player_entry *entry) { return (char *)entr
 
 /* ---- opening ---- */
 
-/* What the levels share, as far as bytes are there. */
+/* Builds what the segments share at each level, as far as its bytes are there. */
 static int ath_player_refine(ath_player *p)
 {
     for (int32_t level = 1; level < p->info.level_count; level++) {
@@ -348,7 +353,6 @@ void ath_player_close(ath_player *player)
 }
 
 const ath_file *ath_player_file(const ath_player *player) { return player->file; }
-
 const ath_fault_info *ath_player_fault(const ath_player *player) { return &player->fault; }
 
 /* ---- prepared segments ---- */
@@ -360,7 +364,7 @@ static ath_player_entry *ath_player_find(const ath_player *p, int32_t segment, i
     return entry;
 }
 
-/* Frees what was shown longest ago until there is room for so many bytes more; not what this call has used. */
+/* Frees the segments that were shown longest ago until `size` bytes fit, but none that this call has used. */
 static void ath_player_make_room(ath_player *p, size_t size)
 {
     while (p->cached + size > p->options.cache_bytes) {
@@ -383,7 +387,7 @@ static void ath_player_insert(ath_player *p, ath_player_entry *entry)
     p->cached += entry->size;
 }
 
-/* A job whose work memory is there, and is used again. */
+/* Returns a job with work memory, which is reused. */
 static ath_player_job *ath_player_idle_job(ath_player *p)
 {
     ath_player_job *job = p->idle;
@@ -409,7 +413,7 @@ static void ath_player_retire(ath_player *p, ath_player_job *job)
     p->idle = job;
 }
 
-/* Begins to prepare a segment; where the one that it is joined to is there, from that. */
+/* Begins to prepare a segment, from the end of the one that it is joined to if that is cached. */
 static int ath_player_start(ath_player *p, int32_t segment, int32_t level, ath_player_job **started)
 {
     size_t size = ath_segment_size(p->file, level), work_size = ath_work_size(p->file);
@@ -459,7 +463,7 @@ void ath_player_end(ath_player *player, ath_player_job *job)
     ath_player_retire(player, job);
 }
 
-/* A segment at a level, prepared at once where it is not there. */
+/* Gets a segment at a level, and prepares it if it is not cached. */
 static int ath_player_segment(ath_player *p, int32_t segment, int32_t level, const ath_segment **found)
 {
     ath_player_job *job = p->own;
@@ -483,7 +487,7 @@ static int ath_player_segment(ath_player *p, int32_t segment, int32_t level, con
 
 /* ---- showing ---- */
 
-/* The deepest level up to `level` (-1: any) that a segment has. */
+/* Returns the deepest level up to `level` (-1: any) whose bytes a segment has. */
 static int32_t ath_player_level_of(const ath_player *p, int32_t segment, int32_t level)
 {
     int32_t ready = ath_ready_level(p->file, segment);
@@ -491,7 +495,6 @@ static int32_t ath_player_level_of(const ath_player *p, int32_t segment, int32_t
     return level < 0 || level > ready ? ready : level;
 }
 
-/* The segments of a place on the frames at a level. */
 static int ath_player_moment_at(ath_player *p, double frame, int32_t level, ath_player_moment *moment)
 {
     ath_blend blend = ath_blend_at(p->file, frame);
@@ -509,7 +512,7 @@ static int ath_player_moment_at(ath_player *p, double frame, int32_t level, ath_
     return ATH_OK;
 }
 
-/* Where a clip is at a time. before: where it was when it was shown last; null: it was not. */
+/* before: null, or where the clip was when it was shown last. */
 static ath_player_track ath_player_track_of(const ath_player *p, const ath_player_track *before,
                                             const ath_player_share *share)
 {
@@ -528,7 +531,7 @@ static ath_player_track ath_player_track_of(const ath_player *p, const ath_playe
     return now;
 }
 
-/* Shows clips from now on; what is to be prepared ahead follows from them. */
+/* Shows these clips from now on. */
 static int ath_player_move(ath_player *p, const ath_player_share *shares, int32_t count)
 {
     ath_player_track tracks[ATH_BLEND_CLIPS];
@@ -545,15 +548,9 @@ static int ath_player_move(ath_player *p, const ath_player_share *shares, int32_
     return ATH_OK;
 }
 
-/* The same of one clip. */
 static int ath_player_move_one(ath_player *p, int32_t clip, double seconds, ath_wrap wrap, int32_t level, double *frame)
 {
-    ath_player_share share;
-    share.clip = clip;
-    share.level = level;
-    share.wrap = wrap;
-    share.seconds = seconds;
-    share.weight = 1.0;
+    ath_player_share share = {clip, level, wrap, seconds, 1.0};
     int result = ath_player_move(p, &share, 1);
     *frame = result == ATH_OK ? p->tracks[0].frame : 0.0;
     return result;
@@ -608,7 +605,7 @@ int ath_player_faded_positions(ath_player *player, int32_t clip, double seconds,
 
 /* ---- several clips ---- */
 
-/* The shares that have a weight, in front; -1: more than ATH_BLEND_CLIPS. */
+/* Copies the shares that have a weight and returns their number; -1: more than ATH_BLEND_CLIPS. */
 static int32_t ath_player_used(const ath_player_share *shares, int32_t count, ath_player_share *used)
 {
     int32_t found = 0;
@@ -635,10 +632,8 @@ int ath_player_blended_positions(ath_player *player, const ath_player_share *sha
     for (int32_t i = 0; i < count; i++) {
         result = ath_player_moment_at(player, player->tracks[i].frame, used[i].level, moments + i);
         if (result != ATH_OK) return result;
-        blended[i].segments = moments[i].segments;
-        blended[i].segment_count = moments[i].segment_count;
-        blended[i].frame = moments[i].frame;
-        blended[i].weight = used[i].weight;
+        ath_share share = {moments[i].segments, moments[i].segment_count, moments[i].frame, used[i].weight};
+        blended[i] = share;
     }
     return ath_blended_positions(player->file, blended, count, order, xyz, stride, player->blending,
                                  player->blending ? size : 0);
@@ -654,22 +649,19 @@ int ath_player_wind_positions(ath_player *player, const ath_wind *winds, double 
     ath_wind_weights(winds, player->info.clip_count, strength, heading, player->weights);
     for (int32_t i = 0; i < player->info.clip_count && count < ATH_BLEND_CLIPS; i++) {
         if (!(player->weights[i] > 0.0)) continue;
-        shares[count].clip = i;
-        shares[count].level = level;
-        shares[count].wrap = wrap;
-        shares[count].seconds = seconds;
-        shares[count++].weight = player->weights[i];
+        ath_player_share share = {i, level, wrap, seconds, player->weights[i]};
+        shares[count++] = share;
     }
     return ath_player_blended_positions(player, shares, count, order, xyz, stride);
 }
 
 /* ---- without an end ---- */
 
-static const double ATH_PLAYER_LONGEST = 1e7; /* seconds of a play: 115 days */
+static const double ATH_PLAYER_LONGEST = 1e7; /* seconds, or 115 days */
 
 enum { ATH_PLAYER_NONE = -1 };
 
-/* Seconds from a clip's first frame to another. */
+/* Returns the seconds from a clip's first frame to another. */
 static double ath_player_since(const ath_player *p, int32_t clip, int32_t frame)
 {
     const double *times = ath_times(p->file) + ath_clips(p->file)[clip].first_frame;
@@ -683,7 +675,7 @@ static double ath_player_lasts(const ath_player *p, int32_t clip, const ath_play
     return now < old ? now : old;
 }
 
-/* 0 to 1, of a 32-bit xorshift (Marsaglia 2003). */
+/* Returns a random number below 1 from a 32-bit xorshift (Marsaglia 2003). */
 static double ath_player_chance(ath_player_endless *play)
 {
     play->state ^= play->state << 13;
@@ -692,7 +684,7 @@ static double ath_player_chance(ath_player_endless *play)
     return (double)play->state / 4294967296.0;
 }
 
-/* The first frame from `from` on that a transition leaves at; the last such of all where there is none. */
+/* Returns the first frame from `from` on that a transition leaves at; `last` if there is none. */
 static int32_t ath_player_leave(const ath_player_endless *play, int32_t from, int32_t last)
 {
     int32_t found = last;
@@ -711,13 +703,13 @@ static int32_t ath_player_last_leave(const ath_player_transition *ways, int32_t 
     return last;
 }
 
-/* Whether one is in front of another among those that leave at one frame. */
+/* Orders the transitions that leave at one frame. */
 static int ath_player_in_front(const ath_player_transition *a, const ath_player_transition *b)
 {
     return a->enter != b->enter ? a->enter < b->enter : a->frames < b->frames;
 }
 
-/* Of those that leave at a frame the one with so many in front of it. */
+/* Returns the transition that leaves at a frame and has `place` others in front of it. */
 static int32_t ath_player_way(const ath_player_endless *play, int32_t leave, int32_t place)
 {
     const ath_player_transition *ways = play->transitions;
@@ -733,7 +725,7 @@ static int32_t ath_player_way(const ath_player_endless *play, int32_t leave, int
     return 0;
 }
 
-/* The transition that is taken from a frame on. */
+/* Returns the next transition that is taken from a frame on. */
 static int32_t ath_player_draw(ath_player_endless *play, int32_t from)
 {
     int32_t last = ath_player_last_leave(play->transitions, play->transition_count), same = 0;
@@ -771,13 +763,13 @@ int ath_player_endless_begin(const ath_player *player, ath_player_endless *play,
     return ATH_OK;
 }
 
-/* Where in the clip a run of a play begins. */
+/* Returns where in the clip the last transition has entered, in seconds. */
 static double ath_player_enters(const ath_player *p, const ath_player_endless *play)
 {
     return play->run < 0 ? 0.0 : ath_player_since(p, play->clip, play->transitions[play->run].enter);
 }
 
-/* Takes the transitions up to a time. */
+/* Takes all transitions up to a time. */
 static void ath_player_go(const ath_player *p, ath_player_endless *play, double seconds)
 {
     if (seconds < play->begins) ath_player_restart(play);
@@ -794,30 +786,24 @@ static void ath_player_go(const ath_player *p, ath_player_endless *play, double 
 int ath_player_endless_positions(ath_player *player, ath_player_endless *play, double seconds, int32_t level,
                                  ath_order order, float *xyz, size_t stride)
 {
-    ath_player_share shares[2];
     if (!(seconds >= 0.0 && seconds <= ATH_PLAYER_LONGEST)) return ATH_BAD_ARGUMENT;
     ath_player_go(player, play, seconds);
-    double passed = seconds - play->begins, weight = 1.0;
-    for (int32_t i = 0; i < 2; i++) {
-        shares[i].clip = play->clip;
-        shares[i].level = level;
-        shares[i].wrap = ATH_AS_MARKED;
-    }
-    shares[0].seconds = shares[1].seconds = ath_player_enters(player, play) + passed;
+    double passed = seconds - play->begins, weight = 1.0, entered = ath_player_enters(player, play) + passed;
+    double left = entered;
     if (play->run >= 0) {
         const ath_player_transition *way = play->transitions + play->run;
         double lasts = ath_player_lasts(player, play->clip, way), share = passed / lasts;
-        shares[0].seconds = ath_player_since(player, play->clip, way->leave) + passed;
+        left = ath_player_since(player, play->clip, way->leave) + passed;
         if (passed < lasts) weight = share * share * (3.0 - 2.0 * share);
     }
-    shares[0].weight = 1.0 - weight;
-    shares[1].weight = weight;
+    ath_player_share shares[2] = {{play->clip, level, ATH_AS_MARKED, left, 1.0 - weight},
+                                  {play->clip, level, ATH_AS_MARKED, entered, weight}};
     return ath_player_blended_positions(player, shares, 2, order, xyz, stride);
 }
 
 /* ---- ahead ---- */
 
-/* The segment that is shown after this one; -1: none is. */
+/* Returns the segment that comes after the one shown; -1: none. */
 static int32_t ath_player_next(const ath_player *p, const ath_player_track *now)
 {
     const ath_clip *clip = ath_clips(p->file) + now->clip;
@@ -828,7 +814,7 @@ static int32_t ath_player_next(const ath_player *p, const ath_player_track *now)
     return -1;
 }
 
-/* Whether a segment waits to be prepared. *level: that to show it at; then the one to prepare it at. */
+/* Returns whether a segment waits to be prepared. *level is the level to show, then the level to prepare. */
 static int ath_player_wants(const ath_player *p, int32_t segment, int32_t *level)
 {
     if (segment < 0) return 0;
@@ -860,7 +846,7 @@ int ath_player_ahead(ath_player *player, int32_t steps)
 
 /* ---- topology ---- */
 
-/* Of each source vertex the file's; null: no memory. */
+/* Returns the file's vertex for each vertex of the source; null: there is no memory. */
 static uint32_t *ath_player_file_vertices(const ath_player *p)
 {
     size_t size = (size_t)p->info.vertex_count * sizeof(uint32_t);
@@ -879,7 +865,7 @@ static int ath_player_reorder(const ath_player *p, ath_order order, uint32_t *ve
     return ATH_OK;
 }
 
-/* Polygons of a kind, as fans of primitives of `size` corners. */
+/* Splits polygons into fans of primitives with `size` corners. */
 static size_t ath_player_split(const ath_polygons *shape, const uint32_t *counts, const int32_t *corners, uint32_t size,
                                uint32_t *primitives)
 {
@@ -924,7 +910,7 @@ int ath_player_triangles(ath_player *player, ath_order order, uint32_t *triangle
     return ath_player_primitives(player, ATH_FACES, 3, order, triangles, count);
 }
 
-/* Along stems, and from each stem to the vertex that it hangs on. */
+/* Connects the vertices of each stem, and the first of them to the attach vertex. */
 static size_t ath_player_stem_lines(const ath_player *p, ath_order order, uint32_t *lines)
 {
     const ath_branch *branches = ath_branches(p->file);
@@ -972,7 +958,7 @@ static void ath_player_cross(const float *a, const float *b, float *out)
 
 static float ath_player_dot(const float *a, const float *b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
-/* Nothing where it has no length. */
+/* Leaves a vector of length 0 as it is. */
 static void ath_player_normalise(float *vector)
 {
     float length = sqrtf(ath_player_dot(vector, vector)), scale = length > 0.0f ? 1.0f / length : 0.0f;
@@ -995,7 +981,8 @@ void ath_player_normals(const uint32_t *triangles, size_t count, const float *xy
     for (int32_t i = 0; i < vertex_count; i++) ath_player_normalise(normals + 3 * (size_t)i);
 }
 
-/* Adds to the corners' tangents how the surface goes on with u; the fourth number is the area in u and v, with its sign. */
+/* Adds the surface's derivative by u to the tangents of the corners, and the signed area in uv to their fourth
+ * number. */
 static void ath_player_add_tangent(const uint32_t *corner, const float *xyz, size_t stride, const float *uv,
                                    size_t uv_stride, float *tangents)
 {

@@ -1,18 +1,18 @@
 /* The orthonormal bases of the motion model: cantilever modes along a piece, affine functions of a sheet, waves in
  * time. FORMAT.md, "Bases", states the same operations in the same order; nothing here may be reordered. */
-#include "model/plan.h"
+#include "model/basis.h"
 
 #define PI 3.14159265358979323846
 #define HALF_ROOT_3 0.86602540378443864676
 
-/* Of a function's squared length, what those before it must leave of it to go on with. */
+/* Share of a function's squared length that must remain after projection for it to join a basis. */
 #define LEFT 1e-10
 
 enum { MOST_PROBES = 64, MOST_ROWS = ATH_SEGMENT_FRAMES, MODE_STEPS = 32 };
 
-/* Householder reduction of the symmetric n x n matrix `a` to tridiagonal form; on return row i of `q` is the i-th
- * basis vector in which the matrix is tridiagonal (diagonal d, subdiagonal e[1..n-1]). Rounding makes the matrix
- * unsymmetric: `a` has its columns one behind the other, so that sums of a row each run side by side. */
+/* Householder reduction of the symmetric n x n matrix `a` to tridiagonal form; on return row i of `q` is the i-th basis
+ * vector in which the matrix is tridiagonal (diagonal d, subdiagonal e[1..n-1]). Rounding makes the matrix unsymmetric.
+ * `a` is column-major, so that the sums of the rows run side by side. */
 ATH_HOT static void tridiagonalise(int32_t n, double *ATH_RESTRICT a, double *ATH_RESTRICT q, double *d, double *e)
 {
     double v[MOST_ROWS], p[MOST_ROWS], sums[MOST_ROWS];
@@ -54,7 +54,6 @@ ATH_HOT static void tridiagonalise(int32_t n, double *ATH_RESTRICT a, double *AT
     }
 }
 
-/* Turns two rows into each other. */
 ATH_INLINE void rotate_rows(int32_t n, double c, double s, double *ATH_RESTRICT low, double *ATH_RESTRICT high)
 {
     for (int32_t k = 0; k < n; k++) {
@@ -110,7 +109,7 @@ ATH_HOT static void diagonalise(int32_t n, double *d, double *e, double *q)
     }
 }
 
-/* Eigenvalues in descending order, and a row for the vector of each, its last number not negative. Destroys `a`. */
+/* Fills the eigenvalues in descending order, and a row per eigenvector, with a last number >= 0. Destroys `a`. */
 static void eigenvectors(int32_t n, double *a, double *q, double *values, double *vectors)
 {
     double d[MOST_ROWS], e[MOST_ROWS];
@@ -127,9 +126,9 @@ static void eigenvectors(int32_t n, double *a, double *q, double *values, double
     }
 }
 
-/* Eigenvectors, largest eigenvalue first, of the covariance of a randomly bent cantilever at the arc lengths that
- * `gaps` (small positive integers) add up to: an integrated Wiener process, free rotation by `turn`, roughness. They are
- * orthonormal where the last vertex counts `tip` times. */
+/* Fills the modes of a randomly bent cantilever: eigenvectors, largest eigenvalue first, of its covariance at the arc
+ * lengths that `gaps` (small positive integers) add up to. The covariance is that of an integrated Wiener process, of
+ * free rotation by `turn`, and of roughness. Modes are orthonormal if the last vertex has the weight `tip`. */
 static void cantilever(int32_t n, const uint8_t *gaps, double turn, double rough, double tip, double *basis,
                        double *work)
 {
@@ -165,8 +164,8 @@ void ath_rest_basis(int32_t n, double *basis, double *work)
     cantilever(n, even, 100.0, 0.0, 1.0, basis, work);
 }
 
-/* Adds `candidate` to the `count` orthonormal rows of `basis`, its projections on them subtracted, twice for
- * accuracy. Returns the new count: unchanged where less than `keep` of its squared length remains. */
+/* Adds `candidate` to the `count` orthonormal rows of `basis`, its projections on them subtracted, twice for accuracy.
+ * Returns the new count: unchanged where less than `keep` of its squared length remains. */
 static int32_t append_orthonormal(int32_t n, double *basis, int32_t count, double *candidate, double keep)
 {
     double before = 0.0, after = 0.0;
@@ -190,8 +189,8 @@ static double distance(const double *a, const double *b)
     return ath_sqrt(x * x + y * y + z * z);
 }
 
-/* Lengths in quarters of their mean, rounded, 1 to 64: coarse enough that evenly meshed stems share one basis, and never 0,
- * so that coincident vertices do no harm. */
+/* Rounds lengths to quarters of their mean, 1 to 64: coarse enough that evenly meshed stems share one basis, and never
+ * 0, so that coincident vertices do no harm. */
 static void quarters_of_mean(int32_t count, const double *lengths, uint8_t *gaps)
 {
     double total = 0.0;
@@ -204,7 +203,7 @@ static void quarters_of_mean(int32_t count, const double *lengths, uint8_t *gaps
 
 enum { MOST_RINGS = ATH_PIECE_VERTICES / 2 };
 
-/* Of a piece's rings: their centres, and the modes of a cantilever along these, rings x rings. */
+/* Fills the centres of a piece's rings, and the modes of a cantilever along the centres, rings x rings. */
 static void modes_of_rings(const ath_piece *piece, const double *rest, double centres[][3], double *modes)
 {
     int32_t rings = ath_rings(piece);
@@ -225,8 +224,8 @@ static void modes_of_rings(const ath_piece *piece, const double *rest, double ce
     cantilever(rings, gaps, 0.1, 0.001, 1.0, modes, work);
 }
 
-/* Rings that move as they are along a cantilever first, then as affine functions of all, then each ring so, then what is left of
- * the modes of an evenly spaced cantilever. Returns the rank. */
+/* Fills the basis of a tube: rings that move without deforming along a cantilever, then affine functions across all
+ * rings, then those across single rings, then the modes of an evenly spaced cantilever. Returns the rank. */
 static int32_t tube(const ath_piece *piece, const double *rest, const double *modes, double *basis)
 {
     int32_t n = piece->count, rank = 0, rings = ath_rings(piece);
@@ -255,8 +254,8 @@ static int32_t tube(const ath_piece *piece, const double *rest, const double *mo
     return rank;
 }
 
-/* The functions x0 - a over the piece's vertices first (flat and straight pieces have fewer than three), then what is
- * left of the modes of an evenly spaced cantilever. Returns the rank. */
+/* Fills the basis of a sheet: the functions x0 - a over its vertices (flat and straight pieces have fewer than three),
+ * then what is left of the modes of an evenly spaced cantilever. Returns the rank. */
 static int32_t sheet(const ath_piece *piece, const double *rest, const double *modes, double *basis)
 {
     int32_t n = piece->count, rank = 0;
@@ -283,7 +282,7 @@ static int32_t sheet(const ath_piece *piece, const double *rest, const double *m
     return rank;
 }
 
-/* Distances along the piece; a sheet is taken for evenly spaced. */
+/* Fills the gaps along a piece. Sheets count as evenly spaced. */
 static void piece_gaps(const ath_piece *piece, const double *rest, uint8_t *gaps)
 {
     double length[ATH_PIECE_VERTICES];
@@ -322,8 +321,9 @@ double ath_tip_weight(const ath_piece *piece, const double *rest)
     return !(piece->flags & ATH_SHEET) && piece->count > 1 && 2.0 * way <= 3.0 * distance(before, base) ? 2.0 : 1.0;
 }
 
-/* Pieces with equal gaps and weights share one basis. `table` is an open-addressing hash of pieces that own theirs. A file may be
- * made so that all of them collide: after MOST_PROBES a piece gets a basis to itself, which holds the same numbers. */
+/* Returns the piece whose basis piece p shares, since gaps and weights are equal. `table` is an open-addressing hash of
+ * the pieces that own their basis. A hostile file may make all of them collide: after MOST_PROBES probes a piece gets
+ * its own basis with the same numbers. */
 static int32_t owner_of_basis(const ath_piece *pieces, int32_t p, const double *rest, const uint8_t *gaps,
                               int32_t *table, uint32_t mask)
 {
@@ -370,7 +370,7 @@ int64_t ath_basis_layout(ath_piece *pieces, int32_t piece_count, const double *r
     return next;
 }
 
-/* Modes of a piece by those that it has in another plan, where they are the same. */
+/* Copies a piece's modes from another plan and returns 1 if they are the same there. */
 static int take_modes(const ath_plan *before, int32_t p, const ath_piece *piece, const double *rest,
                       const uint8_t *gaps, double *modes)
 {
@@ -387,7 +387,7 @@ static int take_modes(const ath_plan *before, int32_t p, const ath_piece *piece,
 static void fill_modes(const ath_piece *pieces, int32_t first, int32_t stop, const double *rest, const uint8_t *gaps,
                        const ath_plan *before, double *work, double *bases)
 {
-    int64_t laid_out = 0; /* up to here by the pieces before: modes that stand further back are the piece's own */
+    int64_t laid_out = 0; /* end of what earlier pieces fill: modes beyond it are the piece's own */
     for (int32_t p = 0; p < stop; p++) {
         const ath_piece *piece = pieces + p;
         int64_t last = piece->flags & ATH_SHEET ? piece->basis : piece->modes;
@@ -423,7 +423,7 @@ void ath_basis_fill(ath_piece *pieces, int32_t piece_count, const double *rest, 
     ath_basis_sheets(pieces, 0, piece_count, rest, bases);
 }
 
-/* cos(x) and sin(x) for 0 <= x <= pi/4 by their series. */
+/* Series of cos(x) and sin(x) for 0 <= x <= pi/4. */
 static double cos_series(double x)
 {
     double x2 = x * x, sum = 1.0;
@@ -438,7 +438,7 @@ static double sin_series(double x)
     return x * sum;
 }
 
-/* cos(pi j / (2 T)), by symmetry from the first eighth of the circle. */
+/* Returns cos(pi j / (2 T)), by symmetry from the first eighth of the circle. */
 static double cos_of_fraction(int64_t j, int64_t T)
 {
     j = j % (4 * T);
@@ -453,7 +453,7 @@ static double cos_of_fraction(int64_t j, int64_t T)
     return sign * value;
 }
 
-/* Real Fourier series: a sine is a cosine a quarter of a turn later. */
+/* Fills a real Fourier series. A sine is a cosine a quarter of a turn later. */
 static void periodic_waves(int32_t frames, double *waves)
 {
     double once = ath_sqrt(1.0 / (double)frames), twice = ath_sqrt(2.0 / (double)frames);
@@ -465,12 +465,11 @@ static void periodic_waves(int32_t frames, double *waves)
     }
 }
 
-/* For 0 <= x <= pi / 2. */
+/* 0 <= x <= pi / 2 */
 static double cos_of(double x) { return x <= 0.25 * PI ? cos_series(x) : sin_series(0.5 * PI - x); }
-
 static double sin_of(double x) { return x <= 0.25 * PI ? sin_series(x) : cos_series(0.5 * PI - x); }
 
-/* For x >= 0, by the series at a quarter of the angle. */
+/* x >= 0. The series runs at a quarter of the angle. */
 static double atan_of(double x)
 {
     if (x > 1.0) return 0.5 * PI - atan_of(1.0 / x);
@@ -499,24 +498,24 @@ static complex_number power(complex_number x, int32_t n)
     return product;
 }
 
-/* What tells the modes of second differences from those of third ones. */
+/* Constants of the modes of second or third differences. A mode is a cosine plus terms that decay from the ends. */
 typedef struct {
-    complex_number root; /* of the wave number, over that of the cosine: what falls from the ends */
-    complex_number edge; /* what falls, at the end: over the sine of the phase */
+    complex_number root; /* wave number of the decaying term over that of the cosine */
+    complex_number edge; /* decaying term at the end over the sine of the phase */
     complex_number turn; /* edge / root^2 */
 } mode_order;
 
 static const mode_order SECOND = {{1.0, 0.0}, {1.0, 0.0}, {1.0, 0.0}},
                         THIRD = {{HALF_ROOT_3, -0.5}, {2.0 * HALF_ROOT_3, 1.0}, {0.0, 2.0}};
 
-/* A mode, cos((2 t + 1) h + phase) and what falls from either end, by `decay` in half a frame. */
+/* A mode: cos((2 t + 1) h + phase), and a term from either end that changes by the factor `decay` per half frame. */
 typedef struct {
-    double sine, cosine, slope; /* of h; tan(phase) */
+    double sine, cosine, slope; /* sin(h), cos(h), tan(phase) */
     complex_number decay;
-    complex_number apart; /* 1 / (1 - what is left of it at the other end) */
+    complex_number apart; /* 1 / (1 - the decayed term at the other end) */
 } mode;
 
-/* Mode k, its h taken as right; even modes are even about the middle, odd ones odd. */
+/* Returns mode k for a given h. Even modes are symmetric about the middle, odd ones antisymmetric. */
 static mode mode_at(int32_t frames, int32_t k, double h, const mode_order *order)
 {
     mode own = {sin_of(h), cos_of(h), 0.0, {0.0, 0.0}, {0.0, 0.0}};
@@ -537,7 +536,7 @@ static mode mode_at(int32_t frames, int32_t k, double h, const mode_order *order
     return own;
 }
 
-/* h solves 2 frames h = pi k - 2 phase(h): most steps take ten bits off the error, those of few frames two. */
+/* Solves 2 frames h = pi k - 2 phase(h). A step takes about ten bits off the error, with few frames two. */
 static mode find_mode(int32_t frames, int32_t k, const mode_order *order)
 {
     double h = PI * ((double)k - 0.5) / (double)(2 * frames);
@@ -582,7 +581,7 @@ static void mode_wave(int32_t frames, int32_t k, const mode_order *order, double
     unit_length(frames, wave);
 }
 
-/* Wave k of the polynomials that do not bend: 1, t and what t^2 has beyond them, about the middle. */
+/* Fills polynomial k about the middle, orthogonal to those before: 1, t, t^2. */
 static void polynomial_wave(int32_t frames, int32_t k, double *wave)
 {
     double mean = (double)(frames * frames - 1) / 12.0;

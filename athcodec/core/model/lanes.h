@@ -1,9 +1,9 @@
-/* Four doubles at a time. Every lane does what a scalar would, each operation rounded once, so that it makes no
- * difference how many lanes the machine has. */
-#ifndef ATH_LANES_H
-#define ATH_LANES_H
+/* Four doubles at a time. Every lane rounds each operation once, as a scalar does, so that the number of lanes of the
+ * machine makes no difference. */
+#ifndef ATH_MODEL_LANES_H
+#define ATH_MODEL_LANES_H
 
-#include "bits/internal.h"
+#include "bits/platform.h"
 
 enum { ATH_LANES = 4 };
 
@@ -81,7 +81,7 @@ ATH_INLINE void lanes_store(double *to, const ath_lanes *from)
 #endif
 #endif
 
-/* A square of ATH_LANES rows and frames, `origin` of each row added, from rows over time to frames of floats. */
+/* Transposes a square of ATH_LANES rows over time into frames of floats, and adds the `origin` of each row. */
 #if defined(ATH_TRANSPOSES)
 
 typedef float ath_float_lanes __attribute__((vector_size(ATH_LANES * 4), aligned(4), may_alias));

@@ -23,8 +23,6 @@ void ath_carve_mesh(ath_mesh *mesh, ath_arena *arena, uint64_t vertex_count, uin
     mesh->work = (int32_t *)ath_take(arena, work_bytes);
 }
 
-/* ---- connectivity ---- */
-
 static void place_face(ath_mesh *mesh, uint32_t first, uint32_t count)
 {
     uint8_t *place = mesh->place + first;
@@ -44,13 +42,13 @@ static void list_corners(ath_mesh *mesh)
     for (int32_t k = 0; k < mesh->corner_count; k++) mesh->first[mesh->corners[k] + 1]++;
     for (int32_t v = 0; v < n; v++) mesh->first[v + 1] += mesh->first[v];
     for (int32_t k = mesh->corner_count - 1; k >= 0; k--) {
-        int32_t *left = mesh->order + mesh->corners[k]; /* not in use yet: how many are placed */
+        int32_t *left = mesh->order + mesh->corners[k]; /* not in use yet: serves to count placed corners */
         if (k == mesh->corner_count - 1) memset(mesh->order, 0, (size_t)n * sizeof *mesh->order);
         mesh->at[mesh->first[mesh->corners[k] + 1] - ++*left] = k;
     }
 }
 
-/* Of the side from a corner to the next: the lower and the higher vertex. */
+/* Fills the lower and the higher vertex of the side from a corner to the next. */
 static void ends_of_side(const ath_mesh *mesh, int32_t corner, int32_t ends[2])
 {
     int32_t a = mesh->corners[corner], b = mesh->corners[ath_next_corner(mesh, corner)];
@@ -58,7 +56,7 @@ static void ends_of_side(const ath_mesh *mesh, int32_t corner, int32_t ends[2])
     ends[1] = ath_max(a, b);
 }
 
-/* Stable, by one end. */
+/* Sorts sides by one end; the sort is stable. */
 static void sort_sides(const ath_mesh *mesh, int32_t end, const int32_t *sides, int32_t count, int32_t *sorted,
                        int32_t *places)
 {
@@ -75,7 +73,7 @@ static void sort_sides(const ath_mesh *mesh, int32_t end, const int32_t *sides, 
     }
 }
 
-/* Two triangles that share a side are halves of a parallelogram; sides that more share are taken two by two. */
+/* Two triangles that share a side are halves of a parallelogram. If more share it, they are paired in order. */
 static void join_triangles(ath_mesh *mesh)
 {
     int32_t *sides = mesh->work, *sorted = sides + mesh->corner_count, *places = sorted + mesh->corner_count;
@@ -97,9 +95,7 @@ static void join_triangles(ath_mesh *mesh)
     }
 }
 
-/* ---- order ---- */
-
-/* Vertices that known ones touch, by how many parallelograms they complete: none, one, two, more. */
+/* Vertices beside placed ones, by the parallelograms that they complete: none, one, two, more. */
 typedef struct {
     int32_t *stack[MESH_STACKS], height[MESH_STACKS];
     uint8_t *state; /* UNTOUCHED, or the last stack that a vertex was put on */
@@ -116,7 +112,7 @@ static void put_on(mesh_front *front, int32_t v, int32_t stack)
     front->stack[stack][front->height[stack]++] = v;
 }
 
-/* A corner one of whose parallelogram has just been placed. */
+/* Notes that a vertex of this corner's parallelogram has been placed. */
 static void touch(const ath_mesh *mesh, mesh_front *front, int32_t corner, int is_beside)
 {
     if (corner < 0 || is_placed(mesh, corner)) return;
@@ -128,7 +124,7 @@ static void touch(const ath_mesh *mesh, mesh_front *front, int32_t corner, int i
         put_on(front, v, front->state[v] + 1);
 }
 
-/* The last of those that complete the most; -1: none is left. */
+/* Returns the newest of the vertices that complete the most parallelograms; -1: none is left. */
 static int32_t take_next(const ath_mesh *mesh, mesh_front *front)
 {
     for (int32_t s = MESH_STACKS - 1; s >= 0; s--)
@@ -168,7 +164,7 @@ static void order_vertices(ath_mesh *mesh)
 void ath_build_mesh(ath_mesh *mesh, const ath_polygons *shape, const uint32_t *counts, const int32_t *corners,
                     const int32_t *vertex_source)
 {
-    int32_t *place = mesh->rank; /* not in use yet: of each vertex in source order, its number */
+    int32_t *place = mesh->rank; /* not in use yet: serves as the file's number of each vertex of the source */
     uint32_t first = 0;
     mesh->corner_count = (int32_t)shape->corner_count;
     for (int32_t v = 0; v < mesh->vertex_count; v++) place[vertex_source[v]] = v;

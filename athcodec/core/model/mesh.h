@@ -1,24 +1,24 @@
-/* Polygons, and what a rest pose that is coded by them needs to know (FORMAT.md, "Connected rest poses"). */
-#ifndef ATH_MESH_H
-#define ATH_MESH_H
+/* Polygons as the coding of a connected rest pose needs them (FORMAT.md, "Connected rest poses"). */
+#ifndef ATH_MODEL_MESH_H
+#define ATH_MODEL_MESH_H
 
-#include "bits/internal.h"
+#include "bits/platform.h"
 
-/* Faces of at most so many corners and faces for each vertex serve a rest pose: what opening takes stays linear. */
+/* Largest numbers of corners and faces per vertex for a connected rest pose, which keep the time of opening linear. */
 enum { MESH_CORNERS = 8, MESH_FACES = 4 };
 
-/* Corners of faces: their vertices in file order; the corner that makes a parallelogram with this one and the two
- * beside it (-1: none); those of each vertex: at[first[v]] to at[first[v + 1] - 1]. */
+/* `corners` holds the vertex of each corner in file order, `opposite` the corner that completes its parallelogram (-1:
+ * none). The corners of vertex v are at[first[v]] to at[first[v + 1] - 1]. */
 typedef struct ath_mesh {
     int32_t vertex_count, corner_count;
     int32_t *corners, *opposite, *first, *at;
-    uint8_t *place;        /* of a corner in its face, for ath_next_corner and ath_corner_before */
-    int32_t *order, *rank; /* vertices in the order of coding, and the place of each there */
-    int32_t *from;         /* of a coded vertex the one that it was seen from */
-    int32_t *work;         /* of decoding and building */
+    uint8_t *place;        /* place of each corner in its face, for ath_next_corner and ath_corner_before */
+    int32_t *order, *rank; /* vertices in the order of coding, and its inverse */
+    int32_t *from;         /* the neighbour that each vertex was coded from */
+    int32_t *work;         /* scratch of decoding and building */
 } ath_mesh;
 
-/* The corner behind, and before, one in its face; -1: none. Faces of more than four corners are open lines. */
+/* Return the corner after, and before, one in its face; -1: none. Faces of more than four corners are open lines. */
 ATH_INLINE int32_t ath_next_corner(const ath_mesh *mesh, int32_t corner)
 {
     static const int8_t jumps[4] = {0, 1, -2, -3};
@@ -39,17 +39,17 @@ ATH_INLINE int ath_serves_rest(const ath_polygons *shape, int32_t vertex_count)
            && shape->face_count <= MESH_FACES * (uint64_t)vertex_count;
 }
 
-/* Integers that building needs as `work`. */
+/* Returns the int32_t that building needs as `work`. */
 uint64_t ath_mesh_work(uint64_t vertex_count, uint64_t corner_count);
-/* Places the arrays of a mesh of at most so many corners. */
+/* Places the arrays of a mesh of at most `corner_count` corners. */
 void ath_carve_mesh(ath_mesh *mesh, ath_arena *arena, uint64_t vertex_count, uint64_t corner_count,
                     uint64_t work_bytes);
-/* From faces in source order; counts: null where all have shape->columns corners. `corners` and `counts` may not be in
- * the mesh's memory. */
+/* Builds the mesh of faces in source order. counts: null if all have shape->columns corners. `corners` and `counts`
+ * must not be in the mesh's memory. */
 ATH_ENCODER_API void ath_build_mesh(ath_mesh *mesh, const ath_polygons *shape, const uint32_t *counts,
                                     const int32_t *corners, const int32_t *vertex_source);
 #ifdef ATH_ENCODER
-/* Bytes of the memory of such a mesh, at the front of which ath_place_mesh puts the struct itself. */
+/* Returns the bytes of a mesh's memory, which ath_place_mesh begins with the struct itself. */
 ATH_API size_t ath_mesh_size(int32_t vertex_count, int32_t corner_count);
 ATH_API void ath_place_mesh(void *memory, int32_t vertex_count, int32_t corner_count);
 #endif

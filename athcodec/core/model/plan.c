@@ -1,4 +1,4 @@
-/* From branches to pieces and nodes: how stems are cut, what hangs where, which level's stream holds what. */
+/* From branches to pieces and nodes: cuts stems, attaches pieces, assigns them to the streams of levels. */
 #include "model/plan.h"
 
 /* Smallest second moment that counts as a direction, relative to the largest. */
@@ -6,7 +6,7 @@
 
 static int32_t divide_up(int32_t a, int32_t b) { return (a + b - 1) / b; }
 
-/* Pieces end where rings do: what is shared among them are rings, each vertex being one of a stem that has none. */
+/* Pieces consist of whole rings. On a stem without rings, every vertex counts as a ring. */
 static int32_t pieces_of(const ath_branch *branch)
 {
     int32_t ring = ath_max(branch->ring, 1);
@@ -42,7 +42,7 @@ int32_t ath_count_pieces(ath_branch *branches, int32_t branch_count, int32_t ver
     return next == vertex_count ? total : 0;
 }
 
-/* The branch after the node's subtree when the node of `b` is a leaf of the ATH, else the next branch. */
+/* Returns the branch of the next node: a leaf of the ATH takes its whole subtree. */
 static int32_t next_node(const ath_branch *branches, int32_t b)
 {
     return branches[b].flags & ATH_WHOLE ? b + branches[b].subtree : b + 1;
@@ -85,8 +85,8 @@ static void split_branch(const ath_branch *branches, int32_t b, ath_piece *piece
     }
 }
 
-/* Attach caches on a stack: in depth-first order those on top are done with first. One goes when its last piece has
- * been attached, before that piece is kept itself, so that a long chain never holds more than one. */
+/* Places attach caches on a stack, since in depth-first order those on top are done with first. A cache is freed when
+ * the last piece has been attached to it, before that piece gets its own: a long chain never holds more than one. */
 static void place_attach_caches(ath_plan *plan, ath_piece *pieces, int32_t *stack, int keep)
 {
     int64_t used = 0;
@@ -155,8 +155,8 @@ void ath_plan_rigid(const ath_plan *plan, ath_piece *pieces, int32_t layer)
     }
 }
 
-/* Functionals w_0, w_1, w_2 with mean(w_i(d) w_j(d)) = (i == j) over the vertices of the subtree, d = x0 - a: the axes
- * with the most left first, orthonormalised under the second moments; directions of no extent are left out. */
+/* Fills functionals w_0, w_1, w_2 with mean(w_i(d) w_j(d)) = (i == j) over the vertices of the subtree, d = x0 - a.
+ * Axes are orthonormalised under the second moments, the longest remainder first, without directions of no extent. */
 static void whiten(const ath_plan *plan, ath_node *node)
 {
     const double *a = ath_rest_attach(plan, plan->pieces + node->piece);

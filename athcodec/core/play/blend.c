@@ -1,27 +1,27 @@
-/* Several clips at once: what each shows is taken apart into edges of stems and turned sheets, these are blended, and put
- * together again from the roots on. */
-#include "model/motion.h"
+/* Blends several clips: the pose of each is taken apart into edges of stems and turned sheets, which are blended and
+ * put together again from the roots on. */
+#include "model/plan.h"
+#include "model/rotations.h"
 #include "play/segment.h"
 
 enum { SHEET_TURNS = 12 };
 
 static const double UPRIGHT =
-    0.001; /* what the rest pose counts in the rotation of a sheet: one that is a line could turn freely */
-static const double MOST_STRETCH = 4.0; /* of a blended edge, where those of the clips point away from each other */
+    0.001; /* weight of the rest pose in a sheet's rotation: a sheet that is a line could turn freely */
+static const double MOST_STRETCH = 4.0; /* largest stretch of a blended edge, if the clips' edges nearly cancel out */
 
-/* Clips that have a weight. */
+/* The clips that have a weight. */
 typedef struct {
     const double *clip[ATH_BLEND_CLIPS]; /* vertices x 3, file order, absolute */
-    double weight[ATH_BLEND_CLIPS];      /* they add up to 1 */
+    double weight[ATH_BLEND_CLIPS];      /* their sum is 1 */
     double *out;
     int32_t count;
 } blending;
 
 static const double *vertex_of(const double *positions, int32_t vertex) { return positions + 3 * (size_t)vertex; }
-
 static double length_of(const double v[3]) { return ath_sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]); }
 
-/* An edge as long as those of the clips are in the mean, in their mean direction. */
+/* A blended edge has the mean length and the mean direction of the clips' edges. */
 static void blend_edge(const blending *own, int32_t from, int32_t to)
 {
     double edge[3] = {0.0}, length = 0.0;
@@ -47,7 +47,7 @@ static void blend_vertex(const blending *own, int32_t vertex)
     }
 }
 
-/* How a piece has turned in a clip about what it hangs on. */
+/* Fills the rotation of a piece in a clip about the vertex that it hangs on. */
 static void sheet_rotation(const ath_plan *plan, const ath_piece *piece, int32_t hangs, const double *clip, double R[9])
 {
     const double *a = ath_rest_of(plan, hangs), *p = vertex_of(clip, hangs);
@@ -81,7 +81,7 @@ static void quaternion_rotation(const double q[4], double R[9])
     R[8] = 1.0 - 2.0 * (x * x + y * y);
 }
 
-/* The mean of rotations, as of unit quaternions on the side of the first. */
+/* Averages rotations as unit quaternions on the side of the first. */
 static void mean_rotation(const blending *own, double turned[ATH_BLEND_CLIPS][9], double R[9])
 {
     double first[4] = {1.0, 0.0, 0.0, 0.0}, sum[4] = {0.0}, length2 = 0.0;
@@ -132,7 +132,8 @@ static void blend_piece(const ath_plan *plan, const blending *own, const ath_pie
     }
 }
 
-/* The shares that count, and their weights over the largest and then over their sum; 0: not one does. */
+/* Finds the shares that count and normalises their weights. Returns their number. Dividing by the largest weight first
+ * avoids overflow. */
 static int32_t weigh(const ath_share *shares, int32_t count, const ath_share **used, double *weight)
 {
     double largest = 0.0, sum = 0.0;
@@ -187,9 +188,7 @@ int ath_blended_positions(const ath_file *file, const ath_share *shares, int32_t
     return held;
 }
 
-/* ---- wind ---- */
-
-/* Degrees from one heading on to another, 0 to 360. */
+/* Returns the degrees from one heading to another, 0 to 360. */
 static double turn_between(double from, double to)
 {
     double degrees = to - from, turns = degrees / 360.0;

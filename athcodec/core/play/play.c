@@ -1,9 +1,9 @@
-/* What a prepared segment shows: positions and matrices at any time, and which level a distance asks for. */
+/* Shows prepared segments: positions and matrices at any time, fades, and the level that a distance asks for. */
 #include "play/segment.h"
 
 /* ---- time ---- */
 
-/* 0 <= x < period; 0 where x is beyond what a double counts. */
+/* Returns x modulo the period; 0 if x is too large to count periods. */
 static double wrapped(double x, double period)
 {
     double turns = x / period;
@@ -13,7 +13,6 @@ static double wrapped(double x, double period)
     return rest < period ? rest : 0.0;
 }
 
-/* Within the clip. */
 static double frame_of(const ath_file *file, const ath_clip *clip, double seconds)
 {
     const double *times = file->times + clip->first_frame;
@@ -49,7 +48,7 @@ double ath_frame_at(const ath_file *file, int32_t clip, double seconds, ath_wrap
     const ath_clip *shown = file->clips + clip;
     if (wrap == ATH_AS_MARKED) wrap = shown->loop ? ATH_LOOP : ATH_CLAMP;
     double first = (double)shown->first_frame, frame = first + frame_within(file, shown, seconds, wrap);
-    return frame < first + (double)shown->frame_count ? frame : first; /* that one is another clip's */
+    return frame < first + (double)shown->frame_count ? frame : first; /* the next frame belongs to another clip */
 }
 
 ath_blend ath_blend_at(const ath_file *file, double frame)
@@ -67,10 +66,10 @@ ath_blend ath_blend_at(const ath_file *file, double frame)
 
 /* ---- segments ---- */
 
-/* The frames to show, in the segments that have them. */
+/* The two frames to blend, in the segments that have them. */
 typedef struct {
     const ath_segment *segment[2];
-    size_t frame[2]; /* of those coded in the segment */
+    size_t frame[2]; /* index among the coded frames of the segment */
     double weight;
 } shown_frames;
 
@@ -91,7 +90,7 @@ static int show_one(const ath_file *file, const ath_segment *segment, int32_t fr
     return ATH_HELD;
 }
 
-/* At this level; -1: at any. */
+/* level: -1 for any. */
 static int find_frames(const ath_file *file, const ath_segment *const *segments, int32_t count, double frame,
                        int32_t level, shown_frames *shown)
 {
@@ -136,7 +135,7 @@ static const double *rest_attach_of(const ath_plan *plan, const ath_part *part)
     return plan->rest + 3 * (size_t)(branch->attach >= 0 ? branch->attach : branch->first);
 }
 
-/* The map as a matrix from absolute rest to absolute positions. */
+/* Makes the map a matrix from absolute rest positions to absolute positions. */
 static void matrix_of(const ath_file *file, const ath_plan *plan, const ath_part *part, const double map[ATH_MAP],
                       double matrix[12])
 {
@@ -151,13 +150,13 @@ static void matrix_of(const ath_file *file, const ath_plan *plan, const ath_part
 
 /* ---- vertices ---- */
 
-/* Where a position goes, as float or (is_float64) double. */
+/* The destination of positions, float or (is_float64) double. */
 typedef struct {
     char *out;
     size_t stride;
     const int32_t *place; /* null: file order */
     int is_float64;
-    float share; /* that it takes of what is there; 1: it is written over */
+    float share; /* weight of new positions; 1: they replace what is there */
 } target;
 
 ATH_INLINE float mixed(float before, float value, float share)
@@ -183,7 +182,7 @@ ATH_INLINE void put(const target *to, size_t vertex, double x, double y, double 
 
 enum { BLOCK = 64 };
 
-/* Rest positions, relative to the origin, moved by a map; absolute. */
+/* Moves rest positions, relative to the origin, to absolute positions. */
 ATH_HOT static void move_block(const double *x0, size_t count, const double m[ATH_MAP], const double a[3],
                                const double origin[3], double *ATH_RESTRICT out)
 {
@@ -195,7 +194,6 @@ ATH_HOT static void move_block(const double *x0, size_t count, const double m[AT
     }
 }
 
-/* Rounds positions to float, the type of the file. */
 ATH_HOT static void round_block(double *block, size_t count)
 {
     for (size_t i = 0; i < count; i++) block[i] = ath_single(block[i]);
@@ -211,7 +209,7 @@ static int is_packed(const target *to)
     return !to->is_float64 && !to->place && to->stride == 3 * sizeof(float) && to->share == 1.0f;
 }
 
-/* Vertices first to first + count - 1 of a node, from where `rest` has them, go to `vertex` on. */
+/* Puts vertices first to first + count - 1 of a node, moved from `rest`, at `vertex` and those behind it. */
 static void put_node(const ath_file *file, const ath_plan *plan, const ath_part *part, const double m[ATH_MAP],
                      const double *rest, size_t first, size_t count, size_t vertex, const target *to)
 {
@@ -237,7 +235,6 @@ ATH_HOT static void blend_floats(const float *a, const float *b, float weight, s
         for (size_t i = 0; i < count; i++) out[i] = a[i] + (b[i] - a[i]) * weight;
 }
 
-/* Floats as they are, each vertex to its place. */
 static void scatter_floats(const float *from, size_t count, size_t vertex, const target *to)
 {
     const int32_t *place = to->place ? to->place + vertex : 0;
@@ -247,7 +244,7 @@ static void scatter_floats(const float *from, size_t count, size_t vertex, const
         memcpy(out + (place ? (size_t)place[i] : vertex + i) * stride, from + 3 * i, 3 * sizeof(float));
 }
 
-/* Vertices first to first + count - 1 go to `vertex` on, those of the exact run that begins at `index`. */
+/* Puts `count` exact vertices from `index` on at `vertex` and those behind it. */
 static void put_floats(const shown_frames *shown, size_t index, size_t count, size_t vertex, const target *to)
 {
     const float *at[2];
@@ -295,7 +292,7 @@ static void put_exact(const shown_frames *shown, size_t index, size_t count, siz
         put_floats(shown, index, count, vertex, to);
 }
 
-/* Vertices first to first + count - 1, all of one part, go to `vertex` on; nodes move the rest pose of `posed`. */
+/* Puts vertices first to first + count - 1 of one part at `vertex` and those behind it. Nodes move `posed`. */
 static void put_part(const ath_file *file, const shown_frames *shown, const ath_part *part, const ath_plan *posed,
                      size_t first, size_t count, size_t vertex, const target *to)
 {
@@ -326,12 +323,7 @@ static int positions(const ath_file *file, const ath_segment *const *segments, i
 
 static target target_of(const ath_file *file, ath_order order, void *out, size_t stride, int is_float64)
 {
-    target to;
-    to.out = (char *)out;
-    to.stride = stride;
-    to.place = order == ATH_SOURCE_ORDER ? file->vertex_source : 0;
-    to.is_float64 = is_float64;
-    to.share = 1.0f;
+    target to = {(char *)out, stride, order == ATH_SOURCE_ORDER ? file->vertex_source : 0, is_float64, 1.0f};
     return to;
 }
 
@@ -388,10 +380,7 @@ static int matrices(const ath_file *file, const ath_segment *const *segments, in
         char *at = (char *)out + (size_t)part->index * stride;
         blend_map(&shown, part->index, map);
         matrix_of(file, plan, part, map, matrix);
-        if (is_float64)
-            memcpy(at, matrix, sizeof matrix);
-        else
-            for (int32_t k = 0; k < 12; k++) ((float *)(void *)at)[k] = (float)matrix[k];
+        for (size_t k = 0; k < 12; k++) ath_put_number(at, k, is_float64, matrix[k]);
     }
     return result;
 }
@@ -410,7 +399,7 @@ int ath_matrices_float64(const ath_file *file, const ath_segment *const *segment
 
 /* ---- from level to level ---- */
 
-/* How far a fade has come: it begins and ends at rest. */
+/* Eases the progress of a fade, which begins and ends at rest. */
 static double eased(double passed) { return passed * passed * (3.0 - 2.0 * passed); }
 
 void ath_fade_to(ath_fade *fade, int32_t level, double share)
@@ -443,11 +432,11 @@ int32_t ath_fade_cut(const ath_fade *fade)
     return deepest;
 }
 
-/* What is shown of the levels of a fade that have a weight. */
+/* The frames of those levels of a fade that have a weight. */
 typedef struct {
-    const ath_segment *cut; /* one of the deepest level */
+    const ath_segment *cut; /* a segment of the deepest level */
     shown_frames shown[ATH_FADE_LEVELS];
-    float share[ATH_FADE_LEVELS]; /* of each in the blend of those up to it */
+    float share[ATH_FADE_LEVELS]; /* weight of each level in the blend with those before it */
     int32_t count;
     int result;
 } faded_frames;
@@ -490,7 +479,7 @@ int ath_faded_positions(const ath_file *file, const ath_segment *const *segments
     return found.result;
 }
 
-/* The part of a segment's level that has a vertex, from `part` on. */
+/* Returns the first part from `part` on that has a vertex. */
 static const ath_part *part_with(const ath_part *part, int32_t vertex)
 {
     while (part->first + part->count <= vertex) part++;
@@ -523,8 +512,7 @@ int ath_faded_matrices(const ath_file *file, const ath_segment *const *segments,
     return found.result;
 }
 
-/* What a level shows of the exact vertices of a deeper one: some are moved by its nodes, of whatever level from the rest
- * pose of those above level 0. */
+/* Shows the exact vertices of a deeper level. Nodes of any level move some of them, from the rest pose of level 1. */
 static void fade_exact(const ath_file *file, const shown_frames *shown, const ath_segment *cut, const target *to)
 {
     const ath_part *moves = shown->segment[0]->parts;

@@ -1,33 +1,35 @@
-/* Decodes the chunks of a segment into what is played: the streams of all levels side by side, piece by piece. A
+/* Decodes the chunks of a segment into positions and maps: the streams of all levels side by side, piece by piece. A
  * piece is placed as soon as its integers are decoded, so that only attach caches are kept. */
-#include "streams/decode.h"
+#include "play/prepare.h"
 #include "bits/exact.inl"
-#include "play/kept.h"
-#include "model/lanes.h"
+#include "model/maps.h"
+#include "model/refine.h"
+#include "play/join.h"
+#include "play/keep.h"
+#include "play/store.h"
+#include "streams/decode.h"
 #include "streams/motion_streams.inl"
 #include "streams/predict.h"
-#include "play/segment.h"
-#include "play/watch.h"
 
-enum { CHECKSUM_STEP = 1 << 16, TILE = 8, CACHE_LINE = 16 /* floats */, MOST_SHAPES = ATH_SHAPE_NUMBERS };
+enum { CHECKSUM_STEP = 1 << 16 };
 
 typedef enum { BEFORE, CHECKSUMS, HEADS, FRAMES, PIECES, DONE, FAILED } prepare_phase;
 
 typedef struct {
     ath_coder coder;
     shape_model *model;
-    refined_shape_model *refined; /* of a refinement, in its place */
-    int32_t shift;                /* of a refinement */
+    refined_shape_model *refined; /* replaces `model` in a refinement */
+    int32_t shift;                /* see ath_parse_refined_shapes */
     const ath_chunk *chunk;       /* null: no piece of the level has shapes */
 } shapes_reader;
 
 typedef struct {
     ath_coder coder;
     coefficient_model *model;
-    refinement_model *refined; /* of a refinement, in its place */
+    refinement_model *refined; /* replaces `model` in a refinement */
     uint32_t *history;
     double *temporal;
-    const ath_chunk *chunk; /* null: the level has none, or it is not wanted */
+    const ath_chunk *chunk; /* null: the level has none, or this preparation does not need it */
 } stems_reader;
 
 typedef struct {
@@ -51,67 +53,59 @@ typedef struct {
     const ath_chunk *chunk;
 } exact_reader;
 
-/* A layer of precision while one piece after the other passes through it. */
+/* A layer of precision, which one piece after the other passes through. */
 typedef struct {
     const ath_plan *plan;
     ath_motion motion;
     ath_scratch scratch;
     ath_piece_rows rows;
     int32_t counts[ATH_SLOTS];
-    int32_t *shape_integers; /* of the piece, 0 between pieces */
+    int32_t *shape_integers; /* all 0 between pieces */
     double *unit_shapes;
-    ath_piece_before before; /* the piece as the layer before has it */
-    double turn_steps[3];    /* of its rotations there */
+    ath_piece_before before; /* the piece in the layer before */
+    double turn_steps[3];    /* rotation steps in the layer before */
 } layer_work;
 
-/* What is prepared, and from what. */
+/* The segment that is asked for, and what its preparation starts from. */
 typedef struct {
     const ath_file *file;
-    void *memory;    /* of the segment */
-    void *positions; /* where they go; null: to that memory */
+    void *memory;    /* memory of the segment */
+    void *positions; /* destination of the positions; null: that memory */
     int32_t index, level;
-    const ath_segment *from; /* the same segment at an earlier level; null: none */
-    const void *kept;        /* of that; null: nothing */
-    kept_head *keeps;        /* what this preparation keeps, written at `keeping`; null: nothing */
+    const ath_segment *from; /* this segment at an earlier level; null: none */
+    const void *kept;        /* integers of `from`; null: none */
+    kept_head *keeps;        /* memory of what is kept, written by `keeping`; null: none */
     kept_writer keeping;
     ath_watcher *watcher; /* null: none */
 } preparation;
-
-/* How a segment goes on where the one before it ends. */
-typedef struct {
-    double *maps;                                           /* ATH_END_FRAMES x nodes x ATH_MAP: the end of that one */
-    void *positions;                                        /* ATH_END_FRAMES x exact vertices x 3: likewise */
-    int32_t width;                                          /* frames; 0: it does not */
-    double jumps[ATH_JOIN_SLOPED], slopes[ATH_JOIN_SLOPED]; /* what is left of either at each of them */
-} ath_join;
 
 struct ath_work {
     const ath_file *file;
     ath_segment *segment;
     preparation asked;
     ath_join join;
-    int32_t only_end; /* what is in preparation is the segment before the one asked for */
+    int32_t only_end; /* 1: the segment before the one asked for is in preparation */
     shapes_reader shapes[ATH_LEVELS];
     stems_reader stems[ATH_LEVELS];
     affines_reader affines[ATH_LEVELS];
     corrections_reader corrections;
     exact_reader exact_level;
     ath_prediction *prediction;
-    const ath_chunk *predicted; /* null: there is none, or it is not wanted */
+    const ath_chunk *predicted; /* null: there is none, or this preparation does not need it */
     ath_stream streams[ATH_LEVELS];
     layer_work layers[ATH_LAYERS];
     ath_node_rows node;
     void *prelude_model;
     prepare_phase phase;
-    const ath_segment *shown_before; /* whose positions are those before make_exact; null: none */
-    const uint8_t *kept;             /* what the next piece is restored from; null: it is decoded */
-    kept_head *keeps;                /* of `asked`, while that is in preparation */
+    const ath_segment *shown_before; /* the level whose positions make_exact starts from; null: none */
+    const uint8_t *kept;             /* the next piece to restore; null: pieces are decoded */
+    kept_head *keeps;                /* asked.keeps while the segment asked for is in preparation */
     kept_writer keeping;
-    int32_t index, level;       /* of the segment in preparation */
-    int32_t first_level;        /* whose chunks are read: those before serve what was prepared before */
-    int32_t first_layer, layer; /* that it takes */
-    int32_t next;               /* level of CHECKSUMS and HEADS, piece of PIECES */
-    int32_t next_kind;          /* of CHECKSUMS */
+    int32_t index, level;       /* the segment in preparation */
+    int32_t first_level;        /* first level whose chunks are read */
+    int32_t first_layer, layer; /* first and last layer that pieces pass through */
+    int32_t next;               /* next level of CHECKSUMS and HEADS, next piece of PIECES */
+    int32_t next_kind;          /* next kind of CHECKSUMS */
     uint32_t crc, crc_at;
     int32_t next_node, exact, shown;
     ath_fault_info fault;
@@ -147,8 +141,8 @@ static void carve_stems(ath_work *work, const ath_file *file, int32_t d, int32_t
 static void carve_layer(layer_work *layer, const ath_file *file, int32_t q, int32_t frames, ath_arena *arena)
 {
     uint64_t T = (uint64_t)frames, row = 3 * T * sizeof(int32_t), rows = (uint64_t)file->plan.longest * row;
-    layer->shape_integers = (int32_t *)ath_take(arena, MOST_SHAPES * ATH_SHAPE_NUMBERS * sizeof(int32_t));
-    layer->unit_shapes = (double *)ath_take(arena, MOST_SHAPES * ATH_SHAPE_NUMBERS * sizeof(double));
+    layer->shape_integers = (int32_t *)ath_take(arena, ATH_MOST_SHAPES * ATH_SHAPE_NUMBERS * sizeof(int32_t));
+    layer->unit_shapes = (double *)ath_take(arena, ATH_MOST_SHAPES * ATH_SHAPE_NUMBERS * sizeof(double));
     layer->rows.modes = (int32_t *)ath_take(arena, rows);
     layer->rows.rotation = (int32_t *)ath_take(arena, row);
     layer->rows.shift = (int32_t *)ath_take(arena, row);
@@ -162,23 +156,13 @@ static void carve_layer(layer_work *layer, const ath_file *file, int32_t q, int3
         (double *)ath_take(arena, (uint64_t)file->plan.attach_cache_rows * 3 * T * sizeof(double));
 }
 
-static size_t number_size(const ath_file *file) { return file->info.is_float64 ? sizeof(double) : sizeof(float); }
-
-/* Of any level. */
-static void carve_end(ath_join *join, const ath_file *file, ath_arena *arena)
-{
-    uint64_t nodes = (uint64_t)file->plan.node_count, vertices = (uint64_t)file->plan.vertex_count;
-    join->maps = (double *)ath_take(arena, ATH_END_FRAMES * nodes * ATH_MAP * sizeof(double));
-    join->positions = ath_take(arena, ATH_END_FRAMES * vertices * 3 * number_size(file));
-}
-
 static uint64_t carve_work(ath_work *work, const ath_file *file, int32_t frames, uint8_t *base)
 {
     ath_arena arena = {base, 0};
     uint64_t row = 3 * (uint64_t)frames * sizeof(int32_t);
     uint32_t affines = levels_with_affines(file);
     ath_take(&arena, sizeof *work);
-    if (file->has_joins) carve_end(&work->join, file, &arena);
+    if (file->has_joins) ath_carve_end(&work->join, file, &arena);
     for (int32_t d = 0; d < file->info.level_count; d++) {
         if (file->stems_levels >> d & 1) carve_stems(work, file, d, frames, &arena);
         if (affines >> d & 1) {
@@ -200,7 +184,7 @@ static uint64_t carve_work(ath_work *work, const ath_file *file, int32_t frames,
 static uint64_t carve_segment(ath_segment *segment, const ath_file *file, int32_t level, int32_t frames, uint8_t *base)
 {
     ath_arena arena = {base, 0};
-    uint64_t T = (uint64_t)frames, number = number_size(file);
+    uint64_t T = (uint64_t)frames, number = ath_number_size(file->info.is_float64);
     segment->frames = frames;
     segment->is_float64 = file->info.is_float64;
     ath_cut_size(file, level, &segment->part_count, &segment->node_count, &segment->exact_vertices);
@@ -225,36 +209,12 @@ size_t ath_segment_size(const ath_file *file, int32_t level)
     return ath_size_or_most(carve_segment(&counted, file, level, file->longest, 0));
 }
 
-/* ---- what is kept ---- */
-
-static int has_stream(const ath_file *file, int32_t d) { return file->stems_levels >> d & 1; }
-
-/* All of the plant at a precision that a stored level refines. */
-static int can_be_kept(const ath_file *file, int32_t level)
-{
-    return level > file->plan.height && level < ath_min(file->info.level_count, ath_lossy_levels(file)) - 1;
-}
-
-size_t ath_keep_size(const ath_file *file, int32_t level)
-{
-    const ath_plan *plan = &file->plan;
-    if (!can_be_kept(file, level)) return 0;
-    uint64_t T = (uint64_t)file->longest, pieces = (uint64_t)plan->piece_count, size = sizeof(kept_head);
-    size += ((uint64_t)plan->vertex_count + 2 * pieces) * kept_row_most(file->longest) + pieces * KEPT_NUMBER;
-    for (int32_t d = 0; d <= level; d++) {
-        if (!has_stream(file, d)) continue;
-        size += sizeof(kept_stream) + T * T * sizeof(float);
-        if (ath_file_chunk(file, ATH_SHAPES, d, 0)) size += pieces * MOST_SHAPES * kept_row_most(ATH_SHAPE_MODES);
-    }
-    return ath_size_or_most(size);
-}
-
 int ath_keep(ath_work *work, void *memory, size_t memory_bytes)
 {
     kept_head *head = (kept_head *)memory;
     if (!ath_fits(memory, memory_bytes, sizeof *head)) return ATH_NO_MEMORY;
     head->bytes = 0;
-    if (!can_be_kept(work->file, work->level)) return ATH_OK;
+    if (!ath_can_be_kept(work->file, work->level)) return ATH_OK;
     head->segment = work->index;
     head->level = work->level;
     work->asked.keeps = work->keeps = head;
@@ -265,17 +225,12 @@ int ath_keep(ath_work *work, void *memory, size_t memory_bytes)
 }
 
 void ath_watch(ath_work *work, ath_watcher *watcher) { work->asked.watcher = watcher; }
-
 const ath_file *ath_watched_file(const ath_work *work) { return work->file; }
-
 int32_t ath_watched_level(const ath_work *work) { return work->asked.level; }
 
-/* Of the segment asked for, not of the one before it. */
+/* The observer follows the segment asked for, not the one before it. */
 static ath_watcher *watcher_of(const ath_work *work) { return work->only_end ? 0 : work->asked.watcher; }
 
-size_t ath_kept_size(const void *kept) { return (size_t)((const kept_head *)kept)->bytes; }
-
-/* Waves that are not learned, by their root. */
 static void set_waves(const ath_work *work, ath_stream *stream, int32_t root)
 {
     stream->temporal =
@@ -284,76 +239,15 @@ static void set_waves(const ath_work *work, ath_stream *stream, int32_t root)
     stream->root = root;
 }
 
-/* Of the waves of a basis that is learned. */
-static size_t learned_numbers(const ath_work *work, const ath_stream *stream)
-{
-    return stream->root < 0 ? 0 : (size_t)stream->temporal_rank * (size_t)work->segment->frames;
-}
-
-static void keep_streams(ath_work *work)
-{
-    for (int32_t d = 0; work->keeping.at && d <= work->level; d++) {
-        const ath_stream *stream = work->streams + d;
-        kept_stream kept = {stream->step, stream->rotation_step_factor, stream->turn_step, stream->temporal_rank,
-                            stream->root};
-        size_t learned = learned_numbers(work, stream);
-        if (!has_stream(work->file, d)) continue;
-        void *at = ath_kept_take(&work->keeping, sizeof kept);
-        if (at) memcpy(at, &kept, sizeof kept);
-        ath_keep_waves(&work->keeping, stream->temporal, learned);
-    }
-}
-
-static void keep_piece(ath_work *work, const ath_piece *piece)
-{
-    const layer_work *layer = work->layers + work->layer;
-    const ath_piece_rows *rows = &layer->rows;
-    int32_t T = layer->motion.frames, shapes = rows->shape_count;
-    ath_keep_number(&work->keeping, shapes);
-    for (int32_t s = 0; s < shapes; s++)
-        ath_keep_row(&work->keeping, layer->shape_integers + s * ATH_SHAPE_NUMBERS, ATH_SHAPE_MODES, ATH_SHAPE_MODES);
-    ath_keep_row(&work->keeping, rows->shift, T, layer->counts[SHIFT_SLOT]);
-    ath_keep_row(&work->keeping, rows->rotation, T, layer->counts[ROTATION_SLOT]);
-    for (int32_t m = 0; m < piece->count; m++)
-        ath_keep_row(&work->keeping, ath_row(rows->modes, m, T), T, layer->counts[m]);
-}
-
-/* Pieces follow. */
 static void restore_streams(ath_work *work)
 {
     work->kept += sizeof(kept_head);
     for (int32_t d = 0; d < work->first_level; d++) {
-        kept_stream kept;
         ath_stream *stream = work->streams + d;
-        double *waves = work->stems[d].temporal;
-        if (!has_stream(work->file, d)) continue;
-        memcpy(&kept, work->kept, sizeof kept);
-        work->kept += sizeof kept;
-        stream->step = kept.step;
-        stream->rotation_step_factor = kept.rotation_step_factor;
-        stream->turn_step = kept.turn_step;
-        stream->temporal_rank = kept.temporal_rank;
-        stream->root = kept.root;
-        if (kept.root < 0) set_waves(work, stream, kept.root);
-        size_t learned = learned_numbers(work, stream);
-        work->kept = ath_kept_waves(work->kept, waves, learned);
-        if (learned > 0) stream->temporal = waves;
+        if (!ath_has_stream(work->file, d)) continue;
+        work->kept = ath_kept_stream(work->kept, stream, work->stems[d].temporal, work->segment->frames);
+        if (stream->root < 0) set_waves(work, stream, stream->root);
     }
-}
-
-static void restore_piece(ath_work *work, const ath_piece *piece)
-{
-    layer_work *layer = work->layers + work->first_layer;
-    ath_piece_rows *rows = &layer->rows;
-    int32_t T = layer->motion.frames, count;
-    work->kept = ath_kept_number(work->kept, &rows->shape_count);
-    for (int32_t s = 0; s < rows->shape_count; s++)
-        work->kept = ath_kept_row(work->kept, layer->shape_integers + s * ATH_SHAPE_NUMBERS, ATH_SHAPE_MODES, &count);
-    ath_unit_shapes(rows->shape_count, layer->shape_integers, layer->unit_shapes);
-    work->kept = ath_kept_row(work->kept, rows->shift, T, layer->counts + SHIFT_SLOT);
-    work->kept = ath_kept_row(work->kept, rows->rotation, T, layer->counts + ROTATION_SLOT);
-    for (int32_t m = 0; m < piece->count; m++)
-        work->kept = ath_kept_row(work->kept, ath_row(rows->modes, m, T), T, layer->counts + m);
 }
 
 /* ---- start ---- */
@@ -374,7 +268,7 @@ static int32_t checksum_steps(const ath_chunk *chunk)
     return chunk && chunk->length > 0 ? (int32_t)((chunk->length - 1) / CHECKSUM_STEP) + 1 : 1;
 }
 
-/* Rest poses have been read. */
+/* Skips REFINED_REST, which has been read. */
 static int32_t kind_after(int32_t kind) { return kind == ATH_EXACT ? ATH_PREDICTED : kind + 1; }
 
 static int32_t steps_of(const ath_file *file, int32_t segment, int32_t level)
@@ -401,39 +295,33 @@ static int refuse(ath_work *work, int code, ath_field field, const ath_chunk *ch
     return ath_fault_at(&work->fault, chunk, (int32_t)(chunk - work->file->chunks));
 }
 
-/* Notes the chunk whose content is not valid, if it is not. */
+/* Notes the chunk if the result says that its content is not valid. */
 static int blame(ath_work *work, const ath_chunk *chunk, int result)
 {
     return result == ATH_OK ? ATH_OK : refuse(work, result, ATH_FIELD_CONTENT, chunk, 0, 0);
 }
 
-/* Null for a chunk that the segment does without. */
-static int check_fed(ath_work *work, const ath_chunk *chunk)
+/* Returns a chunk of the segment, null if it has none, and notes the first that has not been fed. */
+static const ath_chunk *fed_chunk(ath_work *work, int32_t kind, int32_t d)
 {
-    return !chunk || chunk->bytes ? ATH_OK : refuse(work, ATH_MISSING, ATH_FIELD_CHUNK_SIZE, chunk, 0, chunk->length);
+    const ath_chunk *chunk = chunk_of(work, kind, d);
+    if (chunk && !chunk->bytes && work->fault.code == ATH_OK)
+        refuse(work, ATH_MISSING, ATH_FIELD_CHUNK_SIZE, chunk, 0, chunk->length);
+    return chunk;
 }
 
-/* ATH_MISSING unless all have been fed. */
 static int find_chunks(ath_work *work)
 {
-    int result = ATH_OK;
+    int32_t shown = ath_min(work->level, ath_lossy_levels(work->file) - 1);
     for (int32_t d = 0; d <= work->level; d++) {
-        const ath_chunk *stems = chunk_of(work, ATH_STEMS, d);
-        const ath_chunk *affines = chunk_of(work, ATH_AFFINES, d);
-        const ath_chunk *shapes = chunk_of(work, ATH_SHAPES, d);
-        work->shapes[d].chunk = shapes;
-        work->stems[d].chunk = stems;
-        work->affines[d].chunk = affines;
-        if (result == ATH_OK) result = check_fed(work, stems);
-        if (result == ATH_OK) result = check_fed(work, affines);
-        if (result == ATH_OK) result = check_fed(work, shapes);
+        work->stems[d].chunk = fed_chunk(work, ATH_STEMS, d);
+        work->affines[d].chunk = fed_chunk(work, ATH_AFFINES, d);
+        work->shapes[d].chunk = fed_chunk(work, ATH_SHAPES, d);
     }
-    work->corrections.chunk = chunk_of(work, ATH_CORRECTIONS, ath_min(work->level, ath_lossy_levels(work->file) - 1));
-    work->exact_level.chunk = chunk_of(work, ATH_EXACT, work->level);
-    work->predicted = chunk_of(work, ATH_PREDICTED, ath_min(work->level, ath_lossy_levels(work->file) - 1));
-    if (result == ATH_OK) result = check_fed(work, work->predicted);
-    if (result == ATH_OK) result = check_fed(work, work->corrections.chunk);
-    return result == ATH_OK ? check_fed(work, work->exact_level.chunk) : result;
+    work->predicted = fed_chunk(work, ATH_PREDICTED, shown);
+    work->corrections.chunk = fed_chunk(work, ATH_CORRECTIONS, shown);
+    work->exact_level.chunk = fed_chunk(work, ATH_EXACT, work->level);
+    return work->fault.code;
 }
 
 static void ready_layer(ath_work *work, int32_t q)
@@ -448,7 +336,7 @@ static void ready_layer(ath_work *work, int32_t q)
     layer->scratch = ath_motion_scratch(layer->plan, &layer->motion);
     layer->rows.counts = layer->counts;
     layer->rows.shapes = layer->unit_shapes;
-    memset(layer->shape_integers, 0, MOST_SHAPES * ATH_SHAPE_NUMBERS * sizeof(int32_t));
+    memset(layer->shape_integers, 0, ATH_MOST_SHAPES * ATH_SHAPE_NUMBERS * sizeof(int32_t));
     memset(layer->rows.modes, 0, (size_t)work->file->plan.longest * row);
     memset(layer->rows.rotation, 0, row);
     memset(layer->rows.shift, 0, row);
@@ -466,7 +354,7 @@ static void ready_motion(ath_work *work)
     }
 }
 
-/* Begins with a segment: the one asked for, or for its end the one before that. */
+/* Begins to prepare the segment asked for or, for its end, the one before that. */
 static int begin(ath_work *work, const preparation *asked, int32_t index, int32_t level)
 {
     const ath_file *file = asked->file;
@@ -506,42 +394,21 @@ static int begin(ath_work *work, const preparation *asked, int32_t index, int32_
     return result;
 }
 
-/* Shares of a jump and of a slope, from 1 to 0 with level ends, that bend as little as any over so many frames: parabolas,
- * which turn where half of the way is left, or where 1 - sqrt(1/2) is. */
-static void set_join(ath_join *join, int32_t how)
-{
-    const double turn = 0.70710678118654752440, bend = 0.5 + turn;
-    join->width = how % ATH_JOIN_SLOPED;
-    for (int32_t t = 0; t < join->width; t++) {
-        double w = (double)join->width, u = ((double)t + 0.5) / w, left = 1.0 - u;
-        join->jumps[t] = u < 0.5 ? 1.0 - 2.0 * u * u : 2.0 * left * left;
-        join->slopes[t] = how < ATH_JOIN_SLOPED ? 0.0 : w * (u < turn ? u - bend * u * u : bend * left * left);
-    }
-}
-
-/* `before` and `kept`: what was prepared before, null: nothing. */
 static int start(void *memory, size_t work_bytes, const ath_file *file, int32_t index, int32_t level,
                  void *segment_memory, size_t segment_bytes, const ath_segment *before, const void *kept)
 {
     ath_work *work = (ath_work *)memory;
-    preparation asked;
+    preparation asked = {file, segment_memory, 0, index, level, before, kept, 0, {0, 0}, 0};
     if (index < 0 || index >= file->info.segment_count || level < 0 || level >= file->info.level_count)
         return ATH_BAD_ARGUMENT;
     if (!file->rest_known) return ATH_NEEDS_HOST_MESH;
     if (!file->bases || !ath_level_plan(file, level)->bases || !ath_fits(memory, work_bytes, ath_work_size(file))
         || !ath_fits(segment_memory, segment_bytes, ath_segment_size(file, level)))
         return ATH_NO_MEMORY;
-    memset(&asked, 0, sizeof asked);
-    asked.file = file;
-    asked.memory = segment_memory;
-    asked.index = index;
-    asked.level = level;
-    asked.from = before;
-    asked.kept = kept;
     memset(work, 0, sizeof *work);
     int result = begin(work, &asked, index, level), join = ath_join_at(file, index, level);
-    if (result != ATH_OK || join == 0 || work->shown_before) return result; /* that is joined */
-    set_join(&work->join, join);
+    if (result != ATH_OK || join == 0 || work->shown_before) return result; /* `before` is joined already */
+    ath_set_join(&work->join, join);
     work->phase = BEFORE;
     return ATH_OK;
 }
@@ -552,22 +419,12 @@ int ath_prepare_start(void *memory, size_t work_bytes, const ath_file *file, int
     return start(memory, work_bytes, file, index, level, segment_memory, segment_bytes, 0, 0);
 }
 
-/* The end of a prepared segment, for the one that is joined to it. */
-static void take_end(ath_join *join, const ath_segment *before)
-{
-    size_t maps = ATH_END_FRAMES * (size_t)before->node_count * ATH_MAP;
-    size_t all_maps = (size_t)before->frames * (size_t)before->node_count * ATH_MAP;
-    size_t number = before->is_float64 ? sizeof(double) : sizeof(float);
-    memcpy(join->maps, before->maps + (all_maps - maps), maps * sizeof(double));
-    memcpy(join->positions, before->end, ATH_END_FRAMES * 3 * (size_t)before->exact_vertices * number);
-}
-
 int ath_follow(ath_work *work, const ath_segment *before)
 {
     if (work->phase != BEFORE) return ATH_OK;
     if (before->index != ath_segment_before(work->file, work->index) || before->level != work->level)
         return ATH_BAD_ARGUMENT;
-    take_end(&work->join, before);
+    ath_take_end(&work->join, before);
     work->phase = CHECKSUMS;
     return ATH_OK;
 }
@@ -590,7 +447,7 @@ int ath_prepare_to(ath_work *work, void *positions)
     return ATH_OK;
 }
 
-/* The segment before is prepared in the memory of the one asked for. */
+/* Prepares the segment before in the memory of the one asked for. */
 static int go_back(ath_work *work)
 {
     preparation asked = work->asked;
@@ -601,8 +458,8 @@ static int go_back(ath_work *work)
 static int go_on(ath_work *work)
 {
     preparation asked = work->asked;
-    take_end(&work->join, work->segment);
-    set_join(&work->join, ath_join_at(work->file, asked.index, asked.level));
+    ath_take_end(&work->join, work->segment);
+    ath_set_join(&work->join, ath_join_at(work->file, asked.index, asked.level));
     return begin(work, &asked, asked.index, asked.level);
 }
 
@@ -622,7 +479,7 @@ static void next_phase(ath_work *work, prepare_phase phase)
     work->next = 0;
 }
 
-/* A level's chunks, then the next level's. */
+/* Moves on to the next chunk of the level, or to the next level. */
 static void next_to_check(ath_work *work)
 {
     work->crc = work->crc_at = 0;
@@ -648,7 +505,7 @@ static int check_some(ath_work *work)
     return ATH_OK;
 }
 
-/* Own rows of a basis in waves. */
+/* Reads the rows from `known` on, as integers of waves. */
 static int read_waves(ath_work *work, const ath_stems_head *head, int32_t known, int32_t d)
 {
     stems_reader *reader = work->stems + d;
@@ -667,7 +524,7 @@ static int read_waves(ath_work *work, const ath_stems_head *head, int32_t known,
     return coder_finish(&coder) ? ATH_OK : ATH_BAD_CHUNK;
 }
 
-/* Own rows of a basis by their entries. Integers are decoded into the far half of the rows that they become. */
+/* Reads the rows from `known` on as samples. Their integers are decoded into the far half of the rows' memory. */
 static int read_entries(ath_work *work, const ath_stems_head *head, int32_t known, int32_t d)
 {
     int32_t frames = work->segment->frames;
@@ -680,7 +537,7 @@ static int read_entries(ath_work *work, const ath_stems_head *head, int32_t know
     return result;
 }
 
-/* Rows of a basis: those of the one that it begins with, then its own. */
+/* A basis begins with the rows of another one, if it has a base, and goes on with its own rows. */
 static int read_temporal(ath_work *work, const ath_stems_head *head, int32_t d)
 {
     stems_reader *reader = work->stems + d;
@@ -755,7 +612,7 @@ static int open_predicted(ath_work *work)
                                       segment->is_float64, bytes_of(work->predicted), segment->positions));
 }
 
-/* The streams of one level. */
+/* Opens the streams of one level. */
 static int open_level(ath_work *work)
 {
     int32_t d = work->next++, result = ATH_OK;
@@ -766,7 +623,9 @@ static int open_level(ath_work *work)
             coder_start(&work->exact_level.coder, work->exact_level.chunk->bytes, work->exact_level.chunk->length);
         }
         next_phase(work, work->predicted ? FRAMES : PIECES);
-        keep_streams(work);
+        for (int32_t k = 0; work->keeping.at && k <= work->level; k++)
+            if (ath_has_stream(work->file, k))
+                ath_keep_stream(&work->keeping, work->streams + k, work->segment->frames);
         if (work->predicted) return open_predicted(work);
         return chunk ? blame(work, chunk, open_corrections(&work->corrections)) : ATH_OK;
     }
@@ -788,7 +647,7 @@ static void clear_row(int32_t *row, int32_t frames, int32_t *count)
     *count = 0;
 }
 
-/* Rows are zero on entry to code_row. */
+/* code_row needs rows of zeros. */
 static void clear_piece(layer_work *layer, const ath_piece *piece)
 {
     int32_t T = layer->motion.frames;
@@ -799,7 +658,7 @@ static void clear_piece(layer_work *layer, const ath_piece *piece)
     clear_row(layer->rows.rotation, T, layer->counts + ROTATION_SLOT);
 }
 
-/* The shapes that the level adds to those of the piece. */
+/* Reads the shapes that a level adds to the piece. */
 static int read_shapes(ath_work *work, const ath_piece *piece, int32_t level)
 {
     shapes_reader *reader = work->shapes + level;
@@ -849,7 +708,7 @@ static int refine_shapes(ath_work *work, int32_t q, const ath_piece *piece)
     return ATH_OK;
 }
 
-/* What the layer before, whose piece is at `placed`, tells this one. */
+/* Sets what the layer before, which has put the piece at `placed`, tells this one. */
 static void look_before(ath_work *work, int32_t q, int32_t p, const double *placed)
 {
     layer_work *layer = work->layers + q;
@@ -905,66 +764,11 @@ static int refine_piece(ath_work *work, int32_t q, int32_t p, const double **pla
     return ATH_OK;
 }
 
-/* The memory behind a piece in some frames, which the next one fills: fetched while that is decoded. */
-ATH_INLINE void expect_next(float *next, int32_t rows, int32_t start, int32_t stop, size_t frame_size)
-{
-    for (int32_t r = 0; r < rows; r += CACHE_LINE)
-        for (int32_t t = start; t < stop; t++)
-            ath_expect_write((uintptr_t)next + ((size_t)t * frame_size + (size_t)(r + CACHE_LINE - 1)) * sizeof *next);
-}
-
-/* Transposes rows over time into frames. */
-ATH_HOT static void store_floats(const double *placed, int32_t rows, int32_t T, const double origin[3], float *out,
-                                 size_t frame_size)
-{
-    double added[3 + ATH_LANES];
-    int32_t whole = rows - rows % ATH_LANES;
-    for (int32_t i = 0; i < 3 + ATH_LANES; i++) added[i] = origin[i % 3];
-    for (int32_t start = 0; start < T; start += TILE) {
-        int32_t stop = ath_min(start + TILE, T), squares = start + (stop - start) / ATH_LANES * ATH_LANES;
-        expect_next(out + rows, rows, start, stop, frame_size);
-        for (int32_t r = 0; r < rows; r += ATH_LANES) {
-            const double *from = placed + (size_t)r * (size_t)T;
-            float *to = out + r;
-            int32_t t = start;
-            for (; r < whole && t < squares; t += ATH_LANES)
-                lanes_transpose(from + t, (size_t)T, added + r % 3, to + (size_t)t * frame_size, frame_size);
-            for (; t < stop; t++)
-                for (int32_t i = 0; i < ath_min(ATH_LANES, rows - r); i++)
-                    to[(size_t)t * frame_size + (size_t)i] = (float)(from[i * T + t] + added[r % 3 + i]);
-        }
-    }
-}
-
-static void store_doubles(const double *placed, int32_t rows, int32_t T, const double origin[3], double *out,
-                          size_t frame_size)
-{
-    for (int32_t r = 0; r < rows; r++)
-        for (int32_t t = 0; t < T; t++)
-            out[(size_t)t * frame_size + (size_t)r] = placed[(size_t)r * (size_t)T + (size_t)t] + origin[r % 3];
-}
-
-static void store_piece(ath_work *work, const ath_piece *piece, const double *placed)
-{
-    ath_segment *segment = work->segment;
-    size_t at = 3 * (size_t)work->exact, frame_size = 3 * (size_t)segment->exact_vertices;
-    const double *origin = work->file->info.origin;
-    if (segment->is_float64)
-        store_doubles(placed, 3 * piece->count, segment->frames, origin, (double *)segment->positions + at, frame_size);
-    else
-        store_floats(placed, 3 * piece->count, segment->frames, origin, (float *)segment->positions + at, frame_size);
-}
-
 static void correct(ath_segment *segment, size_t at, double parts, double step)
 {
     if (parts == 0.0) return;
-    if (segment->is_float64) {
-        double *position = (double *)segment->positions + at;
-        *position = ath_corrected(*position, parts, step);
-    } else {
-        float *position = (float *)segment->positions + at;
-        *position = (float)ath_corrected((double)*position, parts, step);
-    }
+    double position = ath_number_at(segment->positions, at, segment->is_float64);
+    ath_put_number(segment->positions, at, segment->is_float64, ath_corrected(position, parts, step));
 }
 
 static void correct_vertex(const corrections_reader *reader, const correction_row *row, ath_segment *segment,
@@ -1006,20 +810,15 @@ static int read_exact_point(ath_work *work, size_t at)
     exact_reader *reader = &work->exact_level;
     double known[3], number[3];
     for (size_t k = 0; k < 3; k++)
-        known[k] = work->segment->is_float64 ? ((const double *)work->segment->positions)[at + k]
-                                             : (double)((const float *)work->segment->positions)[at + k];
+        known[k] = ath_number_at(work->segment->positions, at + k, work->segment->is_float64);
     if (!code_exact_point(&reader->coder, reader->model, work->segment->is_float64, known, reader->length, number))
         return 0;
-    for (size_t k = 0; k < 3; k++) {
-        if (work->segment->is_float64)
-            ((double *)work->segment->positions)[at + k] = number[k];
-        else
-            ((float *)work->segment->positions)[at + k] = (float)number[k];
-    }
+    for (size_t k = 0; k < 3; k++)
+        ath_put_number(work->segment->positions, at + k, work->segment->is_float64, number[k]);
     return 1;
 }
 
-/* The source's own positions in place of those that the levels before give. */
+/* Replaces the positions of the last lossy level by the source's own. */
 static int make_exact(ath_work *work, const ath_piece *piece)
 {
     size_t vertices = (size_t)work->segment->exact_vertices;
@@ -1028,108 +827,6 @@ static int make_exact(ath_work *work, const ath_piece *piece)
             if (!read_exact_point(work, (t * vertices + (size_t)(work->exact + i)) * 3))
                 return blame(work, work->exact_level.chunk, ATH_BAD_CHUNK);
     return ATH_OK;
-}
-
-/* Of frames of exact vertices, as many as the segment has. */
-static void *vertex_at(const ath_segment *segment, void *frames, size_t t, size_t vertex)
-{
-    size_t at = 3 * (t * (size_t)segment->exact_vertices + vertex);
-    return (uint8_t *)frames + at * (segment->is_float64 ? sizeof(double) : sizeof(float));
-}
-
-/* Keeps the end of the piece as it is placed. */
-static void keep_end(ath_work *work, const ath_piece *piece)
-{
-    ath_segment *segment = work->segment;
-    size_t vertex = (size_t)work->exact, frames = (size_t)segment->frames;
-    size_t size = 3 * (size_t)piece->count * number_size(work->file);
-    if (!segment->end || frames < ATH_END_FRAMES) return;
-    for (size_t t = 0; t < ATH_END_FRAMES; t++)
-        memcpy(vertex_at(segment, segment->end, t, vertex),
-               vertex_at(segment, segment->positions, frames - ATH_END_FRAMES + t, vertex), size);
-}
-
-/* How far numbers are off where the two that end the segment before go on to, in value and in slope, midway between that
- * and their own first two. */
-ATH_INLINE void set_off(double start, double end, double first, double second, double off[2])
-{
-    off[0] = 0.5 * (3.0 * (end - first) - (start - second));
-    off[1] = (end - start) - (second - first);
-}
-
-ATH_INLINE double joined(const ath_join *join, int32_t t, double x, const double off[2])
-{
-    return x + (off[0] * join->jumps[t] + off[1] * join->slopes[t]);
-}
-
-ATH_HOT static void join_floats(const ath_join *join, const float *start, const float *end, float *x, size_t count,
-                                size_t frame_size)
-{
-    double off[3 * ATH_PIECE_VERTICES][2];
-    for (size_t i = 0; i < count; i++)
-        set_off((double)start[i], (double)end[i], (double)x[i], (double)x[frame_size + i], off[i]);
-    for (int32_t t = 0; t < join->width; t++, x += frame_size)
-        for (size_t i = 0; i < count; i++) x[i] = (float)joined(join, t, (double)x[i], off[i]);
-}
-
-static void join_doubles(const ath_join *join, const double *start, const double *end, double *x, size_t count,
-                         size_t frame_size)
-{
-    double off[3 * ATH_PIECE_VERTICES][2];
-    for (size_t i = 0; i < count; i++) set_off(start[i], end[i], x[i], x[frame_size + i], off[i]);
-    for (int32_t t = 0; t < join->width; t++, x += frame_size)
-        for (size_t i = 0; i < count; i++) x[i] = joined(join, t, x[i], off[i]);
-}
-
-static double join_number(const void *numbers, size_t at, int is_float64)
-{
-    return is_float64 ? ((const double *)numbers)[at] : (double)((const float *)numbers)[at];
-}
-
-static void watch_join(const ath_work *work, const void *start, const void *end, const void *x, size_t count,
-                       size_t frame_size, int is_float64)
-{
-    double off[3 * ATH_PIECE_VERTICES][2];
-    ath_watcher *watcher = watcher_of(work);
-    const ath_join *join = &work->join;
-    if (!watcher) return;
-    for (size_t i = 0; i < count; i++)
-        set_off(join_number(start, i, is_float64), join_number(end, i, is_float64), join_number(x, i, is_float64),
-                join_number(x, frame_size + i, is_float64), off[i]);
-    watcher->join(watcher, join->width, join->jumps, join->slopes, (int32_t)count, off);
-}
-
-static void join_piece(ath_work *work, const ath_piece *piece)
-{
-    ath_segment *segment = work->segment;
-    const ath_join *join = &work->join;
-    size_t vertex = (size_t)work->exact, count = 3 * (size_t)piece->count,
-           frame_size = 3 * (size_t)segment->exact_vertices;
-    const void *start = vertex_at(segment, join->positions, 0, vertex);
-    const void *end = vertex_at(segment, join->positions, 1, vertex);
-    watch_join(work, start, end, vertex_at(segment, segment->positions, 0, vertex), count, frame_size,
-               segment->is_float64);
-    if (segment->is_float64)
-        join_doubles(join, (const double *)start, (const double *)end, (double *)segment->positions + 3 * vertex, count,
-                     frame_size);
-    else
-        join_floats(join, (const float *)start, (const float *)end, (float *)segment->positions + 3 * vertex, count,
-                    frame_size);
-}
-
-/* The piece as the level before, the last lossy one, shows it. */
-static void copy_piece(ath_work *work, const ath_piece *piece)
-{
-    const ath_segment *from = work->shown_before;
-    size_t number = from->is_float64 ? sizeof(double) : sizeof(float), row = 3 * number;
-    for (size_t t = 0; t < (size_t)from->frames; t++) {
-        size_t at = (t * (size_t)from->exact_vertices + (size_t)work->exact) * row;
-        memcpy((uint8_t *)work->segment->positions + at, (const uint8_t *)from->positions + at,
-               (size_t)piece->count * row);
-    }
-    for (size_t t = 0; from->end && t < ATH_END_FRAMES; t++)
-        memcpy(vertex_at(from, work->segment->end, t, (size_t)work->exact),
-               vertex_at(from, from->end, t, (size_t)work->exact), (size_t)piece->count * row);
 }
 
 static int do_frames(ath_work *work)
@@ -1146,19 +843,23 @@ static void watch_piece(const ath_work *work, int32_t p)
     watcher->piece(watcher, layer->plan, &layer->motion, p, &layer->rows);
 }
 
-/* The piece at the first layer, then as each further one refines it. */
+/* Places the piece at the first layer, then refines it layer by layer. */
 static int place_piece(ath_work *work, int32_t p)
 {
     const ath_piece *piece = work->file->plan.pieces + p;
     layer_work *layer = work->layers + work->first_layer;
+    size_t vertex = (size_t)work->exact;
     const double *placed = ath_pose_piece(layer->plan, &layer->motion, p, &layer->rows, &layer->scratch);
     for (int32_t q = work->first_layer + 1; q <= work->layer; q++)
         if (refine_piece(work, q, p, &placed) != ATH_OK) return ATH_BAD_CHUNK;
-    if (work->keeping.at) keep_piece(work, piece);
+    layer = work->layers + work->layer;
+    if (work->keeping.at)
+        ath_keep_piece(&work->keeping, piece, &layer->rows, layer->shape_integers, layer->motion.frames);
     if (watcher_of(work)) watch_piece(work, p);
-    store_piece(work, piece, placed);
-    keep_end(work, piece);
-    if (work->join.width > 0) join_piece(work, piece);
+    ath_store_vertices(work->segment, work->file->info.origin, vertex, piece->count, placed);
+    ath_keep_end(work->segment, vertex, (size_t)piece->count);
+    if (work->join.width > 0)
+        ath_join_vertices(&work->join, work->segment, vertex, (size_t)piece->count, watcher_of(work));
     if (work->corrections.chunk) correct_piece(work, piece);
     return ATH_OK;
 }
@@ -1167,7 +868,7 @@ static int show_piece(ath_work *work, int32_t p)
 {
     const ath_piece *piece = work->file->plan.pieces + p;
     if (work->shown_before)
-        copy_piece(work, piece);
+        ath_copy_vertices(work->segment, work->shown_before, (size_t)work->exact, (size_t)piece->count);
     else if (!work->predicted && place_piece(work, p) != ATH_OK)
         return ATH_BAD_CHUNK;
     int result = work->exact_level.chunk ? make_exact(work, piece) : ATH_OK;
@@ -1189,10 +890,7 @@ static void show_node(ath_work *work, int32_t n)
         for (size_t k = 0; k < 9; k++) map[k] = layer->scratch.at.rotation[k * T + t];
         for (size_t k = 0; k < 3; k++) map[9 + k] = layer->scratch.at.point[k * T + t];
     }
-    if (work->join.width == 0) return;
-    const double *end = work->join.maps + (maps - segment->maps);
-    watch_join(work, end, end + nodes * ATH_MAP, maps, ATH_MAP, nodes * ATH_MAP, 1);
-    join_doubles(&work->join, end, end + nodes * ATH_MAP, maps, ATH_MAP, nodes * ATH_MAP);
+    if (work->join.width > 0) ath_join_map(&work->join, segment, (size_t)(work->shown - 1), watcher);
 }
 
 static int read_node(ath_work *work, int32_t n)
@@ -1205,26 +903,22 @@ static int read_node(ath_work *work, int32_t n)
     return blame(work, reader->chunk, valid ? ATH_OK : ATH_BAD_CHUNK);
 }
 
-static int finish_level(ath_work *work, int32_t d)
+static int finish_stream(ath_work *work, const ath_chunk *chunk, const ath_coder *coder)
 {
-    const stems_reader *stems = work->stems + d;
-    const affines_reader *affines = work->affines + d;
-    const shapes_reader *shapes = work->shapes + d;
-    if (shapes->chunk && !coder_finish(&shapes->coder)) return blame(work, shapes->chunk, ATH_BAD_CHUNK);
-    if (stems->chunk && !coder_finish(&stems->coder)) return blame(work, stems->chunk, ATH_BAD_CHUNK);
-    if (affines->chunk && !coder_finish(&affines->coder)) return blame(work, affines->chunk, ATH_BAD_CHUNK);
-    return ATH_OK;
+    return blame(work, chunk, !chunk || coder_finish(coder) ? ATH_OK : ATH_BAD_CHUNK);
 }
 
 static int finish(ath_work *work)
 {
-    const corrections_reader *corrections = &work->corrections;
     for (int32_t d = 0; d <= work->level; d++)
-        if (finish_level(work, d) != ATH_OK) return ATH_BAD_CHUNK;
+        if (finish_stream(work, work->shapes[d].chunk, &work->shapes[d].coder)
+            || finish_stream(work, work->stems[d].chunk, &work->stems[d].coder)
+            || finish_stream(work, work->affines[d].chunk, &work->affines[d].coder))
+            return ATH_BAD_CHUNK;
     if (work->only_end) return go_on(work);
-    if (corrections->chunk && !coder_finish(&corrections->coder)) return blame(work, corrections->chunk, ATH_BAD_CHUNK);
-    if (work->exact_level.chunk && !coder_finish(&work->exact_level.coder))
-        return blame(work, work->exact_level.chunk, ATH_BAD_CHUNK);
+    if (finish_stream(work, work->corrections.chunk, &work->corrections.coder)
+        || finish_stream(work, work->exact_level.chunk, &work->exact_level.coder))
+        return ATH_BAD_CHUNK;
     ath_cut(work->file, work->level, work->segment->parts);
     work->segment->index = work->index;
     work->segment->level = work->level;
@@ -1234,15 +928,18 @@ static int finish(ath_work *work)
     return ATH_OK;
 }
 
-/* One piece, and the node that begins with it. */
+/* Prepares one piece, and the node that begins with it. */
 static int do_piece(ath_work *work)
 {
     const ath_plan *plan = &work->file->plan;
     int32_t p = work->next++, result = ATH_OK;
     if (p == plan->piece_count) return finish(work);
     const ath_piece *piece = plan->pieces + p;
+    layer_work *first = work->layers + work->first_layer;
     if (work->first_level == 0 && !work->file->header.is_predicted) result = read_first_layer(work, p);
-    if (work->kept) restore_piece(work, piece);
+    if (work->kept)
+        work->kept = ath_kept_piece(work->kept, piece, &first->rows, first->shape_integers, first->unit_shapes,
+                                    first->motion.frames);
     if (result == ATH_OK && work->next_node < plan->node_count && plan->nodes[work->next_node].piece == p) {
         int32_t n = work->next_node++;
         result = read_node(work, n);
@@ -1295,7 +992,5 @@ int ath_prepare_onward(void *work, size_t work_bytes, const ath_file *file, cons
 }
 
 void ath_work_fault(const ath_work *work, ath_fault_info *fault) { *fault = work->fault; }
-
 int32_t ath_segment_index(const ath_segment *segment) { return segment->index; }
-
 int32_t ath_segment_level(const ath_segment *segment) { return segment->level; }

@@ -1,6 +1,6 @@
 /* A prepared segment, as preparing and playing see it. */
-#ifndef ATH_PREPARED_H
-#define ATH_PREPARED_H
+#ifndef ATH_PLAY_SEGMENT_H
+#define ATH_PLAY_SEGMENT_H
 
 #include "file/file.h"
 
@@ -8,13 +8,20 @@ enum { ATH_MAP = 12 }; /* doubles of a map x = c + R (x0 - a): R row by row, c r
 
 struct ath_segment {
     int32_t index, level; /* level -1: not prepared */
-    int32_t frames;       /* coded ones */
+    int32_t frames;       /* coded frames */
     int32_t exact_vertices, node_count, part_count;
     int32_t is_float64;
     ath_part *parts;
     double *maps;    /* frames x node_count x ATH_MAP */
     void *positions; /* frames x exact_vertices x 3, float or (is_float64) double, absolute */
-    void *end;       /* ATH_END_FRAMES x exact_vertices x 3: the last ones, not corrected */
+    void *end;       /* ATH_END_FRAMES x exact_vertices x 3: the last frames before corrections */
 };
+
+/* Returns where an exact vertex stands in `frames`, which hold as many vertices as the segment. */
+ATH_INLINE void *ath_vertex_at(const ath_segment *segment, void *frames, size_t t, size_t vertex)
+{
+    size_t at = 3 * (t * (size_t)segment->exact_vertices + vertex);
+    return (uint8_t *)frames + at * ath_number_size(segment->is_float64);
+}
 
 #endif

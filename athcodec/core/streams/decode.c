@@ -1,7 +1,10 @@
-/* Decodes the streams of the prelude: streams.h compiled for decoding. */
+/* The streams of the prelude, compiled for decoding. */
 #include "streams/decode.h"
+#include "streams/hierarchy.inl"
 #include "streams/polygons.inl"
-#include "streams/prelude.inl"
+#include "streams/rest_exact.inl"
+#include "streams/series.inl"
+#include "streams/source_rest.inl"
 
 size_t ath_prelude_model_size(void)
 {
@@ -11,7 +14,7 @@ size_t ath_prelude_model_size(void)
 
 static int finished(const ath_coder *coder, int valid) { return valid && coder_finish(coder) ? ATH_OK : ATH_BAD_CHUNK; }
 
-/* Marks every value seen by the sign of the entry that it names, and clears the marks. */
+/* Marks every value by the sign of the entry that it names, and clears the marks at the end. */
 static int is_permutation(int32_t count, int32_t *source)
 {
     int distinct = 1;

@@ -1,32 +1,33 @@
-/* Decodes the streams of the prelude and of a learned time basis. */
-#ifndef ATH_DECODE_H
-#define ATH_DECODE_H
+/* Decodes the streams of the prelude and of a learned time basis. All functions return ATH_OK or ATH_BAD_CHUNK. */
+#ifndef ATH_STREAMS_DECODE_H
+#define ATH_STREAMS_DECODE_H
 
-#include "file/container.h"
+#include "container/container.h"
 #include "model/mesh.h"
 #include "model/plan.h"
 
-/* Bytes of scratch memory that any of these needs as `model`. */
+/* Returns the bytes of scratch memory that any of these needs as `model`. */
 size_t ath_prelude_model_size(void);
 
-/* ATH_OK or ATH_BAD_CHUNK. branches: zero on entry. */
+/* branches: zero on entry. */
 int ath_decode_hierarchy(void *model, const uint8_t *bytes, size_t size, int32_t branch_count, int32_t vertex_count,
                          ath_branch *branches, int32_t *branch_source, int32_t *vertex_source);
-/* mesh: of a connected pose, else null; coarse, before: integers and positions of the layer before, null for the first layer; steps: those of this one, null where none are wanted. */
+/* mesh: null unless the pose is connected. coarse, before: integers and positions of the layer before; null for the
+ * first layer. steps: filled with the integers; may be null. */
 int ath_decode_rest(void *model, const uint8_t *bytes, size_t size, const ath_branch *branches, int32_t branch_count,
                     double step, ath_mesh *mesh, const int32_t *coarse, const double *before, int32_t *steps,
                     double *rest);
-/* The rest pose of the source about the reference pose, both less the origin; turns: scratch, branch_count x 9. */
+/* Decodes the source's rest pose about the reference pose, both less the origin. turns: scratch, branch_count x 9. */
 int ath_decode_source_rest(void *model, const uint8_t *bytes, size_t size, const ath_branch *branches,
                            int32_t branch_count, double step, const double *reference, double *turns, double *rest);
-/* Positions as stored, floats or (is_float64) doubles, the origin not taken off. All are finite. */
+/* Decodes positions as stored, floats or (is_float64) doubles, with the origin. All are finite. */
 int ath_decode_exact_rest(void *model, const uint8_t *bytes, size_t size, const ath_branch *branches,
                           int32_t branch_count, const ath_mesh *mesh, int is_float64, double *rest);
-/* Corners in source order. memory: ath_faces_memory bytes; counts: null unless shape->is_mixed. */
+/* Decodes corners in source order. memory: ath_faces_memory bytes. counts: null unless shape->is_mixed is 1. */
 ATH_ENCODER_API size_t ath_faces_memory(int32_t vertex_count);
 int ath_decode_faces(void *memory, ath_bytes stream, const ath_polygons *shape, int32_t vertex_count, uint32_t *counts,
                      int32_t *corners);
-/* All are finite; the caller checks that they increase. */
+/* Times are finite. The caller checks that they increase. */
 int ath_decode_times(void *model, const uint8_t *bytes, size_t size, int32_t frame_count, double *times);
 /* rank x frames integers; ATH_MOST_SAMPLE stands for 1. */
 int ath_decode_temporal(void *model, const uint8_t *bytes, size_t size, int32_t rank, int32_t frames, int32_t *basis);

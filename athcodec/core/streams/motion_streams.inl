@@ -1,9 +1,11 @@
-/* What the streams of a segment hold, in which order: stems, maps of nodes, corrections. Compiled once for each
- * direction, as streams.h is; a unit at a time, so that a decoder reads all levels side by side, piece by piece. */
-#ifndef ATH_MOTION_STREAMS_H
-#define ATH_MOTION_STREAMS_H
+/* The streams of a segment: stems, maps of nodes, corrections. Compiled once for each direction. A call codes one unit,
+ * so that a decoder reads all levels side by side, piece by piece. */
+#ifndef ATH_STREAMS_MOTION_STREAMS_INL
+#define ATH_STREAMS_MOTION_STREAMS_INL
 
 #include "bits/refinements.inl"
+#include "model/corrections.h"
+#include "model/refine.h"
 
 /* ---- shapes ---- */
 
@@ -11,7 +13,7 @@ typedef struct {
     coefficient_model rows;
     uint32_t history[HISTORY_ROWS * ATH_SHAPE_MODES];
     number_model count;
-    int32_t count_before[2]; /* of the piece before, by part */
+    int32_t count_before[2]; /* counts of the piece before, by part */
 } shape_model;
 
 static void shape_model_init(shape_model *model)
@@ -21,9 +23,9 @@ static void shape_model_init(shape_model *model)
     model->count_before[0] = model->count_before[1] = 0;
 }
 
-/* What the stream of one level holds of a piece's shapes: those of its base level first, the others at its own, where
- * the base level is full. `integers`: ATH_SHAPE_NUMBERS of each, zero on entry where decoding; `count`: all of them
- * when encoding, else those that are known. Returns the new count, -1 where it cannot be. */
+/* Codes the shapes of a piece that the stream of one level holds: the base level has the first ones and, if it is full,
+ * the piece's own level the others. integers: ATH_SHAPE_NUMBERS per shape, zero on entry when decoding. count: all
+ * shapes when encoding, else those that are known. Returns the new count; -1: it is not valid. */
 static int32_t code_shapes(ath_coder *coder, shape_model *model, const ath_piece *piece, int32_t level, int32_t count,
                            int32_t *integers)
 {
@@ -56,8 +58,8 @@ static void refined_shape_model_init(refined_shape_model *model)
     number_model_init(&model->count);
 }
 
-/* All shapes of a piece in a refinement: those that the layer before has too, `coarse`, are coded about theirs, times
- * 2 ^ shift. Returns their number, -1 where it cannot be. */
+/* Codes all shapes of a piece in a refinement, about those of the layer before, `coarse`, times 2 ^ shift. Returns
+ * their number; -1: it is not valid. */
 static int32_t code_refined_shapes(ath_coder *coder, refined_shape_model *model, const ath_piece *piece,
                                    int32_t coarse_count, const int32_t *coarse, int32_t shift, int32_t count,
                                    int32_t *integers)
@@ -85,7 +87,7 @@ static void note_count(const ath_piece_rows *rows, int32_t slot, int32_t count)
     if (rows->counts) rows->counts[slot] = count;
 }
 
-/* What the stream of one level holds of a piece. */
+/* Codes the rows of a piece that the stream of one level holds. */
 static void code_piece(ath_coder *coder, coefficient_model *model, const ath_plan *plan, const ath_stream *stream,
                        int32_t frames, int32_t p, int32_t level, const ath_piece_rows *rows)
 {
@@ -109,8 +111,6 @@ static void code_piece(ath_coder *coder, coefficient_model *model, const ath_pla
     }
 }
 
-/* What the stream of a refinement holds of a piece, once its predictions are known: tracks first, then modes, whose
- * predictions need the attach frame that the tracks make. */
 static void code_refined_track(ath_coder *coder, refinement_model *model, const ath_stream *stream,
                                const ath_motion *motion, int32_t slot, const uint32_t ratios[3],
                                const int32_t *predicted, const int32_t *coarse, const ath_piece_rows *rows,
@@ -121,6 +121,8 @@ static void code_refined_track(ath_coder *coder, refinement_model *model, const 
     note_count(rows, slot, ath_row_extent(row, motion->frames, motion->frames));
 }
 
+/* The stream of a refinement holds a piece's tracks first, since the predictions of the modes need the attach frame
+ * that the tracks make. */
 static void code_refined_tracks(ath_coder *coder, refinement_model *model, const ath_plan *plan,
                                 const ath_stream *stream, const ath_motion *motion, const ath_piece *piece,
                                 const ath_piece_rows *rows)
@@ -195,8 +197,8 @@ typedef struct {
     int32_t step_before, above_count;
 } basis_model;
 
-/* Up to three rows of a basis are the axes of one row: an exponent of each, which is the change from the one before, and
- * the integers. */
+/* Codes up to three rows of a basis as the axes of one row: the exponent of each, as the change from the one before,
+ * then the integers. */
 static int code_basis_rows(ath_coder *coder, basis_model *model, int32_t frames, int32_t count, int32_t *exponents,
                            int32_t *row)
 {
@@ -213,11 +215,7 @@ static basis_model basis_model_of(coefficient_model *rows, number_model *steps, 
 {
     coefficient_model_init(rows, frames, history);
     number_model_init(steps);
-    basis_model model;
-    model.rows = rows;
-    model.steps = steps;
-    model.step_before = 0;
-    model.above_count = -1;
+    basis_model model = {rows, steps, 0, -1};
     return model;
 }
 
@@ -225,8 +223,8 @@ static basis_model basis_model_of(coefficient_model *rows, number_model *steps, 
 
 enum { CORRECTION_BLOCK = 8, CORRECTION_BLOCKS = ATH_SEGMENT_FRAMES / CORRECTION_BLOCK };
 
-/* The corrections of one vertex, and a bit for each frame that has one, a byte for each block; the bytes of the block
- * before the first and of the one behind the last are 0. */
+/* The corrections of one vertex, with a bit per frame that has one and a byte per block of frames. The bytes before the
+ * first block and behind the last one are 0. */
 typedef struct {
     ath_correction of[ATH_SEGMENT_FRAMES];
     uint8_t blocks[1 + CORRECTION_BLOCKS + 1];
@@ -236,9 +234,9 @@ typedef struct {
     ath_context vertex[4], block[2][4], frame[3][3][2], zero[2][3], sign[3][3];
     ath_context width[1 + ATH_FOOTPRINTS][ATH_FOOTPRINTS - 1];
     number_model size;
-    correction_row row[2]; /* of the vertex before and of this one; which is which: `turn` */
+    correction_row row[2]; /* rows of the vertex before and of this one, at `turn` */
     int32_t turn;
-    int32_t before; /* whether the two vertices before had any */
+    int32_t before; /* a bit for each of the two vertices before: whether it had any */
 } correction_model;
 
 static void correction_model_init(correction_model *model)
@@ -278,7 +276,7 @@ static void clear_corrections(correction_row *row)
     }
 }
 
-/* Its vector is not all zero; `like` is a neighbour, or zeros. */
+/* Codes a vector that is not all 0. `like` is a neighbour, or zeros. */
 static void code_correction(ath_coder *coder, correction_model *model, const ath_correction *like, ath_correction *own)
 {
     int any = 0, alike = like->q[0] != 0 || like->q[1] != 0 || like->q[2] != 0;
@@ -331,10 +329,10 @@ static void code_corrected_frames(ath_coder *coder, correction_model *model, int
     }
 }
 
-/* Codes the corrections of the next vertex. Returns its row, which stays valid until the vertex after it; null: it
- * has none. When encoding, the row is filled before (next_row). */
+/* An encoder fills this row before code_vertex. */
 static correction_row *next_row(correction_model *model) { return &model->row[model->turn]; }
 
+/* Codes the corrections of the next vertex. Returns its row, valid until the vertex after it; null: it has none. */
 static const correction_row *code_vertex(ath_coder *coder, correction_model *model, int32_t frames, int any)
 {
     correction_row *row = next_row(model), *above = &model->row[1 - model->turn];
@@ -347,14 +345,14 @@ static const correction_row *code_vertex(ath_coder *coder, correction_model *mod
 }
 
 #ifndef ATH_ENCODING
-/* Whether corrections may reach the block of frame t. */
+/* Returns whether corrections may reach the block of frame t. */
 ATH_INLINE int is_reached(const correction_row *row, int32_t t)
 {
     const uint8_t *blocks = row->blocks + t / CORRECTION_BLOCK;
     return (blocks[0] | blocks[1] | blocks[2]) != 0;
 }
 
-/* Of the blocks that corrections may reach; the others are not written. */
+/* Sums the corrections in the blocks that they may reach. Other blocks are not written. */
 static void correction_parts(const correction_row *row, int32_t frames, ath_corrected_parts parts)
 {
     for (int32_t t = 0; t < frames; t += CORRECTION_BLOCK)

@@ -1,52 +1,53 @@
-/* The corners of polygons, or the ends of edges (FORMAT.md, "Polygon stream"). Compiled once for each direction. */
-#ifndef ATH_FACES_MODEL_H
-#define ATH_FACES_MODEL_H
+/* The corners of polygons, or the ends of edges (FORMAT.md, "Polygon stream"). Compiled once for each direction. A way
+ * is the difference between the vertices of two successive corners. */
+#ifndef ATH_STREAMS_POLYGONS_INL
+#define ATH_STREAMS_POLYGONS_INL
 
-#include "file/container.h"
+#include "container/container.h"
 #include "model/mesh.h"
 #include "bits/numbers.inl"
 
 enum {
-    FACE_LONG = 12, /* ways that have to be alike before what followed them is expected again */
+    FACE_LONG = 12, /* equal ways before a long, or a short, repetition is expected to go on */
     FACE_SHORT = 3,
     FACE_TABLE_BITS = 14,
     FACE_RECENT_BITS = 5,
-    FACE_SIDES = 3, /* open sides that are remembered of a vertex, each way */
+    FACE_SIDES = 3, /* open sides that are kept per vertex and direction */
     FACE_GUESSES = 2 + 4 * FACE_SIDES,
-    FACE_REPEATED = 0, /* how a corner was coded: as the long repetition has it, by a guess (the first is 1), or else */
+    FACE_REPEATED = 0, /* how a corner was coded: by the long repetition, by guess k (1 + k), or otherwise */
     FACE_RECENT = FACE_GUESSES + 1,
     FACE_FAR,
     FACE_WAYS,
     FACE_RUNS = 16,
-    FACE_PLACES = 5, /* first to third corner, those behind, and those that two open sides want */
+    FACE_PLACES = 5, /* first, second, third, later corners, and those where two open sides agree */
     FACE_COUNTS_BITS = 6,
     FACE_FAR_MEAN = 1024
 };
 
 typedef struct {
-    ath_context repeats[FACE_RUNS];                            /* by how long the long repetition has held */
+    ath_context repeats[FACE_RUNS];                            /* by how long the repetition has held */
     ath_context guessed[FACE_GUESSES][FACE_PLACES][FACE_WAYS]; /* by how the corner before was coded */
     ath_context is_recent[FACE_PLACES], recent[FACE_PLACES][1 << FACE_RECENT_BITS];
     ath_context same_count[1 << FACE_COUNTS_BITS];
     number_model count, far[3];
     uint32_t far_mean[3], count_mean, counts_seen;
-    uint32_t last[2][1 << FACE_TABLE_BITS]; /* behind the last ways of this hash: the place of a corner */
-    uint32_t followed, run; /* of the long repetition: the corner that it expects again; how long it has held */
-    int32_t next, way;      /* the vertex behind the highest so far; how the last corner was coded */
+    uint32_t last[2][1 << FACE_TABLE_BITS]; /* by the hash of the last ways: the corner that followed them */
+    uint32_t followed, run; /* long repetition: the corner that it repeats next, and for how long it has held */
+    int32_t next, way;      /* highest vertex so far + 1; how the last corner was coded */
 } faces_model;
 
-/* What is coded. `bound`: vertices are 0 to bound - 1; before, after: of each of them the ends of open sides, last ones
- * first, -1: none. */
+/* The polygons that are coded. Vertices are 0 to bound - 1. before, after: the ends of each vertex's open sides; -1:
+ * none. */
 typedef struct {
     const ath_polygons *shape;
-    uint32_t *counts; /* null where all faces are alike */
+    uint32_t *counts; /* null if all faces have as many corners */
     int32_t *corners;
     int32_t (*before)[FACE_SIDES], (*after)[FACE_SIDES];
     int32_t bound;
-    uint32_t most; /* corners that a face may have */
+    uint32_t most; /* most corners of a face */
 } faces_list;
 
-/* memory: a model, and the open sides of each vertex. Vertices and counts are those that their types hold. */
+/* memory: a model, then the open sides of each vertex. The types of vertices and counts bound their values. */
 static faces_list faces_of(faces_model *memory, const ath_polygons *shape, int32_t vertex_count, uint32_t *counts,
                            int32_t *corners)
 {
@@ -77,7 +78,7 @@ static void faces_model_init(faces_model *model)
     model->count_mean = 64;
 }
 
-/* Of the `length` ways before corner i, which need as many corners and one more. */
+/* Hashes the `length` ways before corner i. */
 static uint32_t face_hash(const int32_t *corners, uint32_t i, uint32_t length)
 {
     uint32_t hash = 0;
@@ -86,7 +87,7 @@ static uint32_t face_hash(const int32_t *corners, uint32_t i, uint32_t length)
     return hash >> (32 - FACE_TABLE_BITS);
 }
 
-/* The vertex as far from the one before as corner `from` is; -1: none. */
+/* Repeats the way to corner `from`. Returns the vertex; -1: none. */
 static int32_t face_repeated(const faces_list *faces, uint32_t i, uint32_t from)
 {
     if (from == 0) return -1;
@@ -94,7 +95,7 @@ static int32_t face_repeated(const faces_list *faces, uint32_t i, uint32_t from)
     return vertex >= 0 && vertex < faces->bound ? (int32_t)vertex : -1;
 }
 
-/* Guesses of corner j of a face that begins at corner `first`; `previous`: where the face before begins. */
+/* Fills guesses for corner j of the face that begins at corner `first`. The face before begins at `previous`. */
 static void face_guesses(const faces_model *model, const faces_list *faces, uint32_t first, uint32_t j,
                          uint32_t previous, int32_t repeated, int32_t guesses[FACE_GUESSES])
 {
@@ -119,7 +120,7 @@ static void face_guesses(const faces_model *model, const faces_list *faces, uint
     while (k < FACE_GUESSES) guesses[k++] = -1;
 }
 
-/* By how far it is from another. */
+/* Codes a vertex by its difference from another. */
 static int32_t code_far(ath_coder *coder, faces_model *model, const faces_list *faces, int32_t j, int32_t about,
                         int32_t vertex)
 {
@@ -128,7 +129,7 @@ static int32_t code_far(ath_coder *coder, faces_model *model, const faces_list *
     return difference < -about || difference >= faces->bound - about ? -1 : about + difference;
 }
 
-/* The vertex of corner i, which is the j-th of its face; -1: none. */
+/* Codes the vertex of corner j of a face; -1: it is not valid. */
 static int32_t code_corner(ath_coder *coder, faces_model *model, const faces_list *faces, uint32_t first, uint32_t j,
                            uint32_t previous, uint32_t last)
 {
@@ -169,7 +170,7 @@ static int32_t code_corner(ath_coder *coder, faces_model *model, const faces_lis
     return code_far(coder, model, faces, ath_min(place, 2), i > 0 ? faces->corners[about] : 0, vertex);
 }
 
-/* Corner i, of which the long repetition expected this, has been coded. */
+/* Notes corner i, which the long repetition expected to be `expected`. */
 static void face_note(faces_model *model, const faces_list *faces, uint32_t i, int32_t expected)
 {
     int32_t vertex = faces->corners[i];
@@ -182,7 +183,7 @@ static void face_note(faces_model *model, const faces_list *faces, uint32_t i, i
     }
 }
 
-/* Where corners stood that followed the same ways as corner i; corner i is the last now. */
+/* Returns the last corner that followed the same ways as corner i, which takes its place. */
 static uint32_t face_seen(faces_model *model, const faces_list *faces, uint32_t i, int32_t table, uint32_t length)
 {
     if (i <= length) return 0;
@@ -207,7 +208,7 @@ static void open_side(int32_t ends[FACE_SIDES], int32_t end)
     ends[0] = end;
 }
 
-/* A side closes where it is open the other way, or the same way, and else opens. */
+/* Closes a side that is open in the opposite direction, or in the same one; else opens it. */
 static void faces_side(const faces_list *faces, int32_t from, int32_t to)
 {
     int closed = close_side(faces->after[to], from) | close_side(faces->before[from], to);

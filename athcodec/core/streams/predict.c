@@ -1,17 +1,16 @@
-/* Decodes predicted motion: predicted_model.h compiled for decoding. */
+/* Predicted motion, compiled for decoding. */
 #include "streams/predict.h"
 #include "streams/predicted.inl"
 
 enum { STEP_VERTICES = 1024 };
 
 struct ath_prediction {
-    prediction segment; /* whose arrays lie behind it */
+    prediction segment; /* its arrays follow this struct */
     ath_coder coder;
-    int32_t frames, vertex; /* vertex: how many of the frame are decoded */
-    int32_t next;           /* the one that comes then */
+    int32_t frames, vertex; /* vertex: how many vertices of the frame are decoded */
+    int32_t next;           /* the vertex that comes next */
 };
 
-/* The coder's place, and the arrays behind it. */
 static uint64_t carve_all(ath_prediction *p, int32_t vertex_count, uint8_t *base)
 {
     ath_arena arena = {base, 0};

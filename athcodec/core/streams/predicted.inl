@@ -1,34 +1,34 @@
-/* What PREDICTED holds of a segment (FORMAT.md, "Predicted motion"): frame by frame, each vertex about a prediction from
- * what is decoded. Compiled once for each direction, as streams.h is. */
-#ifndef ATH_PREDICTED_MODEL_H
-#define ATH_PREDICTED_MODEL_H
+/* The PREDICTED chunk of a segment (FORMAT.md, "Predicted motion"): frame by frame, each vertex is coded about a
+ * prediction from decoded ones. Compiled once for each direction. */
+#ifndef ATH_STREAMS_PREDICTED_INL
+#define ATH_STREAMS_PREDICTED_INL
 
-#include "file/container.h"
+#include "container/container.h"
 #include "bits/lattice.inl"
 #include "model/plan.h"
 
 enum { GUESSES = 13, FEATURES = 8, FITS = 3, FITTED = GUESSES - 1, LINE_GUESS = 6 };
 enum { LONGEST_LINE = 24, LONGEST_MEAN = 64, SOLVED_EVERY = 16, FIT_MEMORY = 256, RUNS = 8 };
 
-/* A vertex from frame to frame. */
+/* The state of a vertex from frame to frame. */
 typedef struct {
-    double line[3], slope[3]; /* the line through its last positions */
-    double older[3];          /* the slope before it last turned */
+    double line[3], slope[3]; /* the line through the last positions */
+    double older[3];          /* the slope before the last turn */
     double mean[3];
-    double error[GUESSES], noise; /* noise: error of the line while it does not turn */
-    int32_t age, frames;          /* positions that make the line, the mean */
-    int32_t steps[3];             /* its integers when they were last not 0 */
-    uint32_t size[2];             /* of its integers in the last frames */
-    int32_t before, above;        /* the vertex that it follows, the one that this follows; -1: none */
-    int32_t base;                 /* where its stem is attached, or begins; -1: it is there itself */
-    int32_t like;                 /* its place on an earlier stem that is as long, -1: none */
-    int32_t near;                 /* whose errors and integers tell of its own, -1: none */
-    int32_t tip;                  /* the last vertex of its stem, -1: it is an end itself */
-    int32_t earlier, next;        /* in the order of coding, -1: none */
-    int32_t leads, followed;      /* of a last vertex: whether its stem has others than ends; these follow it */
+    double error[GUESSES], noise; /* noise: error of the line while the vertex does not turn */
+    int32_t age, frames;          /* positions in the line, and in the mean */
+    int32_t steps[3];             /* the last integers that were not all 0 */
+    uint32_t size[2];             /* sums of the integers' magnitudes in the last two frames */
+    int32_t before, above;        /* the vertex that this one follows, and the one that that follows; -1: none */
+    int32_t base;                 /* attach vertex, or first vertex, of the stem; -1: this is that vertex */
+    int32_t like;                 /* corresponding vertex of an earlier stem of equal length; -1: none */
+    int32_t near;                 /* the vertex whose errors and integers are likely to be similar; -1: none */
+    int32_t tip;                  /* the last vertex of the stem; -1: this is an end */
+    int32_t earlier, next;        /* neighbours in the order of coding; -1: none */
+    int32_t leads, followed; /* for the last vertex of a stem: whether others lie between the ends, and follow them */
 } predicted_vertex;
 
-/* Weights of the features by least squares. */
+/* Weights of the features, found by least squares. */
 typedef struct {
     double moments[FEATURES][FEATURES], products[FEATURES], weights[FEATURES];
     int32_t count, wait;
@@ -42,15 +42,15 @@ typedef struct {
     int32_t run, last_run, last_distance, last_followed;
 } predicted_model;
 
-/* Positions around the frame that is coded, less the origin, vertex_count x 3 each. */
+/* Positions of the frames around the current one, less the origin, vertex_count x 3 each. */
 typedef struct {
     const double *rest;
-    const double *was[3]; /* the frame that it is coded about, what that is coded about, and so on */
-    const double *last;   /* the frame before it */
+    const double *was[3]; /* the frame that this one is coded about, the frame that that is coded about, and so on */
+    const double *last;   /* the frame before */
     double *now;
 } predicted_frames;
 
-/* What a vertex is expected to do: ways from where it was. */
+/* Predicted ways of a vertex from its position in the frame that this one is coded about. */
 typedef struct {
     double guess[GUESSES][3], features[3][FEATURES], way[3];
     int32_t fit;
@@ -76,9 +76,8 @@ static void predicted_model_init(predicted_model *model)
     model->last_distance = 1;
 }
 
-/* ---- frames ---- */
-
-/* Whether a frame is a copy, and of or about how many frames before it is. 0: there is no such frame. */
+/* Codes whether a frame is a copy, and how many frames before it the frame is that it copies or is coded about. Returns
+ * 0 if there is no such frame. */
 ATH_INLINE int code_reference(ath_coder *coder, predicted_model *model, int32_t frame, int *copied, int32_t *distance)
 {
     int32_t run = ath_min(model->run, RUNS - 1), last = ath_min(model->last_run, RUNS - 1);
@@ -99,9 +98,7 @@ ATH_INLINE int code_reference(ath_coder *coder, predicted_model *model, int32_t 
     return 1;
 }
 
-/* ---- least squares ---- */
-
-/* By Cholesky's factors. */
+/* Solves by Cholesky factorisation. */
 static void solve_fit(predicted_fit *fit)
 {
     double lower[FEATURES][FEATURES], y[FEATURES];
@@ -148,13 +145,10 @@ static void learn_fit(predicted_fit *fit, const predicted_way *p, const double w
     }
 }
 
-/* ---- vertices ---- */
-
 ATH_INLINE int is_number(double x) { return x - x == 0.0; }
-
 ATH_INLINE double absolute(double x) { return x < 0.0 ? -x : x; }
 
-/* How far apart two vertices are along the way between them at rest, over that; near 1 where a step is more. */
+/* Returns the extent of two vertices along their rest edge, over its length; near 1 if the step is longer. */
 ATH_INLINE double grown(const double *rest, const double *now, int32_t from, int32_t to, double step)
 {
     double along = step * step, length2 = along;
@@ -168,7 +162,7 @@ ATH_INLINE double grown(const double *rest, const double *now, int32_t from, int
     return length2 > 1e-60 ? along / length2 : 1.0;
 }
 
-/* That of its stem, as far as it is coded; of an end as it was and changed. */
+/* Returns the scale of a stem from its ends or, for an end, extrapolates it from the frames before. */
 ATH_INLINE double stem_scale(const predicted_frames *frames, const predicted_vertex *vertex, int32_t v, double step)
 {
     if (vertex->tip >= 0) return grown(frames->rest, frames->now, vertex->base, vertex->tip, step);
@@ -233,9 +227,7 @@ static void predict_vertex(const predicted_model *model, const ath_predicted_hea
     const predicted_fit *fit = model->fits + p->fit;
     double scales[2] = {1.0, 1.0}, best = 0.0;
     int32_t chosen = 0;
-    if (inner) {
-        scales[0] = grown(frames->rest, frames->now, vertex->above, vertex->before, head->step);
-    }
+    if (inner) scales[0] = grown(frames->rest, frames->now, vertex->above, vertex->before, head->step);
     scales[1] = stem_scale(frames, vertex, v, head->step);
     for (size_t k = 0; k < 3; k++) guess_axis(vertex, frames, (size_t)v, k, scales, fit->weights, p);
     for (int32_t i = 0; i < GUESSES; i++) {
@@ -249,7 +241,7 @@ static void predict_vertex(const predicted_model *model, const ath_predicted_hea
     for (size_t k = 0; k < 3; k++) p->way[k] = is_number(p->guess[chosen][k]) ? p->guess[chosen][k] : 0.0;
 }
 
-/* The line through the last positions begins anew where the vertex turns. */
+/* Adds a position to the line, which begins anew when the vertex turns. */
 ATH_INLINE void learn_line(predicted_vertex *vertex, const double *x, const double *last, double off, double step)
 {
     int turned = off > 4.0 * step + 3.0 * vertex->noise;
@@ -270,7 +262,6 @@ ATH_INLINE void learn_line(predicted_vertex *vertex, const double *x, const doub
     }
 }
 
-/* What its position in this frame tells. */
 static void learn_vertex(predicted_model *model, const ath_predicted_head *head, predicted_vertex *vertices,
                          const predicted_frames *frames, int32_t v, const predicted_way *p)
 {
@@ -295,7 +286,7 @@ static void learn_vertex(predicted_model *model, const ath_predicted_head *head,
 
 ATH_INLINE int32_t size_class(uint32_t size) { return size == 0 ? 0 : size < 2 ? 1 : size < 6 ? 2 : 3; }
 
-/* The magnitude in 1/16 that is expected of its integers; near, beside: sizes of others in this frame. */
+/* Returns the expected magnitude of a vertex's integers in 1/16. near, beside: sizes of other vertices. */
 ATH_INLINE uint32_t expected_size(const predicted_vertex *vertices, int32_t v, uint32_t *near, uint32_t *beside)
 {
     const predicted_vertex *vertex = vertices + v;
@@ -307,7 +298,6 @@ ATH_INLINE uint32_t expected_size(const predicted_vertex *vertices, int32_t v, u
 
 ATH_INLINE int32_t sign_class(int32_t steps) { return steps < 0 ? 0 : steps > 0 ? 2 : 1; }
 
-/* Its integers, under contexts of those around. */
 ATH_INLINE void code_steps(ath_coder *coder, predicted_model *model, int32_t lattice, predicted_vertex *vertices,
                            int32_t v, int32_t steps[3])
 {
@@ -315,10 +305,8 @@ ATH_INLINE void code_steps(ath_coder *coder, predicted_model *model, int32_t lat
     predicted_vertex *vertex = vertices + v;
     const int32_t *signs = vertex->near >= 0 ? vertices[vertex->near].steps : none;
     uint32_t near, beside, sum = 0, expected = expected_size(vertices, v, &near, &beside);
-    ath_context *moved =
-        &model->moved[size_class(vertex->size[0] + vertex->size[1] / 2)][size_class(near)][beside == 0  ? 0
-                                                                                           : beside < 4 ? 1
-                                                                                                        : 2];
+    int32_t own = size_class(vertex->size[0] + vertex->size[1] / 2), louder = (beside > 0) + (beside > 3);
+    ath_context *moved = &model->moved[own][size_class(near)][louder];
     if (coder_bit(coder, moved, steps[0] || steps[1] || steps[2])) {
         for (int32_t k = 0; k < 3; k++) {
             uint32_t about = k == 0 ? expected : (2 * expected + sum * 16 / (uint32_t)k) / 3;
@@ -335,16 +323,14 @@ ATH_INLINE void code_steps(ath_coder *coder, predicted_model *model, int32_t lat
     vertex->size[0] = sum;
 }
 
-/* Whether the vertices of a stem follow its last one. */
+/* Codes whether the vertices between the ends of a stem follow these. */
 ATH_INLINE void code_followed(ath_coder *coder, predicted_model *model, predicted_vertex *tip, int followed)
 {
     tip->followed = coder_bit(coder, &model->followed[tip->followed][model->last_followed], followed);
     model->last_followed = tip->followed;
 }
 
-/* ---- what follows what ---- */
-
-/* Of the table of vertices by where they are at rest: a power of two. */
+/* Returns the size of the table of vertices by rest position, a power of two. */
 ATH_INLINE uint32_t twin_places(int32_t vertex_count)
 {
     uint32_t places = 16;
@@ -352,7 +338,7 @@ ATH_INLINE uint32_t twin_places(int32_t vertex_count)
     return places;
 }
 
-/* The vertex that was last seen in this one's cell, -1: none; from now on it is this one. */
+/* Puts a vertex into the table. Returns the vertex that was in its cell before; -1: none. */
 static int32_t take_place(const double *rest, int32_t *last, uint32_t places, double width, int32_t v)
 {
     int32_t cell[3], same = 1;
@@ -365,21 +351,19 @@ static int32_t take_place(const double *rest, int32_t *last, uint32_t places, do
     return same ? before : -1;
 }
 
-/* ---- a segment ---- */
-
 enum { AROUND = 5 };
 
-/* A segment on its way. Positions: frames x vertex_count x 3 as they are put out, float or (is_float64) double. */
+/* The state of a segment. positions: the output, frames x vertex_count x 3, float or (is_float64) double. */
 typedef struct {
     predicted_model model;
     ath_predicted_head head;
     predicted_vertex *vertices;
     double *memory[AROUND];
-    int32_t *last; /* vertices by their cells, or the first ones of stems by how long these are */
+    int32_t *last; /* vertices by cell; earlier, first vertices of stems by length */
     const double *rest, *origin;
     void *positions;
     int32_t is_float64, vertex_count, frame;
-    int32_t about[ATH_SEGMENT_FRAMES]; /* the frame that each was coded about, -1: the rest pose */
+    int32_t about[ATH_SEGMENT_FRAMES]; /* the frame that each frame was coded about; -1: the rest pose */
     predicted_frames around;
 } prediction;
 
@@ -394,8 +378,8 @@ static uint64_t carve_prediction(prediction *p, int32_t vertex_count, uint8_t *b
     return arena.used;
 }
 
-/* Stems in file order, the ends of each before the others: the first vertex of a stem that hangs on nothing, the last of
- * any. A vertex follows the one before it, the first and the last one the attach vertex. */
+/* Sets the order of coding: stems in file order, and of each stem first its ends, which are the last vertex and, on a
+ * root, the first. A vertex follows the one before it; the first and the last vertex follow the attach vertex. */
 static void follow_stems(prediction *p, const ath_branch *branches, int32_t branch_count)
 {
     int32_t tip_before = -1, first_before = -1, earlier = -1;
@@ -424,7 +408,7 @@ static void follow_stems(prediction *p, const ath_branch *branches, int32_t bran
     }
 }
 
-/* A vertex that lies where an earlier one does, and not where the one that it follows does, follows that. */
+/* A vertex at the rest position of an earlier one follows that, unless the vertex that it follows lies there, too. */
 static void follow_twins(prediction *p)
 {
     double width = p->head.step * 0.00390625;
@@ -440,7 +424,6 @@ static void follow_twins(prediction *p)
     }
 }
 
-/* Its arrays and its head are there. */
 static void start_prediction(prediction *p, const ath_plan *plan, const double *origin, int is_float64, void *positions)
 {
     p->rest = plan->rest;
@@ -461,37 +444,30 @@ static void start_prediction(prediction *p, const ath_plan *plan, const double *
     }
 }
 
-/* Positions of a frame, -1 and before: the rest pose. */
+/* Returns the positions of a frame; the rest pose for negative ones. */
 static const double *known_frame(const prediction *p, int32_t frame, double *memory)
 {
     size_t numbers = 3 * (size_t)p->vertex_count, at = numbers * (size_t)ath_max(frame, 0);
     if (frame < 0) return p->rest;
-    for (size_t i = 0; i < numbers; i++) {
-        double x =
-            p->is_float64 ? ((const double *)p->positions)[at + i] : (double)((const float *)p->positions)[at + i];
-        memory[i] = x - p->origin[i % 3];
-    }
+    for (size_t i = 0; i < numbers; i++)
+        memory[i] = ath_number_at(p->positions, at + i, p->is_float64) - p->origin[i % 3];
     return memory;
 }
 
 static void put_out(const prediction *p, size_t at, size_t k, double x)
 {
-    if (p->is_float64)
-        ((double *)p->positions)[at + k] = x + p->origin[k];
-    else
-        ((float *)p->positions)[at + k] = (float)(x + p->origin[k]);
+    ath_put_number(p->positions, at + k, p->is_float64, x + p->origin[k]);
 }
 
 ATH_INLINE double put_back(const prediction *p, size_t at, size_t k)
 {
-    double x = p->is_float64 ? ((const double *)p->positions)[at + k] : (double)((const float *)p->positions)[at + k];
-    return x - p->origin[k];
+    return ath_number_at(p->positions, at + k, p->is_float64) - p->origin[k];
 }
 
 static void copy_frame(prediction *p, int32_t from)
 {
     size_t numbers = 3 * (size_t)p->vertex_count, at = numbers * (size_t)p->frame;
-    size_t number = p->is_float64 ? sizeof(double) : sizeof(float);
+    size_t number = ath_number_size(p->is_float64);
     uint8_t *positions = (uint8_t *)p->positions;
     if (from >= 0) {
         memcpy(positions + at * number, positions + numbers * (size_t)from * number, numbers * number);
@@ -502,7 +478,7 @@ static void copy_frame(prediction *p, int32_t from)
 
 static int32_t about(const prediction *p, int32_t frame) { return frame < 0 ? -1 : p->about[frame]; }
 
-/* What a frame is coded about. Returns 0 where that is not valid; `copied`: then it has no vertices coded. */
+/* Codes what a frame is coded about; 0: it is not valid. A copied frame has no coded vertices. */
 static int start_frame(ath_coder *coder, prediction *p, int *copied, int32_t distance)
 {
     if (!code_reference(coder, &p->model, p->frame, copied, &distance)) return 0;
@@ -519,13 +495,12 @@ static int start_frame(ath_coder *coder, prediction *p, int *copied, int32_t dis
     return 1;
 }
 
-/* What an integer counts. */
 ATH_INLINE double unit_of(const ath_predicted_head *head)
 {
     return head->lattice ? LATTICE_UNIT * head->step : head->step;
 }
 
-/* Where so many steps take a vertex, put out and in `now`. */
+/* Puts a vertex, moved by its steps, into the output and into `now`. */
 static void place_vertex(prediction *p, int32_t v, const predicted_way *way, const int32_t steps[3])
 {
     size_t from = 3 * (size_t)v, at = 3 * (size_t)p->vertex_count * (size_t)p->frame + from;
@@ -542,7 +517,7 @@ ATH_INLINE int follows(const prediction *p, int32_t v)
     return tip >= 0 && p->vertices[tip].followed;
 }
 
-/* Puts out a vertex that lies between the ends of its stem as it does at rest. */
+/* Places a vertex between the ends of its stem as it is at rest. */
 static void follow_ends(prediction *p, int32_t v, double scale)
 {
     size_t from = 3 * (size_t)v, u = 3 * (size_t)p->vertices[v].base;

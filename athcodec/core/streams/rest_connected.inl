@@ -1,14 +1,14 @@
-/* Where a vertex of a connected rest pose is expected, from those beside it in its faces (FORMAT.md, "Connected rest
- * poses"). Guesses are weighed and learned as elsewhere (rest_predictor.h). */
-#ifndef ATH_REST_CONNECTED_H
-#define ATH_REST_CONNECTED_H
+/* Predicts a vertex of a connected rest pose from its neighbours in faces (FORMAT.md, "Connected rest poses"). Guesses
+ * are weighted and learned as in rest_predictor.inl. */
+#ifndef ATH_STREAMS_REST_CONNECTED_INL
+#define ATH_STREAMS_REST_CONNECTED_INL
 
 #include "model/mesh.h"
 #include "streams/rest_predictor.inl"
 
 enum { CONNECTED_TERMS = 6, CONNECTED_GUESSES = 7, CONNECTED_CLASS = 4 };
 
-/* Before anything is learned, parallelograms are trusted, and neighbours where there are none. */
+/* At first, parallelograms are trusted or, if there are none, neighbours. */
 static void rest_connected_init(rest_predictor *predictor)
 {
     rest_predictor_init(predictor);
@@ -18,11 +18,12 @@ static void rest_connected_init(rest_predictor *predictor)
     }
 }
 
-/* What is known around a vertex: neighbours, and parallelograms that it completes. */
+/* The known surroundings of a vertex: neighbours, and parallelograms that it completes. */
 typedef struct {
     int32_t neighbours, parallelograms;
-    int32_t base;                                  /* the neighbour that was placed last; -1: none */
-    double middle[3], across[3], mean[3], last[3]; /* of the neighbours; what is opposite; parallelograms, and one */
+    int32_t base; /* the neighbour that was placed last; -1: none */
+    double middle[3], across[3], mean[3],
+        last[3]; /* means of neighbours, opposite vertices, parallelograms; the last parallelogram */
 } rest_ring;
 
 static void rest_ring_of(const ath_mesh *mesh, const double *rest, int32_t v, rest_ring *ring)
@@ -60,7 +61,7 @@ static void rest_ring_of(const ath_mesh *mesh, const double *rest, int32_t v, re
     }
 }
 
-/* `before`: the rest pose of the layer before, or null. */
+/* before: the rest pose of the layer before, or null. */
 static void rest_look_beside(rest_predictor *predictor, const ath_mesh *mesh, const rest_ring *ring, const double *rest,
                              const double *before, int32_t v, double per_unit, rest_guess *at)
 {

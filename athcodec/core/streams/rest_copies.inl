@@ -1,26 +1,26 @@
-/* Parts of a rest pose that are copies of one shape: turned, scaled and mirrored (FORMAT.md, "Copies").
- * Compiled once for each direction. */
-#ifndef ATH_REST_COPIES_H
-#define ATH_REST_COPIES_H
+/* Parts of a rest pose that are copies of one shape: turned, scaled and mirrored (FORMAT.md, "Copies"). Compiled for
+ * each direction. */
+#ifndef ATH_STREAMS_REST_COPIES_INL
+#define ATH_STREAMS_REST_COPIES_INL
 
 #include "streams/rest_predictor.inl"
 
 enum { REST_SHAPES = 64, COPY_COUNTS = 16 };
 enum { PLAIN_PART, SHAPE_PART, COPY_PART, PART_ROLES };
 
-#define SHAPE_FINER 0.25 /* steps of a shape, over those of other branches */
-#define COPY_PLACE 0.5   /* units of a copy's first vertex, likewise */
-#define COPY_TURN 0.9    /* units that the furthest vertex moves by where a quaternion's number changes by 1, halved */
+#define SHAPE_FINER 0.25 /* step of a shape over that of other branches */
+#define COPY_PLACE 0.5   /* unit of a copy's first vertex over that of other vertices */
+#define COPY_TURN 0.9    /* units: half of how far one integer of a quaternion moves the furthest vertex */
 
-/* Mean magnitudes of an integer, and of its difference from the one before. */
+/* Mean magnitudes of an integer, and of its difference from the last one. */
 typedef struct {
     uint32_t mean[2];
 } copy_number;
 
-/* A branch that others are copies of, and what the last of them was. */
+/* A branch that others copy, and the place of the last copy. */
 typedef struct {
     int32_t branch, mirrored;
-    double turn[4], scale; /* scale: less 1 */
+    double turn[4], scale; /* scale less 1 */
     copy_number turns[4], scales;
 } rest_shape;
 
@@ -29,13 +29,13 @@ typedef struct {
     number_model rank, turn, scale;
     uint32_t mean_rank;
     lattice_model lattice;
-    rest_memory first;                      /* of the first vertices of copies */
-    double increment[3];                    /* of the last copy, to its first vertex */
-    int32_t shape_count, role[COPY_COUNTS]; /* role: of the last branch of so many vertices */
-    rest_shape shapes[REST_SHAPES];         /* the one used last comes first */
+    rest_memory first;                      /* memory of the first vertices of copies */
+    double increment[3];                    /* from the attach vertex of the last copy to its first vertex */
+    int32_t shape_count, role[COPY_COUNTS]; /* role of the last branch, by its number of vertices */
+    rest_shape shapes[REST_SHAPES];         /* last used first */
 } copy_model;
 
-/* Where a copy is. */
+/* The place of a copy. */
 typedef struct {
     int32_t mirrored, largest, scale, turns[4];
     double R[9]; /* rotation, scale and mirror in one */
@@ -59,7 +59,7 @@ static void copy_model_init(copy_model *model)
     rest_memory_init(&model->first);
 }
 
-/* Shape number `rank` of those with so many vertices, by when they were used last; -1: there are not so many. */
+/* Returns shape number `rank` among those with `count` vertices, last used first; -1: there is none. */
 static int32_t shape_of_rank(const copy_model *model, const ath_branch *branches, int32_t count, int32_t rank)
 {
     for (int32_t i = 0; i < model->shape_count; i++)
@@ -83,7 +83,7 @@ static void add_shape(copy_model *model, int32_t branch)
     move_to_front(model, model->shape_count - 1);
 }
 
-/* An integer about 0 or the last one, whichever has been nearer. */
+/* Codes an integer about 0 or the last one, whichever has been closer. */
 static int code_copy_number(ath_coder *coder, number_model *model, copy_number *known, int32_t last, int32_t *value)
 {
     int repeated = known->mean[1] < known->mean[0];
@@ -95,7 +95,7 @@ static int code_copy_number(ath_coder *coder, number_model *model, copy_number *
     return 1;
 }
 
-/* How far the vertices of a branch are from its first one at most. */
+/* Returns the largest distance of a branch's vertices from its first one. */
 static double copy_lever(const ath_branch *shape, const double *rest)
 {
     const double *first = rest + 3 * (size_t)shape->first;
@@ -108,12 +108,10 @@ static double copy_lever(const ath_branch *shape, const double *rest)
     return ath_sqrt(most);
 }
 
-/* What one is to a copy's integers. */
 ATH_INLINE double copy_quantum(double lever, double unit) { return lever > 0.0 ? COPY_TURN * unit / lever : 1.0; }
-
 ATH_INLINE int is_copy_scale(double s) { return s > 1e-3 && s < 1e3; }
 
-/* Rotation, scale and mirror of a copy from its integers; shape gets what is remembered of it. 0: not valid. */
+/* Makes the matrix of a copy from its integers and notes it in `shape`. Returns 0 if it is not valid. */
 static int copy_matrix(copy_place *place, double quantum, rest_shape *shape)
 {
     double scale = (double)place->scale * quantum, s = 1.0 + scale, squares = 0.0, *q = shape->turn;
@@ -145,8 +143,8 @@ ATH_INLINE void copy_way(const double R[9], const double from[3], const double t
     for (int32_t k = 0; k < 3; k++) way[k] = R[3 * k] * x + R[3 * k + 1] * y + R[3 * k + 2] * z;
 }
 
-/* What is expected of a copy's first vertex: to be at the attach vertex, as far from it as the last copy's, or as the
- * shape's. */
+/* Fills the guesses of a copy's first vertex: the attach vertex, and as far from it as on the last copy or the
+ * shape. */
 static void copy_guess(const copy_model *model, const ath_branch *branch, const ath_branch *shape,
                        const copy_place *place, const double *rest, double per_unit, rest_guess *at)
 {
@@ -160,7 +158,6 @@ static void copy_guess(const copy_model *model, const ath_branch *branch, const 
         for (int32_t k = 0; k < 3; k++) at->guesses[g][k] = at->guesses[g][k] * per_unit;
 }
 
-/* Where it is expected, then. */
 static void copy_start(const copy_model *model, const ath_branch *branch, const ath_branch *shape,
                        const copy_place *place, const double *rest, double own, rest_guess *at, double expected[3])
 {
@@ -190,17 +187,15 @@ static int code_copy_place(ath_coder *coder, copy_model *model, rest_shape *shap
 
 #ifdef ATH_ENCODING
 
-/* ---- how an encoder finds them ---- */
-
 enum { JACOBI_SWEEPS = 12, LEAST_COPIES = 2 };
-#define OF_TOLERANCE 0.4 /* how far off a copy may be, RMS, before anything is rounded */
+#define OF_TOLERANCE 0.4 /* largest RMS error of a copy before rounding, over the tolerance */
 
-/* A similarity that takes a shape to a part: quaternion, scale; `off`: root of the mean square of what is left. */
+/* A similarity that takes a shape to a part. off: RMS of the residual. */
 typedef struct {
     double q[4], scale, off;
 } copy_fit;
 
-/* Eigenvectors, columns of V, of a symmetric matrix, which becomes diagonal. */
+/* Makes a symmetric matrix diagonal. Its eigenvectors are the columns of V. */
 static void jacobi4(double A[4][4], double V[4][4])
 {
     for (int32_t i = 0; i < 16; i++) V[i / 4][i % 4] = i / 4 == i % 4;
@@ -243,7 +238,7 @@ static void mean_point(const double *points, int32_t count, double mean[3])
     }
 }
 
-/* The best similarity from `from` to `to`. A line, whose twist does not matter, has the one with q[3] = 0. */
+/* Finds the best similarity from `from` to `to`. For a line, whose twist is free, q[3] is 0. */
 static void fit_copy(const double *from, const double *to, int32_t count, int mirrored, double tolerance, copy_fit *fit)
 {
     double a[3], b[3], H[3][3] = {{0}}, squares = 0.0, others = 0.0, A[4][4], V[4][4];
@@ -289,7 +284,7 @@ static void fit_copy(const double *from, const double *to, int32_t count, int mi
     fit->off = left > 0.0 ? ath_sqrt(left / (double)count) : 0.0;
 }
 
-/* Is a branch a copy of a shape, but for so much? */
+/* Returns whether a branch is a copy of a shape within the tolerance. */
 static int looks_like_copy(const ath_branch *shape, const ath_branch *branch, const double *pose, double tolerance)
 {
     const double *from = pose + 3 * (size_t)shape->first, *to = pose + 3 * (size_t)branch->first;
@@ -316,7 +311,7 @@ static double copy_tolerance(const ath_branch *branch, double unit, double slack
     return branch->detail == 0 && slack > 0.0 ? slack : LATTICE_REACH * unit;
 }
 
-/* Integers that are next to a similarity. 0: there are none. */
+/* Rounds a similarity to integers. Returns 0 if its scale is out of range. */
 static int copy_integers(const copy_fit *fit, double quantum, copy_place *place)
 {
     place->scale = steps_in(fit->scale - 1.0, quantum, 0.5);
@@ -330,7 +325,7 @@ static int copy_integers(const copy_fit *fit, double quantum, copy_place *place)
     return 1;
 }
 
-/* How far the vertices of a copy are from those of the source at most, its first one being at `first`. */
+/* Returns the largest distance of a copy's vertices from the source's, if its first one is at `first`. */
 static double copy_error(const copy_place *place, const double *shape, const double *first, const double *source,
                          int32_t count)
 {
@@ -347,7 +342,7 @@ static double copy_error(const copy_place *place, const double *shape, const dou
     return ath_sqrt(most);
 }
 
-/* Where the first vertex of a copy is to be; returns how far from there it may be. */
+/* Finds the best place of a copy's first vertex. Returns how far from there it may be. */
 static double copy_target(const ath_branch *branch, const ath_branch *shape, const copy_place *place, double unit,
                           double slack, const double expected[3], const double *source, const double *rest,
                           double target[3])
@@ -364,7 +359,7 @@ static double copy_target(const ath_branch *branch, const ath_branch *shape, con
     return left > 0.0 ? left : 0.0;
 }
 
-/* What a copy is likely to take, and a hundredth of its error over the tolerance; huge where it is beyond that. */
+/* Estimates a copy's cost: its bits, plus a hundredth of its error over the tolerance; huge beyond the tolerance. */
 static double copy_cost(const copy_model *model, const ath_branch *branch, const ath_branch *shape,
                         const copy_place *place, double unit, double slack, const double *source, const double *rest)
 {
@@ -385,7 +380,7 @@ static double copy_cost(const copy_model *model, const ath_branch *branch, const
     return error <= tolerance ? cost + 0.01 * error / tolerance : 1e300;
 }
 
-/* The integers of a copy within the tolerance that are likely to take the fewest bits. 0: there are none. */
+/* Finds the integers of a copy within the tolerance that are likely to take the fewest bits. Returns 0 if none do. */
 static int choose_copy(const copy_model *model, const ath_branch *branches, const ath_branch *branch, int32_t index,
                        double unit, double slack, const double *source, const double *rest, copy_place *best)
 {

@@ -1,7 +1,7 @@
-/* Where the vertices that are coded one by one are expected, learned from those before (FORMAT.md, "Single
- * vertices"). Offsets are in units of the lattice, from the vertex before. */
-#ifndef ATH_REST_PREDICTOR_H
-#define ATH_REST_PREDICTOR_H
+/* Predicts vertices that are coded one by one, and learns from each (FORMAT.md, "Single vertices"). Offsets are in
+ * units of the lattice, from the vertex before. */
+#ifndef ATH_STREAMS_REST_PREDICTOR_INL
+#define ATH_STREAMS_REST_PREDICTOR_INL
 
 #include "bits/lattice.inl"
 
@@ -16,12 +16,12 @@ enum {
     REST_FILTERS = 6
 };
 
-/* Weights of the terms, found by recursive least squares, the same for all axes. */
+/* Weights of the terms for all axes, found by recursive least squares. */
 typedef struct {
     double weight[REST_TERMS], spread[REST_TERMS][REST_TERMS], noise;
 } rest_filter;
 
-/* What the last vertices of a kind left: mean squared errors of the guesses, mean magnitudes of the integers. */
+/* Memory of the last vertices of a kind: mean squared errors of the guesses, mean magnitudes of the integers. */
 typedef struct {
     double error[REST_GUESSES][3];
     uint32_t mean[3];
@@ -29,11 +29,11 @@ typedef struct {
 
 typedef struct {
     rest_filter filters[REST_FILTERS];
-    rest_memory all, phases[REST_PHASES]; /* of all vertices, and by their place within the lag */
+    rest_memory all, phases[REST_PHASES]; /* for all vertices, and by the place within the lag */
     double increments[REST_PHASES][3];
 } rest_predictor;
 
-/* Of one vertex. */
+/* The terms and guesses of one vertex. */
 typedef struct {
     rest_filter *filter;
     rest_memory *phase;
@@ -42,7 +42,7 @@ typedef struct {
     int32_t term_count, guess_count;
 } rest_guess;
 
-/* The last but two of the guesses is a bad one, as a rule, and the last two know the layer before. */
+/* Guess 6 is usually a bad one, and the last two know the layer before. */
 static void rest_memory_init(rest_memory *memory)
 {
     for (int32_t k = 0; k < 3; k++) {
@@ -63,7 +63,7 @@ static void rest_predictor_init(rest_predictor *predictor)
     for (int32_t p = 0; p < REST_PHASES; p++) rest_memory_init(&predictor->phases[p]);
 }
 
-/* Vertex j of a stem; -1 is its attach vertex. Null where there is none. */
+/* Returns vertex j of a stem, the attach vertex for -1; null: there is none. */
 ATH_INLINE const double *rest_on_stem(const ath_branch *branch, const double *rest, int32_t j)
 {
     if (j >= 0) return rest + 3 * (size_t)(branch->first + j);
@@ -94,7 +94,7 @@ static void rest_guess_all(const rest_filter *filter, rest_guess *at)
     }
 }
 
-/* `before`: the rest pose of the layer before, or null. */
+/* before: the rest pose of the layer before, or null. */
 static void rest_look_around(rest_predictor *predictor, const ath_branch *branch, const double *rest,
                              const double *before, int32_t i, double per_unit, rest_guess *at)
 {
@@ -129,7 +129,7 @@ static void rest_look_around(rest_predictor *predictor, const ath_branch *branch
     rest_guess_all(at->filter, at);
 }
 
-/* A mean of the guesses in which those that were good hereabouts count by far the most; on each axis of its own. */
+/* Returns the weighted mean of the guesses on one axis. Guesses that were good nearby weigh by far the most. */
 static double rest_expected(const rest_memory *all, const rest_guess *at, int32_t k)
 {
     double sum = 0.0, weights = 0.0, error[REST_GUESSES], least = 0.0;
@@ -147,14 +147,14 @@ static double rest_expected(const rest_memory *all, const rest_guess *at, int32_
     return sum / weights;
 }
 
-/* A large error counts as a larger one than usual. */
+/* Clips large errors, so that outliers do not spoil the mean. */
 ATH_INLINE void rest_note_error(double *mean, double error, double rate)
 {
     double most = 4.0 * *mean + 16.0;
     *mean = *mean + ((error < most ? error : most) - *mean) * rate;
 }
 
-/* A step of recursive least squares. What is older counts less, but only in the direction that is learned from. */
+/* Takes a step of recursive least squares. Older samples lose weight only in the direction that is learned from. */
 static void rest_learn_axis(rest_filter *filter, const rest_guess *at, int32_t k, double noise, double offset)
 {
     double gain[REST_TERMS], known = 0.0, error = offset;
@@ -178,7 +178,7 @@ static void rest_learn_axis(rest_filter *filter, const rest_guess *at, int32_t k
     }
 }
 
-/* Notes how good the guesses of a vertex were, which is at `offset`; integers: what was coded for it. */
+/* Notes the errors of the guesses for a vertex at `offset`, and its coded integers. */
 static void rest_note(rest_memory *memory, const rest_guess *at, const double offset[3], const int32_t integers[3],
                       double rate)
 {
@@ -191,7 +191,6 @@ static void rest_note(rest_memory *memory, const rest_guess *at, const double of
     }
 }
 
-/* `point`: where the vertex is; `integers`: what was coded for it. */
 static void rest_learn(rest_predictor *predictor, rest_guess *at, double per_unit, const double point[3],
                        const int32_t integers[3])
 {

@@ -1,4 +1,4 @@
-/* Text for people: why a file was refused, the numbers and the sentence that is written from them; what a level is. */
+/* Text for people: names of results and levels, and the sentence that says why a file is refused. */
 #include "file/file.h"
 
 const char *ath_result_name(int result)
@@ -24,57 +24,9 @@ const char *ath_result_name(int result)
     return call >= 0 && call < (int)(sizeof calls / sizeof *calls) ? calls[call] : "UNKNOWN";
 }
 
-int ath_refuse(ath_fault_info *fault, int code, ath_field field, double found, double least, double most)
-{
-    memset(fault, 0, sizeof *fault);
-    fault->code = code;
-    fault->field = (int32_t)field;
-    fault->chunk = -1;
-    fault->level = ATH_NO_LEVEL;
-    fault->found = found;
-    fault->least = least;
-    fault->most = most;
-    return code;
-}
-
-int ath_fault_at(ath_fault_info *fault, const ath_chunk *chunk, int32_t index)
-{
-    fault->chunk = index;
-    fault->kind = chunk->kind;
-    fault->level = chunk->level;
-    fault->segment = chunk->segment;
-    fault->offset = chunk->offset;
-    return fault->code;
-}
-
-const char *ath_kind_name(int kind)
-{
-    switch (kind) {
-    case ATH_HIERARCHY: return "HIERARCHY";
-    case ATH_REST: return "REST";
-    case ATH_TIME: return "TIME";
-    case ATH_METADATA: return "METADATA";
-    case ATH_FACES: return "FACES";
-    case ATH_EDGES: return "EDGES";
-    case ATH_CLIPS: return "CLIPS";
-    case ATH_SOURCE_REST: return "SOURCE_REST";
-    case ATH_STEMS: return "STEMS";
-    case ATH_AFFINES: return "AFFINES";
-    case ATH_CORRECTIONS: return "CORRECTIONS";
-    case ATH_SHAPES: return "SHAPES";
-    case ATH_EXACT: return "EXACT";
-    case ATH_REFINED_REST: return "REFINED_REST";
-    case ATH_PREDICTED: return "PREDICTED";
-    case ATH_ATTRIBUTE: return "ATTRIBUTE";
-    default: return 0;
-    }
-}
-
-/* ---- writing ---- */
-
 typedef struct {
     char *text;
-    size_t capacity, length; /* the length may go beyond the capacity: what does not fit is only counted */
+    size_t capacity, length; /* the length also counts characters that do not fit */
 } writer;
 
 static void put_character(writer *out, char character)
@@ -88,7 +40,7 @@ static void write_text(writer *out, const char *text)
     while (*text) put_character(out, *text++);
 }
 
-/* Puts the zero behind the text; its length. */
+/* Terminates the text and returns its length. */
 static size_t ended(writer *out)
 {
     if (out->capacity > 0) out->text[out->length < out->capacity ? out->length : out->capacity - 1] = 0;
@@ -107,7 +59,7 @@ static void put_hex(writer *out, uint32_t value, int digits)
     while (digits-- > 0) put_character(out, "0123456789abcdef"[value >> 4 * digits & 15]);
 }
 
-/* Six digits and an exponent, of a positive number; the last digit may be off by one. */
+/* Writes six digits and an exponent of a positive number. The last digit may be off by one. */
 static void put_scientific(writer *out, double value)
 {
     int exponent = 0;
@@ -141,11 +93,9 @@ static void put_number(writer *out, double value)
         put_scientific(out, value);
 }
 
-/* ---- sentences ---- */
-
-/* By field. %f: the value found; %a: the values allowed; %p: the chunk and its place; %k: kind, level and segment;
- * %l: level and segment; %m: the most that is allowed, and %c: the least, as a checksum;
- * %n: the file's version and the features that are not known. */
+/* Sentences by field. %f: the value found; %a: the values allowed; %p: the chunk and its place; %k: kind, level and
+ * segment; %l: level and segment; %m: the largest value allowed; %c: the smallest one, as a checksum; %n: the file's
+ * version and unknown features. */
 static const char *const sentences[] = {
     0,
     "file: got first bytes %f%a",
@@ -195,7 +145,7 @@ static void put_version(writer *out, uint32_t version)
     put_integer(out, version & 0xff);
 }
 
-/* "format 1.3 with feature 2, 5" */
+/* Writes "format 1.3 with feature 2, 5". */
 static void put_features(writer *out, const ath_fault_info *fault)
 {
     const char *before = " with feature ";

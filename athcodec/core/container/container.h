@@ -1,41 +1,24 @@
-/* The bytes of an .ath file (FORMAT.md, "File"): with container.py, which writes them, the only place that knows
- * offsets. */
-#ifndef ATH_CONTAINER_H
-#define ATH_CONTAINER_H
+/* The bytes of an .ath file (FORMAT.md, "File"). Only this parser and container.py know offsets. */
+#ifndef ATH_CONTAINER_CONTAINER_H
+#define ATH_CONTAINER_CONTAINER_H
 
-#include "bits/internal.h"
+#include "container/header.h"
+#include "container/refuse.h"
 
-typedef struct ath_header {
-    uint64_t file_length, front_length;
-    double max_error;
-    uint32_t chunk_count, vertex_count, branch_count, frame_count, segment_count;
-    int32_t level_count, full_level_count, clip_count, layer_count, is_float64, is_predicted;
-    int32_t has_faces; /* of the chunk table */
-} ath_header;
-
-/* Announced errors: so many floats without sign, of which the top bits of binary32 are stored, shifted. */
-enum { ATH_SHORT_SHIFT = 18, ATH_SHORT_FLOATS = 255 << 5 };
-
-/* Fills in a fault, and the chunk that it is about. Both return its code. */
-int ath_refuse(ath_fault_info *fault, int code, ath_field field, double found, double least, double most);
-int ath_fault_at(ath_fault_info *fault, const ath_chunk *chunk, int32_t index);
-
-/* Both fill *needed: bytes wanted from the front on ATH_MISSING, on ATH_OK those up to the first chunk, or the
- * prelude. */
+/* Reads the header. On ATH_MISSING, *needed is how many bytes of the front are wanted, on ATH_OK the front's length. */
 int ath_read_header(const uint8_t *bytes, size_t available, const ath_limits *limits, ath_header *header,
                     uint64_t *needed, ath_fault_info *fault);
-/* The rest of a front whose header is valid: fills the header's file_length and, unless null, chunk_count chunks, the
- * errors that ath_errors gives, the joins, and of each frame whether it repeats the one before. */
+/* Reads the rest of a front whose header is valid. Fills the header's file_length and, unless null, chunk_count chunks
+ * and what ath_errors, ath_joins and ath_repeats return. *needed is the length of the prelude. */
 int ath_read_tables(const uint8_t *bytes, size_t available, const ath_limits *limits, ath_header *header,
                     uint64_t *needed, ath_chunk *chunks, double *errors, uint8_t *joins, uint8_t *repeats,
                     ath_fault_info *fault);
 
-/* Index of the first chunk that does not come before this one in file order. */
+/* Returns the index of the first chunk that does not come before this one in file order. */
 uint32_t ath_first_chunk(const ath_chunk *chunks, uint32_t chunk_count, int32_t kind, int32_t level, uint32_t segment);
-/* The chunk of this kind, or null. Level ATH_NO_LEVEL and segment 0 for those of the prelude. */
+/* Returns the chunk of this kind, or null. For the prelude, pass level ATH_NO_LEVEL and segment 0. */
 const ath_chunk *ath_find_chunk(const ath_chunk *chunks, uint32_t chunk_count, int32_t kind, int32_t level,
                                 uint32_t segment);
-int ath_is_motion(const ath_chunk *chunk);
 
 /* ---- heads of chunks: ATH_OK or ATH_BAD_CHUNK; `body` is what follows the head ---- */
 
@@ -47,7 +30,7 @@ typedef struct {
 typedef struct {
     double origin[3], step;
     int32_t exact, is_float64, is_host, connected;
-    uint32_t host_checksum[2]; /* of a mesh of the host's, where that is the rest pose */
+    uint32_t host_checksum[2]; /* checksums of the host's mesh, if that is the rest pose */
 } ath_rest_head;
 
 typedef struct {
@@ -59,39 +42,38 @@ typedef struct {
     uint32_t frames, segments;
     int32_t loop, periodic;
     ath_bytes name;       /* UTF-8 */
-    const uint8_t *seams; /* of a loop: full_level_count floats, see ath_seam */
+    const uint8_t *seams; /* loops only: full_level_count floats, see ath_seam */
 } ath_clip_entry;
 
-/* Of PREDICTED: the step, and whether vertices are points of a lattice. */
 typedef struct {
     double step;
     int32_t lattice;
 } ath_predicted_head;
 
-/* 0: first + i * step; 1: first + i / step; 2: stream; 3 as 1 and 4 as 0, by a whole rate, from 0 on */
+/* 0: first + i * step; 1: first + i / rate; 2: stream; 3: i / rate and 4: i * (1 / rate), with a whole rate */
 typedef int32_t ath_time_method;
 
-/* Basis of STEMS: the waves of stems, those of maps of nodes, learned rows that are integers of waves, or samples. */
+/* Time basis of STEMS: the waves of stems or of nodes, or learned rows, as integers of waves or as samples. */
 enum { ATH_STEM_WAVES, ATH_NODE_WAVES, ATH_BASIS_IN_WAVES, ATH_BASIS_AS_SAMPLES };
-enum { ATH_MOST_SAMPLE = 8192 }; /* stands for 1 */
+enum { ATH_MOST_SAMPLE = 8192 }; /* the sample that stands for 1 */
 
 typedef struct {
     double step, rotation_step_factor;
     int32_t basis_kind; /* up to ATH_NODE_WAVES: no basis is learned */
-    int32_t rank;       /* of a learned basis */
-    int32_t base;       /* level of the stream whose time basis this one's begins with; -1: none */
-    int32_t ratio;      /* of a refinement: the step of the layer before over this one's */
-    int32_t turn;       /* half octaves below 1 of the largest step of rigid pieces' rotations; 0: none */
+    int32_t rank;       /* rows of a learned basis */
+    int32_t base;       /* level of the stream whose basis this one begins with; -1: none */
+    int32_t ratio;      /* refinements: the step of the layer before over this one's */
+    int32_t turn;       /* the largest rotation step of rigid pieces is 2 to the power of -turn / 2; 0: no limit */
     ath_bytes basis;
 } ath_stems_head;
 
 int ath_parse_rest(ath_bytes chunk, ath_rest_head *head, ath_bytes *body);
-/* Of FACES or EDGES, which have at most so many faces and corners together: else ATH_LIMIT_EXCEEDED. */
+/* Largest sum of faces and corners of FACES or EDGES. */
 enum { MOST_CORNERS = 1 << 26 };
-/* Bits of the numbers from 0 on that an integer type holds. */
+/* Returns the bits of the largest number that an integer type holds. */
 ATH_INLINE int32_t ath_bits_of_type(int32_t type) { return (8 << (type & 3)) - (type >> 2 & 1); }
 
-/* Vertices that the numbers of an integer type can name, at most `vertex_count`. */
+/* Returns how many vertices, of `vertex_count`, the numbers of an integer type can name. */
 int32_t ath_vertices_of_type(int32_t type, int32_t vertex_count);
 int ath_parse_polygons(ath_bytes chunk, ath_polygons *shape, ath_bytes *body);
 int ath_parse_source_rest(ath_bytes chunk, ath_source_rest_head *head, ath_bytes *body);
@@ -101,7 +83,7 @@ float ath_seam(const ath_clip_entry *entry, int32_t level);
 int ath_parse_time(ath_bytes chunk, int32_t clip_count, ath_time_method *method, ath_bytes *body);
 int ath_parse_steady(ath_bytes body, ath_time_method method, int32_t clip, double *first, double *step);
 int ath_parse_stems(ath_bytes chunk, int32_t frames, ath_stems_head *head, ath_bytes *body);
-/* Of refinements; shift: the layer before's integers are multiplied by 2 ^ shift to predict these. */
+/* Heads of refinements. shift: predictions are the integers of the layer before times 2 ^ shift. */
 int ath_parse_refined_stems(ath_bytes chunk, int32_t frames, ath_stems_head *head, ath_bytes *body);
 int ath_parse_refined_rest(ath_bytes chunk, double *step, ath_bytes *body);
 int ath_parse_refined_shapes(ath_bytes chunk, int32_t *shift, ath_bytes *body);

@@ -1,13 +1,13 @@
-/* What the files of the core share: helpers, and the layout rules of the motion arrays.
+/* Compilers and C libraries made equal, and helpers that every file of the core uses.
  *
  * Every sum runs in the order that FORMAT.md states, over doubles, with contraction to FMA off, so that all decoders
  * agree bit for bit. Hot loops run over frames: lanes are independent, and any SIMD width gives the same result. */
-#ifndef ATH_INTERNAL_H
-#define ATH_INTERNAL_H
+#ifndef ATH_BITS_PLATFORM_H
+#define ATH_BITS_PLATFORM_H
 
 #include "ath.h"
 
-/* Arithmetic that would give other bits is refused, and contraction to FMA switched off, by what each compiler obeys. */
+/* A build whose arithmetic would give other bits fails. Each compiler has its own way to switch off FMA contraction. */
 #if defined(__FAST_MATH__)
 #error "athcodec: expected a build without -ffast-math, which would change what a file decodes to"
 #endif
@@ -22,9 +22,8 @@
 #pragma fp_contract(off)
 #endif
 
-/* Hot loops are compiled for AVX2 too, where compiler and C library can choose at load time (clang names such clones
- * so that other files do not find them). Lanes are frames: the results are the same. With ThreadSanitizer the choice
- * would run before the sanitizer does, and crash. */
+/* Hot loops are compiled for AVX2, too, if compiler and C library can choose at load time. Clang cannot: other files do
+ * not find its clones. With ThreadSanitizer the choice would run before the sanitizer does, and crash. */
 #if defined(__GNUC__) && !defined(__clang__) && defined(__x86_64__) && defined(__GLIBC__)                              \
     && !defined(__SANITIZE_THREAD__)
 #define ATH_HOT __attribute__((target_clones("avx2", "default")))
@@ -44,7 +43,7 @@
 #define ATH_RESTRICT restrict
 #endif
 
-/* Fetches memory that is to be written soon, wherever that points. */
+/* Prefetches memory that will be written soon. The address may be invalid. */
 #if defined(__GNUC__) && (defined(__x86_64__) || defined(__aarch64__))
 #define ath_expect_write(address) __builtin_prefetch((const void *)(address), 1)
 #else
@@ -64,7 +63,7 @@ void *memset(void *to, int value, size_t size);
 #endif
 #endif
 
-/* What an encoder calls besides ath.h: to be seen from outside only where an encoder is built in. */
+/* Functions that an encoder calls besides ath.h are exported only if the encoder is built in. */
 #if defined(ATH_ENCODER)
 #define ATH_ENCODER_API ATH_API
 #else
@@ -78,27 +77,34 @@ void *memset(void *to, int value, size_t size);
 #define ath_sqrt sqrt
 #endif
 
-enum {
-    ATH_PIECE_VERTICES = 64,  /* longest piece of a stem */
-    ATH_SEGMENT_FRAMES = 256, /* longest segment */
-    ATH_LEVELS = 32,          /* most levels */
-    ATH_LAYERS = 8            /* most layers of precision */
-};
-
 ATH_INLINE int32_t ath_min(int32_t a, int32_t b) { return a < b ? a : b; }
+ATH_INLINE uint64_t ath_larger(uint64_t a, uint64_t b) { return a > b ? a : b; }
 ATH_INLINE int32_t ath_max(int32_t a, int32_t b) { return a > b ? a : b; }
 
-/* Rounded to float. GCC 12 at -O2 puts two of these side by side into one vector and forgets to round; volatile
- * keeps it from that. */
+/* Rounds to float. Without volatile, GCC 12 at -O2 puts two of these into one vector and forgets to round. */
 ATH_INLINE double ath_single(double x)
 {
     volatile float rounded = (float)x;
     return (double)rounded;
 }
 
+/* Numbers of positions are doubles if is_float64 is 1, else floats. */
+ATH_INLINE size_t ath_number_size(int is_float64) { return is_float64 ? sizeof(double) : sizeof(float); }
+ATH_INLINE double ath_number_at(const void *numbers, size_t at, int is_float64)
+{
+    return is_float64 ? ((const double *)numbers)[at] : (double)((const float *)numbers)[at];
+}
+ATH_INLINE void ath_put_number(void *numbers, size_t at, int is_float64, double number)
+{
+    if (is_float64)
+        ((double *)numbers)[at] = number;
+    else
+        ((float *)numbers)[at] = (float)number;
+}
+
 ATH_INLINE size_t ath_size_or_most(uint64_t size) { return size < SIZE_MAX ? (size_t)size : SIZE_MAX; }
 
-/* Parts of one block of memory, each aligned to 16. With a null base it only counts. */
+/* Cuts one block of memory into parts aligned to 16. If the base is null, it only counts. */
 typedef struct {
     uint8_t *base;
     uint64_t used;

@@ -1,9 +1,9 @@
 /* The stream at the front of a file (FORMAT.md, "Front stream"): counts, keys and lengths of chunks, announced errors.
  * Compiled once for each direction. */
-#ifndef ATH_FRONT_MODEL_H
-#define ATH_FRONT_MODEL_H
+#ifndef ATH_CONTAINER_FRONT_INL
+#define ATH_CONTAINER_FRONT_INL
 
-#include "file/container.h"
+#include "container/header.h"
 #include "bits/numbers.inl"
 
 enum { KNOWN_KINDS = 16, KIND_BITS = 5, SIZE_BITS = 30 };
@@ -14,10 +14,10 @@ static const uint16_t known_kinds[KNOWN_KINDS] = {ATH_HIERARCHY, ATH_REST,      
                                                   ATH_EXACT,     ATH_REFINED_REST, ATH_PREDICTED,   ATH_ATTRIBUTE};
 
 typedef struct {
-    ath_context kind[KNOWN_KINDS + 1][1 << KIND_BITS], usual[KNOWN_KINDS + 1]; /* by the kind before */
+    ath_context kind[KNOWN_KINDS + 1][1 << KIND_BITS], usual[KNOWN_KINDS + 1]; /* by the kind of the chunk before */
     number_model place, size;
-    int32_t bits[KNOWN_KINDS + 1]; /* of the last length of each kind */
-    int32_t before;                /* which of the known kinds; KNOWN_KINDS: none of them */
+    int32_t bits[KNOWN_KINDS + 1]; /* bits of the last length, by kind */
+    int32_t before;                /* index of the kind before; KNOWN_KINDS: unknown */
     int32_t was_motion;
     int32_t level;
     uint32_t segment;
@@ -35,7 +35,7 @@ static uint64_t code_raw_bits(ath_coder *coder, int32_t count, uint64_t value)
     return coded;
 }
 
-/* Not inlined everywhere, as in the loops of the motion: the front is short. */
+/* A function, not inlined as in the loops of the motion, since the front is short. */
 static uint32_t code_magnitude(ath_coder *coder, number_model *model, uint32_t expected, uint32_t value)
 {
     return code_unsigned(coder, model, expected, value);
@@ -104,7 +104,8 @@ static int32_t code_kind(ath_coder *coder, chunk_model *model, uint16_t *kind)
     return index;
 }
 
-/* Of a motion chunk: where the one before is, or the place behind it where that cannot be, or another. */
+/* Codes level and segment of a motion chunk. They are usually those of the chunk before, or the next ones if this kind
+ * cannot follow there. */
 static void code_place(ath_coder *coder, chunk_model *model, uint32_t segment_count, int32_t index, ath_chunk *chunk)
 {
     int32_t level = model->level, next = model->was_motion && index <= model->before;
@@ -124,7 +125,7 @@ static void code_place(ath_coder *coder, chunk_model *model, uint32_t segment_co
     model->segment = chunk->segment = segment;
 }
 
-/* Kind, level, segment, length. The level, which may be beyond what a chunk can hold, is left in model->level. */
+/* Codes kind, level, segment and length. The level, which may not fit ath_chunk, is left in model->level. */
 static void code_chunk(ath_coder *coder, chunk_model *model, uint32_t segment_count, ath_chunk *chunk)
 {
     int32_t index = code_kind(coder, model, &chunk->kind), motion = ath_is_motion(chunk);
@@ -146,7 +147,7 @@ static void error_model_init(error_model *model)
     }
 }
 
-/* The errors of a level in a segment, from those before; 0: what was decoded is no such number. */
+/* Codes the errors of a level in a segment about those before. Returns 0 if a decoded one is out of range. */
 static int code_errors(ath_coder *coder, error_model *model, int first_segment, const int32_t *before, int32_t *errors)
 {
     uint32_t *mean = model->mean[first_segment];
@@ -163,9 +164,9 @@ static int code_errors(ath_coder *coder, error_model *model, int first_segment, 
 
 typedef struct {
     number_model change;
-    ath_context joined[3]; /* by whether the segment before is, 2: there is none */
-    ath_context sloped[2]; /* by whether the join coded last is */
-    int32_t last;          /* of the joins coded last; its width is not 0 */
+    ath_context joined[3]; /* by whether the segment before is joined; 2: there is none */
+    ath_context sloped[2]; /* by whether the last join is sloped */
+    int32_t last;          /* the last join whose width is not 0 */
 } join_model;
 
 static void join_model_init(join_model *model)
@@ -176,8 +177,8 @@ static void join_model_init(join_model *model)
     model->last = 16;
 }
 
-/* How a segment is joined to the one before it; `before`: how that one is, -1: it is the first. -1: what was decoded is no
- * such number. */
+/* Codes how a segment is joined to the one before it. before: how that one is joined; -1: this is the first. Returns -1
+ * if the decoded join is out of range. */
 static int32_t code_join(ath_coder *coder, join_model *model, int32_t before, int32_t join)
 {
     if (!coder_bit(coder, &model->joined[before < 0 ? 2 : before > 0], join > 0)) return 0;
@@ -190,13 +191,12 @@ static int32_t code_join(ath_coder *coder, join_model *model, int32_t before, in
 
 enum { MOST_SHOWN = 8 };
 
-/* By how many frames show what the frame before does, it included, and how many showed what came before that. */
+/* Contexts are chosen by how many frames show the current positions, and how many showed those before. */
 typedef struct {
     ath_context repeats[MOST_SHOWN][MOST_SHOWN];
     int32_t shown, before; /* at most MOST_SHOWN */
 } repeat_model;
 
-/* Whether any frame repeats the one before. */
 static int code_has_repeats(ath_coder *coder, repeat_model *model, int has_repeats)
 {
     ath_context any;
@@ -214,7 +214,7 @@ static int code_repeat(ath_coder *coder, repeat_model *model, int repeats)
     return repeats;
 }
 
-/* What the errors of the first level in the first segment are coded about. */
+/* Returns the prediction of the errors of the first level in the first segment. */
 static int32_t first_error(double max_error)
 {
     uint32_t bits;

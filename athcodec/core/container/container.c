@@ -1,16 +1,15 @@
-/* Front and heads of chunks: read with every check that FORMAT.md asks for, in its order. */
-#include "streams/front.inl"
+/* Reads the front and the heads of chunks, with the checks of FORMAT.md in its order. */
+#include "container/container.h"
+#include "container/front.inl"
 
 enum { HEADER_SIZE = 24, CHECKSUM_SIZE = 4, CHECKSUM_AT = 12, TABLE_ENTRY = 16, MOST_SHIFT = 15 };
 
-static const uint32_t MOST_COUNT = 1u << 30; /* of anything, whatever the limits are */
+static const uint32_t MOST_COUNT = 1u << 30; /* largest count of anything, whatever the limits are */
 
 static const double LARGEST = 1.7976931348623157e308;
 
 static uint32_t u16_at(const uint8_t *at) { return (uint32_t)at[0] | (uint32_t)at[1] << 8; }
-
 static uint32_t u32_at(const uint8_t *at) { return u16_at(at) | u16_at(at + 2) << 16; }
-
 static uint64_t u64_at(const uint8_t *at) { return u32_at(at) | (uint64_t)u32_at(at + 4) << 32; }
 
 static float f32_at(const uint8_t *at)
@@ -30,7 +29,6 @@ static double f64_at(const uint8_t *at)
 }
 
 int ath_is_finite(double value) { return value - value == 0.0; }
-
 static int is_step(double value) { return ath_is_finite(value) && value > 0.0; }
 
 void ath_default_limits(ath_limits *limits)
@@ -49,7 +47,7 @@ static uint32_t word_at(const uint8_t *bytes, size_t available, size_t at)
     return word;
 }
 
-/* Before 1.0 any version may change anything, so that both numbers have to be known. */
+/* In format 0.x a minor version may change anything, so both numbers have to match. */
 static int check_version(uint32_t major, uint32_t minor, uint32_t features, ath_fault_info *fault)
 {
     double known = (double)(ATH_FORMAT_MAJOR << 8 | ATH_FORMAT_MINOR), found = (double)(major << 8 | minor);
@@ -72,7 +70,7 @@ static int check_magic(const uint8_t *bytes, size_t available, ath_fault_info *f
     return check_version(bytes[8], bytes[9], u16_at(bytes + 10), fault);
 }
 
-/* Whether the value is none of those allowed: then the fault is filled in. */
+/* Returns the code, and fills in the fault, if the value is out of range; else 0. */
 static int is_outside(ath_fault_info *fault, int code, ath_field field, double found, double least, double most)
 {
     return !(found >= least && found <= most) && ath_refuse(fault, code, field, found, least, most);
@@ -116,7 +114,7 @@ static uint32_t front_checksum(const uint8_t *bytes, uint64_t size)
     return ath_crc32c(crc, bytes + CHECKSUM_AT + 4, (size_t)size - CHECKSUM_AT - 4);
 }
 
-/* Front_Length and Chunk_Count, and all of the front by its checksum. */
+/* Checks Front_Length, Chunk_Count and the checksum of the front. */
 static int check_front(const uint8_t *bytes, size_t available, const ath_limits *limits, const ath_header *header,
                        ath_fault_info *fault)
 {
@@ -162,21 +160,40 @@ int ath_read_header(const uint8_t *bytes, size_t available, const ath_limits *li
 
 /* ---- tables ---- */
 
-static int32_t kind_id(const ath_chunk *chunk) { return chunk->kind & ~ATH_OPTIONAL; }
-
-int ath_is_motion(const ath_chunk *chunk) { return kind_id(chunk) >= 16 && kind_id(chunk) < 32; }
+const char *ath_kind_name(int kind)
+{
+    switch (kind) {
+    case ATH_HIERARCHY: return "HIERARCHY";
+    case ATH_REST: return "REST";
+    case ATH_TIME: return "TIME";
+    case ATH_METADATA: return "METADATA";
+    case ATH_FACES: return "FACES";
+    case ATH_EDGES: return "EDGES";
+    case ATH_CLIPS: return "CLIPS";
+    case ATH_SOURCE_REST: return "SOURCE_REST";
+    case ATH_STEMS: return "STEMS";
+    case ATH_AFFINES: return "AFFINES";
+    case ATH_CORRECTIONS: return "CORRECTIONS";
+    case ATH_SHAPES: return "SHAPES";
+    case ATH_EXACT: return "EXACT";
+    case ATH_REFINED_REST: return "REFINED_REST";
+    case ATH_PREDICTED: return "PREDICTED";
+    case ATH_ATTRIBUTE: return "ATTRIBUTE";
+    default: return 0;
+    }
+}
 
 static int is_refused(int kind)
 {
     return !ath_kind_name(kind) && (!(kind & ATH_OPTIONAL) || ath_kind_name(kind ^ ATH_OPTIONAL));
 }
 
-/* Grows along the file. */
+/* Returns a key that grows along the file. */
 static uint64_t key_of(const ath_chunk *chunk)
 {
     if (ath_is_motion(chunk))
         return (uint64_t)1 << 62 | (uint64_t)chunk->level << 48 | (uint64_t)chunk->segment << 16 | chunk->kind;
-    return (uint64_t)(kind_id(chunk) < 16 ? 0 : 2) << 62 | (uint64_t)kind_id(chunk);
+    return (uint64_t)(ath_kind_id(chunk) < 16 ? 0 : 2) << 62 | (uint64_t)ath_kind_id(chunk);
 }
 
 static int is_bad_chunk(const ath_limits *limits, const ath_header *header, const ath_chunk *chunk, int32_t level,
@@ -191,7 +208,7 @@ static int is_bad_chunk(const ath_limits *limits, const ath_header *header, cons
                                  (double)header->segment_count - 1)));
 }
 
-/* *prelude: where the first chunk behind it begins. */
+/* *prelude: offset of the first chunk behind the prelude. */
 static int read_chunks(ath_coder *coder, const uint8_t *checksums, const ath_limits *limits, ath_header *header,
                        uint64_t *prelude, ath_chunk *chunks, ath_fault_info *fault)
 {
@@ -208,9 +225,9 @@ static int read_chunks(ath_coder *coder, const uint8_t *checksums, const ath_lim
         code_chunk(coder, &model, header->segment_count, &chunk);
         chunk.checksum = u32_at(checksums + CHECKSUM_SIZE * (size_t)i);
         chunk.level = (uint8_t)(ath_is_motion(&chunk) ? ath_min(model.level, ATH_NO_LEVEL) : (int32_t)ATH_NO_LEVEL);
-        chunk.bytes = chunk.length == 0 ? checksums : 0; /* there is nothing to wait for */
+        chunk.bytes = chunk.length == 0 ? checksums : 0; /* an empty chunk needs no feeding */
         uint64_t key = key_of(&chunk);
-        int repeatable = chunk.kind & ATH_OPTIONAL && kind_id(&chunk) >= 32;
+        int repeatable = chunk.kind & ATH_OPTIONAL && ath_kind_id(&chunk) >= 32;
         int in_order = i == 0 || key > key_before || (key == key_before && repeatable);
         if (is_bad_chunk(limits, header, &chunk, model.level, fault)
             || is_outside(fault, ATH_BAD_CHUNK_TABLE, ATH_FIELD_CHUNK_PLACE, i, 0, in_order ? i : i - 1.0))
@@ -234,7 +251,6 @@ static double short_float(int32_t value)
     return (double)number;
 }
 
-/* The table needs no more than the entry before on the way: what an entry is coded about is kept per level. */
 static int read_errors(ath_coder *coder, const ath_header *header, double *errors, ath_fault_info *fault)
 {
     error_model model;
@@ -246,12 +262,8 @@ static int read_errors(ath_coder *coder, const ath_header *header, double *error
         double most = level == header->level_count - 1 ? header->max_error : LARGEST;
         memcpy(entry, first, sizeof entry);
         for (uint32_t segment = 0; segment < header->segment_count; segment++) {
-            if (!code_errors(coder, &model, segment == 0, entry, entry)) {
-                ath_refuse(fault, ATH_BAD_CHUNK_TABLE, ATH_FIELD_ERROR, 0, 0, 0);
-                fault->level = (uint8_t)level;
-                fault->segment = segment;
-                return ATH_BAD_CHUNK_TABLE;
-            }
+            if (!code_errors(coder, &model, segment == 0, entry, entry))
+                return ath_refuse_entry(fault, ATH_FIELD_ERROR, level, segment, 0);
             if (segment == 0) memcpy(first, entry, sizeof first);
             for (int32_t i = 0; errors && i < ATH_MEASURES; i++) {
                 double error = short_float(entry[i]);
@@ -270,12 +282,7 @@ static int read_joins(ath_coder *coder, const ath_header *header, uint8_t *joins
         int32_t width = -1;
         for (uint32_t segment = 0; segment < header->segment_count; segment++) {
             width = header->segment_count > 1 ? code_join(coder, &model, width, 0) : 0;
-            if (width < 0) {
-                ath_refuse(fault, ATH_BAD_CHUNK_TABLE, ATH_FIELD_JOIN, 0, 0, 0);
-                fault->level = (uint8_t)level;
-                fault->segment = segment;
-                return ATH_BAD_CHUNK_TABLE;
-            }
+            if (width < 0) return ath_refuse_entry(fault, ATH_FIELD_JOIN, level, segment, 0);
             if (joins) *joins++ = (uint8_t)width;
         }
     }
@@ -311,11 +318,7 @@ int ath_read_tables(const uint8_t *bytes, size_t available, const ath_limits *li
 
 uint32_t ath_first_chunk(const ath_chunk *chunks, uint32_t chunk_count, int32_t kind, int32_t level, uint32_t segment)
 {
-    ath_chunk wanted;
-    memset(&wanted, 0, sizeof wanted);
-    wanted.kind = (uint16_t)kind;
-    wanted.level = (uint8_t)level;
-    wanted.segment = segment;
+    const ath_chunk wanted = {0, 0, 0, 0, segment, (uint16_t)kind, (uint8_t)level, 0};
     uint64_t key = key_of(&wanted);
     uint32_t low = 0, high = chunk_count;
     while (low < high) {
@@ -340,9 +343,7 @@ const ath_chunk *ath_find_chunk(const ath_chunk *chunks, uint32_t chunk_count, i
 
 static ath_bytes rest_of(ath_bytes chunk, size_t head)
 {
-    ath_bytes rest;
-    rest.bytes = chunk.bytes + head;
-    rest.size = chunk.size - head;
+    ath_bytes rest = {chunk.bytes + head, chunk.size - head};
     return rest;
 }
 
@@ -368,7 +369,7 @@ int ath_parse_rest(ath_bytes chunk, ath_rest_head *head, ath_bytes *body)
     return valid ? ATH_OK : ATH_BAD_CHUNK;
 }
 
-/* Bits of Index_Type; those below are the type. */
+/* Bits of Index_Type above the type itself. */
 enum { IS_MIXED = 8, IS_DERIVED = 16, TYPE_BITS = 7 };
 
 int32_t ath_vertices_of_type(int32_t type, int32_t vertex_count)
@@ -415,7 +416,7 @@ int ath_parse_source_rest(ath_bytes chunk, ath_source_rest_head *head, ath_bytes
     return head->exact ? ATH_OK : ath_parse_refined_rest(*body, &head->step, body);
 }
 
-/* Bytes of the character at the front; 0 where it is not UTF-8 (RFC 3629), or a control character. */
+/* Returns the bytes of the character at the front; 0 if it is not UTF-8 (RFC 3629), or a control character. */
 static size_t character_size(ath_bytes text)
 {
     static const uint8_t least[4] = {0x20, 0xc2, 0xe0, 0xf0}, most[4] = {0x7e, 0xdf, 0xef, 0xf4};
@@ -428,7 +429,7 @@ static size_t character_size(ath_bytes text)
         uint8_t second = more > 0 ? text.bytes[1] : 0;
         int overlong = (first == 0xe0 && second < 0xa0) || (first == 0xf0 && second < 0x90);
         int beyond =
-            (first == 0xed && second > 0x9f) || (first == 0xf4 && second > 0x8f); /* surrogates, no character */
+            (first == 0xed && second > 0x9f) || (first == 0xf4 && second > 0x8f); /* surrogates; beyond Unicode */
         return overlong || beyond ? 0 : more + 1;
     }
     return 0;

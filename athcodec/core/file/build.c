@@ -1,0 +1,163 @@
+/* Builds what the segments share at each level: bases, waves, refined rest poses. */
+#include "file/file.h"
+#include "streams/decode.h"
+
+static int32_t wave_kind(const ath_file *file, int32_t segment, int32_t of_nodes)
+{
+    if (ath_segment_clip(file, segment)->periodic) return ATH_PERIODIC;
+    return of_nodes ? ATH_BEAM : ATH_SMOOTH;
+}
+
+static uint64_t carve_build(ath_file *file, uint8_t *base)
+{
+    ath_arena arena = {base, 0};
+    uint8_t are_there[ATH_WAVE_KINDS][ATH_SEGMENT_FRAMES + 1] = {{0}};
+    for (int32_t s = 0; s < file->info.segment_count; s++)
+        for (int32_t of_nodes = 0; of_nodes < 2; of_nodes++)
+            are_there[wave_kind(file, s, of_nodes)][ath_file_frames(file, s)] = 1;
+    file->bases = (double *)ath_take(&arena, file->bases_count * sizeof(double));
+    for (int32_t kind = 0; kind < ATH_WAVE_KINDS; kind++)
+        for (uint64_t frames = 1; frames <= ATH_SEGMENT_FRAMES; frames++)
+            if (are_there[kind][frames])
+                file->waves[kind][frames] = (double *)ath_take(&arena, frames * frames * sizeof(double));
+    return arena.used;
+}
+
+size_t ath_build_size(const ath_file *file)
+{
+    ath_file counted = *file;
+    return ath_size_or_most(carve_build(&counted, 0));
+}
+
+int ath_build(ath_file *file, void *memory, size_t memory_bytes)
+{
+    ath_file counted = *file;
+    if (!file->rest_known) return ATH_NEEDS_HOST_MESH;
+    if (!ath_fits(memory, memory_bytes, carve_build(&counted, 0))) return ATH_NO_MEMORY;
+    carve_build(file, (uint8_t *)memory);
+    if (file->bases_count > 0) { /* lay out again, since a layer may have overwritten the gaps */
+        ath_basis_layout(file->pieces, file->plan.piece_count, file->rest, file->gaps, (int32_t *)file->scratch);
+        ath_basis_fill(file->pieces, file->plan.piece_count, file->rest, file->gaps, 0, (double *)file->scratch,
+                       file->bases);
+    }
+    file->plan.bases = file->bases;
+    for (int32_t kind = 0; kind < ATH_WAVE_KINDS; kind++)
+        for (int32_t frames = 1; frames <= ATH_SEGMENT_FRAMES; frames++)
+            if (file->waves[kind][frames]) ath_waves(frames, kind, file->waves[kind][frames]);
+    return ATH_OK;
+}
+
+const double *ath_file_waves(const ath_file *file, int32_t segment)
+{
+    return file->waves[wave_kind(file, segment, 0)][ath_file_frames(file, segment)];
+}
+
+const double *ath_file_node_waves(const ath_file *file, int32_t segment)
+{
+    return file->waves[wave_kind(file, segment, 1)][ath_file_frames(file, segment)];
+}
+
+/* Returns the plan that a layer refines. */
+static const ath_plan *plan_before(const ath_file *file, int32_t q)
+{
+    return q > file->first_layer ? &file->layers[q - 1].plan : &file->plan;
+}
+
+/* Returns the plan that a layer refines if that has bases, else null. */
+static const ath_plan *known_bases(const ath_file *file, int32_t q)
+{
+    return q > file->first_layer || file->bases_count > 0 ? plan_before(file, q) : 0;
+}
+
+static const int32_t *rest_steps_before(const ath_file *file, int32_t q)
+{
+    return q > file->first_layer ? file->layers[q - 1].rest_steps : file->rest_steps;
+}
+
+static int decode_layer_rest(ath_file *file, int32_t q, ath_bytes chunk)
+{
+    ath_layer *layer = &file->layers[q];
+    ath_bytes body;
+    double step;
+    int result = ath_parse_refined_rest(chunk, &step, &body);
+    if (result == ATH_OK)
+        result = ath_decode_rest(file->scratch, body.bytes, body.size, file->branches, file->info.branch_count, step,
+                                 file->connected, rest_steps_before(file, q), plan_before(file, q)->rest,
+                                 layer->rest_steps, layer->rest);
+    return result;
+}
+
+/* Reads a layer's rest pose. That of the layer before is known. */
+static int read_layer_rest(ath_file *file, int32_t q, ath_fault_info *fault)
+{
+    ath_layer *layer = &file->layers[q];
+    const ath_chunk *chunk = ath_file_chunk(file, ATH_REFINED_REST, q > 0 ? ath_level_of_layer(file, q) : 1, 0);
+    layer->plan.rest = plan_before(file, q)->rest;
+    if (!chunk) {
+        memcpy(layer->rest_steps, rest_steps_before(file, q), 3 * (size_t)file->header.vertex_count * sizeof(int32_t));
+        return ATH_OK;
+    }
+    ath_bytes content = {chunk->bytes, chunk->length};
+    int32_t index = (int32_t)(chunk - file->chunks);
+    int result = ath_check_chunk(file, index, fault);
+    if (result != ATH_OK) return result;
+    if (file->rest_is_exact || decode_layer_rest(file, q, content) != ATH_OK) {
+        ath_refuse(fault, ATH_BAD_CHUNK, ATH_FIELD_CONTENT, 0, 0, 0);
+        return ath_fault_at(fault, chunk, index);
+    }
+    layer->plan.rest = layer->rest;
+    layer->bases_count = (uint64_t)ath_basis_layout(layer->pieces, layer->plan.piece_count, layer->rest, file->gaps,
+                                                    (int32_t *)file->scratch);
+    if (q == 0) ath_plan_nodes(&layer->plan, layer->nodes);
+    return ATH_OK;
+}
+
+int ath_refine_size(ath_file *file, int32_t level, size_t *memory_bytes, ath_fault_info *fault)
+{
+    ath_fault_info unwanted, *why = fault ? fault : &unwanted;
+    ath_arena counted = {0, 0};
+    *memory_bytes = 0;
+    why->code = ATH_OK;
+    if (level < 0 || level >= file->info.level_count) return ath_refuse(why, ATH_BAD_ARGUMENT, ATH_FIELD_NONE, 0, 0, 0);
+    if (!file->rest_known)
+        return ath_refuse(why, ATH_NEEDS_HOST_MESH, ATH_FIELD_HOST_MESH, 0, file->info.host_checksum[0],
+                          file->info.vertex_count);
+    for (int32_t q = file->first_layer; level > 0 && q <= ath_layer_of(file, level); q++) {
+        ath_layer *layer = &file->layers[q];
+        int result = layer->rest_known ? ATH_OK : read_layer_rest(file, q, why);
+        if (result != ATH_OK) return result;
+        layer->rest_known = 1;
+        if (!layer->plan.bases) ath_take(&counted, layer->bases_count * sizeof(double));
+    }
+    *memory_bytes = ath_size_or_most(counted.used);
+    return ATH_OK;
+}
+
+int ath_refine(ath_file *file, int32_t level, void *memory, size_t memory_bytes)
+{
+    ath_arena arena = {(uint8_t *)memory, 0};
+    size_t needed;
+    int result = ath_refine_size(file, level, &needed, 0);
+    if (result != ATH_OK) return result;
+    if (!file->bases || (needed > 0 && !ath_fits(memory, memory_bytes, needed))) return ATH_NO_MEMORY;
+    for (int32_t q = file->first_layer; level > 0 && q <= ath_layer_of(file, level); q++) {
+        ath_layer *layer = &file->layers[q];
+        if (layer->plan.bases) continue;
+        double *bases = (double *)ath_take(&arena, layer->bases_count * sizeof(double));
+        if (layer->bases_count > 0) {
+            ath_basis_layout(layer->pieces, layer->plan.piece_count, layer->rest, file->gaps, (int32_t *)file->scratch);
+            ath_basis_fill(layer->pieces, layer->plan.piece_count, layer->rest, file->gaps, known_bases(file, q),
+                           (double *)file->scratch, bases);
+            layer->plan.bases = bases;
+        } else {
+            const ath_piece *before = plan_before(file, q)->pieces;
+            for (int32_t p = 0; p < layer->plan.piece_count; p++) {
+                layer->pieces[p].modes = before[p].modes;
+                layer->pieces[p].basis = before[p].basis;
+                layer->pieces[p].rank = before[p].rank;
+            }
+            layer->plan.bases = plan_before(file, q)->bases;
+        }
+    }
+    return ATH_OK;
+}
