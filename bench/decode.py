@@ -28,7 +28,7 @@ import numpy as np
 
 import athcodec
 from athcodec._native import crc32c
-from athcodec.decoding import ath_file
+from athcodec.decoding import segment_decoder
 from athcodec.metrics import ErrorMeter
 from bench.clips import add_ladder, add_rel_error
 from bench.codecs.coder import CORE, compile_c
@@ -254,7 +254,7 @@ def _python_reader(case: Case, threads: int) -> _Reader:
     """athcodec.open and all positions, by so many threads."""
 
     def read() -> float:
-        with patch.object(ath_file, "default_jobs", lambda: threads):
+        with patch.object(segment_decoder, "default_jobs", lambda: threads):
             start = time.perf_counter()
             with athcodec.open(case.file) as decoder:
                 decoder.positions()

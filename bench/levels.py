@@ -15,7 +15,7 @@ import numpy as np
 
 import athcodec
 from athcodec._native import LOOSE
-from athcodec.decoding.ath_file import Level
+from athcodec.decoding.file_tables import Level
 from athcodec.encoding.survey import Ath, Gaps
 from athcodec.metrics import ErrorMeter
 from bench.clips import Encoded, add_clips, add_rel_error, encoded, measure

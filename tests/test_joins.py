@@ -10,7 +10,7 @@ from files import Parts
 from plants import plant
 
 import athcodec
-from athcodec.decoding import ath_file, core_file
+from athcodec.decoding import core_file, segment_decoder
 from athcodec.decoding.container import Limits
 from athcodec.encoding import encoder, joins
 from athcodec.errors import BadChecksum, LimitExceeded
@@ -182,7 +182,7 @@ def many(tmp_path_factory) -> bytes:
 
 @pytest.fixture
 def threads(monkeypatch):
-    return lambda count: monkeypatch.setattr(ath_file, "default_jobs", lambda: count)
+    return lambda count: monkeypatch.setattr(segment_decoder, "default_jobs", lambda: count)
 
 
 @pytest.mark.parametrize("count", [2, 3, 8])

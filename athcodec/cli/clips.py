@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Any
 
 import athcodec
 from athcodec.cli.printing import counted, progress, say
-from athcodec.decoding.ath_file import Level
 from athcodec.decoding.clip_view import ClipView
 from athcodec.decoding.decoder import Decoder
+from athcodec.decoding.file_tables import Level
 from athcodec.errors import AthError, ClipError, LevelUnavailable, NeedsHostMesh, RemoteError, SourceWarning
 from athcodec.files.atomic import check_target, file_ids, is_url, keeping
 from athcodec.files.reading import naming_file

@@ -25,8 +25,8 @@ from athcodec.metrics import ErrorMeter
 from athcodec.options import DEFAULT_REL_ERROR
 
 if TYPE_CHECKING:
-    from athcodec.decoding.ath_file import Level
     from athcodec.decoding.clip_view import ClipView
+    from athcodec.decoding.file_tables import Level
     from athcodec.encoding import Seam
     from athcodec.exporters import Written
 

@@ -11,7 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from athcodec.decoding.decoder import Affines, Decoder
+from athcodec.decoding.affines import Affines
+from athcodec.decoding.decoder import Decoder
 from athcodec.errors import LevelUnavailable
 from athcodec.files.atomic import FileId
 from athcodec.motion.clip import ClipRange, clip_range_frames, polygons
@@ -46,10 +47,10 @@ class ClipView:
         self, decoder: Decoder, level: int | None = None, frames: range | None = None, *, all_clips: bool = False
     ):
         self.decoder = decoder
-        self.level = decoder.deepest if level is None else whole("level", level)
-        if not 0 <= self.level < decoder.level_count:
-            raise LevelUnavailable(f"level: got {level}; expected 0 to {decoder.level_count - 1}")
-        played = [decoder.play(clip.name) for clip in decoder.clips] if all_clips else [decoder]
+        self.level = decoder.file.deepest if level is None else whole("level", level)
+        if not 0 <= self.level < decoder.file.level_count:
+            raise LevelUnavailable(f"level: got {level}; expected 0 to {decoder.file.level_count - 1}")
+        played = [decoder.play(clip.name) for clip in decoder.file.clips] if all_clips else [decoder]
         self._runs = [(clip, _checked(frames, clip.frame_count)) for clip in played]
 
     @property
@@ -78,17 +79,17 @@ class ClipView:
     @property
     def vertex_count(self) -> int:
         """Vertices of the plant, N."""
-        return self.decoder.vertex_count
+        return self.decoder.file.vertex_count
 
     @property
     def branch_count(self) -> int:
         """Branches of the plant, B."""
-        return self.decoder.branch_count
+        return self.decoder.file.branch_count
 
     @property
     def dtype(self) -> np.dtype:
         """Type of the positions, float32 or float64."""
-        return self.decoder.dtype
+        return self.decoder.file.dtype
 
     @property
     def max_error(self) -> float:
@@ -116,37 +117,37 @@ class ClipView:
     @property
     def rest(self) -> np.ndarray:
         """Rest pose, (N, 3) float32 or float64, scene units."""
-        return self.decoder.rest
+        return self.decoder.file.rest
 
     @property
     def vertex_branch(self) -> np.ndarray:
         """The branch of each vertex, (N,) int32."""
-        return self.decoder.vertex_branch
+        return self.decoder.file.vertex_branch
 
     @property
     def branch_parent(self) -> np.ndarray:
         """The parent of each branch, (B,) int32, -1 for a root."""
-        return self.decoder.branch_parent
+        return self.decoder.file.branch_parent
 
     @property
     def stem_index(self) -> np.ndarray | None:
         """Place of each vertex on its stem, (N,) int32, or None; see MotionClip."""
-        return self.decoder.stem_index
+        return self.decoder.file.stem_index
 
     @property
     def edges(self) -> np.ndarray | None:
         """(E, 2) vertex numbers, or None."""
-        return self.decoder.edges
+        return self.decoder.file.edges
 
     @property
     def faces(self) -> np.ndarray | None:
         """(F, k) vertex numbers, or None."""
-        return self.decoder.faces
+        return self.decoder.file.faces
 
     @property
     def attributes(self) -> dict[str, np.ndarray]:
         """Named static arrays, as the source had them."""
-        return self.decoder.attributes
+        return self.decoder.file.attributes
 
     @property
     def polygons(self) -> tuple[np.ndarray, np.ndarray] | None:

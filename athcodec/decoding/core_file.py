@@ -209,7 +209,8 @@ class File:
         self.has_rest = not self.info.rest_is_host
         self._build: np.ndarray | None = None
         self._refinements: list[np.ndarray] = []
-        self._refined = -1  # levels up to this one have what their segments share
+        self._refined = -1  # The deepest level whose segments have what they share.
+        self.poses_read = 0  # The deepest level whose reference pose the core has read.
         self._building = threading.Lock()
 
     @property
@@ -258,6 +259,7 @@ class File:
     def _refine_size(self, level: int) -> int:
         size, fault = c_size_t(), Fault()
         self._check(lib.ath_refine_size(self._file, level, byref(size), byref(fault)), fault)
+        self.poses_read = max(self.poses_read, level)
         return size.value
 
     def _array(self, address: int, dtype: npt.DTypeLike, count: int) -> np.ndarray:

@@ -8,63 +8,27 @@ from __future__ import annotations
 
 import threading
 from bisect import bisect_right
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Generic, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
 from athcodec.decoding import core_file
-from athcodec.decoding.ath_file import AthFile, Clip, Level, median_rate
+from athcodec.decoding.affines import Affines, affines_of, residual_of
+from athcodec.decoding.ath_file import AthFile
+from athcodec.decoding.blending import Blending, Share
 from athcodec.decoding.endless_play import EndlessPlay
-from athcodec.errors import BadChunk, LevelUnavailable
-from athcodec.motion.affine_fit import stem_maps
+from athcodec.decoding.file_tables import Clip, Level, median_rate
+from athcodec.errors import LevelUnavailable
 from athcodec.motion.joining import metadata_of, wind_of
 from athcodec.options import whole
 
 SHOWN_TYPES = (np.dtype(np.float32), np.dtype(np.float64))
 
 T = TypeVar("T")
-
-
-@dataclass(frozen=True)
-class Affines:
-    """The parts of a level as matrices, K of them, by first vertex.
-
-    Attributes
-    ----------
-    branch : (K,) int32
-        The branch that each part is on, in the source's numbering.
-    first_vertex, vertex_count : (K,) int32
-        Its vertices, in file order (`Decoder.hierarchy.vertex_source` has their numbers in the source).
-    is_stem : (K,) bool
-        Whether it is an exact stem, whose matrix is a least-squares fit, or a node of the ATH, which moves as one.
-    matrices : (K, 3, 4) float64
-        From the reference pose of the level (`Decoder.level_rest`) to positions, both absolute, in scene units:
-        x' = matrix[:, :3] @ x + matrix[:, 3].
-    """
-
-    branch: np.ndarray
-    first_vertex: np.ndarray
-    vertex_count: np.ndarray
-    is_stem: np.ndarray
-    matrices: np.ndarray
-
-
-class _OfFile(Generic[T]):
-    """What a decoder has of its file."""
-
-    def __init__(self, get: Callable[[AthFile], T]):
-        self._get = get
-
-    def __set_name__(self, owner: type[Decoder], name: str) -> None:
-        self.__doc__ = getattr(AthFile, name).__doc__
-
-    def __get__(self, decoder: Decoder, owner: type[Decoder]) -> T:
-        return self._get(decoder.file)
 
 
 class Decoder:
@@ -89,10 +53,6 @@ class Decoder:
         The file, which all decoders of its clips share.
     clip : Clip
         The clip that is played.
-    clips, vertex_count, branch_count, level_count, full_level_count, deepest, complete, missing, max_error_bound, dtype
-        What `file` says of itself; see AthFile.
-    rest, hierarchy, vertex_branch, branch_parent, stem_index, edges, faces, attributes, error_weights
-        Static data of `file`; see AthFile.
 
     Raises
     ------
@@ -100,32 +60,12 @@ class Decoder:
         Where no clip has that name.
     """
 
-    clips = _OfFile(lambda file: file.clips)
-    vertex_count = _OfFile(lambda file: file.vertex_count)
-    branch_count = _OfFile(lambda file: file.branch_count)
-    level_count = _OfFile(lambda file: file.level_count)
-    full_level_count = _OfFile(lambda file: file.full_level_count)
-    deepest = _OfFile(lambda file: file.deepest)
-    complete = _OfFile(lambda file: file.complete)
-    missing = _OfFile(lambda file: file.missing)
-    max_error_bound = _OfFile(lambda file: file.max_error_bound)
-    dtype = _OfFile(lambda file: file.dtype)
-    rest = _OfFile(lambda file: file.rest)
-    hierarchy = _OfFile(lambda file: file.hierarchy)
-    vertex_branch = _OfFile(lambda file: file.vertex_branch)
-    branch_parent = _OfFile(lambda file: file.branch_parent)
-    stem_index = _OfFile(lambda file: file.stem_index)
-    edges = _OfFile(lambda file: file.edges)
-    faces = _OfFile(lambda file: file.faces)
-    attributes = _OfFile(lambda file: file.attributes)
-    error_weights = _OfFile(lambda file: file.error_weights)
-
     def __init__(self, file: AthFile, clip: str | None = None, *, closes_file: bool = False):
         self.file, self._closes_file = file, closes_file
         self.clip: Clip = file.clips[0] if clip is None else file.clip_named(clip)
         self._lock = threading.Lock()
         self._last: tuple[tuple[int, int] | None, core_file.Segment | None] = None, None  # (segment, level), prepared
-        self._blending: dict[tuple[int, int], core_file.Segment] = {}  # prepared for the last call of `blended`
+        self._blending = Blending(file)
 
     def play(self, name: str) -> Decoder:
         """Another clip of the same file, at the same time as this one.
@@ -189,7 +129,7 @@ class Decoder:
     def metadata(self) -> dict[str, Any]:
         """Unit, up axis and whatever else the source said of itself, this clip's own in place of those for all."""
         metadata = self.file.metadata
-        return metadata_of(metadata, self.clip.name) if len(self.clips) > 1 else metadata
+        return metadata_of(metadata, self.clip.name) if len(self.file.clips) > 1 else metadata
 
     @property
     def levels(self) -> list[Level]:
@@ -268,8 +208,8 @@ class Decoder:
             Where their bytes are damaged.
         """
         level, (first, last) = self._checked_level(level), self._checked_frames(frames)
-        dtype = np.dtype(dtype or self.dtype)
-        shown = np.empty((last - first, self.vertex_count, 3), dtype if dtype in SHOWN_TYPES else self.dtype)
+        dtype = np.dtype(dtype or self.file.dtype)
+        shown = np.empty((last - first, self.file.vertex_count, 3), dtype if dtype in SHOWN_TYPES else self.file.dtype)
 
         def show(segment: int, ready: core_file.Segment) -> None:
             start, stop = self.segments[segment - self.clip.first_segment]
@@ -278,7 +218,7 @@ class Decoder:
 
         def room(segment: int) -> np.ndarray | None:
             start, stop = self.segments[segment - self.clip.first_segment]
-            is_all = first <= start and stop <= last and shown.dtype == self.dtype
+            is_all = first <= start and stop <= last and shown.dtype == self.file.dtype
             return shown[start - first : stop - first] if is_all else None
 
         segments = self._in_file(self._segments_of(first, last))
@@ -341,9 +281,9 @@ class Decoder:
         dict of str to float
             At most four clips by name, with weights above 0 that add up to 1; for `blended`.
         """
-        winds = np.array([wind_of(metadata_of(self.file.metadata, clip.name)) for clip in self.clips])
+        winds = np.array([wind_of(metadata_of(self.file.metadata, clip.name)) for clip in self.file.clips])
         weights = core_file.wind_weights(winds, strength, heading)
-        return {clip.name: float(weight) for clip, weight in zip(self.clips, weights) if weight > 0}
+        return {clip.name: float(weight) for clip, weight in zip(self.file.clips, weights) if weight > 0}
 
     def blended(
         self,
@@ -379,9 +319,9 @@ class Decoder:
         used = {name: float(weight) for name, weight in weights.items() if not weight <= 0}
         if not 0 < len(used) <= core_file.BLEND_CLIPS or not np.isfinite(list(used.values())).all():
             raise ValueError(f"weights: got {dict(weights)}; expected 1 to {core_file.BLEND_CLIPS} that are above 0")
-        return self._blend(
+        return self._blending.positions(
             [
-                (
+                Share(
                     self.file.clip_named(name),
                     seconds[name] if isinstance(seconds, Mapping) else seconds,
                     self._checked_level(level.get(name) if isinstance(level, Mapping) else level),
@@ -434,30 +374,8 @@ class Decoder:
         weights = np.array([weight for _, weight in places], np.float64)
         if not 0 < len(places) <= core_file.BLEND_CLIPS or not (np.isfinite(weights) & (weights > 0)).all():
             raise ValueError(f"places: got {list(places)}; expected 1 to {core_file.BLEND_CLIPS} with weights above 0")
-        own = self._checked_level(level)
-        return self._blend([(self.clip, seconds, own, weight) for seconds, weight in places])
-
-    def _blend(self, parts: Sequence[tuple[Clip, float, int, float]]) -> np.ndarray:
-        """Clips, each at its seconds, level and weight."""
-        with self._lock:
-            before, self._blending = self._blending, {}
-        ready: dict[tuple[int, int], core_file.Segment] = {}
-        shares = []
-        for clip, own_seconds, own_level, weight in parts:
-            frame = self.file.core.frame_at(self.clips.index(clip), own_seconds)
-            first, starts = int(frame), self.file.segment_starts(clip)
-            after = first + 1 if first + 1 < starts[-1] else starts[0]
-            shown = {
-                clip.first_segment + bisect_right(starts, place) - 1
-                for place in ([first, after] if frame > first else [first])
-            }
-            for segment in shown:
-                place = segment, own_level
-                ready[place] = ready.get(place) or before.get(place) or self.file.prepare(*place)
-            shares.append(([ready[segment, own_level] for segment in shown], frame, weight))
-        with self._lock:
-            self._blending = ready
-        return self.file.core.blended(shares)
+        level = self._checked_level(level)
+        return self._blending.positions([Share(self.clip, seconds, level, weight) for seconds, weight in places])
 
     def level_rest(self, level: int | None = None) -> np.ndarray:
         """The reference pose of a level, which its maps move: the source's rest pose, or another that the motion is
@@ -502,27 +420,9 @@ class Decoder:
         LevelUnavailable, FormatError
             As for `positions`.
         """
-        level, (frame, _) = self._checked_level(level), self._checked_frames(frame)
-        file, core, in_file = self.file, self.file.core, self.clip.first_frame + frame
-        parts = core.cut(level)
-        nodes, stems = parts[parts["branch"] >= 0], file.exact_branches(parts)
-        positions = np.empty((self.vertex_count, 3))
-        with self._prepared(self.clip.first_segment + self._segment_of(frame), level) as ready:
-            node_matrices = core.matrices(ready, in_file, len(nodes))
-            core.positions(ready, in_file, positions, core_file.FILE_ORDER)
-        try:
-            with np.errstate(over="ignore", invalid="ignore"):
-                maps = stem_maps(file.hierarchy, file.level_rest(level, core_file.FILE_ORDER), positions[None])
-        except np.linalg.LinAlgError:  # which only some plants with infinite positions lead to
-            maps = np.array(np.nan)
-        if not np.isfinite(maps).all():
-            raise BadChunk(f"frame {frame}: got positions that no matrix fits; expected those of a plant")
-        first = np.concatenate([nodes["first"], file.branches["first"][stems]])
-        count = np.concatenate([nodes["count"], file.branches["count"][stems]])
-        branch = file.hierarchy.branch_source[np.concatenate([nodes["branch"], stems])]
-        is_stem, matrices = np.arange(len(first)) >= len(nodes), np.concatenate([node_matrices, maps[0, stems]])
-        order = np.argsort(first, kind="stable")
-        return Affines(branch[order], first[order], count[order], is_stem[order], matrices[order])
+        level, (index, _) = self._checked_level(level), self._checked_frames(frame)
+        with self._prepared(self.clip.first_segment + self._segment_of(index), level) as ready:
+            return affines_of(self.file, ready, level, self.clip.first_frame + index, f"frame {index}")
 
     def residual(self, frame: int, level: int | None = None) -> np.ndarray:
         """What the matrices of `affines` leave out, in the space of the level's rest pose (paper, eq. 3).
@@ -544,22 +444,14 @@ class Decoder:
         LevelUnavailable, FormatError
             As for `positions`.
         """
-        parts, vertex_source = self.affines(frame, level), self.hierarchy.vertex_source
-        full = self.positions(frame, self.deepest, np.float64)[vertex_source]
-        if not np.isfinite(full).all():
-            raise BadChunk(f"frame {frame}: got positions that are not finite; expected those of a plant")
-        out = np.empty_like(full)
-        for first, count, matrix in zip(parts.first_vertex, parts.vertex_count, parts.matrices):
-            rows = slice(first, first + count)
-            away = (full[rows] - matrix[:, 3]).T
-            out[vertex_source[rows]] = np.linalg.lstsq(matrix[:, :3], away, rcond=1e-15)[0].T
-        return out
+        positions = self.positions(frame, self.file.deepest, np.float64)
+        return residual_of(self.affines(frame, level), positions, self.file.hierarchy.vertex_source, f"frame {frame}")
 
     def _checked_level(self, level: int | None) -> int:
         if level is None:
-            return self.deepest
-        if not 0 <= (level := whole("level", level)) < self.level_count:
-            raise LevelUnavailable(f"level: got {level}; expected 0 to {self.level_count - 1}")
+            return self.file.deepest
+        if not 0 <= (level := whole("level", level)) < self.file.level_count:
+            raise LevelUnavailable(f"level: got {level}; expected 0 to {self.file.level_count - 1}")
         return level
 
     def _checked_frames(self, frames: int | slice | None) -> tuple[int, int]:
