@@ -8,7 +8,20 @@ array; they release the GIL, and hold no state.
 from __future__ import annotations
 
 import ctypes
-from ctypes import POINTER, c_char_p, c_double, c_int, c_int32, c_int64, c_size_t, c_uint8, c_uint32, c_uint64, c_void_p
+from ctypes import (
+    POINTER,
+    byref,
+    c_char_p,
+    c_double,
+    c_int,
+    c_int32,
+    c_int64,
+    c_size_t,
+    c_uint8,
+    c_uint32,
+    c_uint64,
+    c_void_p,
+)
 
 import numpy as np
 
@@ -213,6 +226,7 @@ _ENCODING = {  # core/model/plan.h, core/model/motion.h, core/encode/encode.h
     "ath_waves": (None, [c_int32, c_int32, c_void_p]),
     "ath_motion_work": (c_size_t, [c_int32, c_int32]),
     "ath_attach_cache_size": (c_size_t, [c_int64, c_int32]),
+    "ath_layout": (c_char_p, [c_int32, c_void_p, c_void_p]),
     "ath_model_size": (c_size_t, []),
     "ath_differences": (None, [*[c_int32] * 3, *[c_void_p] * 6, c_double, *[c_void_p] * 3]),
     "ath_gather": (None, [c_int32, c_int32, c_void_p, c_int32, c_int, c_void_p, c_void_p, c_void_p]),
@@ -331,6 +345,57 @@ def _bind() -> ctypes.CDLL:
 
 
 lib = _bind()
+
+
+def _core_layouts() -> dict[str, dict[str, tuple[int, int]]]:
+    """Return the core's structs by name: (offset, size) of each field, and of the whole struct under ""."""
+    structs: dict[str, dict[str, tuple[int, int]]] = {}
+    offset, size, index = c_size_t(), c_size_t(), 0
+    while (entry := lib.ath_layout(index, byref(offset), byref(size))) is not None:
+        struct, _, field = entry.decode().partition(".")
+        structs.setdefault(struct, {})[field] = offset.value, size.value
+        index += 1
+    return structs
+
+
+CORE_LAYOUTS = _core_layouts()
+
+
+def check_layouts(mirrors: dict[str, type[ctypes.Structure] | np.dtype]) -> None:
+    """Raise ImportError unless these classes and dtypes have the layouts of the core's structs."""
+    for struct, mirror in mirrors.items():
+        if isinstance(mirror, np.dtype):
+            layout = {"": (0, mirror.itemsize)}
+            layout |= {name: (field[1], field[0].itemsize) for name, field in (mirror.fields or {}).items()}
+        else:
+            layout = {"": (0, ctypes.sizeof(mirror))}
+            layout |= {name: (getattr(mirror, name).offset, getattr(mirror, name).size) for name, *_ in mirror._fields_}
+        core = CORE_LAYOUTS.get(struct, {})
+        differing = sorted({name for name, _ in layout.items() ^ core.items()})
+        if differing:
+            got, expected = ({name: side.get(name) for name in differing} for side in (core, layout))
+            raise ImportError(
+                f"athcodec's C core: struct {struct}: got (offset, size) {got}, expected {expected} as in Python; "
+                "pip install builds the core again"
+            )
+
+
+MIRRORS: dict[str, type[ctypes.Structure] | np.dtype] = {
+    "ath_branch": BRANCH,
+    "ath_chunk": CHUNK,
+    "ath_coarse": Coarse,
+    "ath_header": Header,
+    "ath_integers": Integers,
+    "ath_met_ends": CoreMetEnds,
+    "ath_motion": Motion,
+    "ath_node": NODE,
+    "ath_piece": PIECE,
+    "ath_plan": CorePlan,
+    "ath_polygons": CorePolygons,
+    "ath_rounding": Rounding,
+    "ath_stream": Stream,
+}
+check_layouts(MIRRORS)
 
 
 def address(array: np.ndarray | None, dtype, size: int) -> int | None:

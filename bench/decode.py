@@ -163,7 +163,7 @@ class Case:
                 athcodec.encode(clip, self.file, rel_error=rel_error, attributes="none", ladder=ladder)
                 self.positions = np.asarray(clip.block(0, clip.frame_count), np.float32)
         with athcodec.open(self.file, strict=True) as decoder:
-            self.bound, self.rest = decoder.max_error_bound, np.asarray(decoder.rest, np.float32)
+            self.bound, self.rest = decoder.file.max_error_bound, np.asarray(decoder.file.rest, np.float32)
             decoded = np.ascontiguousarray(decoder.positions(), np.float32)
         if path.suffix == ".ath":
             self.positions = decoded

@@ -106,7 +106,7 @@ class Unit:
             return {
                 "seconds": decoder.frame_count / decoder.fps,
                 "segments": len(decoder.segments),
-                "vertices": decoder.vertex_count,
+                "vertices": decoder.file.vertex_count,
                 "prelude": decoder.file.prelude_length,
                 "chunks": [(chunk.kind, chunk.level, chunk.length) for chunk in chunks],
             }
@@ -258,7 +258,7 @@ def _turn(angle: float) -> np.ndarray:
 def _side(file: Path) -> float:
     """The longest side of the rest pose's bounding box."""
     with athcodec.open(file) as decoder:
-        return float(np.ptp(decoder.rest, axis=0).max())
+        return float(np.ptp(decoder.file.rest, axis=0).max())
 
 
 def _units(program: Path, files: list[Path], rounds: int) -> list[Unit]:

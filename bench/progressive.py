@@ -116,7 +116,7 @@ def _boundaries(decoder: athcodec.Decoder) -> list[tuple[int, int, int]]:
         if chunk.is_motion:
             ends[chunk.level, chunk.segment] = chunk.offset + chunk.length
     before, found = decoder.file.prelude_length, []
-    for level in range(decoder.level_count):
+    for level in range(decoder.file.level_count):
         for segment in range(len(decoder.segments)):
             before = ends.get((level, segment), before)
             found.append((level, segment, before))
@@ -167,7 +167,7 @@ def cost(clip_path: Path, rel_error: float) -> dict[str, Any] | None:
 
 
 def _cost(recoding: _Recoding, decoder: athcodec.Decoder, summary: athcodec.Summary) -> dict[str, Any]:
-    uniform, levels = recoding.of_one_level(), decoder.level_count
+    uniform, levels = recoding.of_one_level(), decoder.file.level_count
     split = min(recoding.streams(settings) for settings in (recoding.settings, *uniform))
     unsplit = min(recoding.streams(settings, split=False) for settings in (recoding.settings, *uniform))
     merged = min(recoding.streams(settings, split=False, one_level=True) for settings in uniform)

@@ -102,7 +102,7 @@ def _row(clip: _Clip, file: Path, args: argparse.Namespace, program: Path) -> di
     encode = _encode_seconds(clip.path, file, args.rel_error, args.encodes)
     decode, in_c = _decode_seconds(file, args.decodes), _c_seconds(file, program, args.decodes)
     with athcodec.open(file) as decoder:
-        frames, vertices, branches = decoder.frame_count, decoder.vertex_count, decoder.branch_count
+        frames, vertices, branches = decoder.frame_count, decoder.file.vertex_count, decoder.file.branch_count
         segments = len(decoder.segments)
     row = {
         "series": clip.series,

@@ -186,7 +186,7 @@ def test_a_clip_from_alembic_through_ath_to_alembic_keeps_the_bound(tmp_path):
         athcodec.encode(labelled, tmp_path / "a.ath", rel_error=1e-4)
         with athcodec.open(tmp_path / "a.ath") as decoder:
             athcodec.write(athcodec.ClipView(decoder, frames=range(2, 9)), tmp_path / "b.abc")
-            bound = decoder.max_error_bound
+            bound = decoder.file.max_error_bound
         with athcodec.read(tmp_path / "b.abc") as again:
             error = np.linalg.norm(again.block(0, 7).astype(float) - clip.block(2, 9), axis=2).max()
             assert 0 < error <= bound * (1 + 1e-5) and again.metadata["start_frame"] == 103

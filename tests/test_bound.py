@@ -169,7 +169,7 @@ def encoded_or_refused(clip, bound, options, path, work) -> float:
     with athcodec.open(summary.path, strict=True) as decoder:
         meter = ErrorMeter()
         meter.add(clip.positions, decoder.positions())
-        assert meter.max_error <= decoder.max_error_bound <= bound
+        assert meter.max_error <= decoder.file.max_error_bound <= bound
     return bound
 
 

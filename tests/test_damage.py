@@ -105,7 +105,7 @@ def predicted_parts(full_clip, tmp_path_factory) -> Parts:
 def played(data) -> list[np.ndarray]:
     """Positions of every level."""
     decoder = athcodec.open(BytesIO(data))
-    return [decoder.positions(level=level) for level in range(decoder.level_count)]
+    return [decoder.positions(level=level) for level in range(decoder.file.level_count)]
 
 
 def check(data: bytes, **options) -> None:
@@ -132,7 +132,9 @@ def use(data: bytes, **options) -> bool:
             assert "\n" not in str(error)
             return False
         answered = True
-        for ask in asks + [lambda d, level=level: d.positions(level=level) for level in range(decoder.level_count)]:
+        for ask in asks + [
+            lambda d, level=level: d.positions(level=level) for level in range(decoder.file.level_count)
+        ]:
             try:
                 ask(decoder)
             except REFUSED as error:
@@ -183,12 +185,12 @@ def test_levels_before_a_damaged_chunk_still_play(parts, data, played):
         with pytest.raises(BadChecksum, match=f"level {chunk.level}, segment {chunk.segment}"):
             check(broken)
         decoder = opened(broken, allow_partial=True)
-        assert f"damaged from level {chunk.level}" in decoder.missing
+        assert f"damaged from level {chunk.level}" in decoder.file.missing
         assert [d.available for d in decoder.levels] == [d < chunk.level for d in range(len(played))]
         for level in range(chunk.level):
             assert np.array_equal(decoder.positions(level=level), played[level])
         if chunk.level > 0:
-            assert decoder.deepest == chunk.level - 1
+            assert decoder.file.deepest == chunk.level - 1
             assert np.array_equal(decoder.positions(), played[chunk.level - 1])
         else:
             with pytest.raises(FormatError):
@@ -329,7 +331,7 @@ def test_an_unknown_optional_chunk_is_skipped(kind, at, parts, played):
     longer = parts.with_chunks(parts.chunks[:place] + [unknown(kind)] + parts.chunks[place:])
     decoder = opened(longer, strict=True)
     decoder.file.check()
-    assert np.array_equal(decoder.positions(), played[-1]) and set(decoder.attributes) == {"radius", "species"}
+    assert np.array_equal(decoder.positions(), played[-1]) and set(decoder.file.attributes) == {"radius", "species"}
 
 
 def test_a_file_with_unknown_optional_chunks_can_be_truncated(parts, played, tmp_path):
@@ -803,11 +805,11 @@ def assert_whole_or_not_it(stream: bytes, whole: np.ndarray, decode) -> None:
 def test_an_exact_rest_pose_that_is_not_whole_is_refused_or_another(dtype, parts):
     parts = Parts.of(parts.without(ct.SOURCE_REST))
     decoder = opened(parts.file())
-    pose = np.random.default_rng(5).normal(size=(decoder.vertex_count, 3)).astype(dtype)
+    pose = np.random.default_rng(5).normal(size=(decoder.file.vertex_count, 3)).astype(dtype)
 
     def decode(stream):
         head = ct.Rest(decoder.file.origin, 1.0, pose.dtype, stream, exact=True)
-        return opened(parts.with_payload(ct.REST, ct.pack_rest(head))).rest[decoder.hierarchy.vertex_source]
+        return opened(parts.with_payload(ct.REST, ct.pack_rest(head))).file.rest[decoder.file.hierarchy.vertex_source]
 
     assert_whole_or_not_it(streams.encode_exact_rest(decoder.file.branches, pose), pose, decode)
 
@@ -840,7 +842,7 @@ def test_the_largest_steps_play_and_frames_with_infinite_positions_have_no_matri
     decoder = opened(with_step(parts, kind, 1e38))
     decoder.file.check()
     found = []
-    for level in range(decoder.level_count):
+    for level in range(decoder.file.level_count):
         positions = decoder.positions(0, level)
         assert not np.isnan(decoder.positions(slice(*decoder.segments[0]), level)).any()
         if np.isfinite(positions).all():
@@ -1013,7 +1015,7 @@ def test_a_segment_that_takes_more_memory_than_the_limit_is_not_decoded(data):
     with pytest.raises(LimitExceeded, match=f"limit is {least - 1}"):
         opened(data, limits=Limits(memory_bytes=least - 1))
     decoder = opened(data, limits=Limits(memory_bytes=least))
-    assert decoder.rest.shape == (header.vertex_count, 3)
+    assert decoder.file.rest.shape == (header.vertex_count, 3)
     with pytest.raises(LimitExceeded, match=f"level 0, segment 0.*limit is {least}"):
         decoder.positions(0, 0)
 
@@ -1037,9 +1039,9 @@ def test_many_attributes_together_keep_to_the_memory_limit(parts):
         unknown(ct.ATTRIBUTE, attribute(zstd(bytes(1 << 20)), name=b"a%d" % i, shape=[1 << 18])) for i in range(9)
     ]
     file = parts.with_chunks(chunks)
-    assert len(opened(file).attributes) == 9
+    assert len(opened(file).file.attributes) == 9
     with pytest.raises(LimitExceeded, match="attributes"):
-        _ = opened(file, limits=Limits(memory_bytes=8 << 20)).attributes
+        _ = opened(file, limits=Limits(memory_bytes=8 << 20)).file.attributes
 
 
 # ---- errors ----

@@ -134,7 +134,7 @@ def test_deeper_levels_cost_more_bytes_and_show_more_parts_with_less_error(name,
 def test_level_0_of_a_plant_on_one_root_is_one_affine_map_per_frame(name, plants):
     path, source = plants[name]
     with athcodec.open(path) as decoder:
-        pose = base_pose(decoder)[np.argsort(decoder.hierarchy.vertex_source)]
+        pose = base_pose(decoder)[np.argsort(decoder.file.hierarchy.vertex_source)]
         assert decoder.levels[0].nodes == 1
         for frame in shown_frames(decoder):
             shown = decoder.positions(frame, 0).astype(np.float64)
@@ -149,13 +149,13 @@ def test_stems_above_a_level_have_their_final_shape_but_for_corrections_and_join
     parts.header.joins = None
     bare = opened(parts.without(ct.CORRECTIONS), strict=True)
     with opened(parts.file(), strict=True) as decoder:
-        last, order = decoder.file.core.info.depth_levels - 1, decoder.hierarchy.vertex_source
+        last, order = decoder.file.core.info.depth_levels - 1, decoder.file.hierarchy.vertex_source
         final = bare.positions(level=last)[:, order]
         assert any(chunk.kind == ct.CORRECTIONS for chunk, _ in parts.chunks)
         assert not np.array_equal(bare.positions(), decoder.positions())
-        branch = decoder.hierarchy.vertex_branch()
+        branch = decoder.file.hierarchy.vertex_branch()
         for level in range(1, last):
-            exact = np.isin(branch, Plan(decoder.file.branches, decoder.vertex_count).exact_branches(level))
+            exact = np.isin(branch, Plan(decoder.file.branches, decoder.file.vertex_count).exact_branches(level))
             shown = decoder.affines(0, level)
             assert np.array_equal(exact, np.repeat(shown.is_stem, shown.vertex_count))
             positions = decoder.positions(level=level)[:, order]
@@ -317,7 +317,7 @@ def test_a_frame_at_a_level_reads_only_that_segment_and_the_levels_up_to_it(leve
     for name in NAMES:
         file = Recorder(plants[name][0].read_bytes())
         decoder = athcodec.open(file)
-        if level >= decoder.level_count:
+        if level >= decoder.file.level_count:
             continue
         prelude = decoder.file.prelude_length
         assert all(stop <= prelude for _, stop in file.ranges), "opening reads the prelude alone"
@@ -428,7 +428,7 @@ def test_static_data_can_be_read_and_checked_while_other_threads_watch(full_clip
             decoder.file.check()
             for name in ("attributes", "metadata", "faces", "edges"):
                 vars(decoder.file).pop(name)  # remembered otherwise
-            assert np.array_equal(decoder.attributes["radius"], full_clip.attributes["radius"])
+            assert np.array_equal(decoder.file.attributes["radius"], full_clip.attributes["radius"])
             assert decoder.metadata.items() >= full_clip.metadata.items()
 
     with ThreadPoolExecutor(3) as threads:
@@ -440,9 +440,9 @@ def test_static_data_can_be_read_and_checked_while_other_threads_watch(full_clip
 def test_positions_of_another_type_are_the_files_own_in_that_type(dtype, tmp_path):
     athcodec.encode(plant(seed=3, branches=8, frames=12, dtype=dtype), tmp_path / "p.ath", effort="fast")
     with athcodec.open(tmp_path / "p.ath") as decoder:
-        for level in range(decoder.level_count):
+        for level in range(decoder.file.level_count):
             own = decoder.positions(level=level)
-            assert own.dtype == decoder.dtype == dtype
+            assert own.dtype == decoder.file.dtype == dtype
             for other in (np.float16, np.float32, np.float64, ">f4", ">f8"):
                 shown = decoder.positions(level=level, dtype=other)
                 assert shown.dtype == np.dtype(other) and np.array_equal(shown, own.astype(other))
@@ -452,7 +452,7 @@ def test_attributes_are_read_when_asked_for(full_ath):
     with athcodec.open(full_ath) as decoder:
         decoder.positions()
         before = decoder.file.bytes_read
-        assert set(decoder.attributes) == {"radius", "species"}
+        assert set(decoder.file.attributes) == {"radius", "species"}
         assert decoder.file.bytes_read > before
 
 
@@ -523,7 +523,7 @@ def test_info_is_json_and_agrees_with_the_summary(bushy_clip, tmp_path):
 
 def test_the_table_of_the_ath_is_that_of_the_analysis(bushy_clip, bushy_ath):
     with athcodec.open(bushy_ath) as decoder:
-        bound = decoder.max_error_bound
+        bound = decoder.file.max_error_bound
         expected = athcodec.build_ath(bushy_clip, bound, 0, bound, 0).table1()
         assert decoder.file.table1().items() <= expected.items()
 
@@ -536,7 +536,7 @@ def test_one_frame_has_no_frame_rate(tmp_path):
 
 def test_allow_partial_changes_nothing_about_an_intact_file(bushy_ath):
     with athcodec.open(bushy_ath) as plain, athcodec.open(bushy_ath, allow_partial=True) as partial:
-        assert partial.complete and partial.missing == "" and partial.deepest == plain.deepest
+        assert partial.file.complete and partial.file.missing == "" and partial.file.deepest == plain.deepest
         assert np.array_equal(partial.positions(), plain.positions())
         plain.file.check()
         partial.file.check()
@@ -558,7 +558,7 @@ def test_a_wrong_byte_in_a_chunk_is_met_when_it_is_read_and_not_before(bushy_ath
         last = [chunk for chunk in decoder.file.chunks if chunk.is_motion][-1]
     data[last.offset + last.length // 2] ^= 1
     decoder = athcodec.open(BytesIO(bytes(data)), strict=True)
-    decoder.positions(level=decoder.level_count - 2)
+    decoder.positions(level=decoder.file.level_count - 2)
     with pytest.raises(BadChecksum, match="CORRECTIONS of level 5, segment 3"):
         decoder.positions()
 
@@ -569,9 +569,9 @@ def test_maps_hang_together_on_degenerate_plants(scratch, clip):
     size = size_of(clip.positions) or 1.0
     athcodec.encode(clip, scratch / "maps.ath", max_error=1e-3 * size, segment_frames=16, effort="fast")
     with athcodec.open(scratch / "maps.ath") as decoder:
-        hierarchy = decoder.hierarchy
+        hierarchy = decoder.file.hierarchy
         full = decoder.positions(17)[hierarchy.vertex_source]
-        for level in range(decoder.level_count):
+        for level in range(decoder.file.level_count):
             pose = base_pose(decoder, level)
             parts = decoder.affines(17, level)
             assert len(parts.branch) == decoder.levels[level].nodes
@@ -607,4 +607,4 @@ def test_a_rest_pose_beyond_float32_is_infinite_without_a_warning():
     head = ct.Rest(np.array([most, -most, 0.0]), most, np.dtype(np.float32))
     head.stream = streams.encode_rest(roots(1), 1.0, np.array([[2.5, -2.5, 0.0]])).stream
     with opened(still_file(rest=ct.pack_rest(head))) as decoder:
-        assert decoder.rest.tolist() == [[np.inf, -np.inf, 0.0]]
+        assert decoder.file.rest.tolist() == [[np.inf, -np.inf, 0.0]]

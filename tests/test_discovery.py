@@ -286,10 +286,10 @@ def test_what_was_found_is_kept_edited_and_used(dressed, tmp_path, capsys):
     Path(kept).write_text(json.dumps(content))
     assert main(["encode", source, coded, "--hierarchy", kept, "--effort", "fast"]) == 0
     with athcodec.open(coded) as decoder:
-        assert decoder.branch_parent[-1] == 0
+        assert decoder.file.branch_parent[-1] == 0
         found = athcodec.find_branches(bare(dressed))
-        assert np.array_equal(decoder.vertex_branch, found.vertex_branch)
-        assert np.array_equal(decoder.branch_parent[:-1], found.branch_parent[:-1])
+        assert np.array_equal(decoder.file.vertex_branch, found.vertex_branch)
+        assert np.array_equal(decoder.file.branch_parent[:-1], found.branch_parent[:-1])
 
 
 def test_a_saved_hierarchy_comes_back_unchanged(dressed, tmp_path):

@@ -356,7 +356,7 @@ def test_plain_lists_can_be_encoded(tmp_path):
     )
     athcodec.encode(clip, tmp_path / "s.ath", rel_error=1e-3)
     with athcodec.open(tmp_path / "s.ath", strict=True) as decoder:
-        assert np.abs(decoder.positions() - clip.positions).max() <= decoder.max_error_bound
+        assert np.abs(decoder.positions() - clip.positions).max() <= decoder.file.max_error_bound
 
 
 # ---- memory ----

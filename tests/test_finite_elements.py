@@ -191,7 +191,7 @@ def test_a_clip_view_keeps_times_frames_and_the_bound(tmp_path, name):
     clip = quad_clip(frames=40)
     with athcodec.open(coded(clip, tmp_path)) as decoder:
         athcodec.write(ClipView(decoder, frames=range(10, 30)), tmp_path / name)
-        bound = decoder.max_error_bound
+        bound = decoder.file.max_error_bound
     with athcodec.read(tmp_path / name) as part:
         assert part.metadata["start_frame"] == 11 and part.frame_count == 20
         off = np.linalg.norm(part.block(0, 20).astype(float) - clip.block(10, 30), axis=2)

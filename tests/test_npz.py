@@ -106,7 +106,7 @@ def test_decoded_frames_written_to_an_archive_keep_the_bound(tmp_path):
     clip = quad_clip(frames=20)
     with athcodec.open(coded(clip, tmp_path)) as decoder:
         athcodec.write(ClipView(decoder, frames=range(4, 20)), tmp_path / "a.npz")
-        bound = decoder.max_error_bound
+        bound = decoder.file.max_error_bound
     with athcodec.read(tmp_path / "a.npz") as again:
         off = np.linalg.norm(again.block(0, 16).astype(float) - clip.block(4, 20), axis=2)
         assert off.max() <= bound and np.array_equal(again.time, clip.time[4:])

@@ -93,7 +93,7 @@ def test_a_clip_view_keeps_its_frame_numbers(tmp_path, suffix):
     path = coded(quad_clip(frames=40), tmp_path)
     with athcodec.open(path) as decoder:
         athcodec.write(ClipView(decoder, frames=range(10, 30)), tmp_path / f"part{suffix}")
-        bound = decoder.max_error_bound
+        bound = decoder.file.max_error_bound
     with athcodec.read(tmp_path / f"part{suffix}", fps=24) as part:
         assert part.metadata["start_frame"] == 11 and part.frame_count == 20
         wanted = quad_clip(frames=40).block(10, 30)

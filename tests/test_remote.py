@@ -199,7 +199,7 @@ def runs(decoder: athcodec.Decoder, level: int, first: int, last: int) -> list[t
     """(start, stop) of the chunks that the segments need behind what is read ahead, joined where they are
     close."""
     joined: list[list[int]] = []
-    kinds = (16,) if level == decoder.full_level_count - 1 else (16, 17)
+    kinds = (16,) if level == decoder.file.full_level_count - 1 else (16, 17)
     for chunk in decoder.file.chunks:
         wanted = chunk.kind in kinds or (chunk.kind == 18 and chunk.level == level)
         if wanted and chunk.is_motion and chunk.level <= level and first <= chunk.segment <= last:
@@ -263,14 +263,14 @@ def test_a_short_file_is_one_request_in_all(server, full_ath, full_clip):
     metadata = full_clip.metadata | {"hierarchy_thresholds": {"epsilon": 0, "xi": 0, "eta": 0, "lambda": 0}}
     with athcodec.open(server.url) as decoder:
         decoder.file.check()
-        assert decoder.metadata == metadata and list(decoder.attributes) == list(full_clip.attributes)
+        assert decoder.metadata == metadata and list(decoder.file.attributes) == list(full_clip.attributes)
         assert decoder.file.source.requests == 1 and decoder.file.source.bytes == len(server.data)
 
 
 def test_a_prefix_on_a_server_plays_the_levels_that_are_there(server, local):
     server.data = server.data[: local.levels[1].bytes + 10]
     with athcodec.open(server.url) as decoder:
-        assert decoder.deepest == 1 and not decoder.file.complete
+        assert decoder.file.deepest == 1 and not decoder.file.complete
         assert np.array_equal(decoder.positions(), local.positions(level=1))
         with pytest.raises(LevelUnavailable, match="cut off"):
             decoder.positions(level=2)

@@ -208,7 +208,7 @@ def test_decoded_frames_written_as_numbered_files_keep_the_bound(tmp_path, suffi
     clip = quad_clip(frames=20)
     with athcodec.open(coded(clip, tmp_path)) as decoder:
         athcodec.write(ClipView(decoder), tmp_path / f"out{suffix}")
-        bound = decoder.max_error_bound
+        bound = decoder.file.max_error_bound
     with athcodec.read(tmp_path / f"out_0001{suffix}") as again:
         off = np.linalg.norm(again.block(0, 20).astype(float) - clip.block(0, 20), axis=2)
         assert off.max() <= bound and np.array_equal(again.faces, clip.faces)

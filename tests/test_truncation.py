@@ -22,8 +22,8 @@ class Whole:
             self.chunks, self.levels = decoder.file.chunks, decoder.levels
             self.prelude = decoder.file.prelude_length
             self.segments, self.header = decoder.segments, decoder.file.header
-            self.positions = [decoder.positions(level=level) for level in range(decoder.level_count)]
-            self.bound, self.attributes = decoder.max_error_bound, decoder.attributes
+            self.positions = [decoder.positions(level=level) for level in range(decoder.file.level_count)]
+            self.bound, self.attributes = decoder.file.max_error_bound, decoder.file.attributes
 
     def cut(self, size: int, **options) -> athcodec.Decoder:
         return athcodec.open(BytesIO(self.data[:size]), **options)
@@ -51,7 +51,7 @@ def full(full_ath):
 
 def assert_plays_as_far_as_it_goes(whole: Whole, size: int) -> None:
     decoder, deepest = whole.cut(size), whole.deepest_within(size)
-    assert not decoder.file.complete and decoder.missing and "\n" not in decoder.missing
+    assert not decoder.file.complete and decoder.file.missing and "\n" not in decoder.missing
     assert [level.available for level in decoder.levels] == [d <= deepest for d in range(len(whole.levels))]
     with pytest.raises(Truncated):
         decoder.file.check()
@@ -59,7 +59,7 @@ def assert_plays_as_far_as_it_goes(whole: Whole, size: int) -> None:
         with pytest.raises(Truncated, match="level 0"):
             decoder.positions()
     else:
-        assert decoder.deepest == deepest
+        assert decoder.file.deepest == deepest
         assert np.array_equal(decoder.positions(), whole.positions[deepest])
     if deepest + 1 < len(whole.levels):
         with pytest.raises(LevelUnavailable, match=f"level {deepest + 1}, segment"):
@@ -158,8 +158,8 @@ def test_truncated_files_are_whole_and_play_the_same_levels(whole, tmp_path):
         assert size == target.stat().st_size
         with athcodec.open(target, strict=True) as decoder:
             decoder.file.check()
-            assert decoder.file.complete and decoder.missing == ""
-            assert decoder.level_count == level.level + 1 and decoder.full_level_count == len(whole.levels)
+            assert decoder.file.complete and decoder.file.missing == ""
+            assert decoder.file.level_count == level.level + 1 and decoder.file.full_level_count == len(whole.levels)
             for coarser in range(level.level + 1):
                 assert np.array_equal(decoder.positions(level=coarser), whole.positions[coarser])
             with pytest.raises(LevelUnavailable, match=f"expected 0 to {level.level}"):
@@ -171,7 +171,7 @@ def test_a_truncated_file_promises_the_error_of_its_last_level(whole, tmp_path):
         truncate(whole.path, tmp_path / "cut.ath", level.level)
         with athcodec.open(tmp_path / "cut.ath") as decoder:
             expected = whole.bound if level.level == len(whole.levels) - 1 else level.max_error
-            assert decoder.max_error_bound == expected
+            assert decoder.file.max_error_bound == expected
             assert [(d.max_error, d.rms_error, d.nodes) for d in decoder.levels] == [
                 (d.max_error, d.rms_error, d.nodes) for d in whole.levels[: level.level + 1]
             ]
@@ -182,9 +182,11 @@ def test_a_truncated_file_is_shorter_and_keeps_its_static_data(full, full_clip, 
     assert sizes == sorted(set(sizes)) and sizes[-1] == len(full.data)
     truncate(full.path, tmp_path / "cut.ath", 0)
     with athcodec.open(tmp_path / "cut.ath") as decoder:
-        assert np.array_equal(decoder.faces, full_clip.faces) and np.array_equal(decoder.edges, full_clip.edges)
+        assert np.array_equal(decoder.file.faces, full_clip.faces) and np.array_equal(
+            decoder.file.edges, full_clip.edges
+        )
         assert decoder.metadata.items() >= full_clip.metadata.items()
-        assert {name: a.tobytes() for name, a in decoder.attributes.items()} == {
+        assert {name: a.tobytes() for name, a in decoder.file.attributes.items()} == {
             name: a.tobytes() for name, a in full_clip.attributes.items()
         }
 

@@ -93,8 +93,8 @@ def facts_of(
     """decoder.file.info(), and per level what it adds to the file cut before it. tick_ratios: of each clip at each
     level, where they were measured."""
     facts = {"file": os.fspath(path)} | decoder.file.info()
-    facts |= {"unit": decoder.metadata.get("unit"), "missing": decoder.missing}
-    facts["raw_bytes"] = facts["frames"] * decoder.vertex_count * 12
+    facts |= {"unit": decoder.metadata.get("unit"), "missing": decoder.file.missing}
+    facts["raw_bytes"] = facts["frames"] * decoder.file.vertex_count * 12
     facts["ratio"] = facts["raw_bytes"] / facts["bytes"]
     before = decoder.file.prelude_length
     for level in facts["levels"]:

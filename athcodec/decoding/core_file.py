@@ -29,7 +29,7 @@ from ctypes import (
 import numpy as np
 import numpy.typing as npt
 
-from athcodec._native import BRANCH, CHUNK, MEASURES, CorePolygons, as_bytes, lib
+from athcodec._native import BRANCH, CHUNK, MEASURES, CorePolygons, as_bytes, check_layouts, lib
 from athcodec.decoding import container
 from athcodec.errors import LimitExceeded
 from athcodec.motion.polygons import Polygons, type_of
@@ -130,6 +130,18 @@ class Range(Structure):
     """ath_range."""
 
     _fields_ = [("offset", c_uint64), ("size", c_uint64)]
+
+
+MIRRORS: dict[str, type[ctypes.Structure] | np.dtype] = {
+    "ath_clip": Clip,
+    "ath_fault_info": Fault,
+    "ath_info": Info,
+    "ath_limits": Limits,
+    "ath_part": PART,
+    "ath_range": Range,
+    "ath_share": Share,
+}
+check_layouts(MIRRORS)
 
 
 def aligned(size: int) -> np.ndarray:

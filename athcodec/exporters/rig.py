@@ -113,7 +113,7 @@ def fit_rig(motion: Any, most: int = RIG_JOINTS, report: Callable[[float], None]
 def hierarchy_to_rig(motion: Any) -> Hierarchy:
     """The branches of a motion, or those that are found where it has none."""
     if isinstance(motion, ClipView):
-        return motion.decoder.hierarchy
+        return motion.decoder.file.hierarchy
     return hierarchy_of(motion if motion.has_branches else with_branches(motion, find_branches(motion)))
 
 
