@@ -11,8 +11,9 @@ if TYPE_CHECKING:  # what __getattr__ finds, for type checkers and the reference
     from athcodec.encoding import Summary, encode
     from athcodec.encoding.survey import Ath, build_ath
     from athcodec.exporters import write, write_hdf5
+    from athcodec.motion.branches.finding import find_branches
+    from athcodec.motion.branches.result import Found
     from athcodec.motion.clip import MotionClip
-    from athcodec.motion.discovery import Found, find_branches
     from athcodec.motion.joining import in_wind, join, looped, split
     from athcodec.motion.thresholds import Thresholds
     from athcodec.motion.transitions import endless
@@ -56,7 +57,8 @@ _LAZY = {  # by module: to import the package loads none, so that a command or a
     "decoding.clip_view": ("ClipView",),
     "decoding.decoder": ("Decoder",),
     "opening": ("open",),
-    "motion.discovery": ("Found", "find_branches"),
+    "motion.branches.finding": ("find_branches",),
+    "motion.branches.result": ("Found",),
     "encoding": ("Summary", "encode"),
     "exporters": ("write", "write_hdf5"),
     "motion.joining": ("in_wind", "join", "looped", "split"),

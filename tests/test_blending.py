@@ -68,7 +68,7 @@ def _shown(decoder, name, seconds, level=None):
 
 def _edges(decoder) -> np.ndarray:
     """(E, 2): along the stems, and from each branch to the vertex that it hangs on."""
-    return np.asarray(decoder.edges).reshape(-1, 2)
+    return np.asarray(decoder.file.edges).reshape(-1, 2)
 
 
 def _lengths(positions, edges):
@@ -113,7 +113,7 @@ def test_nearly_all_edges_of_a_mesh_keep_their_lengths(leafed_ath, weights):
 
 
 def _face_edges(decoder):
-    faces = decoder.faces
+    faces = decoder.file.faces
     return np.unique(np.sort(np.stack([faces, np.roll(faces, -1, axis=1)], axis=-1).reshape(-1, 2)), axis=0)
 
 

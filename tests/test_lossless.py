@@ -37,7 +37,7 @@ def test_the_level_before_keeps_the_bound_and_plays_as_without(tmp_path):
     lossless = opened(encoded(clip, path=tmp_path / "a.ath", rel_error=1e-4))
     athcodec.encode(clip, tmp_path / "b.ath", rel_error=1e-4, exact_rest=True)
     with athcodec.open(tmp_path / "b.ath") as lossy:
-        assert lossless.file.level_count == lossy.level_count + 1
+        assert lossless.file.level_count == lossy.file.level_count + 1
         for level in range(lossy.file.level_count):
             assert bits(lossless.positions(level=level)) == bits(lossy.positions(level=level))
 

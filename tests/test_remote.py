@@ -212,7 +212,7 @@ def runs(decoder: athcodec.Decoder, level: int, first: int, last: int) -> list[t
 
 
 def test_a_segment_is_one_request_for_each_run_of_its_chunks(server, local):
-    level, segment = local.level_count - 1, len(local.segments) - 1
+    level, segment = local.file.level_count - 1, len(local.segments) - 1
     frame = local.segments[segment][0]
     wanted = runs(local, level, segment, segment)
     assert len(wanted) > 1
@@ -482,7 +482,7 @@ def test_another_file_of_the_same_length_is_met_by_its_checksums(server):
 def test_the_command_reads_urls_and_says_what_it_took(server, local, tmp_path, capsys):
     assert cli.main(["info", server.url, "--json", "--stats"]) == 0
     out, err = capsys.readouterr()
-    assert json.loads(out)["vertices"] == local.vertex_count and json.loads(out)["file"] == server.url
+    assert json.loads(out)["vertices"] == local.file.vertex_count and json.loads(out)["file"] == server.url
     assert err == f"athcodec: stats: 1 request, {READ_AHEAD:,} bytes fetched of {len(server.data):,}\n"
     assert cli.main(["verify", server.url, "--stats"]) == 0
     assert f"2 requests, {len(server.data):,} bytes" in capsys.readouterr().err
@@ -537,7 +537,7 @@ def test_the_command_reads_other_systems_and_says_what_it_took(other_url, local,
     size, out = local.file.file_length, tmp_path / "a.h5"
     assert cli.main(["info", other_url, "--json", "--stats"]) == 0
     printed, err = capsys.readouterr()
-    assert json.loads(printed)["vertices"] == local.vertex_count
+    assert json.loads(printed)["vertices"] == local.file.vertex_count
     assert err == f"athcodec: stats: 2 requests, {READ_AHEAD:,} bytes fetched of {size:,}\n"
     assert cli.main(["verify", other_url, "--stats"]) == 0
     assert f"3 requests, {size:,} bytes" in capsys.readouterr().err

@@ -252,7 +252,7 @@ def test_an_exact_rest_pose_comes_back_bit_for_bit(dtype, scratch):
         rest=rest,
     )
     decoder = reopened(clip, scratch, exact_rest=True)
-    assert decoder.file.rest.dtype == dtype and decoder.rest.tobytes() == rest.tobytes()
+    assert decoder.file.rest.dtype == dtype and decoder.file.rest.tobytes() == rest.tobytes()
     assert largest_error(decoder.positions(), clip) <= decoder.file.max_error_bound
 
 

@@ -51,7 +51,7 @@ def full(full_ath):
 
 def assert_plays_as_far_as_it_goes(whole: Whole, size: int) -> None:
     decoder, deepest = whole.cut(size), whole.deepest_within(size)
-    assert not decoder.file.complete and decoder.file.missing and "\n" not in decoder.missing
+    assert not decoder.file.complete and decoder.file.missing and "\n" not in decoder.file.missing
     assert [level.available for level in decoder.levels] == [d <= deepest for d in range(len(whole.levels))]
     with pytest.raises(Truncated):
         decoder.file.check()
@@ -108,8 +108,8 @@ def test_what_is_missing_is_named(bushy, full):
     first = next(c.offset for c in bushy.chunks if (c.is_motion, c.level, c.segment) == (True, 1, 2))
     decoder = bushy.cut(first + 1)
     levels = len(bushy.levels)
-    assert decoder.missing.startswith("level 1: segments 2-3; level 2: segments 0-3")
-    assert decoder.missing.count("level") == levels - 1
+    assert decoder.file.missing.startswith("level 1: segments 2-3; level 2: segments 0-3")
+    assert decoder.file.missing.count("level") == levels - 1
     for file in (bushy, full):
         last = [chunk for chunk in file.chunks if chunk.is_motion][-1]
         rest = (
@@ -124,8 +124,8 @@ def test_what_is_missing_is_named(bushy, full):
 def test_a_file_cut_in_its_attributes_plays_in_full_and_says_so(full):
     size = next(c.offset for c in full.chunks if c.kind & 0x7FFF == 32) + 3
     decoder = full.cut(size)
-    assert not decoder.file.complete and "attributes" in decoder.missing
-    assert np.array_equal(decoder.positions(), full.positions[-1]) and decoder.attributes == {}
+    assert not decoder.file.complete and "attributes" in decoder.file.missing
+    assert np.array_equal(decoder.positions(), full.positions[-1]) and decoder.file.attributes == {}
 
 
 def test_segments_that_arrived_play_deeper_than_those_that_did_not(bushy):
@@ -133,7 +133,7 @@ def test_segments_that_arrived_play_deeper_than_those_that_did_not(bushy):
     size = next(c.offset for c in bushy.chunks if (c.is_motion, c.level, c.segment) == (True, 3, 2))
     decoder = bushy.cut(size)
     start, stop = bushy.segments[1]
-    assert decoder.deepest == 2
+    assert decoder.file.deepest == 2
     assert np.array_equal(decoder.positions(slice(start, stop), 3), bushy.positions[3][start:stop])
     with pytest.raises(LevelUnavailable, match="level 3, segment 2"):
         decoder.positions(stop, 3)
@@ -142,7 +142,7 @@ def test_segments_that_arrived_play_deeper_than_those_that_did_not(bushy):
 def test_a_prefix_cut_after_a_level_plays_that_level_bit_for_bit(whole):
     for level in whole.levels:
         decoder = whole.cut(level.bytes)
-        assert decoder.deepest == level.level
+        assert decoder.file.deepest == level.level
         assert np.array_equal(decoder.positions(), whole.positions[level.level])
         with pytest.raises(LevelUnavailable):
             whole.cut(level.bytes - 1).positions(level=level.level)

@@ -370,8 +370,8 @@ def positions_of(page, call: str) -> np.ndarray:
 
 def drawn_at_level_0(decoder, frame: int) -> np.ndarray:
     """Its matrices on the rest pose of the levels above, which a page draws it with once that is there."""
-    parts, order = decoder.affines(frame, 0), decoder.hierarchy.vertex_source
-    matrices, out = np.repeat(parts.matrices, parts.vertex_count, axis=0), np.empty((decoder.vertex_count, 3))
+    parts, order = decoder.affines(frame, 0), decoder.file.hierarchy.vertex_source
+    matrices, out = np.repeat(parts.matrices, parts.vertex_count, axis=0), np.empty((decoder.file.vertex_count, 3))
     out[order] = np.einsum("nij,nj->ni", matrices[..., :3], decoder.level_rest(1)[order]) + matrices[..., 3]
     return out
 
@@ -597,7 +597,7 @@ def test_no_vertex_jumps_where_the_level_changes(opened, segmented, case):
     """It is asked for, or a segment begins of which less can be shown. No vertex goes further in a picture than a level
     takes it and its share of the way, nor does it jerk; without fading it does."""
     data, decoder = segmented
-    deepest, step, fade = decoder.level_count - 1, 1 / 60, 0.2
+    deepest, step, fade = decoder.file.level_count - 1, 1 / 60, 0.2
     wanted = [1] * 3 + [deepest] * 5 + [2] * 20 if case == "asked" else [deepest] * 30
     start = 0.0 if case == "asked" else 16 / 30 - 10 * step
     levels = sorted({1, *wanted})

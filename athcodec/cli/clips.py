@@ -19,7 +19,7 @@ from athcodec.errors import AthError, ClipError, LevelUnavailable, NeedsHostMesh
 from athcodec.files.atomic import check_target, file_ids, is_url, keeping
 from athcodec.files.reading import naming_file
 from athcodec.metrics import ErrorMeter, MotionMeter, SmoothnessMeter, compare_clips, level_meters
-from athcodec.motion import discovery
+from athcodec.motion.branches.result import with_branches as clip_with_branches
 from athcodec.motion.clip import MotionClip
 from athcodec.motion.joining import BLEND, in_wind
 from athcodec.motion.thresholds import Thresholds
@@ -232,7 +232,7 @@ def with_branches(clip: MotionClip, hierarchy: str | None) -> MotionClip:
         return clip
     found = find_or_load(clip, hierarchy)
     say("hierarchy", str(found))
-    return discovery.with_branches(clip, found)
+    return clip_with_branches(clip, found)
 
 
 def bound(args: argparse.Namespace, unit: Any) -> dict[str, float | int]:

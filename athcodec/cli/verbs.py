@@ -56,7 +56,7 @@ from athcodec.cli.streams import ATH, STREAM, standard_streams
 from athcodec.decoding.clip_view import ClipView
 from athcodec.errors import AthError, ClipError
 from athcodec.files.atomic import scratch_folder
-from athcodec.motion import discovery
+from athcodec.motion.branches.saving import save
 from athcodec.motion.clip import MotionClip
 from athcodec.motion.hierarchy import branch_orders
 from athcodec.options import DEFAULT_LADDER, DEFAULT_REL_ERROR, HOST, ladder_of
@@ -188,7 +188,7 @@ def hierarchy(args: argparse.Namespace) -> int:
             report("branches", 0.0)
         found = athcodec.find_branches(clip, args.method, args.root)
     if args.save:
-        discovery.save(found, args.save)
+        save(found, args.save)
     sizes = np.bincount(found.vertex_branch)
     orders = branch_orders(found.branch_parent)
     if args.json:

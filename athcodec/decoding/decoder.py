@@ -1,7 +1,6 @@
-"""From an .ath file back to motion: one of its clips at any level, any frames.
+"""Playing one clip of an .ath file: any frames at any level.
 
-A `Decoder` plays one clip; the `AthFile` behind it holds what all clips share, reads the bytes and has the C core
-decode segments. Only the segments and levels that frames ask for are read.
+The `AthFile` behind a `Decoder` holds what all clips share, and reads and decodes the segments that the frames need.
 """
 
 from __future__ import annotations
@@ -11,7 +10,7 @@ from bisect import bisect_right
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import cached_property
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -26,24 +25,22 @@ from athcodec.errors import LevelUnavailable
 from athcodec.motion.joining import metadata_of, wind_of
 from athcodec.options import whole
 
-SHOWN_TYPES = (np.dtype(np.float32), np.dtype(np.float64))
-
-T = TypeVar("T")
+SHOWN_TYPES = (np.dtype(np.float32), np.dtype(np.float64))  # Types that the core writes itself.
 
 
 class Decoder:
     """One clip of an .ath file, at any of its levels; a context manager.
 
     Positions come in the source's vertex order, in scene units. Frames, segments, times and errors are those of the
-    clip, counted from its first frame. What all clips of the file share is that of `file`; the most used members
-    stand here too. Threads may share a decoder.
+    clip, counted from its first frame. `file` has what all clips share, such as vertices, levels and the rest pose.
+    Threads may share a decoder.
 
     Parameters
     ----------
     file : AthFile
         An opened file; see `athcodec.open` for a path.
     clip : str, optional
-        The name of the clip to play; by default the first.
+        Name of the clip to play; by default the first.
     closes_file : bool
         Whether closing the decoder closes the file.
 
@@ -57,23 +54,24 @@ class Decoder:
     Raises
     ------
     ClipUnavailable
-        Where no clip has that name.
+        If no clip has that name.
     """
 
     def __init__(self, file: AthFile, clip: str | None = None, *, closes_file: bool = False):
         self.file, self._closes_file = file, closes_file
         self.clip: Clip = file.clips[0] if clip is None else file.clip_named(clip)
         self._lock = threading.Lock()
-        self._last: tuple[tuple[int, int] | None, core_file.Segment | None] = None, None  # (segment, level), prepared
+        # The segment that was decoded last, after its number and level.
+        self._last: tuple[tuple[int, int] | None, core_file.Segment | None] = None, None
         self._blending = Blending(file)
 
     def play(self, name: str) -> Decoder:
-        """Another clip of the same file, at the same time as this one.
+        """Return a decoder for another clip of the same file; both may be used at the same time.
 
         Parameters
         ----------
         name : str
-            The clip's.
+            Name of the clip.
 
         Returns
         -------
@@ -83,12 +81,12 @@ class Decoder:
         Raises
         ------
         ClipUnavailable
-            Where no clip has that name.
+            If no clip has that name.
         """
         return Decoder(self.file, name)
 
     def close(self) -> None:
-        """Closes the file where the decoder comes from `athcodec.open`."""
+        """Close the file, if the decoder comes from `athcodec.open`."""
         if self._closes_file:
             self.file.close()
 
@@ -127,7 +125,7 @@ class Decoder:
 
     @property
     def metadata(self) -> dict[str, Any]:
-        """Unit, up axis and whatever else the source said of itself, this clip's own in place of those for all."""
+        """Unit, up axis and whatever else the source states, with this clip's values in place of the file's."""
         metadata = self.file.metadata
         return metadata_of(metadata, self.clip.name) if len(self.file.clips) > 1 else metadata
 
@@ -137,30 +135,30 @@ class Decoder:
         return self.file.levels_in(self.clip.segments)
 
     def level_for(self, distance: float, fov: float, height: float, pixels: float = 1.0, measure: str = "max") -> int:
-        """The level to show from afar.
+        """Return the level to show at a distance.
 
         Parameters
         ----------
         distance : float
-            From the eye, in scene units.
+            Distance from the eye, in scene units.
         fov : float
             Vertical field of view, radians.
         height : float
-            Of the screen, pixels.
+            Height of the screen, pixels.
         pixels : float
-            By how much vertices may be off on the screen.
+            Largest deviation of vertices on the screen.
         measure : {"max", "p99", "rms"}
-            Of the errors of all vertices: with "p99" at most 1 % of them may be off by more.
+            Statistic of the vertices' errors; with "p99", at most 1 % of them may deviate further.
 
         Returns
         -------
         int
-            The coarsest stored level whose error is at most that; the deepest where none is.
+            The coarsest stored level whose error is at most `pixels`; the deepest if none is.
         """
         return self.file.core.level_for(self.clip.segments, measure, distance, fov, height, pixels)
 
     def level_within(self, max_error: float) -> int:
-        """The level to use where vertices may be off by no more than a length.
+        """Return the coarsest stored level whose largest error in this clip is at most a length.
 
         Parameters
         ----------
@@ -170,12 +168,12 @@ class Decoder:
         Returns
         -------
         int
-            The coarsest stored level whose largest error in this clip is at most that.
+            Number of the level.
 
         Raises
         ------
         LevelUnavailable
-            Where that of the deepest level is larger.
+            If the error of the deepest level is larger.
         """
         return self.file.level_within(max_error, self.clip.segments)
 
@@ -184,7 +182,7 @@ class Decoder:
     def positions(
         self, frames: int | slice | None = None, level: int | None = None, dtype: npt.DTypeLike | None = None
     ) -> np.ndarray:
-        """Positions of all vertices in one or several frames. Threads share the segments, where there are several.
+        """Return the positions of all vertices in one or several frames. Threads share the segments.
 
         Parameters
         ----------
@@ -203,9 +201,9 @@ class Decoder:
         Raises
         ------
         LevelUnavailable
-            Where the file has no such level or frame, or was cut off before them.
+            If the file has no such level or frame, or was cut off before them.
         FormatError
-            Where their bytes are damaged.
+            If their bytes are damaged.
         """
         level, (first, last) = self._checked_level(level), self._checked_frames(frames)
         dtype = np.dtype(dtype or self.file.dtype)
@@ -234,7 +232,7 @@ class Decoder:
     def blocks(
         self, level: int | None = None, dtype: npt.DTypeLike | None = None, frames: int | slice | None = None
     ) -> Iterator[tuple[int, np.ndarray]]:
-        """The same, one segment in memory at a time.
+        """Yield positions in blocks, with one segment in memory at a time.
 
         Parameters
         ----------
@@ -263,11 +261,11 @@ class Decoder:
             yield low, self.positions(slice(low, high), level, dtype)
 
     def wind_weights(self, strength: float, heading: float) -> dict[str, float]:
-        """Clips to blend for a wind.
+        """Return the clips to blend for a wind, with their weights.
 
-        Bilinear in strength and heading of the clips' own winds (metadata "strength" and "heading"): between the two
-        strengths next to the wanted one, and at each between the two headings next to the wanted one on the circle.
-        It changes without a jump, and is held beyond the calmest and the wildest clip.
+        The weights are bilinear in the strength and heading of the clips' winds (metadata "strength" and "heading"):
+        between the two strengths next to the wanted one, and at each between the two headings next to the wanted one on
+        the circle. They change without a jump, and stay constant beyond the calmest and the wildest clip.
 
         Parameters
         ----------
@@ -291,28 +289,28 @@ class Decoder:
         seconds: float | Mapping[str, float],
         level: int | None | Mapping[str, int] = None,
     ) -> np.ndarray:
-        """Several clips of the file at once, blended along the branches.
+        """Return several clips of the file at once, blended along the branches.
 
-        These stay attached, and edges along stems are as long as those of the clips in their weighted mean.
+        Branches stay attached, and edges along stems are as long as the weighted mean of those in the clips.
 
         Parameters
         ----------
         weights : mapping of str to float
-            By name of clip; up to four are above 0. They need not add up to 1.
+            Weights by name of clip; up to four are above 0. They need not add up to 1.
         seconds : float or mapping of str to float
-            Since the first frame, of all clips or of each; loops wrap around.
+            Time since the first frame, for all clips or for each; loops wrap around.
         level : int or mapping of str to int, optional
-            Level of detail, of all clips or of each; by default the deepest that is complete.
+            Level of detail, for all clips or for each; by default the deepest that is complete.
 
         Returns
         -------
         numpy.ndarray
-            (N, 3) float32, scene units. Where one clip alone has a weight, that clip's numbers.
+            (N, 3) float32, scene units. If only one clip has a weight, its positions unchanged.
 
         Raises
         ------
         ValueError
-            Where no weight is above 0, one is not finite, or more than four are above 0.
+            If no weight is above 0, one is not finite, or more than four are above 0.
         ClipUnavailable, LevelUnavailable, FormatError
             As for `play` and `positions`.
         """
@@ -332,27 +330,27 @@ class Decoder:
         )
 
     def endless(self, seed: int = 1) -> EndlessPlay:
-        """The clip played without an end, over transitions that `athcodec.endless` has found between its like frames.
+        """Play the clip without an end, over transitions that `athcodec.endless` stored between its like frames.
 
         Parameters
         ----------
         seed : int, optional
-            Another one gives another order.
+            Another seed gives another order of transitions.
 
         Returns
         -------
         EndlessPlay
-            Its `positions(seconds)` are those of any time.
+            An object whose `positions(seconds)` returns the plant at any time.
 
         Raises
         ------
         ValueError
-            Where the clip names no transitions.
+            If the clip names no transitions.
         """
         return EndlessPlay(self, seed)
 
     def blended_places(self, places: Sequence[tuple[float, float]], level: int | None = None) -> np.ndarray:
-        """The clip at several times at once, blended along the branches as `blended` blends clips.
+        """Return the clip at several times at once, blended along the branches as `blended` blends clips.
 
         Parameters
         ----------
@@ -378,10 +376,7 @@ class Decoder:
         return self._blending.positions([Share(self.clip, seconds, level, weight) for seconds, weight in places])
 
     def level_rest(self, level: int | None = None) -> np.ndarray:
-        """The reference pose of a level, which its maps move: the source's rest pose, or another that the motion is
-        closer to. Levels that refine the plant may refine it, too.
-
-        `rest` is the rest pose of the source, rounded to its type.
+        """Return the reference pose of a level, which its maps move; see `AthFile.level_rest`.
 
         Parameters
         ----------
@@ -401,7 +396,7 @@ class Decoder:
         return self.file.level_rest(self._checked_level(level))
 
     def affines(self, frame: int, level: int | None = None) -> Affines:
-        """A frame at a level as matrices: nodes that move as one, and least-squares maps of exact stems (paper, eq. 2).
+        """Return a frame as matrices: of nodes that move as one, and least-squares maps of exact stems (paper, eq. 2).
 
         Parameters
         ----------
@@ -425,7 +420,7 @@ class Decoder:
             return affines_of(self.file, ready, level, self.clip.first_frame + index, f"frame {index}")
 
     def residual(self, frame: int, level: int | None = None) -> np.ndarray:
-        """What the matrices of `affines` leave out, in the space of the level's rest pose (paper, eq. 3).
+        """Return what the matrices of `affines` leave out, in the space of the level's rest pose (paper, eq. 3).
 
         The matrix of a vertex's part, applied to this, gives the position at the deepest complete level.
 
@@ -469,9 +464,9 @@ class Decoder:
 
     @contextmanager
     def _prepared(self, segment: int, level: int, to: np.ndarray | None = None) -> Iterator[core_file.Segment]:
-        """A segment of the file at a level, for the caller alone; the last one is kept. Raises as `positions`.
+        """Give the caller alone a segment of the file at a level; the last one is kept. Raises as `positions`.
 
-        to: as for `AthFile.prepare`.
+        `to` is that of `AthFile.prepare`.
         """
         place = segment, level
         with self._lock:
@@ -485,7 +480,7 @@ class Decoder:
                 self._last = (None if ready.gone else place), ready
 
     def _segments_of(self, first: int, last: int) -> range:
-        """The clip's segments that hold the frames first to last - 1."""
+        """Return the clip's segments that hold the frames first to last - 1."""
         return range(self._segment_of(first), self._segment_of(last - 1) + 1) if first < last else range(0)
 
     def _in_file(self, segments: range) -> range:

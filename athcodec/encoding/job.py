@@ -48,8 +48,8 @@ from athcodec.encoding.summary import Seam, Summary
 from athcodec.encoding.survey import Ath, Survey, survey
 from athcodec.errors import BoundError, ClipError
 from athcodec.files.threads import ThreadPool, default_jobs
+from athcodec.motion.branches.result import Found, with_branches
 from athcodec.motion.clip import ERROR_WEIGHTS, MotionClip
-from athcodec.motion.discovery import Found, with_branches
 from athcodec.motion.hierarchy import Hierarchy, derived_edges, hierarchy_of
 from athcodec.motion.polygons import POLYGON_ARRAYS, Polygons, type_code
 from athcodec.motion.thresholds import THRESHOLDS, Thresholds
