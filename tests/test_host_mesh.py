@@ -91,9 +91,8 @@ def test_the_bound_is_kept_with_the_hosts_mesh(source, tmp_path, options):
     data = encode(clip, tmp_path / "a.ath", **options)
     with opened(data, host_mesh=source) as decoder:
         assert_kept(decoder, clip)
-        assert (
-            np.array_equal(decoder.file.rest, source.rest.astype(np.float32)) and decoder.file.rest.dtype == np.float32
-        )
+        assert np.array_equal(decoder.file.rest, source.rest.astype(np.float32))
+        assert decoder.file.rest.dtype == np.float32
         assert not any(chunk.kind == ct.REFINED_REST for chunk in decoder.file.chunks)
         decoder.file.check()
 

@@ -29,7 +29,7 @@ from ctypes import (
 import numpy as np
 import numpy.typing as npt
 
-from athcodec._native import BRANCH, CHUNK, MEASURES, CorePolygons, as_bytes, check_layouts, lib
+from athcodec._native import BRANCH, CHUNK, MEASURES, CorePolygons, as_bytes, check_layouts, fields, lib
 from athcodec.decoding import container
 from athcodec.errors import LimitExceeded
 from athcodec.motion.polygons import Polygons, type_of
@@ -44,75 +44,51 @@ FILE_ORDER, SOURCE_ORDER = 0, 1
 AS_MARKED = 3
 BLEND_CLIPS = 4
 
-PART = np.dtype([(name, "<i4") for name in ("first", "count", "branch", "index")])
+PART = np.dtype(fields("<i4", "first count branch index"))
 
 
 class Limits(Structure):
     """ath_limits."""
 
-    _fields_ = [
-        (name, c_uint32)
-        for name in ("chunks table_bytes vertices branches frames hierarchy_depth chunk_bytes reserved").split()
-    ]
-    _fields_ += [("memory_bytes", c_uint64)]
+    _fields_ = fields(
+        *(c_uint32, "chunks table_bytes vertices branches frames hierarchy_depth chunk_bytes reserved"),
+        *(c_uint64, "memory_bytes"),
+    )
 
     @classmethod
     def of(cls, limits: container.Limits) -> Limits:
-        """Those of container.Limits that the core keeps to; more than a field can hold is its largest value."""
-        most = {field[0]: 256 ** ctypes.sizeof(field[1]) - 1 for field in cls._fields_ if field[0] != "reserved"}
+        """Return the limits that the core keeps to; more than a field can hold becomes its largest value."""
+        most = {name: 256 ** ctypes.sizeof(kind) - 1 for name, kind in cls._fields_ if name != "reserved"}
         return cls(**{name: min(getattr(limits, name), largest) for name, largest in most.items()})
 
 
 class Info(Structure):
     """ath_info."""
 
-    _fields_ = [
-        ("file_length", c_uint64),
-        ("prelude_length", c_uint64),
-        ("max_error", c_double),
-        ("origin", c_double * 3),
-    ]
-    _fields_ += [
-        (name, c_int32)
-        for name in (
-            "vertex_count branch_count frame_count segment_count clip_count "
-            "level_count full_level_count layer_count depth_levels node_count chunk_count "
-            "is_float64"
-        ).split()
-    ]
-    _fields_ += [
-        ("rest_is_float64", c_int32),
-        ("rest_is_host", c_int32),
-        ("host_checksum", c_uint32 * 2),
-        ("is_predicted", c_int32),
-    ]
+    _fields_ = fields(
+        *(c_uint64, "file_length prelude_length", c_double, "max_error", c_double * 3, "origin"),
+        *(c_int32, "vertex_count branch_count frame_count segment_count clip_count level_count full_level_count"),
+        *(c_int32, "layer_count depth_levels node_count chunk_count is_float64 rest_is_float64 rest_is_host"),
+        *(c_uint32 * 2, "host_checksum", c_int32, "is_predicted"),
+    )
 
 
 class Clip(Structure):
     """ath_clip."""
 
-    _fields_ = [("name", ctypes.c_char_p), ("duration", c_double)]
-    _fields_ += [
-        (name, c_int32) for name in ("first_frame frame_count first_segment segment_count loop periodic").split()
-    ]
+    _fields_ = fields(
+        *(ctypes.c_char_p, "name", c_double, "duration"),
+        *(c_int32, "first_frame frame_count first_segment segment_count loop periodic"),
+    )
 
 
 class Fault(Structure):
     """ath_fault_info; its text is one line of English."""
 
-    _fields_ = [
-        ("code", c_int32),
-        ("field", c_int32),
-        ("chunk", c_int32),
-        ("kind", c_uint16),
-        ("level", c_uint8),
-        ("reserved", c_uint8),
-        ("segment", c_uint32),
-        ("offset", c_uint64),
-        ("found", c_double),
-        ("least", c_double),
-        ("most", c_double),
-    ]
+    _fields_ = fields(
+        *(c_int32, "code field chunk", c_uint16, "kind", c_uint8, "level reserved"),
+        *(c_uint32, "segment", c_uint64, "offset", c_double, "found least most"),
+    )
 
     def __str__(self) -> str:
         text = ctypes.create_string_buffer(FAULT_TEXT)
@@ -123,13 +99,13 @@ class Fault(Structure):
 class Share(Structure):
     """ath_share."""
 
-    _fields_ = [("segments", c_void_p), ("segment_count", c_int32), ("frame", c_double), ("weight", c_double)]
+    _fields_ = fields(c_void_p, "segments", c_int32, "segment_count", c_double, "frame weight")
 
 
 class Range(Structure):
     """ath_range."""
 
-    _fields_ = [("offset", c_uint64), ("size", c_uint64)]
+    _fields_ = fields(c_uint64, "offset size")
 
 
 MIRRORS: dict[str, type[ctypes.Structure] | np.dtype] = {
