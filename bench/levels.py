@@ -73,9 +73,8 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 
 def _same_nodes(result: Encoded) -> Ath:
     """The paper's ATH with the thresholds of the file."""
-    ath = athcodec.build_ath(
-        result.clip, max_error=result.summary.max_error_bound, hierarchy=result.decoder.file.hierarchy
-    )
+    hierarchy = result.decoder.file.hierarchy
+    ath = athcodec.build_ath(result.clip, max_error=result.summary.max_error_bound, hierarchy=hierarchy)
     ours, theirs = result.decoder.file.table1(), ath.table1()
     if any(ours[key] != theirs[key] for key in ("depth", "nodes", "leaves")):
         raise RuntimeError(f"nodes of the ATH: got {ours} in the file, {theirs} from the clip")

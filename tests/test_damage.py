@@ -132,9 +132,8 @@ def use(data: bytes, **options) -> bool:
             assert "\n" not in str(error)
             return False
         answered = True
-        for ask in asks + [
-            lambda d, level=level: d.positions(level=level) for level in range(decoder.file.level_count)
-        ]:
+        levels = range(decoder.file.level_count)
+        for ask in asks + [lambda d, level=level: d.positions(level=level) for level in levels]:
             try:
                 ask(decoder)
             except REFUSED as error:

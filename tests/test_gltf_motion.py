@@ -409,7 +409,7 @@ def test_truncate_takes_a_glb_and_writes_one_or_the_file_alone(source, tmp_path)
         athcodec.open(cut) as short,
         athcodec.open(alone, host_mesh=short.file.rest) as bare,
     ):
-        assert short.file.level_count == bare.file.level_count == 2 < long.level_count
+        assert short.file.level_count == bare.file.level_count == 2 < long.file.level_count
         for frame in (0, 17, 39):
             assert np.array_equal(short.positions(frame), long.positions(frame, 1))
             assert np.array_equal(bare.positions(frame), long.positions(frame, 1))

@@ -175,13 +175,9 @@ def test_a_file_says_what_it_holds_without_the_mesh(hosted, mesh, source):
         assert (
             file.host_checksum == f"{ct.crc32c(data):08x}{ct.crc32c(data[::-1]):08x}" == info["host_mesh"]["checksum"]
         )
-        assert (
-            file.needs_host_mesh and info["vertices"] == len(mesh) and len(decoder.levels) == decoder.file.level_count
-        )
-        assert np.array_equal(decoder.time, source.time) and np.array_equal(
-            decoder.file.vertex_branch, source.vertex_branch
-        )
-        assert decoder.file.deepest == decoder.file.level_count - 1 and decoder.level_for(1e5, 1.0, 1e3) == 0
+        assert file.needs_host_mesh and info["vertices"] == len(mesh) and len(decoder.levels) == file.level_count
+        assert np.array_equal(decoder.time, source.time) and np.array_equal(file.vertex_branch, source.vertex_branch)
+        assert file.deepest == file.level_count - 1 and decoder.level_for(1e5, 1.0, 1e3) == 0
         file.check(decode=False)
         file.set_host_mesh(mesh)
         assert not file.needs_host_mesh

@@ -393,10 +393,8 @@ def test_the_wind_chooses_what_is_blended(lib, medley_ath):
         winds = [(2.0 + 6.0 * (i > 0), 90.0 * i) for i in range(len(names))]
         for strength, heading in ((0, 0), (5, 130), (8, 95), (99, 300)):
             weights = core_file.wind_weights(np.array(winds), strength, heading)
-            wanted = file.blended(dict(zip(names, weights.tolist())), 0.37)
-            np.testing.assert_array_equal(
-                player.in_wind(file.file.vertex_count, winds, strength, heading, 0.37), wanted
-            )
+            shown = player.in_wind(file.file.vertex_count, winds, strength, heading, 0.37)
+            np.testing.assert_array_equal(shown, file.blended(dict(zip(names, weights.tolist())), 0.37))
 
 
 def test_blends_without_a_weight_or_a_clip_or_memory_are_refused(lib, medley_ath):

@@ -62,8 +62,10 @@ class AthFile(StaticData, SegmentDecoder):
         Whether every byte that the header announces is there.
     bytes_read : int
         Bytes read so far.
-    vertex_count, branch_count, frame_count : int
-        Vertices and branches of the plant, N and B, and frames of all clips.
+    vertex_count, branch_count, frame_count, segment_count : int
+        Vertices and branches of the plant, N and B; frames and segments of all clips.
+    level_count, full_level_count : int
+        Stored levels, 0 to level_count - 1, and levels of the original encoding, which a truncated file has fewer of.
     max_error_bound : float
         Largest distance of any vertex in any frame at the deepest stored level, as promised; scene units.
     dtype : numpy.dtype

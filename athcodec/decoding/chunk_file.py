@@ -48,12 +48,13 @@ class ChunkFile:
             self.core = self._open_core()
             self.file_length: int = self.core.info.file_length
             self.prelude_length: int = self.core.info.prelude_length
+            self.segment_count: int = self.core.info.segment_count
+            self.level_count: int = self.core.info.level_count
+            self.full_level_count: int = self.core.info.full_level_count
             self.complete: bool = self.available_length >= self.file_length
             self._check_length(strict)
             self._set_table()
-            self._damaged_from: int = self.core.info.level_count
-            if allow_partial:
-                self._damaged_from = self._first_damaged_level()
+            self._damaged_from = self._first_damaged_level() if allow_partial else self.level_count
         except BaseException:
             self.close()
             raise
@@ -156,28 +157,11 @@ class ChunkFile:
         return list(map(Chunk, *columns, self._index[rows].tolist()))
 
     def find(self, kind: int) -> Chunk | None:
-        """Return the first chunk of a kind, such as the only one of metadata.
-
-        Parameters
-        ----------
-        kind : int
-            A number of the chunk table (FORMAT.md, "Chunk table").
-
-        Returns
-        -------
-        Chunk or None
-            None if the file has no such chunk.
-        """
+        """Return the first chunk of a kind (FORMAT.md, "Chunk table"), or None if the file has none."""
         return next(iter(self._chunks_of(kind)), None)
 
     def is_available(self, chunk: Chunk) -> bool:
-        """Return whether the chunk's bytes are there.
-
-        Parameters
-        ----------
-        chunk : Chunk
-            One of `chunks`.
-        """
+        """Return whether the bytes of a chunk, one of `chunks`, are there."""
         return chunk.offset + chunk.length <= self.available_length
 
     def _lacks(self, kind: int) -> bool:
@@ -215,7 +199,7 @@ class ChunkFile:
                     self.payload(chunk)
                 except BadChecksum:
                     return chunk.level
-        return self._damaged_from
+        return self.level_count
 
 
 def _opened(path: Any, gltf_motion: str | None) -> Any:

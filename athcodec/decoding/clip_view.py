@@ -1,7 +1,4 @@
-"""Some frames of an .ath file at one level, or all its clips, in the shape of a clip: what exporters write.
-
-It decodes nothing itself (decoder.py) and knows no file format (exporters/).
-"""
+"""Some frames of an .ath file at one level, or all its clips, in the shape of a clip, which exporters write."""
 
 from __future__ import annotations
 
@@ -15,15 +12,15 @@ from athcodec.decoding.affines import Affines
 from athcodec.decoding.decoder import Decoder
 from athcodec.errors import LevelUnavailable
 from athcodec.files.atomic import FileId
-from athcodec.motion.clip import ClipRange, clip_range_frames, polygons
+from athcodec.motion.clip import DEFAULT_FPS, ClipRange, clip_range_frames, polygons, stated_fps
 from athcodec.options import whole
 
 
 class ClipView:
     """Frames of an .ath file at one level, with the names and the meanings of MotionClip, and `affines` besides.
 
-    Vertices stand in the source's order, lengths are in scene units. Frame 0 is the first of the view; time and
-    metadata["start_frame"] are those that it has in the whole clip.
+    Vertices stand in the source's order, lengths are in scene units. Frame 0 is the first of the view; its time and
+    metadata["start_frame"] are those of the frame in the whole clip.
 
     Parameters
     ----------
@@ -32,7 +29,7 @@ class ClipView:
     level : int, optional
         Level of detail; by default the deepest that is complete.
     frames : range, optional
-        Those of the clip, with step 1; by default all.
+        Frames of the clip, with step 1; by default all.
     all_clips : bool
         Show these frames of every clip of the file, one clip after the other, as a MotionClip of several clip ranges
         has them.
@@ -40,7 +37,7 @@ class ClipView:
     Raises
     ------
     LevelUnavailable
-        Where the level or the frames do not exist.
+        If the level or the frames do not exist.
     """
 
     def __init__(
@@ -55,12 +52,12 @@ class ClipView:
 
     @property
     def inputs(self) -> frozenset[FileId]:
-        """The files that it is read from, by device and inode."""
+        """The files that the view is read from, by device and inode."""
         return self.decoder.file.inputs
 
     @property
     def clip_ranges(self) -> tuple[ClipRange, ...]:
-        """The clips; frames of a loop that are not all it has are no loop."""
+        """The clips. Frames of a loop are only a loop if they are all of it."""
         return tuple(
             ClipRange(decoder.clip.name, len(frames), decoder.clip.loop and len(frames) == decoder.frame_count)
             for decoder, frames in self._runs
@@ -103,15 +100,12 @@ class ClipView:
 
     @property
     def fps(self) -> float:
-        """Frames per second: what the source said, else the median rate of the file, else 30."""
-        said = self.metadata.get("fps")
-        if isinstance(said, (int, float)) and not isinstance(said, bool) and 0 < said < float("inf"):
-            return float(said)
-        return self.decoder.fps or 30.0
+        """Frames per second that the source states, else the median rate of the file, else 30."""
+        return stated_fps(self.metadata) or self.decoder.fps or DEFAULT_FPS
 
     @cached_property
     def metadata(self) -> dict[str, Any]:
-        """Unit, up axis and whatever else the source said of the clip, or of all clips."""
+        """Unit, up axis and whatever else the source states for the clip, or for all clips."""
         return dict(self.decoder.metadata if len(self._runs) == 1 else self.decoder.file.metadata)
 
     @property
@@ -155,12 +149,12 @@ class ClipView:
         return polygons(self.faces, self.attributes)
 
     def block(self, start: int, stop: int) -> np.ndarray:
-        """Positions of some frames of the view.
+        """Return the positions of some frames of the view.
 
         Parameters
         ----------
         start, stop : int
-            The first frame, and that behind the last.
+            The first frame, and the frame behind the last.
 
         Returns
         -------
@@ -172,15 +166,15 @@ class ClipView:
         LevelUnavailable, FormatError
             As Decoder.positions.
         """
-        found = []
+        parts = []
         for (decoder, frames), (first, last) in zip(self._runs, self.clip_range_frames):
-            own = frames[max(start - first, 0) : max(min(stop, last) - first, 0)]
-            if own:
-                found.append(decoder.positions(slice(own.start, own.stop), self.level))
-        return found[0] if len(found) == 1 else np.concatenate(found)
+            part = frames[max(start - first, 0) : max(min(stop, last) - first, 0)]
+            if part:
+                parts.append(decoder.positions(slice(part.start, part.stop), self.level))
+        return parts[0] if len(parts) == 1 else np.concatenate(parts)
 
     def blocks(self) -> Iterator[tuple[int, np.ndarray]]:
-        """Positions of all frames, one segment in memory at a time.
+        """Yield the positions of all frames, with one segment in memory at a time.
 
         Yields
         ------
@@ -199,22 +193,22 @@ class ClipView:
                 yield start - frames.start + first, block
 
     def affines(self, frame: int) -> Affines:
-        """A frame of the view as matrices.
+        """Return a frame of the view as matrices.
 
         Parameters
         ----------
         frame : int
-            Counted from the view's first.
+            Number of the frame in the view.
 
         Returns
         -------
         Affines
-            As those of Decoder.affines.
+            The result of Decoder.affines.
 
         Raises
         ------
         IndexError
-            Where the view has no such frame.
+            If the view has no such frame.
         LevelUnavailable, FormatError
             As Decoder.positions.
         """
@@ -225,7 +219,7 @@ class ClipView:
 
 
 def _checked(frames: range | None, frame_count: int) -> range:
-    """All frames where none are given."""
+    """Return the frames, by default all. Raises LevelUnavailable if they do not exist."""
     frames = range(frame_count) if frames is None else frames
     if not (0 <= frames.start < frames.stop <= frame_count and frames.step == 1):
         raise LevelUnavailable(f"frames: got {frames.start}:{frames.stop}, expected A:B with A < B <= {frame_count}")

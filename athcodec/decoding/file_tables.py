@@ -89,21 +89,6 @@ class FileTables(ChunkFile):
         values = {name: getattr(self.core.info, name) for name in counts}
         return ct.Header(**values, joins=self.core.joins(), repeats=self.core.repeats())
 
-    @property
-    def segment_count(self) -> int:
-        """Segments of all clips."""
-        return self.core.info.segment_count
-
-    @property
-    def level_count(self) -> int:
-        """Number of stored levels, 0 to level_count - 1."""
-        return self.core.info.level_count
-
-    @property
-    def full_level_count(self) -> int:
-        """Levels of the original encoding; more than level_count in a truncated file."""
-        return self.core.info.full_level_count
-
     # ---- clips ----
 
     @cached_property
@@ -111,16 +96,9 @@ class FileTables(ChunkFile):
         """The clips that the file holds, in its order."""
         return tuple(
             Clip(
-                clip.name.decode(),
-                clip.first_frame,
-                clip.frame_count,
-                clip.first_segment,
-                clip.segment_count,
-                bool(clip.loop),
-                clip.duration,
-                tuple(self.core.seam_error(index, level) for level in range(self.full_level_count))
-                if clip.loop
-                else (),
+                *(clip.name.decode(), clip.first_frame, clip.frame_count, clip.first_segment, clip.segment_count),
+                *(bool(clip.loop), clip.duration),
+                tuple(self.core.seam_error(index, level) for level in range(self.full_level_count if clip.loop else 0)),
             )
             for index, clip in enumerate(self.core.clips())
         )
@@ -150,18 +128,7 @@ class FileTables(ChunkFile):
         return self.core.times()
 
     def segment_starts(self, clip: Clip) -> list[int]:
-        """Return the first frame of each segment of a clip, and the frame behind its last.
-
-        Parameters
-        ----------
-        clip : Clip
-            One of `clips`.
-
-        Returns
-        -------
-        list of int
-            Frames of the whole file; one more than the clip has segments.
-        """
+        """Return the first frame of each segment of a clip, in the whole file, and the frame behind its last."""
         return self.core.segment_starts(clip.segments)
 
     # ---- levels ----
@@ -240,29 +207,12 @@ class FileTables(ChunkFile):
         return self.core.branches()
 
     def nodes_at(self, level: int) -> int:
-        """Return the number of parts at a level: exact stems, and subtrees that move as one.
-
-        Parameters
-        ----------
-        level : int
-            A stored level.
-        """
+        """Return the number of parts at a stored level: exact stems, and subtrees that move as one."""
         parts = self.core.cut(level)
         return len(self.exact_branches(parts)) + int((parts["branch"] >= 0).sum())
 
     def exact_branches(self, parts: np.ndarray) -> np.ndarray:
-        """Return the branches whose stems are exact in a cut.
-
-        Parameters
-        ----------
-        parts : ndarray, (P,) core_file.PART
-            The parts that the plant is made of at a level, `core.cut(level)`.
-
-        Returns
-        -------
-        ndarray, (K,) int64
-            Ascending, in file order.
-        """
+        """Return the branches, (K,) int64 in file order, whose stems are exact in a cut, `core.cut(level)`."""
         runs = parts[parts["branch"] < 0]
         run = np.searchsorted(runs["first"], self.branches["first"], "right") - 1
         ends = np.append(runs["first"] + runs["count"], 0)  # Index -1 stands for branches before the first run.
@@ -274,13 +224,7 @@ class FileTables(ChunkFile):
         return self.levels_in(range(self.segment_count))
 
     def levels_in(self, segments: range) -> list[Level]:
-        """Return the stored levels, coarse to fine, with their errors in some segments of the file.
-
-        Parameters
-        ----------
-        segments : range
-            Numbers of segments in the whole file.
-        """
+        """Return the stored levels, coarse to fine, with their errors in some segments of the whole file."""
         return [
             Level(
                 level,

@@ -25,15 +25,7 @@ class SegmentDecoder(ChunkFile):
         return core_file.Work(self.core.work_size())
 
     def prefetch(self, segments: range, level: int) -> None:
-        """Fetch what these segments need at a level from a remote file.
-
-        Parameters
-        ----------
-        segments : range
-            Numbers of segments in the whole file.
-        level : int
-            A stored level.
-        """
+        """Fetch what segments of the whole file need at a level from a remote source."""
         with self._lock:
             self._announce(self.core.missing(level, segments[0], segments[-1]))
 
