@@ -3,7 +3,7 @@
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-if TYPE_CHECKING:  # what __getattr__ finds, for type checkers and the reference
+if TYPE_CHECKING:  # Type checkers and the reference look here for what __getattr__ returns.
     from athcodec import errors, metrics
     from athcodec.decoding.ath_file import AthFile
     from athcodec.decoding.clip_view import ClipView
@@ -49,7 +49,8 @@ __all__ = [
     "write",
     "write_hdf5",
 ]
-_LAZY = {  # by module: to import the package loads none, so that a command or a program pays for what it uses
+# Names by module. Importing the package loads none of them, so that a command or a program pays for what it uses.
+_LAZY = {
     "encoding.survey": ("Ath", "build_ath"),
     "motion.thresholds": ("Thresholds",),
     "decoding.ath_file": ("AthFile",),

@@ -129,7 +129,7 @@ class CorePolygons(ctypes.Structure):
 
 _WRITER = [c_void_p, c_void_p, c_size_t]  # Scratch memory, and the buffer with its size.
 _SEGMENT = [POINTER(CorePlan), POINTER(Motion), POINTER(Integers)]
-_PLAYING = {  # core/include/ath.h
+_PLAYING = {  # Functions of core/include/ath.h.
     "ath_result_name": (c_char_p, [c_int]),
     "ath_kind_name": (c_char_p, [c_int]),
     "ath_fault_text": (c_size_t, [c_void_p, c_char_p, c_size_t]),
@@ -193,7 +193,7 @@ _PLAYING = {  # core/include/ath.h
     "ath_level_for": (c_int32, [c_void_p, c_int32, c_int32, c_int, c_double, c_double, c_double, c_double]),
     "ath_crc32c": (c_uint32, [c_uint32, c_void_p, c_size_t]),
 }
-_ENCODING = {  # core/model/plan.h, core/model/motion.h, core/encode/encode.h
+_ENCODING = {  # Functions of core/model/plan.h, core/model/motion.h and core/encode/encode.h.
     "ath_count_pieces": (c_int32, [c_void_p, c_int32, c_int32]),
     "ath_count_nodes": (c_int32, [c_void_p, c_int32]),
     "ath_build_plan": (None, [POINTER(CorePlan), *[c_void_p] * 3, c_int]),
@@ -325,7 +325,7 @@ check_layouts(MIRRORS)
 
 
 def address(array: np.ndarray | None, dtype, size: int) -> int | None:
-    """Pointer to a contiguous array of at least `size` items of `dtype`.
+    """Return a pointer to a contiguous array of at least `size` items of `dtype`.
 
     Raises TypeError where the array is anything else: a mistake of the caller that would corrupt memory.
     """
@@ -340,24 +340,24 @@ def address(array: np.ndarray | None, dtype, size: int) -> int | None:
 
 
 def new_model() -> np.ndarray:
-    """Scratch memory for one coding call at a time."""
+    """Return scratch memory for one coding call at a time."""
     return np.empty(lib.ath_model_size() // 8 + 1, np.uint64)
 
 
 def as_bytes(data) -> np.ndarray:
-    """Bytes-like data as an array that can be handed to the core."""
+    """Return bytes-like data as an array that can be handed to the core."""
     return np.frombuffer(data, np.uint8) if len(data) else np.zeros(1, np.uint8)[:0]
 
 
 def crc32c(data, crc: int = 0) -> int:
-    """CRC-32C of bytes-like data, continuing from `crc`."""
+    """Return the CRC-32C of bytes-like data, continuing from `crc`."""
     array = as_bytes(data)
     return lib.ath_crc32c(crc, array.ctypes.data, array.size)
 
 
 def encode_stream(function_name: str, capacity: int, *arguments, model: np.ndarray | None = None) -> bytes:
-    """Runs one of the core's writers, with more room until its stream fits; model: its scratch memory, where that is
-    another than `new_model` gives."""
+    """Run one of the core's writers, with more room until its stream fits. `model` is its scratch memory, by default
+    that of `new_model`."""
     model = new_model() if model is None else model
     while True:
         buffer = np.empty(capacity, np.uint8)

@@ -21,7 +21,7 @@ def open(
     host_mesh: HostMesh | str | os.PathLike[str] | None = None,
     gltf_motion: str | None = None,
 ) -> Decoder:
-    """Opens an .ath file for playing one of its clips.
+    """Open an .ath file for playing one of its clips.
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ def open(
 
 def set_host_mesh_of(file: AthFile, path: str | os.PathLike[str]) -> None:
     """Read a mesh in the unit and axes of an .ath file and hand it over. Raises ClipError, WrongHostMesh, OSError."""
-    from athcodec.sources import read  # takes long to import, and most files need no mesh
+    from athcodec.sources import read  # The sources take long to import, and most files need no mesh.
 
     units = {name: file.metadata[name] for name in ("unit", "up_axis") if isinstance(file.metadata.get(name), str)}
     with read(path, **units) as clip:

@@ -1,4 +1,4 @@
-"""A shorter .ath file from a longer one, without decoding: the deeper levels are left out, the header says so."""
+"""A shorter .ath file from a longer one, without decoding: the deeper levels and their entries in the header go."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ def truncate(
                     f"{chunk.offset + chunk.length}"
                 )
         if Path(target).suffix.lower() == ".glb":
-            from athcodec.exporters.gltf_into import put_motion  # which takes long to import
+            from athcodec.exporters.gltf_into import put_motion  # The module takes long to import.
             from athcodec.files.gltf.motion import GltfMotion
 
             if not isinstance(file.source, GltfMotion):
@@ -94,7 +94,7 @@ def truncate(
 
 
 def _shortened(file: AthFile, level: int) -> tuple[bytes, list[ct.Chunk]]:
-    """The front of the file that ends with a level, and what follows it."""
+    """Return the front of the file that ends with a level, and the chunks behind it."""
     chunks = [chunk for chunk in file.chunks if not chunk.is_motion or chunk.level <= level]
     if file.rest_is_missing:
         chunks = [chunk for chunk in chunks if chunk.kind != ct.SOURCE_REST]
