@@ -1,4 +1,4 @@
-"""Branches for a clip that names none, from what it has to find them by.
+"""Branches for a clip that names none, found by what data it has.
 
 Labels come from attributes named like branch ids, from the joints of a skin, from an edge graph, from the connected
 components of a render mesh, or from motion: runs of points that keep their distance, or patches of a mesh that move
@@ -24,16 +24,16 @@ from athcodec.options import METHODS, whole
 
 LABEL_NAMES = ("vertex_branch", "branch", "branch_id", "branchid", "branch_index", "branchindex", "branch_number")
 PARENT_NAMES = ("branch_parent", "branchparent", "branch_parents", "parent_branch", "parent")
-LONE_POINTS = 0.1  # of the vertices, up to which runs are tried against no patches
-COMPONENTS_AT_MOST = 0.6  # of the vertices: more components than that are no branches but loose points
-PATCH_VERTICES = 150  # that a patch of a mesh without other branches has on average
-SMALL_PATCH, LARGE_PATCH = 40, 600  # one of which is tried besides
-LARGE_MESH = 10_000  # vertices from which on that is the large one
-FREE_PATCHES = (64, 200)  # vertices of patches without parents
+LONE_POINTS = 0.1  # Part of the vertices that may be alone before patches are tried besides runs.
+COMPONENTS_AT_MOST = 0.6  # Part of the vertices above which components are no branches but loose points.
+PATCH_VERTICES = 150  # Average vertices of a patch in a mesh without other branches.
+SMALL_PATCH, LARGE_PATCH = 40, 600  # Sizes of patches, one of which is tried besides.
+LARGE_MESH = 10_000  # Vertices from which on LARGE_PATCH is the one.
+FREE_PATCHES = (64, 200)  # Vertices of patches without parents.
 
 
 def find_branches(clip: MotionClip, method: str = "auto", root: int | None = None) -> Found:
-    """Find branches for a clip; those that it has are not looked at.
+    """Find branches for a clip; those that it has are ignored.
 
     Parameters
     ----------
@@ -63,43 +63,43 @@ def find_branches(clip: MotionClip, method: str = "auto", root: int | None = Non
     if method != "auto" and method not in METHODS:
         raise ValueError(f"method: got {method!r}, expected auto or one of {', '.join(METHODS)}")
     root = None if root is None else whole("root", root)
-    found = _first_found(Seen(clip), METHODS if method == "auto" else (method,), root)
-    if found is None:
+    branches = _first_found(Seen(clip), METHODS if method == "auto" else (method,), root)
+    if branches is None:
         raise ClipError(f"branches: the clip has nothing to find them by {method}, expected {_EXPECTED[method]}")
-    return found
+    return branches
 
 
 def candidates(clip: MotionClip) -> list[Found]:
-    """What find_branches gives; and where that goes by motion, or by runs that leave many points alone, also patches of
-    other sizes, patches without parents, and one single branch; where it welds pieces of a mesh, also the pieces: only
-    a trial shows which of them makes the smallest file. A clip that stands still has no patches and no runs."""
+    """Return what find_branches finds and, if only a trial shows which makes the smallest file, alternatives: for
+    motion, or runs that leave many points alone, patches of other sizes, patches without parents and one single branch;
+    for a welded mesh, its pieces. A clip that stands still has no patches and no runs."""
     seen = Seen(clip)
     single = Found(np.zeros(clip.vertex_count, np.int32), np.array([-1], np.int32), None, "motion")
     if stands_still(clip):
-        found = _first_found(seen, METHODS[:-2], None)
-        return [single] if found is None else [single, found]
-    found = _first_found(seen, METHODS, None) or _by_motion(seen, None)
-    if found.method == "skeleton":
-        return [found, dataclasses.replace(found, stem_index=None)]
-    lone = np.count_nonzero(np.bincount(found.vertex_branch) == 1)
-    if found.method == "components":
-        unwelded = pieces(clip)  # leaves that touch are welded, which is wrong where they move by themselves
-        return [found] if len(unwelded.branch_parent) == len(found.branch_parent) else [found, unwelded]
-    if found.method != "motion" and not (found.method == "runs" and lone > LONE_POINTS * clip.vertex_count):
-        return [found]
-    patches = [found] if found.method == "motion" else [found, _by_motion(seen, None)]
+        first = _first_found(seen, METHODS[:-2], None)
+        return [single] if first is None else [single, first]
+    first = _first_found(seen, METHODS, None) or _by_motion(seen, None)
+    if first.method == "skeleton":
+        return [first, dataclasses.replace(first, stem_index=None)]
+    lone = np.count_nonzero(np.bincount(first.vertex_branch) == 1)
+    if first.method == "components":
+        unwelded = pieces(clip)  # Leaves that touch are welded, which is wrong if they move by themselves.
+        return [first] if len(unwelded.branch_parent) == len(first.branch_parent) else [first, unwelded]
+    if first.method != "motion" and not (first.method == "runs" and lone > LONE_POINTS * clip.vertex_count):
+        return [first]
+    patches = [first] if first.method == "motion" else [first, _by_motion(seen, None)]
     return [single, *patches, *_more_patches(seen)]
 
 
 def _more_patches(seen: Seen) -> list[Found]:
-    """Patches of another size than usual, and such without parents."""
+    """Return patches of another size than usual, and patches without parents."""
     if seen.clip.vertex_count >= LARGE_MESH:
         return [_by_motion(seen, None, LARGE_PATCH), _free_patches(seen, FREE_PATCHES[-1])]
     return [_by_motion(seen, None, SMALL_PATCH), *(_free_patches(seen, size) for size in FREE_PATCHES)]
 
 
 def pieces(clip: MotionClip) -> Found:
-    """The connected pieces of a clip's mesh as branches without parents: what can be had without scipy.
+    """Return the connected pieces of a clip's mesh as branches without parents, which takes no scipy.
 
     Parameters
     ----------
@@ -123,12 +123,15 @@ def pieces(clip: MotionClip) -> Found:
 
 
 def _first_found(seen: Seen, methods: Sequence[str], root: int | None) -> Found | None:
-    """By the first method that has something to go by; motion always has."""
-    return next((found for found in (_FINDERS[name](seen, root) for name in methods) if found is not None), None)
+    """Return branches by the first method that has data to go by; motion always has."""
+    return next(
+        (branches for branches in (_FINDERS[name](seen, root) for name in methods) if branches is not None), None
+    )
 
 
 def _by_attributes(seen: Seen, root: int | None) -> Found | None:
-    """Labels that the source has under a usual name, for vertices or faces, and their parents if it has those too."""
+    """Find branches by labels under a usual name, for vertices or faces, and their parents if the source has those
+    too."""
     clip = seen.clip
     named = {name.lower().rsplit("/", 1)[-1].replace("primvars:", ""): array for name, array in clip.attributes.items()}
     labels = next(
@@ -139,14 +142,14 @@ def _by_attributes(seen: Seen, root: int | None) -> Found | None:
     names, vertex_branch = np.unique(labels, return_inverse=True)
     parents = next((named[name] for name in PARENT_NAMES if name in named), None)
     if parents is not None and parents.ndim == 1 and parents.dtype.kind in "iu" and len(parents) > names.max():
-        own = parents[names].astype(np.int64)
-        parent = np.where(np.isin(own, names), np.searchsorted(names, own).clip(0, len(names) - 1), -1)
+        above = parents[names].astype(np.int64)
+        parent = np.where(np.isin(above, names), np.searchsorted(names, above).clip(0, len(names) - 1), -1)
         return arranged(seen, vertex_branch, root, "attributes", parent)
     return arranged(seen, vertex_branch, root, "attributes")
 
 
 def _vertex_labels(clip: MotionClip, array: np.ndarray | None) -> np.ndarray | None:
-    """Whole numbers from 0 on, one per vertex, of an array per vertex or per face; None where it is neither."""
+    """Return whole numbers from 0 on, one per vertex, of an array per vertex or per face; None if it is neither."""
     if array is None or array.size not in (len(array), 0) or array.dtype.kind not in "iuf":
         return None
     values = np.round(array.reshape(-1)).astype(np.int64) if array.size else array
@@ -161,8 +164,8 @@ def _vertex_labels(clip: MotionClip, array: np.ndarray | None) -> np.ndarray | N
 
 
 def _by_skeleton(seen: Seen, root: int | None) -> Found | None:
-    """Chains of joints: the vertices whose strongest weights are theirs. An object that no joint moves hangs on the one
-    that is nearest."""
+    """Find branches by chains of joints: the vertices whose strongest weights are theirs. An object that no joint moves
+    hangs on the nearest one."""
     clip = seen.clip
     if clip.skin is None or (clip.skin.vertex_joint >= 0).sum() == 0:
         return None
@@ -171,7 +174,7 @@ def _by_skeleton(seen: Seen, root: int | None) -> Found | None:
         nearest, parts = _nearest_label(clip.rest, joint), _unlabelled_parts(clip, joint)
         joint = np.where(parts < 0, nearest[0], len(parents) + parts)
         order = np.lexsort((nearest[1], parts))
-        first = order[np.flatnonzero(np.diff(parts[order], prepend=-1))]  # of each part the vertex that is nearest
+        first = order[np.flatnonzero(np.diff(parts[order], prepend=-1))]  # The nearest vertex of each part.
         parents = np.concatenate([parents, nearest[0][first]])
     names, label = np.unique(joint, return_inverse=True)
     is_used = np.zeros(len(parents), bool)
@@ -189,14 +192,15 @@ def _used_ancestor(joint: int, parents: np.ndarray, is_used: np.ndarray) -> int:
 
 
 def _nearest_label(rest: np.ndarray, label: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(N,) the label of the vertex that is nearest and has one, and how far away it is."""
+    """Return the label of the nearest vertex that has one, and its distance, (N,)."""
     tree = scipy_module("spatial").cKDTree(rest[label >= 0])
     distance, place = tree.query(rest)
     return np.where(label >= 0, label, label[label >= 0][place]), distance
 
 
 def _unlabelled_parts(clip: MotionClip, label: np.ndarray) -> np.ndarray:
-    """(N,) of objects, and of each of their copies, that have no label at all, from 0 on; -1 for all other vertices."""
+    """Return the number of each object, and of each of its copies, that has no label at all, (N,); -1 for other
+    vertices."""
     counts, copies = (clip.attributes.get(name) for name in ("part_vertex_counts", "part_copies"))
     if counts is None or counts.ndim != 1 or counts.sum() != len(label):
         return np.full(len(label), -1)
@@ -209,7 +213,7 @@ def _unlabelled_parts(clip: MotionClip, label: np.ndarray) -> np.ndarray:
 
 
 def _by_edges(seen: Seen, root: int | None) -> Found | None:
-    """Stems of a graph of centre lines; not for meshes, whose edges close cycles."""
+    """Find branches by a graph of centre lines; not for meshes, whose edges close cycles."""
     clip = seen.clip
     if clip.edges is None or not len(clip.edges) or clip.polygons is not None:
         return None
@@ -222,7 +226,7 @@ def _by_edges(seen: Seen, root: int | None) -> Found | None:
 
 
 def _by_components(seen: Seen, root: int | None) -> Found | None:
-    """Pieces of a mesh that hang together: bark tubes, leaf cards."""
+    """Find branches by pieces of a mesh that hang together: bark tubes, leaf cards."""
     if not len(seen.mesh):
         return None
     vertex_count = seen.clip.vertex_count
@@ -234,10 +238,11 @@ def _by_components(seen: Seen, root: int | None) -> Found | None:
 
 
 def _by_runs(seen: Seen, root: int | None) -> Found | None:
-    """Points that nothing joins, linked to those that keep their distance: blades, needles, strands, centre lines."""
+    """Find branches of points that nothing joins by linking those that keep their distance: blades, needles,
+    strands."""
     if len(seen.mesh):
         return None
-    frames = seen.frames[1:]  # the rest pose may have links of other lengths
+    frames = seen.frames[1:]  # The rest pose may have links of other lengths.
     links = run_links(frames)
     if links is None:
         return None
@@ -246,18 +251,18 @@ def _by_runs(seen: Seen, root: int | None) -> Found | None:
 
 
 def _by_motion(seen: Seen, root: int | None, patch_vertices: int = PATCH_VERTICES) -> Found:
-    """Patches that move rigidly, each on one that it touches."""
+    """Find patches that move rigidly, each on one that it touches."""
     return arranged(seen, _patches(seen, patch_vertices), root, "motion")
 
 
 def _free_patches(seen: Seen, patch_vertices: int) -> Found:
-    """Patches without parents: what moves as a blend of few poses, as skins do, stays one in the space of the clip."""
+    """Find patches without parents: a blend of few poses, as in skins, stays one in the space of the clip."""
     label = _patches(seen, patch_vertices)
     return Found(label.astype(np.int32), np.full(label.max() + 1, -1, np.int32), None, "motion")
 
 
 def _patches(seen: Seen, patch_vertices: int) -> np.ndarray:
-    """(N,) labels of patches grown over the mesh, or over near neighbours where there is none."""
+    """Return labels of patches grown over the mesh, (N,), or over near neighbours if there is none."""
     links = seen.links if len(seen.links) else near_neighbours(seen.clip.rest, 8)
     return rigid_patches(seen.frames, links, patch_vertices)
 

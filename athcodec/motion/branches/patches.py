@@ -9,22 +9,23 @@ from athcodec.motion.branches.seen import cheapest_of_each, components, numbered
 
 PATCH_ROUNDS = 8
 MOST_PATCHES = 2000
-CRUMB = 12  # vertices: smaller patches join a neighbour
+CRUMB = 12  # Vertices below which a patch joins a neighbour.
 
 
 def rigid_patches(frames: np.ndarray, links: np.ndarray, patch_vertices: int) -> np.ndarray:
-    """(N,) labels of connected patches whose vertices one affine map per frame carries well: seeds spread over the
-    mesh, then maps and memberships in turn (Lloyd's iteration), vertices changing to patches beside theirs only."""
+    """Return labels of connected patches whose vertices one affine map per frame carries well, (N,): seeds spread over
+    the mesh, then maps and memberships in turn (Lloyd's iteration), in which vertices change to neighbouring patches
+    only."""
     links = np.concatenate([links, links[:, ::-1]])
     label = _spread(frames[0], links, int(np.clip(frames.shape[1] / patch_vertices, 1, MOST_PATCHES)))
     for _ in range(PATCH_ROUNDS):
         maps = _maps(frames, label)
-        own = _misfit(frames, maps, np.arange(len(label)), label)
+        current = _misfit(frames, maps, np.arange(len(label)), label)
         beside = label[links[:, 0]] != label[links[:, 1]]
         vertex, other = np.unique(np.stack([links[beside, 0], label[links[beside, 1]]], axis=1), axis=0).T
         misfit = _misfit(frames, maps, vertex, other)
         best = cheapest_of_each(vertex, misfit)
-        best = best[misfit[best] < own[vertex[best]]]
+        best = best[misfit[best] < current[vertex[best]]]
         label[vertex[best]] = other[best]
         label = numbered(label)
     inner = links[label[links[:, 0]] == label[links[:, 1]]]
@@ -32,7 +33,8 @@ def rigid_patches(frames: np.ndarray, links: np.ndarray, patch_vertices: int) ->
 
 
 def _spread(rest: np.ndarray, links: np.ndarray, count: int) -> np.ndarray:
-    """(N,) labels: the nearest, over the links, of `count` seeds that are far from each other; every part has one."""
+    """Return the nearest seed of each vertex over the links, (N,), of `count` seeds that are far apart; every part has
+    one."""
     length = np.maximum(np.linalg.norm(rest[links[:, 0]] - rest[links[:, 1]], axis=1), 1e-30)
     graph = scipy_module("sparse").coo_matrix((length, links.T), (len(rest),) * 2).tocsr()
     dijkstra = scipy_module("sparse.csgraph").dijkstra
@@ -47,7 +49,8 @@ def _spread(rest: np.ndarray, links: np.ndarray, count: int) -> np.ndarray:
 
 
 def _maps(frames: np.ndarray, label: np.ndarray) -> np.ndarray:
-    """(B, F, 4, 3) least-squares affine maps from the rest pose; translations where vertices do not determine more."""
+    """Return least-squares affine maps from the rest pose, (B, F, 4, 3); translations if vertices do not determine
+    more."""
     order = np.argsort(label, kind="stable")
     first = np.searchsorted(label[order], np.arange(label.max() + 1))
     rest = np.concatenate([frames[0], np.ones((len(label), 1))], axis=1)[order]
@@ -60,7 +63,7 @@ def _maps(frames: np.ndarray, label: np.ndarray) -> np.ndarray:
 
 
 def _misfit(frames: np.ndarray, maps: np.ndarray, vertex: np.ndarray, label: np.ndarray) -> np.ndarray:
-    """Sum over frames of the squared distances of vertices from where maps carry them."""
+    """Return the sum over frames of the squared distances of vertices from where maps carry them."""
     total = np.zeros(len(vertex))
     rest = np.concatenate([frames[0, vertex], np.ones((len(vertex), 1))], axis=1)
     for frame, moved in enumerate(frames):
@@ -70,7 +73,7 @@ def _misfit(frames: np.ndarray, maps: np.ndarray, vertex: np.ndarray, label: np.
 
 
 def _without_crumbs(label: np.ndarray, links: np.ndarray) -> np.ndarray:
-    """Patches of few vertices are merged into a neighbour."""
+    """Merge patches of few vertices into a neighbour."""
     for _ in range(PATCH_ROUNDS):
         size = np.bincount(label)
         leaves = (size[label[links[:, 0]]] < CRUMB) & (size[label[links[:, 0]]] < size[label[links[:, 1]]])

@@ -46,8 +46,8 @@ def checked_branches(vertex_branch: np.ndarray, parent: np.ndarray, stem_index: 
     return Found(vertex_branch, parent, check_stem_index(stem_index.astype(np.int64), vertex_branch), method)
 
 
-def with_branches(clip: MotionClip, found: Found) -> MotionClip:
-    """The clip on branches that were found. Raises ClipError where they are for another number of vertices."""
+def with_branches(clip: MotionClip, branches: Found) -> MotionClip:
+    """Return the clip on branches that were found. Raises ClipError if they are for another number of vertices."""
     return clip.replace(
-        vertex_branch=found.vertex_branch, branch_parent=found.branch_parent, stem_index=found.stem_index
+        vertex_branch=branches.vertex_branch, branch_parent=branches.branch_parent, stem_index=branches.stem_index
     )

@@ -12,12 +12,12 @@ from athcodec.files.atomic import new_file
 from athcodec.motion.branches.result import Found, checked_branches
 
 
-def save(found: Found, path: str | os.PathLike[str]) -> None:
+def save(branches: Found, path: str | os.PathLike[str]) -> None:
     """Write branches to a JSON file that a user can edit, one line per branch.
 
     Parameters
     ----------
-    found : Found
+    branches : Found
     path : str or path
         The file: of each branch its parent, and its vertices from base to tip as runs, "0-5 9". Older JSON is replaced,
         no other file.
@@ -25,16 +25,16 @@ def save(found: Found, path: str | os.PathLike[str]) -> None:
     Raises
     ------
     OSError
-        Where the file cannot be written.
+        If the file cannot be written.
     """
-    order = _stem_order(found.vertex_branch, found.stem_index)
-    bounds = np.searchsorted(found.vertex_branch[order], np.arange(len(found.branch_parent) + 1))
+    order = _stem_order(branches.vertex_branch, branches.stem_index)
+    bounds = np.searchsorted(branches.vertex_branch[order], np.arange(len(branches.branch_parent) + 1))
     lines = [
         json.dumps({"branch": branch, "parent": int(parent), "vertices": _runs(order[first:last])})
-        for branch, (parent, first, last) in enumerate(zip(found.branch_parent, bounds[:-1], bounds[1:]))
+        for branch, (parent, first, last) in enumerate(zip(branches.branch_parent, bounds[:-1], bounds[1:]))
     ]
     with new_file(path) as file:
-        file.write(f'{{"vertex_count": {len(order)}, "method": {json.dumps(found.method)}, "branches": [\n'.encode())
+        file.write(f'{{"vertex_count": {len(order)}, "method": {json.dumps(branches.method)}, "branches": [\n'.encode())
         file.write(",\n".join(lines).encode() + b"\n]}\n")
 
 
@@ -85,7 +85,7 @@ def load(path: str | os.PathLike[str]) -> Found:
 
 
 def _runs(vertices: np.ndarray) -> str:
-    """ "0-5 9 7" for 0 1 2 3 4 5 9 7."""
+    """Return runs of numbers, "0-5 9 7" for 0 1 2 3 4 5 9 7."""
     breaks = np.flatnonzero(np.diff(vertices) != 1) + 1
     firsts, lasts = vertices[np.append(0, breaks)], vertices[np.append(breaks, len(vertices)) - 1]
     return " ".join(f"{a}-{b}" if a != b else f"{a}" for a, b in zip(firsts.tolist(), lasts.tolist()))

@@ -9,40 +9,40 @@ import numpy as np
 from athcodec.motion.branches.point_runs import scipy_module
 from athcodec.motion.clip import MotionClip
 
-SAMPLE_FRAMES = 12  # of the clip, which the methods look at
-WELD = 1e-6  # of the diagonal: vertices that stay closer than this are one vertex of a mesh that was split
+SAMPLE_FRAMES = 12  # Frames of the clip that the methods look at.
+WELD = 1e-6  # Part of the diagonal; vertices that stay closer are one vertex of a mesh that was split.
 
 
 class Seen:
-    """What the methods look at in a clip, each made once, when it is asked for."""
+    """What the methods look at in a clip, each computed once, when it is asked for."""
 
     def __init__(self, clip: MotionClip):
         self.clip = clip
 
     @cached_property
     def frames(self) -> np.ndarray:
-        """(1 + k, N, 3) float64: the rest pose and a few frames spread over the clip."""
+        """The rest pose and a few frames spread over the clip, (1 + k, N, 3) float64."""
         return _sampled(self.clip)
 
     @cached_property
     def mesh(self) -> np.ndarray:
-        """(L, 2) pairs of vertices that edges or sides of faces join."""
+        """Pairs of vertices that edges or sides of faces join, (L, 2)."""
         return links_of(self.clip)
 
     @cached_property
     def links(self) -> np.ndarray:
-        """The same, and what stays at one place."""
+        """The links of `mesh`, and those between vertices that stay at one place."""
         return _welded(self.clip, self.mesh)
 
 
 def _sampled(clip: MotionClip) -> np.ndarray:
-    """(1 + k, N, 3) float64: the rest pose and a few frames spread over the clip."""
+    """Return the rest pose and a few frames spread over the clip, (1 + k, N, 3) float64."""
     some = np.unique(np.linspace(0, clip.frame_count - 1, min(SAMPLE_FRAMES, clip.frame_count)).astype(int))
     return np.concatenate([clip.rest[None], *(clip.block(frame, frame + 1).astype(np.float64) for frame in some)])
 
 
 def links_of(clip: MotionClip) -> np.ndarray:
-    """(L, 2) pairs of vertices that edges or sides of faces join."""
+    """Return pairs of vertices that edges or sides of faces join, (L, 2)."""
     pairs = [np.zeros((0, 2), np.int64)]
     if clip.edges is not None:
         pairs.append(clip.edges.astype(np.int64))
@@ -59,7 +59,7 @@ def links_of(clip: MotionClip) -> np.ndarray:
 
 
 def copies_of(clip: MotionClip) -> np.ndarray:
-    """(N,) the number of the copy that each vertex is of, from 1 on; 0 for what is none (MotionClip, part_copies)."""
+    """Return the number of the copy that each vertex is of, (N,), from 1 on; 0 for none (MotionClip, part_copies)."""
     counts, copies = (clip.attributes.get(f"part_{name}") for name in ("vertex_counts", "copies"))
     none = np.zeros(clip.vertex_count, np.int64)
     if counts is None or copies is None or counts.dtype.kind not in "iu" or copies.dtype.kind not in "iu":
@@ -74,7 +74,7 @@ def copies_of(clip: MotionClip) -> np.ndarray:
 
 
 def _welded(clip: MotionClip, links: np.ndarray) -> np.ndarray:
-    """`links`, and one between vertices that stay at the same place: seams of a mesh that was split for its normals."""
+    """Return `links`, and links between vertices that stay at the same place: seams of a mesh split for its normals."""
     rest = clip.rest
     last = clip.block(clip.frame_count - 1, clip.frame_count)[0].astype(np.float64)
     middle = clip.block(clip.frame_count // 2, clip.frame_count // 2 + 1)[0].astype(np.float64)
@@ -87,7 +87,7 @@ def _welded(clip: MotionClip, links: np.ndarray) -> np.ndarray:
 
 
 def components(links: np.ndarray, vertex_count: int) -> np.ndarray:
-    """(N,) labels of the parts that links join, numbered by their first vertices."""
+    """Return labels of the parts that links join, (N,), numbered by their first vertices."""
     sparse = scipy_module("sparse")
     graph = sparse.coo_matrix((np.ones(len(links), np.int8), links.T), (vertex_count, vertex_count))
     label = scipy_module("sparse.csgraph").connected_components(graph, directed=False)[1]
@@ -95,7 +95,7 @@ def components(links: np.ndarray, vertex_count: int) -> np.ndarray:
 
 
 def numbered(label: np.ndarray) -> np.ndarray:
-    """Labels numbered from 0 on by their first vertices."""
+    """Return labels numbered from 0 on by their first vertices."""
     _, first, inverse = np.unique(label, return_index=True, return_inverse=True)
     rank = np.empty(len(first), np.int64)
     rank[np.argsort(first)] = np.arange(len(first))
@@ -103,7 +103,7 @@ def numbered(label: np.ndarray) -> np.ndarray:
 
 
 def near_neighbours(points: np.ndarray, count: int) -> np.ndarray:
-    """(L, 2) pairs of points and their nearest others."""
+    """Return pairs of points and their nearest others, (L, 2)."""
     near = (
         scipy_module("spatial").cKDTree(points).query(points, k=min(count + 1, len(points)))[1].reshape(len(points), -1)
     )
@@ -111,6 +111,6 @@ def near_neighbours(points: np.ndarray, count: int) -> np.ndarray:
 
 
 def cheapest_of_each(key: np.ndarray, cost: np.ndarray) -> np.ndarray:
-    """Of each group of the same key the entry that costs least."""
+    """Return the cheapest entry of each group of the same key."""
     order = np.lexsort((cost, key))
     return order[np.unique(key[order], return_index=True)[1]]
