@@ -15,7 +15,7 @@ LIBRARY_NAME = f"libath{_SUFFIX}"
 def library_path() -> Path:
     """Return the path of the C core's shared library.
 
-    Raises ImportError where no directory of the package holds it.
+    Raises ImportError if no directory of the package holds it.
     """
     package = __package__ or "athcodec"
     spec = find_spec(package)
@@ -31,7 +31,7 @@ def library_path() -> Path:
 def load_library() -> ctypes.CDLL:
     """Return the C core as a ctypes library.
 
-    Raises ImportError where it is missing or where the system refuses to load it.
+    Raises ImportError if it is missing or the system refuses to load it.
     """
     path = library_path()
     try:

@@ -327,7 +327,7 @@ check_layouts(MIRRORS)
 def address(array: np.ndarray | None, dtype, size: int) -> int | None:
     """Return a pointer to a contiguous array of at least `size` items of `dtype`.
 
-    Raises TypeError where the array is anything else: a mistake of the caller that would corrupt memory.
+    Raises TypeError if the array is anything else: a mistake of the caller that would corrupt memory.
     """
     if array is None:
         return None

@@ -52,13 +52,13 @@ def open(
     Raises
     ------
     FormatError
-        Where the file cannot be decoded: Truncated, BadChecksum, LimitExceeded ...
+        If the file cannot be decoded: Truncated, BadChecksum, LimitExceeded ...
     ClipUnavailable
-        Where no clip has that name.
+        If no clip has that name.
     ClipError
-        Where a GLB has no such motion.
+        If a GLB has no such motion.
     RemoteError, OSError
-        Where it cannot be read.
+        If it cannot be read.
     """
     mesh_path = host_mesh if isinstance(host_mesh, (str, os.PathLike)) else None
     mesh = None if mesh_path is not None else cast(HostMesh | None, host_mesh)

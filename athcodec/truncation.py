@@ -52,15 +52,15 @@ def truncate(
     Raises
     ------
     LevelUnavailable
-        Where the source has no such level.
+        If the source has no such level.
     FormatError
-        Where the source is damaged, or was cut off before that level.
+        If the source is damaged, or was cut off before that level.
     ClipError
-        Where a GLB is to be written and the source is none, or one that has no such motion, or several.
+        If a GLB is to be written and the source is none, or one that has no such motion, or several.
     OSError
-        Where a file cannot be read or written.
+        If a file cannot be read or written.
     TypeError
-        Where not one of `level`, `max_error` and `target_size` is given.
+        If not exactly one of `level`, `max_error` and `target_size` is given.
     """
     if sum(option is not None for option in (level, max_error, target_size)) != 1:
         raise TypeError("truncate: expected one of level, max_error and target_size")

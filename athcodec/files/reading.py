@@ -97,7 +97,7 @@ class FileWatch:
 def file_beside(folder: str | PathLike[str], name: str, allow_outside: bool = False) -> Path:
     """Return the file that a source names, by a path from its folder.
 
-    Raises ClipError where it is no plain file and, unless `allow_outside`, where it lies outside of that folder: a
+    Raises ClipError if it is no plain file and, unless `allow_outside`, if it lies outside of that folder: a
     source that is not trusted must not reach other files on the disk.
     """
     if not name or "\0" in name:

@@ -58,7 +58,7 @@ class Remote:
     Raises
     ------
     RemoteError
-        Where the bytes cannot be had, or are no longer those of the file that was opened.
+        If the bytes cannot be had, or are no longer those of the file that was opened.
     """
 
     def __init__(self, url: str, *, timeout: float = 30.0, retries: int = 3, **options):

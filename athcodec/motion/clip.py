@@ -111,7 +111,7 @@ class MotionClip:
     rest_pose : {"first", "mean"}, optional
         How the rest pose is made where none is given: the first frame, or the mean of all, which reads the clip once.
     stem_index : (N,) array of integers, optional
-        The place of each vertex on its stem, 0 at the base. None where the vertices of every branch run from base to
+        The place of each vertex on its stem, 0 at the base. None if the vertices of every branch run from base to
         tip in the order of their numbers.
     clip_ranges : tuple of ClipRange, optional
         The clips that the frames are, one after the other, or the only one, where it has a name or is a loop; `join`
@@ -135,7 +135,7 @@ class MotionClip:
     Raises
     ------
     ClipError
-        Where the structure is wrong; by `block` and `blocks`, at the first position that is not a finite number.
+        If the structure is wrong; by `block` and `blocks`, at the first position that is not a finite number.
     """
 
     positions: Any
@@ -222,7 +222,7 @@ class MotionClip:
         Raises
         ------
         ClipError
-            Where the changed structure is wrong.
+            If the changed structure is wrong.
         """
         clip = replace(self, **{"rest": self.source_rest} | changes)
         if rest_given is not None or "rest" not in changes:
@@ -260,7 +260,7 @@ class MotionClip:
         Raises
         ------
         ClipError
-            Where the structure is wrong.
+            If the structure is wrong.
         """
         frame_count, vertex_count = self._check_positions()
         check_clip_ranges(self.clip_ranges, frame_count)
@@ -313,7 +313,7 @@ class MotionClip:
         IndexError
             For frames that do not exist.
         ClipError
-            Where a position is NaN, infinite or beyond 1e18, or cannot be read.
+            If a position is NaN, infinite or beyond 1e18, or cannot be read.
         """
         if not 0 <= start < stop <= self.frame_count:
             raise IndexError(f"frames {start} to {stop}: expected 0 <= start < stop <= {self.frame_count}")

@@ -94,7 +94,7 @@ class Hierarchy:
         Raises
         ------
         ClipError
-            Where the branches are not in depth-first preorder, a stem is empty, a branch is not attached to its
+            If the branches are not in depth-first preorder, a stem is empty, a branch is not attached to its
             parent's stem, or a source array is no permutation.
         """
         parent = np.asarray(branch_parent, np.int64)
@@ -165,7 +165,7 @@ def build_hierarchy(
     its own base; where the edges join none of its vertices to that stem, at the stem's vertex nearest to its
     base in the rest pose.
 
-    Raises ClipError where labels and parents are no forest of branches that have vertices (see
+    Raises ClipError if labels and parents are no forest of branches that have vertices (see
     check_branches).
     """
     rest = np.asarray(rest, np.float64)
@@ -194,7 +194,7 @@ def branches_from_edges(
     vertices (the lowest vertex number, if equal) and the others start branches. Branches are numbered in
     depth-first preorder, siblings from base to tip.
 
-    Raises ClipError where the edges close a cycle (it names one edge of it) or root is not usable.
+    Raises ClipError if the edges close a cycle (it names one edge of it) or root is not usable.
     """
     edges = np.asarray(check_indices("edges", edges, vertex_count, width=2), np.int64)
     tour = _EulerTour(edges, vertex_count)

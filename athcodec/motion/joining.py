@@ -45,7 +45,7 @@ def join(clips: Mapping[str, MotionClip]) -> MotionClip:
     Raises
     ------
     ClipError
-        Where the clips are not of one plant, a name cannot be stored, or one of them is several clips already.
+        If the clips are not of one plant, a name cannot be stored, or one of them is several clips already.
     """
     if not clips:
         raise ClipError("clips: got none, expected at least one")
@@ -120,7 +120,7 @@ def in_wind(clip: MotionClip, strength: float, heading: float = 0.0) -> MotionCl
     strength : float
         Of the wind, 0 or more, in any unit that all clips of a file share.
     heading : float, optional
-        Where the wind blows to, degrees about the up axis.
+        Direction that the wind blows to, degrees about the up axis.
 
     Returns
     -------
@@ -130,7 +130,7 @@ def in_wind(clip: MotionClip, strength: float, heading: float = 0.0) -> MotionCl
     Raises
     ------
     ClipError
-        Where a number is not finite, or the strength below 0.
+        If a number is not finite, or the strength below 0.
     """
     if not (math.isfinite(strength) and strength >= 0 and math.isfinite(heading)):
         raise ClipError(
@@ -169,7 +169,7 @@ def looped(clip: MotionClip, blend: int = 0) -> MotionClip:
     Raises
     ------
     ClipError
-        Where the clip is several clips, or has too few frames to blend.
+        If the clip is several clips, or has too few frames to blend.
     """
     clip_range = _only_clip_range("", clip)
     if not 0 <= whole("blend", blend) <= clip.frame_count // 3:

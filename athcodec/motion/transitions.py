@@ -54,7 +54,7 @@ def endless(clip: MotionClip) -> MotionClip:
     Raises
     ------
     ClipError
-        Where it is several clips, or no two of its frames are alike enough.
+        If it is several clips, or no two of its frames are alike enough.
     """
     if len(clip.clip_ranges) > 1:
         raise ClipError(f"endless: got {len(clip.clip_ranges)} clips in one, expected a single one")

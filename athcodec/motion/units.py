@@ -72,7 +72,7 @@ class Length:
         Raises
         ------
         BoundError
-            Where the length has a unit, and the clip has none or an unknown one.
+            If the length has a unit, and the clip has none or an unknown one.
         """
         if not self.unit:
             return self.value
@@ -103,7 +103,7 @@ def parse_length(text: str) -> Length:
     Raises
     ------
     BoundError
-        Where it is none.
+        If it is none.
     """
     match = _QUANTITY.fullmatch(text)
     if not match or match[2] not in ("", *METRES) or float(match[1]) == float("inf"):
@@ -129,7 +129,7 @@ def parse_size(text: str) -> int:
     Raises
     ------
     BoundError
-        Where it is none.
+        If it is none.
     """
     match = _QUANTITY.fullmatch(text)
     size = float(match[1]) * BYTES[match[2]] if match and match[2] in BYTES else 0.0

@@ -54,9 +54,9 @@ def find_branches(clip: MotionClip, method: str = "auto", root: int | None = Non
     Raises
     ------
     ClipError
-        Where the clip does not have the data that the method needs.
+        If the clip does not have the data that the method needs.
     MissingExtra
-        Where scipy is missing.
+        If scipy is missing.
     ValueError
         For a method that does not exist.
     """

@@ -53,9 +53,9 @@ def load(path: str | os.PathLike[str]) -> Found:
     Raises
     ------
     ClipError
-        Where the file is no such JSON, or does not have every vertex once.
+        If the file is no such JSON, or does not have every vertex once.
     OSError
-        Where it cannot be opened.
+        If it cannot be opened.
     """
     with open(path, encoding="utf-8") as file:
         try:
