@@ -170,17 +170,9 @@ class AthFile(StaticData, SegmentDecoder):
         }
 
     def check(self, decode: bool = True) -> None:
-        """Read every chunk and decode every level.
+        """Read every chunk and decode every level. Raises FormatError, the first fault in the file.
 
-        Parameters
-        ----------
-        decode : bool
-            False compares checksums and reads static data only, which needs no mesh of the host's.
-
-        Raises
-        ------
-        FormatError
-            The first fault in the file.
+        Without `decode`, compare checksums and read static data only, which needs no mesh of the host's.
         """
         if not self.complete:
             raise Truncated(f"file: got {self.available_length} bytes; expected {self.file_length}; {self.missing}")

@@ -52,7 +52,9 @@ class ChunkFile:
             self.level_count: int = self.core.info.level_count
             self.full_level_count: int = self.core.info.full_level_count
             self.complete: bool = self.available_length >= self.file_length
-            self._check_length(strict)
+            if strict and self.available_length != self.file_length:
+                refused = TrailingBytes if self.complete else Truncated
+                raise refused(f"file: got {self.available_length} bytes; expected {self.file_length}")
             self._set_table()
             self._damaged_from = self._first_damaged_level() if allow_partial else self.level_count
         except BaseException:
@@ -113,11 +115,6 @@ class ChunkFile:
         refused = Truncated if error.code == core_file.MISSING else error_class(error.code)
         return refused(f"{error}{getattr(self._source, 'change_hint', '') if refused is BadChecksum else ''}")
 
-    def _check_length(self, strict: bool) -> None:
-        expected, size = self.file_length, self.available_length
-        if strict and size != expected:
-            raise (Truncated if size < expected else TrailingBytes)(f"file: got {size} bytes; expected {expected}")
-
     @contextmanager
     def _fed(self, ranges: list[tuple[int, int]], what: str) -> Iterator[None]:
         """Give the core these bytes, (offset, size), for as long as the context lasts. Raises as `prepare`."""
@@ -169,20 +166,7 @@ class ChunkFile:
         return not all(map(self.is_available, self._chunks_of(kind)))
 
     def payload(self, chunk: Chunk) -> bytes:
-        """Return a chunk's bytes as stored.
-
-        Parameters
-        ----------
-        chunk : Chunk
-            One of `chunks`.
-
-        Raises
-        ------
-        Truncated
-            If the file was cut off before their end.
-        BadChecksum
-            If they are damaged.
-        """
+        """Return the stored bytes of a chunk, one of `chunks`. Raises Truncated, BadChecksum."""
         with self._lock:
             data = self._read(chunk.offset, chunk.length, str(chunk))
             try:

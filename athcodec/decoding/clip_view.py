@@ -37,7 +37,7 @@ class ClipView:
     Raises
     ------
     LevelUnavailable
-        If the level or the frames do not exist.
+        If the level or the frames do not exist. Methods raise the errors of Decoder besides.
     """
 
     def __init__(
@@ -160,11 +160,6 @@ class ClipView:
         -------
         numpy.ndarray
             (stop - start, N, 3), scene units.
-
-        Raises
-        ------
-        LevelUnavailable, FormatError
-            As Decoder.positions.
         """
         parts = []
         for (decoder, frames), (first, last) in zip(self._runs, self.clip_range_frames):
@@ -182,11 +177,6 @@ class ClipView:
             The first frame of the block.
         block : numpy.ndarray
             (k, N, 3), scene units.
-
-        Raises
-        ------
-        LevelUnavailable, FormatError
-            As Decoder.positions.
         """
         for (decoder, frames), (first, _) in zip(self._runs, self.clip_range_frames):
             for start, block in decoder.blocks(self.level, frames=slice(frames.start, frames.stop)):
@@ -209,8 +199,6 @@ class ClipView:
         ------
         IndexError
             If the view has no such frame.
-        LevelUnavailable, FormatError
-            As Decoder.positions.
         """
         for (decoder, frames), (first, last) in zip(self._runs, self.clip_range_frames):
             if first <= frame < last:

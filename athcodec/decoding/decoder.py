@@ -10,6 +10,7 @@ from bisect import bisect_right
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import cached_property
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
@@ -55,6 +56,10 @@ class Decoder:
     ------
     ClipUnavailable
         If no clip has that name.
+    LevelUnavailable
+        By methods that take a level or frames, if the file has no such ones, or was cut off before them.
+    FormatError
+        By the same methods, if the bytes are damaged.
     """
 
     def __init__(self, file: AthFile, clip: str | None = None, *, closes_file: bool = False):
@@ -118,10 +123,6 @@ class Decoder:
         """(start, stop) frames of each segment."""
         starts = [start - self.clip.first_frame for start in self.file.segment_starts(self.clip)]
         return list(zip(starts, starts[1:]))
-
-    @cached_property
-    def _segment_starts(self) -> list[int]:
-        return [start for start, _ in self.segments]
 
     @property
     def metadata(self) -> dict[str, Any]:
@@ -197,13 +198,6 @@ class Decoder:
         -------
         numpy.ndarray
             (N, 3) for one frame, else (frames, N, 3), scene units.
-
-        Raises
-        ------
-        LevelUnavailable
-            If the file has no such level or frame, or was cut off before them.
-        FormatError
-            If their bytes are damaged.
         """
         level, (first, last) = self._checked_level(level), self._checked_frames(frames)
         dtype = np.dtype(dtype or self.file.dtype)
@@ -245,11 +239,6 @@ class Decoder:
             The first frame of the block.
         block : numpy.ndarray
             (k, N, 3), scene units.
-
-        Raises
-        ------
-        LevelUnavailable, FormatError
-            As for `positions`.
         """
         level, (first, last) = self._checked_level(level), self._checked_frames(frames)
         segments = self._segments_of(first, last)
@@ -311,8 +300,8 @@ class Decoder:
         ------
         ValueError
             If no weight is above 0, one is not finite, or more than four are above 0.
-        ClipUnavailable, LevelUnavailable, FormatError
-            As for `play` and `positions`.
+        ClipUnavailable
+            If no clip has that name.
         """
         used = {name: float(weight) for name, weight in weights.items() if not weight <= 0}
         if not 0 < len(used) <= core_file.BLEND_CLIPS or not np.isfinite(list(used.values())).all():
@@ -363,11 +352,6 @@ class Decoder:
         -------
         numpy.ndarray
             (N, 3) float32, scene units.
-
-        Raises
-        ------
-        ValueError, LevelUnavailable, FormatError
-            As for `blended`.
         """
         weights = np.array([weight for _, weight in places], np.float64)
         if not 0 < len(places) <= core_file.BLEND_CLIPS or not (np.isfinite(weights) & (weights > 0)).all():
@@ -387,11 +371,6 @@ class Decoder:
         -------
         numpy.ndarray
             (N, 3) float64, scene units.
-
-        Raises
-        ------
-        LevelUnavailable, FormatError
-            As for `positions`.
         """
         return self.file.level_rest(self._checked_level(level))
 
@@ -409,11 +388,6 @@ class Decoder:
         -------
         Affines
             Maps from the reference pose of the level, `level_rest`, to the frame.
-
-        Raises
-        ------
-        LevelUnavailable, FormatError
-            As for `positions`.
         """
         level, (index, _) = self._checked_level(level), self._checked_frames(frame)
         with self._prepared(self.clip.first_segment + self._segment_of(index), level) as ready:
@@ -433,11 +407,6 @@ class Decoder:
         -------
         numpy.ndarray
             (N, 3) float64, scene units.
-
-        Raises
-        ------
-        LevelUnavailable, FormatError
-            As for `positions`.
         """
         positions = self.positions(frame, self.file.deepest, np.float64)
         return residual_of(self.affines(frame, level), positions, self.file.hierarchy.vertex_source, f"frame {frame}")
@@ -487,4 +456,4 @@ class Decoder:
         return range(self.clip.first_segment + segments.start, self.clip.first_segment + segments.stop)
 
     def _segment_of(self, frame: int) -> int:
-        return bisect_right(self._segment_starts, frame) - 1
+        return bisect_right(self.segments, frame, key=itemgetter(0)) - 1

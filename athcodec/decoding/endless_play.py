@@ -84,11 +84,6 @@ class EndlessPlay:
             Time, as for `places`.
         level : int, optional
             Level of detail; by default the deepest that is complete.
-
-        Raises
-        ------
-        LevelUnavailable, FormatError
-            As for `Decoder.positions`.
         """
         return self._decoder.blended_places(self.places(seconds), level)
 

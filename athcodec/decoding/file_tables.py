@@ -104,18 +104,7 @@ class FileTables(ChunkFile):
         )
 
     def clip_named(self, name: str) -> Clip:
-        """Return the clip of this name.
-
-        Parameters
-        ----------
-        name : str
-            The name, as in `clips`.
-
-        Raises
-        ------
-        ClipUnavailable
-            If no clip has it.
-        """
+        """Return the clip of this name. Raises ClipUnavailable if there is none."""
         for clip in self.clips:
             if clip.name == name:
                 return clip
@@ -144,13 +133,7 @@ class FileTables(ChunkFile):
         return ct.is_motion(self._table["kind"]) & (self._ends > self.available_length)
 
     def available(self, level: int) -> bool:
-        """Return whether all segments of all levels up to this one are there and undamaged.
-
-        Parameters
-        ----------
-        level : int
-            0 is the coarsest.
-        """
+        """Return whether all segments of all levels up to this one are there and undamaged."""
         return whole("level", level) < self._first_lacking
 
     @cached_property
@@ -160,13 +143,7 @@ class FileTables(ChunkFile):
 
     @property
     def deepest(self) -> int:
-        """The deepest complete level.
-
-        Raises
-        ------
-        Truncated
-            If not even level 0 is complete.
-        """
+        """The deepest complete level. Raises Truncated if not even level 0 is complete."""
         if self._first_lacking == 0:
             raise Truncated(f"level 0: got {self.available_length} bytes; expected at least {self._level_end(0)}")
         return self._first_lacking - 1

@@ -78,22 +78,9 @@ class SegmentDecoder(ChunkFile):
     def show_all(self, segments: range, level: int, show: Show, room: Room) -> None:
         """Decode segments of the file at a level, in runs that threads share.
 
-        Parameters
-        ----------
-        segments : range
-            Numbers of segments in the whole file.
-        level : int
-            A stored level.
-        show : callable
-            Takes a segment's number and the prepared segment, whose memory the next one takes over; threads call it.
-        room : callable
-            Takes a segment's number and returns the array that `prepare` has as `to`. Segments whose positions went
-            there are not shown.
-
-        Raises
-        ------
-        LevelUnavailable, FormatError
-            As for `prepare`.
+        `room` takes a segment's number and returns the array that `prepare` has as `to`. For segments whose positions
+        did not go there, threads call `show` with the number and the prepared segment, whose memory the next one takes
+        over. Raises as `prepare`.
         """
         what = f"level {level}, segments {segments.start} to {segments.stop - 1}"
         with self._lock, self._fed(self.core.missing(level, segments[0], segments[-1]), what):

@@ -161,24 +161,8 @@ class StaticData(FileTables):
         """Return the reference pose of a level, which its maps move: the source's rest pose, or another that the motion
         is closer to. Levels that refine the plant may refine their reference pose, too.
 
-        Parameters
-        ----------
-        level : int
-            A stored level.
-        order : int
-            core_file.SOURCE_ORDER or core_file.FILE_ORDER.
-
-        Returns
-        -------
-        numpy.ndarray
-            (N, 3) float64, scene units, not rounded to the source's type.
-
-        Raises
-        ------
-        LevelUnavailable
-            If the file was cut off before it.
-        FormatError
-            If it is damaged.
+        It is (N, 3) float64, scene units, not rounded to the source's type, in core_file.SOURCE_ORDER or FILE_ORDER.
+        Raises LevelUnavailable, FormatError.
         """
         with self._poses_read(level):
             return self.core.level_rest(level, order)

@@ -104,10 +104,9 @@ def prefix_as_a_stream(data: bytes, size: int) -> int:
         except Truncated:
             return 0
         raise Wrong(f"{size} bytes: got level 0, which is incomplete")
-    if decoder.file.deepest != deepest or not np.array_equal(
-        decoder.positions(), _played(data)[deepest], equal_nan=True
-    ):
-        raise Wrong(f"{size} bytes: got level {decoder.file.deepest}; expected level {deepest} as in the whole file")
+    level = decoder.file.deepest
+    if level != deepest or not np.array_equal(decoder.positions(), _played(data)[deepest], equal_nan=True):
+        raise Wrong(f"{size} bytes: got level {level}; expected level {deepest} as in the whole file")
     return 0
 
 

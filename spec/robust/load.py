@@ -295,9 +295,7 @@ def _calls(path: str, out: str) -> dict[str, Call]:
         "positions": opened(lambda decoder: decoder.positions()),
         "frames": opened(lambda decoder: [decoder.positions(i, level) for i in (0, -1) for level in (0, 1)]),
         "affines": opened(lambda decoder: decoder.affines(3, 1)),
-        "static": opened(
-            lambda decoder: (decoder.file.attributes, decoder.metadata, decoder.file.edges, decoder.file.rest)
-        ),
+        "static": opened(lambda it: (it.file.attributes, it.metadata, it.file.edges, it.file.rest)),
         "check": opened(lambda decoder: decoder.file.check()),
         "truncate": lambda: athcodec.truncate(path, out, 0),
         "encode": lambda: athcodec.encode(clip, out, effort="fast", segment_frames=16),

@@ -22,7 +22,9 @@ class Seen:
     @cached_property
     def frames(self) -> np.ndarray:
         """The rest pose and a few frames spread over the clip, (1 + k, N, 3) float64."""
-        return _sampled(self.clip)
+        clip = self.clip
+        some = np.unique(np.linspace(0, clip.frame_count - 1, min(SAMPLE_FRAMES, clip.frame_count)).astype(int))
+        return np.concatenate([clip.rest[None], *(clip.block(frame, frame + 1).astype(np.float64) for frame in some)])
 
     @cached_property
     def mesh(self) -> np.ndarray:
@@ -33,12 +35,6 @@ class Seen:
     def links(self) -> np.ndarray:
         """The links of `mesh`, and those between vertices that stay at one place."""
         return _welded(self.clip, self.mesh)
-
-
-def _sampled(clip: MotionClip) -> np.ndarray:
-    """Return the rest pose and a few frames spread over the clip, (1 + k, N, 3) float64."""
-    some = np.unique(np.linspace(0, clip.frame_count - 1, min(SAMPLE_FRAMES, clip.frame_count)).astype(int))
-    return np.concatenate([clip.rest[None], *(clip.block(frame, frame + 1).astype(np.float64) for frame in some)])
 
 
 def links_of(clip: MotionClip) -> np.ndarray:
