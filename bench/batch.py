@@ -21,7 +21,7 @@ import numpy as np
 import athcodec
 from athcodec import batch
 from athcodec.batch.show import Show
-from bench.clips import add_effort, add_rel_error, add_source
+from bench.clips import add_effort, add_number, add_rel_error, add_source
 from bench.tables import table
 
 COUNT, FRAMES, WORKERS, TARGET = 200, 40, (1, 2), 1.7
@@ -49,26 +49,14 @@ class _Clock(Show):
         self.last = time.perf_counter()
 
 
-def add_windows(parser: argparse.ArgumentParser) -> None:
-    """Arguments of the clips to encode, and how."""
-    parser.add_argument("--clips", type=int, default=COUNT, metavar="N", help="number of clips (default %(default)s)")
-    parser.add_argument("--frames", type=int, default=FRAMES, metavar="N", help="frames per clip (default %(default)s)")
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    add_number(parser, "--clips", COUNT, "number of clips")
+    add_number(parser, "--frames", FRAMES, "frames per clip")
     add_source(parser)
     add_effort(parser)
     add_rel_error(parser)
-
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    add_windows(parser)
-    parser.add_argument(
-        "--workers",
-        type=int,
-        nargs="+",
-        default=list(WORKERS),
-        metavar="N",
-        help="numbers of workers; others are compared with the first (default 1 2)",
-    )
-    parser.add_argument("--rounds", type=int, default=1, metavar="N", help="(default %(default)s)")
+    add_number(parser, "--workers", WORKERS, "numbers of workers; others are compared with the first")
+    add_number(parser, "--rounds", 1, "runs of everything")
 
 
 def run(args: argparse.Namespace) -> dict[str, Any]:

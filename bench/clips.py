@@ -10,6 +10,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -42,14 +43,17 @@ def add_clips(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def add_rel_error(parser: argparse.ArgumentParser) -> None:
+def add_number(parser: argparse.ArgumentParser, name: str, default: Any, what: str, metavar: str = "N") -> None:
+    """Add an option that takes a number, or several where its default is several."""
+    several = {"nargs": "+"} if isinstance(default, tuple) else {}
+    kind = type(default[0] if several else default)
     parser.add_argument(
-        "--rel-error",
-        type=float,
-        default=REL_ERROR,
-        metavar="FRACTION",
-        help="error bound over the bounding box's diagonal (default %(default)s)",
+        name, type=kind, default=default, metavar=metavar, help=f"{what} (default %(default)s)", **several
     )
+
+
+def add_rel_error(parser: argparse.ArgumentParser, default: Any = REL_ERROR) -> None:
+    add_number(parser, "--rel-error", default, "error bound over the bounding box's diagonal", "FRACTION")
 
 
 def add_ladder(parser: argparse.ArgumentParser, default: str) -> None:

@@ -159,11 +159,6 @@ RECIPES |= odd.CLIPS | odd.MESHES
 RECIPES["canopy_1k_60f"] = Canopy(120, 2, 60, 4.0, 8.0, 80, "broadleaf", seed=15)
 
 
-def clips(suite: str, folder: Path | None = None) -> list[tuple[str, Path, str]]:
-    """(name, path, description) of every clip of a suite; missing files are made."""
-    return [(name, path_of(name, folder), describe(name)) for name in SUITES[suite]]
-
-
 def path_of(name: str, folder: Path | None = None) -> Path:
     """The file of a clip by name, made if it is missing, or of any HDF5 clip by its path.
 
@@ -209,6 +204,7 @@ def _make(name: str, source_path: Path | None, path: Path) -> float:
         if source:
             source.close()
     clip.metadata["recipe"] = recipe_text(name)
+    path.unlink(missing_ok=True)  # What is there may be damaged, and no file of another kind is replaced.
     athcodec.write_hdf5(clip, path)
     return time.perf_counter() - start
 

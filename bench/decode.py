@@ -30,7 +30,7 @@ import athcodec
 from athcodec._native import crc32c
 from athcodec.decoding import segment_decoder
 from athcodec.metrics import ErrorMeter
-from bench.clips import add_ladder, add_rel_error
+from bench.clips import add_ladder, add_number, add_rel_error
 from bench.codecs.coder import CORE, compile_c
 from bench.codecs.program import arrays_of, from_arrays
 from bench.tables import table
@@ -105,12 +105,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_rel_error(parser)
     add_ladder(parser, "decades")
-    for name, count, what in (
-        ("rounds", ROUNDS, "runs of everything"),
-        ("seeks", SEEKS, "random frames"),
-        ("instances", INSTANCES, "plants shown at once"),
-    ):
-        parser.add_argument(f"--{name}", type=int, default=count, metavar="N", help=f"{what} (default %(default)s)")
+    add_number(parser, "--rounds", ROUNDS, "runs of everything")
+    add_number(parser, "--seeks", SEEKS, "random frames")
+    add_number(parser, "--instances", INSTANCES, "plants shown at once")
 
 
 def run(args: argparse.Namespace) -> dict[str, Any]:
@@ -188,13 +185,13 @@ class Case:
         return lines
 
 
-def compile_program(folder: Path, name: str = "decode") -> Path:
-    """Compiles NAME.c of this folder with the decoder's sources and flags of CMakeLists.txt."""
+def compile_program(folder: Path) -> Path:
+    """Compiles decode.c with the decoder's sources and flags of CMakeLists.txt."""
     sources = re.search(r"set\(ATH_DECODER_SOURCES\s+([^)]*)\)", (CORE / "CMakeLists.txt").read_text())
     if sources is None:
         raise SystemExit("CMakeLists.txt: got no ATH_DECODER_SOURCES, expected the decoder's source files")
-    program = folder / name
-    compile_c(program, [Path(__file__).with_name(f"{name}.c"), *(CORE / source for source in sources[1].split())])
+    program = folder / "decode"
+    compile_c(program, [Path(__file__).with_suffix(".c"), *(CORE / source for source in sources[1].split())])
     return program
 
 

@@ -14,6 +14,7 @@ from typing import Any
 
 import athcodec
 from bench.browser import chromium
+from bench.clips import add_number
 from bench.tables import table
 from bench.throttled_server import ThrottledServer
 
@@ -36,10 +37,8 @@ until it is drawn, until it has moved, and until all bytes that the clip needs h
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("file", type=Path, nargs="?", help="the .ath file (default: the leafed sample)")
-    parser.add_argument(
-        "--line", type=float, nargs="+", default=[1.0, 10.0, 100.0], metavar="MBIT", help="megabits a second"
-    )
-    parser.add_argument("--rounds", type=int, default=5, metavar="N", help="how often the page is opened (default 5)")
+    add_number(parser, "--line", (1.0, 10.0, 100.0), "megabits a second", "MBIT")
+    add_number(parser, "--rounds", 5, "how often the page is opened")
 
 
 def run(args: argparse.Namespace) -> dict[str, Any]:

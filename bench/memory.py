@@ -18,7 +18,7 @@ from typing import Any
 import athcodec
 from athcodec.encoding.segmentation import split_segments
 from athcodec.options import MIN_SEGMENT
-from bench.clips import add_clips, add_rel_error
+from bench.clips import add_clips, add_number, add_rel_error
 from bench.tables import table
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -35,14 +35,7 @@ HDF5's chunk cache, at most 64 MiB, is included: it fills as a clip gets longer.
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_clips(parser)
     add_rel_error(parser)
-    parser.add_argument(
-        "--repeats",
-        type=int,
-        nargs="+",
-        default=list(REPEATS),
-        metavar="N",
-        help="numbers of repetitions of the clip (default 4 8)",
-    )
+    add_number(parser, "--repeats", REPEATS, "repetitions of the clip")
 
 
 def run(args: argparse.Namespace) -> dict[str, Any]:

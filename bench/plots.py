@@ -1,7 +1,7 @@
 """Pictures of rate and distortion, one set per clip, as PNG, by matplotlib (of the extra `bench` alone).
 
-Rate against the largest error, rate against the RMS error, and the growing prefix of one file. Both axes are
-logarithmic. Colours are those of Okabe and Ito ("Color universal design", 2008), which colour-blind people
+Rate against the largest error and against the RMS error, both axes logarithmic; prefixes over files of their own.
+Colours are those of Okabe and Ito ("Color universal design", 2008), which colour-blind people
 can tell apart, without the yellow, which is faint on white; every curve has its own marker too, so that the
 pictures are readable in grey.
 """
@@ -33,9 +33,6 @@ def draw(contents: dict[str, list[dict[str, Any]]], clip: str, folder: Path, pre
     figure_of = pyplot(INCHES)
     points = measured(point for point in contents["points"] if point["clip"] == clip)
     pictures = {error: _rate_picture(figure_of, points, error, clip) for error in ERRORS if points}
-    for result in contents["curves"]:
-        if result["clip"] == clip:
-            pictures["progressive"] = _progressive_picture(figure_of, result, clip)
     return [save(figure, folder / file_name(prefix + clip, what)) for what, figure in pictures.items()]
 
 
@@ -85,48 +82,6 @@ def _style_of(point: Point, styles) -> dict[str, Any]:
     return {"color": colour, "marker": marker, "linestyle": style, "linewidth": 1.3, "markersize": 5}
 
 
-def _progressive_picture(figure_of, result: dict[str, Any], clip: str):
-    figure, axes = figure_of()
-    steps, single = result["steps"], result["single"]
-    for number, (error, name) in enumerate((("max", "largest error"), ("rms", "RMS error"))):
-        axes.plot(
-            [row["bytes"] for row in steps],
-            [row[error] for row in steps],
-            drawstyle="steps-post",
-            color=COLOURS[number],
-            marker="os"[number],
-            linewidth=2,
-            label=f"prefix of one file: {name}",
-        )
-        axes.plot(
-            [row["bytes"] for row in single],
-            [row[error] for row in single],
-            color=COLOURS[number],
-            linestyle="--",
-            marker="^v"[number],
-            linewidth=1.2,
-            label=f"files of their own: {name}",
-        )
-    for row in steps:
-        if row["segments"] == max(other["segments"] for other in steps):
-            axes.annotate(
-                f"level {row['level']}",
-                (row["bytes"], row["max"]),
-                xytext=(5, 6),
-                textcoords="offset points",
-                fontsize=9,
-            )
-    _label(
-        axes,
-        f"{clip}: a growing prefix of one file, bound {result['bound']:g}",
-        "bytes",
-        "error / bounding-box diagonal",
-    )
-    axes.margins(x=0.1)
-    axes.legend(fontsize=9, loc="best")
-    return figure
-
-
 def _label(axes, title: str, across: str, up: str) -> None:
     from matplotlib.ticker import LogLocator, NullFormatter
 
@@ -139,6 +94,33 @@ def _label(axes, title: str, across: str, up: str) -> None:
     axes.set_xlabel(across)
     axes.set_ylabel(up)
     axes.grid(True, which="major", color="#dddddd", linewidth=0.8)
+
+
+def draw_prefixes(rows: list[dict[str, Any]], file: Path) -> Path:
+    """Draw the bytes of prefixes over those of files of their own, by error. Raises NoPlots."""
+    figure, axes = pyplot((8, 4.5))()
+    clips = list(dict.fromkeys(row["clip"] for row in rows))
+    curves: dict[tuple[str, str, str], list[dict[str, Any]]] = {}
+    for row in rows:
+        curves.setdefault((row["clip"], row["ladder"], row["measure"]), []).append(row)
+    for (clip, ladder, measure), own in sorted(curves.items()):
+        line = ("-", "--", ":", "-.")[clips.index(clip) % 4]
+        colour = COLOURS[2 * (ladder == "none") + (measure == "RMS")]
+        what = "single layer" if ladder == "none" else "layers"
+        name = f"{clip}, {what}: {'largest' if measure == 'max' else measure} error"
+        axes.semilogx([row["error"] for row in own], [row["ratio"] for row in own], line, color=colour, label=name)
+        steps = [row for row in own if row["step"]]
+        axes.plot([row["error"] for row in steps], [row["ratio"] for row in steps], "o", color=colour, markersize=4)
+    axes.set_yscale("log", base=2)
+    axes.yaxis.set_major_formatter("{x:g}")
+    axes.axhline(1, color="black", linewidth=0.8)
+    axes.invert_xaxis()
+    axes.set_title("A prefix that keeps an error, over a file of its own (dots: levels)")
+    axes.set_xlabel("error / diagonal")
+    axes.set_ylabel("prefix / own")
+    axes.grid(True, color="#dddddd", linewidth=0.8)
+    axes.legend(fontsize=8)
+    return save(figure, file)
 
 
 def save(figure, file: Path) -> Path:

@@ -1,4 +1,4 @@
-"""A short run of the main verbs, two minutes: codecs, decoder, the paper's table, scaling, forests, URLs, report.
+"""A short run of the main verbs, two minutes: codecs, decoder, URLs, report.
 
 Each step is a separate command; its JSON and the report go to one folder. What takes long is left out: most codecs,
 most bounds, large clips. It checks that everything works; figures to quote come from the full runs.
@@ -14,11 +14,12 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from bench.clips import add_number
 from bench.tables import table
 
 ROOT = Path(__file__).resolve().parent.parent
 CLIPS = ("sample", "mj_1k_200f")
-CODECS = ("athcodec", "float16 or integers + zstd", "pcodec", "trajectory PCA + hierarchy (CoDDyAC), range coder")
+CODECS = ("athcodec", "float16 or integers + zstd", "pcodec", "trajectory PCA + hierarchy (CoDDyAC)")
 BOUNDS = (1e-3, 1e-4)
 
 NOTE = "Seconds of each step, including the start of Python."
@@ -35,14 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--codecs", nargs="+", metavar="NAME", default=list(CODECS), help="codecs to compare (default: %(default)s)"
     )
-    parser.add_argument(
-        "--bounds",
-        type=float,
-        nargs="+",
-        metavar="FRACTION",
-        default=list(BOUNDS),
-        help="error bounds over the bounding box's diagonal",
-    )
+    add_number(parser, "--bounds", BOUNDS, "error bounds over the bounding box's diagonal", "FRACTION")
     parser.add_argument(
         "--out",
         type=Path,
@@ -79,10 +73,7 @@ def _steps(args: argparse.Namespace) -> Iterator[tuple[str, list[str]]]:
     steps = {
         "rd": [*clips, "--codecs", *args.codecs, "--bounds", *bounds],
         "decode": [*files, *few],
-        "paper": [*files, "--rel-error", "1e-4"],
-        "scale": ["--encodes", "1", *made],
-        "forest": ["--instances", "1", "100", "--clips", "1", "4", "--rounds", "1", *made],
-        "remote": ["--plants", "1", "--frames", "240", "--frame", "200", "--rounds", "1", *made],
+        "remote": [*"--plants 1 --frames 240 --frame 200 --rounds 1".split(), *made],
     }
     for verb, words in steps.items():
         yield verb, [*words, "--json", str(out / f"{verb}.json")]

@@ -3,8 +3,8 @@
 Each codec makes the smallest file it can within the bound; one process encodes, another decodes the bytes and
 measures (rd_worker.py). A codec that is missing, exceeds the bound, crashes or takes too long gets a row
 that says so. With --json results are saved as they are measured: a run that was stopped resumes there, and a result of
-the same clip, code and versions is not measured again. The tables add mean
-savings and ratios (compare.py), and the error and cost of growing prefixes of one file (progressive.py).
+the same clip, code and versions is not measured again. The tables add mean savings and
+ratios (compare.py).
 """
 
 from __future__ import annotations
@@ -22,11 +22,9 @@ from pathlib import Path
 from typing import Any
 
 import athcodec
-from bench import compare, data, odd, progressive
-from bench.clips import REL_ERROR
-from bench.codec_registry import OURS, all_codecs, chosen, fingerprint, fingerprint_of_athcodec, is_lossless
+from bench import compare, data, odd
+from bench.codec_registry import all_codecs, chosen, fingerprint, is_lossless
 from bench.codecs import Codec, simple
-from bench.curves import Curve
 from bench.store import Store
 from bench.suite import SUITES, Case, cases, digest
 from bench.tables import cpu_model, environment, table
@@ -38,24 +36,10 @@ BOUNDS = {
     "odd": (1e-2, 1e-3, 1e-4, 1e-5, 1e-6),
     "odd-quick": (1e-3, 1e-5),
 }
-ODD_CODECS = (
-    "athcodec",
-    simple.NAME,
-    "SZ3",
-    "global PCA, range coder",
-    "clustered PCA (Sattler), range coder",
-    "moving frames + PCA (Lengyel), range coder",
-)
+ODD_CODECS = ("athcodec", simple.NAME, "SZ3", "global PCA", "clustered PCA (Sattler)", "moving frames + PCA (Lengyel)")
 CODECS = {"odd": ODD_CODECS, "odd-quick": ODD_CODECS[:2]}  # of other suites all
-LOOSER = {"quick": (0.3, 0.03, 3e-3), "full": (0.3, 0.1, 0.03, 0.01, 3e-3, 1e-3, 3e-4)}
-COST_BOUNDS = {"quick": (1e-4,), "full": (1e-3, 1e-4, 1e-5)}
 TIMEOUTS = {"quick": 3600, "full": 3600, "odd": 300, "odd-quick": 300}
-KEYS = {
-    "clips": ("clip",),
-    "points": ("clip", "codec", "bound"),
-    "curves": ("clip", "bound"),
-    "costs": ("clip", "bound"),
-}
+KEYS = {"clips": ("clip",), "points": ("clip", "codec", "bound")}
 OK, MISSING, BROKEN, FAILED, SLOW = "ok", "missing", "bound broken", "failed", "too slow"
 CANNOT = "cannot keep the bound"
 ABOUT = ("frames", "fps", "vertices", "branches")
@@ -144,9 +128,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
         for name, codec in codecs.items():
             for bound in (0.0,) if is_lossless(codec) else bounds:
                 _point(_Job(case, name, codec, bound, about["digest"], timeout), store, args.again)
-        if args.suite in LOOSER and any(codec.kind == OURS for codec in codecs.values()):
-            _levels(case, about["digest"], bounds, args.suite, store)
-    return summary(store.contents(), [case.name for case in clips], bounds, args.suite not in LOOSER)
+    return summary(store.contents(), [case.name for case in clips], bounds, args.suite in CODECS)
 
 
 def _codecs(args: argparse.Namespace) -> dict[str, Codec]:
@@ -264,23 +246,6 @@ def _print_progress(job: _Job, result: dict[str, Any]) -> None:
     print(f"{job.case.name}, {job.codec.name}, {job.bound:g}: {end}", file=sys.stderr, flush=True)
 
 
-# ---- levels ----
-
-
-def _levels(case: Case, clip_digest: str, bounds: tuple[float, ...], suite: str, store: Store) -> None:
-    """The progressive curve at the bound nearest to the default, and the cost of the levels."""
-    depends = {"clip": clip_digest, "looser": str(LOOSER[suite])} | fingerprint_of_athcodec()
-    shown = min(bounds, key=lambda bound: (abs(bound / REL_ERROR - 1), bound))
-    costs = [bound for bound in COST_BOUNDS[suite] if bound in bounds] or [shown]
-    wanted = [("curves", shown, lambda path, bound: progressive.curve(path, bound, LOOSER[suite]))]
-    wanted += [("costs", bound, progressive.cost) for bound in costs]
-    for name, bound, measure in wanted:
-        identity = {"clip": case.name, "bound": bound}
-        measured = None if store.find(name, identity, depends) else measure(case.path, bound)
-        if measured is not None:
-            store.add(name, identity | measured | {"depends": depends})
-
-
 # ---- tables ----
 
 
@@ -297,7 +262,7 @@ def summary(
         if point["clip"] in clips and (bounds is None or point["bound"] in (0, *bounds))
     ]
     if as_odd:
-        return {"tables": [*tables, *_odd_tables(points)], "broken": list(_broken(points, []))}
+        return {"tables": [*tables, *_odd_tables(points)], "broken": list(_broken(points))}
     all_ratios: list[dict[str, Any]] = []
     for clip in clips:
         own = [point for point in points if point["clip"] == clip]
@@ -309,10 +274,9 @@ def summary(
             all_ratios += [{"clip": clip, "codec": ours} | row for row in rows]
             tables.append(table(f"Mean saving: {clip}, {ours}", compare.savings(own, ours), SAVINGS_NOTE))
             tables.append(table(f"Ratios: {clip}, {ours}", rows, RATIOS_NOTE, *_absent(own)))
-        tables += _level_tables(contents, clip)
     if len(clips) > 1:
         tables.append(table("Ratios over all clips", compare.over_clips(all_ratios), OVER_CLIPS_NOTE))
-    return {"tables": tables, "broken": list(_broken(points, contents["curves"]))}
+    return {"tables": tables, "broken": list(_broken(points))}
 
 
 def _odd_tables(points: list[dict[str, Any]]) -> Iterator[dict[str, Any]]:
@@ -407,32 +371,8 @@ def _absent(points: list[dict[str, Any]]) -> list[str]:
     return [f"Not measured: {names}."] if absent else []
 
 
-def _level_tables(contents: dict[str, list[dict[str, Any]]], clip: str) -> Iterator[dict[str, Any]]:
-    for result in contents["curves"]:
-        if result["clip"] == clip:
-            single = Curve.of([row["max"] for row in result["single"]], [row["bytes"] for row in result["single"]])
-            rows = [_step_row(row, single.size_at(row["max"])) for row in result["steps"]]
-            yield table(
-                f"A growing prefix of one file: {clip}, bound {result['bound']:g}", rows, progressive.CURVE_NOTE
-            )
-    costs = [
-        {"bound": f"{row['bound']:g}"}
-        | {name: value for name, value in row.items() if name not in ("clip", "bound", "depends", "command")}
-        for row in contents["costs"]
-        if row["clip"] == clip
-    ]
-    if costs:
-        yield table(f"What levels cost: {clip}", costs, progressive.COST_NOTE)
-
-
-def _step_row(row: dict[str, Any], single: float | None) -> dict[str, Any]:
-    return row | {"single file": single and round(single), "prefix/single": single and row["bytes"] / single}
-
-
-def _broken(points: list[dict[str, Any]], curves: list[dict[str, Any]]) -> Iterator[str]:
+def _broken(points: list[dict[str, Any]]) -> Iterator[str]:
     """Faults of athcodec and the baselines; those of programs are only rows."""
     for point in points:
         if point["status"] in (BROKEN, FAILED) and point["kind"] != "program":
             yield (f"{point['clip']}, {point['codec']} at {point['bound']:g}: {point['status']}: {point['why']}")
-    for result in curves:
-        yield from result["broken"]

@@ -20,7 +20,7 @@ import numpy as np
 
 import athcodec
 from athcodec.files.remote import READ_AHEAD
-from bench.clips import ReplicatedPlants, add_effort, add_rel_error, add_source, replicated_plants
+from bench.clips import ReplicatedPlants, add_effort, add_number, add_rel_error, add_source, replicated_plants
 from bench.tables import table
 from bench.throttled_server import ThrottledServer
 
@@ -40,15 +40,11 @@ Step = Callable[[athcodec.Decoder], Any]
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_source(parser)
-    parser.add_argument(
-        "--plants", type=int, nargs="+", default=list(PLANTS), metavar="N", help="copies of it in a clip (default 1 20)"
-    )
-    parser.add_argument("--frames", type=int, default=FRAMES, metavar="N", help="of a clip (default %(default)s)")
-    parser.add_argument("--frame", type=int, default=FRAME, metavar="N", help="that is shown (default %(default)s)")
-    parser.add_argument(
-        "--latency", type=float, default=LATENCY, metavar="SECONDS", help="before a response (default %(default)s)"
-    )
-    parser.add_argument("--rounds", type=int, default=ROUNDS, metavar="N", help="(default %(default)s)")
+    add_number(parser, "--plants", PLANTS, "copies of it in a clip")
+    add_number(parser, "--frames", FRAMES, "frames of a clip")
+    add_number(parser, "--frame", FRAME, "the frame that is shown")
+    add_number(parser, "--latency", LATENCY, "seconds before a response", "SECONDS")
+    add_number(parser, "--rounds", ROUNDS, "runs of everything")
     add_effort(parser, "fast")
     add_rel_error(parser)
 

@@ -1,7 +1,7 @@
 """One page from all results: the clips, every table with the command that made it, pictures.
 
 Reads the JSON files of a folder (of any verb) and writes report.md and, where matplotlib is installed, the pictures of
-plots.py and charts.py beside them. Measures nothing: a verb without a file has no section.
+plots.py beside them. Measures nothing: a verb without a file has no section.
 """
 
 from __future__ import annotations
@@ -10,14 +10,12 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from bench import charts, odd, plots, rd, store
+from bench import odd, plots, rd, store
 from bench.tables import as_text, table
 
 RESULTS = Path(__file__).resolve().parent / "results"
 TITLES = {
     "rd": "Rate and distortion",
-    "paper": "The paper's table again",
-    "scale": "Time by size",
     "decode": "The decoder",
     "sizes": "Sizes and what they are made of",
     "levels": "Levels of detail",
@@ -25,9 +23,7 @@ TITLES = {
     "speed": "Encoding and decoding in Python",
     "memory": "Memory of encoding",
     "large": "Large clips",
-    "forest": "Forests",
     "batch": "Many clips",
-    "fault-injection": "A batch under fault injection",
     "remote": "Behind a URL",
 }
 
@@ -62,7 +58,7 @@ def write(folder: Path) -> dict[str, Any]:
     """Writes report.md and pictures into the folder of the results; returns the list of files as a result."""
     results = [(path.stem, store.read(path)) for path in sorted(folder.glob("*.json"))]
     results = sorted(
-        ((name, result) for name, result in results if "command" in result),
+        ((name, result) for name, result in results if "points" in result or "tables" in result),
         key=lambda pair: ORDER.get(_verb(pair[1]), len(ORDER)),
     )
     if not results:
@@ -83,10 +79,12 @@ def _verb(result: dict[str, Any]) -> str:
 
 def _pictures(name: str, result: dict[str, Any], folder: Path) -> tuple[dict[str, list[Path]], str]:
     """Files by clip (under "" those about all clips), and the reason if there are none."""
-    verb, prefix = _verb(result), "" if name == "rd" else f"{name}_"
+    prefix = "" if name == "rd" else f"{name}_"
     try:
-        if verb != "rd":
-            return {"": charts.draw(verb, name, result, folder)}, ""
+        if _verb(result) == "progressive":
+            return {"": [plots.draw_prefixes(result["chart"], folder / f"{name}.png")]}, ""
+        if _verb(result) != "rd":
+            return {"": []}, ""
         clips = [] if _is_odd(result) else [row["clip"] for row in result["clips"]]
         return {clip: plots.draw(result, clip, folder, prefix) for clip in clips}, ""
     except plots.NoPlots as error:

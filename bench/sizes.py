@@ -13,7 +13,7 @@ from typing import Any
 
 from athcodec.metrics import ErrorMeter, bits_per_vertex_frame
 from athcodec.options import EFFORTS, LADDERS
-from bench.clips import Encoded, add_clips, encoded, measure
+from bench.clips import Encoded, add_clips, add_rel_error, encoded, measure
 from bench.tables import table
 
 REL_ERRORS = (1e-3, 1e-4, 1e-5)
@@ -36,14 +36,7 @@ Rotations (step factors) and learned time bases by level.
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_clips(parser)
-    parser.add_argument(
-        "--rel-error",
-        type=float,
-        nargs="+",
-        default=list(REL_ERRORS),
-        metavar="FRACTION",
-        help="error bounds over the bounding box's diagonal",
-    )
+    add_rel_error(parser, REL_ERRORS)
     parser.add_argument("--effort", nargs="+", choices=EFFORTS, default=["default"], help="efforts of the encoder")
 
 

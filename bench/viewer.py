@@ -1,4 +1,4 @@
-"""The viewer in Chromium: time to first motion on a slow connection, long tasks, size of the bundles, forests.
+"""The viewer in Chromium: time to first motion on a slow connection, long tasks, forests.
 
 The page is loaded and empty when a file is requested, as in a viewer that opens several files; the same is assumed for
 the other formats. These count as shown when their last byte has arrived; parsing is not included. Rendering is in
@@ -8,26 +8,23 @@ software: only ratios of frame times are meaningful for a graphics processor.
 from __future__ import annotations
 
 import argparse
-import gzip
 import json
 import statistics
-import struct
 import tempfile
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 import athcodec
 from athcodec.options import LADDERS
 from bench.browser import chromium
-from bench.clips import add_clips, add_rel_error, encoded
+from bench.clips import add_clips, add_number, add_rel_error, encoded
 from bench.tables import table
-from bench.throttled_server import WEB, ThrottledServer
+from bench.throttled_server import ThrottledServer
 
 MEGABIT = 125_000
 SLOW = 10_000  # bytes a second
 ROUNDS = 7
+INSTANCES = 10, 30, 100, 300, 1000
 MOST_SECONDS, MOST_SHARE, LONGEST_TASK = 0.5, 0.1, 50
 
 OBSERVE = """new Promise((found) => {
@@ -40,30 +37,6 @@ FETCH = """async (name) => {
   const start = performance.now(), answer = await fetch(name);
   const size = (await answer.arrayBuffer()).byteLength;
   return { seconds: (performance.now() - start) / 1000, size };
-}"""
-MODES = """async ([name, mode, levels, frames]) => {
-  const { ATHLoader } = await import("athcodec-three"), loader = new ATHLoader().setMode(mode);
-  const ath = await loader.loadAsync(name), { stage } = athcodecViewer, gl = stage.renderer.getContext();
-  const { motion } = ath, scene = stage.scene([ath.object]), pixel = new Uint8Array(4), found = [];
-  while (!motion.complete) await new Promise((done) => setTimeout(done, 20));
-  for (let level = 0; level < levels; level++) {
-    const ms = [], worker = [];
-    for (let i = 0; i < frames; i++) {
-      const start = performance.now();
-      await motion.show(i / 30, level);
-      stage.renderer.render(scene, stage.camera);
-      gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, pixel);
-      ms.push(performance.now() - start);
-      worker.push(motion.milliseconds);
-    }
-    const median = (values) => values.sort((a, b) => a - b)[frames >> 1];
-    const texture = motion.uniforms.athData.value, bytes = mode === "matrices" ? texture.image.data.byteLength
-      : 12 * motion.info.vertexCount;
-    found.push({ level, mode, ms: median(ms), worker: median(worker), bytes });
-  }
-  ath.dispose();
-  loader.dispose();
-  return found;
 }"""
 COMPARE = """([left, right, seconds]) => {
   const press = (group, value) => document.querySelector(`#${group} [data-value="${value}"]`).click();
@@ -89,18 +62,14 @@ NOTE_FOREST = """
 Milliseconds from choosing levels until the picture is drawn, in software, the fastest of seven, alternating;
 vertices are those drawn.
 """
-NOTE_MODES = """
-Milliseconds from requesting a frame from the worker until it is drawn, medians; bytes: sent to the graphics processor.
-Matrices: by a texture, in the vertex shader (the default); positions: by a new position attribute.
-"""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_clips(parser)
     add_rel_error(parser)
-    parser.add_argument("--line", type=float, default=10.0, metavar="MBIT", help="megabits a second (default 10)")
-    parser.add_argument("--rounds", type=int, default=5, metavar="N", help="how often a file is opened (default 5)")
-    parser.add_argument("--instances", type=int, nargs="+", default=[10, 30, 100, 300, 1000], metavar="N")
+    add_number(parser, "--line", 10.0, "megabits a second", "MBIT")
+    add_number(parser, "--rounds", 5, "how often a file is opened")
+    add_number(parser, "--instances", INSTANCES, "plants of the forests")
     parser.add_argument(
         "--picture", type=Path, metavar="FILE.png", help="measure nothing: write a picture of the page with two levels"
     )
@@ -109,7 +78,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> dict[str, Any]:
     if args.picture:
         return _picture(args.clips[0], args.rel_error, args.picture)
-    starts, tasks, forests, modes, broken = [], [], [], [], []
+    starts, tasks, forests, broken = [], [], [], []
     with tempfile.TemporaryDirectory() as folder, chromium() as browser:
         for path in args.clips:
             files = _files(path, Path(folder), args.rel_error)
@@ -118,16 +87,11 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
             tasks.append({"clip": path.stem} | found["tasks"])
             broken += _missed_targets(path.stem, found)
             forests += [{"clip": path.stem} | row for row in _forests(browser, files["tree.ath"], args.instances)]
-            modes += [{"clip": path.stem} | row for row in _modes(browser, files["tree.ath"])]
-    scripts = {path.name: path.read_bytes() for path in sorted(WEB.glob("*.js"))}
-    sizes = [{"file": name, "bytes": len(code), "gzip": len(gzip.compress(code))} for name, code in scripts.items()]
     return {
         "tables": [
             table(f"First motion at {args.line:g} Mbit/s", starts, NOTE_START),
             table("Tasks of the main thread, ms", tasks, NOTE_TASKS),
-            table("Bundles, in bytes", sizes),
             table("Forest", forests, NOTE_FOREST),
-            table("Ways of moving the vertices", modes, NOTE_MODES),
         ],
         "broken": broken,
     }
@@ -152,47 +116,12 @@ def _files(path: Path, folder: Path, rel_error: float) -> dict[str, bytes]:
     """The clip as .ath, as raw float32 and as a GLB with morph targets."""
     with athcodec.read_hdf5(path) as clip:
         athcodec.encode(clip, folder / "tree.ath", rel_error=rel_error)
-        positions = clip.block(0, clip.frame_count).astype("<f4")
+        athcodec.write(clip.replace(attributes={}), folder / "tree.glb", animation="morphs")
         return {
             "tree.ath": (folder / "tree.ath").read_bytes(),
-            "tree.raw": positions.tobytes(),
-            "tree.glb": _glb(positions, clip.time),
+            "tree.raw": clip.block(0, clip.frame_count).astype("<f4").tobytes(),
+            "tree.glb": (folder / "tree.glb").read_bytes(),
         }
-
-
-def _glb(positions: np.ndarray, time: np.ndarray) -> bytes:
-    """Points with a morph target per frame, and the animation that shows one after the other."""
-    frames, count = positions.shape[:2]
-    arrays = [positions[0], *(positions - positions[0]), time.astype("<f4"), np.eye(frames, dtype="<f4")]
-    views, accessors, body = [], [], b""
-    for array in arrays:
-        views.append({"buffer": 0, "byteOffset": len(body), "byteLength": array.nbytes})
-        accessor = {"bufferView": len(views) - 1, "componentType": 5126, "type": "SCALAR", "count": array.size}
-        if array.ndim == 2 and array.shape[1] == 3:
-            accessor |= {"type": "VEC3", "count": len(array)}
-            accessor |= {"min": array.min(axis=0).tolist(), "max": array.max(axis=0).tolist()}
-        accessors.append(accessor)
-        body += array.tobytes()
-    sampler = {"input": frames + 1, "output": frames + 2}
-    targets = [{"POSITION": 1 + frame} for frame in range(frames)]
-    head = json.dumps(
-        {
-            "asset": {"version": "2.0"},
-            "scene": 0,
-            "scenes": [{"nodes": [0]}],
-            "nodes": [{"mesh": 0}],
-            "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "mode": 0, "targets": targets}]}],
-            "animations": [
-                {"samplers": [sampler], "channels": [{"sampler": 0, "target": {"node": 0, "path": "weights"}}]}
-            ],
-            "accessors": accessors,
-            "bufferViews": views,
-            "buffers": [{"byteLength": len(body)}],
-        }
-    ).encode()
-    head += b" " * (-len(head) % 4)
-    parts = struct.pack("<II", len(head), 0x4E4F534A) + head + struct.pack("<II", len(body), 0x004E4942) + body
-    return struct.pack("<4sII", b"glTF", 2, 12 + len(parts)) + parts
 
 
 def _page(browser, server: ThrottledServer, name: str | None = None):
@@ -322,16 +251,3 @@ def _forests(browser, data: bytes, counts: list[int]) -> list[dict[str, Any]]:
             )
         page.close()
     return rows
-
-
-def _modes(browser, data: bytes) -> list[dict[str, Any]]:
-    with ThrottledServer({"tree.ath": data}) as server:
-        page = _page(browser, server, "tree.ath")
-        page.wait_for_function("() => athcodecViewer.motion?.complete")
-        page.evaluate("athcodecViewer.setPlaying(false)")
-        levels = page.evaluate("athcodecViewer.motion.levelCount")
-        rows = [
-            row for mode in ("matrices", "positions") for row in page.evaluate(MODES, ["/tree.ath", mode, levels, 21])
-        ]
-        page.close()
-    return sorted(rows, key=lambda row: row["level"])

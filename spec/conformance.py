@@ -47,21 +47,9 @@ from spec.document import File, clip_entry, crc32c, rules
 
 FOLDER = Path(__file__).resolve().parent / "vectors"
 DECODER_MODULE = Path(__file__).resolve().parent.parent / "athcodec" / "viewer" / "ath_decoder.mjs"
-ERRORS = (
-    "INVALID",
-    "NOT_AN_ATH_FILE",
-    "UNSUPPORTED_VERSION",
-    "TRUNCATED",
-    "BAD_CHECKSUM",
-    "BAD_HEADER",
-    "BAD_CHUNK_TABLE",
-    "UNKNOWN_CHUNK",
-    "BAD_CHUNK",
-    "LIMIT_EXCEEDED",
-    "TRAILING_BYTES",
-    "NEEDS_HOST_MESH",
-    "WRONG_HOST_MESH",
-    "UNSUPPORTED_FEATURE",
+ERRORS = tuple(
+    "INVALID NOT_AN_ATH_FILE UNSUPPORTED_VERSION TRUNCATED BAD_CHECKSUM BAD_HEADER BAD_CHUNK_TABLE UNKNOWN_CHUNK "
+    "BAD_CHUNK LIMIT_EXCEEDED TRAILING_BYTES NEEDS_HOST_MESH WRONG_HOST_MESH UNSUPPORTED_FEATURE".split()
 )
 NO_ANSWER = ("strict", "open")
 SECONDS = 120

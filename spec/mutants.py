@@ -1,6 +1,7 @@
 """Tests the vectors: changes the code of FORMAT.md in one place at a time, and looks whether a vector tells.
 
     python -m spec.mutants                    all changes; writes spec/mutants.md
+    python -m spec.mutants --draw N --seed S  N of them, drawn at random; writes spec/mutants.md
     python -m spec.mutants --only GLOB        those whose name matches; prints what no vector tells
     python -m spec.mutants --list [GLOB]      their names
 
@@ -22,6 +23,7 @@ import hashlib
 import math
 import os
 import pickle
+import random
 import re
 import resource
 import signal
@@ -30,7 +32,7 @@ import time
 import tomllib
 import types
 from collections import Counter, defaultdict
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
 from pathlib import Path
@@ -49,6 +51,7 @@ SECONDS, TIMES_AS_LONG = 1.0, 10.0  # of the processor, for a vector; and how ma
 MEMORY = 3 << 30
 NOT_CHANGED = (ast.operator, ast.unaryop, ast.boolop, ast.cmpop, ast.expr_context)
 MISSED = "missed"
+UNEXPLAINED = "*Unexplained.* A vector that is slower than the seconds above may tell these changes, or none does."
 
 
 # ---- changes -----------------------------------------------------------------------------------------------
@@ -81,14 +84,6 @@ class Mutant:
     function: str
     line: int  # of FORMAT.md, which has to run; 0: any may do
     of_floats: int  # the number of the expression that has to be of floats; -1: any
-
-    @property
-    def heading(self) -> str:
-        """The section of FORMAT.md that it is in."""
-        above = document.TEXT.splitlines()[: self.place_line]
-        return next(line.lstrip("# ") for line in reversed(above) if re.match(r"#{2,4} [A-Z]", line))
-
-    place_line: int = 0
 
 
 def parent_of(node: ast.AST) -> ast.AST:
@@ -146,8 +141,7 @@ class Changes:
         if self._names[name] > 1:
             name += f" ({self._names[name]})"
         number = node.number if of_floats else -1  # type: ignore[attr-defined]
-        place_line = self.tree.body[self.top].lineno
-        self.mutants.append(Mutant(name, place, replacement, self.top, self.function, self.line, number, place_line))
+        self.mutants.append(Mutant(name, place, replacement, self.top, self.function, self.line, number))
 
 
 def shown_with(node: ast.AST) -> ast.AST:
@@ -171,29 +165,11 @@ def as_line(node: ast.AST) -> str:
 
 # ---- what a node can be replaced by ------------------------------------------------------------------------
 
-OPERATORS: dict[type, list[type]] = {
-    ast.Add: [ast.Sub],
-    ast.Sub: [ast.Add],
-    ast.Mult: [ast.Add],
-    ast.Div: [ast.Mult],
-    ast.Mod: [ast.FloorDiv],
-    ast.LShift: [ast.RShift],
-    ast.RShift: [ast.LShift],
-    ast.BitAnd: [ast.BitOr],
-    ast.BitOr: [ast.BitAnd],
-    ast.BitXor: [ast.BitOr],
-    ast.Pow: [ast.Mult],
-    ast.Lt: [ast.LtE],
-    ast.LtE: [ast.Lt],
-    ast.Gt: [ast.GtE],
-    ast.GtE: [ast.Gt],
-    ast.Eq: [ast.NotEq],
-    ast.NotEq: [ast.Eq],
-    ast.In: [ast.NotIn],
-    ast.NotIn: [ast.In],
-    ast.Is: [ast.IsNot],
-    ast.IsNot: [ast.Is],
-}
+CHANGED_TO = (
+    "Add Sub, Sub Add, Mult Add, Div Mult, Mod FloorDiv, LShift RShift, RShift LShift, BitAnd BitOr, BitOr BitAnd, "
+    "BitXor BitOr, Pow Mult, Lt LtE, LtE Lt, Gt GtE, GtE Gt, Eq NotEq, NotEq Eq, In NotIn, NotIn In, Is IsNot, IsNot Is"
+)
+OPERATORS = {getattr(ast, old): getattr(ast, new) for old, new in map(str.split, CHANGED_TO.split(","))}
 SYMMETRIC = "times", "distance"  # functions of two arguments in any order
 SWAPPED = (ast.Sub, ast.Div, ast.FloorDiv, ast.Mod, ast.LShift, ast.RShift)
 NEGATED = {ast.Lt: ast.GtE, ast.LtE: ast.Gt, ast.Gt: ast.LtE, ast.GtE: ast.Lt}
@@ -201,10 +177,8 @@ NEGATED = {ast.Lt: ast.GtE, ast.LtE: ast.Gt, ast.Gt: ast.LtE, ast.GtE: ast.Lt}
 
 def replacements(node: ast.AST) -> Iterator[tuple[ast.AST, bool]]:
     """And whether it makes a difference for floats alone."""
-    makers = BY_TYPE.get(type(node), ())
-    for make in makers:
-        for made in make(node):
-            yield made if isinstance(made, tuple) else (made, False)
+    for made in BY_TYPE[type(node)](node) if type(node) in BY_TYPE else ():
+        yield made if isinstance(made, tuple) else (made, False)
     if is_condition(node):
         yield ast.Constant(True), False
         if not is_required(node):
@@ -269,7 +243,8 @@ def binary(node: ast.BinOp) -> Iterator[Any]:
     left, op, right = node.left, node.op, node.right
     if isinstance(getattr(left, "value", 0), (str, bytes)):
         return
-    yield from (ast.BinOp(left, new(), right) for new in OPERATORS.get(type(op), ()))
+    if type(op) in OPERATORS:
+        yield ast.BinOp(left, OPERATORS[type(op)](), right)
     if isinstance(op, SWAPPED):
         yield ast.BinOp(right, op, left)
     if isinstance(op, ast.FloorDiv):
@@ -293,12 +268,8 @@ def other_roundings(node: ast.BinOp) -> Iterator[ast.AST]:
     if isinstance(op, ast.Div) and not is_power_of_two(left) and not is_power_of_two(right):
         yield ast.BinOp(left, ast.Mult(), ast.BinOp(one, op, right))
     by_reciprocal = isinstance(op, ast.Mult) and isinstance(right, ast.BinOp) and isinstance(right.op, ast.Div)
-    if by_reciprocal and is_one(right.left):
+    if by_reciprocal and isinstance(right.left, ast.Constant) and right.left.value == 1.0:
         yield ast.BinOp(left, ast.Div(), right.right)
-
-
-def is_one(node: ast.AST) -> bool:
-    return isinstance(node, ast.Constant) and node.value == 1.0
 
 
 def is_power_of_two(node: ast.AST) -> bool:
@@ -308,7 +279,8 @@ def is_power_of_two(node: ast.AST) -> bool:
 
 
 def augmented(node: ast.AugAssign) -> Iterator[Any]:
-    yield from (ast.AugAssign(node.target, new(), node.value) for new in OPERATORS.get(type(node.op), ()))
+    if type(node.op) in OPERATORS:
+        yield ast.AugAssign(node.target, OPERATORS[type(node.op)](), node.value)
     yield ast.Pass()
 
 
@@ -316,8 +288,8 @@ def compared(node: ast.Compare) -> Iterator[Any]:
     if chooses_one_of_them(node):  # which are the same where they are equal
         return
     for i, op in enumerate(node.ops):
-        for new in OPERATORS[type(op)]:
-            yield ast.Compare(node.left, [*node.ops[:i], new(), *node.ops[i + 1 :]], node.comparators)
+        ops = [*node.ops[:i], OPERATORS[type(op)](), *node.ops[i + 1 :]]
+        yield ast.Compare(node.left, ops, node.comparators)
     if len(node.ops) > 1:
         yield ast.Compare(node.left, node.ops[:-1], node.comparators[:-1])
         yield ast.Compare(node.comparators[0], node.ops[1:], node.comparators[1:])
@@ -382,20 +354,17 @@ def missing_expression(node: ast.Expr) -> Iterator[Any]:
         yield ast.Pass()
 
 
-BY_TYPE: dict[type, tuple] = {
-    ast.Constant: (constants,),
-    ast.BinOp: (binary,),
-    ast.AugAssign: (augmented,),
-    ast.Compare: (compared,),
-    ast.BoolOp: (joined,),
-    ast.UnaryOp: (unary,),
-    ast.Call: (called,),
-    ast.Continue: (missing,),
-    ast.Break: (missing,),
-    ast.Assign: (missing,),
-    ast.Raise: (missing,),
-    ast.Return: (missing_return,),
-    ast.Expr: (missing_expression,),
+BY_TYPE: dict[type, Callable[[Any], Iterator[Any]]] = {
+    ast.Constant: constants,
+    ast.BinOp: binary,
+    ast.AugAssign: augmented,
+    ast.Compare: compared,
+    ast.BoolOp: joined,
+    ast.UnaryOp: unary,
+    ast.Call: called,
+    ast.Return: missing_return,
+    ast.Expr: missing_expression,
+    **dict.fromkeys((ast.Continue, ast.Break, ast.Assign, ast.Raise), missing),
 }
 
 
@@ -478,6 +447,7 @@ class Cache:
     known: dict[str, Known] = field(default_factory=dict)  # by the name of the vector
     floats: set[int] = field(default_factory=set)  # numbers of expressions
     fates: dict[str, str] = field(default_factory=dict)  # of changes
+    missed: dict[str, float] = field(default_factory=dict)  # Seconds of all these vectors that a change was tried with.
 
     @staticmethod
     def of(tree: ast.Module) -> Cache:
@@ -504,6 +474,8 @@ def measure(changes: Changes, cache: Cache) -> list[Known]:
 
     marked = Marked({mutant.of_floats for mutant in changes.mutants}).visit(copy.deepcopy(changes.tree))
     parts = [compiled(node) for node in marked.body] if missing else []
+    if missing:
+        cache.missed.clear()
     for vector in missing:
         ran.clear()
         rules = document.run(parts, _ran=ran, _typed=typed)
@@ -527,8 +499,10 @@ class Run:
         self.lately: dict[str, list[str]] = defaultdict(list)  # of a function: vectors that caught changes, last first
 
     def all(self, mutants: list[Mutant], jobs: int) -> dict[str, str]:
-        """What becomes of each change; what is known to be caught is not tried again."""
-        waiting = [mutant for mutant in mutants if self.cache.fates.get(mutant.name, MISSED) == MISSED][::-1]
+        """Return what becomes of each change. What is known to be caught, or missed for as long, is not tried again."""
+        caught = {name for name, fate in self.cache.fates.items() if fate != MISSED}
+        known = caught | {name for name, seconds in self.cache.missed.items() if seconds >= self.seconds}
+        waiting = [mutant for mutant in mutants if mutant.name not in known][::-1]
         running, told = {}, time.monotonic()
         while waiting or running:
             while waiting and len(running) < jobs:
@@ -584,6 +558,8 @@ class Run:
 
     def _note(self, mutant: Mutant, fate: str) -> None:
         self.cache.fates[mutant.name] = fate
+        if fate == MISSED:
+            self.cache.missed[mutant.name] = self.seconds
         if fate.startswith("result of "):
             name, names = fate.removeprefix("result of "), self.lately[mutant.function]
             if name in names:
@@ -600,6 +576,11 @@ class Reason:
 
     why: str
     like: list[str]
+    gap: bool = False  # A vector could tell the changes, but none does.
+
+    @property
+    def sentence(self) -> str:
+        return ("*Gap.* " if self.gap else "") + " ".join(self.why.split())
 
     def matches(self, name: str) -> bool:
         return any(re.fullmatch(pattern, name) for pattern in self.like)
@@ -609,34 +590,50 @@ def reasons() -> list[Reason]:
     return [Reason(**entry) for entry in tomllib.loads(REASONS.read_text("utf-8"))["reason"]]
 
 
-def faults(fates: dict[str, str], known: list[Reason]) -> list[str]:
-    """What is missed without a reason, and reasons that are not needed."""
+def faults(fates: dict[str, str], known: list[Reason], is_complete: bool = True) -> list[str]:
+    """Return what is missed without a reason and, if all changes were tried, the reasons that are not needed."""
     missed = [name for name, fate in fates.items() if fate == MISSED]
     lines = [f"not caught: {name}" for name in missed if not any(reason.matches(name) for reason in known)]
-    patterns = [pattern for reason in known for pattern in reason.like]
+    patterns = [pattern for reason in known for pattern in reason.like if is_complete]
     unneeded = [pattern for pattern in patterns if not any(re.fullmatch(pattern, name) for name in missed)]
     return lines + [f"no change that is not caught is like: {pattern}" for pattern in unneeded]
 
 
-def as_markdown(mutants: list[Mutant], fates: dict[str, str], vectors: int, seconds: float) -> str:
-    found: dict[str, Counter] = defaultdict(Counter)
-    for mutant in mutants:
-        fate = fates[mutant.name]
-        found[mutant.heading]["missed" if fate == MISSED else fate.split()[0]] += 1
-    total = sum(found.values(), Counter())
+def as_markdown(drawn: dict[str, str], changes: int, how: str, vectors: int, seconds: float) -> str:
+    """Return the page about the changes that were tried: `drawn` has what became of each of them."""
+    fates = Counter(MISSED if fate == MISSED else fate.split()[0] for fate in drawn.values())
+    known = reasons()
+    survivors: dict[str, list[str]] = defaultdict(list)
+    for name, fate in drawn.items():
+        if fate == MISSED:
+            reason = next((reason for reason in known if reason.matches(name)), None)
+            survivors[reason.sentence if reason else UNEXPLAINED].append(name)
+    caught = len(drawn) - fates[MISSED]
     lines = [
-        "# Changes of the document's code",
+        "# Mistakes that the vectors find",
         "",
-        f"Written by `python -m spec.mutants`. Each change was tried with those of {vectors} vectors that run what",
-        f"it changes, the fastest first, up to {seconds:g} s of decoding. It is caught by another result, an exception",
-        "that is no error of the format, or because decoding does not end. `mutants.toml` says why some are missed.",
+        f"`python -m spec.mutants {how}".rstrip() + "` wrote this page. The command makes one mistake at a time in the",
+        "Python code of [FORMAT.md](../FORMAT.md), which is a complete decoder: another constant, operator, comparison",
+        "or order of operations, a condition that is always true or never, a missing statement, swapped arguments. It",
+        "decodes the vectors that run the changed line, the fastest first, until one tells the changed decoder from",
+        f"the true one or {seconds:g} s of decoding have passed. A change survives if none of them does.",
         "",
-        "| Section of FORMAT.md | changes | result | exception | no end | not caught |",
-        "|---|---:|---:|---:|---:|---:|",
+        "| | changes |",
+        "|---|---:|",
+        f"| possible | {changes} |",
+        f"| tried with up to {vectors} vectors | {len(drawn)} |",
+        f"| told apart by another result | {fates['result']} |",
+        f"| told apart by an exception that is no error of the format | {fates['exception']} |",
+        f"| told apart because decoding does not end | {fates['no']} |",
+        f"| **told apart in all** | **{caught} ({100 * caught / len(drawn):.1f} %)** |",
+        f"| survived | {fates[MISSED]} |",
+        "",
+        "## Survivors",
+        "",
+        "`spec/mutants.toml` has the reasons. *Gap* marks changes that a vector could tell, but none does.",
     ]
-    for heading, how in [*found.items(), ("**all**", total)]:
-        numbers = [how.total(), how["result"], how["exception"], how["no"], how["missed"]]
-        lines.append(f"| {heading} | {' | '.join(map(str, numbers))} |")
+    for sentence, names in survivors.items():
+        lines += ["", sentence, "", *(f"- `{name}`" for name in names)]
     return "\n".join(lines) + "\n"
 
 
@@ -644,6 +641,10 @@ def main(words: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="python -m spec.mutants", description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--only", metavar="GLOB", default="*", help="changes whose name matches; writes no report")
     parser.add_argument("--list", nargs="?", const="*", metavar="GLOB", help="print the names of changes")
+    parser.add_argument("--draw", type=int, metavar="N", help="try N changes, drawn at random")
+    parser.add_argument(
+        "--seed", type=int, default=0, help="of the draw; a larger N adds to the same draw (%(default)s)"
+    )
     parser.add_argument("--quick", action="store_true", help="only with the fastest vectors; writes no report")
     parser.add_argument(
         "--seconds", type=float, default=MOST_SECONDS, help="of vectors that a change is tried with (%(default)s)"
@@ -658,8 +659,11 @@ def main(words: list[str] | None = None) -> int:
     cache = Cache.of(changes.tree)
     vectors = measure(changes, cache)
     print(f"{len(vectors)} vectors in {sum(known.seconds for known in vectors):.0f} s", flush=True)
-    mutants = [mutant for mutant in changes.mutants if mutant.of_floats < 0 or mutant.of_floats in cache.floats]
-    mutants = [mutant for mutant in mutants if fnmatchcase(mutant.name, options.only)]
+    possible = [mutant for mutant in changes.mutants if mutant.of_floats < 0 or mutant.of_floats in cache.floats]
+    mutants = [mutant for mutant in possible if fnmatchcase(mutant.name, options.only)]
+    if options.draw is not None:
+        random.Random(options.seed).shuffle(mutants)
+        mutants = mutants[: options.draw]
     gc.freeze()  # pages that all processes share
     seconds = QUICK_SECONDS if options.quick else options.seconds
     fates = Run(changes, vectors, cache, seconds).all(mutants, options.jobs)
@@ -667,8 +671,9 @@ def main(words: list[str] | None = None) -> int:
         missed = [name for name, fate in fates.items() if fate == MISSED]
         print(*missed, f"{len(fates)} changes, {len(missed)} not caught", sep="\n")
         return 0
-    REPORT.write_text(as_markdown(mutants, fates, len(vectors), seconds), "utf-8")
-    wrong = faults(fates, reasons())
+    how = "" if options.draw is None else f"--draw {options.draw} --seed {options.seed}"
+    REPORT.write_text(as_markdown(fates, len(possible), how, len(vectors), seconds), "utf-8")
+    wrong = faults(fates, reasons(), is_complete=options.draw is None)
     print(*wrong, f"{len(fates)} changes, {len(wrong)} faults, {time.monotonic() - begun:.0f} s", sep="\n")
     return 1 if wrong else 0
 

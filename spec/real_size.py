@@ -210,8 +210,6 @@ def features(data: bytes) -> set[str]:
         "sloped joins": any(join.is_sloped for join in joins),
         "repeats": any(header.repeats),
         "learned bases": any(head[5] > 1 for head in heads),
-        "shared bases": any(head[5] > 1 and head[8] != 255 for head in heads),
-        "waves of nodes": any(head[5] == 1 for head in heads),
         "sheets": any(branch.flags & rules.SHEET for branch in file.branches),
         "loose branches": any(branch.flags & rules.LOOSE for branch in file.branches),
         "whole subtrees": any(branch.flags & rules.WHOLE for branch in file.branches),

@@ -58,14 +58,8 @@ def as_markdown(results: dict[str, dict]) -> str:
         "",
     ]
     for name, result in sorted(results.items()):
-        lines += [
-            f"## {name}",
-            "",
-            result["about"],
-            "",
-            "| class | tried | crashes | hangs | over limit | wrong | |",
-            "|---|---|---|---|---|---|---|",
-        ]
+        lines += [f"## {name}", "", result["about"], ""]
+        lines += ["| class | tried | crashes | hangs | over limit | wrong | |", "|---|---|---|---|---|---|---|"]
         for row in result["rows"]:
             counts = " | ".join(f"{row[count]:,}" for count in COUNTS)
             lines.append(f"| {row['name']} | {counts} | {row['note']} |")

@@ -14,6 +14,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from copy import copy
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 
@@ -102,63 +103,48 @@ class ScriptedCoder(rules.RangeDecoder):
         return (last >> zeros << zeros).to_bytes(self.length, "big").rstrip(b"\0")
 
 
-def scripted_unsigned(original: Callable):
-    def code(coder, model, c):
-        coder.decisions.extend(magnitude_bits(coder.script.answer("unsigned", 1 << 30), 30))
-        return original(coder, model, c)
-
-    return code
+def scripted_unsigned(original: Callable, coder, model, c):
+    coder.decisions.extend(magnitude_bits(coder.script.answer("unsigned", 1 << 30), 30))
+    return original(coder, model, c)
 
 
-def scripted_signed(original_unsigned: Callable):
-    def code(coder, model, c, sign=None):
-        value = coder.script.answer("signed", 1 << 30)
-        coder.decisions.extend(magnitude_bits(abs(value), 30))
-        if original_unsigned(coder, model, c):
-            coder.decisions.append(value < 0)
-            rules.code_sign(coder, sign)
-        return value
-
-    return code
+def scripted_signed(original: Callable, coder, model, c, sign=None):
+    value = coder.script.answer("signed", 1 << 30)
+    coder.decisions.extend(magnitude_bits(abs(value), 30))
+    if original(coder, model, c):
+        coder.decisions.append(value < 0)
+        rules.code_sign(coder, sign)
+    return value
 
 
-def scripted_count(original: Callable):
-    def code(coder, model, history, above, rank):
-        count = coder.script.answer("count", rank)
-        coder.decisions.extend([0] + magnitude_bits(count, 10)[1:] if count else [1])
-        return original(coder, model, history, above, rank)
-
-    return code
+def scripted_count(original: Callable, coder, model, history, above, rank):
+    count = coder.script.answer("count", rank)
+    coder.decisions.extend([0] + magnitude_bits(count, 10)[1:] if count else [1])
+    return original(coder, model, history, above, rank)
 
 
-def scripted_exact(original: Callable):
-    def code(coder, model, n, expected, before):
-        """The script has the number, or (magnitude, negative) of its difference from the predicted one."""
-        value = coder.script.answer("exact", 0)
-        if not isinstance(value, tuple):
-            likely = rules.single(expected) if n == 32 else expected
-            likely = likely if rules.finite(likely) else 0.0
-            difference = rules.ordered(rules.to_bits(value, n), n) - rules.ordered(rules.to_bits(likely, n), n)
-            value = abs(difference), difference < 0
-        coder.decisions.extend(magnitude_bits(value[0], n) + ([value[1]] if value[0] else []))
-        return original(coder, model, n, expected, before)
-
-    return code
+def scripted_exact(original: Callable, coder, model, n, expected, before):
+    """The script has the number, or (magnitude, negative) of its difference from the predicted one."""
+    value = coder.script.answer("exact", 0)
+    if not isinstance(value, tuple):
+        likely = rules.single(expected) if n == 32 else expected
+        likely = likely if rules.finite(likely) else 0.0
+        difference = rules.ordered(rules.to_bits(value, n), n) - rules.ordered(rules.to_bits(likely, n), n)
+        value = abs(difference), difference < 0
+    coder.decisions.extend(magnitude_bits(value[0], n) + ([value[1]] if value[0] else []))
+    return original(coder, model, n, expected, before)
 
 
-def scripted_corner(original: Callable):
-    def code(coder, model, bound, corners, first, j, previous):
-        """The script has the vertex. It is coded as the first thing that says it."""
-        vertex, script = coder.script.answer("corner", bound - 1), coder.script
-        seen = copy(model)
-        seen.places = [dict(table) for table in model.places]
-        coder.decisions.extend(corner_decisions(seen, bound, corners, first, j, previous, vertex))
-        about = corners[-1 if j > 0 else previous] if corners else 0
-        coder.script = Script(vertex - about)
-        original(coder, model, bound, corners, first, j, previous)
-        coder.script = script
-
-    return code
+def scripted_corner(original: Callable, coder, model, bound, corners, first, j, previous):
+    """The script has the vertex. It is coded as the first thing that says it."""
+    vertex, script = coder.script.answer("corner", bound - 1), coder.script
+    seen = copy(model)
+    seen.places = [dict(table) for table in model.places]
+    coder.decisions.extend(corner_decisions(seen, bound, corners, first, j, previous, vertex))
+    about = corners[-1 if j > 0 else previous] if corners else 0
+    coder.script = Script(vertex - about)
+    original(coder, model, bound, corners, first, j, previous)
+    coder.script = script
 
 
 def corner_decisions(model, bound, corners, first, j, previous, vertex) -> list[int]:
@@ -178,17 +164,25 @@ def corner_decisions(model, bound, corners, first, j, previous, vertex) -> list[
     return [*bits, 0]
 
 
-def scripted_face_count(original: Callable):
-    def code(coder, model, before):
-        """The script has the number of corners."""
-        count, script = coder.script.answer("unsigned", 8), coder.script
-        coder.decisions.append(int(count == before))
-        coder.script = Script(count)
-        original(coder, model, before)
-        coder.script = script
-        return count
+def scripted_face_count(original: Callable, coder, model, before):
+    """The script has the number of corners."""
+    count, script = coder.script.answer("unsigned", 8), coder.script
+    coder.decisions.append(int(count == before))
+    coder.script = Script(count)
+    original(coder, model, before)
+    coder.script = script
+    return count
 
-    return code
+
+# What is replaced of FORMAT.md's code, by what, and the function that this calls.
+SCRIPTED = {
+    "code_in_class": (scripted_unsigned, "code_in_class"),
+    "code_signed_in_class": (scripted_signed, "code_in_class"),
+    "decode_count": (scripted_count, "decode_count"),
+    "code_exact": (scripted_exact, "code_exact"),
+    "decode_corner": (scripted_corner, "decode_corner"),
+    "decode_face_count": (scripted_face_count, "decode_face_count"),
+}
 
 
 @contextmanager
@@ -200,23 +194,13 @@ def scripted(script: Script) -> Iterator[list[ScriptedCoder]]:
         made.append(ScriptedCoder(script))
         return made[-1]
 
-    replaced = {
-        "RangeDecoder": coder,
-        "code_in_class": scripted_unsigned(rules.code_in_class),
-        "code_signed_in_class": scripted_signed(rules.code_in_class),
-        "decode_count": scripted_count(rules.decode_count),
-        "code_exact": scripted_exact(rules.code_exact),
-        "decode_corner": scripted_corner(rules.decode_corner),
-        "decode_face_count": scripted_face_count(rules.decode_face_count),
-    }
-    kept = {name: getattr(rules, name) for name in replaced}
+    kept = {name: getattr(rules, name) for name in ("RangeDecoder", *SCRIPTED)}
+    vars(rules).update({name: partial(function, kept[of]) for name, (function, of) in SCRIPTED.items()})
+    rules.RangeDecoder = coder
     try:
-        for name, function in replaced.items():
-            setattr(rules, name, function)
         yield made
     finally:
-        for name, function in kept.items():
-            setattr(rules, name, function)
+        vars(rules).update(kept)
 
 
 def write(function: Callable, script: Script | list, *arguments, lowest: bool = False) -> bytes:
@@ -290,10 +274,7 @@ class FrontScript:
     def __init__(self, counts: dict):
         self.counts = counts
         self.values = [
-            counts["vertex_count"] - 1,
-            counts["branch_count"] - 1,
-            counts["frame_count"] - 1,
-            counts["segment_count"] - 1,
+            *(counts[f"{name}_count"] - 1 for name in ("vertex", "branch", "frame", "segment")),
             counts["full_level_count"] - 2,
             counts["full_level_count"] - counts["level_count"],
             counts["clip_count"] - 1,
@@ -473,9 +454,11 @@ def hierarchy_script(stems: list[Stem], branch_source: list | None = None, verte
             last_place[stem.parent] = stem.place
     return (
         script
-        + numbers_script([(stem.lag, stem.rigid) for stem in stems])
-        + numbers_script([(stem.lag, stem.detail) for stem in stems])
-        + numbers_script([(stem.lag, stem.ring) for stem in stems])
+        + [
+            n
+            for name in ("rigid", "detail", "ring")
+            for n in numbers_script([(s.lag, getattr(s, name)) for s in stems])
+        ]
         + permutation_script(branch_source, stems, False)
         + permutation_script(vertex_source, stems, True, branch_source)
     )
@@ -625,10 +608,14 @@ def _no_motion(plan, frames: int, periodic: bool, shapes):
     return motion
 
 
+def _of_draft(name: str) -> Callable:
+    return lambda plant, *arguments, **fields: getattr(plant.draft(), name)(*arguments, **fields)
+
+
 @dataclass
 class Plant:
-    """A file of scripts, by (kind, level, segment) or (kind, level). Streams without a script hold empty rows; SHAPES,
-    CORRECTIONS and REFINED_REST are there only with one."""
+    """A file of scripts, or seeds of random ones, by (kind, level, segment) or (kind, level). Streams without a script
+    hold empty rows; SHAPES, CORRECTIONS and REFINED_REST are there only with one."""
 
     stems: list[Stem]
     frames: int = 1
@@ -713,8 +700,8 @@ class Plant:
             repeats=self.repeats,
         )
 
-    def file(self) -> bytes:
-        return self.draft().file()
+    file, add, change, without = map(_of_draft, ("file", "add", "change", "without"))
+    with_header, upto = map(_of_draft, ("with_header", "upto"))
 
     def _rest(self, branches: list) -> bytes:
         if self.mesh is not None:
@@ -828,4 +815,5 @@ class Plant:
 
     def _write(self, function: Callable, place: tuple, *arguments) -> bytes:
         script = self.scripts.get(place, self.scripts.get(place[:2], []))
-        return write(function, script() if callable(script) else script, *arguments)
+        script = Chance(script) if isinstance(script, int) else script() if callable(script) else script
+        return write(function, script, *arguments)

@@ -172,16 +172,14 @@ def bushy_clip():
 def bushy_ath(bushy_clip, tmp_path_factory):
     """The bushy clip in four segments."""
     path = tmp_path_factory.mktemp("bushy") / "bushy.ath"
-    athcodec.encode(bushy_clip, path, rel_error=1e-3, segment_frames=16, ladder="none")
-    return path
+    return athcodec.encode(bushy_clip, path, rel_error=1e-3, segment_frames=16, ladder="none").path
 
 
 @pytest.fixture(scope="session")
 def layered_ath(bushy_clip, tmp_path_factory):
     """The bushy clip in four segments and three layers of precision, each with a rest pose of its own."""
     path = tmp_path_factory.mktemp("layered") / "layered.ath"
-    athcodec.encode(bushy_clip, path, rel_error=1e-4, ladder=(1e-2, 1e-3), segment_frames=16)
-    return path
+    return athcodec.encode(bushy_clip, path, rel_error=1e-4, ladder=(1e-2, 1e-3), segment_frames=16).path
 
 
 def full_clip_of(seed: int):
@@ -221,15 +219,8 @@ def medley_clips():
     clip = awkward(seed=7, branches=9, longest=8, frames=90, roots=1, shape="stem", motion="sway")
 
     def part(start, stop, time):
-        return MotionClip(
-            clip.block(start, stop),
-            time,
-            clip.vertex_branch,
-            clip.branch_parent,
-            stem_index=clip.stem_index,
-            rest=clip.source_rest,
-            metadata={"unit": "m", "from": start},
-        )
+        metadata = {"unit": "m", "from": start}
+        return clip.replace(positions=clip.block(start, stop), time=time, metadata=metadata)
 
     return {
         "calm": athcodec.looped(part(0, 20, np.arange(20) / 30)),
@@ -255,6 +246,14 @@ def full_ath(full_clip, tmp_path_factory):
     tam = athcodec.Thresholds(0, 0, 0, 0)  # with modes, whatever is smaller
     athcodec.encode(full_clip, path, rel_error=1e-4, segment_frames=16, tam=tam, ladder="none", rest_error="bound")
     return path
+
+
+@pytest.fixture(scope="session")
+def predicted_ath(full_clip, tmp_path_factory):
+    """The full clip in two segments of predicted motion."""
+    path = tmp_path_factory.mktemp("predicted") / "full.ath"
+    options = {"segment_frames": 16, "ladder": "none", "rest_error": "bound"}
+    return athcodec.encode(full_clip, path, rel_error=1e-4, **options).path
 
 
 @pytest.fixture(scope="session")

@@ -105,6 +105,11 @@ def opened(data: bytes, **options) -> athcodec.Decoder:
     return athcodec.open(BytesIO(data), **options)
 
 
+def coded(clip: athcodec.MotionClip, path: Path, **options) -> athcodec.Decoder:
+    """The clip encoded to a file, which is opened strictly."""
+    return athcodec.open(athcodec.encode(clip, path, **options).path, strict=True)
+
+
 # ---- files made from nothing ----
 
 

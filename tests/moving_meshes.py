@@ -6,8 +6,8 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
+from plants import ring_quads
 
-import athcodec
 from athcodec.errors import ClipError
 from athcodec.motion.clip import MotionClip
 
@@ -30,53 +30,21 @@ def mixed_clip(frames: int = 6, dtype: object = np.float32, fps: float = 24.0, s
         "part_vertex_counts": np.array([5, 3], np.int32),
         "uv": np.random.default_rng(1).random((len(corners), 2)).astype(np.float32),
     }
-    domains = {
-        "face_vertex_counts": "face",
-        "face_vertex_indices": "corner",
-        "uv": "corner",
-        "part_vertex_counts": "constant",
-    }
-    metadata = {
-        "fps": fps,
-        "start_frame": start,
-        "part_names": ["leaf", "twig"],
-        "part_kinds": ["mesh", "curves"],
-        "domains": domains,
-    }
-    return MotionClip(
-        swaying(POINTS, frames, dtype),
-        np.arange(frames) / fps,
-        edges=np.array([[5, 6], [6, 7]]),
-        attributes=attributes,
-        metadata=metadata,
-    )
+    domains = {"face_vertex_counts": "face", "face_vertex_indices": "corner", "uv": "corner"}
+    metadata = {"fps": fps, "start_frame": start, "part_names": ["leaf", "twig"], "part_kinds": ["mesh", "curves"]}
+    metadata["domains"] = domains | {"part_vertex_counts": "constant"}
+    more = {"edges": np.array([[5, 6], [6, 7]]), "attributes": attributes, "metadata": metadata}
+    return MotionClip(swaying(POINTS, frames, dtype), np.arange(frames) / fps, **more)
 
 
 def quad_clip(frames: int = 6, dtype: object = np.float32, rings: int = 6) -> MotionClip:
     """A tube of quads, one object."""
     angle = np.linspace(0, 2 * np.pi, 5)[:-1]
     rest = np.array([[np.cos(a), 0.7 * ring, np.sin(a)] for ring in range(rings) for a in angle])
-    faces = np.array(
-        [
-            [4 * r + i, 4 * r + (i + 1) % 4, 4 * r + 4 + (i + 1) % 4, 4 * r + 4 + i]
-            for r in range(rings - 1)
-            for i in range(4)
-        ],
-        np.int32,
-    )
-    return MotionClip(
-        swaying(rest, frames, dtype),
-        np.arange(frames) / 24,
-        faces=faces,
-        attributes={"part_vertex_counts": np.array([len(rest)], np.int32)},
-        metadata={
-            "fps": 24.0,
-            "start_frame": 1,
-            "part_names": ["tube"],
-            "part_kinds": ["mesh"],
-            "domains": {"part_vertex_counts": "constant"},
-        },
-    )
+    parts = {"part_names": ["tube"], "part_kinds": ["mesh"], "domains": {"part_vertex_counts": "constant"}}
+    more = {"attributes": {"part_vertex_counts": np.array([len(rest)], np.int32)}, "faces": ring_quads(rings, 4)}
+    metadata = {"fps": 24.0, "start_frame": 1} | parts
+    return MotionClip(swaying(rest, frames, dtype), np.arange(frames) / 24, metadata=metadata, **more)
 
 
 def assert_same_motion(got: MotionClip, wanted: MotionClip, tolerance: float = 0.0) -> None:
@@ -101,12 +69,6 @@ def assert_same_mesh(got: MotionClip, wanted: MotionClip) -> None:
 def on_one_branch(clip: MotionClip) -> MotionClip:
     """The clip as the encoder takes it."""
     return clip.replace(vertex_branch=np.zeros(clip.vertex_count, np.int32), branch_parent=np.array([-1]))
-
-
-def coded(clip: MotionClip, folder: Path, rel_error: float = 1e-4) -> Path:
-    path = folder / "coded.ath"
-    athcodec.encode(on_one_branch(clip), path, rel_error=rel_error)
-    return path
 
 
 def damaged(data: bytes, seed: int = 0, cuts: int = 25, changes: int = 40) -> Iterator[bytes]:

@@ -277,8 +277,20 @@ def runs_of_points(
     return clip_of(moved, moved[0], branch[vertices], np.full(len(counts), -1), stem_index=place[vertices])
 
 
+def ring_quads(rings: int, around: int) -> np.ndarray:
+    """(F, 4) of a tube whose vertices go ring by ring."""
+    ring, side, following = np.arange(rings - 1)[:, None] * around, np.arange(around), np.roll(np.arange(around), -1)
+    corners = [ring + side, ring + following, ring + around + following, ring + around + side]
+    return np.stack(corners, axis=-1).reshape(-1, 4).astype(np.int32)
+
+
+def distance(a: np.ndarray, b: np.ndarray) -> float:
+    """The largest of any vertex in any frame."""
+    return float(np.linalg.norm(np.asarray(a, np.float64) - b, axis=-1).max())
+
+
 def diagonal(clip: MotionClip) -> float:
-    return float(np.linalg.norm(np.ptp(clip.positions.reshape(-1, 3).astype(np.float64), axis=0)))
+    return float(np.linalg.norm(np.ptp(clip.block(0, clip.frame_count).reshape(-1, 3).astype(np.float64), axis=0)))
 
 
 def bound_for(clip: MotionClip, fraction: float) -> float:
@@ -288,7 +300,7 @@ def bound_for(clip: MotionClip, fraction: float) -> float:
     return max(fraction * diagonal(clip), 3 * least_bound(low, high, clip.dtype), 1e-6 * away)
 
 
-def _turns(angles: np.ndarray) -> np.ndarray:
+def turns(angles: np.ndarray) -> np.ndarray:
     """(..., 3, 3) rotations of rotation vectors (..., 3)."""
     size = np.linalg.norm(angles, axis=-1)[..., None, None] + 1e-12
     x, y, z = np.moveaxis(angles, -1, 0)
@@ -315,7 +327,7 @@ def blown_tree(seed: int, branches: int = 120, frames: int = 120, lean: float = 
         length = 8.0 if b == 0 else rng.uniform(0.1, 1.5)
         rate, phase = rng.uniform(0.2, 4.0, 3), rng.uniform(0.0, 6.0, 3)
         swing = rng.uniform(0.0, sway) * np.sin(2 * np.pi * rate * time[:, None] + phase)
-        turn = _turns(swing + rng.uniform(0.0, 0.4 if b else 0.08) * wind)
+        turn = turns(swing + rng.uniform(0.0, 0.4 if b else 0.08) * wind)
         turned.append(turned[parent[b]] @ turn if b else turn)
         hold = first[parent[b]] + rng.integers(counts[parent[b]]) if b else 0
         along = np.arange(count) + (b > 0)
@@ -337,8 +349,6 @@ def bending_tube() -> MotionClip:
     clip = tube(40, 12, 30)
     clip.positions = clip.positions * np.float32(1)
     clip.positions[..., 0] += (np.arange(30, dtype=np.float32) / 29)[:, None] * np.float32(0.06) * clip.rest[:, 2] ** 2
-    rings, around = 12 * np.arange(39)[:, None], np.arange(12)[None]
-    corners = [rings + around, rings + (around + 1) % 12, rings + 12 + (around + 1) % 12, rings + 12 + around]
-    clip.faces = np.stack(corners, axis=-1).reshape(-1, 4).astype(np.int32)
+    clip.faces = ring_quads(40, 12)
     clip.check()
     return clip

@@ -8,6 +8,7 @@ from itertools import product
 
 import numpy as np
 import pytest
+from plants import clip_of
 
 from athcodec.encoding import survey as ath_module
 from athcodec.encoding.survey import Ath, Gaps, build_ath, survey
@@ -26,16 +27,8 @@ def rotations(count: int, seed: int = 0) -> np.ndarray:
     return q * np.sign(np.linalg.det(q))[:, None, None]
 
 
-def make_clip(
-    rest: np.ndarray, positions: np.ndarray, vertex_branch: np.ndarray, branch_parent: list[int]
-) -> MotionClip:
-    return MotionClip(
-        positions=positions,
-        time=np.arange(len(positions)) / 30,
-        rest=rest,
-        vertex_branch=vertex_branch,
-        branch_parent=np.array(branch_parent),
-    )
+def make_clip(rest: np.ndarray, positions: np.ndarray, vertex_branch: np.ndarray, branch_parent: list) -> MotionClip:
+    return clip_of(positions, rest, vertex_branch, np.array(branch_parent), np.float64)
 
 
 def bushy_clip(noise: float, seed: int = 1) -> MotionClip:
@@ -359,19 +352,6 @@ def test_of_a_chain_of_two_thousand_branches_only_the_subtrees_above_the_depth_l
     assert ath.height == 29 and ath.node_count == 30 and ath.whole[-1]
 
 
-class CountedFrames:
-    """Positions that count how often each frame is read."""
-
-    def __init__(self, positions: np.ndarray) -> None:
-        self._positions = positions
-        self.shape, self.dtype = positions.shape, positions.dtype
-        self.reads = np.zeros(len(positions), int)
-
-    def __getitem__(self, frames: slice) -> np.ndarray:
-        self.reads[frames] += 1
-        return self._positions[frames]
-
-
 def ancestors(ath: Ath, node: int) -> list[int]:
     above = []
     while (node := int(ath.node_parent[node])) >= 0:
@@ -412,42 +392,6 @@ def test_a_survey_accepts_what_tam_accepts_by_its_definition(xi, lam, monkeypatc
     assert len(results) > 1
 
 
-def test_one_reading_serves_any_number_of_bounds(sample_clip):
-    clip = make_clip(
-        sample_clip.rest,
-        sample_clip.block(0, sample_clip.frame_count),
-        sample_clip.vertex_branch,
-        sample_clip.branch_parent,
-    )
-    clip.positions = CountedFrames(clip.positions)
-    surveyed = survey(clip)
-    sizes = []
-    for part in (1e-6, 1e-3, 3e-3, 1e-2, 3e-2, 1.0):
-        bound = part * surveyed.diagonal
-        ath = surveyed.ath(Thresholds(bound, 0, bound, 0))
-        np.testing.assert_array_equal(ath.node_branch, build_ath(sample_clip, max_error=bound).node_branch)
-        sizes.append(ath.node_count)
-    assert len(set(sizes)) >= 3
-    assert (clip.positions.reads == 1).all()
-
-
-def test_a_survey_measures_the_extent_and_the_motion_of_all_frames(sample_clip):
-    surveyed = survey(sample_clip)
-    positions = sample_clip.block(0, sample_clip.frame_count).astype(float)
-    low, high = positions.min(axis=(0, 1)), positions.max(axis=(0, 1))
-    np.testing.assert_array_equal((surveyed.low, surveyed.high), (low, high))
-    assert surveyed.low.dtype == surveyed.high.dtype == np.float64
-    assert surveyed.diagonal == pytest.approx(np.linalg.norm(high - low))
-    assert surveyed.rms_motion == pytest.approx(rms(positions - sample_clip.rest))
-    assert surveyed.frame_count == sample_clip.frame_count
-
-
-def test_the_extent_does_not_depend_on_the_depth_limit(sample_clip):
-    shallow, deep = survey(sample_clip, max_depth=0), survey(sample_clip)
-    assert (shallow.diagonal, shallow.rms_motion) == (deep.diagonal, deep.rms_motion)
-    assert shallow.ath(Thresholds(0.0, 0, 0.0, 0)).node_count == 1
-
-
 def test_thresholds_that_were_not_surveyed_are_refused():
     clip = bushy_clip(noise=0.1)
     plain, wide = survey(clip), survey(clip, lam=2, xi=0.2, eta=3)
@@ -461,23 +405,3 @@ def test_thresholds_that_were_not_surveyed_are_refused():
             surveyed.ath(thresholds)
     assert wide.ath(Thresholds(0.0, 0, 0.3, 0)).node_count == 6
     assert plain.ath(Thresholds(0.0, FRAMES, np.inf, 0)).node_count == 1
-
-
-@pytest.mark.parametrize(
-    "arguments",
-    [{"lam": 1}, {"lam": -1}, {"eta": -1}, {"max_depth": -1}, {"lam": 1, "xi": -1.0}, {"lam": 1, "xi": np.nan}],
-)
-def test_surveys_of_unusable_thresholds_are_refused_before_anything_is_read(arguments):
-    clip = bushy_clip(noise=0.0)
-    clip.positions = CountedFrames(clip.positions)
-    with pytest.raises(ValueError, match="got"):
-        survey(clip, **arguments)
-    assert not clip.positions.reads.any()
-
-
-def test_progress_of_a_survey_rises_to_one(sample_clip, monkeypatch):
-    monkeypatch.setattr("athcodec.encoding.survey._WORK_VERTICES", 7 * 1001)
-    fractions = []
-    survey(sample_clip, progress=fractions.append)
-    assert len(fractions) > 10 and fractions[-1] == 1.0
-    assert fractions == sorted(fractions) and fractions[0] > 0.0

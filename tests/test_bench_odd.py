@@ -12,39 +12,26 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-ROOT = Path(__file__).resolve().parent.parent
-sys.path.append(str(ROOT))  # for bench, which is not installed; athcodec stays the installed one
+import athcodec
+from athcodec.motion.hierarchy import hierarchy_of
+from bench import compare, data, odd, rd
+from bench.codecs import Source, check, simple
+from bench.codecs.program import CannotKeep
+from bench.odd import growing
+from bench.odd.bending import Bones, moved_tree, scanned_tree, swaying_tree
+from bench.odd.grass import grass
+from bench.odd.others import captured_stem, still_mesh, tumbling_cube
+from bench.store import read
+from bench.trees.plant import grow
 
-import athcodec  # noqa: E402
-from athcodec.motion.hierarchy import hierarchy_of  # noqa: E402
-from bench import compare, data, odd, rd  # noqa: E402
-from bench.codecs import Source, check, simple  # noqa: E402
-from bench.codecs.program import CannotKeep  # noqa: E402
-from bench.odd import growing  # noqa: E402
-from bench.odd.bending import Bones, moved_tree, scanned_tree, swaying_tree  # noqa: E402
-from bench.odd.grass import grass  # noqa: E402
-from bench.odd.others import captured_stem, still_mesh, tumbling_cube  # noqa: E402
-from bench.store import read  # noqa: E402
-from bench.trees.plant import grow  # noqa: E402
+ROOT = Path(__file__).resolve().parent.parent
 
 pytestmark = pytest.mark.tools
 
-SHAPES = {
-    "growth": (120, 1001),
-    "growth_in_wind": (120, 1001),
-    "unfolding": (120, 1141),
-    "grass": (160, 5600),
-    "grass_shuffled": (160, 5600),
-    "capture": (2000, 31),
-    "capture_long": (6000, 31),
-    "calm": (100, 4000),
-    "few_7": (7, 11666),
-    "few_9": (9, 7207),
-    "one_frame": (1, 8322),
-    "morph": (225, 1528),
-    "vertex": (100, 1),
-    "cube": (127, 24),
-}
+SHAPES = {"growth": (120, 1001), "growth_in_wind": (120, 1001), "unfolding": (120, 1141), "grass": (160, 5600)}
+SHAPES |= {"grass_shuffled": (160, 5600), "capture": (2000, 31), "capture_long": (6000, 31), "calm": (100, 4000)}
+SHAPES |= {"few_7": (7, 11666), "few_9": (9, 7207), "one_frame": (1, 8322), "morph": (225, 1528)}
+SHAPES |= {"vertex": (100, 1), "cube": (127, 24)}
 
 
 def digest(clip):
@@ -318,14 +305,9 @@ def test_the_best_of_all_others_is_named_and_files_that_broke_their_bound_do_not
 def test_the_suite_prints_one_table_of_its_clips_with_sizes_that_were_checked(tmp_path):
     file = tmp_path / "result.json"
     words = ["rd", "vertex", "--suite", "odd-quick", "--bounds", "1e-3", "--json", str(file)]
-    done = subprocess.run(
-        [sys.executable, "-m", "bench", *words],
-        cwd=ROOT,
-        text=True,
-        capture_output=True,
-        timeout=300,
-        env=os.environ | {data.FOLDER_VARIABLE: str(tmp_path)},
-    )
+    environment = os.environ | {data.FOLDER_VARIABLE: str(tmp_path)}
+    command = [sys.executable, "-m", "bench", *words]
+    done = subprocess.run(command, cwd=ROOT, text=True, capture_output=True, timeout=300, env=environment)
     assert done.returncode == 0, done.stderr
     sizes = {point["codec"]: point["bytes"] for point in read(file)["points"]}
     assert set(sizes) == set(rd.CODECS["odd-quick"])

@@ -13,13 +13,11 @@ import pytest
 
 from athcodec.motion.clip import MotionClip
 from athcodec.sources import read_hdf5, sample_path
+from bench.codecs import BoundBroken, Source, check
+from bench.codecs.program import CannotKeep, Grid
+from bench.codecs.programs import CLASSES, PROGRAMS, lossless
 
 ROOT = Path(__file__).resolve().parent.parent
-sys.path.append(str(ROOT))  # for bench, which is not installed; athcodec stays the installed one
-
-from bench.codecs import BoundBroken, Source, check  # noqa: E402
-from bench.codecs.program import CannotKeep, Grid  # noqa: E402
-from bench.codecs.programs import CLASSES, PROGRAMS, lossless  # noqa: E402
 
 pytestmark = pytest.mark.tools
 
@@ -38,13 +36,7 @@ def interleaved(clip, seed):
     order = np.empty(len(branch), int)
     order[np.argsort(labels, kind="stable")] = np.argsort(branch, kind="stable")
     positions = clip.block(FRAMES.start, FRAMES.stop)[:, kept][:, order]
-    return MotionClip(
-        positions=positions,
-        time=clip.time[FRAMES],
-        vertex_branch=labels,
-        branch_parent=clip.branch_parent[:BRANCHES],
-        rest=clip.rest[kept][order],
-    )
+    return MotionClip(positions, clip.time[FRAMES], labels, clip.branch_parent[:BRANCHES], clip.rest[kept][order])
 
 
 @pytest.fixture(scope="module")

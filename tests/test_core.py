@@ -1,39 +1,23 @@
 """What an engine that calls the C core relies on (ath.h): sizes that are enough and checked, bytes in any order,
-levels and times that mean what the header says, and the same bits in whatever order frames are decoded.
-
-The functions are declared here from the header alone, as a program would, apart from the package's own binding.
-"""
+levels and times that mean what the header says, and the same bits in whatever order frames are decoded."""
 
 from __future__ import annotations
 
 import ctypes
 import itertools
 import re
-import threading
-from ctypes import (
-    POINTER,
-    byref,
-    c_char_p,
-    c_double,
-    c_int,
-    c_int32,
-    c_size_t,
-    c_uint8,
-    c_uint16,
-    c_uint32,
-    c_uint64,
-    c_void_p,
-)
+from concurrent.futures import ThreadPoolExecutor
+from ctypes import byref, c_int32, c_size_t, c_void_p
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from files import Parts, draft_of, with_header
+from header import Chunk, Clip, Fade, Fault, Info, Limits, Part, Range, core
 from plants import awkward
 
 import athcodec
 from athcodec import errors
-from athcodec._library import load_library
 from athcodec.decoding import container as ct
 from athcodec.encoding.search import Search
 from athcodec.encoding.segment import Settings
@@ -44,172 +28,6 @@ FILE_ORDER, SOURCE_ORDER = 0, 1
 CLAMP, LOOP, PING_PONG, AS_MARKED = 0, 1, 2, 3
 GUARD = 0xA5
 LADDER = (1e-2, 1e-3)
-
-
-class Info(ctypes.Structure):
-    _fields_ = [
-        ("file_length", c_uint64),
-        ("prelude_length", c_uint64),
-        ("max_error", c_double),
-        ("origin", c_double * 3),
-    ]
-    _fields_ += [
-        (name, c_int32)
-        for name in (
-            "vertex_count branch_count frame_count segment_count clip_count "
-            "level_count full_level_count layer_count depth_levels node_count chunk_count "
-            "is_float64"
-        ).split()
-    ]
-    _fields_ += [
-        ("rest_is_float64", c_int32),
-        ("rest_is_host", c_int32),
-        ("host_checksum", c_uint32 * 2),
-        ("is_predicted", c_int32),
-    ]
-
-
-class Clip(ctypes.Structure):
-    _fields_ = [("name", c_char_p), ("duration", c_double)]
-    _fields_ += [
-        (name, c_int32) for name in ("first_frame frame_count first_segment segment_count loop reserved").split()
-    ]
-
-
-class Limits(ctypes.Structure):
-    _fields_ = [
-        (name, c_uint32)
-        for name in ("chunks table_bytes vertices branches frames hierarchy_depth chunk_bytes reserved").split()
-    ] + [("memory_bytes", c_uint64)]
-
-
-class Range(ctypes.Structure):
-    _fields_ = [("offset", c_uint64), ("size", c_uint64)]
-
-
-class Part(ctypes.Structure):
-    _fields_ = [(name, c_int32) for name in ("first", "count", "branch", "index")]
-
-
-class Chunk(ctypes.Structure):
-    _fields_ = [
-        ("bytes", c_void_p),
-        ("offset", c_uint64),
-        ("length", c_uint32),
-        ("checksum", c_uint32),
-        ("segment", c_uint32),
-        ("kind", c_uint16),
-        ("level", c_uint8),
-        ("reserved", c_uint8),
-    ]
-
-
-class Fault(ctypes.Structure):
-    _fields_ = [
-        ("code", c_int32),
-        ("field", c_int32),
-        ("chunk", c_int32),
-        ("kind", c_uint16),
-        ("level", c_uint8),
-        ("reserved", c_uint8),
-        ("segment", c_uint32),
-        ("offset", c_uint64),
-        ("found", c_double),
-        ("least", c_double),
-        ("most", c_double),
-    ]
-
-
-class Blend(ctypes.Structure):
-    _fields_ = [("frame", c_int32 * 2), ("segment", c_int32 * 2), ("weight", c_double)]
-
-
-class Fade(ctypes.Structure):
-    _fields_ = [("count", c_int32), ("level", c_int32 * 4), ("weight", c_double * 4), ("passed", c_double * 4)]
-
-    @property
-    def weights(self) -> dict[int, float]:
-        """Of the levels; one may be there twice."""
-        found: dict[int, float] = {}
-        for level, weight in zip(self.level[: self.count], self.weight):
-            found[level] = found.get(level, 0.0) + weight
-        return found
-
-
-_SHOW = [c_void_p, POINTER(c_void_p), c_int32, c_double]
-_SIGNATURES = {
-    "ath_result_name": (c_char_p, [c_int]),
-    "ath_default_limits": (None, [POINTER(Limits)]),
-    "ath_front": (c_int, [c_void_p, c_size_t, POINTER(Limits), POINTER(c_size_t), POINTER(c_size_t), POINTER(Fault)]),
-    "ath_open": (c_int, [c_void_p, c_size_t, c_void_p, c_size_t, POINTER(Limits), POINTER(Fault)]),
-    "ath_fault_text": (c_size_t, [POINTER(Fault), c_char_p, c_size_t]),
-    "ath_set_host_mesh": (c_int, [c_void_p, c_void_p, c_size_t, c_int32, POINTER(Fault)]),
-    "ath_build_size": (c_size_t, [c_void_p]),
-    "ath_build": (c_int, [c_void_p, c_void_p, c_size_t]),
-    "ath_refine_size": (c_int, [c_void_p, c_int32, POINTER(c_size_t), POINTER(Fault)]),
-    "ath_refine": (c_int, [c_void_p, c_int32, c_void_p, c_size_t]),
-    "ath_get_info": (None, [c_void_p, POINTER(Info)]),
-    "ath_vertex_source": (POINTER(c_int32), [c_void_p]),
-    "ath_times": (POINTER(c_double), [c_void_p]),
-    "ath_clips": (POINTER(Clip), [c_void_p]),
-    "ath_clip_named": (c_int32, [c_void_p, c_char_p]),
-    "ath_seam_error": (c_double, [c_void_p, c_int32, c_int32]),
-    "ath_rest": (c_int, [c_void_p, c_int, c_void_p, c_size_t]),
-    "ath_level_rest": (c_int, [c_void_p, c_int32, c_int, c_void_p, c_size_t]),
-    "ath_level_error": (c_double, [c_void_p, c_int32, c_int32, c_int32, c_int]),
-    "ath_segment_start": (c_int32, [c_void_p, c_int32]),
-    "ath_segment_of": (c_int32, [c_void_p, c_int32]),
-    "ath_chunks": (POINTER(Chunk), [c_void_p]),
-    "ath_work_fault": (None, [c_void_p, POINTER(Fault)]),
-    "ath_feed": (None, [c_void_p, c_void_p, c_uint64, c_size_t]),
-    "ath_drop": (None, [c_void_p, c_uint64, c_uint64]),
-    "ath_ranges": (c_int32, [c_void_p, c_int32, c_int32, c_int32, c_int, c_void_p, c_int32]),
-    "ath_ready_level": (c_int32, [c_void_p, c_int32]),
-    "ath_follow": (c_int, [c_void_p, c_void_p]),
-    "ath_joined_to": (c_int32, [c_void_p, c_int32, c_int32]),
-    "ath_joins": (c_void_p, [c_void_p]),
-    "ath_repeats": (c_void_p, [c_void_p]),
-    "ath_cut_size": (None, [c_void_p, c_int32, *[POINTER(c_int32)] * 3]),
-    "ath_cut": (None, [c_void_p, c_int32, POINTER(Part)]),
-    "ath_work_size": (c_size_t, [c_void_p]),
-    "ath_segment_size": (c_size_t, [c_void_p, c_int32]),
-    "ath_prepare_start": (c_int, [c_void_p, c_size_t, c_void_p, c_int32, c_int32, c_void_p, c_size_t]),
-    "ath_prepare_step": (c_int, [c_void_p, c_int32]),
-    "ath_prepare_to": (c_int, [c_void_p, c_void_p]),
-    "ath_prepare_steps": (c_int32, [c_void_p, c_int32, c_int32]),
-    "ath_prepare": (c_int, [c_void_p, c_size_t, c_void_p, c_int32, c_int32, c_void_p, c_size_t]),
-    "ath_keep_size": (c_size_t, [c_void_p, c_int32]),
-    "ath_keep": (c_int, [c_void_p, c_void_p, c_size_t]),
-    "ath_kept_size": (c_size_t, [c_void_p]),
-    "ath_goes_on": (c_int, [*[c_void_p] * 3, c_int32]),
-    "ath_prepare_onward": (c_int, [c_void_p, c_size_t, *[c_void_p] * 3, c_int32, c_void_p, c_size_t]),
-    "ath_onward_ranges": (c_int32, [c_void_p, *[c_int32] * 4, c_int, c_void_p, c_int32]),
-    "ath_segment_index": (c_int32, [c_void_p]),
-    "ath_segment_level": (c_int32, [c_void_p]),
-    "ath_frame_at": (c_double, [c_void_p, c_int32, c_double, c_int]),
-    "ath_blend_at": (Blend, [c_void_p, c_double]),
-    "ath_positions": (c_int, [*_SHOW, c_int, c_void_p, c_size_t]),
-    "ath_positions_float64": (c_int, [*_SHOW, c_int, c_void_p, c_size_t]),
-    "ath_matrices": (c_int, [*_SHOW, c_void_p, c_size_t]),
-    "ath_exact": (c_int, [*_SHOW, c_void_p, c_size_t]),
-    "ath_fade_to": (None, [POINTER(Fade), c_int32, c_double]),
-    "ath_fade_cut": (c_int32, [POINTER(Fade)]),
-    "ath_faded_positions": (c_int, [*_SHOW, POINTER(Fade), c_int, c_void_p, c_size_t]),
-    "ath_faded_matrices": (c_int, [*_SHOW, POINTER(Fade), c_void_p, c_size_t]),
-    "ath_faded_exact": (c_int, [*_SHOW, POINTER(Fade), c_void_p, c_size_t]),
-    "ath_level_for": (c_int32, [c_void_p, c_int32, c_int32, c_int, c_double, c_double, c_double, c_double]),
-}
-
-
-def _declared() -> ctypes.CDLL:
-    library = load_library()
-    for name, (result, arguments) in _SIGNATURES.items():
-        function = getattr(library, name)
-        function.restype, function.argtypes = result, arguments
-    return library
-
-
-core = _declared()
 
 
 class Memory:
@@ -338,11 +156,9 @@ class Player:
 
     def try_to_prepare(self, segment: int, level: int, work: Memory, into: Memory, call=core.ath_prepare) -> int:
         refined = self.refine(level)
-        return (
-            refined
-            if refined != OK
-            else call(work.address, work.size, self.address, segment, level, into.address, into.size)
-        )
+        if refined != OK:
+            return refined
+        return call(work.address, work.size, self.address, segment, level, into.address, into.size)
 
     def start(self, segment: int, level: int, work: Memory, into: Memory) -> int:
         return self.try_to_prepare(segment, level, work, into, core.ath_prepare_start)
@@ -379,16 +195,8 @@ class Player:
     def start_onward(self, before: tuple[Memory, Memory], level: int, work: Memory, into: Memory) -> int:
         assert self.refine(level) == OK
         shown, kept = before
-        return core.ath_prepare_onward(
-            work.address,
-            work.size,
-            self.address,
-            shown.address,
-            kept.size and kept.address,
-            level,
-            into.address,
-            into.size,
-        )
+        before = shown.address, kept.size and kept.address
+        return core.ath_prepare_onward(work.address, work.size, self.address, *before, level, into.address, into.size)
 
     def go_on(
         self, before: tuple[Memory, Memory], level: int, joined_to: Memory | None = None
@@ -446,11 +254,6 @@ def player(data) -> Player:
     return Player(data)
 
 
-@pytest.fixture(scope="module")
-def uneven(full_ath) -> Player:
-    return Player(full_ath.read_bytes())
-
-
 # ---- results and memory ----
 
 
@@ -504,15 +307,9 @@ def test_memory_that_is_too_small_or_not_aligned_is_refused_and_not_touched(data
 
 def test_levels_and_segments_that_a_file_does_not_have_are_bad_arguments(player):
     work, segment = player.work(), Memory(max(player.room(level).size for level in player.levels))
-    for index, level in (
-        (-1, 0),
-        (player.info.segment_count, 0),
-        (2**31 - 1, 0),
-        (0, -1),
-        (0, player.info.level_count),
-        (0, 255),
-        (-(2**31), -(2**31)),
-    ):
+    no_segment = [(index, 0) for index in (-1, player.info.segment_count, 2**31 - 1)]
+    no_level = [(0, level) for level in (-1, player.info.level_count, 255)]
+    for index, level in (*no_segment, *no_level, (-(2**31), -(2**31))):
         assert player.start(index, level, work, segment) == BAD_ARGUMENT
 
 
@@ -892,18 +689,13 @@ def test_the_number_of_steps_is_known_before(player):
 def test_threads_prepare_from_one_file_at_the_same_time(player):
     jobs = [(segment, level) for level in player.levels for segment in player.segments]
     alone = {job: player.prepare(*job) for job in jobs}
-    together: list[dict] = [{}, {}]
 
-    def prepare(results, order):
+    def prepare(order) -> dict:
         work = player.work()
-        for job in order:
-            results[job] = player.prepare(*job, work)
+        return {job: player.prepare(*job, work) for job in order}
 
-    threads = [threading.Thread(target=prepare, args=(together[i], jobs[:: 1 - 2 * i])) for i in range(2)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
+    with ThreadPoolExecutor(2) as threads:
+        together = list(threads.map(prepare, (jobs, jobs[::-1])))
     for segment, level in jobs:
         for frame in range(player.start_of(segment), player.start_of(segment + 1)):
             one, *others = [player.frame([done[segment, level]], frame) for done in (alone, *together)]
@@ -1411,11 +1203,6 @@ def test_clips_are_found_by_name_and_follow_each_other(player):
     assert (frame, segment) == (player.info.frame_count, player.info.segment_count)
     for nobody in (b"nobody", b"calm ", b"cal"):
         assert core.ath_clip_named(player.address, nobody) == -1
-
-
-def test_the_times_of_the_uneven_clip_are_uneven(uneven):
-    times = uneven.times_of(uneven.clips[0])
-    assert np.ptp(np.diff(times)) > 1e-4
 
 
 def test_a_loop_blends_the_last_frame_into_the_first(player):

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from plants import plant, runs_of_points
+from plants import plant, ring_quads, runs_of_points, turns
 
 import athcodec
 from athcodec import MotionClip
@@ -132,10 +132,6 @@ def walker(frames: int = 20) -> MotionClip:
     legs = np.abs(np.abs(body[:, 0]) - 0.75) < 0.12
     drop = legs & (body[:, 1] < -0.1)
     body[drop, 1] *= 4
-    ring = np.arange(rings - 1)[:, None] * around
-    side, following = np.arange(around), (np.arange(around) + 1) % around
-    quads = [ring + side, ring + following, ring + around + following, ring + around + side]
-    faces = np.stack(quads, axis=2).reshape(-1, 4)
     time = np.arange(frames) / 30
     positions = np.repeat(body[None], frames, axis=0)
     for front in (-1, 1):
@@ -147,7 +143,7 @@ def walker(frames: int = 20) -> MotionClip:
             positions[:, leg, 1] += (np.cos(swing)[:, None] - 1) * lever
     positions[:, :, 1] += 0.05 * np.sin(2 * np.pi * 3.4 * time)[:, None]
     positions[:, :, 2] += 0.1 * np.sin(3 * body[:, 0] + 4 * time[:, None])
-    return MotionClip(positions.astype(np.float32), time, faces=faces)
+    return MotionClip(positions.astype(np.float32), time, faces=ring_quads(rings, around))
 
 
 @pytest.mark.slow
@@ -382,20 +378,14 @@ def test_leaves_that_touch_and_move_by_themselves_are_branches_of_their_own(tmp_
     base = np.array([[i % 5, i // 5, 0] for i in range(count)], float)
     base[1::2] = base[::2]  # two on each place
     axes = rng.normal(size=(count, 3))
-    turns = [np.stack([about(axis, 0.5 * np.sin(t / 3 + k)) for k, axis in enumerate(axes)]) for t in range(frames)]
-    positions = np.stack([leaf @ turn.swapaxes(1, 2) + base[:, None] for turn in turns]).reshape(frames, -1, 3)
+    axes /= np.linalg.norm(axes, axis=1, keepdims=True)
+    angles = 0.5 * np.sin(np.arange(frames)[:, None] / 3 + np.arange(count))
+    positions = (leaf @ turns(angles[..., None] * axes).swapaxes(2, 3) + base[:, None]).reshape(frames, -1, 3)
     faces = (np.array([[0, 1, 2, 3]]) + 4 * np.arange(count)[:, None]).astype(np.int32)
     clip = MotionClip(positions.astype(np.float32), np.arange(frames) / 30, faces=faces)
     assert len(athcodec.find_branches(clip).branch_parent) == count // 2
     summary = athcodec.encode(clip, tmp_path / "a.ath", rel_error=1e-3)
     assert summary.found_branches.startswith(f"{count} branches by components")
-
-
-def about(axis: np.ndarray, angle: float) -> np.ndarray:
-    """The rotation matrix of an axis and an angle."""
-    x, y, z = axis / np.linalg.norm(axis)
-    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
 
 
 def test_pieces_need_no_scipy_and_are_those_that_hang_together(dressed, monkeypatch):

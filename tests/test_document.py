@@ -15,13 +15,10 @@ from plants import awkward, bush, chain_plant, plant, tube
 
 import athcodec
 from athcodec.errors import FormatError
+from spec.document import File, rules
 
 ROOT = Path(__file__).resolve().parent.parent
 VECTORS = ROOT / "spec" / "vectors" / "valid"
-sys.path.append(str(ROOT))  # for spec, which is not installed; athcodec stays the installed one
-
-from spec.document import File, rules  # noqa: E402
-
 WITH_MODES = athcodec.Thresholds(0, 0, 0, 0)  # whatever is smaller
 LAYERS = {"rel_error": 1e-4, "ladder": (1e-2, 1e-3), "tam": WITH_MODES}
 

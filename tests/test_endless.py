@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from files import coded
+from test_blending import beams
 
 import athcodec
 from athcodec.cli import main
 from athcodec.decoding.endless_play import EndlessPlay
 from athcodec.errors import ClipError
 from athcodec.motion.transitions import transitions_of
-from bench.trees.beams import bend
 from bench.trees.plant import grow
 from bench.trees.wind import Wind
 
@@ -21,23 +22,13 @@ HOUR = 3600.0
 @pytest.fixture(scope="module")
 def tree():
     """A small tree of beams in wind."""
-    plant = grow(300, 2, 8.0, seed=3)
-    return athcodec.MotionClip(
-        bend(plant, Wind(6.0, 8.0, seed=3), FRAMES, FPS),
-        np.arange(FRAMES) / FPS,
-        plant.branch,
-        plant.branch_parent,
-        rest=plant.position.astype(np.float32),
-        edges=plant.edges,
-        attributes={"radius": plant.radius.astype(np.float32)},
-    )
+    return beams(grow(300, 2, 8.0, seed=3), Wind(6.0, 8.0, seed=3), FRAMES)
 
 
 @pytest.fixture(scope="module")
 def tree_ath(tree, tmp_path_factory):
     path = tmp_path_factory.mktemp("endless") / "tree.ath"
-    athcodec.encode(athcodec.endless(tree), path, rel_error=1e-4)
-    return path
+    return athcodec.encode(athcodec.endless(tree), path, rel_error=1e-4).path
 
 
 def _jerk(positions) -> float:
@@ -119,8 +110,7 @@ def test_a_motion_that_does_not_come_back_is_refused():
 def test_each_clip_of_a_file_has_its_own(tree, tmp_path):
     path = tmp_path / "two.ath"
     shorter = tree.replace(positions=tree.positions[:150], time=tree.time[:150])
-    athcodec.encode(athcodec.join({"calm": shorter, "storm": athcodec.endless(tree)}), path, rel_error=1e-2)
-    with athcodec.open(path) as decoder:
+    with coded(athcodec.join({"calm": shorter, "storm": athcodec.endless(tree)}), path, rel_error=1e-2) as decoder:
         assert [clip["transitions"] > 0 for clip in decoder.file.info()["clips"]] == [False, True]
         with pytest.raises(ValueError, match="transitions"):
             decoder.play("calm").endless()

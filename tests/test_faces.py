@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import zstandard
 from files import Parts, opened
+from plants import ring_quads
 from test_rest import cards, simple_bytes, terrain, tubes
 
 import athcodec
@@ -28,10 +29,7 @@ def grid_faces(rows: int, columns: int, quads: bool = False) -> np.ndarray:
 
 
 def tube_faces(count: int, rings: int = 24, around: int = 8) -> np.ndarray:
-    ring, place = np.arange(rings - 1)[:, None] * around, np.arange(around)
-    following = (place + 1) % around
-    one = np.stack([ring + place, ring + following, ring + around + following, ring + around + place], axis=-1)
-    return (one.reshape(-1, 4) + rings * around * np.arange(count)[:, None, None]).reshape(-1, 4)
+    return (ring_quads(rings, around) + rings * around * np.arange(count)[:, None, None]).reshape(-1, 4)
 
 
 def shuffled(points: np.ndarray, faces: np.ndarray, seed: int) -> tuple[np.ndarray, np.ndarray]:
@@ -55,8 +53,7 @@ def still(points: np.ndarray, faces: np.ndarray) -> athcodec.MotionClip:
 
 def encoded(clip: athcodec.MotionClip, **options) -> bytes:
     with tempfile.TemporaryDirectory() as folder:
-        athcodec.encode(clip, Path(folder) / "a.ath", **options)
-        return (Path(folder) / "a.ath").read_bytes()
+        return athcodec.encode(clip, Path(folder) / "a.ath", **options).path.read_bytes()
 
 
 def rest_bytes(data: bytes) -> int:

@@ -9,7 +9,6 @@ from __future__ import annotations
 import io
 import os
 import stat
-import sys
 from contextlib import nullcontext
 from pathlib import Path
 
@@ -23,11 +22,7 @@ from athcodec import cli
 from athcodec.files import atomic as atomic_files
 from athcodec.files.atomic import PendingFile, new_file
 from athcodec.sources import sample_path
-
-ROOT = Path(__file__).resolve().parent.parent
-sys.path.append(str(ROOT))  # for spec, which is not installed; athcodec stays the installed one
-
-from spec.robust import _io_errors, faults  # noqa: E402
+from spec.robust import _io_errors, faults
 
 pytestmark = pytest.mark.tools
 
@@ -297,13 +292,7 @@ class Restless:
 
 def restless(factor: float) -> athcodec.MotionClip:
     source = plant(seed=1, branches=5, longest=4, frames=40)
-    return athcodec.MotionClip(
-        positions=Restless(source.positions, factor),
-        rest=source.rest,
-        time=source.time,
-        vertex_branch=source.vertex_branch,
-        branch_parent=source.branch_parent,
-    )
+    return source.replace(positions=Restless(source.positions, factor))
 
 
 def test_arrays_that_change_a_little_between_two_readings_give_an_intact_file(tmp_path):

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import base64
 import re
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,11 +11,8 @@ import pytest
 import athcodec
 from athcodec import cli
 from athcodec.viewer import view
-
-sys.path.append(str(Path(__file__).parents[1]))  # for bench, which is not installed; athcodec stays the installed one
-
-from bench.throttled_server import ThrottledServer  # noqa: E402
-from bench.trees.tufts import fern, grass  # noqa: E402
+from bench.throttled_server import ThrottledServer
+from bench.trees.tufts import fern, grass
 
 pytestmark = pytest.mark.web
 

@@ -5,7 +5,6 @@ In Chromium, Debian's, without a graphics card; marker `browser`.
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -13,16 +12,13 @@ import pytest
 from plants import bending_tube, blown_tree
 
 import athcodec
-
-sys.path.append(str(Path(__file__).parents[1]))  # for bench, which is not installed; athcodec stays the installed one
-
-from athcodec.decoding.core_file import FILE_ORDER  # noqa: E402
-from athcodec.gpu import GpuFile  # noqa: E402
-from athcodec.gpu.evaluate import Passes, Source  # noqa: E402
-from athcodec.motion.joining import in_wind  # noqa: E402
-from athcodec.viewer.build_viewer import modules  # noqa: E402
-from bench.browser import WEBGPU_FLAGS, chromium  # noqa: E402
-from bench.throttled_server import ThrottledServer  # noqa: E402
+from athcodec.decoding.core_file import FILE_ORDER
+from athcodec.gpu import GpuFile
+from athcodec.gpu.evaluate import Passes, Source
+from athcodec.motion.joining import in_wind
+from athcodec.viewer.build_viewer import modules
+from bench.browser import WEBGPU_FLAGS, chromium
+from bench.throttled_server import ThrottledServer
 
 pytestmark = pytest.mark.browser
 FINEST = "athcodecForest.forest.levels.length === athcodecForest.ath.motion.levelCount"
@@ -39,8 +35,7 @@ def grove(tmp_path_factory):
     """A file of two clips, in segments."""
     path = tmp_path_factory.mktemp("grove") / "grove.ath"
     gale, calm = blown_tree(3, 60, 30), blown_tree(3, 60, 24, sway=0.02)
-    athcodec.encode(athcodec.join({"gale": gale, "calm": calm}), path, rel_error=1e-3, segment_frames=20)
-    return path
+    return athcodec.encode(athcodec.join({"gale": gale, "calm": calm}), path, rel_error=1e-3, segment_frames=20).path
 
 
 @pytest.fixture(scope="module")
@@ -51,8 +46,7 @@ def winds(tmp_path_factory):
         "calm": in_wind(blown_tree(3, 60, 48, sway=0.02), 2.0, 0.0),
         "gale": in_wind(blown_tree(3, 60, 40), 8.0, 0.0),
     }
-    athcodec.encode(athcodec.join(clips), path, rel_error=1e-3, segment_frames=20)
-    return path
+    return athcodec.encode(athcodec.join(clips), path, rel_error=1e-3, segment_frames=20).path
 
 
 @pytest.fixture

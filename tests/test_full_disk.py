@@ -29,12 +29,8 @@ except OSError as error:
 @pytest.mark.parametrize("name", ["a.pc2", "a.mdd", "a.obj", "a.ply", "a.npz", "a.xdmf", "a.pvd", "a.abc"])
 def test_a_full_disk_is_an_error_and_leaves_no_file(tmp_path, name):
     for limit in (3000, 40000):
-        done = subprocess.run(
-            [sys.executable, "-c", WRITE, str(tmp_path / name), str(limit)],
-            capture_output=True,
-            text=True,
-            timeout=120,
-            env=os.environ | {"PYTHONPATH": str(Path(__file__).parent)},
-        )
+        command = [sys.executable, "-c", WRITE, str(tmp_path / name), str(limit)]
+        environment = os.environ | {"PYTHONPATH": str(Path(__file__).parent)}
+        done = subprocess.run(command, capture_output=True, text=True, timeout=120, env=environment)
         assert (done.returncode, done.stdout.strip()) == (0, str(tmp_path / name)), done.stderr[-2000:]
         assert os.listdir(tmp_path) == []

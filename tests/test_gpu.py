@@ -4,14 +4,13 @@ NumPy and, with the marker `browser`, by the shaders in Chromium (Debian's, with
 from __future__ import annotations
 
 import base64
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
 from moving_meshes import leafed_tree
-from plants import blown_tree, bush, chain_plant
+from plants import blown_tree, bush, chain_plant, distance
 from test_blending import simulated
 from test_tubes import twigs
 
@@ -20,10 +19,8 @@ from athcodec.decoding.core_file import FILE_ORDER, CoreError
 from athcodec.gpu import SHADERS, GpuFile, Room, corners_of
 from athcodec.gpu.evaluate import BODY, LEVEL, SEGMENT, Passes, Source, head, section
 from athcodec.sources import sample_path
-
-sys.path.append(str(Path(__file__).parents[1]))  # for bench and spec; athcodec stays the installed one
-from bench.browser import WEBGPU_FLAGS, chromium  # noqa: E402
-from spec.robust.hostile import repaired  # noqa: E402
+from bench.browser import WEBGPU_FLAGS, chromium
+from spec.robust.hostile import repaired
 
 pytestmark = pytest.mark.web
 
@@ -62,10 +59,6 @@ class Checked:
         corners = np.array([np.min(every, axis=(0, 1)), np.max(every, axis=(0, 1))])
         diagonal = float(np.linalg.norm(corners[1] - corners[0]))
         return max(SHARE_OF_BOUND * self.info.max_error, SHARE_OF_DIAGONAL * diagonal)
-
-
-def distance(a: np.ndarray, b: np.ndarray) -> float:
-    return float(np.sqrt(((a - b) ** 2).sum(-1)).max())
 
 
 def loaded(path_or_clip, path: Path, **options) -> Checked:

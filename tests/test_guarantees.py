@@ -7,27 +7,15 @@ import re
 
 import numpy as np
 import pytest
-from plants import tube
+from plants import ring_quads, tube
 
 import athcodec
 from athcodec import ClipView, MotionClip
 from athcodec.errors import ClipError
 
 RATE = 24000 / 1001
-FORMATS = {
-    "hdf5": "a.h5",
-    "npz": "a.npz",
-    "usdc": "a.usdc",
-    "usda": "a.usda",
-    "alembic": "a.abc",
-    "gltf": "a.glb",
-    "pc2": "a.pc2",
-    "mdd": "a.mdd",
-    "obj": "a.obj",
-    "ply": "a.ply",
-    "xdmf": "a.xdmf",
-    "pvd": "a.pvd",
-}
+FORMATS = {"hdf5": "a.h5", "npz": "a.npz", "usdc": "a.usdc", "usda": "a.usda", "alembic": "a.abc", "gltf": "a.glb"}
+FORMATS |= {name: f"a.{name}" for name in ("pc2", "mdd", "obj", "ply", "xdmf", "pvd")}
 NUMBERED = {"obj", "ply"}  # a file per frame
 
 NO_RATE = {"pc2", "obj", "ply", "pvd"}  # frames have numbers or times there, but no rate: who reads has to give it
@@ -47,23 +35,24 @@ def tiered(names) -> list:
 def clip() -> MotionClip:
     """A tube in centimetres with z up at 23.976 frames per second, whose first frame is number 1001."""
     made = tube(rings=8, around=6, frames=9)
-    ring, side = 6 * np.arange(7)[:, None], np.arange(6)
-    corners = [ring + side, ring + (side + 1) % 6, ring + 6 + (side + 1) % 6, ring + 6 + side]
-    quads = np.stack(corners, axis=2).reshape(-1, 4).astype(np.int32)
     weights = np.linspace(1, 2, made.vertex_count).astype(np.float32)
     return dataclasses.replace(
         made,
         time=np.arange(9) / RATE,
-        faces=quads,
+        faces=ring_quads(8, 6),
         rest=made.rest.astype(np.float32),
         attributes={"uv": np.random.default_rng(0).random((made.vertex_count, 2)).astype(np.float32), "slack": weights},
         metadata={"unit": "cm", "up_axis": "z", "fps": RATE, "start_frame": 1001},
     )
 
 
+def write(clip, path) -> None:
+    athcodec.write(clip, path, **({"animation": "morphs"} if path.suffix == ".glb" else {}))
+
+
 def there_and_back(clip, folder, name: str) -> MotionClip:
     path = folder / FORMATS[name]
-    athcodec.write(clip, path, **({"animation": "morphs"} if name == "gltf" else {}))
+    write(clip, path)
     given = {"fps": RATE} if name in NO_RATE else {}
     return athcodec.read(min(folder.glob("a_*.*")) if name in NUMBERED else path, **given)
 
@@ -139,6 +128,15 @@ def test_changing_topology_is_refused_by_the_number_of_its_frame(clip, tmp_path,
     with pytest.raises(ClipError, match=rf"a_1004.{kind}: got .*topology that changes"):
         with athcodec.read(tmp_path / f"a_1001.{kind}") as again:
             again.block(0, 9)
+
+
+@pytest.mark.parametrize("name", tiered(FORMATS))
+def test_a_failed_write_leaves_no_file(clip, tmp_path, name):
+    positions = clip.block(0, 9).copy()
+    positions[5, 0, 0] = np.nan
+    with pytest.raises(ClipError, match="frame 5"):
+        write(clip.replace(positions=positions), tmp_path / FORMATS[name])
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_every_format_of_the_table_is_tried_here():

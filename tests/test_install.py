@@ -206,17 +206,8 @@ def engine(installed, tmp_path_factory) -> Path:
     """The build folder of a project that uses the installed decoder through find_package."""
     project = tmp_path_factory.mktemp("engine")
     write_project(project, f"find_package(athcodec {athcodec.__version__} REQUIRED)")
-    run(
-        "cmake",
-        "-G",
-        "Ninja",
-        "-S",
-        project,
-        "-B",
-        project / "build",
-        f"-DCMAKE_PREFIX_PATH={installed}",
-        "-DCMAKE_BUILD_TYPE=Release",
-    )
+    options = [f"-DCMAKE_PREFIX_PATH={installed}", "-DCMAKE_BUILD_TYPE=Release"]
+    run("cmake", "-G", "Ninja", "-S", project, "-B", project / "build", *options)
     run("cmake", "--build", project / "build")
     return project / "build"
 
@@ -261,12 +252,8 @@ def library_folder(installed: Path) -> Path:
 def test_an_install_holds_the_header_both_libraries_and_both_ways_to_find_them(installed):
     folder = library_folder(installed)
     files = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
-    assert {
-        "libath.a",
-        "pkgconfig/athcodec.pc",
-        "cmake/athcodec/athcodecConfig.cmake",
-        "cmake/athcodec/athcodecConfigVersion.cmake",
-    } <= files
+    found_by_cmake = {f"cmake/athcodec/athcodecConfig{part}.cmake" for part in ("", "Version")}
+    assert {"libath.a", "pkgconfig/athcodec.pc", *found_by_cmake} <= files
     for name in HEADERS:
         assert (installed / "include" / name).read_bytes() == (CORE / "include" / name).read_bytes()
     assert sorted(path.name for path in installed.rglob("*.h")) == sorted(HEADERS)

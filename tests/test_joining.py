@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from plants import distance
 
 import athcodec
 from athcodec import exporters
@@ -15,8 +16,8 @@ from athcodec.errors import BoundError, ClipError, ClipUnavailable
 from athcodec.motion.clip import ClipRange
 
 
-def distance(a: np.ndarray, b: np.ndarray) -> float:
-    return float(np.linalg.norm(np.float64(a) - b, axis=-1).max())
+def part(clip: athcodec.MotionClip, start: int, stop: int) -> athcodec.MotionClip:
+    return clip.replace(positions=clip.block(start, stop), time=clip.time[: stop - start])
 
 
 def test_each_clip_is_found_by_its_name_and_keeps_the_bound(medley_clips, medley_ath):
@@ -66,10 +67,7 @@ def test_an_unknown_name_says_which_there_are(medley_ath, sample_ath):
 
 
 def test_one_file_is_smaller_than_one_for_each_clip(sample_clip, tmp_path):
-    def part(start, stop):
-        return sample_clip.replace(positions=sample_clip.block(start, stop), time=sample_clip.time[: stop - start])
-
-    clips = {f"part{start}": part(start, start + 40) for start in (0, 40, 80)}
+    clips = {f"part{start}": part(sample_clip, start, start + 40) for start in (0, 40, 80)}
     together = athcodec.encode(athcodec.join(clips), tmp_path / "together.ath", rel_error=1e-3)
     apart = [
         athcodec.encode(clip, tmp_path / f"{name}.ath", max_error=together.max_error_bound).bytes
@@ -80,25 +78,15 @@ def test_one_file_is_smaller_than_one_for_each_clip(sample_clip, tmp_path):
 
 @pytest.mark.slow
 def test_the_size_does_not_depend_on_the_order_of_the_clips(medley_clips, tmp_path):
-    names = list(medley_clips)
-    orders = (names, names[::-1], names[1:] + names[:1])
-    sizes = [
-        athcodec.encode(
-            athcodec.join({name: medley_clips[name] for name in order}),
-            tmp_path / "a.ath",
-            max_error=1e-3,
-            segment_frames=16,
-        ).bytes
-        for order in orders
-    ]
+    names, sizes = list(medley_clips), []
+    for order in (names, names[::-1], names[1:] + names[:1]):
+        joined = athcodec.join({name: medley_clips[name] for name in order})
+        sizes.append(athcodec.encode(joined, tmp_path / "a.ath", max_error=1e-3, segment_frames=16).bytes)
     assert max(sizes) - min(sizes) < 0.01 * max(sizes)
 
 
 def test_a_large_plant_is_searched_on_a_part_of_it_in_all_its_clips(sample_clip, tmp_path, monkeypatch):
-    def part(start, stop):
-        return sample_clip.replace(positions=sample_clip.block(start, stop), time=sample_clip.time[: stop - start])
-
-    clips = {"a": part(0, 40), "b": part(40, 120)}
+    clips = {"a": part(sample_clip, 0, 40), "b": part(sample_clip, 40, 120)}
     whole = athcodec.encode(athcodec.join(clips), tmp_path / "a.ath", rel_error=1e-3)
     monkeypatch.setattr("athcodec.encoding.sample.LARGE", 500)
     monkeypatch.setattr("athcodec.encoding.sample.LEAST_SAMPLE", 200)
@@ -185,23 +173,14 @@ def test_a_target_size_is_that_of_all_clips_and_branches_are_found_for_all(medle
 
 def test_clips_of_other_plants_are_refused_by_what_differs(medley_clips):
     calm = medley_clips["calm"]
+    bare = {"branch_parent": None, "vertex_branch": None, "stem_index": None}
+    short = {"positions": calm.block(0, 9)[:, :-1], "time": calm.time[:9], "rest": calm.rest[:-1]}
     other = {
-        "vertices": (
-            {
-                "positions": calm.block(0, 9)[:, :-1],
-                "time": calm.time[:9],
-                "rest": calm.rest[:-1],
-                "clip_ranges": (),
-                "vertex_branch": None,
-                "branch_parent": None,
-                "stem_index": None,
-            },
-            "b: got .* vertices, expected",
-        ),
+        "vertices": (short | bare | {"clip_ranges": ()}, "b: got .* vertices, expected"),
         "rest": ({"rest": calm.rest + 1}, "b: got another rest pose than a .vertex"),
         "faces": ({"faces": np.array([[0, 1, 2]])}, "b: got other faces than a"),
         "attributes": ({"attributes": {"radius": np.ones(3)}}, "b: got another attribute radius than a"),
-        "branches": ({"branch_parent": None, "vertex_branch": None, "stem_index": None}, "b: got other vertex_branch"),
+        "branches": (bare, "b: got other vertex_branch"),
         "clip_ranges": (
             {"clip_ranges": (ClipRange("x", 10), ClipRange("y", 10))},
             "b: got 2 clips in one, expected a single one",

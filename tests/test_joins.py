@@ -81,6 +81,8 @@ def test_at_loose_bounds_no_level_without_corrections_ticks_where_segments_meet(
         athcodec.encode(clip, path, rel_error=1e-2, segment_frames=SEGMENT, ladder="none")
     with athcodec.open(path) as decoder:
         seams = [start for start, _ in decoder.segments[1:]]
+        # Level 1 hardly moves in the last segment, because the search chooses coarse rotations. A join over more frames
+        # than 16 would bend less than 2.35 times as much as a usual frame, but make the level worse than level 0.
         assert max(tick(decoder.positions(level=level), seams) for level in range(decoder.file.level_count - 1)) < 2.4
     assert_the_same_however_one_comes_to_it(path.read_bytes())
 

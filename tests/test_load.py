@@ -6,10 +6,8 @@ long ones.
 
 from __future__ import annotations
 
-import sys
 import threading
 from itertools import count
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,11 +16,7 @@ import athcodec
 from athcodec.decoding import core_file
 from athcodec.decoding.container import Limits
 from athcodec.errors import LimitExceeded
-
-ROOT = Path(__file__).resolve().parent.parent
-sys.path.append(str(ROOT))  # for spec, which is not installed; athcodec stays the installed one
-
-from spec.robust import load  # noqa: E402
+from spec.robust import load
 
 pytestmark = pytest.mark.tools
 

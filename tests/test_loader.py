@@ -11,21 +11,19 @@ import json
 import re
 import shutil
 import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
-from plants import bending_tube, tube
+from files import coded
+from plants import bending_tube, ring_quads, tube
 from programs import CACHE, install_once
 
 import athcodec
 from athcodec.motion.joining import in_wind
+from bench.throttled_server import WEB, ThrottledServer
 
 ROOT = Path(__file__).resolve().parent.parent
-sys.path.append(str(ROOT))  # for bench, which is not installed; athcodec stays the installed one
-
-from bench.throttled_server import WEB, ThrottledServer  # noqa: E402
 
 pytestmark = pytest.mark.web
 
@@ -51,14 +49,10 @@ def run_node(case: str, path: Path, *words):
 def mesh_ath(tmp_path_factory):
     """A tube of quads in three segments."""
     clip = tube(20, 8, 40)
-    rings = np.arange(19)[:, None] * 8
-    around = np.arange(8)[None]
-    corners = [rings + around, rings + (around + 1) % 8, rings + 8 + (around + 1) % 8, rings + 8 + around]
-    clip.faces = np.stack(corners, axis=-1).reshape(-1, 4).astype(np.int32)
+    clip.faces = ring_quads(20, 8)
     clip.check()
     path = tmp_path_factory.mktemp("mesh") / "mesh.ath"
-    athcodec.encode(clip, path, rel_error=1e-3, segment_frames=16)
-    return path
+    return athcodec.encode(clip, path, rel_error=1e-3, segment_frames=16).path
 
 
 # ---- it never stops for good ----
@@ -167,8 +161,7 @@ def test_endless_play_shows_what_the_decoder_in_python_does(sample_clip, tmp_pat
     path = tmp_path / "endless.ath"
     transitions = [[30, 2, 6], [50, 10, 8], [50, 20, 6], [40, 31, 7]]
     clip = sample_clip.replace(metadata=sample_clip.metadata | {"transitions": transitions})
-    athcodec.encode(clip, path, rel_error=1e-3, segment_frames=16)
-    with athcodec.open(path) as decoder:
+    with coded(clip, path, rel_error=1e-3, segment_frames=16) as decoder:
         play = decoder.endless(7)
         seconds = [float(t) for t in np.arange(0, 40, 0.63)]
         wanted = [hashlib.sha256(play.positions(t)).hexdigest() for t in seconds]

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from files import Parts, opened
+from files import Parts, coded, opened
 from plants import clip_of, plant
 
 import athcodec
@@ -13,8 +13,7 @@ from athcodec.errors import BadChunk, BadChunkTable, BadHeader
 
 def encoded(clip, **options) -> bytes:
     path = options.pop("path")
-    athcodec.encode(clip, path, lossless=True, **options)
-    return path.read_bytes()
+    return athcodec.encode(clip, path, lossless=True, **options).path.read_bytes()
 
 
 def bits(array: np.ndarray) -> bytes:
@@ -35,8 +34,7 @@ def test_the_last_level_has_every_bit_of_positions_and_rest_pose(dtype, bound, t
 def test_the_level_before_keeps_the_bound_and_plays_as_without(tmp_path):
     clip = plant(seed=4, branches=9, frames=40)
     lossless = opened(encoded(clip, path=tmp_path / "a.ath", rel_error=1e-4))
-    athcodec.encode(clip, tmp_path / "b.ath", rel_error=1e-4, exact_rest=True)
-    with athcodec.open(tmp_path / "b.ath") as lossy:
+    with coded(clip, tmp_path / "b.ath", rel_error=1e-4, exact_rest=True) as lossy:
         assert lossless.file.level_count == lossy.file.level_count + 1
         for level in range(lossy.file.level_count):
             assert bits(lossless.positions(level=level)) == bits(lossy.positions(level=level))

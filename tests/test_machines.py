@@ -12,10 +12,7 @@ from pathlib import Path
 import pytest
 from fuzz.targets import CORE
 
-ROOT = Path(__file__).resolve().parent.parent
-sys.path.append(str(ROOT))  # for spec, which is not installed
-
-from spec import conformance  # noqa: E402
+from spec import conformance
 
 pytestmark = pytest.mark.machines
 

@@ -7,6 +7,7 @@ import sys
 
 import numpy as np
 import pytest
+from plants import clip_of
 
 import athcodec
 from athcodec.exporters import FORMATS
@@ -37,13 +38,7 @@ def files(tmp_path_factory):
     paths = []
     for frames in (FRAMES, TIMES * FRAMES):
         sway = np.sin(np.arange(frames) / 7)[:, None, None] * np.linspace(0, 1, VERTICES)[None, :, None] ** 2
-        clip = athcodec.MotionClip(
-            (rest + sway * [1.0, 0.0, 0.2]).astype(np.float32),
-            np.arange(frames) / 30,
-            np.zeros(VERTICES, int),
-            [-1],
-            rest=rest,
-        )
+        clip = clip_of(rest + sway * [1.0, 0.0, 0.2], rest, np.zeros(VERTICES, int), np.array([-1]))
         path = tmp_path_factory.mktemp("long") / f"{frames}.ath"
         athcodec.encode(clip, path, rel_error=1e-3, segment_frames=32, effort="fast")
         paths.append(path)
@@ -59,7 +54,6 @@ def test_exporting_more_frames_takes_no_more_memory(kind, files, tmp_path):
 
 
 def _peak(source, target, kind: str) -> int:
-    done = subprocess.run(
-        [sys.executable, "-c", EXPORT, str(source), str(target), kind], check=True, capture_output=True, text=True
-    )
+    command = [sys.executable, "-c", EXPORT, str(source), str(target), kind]
+    done = subprocess.run(command, check=True, capture_output=True, text=True)
     return int(done.stdout) * (1 if sys.platform == "darwin" else 1024)

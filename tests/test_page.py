@@ -121,14 +121,9 @@ def test_loading_is_told_before_the_first_picture(opened, sample_ath):
 
 def test_arrows_move_the_choice_in_a_group(page):
     page.locator("#colour [data-value=plain]").focus()
-    for key, value in (
-        ("ArrowRight", "node"),
-        ("ArrowRight", "order"),
-        ("ArrowLeft", "node"),
-        ("ArrowUp", "plain"),
-        ("ArrowUp", "distance"),
-    ):
-        page.keyboard.press(key)
+    keys = ("Right", "Right", "Left", "Up", "Up")
+    for key, value in zip(keys, ("node", "order", "node", "plain", "distance")):
+        page.keyboard.press(f"Arrow{key}")
         assert chosen(page, "colour") == value
         assert page.evaluate("document.activeElement.dataset.value") == value
     assert page.evaluate("document.querySelectorAll('#colour [tabindex=\"0\"]').length") == 1

@@ -10,8 +10,9 @@ from ctypes import POINTER, byref, c_double, c_float, c_int32, c_size_t, c_uint3
 
 import numpy as np
 import pytest
-from files import Parts
+from files import Parts, coded
 from fuzz.targets import CORE
+from header import Fade
 from moving_meshes import leafed_tree, mixed_clip
 from test_install import C_COMPILERS, CXX_COMPILERS, run
 
@@ -34,10 +35,6 @@ Release = ctypes.CFUNCTYPE(None, c_void_p, c_void_p)
 class Options(ctypes.Structure):
     _fields_ = [("allocate", Allocate), ("release", Release), ("context", c_void_p), ("cache_bytes", c_size_t)]
     _fields_ += [("limits", c_void_p), ("host_mesh", c_void_p), ("host_stride", c_size_t), ("host_vertices", c_int32)]
-
-
-class Fade(ctypes.Structure):
-    _fields_ = [("count", c_int32), ("level", c_int32 * 4), ("weight", c_double * 4), ("passed", c_double * 4)]
 
 
 class Share(ctypes.Structure):
@@ -428,8 +425,7 @@ def test_what_comes_of_each_blended_clip_is_prepared_ahead(lib, scratch, sample_
 
 def test_a_play_without_an_end_is_that_of_python_also_backwards(lib, scratch, sample_clip):
     path = scratch / "endless.ath"
-    athcodec.encode(athcodec.endless(sample_clip), path, rel_error=1e-3)
-    with athcodec.open(path) as file, Player(lib, path.read_bytes()) as player:
+    with coded(athcodec.endless(sample_clip), path, rel_error=1e-3) as file, Player(lib, path.read_bytes()) as player:
         ways = [Transition(*way) for way in reversed(file.metadata["transitions"])]
         play, table, xyz = Endless(), (Transition * len(ways))(*ways), np.empty((file.file.vertex_count, 3), np.float32)
         begin = lib.ath_player_endless_begin

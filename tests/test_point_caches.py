@@ -7,10 +7,9 @@ import struct
 
 import numpy as np
 import pytest
-from moving_meshes import assert_same_mesh, assert_same_motion, coded, mixed_clip, quad_clip, survives_damage
+from moving_meshes import assert_same_mesh, assert_same_motion, mixed_clip, quad_clip, survives_damage
 
 import athcodec
-from athcodec.decoding.clip_view import ClipView
 from athcodec.errors import ClipError
 from athcodec.motion.clip import MotionClip
 from athcodec.sources import raw
@@ -86,18 +85,6 @@ def test_cache_and_mesh_come_back_as_they_were(tmp_path, suffix):
         assert_same_mesh(again, clip)
         assert np.array_equal(again.attributes["uv"], clip.attributes["uv"])
         assert again.metadata == clip.metadata
-
-
-@pytest.mark.parametrize("suffix", [".pc2", ".mdd"])
-def test_a_clip_view_keeps_its_frame_numbers(tmp_path, suffix):
-    path = coded(quad_clip(frames=40), tmp_path)
-    with athcodec.open(path) as decoder:
-        athcodec.write(ClipView(decoder, frames=range(10, 30)), tmp_path / f"part{suffix}")
-        bound = decoder.file.max_error_bound
-    with athcodec.read(tmp_path / f"part{suffix}", fps=24) as part:
-        assert part.metadata["start_frame"] == 11 and part.frame_count == 20
-        wanted = quad_clip(frames=40).block(10, 30)
-        assert np.linalg.norm(part.block(0, 20).astype(float) - wanted, axis=2).max() <= bound
 
 
 def test_the_mesh_may_be_named_and_be_in_another_format(tmp_path):
@@ -188,13 +175,3 @@ def test_a_cache_that_shrinks_while_it_is_read_is_an_error(tmp_path):
             clip.block(0, 4)
         with pytest.raises(ClipError, match="was changed"), clip.watched():
             pass
-
-
-def test_a_failed_write_leaves_no_file(tmp_path):
-    positions = np.array(quad_clip().positions)
-    positions[5, 0, 0] = np.nan
-    broken = MotionClip(positions, np.arange(6.0), faces=quad_clip().faces)
-    for name in ("a.pc2", "a.mdd"):
-        with pytest.raises(ClipError, match="frame 5"):
-            athcodec.write(broken, tmp_path / name)
-    assert os.listdir(tmp_path) == []

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import sys
 from io import BytesIO
-from pathlib import Path
 
 import numpy as np
 import pytest
+from files import coded
+from plants import diagonal, distance
 
 import athcodec
 from athcodec.decoding import container as ct
@@ -15,10 +15,7 @@ from athcodec.encoding import encoder
 from athcodec.encoding.quantise import SOURCE_REST_TOLERANCE
 from athcodec.encoding.search import Search
 from athcodec.errors import BadChecksum, Truncated
-
-sys.path.append(str(Path(__file__).resolve().parent.parent))  # for bench, which is not installed
-
-from bench.odd.bending import scanned_tree  # noqa: E402
+from bench.odd.bending import scanned_tree
 
 OPTIONS = {"rel_error": 1e-4, "segment_frames": 16, "tam": athcodec.Thresholds(0, 0, 0, 0)}  # not predicted
 
@@ -27,14 +24,6 @@ OPTIONS = {"rel_error": 1e-4, "segment_frames": 16, "tam": athcodec.Thresholds(0
 def about_mean(monkeypatch):
     """Files are made about the mean pose, whether it pays or not."""
     monkeypatch.setattr(Search, "about_best_reference", Search.about_mean_pose)
-
-
-def diagonal(clip):
-    return float(np.linalg.norm(np.ptp(clip.block(0, clip.frame_count).reshape(-1, 3), axis=0)))
-
-
-def distance(a, b):
-    return float(np.linalg.norm(np.asarray(a, float) - b, axis=-1).max())
 
 
 @pytest.mark.parametrize("ladder", ["none", "decades"])
@@ -73,8 +62,7 @@ def test_the_pose_that_is_chosen_makes_the_smaller_file(fraction, most, tmp_path
 
 @pytest.mark.parametrize("options", [{"exact_rest": True}, {"lossless": True}])
 def test_exact_rest_poses_come_back_bit_for_bit(bushy_clip, tmp_path, options):
-    athcodec.encode(bushy_clip, tmp_path / "a.ath", **OPTIONS, **options)
-    with athcodec.open(tmp_path / "a.ath", strict=True) as decoder:
+    with coded(bushy_clip, tmp_path / "a.ath", **OPTIONS, **options) as decoder:
         assert decoder.file.rest.tobytes() == bushy_clip.source_rest.tobytes()
         assert not np.array_equal(decoder.level_rest(), bushy_clip.rest)
 
@@ -84,8 +72,7 @@ def test_a_rest_pose_that_was_made_is_not_stored(bushy_clip, tmp_path):
         bushy_clip.block(0, bushy_clip.frame_count), bushy_clip.time, bushy_clip.vertex_branch, bushy_clip.branch_parent
     )
     assert not clip.rest_given and not clip.replace(metadata={}).rest_given and bushy_clip.rest_given
-    athcodec.encode(clip, tmp_path / "a.ath", **OPTIONS)
-    with athcodec.open(tmp_path / "a.ath") as decoder:
+    with coded(clip, tmp_path / "a.ath", **OPTIONS) as decoder:
         assert decoder.file.find(ct.SOURCE_REST) is None
         assert np.array_equal(decoder.file.rest, np.float32(decoder.level_rest()))
 
@@ -103,8 +90,7 @@ def test_shortened_files_keep_the_rest_pose(bushy_clip, tmp_path):
 
 
 def test_a_damaged_rest_pose_is_refused_by_those_who_ask_for_it(bushy_clip, tmp_path):
-    athcodec.encode(bushy_clip, tmp_path / "a.ath", **OPTIONS)
-    with athcodec.open(tmp_path / "a.ath") as decoder:
+    with coded(bushy_clip, tmp_path / "a.ath", **OPTIONS) as decoder:
         chunk = decoder.file.find(ct.SOURCE_REST)
     data = bytearray((tmp_path / "a.ath").read_bytes())
     data[chunk.offset + chunk.length - 1] ^= 1
@@ -117,8 +103,7 @@ def test_a_damaged_rest_pose_is_refused_by_those_who_ask_for_it(bushy_clip, tmp_
 
 
 def test_a_file_cut_off_behind_its_motion_says_that_the_rest_pose_is_missing(bushy_clip, tmp_path):
-    athcodec.encode(bushy_clip, tmp_path / "a.ath", **OPTIONS)
-    data = (tmp_path / "a.ath").read_bytes()
+    data = athcodec.encode(bushy_clip, tmp_path / "a.ath", **OPTIONS).path.read_bytes()
     with athcodec.open(tmp_path / "a.ath") as whole:
         assert not whole.file.rest_is_missing and not whole.file.missing
         end, motion = whole.file.levels[-1].bytes, whole.positions()
@@ -133,8 +118,7 @@ def test_a_file_cut_off_behind_its_motion_says_that_the_rest_pose_is_missing(bus
 
 def test_joined_clips_share_both_poses(medley_clips, tmp_path):
     joined = athcodec.join(medley_clips)
-    athcodec.encode(joined, tmp_path / "a.ath", **OPTIONS)
-    with athcodec.open(tmp_path / "a.ath") as decoder:
+    with coded(joined, tmp_path / "a.ath", **OPTIONS) as decoder:
         assert joined.rest_given == (decoder.file.find(ct.SOURCE_REST) is not None)
         assert distance(decoder.file.rest, joined.rest) <= SOURCE_REST_TOLERANCE * diagonal(joined)
         for clip in decoder.file.clips:

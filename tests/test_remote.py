@@ -7,12 +7,14 @@ from __future__ import annotations
 
 import asyncio
 import gzip
+import itertools
 import json
 import re
 import subprocess
 import sys
 import threading
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 
 import fsspec
@@ -89,26 +91,18 @@ class Handler(BaseHTTPRequestHandler):
         pass
 
 
+def among(chosen: Callable[[int], bool], fault: Callable) -> Callable:
+    """The fault for requests of some numbers, counted from 1."""
+    asked = itertools.count(1)
+    return lambda handler, start, stop: chosen(next(asked)) and fault(handler, start, stop)
+
+
 def first(count: int, fault: Callable) -> Callable:
-    """The fault for the first so many requests only."""
-    asked = []
-
-    def sometimes(handler: Handler, start: int, stop: int) -> bool:
-        asked.append(start)
-        return len(asked) <= count and fault(handler, start, stop)
-
-    return sometimes
+    return among(lambda number: number <= count, fault)
 
 
 def after(count: int, fault: Callable) -> Callable:
-    """The fault behind so many good answers."""
-    asked = []
-
-    def sometimes(handler: Handler, start: int, stop: int) -> bool:
-        asked.append(start)
-        return len(asked) > count and fault(handler, start, stop)
-
-    return sometimes
+    return among(lambda number: number > count, fault)
 
 
 def drop(handler: Handler, start: int, stop: int) -> bool:
@@ -313,18 +307,13 @@ def test_addresses_of_this_machine_and_of_private_networks_are_known(host):
 def test_several_threads_play_from_one_server(server, local):
     expected = local.positions()
     with athcodec.open(server.url) as decoder:
-        wrong = []
 
         def watch(seed: int) -> None:
             for frame in np.random.default_rng(seed).integers(decoder.frame_count, size=20):
-                wrong.extend([frame] if not np.array_equal(decoder.positions(frame), expected[frame]) else [])
+                assert np.array_equal(decoder.positions(frame), expected[frame])
 
-        threads = [threading.Thread(target=watch, args=(seed,)) for seed in range(4)]
-        for thread in threads:
-            thread.start()
-        for thread in threads:
-            thread.join()
-        assert not wrong
+        with ThreadPoolExecutor(4) as threads:
+            list(threads.map(watch, range(4)))
 
 
 # ---- servers with faults ----

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 import zstandard
-from files import Parts, opened
+from files import Parts, coded, opened
 from plants import diagonal
 
 import athcodec
@@ -96,24 +96,21 @@ def test_still_meshes_keep_their_bound(scratch, name, ladder):
     points = MESHES[name](6)
     clip = still(points, 3)
     bound = 1e-4 * diagonal(clip)
-    athcodec.encode(clip, scratch / "still.ath", max_error=bound, attributes="none", ladder=ladder)
-    with athcodec.open(scratch / "still.ath") as decoder:
+    with coded(clip, scratch / "still.ath", max_error=bound, attributes="none", ladder=ladder) as decoder:
         assert np.linalg.norm(decoder.positions() - points, axis=2).max() <= bound
 
 
 @pytest.mark.parametrize(("dtype", "origin"), [(np.float64, 0.0), (np.float32, 1e4), (np.float64, -1e7)])
 def test_a_still_mesh_far_from_the_origin_keeps_its_bound(scratch, dtype, origin):
     points = (terrain(20, 20, 0.1, 3).astype(float) + origin).astype(dtype)
-    athcodec.encode(still(points), scratch / "far.ath", max_error=0.01, ladder="none")
-    with athcodec.open(scratch / "far.ath") as decoder:
+    with coded(still(points), scratch / "far.ath", max_error=0.01, ladder="none") as decoder:
         assert np.linalg.norm(decoder.positions(0).astype(float) - points, axis=1).max() <= 0.01
 
 
 def test_a_still_mesh_keeps_the_bounds_of_its_vertices(scratch):
     points = terrain(20, 20, 0.1, 4)
     weights = np.random.default_rng(1).uniform(0.1, 1.0, len(points))
-    athcodec.encode(still(points), scratch / "weights.ath", max_error=0.05, weights=weights)
-    with athcodec.open(scratch / "weights.ath") as decoder:
+    with coded(still(points), scratch / "weights.ath", max_error=0.05, weights=weights) as decoder:
         assert (np.linalg.norm(decoder.positions(0) - points, axis=1) <= 0.05 * weights).all()
 
 

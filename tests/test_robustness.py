@@ -8,14 +8,12 @@ import sys
 from pathlib import Path
 
 import pytest
+from bad_cases import behave
+
+from spec import robustness
+from spec.robust import Row, _cases
 
 ROOT = Path(__file__).resolve().parent.parent
-sys.path.append(str(ROOT))  # for spec, which is not installed
-
-from bad_cases import behave  # noqa: E402
-
-from spec import robustness  # noqa: E402
-from spec.robust import Row, _cases  # noqa: E402
 
 pytestmark = pytest.mark.tools
 
@@ -49,10 +47,6 @@ def test_the_report_has_every_row_and_keeps_what_a_run_leaves_out(tmp_path, monk
 
 @pytest.mark.slow
 def test_hostile_files_cause_no_crash_hang_or_flood_of_memory(tmp_path):
-    done = subprocess.run(
-        [sys.executable, "-m", "spec.robustness", "--only", "hostile", "--seconds", "90", "--out", str(tmp_path)],
-        cwd=ROOT,
-        capture_output=True,
-        text=True,
-    )
+    words = "-m spec.robustness --only hostile --seconds 90 --out".split()
+    done = subprocess.run([sys.executable, *words, str(tmp_path)], cwd=ROOT, capture_output=True, text=True)
     assert done.returncode == 0, done.stdout + done.stderr

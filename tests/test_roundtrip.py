@@ -16,7 +16,6 @@ from athcodec import MotionClip, Thresholds
 from athcodec.decoding import container as ct
 from athcodec.encoding import streams
 from athcodec.encoding.job import time_chunk
-from athcodec.encoding.quantise import SOURCE_REST_TOLERANCE
 from athcodec.motion.clip import NOT_KEPT
 from athcodec.motion.hierarchy import derived_edges, hierarchy_of
 
@@ -48,17 +47,6 @@ def reopened(clip: MotionClip, folder, **options) -> athcodec.Decoder:
     """The clip through a file, as an open decoder that the test need not close: its bytes are in memory."""
     path = athcodec.encode(clip, folder / "again.ath", **{"rel_error": 1e-3, "effort": "fast"} | options).path
     return athcodec.open(BytesIO(path.read_bytes()), strict=True)
-
-
-def with_static(clip: MotionClip, **more) -> MotionClip:
-    return MotionClip(
-        positions=clip.positions,
-        rest=clip.rest,
-        time=clip.time,
-        vertex_branch=clip.vertex_branch,
-        branch_parent=clip.branch_parent,
-        **more,
-    )
 
 
 # ---- motion ----
@@ -216,22 +204,10 @@ def test_steady_times_cost_a_rule_and_no_table(rate, origin):
     assert len(time_chunk(origin + np.arange(500) / rate)) == (3 if whole else 17)
 
 
-def test_uneven_times_survive_a_file(full_ath, full_clip):
-    with athcodec.open(full_ath) as decoder:
-        assert np.array_equal(decoder.time, full_clip.time)
-        assert decoder.fps == pytest.approx(1 / np.median(np.diff(full_clip.time)))
-
-
 @pytest.mark.parametrize("rest_pose", ["first", "mean"])
 def test_a_clip_without_a_rest_pose_gets_one_from_its_frames(rest_pose, scratch):
     source = plant(seed=7, branches=6, frames=20)
-    clip = MotionClip(
-        positions=source.positions,
-        time=source.time,
-        vertex_branch=source.vertex_branch,
-        branch_parent=source.branch_parent,
-        rest_pose=rest_pose,
-    )
+    clip = MotionClip(source.positions, source.time, source.vertex_branch, source.branch_parent, rest_pose=rest_pose)
     expected = source.positions[0] if rest_pose == "first" else source.positions.mean(axis=0, dtype=np.float64)
     decoder = reopened(clip, scratch)
     assert np.linalg.norm(decoder.file.rest - expected, axis=1).max() <= decoder.file.max_error_bound
@@ -243,24 +219,10 @@ def test_an_exact_rest_pose_comes_back_bit_for_bit(dtype, scratch):
     source = awkward(seed=8, branches=12, frames=20, motion="sway", shuffled=True, offset=3.0)
     rest = source.rest.astype(dtype)
     rest[0, 0] = -0.0
-    clip = MotionClip(
-        positions=source.positions,
-        time=source.time,
-        vertex_branch=source.vertex_branch,
-        branch_parent=source.branch_parent,
-        stem_index=source.stem_index,
-        rest=rest,
-    )
+    clip = source.replace(rest=rest)
     decoder = reopened(clip, scratch, exact_rest=True)
     assert decoder.file.rest.dtype == dtype and decoder.file.rest.tobytes() == rest.tobytes()
     assert largest_error(decoder.positions(), clip) <= decoder.file.max_error_bound
-
-
-def test_a_coded_rest_pose_stays_within_the_bound_of_the_motion_or_its_tolerance(bushy_ath, bushy_clip):
-    diagonal = np.linalg.norm(np.ptp(bushy_clip.positions.reshape(-1, 3), axis=0))
-    with athcodec.open(bushy_ath) as decoder:
-        tolerance = max(decoder.file.max_error_bound, SOURCE_REST_TOLERANCE * diagonal)
-        assert np.linalg.norm(decoder.file.rest - bushy_clip.rest, axis=1).max() <= tolerance
 
 
 # ---- static data ----
@@ -291,7 +253,7 @@ def same_array(got: np.ndarray, expected: np.ndarray) -> bool:
 
 @pytest.fixture(scope="module")
 def attributes_back(scratch):
-    return reopened(with_static(plant(frames=3), attributes=ATTRIBUTES), scratch).file.attributes
+    return reopened(plant(frames=3).replace(attributes=ATTRIBUTES), scratch).file.attributes
 
 
 @pytest.mark.parametrize("name", ATTRIBUTES)
@@ -303,7 +265,7 @@ def test_a_named_array_comes_back_unchanged(name, attributes_back):
 def test_records_come_back_as_an_array_for_each_field(scratch):
     leaf = np.dtype([("uv", [("u", "<f4"), ("v", "<f4")]), ("normal", ">f4", (3,)), ("tag", "S2")], align=True)
     values = np.array([((1, 2), (0, 0, 1), b"a"), ((3, 4), (0, 1, 0), b"bc")], leaf)
-    back = reopened(with_static(plant(frames=3), attributes={"leaf": values}), scratch).file.attributes
+    back = reopened(plant(frames=3).replace(attributes={"leaf": values}), scratch).file.attributes
     assert list(back) == ["leaf.uv.u", "leaf.uv.v", "leaf.normal", "leaf.tag"]
     for name, got in back.items():
         expected = values
@@ -318,7 +280,7 @@ def test_edges_keep_their_type_whether_they_follow_from_the_hierarchy_or_not(dty
     derived = derived_edges(hierarchy_of(source)).astype(dtype)
     sizes = []
     for edges in (derived, derived[::-1].copy()):
-        decoder = reopened(with_static(source, edges=edges), scratch)
+        decoder = reopened(source.replace(edges=edges), scratch)
         assert same_array(decoder.file.edges, edges.astype(edges.dtype.newbyteorder("<")))
         sizes.append(decoder.file.find(ct.EDGES).length)
     assert sizes[0] == 1 < sizes[1], "edges that follow from the hierarchy cost next to nothing"
@@ -329,7 +291,7 @@ def test_edges_keep_their_type_whether_they_follow_from_the_hierarchy_or_not(dty
 )
 def test_faces_come_back_unchanged(faces, scratch):
     expected = faces.astype(faces.dtype.newbyteorder("<"))
-    assert same_array(reopened(with_static(plant(frames=3), faces=faces), scratch).file.faces, expected)
+    assert same_array(reopened(plant(frames=3).replace(faces=faces), scratch).file.faces, expected)
 
 
 @pytest.mark.parametrize(
@@ -342,13 +304,17 @@ def test_faces_come_back_unchanged(faces, scratch):
     ],
 )
 def test_metadata_come_back_unchanged(metadata, scratch):
-    assert reopened(with_static(plant(frames=3), metadata=metadata), scratch).metadata == metadata
+    assert reopened(plant(frames=3).replace(metadata=metadata), scratch).metadata == metadata
 
 
 def test_a_clip_without_static_data_has_none_in_its_file(scratch):
     decoder = reopened(plant(frames=3), scratch)
-    assert decoder.file.faces is None and decoder.file.edges is None
-    assert decoder.file.attributes == {} and decoder.metadata == {}
+    assert (
+        decoder.file.faces is None
+        and decoder.file.edges is None
+        and decoder.file.attributes == {}
+        and decoder.metadata == {}
+    )
 
 
 def test_attributes_none_keeps_the_motion_and_the_units_alone(full_clip, scratch):
@@ -359,26 +325,18 @@ def test_attributes_none_keeps_the_motion_and_the_units_alone(full_clip, scratch
     assert apart <= 2 * bare.file.max_error_bound and bare.file.file_length < full.file.file_length
 
 
-@pytest.mark.parametrize(
-    "more",
-    [
-        {"attributes": {f"a{i}": np.zeros(1) for i in range(257)}},
-        {"attributes": {"n" * 5000: np.zeros(1)}},
-        {"attributes": {"wide": np.zeros(1, "S2000000")}},
-        {"metadata": {"text": "x" * (1 << 20)}},
-        {"metadata": {"object": {1, 2}}},
-        {"metadata": {"text": "\ud800"}},
-    ],
-    ids=[
-        "257 attributes",
-        "a name of 5000 bytes",
-        "items of 2 MB",
-        "1 MiB of metadata",
-        "metadata that is no JSON",
-        "metadata that is no UTF-8",
-    ],
-)
+TOO_MUCH = {
+    "257 attributes": {"attributes": {f"a{i}": np.zeros(1) for i in range(257)}},
+    "a name of 5000 bytes": {"attributes": {"n" * 5000: np.zeros(1)}},
+    "items of 2 MB": {"attributes": {"wide": np.zeros(1, "S2000000")}},
+    "1 MiB of metadata": {"metadata": {"text": "x" * (1 << 20)}},
+    "metadata that is no JSON": {"metadata": {"object": {1, 2}}},
+    "metadata that is no UTF-8": {"metadata": {"text": "\ud800"}},
+}
+
+
+@pytest.mark.parametrize("more", TOO_MUCH.values(), ids=TOO_MUCH)
 def test_static_data_beyond_what_a_decoder_accepts_are_refused_when_encoding(more, tmp_path):
     with pytest.raises(athcodec.errors.ClipError):
-        athcodec.encode(with_static(plant(frames=3), **more), tmp_path / "refused.ath", effort="fast")
+        athcodec.encode(plant(frames=3).replace(**more), tmp_path / "refused.ath", effort="fast")
     assert not list(tmp_path.iterdir())

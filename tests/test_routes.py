@@ -70,6 +70,8 @@ POSITIONS = np.stack(
 @pytest.fixture(scope="module")
 def clip() -> MotionClip:
     """A bough that bends and three leaves of one shape, in centimetres with z up, at 23.976 from frame 1001."""
+    names = {"part_names": NAMES, "part_kinds": ["mesh", "mesh"], "material_names": ["bark", "green"]}
+    domains = {"part_vertex_counts": "constant", "part_copies": "constant", "face_material": "face"}
     return MotionClip(
         POSITIONS,
         np.arange(FRAMES) / RATE,
@@ -83,16 +85,7 @@ def clip() -> MotionClip:
             "part_copies": np.array([1, COPIES], np.int32),
             "face_material": np.repeat(np.array([0, 1], np.int32), [len(QUADS), COPIES]),
         },
-        metadata={
-            "unit": "cm",
-            "up_axis": "z",
-            "fps": RATE,
-            "start_frame": START,
-            "part_names": NAMES,
-            "part_kinds": ["mesh", "mesh"],
-            "material_names": ["bark", "green"],
-            "domains": {"part_vertex_counts": "constant", "part_copies": "constant", "face_material": "face"},
-        },
+        metadata={"unit": "cm", "up_axis": "z", "fps": RATE, "start_frame": START, "domains": domains} | names,
     )
 
 
@@ -657,187 +650,71 @@ def by_schema(path: Path) -> None:
         file.attrs.update(said)
 
 
+SHORT = {"+": YES, "-": NO, "vertices": "as vertices", "one": "one a file", "y-up": "y up"}
+
+
 @dataclass(frozen=True)
 class Route:
-    """A row: the file, who reads or writes it, and what the cells are, in the order of COLUMNS."""
+    """A row: the file, who reads or writes it, and the cells by their short names, in the order of COLUMNS."""
 
     name: str
     file: str
     other: Callable[[Path], Any]
     libraries: str
-    cells: str
+    short: str
     options: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def cells(self) -> str:
+        return " | ".join(SHORT.get(word, word) for word in self.short.split())
 
 
 SOURCES: list[Route] = [
-    Route("USD", "a.usda", by_usd, "usd-core", "yes | yes | names | yes | yes | one a file | yes | yes | yes | yes"),
-    Route(
-        "Alembic", "a.abc", by_alembic, "alembic3d", "yes | yes | names | yes | yes | one a file | no | no | yes | yes"
-    ),
-    Route(
-        "glTF",
-        "a.glb",
-        by_gltf,
-        "pygltflib",
-        "yes | yes | names | yes | yes | yes | metres | y up | yes | yes",
-        {"takes": ["all"]},
-    ),
-    Route(
-        "OBJ",
-        f"a_{START}.obj",
-        by_lines,
-        "its text",
-        "yes | yes | names | yes | as vertices | one a file | no | no | no | yes",
-    ),
-    Route(
-        "PLY",
-        f"a_{START}.ply",
-        by_meshio,
-        "meshio",
-        "yes | no | no | yes | as vertices | one a file | no | no | no | yes",
-    ),
-    Route(
-        "PC2 and its OBJ",
-        "a.pc2",
-        by_bytes,
-        "NumPy",
-        "yes | yes | names | yes | as vertices | one a file | no | no | no | yes",
-    ),
-    Route(
-        "MDD and its OBJ",
-        "a.mdd",
-        by_bytes,
-        "NumPy",
-        "yes | yes | names | yes | as vertices | one a file | no | no | yes | yes",
-    ),
-    Route(
-        "XDMF",
-        "a.xdmf",
-        by_time_series,
-        "meshio",
-        "yes | no | no | yes | as vertices | one a file | no | no | yes | no",
-    ),
-    Route(
-        "VTU, PVD", "a.pvd", by_meshio, "meshio", "yes | no | no | yes | as vertices | one a file | no | no | yes | yes"
-    ),
-    Route(
-        "VTK",
-        f"a_{START}.vtk",
-        by_meshio,
-        "meshio",
-        "yes | no | no | yes | as vertices | one a file | no | no | no | yes",
-    ),
-    Route("HDF5", "a.h5", by_schema, "h5py", "yes | yes | names | yes | yes | one a file | yes | yes | yes | yes"),
-    Route("NumPy", "a.npz", by_schema, "NumPy", "yes | yes | names | yes | yes | one a file | yes | yes | yes | yes"),
+    Route("USD", "a.usda", by_usd, "usd-core", "+ + names + + one + + + +"),
+    Route("Alembic", "a.abc", by_alembic, "alembic3d", "+ + names + + one - - + +"),
+    Route("glTF", "a.glb", by_gltf, "pygltflib", "+ + names + + + metres y-up + +", {"takes": ["all"]}),
+    Route("OBJ", f"a_{START}.obj", by_lines, "its text", "+ + names + vertices one - - - +"),
+    Route("PLY", f"a_{START}.ply", by_meshio, "meshio", "+ - - + vertices one - - - +"),
+    Route("PC2 and its OBJ", "a.pc2", by_bytes, "NumPy", "+ + names + vertices one - - - +"),
+    Route("MDD and its OBJ", "a.mdd", by_bytes, "NumPy", "+ + names + vertices one - - + +"),
+    Route("XDMF", "a.xdmf", by_time_series, "meshio", "+ - - + vertices one - - + -"),
+    Route("VTU, PVD", "a.pvd", by_meshio, "meshio", "+ - - + vertices one - - + +"),
+    Route("VTK", f"a_{START}.vtk", by_meshio, "meshio", "+ - - + vertices one - - - +"),
+    Route("HDF5", "a.h5", by_schema, "h5py", "+ + names + + one + + + +"),
+    Route("NumPy", "a.npz", by_schema, "NumPy", "+ + names + + one + + + +"),
 ]
 TARGETS: list[Route] = [
+    Route("USD", "a.usda", in_usd, "usd-core", "+ + names + vertices one + + + +"),
+    Route("USD, `--instances`", "a.usdc", in_usd, "usd-core", "+ + names + + one + + + +", {"instances": True}),
+    Route("USD, `--rig`", "rig.usda", in_usd, "usd-core", "+ + names + vertices + + + + +", {"rig": 64}),
+    Route("Alembic", "a.abc", in_alembic, "alembic3d", "+ + names + vertices one - y-up + +"),
     Route(
-        "USD",
-        "a.usda",
-        in_usd,
-        "usd-core",
-        "yes | yes | names | yes | as vertices | one a file | yes | yes | yes | yes",
+        "Alembic, `--instances`", "a.abc", in_alembic, "alembic3d", "+ + names + + one - y-up + +", {"instances": True}
     ),
     Route(
-        "USD, `--instances`",
-        "a.usdc",
-        in_usd,
-        "usd-core",
-        "yes | yes | names | yes | yes | one a file | yes | yes | yes | yes",
-        {"instances": True},
-    ),
-    Route(
-        "USD, `--rig`",
-        "rig.usda",
-        in_usd,
-        "usd-core",
-        "yes | yes | names | yes | as vertices | yes | yes | yes | yes | yes",
-        {"rig": 64},
-    ),
-    Route(
-        "Alembic",
-        "a.abc",
-        in_alembic,
-        "alembic3d",
-        "yes | yes | names | yes | as vertices | one a file | no | y up | yes | yes",
-    ),
-    Route(
-        "Alembic, `--instances`",
-        "a.abc",
-        in_alembic,
-        "alembic3d",
-        "yes | yes | names | yes | yes | one a file | no | y up | yes | yes",
-        {"instances": True},
-    ),
-    Route(
-        "glTF, joints",
-        "a.glb",
-        in_gltf,
-        "pygltflib",
-        "yes | yes | names | yes | as vertices | yes | metres | y up | yes | yes",
-        {"animation": "joints"},
+        "glTF, joints", "a.glb", in_gltf, "pygltflib", "+ + names + vertices + metres y-up + +", {"animation": "joints"}
     ),
     Route(
         "glTF, morph targets",
         "a.glb",
         in_gltf,
         "pygltflib",
-        "yes | yes | names | yes | as vertices | yes | metres | y up | yes | yes",
+        "+ + names + vertices + metres y-up + +",
         {"animation": "morphs"},
     ),
+    Route("glTF, `--instances`", "a.glb", in_gltf, "pygltflib", "+ + names + + + metres y-up + +", {"instances": True}),
+    Route("glTF, `--rig`", "rig.glb", in_gltf, "pygltflib", "+ + names + vertices + metres y-up + +", {"rig": 64}),
+    Route("OBJ", "a.obj", in_numbered, "meshio", "+ + names + vertices one - - - +"),
+    Route("PLY", "a.ply", in_numbered, "meshio", "+ + names + + one + + + +"),
+    Route("PC2 and its OBJ", "a.pc2", in_pc2, "NumPy, meshio", "+ + names + vertices one - - - +"),
+    Route("MDD and its OBJ", "a.mdd", in_mdd, "NumPy, meshio", "+ + names + vertices one - - + +"),
+    Route("XDMF", "a.xdmf", in_xdmf, "h5py", "+ + names + + one + + + +"),
+    Route("VTU, PVD", "a.pvd", in_vtu, "meshio", "+ + names + + one + + + +"),
+    Route("HDF5", "a.h5", in_schema, "h5py", "+ + names + + one + + + +"),
+    Route("NumPy", "a.npz", in_schema, "NumPy", "+ + names + + one + + + +"),
+    Route("`.vat`", "a.vat", in_vat, "OpenEXR, pygltflib", "+ + names + vertices one + + + +", {"half": False}),
     Route(
-        "glTF, `--instances`",
-        "a.glb",
-        in_gltf,
-        "pygltflib",
-        "yes | yes | names | yes | yes | yes | metres | y up | yes | yes",
-        {"instances": True},
-    ),
-    Route(
-        "glTF, `--rig`",
-        "rig.glb",
-        in_gltf,
-        "pygltflib",
-        "yes | yes | names | yes | as vertices | yes | metres | y up | yes | yes",
-        {"rig": 64},
-    ),
-    Route(
-        "OBJ", "a.obj", in_numbered, "meshio", "yes | yes | names | yes | as vertices | one a file | no | no | no | yes"
-    ),
-    Route("PLY", "a.ply", in_numbered, "meshio", "yes | yes | names | yes | yes | one a file | yes | yes | yes | yes"),
-    Route(
-        "PC2 and its OBJ",
-        "a.pc2",
-        in_pc2,
-        "NumPy, meshio",
-        "yes | yes | names | yes | as vertices | one a file | no | no | no | yes",
-    ),
-    Route(
-        "MDD and its OBJ",
-        "a.mdd",
-        in_mdd,
-        "NumPy, meshio",
-        "yes | yes | names | yes | as vertices | one a file | no | no | yes | yes",
-    ),
-    Route("XDMF", "a.xdmf", in_xdmf, "h5py", "yes | yes | names | yes | yes | one a file | yes | yes | yes | yes"),
-    Route("VTU, PVD", "a.pvd", in_vtu, "meshio", "yes | yes | names | yes | yes | one a file | yes | yes | yes | yes"),
-    Route("HDF5", "a.h5", in_schema, "h5py", "yes | yes | names | yes | yes | one a file | yes | yes | yes | yes"),
-    Route("NumPy", "a.npz", in_schema, "NumPy", "yes | yes | names | yes | yes | one a file | yes | yes | yes | yes"),
-    Route(
-        "`.vat`",
-        "a.vat",
-        in_vat,
-        "OpenEXR, pygltflib",
-        "yes | yes | names | yes | as vertices | one a file | yes | yes | yes | yes",
-        {"half": False},
-    ),
-    Route(
-        "`.openvat`",
-        "a.openvat",
-        in_openvat,
-        "OpenEXR, pygltflib",
-        "yes | yes | names | yes | as vertices | one a file | no | no | no | no",
-        {"half": False},
+        "`.openvat`", "a.openvat", in_openvat, "OpenEXR, pygltflib", "+ + names + vertices one - - - -", {"half": False}
     ),
 ]
 

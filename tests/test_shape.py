@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from files import coded
 from moving_meshes import leafed_tree
 from plants import diagonal
 
@@ -64,16 +65,14 @@ def test_cards_smaller_than_the_bound_keep_shape_and_turn_as_in_the_source(tree,
 @pytest.mark.parametrize("size", [0.5, 0.8])
 def test_cards_that_need_corrections_do_not_twitch(scratch, size):
     clip = leafed_tree(size=size)
-    athcodec.encode(clip, scratch / "tree.ath", rel_error=1e-3)
-    with athcodec.open(scratch / "tree.ath") as decoder:
+    with coded(clip, scratch / "tree.ath", rel_error=1e-3) as decoder:
         error = (decoder.positions().astype(float) - source_of(clip)) / (1e-3 * diagonal(clip))
     assert np.linalg.norm(error, axis=2).max() <= 1
     assert np.quantile(np.linalg.norm(np.diff(error, 2, axis=0), axis=2), 0.999) <= 1.6
 
 
 def test_every_level_and_its_reference_pose_keep_the_shape_of_cards(tree, scratch):
-    athcodec.encode(tree, scratch / "tree.ath", rel_error=1e-4)
-    with athcodec.open(scratch / "tree.ath") as decoder:
+    with coded(tree, scratch / "tree.ath", rel_error=1e-4) as decoder:
         assert len(decoder.levels) > 4
         for level in range(len(decoder.levels)):
             decoded = decoder.positions(level=level).astype(float)
@@ -112,8 +111,7 @@ def test_a_rest_pose_of_the_bound_takes_fewer_bytes_and_loses_shape(tree, scratc
 def test_a_rest_pose_is_as_precise_as_it_is_asked_for_at_every_level(tree, scratch, rest_error, metres):
     clip = tree.replace(metadata={"unit": "m"})
     most = metres or rest_error * diagonal(tree)
-    athcodec.encode(clip, scratch / "tree.ath", rel_error=1e-3, rest_error=rest_error, effort="fast")
-    with athcodec.open(scratch / "tree.ath") as decoder:
+    with coded(clip, scratch / "tree.ath", rel_error=1e-3, rest_error=rest_error, effort="fast") as decoder:
         for level in range(len(decoder.levels)):
             assert np.linalg.norm(decoder.level_rest(level) - clip.rest, axis=1).max() <= most
 

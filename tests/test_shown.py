@@ -40,8 +40,7 @@ def hostile_ath(tmp_path):
     """A file whose unit is such text."""
     clip = plant(seed=1, branches=2, frames=4)
     clip.metadata = {"unit": HOSTILE}
-    athcodec.encode(clip, tmp_path / "a.ath", effort="fast")
-    return tmp_path / "a.ath"
+    return athcodec.encode(clip, tmp_path / "a.ath", effort="fast").path
 
 
 @pytest.mark.parametrize(

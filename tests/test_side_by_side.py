@@ -7,7 +7,6 @@ from __future__ import annotations
 import base64
 import json
 import re
-import sys
 import zlib
 from pathlib import Path
 
@@ -16,12 +15,8 @@ import pytest
 
 import athcodec
 from athcodec.sources import sample_path
-
-ROOT = Path(__file__).resolve().parent.parent
-sys.path.append(str(ROOT))  # for bench, which is not installed; athcodec stays the installed one
-
-from bench.__main__ import main  # noqa: E402
-from bench.browser import chromium  # noqa: E402
+from bench.__main__ import main
+from bench.browser import chromium
 
 pytestmark = pytest.mark.tools
 
@@ -89,14 +84,8 @@ def test_motion_of_another_codec_is_a_panel_too_and_a_loop_ends_where_it_begins(
     other = loop.replace(positions=rough)
     athcodec.write(other, tmp_path / "rough.npz")
     athcodec.encode(loop, tmp_path / "loop.ath", rel_error=1e-2, effort="fast", ladder="none")
-    words = [
-        tmp_path / "loop.h5",
-        tmp_path / "rough.npz",
-        tmp_path / "loop.ath",
-        "--rel-error",
-        "-o",
-        tmp_path / "a.html",
-    ]
+    files = [tmp_path / name for name in ("loop.h5", "rough.npz", "loop.ath")]
+    words = [*files, "--rel-error", "-o", tmp_path / "a.html"]
     assert main(["compare", *map(str, words)]) == 0
     _, foreign, ours = contents(tmp_path / "a.html")["panels"]
     assert foreign["name"] == "rough.npz" and foreign["seams"] == []

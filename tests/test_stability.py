@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from plants import blown_tree, plant
+from plants import blown_tree, clip_of, plant
 
 import athcodec
 
@@ -88,15 +88,9 @@ def test_what_hangs_on_a_stem_that_has_turned_over_costs_no_more_than_on_one_tha
         angles = turn + 0.1 * np.sin(2 * np.pi * time)
         side = 0.1 * np.cos(2 * np.pi * time)
         along = np.stack([np.sin(angles), np.cos(angles) * np.cos(side), np.cos(angles) * np.sin(side)], axis=1)
-        rest = np.array([[0, 0, 0], [0, 1, 0], [0, 2, 0], [0, 2.5, 0.1], [0, 3, 0.2]], np.float32)
+        rest = np.array([[0, 0, 0], [0, 1, 0], [0, 2, 0], [0, 2.5, 0.1], [0, 3, 0.2]])
         positions = along[:, None, :] * rest[None, :, 1:2]
-        clip = athcodec.MotionClip(
-            positions.astype(np.float32),
-            time,
-            rest=rest,
-            vertex_branch=np.array([0, 0, 0, 1, 1], np.int32),
-            branch_parent=np.array([-1, 0], np.int32),
-        )
+        clip = clip_of(positions, rest, np.array([0, 0, 0, 1, 1]), np.array([-1, 0]))
         return size_at(clip, 1e-4, tmp_path / "a.ath", **about_rest)
 
     assert swaying(angle) <= 1.25 * swaying(0.0)

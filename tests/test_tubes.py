@@ -3,22 +3,17 @@ everywhere. And leaves that turn far from frame to frame."""
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
+from files import coded
 from moving_meshes import leafed_tree
-from plants import clip_of, tube
+from plants import clip_of, ring_quads, tube
 
 import athcodec
 from athcodec.encoding import streams
 from athcodec.encoding.rings import ring_sizes
 from athcodec.motion.clip import MotionClip
-
-sys.path.append(str(Path(__file__).resolve().parent.parent))  # for spec, which is not installed
-
-from spec.document import File  # noqa: E402
+from spec.document import File
 
 SIDES, RINGS, TWIGS = 6, 12, 9
 RADIUS = 0.004
@@ -51,11 +46,8 @@ def twigs(frames: int = 40) -> MotionClip:
 
 def quads() -> np.ndarray:
     """(F, 4) of the twigs."""
-    lower = np.concatenate([RINGS + SIDES * (RINGS * twig + np.arange(RINGS - 1)) for twig in range(TWIGS)])[:, None]
-    side, following = np.arange(SIDES), (np.arange(SIDES) + 1) % SIDES
-    upper = lower + SIDES
-    faces = np.stack([lower + side, lower + following, upper + following, upper + side], axis=2)
-    return faces.reshape(-1, 4).astype(np.int32)
+    first = RINGS + RINGS * SIDES * np.arange(TWIGS)
+    return (ring_quads(RINGS, SIDES) + first[:, None, None]).reshape(-1, 4).astype(np.int32)
 
 
 def around_rings(frames: np.ndarray) -> np.ndarray:
@@ -105,8 +97,7 @@ def first(clip: MotionClip, count: int) -> MotionClip:
 def test_twigs_keep_their_thickness_at_loose_bounds(scratch, bound, options):
     """A bound of ten times their thickness left rings that were off by a third."""
     clip = twigs()
-    athcodec.encode(clip, scratch / "twigs.ath", rel_error=bound, attributes="none", **options)
-    with athcodec.open(scratch / "twigs.ath") as decoder:
+    with coded(clip, scratch / "twigs.ath", rel_error=bound, attributes="none", **options) as decoder:
         assert np.all(decoder.file.branches["ring"][1:] == SIDES)
         decoded = decoder.positions().astype(np.float64)
     stretch = np.abs(around_rings(decoded) / around_rings(np.asarray(clip.positions, np.float64)) - 1)
@@ -117,8 +108,7 @@ def test_twigs_keep_their_thickness_at_loose_bounds(scratch, bound, options):
     "options", [{"rel_error": 1e-3, "ladder": "none"}, pytest.param({"rel_error": 1e-5}, marks=pytest.mark.vectors)]
 )
 def test_the_document_plays_the_same_tubes(scratch, options):
-    athcodec.encode(twigs(12), scratch / "twigs.ath", attributes="none", **options)
-    document = File((scratch / "twigs.ath").read_bytes())
+    document = File(athcodec.encode(twigs(12), scratch / "twigs.ath", attributes="none", **options).path.read_bytes())
     assert any(branch.ring for branch in document.file.branches)
     with athcodec.open(scratch / "twigs.ath") as decoder:
         for level in range(len(decoder.levels)):
@@ -137,8 +127,7 @@ def test_leaves_that_turn_by_more_than_a_right_angle_between_frames_do_not_tumbl
             base = positions[t, card[0]]
             positions[t, card] = base + (positions[t, card] - base) @ rotation(rng).T
     clip = tree.replace(positions=positions.astype(np.float32))
-    athcodec.encode(clip, scratch / "tree.ath", rel_error=1e-2, ladder="none", attributes="none")
-    with athcodec.open(scratch / "tree.ath") as decoder:
+    with coded(clip, scratch / "tree.ath", rel_error=1e-2, ladder="none", attributes="none") as decoder:
         shown = decoder.positions().astype(np.float64)
     across = [frames[:, numbers[:, 2]] - frames[:, numbers[:, 0]] for frames in (positions, shown)]
     source, decoded = (vectors / np.linalg.norm(vectors, axis=2, keepdims=True) for vectors in across)

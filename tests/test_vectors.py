@@ -10,14 +10,12 @@ from pathlib import Path
 
 import pytest
 
+from athcodec import errors
+from athcodec.decoding import container
+from athcodec.decoding.ath_file import AthFile
+from spec import conformance
+
 ROOT = Path(__file__).resolve().parent.parent
-sys.path.append(str(ROOT))  # for spec, which is not installed; athcodec stays the installed one
-
-from athcodec import errors  # noqa: E402
-from athcodec.decoding import container  # noqa: E402
-from athcodec.decoding.ath_file import AthFile  # noqa: E402
-from spec import conformance  # noqa: E402
-
 VECTORS = conformance.vectors()
 
 

@@ -75,16 +75,6 @@ def test_so_is_every_other_of_any_format(suffix, clip, power, wide, options, cap
     holds(tmp_path, suffix, clip, 10.0**power, wide, options, capsys)
 
 
-def test_errors_of_tiny_and_huge_motions_are_measured_by_their_true_size():
-    """Squares of them are no numbers any more."""
-    from athcodec.metrics import ErrorMeter
-
-    for scale in (1e-200, 1e-162, 1.0, 1e160):
-        meter = ErrorMeter()
-        meter.add(np.zeros((1, 2, 3)), np.array([[[3 * scale, 0, 4 * scale], [0, 0, 0]]]))
-        assert np.isclose(meter.max_error, 5 * scale, rtol=1e-12, atol=0)
-
-
 # ---- the error table ----
 
 

@@ -21,20 +21,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from plants import clip_of, tube
+from plants import bending_tube, clip_of
 
 import athcodec
 from athcodec import cli
 from athcodec.decoding import container as ct
 from athcodec.viewer import view
 from athcodec.viewer.build_viewer import MOST_BYTES, own_bytes
+from bench import throttled_server
+from bench.throttled_server import WEB, ThrottledServer
+from bench.trees.plant import grow
 
 ROOT = Path(__file__).resolve().parent.parent
-sys.path.append(str(ROOT))  # for bench, which is not installed; athcodec stays the installed one
-
-from bench import throttled_server  # noqa: E402
-from bench.throttled_server import WEB, ThrottledServer  # noqa: E402
-from bench.trees.plant import grow  # noqa: E402
 
 pytestmark = pytest.mark.web
 
@@ -196,36 +194,14 @@ def test_the_npm_package_installs_from_its_tarball(tmp_path):
 
     tarball = npm("pack", "--silent", "--pack-destination", str(tmp_path), cwd=VIEWER).split()[-1]
     (tmp_path / "package.json").write_text('{"type": "module", "private": true}')
-    npm(
-        "install",
-        "--silent",
-        "--no-audit",
-        "--no-fund",
-        f"./{tarball}",
-        "three@0.187.0",
-        "typescript@5.9.3",
-        "@types/three",
-        "@gltf-transform/core@4.5.1",
-        cwd=tmp_path,
-    )
+    packages = "three@0.187.0 typescript@5.9.3 @types/three @gltf-transform/core@4.5.1".split()
+    npm("install", "--silent", "--no-audit", "--no-fund", f"./{tarball}", *packages, cwd=tmp_path)
     (tmp_path / "use.mjs").write_text(PACKED)
     done = subprocess.run(["node", "use.mjs"], cwd=tmp_path, capture_output=True, text=True)
     wanted = ["function", "function", True, "/x/ath_worker.js", "ATH_motion", "ATH_motion", "function"]
     assert json.loads(done.stdout) == wanted, done.stderr
     (tmp_path / "use.ts").write_text(TYPED)
-    command = [
-        "npx",
-        "tsc",
-        "--noEmit",
-        "--strict",
-        "--target",
-        "esnext",
-        "--module",
-        "esnext",
-        "--moduleResolution",
-        "bundler",
-        "use.ts",
-    ]
+    command = "npx tsc --noEmit --strict --target esnext --module esnext --moduleResolution bundler use.ts".split()
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
     assert done.returncode == 0, done.stdout
 
@@ -285,22 +261,14 @@ def gusty_tree():
         swing = gust * np.sin(rng.uniform(3, 9) * time_ + rng.uniform(0, 6))
         along = np.linspace(0, 1, len(mine)) ** 2
         positions[:, mine] += swing[:, None, None] * along[:, None] * rng.normal(size=3) * 0.15
-    return clip_of(
-        positions,
-        plant.position,
-        plant.branch,
-        plant.branch_parent,
-        edges=plant.edges,
-        attributes={"radius": plant.radius.astype(np.float32)},
-        metadata={"unit": "m", "up_axis": "y"},
-    )
+    more = {"attributes": {"radius": plant.radius.astype(np.float32)}, "metadata": {"unit": "m", "up_axis": "y"}}
+    return clip_of(positions, plant.position, plant.branch, plant.branch_parent, edges=plant.edges, **more)
 
 
 @pytest.fixture(scope="module")
 def gusty_ath(gusty_tree, tmp_path_factory):
     path = tmp_path_factory.mktemp("gusty") / "gusty.ath"
-    athcodec.encode(gusty_tree, path, rel_error=1e-4, effort="fast")
-    return path
+    return athcodec.encode(gusty_tree, path, rel_error=1e-4, effort="fast").path
 
 
 @pytest.fixture(scope="module")
@@ -308,16 +276,9 @@ def windy_ath(gusty_tree, tmp_path_factory):
     """Three clips of that tree: a calm that was blended into a loop, a gust, and a storm that is one."""
 
     def part(start: int, stop: int, force: float):
-        rest = gusty_tree.rest
-        return clip_of(
-            rest + force * (gusty_tree.block(start, stop) - rest),
-            rest,
-            gusty_tree.vertex_branch,
-            gusty_tree.branch_parent,
-            edges=gusty_tree.edges,
-            attributes=gusty_tree.attributes,
-            metadata=gusty_tree.metadata,
-        )
+        rest, moved = gusty_tree.rest, gusty_tree.block(start, stop)
+        positions = (rest + force * (moved - rest)).astype(np.float32)
+        return gusty_tree.replace(positions=positions, time=np.arange(len(moved)) / 30)
 
     clips = {
         "calm": athcodec.looped(part(0, 40, 0.3), blend=8),
@@ -325,8 +286,7 @@ def windy_ath(gusty_tree, tmp_path_factory):
         "storm": athcodec.looped(part(60, 120, 1.6), blend=20),
     }
     path = tmp_path_factory.mktemp("windy") / "windy.ath"
-    athcodec.encode(athcodec.join(clips), path, rel_error=1e-4, effort="fast", segment_frames=16)
-    return path
+    return athcodec.encode(athcodec.join(clips), path, rel_error=1e-4, effort="fast", segment_frames=16).path
 
 
 class HeldServer(ThrottledServer):
@@ -1012,15 +972,8 @@ def ink(page) -> float:
 @browser_test
 def test_meshes_of_all_kinds_are_drawn(opened, tmp_path):
     """Faces of four corners; of different sizes; uv per corner."""
-    clip = tube(40, 12, 30)
-    quads = np.array(
-        [
-            [12 * r + k, 12 * r + (k + 1) % 12, 12 * r + 12 + (k + 1) % 12, 12 * r + 12 + k]
-            for r in range(39)
-            for k in range(12)
-        ],
-        np.int32,
-    )
+    clip = bending_tube()
+    quads = clip.faces
     mixed = {"face_vertex_counts": np.full(len(quads), 4, np.int32), "face_vertex_indices": quads.ravel()}
     mixed["face_vertex_counts"][0] = 3
     mixed["face_vertex_indices"] = np.delete(quads.ravel(), 3)
@@ -1034,8 +987,7 @@ def test_meshes_of_all_kinds_are_drawn(opened, tmp_path):
     for name, (clip.faces, clip.attributes, clip.metadata) in cases.items():
         clip.metadata = clip.metadata | {"up_axis": "z"}
         clip.check()
-        athcodec.encode(clip, tmp_path / name, rel_error=1e-3)
-        files[name] = (tmp_path / name).read_bytes()
+        files[name] = athcodec.encode(clip, tmp_path / name, rel_error=1e-3).path.read_bytes()
     with ThrottledServer(files) as line:
         for name in files:
             page = opened(line.page(name))
@@ -1047,12 +999,8 @@ def test_meshes_of_all_kinds_are_drawn(opened, tmp_path):
             }""")
             triangles = 2 * len(quads) - (name == "mixed.ath")
             vertices = quads.size if name == "corners.ath" else clip.vertex_count
-            assert mesh == {
-                "index": 3 * triangles,
-                "vertices": vertices,
-                "normal": vertices,
-                "uv": vertices if name == "corners.ath" else 0,
-            }
+            uv = vertices if name == "corners.ath" else 0
+            assert mesh == {"index": 3 * triangles, "vertices": vertices, "normal": vertices, "uv": uv}
             page.wait_for_function("() => athcodecViewer.counters.pictures > 1")
             assert ink(page) > 0.01, name
 
@@ -1068,19 +1016,8 @@ def smooth_normals(positions: np.ndarray, quads: np.ndarray) -> np.ndarray:
 
 @browser_test
 def test_normals_turn_with_the_surface_at_every_level(opened, tmp_path):
-    clip = tube(40, 12, 30)
-    quads = np.array(
-        [
-            [12 * r + k, 12 * r + (k + 1) % 12, 12 * r + 12 + (k + 1) % 12, 12 * r + 12 + k]
-            for r in range(39)
-            for k in range(12)
-        ],
-        np.int32,
-    )
-    clip.positions = clip.positions * np.float32(1)
-    clip.positions[..., 0] += 0.06 * clip.rest[:, 2] ** 2  # so that it has turned far
-    clip.faces = quads
-    clip.check()
+    clip = bending_tube()
+    quads = clip.faces
     path = tmp_path / "tube.ath"
     athcodec.encode(clip, path, rel_error=1e-3)
     with ThrottledServer({"tube.ath": path.read_bytes()}) as line, athcodec.open(path) as decoder:

@@ -10,22 +10,22 @@ import re
 import shutil
 import subprocess
 import sys
-from ctypes import POINTER, byref, c_double, c_int, c_int32, c_size_t, c_void_p, create_string_buffer
 from pathlib import Path
 
 import numpy as np
 import pytest
+from header import core
 from plants import awkward, clip_of, grow, plant, random_hierarchy
+from test_core import FILE_ORDER, OK, SOURCE_ORDER, Player, cut
 
 import athcodec
-from athcodec._library import load_library
+from athcodec._native import MEASURES
 
 pytestmark = pytest.mark.web
 
 VIEWER = Path(__file__).resolve().parent.parent / "athcodec" / "viewer"
 MODULE = VIEWER / "ath_decoder.mjs"
 MOST_BYTES = 170_000
-OK, HELD, NOT_PREPARED = 0, 65, 67
 
 
 # ---- Node ----
@@ -67,120 +67,6 @@ def run_node(tmp_path, script: str, *words):
     done = subprocess.run([node, str(file), *map(str, words)], capture_output=True, text=True, timeout=120)
     assert done.returncode == 0, done.stderr
     return json.loads(done.stdout)
-
-
-# ---- the C library, by ath.h ----
-
-
-class Info(ctypes.Structure):
-    """The front of ath_info."""
-
-    _fields_ = [(name, ctypes.c_uint64) for name in ("file_length", "prelude_length")]
-    _fields_ += [("max_error", c_double), ("origin", c_double * 3)]
-    _fields_ += [
-        (name, c_int32)
-        for name in (
-            "vertex_count",
-            "branch_count",
-            "frame_count",
-            "segment_count",
-            "clip_count",
-            "level_count",
-            "full_level_count",
-            "layer_count",
-            "depth_levels",
-            "node_count",
-            "chunk_count",
-            "is_float64",
-        )
-    ]
-    _fields_ += [("more", c_int32 * 16)]
-
-
-class Clip(ctypes.Structure):
-    _fields_ = [("name", ctypes.c_char_p), ("duration", c_double)]
-    _fields_ += [
-        (name, c_int32) for name in ("first_frame frame_count first_segment segment_count loop reserved").split()
-    ]
-
-
-class Native:
-    """A file opened by the C library, all of it fed."""
-
-    def __init__(self, data: bytes):
-        self.lib = load_library()
-        for name in ("ath_build_size", "ath_work_size", "ath_segment_size"):
-            getattr(self.lib, name).restype = c_size_t
-        for name in ("ath_times", "ath_branches", "ath_clips"):
-            getattr(self.lib, name).restype = c_void_p
-        for name in ("ath_frame_at", "ath_seam_error", "ath_level_error"):
-            getattr(self.lib, name).restype = c_double
-        self.kept = [create_string_buffer(data, len(data))]
-        front, size = c_size_t(), c_size_t()
-        assert self.lib.ath_front(self.kept[0], c_size_t(len(data)), None, byref(front), byref(size), None) == OK
-        self.file = self.block(size.value)
-        assert self.lib.ath_open(self.file, size, self.kept[0], c_size_t(len(data)), None, None) == OK
-        size = c_size_t(self.lib.ath_build_size(self.file))
-        assert self.lib.ath_build(self.file, self.block(size.value), size) == OK
-        self.info = Info()
-        self.lib.ath_get_info(self.file, byref(self.info))
-
-    def block(self, size: int) -> c_void_p:
-        """Memory aligned to 16."""
-        memory = create_string_buffer(size + 16)
-        self.kept.append(memory)
-        return c_void_p(ctypes.addressof(memory) + -ctypes.addressof(memory) % 16)
-
-    def prepare(self, level: int):
-        """Pointers to all segments."""
-        needed = c_size_t()
-        assert self.lib.ath_refine_size(self.file, c_int32(level), byref(needed), None) == OK
-        assert self.lib.ath_refine(self.file, c_int32(level), self.block(needed.value), needed) == OK
-        work, size = (
-            c_size_t(self.lib.ath_work_size(self.file)),
-            c_size_t(self.lib.ath_segment_size(self.file, c_int32(level))),
-        )
-        segments = [self.block(size.value) for _ in range(self.info.segment_count)]
-        scratch = self.block(work.value)
-        for i, segment in enumerate(segments):
-            assert self.lib.ath_prepare(scratch, work, self.file, i, level, segment, size) == OK
-        return (c_void_p * len(segments))(*segments)
-
-    def cut(self, level: int) -> tuple[int, int]:
-        """(nodes, exact vertices)."""
-        nodes, exact = c_int32(), c_int32()
-        self.lib.ath_cut_size(self.file, level, None, byref(nodes), byref(exact))
-        return nodes.value, exact.value
-
-    def show(self, function: str, shape, dtype, segments, frame: float, *order) -> np.ndarray:
-        out = np.zeros(shape, dtype)
-        result = getattr(self.lib, function)(
-            self.file,
-            segments,
-            c_int32(len(segments)),
-            c_double(frame),
-            *order,
-            c_void_p(out.ctypes.data),
-            c_size_t(out[:1].nbytes),
-        )
-        assert result == OK
-        return out
-
-    def positions(self, segments, frame: float, order: int = 1, dtype=np.float32) -> np.ndarray:
-        name = "ath_positions" if dtype == np.float32 else "ath_positions_float64"
-        return self.show(name, (self.info.vertex_count, 3), dtype, segments, frame, c_int(order))
-
-    def level_name(self, level: int) -> str:
-        text = create_string_buffer(32)
-        self.lib.ath_level_name(self.file, level, text, c_size_t(len(text)))
-        return text.value.decode()
-
-    def level_error(self, level: int, first: int) -> dict:
-        last = self.info.segment_count - 1
-        return {
-            name: self.lib.ath_level_error(self.file, level, first, last, measure)
-            for measure, name in enumerate(("max", "p99", "rms"))
-        }
 
 
 def digest(*arrays) -> str:
@@ -230,7 +116,7 @@ def any_ath(request, tmp_path_factory, sample_ath, bushy_ath, full_ath, medley_a
     if request.param == "wide":
         clip = awkward(seed=8, branches=9, frames=40, dtype=np.float64, offset=1e3, motion="sway")
         athcodec.encode(clip, path, rel_error=1e-5, segment_frames=16, effort="fast")
-        assert Native(path.read_bytes()).info.is_float64 == 1
+        assert Player(path.read_bytes()).info.is_float64 == 1
     elif request.param == "exact rest":
         athcodec.encode(plant(seed=2, roots=2, offset=50.0), path, exact_rest=True, effort="fast")
     else:
@@ -268,27 +154,30 @@ answer(levels);
 
 
 def test_every_level_shows_the_bits_of_the_c_library_at_and_between_frames(any_ath, tmp_path):
-    native = Native(any_ath.read_bytes())
-    times = times_between(native.info.frame_count)
-    wanted = []
-    for level in range(native.info.level_count):
-        segments = native.prepare(level)
-        (nodes, exact), all_frames = native.cut(level), range(native.info.frame_count)
-        wanted.append(
-            {
-                "frames": digest(*(native.positions(segments, t) for t in all_frames)),
-                "wide": digest(*(native.positions(segments, t, dtype=np.float64) for t in all_frames)),
-                "between": [
-                    digest(
-                        native.positions(segments, t, order=0),
-                        native.show("ath_matrices", (nodes, 12), np.float32, segments, t),
-                        native.show("ath_exact", (exact, 3), np.float32, segments, t),
-                        native.show("ath_matrices_float64", (nodes, 12), np.float64, segments, t),
-                    )
-                    for t in times
-                ],
-            }
-        )
+    player, wanted = Player(any_ath.read_bytes()), []
+    vertices, every = player.info.vertex_count, range(player.info.frame_count)
+    times = times_between(player.info.frame_count)
+    for level in player.levels:
+        prepared, (_, nodes, exact) = player.prepare_all(level), cut(player, level)
+
+        def shown(name: str, rows: int, width: int, frame: float, *order: int, dtype=np.float32, prepared=prepared):
+            out = np.zeros((rows, width), dtype)
+            show = *player.at(prepared, frame), *order, out.ctypes.data, width * out.itemsize
+            assert getattr(core, f"ath_{name}")(*show) == OK
+            return out
+
+        wide = (shown("positions_float64", vertices, 3, t, SOURCE_ORDER, dtype=np.float64) for t in every)
+        between = [
+            digest(
+                shown("positions", vertices, 3, t, FILE_ORDER),
+                shown("matrices", nodes, 12, t),
+                shown("exact", exact, 3, t),
+                shown("matrices_float64", nodes, 12, t, dtype=np.float64),
+            )
+            for t in times
+        ]
+        frames = digest(*(player.frame(prepared, t) for t in every))
+        wanted.append({"frames": frames, "wide": digest(*wide), "between": between})
     assert run_node(tmp_path, SHOW, any_ath, json.dumps(times)) == wanted
 
 
@@ -318,60 +207,52 @@ answer({
 
 
 def test_the_module_describes_a_file_as_the_c_library_does(any_ath, tmp_path):
-    native = Native(any_ath.read_bytes())
-    lib, file, info = native.lib, native.file, native.info
+    player = Player(any_ath.read_bytes())
+    file, info, last = player.address, player.info, player.info.segment_count - 1
     rest, wide = np.zeros((info.vertex_count, 3), np.float32), np.zeros((info.vertex_count, 3))
-    assert lib.ath_read_rest(file, None) == 0
-    lib.ath_rest(file, 1, c_void_p(rest.ctypes.data), c_size_t(12))
-    lib.ath_rest_float64(file, 0, c_void_p(wide.ctypes.data), c_size_t(24))
+    assert core.ath_read_rest(file, None) == OK
+    core.ath_rest(file, SOURCE_ORDER, rest.ctypes.data, 12)
+    core.ath_rest_float64(file, FILE_ORDER, wide.ctypes.data, 24)
     seconds = [-1, 0, 0.05, 0.4, 1, 7.77, 1e9, float("nan")]
 
-    def level_for(measure: int, distance: float) -> int:
-        numbers = map(c_double, (distance, 0.8, 1080, 1))
-        return lib.ath_level_for(file, 0, info.segment_count - 1, measure, *numbers)
+    def error(level: int, first: int) -> dict[str, float]:
+        return {name: core.ath_level_error(file, level, first, last, i) for i, name in enumerate(MEASURES)}
 
+    def level_for(measure: int, distance: float) -> int:
+        return core.ath_level_for(file, 0, last, measure, distance, 0.8, 1080, 1)
+
+    def level_name(level: int) -> str:
+        text = ctypes.create_string_buffer(32)
+        core.ath_level_name(file, level, text, len(text))
+        return text.value.decode()
+
+    counts = "vertex branch frame segment clip level full_level node chunk".split()
     wanted = {
         "info": [
-            info.file_length,
-            info.prelude_length,
-            info.max_error,
-            list(info.origin),
-            info.vertex_count,
-            info.branch_count,
-            info.frame_count,
-            info.segment_count,
-            info.clip_count,
-            info.level_count,
-            info.full_level_count,
-            info.node_count,
-            info.chunk_count,
+            *(info.file_length, info.prelude_length, info.max_error, list(info.origin)),
+            *(getattr(info, f"{name}_count") for name in counts),
             bool(info.is_float64),
         ],
-        "branches": digest(np.frombuffer(ctypes.string_at(lib.ath_branches(file), 44 * info.branch_count), np.int32)),
-        "times": list(ctypes.cast(lib.ath_times(file), POINTER(c_double))[: info.frame_count]),
+        "branches": digest(np.ctypeslib.as_array(core.ath_branches(file), (info.branch_count,))),
+        "times": core.ath_times(file)[: info.frame_count],
         "rest": [digest(rest), digest(wide)],
-        "errors": [
-            [native.level_error(level, segment) for segment in (0, info.segment_count - 1)]
-            for level in range(info.level_count)
-        ],
+        "errors": [[error(level, segment) for segment in (0, last)] for level in player.levels],
         "frameAt": [
-            [[lib.ath_frame_at(file, clip, c_double(s), wrap) for s in seconds] for clip in range(info.clip_count)]
+            [[core.ath_frame_at(file, clip, s, wrap) for s in seconds] for clip in range(info.clip_count)]
             for wrap in range(4)
         ],
         "clips": [
             [
-                clip.name.decode(),
-                clip.duration,
-                clip.first_frame,
-                clip.frame_count,
-                clip.first_segment,
-                clip.segment_count,
-                bool(clip.loop),
-                [lib.ath_seam_error(file, i, level) for level in range(info.level_count)],
+                *(clip.name.decode(), clip.duration, clip.first_frame, clip.frame_count, clip.first_segment),
+                *(
+                    clip.segment_count,
+                    bool(clip.loop),
+                    [core.ath_seam_error(file, i, level) for level in player.levels],
+                ),
             ]
-            for i, clip in enumerate(ctypes.cast(lib.ath_clips(file), POINTER(Clip))[: info.clip_count])
+            for i, clip in enumerate(player.clips)
         ],
-        "names": [native.level_name(level) for level in range(info.level_count)],
+        "names": [level_name(level) for level in player.levels],
         "levelFor": [level_for(0, distance) for distance in (0, 0.1, 1, 10, 100, 1e4, 1e6)],
         "levelForMost": [level_for(1, distance) for distance in (0.1, 1, 10, 100, 1e4)],
     }

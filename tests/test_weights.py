@@ -6,6 +6,7 @@ import json
 
 import numpy as np
 import pytest
+from files import coded
 from plants import plant
 
 import athcodec
@@ -32,8 +33,7 @@ def twiggy():
 @pytest.mark.parametrize("effort", ["fast", "default", "best"])
 def test_every_vertex_keeps_its_own_bound(twiggy, tmp_path, effort):
     weights = twiggy.attributes["slack"]
-    athcodec.encode(twiggy, tmp_path / "a.ath", max_error=0.02, weights="slack", effort=effort)
-    with athcodec.open(tmp_path / "a.ath") as decoder:
+    with coded(twiggy, tmp_path / "a.ath", max_error=0.02, weights="slack", effort=effort) as decoder:
         errors = largest_errors(twiggy, decoder)
         assert (errors <= 0.02 * weights).all()
         assert errors.max() > 0.02, "nothing was coarser where it might be"
@@ -49,8 +49,7 @@ def test_coarser_vertices_make_a_smaller_file(twiggy, tmp_path):
 
 def test_weights_may_be_an_array_and_are_kept(twiggy, tmp_path):
     weights = twiggy.attributes.pop("slack")
-    athcodec.encode(twiggy, tmp_path / "a.ath", max_error=0.02, weights=weights)
-    with athcodec.open(tmp_path / "a.ath") as decoder:
+    with coded(twiggy, tmp_path / "a.ath", max_error=0.02, weights=weights) as decoder:
         assert np.array_equal(decoder.file.error_weights, weights)
     assert "error_weights" not in twiggy.attributes
 

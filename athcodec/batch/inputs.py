@@ -37,7 +37,7 @@ TAGS = (
     "md5Hash",
     "generation",
     "created",
-)  # what file systems say of a file that changes with it
+)  # File systems report these fields differently once a file has changed.
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ class Item:
 
     @property
     def fingerprint(self) -> str:
-        """Of the output: short, and of plain characters whatever the names have."""
+        """Return a name for the output: short, and of plain characters whatever the inputs' names have."""
         return hashlib.sha256(os.fsencode(self.output)).hexdigest()[:16]
 
     @property
@@ -229,7 +229,7 @@ def download(url: str, path: str) -> str:
         system.get_file(source, path)
     except Exception as error:
         if isinstance(error, OSError) and error.errno and error.filename == path:
-            raise  # of the local disk
+            raise  # The local disk failed, which no retry mends.
         raise RemoteError(f"{without_secrets(url)}: {type(error).__name__}: {_one_line(error)}") from None
     return sha256(path)
 
@@ -283,7 +283,7 @@ def _files_identity(paths: list[str]) -> dict[str, Any]:
 
 
 def remote_identity(url: str) -> dict[str, Any]:
-    """What the file system says of a file now: listings may be old, or tell times more exactly. Raises RemoteError."""
+    """Return present facts of a file: listings may be old, or tell times more exactly. Raises RemoteError."""
     system, path = file_system(url)
     system.invalidate_cache()
     try:
@@ -294,6 +294,6 @@ def remote_identity(url: str) -> dict[str, Any]:
 
 
 def sha256(path: str | os.PathLike[str]) -> str:
-    """Of a file's content. Raises OSError."""
+    """Return the digest of a file's content. Raises OSError."""
     with open(path, "rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()

@@ -47,7 +47,7 @@ class SchedulerError(AthError):
 
 @dataclass
 class Outcome:
-    """What a run did.
+    """The result of a run.
 
     Attributes
     ----------
@@ -100,7 +100,7 @@ def preview(
     manifest: str | os.PathLike[str] | None = None,
     redo: bool = False,
 ) -> list[Todo]:
-    """What `run` would do with each clip. Nothing is written.
+    """Return what `run` would do with each clip. Nothing is written.
 
     Parameters
     ----------
@@ -220,7 +220,7 @@ def _tidy(outputs: Iterable[str]) -> None:
 
 
 def _key(item: Item, output: str | os.PathLike[str]) -> str:
-    """What the manifest calls an output: the directory may be moved with it."""
+    """Return the manifest's name for an output: the directory may be moved with it."""
     if is_url(item.output):
         return item.output[len(os.fspath(output).rstrip("/")) + 1 :]
     return Path(os.path.relpath(item.output, output)).as_posix()
@@ -293,7 +293,7 @@ def _client(workers: int | None, scheduler: str | None) -> Iterator[Any]:
     """A client of Dask: of a scheduler that is there, or of processes of our own, which go with it."""
     import distributed
 
-    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # of workers that die the manifest has a record
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # The manifest records workers that die.
     if scheduler is None:
         with _cluster(workers or os.cpu_count() or 1) as cluster, distributed.Client(cluster) as client:
             yield client
@@ -376,11 +376,11 @@ class _Run:
             self.client.unsubscribe_topic(self.topic)
 
     def _folder(self, item: Item) -> str:
-        """Of one clip in the scratch folder."""
+        """Paths of one clip in the scratch folder."""
         return os.path.join(self.folder, item.fingerprint)
 
     def _submit(self, item: Item, what: str, function: Any, *arguments: Any, **options: Any) -> Any:
-        """Of clips that were begun the rest comes first."""
+        """Put the remaining steps of clips that were begun first."""
         future = self.client.submit(function, item, *arguments, **options, pure=False, priority=what != "begin")
         self.pending[future.key] = item, what, future
         future.add_done_callback(self.finished.put)

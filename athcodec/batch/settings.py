@@ -29,7 +29,7 @@ from athcodec.motion.units import parse_length, parse_size
 from athcodec.options import EFFORTS, HOST, MAX_SEGMENT, METHODS, MIN_SEGMENT, ladder_of
 from athcodec.sources import FORMATS, format_named
 
-BOUNDS = ("max_error", "rel_error", "target_size")  # of which a clip has one
+BOUNDS = ("max_error", "rel_error", "target_size")  # A clip is encoded with exactly one of these.
 READING = (
     "source_format",
     "rest",
@@ -50,7 +50,7 @@ SHAPING = (
     "endless",
     "strength",
     "heading",
-)  # what is made of a clip before it is coded
+)  # These settings change a clip before it is encoded.
 
 Settings = dict[str, Any]
 
@@ -132,7 +132,7 @@ def check_settings(
 
 
 def settings_of(names: tuple[str, ...], default: Settings, patterns: Mapping[str, Settings]) -> Settings:
-    """Those of a clip that is called any of `names`: what all patterns say that one of them fits."""
+    """Return the settings of a clip that is called any of `names`: those of all patterns that fit one of them."""
     merged = dict(default)
     for pattern, settings in patterns.items():
         if any(fnmatchcase(name, pattern) for name in names):

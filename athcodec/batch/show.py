@@ -18,12 +18,12 @@ if TYPE_CHECKING:
     from athcodec.batch.inputs import Item
 from athcodec.files.shown import shown
 
-ROWS = 20  # of the live table
+ROWS = 20  # Rows that the live table shows.
 ENDED = ("done", "failed", "kept")
 
 
 class Show:
-    """What a run reports; this base class shows nothing. `stage` is called by another thread than the others."""
+    """Receiver of a run's reports; this base class shows nothing. Another thread calls `stage` than the others."""
 
     def begin(self, items: Sequence[Item], kept: int) -> None:
         """Before the first clip; the files of `kept` further ones are up to date."""

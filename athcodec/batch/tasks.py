@@ -1,4 +1,4 @@
-"""What workers do: encode a clip, or the three steps of a long one, and return the result as plain dictionaries.
+"""Tasks of the workers: encode a clip, or the three steps of a long one, and return the result as plain dictionaries.
 
 `begin` encodes a clip of few segments, and of others makes the draft, `code` some of its segments, `finish` the file.
 Draft and coded segments lie as files in the run's scratch folder, beside the outputs, which all workers see under the

@@ -17,7 +17,7 @@ from pathlib import Path
 
 from athcodec.files.atomic import new_file
 
-PYTHONS = ("3.11", "3.13")  # of Blender 4.2 to 5.0, and from 5.1
+PYTHONS = ("3.11", "3.13")  # Blender 4.2 to 5.0 has the first, Blender 5.1 and later the second.
 NEEDED = ("zstandard",)
 EXTENSION = Path(__file__).resolve().parent / "extension"
 PLATFORMS = {"linux": "linux", "manylinux": "linux", "win": "windows", "macosx": "macos"}
@@ -101,7 +101,8 @@ def _fetched(wheels: Sequence[Path], folder: Path) -> list[Path]:
 
 
 def _pip_platforms(tag: str) -> list[str]:
-    """What pip may choose for a platform: a wheel that was built here is for "linux", published ones for manylinux."""
+    """Return the tags that pip may choose for a platform: a wheel that was built here is for "linux", published ones
+    for manylinux."""
     machine = tag.removeprefix("linux_")
     if machine != tag:
         return [f"manylinux2014_{machine}", f"manylinux_2_17_{machine}", f"manylinux_2_28_{machine}"]

@@ -85,7 +85,7 @@ def _endless(name: str, clip: MotionClip) -> MotionClip:
 def _checked_names(
     names: Sequence[str], clip_count: int, args: argparse.Namespace
 ) -> tuple[Sequence[str], Sequence[str]]:
-    """Those of the loops, and of the clips without an end. ClipError where they do not fit the clips."""
+    """Return the names of the loops and of the clips without an end. ClipError where they do not fit the clips."""
     if len(names) != clip_count:
         raise ClipError(f"--names: got {len(names)}, expected {clip_count}, one for each clip")
     loops, endless = (names if given == ["all"] else given or [] for given in (args.loop, args.endless))
@@ -121,7 +121,7 @@ def _say_takes(clip: MotionClip, path: str, args: argparse.Namespace) -> None:
 
 
 def view_to_decode(decoder: Decoder, args: argparse.Namespace) -> ClipView:
-    """What of a file is decoded: frames of a clip, or all clips."""
+    """Return the part of a file to decode: frames of a clip, or all clips."""
     level, of_one = args.level, args.clip is not None or len(decoder.file.clips) == 1
     if args.max_error is not None:
         length = args.max_error.in_scene_units(decoder.metadata.get("unit"))
@@ -285,7 +285,7 @@ def measure_against(decoder: Decoder, source: str, clip: MotionClip) -> list[dic
 
 
 def tick_ratios(decoder: Decoder) -> list[list[float | None]]:
-    """Of each clip, at each level that is complete, how much more it jerks near seams than in its median frame."""
+    """Return how much more each clip jerks near seams than in its median frame, at each complete level."""
     ratios: list[list[float | None]] = []
     with progress() as report:
         for clip in decoder.file.clips:
@@ -353,7 +353,7 @@ def check_name(output: str, suffix: str, inputs: Sequence[str] = ()) -> None:
 
 
 def _stats(decoder: Decoder) -> str:
-    """What was read of a file, and what that asked of a server."""
+    """Return how much of a file was read, and by how many requests."""
     requests = getattr(decoder.file.source, "requests", None)
     if requests is None:
         return f"{decoder.file.bytes_read:,} bytes read of {decoder.file.file_length:,}"

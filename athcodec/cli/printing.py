@@ -1,4 +1,4 @@
-"""What the command line shows: tables, JSON, one-line messages, progress."""
+"""Output of the command line: tables, JSON, one-line messages, progress."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ def echo(text: str, *, file: TextIO | None = None, flush: bool = False) -> None:
 
 
 def print_files(facts: list[dict[str, Any]], as_json: bool) -> None:
-    """What facts_of gives of a file, or of each motion of a GLB."""
+    """Return the facts of a file, or of each motion of a GLB."""
     if as_json:
         print_json(facts[0] if len(facts) == 1 else {"motions": facts})
         return
@@ -370,7 +370,7 @@ def say_seam(seam: Seam, path: str) -> None:
 
 
 def one_line(error: Exception) -> str:
-    """What went wrong, where, got, expected. An error that nobody foresaw is named by its class."""
+    """Return what went wrong in one line. An error that nobody foresaw is named by its class."""
     if isinstance(error, OSError) and error.filename is not None:
         return f"{error.filename}: {error.strerror}"
     text = " ".join(str(error).split())

@@ -58,7 +58,7 @@ class Streams:
         return self._output
 
     def send(self) -> None:
-        """What has been written goes to standard output. Raises ClipError where it is more than one file, OSError."""
+        """Copy the written file to standard output. Raises ClipError where it is more than one file, OSError."""
         if not self.writes:
             return
         made = os.listdir(os.path.dirname(self._output))

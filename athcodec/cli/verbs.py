@@ -1,4 +1,4 @@
-"""What each verb of the command line does: a function that takes the parsed arguments and returns the exit code."""
+"""The verbs of the command line: each is a function that takes the parsed arguments and returns the exit code."""
 
 from __future__ import annotations
 

@@ -11,8 +11,8 @@ from dataclasses import replace
 import numpy as np
 
 from athcodec.encoding import quantise as qz
-from athcodec.encoding.motion import Plan, SegmentMotion
-from athcodec.encoding.segment import FINER, Settings, Source, analyse_finely, branch_records, level_streams
+from athcodec.encoding.motion import SegmentMotion
+from athcodec.encoding.segment import FINER, Settings, Source, analyse_finely, level_streams, uncoded_plan
 from athcodec.encoding.survey import Ath
 
 SEGMENTS = 4  # that the mean is taken of
@@ -20,9 +20,8 @@ SEGMENTS = 4  # that the mean is taken of
 
 def mean_pose(source: Source, ath: Ath, settings: Settings) -> np.ndarray:
     """(N, 3) float64 less the origin, file order; settings: the start of a search."""
-    settings = replace(settings, forms=source.sheet_like.astype(np.int32))
-    plan = Plan(branch_records(source.hierarchy, ath, settings), source.clip.vertex_count, source.pool)
-    plan.set_rest(source.rest)
+    settings = replace(settings, forms=source.sheet_like.astype(np.int32), layer=0)
+    plan = uncoded_plan(source, ath, settings)
     some = np.unique(np.linspace(0, len(source.segments) - 1, SEGMENTS).astype(int))
     coefficients, tracks, frames = 0.0, 0.0, 0
     for segment in some:

@@ -44,6 +44,7 @@ from athcodec.encoding.segment import (
     loose_branches,
     thread_count,
     time_components,
+    uncoded_plan,
     with_best_lags,
     with_connected_rest,
 )
@@ -650,11 +651,10 @@ class Search:
         """Of segments spread over the clip, in the steps of the trial that asked first for them."""
         known = self._turning(settings)
         if known not in self._components:
-            prelude, count = self.prelude(settings), len(self.source.segments)
+            plan, count = uncoded_plan(self.source, self.ath, settings), len(self.source.segments)
             some = np.unique(np.linspace(0, count - 1, LEARNING_SEGMENTS).astype(int))
             self._components[known] = components(
-                prelude.plan,
-                (analyse_finely(prelude.plan, settings, self.source.positions(segment)) for segment in some),
+                plan, (analyse_finely(plan, settings, self.source.positions(segment)) for segment in some)
             )
         return self._components[known]
 

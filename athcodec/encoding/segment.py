@@ -338,6 +338,15 @@ def branch_records(hierarchy: Hierarchy, ath: Ath, settings: Settings) -> np.nda
     return branches
 
 
+def uncoded_plan(source: Source, ath: Ath, settings: Settings) -> Plan:
+    """The plan on the rest pose before it is coded. Poses and modes are learned on it, because they would else describe
+    the rounding of the coded pose as well."""
+    branches = branch_records(source.hierarchy, ath, settings)
+    plan = Plan(branches, source.hierarchy.vertex_count, source.pool, layer=settings.layer)
+    plan.set_rest(source.rest)
+    return plan
+
+
 class CodedPrelude:
     """Hierarchy and rest pose as the decoder will have them, for one choice of settings."""
 

@@ -101,7 +101,7 @@ FORMATS = (
 
 @dataclass(frozen=True)
 class Written:
-    """What `write` has written.
+    """The result of `write`.
 
     Parameters
     ----------

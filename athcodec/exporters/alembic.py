@@ -72,7 +72,7 @@ def write_clip(
 
 
 def _send(process: subprocess.Popen, head: Any, motion: Any, report: Callable[[float], None]) -> bytes:
-    """What the process says in the end."""
+    """Return the final answer of the process."""
     try:
         pickle.dump(head, process.stdin, pickle.HIGHEST_PROTOCOL)
         for start, block in motion.blocks():

@@ -33,7 +33,7 @@ class Copies:
 
 
 def fit_copies(motion: Any, objects: list[SceneObject], allowed: float | None = None) -> dict[int, Copies]:
-    """Of those objects that are copies, of the same materials, and that transforms keep within `allowed`, or within
+    """Return the objects that are copies, of the same materials, and that transforms keep within `allowed`, or within
     what the level is off, by their place in the list."""
     allowed = allowed_error(motion) if allowed is None else allowed
     materials = face_materials(motion)
@@ -51,7 +51,7 @@ def fit_copies(motion: Any, objects: list[SceneObject], allowed: float | None = 
 
 
 def cost_of(instanced: dict[int, Copies]) -> dict[str, Any]:
-    """What a writer says of its instances."""
+    """Return the sentence about a writer's instances."""
     if not instanced:
         return {}
     error = max(copies.max_error for copies in instanced.values())

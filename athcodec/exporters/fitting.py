@@ -27,9 +27,9 @@ SMALLEST_SCALE = 1e-4
 HELD = 1e-9  # how much, of a part's own extent, the rotation of the frame before counts
 ROUGHLY = 8  # one frame in so many is looked at first
 WORK_BYTES = 32 << 20
-FINEST = 1e-5  # of the clip's size: nothing finer is asked for
-OF_LEVEL = 1.0  # what a transform may add to the error of the level, as a multiple of it
-OF_CLIP = 1e-4  # of the clip's size, where there is no level
+FINEST = 1e-5  # Smallest tolerance of a fit, over the clip's size.
+OF_LEVEL = 1.0  # Error that a transform may add to the level's, over the level's error.
+OF_CLIP = 1e-4  # Tolerance over the clip's size, for clips without levels.
 
 
 def allowed_error(motion: Any) -> float:
@@ -105,7 +105,7 @@ class Placed:
         return rotation * scale[:, None, :], (found, scale)
 
     def nearest(self, cross: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        scale = self._scale  # of the frame before, which is near
+        scale = self._scale  # The scale of the frame before is a close first guess.
         safe = np.where(self._flat, 1.0, self._spread)
         for _ in range(ROUNDS):
             rotation = _proper(cross * scale[:, None, :] + self._held * self._axes)

@@ -106,7 +106,7 @@ def _write(
 def _writer(
     motion: Any, options: WriteOptions, found: list[GltfMesh | GltfCopies], report: Callable[[float], None]
 ) -> _Joined | _Morphed:
-    """What moves the meshes as the options say."""
+    """Return what moves the meshes, as the options ask."""
     if options.rig is not None:
         return _Joined(motion, fit_rig(motion, options.rig, report))
     chosen = np.zeros(motion.vertex_count, bool)

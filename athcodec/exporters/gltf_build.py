@@ -163,7 +163,9 @@ def meshes_of(motion: Any, name: str, more: Mapping[str, np.ndarray] | None = No
     labels, names = face_materials(motion) or (np.full(0 if faces is None else len(faces[0]), -1), [])
     labels = np.where((labels >= 0) & (labels < len(names)), labels, -1)
     if faces is not None:
-        labels = np.repeat(labels, np.maximum(np.asarray(faces[0], np.int64) - 2, 0))  # of each triangle
+        labels = np.repeat(
+            labels, np.maximum(np.asarray(faces[0], np.int64) - 2, 0)
+        )  # One label for each triangle of a polygon.
     made = []
     for part_name, start, stop in _objects(motion, name, corner_vertex[triangles], edges):
         rows = np.flatnonzero((source >= start) & (source < stop))
@@ -238,7 +240,7 @@ class Take:
     extras: dict[str, Any]
 
     def of(self, values: np.ndarray) -> np.ndarray:
-        """What the keys are, of values (T, ...) per frame of the motion."""
+        """Return the keys of values (T, ...), one per frame of the motion."""
         own = values[self.start : self.stop]
         return np.concatenate([own, own[:1]]) if self.is_loop else own
 
@@ -282,7 +284,7 @@ def _clock(metadata: Mapping[str, Any], time: np.ndarray, fps: float) -> dict[st
 
 
 def branch_extras(motion: Any) -> dict[str, Any]:
-    """What extras say of the branches of a motion."""
+    """Return the extras that describe the branches of a motion."""
     parent = getattr(motion, "branch_parent", None)
     return {} if parent is None else {"branch_parent": np.asarray(parent).tolist()}
 

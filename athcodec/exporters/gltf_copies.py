@@ -35,7 +35,7 @@ class Movers:
 
     @classmethod
     def all_of(cls, movers: list[Movers]) -> Movers | None:
-        """Those of several, one after the other; None of none."""
+        """Concatenate the arrays of several; None of none."""
         if not movers:
             return None
         return cls(
@@ -162,7 +162,7 @@ def _joined(shapes: list[GltfMesh]) -> GltfMesh:
 
 
 def unit_quaternion(quaternion: np.ndarray) -> list[float]:
-    """Of length 1 in float64."""
+    """Return the vectors with length 1 in float64."""
     exact = quaternion.astype(np.float64)
     return (exact / np.linalg.norm(exact)).tolist()
 
@@ -175,7 +175,7 @@ def _without(shape: GltfMesh | GltfCopies, lost: set[str]) -> GltfMesh | GltfCop
 
 
 def _hold(motion: Any, copies: Copies, allowed: float) -> None:
-    """What hardly moves stands still, and needs no keys."""
+    """Hold values that hardly move still, so that they need no keys."""
     extent = np.tile(np.abs(copies.shape).max(axis=0), (copies.places.shape[1], 1))
     for start, stop in motion.clip_range_frames:
         poses = [pose[start:stop] for pose in (copies.places, copies.turns, copies.scales)]

@@ -44,11 +44,13 @@ from athcodec.motion.joining import split
 from athcodec.sources import ReadOptions
 from athcodec.sources.gltf import GltfNode, read_moving
 
-SHARE_OF_TWINS = 1 / 8  # of the vertices: from there on the motion holds twins once, and meshes number its vertices
-ALIGNMENT = 8  # of what is left of the bytes
+SHARE_OF_TWINS = (
+    1 / 8
+)  # Share of duplicate vertices from which the motion holds each once and meshes number its vertices.
+ALIGNMENT = 8  # Bytes to which the parts of the remaining buffer are aligned.
 INSTANCES = "EXT_mesh_gpu_instancing"
 DRACO = "KHR_draco_mesh_compression"
-KNOWN = (*HARMLESS, INSTANCES, DRACO, "FB_ngon_encoding")  # of whose indices _references has all
+KNOWN = (*HARMLESS, INSTANCES, DRACO, "FB_ngon_encoding")  # _references lists every index that these extensions hold.
 POINTING = ("KHR_animation_pointer",)  # to places in the file, as text
 Reference = tuple[str, Any, Any]
 """An array of the file ("accessors" ...), and the holder and key of an index into it."""
@@ -156,7 +158,7 @@ class Into:
                 node["mesh"] = len(gltf["meshes"]) - 1
             if not self._keep:
                 mesh.pop("weights", None)
-                mesh.get("extras", {}).pop("targetNames", None)  # of morph targets, by custom
+                mesh.get("extras", {}).pop("targetNames", None)  # By custom this member names morph targets.
                 for key in ("weights", "skin"):
                     node.pop(key, None)
         for part in self._nodes:
@@ -371,8 +373,8 @@ def _pop_extension(holder: dict) -> None:
 
 
 def _twins(clip: MotionClip) -> tuple[np.ndarray, np.ndarray | None]:
-    """Of vertices that are at one place in each frame the first, and which of these each vertex is; None where twins
-    are few."""
+    """Return the first of the vertices that share their places in all frames, and which of these each vertex is; None
+    where twins are few."""
     everyone = np.arange(clip.vertex_count)
     kind = _kinds(np.zeros(clip.vertex_count, np.int64), clip.source_rest)
     for _, block in clip.blocks():
@@ -420,7 +422,7 @@ def _without_twins(clip: MotionClip, first: np.ndarray, vertex: np.ndarray) -> M
 
 
 def _drop_channels(gltf: dict, moving: set[int], needless: set[int]) -> None:
-    """Those of the weights of these nodes, and of needless ones."""
+    """Return the channels of these nodes' weights, and of needless ones."""
     kept = []
     for animation in gltf.get("animations", []):
         targets = [(channel["target"].get("node"), channel["target"].get("path")) for channel in animation["channels"]]
@@ -441,8 +443,8 @@ def _drop_channels(gltf: dict, moving: set[int], needless: set[int]) -> None:
 
 
 def _needless_nodes(gltf: dict, freed: set[int]) -> set[int]:
-    """Of nodes that moved vertices, those above and those below them: which show nothing, no skin uses, and nothing
-    that stays is below."""
+    """Return the nodes that moved vertices, those above and those below them, which show nothing, no skin uses, and
+    nothing that stays is below."""
     nodes = gltf["nodes"]
     parent = {child: index for index, node in enumerate(nodes) for child in node.get("children", ())}
     related = set(freed)
@@ -524,7 +526,7 @@ def _each(kind: str, holder: dict, key: str) -> Iterator[Reference]:
 
 
 def _used(gltf: dict) -> dict[str, set[int]]:
-    """What of each array is referred to."""
+    """Return which entries of each array are referred to."""
     found: dict[str, set[int]] = {kind: set() for kind in ("nodes", "skins", "accessors", "bufferViews")}
     for kind, holder, key in _references(gltf):
         found[kind].add(holder[key])
@@ -577,7 +579,7 @@ class _Binary:
         return len(self._json["bufferViews"]) - 1
 
     def put(self, start: int, data: bytes) -> None:
-        """These bytes in place of as many that were there."""
+        """Replace as many bytes by these."""
         self._old = self._old[:start] + data + self._old[start + len(data) :]
 
     def attribute(self, values: np.ndarray, bounds: bool = False) -> int:
@@ -625,7 +627,7 @@ class _Binary:
 
 
 def _byte_ranges(views: list[dict]) -> Iterator[dict]:
-    """What has byteOffset and byteLength in the binary chunk: views, and what decompresses to them."""
+    """Return the entries with byteOffset and byteLength in the binary chunk: views, and what decompresses to them."""
     for view in views:
         for holder in (view, *((view.get("extensions") or {}).get(name) for name in MESHOPT)):
             if holder is not None and holder["buffer"] == 0:

@@ -14,7 +14,7 @@ import numpy as np
 
 from athcodec.exporters.fitting import Placed, fit, quaternions, rotation_matrices
 
-SLACK = 0.01  # of the allowed error: what moves less stands still
+SLACK = 0.01  # Share of the allowed error below which motion counts as none.
 
 
 @dataclass(eq=False)

@@ -30,7 +30,7 @@ from athcodec.motion.hierarchy import Hierarchy, hierarchy_of
 from athcodec.options import RIG_JOINTS
 
 LONGEST_CHAIN = 32
-WORST = 0.5  # of how far the worst part is off: those that are not so far are left for a later round
+WORST = 0.5  # Parts whose error is below this share of the worst part's wait for a later round.
 BINS = 64  # pieces of a stem of which the middles make its centre line
 ROUNDS = 64  # in which parts are cut
 SWEEPS = 4
@@ -77,7 +77,7 @@ class _Parts:
 def _cut(
     hierarchy: Hierarchy, branch: int, stop: int, chain: int, excess: float, left: int
 ) -> list[tuple[int, int, int]]:
-    """What becomes of a part, of `left` joints more at most."""
+    """Return the joints of a part, at most `left` more."""
     if chain:
         room = min(LONGEST_CHAIN, int(hierarchy.stem_count[branch]), chain + left)
         return [(branch, stop, max(min(int(np.ceil(chain * min(np.sqrt(excess), 2.0))), room), chain))]
@@ -290,7 +290,7 @@ def _off(
 ) -> float:
     """The largest distance of vertices that joints move, as an engine has them, from where they are to be."""
     local, at = rotation_matrices(turns.astype(np.float64)), shifts.astype(np.float64)
-    for joint in range(1, len(parents)):  # those above come first
+    for joint in range(1, len(parents)):  # Parents precede their children.
         above = parents[joint]
         at[:, joint] = np.einsum("tij,tj->ti", local[:, above], at[:, joint]) + at[:, above]
         local[:, joint] = local[:, above] @ local[:, joint]

@@ -65,8 +65,8 @@ def objects_of(motion: Any) -> list[SceneObject]:
 
 
 def said_names(motion: Any) -> dict[str, Any]:
-    """What formats without a place for it keep as JSON: the objects, with their kinds and numbers of vertices and
-    copies, and the names of materials. sources.scene_objects.scene_said reads it back."""
+    """Return the JSON that formats without a place for it keep: the objects, with their kinds and numbers of vertices
+    and copies, and the names of materials. sources.scene_objects.scene_said reads it back."""
     found: dict[str, Any] = {}
     names, counts = motion.metadata.get("part_names"), motion.attributes.get("part_vertex_counts")
     if isinstance(names, list) and counts is not None and counts.shape == (len(names),):
@@ -210,7 +210,7 @@ def material_runs(labels: np.ndarray, names: list[str]) -> list[tuple[int, np.nd
 
 
 def domain_of(motion: Any, name: str, values: np.ndarray, domains: dict[str, str]) -> str:
-    """What the clip says where the rows fit, else what they fit."""
+    """Return what the clip says if the rows fit it, else what they fit."""
     polygons = motion.polygons or ((), ())
     rows = {
         "vertex": motion.vertex_count,
@@ -233,7 +233,7 @@ def rows_of(values: np.ndarray, domain: str, obj: SceneObject) -> np.ndarray:
 
 
 def own_arrays(motion: Any, left: dict[str, tuple[np.ndarray, str]]) -> Iterator[tuple[ArrayDescriptor, np.ndarray]]:
-    """What scene formats have no place for: rest, branches, edges and the arrays in `left`, each as (bytes,) uint8."""
+    """Return what scene formats cannot hold: rest, branches, edges and the arrays in `left`, each as (bytes,) uint8."""
     arrays = {"rest": (getattr(motion, "source_rest", motion.rest), "vertex")}
     for name, domain in (("vertex_branch", "vertex"), ("branch_parent", ""), ("stem_index", "vertex"), ("edges", "")):
         arrays[name] = getattr(motion, name, None), domain

@@ -29,7 +29,7 @@ def frame_numbers(motion: Any) -> np.ndarray:
 
 
 def distinct_frame_numbers(motion: Any) -> np.ndarray:
-    """The same, for formats that find a frame by its number. Raises ClipError where two have the same."""
+    """Return the times for formats that find a frame by its number. Raises ClipError where two have the same."""
     numbers = frame_numbers(motion)
     same = np.flatnonzero(np.diff(numbers) <= 0)
     if same.size:

@@ -427,7 +427,7 @@ def _vt(values: np.ndarray, type_name: Sdf.ValueTypeName, dtype: str) -> Any:
 
 
 def _own_arrays(root: Usd.Prim, motion: Any, left: dict[str, tuple[np.ndarray, str]]) -> None:
-    """What has no place in the prims, byte for byte."""
+    """Return the data that has no place in the prims, byte for byte."""
     for descriptor, raw in own_arrays(motion, left):
         attribute = root.CreateAttribute(
             f"{OWN}:{_identifier(descriptor.name)}", Sdf.ValueTypeNames.UCharArray, True, Sdf.VariabilityUniform

@@ -40,7 +40,7 @@ class Part:
 
 
 def parts_of(motion: Any, objects: list[SceneObject], joints: Joints) -> dict[int, Part]:
-    """Those objects that are copies of one shape at rest, by their number. ClipError where no base is left."""
+    """Return the objects that are copies of one shape at rest, by their number. ClipError where no base is left."""
     rest = np.asarray(motion.rest)
     still = MotionClip(rest[None], np.zeros(1), rest=rest)
     found = {

@@ -106,7 +106,7 @@ class _Grid:
         self.per_row = min(nodes, PER_ROW)
         self.rows_per_frame = -(-nodes // self.per_row)
         self.width = 3 * self.per_row
-        self.frames = min(frames, WIDEST // self.rows_per_frame)  # of one texture
+        self.frames = min(frames, WIDEST // self.rows_per_frame)  # Frames that one texture holds.
         self.height = self.frames * self.rows_per_frame
 
     def textures(self, rows: np.ndarray, name: str) -> Iterator[tuple[dict[str, Any], np.ndarray]]:

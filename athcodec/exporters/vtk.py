@@ -53,7 +53,7 @@ def write_clip(
 
 
 def _stem(target: Path) -> str:
-    """Of the index: the name of the series without what stands for its numbers."""
+    """Return the index's name: that of the series without the place of its numbers."""
     if target.suffix.lower() == ".pvd":
         return target.stem
     bare = target.stem.rstrip("0123456789").partition("#")[0].partition("%")[0].rstrip("_-. ")

@@ -122,8 +122,9 @@ class GpuFile:
 
 
 def corners_of(triangles: np.ndarray, vertex_count: int) -> np.ndarray:
-    """What vertices.wgsl takes normals from, uint32: where the corners of each vertex begin, and one behind the last;
-    then the two other corners of each triangle at a vertex, in the order of its turn. triangles: (F, 3), file order."""
+    """Return the corners that vertices.wgsl takes normals from, uint32: where the corners of each vertex begin, and
+    one behind the last; then the two other corners of each triangle at a vertex, in the order of its turn. triangles:
+    (F, 3), file order."""
     turns = np.concatenate([np.roll(triangles, -turn, axis=1) for turn in range(3)]).astype(np.uint32)
     turns = turns[np.argsort(turns[:, 0], kind="stable")]
     first = np.searchsorted(turns[:, 0], np.arange(vertex_count + 1))

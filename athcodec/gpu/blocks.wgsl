@@ -3,7 +3,7 @@
 @group(0) @binding(0) var<storage, read> level: array<u32>;
 @group(0) @binding(1) var<storage, read> segments: array<u32>; // blocks one behind the other
 
-// What is placed: the blend of its sources. A dispatch places several, one for each y of its workgroups.
+// A place is a blend of its sources. A dispatch computes several, one for each y of its workgroups.
 struct Place {
     sources: u32, // word of `places` that they begin at
     source_count: u32,
@@ -11,14 +11,14 @@ struct Place {
     matrices: u32,
     modes: u32,
     bodies: u32,
-    strength: f32, // that motion is multiplied by
+    strength: f32, // Factor of the motion.
 }
 // A frame that a place shows, alone or blended with others.
 struct Source {
     segment: u32, // word that the block of its segment begins at
     frame: u32,
     amplitudes: u32, // number before its own
-    weight: f32,     // those of a place add up to 1
+    weight: f32,     // The weights of a place add up to 1.
 }
 @group(0) @binding(2) var<storage, read> places: array<u32>; // all of a dispatch, then all their sources
 var<private> run: Place;
@@ -105,7 +105,7 @@ fn place_at(y: u32) -> Place {
         bitcast<f32>(places[at + 6u]));
 }
 
-// Of the place that runs. Functions of segments are about the source that is set.
+// The place that this invocation computes. Functions of segments read the source that is set.
 fn source_at(s: u32) -> Source {
     let at = run.sources + SOURCE_WORDS * s;
     return Source(places[at], places[at + 1u], places[at + 2u], bitcast<f32>(places[at + 3u]));

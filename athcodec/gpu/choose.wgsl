@@ -1,4 +1,4 @@
-// What instances are drawn with: each that is in view is appended to the list of the coarsest shape whose error its distance
+// Chooses what instances are drawn with: each that is in view is appended to the list of the coarsest shape whose error its distance
 // hides. One invocation per instance.
 
 struct Instance {
@@ -7,13 +7,13 @@ struct Instance {
 }
 
 struct View {
-    planes: array<vec4<f32>, 6>, // of what is seen: normal, distance
+    planes: array<vec4<f32>, 6>, // The planes of the view: normal, distance.
     eye: vec3<f32>,
     pixel: f32, // the error that is allowed at distance 1
     count: u32,
     shapes: u32,
     reach: f32, // how far from its place an instance of size 1 can be seen
-    room: u32,  // of a list
+    room: u32,  // Instances that a list has room for.
 }
 
 struct Shape {

@@ -175,7 +175,7 @@ class Source:
 
 
 class Passes:
-    """What the blocks of a level and of its segments show: frames of one segment, or of several, blended.
+    """Positions that the blocks of a level and of its segments give: frames of one segment, or of several, blended.
 
     Parameters
     ----------
@@ -201,7 +201,7 @@ class Passes:
         if any(source.head["baked"] for source in sources):
             self.positions += sum(source.baked(self.positions.shape) for source in sources)
             return
-        self._modes: dict[int, np.ndarray] = {}  # of pieces, (modes, 3, frames)
+        self._modes: dict[int, np.ndarray] = {}  # By piece: (modes, 3, frames).
         for body in section(level, self._of_level["order"], "<u4", len(self._bodies)):
             self._place(int(body))
         for source in sources:

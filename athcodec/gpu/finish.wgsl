@@ -2,7 +2,7 @@
 
 @group(0) @binding(3) var<storage, read_write> positions: array<f32>;
 @group(0) @binding(4) var<storage, read_write> matrices: array<f32>;
-@group(0) @binding(5) var<uniform> which: u32; // of the sources of each place, for corrections
+@group(0) @binding(5) var<uniform> which: u32; // The source of each place whose corrections are added.
 
 const FOOTPRINTS = array<array<f32, 4>, 3>(
     array<f32, 4>(32.0, 0.0, 0.0, 0.0), array<f32, 4>(32.0, 16.0, 0.0, 0.0), array<f32, 4>(32.0, 27.0, 16.0, 5.0),
@@ -12,7 +12,7 @@ fn is_joined() -> bool {
     return source.frame < segment(JOIN_FRAMES);
 }
 
-// What is left of jumps and of slopes at the frame.
+// The shares of jumps and of slopes that remain at the frame.
 fn curve() -> vec2<f32> {
     let at = segment(JOIN_CURVE) + 2u * source.frame;
     return run.strength * source.weight * vec2<f32>(segment_float(at), segment_float(at + 1u));

@@ -1,12 +1,12 @@
 // Pass 2: bodies of one depth, each placed from the one that it hangs on; amplitudes of all sources of a place add up. One
 // workgroup per body, one invocation per position.
 
-@group(0) @binding(8) var<uniform> depth: u32; // of the bodies that are placed
+@group(0) @binding(8) var<uniform> depth: u32; // Depth of the bodies that this pass places.
 @group(0) @binding(3) var<storage, read> amplitudes: array<f32>;
 @group(0) @binding(4) var<storage, read_write> positions: array<f32>;
 @group(0) @binding(5) var<storage, read_write> matrices: array<f32>;
-@group(0) @binding(6) var<storage, read_write> parent_modes: array<f32>; // those of a body from its first position on
-@group(0) @binding(7) var<storage, read_write> frames: array<f32>; // of bodies: rotation, point
+@group(0) @binding(6) var<storage, read_write> parent_modes: array<f32>; // The modes of a body begin at its first position.
+@group(0) @binding(7) var<storage, read_write> frames: array<f32>; // For each body: rotation, point.
 
 const SHIFT = 64u;
 const ROTATION = 65u;
@@ -31,7 +31,7 @@ fn position_at(index: u32) -> vec3<f32> {
     return vec3<f32>(positions[at], positions[at + 1u], positions[at + 2u]);
 }
 
-// What mode m of its parent adds to the tangent that a body follows.
+// Returns what mode m of its parent adds to the tangent that a body follows.
 fn way_by_mode(body: Body, m: u32) -> vec3<f32> {
     let parent = level[BODIES] + BODY_WORDS * u32(max(body.parent, 0));
     if ((body.flags & FOLLOWS) == 0u || m >= level[parent + 4u]) {
@@ -98,7 +98,7 @@ fn hung(body: Body) -> Frame {
     return Frame(position_at(u32(body.attach)), rotation);
 }
 
-// What a row of a rotation turns by.
+// Returns the rotation that a row stands for.
 fn turn_of(own: Move, row: u32) -> vec3<f32> {
     let at = segment(TURNS) + own.turn;
     let q = amplitude(row);
@@ -244,7 +244,7 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups
     placed[i] = way_by_mode(body, i);
     workgroupBarrier();
     var top = 0u;
-    for (var s = 0u; s < places[PLACE_WORDS * group.y + 1u]; s++) { // of the place: the same for all of the workgroup
+    for (var s = 0u; s < places[PLACE_WORDS * group.y + 1u]; s++) { // The count is uniform over the workgroup.
         source = source_at(s);
         top = max(top, add_modes(b, body, i));
         workgroupBarrier();

@@ -4,7 +4,7 @@
 struct Run {
     positions: vec4<u32>, // numbers before those of the two frames now, and of the two that the time drawn before lies between
     matrices: vec4<u32>,
-    weights: vec2<f32>, // of the second of each two
+    weights: vec2<f32>, // Weights of the second of each pair.
     with_normals: u32,
     vertices: u32, // number before those that are written
 }

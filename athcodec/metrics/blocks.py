@@ -1,4 +1,4 @@
-"""What all meters share: blocks of frames, a few frames at a time, and figures of more values than fit into memory."""
+"""Parts that all meters share: blocks of a few frames, and figures of more values than fit into memory."""
 
 from __future__ import annotations
 

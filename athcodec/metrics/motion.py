@@ -76,7 +76,7 @@ class MotionMeter:
             meter.add(reference, decoded)
 
     def figures(self) -> dict[str, Any]:
-        """What was measured, by names that JSON uses: "smoothness" and "shape" are dictionaries of their own.
+        """The measurements, by names that JSON uses: "smoothness" and "shape" are dictionaries of their own.
 
         Second differences of the error are in bounds, angles in degrees. What a clip has no seams, edges or faces for
         is None.

@@ -1,4 +1,4 @@
-"""What decoding does to shapes: how edges stretch, how faces turn, which of them collapse."""
+"""Effects of decoding on shapes: how edges stretch, how faces turn, which of them collapse."""
 
 from __future__ import annotations
 

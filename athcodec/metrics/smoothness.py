@@ -55,7 +55,9 @@ class SmoothnessMeter:
         self._bound, self._loop = np.asarray(bound, np.float64), loop
         self._square = 0.0
         self._points = self._added = 0
-        self._first = self._last = np.empty((2, 0, 0, 3))  # of source and decoded, two frames at most
+        self._first = self._last = np.empty(
+            (2, 0, 0, 3)
+        )  # The last frames of source and decoded positions, two at most.
 
     def add(self, reference: np.ndarray, decoded: np.ndarray) -> None:
         """Add the next frames.
@@ -127,7 +129,7 @@ class SmoothnessMeter:
 
     @property
     def tick_ratio(self) -> float | None:
-        """What is decoded near seams, see `tick_ratio`."""
+        """Frames near seams, see `tick_ratio`."""
         return tick_ratio(self.acceleration, self.seams)
 
     @property

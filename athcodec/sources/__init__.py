@@ -29,7 +29,7 @@ from athcodec.motion.frames import Frames
 from athcodec.motion.units import METRES, unit_symbol
 from athcodec.options import MAX_MEMORY, SAMPLES
 
-# what is not read of a scene and is no shape
+# Parts of a scene that are not read and are no shapes.
 NO_SHAPES = frozenset(
     (
         "Material",

@@ -70,7 +70,7 @@ NODES = {
     "pyramid": 5,
     "pyramid13": 13,
 }
-NODE_BYTES = 160  # what a vertex of a cell takes while faces and edges are made of it
+NODE_BYTES = 160  # Bytes that a vertex of a cell takes while its faces and edges are made.
 _CORNERS = {"triangle": [0, 1, 2], "quad": [0, 1, 2, 3], "pixel": [0, 1, 3, 2]}
 _SIDES = {
     "tetra": [[0, 1, 3], [1, 2, 3], [2, 0, 3], [0, 2, 1]],

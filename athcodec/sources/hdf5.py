@@ -47,7 +47,7 @@ GROWTH = {
     h5py.h5z.FILTER_LZF: 90,
 }
 """How many bytes a filter makes of one at most; DEFLATE unpacks all that there is, whatever size a chunk has."""
-MOST_GROWTH = 1 << 20  # of a filter that is not known
+MOST_GROWTH = 1 << 20  # Largest growth that is expected of an unknown filter.
 BROKEN = (OSError, RuntimeError, KeyError, ValueError, TypeError, OverflowError, UnicodeError, MemoryError)
 _OWN = "expected numbers in the file itself; --allow-outside (allow_outside=True) reads others"
 
@@ -142,7 +142,7 @@ def check_own(file: h5py.File, name: str, allow_outside: bool) -> None:
 
 
 def _names(file: h5py.File) -> list[str]:
-    """Of all that hangs in the file, links to other files among it, which are not followed."""
+    """Return the names in the file, among them links to other files, which are not followed."""
     names, groups, seen = [], [("", file["/"])], set()
     while groups:
         within, group = groups.pop()
@@ -168,7 +168,7 @@ def _dataset(file: h5py.File, name: str) -> h5py.Dataset | None:
 
 
 def chunk_bytes(dataset: h5py.Dataset) -> int:
-    """What is unpacked at once of a dataset."""
+    """Return how many bytes of a dataset are unpacked at once."""
     return int(np.prod(dataset.chunks or (0,), dtype=object)) * dataset.dtype.itemsize
 
 

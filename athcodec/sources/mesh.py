@@ -24,9 +24,9 @@ from athcodec.motion.clip import RESERVED_NAMES, polygons
 from athcodec.sources.scene_objects import FACE_MATERIAL, OWN, scene_of_json, scene_said
 
 FLOAT32_DIGITS = 9
-WORD_ENDS, WORD_BYTES = b" \t\n\r\f\v/", 128  # what a word of text takes, and what is made of it
+WORD_ENDS, WORD_BYTES = b" \t\n\r\f\v/", 128  # Bytes that a word of text and the value made of it take.
 MESSAGE = 300  # characters of what Python says of a number
-STATEMENT_BYTES = 16  # of a word of OBJ that is not known
+STATEMENT_BYTES = 16  # Bytes that an unknown statement of OBJ takes for each word.
 STRIPS = "tristrips"
 PLY_ELEMENTS = ("vertex", "face", "edge")
 FREE_FORM = ("curv", "curv2", "surf")
@@ -53,7 +53,7 @@ PLY_TYPES = {
 
 @dataclass
 class Mesh:
-    """What a mesh file holds: points (N, 3), and the rest as in MotionClip."""
+    """Content of a mesh file: points (N, 3), and the rest as in MotionClip."""
 
     points: np.ndarray
     faces: np.ndarray | None = None
@@ -104,7 +104,7 @@ def parse_mesh(data: bytes, path: str | PathLike[str], budget: Budget) -> Mesh:
 
 
 def kind_of(faces: object, edges: object) -> str:
-    """What metadata["part_kinds"] calls an object with these faces and edges, None for none."""
+    """Return the kind in metadata["part_kinds"] of an object with these faces and edges, None for none."""
     return "mesh" if faces is not None else "points" if edges is None else "curves"
 
 
@@ -157,7 +157,7 @@ class _Obj:
         self.edges: list[tuple[int, int]] = []
         self.objects, self.groups, self.materials = _Names(), _Names(), _Names()
         self.face_labels: list[tuple[int, int, int]] = []
-        self.element_labels: list[tuple[int, int, Sequence[int]]] = []  # of lines and points
+        self.element_labels: list[tuple[int, int, Sequence[int]]] = []  # Labels of lines and points.
         self.point_objects: list[int] = []
         self.not_read: dict[bytes, None] = {}
 
@@ -382,7 +382,7 @@ class PlyHeader:
     order: str  # "<", ">", or "" for text
     elements: list[PlyElement]
     length: int
-    said: dict[str, Any] = field(default_factory=dict)  # what our writer adds
+    said: dict[str, Any] = field(default_factory=dict)  # Comments that our exporter adds.
 
 
 def ply_header(data: bytes) -> PlyHeader:
@@ -448,7 +448,7 @@ class _Text:
 
 
 class _Binary:
-    """The same for bytes of one order."""
+    """Read values of one byte order."""
 
     def __init__(self, data: bytes, at: int, order: str):
         self._data, self._at, self._order = data, at, order

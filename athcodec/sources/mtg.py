@@ -26,7 +26,7 @@ from athcodec.motion.clip import MotionClip
 
 MAX_FILE_BYTES = 1 << 28
 MAX_ENTITIES = 1 << 22
-FARTHEST = 0.1  # of the clip's diagonal: half of its vertices may be that far from the plant of the MTG
+FARTHEST = 0.1  # Largest median distance of the clip's vertices from the plant of the MTG, over the clip's diagonal.
 COORDINATES = ("XX", "YY", "ZZ")
 BLOCK_PAIRS = 1 << 20
 _SECTION = re.compile(r"\s*(CODE|CLASSES|DESCRIPTION|FEATURES|MTG)\s*:?\s*(\S*)")

@@ -87,7 +87,7 @@ class _Process:
             self.described = self.ask(json.dumps(wanted))
 
     def ask(self, line: str) -> bytes:
-        """What the process answers. Raises ClipError where it says what is wrong, or has ended."""
+        """Return the answer of the process. Raises ClipError where it reports a fault, or has ended."""
         if not self._end.alive:
             raise ClipError("positions: the clip is closed")
         with self._lock:

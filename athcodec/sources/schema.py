@@ -1,4 +1,4 @@
-"""What the formats with the names of athcodec's schema have in common: HDF5 (see hdf5.py) and NumPy archives (npz.py).
+"""Parts that the formats with the names of athcodec's schema share: HDF5 (see hdf5.py) and NumPy archives (npz.py).
 It opens no files.
 """
 
@@ -52,7 +52,7 @@ def clip_of_arrays(
 def _branches(
     positions: Any, array: Callable[[str], np.ndarray | None], metadata: dict[str, Any], options: ReadOptions
 ) -> dict[str, np.ndarray | None]:
-    """Those of the file, else those that its edges make."""
+    """Return the branches of the file, else those that its edges make."""
     found = {name: array(name) for name in BRANCHES}
     edges = array("edges")
     if found["vertex_branch"] is not None or found["branch_parent"] is not None:

@@ -29,7 +29,7 @@ from athcodec.sources.timing import numbered_times
 _NUMBERED = re.compile(r"(.*?)(\d+)", re.DOTALL)
 _ELEMENTS = frozenset((b"f ", b"f\t", b"l ", b"l\t"))
 LARGEST_NUMBER = 10**9
-FRAME_SUFFIXES = (".obj", ".ply", ".vtu", ".vtk")  # of formats that have one file per frame
+FRAME_SUFFIXES = (".obj", ".ply", ".vtu", ".vtk")  # Formats that have one file per frame.
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class Numbering:
 
     @classmethod
     def of_pattern(cls, path: Path) -> Numbering | None:
-        """That of a name with # or %04d in it; None where there is none."""
+        """Return the pattern of a name with # or %04d in it; None where there is none."""
         found = NUMBER_PATTERN.fullmatch(path.name)
         if found is None:
             return None

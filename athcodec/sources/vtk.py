@@ -54,8 +54,8 @@ _UNPACKERS: dict[str, Callable[[int], Any]] = {
     "vtkLZMADataCompressor": lambda room: lzma.LZMADecompressor(memlimit=room),
 }
 """Of the bytes that they may take themselves."""
-WORD_BYTES = 16  # what a byte of a legacy file takes while meshio reads it
-GRIDS = 4  # that are held at once: three that are compared, and one that is read
+WORD_BYTES = 16  # Bytes that a byte of a legacy file takes while meshio reads it.
+GRIDS = 4  # Grids that are held at once: three that are compared, and one that is read.
 _BROKEN = (
     ValueError,
     KeyError,
@@ -142,7 +142,7 @@ class _Steps:
     """See fields.Steps."""
 
     def __init__(self, files: Sequence[Path], max_memory: int):
-        self._files, self._max_memory = list(files), max_memory  # of one file
+        self._files, self._max_memory = list(files), max_memory  # The frames of one file.
         self.unchanged = FileWatch(*self._files)
         self._now: tuple[int, _Grid] | None = None
         first = self._grid(0)
@@ -312,7 +312,9 @@ class _Vtu:
         if form == "ascii":
             self._budget.need(TEXT_BYTES * len(element.text or ""), element.get("Name", "points"))
             words = (element.text or "").split()
-            with np.errstate(over="ignore", invalid="ignore"):  # what does not fit is refused where it is used
+            with np.errstate(
+                over="ignore", invalid="ignore"
+            ):  # Values that do not fit are refused where they are used.
                 return np.array(words, np.float64 if dtype.kind == "f" else np.int64).astype(dtype)
         if form == "binary":
             data = self._decoded((element.text or "").strip().encode())

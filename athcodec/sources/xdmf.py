@@ -29,7 +29,7 @@ from athcodec.sources.hdf5 import check_own, chunk_bytes, unpacks_to_more
 from athcodec.sources.scene_objects import MATERIAL_NAMES
 from athcodec.sources.timing import times_in_seconds, whole
 
-XML_BYTES, TEXT_BYTES = 224, 40  # what an element or an attribute takes, and a byte of text that becomes numbers
+XML_BYTES, TEXT_BYTES = 224, 40  # Bytes that an element or attribute takes, and a byte of text that becomes numbers.
 MIXED = {
     1: "poly_vertex",
     2: "poly_line",
@@ -149,7 +149,7 @@ class Data:
     def _text(self, item: ElementTree.Element) -> np.ndarray:
         text = item.text or ""
         self.budget.need(TEXT_BYTES * len(text), "DataItem")
-        with np.errstate(over="ignore", invalid="ignore"):  # what does not fit is refused where it is used
+        with np.errstate(over="ignore", invalid="ignore"):  # Values that do not fit are refused where they are used.
             return np.array(text.split(), np.float64).astype(_dtype(item))
 
     def _binary(self, item: ElementTree.Element, shape: tuple[int, ...]) -> np.ndarray:
@@ -446,7 +446,7 @@ def _information(root: ElementTree.Element) -> dict[str, Any]:
         elif name in ("fps", "start_frame"):
             said[name] = whole(float(value)) if name == "start_frame" else float(value)
         elif name in ("objects", MATERIAL_NAMES):
-            with suppress(ValueError, RecursionError):  # of another program's: something else
+            with suppress(ValueError, RecursionError):  # Another program may have written something else here.
                 said[name] = json.loads(value)
     frame_rate(said)
     return said

@@ -30,7 +30,7 @@ export const supported: boolean;
  * `supported` is false. */
 export const ready: Promise<void>;
 
-/** What is wrong with a file, or missing of it; `message` says where, what was found and what is allowed, in the words
+/** The fault of a file, or what it lacks; `message` says where, what was found and what is allowed, in the words
  * of C and Python. */
 export class AthError extends Error {
   /** Number in FORMAT.md, "Errors", if below 64; 66: bytes are missing; 68: the host has no memory left. */
@@ -39,19 +39,19 @@ export class AthError extends Error {
   readonly codeName: string;
   /** Index of the chunk at fault, see AthFile.chunks(); -1: none. */
   readonly chunk: number;
-  /** Of "MISSING" from AthFile.open(): how many bytes of the file's front to come back with. More may be
+  /** With "MISSING" from AthFile.open(): how many bytes of the file's front to come back with. More may be
    * needed then. */
   readonly needed: number;
 }
 
 /** "file" or "source", see above. */
-/** Of the errors of all vertices in all frames: the largest; what at most 1 % of them exceed, which says what is seen
+/** A measure of the errors of all vertices in all frames: the largest; what at most 1 % of them exceed, which says what is seen
  * where single vertices stray; the root of their mean square. */
 export type Measure = "max" | "p99" | "rms";
 export type Errors = Record<Measure, number>;
 export type Order = "file" | "source";
 
-/** What comes after a clip's last frame: it stays; the first, blended into; the same way back; "loop" where the
+/** How a clip goes on after its last frame: it stays; the first, blended into; the same way back; "loop" where the
  * clip is marked as one, else "clamp". */
 export type Wrap = "clamp" | "loop" | "pingpong" | "marked";
 
@@ -67,7 +67,7 @@ export interface AthInfo {
   readonly origin: readonly [number, number, number];
   readonly vertexCount: number;
   readonly branchCount: number;
-  /** Of all clips. */
+  /** Counted over all clips. */
   readonly frameCount: number;
   readonly segmentCount: number;
   readonly clipCount: number;
@@ -85,7 +85,7 @@ export interface AthInfo {
   readonly isFloat64: boolean;
   /** All levels but level 0 are predicted motion. */
   readonly isPredicted: boolean;
-  /** The same of the rest pose. */
+  /** The rest pose in this form. */
   readonly restIsFloat64: boolean;
   /** Whether the rest pose is a mesh that the host has, for setHostMesh(); of that mesh the checksum, 16 hexadecimal
    * digits, else null. */
@@ -128,7 +128,7 @@ export interface Branches {
   readonly attach: Int32Array;
   /** 1: flat or compact; 2: not attached; 4: its subtree moves as one. Added up. */
   readonly flags: Int32Array;
-  /** Of the rest pose's predictor. */
+  /** Number of the rest pose's predictor. */
   readonly lag: Int32Array;
 }
 
@@ -144,7 +144,7 @@ export interface Parts {
   readonly count: Int32Array;
   /** Branch whose subtree moves by one matrix; -1: an exact run, vertices with positions of their own. */
   readonly branch: Int32Array;
-  /** Of the part's matrix, or of the run's first vertex among the exact ones. */
+  /** Index of the part's matrix, or of the run's first vertex among the exact ones. */
   readonly index: Int32Array;
 }
 
@@ -275,7 +275,7 @@ export class AthFile {
   levelRest<T extends Float32Array | Float64Array>(level: number, order: Order, options: { out: T }): T;
   /** Error of showing a level, measured by the encoder, over the segments `first` to `last` (default: all). */
   levelError(level: number, first?: number, last?: number): Errors;
-  /** What a level is, for people: "depth 1", "layer 2 of 3", "all branches", "lossless". */
+  /** Describes a level for people: "depth 1", "layer 2 of 3", "all branches", "lossless". */
   levelName(level: number): string;
   /** How well a level keeps the step of a loop from its last frame to its first: the most that any vertex's is
    * off; 0 for clips that are no loops. Known of all fullLevelCount levels, stored or not. */
@@ -322,7 +322,7 @@ export class AthFile {
    * following: the segment that this one is joined to, prepared at the same level, so that its end is not decoded again;
    * of no use where it is another. */
   prepare(segment: number, level: number, options?: GoingOn): Segment;
-  /** The same, to be spread over frames. Throws AthError: "MISSING", "NO_MEMORY". */
+  /** Prepares a segment in steps, to be spread over frames. Throws AthError: "MISSING", "NO_MEMORY". */
   preparation(segment: number, level: number, options?: GoingOn): Preparation;
 
   /** Where on the frames a time, in seconds since the first frame of the clip (default: the first clip), is: from
@@ -371,7 +371,7 @@ export class AthFile {
 
   /** The GPU form of a level (core/include/ath_gpu.h, docs/gpu.md): a block of words that goes to the GPU as it is. */
   gpuLevel(level: number): Uint32Array;
-  /** The same of a segment at a level; its bytes have to be here. */
+  /** Bytes that a segment takes at a level; its bytes have to be here. */
   gpuSegment(segment: number, level: number): Uint32Array;
   /** Which of the coded frames of its segment shows a frame of the file. */
   gpuFrame(frame: number): number;

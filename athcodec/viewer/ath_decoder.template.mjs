@@ -161,7 +161,7 @@ class Core {
     return this.view(Type, at >>> 0, length).slice();
   }
 
-  // What `call` returns, given `size` bytes of memory for its results.
+  // Returns what `call` returns, given `size` bytes of memory for its results.
   with(size, call) {
     const at = this.take(size);
     try {
@@ -363,7 +363,7 @@ export class AthFile {
   #own = null;            // the Core, until dispose()
   #at = 0;                // the ath_file
   #chunks = [];           // as chunks() has them; `at`: a copy of their bytes, of which `filled` are there
-  #pointers = new Map();  // of segments that are prepared: {at, kept}
+  #pointers = new Map();  // By prepared segment: {at, kept}.
   #preparing = new Map(); // index of a segment: how many preparations that may read it are under way
   #works = [];            // ath_works that nobody uses
   #scratch = { at: 0, size: 0 };
@@ -460,7 +460,7 @@ export class AthFile {
     if (code !== OK) throw this.#core.error(code, what);
   }
 
-  // What `call` returns, given the address of a fault; throws what it filled in unless the code is `allowed`.
+  // Returns what `call` returns, given the address of a fault; throws that fault unless the code is `allowed`.
   #checkFault(call, allowed = OK) {
     return this.#core.with(FAULT_SIZE, (fault) => {
       const code = call(fault);
@@ -723,7 +723,7 @@ export class AthFile {
     try {
       this.#refine(level);
       at = core.take(size);
-      let code = BAD_ARGUMENT; // of what cannot be gone on from
+      let code = BAD_ARGUMENT; // Such a segment cannot be gone on from.
       if (before) code = c.ath_prepare_onward(work, workSize, this.#at, before.at, before.kept, level, at, size);
       if (code === BAD_ARGUMENT) {
         before = null;
@@ -797,7 +797,7 @@ export class AthFile {
     return out;
   }
 
-  // What `call` shows of segments, given the address of an array of pointers to them, and their number.
+  // Returns what `call` shows of segments, given the address of an array of pointers to them, and their number.
   #show(segments, frame, out, length, call) {
     number(frame, "frame");
     const pointers = Array.from(segments, (segment) => this.#pointer(segment));
@@ -814,7 +814,7 @@ export class AthFile {
     throw new TypeError("segments: got something else, expected what prepare() of this file returned");
   }
 
-  // What `call` shows, given the address of an ath_fade, too: levels and their weights.
+  // Returns what `call` shows, given the address of an ath_fade, too: levels and their weights.
   #showFaded(fade, segments, frame, out, length, call) {
     whole(fade.levels.length, 1, FADE_LEVELS, "levels of fade");
     if (!(out instanceof Float32Array)) throw new TypeError("out: got something else, expected a Float32Array of a fade");

@@ -20,7 +20,7 @@ async function bundle(entry, name, external) {
   return readFileSync(join(out, name), "utf8");
 }
 
-// What a bundle imports of three.js.
+// Names that a bundle imports from three.js.
 function names(text) {
   return [...text.matchAll(/import\s*{([^}]*)}\s*from\s*"three"/g)]
     .flatMap(([, list]) => list.split(",").map((name) => name.trim().split(" as ")[0]));

@@ -36,7 +36,7 @@ FRAMES_PER_SECOND = 15
 FORMATS = {"png": "PNG", "gif": "GIF", "webp": "WEBP"}
 
 _STILL_QUALITY = 78
-_STILL_AT = 0.7  # of the clip's duration
+_STILL_AT = 0.7  # Time of a still picture, over the clip's duration.
 _TIMEOUT = 120_000  # ms
 _WHOLE = "() => globalThis.athcodecViewer?.motion?.complete"
 _ALONE = """() => {

@@ -110,7 +110,7 @@ def _refuse_glb(head: bytes) -> None:
 def _read(path: str | os.PathLike[str]) -> bytes:
     if not is_url(path):
         return Path(path).read_bytes()
-    from athcodec.files.remote import Remote  # what it needs takes long to import
+    from athcodec.files.remote import Remote  # Its requirements take long to import.
 
     with Remote(path) as file:
         return file.read()

@@ -1,4 +1,4 @@
-/* What the C decoder needs in WebAssembly beside its own sources: the memory functions, which become one
+/* Functions that the C decoder needs in WebAssembly beside its own sources: the memory functions, which become one
  * instruction each, and checks that ath.h's structs are as ath_decoder.template.mjs reads them. */
 #include "ath.h"
 #include "ath_gpu.h"

@@ -21,7 +21,7 @@ import numpy as np
 from athcodec.motion.hierarchy import Hierarchy
 from bench.codecs import Source
 from bench.codecs.baseline import Baseline, Choice, Ladder, Settings
-from bench.codecs.coder import EntropyCoder, Reader, Writer
+from bench.codecs.coder import Reader, Writer
 from bench.codecs.lengyel import Parts, quaternions
 from bench.codecs.pca import GRID
 from bench.codecs.tree import VertexOrder, memo, ordered, read_order, read_pose, vertex_order, write_order, write_pose
@@ -36,10 +36,10 @@ Follow = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
 
 
 class SkeletalTracks(Baseline):
-    title = "skeletal tracks (ACL)"
+    name = "skeletal tracks (ACL)"
 
-    def __init__(self, coder: EntropyCoder, tiers: int = 2):
-        super().__init__(coder)
+    def __init__(self, tiers: int = 2):
+        super().__init__()
         self.tiers = tiers  # that are read
 
     def grid(self, source: Source, bound: float) -> dict[str, Ladder | Choice]:

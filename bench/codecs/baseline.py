@@ -18,10 +18,9 @@ import numpy as np
 
 from athcodec.encoding import quantise
 from bench.codecs import Source
-from bench.codecs.coder import EntropyCoder, Reader, Writer, compiler, read_corrections, write_corrections
+from bench.codecs.coder import Reader, Writer, compiler, read_corrections, write_corrections
 from bench.codecs.tree import VertexOrder, ordered
 
-FINALISTS = 3
 LARGE = 8_000_000  # numbers; larger clips are searched by a part of them
 SEARCHED = 3_000  # vertices of that part
 AGAIN = ("step", "clusters")  # what is searched with all vertices
@@ -77,15 +76,15 @@ class Search:
             self.known[at] = self.cost(self.settings(at))
         return self.known[at]
 
-    def run(self, rounds: int) -> list[Settings]:
-        """All settings tried, best first."""
+    def run(self, rounds: int) -> Settings:
+        """Return the best of all settings tried."""
         splits = [range(len(axis.values)) if isinstance(axis, Split) else (axis.start,) for axis in self.grid.values()]
         best = min((self._round(first, True) for first in product(*splits)), key=self._cost)
         for _ in range(rounds - 1):
             before, best = best, self._round(best, False)
             if best == before:
                 break
-        return [self.settings(at) for at in sorted(self.known, key=self.known.get)]
+        return self.settings(min(self.known, key=self.known.get))
 
     def _round(self, best: tuple[int, ...], first: bool) -> tuple[int, ...]:
         for axis, values in enumerate(self.grid.values()):
@@ -115,15 +114,13 @@ class Search:
 
 
 class Baseline(ABC):
-    """A method of the literature, with one of two entropy coders."""
+    """A method of the literature."""
 
     kind = "baseline"
-    title = ""
+    name = ""
     rounds = 3  # of the search over all settings
 
-    def __init__(self, coder: EntropyCoder):
-        self.coder = coder
-        self.name = f"{self.title}, {coder.name}"
+    def __init__(self) -> None:
         self.settings: Settings = {}
 
     def missing(self) -> str | None:
@@ -142,32 +139,28 @@ class Baseline(ABC):
         """(N, 3, T) float64 positions of the lossy part, and their order."""
 
     def encode(self, source: Source, bound: float) -> bytes:
-        quick = self.coder.quick()
-        tried = self._searched(source, bound, quick)
-        finalists = tried[:1] if quick is self.coder else tried[:FINALISTS]
-        encodings = [(self._trial(source, bound, settings, self.coder), settings) for settings in finalists]
-        data, self.settings = min(encodings, key=lambda encoding: len(encoding[0]))
-        return data
+        self.settings = self._searched(source, bound)
+        return self._trial(source, bound, self.settings)
 
-    def _searched(self, source: Source, bound: float, coder: EntropyCoder) -> list[Settings]:
-        """All settings tried, best first."""
+    def _searched(self, source: Source, bound: float) -> Settings:
+        """Return the settings of the smallest encoding found."""
 
-        def search(source: Source, grid: dict[str, Ladder | Choice], rounds: int) -> list[Settings]:
-            return Search(lambda settings: len(self._trial(source, bound, settings, coder)), grid).run(rounds)
+        def search(source: Source, grid: dict[str, Ladder | Choice], rounds: int) -> Settings:
+            return Search(lambda settings: len(self._trial(source, bound, settings)), grid).run(rounds)
 
         if source.positions.size <= LARGE:
             return search(source, self.grid(source, bound), self.rounds)
         part = source.part(SEARCHED)
         grid = self.grid(part, bound)
-        best = search(part, grid, 1)[0]
+        best = search(part, grid, 1)
         near = {
             name: axis.starting_at(best[name]) if name in AGAIN else Choice((best[name],))
             for name, axis in grid.items()
         }
         return search(source, near, 1)
 
-    def _trial(self, source: Source, bound: float, settings: Settings, coder: EntropyCoder) -> bytes:
-        writer = Writer(coder)
+    def _trial(self, source: Source, bound: float, settings: Settings) -> bytes:
+        writer = Writer()
         order = self.write(writer, source, bound, settings)
         lossy, _ = self.read(writer.echo())
         positions = np.ascontiguousarray(lossy, np.float32)
@@ -175,7 +168,7 @@ class Baseline(ABC):
         return writer.data() + write_corrections(positions, ordered(source, order), limit)
 
     def decode(self, data: bytes) -> np.ndarray:
-        reader = Reader(self.coder, data)
+        reader = Reader(data)
         lossy, order = self.read(reader)
         positions = np.ascontiguousarray(lossy, np.float32)
         read_corrections(positions, reader)

@@ -33,7 +33,7 @@ WEIGHT_STEPS = 32
 
 
 class Coddyac(Baseline):
-    title = "trajectory PCA + hierarchy (CoDDyAC)"
+    name = "trajectory PCA + hierarchy (CoDDyAC)"
 
     def grid(self, source: Source, bound: float) -> dict[str, Ladder | Choice]:
         return grid_of(

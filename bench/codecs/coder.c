@@ -6,6 +6,7 @@
 #include <stdint.h>
 #include <stdlib.h>
 
+#include "file/container.h"
 #include "streams/motion_streams.inl"
 #include "streams/prelude.inl"
 

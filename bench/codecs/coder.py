@@ -1,9 +1,9 @@
-"""Entropy coders of the baselines: athcodec's (coder.c, compiled here with the core's flags) and zstd -19.
+"""The entropy coder of the baselines, which is athcodec's (coder.c, compiled here with the core's flags).
 
-Both take the same arrays of integers: rows of three axes over frequency, and tables of anything else.
+It takes arrays of integers: rows of three axes over frequency, and tables of anything else.
 `Writer` concatenates such arrays and a few numbers, each with its shape and length, and `Reader` parses them, so that a
 decoder gets nothing that was not counted. Hierarchy and corrections are
-coded as athcodec codes them, whatever the entropy coder. Integers of any size up to 64 bits are taken; those
+coded as athcodec codes them. Integers of any size up to 64 bits are taken; those
 of 30 bits or more are split, which baselines never need.
 """
 
@@ -21,10 +21,8 @@ from collections.abc import Sequence
 from ctypes import c_double, c_int32, c_int64, c_void_p
 from functools import cache
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
-import zstandard
 
 from athcodec._native import BRANCH, SEGMENT_FRAMES
 from athcodec.encoding import quantise, streams
@@ -99,121 +97,43 @@ def _read(name: str, data: bytes, *arguments) -> None:
         raise DamagedStream(f"{name}: got {len(data)} bytes that are not such a stream")
 
 
-# ---- entropy coders ----
+# ---- arrays of integers ----
 
 
-class EntropyCoder(Protocol):
-    name: str
-
-    def rows(self, rows: np.ndarray, unit: int) -> bytes:
-        """(R, 3, F) int32 below 2^30; `unit` rows belong together."""
-
-    def read_rows(self, data: bytes, shape: tuple[int, int, int], unit: int) -> np.ndarray: ...
-
-    def table(self, table: np.ndarray) -> bytes:
-        """(R, C) int32 below 2^30."""
-
-    def read_table(self, data: bytes, shape: tuple[int, int]) -> np.ndarray: ...
-
-
-class RangeCoder:
-    """The entropy coder of .ath files."""
-
-    name = "range coder"
-
-    def quick(self) -> RangeCoder:
-        return self
-
-    def rows(self, rows: np.ndarray, unit: int) -> bytes:
-        """As motion coefficients or as a table, whichever is smaller."""
-        streams = [self._motion_rows(rows, unit), self.table(rows.reshape(len(rows), -1))]
-        smaller = int(len(streams[1]) < len(streams[0]))
-        return bytes([smaller]) + streams[smaller]
-
-    def read_rows(self, data: bytes, shape: tuple[int, int, int], unit: int) -> np.ndarray:
-        if data[0]:
-            return self.read_table(data[1:], (shape[0], 3 * shape[2])).reshape(shape)
-        return self._read_motion_rows(data[1:], shape, unit)
-
-    def _motion_rows(self, rows: np.ndarray, unit: int) -> bytes:
-        parts = [np.ascontiguousarray(rows[:, :, at : at + SEGMENT_FRAMES]) for at in _blocks(rows.shape[2])]
-        streams = [
-            _written("bench_rows", 4096 + part.size, len(part), part.shape[2], unit, part.ctypes.data) for part in parts
-        ]
-        return _join(streams)
-
-    def _read_motion_rows(self, data: bytes, shape: tuple[int, int, int], unit: int) -> np.ndarray:
-        rows = np.zeros(shape, np.int32)
-        for at, stream in zip(_blocks(shape[2]), _split(data, len(_blocks(shape[2]))), strict=True):
-            part = np.zeros((*shape[:2], min(SEGMENT_FRAMES, shape[2] - at)), np.int32)
-            _read("bench_rows", stream, len(part), part.shape[2], unit, part.ctypes.data)
-            rows[:, :, at : at + SEGMENT_FRAMES] = part
-        return rows
-
-    def table(self, table: np.ndarray) -> bytes:
-        table = table.copy()
-        return _written("bench_table", 4096 + 2 * table.size, *table.shape, table.ctypes.data)
-
-    def read_table(self, data: bytes, shape: tuple[int, int]) -> np.ndarray:
-        table = np.zeros(shape, np.int32)
-        _read("bench_table", data, *shape, table.ctypes.data)
-        return table
-
-
-class Zstd:
-    """zstd after a rearrangement of bytes.
-
-    Every line of numbers has as many bytes per number as its largest one needs, plane by plane. Lines are vertices or
-    frequencies, whichever is smaller.
+def _code_rows(rows: np.ndarray, unit: int) -> bytes:
+    """(R, 3, F) int32 below 2^30, `unit` rows of which belong together, as motion coefficients or as a table, whichever
+    is smaller.
     """
-
-    name = "zstd -19"
-
-    def __init__(self, level: int = 19):
-        self.level = level
-
-    def quick(self) -> Zstd:
-        """A fast level for the search; the order of sizes is nearly always that of level 19."""
-        return Zstd(3)
-
-    def rows(self, rows: np.ndarray, unit: int) -> bytes:
-        return self.table(rows.reshape(len(rows), -1))
-
-    def read_rows(self, data: bytes, shape: tuple[int, int, int], unit: int) -> np.ndarray:
-        return self.read_table(data, (shape[0], shape[1] * shape[2])).reshape(shape)
-
-    def table(self, table: np.ndarray) -> bytes:
-        layouts = [_byte_lines(table), _byte_lines(np.ascontiguousarray(table.T))]
-        sizes = [len(zstandard.compress(layout, 3)) for layout in layouts]
-        turned = int(sizes[1] < sizes[0])
-        return bytes([turned]) + zstandard.ZstdCompressor(
-            level=self.level, write_checksum=False, write_content_size=True
-        ).compress(layouts[turned])
-
-    def read_table(self, data: bytes, shape: tuple[int, int]) -> np.ndarray:
-        raw = zstandard.decompress(data[1:])
-        return np.ascontiguousarray(_from_byte_lines(raw, shape[::-1]).T) if data[0] else _from_byte_lines(raw, shape)
+    parts = [np.ascontiguousarray(rows[:, :, at : at + SEGMENT_FRAMES]) for at in _blocks(rows.shape[2])]
+    coded = [
+        _written("bench_rows", 4096 + part.size, len(part), part.shape[2], unit, part.ctypes.data) for part in parts
+    ]
+    streams = [_join(coded), _code_table(rows.reshape(len(rows), -1))]
+    smaller = int(len(streams[1]) < len(streams[0]))
+    return bytes([smaller]) + streams[smaller]
 
 
-def _byte_lines(table: np.ndarray) -> bytes:
-    """Bytes per number of each line, then its numbers, signs in the lowest bit: all lowest bytes, then the next."""
-    folded = ((table.astype(np.int64) << 1) ^ (table.astype(np.int64) >> 63)).astype("<u4")
-    largest = folded.max(axis=1, initial=0)
-    widths = (largest > 0).astype(np.uint8) + (largest > 0xFF) + (largest > 0xFFFF) + (largest > 0xFFFFFF)
-    planes = folded.view(np.uint8).reshape(*folded.shape, 4)
-    lines = [planes[i, :, byte] for i in range(len(folded)) for byte in range(widths[i])]
-    return widths.tobytes() + (np.concatenate(lines).tobytes() if lines else b"")
+def _read_rows(data: bytes, shape: tuple[int, int, int], unit: int) -> np.ndarray:
+    if data[0]:
+        return _read_table(data[1:], (shape[0], 3 * shape[2])).reshape(shape)
+    rows = np.zeros(shape, np.int32)
+    for at, stream in zip(_blocks(shape[2]), _split(data[1:], len(_blocks(shape[2]))), strict=True):
+        part = np.zeros((*shape[:2], min(SEGMENT_FRAMES, shape[2] - at)), np.int32)
+        _read("bench_rows", stream, len(part), part.shape[2], unit, part.ctypes.data)
+        rows[:, :, at : at + SEGMENT_FRAMES] = part
+    return rows
 
 
-def _from_byte_lines(raw: bytes, shape: tuple[int, int]) -> np.ndarray:
-    widths = np.frombuffer(raw, np.uint8, shape[0])
-    planes = np.zeros((*shape, 4), np.uint8)
-    at = shape[0]
-    for i, width in enumerate(widths.tolist()):
-        planes[i, :, :width] = np.frombuffer(raw, np.uint8, width * shape[1], at).reshape(width, shape[1]).T
-        at += width * shape[1]
-    folded = planes.view("<u4")[:, :, 0].astype(np.int64)
-    return ((folded >> 1) ^ -(folded & 1)).astype(np.int32)
+def _code_table(table: np.ndarray) -> bytes:
+    """(R, C) int32 below 2^30."""
+    table = table.copy()
+    return _written("bench_table", 4096 + 2 * table.size, *table.shape, table.ctypes.data)
+
+
+def _read_table(data: bytes, shape: tuple[int, int]) -> np.ndarray:
+    table = np.zeros(shape, np.int32)
+    _read("bench_table", data, *shape, table.ctypes.data)
+    return table
 
 
 def _blocks(frames: int) -> range:
@@ -270,8 +190,7 @@ def core_branches(hierarchy: Hierarchy) -> np.ndarray:
 class Writer:
     """Parts of an encoding, in the order in which they are read. Each method returns what a reader will get."""
 
-    def __init__(self, coder: EntropyCoder):
-        self.coder = coder
+    def __init__(self) -> None:
         self.parts: list[bytes] = []
         self.values: list[object] = []
 
@@ -285,7 +204,7 @@ class Writer:
 
     def echo(self) -> Echo:
         """A reader of the written values, without decoding."""
-        return Echo(self.coder, self.values)
+        return Echo(self.values)
 
     def count(self, value: int) -> int:
         return self._add(varint(value), value)
@@ -297,13 +216,13 @@ class Writer:
     def rows(self, rows: np.ndarray, unit: int = 1) -> np.ndarray:
         """(R, 3, F) integers, coded as motion coefficients are; see bench_rows for `unit`."""
         head = b"".join(map(varint, (len(rows), rows.shape[2], unit)))
-        coded, wide = self._integers(rows, lambda part: self.coder.rows(part, unit))
+        coded, wide = self._integers(rows, lambda part: _code_rows(part, unit))
         return self._add(head + coded, wide)
 
     def table(self, table: np.ndarray) -> np.ndarray:
         """(R, C) integers of any kind; best if neighbours are of similar magnitude."""
         head = b"".join(map(varint, table.shape))
-        coded, wide = self._integers(table, self.coder.table)
+        coded, wide = self._integers(table, _code_table)
         return self._add(head + coded, wide)
 
     def _integers(self, integers: np.ndarray, code) -> tuple[bytes, np.ndarray]:
@@ -331,7 +250,7 @@ class Writer:
         for own in lags:
             branches["lag"] = own
             rest = streams.encode_rest(branches, step, pose)
-            table = Writer(self.coder)
+            table = Writer()
             table.table(own[None])
             coded.append((table.data(), rest))
         head, rest = min(coded, key=lambda some: len(some[0]) + len(some[1].stream))
@@ -347,8 +266,8 @@ class Writer:
 class Echo:
     """The values of a Writer, one after the other."""
 
-    def __init__(self, coder: EntropyCoder, values: list[object]):
-        self.coder, self._values = coder, iter(values)
+    def __init__(self, values: list[object]):
+        self._values = iter(values)
 
     def _next(self):
         return next(self._values)
@@ -362,8 +281,8 @@ class Echo:
 class Reader:
     """The parts of an encoding, from its bytes alone."""
 
-    def __init__(self, coder: EntropyCoder, data: bytes, at: int = 0):
-        self.coder, self._data, self.at = coder, data, at
+    def __init__(self, data: bytes, at: int = 0):
+        self._data, self.at = data, at
 
     def count(self) -> int:
         value, self.at = read_varint(self._data, self.at)
@@ -380,11 +299,11 @@ class Reader:
 
     def rows(self) -> np.ndarray:
         shape, unit = (self.count(), 3, self.count()), self.count()
-        return self._integers(shape, lambda data: self.coder.read_rows(data, shape, unit))
+        return self._integers(shape, lambda data: _read_rows(data, shape, unit))
 
     def table(self) -> np.ndarray:
         shape = self.count(), self.count()
-        return self._integers(shape, lambda data: self.coder.read_table(data, shape))
+        return self._integers(shape, lambda data: _read_table(data, shape))
 
     def _integers(self, shape: tuple[int, ...], decode) -> np.ndarray:
         result = np.zeros(shape, np.int64)

@@ -27,7 +27,7 @@ REGULARISATION = 1e-3  # towards no rotation, which determines the twist of stra
 
 
 class Lengyel(Baseline):
-    title = "moving frames + PCA (Lengyel)"
+    name = "moving frames + PCA (Lengyel)"
 
     def grid(self, source: Source, bound: float) -> dict[str, Ladder | Choice]:
         depths = tuple(range(min(DEEPEST, int(source.hierarchy.branch_depth.max())) + 1))

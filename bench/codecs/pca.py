@@ -301,7 +301,7 @@ def read_front(reader: Reader) -> tuple[VertexOrder, Trajectories, np.ndarray, f
 
 
 class GlobalPca(Baseline):
-    title = "global PCA"
+    name = "global PCA"
     degrees: tuple[int, ...] = (0,)  # of linear prediction
 
     def grid(self, source: Source, bound: float) -> dict[str, Ladder | Choice]:
@@ -319,7 +319,7 @@ class GlobalPca(Baseline):
 
 
 class PredictedPca(GlobalPca):
-    title = "PCA + linear prediction (Karni-Gotsman)"
+    name = "PCA + linear prediction (Karni-Gotsman)"
     degrees = (2, 1, 3, 4)
 
     def grid(self, source: Source, bound: float) -> dict[str, Ladder | Choice]:
@@ -327,7 +327,7 @@ class PredictedPca(GlobalPca):
 
 
 class ClusteredPca(Baseline):
-    title = "clustered PCA (Sattler)"
+    name = "clustered PCA (Sattler)"
     counts = (1, 2, 4, 8, 16, 24, 32, 48, 64, 96, 128, 192)
     rank = 8  # of the bases that define the clusters
     main = 24  # components of the motion that clusters are formed by

@@ -16,7 +16,7 @@ from athcodec._native import BRANCH
 from athcodec.encoding import quantise
 from athcodec.motion.hierarchy import Hierarchy
 from bench.codecs import Source
-from bench.codecs.coder import RangeCoder, Reader, Writer, core_branches
+from bench.codecs.coder import Reader, Writer, core_branches
 
 KEPT = 6  # cached values of each kind
 ORDERS = ("source", "hierarchy")
@@ -143,23 +143,13 @@ def _shaped(mask: np.ndarray, like: np.ndarray) -> np.ndarray:
 
 
 def write_pose(writer: Writer, order: VertexOrder, pose: np.ndarray, step: float) -> np.ndarray:
-    """A static pose, (N, 3), at a step, by the range coder as a rest pose of a file; returns what a reader will get."""
+    """A static pose, (N, 3), at a step, as a rest pose of a file; returns what a reader will get."""
     step = writer.single(step)
-    if isinstance(writer.coder, RangeCoder):
-        return writer.pose(order.branches, _lags(order, pose, step), step, pose)
-    q = np.rint(pose / step).astype(np.int64)
-    costs = [np.log2(1 + np.abs(differences(q, order, degree))).sum() for degree in (0, 1, 2)]
-    degree = writer.count(int(np.argmin(costs)))
-    writer.table(differences(q, order, degree))
-    return q * step
+    return writer.pose(order.branches, _lags(order, pose, step), step, pose)
 
 
 def read_pose(reader: Reader, order: VertexOrder) -> np.ndarray:
-    step = reader.single()
-    if isinstance(reader.coder, RangeCoder):
-        return reader.pose(order.branches, step)
-    degree = reader.count()
-    return sums(reader.table(), order, degree) * step
+    return reader.pose(order.branches, reader.single())
 
 
 def _lags(order: VertexOrder, pose: np.ndarray, step: float) -> list[np.ndarray]:

@@ -7,8 +7,6 @@ expected error of a vector is stated here; expected.txt gets the results of FORM
 vector never changes once it exists: a better one gets another name.
 """
 
-from __future__ import annotations
-
 from importlib import import_module
 from pathlib import Path
 

@@ -1,11 +1,10 @@
-"""Vectors and how they are declared, and the files that most others are derived from."""
-
-from __future__ import annotations
+"""Vectors and how they are declared, files that others are derived from, and the names that all modules use."""
 
 import math
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -41,26 +40,19 @@ VECTORS: list[Vector] = []
 MADE: dict[str, Plant | Draft | bytes | Callable] = {}  # by the name of the vector
 
 
-def valid(
-    name: str,
-    reason: str,
-    make: Plant | Draft | bytes | Callable,
-    scripted: bool = True,
-    mesh: np.ndarray | None = None,
-) -> None:
-    MADE[name] = make
+def valid(title: str, make: Plant | Draft | bytes | Callable, *arguments, scripted=True, mesh=None, **fields) -> None:
+    """Declare a valid vector by "NAME: REASON", and what makes it, which may get arguments."""
+    name, reason = title.split(": ", 1)
+    MADE[name] = make = partial(make, *arguments, **fields) if arguments or fields else make
     VECTORS.append(Vector(name, reason, lambda: bytes_of(make), scripted=scripted, mesh=mesh_bytes(mesh)))
 
 
-def invalid(
-    name: str,
-    reason: str,
-    make: Draft | bytes | Callable,
-    error: str = "BAD_CHUNK",
-    item: str | int = "open",
-    mesh: np.ndarray | None = None,
-) -> None:
-    VECTORS.append(Vector(name, reason, lambda: bytes_of(make), error, str(item), mesh=mesh_bytes(mesh)))
+def invalid(title: str, make: Draft | bytes | Callable, error="BAD_CHUNK", item: str | int = "open", mesh=None) -> None:
+    """Declare an invalid vector by "NAME: REASON", or by "NAME ERROR ITEM: REASON" where these are others."""
+    head, reason = title.split(": ", 1)
+    name, *expected = head.split()
+    expected += [error, str(item)][len(expected) :]
+    VECTORS.append(Vector(name, reason, lambda: bytes_of(make), *expected, mesh=mesh_bytes(mesh)))
 
 
 def mesh_bytes(mesh: np.ndarray | None) -> bytes | None:
@@ -71,6 +63,22 @@ def bytes_of(made: Plant | Draft | bytes | Callable) -> bytes:
     if callable(made):
         made = made()
     return made if isinstance(made, bytes) else made.file()
+
+
+def stems_of(text: str) -> list[Stem]:
+    """Return stems, separated by commas: parent, vertices and place, then flags and other fields by their names."""
+    stems = []
+    for words in map(str.split, text.split(",")):
+        named = dict(word.split("=") for word in words if "=" in word)
+        flags = sum(getattr(rules, word) for word in words if word.isupper())
+        numbers = [int(word) for word in words if word.lstrip("-").isdigit()]
+        stems.append(Stem(*numbers, flags=flags, **{name: int(value) for name, value in named.items()}))
+    return stems
+
+
+def points_of(text: str) -> list[list[float]]:
+    """Return points, three numbers each."""
+    return np.array(text.replace(",", " ").split(), float).reshape(-1, 3).tolist()
 
 
 def lone(**fields) -> Plant:
@@ -85,10 +93,10 @@ def forked(**fields) -> Plant:
     """A trunk and a branch, four frames in two segments, every kind of motion chunk."""
     scripts = {
         (SHAPES, 1, 0): [2, *row((3, 0, 4), (0, 1, 0)), *row((0, 0, 1)), 0],
-        (STEMS, 1): lambda: Chance(1),
-        (STEMS, 2): lambda: Chance(2),
+        (STEMS, 1): 1,
+        (STEMS, 2): 2,
         (AFFINES, 0): [-8, *row((5, -3, 1), (0, 2, 0))],
-        (CORRECTIONS, 2): lambda: Chance(3),
+        (CORRECTIONS, 2): 3,
     }
     return Plant(FORK, **{"frames": 4, "segments": 2, "scripts": scripts} | fields)
 
@@ -106,7 +114,7 @@ def moving(stems: list[Stem], seed: int, frames: int = 3, segments: int = 1, **f
     """Random rows at all levels."""
     scripts = {}
     for level in range(33):
-        scripts[STEMS, level] = lambda level=level: Chance(100 * seed + level)
+        scripts[STEMS, level] = 100 * seed + level
         scripts[AFFINES, level] = lambda level=level: Chance(100 * seed + level + 50, large=4)
     return Plant(stems, frames, segments, **{"scripts": scripts} | fields)
 
@@ -134,16 +142,7 @@ def exact_rest(stems: list[Stem], numbers: list, is_float64: bool, **fields) -> 
 
 FUTURE = b"from the future"
 LAYER_HEADS = {level: stems_head(0.5 / 4 ** max(level - 2, 0), level % 3) for level in range(12)}
-MIXED = [
-    Stem(-1, 4),
-    Stem(0, 3, 2, SHEET),
-    Stem(1, 2, 1, LOOSE),
-    Stem(0, 70, 3),
-    Stem(3, 5, 66, SHEET | LOOSE),
-    Stem(-1, 6, 0, SHEET),
-    Stem(5, 3, 4, WHOLE),
-    Stem(6, 2, 1),
-]
+MIXED = stems_of("-1 4, 0 3 2 SHEET, 1 2 1 LOOSE, 0 70 3, 3 5 66 SHEET LOOSE, -1 6 0 SHEET, 5 3 4 WHOLE, 6 2 1")
 
 
 def refinements(stems: list[Stem], seed: int, large: int = 12, **fields) -> Plant:
@@ -158,8 +157,8 @@ def refinements(stems: list[Stem], seed: int, large: int = 12, **fields) -> Plan
     return plant
 
 
-def header(name: str, reason: str, error: str = "BAD_HEADER", **fields) -> None:
-    invalid(f"header-{name}", reason, lambda: lone().draft().with_header(**fields), error)
+def header(title: str, **fields) -> None:
+    invalid(f"header-{title}", lambda: lone().with_header(**fields), "BAD_HEADER")
 
 
 def joins(*widths: float) -> tuple[Join, ...]:
@@ -171,8 +170,8 @@ def flipped(data: bytes, place: int) -> bytes:
     return data[:place] + bytes([data[place] ^ 0x10]) + data[place + 1 :]
 
 
-def table(name: str, reason: str, make: Callable[[], Draft | bytes], error: str = "BAD_CHUNK_TABLE") -> None:
-    invalid(f"table-{name}", reason, make, error)
+def table(title: str, make: Callable[[], Draft | bytes]) -> None:
+    invalid(f"table-{title}", make, "BAD_CHUNK_TABLE")
 
 
 def inserted(at: int, *entries: Entry) -> Draft:
@@ -191,20 +190,18 @@ def end_of(draft: Draft, kind: int, level: int = NO_LEVEL, segment: int = 0) -> 
     return len(draft.file()) - sum(len(entry.content) for entry in behind)
 
 
-def prelude(name: str, kind: int, reason: str, content: bytes | Callable[[], bytes], error: str = "BAD_CHUNK") -> None:
+def prelude(kind: int, title: str, content: bytes | Callable[[], bytes]) -> None:
     def make() -> Draft:
         return fork().change(kind, content=content() if callable(content) else content)
 
-    invalid(f"{KIND_NAMES[kind].lower()}-{name}", reason, make, error)
+    invalid(f"{KIND_NAMES[kind].lower()}-{title}", make)
 
 
-def motion(
-    name: str, kind: int, level: int, reason: str, content: bytes | Callable[[], bytes], segment: int = 0
-) -> None:
+def motion(kind: int, level: int, title: str, content: bytes | Callable[[], bytes], segment: int = 0) -> None:
     def make() -> Draft:
         return fork().change(kind, level, segment, content=content() if callable(content) else content)
 
-    invalid(f"{KIND_NAMES[kind].lower()}-{name}", reason, make, item=level)
+    invalid(f"{KIND_NAMES[kind].lower()}-{title}", make, item=level)
 
 
 def forked_plan():

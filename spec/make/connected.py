@@ -1,12 +1,5 @@
 """REST: connected rest poses, which follow FACES."""
 
-from __future__ import annotations
-
-from collections.abc import Callable
-
-import numpy as np
-
-from spec.document import rules
 from spec.make.base import *
 from spec.make.polygons import FACES_3, MANY_FACES, derived, mixed_polygons, polygons
 from spec.make.rest import BY_VERTEX, coded_rest, with_rest
@@ -29,48 +22,6 @@ def connected(
         rest = rest_chunk(stream, step=step, reserved=bits)
     fields = {} if order is None else {"vertex_source": order}
     return with_rest(BY_VERTEX, rest, faces=content, **fields)
-
-
-for name_, make_faces in MANY_FACES.items():
-    valid(
-        f"rest-connected-{name_.replace(' ', '-')}",
-        f"a rest pose by faces: {name_}",
-        lambda make_faces=make_faces: connected(make_faces),
-    )
-valid(
-    "rest-connected-order",
-    "a rest pose by faces of vertices that stand the other way round",
-    lambda: connected(MANY_FACES["strip"], order=list(range(119, -1, -1))),
-)
-valid("rest-connected-tiny", "the same, a subnormal Rest_Step", lambda: connected(MANY_FACES["strip"], 74, FLOAT_TINY))
-valid("rest-connected-exact", "an exact rest pose by faces", lambda: connected(MANY_FACES["quads"], exact=True))
-valid(
-    "rest-connected-none", "a rest pose by no faces", lambda: connected(lambda: polygons(np.zeros((0, 3), "<u2"), 120))
-)
-invalid(
-    "rest-connected-without-faces",
-    "Method has Is_Connected, and there are no FACES",
-    lambda: with_rest(FORK, coded_rest(FORK, [], reserved=REST_CONNECTED >> 2)),
-    "BAD_CHUNK_TABLE",
-)
-for what, content in (
-    ("broken", lambda: polygons(FACES_3) + b"\0"),
-    ("derived", lambda: derived("<i4")),
-    ("many-corners", lambda: polygons(np.zeros((1, 41), "<i4"))),
-    ("many-faces", lambda: polygons(np.zeros((21, 1), "<i4"))),
-):
-    invalid(
-        f"rest-connected-{what}-faces",
-        f"a rest pose by faces that do not serve it: {what}",
-        lambda content=content: (
-            with_rest(FORK, coded_rest(FORK, [], reserved=REST_CONNECTED >> 2)).draft().add(Entry(FACES, content()))
-        ),
-    )
-valid(
-    "rest-connected-own-opposite",
-    "a quadrangle whose corners one and three are the same vertex, behind those between them",
-    lambda: meshed([Stem(-1, 5)], [[3, 0, 3, 1], [0, 1, 2], [2, 3, 4]], Chance(530, large=5)),
-)
 
 
 def meshed(stems: list[Stem], faces: list[list[int]], script: list | Chance, **fields) -> Plant:
@@ -144,27 +95,47 @@ def leaves() -> list[list[int]]:
 
 
 HUBS = [Stem(-1, 1 + max(map(max, hubs())), lag=1)]
+
+
+for name_, make_faces in MANY_FACES.items():
+    valid(f"rest-connected-{name_.replace(' ', '-')}: a rest pose by faces: {name_}", connected, make_faces)
 valid(
-    "rest-connected-hubs",
-    "vertices that complete up to seven parallelograms, or have up to ten neighbours, and no other way",
-    lambda: meshed(HUBS, hubs(), Chance(210, large=5)),
+    "rest-connected-order: a rest pose by faces of vertices that stand the other way round",
+    lambda: connected(MANY_FACES["strip"], order=list(range(119, -1, -1))),
 )
-valid(
-    "rest-connected-leaves",
-    "by faces shapes, copies, branches that others have begun, and steps of branches of their own",
-    lambda: meshed(LEAVES, leaves(), Chance(230, large=3, begin=[1])),
+valid("rest-connected-tiny: the same, a subnormal Rest_Step", lambda: connected(MANY_FACES["strip"], 74, FLOAT_TINY))
+valid("rest-connected-exact: an exact rest pose by faces", lambda: connected(MANY_FACES["quads"], exact=True))
+valid("rest-connected-none: a rest pose by no faces", lambda: connected(lambda: polygons(np.zeros((0, 3), "<u2"), 120)))
+invalid(
+    "rest-connected-without-faces BAD_CHUNK_TABLE: Method has Is_Connected, and there are no FACES",
+    lambda: with_rest(FORK, coded_rest(FORK, [], reserved=REST_CONNECTED >> 2)),
 )
-valid(
-    "rest-connected-crowd",
-    "triangles and quadrangles of the same sides, and of the same vertex twice",
-    lambda: meshed([Stem(-1, 17)], crowd(211), Chance(212, large=5)),
-)
-valid(
-    "rest-connected-most",
-    "a rest pose by four faces and eight corners for each vertex",
-    lambda: meshed(
+for what, content in (
+    ("broken", lambda: polygons(FACES_3) + b"\0"),
+    ("derived", lambda: derived("<i4")),
+    ("many-corners", lambda: polygons(np.zeros((1, 41), "<i4"))),
+    ("many-faces", lambda: polygons(np.zeros((21, 1), "<i4"))),
+):
+    invalid(
+        f"rest-connected-{what}-faces: a rest pose by faces that do not serve it: {what}",
+        lambda content=content: with_rest(FORK, coded_rest(FORK, [], reserved=REST_CONNECTED >> 2)).add(
+            Entry(FACES, content())
+        ),
+    )
+for title, make in {
+    "rest-connected-own-opposite: a quadrangle whose corners one and three are the same vertex, behind those "
+    "between them": lambda: meshed([Stem(-1, 5)], [[3, 0, 3, 1], [0, 1, 2], [2, 3, 4]], Chance(530, large=5)),
+    "rest-connected-hubs: vertices that complete up to seven parallelograms, or have up to ten neighbours, and no "
+    "other way": lambda: meshed(HUBS, hubs(), Chance(210, large=5)),
+    "rest-connected-leaves: by faces shapes, copies, branches that others have begun, and steps of branches of "
+    "their own": lambda: meshed(LEAVES, leaves(), Chance(230, large=3, begin=[1])),
+    "rest-connected-crowd: triangles and quadrangles of the same sides, and of the same vertex twice": lambda: meshed(
+        [Stem(-1, 17)], crowd(211), Chance(212, large=5)
+    ),
+    "rest-connected-most: a rest pose by four faces and eight corners for each vertex": lambda: meshed(
         FORK,
         [[(i + k * (1 + i % 3)) % 5 for k in range(3 if i < 6 else 2 if i < 14 else 1)] for i in range(20)],
         Chance(506, large=5),
     ),
-)
+}.items():
+    valid(title, make)

@@ -1,46 +1,10 @@
 """REST: copies of shapes."""
 
-from __future__ import annotations
-
-from collections.abc import Callable, Sequence
-from dataclasses import replace
-
-import numpy as np
-
-from spec.document import rules
 from spec.make.base import *
 from spec.make.rest import coded_rest, with_rest
 
-COPIED = [  # a shape and its copies, of branches that have detail and that have none
-    Stem(-1, 8, lag=2),
-    Stem(0, 4, 3, lag=2),
-    Stem(0, 4, 5, SHEET, lag=2, detail=118),
-    Stem(0, 4, 0, lag=1),
-    Stem(0, 8, 2, lag=2),
-]
-valid(
-    "rest-copies",
-    "copies of shapes that are mirrored and scaled",
-    lambda: with_rest(COPIED, coded_rest(COPIED, Chance(3, large=3, begin=[1]))),
-)
-for name_, seed_, title_ in (
-    ("rest-copies-of-no-shape", 5, "a copy of a shape that is not there"),
-    ("rest-copies-scale", 4, "the scale of a copy is not above 0"),
-    ("rest-copies-rotation", 40, "a quaternion of more than 1"),
-):
-    invalid(
-        name_,
-        title_,
-        lambda seed_=seed_: (
-            with_rest(COPIED, coded_rest(COPIED, Chance(3, large=3, begin=[1])))
-            .draft()
-            .change(REST, content=coded_rest(COPIED, Chance(seed_, large=3, begin=[1])))
-        ),
-    )
-valid(
-    "rest-copies-between",
-    "the last turn of a shape is two and a half steps of the next copy, but for rounding",
-    lambda: copy_of((36, 0, 0), (0, 0, 1, 0), (15, 0, 3, 0), *[(0, 0, 0, 0), (15, 0, 0, 0)] * 3),
+COPIED = stems_of(  # a shape and its copies, of branches that have detail and that have none
+    "-1 8 lag=2, 0 4 3 lag=2, 0 4 5 SHEET lag=2 detail=118, 0 4 0 lag=1, 0 8 2 lag=2"
 )
 
 
@@ -72,7 +36,7 @@ def broken_rest(make: Callable[[], Plant], goes_on: bool = True) -> Draft:
     finally:
         rules.require = kept
     rest = coded_rest(plant.stems, [], 0.3, rest_type=1)
-    return replace(plant, rest=rest).draft().change(REST, content=plant.rest)
+    return replace(plant, rest=rest).change(REST, content=plant.rest)
 
 
 def copy_of(tip: tuple[int, int, int], *places: Sequence[int], largest: int = 0) -> Plant:
@@ -116,40 +80,50 @@ def copies_of_lengths() -> Plant:
 
 
 FAR, MOST = ((1 << 30) - 2,) * 3, (1 << 29) - 1
+
+
 valid(
-    "rest-copies-turned",
-    "the last turn and scale of a shape, which its next copy is about, of two shapes in turn",
-    copies_turned,
+    "rest-copies: copies of shapes that are mirrored and scaled",
+    lambda: with_rest(COPIED, coded_rest(COPIED, Chance(3, large=3, begin=[1]))),
 )
-valid("rest-copies-of-many", "64 shapes are remembered, and the last of these is copied", copies_of_many)
-valid(
-    "rest-copies-of-lengths", "branches of 15, 16 and 17 vertices that are shapes, copies or neither", copies_of_lengths
-)
-valid(
-    "rest-copies-of-roots",
-    "a root that is a copy of a branch, a branch that is one of a root, and a root of a root",
-    lambda: with_copies(
+for name_, seed_, title_ in (
+    ("rest-copies-of-no-shape", 5, "a copy of a shape that is not there"),
+    ("rest-copies-scale", 4, "the scale of a copy is not above 0"),
+    ("rest-copies-rotation", 40, "a quaternion of more than 1"),
+):
+    invalid(
+        f"{name_}: {title_}",
+        lambda seed_=seed_: with_rest(COPIED, coded_rest(COPIED, Chance(3, large=3, begin=[1]))).change(
+            REST, content=coded_rest(COPIED, Chance(seed_, large=3, begin=[1]))
+        ),
+    )
+for title, make in {
+    "rest-copies-between: the last turn of a shape is two and a half steps of the next copy, "
+    "but for rounding": lambda: copy_of((36, 0, 0), (0, 0, 1, 0), (15, 0, 3, 0), *[(0, 0, 0, 0), (15, 0, 0, 0)] * 3),
+    "rest-copies-turned: the last turn and scale of a shape, which its next copy is about, of "
+    "two shapes in turn": copies_turned,
+    "rest-copies-of-many: 64 shapes are remembered, and the last of these is copied": copies_of_many,
+    "rest-copies-of-lengths: branches of 15, 16 and 17 vertices that are shapes, copies or neither": copies_of_lengths,
+    "rest-copies-of-roots: a root that is a copy of a branch, a branch that is one of a root, "
+    "and a root of a root": lambda: with_copies(
         [3, Stem(-1, 3), Stem(-1, 2), Stem(3, 2, 1), Stem(-1, 2), Stem(5, 3, 1)],
         *([1, *by_chance(3, 190, 9)], copied(0, (1, 1, 2, -1)), by_chance(1, 191)),
         *([1, *by_chance(2, 192, 9)], copied(0, (0, -1, 2, 0)), by_chance(1, 193)),
         *(copied(0, (1, 0, 0, 1)), by_chance(1, 194), copied(0), by_chance(1, 195)),
     ),
-)
-valid(
-    "rest-copies-of-a-point",
-    "a shape of one vertex, whose copies have whole numbers for their scale, up to 999, and for their turn",
-    lambda: with_copies(
+    "rest-copies-of-a-point: a shape of one vertex, whose copies have whole numbers for their scale, up to 999, and "
+    "for their turn": lambda: with_copies(
         [1] * 4,
         *([1, *by_chance(1, 196)], copied(0, (998, 1, 0, 0)), by_chance(1, 197)),
         *(copied(0, (0, 0, -1, 0), 3), by_chance(1, 198), copied(0, (2, 0, 0, 0), 2), by_chance(1, 199)),
     ),
-)
-valid("rest-copies-tiny", "a copy of just over 1/1000 of its shape", lambda: copy_of((8, 0, 68), (-19, 0, 0, 0)))
-valid(
-    "rest-copies-far",
-    "numbers of a copy of 29 bits, and what is expected of many behind it",
-    lambda: copy_of(FAR, (MOST, MOST, -MOST, 0), *[(0, 0, 1, 0), (1, -1, 0, 0)] * 25),
-)
+    "rest-copies-tiny: a copy of just over 1/1000 of its shape": lambda: copy_of((8, 0, 68), (-19, 0, 0, 0)),
+    "rest-copies-far: numbers of a copy of 29 bits, and what is expected of many behind it": lambda: copy_of(
+        FAR, (MOST, MOST, -MOST, 0), *[(0, 0, 1, 0), (1, -1, 0, 0)] * 25
+    ),
+}.items():
+    valid(title, make)
+
 for name_, reason_, tip_, places_ in (
     ("scale-1000", "a scale of 1000", (0, 0, 0), [(999, 0, 0, 0)]),
     ("scale-tiny", "a scale of just under 1/1000", (4, 0, 90), [(-25, 0, 0, 0)]),
@@ -157,18 +131,15 @@ for name_, reason_, tip_, places_ in (
     ("number-negative", "a number of -2^29", FAR, [(MOST, -MOST - 1, 0, 0)]),
 ):
     invalid(
-        f"rest-copies-{name_}",
-        f"{reason_}, of a copy",
+        f"rest-copies-{name_}: {reason_}, of a copy",
         lambda tip_=tip_, places_=places_: broken_rest(lambda: copy_of(tip_, *places_)),
     )
 invalid(
-    "rest-copies-rotation-little",
-    "a quaternion of little more than 1",
+    "rest-copies-rotation-little: a quaternion of little more than 1",
     lambda: broken_rest(lambda: copy_of((10, 0, 0), (0, 2, 2, 0)), goes_on=False),
 )
 invalid(
-    "rest-copies-of-the-65th",
-    "a copy of the shape before the last 64",
+    "rest-copies-of-the-65th: a copy of the shape before the last 64",
     lambda: broken_rest(
         lambda: with_copies([1] * 66, [1, 0, 0, 0], *([0, 1, *by_chance(1, 400 + b)] for b in range(64)), copied(64)),
         goes_on=False,

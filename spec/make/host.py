@@ -1,12 +1,5 @@
 """REST: the host's mesh as the rest pose."""
 
-from __future__ import annotations
-
-from dataclasses import replace
-
-import numpy as np
-
-from spec.document import rules
 from spec.make.base import *
 from spec.make.layers import layered
 from spec.make.rest import AWKWARD_FLOATS
@@ -20,86 +13,10 @@ def hosted(mesh: np.ndarray = MESH, **fields) -> Plant:
     return forked(**{"mesh": mesh, "vertex_source": ORDER} | fields)
 
 
-valid("host-mesh", "the rest pose is the host's mesh, in source order", hosted, mesh=MESH)
-valid(
-    "host-mesh-far",
-    "a mesh far from 0, less an origin",
-    lambda: hosted(MESH * np.float32(1e5), origin=(2e5, -1e5, 0.1)),
-    mesh=MESH * np.float32(1e5),
-)
 AWKWARD_MESH = np.array([*AWKWARD_FLOATS, 0.0, -0.0, 0.0, 1.0, -2.0, -0.5], "<f4").reshape(5, 3)
-valid(
-    "host-mesh-awkward",
-    "-0.0, which counts as 0.0, subnormal and largest numbers in the host's mesh",
-    lambda: hosted(AWKWARD_MESH),
-    mesh=AWKWARD_MESH,
-)
-valid("host-mesh-wide", "binary64 positions about a mesh of binary32", lambda: hosted(is_float64=True), mesh=MESH)
 NO_REFINED_REST = [(REFINED_REST, 3, 0), (REFINED_REST, 4, 0)]
-valid(
-    "host-mesh-layers",
-    "three layers about the host's mesh, which none refines",
-    lambda: layered(3, *NO_REFINED_REST, mesh=MESH, vertex_source=ORDER),
-    mesh=MESH,
-)
 HOSTED_STEMS = [Stem(-1, 70), Stem(0, 9, 60, SHEET), Stem(1, 4, 8)]
 HOSTED_MESH = np.array(grown(HOSTED_STEMS, 6), "<f4")
-valid(
-    "host-mesh-sheets",
-    "sheets and long stems of the host's mesh",
-    lambda: moving(HOSTED_STEMS, 71, frames=3, mesh=HOSTED_MESH, heads=HEADS),
-    mesh=HOSTED_MESH,
-)
-invalid("host-mesh-none", "no mesh is given", hosted, "NEEDS_HOST_MESH", 0)
-invalid("host-mesh-short", "a mesh with one vertex less", hosted, "WRONG_HOST_MESH", 0, MESH[:-1])
-invalid(
-    "host-mesh-long", "a mesh with one vertex more", hosted, "WRONG_HOST_MESH", 0, np.append(MESH, MESH[:1], axis=0)
-)
-invalid("host-mesh-in-file-order", "the mesh in file order", hosted, "WRONG_HOST_MESH", 0, MESH[ORDER])
-for name, value in (("nan", NAN), ("infinite", -INFINITY)):
-    INFINITE_MESH = np.append(MESH[:-1], [[0.0, np.float32(value), 0.0]], axis=0).astype("<f4")
-    invalid(
-        f"host-mesh-{name}",
-        f"the file's own mesh has {value}",
-        lambda mesh=INFINITE_MESH: hosted().draft().change(REST, content=host_rest_chunk(mesh)),
-        "WRONG_HOST_MESH",
-        0,
-        INFINITE_MESH,
-    )
-for at, which in ((17, "first"), (21, "second")):
-    invalid(
-        f"host-mesh-{which}-checksum",
-        f"a mesh that differs by the {which} checksum alone",
-        lambda at=at: hosted().draft().change(REST, content=flipped(host_rest_chunk(MESH), at)),
-        "WRONG_HOST_MESH",
-        0,
-        MESH,
-    )
-for name, why, bits in (("exact", "Is_Exact", {"exact": 1}), ("float64", "Rest_Is_Float64", {"rest_type": 1})):
-    prelude(f"host-{name}", REST, f"{why} beside Is_Host in Method", lambda bits=bits: host_rest_chunk(MESH, **bits))
-for name, why, change in (
-    ("no-checksum", "Is_Host without checksums", lambda chunk: chunk[:17]),
-    ("checksum-short", "Is_Host with 7 bytes of checksums", lambda chunk: chunk[:-1]),
-    ("checksum-long", "Is_Host with a byte behind the checksums", lambda chunk: chunk + b"\0"),
-):
-    prelude(f"host-{name}", REST, why, lambda change=change: change(host_rest_chunk(MESH)))
-prelude(
-    "step-of-host",
-    REST,
-    "Rest_Step is 0 with Is_Host, where it has no meaning",
-    lambda: host_rest_chunk(MESH, step=0.0),
-)
-invalid(
-    "refined-rest-of-host",
-    "REFINED_REST of the host's mesh",
-    lambda: (
-        layered(3, *NO_REFINED_REST, mesh=MESH, vertex_source=ORDER)
-        .draft()
-        .add(Entry(REFINED_REST, refined_rest_chunk(b""), 3))
-    ),
-    item=3,
-    mesh=MESH,
-)
 
 
 def tall(*counts: int) -> Draft:
@@ -132,17 +49,71 @@ def without_mesh(stems: list[Stem]) -> Draft:
     )
 
 
-invalid(
-    "host-mesh-tall",
-    "of a stem of 2^17 vertices among short ones only 2^16 count for how many others have",
-    lambda: tall(1 << 17, *range(1, 17)),
-    "NEEDS_HOST_MESH",
-    0,
+valid("host-mesh: the rest pose is the host's mesh, in source order", hosted, mesh=MESH)
+valid(
+    "host-mesh-far: a mesh far from 0, less an origin",
+    lambda: hosted(MESH * np.float32(1e5), origin=(2e5, -1e5, 0.1)),
+    mesh=MESH * np.float32(1e5),
+)
+valid(
+    "host-mesh-awkward: -0.0, which counts as 0.0, subnormal and largest numbers in the host's mesh",
+    lambda: hosted(AWKWARD_MESH),
+    mesh=AWKWARD_MESH,
+)
+valid("host-mesh-wide: binary64 positions about a mesh of binary32", lambda: hosted(is_float64=True), mesh=MESH)
+valid(
+    "host-mesh-layers: three layers about the host's mesh, which none refines",
+    lambda: layered(3, *NO_REFINED_REST, mesh=MESH, vertex_source=ORDER),
+    mesh=MESH,
+)
+valid(
+    "host-mesh-sheets: sheets and long stems of the host's mesh",
+    lambda: moving(HOSTED_STEMS, 71, frames=3, mesh=HOSTED_MESH, heads=HEADS),
+    mesh=HOSTED_MESH,
+)
+invalid("host-mesh-none NEEDS_HOST_MESH 0: no mesh is given", hosted)
+invalid("host-mesh-short: a mesh with one vertex less", hosted, "WRONG_HOST_MESH", 0, MESH[:-1])
+invalid("host-mesh-long: a mesh with one vertex more", hosted, "WRONG_HOST_MESH", 0, np.append(MESH, MESH[:1], axis=0))
+invalid("host-mesh-in-file-order: the mesh in file order", hosted, "WRONG_HOST_MESH", 0, MESH[ORDER])
+for name, value in (("nan", NAN), ("infinite", -INFINITY)):
+    INFINITE_MESH = np.append(MESH[:-1], [[0.0, np.float32(value), 0.0]], axis=0).astype("<f4")
+    invalid(
+        f"host-mesh-{name}: the file's own mesh has {value}",
+        lambda mesh=INFINITE_MESH: hosted().change(REST, content=host_rest_chunk(mesh)),
+        "WRONG_HOST_MESH",
+        0,
+        INFINITE_MESH,
+    )
+for at, which in ((17, "first"), (21, "second")):
+    invalid(
+        f"host-mesh-{which}-checksum: a mesh that differs by the {which} checksum alone",
+        lambda at=at: hosted().change(REST, content=flipped(host_rest_chunk(MESH), at)),
+        "WRONG_HOST_MESH",
+        0,
+        MESH,
+    )
+for name, why, bits in (("exact", "Is_Exact", {"exact": 1}), ("float64", "Rest_Is_Float64", {"rest_type": 1})):
+    prelude(REST, f"host-{name}: {why} beside Is_Host in Method", lambda bits=bits: host_rest_chunk(MESH, **bits))
+for name, why, change in (
+    ("no-checksum", "Is_Host without checksums", lambda chunk: chunk[:17]),
+    ("checksum-short", "Is_Host with 7 bytes of checksums", lambda chunk: chunk[:-1]),
+    ("checksum-long", "Is_Host with a byte behind the checksums", lambda chunk: chunk + b"\0"),
+):
+    prelude(REST, f"host-{name}: {why}", lambda change=change: change(host_rest_chunk(MESH)))
+prelude(
+    REST, "step-of-host: Rest_Step is 0 with Is_Host, where it has no meaning", lambda: host_rest_chunk(MESH, step=0.0)
 )
 invalid(
-    "host-mesh-deep",
-    "a chain of 1300 branches, from whose end others go up by 1200 and then by 1 to 1000",
-    deep,
-    "NEEDS_HOST_MESH",
-    0,
+    "refined-rest-of-host BAD_CHUNK 3: REFINED_REST of the host's mesh",
+    lambda: layered(3, *NO_REFINED_REST, mesh=MESH, vertex_source=ORDER).add(
+        Entry(REFINED_REST, refined_rest_chunk(b""), 3)
+    ),
+    mesh=MESH,
 )
+for title, make in {
+    "host-mesh-tall NEEDS_HOST_MESH 0: of a stem of 2^17 vertices among short ones only 2^16 count for how many "
+    "others have": lambda: tall(1 << 17, *range(1, 17)),
+    "host-mesh-deep NEEDS_HOST_MESH 0: a chain of 1300 branches, from whose end others go up by 1200 and then by "
+    "1 to 1000": deep,
+}.items():
+    invalid(title, make)

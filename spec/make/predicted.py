@@ -1,15 +1,5 @@
 """PREDICTED: motion without modes."""
 
-from __future__ import annotations
-
-import math
-import struct
-from collections.abc import Callable
-from dataclasses import replace
-
-import numpy as np
-
-from spec.document import rules
 from spec.make.base import *
 
 ROOTED = [Stem(-1, 4, flags=WHOLE), Stem(0, 3, 2), Stem(1, 2, 2), Stem(0, 3, 3)]
@@ -72,172 +62,11 @@ def swayed(frames: int, seed: int, stems: list[Stem] = ROOTED, **options) -> lis
     return [[0, 1, *frame_steps(stems, seed + t, **options)] for t in range(frames)]
 
 
-valid("predicted-still", "nothing moves", lambda: predicted(ROOTED, [RESTING] * 3))
-valid("predicted-smallest", "one vertex, one frame", lambda: predicted(SINGLE, [[0, 1]]))
-valid("predicted", "vertices move at random, longer than any line", lambda: predicted(ROOTED, swayed(30, 1, large=5)))
-valid(
-    "predicted-following",
-    "most stems follow their ends, for long and then for a while not",
-    lambda: predicted(ROOTED, swayed(8, 21, follow=0.9) + swayed(4, 40, follow=0.1) + swayed(8, 50, follow=0.9)),
-)
-valid(
-    "predicted-following-huge",
-    "what follows leaves the range of binary32, and of binary64",
-    lambda: predicted(
-        LONG, swayed(6, 60, LONG, large=30, follow=1.0), predicted=predicted_head(FLOAT_MAX), is_float64=True
-    ),
-)
-valid(
-    "predicted-lattice",
-    "vertices are points of the lattice",
-    lambda: predicted(ROOTED, [[0, 1, *frame_points(ROOTED, 30 + t)] for t in range(20)], lattice=1),
-)
-valid(
-    "predicted-lattice-huge",
-    "the largest points of the lattice, even and odd",
-    lambda: predicted(
-        SINGLE,
-        [
-            [0, 1, 1, -((1 << 30) - 1), 1, (1 << 30) - 1, 0, (1 << 30) - 1],
-            [0, 1, 1, (1 << 30) - 2, (1 << 30) - 1, -((1 << 30) - 1)],
-        ],
-        predicted=predicted_head(FLOAT_MAX, 1),
-    ),
-)
-valid(
-    "predicted-references",
-    "frames that are copies of earlier ones, of the rest pose, and coded about earlier ones",
-    lambda: predicted(
-        ROOTED,
-        [
-            [0, 1, *frame_steps(ROOTED, 3)],
-            [0, 1, *frame_steps(ROOTED, 4)],
-            [1, 1],
-            [1, 1],
-            [0, 0, 2, *frame_steps(ROOTED, 5)],
-            [1, 0, 5],
-            [0, 1, *frame_steps(ROOTED, 6)],
-            [0, 0, 0, *frame_steps(ROOTED, 7)],
-        ],
-    ),
-)
-valid(
-    "predicted-all-copied", "every frame is the rest pose", lambda: predicted(ROOTED, [[1, 1]] + [[1, 0, 0], [1, 0, 2]])
-)
-valid(
-    "predicted-twins",
-    "vertices that rest at the same places, and a stem as long as another",
-    lambda: predicted(
-        TWINS, swayed(9, 8, TWINS, large=6), points=[[4.0 * (i % 3), float(i % 2), 1.0] for i in range(14)]
-    ),
-)
-valid(
-    "predicted-collapsed",
-    "all vertices rest at one place",
-    lambda: predicted(ROOTED, swayed(6, 9), points=[[2.0, 2.0, 2.0]] * 12),
-)
-valid(
-    "predicted-huge",
-    "the largest integers and steps: positions leave the range of binary32",
-    lambda: predicted(SINGLE, [[0, 1, 1, (1 << 30) - 1, -((1 << 30) - 1), 1]] * 5, predicted=predicted_head(FLOAT_MAX)),
-)
-valid(
-    "predicted-tiny", "a subnormal Step", lambda: predicted(ROOTED, swayed(4, 10), predicted=predicted_head(FLOAT_TINY))
-)
-valid(
-    "predicted-wide",
-    "binary64 positions far from the origin",
-    lambda: predicted(ROOTED, swayed(7, 11), is_float64=True, origin=(1e6, -3e5, 0.125)),
-)
-valid(
-    "predicted-rounded",
-    "binary32 positions far from the origin, a step below their spacing",
-    lambda: predicted(ROOTED, swayed(7, 12), origin=(1e6, -3e5, 0.125)),
-)
-valid(
-    "predicted-segments",
-    "two segments, of which one has maps for level 0",
-    lambda: predicted(ROOTED, swayed(5, 13), 2, scripts={(AFFINES, 0, 1): [-8, *row((5, -3, 1), (0, 2, 0))]}),
-)
-valid(
-    "predicted-roots",
-    "maps of roots of one vertex, of one stem and of a subtree",
-    lambda: predicted(ROOTS, swayed(3, 14, ROOTS), scripts={(AFFINES, 0, 0): lambda: Chance(15, large=4)}),
-)
-valid("predicted-level-0", "shortened: level 0 of 2", lambda: predicted(ROOTED, swayed(2, 16)).draft().upto(0))
-valid(
-    "predicted-lossless",
-    "the source's own numbers behind it",
-    lambda: (
-        predicted(ROOTED, swayed(2, 17))
-        .draft()
-        .with_header(level_count=3, full_level_count=3)
-        .add(Entry(EXACT, b"", 2, 0))
-    ),
-)
-
-
 def swaying() -> Draft:
     return predicted(ROOTED, swayed(3, 18), 2).draft()
 
 
 PREDICTED_PLACE = PREDICTED, 1, 1
-invalid("predicted-missing", "a segment has none", lambda: swaying().without(*PREDICTED_PLACE), "BAD_CHUNK_TABLE")
-invalid(
-    "predicted-stems",
-    "a segment has STEMS too",
-    lambda: swaying().add(Entry(STEMS, stems_head(), 1, 0)),
-    "BAD_CHUNK_TABLE",
-)
-invalid(
-    "predicted-corrections",
-    "a segment has CORRECTIONS too",
-    lambda: swaying().add(Entry(CORRECTIONS, struct.pack("<f", 0.5), 1, 0)),
-    "BAD_CHUNK_TABLE",
-)
-invalid(
-    "predicted-unsaid",
-    "PREDICTED where Is_Predicted is 0",
-    lambda: fork().add(Entry(PREDICTED, predicted_head(), 2, 0)),
-    "BAD_CHUNK_TABLE",
-)
-invalid(
-    "predicted-at-level-0",
-    "PREDICTED of level 0",
-    lambda: swaying().add(Entry(PREDICTED, predicted_head(), 0, 0)),
-    "BAD_CHUNK_TABLE",
-)
-invalid(
-    "predicted-layers", "Layer_Count 2", lambda: swaying().with_header(layer_count=2, full_level_count=3), "BAD_HEADER"
-)
-invalid(
-    "predicted-nodes",
-    "h is 1",
-    lambda: predicted(FORKED, swayed(1, 19, FORKED)).draft().with_header(full_level_count=3, level_count=2),
-    "BAD_HEADER",
-)
-for name, reason, content in (
-    ("short", "4 bytes", predicted_head()[:4]),
-    ("lattice-2", "Is_Lattice is 2", predicted_head(lattice=2)),
-    ("step-0", "Step 0", predicted_head(0.0)),
-    ("step-nan", "Step is NaN", predicted_head(math.nan)),
-    ("left-over", "a byte behind the stream", predicted_head() + b"\1" * 400),
-    ("zero", "a stream that ends in 0", predicted_head() + b"\1\0"),
-):
-    invalid(
-        f"predicted-{name}", reason, lambda content=content: swaying().change(*PREDICTED_PLACE, content=content), item=1
-    )
-invalid(
-    "predicted-before-first",
-    "a frame is coded about one before the rest pose",
-    lambda: predicted(ROOTED, [RESTING, [0, 0, 2]]),
-    item=1,
-)
-valid(
-    "predicted-on-vertex-0",
-    "a stem on vertex 0, whose first vertex is no end",
-    lambda: predicted([Stem(-1, 2, flags=WHOLE), Stem(0, 3, 0)], swayed(6, 510, [Stem(-1, 2), Stem(0, 3, 0)])),
-)
 
 
 def with_source(draft: Draft, seed: int) -> Draft:
@@ -263,21 +92,6 @@ SOURCE_FRAMES = [  # with copies, of the frame before, of earlier ones and of th
     [0, 1, *frame_steps(ROOTED, 152)],
     [1, 0, 1],
 ]
-for name_, more_ in (("", {}), ("-wide", {"is_float64": True, "origin": (3.0, -1e3, 0.1)})):
-    valid(
-        f"predicted-lossless-repeats{name_}",
-        "the source's own numbers, which differ where predicted motion has copies, of frames that are shown for long; "
-        "level 0 is joined",
-        lambda more_=more_: with_source(
-            replace(
-                predicted(ROOTED, SOURCE_FRAMES, 2, scripts={(AFFINES, 0): lambda: Chance(153, large=4)}, **more_),
-                frames=20,
-                repeats=(0, 1, 0, 0, 1, 1, 0, 0, 0, 1) + (0, 0, 0, 1, 0, 0, 1, 0, 1, 1),
-                joins=joins(0, 2.5, 0, 0),
-            ).draft(),
-            154,
-        ),
-    )
 
 
 def cells(seed: int) -> list[list[float]]:
@@ -290,31 +104,11 @@ def cells(seed: int) -> list[list[float]]:
 
 
 PAIR, POINTS = [Stem(-1, 2, flags=WHOLE)], [Stem(-1, 1)] * 64
-valid(
-    "predicted-long",
-    "more frames than means are of, and more than vertices are of any line",
-    lambda: predicted(PAIR, swayed(200, 213, PAIR, large=5, still=0.1)),
-)
-valid(
-    "predicted-cells",
-    "vertices that follow others at the same places, unless the entry of their cell has been taken",
-    lambda: predicted(
-        POINTS,
-        swayed(3, 310, POINTS, large=6, still=0.2),
-        rest=exact_rest(POINTS, np.array(cells(223)).ravel().tolist(), True),
-        is_float64=True,
-    ),
-)
 LEAVING = [  # both ends of a stem, and those between them: a root that leaves binary32, and others that follow it
     *([0, 1, 1, 20, 0, 1, 1, move, 1, 0, 0, 0, 0] for move in (20, 1, 0, 0, -1, 0, 0)),
     *([0, 1, 1, 60, 3, 0, 1, 0, 1, move, 1] for move in (2, 0, 0, 1)),
     *([0, 0, distance, 0, 1, 0, move, 0, 1] for distance, move in ((8, 1), (0, 2))),
 ]
-valid(
-    "predicted-beyond",
-    "a root that leaves binary32: what is expected to go with it stays, and so does what follows ends",
-    lambda: predicted([Stem(-1, 4, flags=WHOLE)], LEAVING, predicted=predicted_head(1e36)),
-)
 
 
 def turns(seed: int) -> list:
@@ -326,34 +120,6 @@ def turns(seed: int) -> list:
     ]
 
 
-valid(
-    "predicted-turns",
-    "lines that begin anew in frames that are coded about earlier ones",
-    lambda: predicted(PAIR, turns(330)),
-)
-valid(
-    "predicted-about-copies",
-    "frames that are coded about copies, about copies of copies, and about frames that were coded about these",
-    lambda: predicted(
-        ROOTED,
-        [
-            *swayed(2, 320, still=0.1),
-            *([1, 1], *swayed(1, 322, still=0.1), [1, 1], [1, 1], *swayed(2, 323, still=0.1)),
-            *([0, 0, 3, *frame_steps(ROOTED, 325, still=0.1)], [0, 0, 0, *frame_steps(ROOTED, 326, still=0.1)]),
-            *([1, 0, 6], [0, 0, 0, *frame_steps(ROOTED, 327, still=0.1)], *swayed(2, 328, still=0.1)),
-        ],
-    ),
-)
-valid(
-    "predicted-copied-rest",
-    "a copy of the rest pose, rounded as it is shown, which others are coded about",
-    lambda: predicted(
-        ROOTED,
-        [[1, 1], *swayed(2, 315, still=0.1), [1, 0, 3], *swayed(2, 317, still=0.1)],
-        origin=(1e6, -3e5, 0.125),
-        step=0.01,
-    ),
-)
 RUNS_OF_COPIES = (3, 9, 8, 12, 7, 10, 6, 8, 9, 7, 11, 8, 0, 8, 1, 9)
 
 
@@ -365,23 +131,173 @@ def in_runs() -> Plant:
     return predicted(SINGLE, frames)
 
 
-valid("predicted-long-runs", "runs of copied frames of up to 12, of which those from 7 on are alike", in_runs)
+for title, make in {
+    "predicted-still: nothing moves": lambda: predicted(ROOTED, [RESTING] * 3),
+    "predicted-smallest: one vertex, one frame": lambda: predicted(SINGLE, [[0, 1]]),
+    "predicted: vertices move at random, longer than any line": lambda: predicted(ROOTED, swayed(30, 1, large=5)),
+    "predicted-following: most stems follow their ends, for long and then for a while not": lambda: predicted(
+        ROOTED, swayed(8, 21, follow=0.9) + swayed(4, 40, follow=0.1) + swayed(8, 50, follow=0.9)
+    ),
+    "predicted-following-huge: what follows leaves the range of binary32, and of binary64": lambda: predicted(
+        LONG, swayed(6, 60, LONG, large=30, follow=1.0), predicted=predicted_head(FLOAT_MAX), is_float64=True
+    ),
+    "predicted-lattice: vertices are points of the lattice": lambda: predicted(
+        ROOTED, [[0, 1, *frame_points(ROOTED, 30 + t)] for t in range(20)], lattice=1
+    ),
+    "predicted-lattice-huge: the largest points of the lattice, even and odd": lambda: predicted(
+        SINGLE,
+        [
+            [0, 1, 1, -((1 << 30) - 1), 1, (1 << 30) - 1, 0, (1 << 30) - 1],
+            [0, 1, 1, (1 << 30) - 2, (1 << 30) - 1, -((1 << 30) - 1)],
+        ],
+        predicted=predicted_head(FLOAT_MAX, 1),
+    ),
+    "predicted-references: frames that are copies of earlier ones, of the rest pose, and coded "
+    "about earlier ones": lambda: predicted(
+        ROOTED,
+        [
+            [0, 1, *frame_steps(ROOTED, 3)],
+            [0, 1, *frame_steps(ROOTED, 4)],
+            [1, 1],
+            [1, 1],
+            [0, 0, 2, *frame_steps(ROOTED, 5)],
+            [1, 0, 5],
+            [0, 1, *frame_steps(ROOTED, 6)],
+            [0, 0, 0, *frame_steps(ROOTED, 7)],
+        ],
+    ),
+    "predicted-all-copied: every frame is the rest pose": lambda: predicted(ROOTED, [[1, 1]] + [[1, 0, 0], [1, 0, 2]]),
+    "predicted-twins: vertices that rest at the same places, and a stem as long as another": lambda: predicted(
+        TWINS, swayed(9, 8, TWINS, large=6), points=[[4.0 * (i % 3), float(i % 2), 1.0] for i in range(14)]
+    ),
+    "predicted-collapsed: all vertices rest at one place": lambda: predicted(
+        ROOTED, swayed(6, 9), points=[[2.0, 2.0, 2.0]] * 12
+    ),
+    "predicted-huge: the largest integers and steps: positions leave the range of binary32": lambda: predicted(
+        SINGLE, [[0, 1, 1, (1 << 30) - 1, -((1 << 30) - 1), 1]] * 5, predicted=predicted_head(FLOAT_MAX)
+    ),
+    "predicted-tiny: a subnormal Step": lambda: predicted(ROOTED, swayed(4, 10), predicted=predicted_head(FLOAT_TINY)),
+    "predicted-wide: binary64 positions far from the origin": lambda: predicted(
+        ROOTED, swayed(7, 11), is_float64=True, origin=(1e6, -3e5, 0.125)
+    ),
+    "predicted-rounded: binary32 positions far from the origin, a step below their spacing": lambda: predicted(
+        ROOTED, swayed(7, 12), origin=(1e6, -3e5, 0.125)
+    ),
+    "predicted-segments: two segments, of which one has maps for level 0": lambda: predicted(
+        ROOTED, swayed(5, 13), 2, scripts={(AFFINES, 0, 1): [-8, *row((5, -3, 1), (0, 2, 0))]}
+    ),
+    "predicted-roots: maps of roots of one vertex, of one stem and of a subtree": lambda: predicted(
+        ROOTS, swayed(3, 14, ROOTS), scripts={(AFFINES, 0, 0): lambda: Chance(15, large=4)}
+    ),
+    "predicted-level-0: shortened: level 0 of 2": lambda: predicted(ROOTED, swayed(2, 16)).upto(0),
+    "predicted-lossless: the source's own numbers behind it": lambda: (
+        predicted(ROOTED, swayed(2, 17)).with_header(level_count=3, full_level_count=3).add(Entry(EXACT, b"", 2, 0))
+    ),
+}.items():
+    valid(title, make)
+
+for title, make in {
+    "predicted-missing BAD_CHUNK_TABLE: a segment has none": lambda: swaying().without(*PREDICTED_PLACE),
+    "predicted-stems BAD_CHUNK_TABLE: a segment has STEMS too": lambda: swaying().add(Entry(STEMS, stems_head(), 1, 0)),
+    "predicted-corrections BAD_CHUNK_TABLE: a segment has CORRECTIONS too": lambda: swaying().add(
+        Entry(CORRECTIONS, struct.pack("<f", 0.5), 1, 0)
+    ),
+    "predicted-unsaid BAD_CHUNK_TABLE: PREDICTED where Is_Predicted is 0": lambda: fork().add(
+        Entry(PREDICTED, predicted_head(), 2, 0)
+    ),
+    "predicted-at-level-0 BAD_CHUNK_TABLE: PREDICTED of level 0": lambda: swaying().add(
+        Entry(PREDICTED, predicted_head(), 0, 0)
+    ),
+    "predicted-layers BAD_HEADER: Layer_Count 2": lambda: swaying().with_header(layer_count=2, full_level_count=3),
+    "predicted-nodes BAD_HEADER: h is 1": lambda: predicted(FORKED, swayed(1, 19, FORKED)).with_header(
+        full_level_count=3, level_count=2
+    ),
+}.items():
+    invalid(title, make)
+
+for name, reason, content in (
+    ("short", "4 bytes", predicted_head()[:4]),
+    ("lattice-2", "Is_Lattice is 2", predicted_head(lattice=2)),
+    ("step-0", "Step 0", predicted_head(0.0)),
+    ("step-nan", "Step is NaN", predicted_head(math.nan)),
+    ("left-over", "a byte behind the stream", predicted_head() + b"\1" * 400),
+    ("zero", "a stream that ends in 0", predicted_head() + b"\1\0"),
+):
+    invalid(
+        f"predicted-{name} BAD_CHUNK 1: {reason}",
+        lambda content=content: swaying().change(*PREDICTED_PLACE, content=content),
+    )
 invalid(
-    "predicted-step-infinite",
-    "Step is infinite",
-    lambda: swaying().change(*PREDICTED_PLACE, content=predicted_head(INFINITY)),
-    item=1,
+    "predicted-before-first BAD_CHUNK 1: a frame is coded about one before the rest pose",
+    lambda: predicted(ROOTED, [RESTING, [0, 0, 2]]),
 )
 valid(
-    "predicted-short-exactly",
-    "a step and a way at rest whose squares add up to 1e-60, which is no more than that",
-    lambda: predicted(
-        [Stem(-1, 3, flags=WHOLE)],
-        swayed(6, 140, [Stem(-1, 3, flags=WHOLE)], follow=1.0, still=0.1),
-        rest=exact_rest(
-            [Stem(-1, 3)], [0, 0, 0, 0, 3e-31, 2e-31, 9.50870501981432e-31, 2.9299366694240276e-31, 0], True
+    "predicted-on-vertex-0: a stem on vertex 0, whose first vertex is no end",
+    lambda: predicted([Stem(-1, 2, flags=WHOLE), Stem(0, 3, 0)], swayed(6, 510, [Stem(-1, 2), Stem(0, 3, 0)])),
+)
+for name_, more_ in (("", {}), ("-wide", {"is_float64": True, "origin": (3.0, -1e3, 0.1)})):
+    valid(
+        f"predicted-lossless-repeats{name_}: the source's own numbers, which differ where predicted motion has copies, "
+        "of frames that are shown for long; level 0 is joined",
+        lambda more_=more_: with_source(
+            replace(
+                predicted(ROOTED, SOURCE_FRAMES, 2, scripts={(AFFINES, 0): lambda: Chance(153, large=4)}, **more_),
+                frames=20,
+                repeats=(0, 1, 0, 0, 1, 1, 0, 0, 0, 1) + (0, 0, 0, 1, 0, 0, 1, 0, 1, 1),
+                joins=joins(0, 2.5, 0, 0),
+            ).draft(),
+            154,
         ),
-        predicted=predicted_head(1e-31),
+    )
+for title, make in {
+    "predicted-long: more frames than means are of, and more than vertices are of any line": lambda: predicted(
+        PAIR, swayed(200, 213, PAIR, large=5, still=0.1)
+    ),
+    "predicted-cells: vertices that follow others at the same places, unless the entry of their "
+    "cell has been taken": lambda: predicted(
+        POINTS,
+        swayed(3, 310, POINTS, large=6, still=0.2),
+        rest=exact_rest(POINTS, np.array(cells(223)).ravel().tolist(), True),
         is_float64=True,
     ),
+    "predicted-beyond: a root that leaves binary32: what is expected to go with it stays, and so does what follows "
+    "ends": lambda: predicted([Stem(-1, 4, flags=WHOLE)], LEAVING, predicted=predicted_head(1e36)),
+    "predicted-turns: lines that begin anew in frames that are coded about earlier ones": lambda: predicted(
+        PAIR, turns(330)
+    ),
+    "predicted-about-copies: frames that are coded about copies, about copies of copies, and about frames that were "
+    "coded about these": lambda: predicted(
+        ROOTED,
+        [
+            *swayed(2, 320, still=0.1),
+            *([1, 1], *swayed(1, 322, still=0.1), [1, 1], [1, 1], *swayed(2, 323, still=0.1)),
+            *([0, 0, 3, *frame_steps(ROOTED, 325, still=0.1)], [0, 0, 0, *frame_steps(ROOTED, 326, still=0.1)]),
+            *([1, 0, 6], [0, 0, 0, *frame_steps(ROOTED, 327, still=0.1)], *swayed(2, 328, still=0.1)),
+        ],
+    ),
+    "predicted-copied-rest: a copy of the rest pose, rounded as it is shown, which others are coded about": lambda: (
+        predicted(
+            ROOTED,
+            [[1, 1], *swayed(2, 315, still=0.1), [1, 0, 3], *swayed(2, 317, still=0.1)],
+            origin=(1e6, -3e5, 0.125),
+            step=0.01,
+        )
+    ),
+    "predicted-long-runs: runs of copied frames of up to 12, of which those from 7 on are alike": in_runs,
+}.items():
+    valid(title, make)
+
+
+invalid(
+    "predicted-step-infinite BAD_CHUNK 1: Step is infinite",
+    lambda: swaying().change(*PREDICTED_PLACE, content=predicted_head(INFINITY)),
+)
+valid(
+    "predicted-short-exactly: a step and a way at rest whose squares add up to 1e-60, which is no more than that",
+    predicted,
+    [Stem(-1, 3, flags=WHOLE)],
+    swayed(6, 140, [Stem(-1, 3, flags=WHOLE)], follow=1.0, still=0.1),
+    rest=exact_rest([Stem(-1, 3)], [0, 0, 0, 0, 3e-31, 2e-31, 9.50870501981432e-31, 2.9299366694240276e-31, 0], True),
+    predicted=predicted_head(1e-31),
+    is_float64=True,
 )

@@ -1,131 +1,98 @@
 """TIME."""
 
-from __future__ import annotations
-
-from collections.abc import Callable
-
-from spec.document import rules
 from spec.make.base import *
 from spec.make.clips import two_clips
-
-valid("time-whole-rate", "times by a whole rate", lambda: lone(frames=7, time=whole_rates(3)))
-valid(
-    "time-whole-step",
-    "times by a step that is one over a whole rate",
-    lambda: lone(frames=7, time=whole_rates(49, method=4)),
-)
-valid("time-largest-rate", "Rate 65535", lambda: lone(frames=7, time=whole_rates(65535)))
-valid("time-rate", "times by their rate, First below 0", lambda: lone(frames=4, time=steady_time(-2.0, 24.0, 1)))
-valid(
-    "time-wide",
-    "times far from 0, with a Step that just counts",
-    lambda: lone(frames=3, time=steady_time(2.0**52, 1.0)),
-)
-valid(
-    "time-uneven",
-    "times one by one, -0.0 and subnormal ones among them",
-    lambda: lone(frames=6, time=uneven_time(-1e300, -1.0, -0.0, TINY, 1 / 3, HIGHEST)),
-)
-valid("time-one-uneven", "a single time by Method 2", lambda: lone(time=uneven_time(1.5)))
 
 
 def steady(first: float, step: float, method: int = 0) -> Callable[[], bytes]:
     return lambda: steady_time(first, step, method)
 
 
-prelude("empty", TIME, "no bytes", b"")
-prelude("method-5", TIME, "Method 5", lambda: whole_rates(1, method=5))
+def clip_times(title: str, make: Callable[[], bytes]) -> None:
+    """TIME of the two clips."""
+    invalid(f"time-{title}", lambda: two_clips().change(TIME, content=make()))
+
+
+STEADY = (0.0, 0.25)
+
+
+valid("time-whole-rate: times by a whole rate", lambda: lone(frames=7, time=whole_rates(3)))
+valid("time-whole-step: times by a step that is one over a whole rate", lone, frames=7, time=whole_rates(49, method=4))
+valid("time-largest-rate: Rate 65535", lambda: lone(frames=7, time=whole_rates(65535)))
+valid("time-rate: times by their rate, First below 0", lambda: lone(frames=4, time=steady_time(-2.0, 24.0, 1)))
+valid("time-wide: times far from 0, with a Step that just counts", lone, frames=3, time=steady_time(2.0**52, 1.0))
+valid(
+    "time-uneven: times one by one, -0.0 and subnormal ones among them",
+    lambda: lone(frames=6, time=uneven_time(-1e300, -1.0, -0.0, TINY, 1 / 3, HIGHEST)),
+)
+valid("time-one-uneven: a single time by Method 2", lambda: lone(time=uneven_time(1.5)))
+prelude(TIME, "empty: no bytes", b"")
+prelude(TIME, "method-5: Method 5", lambda: whole_rates(1, method=5))
 for method in (3, 4):
-    prelude(
-        f"whole-{method}-0", TIME, f"Rate 0 of Method {method}", lambda method=method: whole_rates(0, method=method)
-    )
-prelude("whole-short", TIME, "half of Rate", lambda: whole_rates(2)[:2])
-prelude("whole-long", TIME, "two Rates of one clip", lambda: whole_rates(2, 2))
-prelude("short", TIME, "First and half of Step", lambda: steady_time()[:13])
-prelude("long", TIME, "a byte behind Step", lambda: steady_time() + b"\0")
+    prelude(TIME, f"whole-{method}-0: Rate 0 of Method {method}", lambda method=method: whole_rates(0, method=method))
+prelude(TIME, "whole-short: half of Rate", lambda: whole_rates(2)[:2])
+prelude(TIME, "whole-long: two Rates of one clip", lambda: whole_rates(2, 2))
+prelude(TIME, "short: First and half of Step", lambda: steady_time()[:13])
+prelude(TIME, "long: a byte behind Step", lambda: steady_time() + b"\0")
 for what, value in (("zero", 0.0), ("negative", -1.0), ("nan", NAN), ("infinite", INFINITY)):
-    prelude(f"step-{what}", TIME, f"Step is {value}", steady(0.0, value))
-    prelude(f"rate-{what}", TIME, f"Step of Method 1 is {value}", steady(0.0, value, 1))
-prelude("first-nan", TIME, "First is NaN", steady(NAN, 1.0))
-prelude("first-infinite", TIME, "First is infinite", steady(-INFINITY, 1.0))
-prelude("stands-still", TIME, "Step vanishes beside First", steady(1e30, 1.0))
-prelude("overflows", TIME, "times beyond binary64", steady(0.0, HIGHEST))
-prelude("rate-overflows", TIME, "a rate so low that times are infinite", steady(0.0, TINY, 1))
-prelude("equal", TIME, "a time twice", lambda: uneven_time(0.0, 1.0, 1.0, 2.0))
-prelude("descends", TIME, "a time before the one before", lambda: uneven_time(0.0, 1.0, 2.0, 1.5))
-prelude("zeros", TIME, "-0.0 is not before 0.0", lambda: uneven_time(-0.0, 0.0, 1.0, 2.0))
+    prelude(TIME, f"step-{what}: Step is {value}", steady(0.0, value))
+    prelude(TIME, f"rate-{what}: Step of Method 1 is {value}", steady(0.0, value, 1))
+prelude(TIME, "first-nan: First is NaN", steady(NAN, 1.0))
+prelude(TIME, "first-infinite: First is infinite", steady(-INFINITY, 1.0))
+prelude(TIME, "stands-still: Step vanishes beside First", steady(1e30, 1.0))
+prelude(TIME, "overflows: times beyond binary64", steady(0.0, HIGHEST))
+prelude(TIME, "rate-overflows: a rate so low that times are infinite", steady(0.0, TINY, 1))
+prelude(TIME, "equal: a time twice", lambda: uneven_time(0.0, 1.0, 1.0, 2.0))
+prelude(TIME, "descends: a time before the one before", lambda: uneven_time(0.0, 1.0, 2.0, 1.5))
+prelude(TIME, "zeros: -0.0 is not before 0.0", lambda: uneven_time(-0.0, 0.0, 1.0, 2.0))
 prelude(
-    "infinite",
     TIME,
-    "an infinite time at the end",
+    "infinite: an infinite time at the end",
     lambda: uneven_time(
         0.0, 1.0, 2.0, (rules.ordered(0x7FF << 52, 64) - rules.ordered(rules.to_bits(3.0, 64), 64), False)
     ),
 )
-prelude("zero-behind", TIME, "a zero byte behind the stream", lambda: uneven_time(0.0, 1.0, 2.5, 3.0) + b"\0")
-prelude("bytes-behind", TIME, "bytes behind the stream", lambda: uneven_time(0.0, 1.0, 2.5, 3.0) + b"\1" * 12)
+prelude(TIME, "zero-behind: a zero byte behind the stream", lambda: uneven_time(0.0, 1.0, 2.5, 3.0) + b"\0")
+prelude(TIME, "bytes-behind: bytes behind the stream", lambda: uneven_time(0.0, 1.0, 2.5, 3.0) + b"\1" * 12)
 invalid(
-    "time-code-outside",
-    "a stream whose code is outside the final interval",
-    lambda: lone().draft().change(TIME, content=b"\2" + b"\xff" * 8),
+    "time-code-outside: a stream whose code is outside the final interval",
+    lambda: lone().change(TIME, content=b"\2" + b"\xff" * 8),
 )
 invalid(
-    "time-of-one-infinite",
-    "First of a single frame is infinite",
-    lambda: lone().draft().change(TIME, content=steady_time(INFINITY)),
+    "time-of-one-infinite: First of a single frame is infinite",
+    lambda: lone().change(TIME, content=steady_time(INFINITY)),
 )
-
-
-def clip_times(name: str, reason: str, make: Callable[[], bytes]) -> None:
-    """TIME of the two clips."""
-    invalid(f"time-{name}", reason, lambda: two_clips().change(TIME, content=make()))
-
-
-STEADY = (0.0, 0.25)
-clip_times("of-one-clip", "First and Step of one clip of two", lambda: steady_times(STEADY))
-clip_times(
-    "of-three-clips", "First and Step of three clips where two are", lambda: steady_times(STEADY, STEADY, STEADY)
-)
-clip_times("without-last-step", "First of the second clip without its Step", lambda: steady_times(STEADY, STEADY)[:-8])
+clip_times("of-one-clip: First and Step of one clip of two", lambda: steady_times(STEADY))
+clip_times("of-three-clips: First and Step of three clips where two are", lambda: steady_times(STEADY, STEADY, STEADY))
+clip_times("without-last-step: First of the second clip without its Step", lambda: steady_times(STEADY, STEADY)[:-8])
 invalid(
-    "time-of-two-clips",
-    "First and Step of two clips where one is",
-    lambda: lone().draft().change(TIME, content=steady_times(STEADY, STEADY)),
+    "time-of-two-clips: First and Step of two clips where one is",
+    lambda: lone().change(TIME, content=steady_times(STEADY, STEADY)),
 )
 for what, value in (("zero", 0.0), ("negative", -1.0), ("nan", NAN), ("infinite", INFINITY)):
     clip_times(
-        f"second-step-{what}",
-        f"Step of the second clip is {value}",
+        f"second-step-{what}: Step of the second clip is {value}",
         lambda value=value: steady_times(STEADY, (0.0, value)),
     )
     clip_times(
-        f"second-rate-{what}",
-        f"Step of the second clip, by Method 1, is {value}",
+        f"second-rate-{what}: Step of the second clip, by Method 1, is {value}",
         lambda value=value: steady_times(STEADY, (0.0, value), method=1),
     )
-clip_times("second-first-nan", "First of the second clip is NaN", lambda: steady_times(STEADY, (NAN, 1.0)))
-clip_times(
-    "second-stands-still",
-    "Step of the second clip vanishes beside its First",
-    lambda: steady_times(STEADY, (1e30, 1.0)),
-)
-clip_times(
-    "first-stands-still", "Step of the first clip vanishes beside its First", lambda: steady_times((1e30, 1.0), STEADY)
-)
-clip_times("second-overflows", "times of the second clip beyond binary64", lambda: steady_times(STEADY, (0.0, HIGHEST)))
-clip_times(
-    "uneven-second-equal", "a time twice in the second clip", lambda: uneven_time(0.0, 1.0, 2.0, 0.0, 1.0, 1.0, 2.0)
-)
-clip_times(
-    "uneven-first-descends",
-    "a time of the first clip before the one before",
-    lambda: uneven_time(0.0, 2.0, 1.0, 3.0, 4.0, 5.0, 6.0),
-)
-clip_times(
-    "uneven-more", "a time more than there are frames", lambda: uneven_time(0.0, 1.5, 2.0, 0.0, 1.0, 2.0, 3.0, 1e-9)
-)
+for title, make in {
+    "second-first-nan: First of the second clip is NaN": lambda: steady_times(STEADY, (NAN, 1.0)),
+    "second-stands-still: Step of the second clip vanishes beside its First": lambda: steady_times(STEADY, (1e30, 1.0)),
+    "first-stands-still: Step of the first clip vanishes beside its First": lambda: steady_times((1e30, 1.0), STEADY),
+    "second-overflows: times of the second clip beyond binary64": lambda: steady_times(STEADY, (0.0, HIGHEST)),
+    "uneven-second-equal: a time twice in the second clip": lambda: uneven_time(0.0, 1.0, 2.0, 0.0, 1.0, 1.0, 2.0),
+    "uneven-first-descends: a time of the first clip before the one before": lambda: uneven_time(
+        0.0, 2.0, 1.0, 3.0, 4.0, 5.0, 6.0
+    ),
+    "uneven-more: a time more than there are frames": lambda: uneven_time(0.0, 1.5, 2.0, 0.0, 1.0, 2.0, 3.0, 1e-9),
+}.items():
+    clip_times(title, make)
+
 valid(
-    "time-uneven-empty",
-    "TIME of Method 2 without a stream: its bits are ones, and the only time is the least that there is",
+    "time-uneven-empty: TIME of Method 2 without a stream: its bits are ones, and the only time is the least that "
+    "there is",
     lambda: lone(time=b"\2"),
 )

@@ -1,54 +1,11 @@
 """Tubes and rigid branches."""
 
-from __future__ import annotations
-
-import math
-from dataclasses import replace
-
-import numpy as np
-
 from spec.make.base import *
 
 RIGID = [replace(stem, rigid=q % 4, detail=q % 3 * 120) for q, stem in enumerate(MIXED)]
-valid("rigid", "branches that move as they are: alone, with others on them, loose", refinements(RIGID, 38, layers=1))
-valid(
-    "rigid-turn",
-    "the same with a largest step of rotations",
-    refinements(RIGID, 39, layers=1, default_head=stems_head(0.5, 161)),
-)
-TUBES = [
-    Stem(-1, 13, 0, SHEET, lag=4, ring=4),
-    Stem(0, 70, 5, SHEET, lag=6, ring=6),
-    Stem(1, 8, 69, SHEET | LOOSE, ring=2),
-    Stem(1, 5, 30),
-    Stem(0, 62, 3, SHEET, ring=30),
-    Stem(0, 20, 1, SHEET, ring=32),
-    Stem(-1, 9, 0, SHEET, rigid=1, ring=3),
-    Stem(6, 12, 4, SHEET | WHOLE, ring=3),
-    Stem(7, 6, 2, SHEET, ring=2),
-]
-valid(
-    "tubes",
-    "tubes: with a tip, of two pieces, loose, of a ring that is none, rigid, and what hangs on them",
-    refinements(TUBES, 41, layers=1),
-)
-valid(
-    "tube-gaps",
-    "the same of the rings of a tube",
-    lambda: placed(
-        [Stem(-1, 40, flags=SHEET, ring=2)],
-        [[1000.0 * (i > 17) + i, j, 0.1 * i * j] for i in range(20) for j in (0, 1)],
-        132,
-    ),
-)
-valid(
-    "rigid-diagonal",
-    "rigid branches whose inertia has no products: nothing to reduce, axes that are equally long",
-    lambda: placed(
-        [Stem(-1, 2), Stem(0, 3, 1, rigid=1), Stem(0, 3, 0, rigid=1), Stem(0, 2, 1, rigid=1)],
-        [[0, 0, 0], [1, 0, 0], [5, 0, 0], [1, 8, 0], [1, 0, 2], [0, 0, 3], [0, 3, 0], [3, 0, 0], [1, 4, 0], [1, 5, 0]],
-        133,
-    ),
+TUBES = stems_of(
+    "-1 13 0 SHEET lag=4 ring=4, 0 70 5 SHEET lag=6 ring=6, 1 8 69 SHEET LOOSE ring=2, 1 5 30, 0 62 3 SHEET "
+    "ring=30, 0 20 1 SHEET ring=32, -1 9 0 SHEET rigid=1 ring=3, 6 12 4 SHEET WHOLE ring=3, 7 6 2 SHEET ring=2"
 )
 
 
@@ -78,13 +35,34 @@ def of_any_size(*powers: int) -> Plant:
     )
 
 
+valid("rigid: branches that move as they are: alone, with others on them, loose", refinements(RIGID, 38, layers=1))
 valid(
-    "rigid-tiny",
-    "branches that move as they are, of 1e-78 to 1e-84 and of 1e-160: squares of their moments are 0",
+    "rigid-turn: the same with a largest step of rotations",
+    refinements(RIGID, 39, layers=1, default_head=stems_head(0.5, 161)),
+)
+valid(
+    "tubes: tubes: with a tip, of two pieces, loose, of a ring that is none, rigid, and what hangs on them",
+    refinements(TUBES, 41, layers=1),
+)
+valid(
+    "tube-gaps: the same of the rings of a tube",
+    placed,
+    [Stem(-1, 40, flags=SHEET, ring=2)],
+    [[1000.0 * (i > 17) + i, j, 0.1 * i * j] for i in range(20) for j in (0, 1)],
+    132,
+)
+valid(
+    "rigid-diagonal: rigid branches whose inertia has no products: nothing to reduce, axes that are equally long",
+    placed,
+    [Stem(-1, 2), Stem(0, 3, 1, rigid=1), Stem(0, 3, 0, rigid=1), Stem(0, 2, 1, rigid=1)],
+    [[0, 0, 0], [1, 0, 0], [5, 0, 0], [1, 8, 0], [1, 0, 2], [0, 0, 3], [0, 3, 0], [3, 0, 0], [1, 4, 0], [1, 5, 0]],
+    133,
+)
+valid(
+    "rigid-tiny: branches that move as they are, of 1e-78 to 1e-84 and of 1e-160: squares of their moments are 0",
     lambda: of_any_size(*[*range(-274, -265)] * 2, *[-268] * 12, -279, -276, -260, *[*range(-536, -531)] * 2),
 )
 valid(
-    "rigid-huge",
-    "rigid branches of 1e77 to 1e150: squares of their moments are infinite, and nothing is reduced",
+    "rigid-huge: rigid branches of 1e77 to 1e150: squares of their moments are infinite, and nothing is reduced",
     lambda: of_any_size(250, 257, 258, 259, 260, 300, 400, 500),
 )

@@ -1,11 +1,7 @@
 """All features in one file, what the encoder writes, and the same rules in binary64."""
 
-from __future__ import annotations
-
 import tempfile
 from pathlib import Path
-
-import numpy as np
 
 from spec import real_size
 from spec.make.base import *
@@ -16,26 +12,11 @@ from spec.make.rest import coded_rest
 from spec.make.source_rest import bent
 from spec.make.static import WIND_FRAME, element, numbers
 
-EVERYTHING = [
-    Stem(-1, 6, lag=1),
-    Stem(0, 1, 3, lag=2),
-    Stem(0, 66, 5, LOOSE),
-    Stem(2, 5, 60, SHEET | LOOSE),
-    Stem(3, 3, 0, LOOSE),
-    Stem(2, 4, 1, WHOLE, lag=0),
-    Stem(5, 4, 3, SHEET, lag=0),
-    Stem(-1, 7, 0, SHEET),
-    Stem(7, 2, 3, SHEET | WHOLE),
-    Stem(7, 5, 6, SHEET, lag=0),
-    Stem(7, 4, 1),
-    Stem(10, 2, 2),
-    Stem(-1, 1, 0, WHOLE),
-    Stem(12, 2),
-    Stem(12, 3, 0, LOOSE),
-    Stem(-1, 3),
-    Stem(15, 3, 2, LOOSE | WHOLE),
-    Stem(16, 2, 1, LOOSE),
-]
+EVERYTHING = stems_of(
+    "-1 6 lag=1, 0 1 3 lag=2, 0 66 5 LOOSE, 2 5 60 SHEET LOOSE, 3 3 0 LOOSE, 2 4 1 WHOLE lag=0, 5 4 3 SHEET "
+    "lag=0, -1 7 0 SHEET, 7 2 3 SHEET WHOLE, 7 5 6 SHEET lag=0, 7 4 1, 10 2 2, -1 1 0 WHOLE, 12 2, 12 3 0 "
+    "LOOSE, -1 3, 15 3 2 LOOSE WHOLE, 16 2 1 LOOSE"
+)
 
 
 def everything() -> Draft:
@@ -56,9 +37,9 @@ def everything() -> Draft:
         is_float64=True,
         layers=2,
         heads=HEADS | bases | {5: stems_head(0.01, 2)},
-        scripts={(STEMS, level): lambda level=level: Chance(72 + level) for level in range(6)}
+        scripts={(STEMS, level): 72 + level for level in range(6)}
         | {(AFFINES, level): lambda level=level: Chance(80 + level, large=3) for level in range(5)}
-        | {(CORRECTIONS, level): lambda level=level: Chance(86 + level) for level in (4, 5)}
+        | {(CORRECTIONS, level): 86 + level for level in (4, 5)}
         | {(REFINED_REST, 5, 0): lambda: Chance(92, large=4)}
         | {
             (SHAPES, 1, 0): [
@@ -76,25 +57,18 @@ def everything() -> Draft:
             (SHAPES, 5, 0): [2, *refined_row((0, -1, 0)), *refined_row((3, 0, 0), (0, 0, -1))],
         },
     )
-    return (
-        plant.draft()
-        .with_header(level_count=7, full_level_count=7)
-        .add(
-            Entry(EXACT, b"", 6, 0),
-            Entry(EXACT, b"", 6, 1),
-            Entry(METADATA, b"\1" + WIND_FRAME),
-            Entry(FACES, polygons(FACES_3)),
-            Entry(EDGES, derived("<i2")),
-            Entry(0x8009, FUTURE),
-            Entry(0x8018, FUTURE, 1, 1),
-            Entry(ATTRIBUTE, numbers(np.arange(6.0).reshape(2, 3), name="b")),
-            Entry(ATTRIBUTE, element("|S3", b"oak", "a")),
-            Entry(0x8040, FUTURE),
-        )
+    return plant.with_header(level_count=7, full_level_count=7).add(
+        Entry(EXACT, b"", 6, 0),
+        Entry(EXACT, b"", 6, 1),
+        Entry(METADATA, b"\1" + WIND_FRAME),
+        Entry(FACES, polygons(FACES_3)),
+        Entry(EDGES, derived("<i2")),
+        Entry(0x8009, FUTURE),
+        Entry(0x8018, FUTURE, 1, 1),
+        Entry(ATTRIBUTE, numbers(np.arange(6.0).reshape(2, 3), name="b")),
+        Entry(ATTRIBUTE, element("|S3", b"oak", "a")),
+        Entry(0x8040, FUTURE),
     )
-
-
-valid("everything", "every kind of chunk, flag, method and stream in one file", everything)
 
 
 def encoded(name: str) -> bytes:
@@ -142,6 +116,7 @@ def encoded(name: str) -> bytes:
         return target.read_bytes()
 
 
+valid("everything: every kind of chunk, flag, method and stream in one file", everything)
 for name, why in (
     ("encoded-tree", "a small tree in wind"),
     ("encoded-wide", "binary64 positions"),
@@ -153,7 +128,7 @@ for name, why in (
     ("encoded-layers", "three layers of precision"),
     ("encoded-layers-lossless", "three layers of precision, then every bit of the source"),
 ):
-    valid(name, f"what athcodec wrote: {why}", lambda name=name: encoded(name), scripted=False)
+    valid(f"{name}: what athcodec wrote: {why}", lambda name=name: encoded(name), scripted=False)
 for name_, what_ in (
     (
         "all",
@@ -165,8 +140,7 @@ for name_, what_ in (
     ("predicted", "the same in predicted motion, which excludes modes, shapes, bases, corrections, joins and layers"),
 ):
     valid(
-        f"real-size-{name_}",
-        f"what athcodec wrote of a tree with leaves: {what_}",
+        f"real-size-{name_}: what athcodec wrote of a tree with leaves: {what_}",
         lambda name_=name_: real_size.encoded(name_),
         scripted=False,
     )

@@ -6,6 +6,7 @@ prints below its rows.
 
 from __future__ import annotations
 
+import subprocess
 from dataclasses import dataclass
 
 
@@ -24,3 +25,8 @@ class Row:
     @property
     def faults(self) -> int:
         return self.crashes + self.hangs + self.over_limit + self.wrong
+
+
+def ended(words: list, **options) -> subprocess.CompletedProcess:
+    """Run a command to its end; what it prints is kept as text."""
+    return subprocess.run(words, capture_output=True, text=True, **options)

@@ -21,7 +21,7 @@ from collections.abc import Iterator
 from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 
-from spec.robust import Row
+from spec.robust import Row, ended
 from spec.robust.faults import OLDER, ONE_LINE, Place, is_whole
 
 HERE = Path(__file__).resolve().parent
@@ -45,12 +45,10 @@ def each_call(verb: str, folder: Path, sample: int = 0, lasts: bool = False, unt
     row = Row(f"{verb}: call n fails{', and all after it' if lasts else ''}", 0)
     library = build(folder)
     asked = {"verb": verb, "folder": str(folder), "sample": sample, "lasts": lasts, "seconds": until - time.monotonic()}
-    done = subprocess.run(
+    done = ended(
         [sys.executable, "-m", "spec.robust._io_errors", json.dumps(asked, default=str)],
         env=os.environ | {"LD_PRELOAD": str(library), "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"},
         cwd=HERE.parent.parent,
-        capture_output=True,
-        text=True,
     )
     if done.returncode:
         raise RuntimeError(done.stderr[-3000:])
@@ -76,8 +74,8 @@ def each_call_of_batch(folder: Path, numbers: list[int], until: float = float("i
         if time.monotonic() > until:
             break
         faulty = {"LD_PRELOAD": str(library), "FAULTY_FOLDER": str(folder), "FAULTY_CALL": str(n)}
-        done = subprocess.run(command, env=os.environ | faulty, capture_output=True, text=True)
-        again = subprocess.run(command, capture_output=True, text=True)
+        done = ended(command, env=os.environ | faulty)
+        again = ended(command)
         left = {path.name for path in place.folder.iterdir()} - {target.name, "athcodec-batch.jsonl"}
         row.tried += 1
         row.crashes += done.returncode not in (0, 1)

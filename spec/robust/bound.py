@@ -30,21 +30,8 @@ from spec.robust import Row
 
 HIERARCHIES = ("random", "chain", "bush", "roots", "one")
 RESTS = ("grown", "unrelated", "point", "line", "plane", "lattice", "scales")
-ACTIONS = (
-    "spike",
-    "flicker",
-    "step",
-    "explode",
-    "collapse",
-    "shuffle",
-    "walk",
-    "lattice",
-    "leave",
-    "mirror",
-    "flatten",
-    "noise",
-    "spin",
-    "swap axes",
+ACTIONS = tuple(
+    "spike,flicker,step,explode,collapse,shuffle,walk,lattice,leave,mirror,flatten,noise,spin,swap axes".split(",")
 )
 
 
@@ -101,13 +88,8 @@ class Attack:
         """Keywords of encode(), with a bound in scene units."""
         size = extent(clip) or 1.0
         tam = self.tam and Thresholds(self.tam[0] * size, self.tam[1], self.tam[2] * size, self.tam[3])
-        return {
-            "max_error": self.bound * size,
-            "segment_frames": self.segment_frames,
-            "effort": self.effort,
-            "exact_rest": self.exact_rest,
-            "tam": tam,
-        }
+        kept = {name: getattr(self, name) for name in ("segment_frames", "effort", "exact_rest")}
+        return kept | {"max_error": self.bound * size, "tam": tam}
 
 
 def extent(clip: MotionClip) -> float:
@@ -343,13 +325,8 @@ def attack_for(seconds: float, first_seed: int = 0) -> Row:
 
 def describe(attack: Attack) -> str:
     """The attack as Python code, without default values."""
-    default = Attack()
-    given_ = [
-        f"{field.name}={getattr(attack, field.name)!r}"
-        for field in dataclasses.fields(Attack)
-        if getattr(attack, field.name) != getattr(default, field.name)
-    ]
-    return f"Attack({', '.join(given_)})"
+    default = vars(Attack())
+    return f"Attack({', '.join(f'{name}={x!r}' for name, x in vars(attack).items() if x != default[name])})"
 
 
 def large() -> Row:

@@ -25,7 +25,7 @@ from pathlib import Path
 
 import athcodec
 from athcodec.sources import sample_path
-from spec.robust import Row
+from spec.robust import Row, ended
 
 TIMEOUT = 120.0  # seconds after which a command counts as hung
 ONE_LINE = re.compile(r"athcodec: error: [^\n]+\n")
@@ -193,11 +193,8 @@ def fill_small_disk(place: Place, kilobytes: list[int]) -> Row:
             script = (
                 'mount -t tmpfs -o size="$2"k none "$1" && cd "$1" && shift 2 && "$@" >&2; code=$?; ls -A .; exit $code'
             )
-            done = subprocess.run(
-                ["unshare", "-rm", "sh", "-c", script, "sh", str(place.folder), str(size), *command],
-                capture_output=True,
-                text=True,
-                timeout=TIMEOUT,
+            done = ended(
+                ["unshare", "-rm", "sh", "-c", script, "sh", str(place.folder), str(size), *command], timeout=TIMEOUT
             )
             refused = done.returncode == 1 and ONE_LINE.fullmatch(done.stderr) and done.stdout == ""
             row.tried += 1

@@ -280,43 +280,26 @@ def announces_too_much(_: bytes, name: str) -> int:
 def _classes(files: dict[str, bytes]) -> list[tuple[float, Cases]]:
     """(weight of the time, cases)"""
     small = {name: data for name, data in files.items() if len(data) <= SMALL}
-
-    def cases_of(of: dict[str, bytes], arguments) -> list[tuple[str, object]]:
-        return [(name, argument) for name, data in of.items() for argument in arguments(data)]
-
-    def made(names) -> list[tuple[str, object]]:
-        return [("least", name) for name in names]
-
+    of_files = [
+        (0.5, "a byte or more too many", files, lambda _: [b"\0", b"more", bytes(4096)], too_long),
+        (1, "prefixes, opened strictly", files, lambda data: range(len(data)), prefix_strictly),
+        (1, "prefixes, as a stream", files, lambda data: range(len(data)), prefix_as_a_stream),
+        (1.5, "fields of the header at their extremes", small, header_changes, header_field),
+        (1, "entries of the chunk table at their extremes", small, table_changes, table_field),
+        (1.5, "flipped bits", small, checked_bits, flipped_bit),
+        (2, "flipped bits, checksums repaired", small, lambda data: range(8 * len(data)), flipped_bit_repaired),
+        (1.5, "corrupted fronts and chunks, checksums repaired", small, lambda _: range(10_000), corrupted),
+    ]
+    made = [
+        (0.5, "small files that announce much", hostile_files.LYING, announces_too_much),
+        (2, "files made to be slow", hostile_files.SLOW, slow_file),
+    ]
     return [
-        (
-            0.5,
-            Cases("a byte or more too many", files, cases_of(files, lambda _: [b"\0", b"more", bytes(4096)]), too_long),
-        ),
-        (1, Cases("prefixes, opened strictly", files, cases_of(files, lambda d: range(len(d))), prefix_strictly)),
-        (1, Cases("prefixes, as a stream", files, cases_of(files, lambda d: range(len(d))), prefix_as_a_stream)),
-        (1.5, Cases("fields of the header at their extremes", small, cases_of(small, header_changes), header_field)),
-        (1, Cases("entries of the chunk table at their extremes", small, cases_of(small, table_changes), table_field)),
-        (1.5, Cases("flipped bits", small, cases_of(small, checked_bits), flipped_bit)),
-        (
-            2,
-            Cases(
-                "flipped bits, checksums repaired",
-                small,
-                cases_of(small, lambda d: range(8 * len(d))),
-                flipped_bit_repaired,
-            ),
-        ),
-        (
-            1.5,
-            Cases(
-                "corrupted fronts and chunks, checksums repaired",
-                small,
-                cases_of(small, lambda _: range(10_000)),
-                corrupted,
-            ),
-        ),
-        (0.5, Cases("small files that announce much", files, made(hostile_files.LYING), announces_too_much, few=True)),
-        (2, Cases("files made to be slow", files, made(hostile_files.SLOW), slow_file, few=True)),
+        (weight, Cases(name, of, [(file, x) for file, data in of.items() for x in arguments(data)], attempt))
+        for weight, name, of, arguments, attempt in of_files
+    ] + [
+        (weight, Cases(name, files, [("least", x) for x in names], attempt, few=True))
+        for weight, name, names, attempt in made
     ]
 
 

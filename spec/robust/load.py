@@ -29,7 +29,7 @@ import athcodec
 from athcodec.decoding.container import Limits
 from athcodec.errors import AthError, LimitExceeded
 from athcodec.sources import sample_path
-from spec.robust import Row
+from spec.robust import Row, ended
 
 HERE = Path(__file__).resolve().parent
 CORE = HERE.parent.parent / "athcodec" / "core"
@@ -46,12 +46,8 @@ def job(name: str, *words: object) -> tuple[int, dict]:
     root = str(HERE.parent.parent)
     environment = os.environ | {"PYTHONPATH": os.pathsep.join([root, os.environ.get("PYTHONPATH", "")])}
     try:
-        done = subprocess.run(
-            [sys.executable, "-m", "spec.robust.load", name, *map(str, words)],
-            env=environment,
-            capture_output=True,
-            text=True,
-            timeout=TIMEOUT,
+        done = ended(
+            [sys.executable, "-m", "spec.robust.load", name, *map(str, words)], env=environment, timeout=TIMEOUT
         )
     except subprocess.TimeoutExpired:
         return -1, {"error": "hung"}
@@ -73,7 +69,7 @@ def compiled(folder: Path, sources: list[Path], *options: str) -> Path:
     problems = ""
     for compiler in compilers():
         command = [*compiler.split(), "-std=c11", "-O1", "-g", *options, "-o", target, *sources, "-lm", "-lpthread"]
-        done = subprocess.run(command, capture_output=True, text=True)
+        done = ended(command)
         if done.returncode == 0:
             return target
         problems += f"{compiler}: {done.stderr.strip()[-500:]}\n"
@@ -88,24 +84,16 @@ def thread_program(folder: Path) -> Path:
     cmake = (CORE / "CMakeLists.txt").read_text()
     names = re.search(r"set\(ATH_DECODER_SOURCES\s+([^)]*)\)", cmake)[1].split()
     flags = re.findall(r"^\s*(-f[\w=-]+)", cmake, re.MULTILINE)
-    return compiled(
-        folder,
-        [HERE / "threads.c", *(CORE / name for name in names)],
-        "-fsanitize=thread",
-        *flags,
-        "-DATH_STATIC",
-        f"-I{CORE / 'include'}",
-        f"-I{CORE}",
-    )
+    sources = [HERE / "threads.c", *(CORE / name for name in names)]
+    folders = f"-I{CORE}", f"-I{CORE / 'include'}"
+    return compiled(folder, sources, "-fsanitize=thread", *flags, "-DATH_STATIC", *folders)
 
 
 def race(program: Path, *words: object) -> tuple[int, str, dict]:
     """(exit code, stderr, result) of one run of threads.c."""
     environment = os.environ | {"TSAN_OPTIONS": f"exitcode={RACE_FOUND} halt_on_error=1"}
     try:
-        done = subprocess.run(
-            [program, *map(str, words)], env=environment, capture_output=True, text=True, timeout=TIMEOUT
-        )
+        done = ended([program, *map(str, words)], env=environment, timeout=TIMEOUT)
     except subprocess.TimeoutExpired:
         return -1, "hung", {}
     return done.returncode, done.stderr, json.loads(done.stdout) if done.stdout else {}
@@ -115,9 +103,8 @@ def threads_in_c(program: Path, files: list[Path], threads: int, rounds: int) ->
     code, err, result = race(program, threads, rounds, *files)
     row = Row("threads, C core, ThreadSanitizer", result.get("preparations", 0), crashes=int(code < 0))
     row.wrong = result.get("wrong", 0) + err.count("WARNING: ThreadSanitizer")
-    row.note = (
-        f"{threads} threads, {result.get('frames', 0):,} frames shown, fed {result.get('feeds', 0):,} times meanwhile"
-    )
+    shown, feeds = result.get("frames", 0), result.get("feeds", 0)
+    row.note = f"{threads} threads, {shown:,} frames shown, fed {feeds:,} times meanwhile"
     return row
 
 
@@ -180,12 +167,8 @@ def seek_at_random(path: str, seeks: int) -> dict:
         before, blocks = resident_bytes(), sys.getallocatedblocks()
         wrong += some(seeks)
         gc.collect()
-        return {
-            "seeks": seeks,
-            "wrong": wrong,
-            "growth": resident_bytes() - before,
-            "objects": sys.getallocatedblocks() - blocks,
-        }
+        growth, objects = resident_bytes() - before, sys.getallocatedblocks() - blocks
+        return {"seeks": seeks, "wrong": wrong, "growth": growth, "objects": objects}
 
 
 def seeks(path: Path, count: int) -> Row:
@@ -196,9 +179,8 @@ def seeks(path: Path, count: int) -> Row:
     return row
 
 
-ALLOWED_GROWTH = (
-    4 << 20
-)  # bytes that allocators of threads may keep; leaking a segment at each seek takes 25 times that
+# Bytes that allocators of threads may keep; leaking a segment at each seek takes 25 times as much.
+ALLOWED_GROWTH = 4 << 20
 
 
 # ---- many at once ----
@@ -215,19 +197,14 @@ def open_many(path: str, count: int) -> dict:
         expected = [decoder.positions(level=level) for level in range(decoder.file.level_count)]
     decoders = [athcodec.open(path) for _ in range(count)]
     wrong = sum(not _same(decoder, expected, rng) for decoder in decoders)
-    bytes_per_decoder = (resident_bytes() - before) / count
+    each = (resident_bytes() - before) / count
     rng.shuffle(decoders)
     while decoders:
         decoders.pop().close()
         for decoder in decoders[: 1 if len(decoders) % 10 else 5]:
             wrong += not _same(decoder, expected, rng)
     gc.collect()
-    return {
-        "decoders": count,
-        "wrong": wrong,
-        "bytes_per_decoder": bytes_per_decoder,
-        "files_left": _open_files() - files,
-    }
+    return {"decoders": count, "wrong": wrong, "bytes_per_decoder": each, "files_left": _open_files() - files}
 
 
 def _open_files() -> int:
@@ -351,13 +328,8 @@ def failing_allocations(path: Path, seconds: float = 300.0) -> Row:
     code, result = job("allocations", path, seconds)
     row = Row("the n-th allocation of an array fails", sum(result.get("tried", {}).values()), crashes=int(code != 0))
     row.wrong = len(result.get("wrong", []))
-    row.note = "; ".join(
-        [
-            f"in {len(result.get('tried', {}))} calls, {result.get('raised', 0)} raised",
-            *result.get("wrong", [])[:3],
-            *result.get("error", "").strip().splitlines()[-1:],
-        ]
-    )
+    notes = [f"in {len(result.get('tried', {}))} calls, {result.get('raised', 0)} raised", *result.get("wrong", [])[:3]]
+    row.note = "; ".join(notes + result.get("error", "").strip().splitlines()[-1:])
     return row
 
 

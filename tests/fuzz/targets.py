@@ -27,18 +27,8 @@ NO_FUZZER = (
     "once, not mutated"
 )
 
-COMMON = [
-    "-g",
-    "-O2",
-    "-std=c11",
-    "-ffp-contract=off",
-    "-fno-math-errno",
-    "-fno-omit-frame-pointer",
-    "-DATH_STATIC",
-    "-Wall",
-    "-Wextra",
-    f"-I{HERE}",
-]
+COMMON = "-g -O2 -std=c11 -ffp-contract=off -fno-math-errno -fno-omit-frame-pointer -DATH_STATIC -Wall -Wextra".split()
+COMMON.append(f"-I{HERE}")
 ADDRESS = ["-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
 SANITIZERS = {
     "address": [*ADDRESS, "-fsanitize=float-cast-overflow"],
@@ -165,22 +155,10 @@ def fuzz(
     for folder in (corpus, finds):
         folder.mkdir(parents=True, exist_ok=True)
     before = set(finds.iterdir())
-    command = [
-        program,
-        corpus,
-        start,
-        f"-max_total_time={max(1, round(seconds))}",
-        f"-runs={runs}",
-        f"-timeout={TIMEOUT}",
-        f"-rss_limit_mb={RSS_MB}",
-        f"-malloc_limit_mb={MALLOC_MB}",
-        f"-max_len={seeds.LARGEST}",
-        f"-seed={seed}",
-        f"-dict={HERE / 'ath.dict'}",
-        f"-artifact_prefix={finds}/{target}-",
-        "-print_final_stats=1",
-        "-reload=0",
-    ]
+    how = f"-max_total_time={max(1, round(seconds))} -runs={runs} -seed={seed} -max_len={seeds.LARGEST}"
+    how += f" -timeout={TIMEOUT} -rss_limit_mb={RSS_MB} -malloc_limit_mb={MALLOC_MB} -print_final_stats=1 -reload=0"
+    places = f"-dict={HERE / 'ath.dict'}", f"-artifact_prefix={finds}/{target}-"
+    command = [program, corpus, start, *how.split(), *places]
     done = subprocess.run(
         [str(word) for word in command],
         stdout=subprocess.PIPE,

@@ -179,7 +179,8 @@ class Recording:
 
 
 def _shape(mesh) -> tuple[int, int, int, int]:
-    """What has to stay: numbers of vertices, edges, faces, and a hash of which vertices the corners are."""
+    """Return what has to stay the same over all frames: numbers of vertices, edges, faces, and a hash of which
+    vertices the corners are."""
     corners = np.empty(len(mesh.loops), np.int32)
     mesh.loops.foreach_get("vertex_index", corners)
     return len(mesh.vertices), len(mesh.edges), len(mesh.polygons), hash(corners.tobytes())

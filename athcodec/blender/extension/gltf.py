@@ -41,7 +41,7 @@ class AthGltfSettings(bpy.types.PropertyGroup):
 
 
 class glTF2ExportUserExtension:
-    """What Blender's exporter calls; one for each export."""
+    """Receiver of the calls of Blender's exporter; one for each export."""
 
     def __init__(self):
         from io_scene_gltf2.io.com import gltf2_io_extensions as extensions
@@ -49,7 +49,7 @@ class glTF2ExportUserExtension:
 
         self._extensions, self._binary = extensions, BinaryData
         self._recordings, self._primitives, self._open = {}, [], ExitStack()
-        self._first = {}  # of primitives whose vertices are numbered as those of the motion, by id
+        self._first = {}  # By id: primitives whose vertices are numbered as the motion numbers them.
 
     def pre_export_hook(self, export_settings):
         """Evaluates the frames of all objects that may move."""
@@ -73,7 +73,7 @@ class glTF2ExportUserExtension:
         return self._open.enter_context(tempfile.TemporaryFile())
 
     def _objects(self, export_settings):
-        """Those that are exported as meshes without a skin."""
+        """Return the objects that are exported as meshes without a skin."""
         for obj in bpy.context.view_layer.objects:
             has_skin = export_settings["gltf_skins"] and any(each.type == "ARMATURE" for each in obj.modifiers)
             chosen = not export_settings["gltf_selected"] or obj.select_get()

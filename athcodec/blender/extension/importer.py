@@ -81,7 +81,7 @@ class IMPORT_OT_ath(bpy.types.Operator, ImportHelper):
                 obj = add_object(
                     context, path, self.level, self.loop, self.set_scene, self.use_relative, self.clip, self.host_mesh
                 )
-            except Exception as error:  # of the file, reported in one line
+            except Exception as error:  # Any fault of the file is reported in one line.
                 self.report({"ERROR"}, " ".join(f"{path}: {error}".split()))
                 return {"CANCELLED"}
             for selected in context.selected_objects:

@@ -47,7 +47,7 @@ def decoder_for(obj):
 
 
 def clip_names(obj) -> list[str]:
-    """Of the file that an object plays; none where it cannot be read."""
+    """Return the names in the file that an object plays; none where it cannot be read."""
     try:
         return [clip.name for clip in decoder_of(path_of(obj)).file.clips if clip.name]
     except Exception:  # asked while a menu is drawn; the panel says what is wrong

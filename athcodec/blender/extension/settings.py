@@ -1,4 +1,4 @@
-"""What an object that plays from a file keeps, in the .blend, of that file and of how it is played."""
+"""Settings that an object keeps in the .blend: the file it plays and how."""
 
 # ruff: noqa: F722, F821 -- Blender's properties are annotations
 

@@ -36,7 +36,7 @@ class AthFileFormat : public SdfFileFormat, public PcpDynamicFileFormatInterface
 namespace
 {
 
-// What the arguments choose. False where the file has no such clip or level: *why says it.
+// Reads what the arguments choose. Returns false where the file has no such clip or level, and says so in *why.
 bool Chosen(const SdfFileFormat::FileFormatArguments &arguments, const athusd::Motion &motion, athusd::Choice *choice,
             std::string *why)
 {

@@ -53,7 +53,7 @@ class Motion
     std::shared_ptr<const char> _bytes;
     ath_player *_player = nullptr;
     ath_info _info{};
-    mutable std::mutex _mutex;        // of all below, and of the player
+    mutable std::mutex _mutex;        // Guards all members below, and the player.
     mutable std::list<Frame> _frames; // the one that was asked for last in front
     mutable bool _reported = false;
 };

@@ -243,7 +243,7 @@ Rows RowsOf(const std::string &domain, const Object &object)
     return {0, 1};
 }
 
-// What the file says where the rows fit, else what they fit; empty: none that USD has a place for.
+// Returns what the file says if the rows fit it, else what they fit; empty if USD has no place for it.
 std::string DomainOf(const StaticData &data, const std::string &name, const StaticArray &array, const ath_info &info)
 {
     const std::map<std::string, size_t> rows = {{"vertex", size_t(info.vertex_count)},
@@ -437,7 +437,7 @@ std::vector<double> CodesOf(const JsObject &metadata, const double *times, int c
     return codes;
 }
 
-// What holds for one clip: the members for all, and those for it in their place.
+// Returns the metadata of one clip: its own members replace those of all clips.
 JsObject MetadataOf(const JsObject &metadata, const std::string &clip)
 {
     JsObject own = metadata;

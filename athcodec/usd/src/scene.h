@@ -14,7 +14,7 @@
 namespace athusd
 {
 
-// What of a file a layer shows.
+// The part of a file that a layer shows.
 struct Choice {
     int clip = -1;  // -1: all, as variants
     int level = -1; // -1: the deepest
@@ -25,14 +25,14 @@ struct Series {
     SdfPath path;
     int clip;
     size_t first, count; // vertices
-    float margin;        // of an extent, around the points: half of the largest width
+    float margin;        // Margin of an extent around the points: half of the largest width.
     bool is_extent;
 };
 
 struct Scene {
     SdfLayerRefPtr layer; // all but time samples
     std::vector<Series> series;
-    std::vector<std::vector<double>> codes; // of each clip's frames
+    std::vector<std::vector<double>> codes; // For each clip: the time codes of its frames.
 
     // With `metadata_only` the layer has no more than its own metadata.
     static Scene Of(const Motion &motion, const Choice &choice, bool metadata_only);

@@ -1,4 +1,4 @@
-// What a file holds besides motion: metadata, polygons, and named arrays.
+// Static data of a file: metadata, polygons, and named arrays.
 #pragma once
 
 #include "motion.h"

@@ -101,7 +101,7 @@ function write({ mesh, vertices }, positions) {
 class ATHMotionExtension {
   name = EXTENSION;
   order = 100;
-  #plants = []; // of each motion: {player, vertices: Map}, null where it does not play
+  #plants = []; // For each motion {player, vertices: Map}, null where it does not play.
   #attached = new Set();
 
   constructor(loader) {

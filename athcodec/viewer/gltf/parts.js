@@ -1,4 +1,4 @@
-// What ATH_motion says of a glTF file: which primitives a motion moves, and which of its vertices theirs are. Every
+// Reads ATH_motion in a glTF file: which primitives a motion moves, and which of its vertices theirs are. Every
 // number is checked here; spec/gltf/README.md of athcodec describes the extension.
 
 export const EXTENSION = "ATH_motion", VERTEX = "_ATH_VERTEX";
@@ -11,7 +11,7 @@ export function motionsOf(json) {
   return Array.isArray(motions) ? motions : [];
 }
 
-/** What a primitive says of its motion; null where that is nothing. */
+/** Returns the extension of a primitive; null where it has none. */
 export function saidOf(primitive) {
   return primitive.extensions?.[EXTENSION] ?? null;
 }

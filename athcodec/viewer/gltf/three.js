@@ -12,7 +12,7 @@ export function athMotion(loader) {
   return (parser) => new ATHMotionPlugin(parser, loader);
 }
 
-// What actions of a mixer write to: of clip i `seconds<i>` and `weight<i>`, both times the action's weight.
+// Actions of a mixer write to `seconds<i>` and `weight<i>` of clip i, both times the action's weight.
 class Clock extends Object3D {
   fade = 0.2; // seconds from clip to clip
   #motion;
@@ -48,7 +48,7 @@ class Clock extends Object3D {
 
 class ATHMotionPlugin {
   name = EXTENSION;
-  #plants = [];            // of each motion: {ath, clock, vertices: Map}, null where it does not play
+  #plants = [];            // For each motion {ath, clock, vertices: Map}, null where it does not play.
   #geometries = new Map();
   #materials = new Map();
 

@@ -43,7 +43,7 @@ export class MotionList extends ExtensionProperty {
   removeMotion(motion: Motion): this;
 }
 
-/** Of a primitive: primitive.getExtension("ATH_motion"). */
+/** A primitive's extension: primitive.getExtension("ATH_motion"). */
 export class PrimitiveMotion extends ExtensionProperty {
   readonly extensionName: "ATH_motion";
   readonly propertyType: "PrimitiveMotion";

@@ -136,7 +136,7 @@ export class ATHMotionExtension extends Extension {
     return this.createMotion().setName(name).setExtras(extras).setClips(clips).setBytes(data.slice(byteOffset, byteOffset + byteLength));
   }
 
-  // Of all primitives that a motion moves, those of meshes that are in the document.
+  // Returns the primitives that a motion moves and whose meshes are in the document.
   #primitives(motion) {
     return this.document.getRoot().listMeshes().flatMap((mesh) => mesh.listPrimitives()
       .filter((primitive) => primitive.getExtension(EXTENSION)?.getMotion() === motion)
@@ -210,7 +210,7 @@ export function aside(...steps) {
   return async function aside(document) {
     const root = document.getRoot(), before = root.listMeshes();
     const moved = before.filter((mesh) => mesh.listPrimitives().some((primitive) => primitive.getExtension(EXTENSION)));
-    for (const mesh of moved) root.removeRef("meshes", mesh); // what is not in the document's list is not seen
+    for (const mesh of moved) root.removeRef("meshes", mesh); // A mesh outside the document's list is not seen.
     try {
       await document.transform(...steps);
     } finally {
@@ -222,7 +222,7 @@ export function aside(...steps) {
   };
 }
 
-// Of a rest pose, to tell it from another: FNV-1a of 32 bits over its words, twice.
+// Tells one rest pose from another: FNV-1a of 32 bits over its words, twice.
 function digest(rest) {
   const words = new Uint32Array(rest.buffer, rest.byteOffset, rest.length);
   let a = 0x811c9dc5, b = 0x01000193 ^ rest.length;

@@ -53,7 +53,7 @@ function restoreSplit(text) {
   if (Number.isFinite(share)) setSplit(share);
 }
 
-/** What the address says, once the first file is shown. What it names and the file has not is passed over. */
+/** Applies the address once the first file is shown. Names that the file lacks are passed over. */
 export function restore() {
   const wanted = new URLSearchParams(location.hash.slice(1)), get = (name, use) => { if (wanted.has(name)) use(wanted.get(name)); };
   const { clips, levelCount } = main().motion;

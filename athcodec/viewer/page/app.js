@@ -1,4 +1,4 @@
-// What the parts of the page share: what is open, what is on the stage, and how it plays.
+// State that the parts of the page share: what is open, what is on the stage, and how it plays.
 
 import { ATHLoader } from "athcodec-three";
 

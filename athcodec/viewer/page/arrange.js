@@ -1,4 +1,4 @@
-// What is on the stage: plants for the files that are open and what is chosen, and the view of them.
+// Arranges the stage: plants for the files that are open and what is chosen, and the view of them.
 
 import { Box3, Vector3 } from "three";
 
@@ -95,7 +95,7 @@ export function frameView() {
   stage.lookOver(all, forestRadius());
 }
 
-/** The same, as long as nobody moved the view by hand. */
+/** Frames the view anew, as long as nobody moved it by hand. */
 export function reframe() {
   if (app.plants.length > 0 && !app.stage.moved) frameView();
 }

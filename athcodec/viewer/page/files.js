@@ -80,7 +80,7 @@ export function refuse(error, again = null) {
   loadingStory(null);
 }
 
-// What is wrong with the file that is shown stays in view as long as the file does.
+// A fault of the file that is shown stays in view as long as the file does.
 function complain(failure, motion, again) {
   const box = $("trouble");
   box.querySelector("span").textContent = shownWithout(failure, motion);

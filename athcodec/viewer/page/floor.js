@@ -1,4 +1,4 @@
-// What grows on a forest's floor besides the trees: plants of other files, which come when a forest is first shown.
+// The floor of a forest: plants of other files, which come when a forest is first shown.
 
 import { app, loader, state } from "./app.js";
 import { forestOfPlant, ground } from "./grove.js";

@@ -5,7 +5,7 @@ import { BufferAttribute, BufferGeometry, Color, Vector3 } from "three";
 const BARK = new Color(0x6a543c), LEAVES = [0x4f7a34, 0x6b9440, 0x86a94a].map((hex) => new Color(hex));
 const MOST_LEAVES = 2600;
 
-// The same numbers in every run, from 0 to 1.
+// Random numbers from 0 to 1, equal in every run.
 const chance = (i, salt) => {
   const x = Math.sin(12.9898 * i + 78.233 * salt) * 43758.5453;
   return x - Math.floor(x);

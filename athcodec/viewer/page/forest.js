@@ -14,9 +14,9 @@ import { Walk } from "./walk.js";
 import { radii } from "../src/radii.js";
 
 const $ = (id) => document.getElementById(id), asked = new URLSearchParams(location.search);
-const SPACING = 1.5; // of plants, in radii of one
-const EYES = 0.28, PACE = 0.7; // of who walks: above ground, and a second, in radii
-const SLOW_MS = 40, SLOW_FRAMES = 12; // of pictures after which there is less to draw
+const SPACING = 1.5; // Distance between plants, in radii of one.
+const EYES = 0.28, PACE = 0.7; // Height of a walker's eyes, and way per second, in radii.
+const SLOW_MS = 40, SLOW_FRAMES = 12; // After so many pictures as slow as this, less is drawn.
 const state = { frames: 0, milliseconds: 0, forest: null, ath: null, error: null };
 window.athcodecForest = state;
 
@@ -42,7 +42,7 @@ function windsOf({ motion: { clips }, metadata }) {
   return wild > calm ? { calm, wild } : null;
 }
 
-// What else the address names, between the trees.
+// Plants between the trees that the address names.
 function floors(renderer, trees, reach) {
   return Promise.all(floorOf(asked).map(async ({ source, each }, kind) => {
     const ath = await new ATHLoader().loadAsync(source), winds = windsOf(ath), { clips } = ath.motion;

@@ -6,7 +6,7 @@ const { Fn, clamp, color, dot, max, mix, mx_noise_float, normalWorldGeometry, po
 
 export const SUN = new Vector3(-0.62, 0.72, 0.32).normalize();
 const ZENITH = 0x6fa6da, HORIZON = 0xe4ebe8, GLOW = 0xfff0d6, SHADOW_PIXELS = 2048;
-const SHADOW_REACH = 9; // of what has shadows, in radii of a plant
+const SHADOW_REACH = 9; // Reach of shadows, in radii of a plant.
 
 const sky = Fn(() => {
   const up = clamp(normalWorldGeometry.y, 0, 1), toward = max(dot(normalWorldGeometry, vec3(SUN.x, SUN.y, SUN.z)), 0);

@@ -2,8 +2,8 @@
 
 import { BufferAttribute, BufferGeometry, CircleGeometry, Color, Group, InstancedMesh, Matrix4, Mesh, MeshLambertMaterial, Object3D, Vector3 } from "three";
 
-const REACH = 60; // of the disc, over the radius of the meadow
-const BLADES = 26000, TALL = 0.015, WIDE = 0.0015; // over the meadow's radius
+const REACH = 60; // Radius of the disc, over the radius of the meadow.
+const BLADES = 26000, TALL = 0.015, WIDE = 0.0015; // Number of blades; height and width over the meadow's radius.
 const COLOURS = { day: [0x687d45, 0x90a060], dusk: [0x4a5a38, 0x66744a] };
 
 const chance = (i, salt) => {
@@ -64,7 +64,7 @@ function blade() {
   geometry.setAttribute("position", new BufferAttribute(Float32Array.from(points), 3));
   geometry.setAttribute("color", new BufferAttribute(Float32Array.from(colours), 3));
   geometry.setAttribute("normal", new BufferAttribute(Float32Array.from(points, (_, i) => (i % 3 === 2 ? 1 : 0)), 3));
-  geometry.setIndex([0, 1, 2, 2, 1, 3, 2, 3, 4, 2, 1, 0, 3, 1, 2, 4, 3, 2]); // of both sides: one that is turned over would be dark
+  geometry.setIndex([0, 1, 2, 2, 1, 3, 2, 3, 4, 2, 1, 0, 3, 1, 2, 4, 3, 2]); // Both sides are drawn: a blade that is turned over would be dark.
   return geometry;
 }
 
@@ -94,7 +94,7 @@ function bladeMaterial() {
   return material;
 }
 
-/** What the blades of a meadow sway in. strength: 0 to 1; heading: degrees, clockwise from above. */
+/** Sets the wind that the blades of a meadow sway in. strength: 0 to 1; heading: degrees, clockwise from above. */
 export function blow(ground, seconds, strength, heading) {
   ground.getObjectByName("grass").material.userData.breeze.set(seconds, strength, (90 - heading) * Math.PI / 180);
 }

@@ -9,7 +9,7 @@ import { surfaceMaterial } from "./surfaces.js";
 
 const GREEN = 0x6f8f4a;
 
-/** The same forest, whose plants cast shadows on the ground and each other. */
+/** A forest whose plants cast shadows on the ground and each other. */
 export const shadowed = (forest) => Object.assign(forest, { castShadow: true, receiveShadow: true });
 
 /** A forest of a plant, with its surfaces, in place of the plant itself. */

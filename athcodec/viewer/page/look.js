@@ -103,7 +103,7 @@ export function setSplit(share) {
   app.stage.changed();
 }
 
-/** What is on either side. */
+/** Sets what is on either side. */
 export function splitLabels() {
   const two = app.plants.length > 1;
   $("split-view").hidden = !two;

@@ -1,8 +1,8 @@
 // Where the plants of a forest stand: trees evenly and a little off their places, those of the floor in groups between them.
 
-const MOST = 12000; // of one kind: of large forests the trees in the middle have them
+const MOST = 12000; // Plants of one kind at most; in large forests only the trees in the middle have them.
 
-// The same numbers in every run, from 0 to 1.
+// Random numbers from 0 to 1, equal in every run.
 const chance = (i, salt) => {
   const x = Math.sin(12.9898 * (i + 1) + 78.233 * salt) * 43758.5453;
   return x - Math.floor(x);
@@ -47,12 +47,12 @@ export function rooted(places, { metadata, rest }) {
 
 const EACH = 4;
 
-/** What an attribute names for the floor: files with spaces between them, each with `=COUNT` behind it, or none. */
+/** Returns what an attribute names for the floor: files with spaces between them, each with `=COUNT` behind it, or none. */
 export function floorIn(text) {
   return (text.match(/\S+/g) ?? []).map((each) => /^(.*?)(?:=([\d.]+))?$/.exec(each)).map(([, source, count]) => ({ source, each: Number(count) || EACH }));
 }
 
-/** What an address names for the floor: `floor=URL`, one or several, each with an `each=COUNT` behind it, or none. */
+/** Returns what an address names for the floor: `floor=URL`, one or several, each with an `each=COUNT` behind it, or none. */
 export function floorOf(wanted) {
   const counts = wanted.getAll("each").map(Number);
   return wanted.getAll("floor").map((source, i) => ({ source, each: counts[i] > 0 ? counts[i] : EACH }));

@@ -78,7 +78,7 @@ export class Plant {
     this.#drawn = [];
   }
 
-  // What came behind the motion: faces, or how thick the limbs are.
+  // Adds what came behind the motion: faces, or how thick the limbs are.
   #arrays() {
     if (this.ath.hasFaces) {
       this.#build();
@@ -95,12 +95,12 @@ export class Plant {
     this.root.updateMatrixWorld(true);
   }
 
-  /** What the file's texture coordinates tell apart, see surfacesOf; null: nothing. */
+  /** Surfaces that the file's texture coordinates tell apart, see surfacesOf; null: none. */
   get surfaces() {
     return this.ath.geometry?.hasAttribute("uv") ? surfacesOf(this.ath.metadata) : null;
   }
 
-  /** What a forest of it casts shadows with; null: nothing of its own. */
+  /** Material with which a forest of it casts shadows; null: none of its own. */
   get depthMaterial() {
     const { surfaces } = this;
     return surfaces && (() => surfaceDepth(surfaces));
@@ -141,7 +141,7 @@ export class Plant {
     this.#dress();
   }
 
-  /** What a forest draws of a plant without faces: lines in the colours of bark. */
+  /** Returns what a forest draws of a plant without faces: lines in the colours of bark. */
   forestGeometry() {
     if (this.ath.hasFaces) return this.ath.geometry;
     const geometry = this.#lines(), out = new Float32Array(this.ath.rest.length), colourOf = this.#barks();
@@ -244,7 +244,7 @@ export class Plant {
     }
   }
 
-  /** Of meshes without colours of their own: tubes are bark, and what has no rings is a leaf, none quite like the next. */
+  /** Colours meshes that have none of their own: tubes are bark, and what has no rings is a leaf, none quite like the next. */
   #leafColours() {
     const { ring, depth } = this.ath.branches, branch = this.ath.vertexBranch;
     return (vertex) => {

@@ -1,4 +1,4 @@
-// What scripts and tests can call: globalThis.athcodecViewer.
+// Functions that scripts and tests can call: globalThis.athcodecViewer.
 
 import { app, counters, main, state } from "./app.js";
 import { frameView } from "./arrange.js";

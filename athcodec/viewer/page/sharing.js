@@ -1,4 +1,4 @@
-// What leaves the page: pictures, videos, links; and the page over the whole screen.
+// Sharing: pictures, videos, links; and the page over the whole screen.
 
 import { app, state } from "./app.js";
 import { write } from "./address.js";

@@ -122,7 +122,7 @@ export class Stage {
     this.#draw(scenes);
   }
 
-  /** What of QUALITY there is time for. */
+  /** Returns the part of QUALITY that there is time for. */
   get quality() {
     return QUALITY[this.less];
   }
@@ -168,7 +168,7 @@ export class Stage {
     this.changed();
   }
 
-  /** What is near of a forest that reaches so far; box: of one plant. */
+  /** Returns the near part of a forest that reaches so far; box: the box of one plant. */
   lookOver(box, reach) {
     const size = box.getSize(new Vector3()), most = Math.max(size.x, size.y, size.z), far = Math.max(reach, most), near = Math.min(far, 1.7 * most);
     const part = new Box3(new Vector3(-near, box.min.y, -near), new Vector3(near, box.max.y, near));
@@ -185,7 +185,7 @@ export class Stage {
       ground.position.y = height;
       ground.scale.setScalar(size);
       ground.getObjectByName("grass").scale.setScalar(Math.sqrt(plant / size));
-      const wide = Math.min(size, SHADED * plant); // of what has shadows
+      const wide = Math.min(size, SHADED * plant); // Size of the part that has shadows.
       this.sky.shade(scene, new Vector3(0, height + 0.25 * wide, 0), 0.75 * wide);
     }
     this.fog(0, 0);
@@ -209,7 +209,7 @@ export class Stage {
     return this.height * this.renderer.getPixelRatio();
   }
 
-  // What lies behind the settings is drawn too, and counts for nothing else.
+  // The part behind the settings is drawn too, and counts for nothing else.
   render() {
     const { renderer, camera, panes, width, height } = this, seen = width - this.inset, left = this.split * seen;
     camera.aspect = seen / height;

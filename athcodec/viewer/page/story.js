@@ -1,4 +1,4 @@
-// What the page tells of the file: how small it is, how much of it is here, and how that looks.
+// The page's account of the file: how small it is, how much of it is here, and how that looks.
 
 import { app, counters, main, state } from "./app.js";
 import { forests } from "./floor.js";
@@ -10,7 +10,7 @@ import { within } from "./look.js";
 const SHAPES = 0x13, REFINED_REST = 0x15, NO_LEVEL = 255; // chunks that are of no clip alone
 const FLOAT3 = 12; // bytes of a position as float32
 
-let bandwidth = null; // of the loading that is played again, bits a second
+let bandwidth = null; // Bits per second of the loading that is played again.
 
 export function describe() {
   const [ath] = app.opened, { info, clips } = ath.motion, counts = [...new Set(clips.map((clip) => clip.frameCount))];
@@ -45,7 +45,7 @@ export function replayed(bits) {
   for (const button of $("replay").querySelectorAll("button")) button.setAttribute("aria-pressed", String(1e6 * button.dataset.mbit === bits));
 }
 
-/** What of the file the clip that plays can need, bytes. */
+/** Returns how many bytes of the file the clip that plays can need. */
 function needed({ channel }, { clip, bytesTotal }) {
   const end = clip.firstSegment + clip.segmentCount;
   const others = channel.chunks.filter(({ kind, level, segment }) => level !== NO_LEVEL && kind !== SHAPES && kind !== REFINED_REST

@@ -6,7 +6,7 @@ import { DoubleSide, MeshDepthMaterial, MeshStandardMaterial, RGBADepthPacking }
 
 const STEMS = ["bark", "stalks"], LEAVES = ["leaves", "blades", "pinnae"];
 
-/** What the metadata of a file call its surfaces, as [of stems, of leaves]; null where they name none that is known. */
+/** Returns how the metadata of a file name its surfaces, as [of stems, of leaves]; null where they name none that is known. */
 export function surfacesOf({ surfaces }) {
   const [stem, leaf] = typeof surfaces === "string" ? surfaces.split(", ") : [];
   return STEMS.includes(stem) && LEAVES.includes(leaf) ? [stem, leaf] : null;
@@ -120,7 +120,7 @@ if (athIsLeaf && dot(normal, normalize(vViewPosition)) < 0.0) normal = -normal;
 }
 `;
 
-// What shines through a leaf from behind: the sun's light, shadowed as it is on the leaf, yellower than what it reflects.
+// Light shines through a leaf from behind: the sun's, shadowed as it is on the leaf, yellower than what it reflects.
 const THROUGH = /* glsl */`
 #if NUM_DIR_LIGHTS > 0
 if (athIsLeaf) {
@@ -166,7 +166,7 @@ export function surfaceMaterial(surfaces) {
   return material;
 }
 
-/** The same material with the leaves' outlines, in colours that tell something. */
+/** Returns the material with the leaves' outlines, in colours that tell something. */
 export function outlined(material, surfaces) {
   material.onBeforeCompile = (shader) => given(shader, shader.fragmentShader
     .replace("#include <common>", `#include <common>\n${SHAPE}`).replace("#include <map_fragment>", EDGE), surfaces);
@@ -174,7 +174,7 @@ export function outlined(material, surfaces) {
   return soften(material);
 }
 
-/** What shadows are drawn with, so that they have the leaves' outlines. */
+/** Returns the material of shadows, which then have the leaves' outlines. */
 export function surfaceDepth(surfaces) {
   const material = new MeshDepthMaterial({ depthPacking: RGBADepthPacking, side: DoubleSide });
   material.onBeforeCompile = (shader) => given(shader, shader.fragmentShader

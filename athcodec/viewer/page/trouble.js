@@ -1,4 +1,4 @@
-// What went wrong, in words of a person.
+// Explains to a person what went wrong.
 
 import { detailText } from "./ui.js";
 
@@ -21,13 +21,13 @@ const DAMAGED = ["The file is damaged", "Some of its bytes are not what they wer
 
 const PASSING = ["HTTP", "NETWORK", "MISSING", "TRUNCATED", "CHANGED", "WORKER"];
 
-/** Of a failure: {title, advice, passing}; `passing`: whether it may be gone when it is tried again. */
+/** Describes a failure: {title, advice, passing}; `passing`: whether it may be gone when it is tried again. */
 export function wordsOf(codeName) {
   const [title, advice] = WORDS[codeName] ?? DAMAGED;
   return { title, advice, passing: PASSING.includes(codeName) };
 }
 
-/** What is shown in spite of a failure. */
+/** Shows what can be shown in spite of a failure. */
 export function shownWithout({ type, codeName, level }, motion) {
   if (type === "stopped") return `${wordsOf(codeName).title}. What is here plays on.`;
   if (level === null) return "The file is damaged: colours, radii or textures are missing.";

@@ -104,7 +104,7 @@ export function rows(list, entries) {
   });
 }
 
-/** What is here over time: the deeper, the stronger. */
+/** Draws which parts of the clip are here: the deeper the level, the stronger. */
 export function paintReady(element, levels, levelCount) {
   const stops = [];
   levels.forEach((level, i) => {

@@ -54,7 +54,7 @@ function dot(strength, heading) {
   return circle;
 }
 
-// What plays, as a wind.
+// The wind that plays.
 function now() {
   if (state.wind) return state.wind;
   const { metadata, motion: { clip } } = app.opened[0], { strength = range.least, heading = 0 } = { ...metadata, ...metadata.clips?.[clip.name] };

@@ -9,11 +9,11 @@ import { dataTexture, eased, roundOf } from "./ATHMotion.js";
 import { clustered, gather } from "./geometry.js";
 import { injectMotion, motionUniforms, shadowMaterials } from "./shader.js";
 
-const MOST_TEXELS = 4 << 20; // of one level: 64 MiB; longer clips are played at fewer frames a second
+const MOST_TEXELS = 4 << 20; // Texels of one level: 64 MiB. Longer clips are played at fewer frames a second.
 const TALLEST = 4096;        // rows of a texture that every device has
 const CELL = 1.5;            // side of the cells of simplified geometry, in pixels' worth of error
 const COARSER = 2;           // from one geometry to the next
-const FEWER = 0.85;          // of the vertices before, for a geometry to be worth it
+const FEWER = 0.85;          // A geometry is made if it has at most this share of the vertices of the one before.
 const MOTIONS = -1;          // in place of a clip's number: the one that the motion plays
 
 const plainMaterial = (lines) => (lines ? new LineBasicMaterial({ color: 0x6b5b45 })
@@ -23,7 +23,7 @@ const breath = () => new Promise((done) => { setTimeout(done); });
 export class ATHForest extends Group {
   levelOfDetail = true;
   pixels = 1;
-  measure = "p99"; // of the errors of levels that `pixels` is about; before the first bake()
+  measure = "p99"; // Measure of the errors that `pixels` limits; set it before the first bake().
   fade = 0.2;      // seconds that an instance takes to another level; 0: none
   fading = false;  // whether one does
   counts = [];     // instances drawn, by level
@@ -31,19 +31,19 @@ export class ATHForest extends Group {
   culled = 0;
 
   #ath;
-  #bins = new Map();    // of every clip, the finest first: {level, tolerance, drawn, place, turn, size, uniforms, filled,
+  #bins = new Map();    // By clip, the finest first: {level, tolerance, drawn, place, turn, size, uniforms, filled,
                         // rows, perRow, texel, fades}; fades: of levels that instances fade in from, the same and `from`
-  #shown = [];          // those that the motion's clip was drawn with last
+  #shown = [];          // Bins that the motion's clip was drawn with last.
   #baking = new Set();
-  #baked = new Map();   // of every clip: levels
-  #motions = new Map(); // of clips that only instances play: what has them fetched
+  #baked = new Map();   // By clip: its baked levels.
+  #motions = new Map(); // By clip that only instances play: the motion that fetches it.
   #places = new Float32Array(0);
   #turns = new Float32Array(0); // cosine, sine, seconds ahead, clip
-  #states = [];         // of every instance that is in view: {clip, level, from, since}; from: -1, or what it fades in from
+  #states = [];         // For every instance in view: {clip, level, from, since}; from: -1, or what it fades in from
   #material;
   #depthMaterial;
   #geometry;
-  #now = 0;             // of the last update(), milliseconds
+  #now = 0;             // Time of the last update(), milliseconds.
 
   /** geometry: what is drawn (default: the file's faces, else lines). material(isLines, level): makes the material of a
    * level (default: like ath.object's); depthMaterial(): what its shadows are drawn with, where `castShadow` is set. */
@@ -158,7 +158,7 @@ export class ATHForest extends Group {
     return bin;
   }
 
-  // What draws instances of a bin that fade in from the level of another.
+  // Draws instances of a bin that fade in from the level of another.
   #fadingBin(clip, bin, from) {
     if (!bin.fades.has(from.level)) {
       const { athData, athForest, athStride } = from.uniforms, lines = !bin.base.hasAttribute("normal");

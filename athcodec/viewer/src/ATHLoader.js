@@ -36,7 +36,7 @@ class Channel {
   sent = 0; // when the worker sent what came last, by the page's clock: the page may have been busy since
   decodedAt = null; // when the first of the motion was
   known = new Map();  // level: {parts, texels, vertices, boxes}
-  #asked = new Map(); // what is under way: key: {promise, resolve, reject}
+  #asked = new Map(); // Requests under way, by key: {promise, resolve, reject}.
   #nextView = 1;
   #nextWork = 1;
   #toRest = null;     // {to, timer}: the finer rest pose, as long as the one that is shown goes to it
@@ -53,7 +53,7 @@ class Channel {
     worker.channels.set(this.id, this);
   }
 
-  // What is not settled is not going to be.
+  // Promises that are not settled never will be.
   #fail(error) {
     for (const { reject } of [this.settle.opened, this.settle.whole, ...this.#asked.values()]) reject(error);
     this.#asked.clear();
@@ -110,7 +110,7 @@ class Channel {
     this.#answer(`parts ${level}`, known);
   }
 
-  // Of every node where its matrix is in a texture, and the middle and half the size of the box of what it moves.
+  // For every node: where its matrix is in a texture, and the middle and half the size of the box of what it moves.
   #boxes({ branch, first, count, index }) {
     const { rest, vertexSource } = this, point = new Vector3(), box = new Box3(), half = new Vector3(), found = [];
     for (let part = 0; part < branch.length; part++) {
@@ -137,7 +137,7 @@ class Channel {
     return this.#toRest !== null;
   }
 
-  // Over the time of a fade, as plants that are shown at level 0 go with it; at once where there are none.
+  // Plants that are shown at level 0 go with it over the time of a fade; without any it happens at once.
   #easeRest(to) {
     const from = this.rest.slice(), start = performance.now();
     const seconds = Math.max(0, ...[...this.views.values()].map(({ level, fade }) => (level === 0 ? fade : 0)));
@@ -189,7 +189,7 @@ class Channel {
     return answer;
   }
 
-  /** What each clip counts for a wind, by its own: {weights}. */
+  /** Returns the weight of each clip for a wind: {weights}. */
   windWeights(strength, heading) {
     const id = this.#nextWork++;
     return this.#ask(`wind ${id}`, { type: "wind", id, strength, heading });
@@ -265,7 +265,7 @@ class Channel {
   }
 }
 
-/** What load() gives: see index.d.ts. What is drawn is made when it is first asked for. */
+/** The result of load(): see index.d.ts. Objects to draw are made when they are first asked for. */
 export class ATH extends EventDispatcher {
   attributes = {};
   #channel;
@@ -462,7 +462,7 @@ export class ATHLoader extends Loader {
       });
   }
 
-  /** The same of bytes that are here: a buffer or a view of one, of which the worker gets a copy. */
+  /** Opens bytes that are here: a buffer or a view of one, of which the worker gets a copy. */
   parse(buffer, onLoad, onError = (error) => console.error(error)) {
     this.parseAsync(buffer).then(onLoad, onError);
   }

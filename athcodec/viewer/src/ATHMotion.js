@@ -31,7 +31,7 @@ export const failureOf = ({ message, codeName }) =>
 
 const FRAME_MS = 33; // between pictures of a fade that nobody asks for
 
-/** What is shown of the next where `passed` of a fade's time has: it begins and ends at rest. */
+/** Returns the share of the next level when `passed` of a fade's time has gone: it begins and ends at rest. */
 export function eased(passed) {
   return passed < 1 ? passed * passed * (3 - 2 * passed) : 1;
 }
@@ -41,11 +41,11 @@ const SHAPES = 0x13, REFINED_REST = 0x15; // chunks that serve all segments
 /** Events: "frame" (a new picture is shown), "level" (another level is), "clip" (another clip is), "progress" (bytes
  * came), "ready" (what can be shown changed), "stopped", "damaged" and "error" (with `message`: what is here goes on playing). */
 export class ATHMotion extends EventDispatcher {
-  clip;               // that plays, one of `clips`
+  clip;               // The clip that plays, one of `clips`.
   time = 0;           // seconds, as asked for
   start = 0;          // the time of the clip's first frame
   wrap;               // "marked", "clamp", "loop", "pingpong"
-  frame = 0;          // of the picture that is shown; -1: of none yet
+  frame = 0;          // Frame of the picture that is shown; -1: none yet.
   level = -1;
   held = false;
   automatic = true;
@@ -57,25 +57,25 @@ export class ATHMotion extends EventDispatcher {
   heat = false;       // whether pictures come with `distances`
   distances = null;   // per vertex, from the deepest position that is here
   mode = "matrices";
-  milliseconds = 0;   // that the worker took for the last picture
+  milliseconds = 0;   // Time that the worker took for the last picture.
   uniforms = motionUniforms();
 
   #channel;
   #id;
   #geometries = new Set();
-  #known = null;          // of the level that is shown: see Channel's `known`
+  #known = null;          // Channel's `known` of the level that is shown.
   #moved = null;          // all vertices of the picture that is shown, once somebody asks for them
-  #bounds = new Box3();   // of that picture
+  #bounds = new Box3();   // Bounds of that picture.
   #shadows = null;
   #textures = new Map();
   #spare = null;
-  #asked = null;          // what the worker was asked last, "" while it is at work
+  #asked = null;          // Key of the last request to the worker, "" while it is at work.
   #pending = false;
   #stale = false;
   #timer = 0;
   #old = null;            // the clip before, as long as it is shown: {clip, seconds, wrap, at, fade, passed, begun}
   #wind = null;           // [strength, heading] of the clips that are blended
-  #endless = null;        // of the clip that plays
+  #endless = null;        // Endless play of the clip that plays.
   #answers = new Map();
   #next = 1;
 
@@ -125,7 +125,7 @@ export class ATHMotion extends EventDispatcher {
     return this.info.levelCount;
   }
 
-  /** What a level is, for people. */
+  /** Describes a level for people. */
   levelName(level) {
     return this.info.levelNames[level];
   }
@@ -447,7 +447,7 @@ export class ATHMotion extends EventDispatcher {
     else {
       const { parts: { nodeCount, exactCount } } = this.#known, stride = 4 * this.uniforms.athStride.value;
       points(12 * nodeCount, 12 * nodeCount + stride * exactCount, stride);
-      for (const [at, x, y, z, u, v, w] of boxes) // of a box the middle and half its size
+      for (const [at, x, y, z, u, v, w] of boxes) // Each box is its middle and half its size.
         for (let k = 0; k < 3; k++) {
           const [a, b, c, d] = data.subarray(at + 4 * k, at + 4 * k + 4), middle = a * x + b * y + c * z + d;
           const half = Math.abs(a) * u + Math.abs(b) * v + Math.abs(c) * w;
@@ -527,7 +527,7 @@ export class ATHMotion extends EventDispatcher {
     if (this.mode === "positions") return;
     const { source, other } = geometry.userData;
     this.#setPart(geometry, "athPart", source);
-    if (other) this.#setPart(geometry, "athPartOther", other); // of the far end, where a vertex draws a line's side
+    if (other) this.#setPart(geometry, "athPartOther", other); // Part of the far end, where a vertex draws a line's side.
   }
 
   #setPart(geometry, name, source) {

@@ -16,14 +16,14 @@ canvas { display: block; outline-offset: -2px; opacity: 0; transition: opacity .
 canvas.drawn { opacity: 1; }
 @media (prefers-reduced-motion: reduce) { canvas { transition: none; } }`;
 const LONGEST = 0.5; // seconds that pass at most from a picture to the next, as in a tab that was hidden
-const NEAR = "120px"; // of being in view
+const NEAR = "120px"; // Distance from the view within which an element loads.
 const BREEZE = 0.5; // in the grass of the scenery
 const MOST_TREES = 10000;
 const FORGET_MS = 4000; // out of view, after which a lazy one gives back what it takes
 
 let loader = null;
 
-// What a plant is drawn in where there is no scenery: light, and nothing behind it.
+// A plant without scenery is drawn in light, with nothing behind it.
 class Bare {
   camera = new PerspectiveCamera(38, 1, 0.01, 1000);
   #scene = new Scene();
@@ -70,7 +70,7 @@ class Bare {
     this.controls.update();
   }
 
-  took() {} // what a picture takes leaves nothing out
+  took() {} // The time that a picture takes never leaves anything out.
 
   breeze() {} // no grass
 
@@ -93,7 +93,7 @@ class Scenery extends Stage {
   }
 
   #box = null;
-  #reach = 0; // of a forest
+  #reach = 0; // Reach of a forest.
 
   #fit() {
     if (!this.#box || this.moved) return;
@@ -126,7 +126,7 @@ export class ATHViewerElement extends HTMLElement {
     return loader ??= new ATHLoader();
   }
 
-  #stand = document.createElement("div"); // what the canvas stands in
+  #stand = document.createElement("div"); // Frame of the canvas.
   #canvas = null;
   #stage = null; // null where it is lazy and out of view
   #plant = null;
@@ -251,7 +251,7 @@ export class ATHViewerElement extends HTMLElement {
     return this.#plant?.ath ?? null;
   }
 
-  /** What is drawn of a forest: the trees, and each plant of its floor. */
+  /** Returns what is drawn of a forest: the trees, and each plant of its floor. */
   get forests() {
     return this.#grove?.forests ?? [];
   }

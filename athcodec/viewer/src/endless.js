@@ -1,7 +1,7 @@
 // Play without an end: which places of a clip are shown when, by the transitions between like frames that the encoder has found.
 // The same seed gives the same play as in athcodec/motion/transitions.py, which is where they come from.
 
-const TAKEN = 0.5; // of the transitions that are come to
+const TAKEN = 0.5; // Probability that a transition is taken.
 const LONGEST = 1e7; // seconds of a play
 
 /** The transitions of a clip's metadata, by the frame that they leave at: [[leave, enter, frames]]; none where these are not such
@@ -17,7 +17,7 @@ export function transitionsOf({ transitions }, frameCount) {
 export class EndlessPlay {
   #ways;
   #state;
-  #runs = [{ begins: 0, leave: 0, enter: 0, lasts: 0, over: 0 }]; // of the clip, and what led to each
+  #runs = [{ begins: 0, leave: 0, enter: 0, lasts: 0, over: 0 }]; // Runs of the clip, each with the transition that led to it.
   #next;
 
   /** transitions: of transitionsOf(); times: seconds of the clip's frames; seed: an integer. */
@@ -29,7 +29,7 @@ export class EndlessPlay {
     this.#next = this.#drawn(0);
   }
 
-  /** What is shown `seconds` after the play began: [{seconds, weight}] of one place of the clip or, within a transition, of two;
+  /** Returns what is shown `seconds` after the play began: [{seconds, weight}] of one place of the clip or, within a transition, of two;
    * and `ahead`, where the next transition leads to. */
   at(seconds) {
     const time = Math.min(Math.max(seconds, 0), LONGEST);

@@ -5,7 +5,7 @@ import { AthFade } from "../ath_decoder.mjs";
 export class Fading {
   #fade = new AthFade();
   #at = 0;      // when it was asked for last, milliseconds
-  tracks = [];  // of each frame that is shown: {frame, held}, see Session's #terms
+  tracks = [];  // For each frame that is shown {frame, held}, see Session's #terms.
 
   /** The level that is gone to, -1 before there is one. */
   get level() {

@@ -108,7 +108,7 @@ export function addAttributes(geometry, ath, attributes) {
     const order = perCorner ? Uint32Array.from({ length: rows }, (_, i) => i) : source;
     const values = gather(new Float32Array(size * source.length), found.array, order, size).map((value) => value * scale);
     geometry.setAttribute(attribute, new BufferAttribute(values, size));
-    if (name === "normals") geometry.userData.faces = null; // those of `setRest` are computed
+    if (name === "normals") geometry.userData.faces = null; // The normals of `setRest` are computed.
   }
 }
 

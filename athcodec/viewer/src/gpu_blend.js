@@ -1,4 +1,4 @@
-// What a plant of a forest shows at a time: frames of clips, each with a weight, which add up to 1.
+// A plant of a forest shows at any time: frames of clips, each with a weight, which add up to 1.
 
 import { EndlessPlay, transitionsOf } from "./endless.js";
 import { roundOf } from "./ATHMotion.js";
@@ -17,7 +17,7 @@ export class Mixture {
     this.#wanted = sum > 0 ? new Map([...weights].map(([clip, weight]) => [clip, weight / sum])) : new Map([[OWN, 1]]);
   }
 
-  /** Those that are wanted in place of plants' own. */
+  /** Weights that replace the plants' own. */
   get clips() {
     return [...this.#wanted.keys()].filter((clip) => clip !== OWN);
   }
@@ -34,7 +34,7 @@ export class Mixture {
     this.#shown = new Map(next.map(([clip, weight]) => [clip, weight / total]));
   }
 
-  /** Of a plant that plays `own`: the weight of each clip. */
+  /** Returns the weight of each clip for a plant that plays `own`. */
   of(own) {
     const weights = new Map();
     for (const [clip, weight] of this.#shown) weights.set(clip ?? own, (weights.get(clip ?? own) ?? 0) + weight);
@@ -45,8 +45,8 @@ export class Mixture {
 /** Clips as forests play them: around, or without an end. */
 export class Play {
   #channel;
-  #endless = new Map(); // of "clip plant"
-  seed = null;          // of endless play; null: clips go around
+  #endless = new Map(); // By "clip plant".
+  seed = null;          // Seed of endless play; null: clips go around.
 
   constructor(channel) {
     this.#channel = channel;

@@ -20,7 +20,7 @@ const MOST_SHAPES = 32;
 const SLOTS = 4;          // frames that a plant keeps: two that are shown, and two that were before
 const CELL = 1.5;         // side of the cells of simplified geometry, in pixels' worth of error
 const COARSER = 2;        // from one shape to the next
-const FEWER = 0.85;       // of the vertices before, for a shape to be worth it
+const FEWER = 0.85;       // A shape is made if it has at most this share of the vertices of the one before.
 const VIEW_WORDS = 32, FLOATS = 9;
 const WHITE = 0xffffff;
 
@@ -34,7 +34,7 @@ export class ATHForest extends Group {
   ease = 0.2;      // seconds in which two thirds of a change of weights have happened; 0: at once
   bytesOfMotion = 0;     // uploaded so far: segments and levels, once each
   bytesOfParameters = 0; // and what says which frames are shown, every frame
-  levels = [];     // that can be drawn: {level, passes, ...}
+  levels = [];     // Levels that can be drawn: {level, passes, ...}.
 
   #renderer;
   #ath;
@@ -44,9 +44,9 @@ export class ATHForest extends Group {
   #device;
   #kernels;
   #choose;
-  #motions = new Map(); // of clips that are shown: a view that has their bytes fetched
+  #motions = new Map(); // By clip that is shown: a view that has its bytes fetched.
   #plants = [];         // {clip, phase}: what instances show, one of each clip and phase in use; phase: 0 to 1
-  #times = [];          // of each plant at this frame: [{frame, weight}]
+  #times = [];          // For each plant at this frame: [{frame, weight}].
   #mixture = new Mixture();
   #play;
   #eased = 0;           // when weights were advanced, milliseconds
@@ -56,7 +56,7 @@ export class ATHForest extends Group {
   #set = null;
   #shapes = [];         // {level, tolerance, list, drawn}, the finest first
   #box = new Box3();
-  #size = 1;            // of the largest instance
+  #size = 1;            // Size of the largest instance.
   #count = 0;
   #loading = false;
   #version = 0;
@@ -95,7 +95,7 @@ export class ATHForest extends Group {
     return this.#plants.length;
   }
 
-  /** Of each plant that is computed: the name of its clip and its phase, 0 to 1. */
+  /** For each plant that is computed: the name of its clip and its phase, 0 to 1. */
   get plants() {
     return this.#plants.map(({ clip, phase }) => [clip.name, phase]);
   }
@@ -198,7 +198,7 @@ export class ATHForest extends Group {
 
   // ---- levels ----
 
-  // Of clips that have come later, what levels that are shown lack; then the next level, once its bytes are here and an instance
+  // Uploads what levels that are shown lack of clips that came later; then the next level, once its bytes are here and an instance
   // is so near that the one before does not do.
   #loadNext(hidden) {
     const next = this.levels.length, { motion } = this.#ath;
@@ -215,7 +215,7 @@ export class ATHForest extends Group {
     work().catch(({ message, codeName }) => this.#ath.motion.dispatchEvent({ type: "error", message, codeName }));
   }
 
-  // Of all clips that are played.
+  // Counted over all clips that are played.
   #error(level) {
     return Math.max(...Array.from(this.#motions.keys(), ({ errors }) => errors[level][this.measure]));
   }
@@ -260,7 +260,7 @@ export class ATHForest extends Group {
     return true;
   }
 
-  // What has been uploaded since the last time.
+  // Bytes that have been uploaded since the last time.
   #account(own, kind) {
     this[kind] += own.passes.uploaded - own.uploaded;
     own[kind] += own.passes.uploaded - own.uploaded;
@@ -342,7 +342,7 @@ export class ATHForest extends Group {
 
   // ---- frames ----
 
-  /** What is shown at `seconds`: once per frame, before rendering. height: of the screen, in pixels. */
+  /** Shows `seconds`: to be called once per frame, before rendering. height: the screen's, in pixels. */
   update(camera, height, seconds) {
     if (!this.#set) return;
     const hidden = this.#look(camera, height);
@@ -485,7 +485,7 @@ function inverse(source) {
   return place;
 }
 
-// What vertices.wgsl takes normals from: see `corners_of` in athcodec/gpu.
+// Corners that vertices.wgsl takes normals from: see `corners_of` in athcodec/gpu.
 function cornersOf(geometry, vertexSource) {
   const place = inverse(vertexSource), index = Uint32Array.from(geometry.index.array, (i) => place[geometry.userData.source[i]]);
   const count = vertexSource.length, next = new Uint32Array(count + 1), out = new Uint32Array(count + 1 + 2 * index.length);

@@ -23,7 +23,7 @@ void main() {
   if (far) p = q;
   float pixel = (isOrthographic ? 1.0 : -p.z) * 2.0 / (projectionMatrix[1][1] * screen.y);
   float wide = max(far ? radiusOther : radius, 0.55 * pixel);
-  p.xy += wide * (across * position.y + vec2(across.y, -across.x) * (far ? -0.6 : 0.6)); // over the joints, where limbs bend
+  p.xy += wide * (across * position.y + vec2(across.y, -across.x) * (far ? -0.6 : 0.6)); // Joints, where limbs bend, are covered.
   gl_Position = projectionMatrix * p;
   vColor = far ? colorOther : color;
   vSide = position.y;
@@ -80,7 +80,7 @@ export function setRadii(geometry, perVertex) {
   }
 }
 
-/** What their shadows are drawn with. */
+/** Returns the material of their shadows. */
 export function limbDepth(uniforms) {
   const fragmentShader = "#include <packing>\nvoid main() { gl_FragColor = packDepthToRGBA(gl_FragCoord.z); }";
   return new ShaderMaterial({ vertexShader: VERTEX, fragmentShader, side: 2, uniforms: { ...uniforms, screen: { value: new Vector2(2048, 2048) } } });

@@ -16,7 +16,7 @@ attribute vec4 athTurn; // cosine, sine, frame, the frame that its fraction lead
 #endif
 #ifdef ATH_FADING
 attribute float athPartBefore;
-attribute vec4 athFading; // the same two frames of the level before, its share
+attribute vec4 athFading; // These two frames at the level before, and its share.
 uniform highp sampler2D athDataBefore;
 uniform vec2 athBefore; // texels per frame, per exact vertex
 bool athIsBefore = false;

@@ -4,7 +4,7 @@
 import { decompress } from "fzstd";
 
 const METADATA = 0x8004, ATTRIBUTE = 0x8020;
-const MOST_BYTES = 2 ** 30; // of one array
+const MOST_BYTES = 2 ** 30; // Largest size of one array, bytes.
 const MOST_TEXT = 2 ** 24;
 // Typed arrays of kinds and sizes of elements (FORMAT.md, "ATTRIBUTE"); others have none: halves, pairs, texts.
 const NUMBERS = [
@@ -19,7 +19,7 @@ function wrong(what) {
   return Object.assign(new Error(`BAD_CHUNK: ${what}`), { codeName: "BAD_CHUNK" });
 }
 
-// What a zstd frame says its content has; -1 where it does not say it.
+// Returns the content size that a zstd frame declares; -1 where it declares none.
 function contentSize(frame) {
   if (frame.length < 6 || frame[0] !== 0x28 || frame[1] !== 0xb5 || frame[2] !== 0x2f || frame[3] !== 0xfd)
     throw wrong("static data: got no zstd frame, expected one");
@@ -113,7 +113,7 @@ function derivedEdges(file) {
   return Uint32Array.from(edges);
 }
 
-/** What stands in front of the motion: {metadata, faces, edges, skeleton}. `skeleton` is always there: the
+/** Reads what stands in front of the motion: {metadata, faces, edges, skeleton}. `skeleton` is always there: the
  * stored edges, or those that follow from the branches. */
 export function readPrelude(file) {
   const index = file.chunks().findIndex(({ kind }) => kind === METADATA), edges = file.polygons("edges");
