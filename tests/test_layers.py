@@ -137,9 +137,8 @@ def test_poses_are_as_precise_as_the_deepest_level_that_is_there(layered_ath, bu
     for level, pose in enumerate(poses):
         athcodec.truncate(layered_ath, tmp_path / "cut.ath", level)
         with athcodec.open(tmp_path / "cut.ath", strict=True) as cut:
-            assert np.array_equal(cut.level_rest(), pose) and np.array_equal(
-                cut.file.rest, cut_rest(layered_ath, level)
-            )
+            assert np.array_equal(cut.level_rest(), pose)
+            assert np.array_equal(cut.file.rest, cut_rest(layered_ath, level))
     assert np.array_equal(cut.file.rest, deepest)
 
 

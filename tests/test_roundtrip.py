@@ -308,13 +308,8 @@ def test_metadata_come_back_unchanged(metadata, scratch):
 
 
 def test_a_clip_without_static_data_has_none_in_its_file(scratch):
-    decoder = reopened(plant(frames=3), scratch)
-    assert (
-        decoder.file.faces is None
-        and decoder.file.edges is None
-        and decoder.file.attributes == {}
-        and decoder.metadata == {}
-    )
+    file = reopened(plant(frames=3), scratch).file
+    assert file.faces is None and file.edges is None and file.attributes == {} and file.metadata == {}
 
 
 def test_attributes_none_keeps_the_motion_and_the_units_alone(full_clip, scratch):

@@ -24,9 +24,8 @@ class Whole:
             self.segments, self.header = decoder.segments, decoder.file.header
             self.positions = [decoder.positions(level=level) for level in range(decoder.file.level_count)]
             self.bound, self.attributes = decoder.file.max_error_bound, decoder.file.attributes
-            self.poses = [
-                decoder.level_rest(level).astype(decoder.file.rest.dtype) for level in range(decoder.file.level_count)
-            ]
+            dtype, count = decoder.file.rest.dtype, decoder.file.level_count
+            self.poses = [decoder.level_rest(level).astype(dtype) for level in range(count)]
 
     def cut(self, size: int, **options) -> athcodec.Decoder:
         return athcodec.open(BytesIO(self.data[:size]), **options)
@@ -65,9 +64,7 @@ def assert_plays_as_far_as_it_goes(whole: Whole, size: int) -> None:
         assert decoder.file.deepest == deepest
         assert np.array_equal(decoder.positions(), whole.positions[deepest])
     if deepest + 1 < len(whole.levels):
-        assert np.array_equal(decoder.file.rest, whole.poses[max(deepest, 0)]), (
-            "in place of the rest pose of the source"
-        )
+        assert np.array_equal(decoder.file.rest, whole.poses[max(deepest, 0)]), "instead of the source's rest pose"
         with pytest.raises(LevelUnavailable, match=f"level {deepest + 1}, segment"):
             decoder.positions(level=deepest + 1)
 
@@ -183,9 +180,8 @@ def test_a_truncated_file_is_shorter_and_keeps_its_static_data(full, full_clip, 
     assert sizes == sorted(set(sizes)) and sizes[-1] == len(full.data)
     truncate(full.path, tmp_path / "cut.ath", 0)
     with athcodec.open(tmp_path / "cut.ath") as decoder:
-        assert np.array_equal(decoder.file.faces, full_clip.faces) and np.array_equal(
-            decoder.file.edges, full_clip.edges
-        )
+        assert np.array_equal(decoder.file.faces, full_clip.faces)
+        assert np.array_equal(decoder.file.edges, full_clip.edges)
         assert decoder.metadata.items() >= full_clip.metadata.items()
         assert {name: a.tobytes() for name, a in decoder.file.attributes.items()} == {
             name: a.tobytes() for name, a in full_clip.attributes.items()
