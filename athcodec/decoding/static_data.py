@@ -1,7 +1,4 @@
-"""The static data of an .ath file, which do not move: rest pose, branches, faces, edges, attributes and metadata.
-
-Arrays are in the source's numbering. They are read when they are first asked for.
-"""
+"""The static data of an .ath file, in the source's numbering: rest pose, branches, faces, attributes, metadata."""
 
 from __future__ import annotations
 
