@@ -3,7 +3,7 @@
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-if TYPE_CHECKING:  # what __getattr__ finds, for type checkers and the reference
+if TYPE_CHECKING:  # Type checkers and the reference look here for what __getattr__ returns.
     from athcodec import errors, metrics
     from athcodec.decoding.ath_file import AthFile
     from athcodec.decoding.clip_view import ClipView
@@ -11,8 +11,9 @@ if TYPE_CHECKING:  # what __getattr__ finds, for type checkers and the reference
     from athcodec.encoding import Summary, encode
     from athcodec.encoding.survey import Ath, build_ath
     from athcodec.exporters import write, write_hdf5
+    from athcodec.motion.branches.finding import find_branches
+    from athcodec.motion.branches.result import Found
     from athcodec.motion.clip import MotionClip
-    from athcodec.motion.discovery import Found, find_branches
     from athcodec.motion.joining import in_wind, join, looped, split
     from athcodec.motion.thresholds import Thresholds
     from athcodec.motion.transitions import endless
@@ -48,7 +49,8 @@ __all__ = [
     "write",
     "write_hdf5",
 ]
-_LAZY = {  # by module: to import the package loads none, so that a command or a program pays for what it uses
+# Names by module. Importing the package loads none of them, so that a command or a program pays for what it uses.
+_LAZY = {
     "encoding.survey": ("Ath", "build_ath"),
     "motion.thresholds": ("Thresholds",),
     "decoding.ath_file": ("AthFile",),
@@ -56,7 +58,8 @@ _LAZY = {  # by module: to import the package loads none, so that a command or a
     "decoding.clip_view": ("ClipView",),
     "decoding.decoder": ("Decoder",),
     "opening": ("open",),
-    "motion.discovery": ("Found", "find_branches"),
+    "motion.branches.finding": ("find_branches",),
+    "motion.branches.result": ("Found",),
     "encoding": ("Summary", "encode"),
     "exporters": ("write", "write_hdf5"),
     "motion.joining": ("in_wind", "join", "looped", "split"),

@@ -1,8 +1,5 @@
-"""Finds and loads the C core that the build puts into this package. What its functions take and return is
-not known here: the bindings (_native.py) declare that. The library is looked for in every directory of the
-package, because an editable install keeps the Python files in the source tree and the built library in
-site-packages.
-"""
+"""Finding and loading the C core that the build puts into this package. Every directory of the package is searched,
+because an editable install keeps the built library in site-packages. The bindings are in _native.py."""
 
 from __future__ import annotations
 
@@ -16,9 +13,9 @@ LIBRARY_NAME = f"libath{_SUFFIX}"
 
 
 def library_path() -> Path:
-    """Path of the C core's shared library.
+    """Return the path of the C core's shared library.
 
-    Raises ImportError where no directory of the package holds it.
+    Raises ImportError if no directory of the package holds it.
     """
     package = __package__ or "athcodec"
     spec = find_spec(package)
@@ -32,9 +29,9 @@ def library_path() -> Path:
 
 
 def load_library() -> ctypes.CDLL:
-    """The C core as a ctypes library.
+    """Return the C core as a ctypes library.
 
-    Raises ImportError where it is missing or where the system refuses to load it.
+    Raises ImportError if it is missing or the system refuses to load it.
     """
     path = library_path()
     try:

@@ -8,7 +8,21 @@ array; they release the GIL, and hold no state.
 from __future__ import annotations
 
 import ctypes
-from ctypes import POINTER, c_char_p, c_double, c_int, c_int32, c_int64, c_size_t, c_uint8, c_uint32, c_uint64, c_void_p
+from ctypes import (
+    POINTER,
+    byref,
+    c_char_p,
+    c_double,
+    c_int,
+    c_int32,
+    c_int64,
+    c_size_t,
+    c_uint8,
+    c_uint32,
+    c_uint64,
+    c_void_p,
+)
+from typing import Any
 
 import numpy as np
 
@@ -27,116 +41,95 @@ SHORT_SHIFT, SHORT_FLOATS = 18, 255 << 5
 MEASURES = "max", "p99", "rms"
 """ath_measure, in its order."""
 
-BRANCH = np.dtype(
-    [(name, "<i4") for name in "parent count attach flags lag first subtree depth rigid detail ring".split()]
-)
+
+def fields(*types_and_names: Any) -> list[tuple[str, Any]]:
+    """Return (name, type) of each field of a record, from types that are each followed by their fields' names."""
+    pairs = zip(types_and_names[::2], types_and_names[1::2])
+    return [(name, kind) for kind, names in pairs for name in names.split()]
+
+
+# Records that the core repeats, in arrays (dtypes) or on their own (structs). `check_layouts` compares them.
+BRANCH = np.dtype(fields("<i4", "parent count attach flags lag first subtree depth rigid detail ring"))
 PIECE = np.dtype(
-    [(name, "<i8") for name in ("modes", "basis", "attach_cache")]
-    + [(name, "<i4") for name in "first count parent attach branch flags rank level low_level low_modes".split()]
-    + [("last_attached", "<i4"), ("ring", "<i4")]
+    fields(
+        *("<i8", "modes basis attach_cache"),
+        *("<i4", "first count parent attach branch flags rank level low_level low_modes last_attached ring"),
+    )
 )
-NODE = np.dtype(
-    [("whitening", "<f8", (9,))] + [(name, "<i4") for name in "branch piece first count level last coded rank".split()]
-)
-
-
-CHUNK = np.dtype(
-    [
-        ("bytes", "<u8"),
-        ("offset", "<u8"),
-        ("length", "<u4"),
-        ("checksum", "<u4"),
-        ("segment", "<u4"),
-        ("kind", "<u2"),
-        ("level", "u1"),
-        ("reserved", "u1"),
-    ]
-)
-"""ath_chunk"""
+NODE = np.dtype(fields("9<f8", "whitening", "<i4", "branch piece first count level last coded rank"))
+CHUNK = np.dtype(fields("<u8", "bytes offset", "<u4", "length checksum segment", "<u2", "kind", "u1", "level reserved"))
 
 
 class CorePlan(ctypes.Structure):
     """ath_plan."""
 
-    _fields_ = [(name, c_int32) for name in ("vertex_count", "branch_count", "piece_count", "node_count")]
-    _fields_ += [("attach_cache_rows", c_int64), ("height", c_int32), ("longest", c_int32)]
-    _fields_ += [(name, c_void_p) for name in ("branches", "pieces", "nodes", "rest", "bases")]
+    _fields_ = fields(
+        *(c_int32, "vertex_count branch_count piece_count node_count", c_int64, "attach_cache_rows"),
+        *(c_int32, "height longest", c_void_p, "branches pieces nodes rest bases"),
+    )
 
 
 class Stream(ctypes.Structure):
     """ath_stream."""
 
-    _fields_ = [
-        ("step", c_double),
-        ("rotation_step_factor", c_double),
-        ("temporal", c_void_p),
-        ("temporal_rank", c_int32),
-        ("root", c_int32),
-        ("turn_step", c_double),
-    ]
+    _fields_ = fields(
+        *(c_double, "step rotation_step_factor", c_void_p, "temporal"),
+        *(c_int32, "temporal_rank root", c_double, "turn_step"),
+    )
 
 
 class Motion(ctypes.Structure):
     """ath_motion."""
 
-    _fields_ = [
-        (name, c_void_p) for name in ("streams", "waves", "attach_caches", "work", "before", "known", "decoded")
-    ]
-    _fields_ += [("frames", c_int32), ("ratio", c_int32)]
+    _fields_ = fields(c_void_p, "streams waves attach_caches work before known decoded", c_int32, "frames ratio")
 
 
 class Coarse(ctypes.Structure):
     """ath_coarse."""
 
-    _fields_ = [
-        (name, c_void_p)
-        for name in "placed integers integer_tracks shape_counts tracks frames extents turn_steps".split()
-    ]
+    _fields_ = fields(c_void_p, "placed integers integer_tracks shape_counts tracks frames extents turn_steps")
 
 
 class Integers(ctypes.Structure):
     """ath_integers."""
 
-    _fields_ = [
-        (name, c_void_p)
-        for name in (
-            "coefficients tracks node_tracks node_steps predicted predicted_tracks "
-            "shape_counts shape_first shapes duals"
-        ).split()
-    ]
+    _fields_ = fields(
+        *(c_void_p, "coefficients tracks node_tracks node_steps predicted predicted_tracks"),
+        *(c_void_p, "shape_counts shape_first shapes duals"),
+    )
 
 
 class Rounding(ctypes.Structure):
     """ath_rounding."""
 
-    _fields_ = [("dead_zone", c_double), ("ends", c_double * 3)]
+    _fields_ = fields(c_double, "dead_zone", c_double * 3, "ends")
 
 
 class CoreMetEnds(ctypes.Structure):
     """ath_met_ends."""
 
-    _fields_ = [("decided", c_void_p), ("count", c_int64), ("closed", c_int32), ("reserved", c_int32)]
+    _fields_ = fields(c_void_p, "decided", c_int64, "count", c_int32, "closed reserved")
 
 
 class Header(ctypes.Structure):
     """ath_header."""
 
-    _fields_ = [("file_length", c_uint64), ("front_length", c_uint64), ("max_error", c_double)]
-    _fields_ += [(name, c_uint32) for name in "chunk_count vertex_count branch_count frame_count segment_count".split()]
-    _fields_ += [
-        (name, c_int32)
-        for name in "level_count full_level_count clip_count layer_count is_float64 is_predicted has_faces".split()
-    ]
+    _fields_ = fields(
+        *(c_uint64, "file_length front_length", c_double, "max_error"),
+        *(c_uint32, "chunk_count vertex_count branch_count frame_count segment_count"),
+        *(c_int32, "level_count full_level_count clip_count layer_count is_float64 is_predicted has_faces"),
+    )
 
 
 class CorePolygons(ctypes.Structure):
     """ath_polygons."""
 
-    _fields_ = [(name, c_uint32) for name in ("face_count", "corner_count", "columns")]
-    _fields_ += [(name, c_uint8) for name in ("is_mixed", "is_derived", "index_type", "count_type")]
+    _fields_ = fields(c_uint32, "face_count corner_count columns", c_uint8, "is_mixed is_derived index_type count_type")
 
 
-_PLAYING = {  # core/include/ath.h
+_WRITER = [c_void_p, c_void_p, c_size_t]  # Scratch memory, and the buffer with its size.
+_SEGMENT = [POINTER(CorePlan), POINTER(Motion), POINTER(Integers)]
+_PLAYING = {  # Functions of core/include/ath.h.
     "ath_result_name": (c_char_p, [c_int]),
     "ath_kind_name": (c_char_p, [c_int]),
     "ath_fault_text": (c_size_t, [c_void_p, c_char_p, c_size_t]),
@@ -200,12 +193,12 @@ _PLAYING = {  # core/include/ath.h
     "ath_level_for": (c_int32, [c_void_p, c_int32, c_int32, c_int, c_double, c_double, c_double, c_double]),
     "ath_crc32c": (c_uint32, [c_uint32, c_void_p, c_size_t]),
 }
-_ENCODING = {  # core/model/*.h, core/encode/encode.h
+_ENCODING = {  # Functions of core/model/*.h and core/encode/encode.h.
     "ath_count_pieces": (c_int32, [c_void_p, c_int32, c_int32]),
     "ath_count_nodes": (c_int32, [c_void_p, c_int32]),
-    "ath_build_plan": (None, [POINTER(CorePlan), c_void_p, c_void_p, c_void_p, c_int]),
+    "ath_build_plan": (None, [POINTER(CorePlan), *[c_void_p] * 3, c_int]),
     "ath_basis_table_size": (c_size_t, [c_int32]),
-    "ath_basis_layout": (c_int64, [c_void_p, c_int32, c_void_p, c_void_p, c_void_p]),
+    "ath_basis_layout": (c_int64, [c_void_p, c_int32, *[c_void_p] * 3]),
     "ath_basis_modes": (None, [c_void_p, c_int32, c_int32, *[c_void_p] * 4]),
     "ath_basis_sheets": (None, [c_void_p, c_int32, c_int32, c_void_p, c_void_p]),
     "ath_principal": (None, [c_int32, c_int32, *[c_void_p] * 4]),
@@ -213,37 +206,14 @@ _ENCODING = {  # core/model/*.h, core/encode/encode.h
     "ath_waves": (None, [c_int32, c_int32, c_void_p]),
     "ath_motion_work": (c_size_t, [c_int32, c_int32]),
     "ath_attach_cache_size": (c_size_t, [c_int64, c_int32]),
+    "ath_layout": (c_char_p, [c_int32, c_void_p, c_void_p]),
     "ath_model_size": (c_size_t, []),
     "ath_differences": (None, [*[c_int32] * 3, *[c_void_p] * 6, c_double, *[c_void_p] * 3]),
-    "ath_gather": (None, [c_int32, c_int32, c_void_p, c_int32, c_int, c_void_p, c_void_p, c_void_p]),
-    "ath_analyse": (
-        None,
-        [
-            *[POINTER(CorePlan), POINTER(Motion), POINTER(Integers), c_int32, c_int32],
-            *[c_void_p, POINTER(Rounding), c_void_p, c_int, c_void_p],
-        ],
-    ),
-    "ath_analyse_nodes": (
-        None,
-        [
-            POINTER(CorePlan),
-            POINTER(Motion),
-            POINTER(Integers),
-            c_int32,
-            c_int32,
-            c_void_p,
-            c_void_p,
-            POINTER(Rounding),
-        ],
-    ),
-    "ath_pose": (
-        None,
-        [POINTER(CorePlan), POINTER(Motion), POINTER(Integers), c_int32, c_int32, c_int32, c_void_p, c_int, c_void_p],
-    ),
-    "ath_pose_nodes": (
-        None,
-        [POINTER(CorePlan), POINTER(Motion), POINTER(Integers), c_int32, c_int32, c_int32, c_void_p, c_int, c_void_p],
-    ),
+    "ath_gather": (None, [c_int32, c_int32, c_void_p, c_int32, c_int, *[c_void_p] * 3]),
+    "ath_analyse": (None, [*_SEGMENT, c_int32, c_int32, c_void_p, POINTER(Rounding), c_void_p, c_int, c_void_p]),
+    "ath_analyse_nodes": (None, [*_SEGMENT, c_int32, c_int32, c_void_p, c_void_p, POINTER(Rounding)]),
+    "ath_pose": (None, [*_SEGMENT, *[c_int32] * 3, c_void_p, c_int, c_void_p]),
+    "ath_pose_nodes": (None, [*_SEGMENT, *[c_int32] * 3, c_void_p, c_int, c_void_p]),
     "ath_add_moments": (c_int64, [c_int64, c_int32, c_void_p, c_double, c_void_p]),
     "ath_multiply": (None, [*[c_int64] * 4, c_void_p, c_int64, c_void_p, c_int64, c_void_p]),
     "ath_decompose": (None, [c_int64, *[c_void_p] * 4]),
@@ -259,66 +229,36 @@ _ENCODING = {  # core/model/*.h, core/encode/encode.h
     ),
     "ath_apply_corrections": (None, [c_int32, c_int, c_void_p, c_double, c_void_p, c_int64]),
     "ath_encode_front": (c_int64, [c_void_p, c_size_t, POINTER(Header), *[c_void_p] * 4]),
-    "ath_encode_hierarchy": (c_int64, [c_void_p, c_void_p, c_size_t, c_void_p, c_int32, c_int32, c_void_p, c_void_p]),
+    "ath_encode_hierarchy": (c_int64, [*_WRITER, c_void_p, c_int32, c_int32, c_void_p, c_void_p]),
     "ath_mesh_size": (c_size_t, [c_int32, c_int32]),
     "ath_place_mesh": (None, [c_void_p, c_int32, c_int32]),
     "ath_build_mesh": (None, [c_void_p, POINTER(CorePolygons), *[c_void_p] * 3]),
     "ath_faces_memory": (c_size_t, [c_int32]),
-    "ath_encode_faces": (c_int64, [c_void_p, c_void_p, c_size_t, POINTER(CorePolygons), c_int32, c_void_p, c_void_p]),
-    "ath_encode_rest": (
-        c_int64,
-        [c_void_p, c_void_p, c_size_t, c_void_p, c_int32, c_double, c_double, *[c_void_p] * 8],
-    ),
+    "ath_encode_faces": (c_int64, [*_WRITER, POINTER(CorePolygons), c_int32, c_void_p, c_void_p]),
+    "ath_encode_rest": (c_int64, [*_WRITER, c_void_p, c_int32, c_double, c_double, *[c_void_p] * 8]),
     "ath_find_copies": (c_int32, [c_void_p, c_int32, c_void_p, c_double, c_double, c_void_p, c_void_p]),
-    "ath_encode_refined_shapes": (
-        c_int64,
-        [
-            c_void_p,
-            c_void_p,
-            c_size_t,
-            POINTER(CorePlan),
-            c_void_p,
-            c_void_p,
-            c_void_p,
-            c_void_p,
-            c_void_p,
-            c_void_p,
-            c_int32,
-        ],
-    ),
-    "ath_encode_source_rest": (c_int64, [c_void_p, c_void_p, c_size_t, c_void_p, c_int32, c_double, *[c_void_p] * 5]),
-    "ath_encode_exact_rest": (c_int64, [c_void_p, c_void_p, c_size_t, c_void_p, c_int32, c_void_p, c_int, c_void_p]),
-    "ath_encode_times": (c_int64, [c_void_p, c_void_p, c_size_t, c_int32, c_void_p]),
-    "ath_add_basis_rows": (None, [c_void_p, c_int32, c_int32, c_int32, *[c_void_p] * 3]),
-    "ath_encode_basis": (c_int64, [c_void_p, c_void_p, c_size_t, c_int32, c_int32, c_void_p, c_void_p]),
-    "ath_encode_temporal": (c_int64, [c_void_p, c_void_p, c_size_t, c_int32, c_int32, c_void_p]),
+    "ath_encode_refined_shapes": (c_int64, [*_WRITER, POINTER(CorePlan), *[c_void_p] * 6, c_int32]),
+    "ath_encode_source_rest": (c_int64, [*_WRITER, c_void_p, c_int32, c_double, *[c_void_p] * 5]),
+    "ath_encode_exact_rest": (c_int64, [*_WRITER, c_void_p, c_int32, c_void_p, c_int, c_void_p]),
+    "ath_encode_times": (c_int64, [*_WRITER, c_int32, c_void_p]),
+    "ath_add_basis_rows": (None, [c_void_p, *[c_int32] * 3, *[c_void_p] * 3]),
+    "ath_encode_basis": (c_int64, [*_WRITER, c_int32, c_int32, c_void_p, c_void_p]),
+    "ath_encode_temporal": (c_int64, [*_WRITER, c_int32, c_int32, c_void_p]),
     "ath_mode_weights": (None, [c_void_p, c_void_p]),
     "ath_unit_shapes": (c_int, [c_int32, c_void_p, c_void_p]),
-    "ath_encode_shapes": (
-        c_int64,
-        [c_void_p, c_void_p, c_size_t, POINTER(CorePlan), c_void_p, c_void_p, c_void_p, c_int32],
-    ),
-    "ath_encode_exact": (c_int64, [c_void_p, c_void_p, c_size_t, c_int32, c_int32, c_int, c_void_p, c_void_p]),
-    "ath_encode_stems": (
-        c_int64,
-        [c_void_p, c_void_p, c_size_t, POINTER(CorePlan), POINTER(Motion), POINTER(Integers), c_int32],
-    ),
-    "ath_encode_refinement": (
-        c_int64,
-        [c_void_p, c_void_p, c_size_t, POINTER(CorePlan), POINTER(Motion), POINTER(Integers), c_int32],
-    ),
-    "ath_encode_affines": (
-        c_int64,
-        [c_void_p, c_void_p, c_size_t, POINTER(CorePlan), POINTER(Motion), POINTER(Integers), c_int32],
-    ),
+    "ath_encode_shapes": (c_int64, [*_WRITER, POINTER(CorePlan), *[c_void_p] * 3, c_int32]),
+    "ath_encode_exact": (c_int64, [*_WRITER, c_int32, c_int32, c_int, c_void_p, c_void_p]),
+    "ath_encode_stems": (c_int64, [*_WRITER, *_SEGMENT, c_int32]),
+    "ath_encode_refinement": (c_int64, [*_WRITER, *_SEGMENT, c_int32]),
+    "ath_encode_affines": (c_int64, [*_WRITER, *_SEGMENT, c_int32]),
     "ath_plan_rigid": (None, [POINTER(CorePlan), c_void_p, c_int32]),
     "ath_without_stems": (None, [POINTER(CorePlan), c_void_p, c_void_p]),
     "ath_predicted_memory": (c_size_t, [c_int32]),
     "ath_encode_predicted": (
         c_int64,
-        [c_void_p, c_void_p, c_size_t, POINTER(CorePlan), c_void_p, c_int32, c_int, c_double, c_int, *[c_void_p] * 3],
+        [*_WRITER, POINTER(CorePlan), c_void_p, c_int32, c_int, c_double, c_int, *[c_void_p] * 3],
     ),
-    "ath_encode_corrections": (c_int64, [c_void_p, c_void_p, c_size_t, c_int32, c_int32, c_void_p, c_int64]),
+    "ath_encode_corrections": (c_int64, [*_WRITER, c_int32, c_int32, c_void_p, c_int64]),
 }
 
 
@@ -333,10 +273,61 @@ def _bind() -> ctypes.CDLL:
 lib = _bind()
 
 
-def address(array: np.ndarray | None, dtype, size: int) -> int | None:
-    """Pointer to a contiguous array of at least `size` items of `dtype`.
+def _core_layouts() -> dict[str, dict[str, tuple[int, int]]]:
+    """Return the core's structs by name: (offset, size) of each field, and of the whole struct under ""."""
+    structs: dict[str, dict[str, tuple[int, int]]] = {}
+    offset, size, index = c_size_t(), c_size_t(), 0
+    while (entry := lib.ath_layout(index, byref(offset), byref(size))) is not None:
+        struct, _, field = entry.decode().partition(".")
+        structs.setdefault(struct, {})[field] = offset.value, size.value
+        index += 1
+    return structs
 
-    Raises TypeError where the array is anything else: a mistake of the caller that would corrupt memory.
+
+CORE_LAYOUTS = _core_layouts()
+
+
+def check_layouts(mirrors: dict[str, type[ctypes.Structure] | np.dtype]) -> None:
+    """Raise ImportError unless these classes and dtypes have the layouts of the core's structs."""
+    for struct, mirror in mirrors.items():
+        if isinstance(mirror, np.dtype):
+            layout = {"": (0, mirror.itemsize)}
+            layout |= {name: (field[1], field[0].itemsize) for name, field in (mirror.fields or {}).items()}
+        else:
+            layout = {"": (0, ctypes.sizeof(mirror))}
+            layout |= {name: (getattr(mirror, name).offset, getattr(mirror, name).size) for name, *_ in mirror._fields_}
+        core = CORE_LAYOUTS.get(struct, {})
+        differing = sorted({name for name, _ in layout.items() ^ core.items()})
+        if differing:
+            got, expected = ({name: side.get(name) for name in differing} for side in (core, layout))
+            raise ImportError(
+                f"athcodec's C core: struct {struct}: got (offset, size) {got}, expected {expected} as in Python; "
+                "pip install builds the core again"
+            )
+
+
+MIRRORS: dict[str, type[ctypes.Structure] | np.dtype] = {
+    "ath_branch": BRANCH,
+    "ath_chunk": CHUNK,
+    "ath_node": NODE,
+    "ath_piece": PIECE,
+    "ath_plan": CorePlan,
+    "ath_coarse": Coarse,
+    "ath_integers": Integers,
+    "ath_motion": Motion,
+    "ath_stream": Stream,
+    "ath_header": Header,
+    "ath_met_ends": CoreMetEnds,
+    "ath_polygons": CorePolygons,
+    "ath_rounding": Rounding,
+}
+check_layouts(MIRRORS)
+
+
+def address(array: np.ndarray | None, dtype, size: int) -> int | None:
+    """Return a pointer to a contiguous array of at least `size` items of `dtype`.
+
+    Raises TypeError if the array is anything else: a mistake of the caller that would corrupt memory.
     """
     if array is None:
         return None
@@ -349,24 +340,24 @@ def address(array: np.ndarray | None, dtype, size: int) -> int | None:
 
 
 def new_model() -> np.ndarray:
-    """Scratch memory for one coding call at a time."""
+    """Return scratch memory for one coding call at a time."""
     return np.empty(lib.ath_model_size() // 8 + 1, np.uint64)
 
 
 def as_bytes(data) -> np.ndarray:
-    """Bytes-like data as an array that can be handed to the core."""
+    """Return bytes-like data as an array that can be handed to the core."""
     return np.frombuffer(data, np.uint8) if len(data) else np.zeros(1, np.uint8)[:0]
 
 
 def crc32c(data, crc: int = 0) -> int:
-    """CRC-32C of bytes-like data, continuing from `crc`."""
+    """Return the CRC-32C of bytes-like data, continuing from `crc`."""
     array = as_bytes(data)
     return lib.ath_crc32c(crc, array.ctypes.data, array.size)
 
 
 def encode_stream(function_name: str, capacity: int, *arguments, model: np.ndarray | None = None) -> bytes:
-    """Runs one of the core's writers, with more room until its stream fits; model: its scratch memory, where that is
-    another than `new_model` gives."""
+    """Run one of the core's writers, with more room until its stream fits. `model` is its scratch memory, by default
+    that of `new_model`."""
     model = new_model() if model is None else model
     while True:
         buffer = np.empty(capacity, np.uint8)

@@ -56,7 +56,7 @@ class UnsupportedVersion(FormatError):
 
 
 class Truncated(FormatError):
-    """The file ends before what was asked for."""
+    """The file ends before the bytes that were needed."""
 
     code, name = 4, "TRUNCATED"
 
@@ -104,13 +104,13 @@ class TrailingBytes(FormatError):
 
 
 class NeedsHostMesh(FormatError):
-    """The rest pose is not in the file: it is a mesh that whoever plays it has, and that was not given."""
+    """The rest pose is a mesh of the host's, which was not passed."""
 
     code, name = 12, "NEEDS_HOST_MESH"
 
 
 class WrongHostMesh(FormatError):
-    """The mesh that was given is not the one that the file was made for."""
+    """The mesh that was passed is not the one that the file was made for."""
 
     code, name = 13, "WRONG_HOST_MESH"
 
@@ -122,18 +122,18 @@ class UnsupportedFeature(FormatError):
 
 
 class LevelUnavailable(AthError, LookupError):
-    """A level or frame was asked for that the file, or what is there of it, does not hold."""
+    """The file, or the part of it that is there, has no such level or frame."""
 
 
 class ClipUnavailable(AthError, LookupError):
-    """A clip was asked for by a name that none of the file's has."""
+    """The file has no clip of this name."""
 
 
 class RemoteError(AthError, OSError):
-    """Bytes behind a URL cannot be had, or are no longer those of the file that was opened."""
+    """Bytes behind a URL cannot be fetched, or are no longer those of the file that was opened."""
 
 
 def error_class(code: int) -> type[FormatError]:
-    """The class of a code of FORMAT.md's table. KeyError: none of a file's."""
+    """Return the class of a code of FORMAT.md's table. Raises KeyError for other codes."""
     classes: list[type[FormatError]] = [FormatError, *FormatError.__subclasses__()]
     return {error.code: error for error in classes}[code]

@@ -21,7 +21,7 @@ def open(
     host_mesh: HostMesh | str | os.PathLike[str] | None = None,
     gltf_motion: str | None = None,
 ) -> Decoder:
-    """Opens an .ath file for playing one of its clips.
+    """Open an .ath file for playing one of its clips.
 
     Parameters
     ----------
@@ -52,13 +52,13 @@ def open(
     Raises
     ------
     FormatError
-        Where the file cannot be decoded: Truncated, BadChecksum, LimitExceeded ...
+        If the file cannot be decoded: Truncated, BadChecksum, LimitExceeded ...
     ClipUnavailable
-        Where no clip has that name.
+        If no clip has that name.
     ClipError
-        Where a GLB has no such motion.
+        If a GLB has no such motion.
     RemoteError, OSError
-        Where it cannot be read.
+        If it cannot be read.
     """
     mesh_path = host_mesh if isinstance(host_mesh, (str, os.PathLike)) else None
     mesh = None if mesh_path is not None else cast(HostMesh | None, host_mesh)
@@ -76,7 +76,7 @@ def open(
 
 def set_host_mesh_of(file: AthFile, path: str | os.PathLike[str]) -> None:
     """Read a mesh in the unit and axes of an .ath file and hand it over. Raises ClipError, WrongHostMesh, OSError."""
-    from athcodec.sources import read  # takes long to import, and most files need no mesh
+    from athcodec.sources import read  # The sources take long to import, and most files need no mesh.
 
     units = {name: file.metadata[name] for name in ("unit", "up_axis") if isinstance(file.metadata.get(name), str)}
     with read(path, **units) as clip:

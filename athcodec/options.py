@@ -1,5 +1,5 @@
-"""What options may say: their words, defaults and limits. It imports nothing heavy, for the command line needs it to
-explain itself."""
+"""Options: their words, defaults and limits. Nothing heavy is imported, because the command line needs it to explain
+itself."""
 
 from __future__ import annotations
 
@@ -9,21 +9,21 @@ from collections.abc import Sequence
 from typing import SupportsIndex
 
 DEFAULT_REL_ERROR = 1e-4
-LOSSLESS_REL_ERROR = 4e-7  # about where a lossless file is smallest
+LOSSLESS_REL_ERROR = 4e-7  # Error over the diagonal at which a lossless file is about smallest.
 EFFORTS = ("fast", "default", "best")
-LADDERS = {"none": (), "decades": (1e-2, 1e-3, 1e-4, 1e-5)}  # largest errors over the diagonal
+LADDERS = {"none": (), "decades": (1e-2, 1e-3, 1e-4, 1e-5)}  # Largest errors over the diagonal.
 DEFAULT_LADDER = "decades"
-MIN_SEGMENT, MAX_SEGMENT, DEFAULT_SEGMENT = 16, 256, 128  # frames
-METHODS = ("attributes", "skeleton", "edges", "components", "runs", "motion")  # that find branches
-SAMPLES = ("tree", "growth")  # that ship with the package
-MAX_MEMORY = 4 << 30  # bytes that reading a source may take
-RIG_JOINTS = 256  # of a rig, where none are asked for
+MIN_SEGMENT, MAX_SEGMENT, DEFAULT_SEGMENT = 16, 256, 128  # Frames.
+METHODS = ("attributes", "skeleton", "edges", "components", "runs", "motion")  # Methods of finding branches.
+SAMPLES = ("tree", "growth")  # Sources that ship with the package.
+MAX_MEMORY = 4 << 30  # Bytes that reading a source may take.
+RIG_JOINTS = 256  # Default joints of a rig.
 HOST = "host"
 """The word for a rest pose that whoever plays the file has: `--rest host`."""
 
 
 def whole(what: str, number: SupportsIndex) -> int:
-    """The number as an int, NumPy's integers too. TypeError for any other, such as 3.5 or 3.0."""
+    """Return the number as an int, NumPy's integers too. Raises TypeError for any other, such as 3.5 or 3.0."""
     try:
         return operator.index(number)
     except TypeError:
@@ -31,7 +31,8 @@ def whole(what: str, number: SupportsIndex) -> int:
 
 
 def ladder_of(ladder: str | Sequence[float]) -> tuple[float, ...]:
-    """Largest errors over the diagonal, descending, of a ladder's name or errors, in text with commas between them.
+    """Return the largest errors over the diagonal, descending, of a ladder's name or errors, in text with commas
+    between them.
 
     Raises ValueError.
     """

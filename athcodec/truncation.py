@@ -1,4 +1,4 @@
-"""A shorter .ath file from a longer one, without decoding: the deeper levels are left out, the header says so."""
+"""A shorter .ath file from a longer one, without decoding: the deeper levels and their entries in the header go."""
 
 from __future__ import annotations
 
@@ -52,15 +52,15 @@ def truncate(
     Raises
     ------
     LevelUnavailable
-        Where the source has no such level.
+        If the source has no such level.
     FormatError
-        Where the source is damaged, or was cut off before that level.
+        If the source is damaged, or was cut off before that level.
     ClipError
-        Where a GLB is to be written and the source is none, or one that has no such motion, or several.
+        If a GLB is to be written and the source is none, or one that has no such motion, or several.
     OSError
-        Where a file cannot be read or written.
+        If a file cannot be read or written.
     TypeError
-        Where not one of `level`, `max_error` and `target_size` is given.
+        If not exactly one of `level`, `max_error` and `target_size` is given.
     """
     if sum(option is not None for option in (level, max_error, target_size)) != 1:
         raise TypeError("truncate: expected one of level, max_error and target_size")
@@ -80,7 +80,7 @@ def truncate(
                     f"{chunk.offset + chunk.length}"
                 )
         if Path(target).suffix.lower() == ".glb":
-            from athcodec.exporters.gltf_into import put_motion  # which takes long to import
+            from athcodec.exporters.gltf_into import put_motion  # The module takes long to import.
             from athcodec.files.gltf.motion import GltfMotion
 
             if not isinstance(file.source, GltfMotion):
@@ -94,7 +94,7 @@ def truncate(
 
 
 def _shortened(file: AthFile, level: int) -> tuple[bytes, list[ct.Chunk]]:
-    """The front of the file that ends with a level, and what follows it."""
+    """Return the front of the file that ends with a level, and the chunks behind it."""
     chunks = [chunk for chunk in file.chunks if not chunk.is_motion or chunk.level <= level]
     if file.rest_is_missing:
         chunks = [chunk for chunk in chunks if chunk.kind != ct.SOURCE_REST]

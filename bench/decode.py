@@ -28,7 +28,7 @@ import numpy as np
 
 import athcodec
 from athcodec._native import crc32c
-from athcodec.decoding import ath_file
+from athcodec.decoding import segment_decoder
 from athcodec.metrics import ErrorMeter
 from bench.clips import add_ladder, add_number, add_rel_error
 from bench.codecs.coder import CORE, compile_c
@@ -160,7 +160,7 @@ class Case:
                 athcodec.encode(clip, self.file, rel_error=rel_error, attributes="none", ladder=ladder)
                 self.positions = np.asarray(clip.block(0, clip.frame_count), np.float32)
         with athcodec.open(self.file, strict=True) as decoder:
-            self.bound, self.rest = decoder.max_error_bound, np.asarray(decoder.rest, np.float32)
+            self.bound, self.rest = decoder.file.max_error_bound, np.asarray(decoder.file.rest, np.float32)
             decoded = np.ascontiguousarray(decoder.positions(), np.float32)
         if path.suffix == ".ath":
             self.positions = decoded
@@ -251,7 +251,7 @@ def _python_reader(case: Case, threads: int) -> _Reader:
     """athcodec.open and all positions, by so many threads."""
 
     def read() -> float:
-        with patch.object(ath_file, "default_jobs", lambda: threads):
+        with patch.object(segment_decoder, "default_jobs", lambda: threads):
             start = time.perf_counter()
             with athcodec.open(case.file) as decoder:
                 decoder.positions()

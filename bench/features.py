@@ -23,7 +23,7 @@ from athcodec.encoding.bounds import BoundOption
 from athcodec.encoding.branch_trials import best_branches
 from athcodec.encoding.features import Feature
 from athcodec.encoding.progress import silent
-from athcodec.motion.discovery import with_branches
+from athcodec.motion.branches.result import with_branches
 from athcodec.motion.polygons import Polygons
 from bench.clips import add_ladder, measure
 from bench.store import Store, read

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 import athcodec
-from athcodec.motion import discovery
+from athcodec.motion.branches.result import Found, with_branches
 from bench.clips import add_rel_error
 from bench.data import path_of
 from bench.tables import table
@@ -54,7 +54,7 @@ def measure(path: Path, rel_error: float) -> dict[str, Any]:
         seconds = time.perf_counter() - began
         true, ours = (
             athcodec.encode(variant, Path(folder, "a.ath"), rel_error=rel_error, attributes="none").bytes
-            for variant in (clip, discovery.with_branches(bare, found))
+            for variant in (clip, with_branches(bare, found))
         )
         return {
             "clip": path.stem,
@@ -70,7 +70,7 @@ def measure(path: Path, rel_error: float) -> dict[str, Any]:
         }
 
 
-def right_percent(found: discovery.Found, clip: athcodec.MotionClip) -> float:
+def right_percent(found: Found, clip: athcodec.MotionClip) -> float:
     """Per cent of the branches found whose parent is that of their first vertex's true branch."""
     true_branch = clip.vertex_branch[np.unique(found.vertex_branch, return_index=True)[1]]
     parent = np.where(found.branch_parent < 0, -1, true_branch[found.branch_parent])

@@ -15,7 +15,7 @@ import numpy as np
 
 import athcodec
 from athcodec._native import LOOSE
-from athcodec.decoding.ath_file import Level
+from athcodec.decoding.file_tables import Level
 from athcodec.encoding.survey import Ath, Gaps
 from athcodec.metrics import ErrorMeter
 from bench.clips import Encoded, add_clips, add_rel_error, encoded, measure
@@ -73,7 +73,8 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 
 def _same_nodes(result: Encoded) -> Ath:
     """The paper's ATH with the thresholds of the file."""
-    ath = athcodec.build_ath(result.clip, max_error=result.summary.max_error_bound, hierarchy=result.decoder.hierarchy)
+    hierarchy = result.decoder.file.hierarchy
+    ath = athcodec.build_ath(result.clip, max_error=result.summary.max_error_bound, hierarchy=hierarchy)
     ours, theirs = result.decoder.file.table1(), ath.table1()
     if any(ours[key] != theirs[key] for key in ("depth", "nodes", "leaves")):
         raise RuntimeError(f"nodes of the ATH: got {ours} in the file, {theirs} from the clip")
@@ -102,8 +103,8 @@ def _level_row(stored: Level, ours: ErrorMeter, paper: ErrorMeter | None) -> dic
 
 def _broken_lines(path: Path, stored: Level, ours: ErrorMeter, decoder: athcodec.Decoder) -> list[str]:
     """A line if the decoded error exceeds the level's error in the file or, at the last level, the bound."""
-    is_last = stored.level == decoder.level_count - 1
-    allowed = decoder.max_error_bound if is_last else stored.max_error * (1 + ROUNDING)
+    is_last = stored.level == decoder.file.level_count - 1
+    allowed = decoder.file.max_error_bound if is_last else stored.max_error * (1 + ROUNDING)
     if ours.max_error <= allowed:
         return []
     return [f"{path.name}, level {stored.level}: got an error of {ours.max_error:.9g}; expected at most {allowed:.9g}"]
@@ -135,7 +136,7 @@ class _Joints:
 
     def __init__(self, decoder: athcodec.Decoder, level: int) -> None:
         self.decoder, self.level = decoder, level
-        hierarchy, parts = decoder.hierarchy, decoder.affines(0, level)
+        hierarchy, parts = decoder.file.hierarchy, decoder.affines(0, level)
         part_of_branch = np.searchsorted(parts.first_vertex, hierarchy.first_vertex, side="right") - 1
         part_of_attach = np.searchsorted(parts.first_vertex, hierarchy.attach, side="right") - 1
         is_joint = (hierarchy.attach >= 0) & (part_of_branch != part_of_attach)

@@ -90,9 +90,9 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 def _levels(
     decoder: athcodec.Decoder, clip: athcodec.MotionClip, name: str, levels: Sequence[int] | None
 ) -> Iterator[Panel]:
-    _check(name, (decoder.frame_count, decoder.vertex_count), clip)
+    _check(name, (decoder.frame_count, decoder.file.vertex_count), clip)
     meters = level_meters(decoder, clip)
-    for number in levels or [decoder.deepest]:
+    for number in levels or [decoder.file.deepest]:
         level = decoder.levels[number]
         positions = decoder.positions(level=number, dtype=np.float64)
         yield Panel(f"{name}, level {number}", f"{level.name}, {level.bytes:,} bytes", positions, meters[number])

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from athcodec.decoding.ath_file import Level
+from athcodec.decoding.file_tables import Level
 from athcodec.metrics import MotionMeter, SmoothnessMeter, level_meters
 from bench import plots
 from bench.clips import Encoded, add_clips, add_effort, add_ladder, add_rel_error, add_segment_frames, encoded

@@ -100,7 +100,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 def _picture(clip: Path, rel_error: float, out: Path) -> dict[str, Any]:
     """Two levels of a file with layers of precision side by side, coloured by their distance from the deepest one."""
     with encoded(clip, rel_error, ladder=LADDERS["decades"]) as result, chromium() as browser:
-        data, right = result.summary.path.read_bytes(), result.decoder.deepest - 1
+        data, right = result.summary.path.read_bytes(), result.decoder.file.deepest - 1
         with ThrottledServer({clip.with_suffix(".ath").name: data}) as server:
             page = browser.new_page(viewport={"width": 1280, "height": 800})
             page.goto(server.page(clip.with_suffix(".ath").name))

@@ -267,11 +267,11 @@ def ask_package(decoder, item: str) -> bytes:
     if item == "rest":
         return decoder.file.rest_at(0).tobytes()
     if item == "clips":
-        return b"".join(clip_entry(by_document(clip)) for clip in decoder.clips)
+        return b"".join(clip_entry(by_document(clip)) for clip in decoder.file.clips)
     if item != "static":
-        played = (decoder.play(clip.name) for clip in decoder.clips)
+        played = (decoder.play(clip.name) for clip in decoder.file.clips)
         return b"".join((clip.time if item == "time" else clip.positions(level=int(item))).tobytes() for clip in played)
-    arrays = [decoder.faces, decoder.edges, *decoder.attributes.values()]
+    arrays = [decoder.file.faces, decoder.file.edges, *decoder.file.attributes.values()]
     return metadata_text(decoder) + b"".join(array.tobytes() for array in arrays if array is not None)
 
 

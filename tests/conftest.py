@@ -17,7 +17,7 @@ from programs import blender_python
 from s3 import S3Server
 
 import athcodec
-from athcodec.decoding import ath_file, core_file
+from athcodec.decoding import core_file, segment_decoder
 from athcodec.motion.clip import MotionClip
 from athcodec.sources import read_hdf5, sample_path
 
@@ -266,7 +266,7 @@ def work_of(_counted_core, monkeypatch):
     """A function that counts the work of an action; until the test ends, Python decodes with a core that counts, in a
     single thread: how several share the work depends on what else the machine does."""
     monkeypatch.setattr(core_file, "lib", _counted_core)
-    monkeypatch.setattr(ath_file, "default_jobs", lambda: 1)
+    monkeypatch.setattr(segment_decoder, "default_jobs", lambda: 1)
     return _counted_core.work_of
 
 

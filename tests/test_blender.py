@@ -52,7 +52,7 @@ def test_the_sample_plays_as_the_decoder_has_it(extended_blender, sample_ath, le
             assert np.allclose(positions, expected, rtol=0, atol=1e-6)
         assert not np.array_equal(shown["shown"][1], first)
         assert shown["rate"] == pytest.approx(decoder.fps) and np.diff(shown["range"]) == decoder.frame_count - 1
-        assert shown["edges"] == len(decoder.edges)
+        assert shown["edges"] == len(decoder.file.edges)
     assert {"radius", "vertex_branch"} <= set(shown["names"])
     assert np.allclose(shown["world"], shown["shown"][-1] @ UP_IS_Z, atol=1e-5)
 
@@ -267,14 +267,14 @@ def test_what_blender_shows_is_written_within_the_bound(extended_blender, tmp_pa
     found = extended_blender.run(EXPORT, ath=tmp_path / "a.ath", options=options)
     with athcodec.open(tmp_path / "a.ath", strict=True) as decoder:
         error = np.linalg.norm(decoder.positions().astype(float) - found["shown"], axis=2).max()
-        assert error <= decoder.max_error_bound + 2e-6
-        assert decoder.max_error_bound <= 0.01
+        assert error <= decoder.file.max_error_bound + 2e-6
+        assert decoder.file.max_error_bound <= 0.01
         if options.get("bound") == "LOSSLESS":
             assert error < 2e-6  # as numpy multiplies the matrix
-        assert np.array_equal(decoder.faces, found["faces"]) and "uv" in decoder.attributes
+        assert np.array_equal(decoder.file.faces, found["faces"]) and "uv" in decoder.file.attributes
         assert decoder.metadata["start_frame"] == 11 and decoder.metadata["up_axis"] == "z"
         assert decoder.metadata["fps"] == pytest.approx(24000 / 1001)
-        assert decoder.branch_parent.tolist() == [-1, 0]
+        assert decoder.file.branch_parent.tolist() == [-1, 0]
 
 
 @pytest.mark.programs
@@ -283,7 +283,7 @@ def test_meshes_without_branches_are_written_within_the_bound_too(extended_blend
     found = extended_blender.run(script, ath=tmp_path / "a.ath", options={})
     with athcodec.open(tmp_path / "a.ath", strict=True) as decoder:
         error = np.linalg.norm(decoder.positions().astype(float) - found["shown"], axis=2).max()
-        assert error <= decoder.max_error_bound + 2e-6
+        assert error <= decoder.file.max_error_bound + 2e-6
 
 
 GLTF = """
@@ -331,8 +331,8 @@ def test_blenders_gltf_has_the_motion_of_what_modifiers_move(extended_blender, t
         positions = decoder.positions().astype(float) @ [[1, 0, 0], [0, 0, 1], [0, -1, 0]] + [1, 2, 3]
         assert positions.shape == shown.shape
         error = np.linalg.norm(positions - shown, axis=2).max()
-        assert error <= decoder.max_error_bound + 1e-6 < 1e-3
-        assert len(decoder.faces) == 2 * (4 if subdivided else 1) * 9 * 7
+        assert error <= decoder.file.max_error_bound + 1e-6 < 1e-3
+        assert len(decoder.file.faces) == 2 * (4 if subdivided else 1) * 9 * 7
     check_schemas(json.loads(json.dumps(structure(path))))
 
 

@@ -75,7 +75,7 @@ def test_blender_moves_as_the_file_decodes(tmp_path, kind, how):
     clip = quad_clip()
     with coded(on_one_branch(clip), tmp_path / "coded.ath", rel_error=1e-4) as decoder:
         athcodec.write(ClipView(decoder), tmp_path / f"tree.{kind.lower()}")
-        decoded, bound = decoder.positions(slice(0, 6)), decoder.max_error_bound
+        decoded, bound = decoder.positions(slice(0, 6)), decoder.file.max_error_bound
     run_script(blender_python(), MOVED_BY_CACHE, tmp_path, kind, how)
     moved = np.load(tmp_path / "moved.npy")
     assert np.abs(moved - decoded).max() < 1e-6

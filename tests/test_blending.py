@@ -66,7 +66,7 @@ def _shown(decoder, name, seconds, level=None):
 
 def _edges(decoder) -> np.ndarray:
     """(E, 2): along the stems, and from each branch to the vertex that it hangs on."""
-    return np.asarray(decoder.edges).reshape(-1, 2)
+    return np.asarray(decoder.file.edges).reshape(-1, 2)
 
 
 def _lengths(positions, edges):
@@ -83,7 +83,7 @@ def test_edges_of_stems_keep_the_lengths_that_they_have_in_the_clips(tree_ath, w
         for seconds in SECONDS:
             blended = _lengths(decoder.blended(weights, seconds), edges)
             own = np.array([_lengths(_shown(decoder, name, seconds), edges) for name in weights])
-            rounding = 1e-5 * np.ptp(decoder.rest, axis=0).max()
+            rounding = 1e-5 * np.ptp(decoder.file.rest, axis=0).max()
             assert (blended <= own.max(axis=0) * 1.01 + rounding).all()
             assert (blended >= own.min(axis=0) * 0.99 - rounding).all()
 
@@ -105,13 +105,13 @@ def test_nearly_all_edges_of_a_mesh_keep_their_lengths(leafed_ath, weights):
         for seconds in SECONDS:
             blended = _lengths(decoder.blended(weights, seconds), edges)
             own = np.array([_lengths(_shown(decoder, name, seconds), edges) for name in weights])
-            rounding = 2 * decoder.max_error_bound
+            rounding = 2 * decoder.file.max_error_bound
             beyond = np.maximum(blended - own.max(axis=0) * 1.01, own.min(axis=0) * 0.99 - blended) - rounding
             assert (beyond <= 0).mean() > 0.999
 
 
 def _face_edges(decoder):
-    faces = decoder.faces
+    faces = decoder.file.faces
     return np.unique(np.sort(np.stack([faces, np.roll(faces, -1, axis=1)], axis=-1).reshape(-1, 2)), axis=0)
 
 
@@ -127,7 +127,7 @@ def test_one_clip_alone_is_that_clip_to_the_bit(tree_ath, level):
 
 def test_weights_change_it_without_a_jump(tree_ath):
     with athcodec.open(tree_ath) as decoder:
-        size = np.linalg.norm(np.ptp(decoder.rest, axis=0))
+        size = np.linalg.norm(np.ptp(decoder.file.rest, axis=0))
         for level in (0, 1, None):
             steps = [
                 decoder.blended({"storm": 1 - part, "across": part}, 0.55, level) for part in np.linspace(0, 1, 41)
@@ -147,7 +147,7 @@ def test_weights_count_by_their_shares(tree_ath):
 
 def test_each_clip_has_a_time_and_a_level_of_its_own(tree_ath):
     with athcodec.open(tree_ath) as decoder:
-        seconds, levels = {"calm": 0.1, "storm": 0.5}, {"calm": 0, "storm": decoder.deepest}
+        seconds, levels = {"calm": 0.1, "storm": 0.5}, {"calm": 0, "storm": decoder.file.deepest}
         shown = decoder.blended({"calm": 1e-9, "storm": 1}, seconds, levels)
         assert np.allclose(shown, _shown(decoder, "storm", 0.5), atol=1e-4)
 
@@ -172,7 +172,7 @@ def test_the_wind_of_each_clip_chooses_the_clips(tree_ath):
         assert decoder.wind_weights(5, 0) == pytest.approx({"calm": 0.5, "storm": 0.5})
         assert decoder.wind_weights(8, 225) == pytest.approx({"storm": 0.5, "across": 0.5})  # the long way round
         assert decoder.wind_weights(8, -360 * 5) == {"storm": 1}
-        assert decoder.blended(decoder.wind_weights(5, 45), 0.2).shape == (decoder.vertex_count, 3)
+        assert decoder.blended(decoder.wind_weights(5, 45), 0.2).shape == (decoder.file.vertex_count, 3)
 
 
 def test_at_most_four_clips_are_blended_and_weights_have_no_jumps():

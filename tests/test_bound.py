@@ -79,7 +79,7 @@ def test_a_broken_promise_would_be_seen(scratch, monkeypatch):
     def moved(decoder, frames=None, level=None, dtype=None):
         shown = positions(decoder, frames, level, dtype).copy()
         if shown.ndim == 3:
-            shown[7, 1, 2] += 2 * decoder.max_error_bound
+            shown[7, 1, 2] += 2 * decoder.file.max_error_bound
         return shown
 
     monkeypatch.setattr(athcodec.Decoder, "positions", moved)
@@ -151,7 +151,7 @@ def encoded_or_refused(clip, bound, options, path, work) -> float:
     with athcodec.open(summary.path, strict=True) as decoder:
         meter = ErrorMeter()
         meter.add(clip.positions, decoder.positions())
-        assert meter.max_error <= decoder.max_error_bound <= bound
+        assert meter.max_error <= decoder.file.max_error_bound <= bound
     return bound
 
 

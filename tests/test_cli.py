@@ -125,7 +125,7 @@ def test_without_attributes_only_the_unit_is_kept(tmp_path):
     assert run("encode", SAMPLE, tmp_path / "a.ath", *how) == 0
     with athcodec.open(tmp_path / "a.ath") as decoder:
         assert decoder.metadata == {"unit": "m", "up_axis": "y"}
-        assert decoder.edges is None and decoder.attributes == {}
+        assert decoder.file.edges is None and decoder.file.attributes == {}
 
 
 def test_an_exact_rest_pose_is_that_of_the_source_or_the_mean(tmp_path):
@@ -135,9 +135,9 @@ def test_an_exact_rest_pose_is_that_of_the_source_or_the_mean(tmp_path):
     assert run("encode", SAMPLE, tmp_path / "a.ath", *options) == 0
     assert run("encode", SAMPLE, tmp_path / "b.ath", *options, "--rest", "mean") == 0
     with h5py.File(SAMPLE) as source, athcodec.open(tmp_path / "a.ath") as decoder:
-        assert np.array_equal(decoder.rest, source["rest"][()])
+        assert np.array_equal(decoder.file.rest, source["rest"][()])
     with athcodec.open(tmp_path / "b.ath") as decoder:
-        assert np.array_equal(decoder.rest, mean)
+        assert np.array_equal(decoder.file.rest, mean)
 
 
 def test_thresholds_of_the_paper_are_taken_in_the_units_given(tmp_path, capsys):
@@ -186,7 +186,7 @@ def test_a_truncated_file_is_a_whole_one_of_fewer_levels(encoded, tmp_path, caps
     assert shorter.stat().st_size < encoded.stat().st_size
     assert run("verify", shorter, "--against", SAMPLE) == 0
     with athcodec.open(encoded) as whole, athcodec.open(shorter, strict=True) as decoder:
-        assert decoder.level_count == 2
+        assert decoder.file.level_count == 2
         assert np.array_equal(decoder.positions(30), whole.positions(30, level=1))
 
 
@@ -218,9 +218,9 @@ def test_the_page_of_the_demo_shows_the_leafed_tree(tmp_path, capsys):
     data = base64.b64encode(sample_path("leafed").read_bytes()).decode()
     assert data in (tmp_path / "athcodec_demo.html").read_text()
     with athcodec.open(sample_path("leafed"), strict=True) as decoder:
-        clips = [(clip.name, clip.loop, clip.frame_count) for clip in decoder.clips]
+        clips = [(clip.name, clip.loop, clip.frame_count) for clip in decoder.file.clips]
         assert clips == [("calm", True, 150), ("gale", True, 150)]
-        assert decoder.complete and decoder.faces is not None
+        assert decoder.file.complete and decoder.file.faces is not None
 
 
 # ---- damaged files ----
@@ -260,8 +260,8 @@ def test_verify_measures_smoothness_and_shape_of_every_level(sample_ath, capsys)
     assert run("verify", sample_ath, "--against", SAMPLE, "--json") == 0
     levels = json.loads(capsys.readouterr().out)["clips"][0]["levels"]
     with athcodec.open(sample_ath) as decoder, read_hdf5(SAMPLE) as clip:
-        source, bound = clip.block(0, 120).astype(float), decoder.max_error_bound
-        decoded = [decoder.positions(level=number).astype(float) for number in range(decoder.level_count)]
+        source, bound = clip.block(0, 120).astype(float), decoder.file.max_error_bound
+        decoded = [decoder.positions(level=number).astype(float) for number in range(decoder.file.level_count)]
         edges = clip.edges
     jerk = np.linalg.norm(np.diff(decoded[-1] - source, 2, axis=0), axis=2) / bound
     looks = levels[-1]["smoothness"]
@@ -293,9 +293,9 @@ def test_info_tells_ticks_at_seams_without_the_source(sample_ath, medley_ath, ca
     assert run("info", sample_ath, "--motion") == 0
     assert f"{expected[0]:.3g}" in capsys.readouterr().out
     with athcodec.open(medley_ath) as decoder:
-        for clip, ratios in zip(decoder.clips, tick_ratios(decoder), strict=True):
+        for clip, ratios in zip(decoder.file.clips, tick_ratios(decoder), strict=True):
             has_seams = clip.segment_count > 1 or clip.loop
-            assert [ratio is not None for ratio in ratios] == [has_seams] * decoder.level_count
+            assert [ratio is not None for ratio in ratios] == [has_seams] * decoder.file.level_count
 
 
 def test_info_decodes_nothing_unless_asked(encoded, facts, tmp_path, capsys):
@@ -474,10 +474,10 @@ def test_the_files_of_a_shell_pattern_are_one_sequence(encoded, tmp_path, capsys
     for words in ([*calm, out], ["-o", out, *calm]):
         assert run("encode", *words, *how) == 0
         with athcodec.open(out) as decoder:
-            assert [(clip.name, clip.frame_count) for clip in decoder.clips] == [("", 3)]
+            assert [(clip.name, clip.frame_count) for clip in decoder.file.clips] == [("", 3)]
     assert run("encode", *calm, *gale, out, *how) == 0
     with athcodec.open(out) as decoder:
-        assert [(clip.name, clip.frame_count) for clip in decoder.clips] == [("calm", 3), ("gale", 3)]
+        assert [(clip.name, clip.frame_count) for clip in decoder.file.clips] == [("calm", 3), ("gale", 3)]
     items = batch.find([*calm, str(tmp_path / "gale" / "*.obj")], tmp_path / "many")
     found = [(Path(item.input), Path(item.output).name) for item in items]
     assert found == [(calm[0], "calm.ath"), (gale[0], "gale.ath")]

@@ -4,9 +4,10 @@ JavaScript and FORMAT.md repeat it."""
 from __future__ import annotations
 
 import re
-from ctypes import byref, sizeof
+from ctypes import Structure, byref, c_uint32, c_uint64
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from athcodec import _native, errors
@@ -109,11 +110,15 @@ def test_python_and_javascript_repeat_the_numbers_of_the_core():
     assert repeated.items() <= C.items() and {"MORE", "HELD", "MISSING", "NO_MEMORY", "FAULT_TEXT"} <= repeated.keys()
 
 
-def test_structs_of_python_are_as_large_as_those_of_c():
-    """wasm.c asserts the sizes at 32 bits, which no pointer of these changes."""
-    asserted = dict(re.findall(r"sizeof\((ath_\w+)\) == (\d+)", (VIEWER / "wasm.c").read_text("utf-8")))
-    assert sizeof(core_file.Info) == int(asserted["ath_info"])
-    assert sizeof(core_file.Fault) == int(asserted["ath_fault_info"])
-    assert core_file.CHUNK.itemsize == int(asserted["ath_chunk"])
-    assert core_file.PART.itemsize == int(asserted["ath_part"])
-    assert _native.BRANCH.itemsize == int(asserted["ath_branch"])
+def test_a_struct_that_python_mirrors_otherwise_is_refused_by_its_name():
+    class Range(Structure):
+        _fields_ = [("offset", c_uint64), ("size", c_uint32)]
+
+    swapped = [(name, core_file.PART[name]) for name in ("count", "first", "branch", "index")]
+    for name, mirror in {"ath_range": Range, "ath_part": np.dtype(swapped), "ath_lost": core_file.PART}.items():
+        with pytest.raises(ImportError, match=f"struct {name}: got .* expected .* pip install"):
+            _native.check_layouts({name: mirror})
+
+
+def test_every_struct_in_the_table_of_the_core_is_mirrored():
+    assert _native.MIRRORS.keys() | core_file.MIRRORS.keys() == _native.CORE_LAYOUTS.keys()

@@ -88,7 +88,7 @@ def test_no_vertex_of_the_sample_pops_at_a_loose_bound(ladder, tmp_path):
     with athcodec.open(path) as decoder:
         for level in decoder.levels[decoder.file.core.info.depth_levels - 1 :]:
             error = (decoder.positions(level=level.level).astype(np.float64) - source).transpose(1, 2, 0)
-            bound = max(level.max_error, decoder.max_error_bound)
+            bound = max(level.max_error, decoder.file.max_error_bound)
             assert bends(error).max() <= 1.5 * bound
             assert ((bends(error) > bound).mean(axis=0) <= 0.02).all()
 

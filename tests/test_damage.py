@@ -99,7 +99,7 @@ def predicted_parts(predicted_ath) -> Parts:
 def played(data) -> list[np.ndarray]:
     """Positions of every level."""
     decoder = athcodec.open(BytesIO(data))
-    return [decoder.positions(level=level) for level in range(decoder.level_count)]
+    return [decoder.positions(level=level) for level in range(decoder.file.level_count)]
 
 
 def check(data: bytes, **options) -> None:
@@ -109,9 +109,9 @@ def check(data: bytes, **options) -> None:
 def use(data: bytes, **options) -> bool:
     """Asks for everything that a file may hold. Whether it answered; raises what is neither answer nor refusal."""
     asks = [lambda d: d.file.check(), lambda d: d.affines(0), lambda d: d.residual(0, 0), lambda d: d.file.info()]
-    asks += [lambda d: [d.play(clip.name).positions() for clip in d.clips[1:]]]
+    asks += [lambda d: [d.play(clip.name).positions() for clip in d.file.clips[1:]]]
     names = "rest vertex_branch stem_index edges faces metadata attributes".split()
-    asks += [lambda d, name=name: getattr(d, name) for name in names]
+    asks += [lambda d, name=name: getattr(d.file, name) for name in names]
     with np.errstate(all="ignore"):
         try:
             decoder = opened(data, **options)
@@ -119,7 +119,8 @@ def use(data: bytes, **options) -> bool:
             assert "\n" not in str(error)
             return False
         answered = True
-        for ask in asks + [lambda d, level=level: d.positions(level=level) for level in range(decoder.level_count)]:
+        levels = range(decoder.file.level_count)
+        for ask in asks + [lambda d, level=level: d.positions(level=level) for level in levels]:
             try:
                 ask(decoder)
             except REFUSED as error:
@@ -170,12 +171,12 @@ def test_levels_before_a_damaged_chunk_still_play(parts, data, played):
         with pytest.raises(BadChecksum, match=f"level {chunk.level}, segment {chunk.segment}"):
             check(broken)
         decoder = opened(broken, allow_partial=True)
-        assert f"damaged from level {chunk.level}" in decoder.missing
+        assert f"damaged from level {chunk.level}" in decoder.file.missing
         assert [d.available for d in decoder.levels] == [d < chunk.level for d in range(len(played))]
         for level in range(chunk.level):
             assert np.array_equal(decoder.positions(level=level), played[level])
         if chunk.level > 0:
-            assert decoder.deepest == chunk.level - 1
+            assert decoder.file.deepest == chunk.level - 1
             assert np.array_equal(decoder.positions(), played[chunk.level - 1])
         else:
             with pytest.raises(FormatError):
@@ -197,7 +198,7 @@ def test_damaged_static_data_do_not_keep_the_motion_from_playing(parts, data, pl
         decoder = opened(flipped(data, parts.chunks[parts.index(kind)][0].offset + 3))
         assert np.array_equal(decoder.positions(), played[-1])
         with pytest.raises(BadChecksum, match=ct.KIND_NAMES[kind]):
-            getattr(decoder, ask)
+            getattr(decoder.file, ask)
 
 
 def test_a_segment_that_was_refused_leaves_the_others_as_they_are(parts, data, played):
@@ -290,7 +291,7 @@ def test_an_unknown_optional_chunk_is_skipped(kind, at, parts, played):
     longer = parts.with_chunks(parts.chunks[:place] + [unknown(kind)] + parts.chunks[place:])
     decoder = opened(longer, strict=True)
     decoder.file.check()
-    assert np.array_equal(decoder.positions(), played[-1]) and set(decoder.attributes) == {"radius", "species"}
+    assert np.array_equal(decoder.positions(), played[-1]) and set(decoder.file.attributes) == {"radius", "species"}
 
 
 def test_a_file_with_unknown_optional_chunks_can_be_truncated(parts, played, tmp_path):
@@ -750,11 +751,13 @@ def assert_whole_or_not_it(stream: bytes, whole: np.ndarray, decode) -> None:
 def test_an_exact_rest_pose_that_is_not_whole_is_refused_or_another(dtype, parts):
     parts = Parts.of(parts.without(ct.SOURCE_REST))
     decoder = opened(parts.file())
-    pose = np.random.default_rng(5).normal(size=(decoder.vertex_count, 3)).astype(dtype)
+    pose = np.random.default_rng(5).normal(size=(decoder.file.vertex_count, 3)).astype(dtype)
 
     def decode(stream):
         head = writing.Rest(decoder.file.origin, 1.0, pose.dtype, stream, exact=True)
-        return opened(parts.with_payload(ct.REST, writing.pack_rest(head))).rest[decoder.hierarchy.vertex_source]
+        return opened(parts.with_payload(ct.REST, writing.pack_rest(head))).file.rest[
+            decoder.file.hierarchy.vertex_source
+        ]
 
     assert_whole_or_not_it(streams.encode_exact_rest(decoder.file.branches, pose), pose, decode)
 
@@ -787,7 +790,7 @@ def test_the_largest_steps_play_and_frames_with_infinite_positions_have_no_matri
     decoder = opened(with_step(parts, kind, 1e38))
     decoder.file.check()
     found = []
-    for level in range(decoder.level_count):
+    for level in range(decoder.file.level_count):
         positions = decoder.positions(0, level)
         assert not np.isnan(decoder.positions(slice(*decoder.segments[0]), level)).any()
         if np.isfinite(positions).all():
@@ -916,7 +919,7 @@ def test_a_segment_that_takes_more_memory_than_the_limit_is_not_decoded(data):
     with pytest.raises(LimitExceeded, match=f"limit is {least - 1}"):
         opened(data, limits=Limits(memory_bytes=least - 1))
     decoder = opened(data, limits=Limits(memory_bytes=least))
-    assert decoder.rest.shape == (header.vertex_count, 3)
+    assert decoder.file.rest.shape == (header.vertex_count, 3)
     with pytest.raises(LimitExceeded, match=f"level 0, segment 0.*limit is {least}"):
         decoder.positions(0, 0)
 
@@ -940,9 +943,9 @@ def test_many_attributes_together_keep_to_the_memory_limit(parts):
         unknown(ct.ATTRIBUTE, attribute(zstd(bytes(1 << 20)), name=b"a%d" % i, shape=[1 << 18])) for i in range(9)
     ]
     file = parts.with_chunks(chunks)
-    assert len(opened(file).attributes) == 9
+    assert len(opened(file).file.attributes) == 9
     with pytest.raises(LimitExceeded, match="attributes"):
-        _ = opened(file, limits=Limits(memory_bytes=8 << 20)).attributes
+        _ = opened(file, limits=Limits(memory_bytes=8 << 20)).file.attributes
 
 
 # ---- errors ----

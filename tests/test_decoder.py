@@ -61,7 +61,7 @@ def size_of(source: np.ndarray) -> float:
 
 def base_pose(decoder, level: int = 0) -> np.ndarray:
     """(N, 3) the rest pose of a level in file order, before it is rounded to the source's type."""
-    return decoder.level_rest(level)[decoder.hierarchy.vertex_source]
+    return decoder.level_rest(level)[decoder.file.hierarchy.vertex_source]
 
 
 def applied(matrices: np.ndarray, points: np.ndarray) -> np.ndarray:
@@ -78,7 +78,7 @@ def shown_frames(decoder) -> list[int]:
 
 def test_the_errors_in_the_table_are_those_of_stopping_there(played):
     decoder, source = played
-    assert len(decoder.segments) > 1 and len(decoder.levels) == decoder.level_count
+    assert len(decoder.segments) > 1 and len(decoder.levels) == decoder.file.level_count
     rounding = 1e-6 * size_of(source)
     for level in decoder.levels:
         distance = np.linalg.norm(decoder.positions(level=level.level) - source, axis=2)
@@ -92,7 +92,7 @@ def test_the_errors_in_the_table_are_those_of_stopping_there(played):
 def test_the_table_holds_the_errors_of_each_segment(played):
     decoder, source = played
     for segment, (start, stop) in enumerate(decoder.segments):
-        for level in range(decoder.level_count):
+        for level in range(decoder.file.level_count):
             distance = np.linalg.norm(decoder.positions(slice(start, stop), level) - source[start:stop], axis=2)
             largest, p99, rms = decoder.file.errors[level, segment]
             assert distance.max() <= largest and np.sqrt((distance**2).mean()) == pytest.approx(rms, rel=0.04, abs=1e-6)
@@ -128,7 +128,7 @@ def test_deeper_levels_cost_more_bytes_and_show_more_parts_with_less_error(name,
 def test_level_0_of_a_plant_on_one_root_is_one_affine_map_per_frame(name, plants):
     path, source = plants[name]
     with athcodec.open(path) as decoder:
-        pose = base_pose(decoder)[np.argsort(decoder.hierarchy.vertex_source)]
+        pose = base_pose(decoder)[np.argsort(decoder.file.hierarchy.vertex_source)]
         assert decoder.levels[0].nodes == 1
         for frame in shown_frames(decoder):
             shown = decoder.positions(frame, 0).astype(np.float64)
@@ -143,12 +143,12 @@ def test_stems_above_a_level_have_their_final_shape_but_for_corrections_and_join
     parts.header.joins = None
     bare = opened(parts.without(ct.CORRECTIONS), strict=True)
     with opened(parts.file(), strict=True) as decoder:
-        last, order = decoder.file.core.info.depth_levels - 1, decoder.hierarchy.vertex_source
+        last, order = decoder.file.core.info.depth_levels - 1, decoder.file.hierarchy.vertex_source
         final = bare.positions(level=last)[:, order]
         assert any(chunk.kind == ct.CORRECTIONS for chunk, _ in parts.chunks)
         assert not np.array_equal(bare.positions(), decoder.positions())
-        branch = decoder.hierarchy.vertex_branch()
-        pieces = Plan(decoder.file.branches, decoder.vertex_count).pieces
+        branch = decoder.file.hierarchy.vertex_branch()
+        pieces = Plan(decoder.file.branches, decoder.file.vertex_count).pieces
         for level in range(1, last):
             exact = np.isin(branch, pieces["branch"][pieces["level"] <= level])
             shown = decoder.affines(0, level)
@@ -166,11 +166,11 @@ def test_the_parts_of_a_level_share_out_the_vertices(played):
         parts = decoder.affines(0, level.level)
         assert len(parts.matrices) == len(parts.branch) == level.nodes
         stops = parts.first_vertex + parts.vertex_count
-        assert parts.first_vertex[0] == 0 and stops[-1] == decoder.vertex_count
+        assert parts.first_vertex[0] == 0 and stops[-1] == decoder.file.vertex_count
         assert np.array_equal(parts.first_vertex[1:], stops[:-1]) and (parts.vertex_count > 0).all()
-        first_of_part = decoder.hierarchy.vertex_source[parts.first_vertex]
-        assert np.array_equal(decoder.vertex_branch[first_of_part], parts.branch)
-    assert parts.is_stem.all() and len(parts.branch) == decoder.branch_count
+        first_of_part = decoder.file.hierarchy.vertex_source[parts.first_vertex]
+        assert np.array_equal(decoder.file.vertex_branch[first_of_part], parts.branch)
+    assert parts.is_stem.all() and len(parts.branch) == decoder.file.branch_count
 
 
 def test_the_map_of_a_part_that_moves_as_one_gives_its_positions(played):
@@ -179,7 +179,7 @@ def test_the_map_of_a_part_that_moves_as_one_gives_its_positions(played):
         pose = base_pose(decoder, level)
         for frame in shown_frames(decoder):
             parts = decoder.affines(frame, level)
-            shown = decoder.positions(frame, level, np.float64)[decoder.hierarchy.vertex_source]
+            shown = decoder.positions(frame, level, np.float64)[decoder.file.hierarchy.vertex_source]
             moved = applied(np.repeat(parts.matrices, parts.vertex_count, axis=0), pose[:, None])[:, 0]
             as_one = np.repeat(~parts.is_stem, parts.vertex_count)
             assert as_one.any() and np.abs(moved - shown)[as_one].max() < 1e-6 * size_of(source)
@@ -188,8 +188,8 @@ def test_the_map_of_a_part_that_moves_as_one_gives_its_positions(played):
 def test_every_subtree_stays_attached_to_its_parents_stem(played):
     decoder, source = played
     assert not (decoder.file.branches["flags"] & LOOSE).any()
-    hierarchy, attached = decoder.hierarchy, 0
-    for level in range(decoder.level_count - 1):
+    hierarchy, attached = decoder.file.hierarchy, 0
+    for level in range(decoder.file.level_count - 1):
         pose = base_pose(decoder, level)
         for frame in shown_frames(decoder):
             parts = decoder.affines(frame, level)
@@ -200,13 +200,13 @@ def test_every_subtree_stays_attached_to_its_parents_stem(played):
             hung = applied(parts.matrices[children], pose[attach[children], None])[:, 0]
             assert np.abs(hung - shown[attach[children]]).max(initial=0) < 1e-6 * size_of(source)
             attached += len(children)
-    assert attached > 0 or decoder.branch_count == 1
+    assert attached > 0 or decoder.file.branch_count == 1
 
 
 def test_a_map_applied_to_its_residual_gives_the_full_positions(played):
     decoder, source = played
-    order = decoder.hierarchy.vertex_source
-    for level in range(decoder.level_count):
+    order = decoder.file.hierarchy.vertex_source
+    for level in range(decoder.file.level_count):
         for frame in shown_frames(decoder)[:2]:
             parts, residual = decoder.affines(frame, level), decoder.residual(frame, level)
             full = decoder.positions(frame, dtype=np.float64)[order]
@@ -221,7 +221,7 @@ def test_a_map_applied_to_its_residual_gives_the_full_positions(played):
 def test_any_frames_alone_equal_those_of_the_whole(played):
     decoder, _ = played
     count = decoder.frame_count
-    for level in (0, decoder.level_count - 1):
+    for level in (0, decoder.file.level_count - 1):
         whole = decoder.positions(level=level)
         boundary = decoder.segments[1][0]
         for chosen in (slice(boundary - 2, boundary + 3), slice(boundary, None), slice(-3, None), slice(5, 5)):
@@ -312,7 +312,7 @@ def test_a_frame_at_a_level_reads_only_that_segment_and_the_levels_up_to_it(leve
     for name in NAMES:
         file = Recorder(plants[name][0].read_bytes())
         decoder = athcodec.open(file)
-        if level >= decoder.level_count:
+        if level >= decoder.file.level_count:
             continue
         prelude = decoder.file.prelude_length
         assert all(stop <= prelude for _, stop in file.ranges), "opening reads the prelude alone"
@@ -356,7 +356,7 @@ def test_the_frames_of_a_segment_in_turn_read_and_decode_it_once(played, monkeyp
             prepare(file, work, segment, level, *memory),
         ),
     )
-    (first, stop), last = decoder.segments[1], decoder.level_count - 1
+    (first, stop), last = decoder.segments[1], decoder.file.level_count - 1
     decoder.positions(first, last)
     before = decoder.file.bytes_read
     for frame in (*range(first, stop), *reversed(range(first, stop))):
@@ -374,14 +374,14 @@ def test_the_frames_of_a_segment_in_turn_read_and_decode_it_once(played, monkeyp
 
 def test_several_threads_at_once_see_what_one_alone_does(played):
     decoder, _ = played
-    alone = [decoder.positions(level=level) for level in range(decoder.level_count)]
-    maps = [decoder.affines(5, level).matrices for level in range(decoder.level_count)]
+    alone = [decoder.positions(level=level) for level in range(decoder.file.level_count)]
+    maps = [decoder.affines(5, level).matrices for level in range(decoder.file.level_count)]
 
     def watch(seed: int) -> int:
         """Frames, runs of frames and maps of any level, at random; how many were looked at."""
         rng = np.random.default_rng(seed)
         for _ in range(40):
-            level, frame = int(rng.integers(decoder.level_count)), int(rng.integers(decoder.frame_count))
+            level, frame = int(rng.integers(decoder.file.level_count)), int(rng.integers(decoder.frame_count))
             run = slice(frame, frame + int(rng.integers(1, 20)))
             assert np.array_equal(decoder.positions(frame, level), alone[level][frame])
             assert np.array_equal(decoder.positions(run, level), alone[level][run])
@@ -414,7 +414,7 @@ def test_static_data_can_be_read_and_checked_while_other_threads_watch(full_clip
             decoder.file.check()
             for name in ("attributes", "metadata", "faces", "edges"):
                 vars(decoder.file).pop(name)  # remembered otherwise
-            assert np.array_equal(decoder.attributes["radius"], full_clip.attributes["radius"])
+            assert np.array_equal(decoder.file.attributes["radius"], full_clip.attributes["radius"])
             assert decoder.metadata.items() >= full_clip.metadata.items()
 
     with ThreadPoolExecutor(3) as threads:
@@ -425,9 +425,9 @@ def test_static_data_can_be_read_and_checked_while_other_threads_watch(full_clip
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
 def test_positions_of_another_type_are_the_files_own_in_that_type(dtype, tmp_path):
     with coded(plant(seed=3, branches=8, frames=12, dtype=dtype), tmp_path / "p.ath", effort="fast") as decoder:
-        for level in range(decoder.level_count):
+        for level in range(decoder.file.level_count):
             own = decoder.positions(level=level)
-            assert own.dtype == decoder.dtype == dtype
+            assert own.dtype == decoder.file.dtype == dtype
             for other in (np.float16, np.float32, np.float64, ">f4", ">f8"):
                 shown = decoder.positions(level=level, dtype=other)
                 assert shown.dtype == np.dtype(other) and np.array_equal(shown, own.astype(other))
@@ -437,7 +437,7 @@ def test_attributes_are_read_when_asked_for(full_ath):
     with athcodec.open(full_ath) as decoder:
         decoder.positions()
         before = decoder.file.bytes_read
-        assert set(decoder.attributes) == {"radius", "species"}
+        assert set(decoder.file.attributes) == {"radius", "species"}
         assert decoder.file.bytes_read > before
 
 
@@ -499,7 +499,7 @@ def test_info_is_json_and_agrees_with_the_summary(bushy_clip, tmp_path):
 
 def test_the_table_of_the_ath_is_that_of_the_analysis(bushy_clip, bushy_ath):
     with athcodec.open(bushy_ath) as decoder:
-        bound = decoder.max_error_bound
+        bound = decoder.file.max_error_bound
         expected = athcodec.build_ath(bushy_clip, bound, 0, bound, 0).table1()
         assert decoder.file.table1().items() <= expected.items()
 
@@ -511,7 +511,7 @@ def test_one_frame_has_no_frame_rate(tmp_path):
 
 def test_allow_partial_changes_nothing_about_an_intact_file(bushy_ath):
     with athcodec.open(bushy_ath) as plain, athcodec.open(bushy_ath, allow_partial=True) as partial:
-        assert partial.complete and partial.missing == "" and partial.deepest == plain.deepest
+        assert partial.file.complete and partial.file.missing == "" and partial.file.deepest == plain.file.deepest
         assert np.array_equal(partial.positions(), plain.positions())
         plain.file.check()
         partial.file.check()
@@ -522,9 +522,9 @@ def test_allow_partial_changes_nothing_about_an_intact_file(bushy_ath):
 def test_maps_hang_together_on_degenerate_plants(scratch, clip):
     size = size_of(clip.positions) or 1.0
     with coded(clip, scratch / "maps.ath", max_error=1e-3 * size, segment_frames=16, effort="fast") as decoder:
-        hierarchy = decoder.hierarchy
+        hierarchy = decoder.file.hierarchy
         full = decoder.positions(17)[hierarchy.vertex_source]
-        for level in range(decoder.level_count):
+        for level in range(decoder.file.level_count):
             pose = base_pose(decoder, level)
             parts = decoder.affines(17, level)
             assert len(parts.branch) == decoder.levels[level].nodes
@@ -560,4 +560,4 @@ def test_a_rest_pose_beyond_float32_is_infinite_without_a_warning():
     head = writing.Rest(np.array([most, -most, 0.0]), most, np.dtype(np.float32))
     head.stream = streams.encode_rest(roots(1), 1.0, np.array([[2.5, -2.5, 0.0]])).stream
     with opened(still_file(rest=writing.pack_rest(head))) as decoder:
-        assert decoder.rest.tolist() == [[np.inf, -np.inf, 0.0]]
+        assert decoder.file.rest.tolist() == [[np.inf, -np.inf, 0.0]]

@@ -16,7 +16,7 @@ from athcodec import MotionClip
 from athcodec.cli import main
 from athcodec.encoding.job import EncodingJob
 from athcodec.errors import ClipError
-from athcodec.motion import discovery
+from athcodec.motion.branches import finding, saving, seen
 from athcodec.motion.clip import Skin, source_stem_index
 from athcodec.motion.hierarchy import branch_orders
 from bench.odd.grass import ORDERS, grass
@@ -38,7 +38,7 @@ def bare(clip: MotionClip, **changes) -> MotionClip:
     return clip.replace(vertex_branch=None, branch_parent=None, stem_index=None, **changes)
 
 
-def right_parents(found: discovery.Found, clip: MotionClip) -> float:
+def right_parents(found: athcodec.Found, clip: MotionClip) -> float:
     """Share of the branches found that are branches of the clip, on the right parent."""
     whose = clip.vertex_branch[np.unique(found.vertex_branch, return_index=True)[1]]
     parent = np.where(found.branch_parent < 0, -1, whose[found.branch_parent])
@@ -282,17 +282,17 @@ def test_what_was_found_is_kept_edited_and_used(dressed, tmp_path, capsys):
     Path(kept).write_text(json.dumps(content))
     assert main(["encode", source, coded, "--hierarchy", kept, "--effort", "fast"]) == 0
     with athcodec.open(coded) as decoder:
-        assert decoder.branch_parent[-1] == 0
+        assert decoder.file.branch_parent[-1] == 0
         found = athcodec.find_branches(bare(dressed))
-        assert np.array_equal(decoder.vertex_branch, found.vertex_branch)
-        assert np.array_equal(decoder.branch_parent[:-1], found.branch_parent[:-1])
+        assert np.array_equal(decoder.file.vertex_branch, found.vertex_branch)
+        assert np.array_equal(decoder.file.branch_parent[:-1], found.branch_parent[:-1])
 
 
 def test_a_saved_hierarchy_comes_back_unchanged(dressed, tmp_path):
     mixed = renumbered(dressed, np.random.default_rng(0).permutation(dressed.vertex_count))
     found = athcodec.find_branches(bare(mixed))
-    discovery.save(found, tmp_path / "a.json")
-    again = discovery.load(tmp_path / "a.json")
+    saving.save(found, tmp_path / "a.json")
+    again = saving.load(tmp_path / "a.json")
     for name in ("vertex_branch", "branch_parent", "stem_index"):
         assert np.array_equal(getattr(found, name), getattr(again, name)), name
 
@@ -317,7 +317,7 @@ def one_branch(vertex_count: int, parent: int, vertices: str) -> str:
 def test_a_file_without_usable_branches_is_refused(tmp_path, text, message):
     (tmp_path / "a.json").write_text(text)
     with pytest.raises(ClipError, match=message):
-        discovery.load(tmp_path / "a.json")
+        saving.load(tmp_path / "a.json")
 
 
 def test_a_method_without_the_data_that_it_needs_is_refused(dressed):
@@ -350,7 +350,7 @@ def loose_points() -> MotionClip:
 
 
 def test_candidates_for_branches_are_tried_at_the_bound_of_the_file(loose_points, tmp_path, monkeypatch):
-    assert len(discovery.candidates(loose_points)) > 1
+    assert len(finding.candidates(loose_points)) > 1
     bounds = trial_bounds(loose_points, tmp_path / "a.ath", monkeypatch, max_error=0.02)
     assert len(bounds) > 1
     assert set(bounds) == {0.02}
@@ -389,8 +389,9 @@ def test_leaves_that_touch_and_move_by_themselves_are_branches_of_their_own(tmp_
 
 
 def test_pieces_need_no_scipy_and_are_those_that_hang_together(dressed, monkeypatch):
-    expected = discovery._components(discovery._links(dressed), dressed.vertex_count)
-    monkeypatch.setattr(discovery, "scipy_module", None)
-    found = discovery.pieces(bare(dressed))
+    expected = seen.components(seen.links_of(dressed), dressed.vertex_count)
+    for module in (finding, seen):
+        monkeypatch.setattr(module, "scipy_module", None)
+    found = finding.pieces(bare(dressed))
     assert np.array_equal(found.vertex_branch, expected) and (found.branch_parent == -1).all()
-    assert len(discovery.pieces(bare(dressed, faces=None, edges=None)).branch_parent) == 1
+    assert len(finding.pieces(bare(dressed, faces=None, edges=None)).branch_parent) == 1

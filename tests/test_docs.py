@@ -106,7 +106,7 @@ def test_the_c_program_with_a_player_shows_the_positions_of_python(files, c_prog
     x, y, z = map(float, re.findall(r"-?\d+\.\d+", c_program(0, files / "tree.ath")))
     with athcodec.open(files / "tree.ath") as decoder:
         frame = (299 / 60) % (decoder.time[-1] - decoder.time[0] + 1 / 30) * 30  # the frame of the last drawn one
-        source = np.flatnonzero(decoder.vertex_branch == np.flatnonzero(decoder.branch_parent < 0)[0])[0]
+        source = np.flatnonzero(decoder.file.vertex_branch == np.flatnonzero(decoder.file.branch_parent < 0)[0])[0]
         around = decoder.positions()[[int(frame), (int(frame) + 1) % decoder.frame_count]][:, source]
     assert (around.min(axis=0) - 1e-5 <= (x, y, z)).all() and ((x, y, z) <= around.max(axis=0) + 1e-5).all()
 
@@ -116,7 +116,7 @@ def test_the_c_program_shows_a_coarse_level_at_a_distance(files, c_program):
     found = re.fullmatch(r"level (\d+): (\d+) matrices, (\d+) exact vertices\n", shown)
     level, matrices, exact = map(int, found.groups())
     with athcodec.open(files / "tree.ath") as decoder:
-        assert 0 < level < decoder.deepest and (matrices, exact) == (0, 1001)
+        assert 0 < level < decoder.file.deepest and (matrices, exact) == (0, 1001)
 
 
 def test_the_javascript_program_has_the_positions_of_python(files, tmp_path):

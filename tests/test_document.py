@@ -27,12 +27,12 @@ def assert_same_bits(data: bytes) -> None:
     """Every level, the rest pose of the last, the times and the static data; NaN only as such."""
     file = File(data, strict=True)
     with athcodec.open(io.BytesIO(data), strict=True) as decoder:
-        played = [decoder.play(clip.name) for clip in decoder.clips]
-        for level in range(decoder.level_count):
+        played = [decoder.play(clip.name) for clip in decoder.file.clips]
+        for level in range(decoder.file.level_count):
             assert_same_numbers(file.positions(level), np.concatenate([clip.positions(level=level) for clip in played]))
-        assert_same_numbers(file.rest(decoder.level_count - 1), decoder.rest)
+        assert_same_numbers(file.rest(decoder.file.level_count - 1), decoder.file.rest)
         assert [list(clip.time) for clip in played] == file.file.times
-        arrays = [decoder.faces, decoder.edges, *decoder.attributes.values()]
+        arrays = [decoder.file.faces, decoder.file.edges, *decoder.file.attributes.values()]
         assert [array.tobytes() for array in arrays if array is not None] == file.arrays()
 
 
@@ -111,7 +111,7 @@ def test_corrupted_chunks_are_refused_alike_or_mean_the_same(name):
 
 def all_positions(data: bytes, level: int) -> np.ndarray:
     with opened(data) as decoder:
-        return np.concatenate([decoder.play(clip.name).positions(level=level) for clip in decoder.clips])
+        return np.concatenate([decoder.play(clip.name).positions(level=level) for clip in decoder.file.clips])
 
 
 def test_a_prefix_plays_as_far_as_it_goes():

@@ -324,7 +324,7 @@ def test_plain_lists_can_be_encoded(tmp_path):
         branch_parent=[-1],
     )
     with coded(clip, tmp_path / "s.ath", rel_error=1e-3) as decoder:
-        assert np.abs(decoder.positions() - clip.positions).max() <= decoder.max_error_bound
+        assert np.abs(decoder.positions() - clip.positions).max() <= decoder.file.max_error_bound
 
 
 # ---- memory ----

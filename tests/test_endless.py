@@ -114,7 +114,7 @@ def test_each_clip_of_a_file_has_its_own(tree, tmp_path):
         assert [clip["transitions"] > 0 for clip in decoder.file.info()["clips"]] == [False, True]
         with pytest.raises(ValueError, match="transitions"):
             decoder.play("calm").endless()
-        assert decoder.play("storm").endless().positions(500.0).shape == (decoder.vertex_count, 3)
+        assert decoder.play("storm").endless().positions(500.0).shape == (decoder.file.vertex_count, 3)
 
 
 def test_the_command_line_finds_and_prints_them(tmp_path, capsys):

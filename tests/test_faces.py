@@ -94,9 +94,10 @@ def test_faces_of_different_sizes_come_back(dtype):
     }
     clip = athcodec.MotionClip(terrain(10, 10, 0.1, 1)[None], np.zeros(1), attributes=arrays)
     with opened(encoded(clip)) as decoder:
-        assert decoder.faces is None and set(decoder.attributes) == set(arrays)
+        assert decoder.file.faces is None and set(decoder.file.attributes) == set(arrays)
         for name, array in arrays.items():
-            assert decoder.attributes[name].dtype == array.dtype and np.array_equal(decoder.attributes[name], array)
+            assert decoder.file.attributes[name].dtype == array.dtype
+            assert np.array_equal(decoder.file.attributes[name], array)
 
 
 @pytest.mark.parametrize("share", [0.7, 0.85])
@@ -106,7 +107,7 @@ def test_vertices_by_chance_cost_little_more_where_faces_are_stored(share):
     bound = {0.7: 1e-3, 0.85: 1e-4}[share] * float(np.linalg.norm(np.ptp(points, axis=0)))
     data = encoded(still(*mixed), max_error=bound)
     with opened(data) as decoder:
-        assert np.array_equal(decoder.faces, mixed[1])
+        assert np.array_equal(decoder.file.faces, mixed[1])
         assert np.linalg.norm(decoder.positions(0).astype(float) - mixed[0], axis=1).max() <= bound
     assert rest_bytes(data) < share * simple_bytes(mixed[0], bound)
     assert rest_bytes(data) < 1.15 * rest_bytes(encoded(still(points, faces), max_error=bound))
@@ -133,7 +134,7 @@ def test_faces_are_not_stored_without_attributes():
     data = encoded(still(points, faces), rel_error=1e-4, attributes="none")
     assert File(data).content(rules.REST)[0] & CONNECTED == 0
     with opened(data) as decoder:
-        assert decoder.faces is None
+        assert decoder.file.faces is None
 
 
 @pytest.mark.parametrize(
@@ -149,9 +150,9 @@ def test_the_document_reads_the_same_connected_rest_pose(options, frames):
     file = File(data, strict=True)
     assert frames > 1 or file.content(rules.REST)[0] & CONNECTED
     with opened(data) as decoder:
-        for level in range(decoder.level_count):
+        for level in range(decoder.file.level_count):
             assert decoder.positions(level=level).tobytes() == file.positions(level).tobytes()
-        assert decoder.faces.tobytes() == file.arrays()[0]
+        assert decoder.file.faces.tobytes() == file.arrays()[0]
 
 
 @pytest.mark.parametrize("seed", range(12))
@@ -168,7 +169,7 @@ def test_random_bytes_as_faces_are_the_same_to_all_or_refused(seed):
     data = with_faces(encoded(clip, rel_error=1e-3, ladder="none"), chunk[:9] + stream)
     try:
         with opened(data) as decoder:
-            found = decoder.faces.reshape(-1).tolist()
+            found = decoder.file.faces.reshape(-1).tolist()
     except AthError:
         found = None
     assert found == expected

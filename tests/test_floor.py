@@ -33,12 +33,12 @@ def test_the_samples_are_small_loops_in_two_winds_with_surfaces(name):
     path = athcodec.sample_path(name)
     assert path.stat().st_size < 60_000
     with athcodec.open(path, strict=True) as decoder:
-        assert [(clip.name, clip.loop, clip.frame_count) for clip in decoder.clips] == [
+        assert [(clip.name, clip.loop, clip.frame_count) for clip in decoder.file.clips] == [
             ("calm", True, 150),
             ("gale", True, 150),
         ]
         metadata = decoder.file.metadata
-        assert 300 < decoder.vertex_count <= 3000
+        assert 300 < decoder.file.vertex_count <= 3000
     assert metadata["surfaces"] == {"fern": "stalks, pinnae", "grass": "stalks, blades"}[name]
     assert [metadata["clips"][clip]["strength"] for clip in ("calm", "gale")] == [2.5, 10.0]
 

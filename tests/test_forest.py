@@ -114,7 +114,7 @@ def blocks_show(path: Path, seconds: float, weights: dict[str, float], phase: fl
     level = file.core.info.level_count - 1
     starts = file.core.segment_starts(range(file.core.info.segment_count + 1))
     with athcodec.open(path) as decoder:
-        clips = {clip.name: clip for clip in decoder.clips}
+        clips = {clip.name: clip for clip in decoder.file.clips}
     sources = []
     for name, weight in weights.items():
         clip = clips[name]
@@ -180,7 +180,7 @@ def test_plants_play_without_an_end(opened, tmp_path, sample_clip):
         for seconds in np.linspace(0.4, 60.0, 40):
             wanted = play.positions(seconds + phase * round_of)[core.vertex_source()] - np.array(core.info.origin)
             got = shown(page, float(seconds), level)[0, :, :3]
-            assert np.abs(got - wanted).max() <= decoder.max_error_bound
+            assert np.abs(got - wanted).max() <= decoder.file.max_error_bound
 
 
 def test_every_instance_in_view_is_drawn_once_and_wind_of_no_strength_is_still(opened, grove):

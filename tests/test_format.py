@@ -65,7 +65,7 @@ def by_document(clips: list) -> list[tuple]:
 def by_code(decoder: athcodec.Decoder) -> list[tuple]:
     return [
         (clip.name, clip.frame_count, clip.segment_count, list(clip.seam_errors) if clip.loop else None)
-        for clip in decoder.clips
+        for clip in decoder.file.clips
     ]
 
 
@@ -284,7 +284,7 @@ def played(data: bytes, kind: int) -> Iterator[athcodec.Decoder]:
 def read_hierarchy(stream: bytes, like: np.ndarray, fields: list[str]) -> tuple:
     """Fields of the branches, and both permutations, in a file that else fits branches `like` those."""
     with played(still_file(branches=like, hierarchy=stream), container.HIERARCHY) as decoder:
-        numbers = decoder.hierarchy
+        numbers = decoder.file.hierarchy
         assert not decoder.positions().any()
         rows = [[int(row[name]) for name in fields] for row in decoder.file.branches]
         return rows, numbers.branch_source.tolist(), numbers.vertex_source.tolist()
@@ -295,7 +295,7 @@ def read_exact_rest(stream: bytes, branches: np.ndarray, dtype: type) -> np.ndar
     data = still_file(branches=branches, rest=exact_rest_chunk(stream, dtype))
     try:
         with opened(data, strict=True) as decoder:
-            return decoder.rest
+            return decoder.file.rest
     except errors.BadChunk as error:
         assert str(error).startswith("chunk REST ")
         raise

@@ -46,7 +46,7 @@ def test_a_gallery_is_a_folder_with_page_viewer_and_files(sample_ath, bare, tmp_
     page = (out / "index.html").read_text("utf-8")
     assert "<h2>oak &amp; ash</h2>" in page and "CARDS" not in page
     with athcodec.open(files[0]) as decoder:
-        assert f"{decoder.vertex_count:,} points, {decoder.frame_count} frames" in page
+        assert f"{decoder.file.vertex_count:,} points, {decoder.frame_count} frames" in page
     assert {path.name for path in (out / "plants").iterdir()} == {"oak & ash.ath", "fern.ath"}
     named = re.findall(r'(?:src|href)="((?:viewer|plants)/[^"?]*)', page) + re.findall(r'": "\./([^"]*)"', page)
     for name in named:

@@ -652,7 +652,7 @@ def far(a, b):
 
 def test_joints_keep_the_error_that_the_file_states_at_every_level(leafy_ath, tmp_path):
     with athcodec.open(leafy_ath) as decoder:
-        for level in range(decoder.level_count):
+        for level in range(decoder.file.level_count):
             view = ClipView(decoder, level)
             path = tmp_path / f"{level}.glb"
             write(view, path, animation="joints")
@@ -667,7 +667,7 @@ def test_joints_keep_the_error_that_the_file_states_at_every_level(leafy_ath, tm
 
 def test_a_clip_through_ath_and_glb_keeps_the_bound(leafy, leafy_ath, tmp_path):
     with athcodec.open(leafy_ath) as decoder:
-        bound = decoder.max_error_bound
+        bound = decoder.file.max_error_bound
         for animation, more in (("joints", 1.1 * bound), ("morphs", 1e-6), ("auto", 1.1 * bound)):
             write(ClipView(decoder), tmp_path / "a.glb", animation=animation)
             positions, clip = frames_of(tmp_path / "a.glb")
@@ -819,7 +819,7 @@ def test_clips_keep_names_loops_and_motion_from_glb_through_ath_to_glb(seasons, 
     assert main(["encode", str(tmp_path / "joined.glb"), str(tmp_path / "a.ath"), "--takes", "all"]) == 0
     assert main(["decode", str(tmp_path / "a.ath"), str(tmp_path / "again.glb"), "--animation", animation]) == 0
     with athcodec.open(tmp_path / "a.ath") as decoder:
-        error = decoder.max_error_bound + 1e-5
+        error = decoder.file.max_error_bound + 1e-5
     error += sum(facts_of(tmp_path / name)["athcodec"]["max_error"] for name in ("joined.glb", "again.glb"))
     same_clips(tmp_path / "again.glb", seasons, error)
     assert main(["verify", str(tmp_path / "a.ath"), "--takes", "all", "--against", str(tmp_path / "joined.glb")]) == 0
@@ -863,7 +863,7 @@ def test_the_takes_that_are_not_read_are_named(tmp_path, capsys):
     assert main(["encode", path, out, "--takes", "all", "--names", "a,b,c,d", "--loop", "a", "--fps", "10"]) == 0
     assert "takes" not in capsys.readouterr().err.splitlines()[-1]
     with athcodec.open(out) as decoder:
-        assert {clip.name: clip.loop for clip in decoder.clips} == {"a": True, "b": False, "c": False, "d": True}
+        assert {clip.name: clip.loop for clip in decoder.file.clips} == {"a": True, "b": False, "c": False, "d": True}
 
 
 # ---- copies ----

@@ -90,7 +90,7 @@ def world(path, clip=None):
                 matrix = scene.matrices(scene.ancestors({index}), None)[index][0]
                 found.append(positions[:, vertices] @ matrix[:3, :3].T + matrix[:3, 3])
                 largest = max(largest, np.linalg.norm(matrix[:3, :3], 2))
-        return np.concatenate(found, axis=1), decoder.max_error_bound * largest
+        return np.concatenate(found, axis=1), decoder.file.max_error_bound * largest
 
 
 def assert_same_motion(source, out, clip=None, **options):
@@ -166,9 +166,9 @@ def test_vertices_on_both_sides_of_a_seam_are_coded_once(leafy, tmp_path):  # no
     out = encoded(source, tmp_path / "out.glb")
     assert_same_motion(source, out)
     with athcodec.open(out) as decoder:
-        assert decoder.vertex_count == len(np.unique(leafy.faces)) < leafy.faces.size
-        assert decoder.clips[0].name == "breeze"
-        assert decoder.faces.shape == leafy.faces.shape
+        assert decoder.file.vertex_count == len(np.unique(leafy.faces)) < leafy.faces.size
+        assert decoder.file.clips[0].name == "breeze"
+        assert decoder.file.faces.shape == leafy.faces.shape
     assert main(["verify", str(out), "--against", str(source)]) == 0
 
 
@@ -273,8 +273,8 @@ def test_animations_become_clips_of_their_names_rates_loops_and_starts(seasons, 
     write(athcodec.join(seasons), tmp_path / "source.glb", animation="morphs")
     out = encoded(tmp_path / "source.glb", tmp_path / "out.glb")
     with athcodec.open(out) as decoder:
-        assert [clip.name for clip in decoder.clips] == list(seasons)
-        assert [clip.loop for clip in decoder.clips] == [True, False, False, False]
+        assert [clip.name for clip in decoder.file.clips] == list(seasons)
+        assert [clip.loop for clip in decoder.file.clips] == [True, False, False, False]
     for name in seasons:
         assert_same_motion(tmp_path / "source.glb", out, name, takes=[name])
     said = {clip["name"]: clip for clip in structure(out)["extensions"]["ATH_motion"]["motions"][0]["clips"]}
@@ -359,9 +359,9 @@ def test_a_glb_with_several_motions_is_opened_by_name(stand, tmp_path, capsys):
     assert [motion["name"] for motion in structure(stand)["extensions"]["ATH_motion"]["motions"]] == ["oak", "beech"]
     for name in ("oak", "beech"):
         with read(source, only=[f"{name}*"]) as wanted, athcodec.open(stand, gltf_motion=name) as decoder:
-            shown = decoder.positions(slice(0, 12)) + (wanted.rest - decoder.rest)
-            assert decoder.vertex_count == 8 and len(decoder.faces) == 2
-            assert far(shown, wanted.block(0, 12)) <= decoder.max_error_bound + 1e-5
+            shown = decoder.positions(slice(0, 12)) + (wanted.rest - decoder.file.rest)
+            assert decoder.file.vertex_count == 8 and len(decoder.file.faces) == 2
+            assert far(shown, wanted.block(0, 12)) <= decoder.file.max_error_bound + 1e-5
     for choice, said in ((None, "oak.*beech"), ("elm", "oak.*beech")):
         with pytest.raises(ClipError, match=said):
             athcodec.open(stand, gltf_motion=choice)
@@ -390,7 +390,7 @@ def test_motions_of_a_glb_are_written_back_and_cut_each_or_all(stand, tmp_path):
     cut = tmp_path / "cut.glb"
     assert main(["truncate", str(stand), str(cut), "--level", "0", "--gltf-motion", "oak"]) == 0
     with athcodec.open(cut, gltf_motion="oak") as oak, athcodec.open(cut, gltf_motion="beech") as beech:
-        assert oak.level_count == 1 < beech.level_count
+        assert oak.file.level_count == 1 < beech.file.level_count
 
 
 def test_a_motion_takes_no_name_that_the_glb_has(stand, tmp_path, capsys):
@@ -404,8 +404,12 @@ def test_truncate_takes_a_glb_and_writes_one_or_the_file_alone(source, tmp_path)
         assert main(["truncate", str(whole), str(out), "--level", "1"]) == 0
     check_schemas(structure(cut))
     assert structure(cut)["meshes"] == structure(whole)["meshes"] and cut.stat().st_size < whole.stat().st_size
-    with athcodec.open(whole) as long, athcodec.open(cut) as short, athcodec.open(alone, host_mesh=short.rest) as bare:
-        assert short.level_count == bare.level_count == 2 < long.level_count
+    with (
+        athcodec.open(whole) as long,
+        athcodec.open(cut) as short,
+        athcodec.open(alone, host_mesh=short.file.rest) as bare,
+    ):
+        assert short.file.level_count == bare.file.level_count == 2 < long.file.level_count
         for frame in (0, 17, 39):
             assert np.array_equal(short.positions(frame), long.positions(frame, 1))
             assert np.array_equal(bare.positions(frame), long.positions(frame, 1))

@@ -75,7 +75,7 @@ def test_files_are_valid_and_engines_show_what_the_text_says(kind, sources, node
     assert_valid(node, out)
     wanted, _ = world(out)
     with athcodec.open(out) as decoder:
-        times, name = start_of(kind) + decoder.time - decoder.time[0], decoder.clips[0].name
+        times, name = start_of(kind) + decoder.time - decoder.time[0], decoder.file.clips[0].name
     frames = [0, 7, len(times) - 1]
     for engine in ENGINES:
         shown, facts = played(engine, out, times[frames])

@@ -135,7 +135,7 @@ def test_what_is_written_is_valid_and_three_plays_it_within_the_stated_error(
 ):
     path = tmp_path / "a.glb"
     with athcodec.open(leafy_ath) as decoder:
-        for level in range(decoder.level_count):
+        for level in range(decoder.file.level_count):
             view = ClipView(decoder, level, range(4, 30))
             write(view, path, animation=animation)
             assert_valid(node, path)
@@ -200,7 +200,7 @@ def test_a_clip_goes_from_three_through_ath_and_back_to_three(three_file, node, 
     with athcodec.open(tmp_path / "a.ath") as decoder:
         write(ClipView(decoder), tmp_path / "b.glb", animation="morphs")
         assert_valid(node, tmp_path / "b.glb")
-        assert far(played(tmp_path / "b.glb", np.arange(25) / 24), before) <= decoder.max_error_bound + 1e-5
+        assert far(played(tmp_path / "b.glb", np.arange(25) / 24), before) <= decoder.file.max_error_bound + 1e-5
 
 
 def read_as_one_branch(clip):
@@ -284,7 +284,7 @@ def test_an_animal_goes_through_ath_and_is_played_within_the_bound(panda, node, 
             assert_valid(node, tmp_path / "b.glb")
             stated = json.loads(structure(tmp_path / "b.glb"))["asset"]["extras"]["athcodec"]["max_error"]
             shown = played(tmp_path / "b.glb", times[::10])
-            assert far(shown, wanted[::10]) <= decoder.max_error_bound + stated + 1e-6 * np.abs(wanted).max()
+            assert far(shown, wanted[::10]) <= decoder.file.max_error_bound + stated + 1e-6 * np.abs(wanted).max()
 
 
 @pytest.mark.parametrize("bound", [1e-3, 1e-4])

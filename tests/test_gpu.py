@@ -234,9 +234,9 @@ def winds(tmp_path_factory):
     file = Checked(path)
     with athcodec.open(path) as decoder:
         order = file.gpu.core.vertex_source()
-        faces = np.argsort(order)[decoder.faces]
+        faces = np.argsort(order)[decoder.file.faces]
         file.edges = np.stack([faces, np.roll(faces, -1, axis=1)], axis=-1).reshape(-1, 2)
-        names = [clip.name for clip in decoder.clips]
+        names = [clip.name for clip in decoder.file.clips]
         blends = lambda weights, second: decoder.blended(dict(zip(names, weights)), second)  # noqa: E731
         file.decoder_blends = lambda *asked: blends(*asked)[order] - np.array(file.info.origin)
         yield file

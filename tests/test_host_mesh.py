@@ -65,7 +65,7 @@ def assert_kept(decoder: athcodec.Decoder, clip: MotionClip) -> None:
     """Every vertex of every frame is within the bound of the file."""
     positions = decoder.positions(dtype=np.float64)
     largest = np.linalg.norm(positions - clip.block(0, clip.frame_count), axis=2).max()
-    assert largest <= decoder.max_error_bound
+    assert largest <= decoder.file.max_error_bound
 
 
 # ---- with the mesh ----
@@ -81,7 +81,8 @@ def test_the_bound_is_kept_with_the_hosts_mesh(source, tmp_path, options):
     data = encode(clip, tmp_path / "a.ath", **options)
     with opened(data, host_mesh=source) as decoder:
         assert_kept(decoder, clip)
-        assert np.array_equal(decoder.rest, source.rest.astype(np.float32)) and decoder.rest.dtype == np.float32
+        assert np.array_equal(decoder.file.rest, source.rest.astype(np.float32))
+        assert decoder.file.rest.dtype == np.float32
         assert not any(chunk.kind == ct.REFINED_REST for chunk in decoder.file.chunks)
         decoder.file.check()
 
@@ -104,7 +105,7 @@ def test_a_binary64_clip_plays_about_the_mesh_as_float32(tmp_path):
     data = encode(clip, tmp_path / "a.ath", rel_error=1e-8)
     for mesh in (clip, clip.rest, clip.rest.astype(np.float32)):
         with opened(data, host_mesh=mesh) as decoder:
-            assert decoder.dtype == np.float64 and decoder.rest.dtype == np.float32
+            assert decoder.file.dtype == np.float64 and decoder.file.rest.dtype == np.float32
             assert_kept(decoder, clip)
 
 
@@ -126,7 +127,7 @@ def test_several_clips_and_loops_share_the_mesh(source, mesh, tmp_path):
     with opened(encode(athcodec.join(clips), tmp_path / "a.ath"), host_mesh=mesh) as decoder:
         for name, clip in clips.items():
             assert_kept(decoder.play(name), clip)
-        assert decoder.clip.seam_errors[-1] <= 2 * decoder.max_error_bound
+        assert decoder.clip.seam_errors[-1] <= 2 * decoder.file.max_error_bound
 
 
 def test_a_file_in_three_steps_is_that_of_one(source, hosted, tmp_path):
@@ -164,9 +165,9 @@ def test_a_file_says_what_it_holds_without_the_mesh(hosted, mesh, source):
         assert (
             file.host_checksum == f"{ct.crc32c(data):08x}{ct.crc32c(data[::-1]):08x}" == info["host_mesh"]["checksum"]
         )
-        assert file.needs_host_mesh and info["vertices"] == len(mesh) and len(decoder.levels) == decoder.level_count
-        assert np.array_equal(decoder.time, source.time) and np.array_equal(decoder.vertex_branch, source.vertex_branch)
-        assert decoder.deepest == decoder.level_count - 1 and decoder.level_for(1e5, 1.0, 1e3) == 0
+        assert file.needs_host_mesh and info["vertices"] == len(mesh) and len(decoder.levels) == file.level_count
+        assert np.array_equal(decoder.time, source.time) and np.array_equal(file.vertex_branch, source.vertex_branch)
+        assert file.deepest == file.level_count - 1 and decoder.level_for(1e5, 1.0, 1e3) == 0
         file.check(decode=False)
         file.set_host_mesh(mesh)
         assert not file.needs_host_mesh
@@ -175,14 +176,14 @@ def test_a_file_says_what_it_holds_without_the_mesh(hosted, mesh, source):
 
 def test_whatever_takes_the_rest_pose_needs_the_mesh(hosted):
     with opened(hosted) as decoder:
-        for level in range(decoder.level_count):
+        for level in range(decoder.file.level_count):
             for ask in (decoder.positions, decoder.affines, decoder.residual):
                 with pytest.raises(NeedsHostMesh, match="got none; expected the mesh that the file was made for"):
                     ask(0, level)
             with pytest.raises(NeedsHostMesh):
                 decoder.level_rest(level)
         with pytest.raises(NeedsHostMesh):
-            _ = decoder.rest
+            _ = decoder.file.rest
         with pytest.raises(NeedsHostMesh):
             decoder.file.check()
 
@@ -227,7 +228,7 @@ def test_truncating_needs_no_mesh_and_keeps_its_checksum(hosted, mesh, tmp_path)
     (tmp_path / "a.ath").write_bytes(hosted)
     athcodec.truncate(tmp_path / "a.ath", tmp_path / "b.ath", 1)
     with opened(hosted, host_mesh=mesh) as whole, athcodec.open(tmp_path / "b.ath", host_mesh=mesh) as less:
-        assert less.file.host_checksum == whole.file.host_checksum and less.level_count == 2
+        assert less.file.host_checksum == whole.file.host_checksum and less.file.level_count == 2
         assert np.array_equal(less.positions(level=1), whole.positions(level=1))
 
 
@@ -248,7 +249,7 @@ def test_the_mesh_of_a_file_is_brought_to_the_units_and_axes_of_the_motion(tmp_p
     turned = ["--unit", "cm", "--up-axis", "z"]
     assert cli.main(["encode", SAMPLE, str(ath), "--rest", "host", "--effort", "fast", *turned]) == 0
     with athcodec.open(ath, host_mesh=SAMPLE) as decoder:
-        assert np.ptp(decoder.rest[:, 2]) > 700 and decoder.metadata["unit"] == "cm"
+        assert np.ptp(decoder.file.rest[:, 2]) > 700 and decoder.metadata["unit"] == "cm"
 
 
 # ---- C ----

@@ -221,7 +221,7 @@ def expected(sample_ath) -> str:
 
 def said_of(path: Path) -> str:
     with athcodec.open(path) as decoder:
-        numbers = decoder.vertex_count, decoder.frame_count, len(decoder.segments), decoder.level_count
+        numbers = decoder.file.vertex_count, decoder.frame_count, len(decoder.segments), decoder.file.level_count
         crc = crc32c(np.ascontiguousarray(decoder.positions(), np.float32).tobytes())
     return "OK {} {} {} {} {:08x}\n".format(*numbers, crc)
 
@@ -324,7 +324,7 @@ def played(walk) -> str:
 
 def test_the_example_shows_coarse_levels_far_away_and_the_deepest_one_close_by(played, sample_ath):
     with athcodec.open(sample_ath) as decoder:
-        deepest = decoder.level_count - 1
+        deepest = decoder.file.level_count - 1
     _, distance, asked, shown, *_ = rows(played).T
     nearest = distance == distance.min()
     assert shown[0] == 0 and asked[-1] == 0 and shown[-1] <= 1
@@ -346,7 +346,7 @@ def test_programs_play_the_levels_of_a_file_with_layers(engine, layered_ath):
     assert run(engine / "static", layered_ath) == said_of(layered_ath)
     text = run(engine / "play", layered_ath, "--slices", 40, "--seconds", 24, "--fps", 30)
     with athcodec.open(layered_ath) as decoder:
-        assert rows(text)[:, 3].max() == decoder.level_count - 1
+        assert rows(text)[:, 3].max() == decoder.file.level_count - 1
     assert text.splitlines()[-1] == "ranges missing at the end: 0"
 
 

@@ -23,11 +23,11 @@ def part(clip: athcodec.MotionClip, start: int, stop: int) -> athcodec.MotionCli
 def test_each_clip_is_found_by_its_name_and_keeps_the_bound(medley_clips, medley_ath):
     with athcodec.open(medley_ath, strict=True) as decoder:
         decoder.file.check()
-        assert [clip.name for clip in decoder.clips] == list(medley_clips)
+        assert [clip.name for clip in decoder.file.clips] == list(medley_clips)
         for name, source in medley_clips.items():
             played = decoder.play(name)
             assert played.frame_count == source.frame_count and np.array_equal(played.time, source.time)
-            assert distance(played.positions(), source.block(0, source.frame_count)) <= decoder.max_error_bound
+            assert distance(played.positions(), source.block(0, source.frame_count)) <= decoder.file.max_error_bound
             assert played.clip.loop == any(clip_range.loop for clip_range in source.clip_ranges)
             assert played.metadata["from"] == source.metadata["from"] and played.metadata["unit"] == "m"
             with athcodec.open(medley_ath, clip=name) as alone:
@@ -43,7 +43,7 @@ def test_errors_of_a_clip_are_its_own_at_every_level(medley_clips, medley_ath):
                 assert measured <= level.max_error * (1 + 1e-6) and level.max_error <= measured * (1 + 1 / 31)
         assert [level["max_error"] for level in decoder.file.info()["levels"]] == [
             max(decoder.play(name).levels[level].max_error for name in medley_clips)
-            for level in range(decoder.level_count)
+            for level in range(decoder.file.level_count)
         ]
 
 
@@ -94,14 +94,14 @@ def test_a_large_plant_is_searched_on_a_part_of_it_in_all_its_clips(sample_clip,
     assert searched.max_error_bound == whole.max_error_bound and searched.bytes < 1.05 * whole.bytes
     with athcodec.open(tmp_path / "b.ath", strict=True) as decoder:
         for name, clip in clips.items():
-            assert distance(decoder.play(name).positions(), clip.positions) <= decoder.max_error_bound
+            assert distance(decoder.play(name).positions(), clip.positions) <= decoder.file.max_error_bound
 
 
 def test_a_cut_off_file_shows_all_clips_at_the_levels_that_are_left(medley_clips, medley_ath, tmp_path):
     shorter = tmp_path / "shorter.ath"
     athcodec.truncate(medley_ath, shorter, 1)
     with athcodec.open(shorter, strict=True) as decoder, athcodec.open(medley_ath) as full:
-        assert decoder.level_count == 2
+        assert decoder.file.level_count == 2
         for name in medley_clips:
             assert np.array_equal(decoder.play(name).positions(), full.play(name).positions(level=1))
             assert decoder.play(name).clip == full.play(name).clip
@@ -115,7 +115,7 @@ def test_the_error_at_the_seam_is_how_far_off_the_step_over_it_is(medley_clips, 
             for level, stated in enumerate(played.clip.seam_errors):
                 shown = played.positions(0, level, np.float64) - played.positions(-1, level, np.float64)
                 assert stated == pytest.approx(distance(shown, np.float64(first) - last), rel=1e-5)
-            assert played.clip.seam_errors[-1] <= 2 * decoder.max_error_bound
+            assert played.clip.seam_errors[-1] <= 2 * decoder.file.max_error_bound
         assert decoder.play("still").clip.seam_errors == ()
 
 
@@ -318,9 +318,9 @@ def test_a_float32_rest_pose_made_for_several_clips_is_stored_as_float32(sources
     out = str(tmp_path / "oak.ath")
     assert main(["encode", *sources, "-o", out, "--rest", "first", "--exact-rest", "--effort", "fast"]) == 0
     with athcodec.open(out) as decoder:
-        assert decoder.rest.dtype == np.float32
+        assert decoder.file.rest.dtype == np.float32
         with athcodec.read(sources[0], rest="first") as first:
-            assert np.array_equal(decoder.rest, first.source_rest)
+            assert np.array_equal(decoder.file.rest, first.source_rest)
 
 
 @pytest.mark.slow
@@ -331,7 +331,7 @@ def test_the_output_may_stand_behind_the_inputs_or_between_options(sources, tmp_
         out = str(tmp_path / f"{place}.ath")
         assert main(["encode", *(word.format(out) for word in words)]) == 0
         with athcodec.open(out) as decoder:
-            assert [clip.name for clip in decoder.clips] == (["calm", "Böe"] if sources[1] in words else [""])
+            assert [clip.name for clip in decoder.file.clips] == (["calm", "Böe"] if sources[1] in words else [""])
 
 
 @pytest.mark.parametrize(

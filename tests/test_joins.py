@@ -10,7 +10,7 @@ from files import Parts
 from plants import plant
 
 import athcodec
-from athcodec.decoding import ath_file, core_file
+from athcodec.decoding import core_file, segment_decoder
 from athcodec.decoding.container import Limits
 from athcodec.encoding import encoder
 from athcodec.encoding.choices import joins
@@ -70,7 +70,7 @@ def test_the_last_level_does_not_tick_where_segments_meet(coded, sample_position
     with athcodec.open(io.BytesIO(coded)) as decoder:
         seams = [start for start, _ in decoder.segments[1:]]
         shown = decoder.positions().astype(np.float64)
-        bends = np.linalg.norm(np.diff(shown - sample_positions, 2, axis=0), axis=2) / decoder.max_error_bound
+        bends = np.linalg.norm(np.diff(shown - sample_positions, 2, axis=0), axis=2) / decoder.file.max_error_bound
     assert tick(shown, seams) < 1.9
     near = np.concatenate([bends[seam - 3 : seam + 2] for seam in seams])
     assert (near > 1).mean(axis=1).max() < 0.01 and near.max() < 1.5
@@ -84,7 +84,7 @@ def test_at_loose_bounds_no_level_without_corrections_ticks_where_segments_meet(
         seams = [start for start, _ in decoder.segments[1:]]
         # Level 1 hardly moves in the last segment, because the search chooses coarse rotations. A join over more frames
         # than 16 would bend less than 2.35 times as much as a usual frame, but make the level worse than level 0.
-        assert max(tick(decoder.positions(level=level), seams) for level in range(decoder.level_count - 1)) < 2.4
+        assert max(tick(decoder.positions(level=level), seams) for level in range(decoder.file.level_count - 1)) < 2.4
     assert_the_same_however_one_comes_to_it(path.read_bytes())
 
 
@@ -102,7 +102,7 @@ def test_the_bound_holds_for_what_is_joined(coded, sample_positions):
         for level in decoder.levels:
             away = np.linalg.norm(decoder.positions(level=level.level, dtype=np.float64) - sample_positions, axis=2)
             assert away.max() <= level.max_error
-        assert away.max() <= decoder.max_error_bound
+        assert away.max() <= decoder.file.max_error_bound
 
 
 def test_a_frame_is_the_same_however_one_comes_to_it(coded):
@@ -115,7 +115,7 @@ def test_a_frame_of_a_loop_is_the_same_however_one_comes_to_it(loop):
 
 def assert_the_same_however_one_comes_to_it(data: bytes) -> None:
     with athcodec.open(io.BytesIO(data)) as decoder:
-        for level in range(decoder.level_count):
+        for level in range(decoder.file.level_count):
             forwards = decoder.positions(level=level)
             for start, stop in reversed(decoder.segments):
                 assert np.array_equal(decoder.positions(stop - 1, level), forwards[stop - 1])
@@ -152,7 +152,7 @@ def test_short_segments_keep_the_bound(frames, tmp_path):
     athcodec.encode(clip, tmp_path / "short.ath", rel_error=1e-4, segment_frames=16, effort="fast")
     with athcodec.open(tmp_path / "short.ath") as decoder:
         away = np.linalg.norm(decoder.positions() - clip.block(0, frames), axis=2)
-        assert away.max() <= decoder.max_error_bound
+        assert away.max() <= decoder.file.max_error_bound
 
 
 def test_a_clip_of_one_segment_has_no_joins(tmp_path):
@@ -165,7 +165,7 @@ def test_a_clip_of_one_segment_has_no_joins(tmp_path):
 def test_the_end_of_a_segment_is_part_of_what_the_next_one_needs(coded):
     """A file cut off inside the second segment of a level shows neither that nor the third at the level."""
     with athcodec.open(io.BytesIO(coded)) as decoder:
-        level = decoder.level_count - 1
+        level = decoder.file.level_count - 1
         core = decoder.file.core
         assert core.joined_to(2, level) == 1 and core.joined_to(0, level) == -1
         of_second = {(c.offset, c.length) for c in decoder.file.chunks if c.level == level and c.segment == 1}
@@ -185,14 +185,14 @@ def many(tmp_path_factory) -> bytes:
 
 @pytest.fixture
 def threads(monkeypatch):
-    return lambda count: monkeypatch.setattr(ath_file, "default_jobs", lambda: count)
+    return lambda count: monkeypatch.setattr(segment_decoder, "default_jobs", lambda: count)
 
 
 @pytest.mark.parametrize("count", [2, 3, 8])
 def test_threads_that_share_the_segments_show_what_one_does(count, many, threads):
     with athcodec.open(io.BytesIO(many)) as decoder:
         assert len(decoder.segments) == 7 and decoder.file.joins.any()
-        for level in (1, decoder.level_count - 1):
+        for level in (1, decoder.file.level_count - 1):
             threads(1)
             alone = decoder.positions(level=level)
             threads(count)
@@ -205,7 +205,7 @@ def test_threads_take_no_more_memory_than_is_allowed(many, threads, monkeypatch)
     """What one segment takes, without what another is joined to, is enough for all of them."""
     threads(3)
     with athcodec.open(io.BytesIO(many)) as decoder:
-        core, level = decoder.file.core, decoder.level_count - 1
+        core, level = decoder.file.core, decoder.file.level_count - 1
         expected, needed = decoder.positions(), core.segment_size(level) + core.work_size()
     sizes = []
     own = core_file.Segment.__init__
@@ -223,7 +223,7 @@ def test_damage_that_one_of_the_threads_meets_is_refused(many, threads):
     threads(3)
     data = bytearray(many)
     with athcodec.open(io.BytesIO(many)) as decoder:
-        intact, level = decoder.positions(slice(0, 36)), decoder.level_count - 1
+        intact, level = decoder.positions(slice(0, 36)), decoder.file.level_count - 1
         last = [chunk for chunk in decoder.file.chunks if chunk.segment == 5 and chunk.level == level][-1]
     data[last.offset + last.length // 2] ^= 1
     with athcodec.open(io.BytesIO(bytes(data))) as decoder:

@@ -49,7 +49,7 @@ def check_levels(clip, path, name: str | None = None) -> None:
             errors = np.linalg.norm(played.positions(level=level.level).astype(np.float64) - source, axis=2)
             assert errors.max() <= level.max_error * (1 + ROUNDING) + rounding
             assert np.sqrt(np.mean(errors**2)) <= level.rms_error * (1 + ROUNDING) + rounding
-        assert errors.max() <= decoder.max_error_bound
+        assert errors.max() <= decoder.file.max_error_bound
 
 
 # ---- what a ladder is ----
@@ -94,8 +94,8 @@ def test_prefixes_of_a_file_with_layers_are_a_fraction_and_the_whole_little_more
     alone, layers = sample_files
     assert layers.bytes < 1.06 * alone.bytes
     with athcodec.open(alone.path) as one, athcodec.open(layers.path) as several:
-        assert several.level_count == one.level_count + 2
-        least, first = several.levels[0], several.levels[one.level_count - 1]
+        assert several.file.level_count == one.file.level_count + 2
+        least, first = several.levels[0], several.levels[one.file.level_count - 1]
         assert least.bytes < 0.6 * one.levels[0].bytes
         assert first.bytes < 0.2 * one.levels[-1].bytes
         assert first.max_error < 2e-2 * alone.max_error_bound / alone.relative_bound
@@ -107,7 +107,7 @@ def test_levels_have_the_errors_of_the_table(bushy_clip, layered):
 
 def test_layers_play_alike_whatever_was_played_before(layered):
     with athcodec.open(layered) as decoder:
-        last = decoder.level_count - 1
+        last = decoder.file.level_count - 1
         down = {level: decoder.positions(20, level) for level in range(last, -1, -1)}
         up = {level: decoder.positions(20, level) for level in range(last + 1)}
         assert all((down[level] == up[level]).all() for level in up)
@@ -129,7 +129,7 @@ def test_poses_are_as_precise_as_the_deepest_level_that_is_there(layered_ath, bu
     with athcodec.open(layered_ath) as whole:
         poses = [whole.level_rest(level.level) for level in whole.levels]
         refined = [chunk.level for chunk in whole.file.chunks if chunk.kind == ct.REFINED_REST]
-        deepest, diagonal = whole.rest, np.linalg.norm(np.ptp(bushy_clip.positions.reshape(-1, 3), axis=0))
+        deepest, diagonal = whole.file.rest, np.linalg.norm(np.ptp(bushy_clip.positions.reshape(-1, 3), axis=0))
         assert np.linalg.norm(deepest - bushy_clip.rest, axis=1).max() <= SOURCE_REST_TOLERANCE * diagonal
     errors = [np.abs(pose - poses[-1]).max() for pose in poses]
     assert refined == [len(poses) - 2, len(poses) - 1]
@@ -137,8 +137,9 @@ def test_poses_are_as_precise_as_the_deepest_level_that_is_there(layered_ath, bu
     for level, pose in enumerate(poses):
         athcodec.truncate(layered_ath, tmp_path / "cut.ath", level)
         with athcodec.open(tmp_path / "cut.ath", strict=True) as cut:
-            assert np.array_equal(cut.level_rest(), pose) and np.array_equal(cut.rest, cut_rest(layered_ath, level))
-    assert np.array_equal(cut.rest, deepest)
+            assert np.array_equal(cut.level_rest(), pose)
+            assert np.array_equal(cut.file.rest, cut_rest(layered_ath, level))
+    assert np.array_equal(cut.file.rest, deepest)
 
 
 @pytest.fixture(scope="module")
@@ -165,14 +166,14 @@ def test_a_rest_pose_that_is_cut_off_leaves_level_0(in_steps, tmp_path):
     path, _ = in_steps
     with athcodec.open(path) as whole:
         chunk = next(chunk for chunk in whole.file.chunks if chunk.kind == ct.REFINED_REST)
-        for level in (0, 1, whole.level_count - 1):
+        for level in (0, 1, whole.file.level_count - 1):
             athcodec.truncate(path, tmp_path / "cut.ath", level)
             with athcodec.open(tmp_path / "cut.ath", strict=True) as cut:
                 assert (chunk.level in [own.level for own in cut.file.chunks if own.kind == chunk.kind]) == (level > 0)
                 assert np.array_equal(cut.positions(7), whole.positions(7, level))
                 assert np.array_equal(cut.level_rest(level), whole.level_rest(level))
         with athcodec.open(BytesIO(path.read_bytes()[: chunk.offset + 1])) as part:
-            assert part.deepest == 0 and np.array_equal(part.positions(7), whole.positions(7, 0))
+            assert part.file.deepest == 0 and np.array_equal(part.positions(7), whole.positions(7, 0))
             assert np.array_equal(part.affines(7).matrices, whole.affines(7, 0).matrices)
 
 
@@ -189,7 +190,7 @@ def test_level_1_refines_no_rest_pose_where_it_may_not(roots, options, tmp_path)
 def test_asking_for_the_rest_pose_reads_the_rest_poses_alone_and_once(layered_ath):
     with athcodec.open(layered_ath) as decoder:
         before = decoder.file.bytes_read
-        assert np.array_equal(decoder.rest, decoder.rest) and np.array_equal(
+        assert np.array_equal(decoder.file.rest, decoder.file.rest) and np.array_equal(
             decoder.level_rest(0), decoder.level_rest(1)
         )
         sizes = [chunk.length for chunk in decoder.file.chunks if chunk.kind in (ct.REFINED_REST, ct.SOURCE_REST)]
@@ -199,7 +200,7 @@ def test_asking_for_the_rest_pose_reads_the_rest_poses_alone_and_once(layered_at
 def test_maps_are_from_the_rest_pose_of_their_level(layered_ath):
     """Least-squares fits from the rest pose of another layer fit less well."""
     with athcodec.open(layered_ath) as decoder:
-        order, deepest = decoder.hierarchy.vertex_source, decoder.level_count - 1
+        order, deepest = decoder.file.hierarchy.vertex_source, decoder.file.level_count - 1
         parts = decoder.affines(20, deepest)
         shown = decoder.positions(20, deepest, np.float64)[order]
         matrices = np.repeat(parts.matrices, parts.vertex_count, axis=0)
@@ -219,8 +220,8 @@ def test_a_damaged_rest_pose_hides_the_levels_of_its_layer(layered_ath):
         coarse, rest = whole.positions(20, chunk.level - 1), cut_rest(layered_ath, chunk.level - 1)
     data[chunk.offset] ^= 1
     with athcodec.open(BytesIO(data), allow_partial=True) as part:
-        assert part.deepest == chunk.level - 1
-        assert np.array_equal(part.positions(20), coarse) and np.array_equal(part.rest, rest)
+        assert part.file.deepest == chunk.level - 1
+        assert np.array_equal(part.positions(20), coarse) and np.array_equal(part.file.rest, rest)
     with athcodec.open(BytesIO(data)) as strict, pytest.raises(BadChecksum, match=str(chunk)):
         strict.positions(20)
 
@@ -257,7 +258,7 @@ def test_layers_take_no_more_memory_than_the_limit(tmp_path):
     athcodec.encode(clip, tmp_path / "a.ath", rel_error=1e-5, effort="fast", ladder=LADDER)
     limits = ct.Limits(memory_bytes=572 * clip.vertex_count)
     with athcodec.open(tmp_path / "a.ath", limits=limits) as decoder:
-        last = decoder.level_count - 1
+        last = decoder.file.level_count - 1
         assert np.isfinite(decoder.positions(level=last - 3)).all()
         with pytest.raises(LimitExceeded, match=rf"level {last}: got layers of \d+ bytes; the limit is"):
             decoder.positions(level=last)
@@ -280,7 +281,7 @@ def test_deep_hierarchies_and_long_ladders_have_as_many_layers_as_a_file_may(los
     for name, clip, layers in (("a", deep, 2 - lossless), ("b", wide, 8)):
         check_levels(clip, tmp_path / f"{name}.ath")
         with athcodec.open(tmp_path / f"{name}.ath") as decoder:
-            assert decoder.level_count <= 32
+            assert decoder.file.level_count <= 32
             assert sum(level.name.startswith("layer") for level in decoder.levels) == (layers if layers > 1 else 0)
 
 
@@ -322,7 +323,7 @@ def test_truncate_keeps_the_first_level_within_an_error(layered, tmp_path):
     for level in levels:
         athcodec.truncate(layered, tmp_path / "cut.ath", max_error=level.max_error)
         with athcodec.open(tmp_path / "cut.ath") as cut:
-            kept = cut.level_count - 1
+            kept = cut.file.level_count - 1
         assert levels[kept].max_error <= level.max_error
         assert all(before.max_error > level.max_error for before in levels[:kept])
 

@@ -116,7 +116,7 @@ def test_memory_that_fails_for_the_core_leaves_a_decoder_that_goes_on(sample_ath
         scarce.left = failures + 1
         try:
             with athcodec.open(sample_ath) as decoder:
-                for level in (0, decoder.level_count - 1):
+                for level in (0, decoder.file.level_count - 1):
                     decoder.positions(0, level)
             done = True
         except MemoryError:

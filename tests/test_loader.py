@@ -105,13 +105,13 @@ def test_react_draws_a_plant_that_use_loader_of_fiber_loads(layered_ath):
     install_once(folder, " ".join(packages), install)
     found = node(NODE / "use_loader.mjs", folder, layered_ath)
     with athcodec.open(layered_ath) as decoder:
-        assert f"of {decoder.level_count} levels" in found["drawn"] and found["errors"] == []
+        assert f"of {decoder.file.level_count} levels" in found["drawn"] and found["errors"] == []
 
 
 def test_damage_is_named_and_other_segments_are_shown_at_their_deepest_level(layered_ath, tmp_path):
     data = bytearray(layered_ath.read_bytes())
     with athcodec.open(layered_ath) as decoder:
-        deepest = decoder.level_count - 1
+        deepest = decoder.file.level_count - 1
         chunk = next(c for c in decoder.file.chunks if c.is_motion and (c.level, c.segment) == (deepest, 1))
         data[chunk.offset] ^= 1
     path = tmp_path / "damaged.ath"
@@ -143,7 +143,7 @@ def test_abort_ends_downloads_and_what_is_here_goes_on_playing(layered_ath):
 @pytest.mark.parametrize("with_faces", [False, True])
 def test_a_wind_shows_the_blended_clips_of_the_decoder(with_faces, sample_clip, mesh_ath, tmp_path):
     with athcodec.open(mesh_ath) as decoder:
-        source = athcodec.ClipView(decoder, decoder.deepest) if with_faces else sample_clip
+        source = athcodec.ClipView(decoder, decoder.file.deepest) if with_faces else sample_clip
         clip = athcodec.MotionClip(
             source.block(0, 40), np.arange(40) / 30, source.vertex_branch, source.branch_parent, source.rest,
             source.edges, source.faces,

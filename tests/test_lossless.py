@@ -27,16 +27,16 @@ def test_the_last_level_has_every_bit_of_positions_and_rest_pose(dtype, bound, t
     decoder = opened(encoded(clip, path=tmp_path / "a.ath", segment_frames=16, **bound), strict=True)
     assert bits(decoder.positions()) == bits(clip.positions) and decoder.positions().dtype == dtype
     assert bits(decoder.positions(17)) == bits(clip.positions[17])
-    assert bits(decoder.rest.astype(clip.rest_dtype)) == bits(clip.rest.astype(clip.rest_dtype))
-    assert decoder.max_error_bound == 0 and decoder.levels[-1].max_error == 0
+    assert bits(decoder.file.rest.astype(clip.rest_dtype)) == bits(clip.rest.astype(clip.rest_dtype))
+    assert decoder.file.max_error_bound == 0 and decoder.levels[-1].max_error == 0
 
 
 def test_the_level_before_keeps_the_bound_and_plays_as_without(tmp_path):
     clip = plant(seed=4, branches=9, frames=40)
     lossless = opened(encoded(clip, path=tmp_path / "a.ath", rel_error=1e-4))
     with coded(clip, tmp_path / "b.ath", rel_error=1e-4, exact_rest=True) as lossy:
-        assert lossless.level_count == lossy.level_count + 1
-        for level in range(lossy.level_count):
+        assert lossless.file.level_count == lossy.file.level_count + 1
+        for level in range(lossy.file.level_count):
             assert bits(lossless.positions(level=level)) == bits(lossy.positions(level=level))
 
 
@@ -44,7 +44,7 @@ def test_the_hierarchy_is_as_deep_as_that_of_the_lossy_file(tmp_path):
     clip = plant(seed=4, branches=9, frames=40)
     lossless = opened(encoded(clip, path=tmp_path / "a.ath", rel_error=1e-4, ladder="none"))
     lossy = athcodec.encode(clip, tmp_path / "b.ath", rel_error=1e-4, ladder="none")
-    assert lossless.full_level_count == len(lossy.levels) + 1
+    assert lossless.file.full_level_count == len(lossy.levels) + 1
     assert lossless.file.table1() == lossy.table1 == lossless.file.info()["ath"]
     assert lossy.table1["depth"] == len(lossy.levels) - 1
 
@@ -66,11 +66,11 @@ def test_numbers_that_arithmetic_would_change_come_back(dtype, tmp_path):
 def test_leaving_the_last_level_out_leaves_a_lossy_file(tmp_path):
     clip = plant(seed=5, branches=9, frames=40)
     data = encoded(clip, path=tmp_path / "a.ath", rel_error=1e-4)
-    deepest = opened(data).level_count - 1
+    deepest = opened(data).file.level_count - 1
     athcodec.truncate(tmp_path / "a.ath", tmp_path / "b.ath", deepest - 1)
     shorter = opened((tmp_path / "b.ath").read_bytes(), strict=True)
     assert bits(shorter.positions()) == bits(opened(data).positions(level=deepest - 1))
-    assert 0 < shorter.max_error_bound == shorter.levels[-1].max_error
+    assert 0 < shorter.file.max_error_bound == shorter.levels[-1].max_error
     cut = opened(data[: opened(data).file.levels[deepest - 1].bytes])
     assert bits(cut.positions()) == bits(shorter.positions())
 

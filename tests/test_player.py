@@ -161,11 +161,11 @@ def test_any_moment_in_any_order_is_what_python_decodes(lib, medley_ath):
         names = [clip.name for clip in file.file.clips]
         decoders = {name: athcodec.open(medley_ath, clip=name) for name in names}
         for _ in range(200):
-            clip, level = int(rng.integers(len(names))), int(rng.integers(-1, file.level_count))
+            clip, level = int(rng.integers(len(names))), int(rng.integers(-1, file.file.level_count))
             decoder = decoders[names[clip]]
             frame = int(rng.integers(decoder.frame_count))
             seconds = decoder.time[frame] - decoder.time[0]
-            shown = player.positions(file.vertex_count, seconds, level, clip)
+            shown = player.positions(file.file.vertex_count, seconds, level, clip)
             wanted = decoder.positions(frame, level=None if level < 0 else level)
             np.testing.assert_array_equal(shown, wanted)
         for decoder in decoders.values():
@@ -178,12 +178,12 @@ def test_between_frames_positions_are_between_theirs_also_where_segments_meet(li
         for frame in (0, 38, 39, 40, 79, 117):
             seconds = 0.25 * time[frame] + 0.75 * time[frame + 1] - time[0]
             wanted = 0.25 * positions[frame].astype(float) + 0.75 * positions[frame + 1]
-            np.testing.assert_allclose(player.positions(file.vertex_count, seconds), wanted, atol=1e-5)
+            np.testing.assert_allclose(player.positions(file.file.vertex_count, seconds), wanted, atol=1e-5)
 
 
 def test_matrices_and_exact_vertices_give_the_same_positions(lib, sample_ath):
     with athcodec.open(sample_ath) as file, Player(lib, sample_ath.read_bytes()) as player:
-        for level in range(file.level_count):
+        for level in range(file.file.level_count):
             nodes, exact, shown = c_int32(), c_int32(), c_int32(-1)
             core = c_void_p(lib.ath_player_file(player.player))
             lib.ath_cut_size(core, level, None, byref(nodes), byref(exact))
@@ -193,7 +193,7 @@ def test_matrices_and_exact_vertices_give_the_same_positions(lib, sample_ath):
                 player.player, 0, c_double(1.0), CLAMP, level, matrices.ctypes, runs.ctypes, byref(shown)
             )
             assert (result, shown.value) == (OK, level)
-            positions = player.positions(file.vertex_count, 1.0, level, order=FILE_ORDER)
+            positions = player.positions(file.file.vertex_count, 1.0, level, order=FILE_ORDER)
             found = {tuple(row) for row in positions.tolist()}
             assert np.isfinite(matrices).all() and len(matrices) + len(runs) > 0
             assert {tuple(row) for row in runs.tolist()} <= found
@@ -202,7 +202,7 @@ def test_matrices_and_exact_vertices_give_the_same_positions(lib, sample_ath):
 @pytest.mark.parametrize("share", [0.1, 0.35])
 def test_a_fade_is_between_its_levels(lib, sample_ath, share):
     with athcodec.open(sample_ath) as file, Player(lib, sample_ath.read_bytes()) as player:
-        fade, xyz = Fade(), np.empty((file.vertex_count, 3), np.float32)
+        fade, xyz = Fade(), np.empty((file.file.vertex_count, 3), np.float32)
         lib.ath_fade_to(byref(fade), 1, c_double(1.0))
         for _ in range(2):
             lib.ath_fade_to(byref(fade), 2, c_double(share))
@@ -212,7 +212,7 @@ def test_a_fade_is_between_its_levels(lib, sample_ath, share):
             player.player, 0, c_double(seconds), CLAMP, byref(fade), SOURCE_ORDER, xyz.ctypes, c_size_t(12)
         )
         assert result == OK
-        coarse, fine = (player.positions(file.vertex_count, seconds, level).astype(float) for level in (1, 2))
+        coarse, fine = (player.positions(file.file.vertex_count, seconds, level).astype(float) for level in (1, 2))
         weight = fade.weight[1]
         assert 0 < weight < 1
         np.testing.assert_allclose(xyz, (1 - weight) * coarse + weight * fine, atol=1e-5)
@@ -221,8 +221,8 @@ def test_a_fade_is_between_its_levels(lib, sample_ath, share):
 def test_of_a_prefix_the_deepest_level_that_is_there_is_shown(lib, sample_ath):
     data = sample_ath.read_bytes()
     with athcodec.open(sample_ath) as file:
-        wanted = [file.positions(5, level=level) for level in range(file.level_count)]
-        count = file.vertex_count
+        wanted = [file.positions(5, level=level) for level in range(file.file.level_count)]
+        count = file.file.vertex_count
     levels = set()
     for length in np.linspace(len(data) * 0.3, len(data), 25).astype(int):
         with Player(lib, data[:length]) as player:
@@ -372,32 +372,32 @@ def test_a_job_that_is_not_done_can_be_dropped(lib, sample_ath):
 def test_clips_are_blended_as_python_blends_them(lib, medley_ath):
     rng = np.random.default_rng(7)
     with athcodec.open(medley_ath) as file, Player(lib, medley_ath.read_bytes(), cache_bytes=1) as player:
-        names = [clip.name for clip in file.clips]
+        names = [clip.name for clip in file.file.clips]
         for _ in range(30):
             chosen = rng.permutation(len(names))[: rng.integers(1, 5)]
             seconds = {names[i]: float(rng.uniform(0, 2)) for i in chosen}
             weights = {name: float(rng.uniform(0.1, 1)) for name in seconds}
-            level = int(rng.integers(file.level_count))
+            level = int(rng.integers(file.file.level_count))
             shares = [Share(names.index(n), level, AS_MARKED, seconds[n], weights[n]) for n in seconds]
             unused = Share(len(names), 99, LOOP, 0.0, 0.0)
-            shown = player.blended(file.vertex_count, [*shares, unused])
+            shown = player.blended(file.file.vertex_count, [*shares, unused])
             np.testing.assert_array_equal(shown, file.blended(weights, seconds, level))
 
 
 def test_the_wind_chooses_what_is_blended(lib, medley_ath):
     with athcodec.open(medley_ath) as file, Player(lib, medley_ath.read_bytes()) as player:
-        names = [clip.name for clip in file.clips]
+        names = [clip.name for clip in file.file.clips]
         winds = [(2.0 + 6.0 * (i > 0), 90.0 * i) for i in range(len(names))]
         for strength, heading in ((0, 0), (5, 130), (8, 95), (99, 300)):
             weights = core_file.wind_weights(np.array(winds), strength, heading)
-            wanted = file.blended(dict(zip(names, weights.tolist())), 0.37)
-            np.testing.assert_array_equal(player.in_wind(file.vertex_count, winds, strength, heading, 0.37), wanted)
+            shown = player.in_wind(file.file.vertex_count, winds, strength, heading, 0.37)
+            np.testing.assert_array_equal(shown, file.blended(dict(zip(names, weights.tolist())), 0.37))
 
 
 def test_blends_without_a_weight_or_a_clip_or_memory_are_refused(lib, medley_ath):
     data, memory = medley_ath.read_bytes(), Memory()
     with athcodec.open(medley_ath) as file, Player(lib, data, memory) as player:
-        count, clips = file.vertex_count, len(file.clips)
+        count, clips = file.file.vertex_count, len(file.file.clips)
         for weights, clip in (([], 0), ([0.0], 0), ([float("nan")], 0), ([1.0] * 5, 0), ([1.0], clips), ([1.0], -1)):
             assert player.blended(count, [Share(clip, -1, CLAMP, 0.0, weight) for weight in weights]) == BAD_ARGUMENT
         memory.fails = memory.taken
@@ -427,7 +427,7 @@ def test_a_play_without_an_end_is_that_of_python_also_backwards(lib, scratch, sa
     path = scratch / "endless.ath"
     with coded(athcodec.endless(sample_clip), path, rel_error=1e-3) as file, Player(lib, path.read_bytes()) as player:
         ways = [Transition(*way) for way in reversed(file.metadata["transitions"])]
-        play, table, xyz = Endless(), (Transition * len(ways))(*ways), np.empty((file.vertex_count, 3), np.float32)
+        play, table, xyz = Endless(), (Transition * len(ways))(*ways), np.empty((file.file.vertex_count, 3), np.float32)
         begin = lib.ath_player_endless_begin
         assert begin(player.player, byref(play), 0, table, len(ways), 9) == OK
         wanted = file.endless(seed=9)
@@ -464,8 +464,8 @@ def test_triangles_are_fans_of_the_faces_in_either_order(lib, scratch):
         wanted = fans(clip.attributes["face_vertex_counts"], clip.attributes["face_vertex_indices"])
         np.testing.assert_array_equal(player.lines("triangles", 3), wanted)
         own = player.lines("triangles", 3, FILE_ORDER)
-        there = player.positions(file.vertex_count, 0.1, order=FILE_ORDER)
-        np.testing.assert_array_equal(there[own], player.positions(file.vertex_count, 0.1)[wanted])
+        there = player.positions(file.file.vertex_count, 0.1, order=FILE_ORDER)
+        np.testing.assert_array_equal(there[own], player.positions(file.file.vertex_count, 0.1)[wanted])
 
 
 def test_lines_are_those_of_the_source_or_along_stems(lib, sample_ath, full_ath, full_clip, scratch, bushy_clip):

@@ -33,15 +33,15 @@ def test_a_rest_pose_that_was_given_comes_back_within_its_tolerance(bushy_clip, 
     with athcodec.open(tmp_path / "a.ath") as decoder:
         assert decoder.file.find(ct.SOURCE_REST)
         assert distance(decoder.level_rest(), bushy_clip.rest) > 10 * 1e-4 * size  # the bound
-        assert distance(decoder.rest, bushy_clip.rest) <= SOURCE_REST_TOLERANCE * size
+        assert distance(decoder.file.rest, bushy_clip.rest) <= SOURCE_REST_TOLERANCE * size
         assert distance(decoder.positions(), bushy_clip.block(0, bushy_clip.frame_count)) <= 1e-4 * size
-        for level in range(decoder.level_count):
+        for level in range(decoder.file.level_count):
             maps = decoder.affines(3, level)
             node = int(np.argmin(maps.is_stem))
             if maps.is_stem[node]:
                 continue
             some = slice(maps.first_vertex[node], maps.first_vertex[node] + maps.vertex_count[node])
-            vertices = decoder.hierarchy.vertex_source[some]
+            vertices = decoder.file.hierarchy.vertex_source[some]
             moved = decoder.level_rest(level)[vertices] @ maps.matrices[node, :, :3].T + maps.matrices[node, :, 3]
             assert distance(moved, decoder.positions(3, level)[vertices]) <= 1e-5 * size
 
@@ -63,7 +63,7 @@ def test_the_pose_that_is_chosen_makes_the_smaller_file(fraction, most, tmp_path
 @pytest.mark.parametrize("options", [{"exact_rest": True}, {"lossless": True}])
 def test_exact_rest_poses_come_back_bit_for_bit(bushy_clip, tmp_path, options):
     with coded(bushy_clip, tmp_path / "a.ath", **OPTIONS, **options) as decoder:
-        assert decoder.rest.tobytes() == bushy_clip.source_rest.tobytes()
+        assert decoder.file.rest.tobytes() == bushy_clip.source_rest.tobytes()
         assert not np.array_equal(decoder.level_rest(), bushy_clip.rest)
 
 
@@ -74,7 +74,7 @@ def test_a_rest_pose_that_was_made_is_not_stored(bushy_clip, tmp_path):
     assert not clip.rest_given and not clip.replace(metadata={}).rest_given and bushy_clip.rest_given
     with coded(clip, tmp_path / "a.ath", **OPTIONS) as decoder:
         assert decoder.file.find(ct.SOURCE_REST) is None
-        assert np.array_equal(decoder.rest, np.float32(decoder.level_rest()))
+        assert np.array_equal(decoder.file.rest, np.float32(decoder.level_rest()))
 
 
 def test_shortened_files_keep_the_rest_pose(bushy_clip, tmp_path):
@@ -86,7 +86,7 @@ def test_shortened_files_keep_the_rest_pose(bushy_clip, tmp_path):
                 whole.file.find(ct.SOURCE_REST)
             )
             closest = distance(cut.level_rest(), whole.level_rest())
-            assert distance(cut.rest, whole.rest) <= 4 * closest + 1e-6
+            assert distance(cut.file.rest, whole.file.rest) <= 4 * closest + 1e-6
 
 
 def test_a_damaged_rest_pose_is_refused_by_those_who_ask_for_it(bushy_clip, tmp_path):
@@ -97,7 +97,7 @@ def test_a_damaged_rest_pose_is_refused_by_those_who_ask_for_it(bushy_clip, tmp_
     with athcodec.open(BytesIO(data)) as decoder:
         assert decoder.positions(3).shape == decoder.level_rest().shape
         with pytest.raises(BadChecksum, match="SOURCE_REST"):
-            decoder.rest  # noqa: B018
+            decoder.file.rest  # noqa: B018
         with pytest.raises(BadChecksum, match="SOURCE_REST"):
             decoder.file.check()
 
@@ -105,13 +105,13 @@ def test_a_damaged_rest_pose_is_refused_by_those_who_ask_for_it(bushy_clip, tmp_
 def test_a_file_cut_off_behind_its_motion_says_that_the_rest_pose_is_missing(bushy_clip, tmp_path):
     data = athcodec.encode(bushy_clip, tmp_path / "a.ath", **OPTIONS).path.read_bytes()
     with athcodec.open(tmp_path / "a.ath") as whole:
-        assert not whole.file.rest_is_missing and not whole.missing
+        assert not whole.file.rest_is_missing and not whole.file.missing
         end, motion = whole.file.levels[-1].bytes, whole.positions()
         assert end <= whole.file.find(ct.SOURCE_REST).offset
     with athcodec.open(BytesIO(data[:end])) as cut:
-        assert cut.file.rest_is_missing and cut.missing == "rest pose of the source"
+        assert cut.file.rest_is_missing and cut.file.missing == "rest pose of the source"
         assert np.array_equal(cut.positions(), motion)
-        assert np.array_equal(cut.rest, cut.level_rest().astype(cut.rest.dtype))
+        assert np.array_equal(cut.file.rest, cut.level_rest().astype(cut.file.rest.dtype))
         with pytest.raises(Truncated, match="SOURCE_REST"):
             cut.file.rest_at(0)
 
@@ -120,8 +120,8 @@ def test_joined_clips_share_both_poses(medley_clips, tmp_path):
     joined = athcodec.join(medley_clips)
     with coded(joined, tmp_path / "a.ath", **OPTIONS) as decoder:
         assert joined.rest_given == (decoder.file.find(ct.SOURCE_REST) is not None)
-        assert distance(decoder.rest, joined.rest) <= SOURCE_REST_TOLERANCE * diagonal(joined)
-        for clip in decoder.clips:
+        assert distance(decoder.file.rest, joined.rest) <= SOURCE_REST_TOLERANCE * diagonal(joined)
+        for clip in decoder.file.clips:
             assert np.array_equal(decoder.play(clip.name).level_rest(), decoder.level_rest())
 
 

@@ -192,7 +192,7 @@ def test_any_clip_keeps_the_bound_and_decodes_as_the_document_says(scratch, clip
         found = athcodec.encode(clip, path, max_error=bound, ladder="none", segment_frames=segment_frames)
     positions = clip.block(0, clip.frame_count).astype(float)
     with athcodec.open(path, strict=True) as decoder:
-        for level in range(decoder.level_count):
+        for level in range(decoder.file.level_count):
             shown = decoder.positions(level=level)
             error = np.linalg.norm(shown.astype(float) - positions, axis=2).max()
             assert error <= decoder.levels[level].max_error * (1 + 1e-9)
@@ -217,7 +217,7 @@ def test_several_clips_and_loops_play(always, tmp_path):
     with athcodec.open(tmp_path / "a.ath") as decoder:
         for name, clip in clips.items():
             shown = decoder.play(name).positions().astype(float)
-            assert np.linalg.norm(shown - clip.positions, axis=2).max() <= decoder.max_error_bound
+            assert np.linalg.norm(shown - clip.positions, axis=2).max() <= decoder.file.max_error_bound
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
@@ -225,7 +225,7 @@ def test_the_sources_own_numbers_come_back(always, dtype, tmp_path):
     clip = plant(seed=3, branches=9, frames=40, dtype=dtype, offset=5.0)
     assert size(clip, tmp_path, 1e-3, lossless=True).choices["motion"] == "predicted"
     decoder = opened((tmp_path / "a.ath").read_bytes(), strict=True)
-    assert decoder.level_count == 3 and decoder.positions().tobytes() == clip.positions.tobytes()
+    assert decoder.file.level_count == 3 and decoder.positions().tobytes() == clip.positions.tobytes()
     before = decoder.positions(level=1).astype(float)
     assert np.linalg.norm(before - clip.positions, axis=2).max() <= decoder.levels[1].max_error
 

@@ -193,7 +193,7 @@ def runs(decoder: athcodec.Decoder, level: int, first: int, last: int) -> list[t
     """(start, stop) of the chunks that the segments need behind what is read ahead, joined where they are
     close."""
     joined: list[list[int]] = []
-    kinds = (16,) if level == decoder.full_level_count - 1 else (16, 17)
+    kinds = (16,) if level == decoder.file.full_level_count - 1 else (16, 17)
     for chunk in decoder.file.chunks:
         wanted = chunk.kind in kinds or (chunk.kind == 18 and chunk.level == level)
         if wanted and chunk.is_motion and chunk.level <= level and first <= chunk.segment <= last:
@@ -206,7 +206,7 @@ def runs(decoder: athcodec.Decoder, level: int, first: int, last: int) -> list[t
 
 
 def test_a_segment_is_one_request_for_each_run_of_its_chunks(server, local):
-    level, segment = local.level_count - 1, len(local.segments) - 1
+    level, segment = local.file.level_count - 1, len(local.segments) - 1
     frame = local.segments[segment][0]
     wanted = runs(local, level, segment, segment)
     assert len(wanted) > 1
@@ -257,14 +257,14 @@ def test_a_short_file_is_one_request_in_all(server, full_ath, full_clip):
     metadata = full_clip.metadata | {"hierarchy_thresholds": {"epsilon": 0, "xi": 0, "eta": 0, "lambda": 0}}
     with athcodec.open(server.url) as decoder:
         decoder.file.check()
-        assert decoder.metadata == metadata and list(decoder.attributes) == list(full_clip.attributes)
+        assert decoder.metadata == metadata and list(decoder.file.attributes) == list(full_clip.attributes)
         assert decoder.file.source.requests == 1 and decoder.file.source.bytes == len(server.data)
 
 
 def test_a_prefix_on_a_server_plays_the_levels_that_are_there(server, local):
     server.data = server.data[: local.levels[1].bytes + 10]
     with athcodec.open(server.url) as decoder:
-        assert decoder.deepest == 1 and not decoder.file.complete
+        assert decoder.file.deepest == 1 and not decoder.file.complete
         assert np.array_equal(decoder.positions(), local.positions(level=1))
         with pytest.raises(LevelUnavailable, match="cut off"):
             decoder.positions(level=2)
@@ -471,7 +471,7 @@ def test_another_file_of_the_same_length_is_met_by_its_checksums(server):
 def test_the_command_reads_urls_and_says_what_it_took(server, local, tmp_path, capsys):
     assert cli.main(["info", server.url, "--json", "--stats"]) == 0
     out, err = capsys.readouterr()
-    assert json.loads(out)["vertices"] == local.vertex_count and json.loads(out)["file"] == server.url
+    assert json.loads(out)["vertices"] == local.file.vertex_count and json.loads(out)["file"] == server.url
     assert err == f"athcodec: stats: 1 request, {READ_AHEAD:,} bytes fetched of {len(server.data):,}\n"
     assert cli.main(["verify", server.url, "--stats"]) == 0
     assert f"2 requests, {len(server.data):,} bytes" in capsys.readouterr().err
@@ -526,7 +526,7 @@ def test_the_command_reads_other_systems_and_says_what_it_took(other_url, local,
     size, out = local.file.file_length, tmp_path / "a.h5"
     assert cli.main(["info", other_url, "--json", "--stats"]) == 0
     printed, err = capsys.readouterr()
-    assert json.loads(printed)["vertices"] == local.vertex_count
+    assert json.loads(printed)["vertices"] == local.file.vertex_count
     assert err == f"athcodec: stats: 2 requests, {READ_AHEAD:,} bytes fetched of {size:,}\n"
     assert cli.main(["verify", other_url, "--stats"]) == 0
     assert f"3 requests, {size:,} bytes" in capsys.readouterr().err

@@ -55,7 +55,7 @@ def test_held_poses_take_few_bytes_more_than_the_poses(poses, tmp_path):
 def test_repeats_have_the_very_positions_at_every_level(poses, tmp_path, ladder):
     encoded(held(poses, 3), tmp_path / "held.ath", ladder=ladder)
     with athcodec.open(tmp_path / "held.ath") as decoder:
-        for level in range(decoder.level_count):
+        for level in range(decoder.file.level_count):
             positions = decoder.positions(level=level)
             assert np.array_equal(positions, np.repeat(positions[::3], 3, axis=0))
 

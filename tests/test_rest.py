@@ -134,7 +134,7 @@ def test_the_document_plays_the_same_still_mesh(scratch, ladder):
     athcodec.encode(still(terrain(12, 9, 0.1, 7), 2), scratch / "still.ath", rel_error=1e-4, ladder=ladder)
     data = (scratch / "still.ath").read_bytes()
     with athcodec.open(scratch / "still.ath") as decoder:
-        for level in range(decoder.level_count):
+        for level in range(decoder.file.level_count):
             assert decoder.positions(level=level).tobytes() == File(data).positions(level).tobytes()
 
 

@@ -22,7 +22,7 @@ def test_a_rig_is_as_far_off_as_it_says(sample_ath, tmp_path, name):
     with athcodec.open(sample_ath) as decoder:
         written = athcodec.write(ClipView(decoder), tmp_path / name, rig=200)
         positions = decoder.positions(slice(0, decoder.frame_count)).astype(np.float64)
-        diagonal = np.linalg.norm(np.ptp(decoder.rest, axis=0))
+        diagonal = np.linalg.norm(np.ptp(decoder.file.rest, axis=0))
     with athcodec.read(tmp_path / name) as clip:
         off = np.linalg.norm(clip.block(0, clip.frame_count) - positions, axis=2).max()
     assert off == pytest.approx(written.facts["max_error"], abs=2e-6) and off < 2e-3 * diagonal
@@ -39,7 +39,7 @@ def test_more_joints_are_closer(sample_ath, sample_clip, tmp_path):
 
 def test_joints_are_a_tree_over_the_branches_and_weights_add_up_to_one(sample_ath):
     with athcodec.open(sample_ath) as decoder:
-        rig, branch, parents = fit_rig(ClipView(decoder), 256), decoder.vertex_branch, decoder.branch_parent
+        rig, branch, parents = fit_rig(ClipView(decoder), 256), decoder.file.vertex_branch, decoder.file.branch_parent
     assert rig.names[0] == "root" and rig.parent[0] == -1
     assert (rig.parent[1:] < np.arange(1, len(rig.parent))).all() and (rig.parent[1:] >= 0).all()
     assert np.allclose(rig.weights.sum(axis=1), 1) and (rig.weights >= 0).all()
@@ -64,7 +64,7 @@ def test_a_stage_has_the_root_skeleton_and_animations_that_usd_skel_asks_for(sev
     with athcodec.open(path) as decoder, athcodec.read(tmp_path / "a.usda") as clip:
         first = decoder.play(names[0])
         off = clip.block(0, first.frame_count) - first.positions(slice(0, first.frame_count))
-        assert np.linalg.norm(off, axis=2).max() < 0.05 * np.linalg.norm(np.ptp(decoder.rest, axis=0))
+        assert np.linalg.norm(off, axis=2).max() < 0.05 * np.linalg.norm(np.ptp(decoder.file.rest, axis=0))
         assert clip.not_read == {"SkelAnimation": [f"/clip/skeleton/{name}" for name in names[1:]]}
 
 

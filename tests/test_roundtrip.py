@@ -33,14 +33,14 @@ def assert_comes_back(clip: MotionClip, folder, fraction: float = 1e-3, **option
         decoder.file.check()
         decoded = decoder.positions()
         assert decoded.dtype == clip.dtype and decoded.shape == clip.positions.shape
-        assert largest_error(decoded, clip) <= bound == decoder.max_error_bound
-        assert np.array_equal(decoder.vertex_branch, clip.vertex_branch)
-        assert np.array_equal(decoder.branch_parent, clip.branch_parent)
+        assert largest_error(decoded, clip) <= bound == decoder.file.max_error_bound
+        assert np.array_equal(decoder.file.vertex_branch, clip.vertex_branch)
+        assert np.array_equal(decoder.file.branch_parent, clip.branch_parent)
         assert np.array_equal(decoder.time, clip.time)
         if clip.stem_index is None:
-            assert decoder.stem_index is None
+            assert decoder.file.stem_index is None
         else:
-            assert np.array_equal(decoder.stem_index, clip.stem_index)
+            assert np.array_equal(decoder.file.stem_index, clip.stem_index)
 
 
 def reopened(clip: MotionClip, folder, **options) -> athcodec.Decoder:
@@ -146,25 +146,25 @@ def test_the_bound_does_not_depend_on_what_tam_accepts(tam, scratch):
 
 def test_one_accepted_plant_is_one_node_and_two_levels(scratch):
     decoder = reopened(plant(seed=4, branches=15, frames=20), scratch, tam=Thresholds(1e9, 0, 1e9, 0), ladder="none")
-    assert decoder.file.table1()["nodes"] == 1 and decoder.level_count == 2
+    assert decoder.file.table1()["nodes"] == 1 and decoder.file.level_count == 2
 
 
 def test_chains_fold_the_depths_beyond_29_into_one_level(scratch):
     decoder = reopened(chain_plant(45, 2), scratch, tam=Thresholds(0, 0, 0, 0), ladder="none")
-    assert decoder.file.table1()["depth"] == 30 and decoder.full_level_count == 31
+    assert decoder.file.table1()["depth"] == 30 and decoder.file.full_level_count == 31
 
 
 def test_float64_output_of_a_float32_file_is_within_the_bound_too(bushy_ath, bushy_clip):
     with athcodec.open(bushy_ath) as decoder:
         wide = decoder.positions(dtype=np.float64)
-        assert wide.dtype == np.float64 and largest_error(wide, bushy_clip) <= decoder.max_error_bound
+        assert wide.dtype == np.float64 and largest_error(wide, bushy_clip) <= decoder.file.max_error_bound
 
 
 def test_a_float64_source_gives_float64_and_errors_below_what_float32_could_tell(scratch):
     clip = plant(seed=6, branches=4, frames=16, dtype=np.float64, offset=1e4)
     bound = float(np.spacing(np.float32(1e4))) / 1000
     decoder = reopened(clip, scratch, rel_error=None, max_error=bound)
-    assert decoder.dtype == np.float64 and largest_error(decoder.positions(), clip) <= bound
+    assert decoder.file.dtype == np.float64 and largest_error(decoder.positions(), clip) <= bound
 
 
 def test_a_static_clip_costs_no_more_than_its_rest_pose(scratch):
@@ -210,8 +210,8 @@ def test_a_clip_without_a_rest_pose_gets_one_from_its_frames(rest_pose, scratch)
     clip = MotionClip(source.positions, source.time, source.vertex_branch, source.branch_parent, rest_pose=rest_pose)
     expected = source.positions[0] if rest_pose == "first" else source.positions.mean(axis=0, dtype=np.float64)
     decoder = reopened(clip, scratch)
-    assert np.linalg.norm(decoder.rest - expected, axis=1).max() <= decoder.max_error_bound
-    assert largest_error(decoder.positions(), clip) <= decoder.max_error_bound
+    assert np.linalg.norm(decoder.file.rest - expected, axis=1).max() <= decoder.file.max_error_bound
+    assert largest_error(decoder.positions(), clip) <= decoder.file.max_error_bound
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
@@ -221,8 +221,8 @@ def test_an_exact_rest_pose_comes_back_bit_for_bit(dtype, scratch):
     rest[0, 0] = -0.0
     clip = source.replace(rest=rest)
     decoder = reopened(clip, scratch, exact_rest=True)
-    assert decoder.rest.dtype == dtype and decoder.rest.tobytes() == rest.tobytes()
-    assert largest_error(decoder.positions(), clip) <= decoder.max_error_bound
+    assert decoder.file.rest.dtype == dtype and decoder.file.rest.tobytes() == rest.tobytes()
+    assert largest_error(decoder.positions(), clip) <= decoder.file.max_error_bound
 
 
 # ---- static data ----
@@ -253,7 +253,7 @@ def same_array(got: np.ndarray, expected: np.ndarray) -> bool:
 
 @pytest.fixture(scope="module")
 def attributes_back(scratch):
-    return reopened(plant(frames=3).replace(attributes=ATTRIBUTES), scratch).attributes
+    return reopened(plant(frames=3).replace(attributes=ATTRIBUTES), scratch).file.attributes
 
 
 @pytest.mark.parametrize("name", ATTRIBUTES)
@@ -265,7 +265,7 @@ def test_a_named_array_comes_back_unchanged(name, attributes_back):
 def test_records_come_back_as_an_array_for_each_field(scratch):
     leaf = np.dtype([("uv", [("u", "<f4"), ("v", "<f4")]), ("normal", ">f4", (3,)), ("tag", "S2")], align=True)
     values = np.array([((1, 2), (0, 0, 1), b"a"), ((3, 4), (0, 1, 0), b"bc")], leaf)
-    back = reopened(plant(frames=3).replace(attributes={"leaf": values}), scratch).attributes
+    back = reopened(plant(frames=3).replace(attributes={"leaf": values}), scratch).file.attributes
     assert list(back) == ["leaf.uv.u", "leaf.uv.v", "leaf.normal", "leaf.tag"]
     for name, got in back.items():
         expected = values
@@ -281,7 +281,7 @@ def test_edges_keep_their_type_whether_they_follow_from_the_hierarchy_or_not(dty
     sizes = []
     for edges in (derived, derived[::-1].copy()):
         decoder = reopened(source.replace(edges=edges), scratch)
-        assert same_array(decoder.edges, edges.astype(edges.dtype.newbyteorder("<")))
+        assert same_array(decoder.file.edges, edges.astype(edges.dtype.newbyteorder("<")))
         sizes.append(decoder.file.find(ct.EDGES).length)
     assert sizes[0] == 1 < sizes[1], "edges that follow from the hierarchy cost next to nothing"
 
@@ -291,7 +291,7 @@ def test_edges_keep_their_type_whether_they_follow_from_the_hierarchy_or_not(dty
 )
 def test_faces_come_back_unchanged(faces, scratch):
     expected = faces.astype(faces.dtype.newbyteorder("<"))
-    assert same_array(reopened(plant(frames=3).replace(faces=faces), scratch).faces, expected)
+    assert same_array(reopened(plant(frames=3).replace(faces=faces), scratch).file.faces, expected)
 
 
 @pytest.mark.parametrize(
@@ -308,16 +308,16 @@ def test_metadata_come_back_unchanged(metadata, scratch):
 
 
 def test_a_clip_without_static_data_has_none_in_its_file(scratch):
-    decoder = reopened(plant(frames=3), scratch)
-    assert decoder.faces is None and decoder.edges is None and decoder.attributes == {} and decoder.metadata == {}
+    file = reopened(plant(frames=3), scratch).file
+    assert file.faces is None and file.edges is None and file.attributes == {} and file.metadata == {}
 
 
 def test_attributes_none_keeps_the_motion_and_the_units_alone(full_clip, scratch):
     bare, full = (reopened(full_clip, scratch, attributes=which) for which in ("none", "all"))
-    assert bare.faces is None and bare.edges is None and bare.attributes == {}
+    assert bare.file.faces is None and bare.file.edges is None and bare.file.attributes == {}
     assert bare.metadata == {"unit": "m", "up_axis": "y"} and full.metadata == full_clip.metadata
     apart = np.linalg.norm(bare.positions().astype(float) - full.positions(), axis=2).max()
-    assert apart <= 2 * bare.max_error_bound and bare.file.file_length < full.file.file_length
+    assert apart <= 2 * bare.file.max_error_bound and bare.file.file_length < full.file.file_length
 
 
 TOO_MUCH = {

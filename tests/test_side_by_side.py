@@ -57,7 +57,7 @@ def test_the_page_holds_the_motions_and_what_trembles(page, sample_ath, sample_p
     assert "level 3" in fine["name"] and "tick ratio" in fine["about"][1]
     with athcodec.open(sample_ath) as decoder:
         decoded = [sample_positions, decoder.positions(level=0), decoder.positions(level=3)]
-        bounds = [None] + [max(decoder.levels[level].max_error, decoder.max_error_bound) for level in (0, 3)]
+        bounds = [None] + [max(decoder.levels[level].max_error, decoder.file.max_error_bound) for level in (0, 3)]
     low, high = (edge([edge(shown, axis=(0, 1)) for shown in decoded], axis=0) for edge in (np.min, np.max))
     cell = (high - low).max() / 2 / data["grid"]
     for panel, expected, bound in zip(data["panels"], decoded, bounds, strict=True):
@@ -91,7 +91,7 @@ def test_motion_of_another_codec_is_a_panel_too_and_a_loop_ends_where_it_begins(
     assert foreign["name"] == "rough.npz" and foreign["seams"] == []
     assert ours["seams"] == [0]
     with athcodec.open(tmp_path / "loop.ath") as decoder:
-        bound, decoded = decoder.max_error_bound, decoder.positions()
+        bound, decoded = decoder.file.max_error_bound, decoder.positions()
     heat = unpacked(ours["heat"], "u1", 100, 1001)
     expected = jerks(loop.block(0, 100).astype(float), decoded, loop=True) / bound * 64
     assert np.abs(heat - np.minimum(expected, 255)).max() <= 0.51 and heat[[0, -1]].any()
@@ -122,7 +122,7 @@ def test_smoothness_is_a_table_and_a_picture(sample_positions, tmp_path, capsys)
 @pytest.mark.browser
 def test_the_page_plays_and_lights_what_trembles(page, sample_ath, sample_positions):
     with athcodec.open(sample_ath) as decoder:
-        bound = decoder.max_error_bound
+        bound = decoder.file.max_error_bound
         jerk = jerks(sample_positions.astype(float), decoder.positions()) / bound
     frame, errors = int((jerk > 1).sum(axis=1).argmax()), []
     with chromium() as browser:

@@ -53,7 +53,7 @@ def rms_errors(decoder, source: np.ndarray) -> list[float]:
 def check_levels(clip, path, **options) -> None:
     bound = athcodec.encode(clip, path, attributes="none", **options).max_error_bound
     with athcodec.open(path) as decoder:
-        for own, (start, stop) in zip(decoder.clips, clip.clip_range_frames):
+        for own, (start, stop) in zip(decoder.file.clips, clip.clip_range_frames):
             for before, after in pairwise(rms_errors(decoder.play(own.name), clip.block(start, stop))):
                 assert after <= RISE * before + PART * bound, (own.name, before, after)
 

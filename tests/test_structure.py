@@ -36,7 +36,7 @@ FORBIDDEN = {
     "decoding/container.py": "import athcodec.encoding.streams",
     "encoding/features.py": "import athcodec.sources.raw",
     "exporters/mdd.py": "def f():\n    import athcodec.encoding",
-    "motion/hierarchy.py": "import athcodec.motion.joining, athcodec.motion.discovery",
+    "motion/hierarchy.py": "import athcodec.motion.joining, athcodec.motion.branches.finding",
 }
 
 

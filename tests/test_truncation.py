@@ -22,9 +22,10 @@ class Whole:
             self.chunks, self.levels = decoder.file.chunks, decoder.levels
             self.prelude = decoder.file.prelude_length
             self.segments, self.header = decoder.segments, decoder.file.header
-            self.positions = [decoder.positions(level=level) for level in range(decoder.level_count)]
-            self.bound, self.attributes = decoder.max_error_bound, decoder.attributes
-            self.poses = [decoder.level_rest(level).astype(decoder.rest.dtype) for level in range(decoder.level_count)]
+            self.positions = [decoder.positions(level=level) for level in range(decoder.file.level_count)]
+            self.bound, self.attributes = decoder.file.max_error_bound, decoder.file.attributes
+            dtype, count = decoder.file.rest.dtype, decoder.file.level_count
+            self.poses = [decoder.level_rest(level).astype(dtype) for level in range(count)]
 
     def cut(self, size: int, **options) -> athcodec.Decoder:
         return athcodec.open(BytesIO(self.data[:size]), **options)
@@ -52,7 +53,7 @@ def full(full_ath):
 
 def assert_plays_as_far_as_it_goes(whole: Whole, size: int) -> None:
     decoder, deepest = whole.cut(size), whole.deepest_within(size)
-    assert not decoder.file.complete and decoder.missing and "\n" not in decoder.missing
+    assert not decoder.file.complete and decoder.file.missing and "\n" not in decoder.file.missing
     assert [level.available for level in decoder.levels] == [d <= deepest for d in range(len(whole.levels))]
     with pytest.raises(Truncated):
         decoder.file.check()
@@ -60,10 +61,10 @@ def assert_plays_as_far_as_it_goes(whole: Whole, size: int) -> None:
         with pytest.raises(Truncated, match="level 0"):
             decoder.positions()
     else:
-        assert decoder.deepest == deepest
+        assert decoder.file.deepest == deepest
         assert np.array_equal(decoder.positions(), whole.positions[deepest])
     if deepest + 1 < len(whole.levels):
-        assert np.array_equal(decoder.rest, whole.poses[max(deepest, 0)]), "in place of the rest pose of the source"
+        assert np.array_equal(decoder.file.rest, whole.poses[max(deepest, 0)]), "instead of the source's rest pose"
         with pytest.raises(LevelUnavailable, match=f"level {deepest + 1}, segment"):
             decoder.positions(level=deepest + 1)
 
@@ -105,8 +106,8 @@ def test_what_is_missing_is_named(bushy, full):
     first = next(c.offset for c in bushy.chunks if (c.is_motion, c.level, c.segment) == (True, 1, 2))
     decoder = bushy.cut(first + 1)
     levels = len(bushy.levels)
-    assert decoder.missing.startswith("level 1: segments 2-3; level 2: segments 0-3")
-    assert decoder.missing.count("level") == levels - 1
+    assert decoder.file.missing.startswith("level 1: segments 2-3; level 2: segments 0-3")
+    assert decoder.file.missing.count("level") == levels - 1
     for file in (bushy, full):
         last = [chunk for chunk in file.chunks if chunk.is_motion][-1]
         rest = (
@@ -114,15 +115,15 @@ def test_what_is_missing_is_named(bushy, full):
             if any(chunk.kind == athcodec.decoding.container.SOURCE_REST for chunk in file.chunks)
             else ""
         )
-        missing = file.cut(last.offset + last.length - 1).missing
+        missing = file.cut(last.offset + last.length - 1).file.missing
         assert missing == f"level {last.level}: segment {last.segment}{rest}"
 
 
 def test_a_file_cut_in_its_attributes_plays_in_full_and_says_so(full):
     size = next(c.offset for c in full.chunks if c.kind & 0x7FFF == 32) + 3
     decoder = full.cut(size)
-    assert not decoder.file.complete and "attributes" in decoder.missing
-    assert np.array_equal(decoder.positions(), full.positions[-1]) and decoder.attributes == {}
+    assert not decoder.file.complete and "attributes" in decoder.file.missing
+    assert np.array_equal(decoder.positions(), full.positions[-1]) and decoder.file.attributes == {}
 
 
 def test_segments_that_arrived_play_deeper_than_those_that_did_not(bushy):
@@ -130,7 +131,7 @@ def test_segments_that_arrived_play_deeper_than_those_that_did_not(bushy):
     size = next(c.offset for c in bushy.chunks if (c.is_motion, c.level, c.segment) == (True, 3, 2))
     decoder = bushy.cut(size)
     start, stop = bushy.segments[1]
-    assert decoder.deepest == 2
+    assert decoder.file.deepest == 2
     assert np.array_equal(decoder.positions(slice(start, stop), 3), bushy.positions[3][start:stop])
     with pytest.raises(LevelUnavailable, match="level 3, segment 2"):
         decoder.positions(stop, 3)
@@ -139,7 +140,7 @@ def test_segments_that_arrived_play_deeper_than_those_that_did_not(bushy):
 def test_a_prefix_cut_after_a_level_plays_that_level_bit_for_bit(whole):
     for level in whole.levels:
         decoder = whole.cut(level.bytes)
-        assert decoder.deepest == level.level
+        assert decoder.file.deepest == level.level
         assert np.array_equal(decoder.positions(), whole.positions[level.level])
         with pytest.raises(LevelUnavailable):
             whole.cut(level.bytes - 1).positions(level=level.level)
@@ -155,8 +156,8 @@ def test_truncated_files_are_whole_and_play_the_same_levels(whole, tmp_path):
         assert size == target.stat().st_size
         with athcodec.open(target, strict=True) as decoder:
             decoder.file.check()
-            assert decoder.file.complete and decoder.missing == ""
-            assert decoder.level_count == level.level + 1 and decoder.full_level_count == len(whole.levels)
+            assert decoder.file.complete and decoder.file.missing == ""
+            assert decoder.file.level_count == level.level + 1 and decoder.file.full_level_count == len(whole.levels)
             for coarser in range(level.level + 1):
                 assert np.array_equal(decoder.positions(level=coarser), whole.positions[coarser])
             with pytest.raises(LevelUnavailable, match=f"expected 0 to {level.level}"):
@@ -168,7 +169,7 @@ def test_a_truncated_file_promises_the_error_of_its_last_level(whole, tmp_path):
         truncate(whole.path, tmp_path / "cut.ath", level.level)
         with athcodec.open(tmp_path / "cut.ath") as decoder:
             expected = whole.bound if level.level == len(whole.levels) - 1 else level.max_error
-            assert decoder.max_error_bound == expected
+            assert decoder.file.max_error_bound == expected
             assert [(d.max_error, d.rms_error, d.nodes) for d in decoder.levels] == [
                 (d.max_error, d.rms_error, d.nodes) for d in whole.levels[: level.level + 1]
             ]
@@ -179,9 +180,10 @@ def test_a_truncated_file_is_shorter_and_keeps_its_static_data(full, full_clip, 
     assert sizes == sorted(set(sizes)) and sizes[-1] == len(full.data)
     truncate(full.path, tmp_path / "cut.ath", 0)
     with athcodec.open(tmp_path / "cut.ath") as decoder:
-        assert np.array_equal(decoder.faces, full_clip.faces) and np.array_equal(decoder.edges, full_clip.edges)
+        assert np.array_equal(decoder.file.faces, full_clip.faces)
+        assert np.array_equal(decoder.file.edges, full_clip.edges)
         assert decoder.metadata.items() >= full_clip.metadata.items()
-        assert {name: a.tobytes() for name, a in decoder.attributes.items()} == {
+        assert {name: a.tobytes() for name, a in decoder.file.attributes.items()} == {
             name: a.tobytes() for name, a in full_clip.attributes.items()
         }
 

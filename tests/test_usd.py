@@ -285,7 +285,7 @@ def test_copies_are_written_as_instances_again(tmp_path, capsys):
     assert "As instances that is off the level by up to" in capsys.readouterr().out
     with athcodec.open(tmp_path / "a.ath") as decoder, athcodec.read(tmp_path / "c.usdc") as again:
         off = np.linalg.norm(again.block(0, 10).astype(float) - decoder.positions(slice(0, 10)), axis=2).max()
-        assert again.attributes["part_copies"].tolist() == [1, 20, 20] and off <= 1.01 * decoder.max_error_bound
+        assert again.attributes["part_copies"].tolist() == [1, 20, 20] and off <= 1.01 * decoder.file.max_error_bound
 
 
 def test_what_of_a_point_instancer_is_never_seen_is_not_read(tmp_path):
@@ -562,7 +562,7 @@ def test_a_clip_from_usd_through_ath_to_usd_keeps_the_bound(tmp_path):
         athcodec.encode(labelled, tmp_path / "a.ath", rel_error=1e-4)
         with athcodec.open(tmp_path / "a.ath") as decoder:
             athcodec.write(athcodec.ClipView(decoder, frames=range(2, 9)), tmp_path / "b.usdc")
-            bound = decoder.max_error_bound
+            bound = decoder.file.max_error_bound
         with athcodec.read(tmp_path / "b.usdc") as again:
             error = np.linalg.norm(again.block(0, 7).astype(float) - clip.block(2, 9), axis=2).max()
             assert 0 < error <= bound * (1 + 1e-5)

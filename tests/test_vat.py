@@ -88,7 +88,7 @@ def shown_by_positions(folder, pixels):
 @pytest.mark.parametrize("half", [True, False])
 def test_a_shader_shows_every_level_within_the_stated_error(leafy_ath, tmp_path, half):  # noqa: F811
     with athcodec.open(leafy_ath) as decoder:
-        for level in range(decoder.level_count):
+        for level in range(decoder.file.level_count):
             view = ClipView(decoder, level, range(3, 30))
             folder = tmp_path / f"{level}.vat"
             write(view, folder, half=half)

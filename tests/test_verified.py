@@ -106,7 +106,7 @@ def understated(path, clip) -> list[str]:
     """The errors of a level and segment that the file states to be smaller than they are."""
     found = []
     with athcodec.open(path, strict=True) as decoder:
-        for level in range(decoder.level_count):
+        for level in range(decoder.file.level_count):
             away = np.linalg.norm(decoder.positions(level=level).astype(np.float64) - clip.positions, axis=2)
             for segment, (start, stop) in enumerate(decoder.segments):
                 errors = np.sort(away[start:stop], axis=None)

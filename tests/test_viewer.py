@@ -330,8 +330,8 @@ def positions_of(page, call: str) -> np.ndarray:
 
 def drawn_at_level_0(decoder, frame: int) -> np.ndarray:
     """Its matrices on the rest pose of the levels above, which a page draws it with once that is there."""
-    parts, order = decoder.affines(frame, 0), decoder.hierarchy.vertex_source
-    matrices, out = np.repeat(parts.matrices, parts.vertex_count, axis=0), np.empty((decoder.vertex_count, 3))
+    parts, order = decoder.affines(frame, 0), decoder.file.hierarchy.vertex_source
+    matrices, out = np.repeat(parts.matrices, parts.vertex_count, axis=0), np.empty((decoder.file.vertex_count, 3))
     out[order] = np.einsum("nij,nj->ni", matrices[..., :3], decoder.level_rest(1)[order]) + matrices[..., 3]
     return out
 
@@ -342,7 +342,7 @@ def test_every_level_shows_the_positions_that_python_decodes(opened, sample_ath)
     with ThrottledServer({"tree.ath": sample_ath.read_bytes()}) as line, athcodec.open(sample_ath) as decoder:
         page = opened(line.page("tree.ath"))
         size = float(np.ptp(decoder.positions(0), axis=0).max())
-        for level in range(decoder.level_count):
+        for level in range(decoder.file.level_count):
             for frame in (0, 41, decoder.frame_count - 1):
                 wanted = decoder.positions(frame, level)
                 seconds = float(decoder.time[frame] - decoder.time[0])
@@ -393,10 +393,10 @@ def play(page, clip) -> None:
 def test_every_clip_shows_the_positions_that_python_decodes_of_it(opened, medley_ath):
     with ThrottledServer({"tree.ath": medley_ath.read_bytes()}) as line, athcodec.open(medley_ath) as first:
         page = opened(line.page("tree.ath"))
-        for index, clip in reversed(list(enumerate(first.clips))):
+        for index, clip in reversed(list(enumerate(first.file.clips))):
             play(page, index)
             decoder = first.play(clip.name)
-            for level in (0, decoder.level_count - 1):
+            for level in (0, decoder.file.level_count - 1):
                 for frame in sorted({0, clip.frame_count // 2, clip.frame_count - 1}):
                     wanted, seconds = decoder.positions(frame, level), float(decoder.time[frame] - decoder.time[0])
                     decoded = positions_of(page, f"athcodecViewer.decoded({seconds}, {level})")
@@ -411,7 +411,7 @@ def test_every_clip_shows_the_positions_that_python_decodes_of_it(opened, medley
 def test_only_the_clips_that_play_are_fetched(opened, windy_ath):
     data = windy_ath.read_bytes()
     with ThrottledServer({"tree.ath": data}) as line, athcodec.open(windy_ath) as decoder:
-        clips = {clip.name: clip for clip in decoder.clips}
+        clips = {clip.name: clip for clip in decoder.file.clips}
         shared = ct.SHAPES, ct.REFINED_REST  # by all segments
         common = {chunk.offset for chunk in decoder.file.chunks if not chunk.is_motion or chunk.kind in shared}
 
@@ -442,11 +442,11 @@ def test_the_clip_before_goes_on_until_the_next_is_here_and_fades_into_it(opened
         page = opened(line.page("tree.ath"))
         page.evaluate("athcodecViewer.setPlaying(false)")
         line.hold()
-        page.evaluate(f"void (globalThis.fading = ({FADE})({decoder.level_count - 1}))")
+        page.evaluate(f"void (globalThis.fading = ({FADE})({decoder.file.level_count - 1}))")
         page.wait_for_function("() => globalThis.waiting?.length > 0", timeout=60_000)
         line.release()
         found = page.evaluate("fading")
-        gust = decoder.clips[1]
+        gust = decoder.file.clips[1]
         assert all(0 <= frame < gust.first_frame for frame in found["waiting"])
         assert gust.first_frame <= found["frame"] < gust.first_frame + gust.frame_count
         before, after = (np.array(found[name]).reshape(-1, 3) for name in ("before", "after"))
@@ -557,7 +557,7 @@ def test_no_vertex_jumps_where_the_level_changes(opened, segmented, case):
     """It is asked for, or a segment begins of which less can be shown. No vertex goes further in a picture than a level
     takes it and its share of the way, nor does it jerk; without fading it does."""
     data, decoder = segmented
-    deepest, step, fade = decoder.level_count - 1, 1 / 60, 0.2
+    deepest, step, fade = decoder.file.level_count - 1, 1 / 60, 0.2
     wanted = [1] * 3 + [deepest] * 5 + [2] * 20 if case == "asked" else [deepest] * 30
     start = 0.0 if case == "asked" else 16 / 30 - 10 * step
     levels = sorted({1, *wanted})
@@ -606,7 +606,7 @@ SHARPENING = """async (deepest) => {
 def test_a_tree_that_sharpens_as_bytes_come_does_not_jump(opened, sample_ath):
     """Time stands still: what moves is what levels, and their rest poses, differ by. At rest it is at the deepest."""
     with athcodec.open(sample_ath) as decoder:
-        first, deepest = decoder.levels[0].bytes, decoder.level_count - 1
+        first, deepest = decoder.levels[0].bytes, decoder.file.level_count - 1
         apart = np.abs(decoder.positions(6, 0) - decoder.positions(6, deepest)).max()
         apart += 2 * np.abs(decoder.level_rest(0) - decoder.level_rest(1)).max()
     with HeldServer({"tree.ath": sample_ath.read_bytes()}, after=first + 100) as line:
@@ -689,7 +689,7 @@ def test_an_instance_of_a_forest_fades_from_level_to_level(opened, sample_ath):
     with ThrottledServer({"tree.ath": sample_ath.read_bytes()}) as line, athcodec.open(sample_ath) as decoder:
         page = opened(line.page("tree.ath"))
         page.evaluate("athcodecViewer.setPlaying(false)")
-        found = page.evaluate(FOREST, [1, decoder.level_count - 1])
+        found = page.evaluate(FOREST, [1, decoder.file.level_count - 1])
     before, after = np.array(found["levels"])
     apart = np.abs(before - after).max()
     for shown, passed in zip(np.array(found["shown"]), (0, 0.2, 0.5, 1)):
@@ -702,8 +702,8 @@ def test_an_instance_of_a_forest_fades_from_level_to_level(opened, sample_ath):
 def test_a_loop_goes_over_its_seam_without_a_jump_and_other_clips_end(opened, medley_ath, medley_clips):
     with ThrottledServer({"tree.ath": medley_ath.read_bytes()}) as line, athcodec.open(medley_ath) as first:
         page = opened(line.page("tree.ath"))
-        deepest = first.level_count - 1
-        for index, clip in enumerate(first.clips):
+        deepest = first.file.level_count - 1
+        for index, clip in enumerate(first.file.clips):
             play(page, index)
             decoder, last = first.play(clip.name), clip.frame_count - 1
             ends = decoder.positions(0), decoder.positions(last)
@@ -805,7 +805,7 @@ def test_only_the_level_that_is_looked_at_is_fetched(opened, gusty_ath):
         settle(page, line)
         assert page.evaluate("athcodecViewer.motion.level") == 1
         page.wait_for_function("() => document.getElementById('facts').textContent.includes(': depth 1')")
-        assert line.sent("tree.ath") < 0.6 * len(data) and decoder.level_count > 2
+        assert line.sent("tree.ath") < 0.6 * len(data) and decoder.file.level_count > 2
 
 
 @browser_test
@@ -1023,7 +1023,7 @@ def test_normals_turn_with_the_surface_at_every_level(opened, tmp_path):
     with ThrottledServer({"tube.ath": path.read_bytes()}) as line, athcodec.open(path) as decoder:
         page = opened(line.page("tube.ath"))
         page.wait_for_function("() => athcodecViewer.plants[0].ath.geometry?.hasAttribute('normal')")
-        for level in range(decoder.level_count):
+        for level in range(decoder.file.level_count):
             page.evaluate(f"athcodecViewer.shown({decoder.time[20] - decoder.time[0]}, {level})")
             shown = positions_of(page, "athcodecViewer.onGraphics('normals')")
             wanted = smooth_normals(decoder.positions(20, level).astype(float), quads)

@@ -483,7 +483,7 @@ answer({ ...result, end: [fade.levels, fade.weights] });
 def test_levels_fade_into_each_other(sample_ath, tmp_path):
     result = run_node(tmp_path, FADES, sample_ath)
     with athcodec.open(sample_ath) as decoder:
-        deepest, size = decoder.level_count - 1, np.abs(decoder.positions(1)).max()
+        deepest, size = decoder.file.level_count - 1, np.abs(decoder.positions(1)).max()
     assert result["before"] == {"levels": [], "cut": -1}
     assert result["levels"] == [1, deepest, 0] and result["cut"] == deepest
     assert sum(result["weights"]) == pytest.approx(1) and result["weights"][2] == 0 < result["weights"][1]

@@ -37,8 +37,8 @@ def test_every_vertex_keeps_its_own_bound(twiggy, tmp_path, effort):
         errors = largest_errors(twiggy, decoder)
         assert (errors <= 0.02 * weights).all()
         assert errors.max() > 0.02, "nothing was coarser where it might be"
-        assert decoder.max_error_bound == pytest.approx(0.08)
-        assert np.array_equal(decoder.error_weights, weights)
+        assert decoder.file.max_error_bound == pytest.approx(0.08)
+        assert np.array_equal(decoder.file.error_weights, weights)
 
 
 def test_coarser_vertices_make_a_smaller_file(twiggy, tmp_path):
@@ -50,7 +50,7 @@ def test_coarser_vertices_make_a_smaller_file(twiggy, tmp_path):
 def test_weights_may_be_an_array_and_are_kept(twiggy, tmp_path):
     weights = twiggy.attributes.pop("slack")
     with coded(twiggy, tmp_path / "a.ath", max_error=0.02, weights=weights) as decoder:
-        assert np.array_equal(decoder.error_weights, weights)
+        assert np.array_equal(decoder.file.error_weights, weights)
     assert "error_weights" not in twiggy.attributes
 
 

@@ -27,7 +27,7 @@ from athcodec.encoding.segmentation import split_segments
 from athcodec.errors import AthError, ClipError, SourceWarning
 from athcodec.files.atomic import check_target, is_url, keeping
 from athcodec.files.shown import redacted
-from athcodec.motion import discovery
+from athcodec.motion.branches.result import with_branches
 from athcodec.motion.clip import MotionClip
 from athcodec.motion.joining import in_wind
 from athcodec.sources import listed
@@ -162,7 +162,7 @@ def _opened(item: Item, folder: str, source: dict[str, Any]) -> Iterator[MotionC
         clip = clip if blend is None else athcodec.looped(clip, blend)
         clip = athcodec.endless(clip) if item.settings.get("endless") else clip
         hierarchy = item.settings.get("hierarchy")
-        yield clip if hierarchy is None else discovery.with_branches(clip, find_or_load(clip, hierarchy))
+        yield clip if hierarchy is None else with_branches(clip, find_or_load(clip, hierarchy))
     _check_source(item, source)
 
 

@@ -12,14 +12,14 @@ from typing import TYPE_CHECKING, Any
 
 import athcodec
 from athcodec.cli.printing import counted, progress, say
-from athcodec.decoding.ath_file import Level
 from athcodec.decoding.clip_view import ClipView
 from athcodec.decoding.decoder import Decoder
+from athcodec.decoding.file_tables import Level
 from athcodec.errors import AthError, ClipError, LevelUnavailable, NeedsHostMesh, RemoteError, SourceWarning
 from athcodec.files.atomic import check_target, file_ids, is_url, keeping
 from athcodec.files.reading import naming_file
 from athcodec.metrics import ErrorMeter, MotionMeter, SmoothnessMeter, compare_clips, level_meters
-from athcodec.motion import discovery
+from athcodec.motion.branches.result import with_branches as clip_with_branches
 from athcodec.motion.clip import MotionClip
 from athcodec.motion.joining import BLEND, in_wind
 from athcodec.motion.thresholds import Thresholds
@@ -122,14 +122,14 @@ def _say_takes(clip: MotionClip, path: str, args: argparse.Namespace) -> None:
 
 def view_to_decode(decoder: Decoder, args: argparse.Namespace) -> ClipView:
     """Return the part of a file to decode: frames of a clip, or all clips."""
-    level, of_one = args.level, args.clip is not None or len(decoder.clips) == 1
+    level, of_one = args.level, args.clip is not None or len(decoder.file.clips) == 1
     if args.max_error is not None:
         length = args.max_error.in_scene_units(decoder.metadata.get("unit"))
         level = decoder.level_within(length) if of_one else decoder.file.level_within(length)
     if of_one:
         return ClipView(decoder, level, _frames(args.frames, decoder.frame_count))
     if args.frames != (None, None):
-        names = ", ".join(clip.name for clip in decoder.clips)
+        names = ", ".join(clip.name for clip in decoder.file.clips)
         raise ClipError(f"--frames: got several clips, {names}; expected one of them with --clip")
     return ClipView(decoder, level, all_clips=True)
 
@@ -140,7 +140,7 @@ def with_sources(
     """The clips to verify, and what to compare each with: a clip of a file."""
     if not args.against:
         return []
-    played = [decoder] if args.clip is not None else [decoder.play(clip.name) for clip in decoder.clips]
+    played = [decoder] if args.clip is not None else [decoder.play(clip.name) for clip in decoder.file.clips]
     sources = [
         (path, clip)
         for path in args.against
@@ -232,7 +232,7 @@ def with_branches(clip: MotionClip, hierarchy: str | None) -> MotionClip:
         return clip
     found = find_or_load(clip, hierarchy)
     say("hierarchy", str(found))
-    return discovery.with_branches(clip, found)
+    return clip_with_branches(clip, found)
 
 
 def bound(args: argparse.Namespace, unit: Any) -> dict[str, float | int]:
@@ -265,10 +265,11 @@ def measure_against(decoder: Decoder, source: str, clip: MotionClip) -> list[dic
     with naming(source), clip.watched(), progress() as report:
         if isinstance(blend := decoder.metadata.get(BLEND), int) and BLEND not in clip.metadata:
             clip = athcodec.looped(clip, blend)
-        got, expected = ((item.frame_count, item.vertex_count) for item in (clip, decoder))
+        got = clip.frame_count, clip.vertex_count
+        expected = decoder.frame_count, decoder.file.vertex_count
         if got != expected:
             raise ClipError(f"got {got} frames and vertices, expected {expected} as in the .ath file")
-        weights = decoder.error_weights
+        weights = decoder.file.error_weights
         meters = level_meters(decoder, clip)
         for start, stop in decoder.segments:
             reference = clip.block(start, stop)
@@ -278,7 +279,7 @@ def measure_against(decoder: Decoder, source: str, clip: MotionClip) -> list[dic
                 report("measure", stop / clip.frame_count)
     levels = [_measured(level, meter) for level, meter in zip(decoder.levels, meters, strict=True)]
     if weights is not None:
-        promised = decoder.max_error_bound / float(weights.max())
+        promised = decoder.file.max_error_bound / float(weights.max())
         levels[-1]["kept"] &= meters[-1].error.max_weighted_error <= promised * (1 + ROUNDING)
     return levels
 
@@ -287,12 +288,12 @@ def tick_ratios(decoder: Decoder) -> list[list[float | None]]:
     """Return how much more each clip jerks near seams than in its median frame, at each complete level."""
     ratios: list[list[float | None]] = []
     with progress() as report:
-        for clip in decoder.clips:
+        for clip in decoder.file.clips:
             played = decoder.play(clip.name)
             starts = [start for start, _ in played.segments]
             meters = [SmoothnessMeter(clip.frame_count, starts=starts, loop=clip.loop) for _ in played.levels]
             for start, stop in played.segments:
-                for number, meter in enumerate(meters[: decoder.deepest + 1]):
+                for number, meter in enumerate(meters[: decoder.file.deepest + 1]):
                     frames = played.positions(slice(start, stop), number)
                     meter.add(frames, frames)
                 if report:
@@ -363,6 +364,6 @@ def _stats(decoder: Decoder) -> str:
 
 def what_is_missing(decoder: Decoder) -> str:
     if decoder.file.complete:
-        return decoder.missing
+        return decoder.file.missing
     got, expected = decoder.file.info()["available_bytes"], decoder.file.file_length
-    return f"cut off at {got:,} of {expected:,} bytes; missing {decoder.missing}"
+    return f"cut off at {got:,} of {expected:,} bytes; missing {decoder.file.missing}"

@@ -25,8 +25,8 @@ from athcodec.metrics import ErrorMeter
 from athcodec.options import DEFAULT_REL_ERROR
 
 if TYPE_CHECKING:
-    from athcodec.decoding.ath_file import Level
     from athcodec.decoding.clip_view import ClipView
+    from athcodec.decoding.file_tables import Level
     from athcodec.encoding import Seam
     from athcodec.exporters import Written
 
@@ -93,8 +93,8 @@ def facts_of(
     """decoder.file.info(), and per level what it adds to the file cut before it. tick_ratios: of each clip at each
     level, where they were measured."""
     facts = {"file": os.fspath(path)} | decoder.file.info()
-    facts |= {"unit": decoder.metadata.get("unit"), "missing": decoder.missing}
-    facts["raw_bytes"] = facts["frames"] * decoder.vertex_count * 12
+    facts |= {"unit": decoder.metadata.get("unit"), "missing": decoder.file.missing}
+    facts["raw_bytes"] = facts["frames"] * decoder.file.vertex_count * 12
     facts["ratio"] = facts["raw_bytes"] / facts["bytes"]
     before = decoder.file.prelude_length
     for level in facts["levels"]:

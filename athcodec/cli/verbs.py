@@ -56,7 +56,7 @@ from athcodec.cli.streams import ATH, STREAM, standard_streams
 from athcodec.decoding.clip_view import ClipView
 from athcodec.errors import AthError, ClipError
 from athcodec.files.atomic import scratch_folder
-from athcodec.motion import discovery
+from athcodec.motion.branches.saving import save
 from athcodec.motion.clip import MotionClip
 from athcodec.motion.hierarchy import branch_orders
 from athcodec.options import DEFAULT_LADDER, DEFAULT_REL_ERROR, HOST, ladder_of
@@ -188,7 +188,7 @@ def hierarchy(args: argparse.Namespace) -> int:
             report("branches", 0.0)
         found = athcodec.find_branches(clip, args.method, args.root)
     if args.save:
-        discovery.save(found, args.save)
+        save(found, args.save)
     sizes = np.bincount(found.vertex_branch)
     orders = branch_orders(found.branch_parent)
     if args.json:
@@ -233,7 +233,7 @@ def _decode(args: argparse.Namespace, quiet: bool) -> int:
         motions = [view_to_decode(decoder, args) for decoder in decoders]
         written = _write_decoded(motions, args)
         for decoder, motion in zip(decoders, motions):
-            if decoder.missing:
+            if decoder.file.missing:
                 say("warning", f"{args.input}: decoded to level {motion.level}; {what_is_missing(decoder)}")
             if not quiet:
                 print_written(written, motion, decoder.levels[motion.level])
@@ -307,7 +307,7 @@ def _verified(args: argparse.Namespace, name: str | None) -> dict[str, Any]:
                 decoder.file.set_host_mesh(opened.enter_context(read_clip(args, args.against[0])))
             result["decoded"] = not decoder.file.needs_host_mesh
             decoder.file.check(result["decoded"])
-            result |= {"max_error_bound": decoder.max_error_bound, "unit": decoder.metadata.get("unit")}
+            result |= {"max_error_bound": decoder.file.max_error_bound, "unit": decoder.metadata.get("unit")}
             for played, source, clip in with_sources(decoder, args, opened):
                 measured = {"name": played.clip.name, "against": source}
                 measured["levels"] = measure_against(played, source, clip)
@@ -338,7 +338,7 @@ def truncate(args: argparse.Namespace) -> int:
         )
     kept = args.gltf_motion if args.output.lower().endswith(".glb") else None
     with open_file(args.output, gltf_motion=kept) as decoder:
-        last = decoder.level_count - 1
+        last = decoder.file.level_count - 1
     before, after = (os.path.getsize(path) for path in (args.input, args.output))
     echo(f"{args.output}: levels 0 to {last}, {after:,} of {before:,} bytes")
     return 0
@@ -444,7 +444,7 @@ def demo(args: argparse.Namespace) -> int:
             with progress() as report:
                 athcodec.encode(clip, encoded, rel_error=DEFAULT_REL_ERROR, progress=report)
             with open_file(encoded, strict=True) as decoder:
-                meters = [decode_and_measure(decoder, clip, encoded, d) for d in range(decoder.level_count)]
+                meters = [decode_and_measure(decoder, clip, encoded, d) for d in range(decoder.file.level_count)]
                 print_demo(facts_of(encoded, decoder), meters)
         page = Path(args.keep or ".", DEMO_PAGE)
         if args.sample == "tree":

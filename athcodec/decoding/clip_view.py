@@ -1,7 +1,4 @@
-"""Some frames of an .ath file at one level, or all its clips, in the shape of a clip: what exporters write.
-
-It decodes nothing itself (decoder.py) and knows no file format (exporters/).
-"""
+"""Some frames of an .ath file at one level, or all its clips, in the shape of a clip, which exporters write."""
 
 from __future__ import annotations
 
@@ -11,18 +8,19 @@ from typing import Any
 
 import numpy as np
 
-from athcodec.decoding.decoder import Affines, Decoder
+from athcodec.decoding.affines import Affines
+from athcodec.decoding.decoder import Decoder
 from athcodec.errors import LevelUnavailable
 from athcodec.files.atomic import FileId
-from athcodec.motion.clip import ClipRange, clip_range_frames, polygons
+from athcodec.motion.clip import DEFAULT_FPS, ClipRange, clip_range_frames, polygons, stated_fps
 from athcodec.options import whole
 
 
 class ClipView:
     """Frames of an .ath file at one level, with the names and the meanings of MotionClip, and `affines` besides.
 
-    Vertices stand in the source's order, lengths are in scene units. Frame 0 is the first of the view; time and
-    metadata["start_frame"] are those that it has in the whole clip.
+    Vertices stand in the source's order, lengths are in scene units. Frame 0 is the first of the view; its time and
+    metadata["start_frame"] are those of the frame in the whole clip.
 
     Parameters
     ----------
@@ -31,7 +29,7 @@ class ClipView:
     level : int, optional
         Level of detail; by default the deepest that is complete.
     frames : range, optional
-        Those of the clip, with step 1; by default all.
+        Frames of the clip, with step 1; by default all.
     all_clips : bool
         Show these frames of every clip of the file, one clip after the other, as a MotionClip of several clip ranges
         has them.
@@ -39,27 +37,27 @@ class ClipView:
     Raises
     ------
     LevelUnavailable
-        Where the level or the frames do not exist.
+        If the level or the frames do not exist. Methods raise the errors of Decoder besides.
     """
 
     def __init__(
         self, decoder: Decoder, level: int | None = None, frames: range | None = None, *, all_clips: bool = False
     ):
         self.decoder = decoder
-        self.level = decoder.deepest if level is None else whole("level", level)
-        if not 0 <= self.level < decoder.level_count:
-            raise LevelUnavailable(f"level: got {level}; expected 0 to {decoder.level_count - 1}")
-        played = [decoder.play(clip.name) for clip in decoder.clips] if all_clips else [decoder]
+        self.level = decoder.file.deepest if level is None else whole("level", level)
+        if not 0 <= self.level < decoder.file.level_count:
+            raise LevelUnavailable(f"level: got {level}; expected 0 to {decoder.file.level_count - 1}")
+        played = [decoder.play(clip.name) for clip in decoder.file.clips] if all_clips else [decoder]
         self._runs = [(clip, _checked(frames, clip.frame_count)) for clip in played]
 
     @property
     def inputs(self) -> frozenset[FileId]:
-        """The files that it is read from, by device and inode."""
+        """The files that the view is read from, by device and inode."""
         return self.decoder.file.inputs
 
     @property
     def clip_ranges(self) -> tuple[ClipRange, ...]:
-        """The clips; frames of a loop that are not all it has are no loop."""
+        """The clips. Frames of a loop are only a loop if they are all of it."""
         return tuple(
             ClipRange(decoder.clip.name, len(frames), decoder.clip.loop and len(frames) == decoder.frame_count)
             for decoder, frames in self._runs
@@ -78,17 +76,17 @@ class ClipView:
     @property
     def vertex_count(self) -> int:
         """Vertices of the plant, N."""
-        return self.decoder.vertex_count
+        return self.decoder.file.vertex_count
 
     @property
     def branch_count(self) -> int:
         """Branches of the plant, B."""
-        return self.decoder.branch_count
+        return self.decoder.file.branch_count
 
     @property
     def dtype(self) -> np.dtype:
         """Type of the positions, float32 or float64."""
-        return self.decoder.dtype
+        return self.decoder.file.dtype
 
     @property
     def max_error(self) -> float:
@@ -102,51 +100,48 @@ class ClipView:
 
     @property
     def fps(self) -> float:
-        """Frames per second: what the source said, else the median rate of the file, else 30."""
-        said = self.metadata.get("fps")
-        if isinstance(said, (int, float)) and not isinstance(said, bool) and 0 < said < float("inf"):
-            return float(said)
-        return self.decoder.fps or 30.0
+        """Frames per second that the source states, else the median rate of the file, else 30."""
+        return stated_fps(self.metadata) or self.decoder.fps or DEFAULT_FPS
 
     @cached_property
     def metadata(self) -> dict[str, Any]:
-        """Unit, up axis and whatever else the source said of the clip, or of all clips."""
+        """Unit, up axis and whatever else the source states for the clip, or for all clips."""
         return dict(self.decoder.metadata if len(self._runs) == 1 else self.decoder.file.metadata)
 
     @property
     def rest(self) -> np.ndarray:
         """Rest pose, (N, 3) float32 or float64, scene units."""
-        return self.decoder.rest
+        return self.decoder.file.rest
 
     @property
     def vertex_branch(self) -> np.ndarray:
         """The branch of each vertex, (N,) int32."""
-        return self.decoder.vertex_branch
+        return self.decoder.file.vertex_branch
 
     @property
     def branch_parent(self) -> np.ndarray:
         """The parent of each branch, (B,) int32, -1 for a root."""
-        return self.decoder.branch_parent
+        return self.decoder.file.branch_parent
 
     @property
     def stem_index(self) -> np.ndarray | None:
         """Place of each vertex on its stem, (N,) int32, or None; see MotionClip."""
-        return self.decoder.stem_index
+        return self.decoder.file.stem_index
 
     @property
     def edges(self) -> np.ndarray | None:
         """(E, 2) vertex numbers, or None."""
-        return self.decoder.edges
+        return self.decoder.file.edges
 
     @property
     def faces(self) -> np.ndarray | None:
         """(F, k) vertex numbers, or None."""
-        return self.decoder.faces
+        return self.decoder.file.faces
 
     @property
     def attributes(self) -> dict[str, np.ndarray]:
         """Named static arrays, as the source had them."""
-        return self.decoder.attributes
+        return self.decoder.file.attributes
 
     @property
     def polygons(self) -> tuple[np.ndarray, np.ndarray] | None:
@@ -154,32 +149,27 @@ class ClipView:
         return polygons(self.faces, self.attributes)
 
     def block(self, start: int, stop: int) -> np.ndarray:
-        """Positions of some frames of the view.
+        """Return the positions of some frames of the view.
 
         Parameters
         ----------
         start, stop : int
-            The first frame, and that behind the last.
+            The first frame, and the frame behind the last.
 
         Returns
         -------
         numpy.ndarray
             (stop - start, N, 3), scene units.
-
-        Raises
-        ------
-        LevelUnavailable, FormatError
-            As Decoder.positions.
         """
-        found = []
+        parts = []
         for (decoder, frames), (first, last) in zip(self._runs, self.clip_range_frames):
-            own = frames[max(start - first, 0) : max(min(stop, last) - first, 0)]
-            if own:
-                found.append(decoder.positions(slice(own.start, own.stop), self.level))
-        return found[0] if len(found) == 1 else np.concatenate(found)
+            part = frames[max(start - first, 0) : max(min(stop, last) - first, 0)]
+            if part:
+                parts.append(decoder.positions(slice(part.start, part.stop), self.level))
+        return parts[0] if len(parts) == 1 else np.concatenate(parts)
 
     def blocks(self) -> Iterator[tuple[int, np.ndarray]]:
-        """Positions of all frames, one segment in memory at a time.
+        """Yield the positions of all frames, with one segment in memory at a time.
 
         Yields
         ------
@@ -187,35 +177,28 @@ class ClipView:
             The first frame of the block.
         block : numpy.ndarray
             (k, N, 3), scene units.
-
-        Raises
-        ------
-        LevelUnavailable, FormatError
-            As Decoder.positions.
         """
         for (decoder, frames), (first, _) in zip(self._runs, self.clip_range_frames):
             for start, block in decoder.blocks(self.level, frames=slice(frames.start, frames.stop)):
                 yield start - frames.start + first, block
 
     def affines(self, frame: int) -> Affines:
-        """A frame of the view as matrices.
+        """Return a frame of the view as matrices.
 
         Parameters
         ----------
         frame : int
-            Counted from the view's first.
+            Number of the frame in the view.
 
         Returns
         -------
         Affines
-            As those of Decoder.affines.
+            The result of Decoder.affines.
 
         Raises
         ------
         IndexError
-            Where the view has no such frame.
-        LevelUnavailable, FormatError
-            As Decoder.positions.
+            If the view has no such frame.
         """
         for (decoder, frames), (first, last) in zip(self._runs, self.clip_range_frames):
             if first <= frame < last:
@@ -224,7 +207,7 @@ class ClipView:
 
 
 def _checked(frames: range | None, frame_count: int) -> range:
-    """All frames where none are given."""
+    """Return the frames, by default all. Raises LevelUnavailable if they do not exist."""
     frames = range(frame_count) if frames is None else frames
     if not (0 <= frames.start < frames.stop <= frame_count and frames.step == 1):
         raise LevelUnavailable(f"frames: got {frames.start}:{frames.stop}, expected A:B with A < B <= {frame_count}")

@@ -61,7 +61,7 @@ _FRONT_BYTES, _FRONT_BYTES_OF_EACH, _FRONT_BYTES_OF_FRAME = 512, 128, 2
 
 @dataclass(frozen=True)
 class Limits:
-    """What a reader accepts; FORMAT.md, "Limits".
+    """Limits on what a reader accepts; FORMAT.md, "Limits".
 
     Attributes
     ----------
@@ -201,7 +201,7 @@ def round_up_singles(values: np.ndarray) -> np.ndarray:
 
 
 def brief(value: object) -> str:
-    """What a file holds, as an error message shows it."""
+    """Return what a file holds as an error message shows it."""
     text = repr(value)
     return text if len(text) <= 100 else text[:97] + "..."
 
@@ -230,8 +230,8 @@ def _decompress(data: bytes, dtype: np.dtype, shape: tuple[int, ...], what: str,
 
 
 def _check_window(data: bytes, expected: int, what: str) -> None:
-    """Reads Window_Descriptor (RFC 8878, 3.1.1.1.2) itself: zstd does not tell the largest windows from no frame, and
-    max_window_size does not bind where all is decompressed in one call."""
+    """Check Window_Descriptor (RFC 8878, 3.1.1.1.2), because zstd does not tell the largest windows from no frame, and
+    max_window_size has no effect if all is decompressed in one call."""
     if data[:4] == zstandard.FRAME_HEADER and len(data) > 5 and not data[4] & _ZSTD_SINGLE_SEGMENT:
         exponent, mantissa = data[5] >> 3, data[5] & 7
         window = (8 + mantissa) << 7 + exponent
@@ -240,7 +240,7 @@ def _check_window(data: bytes, expected: int, what: str) -> None:
 
 
 def zstd_decompress_exact(data: bytes, expected: int, what: str, limits: Limits) -> bytes:
-    """One zstd frame that says it holds `expected` bytes and does; anything else raises BadChunk or LimitExceeded."""
+    """Return the content of a zstd frame that announces and holds `expected` bytes. Raises BadChunk, LimitExceeded."""
     if expected > limits.decoded_chunk_bytes:
         raise LimitExceeded(f"{what}: got {expected} bytes; the limit is {limits.decoded_chunk_bytes}")
     _check_window(data, expected, what)
@@ -253,7 +253,7 @@ def zstd_decompress_exact(data: bytes, expected: int, what: str, limits: Limits)
 
 
 def parse_array(data: bytes, what: str, limits: Limits) -> tuple[str, np.ndarray]:
-    """Name and array of ATTRIBUTE."""
+    """Return the name and array of ATTRIBUTE."""
     if len(data) < ARRAY_HEAD.size:
         raise BadChunk(f"{what}: got {len(data)} bytes; expected at least {ARRAY_HEAD.size}")
     code, dimensions, length, size = ARRAY_HEAD.unpack_from(data)
@@ -275,7 +275,7 @@ def parse_array(data: bytes, what: str, limits: Limits) -> tuple[str, np.ndarray
 
 
 def _array_type(code: int, size: int, what: str) -> np.dtype:
-    """Of Type and Item_Bytes."""
+    """Return the dtype of Type and Item_Bytes."""
     if code >= len(ARRAY_KINDS) or size not in _KIND_SIZES[ARRAY_KINDS[code]]:
         raise BadChunk(f"{what}: got type {code} of {size} bytes; expected numbers, booleans or texts")
     return np.dtype(f"<{ARRAY_KINDS[code]}{size}")
@@ -316,7 +316,7 @@ def parse_metadata(data: bytes, limits: Limits) -> dict:
 def _parse_json(text: bytes, what: str) -> dict:
     try:
         value = json.loads(text.decode(), object_pairs_hook=_unique, parse_constant=_refuse, parse_float=_finite)
-        json.dumps(value, ensure_ascii=False).encode()  # lone surrogates
+        json.dumps(value, ensure_ascii=False).encode()  # Raises for lone surrogates.
     except (ValueError, RecursionError):
         value = None
     if not isinstance(value, dict):

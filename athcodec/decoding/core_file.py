@@ -1,8 +1,7 @@
 """ath.h in Python: a file opened by the C core, its prepared segments, and what they show.
 
-Every member mirrors a function of core/include/ath.h, where its contract stands; this module owns the memory, checks
-sizes and
-turns result codes into exceptions. It reads no file: whoever uses it feeds the bytes (ath_file.py does).
+Every member mirrors a function of core/include/ath.h, where its contract stands. This module holds the memory, checks
+sizes and turns result codes into exceptions. It reads no file: chunk_file.py feeds the bytes.
 Vertices are in file order unless said otherwise; positions are in scene units.
 """
 
@@ -29,14 +28,14 @@ from ctypes import (
 import numpy as np
 import numpy.typing as npt
 
-from athcodec._native import BRANCH, CHUNK, MEASURES, CorePolygons, as_bytes, lib
+from athcodec._native import BRANCH, CHUNK, MEASURES, CorePolygons, as_bytes, check_layouts, fields, lib
 from athcodec.decoding import container
 from athcodec.errors import LimitExceeded
 from athcodec.motion.polygons import Polygons, type_of
 
 ALIGNMENT = 16
 MOST_STEPS = 2**31 - 1
-KEPT_SHARE = 2  # of a segment's memory, at most, goes to what a deeper level goes on from; a hundredth is usual
+KEPT_SHARE = 2  # A segment keeps at most 1 / KEPT_SHARE of its memory for a deeper level; a hundredth is usual.
 FAULT_TEXT = 256
 LEVEL_NAME = 32
 OK, HELD, MISSING = 0, 65, 66
@@ -44,75 +43,51 @@ FILE_ORDER, SOURCE_ORDER = 0, 1
 AS_MARKED = 3
 BLEND_CLIPS = 4
 
-PART = np.dtype([(name, "<i4") for name in ("first", "count", "branch", "index")])
+PART = np.dtype(fields("<i4", "first count branch index"))
 
 
 class Limits(Structure):
     """ath_limits."""
 
-    _fields_ = [
-        (name, c_uint32)
-        for name in ("chunks table_bytes vertices branches frames hierarchy_depth chunk_bytes reserved").split()
-    ]
-    _fields_ += [("memory_bytes", c_uint64)]
+    _fields_ = fields(
+        *(c_uint32, "chunks table_bytes vertices branches frames hierarchy_depth chunk_bytes reserved"),
+        *(c_uint64, "memory_bytes"),
+    )
 
     @classmethod
     def of(cls, limits: container.Limits) -> Limits:
-        """Those of container.Limits that the core keeps to; more than a field can hold is its largest value."""
-        most = {field[0]: 256 ** ctypes.sizeof(field[1]) - 1 for field in cls._fields_ if field[0] != "reserved"}
+        """Return the limits that the core keeps to; more than a field can hold becomes its largest value."""
+        most = {name: 256 ** ctypes.sizeof(kind) - 1 for name, kind in cls._fields_ if name != "reserved"}
         return cls(**{name: min(getattr(limits, name), largest) for name, largest in most.items()})
 
 
 class Info(Structure):
     """ath_info."""
 
-    _fields_ = [
-        ("file_length", c_uint64),
-        ("prelude_length", c_uint64),
-        ("max_error", c_double),
-        ("origin", c_double * 3),
-    ]
-    _fields_ += [
-        (name, c_int32)
-        for name in (
-            "vertex_count branch_count frame_count segment_count clip_count "
-            "level_count full_level_count layer_count depth_levels node_count chunk_count "
-            "is_float64"
-        ).split()
-    ]
-    _fields_ += [
-        ("rest_is_float64", c_int32),
-        ("rest_is_host", c_int32),
-        ("host_checksum", c_uint32 * 2),
-        ("is_predicted", c_int32),
-    ]
+    _fields_ = fields(
+        *(c_uint64, "file_length prelude_length", c_double, "max_error", c_double * 3, "origin"),
+        *(c_int32, "vertex_count branch_count frame_count segment_count clip_count level_count full_level_count"),
+        *(c_int32, "layer_count depth_levels node_count chunk_count is_float64 rest_is_float64 rest_is_host"),
+        *(c_uint32 * 2, "host_checksum", c_int32, "is_predicted"),
+    )
 
 
 class Clip(Structure):
     """ath_clip."""
 
-    _fields_ = [("name", ctypes.c_char_p), ("duration", c_double)]
-    _fields_ += [
-        (name, c_int32) for name in ("first_frame frame_count first_segment segment_count loop periodic").split()
-    ]
+    _fields_ = fields(
+        *(ctypes.c_char_p, "name", c_double, "duration"),
+        *(c_int32, "first_frame frame_count first_segment segment_count loop periodic"),
+    )
 
 
 class Fault(Structure):
     """ath_fault_info; its text is one line of English."""
 
-    _fields_ = [
-        ("code", c_int32),
-        ("field", c_int32),
-        ("chunk", c_int32),
-        ("kind", c_uint16),
-        ("level", c_uint8),
-        ("reserved", c_uint8),
-        ("segment", c_uint32),
-        ("offset", c_uint64),
-        ("found", c_double),
-        ("least", c_double),
-        ("most", c_double),
-    ]
+    _fields_ = fields(
+        *(c_int32, "code field chunk", c_uint16, "kind", c_uint8, "level reserved"),
+        *(c_uint32, "segment", c_uint64, "offset", c_double, "found least most"),
+    )
 
     def __str__(self) -> str:
         text = ctypes.create_string_buffer(FAULT_TEXT)
@@ -123,25 +98,36 @@ class Fault(Structure):
 class Share(Structure):
     """ath_share."""
 
-    _fields_ = [("segments", c_void_p), ("segment_count", c_int32), ("frame", c_double), ("weight", c_double)]
+    _fields_ = fields(c_void_p, "segments", c_int32, "segment_count", c_double, "frame weight")
 
 
 class Range(Structure):
     """ath_range."""
 
-    _fields_ = [("offset", c_uint64), ("size", c_uint64)]
+    _fields_ = fields(c_uint64, "offset size")
+
+
+MIRRORS: dict[str, type[ctypes.Structure] | np.dtype] = {
+    "ath_clip": Clip,
+    "ath_fault_info": Fault,
+    "ath_info": Info,
+    "ath_limits": Limits,
+    "ath_part": PART,
+    "ath_range": Range,
+    "ath_share": Share,
+}
+check_layouts(MIRRORS)
 
 
 def aligned(size: int) -> np.ndarray:
-    """Uninitialised bytes whose address is a multiple of ALIGNMENT."""
+    """Return uninitialised bytes whose address is a multiple of ALIGNMENT."""
     block = np.empty(size + ALIGNMENT, np.uint8)
     start = -block.ctypes.data % ALIGNMENT
     return block[start : start + size]
 
 
 class CoreError(Exception):
-    """A result of the core that is no success: `code` (FORMAT.md, "Errors", or above 63 about the call), in words what
-    is at fault."""
+    """A failure of the core, with the sentence for it; codes are those of FORMAT.md, or above 63 about the call."""
 
     def __init__(self, code: int, fault: Fault | None = None):
         super().__init__(str(fault) if fault else lib.ath_result_name(code).decode())
@@ -149,20 +135,20 @@ class CoreError(Exception):
 
 
 def front(data: bytes, limits: Limits) -> tuple[int, int, Fault]:
-    """What the front of a file says of which these bytes are there: how many of them ath_open needs, at least, and how
-    much memory it then takes (0: not known yet), with what is missing. Raises CoreError."""
-    there, size, memory, fault = as_bytes(data), c_size_t(), c_size_t(), Fault()
-    result = lib.ath_front(there.ctypes.data, len(there), byref(limits), byref(size), byref(memory), byref(fault))
+    """Return, from the first bytes of a file, how many bytes ath_open needs at least, how much memory it then takes (0:
+    not known yet), and what is missing. Raises CoreError."""
+    array, size, memory, fault = as_bytes(data), c_size_t(), c_size_t(), Fault()
+    result = lib.ath_front(array.ctypes.data, len(array), byref(limits), byref(size), byref(memory), byref(fault))
     if result not in (OK, MISSING):
         raise CoreError(result, fault)
     return size.value, memory.value, fault
 
 
 class Segment:
-    """One segment prepared at one level, in memory of its own that another preparation may take over, and what a deeper
-    level goes on from.
+    """One segment prepared at one level, in memory that another preparation may take over, and what a deeper level goes
+    on from.
 
-    gone: its positions went to an array of the caller's. Then nothing but its end is to be used.
+    If the segment is `gone`, its positions went to an array of the caller's, and only its end may be used.
     """
 
     def __init__(self, size: int):
@@ -182,7 +168,7 @@ class Segment:
 
 
 class Work:
-    """What one preparation at a time needs."""
+    """Scratch memory for one preparation at a time."""
 
     def __init__(self, size: int):
         self.memory = aligned(size)
@@ -193,7 +179,7 @@ class Work:
 
 
 class File:
-    """An opened file. Raises CoreError; safe to read from several threads, each with a Work of its own."""
+    """An opened file. It raises CoreError, and several threads may use it, each with its Work."""
 
     def __init__(self, prelude: bytes, memory: int, limits: Limits):
         self._prelude, self._memory, fault = as_bytes(prelude), aligned(memory), Fault()
@@ -209,12 +195,13 @@ class File:
         self.has_rest = not self.info.rest_is_host
         self._build: np.ndarray | None = None
         self._refinements: list[np.ndarray] = []
-        self._refined = -1  # levels up to this one have what their segments share
+        self._refined = -1  # The deepest level whose segments have what they share.
+        self.poses_read = 0  # The deepest level whose reference pose the core has read.
         self._building = threading.Lock()
 
     @property
     def pointer(self) -> int:
-        """The ath_file, for functions beside ath.h."""
+        """Address of the ath_file, for functions outside ath.h."""
         return self._file
 
     @staticmethod
@@ -224,7 +211,7 @@ class File:
         return result
 
     def set_host_mesh(self, mesh: np.ndarray) -> None:
-        """The rest pose of a file that does not hold it, (N, 3) float32 in source order."""
+        """Set the rest pose of a file without one, (N, 3) float32 in source order."""
         fault = Fault()
         with self._building:
             result = lib.ath_set_host_mesh(self._file, mesh.ctypes.data, mesh.strides[0], len(mesh), byref(fault))
@@ -232,7 +219,7 @@ class File:
             self.has_rest = True
 
     def build(self) -> None:
-        """Computes the bases that all segments share, unless that is done."""
+        """Compute the bases that all segments share, unless that is done."""
         with self._building:
             if self._build is None:
                 memory = aligned(lib.ath_build_size(self._file))
@@ -240,7 +227,7 @@ class File:
                 self._build = memory
 
     def refine(self, level: int) -> None:
-        """Computes what the segments share at a level, unless that is done."""
+        """Compute what the segments share at a level, unless that is done."""
         with self._building:
             if level <= self._refined:
                 return
@@ -250,7 +237,7 @@ class File:
             self._refined = level
 
     def refinement_size(self, level: int) -> int:
-        """Bytes of what the segments share at the levels up to one, and of what is built already."""
+        """Return the bytes of what the segments share at the levels up to one, built already or not."""
         with self._building:
             further = self._refine_size(level) if level > self._refined else 0
             return further + sum(map(len, self._refinements))
@@ -258,6 +245,7 @@ class File:
     def _refine_size(self, level: int) -> int:
         size, fault = c_size_t(), Fault()
         self._check(lib.ath_refine_size(self._file, level, byref(size), byref(fault)), fault)
+        self.poses_read = max(self.poses_read, level)
         return size.value
 
     def _array(self, address: int, dtype: npt.DTypeLike, count: int) -> np.ndarray:
@@ -266,9 +254,9 @@ class File:
         return view.view(dtype).copy()
 
     def polygons(self, kind: int, most: int) -> Polygons:
-        """FACES or EDGES, which are there. Edges that follow from the branches have no corners, but are `derived`.
+        """Return FACES or EDGES, whose bytes are fed. Edges that follow from the branches are `derived` and empty.
 
-        Raises LimitExceeded where there are more faces and corners than that.
+        Raises LimitExceeded if there are more than `most` faces and corners.
         """
         shape, fault = CorePolygons(), Fault()
         self._check(lib.ath_polygons_of(self._file, kind, byref(shape), byref(fault)), fault)
@@ -288,7 +276,7 @@ class File:
         return Polygons(corners, counts, shape.face_count, shape.columns, types[0], count_type, bool(shape.is_derived))
 
     def branches(self) -> np.ndarray:
-        """(B,) of _native.BRANCH."""
+        """Return (B,) of _native.BRANCH."""
         return self._array(lib.ath_branches(self._file), BRANCH, self.info.branch_count)
 
     def branch_source(self) -> np.ndarray:
@@ -298,18 +286,18 @@ class File:
         return self._array(lib.ath_vertex_source(self._file), "<i4", self.info.vertex_count)
 
     def times(self) -> np.ndarray:
-        """Seconds, (T,) float64, of all clips."""
+        """Return the seconds of the frames of all clips, (T,) float64."""
         return self._array(lib.ath_times(self._file), "<f8", self.info.frame_count)
 
     def clips(self) -> list[Clip]:
-        """In memory of the file."""
+        """Return the clips, which stay in the file's memory."""
         return ctypes.cast(lib.ath_clips(self._file), POINTER(Clip))[: self.info.clip_count]
 
     def seam_error(self, clip: int, level: int) -> float:
         return lib.ath_seam_error(self._file, clip, level)
 
     def level_rest(self, level: int, order: int = FILE_ORDER) -> np.ndarray:
-        """(N, 3) float64: the reference pose of the level, read unless that is done."""
+        """Return the reference pose of the level, (N, 3) float64, after reading it unless that is done."""
         with self._building:
             self._refine_size(level)
         out = np.empty((self.info.vertex_count, 3))
@@ -317,7 +305,7 @@ class File:
         return out
 
     def rest(self, level: int, order: int = SOURCE_ORDER) -> np.ndarray:
-        """(N, 3) float64: the rest pose of the source, as close as the reference poses up to a level bring it."""
+        """Return the source's rest pose, (N, 3) float64, as decoded with the reference poses up to a level."""
         out, fault = np.empty((self.info.vertex_count, 3)), Fault()
         with self._building:
             self._refine_size(level)
@@ -326,36 +314,36 @@ class File:
         return out
 
     def chunks(self) -> np.ndarray:
-        """(C,) of CHUNK: the chunk table, unknown optional kinds included."""
+        """Return the chunk table, (C,) of CHUNK, with unknown optional kinds."""
         return self._array(lib.ath_chunks(self._file), CHUNK, self.info.chunk_count)
 
     def check_chunk(self, index: int, offset: int, data: bytes) -> None:
-        """Compares the checksum of a chunk, which is at this offset of the file, with its bytes; they are not kept."""
-        there, fault = as_bytes(data), Fault()
-        self.feed(there, offset)
+        """Compare the checksum of a chunk at an offset of the file with its bytes, which are not kept."""
+        array, fault = as_bytes(data), Fault()
+        self.feed(array, offset)
         try:
             self._check(lib.ath_check_chunk(self._file, index, byref(fault)), fault)
         finally:
-            self.drop(offset, len(there))
-            if offset < len(self._prelude):  # which stays
+            self.drop(offset, len(array))
+            if offset < len(self._prelude):  # The prelude must stay.
                 self.feed(self._prelude, 0)
 
     def errors(self) -> np.ndarray:
-        """(levels, segments, 3) float64: the error of each level in each segment by each of MEASURES, scene units."""
+        """Return the error of each level in each segment by each of MEASURES, (levels, segments, 3), scene units."""
         shape = self.info.level_count, self.info.segment_count, len(MEASURES)
         return self._array(lib.ath_errors(self._file), "<f8", math.prod(shape)).reshape(shape)
 
     def joins(self) -> np.ndarray:
-        """(levels, segments) uint8: how each segment is joined to the one before it."""
+        """Return how each segment is joined to the one before it, (levels, segments) uint8."""
         shape = self.info.level_count, self.info.segment_count
         return self._array(lib.ath_joins(self._file), np.uint8, math.prod(shape)).reshape(shape)
 
     def repeats(self) -> np.ndarray:
-        """(frames,) bool: whether each frame shows the very positions of the one before."""
+        """Return whether each frame repeats the positions of the one before, (frames,) bool."""
         return self._array(lib.ath_repeats(self._file), np.uint8, self.info.frame_count) > 0
 
     def level_error(self, level: int, segments: range) -> tuple[float, float, float]:
-        """Error of a level in these segments by each of MEASURES, scene units."""
+        """Return the error of a level in these segments by each of MEASURES, scene units."""
         largest, p99, rms = (
             lib.ath_level_error(self._file, level, segments[0], segments[-1], measure)
             for measure in range(len(MEASURES))
@@ -363,17 +351,17 @@ class File:
         return largest, p99, rms
 
     def level_name(self, level: int) -> str:
-        """What a level is, for people."""
+        """Return the name of a level, for people."""
         text = ctypes.create_string_buffer(LEVEL_NAME)
         lib.ath_level_name(self._file, level, text, len(text))
         return text.value.decode()
 
     def segment_starts(self, segments: range) -> list[int]:
-        """The first frame of each of these segments, and that behind the last of them."""
+        """Return the first frame of each of these segments, and the frame behind the last of them."""
         return [lib.ath_segment_start(self._file, segment) for segment in (*segments, segments.stop)]
 
     def cut(self, level: int) -> np.ndarray:
-        """(P,) of PART: what the plant is made of at a level."""
+        """Return the parts that the plant is made of at a level, (P,) of PART."""
         count = c_int32()
         lib.ath_cut_size(self._file, level, byref(count), None, None)
         parts = np.zeros(count.value, PART)
@@ -383,21 +371,21 @@ class File:
     # ---- bytes ----
 
     def missing(self, level: int, segment: int, last: int | None = None) -> list[tuple[int, int]]:
-        """(offset, size) of the bytes that are still to be fed for a segment, or all from it to the last."""
+        """Return (offset, size) of the bytes still to be fed for a segment, or for all from it to the last."""
         return self._ranges(lib.ath_ranges, level, segment, segment if last is None else last)
 
     def missing_of(self, segment: int, level: int, after: int = -1) -> list[tuple[int, int]]:
-        """The same of the levels behind `after`, without what it is joined to."""
+        """Return the missing bytes of the levels behind `after`, without those of the segment that it is joined to."""
         return self._ranges(lib.ath_onward_ranges, after, level, segment, segment)
 
     def _ranges(self, call: Callable[..., int], *of: int) -> list[tuple[int, int]]:
         count = call(self._file, *of, 0, None, 0)
         ranges = (Range * count)()
         call(self._file, *of, 0, ranges, count)
-        return [(found.offset, found.size) for found in ranges]
+        return [(item.offset, item.size) for item in ranges]
 
     def feed(self, data: np.ndarray, offset: int) -> None:
-        """data: uint8, which the caller keeps until it is dropped."""
+        """Give bytes at an offset of the file to the core; the caller keeps the uint8 array until it is dropped."""
         lib.ath_feed(self._file, data.ctypes.data, offset, len(data))
 
     def drop(self, offset: int, size: int) -> None:
@@ -412,20 +400,20 @@ class File:
         return lib.ath_segment_size(self._file, level)
 
     def goes_on(self, before: Segment, segment: int, level: int) -> bool:
-        """Whether what was prepared is this segment, at a level that this one goes on from."""
+        """Return whether a prepared segment is this one, at a level from which decoding can go on to this level."""
         same = lib.ath_segment_index(before.pointer) == segment and not before.gone
         return same and bool(lib.ath_goes_on(self._file, before.pointer, before.kept_pointer, level))
 
     def joined_to(self, segment: int, level: int) -> int:
-        """The segment whose end one goes on from at a level; -1: none."""
+        """Return the segment whose end this one goes on from at a level, or -1."""
         return lib.ath_joined_to(self._file, segment, level)
 
     def is_ready(self, prepared: Segment, segment: int, level: int) -> bool:
-        """Whether what was prepared is this segment at this level."""
+        """Return whether a prepared segment is this one at this level."""
         return lib.ath_segment_index(prepared.pointer) == segment and self.level_of(prepared) == level
 
     def level_of(self, segment: Segment) -> int:
-        """That it is prepared at; -1: at none."""
+        """Return the level that a segment is prepared at, or -1."""
         return lib.ath_segment_level(segment.pointer)
 
     def prepare(
@@ -438,10 +426,10 @@ class File:
         joined_to: Segment | None = None,
         to: np.ndarray | None = None,
     ) -> None:
-        """Decodes a segment at a level, from the beginning or from what goes_on() is true of.
+        """Decode a segment at a level, from the beginning or from a segment of which goes_on() is true.
 
-        joined_to: the segment that it is joined to, where that is ready at the level; to: a contiguous array for its
-        positions, of the file's type, where they are to go if they can (`into.gone`).
+        `joined_to` is the segment that it is joined to, if that is ready at the level. `to` is a contiguous array of
+        the file's type, which gets the positions if the core can write there (`into.gone`).
         """
         self.build()
         self.refine(level)
@@ -467,20 +455,20 @@ class File:
         return aligned(max(most, ALIGNMENT))
 
     def positions(self, segment: Segment, frame: float, out: np.ndarray, order: int = SOURCE_ORDER) -> None:
-        """Fills `out`, contiguous (N, 3) float32 or float64, with the positions of a frame of the segment."""
+        """Fill `out`, contiguous (N, 3) float32 or float64, with the positions of a frame of the segment."""
         show = lib.ath_positions_float64 if out.dtype == np.float64 else lib.ath_positions
         self._check(
             show(self._file, byref(ctypes.c_void_p(segment.pointer)), 1, frame, order, out.ctypes.data, out.strides[0])
         )
 
     def frame_at(self, clip: int, seconds: float) -> float:
-        """Where on the file's frames a time of a clip is, a loop's wrapped around."""
+        """Return the place of a clip's time among the file's frames; times of a loop wrap around."""
         return lib.ath_frame_at(self._file, clip, seconds, AS_MARKED)
 
     def blended(self, shares: list[tuple[list[Segment], float, float]], order: int = SOURCE_ORDER) -> np.ndarray:
-        """(N, 3) float32: several clips at once, of each the segments that show it, its frame and its weight."""
+        """Return several clips at once, (N, 3) float32, from the segments, frame and weight of each."""
         arrays = [(c_void_p * len(segments))(*(segment.pointer for segment in segments)) for segments, _, _ in shares]
-        given = (Share * len(shares))(
+        records = (Share * len(shares))(
             *(
                 Share(ctypes.addressof(array), len(array), frame, weight)
                 for array, (_, frame, weight) in zip(arrays, shares)
@@ -489,13 +477,13 @@ class File:
         out, scratch = np.empty((self.info.vertex_count, 3), np.float32), aligned(lib.ath_blend_size(self._file))
         self._check(
             lib.ath_blended_positions(
-                self._file, given, len(given), order, out.ctypes.data, 12, scratch.ctypes.data, len(scratch)
+                self._file, records, len(records), order, out.ctypes.data, 12, scratch.ctypes.data, len(scratch)
             )
         )
         return out
 
     def matrices(self, segment: Segment, frame: float, node_count: int) -> np.ndarray:
-        """(nodes, 3, 4) float64: maps of the cut's nodes from rest positions to positions."""
+        """Return the maps of the cut's nodes from rest positions to positions, (nodes, 3, 4) float64."""
         out = np.empty((node_count, 3, 4))
         self._check(
             lib.ath_matrices_float64(
@@ -507,7 +495,7 @@ class File:
     def level_for(
         self, segments: range, measure: str, distance: float, fov: float, height: float, pixels: float
     ) -> int:
-        """The coarsest level whose error in these segments, seen from afar, is at most `pixels`."""
+        """Return the coarsest level whose error in these segments, seen at a distance, is at most `pixels`."""
         if measure not in MEASURES:
             raise ValueError(f"measure: got {measure!r}; expected one of {', '.join(MEASURES)}")
         number = MEASURES.index(measure)
@@ -515,7 +503,7 @@ class File:
 
 
 def wind_weights(winds: np.ndarray, strength: float, heading: float) -> np.ndarray:
-    """(K,) float64: weights of clips for a wind, given the strengths and headings of theirs, (K, 2); NaN: none."""
-    given, weights = np.ascontiguousarray(winds, np.float64), np.zeros(len(winds))
-    lib.ath_wind_weights(given.ctypes.data, len(given), strength, heading, weights.ctypes.data)
+    """Return weights of clips for a wind, (K,) float64, from their strengths and headings, (K, 2), NaN without wind."""
+    winds, weights = np.ascontiguousarray(winds, np.float64), np.zeros(len(winds))
+    lib.ath_wind_weights(winds.ctypes.data, len(winds), strength, heading, weights.ctypes.data)
     return weights

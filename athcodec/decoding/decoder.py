@@ -1,85 +1,47 @@
-"""From an .ath file back to motion: one of its clips at any level, any frames.
+"""Playing one clip of an .ath file: any frames at any level.
 
-A `Decoder` plays one clip; the `AthFile` behind it holds what all clips share, reads the bytes and has the C core
-decode segments. Only the segments and levels that frames ask for are read.
+The `AthFile` behind a `Decoder` holds what all clips share, and reads and decodes the segments that the frames need.
 """
 
 from __future__ import annotations
 
 import threading
 from bisect import bisect_right
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Generic, TypeVar
+from operator import itemgetter
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from athcodec.decoding import core_file
-from athcodec.decoding.ath_file import AthFile, Clip, Level, median_rate
+from athcodec.decoding.affines import Affines, affines_of, residual_of
+from athcodec.decoding.ath_file import AthFile
+from athcodec.decoding.blending import Blending, Share
 from athcodec.decoding.endless_play import EndlessPlay
-from athcodec.errors import BadChunk, LevelUnavailable
-from athcodec.motion.affine_fit import stem_maps
+from athcodec.decoding.file_tables import Clip, Level, median_rate
+from athcodec.errors import LevelUnavailable
 from athcodec.motion.joining import metadata_of, wind_of
 from athcodec.options import whole
 
-SHOWN_TYPES = (np.dtype(np.float32), np.dtype(np.float64))
-
-T = TypeVar("T")
-
-
-@dataclass(frozen=True)
-class Affines:
-    """The parts of a level as matrices, K of them, by first vertex.
-
-    Attributes
-    ----------
-    branch : (K,) int32
-        The branch that each part is on, in the source's numbering.
-    first_vertex, vertex_count : (K,) int32
-        Its vertices, in file order (`Decoder.hierarchy.vertex_source` has their numbers in the source).
-    is_stem : (K,) bool
-        Whether it is an exact stem, whose matrix is a least-squares fit, or a node of the ATH, which moves as one.
-    matrices : (K, 3, 4) float64
-        From the reference pose of the level (`Decoder.level_rest`) to positions, both absolute, in scene units:
-        x' = matrix[:, :3] @ x + matrix[:, 3].
-    """
-
-    branch: np.ndarray
-    first_vertex: np.ndarray
-    vertex_count: np.ndarray
-    is_stem: np.ndarray
-    matrices: np.ndarray
-
-
-class _OfFile(Generic[T]):
-    """What a decoder has of its file."""
-
-    def __init__(self, get: Callable[[AthFile], T]):
-        self._get = get
-
-    def __set_name__(self, owner: type[Decoder], name: str) -> None:
-        self.__doc__ = getattr(AthFile, name).__doc__
-
-    def __get__(self, decoder: Decoder, owner: type[Decoder]) -> T:
-        return self._get(decoder.file)
+SHOWN_TYPES = (np.dtype(np.float32), np.dtype(np.float64))  # Types that the core writes itself.
 
 
 class Decoder:
     """One clip of an .ath file, at any of its levels; a context manager.
 
     Positions come in the source's vertex order, in scene units. Frames, segments, times and errors are those of the
-    clip, counted from its first frame. What all clips of the file share is that of `file`; the most used members
-    stand here too. Threads may share a decoder.
+    clip, counted from its first frame. `file` has what all clips share, such as vertices, levels and the rest pose.
+    Threads may share a decoder.
 
     Parameters
     ----------
     file : AthFile
         An opened file; see `athcodec.open` for a path.
     clip : str, optional
-        The name of the clip to play; by default the first.
+        Name of the clip to play; by default the first.
     closes_file : bool
         Whether closing the decoder closes the file.
 
@@ -89,51 +51,32 @@ class Decoder:
         The file, which all decoders of its clips share.
     clip : Clip
         The clip that is played.
-    clips, vertex_count, branch_count, level_count, full_level_count, deepest, complete, missing, max_error_bound, dtype
-        What `file` says of itself; see AthFile.
-    rest, hierarchy, vertex_branch, branch_parent, stem_index, edges, faces, attributes, error_weights
-        Static data of `file`; see AthFile.
 
     Raises
     ------
     ClipUnavailable
-        Where no clip has that name.
+        If no clip has that name.
+    LevelUnavailable
+        By methods that take a level or frames, if the file has no such ones, or was cut off before them.
+    FormatError
+        By the same methods, if the bytes are damaged.
     """
-
-    clips = _OfFile(lambda file: file.clips)
-    vertex_count = _OfFile(lambda file: file.vertex_count)
-    branch_count = _OfFile(lambda file: file.branch_count)
-    level_count = _OfFile(lambda file: file.level_count)
-    full_level_count = _OfFile(lambda file: file.full_level_count)
-    deepest = _OfFile(lambda file: file.deepest)
-    complete = _OfFile(lambda file: file.complete)
-    missing = _OfFile(lambda file: file.missing)
-    max_error_bound = _OfFile(lambda file: file.max_error_bound)
-    dtype = _OfFile(lambda file: file.dtype)
-    rest = _OfFile(lambda file: file.rest)
-    hierarchy = _OfFile(lambda file: file.hierarchy)
-    vertex_branch = _OfFile(lambda file: file.vertex_branch)
-    branch_parent = _OfFile(lambda file: file.branch_parent)
-    stem_index = _OfFile(lambda file: file.stem_index)
-    edges = _OfFile(lambda file: file.edges)
-    faces = _OfFile(lambda file: file.faces)
-    attributes = _OfFile(lambda file: file.attributes)
-    error_weights = _OfFile(lambda file: file.error_weights)
 
     def __init__(self, file: AthFile, clip: str | None = None, *, closes_file: bool = False):
         self.file, self._closes_file = file, closes_file
         self.clip: Clip = file.clips[0] if clip is None else file.clip_named(clip)
         self._lock = threading.Lock()
-        self._last: tuple[tuple[int, int] | None, core_file.Segment | None] = None, None  # (segment, level), prepared
-        self._blending: dict[tuple[int, int], core_file.Segment] = {}  # prepared for the last call of `blended`
+        # The segment that was decoded last, after its number and level.
+        self._last: tuple[tuple[int, int] | None, core_file.Segment | None] = None, None
+        self._blending = Blending(file)
 
     def play(self, name: str) -> Decoder:
-        """Another clip of the same file, at the same time as this one.
+        """Return a decoder for another clip of the same file; both may be used at the same time.
 
         Parameters
         ----------
         name : str
-            The clip's.
+            Name of the clip.
 
         Returns
         -------
@@ -143,12 +86,12 @@ class Decoder:
         Raises
         ------
         ClipUnavailable
-            Where no clip has that name.
+            If no clip has that name.
         """
         return Decoder(self.file, name)
 
     def close(self) -> None:
-        """Closes the file where the decoder comes from `athcodec.open`."""
+        """Close the file, if the decoder comes from `athcodec.open`."""
         if self._closes_file:
             self.file.close()
 
@@ -181,15 +124,11 @@ class Decoder:
         starts = [start - self.clip.first_frame for start in self.file.segment_starts(self.clip)]
         return list(zip(starts, starts[1:]))
 
-    @cached_property
-    def _segment_starts(self) -> list[int]:
-        return [start for start, _ in self.segments]
-
     @property
     def metadata(self) -> dict[str, Any]:
-        """Unit, up axis and whatever else the source said of itself, this clip's own in place of those for all."""
+        """Unit, up axis and whatever else the source states, with this clip's values in place of the file's."""
         metadata = self.file.metadata
-        return metadata_of(metadata, self.clip.name) if len(self.clips) > 1 else metadata
+        return metadata_of(metadata, self.clip.name) if len(self.file.clips) > 1 else metadata
 
     @property
     def levels(self) -> list[Level]:
@@ -197,30 +136,30 @@ class Decoder:
         return self.file.levels_in(self.clip.segments)
 
     def level_for(self, distance: float, fov: float, height: float, pixels: float = 1.0, measure: str = "max") -> int:
-        """The level to show from afar.
+        """Return the level to show at a distance.
 
         Parameters
         ----------
         distance : float
-            From the eye, in scene units.
+            Distance from the eye, in scene units.
         fov : float
             Vertical field of view, radians.
         height : float
-            Of the screen, pixels.
+            Height of the screen, pixels.
         pixels : float
-            By how much vertices may be off on the screen.
+            Largest deviation of vertices on the screen.
         measure : {"max", "p99", "rms"}
-            Of the errors of all vertices: with "p99" at most 1 % of them may be off by more.
+            Statistic of the vertices' errors; with "p99", at most 1 % of them may deviate further.
 
         Returns
         -------
         int
-            The coarsest stored level whose error is at most that; the deepest where none is.
+            The coarsest stored level whose error is at most `pixels`; the deepest if none is.
         """
         return self.file.core.level_for(self.clip.segments, measure, distance, fov, height, pixels)
 
     def level_within(self, max_error: float) -> int:
-        """The level to use where vertices may be off by no more than a length.
+        """Return the coarsest stored level whose largest error in this clip is at most a length.
 
         Parameters
         ----------
@@ -230,12 +169,12 @@ class Decoder:
         Returns
         -------
         int
-            The coarsest stored level whose largest error in this clip is at most that.
+            Number of the level.
 
         Raises
         ------
         LevelUnavailable
-            Where that of the deepest level is larger.
+            If the error of the deepest level is larger.
         """
         return self.file.level_within(max_error, self.clip.segments)
 
@@ -244,7 +183,7 @@ class Decoder:
     def positions(
         self, frames: int | slice | None = None, level: int | None = None, dtype: npt.DTypeLike | None = None
     ) -> np.ndarray:
-        """Positions of all vertices in one or several frames. Threads share the segments, where there are several.
+        """Return the positions of all vertices in one or several frames. Threads share the segments.
 
         Parameters
         ----------
@@ -259,17 +198,10 @@ class Decoder:
         -------
         numpy.ndarray
             (N, 3) for one frame, else (frames, N, 3), scene units.
-
-        Raises
-        ------
-        LevelUnavailable
-            Where the file has no such level or frame, or was cut off before them.
-        FormatError
-            Where their bytes are damaged.
         """
         level, (first, last) = self._checked_level(level), self._checked_frames(frames)
-        dtype = np.dtype(dtype or self.dtype)
-        shown = np.empty((last - first, self.vertex_count, 3), dtype if dtype in SHOWN_TYPES else self.dtype)
+        dtype = np.dtype(dtype or self.file.dtype)
+        shown = np.empty((last - first, self.file.vertex_count, 3), dtype if dtype in SHOWN_TYPES else self.file.dtype)
 
         def show(segment: int, ready: core_file.Segment) -> None:
             start, stop = self.segments[segment - self.clip.first_segment]
@@ -278,7 +210,7 @@ class Decoder:
 
         def room(segment: int) -> np.ndarray | None:
             start, stop = self.segments[segment - self.clip.first_segment]
-            is_all = first <= start and stop <= last and shown.dtype == self.dtype
+            is_all = first <= start and stop <= last and shown.dtype == self.file.dtype
             return shown[start - first : stop - first] if is_all else None
 
         segments = self._in_file(self._segments_of(first, last))
@@ -294,7 +226,7 @@ class Decoder:
     def blocks(
         self, level: int | None = None, dtype: npt.DTypeLike | None = None, frames: int | slice | None = None
     ) -> Iterator[tuple[int, np.ndarray]]:
-        """The same, one segment in memory at a time.
+        """Yield positions in blocks, with one segment in memory at a time.
 
         Parameters
         ----------
@@ -307,11 +239,6 @@ class Decoder:
             The first frame of the block.
         block : numpy.ndarray
             (k, N, 3), scene units.
-
-        Raises
-        ------
-        LevelUnavailable, FormatError
-            As for `positions`.
         """
         level, (first, last) = self._checked_level(level), self._checked_frames(frames)
         segments = self._segments_of(first, last)
@@ -323,11 +250,11 @@ class Decoder:
             yield low, self.positions(slice(low, high), level, dtype)
 
     def wind_weights(self, strength: float, heading: float) -> dict[str, float]:
-        """Clips to blend for a wind.
+        """Return the clips to blend for a wind, with their weights.
 
-        Bilinear in strength and heading of the clips' own winds (metadata "strength" and "heading"): between the two
-        strengths next to the wanted one, and at each between the two headings next to the wanted one on the circle.
-        It changes without a jump, and is held beyond the calmest and the wildest clip.
+        The weights are bilinear in the strength and heading of the clips' winds (metadata "strength" and "heading"):
+        between the two strengths next to the wanted one, and at each between the two headings next to the wanted one on
+        the circle. They change without a jump, and stay constant beyond the calmest and the wildest clip.
 
         Parameters
         ----------
@@ -341,9 +268,9 @@ class Decoder:
         dict of str to float
             At most four clips by name, with weights above 0 that add up to 1; for `blended`.
         """
-        winds = np.array([wind_of(metadata_of(self.file.metadata, clip.name)) for clip in self.clips])
+        winds = np.array([wind_of(metadata_of(self.file.metadata, clip.name)) for clip in self.file.clips])
         weights = core_file.wind_weights(winds, strength, heading)
-        return {clip.name: float(weight) for clip, weight in zip(self.clips, weights) if weight > 0}
+        return {clip.name: float(weight) for clip, weight in zip(self.file.clips, weights) if weight > 0}
 
     def blended(
         self,
@@ -351,37 +278,37 @@ class Decoder:
         seconds: float | Mapping[str, float],
         level: int | None | Mapping[str, int] = None,
     ) -> np.ndarray:
-        """Several clips of the file at once, blended along the branches.
+        """Return several clips of the file at once, blended along the branches.
 
-        These stay attached, and edges along stems are as long as those of the clips in their weighted mean.
+        Branches stay attached, and edges along stems are as long as the weighted mean of those in the clips.
 
         Parameters
         ----------
         weights : mapping of str to float
-            By name of clip; up to four are above 0. They need not add up to 1.
+            Weights by name of clip; up to four are above 0. They need not add up to 1.
         seconds : float or mapping of str to float
-            Since the first frame, of all clips or of each; loops wrap around.
+            Time since the first frame, for all clips or for each; loops wrap around.
         level : int or mapping of str to int, optional
-            Level of detail, of all clips or of each; by default the deepest that is complete.
+            Level of detail, for all clips or for each; by default the deepest that is complete.
 
         Returns
         -------
         numpy.ndarray
-            (N, 3) float32, scene units. Where one clip alone has a weight, that clip's numbers.
+            (N, 3) float32, scene units. If only one clip has a weight, its positions unchanged.
 
         Raises
         ------
         ValueError
-            Where no weight is above 0, one is not finite, or more than four are above 0.
-        ClipUnavailable, LevelUnavailable, FormatError
-            As for `play` and `positions`.
+            If no weight is above 0, one is not finite, or more than four are above 0.
+        ClipUnavailable
+            If no clip has that name.
         """
         used = {name: float(weight) for name, weight in weights.items() if not weight <= 0}
         if not 0 < len(used) <= core_file.BLEND_CLIPS or not np.isfinite(list(used.values())).all():
             raise ValueError(f"weights: got {dict(weights)}; expected 1 to {core_file.BLEND_CLIPS} that are above 0")
-        return self._blend(
+        return self._blending.positions(
             [
-                (
+                Share(
                     self.file.clip_named(name),
                     seconds[name] if isinstance(seconds, Mapping) else seconds,
                     self._checked_level(level.get(name) if isinstance(level, Mapping) else level),
@@ -392,27 +319,27 @@ class Decoder:
         )
 
     def endless(self, seed: int = 1) -> EndlessPlay:
-        """The clip played without an end, over transitions that `athcodec.endless` has found between its like frames.
+        """Play the clip without an end, over transitions that `athcodec.endless` stored between its like frames.
 
         Parameters
         ----------
         seed : int, optional
-            Another one gives another order.
+            Another seed gives another order of transitions.
 
         Returns
         -------
         EndlessPlay
-            Its `positions(seconds)` are those of any time.
+            An object whose `positions(seconds)` returns the plant at any time.
 
         Raises
         ------
         ValueError
-            Where the clip names no transitions.
+            If the clip names no transitions.
         """
         return EndlessPlay(self, seed)
 
     def blended_places(self, places: Sequence[tuple[float, float]], level: int | None = None) -> np.ndarray:
-        """The clip at several times at once, blended along the branches as `blended` blends clips.
+        """Return the clip at several times at once, blended along the branches as `blended` blends clips.
 
         Parameters
         ----------
@@ -425,45 +352,15 @@ class Decoder:
         -------
         numpy.ndarray
             (N, 3) float32, scene units.
-
-        Raises
-        ------
-        ValueError, LevelUnavailable, FormatError
-            As for `blended`.
         """
         weights = np.array([weight for _, weight in places], np.float64)
         if not 0 < len(places) <= core_file.BLEND_CLIPS or not (np.isfinite(weights) & (weights > 0)).all():
             raise ValueError(f"places: got {list(places)}; expected 1 to {core_file.BLEND_CLIPS} with weights above 0")
-        own = self._checked_level(level)
-        return self._blend([(self.clip, seconds, own, weight) for seconds, weight in places])
-
-    def _blend(self, parts: Sequence[tuple[Clip, float, int, float]]) -> np.ndarray:
-        """Clips, each at its seconds, level and weight."""
-        with self._lock:
-            before, self._blending = self._blending, {}
-        ready: dict[tuple[int, int], core_file.Segment] = {}
-        shares = []
-        for clip, own_seconds, own_level, weight in parts:
-            frame = self.file.core.frame_at(self.clips.index(clip), own_seconds)
-            first, starts = int(frame), self.file.segment_starts(clip)
-            after = first + 1 if first + 1 < starts[-1] else starts[0]
-            shown = {
-                clip.first_segment + bisect_right(starts, place) - 1
-                for place in ([first, after] if frame > first else [first])
-            }
-            for segment in shown:
-                place = segment, own_level
-                ready[place] = ready.get(place) or before.get(place) or self.file.prepare(*place)
-            shares.append(([ready[segment, own_level] for segment in shown], frame, weight))
-        with self._lock:
-            self._blending = ready
-        return self.file.core.blended(shares)
+        level = self._checked_level(level)
+        return self._blending.positions([Share(self.clip, seconds, level, weight) for seconds, weight in places])
 
     def level_rest(self, level: int | None = None) -> np.ndarray:
-        """The reference pose of a level, which its maps move: the source's rest pose, or another that the motion is
-        closer to. Levels that refine the plant may refine it, too.
-
-        `rest` is the rest pose of the source, rounded to its type.
+        """Return the reference pose of a level, which its maps move; see `AthFile.level_rest`.
 
         Parameters
         ----------
@@ -474,16 +371,11 @@ class Decoder:
         -------
         numpy.ndarray
             (N, 3) float64, scene units.
-
-        Raises
-        ------
-        LevelUnavailable, FormatError
-            As for `positions`.
         """
         return self.file.level_rest(self._checked_level(level))
 
     def affines(self, frame: int, level: int | None = None) -> Affines:
-        """A frame at a level as matrices: nodes that move as one, and least-squares maps of exact stems (paper, eq. 2).
+        """Return a frame as matrices: of nodes that move as one, and least-squares maps of exact stems (paper, eq. 2).
 
         Parameters
         ----------
@@ -496,36 +388,13 @@ class Decoder:
         -------
         Affines
             Maps from the reference pose of the level, `level_rest`, to the frame.
-
-        Raises
-        ------
-        LevelUnavailable, FormatError
-            As for `positions`.
         """
-        level, (frame, _) = self._checked_level(level), self._checked_frames(frame)
-        file, core, in_file = self.file, self.file.core, self.clip.first_frame + frame
-        parts = core.cut(level)
-        nodes, stems = parts[parts["branch"] >= 0], file.exact_branches(parts)
-        positions = np.empty((self.vertex_count, 3))
-        with self._prepared(self.clip.first_segment + self._segment_of(frame), level) as ready:
-            node_matrices = core.matrices(ready, in_file, len(nodes))
-            core.positions(ready, in_file, positions, core_file.FILE_ORDER)
-        try:
-            with np.errstate(over="ignore", invalid="ignore"):
-                maps = stem_maps(file.hierarchy, file.level_rest(level, core_file.FILE_ORDER), positions[None])
-        except np.linalg.LinAlgError:  # which only some plants with infinite positions lead to
-            maps = np.array(np.nan)
-        if not np.isfinite(maps).all():
-            raise BadChunk(f"frame {frame}: got positions that no matrix fits; expected those of a plant")
-        first = np.concatenate([nodes["first"], file.branches["first"][stems]])
-        count = np.concatenate([nodes["count"], file.branches["count"][stems]])
-        branch = file.hierarchy.branch_source[np.concatenate([nodes["branch"], stems])]
-        is_stem, matrices = np.arange(len(first)) >= len(nodes), np.concatenate([node_matrices, maps[0, stems]])
-        order = np.argsort(first, kind="stable")
-        return Affines(branch[order], first[order], count[order], is_stem[order], matrices[order])
+        level, (index, _) = self._checked_level(level), self._checked_frames(frame)
+        with self._prepared(self.clip.first_segment + self._segment_of(index), level) as ready:
+            return affines_of(self.file, ready, level, self.clip.first_frame + index, f"frame {index}")
 
     def residual(self, frame: int, level: int | None = None) -> np.ndarray:
-        """What the matrices of `affines` leave out, in the space of the level's rest pose (paper, eq. 3).
+        """Return what the matrices of `affines` leave out, in the space of the level's rest pose (paper, eq. 3).
 
         The matrix of a vertex's part, applied to this, gives the position at the deepest complete level.
 
@@ -538,28 +407,15 @@ class Decoder:
         -------
         numpy.ndarray
             (N, 3) float64, scene units.
-
-        Raises
-        ------
-        LevelUnavailable, FormatError
-            As for `positions`.
         """
-        parts, vertex_source = self.affines(frame, level), self.hierarchy.vertex_source
-        full = self.positions(frame, self.deepest, np.float64)[vertex_source]
-        if not np.isfinite(full).all():
-            raise BadChunk(f"frame {frame}: got positions that are not finite; expected those of a plant")
-        out = np.empty_like(full)
-        for first, count, matrix in zip(parts.first_vertex, parts.vertex_count, parts.matrices):
-            rows = slice(first, first + count)
-            away = (full[rows] - matrix[:, 3]).T
-            out[vertex_source[rows]] = np.linalg.lstsq(matrix[:, :3], away, rcond=1e-15)[0].T
-        return out
+        positions = self.positions(frame, self.file.deepest, np.float64)
+        return residual_of(self.affines(frame, level), positions, self.file.hierarchy.vertex_source, f"frame {frame}")
 
     def _checked_level(self, level: int | None) -> int:
         if level is None:
-            return self.deepest
-        if not 0 <= (level := whole("level", level)) < self.level_count:
-            raise LevelUnavailable(f"level: got {level}; expected 0 to {self.level_count - 1}")
+            return self.file.deepest
+        if not 0 <= (level := whole("level", level)) < self.file.level_count:
+            raise LevelUnavailable(f"level: got {level}; expected 0 to {self.file.level_count - 1}")
         return level
 
     def _checked_frames(self, frames: int | slice | None) -> tuple[int, int]:
@@ -577,9 +433,9 @@ class Decoder:
 
     @contextmanager
     def _prepared(self, segment: int, level: int, to: np.ndarray | None = None) -> Iterator[core_file.Segment]:
-        """A segment of the file at a level, for the caller alone; the last one is kept. Raises as `positions`.
+        """Give the caller alone a segment of the file at a level; the last one is kept. Raises as `positions`.
 
-        to: as for `AthFile.prepare`.
+        `to` is that of `AthFile.prepare`.
         """
         place = segment, level
         with self._lock:
@@ -593,11 +449,11 @@ class Decoder:
                 self._last = (None if ready.gone else place), ready
 
     def _segments_of(self, first: int, last: int) -> range:
-        """The clip's segments that hold the frames first to last - 1."""
+        """Return the clip's segments that hold the frames first to last - 1."""
         return range(self._segment_of(first), self._segment_of(last - 1) + 1) if first < last else range(0)
 
     def _in_file(self, segments: range) -> range:
         return range(self.clip.first_segment + segments.start, self.clip.first_segment + segments.stop)
 
     def _segment_of(self, frame: int) -> int:
-        return bisect_right(self._segment_starts, frame) - 1
+        return bisect_right(self.segments, frame, key=itemgetter(0)) - 1

@@ -1,4 +1,4 @@
-"""Play without an end, over the transitions that a clip's metadata name."""
+"""Endless play of a clip, over the transitions that its metadata name."""
 
 from __future__ import annotations
 
@@ -14,45 +14,46 @@ if TYPE_CHECKING:
     from athcodec.decoding.decoder import Decoder
 
 LONGEST = 1e7  # Seconds that a play can last: 115 days.
-TAKEN = 0.5  # Probability that a player takes a transition it comes to.
+TAKEN = 0.5  # Probability that a player takes the transition ahead.
 
 
-class _Way(NamedTuple):
-    """A transition in seconds since the clip's first frame."""
+class _Transition(NamedTuple):
+    """A transition; its times are seconds since the clip's first frame."""
 
     leave: float
     enter: float
     lasts: float
-    over: float  # where the clip is when it is over
+    over: float  # Place in the clip at which the transition ends.
 
 
 class EndlessPlay:
-    """A clip that is played without an end: at each of its transitions chance decides whether it is taken.
+    """A clip that is played without an end; at each transition, chance decides whether it is taken.
 
-    The same seed gives the same play. Made by `Decoder.endless`.
+    The same seed gives the same play. `Decoder.endless` returns one.
     """
 
     def __init__(self, decoder: Decoder, seed: int = 1):
         time = decoder.time - decoder.time[0]
-        found = transitions_of(decoder.metadata, decoder.frame_count)
-        if not found:
+        stored = transitions_of(decoder.metadata, decoder.frame_count)
+        if not stored:
             raise ValueError(f"clip {decoder.clip.name!r}: got no transitions, expected some, of encode --endless")
         self._decoder = decoder
-        self._ways = [
-            _Way(time[a], time[b], min(time[a + n] - time[a], time[b + n] - time[b]), time[b + n]) for a, b, n in found
+        self._transitions = [
+            _Transition(time[a], time[b], min(time[a + n] - time[a], time[b + n] - time[b]), time[b + n])
+            for a, b, n in stored
         ]
         self._state = (whole("seed", seed) * 2654435761 + 1) % 2**32 or 1
-        self._begins = [0.0]  # when each run of the clip begins
-        self._runs = [_Way(0.0, 0.0, 0.0, 0.0)]  # what led to it
+        self._begins = [0.0]  # Seconds of play at which each run of the clip begins.
+        self._runs = [_Transition(0.0, 0.0, 0.0, 0.0)]  # The transition before each run.
         self._next = self._drawn(0.0)
 
     def places(self, seconds: float) -> list[tuple[float, float]]:
-        """Where in the clip a time is.
+        """Return the places in the clip that are shown at a time.
 
         Parameters
         ----------
         seconds : float
-            Since the play began, 0 to 1e7.
+            Time since the play began, 0 to 1e7.
 
         Returns
         -------
@@ -70,37 +71,32 @@ class EndlessPlay:
         if passed >= way.lasts:
             return [(way.enter + passed, 1.0)]
         share = passed / way.lasts
-        weight = share * share * (3 - 2 * share)  # smoothstep: velocities do not jump
+        weight = share * share * (3 - 2 * share)  # Smoothstep keeps velocities from jumping.
         both = [(way.leave + passed, 1 - weight), (way.enter + passed, weight)]
         return [place for place in both if place[1] > 0]
 
     def positions(self, seconds: float, level: int | None = None) -> np.ndarray:
-        """(N, 3) float32, scene units: the plant at a time, within a transition blended along the branches.
+        """Return the plant at a time, (N, 3) float32, scene units, blended along the branches within a transition.
 
         Parameters
         ----------
         seconds : float
-            As for `places`.
+            Time, as for `places`.
         level : int, optional
             Level of detail; by default the deepest that is complete.
-
-        Raises
-        ------
-        LevelUnavailable, FormatError
-            As for `Decoder.positions`.
         """
         return self._decoder.blended_places(self.places(seconds), level)
 
-    def _drawn(self, seconds: float) -> _Way:
-        """The way that is taken after this place in the clip. All ways are over before the last of them leaves."""
-        last = self._ways[-1].leave
-        ahead = sorted({way.leave for way in self._ways if seconds <= way.leave < last})
+    def _drawn(self, seconds: float) -> _Transition:
+        """Draw the transition that follows a place in the clip. All transitions end before the last of them leaves."""
+        last = self._transitions[-1].leave
+        ahead = sorted({way.leave for way in self._transitions if seconds <= way.leave < last})
         leave = next((place for place in ahead if self._random() < TAKEN), last)
-        same = [way for way in self._ways if way.leave == leave]
-        return same[int(self._random() * len(same))]
+        ways = [way for way in self._transitions if way.leave == leave]
+        return ways[int(self._random() * len(ways))]
 
     def _random(self) -> float:
-        """0 to 1, of a 32-bit xorshift (Marsaglia 2003), the same in all languages."""
+        """Return a number from 0 to 1 of a 32-bit xorshift (Marsaglia 2003), the same in all languages."""
         for shift in (13, -17, 5):
             self._state ^= (self._state << shift if shift > 0 else self._state >> -shift) & 0xFFFFFFFF
         return self._state / 2**32

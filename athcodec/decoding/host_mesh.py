@@ -1,4 +1,4 @@
-"""The mesh that is the rest pose of a file which does not hold one, as whoever plays the file has it."""
+"""The mesh of the host that is the rest pose of a file without one."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ HostMesh: TypeAlias = npt.ArrayLike | MotionClip
 
 
 def mesh_positions(mesh: HostMesh) -> tuple[np.ndarray, frozenset[FileId]]:
-    """(N, 3) float32 positions of a mesh, and the files that they come from. Raises ClipError."""
+    """Return (N, 3) float32 positions of a mesh, and the files that they come from. Raises ClipError."""
     positions = np.asarray(mesh.rest if isinstance(mesh, MotionClip) else mesh)
     if positions.ndim != 2 or positions.shape[1] != 3 or positions.dtype.kind not in "fiu":
         raise ClipError(f"host mesh: got {positions.dtype} of shape {positions.shape}, expected positions (N, 3)")

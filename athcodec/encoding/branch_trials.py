@@ -1,4 +1,4 @@
-"""Which of the branches that discovery.py proposes make the smallest file. Each proposal is tried on a few frames."""
+"""Which of the branches that motion/branches proposes make the smallest file; each is tried on a few frames."""
 
 from __future__ import annotations
 
@@ -16,8 +16,9 @@ from athcodec.encoding.progress import Progress
 from athcodec.encoding.segment import Source
 from athcodec.encoding.survey import survey
 from athcodec.errors import BoundError
+from athcodec.motion.branches.finding import candidates
+from athcodec.motion.branches.result import Found, with_branches
 from athcodec.motion.clip import MotionClip
-from athcodec.motion.discovery import Found, candidates, with_branches
 from athcodec.motion.hierarchy import hierarchy_of
 from athcodec.options import DEFAULT_SEGMENT
 

@@ -52,8 +52,8 @@ from athcodec.encoding.summary import Seam, Summary
 from athcodec.encoding.survey import Ath, Survey, survey
 from athcodec.errors import BoundError, ClipError
 from athcodec.files.threads import ThreadPool, default_jobs
+from athcodec.motion.branches.result import Found, with_branches
 from athcodec.motion.clip import ERROR_WEIGHTS, MotionClip
-from athcodec.motion.discovery import Found, with_branches
 from athcodec.motion.hierarchy import Hierarchy, derived_edges, hierarchy_of
 from athcodec.motion.polygons import POLYGON_ARRAYS, Polygons, type_code
 from athcodec.motion.thresholds import THRESHOLDS, Thresholds
@@ -514,13 +514,13 @@ class EncodingJob:
         """Return for each loop how far off its step from the last frame to the first is, per level."""
         return [
             self._seam_errors_of(decoder.play(clip.name), self._step(stop - 1, start)) if clip.loop else None
-            for clip, (start, stop) in zip(decoder.clips, self.clip.clip_range_frames)
+            for clip, (start, stop) in zip(decoder.file.clips, self.clip.clip_range_frames)
         ]
 
     @staticmethod
     def _seam_errors_of(loop: Decoder, step: np.ndarray) -> list[float]:
         errors = []
-        for level in range(loop.level_count):
+        for level in range(loop.file.level_count):
             last, first = (loop.positions(frame, level, np.float64) for frame in (-1, 0))
             errors.append(np.linalg.norm(first - last - step, axis=1).max())
         return errors
@@ -533,7 +533,7 @@ class EncodingJob:
     def seams(self, decoder: Decoder) -> tuple[Seam, ...]:
         """Return the seams of the loops of the file just written."""
         seams = []
-        for clip, (start, stop) in zip(decoder.clips, self.clip.clip_range_frames):
+        for clip, (start, stop) in zip(decoder.file.clips, self.clip.clip_range_frames):
             if clip.loop:
                 beside = [(start, min(start + 1, stop - 1)), (max(stop - 2, start), stop - 1)]
                 step, *steps = (

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from athcodec.decoding.ath_file import Level
+from athcodec.decoding.file_tables import Level
 
 
 @dataclass(frozen=True)

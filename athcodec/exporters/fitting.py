@@ -175,7 +175,7 @@ def _ranges(motion: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     if isinstance(motion, ClipView):
         parts = motion.affines(0)
         return (
-            motion.decoder.hierarchy.vertex_source,
+            motion.decoder.file.hierarchy.vertex_source,
             parts.first_vertex.astype(np.int64),
             (parts.vertex_count.astype(np.int64)),
         )

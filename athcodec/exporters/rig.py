@@ -24,7 +24,8 @@ from athcodec.decoding.clip_view import ClipView
 from athcodec.exporters.fitting import allowed_error, portions, quaternions, rotation_matrices
 from athcodec.exporters.gltf_joints import Joints
 from athcodec.exporters.scene_objects import distinct
-from athcodec.motion.discovery import find_branches, with_branches
+from athcodec.motion.branches.finding import find_branches
+from athcodec.motion.branches.result import with_branches
 from athcodec.motion.hierarchy import Hierarchy, hierarchy_of
 from athcodec.options import RIG_JOINTS
 
@@ -113,7 +114,7 @@ def fit_rig(motion: Any, most: int = RIG_JOINTS, report: Callable[[float], None]
 def hierarchy_to_rig(motion: Any) -> Hierarchy:
     """The branches of a motion, or those that are found where it has none."""
     if isinstance(motion, ClipView):
-        return motion.decoder.hierarchy
+        return motion.decoder.file.hierarchy
     return hierarchy_of(motion if motion.has_branches else with_branches(motion, find_branches(motion)))
 
 

@@ -1,1 +1,1 @@
-"""Files as bytes: opening, replacing, fetching; it knows nothing of plants."""
+"""Files as bytes: opening, replacing and fetching them."""

@@ -1,4 +1,4 @@
-"""Files that take their name only when they are whole, and what dead writers have left of theirs.
+"""Files that take their name only when they are complete, and removal of what dead writers have left.
 
 An older file is replaced only where it holds what the new one holds, or nothing, and is no input.
 
@@ -25,11 +25,12 @@ from athcodec.files.kinds import UNKNOWN, kind_by_suffix, kind_of
 
 try:
     import fcntl
-except ImportError:  # Windows, where nobody can remove a file that another has open
+except ImportError:  # Windows lets nobody remove a file that another program has open.
     fcntl = None
 
 FileId = tuple[int, int]
-NAME_CHARACTERS = 50  # of the target in the pending file's name: a name of the longest length has room for the rest too
+# Characters of the target's name in that of the pending file; even the longest name leaves room for the rest.
+NAME_CHARACTERS = 50
 PLAIN_OPEN = getattr(os, "O_CLOEXEC", 0) | getattr(os, "O_BINARY", 0)
 
 _PENDING_NAME = re.compile(r"(\..*\.)[0-9a-f]{8}\.part", re.DOTALL)
@@ -38,13 +39,13 @@ _inputs: ContextVar[frozenset[FileId]] = ContextVar("_inputs", default=frozenset
 
 
 def file_id(file: str | os.PathLike[str] | int) -> FileId:
-    """What a file has in common under all its names: device and inode. Raises OSError."""
+    """Return device and inode, which a file has in common under all its names. Raises OSError."""
     status = os.stat(file)
     return status.st_dev, status.st_ino
 
 
 def file_ids(*paths: str | os.PathLike[str] | None) -> frozenset[FileId]:
-    """The same of those paths that are files; URLs and others are left out."""
+    """Return the device and inode of those of the paths that are files; URLs and others are left out."""
     return frozenset(file_id(path) for path in paths if path is not None and os.path.isfile(path))
 
 
@@ -59,9 +60,9 @@ def keeping(inputs: Iterable[FileId]) -> Iterator[None]:
 
 
 def check_target(path: str | os.PathLike[str], suffix: str = "") -> str:
-    """The file that `path` names, behind any links. Raises OSError where nothing can be written there: the
-    directory is missing or read-only, `path` is one, no plain file, a read-only one, an input, or not of the kind that
-    this suffix promises."""
+    """Return the file that `path` names, behind any links. Raises OSError if nothing can be written there: the
+    directory is missing or read-only, or `path` is a directory, no plain file, read-only, an input, or not of the kind
+    that this suffix promises."""
     path = os.fspath(path)
     target = os.path.realpath(path)
     directory = os.path.dirname(target if os.path.islink(path) else path) or "."
@@ -84,27 +85,26 @@ def check_target(path: str | os.PathLike[str], suffix: str = "") -> str:
 
 
 def _check_replaceable(path: str, kind: str | None) -> None:
-    """FileExistsError where a file is there that is an input, or that holds anything but this kind; None: any kind."""
+    """Raise FileExistsError if the file is an input, or holds anything but this kind; None allows any kind."""
     if not os.path.exists(path):
         return
     if file_id(path) in _inputs.get():
         raise FileExistsError(f"{path}: is the input, or a file that belongs to it; choose another output name")
-    found = kind_of(path) if kind is not None and os.path.getsize(path) else kind
-    if found != kind or found == UNKNOWN:
+    content = kind_of(path) if kind is not None and os.path.getsize(path) else kind
+    if content != kind or content == UNKNOWN:
         raise FileExistsError(
-            f"{path}: is there already and holds {found}, expected {kind}; choose another output name, or remove it "
+            f"{path}: is there already and holds {content}, expected {kind}; choose another output name, or remove it "
             "first"
         )
 
 
 def is_url(path: object) -> bool:
-    """Whether a path is one for remote.py."""
+    """Return whether a path is a URL for remote.py."""
     return isinstance(path, str) and _URL.match(path) is not None
 
 
 class PendingFile:
-    """A file on its way to `path`: it is written as `name`, beside it, until it is complete; `descriptor` is
-    open.
+    """A file on its way to `path`. It is written as `name`, beside `path`, until it is complete; `descriptor` is open.
 
     It has the permissions of the file that it replaces, or those of any new file. Raises OSError.
     """
@@ -120,24 +120,24 @@ class PendingFile:
             raise
 
     def complete(self) -> None:
-        """Gives the file its name, in place of an older one, once its bytes are on the disk."""
+        """Give the file its name, in place of an older one, as soon as its bytes are on the disk."""
         _check_replaceable(self.path, kind_of(self.name))
         try:
             os.fsync(self.descriptor)
             if fcntl is None:
-                self._close()  # Windows renames no open files
+                self._close()  # Windows renames no open files.
             os.replace(self.name, self.path)
         except OSError as error:
             raise OSError(error.errno, error.strerror, self.path) from None
-        with suppress(OSError):  # its bytes are on the disk, under its name
+        with suppress(OSError):  # The bytes are on the disk, under the final name.
             self._close()
         _sync_folder(os.path.dirname(self.path))
 
     def discard(self) -> None:
-        """Removes what has been written."""
+        """Remove what has been written."""
         if fcntl is None:
             self._close()
-        with suppress(OSError):  # it is gone, or the next writer removes it
+        with suppress(OSError):  # The file is gone already, or the next writer removes it.
             os.unlink(self.name)
         with suppress(OSError):
             self._close()
@@ -170,7 +170,7 @@ class _Naming(io.FileIO):
 
 @contextmanager
 def new_file(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
-    """A file that replaces `path` when the block ends, and leaves nothing behind when it raises. Raises
+    """Give a file that replaces `path` when the block ends, and leaves nothing behind if the block raises. Raises
     OSError."""
     pending = PendingFile(path)
     try:
@@ -184,9 +184,9 @@ def new_file(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
 
 @contextmanager
 def new_files(path: str | os.PathLike[str], named: bool = True) -> Iterator[str]:
-    """A folder for files that belong together. When the block ends they move beside `path`, the one of that name last,
-    in place of older ones; nothing is left behind when it raises. One of them must have that name, unless `named` is
-    False. Raises OSError."""
+    """Give a folder for files that belong together. When the block ends, they move beside `path`, the one of that name
+    last, in place of older ones. If the block raises, nothing is left behind. One of them must have that name, unless
+    `named` is False. Raises OSError."""
     path = check_target(path)
     directory, name = os.path.split(path)
     with scratch_folder(path) as folder:
@@ -203,8 +203,8 @@ def new_files(path: str | os.PathLike[str], named: bool = True) -> Iterator[str]
 
 @contextmanager
 def new_folder(path: str | os.PathLike[str]) -> Iterator[str]:
-    """A folder that becomes `path` when the block ends, whole; nothing is left behind when it raises. Nothing that
-    exists is replaced. Raises OSError."""
+    """Give a folder that becomes `path` when the block ends. Nothing that exists is replaced, and if the block raises,
+    nothing is left behind. Raises OSError."""
     path = check_target(path)
     if os.path.lexists(path):
         raise FileExistsError(f"{path}: exists, expected the name of a new folder")
@@ -216,8 +216,8 @@ def new_folder(path: str | os.PathLike[str]) -> Iterator[str]:
 
 @contextmanager
 def scratch_folder(path: str) -> Iterator[str]:
-    """A locked folder beside `path`, removed with all that is still in it when the block ends. An OSError that names no
-    file names `path`."""
+    """Give a locked folder beside `path`, removed with all that is still in it when the block ends. An OSError that
+    names no file names `path`."""
     remove_leftovers(path)
     directory, name = os.path.split(path)
     folder = os.path.join(directory, f"{_prefix(name)}{secrets.token_hex(4)}.part")
@@ -236,10 +236,10 @@ def scratch_folder(path: str) -> Iterator[str]:
 
 
 def _sync_folder(folder: str) -> None:
-    """A name that was given is kept where the power fails: it is on the disk once its folder is."""
+    """Write a folder to the disk, so that a new name in it survives a power failure."""
     if fcntl is None:
-        return  # Windows opens no folders
-    with suppress(OSError):  # a folder that cannot be read, a file system that syncs none: the file itself is whole
+        return  # Windows opens no folders.
+    with suppress(OSError):  # The folder cannot be read, or the file system syncs none; the file itself is complete.
         descriptor = os.open(folder or ".", os.O_RDONLY | PLAIN_OPEN)
         try:
             os.fsync(descriptor)
@@ -251,25 +251,25 @@ def _locked_folder(folder: str) -> int:
     if fcntl is None:
         return -1
     descriptor = os.open(folder, os.O_RDONLY | PLAIN_OPEN)
-    with suppress(OSError):  # a file system without locks
+    with suppress(OSError):  # The file system has no locks.
         fcntl.flock(descriptor, fcntl.LOCK_EX)
     return descriptor
 
 
 def remove_leftovers(path: str) -> None:
-    """Removes what writers that have died, and only those, left of files on their way to `path`."""
+    """Remove what dead writers, and only those, have left of files on their way to `path`."""
     directory, name = os.path.split(path)
     remove_leftovers_of(directory, [name])
 
 
 def remove_leftovers_of(directory: str, names: Iterable[str]) -> None:
-    """The same for many files of a directory, which is listed once."""
+    """Remove what dead writers have left of many files of a directory, which is listed once."""
     prefixes = {_prefix(name) for name in names}
-    with suppress(OSError):  # a directory that can be written to but not listed
-        for found in os.listdir(directory):
-            match = _PENDING_NAME.fullmatch(found)
+    with suppress(OSError):  # The directory can be written to but not listed.
+        for entry in os.listdir(directory):
+            match = _PENDING_NAME.fullmatch(entry)
             if match and match[1] in prefixes:
-                _remove_if_dead(os.path.join(directory, found))
+                _remove_if_dead(os.path.join(directory, entry))
 
 
 def _prefix(name: str) -> str:
@@ -286,15 +286,15 @@ def _locked_new_file(path: str) -> tuple[str, int]:
             continue
         if fcntl is None:
             return pending, descriptor
-        with suppress(OSError):  # a file system without locks
+        with suppress(OSError):  # The file system has no locks.
             fcntl.flock(descriptor, fcntl.LOCK_EX)
         if os.fstat(descriptor).st_nlink:
             return pending, descriptor
-        os.close(descriptor)  # another took it for a leftover before it was locked
+        os.close(descriptor)  # Another writer took the file for a leftover before it was locked.
 
 
 def _remove_if_dead(name: str) -> None:
-    with suppress(OSError):  # held by its writer, gone by now, or not ours
+    with suppress(OSError):  # The file is locked by its writer, gone by now, or not ours.
         if fcntl is None:
             shutil.rmtree(name) if os.path.isdir(name) else os.unlink(name)
             return
@@ -312,7 +312,7 @@ def _remove_if_dead(name: str) -> None:
 
 
 def _take_permissions(path: str, descriptor: int) -> None:
-    """Owner, where that is allowed, group and mode of an older file: what was private stays so."""
+    """Copy owner, if that is allowed, group and mode of an older file, so that a private file stays private."""
     if fcntl is None:
         return
     try:
@@ -328,5 +328,5 @@ def _take_permissions(path: str, descriptor: int) -> None:
             if error.errno not in (errno.EPERM, errno.EINVAL, errno.ENOSYS, errno.ENOTSUP):
                 raise
     else:
-        mode &= ~0o070  # for another group than it was meant for
+        mode &= ~0o070  # The older file was meant for another group.
     os.fchmod(descriptor, mode)

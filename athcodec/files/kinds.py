@@ -1,4 +1,4 @@
-"""What a file holds, by its first bytes: an output replaces a file of its own kind and no other."""
+"""The kind of a file by its first bytes: an output replaces a file of its kind and no other."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ from athcodec.files.plain import open_plain
 HEAD_BYTES = 4096
 TEXT, UNKNOWN = "text", "something else"
 
-_KINDS = {  # the words of a message: suffixes, and a pattern of the first bytes; the first that fits is the kind
+# Words of a message, with suffixes and a pattern of the first bytes; the first pattern that fits is the kind.
+_KINDS = {
     ".ath": ((".ath",), rb"\x89ATH\r\n\x1a\n"),
     "HDF5": ((".h5", ".hdf5", ".hdf"), rb"\x89HDF\r\n\x1a\n"),
     "NumPy archive": ((".npz",), rb"PK\x03\x04.{26}[^\0]{1,200}?\.npy"),
@@ -28,28 +29,29 @@ _KINDS = {  # the words of a message: suffixes, and a pattern of the first bytes
     "WebP": ((".webp",), rb"RIFF.{4}WEBP"),
     "JSON": ((".json",), rb"\s*[{\[]"),
     "OBJ or PLY": ((".obj", ".ply"), rb"ply\r?\n|[^\0]*?(?m:^v[ \t]+[-+.\d])"),
-    "MDD": ((".mdd",), rb"(?!)"),  # told by its length
+    "MDD": ((".mdd",), rb"(?!)"),  # The length of the file tells this kind.
 }
 _PATTERNS = {kind: re.compile(pattern, re.DOTALL) for kind, (_, pattern) in _KINDS.items()}
 _MDD_HEADER = struct.Struct(">ii")
 
 
 def kind_by_suffix(suffix: str) -> str | None:
-    """The kind of file that a suffix promises; None for one that promises none."""
+    """Return the kind of file that a suffix promises; None if it promises none."""
     suffix = suffix.lower()
     return next((kind for kind, (suffixes, _) in _KINDS.items() if suffix in suffixes), None)
 
 
 def kind_of(path: str | os.PathLike[str]) -> str:
-    """The kind of a file by its content; TEXT for other text, UNKNOWN for anything else. Raises ClipError, OSError."""
+    """Return the kind of a file by its content; TEXT for other text, UNKNOWN for anything else. Raises ClipError,
+    OSError."""
     try:
         with open_plain(path) as file:
             head, length = file.read(HEAD_BYTES), os.fstat(file.fileno()).st_size
     except OSError as error:
         raise OSError(error.errno, error.strerror, os.fspath(path)) from None
-    found = next((kind for kind, pattern in _PATTERNS.items() if pattern.match(head)), None)
-    if found is None and len(head) >= _MDD_HEADER.size:
+    match = next((kind for kind, pattern in _PATTERNS.items() if pattern.match(head)), None)
+    if match is None and len(head) >= _MDD_HEADER.size:
         frames, vertices = _MDD_HEADER.unpack_from(head)
         if min(frames, vertices) > 0 and length == _MDD_HEADER.size + 4 * frames + 12 * frames * vertices:
             return "MDD"
-    return found or (UNKNOWN if b"\0" in head else TEXT)
+    return match or (UNKNOWN if b"\0" in head else TEXT)

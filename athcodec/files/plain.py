@@ -1,4 +1,4 @@
-"""Opening of files to read: plain ones alone."""
+"""Opening of plain files for reading."""
 
 from __future__ import annotations
 
@@ -9,12 +9,13 @@ from typing import BinaryIO, cast
 
 from athcodec.errors import ClipError
 
-_WITHOUT_WAITING = getattr(os, "O_NONBLOCK", 0)  # for somebody who writes to a pipe; of plain files it changes nothing
+# Keeps open() from waiting for somebody who writes to a pipe; of plain files it changes nothing.
+_WITHOUT_WAITING = getattr(os, "O_NONBLOCK", 0)
 
 
 def open_plain(path: str | PathLike[str], buffering: int = 0) -> BinaryIO:
-    """A plain file, open to be read, without a buffer by default. Raises ClipError for a device or pipe, which may have
-    no end or no beginning, OSError where it cannot be opened."""
+    """Open a plain file for reading, without a buffer by default. Raises ClipError for a device or pipe, which may have
+    no end or no beginning, and OSError if it cannot be opened."""
     file = open(path, "rb", buffering, opener=lambda name, flags: os.open(name, flags | _WITHOUT_WAITING))
     if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
         file.close()

@@ -1,6 +1,5 @@
-"""What readers do with the files that they open: take plain files alone, watch them for changes, close them where
-reading fails, say in errors which file it was, and count the memory that it takes. It knows no file format.
-"""
+"""What readers do with files: take plain files alone, watch them for changes, close them if reading fails, name them in
+errors, and count the memory that reading takes. It knows no file format."""
 
 from __future__ import annotations
 
@@ -17,7 +16,7 @@ from athcodec.files.plain import open_plain
 from athcodec.options import MAX_MEMORY
 
 File = str | PathLike[str] | int
-Stamp = tuple[int, int, int, int]  # size, time of change, device, inode
+Stamp = tuple[int, int, int, int]  # Size, time of change, device and inode.
 
 
 class Closable(Protocol):
@@ -25,14 +24,14 @@ class Closable(Protocol):
 
 
 def read_plain(path: str | PathLike[str], budget: Budget) -> bytes:
-    """All bytes of a plain file. Raises ClipError, OSError."""
+    """Return all bytes of a plain file. Raises ClipError, OSError."""
     with open_plain(path) as file:
         budget.need(os.fstat(file.fileno()).st_size, fspath(path))
         return file.read()
 
 
 class Budget:
-    """The memory that reading a source may take, bytes, of which arrays that stay take their part.
+    """The memory that reading a source may take, in bytes; arrays that stay are subtracted.
 
     What is counted are the arrays and texts of the file, as they are unpacked, not what libraries need besides.
     """
@@ -41,22 +40,23 @@ class Budget:
         self.limit, self.left = limit, limit
 
     def need(self, size: int, what: str) -> None:
-        """Raises ClipError where there is no room for so many bytes, which do not stay."""
+        """Raise ClipError if there is no room for so many bytes, which do not stay."""
         if size > self.left:
             raise ClipError(f"{what}: got {size:,} bytes to read, but {no_room(self.limit)}")
 
     def need_for(self, text: bytes, marks: bytes, each: int, what: str) -> None:
-        """Room for the objects, each of so many bytes, that are made of a text: one before each of these marks."""
+        """Check that there is room for the objects made of a text, each of so many bytes: one before each of these
+        marks."""
         self.need(len(text) + each * (1 + len(text) - len(text.translate(None, marks))), what)
 
     def take(self, size: int, what: str) -> None:
-        """The same for bytes that stay."""
+        """Check that there is room for bytes that stay, and subtract them."""
         self.need(size, what)
         self.left -= size
 
 
 def no_room(limit: int) -> str:
-    """What messages say of memory that is not to be had."""
+    """Return the message for memory that a source may not take."""
     return f"expected at most {limit:,} bytes of memory for the whole source; --max-memory (max_memory=) allows more"
 
 
@@ -73,13 +73,13 @@ class FileWatch:
 
     @classmethod
     def of(cls, stamps: dict[File, Stamp]) -> FileWatch:
-        """One that goes on from the `stamps` of another."""
+        """Return an instance that goes on from the `stamps` of another."""
         watch = cls()
         watch.stamps = stamps
         return watch
 
     def add(self, file: File) -> None:
-        """Raises OSError where there is no such file."""
+        """Remember the state of a file. Raises OSError if there is none."""
         self.stamps.setdefault(file, _stamp(file))
 
     def __call__(self) -> bool:
@@ -90,14 +90,14 @@ class FileWatch:
 
     @property
     def files(self) -> frozenset[FileId]:
-        """What the files are on their disk, under whatever name."""
+        """Device and inode of the files."""
         return frozenset(stamp[2:] for stamp in self.stamps.values())
 
 
 def file_beside(folder: str | PathLike[str], name: str, allow_outside: bool = False) -> Path:
-    """A file that a source names, by a path from its own folder.
+    """Return the file that a source names, by a path from its folder.
 
-    Raises ClipError where it is no plain file and, unless `allow_outside`, where it lies outside of that folder: a
+    Raises ClipError if it is no plain file and, unless `allow_outside`, if it lies outside of that folder: a
     source that is not trusted must not reach other files on the disk.
     """
     if not name or "\0" in name:
@@ -110,7 +110,7 @@ def file_beside(folder: str | PathLike[str], name: str, allow_outside: bool = Fa
 
 
 def check_inside(folder: str | PathLike[str], path: str | PathLike[str], allow_outside: bool) -> None:
-    """Raises ClipError for a path outside of a folder. Links inside the folder lead where they lead."""
+    """Raise ClipError for a path outside of a folder. Links inside the folder may lead outside."""
     if not allow_outside and not Path(os.path.abspath(path)).is_relative_to(os.path.abspath(folder)):
         raise ClipError(
             f"got the file {fspath(path)[-80:]!r}, expected one in the folder of the source or below it; "
@@ -125,7 +125,7 @@ def _stamp(file: File) -> Stamp:
 
 @contextmanager
 def naming(path: str | PathLike[str], *errors: type[Exception]) -> Iterator[None]:
-    """Errors of the block that are ClipErrors, or of these further types, become ClipErrors that begin with `path`."""
+    """Turn ClipErrors of the block, and errors of these further types, into ClipErrors that begin with `path`."""
     try:
         yield
     except ClipError as error:
@@ -139,7 +139,7 @@ def naming(path: str | PathLike[str], *errors: type[Exception]) -> Iterator[None
 
 @contextmanager
 def naming_file(path: str | PathLike[str]) -> Iterator[None]:
-    """Errors of the system that name no file, such as those of reading, name this one."""
+    """Let errors of the system that name no file, such as those of reading, name this one."""
     try:
         yield
     except OSError as error:
@@ -150,7 +150,7 @@ def naming_file(path: str | PathLike[str]) -> Iterator[None]:
 
 @contextmanager
 def closing_on_failure(resource: Closable) -> Iterator[None]:
-    """Closes the resource where the block raises; else it stays open."""
+    """Close the resource if the block raises; otherwise leave it open."""
     try:
         yield
     except BaseException:

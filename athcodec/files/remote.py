@@ -21,11 +21,11 @@ from athcodec.errors import RemoteError
 from athcodec.files.shown import redacted, without_secrets
 
 READ_AHEAD = 64 << 10
-GAP = 16 << 10  # bytes that nobody asked for and that cost less than another request
-KEPT_BYTES = 64 << 20  # of what has been fetched; a server without ranges may send a file of so much
-AT_ONCE = 8  # requests
-SLOWEST = 4096  # bytes a second: a request that takes longer has stalled
-FIRST_PAUSE = 0.1  # seconds before a request is made again; four times as long each further time
+GAP = 16 << 10  # Unwanted bytes that cost less than another request.
+KEPT_BYTES = 64 << 20  # Bytes that are kept; a server without ranges may send a file of this size.
+AT_ONCE = 8  # Requests at the same time.
+SLOWEST = 4096  # Bytes a second; a slower request has stalled.
+FIRST_PAUSE = 0.1  # Seconds before a request is repeated; each further wait is four times as long.
 INSTALL = 'pip install "athcodec[remote]"'
 
 _RANGE = re.compile(r"bytes (\d+)-(\d+)/(\d+)")
@@ -58,24 +58,24 @@ class Remote:
     Raises
     ------
     RemoteError
-        Where the bytes cannot be had, or are no longer those of the file that was opened.
+        If the bytes cannot be had, or are no longer those of the file that was opened.
     """
 
     def __init__(self, url: str, *, timeout: float = 30.0, retries: int = 3, **options):
         self.url, self.timeout, self.retries = url, timeout, retries
         self.requests = self.bytes = 0
-        self._place, self._kept = 0, OrderedDict()  # offset: bytes
+        self._place, self._kept = 0, OrderedDict()  # Bytes by their offset.
         self._source = _source(self, options)
         self.size = self._source.size()
 
     @property
     def change_hint(self) -> str:
-        """What else than damage a wrong checksum may come from, to go behind an error message."""
+        """What else than damage may cause a wrong checksum, as the end of an error message."""
         return self._source.change_hint
 
     def prefetch(self, ranges: list[Range]) -> None:
-        """Fetches what is not there yet of these ascending ranges where it can be kept until it is read: one
-        request for each, and for those that are close together."""
+        """Fetch what is missing of these ascending ranges, if it can be kept until it is read: one request for each,
+        and for those that are close together."""
         wanted = _joined([self._missing(offset, min(size, self.size - offset)) for offset, size in ranges])
         if sum(size for _, size in wanted) <= KEPT_BYTES:
             self.keep(self._source.fetch(wanted))
@@ -89,7 +89,7 @@ class Remote:
             self._kept.popitem(last=False)
 
     def _at(self, offset: int) -> bytes | memoryview:
-        """Kept bytes from `offset` on; empty where there are none."""
+        """Return the kept bytes from `offset` on; empty if there are none."""
         best = memoryview(b"")
         for start, data in self._kept.items():
             if start <= offset < start + len(data) and start + len(data) - offset > len(best):
@@ -97,7 +97,7 @@ class Remote:
         return best
 
     def _missing(self, offset: int, size: int) -> Range:
-        """What is left of a range without its kept beginning."""
+        """Return what is left of a range without its kept beginning."""
         while size > 0 and (there := len(self._at(offset))):
             offset, size = offset + there, size - there
         return offset, max(size, 0)
@@ -136,7 +136,7 @@ class Remote:
 
 
 def _joined(ranges: list[Range]) -> list[Range]:
-    """Ascending ranges without empty ones; those that are less than a GAP apart as one."""
+    """Return ascending ranges without empty ones; those that are less than a GAP apart become one."""
     joined: list[Range] = []
     for offset, size in ranges:
         if joined and size and offset - sum(joined[-1]) <= GAP:
@@ -147,7 +147,7 @@ def _joined(ranges: list[Range]) -> list[Range]:
 
 
 def _source(remote: Remote, options: dict):
-    """What fetches: HTTP with an eye on its answers, or any other file system."""
+    """Return the transport of a URL: HTTP with checks of its answers, or any other file system."""
     shown = without_secrets(remote.url)
     try:
         import fsspec
@@ -169,8 +169,8 @@ def _source(remote: Remote, options: dict):
 
 
 def guarded(url: str, options: dict) -> dict:
-    """Options for fsspec's file system of HTTP, with which a server cannot send us on to machines that it does not
-    reach itself: redirects from a public address to a private one raise RemoteError."""
+    """Return options for fsspec's file system of HTTP, with which a server cannot redirect us to machines that it does
+    not reach itself: redirects from a public address to a private one raise RemoteError."""
     import aiohttp
 
     first = urlsplit(url).hostname or ""
@@ -183,17 +183,17 @@ def guarded(url: str, options: dict) -> dict:
 
     trace = aiohttp.TraceConfig()
     trace.on_request_redirect.append(check)
-    own = options.get("client_kwargs") or {}
-    return options | {"client_kwargs": own | {"trace_configs": [*own.get("trace_configs", ()), trace]}}
+    origin = options.get("client_kwargs") or {}
+    return options | {"client_kwargs": origin | {"trace_configs": [*origin.get("trace_configs", ()), trace]}}
 
 
 async def is_private(host: str) -> bool:
-    """Whether a name leads to an address of this machine, a private network or one of a link."""
+    """Return whether a name leads to an address of this machine, a private network or a link."""
     try:
-        found = await asyncio.get_running_loop().getaddrinfo(host, None)
+        addresses = await asyncio.get_running_loop().getaddrinfo(host, None)
     except (OSError, UnicodeError):
-        return False  # and is not to be reached either
-    return any(not ipaddress.ip_address(address[0].partition("%")[0]).is_global for *_, address in found)
+        return False  # A name without an address leads nowhere.
+    return any(not ipaddress.ip_address(address[0].partition("%")[0]).is_global for *_, address in addresses)
 
 
 def _one_line(error: BaseException) -> str:
@@ -201,8 +201,7 @@ def _one_line(error: BaseException) -> str:
 
 
 class _AnySystem:
-    """Any fsspec file system, as far as all of them go: nothing tells a file that has changed but its
-    checksums."""
+    """Any fsspec file system. Only checksums tell that a file has changed."""
 
     change_hint = ", or the file has been changed since it was opened"
 
@@ -216,7 +215,7 @@ class _AnySystem:
         return size
 
     def fetch(self, ranges: list[Range]) -> list[tuple[int, bytes]]:
-        """All at once, where the file system can."""
+        """Fetch all ranges at once, if the file system can."""
         if not ranges:
             return []
         starts, stops = [offset for offset, _ in ranges], [offset + size for offset, size in ranges]
@@ -235,7 +234,7 @@ class _AnySystem:
         self._remote.requests += requests
         try:
             return ask()
-        except Exception as error:  # each file system has errors of its own
+        except Exception as error:  # Each file system has errors of its own kind.
             raise RemoteError(f"{self._shown}: {type(error).__name__}: {_one_line(error)}") from error
 
     def close(self) -> None:
@@ -259,7 +258,7 @@ class _Http:
         return "" if self._tags else ", or the file has been changed on the server, which says nothing of that"
 
     def size(self) -> int:
-        """The length of the file, with its first bytes: one request for both."""
+        """Return the length of the file and its first bytes, in one request."""
         try:
             self._remote.keep(self.fetch([(0, READ_AHEAD)]))
         except BaseException:
@@ -335,11 +334,11 @@ class _Http:
         raise self._refusal(f"the server answers {answer.status} {answer.reason}")
 
     async def _part(self, answer, offset: int, size: int) -> bytes:
-        said = answer.headers.get("Content-Range", "nothing")
-        match = _RANGE.fullmatch(said)
+        content_range = answer.headers.get("Content-Range", "nothing")
+        match = _RANGE.fullmatch(content_range)
         if match is None or answer.headers.get("Content-Encoding", "identity") != "identity":
             raise self._refusal(
-                f"got Content-Range {said!r}, Content-Encoding "
+                f"got Content-Range {content_range!r}, Content-Encoding "
                 f"{answer.headers.get('Content-Encoding')!r}; expected bytes as they are, of a known "
                 "length"
             )
@@ -362,7 +361,7 @@ class _Http:
         return data
 
     def _nothing(self, answer) -> bytes:
-        """The range begins behind the end: an empty file, or one that has become shorter."""
+        """Raise for a range that begins behind the end, of an empty file or of one that has become shorter."""
         length = int(re.sub(r"\D", "", answer.headers.get("Content-Range", "")) or 0)
         if self._length is None and length > 0:
             raise self._refusal("the server answers 416 to a range that the file has")
@@ -382,7 +381,7 @@ class _Http:
         return bytes(data)
 
     def _check_same(self, length: int, headers) -> None:
-        """Raises RemoteError where the file is not the one that was opened."""
+        """Raise RemoteError if the file is not the one that was opened."""
         tags = {name: headers[name] for name in ("ETag", "Last-Modified") if name in headers}
         if self._length is None:
             self._length, self._tags = length, tags

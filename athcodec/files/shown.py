@@ -1,5 +1,5 @@
-"""Text as people are shown it: what files and servers say can neither steer a terminal nor give away keys. It imports
-nothing heavy, for the command line needs it to explain itself."""
+"""Text as people are shown it: what files and servers say can neither steer a terminal nor give away keys. Nothing
+heavy is imported, because the command line needs it to explain itself."""
 
 from __future__ import annotations
 
@@ -13,23 +13,23 @@ _VALUE = re.compile(r"(?<==)[^&;#\s'\"<>]+")
 
 
 def shown(text: str) -> str:
-    """Lines of `text` as a terminal may have them, and with the URLs in it as `redacted`."""
+    """Return lines of `text` without controls, and with the URLs in it as `redacted`."""
     return escaped(redacted(text))
 
 
 def escaped(text: str) -> str:
-    """Lines of `text` without what moves a cursor, sets colours or turns the direction of writing."""
-    return _UNSAFE.sub(lambda found: ascii(found[0])[1:-1], text)
+    """Return lines of `text` without what moves a cursor, sets colours or turns the direction of writing."""
+    return _UNSAFE.sub(lambda match: ascii(match[0])[1:-1], text)
 
 
 def redacted(text: str) -> str:
-    """`text` without users, passwords and the values of queries in URLs, which may be keys."""
+    """Return `text` without users, passwords and the values of queries in URLs, which may be keys."""
     if "://" not in text:
         return text
-    return _QUERY.sub(lambda found: found[1] + _VALUE.sub("...", found[2]), _USER.sub("", text))
+    return _QUERY.sub(lambda match: match[1] + _VALUE.sub("...", match[2]), _USER.sub("", text))
 
 
 def without_secrets(url: str) -> str:
-    """A URL as messages show it: without user, password and query."""
+    """Return a URL as messages show it, without user, password and query."""
     parts = urlsplit(url)
     return f"{parts.scheme}://{parts.netloc.rpartition('@')[2]}{parts.path}"

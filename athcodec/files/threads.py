@@ -12,17 +12,17 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any
 
-MOST = 4  # threads by default
-RANGE_NUMBERS = 3 << 18  # of an array, per call of a thread
+MOST = 4  # Threads by default.
+RANGE_NUMBERS = 3 << 18  # Numbers of an array for each call of a thread.
 
 
 def default_jobs() -> int:
-    """Default number of threads: one per core, at most MOST."""
+    """Return the default number of threads: one per core, at most MOST."""
     return min(MOST, os.cpu_count() or 1)
 
 
 class ThreadPool:
-    """`jobs` threads; a single job runs on the caller's thread, unless `beside` asks for another one.
+    """A pool of `jobs` threads; a single job runs on the caller's thread, unless `beside` asks for another one.
 
     Functions that the pool runs must not use the pool themselves.
     """
@@ -32,7 +32,7 @@ class ThreadPool:
         self._executor = ThreadPoolExecutor(jobs) if jobs > 1 or beside else None
 
     def map(self, function: Callable[..., Any], items: Sequence[tuple[Any, ...]]) -> list[Any]:
-        """function(*item) of all items, in order."""
+        """Return function(*item) of all items, in order."""
         if self._executor is None or len(items) < 2:
             return [function(*item) for item in items]
         started = [self._start(function, *item) for item in items]
@@ -43,7 +43,7 @@ class ThreadPool:
                 future.cancel()
 
     def ordered(self, function: Callable[[Any], Any], items: Iterable[Any], ahead: int) -> Iterator[Any]:
-        """function(item) of all items, in order; up to `ahead` further items are read and started meanwhile."""
+        """Yield function(item) of all items, in order; up to `ahead` further items are read and started meanwhile."""
         if self._executor is None:
             yield from map(function, items)
             return
@@ -56,11 +56,11 @@ class ThreadPool:
             yield pending.popleft().result()
 
     def _start(self, function: Callable[..., Any], *words: Any) -> Future[Any]:
-        """The call on another thread or, where there is no memory for one, on the caller's."""
+        """Start the call on another thread or, if there is no memory for one, run it on the caller's."""
         if self._executor is not None:
             try:
                 return self._executor.submit(function, *words)
-            except RuntimeError:  # the call may be queued all the same, and done twice
+            except RuntimeError:  # The call may be queued all the same, and run twice.
                 self._executor.shutdown()
                 self._executor = None
         done: Future[Any] = Future()
@@ -75,6 +75,6 @@ SERIAL = ThreadPool()
 
 
 def ranges(count: int, numbers: int) -> list[tuple[int, int]]:
-    """Runs (start, stop) of 0 to count - 1 for one call each; rows hold `numbers` numbers."""
+    """Split 0 to count - 1 into (start, stop) for one call each; rows hold `numbers` numbers."""
     length = max(1, RANGE_NUMBERS // max(1, numbers))
     return [(start, min(start + length, count)) for start in range(0, count, length)]

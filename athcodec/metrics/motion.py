@@ -135,12 +135,12 @@ def level_meters(decoder: Decoder, clip: MotionClip) -> list[MotionMeter]:
     """
     edges = edges_of(clip)
     if edges is None:
-        edges = stem_links(decoder.vertex_branch, decoder.stem_index)
+        edges = stem_links(decoder.file.vertex_branch, decoder.file.stem_index)
     return [
         MotionMeter(
             clip,
-            bound=max(level.max_error, decoder.max_error_bound),
-            weights=decoder.error_weights,
+            bound=max(level.max_error, decoder.file.max_error_bound),
+            weights=decoder.file.error_weights,
             starts=[start for start, _ in decoder.segments],
             loop=decoder.clip.loop,
             edges=edges,

@@ -21,14 +21,15 @@ MIN_STRETCH = 0.1
 """Least stretch of any direction in a map, relative to its largest where that is below 1. A frame in which
 the best fit flattens a subtree would otherwise have no inverse, or residuals many times as long as the
 map's error."""
-_LEAST_SCALE = 1e-2  # MIN_STRETCH is relative to this at least: a subtree may shrink to a point
-_SMALLEST_EXTENT = 1e-100  # squares of what is smaller have no inverse
-_POINT_EXTENT = 1e-12  # of the plant's: below it a subtree is one point
+_LEAST_SCALE = 1e-2  # Smallest value that MIN_STRETCH is relative to, because a subtree may shrink to a point.
+_SMALLEST_EXTENT = 1e-100  # Squares of smaller numbers have no inverse.
+_POINT_EXTENT = 1e-12  # Part of the plant's size below which a subtree is one point.
 
 
 @dataclass(frozen=True)
 class Differences:
-    """GAD (k,C) and LAD of C pieces in some frames: the largest distance and the most vertices beyond xi, (C,)."""
+    """Return GAD (k,C) and LAD (C,) of C pieces in some frames: the largest distance, and the most vertices beyond
+    xi."""
 
     gads: np.ndarray
     largest_distance: np.ndarray
@@ -36,11 +37,11 @@ class Differences:
 
     @classmethod
     def of(cls, frames: np.ndarray, pieces: Pieces, xi: float | None) -> Differences:
-        """Of frames (3,k,N), seen from the origin of the pieces."""
+        """Return both measures of frames (3,k,N), seen from the origin of the pieces."""
         return pieces.fit(frames).differences(np.inf if xi is None else xi)
 
     def __or__(self, other: Differences) -> Differences:
-        """Both together, but for the GADs."""
+        """Return the LAD of the pieces with their GADs."""
         return Differences(
             other.gads,
             np.maximum(self.largest_distance, other.largest_distance),
@@ -49,7 +50,8 @@ class Differences:
 
 
 def stem_maps(hierarchy: Hierarchy, rest: np.ndarray, frames: np.ndarray) -> np.ndarray:
-    """Least-squares maps (eq. 2) of every branch's stem: (k,B,3,4) float64 from rest to the positions of each frame.
+    """Return least-squares maps (eq. 2) of every branch's stem, (k,B,3,4) float64, from rest to positions of each
+    frame.
 
     rest is (N,3) and frames (k,N,3), both in file order; B branches in file order.
     """
@@ -96,20 +98,20 @@ class Pieces:
         return cls(hierarchy, rest, branches, stop_branch, parent, level)
 
     def vertices(self, some: np.ndarray) -> np.ndarray:
-        """The vertices of some pieces, one piece after the other."""
+        """Return the vertices of some pieces, one piece after the other."""
         counts = self.counts[some]
         return np.arange(counts.sum()) + np.repeat(self.first[some] - starts(counts), counts)
 
     def fit(self, frames: np.ndarray) -> Fit:
-        """The maps of all pieces in frames (3,k,N)."""
+        """Return the maps of all pieces in frames (3,k,N)."""
         return Fit(self, frames)
 
     def _describe_rest_pose(self) -> None:
-        """Each piece's centroid, principal axes (columns, longest first), rank and pseudo-inverse."""
+        """Return each piece's centroid, principal axes (columns, longest first), rank and pseudo-inverse."""
         count = len(self.first)
         self.centroid = np.empty((count, 3))
         covariance = np.empty((count, 3, 3))
-        for some in self.levels:  # level by level, since the pieces of one level do not overlap
+        for some in self.levels:  # Pieces of one level do not overlap.
             vertices, counts = self.vertices(some), self.counts[some]
             points = self.rest[:, vertices]
             centroid = np.add.reduceat(points, starts(counts), axis=1) / counts
@@ -151,7 +153,7 @@ class Fit:
             rotation[:, lenders] = _nearest_rotation(self.linear[:, lenders])
 
     def _sums(self) -> np.ndarray:
-        """Sums of x_i y_j and x_i over each piece's vertices, x now and y at rest: (k,n,3,4).
+        """Return sums of x_i y_j and x_i over each piece's vertices, (k,n,3,4), of x now and y at rest.
 
         Running sums over the stems serve every subtree at once, because a subtree is a range of stems.
         """
@@ -185,29 +187,29 @@ class Fit:
         self.linear[:, points] = rotation[:, pieces.parent[points]]
 
     def matrices(self) -> np.ndarray:
-        """(k,n,3,4) from rest positions to positions of each frame, in the scene's coordinates."""
+        """Return maps (k,n,3,4) from rest positions to positions of each frame, in the scene's coordinates."""
         pieces = self.pieces
         base = (pieces.centroid + pieces.origin)[..., None]
         offset = self.centroid + pieces.origin - multiply(self.linear, base)[..., 0]
         return np.concatenate([self.linear, offset[..., None]], axis=3)
 
     def inverse_maps(self) -> tuple[np.ndarray, np.ndarray]:
-        """(k,n,3,3) and (k,n,3): x goes to its residual as inverse x + offset, both seen from the origin."""
+        """Return (k,n,3,3) and (k,n,3): x goes to its residual as inverse x + offset, both seen from the origin."""
         offset = self.pieces.centroid - multiply(self.inverse, self.centroid[..., None])[..., 0]
         return self.inverse, offset
 
     def apply(self, some: np.ndarray, vertices: np.ndarray, counts: np.ndarray) -> np.ndarray:
-        """Where some pieces' maps put vertices, counts[i] of them by piece some[i]: (3,k,sum of counts)."""
+        """Return where some pieces' maps put vertices, (3,k,sum of counts), with counts[i] of them by piece some[i]."""
         linear = self.linear[:, some]
         offset = self.centroid[:, some] - multiply(linear, self.pieces.centroid[some][..., None])[..., 0]
         return map_points(linear, offset, self.pieces.rest[:, None, vertices], counts)
 
     def differences(self, xi: float) -> Differences:
-        """How far the residuals are from their base places."""
+        """Return how far the residuals are from their base places."""
         pieces, (_, frames, vertices) = self.pieces, self.frames.shape
         inverse, offset = self.inverse_maps()
         count = len(pieces.first)
-        found = Differences(np.empty((frames, count)), np.empty(count), np.empty(count, np.int32))
+        fits = Differences(np.empty((frames, count)), np.empty(count), np.empty(count, np.int32))
         lib.ath_differences(
             vertices,
             frames,
@@ -219,11 +221,11 @@ class Fit:
             address(pieces.rest, np.float64, 3 * vertices),
             address(self.frames, np.float64, self.frames.size),
             xi,
-            found.gads.ctypes.data,
-            found.largest_distance.ctypes.data,
-            found.most_beyond_xi.ctypes.data,
+            fits.gads.ctypes.data,
+            fits.largest_distance.ctypes.data,
+            fits.most_beyond_xi.ctypes.data,
         )
-        return found
+        return fits
 
 
 def starts(counts: np.ndarray) -> np.ndarray:
@@ -231,7 +233,7 @@ def starts(counts: np.ndarray) -> np.ndarray:
 
 
 def map_points(linear: np.ndarray, offset: np.ndarray, points: np.ndarray, counts: np.ndarray) -> np.ndarray:
-    """linear x + offset, (k,n,3,3) and (k,n,3); map i serves the next counts[i] points of (3,k or 1,V)."""
+    """Return linear x + offset, of (k,n,3,3) and (k,n,3); map i serves the next counts[i] points of (3,k or 1,V)."""
     result = np.empty((3, len(linear), points.shape[2]))
     for i in range(3):
         result[i] = np.repeat(offset[..., i], counts, axis=1)
@@ -241,7 +243,7 @@ def map_points(linear: np.ndarray, offset: np.ndarray, points: np.ndarray, count
 
 
 def _invertible(linear: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The maps (k,n,3,3) with every direction stretched by MIN_STRETCH at least, and their inverses."""
+    """Return the maps (k,n,3,3) with every direction stretched by MIN_STRETCH at least, and their inverses."""
     a, b, c = linear[..., 0], linear[..., 1], linear[..., 2]
     adjugate = np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=-2)
     determinant = (a * adjugate[..., 0, :]).sum(axis=-1)
@@ -271,7 +273,8 @@ def _nearest_rotation(linear: np.ndarray) -> np.ndarray:
 
 
 def _least_rotation(start: np.ndarray, goal: np.ndarray) -> np.ndarray:
-    """(...,3,3): turns unit vectors `start` into `goal` and nothing else; the identity where goal is zero."""
+    """Return rotations (...,3,3) that turn unit vectors `start` into `goal` on the shortest way; identities where goal
+    is zero."""
     axis = np.cross(start, goal)
     cosine = (start * goal).sum(axis=-1)
     turn = np.zeros((*axis.shape, 3))

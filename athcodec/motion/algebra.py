@@ -1,4 +1,4 @@
-"""Linear algebra of the encoder in the C core, whose sums have one order.
+"""Linear algebra of the encoder in the C core, whose sums have a fixed order.
 
 NumPy's own (`@`, numpy.linalg) runs in BLAS and LAPACK, which give other bits with other processors and numbers of
 threads, and einsum with other instruction sets: what decides which bytes a file holds goes through these functions, so
@@ -14,7 +14,7 @@ from athcodec._native import address, lib
 
 
 def multiply(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """a @ b, of stacks of matrices, in float64."""
+    """Return a @ b, of stacks of matrices, in float64."""
     batch = np.broadcast_shapes(a.shape[:-2], b.shape[:-2])
     (rows, inner), columns = a.shape[-2:], b.shape[-1]
     if b.shape[-2] != inner:
@@ -36,7 +36,8 @@ def multiply(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def _stack(matrices: np.ndarray, batch: tuple[int, ...]) -> tuple[np.ndarray, int]:
-    """The matrices of a stack behind each other, and numbers from one to the next: none where all are the same."""
+    """Return the matrices of a stack behind each other, and the distance from one to the next: 0 if all are the
+    same."""
     size = math.prod(matrices.shape[-2:])
     if matrices.size == size:
         return np.ascontiguousarray(matrices, np.float64), 0
@@ -44,7 +45,7 @@ def _stack(matrices: np.ndarray, batch: tuple[int, ...]) -> tuple[np.ndarray, in
 
 
 def decompose(matrices: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Singular value decomposition of (..., 3, 3), as numpy.linalg.svd gives it."""
+    """Return the singular value decomposition of (..., 3, 3), as numpy.linalg.svd does."""
     matrices = np.ascontiguousarray(matrices, np.float64)
     left, stretch, right = np.empty(matrices.shape), np.empty(matrices.shape[:-1]), np.empty(matrices.shape)
     arrays = (address(array, np.float64, 0) for array in (matrices, left, stretch, right))
@@ -53,14 +54,14 @@ def decompose(matrices: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]
 
 
 def determinant(matrices: np.ndarray) -> np.ndarray:
-    """Of (..., 3, 3)."""
+    """Return the determinants of (..., 3, 3)."""
     across = np.cross(matrices[..., 1, :], matrices[..., 2, :])
     return (matrices[..., 0, :] * across).sum(axis=-1)
 
 
 def principal(moments: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Eigenvalues, (K, n) in descending order, and eigenvectors, (K, n, n) a row each, of symmetric matrices (K, n, n),
-    which are destroyed."""
+    """Return eigenvalues, (K, n) in descending order, and eigenvectors, (K, n, n) a row each, of symmetric matrices (K,
+    n, n), which are destroyed."""
     values, vectors = np.empty(moments.shape[:2]), np.empty(moments.shape)
     arrays = moments, np.empty(moments.shape[1:]), values, vectors
     lib.ath_principal(*moments.shape[:2], *(address(array, np.float64, 0) for array in arrays))
@@ -68,12 +69,13 @@ def principal(moments: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def solve(matrix: np.ndarray, rows: np.ndarray) -> np.ndarray:
-    """What a positive definite matrix, (n, n), takes to the rows, (n, m)."""
+    """Return the solutions, (n, m), for a positive definite matrix (n, n) and right-hand sides (n, m)."""
     out, scratch = np.array(rows, np.float64, order="C"), np.array(matrix, np.float64, order="C")
     lib.ath_solve(*out.shape, address(scratch, np.float64, 0), address(out, np.float64, 0))
     return out
 
 
 def length(vector: np.ndarray) -> float:
-    """Of one vector; numpy.linalg.norm asks BLAS for it unless it is told the axis."""
+    """Return the norm of one vector. Without an axis, numpy.linalg.norm would ask BLAS, whose sums have no fixed
+    order."""
     return float(np.linalg.norm(vector, axis=0))

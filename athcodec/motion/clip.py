@@ -25,7 +25,8 @@ NOT_KEPT = {
     "c": "complex array (store real and imaginary parts as two)",
     "V": "array of raw bytes (store unsigned integers)",
 }
-ERROR_WEIGHTS = "error_weights"  # metadata: name of the attribute that holds factors on the bound; or that attribute
+# Key of metadata: name of the attribute that holds factors on the bound. Also the usual name of that attribute.
+ERROR_WEIGHTS = "error_weights"
 RESERVED_NAMES = frozenset(
     ("positions", "rest", "time", "vertex_branch", "branch_parent", "stem_index", "edges", "faces")
 )
@@ -33,7 +34,7 @@ RESERVED_NAMES = frozenset(
 
 @dataclass(frozen=True, eq=False)
 class Skin:
-    """The joints that move a clip's vertices, as far as its source says; only finding branches looks at them.
+    """The joints that move a clip's vertices, as far as the source states them; only finding branches uses them.
 
     Parameters
     ----------
@@ -52,7 +53,7 @@ class Skin:
 
 @dataclass(frozen=True)
 class ClipRange:
-    """A run of frames that is a clip of its own in a file.
+    """A run of frames that is a clip in a file.
 
     Parameters
     ----------
@@ -110,7 +111,7 @@ class MotionClip:
     rest_pose : {"first", "mean"}, optional
         How the rest pose is made where none is given: the first frame, or the mean of all, which reads the clip once.
     stem_index : (N,) array of integers, optional
-        The place of each vertex on its stem, 0 at the base. None where the vertices of every branch run from base to
+        The place of each vertex on its stem, 0 at the base. None if the vertices of every branch run from base to
         tip in the order of their numbers.
     clip_ranges : tuple of ClipRange, optional
         The clips that the frames are, one after the other, or the only one, where it has a name or is a loop; `join`
@@ -134,14 +135,14 @@ class MotionClip:
     Raises
     ------
     ClipError
-        Where the structure is wrong; by `block` and `blocks`, at the first position that is not a finite number.
+        If the structure is wrong; by `block` and `blocks`, at the first position that is not a finite number.
     """
 
     positions: Any
     time: np.ndarray
     vertex_branch: np.ndarray | None = None
     branch_parent: np.ndarray | None = None
-    rest: np.ndarray = field(default=cast(Any, None))  # None only until it has been made
+    rest: np.ndarray = field(default=cast(Any, None))  # None only until __post_init__ has made it.
     edges: np.ndarray | None = None
     faces: np.ndarray | None = None
     attributes: dict[str, np.ndarray] = field(default_factory=dict)
@@ -156,7 +157,7 @@ class MotionClip:
     rest_dtype: np.dtype = field(init=False)
     rest_given: bool = field(init=False, default=False)
     _checked_rest: np.ndarray | None = field(init=False, default=None)
-    _stands_still: bool | None = field(init=False, default=None)  # None: not known yet
+    _stands_still: bool | None = field(init=False, default=None)  # None: not known yet.
 
     def __post_init__(self) -> None:
         if not (hasattr(self.positions, "shape") and hasattr(self.positions, "dtype")):
@@ -190,7 +191,7 @@ class MotionClip:
 
     @property
     def branch_count(self) -> int:
-        """Number of branches, B; 0 where they are not known."""
+        """Number of branches, B; 0 if they are not known."""
         return 0 if self.branch_parent is None else len(self.branch_parent)
 
     @property
@@ -200,11 +201,11 @@ class MotionClip:
 
     @property
     def source_rest(self) -> np.ndarray:
-        """(N, 3) rest pose in `rest_dtype`, as it was given."""
+        """Rest pose in `rest_dtype`, (N, 3), unchanged."""
         return self.rest.astype(self.rest_dtype)
 
     def replace(self, *, rest_given: bool | None = None, **changes: Any) -> MotionClip:
-        """The clip with other values of some parameters; the rest pose keeps its dtype unless another pose is given.
+        """Return the clip with other values of some parameters; the rest pose keeps its dtype unless another is passed.
 
         Parameters
         ----------
@@ -221,7 +222,7 @@ class MotionClip:
         Raises
         ------
         ClipError
-            Where the changed structure is wrong.
+            If the changed structure is wrong.
         """
         clip = replace(self, **{"rest": self.source_rest} | changes)
         if rest_given is not None or "rest" not in changes:
@@ -232,8 +233,7 @@ class MotionClip:
 
     @property
     def polygons(self) -> tuple[np.ndarray, np.ndarray] | None:
-        """Faces of any sizes: numbers of corners (F,), and the vertex of each corner (C,), face after face; None where
-        there are no faces."""
+        """Faces of any sizes, or None: corners of each (F,), and the vertex of each corner (C,), face after face."""
         return polygons(self.faces, self.attributes)
 
     @property
@@ -243,13 +243,13 @@ class MotionClip:
 
     @property
     def fps(self) -> float:
-        """Median frame rate in frames per second; of a single frame metadata["fps"], else 30."""
+        """Median frame rate in frames per second; metadata["fps"] of a single frame, else 30."""
         steps = np.concatenate([np.diff(self.time[start:stop]) for start, stop in self.clip_range_frames])
         return float(1.0 / np.median(steps)) if len(steps) else frame_rate(self.metadata)
 
     @property
     def clip_range_frames(self) -> list[tuple[int, int]]:
-        """(start, stop) frames of each clip range; of the whole clip where it has none."""
+        """(start, stop) frames of each clip range, or of the whole clip without ranges."""
         return clip_range_frames(self.clip_ranges) if self.clip_ranges else [(0, self.frame_count)]
 
     def check(self) -> None:
@@ -260,7 +260,7 @@ class MotionClip:
         Raises
         ------
         ClipError
-            Where the structure is wrong.
+            If the structure is wrong.
         """
         frame_count, vertex_count = self._check_positions()
         check_clip_ranges(self.clip_ranges, frame_count)
@@ -276,7 +276,7 @@ class MotionClip:
 
     @contextmanager
     def watched(self) -> Iterator[None]:
-        """Context in which the files behind the positions must not change.
+        """Guard a block in which the files behind the positions must not change.
 
         Raises
         ------
@@ -296,7 +296,7 @@ class MotionClip:
         return getattr(self.unchanged, "files", frozenset())
 
     def block(self, start: int, stop: int) -> np.ndarray:
-        """Positions of frames `start` to `stop` - 1.
+        """Return the positions of frames `start` to `stop` - 1.
 
         Parameters
         ----------
@@ -313,7 +313,7 @@ class MotionClip:
         IndexError
             For frames that do not exist.
         ClipError
-            Where a position is NaN, infinite or beyond 1e18, or cannot be read.
+            If a position is NaN, infinite or beyond 1e18, or cannot be read.
         """
         if not 0 <= start < stop <= self.frame_count:
             raise IndexError(f"frames {start} to {stop}: expected 0 <= start < stop <= {self.frame_count}")
@@ -326,7 +326,7 @@ class MotionClip:
         return frames
 
     def blocks(self, max_frames: int | None = None) -> Iterator[tuple[int, np.ndarray]]:
-        """All frames in order, a block at a time.
+        """Yield all frames in order, a block at a time.
 
         Parameters
         ----------
@@ -369,7 +369,7 @@ class MotionClip:
         self.stem_index = check_stem_index(self.stem_index, self.vertex_branch)
 
     def _take_padding_off(self) -> None:
-        """Faces whose rows end with -1 become polygons of their own sizes."""
+        """Turn faces whose rows end with -1 into polygons of different sizes."""
         faces = np.asarray(self.faces)
         if self.faces is None or faces.ndim != 2 or faces.dtype.kind != "i" or not (faces == -1).any():
             return
@@ -381,8 +381,8 @@ class MotionClip:
         self.faces = None
         self.attributes |= {"face_vertex_counts": counts, "face_vertex_indices": faces[used]}
         domains = {"face_vertex_counts": "face", "face_vertex_indices": "corner"}
-        said = self.metadata.get("domains")
-        self.metadata["domains"] = (said if isinstance(said, dict) else {}) | domains
+        stated = self.metadata.get("domains")
+        self.metadata["domains"] = (stated if isinstance(stated, dict) else {}) | domains
 
     def _check_positions(self) -> tuple[int, int]:
         shape, dtype = tuple(self.positions.shape or ()), self.positions.dtype
@@ -423,7 +423,7 @@ class MotionClip:
 
 
 def check_float_dtype(name: str, dtype: np.dtype) -> None:
-    """ClipError unless float32 or float64, in any byte order."""
+    """Raise ClipError unless the dtype is float32 or float64, in any byte order."""
     if dtype.kind != "f" or dtype.itemsize not in (4, 8):
         raise ClipError(f"{name}: got dtype {dtype}, expected float32 or float64")
 
@@ -431,7 +431,7 @@ def check_float_dtype(name: str, dtype: np.dtype) -> None:
 def check_finite(frames: np.ndarray, start: int = 0) -> None:
     """Raise ClipError, naming frame and vertex, unless the (k, N, 3) frames from `start` on are finite numbers whose
     squares are finite in float32 arithmetic too."""
-    if -LARGEST_COORDINATE <= frames.min() and frames.max() <= LARGEST_COORDINATE:  # not so where one is NaN
+    if -LARGEST_COORDINATE <= frames.min() and frames.max() <= LARGEST_COORDINATE:  # False if one is NaN.
         return
     usable = np.abs(frames) <= LARGEST_COORDINATE
     frame, vertex = np.argwhere(~usable.all(axis=2))[0]
@@ -443,14 +443,14 @@ def check_finite(frames: np.ndarray, start: int = 0) -> None:
 
 
 def clip_range_frames(clip_ranges: Sequence[ClipRange]) -> list[tuple[int, int]]:
-    """(start, stop) frames of each clip range, where the first begins at frame 0."""
+    """Return (start, stop) frames of each clip range, the first of which begins at frame 0."""
     stops = np.cumsum([clip_range.frame_count for clip_range in clip_ranges]).tolist()
     return list(zip([0, *stops], stops))
 
 
 def check_clip_ranges(clip_ranges: Sequence[ClipRange], frame_count: int) -> None:
-    """ClipError unless they make up all frames and have different names that can be stored; a single one may have no
-    name."""
+    """Raise ClipError unless the ranges make up all frames and have different names that can be stored; a single one
+    may have no name."""
     if not clip_ranges:
         return
     counts = [clip_range.frame_count for clip_range in clip_ranges]
@@ -475,7 +475,8 @@ def is_name(text: str) -> bool:
 
 
 def check_time(time: Any, frame_count: int, clip_ranges: Sequence[ClipRange] = ()) -> np.ndarray:
-    """(T,) float64 seconds; ClipError unless finite, strictly increasing within each clip range and one per frame."""
+    """Return (T,) float64 seconds. Raises ClipError unless they are finite, increase within each clip range, one per
+    frame."""
     times: np.ndarray = np.asarray(time)
     if times.shape != (frame_count,):
         raise ClipError(f"time: got shape {times.shape}, expected ({frame_count},), one time per frame")
@@ -496,7 +497,7 @@ def check_time(time: Any, frame_count: int, clip_ranges: Sequence[ClipRange] = (
 
 
 def stated_fps(metadata: Mapping[str, Any]) -> float | None:
-    """Frames per second in `metadata["fps"]`; None where it is missing or no positive number."""
+    """Return the frames per second in `metadata["fps"]`; None if it is missing or no positive number."""
     fps = metadata.get("fps")
     if isinstance(fps, (int, float)) and not isinstance(fps, bool) and 0 < fps < float("inf"):
         return float(fps)
@@ -504,7 +505,7 @@ def stated_fps(metadata: Mapping[str, Any]) -> float | None:
 
 
 def frame_rate(metadata: Mapping[str, Any]) -> float:
-    """Frames per second in `metadata["fps"]`, 30 where it is missing; ClipError for no positive number."""
+    """Return the frames per second in `metadata["fps"]`, by default 30. Raises ClipError for no positive number."""
     fps = stated_fps(metadata) if "fps" in metadata else DEFAULT_FPS
     if fps is None:
         raise ClipError(f"fps: got {metadata['fps']!r}, expected a positive number")
@@ -512,7 +513,7 @@ def frame_rate(metadata: Mapping[str, Any]) -> float:
 
 
 def check_indices(name: str, indices: Any, stop: int, width: int | None = None) -> np.ndarray | None:
-    """`indices` as an array of its own integer dtype, every entry in 0 .. stop - 1; ClipError otherwise."""
+    """Return `indices` as an array of its integer dtype. Raises ClipError unless every entry is in 0 .. stop - 1."""
     if indices is None:
         return None
     array: np.ndarray = np.asarray(indices)
@@ -529,7 +530,7 @@ def check_indices(name: str, indices: Any, stop: int, width: int | None = None) 
 
 
 def polygons(faces: np.ndarray | None, attributes: Mapping[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray] | None:
-    """(counts (F,), indices (C,)) of `faces` or of the attributes that stand for it; None where there are neither."""
+    """Return (counts (F,), indices (C,)) of `faces` or of the attributes that stand for it; None without either."""
     if faces is not None:
         return np.full(len(faces), faces.shape[1], np.int64), np.asarray(faces).reshape(-1)
     counts, indices = (attributes.get(f"face_vertex_{name}") for name in ("counts", "indices"))
@@ -537,7 +538,7 @@ def polygons(faces: np.ndarray | None, attributes: Mapping[str, np.ndarray]) -> 
 
 
 def check_polygons(faces: tuple[np.ndarray, np.ndarray] | None, vertex_count: int) -> None:
-    """ClipError unless counts and indices of polygons fit each other and name vertices that exist."""
+    """Raise ClipError unless counts and indices of polygons fit each other and name vertices that exist."""
     if faces is None:
         return
     counts, indices = (_integers(f"face_vertex_{name}", array) for name, array in zip(("counts", "indices"), faces))
@@ -547,7 +548,8 @@ def check_polygons(faces: tuple[np.ndarray, np.ndarray] | None, vertex_count: in
 
 
 def check_branches(vertex_branch: Any, branch_parent: Any, vertex_count: int) -> tuple[np.ndarray, np.ndarray]:
-    """(N,) and (B,) int32 labels and parents; ClipError unless a forest of branches that have vertices."""
+    """Return (N,) and (B,) int32 labels and parents. Raises ClipError unless they are a forest of branches with
+    vertices."""
     branch_parent = _integers("branch_parent", branch_parent)
     branch_count = len(branch_parent)
     vertex_branch = _integers("vertex_branch", vertex_branch)
@@ -565,7 +567,7 @@ def check_branches(vertex_branch: Any, branch_parent: Any, vertex_count: int) ->
 
 
 def check_stem_index(stem_index: Any, vertex_branch: np.ndarray) -> np.ndarray | None:
-    """(N,) int32, or None where it only repeats the order of the vertex numbers.
+    """Return (N,) int32, or None if it only repeats the order of the vertex numbers.
 
     Raises ClipError unless every branch with n vertices has the places 0 .. n - 1 once each.
     """
@@ -578,8 +580,8 @@ def check_stem_index(stem_index: Any, vertex_branch: np.ndarray) -> np.ndarray |
     places = source_stem_index(vertex_branch)
     order = np.lexsort((stem_index, vertex_branch))
     expected = np.sort(places + vertex_branch * np.int64(len(places)))
-    found = stem_index[order] + vertex_branch[order] * np.int64(len(places))
-    bad = np.flatnonzero(found != expected)
+    numbered_places = stem_index[order] + vertex_branch[order] * np.int64(len(places))
+    bad = np.flatnonzero(numbered_places != expected)
     if bad.size:
         vertex = order[bad[0]]
         raise ClipError(
@@ -590,7 +592,7 @@ def check_stem_index(stem_index: Any, vertex_branch: np.ndarray) -> np.ndarray |
 
 
 def source_stem_index(vertex_branch: np.ndarray) -> np.ndarray:
-    """(N,) int32 place of each vertex on its stem where vertices run from base to tip by their numbers."""
+    """Return the place of each vertex on its stem, (N,) int32, if vertices run from base to tip by their numbers."""
     order = np.argsort(vertex_branch, kind="stable")
     labels = vertex_branch[order]
     places = np.empty(len(order), np.int32)
@@ -599,7 +601,7 @@ def source_stem_index(vertex_branch: np.ndarray) -> np.ndarray:
 
 
 def check_attributes(attributes: Mapping[str, Any] | None) -> tuple[dict[str, np.ndarray], dict[str, list[str]]]:
-    """Named arrays, little-endian and without records, and the names of those of types that no file holds (`NOT_KEPT`).
+    """Return named arrays, little-endian and without records, and the names of those that no file holds (`NOT_KEPT`).
 
     Raises ClipError unless the names are free, and the values numbers, booleans or bytes.
     """
@@ -621,7 +623,7 @@ def check_attributes(attributes: Mapping[str, Any] | None) -> tuple[dict[str, np
 
 
 def _columns(name: str, array: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
-    """An array of records as one array for each field, at any depth; any other as it is."""
+    """Yield an array of records as one array for each field, at any depth; any other array unchanged."""
     if array.dtype.names is None:
         yield name, array
     for field_name in array.dtype.names or ():
@@ -634,9 +636,9 @@ def _check_parents(branch_parent: np.ndarray) -> np.ndarray:
     if bad.size:
         got = branch_parent[bad[0]]
         raise ClipError(f"branch_parent: branch {bad[0]} has parent {got}, expected -1 to {branch_count - 1}")
-    own = np.flatnonzero(branch_parent == np.arange(branch_count))
-    if own.size:
-        raise ClipError(f"branch_parent: branch {own[0]} is its own parent, expected another branch or -1")
+    loops = np.flatnonzero(branch_parent == np.arange(branch_count))
+    if loops.size:
+        raise ClipError(f"branch_parent: branch {loops[0]} is its own parent, expected another branch or -1")
     branch_parent = branch_parent.astype(np.int32)
     on_cycle = _branch_on_cycle(branch_parent)
     if on_cycle is not None:

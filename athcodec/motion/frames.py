@@ -1,4 +1,4 @@
-"""Positions that are made when they are asked for, in place of an array in memory.
+"""Positions that are computed when they are asked for, in place of an array in memory.
 
 A reader has a function that makes a run of frames; a MotionClip, and whatever joins clips or changes their units,
 slices the result as it would an array.
@@ -13,7 +13,7 @@ from numpy.typing import DTypeLike
 
 
 class Frames:
-    """(T, N, 3) positions of which only the frames that are sliced exist.
+    """Positions (T, N, 3) of which only the frames that are sliced exist.
 
     Parameters
     ----------

@@ -76,7 +76,7 @@ class Hierarchy:
         vertex_source: np.ndarray | None = None,
         branch_source: np.ndarray | None = None,
     ) -> Hierarchy:
-        """The hierarchy from the arrays that determine the others.
+        """Return the hierarchy from the arrays that determine the others.
 
         Parameters
         ----------
@@ -94,7 +94,7 @@ class Hierarchy:
         Raises
         ------
         ClipError
-            Where the branches are not in depth-first preorder, a stem is empty, a branch is not attached to its
+            If the branches are not in depth-first preorder, a stem is empty, a branch is not attached to its
             parent's stem, or a source array is no permutation.
         """
         parent = np.asarray(branch_parent, np.int64)
@@ -123,18 +123,18 @@ class Hierarchy:
         return len(self.branch_parent)
 
     def vertex_branch(self) -> np.ndarray:
-        """(N,) int32: the branch of each vertex, both in file order."""
+        """Return the branch of each vertex, (N,) int32, both in file order."""
         return np.repeat(np.arange(self.branch_count, dtype=np.int32), self.stem_count)
 
     def subtree_range(self, branch: int) -> tuple[int, int]:
-        """The vertices of the subtree of `branch` in file order: first, and one past the last."""
+        """Return the vertices of the subtree of `branch` in file order: first, and one past the last."""
         if not 0 <= branch < self.branch_count:
             raise IndexError(f"branch {branch}: expected 0 to {self.branch_count - 1}")
         last = branch + int(self.subtree_branches[branch]) - 1
         return int(self.first_vertex[branch]), int(self.first_vertex[last] + self.stem_count[last])
 
     def source_branches(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """vertex_branch (N,), branch_parent (B,) and stem_index (N,) in source numbering, int32."""
+        """Return vertex_branch (N,), branch_parent (B,) and stem_index (N,) in source numbering, int32."""
         branch = self.vertex_branch()
         vertex_branch = np.empty_like(branch)
         vertex_branch[self.vertex_source] = self.branch_source[branch]
@@ -146,8 +146,8 @@ class Hierarchy:
 
 
 def hierarchy_of(clip: MotionClip) -> Hierarchy:
-    """The hierarchy of a clip's branches; see build_hierarchy()."""
-    assert clip.vertex_branch is not None and clip.branch_parent is not None  # a MotionClip has set them
+    """Return the hierarchy of a clip's branches; see build_hierarchy()."""
+    assert clip.vertex_branch is not None and clip.branch_parent is not None  # MotionClip has set both or neither.
     return build_hierarchy(clip.vertex_branch, clip.branch_parent, clip.rest, clip.edges, clip.stem_index)
 
 
@@ -158,14 +158,14 @@ def build_hierarchy(
     edges: np.ndarray | None = None,
     stem_index: np.ndarray | None = None,
 ) -> Hierarchy:
-    """The hierarchy of labelled branches.
+    """Return the hierarchy of labelled branches.
 
     vertex_branch (N,), branch_parent (B,), rest (N, 3), edges (E, 2) or None and stem_index (N,) or None are
     as in MotionClip, in source numbering. A branch attaches to the parent's stem along the edge nearest to
     its own base; where the edges join none of its vertices to that stem, at the stem's vertex nearest to its
     base in the rest pose.
 
-    Raises ClipError where labels and parents are no forest of branches that have vertices (see
+    Raises ClipError if labels and parents are no forest of branches that have vertices (see
     check_branches).
     """
     rest = np.asarray(rest, np.float64)
@@ -186,7 +186,7 @@ def build_hierarchy(
 def branches_from_edges(
     edges: np.ndarray, vertex_count: int, rest: np.ndarray, root: int | Sequence[int] | None = None, up_axis: str = "y"
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Branches of a forest of centre lines: int32 vertex_branch (N,), branch_parent (B,), stem_index (N,).
+    """Return the branches of a forest of centre lines: int32 vertex_branch (N,), branch_parent (B,), stem_index (N,).
 
     edges (E, 2) joins vertices 0 .. vertex_count - 1 in either direction; an edge given twice counts once.
     Each connected part is rooted at the vertex of `root` that lies in it, else at its lowest vertex along
@@ -194,7 +194,7 @@ def branches_from_edges(
     vertices (the lowest vertex number, if equal) and the others start branches. Branches are numbered in
     depth-first preorder, siblings from base to tip.
 
-    Raises ClipError where the edges close a cycle (it names one edge of it) or root is not usable.
+    Raises ClipError if the edges close a cycle (it names one edge of it) or root is not usable.
     """
     edges = np.asarray(check_indices("edges", edges, vertex_count, width=2), np.int64)
     tour = _EulerTour(edges, vertex_count)
@@ -213,7 +213,7 @@ def branches_from_edges(
 
 
 def derived_edges(hierarchy: Hierarchy) -> np.ndarray:
-    """(E, 2) int32 edges that the hierarchy implies, in source numbering.
+    """Return the edges that the hierarchy implies, (E, 2) int32, in source numbering.
 
     One row (u, v) for every vertex v that is not the first of a root's stem, by ascending v: u is the vertex
     before v on its stem, or the attach point where v is the first of its stem.
@@ -227,7 +227,7 @@ def derived_edges(hierarchy: Hierarchy) -> np.ndarray:
 
 
 def branch_orders(branch_parent: np.ndarray) -> np.ndarray:
-    """(B,) int32 order of each branch, 0 for a root, 1 for a branch of a root and so on.
+    """Return the order of each branch, (B,) int32: 0 for a root, 1 for a branch of a root and so on.
 
     branch_parent (B,) may be in any order but must have no cycle.
     """
@@ -241,7 +241,7 @@ def branch_orders(branch_parent: np.ndarray) -> np.ndarray:
 
 
 class _EulerTour:
-    """Every edge of a forest once in each direction, in the order of a walk around each connected part."""
+    """Return every edge of a forest once in each direction, in the order of a walk around each connected part."""
 
     def __init__(self, edges: np.ndarray, vertex_count: int) -> None:
         once = np.unique(np.sort(edges, axis=1), axis=0)
@@ -279,9 +279,8 @@ class _EulerTour:
         return part
 
     def rooted_at(self, roots: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Parent (-1 for a root) and number of vertices in the subtree of every vertex, for one root per
-        part.
-        """
+        """Return parent (-1 for a root) and number of vertices in the subtree of every vertex, for one root per
+        part."""
         remaining, jump = self._steps_to_end(roots)
         for _ in range(self.doublings):
             remaining, jump = remaining + remaining[jump], jump[jump]
@@ -306,13 +305,13 @@ class _EulerTour:
 def _choose_roots(part: np.ndarray, rest: np.ndarray, root: int | Sequence[int] | None, up_axis: str) -> np.ndarray:
     axis, sign = _parse_axis(up_axis)
     vertices = np.atleast_1d([] if root is None else root)
-    given = np.array([whole("root", vertex) for vertex in vertices], np.int64)
-    if ((given < 0) | (given >= len(part))).any():
-        raise ClipError(f"root: got {given.tolist()}, expected vertices 0 to {len(part) - 1}")
-    if len(np.unique(part[given])) < len(given):
-        raise ClipError(f"root: got {given.tolist()}, expected at most one in each connected part")
+    wanted = np.array([whole("root", vertex) for vertex in vertices], np.int64)
+    if ((wanted < 0) | (wanted >= len(part))).any():
+        raise ClipError(f"root: got {wanted.tolist()}, expected vertices 0 to {len(part) - 1}")
+    if len(np.unique(part[wanted])) < len(wanted):
+        raise ClipError(f"root: got {wanted.tolist()}, expected at most one in each connected part")
     is_other = np.ones(len(part), bool)
-    is_other[given] = False
+    is_other[wanted] = False
     order = np.lexsort((sign * rest[:, axis], is_other, part))
     return order[np.unique(part[order], return_index=True)[1]]
 
@@ -325,7 +324,7 @@ def _parse_axis(up_axis: str) -> tuple[int, float]:
 
 
 def _follow_larger_subtree(parent: np.ndarray, subtree_size: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The first vertex of every vertex's stem, and its place on that stem."""
+    """Return the first vertex of every vertex's stem, and the vertex's place on that stem."""
     children = np.flatnonzero(parent >= 0)
     by_fork = children[np.lexsort((children, -subtree_size[children], parent[children]))]
     goes_on = by_fork[np.unique(parent[by_fork], return_index=True)[1]]
@@ -338,7 +337,7 @@ def _follow_larger_subtree(parent: np.ndarray, subtree_size: np.ndarray) -> tupl
 
 
 def _closing_edge(edges: np.ndarray, vertex_count: int) -> int:
-    """The first edge that joins two vertices which the edges before it already join."""
+    """Return the first edge that joins two vertices which the edges before it already join."""
     leader = list(range(vertex_count))
 
     def find(vertex: int) -> int:
@@ -362,7 +361,7 @@ def _raise_cycle(edge: np.ndarray) -> None:
 
 
 def _preorder(branch_parent: np.ndarray, sibling_order: np.ndarray) -> np.ndarray:
-    """Branches in depth-first preorder; siblings stand as in `sibling_order`, which lists all branches."""
+    """Return branches in depth-first preorder; siblings stand as in `sibling_order`, which lists all branches."""
     children: list[list[int]] = [[] for _ in range(len(branch_parent) + 1)]
     for branch in sibling_order[::-1].tolist():
         children[branch_parent[branch]].append(branch)
@@ -418,7 +417,7 @@ def _check_stems(parent: np.ndarray, stem_count: np.ndarray, attach: np.ndarray)
 def _attach_points(
     parent: np.ndarray, stem_count: np.ndarray, rest: np.ndarray, edges: np.ndarray | None
 ) -> np.ndarray:
-    """Attach point of every branch; all in file order."""
+    """Return the attach point of every branch; all in file order."""
     attach = np.full(len(parent), -1, np.int64)
     first = np.cumsum(stem_count) - stem_count
     if edges is not None:
@@ -434,15 +433,14 @@ def _attach_points(
 def _joining_edges(
     parent: np.ndarray, vertex_branch: np.ndarray, rest: np.ndarray, edges: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The branches that an edge joins to their parent's stem, and where: the edge nearest to the base, then
-    the shortest.
-    """
-    own, other = np.concatenate([edges, edges[:, ::-1]]).T
-    joins = parent[vertex_branch[own]] == vertex_branch[other]
-    own, other = own[joins], other[joins]
-    length = ((rest[own] - rest[other]) ** 2).sum(axis=1)
-    order = np.lexsort((other, length, own))
-    branch, best = np.unique(vertex_branch[own[order]], return_index=True)
+    """Return the branches that an edge joins to their parent's stem, and where: the edge nearest to the base, then the
+    shortest."""
+    child_vertex, other = np.concatenate([edges, edges[:, ::-1]]).T
+    joins = parent[vertex_branch[child_vertex]] == vertex_branch[other]
+    child_vertex, other = child_vertex[joins], other[joins]
+    length = ((rest[child_vertex] - rest[other]) ** 2).sum(axis=1)
+    order = np.lexsort((other, length, child_vertex))
+    branch, best = np.unique(vertex_branch[child_vertex[order]], return_index=True)
     return branch, other[order][best]
 
 
@@ -465,5 +463,5 @@ def _inverse(permutation: np.ndarray) -> np.ndarray:
 
 
 def _lookup(table: np.ndarray, indices: np.ndarray) -> np.ndarray:
-    """table[indices], with -1 staying -1."""
+    """Return table[indices], with -1 staying -1."""
     return np.where(indices < 0, -1, table[indices])

@@ -21,14 +21,14 @@ from athcodec.motion.clip import ClipRange, MotionClip, check_clip_ranges, clip_
 from athcodec.motion.frames import Frames
 from athcodec.options import whole
 
-BLEND = "loop_blend"  # metadata: frames that were blended
-OWN = "clips"  # metadata: by name, what one of several clips has of its own
-STRENGTH, HEADING = "strength", "heading"  # metadata: the wind of a clip, the heading in degrees
-NAME, LOOP = "clip_name", "loop"  # metadata of files that hold a single clip and know no names or loops
+BLEND = "loop_blend"  # Key of metadata: number of frames that were blended.
+OWN = "clips"  # Key of metadata: by name, what only one of several clips has.
+STRENGTH, HEADING = "strength", "heading"  # Keys of metadata: the wind of a clip, the heading in degrees.
+NAME, LOOP = "clip_name", "loop"  # Keys of metadata in files that hold a single clip and know no names or loops.
 
 
 def join(clips: Mapping[str, MotionClip]) -> MotionClip:
-    """Several clips of one plant as one clip, for one .ath file, which holds once what they have in common.
+    """Return several clips of one plant as one clip, for one .ath file, which holds once what they have in common.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ def join(clips: Mapping[str, MotionClip]) -> MotionClip:
     Raises
     ------
     ClipError
-        Where the clips are not of one plant, a name cannot be stored, or one of them is several clips already.
+        If the clips are not of one plant, a name cannot be stored, or one of them is several clips already.
     """
     if not clips:
         raise ClipError("clips: got none, expected at least one")
@@ -79,7 +79,7 @@ def join(clips: Mapping[str, MotionClip]) -> MotionClip:
 
 
 def split(clip: MotionClip) -> dict[str, MotionClip]:
-    """The clips that `join` made one of.
+    """Return the clips that `join` made one of.
 
     Parameters
     ----------
@@ -104,15 +104,15 @@ def split(clip: MotionClip) -> dict[str, MotionClip]:
 
 
 def metadata_of(metadata: Mapping[str, Any], name: str) -> dict[str, Any]:
-    """Those of one of several clips, what all have in common and what it has of its own, out of those of all."""
+    """Return the metadata of one of several clips: what all have in common, and what only this one has."""
     owned = metadata.get(OWN)
-    own = owned.get(name) if isinstance(owned, dict) else None
+    by_clip = owned.get(name) if isinstance(owned, dict) else None
     common = {key: value for key, value in metadata.items() if key != OWN}
-    return common | own if isinstance(own, dict) else common
+    return common | by_clip if isinstance(by_clip, dict) else common
 
 
 def in_wind(clip: MotionClip, strength: float, heading: float = 0.0) -> MotionClip:
-    """The clip with the wind that it shows, by which players choose what to blend.
+    """Return the clip with the wind that it shows, by which players choose what to blend.
 
     Parameters
     ----------
@@ -120,7 +120,7 @@ def in_wind(clip: MotionClip, strength: float, heading: float = 0.0) -> MotionCl
     strength : float
         Of the wind, 0 or more, in any unit that all clips of a file share.
     heading : float, optional
-        Where the wind blows to, degrees about the up axis.
+        Direction that the wind blows to, degrees about the up axis.
 
     Returns
     -------
@@ -130,7 +130,7 @@ def in_wind(clip: MotionClip, strength: float, heading: float = 0.0) -> MotionCl
     Raises
     ------
     ClipError
-        Where a number is not finite, or the strength below 0.
+        If a number is not finite, or the strength below 0.
     """
     if not (math.isfinite(strength) and strength >= 0 and math.isfinite(heading)):
         raise ClipError(
@@ -140,7 +140,7 @@ def in_wind(clip: MotionClip, strength: float, heading: float = 0.0) -> MotionCl
 
 
 def wind_of(metadata: Mapping[str, Any]) -> tuple[float, float]:
-    """Strength and heading of a clip's wind, given its metadata; not a number where it names none."""
+    """Return strength and heading of a clip's wind, from its metadata; NaN if it names none."""
     strength, heading = metadata.get(STRENGTH), metadata.get(HEADING, 0.0)
     numbers = [
         float(value)
@@ -152,7 +152,7 @@ def wind_of(metadata: Mapping[str, Any]) -> tuple[float, float]:
 
 
 def looped(clip: MotionClip, blend: int = 0) -> MotionClip:
-    """The clip as a loop: its first frame follows its last, after the mean time of a frame.
+    """Return the clip as a loop: its first frame follows its last, after the mean time of a frame.
 
     Parameters
     ----------
@@ -169,7 +169,7 @@ def looped(clip: MotionClip, blend: int = 0) -> MotionClip:
     Raises
     ------
     ClipError
-        Where the clip is several clips, or has too few frames to blend.
+        If the clip is several clips, or has too few frames to blend.
     """
     clip_range = _only_clip_range("", clip)
     if not 0 <= whole("blend", blend) <= clip.frame_count // 3:
@@ -189,15 +189,16 @@ def looped(clip: MotionClip, blend: int = 0) -> MotionClip:
 
 
 def clip_metadata(motion: Any) -> dict[str, Any]:
-    """Metadata of a motion, with the name of its clip and whether that is a loop, for files that hold a single clip."""
+    """Return metadata of a motion, with the name of its clip and whether that is a loop, for files with a single
+    clip."""
     clip_range = next(iter(getattr(motion, "clip_ranges", ())), ClipRange("", 0))
     metadata = getattr(motion, "metadata", None) or {}
     return metadata | ({NAME: clip_range.name} if clip_range.name else {}) | ({LOOP: True} if clip_range.loop else {})
 
 
 def read_clip_metadata(clip: MotionClip) -> None:
-    """Moves name and loop from the metadata of a clip, as clip_metadata has put them there, to its clip range.
-    Raises ClipError."""
+    """Move name and loop from the metadata of a clip, as clip_metadata puts them there, to its clip range. Raises
+    ClipError."""
     name, loop = clip.metadata.get(NAME), clip.metadata.get(LOOP)
     name, loop = name if isinstance(name, str) else "", loop is True
     if name or loop:
@@ -213,7 +214,7 @@ def _only_clip_range(name: str, clip: MotionClip) -> ClipRange:
 
 
 def _check_alike(name: str, clip: MotionClip, first_name: str, first: MotionClip) -> None:
-    """ClipError unless both are of the same plant."""
+    """Raise ClipError unless both are of the same plant."""
     if clip.vertex_count != first.vertex_count:
         raise ClipError(f"{name}: got {clip.vertex_count} vertices, expected {first.vertex_count} as {first_name} has")
     for what in ("vertex_branch", "branch_parent", "stem_index", "edges", "faces"):
@@ -231,9 +232,9 @@ def _equal(a: np.ndarray | None, b: np.ndarray | None) -> bool:
 
 
 def _common_rest(clips: Mapping[str, MotionClip]) -> np.ndarray:
-    own = {name: clip for name, clip in clips.items() if not np.array_equal(clip.rest, clip.block(0, 1)[0])}
-    name, chosen = next(iter((own or clips).items()))
-    for other, clip in own.items():
+    rests = {name: clip for name, clip in clips.items() if not np.array_equal(clip.rest, clip.block(0, 1)[0])}
+    name, chosen = next(iter((rests or clips).items()))
+    for other, clip in rests.items():
         if not np.array_equal(clip.rest, chosen.rest):
             vertex = int(np.linalg.norm(clip.rest - chosen.rest, axis=1).argmax())
             raise ClipError(
@@ -245,18 +246,18 @@ def _common_rest(clips: Mapping[str, MotionClip]) -> np.ndarray:
 
 
 def _common_metadata(clips: Mapping[str, MotionClip]) -> dict[str, Any]:
-    """What all have in common, and under OWN what each has of its own."""
+    """Return the metadata that all have in common, with the others of each clip under OWN."""
     every = [clip.metadata for clip in clips.values()]
     common = {
         key: value
         for key, value in every[0].items()
         if all(key in metadata and metadata[key] == value for metadata in every)
     }
-    own = {
+    by_clip = {
         name: {key: value for key, value in clip.metadata.items() if key not in common} for name, clip in clips.items()
     }
-    own = {name: metadata for name, metadata in own.items() if metadata}
-    return common | {OWN: own} if own else common
+    by_clip = {name: metadata for name, metadata in by_clip.items() if metadata}
+    return common | {OWN: by_clip} if by_clip else common
 
 
 class _AllUnchanged:
@@ -271,7 +272,7 @@ class _AllUnchanged:
 
 
 def _joined(parts: Sequence[Any]) -> Frames:
-    """Positions of several, one after the other."""
+    """Positions of several clips, one after the other."""
     ranges = clip_range_frames([ClipRange("", part.shape[0]) for part in parts])
     dtype = np.result_type(*(part.dtype for part in parts))
 
@@ -287,14 +288,14 @@ def _joined(parts: Sequence[Any]) -> Frames:
 
 
 def _run(positions: Any, first: int, last: int) -> Frames:
-    """Frames `first` to `last` - 1."""
+    """Return frames `first` to `last` - 1."""
     return Frames(
         lambda start, stop: positions[first + start : first + stop], last - first, positions.shape[1], positions.dtype
     )
 
 
 def _blended(positions: Any, blend: int) -> Frames:
-    """All but the last `blend` frames, of which the first go from what follows the new last one over to their own."""
+    """All but the last `blend` frames; the first ones are blended from the frames that follow the new last one."""
     frame_count, dtype = positions.shape[0] - blend, positions.dtype
 
     def read(start: int, stop: int) -> np.ndarray:
@@ -302,7 +303,7 @@ def _blended(positions: Any, blend: int) -> Frames:
         if start >= last:
             return shown
         place = np.arange(start, last)[:, None, None] / blend
-        weight = place * place * (3 - 2 * place)  # smoothstep: neither positions nor speeds jump
+        weight = place * place * (3 - 2 * place)  # Smoothstep: neither positions nor speeds jump.
         leaving = np.asarray(positions[frame_count + start : frame_count + last], np.float64)
         mixed = shown.astype(dtype, copy=True)
         mixed[: last - start] = leaving + (shown[: last - start] - leaving) * weight

@@ -1,5 +1,5 @@
 """Polygons by the vertices of their corners, as FACES and EDGES hold them: all with as many corners, or each with a
-number of its own."""
+count."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _SIGNED = 4
 
 
 def type_code(dtype: np.dtype) -> int:
-    """An integer type as FORMAT.md numbers them."""
+    """Return the code of an integer type in FORMAT.md."""
     size = dtype.itemsize.bit_length() - 1
     return size | _SIGNED * (dtype.kind == "i")
 
@@ -27,8 +27,8 @@ def type_of(code: int) -> np.dtype:
 
 @dataclass(frozen=True)
 class Polygons:
-    """Corners: (C,) int32, source order; counts: (F,) uint32, or None where all faces have `columns` corners; and the
-    types that both had in the source."""
+    """Corners (C,) int32 in source order, counts (F,) uint32, or None if all faces have `columns` corners, and the
+    source's types."""
 
     corners: np.ndarray
     counts: np.ndarray | None
@@ -36,17 +36,17 @@ class Polygons:
     columns: int
     index_type: np.dtype
     count_type: np.dtype | None = None
-    derived: bool = False  # edges that follow from the branches; they have no corners here
+    derived: bool = False  # Edges that follow from the branches; they have no corners here.
 
     @classmethod
     def of_rows(cls, rows: np.ndarray) -> Polygons:
-        """Of an array of vertex numbers, (F, k)."""
+        """Return the polygons of an array of vertex numbers, (F, k)."""
         corners = np.ascontiguousarray(rows, np.int32).reshape(-1)
         return cls(corners, None, len(rows), rows.shape[1], rows.dtype)
 
     @classmethod
     def of_attributes(cls, attributes: Mapping[str, np.ndarray]) -> Polygons | None:
-        """Of the arrays that stand for faces of different sizes, where these are there, and plain."""
+        """Return the polygons of the arrays that stand for faces of different sizes, if they are there and plain."""
         counts, indices = (attributes.get(name) for name in POLYGON_ARRAYS)
         if counts is None or indices is None or counts.ndim != 1 or indices.ndim != 1:
             return None
@@ -70,11 +70,11 @@ class Polygons:
 
     @property
     def rows(self) -> np.ndarray:
-        """(F, k) of the source's type, of faces of as many corners."""
+        """Faces of as many corners, (F, k) of the source's type."""
         return self.corners.astype(self.index_type).reshape(self.face_count, self.columns)
 
     @property
     def attributes(self) -> dict[str, np.ndarray]:
-        """Of faces of different sizes, of the source's types."""
+        """Arrays of faces of different sizes, of the source's types."""
         arrays = self.counts.astype(self.count_type), self.corners.astype(self.index_type)
         return dict(zip(POLYGON_ARRAYS, arrays))

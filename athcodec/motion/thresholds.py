@@ -9,7 +9,7 @@ from typing import Any
 
 from athcodec.options import whole
 
-THRESHOLDS = "hierarchy_thresholds"  # of metadata
+THRESHOLDS = "hierarchy_thresholds"  # Key of metadata.
 
 
 @dataclass(frozen=True)
@@ -45,13 +45,13 @@ class Thresholds:
 
     @property
     def in_metadata(self) -> dict[str, float]:
-        """What a file keeps of them under the name THRESHOLDS; JSON has no infinity."""
+        """The entry in a file's metadata under THRESHOLDS; JSON has no infinity."""
         most = sys.float_info.max
         return {"epsilon": min(self.epsilon, most), "xi": min(self.xi, most), "eta": self.eta, "lambda": self.lam}
 
     @classmethod
     def of_metadata(cls, metadata: Mapping[str, Any]) -> Thresholds | None:
-        """None where a file keeps none, or no numbers."""
+        """Return the thresholds in a file's metadata, or None if there are none, or no numbers."""
         try:
             kept = metadata[THRESHOLDS]
             return cls(kept["epsilon"], kept["eta"], kept["xi"], kept["lambda"])

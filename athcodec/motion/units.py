@@ -1,7 +1,5 @@
 """Lengths and file sizes as people write them: "1mm", "0.5 cm", "2e-3", "50kB", "1.5MiB". Based on the exact
-definitions of the inch (25.4 mm) and the foot (12 inches), and on IEC 80000-13 for sizes. It parses and
-converts; what a length is used for, and whether it can be kept, is decided elsewhere.
-"""
+definitions of the inch (25.4 mm) and the foot (12 inches), and on IEC 80000-13 for sizes."""
 
 from __future__ import annotations
 
@@ -59,7 +57,7 @@ class Length:
         return f"{self.value:g}{self.unit}"
 
     def in_scene_units(self, scene_unit: object) -> float:
-        """The length in the units of a clip.
+        """Return the length in the units of a clip.
 
         Parameters
         ----------
@@ -74,7 +72,7 @@ class Length:
         Raises
         ------
         BoundError
-            Where the length has a unit, and the clip has none or an unknown one.
+            If the length has a unit, and the clip has none or an unknown one.
         """
         if not self.unit:
             return self.value
@@ -105,7 +103,7 @@ def parse_length(text: str) -> Length:
     Raises
     ------
     BoundError
-        Where it is none.
+        If it is none.
     """
     match = _QUANTITY.fullmatch(text)
     if not match or match[2] not in ("", *METRES) or float(match[1]) == float("inf"):
@@ -131,7 +129,7 @@ def parse_size(text: str) -> int:
     Raises
     ------
     BoundError
-        Where it is none.
+        If it is none.
     """
     match = _QUANTITY.fullmatch(text)
     size = float(match[1]) * BYTES[match[2]] if match and match[2] in BYTES else 0.0
@@ -141,6 +139,6 @@ def parse_size(text: str) -> int:
 
 
 def unit_symbol(unit: object) -> str:
-    """The symbol in METRES of a unit that metadata names in full ("Meters"), or what was given."""
+    """Return the symbol in METRES of a unit that metadata names in full ("Meters"), or the unit unchanged."""
     name = str(unit).strip()
     return _LONG_NAMES.get(name.lower().removesuffix("s"), name if name in METRES else name.lower())

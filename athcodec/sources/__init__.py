@@ -2,7 +2,7 @@
 
 `read` finds the format by what a file begins with, then by its suffix, and imports the module of that format and no
 other. A module has one function, `read_clip(path, options) -> MotionClip`. Most formats name no branches: the clip has
-none then (see discovery.py).
+none then (see motion/branches).
 """
 
 from __future__ import annotations

@@ -91,8 +91,8 @@ def facts_of(path: str | os.PathLike[str]) -> str:
     if is_url(path):
         raise AthError(f"{path}: got a URL, expected a file that can be copied into the gallery")
     with open_ath(path) as decoder:
-        vertices = decoder.vertex_count
-        frames = [clip.frame_count for clip in decoder.clips]
+        vertices = decoder.file.vertex_count
+        frames = [clip.frame_count for clip in decoder.file.clips]
     size = os.path.getsize(path)
     clips = f"{len(frames)} clips, " if len(frames) > 1 else ""
     times = _FLOAT3 * vertices * sum(frames) / size

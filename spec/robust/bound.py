@@ -209,26 +209,26 @@ def distances(decoded: np.ndarray, source: np.ndarray, unit: float) -> np.ndarra
 
 def _broken(decoder: athcodec.Decoder, clip: MotionClip, bound: float, attack: Attack):
     source = clip.positions
-    if decoder.max_error_bound > bound:
-        yield f"the file promises {decoder.max_error_bound}, not {bound}"
-    for level in range(decoder.level_count):
+    if decoder.file.max_error_bound > bound:
+        yield f"the file promises {decoder.file.max_error_bound}, not {bound}"
+    for level in range(decoder.file.level_count):
         off = distances(decoder.positions(level=level), source, bound)
         stated = decoder.file.errors[level, :, 0] / bound
         for segment, (start, stop) in enumerate(decoder.segments):
             worst = off[start:stop].max()
             if not worst <= stated[segment] * (1 + 1e-6) + 1e-9:
                 yield f"level {level}, segment {segment}: stated {stated[segment]}, got {worst} bounds"
-        if level == decoder.level_count - 1 and not off.max() <= 1.0:
+        if level == decoder.file.level_count - 1 and not off.max() <= 1.0:
             frame, vertex = np.unravel_index(np.argmax(off), off.shape)
             yield f"frame {frame}, vertex {vertex}: {off.max()} bounds off"
     frame = attack.seed % clip.frame_count
     if not np.array_equal(decoder.positions(frame), decoder.positions()[frame]):
         yield f"frame {frame} alone is another"
     if attack.exact_rest:
-        if decoder.rest.tobytes() != clip.rest.astype(clip.rest_dtype).tobytes():
+        if decoder.file.rest.tobytes() != clip.rest.astype(clip.rest_dtype).tobytes():
             yield "the exact rest pose has changed"
-    elif not distances(decoder.rest, clip.rest, bound).max() <= _rest_limit(decoder, clip, bound):
-        yield f"the rest pose is {distances(decoder.rest, clip.rest, bound).max()} bounds off"
+    elif not distances(decoder.file.rest, clip.rest, bound).max() <= _rest_limit(decoder, clip, bound):
+        yield f"the rest pose is {distances(decoder.file.rest, clip.rest, bound).max()} bounds off"
 
 
 def _rest_limit(decoder: athcodec.Decoder, clip: MotionClip, bound: float) -> float:

@@ -82,7 +82,7 @@ def _whole_clip(data: bytes) -> int:
 @cache
 def _played(data: bytes) -> list[np.ndarray]:
     decoder = athcodec.open(BytesIO(data))
-    return [decoder.positions(level=level) for level in range(decoder.level_count)]
+    return [decoder.positions(level=level) for level in range(decoder.file.level_count)]
 
 
 def prefix_strictly(data: bytes, size: int) -> int:
@@ -104,8 +104,9 @@ def prefix_as_a_stream(data: bytes, size: int) -> int:
         except Truncated:
             return 0
         raise Wrong(f"{size} bytes: got level 0, which is incomplete")
-    if decoder.deepest != deepest or not np.array_equal(decoder.positions(), _played(data)[deepest], equal_nan=True):
-        raise Wrong(f"{size} bytes: got level {decoder.deepest}; expected level {deepest} as in the whole file")
+    level = decoder.file.deepest
+    if level != deepest or not np.array_equal(decoder.positions(), _played(data)[deepest], equal_nan=True):
+        raise Wrong(f"{size} bytes: got level {level}; expected level {deepest} as in the whole file")
     return 0
 
 
@@ -235,10 +236,10 @@ def seconds_and_bytes(data: bytes) -> tuple[float, int]:
     decoder = athcodec.open(BytesIO(data))
     given = sum(block.nbytes for _, block in decoder.blocks())
     taken = time.perf_counter() - start
-    work = decoder.file.core.work_size() + decoder.file.core.segment_size(decoder.level_count - 1)
+    work = decoder.file.core.work_size() + decoder.file.core.segment_size(decoder.file.level_count - 1)
     own = len(decoder.file.core._memory) + len(decoder.file.core._build) + work * len(decoder.segments)
     own += CHUNK_BYTES * decoder.file.header.chunk_count
-    return taken, len(data) + given + decoder.rest.nbytes + own
+    return taken, len(data) + given + decoder.file.rest.nbytes + own
 
 
 @cache

@@ -112,7 +112,7 @@ def threads_in_python(files: list[Path], threads: int, looks: int) -> Row:
     """Threads on shared and on separate decoders of each file, compared with a single thread."""
     row = Row("threads, Python", 0, note=f"{threads} threads on {len(files)} files, shared and their own")
     shared = [athcodec.open(path) for path in files]
-    expected = [[decoder.positions(level=level) for level in range(decoder.level_count)] for decoder in shared]
+    expected = [[decoder.positions(level=level) for level in range(decoder.file.level_count)] for decoder in shared]
 
     def watch(seed: int) -> int:
         rng, wrong = random.Random(seed), 0
@@ -135,7 +135,7 @@ def threads_in_python(files: list[Path], threads: int, looks: int) -> Row:
 
 def _same(decoder: athcodec.Decoder, expected: list[np.ndarray], rng: random.Random) -> bool:
     """Whether a random frame, or some frames, of a random level are as expected."""
-    level, frame = rng.randrange(decoder.level_count), rng.randrange(decoder.frame_count)
+    level, frame = rng.randrange(decoder.file.level_count), rng.randrange(decoder.frame_count)
     if rng.random() < 0.2:
         frames = slice(frame, frame + 10)
         return np.array_equal(decoder.positions(frames, level), expected[level][frames])
@@ -157,7 +157,7 @@ def seek_at_random(path: str, seeks: int) -> dict:
     """Growth of memory and of the number of Python's objects over so many seeks and changes of level."""
     rng = random.Random(4)
     with athcodec.open(path) as decoder:
-        expected = [decoder.positions(level=level) for level in range(decoder.level_count)]
+        expected = [decoder.positions(level=level) for level in range(decoder.file.level_count)]
 
         def some(count: int) -> int:
             return sum(not _same(decoder, expected, rng) for _ in range(count))
@@ -194,7 +194,7 @@ def open_many(path: str, count: int) -> dict:
         resource.setrlimit(resource.RLIMIT_NOFILE, (wanted, hard))
     rng, before, files = random.Random(9), resident_bytes(), _open_files()
     with athcodec.open(path) as decoder:
-        expected = [decoder.positions(level=level) for level in range(decoder.level_count)]
+        expected = [decoder.positions(level=level) for level in range(decoder.file.level_count)]
     decoders = [athcodec.open(path) for _ in range(count)]
     wrong = sum(not _same(decoder, expected, rng) for decoder in decoders)
     each = (resident_bytes() - before) / count
@@ -272,7 +272,7 @@ def _calls(path: str, out: str) -> dict[str, Call]:
         "positions": opened(lambda decoder: decoder.positions()),
         "frames": opened(lambda decoder: [decoder.positions(i, level) for i in (0, -1) for level in (0, 1)]),
         "affines": opened(lambda decoder: decoder.affines(3, 1)),
-        "static": opened(lambda decoder: (decoder.attributes, decoder.metadata, decoder.edges, decoder.rest)),
+        "static": opened(lambda it: (it.file.attributes, it.metadata, it.file.edges, it.file.rest)),
         "check": opened(lambda decoder: decoder.file.check()),
         "truncate": lambda: athcodec.truncate(path, out, 0),
         "encode": lambda: athcodec.encode(clip, out, effort="fast", segment_frames=16),

@@ -115,10 +115,11 @@ def write_object(
 def encoded(clip, path: str, **options):
     """athcodec.encode, with the pieces of the mesh as branches where none are named and none can be found."""
     import athcodec
-    from athcodec.motion import discovery
+    from athcodec.motion.branches.finding import pieces
+    from athcodec.motion.branches.result import with_branches
 
     if not clip.has_branches and find_spec("scipy") is None:
-        clip = discovery.with_branches(clip, discovery.pieces(clip))
+        clip = with_branches(clip, pieces(clip))
     return athcodec.encode(clip, path, **options)
 
 

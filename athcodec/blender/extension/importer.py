@@ -163,17 +163,17 @@ def _mesh(name: str, decoder):
     from athcodec.motion.clip import polygons
 
     mesh = bpy.data.meshes.new(name)
-    mesh.vertices.add(decoder.vertex_count)
-    mesh.vertices.foreach_set("co", np.ascontiguousarray(decoder.rest, np.float32).reshape(-1))
+    mesh.vertices.add(decoder.file.vertex_count)
+    mesh.vertices.foreach_set("co", np.ascontiguousarray(decoder.file.rest, np.float32).reshape(-1))
     if decoder.file.host_checksum is not None:
         layer = mesh.attributes.new(player.HOST_MESH, "FLOAT_VECTOR", "POINT")
-        layer.data.foreach_set("vector", np.ascontiguousarray(decoder.rest, np.float32).reshape(-1))
-    found = polygons(decoder.faces, decoder.attributes)
+        layer.data.foreach_set("vector", np.ascontiguousarray(decoder.file.rest, np.float32).reshape(-1))
+    found = polygons(decoder.file.faces, decoder.file.attributes)
     if found is not None:
         _add_faces(mesh, *found)
-    if decoder.edges is not None and len(decoder.edges):
-        mesh.edges.add(len(decoder.edges))
-        mesh.edges.foreach_set("vertices", np.ascontiguousarray(decoder.edges, np.int32).reshape(-1))
+    if decoder.file.edges is not None and len(decoder.file.edges):
+        mesh.edges.add(len(decoder.file.edges))
+        mesh.edges.foreach_set("vertices", np.ascontiguousarray(decoder.file.edges, np.int32).reshape(-1))
     mesh.update(calc_edges=found is not None)
     corners = len(found[1]) if found is not None else 0
     if len(mesh.loops) == corners:
@@ -191,10 +191,10 @@ def _add_faces(mesh, counts: np.ndarray, indices: np.ndarray) -> None:
 
 def _add_attributes(mesh, decoder) -> None:
     domains = decoder.metadata.get("domains", {})
-    arrays = {**decoder.attributes, "vertex_branch": decoder.vertex_branch}
-    if decoder.stem_index is not None:
-        arrays["stem_index"] = decoder.stem_index
-    mesh[PARENTS] = np.asarray(decoder.branch_parent).tolist()
+    arrays = {**decoder.file.attributes, "vertex_branch": decoder.file.vertex_branch}
+    if decoder.file.stem_index is not None:
+        arrays["stem_index"] = decoder.file.stem_index
+    mesh[PARENTS] = np.asarray(decoder.file.branch_parent).tolist()
     rows = {"POINT": len(mesh.vertices), "CORNER": len(mesh.loops), "FACE": len(mesh.polygons)}
     for name, values in arrays.items():
         domain = DOMAINS.get(domains.get(name, "vertex") if isinstance(domains, dict) else "vertex")

@@ -42,9 +42,9 @@ class OBJECT_PT_ath(bpy.types.Panel):
         shown = decoder.levels[player.level_of(obj, decoder)]
         unit = decoder.metadata.get("unit", "")
         return [
-            f"level {shown.level} of 0 to {decoder.deepest}: {shown.name}, {shown.nodes:,} nodes",
+            f"level {shown.level} of 0 to {decoder.file.deepest}: {shown.name}, {shown.nodes:,} nodes",
             f"largest error {shown.max_error:.3g} {unit}",
-            f"{decoder.frame_count:,} frames, {decoder.fps:.6g} per second, {decoder.vertex_count:,} vertices",
+            f"{decoder.frame_count:,} frames, {decoder.fps:.6g} per second, {decoder.file.vertex_count:,} vertices",
         ]
 
 

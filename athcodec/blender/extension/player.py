@@ -49,7 +49,7 @@ def decoder_for(obj):
 def clip_names(obj) -> list[str]:
     """Return the names in the file that an object plays; none where it cannot be read."""
     try:
-        return [clip.name for clip in decoder_of(path_of(obj)).clips if clip.name]
+        return [clip.name for clip in decoder_of(path_of(obj)).file.clips if clip.name]
     except Exception:  # asked while a menu is drawn; the panel says what is wrong
         return []
 
@@ -69,7 +69,7 @@ def problem_of(obj) -> str:
 
 def level_of(obj, decoder) -> int:
     """The level that an object shows: what it asks for, as far as the file has it."""
-    return decoder.deepest if obj.ath.level == DEEPEST else min(obj.ath.level, decoder.deepest)
+    return decoder.file.deepest if obj.ath.level == DEEPEST else min(obj.ath.level, decoder.file.deepest)
 
 
 def place_in(decoder, settings, scene) -> float:
@@ -113,8 +113,8 @@ def show(obj, scene) -> None:
 def _show(obj, scene) -> None:
     decoder = decoder_for(obj)
     mesh = obj.data
-    if len(mesh.vertices) != decoder.vertex_count:
-        raise ValueError(f"the mesh has {len(mesh.vertices)} vertices, the file {decoder.vertex_count}")
+    if len(mesh.vertices) != decoder.file.vertex_count:
+        raise ValueError(f"the mesh has {len(mesh.vertices)} vertices, the file {decoder.file.vertex_count}")
     positions = positions_at(decoder, place_in(decoder, obj.ath, scene), level_of(obj, decoder))
     mesh.vertices.foreach_set("co", positions.reshape(-1))
     mesh.update()

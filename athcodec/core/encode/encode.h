@@ -64,6 +64,10 @@ ATH_INLINE ath_node_rows ath_rows_of_node(const ath_integers *integers, int32_t 
     return rows;
 }
 
+/* Name, offset and size of an entry in the table of layouts: a struct, then its fields as "struct.field". Null behind the
+ * last entry. */
+ATH_ENCODER_API const char *ath_layout(int32_t index, size_t *offset, size_t *size);
+
 /* Returns the bytes of scratch memory that any of the writers below needs as `model`. */
 ATH_ENCODER_API size_t ath_model_size(void);
 

@@ -28,8 +28,8 @@ from athcodec.options import MAX_MEMORY
 
 COMPONENTS = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
-KEPT_VIEWS = 8  # that have been decompressed
-JSON_ENDS, JSON_BYTES = b",:[{", 96  # of text, and what is made of a part of it
+KEPT_VIEWS = 8  # Bytes that have been decompressed.
+JSON_ENDS, JSON_BYTES = b",:[{", 96  # Bytes of text, and of the objects made of it.
 MESHOPT = ("EXT_meshopt_compression", "KHR_meshopt_compression")
 # Extensions that a reader of positions may ignore, or that are read here.
 HARMLESS = (
@@ -124,7 +124,7 @@ class GltfFile:
                 )
 
     def item(self, kind: str, index: Any) -> dict:
-        """Entry `index` of the array `kind` ("nodes", "accessors" ...). Raises ClipError."""
+        """Return entry `index` of the array `kind` ("nodes", "accessors" ...). Raises ClipError."""
         every = self.json.get(kind)
         count = len(every) if isinstance(every, list) else 0
         if not isinstance(index, int) or isinstance(index, bool) or not 0 <= index < count:
@@ -139,11 +139,11 @@ class GltfFile:
     # ---- accessors ----
 
     def count(self, index: Any) -> int:
-        """Number of elements of accessor `index`."""
+        """Return the number of elements of accessor `index`."""
         return integer(self.item("accessors", index), "count", low=1)
 
     def array(self, index: Any) -> np.ndarray:
-        """Accessor `index` as (count, width) in its component type. Raises ClipError."""
+        """Return accessor `index` as (count, width) in its component type. Raises ClipError."""
         accessor, where = self.item("accessors", index), f"accessor {index}"
         dtype = looked_up(COMPONENTS, accessor.get("componentType"), f"{where}: componentType")
         width = looked_up(WIDTHS, accessor.get("type"), f"{where}: type")
@@ -160,7 +160,7 @@ class GltfFile:
         return values
 
     def floats(self, index: Any) -> np.ndarray:
-        """Accessor `index` as numbers: float32 as they are, normalized integers between -1 and 1 (float64)."""
+        """Return accessor `index` as numbers: float32 unchanged, normalized integers between -1 and 1 (float64)."""
         values = self.array(index)
         if values.dtype.kind == "f":
             return values
@@ -169,7 +169,7 @@ class GltfFile:
         return np.maximum(values / float(np.iinfo(values.dtype).max), -1.0)
 
     def attribute(self, index: Any) -> np.ndarray:
-        """Accessor `index` in the type that it is stored in, normalized integers as float32."""
+        """Return accessor `index` in the type that it is stored in, normalized integers as float32."""
         is_normalized = self.item("accessors", index).get("normalized")
         return self.floats(index).astype(np.float32) if is_normalized else self.array(index)
 
@@ -200,11 +200,12 @@ class GltfFile:
         return values
 
     def binary_chunk(self) -> bytes:
-        """The bytes of the GLB's own buffer; none where it has none."""
+        """Return the bytes of the GLB's internal buffer; none if it has none."""
         return self._binary.read(0, self._binary.size) if self._binary is not None else b""
 
     def part(self, holder: Mapping, key: str) -> tuple[_Bytes, int, int]:
-        """Where the bytes of the buffer view `key` lie: a buffer to `read`, an offset and a size. Raises ClipError."""
+        """Return where the bytes of the buffer view `key` lie: a buffer to `read`, an offset and a size. Raises
+        ClipError."""
         index = integer(holder, key)
         view = self.item("bufferViews", index)
         offset, size = integer(view, "byteOffset", 0), integer(view, "byteLength", low=1)
@@ -224,7 +225,8 @@ class GltfFile:
         if index not in self._unpacked_views:
             packed = entry(entry(self.item("bufferViews", index), "extensions"), name)
             raw = self._slice(packed, integer(packed, "byteOffset", 0), integer(packed, "byteLength", low=1), name)
-            self.budget.need((KEPT_VIEWS + 4) * unpacked_size(packed), f"bufferView {index}")  # 4: while it is unpacked
+            # Unpacking takes four times the memory.
+            self.budget.need((KEPT_VIEWS + 4) * unpacked_size(packed), f"bufferView {index}")
             if len(self._unpacked_views) >= KEPT_VIEWS:
                 self._unpacked_views.pop(next(iter(self._unpacked_views)))
             self._unpacked_views[index] = unpack(raw, packed)
@@ -248,23 +250,23 @@ class GltfFile:
         buffer = self.item("buffers", index)
         uri = buffer.get("uri")
         if uri is None and index == 0 and self._binary is not None:
-            found = self._binary
+            source = self._binary
         elif isinstance(uri, str) and uri.startswith("data:"):
-            found = _Bytes(_data_uri(uri))
+            source = _Bytes(_data_uri(uri))
         elif isinstance(uri, str):
             file = self._open(self._beside(uri))
-            found = _FilePart(file, 0, os.fstat(file.fileno()).st_size)
+            source = _FilePart(file, 0, os.fstat(file.fileno()).st_size)
         else:
             raise ClipError(f"buffers: entry {index} has no bytes, expected a URI or the binary chunk of a GLB")
         length = integer(buffer, "byteLength", low=1)
-        if length > found.size:
-            raise ClipError(f"buffers: entry {index} has {found.size} bytes, expected {length}")
-        found.size = length
-        return found
+        if length > source.size:
+            raise ClipError(f"buffers: entry {index} has {source.size} bytes, expected {length}")
+        source.size = length
+        return source
 
     def _beside(self, uri: str) -> str:
-        """The file that a relative URI names. One that leads elsewhere is refused: a file that is not trusted must
-        not read others on the disk."""
+        """Return the file that a relative URI names. A URI that leads elsewhere is refused: an untrusted file must not
+        read others on the disk."""
         name = unquote(uri)
         parts = name.replace("\\", "/").split("/")
         if ":" in parts[0] or name.startswith(("/", "\\")) or ".." in parts or "\0" in name:
@@ -298,12 +300,12 @@ class _FilePart(_Bytes):
 
 def _parsed(text: bytes) -> dict:
     try:
-        found = json.loads(text.decode("utf-8-sig"), parse_constant=_no_constant)
+        document = json.loads(text.decode("utf-8-sig"), parse_constant=_no_constant)
     except (ValueError, RecursionError) as error:
         raise ClipError(f"JSON: got text that is none: {str(error)[:100]}, expected glTF 2.0") from None
-    if not isinstance(found, dict):
-        raise ClipError(f"JSON: got {brief(found)}, expected an object")
-    return found
+    if not isinstance(document, dict):
+        raise ClipError(f"JSON: got {brief(document)}, expected an object")
+    return document
 
 
 def _no_constant(name: str) -> None:

@@ -14,7 +14,7 @@ BROKEN = (LookupError, AttributeError, MemoryError, OverflowError, RecursionErro
 
 
 def entry(holder: Mapping, key: str) -> dict:
-    """The object `key` of another. Raises ClipError."""
+    """Return the object `key` of another. Raises ClipError."""
     value = holder.get(key)
     if not isinstance(value, dict):
         raise ClipError(f"{key}: got {brief(value)}, expected an object")
@@ -22,12 +22,12 @@ def entry(holder: Mapping, key: str) -> dict:
 
 
 def entries(holder: Mapping, key: str) -> list[dict]:
-    """The array of objects `key`, empty where there is none. Raises ClipError."""
+    """Return the array of objects `key`, empty if there is none. Raises ClipError."""
     return _array(holder, key, lambda value: isinstance(value, dict), "objects")
 
 
 def integer(holder: Mapping, key: str, default: int | None = None, low: int = 0, stop: int = 1 << 53) -> int:
-    """The whole number `key`, from `low` to `stop` - 1. Raises ClipError."""
+    """Return the whole number `key`, from `low` to `stop` - 1. Raises ClipError."""
     value = holder.get(key, default)
     if isinstance(value, float) and value.is_integer():
         value = int(value)
@@ -37,7 +37,7 @@ def integer(holder: Mapping, key: str, default: int | None = None, low: int = 0,
 
 
 def indices(holder: Mapping, key: str) -> list[int]:
-    """The array of whole numbers `key`, empty where there is none. Raises ClipError."""
+    """Return the array of whole numbers `key`, empty if there is none. Raises ClipError."""
     return _array(holder, key, lambda value: type(value) is int and value >= 0, "indices")
 
 
@@ -51,7 +51,7 @@ def _array(holder: Mapping, key: str, is_valid: Callable[[Any], bool], expected:
 
 
 def vector(holder: Mapping, key: str, default: list[float]) -> np.ndarray:
-    """The array of as many finite numbers as `default` has, float64. Raises ClipError."""
+    """Return the array of as many finite numbers as `default` has, float64. Raises ClipError."""
     value = holder.get(key, default)
     if not isinstance(value, list) or len(value) != len(default) or any(type(n) not in (int, float) for n in value):
         raise ClipError(f"{key}: got {brief(value)}, expected {len(default)} numbers")
@@ -59,13 +59,13 @@ def vector(holder: Mapping, key: str, default: list[float]) -> np.ndarray:
 
 
 def brief(value: Any) -> str:
-    """A value for a message, cut off where it is long."""
+    """Return a value for a message, cut off if it is long."""
     text = repr(value)
     return text if len(text) <= 60 else f"{text[:57]}..."
 
 
 def looked_up(table: Mapping, key: Any, what: str) -> Any:
-    """The entry `key` of a table of what glTF allows. Raises ClipError."""
+    """Return the entry `key` of a table of what glTF allows. Raises ClipError."""
     if not isinstance(key, (int, str)) or key not in table:
         raise ClipError(f"{what}: got {brief(key)}, expected one of {', '.join(map(str, table))}")
     return table[key]

@@ -10,16 +10,16 @@ from athcodec.errors import ClipError, MissingExtra
 from athcodec.files.gltf.json import integer
 
 STRIDES = {"OCTAHEDRAL": (4, 8), "QUATERNION": (8,), "EXPONENTIAL": range(4, 257, 4), "NONE": range(1, 257)}
-MOST_PER_BYTE = 2048  # bytes that the codec makes of one at most: more is refused before memory is allocated
+MOST_PER_BYTE = 2048  # Bytes that the codec makes of one at most; more is refused before memory is allocated.
 
 
 def unpacked_size(packed: Mapping) -> int:
-    """Bytes that the buffer view has. Raises ClipError."""
+    """Return the number of bytes of the buffer view. Raises ClipError."""
     return integer(packed, "count", low=1) * integer(packed, "byteStride", low=1, stop=257)
 
 
 def unpack(raw: bytes, packed: Mapping) -> bytes:
-    """The bytes of a buffer view whose extension object is `packed`. Raises ClipError, MissingExtra."""
+    """Return the bytes of a buffer view whose extension object is `packed`. Raises ClipError, MissingExtra."""
     try:
         import meshoptimizer as library
     except ImportError:

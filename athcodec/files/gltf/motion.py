@@ -1,4 +1,4 @@
-"""ATH_motion in a GLB: where the .ath file lies, and what the meshes around it are to it: rest pose and faces.
+"""ATH_motion in a GLB: where the .ath file lies, and the rest pose and faces that the meshes around it give it.
 
 The extension is described in spec/gltf/README.md. Its motions are the bytes of buffer views; a primitive names one and
 says which vertices of it its own are.
@@ -28,23 +28,23 @@ GltfPlace = tuple[dict, np.ndarray]
 
 
 def extension_of(holder: dict) -> dict | None:
-    """What the extension says of a part of the file, None where that is nothing. Raises ClipError."""
+    """Return the extension object of a part of the file, or None. Raises ClipError."""
     extensions = holder.get("extensions")
     return entry(extensions, EXTENSION) if isinstance(extensions, dict) and EXTENSION in extensions else None
 
 
 def motion_names(gltf: dict) -> list[str]:
-    """What the motions of a file are called, each by another name. Raises ClipError."""
-    found: list[str] = []
+    """Return the names of a file's motions, which differ. Raises ClipError."""
+    names: list[str] = []
     for number, motion in enumerate(entries(extension_of(gltf) or {}, "motions")):
-        said = motion.get("name")
-        name = said if isinstance(said, str) and said else f"motion {number}"
-        found.append(f"{name}.{number}" if name in found else name)
-    return found
+        stated = motion.get("name")
+        name = stated if isinstance(stated, str) and stated else f"motion {number}"
+        names.append(f"{name}.{number}" if name in names else name)
+    return names
 
 
 def motions_in(path: str | os.PathLike[str]) -> list[str]:
-    """The names of the motions in a GLB; none of another file. Raises ClipError, OSError."""
+    """Return the names of the motions in a GLB; none for another file. Raises ClipError, OSError."""
     with open_plain(path) as file:
         if file.read(4) != MAGIC:
             return []
@@ -103,10 +103,10 @@ class GltfMotion:
 
     @cached_property
     def _places(self) -> list[GltfPlace]:
-        found = places_of(self._gltf, self.number)
-        if not found:
+        places = places_of(self._gltf, self.number)
+        if not places:
             raise ClipError(f"{EXTENSION}: got no primitive that a motion moves, expected at least one")
-        return found
+        return places
 
     @cached_property
     def host_mesh(self) -> np.ndarray:
@@ -136,27 +136,27 @@ class GltfMotion:
     @cached_property
     def faces(self) -> np.ndarray | None:
         with naming(self.path, *BROKEN):
-            found = [vertices[triangles(self._gltf, primitive, len(vertices))] for primitive, vertices in self._places]
-            return np.concatenate(found).astype(np.int32) if any(map(len, found)) else None
+            faces = [vertices[triangles(self._gltf, primitive, len(vertices))] for primitive, vertices in self._places]
+            return np.concatenate(faces).astype(np.int32) if any(map(len, faces)) else None
 
 
 def places_of(file: GltfFile, number: int) -> list[GltfPlace]:
-    """The primitives that one of the file's motions moves. Raises ClipError."""
-    found, count = [], len(motion_names(file.json))
+    """Return the primitives that one of the file's motions moves. Raises ClipError."""
+    places, count = [], len(motion_names(file.json))
     for mesh in file.items("meshes"):
         for primitive in entries(mesh, "primitives"):
-            said = extension_of(primitive)
-            if said is not None and integer(said, "motion", stop=count) == number:
-                found.append((primitive, _vertices(file, primitive, said)))
-    return found
+            binding = extension_of(primitive)
+            if binding is not None and integer(binding, "motion", stop=count) == number:
+                places.append((primitive, _vertices(file, primitive, binding)))
+    return places
 
 
-def _vertices(file: GltfFile, primitive: dict, said: dict) -> np.ndarray:
-    """(n,) the motion's vertex of each vertex of a primitive."""
+def _vertices(file: GltfFile, primitive: dict, binding: dict) -> np.ndarray:
+    """Return the motion's vertex of each vertex of a primitive, (n,)."""
     attributes: dict[str, Any] = entry(primitive, "attributes")
-    count = len(file.array(integer(attributes, "POSITION")))  # those that the file has bytes for
+    count = len(file.array(integer(attributes, "POSITION")))  # The file may have bytes for fewer vertices.
     if VERTEX_ATTRIBUTE not in attributes:
-        return integer(said, "firstVertex", 0) + np.arange(count)
+        return integer(binding, "firstVertex", 0) + np.arange(count)
     values = file.array(integer(attributes, VERTEX_ATTRIBUTE))[:, 0]
     if len(values) != count or not np.isfinite(values).all() or values.min() < 0 or (values % 1).any():
         raise ClipError(f"{VERTEX_ATTRIBUTE}: got what numbers no vertices, expected {count} whole numbers")

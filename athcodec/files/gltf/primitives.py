@@ -10,7 +10,8 @@ from athcodec.files.gltf.json import integer
 
 
 def triangles(file: GltfFile, primitive: dict, count: int) -> np.ndarray:
-    """(F, 3) a primitive's triangles of its `count` vertices; none where it draws points or lines. Raises ClipError."""
+    """Return a primitive's triangles of its `count` vertices, (F, 3); none if it draws points or lines. Raises
+    ClipError."""
     mode = integer(primitive, "mode", 4, stop=7)
     return rows_of(corners(file, primitive, count, "primitive"), mode) if mode >= 4 else np.zeros((0, 3), np.int64)
 
@@ -25,7 +26,7 @@ def corners(file: GltfFile, primitive: dict, count: int, name: str) -> np.ndarra
 
 
 def rows_of(corners: np.ndarray, mode: int) -> np.ndarray:
-    """Corners of LINES (1), LINE_LOOP, LINE_STRIP, TRIANGLES (4), TRIANGLE_STRIP or TRIANGLE_FAN (6) as rows."""
+    """Return corners of LINES (1), LINE_LOOP, LINE_STRIP, TRIANGLES (4), TRIANGLE_STRIP or TRIANGLE_FAN (6) as rows."""
     if mode == 1:
         return corners[: len(corners) // 2 * 2].reshape(-1, 2)
     if mode in (2, 3):

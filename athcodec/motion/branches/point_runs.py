@@ -14,23 +14,23 @@ import numpy as np
 
 from athcodec.errors import MissingExtra
 
-NEAR = (16, 96)  # points around each one, at least and at most, among which its neighbours are looked for
-PAIRS = 1 << 19  # in all, where that is more than the least
-ROUNDS = 6  # of looking for those of loose ends, among ever fewer points and so ever further away
-PRECISION = 1e-7  # of the diagonal, and of the distance from the origin: what moves less stands still
-USUAL, ALIKE = 0.25, 30.0  # links are steady up to ALIKE times this quantile of the steadiest ones of all points
-STEADY = 0.05  # change of a link's length over how much its ends move against each other, at most, for that
-PLIANT = 3.0  # times that quantile: of links that are steadier the shorter one is the better
-UNSTEADY, UNLIKE = 0.2, 4.0  # likewise, at most, where all others are UNLIKE times as unsteady
-OFF_LINE = 0.5  # of a link's length: how far off its line a still point behind it may be
-CROWD = 1.5  # of the length of the links at a point: what else is steady within that is no neighbour on a run
-CROWDED = 0.25  # of such pairs for each point: they are a sheet or a body
-JOINED = 0.5  # of the points, at least, that are on runs
+NEAR = (16, 96)  # Nearest points of each one, at least and at most, among which neighbours are sought.
+PAIRS = 1 << 19  # Pairs in all, if that is more than the least.
+ROUNDS = 6  # Rounds of linking loose ends, among ever fewer points and so ever further away.
+PRECISION = 1e-7  # Part of the diagonal, and of the distance from the origin, below which a point stands still.
+USUAL, ALIKE = 0.25, 30.0  # Links are steady up to ALIKE times this quantile of all points' steadiest ones.
+STEADY = 0.05  # Largest change of a steady link's length over its ends' motion against each other.
+PLIANT = 3.0  # Times that quantile, below which the shorter of two links is the better.
+UNSTEADY, UNLIKE = 0.2, 4.0  # Largest change of a link whose alternatives are UNLIKE times as unsteady.
+OFF_LINE = 0.5  # Part of a link's length that a still point behind it may be off its line.
+CROWD = 1.5  # Part of the length of a point's links within which other steady points are no neighbours on a run.
+CROWDED = 0.25  # Such pairs for each point that make the points a sheet or a body.
+JOINED = 0.5  # Least part of the points that is on runs.
 PAIRS_AT_ONCE = 1 << 13
 
 
 def run_links(frames: np.ndarray) -> np.ndarray | None:
-    """(L, 2) pairs of neighbours along runs, which close no cycles; None where the points are no runs.
+    """Return pairs of neighbours along runs, (L, 2), which close no cycles; None if the points are no runs.
 
     frames: (F, N, 3) positions in a few frames.
     """
@@ -50,8 +50,8 @@ def run_links(frames: np.ndarray) -> np.ndarray | None:
 
 
 def base_points(frames: np.ndarray, links: np.ndarray, root: int | None) -> np.ndarray:
-    """Of each thing that links join the end that moves least, of ends that move about alike the first of the source;
-    `root`, if any, of its own."""
+    """Return, of each thing that links join, the end that moves least; of ends that move alike, the first. `root` is
+    the base of its thing."""
     count = frames.shape[1]
     way = np.sqrt(((frames - frames[0]) ** 2).sum(axis=(0, 2)))
     part, is_inner = _parts(links, count), _degrees(links, count) > 1
@@ -72,11 +72,11 @@ class _Steady:
         low, high = frames.min(axis=(0, 1)), frames.max(axis=(0, 1))
         away = float(np.maximum(np.abs(low), np.abs(high)).max())
         self.precision = PRECISION * max(float(np.linalg.norm(high - low)), away) + 1e-300
-        self._best = np.ones(self._count)  # change of the steadiest pair of each point
+        self._best = np.ones(self._count)  # Change of the steadiest pair of each point.
         self._pairs, self._change, self._length = np.zeros((0, 2), np.int64), np.zeros(0), np.zeros(0)
 
     def add(self, pairs: np.ndarray) -> None:
-        """Those of some pairs, (P, 2), that keep their distance."""
+        """Add those of some pairs, (P, 2), that keep their distance."""
         change, length = self._measured(pairs)
         for end in pairs.T:
             np.minimum.at(self._best, end, change)
@@ -89,7 +89,8 @@ class _Steady:
         self._length = np.concatenate([self._length, length[is_steady]])[once]
 
     def _measured(self, pairs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """How much the distance of each pair changes, over how much the two move against each other; and its mean."""
+        """Return how much the distance of each pair changes, over the motion of the two against each other, and its
+        mean."""
         change, length = np.empty(len(pairs)), np.empty(len(pairs))
         for start in range(0, len(pairs), PAIRS_AT_ONCE):
             some = slice(start, start + PAIRS_AT_ONCE)
@@ -102,7 +103,7 @@ class _Steady:
         return change, length
 
     def distinct(self, pairs: np.ndarray, links: np.ndarray) -> np.ndarray:
-        """(L, 2) pairs of a point without links that are much steadier than any other pair of either end."""
+        """Return pairs of a point without links that are much steadier than any other pair of either end, (L, 2)."""
         degree, part = _degrees(links, self._count), _parts(links, self._count)
         pairs = pairs[part[pairs[:, 0]] != part[pairs[:, 1]]]
         change, _ = self._measured(pairs)
@@ -116,7 +117,7 @@ class _Steady:
         return pairs[is_distinct & (degree[pairs].min(axis=1) == 0)]
 
     def tree(self) -> np.ndarray:
-        """(L, 2) of them those that join the same points at the least cost in all."""
+        """Return those of the pairs, (L, 2), that join the same points at the least total cost."""
         sparse, graphs = scipy_module("sparse"), scipy_module("sparse.csgraph")
         cost = np.maximum(self._length, self.precision) * np.hypot(self._change, PLIANT * self._usual)
         graph = sparse.coo_matrix((cost, self._pairs.T), (self._count, self._count)).tocsr()
@@ -124,7 +125,7 @@ class _Steady:
         return np.stack([tree.row, tree.col], axis=1).astype(np.int64)
 
     def beside(self, links: np.ndarray) -> int:
-        """How many of them are no links, but about as short as the links at both points."""
+        """Return how many of the pairs are no links, but about as short as the links at both points."""
         way = np.linalg.norm(self._start[links[:, 0]] - self._start[links[:, 1]], axis=1)
         longest = np.zeros(self._count)
         for end in links.T:
@@ -134,7 +135,7 @@ class _Steady:
 
 
 def _with_still_points(frames: np.ndarray, links: np.ndarray, precision: float) -> np.ndarray:
-    """The links, and those to points that do not move, where they stand behind an end that does not move either."""
+    """Return the links, and those to points that do not move, if they stand behind an end that does not move either."""
     count = frames.shape[1]
     still = np.sqrt(((frames - frames[0]) ** 2).sum(axis=2)).max(axis=0) <= 4 * precision
     cKDTree = scipy_module("spatial").cKDTree
@@ -150,15 +151,15 @@ def _with_still_points(frames: np.ndarray, links: np.ndarray, precision: float) 
         apart, which = cKDTree(frames[0, lone]).query(frames[0, end] + step)
         fits = np.flatnonzero(apart <= OFF_LINE * np.linalg.norm(step, axis=1))
         fits = fits[np.argsort(apart[fits], kind="stable")]
-        taken = fits[np.unique(which[fits], return_index=True)[1]]
-        if not len(taken):
+        used = fits[np.unique(which[fits], return_index=True)[1]]
+        if not len(used):
             break
-        links = np.concatenate([links, np.stack([end[taken], lone[which[taken]]], axis=1)])
+        links = np.concatenate([links, np.stack([end[used], lone[which[used]]], axis=1)])
     return links
 
 
 def _near_pairs(points: np.ndarray, names: np.ndarray) -> np.ndarray:
-    """(P, 2) names of near points, the smaller first, each pair once."""
+    """Return pairs of near points, (P, 2), the smaller number first, each once."""
     if len(names) < 2:
         return np.zeros((0, 2), np.int64)
     count = min(len(names), 1 + int(np.clip(PAIRS // len(names), *NEAR)))
@@ -172,19 +173,19 @@ def _near_pairs(points: np.ndarray, names: np.ndarray) -> np.ndarray:
 
 
 def _degrees(links: np.ndarray, count: int) -> np.ndarray:
-    """(N,) links at each point."""
+    """Return the links at each point, (N,)."""
     return np.bincount(links.reshape(-1), minlength=count)
 
 
 def _parts(links: np.ndarray, count: int) -> np.ndarray:
-    """(N,) labels of what links join."""
+    """Return labels of what links join, (N,)."""
     graph = scipy_module("sparse").coo_matrix((np.ones(len(links), np.int8), links.T), (count, count))
     labels: np.ndarray = scipy_module("sparse.csgraph").connected_components(graph, directed=False)[1]
     return labels
 
 
 def scipy_module(name: str) -> Any:
-    """A module of scipy. Raises MissingExtra without it."""
+    """Return a module of scipy. Raises MissingExtra without it."""
     try:
         return importlib.import_module(f"scipy.{name}")
     except ImportError:

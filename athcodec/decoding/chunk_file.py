@@ -1,0 +1,205 @@
+"""The bytes and chunks of an .ath file: what is there of them, undamaged, and how the C core gets them."""
+
+from __future__ import annotations
+
+import os
+import threading
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from functools import cached_property
+from typing import Any, BinaryIO
+
+import numpy as np
+
+from athcodec._native import as_bytes
+from athcodec.decoding import container as ct
+from athcodec.decoding import core_file
+from athcodec.decoding.container import Chunk, Limits
+from athcodec.errors import (
+    BadChecksum,
+    ClipError,
+    FormatError,
+    LevelUnavailable,
+    NotAnAthFile,
+    TrailingBytes,
+    Truncated,
+    error_class,
+)
+from athcodec.files.atomic import file_ids, is_url
+from athcodec.files.plain import open_plain
+
+CHUNK_FIELDS = ("kind", "level", "segment", "length", "checksum", "offset")
+
+
+class ChunkFile:
+    """An opened file that reads its chunks and feeds them to the C core. AthFile documents the attributes."""
+
+    def __init__(
+        self, path: Any, strict: bool, allow_partial: bool, limits: Limits | None, gltf_motion: str | None
+    ) -> None:
+        self.limits = limits or Limits()
+        self.bytes_read = 0
+        self._lock = threading.Lock()
+        self._closes_source = not hasattr(path, "read")
+        self._source = _opened(path, gltf_motion) if self._closes_source else path
+        self.inputs = file_ids(path if self._closes_source else getattr(path, "name", None))
+        try:
+            self.available_length: int = self._source.seek(0, os.SEEK_END)
+            self.core = self._open_core()
+            self.file_length: int = self.core.info.file_length
+            self.prelude_length: int = self.core.info.prelude_length
+            self.segment_count: int = self.core.info.segment_count
+            self.level_count: int = self.core.info.level_count
+            self.full_level_count: int = self.core.info.full_level_count
+            self.complete: bool = self.available_length >= self.file_length
+            if strict and self.available_length != self.file_length:
+                refused = TrailingBytes if self.complete else Truncated
+                raise refused(f"file: got {self.available_length} bytes; expected {self.file_length}")
+            self._set_table()
+            self._damaged_from = self._first_damaged_level() if allow_partial else self.level_count
+        except BaseException:
+            self.close()
+            raise
+
+    def close(self) -> None:
+        """Close the file, if it was opened here, as soon as no thread reads from it."""
+        if self._closes_source:
+            with self._lock:
+                self._source.close()
+
+    @property
+    def source(self) -> Any:
+        """The file object that the bytes come from. That of a URL counts its `requests` and `bytes`."""
+        return self._source
+
+    # ---- bytes ----
+
+    def _read_some(self, offset: int, length: int) -> bytes:
+        """Return `length` bytes, or fewer at the end; a file object may give fewer at a time than it was asked for."""
+        self._source.seek(offset)
+        parts, size = [], 0
+        while size < length and (part := self._source.read(length - size)):
+            parts.append(part)
+            size += len(part)
+        self.bytes_read += size
+        return parts[0] if len(parts) == 1 else b"".join(parts)
+
+    def _read(self, offset: int, length: int, what: str) -> bytes:
+        data = self._read_some(offset, length)
+        if len(data) < length:
+            raise Truncated(f"{what}: got {len(data)} bytes; expected {length}")
+        return data
+
+    def _announce(self, ranges: list[tuple[int, int]]) -> None:
+        """Tell a remote source which (offset, size) are read next, so that it fetches them together."""
+        if hasattr(self._source, "prefetch"):
+            self._source.prefetch(ranges)
+
+    def _open_core(self) -> core_file.File:
+        limits, data = core_file.Limits.of(self.limits), b""
+        try:
+            needed, memory, lacking = core_file.front(data, limits)
+            while len(data) < needed:
+                more = self._read_some(len(data), needed - len(data))
+                if not more:
+                    raise Truncated(str(lacking)) if data else NotAnAthFile("file: got no bytes; expected an .ath file")
+                data += more
+                if len(data) < needed or not memory:
+                    needed, memory, lacking = core_file.front(data, limits)
+            return core_file.File(data, memory, limits)
+        except core_file.CoreError as error:
+            raise self._refusal(error) from None
+
+    def _refusal(self, error: core_file.CoreError) -> FormatError:
+        """Return the exception for an error of the core. A bad checksum may be that of a remote file that changed."""
+        refused = Truncated if error.code == core_file.MISSING else error_class(error.code)
+        return refused(f"{error}{getattr(self._source, 'change_hint', '') if refused is BadChecksum else ''}")
+
+    @contextmanager
+    def _fed(self, ranges: list[tuple[int, int]], what: str) -> Iterator[None]:
+        """Give the core these bytes, (offset, size), for as long as the context lasts. Raises as `prepare`."""
+        if any(offset + size > self.available_length for offset, size in ranges):
+            raise LevelUnavailable(
+                f"{what}: not in the file; it is cut off at {self.available_length} of {self.file_length} bytes"
+            )
+        self._announce(ranges)
+        pieces = [as_bytes(self._read(offset, size, f"bytes from {offset} on")) for offset, size in ranges]
+        try:
+            for (offset, _), data in zip(ranges, pieces):
+                self.core.feed(data, offset)
+            yield
+        except core_file.CoreError as error:
+            raise self._refusal(error) from None
+        finally:
+            for offset, size in ranges:
+                self.core.drop(offset, size)
+
+    # ---- chunks ----
+
+    def _set_table(self) -> None:
+        table = self.core.chunks()
+        self._index = np.flatnonzero(np.isin(table["kind"], list(ct.KIND_NAMES), kind="table"))  # Of the known kinds.
+        self._table = table[self._index]
+
+    @cached_property
+    def chunks(self) -> list[Chunk]:
+        """The chunk table without unknown kinds, in file order."""
+        return self._chunks_at(slice(None))
+
+    def _chunks_of(self, kind: int) -> list[Chunk]:
+        return self._chunks_at(np.flatnonzero(self._table["kind"] == kind))
+
+    def _chunks_at(self, rows: Any) -> list[Chunk]:
+        columns = (self._table[name][rows].tolist() for name in CHUNK_FIELDS)
+        return list(map(Chunk, *columns, self._index[rows].tolist()))
+
+    def find(self, kind: int) -> Chunk | None:
+        """Return the first chunk of a kind (FORMAT.md, "Chunk table"), or None if the file has none."""
+        return next(iter(self._chunks_of(kind)), None)
+
+    def is_available(self, chunk: Chunk) -> bool:
+        """Return whether the bytes of a chunk, one of `chunks`, are there."""
+        return chunk.offset + chunk.length <= self.available_length
+
+    def _lacks(self, kind: int) -> bool:
+        """Return whether the file was cut off before a chunk of this kind."""
+        return not all(map(self.is_available, self._chunks_of(kind)))
+
+    def payload(self, chunk: Chunk) -> bytes:
+        """Return the stored bytes of a chunk, one of `chunks`. Raises Truncated, BadChecksum."""
+        with self._lock:
+            data = self._read(chunk.offset, chunk.length, str(chunk))
+            try:
+                self.core.check_chunk(chunk.index, chunk.offset, data)
+            except core_file.CoreError as error:
+                raise self._refusal(error) from None
+        return data
+
+    def _first_damaged_level(self) -> int:
+        self._announce([(0, self.file_length)])
+        for chunk in self.chunks:
+            if chunk.is_motion and self.is_available(chunk):
+                try:
+                    self.payload(chunk)
+                except BadChecksum:
+                    return chunk.level
+        return self.level_count
+
+
+def _opened(path: Any, gltf_motion: str | None) -> Any:
+    """Return the file object of a path, a URL, or a motion inside a GLB."""
+    if is_url(path):
+        from athcodec.files.remote import Remote  # The packages behind it take long to import.
+
+        return Remote(path)
+    file: BinaryIO = open_plain(os.fspath(path), -1)
+    with ExitStack() as unread:
+        unread.callback(file.close)
+        if file.read(4) != b"glTF":
+            if gltf_motion is not None:
+                raise ClipError(f"gltf_motion: got {gltf_motion!r} of a file that is no GLB, expected a GLB")
+            unread.pop_all()
+            return file
+    from athcodec.files.gltf.motion import GltfMotion  # The module takes long to import.
+
+    return GltfMotion(path, gltf_motion)

@@ -1,0 +1,146 @@
+"""Segments of an .ath file, decoded at a level: one at a time, or many in threads."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cached_property
+from typing import TypeAlias
+
+import numpy as np
+
+from athcodec.decoding import core_file
+from athcodec.decoding.chunk_file import ChunkFile
+from athcodec.errors import LimitExceeded
+from athcodec.files.threads import ThreadPool, default_jobs
+
+Show: TypeAlias = Callable[[int, core_file.Segment], None]
+Room: TypeAlias = Callable[[int], np.ndarray | None]
+
+
+class SegmentDecoder(ChunkFile):
+    """A file whose segments can be decoded within the memory that its limits allow."""
+
+    @cached_property
+    def _work(self) -> core_file.Work:
+        return core_file.Work(self.core.work_size())
+
+    def prefetch(self, segments: range, level: int) -> None:
+        """Fetch what segments of the whole file need at a level from a remote source."""
+        with self._lock:
+            self._announce(self.core.missing(level, segments[0], segments[-1]))
+
+    def prepare(
+        self, segment: int, level: int, spare: core_file.Segment | None = None, to: np.ndarray | None = None
+    ) -> core_file.Segment:
+        """Decode a segment of the file at a level.
+
+        Parameters
+        ----------
+        segment : int
+            Number of the segment in the whole file.
+        level : int
+            A stored level.
+        spare : core_file.Segment, optional
+            A prepared segment that nobody needs any more. If it is this one at a coarser level of all vertices, or the
+            one that this is joined to, decoding goes on from there and does not read its bytes again. Otherwise its
+            memory is reused if it is large enough.
+        to : (k, N, 3) array, optional
+            Array for the positions of the k frames, of the file's type, contiguous, in the source's order. The array
+            stays untouched if decoding cannot write there directly.
+
+        Returns
+        -------
+        core_file.Segment
+            Argument for `core.positions` and `core.matrices`, unless it is `gone` to the array.
+
+        Raises
+        ------
+        LevelUnavailable
+            If the file was cut off before the segment.
+        FormatError
+            If it is damaged, or needs more memory than is allowed.
+        """
+        what, size = f"level {level}, segment {segment}", self.core.segment_size(level)
+        needed = self._checked_need(level, what)
+        before = joined_to = None
+        if spare and needed + len(spare.memory) <= self.limits.memory_bytes:
+            if self.core.goes_on(spare, segment, level):
+                before = spare
+            elif self.core.is_ready(spare, self.core.joined_to(segment, level), level):
+                joined_to = spare
+        is_free = spare and not before and not joined_to and len(spare.memory) >= size
+        ready = spare if spare and is_free else core_file.Segment(size)
+        with self._lock, self._fed(self._missing(segment, level, before, joined_to), what):
+            self._refine(level)
+            self.core.prepare(self._work, segment, level, ready, before, joined_to, to)
+        return ready
+
+    def show_all(self, segments: range, level: int, show: Show, room: Room) -> None:
+        """Decode segments of the file at a level, in runs that threads share.
+
+        `room` takes a segment's number and returns the array that `prepare` has as `to`. For segments whose positions
+        did not go there, threads call `show` with the number and the prepared segment, whose memory the next one takes
+        over. Raises as `prepare`.
+        """
+        what = f"level {level}, segments {segments.start} to {segments.stop - 1}"
+        with self._lock, self._fed(self.core.missing(level, segments[0], segments[-1]), what):
+            self._refine(level)
+            follows, runs = self._runs(segments, level, what)
+            items = [(run, level, follows, show, room) for run in runs]
+            faults = ThreadPool(len(runs)).map(self._show_run, items)
+            for fault in filter(None, faults):
+                raise fault
+
+    def _checked_need(self, level: int, what: str) -> int:
+        """Return the bytes that preparing a segment takes. Raises LimitExceeded if they are not allowed."""
+        needed, limit = self.core.segment_size(level) + self.core.work_size(), self.limits.memory_bytes
+        if needed > limit:
+            raise LimitExceeded(f"{what}: got a need of {needed} bytes; the limit is {limit}")
+        return needed
+
+    def _runs(self, segments: range, level: int, what: str) -> tuple[bool, list[range]]:
+        """Return whether memory allows to go on from a segment to one joined to it, and one run for each thread.
+
+        The first segment of a run is decoded with the one that it is joined to: no other thread has its end yet.
+        """
+        joined = any(self.core.joined_to(segment, level) >= 0 for segment in segments)
+        size, limit, needed = self.core.segment_size(level), self.limits.memory_bytes, self._checked_need(level, what)
+        follows = joined and needed + size <= limit
+        room = limit // (needed + size if follows else needed)
+        count = max(1, min(default_jobs(), len(segments) // (2 if joined else 1), room))
+        cuts = [len(segments) * i // count for i in range(count + 1)]
+        return follows, [segments[start:stop] for start, stop in zip(cuts, cuts[1:])]
+
+    def _show_run(self, run: range, level: int, follows: bool, show: Show, room: Room) -> core_file.CoreError | None:
+        """Return a fault rather than raise it, because the other runs need the file's bytes until they end."""
+        work, size = core_file.Work(self.core.work_size()), self.core.segment_size(level)
+        ready, spare = core_file.Segment(size), None
+        for segment in run:
+            joined_to = None
+            if follows and segment > run.start and self.core.joined_to(segment, level) == segment - 1:
+                joined_to, ready = ready, spare or core_file.Segment(size)
+                spare = joined_to
+            try:
+                self.core.prepare(work, segment, level, ready, joined_to=joined_to, to=room(segment))
+            except core_file.CoreError as fault:
+                return fault
+            if not ready.gone:
+                show(segment, ready)
+        return None
+
+    def _refine(self, level: int) -> None:
+        """Build what the segments share at a level, whose bytes are there."""
+        needed, limit = self.core.refinement_size(level), self.limits.memory_bytes
+        if needed > limit:
+            raise LimitExceeded(f"level {level}: got layers of {needed} bytes; the limit is {limit}")
+        self.core.build()
+        self.core.refine(level)
+
+    def _missing(
+        self, segment: int, level: int, before: core_file.Segment | None, joined_to: core_file.Segment | None
+    ) -> list[tuple[int, int]]:
+        if not before and not joined_to:
+            return self.core.missing(level, segment)
+        ranges = self.core.missing_of(segment, level, self.core.level_of(before) if before else -1)
+        neighbour = -1 if joined_to else self.core.joined_to(segment, level)
+        return ranges if neighbour < 0 else sorted(ranges + self.core.missing_of(neighbour, level))

@@ -1,0 +1,215 @@
+"""The static data of an .ath file, in the source's numbering: rest pose, branches, faces, attributes, metadata."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from athcodec.decoding import container as ct
+from athcodec.decoding import core_file
+from athcodec.decoding.file_tables import FileTables
+from athcodec.decoding.host_mesh import HostMesh, mesh_positions
+from athcodec.errors import BadChunk, LimitExceeded, Truncated
+from athcodec.motion.clip import ERROR_WEIGHTS, check_stem_index
+from athcodec.motion.hierarchy import Hierarchy, derived_edges
+from athcodec.motion.polygons import Polygons
+
+
+class StaticData(FileTables):
+    """A file whose static data can be read."""
+
+    _rest_read = -1, np.empty(0)  # The level that `rest_at` was last asked for, and its pose.
+
+    @cached_property
+    def metadata(self) -> dict[str, Any]:
+        """Unit, up axis and whatever else the sources of all clips state, as `join` puts it together."""
+        chunk = self.find(ct.METADATA)
+        return ct.parse_metadata(self.payload(chunk), self.limits) if chunk else {}
+
+    # ---- branches ----
+
+    @cached_property
+    def hierarchy(self) -> Hierarchy:
+        """The branches in file order, with their parents and attachments."""
+        return Hierarchy.from_parts(
+            self.branches["parent"],
+            self.branches["count"],
+            self.branches["attach"],
+            self.core.vertex_source(),
+            self.core.branch_source(),
+        )
+
+    @cached_property
+    def _source_branches(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        return self.hierarchy.source_branches()
+
+    @property
+    def vertex_branch(self) -> np.ndarray:
+        """The branch of each vertex, (N,) int32."""
+        return self._source_branches[0]
+
+    @property
+    def branch_parent(self) -> np.ndarray:
+        """The parent of each branch, (B,) int32, -1 for a root."""
+        return self._source_branches[1]
+
+    @property
+    def stem_index(self) -> np.ndarray | None:
+        """Place of each vertex on its stem, (N,) int32; None if the source's numbering already says it."""
+        vertex_branch, _, places = self._source_branches
+        return check_stem_index(places, vertex_branch)
+
+    # ---- polygons and attributes ----
+
+    @cached_property
+    def faces(self) -> np.ndarray | None:
+        """Vertex numbers of the corners, (F, k) of the source's integer type, or None; faces of different sizes are
+        attributes. If the file has none and is in a GLB, the triangles there."""
+        if self.find(ct.FACES) is None:
+            return getattr(self._source, "faces", None)
+        return None if self._polygons is None or self._polygons.counts is not None else self._polygons.rows
+
+    @cached_property
+    def edges(self) -> np.ndarray | None:
+        """Vertex numbers of both ends, (E, 2) of the source's integer type, or None."""
+        stored = self._indices(ct.EDGES)
+        if stored is None or not stored.derived:
+            return None if stored is None else stored.rows
+        return derived_edges(self.hierarchy).astype(stored.index_type)
+
+    @cached_property
+    def _polygons(self) -> Polygons | None:
+        return self._indices(ct.FACES)
+
+    def _indices(self, kind: int) -> Polygons | None:
+        chunk = self.find(kind)
+        if chunk is None:
+            return None
+        with self._lock, self._fed([(chunk.offset, chunk.length)], str(chunk)):
+            return self.core.polygons(kind, self.limits.corners)
+
+    @cached_property
+    def attributes(self) -> dict[str, np.ndarray]:
+        """Named static arrays, unchanged. Those that a cut-off file lacks are left out."""
+        faces = self._polygons
+        result: dict[str, np.ndarray] = {} if faces is None or faces.counts is None else faces.attributes
+        for chunk in self._chunks_of(ct.ATTRIBUTE):
+            if not self.is_available(chunk):
+                continue
+            if len(result) >= self.limits.attributes:
+                raise LimitExceeded(f"{chunk}: got more than {self.limits.attributes} attributes")
+            name, array = ct.parse_array(self.payload(chunk), str(chunk), self.limits)
+            if name in result:
+                raise BadChunk(f"{chunk}: got attribute {ct.brief(name)} twice")
+            result[name] = array
+            total = sum(array.nbytes for array in result.values())
+            if total > self.limits.memory_bytes:
+                raise LimitExceeded(
+                    f"{chunk}: got {total} bytes of attributes; the limit is {self.limits.memory_bytes}"
+                )
+        return result
+
+    @property
+    def error_weights(self) -> np.ndarray | None:
+        """Factors on the bound that the file was encoded with, (N,) float64, or None.
+
+        Vertex v is within max_error_bound * error_weights[v] / error_weights.max() at the deepest level of the full
+        file.
+        """
+        name = self.metadata.get(ERROR_WEIGHTS)
+        array = self.attributes.get(name) if isinstance(name, str) else None
+        if array is None or array.size != self.core.info.vertex_count or array.dtype.kind not in "biuf":
+            return None
+        weights = array.reshape(-1).astype(np.float64)
+        return weights if np.isfinite(weights).all() and weights.min() > 0 else None
+
+    # ---- rest pose ----
+
+    @property
+    def rest(self) -> np.ndarray:
+        """Rest pose of the source as decoded with the deepest complete level, (N, 3), float32 or float64 as in the
+        source. If the source had none, or `rest_is_missing`, the reference pose of that level."""
+        level = max(self._first_lacking - 1, 0)
+        return self._as_rest(self.level_rest(level)) if self.rest_is_missing else self.rest_at(level)
+
+    def rest_at(self, level: int) -> np.ndarray:
+        """Return the rest pose as decoded with a stored level. Raises Truncated if `rest_is_missing`."""
+        if self.rest_is_missing:
+            raise Truncated(
+                f"SOURCE_REST: not in the file; it is cut off at {self.available_length} of {self.file_length} bytes"
+            )
+        level_read, pose = self._rest_read
+        if level_read != level:
+            with self._poses_read(level, [ct.SOURCE_REST]):
+                pose = self._as_rest(self.core.rest(level))
+            self._rest_read = level, pose
+        return pose.copy()
+
+    def _as_rest(self, pose: np.ndarray) -> np.ndarray:
+        """Return a pose in the source's type; numbers beyond float32 become infinite, as FORMAT.md rounds."""
+        with np.errstate(over="ignore"):
+            return pose.astype(np.float64 if self.core.info.rest_is_float64 else np.float32, copy=False)
+
+    def level_rest(self, level: int, order: int = core_file.SOURCE_ORDER) -> np.ndarray:
+        """Return the reference pose of a level, which its maps move: the source's rest pose, or another that the motion
+        is closer to. Levels that refine the plant may refine their reference pose, too.
+
+        It is (N, 3) float64, scene units, not rounded to the source's type, in core_file.SOURCE_ORDER or FILE_ORDER.
+        Raises LevelUnavailable, FormatError.
+        """
+        with self._poses_read(level):
+            return self.core.level_rest(level, order)
+
+    @contextmanager
+    def _poses_read(self, level: int, kinds: Sequence[int] = ()) -> Iterator[None]:
+        """Give the core the reference poses up to a level's, and the chunks of these kinds, while the context lasts."""
+        with self._lock:
+            chunks = [
+                chunk for chunk in self._chunks_of(ct.REFINED_REST) if self.core.poses_read < chunk.level <= level
+            ]
+            chunks += [chunk for kind in kinds for chunk in self._chunks_of(kind)]
+            with self._fed([(chunk.offset, chunk.length) for chunk in chunks], f"reference pose of level {level}"):
+                yield
+
+    # ---- the host's mesh ----
+
+    @property
+    def host_checksum(self) -> str | None:
+        """The checksum, 16 hexadecimal digits, of the host's mesh that is the rest pose; None if the file holds a rest
+        pose."""
+        info = self.core.info
+        return "{:08x}{:08x}".format(*info.host_checksum) if info.rest_is_host else None
+
+    @property
+    def needs_host_mesh(self) -> bool:
+        """Whether the rest pose is a mesh of the host's that has not been set. Nothing can be decoded then."""
+        return not self.core.has_rest
+
+    def set_host_mesh(self, mesh: HostMesh) -> None:
+        """Set the mesh that the file was made for, if the file does not hold the rest pose; others ignore it.
+
+        Parameters
+        ----------
+        mesh : (N, 3) array or MotionClip
+            Positions in the source's order, scene units and axes, which are used as float32, bit for bit; or a clip
+            that has them as its rest pose.
+
+        Raises
+        ------
+        WrongHostMesh
+            If it is another mesh, by its number of vertices or its checksum.
+        ClipError
+            If it is no mesh.
+        """
+        if self.needs_host_mesh:
+            positions, files = mesh_positions(mesh)
+            self.inputs |= files
+            try:
+                with self._lock:
+                    self.core.set_host_mesh(positions)
+            except core_file.CoreError as error:
+                raise self._refusal(error) from None

@@ -1,0 +1,1 @@
+"""Branches of clips that name none: finding them, and files that keep them."""

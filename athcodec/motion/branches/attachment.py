@@ -1,0 +1,203 @@
+"""A tree over labelled vertices, and the order of the vertices along each branch.
+
+A branch hangs where it stays closest to a larger one in a few frames. Its vertices are put in order of their distance
+over the mesh from there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from athcodec.motion.branches.point_runs import scipy_module
+from athcodec.motion.branches.result import Found, checked_branches
+from athcodec.motion.branches.seen import Seen, cheapest_of_each, components
+from athcodec.motion.clip import source_stem_index
+
+NEIGHBOURS = 60  # Nearest vertices of each one among which other branches are sought.
+LONE_PARTS = 64  # Most parts of the plant whose nearest others are sought at any distance.
+QUERY = 1 << 21  # Neighbours in one query.
+STAYING = 300.0  # Weight of the variation of two branches' distance against its size.
+ALIKE = 4.0  # Cost factor of two branches of the same size: no leaf grows on a leaf.
+ROOT_SIZE = 0.25  # Part of the largest branch's diagonal below which a branch is no root.
+IN_ORDER = 0.7  # Rank correlation of the source's order with the distance from the base that keeps the source's order.
+SMALL = 8  # Vertices of a branch up to which the source's order is always kept.
+
+
+def arranged(seen: Seen, label: np.ndarray, root: int | None, method: str, parent: np.ndarray | None = None) -> Found:
+    """Return a tree over the labels, whose vertices run from base to tip."""
+    frames, rest = seen.frames, seen.clip.rest
+    if parent is None:
+        joints = _joints(frames, label, _contacts(frames, label), root)
+    else:
+        joints = _joints_of(rest, frames, label, parent)
+    return checked_branches(label, joints.parent, _along(rest, label, joints, seen.links), method)
+
+
+@dataclass(frozen=True)
+class _Joints:
+    """Where branches hang: parent (B,), -1 for a root, and base (B,), the branch's vertex that is nearest to the
+    parent."""
+
+    parent: np.ndarray
+    base: np.ndarray
+
+
+@dataclass(frozen=True)
+class _Contacts:
+    """Pairs of branches that may hang on each other: (C, 2) vertices of theirs, and the cost (C,)."""
+
+    vertices: np.ndarray
+    cost: np.ndarray
+
+
+def _joints(frames: np.ndarray, label: np.ndarray, contacts: _Contacts, root: int | None) -> _Joints:
+    """Return a tree of branches of the least total cost, from a root outwards, for each part that contacts join."""
+    count = int(label.max()) + 1
+    branch, other = label[contacts.vertices].T
+    sparse, graphs = scipy_module("sparse"), scipy_module("sparse.csgraph")
+    least = contacts.cost.max(initial=1e-30) * 1e-9  # A cost of 0 would be no contact.
+    graph = sparse.coo_matrix((contacts.cost + least, (branch, other)), (count, count)).tocsr()
+    tree = graphs.minimum_spanning_tree(graph)
+    parts = graphs.connected_components(tree, directed=False)[1]
+    still = _stillest(frames, label)
+    roots = _roots(frames, label, still, parts, root)
+    hub = sparse.coo_matrix((np.ones(len(roots)), (np.full(len(roots), count), roots)), (count + 1, count + 1))
+    whole = sparse.bmat([[tree, None], [None, sparse.coo_matrix((1, 1))]]) + hub
+    parent = graphs.breadth_first_order(whole, count, directed=False)[1][:count]
+    parent = np.where(parent == count, -1, parent)
+    return _Joints(parent, _bases(parent, still, branch, other, contacts.vertices))
+
+
+def _bases(
+    parent: np.ndarray, still: np.ndarray, branch: np.ndarray, other: np.ndarray, vertices: np.ndarray
+) -> np.ndarray:
+    base = still.copy()
+    for child, above, vertex in ((branch, other, vertices[:, 0]), (other, branch, vertices[:, 1])):
+        hangs = parent[child] == above
+        base[child[hangs]] = vertex[hangs]
+    return base
+
+
+def _joints_of(rest: np.ndarray, frames: np.ndarray, label: np.ndarray, parent: np.ndarray) -> _Joints:
+    """Return where branches touch the parents that they are known to have."""
+    tree_of: dict[int, Any] = {}
+    base, order = _stillest(frames, label), np.argsort(label, kind="stable")
+    bounds = np.searchsorted(label[order], np.arange(len(parent) + 1))
+    for branch in np.flatnonzero(parent >= 0).tolist():
+        above = int(parent[branch])
+        if above not in tree_of:
+            tree_of[above] = scipy_module("spatial").cKDTree(rest[order[bounds[above] : bounds[above + 1]]])
+        vertices = order[bounds[branch] : bounds[branch + 1]]
+        base[branch] = vertices[tree_of[above].query(rest[vertices])[0].argmin()]
+    return _Joints(parent, base)
+
+
+def _stillest(frames: np.ndarray, label: np.ndarray) -> np.ndarray:
+    """Return the vertex of each branch that moves least, (B,), where a root begins."""
+    way = ((frames - frames[0]) ** 2).sum(axis=(0, 2))
+    order = np.lexsort((way, label))
+    return order[np.searchsorted(label[order], np.arange(label.max() + 1))]
+
+
+def _roots(frames: np.ndarray, label: np.ndarray, still: np.ndarray, parts: np.ndarray, root: int | None) -> np.ndarray:
+    """Return the branch of each part, among the large ones, of which some vertex moves least."""
+    size = _sizes(frames[0], label)
+    largest = np.zeros(parts.max() + 1)
+    np.maximum.at(largest, parts, size)
+    way = ((frames[:, still] - frames[0, still]) ** 2).sum(axis=(0, 2))
+    is_small = size < ROOT_SIZE * largest[parts]
+    if root is not None:
+        way[label[root]], is_small[label[root]] = -1.0, False
+    order = np.lexsort((-size, way, is_small, parts))
+    return order[np.unique(parts[order], return_index=True)[1]]
+
+
+def _sizes(rest: np.ndarray, label: np.ndarray) -> np.ndarray:
+    """Return the diagonals of the branches' bounding boxes."""
+    order = np.argsort(label, kind="stable")
+    first = np.searchsorted(label[order], np.arange(label.max() + 1))
+    low, high = (function.reduceat(rest[order], first) for function in (np.minimum, np.maximum))
+    diagonals: np.ndarray = np.linalg.norm(high - low, axis=1)
+    return diagonals
+
+
+def _contacts(frames: np.ndarray, label: np.ndarray) -> _Contacts:
+    """Return the pair of vertices of every two near branches that best keeps its distance: they may hang together
+    there."""
+    pairs = _near_pairs(frames[0], label)
+    gap = np.linalg.norm(frames[0, pairs[:, 0]] - frames[0, pairs[:, 1]], axis=1)
+    near = gap <= _sizes(frames[0], label)[label[pairs]].max(axis=1)
+    pairs, cost = pairs[near], gap[near]
+    for start in range(0, len(pairs), QUERY // len(frames)):
+        some = slice(start, start + QUERY // len(frames))
+        apart = np.linalg.norm(frames[:, pairs[some, 0]] - frames[:, pairs[some, 1]], axis=2)
+        cost[some] += STAYING * apart.std(axis=0)
+    size = np.bincount(label)[label[pairs]]
+    cost[size[:, 0] == size[:, 1]] *= ALIKE
+    both = np.sort(label[pairs], axis=1)
+    best = cheapest_of_each(both[:, 0] * (int(label.max()) + 1) + both[:, 1], cost)
+    return _Contacts(pairs[best], cost[best])
+
+
+def _near_pairs(rest: np.ndarray, label: np.ndarray) -> np.ndarray:
+    """Return vertices and the nearest one to each on every branch that is near it, (C, 2)."""
+    cKDTree, count = scipy_module("spatial").cKDTree, int(label.max()) + 1
+    near_pairs = [np.zeros((0, 2), np.int64), *_others_nearby(cKDTree(rest), rest, label, min(NEIGHBOURS, len(rest)))]
+    part = components(np.concatenate([label[pairs] for pairs in near_pairs]), count)
+    sizes = np.bincount(part, np.bincount(label, minlength=count))
+    # The vertices of such a part have only each other as neighbours.
+    for lone in np.argsort(-sizes)[1 : 1 + LONE_PARTS]:
+        is_inside = part[label] == lone
+        vertices, others = np.flatnonzero(is_inside), np.flatnonzero(~is_inside)
+        near_pairs.append(np.stack([vertices, others[cKDTree(rest[others]).query(rest[vertices])[1]]], axis=1))
+    return np.concatenate(near_pairs)
+
+
+def _others_nearby(tree: Any, rest: np.ndarray, label: np.ndarray, near: int) -> Iterator[np.ndarray]:
+    """Yield pairs of vertices and those among their `near` nearest that are of other branches, one of each branch."""
+    length = max(1, QUERY // near)
+    for start in range(0, len(rest), length):
+        some = np.arange(start, min(start + length, len(rest)))
+        apart, others = (array.reshape(len(some), -1) for array in tree.query(rest[some], k=near))
+        row, column = np.nonzero(label[others] != label[some][:, None])
+        other = others[row, column]
+        best = cheapest_of_each(some[row] * (int(label.max()) + 1) + label[other], apart[row, column])
+        yield np.stack([some[row[best]], other[best]], axis=1)
+
+
+def _along(rest: np.ndarray, label: np.ndarray, joints: _Joints, links: np.ndarray) -> np.ndarray:
+    """Return the places of the vertices on their branches, (N,), from the base out: the source's order, or its reverse,
+    if it is one, else by the distance from the base over the links within the branch."""
+    count = len(rest)
+    way = _ways(rest, label, joints, links)
+    place = np.empty(count, np.int64)
+    order = np.lexsort((np.arange(count), way, label))
+    first = np.searchsorted(label[order], np.arange(label.max() + 1))
+    place[order] = np.arange(count) - first[label[order]]
+    source = source_stem_index(label)
+    agreement = _rank_correlation(label, place, source)
+    size = np.bincount(label)
+    turned = np.where(agreement[label] < 0, size[label] - 1 - source, source)
+    return np.where((np.abs(agreement) >= IN_ORDER)[label] | (size <= SMALL)[label], turned, place)
+
+
+def _ways(rest: np.ndarray, label: np.ndarray, joints: _Joints, links: np.ndarray) -> np.ndarray:
+    """Return the distance of each vertex from the base of its branch, (N,), over the links within it; straight if no
+    links lead there."""
+    inner = links[label[links[:, 0]] == label[links[:, 1]]]
+    length = np.linalg.norm(rest[inner[:, 0]] - rest[inner[:, 1]], axis=1)
+    graph = scipy_module("sparse").coo_matrix((length, inner.T), (len(rest),) * 2).tocsr()
+    graph.data = np.maximum(graph.data, 1e-30)  # A distance of 0 would be no link.
+    way: np.ndarray = scipy_module("sparse.csgraph").dijkstra(graph, directed=False, indices=joints.base, min_only=True)
+    return np.where(np.isfinite(way), way, np.linalg.norm(rest - rest[joints.base][label], axis=1))
+
+
+def _rank_correlation(label: np.ndarray, first: np.ndarray, second: np.ndarray) -> np.ndarray:
+    """Return Spearman's coefficient of each branch, (B,), between two orders of its vertices."""
+    size = np.bincount(label)
+    apart = np.bincount(label, (first - second).astype(np.float64) ** 2)
+    return 1 - 6 * apart / np.maximum(size * (size.astype(np.float64) ** 2 - 1), 1)

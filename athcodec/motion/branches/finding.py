@@ -1,0 +1,286 @@
+"""Branches for a clip that names none, found by what data it has.
+
+Labels come from attributes named like branch ids, from the joints of a skin, from an edge graph, from the connected
+components of a render mesh, or from motion: runs of points that keep their distance, or patches of a mesh that move
+rigidly. attachment.py arranges all but runs and edge graphs alike. Only a few frames are read.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from athcodec.errors import ClipError
+from athcodec.motion.branches.attachment import arranged
+from athcodec.motion.branches.patches import rigid_patches
+from athcodec.motion.branches.point_runs import base_points, run_links, scipy_module
+from athcodec.motion.branches.result import Found
+from athcodec.motion.branches.seen import Seen, components, links_of, near_neighbours, numbered
+from athcodec.motion.clip import MotionClip, stands_still
+from athcodec.motion.hierarchy import branches_from_edges
+from athcodec.options import METHODS, whole
+
+LABEL_NAMES = ("vertex_branch", "branch", "branch_id", "branchid", "branch_index", "branchindex", "branch_number")
+PARENT_NAMES = ("branch_parent", "branchparent", "branch_parents", "parent_branch", "parent")
+LONE_POINTS = 0.1  # Part of the vertices that may be alone before patches are tried besides runs.
+COMPONENTS_AT_MOST = 0.6  # Part of the vertices above which components are no branches but loose points.
+PATCH_VERTICES = 150  # Average vertices of a patch in a mesh without other branches.
+SMALL_PATCH, LARGE_PATCH = 40, 600  # Sizes of patches, one of which is tried besides.
+LARGE_MESH = 10_000  # Vertices from which on LARGE_PATCH is the one.
+FREE_PATCHES = (64, 200)  # Vertices of patches without parents.
+
+
+def find_branches(clip: MotionClip, method: str = "auto", root: int | None = None) -> Found:
+    """Find branches for a clip; those that it has are ignored.
+
+    Parameters
+    ----------
+    clip : MotionClip
+    method : str, optional
+        "attributes": arrays named like branch numbers, per vertex or face. "skeleton": the joints that moved the
+        vertices. "edges": a graph of centre lines. "components": the connected components of a mesh. "runs": points
+        without faces or edges, linked to those that keep their distance: blades, needles, strands, centre lines.
+        "motion": patches that move rigidly. "auto": the first of these that the clip has the data for.
+    root : int, optional
+        A vertex of the branch that all others hang on, directly or not; by default the largest branch is that.
+
+    Returns
+    -------
+    Found
+        The branches; a clip gets them by ``clip.replace(vertex_branch=..., branch_parent=..., stem_index=...)``.
+
+    Raises
+    ------
+    ClipError
+        If the clip does not have the data that the method needs.
+    MissingExtra
+        If scipy is missing.
+    ValueError
+        For a method that does not exist.
+    """
+    if method != "auto" and method not in METHODS:
+        raise ValueError(f"method: got {method!r}, expected auto or one of {', '.join(METHODS)}")
+    root = None if root is None else whole("root", root)
+    branches = _first_found(Seen(clip), METHODS if method == "auto" else (method,), root)
+    if branches is None:
+        raise ClipError(f"branches: the clip has nothing to find them by {method}, expected {_EXPECTED[method]}")
+    return branches
+
+
+def candidates(clip: MotionClip) -> list[Found]:
+    """Return what find_branches finds and, if only a trial shows which makes the smallest file, alternatives: for
+    motion, or runs that leave many points alone, patches of other sizes, patches without parents and one single branch;
+    for a welded mesh, its pieces. A clip that stands still has no patches and no runs."""
+    seen = Seen(clip)
+    single = Found(np.zeros(clip.vertex_count, np.int32), np.array([-1], np.int32), None, "motion")
+    if stands_still(clip):
+        first = _first_found(seen, METHODS[:-2], None)
+        return [single] if first is None else [single, first]
+    first = _first_found(seen, METHODS, None) or _by_motion(seen, None)
+    if first.method == "skeleton":
+        return [first, dataclasses.replace(first, stem_index=None)]
+    lone = np.count_nonzero(np.bincount(first.vertex_branch) == 1)
+    if first.method == "components":
+        unwelded = pieces(clip)  # Leaves that touch are welded, which is wrong if they move by themselves.
+        return [first] if len(unwelded.branch_parent) == len(first.branch_parent) else [first, unwelded]
+    if first.method != "motion" and not (first.method == "runs" and lone > LONE_POINTS * clip.vertex_count):
+        return [first]
+    patches = [first] if first.method == "motion" else [first, _by_motion(seen, None)]
+    return [single, *patches, *_more_patches(seen)]
+
+
+def _more_patches(seen: Seen) -> list[Found]:
+    """Return patches of another size than usual, and patches without parents."""
+    if seen.clip.vertex_count >= LARGE_MESH:
+        return [_by_motion(seen, None, LARGE_PATCH), _free_patches(seen, FREE_PATCHES[-1])]
+    return [_by_motion(seen, None, SMALL_PATCH), *(_free_patches(seen, size) for size in FREE_PATCHES)]
+
+
+def pieces(clip: MotionClip) -> Found:
+    """Return the connected pieces of a clip's mesh as branches without parents, which takes no scipy.
+
+    Parameters
+    ----------
+    clip : MotionClip
+
+    Returns
+    -------
+    Found
+        A single branch where there is one piece, or too many of few vertices.
+    """
+    links, label = links_of(clip), np.arange(clip.vertex_count)
+    while len(links) and (label[links[:, 0]] != label[links[:, 1]]).any():
+        ends = label[links]
+        np.minimum.at(label, ends, ends.min(axis=1, keepdims=True))
+        while not np.array_equal(label, label[label]):
+            label = label[label]
+    label = numbered(label)
+    if label.max() >= COMPONENTS_AT_MOST * clip.vertex_count:
+        label[:] = 0
+    return Found(label.astype(np.int32), np.full(label.max() + 1, -1, np.int32), None, "components")
+
+
+def _first_found(seen: Seen, methods: Sequence[str], root: int | None) -> Found | None:
+    """Return branches by the first method that has data to go by; motion always has."""
+    return next(
+        (branches for branches in (_FINDERS[name](seen, root) for name in methods) if branches is not None), None
+    )
+
+
+def _by_attributes(seen: Seen, root: int | None) -> Found | None:
+    """Find branches by labels under a usual name, for vertices or faces, and their parents if the source has those
+    too."""
+    clip = seen.clip
+    named = {name.lower().rsplit("/", 1)[-1].replace("primvars:", ""): array for name, array in clip.attributes.items()}
+    labels = next(
+        (label for label in (_vertex_labels(clip, named.get(name)) for name in LABEL_NAMES) if label is not None), None
+    )
+    if labels is None:
+        return None
+    names, vertex_branch = np.unique(labels, return_inverse=True)
+    parents = next((named[name] for name in PARENT_NAMES if name in named), None)
+    if parents is not None and parents.ndim == 1 and parents.dtype.kind in "iu" and len(parents) > names.max():
+        above = parents[names].astype(np.int64)
+        parent = np.where(np.isin(above, names), np.searchsorted(names, above).clip(0, len(names) - 1), -1)
+        return arranged(seen, vertex_branch, root, "attributes", parent)
+    return arranged(seen, vertex_branch, root, "attributes")
+
+
+def _vertex_labels(clip: MotionClip, array: np.ndarray | None) -> np.ndarray | None:
+    """Return whole numbers from 0 on, one per vertex, of an array per vertex or per face; None if it is neither."""
+    if array is None or array.size not in (len(array), 0) or array.dtype.kind not in "iuf":
+        return None
+    values = np.round(array.reshape(-1)).astype(np.int64) if array.size else array
+    if len(values) == clip.vertex_count:
+        return values if values.min() >= 0 else None
+    polygons = clip.polygons
+    if polygons is None or len(values) != len(polygons[0]) or values.min() < 0:
+        return None
+    labels = np.full(clip.vertex_count, -1, np.int64)
+    labels[polygons[1][::-1]] = np.repeat(values, polygons[0])[::-1]
+    return labels if labels.min() >= 0 else None
+
+
+def _by_skeleton(seen: Seen, root: int | None) -> Found | None:
+    """Find branches by chains of joints: the vertices whose strongest weights are theirs. An object that no joint moves
+    hangs on the nearest one."""
+    clip = seen.clip
+    if clip.skin is None or (clip.skin.vertex_joint >= 0).sum() == 0:
+        return None
+    joint, parents = clip.skin.vertex_joint.astype(np.int64), np.asarray(clip.skin.joint_parent)
+    if (joint < 0).any():
+        nearest, parts = _nearest_label(clip.rest, joint), _unlabelled_parts(clip, joint)
+        joint = np.where(parts < 0, nearest[0], len(parents) + parts)
+        order = np.lexsort((nearest[1], parts))
+        first = order[np.flatnonzero(np.diff(parts[order], prepend=-1))]  # The nearest vertex of each part.
+        parents = np.concatenate([parents, nearest[0][first]])
+    names, label = np.unique(joint, return_inverse=True)
+    is_used = np.zeros(len(parents), bool)
+    is_used[names] = True
+    parent = np.array([_used_ancestor(int(name), parents, is_used) for name in names])
+    parent = np.where(parent < 0, -1, np.searchsorted(names, parent))
+    return arranged(seen, label, root, "skeleton", parent)
+
+
+def _used_ancestor(joint: int, parents: np.ndarray, is_used: np.ndarray) -> int:
+    joint = int(parents[joint])
+    while joint >= 0 and not is_used[joint]:
+        joint = int(parents[joint])
+    return joint
+
+
+def _nearest_label(rest: np.ndarray, label: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the label of the nearest vertex that has one, and its distance, (N,)."""
+    tree = scipy_module("spatial").cKDTree(rest[label >= 0])
+    distance, place = tree.query(rest)
+    return np.where(label >= 0, label, label[label >= 0][place]), distance
+
+
+def _unlabelled_parts(clip: MotionClip, label: np.ndarray) -> np.ndarray:
+    """Return the number of each object, and of each of its copies, that has no label at all, (N,); -1 for other
+    vertices."""
+    counts, copies = (clip.attributes.get(name) for name in ("part_vertex_counts", "part_copies"))
+    if counts is None or counts.ndim != 1 or counts.sum() != len(label):
+        return np.full(len(label), -1)
+    if copies is not None and copies.shape == counts.shape and (counts % np.maximum(copies, 1) == 0).all():
+        counts = np.repeat(counts // np.maximum(copies, 1), np.maximum(copies, 1))
+    part = np.repeat(np.arange(len(counts)), counts)
+    is_bare = np.bincount(part, label >= 0, len(counts)) == 0
+    place = np.cumsum(is_bare) - 1
+    return np.where(is_bare[part], place[part], -1)
+
+
+def _by_edges(seen: Seen, root: int | None) -> Found | None:
+    """Find branches by a graph of centre lines; not for meshes, whose edges close cycles."""
+    clip = seen.clip
+    if clip.edges is None or not len(clip.edges) or clip.polygons is not None:
+        return None
+    try:
+        up_axis = clip.metadata.get("up_axis", "y")
+        branches = branches_from_edges(clip.edges, clip.vertex_count, clip.rest, root, up_axis)
+    except ClipError:
+        return None
+    return Found(*branches, "edges")
+
+
+def _by_components(seen: Seen, root: int | None) -> Found | None:
+    """Find branches by pieces of a mesh that hang together: bark tubes, leaf cards."""
+    if not len(seen.mesh):
+        return None
+    vertex_count = seen.clip.vertex_count
+    label = components(seen.links, vertex_count)
+    count = int(label.max()) + 1
+    if count == 1 or count > COMPONENTS_AT_MOST * vertex_count:
+        return None
+    return arranged(seen, label, root, "components")
+
+
+def _by_runs(seen: Seen, root: int | None) -> Found | None:
+    """Find branches of points that nothing joins by linking those that keep their distance: blades, needles,
+    strands."""
+    if len(seen.mesh):
+        return None
+    frames = seen.frames[1:]  # The rest pose may have links of other lengths.
+    links = run_links(frames)
+    if links is None:
+        return None
+    bases = base_points(frames, links, root)
+    return Found(*branches_from_edges(links, seen.clip.vertex_count, seen.clip.rest, bases.tolist()), "runs")
+
+
+def _by_motion(seen: Seen, root: int | None, patch_vertices: int = PATCH_VERTICES) -> Found:
+    """Find patches that move rigidly, each on one that it touches."""
+    return arranged(seen, _patches(seen, patch_vertices), root, "motion")
+
+
+def _free_patches(seen: Seen, patch_vertices: int) -> Found:
+    """Find patches without parents: a blend of few poses, as in skins, stays one in the space of the clip."""
+    label = _patches(seen, patch_vertices)
+    return Found(label.astype(np.int32), np.full(label.max() + 1, -1, np.int32), None, "motion")
+
+
+def _patches(seen: Seen, patch_vertices: int) -> np.ndarray:
+    """Return labels of patches grown over the mesh, (N,), or over near neighbours if there is none."""
+    links = seen.links if len(seen.links) else near_neighbours(seen.clip.rest, 8)
+    return rigid_patches(seen.frames, links, patch_vertices)
+
+
+_FINDERS: dict[str, Callable[[Seen, int | None], Found | None]] = {
+    "attributes": _by_attributes,
+    "skeleton": _by_skeleton,
+    "edges": _by_edges,
+    "components": _by_components,
+    "runs": _by_runs,
+    "motion": _by_motion,
+}
+_EXPECTED = {
+    "attributes": f"an attribute per vertex or face named as one of {', '.join(LABEL_NAMES)}",
+    "skeleton": "joints with weights",
+    "edges": "edges without cycles and no faces",
+    "components": "faces or edges in several separate pieces",
+    "runs": "points without faces or edges, of which neighbours keep their distance",
+    "motion": "vertices",
+    "auto": "vertices",
+}

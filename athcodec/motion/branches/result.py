@@ -1,0 +1,53 @@
+"""Branches that were found for a clip."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from athcodec.motion.clip import MotionClip, check_branches, check_stem_index
+from athcodec.motion.hierarchy import branch_orders
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """Branches that were found for a clip; `str` describes them in one line.
+
+    Parameters
+    ----------
+    vertex_branch : (N,) int32 array
+        The branch of each vertex.
+    branch_parent : (B,) int32 array
+        The branch that each branch grows on, -1 for a root.
+    stem_index : (N,) int32 array or None
+        The place of each vertex on its stem, as in MotionClip.
+    method : str
+        How they were found: "attributes", "skeleton", "edges", "components", "runs", "motion", or "file".
+    """
+
+    vertex_branch: np.ndarray
+    branch_parent: np.ndarray
+    stem_index: np.ndarray | None
+    method: str
+
+    def __str__(self) -> str:
+        orders = branch_orders(self.branch_parent)
+        roots = int((self.branch_parent < 0).sum())
+        sizes = np.bincount(self.vertex_branch)
+        return (
+            f"{len(self.branch_parent):,} branches by {self.method}: {roots:,} without a parent, up to order "
+            f"{orders.max()}, {sizes.min():,} to {sizes.max():,} vertices each"
+        )
+
+
+def checked_branches(vertex_branch: np.ndarray, parent: np.ndarray, stem_index: np.ndarray, method: str) -> Found:
+    vertex_branch, parent = check_branches(vertex_branch.astype(np.int64), parent.astype(np.int64), len(vertex_branch))
+    return Found(vertex_branch, parent, check_stem_index(stem_index.astype(np.int64), vertex_branch), method)
+
+
+def with_branches(clip: MotionClip, branches: Found) -> MotionClip:
+    """Return the clip on branches that were found. Raises ClipError if they are for another number of vertices."""
+    return clip.replace(
+        vertex_branch=branches.vertex_branch, branch_parent=branches.branch_parent, stem_index=branches.stem_index
+    )

@@ -1,0 +1,112 @@
+"""What the methods that find branches look at in a clip: positions in a few frames, and links between vertices."""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+
+from athcodec.motion.branches.point_runs import scipy_module
+from athcodec.motion.clip import MotionClip
+
+SAMPLE_FRAMES = 12  # Frames of the clip that the methods look at.
+WELD = 1e-6  # Part of the diagonal; vertices that stay closer are one vertex of a mesh that was split.
+
+
+class Seen:
+    """What the methods look at in a clip, each computed once, when it is asked for."""
+
+    def __init__(self, clip: MotionClip):
+        self.clip = clip
+
+    @cached_property
+    def frames(self) -> np.ndarray:
+        """The rest pose and a few frames spread over the clip, (1 + k, N, 3) float64."""
+        clip = self.clip
+        some = np.unique(np.linspace(0, clip.frame_count - 1, min(SAMPLE_FRAMES, clip.frame_count)).astype(int))
+        return np.concatenate([clip.rest[None], *(clip.block(frame, frame + 1).astype(np.float64) for frame in some)])
+
+    @cached_property
+    def mesh(self) -> np.ndarray:
+        """Pairs of vertices that edges or sides of faces join, (L, 2)."""
+        return links_of(self.clip)
+
+    @cached_property
+    def links(self) -> np.ndarray:
+        """The links of `mesh`, and those between vertices that stay at one place."""
+        return _welded(self.clip, self.mesh)
+
+
+def links_of(clip: MotionClip) -> np.ndarray:
+    """Return pairs of vertices that edges or sides of faces join, (L, 2)."""
+    pairs = [np.zeros((0, 2), np.int64)]
+    if clip.edges is not None:
+        pairs.append(clip.edges.astype(np.int64))
+    if clip.polygons is not None:
+        counts, indices = (array.astype(np.int64) for array in clip.polygons)
+        following = np.arange(1, len(indices) + 1)
+        ends = np.cumsum(counts)
+        following[ends[counts > 0] - 1] = (ends - counts)[counts > 0]
+        pairs.append(np.stack([indices, indices[following]], axis=1))
+    copy = copies_of(clip)
+    inside = np.flatnonzero((copy[1:] == copy[:-1]) & (copy[1:] > 0))
+    pairs.append(np.stack([inside, inside + 1], axis=1))
+    return np.concatenate(pairs)
+
+
+def copies_of(clip: MotionClip) -> np.ndarray:
+    """Return the number of the copy that each vertex is of, (N,), from 1 on; 0 for none (MotionClip, part_copies)."""
+    counts, copies = (clip.attributes.get(f"part_{name}") for name in ("vertex_counts", "copies"))
+    none = np.zeros(clip.vertex_count, np.int64)
+    if counts is None or copies is None or counts.dtype.kind not in "iu" or copies.dtype.kind not in "iu":
+        return none
+    usable = counts.shape == copies.shape and counts.ndim == 1 and (counts >= 0).all() and (copies >= 1).all()
+    usable = usable and (copies <= np.maximum(counts, 1)).all()
+    if not usable or counts.sum(dtype=np.int64) != len(none) or (counts % copies).any():
+        return none
+    is_copied = np.repeat(copies > 1, counts)
+    each = np.repeat(counts // copies, copies)
+    return np.where(is_copied, np.repeat(np.arange(1, len(each) + 1), each), 0)
+
+
+def _welded(clip: MotionClip, links: np.ndarray) -> np.ndarray:
+    """Return `links`, and links between vertices that stay at the same place: seams of a mesh split for its normals."""
+    rest = clip.rest
+    last = clip.block(clip.frame_count - 1, clip.frame_count)[0].astype(np.float64)
+    middle = clip.block(clip.frame_count // 2, clip.frame_count // 2 + 1)[0].astype(np.float64)
+    step = max(WELD * float(np.linalg.norm(np.ptp(rest, axis=0))), 1e-30)
+    cells = np.round(np.concatenate([rest, last, middle], axis=1) / step)
+    order = np.lexsort(cells.T)
+    copy = copies_of(clip)[order]
+    same = np.flatnonzero((cells[order[1:]] == cells[order[:-1]]).all(axis=1) & (copy[1:] == copy[:-1]))
+    return np.concatenate([links, np.stack([order[same], order[same + 1]], axis=1)])
+
+
+def components(links: np.ndarray, vertex_count: int) -> np.ndarray:
+    """Return labels of the parts that links join, (N,), numbered by their first vertices."""
+    sparse = scipy_module("sparse")
+    graph = sparse.coo_matrix((np.ones(len(links), np.int8), links.T), (vertex_count, vertex_count))
+    label = scipy_module("sparse.csgraph").connected_components(graph, directed=False)[1]
+    return numbered(label)
+
+
+def numbered(label: np.ndarray) -> np.ndarray:
+    """Return labels numbered from 0 on by their first vertices."""
+    _, first, inverse = np.unique(label, return_index=True, return_inverse=True)
+    rank = np.empty(len(first), np.int64)
+    rank[np.argsort(first)] = np.arange(len(first))
+    return rank[inverse]
+
+
+def near_neighbours(points: np.ndarray, count: int) -> np.ndarray:
+    """Return pairs of points and their nearest others, (L, 2)."""
+    near = (
+        scipy_module("spatial").cKDTree(points).query(points, k=min(count + 1, len(points)))[1].reshape(len(points), -1)
+    )
+    return np.stack([np.repeat(np.arange(len(points)), near.shape[1] - 1), near[:, 1:].reshape(-1)], axis=1)
+
+
+def cheapest_of_each(key: np.ndarray, cost: np.ndarray) -> np.ndarray:
+    """Return the cheapest entry of each group of the same key."""
+    order = np.lexsort((cost, key))
+    return order[np.unique(key[order], return_index=True)[1]]
