@@ -7,8 +7,8 @@ import { Box3, BufferAttribute, DataTexture, EventDispatcher, FloatType, Instanc
 import { EndlessPlay, transitionsOf } from "./endless.js";
 import { Followed, setRest } from "./geometry.js";
 import { injectMotion, motionUniforms, shadowMaterials } from "./shader.js";
+import { WIDTH } from "./texels.js";
 
-const WIDTH = 1024; // as in session.js
 const centre = new Vector3(), scale = new Vector3();
 
 export function dataTexture(data) {
@@ -363,7 +363,7 @@ export class ATHMotion extends EventDispatcher {
     this.#ask();
   }
 
-  /** A picture of the worker: data is a texture (see session.js) or, in mode "positions", all vertices. */
+  /** A picture of the worker: data is a texture (see texels.js) or, in mode "positions", all vertices. */
   picture(message) {
     const answer = this.#answers.get(message.id), { shown, codeName } = message;
     this.#answers.delete(message.id);

@@ -1,5 +1,5 @@
 // The worker of ATHLoader: one or more files, each a Session. Messages carry the number of their file; the first
-// of a file is "open".
+// of a file is "open", and each other type is a method of Session.
 
 import { ready } from "../ath_decoder.mjs";
 import { describe, Session } from "./session.js";
@@ -8,7 +8,8 @@ import { HttpSource, MemorySource, PacedSource } from "./source.js";
 const sessions = new Map();
 
 function open({ file, url, options, bytes, clip, hostMesh, bandwidth }) {
-  const post = (message, transfer = []) => self.postMessage({ ...message, file, sent: performance.timeOrigin + performance.now() }, transfer);
+  const post = (message, arrays = []) => self.postMessage({ ...message, file, sent: performance.timeOrigin + performance.now() },
+    arrays.filter(Boolean).map((array) => array.buffer));
   const source = bytes ? new MemorySource(new Uint8Array(bytes)) : new HttpSource(url, options);
   const session = new Session(bandwidth ? new PacedSource(source, bandwidth / 8) : source, post, clip, hostMesh);
   sessions.set(file, session);
@@ -18,18 +19,8 @@ function open({ file, url, options, bytes, clip, hostMesh, bandwidth }) {
 function take(data) {
   const session = sessions.get(data.file);
   if (data.type === "open") open(data);
-  else if (data.type === "picture") session?.picture(data);
-  else if (data.type === "drop") session?.drop(data.view);
-  else if (data.type === "parts") session?.tell(data.level);
-  else if (data.type === "bake") session?.bake(data);
-  else if (data.type === "gpu") session?.gpu(data);
-  else if (data.type === "wind") session?.wind(data);
-  else if (data.type === "all") session?.fetchAll();
-  else if (data.type === "abort") session?.abort();
-  else if (data.type === "close") {
-    session?.close();
-    sessions.delete(data.file);
-  }
+  else session?.[data.type](data);
+  if (data.type === "close") sessions.delete(data.file);
 }
 
 self.onmessage = ({ data }) => {

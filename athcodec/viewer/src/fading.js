@@ -2,26 +2,13 @@
 
 import { AthFade } from "../ath_decoder.mjs";
 
-export class Fading {
-  #fade = new AthFade();
+export class Fading extends AthFade {
   #at = 0;      // when it was asked for last, milliseconds
-  tracks = [];  // For each frame that is shown {frame, held}, see Session's #terms.
+  tracks = [];  // For each frame that is shown {frame, held}, see Mixing's #terms.
 
   /** The level that is gone to, -1 before there is one. */
   get level() {
     return this.levels.at(-1) ?? -1;
-  }
-
-  get levels() {
-    return this.#fade.levels;
-  }
-
-  get weights() {
-    return this.#fade.weights;
-  }
-
-  get cut() {
-    return this.#fade.cut;
   }
 
   get underWay() {
@@ -30,9 +17,9 @@ export class Fading {
 
   /** Goes to a level by the time `now` in milliseconds; at once where a fade takes no seconds. Time without a fade does not
    * count: nobody may have looked. */
-  to(level, now = 0, seconds = 0) {
+  goTo(level, now = 0, seconds = 0) {
     const passed = this.underWay ? (now - this.#at) / 1000 : 0;
-    this.#fade.to(level, seconds > 0 ? Math.max(0, passed) / seconds : Infinity);
+    this.to(level, seconds > 0 ? Math.max(0, passed) / seconds : Infinity);
     this.#at = now;
   }
 }

@@ -2,8 +2,10 @@
 // AthFile.chunkBytes(), which has verified their checksums; everything else about them is checked here.
 
 import { decompress } from "fzstd";
+import { LoadError } from "./source.js";
 
-const METADATA = 0x8004, ATTRIBUTE = 0x8020;
+export const ATTRIBUTE = 0x8020;
+const METADATA = 0x8004;
 const MOST_BYTES = 2 ** 30; // Largest size of one array, bytes.
 const MOST_TEXT = 2 ** 24;
 // Typed arrays of kinds and sizes of elements (FORMAT.md, "ATTRIBUTE"); others have none: halves, pairs, texts.
@@ -16,7 +18,7 @@ const NUMBERS = [
 const text = new TextDecoder("utf-8", { fatal: true });
 
 function wrong(what) {
-  return Object.assign(new Error(`BAD_CHUNK: ${what}`), { codeName: "BAD_CHUNK" });
+  return new LoadError(`BAD_CHUNK: ${what}`, "BAD_CHUNK");
 }
 
 // Returns the content size that a zstd frame declares; -1 where it declares none.
@@ -148,8 +150,7 @@ function checkPolygons({ face_vertex_counts: counts, face_vertex_indices: indice
     if (!(vertex >= 0 && vertex < vertexCount)) throw wrong(`face_vertex_indices: got vertex ${vertex}`);
 }
 
-/** The chunks of named arrays that are not here, as ranges. */
-export function attributeRanges(file) {
-  return file.chunks().filter(({ kind, fed }) => kind === ATTRIBUTE && !fed)
-    .map(({ offset, length }) => ({ offset, size: length }));
+/** The chunks, all or those of a kind, that are not here, as ranges. */
+export function missingChunks(file, only = null) {
+  return file.chunks().filter(({ kind, fed }) => !fed && kind === (only ?? kind)).map(({ offset, length }) => ({ offset, size: length }));
 }

@@ -1,0 +1,183 @@
+// Decoding of segments in short steps, what the views show first. Decoded ones are kept up to a limit, for pictures to be made of.
+
+import { around, clipAt, segmentAt } from "./frames.js";
+import { pause } from "./pause.js";
+
+const STEPS = 8, SLICE_MS = 6; // Decoding looks at the clock every 8 steps and at the messages every 6 ms.
+const MOST_PREPARED = 256 << 20; // Largest size of the decoded segments that are kept, bytes.
+
+export class Jobs {
+  #file; #views; #firstSegment; #signal; #tell;
+  #prepared = new Map(); // {"segment/level": Segment}, the most recently used last
+  #failed = new Set();   // "segment/level" that need a damaged chunk
+  #busy = false;
+  #goingOnFrom = null;   // The preparation under way reads this segment.
+
+  /** tell: functions that are called when a segment is `kept`, when it was `decoded` in steps, when it is found `damaged`. */
+  constructor(file, views, firstSegment, signal, tell) {
+    this.#file = file;
+    this.#views = views;
+    this.#firstSegment = firstSegment;
+    this.#signal = signal;
+    this.#tell = tell;
+  }
+
+  /** Returns the deepest level up to `most` that a segment can be shown at: its bytes are here and are not damaged; -1: none. */
+  readyLevel(segment, most = Infinity) {
+    let level = Math.min(most, this.#file.readyLevel(segment));
+    while (level >= 0 && this.#failed.has(`${segment}/${level}`)) level--;
+    return level;
+  }
+
+  /** Decodes what the views want and is here, one segment after another. */
+  async run() {
+    if (this.#busy) return;
+    this.#busy = true;
+    try {
+      for (let job = this.#job(); job && !this.#signal.aborted; job = this.#job()) await this.#prepareInSteps(...job);
+    } finally {
+      this.#busy = false;
+    }
+  }
+
+  #job() {
+    return [...this.#jobs()].find(([segment, level]) => level >= 0 && !this.#prepared.has(`${segment}/${level}`));
+  }
+
+  // Segments and levels to decode: what the views show, what that blends into, what comes next; at first what a view begins with.
+  * #jobs() {
+    if (this.#views.size === 0 && this.#prepared.size === 0) yield [this.#firstSegment, this.readyLevel(this.#firstSegment)];
+    const shown = [...this.#views.values()].flatMap(({ level, frames }) => frames.map((frame) => {
+      const [segment, other = -1] = around(this.#file, frame);
+      return { clip: clipAt(this.#file, frame), most: level, segment, other, level: this.readyLevel(segment, level) };
+    }));
+    for (const { segment, level } of shown) yield [segment, level];
+    for (const { other, level } of shown) if (other >= 0 && this.readyLevel(other, level) === level) yield [other, level];
+    for (const { clip: { firstSegment, segmentCount }, segment, most } of shown) {
+      const next = firstSegment + (segment - firstSegment + 1) % segmentCount;
+      yield [next, this.readyLevel(next, most)];
+    }
+    for (const { level, ahead } of this.#views.values())
+      for (const segment of ahead.map((frame) => segmentAt(this.#file, frame))) yield [segment, this.readyLevel(segment, level)];
+  }
+
+  async #prepareInSteps(segment, level) {
+    try {
+      const known = this.#known(segment, level), preparation = this.#file.preparation(segment, level, known);
+      this.#goingOnFrom = known.from;
+      let start = performance.now();
+      while (!preparation.step(STEPS)) {
+        if (performance.now() - start < SLICE_MS) continue;
+        await pause();
+        if (this.#signal.aborted) return;
+        start = performance.now();
+      }
+      this.#keep(preparation.segment);
+      this.#tell.decoded(segment, level);
+    } catch (error) {
+      this.#damaged(segment, level, error);
+    }
+    this.#goingOnFrom = null;
+  }
+
+  // Returns what a preparation may go on from, the segment at the deepest level decoded so far, and the segment that it is joined to.
+  #known(index, level) {
+    const following = this.#prepared.get(`${this.#file.joinedTo(index, level)}/${level}`) ?? null;
+    let from = null;
+    while (!from && level > 0) from = this.#prepared.get(`${index}/${--level}`);
+    return { from, keep: true, following };
+  }
+
+  // Leaves out what needs the chunk that is damaged, in all segments.
+  #damaged(segment, level, error) {
+    const file = this.#file, { levelCount, segmentCount } = file.info, chunk = file.chunks()[error.chunk];
+    const known = this.#failed.size, bad = chunk?.level < levelCount ? Math.min(level, chunk.level) : level;
+    this.#failed.add(`${segment}/${level}`);
+    for (let s = 0; chunk && s < segmentCount; s++)
+      for (let l = bad; l < levelCount; l++)
+        if (file.ranges(l, s, s, true).some(({ offset, size }) => offset <= chunk.offset && chunk.offset < offset + size)) this.#failed.add(`${s}/${l}`);
+    if (this.#failed.size > known) this.#tell.damaged(segment, bad, error);
+  }
+
+  #keep(segment) {
+    this.#tell.kept(segment);
+    this.#use(segment);
+    const { frameCount, segmentCount, vertexCount } = this.#file.info;
+    const shown = [...this.#views.values()].reduce((sum, { frames }) => sum + frames.length, 0);
+    const most = Math.max(6, 2 * shown + 2, Math.floor(MOST_PREPARED / (16 * vertexCount * (frameCount / segmentCount))));
+    const wanted = new Set(Array.from(this.#jobs(), (job) => job.join("/")));
+    for (const [oldest, old] of this.#prepared) {
+      if (this.#prepared.size <= most) break;
+      if (old === this.#goingOnFrom || old === segment || wanted.has(oldest)) continue;
+      old.free();
+      this.#prepared.delete(oldest);
+    }
+    return segment;
+  }
+
+  #use(segment) {
+    if (!segment) return null;
+    const key = `${segment.index}/${segment.level}`, old = this.#prepared.get(key);
+    if (old !== segment) old?.free();
+    this.#prepared.delete(key);
+    this.#prepared.set(key, segment);
+    return segment;
+  }
+
+  #segment(index, level) {
+    return this.#use(this.#prepared.get(`${index}/${level}`));
+  }
+
+  /** Returns a decoded segment of a level, whichever it is, and keeps it from being let go of. */
+  anyAt(level) {
+    return this.#use([...this.#prepared.values()].find((segment) => segment.level === level));
+  }
+
+  /** Returns what shows `frame`, {frame, level, segments}: at the deepest level that is decoded or, where nothing is, at the
+   * coarsest; where the segment of the frame is not to be had, that of the frame that it blends into will do. */
+  show(frame, level) {
+    let picture = null;
+    for (let shown = level; !picture && shown >= 0; shown--) picture = this.decoded(frame, shown);
+    picture ??= this.coarser(frame, 0);
+    for (let shown = level; !picture && shown >= 0; shown--) picture = this.decoded(frame, shown, true);
+    return picture;
+  }
+
+  /** Returns what show() does, but while a coarser level than `now` is asked for and is not decoded, `now` stays. */
+  showNext(frame, level, now) {
+    return (now > level && !this.isDecoded(frame, level) && this.decoded(frame, now)) || this.show(frame, level);
+  }
+
+  /** Returns what shows `frame` at this level if that is decoded; else null. blended: the frame that it blends into will do. */
+  decoded(frame, level, blended = false) {
+    const segments = around(this.#file, frame).map((index) => this.#segment(index, level));
+    return segments[0] || (blended && segments[1]) ? { frame, level, segments } : null;
+  }
+
+  /** Returns what shows `frame` at this level, decoded now. Throws where that cannot be. */
+  exactly(frame, level) {
+    return { frame, level, segments: around(this.#file, frame).map((index) => this.#now(index, level)) };
+  }
+
+  /** Returns what shows `frame` at this level, decoded now; null where that cannot be. */
+  coarser(frame, level) {
+    const [index, next] = around(this.#file, frame).map((segment) => (this.readyLevel(segment) < level ? -1 : segment));
+    if (index < 0) return null;
+    try {
+      return { frame, level, segments: [this.#now(index, level), next >= 0 ? this.#segment(next, level) : null] };
+    } catch (error) {
+      this.#damaged(index, level, error);
+      return null;
+    }
+  }
+
+  #now(index, level) {
+    return this.#segment(index, level) ?? this.#keep(this.#file.prepare(index, level, this.#known(index, level)));
+  }
+
+  /** Returns whether the segment of `frame` is decoded as deep as it is here, up to a level. */
+  isDecoded(frame, level) {
+    const index = segmentAt(this.#file, frame);
+    return this.#prepared.has(`${index}/${this.readyLevel(index, level)}`);
+  }
+}

@@ -1,0 +1,109 @@
+// Textures for the GPU: matrices of nodes, then exact vertices, with the rotations of their normals where the mesh has faces.
+
+import { normals, turns } from "./normals.js";
+import { pause } from "./pause.js";
+
+export const WIDTH = 1024; // Width of a texture in texels, each of four numbers.
+export const BLENDED = -1; // In place of a level: all vertices are exact, as blended clips leave them.
+const REFINED_REST = 0x15;
+
+export class Texels {
+  #file; #faces; #order;
+  #parts = new Map();
+  #finerRest; // The rest pose is level 0's, and levels above have another.
+  #restNormals = null;
+
+  constructor(file, faces) {
+    this.#file = file;
+    this.#faces = faces;
+    this.#order = file.vertexSource();
+    const exactCount = file.info.vertexCount, [none, zero, all] = [-1, 0, exactCount].map((number) => Int32Array.of(number));
+    this.#parts.set(BLENDED, { nodeCount: 0, exactCount, branch: none, first: zero, count: all, index: zero });
+    this.#finerRest = file.chunks().some(({ kind, level }) => kind === REFINED_REST && level === 1);
+    this.rest = this.refine(file.readyLevel(0)) ?? file.levelRest(0);
+  }
+
+  set faces(faces) {
+    this.#faces = faces;
+    this.#restNormals = null;
+  }
+
+  /** Takes the rest pose of the levels above 0 once one of them is here, for level 0 as well. Returns the pose if it is new. */
+  refine(level) {
+    if (!this.#finerRest || level <= 0) return null;
+    this.#finerRest = false;
+    try {
+      this.#restNormals = null;
+      return this.rest = this.#file.levelRest(1);
+    } catch {
+      return null; // damaged: levels that need it will say so
+    }
+  }
+
+  parts(level) {
+    if (!this.#parts.has(level)) this.#parts.set(level, this.#file.parts(level));
+    return this.#parts.get(level);
+  }
+
+  /** Returns the number of texels of a level: three per node, then one per exact vertex, two with the rotation of its normal. */
+  count(level) {
+    const { nodeCount, exactCount } = this.parts(level);
+    return 3 * nodeCount + (this.#faces ? 2 : 1) * exactCount;
+  }
+
+  /** Returns the texture of a level for what shows a frame. buffer: an old texture's, to be written over where it fits. */
+  pack(shown, level, buffer) {
+    return this.#fill(this.#room(level, buffer), 0, shown, level);
+  }
+
+  /** Returns the texture of positions, all vertices as exact ones. */
+  packExact(xyz, buffer) {
+    const data = this.#room(BLENDED, buffer), source = this.#order, stride = this.#faces ? 8 : 4;
+    for (let i = 0, to = 0; i < source.length; i++, to += stride)
+      for (let k = 0; k < 3; k++) data[to + k] = xyz[3 * source[i] + k];
+    if (this.#faces) this.#fillTurns(data, 0, BLENDED, xyz);
+    return data;
+  }
+
+  /** Returns every `step`-th frame of a clip at a level, one behind the other: what a forest plays. shownAt: what shows a frame. */
+  async bake({ firstFrame, frameCount }, level, step, shownAt, signal) {
+    const texels = this.count(level), rows = Math.ceil(frameCount / step);
+    const data = new Float32Array(4 * WIDTH * Math.ceil((rows * texels) / WIDTH));
+    for (let row = 0; row < rows; row++) {
+      this.#fill(data, 4 * row * texels, shownAt(firstFrame + row * step), level);
+      if (row % 4 === 3) await pause();
+      signal.throwIfAborted();
+    }
+    return { rows, texels, data };
+  }
+
+  #room(level, buffer) {
+    const size = 4 * WIDTH * Math.ceil(this.count(level) / WIDTH);
+    return buffer?.byteLength === 4 * size ? new Float32Array(buffer) : new Float32Array(size);
+  }
+
+  #fill(data, at, { frame, segments, fade = null }, level) {
+    const { nodeCount, exactCount } = this.parts(level), exactAt = at + 12 * nodeCount;
+    this.#file.matrices(segments, frame, { out: data.subarray(at, exactAt), fade });
+    if (exactCount === 0) return data;
+    const exact = this.#file.exact(segments, frame, { fade }), stride = this.#faces ? 8 : 4;
+    for (let i = 0, from = 0, to = exactAt; i < exactCount; i++, to += stride) {
+      data[to] = exact[from++];
+      data[to + 1] = exact[from++];
+      data[to + 2] = exact[from++];
+    }
+    if (this.#faces) this.#fillTurns(data, exactAt, level, this.#file.positions(segments, frame, { fade }));
+    return data;
+  }
+
+  // How the normal of every exact vertex has turned since the rest pose.
+  #fillTurns(data, at, level, positions) {
+    this.#restNormals ??= normals(this.rest, this.#faces);
+    const { branch, first, count, index } = this.parts(level), now = normals(positions, this.#faces);
+    for (let part = 0; part < branch.length; part++) {
+      if (branch[part] >= 0) continue;
+      for (let i = 0; i < count[part]; i++)
+        turns(this.#restNormals, now, this.#order[first[part] + i], data, at + 8 * (index[part] + i) + 4);
+    }
+  }
+}
