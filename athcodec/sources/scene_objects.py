@@ -140,8 +140,8 @@ class SceneObject:
         rows = rows_by_id(ids, self.ids)
         if not len(points) == len(ids) == len(rows) or (rows < 0).any():
             raise ClipError(
-                f"{self.path}: got {len(points)} points with other ids in {where}, expected the {len(rows)} of the first "
-                "frame: points that appear or vanish cannot be read; write them as copies of a mesh with ids"
+                f"{self.path}: got {len(points)} points with other ids in {where}, expected the {len(rows)} of the "
+                "first frame: points that appear or vanish cannot be read; write them as copies of a mesh with ids"
             )
         return points[rows]
 

@@ -275,7 +275,7 @@ class _Copies:
         self.names: np.ndarray | None = None
 
     def follow(self, codes: np.ndarray) -> None:
-        """Finds the prototype of each copy, and the rows of the arrays that it is in. Raises ClipError where that cannot be said."""
+        """Finds the prototype of each copy and its row in each frame. Raises ClipError where a copy cannot be told."""
         if self.names is not None:
             return
         schema, times = self.instancer, [float(codes[0])]
