@@ -41,6 +41,7 @@ from athcodec.files.threads import ThreadPool, default_jobs
 from athcodec.motion.clip import ERROR_WEIGHTS, check_stem_index
 from athcodec.motion.hierarchy import Hierarchy, derived_edges
 from athcodec.motion.joining import HEADING, STRENGTH, metadata_of, wind_of
+from athcodec.motion.presence import stated_presence
 from athcodec.motion.polygons import Polygons
 from athcodec.motion.thresholds import Thresholds
 from athcodec.motion.transitions import transitions_of
@@ -648,6 +649,7 @@ class AthFile:
                     "seconds": clip.duration,
                     "loop": clip.loop,
                     "wind": self._wind_of(clip),
+                    "presence": stated_presence(metadata_of(self.metadata, clip.name)),
                     "transitions": len(transitions_of(metadata_of(self.metadata, clip.name), clip.frame_count)),
                     "seam_errors": list(clip.seam_errors),
                     "max_errors": [level.max_error for level in self.levels_in(clip.segments)],

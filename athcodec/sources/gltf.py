@@ -33,7 +33,7 @@ from athcodec.motion.frames import Frames
 from athcodec.motion.joining import join
 from athcodec.sources import ReadOptions
 from athcodec.sources.gltf_scene import Scene, key_rate, on_grid, rotation_matrices
-from athcodec.sources.scene_objects import FACE_MATERIAL, MATERIAL_NAMES
+from athcodec.sources.scene_objects import FACE_MATERIAL, MATERIAL_NAMES, TWO_SIDES, mirrored, presence_metadata
 
 WORK_BYTES = 64 << 20
 MOST_VERTICES = 1 << 27
@@ -202,7 +202,9 @@ def _clip(
     timings = {name: _sampling(take, options.fps) for name, take in motions.items()}
     still = all(len(timing.times) == 1 for timing in timings.values())
     attributes, branches = _attributes(scene, nodes, options.skip, motion, keep_normals=still)
-    faces, edges, face_material = _connections(file, nodes)
+    times = next(iter(timings.values())).times
+    faces, edges, face_material = _connections(file, nodes, motion.mirrored(times))
+    names = _names(scene, nodes)
     said: dict[str, Any] = {}
     if face_material is not None and FACE_MATERIAL not in options.skip:
         attributes[FACE_MATERIAL] = face_material
@@ -223,7 +225,8 @@ def _clip(
             clip_ranges=(ClipRange("", len(timing.times), True),) if timing.is_loop else (),
             metadata={"unit": "m", "up_axis": "y"}
             | timing.clock
-            | _names(scene, nodes)
+            | names
+            | presence_metadata(names["part_names"], _shown(scenes[name], nodes, timing.times))
             | said
             | ({} if options.takes else _played(scene, nodes)),
             unchanged=file.unchanged,
@@ -276,7 +279,7 @@ def _chosen(scene: Scene, patterns: Sequence[str]) -> list[GltfNode]:
     nodes, seen = [], []
     for index in scene.order:
         mesh_index = scene.nodes[index].get("mesh")
-        if mesh_index is not None:
+        if mesh_index is not None and not scene.is_hidden(index):
             mesh = file.item("meshes", mesh_index)
             called = [scene.name(index), mesh["name"] if isinstance(mesh.get("name"), str) else ""]
             seen.extend(called)
@@ -437,11 +440,13 @@ def _not_read(scene: Scene, nodes: Sequence[GltfNode]) -> dict[str, list[str]]:
 
     for kind, items in (("Material", "materials"), ("Camera", "cameras"), ("scene", "scenes")):
         for number, item in enumerate(file.items(items)):
-            if kind != "scene" or number != file.json.get("scene", 0):
+            if item != TWO_SIDES and (kind != "scene" or number != file.json.get("scene", 0)):
                 add(kind, number, item)
     for index in scene.order:
         if _extension(scene.nodes[index], "KHR_lights_punctual") is not None:
             add("Light", index, scene.nodes[index])
+        if scene.nodes[index].get("mesh") is not None and scene.is_hidden(index):
+            add("hidden", index, scene.nodes[index])
     for node in nodes:
         instancing = _extension(scene.nodes[node.index], INSTANCING)
         own = () if instancing is None else entry(instancing, "attributes")
@@ -602,9 +607,23 @@ class _Motion:
             out[:, :, vertices] += _product(matrix, points)
         return out.swapaxes(1, 2)
 
-    def placed(self, node: GltfNode) -> np.ndarray:
-        """(4, 4) from a node's mesh to the world, without animation; of a skin, by the joint that counts most."""
-        matrices = self.scene.matrices(self.ancestors, None)
+    def mirrored(self, times: np.ndarray) -> list[np.ndarray]:
+        """For each node, whether it turns its mesh inside out, (1,) or (copies,) bool."""
+        matrices = [self.scene.matrices(self.ancestors, times[:1])]
+
+        def matrix(node: GltfNode, frame: int) -> np.ndarray:
+            if frame == len(matrices):
+                matrices.append(self.scene.matrices(self.ancestors, times[frame : frame + 1]))
+            placed = self.placed(node, matrices[frame])
+            placed = placed if self._from_world is None else self._from_world @ placed
+            return placed if node.copies is None else placed @ node.copies
+
+        return [mirrored(lambda frame, node=node: matrix(node, frame), range(len(times))) for node in self._nodes]
+
+    def placed(self, node: GltfNode, matrices: dict[int, np.ndarray] | None = None) -> np.ndarray:
+        """(4, 4) from a node's mesh to the world, by the first of these matrices, or without animation; of a skin, by
+        the joint that counts most."""
+        matrices = self.scene.matrices(self.ancestors, None) if matrices is None else matrices
         if node.skin is None:
             return matrices[node.index][0]
         strongest = np.bincount(node.strongest).argmax()
@@ -733,7 +752,23 @@ def _is_alike(node: GltfNode, other: GltfNode) -> bool:
 
 def _names(scene: Scene, nodes: list[GltfNode]) -> dict[str, Any]:
     parts = _parts(scene, nodes)
-    return {"part_names": [name for name, _ in parts], "part_kinds": [own[0].kind for _, own in parts]}
+    details = [
+        {"doubleSided": "true"} if all(_is_double_sided(scene.file, node) for node in own) else {} for _, own in parts
+    ]
+    return {"part_names": [name for name, _ in parts], "part_kinds": [own[0].kind for _, own in parts]} | (
+        {"part_usd": details} if any(details) else {}
+    )
+
+
+def _is_double_sided(file: GltfFile, node: GltfNode) -> bool:
+    materials = [primitive.get("material") for primitive in node.primitives]
+    return all(number is not None and file.item("materials", number).get("doubleSided") is True for number in materials)
+
+
+def _shown(scene: Scene, nodes: list[GltfNode], times: np.ndarray) -> list[np.ndarray]:
+    """The frames that show each object, or each of its copies."""
+    parts = [own for _, own in _parts(scene, nodes)]
+    return [np.stack([scene.shown(node.index, times) for node in own], axis=1) for own in parts]
 
 
 def _played(scene: Scene, nodes: list[GltfNode]) -> dict[str, Any]:
@@ -746,12 +781,13 @@ def _played(scene: Scene, nodes: list[GltfNode]) -> dict[str, Any]:
 
 
 def _connections(
-    file: GltfFile, nodes: list[GltfNode]
+    file: GltfFile, nodes: list[GltfNode], turned: list[np.ndarray]
 ) -> tuple[np.ndarray | None, np.ndarray | None, np.ndarray | None]:
-    """Faces (F, 3) and edges (E, 2), int32; and the material of each face (F,), -1 for none, where any has one."""
+    """Faces (F, 3) and edges (E, 2), int32; and the material of each face (F,), -1 for none, where any has one.
+    turned: of each node, whether its faces, or those of its copies, are listed the other way round."""
     found: dict[int, list[np.ndarray]] = {2: [], 3: []}
     materials = []
-    for node in nodes:
+    for node, reverse in zip(nodes, turned):
         own: dict[int, list[np.ndarray]] = {2: [], 3: []}
         labels = []
         for primitive in node.primitives:
@@ -764,12 +800,16 @@ def _connections(
             own[rows.shape[1]].append(rows)
             if rows.shape[1] == 3:
                 label = integer(primitive, "material", -1, low=-1, stop=len(file.items("materials")))
+                label = -1 if label >= 0 and file.items("materials")[label] == TWO_SIDES else label
                 labels.append(np.full(len(rows), label, np.int32))
         starts = np.arange(node.first, node.first + node.count, max(node.shape_count, 1))
         for size, parts in own.items():
             if parts:
                 rows = np.concatenate(parts)
-                found[size].append((rows + starts[:, None, None]).reshape(-1, size).astype(np.int32))
+                rows = rows + starts[:, None, None]
+                if size == 3:  # of one node or, by copies, of each
+                    rows = np.where(reverse[:, None, None], rows[..., ::-1], rows)
+                found[size].append(rows.reshape(-1, size).astype(np.int32))
         if labels:
             materials.append(np.tile(np.concatenate(labels), len(starts)))
     faces, edges = (np.concatenate(found[size]) if found[size] else None for size in (3, 2))
@@ -778,7 +818,8 @@ def _connections(
 
 
 def _material_names(file: GltfFile) -> list[str]:
-    names = [item.get("name") for item in file.items("materials")]
+    materials = file.items("materials")
+    names = [item.get("name") for item in (materials[:-1] if materials[-1:] == [TWO_SIDES] else materials)]
     return [name if isinstance(name, str) and name else f"material {number}" for number, name in enumerate(names)]
 
 

@@ -24,6 +24,7 @@ MOST_VERTICES = 1 << 27  # of copies
 MAX_METADATA_BYTES = 1 << 24
 DESCRIPTOR = ".descriptor"  # behind the name of an array's property in an Alembic file: that of its ArrayDescriptor
 FACE_MATERIAL, MATERIAL_NAMES = "face_material", "material_names"  # an attribute, and metadata
+TWO_SIDES = {"doubleSided": True}  # glTF's material of faces that are seen from both sides and have no other
 OWN = "athcodec"  # the namespace of what our writers add to files of other formats
 SCENE_KEYS = {"unit": str, "up_axis": str, "fps": float}  # of metadata, which some formats have no place for
 KNOWN_METADATA = ("fps", "start_frame", "meters_per_unit", "part_names", "part_kinds", "part_usd", "domains", PRESENCE)
@@ -62,7 +63,7 @@ class SceneObject:
     is_still: bool = False  # neither its points nor its place change
     still: np.ndarray | None = None  # its positions then, once they have been read
     ids: np.ndarray | None = None  # those of points that may stand in another order in each frame
-    shown: np.ndarray | None = None  # (T, 1) or (T, copies) bool, the frames that show it or its copies; None: all
+    shown: np.ndarray = field(default_factory=lambda: np.ones((1, 1), bool))  # (T, 1) or (T, copies): frames that do
 
     @property
     def vertices(self) -> slice:
@@ -216,6 +217,7 @@ def clip_of_objects(
     known = _fields(attributes, domains)
     rest, links = known.pop("rest", None), known.pop("edges", None)
     polygons = _faces(objects, attributes)
+    metadata = metadata | _names_and_kinds(objects)
     left_out = [f"{obj.path}.{name}" for obj in objects for name in obj.left_out if name not in options.skip]
     not_read = more.pop("not_read", {}) | ({"attribute": left_out} if left_out else {})
     return MotionClip(
@@ -227,7 +229,9 @@ def clip_of_objects(
         edges=_edges(objects) if links is None else links,
         faces=polygons,
         attributes=attributes,
-        metadata=metadata | _names_and_kinds(objects) | _presence(objects) | {"domains": domains},
+        metadata=metadata
+        | presence_metadata(metadata["part_names"], [obj.shown for obj in objects])
+        | {"domains": domains},
         **known,
         **more,
     )
@@ -311,16 +315,16 @@ def _names_and_kinds(objects: Sequence[SceneObject]) -> dict[str, Any]:
     return metadata | ({"part_usd": [obj.details for obj in objects]} if any(obj.details for obj in objects) else {})
 
 
-def _presence(objects: Sequence[SceneObject]) -> dict[str, Any]:
-    """Metadata: the frames that show each object, or each of its copies, that some frame does not show."""
-    presence = {}
-    for obj, name in zip(objects, _names_and_kinds(objects)["part_names"]):
-        shown = np.ones((1, 1), bool) if obj.shown is None else obj.shown
+def presence_metadata(names: Sequence[str], presence: Sequence[np.ndarray]) -> dict[str, Any]:
+    """Metadata: the frames that show each object, or each of its copies, that some frame does not show. presence:
+    (T, 1) or (T, copies) bool for each object."""
+    stated = {}
+    for name, shown in zip(names, presence):
         if (shown == shown[:, :1]).all():
             shown = shown[:, :1]
         for copy in np.flatnonzero(~shown.all(axis=0)).tolist():
-            presence[name if shown.shape[1] == 1 else f"{name}:{copy}"] = frame_runs(shown[:, copy])
-    return {PRESENCE: presence} if presence else {}
+            stated[name if shown.shape[1] == 1 else f"{name}:{copy}"] = frame_runs(shown[:, copy])
+    return {PRESENCE: stated} if stated else {}
 
 
 def mirrored(matrix: Callable[[int], np.ndarray], frames: Iterable[int]) -> np.ndarray:
