@@ -41,8 +41,8 @@ from athcodec.files.threads import ThreadPool, default_jobs
 from athcodec.motion.clip import ERROR_WEIGHTS, check_stem_index
 from athcodec.motion.hierarchy import Hierarchy, derived_edges
 from athcodec.motion.joining import HEADING, STRENGTH, metadata_of, wind_of
-from athcodec.motion.presence import stated_presence
 from athcodec.motion.polygons import Polygons
+from athcodec.motion.presence import stated_presence
 from athcodec.motion.thresholds import Thresholds
 from athcodec.motion.transitions import transitions_of
 from athcodec.options import whole

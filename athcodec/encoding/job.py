@@ -250,8 +250,8 @@ class EncodingJob:
         for far in (parts_hidden_far_away(part) for part in split(clip).values()):
             if far:
                 warnings.warn(
-                    f"hidden: {', '.join(far)}: the diagonal grows by more than a tenth by where this is in frames that "
-                    "do not show it, and so does a bound relative to the diagonal; move it closer, or pass a length",
+                    f"hidden: {', '.join(far)}: where this is in frames that do not show it makes the diagonal more "
+                    "than a tenth longer, and so a bound relative to it larger; move it closer, or pass a length",
                     SourceWarning,
                     stacklevel=2,
                 )

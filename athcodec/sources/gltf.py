@@ -95,6 +95,7 @@ class GltfNode:
     strongest: np.ndarray | None = None
     copies: np.ndarray | None = None  # (k, 4, 4) from each instance to the node
     of_copies: dict[str, np.ndarray] = field(default_factory=dict)  # (k, width) by attribute: what each copy has
+    mirrored: np.ndarray = field(default_factory=lambda: np.zeros(1, bool))  # whether it, or a copy, is inside out
 
     @property
     def shape_count(self) -> int:
@@ -202,8 +203,8 @@ def _clip(
     timings = {name: _sampling(take, options.fps) for name, take in motions.items()}
     still = all(len(timing.times) == 1 for timing in timings.values())
     attributes, branches = _attributes(scene, nodes, options.skip, motion, keep_normals=still)
-    times = next(iter(timings.values())).times
-    faces, edges, face_material = _connections(file, nodes, motion.mirrored(times))
+    motion.find_mirrored(next(iter(timings.values())).times)
+    faces, edges, face_material = _connections(file, nodes)
     names = _names(scene, nodes)
     said: dict[str, Any] = {}
     if face_material is not None and FACE_MATERIAL not in options.skip:
@@ -607,8 +608,8 @@ class _Motion:
             out[:, :, vertices] += _product(matrix, points)
         return out.swapaxes(1, 2)
 
-    def mirrored(self, times: np.ndarray) -> list[np.ndarray]:
-        """For each node, whether it turns its mesh inside out, (1,) or (copies,) bool."""
+    def find_mirrored(self, times: np.ndarray) -> None:
+        """Notes of each node whether it turns its mesh inside out."""
         matrices = [self.scene.matrices(self.ancestors, times[:1])]
 
         def matrix(node: GltfNode, frame: int) -> np.ndarray:
@@ -618,7 +619,8 @@ class _Motion:
             placed = placed if self._from_world is None else self._from_world @ placed
             return placed if node.copies is None else placed @ node.copies
 
-        return [mirrored(lambda frame, node=node: matrix(node, frame), range(len(times))) for node in self._nodes]
+        for node in self._nodes:
+            node.mirrored = mirrored(lambda frame, node=node: matrix(node, frame), range(len(times)))
 
     def placed(self, node: GltfNode, matrices: dict[int, np.ndarray] | None = None) -> np.ndarray:
         """(4, 4) from a node's mesh to the world, by the first of these matrices, or without animation; of a skin, by
@@ -781,13 +783,12 @@ def _played(scene: Scene, nodes: list[GltfNode]) -> dict[str, Any]:
 
 
 def _connections(
-    file: GltfFile, nodes: list[GltfNode], turned: list[np.ndarray]
+    file: GltfFile, nodes: list[GltfNode]
 ) -> tuple[np.ndarray | None, np.ndarray | None, np.ndarray | None]:
-    """Faces (F, 3) and edges (E, 2), int32; and the material of each face (F,), -1 for none, where any has one.
-    turned: of each node, whether its faces, or those of its copies, are listed the other way round."""
+    """Faces (F, 3) and edges (E, 2), int32; and the material of each face (F,), -1 for none, where any has one."""
     found: dict[int, list[np.ndarray]] = {2: [], 3: []}
     materials = []
-    for node, reverse in zip(nodes, turned):
+    for node in nodes:
         own: dict[int, list[np.ndarray]] = {2: [], 3: []}
         labels = []
         for primitive in node.primitives:
@@ -807,8 +808,8 @@ def _connections(
             if parts:
                 rows = np.concatenate(parts)
                 rows = rows + starts[:, None, None]
-                if size == 3:  # of one node or, by copies, of each
-                    rows = np.where(reverse[:, None, None], rows[..., ::-1], rows)
+                if size == 3:
+                    rows = np.where(node.mirrored[:, None, None], rows[..., ::-1], rows)
                 found[size].append(rows.reshape(-1, size).astype(np.int32))
         if labels:
             materials.append(np.tile(np.concatenate(labels), len(starts)))
