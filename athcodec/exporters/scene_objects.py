@@ -80,7 +80,7 @@ def hidden_copies(objects: list[SceneObject]) -> dict[str, Any]:
 
 def not_written(motion: Any, kept: Sequence[str]) -> dict[str, list[str]]:
     """The names of objects with presence, or with faces of two sides, that a format does not keep."""
-    metadata, is_one_clip = motion.metadata, len(getattr(motion, "clip_ranges", ())) < 2
+    metadata, is_one_clip = getattr(motion, "metadata", None) or {}, len(getattr(motion, "clip_ranges", ())) < 2
     clips = metadata.get(CLIPS) if not is_one_clip else None
     every = [metadata, *(clips.values() if isinstance(clips, dict) else ())]
     presence = dict.fromkeys(name for own in every if isinstance(own, dict) for name in stated_presence(own))

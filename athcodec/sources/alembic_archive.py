@@ -4,7 +4,8 @@ Frames are the times at which anything that is read has a sample; options.fps se
 and transforms go on straight lines. Alembic lists the corners of a face clockwise: they come counter-clockwise, as
 everywhere else here. An Alembic file names no unit and no axis; Y is up by custom, which is said of Blender's files
 alone. The names of face sets become those of materials: attribute "face_material", metadata "material_names". What has
-instances, and a shape that stays as it is, becomes one object, of as many copies. Objects that are hidden throughout,
+instances, and a shape that stays as it is, becomes one object, of as many copies. Visibility becomes presence, and its
+samples count as frames; an object that says it is visible is shown below a hidden one. Objects that are never shown,
 NURBS patches, materials and others are named in the clip's `not_read`; velocities are not read. It is imported by the
 process of reader_main.py alone.
 """

@@ -1,9 +1,9 @@
 """Reads USD stages: meshes, curves and points whose points, transforms or skeletons move.
 
-Every visible prim of the kinds Mesh, BasisCurves, NurbsCurves, HermiteCurves and Points with the purpose "default" or
-"render" is read, also inside instances, into world space: time samples (interpolated as USD does), transforms, and of
-UsdSkel the skinning and the blend shapes. Each such prim in a prototype of a PointInstancer becomes one object, of as
-many copies as the instancer shows at any time. The frames are the whole time codes of the stage's range where it has
+Every prim of the kinds Mesh, BasisCurves, NurbsCurves, HermiteCurves and Points with the purpose "default" or "render"
+that some frame shows is read, also inside instances, into world space: time samples (interpolated as USD does),
+transforms, and of UsdSkel the skinning and the blend shapes. Visibility becomes presence. Each such prim in a prototype
+of a PointInstancer becomes one object, of as many copies as the frames show; ids say which copy is which. The frames are the whole time codes of the stage's range where it has
 one, else the time codes that have samples; options.fps sets another rate. Static primvars become attributes, the names
 of materials the metadata "material_names", of which the attribute "face_material" says the number for each face.
 

@@ -216,7 +216,8 @@ void DefineObject(const SdfPrimSpecHandle &root, const std::string &name, const 
         Ints(object->prim, "faceVertexCounts", std::vector<int>(counts, counts + object->face_count));
         Ints(object->prim, "faceVertexIndices", own);
         if (Text(object->details, "doubleSided") == "true")
-            Attribute(object->prim, "doubleSided", SdfValueTypeNames->Bool, SdfVariabilityUniform)->SetDefaultValue(VtValue(true));
+            Attribute(object->prim, "doubleSided", SdfValueTypeNames->Bool, SdfVariabilityUniform)
+                ->SetDefaultValue(VtValue(true));
     } else if (object->kind == "curves") {
         object->prim = SdfPrimSpec::New(root, name, SdfSpecifierDef, "BasisCurves");
         Ints(object->prim, "curveVertexCounts", object->curves);
