@@ -3,9 +3,10 @@
 Every prim of the kinds Mesh, BasisCurves, NurbsCurves, HermiteCurves and Points with the purpose "default" or "render"
 that some frame shows is read, also inside instances, into world space: time samples (interpolated as USD does),
 transforms, and of UsdSkel the skinning and the blend shapes. Visibility becomes presence. Each such prim in a prototype
-of a PointInstancer becomes one object, of as many copies as the frames show; ids say which copy is which. The frames are the whole time codes of the stage's range where it has
-one, else the time codes that have samples; options.fps sets another rate. Static primvars become attributes, the names
-of materials the metadata "material_names", of which the attribute "face_material" says the number for each face.
+of a PointInstancer becomes one object, of as many copies as the frames show; ids say which copy is which. The frames
+are the whole time codes of the stage's range where it has one, else the time codes that have samples; options.fps sets
+another rate. Static primvars become attributes, the names of materials the metadata "material_names", of which the
+attribute "face_material" says the number for each face.
 
 Points are float32 in USD and so they are here. The stage is opened as it is composed (layers, payloads, value clips);
 what else it holds, such as layers that cannot be found, patches, tetrahedra, what is in materials, is named in the
@@ -265,8 +266,11 @@ def _instanced(
 
 
 class _Copies:
-    """The copies that a PointInstancer shows in the frames at `codes`, once `follow` has found them. They are its rows
-    where these stay the same; else each id is a copy, in ascending order."""
+    """The copies that a PointInstancer shows in the frames that are played, once `follow` has found them.
+
+    A copy is a row of the instancer's arrays or, where ids change in time, an id; ids ascend. `names` (k,) are the rows
+    or ids, `protos` (k,) the numbers of their prototypes, `shown` (T, k) the frames that show them.
+    """
 
     def __init__(self, instancer: UsdGeom.PointInstancer):
         self.instancer = instancer
@@ -282,31 +286,27 @@ class _Copies:
         for attribute in (schema.GetProtoIndicesAttr(), schema.GetIdsAttr(), schema.GetInvisibleIdsAttr()):
             times += attribute.GetTimeSamplesInInterval(_interval(codes))
         times = np.unique(times)
-        self._codes, self._states = codes, _held(times, codes)  # What holds in a frame is what held at a time.
-        self._used = np.unique(self._states)
+        used, self._states = np.unique(_held(times, codes), return_inverse=True)
+        self._codes, times = codes, times[used]  # In a frame holds what held at the last of these times.
         protos, ids = (
-            {state: _array(attribute.Get(times[state]), np.int64) for state in self._used}
+            [_array(attribute.Get(time), np.int64) for time in times]
             for attribute in (schema.GetProtoIndicesAttr(), schema.GetIdsAttr())
         )
-        first = self._used[0]
-        self.follows_ids = all(len(ids[state]) == len(protos[state]) == len(np.unique(ids[state])) for state in ids)
-        self.follows_ids &= not all(np.array_equal(ids[state], ids[first]) for state in ids)
-        self.names = np.arange(len(protos[first]))
-        if self.follows_ids:
-            self.names = np.unique(np.concatenate(list(ids.values())))
+        self.follows_ids = any(not np.array_equal(own, ids[0]) for own in ids)
+        self.follows_ids &= all(len(own) == len(of) == len(np.unique(own)) for own, of in zip(ids, protos))
+        self.names = np.unique(np.concatenate(ids)) if self.follows_ids else np.arange(len(protos[0]))
         self.protos = np.full(len(self.names), -1)
-        self._rows = np.full((len(times), len(self.names)), -1, np.int32)
+        self._rows = np.empty((len(times), len(self.names)), np.int32)
         self.shown = np.zeros(self._rows.shape, bool)
-        for state in self._used:
-            if not self.follows_ids and len(protos[state]) != len(self.names):
-                self._refuse(
-                    state, f"got {len(protos[state])} copies", f"{len(self.names)} as in frame 0, or unique ids in all"
-                )
+        for state, count in enumerate(map(len, protos)):
+            if not self.follows_ids and count != len(self.names):
+                expected = f"{len(self.names)} as in frame 0; give the copies unique ids in all frames"
+                self._refuse(state, f"got {count} copies", expected)
             rows = rows_by_id(ids[state], self.names) if self.follows_ids else self.names
             there = np.flatnonzero(rows >= 0)
             new = protos[state][rows[there]]
             if ((self.protos[there] >= 0) & (self.protos[there] != new)).any():
-                self._refuse(state, "protoIndices changes", "the same shape of each copy in all")
+                self._refuse(state, "protoIndices changes", "the same shape of each copy in all frames")
             self.protos[there] = new
             mask = np.array(schema.ComputeMaskAtTime(times[state]), bool)
             self._rows[state], self.shown[state] = rows, rows >= 0
@@ -321,16 +321,15 @@ class _Copies:
 
     def _hold(self) -> None:
         """Notes where copies stand in frames that do not have them: where they were last, or where they appear."""
-        absent = self._rows[self._used] < 0
-        last = np.maximum.accumulate(np.where(absent, -1, np.arange(len(absent))[:, None]), axis=0)
-        following = np.where(absent, len(absent), np.arange(len(absent))[:, None])
-        following = np.minimum.accumulate(following[::-1], axis=0)[::-1]
-        starts, stops = (np.searchsorted(self._states, self._used, side) for side in ("left", "right"))
-        frames = np.where(last >= 0, stops[last] - 1, starts[np.minimum(following, len(absent) - 1)])
-        self._sources = np.zeros(self._rows.shape, np.int64)  # by state and copy: a frame that has it, and the copy
-        self._sources[self._used] = frames * len(self.names) + np.arange(len(self.names))
-        states, copies = np.nonzero(absent)
-        self._held = np.unique(self._sources[self._used[states], copies])
+        absent, states = self._rows < 0, np.arange(len(self._rows))
+        last = np.maximum.accumulate(np.where(absent, -1, states[:, None]), axis=0)
+        following = np.minimum.accumulate(np.where(absent, states[-1], states[:, None])[::-1], axis=0)[::-1]
+        starts, stops = (np.searchsorted(self._states, states, side) for side in ("left", "right"))
+        frames = np.where(last >= 0, stops[last] - 1, starts[following])
+        self._sources = frames * len(self.names) + np.arange(
+            len(self.names)
+        )  # A frame that has the copy, and the copy.
+        self._held = np.unique(self._sources[absent])
         self._places = np.zeros((len(self._held), 4, 4))
         frames, copies = np.divmod(self._held, max(len(self.names), 1))
         for frame in np.unique(frames):
