@@ -9,6 +9,7 @@ import json
 import numpy as np
 import pytest
 from alembic3d import Abc, AbcCoreAbstract, AbcGeom
+from imath import IntArray, V3fArray
 from pxr import Gf, Usd, UsdGeom, UsdSkel, Vt
 from test_alembic import filled, matrix
 from test_gltf import Maker
@@ -152,17 +153,11 @@ def write_hiding(path):
             for value in values:
                 visibility.setValue(value)
         mesh = AbcGeom.OPolyMesh(place, f"{name}_mesh")
-        corners, counts = filled(imath_array("Int"), [2, 1, 0]), filled(imath_array("Int"), [3])
-        mesh.getSchema().set(AbcGeom.OPolyMeshSchemaSample(filled(imath_array("V3f"), LEAF), corners, counts))
+        corners, counts = filled(IntArray, [2, 1, 0]), filled(IntArray, [3])
+        mesh.getSchema().set(AbcGeom.OPolyMeshSchemaSample(filled(V3fArray, LEAF), corners, counts))
         made += [place, mesh]
     del archive, above, made, place, mesh, visibility
     gc.collect()
-
-
-def imath_array(name):
-    import imath
-
-    return getattr(imath, f"{name}Array")
 
 
 def test_a_hidden_parent_in_alembic_hides_no_child_that_says_it_is_visible(tmp_path):
@@ -232,8 +227,8 @@ def test_a_copy_that_is_hidden_for_a_time_is_kept_and_written_back_as_an_instanc
         before, after, lost = presence_after(tmp_path / "a.usda", tmp_path / name, instances=True)
         assert before == {"leaf:0": [[2, 6]]} and list(after.values()) == [[[2, 6]]] and lost is None
         assert next(iter(after)).endswith(":0")
-        _, after, lost = presence_after(tmp_path / "a.usda", tmp_path / f"c{name}")
-        assert after is None and lost == {"presence of copies, which instances keep": ["leaf"]}
+    _, after, lost = presence_after(tmp_path / "a.usda", tmp_path / "c.usda")
+    assert after is None and lost == {"presence of copies, which instances keep": ["leaf"]}
 
 
 def test_copies_follow_their_ids_and_those_that_appear_or_vanish_become_presence(tmp_path):
@@ -296,7 +291,7 @@ def test_points_of_alembic_follow_their_ids_between_samples_too(tmp_path):
     sampling = Abc.Argument(archive.addTimeSampling(AbcCoreAbstract.TimeSampling(1 / 24, 0)))
     points = AbcGeom.OPoints(archive.getTop(), "dust", sampling)
     for z, order in enumerate(ORDERS):
-        held = filled(imath_array("V3f"), [[x, 0, z] for x in order]), filled(imath_array("Int"), order)
+        held = filled(V3fArray, [[x, 0, z] for x in order]), filled(IntArray, order)
         points.getSchema().set(AbcGeom.OPointsSchemaSample(*held))
     del archive, points
     gc.collect()
@@ -313,22 +308,21 @@ def assert_outward(path, count=1):
     return clip
 
 
-@pytest.mark.parametrize("faces, orientation", [(SIDES, "rightHanded"), ([s[::-1] for s in SIDES], "leftHanded")])
-@pytest.mark.parametrize("scales", [{1: 1}, {1: -1}, {1: 0, 2: -1}])
-def test_faces_of_mirrored_and_left_handed_meshes_of_usd_look_outward(tmp_path, faces, orientation, scales):
-    stage = stage_of(tmp_path / "a.usda", 3)
+@pytest.mark.parametrize("orientation, scales", [("right", {1: -1}), ("left", {1: 1}), ("left", {1: 0, 2: -1})])
+def test_faces_of_mirrored_and_left_handed_meshes_of_usd_look_outward(tmp_path, orientation, scales):
+    faces, stage = SIDES if orientation == "right" else [side[::-1] for side in SIDES], stage_of(tmp_path / "a.usda", 3)
     scale = UsdGeom.Xform.Define(stage, "/above").AddScaleOp()
     for code, x in scales.items():
         scale.Set(Gf.Vec3f(x, 1, 1), code)
     mesh = add_mesh(stage, "/above/box", BOX, faces)
-    mesh.CreateOrientationAttr(orientation)
+    mesh.CreateOrientationAttr(f"{orientation}Handed")
     mesh.CreateDoubleSidedAttr(True)
     corners = UsdGeom.PrimvarsAPI(mesh).CreatePrimvar("corner", mesh.GetPointsAttr().GetTypeName(), "faceVarying")
     corners.Set(Vt.Vec3fArray.FromNumpy(BOX[np.concatenate(faces)]))
     stage.Save()
     clip = assert_outward(tmp_path / "a.usda")
     assert np.array_equal(clip.attributes["corner"], BOX[clip.polygons[1]])
-    for name in ("b.usda", "b.abc", "b.glb", "b.npz"):
+    for name in ("b.usda", "b.abc", "b.glb", "b.npz") if scales == {1: -1} else ():
         written = athcodec.write(clip_of(tmp_path / "a.usda"), tmp_path / name)
         again = assert_outward(tmp_path / name)
         lost = {"doubleSided": ["box"]} if name == "b.abc" else None
@@ -380,11 +374,8 @@ def test_faces_of_mirrored_meshes_and_instances_of_alembic_look_outward(tmp_path
         sample.setMatrix(matrix(np.diag([1 - 2 * i, 1, 1]), [0, 0, 3 * i]))
         place.getSchema().set(sample)
     box = AbcGeom.OPolyMesh(places[0], "box")
-    corners, counts = (
-        filled(imath_array("Int"), np.array(SIDES)[:, ::-1].reshape(-1)),
-        filled(imath_array("Int"), [4] * 6),
-    )
-    box.getSchema().set(AbcGeom.OPolyMeshSchemaSample(filled(imath_array("V3f"), BOX), corners, counts))
+    corners, counts = (filled(IntArray, np.array(SIDES)[:, ::-1].reshape(-1)), filled(IntArray, [4] * 6))
+    box.getSchema().set(AbcGeom.OPolyMeshSchemaSample(filled(V3fArray, BOX), corners, counts))
     places[1].addChildInstance(box, "box")
     del archive, places, place, box
     gc.collect()
