@@ -330,6 +330,21 @@ def test_faces_of_mirrored_and_left_handed_meshes_of_usd_look_outward(tmp_path, 
         assert again.metadata.get("part_usd") == (None if lost else [{"doubleSided": "true"}])
 
 
+def test_what_turns_inside_out_in_time_is_named(tmp_path):
+    stage = stage_of(tmp_path / "a.usda", 3)
+    scale = UsdGeom.Xform.Define(stage, "/above").AddScaleOp()
+    for code in (1, 3):
+        scale.Set(Gf.Vec3f(2 - code, 1, 1), code)
+    add_mesh(stage, "/above/box", BOX, SIDES)
+    stage.Save()
+    made = Maker()
+    node = made.node(mesh=made.mesh({"POSITION": made.array(LEAF)}, "leaf", indices=[0, 1, 2]))
+    made.animation([(node, "scale", [0, 0.5], [[1, 1, 1], [1, 1, -1]], "LINEAR")])
+    for path, name in (tmp_path / "a.usda", "/above/box"), (made.save(tmp_path / "a.glb"), "leaf"):
+        with pytest.warns(SourceWarning, match=f"not read: faces that turn inside out in time {name}"):
+            athcodec.read(path).close()
+
+
 def clip_of(path):
     with athcodec.read(path) as clip:
         return clip.replace(positions=clip.block(0, clip.frame_count))

@@ -33,7 +33,6 @@ from athcodec.sources.scene_objects import (
     SceneObject,
     clip_of_objects,
     frames_of_objects,
-    mirrored,
     own_metadata,
 )
 
@@ -213,7 +212,8 @@ def _clip(archive: Any, options: ReadOptions) -> MotionClip:
             obj.statics.pop("normals", None)  # they turn with each copy
             obj.repeat(len(obj.places))
         if obj.kind == "mesh":  # whose corners are clockwise in the file
-            obj.turn_faces(~mirrored(lambda frame, obj=obj: _matrix(obj, times[frame]), range(len(times))))
+            frames = range(len(times) if obj.moves else 1)
+            obj.face_outward(lambda frame, obj=obj: _matrix(obj, times[frame]), frames, is_reversed=True)
         first += obj.count
     if first == 0:
         raise ClipError("points: got none, expected at least one")

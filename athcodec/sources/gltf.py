@@ -33,7 +33,14 @@ from athcodec.motion.frames import Frames
 from athcodec.motion.joining import join
 from athcodec.sources import ReadOptions
 from athcodec.sources.gltf_scene import Scene, key_rate, on_grid, rotation_matrices
-from athcodec.sources.scene_objects import FACE_MATERIAL, MATERIAL_NAMES, TWO_SIDES, mirrored, presence_metadata
+from athcodec.sources.scene_objects import (
+    FACE_MATERIAL,
+    FLIPPED,
+    MATERIAL_NAMES,
+    TWO_SIDES,
+    mirrored,
+    presence_metadata,
+)
 
 WORK_BYTES = 64 << 20
 MOST_VERTICES = 1 << 27
@@ -95,6 +102,7 @@ class GltfNode:
     strongest: np.ndarray | None = None
     copies: np.ndarray | None = None  # (k, 4, 4) from each instance to the node
     of_copies: dict[str, np.ndarray] = field(default_factory=dict)  # (k, width) by attribute: what each copy has
+    is_flipped: bool = False
     mirrored: np.ndarray = field(default_factory=lambda: np.zeros(1, bool))  # whether it, or a copy, is inside out
 
     @property
@@ -449,6 +457,8 @@ def _not_read(scene: Scene, nodes: Sequence[GltfNode]) -> dict[str, list[str]]:
         if scene.nodes[index].get("mesh") is not None and scene.is_hidden(index):
             add("hidden", index, scene.nodes[index])
     for node in nodes:
+        if node.is_flipped and node.kind == "mesh":
+            found.setdefault(FLIPPED, []).append(node.name)
         instancing = _extension(scene.nodes[node.index], INSTANCING)
         own = () if instancing is None else entry(instancing, "attributes")
         left = [key for key in node.attributes if not key.startswith(("_", "JOINTS_", "WEIGHTS_")) and key not in TAKEN]
@@ -609,18 +619,22 @@ class _Motion:
         return out.swapaxes(1, 2)
 
     def find_mirrored(self, times: np.ndarray) -> None:
-        """Notes of each node whether it turns its mesh inside out."""
-        matrices = [self.scene.matrices(self.ancestors, times[:1])]
+        """Notes of each node whether it turns its mesh inside out, and whether that changes."""
+        matrices: dict[int, dict[int, np.ndarray]] = {}
 
         def matrix(node: GltfNode, frame: int) -> np.ndarray:
-            if frame == len(matrices):
-                matrices.append(self.scene.matrices(self.ancestors, times[frame : frame + 1]))
+            if frame not in matrices:
+                matrices[frame] = self.scene.matrices(self.ancestors, times[frame : frame + 1])
             placed = self.placed(node, matrices[frame])
             placed = placed if self._from_world is None else self._from_world @ placed
             return placed if node.copies is None else placed @ node.copies
 
         for node in self._nodes:
-            node.mirrored = mirrored(lambda frame, node=node: matrix(node, frame), range(len(times)))
+            first, last = (
+                mirrored(lambda frame, node=node: matrix(node, frame), frames)
+                for frames in (range(len(times)), range(len(times))[::-1])
+            )
+            node.mirrored, node.is_flipped = first, not np.array_equal(first, last)
 
     def placed(self, node: GltfNode, matrices: dict[int, np.ndarray] | None = None) -> np.ndarray:
         """(4, 4) from a node's mesh to the world, by the first of these matrices, or without animation; of a skin, by

@@ -24,6 +24,7 @@ MOST_VERTICES = 1 << 27  # of copies
 MAX_METADATA_BYTES = 1 << 24
 DESCRIPTOR = ".descriptor"  # behind the name of an array's property in an Alembic file: that of its ArrayDescriptor
 FACE_MATERIAL, MATERIAL_NAMES = "face_material", "material_names"  # an attribute, and metadata
+FLIPPED = "faces that turn inside out in time"  # in not_read: objects that a transform mirrors in some frames alone
 TWO_SIDES = {"doubleSided": True}  # glTF's material of faces that are seen from both sides and have no other
 OWN = "athcodec"  # the namespace of what our writers add to files of other formats
 SCENE_KEYS = {"unit": str, "up_axis": str, "fps": float}  # of metadata, which some formats have no place for
@@ -60,6 +61,7 @@ class SceneObject:
     statics: dict[str, Static] = field(default_factory=dict)
     materials: list[str] = field(default_factory=list)
     face_materials: np.ndarray | None = None  # (F,) the material of each face, -1 for none
+    is_flipped: bool = False  # mirrored in some frames and not in others
     is_still: bool = False  # neither its points nor its place change
     still: np.ndarray | None = None  # its positions then, once they have been read
     ids: np.ndarray | None = None  # those of points that may stand in another order in each frame
@@ -146,8 +148,12 @@ class SceneObject:
             )
         return points[rows]
 
-    def turn_faces(self, turned: np.ndarray) -> None:
-        """Reverses the corners of all faces, or of those of some copies: turned (1,) or (copies,) bool."""
+    def face_outward(self, matrix: Callable[[int], np.ndarray], frames: range, is_reversed: bool) -> None:
+        """Reverses the corners of faces that a transform mirrors, or, where the file lists corners the other way round,
+        of those that none does. matrix(frame) is (4, 4) or (copies, 4, 4)."""
+        turned = mirrored(matrix, frames)
+        self.is_flipped = not np.array_equal(turned, mirrored(matrix, frames[::-1]))
+        turned ^= is_reversed
         if not turned.any():
             return
         faces = np.repeat(turned, len(self.face_counts) // len(turned))
@@ -220,6 +226,8 @@ def clip_of_objects(
     metadata = metadata | _names_and_kinds(objects)
     left_out = [f"{obj.path}.{name}" for obj in objects for name in obj.left_out if name not in options.skip]
     not_read = more.pop("not_read", {}) | ({"attribute": left_out} if left_out else {})
+    if flipped := [obj.path for obj in objects if obj.is_flipped]:
+        not_read[FLIPPED] = flipped
     return MotionClip(
         frames,
         time,

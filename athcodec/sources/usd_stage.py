@@ -43,7 +43,6 @@ from athcodec.sources.scene_objects import (
     Static,
     clip_of_objects,
     frames_of_objects,
-    mirrored,
     own_metadata,
     rows_by_id,
     transformed,
@@ -504,9 +503,10 @@ def _measure(objects: list[_Prim], codes: np.ndarray, matrix: Callable[[_Prim, i
             obj.repeat(len(obj.instances.rows))
             obj.instances.add_arrays(obj, codes[0])
         if obj.kind == "mesh":
-            turned = mirrored(lambda frame, obj=obj: matrix(obj, frame), range(len(codes)))
-            turned ^= UsdGeom.Mesh(obj.prim).GetOrientationAttr().Get() == UsdGeom.Tokens.leftHanded
-            obj.turn_faces(turned if obj.skeleton is None else turned ^ obj.skeleton.mirrors(obj.count, codes[0]))
+            is_reversed = UsdGeom.Mesh(obj.prim).GetOrientationAttr().Get() == UsdGeom.Tokens.leftHanded
+            is_reversed ^= obj.skeleton is not None and obj.skeleton.mirrors(obj.count, codes[0])
+            frames = range(len(codes) if obj.moves else 1)
+            obj.face_outward(lambda frame, obj=obj: matrix(obj, frame), frames, is_reversed)
         first += obj.count
     if first == 0:
         raise ClipError("points: got none, expected at least one")
