@@ -17,7 +17,7 @@ class ClipError(AthError, ValueError):
 
 
 class SourceWarning(UserWarning):
-    """A source holds something that is part of its picture and is not read."""
+    """A source holds something that is part of its picture and is not read, or that is hidden and costs precision."""
 
 
 class BoundError(AthError, ValueError):

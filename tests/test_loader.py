@@ -20,6 +20,7 @@ from plants import bending_tube, ring_quads, tube
 from programs import CACHE, install_once
 
 import athcodec
+from athcodec.motion.clip import MotionClip
 from athcodec.motion.joining import in_wind
 from bench.throttled_server import WEB, ThrottledServer
 
@@ -73,6 +74,19 @@ def test_a_picture_that_cannot_be_made_is_an_error_that_says_where_and_the_next_
     assert found["moved"] and code == "RangeError"
     assert "clip 0 at 0.5 s, level" in message and "got backwards, expected one of clamp, loop" in message
     assert found["uncaught"] == ["of a listener"] and found["refused"] == ["RangeError", "RangeError", None]
+
+
+def test_what_a_frame_hides_is_not_drawn(tmp_path):
+    clip = MotionClip(
+        np.random.default_rng(0).random((5, 12, 3), np.float32),
+        np.arange(5) / 24,
+        faces=np.arange(12, dtype=np.int32).reshape(4, 3),
+        attributes={"part_vertex_counts": np.int32([3, 9]), "part_copies": np.int32([1, 3])},
+        metadata={"part_names": ["a", "b"], "presence": {"a": [[1, 3]], "b:2": [[0, 1], [4, 5]]}},
+    )
+    athcodec.encode(clip, tmp_path / "a.ath", effort="fast")
+    shown = [[*(range(3) if 1 <= frame < 3 else ()), *range(3, 12 if frame in (0, 4) else 9)] for frame in range(5)]
+    assert run_node("presence", tmp_path / "a.ath") == shown
 
 
 def random_runs(first: int, count: int, *paths):

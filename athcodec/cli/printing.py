@@ -23,6 +23,7 @@ from athcodec.errors import AthError
 from athcodec.files.shown import redacted, shown
 from athcodec.metrics import ErrorMeter
 from athcodec.options import DEFAULT_REL_ERROR
+from athcodec.sources import LISTED
 
 if TYPE_CHECKING:
     from athcodec.decoding.clip_view import ClipView
@@ -133,7 +134,21 @@ def _print_facts(facts: dict[str, Any]) -> None:
         or any(facts["clips"][0][key] for key in ("loop", "wind", "transitions"))
     ):
         _print_clips(facts)
+    for clip in facts["clips"]:
+        _print_presence(clip)
     _print_levels(facts)
+
+
+def _print_presence(clip: dict[str, Any]) -> None:
+    """The objects that some frame does not show, the first `LISTED` of them, and the frames that do."""
+    named = [
+        f"{name} in {', '.join(f'{first} to {stop - 1}' for first, stop in runs) or 'none'}"
+        for name, runs in list(clip["presence"].items())[:LISTED]
+    ]
+    if named:
+        more = len(clip["presence"]) - len(named)
+        of_clip = f" of {clip['name']}" if clip["name"] else ""
+        echo(f"Shown in some frames{of_clip} only: {'; '.join(named)}{f'; and {more:,} more' if more else ''}.")
 
 
 def _rest(facts: dict[str, Any]) -> str:

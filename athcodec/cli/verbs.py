@@ -225,6 +225,8 @@ def decode(args: argparse.Namespace) -> int:
 
 
 def _decode(args: argparse.Namespace, quiet: bool) -> int:
+    from athcodec.sources import listed
+
     check_output(args.output, args.input, args.host_mesh, suffix="" if args.format else None)
     how = {"clip": args.clip, "allow_partial": args.allow_partial, "host_mesh": args.host_mesh}
     with ExitStack() as opened:
@@ -237,6 +239,8 @@ def _decode(args: argparse.Namespace, quiet: bool) -> int:
                 say("warning", f"{args.input}: decoded to level {motion.level}; {what_is_missing(decoder)}")
             if not quiet:
                 print_written(written, motion, decoder.levels[motion.level])
+        if lost := written.facts.get("not_written"):
+            say("not written", f"{args.output}: {listed(lost)}")
     return 0
 
 

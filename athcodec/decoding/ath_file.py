@@ -22,6 +22,7 @@ from athcodec.decoding.segment_decoder import SegmentDecoder
 from athcodec.decoding.static_data import StaticData
 from athcodec.errors import BadChunk, ClipError, Truncated
 from athcodec.motion.joining import HEADING, STRENGTH, metadata_of, wind_of
+from athcodec.motion.presence import stated_presence
 from athcodec.motion.thresholds import Thresholds
 from athcodec.motion.transitions import transitions_of
 
@@ -164,6 +165,7 @@ class AthFile(StaticData, SegmentDecoder):
             "seconds": clip.duration,
             "loop": clip.loop,
             "wind": None if math.isnan(strength) else {STRENGTH: strength, HEADING: heading},
+            "presence": stated_presence(metadata),
             "transitions": len(transitions_of(metadata, clip.frame_count)),
             "seam_errors": list(clip.seam_errors),
             "max_errors": [level.max_error for level in self.levels_in(clip.segments)],

@@ -13,6 +13,7 @@ from athcodec.decoding.decoder import Decoder
 from athcodec.errors import LevelUnavailable
 from athcodec.files.atomic import FileId
 from athcodec.motion.clip import DEFAULT_FPS, ClipRange, clip_range_frames, polygons, stated_fps
+from athcodec.motion.presence import presence_within
 from athcodec.options import whole
 
 
@@ -106,7 +107,9 @@ class ClipView:
     @cached_property
     def metadata(self) -> dict[str, Any]:
         """Unit, up axis and whatever else the source states for the clip, or for all clips."""
-        return dict(self.decoder.metadata if len(self._runs) == 1 else self.decoder.file.metadata)
+        if len(self._runs) > 1:
+            return dict(self.decoder.file.metadata)
+        return presence_within(self.decoder.metadata, self._runs[0][1])
 
     @property
     def rest(self) -> np.ndarray:

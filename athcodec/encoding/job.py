@@ -12,6 +12,7 @@ import dataclasses
 import hashlib
 import math
 import tempfile
+import warnings
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -50,12 +51,14 @@ from athcodec.encoding.shape import RestPrecision
 from athcodec.encoding.start import still_choice
 from athcodec.encoding.summary import Seam, Summary
 from athcodec.encoding.survey import Ath, Survey, survey
-from athcodec.errors import BoundError, ClipError
+from athcodec.errors import BoundError, ClipError, SourceWarning
 from athcodec.files.threads import ThreadPool, default_jobs
 from athcodec.motion.branches.result import Found, with_branches
 from athcodec.motion.clip import ERROR_WEIGHTS, MotionClip
 from athcodec.motion.hierarchy import Hierarchy, derived_edges, hierarchy_of
+from athcodec.motion.joining import split
 from athcodec.motion.polygons import POLYGON_ARRAYS, Polygons, type_code
+from athcodec.motion.presence import parts_hidden_far_away
 from athcodec.motion.thresholds import THRESHOLDS, Thresholds
 from athcodec.motion.units import Length
 from athcodec.options import DEFAULT_LADDER, EFFORTS, MAX_SEGMENT, MIN_SEGMENT, ladder_of, whole
@@ -248,6 +251,14 @@ class EncodingJob:
         _check_limits(clip, hierarchy)
         pool = ThreadPool(options.jobs or default_jobs())
         thresholds = {} if options.tam is None else {name: getattr(options.tam, name) for name in ("lam", "xi", "eta")}
+        for far in (parts_hidden_far_away(part) for part in split(clip).values()):
+            if far:
+                warnings.warn(
+                    f"hidden: {', '.join(far)}: where this is in frames that do not show it makes the diagonal more "
+                    "than a tenth longer, and so a bound relative to it larger; move it closer, or pass a length",
+                    SourceWarning,
+                    stacklevel=2,
+                )
         seen = survey(clip, hierarchy, progress=lambda f: report("survey", f), pool=pool, **thresholds)
         return cls(cls._source(clip, seen, factors, options, pool), options, report, branches)
 

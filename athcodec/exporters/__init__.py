@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from athcodec.errors import ClipError
+from athcodec.exporters.scene_objects import NOT_WRITTEN, not_written
 from athcodec.files.atomic import check_target, keeping
 from athcodec.options import whole
 from athcodec.sources import Format, format_by_suffix, format_named
@@ -22,6 +23,7 @@ from athcodec.sources import Format, format_by_suffix, format_named
 Report = Callable[[str, float], None]
 MOST_RIGGED = 65535
 RIGS = ("usd", "gltf")
+KEPT = ("presence", "doubleSided")
 FILES = "files"  # in what write_clip returns: the names of the files where they are not the one that was asked for
 
 
@@ -70,8 +72,8 @@ class WriteOptions:
 
 
 FORMATS = (
-    Format("hdf5", "HDF5 of athcodec's schema", (".h5", ".hdf5", ".hdf"), "athcodec.exporters.hdf5"),
-    Format("npz", "NumPy archive of the same schema", (".npz",), "athcodec.exporters.npz"),
+    Format("hdf5", "HDF5 of athcodec's schema", (".h5", ".hdf5", ".hdf"), "athcodec.exporters.hdf5", keeps=KEPT),
+    Format("npz", "NumPy archive of the same schema", (".npz",), "athcodec.exporters.npz", keeps=KEPT),
     Format(
         "usd",
         "USD: time-sampled points",
@@ -79,9 +81,25 @@ FORMATS = (
         "athcodec.exporters.usd",
         "usd",
         ("pxr",),
+        keeps=KEPT,
     ),
-    Format("gltf", "glTF: joints or morph targets", (".glb",), "athcodec.exporters.gltf", holds_several=True),
-    Format("alembic", "Alembic: samples of points", (".abc",), "athcodec.exporters.alembic", "alembic", ("alembic3d",)),
+    Format(
+        "gltf",
+        "glTF: joints or morph targets",
+        (".glb",),
+        "athcodec.exporters.gltf",
+        holds_several=True,
+        keeps=("doubleSided",),
+    ),
+    Format(
+        "alembic",
+        "Alembic: samples of points",
+        (".abc",),
+        "athcodec.exporters.alembic",
+        "alembic",
+        ("alembic3d",),
+        keeps=("presence",),
+    ),
     Format("pc2", "PC2 point cache", (".pc2",), "athcodec.exporters.pc2"),
     Format("mdd", "MDD point cache", (".mdd",), "athcodec.exporters.mdd"),
     Format("sequence", "numbered OBJ or PLY files", (".obj", ".ply"), "athcodec.exporters.sequence"),
@@ -108,8 +126,8 @@ class Written:
     files : tuple of pathlib.Path
         The files that hold the clip, in the order of their frames; one, the path that was given, of most formats.
     facts : dict
-        What a format costs that does not hold positions as they are: "max_error" in the clip's unit, and more. Empty of
-        others.
+        What a format costs that does not hold positions as they are: "max_error" in the clip's unit, and more.
+        "not_written" names what the format has no place for, by kind. Empty of others.
     """
 
     files: tuple[Path, ...]
@@ -167,6 +185,8 @@ def write(
         check_target(path, kind.suffixes[0])
         module = importlib.import_module(kind.module)
         facts = dict(module.write_clip(motion, path, wanted, lambda done: report("export", done)) or {})
+    if lost := not_written(motion, kind.keeps) | facts.get(NOT_WRITTEN, {}):
+        facts[NOT_WRITTEN] = lost
     names = facts.pop(FILES, [Path(path).name])
     return Written(tuple(Path(path).with_name(name) for name in names), facts)
 

@@ -19,7 +19,7 @@ import numpy as np
 
 from athcodec.exporters import WriteOptions
 from athcodec.exporters.copies import cost_of, fit_copies
-from athcodec.exporters.scene_objects import objects_of
+from athcodec.exporters.scene_objects import hidden_copies, objects_of
 from athcodec.files.atomic import new_files
 
 STATIC = (
@@ -46,7 +46,10 @@ def write_clip(
 ) -> dict[str, Any]:
     """Write a MotionClip or a ClipView as .abc; returns what instances cost. Raises ClipError, OSError."""
     path = os.fspath(path)
-    instanced = fit_copies(motion, objects_of(motion)) if options.instances else {}
+    objects = objects_of(motion)
+    instanced = fit_copies(motion, objects) if options.instances else {}
+    for number, obj in enumerate(objects):
+        obj.copies = obj.copies if number in instanced else 1
     static = SimpleNamespace(**{name: getattr(motion, name) for name in STATIC})
     static.rest = getattr(motion, "source_rest", motion.rest)
     with new_files(path) as folder:
@@ -68,7 +71,7 @@ def write_clip(
         if said != b"done":
             reason = said.decode("utf-8", "replace") or "Alembic's library has ended its process: is the disk full?"
             raise OSError(errno.EIO, f"cannot be written: {reason}", path)
-    return cost_of(instanced)
+    return cost_of(instanced) | hidden_copies(objects)
 
 
 def _send(process: subprocess.Popen, head: Any, motion: Any, report: Callable[[float], None]) -> bytes:

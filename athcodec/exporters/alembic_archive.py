@@ -82,7 +82,8 @@ def _blocks(given: BinaryIO) -> Iterator[tuple[int, np.ndarray]]:
 def _write(motion: Any, blocks: Iterator[tuple[int, np.ndarray]], instanced: dict[int, Copies], name: str) -> None:
     numbers, rate = distinct_frame_numbers(motion), frame_rate_of(motion)
     archive = Abc.CreateArchiveWithInfo(name, rate, "athcodec", "plant motion")
-    sampling = Abc.Argument(archive.addTimeSampling(_sampling(numbers, rate)))
+    index = archive.addTimeSampling(_sampling(numbers, rate))
+    sampling = Abc.Argument(index)
     root = AbcGeom.OXform(archive.getTop(), "clip")
     if str(motion.metadata.get("up_axis", "y")).lower() == "z":
         turn = AbcGeom.XformSample()
@@ -96,9 +97,11 @@ def _write(motion: Any, blocks: Iterator[tuple[int, np.ndarray]], instanced: dic
     names = distinct(re.sub(r"[/\0]", "_", obj.name.strip("/")) or "part" for obj in objects)
     for number, (obj, name) in enumerate(zip(objects, names)):
         if number in instanced:
-            _add_instanced(root, name, obj, instanced[number], statics, sampling)
+            places = _add_instanced(root, name, obj, instanced[number], statics, sampling)
         else:
-            obj.target = _create(root, name, obj, sampling)
+            places = [AbcGeom.OXform(root, name)]  # programs expect a transform of its own
+            obj.target = KINDS[obj.kind](places[0], name, sampling)
+        _hide(places, obj, index)
     _bind_materials(motion, objects)
     for start, block in blocks:
         for row, positions in enumerate(block.astype(np.float32, copy=False)):
@@ -118,14 +121,22 @@ def _sampling(numbers: np.ndarray, rate: float) -> Any:
     return AbcCoreAbstract.TimeSampling(acyclic, times)
 
 
-def _create(root: Any, name: str, obj: SceneObject, sampling: Any) -> Any:
-    return KINDS[obj.kind](AbcGeom.OXform(root, name), name, sampling)  # programs expect a transform of its own
+def _hide(places: list[Any], obj: SceneObject, sampling: int) -> None:
+    """Writes the visibility of an object, or of each of its copies, to the transforms above them."""
+    if obj.shown is None or obj.shown.shape[1] > len(places):
+        return
+    for place, shown in zip(places, np.broadcast_to(obj.shown, (len(obj.shown), len(places))).T):
+        if not shown.all():
+            visibility = AbcGeom.CreateVisibilityProperty(place, sampling)
+            for value in shown:
+                visibility.setValue(int(value))
 
 
 def _add_instanced(
     root: Any, name: str, obj: SceneObject, copies: Copies, statics: dict[str, tuple[np.ndarray, str]], sampling: Any
-) -> None:
-    """The shape below the transform of the first copy, and an instance of it below that of each other one."""
+) -> list[Any]:
+    """Writes the shape below the transform of the first copy, and an instance of it below that of each other one.
+    Returns these transforms."""
     matrices = np.tile(np.eye(4), (*copies.places.shape[:2], 1, 1))  # of row vectors
     linear = rotation_matrices(copies.turns.astype(np.float64)) * copies.scales[:, :, None, :]
     matrices[..., :3, :3], matrices[..., 3, :3] = linear.swapaxes(2, 3), copies.places
@@ -144,6 +155,7 @@ def _add_instanced(
     _add(one, copies.shape, own)
     for place in places[1:]:
         place.addChildInstance(one.target, name)
+    return places
 
 
 def _bind_materials(motion: Any, objects: list[SceneObject]) -> None:

@@ -19,12 +19,12 @@ import numpy as np
 
 from athcodec import __version__
 from athcodec.errors import ClipError
-from athcodec.exporters.scene_objects import face_materials
+from athcodec.exporters.scene_objects import face_materials, is_double_sided
 from athcodec.exporters.timing import start_frame_of
 from athcodec.motion.clip import ClipRange, stated_fps
 from athcodec.motion.joining import metadata_of
 from athcodec.motion.units import METRES, unit_symbol
-from athcodec.sources.scene_objects import FACE_MATERIAL
+from athcodec.sources.scene_objects import FACE_MATERIAL, TWO_SIDES
 from athcodec.sources.timing import whole
 
 COMPONENTS = {"int8": 5120, "uint8": 5121, "int16": 5122, "uint16": 5123, "uint32": 5125, "float32": 5126}
@@ -140,13 +140,15 @@ class Glb:
 @dataclass(frozen=True, eq=False)
 class GltfMesh:
     """One object: source (n,) the clip's vertices that it shows, corners (F, 3) or (E, 2) of them, or None for points;
-    attributes by their semantic, (n, width); the material of each triangle (F,), -1 for none, or None."""
+    attributes by their semantic, (n, width); the material of each triangle (F,), -1 for none, or None; whether it is
+    seen from both sides."""
 
     name: str
     source: np.ndarray
     corners: np.ndarray | None
     attributes: dict[str, np.ndarray]
     materials: np.ndarray | None = None
+    is_double_sided: bool = False
 
 
 def meshes_of(motion: Any, name: str, more: Mapping[str, np.ndarray] | None = None) -> tuple[list[GltfMesh], list[str]]:
@@ -163,11 +165,13 @@ def meshes_of(motion: Any, name: str, more: Mapping[str, np.ndarray] | None = No
     labels, names = face_materials(motion) or (np.full(0 if faces is None else len(faces[0]), -1), [])
     labels = np.where((labels >= 0) & (labels < len(names)), labels, -1)
     if faces is not None:
-        labels = np.repeat(
-            labels, np.maximum(np.asarray(faces[0], np.int64) - 2, 0)
-        )  # One label for each triangle of a polygon.
-    made = []
-    for part_name, start, stop in _objects(motion, name, corner_vertex[triangles], edges):
+        triangles_per_face = np.maximum(np.asarray(faces[0], np.int64) - 2, 0)
+        labels = np.repeat(labels, triangles_per_face)
+    made, parts = [], _objects(motion, name, corner_vertex[triangles], edges)
+    details = motion.metadata.get("part_usd")
+    if not isinstance(details, list) or len(details) != len(parts):
+        details = [{}] * len(parts)
+    for (part_name, start, stop), detail in zip(parts, details):
         rows = np.flatnonzero((source >= start) & (source < stop))
         place = np.full(len(source), -1)
         place[rows] = np.arange(len(rows))
@@ -177,7 +181,7 @@ def meshes_of(motion: Any, name: str, more: Mapping[str, np.ndarray] | None = No
         corners = place[corner_place[mine]] if len(mine) else place[lines] if len(lines) else None
         attributes = {key: array[rows] for key, array in values.items()}
         materials = materials if (materials >= 0).any() else None
-        made.append(GltfMesh(part_name, source[rows], corners, attributes, materials))
+        made.append(GltfMesh(part_name, source[rows], corners, attributes, materials, is_double_sided(detail)))
     return made, left_out
 
 
@@ -196,21 +200,32 @@ def add_mesh(
         dtype = np.uint16 if mesh.corners.max() < 65535 else np.uint32
         primitives = [
             primitive | more | {"indices": glb.array(corners.astype(dtype).reshape(-1, 1), target=INDICES)}
-            for corners, more in _by_material(mesh)
+            for corners, more in _by_material(glb, mesh)
         ]
     glb.json["meshes"].append({"name": mesh.name, "primitives": primitives})
     return len(glb.json["meshes"]) - 1
 
 
-def _by_material(mesh: GltfMesh) -> list[tuple[np.ndarray, dict[str, Any]]]:
+def _by_material(glb: Glb, mesh: GltfMesh) -> list[tuple[np.ndarray, dict[str, Any]]]:
     """The corners of each primitive, and which material it has: those of the first triangle's first."""
     if mesh.materials is None:
-        return [(mesh.corners, {})]
+        return [(mesh.corners, _material(glb, mesh, -1))]
     labels, first = np.unique(mesh.materials, return_index=True)
     return [
-        (mesh.corners[mesh.materials == label], {"material": int(label)} if label >= 0 else {})
-        for label in labels[np.argsort(first)]
+        (mesh.corners[mesh.materials == label], _material(glb, mesh, int(label))) for label in labels[np.argsort(first)]
     ]
+
+
+def _material(glb: Glb, mesh: GltfMesh, label: int) -> dict[str, Any]:
+    """The material of a primitive, -1 for none. One that a mesh of two sides has shows both wherever it is."""
+    is_surface = mesh.is_double_sided and mesh.corners.shape[1] == 3
+    if is_surface and label < 0:
+        materials = glb.json.setdefault("materials", [])
+        label = materials.index(TWO_SIDES) if TWO_SIDES in materials else len(materials)
+        materials[label:] = materials[label:] or [TWO_SIDES]
+    elif is_surface:
+        glb.json["materials"][label] |= TWO_SIDES
+    return {"material": label} if label >= 0 else {}
 
 
 def add_materials(glb: Glb, motion: Any) -> None:

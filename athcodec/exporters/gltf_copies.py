@@ -123,6 +123,7 @@ def _is_alike(one: SceneObject, other: SceneObject) -> bool:
     return (
         one.copies == other.copies == 1
         and (one.kind, one.count) == (other.kind, other.count)
+        and one.details == other.details
         and all(map(np.array_equal, (*one.faces, one.curves), (*other.faces, other.curves)))
     )
 
@@ -158,6 +159,7 @@ def _joined(shapes: list[GltfMesh]) -> GltfMesh:
         np.concatenate(corners) if corners else None,
         {key: np.concatenate([shape.attributes[key] for shape in shapes]) for key in shapes[0].attributes},
         np.concatenate(materials) if materials else None,
+        shapes[0].is_double_sided,
     )
 
 
@@ -210,7 +212,8 @@ def _as_copies(shape: GltfMesh, obj: SceneObject, copies: Copies) -> GltfCopies 
     if corners is not None:
         mine = (which[corners] == 0).all(axis=1)
         corners, materials = place[corners[mine]], None if materials is None else materials[mine]
-    return GltfCopies(GltfMesh(shape.name, local[rows[0]], corners, shared, materials), copies, own, lost)
+    one = replace(shape, source=local[rows[0]], corners=corners, attributes=shared, materials=materials)
+    return GltfCopies(one, copies, own, lost)
 
 
 def _same(values: np.ndarray, expected: np.ndarray) -> bool:

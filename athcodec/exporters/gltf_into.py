@@ -37,6 +37,7 @@ from athcodec.files.gltf.motion import (
     motion_names,
     places_of,
 )
+from athcodec.files.gltf.primitives import triangles
 from athcodec.files.reading import naming
 from athcodec.motion.clip import ClipRange, MotionClip
 from athcodec.motion.frames import Frames
@@ -190,6 +191,9 @@ class Into:
         for primitive in primitives:
             if not self._keep:
                 primitive.pop("targets", None)
+                if part.mirrored.any() and len(rows := triangles(self._file, primitive, part.count)):
+                    corners = rows[:, ::-1].reshape(-1, 1).astype(np.uint32)
+                    primitive |= {"indices": binary.array(corners), "mode": 4}
             kept = {
                 key: value
                 for key, value in primitive["attributes"].items()
@@ -600,7 +604,7 @@ class _Binary:
         return len(self._json["accessors"]) - 1
 
     def array(self, values: np.ndarray) -> int:
-        """An accessor of (count, 1) float32, with its bounds."""
+        """An accessor of (count, 1) numbers without gaps, with its bounds."""
         index = self.attribute(values, bounds=True)
         self._json["bufferViews"][self._json["accessors"][index]["bufferView"]].pop("target")
         return index

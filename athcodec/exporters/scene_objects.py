@@ -6,16 +6,19 @@ knows no format and touches no positions.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from athcodec.motion.joining import OWN as CLIPS
+from athcodec.motion.presence import PRESENCE, presence_of_parts, stated_presence
 from athcodec.sources.scene_objects import FACE_MATERIAL, MATERIAL_NAMES, SCENE_KEYS, ArrayDescriptor
 
 # kept by the formats themselves, or by their objects
-KNOWN_METADATA = ("fps", "start_frame", "part_names", "part_kinds", "part_usd", "domains")
+KNOWN_METADATA = ("fps", "start_frame", "part_names", "part_kinds", "part_usd", "domains", PRESENCE)
+NOT_WRITTEN = "not_written"  # in what a writer returns: the names of what it has no place for, by kind
 KNOWN_ATTRIBUTES = ("part_vertex_counts", "curve_vertex_counts", "face_vertex_counts", "face_vertex_indices")
 DOMAINS = ("vertex", "corner", "face", "constant")
 
@@ -37,6 +40,7 @@ class SceneObject:
     target: Any = None  # what a writer makes of it
     instancer: Any = None  # and of its copies
     width: float = 0.0  # the largest, of curves and points
+    shown: np.ndarray | None = None  # (T, 1) or (T, copies) bool, the frames that show it or its copies; None: all
 
     @property
     def vertices(self) -> slice:
@@ -59,9 +63,37 @@ def objects_of(motion: Any) -> list[SceneObject]:
         faces = np.asarray(face_counts[low:high]), face_indices[rows] - first
         face_rows = slice(int(low), int(high))
         objects.append(SceneObject(name, kind, first, int(count), faces, next(curves), face_rows, rows, detail))
-    for obj, copies in zip(objects, _copies(motion, len(objects))):
+    said = _copies(motion, len(objects))
+    is_one_clip = len(getattr(motion, "clip_ranges", ())) < 2
+    presence = presence_of_parts(motion.metadata, names, said, motion.frame_count) if is_one_clip else {}
+    for number, (obj, copies) in enumerate(zip(objects, said)):
+        obj.shown = presence.get(number)
         obj.copies = copies if 1 < copies <= obj.count and _repeats(obj, copies) else 1
     return objects
+
+
+def hidden_copies(objects: list[SceneObject]) -> dict[str, Any]:
+    """What a writer says of objects whose copies are hidden one by one, but are not written as instances."""
+    names = [obj.name for obj in objects if obj.copies == 1 and obj.shown is not None and obj.shown.shape[1] > 1]
+    return {NOT_WRITTEN: {"presence of copies, which instances keep": names}} if names else {}
+
+
+def not_written(motion: Any, kept: Sequence[str]) -> dict[str, list[str]]:
+    """The names of objects with presence, or with faces of two sides, that a format does not keep."""
+    metadata, is_one_clip = getattr(motion, "metadata", None) or {}, len(getattr(motion, "clip_ranges", ())) < 2
+    clips = metadata.get(CLIPS) if not is_one_clip else None
+    every = [metadata, *(clips.values() if isinstance(clips, dict) else ())]
+    presence = dict.fromkeys(name for own in every if isinstance(own, dict) for name in stated_presence(own))
+    names, details = metadata.get("part_names"), metadata.get("part_usd")
+    pairs = zip(names, details) if isinstance(names, list) and isinstance(details, list) else ()
+    lost = {"doubleSided": [name for name, detail in pairs if is_double_sided(detail)]}
+    lost = {kind: names for kind, names in lost.items() if names and kind not in kept}
+    return lost if not presence or is_one_clip and "presence" in kept else lost | {"presence": list(presence)}
+
+
+def is_double_sided(details: Any) -> bool:
+    """Whether the faces of an object with such details in "part_usd" are seen from both sides."""
+    return isinstance(details, dict) and details.get("doubleSided") == "true"
 
 
 def said_names(motion: Any) -> dict[str, Any]:

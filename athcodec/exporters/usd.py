@@ -32,6 +32,8 @@ from athcodec.exporters.scene_objects import (
     distinct,
     domain_of,
     face_materials,
+    hidden_copies,
+    is_double_sided,
     material_runs,
     objects_of,
     own_arrays,
@@ -149,11 +151,12 @@ def _write(motion: Any, name: str, options: WriteOptions, report: Callable[[floa
     _bind_materials(stage, motion, objects, names)
     left = _static_arrays(stage, motion, objects)
     _own_arrays(root, motion, left)
+    _write_presence(objects, codes)
     if joints is not None:
-        return _write_rigged(stage, motion, joints, objects, codes, report)
+        return _write_rigged(stage, motion, joints, objects, codes, report) | hidden_copies(objects)
     _write_places(stage, [(objects[number], copies) for number, copies in instanced.items()], codes)
     _write_frames(stage, motion, objects, codes, report)
-    return cost_of(instanced)
+    return cost_of(instanced) | hidden_copies(objects)
 
 
 def _time_codes(motion: Any) -> np.ndarray:
@@ -215,12 +218,13 @@ def _write_assembly(
     write_rig(stage, nanite.BASE, motion, joints, base, codes)
     for number, part in parts.items():
         nanite.place_part(stage, f"{nanite.ROOT_PRIM}/{names[number]}", names[number], objects[number], part, joints)
+    _write_presence(objects, codes)
     _must(stage.GetRootLayer().Save(), stage.GetRootLayer().identifier)
     error = nanite.largest_error(motion, objects, joints, parts)
     report(1.0)
     instances = sum(len(part.joint) for part in parts.values())
     facts = {"animation": "a Nanite Assembly", "joints": len(joints.bind), "instances": instances, "max_error": error}
-    return facts | {WIND: nanite.wind_of(motion, joints)}
+    return facts | {WIND: nanite.wind_of(motion, joints)} | hidden_copies(objects)
 
 
 def _describe_stage(stage: Usd.Stage, motion: Any, codes: np.ndarray, rate: float) -> None:
@@ -260,8 +264,8 @@ def _define(stage: Usd.Stage, place: str, obj: SceneObject) -> UsdGeom.PointBase
         mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
         mesh.CreateFaceVertexCountsAttr(_int_array(obj.faces[0]))
         mesh.CreateFaceVertexIndicesAttr(_int_array(obj.faces[1]))
-        if obj.details.get("orientation") == UsdGeom.Tokens.leftHanded:
-            mesh.CreateOrientationAttr(UsdGeom.Tokens.leftHanded)
+        if is_double_sided(obj.details):
+            mesh.CreateDoubleSidedAttr(True)
     elif obj.kind == "curves":
         schema = curves = UsdGeom.BasisCurves.Define(stage, place)
         curves.CreateCurveVertexCountsAttr(_int_array(obj.curves))
@@ -331,6 +335,20 @@ def _write_places(stage: Usd.Stage, instanced: list[tuple[SceneObject, Copies]],
             scales.Set(_vec3(copies.scales[frame]), code)
             for attribute, array, dtype in turned:
                 attribute.Set(array.FromNumpy(copies.turns[frame].astype(dtype)), code)
+
+
+def _write_presence(objects: list[SceneObject], codes: np.ndarray) -> None:
+    """Visibility of objects, and the copies that an instancer hides, from the frames on in which they change."""
+    for obj in objects:
+        if obj.shown is None or obj.shown.shape[1] > 1 and obj.copies == 1:
+            continue
+        whole, shown = _whole(obj), obj.shown
+        for frame in (0, *np.flatnonzero((shown[1:] != shown[:-1]).any(axis=1)) + 1):
+            if shown.shape[1] > 1:
+                whole.CreateInvisibleIdsAttr().Set(Vt.Int64Array(np.flatnonzero(~shown[frame]).tolist()), codes[frame])
+            else:
+                token = UsdGeom.Tokens.inherited if shown[frame, 0] else UsdGeom.Tokens.invisible
+                whole.CreateVisibilityAttr().Set(token, codes[frame])
 
 
 def _int_array(values: np.ndarray) -> Vt.IntArray:

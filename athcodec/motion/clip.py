@@ -108,6 +108,7 @@ class MotionClip:
         are start_frame + time * fps. "part_names" are the objects that the vertices belong to, one after the other;
         the attribute part_vertex_counts has their numbers of vertices. Where part_copies is there too, an object is so
         many copies of one shape, one after the other, each of which moves as a whole: the leaves of an instancer.
+        "presence" says which frames show an object or a copy, where not all do: docs/formats.md.
     rest_pose : {"first", "mean"}, optional
         How the rest pose is made where none is given: the first frame, or the mean of all, which reads the clip once.
     stem_index : (N,) array of integers, optional

@@ -127,6 +127,8 @@ class Format:
         What its files begin with.
     holds_several : bool, optional
         Whether a file can be written with several clips of one plant.
+    keeps : tuple of str, optional
+        What its files can say of objects besides: "presence", "doubleSided".
     """
 
     name: str
@@ -137,6 +139,7 @@ class Format:
     needs: tuple[str, ...] = ()
     magic: tuple[bytes, ...] = ()
     holds_several: bool = False
+    keeps: tuple[str, ...] = ()
 
     @property
     def is_installed(self) -> bool:

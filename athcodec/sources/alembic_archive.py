@@ -4,7 +4,8 @@ Frames are the times at which anything that is read has a sample; options.fps se
 and transforms go on straight lines. Alembic lists the corners of a face clockwise: they come counter-clockwise, as
 everywhere else here. An Alembic file names no unit and no axis; Y is up by custom, which is said of Blender's files
 alone. The names of face sets become those of materials: attribute "face_material", metadata "material_names". What has
-instances, and a shape that stays as it is, becomes one object, of as many copies. Objects that are hidden throughout,
+instances, and a shape that stays as it is, becomes one object, of as many copies. Visibility becomes presence, and its
+samples count as frames; an object that says it is visible is shown below a hidden one. Objects that are never shown,
 NURBS patches, materials and others are named in the clip's `not_read`; velocities are not read. It is imported by the
 process of reader_main.py alone.
 """
@@ -14,7 +15,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
 from typing import Any
 
@@ -33,7 +34,6 @@ from athcodec.sources.scene_objects import (
     clip_of_objects,
     frames_of_objects,
     own_metadata,
-    turned_corners,
 )
 
 MAX_SAMPLES = 1 << 24
@@ -132,24 +132,65 @@ class _Xform:
 
 
 @dataclass
+class _Visibility:
+    """What an object says of its visibility: hidden, visible whatever is said above it, or, by -1, nothing."""
+
+    track: _Track
+    values: np.ndarray
+
+    def at(self, times: np.ndarray) -> np.ndarray:
+        return self.values[[self.track.at(time)[0][0] for time in times]]
+
+
+@dataclass
+class _Place:
+    """Where an object or an instance of it hangs: its path, and the transforms and visibilities above, leaf first."""
+
+    path: str = ""
+    xforms: list[_Xform] = field(default_factory=list)
+    visibilities: list[_Visibility] = field(default_factory=list)
+
+    def tracks(self) -> Iterator[_Track]:
+        yield from (each.track for each in (*self.xforms, *self.visibilities))
+
+    def shown(self, times: np.ndarray) -> np.ndarray:
+        """(T,) whether the object is shown: the nearest that says anything decides."""
+        stated = np.full(len(times), -1)
+        for visibility in self.visibilities:
+            stated = np.where(stated < 0, visibility.at(times), stated)
+        return stated != 0
+
+    @property
+    def is_seen(self) -> bool:
+        """Whether it is shown at the time of any sample of its visibility."""
+        return self.shown(np.unique([0.0, *(time for each in self.visibilities for time in each.track.times)])).any()
+
+    def matrix(self, time: float) -> np.ndarray:
+        """(4, 4) to the world."""
+        matrix = np.eye(4)
+        for xform in self.xforms:
+            matrix = matrix @ xform.at(time)
+        return matrix
+
+
+@dataclass
 class _Object(SceneObject):
-    """An object that is read, the transforms above it and above its instances, leaf first, and how its points are
-    found. source: its path, of an instance that of what it shows."""
+    """An object that is read, where it and its instances hang, and how its points are found. source: its path, of an
+    instance that of what it shows."""
 
     schema: Any = None
-    xforms: list[_Xform] = field(default_factory=list)
-    instances: list[list[_Xform]] = field(default_factory=list)
+    places: list[_Place] = field(default_factory=list)
     source: str = ""
     points: Any = None
     track: _Track | None = None
 
     def tracks(self) -> Iterator[_Track]:
-        tracks = (xform.track for xforms in (self.xforms, *self.instances) for xform in xforms)
+        tracks = (track for place in self.places for track in place.tracks())
         yield from (track for track in (self.track, *tracks) if len(track.times) > 1)
 
     @property
     def moves(self) -> bool:
-        return any(len(xform.track.times) > 1 for xforms in (self.xforms, *self.instances) for xform in xforms)
+        return any(len(xform.track.times) > 1 for place in self.places for xform in place.xforms)
 
 
 def _clip(archive: Any, options: ReadOptions) -> MotionClip:
@@ -161,12 +202,18 @@ def _clip(archive: Any, options: ReadOptions) -> MotionClip:
     times, rate = _times(archive, objects, options.fps)
     first = 0
     for obj in objects:
-        obj.first, obj.count, obj.is_still = first, len(_points(obj, times[0])), not any(obj.tracks())
-        order = _topology(obj)
-        _statics(obj, order, times[0])
-        if obj.instances:
+        _follow_ids(obj)
+        obj.first, obj.count = first, len(_points(obj, times[0]))
+        obj.is_still = not obj.moves and len(obj.track.times) < 2
+        obj.shown = np.stack([place.shown(times) for place in obj.places], axis=1)
+        _topology(obj)
+        _statics(obj, times[0])
+        if len(obj.places) > 1:
             obj.statics.pop("normals", None)  # they turn with each copy
-            obj.repeat(1 + len(obj.instances))
+            obj.repeat(len(obj.places))
+        if obj.kind == "mesh":  # whose corners are clockwise in the file
+            frames = range(len(times) if obj.moves else 1)
+            obj.face_outward(lambda frame, obj=obj: _matrix(obj, times[frame]), frames, is_reversed=True)
         first += obj.count
     if first == 0:
         raise ClipError("points: got none, expected at least one")
@@ -198,20 +245,18 @@ def _clip(archive: Any, options: ReadOptions) -> MotionClip:
 def _find(archive: Any, only: Sequence[str], not_read: dict[str, list[str]]) -> list[_Object]:
     """All objects that are read, those of instances too; adds the others to not_read, by the names of their kinds."""
     objects, visited = [], 0
-    waiting = [(archive.getTop(), [], "")]
+    waiting = [(archive.getTop(), _Place(), "")]
     while waiting:
-        parent, xforms, above = waiting.pop()
+        parent, place, above = waiting.pop()
         children = []
         for i in range(parent.getNumChildren()):
             visited += 1
             if visited > MAX_OBJECTS:
                 raise ClipError(f"archive: got more than {MAX_OBJECTS} objects")
             child = parent.getChild(i)
-            if _hidden(child):
-                not_read.setdefault("hidden", []).append(child.getFullName())
-                continue
             source = child.instanceSourcePath() if child.isInstanceRoot() else f"{above}/{child.getName()}"
-            children.append((child, _add(child, source, xforms, objects, only, not_read), source))
+            below = _Place(f"{place.path}/{child.getName()}", place.xforms, [*_visibility(child), *place.visibilities])
+            children.append((child, _add(child, source, below, objects, only, not_read), source))
         waiting += reversed(children)
     if not objects:
         what = f" named like {', '.join(only)}" if only else ""
@@ -231,40 +276,37 @@ def _together(objects: list[_Object]) -> list[_Object]:
         elif len(obj.track.times) > 1:
             found.append(obj)
         else:
-            first.instances.append(obj.xforms)
+            first.places += obj.places
     return found
 
 
 def _add(
-    child: Any,
-    source: str,
-    xforms: list[_Xform],
-    objects: list[_Object],
-    only: Sequence[str],
-    not_read: dict[str, list[str]],
-) -> list[_Xform]:
-    """Adds an object that has points; returns the transforms above its children."""
+    child: Any, source: str, place: _Place, objects: list[_Object], only: Sequence[str], not_read: dict[str, list[str]]
+) -> _Place:
+    """Adds an object that has points and is shown; returns where its children hang."""
     name = child.getHeader().getMetaData().get("schema") or ""
     if name.startswith("AbcGeom_Xform"):
-        return _above(child, xforms)
+        return replace(place, xforms=_above(child, place.xforms))
     found = next((schema for start, schema in SCHEMAS.items() if name.startswith(start)), None)
     names = (child.getName(), child.getFullName())
     if name.startswith("AbcGeom_FaceSet"):
-        return xforms  # of a mesh, which is read with it
+        return place  # of a mesh, which is read with it
     if found is None and name:
         kind = name.partition("_")[2].rpartition("_")[0] or name  # of AbcGeom_NuPatch_v2
         not_read.setdefault(kind, []).append(names[1])
     if found is None or only and not any(fnmatchcase(name, pattern) for pattern in only for name in names):
-        return xforms
+        return place
     kind, wrap = found
     schema = wrap(child, EXISTING).getSchema()
     points = schema.getPositionsProperty()
-    if points.getNumSamples():
-        track = _track(points)
-        objects.append(_Object(kind, *names, schema=schema, xforms=xforms, points=points, track=track, source=source))
+    if not points.getNumSamples():
+        not_read.setdefault("empty", []).append(place.path)
+    elif not place.is_seen:
+        not_read.setdefault("hidden", []).append(place.path)
     else:
-        not_read.setdefault("empty", []).append(names[1])
-    return xforms
+        track = _track(points)
+        objects.append(_Object(kind, *names, schema=schema, places=[place], points=points, track=track, source=source))
+    return place
 
 
 def _above(child: Any, xforms: list[_Xform]) -> list[_Xform]:
@@ -277,20 +319,31 @@ def _above(child: Any, xforms: list[_Xform]) -> list[_Xform]:
     return [own, *above]
 
 
-def _track(points: Any) -> _Track:
-    return _Track(points.getTimeSampling(), 1 if points.isConstant() else points.getNumSamples())
+def _track(samples: Any) -> _Track:
+    return _Track(samples.getTimeSampling(), 1 if samples.isConstant() else samples.getNumSamples())
 
 
-def _hidden(child: Any) -> bool:
-    """Whether an object is hidden in all frames."""
-    visible = AbcGeom.GetVisibilityProperty(child)
-    if not visible or not visible.valid() or not visible.isConstant() or not visible.getNumSamples():
-        return False
-    return AbcGeom.GetVisibility(child) == AbcGeom.ObjectVisibility.kVisibilityHidden
+def _visibility(child: Any) -> Iterator[_Visibility]:
+    """What an object says of its visibility, if anything."""
+    samples = AbcGeom.GetVisibilityProperty(child)
+    if samples and samples.valid() and samples.getNumSamples():
+        track = _track(samples)
+        values = [samples.getValue(track.sample(i)) for i in range(len(track.times))]
+        yield _Visibility(track, np.array(values, np.int64).astype(np.int8))
 
 
-def _topology(obj: _Object) -> np.ndarray:
-    """Fills in faces or curves; returns where each corner lies in the file."""
+def _follow_ids(obj: _Object) -> None:
+    """Notes the ids of points that stand in another order in some sample."""
+    samples = obj.schema.getIdsProperty() if obj.kind == "points" else None
+    if samples is None or not samples.valid() or samples.isConstant():
+        return
+    first = np.array(samples.getValue(obj.track.sample(0)), np.uint64)
+    if len(np.unique(first)) == len(first):
+        obj.ids = np.sort(first)
+
+
+def _topology(obj: _Object) -> None:
+    """Fills in faces or curves."""
     if obj.kind == "curves":
         sample = obj.schema.getValue()
         obj.curve_counts = _fixed(obj, obj.schema.getNumVerticesProperty())
@@ -302,11 +355,8 @@ def _topology(obj: _Object) -> np.ndarray:
         obj.face_counts = _fixed(obj, obj.schema.getFaceCountsProperty())
         obj.face_indices = _fixed(obj, obj.schema.getFaceIndicesProperty())
     obj.check()
-    order = turned_corners(obj.face_counts)
-    obj.face_indices = obj.face_indices[order]
     if obj.kind == "mesh":
         _bind_materials(obj)
-    return order
 
 
 def _bind_materials(obj: _Object) -> None:
@@ -379,24 +429,24 @@ def _metadata(archive: Any, times: np.ndarray, rate: float | None) -> dict[str, 
 # ---- what does not move ----
 
 
-def _statics(obj: _Object, order: np.ndarray, time: float) -> None:
+def _statics(obj: _Object, time: float) -> None:
     for name, getter in NAMED_PARAMS:
         if hasattr(obj.schema, getter):  # of a subdivision surface without normals
-            _keep(obj, name, getattr(obj.schema, getter)(), order)
+            _keep(obj, name, getattr(obj.schema, getter)())
     further = obj.schema.getArbGeomParams()
     for i in range(further.getNumProperties() if further.valid() else 0):
         header = further.getPropertyHeader(i)
         kind = next((param for param in PARAMS if param.matches(header)), None)
         if kind is not None:
-            _keep(obj, header.getName(), kind(further, header.getName()), order)
+            _keep(obj, header.getName(), kind(further, header.getName()))
         else:
             obj.left_out.append(header.getName())
     if obj.kind != "mesh":
-        obj.halve_widths(_product(obj.xforms, time))
-    obj.turn_normals(_product(obj.xforms, time), obj.moves)
+        obj.halve_widths(obj.places[0].matrix(time))
+    obj.turn_normals(obj.places[0].matrix(time), obj.moves)
 
 
-def _keep(obj: _Object, name: str, param: Any, order: np.ndarray) -> None:
+def _keep(obj: _Object, name: str, param: Any) -> None:
     if not param.valid() or not param.getNumSamples():
         return
     if not param.isConstant():
@@ -413,8 +463,8 @@ def _keep(obj: _Object, name: str, param: Any, order: np.ndarray) -> None:
         values = values.reshape(len(values) // extent, -1)
     if domain in (None, "constant") and len(values) == obj.count:  # Blender's widths are said to be constant
         domain = "vertex"
-    if domain == "corner" and len(values) == len(order):
-        values = values[order]
+    if domain == "vertex" and obj.ids is not None:  # Arrays that keep their order do not follow the points.
+        domain = None
     obj.keep(name, domain, values)
 
 
@@ -468,28 +518,26 @@ def _descriptor(text: str) -> ArrayDescriptor:
 
 
 def _points(obj: _Object, time: float) -> np.ndarray:
-    found = [
-        (np.array(obj.points.getValue(obj.track.sample(i)), np.float32), weight) for i, weight in obj.track.at(time)
-    ]
+    found = [(_sample(obj, i), weight) for i, weight in obj.track.at(time)]
     counts = {len(points) for points, _ in found}
     if len(counts) != 1:
         raise ClipError(f"{obj.path}: got {max(counts)} points in a sample at {time:g} s, expected {obj.count}")
     if len(found) == 1:
-        return found[0][0].reshape(-1, 3)
-    return sum(points.astype(np.float64) * weight for points, weight in found).astype(np.float32).reshape(-1, 3)
+        return found[0][0]
+    return sum(points.astype(np.float64) * weight for points, weight in found).astype(np.float32)
+
+
+def _sample(obj: _Object, number: int) -> np.ndarray:
+    """(n, 3) points of a sample."""
+    when = obj.track.sample(number)
+    points = np.array(obj.points.getValue(when), np.float32).reshape(-1, 3)
+    if obj.ids is None:
+        return points
+    ids = np.array(obj.schema.getIdsProperty().getValue(when), np.uint64)
+    return obj.ordered(points, ids, f"the sample at {obj.track.times[number]:g} s")
 
 
 def _matrix(obj: _Object, time: float) -> np.ndarray:
     """(4, 4) to the world; of what has instances (copies, 4, 4)."""
-    return (
-        _product(obj.xforms, time)
-        if not obj.instances
-        else np.stack([_product(xforms, time) for xforms in (obj.xforms, *obj.instances)])
-    )
-
-
-def _product(xforms: list[_Xform], time: float) -> np.ndarray:
-    matrix = np.eye(4)
-    for xform in xforms:
-        matrix = matrix @ xform.at(time)
-    return matrix
+    matrices = np.stack([place.matrix(time) for place in obj.places])
+    return matrices if len(matrices) > 1 else matrices[0]

@@ -33,7 +33,14 @@ from athcodec.motion.frames import Frames
 from athcodec.motion.joining import join
 from athcodec.sources import ReadOptions
 from athcodec.sources.gltf_scene import Scene, key_rate, on_grid, rotation_matrices
-from athcodec.sources.scene_objects import FACE_MATERIAL, MATERIAL_NAMES
+from athcodec.sources.scene_objects import (
+    FACE_MATERIAL,
+    FLIPPED,
+    MATERIAL_NAMES,
+    TWO_SIDES,
+    mirrored,
+    presence_metadata,
+)
 
 WORK_BYTES = 64 << 20
 MOST_VERTICES = 1 << 27
@@ -95,6 +102,8 @@ class GltfNode:
     strongest: np.ndarray | None = None
     copies: np.ndarray | None = None  # (k, 4, 4) from each instance to the node
     of_copies: dict[str, np.ndarray] = field(default_factory=dict)  # (k, width) by attribute: what each copy has
+    is_flipped: bool = False
+    mirrored: np.ndarray = field(default_factory=lambda: np.zeros(1, bool))  # whether it, or a copy, is inside out
 
     @property
     def shape_count(self) -> int:
@@ -202,7 +211,9 @@ def _clip(
     timings = {name: _sampling(take, options.fps) for name, take in motions.items()}
     still = all(len(timing.times) == 1 for timing in timings.values())
     attributes, branches = _attributes(scene, nodes, options.skip, motion, keep_normals=still)
+    motion.find_mirrored(next(iter(timings.values())).times)
     faces, edges, face_material = _connections(file, nodes)
+    names = _names(scene, nodes)
     said: dict[str, Any] = {}
     if face_material is not None and FACE_MATERIAL not in options.skip:
         attributes[FACE_MATERIAL] = face_material
@@ -223,7 +234,8 @@ def _clip(
             clip_ranges=(ClipRange("", len(timing.times), True),) if timing.is_loop else (),
             metadata={"unit": "m", "up_axis": "y"}
             | timing.clock
-            | _names(scene, nodes)
+            | names
+            | presence_metadata(names["part_names"], _shown(scenes[name], nodes, timing.times))
             | said
             | ({} if options.takes else _played(scene, nodes)),
             unchanged=file.unchanged,
@@ -276,7 +288,7 @@ def _chosen(scene: Scene, patterns: Sequence[str]) -> list[GltfNode]:
     nodes, seen = [], []
     for index in scene.order:
         mesh_index = scene.nodes[index].get("mesh")
-        if mesh_index is not None:
+        if mesh_index is not None and not scene.is_hidden(index):
             mesh = file.item("meshes", mesh_index)
             called = [scene.name(index), mesh["name"] if isinstance(mesh.get("name"), str) else ""]
             seen.extend(called)
@@ -437,12 +449,16 @@ def _not_read(scene: Scene, nodes: Sequence[GltfNode]) -> dict[str, list[str]]:
 
     for kind, items in (("Material", "materials"), ("Camera", "cameras"), ("scene", "scenes")):
         for number, item in enumerate(file.items(items)):
-            if kind != "scene" or number != file.json.get("scene", 0):
+            if item != TWO_SIDES and (kind != "scene" or number != file.json.get("scene", 0)):
                 add(kind, number, item)
     for index in scene.order:
         if _extension(scene.nodes[index], "KHR_lights_punctual") is not None:
             add("Light", index, scene.nodes[index])
+        if scene.nodes[index].get("mesh") is not None and scene.is_hidden(index):
+            add("hidden", index, scene.nodes[index])
     for node in nodes:
+        if node.is_flipped and node.kind == "mesh":
+            found.setdefault(FLIPPED, []).append(node.name)
         instancing = _extension(scene.nodes[node.index], INSTANCING)
         own = () if instancing is None else entry(instancing, "attributes")
         left = [key for key in node.attributes if not key.startswith(("_", "JOINTS_", "WEIGHTS_")) and key not in TAKEN]
@@ -602,9 +618,28 @@ class _Motion:
             out[:, :, vertices] += _product(matrix, points)
         return out.swapaxes(1, 2)
 
-    def placed(self, node: GltfNode) -> np.ndarray:
-        """(4, 4) from a node's mesh to the world, without animation; of a skin, by the joint that counts most."""
-        matrices = self.scene.matrices(self.ancestors, None)
+    def find_mirrored(self, times: np.ndarray) -> None:
+        """Notes of each node whether it turns its mesh inside out, and whether that changes."""
+        matrices: dict[int, dict[int, np.ndarray]] = {}
+
+        def matrix(node: GltfNode, frame: int) -> np.ndarray:
+            if frame not in matrices:
+                matrices[frame] = self.scene.matrices(self.ancestors, times[frame : frame + 1])
+            placed = self.placed(node, matrices[frame])
+            placed = placed if self._from_world is None else self._from_world @ placed
+            return placed if node.copies is None else placed @ node.copies
+
+        for node in self._nodes:
+            first, last = (
+                mirrored(lambda frame, node=node: matrix(node, frame), frames)
+                for frames in (range(len(times)), range(len(times))[::-1])
+            )
+            node.mirrored, node.is_flipped = first, not np.array_equal(first, last)
+
+    def placed(self, node: GltfNode, matrices: dict[int, np.ndarray] | None = None) -> np.ndarray:
+        """(4, 4) from a node's mesh to the world, by the first of these matrices, or without animation; of a skin, by
+        the joint that counts most."""
+        matrices = self.scene.matrices(self.ancestors, None) if matrices is None else matrices
         if node.skin is None:
             return matrices[node.index][0]
         strongest = np.bincount(node.strongest).argmax()
@@ -733,7 +768,23 @@ def _is_alike(node: GltfNode, other: GltfNode) -> bool:
 
 def _names(scene: Scene, nodes: list[GltfNode]) -> dict[str, Any]:
     parts = _parts(scene, nodes)
-    return {"part_names": [name for name, _ in parts], "part_kinds": [own[0].kind for _, own in parts]}
+    details = [
+        {"doubleSided": "true"} if all(_is_double_sided(scene.file, node) for node in own) else {} for _, own in parts
+    ]
+    return {"part_names": [name for name, _ in parts], "part_kinds": [own[0].kind for _, own in parts]} | (
+        {"part_usd": details} if any(details) else {}
+    )
+
+
+def _is_double_sided(file: GltfFile, node: GltfNode) -> bool:
+    materials = [primitive.get("material") for primitive in node.primitives]
+    return all(number is not None and file.item("materials", number).get("doubleSided") is True for number in materials)
+
+
+def _shown(scene: Scene, nodes: list[GltfNode], times: np.ndarray) -> list[np.ndarray]:
+    """The frames that show each object, or each of its copies."""
+    parts = [own for _, own in _parts(scene, nodes)]
+    return [np.stack([scene.shown(node.index, times) for node in own], axis=1) for own in parts]
 
 
 def _played(scene: Scene, nodes: list[GltfNode]) -> dict[str, Any]:
@@ -764,12 +815,16 @@ def _connections(
             own[rows.shape[1]].append(rows)
             if rows.shape[1] == 3:
                 label = integer(primitive, "material", -1, low=-1, stop=len(file.items("materials")))
+                label = -1 if label >= 0 and file.items("materials")[label] == TWO_SIDES else label
                 labels.append(np.full(len(rows), label, np.int32))
         starts = np.arange(node.first, node.first + node.count, max(node.shape_count, 1))
         for size, parts in own.items():
             if parts:
                 rows = np.concatenate(parts)
-                found[size].append((rows + starts[:, None, None]).reshape(-1, size).astype(np.int32))
+                rows = rows + starts[:, None, None]
+                if size == 3:
+                    rows = np.where(node.mirrored[:, None, None], rows[..., ::-1], rows)
+                found[size].append(rows.reshape(-1, size).astype(np.int32))
         if labels:
             materials.append(np.tile(np.concatenate(labels), len(starts)))
     faces, edges = (np.concatenate(found[size]) if found[size] else None for size in (3, 2))
@@ -778,7 +833,8 @@ def _connections(
 
 
 def _material_names(file: GltfFile) -> list[str]:
-    names = [item.get("name") for item in file.items("materials")]
+    materials = file.items("materials")
+    names = [item.get("name") for item in (materials[:-1] if materials[-1:] == [TWO_SIDES] else materials)]
     return [name if isinstance(name, str) and name else f"material {number}" for number, name in enumerate(names)]
 
 

@@ -6,6 +6,8 @@ the first key and after the last. Matrices of many frames are made at once. It k
 
 from __future__ import annotations
 
+import re
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -16,6 +18,8 @@ from athcodec.files.gltf.document import GltfFile
 from athcodec.files.gltf.json import brief, entries, entry, indices, integer, vector
 
 TRS = {"translation": [0.0, 0.0, 0.0], "rotation": [0.0, 0.0, 0.0, 1.0], "scale": [1.0, 1.0, 1.0]}
+POINTER, NODE_VISIBILITY = "KHR_animation_pointer", "KHR_node_visibility"
+VISIBLE = re.compile(rf"/nodes/(\d+)/extensions/{NODE_VISIBILITY}/visible")
 INTERPOLATIONS = ("STEP", "LINEAR", "CUBICSPLINE")
 RATES = (30.0, 24.0, 25.0, 60.0, 24000 / 1001, 30000 / 1001, 60000 / 1001, 12.0, 15.0, 48.0, 50.0, 100.0, 120.0)
 SLOWEST, FASTEST = 10.0, 240.0  # rates of sampled motion: keys further apart are meant to be interpolated
@@ -173,7 +177,10 @@ class Scene:
         found, inside = [], set(self.order)
         for channel in entries(animation, "channels"):
             target = entry(channel, "target")
-            if target.get("node") is not None and target.get("path") in (*TRS, "weights"):
+            pointer = (target.get("extensions") or {}).get(POINTER) or {}
+            if visible := VISIBLE.fullmatch(str(pointer.get("pointer"))):
+                target = {"node": int(visible[1]), "path": "visible"}
+            if target.get("node") is not None and target.get("path") in (*TRS, "weights", "visible"):
                 node = integer(target, "node", stop=max(len(self.nodes), 1))
                 if node in inside:
                     found.append((node, target["path"], integer(channel, "sampler")))
@@ -218,7 +225,7 @@ class Scene:
 
     def _grouped(self) -> list[tuple[str, list[int], Track]]:
         """(path, nodes, track of all of them) of transforms with the same keys: many are evaluated at once. Weights of
-        morph targets remain in _tracks."""
+        morph targets and visibilities remain in _tracks."""
         alike: dict[tuple, list[int]] = {}
         for (node, path), track in self._tracks.items():
             if path in TRS:
@@ -241,6 +248,28 @@ class Scene:
         """Whether an animation that is played moves any of these nodes or one above them."""
         moved = {index for _, grouped, _ in self._groups for index in grouped}
         return not moved.isdisjoint(self.ancestors(nodes))
+
+    def is_hidden(self, node: int) -> bool:
+        """Whether a node, or one above it, is never visible."""
+        lineage = self._lineage(node)
+        return any((each, "visible") not in self._tracks and not self._is_visible(each) for each in lineage)
+
+    def shown(self, node: int, times: np.ndarray) -> np.ndarray:
+        """(T,) whether a node and all above it are visible."""
+        shown = np.ones(len(times), bool)
+        for each in self._lineage(node):
+            track = self._tracks.get((each, "visible"))
+            shown &= self._is_visible(each) if track is None else track.at(times)[:, 0] > 0.5
+        return shown
+
+    def _lineage(self, node: int) -> Iterator[int]:
+        while node >= 0:
+            yield node
+            node = int(self.parent[node])
+
+    def _is_visible(self, node: int) -> bool:
+        extension = (self.nodes[node].get("extensions") or {}).get(NODE_VISIBILITY)
+        return not isinstance(extension, dict) or extension.get("visible") is not False
 
     def morphs(self, node: int) -> bool:
         """Whether an animation that is played changes the weights of a node's mesh."""

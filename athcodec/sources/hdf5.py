@@ -34,6 +34,7 @@ from athcodec.errors import ClipError
 from athcodec.files.plain import open_plain
 from athcodec.files.reading import Budget, FileWatch, closing_on_failure, naming
 from athcodec.motion.clip import RESERVED_NAMES, MotionClip
+from athcodec.motion.presence import PRESENCE
 from athcodec.motion.thresholds import THRESHOLDS
 from athcodec.sources import ReadOptions
 from athcodec.sources.reader_process import read_apart
@@ -110,7 +111,7 @@ def _read(file: h5py.File, options: ReadOptions) -> MotionClip:
     frame = positions.nbytes // max(positions.shape[0], 1) if positions.shape else 0
     budget.need(4 * frame + chunk_bytes(positions), "positions: a frame")  # read, converted, checked, and the rest pose
     metadata = {name: _to_python(value) for name, value in file.attrs.items()}
-    for name in ("domains", THRESHOLDS):
+    for name in ("domains", THRESHOLDS, PRESENCE, "part_usd"):
         if isinstance(metadata.get(name), str):
             metadata[name] = _parsed(name, metadata[name])
     attributes = _static_arrays(file, options.skip, budget)

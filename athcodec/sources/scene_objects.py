@@ -17,15 +17,18 @@ import numpy as np
 from athcodec.errors import ClipError
 from athcodec.motion.clip import RESERVED_NAMES, MotionClip
 from athcodec.motion.frames import Frames
+from athcodec.motion.presence import PRESENCE, frame_runs
 from athcodec.sources import ReadOptions
 
 MOST_VERTICES = 1 << 27  # of copies
 MAX_METADATA_BYTES = 1 << 24
 DESCRIPTOR = ".descriptor"  # behind the name of an array's property in an Alembic file: that of its ArrayDescriptor
 FACE_MATERIAL, MATERIAL_NAMES = "face_material", "material_names"  # an attribute, and metadata
+FLIPPED = "faces that turn inside out in time"  # in not_read: objects that a transform mirrors in some frames alone
+TWO_SIDES = {"doubleSided": True}  # glTF's material of faces that are seen from both sides and have no other
 OWN = "athcodec"  # the namespace of what our writers add to files of other formats
 SCENE_KEYS = {"unit": str, "up_axis": str, "fps": float}  # of metadata, which some formats have no place for
-KNOWN_METADATA = ("fps", "start_frame", "meters_per_unit", "part_names", "part_kinds", "part_usd", "domains")
+KNOWN_METADATA = ("fps", "start_frame", "meters_per_unit", "part_names", "part_kinds", "part_usd", "domains", PRESENCE)
 
 
 @dataclass
@@ -58,8 +61,11 @@ class SceneObject:
     statics: dict[str, Static] = field(default_factory=dict)
     materials: list[str] = field(default_factory=list)
     face_materials: np.ndarray | None = None  # (F,) the material of each face, -1 for none
+    is_flipped: bool = False  # mirrored in some frames and not in others
     is_still: bool = False  # neither its points nor its place change
     still: np.ndarray | None = None  # its positions then, once they have been read
+    ids: np.ndarray | None = None  # those of points that may stand in another order in each frame
+    shown: np.ndarray = field(default_factory=lambda: np.ones((1, 1), bool))  # (T, 1) or (T, copies): frames that do
 
     @property
     def vertices(self) -> slice:
@@ -132,6 +138,32 @@ class SceneObject:
         }
         self.count, self.copies = self.count * copies, copies
 
+    def ordered(self, points: np.ndarray, ids: np.ndarray, where: str) -> np.ndarray:
+        """The points (n, 3) in the order of `self.ids`. Raises ClipError where their ids are others."""
+        rows = rows_by_id(ids, self.ids)
+        if not len(points) == len(ids) == len(rows) or (rows < 0).any():
+            raise ClipError(
+                f"{self.path}: got {len(points)} points with other ids in {where}, expected the {len(rows)} of the "
+                "first frame: points that appear or vanish cannot be read; write them as copies of a mesh with ids"
+            )
+        return points[rows]
+
+    def face_outward(self, matrix: Callable[[int], np.ndarray], frames: range, is_reversed: bool) -> None:
+        """Reverses the corners of faces that a transform mirrors, or, where the file lists corners the other way round,
+        of those that none does. matrix(frame) is (4, 4) or (copies, 4, 4)."""
+        turned = mirrored(matrix, frames)
+        self.is_flipped = not np.array_equal(turned, mirrored(matrix, frames[::-1]))
+        turned ^= is_reversed
+        if not turned.any():
+            return
+        faces = np.repeat(turned, len(self.face_counts) // len(turned))
+        order = np.arange(len(self.face_indices))
+        order = np.where(np.repeat(faces, self.face_counts), turned_corners(self.face_counts), order)
+        self.face_indices = self.face_indices[order]
+        for static in self.statics.values():
+            if static.domain == "corner":
+                static.values = static.values[order]
+
     def turn_normals(self, matrix: np.ndarray, moves: bool) -> None:
         """Transforms normals to world space; removes them where they turn in time, or have no direction there."""
         normals = self.statics.get("normals")
@@ -191,8 +223,11 @@ def clip_of_objects(
     known = _fields(attributes, domains)
     rest, links = known.pop("rest", None), known.pop("edges", None)
     polygons = _faces(objects, attributes)
+    metadata = metadata | _names_and_kinds(objects)
     left_out = [f"{obj.path}.{name}" for obj in objects for name in obj.left_out if name not in options.skip]
     not_read = more.pop("not_read", {}) | ({"attribute": left_out} if left_out else {})
+    if flipped := [obj.path for obj in objects if obj.is_flipped]:
+        not_read[FLIPPED] = flipped
     return MotionClip(
         frames,
         time,
@@ -202,7 +237,9 @@ def clip_of_objects(
         edges=_edges(objects) if links is None else links,
         faces=polygons,
         attributes=attributes,
-        metadata=metadata | _names_and_kinds(objects) | {"domains": domains},
+        metadata=metadata
+        | presence_metadata(metadata["part_names"], [obj.shown for obj in objects])
+        | {"domains": domains},
         **known,
         **more,
     )
@@ -284,6 +321,36 @@ def _names_and_kinds(objects: Sequence[SceneObject]) -> dict[str, Any]:
         "part_kinds": [obj.kind for obj in objects],
     }
     return metadata | ({"part_usd": [obj.details for obj in objects]} if any(obj.details for obj in objects) else {})
+
+
+def presence_metadata(names: Sequence[str], presence: Sequence[np.ndarray]) -> dict[str, Any]:
+    """Metadata: the frames that show each object, or each of its copies, that some frame does not show. presence:
+    (T, 1) or (T, copies) bool for each object."""
+    stated = {}
+    for name, shown in zip(names, presence):
+        if (shown == shown[:, :1]).all():
+            shown = shown[:, :1]
+        for copy in np.flatnonzero(~shown.all(axis=0)).tolist():
+            stated[name if shown.shape[1] == 1 else f"{name}:{copy}"] = frame_runs(shown[:, copy])
+    return {PRESENCE: stated} if stated else {}
+
+
+def mirrored(matrix: Callable[[int], np.ndarray], frames: Iterable[int]) -> np.ndarray:
+    """Whether a transform turns a mesh inside out, (1,) or (copies,) bool: matrix(frame) is (4, 4) or (copies, 4, 4).
+    The first frame that has an extent says so, because leaves may grow from a scale of 0."""
+    signs = np.zeros(1)
+    for frame in frames:
+        signs = np.where(signs == 0, np.sign(np.linalg.det(matrix(frame).reshape(-1, 4, 4)[:, :3, :3])), signs)
+        if signs.all():
+            break
+    return signs < 0
+
+
+def rows_by_id(ids: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+    """The row of each wanted id, (k,) among `ids` (n,); -1 for one that is not there."""
+    order = np.argsort(ids, kind="stable")
+    places = np.minimum(np.searchsorted(ids[order], wanted), max(len(ids) - 1, 0))
+    return np.where(ids[order][places] == wanted, order[places], -1) if len(ids) else np.full(len(wanted), -1)
 
 
 def _joined_statics(objects: list[SceneObject], skip: Collection[str]) -> tuple[dict[str, np.ndarray], dict[str, str]]:

@@ -1,11 +1,12 @@
 """Reads USD stages: meshes, curves and points whose points, transforms or skeletons move.
 
-Every visible prim of the kinds Mesh, BasisCurves, NurbsCurves, HermiteCurves and Points with the purpose "default" or
-"render" is read, also inside instances, into world space: time samples (interpolated as USD does), transforms, and of
-UsdSkel the skinning and the blend shapes. Each such prim in a prototype of a PointInstancer becomes one object, of as
-many copies as the instancer shows at any time. The frames are the whole time codes of the stage's range where it has
-one, else the time codes that have samples; options.fps sets another rate. Static primvars become attributes, the names
-of materials the metadata "material_names", of which the attribute "face_material" says the number for each face.
+Every prim of the kinds Mesh, BasisCurves, NurbsCurves, HermiteCurves and Points with the purpose "default" or "render"
+that some frame shows is read, also inside instances, into world space: time samples (interpolated as USD does),
+transforms, and of UsdSkel the skinning and the blend shapes. Visibility becomes presence. Each such prim in a prototype
+of a PointInstancer becomes one object, of as many copies as the frames show; ids say which copy is which. The frames
+are the whole time codes of the stage's range where it has one, else the time codes that have samples; options.fps sets
+another rate. Static primvars become attributes, the names of materials the metadata "material_names", of which the
+attribute "face_material" says the number for each face.
 
 Points are float32 in USD and so they are here. The stage is opened as it is composed (layers, payloads, value clips);
 what else it holds, such as layers that cannot be found, patches, tetrahedra, what is in materials, is named in the
@@ -18,7 +19,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
@@ -43,6 +44,7 @@ from athcodec.sources.scene_objects import (
     clip_of_objects,
     frames_of_objects,
     own_metadata,
+    rows_by_id,
     transformed,
 )
 
@@ -50,7 +52,7 @@ MAX_FRAMES = 1 << 24
 READ = frozenset(("", "Xform", "Scope", "SkelRoot", "Skeleton", "SkelAnimation", "BlendShape"))  # what is no loss
 WHOLE = ("Material",)  # prims that are named without those below them
 KNOWN = ("Material", "Camera", "GeomSubset")
-PLACES = ("positions", "orientations", "orientationsf", "scales")
+PLACES = ("positions", "orientations", "orientationsf", "scales", "protoIndices", "ids", "invisibleIds")
 PURPOSES = (UsdGeom.Tokens.default_, UsdGeom.Tokens.render)
 NAMES = {"st": "uv", "displayColor": "colors"}
 DOMAINS = {"vertex": "vertex", "varying": "vertex", "faceVarying": "corner", "uniform": "face", "constant": "constant"}
@@ -150,17 +152,19 @@ def _clip(source: _Stage, options: ReadOptions) -> MotionClip:
     objects = _find_objects(stage, options.only, not_read)
     skins = _bind_skeletons(stage, objects, not_read)
     codes, rate = _time_codes(stage, objects, options.fps, layer.pop("irregular", False))
-    objects = _visible(objects, codes, not_read)
-    _measure(objects, codes)
+    objects = _shown(objects, codes, not_read)
     cache = UsdGeom.XformCache()
 
-    def sample(obj: _Prim, frame: int) -> tuple[np.ndarray, np.ndarray]:
-        points, space = _points(obj, codes, frame), obj.prim if obj.skeleton is None else obj.skeleton.space
+    def matrix(obj: _Prim, frame: int) -> np.ndarray:
         cache.SetTime(codes[frame])
         if obj.instances is not None:
-            return points, obj.instances.matrices(cache, obj.prim, codes[frame])
-        return points, np.array(cache.GetLocalToWorldTransform(space))
+            return obj.instances.matrices(cache, obj.prim, frame)
+        return np.array(cache.GetLocalToWorldTransform(obj.prim if obj.skeleton is None else obj.skeleton.space))
 
+    def sample(obj: _Prim, frame: int) -> tuple[np.ndarray, np.ndarray]:
+        return _points(obj, codes, frame), matrix(obj, frame)
+
+    _measure(objects, codes, matrix)
     frames = frames_of_objects(objects, len(codes), sample, lambda frame: _frame_name(codes, frame), source.reading)
     return clip_of_objects(
         objects,
@@ -233,14 +237,16 @@ def _instanced(
     instancer: UsdGeom.PointInstancer, only: Sequence[str], not_read: dict[str, list[str]]
 ) -> Iterator[_Prim]:
     """What is in the prototypes of a PointInstancer, each as often as the instancer has it."""
-    path = instancer.GetPath()
-    indices = _array(instancer.GetProtoIndicesAttr().Get(Usd.TimeCode.EarliestTime()), np.int64)
+    path, indices = instancer.GetPath(), instancer.GetProtoIndicesAttr()
+    times = indices.GetTimeSamples() or [Usd.TimeCode.Default()]
+    used = set().union(*(indices.Get(time) or () for time in times))
+    copies = _Copies(instancer)
     if UsdGeom.Imageable(instancer).ComputePurpose() not in PURPOSES:
         not_read.setdefault("hidden", []).append(str(path))
         return
     for number, target in enumerate(instancer.GetPrototypesRel().GetForwardedTargets()):
-        rows, prototype = np.flatnonzero(indices == number), instancer.GetPrim().GetStage().GetPrimAtPath(target)
-        if not len(rows) or not prototype:
+        prototype = instancer.GetPrim().GetStage().GetPrimAtPath(target)
+        if number not in used or not prototype:
             continue
         prims = iter(Usd.PrimRange(prototype, Usd.TraverseInstanceProxies(Usd.PrimIsActive & Usd.PrimIsLoaded)))
         for prim in prims:
@@ -254,59 +260,135 @@ def _instanced(
             obj = _object(prim, wanted, not_read)
             if obj is not None:
                 obj.path = f"{path}:{obj.path.removeprefix(f'{path}/')}"
-                obj.instances = _Instances(instancer, prototype, rows)
+                obj.instances = _Instances(copies, number, prototype)
                 yield obj
 
 
-class _Instances:
-    """The copies of one prototype that a PointInstancer has: `rows` of its arrays."""
+class _Copies:
+    """The copies that a PointInstancer shows in the frames that are played, once `follow` has found them.
 
-    def __init__(self, instancer: UsdGeom.PointInstancer, prototype: Usd.Prim, rows: np.ndarray):
-        self.instancer, self.prototype, self.rows = instancer, prototype, rows
+    A copy is a row of the instancer's arrays or, where ids change in time, an id; ids ascend. `names` (k,) are the rows
+    or ids, `protos` (k,) the numbers of their prototypes, `shown` (T, k) the frames that show them.
+    """
 
-    @property
-    def attributes(self) -> list[Usd.Attribute]:
-        """Those that say which instances there are, and where."""
-        prim = self.instancer.GetPrim()
-        return [prim.GetAttribute(name) for name in PLACES if prim.HasAttribute(name)]
+    def __init__(self, instancer: UsdGeom.PointInstancer):
+        self.instancer = instancer
+        prim = instancer.GetPrim()
+        self.attributes = [prim.GetAttribute(name) for name in PLACES if prim.HasAttribute(name)]
+        self.names: np.ndarray | None = None
 
-    def keep_visible(self, codes: np.ndarray) -> None:
-        """Leaves out those that are not shown at any time. Raises ClipError where their number changes."""
-        indices = self.instancer.GetProtoIndicesAttr()
-        times = {float(codes[0])}
-        for attribute in (indices, self.instancer.GetInvisibleIdsAttr()):
-            times.update(time for time in attribute.GetTimeSamples() if codes[0] <= time <= codes[-1])
-        first = _array(indices.Get(codes[0]), np.int64)
-        shown = np.zeros(len(first), bool)
-        for time in sorted(times):
-            if not np.array_equal(_array(indices.Get(time), np.int64), first):
-                frame = min(int(np.searchsorted(codes, time - 1e-9)), len(codes) - 1)
-                raise ClipError(
-                    f"{self.instancer.GetPath()}: protoIndices changes in frame {frame} (time code {time:g}), expected "
-                    "the same instances in all"
-                )
-            mask = self.instancer.ComputeMaskAtTime(time)
-            shown |= np.array(mask, bool) if len(mask) else True
-        self.rows = self.rows[shown[self.rows]]
+    def follow(self, codes: np.ndarray) -> None:
+        """Finds the prototype of each copy and its row in each frame. Raises ClipError where a copy cannot be told."""
+        if self.names is not None:
+            return
+        schema, times = self.instancer, [float(codes[0])]
+        for attribute in (schema.GetProtoIndicesAttr(), schema.GetIdsAttr(), schema.GetInvisibleIdsAttr()):
+            times += attribute.GetTimeSamplesInInterval(_interval(codes))
+        times = np.unique(times)
+        used, self._states = np.unique(_held(times, codes), return_inverse=True)
+        self._codes, times = codes, times[used]  # In a frame holds what held at the last of these times.
+        protos, ids = (
+            [_array(attribute.Get(time), np.int64) for time in times]
+            for attribute in (schema.GetProtoIndicesAttr(), schema.GetIdsAttr())
+        )
+        self.follows_ids = any(not np.array_equal(own, ids[0]) for own in ids)
+        self.follows_ids &= all(len(own) == len(of) == len(np.unique(own)) for own, of in zip(ids, protos))
+        self.names = np.unique(np.concatenate(ids)) if self.follows_ids else np.arange(len(protos[0]))
+        self.protos = np.full(len(self.names), -1)
+        self._rows = np.empty((len(times), len(self.names)), np.int32)
+        self.shown = np.zeros(self._rows.shape, bool)
+        for state, count in enumerate(map(len, protos)):
+            if not self.follows_ids and count != len(self.names):
+                expected = f"{len(self.names)} as in frame 0; give the copies unique ids in all frames"
+                self._refuse(state, f"got {count} copies", expected)
+            rows = rows_by_id(ids[state], self.names) if self.follows_ids else self.names
+            there = np.flatnonzero(rows >= 0)
+            new = protos[state][rows[there]]
+            if ((self.protos[there] >= 0) & (self.protos[there] != new)).any():
+                self._refuse(state, "protoIndices changes", "the same shape of each copy in all frames")
+            self.protos[there] = new
+            mask = np.array(schema.ComputeMaskAtTime(times[state]), bool)
+            self._rows[state], self.shown[state] = rows, rows >= 0
+            if len(mask):
+                self.shown[state, there] = mask[rows[there]]
+        self.shown = self.shown[self._states]
+        self._hold()
 
-    def matrices(self, cache: UsdGeom.XformCache, prim: Usd.Prim, code: float) -> np.ndarray:
-        """(copies, 4, 4) from a prim of the prototype to the world, at the time of the cache."""
+    def _refuse(self, state: int, got: str, expected: str) -> None:
+        frame = int(np.flatnonzero(self._states == state)[0])
+        raise ClipError(f"{self.instancer.GetPath()}: {got} in {_frame_name(self._codes, frame)}, expected {expected}")
+
+    def _hold(self) -> None:
+        """Notes where copies stand in frames that do not have them: where they were last, or where they appear."""
+        absent, states = self._rows < 0, np.arange(len(self._rows))
+        last = np.maximum.accumulate(np.where(absent, -1, states[:, None]), axis=0)
+        following = np.minimum.accumulate(np.where(absent, states[-1], states[:, None])[::-1], axis=0)[::-1]
+        starts, stops = (np.searchsorted(self._states, states, side) for side in ("left", "right"))
+        frames = np.where(last >= 0, stops[last] - 1, starts[following])
+        self._sources = frames * len(self.names) + np.arange(
+            len(self.names)
+        )  # A frame that has the copy, and the copy.
+        self._held = np.unique(self._sources[absent])
+        self._places = np.zeros((len(self._held), 4, 4))
+        frames, copies = np.divmod(self._held, max(len(self.names), 1))
+        for frame in np.unique(frames):
+            own = frames == frame
+            self._places[own] = self._placed(frame)[self._rows[self._states[frame], copies[own]]]
+
+    def places(self, frame: int) -> np.ndarray:
+        """(copies, 4, 4) from the prototype to the instancer."""
+        state = self._states[frame]
+        rows, absent = self._rows[state], np.flatnonzero(self._rows[state] < 0)
+        found = self._placed(frame)
+        if not len(absent):
+            return found[rows]
+        out = np.empty((len(rows), 4, 4))
+        out[rows >= 0] = found[rows[rows >= 0]]
+        out[absent] = self._places[np.searchsorted(self._held, self._sources[state, absent])]
+        return out
+
+    def _placed(self, frame: int) -> np.ndarray:
+        """(rows, 4, 4) as the arrays have them."""
+        code = _code_of_order(self.instancer.GetIdsAttr(), float(self._codes[frame]))
         found = self.instancer.ComputeInstanceTransformsAtTime(
             code, code, UsdGeom.PointInstancer.IncludeProtoXform, UsdGeom.PointInstancer.IgnoreMask
         )
-        placed = np.array(found).reshape(-1, 4, 4)
-        if len(placed) <= self.rows.max(initial=-1):
+        placed, expected = np.array(found).reshape(-1, 4, 4), self._rows[self._states[frame]].max(initial=-1) + 1
+        if len(placed) < expected:
             raise ClipError(
-                f"{self.instancer.GetPath()}: got {len(placed)} positions at time code {code:g}, expected more"
+                f"{self.instancer.GetPath()}: got {len(placed)} positions at time code {code:g}, expected {expected}"
             )
+        return placed
+
+
+class _Instances:
+    """The copies of one prototype that a PointInstancer has."""
+
+    def __init__(self, copies: _Copies, number: int, prototype: Usd.Prim):
+        self.all, self.number, self.prototype = copies, number, prototype
+        self.instancer = copies.instancer
+
+    def choose(self, codes: np.ndarray) -> tuple[np.ndarray, list[str]]:
+        """The frames that show each copy, (T, copies); and the names of copies that none shows, which are left out."""
+        self.all.follow(codes)
+        own, seen = self.all.protos == self.number, self.all.shown.any(axis=0)
+        self.rows = np.flatnonzero(own & seen)
+        return self.all.shown[:, self.rows], [
+            f"{self.instancer.GetPath()}:{name}" for name in self.all.names[own & ~seen]
+        ]
+
+    def matrices(self, cache: UsdGeom.XformCache, prim: Usd.Prim, frame: int) -> np.ndarray:
+        """(copies, 4, 4) from a prim of the prototype to the world, at the time of the cache."""
         inner = np.array(cache.ComputeRelativeTransform(prim, self.prototype)[0])
-        return inner @ placed[self.rows] @ np.array(cache.GetLocalToWorldTransform(self.instancer.GetPrim()))
+        world = np.array(cache.GetLocalToWorldTransform(self.instancer.GetPrim()))
+        return inner @ self.all.places(frame)[self.rows] @ world
 
     def add_arrays(self, obj: _Prim, code: float) -> None:
         """Adds the static arrays that the instancer has for each of its copies."""
         for primvar in UsdGeom.PrimvarsAPI(self.instancer).GetPrimvarsWithValues():
             name, values = str(primvar.GetPrimvarName()), _numbers(primvar.ComputeFlattened(code))
-            if values is None or primvar.ValueMightBeTimeVarying() or len(values) <= self.rows.max(initial=-1):
+            changes = primvar.ValueMightBeTimeVarying() or self.all.follows_ids
+            if values is None or changes or len(values) <= self.rows.max(initial=-1):
                 obj.left_out.append(name)
             elif NAMES.get(name, name) not in obj.statics:
                 obj.left_out = [other for other in obj.left_out if other != NAMES.get(name, name)]
@@ -339,35 +421,71 @@ def _all_above(obj: _Prim) -> Iterator[Usd.Prim]:
         yield from _lineage(obj.instances.instancer.GetPrim())
 
 
-def _visible(objects: list[_Prim], codes: np.ndarray, not_read: dict[str, list[str]]) -> list[_Prim]:
-    """Those that are visible at some time from the first frame to the last."""
+def _shown(objects: list[_Prim], codes: np.ndarray, not_read: dict[str, list[str]]) -> list[_Prim]:
+    """The objects that a frame shows, with the frames that do; notes the others."""
+    known: dict[Sdf.Path, np.ndarray] = {}
 
-    def seen(prim: Usd.Prim) -> bool:
-        times = {float(codes[0])}
-        for ancestor in _lineage(prim):
-            attribute = UsdGeom.Imageable(ancestor).GetVisibilityAttr() if ancestor.IsA(UsdGeom.Imageable) else None
-            times.update(t for t in (attribute.GetTimeSamples() if attribute else ()) if codes[0] <= t <= codes[-1])
-        image = UsdGeom.Imageable(prim)
-        return any(image.ComputeVisibility(time) != UsdGeom.Tokens.invisible for time in times)
+    def inherited(prim: Usd.Prim) -> np.ndarray:
+        """(T,) whether a prim does not say that it is invisible."""
+        attribute = _visibility(prim)
+        if attribute is None:
+            return np.ones(len(codes), bool)
+        if prim.GetPath() not in known:
+            times = attribute.GetTimeSamples() if attribute.ValueMightBeTimeVarying() else [codes[0]]
+            values = np.array([attribute.Get(time) != UsdGeom.Tokens.invisible for time in times])
+            known[prim.GetPath()] = values[_held(times, codes)]
+        return known[prim.GetPath()]
 
-    left = []
+    chosen = []
     for obj in objects:
+        obj.shown = np.logical_and.reduce([inherited(prim) for prim in _hiding(obj)])[:, None]
         if obj.instances is not None:
-            obj.instances.keep_visible(codes)
-        place = obj.prim if obj.instances is None else obj.instances.instancer.GetPrim()
-        if seen(place) and (obj.instances is None or len(obj.instances.rows)):
-            left.append(obj)
+            shown, hidden = obj.instances.choose(codes)
+            obj.shown = obj.shown & shown
+            not_read.setdefault("hidden", []).extend(hidden)
+        if obj.shown.any():
+            chosen.append(obj)
         else:
             not_read.setdefault("hidden", []).append(obj.path)
-    if not left:
-        raise ClipError(f"prims: got {len(objects)} that are invisible, expected a visible one")
-    return left
+    if hidden := list(dict.fromkeys(not_read.pop("hidden", ()))):
+        not_read["hidden"] = hidden
+    if not chosen:
+        raise ClipError(f"prims: got {len(objects)} that no frame shows, expected a visible one")
+    return chosen
 
 
-def _measure(objects: list[_Prim], codes: np.ndarray) -> None:
-    """Fills in what the objects are at the first frame."""
+def _hiding(obj: _Prim) -> Iterator[Usd.Prim]:
+    """The prims that hide an object where they are invisible."""
+    for prim in _lineage(obj.prim):
+        if obj.instances is not None and prim == obj.instances.prototype:
+            yield from _lineage(obj.instances.instancer.GetPrim())
+            return
+        yield prim
+
+
+def _visibility(prim: Usd.Prim) -> Usd.Attribute | None:
+    return UsdGeom.Imageable(prim).GetVisibilityAttr() if prim.IsA(UsdGeom.Imageable) else None
+
+
+def _held(times: Sequence[float], codes: np.ndarray) -> np.ndarray:
+    """(T,) the number of the time whose sample holds at each time code."""
+    return np.maximum(np.searchsorted(times, codes + 1e-6, "right") - 1, 0)
+
+
+def _code_of_order(ids: Usd.Attribute, code: float) -> float:
+    """The time code at which to read arrays whose order `ids` says: the code, or, where USD would mix two orders
+    between samples, that of the sample before it."""
+    if ids.GetNumTimeSamples() < 2:
+        return code
+    low, high = ids.GetBracketingTimeSamples(code + 1e-6)
+    return code if np.array_equal(_array(ids.Get(low), np.int64), _array(ids.Get(high), np.int64)) else low
+
+
+def _measure(objects: list[_Prim], codes: np.ndarray, matrix: Callable[[_Prim, int], np.ndarray]) -> None:
+    """Fills in what the objects are at the first frame; `matrix` is from an object to the world in a frame."""
     first, cache = 0, UsdGeom.XformCache(codes[0])
     for obj in objects:
+        _follow_ids(obj, codes)
         points = _points(obj, codes, 0)
         obj.first, obj.count = first, len(points)
         obj.moves = obj.skeleton is not None or any(
@@ -375,7 +493,7 @@ def _measure(objects: list[_Prim], codes: np.ndarray) -> None:
             for prim in _all_above(obj)
         )
         if obj.instances is not None:
-            obj.moves |= any(attribute.ValueMightBeTimeVarying() for attribute in obj.instances.attributes)
+            obj.moves |= any(attribute.ValueMightBeTimeVarying() for attribute in obj.instances.all.attributes)
         obj.is_rigid = not obj.points.ValueMightBeTimeVarying()
         obj.is_still = not obj.moves and obj.is_rigid
         _topology(obj, codes)
@@ -384,9 +502,25 @@ def _measure(objects: list[_Prim], codes: np.ndarray) -> None:
             obj.statics.pop("normals", None)  # they turn with each copy
             obj.repeat(len(obj.instances.rows))
             obj.instances.add_arrays(obj, codes[0])
+        if obj.kind == "mesh":
+            is_reversed = UsdGeom.Mesh(obj.prim).GetOrientationAttr().Get() == UsdGeom.Tokens.leftHanded
+            is_reversed ^= obj.skeleton is not None and obj.skeleton.mirrors(obj.count, codes[0])
+            frames = range(len(codes) if obj.moves else 1)
+            obj.face_outward(lambda frame, obj=obj: matrix(obj, frame), frames, is_reversed)
         first += obj.count
     if first == 0:
         raise ClipError("points: got none, expected at least one")
+
+
+def _follow_ids(obj: _Prim, codes: np.ndarray) -> None:
+    """Notes the ids of points that stand in another order in some frame."""
+    if obj.kind != "points":
+        return
+    attribute = UsdGeom.Points(obj.prim).GetIdsAttr()
+    first = _array(attribute.Get(codes[0]), np.int64)
+    times = Usd.AttributeQuery(attribute).GetTimeSamplesInInterval(_interval(codes)) if attribute else ()
+    if len(np.unique(first)) == len(first) and not all(np.array_equal(attribute.Get(time), first) for time in times):
+        obj.ids = np.sort(first)
 
 
 def _topology(obj: _Prim, codes: np.ndarray) -> None:
@@ -394,7 +528,8 @@ def _topology(obj: _Prim, codes: np.ndarray) -> None:
         mesh = UsdGeom.Mesh(obj.prim)
         obj.face_counts = _fixed(obj, mesh.GetFaceVertexCountsAttr(), codes)
         obj.face_indices = _fixed(obj, mesh.GetFaceVertexIndicesAttr(), codes)
-        _note(obj, "orientation", mesh.GetOrientationAttr(), "rightHanded")
+        if mesh.GetDoubleSidedAttr().Get():
+            obj.details["doubleSided"] = "true"
         _bind_materials(obj)
     elif obj.kind == "curves":
         obj.curve_counts = _fixed(obj, UsdGeom.Curves(obj.prim).GetCurveVertexCountsAttr(), codes)
@@ -481,7 +616,9 @@ def _sampled(objects: list[_Prim]) -> list[float]:
     for obj in objects:
         found.update(obj.points.GetTimeSamples())
         prims = [*_all_above(obj), *(() if obj.skeleton is None else _lineage(obj.skeleton.query.GetPrim()))]
-        for attribute in () if obj.instances is None else obj.instances.attributes:
+        attributes = [] if obj.instances is None else list(obj.instances.all.attributes)
+        attributes += filter(None, map(_visibility, _hiding(obj)))
+        for attribute in attributes:
             found.update(attribute.GetTimeSamples())
         for prim in prims:
             if prim.IsA(UsdGeom.Xformable):
@@ -531,6 +668,9 @@ def _statics(obj: _Prim, codes: np.ndarray, matrix: np.ndarray) -> None:
     obj.turn_normals(matrix, obj.moves)
     if obj.kind != "mesh":
         _widths(obj, codes, matrix)
+    if obj.ids is not None:  # Arrays that keep their order do not follow the points.
+        obj.left_out += [name for name, static in obj.statics.items() if static.domain == "vertex"]
+        obj.statics = {name: static for name, static in obj.statics.items() if static.domain != "vertex"}
     rest = obj.statics.get("rest")
     if rest is not None and rest.values.shape[1:] == (3,) and rest.values.dtype.kind == "f":
         obj.statics["rest"] = Static(rest.domain, transformed(rest.values, matrix))
@@ -658,6 +798,16 @@ class _Skeleton:
     def space(self) -> Usd.Prim:
         return self.query.GetPrim() if self.skins else self.target.GetPrim()
 
+    def mirrors(self, count: int, code: float) -> bool:
+        """Whether skinning turns a mesh of so many points inside out, by the joint that moves most of them."""
+        joints = self.largest(count)
+        joints = joints[joints >= 0]
+        if not len(joints):
+            return False
+        matrix = np.array(self.query.ComputeSkinningTransforms(code)[int(np.bincount(joints).argmax())])
+        bind = np.array(self.target.GetGeomBindTransform())
+        return bool(np.linalg.det(bind[:3, :3]) * np.linalg.det(matrix[:3, :3]) < 0)
+
     def largest(self, count: int) -> np.ndarray:
         """(count,) joint of the skeleton with the largest weight on each vertex, -1 for none."""
         found = self.target.ComputeVaryingJointInfluences(count) if self.skins else None
@@ -731,12 +881,19 @@ def _skin(objects: list[_Prim], queries: list[tuple[Any, UsdSkel.SkeletonQuery]]
 
 
 def _points(obj: _Prim, codes: np.ndarray, frame: int) -> np.ndarray:
-    points = obj.points.Get(codes[frame])
+    ids = None if obj.ids is None else UsdGeom.Points(obj.prim).GetIdsAttr()
+    code = float(codes[frame]) if ids is None else _code_of_order(ids, float(codes[frame]))
+    points = obj.points.Get(code)
     if points is None:
         raise ClipError(f"{obj.path}: got no points in {_frame_name(codes, frame)}")
     if obj.skeleton is not None:
-        points = obj.skeleton.deform(points, float(codes[frame]))
-    return np.array(points, np.float32).reshape(-1, 3)
+        points = obj.skeleton.deform(points, code)
+    points = np.array(points, np.float32).reshape(-1, 3)
+    return (
+        points
+        if ids is None
+        else obj.ordered(points, _array(ids.Get(code + 1e-6), np.int64), _frame_name(codes, frame))
+    )
 
 
 def _frame_name(codes: np.ndarray, frame: int) -> str:

@@ -70,6 +70,22 @@ cases.unanswerable = async () => {
     refused: [await refusal(motion.show(0, 99)), await refusal(motion.positions(0, -1)), await refusal(motion.nodeNumbers(0))] });
 };
 
+// The vertices that are drawn in each frame.
+cases.presence = async () => {
+  const { ath, motion } = await load(), times = AthFile.open(data).times(), drawn = [];
+  await ath.arrays;
+  const { index, userData: { source } } = ath.geometry;
+  for (let frame = 0; frame < times.length; frame++) {
+    motion.setTime(times[frame] - times[0]);
+    await until(() => motion.frame === frame);
+    const vertices = new Set();
+    for (let i = 0; i < index.count; i += 3)
+      if (index.array[i] !== index.array[i + 1]) for (let k = 0; k < 3; k++) vertices.add(source[index.array[i + k]]);
+    drawn.push([...vertices].sort((a, b) => a - b));
+  }
+  return drawn;
+};
+
 // The levels that four segments reach, and what is said.
 cases.damaged = async () => {
   const { ath, motion } = await load(), failures = [], note = ({ message, codeName, level }) => failures.push([message, codeName, level]);

@@ -215,7 +215,9 @@ void DefineObject(const SdfPrimSpecHandle &root, const std::string &name, const 
         Token(object->prim, "subdivisionScheme", "none");
         Ints(object->prim, "faceVertexCounts", std::vector<int>(counts, counts + object->face_count));
         Ints(object->prim, "faceVertexIndices", own);
-        if (Text(object->details, "orientation") == "leftHanded") Token(object->prim, "orientation", "leftHanded");
+        if (Text(object->details, "doubleSided") == "true")
+            Attribute(object->prim, "doubleSided", SdfValueTypeNames->Bool, SdfVariabilityUniform)
+                ->SetDefaultValue(VtValue(true));
     } else if (object->kind == "curves") {
         object->prim = SdfPrimSpec::New(root, name, SdfSpecifierDef, "BasisCurves");
         Ints(object->prim, "curveVertexCounts", object->curves);

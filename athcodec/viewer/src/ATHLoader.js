@@ -6,6 +6,7 @@ import { Box3, Group, LineBasicMaterial, LineSegments, Loader, Mesh, MeshStandar
 
 import { ATHMotion, eased, failureOf, restBounds } from "./ATHMotion.js";
 import { addAttributes, lineGeometry, meshGeometry, polygonsOf } from "./geometry.js";
+import { Presence } from "./presence.js";
 
 const EASING_MS = 16; // between two steps of the rest pose
 
@@ -274,11 +275,13 @@ export class ATH extends EventDispatcher {
   #lines = null;
   #object = null;
   #loaded = null;
+  #presence = new Presence();
 
   constructor(channel, mode) {
     super();
     this.#channel = channel;
     this.motion = channel.view().setMode(mode);
+    this.motion.addEventListener("frame", () => this.#hide(false));
     this.metadata = channel.statics.metadata;
     this.#faces = polygonsOf(channel.statics, {});
     this.arrays = channel.arrays.then((attributes) => this.#addArrays(attributes));
@@ -303,6 +306,7 @@ export class ATH extends EventDispatcher {
     if (!this.#geometry && this.#faces) {
       this.#geometry = this.motion.attach(meshGeometry(this.#channel, this.#faces));
       addAttributes(this.#geometry, this.#channel, this.attributes);
+      this.#hide(true);
     }
     return this.#geometry;
   }
@@ -310,8 +314,10 @@ export class ATH extends EventDispatcher {
   /** Edges as lines: those of the file or, where it has neither edges nor faces, of the branches. */
   get lines() {
     const { statics } = this.#channel;
-    if (!this.#lines && (statics.edges || !this.#faces))
+    if (!this.#lines && (statics.edges || !this.#faces)) {
       this.#lines = this.motion.attach(lineGeometry(this.#channel, statics.edges ?? statics.skeleton));
+      this.#hide(true);
+    }
     return this.#lines;
   }
 
@@ -323,6 +329,10 @@ export class ATH extends EventDispatcher {
       this.#draw();
     }
     return this.#object;
+  }
+
+  #hide(fresh) {
+    this.#presence.show(this, [this.#geometry, this.#lines].filter(Boolean), fresh);
   }
 
   #draw() {
@@ -378,6 +388,7 @@ export class ATH extends EventDispatcher {
     this.#faces ??= polygonsOf(this.#channel.statics, attributes);
     if (this.#geometry) addAttributes(this.#geometry, this.#channel, attributes);
     if (this.#object && this.#faces) this.#draw();
+    this.#hide(true);
     this.dispatchEvent({ type: "arrays" });
     return attributes;
   }

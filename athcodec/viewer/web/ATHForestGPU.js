@@ -1,4 +1,4 @@
-import{Box3 as Jt,BufferAttribute as ct,DoubleSide as Xt,Group as Kt,IndirectStorageBufferAttribute as Zt,LineBasicNodeMaterial as Qt,LineSegments as te,Mesh as ee,MeshStandardNodeMaterial as se,Frustum as ie,Matrix4 as ft,StorageBufferAttribute as re,TSL as P,Vector3 as $,WebGPUCoordinateSystem as oe}from"three/webgpu";var Q=`// The blocks of a level and of a segment, as core/ath_gpu.h lays them out. This text stands in front of time, hierarchy and finish.
+import{Box3 as Jt,BufferAttribute as ct,DoubleSide as Xt,Group as Kt,IndirectStorageBufferAttribute as Zt,LineBasicNodeMaterial as Qt,LineSegments as te,Mesh as ee,MeshStandardNodeMaterial as se,Frustum as ie,Matrix4 as ft,StorageBufferAttribute as re,TSL as P,Vector3 as $,WebGPUCoordinateSystem as oe}from"three/webgpu";var Q=`// The blocks of a level and of a segment, as core/include/ath_gpu.h lays them out. This text stands in front of time, hierarchy and finish.
 
 @group(0) @binding(0) var<storage, read> level: array<u32>;
 @group(0) @binding(1) var<storage, read> segments: array<u32>; // blocks one behind the other

@@ -1,0 +1,97 @@
+"""Presence over time: the frames of a clip in which each of its objects is shown.
+
+metadata["presence"] has an entry for each object that is not shown throughout: its name in "part_names", or
+"name:number" for one of several copies of one shape, and the frames that show it as [first, stop] pairs. Hidden
+vertices keep positions, which count like all others: for the diagonal, the error bound and the size of the file.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+PRESENCE = "presence"
+FAR = 1.1  # Ratio of the diagonals with and without a hidden part above which the part is named.
+
+
+def frame_runs(shown: np.ndarray) -> list[list[int]]:
+    """The [first, stop] frames of each run of True in `shown` (T,)."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], shown, [False]])))
+    return edges.reshape(-1, 2).tolist()
+
+
+def stated_presence(metadata: Mapping[str, Any]) -> dict[str, list[list[int]]]:
+    """metadata["presence"], without entries that are no list of [first, stop] frames."""
+    stated = metadata.get(PRESENCE)
+    return {name: runs for name, runs in stated.items() if _are_runs(runs)} if isinstance(stated, dict) else {}
+
+
+def _are_runs(runs: Any) -> bool:
+    pairs = isinstance(runs, list) and all(isinstance(run, list) and len(run) == 2 for run in runs)
+    return pairs and all(type(frame) is int and 0 <= frame < 1 << 31 for run in runs for frame in run)
+
+
+def presence_within(metadata: Mapping[str, Any], frames: range) -> dict[str, Any]:
+    """The metadata of these frames of a clip: its presence is cut to them and counted from the first of them."""
+    if PRESENCE not in metadata:
+        return dict(metadata)
+    cut = {}
+    for name, runs in stated_presence(metadata).items():
+        bounds = [[max(first, frames.start), min(stop, frames.stop)] for first, stop in runs]
+        kept = [[first - frames.start, stop - frames.start] for first, stop in bounds if first < stop]
+        if kept != [[0, len(frames)]]:
+            cut[name] = kept
+    return {key: value for key, value in metadata.items() if key != PRESENCE} | ({PRESENCE: cut} if cut else {})
+
+
+def presence_of_parts(
+    metadata: Mapping[str, Any], names: Sequence[str], copies: Sequence[int], frame_count: int
+) -> dict[int, np.ndarray]:
+    """By the number of each object that is not shown throughout: the frames that show it, (T, 1) bool, or those that
+    show each of its copies, (T, copies)."""
+    found: dict[int, np.ndarray] = {}
+    stated = stated_presence(metadata)
+    places = {name: number for number, name in enumerate(names)} if stated else {}
+    for key, runs in stated.items():
+        name, copy = (key, "") if key in places else key.rpartition(":")[::2]
+        part = places.get(name)
+        if part is None or copy and not (copy.isdecimal() and int(copy) < copies[part]):
+            continue
+        shown = np.zeros(frame_count, bool)
+        for first, stop in runs:
+            shown[first:stop] = True
+        if copy:
+            found.setdefault(part, np.ones((frame_count, copies[part]), bool))[:, int(copy)] = shown
+        else:
+            found[part] = shown[:, None]
+    return found
+
+
+def parts_hidden_far_away(clip: Any) -> list[str]:
+    """The names of objects whose hidden positions alone make the diagonal of what is shown more than FAR times as
+    long. Reads every frame of a MotionClip that has presence."""
+    counts, names = clip.attributes.get("part_vertex_counts"), clip.metadata.get("part_names")
+    if not stated_presence(clip.metadata) or counts is None or np.shape(counts) != np.shape(names):
+        return []
+    copies = clip.attributes.get("part_copies", np.ones_like(counts))
+    found = presence_of_parts(clip.metadata, names, copies.tolist(), clip.frame_count)
+    starts = np.cumsum(counts) - counts
+    low, high = (
+        np.full((2, len(names) + 1, 3), np.inf) * np.array([1, -1])[:, None, None]
+    )  # The last row is what is shown.
+    for start, block in clip.blocks():
+        for frame, positions in enumerate(block, start):
+            is_shown = np.ones(len(positions), bool)
+            for part, shown in found.items():
+                rows = slice(starts[part], starts[part] + counts[part])
+                is_shown[rows] = np.repeat(shown[frame], counts[part] // shown.shape[1])
+                hidden = positions[rows][~is_shown[rows]]
+                low[part] = np.minimum(low[part], hidden.min(axis=0, initial=np.inf))
+                high[part] = np.maximum(high[part], hidden.max(axis=0, initial=-np.inf))
+            low[-1] = np.minimum(low[-1], positions[is_shown].min(axis=0, initial=np.inf))
+            high[-1] = np.maximum(high[-1], positions[is_shown].max(axis=0, initial=-np.inf))
+    with np.errstate(invalid="ignore"):  # inf - inf where nothing is shown or hidden
+        diagonals = np.linalg.norm(np.maximum(high, high[-1]) - np.minimum(low, low[-1]), axis=1)
+        return [names[part] for part in found if diagonals[part] > FAR * diagonals[-1]]
