@@ -63,10 +63,10 @@ def objects_of(motion: Any) -> list[SceneObject]:
         faces = np.asarray(face_counts[low:high]), face_indices[rows] - first
         face_rows = slice(int(low), int(high))
         objects.append(SceneObject(name, kind, first, int(count), faces, next(curves), face_rows, rows, detail))
-    said = _copies(motion, len(objects))
+    copy_counts = _copies(motion, len(objects))
     is_one_clip = len(getattr(motion, "clip_ranges", ())) < 2
-    presence = presence_of_parts(motion.metadata, names, said, motion.frame_count) if is_one_clip else {}
-    for number, (obj, copies) in enumerate(zip(objects, said)):
+    presence = presence_of_parts(motion.metadata, names, copy_counts, motion.frame_count) if is_one_clip else {}
+    for number, (obj, copies) in enumerate(zip(objects, copy_counts)):
         obj.shown = presence.get(number)
         obj.copies = copies if 1 < copies <= obj.count and _repeats(obj, copies) else 1
     return objects
