@@ -138,7 +138,7 @@ return new Type(this.c.memory.buffer, at, length);
 copy(Type, at, length) {
 return this.view(Type, at >>> 0, length).slice();
 }
-// What `call` returns, given `size` bytes of memory for its results.
+// Returns what `call` returns, given `size` bytes of memory for its results.
 with(size, call) {
 const at = this.take(size);
 try {
@@ -305,7 +305,7 @@ needsHostMesh = true;   // until the rest pose is known
 #own = null;            // the Core, until dispose()
 #at = 0;                // the ath_file
 #chunks = [];           // as chunks() has them; `at`: a copy of their bytes, of which `filled` are there
-#pointers = new Map();  // of segments that are prepared: {at, kept}
+#pointers = new Map();  // By prepared segment: {at, kept}.
 #preparing = new Map(); // index of a segment: how many preparations that may read it are under way
 #works = [];            // ath_works that nobody uses
 #scratch = { at: 0, size: 0 };
@@ -390,7 +390,7 @@ return this.#core.c;
 #check(code, what) {
 if (code !== OK) throw this.#core.error(code, what);
 }
-// What `call` returns, given the address of a fault; throws what it filled in unless the code is `allowed`.
+// Returns what `call` returns, given the address of a fault; throws that fault unless the code is `allowed`.
 #checkFault(call, allowed = OK) {
 return this.#core.with(FAULT_SIZE, (fault) => {
 const code = call(fault);
@@ -620,7 +620,7 @@ for (const index of reads) this.#preparing.set(index, (this.#preparing.get(index
 try {
 this.#refine(level);
 at = core.take(size);
-let code = BAD_ARGUMENT; // of what cannot be gone on from
+let code = BAD_ARGUMENT; // Such a segment cannot be gone on from.
 if (before) code = c.ath_prepare_onward(work, workSize, this.#at, before.at, before.kept, level, at, size);
 if (code === BAD_ARGUMENT) {
 before = null;
@@ -685,7 +685,7 @@ if (code !== HELD) this.#check(code, "playing");
 out.set(this.#core.view(out.constructor, at, length));
 return out;
 }
-// What `call` shows of segments, given the address of an array of pointers to them, and their number.
+// Returns what `call` shows of segments, given the address of an array of pointers to them, and their number.
 #show(segments, frame, out, length, call) {
 number(frame, "frame");
 const pointers = Array.from(segments, (segment) => this.#pointer(segment));
@@ -700,7 +700,7 @@ if (at !== undefined) return at;
 if (segment instanceof Segment && segment.freed) return 0;
 throw new TypeError("segments: got something else, expected what prepare() of this file returned");
 }
-// What `call` shows, given the address of an ath_fade, too: levels and their weights.
+// Returns what `call` shows, given the address of an ath_fade, too: levels and their weights.
 #showFaded(fade, segments, frame, out, length, call) {
 whole(fade.levels.length, 1, FADE_LEVELS, "levels of fade");
 if (!(out instanceof Float32Array)) throw new TypeError("out: got something else, expected a Float32Array of a fade");

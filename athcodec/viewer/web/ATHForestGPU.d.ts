@@ -46,7 +46,7 @@ export class ATHForest extends Group {
   readonly count: number;
   /** Plants that are computed: one of each clip and phase in use. */
   readonly plantCount: number;
-  /** Of each of them the name of its clip and its phase, 0 to 1 of the clip. */
+  /** For each of them: the name of its clip and its phase, 0 to 1 of the clip. */
   readonly plants: [string, number][];
   /** Names of the clips that are shown, or will be once they are here. */
   readonly clips: string[];
@@ -73,7 +73,7 @@ export class ATHForest extends Group {
    * the file's own, radians, whatever the angle of an instance; null (default): each blows as it is turned itself. A turned motion
    * keeps no lengths where it is large. */
   sway(strength: number, heading?: number | null): this;
-  /** What is shown at `seconds`: once per frame, before rendering. height: of the screen, in pixels. */
+  /** Shows `seconds`: to be called once per frame, before rendering. height: the screen's, in pixels. */
   update(camera: Camera, height: number, seconds: number): void;
   /** Instances drawn by the last update(), by level: read back. */
   drawn(): Promise<number[]>;
