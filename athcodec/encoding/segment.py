@@ -62,15 +62,15 @@ class Source:
     host_rest: bool = False
     rest_precision: RestPrecision = RestPrecision()
     reference: np.ndarray | None = None  # (N, 3) float64 less the origin; None: the rest pose.
-    polygons: Polygons | None = None  # What the file stores as FACES.
+    polygons: Polygons | None = None  # Polygons that the file stores as FACES.
     without: frozenset[Feature] = frozenset()  # Features that the file does without.
     source_rest: np.ndarray = field(init=False)  # (N, 3) float64 less the origin.
     rest: np.ndarray = field(init=False)  # (N, 3) float64 less the origin: the reference pose.
     origin: np.ndarray = field(init=False)  # (3,) float64
     details: np.ndarray = field(init=False)  # (B,) int32 (FORMAT.md, Detail).
     sheet_like: np.ndarray = field(init=False)  # (B,) bool: branches that do not look like beams.
-    clip_range_segments: list[list[tuple[int, int]]] = field(init=False)  # Those of each clip of the file.
-    segments: list[tuple[int, int]] = field(init=False)  # Those of all clips.
+    clip_range_segments: list[list[tuple[int, int]]] = field(init=False)  # Segments of each clip of the file.
+    segments: list[tuple[int, int]] = field(init=False)  # Segments of all clips.
     _held: WeakValueDictionary[int, np.ndarray] = field(init=False, repr=False, compare=False)  # Positions by segment.
 
     def __post_init__(self) -> None:

@@ -29,7 +29,7 @@ class Settings:
 
     bound: float
     largest_bound: float  # The bound of the vertex with the largest weight.
-    limit: float | np.ndarray  # What positions are held to: one distance, or one for each vertex, (N,).
+    limit: float | np.ndarray  # Largest error of positions: one distance, or one for each vertex, (N,).
     step: float
     level_steps: np.ndarray  # (levels,) factors on the step.
     rest_step: float
@@ -128,7 +128,7 @@ class Choice:
 
     settings: Settings
     first_layer: Settings
-    learned_modes: LearnedModes | None  # Those of the last layer.
+    learned_modes: LearnedModes | None  # Learned modes of the last layer.
     reference: np.ndarray | None = None  # (N, 3) pose that motion is coded about, less the origin; None: the rest pose.
     predicted: bool | None = None  # Whether vertices are points of the lattice, where motion is predicted.
     error_share: float = 1.0  # Share of the limits that the errors of predicted motion may take.

@@ -49,11 +49,13 @@ class Trials:
 
     source: Source
     ath: Ath
-    start: Settings  # Those that the search starts with.
+    start: Settings  # Settings that the search starts with.
     samples: Sequence[SegmentSample]  # From calm to wild.
     jobs: int | None = None
-    count: TrialCount = field(default_factory=TrialCount)  # What is reported of the whole search.
-    extrapolation: ExtrapolationFactors | None = None  # What the plant has over its sample; None: it is all there.
+    count: TrialCount = field(default_factory=TrialCount)  # Count that the whole search reports.
+    extrapolation: ExtrapolationFactors | None = (
+        None  # Factors from the sample to the plant; None: the sample is the plant.
+    )
     _counted: int = field(init=False, default=0)  # Trials that have been reported.
     _known: dict[tuple, tuple[float, np.ndarray]] = field(init=False, default_factory=dict)
     _components: dict[tuple, Components] = field(init=False, default_factory=dict)

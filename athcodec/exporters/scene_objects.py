@@ -37,7 +37,7 @@ class SceneObject:
     corner_rows: slice
     details: dict[str, str]
     copies: int = 1  # its vertices and faces are so many copies of one shape
-    target: Any = None  # what a writer makes of it
+    target: Any = None  # The writer's own object for it.
     instancer: Any = None  # and of its copies
     width: float = 0.0  # the largest, of curves and points
     shown: np.ndarray | None = None  # (T, 1) or (T, copies) bool, the frames that show it or its copies; None: all

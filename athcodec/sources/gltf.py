@@ -44,10 +44,10 @@ from athcodec.sources.scene_objects import (
 
 WORK_BYTES = 64 << 20
 MOST_VERTICES = 1 << 27
-INSTANCE_BYTES = 256  # what an instance takes
-CORNER_BYTES = 96  # what a corner of a face takes, of which strips make three
-INFLUENCE_BYTES = 100  # what a joint of a vertex takes
-VERTEX_BYTES = 160  # what a vertex takes in the poses that are held and made
+INSTANCE_BYTES = 256  # Bytes that an instance takes.
+CORNER_BYTES = 96  # Bytes that a corner of a face takes; strips make three of each.
+INFLUENCE_BYTES = 100  # Bytes that a joint of a vertex takes.
+VERTEX_BYTES = 160  # Bytes that a vertex takes in the poses that are held and made.
 MOST_FRAMES = 1 << 20
 KINDS = ("points", "curves", "mesh")  # the last that a node has is what it is
 MODE_KINDS = ("points", "curves", "curves", "curves", "mesh", "mesh", "mesh")
@@ -58,8 +58,8 @@ ANIMATION = "animation:"
 INSTANCING = "EXT_mesh_gpu_instancing"
 COPIES = "copies"  # true in the extras of a node: those below show one shape, and are one object; false: or are not
 INSTANCE_PARTS = {"TRANSLATION": 3, "ROTATION": 4, "SCALE": 3}
-REST_ROUNDING = 1e-6  # of the largest coordinate, by which joints may miss the mesh that they leave as it is
-SAME = 1e-5  # of the size: how far off the end of a loop may be from its beginning
+REST_ROUNDING = 1e-6  # Distance by which joints may miss the unmoved mesh, over its largest coordinate.
+SAME = 1e-5  # Distance between the ends of a loop, over the plant's size.
 
 
 def read_clip(path: str | PathLike[str], options: ReadOptions) -> MotionClip:
@@ -243,7 +243,7 @@ def _clip(
             **branches,
         )
         clips[name].rest_given = options.rest == "auto"
-        rest = clips[name].source_rest  # of several, the same for all
+        rest = clips[name].source_rest  # All clips have the same rest pose.
     return join(clips) if options.takes else clips[""]
 
 

@@ -20,14 +20,14 @@ from athcodec.motion.frames import Frames
 from athcodec.motion.presence import PRESENCE, frame_runs
 from athcodec.sources import ReadOptions
 
-MOST_VERTICES = 1 << 27  # of copies
+MOST_VERTICES = 1 << 27  # Largest number of vertices that copies may make.
 MAX_METADATA_BYTES = 1 << 24
 DESCRIPTOR = ".descriptor"  # behind the name of an array's property in an Alembic file: that of its ArrayDescriptor
 FACE_MATERIAL, MATERIAL_NAMES = "face_material", "material_names"  # an attribute, and metadata
 FLIPPED = "faces that turn inside out in time"  # in not_read: objects that a transform mirrors in some frames alone
 TWO_SIDES = {"doubleSided": True}  # glTF's material of faces that are seen from both sides and have no other
 OWN = "athcodec"  # the namespace of what our writers add to files of other formats
-SCENE_KEYS = {"unit": str, "up_axis": str, "fps": float}  # of metadata, which some formats have no place for
+SCENE_KEYS = {"unit": str, "up_axis": str, "fps": float}  # Members of the metadata that some formats have no place for.
 KNOWN_METADATA = ("fps", "start_frame", "meters_per_unit", "part_names", "part_kinds", "part_usd", "domains", PRESENCE)
 
 
@@ -64,7 +64,7 @@ class SceneObject:
     is_flipped: bool = False  # mirrored in some frames and not in others
     is_still: bool = False  # neither its points nor its place change
     still: np.ndarray | None = None  # its positions then, once they have been read
-    ids: np.ndarray | None = None  # those of points that may stand in another order in each frame
+    ids: np.ndarray | None = None  # Identities of points that may stand in another order in each frame.
     shown: np.ndarray = field(default_factory=lambda: np.ones((1, 1), bool))  # (T, 1) or (T, copies): frames that do
 
     @property

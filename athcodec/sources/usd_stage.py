@@ -49,7 +49,9 @@ from athcodec.sources.scene_objects import (
 )
 
 MAX_FRAMES = 1 << 24
-READ = frozenset(("", "Xform", "Scope", "SkelRoot", "Skeleton", "SkelAnimation", "BlendShape"))  # what is no loss
+READ = frozenset(
+    ("", "Xform", "Scope", "SkelRoot", "Skeleton", "SkelAnimation", "BlendShape")
+)  # Prims whose types need no note when they are not read.
 WHOLE = ("Material",)  # prims that are named without those below them
 KNOWN = ("Material", "Camera", "GeomSubset")
 PLACES = ("positions", "orientations", "orientationsf", "scales", "protoIndices", "ids", "invisibleIds")

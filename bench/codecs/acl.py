@@ -28,7 +28,7 @@ from bench.codecs.tree import VertexOrder, memo, ordered, read_order, read_pose,
 
 SEGMENT = 16  # frames
 MOST_BITS = 19
-RANGE_STEPS = 8  # of a range's ends, in the error of a number
+RANGE_STEPS = 8  # Steps of a range's ends, per error of a number.
 HELD = 1e-4  # how much a hinge is drawn to the bone's middle, over what the motion says
 BLOCK = 1024  # vertices
 
@@ -40,7 +40,7 @@ class SkeletalTracks(Baseline):
 
     def __init__(self, tiers: int = 2):
         super().__init__()
-        self.tiers = tiers  # that are read
+        self.tiers = tiers  # Tiers that are read.
 
     def grid(self, source: Source, bound: float) -> dict[str, Ladder | Choice]:
         return {

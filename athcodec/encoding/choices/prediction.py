@@ -26,7 +26,7 @@ from athcodec.encoding.survey import Ath, Survey
 from athcodec.errors import BoundError
 from athcodec.motion.thresholds import Thresholds
 
-CUBES, LATTICE = False, True  # What positions are rounded to.
+CUBES, LATTICE = False, True  # Positions are rounded to one of these.
 REST_STEPS = (0.5, 0.25, 0.125, 1.15)  # Steps of the rest pose that are tried, in bounds.
 STEPS = (0.999, 0.97, 0.9, 0.75, 0.5, 0.3)  # Steps tried, over the largest that reaches every point in the limit.
 TRIAL_SEGMENTS, TRIAL_FRAMES = 3, 64  # Segments of a trial, and frames of each that show whether it may pay.

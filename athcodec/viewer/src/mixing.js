@@ -1,4 +1,4 @@
-// What a picture is the sum of: levels and clips that fade over, or shares of clips for a wind, which ease in and out.
+// A picture is a sum: of levels and clips that fade over, or of shares of clips for a wind, which ease in and out.
 
 import { Fading } from "./fading.js";
 import { clipAt, segmentAt } from "./frames.js";
@@ -26,7 +26,7 @@ export function sumOf([first, ...others], numbersOf) {
   return numbers;
 }
 
-/** What one view has shown last, and how it goes on from there. */
+/** One view's last picture, and how it goes on from there. */
 export class Mixing {
   #file; #jobs;
   fading = new Fading();

@@ -27,7 +27,7 @@ export class Session {
     this.#download = new Download(source, hostMesh, this.#views, {
       came: (complete) => {
         if (!this.#jobs) return;
-        this.#refine(this.#file.readyLevel(0)); // What level 0 looks like does not depend on the order of events.
+        this.#refine(this.#file.readyLevel(0)); // The look of level 0 must not depend on the order of events.
         this.#jobs.run();
         this.#state(complete);
       },
@@ -225,7 +225,7 @@ export class Session {
     this.#post(answer, [answer.words, answer.coded]);
   }
 
-  /** What each clip counts for a wind. */
+  /** Answers with the weight of each clip for a wind. */
   wind({ id, strength, heading }) {
     this.#post({ type: "wind", id, weights: Array.from(this.#file.windWeights(this.#winds, strength, heading)) });
   }
