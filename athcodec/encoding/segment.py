@@ -38,7 +38,7 @@ FINER = 32  # Step of a layer over the step at which bases and modes are learned
 REST_ROUNDS = 16  # Steps of a rest pose that are tried until one keeps the bound; the last is 1/28 of the first.
 ROWS_AT_ONCE = 1 << 14  # Rows of coefficients whose moments are added at once.
 WORK_BYTES = 1 << 30  # Memory of the segments coded at once, unless `jobs` says how many.
-SAMPLED = 4000  # Vertices from which on trials correct a sample.
+SAMPLED = 4000  # Number of vertices from which trials find corrections of a sample of them only.
 SEGMENT_WORK = 16  # Memory of a segment while it is coded, over its float32 positions.
 
 
@@ -576,7 +576,7 @@ def analyse(
     decoded = np.empty(positions.shape, dtype)
     segment.analyse(positions, settings.rounding, origin, decoded)
     if before is not None:
-        segment.forget_caches()  # A refinement has no nodes.
+        segment.forget_caches()  # Maps of nodes alone need the caches, and a refinement has none.
     return segment, decoded
 
 

@@ -266,7 +266,7 @@ def _positions(motion: _Motion, times: np.ndarray) -> Frames:
     return Frames(lambda start, stop: motion.read(times[start:stop]), len(times), motion.count)
 
 
-# ---- what there is ----
+# ---- scenes and nodes ----
 
 
 def _scenes(file: GltfFile, options: ReadOptions) -> dict[str, Scene]:

@@ -29,7 +29,7 @@ from bench.codecs.tree import VertexOrder, memo, ordered, read_order, read_pose,
 SEGMENT = 16  # frames
 MOST_BITS = 19
 RANGE_STEPS = 8  # Steps of a range's ends, per error of a number.
-HELD = 1e-4  # how much a hinge is drawn to the bone's middle, over what the motion says
+HELD = 1e-4  # Weight of keeping a hinge at its bone's middle, relative to that of fitting the motion.
 BLOCK = 1024  # vertices
 
 Follow = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]

@@ -208,8 +208,9 @@ static int32_t turned_vertices(const ath_plan *plan, const ath_piece *piece)
     return (next < plan->branch_count ? plan->branches[next].first : plan->vertex_count) - piece->first;
 }
 
-/* Adds the products of the branches on a root with their rest pose in frame t, with the same total weight as the root's
- * own. source: the whole plant. own2: squared distances of the root's vertices from its base. */
+/* Adds to H the vertices of the branches that a root carries: products of their positions in frame t and in the rest
+ * pose, weighted so that together they count as much as the root's own. source: positions of the whole plant. own2: sum
+ * of the squared distances of the root's vertices from its base. */
 static void add_carried(const ath_plan *plan, int32_t T, const ath_piece *root, int32_t t, const double *source,
                         double own2, double H[9])
 {

@@ -27,9 +27,9 @@ NO_CORRECTIONS = np.empty((0, 6), np.int32)
 # Ticks are changes of velocity at a seam over those of a usual frame. Up to SMOOTH they are invisible, and beyond ROUGH
 # each weighs ROUGH_WORTH more.
 SMOOTH, ROUGH, ROUGH_WORTH = 1.2, 1.4, 30.0
-ERROR_WORTH = 8.0  # Ticks that an error twice as large weighs.
-ORDER_WORTH = 400.0  # Ticks that an error of twice that of the level before weighs.
-BYTES_WORTH = 40.0  # Ticks that twice as many bytes weigh.
+ERROR_WORTH = 8.0  # Cost, in ticks, of an error twice as large.
+ORDER_WORTH = 400.0  # Cost, in ticks, of an error twice as large as that of the level before.
+BYTES_WORTH = 40.0  # Cost, in ticks, of twice as many bytes.
 CORRECTION_BYTES = 0.3  # Bytes of each position beyond the limit: a correction reaches over frames.
 
 
