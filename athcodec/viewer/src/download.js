@@ -52,7 +52,7 @@ export class Download {
     } catch (error) {
       this.#stop(error);
     }
-    await Promise.all(Array.from({ length: LANES }, () => this.#lane()));
+    for (let lane = 0; lane < LANES; lane++) this.#lane();
   }
 
   /** Looks again at what is wanted, as views have changed or, behind what they want, everything is from now on. */
@@ -91,7 +91,7 @@ export class Download {
     if (this.#file) {
       this.#file.feed(bytes, offset);
       this.look();
-      this.#tell.came(false);
+      this.#tell.came();
       return;
     }
     if (offset > this.#front.length || offset + bytes.length <= this.#front.length) return;
@@ -101,7 +101,7 @@ export class Download {
     this.#front = front;
     if (!AthFile.front(front).ready) return;
     this.#file = AthFile.open(front, { hostMesh: this.#hostMesh });
-    this.#front = new Uint8Array(0);
+    this.#front = null;
     this.#hasFront(this.#file);
   }
 
@@ -169,7 +169,7 @@ export class Download {
       if (request && (!left || from !== request.offset + request.size)) break;
       if (!left) continue;
       if (cut && !request) this.#cut.add(offset);
-      request = { offset: request?.offset ?? from, size: end - (request?.offset ?? from) };
+      (request ??= { offset: from }).size = end - request.offset;
       if (request.size >= most) break;
     }
     return request;

@@ -96,7 +96,7 @@ export class Jobs {
     for (let s = 0; chunk && s < segmentCount; s++)
       for (let l = bad; l < levelCount; l++)
         if (file.ranges(l, s, s, true).some(({ offset, size }) => offset <= chunk.offset && chunk.offset < offset + size)) this.#failed.add(`${s}/${l}`);
-    if (this.#failed.size > known) this.#tell.damaged(segment, bad, error);
+    this.#tell.damaged(segment, bad, error, this.#failed.size > known);
   }
 
   #keep(segment) {
@@ -164,7 +164,7 @@ export class Jobs {
     const [index, next] = around(this.#file, frame).map((segment) => (this.readyLevel(segment) < level ? -1 : segment));
     if (index < 0) return null;
     try {
-      return { frame, level, segments: [this.#now(index, level), next >= 0 ? this.#segment(next, level) : null] };
+      return { frame, level, segments: [this.#now(index, level), this.#segment(next, level)] };
     } catch (error) {
       this.#damaged(index, level, error);
       return null;

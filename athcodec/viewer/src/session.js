@@ -65,8 +65,8 @@ export class Session {
     this.#jobs = new Jobs(file, this.#views, clips[first].firstSegment, this.#closing.signal, {
       kept: ({ level }) => this.#refine(level),
       decoded: (segment, level) => this.#post({ type: "decoded", segment, level }),
-      damaged: (segment, level, error) => {
-        this.#post({ type: "damaged", segment, level, ...describe(error) });
+      damaged: (segment, level, error, isNews) => {
+        if (isNews) this.#post({ type: "damaged", segment, level, ...describe(error) });
         this.#state(true);
       },
     });
@@ -137,10 +137,12 @@ export class Session {
       Object.assign(answer, this.#answer(message));
     } catch (error) {
       Object.assign(answer, describe(error));
-      if (!exactly) answer.message = `picture of clip ${clip} at ${seconds} s, level ${level}: ${answer.message}`;
-      if (!exactly) this.drop(message);
       try {
-        if (!exactly) Object.assign(answer, this.#answer({ ...message, old: null, heat: false, buffer: null }));
+        if (!exactly) {
+          answer.message = `picture of clip ${clip} at ${seconds} s, level ${level}: ${answer.message}`;
+          this.drop(message);
+          Object.assign(answer, this.#answer({ ...message, old: null, heat: false, buffer: null }));
+        }
       } catch {
         // The answer holds an error already.
       }
@@ -163,18 +165,18 @@ export class Session {
       ? (term) => file.positions(term.segments, term.frame, { fade: term.fade })
       : (term, i) => this.#texels.pack(term, cut, i === 0 ? buffer : null));
     return { shown: cut, frame: shown.frame, fading: mixing.fading.underWay, clip: file.clips.indexOf(clipAt(file, shown.frame)),
-      held: file.held, whole: positions, data, ...(heat ? { heat: this.#distances(shown) } : {}) };
+      held: file.held, whole: positions, data, ...(heat && { heat: this.#distances(shown) }) };
   }
 
   // Each share is shown at the deepest level that is decoded of it; those of which nothing is are left out.
   #ofShares(message, used) {
     const { view, clip, seconds, wrap, level, exactly, aside, positions = false, buffer, coarsely } = message;
-    const file = this.#file, jobs = this.#jobs, shares = [], frame = file.frameAt(seconds, wrap, clip), frames = used.map((share) => share.frame);
+    const file = this.#file, jobs = this.#jobs, frame = file.frameAt(seconds, wrap, clip), frames = used.map((share) => share.frame);
     if (!aside) this.#view(message, frames, frames);
-    for (const share of used) {
+    const shares = used.flatMap((share) => {
       const shown = exactly ? jobs.exactly(share.frame, level) : jobs.show(share.frame, coarsely ? 0 : level);
-      if (shown) shares.push({ ...share, ...shown });
-    }
+      return shown ? { ...share, ...shown } : [];
+    });
     if (shares.length === 0) return { frame };
     const mixing = this.#mixing(view), eases = message.wind && !exactly && !aside, shown = Math.min(...shares.map((share) => share.level));
     const mixed = eases ? mixing.eased(message, shares) : { shares, fading: false }, xyz = file.blended(mixed.shares);
@@ -227,7 +229,7 @@ export class Session {
 
   /** What each clip counts for a wind. */
   wind({ id, strength, heading }) {
-    this.#post({ type: "wind", id, weights: Array.from(this.#file.windWeights(this.#winds, strength, heading)) });
+    this.#post({ type: "wind", id, weights: this.#file.windWeights(this.#winds, strength, heading) });
   }
 
   all() {
