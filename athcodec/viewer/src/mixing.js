@@ -1,4 +1,4 @@
-// What a picture is the sum of: levels and clips that fade over, or shares of clips for a wind, which ease in and out.
+// Mixing makes a picture a sum: of levels and clips that fade over, or of shares of clips for a wind, which ease in and out.
 
 import { Fading } from "./fading.js";
 import { clipAt, segmentAt } from "./frames.js";
@@ -30,7 +30,7 @@ export function sumOf([first, ...others], numbersOf) {
 export class Mixing {
   #file; #jobs;
   fading = new Fading();
-  last = null; // {shares, at} that were shown last and when, milliseconds; null: one clip was shown alone
+  last = null; // {shares, at}: the shares that were shown last and when, in milliseconds; null: one clip was shown alone.
 
   constructor(file, jobs) {
     this.#file = file;

@@ -1,5 +1,5 @@
-// One file in a worker: a message of the page calls the method of its type, and the page is told by `post`. A session knows the
-// views; bytes are fetched by Download, decoded by Jobs, mixed by Mixing and packed for the GPU by Texels.
+// A session is one file in a worker: a message of the page calls the method of that name, and `post` answers. It knows the views;
+// bytes are fetched by Download, decoded by Jobs, mixed by Mixing and packed for the GPU by Texels.
 
 import { Download } from "./download.js";
 import { clipAt } from "./frames.js";
@@ -14,8 +14,8 @@ const STATE_MS = 50; // Least time between two messages about the state.
 export class Session {
   #post; #clip; #download;
   #file; #texels; #jobs;  // These are there once the file's front is.
-  #views = new Map();     // {id: {level, frames, wanted, ahead, mixing}}, see #view
-  #winds;                 // {strength, heading} of each clip, null: it has none
+  #views = new Map();     // {id: {level, frames, wanted, ahead, mixing}}: #view explains them.
+  #winds;                 // {strength, heading} for each clip; null: it has none.
   #known = new Set();     // The page knows the parts of these levels.
   #stateAt = 0; #stateTimer = 0;
   #closing = new AbortController();
@@ -93,7 +93,7 @@ export class Session {
     }
   }
 
-  // Tells the page, not at every piece.
+  // Tells the page, but not at every piece.
   #state(now) {
     const wait = now ? 0 : this.#stateAt + STATE_MS - performance.now();
     if (wait > 0) {
@@ -193,7 +193,7 @@ export class Session {
     return mixing.change(frame, coarsely ? 0 : level, old);
   }
 
-  // How far the shown position of each vertex is from that of the deepest level that is here.
+  // Returns how far the shown position of each vertex is from the position at the deepest level that is here.
   #distances({ frame, segments }) {
     const file = this.#file, deepest = this.#jobs.show(frame, file.info.levelCount - 1);
     const [a, b] = [segments, deepest.segments].map((each) => file.positions(each, frame));
@@ -212,7 +212,7 @@ export class Session {
     }
   }
 
-  /** The GPU form of a level or, with `segment`, of a segment at it and which of its coded frames shows each of its frames. */
+  /** Tells the GPU form of a level or, with `segment`, of a segment at it and which of its coded frames shows each of its frames. */
   gpu({ id, level, segment = null }) {
     const file = this.#file, answer = { type: "gpu", id, words: null, coded: null };
     try {
@@ -227,7 +227,7 @@ export class Session {
     this.#post(answer, [answer.words, answer.coded]);
   }
 
-  /** What each clip counts for a wind. */
+  /** Tells the weight of each clip for a wind. */
   wind({ id, strength, heading }) {
     this.#post({ type: "wind", id, weights: this.#file.windWeights(this.#winds, strength, heading) });
   }
@@ -248,7 +248,7 @@ export class Session {
   }
 }
 
-// The clips with their numbers, and for every level the error and the one at the seam.
+// Returns the clips with their numbers, and for every level the error and the one at the seam.
 function clipsOf(file) {
   const levels = Array.from({ length: file.info.levelCount }, (_, level) => level);
   return file.clips.map((clip, index) => ({
@@ -257,7 +257,7 @@ function clipsOf(file) {
   }));
 }
 
-// Numbers that are none do not name a wind.
+// A clip has a wind only if both are numbers.
 function windOf({ strength, heading = 0 }) {
   return Number.isFinite(strength) && Number.isFinite(heading) ? { strength, heading } : null;
 }
