@@ -11,7 +11,7 @@ const LOOKED_AWAY = 1; // Seconds without a picture, after which weights are at 
 export function sharesOf(file, winds, { wind, places, clip, seconds, wrap }) {
   if (wind)
     return file.windWeights(winds, ...wind).flatMap((weight, index) =>
-      (weight > 0 ? [{ weight, clip: index, frame: file.frameAt(seconds, wrap, index) }] : []));
+      (weight > 0 ? { weight, clip: index, frame: file.frameAt(seconds, wrap, index) } : []));
   return places?.length > 1 ? places.map((place) => ({ weight: place.weight, frame: file.frameAt(place.seconds, wrap, clip) })) : null;
 }
 
@@ -30,7 +30,7 @@ export function sumOf([first, ...others], numbersOf) {
 export class Mixing {
   #file; #jobs;
   fading = new Fading();
-  last = null; // {shares, at} that were shown last and when, milliseconds; null: one clip was shown alone
+  last = null; // {shares, at}: the shares that were shown last and when, in milliseconds; null: one clip was shown alone.
 
   constructor(file, jobs) {
     this.#file = file;
@@ -46,7 +46,7 @@ export class Mixing {
     const leaving = (before?.shares ?? []).filter((share) => part < 1 && !wanted.some(same(share)) && share.weight * (1 - part) > GONE);
     const old = leaving.flatMap((share) => {
       const there = this.#jobs.decoded(this.#file.frameAt(seconds, wrap, share.clip), share.level);
-      return there ? [{ ...there, clip: share.clip, weight: share.weight * (1 - part) }] : [];
+      return there ? { ...there, clip: share.clip, weight: share.weight * (1 - part) } : [];
     });
     const arrived = wanted.map((share) => {
       const weight = before?.shares.find(same(share))?.weight ?? 0;
