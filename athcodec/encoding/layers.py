@@ -33,8 +33,8 @@ from athcodec.encoding.choices.joins import (
     seen,
 )
 from athcodec.encoding.features import Feature
-from athcodec.encoding.learned_modes import LearnedModes, nested
-from athcodec.encoding.motion import Plan, SegmentMotion, position_errors
+from athcodec.encoding.learned_modes import nested
+from athcodec.encoding.motion import LearnedModes, Plan, SegmentMotion, position_errors
 from athcodec.encoding.polygons import Mesh
 from athcodec.encoding.segment import (
     CodedPrelude,

@@ -19,8 +19,16 @@ from athcodec.decoding import container as ct
 from athcodec.encoding import quantise as qz
 from athcodec.encoding import streams, writing
 from athcodec.encoding.features import Feature
-from athcodec.encoding.learned_modes import LearnedModes
-from athcodec.encoding.motion import NODE_ROOT, STEM_ROOT, LevelStream, Plan, PlanSample, SegmentMotion, gather
+from athcodec.encoding.motion import (
+    NODE_ROOT,
+    STEM_ROOT,
+    LearnedModes,
+    LevelStream,
+    Plan,
+    PlanSample,
+    SegmentMotion,
+    gather,
+)
 from athcodec.encoding.polygons import Mesh
 from athcodec.encoding.segmentation import split_segments
 from athcodec.encoding.settings import BEAM, Settings

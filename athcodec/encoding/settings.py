@@ -10,7 +10,7 @@ import numpy as np
 from athcodec._native import Rounding
 from athcodec.encoding import quantise as qz
 from athcodec.encoding.features import Feature
-from athcodec.encoding.learned_modes import LearnedModes
+from athcodec.encoding.motion import LearnedModes
 
 BEAM = 0  # Form of a branch whose modes are those of a beam; other forms are SHEET, or the vertices in a tube's ring.
 # Fields that distinguish settings of a search: by hierarchy and rest pose, and by motion.

@@ -15,8 +15,8 @@ import numpy as np
 
 from athcodec.encoding import streams
 from athcodec.encoding.features import Feature
-from athcodec.encoding.learned_modes import Components, LearnedModes, components, learn
-from athcodec.encoding.motion import Plan, SegmentMotion
+from athcodec.encoding.learned_modes import Components, components, learn
+from athcodec.encoding.motion import LearnedModes, Plan, SegmentMotion
 from athcodec.encoding.progress import TrialCount
 from athcodec.encoding.sample import ExtrapolationFactors
 from athcodec.encoding.segment import (

@@ -17,7 +17,7 @@ static int32_t quantise(double value, double dead_zone)
 }
 
 /* units = the row times `count` waves, in units of a step. */
-ATH_INLINE void project_waves(const double *waves, int32_t count, int32_t T, const double *row, double inverse,
+ATH_INLINE void sums_of_waves(const double *waves, int32_t count, int32_t T, const double *row, double inverse,
                               double *units)
 {
     ath_lanes sums[WAVES];
@@ -48,9 +48,9 @@ ATH_HOT static int32_t forward_temporal(const ath_stream *stream, int32_t T, dou
         const double *waves = stream->temporal + (size_t)k * (size_t)T;
         int32_t count = k + WAVES <= stream->temporal_rank ? WAVES : 1;
         if (count == WAVES)
-            project_waves(waves, WAVES, T, row, inverse, units + k);
+            sums_of_waves(waves, WAVES, T, row, inverse, units + k);
         else
-            project_waves(waves, 1, T, row, inverse, units + k);
+            sums_of_waves(waves, 1, T, row, inverse, units + k);
         for (int32_t stop = k + count; k < stop; k++) left -= units[k] * units[k];
     }
     return stream->temporal_rank;
