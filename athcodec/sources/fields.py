@@ -166,12 +166,5 @@ def _is_vector(values: np.ndarray) -> bool:
     return values.ndim == 2 and values.shape[1] in (2, 3) and values.dtype.kind == "f"
 
 
-def same_values(values: np.ndarray, others: np.ndarray | None) -> bool:
-    """Whether both are numbers of one shape and value, NaN included."""
-    if others is None or values.dtype.kind != others.dtype.kind:
-        return False
-    return np.array_equal(values, others, equal_nan=values.dtype.kind == "f")
-
-
 def _listed(names: Sequence[str]) -> str:
     return ", ".join(sorted(names)[:20]) or "no fields per point"

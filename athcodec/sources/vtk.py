@@ -31,9 +31,10 @@ from athcodec.files.reading import Budget, FileWatch, check_inside, naming, read
 from athcodec.motion.clip import MotionClip
 from athcodec.sources import ReadOptions
 from athcodec.sources.cells import NODE_BYTES, VTK_NAMES, VTK_NUMBERS, blocks_of, topology_of
-from athcodec.sources.fields import clip_of_steps, same_values
+from athcodec.sources.fields import clip_of_steps
+from athcodec.sources.mesh import same_values
 from athcodec.sources.scene_objects import OWN, scene_of_json
-from athcodec.sources.sequence import sequence_files
+from athcodec.sources.sequence import files_to_read
 from athcodec.sources.timing import numbered_times, times_in_seconds
 from athcodec.sources.xdmf import TEXT_BYTES, parse_xml
 
@@ -93,7 +94,7 @@ def _files(path: Path, options: ReadOptions) -> tuple[list[Path], np.ndarray, di
     index = _index_of(path, Budget(options.max_memory))
     if index is not None:
         return _listed(index, options)
-    files = sequence_files(path)
+    files = files_to_read(path)
     if None in files:
         return list(files.values()), np.zeros(1), {}
     return [*files.values()], *numbered_times(np.array(list(files)), options.fps)

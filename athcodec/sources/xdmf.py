@@ -24,8 +24,9 @@ from athcodec.files.reading import Budget, FileWatch, closing_on_failure, file_b
 from athcodec.motion.clip import MotionClip, frame_rate
 from athcodec.sources import ReadOptions
 from athcodec.sources.cells import NODE_BYTES, NODES, Block, blocks_of, topology_of
-from athcodec.sources.fields import clip_of_steps, same_values
+from athcodec.sources.fields import clip_of_steps
 from athcodec.sources.hdf5 import check_own, chunk_bytes, unpacks_to_more
+from athcodec.sources.mesh import same_values
 from athcodec.sources.scene_objects import MATERIAL_NAMES
 from athcodec.sources.timing import times_in_seconds, whole
 
