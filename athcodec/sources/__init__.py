@@ -258,9 +258,9 @@ def read(
         kind.check()
         clip: MotionClip = importlib.import_module(kind.module).read_clip(path, wanted)
     lost = {kind: names for kind, names in clip.not_read.items() if kind not in NO_SHAPES}
-    if lost:
-        warnings.warn(f"{os.fspath(path)}: not read: {listed(lost)}", SourceWarning, stacklevel=2)
     with closing_on_failure(clip):
+        if lost:
+            warnings.warn(f"{os.fspath(path)}: not read: {listed(lost)}", SourceWarning, stacklevel=2)
         return _in_axes(_in_units(clip, unit), up_axis)
 
 
