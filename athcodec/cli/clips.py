@@ -15,7 +15,15 @@ from athcodec.cli.printing import counted, progress, say
 from athcodec.decoding.clip_view import ClipView
 from athcodec.decoding.decoder import Decoder
 from athcodec.decoding.file_tables import Level
-from athcodec.errors import AthError, ClipError, LevelUnavailable, NeedsHostMesh, RemoteError, SourceWarning
+from athcodec.errors import (
+    AthError,
+    ClipError,
+    GuessWarning,
+    LevelUnavailable,
+    NeedsHostMesh,
+    RemoteError,
+    SourceWarning,
+)
 from athcodec.files.atomic import check_target, file_ids, is_url, keeping
 from athcodec.files.reading import naming_file
 from athcodec.metrics import ErrorMeter, MotionMeter, SmoothnessMeter, compare_clips, level_meters
@@ -173,6 +181,7 @@ def read_clip(args: argparse.Namespace, path: str) -> MotionClip:
     rest = getattr(args, "rest", "auto")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", SourceWarning)  # said below, with what is no shape
+        warnings.simplefilter("always", GuessWarning)
         clip = athcodec.read(
             path,
             args.source_format,

@@ -33,14 +33,7 @@ from athcodec.motion.frames import Frames
 from athcodec.motion.joining import join
 from athcodec.sources import ReadOptions
 from athcodec.sources.gltf_scene import Scene, key_rate, on_grid, rotation_matrices
-from athcodec.sources.scene_objects import (
-    FACE_MATERIAL,
-    FLIPPED,
-    MATERIAL_NAMES,
-    TWO_SIDES,
-    mirrored,
-    presence_metadata,
-)
+from athcodec.sources.scene_objects import FACE_MATERIAL, FLIPPED, MATERIAL_NAMES, TWO_SIDES, Facing, presence_metadata
 
 WORK_BYTES = 64 << 20
 MOST_VERTICES = 1 << 27
@@ -49,6 +42,7 @@ CORNER_BYTES = 96  # Bytes that a corner of a face takes; strips make three of e
 INFLUENCE_BYTES = 100  # Bytes that a joint of a vertex takes.
 VERTEX_BYTES = 160  # Bytes that a vertex takes in the poses that are held and made.
 MOST_FRAMES = 1 << 20
+FACING_FRAMES = 64  # Frames whose transforms are held at once to see whether they mirror.
 KINDS = ("points", "curves", "mesh")  # the last that a node has is what it is
 MODE_KINDS = ("points", "curves", "curves", "curves", "mesh", "mesh", "mesh")
 NAMES = {"TEXCOORD_0": "uv", "COLOR_0": "colors", "NORMAL": "normals"}
@@ -211,7 +205,11 @@ def _clip(
     timings = {name: _sampling(take, options.fps) for name, take in motions.items()}
     still = all(len(timing.times) == 1 for timing in timings.values())
     attributes, branches = _attributes(scene, nodes, options.skip, motion, keep_normals=still)
-    motion.find_mirrored(next(iter(timings.values())).times)
+    facings = [Facing() for _ in nodes]
+    for name, take in motions.items():
+        take.add_facings(timings[name].times, facings)
+    for node, facing in zip(nodes, facings):
+        node.mirrored, node.is_flipped = facing.mirrored, facing.changes
     faces, edges, face_material = _connections(file, nodes)
     names = _names(scene, nodes)
     said: dict[str, Any] = {}
@@ -618,32 +616,24 @@ class _Motion:
             out[:, :, vertices] += _product(matrix, points)
         return out.swapaxes(1, 2)
 
-    def find_mirrored(self, times: np.ndarray) -> None:
-        """Notes of each node whether it turns its mesh inside out, and whether that changes."""
-        matrices: dict[int, dict[int, np.ndarray]] = {}
+    def add_facings(self, times: np.ndarray, facings: Sequence[Facing]) -> None:
+        """Adds the frames at these times to the facing of each node."""
+        world = np.eye(4) if self._from_world is None else self._from_world
+        for start in range(0, len(times), FACING_FRAMES):
+            matrices = self.scene.matrices(self.ancestors, times[start : start + FACING_FRAMES])
+            for node, facing in zip(self._nodes, facings):
+                placed = (world @ self._placed(node, matrices))[:, None]
+                facing.add(placed if node.copies is None else placed @ node.copies)
 
-        def matrix(node: GltfNode, frame: int) -> np.ndarray:
-            if frame not in matrices:
-                matrices[frame] = self.scene.matrices(self.ancestors, times[frame : frame + 1])
-            placed = self.placed(node, matrices[frame])
-            placed = placed if self._from_world is None else self._from_world @ placed
-            return placed if node.copies is None else placed @ node.copies
+    def placed(self, node: GltfNode) -> np.ndarray:
+        """(4, 4) from a node's mesh to the world without animation; of a skin, by the joint that counts most."""
+        return self._placed(node, self.scene.matrices(self.ancestors, None))[0]
 
-        for node in self._nodes:
-            first, last = (
-                mirrored(lambda frame, node=node: matrix(node, frame), frames)
-                for frames in (range(len(times)), range(len(times))[::-1])
-            )
-            node.mirrored, node.is_flipped = first, not np.array_equal(first, last)
-
-    def placed(self, node: GltfNode, matrices: dict[int, np.ndarray] | None = None) -> np.ndarray:
-        """(4, 4) from a node's mesh to the world, by the first of these matrices, or without animation; of a skin, by
-        the joint that counts most."""
-        matrices = self.scene.matrices(self.ancestors, None) if matrices is None else matrices
+    def _placed(self, node: GltfNode, matrices: dict[int, np.ndarray]) -> np.ndarray:
         if node.skin is None:
-            return matrices[node.index][0]
+            return matrices[node.index]
         strongest = np.bincount(node.strongest).argmax()
-        return matrices[node.joints[strongest]][0] @ node.bind[strongest]
+        return matrices[node.joints[strongest]] @ node.bind[strongest]
 
     def turned(self, node: GltfNode, directions: np.ndarray, is_normal: bool) -> np.ndarray:
         """(n, 3) directions at a node's vertices, as its joints or it turn them without animation; of length 1."""

@@ -151,9 +151,10 @@ class SceneObject:
     def face_outward(self, matrix: Callable[[int], np.ndarray], frames: range, is_reversed: bool) -> None:
         """Reverses the corners of faces that a transform mirrors, or, where the file lists corners the other way round,
         of those that none does. matrix(frame) is (4, 4) or (copies, 4, 4)."""
-        turned = mirrored(matrix, frames)
-        self.is_flipped = not np.array_equal(turned, mirrored(matrix, frames[::-1]))
-        turned ^= is_reversed
+        facing = Facing()
+        for frame in frames:
+            facing.add(matrix(frame).reshape(1, -1, 4, 4))
+        self.is_flipped, turned = facing.changes, facing.mirrored ^ is_reversed
         if not turned.any():
             return
         faces = np.repeat(turned, len(self.face_counts) // len(turned))
@@ -335,15 +336,26 @@ def presence_metadata(names: Sequence[str], presence: Sequence[np.ndarray]) -> d
     return {PRESENCE: stated} if stated else {}
 
 
-def mirrored(matrix: Callable[[int], np.ndarray], frames: Iterable[int]) -> np.ndarray:
-    """Whether a transform turns a mesh inside out, (1,) or (copies,) bool: matrix(frame) is (4, 4) or (copies, 4, 4).
-    The first frame that has an extent says so, because leaves may grow from a scale of 0."""
-    signs = np.zeros(1)
-    for frame in frames:
-        signs = np.where(signs == 0, np.sign(np.linalg.det(matrix(frame).reshape(-1, 4, 4)[:, :3, :3])), signs)
-        if signs.all():
-            break
-    return signs < 0
+class Facing:
+    """Whether a transform turns a mesh, or copies of one, inside out, and whether that changes in the frames added.
+
+    The first frame that has an extent decides, because leaves may grow from a scale of 0.
+    """
+
+    def __init__(self) -> None:
+        self._signs, self.changes = np.zeros(1), False
+
+    def add(self, matrices: np.ndarray) -> None:
+        """Take the (frames, copies, 4, 4) transforms of the next frames."""
+        signs = np.nan_to_num(np.sign(np.linalg.det(matrices[..., :3, :3])))
+        signs = np.concatenate([np.broadcast_to(self._signs, (1, signs.shape[1])), signs])
+        self._signs = signs[(signs != 0).argmax(axis=0), np.arange(signs.shape[1])]
+        self.changes |= bool((signs * self._signs < 0).any())
+
+    @property
+    def mirrored(self) -> np.ndarray:
+        """(copies,) bool."""
+        return self._signs < 0
 
 
 def rows_by_id(ids: np.ndarray, wanted: np.ndarray) -> np.ndarray:
