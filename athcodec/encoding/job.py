@@ -199,7 +199,7 @@ def time_chunk(*times: np.ndarray) -> bytes:
 
 @dataclass
 class _Decided:
-    """What the streams of a file depend on: settings, and what follows from them."""
+    """Settings that the streams of a file depend on, and what follows from them."""
 
     ath: Ath
     choice: Choice

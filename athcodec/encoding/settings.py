@@ -1,4 +1,4 @@
-"""What an encoder decides about a file: the settings of a layer of precision, and those of a whole file."""
+"""Decisions of an encoder about a file: the settings of a layer of precision, and those of a whole file."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ OF_BRANCHES = "forms loose lags details rigid".split()  # Arrays with an entry f
 
 @dataclass(frozen=True)
 class Settings:
-    """What a trial varies. Steps are in scene units; arrays of branches, (B,), are in file order."""
+    """Settings that a trial varies. Steps are in scene units; arrays of branches, (B,), are in file order."""
 
     bound: float
     largest_bound: float  # The bound of the vertex with the largest weight.
@@ -56,7 +56,7 @@ class Settings:
 
     @property
     def key(self) -> tuple:
-        """What distinguishes these settings from others of the same search."""
+        """Return the key that distinguishes these settings from others of the same search."""
         return self.prelude_key + self._values(OF_MOTION)
 
     @property

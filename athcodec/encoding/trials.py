@@ -45,7 +45,7 @@ PRELUDES_KEPT = 6  # Hierarchies and rest poses that are kept between trials.
 
 @dataclass(eq=False)
 class Trials:
-    """What settings cost in one plant, or in a sample of it."""
+    """Trials of settings on one plant, or on a sample of it."""
 
     source: Source
     ath: Ath

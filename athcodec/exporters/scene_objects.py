@@ -73,7 +73,7 @@ def objects_of(motion: Any) -> list[SceneObject]:
 
 
 def hidden_copies(objects: list[SceneObject]) -> dict[str, Any]:
-    """What a writer says of objects whose copies are hidden one by one, but are not written as instances."""
+    """Return the sentence about objects whose copies are hidden one by one, but are not written as instances."""
     names = [obj.name for obj in objects if obj.copies == 1 and obj.shown is not None and obj.shown.shape[1] > 1]
     return {NOT_WRITTEN: {"presence of copies, which instances keep": names}} if names else {}
 

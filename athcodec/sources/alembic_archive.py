@@ -93,7 +93,7 @@ class _Track:
             raise ClipError("archive: got times that are no numbers, expected seconds")
 
     def sample(self, number: int) -> Any:
-        """What asks for a sample: by its time, because the bindings take its number for one."""
+        """Return the selector of a sample: by its time, because the bindings take its number for one."""
         return Abc.ISampleSelector(float(self.times[number]), Abc.ISampleSelector.TimeIndexType.kNearIndex)
 
     def at(self, time: float) -> list[tuple[int, float]]:
@@ -133,7 +133,7 @@ class _Xform:
 
 @dataclass
 class _Visibility:
-    """What an object says of its visibility: hidden, visible whatever is said above it, or, by -1, nothing."""
+    """An object's stated visibility: hidden, visible whatever is said above it, or, by -1, nothing."""
 
     track: _Track
     values: np.ndarray
@@ -324,7 +324,7 @@ def _track(samples: Any) -> _Track:
 
 
 def _visibility(child: Any) -> Iterator[_Visibility]:
-    """What an object says of its visibility, if anything."""
+    """Return an object's stated visibility, if any."""
     samples = AbcGeom.GetVisibilityProperty(child)
     if samples and samples.valid() and samples.getNumSamples():
         track = _track(samples)
@@ -506,7 +506,7 @@ def _own(archive: Any) -> tuple[str | None, list[tuple[dict[str, str], bytes]]]:
 
 
 def _descriptor(text: str) -> ArrayDescriptor:
-    """That of a JSON text; an empty one where it cannot be parsed."""
+    """Return the object of a JSON text; an empty one if it cannot be parsed."""
     try:
         found = ArrayDescriptor(**json.loads(text))
     except (ValueError, TypeError, RecursionError):

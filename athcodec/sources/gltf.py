@@ -192,7 +192,7 @@ def _has_motion(node: GltfNode) -> bool:
 
 
 def _patterns(options: ReadOptions) -> list[str]:
-    """Of the names of nodes and meshes to read."""
+    """Return the patterns of the names of nodes and meshes to read."""
     return [name for name in options.only if not name.startswith(ANIMATION)]
 
 
@@ -281,7 +281,7 @@ def _scenes(file: GltfFile, options: ReadOptions) -> dict[str, Scene]:
 
 
 def _chosen(scene: Scene, patterns: Sequence[str]) -> list[GltfNode]:
-    """Those that show a mesh, where they or it have such a name, in the order of the scene."""
+    """Return the nodes that show a mesh, if they or it have such a name, in the order of the scene."""
     file = scene.file
     nodes, seen = [], []
     for index in scene.order:
@@ -315,7 +315,7 @@ def _number(nodes: Sequence[GltfNode]) -> int:
 
 
 def _animations(file: GltfFile, patterns: Sequence[str], what: str) -> dict[str, int]:
-    """Those that any of the patterns names, in the file's order."""
+    """Return the animations that any of the patterns names, in the file's order."""
     numbers, wanted = _animation_numbers(file), set()
     for pattern in patterns:
         found = {name for name in numbers if name == pattern or fnmatch.fnmatchcase(name, pattern)}
@@ -431,14 +431,14 @@ def _own_extras(scene: Scene, index: int) -> dict[str, np.ndarray]:
 
 
 def _mark(scene: Scene, index: int) -> bool | None:
-    """What a node says of those below it by COPIES: whether they are one object; None for nothing."""
+    """Return what a node states by COPIES about those below it: whether they are one object; None for nothing."""
     extras = scene.nodes[index].get("extras") if index >= 0 else None
     said = extras.get(COPIES) if isinstance(extras, dict) else None
     return said if isinstance(said, bool) else None
 
 
 def _not_read(scene: Scene, nodes: Sequence[GltfNode]) -> dict[str, list[str]]:
-    """What else is in the file; of what each node has, by the name of the node."""
+    """Return what else is in the file; parts of a node by the node's name."""
     file, found = scene.file, {}
 
     def add(kind: str, number: int, item: Any) -> None:
@@ -701,7 +701,7 @@ def _sampling(motion: _Motion, wanted: float | None) -> Sampling:
 
 
 def _said(scene: Scene) -> dict[str, Any]:
-    """What extras say: those of the file, and before them those of the animation."""
+    """Return the extras: those of the file, overridden by those of the animation."""
     items = [scene.file.json["asset"]]
     if len(scene.played) == 1:
         items.append(scene.file.item("animations", scene.played[0]))
@@ -717,7 +717,7 @@ def _returns(motion: _Motion, keys: np.ndarray) -> bool:
 
 
 def _said_rate(said: dict, keys: np.ndarray) -> float | None:
-    """What the file says, where its keys agree."""
+    """Return the frame rate that the file states, if its keys agree."""
     fps = said.get("fps")
     return float(fps) if _is_number(fps) and 0 < fps < 1e6 and on_grid(keys, fps) else None
 

@@ -186,8 +186,8 @@ class SceneObject:
 
 
 class ArrayDescriptor(NamedTuple):
-    """What makes an array of its bytes again, as text that files of other formats can hold: dtype as NumPy writes it;
-    shape as JSON; domain: what its rows stand for, "" for nothing."""
+    """Description of how to make an array of its bytes again, as text that files of other formats can hold: dtype
+    as NumPy writes it; shape as JSON; domain: what its rows stand for, "" for nothing."""
 
     name: str = ""
     dtype: str = ""
@@ -426,7 +426,7 @@ def _spread(obj: SceneObject, static: Static | None, domain: str, shape: tuple[i
 
 
 def scene_of_json(text: str | bytes) -> dict[str, Any]:
-    """What our writers add to files of formats without a place for it; nothing where it is no JSON object."""
+    """Return what our exporters add to files of formats without a place for it; nothing if it is no JSON object."""
     with suppress(ValueError, RecursionError):
         said = json.loads(text)
         if isinstance(said, dict):
@@ -501,7 +501,7 @@ def _faces(objects: list[SceneObject], attributes: dict[str, np.ndarray]) -> np.
 
 
 def _edges(objects: list[SceneObject]) -> np.ndarray | None:
-    """Those between the neighbours on each curve; closed where it is periodic."""
+    """Return the edges between neighbours on each curve, closed if it is periodic."""
     found = []
     for obj in objects:
         if obj.curve_counts is None or not obj.count:
@@ -543,7 +543,7 @@ def _fields(attributes: dict[str, np.ndarray], domains: dict[str, str]) -> dict[
 
 
 def own_metadata(text: Any) -> dict[str, Any]:
-    """What a writer of ours has kept of a clip's metadata, JSON, besides what the format itself holds; else nothing."""
+    """Return the JSON metadata that our exporter kept besides what the format itself holds; else nothing."""
     if not isinstance(text, str) or len(text) > MAX_METADATA_BYTES:
         return {}
     try:

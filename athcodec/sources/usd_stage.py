@@ -238,7 +238,7 @@ def _kind_not_read(prim: Usd.Prim) -> str:
 def _instanced(
     instancer: UsdGeom.PointInstancer, only: Sequence[str], not_read: dict[str, list[str]]
 ) -> Iterator[_Prim]:
-    """What is in the prototypes of a PointInstancer, each as often as the instancer has it."""
+    """Return the meshes in the prototypes of a PointInstancer, each as often as the instancer has it."""
     path, indices = instancer.GetPath(), instancer.GetProtoIndicesAttr()
     times = indices.GetTimeSamples() or [Usd.TimeCode.Default()]
     used = set().union(*(indices.Get(time) or () for time in times))
