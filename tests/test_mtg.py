@@ -204,6 +204,11 @@ def test_what_is_no_mtg_is_refused_with_its_line(tmp_path, code, message, header
     assert str(path) in str(caught.value)
 
 
+def test_an_mtg_in_place_of_a_motion_is_refused_with_what_to_do(tmp_path):
+    with pytest.raises(ClipError, match=r"plant\.mtg: got an MTG, which holds .* no motion; .* --hierarchy FILE\.mtg"):
+        athcodec.read(written(tmp_path, "TOPO\n/P1\n"))
+
+
 def test_damaged_files_are_refused_with_a_clip_error(tmp_path):
     data = written(tmp_path, MEASURED).read_bytes()
     rng, refused = np.random.default_rng(0), 0

@@ -11,6 +11,7 @@ import trimesh
 from moving_meshes import assert_same_mesh, assert_same_motion, mixed_clip, quad_clip, survives_damage
 
 import athcodec
+from athcodec import cli
 from athcodec.errors import ClipError, GuessWarning, SourceWarning
 from athcodec.files.reading import Budget
 from athcodec.motion.clip import MotionClip
@@ -130,6 +131,15 @@ def test_files_with_decimals_and_dates_that_are_left_out_are_named(tmp_path, nam
     assert f"read as 1 of {len(names)} files, without {', '.join(names[1:])}; " in str(said[0].message)
     for alone in ("leaf.obj", "other_7.obj", "leaf_v2_3.obj"):
         athcodec.read(tmp_path / alone).close()
+
+
+def test_results_with_dates_in_their_names_that_are_left_out_are_named(tmp_path, capsys):
+    for day in (30, 31, 1):
+        mesh = meshio.Mesh([[0, 0, day], [1, 0, 0], [0, 1, 0.0]], [("triangle", [[0, 1, 2]])])
+        meshio.write(tmp_path / f"plant_{3 if day > 1 else 4}-{day}.vtu", mesh)
+    path, encoded = tmp_path / "plant_3-30.vtu", tmp_path / "a.ath"
+    assert cli.main(["encode", str(path), str(encoded), "--effort", "fast"]) == 0
+    assert f"warning: {path}: read as 2 of 3 files, without plant_4-1.vtu; frames differ" in capsys.readouterr().err
 
 
 PLY_VALUES = {"uchar red": 0, "uchar green": 9, "uchar blue": 9, "int organ": 5, "float s": 0.25, "float t": 0.5}

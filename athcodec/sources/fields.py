@@ -69,7 +69,7 @@ def clip_of_steps(
     first = _padded(steps.points(0))
     fixed = steps.fixed_points()
     moved_by = _displacement(steps, fixed, len(time), options)
-    if moved_by and moved_by.lower() == AMBIGUOUS and options.field is None and len(time) > 1:
+    if moved_by and moved_by.lower() == AMBIGUOUS and options.field is None:
         warnings.warn(
             f"{name}: the points do not move, and {moved_by} was taken for the displacement that moves them; pass "
             f"--field {moved_by} if it is that, and the name of the displacement if it is a velocity or anything else",

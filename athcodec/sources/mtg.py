@@ -2,8 +2,9 @@
 
 A branch is a longest chain of `<`; `+` begins one. Where entities are decomposed (`/`) their finest parts count: those
 that have no parts themselves. Parts that the file does not connect follow one another in its order. Codes may be
-absolute, shifted to the right, begin with ^ or an alias, and use <<, ++, <.< and +.+; repeated dates (`*`) are
-ignored. Features are kept as numbers where they are numbers. Not read: FORM-B, and what the header says of constraints.
+absolute, shifted to the right, begin with ^ or an alias, and use <<, ++, <.< and +.+; entities without a number are new
+ones, as OpenAlea reads them; repeated dates (`*`) are ignored. Features are kept as numbers where they are numbers. Not
+read: FORM-B, and what the header says of constraints.
 
 A clip gets these branches by the coordinates XX, YY, ZZ, in the clip's own units and axes, or vertex by vertex where
 there are as many.

@@ -91,14 +91,14 @@ def numbering_of(path: str | PathLike[str]) -> Numbering | None:
     if not numbered:
         return None
     prefix, sign, digits = numbered.groups()
-    positive = [others for _, below, others in _numbered(path.parent, prefix, path.suffix) if not below]
-    if sign and prefix[-1:].isalnum() and not positive:  # tree-001.obj
-        prefix, sign, positive = prefix + sign, "", []
-        positive = [others for _, below, others in _numbered(path.parent, prefix, path.suffix) if not below]
+    positive = [number for _, below, number in _numbered(path.parent, prefix, path.suffix) if not below]
+    if sign and prefix[-1:].isalnum() and not positive:  # The hyphen of tree-001.obj is no sign.
+        prefix, sign = prefix + sign, ""
+        positive = [number for _, below, number in _numbered(path.parent, prefix, path.suffix) if not below]
     if digits.startswith("0") and not sign:
         return Numbering(path.parent, prefix, len(digits), path.suffix)
     longest = len(digits) + len(sign)
-    padded = [len(others) for others in positive if others.startswith("0") and 1 < len(others) <= longest]
+    padded = [len(number) for number in positive if number.startswith("0") and 1 < len(number) <= longest]
     return Numbering(path.parent, prefix, max(padded, default=len(digits) if digits[0] == "0" else 1), path.suffix)
 
 
