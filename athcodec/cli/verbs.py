@@ -64,6 +64,8 @@ from athcodec.options import DEFAULT_LADDER, DEFAULT_REL_ERROR, HOST, ladder_of
 if TYPE_CHECKING:
     from athcodec.exporters import Written
 
+ROUNDING_SHARE = 0.05  # Part of a level's error above which decode names what float32 adds to it.
+
 
 def encode(args: argparse.Namespace) -> int:
     paths = [args.input, *(args.paths or ())]
@@ -239,6 +241,13 @@ def _decode(args: argparse.Namespace, quiet: bool) -> int:
                 say("warning", f"{args.input}: decoded to level {motion.level}; {what_is_missing(decoder)}")
             if not quiet:
                 print_written(written, motion, decoder.levels[motion.level])
+        rounding, level_error = written.facts.get("rounding", 0.0), decoders[0].levels[motions[0].level].max_error
+        if rounding > ROUNDING_SHARE * level_error:
+            say(
+                "warning",
+                f"{args.output}: float32 moves positions by up to {rounding:.3g}, the level is off by "
+                f"{level_error:.3g}; .h5, .npz, .xdmf, .pvd, .obj and .ply keep float64",
+            )
         if lost := written.facts.get("not_written"):
             say("not written", f"{args.output}: {listed(lost)}")
     return 0

@@ -29,7 +29,7 @@ from athcodec.files.gltf.motion import EXTENSION, extension_of
 from athcodec.files.gltf.primitives import corners, rows_of
 from athcodec.files.reading import closing_on_failure, naming
 from athcodec.motion.clip import DEFAULT_FPS, RESERVED_NAMES, ClipRange, MotionClip, Skin
-from athcodec.motion.frames import Frames
+from athcodec.motion.frames import Frames, is_far
 from athcodec.motion.joining import join
 from athcodec.sources import ReadOptions
 from athcodec.sources.gltf_scene import Scene, key_rate, on_grid, rotation_matrices
@@ -263,7 +263,7 @@ def _rest_pose(motion: _Motion, nodes: Sequence[GltfNode]) -> np.ndarray:
 
 
 def _positions(motion: _Motion, times: np.ndarray) -> Frames:
-    return Frames(lambda start, stop: motion.read(times[start:stop]), len(times), motion.count)
+    return Frames(lambda start, stop: motion.read(times[start:stop]), len(times), motion.count, motion.dtype)
 
 
 # ---- what there is ----
@@ -563,10 +563,15 @@ class _Motion:
         self.scene, self._nodes, self._from_world = scene, nodes, from_world
         self.count = nodes[-1].first + nodes[-1].count
         self.ancestors = scene.ancestors(_movers(nodes))
+        self.dtype = np.dtype(np.float64)
+        placed = self.read(None)[0]
+        loses = is_far(placed) and not np.array_equal(placed, placed.astype(np.float32))
+        self.dtype = np.dtype(np.float64 if loses else np.float32)
 
     def read(self, times: np.ndarray | None) -> np.ndarray:
-        """(k, N, 3) float32; None: the pose without animation, k = 1."""
-        out = np.empty((1 if times is None else len(times), self.count, 3), np.float32)
+        """(k, N, 3) in `dtype`: float32, or float64 if nodes place them far from the origin. None: the pose without
+        animation, k = 1."""
+        out = np.empty((1 if times is None else len(times), self.count, 3), self.dtype)
         largest = max(node.count for node in self._nodes)
         step = max(1, WORK_BYTES // (48 * largest + 512 * len(self.ancestors)))
         with np.errstate(all="ignore"):

@@ -16,7 +16,7 @@ import numpy as np
 
 from athcodec.errors import ClipError
 from athcodec.motion.clip import RESERVED_NAMES, MotionClip
-from athcodec.motion.frames import Frames
+from athcodec.motion.frames import Frames, is_far
 from athcodec.motion.presence import PRESENCE, frame_runs
 from athcodec.sources import ReadOptions
 
@@ -252,7 +252,8 @@ def frames_of_objects(
     frame_name: Callable[[int], str] = "frame {}".format,
     context: Callable[[], AbstractContextManager[None]] = nullcontext,
 ) -> Frames:
-    """Positions of all objects in world space, frame by frame.
+    """Positions of all objects in world space, frame by frame: float32, or float64 where transforms of the first frame
+    place them far from the origin.
 
     sample(object, frame) gives its points (n, 3) and the (4, 4) matrix, for row vectors, that takes them to the world;
     of copies the points of one and (copies, 4, 4) matrices;
@@ -274,24 +275,31 @@ def frames_of_objects(
             obj.still = points
         return points
 
+    with context():
+        first = [positions(obj, 0) for obj in objects]
+    dtype = np.dtype(np.result_type(*first) if is_far(np.concatenate(first)) else np.float32)
+    for obj in objects:
+        obj.still = None if obj.still is None else obj.still.astype(dtype)
+
     def read(start: int, stop: int) -> np.ndarray:
-        out = np.empty((stop - start, count, 3), np.float32)
+        out = np.empty((stop - start, count, 3), dtype)
         with context():
             for row, frame in enumerate(range(start, stop)):
                 for obj in objects:
                     out[row, obj.vertices] = positions(obj, frame)
         return out
 
-    return Frames(read, frame_count, count)
+    return Frames(read, frame_count, count, dtype)
 
 
 def transformed(points: np.ndarray, matrix: np.ndarray) -> np.ndarray:
-    """(n, 3) points by a (4, 4) matrix for row vectors, as float32; by (k, 4, 4) k times, one after the other."""
+    """(n, 3) points by a (4, 4) matrix for row vectors, as float64; by (k, 4, 4) k times, one after the other. Points
+    that stay keep their type."""
     if matrix.ndim == 3:
-        return (points @ matrix[:, :3, :3] + matrix[:, 3:, :3]).astype(np.float32).reshape(-1, 3)
+        return (points @ matrix[:, :3, :3] + matrix[:, 3:, :3]).reshape(-1, 3)
     if np.array_equal(matrix, np.eye(4)):
         return points
-    return (points @ matrix[:3, :3] + matrix[3, :3]).astype(np.float32)
+    return points @ matrix[:3, :3] + matrix[3, :3]
 
 
 def _add_kept(

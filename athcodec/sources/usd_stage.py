@@ -8,11 +8,11 @@ are the whole time codes of the stage's range where it has one, else the time co
 another rate. Static primvars become attributes, the names of materials the metadata "material_names", of which the
 attribute "face_material" says the number for each face.
 
-Points are float32 in USD and so they are here. The stage is opened as it is composed (layers, payloads, value clips);
-what else it holds, such as layers that cannot be found, patches, tetrahedra, what is in materials, is named in the
-clip's `not_read`; velocities are not read. A stage is opened by its structure; positions are read frame by frame. USD
-trusts the lengths of arrays in a binary file even where it is damaged: it is imported by the process of reader_main.py
-alone, under a limit of memory.
+Points are float32 in USD and so they are here, unless a transform places them far from the origin. The stage is opened
+as it is composed (layers, payloads, value clips); what else it holds, such as layers that cannot be found, patches,
+tetrahedra, what is in materials, is named in the clip's `not_read`; velocities are not read. A stage is opened by its
+structure; positions are read frame by frame. USD trusts the lengths of arrays in a binary file even where it is
+damaged: it is imported by the process of reader_main.py alone, under a limit of memory.
 """
 
 from __future__ import annotations
@@ -33,6 +33,7 @@ from athcodec.errors import ClipError
 from athcodec.files.plain import open_plain
 from athcodec.files.reading import FileWatch, check_inside
 from athcodec.motion.clip import MotionClip, Skin
+from athcodec.motion.frames import is_far
 from athcodec.motion.units import METRES
 from athcodec.sources import ReadOptions
 from athcodec.sources.crate import check_crates
@@ -673,7 +674,8 @@ def _statics(obj: _Prim, codes: np.ndarray, matrix: np.ndarray) -> None:
         obj.statics = {name: static for name, static in obj.statics.items() if static.domain != "vertex"}
     rest = obj.statics.get("rest")
     if rest is not None and rest.values.shape[1:] == (3,) and rest.values.dtype.kind == "f":
-        obj.statics["rest"] = Static(rest.domain, transformed(rest.values, matrix))
+        placed = transformed(rest.values, matrix)
+        obj.statics["rest"] = Static(rest.domain, placed if is_far(placed) else placed.astype(np.float32))
 
 
 def _rename_first_uv(obj: _Prim) -> None:
