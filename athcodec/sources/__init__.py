@@ -200,8 +200,8 @@ FORMATS = (
     Format("xdmf", "XDMF time series", (".xdmf", ".xmf"), "athcodec.sources.xdmf"),
     Format(
         "vtk",
-        "VTU, VTK (with athcodec[mesh]) or PVD series, named by any one of its files",
-        (".vtu", ".vtk", ".pvd"),
+        "VTU, VTP, VTK (with athcodec[mesh]) or PVD series, named by any one of its files",
+        (".vtu", ".vtp", ".vtk", ".pvd"),
         "athcodec.sources.vtk",
     ),
 )

@@ -3,8 +3,8 @@
 Points of a step are those of the file plus the displacement. It is options.field, else the one field per point that is
 called displacement, disp or u; where there is none, the points themselves move, and where they do move, a field of such
 a name is left alone unless it is asked for. Other data per point and per cell are kept where they are the same in all
-steps, and left out where they change in time: those per point are in the clip's `not_read`. The format of the file is
-not known here.
+steps, and named in the clip's `not_read` where they change in time or are per something else. The format of the file
+is not known here.
 """
 
 from __future__ import annotations
@@ -29,6 +29,7 @@ class Steps(Protocol):
     """The steps of a result, as a format gives them, read when they are asked for. `topology` is that of the first."""
 
     topology: Topology
+    left_out: list[str]  # Names of arrays that are neither per point nor, unchanged, per cell.
 
     def points(self, step: int) -> np.ndarray:
         """(N, 2) or (N, 3) points of the mesh."""
@@ -110,7 +111,7 @@ def clip_of_steps(
         metadata=said | metadata,
         resource=resource,
         unchanged=unchanged,
-        not_read={"field": moving} if moving else {},
+        not_read={kind: names for kind, names in (("field", moving), ("attribute", steps.left_out)) if names},
     )
 
 

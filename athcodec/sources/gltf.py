@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 
 from athcodec.errors import ClipError
-from athcodec.files.gltf.document import GltfFile
+from athcodec.files.gltf.document import DRACO, UNPACKED_BY, GltfFile
 from athcodec.files.gltf.json import BROKEN, brief, entries, entry, indices, integer
 from athcodec.files.gltf.motion import EXTENSION, extension_of
 from athcodec.files.gltf.primitives import corners, rows_of
@@ -469,12 +469,9 @@ def _not_read(scene: Scene, nodes: Sequence[GltfNode]) -> dict[str, list[str]]:
 
 
 def _refuse_draco(file: GltfFile, primitive: dict, positions: int) -> None:
-    packed = "KHR_draco_mesh_compression" in (primitive.get("extensions") or {})
+    packed = DRACO in (primitive.get("extensions") or {})
     if packed and file.item("accessors", positions).get("bufferView") is None:
-        raise ClipError(
-            "meshes: got KHR_draco_mesh_compression, expected a file without it: decompress it first, for "
-            "example with gltf-transform copy"
-        )
+        raise ClipError(f"meshes: got {DRACO}, expected a file without it: {UNPACKED_BY}")
 
 
 def _load(node: GltfNode, scene: Scene) -> None:
@@ -860,8 +857,9 @@ def _attributes(
     )
     found: dict[str, np.ndarray] = {}
     for key in keys:
-        name = NAMES.get(key) or (key[1:].lower() if key.isupper() else key[1:])
-        if name and name not in skip and name not in found:
+        name = NAMES.get(key) or (key[1:].lower() if key.isupper() else key[1:]) or key
+        name += "_" * (name in found)
+        if name not in skip:
             found[name] = _attribute(file, nodes, key, name, motion)
     branches = _branches(file, found)
     for name in RESERVED_NAMES & found.keys():

@@ -368,10 +368,13 @@ def _joined_statics(objects: list[SceneObject], skip: Collection[str]) -> tuple[
         if name in skip:
             continue
         array = _joined_static(name, objects)
-        if array is not None:
-            attributes[name] = array.values
-            if array.domain != "vertex":
-                domains[name] = array.domain
+        if array is None:
+            for obj in objects:
+                obj.left_out += [name] * (name in obj.statics)
+            continue
+        attributes[name] = array.values
+        if array.domain != "vertex":
+            domains[name] = array.domain
     attributes["part_vertex_counts"] = np.array([obj.count for obj in objects], np.int32)
     domains["part_vertex_counts"] = "constant"
     if any(obj.copies > 1 for obj in objects):

@@ -29,7 +29,7 @@ from athcodec.sources.timing import numbered_times
 _NUMBERED = re.compile(r"(.*?)(\d+)", re.DOTALL)
 _ELEMENTS = frozenset((b"f ", b"f\t", b"l ", b"l\t"))
 LARGEST_NUMBER = 10**9
-FRAME_SUFFIXES = (".obj", ".ply", ".vtu", ".vtk")  # Formats that have one file per frame.
+FRAME_SUFFIXES = (".obj", ".ply", ".vtu", ".vtp", ".vtk")  # Formats that have one file per frame.
 
 
 @dataclass(frozen=True)

@@ -705,11 +705,9 @@ def _keep(
     element_size: int = 1,
     attribute: Usd.Attribute | None = None,
 ) -> None:
-    """Notes a static array where its rows fit the prim; strings and references to files are none."""
+    """Keeps a static array if it has numbers, and rows that fit the prim; notes the names of others."""
     values = _numbers(values)
-    if values is None:
-        return
-    if element_size > 1 and len(values) % element_size == 0:
+    if values is not None and element_size > 1 and len(values) % element_size == 0:
         values = values.reshape(-1, element_size, *values.shape[1:])
         values = values[..., 0] if values.shape[2:] == (1,) else values
     obj.keep(name, DOMAINS.get(interpolation), _as_written(values, attribute))
@@ -731,10 +729,10 @@ def _is_array(values: Any) -> bool:
     return type(values).__module__.startswith("pxr.Vt")
 
 
-def _as_written(values: np.ndarray, attribute: Usd.Attribute | None) -> np.ndarray:
+def _as_written(values: np.ndarray | None, attribute: Usd.Attribute | None) -> np.ndarray | None:
     """In the dtype that an array had before exporters/usd.py chose one that USD has."""
     said = _said(attribute, "dtype") if attribute else None
-    return values.astype(said) if said in WRITTEN_DTYPES else values
+    return values.astype(said) if values is not None and said in WRITTEN_DTYPES else values
 
 
 def _said(attribute: Usd.Attribute, key: str) -> str | None:

@@ -249,6 +249,7 @@ class _Steps:
         self._mesh = self._grids[0] if self._grids[0].find("Geometry") is not None else own
         self._first_blocks = self._blocks(self._topology_element(0))
         self.topology = topology_of(self._first_blocks, len(self.points(0)))
+        self.left_out: list[str] = []
         self._add_cell_data()
 
     def times(self, options: ReadOptions) -> tuple[np.ndarray, dict[str, Any]]:
@@ -342,11 +343,14 @@ class _Steps:
     def _add_cell_data(self) -> None:
         count = sum(len(block.rows) for block in self._first_blocks)
         for name, center, element in self._attributes(0):
+            values = ()
             if center == "cell" and name and self._is_static(name, "cell"):
                 values = self._data.read(element.find("DataItem"))
-                if len(values) == count:
-                    self._data.budget.take(2 * values.nbytes, name)
-                    self.topology.add_cell_data(name, values[:, 0] if values.shape[1:] == (1,) else values)
+            if center == "cell" and len(values) == count:
+                self._data.budget.take(2 * values.nbytes, name)
+                self.topology.add_cell_data(name, values[:, 0] if values.shape[1:] == (1,) else values)
+            elif center != "node":
+                self.left_out.append(name)
 
     def _is_static(self, name: str, center: str) -> bool:
         """By reference, or by value: the last step is compared first, because what moves is not there where it was."""
