@@ -140,10 +140,9 @@ def _displacement(steps: Any, step_count: int, options: ReadOptions) -> str | No
     if len(found) > 1:
         raise ClipError(f"field: got {_listed(found)}, expected one displacement; name it with --field")
     if not found and step_count > 1:
-        raise ClipError(
-            f"field: got points that do not move and no displacement, only {_listed(names)}; name one of "
-            "them with --field"
-        )
+        others = f" ({', '.join(steps.left_out)}: not one value per point)" if steps.left_out else ""
+        hint = "; name one of them with --field" if names else ", expected one per point: write it at the nodes"
+        raise ClipError(f"field: got points that do not move and no displacement, {_listed(names)}{others}{hint}")
     return found[0] if found else None
 
 

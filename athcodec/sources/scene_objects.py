@@ -25,6 +25,10 @@ MAX_METADATA_BYTES = 1 << 24
 DESCRIPTOR = ".descriptor"  # behind the name of an array's property in an Alembic file: that of its ArrayDescriptor
 FACE_MATERIAL, MATERIAL_NAMES = "face_material", "material_names"  # an attribute, and metadata
 FLIPPED = "faces that turn inside out in time"  # in not_read: objects that a transform mirrors in some frames alone
+CHANGING = (
+    ": points that appear or vanish cannot be read; write them as copies of a mesh with ids, or read other objects "
+    "with --only"
+)
 TWO_SIDES = {"doubleSided": True}  # glTF's material of faces that are seen from both sides and have no other
 OWN = "athcodec"  # the namespace of what our writers add to files of other formats
 SCENE_KEYS = {"unit": str, "up_axis": str, "fps": float}  # of metadata, which some formats have no place for
@@ -144,7 +148,7 @@ class SceneObject:
         if not len(points) == len(ids) == len(rows) or (rows < 0).any():
             raise ClipError(
                 f"{self.path}: got {len(points)} points with other ids in {where}, expected the {len(rows)} of the "
-                "first frame: points that appear or vanish cannot be read; write them as copies of a mesh with ids"
+                f"first frame{CHANGING}"
             )
         return points[rows]
 
@@ -268,7 +272,7 @@ def frames_of_objects(
         if len(points) * obj.copies != obj.count:
             raise ClipError(
                 f"{obj.path}: got {len(points)} points in {frame_name(frame)}, expected {obj.count // obj.copies} as "
-                "in the first frame"
+                f"in the first frame{CHANGING if obj.kind == 'points' else ''}"
             )
         points = transformed(points, matrix)
         if obj.is_still:

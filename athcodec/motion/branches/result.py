@@ -36,8 +36,8 @@ class Found:
         roots = int((self.branch_parent < 0).sum())
         sizes = np.bincount(self.vertex_branch)
         return (
-            f"{len(self.branch_parent):,} branches by {self.method}: {roots:,} without a parent, up to order "
-            f"{orders.max()}, {sizes.min():,} to {sizes.max():,} vertices each"
+            f"{len(sizes):,} branch{'es' * (len(sizes) != 1)} by {self.method}: {roots:,} without a parent, "
+            f"up to order {orders.max()}, {sizes.min():,} to {sizes.max():,} vertices each"
         )
 
 
