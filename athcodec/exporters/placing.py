@@ -28,6 +28,9 @@ def in_singles(motion: Any, can_move: bool) -> Any:
         rest = property(lambda self: motion.rest - origin)
         source_rest = property(lambda self: getattr(motion, "source_rest", motion.rest))
 
+        def block(self, start: int, stop: int) -> np.ndarray:
+            return motion.block(start, stop) - origin
+
         def blocks(self, *args: Any) -> Iterator[tuple[int, np.ndarray]]:
             for start, block in motion.blocks(*args):
                 points = block - origin
