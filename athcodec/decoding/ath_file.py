@@ -102,14 +102,14 @@ class AthFile(StaticData, SegmentDecoder):
         self.max_error_bound: float = info.max_error
         self.dtype = np.dtype(np.float64 if info.is_float64 else np.float32)
         self.origin = np.array(info.origin)
-        if host_mesh is None and self.needs_host_mesh:
-            host_mesh = getattr(self.source, "host_mesh", None)
-        if host_mesh is not None:
-            try:
+        try:
+            if host_mesh is None and self.needs_host_mesh:
+                host_mesh = getattr(self.source, "host_mesh", None)
+            if host_mesh is not None:
                 self.set_host_mesh(host_mesh)
-            except BaseException:
-                self.close()
-                raise
+        except BaseException:
+            self.close()
+            raise
 
     def __enter__(self) -> AthFile:
         return self
