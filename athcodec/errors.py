@@ -20,6 +20,10 @@ class SourceWarning(UserWarning):
     """A source holds something that is part of its picture and is not read, or that is hidden and costs precision."""
 
 
+class GuessWarning(SourceWarning):
+    """What a source means was guessed; the message says what was taken for what, and how to say otherwise."""
+
+
 class BoundError(AthError, ValueError):
     """An error bound or target size cannot be kept."""
 

@@ -12,7 +12,7 @@ WEBGPU_FLAGS = [
     "--enable-unsafe-webgpu",
     "--use-webgpu-adapter=swiftshader",
     "--enable-unsafe-swiftshader",
-    # what a canvas of WebGPU is presented by; without these Chromium's GPU process ends at the first picture
+    # These present a canvas of WebGPU; without them Chromium's GPU process ends at the first picture
     "--use-gl=angle",
     "--use-angle=swiftshader",
     "--ignore-gpu-blocklist",

@@ -107,7 +107,10 @@ def _version(name: str) -> str:
 def _athcodec_files() -> set[Path]:
     """Python of the encoder and decoder, and the compiled core, of the installed package."""
     package = Path(athcodec.__file__).parent
-    return {library_path(), *package.glob("*.py"), *package.glob("encoding/**/*.py")}
+    return {
+        library_path(),
+        *(path for name in ("encoding", "decoding", "motion") for path in package.glob(f"{name}/**/*.py")),
+    }
 
 
 def _bench_files(module: str) -> set[Path]:

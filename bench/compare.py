@@ -20,7 +20,10 @@ Point = dict[str, Any]
 BOUND_TARGETS = {"program": {1e-3: 6.5, 1e-4: 5.0, 1e-5: 2.8}, "baseline": {1e-3: 2.0, 1e-4: 1.6, 1e-5: 1.3}}
 KG_TARGETS = {0.1: 2.5, 0.01: 1.9}  # against PCA; Karni-Gotsman error in per cent
 PCA_NAMES = ("pca", "coddyac")
-SIMPLE_SHARE, SIMPLE_BYTES = 1.02, 160  # of the simple codec's size, and bytes, that ours may take
+SIMPLE_SHARE, SIMPLE_BYTES = (
+    1.02,
+    160,
+)  # Our files may take this share of the simple codec's size, and so many bytes more.
 
 
 def measured(points: Iterable[Point]) -> list[Point]:

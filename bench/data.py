@@ -204,7 +204,7 @@ def _make(name: str, source_path: Path | None, path: Path) -> float:
         if source:
             source.close()
     clip.metadata["recipe"] = recipe_text(name)
-    path.unlink(missing_ok=True)  # What is there may be damaged, and no file of another kind is replaced.
+    path.unlink(missing_ok=True)  # A file there may be damaged, and no file of another kind is replaced.
     athcodec.write_hdf5(clip, path)
     return time.perf_counter() - start
 

@@ -13,7 +13,7 @@
 
 enum { LEVELS = 32, TICKS = 30, RING_BYTES = 64 << 20 };
 
-static const double BETWEEN = 0.37; /* of the way to the next frame: what is shown is a blend */
+static const double BETWEEN = 0.37; /* Part of the way to the next frame, so that a blend is shown. */
 
 typedef struct {
     uint8_t *bytes;
@@ -263,7 +263,7 @@ static void measure_level(const opened *clip, int32_t level, int round, level_ru
     run->matrices_us[round] = (skinned - played) * 1e3 / frames;
 }
 
-/* What a reader fetches to show a level of the whole clip. */
+/* Bytes that a reader fetches to show a level of the whole clip. */
 static uint64_t level_bytes(const opened *clip, int32_t level)
 {
     const ath_file *file = clip->file;
@@ -314,7 +314,7 @@ typedef struct {
     ath_segment *before, *after;
     uint8_t *kept;
     size_t room, kept_bytes;                  /* the latter of all segments */
-    double *keeping_ms, *onward_ms, *anew_ms; /* of all segments, one per round */
+    double *keeping_ms, *onward_ms, *anew_ms; /* Times of all segments, one per round. */
 } pair_run;
 
 static void ready_pair(const opened *clip, int rounds, pair_run *run)
@@ -404,7 +404,7 @@ static void measure_onward(const opened *clip, int rounds)
 
 /* ---- seeking ---- */
 
-/* The same frames in every run and on every machine. */
+/* Draws frames that are equal in every run and on every machine. */
 static int32_t random_frame(uint64_t *state, int32_t frames)
 {
     *state = *state * 6364136223846793005u + 1442695040888963407u;
@@ -437,7 +437,7 @@ static void measure_seeks(const opened *clip, int seeks)
 typedef struct {
     const opened *clip;
     const level_run *runs;
-    const int32_t *levels; /* of instance i: levels[i % level_count] */
+    const int32_t *levels; /* Instance i has levels[i % level_count]. */
     int level_count, count;
     float *ring; /* where what is shown goes, one instance behind the other */
     size_t ring_floats;

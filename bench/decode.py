@@ -41,7 +41,7 @@ except ImportError:
     pysz = None
 
 ROUNDS, SEEKS, INSTANCES = 9, 1000, 1000
-THREADS = (1, 2)  # of Python's positions()
+THREADS = (1, 2)  # Threads of Python's positions().
 TABLES = ("target", "whole", "levels", "onward", "memory", "instances")
 GZIP_CHUNK = 1 << 20
 SZ3_LAYOUTS = ("T,N,3", "N,T,3", "3,T,N", "3,N,T", "T,3N", "3N,T")

@@ -57,12 +57,12 @@ GONE = {  # Features that a format before this one had, by their names among the
     "plain_rest": "plain vertices of rest poses",
     "bent": "bent copies in rest poses",
 }
-OTHERS = {  # What no encoder leaves out; measured by one that was changed for it.
+OTHERS = {  # Features that no encoder leaves out; measured by one that was changed for it.
     "sides": "open sides as guesses of faces",
     "adaptive": "adaptive vertices of rest poses",
 }
 LEAST = 1.0  # Per cent that a feature has to save on some file.
-LEAST_BYTES = 500  # Of the files in the table: of smaller ones a few bytes are many per cent.
+LEAST_BYTES = 500  # Smallest file in the table: a few bytes of smaller ones are many per cent.
 
 NOTE = f"""
 How many per cent larger files are without the feature: the mean of all files, the mean of those that use it, the least

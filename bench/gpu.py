@@ -23,7 +23,7 @@ from bench.throttled_server import ThrottledServer
 
 COUNTS = (100, 10_000)
 UPDATES = 40
-TEXEL = 8  # of a texture of four halves, one for each vertex and frame: positions, without normals
+TEXEL = 8  # Bytes of a texel of four halves, one for each vertex and frame: positions, without normals.
 HERE = Path(__file__).parent
 COSTS = f"""motion: bytes uploaded once, of levels and segments. again: bytes of motion uploaded in {UPDATES} updates
 when all of them are there. parameters: bytes a frame, which frames are shown, and the view. All levels are computed in

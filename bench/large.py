@@ -26,7 +26,7 @@ from athcodec.motion.frames import Frames
 from bench.tables import table
 
 STEM = 100  # vertices
-CHILDREN = 12  # of each stem
+CHILDREN = 12  # Children of each stem.
 FPS = 30.0
 
 NOTE = """

@@ -16,7 +16,7 @@ from bench.tables import table
 from bench.throttled_server import ThrottledServer
 
 SIZE = 760, 460
-FRAMES, LOOP_SECONDS = 60, 5.0  # of the picture; the loop plays in its own time
+FRAMES, LOOP_SECONDS = 60, 5.0  # Frames of the picture; the loop plays in its own time.
 QUALITY = 58
 TIMEOUT = 120_000  # ms
 ALONE = """() => {

@@ -20,7 +20,7 @@ from bench.curves import Curve
 from bench.tables import table
 
 LOOSEST, OWN_PER_DECADE = 0.1, 4
-BELOW = 0.9  # of the bound: the last of them has the errors of whole files too
+BELOW = 0.9  # Share of the bound down to which files are made, so that the last has the errors of whole files too.
 JUST_BELOW = 1 - 1e-6
 MEASURES = ("max", "RMS")
 

@@ -66,7 +66,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 def _steps(args: argparse.Namespace) -> Iterator[tuple[str, list[str]]]:
     out = args.out.resolve()
     clips = [str(Path(clip).resolve()) if Path(clip).is_file() else clip for clip in args.clips]
-    files = [clip for clip in clips if Path(clip).is_file()][:1]  # of the sample where none is given
+    files = [clip for clip in clips if Path(clip).is_file()][:1]  # The first clip, or none: then the sample is taken.
     bounds = [f"{bound:g}" for bound in args.bounds]
     few = ["--rounds", "2", "--seeks", "20", "--instances", "20"]
     made = ["--of", *files] if files else []

@@ -37,7 +37,7 @@ BOUNDS = {
     "odd-quick": (1e-3, 1e-5),
 }
 ODD_CODECS = ("athcodec", simple.NAME, "SZ3", "global PCA", "clustered PCA (Sattler)", "moving frames + PCA (Lengyel)")
-CODECS = {"odd": ODD_CODECS, "odd-quick": ODD_CODECS[:2]}  # of other suites all
+CODECS = {"odd": ODD_CODECS, "odd-quick": ODD_CODECS[:2]}  # Other suites run all codecs.
 TIMEOUTS = {"quick": 3600, "full": 3600, "odd": 300, "odd-quick": 300}
 KEYS = {"clips": ("clip",), "points": ("clip", "codec", "bound")}
 OK, MISSING, BROKEN, FAILED, SLOW = "ok", "missing", "bound broken", "failed", "too slow"

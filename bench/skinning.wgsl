@@ -1,7 +1,7 @@
 // Plants by one matrix per bone, of two frames: what the passes of athcodec/gpu are measured beside.
 struct Show { now: vec2<u32>, before: vec2<u32>, weights: vec2<f32> }
 @group(0) @binding(0) var<storage, read> rest: array<vec4<f32>>; // point and bone, normal
-@group(0) @binding(1) var<storage, read> rows: array<vec4<f32>>; // of matrices, three each
+@group(0) @binding(1) var<storage, read> rows: array<vec4<f32>>; // Rows of matrices, three each.
 @group(0) @binding(2) var<storage, read> shows: array<Show>;
 @group(0) @binding(3) var<storage, read_write> vertices: array<f32>;
 fn moved(x: vec4<f32>, frames: vec2<u32>, weight: f32, bone: u32) -> vec3<f32> {

@@ -257,7 +257,7 @@ def package(data: bytes, item: str, mesh: bytes | None = None) -> bytes:
             return ask_package(decoder, item)
     except FormatError as error:
         raise Refused(error.name) from None
-    except LevelUnavailable:  # of a level that the file stores, but that has not arrived
+    except LevelUnavailable:  # The file stores the level, but it has not arrived.
         raise Refused("TRUNCATED") from None
 
 

@@ -43,11 +43,14 @@ from spec import conformance, document
 HERE = Path(__file__).resolve().parent
 REASONS, REPORT = HERE / "mutants.toml", HERE / "mutants.md"
 CACHE = HERE.parent / "build" / "mutants.pickle"
-LEFT_OUT = {"decode", "Invalid", "Record"}  # what has no effect on results, or is not asked for
+LEFT_OUT = {"decode", "Invalid", "Record"}  # Changes of these have no effect on results, or are not asked for.
 LONGEST_NAME = 72
-QUICK_SECONDS, MOST_SECONDS = 1.0, 6.0  # of vectors that a change is tried with
+QUICK_SECONDS, MOST_SECONDS = 1.0, 6.0  # Decoding time of the vectors that a change is tried with.
 LARGEST = 14_000  # bytes of a vector that is tried: those of real size take too long
-SECONDS, TIMES_AS_LONG = 1.0, 10.0  # of the processor, for a vector; and how many times what the decoder takes
+SECONDS, TIMES_AS_LONG = (
+    1.0,
+    10.0,
+)  # Processor time for a vector, and the time over the decoder's that counts as never ending.
 MEMORY = 3 << 30
 NOT_CHANGED = (ast.operator, ast.unaryop, ast.boolop, ast.cmpop, ast.expr_context)
 MISSED = "missed"
@@ -82,7 +85,7 @@ class Mutant:
     node: ast.AST
     top: int  # the statement of the module that it is in
     function: str
-    line: int  # of FORMAT.md, which has to run; 0: any may do
+    line: int  # Line of FORMAT.md that has to run; 0: any may do.
     of_floats: int  # the number of the expression that has to be of floats; -1: any
 
 
@@ -446,7 +449,7 @@ class Cache:
     source: str
     known: dict[str, Known] = field(default_factory=dict)  # by the name of the vector
     floats: set[int] = field(default_factory=set)  # numbers of expressions
-    fates: dict[str, str] = field(default_factory=dict)  # of changes
+    fates: dict[str, str] = field(default_factory=dict)  # Fates of changes.
     missed: dict[str, float] = field(default_factory=dict)  # Seconds of all these vectors that a change was tried with.
 
     @staticmethod
@@ -496,7 +499,7 @@ class Run:
 
     def __init__(self, changes: Changes, vectors: list[Known], cache: Cache, seconds: float):
         self.decoder, self.vectors, self.cache, self.seconds = Decoder(changes.tree), vectors, cache, seconds
-        self.lately: dict[str, list[str]] = defaultdict(list)  # of a function: vectors that caught changes, last first
+        self.lately: dict[str, list[str]] = defaultdict(list)  # By function: vectors that caught changes, last first.
 
     def all(self, mutants: list[Mutant], jobs: int) -> dict[str, str]:
         """Return what becomes of each change. What is known to be caught, or missed for as long, is not tried again."""

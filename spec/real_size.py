@@ -102,7 +102,7 @@ def motion(plant: Growing, frames: int, wind: float, turns: float, noise: float,
     """(frames, vertices, 3): branches turn about where they hang, and carry others along."""
     time = np.linspace(0.0, 1.0, frames, endpoint=False)
     gusts = plant.random.normal(size=frames) * gust
-    turned: list[tuple[np.ndarray, np.ndarray]] = []  # of branches: matrix and shift of each frame
+    turned: list[tuple[np.ndarray, np.ndarray]] = []  # For each branch: matrix and shift of each frame.
     positions = []
     for b, (points, parent, joint) in enumerate(zip(plant.points, plant.parents, plant.joints)):
         matrix, shift = (np.eye(3)[None], np.zeros((1, 3))) if parent < 0 else turned[parent]

@@ -21,8 +21,8 @@ import numpy as np
 from spec.document import crc32c, rules
 
 LOOSE, SHEET, WHOLE = rules.LOOSE, rules.SHEET, rules.WHOLE
-REST_EXACT, REST_FLOAT64, IS_HOST, REST_CONNECTED = 1, 2, 4, 8  # of REST's Method
-NO_LEVEL = 255  # of a chunk that is not of motion
+REST_EXACT, REST_FLOAT64, IS_HOST, REST_CONNECTED = 1, 2, 4, 8  # Bits of REST's Method.
+NO_LEVEL = 255  # Level of a chunk that is not of motion.
 
 RECENT = 32  # corners that a vertex may be said by
 
@@ -174,7 +174,7 @@ def scripted_face_count(original: Callable, coder, model, before):
     return count
 
 
-# What is replaced of FORMAT.md's code, by what, and the function that this calls.
+# Replacements in FORMAT.md's code, and the function that each calls.
 SCRIPTED = {
     "code_in_class": (scripted_unsigned, "code_in_class"),
     "code_signed_in_class": (scripted_signed, "code_in_class"),
@@ -217,7 +217,7 @@ def write(function: Callable, script: Script | list, *arguments, lowest: bool = 
 
 HEADER = struct.Struct("<8sBBHIII")
 HEADER_FIELDS = "magic major minor features checksum front_length chunk_count".split()
-MOST_ENTRIES = 4096  # of an error table that is written
+MOST_ENTRIES = 4096  # Largest error table that is written.
 
 
 @dataclass(frozen=True)
@@ -225,7 +225,7 @@ class Clip:
     frames: int
     segments: int
     name: str = ""
-    seams: tuple[float, ...] | None = None  # of a loop: Seam_Errors, one for each level
+    seams: tuple[float, ...] | None = None  # For a loop: Seam_Errors, one for each level.
     periodic: bool = False  # a loop of one segment, in periodic waves
 
     def entry(self) -> bytes:
@@ -344,9 +344,9 @@ class Draft:
     header: dict
     entries: tuple[Entry, ...]
     errors: tuple[int, ...] | None = None  # the error table as stored
-    joins: tuple[Join, ...] | None = None  # of each level and segment
-    repeats: tuple[int, ...] = ()  # of each frame
-    stream: Callable[[bytes], bytes] | None = None  # what becomes of the front stream
+    joins: tuple[Join, ...] | None = None  # For each level and segment.
+    repeats: tuple[int, ...] = ()  # For each frame.
+    stream: Callable[[bytes], bytes] | None = None  # Change of the front stream.
 
     def file(self) -> bytes:
         fields = (
@@ -620,27 +620,27 @@ class Plant:
     stems: list[Stem]
     frames: int = 1
     segments: int = 1
-    clips: tuple[Clip, ...] = ()  # of CLIPS; none: one of `frames` and `segments`, without the chunk
+    clips: tuple[Clip, ...] = ()  # Clips of CLIPS; none: one of `frames` and `segments`, without the chunk.
     points: list | None = None  # integers in units of Rest_Step; None: `grown`
     rest: bytes | None = None  # REST
     faces: bytes | None = None  # FACES that it goes by
     source_rest: bytes | None = None  # SOURCE_REST
-    mesh: np.ndarray | None = None  # of the host, in source order, in place of a rest pose
+    mesh: np.ndarray | None = None  # The host's mesh, in source order, in place of a rest pose.
     time: bytes | None = None  # TIME
     branch_source: list | None = None
     vertex_source: list | None = None
     is_float64: bool = False
     scripts: dict = field(default_factory=dict)
-    heads: dict = field(default_factory=dict)  # of STEMS
+    heads: dict = field(default_factory=dict)  # Heads of STEMS.
     default_head: bytes = stems_head()
     origin: tuple = (0.0, 0.0, 0.0)
     step: float = 0.25
     layers: int = 1
-    ratio: int = 4  # of the steps of layers, as STEMS and REFINED_REST have it
-    shift: int = 2  # of SHAPES
+    ratio: int = 4  # Ratio of the steps of layers, as STEMS and REFINED_REST have it.
+    shift: int = 2  # Shift of SHAPES.
     joins: tuple[Join, ...] | None = None
-    repeats: tuple[int, ...] = ()  # of each frame, of one clip; none: no frame is one
-    predicted: bytes | None = None  # of predicted motion, Step and Settings; then AFFINES are there only with a script
+    repeats: tuple[int, ...] = ()  # For each frame of one clip; none: no frame is a repeat.
+    predicted: bytes | None = None  # Predicted motion, Step and Settings; then AFFINES are there only with a script.
 
     def draft(self) -> Draft:
         vertices = sum(stem.count for stem in self.stems)

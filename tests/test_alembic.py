@@ -116,6 +116,25 @@ def test_instances_are_read_as_copies_and_what_is_not_read_is_named(tmp_path):
         assert np.array_equal(found.vertex_branch, np.repeat([0, 1, 2], 12))
 
 
+def test_arrays_that_change_in_a_single_sample_are_named_and_those_with_equal_samples_stay(tmp_path):
+    archive = Abc.OArchive(str(tmp_path / "a.abc"))
+    sampling = Abc.Argument(archive.addTimeSampling(AbcCoreAbstract.TimeSampling(1 / 24, 0)))
+    mesh = AbcGeom.OPolyMesh(archive.getTop(), "grid", sampling)
+    corners, counts = filled(imath.IntArray, QUADS[:, ::-1].reshape(-1)), filled(imath.IntArray, [4] * len(QUADS))
+    scope, place = AbcGeom.GeometryScope.kUniformScope, mesh.getSchema().getArbGeomParams()
+    params = {name: AbcGeom.OFloatGeomParam(place, name, False, scope, 1, sampling) for name in ("wet", "dry")}
+    for frame in range(5):
+        mesh.getSchema().set(AbcGeom.OPolyMeshSchemaSample(filled(imath.V3fArray, sway(frame)), corners, counts))
+        for name, param in params.items():
+            values = filled(imath.FloatArray, [float(name == "wet" and frame == 2)] * len(QUADS))
+            param.set(AbcGeom.OFloatGeomParamSample(values, scope))
+    del archive, mesh, place, params, param
+    gc.collect()
+    with athcodec.read(tmp_path / "a.abc") as clip:
+        assert clip.not_read == {"attribute": ["/grid.wet"]}
+        assert "dry" in clip.attributes and "wet" not in clip.attributes
+
+
 def test_another_frame_rate_interpolates_linearly_between_samples(tmp_path):
     write_archive(tmp_path / "a.abc")
     with athcodec.read(tmp_path / "a.abc", fps=2 * FPS) as clip:

@@ -820,7 +820,7 @@ def test_streams_of_one_byte_over_and_over_end_soon_and_are_refused_where_they_a
         data = parts.with_payload(KINDS[name], parts.payload(KINDS[name], level)[:head] + byte * size, level)
         assert work_of(lambda data=data, of=(byte, size): outcomes.setdefault(of, use(data))) < most
     assert not any(plays for (_, size), plays in outcomes.items() if size > 1)
-    assert any(outcomes.values()) == (name not in ("HIERARCHY", "SHAPES"))
+    assert any(outcomes.values()) == (name != "HIERARCHY")  # A short stream ends in zeros, which may be valid.
 
 
 # ---- zstd ----

@@ -97,7 +97,7 @@ def test_attributes_named_like_branch_ids_are_used(dressed, domain):
     if domain == "face":
         labels = labels[dressed.faces[:, 0]]
     found = athcodec.find_branches(bare(dressed, attributes={"primvars:Branch_ID": labels}))
-    assert found.method == "attributes"
+    assert found.method == "attributes" and " branches by attributes (primvars:Branch_ID): " in str(found)
     assert right_parents(found, dressed) > 0.98
 
 

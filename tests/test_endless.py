@@ -9,7 +9,6 @@ from test_blending import beams
 
 import athcodec
 from athcodec.cli import main
-from athcodec.decoding.endless_play import EndlessPlay
 from athcodec.errors import ClipError
 from athcodec.motion.transitions import transitions_of
 from bench.trees.plant import grow
@@ -74,7 +73,7 @@ def test_an_hour_has_no_period(tree_ath):
 
 def test_a_seed_names_a_play_and_any_time_of_it_can_be_asked_for(tree_ath):
     with athcodec.open(tree_ath) as decoder:
-        one, again, other = (EndlessPlay(decoder, seed) for seed in (3, 3, 4))
+        one, again, other = (decoder.endless(seed) for seed in (3, 3, 4))
         times = np.random.default_rng(1).uniform(0, HOUR, 300)
         there = [one.places(t) for t in times]
         assert there[::-1] == [again.places(t) for t in times[::-1]]

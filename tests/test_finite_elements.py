@@ -11,7 +11,7 @@ import pytest
 from moving_meshes import POINTS, assert_same_mesh, assert_same_motion, mixed_clip, quad_clip, survives_damage, swaying
 
 import athcodec
-from athcodec.errors import ClipError
+from athcodec.errors import ClipError, GuessWarning
 from athcodec.motion.clip import MotionClip
 
 pytestmark = pytest.mark.formats
@@ -36,7 +36,7 @@ def moved(points):
     return motion, (motion - rest)[..., : points.shape[1]]
 
 
-def write_xdmf(path, points, cells, displacement, name="u", data_format="HDF", **more):
+def write_xdmf(path, points, cells, displacement, name="displacement", data_format="HDF", **more):
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(path.parent)  # meshio puts the data where the process is
         with meshio.xdmf.TimeSeriesWriter(path.name, data_format) as writer:
@@ -177,7 +177,7 @@ def test_the_displacement_is_found_or_named_or_asked_for(tmp_path):
     with athcodec.read(path, field="Shift") as clip:
         assert np.abs(clip.block(0, 5) - motion).max() < 1e-12
     path = write_xdmf(tmp_path / "b.xdmf", points, cells, displacement, point_data={"Displacement": 2 * motion[0]})
-    with pytest.raises(ClipError, match="got Displacement, u, expected one displacement"):
+    with pytest.raises(ClipError, match="got Displacement, displacement, expected one displacement"):
         athcodec.read(path)
 
 
@@ -192,12 +192,74 @@ def test_what_is_static_is_kept_and_what_moves_is_left_out(tmp_path):
             for step, moving in enumerate(displacement):
                 writer.write_data(
                     step / 24,
-                    {"u": moving, "mass": np.arange(8.0), "stress": np.full(8, float(step))},
+                    {"displacement": moving, "mass": np.arange(8.0), "stress": np.full(8, float(step))},
                     {"part": [np.array([1, 2, 3])], "damage": [np.full(3, float(step))]},
                 )
     with athcodec.read(path) as clip:
         assert clip.attributes.keys() == {"mass", "part", "part_vertex_counts"}
+        assert clip.not_read == {"field": ["stress", "damage"]}
         assert clip.metadata["domains"]["part"] == "face" and clip.attributes["part"].tolist() == [1, 2, 3]
+
+
+def write_steps(folder, suffix, steps):
+    """Write meshes as VTU, or as one XDMF series that has the mesh in each step; return the path to read."""
+    grids = ""
+    for step, mesh in enumerate(steps):
+        path = folder / f"r_{step:04}{suffix}"
+        meshio.write(path, mesh, **({"data_format": "XML"} if suffix == ".xdmf" else {}))
+        if suffix == ".xdmf":
+            text = path.read_text()
+            grid = text[text.index("<Grid") : text.index("</Domain>")]
+            grids += grid.replace("<Topology", f'<Time Value="{step}"/><Topology')
+    if suffix != ".xdmf":
+        return path
+    series = '<Xdmf Version="3.0"><Domain><Grid GridType="Collection" CollectionType="Temporal">'
+    (folder / "r.xdmf").write_text(f"{series}{grids}</Grid></Domain></Xdmf>")
+    return folder / "r.xdmf"
+
+
+@pytest.mark.parametrize("suffix", [".xdmf", ".vtu"])
+def test_points_and_data_that_differ_in_a_single_step_change_in_time(tmp_path, suffix):
+    points, cells = CELLS["triangles"]
+    motion = np.repeat(points[None], 9, axis=0)
+    motion[3, :, 2] += 0.2
+    steps = [
+        meshio.Mesh(
+            motion[step],
+            cells,
+            point_data={"displacement": motion[step] - points, "mass": np.full(8, float(step == 5))},
+            cell_data={"part": [np.arange(3.0)], "damage": [np.full(3, float(step == 6))]},
+        )
+        for step in range(9)
+    ]
+    with athcodec.read(write_steps(tmp_path, suffix, steps)) as clip:
+        assert np.allclose(clip.block(0, 9), motion, rtol=0, atol=1e-12)
+        assert clip.attributes.keys() == {"part", "part_vertex_counts"}
+        assert clip.not_read == {"field": ["displacement", "mass", "damage"]}
+
+
+@pytest.mark.parametrize("suffix", [".xdmf", ".vtu"])
+def test_a_field_that_may_be_a_velocity_is_said_to_move_the_mesh(tmp_path, suffix):
+    points, cells = CELLS["triangles"]
+    motion, displacement = moved(points)
+    steps = [meshio.Mesh(points, cells, point_data={"U": moving}) for moving in displacement]
+    path = write_steps(tmp_path, suffix, steps)
+    with pytest.warns(GuessWarning, match="U was taken for the displacement.*--field U"), athcodec.read(path) as clip:
+        assert np.abs(clip.block(0, 5) - motion).max() < 1e-12
+    with athcodec.read(path, field="U") as clip:
+        assert np.abs(clip.block(0, 5) - motion).max() < 1e-12
+
+
+@pytest.mark.parametrize("suffix", [".xdmf", ".vtu"])
+def test_a_field_that_is_not_per_point_is_named_with_what_it_is_per(tmp_path, suffix):
+    points, cells = CELLS["triangles"]
+    path = write_steps(tmp_path, suffix, 2 * [meshio.Mesh(points, cells, cell_data={"u": [np.ones((3, 3))]})])
+    if suffix == ".xdmf":
+        path.write_text(path.read_text().replace('"Cell"', '"Other"'))
+    place = "other" if suffix == ".xdmf" else "cell"
+    message = rf"no fields per point; not per point: u \({place}\); write the displacement with one value per point"
+    with pytest.raises(ClipError, match=message):
+        athcodec.read(path)
 
 
 FENICS = """<?xml version="1.0"?>
@@ -345,3 +407,11 @@ def test_damaged_legacy_files_are_refused_with_a_clip_error(tmp_path):
             meshio.vtk.write(tmp_path / f"r{frame}.vtk", meshio.Mesh(points_of_frame, cells), **how)
         refused = survives_damage(tmp_path / "r0.vtk", lambda: athcodec.read(tmp_path / "r1.vtk"), cuts=15, changes=30)
         assert refused > 12
+
+
+@pytest.mark.parametrize("suffix", ["pvd", "xdmf"])
+def test_a_series_without_any_data_stands_still(tmp_path, suffix):
+    clip = MotionClip(np.repeat(CUBE[None], 3, axis=0), np.arange(3) / 24)
+    athcodec.write(clip, tmp_path / f"a.{suffix}")
+    with athcodec.read(tmp_path / f"a.{suffix}") as again:
+        assert np.array_equal(again.block(0, 3), clip.positions)

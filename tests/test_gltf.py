@@ -17,7 +17,7 @@ from plants import plant, turns
 import athcodec
 from athcodec.cli import main
 from athcodec.decoding.clip_view import ClipView
-from athcodec.errors import ClipError, MissingExtra
+from athcodec.errors import ClipError, MissingExtra, SourceWarning
 from athcodec.exporters import gltf as gltf_exporter
 from athcodec.exporters import write
 from athcodec.motion.clip import ClipRange, MotionClip
@@ -355,6 +355,20 @@ def test_sparse_keys_are_sampled_at_30_or_as_asked(tmp_path):
         assert clip.metadata["fps"] == 24000 / 1001 and clip.frame_count == 72
     with pytest.raises(ClipError, match="expected at most"):
         read(path, fps=1e9)
+
+
+@pytest.mark.parametrize("takes", [["flips"], "all"])
+def test_a_mesh_that_turns_inside_out_in_a_single_frame_of_any_clip_is_named(tmp_path, takes):
+    made = Maker()
+    mesh = made.mesh({"POSITION": made.array(CUBE)}, "leaf", [0, 1, 2, 4, 5, 6])
+    node = made.node(mesh=mesh)
+    scales = np.ones((5, 3))
+    made.animation([(node, "scale", range(5), scales, "LINEAR")], "still")
+    scales[2, 0] = -1
+    made.animation([(node, "scale", range(5), scales, "LINEAR")], "flips")
+    path = made.save(tmp_path / "a.glb")
+    with pytest.warns(SourceWarning, match="not read: faces that turn inside out in time leaf"):
+        read(path, fps=1, takes=takes).close()
 
 
 def test_animations_of_different_nodes_run_together_and_takes_do_not(tmp_path):

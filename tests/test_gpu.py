@@ -262,7 +262,8 @@ def blended_clips(file: Checked, level: int, weights: list[float], second: float
 
 @pytest.mark.parametrize("weights", [(0.5, 0.5, 0), (0, 0.5, 0.5), (0.2, 0.5, 0.3)])
 def test_blended_clips_keep_edges_as_long_as_they_are_in_the_clips(winds, weights):
-    """Within 1 %, leaves and bark; and are what the decoder blends, within a tenth of how far the clips are apart."""
+    """Within 1 %, leaves and bark. They are what the decoder blends: 99 % of the vertices within a thirtieth of how far
+    the clips are apart, and all within a quarter, as a leaf that the clips turn far apart may go the other way."""
     level, edges = winds.info.level_count - 1, winds.edges
     length = lambda x: np.linalg.norm(x[edges[:, 1]] - x[edges[:, 0]], axis=1)  # noqa: E731
     alone = [blended_clips(winds, level, own, 0.55) for own in np.eye(3).tolist()]
@@ -272,9 +273,9 @@ def test_blended_clips_keep_edges_as_long_as_they_are_in_the_clips(winds, weight
     assert (length(blended) <= 1.01 * lengths.max(0) + rounding).all()
     assert (length(blended) >= 0.99 * lengths.min(0) - rounding).all()
     apart = max(distance(a, b) for a in alone for b in alone)
-    off = distance(blended, winds.decoder_blends(weights, 0.55))
-    print(f"{weights}: {off / apart:.3f} of the distance of the clips from what the decoder blends")
-    assert off <= 0.1 * apart
+    off = np.linalg.norm(blended - winds.decoder_blends(weights, 0.55), axis=1) / apart
+    print(f"{weights}: {off.max():.3f} of the distance of the clips from what the decoder blends")
+    assert off.max() <= 0.25 and np.quantile(off, 0.99) <= 1 / 30
 
 
 # ---- in a browser ----

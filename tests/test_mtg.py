@@ -99,6 +99,26 @@ def test_undecomposed_entities_stand_for_themselves_and_unconnected_parts_follow
     assert described(mtg) == [(["U1", "U5", "U7"], -1), (["U1"], 0), (["U1"], 0)]
 
 
+def test_entities_without_a_number_are_new_ones(tmp_path):
+    mtg = read_mtg(written(tmp_path, "TOPO\n/P\n^/A\n^/U\n^<U\n^<U\n/P\n^/A\n^/U\n^<U\n"))
+    assert mtg.parent.tolist() == [-1, 0, 1, -1, 3] and mtg.branch_parent.tolist() == [-1, -1]
+    mtg = read_mtg(written(tmp_path, "TOPO\n/P/A/U<U\n\t+A/U\n\t+A/U<U\n/P/A/U\n"))
+    assert described(mtg) == [(["U", "U"], -1), (["U"], 0), (["U", "U"], 0), (["U"], -1)]
+
+
+def test_behind_a_branch_in_columns_of_its_own_a_hat_goes_on_from_what_bears_it(tmp_path):
+    code = "TOPO\n/P1\n\t/A1\n\t\t/U1\n\t\t^<U2\n\t\t^+A2\n\t\t\t/U1\n\t\t\t^<U2\n\t\t^+A3\n\t\t\t/U1\n\t\t^<U3\n"
+    mtg = read_mtg(written(tmp_path, code))
+    assert described(mtg) == [(["U1", "U2", "U3"], -1), (["U1", "U2"], 0), (["U1"], 0)]
+    assert mtg.parent.tolist() == [-1, 0, 1, 2, 1, 1]
+
+
+def test_parts_without_a_hat_belong_to_the_entity_above_them(tmp_path):
+    for hat in ("^", ""):
+        code = f"TOPO\n/P1/A1\n{hat}/U1<U2\n\t+A1\n\t{hat}/U20<U21<A2\n\t{hat}/U25\n{hat}<U3\n#\tTOPO\tdiam\n"
+        assert described(read_mtg(written(tmp_path, code))) == [(["U1", "U2", "U3"], -1), (["U20", "U21", "U25"], 0)]
+
+
 def test_features_belong_to_the_last_entity_or_to_all_of_a_run(tmp_path):
     code = "ENTITY-CODE\t\tdiam\tnote\n/P1/A1/U1\t\t4\ta\n^<U2<<U4\t\t2.5\n^<U5<.<U7\t\t1\n*\t\t9\n\t+A2/U1\t\tb\n"
     mtg = read_mtg(written(tmp_path, code))

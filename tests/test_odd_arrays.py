@@ -48,13 +48,13 @@ def test_polydata_of_vtk_is_read_with_its_faces_lines_and_data(tmp_path):
             assert clip.faces.tolist() == [[0, 1, 2], [0, 2, 3]] and clip.edges.tolist() == [[3, 4]]
             assert clip.attributes["mass"].tolist() == [0, 1, 2, 3, 4]
             assert clip.attributes["edge_organ"].tolist() == [7] and clip.attributes["face_organ"].tolist() == [8, 9]
-            assert clip.not_read == {"attribute": ["label"]}
+            assert clip.not_read == {"field": ["label"]}
 
 
 def test_data_per_cell_that_change_in_time_are_named(tmp_path):
     vtp_files(tmp_path, ["7 8 9", "7 8 9", "7 8 1"])
     with athcodec.read(tmp_path / "leaf_0.vtp") as clip:
-        assert sorted(clip.not_read["attribute"]) == ["label", "organ"]
+        assert sorted(clip.not_read["field"]) == ["label", "organ"]
 
 
 def test_primvars_that_hold_no_numbers_or_do_not_go_together_are_named(tmp_path):

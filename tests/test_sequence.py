@@ -11,7 +11,7 @@ import trimesh
 from moving_meshes import assert_same_mesh, assert_same_motion, mixed_clip, quad_clip, survives_damage
 
 import athcodec
-from athcodec.errors import ClipError, SourceWarning
+from athcodec.errors import ClipError, GuessWarning, SourceWarning
 from athcodec.files.reading import Budget
 from athcodec.motion.clip import MotionClip
 from athcodec.sources.mesh import parse_mesh
@@ -76,9 +76,101 @@ def test_numbers_without_zeros_and_with_gaps_are_frames(tmp_path, named):
 
 def test_frame_numbers_may_outgrow_their_leading_zeros(tmp_path):
     write_triangles(tmp_path, ["a099.obj", "a100.obj", "a1000.obj", "a7.obj"])
-    for named in ("a099.obj", "a100.obj", "a###.obj", "a%03d.obj", "a1000.obj"):
+    for named in ("a###.obj", "a%03d.obj"):
         with athcodec.read(tmp_path / named, fps=1) as clip:
             assert clip.time.tolist() == [0, 1, 901]
+    for named in ("a099.obj", "a100.obj", "a1000.obj"):
+        with (
+            pytest.warns(GuessWarning, match=r"read as 3 of 4 files, without a7\.obj; "),
+            athcodec.read(tmp_path / named, fps=1) as clip,
+        ):
+            assert clip.time.tolist() == [0, 1, 901]
+
+
+@pytest.mark.parametrize("suffix", [".obj", ".ply", ".vtu"])
+@pytest.mark.parametrize(
+    "names",
+    [
+        ["c_-002", "c_-001", "c_000", "c_001"],  # as many digits
+        ["c_-02", "c_-01", "c_000", "c_001"],  # as many characters
+        ["c_-2", "c_-1", "c_0", "c_10"],
+        ["c-2", "c-1", "c0", "c1"],
+        ["-002", "-001", "000", "001"],
+    ],
+)
+def test_numbers_below_zero_are_frames_before_those_above(tmp_path, names, suffix):
+    for z, name in enumerate(names):
+        meshio.write(
+            tmp_path / f"{name}{suffix}", meshio.Mesh([[0, 0, z], [1, 0, 0], [0, 1, 0.0]], [("triangle", [[0, 1, 2]])])
+        )
+    for name in names:
+        with athcodec.read(tmp_path / f"{name}{suffix}", fps=1) as clip:
+            assert clip.block(0, 4)[:, 0, 2].tolist() == [0, 1, 2, 3] and clip.metadata["start_frame"] == -2
+
+
+def test_a_hyphen_before_a_number_is_no_sign_where_all_files_have_it(tmp_path):
+    write_triangles(tmp_path, ["leaf-001.obj", "leaf-002.obj"])
+    with athcodec.read(tmp_path / "leaf-001.obj") as clip:
+        assert clip.block(0, 2)[:, 0, 2].tolist() == [0, 1] and clip.metadata["start_frame"] == 1
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        ["leaf_0.5.obj", "leaf_1.0.obj", "leaf_1.5.obj"],
+        ["plant_03-20_AM.obj", "plant_03-20_PM.obj", "plant_03-21_AM.obj"],
+        ["2024-03-31.obj", "2024-04-01.obj"],
+        ["day12.5.obj", "day13.5.obj"],
+    ],
+)
+def test_files_with_decimals_and_dates_that_are_left_out_are_named(tmp_path, names):
+    write_triangles(tmp_path, [*names, "leaf.obj", "other_7.obj", "leaf_v2_3.obj", "leaf_v3_3.obj"])
+    with pytest.warns(GuessWarning) as said, athcodec.read(tmp_path / names[0]) as clip:
+        assert clip.frame_count == 1
+    assert f"read as 1 of {len(names)} files, without {', '.join(names[1:])}; " in str(said[0].message)
+    for alone in ("leaf.obj", "other_7.obj", "leaf_v2_3.obj"):
+        athcodec.read(tmp_path / alone).close()
+
+
+PLY_VALUES = {"uchar red": 0, "uchar green": 9, "uchar blue": 9, "int organ": 5, "float s": 0.25, "float t": 0.5}
+
+
+def write_changing(folder, kind, changing):
+    """Three squares with colours, organs and texture coordinates, of which some change in the second file."""
+    for frame in range(3):
+        values = {name: value + (frame == 1 and name.split()[1] in changing) for name, value in PLY_VALUES.items()}
+        corners = [(x, y, frame) for x in (0, 1) for y in (0, 1)]
+        if kind == "obj":
+            lines = [f"v {x} {y} {z} {values['uchar red']} 1 1" for x, y, z in corners]
+            lines += [f"vt {values['float s']} 0"] * 4 + [f"usemtl m{frame == 1 and 'material' in changing}"]
+            (folder / f"a_{frame}.obj").write_text("\n".join([*lines, "f 1/1 2/2 4/4 3/3\n"]))
+            continue
+        columns = {**dict(zip(("float x", "float y", "float z"), np.transpose(corners))), **values}
+        types = {"uchar": "u1", "int": "<i4", "float": "<f4"}
+        rows = np.zeros(4, [(name.split()[1], types[name.split()[0]]) for name in columns])
+        for name, column in columns.items():
+            rows[name.split()[1]] = column
+        header = "".join(f"property {name}\n" for name in columns)
+        face = "element face 1\nproperty list uchar int vertex_indices\nend_header\n"
+        form = {"ascii": "ascii", "binary": "binary_little_endian"}[kind]
+        head = f"ply\nformat {form} 1.0\nelement vertex 4\n{header}{face}".encode()
+        body = rows.tobytes() + b"\4" + np.array([0, 1, 3, 2], "<i4").tobytes()
+        if kind == "ascii":
+            body = "\n".join(" ".join(map(str, row)) for row in rows.tolist()).encode() + b"\n4 0 1 3 2\n"
+        (folder / f"a_{frame}.ply").write_bytes(head + body)
+    return folder / ("a_0.obj" if kind == "obj" else "a_0.ply")
+
+
+@pytest.mark.parametrize("kind", ["ascii", "binary", "obj"])
+def test_arrays_that_change_in_a_single_file_are_named_and_others_stay(tmp_path, kind):
+    names = {"red": "colors", "s": "uv"} | ({"material": "face_material"} if kind == "obj" else {"organ": "organ"})
+    for changing in ([], *([name] for name in names), list(names)):
+        with athcodec.read(write_changing(tmp_path, kind, changing)) as clip:
+            changed = sorted(names[name] for name in changing)
+            assert clip.not_read.get("attribute", []) == changed
+            assert clip.attributes.keys() >= set(names.values()) - set(changed)
+            assert not clip.attributes.keys() & set(changed)
+            assert clip.block(0, 3)[:, 0, 2].tolist() == [0, 1, 2]
 
 
 def test_a_single_file_is_a_single_frame(tmp_path):

@@ -330,6 +330,35 @@ def test_what_is_not_read_is_named_once(tmp_path, capsys):
     )
 
 
+def test_arrays_that_change_in_a_single_frame_are_named_and_those_with_equal_samples_stay(tmp_path):
+    stage = new_stage(tmp_path / "a.usda")
+    primvars = UsdGeom.PrimvarsAPI(add_grid(stage))
+    twig = UsdGeom.BasisCurves.Define(stage, "/root/twig")
+    twig.CreateCurveVertexCountsAttr([2])
+    twig.CreatePointsAttr(vec3(GRID[:2]))
+    for name, changes in (("wet", True), ("dry", False)):
+        primvar = primvars.CreatePrimvar(name, Sdf.ValueTypeNames.FloatArray, "uniform")
+        for frame in range(101, 111):
+            primvar.Set([float(changes and frame == 104)] * len(QUADS), frame)
+            twig.GetWidthsAttr().Set([1.0 + (frame == 107)] * 2, frame)
+    stage.Save()
+    clip, _ = read_all(tmp_path / "a.usda")
+    assert clip.not_read == {"attribute": ["/root/grid.wet", "/root/twig.widths"]}
+    assert "dry" in clip.attributes and not clip.attributes.keys() & {"wet", "radius"}
+
+
+@pytest.mark.parametrize("mirrored", [101, 105, 110])
+def test_a_mesh_that_turns_inside_out_in_a_single_frame_is_named(tmp_path, mirrored):
+    stage = new_stage(tmp_path / "a.usda")
+    scale = UsdGeom.Xform.Define(stage, "/root").AddScaleOp()
+    for frame in range(101, 111):
+        scale.Set(Gf.Vec3f(-1 if frame == mirrored else 1, 1, 1), frame)
+    add_grid(stage)
+    stage.Save()
+    with pytest.warns(SourceWarning, match="not read: faces that turn inside out in time /root/grid"):
+        read_all(tmp_path / "a.usda")
+
+
 def skinned(path):
     """A grid on two joints that turn, and a bump that swells by a blend shape."""
     stage = new_stage(path)

@@ -24,7 +24,7 @@ from athcodec.batch.settings import coding_options, loop_frames, reading_options
 from athcodec.decoding import container as ct
 from athcodec.encoding import CodedSegment, Draft
 from athcodec.encoding.segmentation import split_segments
-from athcodec.errors import AthError, ClipError, SourceWarning
+from athcodec.errors import AthError, ClipError, GuessWarning, SourceWarning
 from athcodec.files.atomic import check_target, is_url, keeping
 from athcodec.files.shown import redacted
 from athcodec.motion.branches.result import with_branches
@@ -153,6 +153,7 @@ def _opened(item: Item, folder: str, source: dict[str, Any]) -> Iterator[MotionC
         raise ClipError(f"{item.shown}: the download is not what it was, expected a scratch folder that all share")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", SourceWarning)  # the record says it
+        warnings.simplefilter("always", GuessWarning)
         opened = athcodec.read(path, **reading_options(item.settings))
     with opened as source_clip:
         clip = source_clip

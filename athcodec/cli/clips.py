@@ -18,6 +18,7 @@ from athcodec.decoding.file_tables import Level
 from athcodec.errors import (
     AthError,
     ClipError,
+    GuessWarning,
     LevelUnavailable,
     NeedsHostMesh,
     NotAnAthFile,
@@ -182,6 +183,7 @@ def read_clip(args: argparse.Namespace, path: str) -> MotionClip:
     rest = getattr(args, "rest", "auto")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", SourceWarning)  # said below, with what is no shape
+        warnings.simplefilter("always", GuessWarning)
         clip = athcodec.read(
             path,
             args.source_format,

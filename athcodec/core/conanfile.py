@@ -46,6 +46,6 @@ class Athcodec(ConanFile):
 
     def package_info(self):
         self.cpp_info.libs = ["ath"]
-        self.cpp_info.system_libs = [] if self.settings.os == "Windows" else ["m"]  # what ath_player.h calls
+        self.cpp_info.system_libs = [] if self.settings.os == "Windows" else ["m"]  # ath_player.h calls libm.
         self.cpp_info.builddirs = ["lib/cmake/athcodec"]
         self.cpp_info.set_property("cmake_find_mode", "none")  # the package has its own

@@ -138,7 +138,9 @@ class ChunkFile:
 
     def _set_table(self) -> None:
         table = self.core.chunks()
-        self._index = np.flatnonzero(np.isin(table["kind"], list(ct.KIND_NAMES), kind="table"))  # Of the known kinds.
+        self._index = np.flatnonzero(
+            np.isin(table["kind"], list(ct.KIND_NAMES), kind="table")
+        )  # Chunks of unknown kinds are left out.
         self._table = table[self._index]
 
     @cached_property

@@ -24,7 +24,7 @@ from athcodec.errors import BadChunk, LimitExceeded
 MAGIC = b"\x89ATH\r\n\x1a\n"
 MAJOR, MINOR, FEATURES = 0, 13, 0
 NO_LEVEL = 255
-STEM_WAVES, NODE_WAVES, BASIS_IN_WAVES, BASIS_AS_SAMPLES = range(4)  # of Basis
+STEM_WAVES, NODE_WAVES, BASIS_IN_WAVES, BASIS_AS_SAMPLES = range(4)  # Values of Basis.
 ROTATION_FACTORS = (0, 1, 8)  # by Rotation
 OPTIONAL, KIND_ID = 0x8000, 0x7FFF
 
@@ -184,7 +184,7 @@ def _front_stream(header: Header, chunks: list[Chunk], errors: np.ndarray) -> by
 
 
 def short_floats(lengths: np.ndarray) -> np.ndarray:
-    """What the error table stores of lengths, int32: the top bits of binary32, rounded up."""
+    """Return the numbers that the error table stores for lengths, int32: the top bits of binary32, rounded up."""
     bits = np.ascontiguousarray(round_up_singles(lengths), np.float32).view(np.uint32)
     return np.minimum(bits + (1 << SHORT_SHIFT) - 1 >> SHORT_SHIFT, SHORT_FLOATS - 1).astype(np.int32)
 

@@ -24,6 +24,7 @@ from athcodec.decoding.endless_play import EndlessPlay
 from athcodec.decoding.file_tables import Clip, Level, median_rate
 from athcodec.errors import LevelUnavailable
 from athcodec.motion.joining import metadata_of, wind_of
+from athcodec.motion.transitions import transitions_of
 from athcodec.options import whole
 
 SHOWN_TYPES = (np.dtype(np.float32), np.dtype(np.float64))  # Types that the core writes itself.
@@ -336,7 +337,10 @@ class Decoder:
         ValueError
             If the clip names no transitions.
         """
-        return EndlessPlay(self, seed)
+        stored = transitions_of(self.metadata, self.frame_count)
+        if not stored:
+            raise ValueError(f"clip {self.clip.name!r}: got no transitions, expected some, of encode --endless")
+        return EndlessPlay(self.time, stored, self.blended_places, seed)
 
     def blended_places(self, places: Sequence[tuple[float, float]], level: int | None = None) -> np.ndarray:
         """Return the clip at several times at once, blended along the branches as `blended` blends clips.

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from bisect import bisect_right
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Callable, Sequence
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
-from athcodec.motion.transitions import transitions_of
+from athcodec.motion.transitions import Transition
 from athcodec.options import whole
 
-if TYPE_CHECKING:
-    from athcodec.decoding.decoder import Decoder
-
+Blended: TypeAlias = Callable[[Sequence[tuple[float, float]], int | None], np.ndarray]
 LONGEST = 1e7  # Seconds that a play can last: 115 days.
 TAKEN = 0.5  # Probability that a player takes the transition ahead.
 
@@ -32,12 +31,9 @@ class EndlessPlay:
     The same seed gives the same play. `Decoder.endless` returns one.
     """
 
-    def __init__(self, decoder: Decoder, seed: int = 1):
-        time = decoder.time - decoder.time[0]
-        stored = transitions_of(decoder.metadata, decoder.frame_count)
-        if not stored:
-            raise ValueError(f"clip {decoder.clip.name!r}: got no transitions, expected some, of encode --endless")
-        self._decoder = decoder
+    def __init__(self, time: np.ndarray, stored: Sequence[Transition], blended: Blended, seed: int):
+        time = time - time[0]
+        self._blended = blended
         self._transitions = [
             _Transition(time[a], time[b], min(time[a + n] - time[a], time[b + n] - time[b]), time[b + n])
             for a, b, n in stored
@@ -85,7 +81,7 @@ class EndlessPlay:
         level : int, optional
             Level of detail; by default the deepest that is complete.
         """
-        return self._decoder.blended_places(self.places(seconds), level)
+        return self._blended(self.places(seconds), level)
 
     def _drawn(self, seconds: float) -> _Transition:
         """Draw the transition that follows a place in the clip. All transitions end before the last of them leaves."""

@@ -1,4 +1,4 @@
-"""What the tables at the front of an .ath file say: its clips, and its levels with their sizes and errors."""
+"""Tables at the front of an .ath file: its clips, and its levels with their sizes and errors."""
 
 from __future__ import annotations
 

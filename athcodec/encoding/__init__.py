@@ -1,4 +1,4 @@
-"""What only an encoder needs: from a motion clip to the bytes of an .ath file.
+"""The encoder: from a motion clip to the bytes of an .ath file.
 
 Data flows one way. A clip is sampled (sample.py, segment_samples.py). Its settings are searched (search.py): each
 choice (choices/) is made by trials (trials.py). A segment's motion is analysed (motion.py, learned_modes.py), quantised

@@ -203,7 +203,7 @@ MOST_LOST = 0.4  # Share of points that are far from their neighbours above whic
 
 @dataclass
 class _Decided:
-    """What the streams of a file depend on: settings, and what follows from them."""
+    """Settings that the streams of a file depend on, and what follows from them."""
 
     ath: Ath
     choice: Choice

@@ -33,8 +33,8 @@ from athcodec.encoding.choices.joins import (
     seen,
 )
 from athcodec.encoding.features import Feature
-from athcodec.encoding.learned_modes import LearnedModes, nested
-from athcodec.encoding.motion import Plan, SegmentMotion, position_errors
+from athcodec.encoding.learned_modes import nested
+from athcodec.encoding.motion import LearnedModes, Plan, SegmentMotion, position_errors
 from athcodec.encoding.polygons import Mesh
 from athcodec.encoding.segment import (
     CodedPrelude,
@@ -58,7 +58,7 @@ COARSER = 2.0  # Step of a layer before the last, over that of a file of its own
 NAMED_SHARE = (
     0.06  # Share of the bytes up to a layer that corrections may take to keep the error that the ladder names.
 )
-CORRECTIONS_SHARE = 0.015  # The same share to keep the tightest possible of CORRECTED_LIMITS.
+CORRECTIONS_SHARE = 0.015  # Share of a layer's bytes that keeping the tightest of CORRECTED_LIMITS may take.
 CORRECTED_LIMITS = tuple(2.0 ** (i / 8) for i in range(16, -16, -1))  # Limits over that of the layer.
 LEAST_RATIO, MOST_RATIO = 8, 1 << 14  # Ratio of the steps of neighbouring layers.
 MOST_LAYERS, MOST_LEVELS = 8, 32  # Limits of a file.
@@ -77,9 +77,9 @@ class Layer:
     """One layer of precision. Without a rest pose it has that of the layer before; the first layer that of level 0."""
 
     plan: Plan  # On the rest pose of the layer.
-    settings: Settings  # Those of the file, with the layer's step and limit.
+    settings: Settings  # Settings of the file, with the layer's step and limit.
     modes: LearnedModes | None
-    ratio: int = 1  # Of the layer's step to that of the last layer.
+    ratio: int = 1  # The layer's step over that of the last layer.
     rest: streams.CodedRest | None = None  # The content of REFINED_REST.
 
 
@@ -311,7 +311,7 @@ class CodedMotion:
         self._shown: list[_ShownLevel] = []
         self._decoded = np.empty(0)  # Positions of the last level.
         self._met = streams.FREE_ENDS  # Met by the corrections of the last layer.
-        self._end_corrections = NO_CORRECTIONS  # Those of the last frame.
+        self._end_corrections = NO_CORRECTIONS  # Corrections of the last frame.
         self.joins = [0] * layers.level_count
         segment = self._first(layers.each[0])
         for level, (before, layer) in enumerate(pairwise(layers.each), layers.level_0.level_count):

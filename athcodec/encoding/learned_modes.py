@@ -15,28 +15,10 @@ import numpy as np
 
 from athcodec._native import SHAPE_MODES, address, lib
 from athcodec.encoding import quantise as qz
-from athcodec.encoding.motion import Plan, SegmentMotion
+from athcodec.encoding.motion import LEARNED_NUMBERS, LearnedModes, Plan, SegmentMotion
 from athcodec.motion.algebra import multiply, principal, solve
 
-NUMBERS = 3 * SHAPE_MODES  # Numbers of a learned mode.
 FAINT = 0.15  # Bend of rings, in steps, below which a learned mode drops it: it would stretch rings that turn.
-
-
-@dataclass(frozen=True)
-class LearnedModes:
-    """The learned modes of all pieces, a row each; the modes of a piece follow each other."""
-
-    counts: np.ndarray  # (P,) int32, how many each piece has; 0: it keeps its cantilever modes.
-    first: np.ndarray  # (P,) int64, row of each piece's first mode.
-    integers: np.ndarray  # (K, NUMBERS) int32, as streams hold them: axis a of mode m at SHAPE_MODES a + m.
-    units: np.ndarray  # (K, NUMBERS) float64 of unit length: axis a of mode m at 3 m + a.
-    duals: np.ndarray  # Like units: map a piece's cantilever modes to the tracks of its learned modes.
-
-    def levels(self, plan: Plan) -> np.ndarray:
-        """Return the levels whose streams hold tracks of learned modes."""
-        pieces, learned = plan.pieces, self.counts > 0
-        full = learned & (pieces["low_level"] >= 0) & (self.counts >= 3 * pieces["low_modes"])
-        return np.union1d(plan.base_level[learned], pieces["level"][full])
 
 
 @dataclass(frozen=True)
@@ -143,14 +125,14 @@ def nested(plan: Plan, modes: LearnedModes, wanted: np.ndarray, digits: int) -> 
 
 def _packed(counts: np.ndarray, rows: list[np.ndarray]) -> LearnedModes:
     integers = np.zeros((int(counts.sum()), 3, SHAPE_MODES), np.int32)
-    units, duals = np.zeros((2, len(integers), NUMBERS))
+    units, duals = np.zeros((2, len(integers), LEARNED_NUMBERS))
     first = np.cumsum(counts, dtype=np.int64) - counts
     at = 0
     for numbers in rows:
         count, size = len(numbers), numbers.shape[1] // 3
         integers[at : at + count, :, :size] = numbers.reshape(count, size, 3).transpose(0, 2, 1)
         at += count
-    integers = integers.reshape(-1, NUMBERS)
+    integers = integers.reshape(-1, LEARNED_NUMBERS)
     lib.ath_unit_shapes(len(integers), address(integers, np.int32, 0), address(units, np.float64, 0))
     at = 0
     for numbers in rows:

@@ -13,7 +13,6 @@ from ctypes import addressof
 from dataclasses import dataclass
 from enum import IntEnum
 from functools import cached_property, lru_cache
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -24,6 +23,7 @@ from athcodec._native import (
     PIECE_VERTICES,
     RIGID,
     SEGMENT_FRAMES,
+    SHAPE_MODES,
     SHORT_FLOATS,
     Coarse,
     CorePlan,
@@ -36,9 +36,6 @@ from athcodec._native import (
 )
 from athcodec.decoding.container import from_short_float
 from athcodec.files.threads import SERIAL, ThreadPool, ranges
-
-if TYPE_CHECKING:
-    from athcodec.encoding.learned_modes import LearnedModes
 
 STEM_ROOT, NODE_ROOT = -1, -2  # Roots of streams in waves that are not learned (core/model/motion.h).
 RANGES, LEAST_RANGE = 24, 1024  # Parts of a plant that threads take at a time, and their least number of vertices.
@@ -229,6 +226,26 @@ class PlanSample:
     def is_rigid(self) -> np.ndarray:
         """Per piece whether it turns and moves as it is, (P,)."""
         return self.pieces["flags"] & RIGID > 0
+
+
+LEARNED_NUMBERS = 3 * SHAPE_MODES  # Numbers of a learned mode.
+
+
+@dataclass(frozen=True)
+class LearnedModes:
+    """The learned modes of all pieces, a row each; the modes of a piece follow each other."""
+
+    counts: np.ndarray  # (P,) int32, how many each piece has; 0: it keeps its cantilever modes.
+    first: np.ndarray  # (P,) int64, row of each piece's first mode.
+    integers: np.ndarray  # (K, LEARNED_NUMBERS) int32, as streams hold them: axis a of mode m at SHAPE_MODES a + m.
+    units: np.ndarray  # (K, LEARNED_NUMBERS) float64 of unit length: axis a of mode m at 3 m + a.
+    duals: np.ndarray  # Like units: map a piece's cantilever modes to the tracks of its learned modes.
+
+    def levels(self, plan: Plan) -> np.ndarray:
+        """Return the levels whose streams hold tracks of learned modes."""
+        pieces, learned = plan.pieces, self.counts > 0
+        full = learned & (pieces["low_level"] >= 0) & (self.counts >= 3 * pieces["low_modes"])
+        return np.union1d(plan.base_level[learned], pieces["level"][full])
 
 
 @dataclass

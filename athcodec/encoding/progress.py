@@ -14,8 +14,8 @@ Progress = Callable[[str, float], None]
 # Microseconds of one thread for a vertex in a frame, as `python -m bench large` prints them; only ratios matter.
 SURVEY, TRIAL, MOTION = 0.11, 0.13, 0.24
 TRIALS = {"fast": 7, "default": 31, "best": 50}  # Trials that a search takes as long as, by effort.
-LAYER_TRIALS = {"fast": 3, "default": 24, "best": 10}  # The same for layers of precision in addition.
-SMALL_TRIALS = 100  # The same for a small clip in addition, whose choices are made again.
+LAYER_TRIALS = {"fast": 3, "default": 24, "best": 10}  # Trials that layers of precision take in addition.
+SMALL_TRIALS = 100  # Trials that a small clip takes in addition, whose choices are made again.
 BRANCHES = 0.5  # Work of finding branches, over all other work.
 SIZES = 6  # Files that are made to meet a target size.
 

@@ -88,7 +88,7 @@ class PlantSample:
 
 @dataclass(frozen=True)
 class ExtrapolationFactors:
-    """What a plant has over what its sample has."""
+    """Factors from a sample to its plant."""
 
     vertices: float
     rows: np.ndarray  # (levels,) rows of each level's stream.

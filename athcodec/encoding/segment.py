@@ -19,8 +19,16 @@ from athcodec.decoding import container as ct
 from athcodec.encoding import quantise as qz
 from athcodec.encoding import streams, writing
 from athcodec.encoding.features import Feature
-from athcodec.encoding.learned_modes import LearnedModes
-from athcodec.encoding.motion import NODE_ROOT, STEM_ROOT, LevelStream, Plan, PlanSample, SegmentMotion, gather
+from athcodec.encoding.motion import (
+    NODE_ROOT,
+    STEM_ROOT,
+    LearnedModes,
+    LevelStream,
+    Plan,
+    PlanSample,
+    SegmentMotion,
+    gather,
+)
 from athcodec.encoding.polygons import Mesh
 from athcodec.encoding.segmentation import split_segments
 from athcodec.encoding.settings import BEAM, Settings
@@ -38,7 +46,7 @@ FINER = 32  # Step of a layer over the step at which bases and modes are learned
 REST_ROUNDS = 16  # Steps of a rest pose that are tried until one keeps the bound; the last is 1/28 of the first.
 ROWS_AT_ONCE = 1 << 14  # Rows of coefficients whose moments are added at once.
 WORK_BYTES = 1 << 30  # Memory of the segments coded at once, unless `jobs` says how many.
-SAMPLED = 4000  # Vertices from which on trials correct a sample.
+SAMPLED = 4000  # Number of vertices from which trials find corrections of a sample of them only.
 SEGMENT_WORK = 16  # Memory of a segment while it is coded, over its float32 positions.
 
 
@@ -62,15 +70,15 @@ class Source:
     host_rest: bool = False
     rest_precision: RestPrecision = RestPrecision()
     reference: np.ndarray | None = None  # (N, 3) float64 less the origin; None: the rest pose.
-    polygons: Polygons | None = None  # What the file stores as FACES.
+    polygons: Polygons | None = None  # Polygons that the file stores as FACES.
     without: frozenset[Feature] = frozenset()  # Features that the file does without.
     source_rest: np.ndarray = field(init=False)  # (N, 3) float64 less the origin.
     rest: np.ndarray = field(init=False)  # (N, 3) float64 less the origin: the reference pose.
     origin: np.ndarray = field(init=False)  # (3,) float64
     details: np.ndarray = field(init=False)  # (B,) int32 (FORMAT.md, Detail).
     sheet_like: np.ndarray = field(init=False)  # (B,) bool: branches that do not look like beams.
-    clip_range_segments: list[list[tuple[int, int]]] = field(init=False)  # Those of each clip of the file.
-    segments: list[tuple[int, int]] = field(init=False)  # Those of all clips.
+    clip_range_segments: list[list[tuple[int, int]]] = field(init=False)  # Segments of each clip of the file.
+    segments: list[tuple[int, int]] = field(init=False)  # Segments of all clips.
     _held: WeakValueDictionary[int, np.ndarray] = field(init=False, repr=False, compare=False)  # Positions by segment.
 
     def __post_init__(self) -> None:
@@ -576,7 +584,7 @@ def analyse(
     decoded = np.empty(positions.shape, dtype)
     segment.analyse(positions, settings.rounding, origin, decoded)
     if before is not None:
-        segment.forget_caches()  # A refinement has no nodes.
+        segment.forget_caches()  # Maps of nodes alone need the caches, and a refinement has none.
     return segment, decoded
 
 

@@ -1,4 +1,4 @@
-"""What an encoder decides about a file: the settings of a layer of precision, and those of a whole file."""
+"""Decisions of an encoder about a file: the settings of a layer of precision, and those of a whole file."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from athcodec._native import Rounding
 from athcodec.encoding import quantise as qz
 from athcodec.encoding.features import Feature
-from athcodec.encoding.learned_modes import LearnedModes
+from athcodec.encoding.motion import LearnedModes
 
 BEAM = 0  # Form of a branch whose modes are those of a beam; other forms are SHEET, or the vertices in a tube's ring.
 # Fields that distinguish settings of a search: by hierarchy and rest pose, and by motion.
@@ -25,11 +25,11 @@ OF_BRANCHES = "forms loose lags details rigid".split()  # Arrays with an entry f
 
 @dataclass(frozen=True)
 class Settings:
-    """What a trial varies. Steps are in scene units; arrays of branches, (B,), are in file order."""
+    """Settings that a trial varies. Steps are in scene units; arrays of branches, (B,), are in file order."""
 
     bound: float
     largest_bound: float  # The bound of the vertex with the largest weight.
-    limit: float | np.ndarray  # What positions are held to: one distance, or one for each vertex, (N,).
+    limit: float | np.ndarray  # Largest error of positions: one distance, or one for each vertex, (N,).
     step: float
     level_steps: np.ndarray  # (levels,) factors on the step.
     rest_step: float
@@ -56,7 +56,7 @@ class Settings:
 
     @property
     def key(self) -> tuple:
-        """What distinguishes these settings from others of the same search."""
+        """Return the key that distinguishes these settings from others of the same search."""
         return self.prelude_key + self._values(OF_MOTION)
 
     @property
@@ -128,7 +128,7 @@ class Choice:
 
     settings: Settings
     first_layer: Settings
-    learned_modes: LearnedModes | None  # Those of the last layer.
+    learned_modes: LearnedModes | None  # Learned modes of the last layer.
     reference: np.ndarray | None = None  # (N, 3) pose that motion is coded about, less the origin; None: the rest pose.
     predicted: bool | None = None  # Whether vertices are points of the lattice, where motion is predicted.
     error_share: float = 1.0  # Share of the limits that the errors of predicted motion may take.

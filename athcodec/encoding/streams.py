@@ -12,8 +12,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from athcodec._native import BRANCH, CoreMetEnds, address, encode_stream, lib
-from athcodec.encoding.learned_modes import LearnedModes
-from athcodec.encoding.motion import Plan, SegmentMotion
+from athcodec.encoding.motion import LearnedModes, Plan, SegmentMotion
 from athcodec.encoding.polygons import Mesh
 from athcodec.files.threads import SERIAL, ThreadPool, ranges
 

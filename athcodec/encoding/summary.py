@@ -1,4 +1,4 @@
-"""What encoding reports of the file that it has written."""
+"""The report of encoding about the file that it has written."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Seam:
 
 @dataclass(frozen=True)
 class Summary:
-    """What `encode` has written.
+    """The result of `encode`.
 
     Attributes
     ----------

@@ -15,8 +15,8 @@ import numpy as np
 
 from athcodec.encoding import streams
 from athcodec.encoding.features import Feature
-from athcodec.encoding.learned_modes import Components, LearnedModes, components, learn
-from athcodec.encoding.motion import Plan, SegmentMotion
+from athcodec.encoding.learned_modes import Components, components, learn
+from athcodec.encoding.motion import LearnedModes, Plan, SegmentMotion
 from athcodec.encoding.progress import TrialCount
 from athcodec.encoding.sample import ExtrapolationFactors
 from athcodec.encoding.segment import (
@@ -45,15 +45,17 @@ PRELUDES_KEPT = 6  # Hierarchies and rest poses that are kept between trials.
 
 @dataclass(eq=False)
 class Trials:
-    """What settings cost in one plant, or in a sample of it."""
+    """Trials of settings on one plant, or on a sample of it."""
 
     source: Source
     ath: Ath
-    start: Settings  # Those that the search starts with.
+    start: Settings  # Settings that the search starts with.
     samples: Sequence[SegmentSample]  # From calm to wild.
     jobs: int | None = None
-    count: TrialCount = field(default_factory=TrialCount)  # What is reported of the whole search.
-    extrapolation: ExtrapolationFactors | None = None  # What the plant has over its sample; None: it is all there.
+    count: TrialCount = field(default_factory=TrialCount)  # Count that the whole search reports.
+    extrapolation: ExtrapolationFactors | None = (
+        None  # Factors from the sample to the plant; None: the sample is the plant.
+    )
     _counted: int = field(init=False, default=0)  # Trials that have been reported.
     _known: dict[tuple, tuple[float, np.ndarray]] = field(init=False, default_factory=dict)
     _components: dict[tuple, Components] = field(init=False, default_factory=dict)

@@ -156,7 +156,7 @@ def _steady_step(method: int, time: np.ndarray) -> float | None:
     steps = {(float(time[-1]) - first) / (len(time) - 1), float(time[1]) - first}
     if method == 1:
         steps = {round(1 / step * 1000) / 1000 for step in steps if step > 1e-300} - {0.0}
-    with np.errstate(over="ignore", invalid="ignore"):  # A rule that overflows does not give the times.
+    with np.errstate(over="ignore", invalid="ignore"):  # A step that overflows cannot give the times back.
         fit = (step for step in steps if (first + (index / step if method else index * step) == time).all())
         return next(fit, None)
 

@@ -46,7 +46,7 @@ SCOPES = {
     "face": AbcGeom.GeometryScope.kUniformScope,
     "constant": AbcGeom.GeometryScope.kConstantScope,
 }
-# of the dtype and the shape of a row: the array that holds it and the parameter that writes it
+# By dtype and shape of a row: the array that holds it and the parameter that writes it.
 TYPES = {
     ("f4", ()): (imath.FloatArray, "Float"),
     ("f8", ()): (imath.DoubleArray, "Double"),
@@ -141,7 +141,7 @@ def _add_instanced(
 ) -> list[Any]:
     """Writes the shape below the transform of the first copy, and an instance of it below that of each other one.
     Returns these transforms."""
-    matrices = np.tile(np.eye(4), (*copies.places.shape[:2], 1, 1))  # of row vectors
+    matrices = np.tile(np.eye(4), (*copies.places.shape[:2], 1, 1))  # Matrices act on row vectors.
     linear = rotation_matrices(copies.turns.astype(np.float64)) * copies.scales[:, :, None, :]
     matrices[..., :3, :3], matrices[..., 3, :3] = linear.swapaxes(2, 3), copies.places
     places = [AbcGeom.OXform(root, f"{name}_{number}", sampling) for number in range(obj.copies)]

@@ -47,7 +47,7 @@ from athcodec.sources.gltf import GltfNode, read_moving
 
 SHARE_OF_TWINS = (
     1 / 8
-)  # Share of duplicate vertices from which the motion holds each once and meshes number its vertices.
+)  # Share of duplicate vertices from which the motion stores each once and meshes refer to it by index.
 ALIGNMENT = 8  # Bytes to which the parts of the remaining buffer are aligned.
 INSTANCES = "EXT_mesh_gpu_instancing"
 DRACO = "KHR_draco_mesh_compression"

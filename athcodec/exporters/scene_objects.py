@@ -37,7 +37,7 @@ class SceneObject:
     corner_rows: slice
     details: dict[str, str]
     copies: int = 1  # its vertices and faces are so many copies of one shape
-    target: Any = None  # what a writer makes of it
+    target: Any = None  # The writer's own object for it.
     instancer: Any = None  # and of its copies
     width: float = 0.0  # the largest, of curves and points
     shown: np.ndarray | None = None  # (T, 1) or (T, copies) bool, the frames that show it or its copies; None: all
@@ -63,17 +63,17 @@ def objects_of(motion: Any) -> list[SceneObject]:
         faces = np.asarray(face_counts[low:high]), face_indices[rows] - first
         face_rows = slice(int(low), int(high))
         objects.append(SceneObject(name, kind, first, int(count), faces, next(curves), face_rows, rows, detail))
-    said = _copies(motion, len(objects))
+    copy_counts = _copies(motion, len(objects))
     is_one_clip = len(getattr(motion, "clip_ranges", ())) < 2
-    presence = presence_of_parts(motion.metadata, names, said, motion.frame_count) if is_one_clip else {}
-    for number, (obj, copies) in enumerate(zip(objects, said)):
+    presence = presence_of_parts(motion.metadata, names, copy_counts, motion.frame_count) if is_one_clip else {}
+    for number, (obj, copies) in enumerate(zip(objects, copy_counts)):
         obj.shown = presence.get(number)
         obj.copies = copies if 1 < copies <= obj.count and _repeats(obj, copies) else 1
     return objects
 
 
 def hidden_copies(objects: list[SceneObject]) -> dict[str, Any]:
-    """What a writer says of objects whose copies are hidden one by one, but are not written as instances."""
+    """Return the sentence about objects whose copies are hidden one by one, but are not written as instances."""
     names = [obj.name for obj in objects if obj.copies == 1 and obj.shown is not None and obj.shown.shape[1] > 1]
     return {NOT_WRITTEN: {"presence of copies, which instances keep": names}} if names else {}
 

@@ -59,11 +59,11 @@ def file_names(motion: Any, path: str | PathLike[str]) -> list[str]:
         if motion.frame_count == 1:
             return [path.name]
         numbering = Numbering(path.parent, f"{path.stem}_", DIGITS, path.suffix)
-    numbers = file_numbers(motion)
-    further = sorted(numbering.files().keys() - set(numbers))
+    numbers, files = file_numbers(motion), numbering.files()
+    further = sorted(files.keys() - set(numbers))
     if further:
         raise ClipError(
-            f"{fspath(numbering.path(further[0]))}: is there already and no frame of the clip, which has "
+            f"{fspath(files[further[0]])}: is there already and no frame of the clip, which has "
             f"{numbers[0]} to {numbers[-1]}; remove such files or choose another name"
         )
     return [numbering.path(number).name for number in numbers]

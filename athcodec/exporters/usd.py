@@ -49,7 +49,7 @@ from athcodec.sources.scene_objects import FACE_MATERIAL, OWN
 
 SAVE_BYTES = 16 << 20
 PRIMVARS = {"uv": "st", "colors": "displayColor"}
-TYPES = {  # of a row's shape and kind; for the shape None any number of values per row
+TYPES = {  # By a row's shape and kind; the shape None stands for any number of values per row.
     "f": {(): "Float", (2,): "Float2", (3,): "Float3", (4,): "Float4"},
     "d": {(): "Double", (2,): "Double2", (3,): "Double3", (4,): "Double4"},
     "e": {(): "Half", (2,): "Half2", (3,): "Half3", (4,): "Half4"},

@@ -1,4 +1,4 @@
-"""What readers do with files: take plain files alone, watch them for changes, close them if reading fails, name them in
+"""Habits of readers: take plain files alone, watch them for changes, close them if reading fails, name them in
 errors, and count the memory that reading takes. It knows no file format."""
 
 from __future__ import annotations

@@ -70,7 +70,7 @@ class Remote:
 
     @property
     def change_hint(self) -> str:
-        """What else than damage may cause a wrong checksum, as the end of an error message."""
+        """Return other causes of a wrong checksum than damage, as the end of an error message."""
         return self._source.change_hint
 
     def prefetch(self, ranges: list[Range]) -> None:

@@ -264,9 +264,9 @@ def read(
         kind.check()
         clip: MotionClip = importlib.import_module(kind.module).read_clip(path, wanted)
     lost = {kind: names for kind, names in clip.not_read.items() if kind not in NO_SHAPES}
-    if lost:
-        warnings.warn(f"{os.fspath(path)}: not read: {listed(lost)}", SourceWarning, stacklevel=2)
     with closing_on_failure(clip):
+        if lost:
+            warnings.warn(f"{os.fspath(path)}: not read: {listed(lost)}", SourceWarning, stacklevel=2)
         return _in_axes(_in_units(clip, unit), up_axis)
 
 
@@ -298,6 +298,11 @@ def format_by_suffix(path: str | PathLike[str], formats: Sequence[Format]) -> Fo
     for candidate in formats:
         if suffix in candidate.suffixes:
             return candidate
+    if suffix == ".mtg":
+        raise ClipError(
+            f"{os.fspath(path)}: got an MTG, which holds the branches of a plant and no motion; name the file with the "
+            "motion, and give it these branches with --hierarchy FILE.mtg"
+        )
     known = " ".join(suffix for candidate in formats for suffix in candidate.suffixes)
     raise ClipError(f"{os.fspath(path)}: got an unknown format, expected one of {known}")
 

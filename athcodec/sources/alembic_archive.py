@@ -38,7 +38,7 @@ from athcodec.sources.scene_objects import (
 
 MAX_SAMPLES = 1 << 24
 MAX_OBJECTS = 1 << 20
-SAME_TIME = 1e-4  # of a frame
+SAME_TIME = 1e-4  # Largest difference of equal times, in frames.
 EXISTING = Abc.WrapExistingFlag.kWrapExisting
 SCHEMAS = {
     "AbcGeom_PolyMesh": ("mesh", AbcGeom.IPolyMesh),
@@ -60,7 +60,7 @@ PARAMS = tuple(
         "Float Double Half Int32 UInt32 Int16 UInt16 Char Uchar Boolean V2f V3f V2d V3d V2i V3i P3f P3d N3f N3d C3f C4f"
     ).split()
 )
-# what the bindings raise: Alembic's exceptions, Boost's for types that do not match, and those of a broken archive
+# The bindings raise these: Alembic's exceptions, Boost's for types that do not match, and those of a broken archive
 BROKEN = (RuntimeError, ValueError, TypeError, IndexError, OverflowError, UnicodeError)
 
 
@@ -93,7 +93,7 @@ class _Track:
             raise ClipError("archive: got times that are no numbers, expected seconds")
 
     def sample(self, number: int) -> Any:
-        """What asks for a sample: by its time, because the bindings take its number for one."""
+        """Return the selector of a sample: by its time, because the bindings take its number for one."""
         return Abc.ISampleSelector(float(self.times[number]), Abc.ISampleSelector.TimeIndexType.kNearIndex)
 
     def at(self, time: float) -> list[tuple[int, float]]:
@@ -133,7 +133,7 @@ class _Xform:
 
 @dataclass
 class _Visibility:
-    """What an object says of its visibility: hidden, visible whatever is said above it, or, by -1, nothing."""
+    """An object's stated visibility: hidden, visible whatever is said above it, or, by -1, nothing."""
 
     track: _Track
     values: np.ndarray
@@ -290,9 +290,9 @@ def _add(
     found = next((schema for start, schema in SCHEMAS.items() if name.startswith(start)), None)
     names = (child.getName(), child.getFullName())
     if name.startswith("AbcGeom_FaceSet"):
-        return place  # of a mesh, which is read with it
+        return place  # A mesh is read together with its face sets.
     if found is None and name:
-        kind = name.partition("_")[2].rpartition("_")[0] or name  # of AbcGeom_NuPatch_v2
+        kind = name.partition("_")[2].rpartition("_")[0] or name  # For example NuPatch of AbcGeom_NuPatch_v2.
         not_read.setdefault(kind, []).append(names[1])
     if found is None or only and not any(fnmatchcase(name, pattern) for pattern in only for name in names):
         return place
@@ -324,7 +324,7 @@ def _track(samples: Any) -> _Track:
 
 
 def _visibility(child: Any) -> Iterator[_Visibility]:
-    """What an object says of its visibility, if anything."""
+    """Return an object's stated visibility, if any."""
     samples = AbcGeom.GetVisibilityProperty(child)
     if samples and samples.valid() and samples.getNumSamples():
         track = _track(samples)
@@ -431,7 +431,7 @@ def _metadata(archive: Any, times: np.ndarray, rate: float | None) -> dict[str, 
 
 def _statics(obj: _Object, time: float) -> None:
     for name, getter in NAMED_PARAMS:
-        if hasattr(obj.schema, getter):  # of a subdivision surface without normals
+        if hasattr(obj.schema, getter):  # A subdivision surface has no normals.
             _keep(obj, name, getattr(obj.schema, getter)())
     further = obj.schema.getArbGeomParams()
     for i in range(further.getNumProperties() if further.valid() else 0):
@@ -506,7 +506,7 @@ def _own(archive: Any) -> tuple[str | None, list[tuple[dict[str, str], bytes]]]:
 
 
 def _descriptor(text: str) -> ArrayDescriptor:
-    """That of a JSON text; an empty one where it cannot be parsed."""
+    """Return the object of a JSON text; an empty one if it cannot be parsed."""
     try:
         found = ArrayDescriptor(**json.loads(text))
     except (ValueError, TypeError, RecursionError):

@@ -1,20 +1,20 @@
 """A finite-element result, step by step, as a clip: which field is the displacement, and what else is kept.
 
-Points of a step are those of the file plus the displacement. It is options.field, else the one field per point that is
-called displacement, disp or u; where there is none, the points themselves move, and where they do move, a field of such
-a name is left alone unless it is asked for. Other data per point and per cell are kept where they are the same in all
-steps, and named in the clip's `not_read` where they change in time or are per something else. The format of the file
-is not known here.
+If the points differ in any step, they are the motion. Otherwise the displacement is added to them: options.field, else
+the one field per point that is called displacement, disp or u. A field called u may be a velocity too, so a
+GuessWarning says that it was taken. Other data per point and per cell are kept where they are the same in all steps;
+the clip's `not_read` names the others. The format of the file is not known here.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import warnings
+from collections.abc import Mapping, Sequence
 from typing import Any, Protocol
 
 import numpy as np
 
-from athcodec.errors import ClipError
+from athcodec.errors import ClipError, GuessWarning
 from athcodec.motion.clip import RESERVED_NAMES, MotionClip
 from athcodec.motion.frames import Frames
 from athcodec.sources import ReadOptions
@@ -22,14 +22,21 @@ from athcodec.sources.cells import Topology
 from athcodec.sources.mesh import kind_of
 from athcodec.sources.scene_objects import scene_said
 
-DISPLACEMENTS = ("displacement", "displacements", "disp", "u", "displ")
+AMBIGUOUS = "u"  # Name of the displacement in some programs and of the velocity in others.
+DISPLACEMENTS = ("displacement", "displacements", "disp", "displ", AMBIGUOUS)
 
 
 class Steps(Protocol):
-    """The steps of a result, as a format gives them, read when they are asked for. `topology` is that of the first."""
+    """The steps of a result, as a format gives them, read when they are asked for.
+
+    topology       of the first step
+    left_out       names of data that are in no clip: per cell where they change, or per anything else
+    elsewhere      names of the data of the first step that are not per point, and what they are per
+    """
 
     topology: Topology
-    left_out: list[str]  # Names of arrays that are neither per point nor, unchanged, per cell.
+    left_out: Sequence[str]
+    elsewhere: Mapping[str, str]
 
     def points(self, step: int) -> np.ndarray:
         """(N, 2) or (N, 3) points of the mesh."""
@@ -41,7 +48,7 @@ class Steps(Protocol):
         """(N, ...) values of a field."""
 
     def fixed_points(self) -> bool:
-        """Whether all steps have the points of the first, as far as the file says."""
+        """Whether all steps have the points of the first."""
 
     def check(self, step: int) -> None:
         """Raises ClipError where the cells are others than in the first step."""
@@ -60,10 +67,17 @@ def clip_of_steps(
     """The clip of a result at (T,) times. static: data per point that do not change. Raises ClipError where nothing
     moves, or it is not clear what does."""
     first = _padded(steps.points(0))
-    moved_by = _displacement(steps, len(time), options)
+    fixed = steps.fixed_points()
+    moved_by = _displacement(steps, fixed, len(time), options)
+    if moved_by and moved_by.lower() == AMBIGUOUS and options.field is None and len(time) > 1:
+        warnings.warn(
+            f"{name}: the points do not move, and {moved_by} was taken for the displacement that moves them; pass "
+            f"--field {moved_by} if it is that, and the name of the displacement if it is a velocity or anything else",
+            GuessWarning,
+            stacklevel=2,
+        )
     topology, count = steps.topology, len(first)
     dtype = _dtype(first, _padded(steps.field(0, moved_by)) if moved_by else first)
-    fixed = steps.fixed_points()
 
     def frame(step: int) -> np.ndarray:
         steps.check(step)
@@ -98,7 +112,8 @@ def clip_of_steps(
         "part_kinds": [kind_of(polygons, topology.edges)],
         "domains": {key: domain for key, domain in domains.items() if key in attributes},
     }
-    moving = [key for key in steps.fields() if key != moved_by and key not in attributes and key not in options.skip]
+    kept = {*attributes, *options.skip, moved_by}
+    moving = list(dict.fromkeys(key for key in (*steps.fields(), *steps.left_out) if key not in kept))
     rest = first.astype(dtype) if moved_by and options.rest == "auto" else None
     return MotionClip(
         Frames(read, len(time), count, dtype),
@@ -111,7 +126,7 @@ def clip_of_steps(
         metadata=said | metadata,
         resource=resource,
         unchanged=unchanged,
-        not_read={kind: names for kind, names in (("field", moving), ("attribute", steps.left_out)) if names},
+        not_read={"field": moving} if moving else {},
     )
 
 
@@ -127,32 +142,24 @@ def _dtype(*arrays: np.ndarray) -> type:
     return np.float32 if single else np.float64
 
 
-def _displacement(steps: Any, step_count: int, options: ReadOptions) -> str | None:
+def _displacement(steps: Steps, fixed: bool, step_count: int, options: ReadOptions) -> str | None:
     """The name of the field to add to the points; None: they move themselves."""
     names = list(steps.fields())
+    others = _listed([f"{key} ({place})" for key, place in steps.elsewhere.items()])
+    listed = _listed(names) + (f"; not per point: {others}" if steps.elsewhere else "")
     if options.field is not None:
         if options.field not in names:
-            raise ClipError(f"field: got {options.field!r}, expected one of {_listed(names)}")
+            raise ClipError(f"field: got {options.field!r}, expected one of {listed}")
         return options.field
-    if not steps.fixed_points() and _points_differ(steps, step_count):
+    if not fixed:
         return None
     found = [name for name in names if name.lower() in DISPLACEMENTS and _is_vector(steps.field(0, name))]
     if len(found) > 1:
         raise ClipError(f"field: got {_listed(found)}, expected one displacement; name it with --field")
-    if not found and step_count > 1:
-        others = f" ({', '.join(steps.left_out)}: not one value per point)" if steps.left_out else ""
-        hint = "; name one of them with --field" if names else ", expected one per point: write it at the nodes"
-        raise ClipError(f"field: got points that do not move and no displacement, {_listed(names)}{others}{hint}")
+    if not found and step_count > 1 and (names or steps.elsewhere):  # Without any data, it stands still.
+        advice = "name one of them with --field" if names else "write the displacement with one value per point"
+        raise ClipError(f"field: got points that do not move and no displacement, only {listed}; {advice}")
     return found[0] if found else None
-
-
-def _points_differ(steps: Any, step_count: int) -> bool:
-    first = steps.points(0)
-    return any(
-        not np.array_equal(first, steps.points(step))
-        for step in {1, step_count // 2, step_count - 1}
-        if 0 < step < step_count
-    )
 
 
 def _is_vector(values: np.ndarray) -> bool:

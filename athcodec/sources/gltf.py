@@ -33,22 +33,16 @@ from athcodec.motion.frames import Frames, is_far
 from athcodec.motion.joining import join
 from athcodec.sources import ReadOptions
 from athcodec.sources.gltf_scene import Scene, key_rate, on_grid, rotation_matrices
-from athcodec.sources.scene_objects import (
-    FACE_MATERIAL,
-    FLIPPED,
-    MATERIAL_NAMES,
-    TWO_SIDES,
-    mirrored,
-    presence_metadata,
-)
+from athcodec.sources.scene_objects import FACE_MATERIAL, FLIPPED, MATERIAL_NAMES, TWO_SIDES, Facing, presence_metadata
 
 WORK_BYTES = 64 << 20
 MOST_VERTICES = 1 << 27
-INSTANCE_BYTES = 256  # what an instance takes
-CORNER_BYTES = 96  # what a corner of a face takes, of which strips make three
-INFLUENCE_BYTES = 100  # what a joint of a vertex takes
-VERTEX_BYTES = 160  # what a vertex takes in the poses that are held and made
+INSTANCE_BYTES = 256  # Bytes that an instance takes.
+CORNER_BYTES = 96  # Bytes that a corner of a face takes; strips make three of each.
+INFLUENCE_BYTES = 100  # Bytes that a joint of a vertex takes.
+VERTEX_BYTES = 160  # Bytes that a vertex takes in the poses that are held and made.
 MOST_FRAMES = 1 << 20
+FACING_FRAMES = 64  # Frames whose transforms are held at once to see whether they mirror.
 KINDS = ("points", "curves", "mesh")  # the last that a node has is what it is
 MODE_KINDS = ("points", "curves", "curves", "curves", "mesh", "mesh", "mesh")
 NAMES = {"TEXCOORD_0": "uv", "COLOR_0": "colors", "NORMAL": "normals"}
@@ -58,8 +52,8 @@ ANIMATION = "animation:"
 INSTANCING = "EXT_mesh_gpu_instancing"
 COPIES = "copies"  # true in the extras of a node: those below show one shape, and are one object; false: or are not
 INSTANCE_PARTS = {"TRANSLATION": 3, "ROTATION": 4, "SCALE": 3}
-REST_ROUNDING = 1e-6  # of the largest coordinate, by which joints may miss the mesh that they leave as it is
-SAME = 1e-5  # of the size: how far off the end of a loop may be from its beginning
+REST_ROUNDING = 1e-6  # Distance by which joints may miss the unmoved mesh, over its largest coordinate.
+SAME = 1e-5  # Distance between the ends of a loop, over the plant's size.
 
 
 def read_clip(path: str | PathLike[str], options: ReadOptions) -> MotionClip:
@@ -198,7 +192,7 @@ def _has_motion(node: GltfNode) -> bool:
 
 
 def _patterns(options: ReadOptions) -> list[str]:
-    """Of the names of nodes and meshes to read."""
+    """Return the patterns of the names of nodes and meshes to read."""
     return [name for name in options.only if not name.startswith(ANIMATION)]
 
 
@@ -211,7 +205,11 @@ def _clip(
     timings = {name: _sampling(take, options.fps) for name, take in motions.items()}
     still = all(len(timing.times) == 1 for timing in timings.values())
     attributes, branches = _attributes(scene, nodes, options.skip, motion, keep_normals=still)
-    motion.find_mirrored(next(iter(timings.values())).times)
+    facings = [Facing() for _ in nodes]
+    for name, take in motions.items():
+        take.add_facings(timings[name].times, facings)
+    for node, facing in zip(nodes, facings):
+        node.mirrored, node.is_flipped = facing.mirrored, facing.changes
     faces, edges, face_material = _connections(file, nodes)
     names = _names(scene, nodes)
     said: dict[str, Any] = {}
@@ -243,7 +241,7 @@ def _clip(
             **branches,
         )
         clips[name].rest_given = options.rest == "auto"
-        rest = clips[name].source_rest  # of several, the same for all
+        rest = clips[name].source_rest  # All clips have the same rest pose.
     return join(clips) if options.takes else clips[""]
 
 
@@ -266,7 +264,7 @@ def _positions(motion: _Motion, times: np.ndarray) -> Frames:
     return Frames(lambda start, stop: motion.read(times[start:stop]), len(times), motion.count, motion.dtype)
 
 
-# ---- what there is ----
+# ---- scenes and nodes ----
 
 
 def _scenes(file: GltfFile, options: ReadOptions) -> dict[str, Scene]:
@@ -283,7 +281,7 @@ def _scenes(file: GltfFile, options: ReadOptions) -> dict[str, Scene]:
 
 
 def _chosen(scene: Scene, patterns: Sequence[str]) -> list[GltfNode]:
-    """Those that show a mesh, where they or it have such a name, in the order of the scene."""
+    """Return the nodes that show a mesh, if they or it have such a name, in the order of the scene."""
     file = scene.file
     nodes, seen = [], []
     for index in scene.order:
@@ -317,7 +315,7 @@ def _number(nodes: Sequence[GltfNode]) -> int:
 
 
 def _animations(file: GltfFile, patterns: Sequence[str], what: str) -> dict[str, int]:
-    """Those that any of the patterns names, in the file's order."""
+    """Return the animations that any of the patterns names, in the file's order."""
     numbers, wanted = _animation_numbers(file), set()
     for pattern in patterns:
         found = {name for name in numbers if name == pattern or fnmatch.fnmatchcase(name, pattern)}
@@ -433,14 +431,14 @@ def _own_extras(scene: Scene, index: int) -> dict[str, np.ndarray]:
 
 
 def _mark(scene: Scene, index: int) -> bool | None:
-    """What a node says of those below it by COPIES: whether they are one object; None for nothing."""
+    """Return what a node states by COPIES about those below it: whether they are one object; None for nothing."""
     extras = scene.nodes[index].get("extras") if index >= 0 else None
     said = extras.get(COPIES) if isinstance(extras, dict) else None
     return said if isinstance(said, bool) else None
 
 
 def _not_read(scene: Scene, nodes: Sequence[GltfNode]) -> dict[str, list[str]]:
-    """What else is in the file; of what each node has, by the name of the node."""
+    """Return what else is in the file; parts of a node by the node's name."""
     file, found = scene.file, {}
 
     def add(kind: str, number: int, item: Any) -> None:
@@ -620,32 +618,24 @@ class _Motion:
             out[:, :, vertices] += _product(matrix, points)
         return out.swapaxes(1, 2)
 
-    def find_mirrored(self, times: np.ndarray) -> None:
-        """Notes of each node whether it turns its mesh inside out, and whether that changes."""
-        matrices: dict[int, dict[int, np.ndarray]] = {}
+    def add_facings(self, times: np.ndarray, facings: Sequence[Facing]) -> None:
+        """Adds the frames at these times to the facing of each node."""
+        world = np.eye(4) if self._from_world is None else self._from_world
+        for start in range(0, len(times), FACING_FRAMES):
+            matrices = self.scene.matrices(self.ancestors, times[start : start + FACING_FRAMES])
+            for node, facing in zip(self._nodes, facings):
+                placed = (world @ self._placed(node, matrices))[:, None]
+                facing.add(placed if node.copies is None else placed @ node.copies)
 
-        def matrix(node: GltfNode, frame: int) -> np.ndarray:
-            if frame not in matrices:
-                matrices[frame] = self.scene.matrices(self.ancestors, times[frame : frame + 1])
-            placed = self.placed(node, matrices[frame])
-            placed = placed if self._from_world is None else self._from_world @ placed
-            return placed if node.copies is None else placed @ node.copies
+    def placed(self, node: GltfNode) -> np.ndarray:
+        """(4, 4) from a node's mesh to the world without animation; of a skin, by the joint that counts most."""
+        return self._placed(node, self.scene.matrices(self.ancestors, None))[0]
 
-        for node in self._nodes:
-            first, last = (
-                mirrored(lambda frame, node=node: matrix(node, frame), frames)
-                for frames in (range(len(times)), range(len(times))[::-1])
-            )
-            node.mirrored, node.is_flipped = first, not np.array_equal(first, last)
-
-    def placed(self, node: GltfNode, matrices: dict[int, np.ndarray] | None = None) -> np.ndarray:
-        """(4, 4) from a node's mesh to the world, by the first of these matrices, or without animation; of a skin, by
-        the joint that counts most."""
-        matrices = self.scene.matrices(self.ancestors, None) if matrices is None else matrices
+    def _placed(self, node: GltfNode, matrices: dict[int, np.ndarray]) -> np.ndarray:
         if node.skin is None:
-            return matrices[node.index][0]
+            return matrices[node.index]
         strongest = np.bincount(node.strongest).argmax()
-        return matrices[node.joints[strongest]][0] @ node.bind[strongest]
+        return matrices[node.joints[strongest]] @ node.bind[strongest]
 
     def turned(self, node: GltfNode, directions: np.ndarray, is_normal: bool) -> np.ndarray:
         """(n, 3) directions at a node's vertices, as its joints or it turn them without animation; of length 1."""
@@ -713,7 +703,7 @@ def _sampling(motion: _Motion, wanted: float | None) -> Sampling:
 
 
 def _said(scene: Scene) -> dict[str, Any]:
-    """What extras say: those of the file, and before them those of the animation."""
+    """Return the extras: those of the file, overridden by those of the animation."""
     items = [scene.file.json["asset"]]
     if len(scene.played) == 1:
         items.append(scene.file.item("animations", scene.played[0]))
@@ -729,7 +719,7 @@ def _returns(motion: _Motion, keys: np.ndarray) -> bool:
 
 
 def _said_rate(said: dict, keys: np.ndarray) -> float | None:
-    """What the file says, where its keys agree."""
+    """Return the frame rate that the file states, if its keys agree."""
     fps = said.get("fps")
     return float(fps) if _is_number(fps) and 0 < fps < 1e6 and on_grid(keys, fps) else None
 

@@ -27,7 +27,7 @@ SLOWEST, FASTEST = 10.0, 240.0  # rates of sampled motion: keys further apart ar
 
 @dataclass(frozen=True, eq=False)
 class Track:
-    """What is animated by the same keys: times (K,), values (K, ...), with tangents (K, 3, ...) for CUBICSPLINE."""
+    """Values animated by the same keys: times (K,), values (K, ...), with tangents (K, 3, ...) for CUBICSPLINE."""
 
     times: np.ndarray
     values: np.ndarray

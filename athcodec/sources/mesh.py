@@ -29,6 +29,8 @@ MESSAGE = 300  # characters of what Python says of a number
 STATEMENT_BYTES = 16  # Bytes that an unknown statement of OBJ takes for each word.
 STRIPS = "tristrips"
 PLY_ELEMENTS = ("vertex", "face", "edge")
+STRUCTURE = {"part_vertex_counts", "part_copies", "face_vertex_counts", "face_vertex_indices"}
+NAMED = {FACE_MATERIAL: "material_names", "face_group": "group_names"}  # Arrays whose numbers stand for names.
 FREE_FORM = ("curv", "curv2", "surf")
 HEADER_BYTES = 1 << 24  # names of objects and materials included
 PLY_TYPES = {
@@ -77,6 +79,22 @@ class Mesh:
             if mine is not None and not all(map(np.array_equal, mine, theirs)):
                 return f"got other {what}"
         return ""
+
+    def changed(self, other: Mesh) -> set[str]:
+        """Return the names of the arrays that differ from those of another mesh of this topology, or that only one of
+        both has; numbers of groups and materials differ where their names do."""
+        names = (self.attributes.keys() | other.attributes.keys()) - STRUCTURE
+        different = {name for name in names if not same_values(self.attributes.get(name), other.attributes.get(name))}
+        return different | {
+            name for name, key in NAMED.items() if name in names and self.metadata.get(key) != other.metadata.get(key)
+        }
+
+
+def same_values(values: np.ndarray | None, others: np.ndarray | None) -> bool:
+    """Whether both are numbers of one shape and value, NaN included."""
+    if values is None or others is None or values.dtype.kind != others.dtype.kind:
+        return False
+    return np.array_equal(values, others, equal_nan=values.dtype.kind == "f")
 
 
 def read_mesh(path: str | PathLike[str], budget: Budget) -> Mesh:
@@ -571,11 +589,12 @@ def ply_points(vertices: Any) -> np.ndarray:
 
 
 _UV_NAMES = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"))
+POSITION_COLUMNS = ("x", "y", "z", "nx", "ny", "nz")  # Position and normal, which belong to one pose.
 _PLY_COLORS = ("red", "green", "blue", "alpha")
 
 
 def _add_ply_vertex_values(mesh: Mesh, vertices: dict[str, np.ndarray]) -> None:
-    taken = {"x", "y", "z", "nx", "ny", "nz"}
+    taken = set(POSITION_COLUMNS)
     colors = [name for name in _PLY_COLORS if name in vertices]
     if set(_PLY_COLORS[:3]) <= set(colors):
         mesh.attributes["colors"] = _native(np.stack([vertices[name] for name in colors], axis=1))

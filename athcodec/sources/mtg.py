@@ -110,7 +110,6 @@ class _Entity:
     whole: int  # the entity that this is a part of; -1 for none
     relation: str
     origin: int  # the entity that the code came from
-    line: int
     parts: list[int] = field(default_factory=list)
     features: dict[str, str] = field(default_factory=dict)
 
@@ -127,7 +126,8 @@ class _Plants:
         self._latest: list[int] = []  # by column
         self._topology_columns = 0
         self._line = 0
-        lines = re.sub(r"\(#.*?#\)", _only_breaks, text, flags=re.DOTALL).splitlines()
+        text = re.sub(r"\(#.*?#\)", _only_breaks, text, flags=re.DOTALL)
+        lines = [line.partition("#")[0] for line in text.splitlines()]
         rows = self._header(lines)
         for self._line, cells in rows:
             self._row(cells)
@@ -142,7 +142,7 @@ class _Plants:
         section, form = "", ""
         for number, line in enumerate(lines):
             self._line = number + 1
-            cells = [re.sub(r"#.*", "", cell).strip() for cell in line.split("\t")]
+            cells = [cell.strip() for cell in line.split("\t")]
             if not any(cells):
                 continue
             found = _SECTION.match(" ".join(cells))
@@ -166,7 +166,7 @@ class _Plants:
     def _columns(self, lines: Sequence[str], start: int) -> Iterator[tuple[int, list[str]]]:
         rows = ((number + 1, line.split("\t")) for number, line in enumerate(lines[start:], start))
         for self._line, cells in rows:
-            names = [re.sub(r"#.*", "", cell).strip() for cell in cells]
+            names = [cell.strip() for cell in cells]
             if any(names):
                 break
         else:
@@ -179,7 +179,7 @@ class _Plants:
         return rows
 
     def _row(self, cells: Sequence[str]) -> None:
-        cells = [re.sub(r"#.*", "", cell).strip() for cell in cells]
+        cells = [cell.strip() for cell in cells]
         column = next((place for place, cell in enumerate(cells[: self._topology_columns]) if cell), None)
         if column is None or cells[column] == "*":
             return
@@ -232,11 +232,14 @@ class _Plants:
                 raise self._fail(f"got the alias {alias[1][:20]!r}, which no entity above has")
             return self._aliases[alias[1]], code[alias.end() :], True
         left = next((entity for entity in reversed(self._latest[:column]) if entity >= 0), -1)
-        if left >= 0:
-            return left, code, False
+        above = self._latest[column] if column < len(self._latest) else -1
         first = _STEP.match(code)
-        is_finer = first and self._scales.get(first[2], 1) > 1 and self._latest and self._latest[0] >= 0
-        return (self._latest[0], code, False) if is_finer else (-1, code, True)
+        if above >= 0 and first:  # A row goes on from the one above it where it can be no part of what is to its left.
+            scale = self._scales.get(first[2], 1)
+            is_part = left >= 0 and first[1] == "/" and self.entities[left].scale >= scale > self.entities[above].scale
+            if is_part or (left < 0 and scale > 1):
+                return above, code, False
+        return left, code, left < 0
 
     def _unfolded(self, now: int, relation: str, symbol: str, index: str) -> Iterator[tuple[str, str]]:
         """Each step that one stands for: E1<<E4 is E1<E2<E3<E4."""
@@ -252,8 +255,8 @@ class _Plants:
             yield relation[0], f"{symbol}{number}"
 
     def _step(self, now: int, relation: str, label: str, is_absolute: bool) -> int:
-        """The entity behind a relation; a new one unless it has been named before."""
-        known = self._known.get((now, relation, label))
+        """Return the entity behind a relation: a new one unless its number has been used there before."""
+        known = self._known.get((now, relation, label)) if label[-1].isdigit() else None
         if known is not None and (is_absolute or relation != "+"):
             return known
         symbol = label.rstrip("0123456789")
@@ -262,7 +265,8 @@ class _Plants:
         if len(self.entities) >= MAX_ENTITIES:
             raise self._fail(f"got more than {MAX_ENTITIES} entities")
         scale = self._scales[symbol]
-        beside = self._at_scale(now, scale)
+        origin = now if relation == "/" else self._bearer(now, scale)
+        beside = self._at_scale(origin, scale)
         if relation == "/":
             whole = self._at_scale(now, scale - 1)
         else:
@@ -270,10 +274,23 @@ class _Plants:
                 raise self._fail(f"got {relation}{label[:20]} at the beginning, expected /")
             whole = self.entities[beside].whole if beside >= 0 else -1
         entity = len(self.entities)
-        self.entities.append(_Entity(label, scale, whole, relation, now, self._line))
+        self.entities.append(_Entity(label, scale, whole, relation, origin))
         if whole >= 0:
             self.entities[whole].parts.append(entity)
         self._known[now, relation, label] = entity
+        return entity
+
+    def _bearer(self, entity: int, scale: int) -> int:
+        """Return what < or + goes on from behind an entity: behind S3+B2, <S4 goes on from S3, and so does +B3 once B2
+        has parts in columns of its own."""
+        at = entity
+        while at >= 0:
+            now = self.entities[at]
+            is_borne = now.relation != "/"
+            is_left = is_borne and now.parts and self.entities[now.origin].scale > now.scale
+            if now.scale >= scale and not is_left:
+                return at
+            at = now.origin if is_borne else -1
         return entity
 
     def _at_scale(self, entity: int, scale: int) -> int:

@@ -20,7 +20,7 @@ from athcodec.motion.frames import Frames, is_far
 from athcodec.motion.presence import PRESENCE, frame_runs
 from athcodec.sources import ReadOptions
 
-MOST_VERTICES = 1 << 27  # of copies
+MOST_VERTICES = 1 << 27  # Largest number of vertices that copies may make.
 MAX_METADATA_BYTES = 1 << 24
 DESCRIPTOR = ".descriptor"  # behind the name of an array's property in an Alembic file: that of its ArrayDescriptor
 FACE_MATERIAL, MATERIAL_NAMES = "face_material", "material_names"  # an attribute, and metadata
@@ -31,7 +31,7 @@ CHANGING = (
 )
 TWO_SIDES = {"doubleSided": True}  # glTF's material of faces that are seen from both sides and have no other
 OWN = "athcodec"  # the namespace of what our writers add to files of other formats
-SCENE_KEYS = {"unit": str, "up_axis": str, "fps": float}  # of metadata, which some formats have no place for
+SCENE_KEYS = {"unit": str, "up_axis": str, "fps": float}  # Members of the metadata that some formats have no place for.
 KNOWN_METADATA = ("fps", "start_frame", "meters_per_unit", "part_names", "part_kinds", "part_usd", "domains", PRESENCE)
 
 
@@ -68,7 +68,7 @@ class SceneObject:
     is_flipped: bool = False  # mirrored in some frames and not in others
     is_still: bool = False  # neither its points nor its place change
     still: np.ndarray | None = None  # its positions then, once they have been read
-    ids: np.ndarray | None = None  # those of points that may stand in another order in each frame
+    ids: np.ndarray | None = None  # Identities of points that may stand in another order in each frame.
     shown: np.ndarray = field(default_factory=lambda: np.ones((1, 1), bool))  # (T, 1) or (T, copies): frames that do
 
     @property
@@ -155,9 +155,10 @@ class SceneObject:
     def face_outward(self, matrix: Callable[[int], np.ndarray], frames: range, is_reversed: bool) -> None:
         """Reverses the corners of faces that a transform mirrors, or, where the file lists corners the other way round,
         of those that none does. matrix(frame) is (4, 4) or (copies, 4, 4)."""
-        turned = mirrored(matrix, frames)
-        self.is_flipped = not np.array_equal(turned, mirrored(matrix, frames[::-1]))
-        turned ^= is_reversed
+        facing = Facing()
+        for frame in frames:
+            facing.add(matrix(frame).reshape(1, -1, 4, 4))
+        self.is_flipped, turned = facing.changes, facing.mirrored ^ is_reversed
         if not turned.any():
             return
         faces = np.repeat(turned, len(self.face_counts) // len(turned))
@@ -189,8 +190,8 @@ class SceneObject:
 
 
 class ArrayDescriptor(NamedTuple):
-    """What makes an array of its bytes again, as text that files of other formats can hold: dtype as NumPy writes it;
-    shape as JSON; domain: what its rows stand for, "" for nothing."""
+    """Description of how to make an array of its bytes again, as text that files of other formats can hold: dtype
+    as NumPy writes it; shape as JSON; domain: what its rows stand for, "" for nothing."""
 
     name: str = ""
     dtype: str = ""
@@ -347,15 +348,26 @@ def presence_metadata(names: Sequence[str], presence: Sequence[np.ndarray]) -> d
     return {PRESENCE: stated} if stated else {}
 
 
-def mirrored(matrix: Callable[[int], np.ndarray], frames: Iterable[int]) -> np.ndarray:
-    """Whether a transform turns a mesh inside out, (1,) or (copies,) bool: matrix(frame) is (4, 4) or (copies, 4, 4).
-    The first frame that has an extent says so, because leaves may grow from a scale of 0."""
-    signs = np.zeros(1)
-    for frame in frames:
-        signs = np.where(signs == 0, np.sign(np.linalg.det(matrix(frame).reshape(-1, 4, 4)[:, :3, :3])), signs)
-        if signs.all():
-            break
-    return signs < 0
+class Facing:
+    """Whether a transform turns a mesh, or copies of one, inside out, and whether that changes in the frames added.
+
+    The first frame that has an extent decides, because leaves may grow from a scale of 0.
+    """
+
+    def __init__(self) -> None:
+        self._signs, self.changes = np.zeros(1), False
+
+    def add(self, matrices: np.ndarray) -> None:
+        """Take the (frames, copies, 4, 4) transforms of the next frames."""
+        signs = np.nan_to_num(np.sign(np.linalg.det(matrices[..., :3, :3])))
+        signs = np.concatenate([np.broadcast_to(self._signs, (1, signs.shape[1])), signs])
+        self._signs = signs[(signs != 0).argmax(axis=0), np.arange(signs.shape[1])]
+        self.changes |= bool((signs * self._signs < 0).any())
+
+    @property
+    def mirrored(self) -> np.ndarray:
+        """(copies,) bool."""
+        return self._signs < 0
 
 
 def rows_by_id(ids: np.ndarray, wanted: np.ndarray) -> np.ndarray:
@@ -429,7 +441,7 @@ def _spread(obj: SceneObject, static: Static | None, domain: str, shape: tuple[i
 
 
 def scene_of_json(text: str | bytes) -> dict[str, Any]:
-    """What our writers add to files of formats without a place for it; nothing where it is no JSON object."""
+    """Return what our exporters add to files of formats without a place for it; nothing if it is no JSON object."""
     with suppress(ValueError, RecursionError):
         said = json.loads(text)
         if isinstance(said, dict):
@@ -504,7 +516,7 @@ def _faces(objects: list[SceneObject], attributes: dict[str, np.ndarray]) -> np.
 
 
 def _edges(objects: list[SceneObject]) -> np.ndarray | None:
-    """Those between the neighbours on each curve; closed where it is periodic."""
+    """Return the edges between neighbours on each curve, closed if it is periodic."""
     found = []
     for obj in objects:
         if obj.curve_counts is None or not obj.count:
@@ -546,7 +558,7 @@ def _fields(attributes: dict[str, np.ndarray], domains: dict[str, str]) -> dict[
 
 
 def own_metadata(text: Any) -> dict[str, Any]:
-    """What a writer of ours has kept of a clip's metadata, JSON, besides what the format itself holds; else nothing."""
+    """Return the JSON metadata that our exporter kept besides what the format itself holds; else nothing."""
     if not isinstance(text, str) or len(text) > MAX_METADATA_BYTES:
         return {}
     try:

@@ -1,9 +1,11 @@
 """Reads numbered OBJ or PLY files as the frames of one motion: tree_0001.obj, tree_0002.obj ...
 
-Any one of the files names the motion, and so does a pattern: tree_####.obj or tree_%04d.obj. The numbers are frames:
-where some are missing, the others keep their times. Frames come options.fps a second, DEFAULT_FPS (30) without it. A
-file without a number is a motion of one frame. One file is in memory at a time; faces, edges, texture coordinates and
-all else that does not move come from the first. See mesh.py for what is read of a file. Exporters that split vertices
+Any one of the files names the motion, and so does a pattern: tree_####.obj or tree_%04d.obj. The numbers are frames
+and may be below 0: where some are missing, the others keep their times. Frames come options.fps a second, DEFAULT_FPS
+(30) without it. A file without a number is a motion of one frame. Files whose names differ in another number, as those
+with dates and decimals do, are left out, and a GuessWarning names them. One file is in memory at a time. Faces and
+edges come from the first file, and so do texture coordinates and other arrays that are the same in all; the clip's
+`not_read` names those that change. See mesh.py for what is read of a file. Exporters that split vertices
 (Blender's PLY does where texture coordinates are to be written) split those of all frames alike.
 """
 
@@ -11,23 +13,38 @@ from __future__ import annotations
 
 import os
 import re
+import warnings
 from collections.abc import Callable, Iterable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from os import PathLike, fspath
 from pathlib import Path
 
 import numpy as np
 
-from athcodec.errors import ClipError
+from athcodec.errors import ClipError, GuessWarning
 from athcodec.files.reading import Budget, FileWatch, naming, read_plain
 from athcodec.motion.clip import MotionClip, stated_fps
 from athcodec.motion.frames import Frames
-from athcodec.sources import NUMBER_PATTERN, ReadOptions, is_pattern
-from athcodec.sources.mesh import Mesh, obj_lines, obj_points, parse_mesh, ply_header, ply_points
+from athcodec.sources import LISTED, NUMBER_PATTERN, ReadOptions, is_pattern
+from athcodec.sources.mesh import (
+    NAMED,
+    POSITION_COLUMNS,
+    Mesh,
+    obj_lines,
+    obj_points,
+    parse_mesh,
+    ply_header,
+    ply_points,
+    same_values,
+)
 from athcodec.sources.timing import numbered_times
 
-_NUMBERED = re.compile(r"(.*?)(\d+)", re.DOTALL)
-_ELEMENTS = frozenset((b"f ", b"f\t", b"l ", b"l\t"))
+_NUMBERED = re.compile(r"(.*?)(-?)(\d+)", re.DOTALL)
+# Parts of a name that may tell frames apart: numbers that are no part of a word, decimals, and halves of a day.
+_PLACES = re.compile(r"(?<![^\W_])-?\d+|\d+(?=[.,]\d)|-?\d+$|(?<![^\W_])[AaPp][Mm](?![^\W_])")
+_ELEMENTS = (b"f ", b"f\t", b"l ", b"l\t")
+_LABELS = (b"vt ", b"vt\t", b"usemtl ", b"usemtl\t", b"o ", b"o\t", b"g ", b"g\t")
 LARGEST_NUMBER = 10**9
 FRAME_SUFFIXES = (".obj", ".ply", ".vtu", ".vtp", ".vtk")  # Formats that have one file per frame.
 
@@ -57,11 +74,11 @@ class Numbering:
     def files(self) -> dict[int, Path]:
         """The files that are there, by their numbers, in that order."""
         found = {}
-        for name in os.listdir(self.folder):
-            digits = name[len(self.prefix) : len(name) - len(self.suffix)]
-            is_number = digits.isascii() and digits.isdigit() and len(digits) <= len(str(LARGEST_NUMBER))
-            if is_number and name == self.path(int(digits)).name:
-                found[int(digits)] = self.folder / name
+        for name, sign, digits in _numbered(self.folder, self.prefix, self.suffix):
+            longer = len(digits) - self.width
+            is_padded = longer == 0 or longer > 0 and digits[0] != "0" or longer == -1 and sign  # -001 beside 0000
+            if is_padded and len(digits) <= len(str(LARGEST_NUMBER)) and not (sign and int(digits) == 0):
+                found[int(sign + digits)] = self.folder / name
         return dict(sorted(found.items()))
 
 
@@ -73,18 +90,22 @@ def numbering_of(path: str | PathLike[str]) -> Numbering | None:
     numbered = _NUMBERED.fullmatch(path.stem)
     if not numbered:
         return None
-    prefix, digits = numbered.groups()
-    if digits.startswith("0"):
+    prefix, sign, digits = numbered.groups()
+    positive = [others for _, below, others in _numbered(path.parent, prefix, path.suffix) if not below]
+    if sign and prefix[-1:].isalnum() and not positive:  # tree-001.obj
+        prefix, sign, positive = prefix + sign, "", []
+        positive = [others for _, below, others in _numbered(path.parent, prefix, path.suffix) if not below]
+    if digits.startswith("0") and not sign:
         return Numbering(path.parent, prefix, len(digits), path.suffix)
-    padded = _padded_widths(path, prefix, len(digits))
-    return Numbering(path.parent, prefix, max(padded, default=1), path.suffix)
+    longest = len(digits) + len(sign)
+    padded = [len(others) for others in positive if others.startswith("0") and 1 < len(others) <= longest]
+    return Numbering(path.parent, prefix, max(padded, default=len(digits) if digits[0] == "0" else 1), path.suffix)
 
 
-def _padded_widths(path: Path, prefix: str, longest: int) -> list[int]:
-    """How long the numbers with zeros before them are, of files called like `path`."""
-    form = re.compile(re.escape(prefix) + r"(0\d+)" + re.escape(path.suffix), re.DOTALL)
-    found = [form.fullmatch(name) for name in os.listdir(path.parent)]
-    return [len(match[1]) for match in found if match and len(match[1]) <= longest]
+def _numbered(folder: Path, prefix: str, suffix: str) -> list[tuple[str, str, str]]:
+    """Return the names of the files with only a number between prefix and suffix, the sign of each, and its digits."""
+    form = re.compile(re.escape(prefix) + r"(-?)([0-9]+)" + re.escape(suffix))
+    return [(name, *match.groups()) for name in os.listdir(folder) if (match := form.fullmatch(name))]
 
 
 def sequence_files(path: str | PathLike[str]) -> dict[int | None, Path]:
@@ -99,6 +120,30 @@ def sequence_files(path: str | PathLike[str]) -> dict[int | None, Path]:
             raise ClipError(f"{fspath(path)}: got no such files, expected some like {numbering.path(1).name}")
     elif Path(path) not in files.values():
         return {None: Path(path)}
+    return files
+
+
+def files_to_read(path: str | PathLike[str]) -> dict[int | None, Path]:
+    """Return `sequence_files`; a GuessWarning names files whose names differ in numbers, but not in the last alone."""
+    files, path = sequence_files(path), Path(path)
+    form = _PLACES.sub("#", path.stem)
+    if is_pattern(path) or "#" not in form:
+        return files
+    taken = {file.name for file in files.values()}
+    others = sorted(
+        name
+        for name in set(os.listdir(path.parent)) - taken
+        if name.endswith(path.suffix) and _PLACES.sub("#", name.removesuffix(path.suffix)) == form
+    )
+    if others:
+        more = f" and {len(others) - LISTED} more" if len(others) > LISTED else ""
+        warnings.warn(
+            f"{path}: read as {len(files)} of {len(files) + len(others)} files, without {', '.join(others[:LISTED])}"
+            f"{more}; frames differ in the last number alone, written with as many zeros: to read all as one motion, "
+            f"call them NAME_0001{path.suffix}, NAME_0002{path.suffix} ... in the order of time",
+            GuessWarning,
+            stacklevel=2,
+        )
     return files
 
 
@@ -130,13 +175,18 @@ def each_once(paths: Iterable[str]) -> list[tuple[str, str]]:
 def read_clip(path: str | PathLike[str], options: ReadOptions) -> MotionClip:
     """The clip in the sequence that `path` belongs to. Raises ClipError where a file is broken or, when its frame is
     read, has other vertices, faces or edges than the first; OSError where one cannot be opened."""
-    files = sequence_files(path)
+    files = files_to_read(path)
     reader = FileFrames(list(files.values()), parse_mesh, _fast_reader, Budget(options.max_memory))
     mesh, time, metadata = reader.mesh, np.zeros(1), {}
     if None not in files:
         time, metadata = numbered_times(np.array(list(files)), options.fps or stated_fps(mesh.metadata))
     mesh.metadata["part_names"] = _without_numbers(mesh.metadata["part_names"], reader.paths[0], path)
-    attributes = {name: values for name, values in mesh.attributes.items() if name not in options.skip}
+    changed = reader.changed()
+    attributes = {name: values for name, values in mesh.attributes.items() if name not in changed.union(options.skip)}
+    for name in changed:
+        mesh.metadata["domains"].pop(name, None)
+        mesh.metadata.pop(NAMED.get(name, ""), None)
+    left_out = sorted(changed.difference(options.skip))
     with naming(path):
         return MotionClip(
             reader.frames,
@@ -145,7 +195,7 @@ def read_clip(path: str | PathLike[str], options: ReadOptions) -> MotionClip:
             edges=mesh.edges,
             attributes=attributes,
             metadata=mesh.metadata | metadata,
-            not_read=mesh.not_read,
+            not_read=mesh.not_read | ({"attribute": left_out} if left_out else {}),
             rest_pose="mean" if options.rest == "mean" else "first",
             unchanged=reader.unchanged,
         )
@@ -170,7 +220,7 @@ class FileFrames:
         (bytes, path, budget) -> Mesh.
     fast_reader : callable
         (bytes of the first file, its mesh) -> a function from the bytes of a further file to its points, or to None
-        where that cannot tell whether all else is as in the first.
+        where all else is not as in the first, or that function cannot tell.
     budget : Budget
         What a file may take.
     """
@@ -196,14 +246,29 @@ class FileFrames:
                 block[frame - start] = self._points(frame)
         return block
 
-    def _points(self, frame: int) -> np.ndarray:
-        path = self.paths[frame]
-        data = read_plain(path, self._budget)
+    def changed(self) -> set[str]:
+        """Return the names of the arrays that are not the same in all files."""
+        names: set[str] = set()
+        for path in self.paths[1:]:
+            data = read_plain(path, self._budget)
+            with suppress(ClipError):  # The frame says what is wrong when it is read.
+                if self._quick_points(data) is None:
+                    mesh = self._parse(data, path, self._budget)
+                    names |= set() if self.mesh.same_topology(mesh) else self.mesh.changed(mesh)
+        return names
+
+    def _quick_points(self, data: bytes) -> np.ndarray | None:
         try:
             points = self._fast(data)
         except (ClipError, ValueError, IndexError, OverflowError):
-            points = None  # the full parser says what is wrong
-        if points is not None and points.shape == self.mesh.points.shape:
+            return None  # The full parser says what is wrong.
+        return points if points is not None and points.shape == self.mesh.points.shape else None
+
+    def _points(self, frame: int) -> np.ndarray:
+        path = self.paths[frame]
+        data = read_plain(path, self._budget)
+        points = self._quick_points(data)
+        if points is not None:
             return points
         mesh = self._parse(data, path, self._budget)
         different = self.mesh.same_topology(mesh)
@@ -222,22 +287,23 @@ def _fast_reader(data: bytes, mesh: Mesh) -> Callable[[bytes], np.ndarray | None
 
 
 def _fast_obj(data: bytes, mesh: Mesh) -> Callable[[bytes], np.ndarray | None]:
-    dtype, elements = mesh.points.dtype, _obj_elements(obj_lines(data))
-    if any(b"-" in line for line in elements):
+    dtype, elements, colors = mesh.points.dtype, _obj_elements(obj_lines(data)), mesh.attributes.get("colors")
+    if any(b"-" in line for line in elements if line.startswith(_ELEMENTS)):
         return lambda data: None  # relative numbers: which vertices they mean depends on the lines around them
 
     def points(data: bytes) -> np.ndarray | None:
         lines = obj_lines(data)
         if _obj_elements(lines) != elements:
             return None
-        return obj_points([line.split()[1:] for line in lines if line[:2] in (b"v ", b"v\t")], dtype)[0]
+        points, others = obj_points([line.split()[1:] for line in lines if line[:2] in (b"v ", b"v\t")], dtype)
+        return points if colors is others is None or same_values(colors, others) else None
 
     return points
 
 
 def _obj_elements(lines: Sequence[bytes]) -> list[bytes]:
-    """The lines that say which vertices belong together."""
-    return [line for line in lines if line[:2] in _ELEMENTS]
+    """The lines that say which vertices belong together, and what is where on them."""
+    return [line for line in lines if line.startswith(_ELEMENTS + _LABELS)]
 
 
 def _fast_ply(data: bytes) -> Callable[[bytes], np.ndarray | None]:
@@ -248,10 +314,13 @@ def _fast_ply(data: bytes) -> Callable[[bytes], np.ndarray | None]:
     dtype = vertex.row(header.order, {})
     head, end = data[: header.length], header.length + vertex.count * dtype.itemsize
     tail = data[end:]
+    first = np.frombuffer(data, dtype, vertex.count, len(head))
+    others = [name for name in dtype.names if name not in POSITION_COLUMNS]
 
     def points(data: bytes) -> np.ndarray | None:
         if data[: len(head)] != head or data[end:] != tail:
             return None
-        return ply_points(np.frombuffer(data, dtype, vertex.count, len(head)))
+        rows = np.frombuffer(data, dtype, vertex.count, len(head))
+        return ply_points(rows) if all(np.array_equal(rows[name], first[name]) for name in others) else None
 
     return points

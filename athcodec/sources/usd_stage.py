@@ -50,7 +50,9 @@ from athcodec.sources.scene_objects import (
 )
 
 MAX_FRAMES = 1 << 24
-READ = frozenset(("", "Xform", "Scope", "SkelRoot", "Skeleton", "SkelAnimation", "BlendShape"))  # what is no loss
+READ = frozenset(
+    ("", "Xform", "Scope", "SkelRoot", "Skeleton", "SkelAnimation", "BlendShape")
+)  # Prims whose types need no note when they are not read.
 WHOLE = ("Material",)  # prims that are named without those below them
 KNOWN = ("Material", "Camera", "GeomSubset")
 PLACES = ("positions", "orientations", "orientationsf", "scales", "protoIndices", "ids", "invisibleIds")
@@ -237,7 +239,7 @@ def _kind_not_read(prim: Usd.Prim) -> str:
 def _instanced(
     instancer: UsdGeom.PointInstancer, only: Sequence[str], not_read: dict[str, list[str]]
 ) -> Iterator[_Prim]:
-    """What is in the prototypes of a PointInstancer, each as often as the instancer has it."""
+    """Return the meshes in the prototypes of a PointInstancer, each as often as the instancer has it."""
     path, indices = instancer.GetPath(), instancer.GetProtoIndicesAttr()
     times = indices.GetTimeSamples() or [Usd.TimeCode.Default()]
     used = set().union(*(indices.Get(time) or () for time in times))
@@ -384,11 +386,11 @@ class _Instances:
         world = np.array(cache.GetLocalToWorldTransform(self.instancer.GetPrim()))
         return inner @ self.all.places(frame)[self.rows] @ world
 
-    def add_arrays(self, obj: _Prim, code: float) -> None:
+    def add_arrays(self, obj: _Prim, codes: np.ndarray) -> None:
         """Adds the static arrays that the instancer has for each of its copies."""
         for primvar in UsdGeom.PrimvarsAPI(self.instancer).GetPrimvarsWithValues():
-            name, values = str(primvar.GetPrimvarName()), _numbers(primvar.ComputeFlattened(code))
-            changes = primvar.ValueMightBeTimeVarying() or self.all.follows_ids
+            name, values = str(primvar.GetPrimvarName()), _numbers(primvar.ComputeFlattened(codes[0]))
+            changes = _changes(primvar, codes) or self.all.follows_ids
             if values is None or changes or len(values) <= self.rows.max(initial=-1):
                 obj.left_out.append(name)
             elif NAMES.get(name, name) not in obj.statics:
@@ -502,7 +504,7 @@ def _measure(objects: list[_Prim], codes: np.ndarray, matrix: Callable[[_Prim, i
         if obj.instances is not None:
             obj.statics.pop("normals", None)  # they turn with each copy
             obj.repeat(len(obj.instances.rows))
-            obj.instances.add_arrays(obj, codes[0])
+            obj.instances.add_arrays(obj, codes)
         if obj.kind == "mesh":
             is_reversed = UsdGeom.Mesh(obj.prim).GetOrientationAttr().Get() == UsdGeom.Tokens.leftHanded
             is_reversed ^= obj.skeleton is not None and obj.skeleton.mirrors(obj.count, codes[0])
@@ -649,7 +651,7 @@ def _statics(obj: _Prim, codes: np.ndarray, matrix: np.ndarray) -> None:
     for primvar in UsdGeom.PrimvarsAPI(obj.prim).FindPrimvarsWithInheritance():
         if obj.skeleton is not None and str(primvar.GetPrimvarName()).startswith("skel:"):
             continue  # which has moved it
-        if primvar.HasValue() and primvar.ValueMightBeTimeVarying():
+        if primvar.HasValue() and _changes(primvar, codes):
             obj.left_out.append(primvar.GetPrimvarName())
         elif primvar.HasValue():
             values = primvar.ComputeFlattened(codes[0])
@@ -663,9 +665,8 @@ def _statics(obj: _Prim, codes: np.ndarray, matrix: np.ndarray) -> None:
                 primvar.GetAttr(),
             )
     _rename_first_uv(obj)
-    normals = UsdGeom.PointBased(obj.prim).GetNormalsAttr()
-    if normals.HasAuthoredValue() and not normals.ValueMightBeTimeVarying() and "normals" not in obj.statics:
-        _keep(obj, "normals", normals.Get(codes[0]), UsdGeom.PointBased(obj.prim).GetNormalsInterpolation())
+    schema = UsdGeom.PointBased(obj.prim)
+    _keep_unless_it_changes(obj, codes, "normals", schema.GetNormalsAttr(), schema.GetNormalsInterpolation())
     obj.turn_normals(matrix, obj.moves)
     if obj.kind != "mesh":
         _widths(obj, codes, matrix)
@@ -691,10 +692,32 @@ def _rename_first_uv(obj: _Prim) -> None:
 
 def _widths(obj: _Prim, codes: np.ndarray, matrix: np.ndarray) -> None:
     schema = (UsdGeom.Curves if obj.kind == "curves" else UsdGeom.Points)(obj.prim)
-    widths = schema.GetWidthsAttr()
-    if widths.HasAuthoredValue() and not widths.ValueMightBeTimeVarying() and "radius" not in obj.statics:
-        _keep(obj, "radius", widths.Get(codes[0]), schema.GetWidthsInterpolation())
+    has_radius = "radius" in obj.statics
+    _keep_unless_it_changes(obj, codes, "radius", schema.GetWidthsAttr(), schema.GetWidthsInterpolation())
+    if not has_radius:
         obj.halve_widths(matrix)
+
+
+def _keep_unless_it_changes(
+    obj: _Prim, codes: np.ndarray, name: str, attribute: Usd.Attribute, interpolation: str
+) -> None:
+    """Keep an array of the schema that no primvar replaces, or note that it is left out."""
+    if not attribute.HasAuthoredValue() or name in obj.statics:
+        return
+    if _changes(attribute, codes):
+        obj.left_out.append(attribute.GetName())
+    else:
+        _keep(obj, name, attribute.Get(codes[0]), interpolation)
+
+
+def _changes(source: Usd.Attribute | UsdGeom.Primvar, codes: np.ndarray) -> bool:
+    """Whether an array has other values in any frame than in the first."""
+    if not source.ValueMightBeTimeVarying():
+        return False
+    read = source.ComputeFlattened if isinstance(source, UsdGeom.Primvar) else source.Get
+    first = np.array(read(codes[0]))
+    samples = source.GetTimeSamplesInInterval(_interval(codes))
+    return any(not np.array_equal(np.array(read(code)), first) for code in (*samples, codes[-1]))
 
 
 def _keep(

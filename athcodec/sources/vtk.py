@@ -4,7 +4,7 @@ Numbered files are found from any one of them, or by a pattern, as sequence.py s
 second, DEFAULT_FPS (30) without it, and a .pvd beside them that lists the file gives the times instead. See fields.py
 for what becomes the motion and cells.py for the cells. VTU and VTP: text, base64 and appended data, plain or compressed
 by zlib or LZMA, one piece. Legacy .vtk files, unstructured grids only, are read by meshio. A file is read whole, one at
-a time; whether data other than the displacement change in time is seen from the first, second, middle and last of them.
+a time; all are read once to see which data change in time.
 """
 
 from __future__ import annotations
@@ -32,8 +32,9 @@ from athcodec.motion.clip import MotionClip
 from athcodec.sources import ReadOptions
 from athcodec.sources.cells import NODE_BYTES, VTK_NAMES, VTK_NUMBERS, blocks_of, topology_of
 from athcodec.sources.fields import clip_of_steps
+from athcodec.sources.mesh import same_values
 from athcodec.sources.scene_objects import OWN, scene_of_json
-from athcodec.sources.sequence import sequence_files
+from athcodec.sources.sequence import files_to_read
 from athcodec.sources.timing import numbered_times, times_in_seconds
 from athcodec.sources.xdmf import TEXT_BYTES, parse_xml
 
@@ -55,7 +56,7 @@ _UNPACKERS: dict[str, Callable[[int], Any]] = {
 }
 """Of the bytes that they may take themselves."""
 WORD_BYTES = 16  # Bytes that a byte of a legacy file takes while meshio reads it.
-GRIDS = 4  # Grids that are held at once: three that are compared, and one that is read.
+GRIDS = 3  # Grids that are held at once: the first, the latest, and one that is read.
 # Cells of PolyData in the order of their data: VTK's numbers of those with so many nodes, and of the others.
 _POLY_CELLS = {"Verts": ({1: 1}, 2), "Lines": ({2: 3}, 4), "Polys": ({3: 5, 4: 9}, 7), "Strips": ({}, 6)}
 _BROKEN = (
@@ -95,7 +96,7 @@ def _files(path: Path, options: ReadOptions) -> tuple[list[Path], np.ndarray, di
     index = _index_of(path, Budget(options.max_memory))
     if index is not None:
         return _listed(index, options)
-    files = sequence_files(path)
+    files = files_to_read(path)
     if None in files:
         return list(files.values()), np.zeros(1), {}
     return [*files.values()], *numbered_times(np.array(list(files)), options.fps)
@@ -150,24 +151,26 @@ class _Steps:
         first = self._grid(0)
         self._cells, self.said, self.left_out = first.cells, first.said, first.left_out
         self.topology = topology_of(blocks_of(*first.cells, VTK_NAMES), len(first.points))
-        others = [self._grid(step) for step in {len(files) - 1, len(files) // 2, 1} if 0 < step < len(files)]
-        for name, values in first.cell_data.items():
-            if all(np.array_equal(other.cell_data.get(name), values) for other in others):
-                self.topology.add_cell_data(name, values)
-            else:
-                self.left_out.append(name)
-        self._static = {
-            name: values
-            for name, values in first.point_data.items()
-            if all(np.array_equal(other.point_data.get(name), values) for other in others)
-        }
-        self._fields = list(first.point_data)
+        self._fields, self.elsewhere = list(first.point_data), dict.fromkeys(first.cell_data, "cell")
+        self._static, still, self._fixed = dict(first.point_data), dict(first.cell_data), True
+        names = dict.fromkeys(self._fields), dict.fromkeys(still)
+        for step in range(1, len(files)):
+            grid = self._grid(step)
+            self._fixed = self._fixed and np.array_equal(grid.points, first.points)
+            for same, all_names, data in zip((self._static, still), names, (grid.point_data, grid.cell_data)):
+                all_names.update(dict.fromkeys(data))
+                for name in [name for name, values in same.items() if not same_values(values, data.get(name))]:
+                    del same[name]
+        for name, values in still.items():
+            self.topology.add_cell_data(name, values)
+        self.left_out += [name for name in names[0] if name not in first.point_data]
+        self.left_out += [name for name in names[1] if name not in still]
 
     def static(self) -> dict[str, np.ndarray]:
         return self._static
 
     def fixed_points(self) -> bool:
-        return len(self._files) == 1
+        return self._fixed
 
     def points(self, step: int) -> np.ndarray:
         return self._grid(step).points

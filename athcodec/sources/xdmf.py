@@ -26,6 +26,7 @@ from athcodec.sources import ReadOptions
 from athcodec.sources.cells import NODE_BYTES, NODES, Block, blocks_of, topology_of
 from athcodec.sources.fields import clip_of_steps
 from athcodec.sources.hdf5 import check_own, chunk_bytes, unpacks_to_more
+from athcodec.sources.mesh import same_values
 from athcodec.sources.scene_objects import MATERIAL_NAMES
 from athcodec.sources.timing import times_in_seconds, whole
 
@@ -249,8 +250,8 @@ class _Steps:
         self._mesh = self._grids[0] if self._grids[0].find("Geometry") is not None else own
         self._first_blocks = self._blocks(self._topology_element(0))
         self.topology = topology_of(self._first_blocks, len(self.points(0)))
-        self.left_out: list[str] = []
-        self._add_cell_data()
+        self.elsewhere = {name: center for name, center, _ in self._attributes(0) if center != "node"}
+        self.left_out = self._add_cell_data()
 
     def times(self, options: ReadOptions) -> tuple[np.ndarray, dict[str, Any]]:
         """(T,) seconds from 0, and what the file says of rate, unit and up axis."""
@@ -295,7 +296,10 @@ class _Steps:
         return self._data.read(items[0]).reshape(-1, len(kind))
 
     def fixed_points(self) -> bool:
-        return self._same_items("Geometry")
+        if self._same_items("Geometry"):
+            return True
+        first = self.points(0)
+        return all(np.array_equal(first, self.points(step)) for step in range(1, len(self._grids)))
 
     def _same_items(self, tag: str) -> bool:
         first = _signature(self._element(0, tag))
@@ -340,17 +344,21 @@ class _Steps:
                     found[name] = values
         return found
 
-    def _add_cell_data(self) -> None:
+    def _add_cell_data(self) -> list[str]:
+        """Keep the data per cell that are the same in all steps; return the names of all data that are in no clip."""
         count = sum(len(block.rows) for block in self._first_blocks)
+        steps = range(len(self._grids))
+        left_out = dict.fromkeys((name, center) for step in steps for name, center, _ in self._attributes(step) if name)
         for name, center, element in self._attributes(0):
-            values = ()
             if center == "cell" and name and self._is_static(name, "cell"):
                 values = self._data.read(element.find("DataItem"))
-            if center == "cell" and len(values) == count:
-                self._data.budget.take(2 * values.nbytes, name)
-                self.topology.add_cell_data(name, values[:, 0] if values.shape[1:] == (1,) else values)
-            elif center != "node":
-                self.left_out.append(name)
+                if len(values) == count:
+                    self._data.budget.take(2 * values.nbytes, name)
+                    self.topology.add_cell_data(name, values[:, 0] if values.shape[1:] == (1,) else values)
+                    del left_out[name, center]
+            elif center == "node":
+                left_out.pop((name, center), None)  # See fields().
+        return [name for name, _ in left_out]
 
     def _is_static(self, name: str, center: str) -> bool:
         """By reference, or by value: the last step is compared first, because what moves is not there where it was."""
@@ -373,7 +381,7 @@ class _Steps:
         if not others:
             return True
         values = self._data.read(first)
-        return all(np.array_equal(values, self._data.read(other)) for other in others)
+        return all(same_values(values, self._data.read(other)) for other in others)
 
     def _blocks(self, element: ElementTree.Element | None) -> list[Block]:
         if element is None:

@@ -45,8 +45,8 @@ export class AthError extends Error {
 }
 
 /** "file" or "source", see above. */
-/** A measure of the errors of all vertices in all frames: the largest; what at most 1 % of them exceed, which says what is seen
- * where single vertices stray; the root of their mean square. */
+/** Measures of the error over all vertices in all frames. "max": the largest. "p99": at most 1 % of them exceed it, which is closer
+ * to what one sees if a few vertices stray. "rms": the root of the mean square. */
 export type Measure = "max" | "p99" | "rms";
 export type Errors = Record<Measure, number>;
 export type Order = "file" | "source";
@@ -331,10 +331,10 @@ export class AthFile {
   frameAt(seconds: number, wrap?: Wrap, clip?: number | string): number;
 
   /*
-   * What follows shows a place on the frames, such as 3.25, from prepared segments, of which any number may
-   * be handed over; null and freed ones are passed over. Results go to `out`, which is returned, or to a new
-   * array. Null: none of the segments has this frame, and `out` is as it was. Hand over segments of one level
-   * where matrices or exact vertices are wanted: of several levels, nothing tells which one is shown.
+   * These methods return the pose at a frame number, which may be fractional (3.25). Pass any number of prepared
+   * segments; null and freed ones are skipped. The result goes to `out` if given, else to a new array. They return
+   * null, and leave `out` as it was, if no segment holds the frame. Pass segments of one level if you want matrices
+   * or exact vertices: of several levels, nothing tells which one is shown.
    *
    * With `fade`, the blend of its levels, segments of each of which are handed over; matrices and exact vertices are those
    * of the cut of the deepest, of which one segment has to be there. Null: a level that has a weight lacks the frame.

@@ -18,7 +18,7 @@ import athcodec
 from athcodec.motion.hierarchy import Hierarchy, hierarchy_of
 
 BLOCK = 1 << 20  # numbers
-RUNS = 16  # of branches in a part of a clip
+RUNS = 16  # Branches in a part of a clip.
 
 
 @dataclass
@@ -77,7 +77,7 @@ class Codec(Protocol):
 
     name: str
     kind: str  # "athcodec", "baseline" or "program"
-    settings: dict  # what the last encode chose
+    settings: dict  # Settings that the last encode chose.
 
     def missing(self) -> str | None:
         """The reason why it cannot run here, in one line; None if it can."""

@@ -28,8 +28,8 @@ from bench.codecs.tree import VertexOrder, memo, ordered, read_order, read_pose,
 
 SEGMENT = 16  # frames
 MOST_BITS = 19
-RANGE_STEPS = 8  # of a range's ends, in the error of a number
-HELD = 1e-4  # how much a hinge is drawn to the bone's middle, over what the motion says
+RANGE_STEPS = 8  # Steps of a range's ends, per error of a number.
+HELD = 1e-4  # Weight of keeping a hinge at its bone's middle, relative to that of fitting the motion.
 BLOCK = 1024  # vertices
 
 Follow = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
@@ -40,7 +40,7 @@ class SkeletalTracks(Baseline):
 
     def __init__(self, tiers: int = 2):
         super().__init__()
-        self.tiers = tiers  # that are read
+        self.tiers = tiers  # Tiers that are read.
 
     def grid(self, source: Source, bound: float) -> dict[str, Ladder | Choice]:
         return {

@@ -23,7 +23,7 @@ from bench.codecs.tree import VertexOrder, ordered
 
 LARGE = 8_000_000  # numbers; larger clips are searched by a part of them
 SEARCHED = 3_000  # vertices of that part
-AGAIN = ("step", "clusters")  # what is searched with all vertices
+AGAIN = ("step", "clusters")  # Settings that are searched again with all vertices.
 
 
 @dataclass(frozen=True)
@@ -118,7 +118,7 @@ class Baseline(ABC):
 
     kind = "baseline"
     name = ""
-    rounds = 3  # of the search over all settings
+    rounds = 3  # Rounds of the search over all settings.
 
     def __init__(self) -> None:
         self.settings: Settings = {}

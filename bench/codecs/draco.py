@@ -16,7 +16,7 @@ import numpy as np
 from bench.codecs.program import CannotKeep, Program, join, split
 
 LEVELS = (10, 7)  # more effort by itself is not always smaller
-FLOAT_BITS = 24  # what a float32 coordinate holds exactly
+FLOAT_BITS = 24  # Bits that a float32 coordinate holds exactly.
 INTEGER_BITS = 30  # wider ones are coded as two halves, since it refuses differences of more than 31 bits
 WIDE = 84  # frames or vertices in one point: 252 components
 

@@ -21,7 +21,7 @@ from bench.codecs.coder import Reader, Writer
 from bench.codecs.pca import GRID, Trajectories, grid_of, principal, read_group, write_group
 from bench.codecs.tree import VertexOrder, memo, ordered, read_order, read_pose, vertex_order, write_order, write_pose
 
-LEAST_EXTENT = 1e-3  # of the part's largest; flatter directions are not stretched
+LEAST_EXTENT = 1e-3  # Smallest extent over the part's largest; flatter directions are not stretched.
 DEEPEST = 5  # branches with parts of their own
 REGULARISATION = 1e-3  # towards no rotation, which determines the twist of straight parts
 

@@ -302,7 +302,7 @@ def read_front(reader: Reader) -> tuple[VertexOrder, Trajectories, np.ndarray, f
 
 class GlobalPca(Baseline):
     name = "global PCA"
-    degrees: tuple[int, ...] = (0,)  # of linear prediction
+    degrees: tuple[int, ...] = (0,)  # Degrees of linear prediction.
 
     def grid(self, source: Source, bound: float) -> dict[str, Ladder | Choice]:
         return grid_of("step keep basis joint differences first dead_zone pose lpc order", lpc=Choice(self.degrees))
@@ -329,7 +329,7 @@ class PredictedPca(GlobalPca):
 class ClusteredPca(Baseline):
     name = "clustered PCA (Sattler)"
     counts = (1, 2, 4, 8, 16, 24, 32, 48, 64, 96, 128, 192)
-    rank = 8  # of the bases that define the clusters
+    rank = 8  # Rank of the bases that define the clusters.
     main = 24  # components of the motion that clusters are formed by
     turns = 8
     moved = 16_000  # vertices that turns are made with; the others join the clusters in the end

@@ -35,12 +35,12 @@ AXES = {
     "3|N,T": (2, 1, 0),
 }
 LAYOUTS = tuple(AXES)  # "3|": three arrays, one per axis
-FLAT_LAYOUTS = ("T,N,3", "N,T,3", "3,T,N", "3,N,T", "3N,T")  # those that differ as one row of numbers
+FLAT_LAYOUTS = ("T,N,3", "N,T,3", "3,T,N", "3,N,T", "3N,T")  # Layouts that differ as one row of numbers.
 
 FORMS, ORDERS = ("integers", "floats"), ("source", "hierarchy")
 POSES = ("none", "rest", "mean", "first")
 PREDICTORS = ("none", "time", "time2", "vertex", "time+vertex", "time2+vertex")
-POSE_STEPS = (0.0, 1.0, 0.25)  # of a pose under floats, over the step of the bound's grid; 0: float32, exact
+POSE_STEPS = (0.0, 1.0, 0.25)  # Steps of a pose below floats, over the step of the bound's grid; 0: float32, exact.
 COARSER = (1.05, 1.03, 1.02, 1.015, 1.01, 1.007, 1.005, 1.003, 1.001, 1.0, 0.999, 0.99, 0.95, 0.9, 0.7, 0.4)
 CORNER = 2 / np.sqrt(3)  # step of a grid over the distance from a cell's centre to its corners
 NEARLY = COARSER.index(0.999)

@@ -9,7 +9,7 @@ from bench.odd.bending import FPS, Bones, clip_of, gusty
 from bench.trees.plant import grow
 from bench.trees.ride import rotations, sideways
 
-PARTS = 4  # of the clip: trunk, orders 1 and 2 on each other, and rest
+PARTS = 4  # Parts of the clip: trunk, orders 1 and 2 on each other, and rest.
 
 
 def growth(seed: int, frames: int, vertices: int, eased: bool = False, carried: bool = False) -> MotionClip:

@@ -33,7 +33,7 @@ from bench.trees.wind import Wind
 if TYPE_CHECKING:
     from scipy.sparse import csc_matrix
 
-STEPS = 3  # of a frame
+STEPS = 3  # Time steps of a frame.
 
 
 def bend(
@@ -141,7 +141,7 @@ def _lowest_frequency(stiffness: csc_matrix, mass: np.ndarray) -> float:
     """Of the undamped plant at rest, rad/s."""
     from scipy.sparse.linalg import eigsh
 
-    start = np.ones(len(mass))  # the same in every run
+    start = np.ones(len(mass))  # A fixed start makes every run equal.
     return float(np.sqrt(eigsh(stiffness, 1, _diagonal(mass), sigma=0.0, v0=start, return_eigenvectors=False)[0]))
 
 

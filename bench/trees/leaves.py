@@ -21,12 +21,12 @@ from bench.trees.simulate import AIR
 from bench.trees.wind import DIRECTION, Wind
 
 LEAF_ANGLE = np.radians(60.0)  # to its twig
-STEPS = 8  # of a frame
+STEPS = 8  # Time steps of a frame.
 WIND_STEPS = 2  # evaluations of the wind in a frame
 SETTLING_FRAMES = 30  # before the first, on a plant that stands still
 STIFFER = 0.7  # rad at which a stalk is twice as stiff
 LEAST_WIND = 0.05  # m/s
-LEE_CELL = 0.06  # over the plant's height
+LEE_CELL = 0.06  # Size over the plant's height.
 LEE = 0.25  # logarithm of the wind's loss behind leaves that hide the view once
 
 Air = Callable[[np.ndarray, float], np.ndarray]
@@ -214,8 +214,8 @@ class Plates:
         angle = _rotation_vectors(self.turn)
         spring = self.stiffness * (1 + (angle**2).sum(axis=0) / STIFFER**2)
         spin = self.inertia * self.speed
-        moment -= np.stack([_minor(self.speed, spin, i) for i in range(3)])  # of a top
-        moment[1] += drag[1] * self.speed[1]  # what the wind above holds already
+        moment -= np.stack([_minor(self.speed, spin, i) for i in range(3)])  # The gyroscopic moment of a top.
+        moment[1] += drag[1] * self.speed[1]  # The wind term above holds this part already.
         resisted = self.inertia + seconds * (self.damping + drag + seconds * spring)
         self.speed = (spin + seconds * (moment - spring * angle)) / resisted
         self.turn = _advanced(self.turn, seconds * self.speed)

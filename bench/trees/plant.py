@@ -19,7 +19,7 @@ UP = np.array([0.0, 1.0, 0.0])
 GOLDEN_ANGLE = np.radians(137.508)
 FORK_ANGLE = np.radians(55.0)
 FIRST_FORK = 0.25  # bare part of a stem, as a fraction of its elements
-BASE_RADIUS = 0.0065  # over the plant's height
+BASE_RADIUS = 0.0065  # Radius over the plant's height.
 SMALLEST_STEM = 2  # elements
 
 

@@ -14,7 +14,7 @@ from athcodec import MotionClip
 from bench.trees.ride import BLOCK_FRAMES, Skeleton, drag_at, limited, rotations, sideways, sway
 from bench.trees.wind import Wind
 
-TWIG_LENGTH = 0.03  # over the plant's height
+TWIG_LENGTH = 0.03  # Length over the plant's height.
 TWIG_ANGLE = np.radians(50.0)
 TWIG_BEND = 0.3  # rad at the tip in the mean wind
 TWIG_HERTZ = (1.5, 4.0)

@@ -22,7 +22,7 @@ import numpy as np
 from bench.trees.plant import Plant
 from bench.trees.wind import Wind
 
-DENSITY = 900.0  # of green wood, kg/m3
+DENSITY = 900.0  # Density of green wood, kg/m3.
 YOUNG, SHEAR = 8.5e9, 0.6e9  # Pa
 AIR = 1.2  # kg/m3
 DRAG_OF_WOOD = 1.0
@@ -30,7 +30,7 @@ FOLIAGE_AREA = 0.07  # drag coefficient times area of all foliage, over height s
 FOLIAGE_MASS = 1.2  # kg per m2 of it
 FOLIAGE_SPREAD = 0.05  # radius of gyration of a node's foliage, m
 SECOND_DAMPED = 6.0  # the other damped frequency, over the lowest
-LONGEST_STEP = 1.4  # over the damping's stiffness factor; from 2 on, stiff springs ring up
+LONGEST_STEP = 1.4  # Longest step over the damping's stiffness factor; from 2 on, stiff springs ring up.
 CALM_SECONDS, SPIN_UP_SECONDS = 1.0, 4.0  # the wind rises over the former; the clip begins after the latter
 WIND_RATE = 60.0  # evaluations of the wind per second
 

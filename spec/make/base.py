@@ -29,7 +29,7 @@ class Vector:
     error: str = ""
     item: str = ""
     scripted: bool = True
-    mesh: bytes | None = None  # of the host, which is given to the decoder
+    mesh: bytes | None = None  # A mesh of the host, which is given to the decoder.
 
     @property
     def path(self) -> str:

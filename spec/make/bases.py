@@ -11,7 +11,7 @@ def all_waves(frames: int) -> Callable[[], Plant]:
     return lambda: lone(clips=clips, scripts={(STEMS, 0): rows})
 
 
-WAVE_ROWS = (  # of four rows over four frames: exponents, integers; the axes without a use of the last row are not 0
+WAVE_ROWS = (  # Four rows over four frames: exponents, integers; unused axes of the last row are not 0.
     *(-6, 3, -1),
     *row((9, 0, 1), (-4, 60, 0), (0, 2, 700)),
     -200 + 4,

@@ -5,7 +5,7 @@ from spec.make.layers import layered
 from spec.make.rest import AWKWARD_FLOATS
 
 MESH = np.array(grown(FORK, 5), "<f4") / 4 + np.float32(0.1)
-ORDER = [3, 0, 4, 1, 2]  # of the fork's vertices in the source
+ORDER = [3, 0, 4, 1, 2]  # Order of the fork's vertices in the source.
 
 
 def hosted(mesh: np.ndarray = MESH, **fields) -> Plant:

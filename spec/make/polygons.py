@@ -57,7 +57,7 @@ def derived(type_: str) -> bytes:
 
 FACES_3 = np.array([[0, 1, 2], [2, 1, 4]], "<u2")
 EDGES_2 = np.array([[0, 1], [4, 3]], "<i8")
-MANY_FACES = {  # of 119 vertices: those of BY_VERTEX
+MANY_FACES = {  # Faces of 119 vertices, those of BY_VERTEX.
     "by chance": lambda: polygons(np.zeros((150, 3), "<i2"), 120, script=Chance(71)),
     "strip": lambda: polygons(np.array([[i, i + 1, i + 2] for i in range(118)], "<i4"), 120),
     "quads": lambda: polygons(np.array([[i, i + 1, i + 11, i + 10] for i in range(109)], "<i8"), 120),

@@ -46,12 +46,12 @@ class Attack:
     rest: str = "grown"
     actions: tuple[str, ...] = ()
     frames: int = 20
-    scale: float = 1.0  # of all coordinates
-    squeeze: float = 1.0  # of one axis against the others
+    scale: float = 1.0  # Factor of all coordinates.
+    squeeze: float = 1.0  # Factor of one axis against the others.
     place: float = 0.0  # distance from the origin, in sizes of the plant
     is_float64: bool = False
     shuffled: bool = False  # vertices in random order
-    bound: float = 1e-3  # of the diagonal
+    bound: float = 1e-3  # Bound over the diagonal.
     segment_frames: int = 64
     effort: str = "fast"
     exact_rest: bool = False

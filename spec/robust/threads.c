@@ -113,7 +113,7 @@ static void see_alone(plant *p)
     free(positions);
 }
 
-/* Of a segment at any level: coarse ones, which hold matrices, can take more than the finest. */
+/* Memory of a segment at any level: coarse ones, which hold matrices, can take more than the finest. */
 static size_t largest_segment(const plant *p)
 {
     size_t most = 0;

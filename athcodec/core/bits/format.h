@@ -11,7 +11,8 @@ enum {
     ATH_LAYERS = 8            /* largest number of layers of precision */
 };
 
-/* A piece's rows of integers over temporal frequency, 3 x frames each: its modes, then these. */
+/* Order of a piece's rows of integers (3 x frames each, over temporal frequency): a row per mode, then the shift, then
+ * the rotation. */
 enum { SHIFT_SLOT = ATH_PIECE_VERTICES, ROTATION_SLOT, ATH_SLOTS };
 
 /* A learned shape combines a piece's first modes on three axes. */

@@ -36,8 +36,8 @@ ATH_INLINE uint32_t coarse_steps(int32_t predicted, uint32_t ratio)
     return steps < MAGNITUDE_CLIP ? steps : (uint32_t)MAGNITUDE_CLIP;
 }
 
-/* Predictions of a row, in steps of this layer. coarse, below: integers of the layer before, or null: of this row, and
- * of the row that follows it. */
+/* Predictions of a row, in steps of this layer. coarse: integers of this row in the layer before. below: those of the
+ * row that follows it. Either may be null. */
 typedef struct {
     const int32_t *row, *coarse, *below;
     int32_t frames;

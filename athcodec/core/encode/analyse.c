@@ -17,7 +17,7 @@ static int32_t quantise(double value, double dead_zone)
 }
 
 /* units = the row times `count` waves, in units of a step. */
-ATH_INLINE void project_waves(const double *waves, int32_t count, int32_t T, const double *row, double inverse,
+ATH_INLINE void sums_of_waves(const double *waves, int32_t count, int32_t T, const double *row, double inverse,
                               double *units)
 {
     ath_lanes sums[WAVES];
@@ -48,9 +48,9 @@ ATH_HOT static int32_t forward_temporal(const ath_stream *stream, int32_t T, dou
         const double *waves = stream->temporal + (size_t)k * (size_t)T;
         int32_t count = k + WAVES <= stream->temporal_rank ? WAVES : 1;
         if (count == WAVES)
-            project_waves(waves, WAVES, T, row, inverse, units + k);
+            sums_of_waves(waves, WAVES, T, row, inverse, units + k);
         else
-            project_waves(waves, 1, T, row, inverse, units + k);
+            sums_of_waves(waves, 1, T, row, inverse, units + k);
         for (int32_t stop = k + count; k < stop; k++) left -= units[k] * units[k];
     }
     return stream->temporal_rank;
@@ -208,8 +208,9 @@ static int32_t turned_vertices(const ath_plan *plan, const ath_piece *piece)
     return (next < plan->branch_count ? plan->branches[next].first : plan->vertex_count) - piece->first;
 }
 
-/* Adds the products of the branches on a root with their rest pose in frame t, with the same total weight as the root's
- * own. source: the whole plant. own2: squared distances of the root's vertices from its base. */
+/* Adds to H the vertices of the branches that a root carries: products of their positions in frame t and in the rest
+ * pose, weighted so that together they count as much as the root's own. source: positions of the whole plant. own2: sum
+ * of the squared distances of the root's vertices from its base. */
 static void add_carried(const ath_plan *plan, int32_t T, const ath_piece *root, int32_t t, const double *source,
                         double own2, double H[9])
 {

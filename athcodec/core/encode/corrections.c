@@ -152,7 +152,8 @@ static int32_t footprint_bend(const track *track, int32_t frame, int32_t width, 
 
 static int has_bend(const track *track, int32_t t) { return t > 0 && t < track->frames - 1; }
 
-/* Beyond a closed end the error continues, and corrections add nothing. */
+/* Returns how a correction at a frame changes the bends of the error. Beyond an end that another segment joins, the
+ * error goes on and the correction adds nothing. */
 static place place_at(const track *track, int32_t frame, int32_t width)
 {
     place place = {frame, width, 0, {0.0, 0.0, 0.0}, 0.0};

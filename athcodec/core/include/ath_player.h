@@ -801,7 +801,7 @@ int ath_player_endless_positions(ath_player *player, ath_player_endless *play, d
     return ath_player_blended_positions(player, shares, 2, order, xyz, stride);
 }
 
-/* ---- ahead ---- */
+/* ---- preparing ahead ---- */
 
 /* Returns the segment that comes after the one shown; -1: none. */
 static int32_t ath_player_next(const ath_player *p, const ath_player_track *now)

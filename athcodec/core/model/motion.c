@@ -305,6 +305,44 @@ ATH_HOT static void place(const ath_plan *plan, const ath_motion *motion, const 
     }
 }
 
+/* Takes one step of Newton's method from R towards the rotation nearest to H, which has a Frobenius norm of 1. With C =
+ * H R', the turn omega solves (trace(C) - sym(C)) omega = axial(C). Far from that rotation the trace is small, and 1 in
+ * its place keeps the matrix positive definite. */
+static void turn_towards(const double H[9], double R[9])
+{
+    double C[9];
+    for (int32_t i = 0; i < 3; i++)
+        for (int32_t j = 0; j < 3; j++)
+            C[3 * i + j] = H[3 * i] * R[3 * j] + H[3 * i + 1] * R[3 * j + 1] + H[3 * i + 2] * R[3 * j + 2];
+    double wx = C[7] - C[5], wy = C[2] - C[6], wz = C[3] - C[1];
+    double trace = C[0] + C[4] + C[8];
+    double most = (trace > 1.0 ? trace : 1.0) + 1e-6;
+    double a = most - C[0], b = most - C[4], c = most - C[8];
+    double d = -0.5 * (C[1] + C[3]), e = -0.5 * (C[2] + C[6]), f = -0.5 * (C[5] + C[7]);
+    double xx = b * c - f * f, xy = e * f - d * c, xz = d * f - e * b;
+    double yy = a * c - e * e, yz = d * e - a * f, zz = a * b - d * d;
+    double scale = 0.25 / (a * xx + d * xy + e * xz);
+    double x = (xx * wx + xy * wy + xz * wz) * scale;
+    double y = (xy * wx + yy * wy + yz * wz) * scale;
+    double z = (xz * wx + yz * wy + zz * wz) * scale;
+    double q[9];
+    rational_rotation(x, y, z, q);
+    for (int32_t k = 0; k < 3; k++) {
+        double r0 = R[k], r1 = R[3 + k], r2 = R[6 + k];
+        for (int32_t i = 0; i < 3; i++) R[3 * i + k] = q[3 * i] * r0 + q[3 * i + 1] * r1 + q[3 * i + 2] * r2;
+    }
+}
+
+void ath_turn_to(const double H[9], int32_t steps, double R[9])
+{
+    double unit[9], norm2 = 0.0;
+    for (int32_t k = 0; k < 9; k++) norm2 = norm2 + H[k] * H[k];
+    if (!(norm2 > 1e-200)) return;
+    double inverse = 1.0 / ath_sqrt(norm2);
+    for (int32_t k = 0; k < 9; k++) unit[k] = H[k] * inverse;
+    for (int32_t step = 0; step < steps; step++) turn_towards(unit, R);
+}
+
 /* Fills the rotation nearest to a sheet's decoded vertices, with its own R as the prior. */
 static void turn_with_sheet(const ath_plan *plan, int32_t T, const ath_piece *piece, const ath_scratch *scratch,
                             double *rotation)

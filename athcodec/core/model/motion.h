@@ -111,6 +111,8 @@ const double *ath_pose_piece(const ath_plan *plan, const ath_motion *motion, int
 const double *ath_pose_turned(const ath_plan *plan, const ath_motion *motion, int32_t p, const ath_piece_rows *rows,
                               const ath_scratch *scratch);
 
+/* Turns R towards the rotation nearest to H, whose column k is what rest axis k became. Leaves R if H vanishes. */
+void ath_turn_to(const double H[9], int32_t steps, double R[9]);
 /* x := c + R x, 3 x frames */
 void ath_move(int32_t frames, const ath_frames *at, double *x);
 void ath_move_point(int32_t frames, const double *track, double *point);

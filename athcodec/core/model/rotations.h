@@ -10,12 +10,29 @@ void ath_follow_tangents(int32_t frames, const double *tangent, const double *fr
                          double *turned);
 /* R := R Q(omega), where Q is the rotation of the quaternion normalize(1, omega / 4) squared. */
 void ath_turn(int32_t frames, const double *omega, double *R);
-/* Turns R towards the rotation nearest to H, whose column k is what rest axis k became. Leaves R if H vanishes. */
-void ath_turn_to(const double H[9], int32_t steps, double R[9]);
 /* Fills the vector that ath_turn takes for a rotation matrix. `q` holds the unit quaternion of the frame before, and
  * then that of this one: of its two signs, the one that is nearer. */
 void ath_rotation_vector(const double R[9], double q[4], double omega[3]);
 /* Fills the vectors that turn the rotations `from` into the rotations `to`. */
 void ath_rotations_between(int32_t frames, const double *from, const double *to, double *omega);
+
+/* Fills the rotation of the quaternion normalize(1, x, y, z) squared. */
+ATH_INLINE void rational_rotation(double x, double y, double z, double q[9])
+{
+    double n2 = x * x + y * y + z * z, scale = 1.0 / (1.0 + n2);
+    double w = (1.0 - n2) * scale;
+    x = 2.0 * x * scale;
+    y = 2.0 * y * scale;
+    z = 2.0 * z * scale;
+    q[0] = 1.0 - 2.0 * (y * y + z * z);
+    q[1] = 2.0 * (x * y - w * z);
+    q[2] = 2.0 * (x * z + w * y);
+    q[3] = 2.0 * (x * y + w * z);
+    q[4] = 1.0 - 2.0 * (x * x + z * z);
+    q[5] = 2.0 * (y * z - w * x);
+    q[6] = 2.0 * (x * z - w * y);
+    q[7] = 2.0 * (y * z + w * x);
+    q[8] = 1.0 - 2.0 * (x * x + y * y);
+}
 
 #endif

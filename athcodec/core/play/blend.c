@@ -1,6 +1,6 @@
 /* Blends several clips: the pose of each is taken apart into edges of stems and turned sheets, which are blended and
  * put together again from the roots on. */
-#include "model/plan.h"
+#include "model/motion.h"
 #include "model/rotations.h"
 #include "play/segment.h"
 

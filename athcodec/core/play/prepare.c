@@ -708,7 +708,8 @@ static int refine_shapes(ath_work *work, int32_t q, const ath_piece *piece)
     return ATH_OK;
 }
 
-/* Sets what the layer before, which has put the piece at `placed`, tells this one. */
+/* Collects what this layer predicts piece p from: the piece's rows and positions in the layer before. placed: its
+ * positions in that layer. */
 static void look_before(ath_work *work, int32_t q, int32_t p, const double *placed)
 {
     layer_work *layer = work->layers + q;

@@ -27,15 +27,15 @@ NO_CORRECTIONS = np.empty((0, 6), np.int32)
 # Ticks are changes of velocity at a seam over those of a usual frame. Up to SMOOTH they are invisible, and beyond ROUGH
 # each weighs ROUGH_WORTH more.
 SMOOTH, ROUGH, ROUGH_WORTH = 1.2, 1.4, 30.0
-ERROR_WORTH = 8.0  # Ticks that an error twice as large weighs.
-ORDER_WORTH = 400.0  # Ticks that an error of twice that of the level before weighs.
-BYTES_WORTH = 40.0  # Ticks that twice as many bytes weigh.
+ERROR_WORTH = 8.0  # Cost, in ticks, of an error twice as large.
+ORDER_WORTH = 400.0  # Cost, in ticks, of an error twice as large as that of the level before.
+BYTES_WORTH = 40.0  # Cost, in ticks, of twice as many bytes.
 CORRECTION_BYTES = 0.3  # Bytes of each position beyond the limit: a correction reaches over frames.
 
 
 @dataclass(frozen=True)
 class End:
-    """What a level of the next segment goes on from.
+    """The end of a segment, from which a level of the next one goes on.
 
     positions, source: (N, 3, END_FRAMES), decoded and wanted. usual: the change of velocity in a usual frame.
     corrections: (K, 6) in the last frame, which stand in the first frame of the next segment as well.
@@ -110,7 +110,7 @@ def apply_join(end: End, positions: np.ndarray, join: int) -> None:
 
 
 class ErrorPrice:
-    """What a larger error costs a level without corrections, in ticks. rms: the level's error over so many frames;
+    """Cost, in ticks, of a larger error of a level without corrections. rms: the level's error over so many frames;
     most_rms: the error of the level before."""
 
     def __init__(self, rms: float, most_rms: float, frames: int):
@@ -127,7 +127,7 @@ class ErrorPrice:
 
 
 class CorrectionPrice:
-    """What positions beyond a limit, one or (N,), cost in corrections, in ticks; bytes_: of those vertices, up to the
+    """Cost, in ticks, of correcting positions beyond a limit, one or (N,); bytes_: of those vertices, up to the
     level."""
 
     def __init__(self, limit: float | np.ndarray, bytes_: float):

@@ -26,11 +26,12 @@ from athcodec.encoding.survey import Ath, Survey
 from athcodec.errors import BoundError
 from athcodec.motion.thresholds import Thresholds
 
-CUBES, LATTICE = False, True  # What positions are rounded to.
+CUBES, LATTICE = False, True  # Positions are rounded to one of these.
 REST_STEPS = (0.5, 0.25, 0.125, 1.15)  # Steps of the rest pose that are tried, in bounds.
 STEPS = (0.999, 0.97, 0.9, 0.75, 0.5, 0.3)  # Steps tried, over the largest that reaches every point in the limit.
 TRIAL_SEGMENTS, TRIAL_FRAMES = 3, 64  # Segments of a trial, and frames of each that show whether it may pay.
-STILL, FINE_STILL = 0.35, 0.25  # Errors, in limits, whose second differences are at most 1.4 limits, or one.
+STILL = 0.35  # Largest error, in limits, whose second differences stay within 1.4 limits.
+FINE_STILL = 0.25  # Largest error, in limits, whose second differences stay within one limit.
 FINE = 9e-4  # Bound, in diagonals, below which second differences are held to one limit.
 UNSEEN, INVISIBLE = 1e-5, 1e-6  # Bounds, in diagonals, below which twitches count for less, and for nothing.
 TWITCHING = 0.02  # Share of the vertices that may twitch in any frame.

@@ -133,19 +133,18 @@ def _by_attributes(seen: Seen, root: int | None) -> Found | None:
     """Find branches by labels under a usual name, for vertices or faces, and their parents if the source has those
     too."""
     clip = seen.clip
-    named = {name.lower().rsplit("/", 1)[-1].replace("primvars:", ""): array for name, array in clip.attributes.items()}
-    labels = next(
-        (label for label in (_vertex_labels(clip, named.get(name)) for name in LABEL_NAMES) if label is not None), None
-    )
+    source = {name.lower().rsplit("/", 1)[-1].replace("primvars:", ""): name for name in clip.attributes}
+    named = {name: clip.attributes[original] for name, original in source.items()}
+    candidates = ((name, _vertex_labels(clip, named.get(name))) for name in LABEL_NAMES)
+    taken, labels = next(((name, label) for name, label in candidates if label is not None), ("", None))
     if labels is None:
         return None
     names, vertex_branch = np.unique(labels, return_inverse=True)
-    parents = next((named[name] for name in PARENT_NAMES if name in named), None)
+    parents, parent = next((named[name] for name in PARENT_NAMES if name in named), None), None
     if parents is not None and parents.ndim == 1 and parents.dtype.kind in "iu" and len(parents) > names.max():
         above = parents[names].astype(np.int64)
         parent = np.where(np.isin(above, names), np.searchsorted(names, above).clip(0, len(names) - 1), -1)
-        return arranged(seen, vertex_branch, root, "attributes", parent)
-    return arranged(seen, vertex_branch, root, "attributes")
+    return dataclasses.replace(arranged(seen, vertex_branch, root, "attributes", parent), taken=source[taken])
 
 
 def _vertex_labels(clip: MotionClip, array: np.ndarray | None) -> np.ndarray | None:

@@ -21,11 +21,12 @@ PRECISION = 1e-7  # Part of the diagonal, and of the distance from the origin, b
 USUAL, ALIKE = 0.25, 30.0  # Links are steady up to ALIKE times this quantile of all points' steadiest ones.
 STEADY = 0.05  # Largest change of a steady link's length over its ends' motion against each other.
 PLIANT = 3.0  # Times that quantile, below which the shorter of two links is the better.
-UNSTEADY, UNLIKE = 0.2, 4.0  # Largest change of a link whose alternatives are UNLIKE times as unsteady.
+UNSTEADY = 0.2  # A loose point is linked only if the link's length changes by less than this part.
+UNLIKE = 4.0  # Its other links must change more than this many times as much.
 OFF_LINE = 0.5  # Part of a link's length that a still point behind it may be off its line.
 CROWD = 1.5  # Part of the length of a point's links within which other steady points are no neighbours on a run.
 CROWDED = 0.25  # Such pairs for each point that make the points a sheet or a body.
-JOINED = 0.5  # Least part of the points that is on runs.
+JOINED = 0.5  # Smallest share of the points that must be linked; with fewer, the points form no runs.
 PAIRS_AT_ONCE = 1 << 13
 
 

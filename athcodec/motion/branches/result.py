@@ -24,19 +24,23 @@ class Found:
         The place of each vertex on its stem, as in MotionClip.
     method : str
         How they were found: "attributes", "skeleton", "edges", "components", "runs", "motion", or "file".
+    taken : str, optional
+        The name of the array that was taken for the numbers of branches.
     """
 
     vertex_branch: np.ndarray
     branch_parent: np.ndarray
     stem_index: np.ndarray | None
     method: str
+    taken: str = ""
 
     def __str__(self) -> str:
         orders = branch_orders(self.branch_parent)
         roots = int((self.branch_parent < 0).sum())
         sizes = np.bincount(self.vertex_branch)
+        method = f"{self.method} ({self.taken})" if self.taken else self.method
         return (
-            f"{len(sizes):,} branch{'es' * (len(sizes) != 1)} by {self.method}: {roots:,} without a parent, "
+            f"{len(sizes):,} branch{'es' * (len(sizes) != 1)} by {method}: {roots:,} without a parent, "
             f"up to order {orders.max()}, {sizes.min():,} to {sizes.max():,} vertices each"
         )
 

@@ -1,4 +1,4 @@
-"""What the methods that find branches look at in a clip: positions in a few frames, and links between vertices."""
+"""Observations for the methods that find branches: positions in a few frames, and links between vertices."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ WELD = 1e-6  # Part of the diagonal; vertices that stay closer are one vertex of
 
 
 class Seen:
-    """What the methods look at in a clip, each computed once, when it is asked for."""
+    """Observations of a clip, each computed once, when it is asked for."""
 
     def __init__(self, clip: MotionClip):
         self.clip = clip

@@ -467,7 +467,7 @@ export class ATHMotion extends EventDispatcher {
   /** The vertices of the picture that is shown, 3 numbers each, in source order: what the shader makes of the texture; null
    * where none is shown yet. */
   uploaded() {
-    if (this.#moved || this.level < 0) return this.#moved;
+    if (this.#moved || !this.uniforms.athData.value) return this.#moved;
     const { data } = this.uniforms.athData.value.image, { rest } = this.#channel, { vertices } = this.#known;
     const out = this.#moved = new Float32Array(rest.length);
     for (let vertex = 0, i = 0; vertex < vertices.length; vertex++) {
@@ -516,7 +516,8 @@ export class ATHMotion extends EventDispatcher {
     if (this.mode === "positions") return;
     for (const geometry of this.#geometries) setRest(geometry, this.#channel.rest);
     this.#moved = null;
-    if (this.level >= 0) this.#setBounds(this.uniforms.athData.value.image.data);
+    const texture = this.uniforms.athData.value; // After a change of the mode there is none until the next picture.
+    if (texture) this.#setBounds(texture.image.data);
   }
 
   detach(geometry) {

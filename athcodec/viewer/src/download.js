@@ -1,4 +1,4 @@
-// The download of a file: its front, then what the views want of the clips that they play, the playhead's surroundings first.
+// Download fetches a file: the front, then what the views want of the clips that they play, first what comes next.
 
 import { AthFile } from "../ath_decoder.mjs";
 import { clipAt, segmentAt } from "./frames.js";
@@ -17,18 +17,18 @@ export class Download {
   #front = new Uint8Array(0);
   #hasFront; #reading;    // Reading ends with the front or, without ranges, with the file.
   #firstFrame;            // Before there is a view, the clip of this frame is fetched.
-  #came = 0;              // bytes from the file's beginning on
+  #came = 0;              // bytes that are here from the beginning of the file on, without a gap
   #underway = new Set();  // Ranges that are being fetched.
   #speed = 0;             // bytes a second
   #hasAttributes = false; // All named arrays that can be had are here.
   #everything = false;    // All bytes are wanted, whatever the views show.
   #whole = false;         // All bytes are here.
   #stopped = false;       // No more bytes come.
-  #cut = new Set();       // offsets of ranges that the end of the file cuts, once they have been asked for
+  #cut = new Set();       // The end of the file cuts the ranges at these offsets, which have been asked for.
   #ended = false;         // The session knows that the file is too short.
   #wakes = [];            // Lanes that wait.
 
-  /** tell: functions that are called when bytes `came` (true: the last of a request), `attributes` can be read, it has `stopped`. */
+  /** tell: functions to call when bytes `came` (true: a request's last), `attributes` can be read, the download has `stopped`. */
   constructor(source, hostMesh, views, tell) {
     this.#source = source;
     this.#hostMesh = hostMesh;
@@ -52,7 +52,7 @@ export class Download {
     } catch (error) {
       this.#stop(error);
     }
-    await Promise.all(Array.from({ length: LANES }, () => this.#lane()));
+    for (let lane = 0; lane < LANES; lane++) this.#lane();
   }
 
   /** Looks again at what is wanted, as views have changed or, behind what they want, everything is from now on. */
@@ -80,7 +80,7 @@ export class Download {
       await this.#source.read(have, needed - have, (bytes, offset) => this.#take(bytes, offset));
       if (this.#file) return;
       if (this.#front.length === 0) throw new LoadError("NOT_AN_ATH_FILE: got no bytes", "NOT_AN_ATH_FILE");
-      if (this.#front.length < needed) AthFile.open(this.#front); // throws what is missing
+      if (this.#front.length < needed) AthFile.open(this.#front); // This throws what is missing.
       needed = Math.max(AthFile.front(this.#front).needed, this.#front.length + 1);
     }
   }
@@ -91,7 +91,7 @@ export class Download {
     if (this.#file) {
       this.#file.feed(bytes, offset);
       this.look();
-      this.#tell.came(false);
+      this.#tell.came();
       return;
     }
     if (offset > this.#front.length || offset + bytes.length <= this.#front.length) return;
@@ -101,7 +101,7 @@ export class Download {
     this.#front = front;
     if (!AthFile.front(front).ready) return;
     this.#file = AthFile.open(front, { hostMesh: this.#hostMesh });
-    this.#front = new Uint8Array(0);
+    this.#front = null;
     this.#hasFront(this.#file);
   }
 
@@ -158,24 +158,24 @@ export class Download {
 
   // Returns the next range to ask for; null: none for now.
   #next() {
-    if (this.#source.ranged === false) return null; // everything came with the first request
+    if (this.#source.ranged === false) return null; // Everything came with the first request.
     const most = Math.min(MOST_REQUEST, Math.max(LEAST_REQUEST, this.#speed * REQUEST_SECONDS));
     let request = null;
     for (const { offset, size } of this.#wanted()) {
-      const from = Math.max(offset, Math.min(this.#came, offset + size)); // the beginning of a chunk may be here
+      const from = Math.max(offset, Math.min(this.#came, offset + size)); // The beginning of a chunk may be here.
       const end = Math.min(offset + size, this.#source.total ?? Infinity), cut = end < offset + size;
       const isUnderway = [...this.#underway].some((other) => from < other.offset + other.size && other.offset < end);
       const left = from < end && !(cut && this.#cut.has(offset)) && !isUnderway;
       if (request && (!left || from !== request.offset + request.size)) break;
       if (!left) continue;
       if (cut && !request) this.#cut.add(offset);
-      request = { offset: request?.offset ?? from, size: end - (request?.offset ?? from) };
+      (request ??= { offset: from }).size = end - request.offset;
       if (request.size >= most) break;
     }
     return request;
   }
 
-  // Missing ranges in the order in which they are wanted.
+  // Yields missing ranges in the order in which they are wanted.
   * #wanted() {
     const wishes = this.#wishes();
     for (const { soon, level } of wishes) yield* this.#missing(soon, 0, Math.min(1, level));

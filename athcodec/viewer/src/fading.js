@@ -3,7 +3,7 @@
 import { AthFade } from "../ath_decoder.mjs";
 
 export class Fading extends AthFade {
-  #at = 0;      // when it was asked for last, milliseconds
+  #at = 0;      // milliseconds: when a level was asked for last
   tracks = [];  // For each frame that is shown {frame, held}, see Mixing's #terms.
 
   /** The level that is gone to, -1 before there is one. */

@@ -1,4 +1,4 @@
-// Decoding of segments in short steps, what the views show first. Decoded ones are kept up to a limit, for pictures to be made of.
+// Jobs decodes segments in short steps, first what the views show. It keeps them up to a limit, and pictures are made of them.
 
 import { around, clipAt, segmentAt } from "./frames.js";
 import { pause } from "./pause.js";
@@ -8,8 +8,8 @@ const MOST_PREPARED = 256 << 20; // Largest size of the decoded segments that ar
 
 export class Jobs {
   #file; #views; #firstSegment; #signal; #tell;
-  #prepared = new Map(); // {"segment/level": Segment}, the most recently used last
-  #failed = new Set();   // "segment/level" that need a damaged chunk
+  #prepared = new Map(); // {"segment/level": Segment}: the most recently used is the last.
+  #failed = new Set();   // These "segment/level" need a damaged chunk.
   #busy = false;
   #goingOnFrom = null;   // The preparation under way reads this segment.
 
@@ -44,7 +44,7 @@ export class Jobs {
     return [...this.#jobs()].find(([segment, level]) => level >= 0 && !this.#prepared.has(`${segment}/${level}`));
   }
 
-  // Segments and levels to decode: what the views show, what that blends into, what comes next; at first what a view begins with.
+  // Yields segments and levels to decode: what the views show, what it blends into, what comes next; at first what a view begins with.
   * #jobs() {
     if (this.#views.size === 0 && this.#prepared.size === 0) yield [this.#firstSegment, this.readyLevel(this.#firstSegment)];
     const shown = [...this.#views.values()].flatMap(({ level, frames }) => frames.map((frame) => {
@@ -96,7 +96,7 @@ export class Jobs {
     for (let s = 0; chunk && s < segmentCount; s++)
       for (let l = bad; l < levelCount; l++)
         if (file.ranges(l, s, s, true).some(({ offset, size }) => offset <= chunk.offset && chunk.offset < offset + size)) this.#failed.add(`${s}/${l}`);
-    if (this.#failed.size > known) this.#tell.damaged(segment, bad, error);
+    this.#tell.damaged(segment, bad, error, this.#failed.size > known);
   }
 
   #keep(segment) {
@@ -164,7 +164,7 @@ export class Jobs {
     const [index, next] = around(this.#file, frame).map((segment) => (this.readyLevel(segment) < level ? -1 : segment));
     if (index < 0) return null;
     try {
-      return { frame, level, segments: [this.#now(index, level), next >= 0 ? this.#segment(next, level) : null] };
+      return { frame, level, segments: [this.#now(index, level), this.#segment(next, level)] };
     } catch (error) {
       this.#damaged(index, level, error);
       return null;

@@ -1,4 +1,4 @@
-// What a picture is the sum of: levels and clips that fade over, or shares of clips for a wind, which ease in and out.
+// A picture is a sum: of levels and clips that fade over, or of shares of clips for a wind, which ease in and out.
 
 import { Fading } from "./fading.js";
 import { clipAt, segmentAt } from "./frames.js";
@@ -11,7 +11,7 @@ const LOOKED_AWAY = 1; // Seconds without a picture, after which weights are at 
 export function sharesOf(file, winds, { wind, places, clip, seconds, wrap }) {
   if (wind)
     return file.windWeights(winds, ...wind).flatMap((weight, index) =>
-      (weight > 0 ? [{ weight, clip: index, frame: file.frameAt(seconds, wrap, index) }] : []));
+      (weight > 0 ? { weight, clip: index, frame: file.frameAt(seconds, wrap, index) } : []));
   return places?.length > 1 ? places.map((place) => ({ weight: place.weight, frame: file.frameAt(place.seconds, wrap, clip) })) : null;
 }
 
@@ -26,11 +26,11 @@ export function sumOf([first, ...others], numbersOf) {
   return numbers;
 }
 
-/** What one view has shown last, and how it goes on from there. */
+/** One view's last picture, and how it goes on from there. */
 export class Mixing {
   #file; #jobs;
   fading = new Fading();
-  last = null; // {shares, at} that were shown last and when, milliseconds; null: one clip was shown alone
+  last = null; // {shares, at}: the shares that were shown last and when, in milliseconds; null: one clip was shown alone.
 
   constructor(file, jobs) {
     this.#file = file;
@@ -46,7 +46,7 @@ export class Mixing {
     const leaving = (before?.shares ?? []).filter((share) => part < 1 && !wanted.some(same(share)) && share.weight * (1 - part) > GONE);
     const old = leaving.flatMap((share) => {
       const there = this.#jobs.decoded(this.#file.frameAt(seconds, wrap, share.clip), share.level);
-      return there ? [{ ...there, clip: share.clip, weight: share.weight * (1 - part) }] : [];
+      return there ? { ...there, clip: share.clip, weight: share.weight * (1 - part) } : [];
     });
     const arrived = wanted.map((share) => {
       const weight = before?.shares.find(same(share))?.weight ?? 0;

@@ -39,7 +39,7 @@ export class Presence {
     if (!this.#wholes.has(geometry)) this.#wholes.set(geometry, index.array.slice());
     const whole = this.#wholes.get(geometry), isHidden = new Uint8Array(Math.max(0, ...hidden.map(({ stop }) => stop)));
     for (const { first, stop } of hidden) isHidden.fill(1, first, stop);
-    for (let i = 0; i < whole.length; i++) { // what is hidden becomes a point
+    for (let i = 0; i < whole.length; i++) { // Hidden parts become a point.
       const first = whole[i - i % step];
       index.array[i] = isHidden[source[first]] ? first : whole[i];
     }

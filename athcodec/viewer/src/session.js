@@ -1,5 +1,5 @@
-// One file in a worker: a message of the page calls the method of its type, and the page is told by `post`. A session knows the
-// views; bytes are fetched by Download, decoded by Jobs, mixed by Mixing and packed for the GPU by Texels.
+// A session is one file in a worker: a message of the page calls the method of that name, and `post` answers. It knows the views;
+// bytes are fetched by Download, decoded by Jobs, mixed by Mixing and packed for the GPU by Texels.
 
 import { Download } from "./download.js";
 import { clipAt } from "./frames.js";
@@ -14,8 +14,8 @@ const STATE_MS = 50; // Least time between two messages about the state.
 export class Session {
   #post; #clip; #download;
   #file; #texels; #jobs;  // These are there once the file's front is.
-  #views = new Map();     // {id: {level, frames, wanted, ahead, mixing}}, see #view
-  #winds;                 // {strength, heading} of each clip, null: it has none
+  #views = new Map();     // {id: {level, frames, wanted, ahead, mixing}}: #view explains them.
+  #winds;                 // {strength, heading} for each clip; null: it has none.
   #known = new Set();     // The page knows the parts of these levels.
   #stateAt = 0; #stateTimer = 0;
   #closing = new AbortController();
@@ -27,7 +27,7 @@ export class Session {
     this.#download = new Download(source, hostMesh, this.#views, {
       came: (complete) => {
         if (!this.#jobs) return;
-        this.#refine(this.#file.readyLevel(0)); // What level 0 looks like does not depend on the order of events.
+        this.#refine(this.#file.readyLevel(0)); // The look of level 0 must not depend on the order of events.
         this.#jobs.run();
         this.#state(complete);
       },
@@ -65,8 +65,8 @@ export class Session {
     this.#jobs = new Jobs(file, this.#views, clips[first].firstSegment, this.#closing.signal, {
       kept: ({ level }) => this.#refine(level),
       decoded: (segment, level) => this.#post({ type: "decoded", segment, level }),
-      damaged: (segment, level, error) => {
-        this.#post({ type: "damaged", segment, level, ...describe(error) });
+      damaged: (segment, level, error, isNews) => {
+        if (isNews) this.#post({ type: "damaged", segment, level, ...describe(error) });
         this.#state(true);
       },
     });
@@ -93,7 +93,7 @@ export class Session {
     }
   }
 
-  // Tells the page, not at every piece.
+  // Tells the page, but not at every piece.
   #state(now) {
     const wait = now ? 0 : this.#stateAt + STATE_MS - performance.now();
     if (wait > 0) {
@@ -137,10 +137,12 @@ export class Session {
       Object.assign(answer, this.#answer(message));
     } catch (error) {
       Object.assign(answer, describe(error));
-      if (!exactly) answer.message = `picture of clip ${clip} at ${seconds} s, level ${level}: ${answer.message}`;
-      if (!exactly) this.drop(message);
       try {
-        if (!exactly) Object.assign(answer, this.#answer({ ...message, old: null, heat: false, buffer: null }));
+        if (!exactly) {
+          answer.message = `picture of clip ${clip} at ${seconds} s, level ${level}: ${answer.message}`;
+          this.drop(message);
+          Object.assign(answer, this.#answer({ ...message, old: null, heat: false, buffer: null }));
+        }
       } catch {
         // The answer holds an error already.
       }
@@ -163,18 +165,18 @@ export class Session {
       ? (term) => file.positions(term.segments, term.frame, { fade: term.fade })
       : (term, i) => this.#texels.pack(term, cut, i === 0 ? buffer : null));
     return { shown: cut, frame: shown.frame, fading: mixing.fading.underWay, clip: file.clips.indexOf(clipAt(file, shown.frame)),
-      held: file.held, whole: positions, data, ...(heat ? { heat: this.#distances(shown) } : {}) };
+      held: file.held, whole: positions, data, ...(heat && { heat: this.#distances(shown) }) };
   }
 
   // Each share is shown at the deepest level that is decoded of it; those of which nothing is are left out.
   #ofShares(message, used) {
     const { view, clip, seconds, wrap, level, exactly, aside, positions = false, buffer, coarsely } = message;
-    const file = this.#file, jobs = this.#jobs, shares = [], frame = file.frameAt(seconds, wrap, clip), frames = used.map((share) => share.frame);
+    const file = this.#file, jobs = this.#jobs, frame = file.frameAt(seconds, wrap, clip), frames = used.map((share) => share.frame);
     if (!aside) this.#view(message, frames, frames);
-    for (const share of used) {
+    const shares = used.flatMap((share) => {
       const shown = exactly ? jobs.exactly(share.frame, level) : jobs.show(share.frame, coarsely ? 0 : level);
-      if (shown) shares.push({ ...share, ...shown });
-    }
+      return shown ? { ...share, ...shown } : [];
+    });
     if (shares.length === 0) return { frame };
     const mixing = this.#mixing(view), eases = message.wind && !exactly && !aside, shown = Math.min(...shares.map((share) => share.level));
     const mixed = eases ? mixing.eased(message, shares) : { shares, fading: false }, xyz = file.blended(mixed.shares);
@@ -191,7 +193,7 @@ export class Session {
     return mixing.change(frame, coarsely ? 0 : level, old);
   }
 
-  // How far the shown position of each vertex is from that of the deepest level that is here.
+  // Returns how far the shown position of each vertex is from the position at the deepest level that is here.
   #distances({ frame, segments }) {
     const file = this.#file, deepest = this.#jobs.show(frame, file.info.levelCount - 1);
     const [a, b] = [segments, deepest.segments].map((each) => file.positions(each, frame));
@@ -210,7 +212,7 @@ export class Session {
     }
   }
 
-  /** The GPU form of a level or, with `segment`, of a segment at it and which of its coded frames shows each of its frames. */
+  /** Tells the GPU form of a level or, with `segment`, of a segment at it and which of its coded frames shows each of its frames. */
   gpu({ id, level, segment = null }) {
     const file = this.#file, answer = { type: "gpu", id, words: null, coded: null };
     try {
@@ -225,9 +227,9 @@ export class Session {
     this.#post(answer, [answer.words, answer.coded]);
   }
 
-  /** What each clip counts for a wind. */
+  /** Answers with the weight of each clip for a wind. */
   wind({ id, strength, heading }) {
-    this.#post({ type: "wind", id, weights: Array.from(this.#file.windWeights(this.#winds, strength, heading)) });
+    this.#post({ type: "wind", id, weights: this.#file.windWeights(this.#winds, strength, heading) });
   }
 
   all() {
@@ -246,7 +248,7 @@ export class Session {
   }
 }
 
-// The clips with their numbers, and for every level the error and the one at the seam.
+// Returns the clips with their numbers, and for every level the error and the one at the seam.
 function clipsOf(file) {
   const levels = Array.from({ length: file.info.levelCount }, (_, level) => level);
   return file.clips.map((clip, index) => ({
@@ -255,7 +257,7 @@ function clipsOf(file) {
   }));
 }
 
-// Numbers that are none do not name a wind.
+// A clip has a wind only if both are numbers.
 function windOf({ strength, heading = 0 }) {
   return Number.isFinite(strength) && Number.isFinite(heading) ? { strength, heading } : null;
 }

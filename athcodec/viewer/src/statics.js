@@ -151,6 +151,6 @@ function checkPolygons({ face_vertex_counts: counts, face_vertex_indices: indice
 }
 
 /** The chunks, all or those of a kind, that are not here, as ranges. */
-export function missingChunks(file, only = null) {
+export function missingChunks(file, only) {
   return file.chunks().filter(({ kind, fed }) => !fed && kind === (only ?? kind)).map(({ offset, length }) => ({ offset, size: length }));
 }

@@ -1,4 +1,4 @@
-// Textures for the GPU: matrices of nodes, then exact vertices, with the rotations of their normals where the mesh has faces.
+// Texels fills textures for the GPU: nodes' matrices, then exact vertices, with rotations of normals where the mesh has faces.
 
 import { normals, turns } from "./normals.js";
 import { pause } from "./pause.js";
@@ -36,7 +36,7 @@ export class Texels {
       this.#restNormals = null;
       return this.rest = this.#file.levelRest(1);
     } catch {
-      return null; // damaged: levels that need it will say so
+      return null; // The chunk is damaged: levels that need it will say so.
     }
   }
 

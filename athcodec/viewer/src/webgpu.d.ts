@@ -59,9 +59,9 @@ export class ATHForest extends Group {
   setInstances(instances: ForestInstance[]): this;
   /** Seconds in which two thirds of a change of weights have happened (default 0.2); 0: at once. */
   ease: number;
-  /** Shows these clips at once in place of each instance's own, by their weights: on the card, before branches are placed, so that
-   * they stay attached and keep their lengths. null: each its own again. A clip counts once its bytes are here. Throws RangeError
-   * where a clip is not there or no weight is above 0. */
+  /** Shows a weighted blend of these clips in place of each instance's own. The card blends them before it places branches, which
+   * therefore stay attached and keep their lengths. null: each instance shows its own clip again. A clip takes part as soon as its
+   * bytes have arrived. Throws RangeError if a clip does not exist or no weight is above 0. */
   blend(weights: Record<string, number> | null): this;
   /** Blends up to four clips for a wind: those whose own strength and heading (metadata "strength" and "heading", degrees) are
    * nearest, as ATHMotion.wind() does. Where no clip names a wind, the first is shown. Rejects with RangeError where a number is

@@ -46,7 +46,7 @@ export class ATHForest extends Group {
   readonly count: number;
   /** Plants that are computed: one of each clip and phase in use. */
   readonly plantCount: number;
-  /** Of each of them the name of its clip and its phase, 0 to 1 of the clip. */
+  /** For each of them: the name of its clip and its phase, 0 to 1 of the clip. */
   readonly plants: [string, number][];
   /** Names of the clips that are shown, or will be once they are here. */
   readonly clips: string[];
@@ -59,9 +59,9 @@ export class ATHForest extends Group {
   setInstances(instances: ForestInstance[]): this;
   /** Seconds in which two thirds of a change of weights have happened (default 0.2); 0: at once. */
   ease: number;
-  /** Shows these clips at once in place of each instance's own, by their weights: on the card, before branches are placed, so that
-   * they stay attached and keep their lengths. null: each its own again. A clip counts once its bytes are here. Throws RangeError
-   * where a clip is not there or no weight is above 0. */
+  /** Shows a weighted blend of these clips in place of each instance's own. The card blends them before it places branches, which
+   * therefore stay attached and keep their lengths. null: each instance shows its own clip again. A clip takes part as soon as its
+   * bytes have arrived. Throws RangeError if a clip does not exist or no weight is above 0. */
   blend(weights: Record<string, number> | null): this;
   /** Blends up to four clips for a wind: those whose own strength and heading (metadata "strength" and "heading", degrees) are
    * nearest, as ATHMotion.wind() does. Where no clip names a wind, the first is shown. Rejects with RangeError where a number is
@@ -73,7 +73,7 @@ export class ATHForest extends Group {
    * the file's own, radians, whatever the angle of an instance; null (default): each blows as it is turned itself. A turned motion
    * keeps no lengths where it is large. */
   sway(strength: number, heading?: number | null): this;
-  /** What is shown at `seconds`: once per frame, before rendering. height: of the screen, in pixels. */
+  /** Shows `seconds`: to be called once per frame, before rendering. height: the screen's, in pixels. */
   update(camera: Camera, height: number, seconds: number): void;
   /** Instances drawn by the last update(), by level: read back. */
   drawn(): Promise<number[]>;

@@ -50,7 +50,7 @@ export class ATHLoader extends Loader<ATH> {
   load(url: string, onLoad: (ath: ATH) => void, onProgress?: (event: ProgressEvent) => void,
        onError?: (error: unknown) => void): void;
   loadAsync(url: string, onProgress?: (event: ProgressEvent) => void): Promise<ATH>;
-  /** The same of a whole file in memory, or the front of one: a buffer, shared or not, or any view of one. It stays as it is. */
+  /** Opens a whole file in memory, or the front of one: a buffer, shared or not, or any view of one. It stays as it is. */
   parse(buffer: ArrayBufferLike | ArrayBufferView, onLoad: (ath: ATH) => void, onError?: (error: unknown) => void): void;
   parseAsync(buffer: ArrayBufferLike | ArrayBufferView): Promise<ATH>;
   /** Ends all downloads of this loader, as `abort()` of its manager does. What has no picture yet fails, "AbortError"; all else
@@ -60,9 +60,9 @@ export class ATHLoader extends Loader<ATH> {
   dispose(): this;
 }
 
-/** What is wrong with a file or its way here. */
+/** The fault of a file or of its way here. */
 export interface ATHFailure extends Error {
-  /** Of FORMAT.md, "Errors", "MISSING" where the file ends too early, or "HTTP", "NETWORK", "CHANGED", "WORKER", "CLIP",
+  /** A name of FORMAT.md, "Errors", "MISSING" where the file ends too early, or "HTTP", "NETWORK", "CHANGED", "WORKER", "CLIP",
    * "AbortError" after abort(), "CLOSED" after dispose(). */
   readonly codeName: string;
 }
@@ -134,7 +134,7 @@ export interface ATHMotionEvents {
   clip: { clip: ATHClip };
   /** Bytes came. */
   progress: { loaded: number; total: number };
-  /** What can be shown changed: see ready(). */
+  /** More or less can be shown now: see ready(). */
   ready: {};
   /** No more bytes come; what is here goes on playing. */
   stopped: { message: string; codeName: string };
@@ -146,7 +146,7 @@ export interface ATHMotionEvents {
 }
 
 export class ATHMotion extends EventDispatcher<ATHMotionEvents> {
-  /** Of the file: see AthInfo in ath_decoder.d.ts. */
+  /** Facts of the file: see AthInfo in ath_decoder.d.ts. */
   readonly info: { vertexCount: number; branchCount: number; frameCount: number; segmentCount: number; levelCount: number;
     depthLevels: number; fileLength: number; maxError: number; [name: string]: unknown };
   /** At least one. */
@@ -172,7 +172,7 @@ export class ATHMotion extends EventDispatcher<ATHMotionEvents> {
   /** Seconds until the clip repeats (in a loop the last frame blends into the first) or, where it does not, ends. */
   readonly duration: number;
   readonly levelCount: number;
-  /** What a level is, for people: "depth 1" shows branches down to an order, "all branches" or "layer 2 of 3" all of them,
+  /** Describes a level for people: "depth 1" shows branches down to an order, "all branches" or "layer 2 of 3" all of them,
    * the further the layer the more precisely; "lossless". */
   levelName(level: number): string;
 
@@ -190,7 +190,7 @@ export class ATHMotion extends EventDispatcher<ATHMotionEvents> {
    * here or not decoded yet is shown at the deepest level that is. */
   setLevel(level: number | "auto"): this;
   pixels: number;
-  /** Of the errors of all vertices the largest, the 99th percentile (default: single vertices that stray do not keep
+  /** A measure of the errors of all vertices: the largest, the 99th percentile (default: single vertices that stray do not keep
    * finer levels on the screen), or the root mean square. */
   measure: "max" | "p99" | "rms";
   /** Seconds that going from a level to another takes (default 0.2; 0: at once), by the clock: the two are blended, so that the
@@ -222,7 +222,7 @@ export class ATHMotion extends EventDispatcher<ATHMotionEvents> {
   heat: boolean;
   readonly distances: Float32Array | null;
 
-  /** What of the clip can be shown at a level, in seconds from its first frame. */
+  /** Returns the part of the clip that can be shown at a level, in seconds from its first frame. */
   ready(level: number): { start: number; end: number }[];
   /** The deepest level that is here for each segment of the clip, and for all of it; -1: none. */
   readonly readyLevels: Int8Array;
@@ -234,7 +234,7 @@ export class ATHMotion extends EventDispatcher<ATHMotionEvents> {
   readonly bytesFetched: number;
   readonly bytesTotal: number;
   readonly requests: number;
-  /** Of the clip: bytes up to a level; bits per second; error, in the file's units; how far off the step from a loop's
+  /** Figures of the clip: bytes up to a level; bits per second; error, in the file's units; how far off the step from a loop's
    * last frame to its first is, at most. */
   motionBytes(level: number): number;
   bitRate(level?: number): number;
@@ -280,7 +280,7 @@ export class ATHForest extends Group {
   constructor(ath: ATH, options?: {
     geometry?: BufferGeometry;
     material?: (isLines: boolean, level: number) => Material;
-    /** What its shadows are drawn with, where `castShadow` is set before the first bake(), as for `receiveShadow`. */
+    /** Material of its shadows, where `castShadow` is set before the first bake(), as for `receiveShadow`. */
     depthMaterial?: (() => Material) | null;
   });
   setInstances(instances: ATHInstance[]): void;
@@ -320,7 +320,7 @@ export class ATHLimbs extends Mesh {
 /** One colour, or linear red, green and blue of a vertex of the source. */
 export type LimbColor = ColorRepresentation | ((vertex: number) => [number, number, number]);
 
-/** The same as ATHMotion.bind(), by uniforms. */
+/** As ATHMotion.bind(), by uniforms. */
 export function injectMotion<T extends Material>(material: T, uniforms: Record<string, IUniform>, forest?: boolean): T;
 export function motionUniforms(): Record<"athData" | "athStride" | "athForest", IUniform>;
 /** GLSL for materials of one's own: vec3 athMoved(vec3 position, float athPart), vec3 athTurned(vec3 normal, float athPart). */

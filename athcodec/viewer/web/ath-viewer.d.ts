@@ -27,7 +27,7 @@ import { Camera } from "three";
 import { ATH, ATHForest, ATHLoader } from "athcodec-three";
 
 export class ATHViewerElement extends HTMLElement {
-  /** Of all elements: setDecoderPath() and the like hold for files that load later. */
+  /** The loader of all elements: setDecoderPath() and the like hold for files that load later. */
   static readonly loader: ATHLoader;
   src: string | null;
   paused: boolean;
@@ -37,7 +37,7 @@ export class ATHViewerElement extends HTMLElement {
   pause(): void;
   /** Null before the first picture. */
   readonly ath: ATH | null;
-  /** Of an element with the attribute: the trees, and each plant of the floor that is here. */
+  /** With the attribute: the trees, and each plant of the floor that is here. */
   readonly forests: ATHForest[];
   /** Another one each time that a lazy element comes into view. */
   readonly camera: Camera;

@@ -9,7 +9,7 @@ attribute vec4 athTurn; // cosine, sine, frame, the frame that its fraction lead
 #endif
 #ifdef ATH_FADING
 attribute float athPartBefore;
-attribute vec4 athFading; // the same two frames of the level before, its share
+attribute vec4 athFading; // These two frames at the level before, and its share.
 uniform highp sampler2D athDataBefore;
 uniform vec2 athBefore; // texels per frame, per exact vertex
 bool athIsBefore = false;
@@ -104,7 +104,7 @@ void main() {
   if (far) p = q;
   float pixel = (isOrthographic ? 1.0 : -p.z) * 2.0 / (projectionMatrix[1][1] * screen.y);
   float wide = max(far ? radiusOther : radius, 0.55 * pixel);
-  p.xy += wide * (across * position.y + vec2(across.y, -across.x) * (far ? -0.6 : 0.6)); // over the joints, where limbs bend
+  p.xy += wide * (across * position.y + vec2(across.y, -across.x) * (far ? -0.6 : 0.6)); // Joints, where limbs bend, are covered.
   gl_Position = projectionMatrix * p;
   vColor = far ? colorOther : color;
   vSide = position.y;
