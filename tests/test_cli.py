@@ -368,6 +368,25 @@ def test_wrong_usage_exits_with_2_and_says_how(line, capsys):
     assert "usage: athcodec" in capsys.readouterr().err
 
 
+def test_an_option_that_a_verb_does_not_know_shows_the_usage_of_the_verb(capsys):
+    with pytest.raises(SystemExit):
+        run("encode", "a.h5", "b.ath", "--max-eror", "1mm")
+    assert capsys.readouterr().err.startswith("usage: athcodec encode IN")
+
+
+@pytest.mark.parametrize("verb", ["info", "decode", "view", "verify", "picture"])
+def test_the_help_of_a_verb_names_standard_input_where_it_is_read(verb, tmp_path, monkeypatch, capsys):
+    with pytest.raises(SystemExit):
+        run(verb, "--help")
+    assert ("for standard input" in " ".join(capsys.readouterr().out.split())) == (verb in ("info", "decode"))
+
+
+def test_branch_plans_are_no_clips_and_say_what_they_are_for(tmp_path, capsys):
+    (tmp_path / "a.mtg").write_text("CODE: FORM-A\n")
+    assert run("encode", tmp_path / "a.mtg", tmp_path / "a.ath") == 1
+    assert "holds branches and no motion" in capsys.readouterr().err
+
+
 FAILURES = {
     "missing source": ("encode nowhere.h5 OUT", "nowhere.h5: No such file"),
     "missing file": ("decode nowhere.ath OUT", "nowhere.ath: No such file"),
@@ -375,8 +394,12 @@ FAILURES = {
     "nothing to verify": ("verify nowhere.ath", "nowhere.ath: No such file"),
     "nothing to compare": ("verify FILE --against nowhere.h5", "nowhere.h5: No such file"),
     "nothing to truncate": ("truncate nowhere.ath OUT --level 0", "nowhere.ath: No such file"),
-    "no HDF5": ("encode FILE OUT", "FILE: .*got an unknown format, expected one of .h5.*"),
-    "no .ath": ("info SOURCE", "SOURCE: .*expected"),
+    "an .ath file to encode": ("encode FILE OUT", "FILE: is an .ath file already; `athcodec decode`"),
+    "a folder to encode": (f"encode {Path(SAMPLE).parent} OUT", "is a folder, expected a file: .*`athcodec batch`"),
+    "a source to show": ("info SOURCE", r"SOURCE: is not an .ath file .it looks like HDF5.; use `athcodec encode`"),
+    "a source to truncate": ("truncate SOURCE OUT --level 0", "SOURCE: is not an .ath file .it looks like HDF5."),
+    "several to view": ("view FILE FILE --export a.html", "view: got 2 files, expected one; --export DIR"),
+    "no page": ("view FILE --export a.txt", "--export: got a.txt, expected PAGE.html, or a folder"),
     "no folder": ("encode SOURCE none/a.ath", "none/a.ath: the directory none does not exist"),
     "a folder": ("decode FILE .", "got a directory, expected a file name"),
     "onto itself": ("truncate FILE FILE --level 0", "FILE: is the input"),
@@ -563,7 +586,8 @@ def test_what_is_interrupted_leaves_nothing_behind(tmp_path, monkeypatch, capsys
         result = run("encode", SAMPLE, tmp_path / "a.ath", "--effort", "fast")
     except SystemExit as end:
         result = end.code
-    assert result == code and list(tmp_path.iterdir()) == [] and capsys.readouterr().err == ""
+    assert result == code and list(tmp_path.iterdir()) == []
+    assert capsys.readouterr().err == ("athcodec: interrupted, nothing written\n" if kind == signal.SIGINT else "")
 
 
 def test_an_interrupted_decode_leaves_nothing_behind(encoded, tmp_path, monkeypatch):

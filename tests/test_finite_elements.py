@@ -407,3 +407,11 @@ def test_damaged_legacy_files_are_refused_with_a_clip_error(tmp_path):
             meshio.vtk.write(tmp_path / f"r{frame}.vtk", meshio.Mesh(points_of_frame, cells), **how)
         refused = survives_damage(tmp_path / "r0.vtk", lambda: athcodec.read(tmp_path / "r1.vtk"), cuts=15, changes=30)
         assert refused > 12
+
+
+@pytest.mark.parametrize("suffix", ["pvd", "xdmf"])
+def test_a_series_without_any_data_stands_still(tmp_path, suffix):
+    clip = MotionClip(np.repeat(CUBE[None], 3, axis=0), np.arange(3) / 24)
+    athcodec.write(clip, tmp_path / f"a.{suffix}")
+    with athcodec.read(tmp_path / f"a.{suffix}") as again:
+        assert np.array_equal(again.block(0, 3), clip.positions)

@@ -324,7 +324,10 @@ def test_what_is_not_read_is_named_once(tmp_path, capsys):
     assert cli.main(["encode", str(tmp_path / "a.usda"), str(tmp_path / "a.ath")]) == 0
     [line] = [line for line in capsys.readouterr().err.splitlines() if "not read" in line]
     assert line.startswith(f"athcodec: not read: {tmp_path / 'a.usda'}: missing ")
-    assert line.endswith("Cube /root/box0, /root/box1; Material /root/bark; Camera /eye; attribute /root/grid.wet")
+    kept = "(names are kept for each face, contents only in a GLB by `encode --into`)"
+    assert line.endswith(
+        f"Cube /root/box0, /root/box1; Material /root/bark {kept}; Camera /eye; attribute /root/grid.wet"
+    )
 
 
 def test_arrays_that_change_in_a_single_frame_are_named_and_those_with_equal_samples_stay(tmp_path):
@@ -689,3 +692,15 @@ def test_other_files_are_refused_in_one_line(tmp_path):
         assert "\n" not in str(caught.value)
     with pytest.raises(FileNotFoundError):
         athcodec.read(tmp_path / "none.usd")
+
+
+def test_points_that_appear_are_refused_with_what_to_do(tmp_path):
+    stage = Usd.Stage.CreateNew(str(tmp_path / "a.usda"))
+    points = UsdGeom.Points.Define(stage, "/spores").GetPointsAttr()
+    for frame, count in enumerate((0, 4, 8)):
+        points.Set([(i, frame, 0) for i in range(count)], frame)
+    UsdGeom.Points.Define(stage, "/trunk").GetPointsAttr().Set([(0, 0, 0), (0, 5, 0)])
+    stage.Save()
+    with pytest.raises(ClipError, match=r"/spores: got 4 points in frame 1 .*appear or vanish .*--only"):
+        with athcodec.read(tmp_path / "a.usda") as clip:
+            clip.block(0, 3)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 from plants import awkward_plants
 
@@ -19,9 +19,14 @@ HOLDS_FLOAT64 = ("h5", "npz", "obj", "ply", "xdmf", "pvd")
 SETTINGS = settings(
     deadline=None, derandomize=True, database=None, suppress_health_check=list(HealthCheck), max_examples=6
 )
+BOUNDS = st.one_of(
+    st.tuples(st.just("--rel-error"), st.floats(1e-7, 1e-1).map(repr)),
+    st.tuples(st.just("--target-size"), st.sampled_from(["1kB", "3kB", "20kB"])),
+)
 OPTIONS = st.fixed_dictionaries(
-    {"--rel-error": st.floats(1e-7, 1e-1).map(repr), "--effort": st.just("fast")},
+    {"bound": BOUNDS, "--effort": st.just("fast")},
     optional={
+        "--loop": st.just("all"),
         "--ladder": st.sampled_from(["none", "1e-1,1e-2"]),
         "--rest": st.sampled_from(["first", "mean"]),
         "--segment-frames": st.sampled_from(["16", "20"]),
@@ -32,20 +37,31 @@ OPTIONS = st.fixed_dictionaries(
         "--up-axis": st.sampled_from("xz"),
     },
 )
-POWERS = st.floats(-30, 8)  # of ten, by which all is scaled
+PLACES = st.fixed_dictionaries(
+    {
+        "scale": st.floats(-30, 8).map(lambda power: 10.0**power),
+        "away": st.sampled_from([0.0, 0.0, 1e3, 1e7]),  # From the origin, in sizes of the plant.
+        "held": st.sampled_from([1, 1, 3]),  # Frames that show each pose.
+    }
+)
 REFUSALS = ("expected at least",)
 """For which a clip is not encoded."""
 READING = ("--unit", "--up-axis")
 
 
 def words_of(options: dict) -> list[str]:
-    return [word for name, value in options.items() for word in (name, value) if word is not None]
+    options = dict(options)
+    pairs = [options.pop("bound", (None, None)), *options.items()]
+    return [word for pair in pairs for word in pair if word is not None]
 
 
-def holds(folder, suffix: str, clip, scale: float, wide: bool, options: dict, capsys) -> None:
+def holds(folder, suffix: str, clip, place: dict, wide: bool, options: dict, capsys) -> None:
     dtype = np.float64 if wide and suffix in HOLDS_FLOAT64 else np.float32
-    positions = (clip.positions.astype(np.float64) * scale).astype(dtype)
-    made = athcodec.MotionClip(positions, clip.time, clip.vertex_branch, clip.branch_parent)
+    positions = clip.positions.astype(np.float64)
+    positions = (positions + place["away"] * np.ptp(positions, axis=(0, 1)).max()) * place["scale"]
+    assume(np.abs(positions).max() < 1e18)
+    positions = np.repeat(positions, place["held"], axis=0).astype(dtype)
+    made = athcodec.MotionClip(positions, np.arange(len(positions)) / 30, clip.vertex_branch, clip.branch_parent)
     for old in folder.iterdir():
         old.unlink()
     how = {"animation": "morphs"} if suffix == "glb" else {}
@@ -63,16 +79,16 @@ def holds(folder, suffix: str, clip, scale: float, wide: bool, options: dict, ca
 
 
 @SETTINGS
-@given(suffix=st.sampled_from(QUICK), clip=awkward_plants(), power=POWERS, wide=st.booleans(), options=OPTIONS)
-def test_a_fresh_file_is_as_close_to_its_source_as_it_says(suffix, clip, power, wide, options, capsys, tmp_path):
-    holds(tmp_path, suffix, clip, 10.0**power, wide, options, capsys)
+@given(suffix=st.sampled_from(QUICK), clip=awkward_plants(), place=PLACES, wide=st.booleans(), options=OPTIONS)
+def test_a_fresh_file_is_as_close_to_its_source_as_it_says(suffix, clip, place, wide, options, capsys, tmp_path):
+    holds(tmp_path, suffix, clip, place, wide, options, capsys)
 
 
 @pytest.mark.slow
 @settings(SETTINGS, max_examples=400)
-@given(suffix=st.sampled_from(FORMATS), clip=awkward_plants(), power=POWERS, wide=st.booleans(), options=OPTIONS)
-def test_so_is_every_other_of_any_format(suffix, clip, power, wide, options, capsys, tmp_path):
-    holds(tmp_path, suffix, clip, 10.0**power, wide, options, capsys)
+@given(suffix=st.sampled_from(FORMATS), clip=awkward_plants(), place=PLACES, wide=st.booleans(), options=OPTIONS)
+def test_so_is_every_other_of_any_format(suffix, clip, place, wide, options, capsys, tmp_path):
+    holds(tmp_path, suffix, clip, place, wide, options, capsys)
 
 
 # ---- the error table ----

@@ -26,6 +26,8 @@ from athcodec.files.shown import shown
 
 INTERRUPTED, BROKEN_PIPE, TERMINATED = 130, 141, 143
 """Exit codes: 128 and the number of the signal, as shells have it."""
+OUTCOMES = {"batch": "; the same command goes on from here", "view": "", "demo": ""}
+"""What an interrupted verb leaves, of those that do not write all they write at their end."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -42,6 +44,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             sys.stdout.flush()
         return code
     except KeyboardInterrupt:
+        print(f"athcodec: interrupted{OUTCOMES.get(args.verb, ', nothing written')}", file=sys.stderr)
         return INTERRUPTED
     except BrokenPipeError:
         # Whoever read stdout has left. What is still buffered goes nowhere, or Python complains at exit.

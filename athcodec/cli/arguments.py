@@ -35,14 +35,19 @@ WRITTEN = (
     "file to write, which replaces an older one of its kind when it is complete, and never an input or any other file; "
     "- is standard output, with encode and decode"
 )
-READ = (
-    "a file, - for standard input (decode and info), or a URL, http://, https:// or another that fsspec knows "
-    '(pip install "athcodec[remote]")'
-)
+READ = 'a file or a URL, http://, https:// or another that fsspec knows (pip install "athcodec[remote]")'
+READ_OR_PIPED = f"{READ}, or - for standard input"
 
 
 class _Parser(argparse.ArgumentParser):
     """Whose messages are shown as all others are: they quote arguments, such as names of files."""
+
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> tuple[argparse.Namespace, list[str]]:
+        """The arguments; of those that a verb does not know, it is the verb whose usage is shown."""
+        found, unknown = super().parse_known_args(args, namespace)
+        if unknown:
+            self.error(f"unrecognized arguments: {' '.join(unknown)}")
+        return found, unknown
 
     def _print_message(self, message: str, file: Any = None) -> None:
         super()._print_message(shown(message), file)
@@ -54,7 +59,8 @@ def make_parser() -> argparse.ArgumentParser:
     parser = _Parser(
         prog="athcodec",
         description="A codec for plant motion: levels of detail over its branches, within an error bound.",
-        epilog="athcodec VERB --help explains a verb. Exit codes: 0 done, 1 error or failed check, 2 usage.",
+        epilog="athcodec VERB --help explains a verb. Exit codes: 0 done, 1 error or failed check, 2 usage, "
+        "130 interrupted.",
         allow_abbrev=False,
     )
     parser.add_argument("--version", action="version", version=f"athcodec {athcodec.__version__}")
@@ -413,7 +419,7 @@ def _source_arguments(verb: argparse.ArgumentParser) -> None:
 
 
 def _decode_arguments(verb: argparse.ArgumentParser) -> None:
-    verb.add_argument("input", metavar="IN.ath", help=READ)
+    verb.add_argument("input", metavar="IN.ath", help=READ_OR_PIPED)
     verb.add_argument("output", metavar="OUT", help=f"{WRITTEN}; its suffix says the format, see `athcodec formats`")
     verb.add_argument("--format", metavar="NAME", help="write this format whatever the suffix")
     verb.add_argument(
@@ -523,7 +529,7 @@ def _hierarchy_arguments(verb: argparse.ArgumentParser) -> None:
 
 
 def _info_arguments(verb: argparse.ArgumentParser) -> None:
-    verb.add_argument("file", metavar="FILE.ath", help=READ)
+    verb.add_argument("file", metavar="FILE.ath", help=READ_OR_PIPED)
     verb.add_argument(
         "--motion",
         action="store_true",

@@ -21,10 +21,12 @@ from athcodec.errors import (
     GuessWarning,
     LevelUnavailable,
     NeedsHostMesh,
+    NotAnAthFile,
     RemoteError,
     SourceWarning,
 )
 from athcodec.files.atomic import check_target, file_ids, is_url, keeping
+from athcodec.files.kinds import kind_of
 from athcodec.files.reading import naming_file
 from athcodec.metrics import ErrorMeter, MotionMeter, SmoothnessMeter, compare_clips, level_meters
 from athcodec.motion.branches.result import with_branches as clip_with_branches
@@ -229,10 +231,21 @@ def naming(path: str | Path) -> Iterator[None]:
         with naming_file(path):
             yield
     except AthError as error:
+        if isinstance(error, NotAnAthFile) and (kind := _kind_of_source(path)):
+            hint = f"is not an .ath file (it looks like {kind}); use `athcodec encode` first"
+            raise NotAnAthFile(f"{path}: {hint}") from error
         if str(error).startswith(f"{path}: ") or isinstance(error, RemoteError):
             raise
         hint = "; --host-mesh names it" if isinstance(error, NeedsHostMesh) else ""
         raise type(error)(f"{path}: {error}{hint}") from error
+
+
+def _kind_of_source(path: str | Path) -> str:
+    """Return what a file looks like, if it is a source that can be encoded; else nothing."""
+    with suppress(AthError, OSError):
+        find_format(path)
+        return kind_of(path)
+    return ""
 
 
 def with_branches(clip: MotionClip, hierarchy: str | None) -> MotionClip:

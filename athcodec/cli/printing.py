@@ -120,7 +120,10 @@ def _print_facts(facts: dict[str, Any]) -> None:
     thresholds = ""
     if "epsilon" in ath:
         thresholds = f"; epsilon {ath['epsilon']:.2g}, eta {ath['eta']}, xi {ath['xi']:.2g}, lambda {ath['lam']}"
-    echo(f"ATH: depth {ath['depth']}, {counted(ath['nodes'], 'node')}, {ath['leaves']:,} of them leaves{thresholds}")
+    echo(
+        f"ATH: depth {ath['depth']}, {counted(ath['nodes'], 'node')}, "
+        f"{counted(ath['leaves'], 'leaf', 'leaves')} among them{thresholds}"
+    )
     unit = f" {facts['unit']}" if facts["unit"] else ""
     echo(f"Error bound: {facts['max_error_bound']:.4g}{unit}. {_size(facts)}")
     echo(f"Rest pose: {_rest(facts)}.")

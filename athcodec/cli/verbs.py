@@ -37,6 +37,7 @@ from athcodec.cli.clips import (
     with_sources,
 )
 from athcodec.cli.printing import (
+    counted,
     echo,
     facts_of,
     one_line,
@@ -63,6 +64,8 @@ from athcodec.options import DEFAULT_LADDER, DEFAULT_REL_ERROR, HOST, ladder_of
 
 if TYPE_CHECKING:
     from athcodec.exporters import Written
+
+ROUNDING_SHARE = 0.05  # Part of a level's error above which decode names what float32 adds to it.
 
 
 def encode(args: argparse.Namespace) -> int:
@@ -239,6 +242,13 @@ def _decode(args: argparse.Namespace, quiet: bool) -> int:
                 say("warning", f"{args.input}: decoded to level {motion.level}; {what_is_missing(decoder)}")
             if not quiet:
                 print_written(written, motion, decoder.levels[motion.level])
+        rounding, level_error = written.facts.get("rounding", 0.0), decoders[0].levels[motions[0].level].max_error
+        if rounding > ROUNDING_SHARE * level_error:
+            say(
+                "warning",
+                f"{args.output}: float32 moves positions by up to {rounding:.3g}, the level is off by "
+                f"{level_error:.3g}; .h5, .npz, .xdmf, .pvd, .obj and .ply keep float64",
+            )
         if lost := written.facts.get("not_written"):
             say("not written", f"{args.output}: {listed(lost)}")
     return 0
@@ -387,10 +397,12 @@ def view(args: argparse.Namespace) -> int:
     from athcodec.viewer import view
 
     if args.export and Path(args.export).suffix.lower() not in (".html", ".htm"):
+        if Path(args.export).suffix and not (args.export.endswith("/") or os.path.isdir(args.export)):
+            raise ClipError(f"--export: got {args.export}, expected PAGE.html, or a folder, such as {args.export}/")
         return _export_gallery(args)
     file, *more = args.files
     if more:
-        raise ValueError(f"got {len(args.files)} files, expected one, or --export DIR for a gallery")
+        raise ClipError(f"view: got {len(args.files)} files, expected one; --export DIR makes a gallery of several")
     floor = dict(args.floor or [])
     with naming(file):
         if args.export:
@@ -407,7 +419,7 @@ def _export_gallery(args: argparse.Namespace) -> int:
     from athcodec.viewer import gallery, picture
 
     if args.clip or args.host_mesh or args.floor:
-        raise ValueError("--export DIR: got --clip, --host-mesh or --floor, which are of pages with one file")
+        raise ClipError("--export DIR: got --clip, --host-mesh or --floor, which are of pages with one file")
     for file in args.files:
         with naming(file):
             gallery.facts_of(file)
@@ -415,7 +427,7 @@ def _export_gallery(args: argparse.Namespace) -> int:
     if not stills:
         say("warning", f"no still pictures: they need Chromium and {picture.INSTALL}")
     size = gallery.export_gallery(args.files, args.export, stills)
-    echo(f"{args.export}: {len(args.files)} plants, {size:,} bytes, for any web host")
+    echo(f"{args.export}: {counted(len(args.files), 'plant')}, {size:,} bytes, for any web host")
     return 0
 
 

@@ -57,6 +57,7 @@ from athcodec.motion.branches.result import Found, with_branches
 from athcodec.motion.clip import ERROR_WEIGHTS, MotionClip
 from athcodec.motion.hierarchy import Hierarchy, derived_edges, hierarchy_of
 from athcodec.motion.joining import split
+from athcodec.motion.neighbours import lost_neighbours
 from athcodec.motion.polygons import POLYGON_ARRAYS, Polygons, type_code
 from athcodec.motion.presence import parts_hidden_far_away
 from athcodec.motion.thresholds import THRESHOLDS, Thresholds
@@ -197,6 +198,9 @@ def time_chunk(*times: np.ndarray) -> bytes:
     return steady or writing.pack_time(streams.encode_times(np.concatenate(times).astype(np.float64)))
 
 
+MOST_LOST = 0.4  # Share of points that are far from their neighbours above which encoding warns.
+
+
 @dataclass
 class _Decided:
     """Settings that the streams of a file depend on, and what follows from them."""
@@ -259,6 +263,14 @@ class EncodingJob:
                     SourceWarning,
                     stacklevel=2,
                 )
+        if (lost := lost_neighbours(clip)) > MOST_LOST:
+            warnings.warn(
+                f"points: {lost:.0%} of the sampled points are far from their neighbour, more than a tenth of the "
+                "diagonal, so frames seem to list other points, as scans do, and the file will be large; expected "
+                "vertex i to be the same point of the plant in all frames: register the scans first",
+                SourceWarning,
+                stacklevel=2,
+            )
         seen = survey(clip, hierarchy, progress=lambda f: report("survey", f), pool=pool, **thresholds)
         return cls(cls._source(clip, seen, factors, options, pool), options, report, branches)
 

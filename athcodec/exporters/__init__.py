@@ -14,7 +14,10 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from athcodec.errors import ClipError
+from athcodec.exporters.placing import in_singles
 from athcodec.exporters.scene_objects import NOT_WRITTEN, not_written
 from athcodec.files.atomic import check_target, keeping
 from athcodec.options import whole
@@ -23,6 +26,8 @@ from athcodec.sources import Format, format_by_suffix, format_named
 Report = Callable[[str, float], None]
 MOST_RIGGED = 65535
 RIGS = ("usd", "gltf")
+HAVE_TRANSFORMS = ("usd", "gltf", "alembic")  # They hold the place of a plant that is far from the origin.
+SINGLES = (*HAVE_TRANSFORMS, "pc2", "mdd")  # Formats whose points are float32.
 KEPT = ("presence", "doubleSided")
 FILES = "files"  # in what write_clip returns: the names of the files where they are not the one that was asked for
 
@@ -127,6 +132,7 @@ class Written:
         The files that hold the clip, in the order of their frames; one, the path that was given, of most formats.
     facts : dict
         What a format costs that does not hold positions as they are: "max_error" in the clip's unit, and more.
+        "rounding" is by how much float32 moves a vertex of float64 at most, if the format has float32 alone;
         "not_written" names what the format has no place for, by kind. Empty of others.
     """
 
@@ -184,7 +190,10 @@ def write(
     with keeping(getattr(motion, "inputs", ())):
         check_target(path, kind.suffixes[0])
         module = importlib.import_module(kind.module)
-        facts = dict(module.write_clip(motion, path, wanted, lambda done: report("export", done)) or {})
+        is_rounded = kind.name in SINGLES and motion.dtype == np.float64
+        shown = in_singles(motion, kind.name in HAVE_TRANSFORMS) if is_rounded else motion
+        facts = dict(module.write_clip(shown, path, wanted, lambda done: report("export", done)) or {})
+        facts |= {"rounding": shown.rounding} if is_rounded else {}
     if lost := not_written(motion, kind.keeps) | facts.get(NOT_WRITTEN, {}):
         facts[NOT_WRITTEN] = lost
     names = facts.pop(FILES, [Path(path).name])

@@ -19,6 +19,7 @@ import numpy as np
 
 from athcodec.exporters import WriteOptions
 from athcodec.exporters.copies import cost_of, fit_copies
+from athcodec.exporters.placing import origin_of
 from athcodec.exporters.scene_objects import hidden_copies, objects_of
 from athcodec.files.atomic import new_files
 
@@ -51,7 +52,7 @@ def write_clip(
     for number, obj in enumerate(objects):
         obj.copies = obj.copies if number in instanced else 1
     static = SimpleNamespace(**{name: getattr(motion, name) for name in STATIC})
-    static.rest = getattr(motion, "source_rest", motion.rest)
+    static.rest, static.place = getattr(motion, "source_rest", motion.rest), origin_of(motion)
     with new_files(path) as folder:
         process = subprocess.Popen(
             [sys.executable, "-m", WRITER, os.path.join(folder, os.path.basename(path))],

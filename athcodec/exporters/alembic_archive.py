@@ -1,10 +1,10 @@
 """Writes Alembic (Ogawa): one mesh, curves or points object per object of a clip, its points sample by sample.
 
 Faces and static arrays are written once, materials' names as those of face sets; samples go to disk as they come.
-Points are float32, a clip in float64 is rounded; copies of one shape become instances where options.instances asks for
-it. Everything lies below one transform, which turns a clip whose Z is up to Alembic's custom, Y up, and keeps what
-Alembic has no place for (unit, branches, bytes); sources/alembic_archive.py takes it back from there. See
-alembic.py for who runs it.
+Points are float32, a clip in float64 is rounded; a further transform places one that is far from the origin. Copies of
+one shape become instances if options.instances asks for it. Everything lies below one transform, which turns a clip
+whose Z is up to Alembic's custom, Y up, and keeps what Alembic has no place for (unit, branches, bytes);
+sources/alembic_archive.py takes it back from there. See alembic.py for who runs it.
 """
 
 from __future__ import annotations
@@ -94,6 +94,10 @@ def _write(motion: Any, blocks: Iterator[tuple[int, np.ndarray]], instanced: dic
         obj.copies = obj.copies if number in instanced else 1
     statics, left = _divide(motion, objects)
     _keep_own(root.getSchema().getUserProperties(), motion, left)
+    if motion.place:
+        root, place = AbcGeom.OXform(root, "place"), AbcGeom.XformSample()
+        place.setTranslation(imath.V3d(*motion.place))
+        root.getSchema().set(place)
     names = distinct(re.sub(r"[/\0]", "_", obj.name.strip("/")) or "part" for obj in objects)
     for number, (obj, name) in enumerate(zip(objects, names)):
         if number in instanced:

@@ -95,7 +95,7 @@ def _write(
     facts |= branch_extras(motion) if "_vertex_branch" not in lost else {}
     glb = Glb(clock(motion) | {"athcodec": facts})
     add_materials(glb, motion)
-    transform = root_transform(motion.metadata)
+    transform = root_transform(motion)
     later = write.add(glb, glb.node(name="plant", **transform), transform, found, report)
     facts |= {"max_error": write.max_error, "vertices": motion.vertex_count}
     with new_file(path) as out:
@@ -137,7 +137,7 @@ def write_rest(motion: Any, path: str, name: str, more: Mapping[str, np.ndarray]
     found, left_out = meshes_of(motion, name, more)
     glb = Glb(clock(motion) | {"athcodec": dict(extras) | ({"left_out": left_out} if left_out else {})})
     add_materials(glb, motion)
-    root = glb.node(name="plant", **root_transform(motion.metadata))
+    root = glb.node(name="plant", **root_transform(motion))
     for shape in found:
         if "TEXCOORD_1" in shape.attributes:  # glTF allows a second set only beside a first
             shape.attributes.setdefault("TEXCOORD_0", np.zeros((len(shape.source), 2), np.float32))

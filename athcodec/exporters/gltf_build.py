@@ -19,6 +19,7 @@ import numpy as np
 
 from athcodec import __version__
 from athcodec.errors import ClipError
+from athcodec.exporters.placing import origin_of
 from athcodec.exporters.scene_objects import face_materials, is_double_sided
 from athcodec.exporters.timing import start_frame_of
 from athcodec.motion.clip import ClipRange, stated_fps
@@ -235,11 +236,18 @@ def add_materials(glb: Glb, motion: Any) -> None:
         glb.json["materials"] = [{"name": name} for name in names]
 
 
-def root_transform(metadata: Mapping[str, Any]) -> dict[str, Any]:
+def root_transform(motion: Any) -> dict[str, Any]:
     """Translation, rotation and scale of the node that takes the clip's axes and unit to those of glTF."""
+    metadata = motion.metadata
     metres = METRES.get(unit_symbol(metadata.get("unit") or "m"), 1.0)
-    turn = TURNS.get(str(metadata.get("up_axis", "y")).lower())
-    return ({"rotation": turn} if turn else {}) | ({"scale": [metres] * 3} if metres != 1.0 else {})
+    axis = str(metadata.get("up_axis", "y")).lower()
+    turn = TURNS.get(axis)
+    transform = ({"rotation": turn} if turn else {}) | ({"scale": [metres] * 3} if metres != 1.0 else {})
+    if place := origin_of(motion):
+        # TURNS in whole numbers: their quaternions round.
+        x, y, z = (metres * number for number in place)
+        transform["translation"] = {"y": [x, y, z], "z": [x, z, -y], "x": [-y, x, z]}[axis if turn else "y"]
+    return transform
 
 
 @dataclass(frozen=True, eq=False)

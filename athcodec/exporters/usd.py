@@ -2,9 +2,10 @@
 
 Faces, texture coordinates, names of materials and other static arrays are written once. Frames are written as they come
 and saved now and then: what has been saved leaves memory, so that a clip may be longer than memory. USD's points are
-float32, a clip in float64 is rounded. Prims are in world space and hold no transforms, but for copies of one shape,
-which become a PointInstancer where options.instances asks for it. What USD has no place for (branches, arrays per
-branch, bytes) lies in the namespace "athcodec" of the root prim, from where sources/usd.py takes it back.
+float32, a clip in float64 is rounded. The root has a translation if a plant is far from the origin; of other prims only
+copies of one shape have transforms: they become a PointInstancer if options.instances asks for it. What USD has no
+place for (branches, arrays per branch, bytes) lies in the namespace "athcodec" of the root prim, from where
+sources/usd.py takes it back.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ from athcodec.exporters import WriteOptions
 from athcodec.exporters import usd_nanite as nanite
 from athcodec.exporters.copies import Copies, cost_of, fit_copies, one_copy, rows_of_one
 from athcodec.exporters.gltf_joints import Joints
+from athcodec.exporters.placing import origin_of
 from athcodec.exporters.rig import fit_rig
 from athcodec.exporters.scene_objects import (
     KNOWN_ATTRIBUTES,
@@ -137,6 +139,8 @@ def _write(motion: Any, name: str, options: WriteOptions, report: Callable[[floa
     joints = None if options.rig is None else fit_rig(motion, options.rig, lambda done: report(0.9 * done))
     root = (UsdGeom.Xform if joints is None or options.nanite else UsdSkel.Root).Define(stage, "/clip").GetPrim()
     stage.SetDefaultPrim(root)
+    if origin := origin_of(motion):
+        UsdGeom.Xformable(root).AddTranslateOp().Set(tuple(origin))
     _describe_stage(stage, motion, max((codes[a:b] for a, b in motion.clip_range_frames), key=len), rate)
     objects = objects_of(motion)
     if joints is not None and options.nanite:

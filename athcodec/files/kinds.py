@@ -22,7 +22,7 @@ _KINDS = {
     "Alembic": ((".abc",), rb"Ogawa"),
     "PC2": ((".pc2",), rb"POINTCACHE2\0"),
     "XDMF": ((".xdmf", ".xmf"), rb"[^\0]*<Xdmf"),
-    "VTK": ((".vtu", ".vtk", ".pvd"), rb"[^\0]*<VTKFile|# vtk DataFile"),
+    "VTK": ((".vtu", ".vtp", ".vtk", ".pvd"), rb"[^\0]*<VTKFile|# vtk DataFile"),
     "HTML": ((".html", ".htm"), rb"(\xef\xbb\xbf)?\s*<(?i:!doctype html|html)"),
     "PNG": ((".png",), rb"\x89PNG\r\n\x1a\n"),
     "GIF": ((".gif",), rb"GIF8"),

@@ -11,6 +11,15 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import DTypeLike
 
+FAR = 64  # Distance from the origin, in extents of the plant, beyond which float32 loses too many bits of its shape.
+
+
+def is_far(points: np.ndarray) -> bool:
+    """Whether points (N, 3) lie so far from the origin, as those in map coordinates do, that float32 rounds them
+    coarsely."""
+    with np.errstate(all="ignore"):
+        return bool(len(points) and np.abs(points).max() > FAR * np.ptp(points, axis=0).max())
+
 
 class Frames:
     """Positions (T, N, 3) of which only the frames that are sliced exist.

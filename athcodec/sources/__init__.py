@@ -49,6 +49,12 @@ NO_SHAPES = frozenset(
     )
 )
 LISTED = 8
+MEANINGS = {"Material": " (names are kept for each face, contents only in a GLB by `encode --into`)"}
+ATH, ATH_MAGIC = ".ath", b"\x89ATH\r\n\x1a\n"
+NO_SOURCES = {
+    ATH: "is an .ath file already; `athcodec decode` writes other formats, `athcodec truncate` fewer levels",
+    ".mtg": "holds branches and no motion (MTG); encode the clip of the same plant, with --hierarchy and this file",
+}
 NUMBER_PATTERN = re.compile(r"([^#%]*)(#+|%0?(\d?)d)([^#%]*)", re.DOTALL)
 
 
@@ -200,8 +206,8 @@ FORMATS = (
     Format("xdmf", "XDMF time series", (".xdmf", ".xmf"), "athcodec.sources.xdmf"),
     Format(
         "vtk",
-        "VTU, VTK (with athcodec[mesh]) or PVD series, named by any one of its files",
-        (".vtu", ".vtk", ".pvd"),
+        "VTU, VTP, VTK (with athcodec[mesh]) or PVD series, named by any one of its files",
+        (".vtu", ".vtp", ".vtk", ".pvd"),
         "athcodec.sources.vtk",
     ),
 )
@@ -268,6 +274,7 @@ def listed(not_read: Mapping[str, Sequence[str]]) -> str:
     """MotionClip.not_read in words: each kind once, with its first names."""
     return "; ".join(
         f"{kind} {', '.join(names[:LISTED])}{f' and {len(names) - LISTED} more' if len(names) > LISTED else ''}"
+        f"{MEANINGS.get(kind, '')}"
         for kind, names in not_read.items()
     )
 
@@ -305,6 +312,11 @@ def find_format(path: str | PathLike[str]) -> Format:
     if is_pattern(path):
         head = b"#"
     else:
+        if os.path.isdir(path):
+            raise ClipError(
+                f"{os.fspath(path)}: is a folder, expected a file: any one of numbered files stands for all, and "
+                "`athcodec batch` encodes many clips"
+            )
         with open_plain(path) as file:
             head = file.read(HEAD_BYTES)
     if not head:
@@ -312,6 +324,8 @@ def find_format(path: str | PathLike[str]) -> Format:
     for candidate in FORMATS:
         if head.startswith(candidate.magic or ()):
             return candidate
+    if hint := NO_SOURCES.get(ATH if head.startswith(ATH_MAGIC) else Path(path).suffix.lower()):
+        raise ClipError(f"{os.fspath(path)}: {hint}")
     return format_by_suffix(path, FORMATS)
 
 

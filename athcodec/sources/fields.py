@@ -156,7 +156,7 @@ def _displacement(steps: Steps, fixed: bool, step_count: int, options: ReadOptio
     found = [name for name in names if name.lower() in DISPLACEMENTS and _is_vector(steps.field(0, name))]
     if len(found) > 1:
         raise ClipError(f"field: got {_listed(found)}, expected one displacement; name it with --field")
-    if not found and step_count > 1:
+    if not found and step_count > 1 and (names or steps.elsewhere):  # Without any data, it stands still.
         advice = "name one of them with --field" if names else "write the displacement with one value per point"
         raise ClipError(f"field: got points that do not move and no displacement, only {listed}; {advice}")
     return found[0] if found else None

@@ -23,13 +23,13 @@ from typing import Any
 import numpy as np
 
 from athcodec.errors import ClipError
-from athcodec.files.gltf.document import GltfFile
+from athcodec.files.gltf.document import DRACO, UNPACKED_BY, GltfFile
 from athcodec.files.gltf.json import BROKEN, brief, entries, entry, indices, integer
 from athcodec.files.gltf.motion import EXTENSION, extension_of
 from athcodec.files.gltf.primitives import corners, rows_of
 from athcodec.files.reading import closing_on_failure, naming
 from athcodec.motion.clip import DEFAULT_FPS, RESERVED_NAMES, ClipRange, MotionClip, Skin
-from athcodec.motion.frames import Frames
+from athcodec.motion.frames import Frames, is_far
 from athcodec.motion.joining import join
 from athcodec.sources import ReadOptions
 from athcodec.sources.gltf_scene import Scene, key_rate, on_grid, rotation_matrices
@@ -261,7 +261,7 @@ def _rest_pose(motion: _Motion, nodes: Sequence[GltfNode]) -> np.ndarray:
 
 
 def _positions(motion: _Motion, times: np.ndarray) -> Frames:
-    return Frames(lambda start, stop: motion.read(times[start:stop]), len(times), motion.count)
+    return Frames(lambda start, stop: motion.read(times[start:stop]), len(times), motion.count, motion.dtype)
 
 
 # ---- scenes and nodes ----
@@ -467,12 +467,9 @@ def _not_read(scene: Scene, nodes: Sequence[GltfNode]) -> dict[str, list[str]]:
 
 
 def _refuse_draco(file: GltfFile, primitive: dict, positions: int) -> None:
-    packed = "KHR_draco_mesh_compression" in (primitive.get("extensions") or {})
+    packed = DRACO in (primitive.get("extensions") or {})
     if packed and file.item("accessors", positions).get("bufferView") is None:
-        raise ClipError(
-            "meshes: got KHR_draco_mesh_compression, expected a file without it: decompress it first, for "
-            "example with gltf-transform copy"
-        )
+        raise ClipError(f"meshes: got {DRACO}, expected a file without it: {UNPACKED_BY}")
 
 
 def _load(node: GltfNode, scene: Scene) -> None:
@@ -561,10 +558,15 @@ class _Motion:
         self.scene, self._nodes, self._from_world = scene, nodes, from_world
         self.count = nodes[-1].first + nodes[-1].count
         self.ancestors = scene.ancestors(_movers(nodes))
+        self.dtype = np.dtype(np.float64)
+        placed = self.read(None)[0]
+        loses = is_far(placed) and not np.array_equal(placed, placed.astype(np.float32))
+        self.dtype = np.dtype(np.float64 if loses else np.float32)
 
     def read(self, times: np.ndarray | None) -> np.ndarray:
-        """(k, N, 3) float32; None: the pose without animation, k = 1."""
-        out = np.empty((1 if times is None else len(times), self.count, 3), np.float32)
+        """(k, N, 3) in `dtype`: float32, or float64 if nodes place them far from the origin. None: the pose without
+        animation, k = 1."""
+        out = np.empty((1 if times is None else len(times), self.count, 3), self.dtype)
         largest = max(node.count for node in self._nodes)
         step = max(1, WORK_BYTES // (48 * largest + 512 * len(self.ancestors)))
         with np.errstate(all="ignore"):
@@ -845,8 +847,9 @@ def _attributes(
     )
     found: dict[str, np.ndarray] = {}
     for key in keys:
-        name = NAMES.get(key) or (key[1:].lower() if key.isupper() else key[1:])
-        if name and name not in skip and name not in found:
+        name = NAMES.get(key) or (key[1:].lower() if key.isupper() else key[1:]) or key
+        name += "_" * (name in found)
+        if name not in skip:
             found[name] = _attribute(file, nodes, key, name, motion)
     branches = _branches(file, found)
     for name in RESERVED_NAMES & found.keys():

@@ -604,11 +604,14 @@ def _add_ply_vertex_values(mesh: Mesh, vertices: dict[str, np.ndarray]) -> None:
             mesh.attributes["uv"] = _native(np.stack([vertices[name] for name in pair], axis=1))
             taken |= set(pair)
     for name, column in vertices.items():
-        if name not in taken and not isinstance(column, tuple):
+        if name not in taken:
             _add_attribute(mesh, name, column)
 
 
-def _add_attribute(mesh: Mesh, name: str, values: np.ndarray, prefix: str = "vertex_") -> None:
+def _add_attribute(mesh: Mesh, name: str, values: Any, prefix: str = "vertex_") -> None:
+    if isinstance(values, tuple):
+        mesh.not_read.setdefault("attribute", []).append(f"{prefix}{name} (lists)")
+        return
     if name in RESERVED_NAMES or name in mesh.attributes:
         name = "branch_id" if name == "vertex_branch" else prefix + name
     if name not in RESERVED_NAMES and name not in mesh.attributes:
@@ -645,8 +648,8 @@ def _add_ply_faces(mesh: Mesh, face_values: dict[str, np.ndarray]) -> None:
     if isinstance(face_values.get("texcoord"), tuple):
         per_face, uv = face_values["texcoord"]
         if np.array_equal(per_face, 2 * counts):
+            del face_values["texcoord"]
             mesh.attributes["uv"] = _native(uv).reshape(-1, 2)
             mesh.metadata["domains"]["uv"] = "corner"
     for name, column in face_values.items():
-        if not isinstance(column, tuple):
-            _add_attribute(mesh, name, column, "face_")
+        _add_attribute(mesh, name, column, "face_")

@@ -16,7 +16,7 @@ import numpy as np
 
 from athcodec.errors import ClipError
 from athcodec.motion.clip import RESERVED_NAMES, MotionClip
-from athcodec.motion.frames import Frames
+from athcodec.motion.frames import Frames, is_far
 from athcodec.motion.presence import PRESENCE, frame_runs
 from athcodec.sources import ReadOptions
 
@@ -25,6 +25,10 @@ MAX_METADATA_BYTES = 1 << 24
 DESCRIPTOR = ".descriptor"  # behind the name of an array's property in an Alembic file: that of its ArrayDescriptor
 FACE_MATERIAL, MATERIAL_NAMES = "face_material", "material_names"  # an attribute, and metadata
 FLIPPED = "faces that turn inside out in time"  # in not_read: objects that a transform mirrors in some frames alone
+CHANGING = (
+    ": points that appear or vanish cannot be read; write them as copies of a mesh with ids, or read other objects "
+    "with --only"
+)
 TWO_SIDES = {"doubleSided": True}  # glTF's material of faces that are seen from both sides and have no other
 OWN = "athcodec"  # the namespace of what our writers add to files of other formats
 SCENE_KEYS = {"unit": str, "up_axis": str, "fps": float}  # Members of the metadata that some formats have no place for.
@@ -144,7 +148,7 @@ class SceneObject:
         if not len(points) == len(ids) == len(rows) or (rows < 0).any():
             raise ClipError(
                 f"{self.path}: got {len(points)} points with other ids in {where}, expected the {len(rows)} of the "
-                "first frame: points that appear or vanish cannot be read; write them as copies of a mesh with ids"
+                f"first frame{CHANGING}"
             )
         return points[rows]
 
@@ -253,7 +257,8 @@ def frames_of_objects(
     frame_name: Callable[[int], str] = "frame {}".format,
     context: Callable[[], AbstractContextManager[None]] = nullcontext,
 ) -> Frames:
-    """Positions of all objects in world space, frame by frame.
+    """Positions of all objects in world space, frame by frame: float32, or float64 where transforms of the first frame
+    place them far from the origin.
 
     sample(object, frame) gives its points (n, 3) and the (4, 4) matrix, for row vectors, that takes them to the world;
     of copies the points of one and (copies, 4, 4) matrices;
@@ -268,31 +273,38 @@ def frames_of_objects(
         if len(points) * obj.copies != obj.count:
             raise ClipError(
                 f"{obj.path}: got {len(points)} points in {frame_name(frame)}, expected {obj.count // obj.copies} as "
-                "in the first frame"
+                f"in the first frame{CHANGING if obj.kind == 'points' else ''}"
             )
         points = transformed(points, matrix)
         if obj.is_still:
             obj.still = points
         return points
 
+    with context():
+        first = [positions(obj, 0) for obj in objects]
+    dtype = np.dtype(np.result_type(*first) if is_far(np.concatenate(first)) else np.float32)
+    for obj in objects:
+        obj.still = None if obj.still is None else obj.still.astype(dtype)
+
     def read(start: int, stop: int) -> np.ndarray:
-        out = np.empty((stop - start, count, 3), np.float32)
+        out = np.empty((stop - start, count, 3), dtype)
         with context():
             for row, frame in enumerate(range(start, stop)):
                 for obj in objects:
                     out[row, obj.vertices] = positions(obj, frame)
         return out
 
-    return Frames(read, frame_count, count)
+    return Frames(read, frame_count, count, dtype)
 
 
 def transformed(points: np.ndarray, matrix: np.ndarray) -> np.ndarray:
-    """(n, 3) points by a (4, 4) matrix for row vectors, as float32; by (k, 4, 4) k times, one after the other."""
+    """(n, 3) points by a (4, 4) matrix for row vectors, as float64; by (k, 4, 4) k times, one after the other. Points
+    that stay keep their type."""
     if matrix.ndim == 3:
-        return (points @ matrix[:, :3, :3] + matrix[:, 3:, :3]).astype(np.float32).reshape(-1, 3)
+        return (points @ matrix[:, :3, :3] + matrix[:, 3:, :3]).reshape(-1, 3)
     if np.array_equal(matrix, np.eye(4)):
         return points
-    return (points @ matrix[:3, :3] + matrix[3, :3]).astype(np.float32)
+    return points @ matrix[:3, :3] + matrix[3, :3]
 
 
 def _add_kept(
@@ -372,10 +384,13 @@ def _joined_statics(objects: list[SceneObject], skip: Collection[str]) -> tuple[
         if name in skip:
             continue
         array = _joined_static(name, objects)
-        if array is not None:
-            attributes[name] = array.values
-            if array.domain != "vertex":
-                domains[name] = array.domain
+        if array is None:
+            for obj in objects:
+                obj.left_out += [name] * (name in obj.statics)
+            continue
+        attributes[name] = array.values
+        if array.domain != "vertex":
+            domains[name] = array.domain
     attributes["part_vertex_counts"] = np.array([obj.count for obj in objects], np.int32)
     domains["part_vertex_counts"] = "constant"
     if any(obj.copies > 1 for obj in objects):

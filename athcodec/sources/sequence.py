@@ -46,7 +46,7 @@ _PLACES = re.compile(r"(?<![^\W_])-?\d+|\d+(?=[.,]\d)|-?\d+$|(?<![^\W_])[AaPp][M
 _ELEMENTS = (b"f ", b"f\t", b"l ", b"l\t")
 _LABELS = (b"vt ", b"vt\t", b"usemtl ", b"usemtl\t", b"o ", b"o\t", b"g ", b"g\t")
 LARGEST_NUMBER = 10**9
-FRAME_SUFFIXES = (".obj", ".ply", ".vtu", ".vtk")  # Formats that have one file per frame.
+FRAME_SUFFIXES = (".obj", ".ply", ".vtu", ".vtp", ".vtk")  # Formats that have one file per frame.
 
 
 @dataclass(frozen=True)

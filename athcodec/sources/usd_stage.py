@@ -8,11 +8,11 @@ are the whole time codes of the stage's range where it has one, else the time co
 another rate. Static primvars become attributes, the names of materials the metadata "material_names", of which the
 attribute "face_material" says the number for each face.
 
-Points are float32 in USD and so they are here. The stage is opened as it is composed (layers, payloads, value clips);
-what else it holds, such as layers that cannot be found, patches, tetrahedra, what is in materials, is named in the
-clip's `not_read`; velocities are not read. A stage is opened by its structure; positions are read frame by frame. USD
-trusts the lengths of arrays in a binary file even where it is damaged: it is imported by the process of reader_main.py
-alone, under a limit of memory.
+Points are float32 in USD and so they are here, unless a transform places them far from the origin. The stage is opened
+as it is composed (layers, payloads, value clips); what else it holds, such as layers that cannot be found, patches,
+tetrahedra, what is in materials, is named in the clip's `not_read`; velocities are not read. A stage is opened by its
+structure; positions are read frame by frame. USD trusts the lengths of arrays in a binary file even where it is
+damaged: it is imported by the process of reader_main.py alone, under a limit of memory.
 """
 
 from __future__ import annotations
@@ -33,6 +33,7 @@ from athcodec.errors import ClipError
 from athcodec.files.plain import open_plain
 from athcodec.files.reading import FileWatch, check_inside
 from athcodec.motion.clip import MotionClip, Skin
+from athcodec.motion.frames import is_far
 from athcodec.motion.units import METRES
 from athcodec.sources import ReadOptions
 from athcodec.sources.crate import check_crates
@@ -674,7 +675,8 @@ def _statics(obj: _Prim, codes: np.ndarray, matrix: np.ndarray) -> None:
         obj.statics = {name: static for name, static in obj.statics.items() if static.domain != "vertex"}
     rest = obj.statics.get("rest")
     if rest is not None and rest.values.shape[1:] == (3,) and rest.values.dtype.kind == "f":
-        obj.statics["rest"] = Static(rest.domain, transformed(rest.values, matrix))
+        placed = transformed(rest.values, matrix)
+        obj.statics["rest"] = Static(rest.domain, placed if is_far(placed) else placed.astype(np.float32))
 
 
 def _rename_first_uv(obj: _Prim) -> None:
@@ -726,11 +728,9 @@ def _keep(
     element_size: int = 1,
     attribute: Usd.Attribute | None = None,
 ) -> None:
-    """Notes a static array where its rows fit the prim; strings and references to files are none."""
+    """Keeps a static array if it has numbers, and rows that fit the prim; notes the names of others."""
     values = _numbers(values)
-    if values is None:
-        return
-    if element_size > 1 and len(values) % element_size == 0:
+    if values is not None and element_size > 1 and len(values) % element_size == 0:
         values = values.reshape(-1, element_size, *values.shape[1:])
         values = values[..., 0] if values.shape[2:] == (1,) else values
     obj.keep(name, DOMAINS.get(interpolation), _as_written(values, attribute))
@@ -752,10 +752,10 @@ def _is_array(values: Any) -> bool:
     return type(values).__module__.startswith("pxr.Vt")
 
 
-def _as_written(values: np.ndarray, attribute: Usd.Attribute | None) -> np.ndarray:
+def _as_written(values: np.ndarray | None, attribute: Usd.Attribute | None) -> np.ndarray | None:
     """In the dtype that an array had before exporters/usd.py chose one that USD has."""
     said = _said(attribute, "dtype") if attribute else None
-    return values.astype(said) if said in WRITTEN_DTYPES else values
+    return values.astype(said) if values is not None and said in WRITTEN_DTYPES else values
 
 
 def _said(attribute: Usd.Attribute, key: str) -> str | None:

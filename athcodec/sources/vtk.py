@@ -1,10 +1,10 @@
-"""Reads VTK results: .vtu files listed with their times in a .pvd, or numbered .vtu or .vtk files.
+"""Reads VTK results: .vtu and .vtp files listed with their times in a .pvd, or numbered ones, or numbered .vtk files.
 
 Numbered files are found from any one of them, or by a pattern, as sequence.py says; frames then come options.fps a
 second, DEFAULT_FPS (30) without it, and a .pvd beside them that lists the file gives the times instead. See fields.py
-for what becomes the motion and cells.py for the cells. VTU: text, base64 and appended data, plain or compressed by zlib
-or LZMA, one piece. Legacy .vtk files, unstructured grids only, are read by meshio. A file is read whole, one at a time;
-all are read once to see which data change in time.
+for what becomes the motion and cells.py for the cells. VTU and VTP: text, base64 and appended data, plain or compressed
+by zlib or LZMA, one piece. Legacy .vtk files, unstructured grids only, are read by meshio. A file is read whole, one at
+a time; all are read once to see which data change in time.
 """
 
 from __future__ import annotations
@@ -57,6 +57,8 @@ _UNPACKERS: dict[str, Callable[[int], Any]] = {
 """Of the bytes that they may take themselves."""
 WORD_BYTES = 16  # Bytes that a byte of a legacy file takes while meshio reads it.
 GRIDS = 3  # Grids that are held at once: the first, the latest, and one that is read.
+# Cells of PolyData in the order of their data: VTK's numbers of those with so many nodes, and of the others.
+_POLY_CELLS = {"Verts": ({1: 1}, 2), "Lines": ({2: 3}, 4), "Polys": ({3: 5, 4: 9}, 7), "Strips": ({}, 6)}
 _BROKEN = (
     ValueError,
     KeyError,
@@ -147,7 +149,7 @@ class _Steps:
         self.unchanged = FileWatch(*self._files)
         self._now: tuple[int, _Grid] | None = None
         first = self._grid(0)
-        self._cells, self.said = first.cells, first.said
+        self._cells, self.said, self.left_out = first.cells, first.said, first.left_out
         self.topology = topology_of(blocks_of(*first.cells, VTK_NAMES), len(first.points))
         self._fields, self.elsewhere = list(first.point_data), dict.fromkeys(first.cell_data, "cell")
         self._static, still, self._fixed = dict(first.point_data), dict(first.cell_data), True
@@ -161,7 +163,7 @@ class _Steps:
                     del same[name]
         for name, values in still.items():
             self.topology.add_cell_data(name, values)
-        self.left_out = [name for name in names[0] if name not in first.point_data]
+        self.left_out += [name for name in names[0] if name not in first.point_data]
         self.left_out += [name for name in names[1] if name not in still]
 
     def static(self) -> dict[str, np.ndarray]:
@@ -205,10 +207,12 @@ class _Grid:
         point_data: dict,
         cell_data: dict,
         said: dict[str, Any] | None = None,
+        left_out: Sequence[str] = (),
     ):
         self.points, self.cells, self.said = points, cells, said or {}
         self.point_data = {name: values for name, values in point_data.items() if len(values) == len(points) and name}
         self.cell_data = {name: values for name, values in cell_data.items() if len(values) == len(cells[0]) and name}
+        self.left_out = [*left_out, *sorted({*point_data, *cell_data} - {*self.point_data, *self.cell_data})]
 
 
 def _read_grid(path: Path, budget: Budget) -> _Grid:
@@ -246,14 +250,15 @@ def _legacy_grid(path: Path) -> _Grid:
 
 
 class _Vtu:
-    """The arrays of one VTU file."""
+    """The arrays of one VTU or VTP file."""
 
     def __init__(self, data: bytes, budget: Budget):
         self._budget = budget
         data, self._appended = _without_raw(data)
         self._root = parse_xml(data, "VTKFile", budget)
-        if self._root.get("type") != "UnstructuredGrid":
-            raise ClipError(f"got a VTK file of the type {self._root.get('type')!r}, expected UnstructuredGrid")
+        self._type, self._left_out = self._root.get("type"), []
+        if self._type not in ("UnstructuredGrid", "PolyData"):
+            raise ClipError(f"got a VTK file of the type {self._type!r}, expected UnstructuredGrid or PolyData")
         order = ">" if self._root.get("byte_order") == "BigEndian" else "<"
         self._order = order
         self._count = np.dtype(_TYPES[self._root.get("header_type", "UInt32")]).newbyteorder(order)
@@ -263,17 +268,14 @@ class _Vtu:
         self._unpack = _UNPACKERS.get(name or "")
 
     def grid(self) -> _Grid:
-        pieces = self._root.findall("UnstructuredGrid/Piece")
+        pieces = self._root.findall(f"{self._type}/Piece")
         if len(pieces) != 1:
             raise ClipError(f"got {len(pieces)} pieces, expected one")
         piece = pieces[0]
         points = piece.find("Points/DataArray")
         if points is None:
             raise ClipError("got no points, expected some")
-        cells = {element.get("Name"): element for element in piece.findall("Cells/DataArray")}
-        stops = self._integers(cells["offsets"]) if "offsets" in cells else np.zeros(0, np.int64)
-        types = self._integers(cells["types"]) if "types" in cells else np.zeros(0, np.int64)
-        nodes = self._integers(cells["connectivity"]) if "connectivity" in cells else np.zeros(0, np.int64)
+        types, stops, nodes = self._poly_cells(piece) if self._type == "PolyData" else self._cells(piece, "Cells")
         starts = np.concatenate([[0], stops[:-1]]).astype(np.int64) if len(stops) else stops
         if (
             len(types) != len(stops)
@@ -286,19 +288,37 @@ class _Vtu:
         said = piece.get("NumberOfPoints")
         if said is not None and int(said) != len(found):
             raise ClipError(f"points: got {len(found)}, expected {int(said)}")
-        cells, said = (types, starts, stops, nodes), self._said()
-        return _Grid(found, cells, self._arrays(piece, "PointData"), self._arrays(piece, "CellData"), said)
+        data = [self._arrays(piece, tag) for tag in ("PointData", "CellData")]
+        return _Grid(found, (types, starts, stops, nodes), *data, self._said(), self._left_out)
+
+    def _cells(self, piece: ElementTree.Element, tag: str) -> list[np.ndarray]:
+        """Types, ends and nodes of cells; none of what the file does not list."""
+        cells = {element.get("Name"): element for element in piece.findall(f"{tag}/DataArray")}
+        names = ("types", "offsets", "connectivity")
+        return [self._integers(cells[name]) if name in cells else np.zeros(0, np.int64) for name in names]
+
+    def _poly_cells(self, piece: ElementTree.Element) -> list[np.ndarray]:
+        """Types, ends and nodes of PolyData's cells, which are in a list for each kind."""
+        types, stops, nodes = [], [], []
+        for tag, (numbers, other) in _POLY_CELLS.items():
+            _, ends, corners = self._cells(piece, tag)
+            types.append(np.array([numbers.get(size, other) for size in np.diff(ends, prepend=0).tolist()], np.int64))
+            stops.append(ends + sum(map(len, nodes)))
+            nodes.append(corners)
+        return [np.concatenate(each) for each in (types, stops, nodes)]
 
     def _said(self) -> dict[str, Any]:
-        for element in self._root.findall("UnstructuredGrid/FieldData/DataArray"):
+        for element in self._root.findall(f"{self._type}/FieldData/DataArray"):
             if element.get("Name") == OWN and element.get("type") == "UInt8":
                 return scene_of_json(self._array(element).tobytes())
         return {}
 
     def _arrays(self, piece: ElementTree.Element, tag: str) -> dict[str, np.ndarray]:
         found = {}
-        for element in piece.findall(f"{tag}/DataArray"):
-            if element.get("type") in _TYPES:
+        for element in (*piece.findall(f"{tag}/DataArray"), *piece.findall(f"{tag}/Array")):
+            if element.get("type") not in _TYPES:
+                self._left_out.append(element.get("Name", ""))
+            else:
                 width, values = int(element.get("NumberOfComponents") or 1), self._array(element)
                 found[element.get("Name", "")] = values if width == 1 else values.reshape(-1, width)
         return found

@@ -96,7 +96,7 @@ def facts_of(path: str | os.PathLike[str]) -> str:
     size = os.path.getsize(path)
     clips = f"{len(frames)} clips, " if len(frames) > 1 else ""
     times = _FLOAT3 * vertices * sum(frames) / size
-    counts = f"{vertices:,} points, {clips}{sum(frames)} frames"
+    counts = f"{vertices:,} points, {clips}{sum(frames)} frame{'s' * (sum(frames) != 1)}"
     return f"{counts} · {size / 1000:,.0f} kB, {times:,.0f} times smaller than float32"
 
 

@@ -31,6 +31,8 @@ WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 KEPT_VIEWS = 8  # Bytes that have been decompressed.
 JSON_ENDS, JSON_BYTES = b",:[{", 96  # Bytes of text, and of the objects made of it.
 MESHOPT = ("EXT_meshopt_compression", "KHR_meshopt_compression")
+DRACO = "KHR_draco_mesh_compression"
+UNPACKED_BY = "decompress it first, for example with `gltf-transform copy packed.glb plain.glb`"
 # Extensions that a reader of positions may ignore, or that are read here.
 HARMLESS = (
     "KHR_materials_",
@@ -119,8 +121,10 @@ class GltfFile:
             raise ClipError(f"asset: got version {version[:20]!r}, expected 2.0")
         for name in self.json.get("extensionsRequired") or ():
             if not str(name).startswith(HARMLESS):
+                how = f": {UNPACKED_BY}" if name == DRACO else ""
                 raise ClipError(
                     f"extensionsRequired: got {str(name)[:60]!r}, which is not read here; expected a file without it"
+                    + how
                 )
 
     def item(self, kind: str, index: Any) -> dict:

@@ -40,8 +40,8 @@ class Found:
         sizes = np.bincount(self.vertex_branch)
         method = f"{self.method} ({self.taken})" if self.taken else self.method
         return (
-            f"{len(self.branch_parent):,} branches by {method}: {roots:,} without a parent, up to order "
-            f"{orders.max()}, {sizes.min():,} to {sizes.max():,} vertices each"
+            f"{len(sizes):,} branch{'es' * (len(sizes) != 1)} by {method}: {roots:,} without a parent, "
+            f"up to order {orders.max()}, {sizes.min():,} to {sizes.max():,} vertices each"
         )
 
 

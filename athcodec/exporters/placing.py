@@ -1,0 +1,49 @@
+"""Motions for formats whose points are float32: how far that rounds them, and far from the origin a place for them.
+
+Points in map coordinates lose their shape in float32. Formats with transforms get them about a place in the plant, and
+hold that place in double precision.
+"""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from athcodec.motion.frames import is_far
+
+
+def in_singles(motion: Any, can_move: bool) -> Any:
+    """Return a float64 motion about `origin` (3,), which is 0 unless the format can hold it and float32 needs it.
+
+    Its `rounding` is the largest distance by which float32 moves a vertex in the blocks that were read so far.
+    """
+    rest = np.asarray(motion.rest, np.float64)
+    place = (rest.min(axis=0) + rest.max(axis=0)) / 2 if can_move and is_far(rest) else np.zeros(3)
+    origin = place.astype(np.float32).astype(np.float64)
+
+    class InSingles(type(motion)):  # type: ignore[misc]
+        rest = property(lambda self: motion.rest - origin)
+        source_rest = property(lambda self: getattr(motion, "source_rest", motion.rest))
+
+        def block(self, start: int, stop: int) -> np.ndarray:
+            return motion.block(start, stop) - origin
+
+        def blocks(self, *args: Any) -> Iterator[tuple[int, np.ndarray]]:
+            for start, block in motion.blocks(*args):
+                points = block - origin
+                away = np.linalg.norm(points - points.astype(np.float32), axis=-1)
+                self.rounding = max(self.rounding, float(away.max(initial=0.0)))
+                yield start, points
+
+    moved = copy.copy(motion)
+    moved.__class__, moved.origin, moved.rounding = InSingles, origin, 0.0
+    return moved
+
+
+def origin_of(motion: Any) -> list[float] | None:
+    """Return the place that a motion is about, for a transform; None for the origin itself."""
+    origin = getattr(motion, "origin", None)
+    return origin.tolist() if origin is not None and origin.any() else None
