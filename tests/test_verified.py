@@ -174,6 +174,13 @@ def test_verify_accepts_still_clips_of_float64_with_an_exact_rest_pose(tmp_path,
         assert cli.main(["verify", encoded, "--against", str(source)]) == 0, capsys.readouterr().err
 
 
+@pytest.mark.parametrize("options", [{"rest_error": 1e-2}, {"exact_rest": True}])
+def test_a_single_point_is_as_close_as_its_file_says(tmp_path, options):
+    clip = athcodec.MotionClip(np.full((1, 1, 3), 1e-7, np.float32), [0.0], [0], [-1])
+    athcodec.encode(clip, tmp_path / "a.ath", rel_error=1e-2, effort="fast", **options)
+    assert understated(tmp_path / "a.ath", clip) == []
+
+
 def test_a_held_pose_counts_in_the_mean_error_for_as_long_as_it_is_shown(tmp_path):
     frames = np.random.default_rng(2).normal(size=(3, 30, 3)).astype(np.float32)
     held = np.concatenate([frames[:2], np.repeat(frames[2:], 40, axis=0)])

@@ -67,8 +67,8 @@ class RestPrecision:
 
 
 def detail_of(steps: np.ndarray) -> np.ndarray:
-    """Return the details of the nearest steps; infinite ones have none."""
-    octaves = np.log2(steps, out=np.full(len(steps), np.inf), where=np.isfinite(steps))
+    """Return the details of the nearest steps; infinite ones, and those of a plant without extent, have none."""
+    octaves = np.log2(steps, out=np.full(len(steps), np.inf), where=np.isfinite(steps) & (steps > 0))
     nearest = np.clip(np.rint(2 * np.where(np.isfinite(octaves), octaves, 0)) + WHOLE_DETAIL, 1, MOST_DETAIL)
     return np.where(np.isfinite(octaves), nearest, 0).astype(np.int32)
 
