@@ -16,6 +16,8 @@ from typing import Any
 
 import numpy as np
 
+from athcodec.decoding.clip_view import ClipView
+from athcodec.decoding.decoder import Decoder
 from athcodec.errors import ClipError
 from athcodec.exporters.placing import in_singles
 from athcodec.exporters.scene_objects import NOT_WRITTEN, not_written
@@ -147,8 +149,8 @@ def write(
 
     Parameters
     ----------
-    motion : MotionClip or ClipView
-        A clip, or frames of an .ath file at some level.
+    motion : MotionClip, ClipView or Decoder
+        A clip, frames of an .ath file at some level, or all frames of it at the deepest.
     path : str or path
         The file to write; formats of one file per frame number their files by it. An older file of the same kind, or
         an empty one, is replaced, unless `motion` reads it.
@@ -178,6 +180,7 @@ def write(
         For options that do not exist.
     """
     wanted = WriteOptions(**options)
+    motion = ClipView(motion) if isinstance(motion, Decoder) else motion
     kind = format_by_suffix(path, FORMATS) if format is None else format_named(format, FORMATS)
     kind.check()
     if wanted.rig is not None and kind.name not in RIGS:
@@ -216,7 +219,7 @@ def write_hdf5(clip: Any, path: str | PathLike[str], gzip: bool = False) -> None
 
     Parameters
     ----------
-    clip : MotionClip or ClipView
+    clip : MotionClip, ClipView or Decoder
         Or anything with time, vertex_branch, branch_parent, rest, dtype and blocks() like them.
     path : str or path
         The file to write.
