@@ -298,11 +298,6 @@ def format_by_suffix(path: str | PathLike[str], formats: Sequence[Format]) -> Fo
     for candidate in formats:
         if suffix in candidate.suffixes:
             return candidate
-    if suffix == ".mtg":
-        raise ClipError(
-            f"{os.fspath(path)}: got an MTG, which holds the branches of a plant and no motion; name the file with the "
-            "motion, and give it these branches with --hierarchy FILE.mtg"
-        )
     known = " ".join(suffix for candidate in formats for suffix in candidate.suffixes)
     raise ClipError(f"{os.fspath(path)}: got an unknown format, expected one of {known}")
 
