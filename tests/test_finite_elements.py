@@ -93,6 +93,23 @@ def test_second_order_cells_keep_their_middle_nodes(tmp_path):
         assert clip.vertex_count == 9
 
 
+STRIPS = """<VTKFile type="UnstructuredGrid"><UnstructuredGrid><Piece NumberOfPoints="8" NumberOfCells="3">
+<Points><DataArray type="Float32" NumberOfComponents="3" format="ascii">{}</DataArray></Points>
+<Cells><DataArray type="Int64" Name="connectivity" format="ascii">0 1 4 0 1 2 3 4 3 4 5 6</DataArray>
+<DataArray type="Int64" Name="offsets" format="ascii">3 8 12</DataArray>
+<DataArray type="UInt8" Name="types" format="ascii">5 6 6</DataArray></Cells>
+<CellData><DataArray type="Int32" Name="label" format="ascii">7 8 9</DataArray></CellData>
+</Piece></UnstructuredGrid></VTKFile>"""
+
+
+def test_triangle_strips_become_triangles_that_all_face_one_way(tmp_path):
+    numbers = " ".join(map(str, np.arange(24)))
+    (tmp_path / "a.vtu").write_text(STRIPS.format(numbers))
+    with athcodec.read(tmp_path / "a.vtu") as clip:
+        assert clip.faces.tolist() == [[0, 1, 4], [0, 1, 2], [1, 3, 2], [2, 3, 4], [3, 4, 5], [4, 6, 5]]
+        assert clip.attributes["label"].tolist() == [7, 8, 8, 8, 9, 9]
+
+
 @pytest.mark.parametrize(
     "suffix, how",
     [
