@@ -138,6 +138,8 @@ def _displacement(steps: Any, step_count: int, options: ReadOptions) -> str | No
     found = [name for name in names if name.lower() in DISPLACEMENTS and _is_vector(steps.field(0, name))]
     if len(found) > 1:
         raise ClipError(f"field: got {_listed(found)}, expected one displacement; name it with --field")
+    if not names and step_count > 1:
+        raise ClipError("field: got points that do not move and no field per point, expected a displacement")
     if not found and step_count > 1:
         raise ClipError(
             f"field: got points that do not move and no displacement, only {_listed(names)}; name one of "
