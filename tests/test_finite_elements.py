@@ -93,6 +93,32 @@ def test_second_order_cells_keep_their_middle_nodes(tmp_path):
         assert clip.vertex_count == 9
 
 
+STRIPS = """<VTKFile type="UnstructuredGrid"><UnstructuredGrid><Piece NumberOfPoints="8" NumberOfCells="3">
+<Points><DataArray type="Float32" NumberOfComponents="3" format="ascii">{}</DataArray></Points>
+<Cells><DataArray type="Int64" Name="connectivity" format="ascii">0 1 4 0 1 2 3 4 3 4 5 6</DataArray>
+<DataArray type="Int64" Name="offsets" format="ascii">3 8 12</DataArray>
+<DataArray type="UInt8" Name="types" format="ascii">5 6 6</DataArray></Cells>
+<CellData><DataArray type="Int32" Name="label" format="ascii">7 8 9</DataArray></CellData>
+</Piece></UnstructuredGrid></VTKFile>"""
+
+
+def test_triangle_strips_become_triangles_that_all_face_one_way(tmp_path):
+    numbers = " ".join(map(str, np.arange(24)))
+    (tmp_path / "a.vtu").write_text(STRIPS.format(numbers))
+    with athcodec.read(tmp_path / "a.vtu") as clip:
+        assert clip.faces.tolist() == [[0, 1, 4], [0, 1, 2], [1, 3, 2], [2, 3, 4], [3, 4, 5], [4, 6, 5]]
+        assert clip.attributes["label"].tolist() == [7, 8, 8, 8, 9, 9]
+
+
+def test_a_legacy_file_with_cells_that_meshio_does_not_know_says_what_to_do(tmp_path):
+    points = "\n".join("0 0 0" for _ in range(10))
+    cells = "CELLS 1 11\n10 0 1 2 3 4 5 6 7 8 9\nCELL_TYPES 1\n15\n"
+    head = "# vtk DataFile Version 3.0\na prism\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 10 float\n"
+    (tmp_path / "a.vtk").write_text(f"{head}{points}\n{cells}")
+    with pytest.raises(ClipError, match="meshio does not know what it calls 'penta_prism'; save it as .vtu"):
+        athcodec.read(tmp_path / "a.vtk")
+
+
 @pytest.mark.parametrize(
     "suffix, how",
     [
@@ -176,6 +202,12 @@ def test_the_displacement_is_found_or_named_or_asked_for(tmp_path):
         athcodec.read(path, field="u")
     with athcodec.read(path, field="Shift") as clip:
         assert np.abs(clip.block(0, 5) - motion).max() < 1e-12
+    with meshio.xdmf.TimeSeriesWriter(tmp_path / "none.xdmf", data_format="XML") as writer:
+        writer.write_points_cells(points, cells)
+        for time in TIMES:
+            writer.write_data(float(time))
+    with pytest.raises(ClipError, match="do not move and no field per point, expected a displacement"):
+        athcodec.read(tmp_path / "none.xdmf")
     path = write_xdmf(tmp_path / "b.xdmf", points, cells, displacement, point_data={"Displacement": 2 * motion[0]})
     with pytest.raises(ClipError, match="got Displacement, displacement, expected one displacement"):
         athcodec.read(path)

@@ -452,9 +452,28 @@ def test_buffers_may_be_inside_beside_or_in_the_text(tmp_path, name):
     assert np.array_equal(positions[0], CUBE)
 
 
-def glb(structure, binary=b""):
+def test_a_glb_chunk_that_is_not_aligned_is_followed_where_it_ends(tmp_path):
+    for spaces in range(4):
+        (tmp_path / "a.glb").write_bytes(glb(cube_json(), CUBE.tobytes(), spaces))
+        assert np.array_equal(frames_of(tmp_path / "a.glb")[0][0], CUBE)
+
+
+def test_what_animation_pointers_say_of_a_node_is_played_like_its_own_channels(tmp_path):
+    moved = np.float32([[0, 0, 0], [1, 2, 3]])
+    turned = np.float32([[0, 0, 0, 1], [0, 0, 1, 0]])
+    channels = [(0, "translation", [0, 1], moved, "LINEAR"), (0, "rotation", [0, 1], turned, "LINEAR")]
+    made = moving_cube([*channels, (0, "scale", [0, 1], moved + 1, "STEP")])
+    plain, _ = frames_of(made.save(tmp_path / "plain.glb"), fps=4)
+    for channel in made.gltf.animations[0].channels:
+        pointer = {"pointer": f"/nodes/0/{channel.target.path}"}
+        channel.target = pygltflib.AnimationChannelTarget(path="pointer", extensions={"KHR_animation_pointer": pointer})
+    pointed, _ = frames_of(made.save(tmp_path / "pointed.glb"), fps=4)
+    assert len(plain) == 5 and np.array_equal(pointed, plain)
+
+
+def glb(structure, binary=b"", spaces=0):
     text = json.dumps(structure).encode()
-    text += b" " * (-len(text) % 4)
+    text += b" " * (-len(text) % 4 + spaces)
     binary += bytes(-len(binary) % 4)
     chunks = struct.pack("<II", len(text), 0x4E4F534A) + text
     chunks += struct.pack("<II", len(binary), 0x004E4942) + binary if binary else b""

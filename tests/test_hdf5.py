@@ -185,6 +185,11 @@ BRANCHES = ["vertex_branch", "branch_parent"]
 REFUSED = {
     "labels without parents": (["branch_parent"], {}, "got one of vertex_branch and branch_parent"),
     "no positions": (["positions"], {}, "positions: got no such dataset"),
+    "Alembic of old": (
+        ["positions"],
+        {"ABC/abc": [0]},
+        "archive: got Alembic in HDF5, expected .* abcconvert -toOgawa",
+    ),
     "float16 positions": ([], {"positions": np.zeros((5, 6, 3), "f2")}, "float16"),
     "empty positions": ([], {"positions": h5py.Empty("f4")}, "positions: got a group or an empty dataset"),
     "a cycle of edges": (BRANCHES, {"edges": [[0, 1], [1, 2], [2, 0]]}, "closes a cycle"),

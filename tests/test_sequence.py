@@ -347,6 +347,7 @@ REFUSED = {
     "binary to come": ("a.ply", PLY.format("binary_big_endian", 10**15, ""), "end of the file"),
     "lists to come": ("a.ply", PLY.format("ascii", 1, FACES.format(1)) + "0 0 0\n2000000000 1 2 3", "got a list of"),
     "negative list": ("a.ply", PLY.format("ascii", 1, FACES.format(1)) + "0 0 0\n-1 1 2 3", "got a list of -1"),
+    "longer lines": ("a.ply", PLY.format("ascii", 2, "") + "0 0 0 9\n1 1 1 9\n", "got 2 more words behind the last"),
     "another type": ("a.ply", PLY.format("ascii", 1, "property quad w\n") + "0 0 0 0\n", "expected a type of PLY"),
 }
 

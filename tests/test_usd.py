@@ -119,6 +119,20 @@ def test_units_without_a_symbol_are_kept_in_metres_and_missing_ones_stay_missing
     stage.Save()
     clip, _ = read_all(tmp_path / "a.usda")
     assert clip.metadata["meters_per_unit"] == 0.9144 and "unit" not in clip.metadata
+    layer = Sdf.Layer.FindOrOpen(str(tmp_path / "a.usda"))
+    layer.pseudoRoot.SetInfo("metersPerUnit", Vt.Float(0.01))
+    layer.Export(str(tmp_path / "a.usdc"))
+    assert read_all(tmp_path / "a.usdc")[0].metadata["unit"] == "cm"
+
+
+def test_a_layer_that_no_search_finds_is_named_as_missing_and_the_rest_is_read(tmp_path):
+    stage = grid_file(tmp_path / "a.usda")
+    for number, name in enumerate(("none.usda", "asset:none.usda", "./none.usda")):
+        stage.DefinePrim(f"/gone{number}").GetReferences().AddReference(name)
+    stage.Save()
+    with pytest.warns(SourceWarning, match="missing"):
+        clip, _ = read_all(tmp_path / "a.usda")
+    assert clip.vertex_count == len(GRID) and len(clip.not_read["missing"]) == 3
 
 
 def whole_plant(path):

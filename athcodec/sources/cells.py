@@ -189,6 +189,16 @@ def _add_faces(topology: Topology, blocks: Sequence[Block]) -> None:
             counts.append(block.counts)
             corners.append(block.nodes)
             rows.append(block.rows)
+        elif kind == "triangle_strip":
+            sizes = np.maximum(block.counts - 2, 0)
+            places = np.arange(sizes.sum()) - np.repeat(np.cumsum(sizes) - sizes, sizes)
+            turned = places % 2  # Every second triangle of a strip has its corners the other way round.
+            starts = places + np.repeat(np.cumsum(block.counts) - block.counts, sizes)
+            counts.append(np.full(len(starts), 3))
+            corners.append(
+                block.nodes[np.stack([starts, starts + 1 + turned, starts + 2 - turned], axis=1).reshape(-1)]
+            )
+            rows.append(np.repeat(block.rows, sizes))
     if rows:
         rows, counts, corners = np.concatenate(rows), np.concatenate(counts), np.concatenate(corners)
         order = np.argsort(rows, kind="stable")

@@ -19,7 +19,7 @@ from athcodec.files.gltf.json import brief, entries, entry, indices, integer, ve
 
 TRS = {"translation": [0.0, 0.0, 0.0], "rotation": [0.0, 0.0, 0.0, 1.0], "scale": [1.0, 1.0, 1.0]}
 POINTER, NODE_VISIBILITY = "KHR_animation_pointer", "KHR_node_visibility"
-VISIBLE = re.compile(rf"/nodes/(\d+)/extensions/{NODE_VISIBILITY}/visible")
+POINTED = re.compile(rf"/nodes/(\d+)/(?:({'|'.join(TRS)}|weights)|extensions/{NODE_VISIBILITY}/(visible))")
 INTERPOLATIONS = ("STEP", "LINEAR", "CUBICSPLINE")
 RATES = (30.0, 24.0, 25.0, 60.0, 24000 / 1001, 30000 / 1001, 60000 / 1001, 12.0, 15.0, 48.0, 50.0, 100.0, 120.0)
 SLOWEST, FASTEST = 10.0, 240.0  # rates of sampled motion: keys further apart are meant to be interpolated
@@ -178,8 +178,8 @@ class Scene:
         for channel in entries(animation, "channels"):
             target = entry(channel, "target")
             pointer = (target.get("extensions") or {}).get(POINTER) or {}
-            if visible := VISIBLE.fullmatch(str(pointer.get("pointer"))):
-                target = {"node": int(visible[1]), "path": "visible"}
+            if pointed := POINTED.fullmatch(str(pointer.get("pointer"))):
+                target = {"node": int(pointed[1]), "path": pointed[2] or pointed[3]}
             if target.get("node") is not None and target.get("path") in (*TRS, "weights", "visible"):
                 node = integer(target, "node", stop=max(len(self.nodes), 1))
                 if node in inside:

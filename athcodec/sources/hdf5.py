@@ -106,6 +106,8 @@ def _read(file: h5py.File, options: ReadOptions) -> MotionClip:
     budget = Budget(options.max_memory)
     unchanged = FileWatch(file.id.get_vfd_handle())  # HDF5 itself reads zeros where a file has become shorter
     positions = _dataset(file, "positions")
+    if positions is None and "ABC" in file:
+        raise ClipError("archive: got Alembic in HDF5, expected Alembic in Ogawa; abcconvert -toOgawa makes it")
     if positions is None:
         raise ClipError("positions: got no such dataset, expected (frames, vertices, 3)")
     frame = positions.nbytes // max(positions.shape[0], 1) if positions.shape else 0

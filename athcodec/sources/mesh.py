@@ -556,6 +556,8 @@ def parse_ply(data: bytes) -> Mesh:
         if element.name in values:
             raise ClipError(f"header: got the element {element.name} twice")
         values[element.name] = _element_values(source, element)
+    if not header.order and source.rest():  # Lines longer than the header says: what was read is shifted.
+        raise ClipError(f"header: got {source.rest()} more words behind the last element, expected it to name them all")
     vertices = values.get("vertex", {})
     if not {"x", "y", "z"} <= vertices.keys():
         raise ClipError("got no vertices with x, y and z, expected a PLY file with some")

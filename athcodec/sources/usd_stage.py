@@ -128,6 +128,8 @@ def _check_layers(path: str, allow_outside: bool) -> None:
         for named in layer.GetCompositionAssetDependencies() if layer else ():
             found = layer.ComputeAbsolutePath(named)
             file = Ar.SplitPackageRelativePathOuter(found)[0]
+            if not os.path.isabs(file):  # Names that are searched for: USD says which it does not find.
+                file = str(Ar.GetResolver().Resolve(file))
             if not file or found in seen:
                 continue
             seen.add(found)
@@ -636,7 +638,9 @@ def _metadata(stage: Usd.Stage, codes: np.ndarray, rate: float) -> dict[str, Any
     start = float(codes[0]) * (rate / stage.GetTimeCodesPerSecond())
     metadata: dict[str, Any] = {"fps": float(rate), "start_frame": int(start) if start == int(start) else start}
     if stage.HasAuthoredMetadata(UsdGeom.Tokens.metersPerUnit):
-        metres = UsdGeom.GetStageMetersPerUnit(stage)
+        metres = stage.GetMetadata(UsdGeom.Tokens.metersPerUnit)  # float32 in files of Blender 2.8
+        if not isinstance(metres, (int, float)):
+            raise ClipError(f"metersPerUnit: got {str(metres)[:60]!r}, expected a number")
         symbols = [symbol for symbol, value in METRES.items() if math.isclose(value, metres, rel_tol=1e-6)]
         metadata |= {"unit": symbols[0]} if symbols else {"meters_per_unit": float(metres)}
     if stage.HasAuthoredMetadata(UsdGeom.Tokens.upAxis):

@@ -238,6 +238,8 @@ def _legacy_grid(path: Path) -> _Grid:
         raise
     except Exception as error:  # meshio trusts its files: a damaged one may raise any exception
         text = " ".join(str(error).split()) or type(error).__name__
+        if isinstance(error, KeyError):
+            text = f"meshio does not know what it calls {text}; save it as .vtu"
         raise ClipError(f"{path}: the VTK file cannot be read: {text[:200]}") from None
     counts = [np.full(len(block.data), np.shape(block.data)[1] if len(block.data) else 0) for block in mesh.cells]
     kinds = [np.full(len(block.data), VTK_NUMBERS.get(block.type, 0)) for block in mesh.cells]

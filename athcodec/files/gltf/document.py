@@ -110,7 +110,7 @@ class GltfFile:
                 text = file.read(size)
             elif kind == _BIN_CHUNK and self._binary is None:
                 self._binary = _FilePart(file, place, size)
-            place += size + -size % 4
+            place += size  # Where it ends, aligned or not: trimesh once wrote chunks that are not.
         if text is None:
             raise ClipError("GLB: got no chunk, expected JSON")
         return text
