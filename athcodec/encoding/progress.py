@@ -11,7 +11,7 @@ from athcodec.encoding.sample import is_small, sample_vertices
 
 Progress = Callable[[str, float], None]
 
-# Microseconds of one thread for a vertex in a frame, as `python -m bench large` prints them; only ratios matter.
+# Microseconds of one thread for a vertex in a frame; only their ratios matter.
 SURVEY, TRIAL, MOTION = 0.11, 0.13, 0.24
 TRIALS = {"fast": 7, "default": 31, "best": 50}  # Trials that a search takes as long as, by effort.
 LAYER_TRIALS = {"fast": 3, "default": 24, "best": 10}  # Trials that layers of precision take in addition.
