@@ -110,6 +110,24 @@ def test_triangle_strips_become_triangles_that_all_face_one_way(tmp_path):
         assert clip.attributes["label"].tolist() == [7, 8, 8, 8, 9, 9]
 
 
+def test_a_wedge_has_the_same_sides_in_both_kinds_of_vtk_files(tmp_path):
+    points = "0 0 0\n0 1 0\n1 0 0\n0 0 1\n0 1 1\n1 0 1"  # As VTK numbers them: the first three face outwards.
+    head = "# vtk DataFile Version 3.0\na wedge\nASCII\nDATASET UNSTRUCTURED_GRID\n"
+    cell = "CELLS 1 7\n6 0 1 2 3 4 5\nCELL_TYPES 1\n13\n"
+    (tmp_path / "a.vtk").write_text(f"{head}POINTS 6 float\n{points}\n{cell}")
+    text = STRIPS.format(points).replace('NumberOfPoints="8" NumberOfCells="3"', 'NumberOfPoints="6" NumberOfCells="1"')
+    text = text.replace("0 1 4 0 1 2 3 4 3 4 5 6", "0 1 2 3 4 5").replace("3 8 12", "6").replace("5 6 6", "13")
+    (tmp_path / "a.vtu").write_text(text.replace("7 8 9", "7"))
+    for name in ("a.vtk", "a.vtu"):
+        with athcodec.read(tmp_path / name) as clip:
+            counts, corners = (clip.attributes[f"face_vertex_{what}"] for what in ("counts", "indices"))
+            rest, volume = clip.rest.astype(float), 0.0
+            for face in np.split(corners, np.cumsum(counts)[:-1]):
+                fan = rest[face]
+                volume += sum(np.linalg.det([fan[0], a, b]) for a, b in zip(fan[1:], fan[2:])) / 6
+            assert volume == pytest.approx(0.5), name
+
+
 def test_a_legacy_file_with_cells_that_meshio_does_not_know_says_what_to_do(tmp_path):
     points = "\n".join("0 0 0" for _ in range(10))
     cells = "CELLS 1 11\n10 0 1 2 3 4 5 6 7 8 9\nCELL_TYPES 1\n15\n"

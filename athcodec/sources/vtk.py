@@ -245,10 +245,16 @@ def _legacy_grid(path: Path) -> _Grid:
     kinds = [np.full(len(block.data), VTK_NUMBERS.get(block.type, 0)) for block in mesh.cells]
     stops = np.cumsum(np.concatenate([np.zeros(0, int), *counts]))
     starts = stops - np.concatenate([np.zeros(0, int), *counts])
-    nodes = np.concatenate([np.zeros(0, np.int64), *(np.asarray(block.data).reshape(-1) for block in mesh.cells)])
+    nodes = np.concatenate([np.zeros(0, np.int64), *(_in_vtk_order(block).reshape(-1) for block in mesh.cells)])
     cells = np.concatenate([np.zeros(0, int), *kinds]), starts, stops, nodes
     cell_data = {name: np.concatenate(values) for name, values in mesh.cell_data.items()}
     return _Grid(mesh.points, cells, {name: np.asarray(values) for name, values in mesh.point_data.items()}, cell_data)
+
+
+def _in_vtk_order(block: Any) -> np.ndarray:
+    """Return the cells of a block in the order of the file: meshio turns wedges inside out, which it alone does."""
+    data = np.asarray(block.data)
+    return data[:, [0, 2, 1, 3, 5, 4]] if block.type == "wedge" else data
 
 
 class _Vtu:
