@@ -104,6 +104,17 @@ def test_static_arrays_come_back_unchanged(clip, tmp_path, name):
 
 
 @pytest.mark.parametrize("name", tiered(FORMATS))
+def test_arrays_come_back_or_are_named_as_not_written(clip, tmp_path, name):
+    rng, count, frames = np.random.default_rng(4), clip.vertex_count, clip.frame_count
+    shapes = {"age": (count,), "pull": (count, 3), "heat": (frames, count), "gust": (frames,), "list": (7,)}
+    arrays = {key: rng.random(shape).astype(np.float32) for key, shape in shapes.items()}
+    odd = dataclasses.replace(clip, attributes=clip.attributes | arrays)
+    lost = athcodec.write(odd, tmp_path / FORMATS[name]).facts.get("not_written", {}).get("arrays", [])
+    with there_and_back(odd, tmp_path, name) as back:
+        assert set(shapes) - set(lost) == set(shapes) & set(back.attributes)
+
+
+@pytest.mark.parametrize("name", tiered(FORMATS))
 def test_a_decoded_file_is_within_its_bound_in_every_format(clip, tmp_path, name):
     summary = athcodec.encode(clip, tmp_path / "a.ath", rel_error=1e-3, effort="fast")
     with athcodec.open(tmp_path / "a.ath") as decoder:

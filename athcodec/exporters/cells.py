@@ -60,6 +60,12 @@ def _add(kinds: list, counts: list, nodes: list, kind: str, values: np.ndarray) 
     nodes.append(values.reshape(-1))
 
 
+def arrays_of_cells(motion: Any) -> set[str]:
+    """Return the names of the attributes that files of cells hold: with a row for each point or cell, or cells."""
+    kept = {name for data in cell_and_point_data(motion, cells_of(motion)) for name in data}
+    return kept | {name for name in motion.attributes if name.startswith("cells_")}
+
+
 def cell_and_point_data(motion: Any, cells: Cells) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
     """(per point, per cell): the attributes with a row of numbers for each, at most nine."""
     per_point, per_cell = {}, {}

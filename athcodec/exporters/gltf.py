@@ -47,6 +47,7 @@ from athcodec.exporters.gltf_build import (
 from athcodec.exporters.gltf_copies import PATHS, GltfCopies, Movers, unit_quaternion, with_copies
 from athcodec.exporters.gltf_joints import Joints, fit_joints
 from athcodec.exporters.rig import fit_rig
+from athcodec.exporters.scene_objects import lost_arrays
 from athcodec.files.atomic import new_file
 
 MOST_JOINTS = 65536
@@ -100,7 +101,7 @@ def _write(
     facts |= {"max_error": write.max_error, "vertices": motion.vertex_count}
     with new_file(path) as out:
         glb.write(out, later)
-    return facts
+    return facts | lost_arrays(motion, set(motion.attributes) - set(left_out))
 
 
 def _writer(

@@ -20,7 +20,9 @@ from athcodec.exporters.timing import frame_rate_of, start_frame_of
 from athcodec.sources.mdd import HEADER
 
 
-def write_clip(motion: Any, path: str | PathLike[str], options: WriteOptions, report: Callable[[float], None]) -> None:
+def write_clip(
+    motion: Any, path: str | PathLike[str], options: WriteOptions, report: Callable[[float], None]
+) -> dict[str, Any]:
     """Write the cache and its mesh. Raises ClipError where there is another mesh beside it or times are closer than
     float32 tells apart, OSError where nothing can be written."""
     check_counts(motion)
@@ -28,4 +30,6 @@ def write_clip(motion: Any, path: str | PathLike[str], options: WriteOptions, re
     stored = times.astype(">f4")
     if (np.diff(stored.astype(np.float64)) <= 0).any():
         raise ClipError("time: got frames closer together than float32 tells apart, expected times for an MDD cache")
-    write_cache(motion, path, HEADER.pack(motion.frame_count, motion.vertex_count) + stored.tobytes(), ">f4", report)
+    return write_cache(
+        motion, path, HEADER.pack(motion.frame_count, motion.vertex_count) + stored.tobytes(), ">f4", report
+    )

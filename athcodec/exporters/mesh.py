@@ -74,21 +74,34 @@ def _corner_uv(motion: Any) -> tuple[np.ndarray | None, bool]:
     return (uv, False) if domain == "vertex" and len(uv) == motion.vertex_count else (None, False)
 
 
+def _has_obj_colors(motion: Any) -> bool:
+    """Whether a clip has colours as OBJ has them: three floats for each vertex."""
+    colors = motion.attributes.get("colors")
+    fits = colors is not None and colors.shape == (motion.vertex_count, 3) and colors.dtype.kind == "f"
+    return fits and domain_of(motion, "colors") == "vertex"
+
+
+def obj_arrays(motion: Any) -> set[str]:
+    """Return the names of the attributes that OBJ files of a clip hold."""
+    kept = {"uv": _corner_uv(motion)[0] is not None, "colors": _has_obj_colors(motion)}
+    return {name for name, is_kept in kept.items() if is_kept}
+
+
+def ply_arrays(motion: Any) -> set[str]:
+    """Return the names of the attributes that PLY files of a clip hold."""
+    columns, renamed = _ply_columns(motion), {"uv": "s", "colors": "red"}
+    kept = {name for name in motion.attributes if renamed.get(name, name) in columns}
+    return kept | obj_arrays(motion) & {"uv"}
+
+
 class ObjWriter:
     """OBJ files of one clip; write(file, points) for each."""
 
-    suffix = ".obj"
+    suffix, arrays = ".obj", staticmethod(obj_arrays)
 
     def __init__(self, motion: Any):
         self._tail = "".join(_obj_tail(motion)).encode()
-        colors = motion.attributes.get("colors")
-        fits = (
-            colors is not None
-            and colors.shape == (motion.vertex_count, 3)
-            and colors.dtype.kind == "f"
-            and domain_of(motion, "colors") == "vertex"
-        )
-        self._colors = colors if fits else None
+        self._colors = motion.attributes["colors"] if _has_obj_colors(motion) else None
 
     def write(self, file: BinaryIO, points: np.ndarray) -> None:
         form = COORDINATE_FORMATS[points.dtype.itemsize]
@@ -168,7 +181,7 @@ def _switch_names(motion: Any, lines: list[str], attribute: str, names_key: str,
 class PlyWriter:
     """Binary PLY files of one clip; write(file, points) for each."""
 
-    suffix = ".ply"
+    suffix, arrays = ".ply", staticmethod(ply_arrays)
 
     def __init__(self, motion: Any):
         columns = _ply_columns(motion)

@@ -19,7 +19,8 @@ import numpy as np
 
 from athcodec.errors import ClipError
 from athcodec.exporters import WriteOptions
-from athcodec.exporters.mesh import ObjWriter, has_mesh
+from athcodec.exporters.mesh import ObjWriter, has_mesh, obj_arrays
+from athcodec.exporters.scene_objects import lost_arrays
 from athcodec.exporters.timing import frame_numbers
 from athcodec.files.atomic import check_target, new_files
 from athcodec.files.reading import Budget
@@ -30,11 +31,13 @@ STEP_TOLERANCE = 1e-4
 LARGEST_COUNT = 2**31 - 1
 
 
-def write_clip(motion: Any, path: str | PathLike[str], options: WriteOptions, report: Callable[[float], None]) -> None:
+def write_clip(
+    motion: Any, path: str | PathLike[str], options: WriteOptions, report: Callable[[float], None]
+) -> dict[str, Any]:
     """Write the cache and its mesh. Raises ClipError where the times are uneven or there is another mesh beside it,
     OSError where nothing can be written."""
     header = HEADER.pack(MAGIC, 1, *_counted(motion, *_start_and_step(motion)))
-    write_cache(motion, path, header, "<f4", report)
+    return write_cache(motion, path, header, "<f4", report)
 
 
 def _counted(motion: Any, start: float, step: float) -> tuple[int, float, float, int]:
@@ -64,8 +67,9 @@ def _start_and_step(motion: Any) -> tuple[float, float]:
 
 def write_cache(
     motion: Any, path: str | PathLike[str], header: bytes, dtype: str, report: Callable[[float], None]
-) -> None:
-    """Write the header and the positions as `dtype`, and the mesh where the clip has one and none is there."""
+) -> dict[str, Any]:
+    """Write the header and the positions as `dtype`, and the mesh where the clip has one and none is there; return what
+    they have no place for."""
     mesh_name = _mesh_to_write(motion, Path(check_target(path)))
     with new_files(path) as folder:
         if mesh_name:
@@ -74,6 +78,7 @@ def write_cache(
         with open(os.path.join(folder, Path(check_target(path)).name), "wb") as file:
             file.write(header)
             _write_frames(motion, file, dtype, report)
+    return lost_arrays(motion, obj_arrays(motion) if has_mesh(motion) else ())
 
 
 def _write_frames(motion: Any, file: BinaryIO, dtype: str, report: Callable[[float], None]) -> None:

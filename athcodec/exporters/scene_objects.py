@@ -6,7 +6,7 @@ knows no format and touches no positions.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -76,6 +76,13 @@ def hidden_copies(objects: list[SceneObject]) -> dict[str, Any]:
     """Return the sentence about objects whose copies are hidden one by one, but are not written as instances."""
     names = [obj.name for obj in objects if obj.copies == 1 and obj.shown is not None and obj.shown.shape[1] > 1]
     return {NOT_WRITTEN: {"presence of copies, which instances keep": names}} if names else {}
+
+
+def lost_arrays(motion: Any, kept: Collection[str]) -> dict[str, dict[str, list[str]]]:
+    """Return the names of attributes that a format has no place for; those that describe other arrays are left out."""
+    described = {"part_vertex_counts", "part_copies", "face_vertex_counts", "face_vertex_indices", "normals"}
+    names = [name for name in motion.attributes if name not in described | {FACE_MATERIAL, *kept}]
+    return {NOT_WRITTEN: {"arrays": names}} if names else {}
 
 
 def not_written(motion: Any, kept: Sequence[str]) -> dict[str, list[str]]:

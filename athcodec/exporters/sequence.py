@@ -20,6 +20,7 @@ import numpy as np
 from athcodec.errors import ClipError
 from athcodec.exporters import FILES, WriteOptions
 from athcodec.exporters.mesh import WRITERS
+from athcodec.exporters.scene_objects import lost_arrays
 from athcodec.exporters.timing import frame_numbers
 from athcodec.files.atomic import check_target, new_files
 from athcodec.sources.sequence import LARGEST_NUMBER, Numbering, numbering_of
@@ -39,7 +40,7 @@ def write_clip(
     writer = WRITERS[suffix](motion)
     with new_files(path, named=False) as folder:
         write_frames(motion, writer, [os.path.join(folder, name) for name in names], report)
-    return {FILES: names}
+    return {FILES: names} | lost_arrays(motion, writer.arrays(motion))
 
 
 def write_frames(motion: Any, writer: Any, paths: Sequence[str], report: Callable[[float], None]) -> None:

@@ -21,8 +21,8 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 
 from athcodec.exporters import FILES, WriteOptions
-from athcodec.exporters.cells import cell_and_point_data, cells_of
-from athcodec.exporters.scene_objects import said_scene
+from athcodec.exporters.cells import arrays_of_cells, cell_and_point_data, cells_of
+from athcodec.exporters.scene_objects import lost_arrays, said_scene
 from athcodec.exporters.sequence import file_names, write_frames
 from athcodec.files.atomic import check_target, new_files
 from athcodec.sources.scene_objects import OWN
@@ -49,7 +49,7 @@ def write_clip(
         write_frames(motion, writer, [os.path.join(folder, name) for name in names], report)
         if index:
             Path(folder, index).write_text(_index(motion, names), "utf-8")
-    return {FILES: [index] if index else names}
+    return {FILES: [index] if index else names} | lost_arrays(motion, arrays_of_cells(motion))
 
 
 def _stem(target: Path) -> str:

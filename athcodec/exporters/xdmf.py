@@ -20,9 +20,9 @@ import h5py
 import numpy as np
 
 from athcodec.exporters import WriteOptions
-from athcodec.exporters.cells import Cells, cell_and_point_data, cells_of
+from athcodec.exporters.cells import Cells, arrays_of_cells, cell_and_point_data, cells_of
 from athcodec.exporters.hdf5 import Sink
-from athcodec.exporters.scene_objects import said_names
+from athcodec.exporters.scene_objects import lost_arrays, said_names
 from athcodec.files.atomic import check_target, new_files
 from athcodec.sources.cells import VTK_NAMES, VTK_NUMBERS
 from athcodec.sources.xdmf import MIXED
@@ -48,7 +48,9 @@ _FORMS = {1: "Scalar", 3: "Vector", 6: "Tensor6", 9: "Tensor"}
 SERIES = "motion"
 
 
-def write_clip(motion: Any, path: str | PathLike[str], options: WriteOptions, report: Callable[[float], None]) -> None:
+def write_clip(
+    motion: Any, path: str | PathLike[str], options: WriteOptions, report: Callable[[float], None]
+) -> dict[str, Any]:
     """Write both files. Raises OSError where nothing can be written."""
     name = Path(check_target(path)).name
     with new_files(path) as folder, open(os.path.join(folder, f"{name}.h5"), "w+b", buffering=0) as file:
@@ -58,6 +60,7 @@ def write_clip(motion: Any, path: str | PathLike[str], options: WriteOptions, re
         sink.check()
         ElementTree.indent(root)
         ElementTree.ElementTree(root).write(os.path.join(folder, name), encoding="utf-8", xml_declaration=True)
+    return lost_arrays(motion, arrays_of_cells(motion))
 
 
 class _Writer:
