@@ -531,6 +531,7 @@ def test_tangents_follow_u_at_right_angles_to_normals(lib):
         assert (bitangents[:, 1] > 0.8).all()  # along v
 
 
+@pytest.mark.slow
 def test_it_runs_clean_under_sanitizers(sample_ath, tmp_path):
     """All of a program's calls, with memory that is too old or too small caught."""
     (tmp_path / "program.c").write_text(IMPLEMENTATION + PROGRAM)
