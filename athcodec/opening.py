@@ -66,7 +66,7 @@ def open(
         path, strict=strict, allow_partial=allow_partial, limits=limits, host_mesh=mesh, gltf_motion=gltf_motion
     )
     try:
-        if mesh_path is not None and file.needs_host_mesh:
+        if mesh_path is not None:
             set_host_mesh_of(file, mesh_path)
         return Decoder(file, clip, closes_file=True)
     except BaseException:
@@ -75,7 +75,10 @@ def open(
 
 
 def set_host_mesh_of(file: AthFile, path: str | os.PathLike[str]) -> None:
-    """Read a mesh in the unit and axes of an .ath file and hand it over. Raises ClipError, WrongHostMesh, OSError."""
+    """Read a mesh in the unit and axes of an .ath file and hand it over, if the file needs one. Raises ClipError,
+    WrongHostMesh, OSError."""
+    if not file.needs_host_mesh:
+        return
     from athcodec.sources import read  # The sources take long to import, and most files need no mesh.
 
     units = {name: file.metadata[name] for name in ("unit", "up_axis") if isinstance(file.metadata.get(name), str)}

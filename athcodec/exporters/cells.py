@@ -6,6 +6,7 @@ clip without faces, edges and volumes becomes a point cell per vertex.
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Any
 
@@ -60,10 +61,9 @@ def _add(kinds: list, counts: list, nodes: list, kind: str, values: np.ndarray) 
     nodes.append(values.reshape(-1))
 
 
-def arrays_of_cells(motion: Any) -> set[str]:
-    """Return the names of the attributes that files of cells hold: with a row for each point or cell, or cells."""
-    kept = {name for data in cell_and_point_data(motion, cells_of(motion)) for name in data}
-    return kept | {name for name in motion.attributes if name.startswith("cells_")}
+def arrays_in(motion: Any, per_point: Collection[str], per_cell: Collection[str]) -> set[str]:
+    """Return the names of the attributes that a file of cells holds: its data per point and per cell, and the cells."""
+    return {*per_point, *per_cell, *(name for name in motion.attributes if name.startswith("cells_"))}
 
 
 def cell_and_point_data(motion: Any, cells: Cells) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:

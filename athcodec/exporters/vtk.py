@@ -21,7 +21,7 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 
 from athcodec.exporters import FILES, WriteOptions
-from athcodec.exporters.cells import arrays_of_cells, cell_and_point_data, cells_of
+from athcodec.exporters.cells import arrays_in, cell_and_point_data, cells_of
 from athcodec.exporters.scene_objects import lost_arrays, said_scene
 from athcodec.exporters.sequence import file_names, write_frames
 from athcodec.files.atomic import check_target, new_files
@@ -49,7 +49,7 @@ def write_clip(
         write_frames(motion, writer, [os.path.join(folder, name) for name in names], report)
         if index:
             Path(folder, index).write_text(_index(motion, names), "utf-8")
-    return {FILES: [index] if index else names} | lost_arrays(motion, arrays_of_cells(motion))
+    return {FILES: [index] if index else names} | lost_arrays(motion, writer.arrays)
 
 
 def _stem(target: Path) -> str:
@@ -87,6 +87,7 @@ class _VtuWriter:
         ]
         self._head = b"".join(parts)
         per_point, per_cell = cell_and_point_data(motion, cells)
+        self.arrays = arrays_in(motion, per_point, per_cell)
         described = {"connectivity": cells.nodes, "offsets": cells.stops, "types": cells.types.astype(np.uint8)}
         parts = [
             b"</Points>\n",

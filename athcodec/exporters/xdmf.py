@@ -20,7 +20,7 @@ import h5py
 import numpy as np
 
 from athcodec.exporters import WriteOptions
-from athcodec.exporters.cells import Cells, arrays_of_cells, cell_and_point_data, cells_of
+from athcodec.exporters.cells import Cells, arrays_in, cell_and_point_data, cells_of
 from athcodec.exporters.hdf5 import Sink
 from athcodec.exporters.scene_objects import lost_arrays, said_names
 from athcodec.files.atomic import check_target, new_files
@@ -56,11 +56,12 @@ def write_clip(
     with new_files(path) as folder, open(os.path.join(folder, f"{name}.h5"), "w+b", buffering=0) as file:
         sink = Sink(file.fileno(), fspath(path))
         with h5py.File(sink, "w") as data:
-            root = _Writer(motion, data, f"{name}.h5", options.gzip, sink).write(report)
+            writer = _Writer(motion, data, f"{name}.h5", options.gzip, sink)
+            root = writer.write(report)
         sink.check()
         ElementTree.indent(root)
         ElementTree.ElementTree(root).write(os.path.join(folder, name), encoding="utf-8", xml_declaration=True)
-    return lost_arrays(motion, arrays_of_cells(motion))
+    return lost_arrays(motion, writer.arrays)
 
 
 class _Writer:
@@ -105,6 +106,7 @@ class _Writer:
         geometry = ElementTree.Element("Geometry", GeometryType="XYZ")
         geometry.append(self._item(np.asarray(motion.rest, motion.dtype), "geometry"))
         per_point, per_cell = cell_and_point_data(motion, cells)
+        self.arrays = arrays_in(motion, per_point, per_cell)
         attributes = [
             self._attribute(name, center, values, f"{center.lower()}/{index}")
             for center, data in (("Node", per_point), ("Cell", per_cell))

@@ -115,10 +115,12 @@ def add_object(
     host_mesh: str = "",
 ):
     """A new object in the active collection that plays `path`. Raises OSError, athcodec's errors."""
+    from athcodec.opening import set_host_mesh_of
+
     path = os.path.normpath(bpy.path.abspath(path))
     decoder = player.decoder_of(path, clip)
     if host_mesh:
-        decoder.file.set_host_mesh(bpy.path.abspath(host_mesh))
+        set_host_mesh_of(decoder.file, bpy.path.abspath(host_mesh))
     name = os.path.splitext(os.path.basename(path))[0]
     obj = bpy.data.objects.new(name, _mesh(name, decoder))
     context.collection.objects.link(obj)
