@@ -106,3 +106,33 @@ def test_a_loop_holds_its_poses(poses, tmp_path):
     with athcodec.open(tmp_path / "held.ath") as decoder:
         assert decoder.clip.loop
         assert sum(repeats_of(decoder)) == 40
+
+
+@pytest.mark.parametrize("options", [{}, {"segment_frames": 32}, {"weights": np.linspace(0.5, 2.0, 1001)}])
+def test_poses_that_are_held_but_for_rounding_are_coded_once_and_every_frame_keeps_its_bound(poses, tmp_path, options):
+    clip, rng = held(poses, 3), np.random.default_rng(1)
+    size = float(np.linalg.norm(np.ptp(poses.positions.reshape(-1, 3), axis=0)))
+    noise = 4e-8 * size * rng.uniform(-1, 1, clip.positions.shape)
+    noisy = clip.replace(positions=(clip.positions + noise).astype(np.float32))
+    summary = athcodec.encode(noisy, tmp_path / "noisy.ath", **FEW | options)
+    plain = athcodec.encode(clip, tmp_path / "plain.ath", **FEW | options)
+    assert summary.bytes <= 1.05 * plain.bytes
+    with athcodec.open(tmp_path / "plain.ath") as decoder:
+        expected = repeats_of(decoder)
+    with athcodec.open(tmp_path / "noisy.ath", strict=True) as decoder:
+        assert repeats_of(decoder) == expected and sum(expected) == 80
+        error = np.linalg.norm(decoder.positions() - noisy.positions.astype(np.float64), axis=2)
+        weights = options.get("weights", np.ones(1))
+        assert (error <= weights * BOUND * size * (1 + 1e-6)).all()
+        for level in decoder.levels:
+            shown = np.linalg.norm(decoder.positions(level=level.level) - noisy.positions.astype(np.float64), axis=2)
+            assert shown.max() <= level.max_error
+        assert len(decoder.file.time) == 120
+
+
+def test_a_lossless_file_leaves_out_only_frames_that_are_equal_to_the_bit(poses, tmp_path):
+    clip = held(poses, 2)
+    noisy = clip.replace(positions=clip.positions + np.float32(1e-9) * (np.arange(80) % 2)[:, None, None])
+    athcodec.encode(noisy, tmp_path / "noisy.ath", **FEW | {"lossless": True})
+    with athcodec.open(tmp_path / "noisy.ath") as decoder:
+        assert np.array_equal(decoder.positions(), noisy.positions)

@@ -24,6 +24,7 @@ from athcodec.encoding.segment_samples import SAMPLES
 from athcodec.encoding.segmentation import split_segments
 from athcodec.encoding.summary import Summary
 from athcodec.files.atomic import check_target, keeping, new_file
+from athcodec.motion.branches.grown_pose import with_grown_pose
 from athcodec.motion.clip import MotionClip
 from athcodec.motion.thresholds import Thresholds
 from athcodec.motion.units import Length
@@ -242,6 +243,8 @@ def _begin(
 ) -> tuple[EncodingJob, float]:
     """The job, whose clip has branches by then, and its bound in scene units."""
     clip.check()
+    if not options.keeps_rest:
+        clip = with_grown_pose(clip)
     branches = None
     if not clip.has_branches:
         report("branches", 0.0)

@@ -53,6 +53,7 @@ from athcodec.encoding.summary import Seam, Summary
 from athcodec.encoding.survey import Ath, Survey, survey
 from athcodec.errors import BoundError, ClipError, SourceWarning
 from athcodec.files.threads import ThreadPool, default_jobs
+from athcodec.motion.branches.grown_pose import with_grown_branches, with_grown_pose
 from athcodec.motion.branches.result import Found, with_branches
 from athcodec.motion.clip import ERROR_WEIGHTS, MotionClip
 from athcodec.motion.hierarchy import Hierarchy, derived_edges, hierarchy_of
@@ -69,6 +70,7 @@ CHUNK_BYTES, LEVEL_BYTES = 6, 6  # Bytes of the front for a chunk, and for the e
 PREDICTED_SHARE = 0.8  # Largest share of the bytes of layers at which predicted motion, which has none, is better.
 REFUSAL_ROUNDS = 12  # Largest number of files that are coded to find the smallest bound that can be kept.
 FEW_BYTES = 2000  # Bytes up to which the file of a small clip may do without coarse levels.
+HELD_SHARE = 1 / 64  # Largest distance, in bounds, of a frame from the pose that is shown in its place.
 SEARCH_SAVES = 0.5  # Largest share of the bytes at its first settings that a search has saved.
 STATIC_METADATA = ("unit", "up_axis")
 
@@ -104,6 +106,11 @@ class EncodingOptions:
         if segment_frames is not None:
             options |= {"segment_frames": segment_frames, "predicted_frames": segment_frames}
         return cls(ladder=ladder_of(ladder), rest_precision=RestPrecision.of(rest_error), **options)
+
+    @property
+    def keeps_rest(self) -> bool:
+        """Whether the clip's rest pose comes back bit for bit, and so is what motion is coded about."""
+        return self.exact_rest or self.host_rest
 
     def __post_init__(self) -> None:
         for name in ("segment_frames", "jobs"):
@@ -252,6 +259,7 @@ class EncodingJob:
         """Return the job for a clip, all of whose frames are read. branches: those found for a clip without."""
         clip, factors = _completed(clip, branches, options)
         hierarchy = hierarchy_of(clip)
+        clip = clip if options.keeps_rest else with_grown_branches(clip, hierarchy)
         _check_limits(clip, hierarchy)
         pool = ThreadPool(options.jobs or default_jobs())
         thresholds = {} if options.tam is None else {name: getattr(options.tam, name) for name in ("lam", "xi", "eta")}
@@ -282,7 +290,9 @@ class EncodingJob:
         if got != expected:
             raise ClipError(f"clip: got {got} frames and vertices, expected {expected} as in the draft")
         options = dataclasses.replace(draft.options, jobs=jobs)
+        clip = clip if options.keeps_rest else with_grown_pose(clip)
         clip, factors = _completed(clip, draft.branches, options)
+        clip = clip if options.keeps_rest else with_grown_branches(clip, seen.hierarchy)
         source = cls._source(clip, seen, factors, options, ThreadPool(jobs or default_jobs()))
         return cls(source, options, report, draft.branches)
 
@@ -295,7 +305,7 @@ class EncodingJob:
             seen.hierarchy,
             seen,
             options.segment_frames,
-            options.exact_rest or options.host_rest or (options.lossless and clip.rest_given),
+            options.keeps_rest or (options.lossless and clip.rest_given),
             None if factors is None else factors[seen.hierarchy.vertex_source],
             pool,
             options.host_rest,
@@ -354,6 +364,14 @@ class EncodingJob:
     def decide(self, bound: float) -> _Decided:
         """Search for settings."""
         self._check(bound)
+        return self._holding(bound)._decide(bound)
+
+    def _holding(self, bound: float) -> EncodingJob:
+        """Return the job without frames that others show within a small part of the bound."""
+        tolerance = 0.0 if self.options.lossless else HELD_SHARE * self.source.smallest_bound(bound)
+        return dataclasses.replace(self, source=self.source.holding(tolerance))
+
+    def _decide(self, bound: float) -> _Decided:
         ath = self.seen.ath(self.thresholds(bound))
         ratios = self._layer_ratios(ath, bound)
         ratio = ratios[0]
@@ -417,14 +435,14 @@ class EncodingJob:
     def _estimated_bytes(self, decided: _Decided) -> float:
         """Return the bytes of the motion of a file whose segments are like typical ones."""
         total = float(decided.shared_bytes)
-        for segment, frames in typical_segments(self.source):
+        for segment, frames in typical_segments(decided.source):
             if segment not in decided.tried:
-                motion = self._motion(decided, segment, self.source.positions(segment), self._exact(segment))
+                motion = self._motion(decided, segment, decided.source.positions(segment), self._exact(segment))
                 decided.tried[segment] = CodedSegment(segment, *motion.joined_to())
             coded = decided.tried[segment]
             lossy = [data for (_, kind), data in coded.chunks.items() if kind != ct.EXACT]
             front = CHUNK_BYTES * len(lossy) + LEVEL_BYTES * len(coded.errors)
-            total += (front + sum(map(len, lossy))) * frames / self.source.frames_of(segment)
+            total += (front + sum(map(len, lossy))) * frames / decided.source.frames_of(segment)
         return total
 
     def _layer_ratios(self, ath: Ath, bound: float) -> list[int]:
@@ -453,6 +471,9 @@ class EncodingJob:
 
     def decided(self, draft: Draft) -> _Decided:
         """Return what the maker of the draft decided. Raises ClipError if it is not the same here."""
+        return self._holding(draft.choice.settings.bound)._decided(draft)
+
+    def _decided(self, draft: Draft) -> _Decided:
         settings = draft.choice.settings
         if draft.choice.predicted is not None:
             decided = self._predicted(draft.choice)
@@ -671,7 +692,8 @@ class EncodingJob:
             if segment.index not in missing:
                 raise ValueError(f"segments: got {segment.index} twice or beyond the last, expected each once")
             missing.remove(segment.index)
-            errors[:, segment.index], joins[:, segment.index] = segment.errors, segment.joins
+            errors[:, segment.index] = segment.errors + decided.source.held_error
+            joins[:, segment.index] = segment.joins
             for (level, kind), payload in segment.chunks.items():
                 store.add(kind, payload, level, segment.index)
             self.report("motion", 1 - len(missing) / count)

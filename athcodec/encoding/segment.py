@@ -37,7 +37,7 @@ from athcodec.encoding.survey import Ath, Survey
 from athcodec.encoding.time_bases import Entries, InWaves, TimeComponents
 from athcodec.errors import BoundError
 from athcodec.files.threads import SERIAL, ThreadPool, default_jobs
-from athcodec.motion.algebra import length, multiply
+from athcodec.motion.algebra import largest_distance, length, multiply
 from athcodec.motion.clip import MotionClip, stands_still
 from athcodec.motion.hierarchy import Hierarchy
 from athcodec.motion.polygons import Polygons
@@ -70,6 +70,8 @@ class Source:
     host_rest: bool = False
     rest_precision: RestPrecision = RestPrecision()
     reference: np.ndarray | None = None  # (N, 3) float64 less the origin; None: the rest pose.
+    held: np.ndarray | None = None  # (frames,) bool: frames that the pose before them stands for; None: repeats alone.
+    held_error: float = 0.0  # Largest distance of any vertex in a held frame from the pose that stands for it.
     polygons: Polygons | None = None  # Polygons that the file stores as FACES.
     without: frozenset[Feature] = frozenset()  # Features that the file does without.
     source_rest: np.ndarray = field(init=False)  # (N, 3) float64 less the origin.
@@ -122,10 +124,28 @@ class Source:
         """Return the source in segments of at most so many frames."""
         return self._changed(segment_frames=frames)
 
+    def holding(self, tolerance: float) -> Source:
+        """Return the source with frames left out that differ by at most so much from the last one that is coded."""
+        nearly = (self.seen.steps > 0) & (self.seen.steps <= tolerance)
+        if not nearly.any() or self.still or Feature.REPEATS in self.without:
+            return self
+        held, starts, worst = self.seen.repeats, {start for start, _ in self.segments}, 0.0
+        shown = np.zeros(0)
+        for start, block in self.clip.blocks():
+            for frame, pose in enumerate(block, start):
+                if frame not in starts and nearly[frame]:
+                    distance = largest_distance(pose, shown)
+                    held[frame] = distance <= tolerance
+                    worst = max(worst, distance if held[frame] else 0.0)
+                if not held[frame] or frame in starts:
+                    shown = pose.copy()
+        # Where segments are cut elsewhere, a held frame may stand for others that the same pose stood for.
+        return self._changed(held=held, held_error=2 * worst)
+
     def _changed(self, **fields) -> Source:
         source = replace(self, **fields)
         source.still = self.still  # Frames would have to be read for it again.
-        if len(self.segments) == len(source.segments) == 1:
+        if len(self.segments) == len(source.segments) == 1 and source.held is self.held:
             source._all_positions = self._all_positions
         return source
 
@@ -184,8 +204,9 @@ class Source:
     def limit(self, bound: float) -> float | np.ndarray:
         """Return what decoded positions are held to: one distance for all vertices, or one each, (N,) in file order."""
         if self.weights is None:
-            return qz.error_limit(bound, self.seen.diagonal)
-        return np.array([qz.error_limit(limit, self.seen.diagonal) for limit in bound * self.weights])
+            return qz.error_limit(bound - self.held_error, self.seen.diagonal)
+        limits = bound * self.weights - self.held_error
+        return np.array([qz.error_limit(limit, self.seen.diagonal) for limit in limits])
 
     def smallest_bound(self, bound: float) -> float:
         """Return the smallest bound of any vertex."""
@@ -215,9 +236,10 @@ class Source:
 
     @cached_property
     def repeats(self) -> np.ndarray:
-        """(frames,) bool: frames of the clip that are not coded, because they repeat the one before in their segment.
+        """(frames,) bool: frames of the clip that are not coded, because the one before in their segment shows them.
         None is left out if all are the rest pose: they take no bytes either."""
         repeats = self.seen.repeats & (not self.still and Feature.REPEATS not in self.without)
+        repeats |= self.held if self.held is not None else False
         repeats[[start for start, _ in self.segments]] = False
         return repeats
 

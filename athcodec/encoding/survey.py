@@ -15,7 +15,7 @@ import numpy as np
 
 from athcodec.files.threads import SERIAL, ThreadPool
 from athcodec.motion.affine_fit import Differences, Pieces, seen_from
-from athcodec.motion.algebra import length, multiply
+from athcodec.motion.algebra import largest_distance, length, multiply
 from athcodec.motion.hierarchy import Hierarchy, hierarchy_of
 from athcodec.motion.thresholds import Thresholds
 
@@ -347,8 +347,9 @@ class Survey:
         The surveyed one; None where lam was 0.
     most_beyond_xi : (C,) integer array or None
         The most vertices beyond xi in a frame (LAD); None where lam was 0.
-    repeats : (T,) bool array
-        Whether each frame is the one before it, bit for bit.
+    steps : (T,) float64
+        The largest distance of any vertex from where it is in the frame before, 0 only if all have the same bits;
+        infinite for the first frame.
     """
 
     hierarchy: Hierarchy
@@ -363,7 +364,12 @@ class Survey:
     largest_distance: np.ndarray
     xi: float | None
     most_beyond_xi: np.ndarray | None
-    repeats: np.ndarray
+    steps: np.ndarray
+
+    @property
+    def repeats(self) -> np.ndarray:
+        """(T,) bool: whether each frame is the one before it, bit for bit."""
+        return self.steps == 0
 
     @property
     def diagonal(self) -> float:
@@ -473,8 +479,8 @@ def survey(
         return _Extent.of(frames, rest), Differences.of(seen_from(pieces.origin, frames), pieces, xi)
 
     extent, differences, gads = None, None, _Largest(limits.eta + 1)
-    repeats: list[bool] = []
-    portions = _noting_repeats(_portions(clip, hierarchy.vertex_count), repeats)
+    steps: list[float] = []
+    portions = _noting_steps(_portions(clip, hierarchy.vertex_count), steps)
     for where, how in pool.ordered(measured, portions, 2 * pool.jobs):
         extent, differences = (where, how) if extent is None else (extent | where, differences | how)
         gads.add(how.gads)
@@ -494,7 +500,7 @@ def survey(
         largest_distance=differences.largest_distance,
         xi=xi,
         most_beyond_xi=None if xi is None else differences.most_beyond_xi,
-        repeats=np.array(repeats),
+        steps=np.array(steps),
     )
 
 
@@ -647,14 +653,20 @@ def _portions(positions: MotionClip | np.ndarray, vertex_count: int) -> Iterator
             yield block[start : start + at_once]
 
 
-def _noting_repeats(portions: Iterable[np.ndarray], repeats: list[bool]) -> Iterator[np.ndarray]:
-    """Yield the portions, and note of each frame whether it has the bits of the one before it."""
+def _noting_steps(portions: Iterable[np.ndarray], steps: list[float]) -> Iterator[np.ndarray]:
+    """Yield the portions, and note of each frame how far it is from the one before it (`Survey.steps`)."""
     before = None
     for portion in portions:
         for frame in portion:
-            repeats.append(before is not None and _same_bits(frame, before))
+            steps.append(np.inf if before is None else _step(frame, before))
             before = frame
         yield portion
+
+
+def _step(one: np.ndarray, other: np.ndarray) -> float:
+    if _same_bits(one, other):
+        return 0.0
+    return max(largest_distance(one, other), np.finfo(np.float64).tiny)
 
 
 def _same_bits(one: np.ndarray, other: np.ndarray) -> bool:

@@ -35,6 +35,12 @@ def multiply(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return out
 
 
+def largest_distance(one: np.ndarray, other: np.ndarray) -> float:
+    """Return the largest distance of any point of a pose, (N, 3), from where it is in another."""
+    difference = one.astype(np.float64) - other
+    return math.sqrt(float((difference**2).sum(axis=1).max()))
+
+
 def _stack(matrices: np.ndarray, batch: tuple[int, ...]) -> tuple[np.ndarray, int]:
     """Return the matrices of a stack behind each other, and the distance from one to the next: 0 if all are the
     same."""

@@ -6,7 +6,8 @@ over the mesh from there.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import operator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -21,17 +22,26 @@ NEIGHBOURS = 60  # Nearest vertices of each one among which other branches are s
 LONE_PARTS = 64  # Most parts of the plant whose nearest others are sought at any distance.
 QUERY = 1 << 21  # Neighbours in one query.
 STAYING = 300.0  # Weight of the variation of two branches' distance against its size.
+RELATED = 0.5  # Cost factor for each word that the names of two branches have in common, place by place.
 ALIKE = 4.0  # Cost factor of two branches of the same size: no leaf grows on a leaf.
 ROOT_SIZE = 0.25  # Part of the largest branch's diagonal below which a branch is no root.
 IN_ORDER = 0.7  # Rank correlation of the source's order with the distance from the base that keeps the source's order.
 SMALL = 8  # Vertices of a branch up to which the source's order is always kept.
 
 
-def arranged(seen: Seen, label: np.ndarray, root: int | None, method: str, parent: np.ndarray | None = None) -> Found:
-    """Return a tree over the labels, whose vertices run from base to tip."""
+def arranged(
+    seen: Seen,
+    label: np.ndarray,
+    root: int | None,
+    method: str,
+    parent: np.ndarray | None = None,
+    names: Sequence[Sequence[str]] = (),
+) -> Found:
+    """Return a tree over the labels, whose vertices run from base to tip. names: words of each label's name, of which
+    relatives share the first."""
     frames, rest = seen.frames, seen.clip.rest
     if parent is None:
-        joints = _joints(frames, label, _contacts(frames, label), root)
+        joints = _joints(frames, label, _contacts(frames, label, names), root)
     else:
         joints = _joints_of(rest, frames, label, parent)
     return checked_branches(label, joints.parent, _along(rest, label, joints, seen.links), method)
@@ -125,7 +135,7 @@ def _sizes(rest: np.ndarray, label: np.ndarray) -> np.ndarray:
     return diagonals
 
 
-def _contacts(frames: np.ndarray, label: np.ndarray) -> _Contacts:
+def _contacts(frames: np.ndarray, label: np.ndarray, names: Sequence[Sequence[str]]) -> _Contacts:
     """Return the pair of vertices of every two near branches that best keeps its distance: they may hang together
     there."""
     pairs = _near_pairs(frames[0], label)
@@ -139,6 +149,10 @@ def _contacts(frames: np.ndarray, label: np.ndarray) -> _Contacts:
     size = np.bincount(label)[label[pairs]]
     cost[size[:, 0] == size[:, 1]] *= ALIKE
     both = np.sort(label[pairs], axis=1)
+    if names:
+        pair, back = np.unique(both, axis=0, return_inverse=True)
+        shared = [sum(map(operator.eq, names[a], names[b])) for a, b in pair.tolist()]
+        cost *= RELATED ** np.array(shared)[back.ravel()]
     best = cheapest_of_each(both[:, 0] * (int(label.max()) + 1) + both[:, 1], cost)
     return _Contacts(pairs[best], cost[best])
 

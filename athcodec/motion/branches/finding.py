@@ -1,23 +1,26 @@
 """Branches for a clip that names none, found by what data it has.
 
-Labels come from attributes named like branch ids, from the joints of a skin, from an edge graph, from the connected
-components of a render mesh, or from motion: runs of points that keep their distance, or patches of a mesh that move
-rigidly. attachment.py arranges all but runs and edge graphs alike. Only a few frames are read.
+Labels come from attributes named like branch ids, from the joints of a skin, from an edge graph, from the objects of a
+scene that move as wholes, from the connected components of a render mesh, or from motion: runs of points that keep
+their distance, or patches of a mesh that move rigidly. attachment.py arranges all but runs and edge graphs alike. Only
+a few frames are read.
 """
 
 from __future__ import annotations
 
 import dataclasses
+import re
 from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from athcodec.errors import ClipError
 from athcodec.motion.branches.attachment import arranged
+from athcodec.motion.branches.grown_pose import with_grown_pose
 from athcodec.motion.branches.patches import rigid_patches
 from athcodec.motion.branches.point_runs import base_points, run_links, scipy_module
 from athcodec.motion.branches.result import Found
-from athcodec.motion.branches.seen import Seen, components, links_of, near_neighbours, numbered
+from athcodec.motion.branches.seen import Seen, affine_share, components, links_of, near_neighbours, numbered, parts_of
 from athcodec.motion.clip import MotionClip, stands_still
 from athcodec.motion.hierarchy import branches_from_edges
 from athcodec.options import METHODS, whole
@@ -25,6 +28,7 @@ from athcodec.options import METHODS, whole
 LABEL_NAMES = ("vertex_branch", "branch", "branch_id", "branchid", "branch_index", "branchindex", "branch_number")
 PARENT_NAMES = ("branch_parent", "branchparent", "branch_parents", "parent_branch", "parent")
 LONE_POINTS = 0.1  # Part of the vertices that may be alone before patches are tried besides runs.
+AFFINE = 0.9  # Least share of the vertices that are in objects which move by one affine map each.
 COMPONENTS_AT_MOST = 0.6  # Part of the vertices above which components are no branches but loose points.
 PATCH_VERTICES = 150  # Average vertices of a patch in a mesh without other branches.
 SMALL_PATCH, LARGE_PATCH = 40, 600  # Sizes of patches, one of which is tried besides.
@@ -40,9 +44,11 @@ def find_branches(clip: MotionClip, method: str = "auto", root: int | None = Non
     clip : MotionClip
     method : str, optional
         "attributes": arrays named like branch numbers, per vertex or face. "skeleton": the joints that moved the
-        vertices. "edges": a graph of centre lines. "components": the connected components of a mesh. "runs": points
-        without faces or edges, linked to those that keep their distance: blades, needles, strands, centre lines.
-        "motion": patches that move rigidly. "auto": the first of these that the clip has the data for.
+        vertices. "edges": a graph of centre lines. "objects": the objects of a scene, each of which moves by one
+        affine map; those whose names share more words are the more likely to hang on each other. "components": the
+        connected components of a mesh. "runs": points without faces or edges, linked to those that keep their distance:
+        blades, needles, strands, centre lines. "motion": patches that move rigidly. "auto": the first of these that the
+        clip has the data for.
     root : int, optional
         A vertex of the branch that all others hang on, directly or not; by default the largest branch is that.
 
@@ -63,7 +69,7 @@ def find_branches(clip: MotionClip, method: str = "auto", root: int | None = Non
     if method != "auto" and method not in METHODS:
         raise ValueError(f"method: got {method!r}, expected auto or one of {', '.join(METHODS)}")
     root = None if root is None else whole("root", root)
-    branches = _first_found(Seen(clip), METHODS if method == "auto" else (method,), root)
+    branches = _first_found(Seen(with_grown_pose(clip)), METHODS if method == "auto" else (method,), root)
     if branches is None:
         raise ClipError(f"branches: the clip has nothing to find them by {method}, expected {_EXPECTED[method]}")
     return branches
@@ -79,6 +85,10 @@ def candidates(clip: MotionClip) -> list[Found]:
         first = _first_found(seen, METHODS[:-2], None)
         return [single] if first is None else [single, first]
     first = _first_found(seen, METHODS, None) or _by_motion(seen, None)
+    if first.method == "objects":  # What hangs on a part that grows may move more simply by itself.
+        other = _first_found(seen, METHODS[METHODS.index("objects") + 1 :], None)
+        free = dataclasses.replace(first, branch_parent=np.full_like(first.branch_parent, -1))
+        return [free, first, *([] if other is None else [other])]
     if first.method == "skeleton":
         return [first, dataclasses.replace(first, stem_index=None)]
     lone = np.count_nonzero(np.bincount(first.vertex_branch) == 1)
@@ -200,13 +210,10 @@ def _nearest_label(rest: np.ndarray, label: np.ndarray) -> tuple[np.ndarray, np.
 def _unlabelled_parts(clip: MotionClip, label: np.ndarray) -> np.ndarray:
     """Return the number of each object, and of each of its copies, that has no label at all, (N,); -1 for other
     vertices."""
-    counts, copies = (clip.attributes.get(name) for name in ("part_vertex_counts", "part_copies"))
-    if counts is None or counts.ndim != 1 or counts.sum() != len(label):
+    part = parts_of(clip)
+    if part is None:
         return np.full(len(label), -1)
-    if copies is not None and copies.shape == counts.shape and (counts % np.maximum(copies, 1) == 0).all():
-        counts = np.repeat(counts // np.maximum(copies, 1), np.maximum(copies, 1))
-    part = np.repeat(np.arange(len(counts)), counts)
-    is_bare = np.bincount(part, label >= 0, len(counts)) == 0
+    is_bare = np.bincount(part, label >= 0) == 0
     place = np.cumsum(is_bare) - 1
     return np.where(is_bare[part], place[part], -1)
 
@@ -222,6 +229,21 @@ def _by_edges(seen: Seen, root: int | None) -> Found | None:
     except ClipError:
         return None
     return Found(*branches, "edges")
+
+
+def _by_objects(seen: Seen, root: int | None) -> Found | None:
+    """Find branches by objects of a scene, most of which move by one affine map each."""
+    clip = seen.clip
+    label = parts_of(clip)
+    if label is None or label.max() == 0 or label.max() > COMPONENTS_AT_MOST * len(label):
+        return None
+    if affine_share(seen.frames, label) < AFFINE:
+        return None
+    counts, said = clip.attributes["part_vertex_counts"], clip.metadata.get("part_names")
+    words = said if isinstance(said, list) and len(said) == len(counts) else [""] * len(counts)
+    part = np.searchsorted(np.cumsum(counts), np.unique(label, return_index=True)[1], side="right")
+    found = arranged(seen, label, root, "objects", names=[re.split("[/_|]", str(words[number])) for number in part])
+    return dataclasses.replace(found, stem_index=None)
 
 
 def _by_components(seen: Seen, root: int | None) -> Found | None:
@@ -270,6 +292,7 @@ _FINDERS: dict[str, Callable[[Seen, int | None], Found | None]] = {
     "attributes": _by_attributes,
     "skeleton": _by_skeleton,
     "edges": _by_edges,
+    "objects": _by_objects,
     "components": _by_components,
     "runs": _by_runs,
     "motion": _by_motion,
@@ -278,6 +301,7 @@ _EXPECTED = {
     "attributes": f"an attribute per vertex or face named as one of {', '.join(LABEL_NAMES)}",
     "skeleton": "joints with weights",
     "edges": "edges without cycles and no faces",
+    "objects": "several objects in a scene that move by one affine map each",
     "components": "faces or edges in several separate pieces",
     "runs": "points without faces or edges, of which neighbours keep their distance",
     "motion": "vertices",

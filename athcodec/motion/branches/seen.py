@@ -10,6 +10,8 @@ from athcodec.motion.branches.point_runs import scipy_module
 from athcodec.motion.clip import MotionClip
 
 SAMPLE_FRAMES = 12  # Frames of the clip that the methods look at.
+AFFINE_ERROR = 1e-4  # Part of the diagonal that parts may be off one affine map.
+FLAT = 1e-9  # Part of a part's spread below which a direction has none.
 WELD = 1e-6  # Part of the diagonal; vertices that stay closer are one vertex of a mesh that was split.
 
 
@@ -52,6 +54,40 @@ def links_of(clip: MotionClip) -> np.ndarray:
     inside = np.flatnonzero((copy[1:] == copy[:-1]) & (copy[1:] > 0))
     pairs.append(np.stack([inside, inside + 1], axis=1))
     return np.concatenate(pairs)
+
+
+def parts_of(clip: MotionClip) -> np.ndarray | None:
+    """Return the number of the object of the scene, or of the copy of one, that each vertex is of, (N,); None where the
+    clip does not say."""
+    counts, copies = (clip.attributes.get(name) for name in ("part_vertex_counts", "part_copies"))
+    if counts is None or counts.ndim != 1 or counts.dtype.kind not in "iu" or counts.sum() != clip.vertex_count:
+        return None
+    if copies is not None and copies.shape == counts.shape and (counts % np.maximum(copies, 1) == 0).all():
+        counts = np.repeat(counts // np.maximum(copies, 1), np.maximum(copies, 1))
+    return numbered(np.repeat(np.arange(len(counts)), counts))
+
+
+def affine_share(frames: np.ndarray, label: np.ndarray) -> float:
+    """Return the share of the vertices whose parts, (N,) labels, move by one affine map in each of the frames,
+    (1 + k, N, 3), of which the first is the rest pose."""
+    size = np.bincount(label)
+    centred = [pose - _sums(pose, label)[label] / size[label, None] for pose in frames]
+    rest = centred[0]
+    moments = _sums((rest[:, :, None] * rest[:, None]).reshape(-1, 9), label).reshape(-1, 3, 3)
+    spread = np.trace(moments, axis1=1, axis2=2)
+    inverse = np.linalg.inv(moments + (FLAT * spread + np.finfo(float).tiny)[:, None, None] * np.eye(3))
+    tolerance = AFFINE_ERROR * float(np.linalg.norm(np.ptp(frames.reshape(-1, 3), axis=0)))
+    moves = np.ones(len(size), bool)
+    for pose in centred[1:]:
+        maps = _sums((pose[:, :, None] * rest[:, None]).reshape(-1, 9), label).reshape(-1, 3, 3) @ inverse
+        off = np.linalg.norm(pose - np.einsum("nij,nj->ni", maps[label], rest), axis=1)
+        moves[label[off > tolerance]] = False
+    return float(size[moves].sum() / size.sum())
+
+
+def _sums(values: np.ndarray, label: np.ndarray) -> np.ndarray:
+    """Return the sums of the rows, (N, k), of each label."""
+    return np.stack([np.bincount(label, column) for column in values.T], axis=1)
 
 
 def copies_of(clip: MotionClip) -> np.ndarray:

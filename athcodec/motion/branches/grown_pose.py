@@ -1,0 +1,77 @@
+"""Poses of plants that grow: those in which their parts have their full size.
+
+Maps from a pose in which a part is hardly more than a point say nothing about its shape, so motion is coded about a
+pose that shows every part. A clip whose source has a rest pose keeps it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from athcodec.motion.branches.seen import links_of
+from athcodec.motion.clip import MotionClip
+from athcodec.motion.hierarchy import Hierarchy
+
+FRAMES = 64  # Frames of a clip that are looked at.
+SMALL = 0.5  # Size of a part, over its largest in any frame, below which another pose shows it better.
+
+
+def with_grown_pose(clip: MotionClip) -> MotionClip:
+    """Return the clip with the frame in which it is largest as its rest pose, if it has no rest pose of its own and
+    its first frame is much smaller. Size: the total length of the links between its vertices."""
+    if not _makes_rest_pose(clip):
+        return clip
+    links = links_of(clip)
+    if not len(links):
+        links = np.stack([np.arange(clip.vertex_count - 1), np.arange(1, clip.vertex_count)], axis=1)
+    frames = _some_frames(clip)
+    sizes = [np.linalg.norm(pose[links[:, 0]] - pose[links[:, 1]], axis=1).sum() for pose in _poses(clip, frames)]
+    if sizes[0] >= SMALL * max(sizes):
+        return clip
+    largest = int(frames[int(np.argmax(sizes))])
+    return clip.replace(rest=clip.block(largest, largest + 1)[0], rest_given=False)
+
+
+def with_grown_branches(clip: MotionClip, hierarchy: Hierarchy) -> MotionClip:
+    """Return the clip with a rest pose in which each branch has the shape of the frame where it is largest, if it is
+    much smaller in the rest pose that was made of the motion. Such a branch hangs on its parent as it does in that
+    frame."""
+    if not _makes_rest_pose(clip):
+        return clip
+    frames, source, first = _some_frames(clip), hierarchy.vertex_source, hierarchy.first_vertex
+    sizes = np.array([_branch_sizes(pose[source], first) for pose in _poses(clip, frames)])
+    rest = clip.rest[source]
+    small = np.flatnonzero(_branch_sizes(rest, first) < SMALL * sizes.max(axis=0))
+    if not len(small):
+        return clip
+    largest = frames[sizes.argmax(axis=0)]
+    shown = np.unique(largest[small])
+    shapes = {frame: pose[source] for frame, pose in zip(shown.tolist(), _poses(clip, shown))}
+    for branch in small.tolist():  # Parents come first.
+        shape, attach = shapes[int(largest[branch])], hierarchy.attach[branch]
+        own = slice(first[branch], first[branch] + hierarchy.stem_count[branch])
+        rest[own] = shape[own] + (rest[attach] - shape[attach] if attach >= 0 else 0.0)
+    pose = np.empty_like(rest)
+    pose[source] = rest
+    return clip.replace(rest=pose.astype(clip.rest_dtype), rest_given=False)
+
+
+def _makes_rest_pose(clip: MotionClip) -> bool:
+    return not clip.rest_given and clip.rest_pose == "first" and clip.frame_count > 1
+
+
+def _some_frames(clip: MotionClip) -> np.ndarray:
+    """Return the numbers of frames spread over the clip, the first and the last among them."""
+    return np.unique(np.linspace(0, clip.frame_count - 1, FRAMES).astype(int))
+
+
+def _poses(clip: MotionClip, frames: np.ndarray) -> Iterator[np.ndarray]:
+    """Yield frames, (N, 3) float64."""
+    return (clip.block(frame, frame + 1)[0].astype(np.float64) for frame in frames.tolist())
+
+
+def _branch_sizes(pose: np.ndarray, first: np.ndarray) -> np.ndarray:
+    """Return the diagonals of the stems' bounding boxes, (B,)."""
+    return np.linalg.norm(np.maximum.reduceat(pose, first) - np.minimum.reduceat(pose, first), axis=1)
