@@ -15,23 +15,28 @@ from athcodec.motion.clip import MotionClip
 from athcodec.motion.hierarchy import Hierarchy
 
 FRAMES = 64  # Frames of a clip that are looked at.
+GROWN = 0.9  # Size of the first frame, over that of the most grown one, from which it is the rest pose.
+LINKS = 20_000  # Links that are looked at, about.
 SMALL = 0.5  # Size of a part, over its largest in any frame, below which another pose shows it better.
 
 
 def with_grown_pose(clip: MotionClip) -> MotionClip:
-    """Return the clip with the frame in which it is largest as its rest pose, if it has no rest pose of its own and
-    its first frame is much smaller. Size: the total length of the links between its vertices."""
+    """Return the clip with the frame in which most of it has its full size as its rest pose, if it has no rest pose of
+    its own and its first frame shows less. Size: the lengths of the links between vertices, over their largest."""
     if not _makes_rest_pose(clip):
         return clip
     links = links_of(clip)
     if not len(links):
         links = np.stack([np.arange(clip.vertex_count - 1), np.arange(1, clip.vertex_count)], axis=1)
+    links = links[:: max(1, len(links) // LINKS)]
     frames = _some_frames(clip)
-    sizes = [np.linalg.norm(pose[links[:, 0]] - pose[links[:, 1]], axis=1).sum() for pose in _poses(clip, frames)]
-    if sizes[0] >= SMALL * max(sizes):
+    sizes = np.array([np.linalg.norm(pose[links[:, 0]] - pose[links[:, 1]], axis=1) for pose in _poses(clip, frames)])
+    largest = sizes.max(axis=0)
+    grown = (sizes[:, largest > 0] / largest[largest > 0]).sum(axis=1)
+    if not len(links) or grown[0] >= GROWN * grown.max():
         return clip
-    largest = int(frames[int(np.argmax(sizes))])
-    return clip.replace(rest=clip.block(largest, largest + 1)[0], rest_given=False)
+    best = int(frames[int(np.argmax(grown))])
+    return clip.replace(rest=clip.block(best, best + 1)[0], rest_given=False)
 
 
 def with_grown_branches(clip: MotionClip, hierarchy: Hierarchy) -> MotionClip:

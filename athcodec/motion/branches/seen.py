@@ -69,18 +69,19 @@ def parts_of(clip: MotionClip) -> np.ndarray | None:
 
 def affine_share(frames: np.ndarray, label: np.ndarray) -> float:
     """Return the share of the vertices whose parts, (N,) labels, move by one affine map in each of the frames,
-    (1 + k, N, 3), of which the first is the rest pose."""
+    (k, N, 3), from that in which the part is largest."""
     size = np.bincount(label)
-    centred = [pose - _sums(pose, label)[label] / size[label, None] for pose in frames]
-    rest = centred[0]
-    moments = _sums((rest[:, :, None] * rest[:, None]).reshape(-1, 9), label).reshape(-1, 3, 3)
-    spread = np.trace(moments, axis1=1, axis2=2)
-    inverse = np.linalg.inv(moments + (FLAT * spread + np.finfo(float).tiny)[:, None, None] * np.eye(3))
+    centred = np.stack([pose - _sums(pose, label)[label] / size[label, None] for pose in frames])
+    spreads = np.array([_sums((pose**2).sum(axis=1)[:, None], label)[:, 0] for pose in centred])
+    full = centred[spreads.argmax(axis=0)[label], np.arange(len(label))]
+    moments = _sums((full[:, :, None] * full[:, None]).reshape(-1, 9), label).reshape(-1, 3, 3)
+    flat = (FLAT * spreads.max(axis=0) + np.finfo(float).tiny)[:, None, None] * np.eye(3)
+    inverse = np.linalg.inv(moments + flat)
     tolerance = AFFINE_ERROR * float(np.linalg.norm(np.ptp(frames.reshape(-1, 3), axis=0)))
     moves = np.ones(len(size), bool)
-    for pose in centred[1:]:
-        maps = _sums((pose[:, :, None] * rest[:, None]).reshape(-1, 9), label).reshape(-1, 3, 3) @ inverse
-        off = np.linalg.norm(pose - np.einsum("nij,nj->ni", maps[label], rest), axis=1)
+    for pose in centred:
+        maps = _sums((pose[:, :, None] * full[:, None]).reshape(-1, 9), label).reshape(-1, 3, 3) @ inverse
+        off = np.linalg.norm(pose - np.einsum("nij,nj->ni", maps[label], full), axis=1)
         moves[label[off > tolerance]] = False
     return float(size[moves].sum() / size.sum())
 
