@@ -1,6 +1,6 @@
-"""A short run of the main verbs, two minutes: codecs, decoder, URLs, report.
+"""A short run of the main verbs, two minutes: codecs, decoder, URLs.
 
-Each step is a separate command; its JSON and the report go to one folder. What takes long is left out: most codecs,
+Each step is a separate command; its JSON goes to one folder. What takes long is left out: most codecs,
 most bounds, large clips. It checks that everything works; figures to quote come from the full runs.
 """
 
@@ -19,7 +19,7 @@ from bench.tables import table
 
 ROOT = Path(__file__).resolve().parent.parent
 CLIPS = ("sample", "mj_1k_200f")
-CODECS = ("athcodec", "float16 or integers + zstd", "pcodec", "trajectory PCA + hierarchy (CoDDyAC)")
+CODECS = ("athcodec", "simple (differences, zstd)", "meshoptimizer", "trajectory PCA + hierarchy (CoDDyAC)")
 BOUNDS = (1e-3, 1e-4)
 
 NOTE = "Seconds of each step, including the start of Python."
@@ -38,11 +38,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_number(parser, "--bounds", BOUNDS, "error bounds over the bounding box's diagonal", "FRACTION")
     parser.add_argument(
-        "--out",
-        type=Path,
-        default=Path("build/bench"),
-        metavar="FOLDER",
-        help="where results and report go (default %(default)s)",
+        "--out", type=Path, default=Path("build/bench"), metavar="FOLDER", help="where results go (default %(default)s)"
     )
 
 
@@ -77,4 +73,3 @@ def _steps(args: argparse.Namespace) -> Iterator[tuple[str, list[str]]]:
     }
     for verb, words in steps.items():
         yield verb, [*words, "--json", str(out / f"{verb}.json")]
-    yield "report", ["--results", str(out)]
