@@ -56,7 +56,7 @@ def best_other(sizes: Sizes, bound: float) -> Point | None:
 
 def exponent(bound: float) -> str:
     """A bound as documents write it: 1e-4."""
-    return f"{bound:.0e}".replace("e-0", "e-")
+    return f"{bound:.0e}".replace("e-0", "e-") if bound else "lossless"
 
 
 def short(codec: str) -> str:
@@ -142,11 +142,13 @@ def _listed(names: Sequence[str]) -> str:
 
 
 def by_codec(points: Sequence[Point], clip: str, bounds: Collection[float]) -> list[dict[str, Any]]:
-    """A row for each codec on one clip: its bytes at each bound, or why there are none."""
-    found = [point for point in points if point["clip"] == clip and point["bound"] in bounds]
+    """A row for each codec on one clip: its bytes at each bound, the last one lossless, or why there are none."""
+    found = [point for point in points if point["clip"] == clip and point["bound"] in (*bounds, 0)]
+    columns = dict.fromkeys(exponent(bound) for bound in sorted({point["bound"] for point in found}, reverse=True))
     table: dict[str, dict[str, Any]] = {}
     for point in sorted(found, key=lambda point: -point["bound"]):
-        row = table.setdefault(point["codec"], {"bytes of": point["codec"]} | dict.fromkeys(map(exponent, bounds)))
+        name = point["codec"].removesuffix(", lossless")
+        row = table.setdefault(name, {"bytes of": name} | columns)
         row[exponent(point["bound"])] = point["bytes"] if point["status"] == OK else point["status"]
     return list(table.values())
 
