@@ -136,7 +136,7 @@ def _about(store: Store, case: Case) -> dict[str, Any]:
     program, colon, _ = case.description.partition(": ")
     row = {"clip": case.name, "what": case.description} | ({"program": program} if colon else {})
     if case.path is None:
-        return store.add("clips", row)
+        return store.find("clips", row) or store.add("clips", row)
     with read(case.path) as clip:
         row |= {
             "frames": clip.frame_count,
