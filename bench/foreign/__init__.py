@@ -26,8 +26,8 @@ PROGRAMS: dict[str, tuple[str, dict[str, str]]] = {
     "blender": ("Blender", {"bpy": "bpy==5.0.1"}),
     "cables": ("MuJoCo", {"mujoco": "mujoco"}),
     "roots": ("CPlantBox", {"plantbox": "cplantbox"}),
-    "shader": ("vertex shader", {"pxr": "usd-core"}),
-    "lsystem": ("L-system", {}),
+    "shader": ("vertex shader", {"pxr": "usd-core", "pygltflib": "pygltflib"}),
+    "lsystem": ("L-system", {"trimesh": "trimesh"}),
     "scan": ("skeletor", {"skeletor": "skeletor"}),
     "leaf": ("scikit-fem", {"skfem": "scikit-fem", "meshio": "meshio"}),
 }
@@ -66,9 +66,13 @@ class Foreign:
         return f"{PROGRAMS[self.program][0]}: {self.text}"
 
 
+# Days before which nothing of a plant shows.
+DORMANT = {"strawberry": 5, "soybean": 4, "grapevine_VSP": 27}
+
+
 def _helios(species: str, days: int, held_out: bool = False) -> Foreign:
     step = 1 if days < 10 else 2
-    start = (27 if step == 1 else 22) if species.startswith("grapevine") else 0  # Its buds burst on day 28.
+    start = max(0, DORMANT.get(species, 0) - (0 if days < 10 else 5))
     options = {"species": species, "start": start, "days": days, "step": step, "seed": 1}
     return Foreign("helios", f"{species}, {days} days of growth by {step}", "growth", options, ".usdc", held_out)
 
@@ -93,8 +97,12 @@ CLIPS: dict[str, Foreign] = {
     "cplantbox_maize": _clip(
         "roots", "growth", ".h5", "roots of maize", plant="Zea_mays_4_Leitner_2014", days=25, seed=2
     ),
-    "shader_card_tree": _clip("shader", "morphs", ".glb", "card tree in shader wind, as morph targets", seed=1),
-    "shader_card_bush": _clip("shader", "points", ".usdc", "bush of cards in shader wind, as points", seed=2),
+    "shader_card_tree": _clip(
+        "shader", "morphs", ".glb", "card tree in shader wind, as morph targets", seed=1, nodes=220, frames=100
+    ),
+    "shader_card_bush": _clip(
+        "shader", "points", ".usdc", "bush of cards in shader wind, as points", seed=2, nodes=160, frames=150
+    ),
     "lsystem_fern": _clip("lsystem", "sequence", "_0000.ply", "fern unrolls, a file a frame", plant="fern", seed=1),
     "lsystem_tree": _clip("lsystem", "sequence", "_0000.obj", "tree grows, a file a frame", plant="tree", seed=2),
     "scan_skeleton_tree": _clip("scan", "skeleton", "_0000.ply", "skeleton of a scanned tree, swayed", seed=1),
@@ -106,7 +114,7 @@ CLIPS: dict[str, Foreign] = {
     "cplantbox_lupin": _clip(
         "roots", "growth", ".h5", "roots of lupin", True, plant="Lupinus_albus_Leitner_2014", days=25, seed=11
     ),
-    "shader_card_sapling": _clip("shader", "morphs", ".glb", "another card tree", True, seed=11),
+    "shader_card_sapling": _clip("shader", "morphs", ".glb", "another card tree", True, seed=11, nodes=180, frames=100),
     "lsystem_herb": _clip("lsystem", "sequence", "_0000.ply", "a herb grows", True, plant="herb", seed=11),
     "scan_skeleton_shrub": _clip("scan", "skeleton", "_0000.ply", "another skeleton", True, seed=11),
     "skfem_blade": _clip("leaf", "flutter", ".xdmf", "another leaf blade", True, seed=11),

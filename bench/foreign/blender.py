@@ -28,7 +28,7 @@ def armature(path: Path, seed: int) -> None:
         bone.rotation_mode = "XYZ"
         length = bone.bone.head_local.z
         for axis in (0, 2):
-            _noise(bone, "rotation_euler", axis, 0.02 + 0.05 * length / 4.0, 15.0 + 20.0 * rng.random(), rng)
+            _noise(bone, "rotation_euler", axis, 0.04 + 0.12 * length / 4.0, 15.0 + 20.0 * rng.random(), rng)
     _save(path, bpy.ops.export_scene.gltf, export_format="GLB", export_yup=True)
 
 
@@ -44,7 +44,7 @@ def shape_keys(path: Path, seed: int) -> None:
         key = tree.shape_key_add(name=f"wind {side}")
         wind = np.array([np.cos(side * np.pi / 2), np.sin(side * np.pi / 2), 0.0])
         reach = np.hypot(points[:, 0], points[:, 1])
-        bend = 0.06 * np.maximum(points[:, 2], 0) ** 1.5 + 0.1 * reach * np.sin(3.0 * reach + side)
+        bend = 0.1 * np.maximum(points[:, 2], 0) ** 1.5 + 0.1 * reach * np.sin(3.0 * reach + side)
         moved = points + bend[:, None] * wind - np.array([0, 0, 0.02]) * (bend**2)[:, None]
         key.data.foreach_set("co", moved.astype(np.float32).ravel())
         key.slider_min = -1.0
@@ -70,7 +70,7 @@ def grass(path: Path, seed: int, blades: int) -> None:
         bpy.context.collection.objects.link(blade)
         bend = blade.modifiers.new("Bend", "SIMPLE_DEFORM")
         bend.deform_method, bend.deform_axis, bend.angle = "BEND", "X", rng.uniform(0.2, 0.9)
-        _noise(blade, 'modifiers["Bend"].angle', -1, 0.6, rng.uniform(8, 16), rng)
+        _noise(blade, 'modifiers["Bend"].angle', -1, 1.2, rng.uniform(8, 16), rng)
     _save(path, bpy.ops.wm.usd_export, export_animation=True)
 
 
