@@ -21,7 +21,7 @@ import numpy as np
 import athcodec
 from athcodec import batch
 from athcodec.batch.show import Show
-from bench.clips import add_effort, add_number, add_rel_error, add_source
+from bench.clips import add_effort, add_number, add_rel_error, add_source, read
 from bench.tables import table
 
 COUNT, FRAMES, WORKERS, TARGET = 200, 40, (1, 2), 1.7
@@ -91,7 +91,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 def make_clips(args: argparse.Namespace, folder: Path) -> int:
     """Writes windows of a clip as files; returns their number of vertices."""
     folder.mkdir()
-    with athcodec.read_hdf5(args.of) as clip:
+    with read(args.of) as clip:
         frames = min(args.frames, clip.frame_count)
         for number, start in enumerate(np.linspace(0, clip.frame_count - frames, args.clips).astype(int)):
             window = athcodec.MotionClip(

@@ -30,7 +30,7 @@ import athcodec
 from athcodec._native import crc32c
 from athcodec.decoding import segment_decoder
 from athcodec.metrics import ErrorMeter
-from bench.clips import add_ladder, add_number, add_rel_error
+from bench.clips import add_ladder, add_number, add_rel_error, read
 from bench.codecs.coder import CORE, compile_c
 from bench.codecs.program import arrays_of, from_arrays
 from bench.tables import table
@@ -156,7 +156,7 @@ class Case:
         self.path, self._program = path, program
         self.file = path if path.suffix == ".ath" else folder / "clip.ath"
         if path.suffix != ".ath":
-            with athcodec.read_hdf5(path) as clip:
+            with read(path) as clip:
                 athcodec.encode(clip, self.file, rel_error=rel_error, attributes="none", ladder=ladder)
                 self.positions = np.asarray(clip.block(0, clip.frame_count), np.float32)
         with athcodec.open(self.file, strict=True) as decoder:

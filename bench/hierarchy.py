@@ -17,7 +17,7 @@ import numpy as np
 
 import athcodec
 from athcodec.motion.branches.result import Found, with_branches
-from bench.clips import add_rel_error
+from bench.clips import add_rel_error, read
 from bench.data import path_of
 from bench.tables import table
 
@@ -40,7 +40,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 
 
 def measure(path: Path, rel_error: float) -> dict[str, Any]:
-    with athcodec.read_hdf5(path) as clip, tempfile.TemporaryDirectory() as folder:
+    with read(path) as clip, tempfile.TemporaryDirectory() as folder:
         bare = dataclasses.replace(
             clip,
             vertex_branch=None,

@@ -15,10 +15,9 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-import athcodec
 from athcodec.encoding.segmentation import split_segments
 from athcodec.options import MIN_SEGMENT
-from bench.clips import add_clips, add_number, add_rel_error
+from bench.clips import add_clips, add_number, add_rel_error, read
 from bench.tables import table
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -55,7 +54,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 
 
 def _segment_frames(path: Path) -> int:
-    with athcodec.read_hdf5(path) as clip:
+    with read(path) as clip:
         segments = split_segments(clip.frame_count, clip.vertex_count)
     return max(MIN_SEGMENT, *(stop - start for start, stop in segments))
 

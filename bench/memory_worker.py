@@ -1,7 +1,7 @@
 """The worker process of memory.py: encodes a clip and prints its peak memory, or writes a longer clip.
 
-python -m bench.memory_worker encode CLIP.h5 OUT.ath REL_ERROR SEGMENT_FRAMES
-python -m bench.memory_worker repeat CLIP.h5 OUT.h5 TIMES
+python -m bench.memory_worker encode CLIP OUT.ath REL_ERROR SEGMENT_FRAMES
+python -m bench.memory_worker repeat CLIP OUT.h5 TIMES
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from athcodec.exporters.hdf5 import Hdf5Writer
 
 def encode(source: str, target: str, rel_error: float, segment_frames: int) -> dict[str, int]:
     imports = peak_bytes()
-    with athcodec.read_hdf5(source) as clip:
+    with athcodec.read(source) as clip:
         summary = athcodec.encode(clip, target, rel_error=rel_error, segment_frames=segment_frames, attributes="none")
         frames = clip.frame_count
     peak = peak_bytes()
@@ -36,7 +36,7 @@ def encode(source: str, target: str, rel_error: float, segment_frames: int) -> d
 
 def repeat(source: str, target: str, times: int) -> dict[str, int]:
     """Writes the clip repeated `times` times, gzip-compressed."""
-    with athcodec.read_hdf5(source) as clip:
+    with athcodec.read(source) as clip:
         period = clip.frame_count / clip.fps
         time = np.concatenate([clip.time + period * i for i in range(times)])
         with Hdf5Writer(

@@ -21,7 +21,7 @@ import numpy as np
 
 import athcodec
 from athcodec.metrics import MotionMeter, edges_of, level_meters, second_differences, stem_links
-from bench.clips import add_effort, add_ladder, add_segment_frames, encoded
+from bench.clips import add_effort, add_ladder, add_segment_frames, encoded, read
 from bench.tables import table
 
 TEMPLATE = Path(__file__).with_name("side_by_side.html")
@@ -70,7 +70,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> dict[str, Any]:
-    with athcodec.read_hdf5(args.clip) as clip:
+    with read(args.clip) as clip:
         source = clip.block(0, clip.frame_count).astype(np.float64)
         panels = [Panel("Source", args.clip.name, source)]
         for rel_error in args.rel_error:
