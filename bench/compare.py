@@ -28,13 +28,12 @@ another process that has only the bytes. Source: bytes of its file, or of all fi
 bound --ladder none`, which is what the others keep; they have no header, times and checksums. Best other: the
 smallest file of the other codecs, each tuned for the bound, over ours; bold where it is smaller. Simple: the integers
 of a grid, differences in time and along the vertices, zstd at level 19. Processor: seconds of all threads that
-encoding all arrays takes, with reading the source, and that the best other took at this bound with its search; a
-search ends after 72 of the 120 s that a codec may take. Levels: largest ratio of a level's error to that of the level
-before, of the largest error and of the RMS, and ticks: largest second difference over frames near a seam between
-segments, or a loop's, over that of the median frame, at the level where it is largest, with the source's in the same
-frames; both of the file at 1e-4 in the default layers. Side information: where the source names no branches, codecs
-that learn from branches or order vertices by them were given those that athcodec finds, and the time for that was not
-counted; none was given faces.
+encoding all arrays takes, without other processes that read the source, and that the best other took at this bound
+with its search. Levels: largest ratio of a level's error to that of the level before, of the largest error and of the
+RMS, and ticks: largest second difference over frames near a seam between segments, or a loop's, over that of the
+median frame, at the level where it is largest, with the source's in the same frames; both of the file at 1e-4 in the
+default layers. Side information: where the source names no branches, codecs that learn from branches or order
+vertices by them were given those that athcodec finds, and the time for that was not counted; none was given faces.
 """
 
 
@@ -125,6 +124,8 @@ def losses(clips: Iterable[Mapping[str, Any]], points: Sequence[Point], bounds: 
             larger.append(f"`{clip['clip']}`")
     versions = sorted({point["depends"]["athcodec"].split()[0] for point in own if "depends" in point})
     text = [f"Measured with athcodec {', '.join(versions)}."] if versions else []
+    limits = sorted({point["limit_s"] for point in own if point["kind"] != OURS and "limit_s" in point})
+    text += [f"Other codecs had {' or '.join(f'{limit:g}' for limit in limits)} s for a file."] if limits else []
     text += [f"Of {compared} sizes of athcodec another codec's is smaller in {len(smaller)}{_listed(smaller)}."]
     text += [f"With all arrays the file is larger than its source{_listed(larger)}."] if larger else []
     for what, is_ours in (("Ours has", True), ("Other codecs have", False)):
