@@ -20,6 +20,7 @@ Sizes = Mapping[tuple[str, float], Point]
 BOUNDS = (1e-3, 1e-4, 1e-5)
 [WHOLE_BOUND] = WholeAthcodec.bounds
 OK, MISSING, SLOW = "ok", "missing", "too slow"
+DONE = (OK, MISSING)  # Statuses that are no failure of a codec.
 
 CAPTION = """
 Bound: largest distance of any vertex in any frame, over the diagonal of the bounding box of all frames, checked by
@@ -107,41 +108,40 @@ def _beside(ours: int | None, best: Point | None) -> str | None:
 
 def losses(clips: Iterable[Mapping[str, Any]], points: Sequence[Point], bounds: Collection[float]) -> str:
     """Sentences on where another codec's or the source's file is smaller, and on what has no file."""
-    compared, smaller, larger = 0, [], []
+    compared, smaller, larger, coarser = 0, [], [], []
     names = [clip["clip"] for clip in clips]
     own = [point for point in points if point["clip"] in names and point["bound"] in bounds]
     for clip in clips:
-        sizes = sizes_of(points, clip["clip"])
+        sizes, name = sizes_of(points, clip["clip"]), f"`{clip['clip']}`"
         for bound in sorted(bounds, reverse=True):
             ours, best = sizes.get((Athcodec.name, bound)), best_other(sizes, bound)
-            if ours and best:
-                compared += 1
-                if best["bytes"] < ours["bytes"]:
-                    by = f"{short(best['codec'])} by {100 * (1 - best['bytes'] / ours['bytes']):.1f} %"
-                    smaller.append(f"`{clip['clip']}` at {exponent(bound)} ({by})")
+            compared += bool(ours and best)
+            if ours and best and best["bytes"] < ours["bytes"]:
+                by = f"{short(best['codec'])} by {_percent(best['bytes'], ours['bytes'])}"
+                smaller.append(f"{name} at {exponent(bound)} ({by})")
         whole = sizes.get((WholeAthcodec.name, WHOLE_BOUND))
         if whole and clip.get("source_bytes", whole["bytes"]) < whole["bytes"]:
-            larger.append(f"`{clip['clip']}`")
+            larger.append(f"{name} (by {_percent(whole['bytes'], clip['source_bytes'])})")
+        growth = sizes.get((LayeredAthcodec.name, WHOLE_BOUND), {}).get("level_max_ratio") or 0
+        if growth > 1:
+            coarser.append(f"{name} ({growth:.2f} times)")
+    failed = Counter(f"{short(point['codec'])} {point['status']}" for point in own if point["status"] not in DONE)
     versions = sorted({point["depends"]["athcodec"].split()[0] for point in own if "depends" in point})
-    text = [f"Measured with athcodec {', '.join(versions)}."] if versions else []
-    limits = sorted({point["limit_s"] for point in own if point["kind"] != OURS and "limit_s" in point})
-    text += [f"Other codecs had {' or '.join(f'{limit:g}' for limit in limits)} s for a file."] if limits else []
-    text += [f"Of {compared} sizes of athcodec another codec's is smaller in {len(smaller)}{_listed(smaller)}."]
-    text += [f"With all arrays the file is larger than its source{_listed(larger)}."] if larger else []
-    for what, is_ours in (("Ours has", True), ("Other codecs have", False)):
-        failed = Counter(
-            f"{short(point['codec'])} {point['status']}"
-            for point in own
-            if point["status"] not in (OK, MISSING) and (point["kind"] == OURS) == is_ours
-        )
-        text += (
-            [f"{what} no file{_listed([f'{name} {count} times' for name, count in failed.items()])}."] if failed else []
-        )
-    return " ".join(text)
+    limits = sorted({f"{point['limit_s']:g}" for point in own if point["kind"] != OURS and "limit_s" in point})
+    parts = {
+        "Measured with athcodec": versions,
+        "Processor seconds of other codecs for a file:": limits,
+        f"Of {compared} sizes of athcodec another codec's is smaller in {len(smaller)}:": smaller or ["nowhere"],
+        "With all arrays the file is larger than its source:": larger,
+        "The largest error of a level exceeds that of the level before:": coarser,
+        "Without a file:": [f"{name} {count} times" for name, count in failed.items()],
+    }
+    return " ".join(f"{words} {', '.join(some)}." for words, some in parts.items() if some)
 
 
-def _listed(names: Sequence[str]) -> str:
-    return f": {', '.join(names)}" if names else ""
+def _percent(one: int, other: int) -> str:
+    """How far a size is from another one, in per cent of that."""
+    return f"{100 * abs(one / other - 1):.1f} %"
 
 
 def by_codec(points: Sequence[Point], clip: str, bounds: Collection[float]) -> list[dict[str, Any]]:

@@ -254,7 +254,7 @@ def summary(
         table("Beside other codecs", compare.rows(clips, points, bounds), note, compare.CAPTION, *_absent(points))
     ]
     if in_short:
-        without = [point for point in points if point["status"] not in (OK, MISSING)]
+        without = [point for point in points if point["status"] not in compare.DONE]
         columns = ("clip", "codec", "bound", "status", "why")
         rows = [{name: point[name] for name in columns} for point in without]
         return {"tables": tables + ([table("Without a file", rows)] if rows else []), "broken": list(_broken(points))}
