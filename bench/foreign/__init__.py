@@ -28,7 +28,7 @@ PROGRAMS: dict[str, tuple[str, dict[str, str]]] = {
     "roots": ("CPlantBox", {"plantbox": "cplantbox"}),
     "shader": ("vertex shader", {"pxr": "usd-core", "pygltflib": "pygltflib"}),
     "lsystem": ("L-system", {"trimesh": "trimesh"}),
-    "scan": ("skeletor", {"skeletor": "skeletor"}),
+    "scan": ("skeletor", {"skeletor": "skeletor", "trimesh": "trimesh", "meshio": "meshio"}),
     "leaf": ("scikit-fem", {"skfem": "scikit-fem", "meshio": "meshio"}),
 }
 
@@ -105,8 +105,12 @@ CLIPS: dict[str, Foreign] = {
     ),
     "lsystem_fern": _clip("lsystem", "sequence", "_0000.ply", "fern unrolls, a file a frame", plant="fern", seed=1),
     "lsystem_tree": _clip("lsystem", "sequence", "_0000.obj", "tree grows, a file a frame", plant="tree", seed=2),
-    "scan_skeleton_tree": _clip("scan", "skeleton", "_0000.ply", "skeleton of a scanned tree, swayed", seed=1),
-    "skfem_leaf": _clip("leaf", "flutter", ".xdmf", "leaf blade of plate elements flutters", seed=1),
+    "scan_skeleton_tree": _clip(
+        "scan", "skeleton", "_0000.vtu", "skeleton of a scanned tree, swayed", seed=1, nodes=400
+    ),
+    "skfem_leaf": _clip(
+        "leaf", "flutter", ".xdmf", "leaf blade of plate elements flutters", seed=1, shape=0.5, refine=4
+    ),
     "helios_tomato_8d": _helios("tomato", 8, held_out=True),
     "helios_tomato_20d": _helios("tomato", 20, held_out=True),
     "blender_armature_sapling": _clip("blender", "armature", ".glb", "another tree on keyed bones", True, seed=11),
@@ -116,6 +120,6 @@ CLIPS: dict[str, Foreign] = {
     ),
     "shader_card_sapling": _clip("shader", "morphs", ".glb", "another card tree", True, seed=11, nodes=180, frames=100),
     "lsystem_herb": _clip("lsystem", "sequence", "_0000.ply", "a herb grows", True, plant="herb", seed=11),
-    "scan_skeleton_shrub": _clip("scan", "skeleton", "_0000.ply", "another skeleton", True, seed=11),
-    "skfem_blade": _clip("leaf", "flutter", ".xdmf", "another leaf blade", True, seed=11),
+    "scan_skeleton_shrub": _clip("scan", "skeleton", "_0000.vtu", "another skeleton", True, seed=11, nodes=250),
+    "skfem_blade": _clip("leaf", "flutter", ".xdmf", "another leaf blade", True, seed=11, shape=0.15, refine=3),
 }

@@ -44,7 +44,8 @@ def _write(path: Path, rods: np.ndarray, pins: str, young: float, wind: Wind) ->
     flexes = "".join(
         f"""<flexcomp name="rod{i}" type="direct" dim="1" radius="{RADIUS}" element="{elements}"
             mass="{DENSITY * np.pi * RADIUS**2 * lengths[i].sum()}" point="{" ".join(map(str, rod.ravel()))}">
-            <edge equality="true"/><contact contype="0" conaffinity="0" selfcollide="none"/><pin id="{pins}"/>
+            <edge equality="true" solref="{4 / FPS / STEPS} 1" solimp="0.9995 0.9999 0.001"/>
+            <contact contype="0" conaffinity="0" selfcollide="none"/><pin id="{pins}"/>
             <elasticity young="{young}" poisson="0.3" damping="0.02"/></flexcomp>"""
         for i, rod in enumerate(rods)
     )
