@@ -297,7 +297,7 @@ def test_a_clip_is_made_once_and_again_where_its_recipe_changed(recipes, tmp_pat
 def test_clips_are_found_by_name_and_by_path(monkeypatch, recipes, tmp_path):
     sample = athcodec.sample_path()
     assert data.path_of("sample") == sample == data.path_of(str(sample))
-    with pytest.raises(KeyError, match="got 'nothing', expected the path of an HDF5 file or one of sample,"):
+    with pytest.raises(KeyError, match="got 'nothing', expected the path of a file or one of sample,"):
         data.path_of("nothing")
     monkeypatch.setenv(data.FOLDER_VARIABLE, str(tmp_path))
     recipes["still"] = Still(2)

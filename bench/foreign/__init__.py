@@ -26,7 +26,7 @@ PROGRAMS: dict[str, tuple[str, dict[str, str]]] = {
     "blender": ("Blender", {"bpy": "bpy==5.0.1"}),
     "cables": ("MuJoCo", {"mujoco": "mujoco"}),
     "roots": ("CPlantBox", {"plantbox": "cplantbox"}),
-    "shader": ("vertex shader", {"pxr": "usd-core", "pygltflib": "pygltflib"}),
+    "shader": ("vertex shader", {}),
     "lsystem": ("L-system", {"trimesh": "trimesh"}),
     "scan": ("skeletor", {"skeletor": "skeletor", "trimesh": "trimesh", "meshio": "meshio"}),
     "leaf": ("scikit-fem", {"skfem": "scikit-fem", "meshio": "meshio"}),
@@ -98,10 +98,18 @@ CLIPS: dict[str, Foreign] = {
         "roots", "growth", ".h5", "roots of maize", plant="Zea_mays_4_Leitner_2014", days=25, seed=2
     ),
     "shader_card_tree": _clip(
-        "shader", "morphs", ".glb", "card tree in shader wind, as morph targets", seed=1, nodes=220, frames=100
+        "shader",
+        "morphs",
+        ".glb",
+        "card tree in shader wind, as morph targets",
+        seed=1,
+        nodes=220,
+        orders=3,
+        height=8.0,
+        frames=100,
     ),
     "shader_card_bush": _clip(
-        "shader", "points", ".usdc", "bush of cards in shader wind, as points", seed=2, nodes=160, frames=150
+        "shader", "morphs", ".glb", "bush of cards in shader wind", seed=2, nodes=160, orders=2, height=1.2, frames=150
     ),
     "lsystem_fern": _clip("lsystem", "sequence", "_0000.ply", "fern unrolls, a file a frame", plant="fern", seed=1),
     "lsystem_tree": _clip("lsystem", "sequence", "_0000.obj", "tree grows, a file a frame", plant="tree", seed=2),
@@ -118,7 +126,9 @@ CLIPS: dict[str, Foreign] = {
     "cplantbox_lupin": _clip(
         "roots", "growth", ".h5", "roots of lupin", True, plant="Lupinus_albus_Leitner_2014", days=25, seed=11
     ),
-    "shader_card_sapling": _clip("shader", "morphs", ".glb", "another card tree", True, seed=11, nodes=180, frames=100),
+    "shader_card_sapling": _clip(
+        "shader", "morphs", ".glb", "another card tree", True, seed=11, nodes=180, orders=3, height=6.0, frames=100
+    ),
     "lsystem_herb": _clip("lsystem", "sequence", "_0000.ply", "a herb grows", True, plant="herb", seed=11),
     "scan_skeleton_shrub": _clip("scan", "skeleton", "_0000.vtu", "another skeleton", True, seed=11, nodes=250),
     "skfem_blade": _clip("leaf", "flutter", ".xdmf", "another leaf blade", True, seed=11, shape=0.15, refine=3),

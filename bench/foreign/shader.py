@@ -6,6 +6,8 @@ the trunk bends by height, branches and leaf edges by smoothed triangle waves.
 
 from __future__ import annotations
 
+import json
+import struct
 from pathlib import Path
 
 import numpy as np
@@ -56,69 +58,46 @@ class _Tree:
         return points * length / np.maximum(np.linalg.norm(points, axis=1, keepdims=True), 1e-9)
 
 
-def morphs(path: Path, seed: int, nodes: int, frames: int) -> None:
-    """A morph target for every frame, as tools that bake a shader write it for engines without one."""
-    import pygltflib as gltf
-
-    tree = _Tree(nodes, 3, 8.0, seed)
-    triangles = np.concatenate([tree.faces[:, :3], tree.faces[:, [0, 2, 3]]]).astype(np.uint32)
-    times = (np.arange(frames) / FPS).astype(np.float32)
-    targets = [(tree.at(seconds) - tree.points).astype(np.float32) for seconds in times]
-    file = gltf.GLTF2(scene=0, scenes=[gltf.Scene(nodes=[0])], nodes=[gltf.Node(name="tree", mesh=0)])
-    blob = b""
-
-    def accessor(array: np.ndarray, component: int, kind: str) -> int:
-        nonlocal blob
-        view = gltf.BufferView(buffer=0, byteOffset=len(blob), byteLength=array.nbytes)
-        limits = {"min": array.min(axis=0, keepdims=array.ndim < 2).tolist()}
-        limits["max"] = array.max(axis=0, keepdims=array.ndim < 2).tolist()
-        blob += array.tobytes()
-        file.bufferViews.append(view)
-        file.accessors.append(
-            gltf.Accessor(
-                bufferView=len(file.bufferViews) - 1, componentType=component, count=len(array), type=kind, **limits
-            )
-        )
-        return len(file.accessors) - 1
-
-    shape = gltf.Primitive(
-        attributes=gltf.Attributes(
-            POSITION=accessor(tree.points.astype(np.float32), gltf.FLOAT, gltf.VEC3),
-            COLOR_0=accessor(tree.colours.astype(np.float32), gltf.FLOAT, gltf.VEC3),
-        ),
-        indices=accessor(triangles.ravel(), gltf.UNSIGNED_INT, gltf.SCALAR),
-        targets=[gltf.Attributes(POSITION=accessor(target, gltf.FLOAT, gltf.VEC3)) for target in targets],
-    )
-    file.meshes.append(gltf.Mesh(name="tree", primitives=[shape], weights=[1.0, *[0.0] * (frames - 1)]))
-    sampler = gltf.AnimationSampler(
-        input=accessor(times, gltf.FLOAT, gltf.SCALAR),
-        output=accessor(np.eye(frames, dtype=np.float32).ravel(), gltf.FLOAT, gltf.SCALAR),
-    )
-    channel = gltf.AnimationChannel(sampler=0, target=gltf.AnimationChannelTarget(node=0, path="weights"))
-    file.animations.append(gltf.Animation(name="wind", samplers=[sampler], channels=[channel]))
-    file.buffers.append(gltf.Buffer(byteLength=len(blob)))
-    file.set_binary_blob(blob)
-    file.save_binary(str(path))
-
-
-def points(path: Path, seed: int, nodes: int, frames: int) -> None:
-    """A USD mesh with its points sampled in time and the colours as displayColor."""
-    from pxr import Usd, UsdGeom, Vt
-
-    tree = _Tree(nodes, 2, 1.2, seed)
-    stage = Usd.Stage.CreateNew(str(path))
-    UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.y)
-    UsdGeom.SetStageMetersPerUnit(stage, 1.0)
-    stage.SetTimeCodesPerSecond(FPS)
-    stage.SetStartTimeCode(0)
-    stage.SetEndTimeCode(frames - 1)
-    mesh = UsdGeom.Mesh.Define(stage, "/bush/cards")
-    mesh.CreateFaceVertexCountsAttr([4] * len(tree.faces))
-    mesh.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(tree.faces.ravel()))
-    colour = mesh.CreateDisplayColorPrimvar(UsdGeom.Tokens.vertex)
-    colour.Set(Vt.Vec3fArray.FromNumpy(tree.colours.astype(np.float32)))
-    sampled = mesh.CreatePointsAttr()
-    for frame in range(frames):
-        sampled.Set(Vt.Vec3fArray.FromNumpy(tree.at(frame / FPS).astype(np.float32)), frame)
-    stage.SetDefaultPrim(stage.GetPrimAtPath("/bush"))
-    stage.Save()
+def morphs(path: Path, seed: int, nodes: int, orders: int, height: float, frames: int) -> None:
+    """A GLB with a morph target for every frame, as tools that bake a shader write it for engines without one."""
+    tree = _Tree(nodes, orders, height, seed)
+    triangles = np.concatenate([tree.faces[:, :3], tree.faces[:, [0, 2, 3]]])
+    times = np.arange(frames) / FPS
+    targets = [tree.at(seconds) - tree.points for seconds in times]
+    arrays = [
+        tree.points,
+        tree.colours,
+        triangles.reshape(-1, 1),
+        times[:, None],
+        np.eye(frames).reshape(-1, 1),
+        *targets,
+    ]
+    kept = [array.astype("<u4" if array is arrays[2] else "<f4") for array in arrays]
+    starts = np.cumsum([0, *(array.nbytes for array in kept)]).tolist()
+    primitive = {
+        "attributes": {"POSITION": 0, "COLOR_0": 1},
+        "indices": 2,
+        "targets": [{"POSITION": 5 + frame} for frame in range(frames)],
+    }
+    channel = {"sampler": 0, "target": {"node": 0, "path": "weights"}}
+    document = {
+        "asset": {"version": "2.0"},
+        "scenes": [{"nodes": [0]}],
+        "nodes": [{"name": "tree", "mesh": 0}],
+        "meshes": [{"name": "tree", "primitives": [primitive], "weights": [0] * frames}],
+        "animations": [{"name": "wind", "samplers": [{"input": 3, "output": 4}], "channels": [channel]}],
+        "buffers": [{"byteLength": starts[-1]}],
+        "bufferViews": [
+            {"buffer": 0, "byteOffset": start, "byteLength": array.nbytes} for start, array in zip(starts, kept)
+        ],
+        "accessors": [
+            {"bufferView": view, "componentType": 5125 if view == 2 else 5126, "count": len(array)}
+            | {"type": "VEC3" if array.shape[1] == 3 else "SCALAR"}
+            | {"min": array.min(axis=0).tolist(), "max": array.max(axis=0).tolist()}
+            for view, array in enumerate(kept)
+        ],
+    }
+    text, blob = json.dumps(document).encode(), b"".join(array.tobytes() for array in kept)
+    text += b" " * (-len(text) % 4)
+    head = struct.pack("<4s4I", b"glTF", 2, 28 + len(text) + len(blob), len(text), 0x4E4F534A)
+    path.write_bytes(head + text + struct.pack("<2I", len(blob), 0x004E4942) + blob)
