@@ -1,9 +1,9 @@
 """The clips that the benchmark measures: made once, kept in a folder, the same for everyone.
 
-The shipped sample; trees moved by the physics engine MuJoCo (see bench/trees); the same with many more
-vertices; render meshes of trees with leaves in wind; small clips of many kinds (see bench/odd); and any HDF5 clip by
-its path. All are seeded and differ between machines by rounding only. The attribute "recipe" of a file describes how it
-was made; when the recipe changes, the file is made again.
+The shipped sample; trees moved by the physics engine MuJoCo (see bench/trees); render meshes of trees with leaves in
+wind; small clips of many kinds (see bench/odd); and any HDF5 clip by its path. All are seeded and differ between
+machines by rounding only. The attribute "recipe" of a file describes how it was made; when the recipe changes, the file
+is made again.
 """
 
 from __future__ import annotations
@@ -27,7 +27,6 @@ from bench.tables import table
 from bench.trees.beams import bend
 from bench.trees.mesh import dress
 from bench.trees.plant import grow
-from bench.trees.refine import refine
 from bench.trees.simulate import MissingEngine, Unstable, simulate
 from bench.trees.wind import Wind
 
@@ -56,13 +55,9 @@ class Simulated:
     seed: int
     source: ClassVar[None] = None
 
-    @property
-    def wind(self) -> Wind:
-        return Wind(self.wind_speed, self.height, seed=self.seed)
-
     def make(self, source: None) -> athcodec.MotionClip:
         plant = grow(self.nodes, self.orders, self.height, self.seed)
-        motion = simulate(plant, self.wind, self.frames)
+        motion = simulate(plant, Wind(self.wind_speed, self.height, seed=self.seed), self.frames)
         return athcodec.MotionClip(
             motion.positions,
             motion.time,
@@ -76,25 +71,6 @@ class Simulated:
 
     def __str__(self) -> str:
         return f"MuJoCo, {self.height:g} m tree in wind of {self.wind_speed:g} m/s"
-
-
-@dataclass(frozen=True)
-class Refined:
-    """A simulated clip with `factor` vertices per element, and twigs attached to it."""
-
-    source: str
-    frames: int
-    factor: int
-    twigs: int
-    twig_vertices: int
-    seed: int
-
-    def make(self, source: athcodec.MotionClip) -> athcodec.MotionClip:
-        wind = RECIPES[self.source].wind
-        return refine(source, wind, self.frames, self.factor, self.twigs, self.twig_vertices, self.seed)
-
-    def __str__(self) -> str:
-        return f"{self.source}, {self.factor} vertices per element by splines, {self.twigs:,} twigs riding"
 
 
 @dataclass(frozen=True)
@@ -131,18 +107,12 @@ class Canopy:
         return f"{self.height:g} m tree as a mesh: bark tubes and {self.leaves:,} {self.species} leaves in wind"
 
 
-Recipe = Simulated | Refined | Canopy | odd.Odd
+Recipe = Simulated | Canopy | odd.Odd
 
 RECIPES: dict[str, Recipe] = {
     "mj_1k_200f": Simulated(1000, 2, 200, 8.0, 11.0, seed=1),
-    "mj_1k_1200f": Simulated(1000, 3, 1200, 8.0, 11.0, seed=2),
-    "mj_4k_200f": Simulated(4000, 3, 200, 10.0, 9.0, seed=3),
-    "mj_4k_1200f": Simulated(4000, 6, 1200, 10.0, 6.5, seed=4),
     # the paper's case: 3 levels of branches, about 8,000 nodes, 200 steps, wind along (-1, 0, 1)
     "mj_8k_200f": Simulated(8000, 2, 200, 12.0, 9.0, seed=5),
-    "mj_8k_1200f": Simulated(8000, 6, 1200, 12.0, 6.5, seed=6),
-    "refined_50k_200f": Refined("mj_4k_200f", 200, 6, 2600, 10, seed=7),
-    "refined_200k_60f": Refined("mj_8k_200f", 60, 12, 10400, 10, seed=8),
     "canopy_4k_60f": Canopy(400, 2, 60, 6.0, 8.0, 260, "broadleaf", seed=11),
     "canopy_15k_200f": Canopy(1000, 2, 200, 8.0, 8.0, 1400, "broadleaf", seed=12),
     "canopy_67k_200f": Canopy(4000, 3, 200, 10.0, 8.0, 10000, "poplar", seed=13),

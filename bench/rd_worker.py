@@ -26,7 +26,7 @@ from athcodec.metrics import MotionMeter, bits_per_vertex_frame
 from bench.codec_registry import OURS, chosen
 from bench.codecs import Source
 from bench.codecs.program import CannotKeep
-from bench.memory_worker import peak_bytes
+from bench.memory import peak_bytes
 
 ENCODES, QUICK_ENCODE = 3, 1.0  # an encoder that takes longer than these seconds runs once
 DECODES, DECODE_SECONDS = 7, 5.0  # fewer decodes, at least three, where they take longer than this together

@@ -18,7 +18,6 @@ from bench.trees import simulate as simulation
 from bench.trees.leaves import SPECIES, Leaves, Plates, sheltered
 from bench.trees.mesh import SIDES, dress
 from bench.trees.plant import grow
-from bench.trees.refine import refine
 from bench.trees.ride import Skeleton
 from bench.trees.wind import DIRECTION, Wind
 
@@ -149,19 +148,6 @@ def test_a_pole_bends_under_a_force_at_its_tip_as_beam_theory_says():
     expected = 2.0 * 3.0**3 / (3 * simulation.YOUNG * np.pi / 4 * 0.02**4)
     assert run.nodes()[30, 0] == pytest.approx(expected, rel=0.06)  # 1 + 3 / (2 * 30) by the hinges
     assert 0.01 < expected < 0.1 and abs(run.nodes()[30, 2]) < 1e-6
-
-
-def test_refined_stems_pass_through_the_nodes_and_twigs_stay_on_them(sample_clip):
-    fine = refine(sample_clip, BREEZE, frames=12, factor=3, twigs=40, twig_vertices=4, seed=6)
-    stems = 3 * 1000 + 1
-    assert (fine.vertex_count, fine.frame_count) == (stems + 160, 12)
-    assert np.allclose(fine.positions[:, :stems:3], sample_clip.block(0, 12), atol=1e-6)
-    ratio = lengths(fine.positions, fine.edges) / lengths(fine.rest, fine.edges)
-    assert np.abs(ratio[:, stems - 1 :] - 1).max() < 1e-3, "twigs are torn off"
-    assert np.abs(ratio - 1).max() < 0.3, "stems are torn apart"
-    twig_tips = fine.positions[:, stems + 3 :: 4] - fine.positions[:, stems::4]
-    assert np.ptp(twig_tips, axis=0).max() > 0.01
-    assert len(fine.edges) == fine.vertex_count - 1
 
 
 @pytest.fixture(scope="module")
