@@ -68,11 +68,14 @@ def _pairs(values: dict[str, Any]) -> str:
 
 
 def _table_text(part: dict[str, Any]) -> str:
-    rows = part["rows"]
+    return "\n".join([f"### {part['title']}", "", rows_text(part["rows"]), *(f"\n{note}" for note in part["notes"])])
+
+
+def rows_text(rows: list[dict[str, Any]]) -> str:
+    """Rows as an aligned table, without title and notes."""
     names = list(dict.fromkeys(name for row in rows for name in row))
     columns = [_column(name, [row.get(name) for row in rows]) for name in names]
-    lines = ["| " + " | ".join(cells) + " |" for cells in zip(*columns, strict=True)]
-    return "\n".join([f"### {part['title']}", "", *lines, *(f"\n{note}" for note in part["notes"])])
+    return "\n".join("| " + " | ".join(cells) + " |" for cells in zip(*columns, strict=True))
 
 
 def _column(name: str, values: list[Any]) -> list[str]:

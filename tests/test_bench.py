@@ -21,7 +21,7 @@ from athcodec.encoding.features import Feature
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.append(str(ROOT))  # for bench, which is not installed; athcodec stays the installed one
 
-from bench import codec_registry, compare, features, plots, rd, tables  # noqa: E402
+from bench import codec_registry, compare, features, plots, rd, shown, tables  # noqa: E402
 from bench.curves import Curve, mean_saving  # noqa: E402
 from bench.store import Store, read  # noqa: E402
 
@@ -106,6 +106,12 @@ def test_what_a_feature_saves_is_what_a_file_without_it_takes_more(tmp_path, sam
 def test_the_table_of_features_is_that_of_the_saved_figures():
     _, inside, _ = features.parted(features.DOCUMENT.read_text("utf-8"))
     assert inside == f"\n{features.table_text(features.stored())}\n"
+
+
+@pytest.mark.parametrize("name", shown.SHOWN)
+def test_a_table_in_a_document_is_that_of_its_stored_results(name):
+    text = (ROOT / shown.SHOWN[name].document).read_text("utf-8")
+    assert shown.filled(text, name) == text, "write it again with `python -m bench.shown`"
 
 
 def test_levels_end_within_the_bound_and_have_no_gaps_where_the_papers_have(tmp_path):
