@@ -1,7 +1,4 @@
-"""The tables that documents show of stored results: `python -m bench.shown` writes them between their markers.
-
-A table stands below the command and the version that measured it. A test compares every table with its results.
-"""
+"""The tables of documents that are columns of stored tables, each below its command and the version measured."""
 
 from __future__ import annotations
 
@@ -11,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from bench.tables import rows_text
+from bench.tables import markdown
 
 ROOT = Path(__file__).resolve().parent.parent
 RESULTS = ROOT / "bench" / "results"
@@ -29,7 +26,7 @@ class Shown:
     def text(self) -> str:
         result = json.loads((RESULTS / f"{self.results}.json").read_text("utf-8"))
         tables = {table["title"].split(",")[0]: table["rows"] for table in result["tables"]}
-        return f"`{result['command']}`, athcodec {result['versions']['athcodec']}\n\n{rows_text(self.rows(tables))}"
+        return f"`{result['command']}`, athcodec {result['versions']['athcodec']}\n\n{markdown(self.rows(tables))}"
 
 
 def picked(title: str, clips: tuple[str, ...] = (), **columns: str) -> Callable[[dict[str, list[Row]]], list[Row]]:
@@ -157,22 +154,7 @@ SHOWN = {
 }
 
 
-def filled(text: str, name: str) -> str:
-    """Return the text of a document with the table of this name between its markers."""
-    first, last = f"<!-- {name}: written by python -m bench.shown -->\n", f"<!-- end of {name} -->\n"
-    if text.count(first) != 1 or text.count(last) != 1:
-        raise ValueError(f"markers of {name}: expected {first.strip()} and {last.strip()}, each once; add them")
-    before, after = text.split(first)[0], text.split(last)[1]
-    return f"{before}{first}\n{SHOWN[name].text()}\n\n{last}{after}"
-
-
-def write() -> Iterator[str]:
-    """Write all tables; yield their names."""
+def sections() -> Iterator[tuple[Path, str, str]]:
+    """Every table: document, name and text."""
     for name, shown in SHOWN.items():
-        document = ROOT / shown.document
-        document.write_text(filled(document.read_text("utf-8"), name), "utf-8")
-        yield name
-
-
-if __name__ == "__main__":
-    print("written:", *write())
+        yield ROOT / shown.document, name, shown.text()
