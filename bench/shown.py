@@ -104,26 +104,6 @@ SHOWN = {
     ),
     "host": Shown("docs/command-line.md", "sizes", _host),
     "ladders": Shown("docs/command-line.md", "progressive", _ladders),
-    "first-motion": Shown(
-        "docs/viewer.md", "viewer", picked("First motion at 10 Mbit/s", file="file", bytes="size", seconds="motion")
-    ),
-    "forest": Shown(
-        "docs/viewer.md",
-        "viewer",
-        picked("Forest", plants="instances", in_view="in view", with_levels="detail on", without="detail off"),
-    ),
-    "gpu-memory": Shown(
-        "docs/gpu.md",
-        "gpu",
-        picked(
-            "Bytes of a level",
-            level="level",
-            uploaded_once="uploaded",
-            on_the_card="on the GPU",
-            baked_textures_of_halves="textures",
-            PNG_files_of_OpenVAT="OpenVAT",
-        ),
-    ),
     "levels": Shown(BENCHMARKS, "levels", _levels),
     "prefixes": Shown(BENCHMARKS, "progressive", _prefixes),
     "decoding": Shown(BENCHMARKS, "decode", _decoding),
