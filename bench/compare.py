@@ -24,17 +24,16 @@ OK, MISSING, SLOW = "ok", "missing", "too slow"
 CAPTION = """
 Bound: largest distance of any vertex in any frame, over the diagonal of the bounding box of all frames, checked by
 another process that has only the bytes. Source: bytes of its file, or of all files of a sequence. All arrays:
-`athcodec encode SOURCE` at 1e-4, with faces, names and every array, in layers. Ours: `--attributes none
---rest-error bound --ladder none`, which is what the others keep; they have no
-header, times and checksums. Best other: the smallest file of the other codecs,
-each tuned for the bound, over ours; bold where it is smaller. Simple: the integers of a grid, differences in time and
-along the vertices, zstd at level 19. Processor: seconds of all threads that encoding all arrays takes, and that the
-best other took at this bound with its search. Levels: largest ratio of a level's error to that of the level before,
-of the largest error and of the RMS, and ticks: largest second difference over frames near a seam between segments, or
-a loop's, over that of the median frame, at the level where it is largest, with the source's in the same frames; both
-of the file at 1e-4 in the default layers. Side information: where the source names no
-branches, codecs that learn from branches or order vertices by them were given those that athcodec finds, and the time
-for that was not counted; none was given faces.
+`athcodec encode SOURCE` at 1e-4, with faces, names and every array, in layers. Ours: `--attributes none --rest-error
+bound --ladder none`, which is what the others keep; they have no header, times and checksums. Best other: the
+smallest file of the other codecs, each tuned for the bound, over ours; bold where it is smaller. Simple: the integers
+of a grid, differences in time and along the vertices, zstd at level 19. Processor: seconds of all threads that
+encoding all arrays takes, without other processes that read the source, and that the best other took at this bound
+with its search. Levels: largest ratio of a level's error to that of the level before, of the largest error and of the
+RMS, and ticks: largest second difference over frames near a seam between segments, or a loop's, over that of the
+median frame, at the level where it is largest, with the source's in the same frames; both of the file at 1e-4 in the
+default layers. Side information: where the source names no branches, codecs that learn from branches or order
+vertices by them were given those that athcodec finds, and the time for that was not counted; none was given faces.
 """
 
 
@@ -56,7 +55,7 @@ def best_other(sizes: Sizes, bound: float) -> Point | None:
 
 def exponent(bound: float) -> str:
     """A bound as documents write it: 1e-4."""
-    return f"{bound:.0e}".replace("e-0", "e-")
+    return f"{bound:.0e}".replace("e-0", "e-") if bound else "lossless"
 
 
 def short(codec: str) -> str:
@@ -110,6 +109,7 @@ def losses(clips: Iterable[Mapping[str, Any]], points: Sequence[Point], bounds: 
     """Sentences on where another codec's or the source's file is smaller, and on what has no file."""
     compared, smaller, larger = 0, [], []
     names = [clip["clip"] for clip in clips]
+    own = [point for point in points if point["clip"] in names and point["bound"] in bounds]
     for clip in clips:
         sizes = sizes_of(points, clip["clip"])
         for bound in sorted(bounds, reverse=True):
@@ -122,9 +122,12 @@ def losses(clips: Iterable[Mapping[str, Any]], points: Sequence[Point], bounds: 
         whole = sizes.get((WholeAthcodec.name, WHOLE_BOUND))
         if whole and clip.get("source_bytes", whole["bytes"]) < whole["bytes"]:
             larger.append(f"`{clip['clip']}`")
-    text = [f"Of {compared} sizes of athcodec another codec's is smaller in {len(smaller)}{_listed(smaller)}."]
+    versions = sorted({point["depends"]["athcodec"].split()[0] for point in own if "depends" in point})
+    text = [f"Measured with athcodec {', '.join(versions)}."] if versions else []
+    limits = sorted({point["limit_s"] for point in own if point["kind"] != OURS and "limit_s" in point})
+    text += [f"Other codecs had {' or '.join(f'{limit:g}' for limit in limits)} s for a file."] if limits else []
+    text += [f"Of {compared} sizes of athcodec another codec's is smaller in {len(smaller)}{_listed(smaller)}."]
     text += [f"With all arrays the file is larger than its source{_listed(larger)}."] if larger else []
-    own = [point for point in points if point["clip"] in names and point["bound"] in bounds]
     for what, is_ours in (("Ours has", True), ("Other codecs have", False)):
         failed = Counter(
             f"{short(point['codec'])} {point['status']}"
@@ -142,11 +145,13 @@ def _listed(names: Sequence[str]) -> str:
 
 
 def by_codec(points: Sequence[Point], clip: str, bounds: Collection[float]) -> list[dict[str, Any]]:
-    """A row for each codec on one clip: its bytes at each bound, or why there are none."""
-    found = [point for point in points if point["clip"] == clip and point["bound"] in bounds]
+    """A row for each codec on one clip: its bytes at each bound, the last one lossless, or why there are none."""
+    found = [point for point in points if point["clip"] == clip and point["bound"] in (*bounds, 0)]
+    columns = dict.fromkeys(exponent(bound) for bound in sorted({point["bound"] for point in found}, reverse=True))
     table: dict[str, dict[str, Any]] = {}
     for point in sorted(found, key=lambda point: -point["bound"]):
-        row = table.setdefault(point["codec"], {"bytes of": point["codec"]} | dict.fromkeys(map(exponent, bounds)))
+        name = point["codec"].removesuffix(", lossless")
+        row = table.setdefault(name, {"bytes of": name} | columns)
         row[exponent(point["bound"])] = point["bytes"] if point["status"] == OK else point["status"]
     return list(table.values())
 
@@ -162,7 +167,7 @@ def clips_text(contents: Mapping[str, Any], bounds: Collection[float] = BOUNDS) 
     """Sentences and a table of all codecs for each clip, for a document."""
     clips, points = contents["clips"], contents["points"]
     parts = [losses(clips, points, bounds)]
-    for clip in clips:
+    for clip in (clip for clip in clips if "frames" in clip):
         what = f"`{clip['clip']}`, {clip['frames']} x {clip['vertices']:,}: {clip['what']}"
         parts += [what, markdown(by_codec(points, clip["clip"], bounds))]
     return "\n\n".join(parts) + "\n"

@@ -21,7 +21,7 @@ import numpy as np
 
 import athcodec
 from athcodec._native import crc32c
-from bench.clips import add_ladder, add_number, add_rel_error
+from bench.clips import add_ladder, add_number, add_rel_error, read
 from bench.codecs.coder import CORE, compile_c
 from bench.tables import table
 
@@ -112,7 +112,7 @@ class Case:
         self.path, self._program = path, program
         self.file = path if path.suffix == ".ath" else folder / "clip.ath"
         if path.suffix != ".ath":
-            with athcodec.read_hdf5(path) as clip:
+            with read(path) as clip:
                 athcodec.encode(clip, self.file, rel_error=rel_error, attributes="none", ladder=ladder)
         with athcodec.open(self.file, strict=True) as decoder:
             self.crc = crc32c(np.ascontiguousarray(decoder.positions(), np.float32))

@@ -22,7 +22,7 @@ import athcodec
 from athcodec.encoding.segmentation import split_segments
 from athcodec.exporters.hdf5 import Hdf5Writer
 from athcodec.options import MIN_SEGMENT
-from bench.clips import add_clips, add_number, add_rel_error
+from bench.clips import add_clips, add_number, add_rel_error, read
 from bench.tables import table
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -59,7 +59,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 
 
 def _segment_frames(path: Path) -> int:
-    with athcodec.read_hdf5(path) as clip:
+    with read(path) as clip:
         segments = split_segments(clip.frame_count, clip.vertex_count)
     return max(MIN_SEGMENT, *(stop - start for start, stop in segments))
 
@@ -87,7 +87,7 @@ def _row(peak: dict[str, int]) -> dict[str, float | int]:
 
 def _encode(source: str, target: str, rel_error: float, segment_frames: int) -> dict[str, int]:
     imports = peak_bytes()
-    with athcodec.read_hdf5(source) as clip:
+    with athcodec.read(source) as clip:
         summary = athcodec.encode(clip, target, rel_error=rel_error, segment_frames=segment_frames, attributes="none")
         frames = clip.frame_count
     peak = peak_bytes()
@@ -105,7 +105,7 @@ def _encode(source: str, target: str, rel_error: float, segment_frames: int) -> 
 
 def _repeat(source: str, target: str, times: int) -> dict[str, int]:
     """Writes the clip repeated `times` times, gzip-compressed."""
-    with athcodec.read_hdf5(source) as clip:
+    with athcodec.read(source) as clip:
         period = clip.frame_count / clip.fps
         time = np.concatenate([clip.time + period * i for i in range(times)])
         with Hdf5Writer(

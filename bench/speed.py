@@ -18,7 +18,7 @@ from typing import Any
 import h5py
 
 import athcodec
-from bench.clips import add_clips, add_rel_error
+from bench.clips import add_clips, add_rel_error, read
 from bench.tables import table
 
 ENCODES, DECODES = 3, 7
@@ -70,7 +70,7 @@ class _Case:
         self.path, self.rel_error = path, rel_error
         self.file, self.gzip = folder / "clip.ath", folder / "clip.h5"
         self.frame_bytes = 0
-        with athcodec.read_hdf5(path) as clip:
+        with read(path) as clip:
             self.frame, self.vertex_frames = clip.frame_count // 2, clip.frame_count * clip.vertex_count
             athcodec.write_hdf5(clip, self.gzip, gzip=True)
 
@@ -81,7 +81,7 @@ class _Case:
         )
 
     def encode(self) -> None:
-        with athcodec.read_hdf5(self.path) as clip:
+        with read(self.path) as clip:
             athcodec.encode(clip, self.file, rel_error=self.rel_error, attributes="none")
 
     def decode(self) -> None:

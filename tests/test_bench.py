@@ -20,7 +20,7 @@ from athcodec.encoding.features import Feature
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.append(str(ROOT))  # for bench, which is not installed; athcodec stays the installed one
 
-from bench import codec_registry, compare, features, report  # noqa: E402
+from bench import codec_registry, compare, features, rd_worker, report  # noqa: E402
 from bench.curves import Curve  # noqa: E402
 from bench.store import Store, read  # noqa: E402
 
@@ -255,16 +255,17 @@ def test_a_failure_of_a_codec_is_reported_in_its_row(tmp_path, bushy_file):
     assert "\nBROKEN" not in text  # of programs; a baseline that breaks its bound is our own mistake
 
 
-@pytest.mark.slow
-def test_clips_without_branches_are_measured_on_those_that_encoding_finds(tmp_path, sample_clip):
-    bare = sample_clip.replace(
-        positions=sample_clip.positions[:20], time=sample_clip.time[:20], vertex_branch=None, branch_parent=None
-    )
-    athcodec.write_hdf5(bare.replace(edges=None), tmp_path / "bare.h5")
-    with athcodec.read(tmp_path / "bare.h5") as clip:
-        assert not clip.has_branches
-    text, result = run_bench(tmp_path, "rd", tmp_path / "bare.h5", "--bounds", "1e-4", "--codecs", "athcodec")
-    assert "Rate and distortion: bare" in text and result["points"][0]["status"] == "ok"
+def test_where_a_source_names_no_branches_other_codecs_are_given_those_that_athcodec_finds(bushy_clip):
+    bare = bushy_clip.replace(vertex_branch=None, branch_parent=None, stem_index=None)
+    codecs = codec_registry.chosen(["athcodec", "global PCA"]).values()
+    assert [rd_worker._with_branches(bare, codec, 1e-3).has_branches for codec in codecs] == [False, True]
+
+
+def test_levels_are_measured_on_the_file_in_layers_by_the_process_that_decodes(tmp_path, bushy_file):
+    words = ("rd", bushy_file, "--bounds", "1e-3", "--codecs", "athcodec, layers", "athcodec")
+    layers, single = run_bench(tmp_path, *words)[1]["points"]
+    assert 0 < layers["level_max_ratio"] <= 1.1 and 0 < layers["level_rms_ratio"] < 1
+    assert "level_max_ratio" not in single and min(layers["encode_cpu_s"], single["encode_cpu_s"]) > 0
 
 
 def test_a_baseline_that_breaks_its_bound_fails_the_run(tmp_path, bushy_file):
@@ -326,6 +327,12 @@ def test_results_read_back_as_they_were_saved_one_row_each(tmp_path):
     assert read(file) == {"command": "rd", "points": points}
     text = file.read_text()
     assert text.count("coarse " * 9) == text.count('"zip"') == 1 and text.count("[0,0.5,") == 1
+
+
+def test_results_of_baselines_depend_on_the_entropy_coder_and_not_on_the_encoder():
+    files = codec_registry._bench_files("bench.codecs.pca")
+    assert {"pca.py", "coder.c", "range_coder.inl"} <= {file.name for file in files}
+    assert not any({"encoding", "encode"} & set(file.parts) for file in files)
 
 
 def test_fingerprints_of_code_ignore_comments_and_layout_alone(tmp_path):

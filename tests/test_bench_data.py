@@ -6,7 +6,6 @@ import subprocess
 import sys
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -42,9 +41,8 @@ class Still:
     """A recipe that needs no engine: two vertices."""
 
     frames: int
-    source: ClassVar[None] = None
 
-    def make(self, source):
+    def make(self):
         positions = np.zeros((self.frames, 2, 3), np.float32) + [[0, 0, 0], [0, 1, 0]]
         return athcodec.MotionClip(positions, np.arange(self.frames), np.zeros(2, int), np.array([-1]))
 
@@ -152,7 +150,7 @@ def test_a_pole_bends_under_a_force_at_its_tip_as_beam_theory_says():
 
 @pytest.fixture(scope="module")
 def canopy():
-    return CANOPY.make(None)
+    return CANOPY.make()
 
 
 def still(frames: int) -> Skeleton:
@@ -209,8 +207,8 @@ def test_a_mesh_has_closed_rings_around_its_stems_and_rigid_leaves_on_them(sampl
 def test_a_canopy_comes_out_the_same_again_and_otherwise_by_its_seed(canopy):
     canopy.check()
     assert (canopy.frame_count, round(canopy.fps, 6), canopy.metadata["unit"]) == (40, 30, "m")
-    assert np.array_equal(canopy.positions, CANOPY.make(None).positions)
-    assert not np.array_equal(canopy.positions, replace(CANOPY, seed=4).make(None).positions)
+    assert np.array_equal(canopy.positions, CANOPY.make().positions)
+    assert not np.array_equal(canopy.positions, replace(CANOPY, seed=4).make().positions)
     assert np.ptp(canopy.rest[:, 1]) == pytest.approx(5.0, rel=0.1)
 
 
@@ -283,7 +281,7 @@ def test_a_clip_is_made_once_and_again_where_its_recipe_changed(recipes, tmp_pat
 def test_clips_are_found_by_name_and_by_path(monkeypatch, recipes, tmp_path):
     sample = athcodec.sample_path()
     assert data.path_of("sample") == sample == data.path_of(str(sample))
-    with pytest.raises(KeyError, match="got 'nothing', expected the path of an HDF5 file or one of sample,"):
+    with pytest.raises(KeyError, match="got 'nothing', expected the path of a file or one of sample,"):
         data.path_of("nothing")
     monkeypatch.setenv(data.FOLDER_VARIABLE, str(tmp_path))
     recipes["still"] = Still(2)
