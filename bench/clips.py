@@ -1,5 +1,5 @@
-"""Shared by the verbs: clips from the command line, a clip encoded into a temporary file, errors of decoded positions,
-and clips with more plants and frames.
+"""Shared by the verbs: clips from the command line, a clip encoded into a temporary file, errors of decoded
+positions.
 """
 
 from __future__ import annotations
@@ -13,16 +13,12 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 import athcodec
-from athcodec.exporters.hdf5 import Hdf5Writer
 from athcodec.metrics import ErrorMeter
 from athcodec.options import EFFORTS, LADDERS, ladder_of
 from athcodec.sources.sequence import FRAME_SUFFIXES, sequence_files
 
 REL_ERROR = 1e-4
-FRAMES_AHEAD = 7
 
 
 @dataclass(frozen=True)
@@ -86,16 +82,6 @@ def add_segment_frames(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def add_source(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "--of",
-        type=Path,
-        default=athcodec.sample_path(),
-        metavar="CLIP.h5",
-        help="the clip that those measured are made from (default: the sample)",
-    )
-
-
 def add_effort(parser: argparse.ArgumentParser, default: str = "default") -> None:
     parser.add_argument("--effort", choices=EFFORTS, default=default, help="the encoder's effort (default %(default)s)")
 
@@ -127,40 +113,3 @@ def measure(
     for start, block in decoder.blocks(level, frames=frames):
         meter.add(clip.block(start, start + len(block)), block)
     return meter
-
-
-@contextmanager
-def replicated_plants(path: Path) -> Iterator[ReplicatedPlants]:
-    with read(path) as clip:
-        yield ReplicatedPlants(clip, path.stem)
-
-
-class ReplicatedPlants:
-    """Copies of one plant at the same position, with its motion extended to any number of frames."""
-
-    def __init__(self, clip: athcodec.MotionClip, name: str) -> None:
-        self._clip, self.name = clip, name
-        self._positions = np.asarray(clip.block(0, clip.frame_count), np.float32)
-
-    def write(self, path: Path, plants: int, frames: int) -> None:
-        """Writes an HDF5 clip."""
-        source = self._clip
-        parent, offset = source.branch_parent, np.arange(plants)[:, None] * source.branch_count
-        index = None if source.stem_index is None else np.tile(source.stem_index, plants)
-        with Hdf5Writer(
-            path,
-            time=np.arange(frames) / source.fps,
-            vertex_branch=(source.vertex_branch + offset).ravel(),
-            branch_parent=np.where(parent < 0, -1, parent + offset).ravel(),
-            rest=np.tile(source.rest.astype(np.float32), (plants, 1)),
-            stem_index=index,
-            metadata=source.metadata,
-        ) as writer:
-            for frame in range(frames):
-                writer.add(self._frame(frame, plants).reshape(1, -1, 3))
-
-    def _frame(self, frame: int, plants: int) -> np.ndarray:
-        """(plants, N, 3): played forwards and backwards in turn, each plant some frames ahead of the one before."""
-        last = self._clip.frame_count - 1
-        at = (frame + FRAMES_AHEAD * np.arange(plants)) % max(1, 2 * last)
-        return self._positions[np.where(at > last, 2 * last - at, at)]

@@ -1,10 +1,10 @@
 """The clips that the benchmark measures: made once, kept in a folder, the same for everyone.
 
-The shipped sample; trees moved by the physics engine MuJoCo (see bench/trees); the same with many more
-vertices; render meshes of trees with leaves in wind; small clips of many kinds (see bench/odd); files that other
-programs write (see bench/foreign); and any clip by its path. All are seeded, and those of athcodec's own code differ
-between machines by rounding only. The attribute "recipe" of an HDF5 file, or NAME.recipe beside a file of another kind,
-describes how it was made; when the recipe changes, the file is made again.
+The shipped sample; trees moved by the physics engine MuJoCo (see bench/trees); render meshes of trees with leaves in
+wind; small clips of many kinds (see bench/odd); files that other programs write (see bench/foreign); and any clip by
+its path. All are seeded, and those of athcodec's own code differ between machines by rounding only. The attribute
+"recipe" of an HDF5 file, or NAME.recipe beside a file of another kind, describes how it was made; when the recipe
+changes, the file is made again.
 """
 
 from __future__ import annotations
@@ -14,10 +14,9 @@ import json
 import os
 import time
 from collections.abc import Sequence
-from contextlib import nullcontext
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 import h5py
 import numpy as np
@@ -30,7 +29,6 @@ from bench.tables import table
 from bench.trees.beams import bend
 from bench.trees.mesh import dress
 from bench.trees.plant import grow
-from bench.trees.refine import refine
 from bench.trees.simulate import MissingEngine, Unstable, simulate
 from bench.trees.wind import Wind
 
@@ -41,7 +39,7 @@ RECIPE_VERSION = 1  # goes up when the code below or in bench/trees gives other 
 SAMPLE = "sample"
 
 NOTE = """
-Seconds: to make the clip, without its source clip; "-" where the file existed. File MB: as it lies on disk.
+Seconds: to make the clip; "-" where the file existed. File MB: as it lies on disk.
 Tips: RMS distance of the branches' ends from their mean positions, in per cent of the plant's height. Orders: of
 the branches, trunk 0.
 """
@@ -57,15 +55,10 @@ class Simulated:
     height: float
     wind_speed: float
     seed: int
-    source: ClassVar[None] = None
 
-    @property
-    def wind(self) -> Wind:
-        return Wind(self.wind_speed, self.height, seed=self.seed)
-
-    def make(self, source: None) -> athcodec.MotionClip:
+    def make(self) -> athcodec.MotionClip:
         plant = grow(self.nodes, self.orders, self.height, self.seed)
-        motion = simulate(plant, self.wind, self.frames)
+        motion = simulate(plant, Wind(self.wind_speed, self.height, seed=self.seed), self.frames)
         return athcodec.MotionClip(
             motion.positions,
             motion.time,
@@ -82,25 +75,6 @@ class Simulated:
 
 
 @dataclass(frozen=True)
-class Refined:
-    """A simulated clip with `factor` vertices per element, and twigs attached to it."""
-
-    source: str
-    frames: int
-    factor: int
-    twigs: int
-    twig_vertices: int
-    seed: int
-
-    def make(self, source: athcodec.MotionClip) -> athcodec.MotionClip:
-        wind = RECIPES[self.source].wind
-        return refine(source, wind, self.frames, self.factor, self.twigs, self.twig_vertices, self.seed)
-
-    def __str__(self) -> str:
-        return f"{self.source}, {self.factor} vertices per element by splines, {self.twigs:,} twigs riding"
-
-
-@dataclass(frozen=True)
 class Canopy:
     """A tree of beams in turbulent wind as a render mesh: bark tubes, and leaves hinged on the outer stems."""
 
@@ -113,9 +87,8 @@ class Canopy:
     species: str
     seed: int
     version: int = 1  # goes up when the code below bench/trees gives other leaves or beams
-    source: ClassVar[None] = None
 
-    def make(self, source: None) -> athcodec.MotionClip:
+    def make(self) -> athcodec.MotionClip:
         plant = grow(self.nodes, self.orders, self.height, self.seed)
         wind = Wind(self.wind_speed, self.height, seed=self.seed)
         tree = athcodec.MotionClip(
@@ -134,18 +107,12 @@ class Canopy:
         return f"{self.height:g} m tree as a mesh: bark tubes and {self.leaves:,} {self.species} leaves in wind"
 
 
-Recipe = Simulated | Refined | Canopy | odd.Odd | foreign.Foreign
+Recipe = Simulated | Canopy | odd.Odd | foreign.Foreign
 
 RECIPES: dict[str, Recipe] = {
     "mj_1k_200f": Simulated(1000, 2, 200, 8.0, 11.0, seed=1),
-    "mj_1k_1200f": Simulated(1000, 3, 1200, 8.0, 11.0, seed=2),
-    "mj_4k_200f": Simulated(4000, 3, 200, 10.0, 9.0, seed=3),
-    "mj_4k_1200f": Simulated(4000, 6, 1200, 10.0, 6.5, seed=4),
     # the paper's case: 3 levels of branches, about 8,000 nodes, 200 steps, wind along (-1, 0, 1)
     "mj_8k_200f": Simulated(8000, 2, 200, 12.0, 9.0, seed=5),
-    "mj_8k_1200f": Simulated(8000, 6, 1200, 12.0, 6.5, seed=6),
-    "refined_50k_200f": Refined("mj_4k_200f", 200, 6, 2600, 10, seed=7),
-    "refined_200k_60f": Refined("mj_8k_200f", 60, 12, 10400, 10, seed=8),
     "canopy_4k_60f": Canopy(400, 2, 60, 6.0, 8.0, 260, "broadleaf", seed=11),
     "canopy_15k_200f": Canopy(1000, 2, 200, 8.0, 8.0, 1400, "broadleaf", seed=12),
     "canopy_67k_200f": Canopy(4000, 3, 200, 10.0, 8.0, 10000, "poplar", seed=13),
@@ -195,12 +162,11 @@ def _found_or_made(name: str, folder: Path) -> tuple[Path, float | None]:
     path = folder / f"{name}{getattr(recipe, 'suffix', '.h5')}"
     if path.is_file() and _recipe_in(path, name) == recipe_text(name):
         return path, None
-    source = _found_or_made(recipe.source, folder)[0] if recipe.source else None
     folder.mkdir(parents=True, exist_ok=True)
-    return path, _make(name, source, path)
+    return path, _make(name, path)
 
 
-def _make(name: str, source_path: Path | None, path: Path) -> float:
+def _make(name: str, path: Path) -> float:
     start, recipe = time.perf_counter(), RECIPES[name]
     if isinstance(recipe, foreign.Foreign) and (why := recipe.missing()):
         raise MissingEngine(why)
@@ -209,8 +175,7 @@ def _make(name: str, source_path: Path | None, path: Path) -> float:
     if isinstance(recipe, foreign.Foreign):
         recipe.write(path)
     else:
-        with read(source_path) if source_path else nullcontext() as source:
-            athcodec.write_hdf5(recipe.make(source), path)
+        athcodec.write_hdf5(recipe.make(), path)
     if path.suffix == ".h5":
         with h5py.File(path, "r+") as file:
             file.attrs["recipe"] = recipe_text(name)
@@ -220,12 +185,9 @@ def _make(name: str, source_path: Path | None, path: Path) -> float:
 
 
 def recipe_text(name: str) -> str:
-    """How the clip is made, as JSON, including the recipes of its sources."""
+    """How the clip is made, as JSON."""
     recipe = RECIPES[name]
-    words = {"kind": type(recipe).__name__, "version": RECIPE_VERSION} | asdict(recipe)
-    if recipe.source:
-        words["source"] = json.loads(recipe_text(recipe.source))
-    return json.dumps(words, sort_keys=True)
+    return json.dumps({"kind": type(recipe).__name__, "version": RECIPE_VERSION} | asdict(recipe), sort_keys=True)
 
 
 def _recipe_in(path: Path, name: str) -> str | None:

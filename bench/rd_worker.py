@@ -34,7 +34,7 @@ from bench.codec_registry import OURS, chosen
 from bench.codecs import Codec, Source
 from bench.codecs.ours import LayeredAthcodec, opened
 from bench.codecs.program import CannotKeep
-from bench.memory_worker import peak_bytes
+from bench.memory import peak_bytes
 from bench.smoothness import measured_levels
 
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from bench import compare, features, rd
+from bench import compare, features, rd, shown
 from bench.store import read
 from bench.tables import table
 
@@ -33,6 +33,7 @@ def sections() -> Iterator[tuple[Path, str, str]]:
         file = rd.RESULTS / f"{name}.json"
         if file.exists():
             yield RATIONALE if name == "features" else BENCHMARKS, name, text(read(file))
+    yield from shown.sections()
 
 
 def put(document: Path, name: str, text: str) -> None:

@@ -6,7 +6,6 @@ import subprocess
 import sys
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -18,7 +17,6 @@ from bench.trees import simulate as simulation
 from bench.trees.leaves import SPECIES, Leaves, Plates, sheltered
 from bench.trees.mesh import SIDES, dress
 from bench.trees.plant import grow
-from bench.trees.refine import refine
 from bench.trees.ride import Skeleton
 from bench.trees.wind import DIRECTION, Wind
 
@@ -43,9 +41,8 @@ class Still:
     """A recipe that needs no engine: two vertices."""
 
     frames: int
-    source: ClassVar[None] = None
 
-    def make(self, source):
+    def make(self):
         positions = np.zeros((self.frames, 2, 3), np.float32) + [[0, 0, 0], [0, 1, 0]]
         return athcodec.MotionClip(positions, np.arange(self.frames), np.zeros(2, int), np.array([-1]))
 
@@ -151,22 +148,9 @@ def test_a_pole_bends_under_a_force_at_its_tip_as_beam_theory_says():
     assert 0.01 < expected < 0.1 and abs(run.nodes()[30, 2]) < 1e-6
 
 
-def test_refined_stems_pass_through_the_nodes_and_twigs_stay_on_them(sample_clip):
-    fine = refine(sample_clip, BREEZE, frames=12, factor=3, twigs=40, twig_vertices=4, seed=6)
-    stems = 3 * 1000 + 1
-    assert (fine.vertex_count, fine.frame_count) == (stems + 160, 12)
-    assert np.allclose(fine.positions[:, :stems:3], sample_clip.block(0, 12), atol=1e-6)
-    ratio = lengths(fine.positions, fine.edges) / lengths(fine.rest, fine.edges)
-    assert np.abs(ratio[:, stems - 1 :] - 1).max() < 1e-3, "twigs are torn off"
-    assert np.abs(ratio - 1).max() < 0.3, "stems are torn apart"
-    twig_tips = fine.positions[:, stems + 3 :: 4] - fine.positions[:, stems::4]
-    assert np.ptp(twig_tips, axis=0).max() > 0.01
-    assert len(fine.edges) == fine.vertex_count - 1
-
-
 @pytest.fixture(scope="module")
 def canopy():
-    return CANOPY.make(None)
+    return CANOPY.make()
 
 
 def still(frames: int) -> Skeleton:
@@ -223,8 +207,8 @@ def test_a_mesh_has_closed_rings_around_its_stems_and_rigid_leaves_on_them(sampl
 def test_a_canopy_comes_out_the_same_again_and_otherwise_by_its_seed(canopy):
     canopy.check()
     assert (canopy.frame_count, round(canopy.fps, 6), canopy.metadata["unit"]) == (40, 30, "m")
-    assert np.array_equal(canopy.positions, CANOPY.make(None).positions)
-    assert not np.array_equal(canopy.positions, replace(CANOPY, seed=4).make(None).positions)
+    assert np.array_equal(canopy.positions, CANOPY.make().positions)
+    assert not np.array_equal(canopy.positions, replace(CANOPY, seed=4).make().positions)
     assert np.ptp(canopy.rest[:, 1]) == pytest.approx(5.0, rel=0.1)
 
 

@@ -16,7 +16,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -44,7 +44,6 @@ class Foreign:
     suffix: str
     held_out: bool = False
     version: int = 1  # goes up when the maker gives other motion
-    source: ClassVar[None] = None
 
     def missing(self) -> str | None:
         """Why the clip cannot be made here; None if it can."""
