@@ -87,7 +87,9 @@ CLIPS: dict[str, Foreign] = {
     **{f"helios_{species}_{days}d".lower(): _helios(species, days) for days in AGES for species in HELIOS},
     "blender_armature_tree": _clip("blender", "armature", ".glb", "tree on keyed bones", seed=1),
     "blender_shape_keys": _clip("blender", "shape_keys", ".abc", "tree with shape keys of two winds", seed=2),
-    "blender_bent_grass": _clip("blender", "grass", ".usdc", "blades bent by modifiers", seed=3, blades=80),
+    "blender_bent_grass": _clip(
+        "blender", "grass", ".usdc", "blades displaced by clouds that travel", seed=3, blades=80
+    ),
     "mujoco_cable_grass": _clip("cables", "grass", ".h5", "stems of grass as cables in gusts", seed=1, stems=40),
     "mujoco_cable_vine": _clip("cables", "vine", ".h5", "a vine that hangs from two points", seed=2, joints=120),
     "cplantbox_brassica": _clip(

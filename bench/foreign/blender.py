@@ -53,24 +53,33 @@ def shape_keys(path: Path, seed: int) -> None:
 
 
 def grass(path: Path, seed: int, blades: int) -> None:
-    """Blades, each an object with a modifier that bends it by a keyed angle."""
+    """Blades whose upper parts are displaced by clouds that an empty carries over them."""
     rng = np.random.default_rng(seed)
     bpy.ops.wm.read_factory_settings(use_empty=True)
-    for number in range(blades):
-        height, width = rng.uniform(0.25, 0.6), rng.uniform(0.004, 0.01)
-        levels = np.linspace(0, 1, 10)
-        half = width * np.sqrt(1 - levels)[:, None]
-        left = np.stack([-half[:, 0], 0 * levels, height * levels], 1)
-        points = np.concatenate([left, left * [-1, 1, 1]])
-        faces = [(i, i + 10, i + 11, i + 1) for i in range(9)]
-        mesh = bpy.data.meshes.new(f"blade {number}")
-        mesh.from_pydata(points.tolist(), [], faces)
-        blade = bpy.data.objects.new(mesh.name, mesh)
-        blade.location, blade.rotation_euler = (*rng.uniform(-0.5, 0.5, 2), 0.0), (0, 0, rng.uniform(0, 2 * np.pi))
-        bpy.context.collection.objects.link(blade)
-        bend = blade.modifiers.new("Bend", "SIMPLE_DEFORM")
-        bend.deform_method, bend.deform_axis, bend.angle = "BEND", "X", rng.uniform(0.2, 0.9)
-        _noise(blade, 'modifiers["Bend"].angle', -1, 1.2, rng.uniform(8, 16), rng)
+    levels = np.linspace(0, 1, 10)[:, None]
+    foot = rng.uniform(-0.5, 0.5, (blades, 1, 3)) * [1, 1, 0]
+    side = rng.normal(0, 0.004, (blades, 1, 3)) * [1, 1, 0] * np.sqrt(1 - levels)
+    middle = foot + rng.uniform(0.25, 0.6, (blades, 1, 1)) * levels * [0, 0, 1]
+    middle += levels**2 * rng.normal(0, 0.08, (blades, 1, 3)) * [1, 1, 0]
+    points = np.concatenate([middle - side, middle + side], axis=1).reshape(-1, 3)
+    faces = 20 * np.arange(blades)[:, None, None] + np.arange(9)[:, None] + [0, 10, 11, 1]
+    mesh = bpy.data.meshes.new("grass")
+    mesh.from_pydata(points.tolist(), [], faces.reshape(-1, 4).tolist())
+    field, wind = bpy.data.objects.new("grass", mesh), bpy.data.objects.new("wind", None)
+    group = field.vertex_groups.new(name="height")
+    for vertex, height in enumerate(np.tile(levels[:, 0] ** 2, 2 * blades).tolist()):
+        group.add([vertex], height, "REPLACE")
+    for number, axis in enumerate("XY"):
+        clouds = bpy.data.textures.new(f"gusts {axis}", "CLOUDS")
+        clouds.noise_scale = 0.35 + 0.1 * number
+        push = field.modifiers.new(axis, "DISPLACE")
+        push.texture, push.direction, push.vertex_group = clouds, axis, group.name
+        push.texture_coords, push.texture_coords_object, push.strength = "OBJECT", wind, 0.35
+    for thing in (field, wind):
+        bpy.context.collection.objects.link(thing)
+    for frame, place in ((1, (0, 0, 0)), (FRAMES, (3.0, 1.0, 0.8))):
+        wind.location = place
+        wind.keyframe_insert("location", frame=frame)
     _save(path, bpy.ops.wm.usd_export, export_animation=True)
 
 

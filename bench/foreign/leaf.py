@@ -38,7 +38,8 @@ def flutter(path: Path, seed: int, shape: float, refine: int) -> None:
 
     clamped = basis.get_dofs(lambda x: x[0] < 1e-9)
     matrices = skfem.condense(bending.assemble(basis, t=thickness), mass.assemble(basis), D=clamped)
-    squares, modes = skfem.solve(*matrices, solver=skfem.solver_eigen_scipy_sym(k=MODES, sigma=0.0))
+    start = np.ones(matrices[0].shape[0])  # Else ARPACK begins at random.
+    squares, modes = skfem.solve(*matrices, solver=skfem.solver_eigen_scipy_sym(k=MODES, sigma=0.0, v0=start))
     shapes = modes[basis.nodal_dofs[0]]
     shapes /= np.abs(shapes).max(axis=0)
     hertz = 2.0 * np.sqrt(squares / squares[0])
