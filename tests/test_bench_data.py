@@ -181,7 +181,7 @@ def test_a_pole_of_beams_bends_and_swings_as_theory_says():
     grown = grow(31, 0, 3.0, seed=1)
     upright = np.linspace(0, 3, 31)[:, None] * [0, 1, 0]
     pole = replace(grown, position=upright, radius=np.full(31, 0.02), foliage=np.zeros(31))
-    stiffness, mass = beams._stiffness(pole), beams._mass(pole)
+    stiffness, mass = beams._stiffness(pole), beams.node_mass(pole)
     force = np.zeros(6 * 31)
     force[6 * 30] = 2.0
     bent = np.linalg.solve(stiffness.toarray(), force)
