@@ -2,13 +2,15 @@
 
 The shipped sample; trees moved by the physics engine MuJoCo (see bench/trees); the same with many more
 vertices; render meshes of trees with leaves in wind; small clips of many kinds (see bench/odd); and any HDF5 clip by
-its path. All are seeded and differ between machines by rounding only. The attribute "recipe" of a file describes how it
+its path. All are seeded. Those of trees/exact.py have the same bits on every machine, which their
+digests check; the others differ by rounding only. The attribute "recipe" of a file describes how it
 was made; when the recipe changes, the file is made again.
 """
 
 from __future__ import annotations
 
 import argparse
+import hashlib
 import json
 import os
 import time
@@ -24,6 +26,7 @@ import athcodec
 from athcodec.motion.hierarchy import branch_orders
 from bench import odd
 from bench.tables import table
+from bench.trees import exact
 from bench.trees.beams import bend
 from bench.trees.mesh import dress
 from bench.trees.plant import grow
@@ -42,6 +45,10 @@ Seconds: to make the clip, without its source clip; "-" where the file existed. 
 branches' ends from their mean positions, in per cent of the plant's height. Orders: of the branches,
 trunk 0.
 """
+
+
+class Different(Exception):
+    """A clip that is the same on every machine came out otherwise."""
 
 
 @dataclass(frozen=True)
@@ -131,7 +138,7 @@ class Canopy:
         return f"{self.height:g} m tree as a mesh: bark tubes and {self.leaves:,} {self.species} leaves in wind"
 
 
-Recipe = Simulated | Refined | Canopy | odd.Odd
+Recipe = Simulated | Refined | Canopy | exact.Tree | exact.Cards | odd.Odd
 
 RECIPES: dict[str, Recipe] = {
     "mj_1k_200f": Simulated(1000, 2, 200, 8.0, 11.0, seed=1),
@@ -147,6 +154,20 @@ RECIPES: dict[str, Recipe] = {
     "canopy_15k_200f": Canopy(1000, 2, 200, 8.0, 8.0, 1400, "broadleaf", seed=12),
     "canopy_67k_200f": Canopy(4000, 3, 200, 10.0, 8.0, 10000, "poplar", seed=13),
     "canopy_300k_60f": Canopy(16000, 3, 60, 14.0, 9.0, 16000, "compound", seed=14),
+    # These stand for two clips that cannot be made: see docs/benchmarks.md.
+    "fe_8k_200f": exact.Tree(
+        ((1, 100), (40, 1800), (480, 6100)),
+        frames=200,
+        height=12.0,
+        wind_speed=11.0,
+        intensity=0.2,
+        length=40.0,
+        hertz=0.5,
+        damping=0.1,
+        seed=1,
+        digest="8aa353e6af4d",
+    ),
+    "cards_373x121f": exact.Cards(373, 31, 4, (8.0, 2.0, 2.0), seed=1, digest="6a5c93f6c64e"),
 }
 
 SUITES = {
@@ -206,7 +227,25 @@ def _make(name: str, source_path: Path | None, path: Path) -> float:
     clip.metadata["recipe"] = recipe_text(name)
     path.unlink(missing_ok=True)  # A file there may be damaged, and no file of another kind is replaced.
     athcodec.write_hdf5(clip, path)
+    expected = getattr(RECIPES[name], "digest", None)
+    if expected and (made := digest(path)) != expected:
+        path.unlink()
+        raise Different(
+            f"clip {name}: got digest {made}, expected {expected}, as every machine makes it; "
+            "compare the versions of Python and NumPy, and report both"
+        )
     return time.perf_counter() - start
+
+
+def digest(path: Path) -> str:
+    """Digest of positions, rest pose and branches: the input of a codec."""
+    total = hashlib.sha256()
+    with athcodec.read_hdf5(path) as clip:
+        for array in (clip.rest, clip.vertex_branch, clip.branch_parent):
+            total.update(b"" if array is None else array.tobytes())
+        for _, frames in clip.blocks():
+            total.update(frames.tobytes())
+    return total.hexdigest()[:12]
 
 
 def recipe_text(name: str) -> str:
@@ -263,7 +302,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     for name in names:
         try:
             path, seconds = _found_or_made(name, folder)
-        except (MissingEngine, Unstable, KeyError) as error:
+        except (MissingEngine, Unstable, Different, KeyError) as error:
             raise SystemExit(f"bench data: {error.args[0]}") from error
         with athcodec.read_hdf5(path) as clip:
             rows.append({"name": Path(name).stem} | _row(clip) | {"made": describe(name), "seconds": seconds})

@@ -25,8 +25,9 @@ import athcodec
 from bench import compare, data, odd
 from bench.codec_registry import all_codecs, chosen, fingerprint, is_lossless
 from bench.codecs import Codec, simple
+from bench.data import digest
 from bench.store import Store
-from bench.suite import SUITES, Case, cases, digest
+from bench.suite import SUITES, Case, cases
 from bench.tables import cpu_model, environment, table
 
 ROOT = Path(__file__).resolve().parent.parent

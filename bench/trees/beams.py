@@ -127,7 +127,9 @@ def node_mass(plant: Plant) -> np.ndarray:
     np.add.at(mass, plant.parent[1:], half[1:])
     np.add.at(inertia, plant.parent[1:], turned[1:])
     leaves = FOLIAGE_MASS * foliage_area(plant)
-    return np.repeat(np.stack([mass + leaves, inertia + leaves * (FOLIAGE_SPREAD * FOLIAGE_SPREAD)], axis=1), 3, axis=1).ravel()
+    return np.repeat(
+        np.stack([mass + leaves, inertia + leaves * (FOLIAGE_SPREAD * FOLIAGE_SPREAD)], axis=1), 3, axis=1
+    ).ravel()
 
 
 def node_drag(plant: Plant) -> np.ndarray:

@@ -29,6 +29,7 @@ FPS, STEPS = 30.0, 2  # Frames a second, time steps of a frame.
 UP = np.array([[0.0], [1.0], [0.0]])
 GOLDEN_TURN = 0.381966  # Golden angle in turns.
 FORK_TURN = 0.15  # Angle between a stem and its side stems in turns.
+THINNEST = 0.0002  # Least radius over the plant's height.
 WAVES, WAVE_RATIO = 48, 1.2  # Plane waves of the wind, and ratio of the wave numbers of neighbours.
 
 
@@ -122,7 +123,7 @@ def grow(orders: tuple[tuple[int, int], ...], height: float, seed: int) -> Plant
         stem += stems
     leafy = (np.arange(len(parent)) >= first[0]) | (np.bincount(parent[1:], minlength=len(parent)) == 0)
     foliage = leafy / leafy.sum()
-    radius = BASE_RADIUS * height * np.sqrt(sum_above(parent, foliage))
+    radius = np.maximum(BASE_RADIUS * height * np.sqrt(sum_above(parent, foliage)), THINNEST * height)
     return Plant(
         parent.astype(np.int32),
         branch.astype(np.int32),
@@ -148,8 +149,10 @@ class Gusts:
     The profile grows with the fourth root of the height; the exponent 17/6 of the spectrum is 2.8125.
     """
 
-    def __init__(self, points: np.ndarray, speed: float, height: float, intensity: float, seed: int) -> None:
-        numbers, scale = Numbers(seed), 1.339 * 15.0
+    def __init__(
+        self, points: np.ndarray, speed: float, height: float, intensity: float, length: float, seed: int
+    ) -> None:
+        numbers, scale = Numbers(seed), 1.339 * length
         edges = 0.05 / scale * np.cumprod(np.full(WAVES, WAVE_RATIO))
         number = edges * numbers.uniform(1.0, WAVE_RATIO, WAVES)
         base = 1.0 + (number * scale) * (number * scale)
@@ -235,7 +238,9 @@ def _tips_first(plant: Plant) -> Iterator[np.ndarray]:
             nodes = np.delete(nodes, first)
 
 
-def bend(plant: Plant, gusts: Gusts, speed: float, frames: int, hertz: float, damping: float, spin_up: float) -> np.ndarray:
+def bend(
+    plant: Plant, gusts: Gusts, speed: float, frames: int, hertz: float, damping: float, spin_up: float
+) -> np.ndarray:
     """(T, N, 3) float32 positions of the plant's nodes; beams.bend, with the lowest frequency given in Hz."""
     mass, drag = (part(plant).reshape(-1, 6).T for part in (node_mass, node_drag))
     mass_factor, stiffness_factor = rayleigh(2 * np.pi * hertz, damping)
@@ -265,7 +270,7 @@ def bend(plant: Plant, gusts: Gusts, speed: float, frames: int, hertz: float, da
 
 
 def _placed(plant: Plant, displacement: np.ndarray) -> np.ndarray:
-    """(3, N) nodes of elements that keep their lengths and turn as their chords do, by twice the arc tangent of half."""
+    """(3, N) nodes of elements that keep their lengths and turn as their chords do; a turn t is by 2 arctan(t / 2)."""
     element = plant.elements.T
     change = displacement - displacement[:, np.maximum(plant.parent, 0)]
     half = 0.5 * cross(element, change) / np.maximum(dot(element, element), 1e-30)
@@ -285,6 +290,7 @@ class Tree:
     height: float
     wind_speed: float
     intensity: float
+    length: float
     hertz: float
     damping: float
     seed: int
@@ -293,7 +299,7 @@ class Tree:
 
     def make(self, source: None = None) -> MotionClip:
         plant = grow(self.orders, self.height, self.seed)
-        gusts = Gusts(plant.position.T, self.wind_speed, self.height, self.intensity, self.seed)
+        gusts = Gusts(plant.position.T, self.wind_speed, self.height, self.intensity, self.length, self.seed)
         return MotionClip(
             bend(plant, gusts, self.wind_speed, self.frames, self.hertz, self.damping, 2.0),
             np.arange(self.frames) / FPS,
@@ -307,3 +313,79 @@ class Tree:
 
     def __str__(self) -> str:
         return f"beams, {self.height:g} m tree in gusts of {self.wind_speed:g} m/s"
+
+
+@dataclass(frozen=True)
+class Cards:
+    """Rigid leaf cards that turn about their pivots at a constant rate from key to key; the first key is the rest pose.
+
+    Branch 0 holds the pivots, which stand still; z is up. `degrees` are standard deviations of the keys' turns about
+    x, y and z; `key_frames` is a power of two.
+    """
+
+    cards: int
+    keys: int
+    key_frames: int
+    degrees: tuple[float, float, float]
+    seed: int
+    digest: str
+    source: ClassVar[None] = None
+
+    def make(self, source: None = None) -> MotionClip:
+        numbers, count = Numbers(self.seed), self.cards
+        twig = numbers.uniform(-1.0, 1.0, 3, (count + 6) // 7) * [[0.3], [0.3], [0.8]] + [[0.0], [0.0], [1.5]]
+        pivots = np.repeat(twig, 7, axis=1)[:, :count] + 0.01 * numbers.normal(3, count)
+        along = unit(numbers.normal(3, count) * [[1.0], [1.0], [0.4]])
+        across = unit(cross(along, numbers.normal(3, count)))
+        length = numbers.uniform(0.056, 0.15, count)
+        shape = zip((0.0, 1.0, 1.0, 2.0, 2.0, 3.0), (0.0, -0.72, 0.72, -0.72, 0.72, 0.0), strict=True)
+        corners = np.stack([length / 3.0 * (far * along + wide * across) for far, wide in shape], axis=2)
+        turns = self._turns(numbers)
+        cards = np.stack([pivots[..., None] + _turned(turn[..., None], corners) for turn in turns])
+        cards = cards.reshape(len(turns), 3, -1).transpose(0, 2, 1)
+        still = np.broadcast_to(pivots.T, (len(turns), count, 3))
+        positions = np.concatenate([still, cards], axis=1).astype(np.float32)
+        first = count + 6 * np.arange(count)[:, None, None]
+        return MotionClip(
+            positions,
+            np.arange(len(turns)) / FPS,
+            np.concatenate([np.zeros(count, int), 1 + np.repeat(np.arange(count), 6)]),
+            np.concatenate([[-1], np.zeros(count, int)]),
+            rest=positions[0],
+            faces=(first + [[0, 1, 3, 2], [2, 3, 5, 4]]).reshape(-1, 4).astype(np.int32),
+            metadata={"unit": "m", "up_axis": "z", "fps": FPS},
+        )
+
+    def _turns(self, numbers: Numbers) -> np.ndarray:
+        """(T, 4, N) quaternions, scalar first; frames between keys halve the turn, twice for four frames."""
+        half = numbers.normal(self.keys, 3, self.cards) * (np.array(self.degrees)[:, None] / 720.0)
+        half[0] = 0.0
+        x, y, z = (_about(axis, half[:, axis]) for axis in range(3))
+        turns = [_composed(_composed(c, b), a) for a, b, c in zip(x, y, z, strict=True)]
+        frames = self.key_frames
+        while frames > 1:
+            between = [unit(before + after) for before, after in zip(turns, turns[1:])]
+            turns = [turn for pair in zip(turns, between) for turn in pair] + turns[-1:]
+            frames //= 2
+        return np.stack(turns)
+
+    def __str__(self) -> str:
+        return f"{self.cards} rigid cards that turn about pivots, a key every {self.key_frames} frames"
+
+
+def _about(axis: int, half: np.ndarray) -> np.ndarray:
+    """(K, 4, N) quaternions of turns about a coordinate axis, from half of the angles in turns."""
+    result = np.zeros((len(half), 4, half.shape[1]))
+    result[:, 0], result[:, 1 + axis] = cosine(half), sine(half)
+    return result
+
+
+def _composed(left: np.ndarray, right: np.ndarray) -> np.ndarray:
+    scalar = left[0] * right[0] - dot(left[1:], right[1:])
+    vector = left[0] * right[1:] + right[0] * left[1:] + cross(left[1:], right[1:])
+    return np.concatenate([scalar[None], vector])
+
+
+def _turned(quaternions: np.ndarray, points: np.ndarray) -> np.ndarray:
+    turned = 2.0 * cross(quaternions[1:], points)
+    return points + quaternions[0] * turned + cross(quaternions[1:], turned)
