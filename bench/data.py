@@ -2,14 +2,15 @@
 
 The shipped sample; trees moved by the physics engine MuJoCo (see bench/trees); render meshes of trees with leaves in
 wind; small clips of many kinds (see bench/odd); files that other programs write (see bench/foreign); and any clip by
-its path. All are seeded, and those of athcodec's own code differ between machines by rounding only. The attribute
-"recipe" of an HDF5 file, or NAME.recipe beside a file of another kind, describes how it was made; when the recipe
-changes, the file is made again.
+its path. All are seeded. Those of trees/exact.py have the same bits on every machine, which their digests check; others
+of athcodec's own code differ by rounding only. The attribute "recipe" of an HDF5 file, or NAME.recipe beside a file of
+another kind, describes how it was made; when the recipe changes, the file is made again.
 """
 
 from __future__ import annotations
 
 import argparse
+import hashlib
 import json
 import os
 import time
@@ -26,6 +27,7 @@ from athcodec.motion.hierarchy import branch_orders
 from bench import foreign, odd
 from bench.clips import files_of, read
 from bench.tables import table
+from bench.trees import exact
 from bench.trees.beams import bend
 from bench.trees.mesh import dress
 from bench.trees.plant import grow
@@ -43,6 +45,10 @@ Seconds: to make the clip; "-" where the file existed. File MB: as it lies on di
 Tips: RMS distance of the branches' ends from their mean positions, in per cent of the plant's height. Orders: of
 the branches, trunk 0.
 """
+
+
+class Different(Exception):
+    """A clip that is the same on every machine came out otherwise."""
 
 
 @dataclass(frozen=True)
@@ -107,7 +113,7 @@ class Canopy:
         return f"{self.height:g} m tree as a mesh: bark tubes and {self.leaves:,} {self.species} leaves in wind"
 
 
-Recipe = Simulated | Canopy | odd.Odd | foreign.Foreign
+Recipe = Simulated | Canopy | exact.Tree | exact.Cards | odd.Odd | foreign.Foreign
 
 RECIPES: dict[str, Recipe] = {
     "mj_1k_200f": Simulated(1000, 2, 200, 8.0, 11.0, seed=1),
@@ -117,6 +123,20 @@ RECIPES: dict[str, Recipe] = {
     "canopy_15k_200f": Canopy(1000, 2, 200, 8.0, 8.0, 1400, "broadleaf", seed=12),
     "canopy_67k_200f": Canopy(4000, 3, 200, 10.0, 8.0, 10000, "poplar", seed=13),
     "canopy_300k_60f": Canopy(16000, 3, 60, 14.0, 9.0, 16000, "compound", seed=14),
+    # These stand for two clips that cannot be made: see docs/benchmarks.md.
+    "fe_8k_200f": exact.Tree(
+        ((1, 100), (40, 1800), (480, 6100)),
+        frames=200,
+        height=12.0,
+        wind_speed=11.0,
+        intensity=0.2,
+        length=40.0,
+        hertz=0.5,
+        damping=0.1,
+        seed=1,
+        digest="8aa353e6af4d",
+    ),
+    "cards_373x121f": exact.Cards(373, 31, 4, (8.0, 2.0, 2.0), seed=1, digest="6a5c93f6c64e"),
 }
 
 SUITES = {
@@ -181,7 +201,25 @@ def _make(name: str, path: Path) -> float:
             file.attrs["recipe"] = recipe_text(name)
     else:
         path.with_name(f"{name}.recipe").write_text(recipe_text(name))
+    expected = getattr(recipe, "digest", None)
+    if expected and (made := digest(path)) != expected:
+        path.unlink()
+        raise Different(
+            f"clip {name}: got digest {made}, expected {expected}, as every machine makes it; "
+            "compare the versions of Python and NumPy, and report both"
+        )
     return time.perf_counter() - start
+
+
+def digest(path: Path) -> str:
+    """Digest of positions, rest pose and branches: the input of a codec."""
+    total = hashlib.sha256()
+    with read(path) as clip:
+        for array in (clip.rest, clip.vertex_branch, clip.branch_parent):
+            total.update(b"" if array is None else array.tobytes())
+        for _, frames in clip.blocks():
+            total.update(frames.tobytes())
+    return total.hexdigest()[:12]
 
 
 def recipe_text(name: str) -> str:
@@ -238,7 +276,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
         except MissingEngine as error:
             rows.append({"name": name, "made": f"MISSING: {error}"})
             continue
-        except (Unstable, KeyError) as error:
+        except (Unstable, Different, KeyError) as error:
             raise SystemExit(f"bench data: {error.args[0]}") from error
         with read(path) as clip:
             size = {"file MB": 1e-6 * sum(file.stat().st_size for file in files_of(path))}

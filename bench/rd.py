@@ -27,8 +27,9 @@ from bench.codec_registry import OURS, all_codecs, chosen, fingerprint, is_lossl
 from bench.codecs import Codec, simple
 from bench.codecs.ours import Athcodec
 from bench.compare import MISSING, OK, SLOW
+from bench.data import digest
 from bench.store import Store
-from bench.suite import SUITES, Case, cases, digest
+from bench.suite import SUITES, Case, cases
 from bench.tables import cpu_model, environment, table
 
 ROOT = Path(__file__).resolve().parent.parent

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
 from bench import data
-from bench.clips import read
 from bench.trees.simulate import MissingEngine
 
 SUITES = tuple(data.SUITES)
@@ -38,14 +36,3 @@ def _case(word: str) -> Case:
         return Case(word, Path(data.path_of(word)), data.describe(word))
     except MissingEngine as error:
         return Case(word, None, f"{data.describe(word)}: MISSING: {error}")
-
-
-def digest(path: Path) -> str:
-    """Digest of positions, rest pose and branches: the input of a codec."""
-    total = hashlib.sha256()
-    with read(path) as clip:
-        for array in (clip.rest, clip.vertex_branch, clip.branch_parent):
-            total.update(b"" if array is None else array.tobytes())
-        for _, frames in clip.blocks():
-            total.update(frames.tobytes())
-    return total.hexdigest()[:12]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 from dataclasses import dataclass, replace
@@ -12,7 +13,8 @@ import pytest
 
 import athcodec
 from bench import data
-from bench.trees import beams
+from bench.store import read
+from bench.trees import beams, exact
 from bench.trees import simulate as simulation
 from bench.trees.leaves import SPECIES, Leaves, Plates, sheltered
 from bench.trees.mesh import SIDES, dress
@@ -27,6 +29,11 @@ pytestmark = pytest.mark.tools
 SMALL = data.Simulated(nodes=100, orders=2, frames=20, height=4.0, wind_speed=10.0, seed=1)
 BREEZE = Wind(8.0, 8.0, seed=2)
 CANOPY = data.Canopy(nodes=120, orders=1, frames=40, height=5.0, wind_speed=8.0, leaves=80, species="poplar", seed=3)
+
+SMALL_EXACT = {
+    "tree": exact.Tree(((1, 12), (4, 24), (12, 60)), 5, 4.0, 11.0, 0.2, 15.0, 1.0, 0.1, seed=2, digest="6059e8adabcb"),
+    "cards": exact.Cards(20, 4, 4, (8.0, 2.0, 2.0), seed=3, digest="4433ed57c12f"),
+}
 
 
 @pytest.fixture
@@ -165,7 +172,7 @@ def test_a_pole_of_beams_bends_and_swings_as_theory_says():
     grown = grow(31, 0, 3.0, seed=1)
     upright = np.linspace(0, 3, 31)[:, None] * [0, 1, 0]
     pole = replace(grown, position=upright, radius=np.full(31, 0.02), foliage=np.zeros(31))
-    stiffness, mass = beams._stiffness(pole), beams._mass(pole)
+    stiffness, mass = beams._stiffness(pole), beams.node_mass(pole)
     force = np.zeros(6 * 31)
     force[6 * 30] = 2.0
     bent = np.linalg.solve(stiffness.toarray(), force)
@@ -293,3 +300,69 @@ def test_the_verb_prints_a_table_of_the_clips(tmp_path):
     done = subprocess.run(words, cwd=ROOT, text=True, capture_output=True, timeout=120)
     assert done.returncode == 0, done.stderr
     assert "| sample |    1,001 |    120 |       99 | 0-2" in done.stdout
+
+
+def exact_digests(folder: Path) -> list[str]:
+    """Digests of the small exact clips, which are made anew."""
+    data.RECIPES |= {name: replace(recipe, digest="") for name, recipe in SMALL_EXACT.items()}
+    return [data.digest(data.path_of(name, folder)) for name in SMALL_EXACT]
+
+
+def test_exact_clips_have_the_same_bits_on_every_machine(recipes, tmp_path):
+    assert exact_digests(tmp_path) == [recipe.digest for recipe in SMALL_EXACT.values()]
+
+
+def test_exact_clips_have_the_same_bits_without_wide_vectors_and_with_kernels_of_another_processor(tmp_path):
+    features = np._core._multiarray_umath.__cpu_dispatch__
+    script = "import sys, pathlib, test_bench_data as t; print(*t.exact_digests(pathlib.Path(sys.argv[1])))"
+    environment = {"NPY_DISABLE_CPU_FEATURES": " ".join(features), "OPENBLAS_CORETYPE": "Nehalem"}
+    done = subprocess.run(
+        [sys.executable, "-c", script, str(tmp_path)],
+        cwd=ROOT / "tests",
+        env=os.environ | {"PYTHONPATH": str(ROOT)} | environment,
+        text=True,
+        capture_output=True,
+        timeout=300,
+    )
+    assert done.stdout.split() == [recipe.digest for recipe in SMALL_EXACT.values()], done.stderr
+
+
+def test_an_exact_clip_that_comes_out_otherwise_is_refused_and_not_kept(recipes, tmp_path):
+    recipes["cards"] = replace(SMALL_EXACT["cards"], seed=4)
+    with pytest.raises(data.Different, match=f"clip cards: got digest .*, expected {SMALL_EXACT['cards'].digest}"):
+        data.path_of("cards", tmp_path)
+    assert not list(tmp_path.iterdir())
+
+
+def test_exact_trees_solve_the_equations_of_beams():
+    plant = exact.grow(((1, 12), (4, 24), (12, 60)), 4.0, seed=2)
+    weight, load = np.random.default_rng(1).uniform(1, 1e4, (2, 6, len(plant.parent)))
+    load[:, 0] = 0.0
+    matrix = 1.5 * beams._stiffness(plant).toarray() + np.diag(weight.T.ravel())
+    expected = np.linalg.solve(matrix, load.T.ravel()).reshape(-1, 6).T
+    assert np.allclose(exact.Equations(plant, 1.5, weight).solve(load), expected, rtol=1e-6, atol=1e-9)
+    turns = np.linspace(-3, 3, 1001)
+    assert np.abs(exact.sine(turns) - np.sin(2 * np.pi * turns)).max() < 1e-14
+
+
+def test_exact_cards_are_rigid_and_turn_steadily_between_keys():
+    clip = SMALL_EXACT["cards"].make()
+    cards = clip.positions[:, 20:].reshape(13, 20, 6, 3).astype(np.float64)
+    apart = np.linalg.norm(cards[:, :, :, None] - cards[:, :, None], axis=-1)
+    assert np.ptp(apart, axis=0).max() < 1e-6
+    pace = np.linalg.norm(np.diff(cards[:, :, 5], axis=0), axis=-1).reshape(3, 4, 20)
+    assert np.ptp(pace, axis=1).max() < 1e-6 and np.ptp(pace, axis=0).max() > 1e-3
+    assert (clip.positions[:, :20] == clip.rest[:20]).all() and (clip.positions[0] == clip.rest).all()
+
+
+def test_the_table_of_clips_that_stand_for_others_is_that_of_the_saved_figures():
+    saved = [read(ROOT / "bench" / "results" / f"{name}.json") for name in ("not_made", "stand_ins")]
+    old, new = (result["tables"][0]["rows"] for result in saved)
+    pairs = {(a["clip"], a["bound"], a["ladder"]): (a["bytes"], b["bytes"]) for a, b in zip(old, new, strict=True)}
+    text = (ROOT / "docs" / "benchmarks.md").read_text("utf-8")
+    for bound in ("0.001", "0.0001", "1e-05"):
+        for ladder in ("none", "decades"):
+            sizes = [pairs[clip, bound, ladder] for clip in ("tree_8k_200f", "leaves_373x121f")]
+            cells = [f"{one:,} | {other:,} | {other / one:.2f}" for one, other in sizes]
+            assert f"| {float(bound):.0e}, `{ladder}` | {' | '.join(cells)} |".replace("e-0", "e-") in text
+            assert all(0.5 < other / one < 2 for one, other in sizes)
