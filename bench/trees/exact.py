@@ -297,7 +297,7 @@ class Tree:
     digest: str
     source: ClassVar[None] = None
 
-    def make(self, source: None = None) -> MotionClip:
+    def make(self) -> MotionClip:
         plant = grow(self.orders, self.height, self.seed)
         gusts = Gusts(plant.position.T, self.wind_speed, self.height, self.intensity, self.length, self.seed)
         return MotionClip(
@@ -331,7 +331,7 @@ class Cards:
     digest: str
     source: ClassVar[None] = None
 
-    def make(self, source: None = None) -> MotionClip:
+    def make(self) -> MotionClip:
         numbers, count = Numbers(self.seed), self.cards
         twig = numbers.uniform(-1.0, 1.0, 3, (count + 6) // 7) * [[0.3], [0.3], [0.8]] + [[0.0], [0.0], [1.5]]
         pivots = np.repeat(twig, 7, axis=1)[:, :count] + 0.01 * numbers.normal(3, count)
