@@ -1,5 +1,5 @@
-"""Shared by the verbs: clips from the command line, a clip encoded into a temporary file, errors of decoded positions,
-and clips with more plants and frames.
+"""Shared by the verbs: clips from the command line, a clip encoded into a temporary file, errors of decoded
+positions.
 """
 
 from __future__ import annotations
@@ -9,18 +9,16 @@ import tempfile
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from os import PathLike
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 import athcodec
-from athcodec.exporters.hdf5 import Hdf5Writer
 from athcodec.metrics import ErrorMeter
 from athcodec.options import EFFORTS, LADDERS, ladder_of
+from athcodec.sources.sequence import FRAME_SUFFIXES, sequence_files
 
 REL_ERROR = 1e-4
-FRAMES_AHEAD = 7
 
 
 @dataclass(frozen=True)
@@ -32,12 +30,24 @@ class Encoded:
     decoder: athcodec.Decoder
 
 
+def read(path: str | PathLike[str]) -> athcodec.MotionClip:
+    """Open the clip in a file of any format, as a user would: with the default options."""
+    return athcodec.read(path)
+
+
+def files_of(path: Path) -> list[Path]:
+    """The files that a clip lies in: `path`, the other frames of a sequence, the arrays beside an XDMF file."""
+    beside = path.parent.glob(f"{path.stem}.h5") if path.suffix == ".xdmf" else ()
+    frames = sequence_files(path).values() if path.suffix in FRAME_SUFFIXES else ()
+    return sorted({path, *frames, *beside})
+
+
 def add_clips(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "clips",
         nargs="*",
         type=Path,
-        metavar="CLIP.h5",
+        metavar="CLIP",
         default=[athcodec.sample_path()],
         help="motion clips; by default the sample that ships with athcodec",
     )
@@ -72,16 +82,6 @@ def add_segment_frames(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def add_source(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "--of",
-        type=Path,
-        default=athcodec.sample_path(),
-        metavar="CLIP.h5",
-        help="the clip that those measured are made from (default: the sample)",
-    )
-
-
 def add_effort(parser: argparse.ArgumentParser, default: str = "default") -> None:
     parser.add_argument("--effort", choices=EFFORTS, default=default, help="the encoder's effort (default %(default)s)")
 
@@ -96,7 +96,7 @@ def encoded(
     segment_frames: int | None = None,
 ) -> Iterator[Encoded]:
     """The clip at `path`, encoded without attributes into a file that is deleted with the context."""
-    with tempfile.TemporaryDirectory() as folder, athcodec.read_hdf5(path) as clip:
+    with tempfile.TemporaryDirectory() as folder, read(path) as clip:
         file = Path(folder) / "clip.ath"
         settings = {"attributes": "none", "effort": effort, "ladder": ladder, "host_rest": host_rest}
         given = {"rel_error": rel_error, "rest_error": "bound", "segment_frames": segment_frames}
@@ -113,40 +113,3 @@ def measure(
     for start, block in decoder.blocks(level, frames=frames):
         meter.add(clip.block(start, start + len(block)), block)
     return meter
-
-
-@contextmanager
-def replicated_plants(path: Path) -> Iterator[ReplicatedPlants]:
-    with athcodec.read_hdf5(path) as clip:
-        yield ReplicatedPlants(clip, path.stem)
-
-
-class ReplicatedPlants:
-    """Copies of one plant at the same position, with its motion extended to any number of frames."""
-
-    def __init__(self, clip: athcodec.MotionClip, name: str) -> None:
-        self._clip, self.name = clip, name
-        self._positions = np.asarray(clip.block(0, clip.frame_count), np.float32)
-
-    def write(self, path: Path, plants: int, frames: int) -> None:
-        """Writes an HDF5 clip."""
-        source = self._clip
-        parent, offset = source.branch_parent, np.arange(plants)[:, None] * source.branch_count
-        index = None if source.stem_index is None else np.tile(source.stem_index, plants)
-        with Hdf5Writer(
-            path,
-            time=np.arange(frames) / source.fps,
-            vertex_branch=(source.vertex_branch + offset).ravel(),
-            branch_parent=np.where(parent < 0, -1, parent + offset).ravel(),
-            rest=np.tile(source.rest.astype(np.float32), (plants, 1)),
-            stem_index=index,
-            metadata=source.metadata,
-        ) as writer:
-            for frame in range(frames):
-                writer.add(self._frame(frame, plants).reshape(1, -1, 3))
-
-    def _frame(self, frame: int, plants: int) -> np.ndarray:
-        """(plants, N, 3): played forwards and backwards in turn, each plant some frames ahead of the one before."""
-        last = self._clip.frame_count - 1
-        at = (frame + FRAMES_AHEAD * np.arange(plants)) % max(1, 2 * last)
-        return self._positions[np.where(at > last, 2 * last - at, at)]

@@ -2,8 +2,8 @@
 
 A custom codec is named MODULE:NAME, an object or class of an importable module (codecs/__init__.py says what it must
 provide). `fingerprint` identifies the code that made a result, so that the result is measured again when that code has
-changed; comments, docstrings and layout do not count. Baselines use parts of athcodec: for them its version counts, not
-every change of its code.
+changed; comments, docstrings and layout do not count. Baselines use parts of athcodec: for them its version counts and
+the C files of the entropy coder, not every change of its encoder.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from types import ModuleType
 import athcodec
 from athcodec._library import library_path
 from bench.codecs import Codec
+from bench.codecs.coder import CORE, CORE_SOURCES
 from bench.codecs.programs import lossless
 
 SOURCES = (
@@ -31,7 +32,8 @@ SOURCES = (
     ("bench.codecs.simple", "SIMPLE"),
 )
 OURS = "athcodec"
-DISTRIBUTIONS = ("athcodec", "numpy", "zstandard")
+DISTRIBUTIONS = ("athcodec", "zstandard")
+INCLUDE = re.compile(r'^#include "([^"]+)"', re.MULTILINE)
 
 
 def all_codecs() -> Iterator[Codec]:
@@ -114,15 +116,30 @@ def _athcodec_files() -> set[Path]:
 
 
 def _bench_files(module: str) -> set[Path]:
-    """The file of a module, the C file beside it, and those of the codec modules that it imports, recursively."""
+    """The file of a module and the C files that it compiles, and those of all codec modules that it imports."""
     files: set[Path] = set()
     names = [module]
     while names:
         spec = _spec(names.pop())
         if spec is None or spec.origin is None or Path(spec.origin) in files:
             continue
-        files |= {file for file in (Path(spec.origin), Path(spec.origin).with_suffix(".c")) if file.exists()}
+        files.add(Path(spec.origin))
+        if (beside := Path(spec.origin).with_suffix(".c")).exists():
+            files |= _c_files([beside, *CORE_SOURCES])
         names += [name for name in _imports(Path(spec.origin)) if name.startswith("bench.codecs")]
+    return files
+
+
+def _c_files(sources: Iterable[Path]) -> set[Path]:
+    """C files and what they include of the core, recursively."""
+    files, waiting = set(), list(sources)
+    while waiting:
+        file = waiting.pop()
+        if file not in files:
+            files.add(file)
+            folders = (file.parent, CORE, CORE / "include")
+            near = (folder / name for name in INCLUDE.findall(file.read_text()) for folder in folders)
+            waiting += [path.resolve() for path in near if path.exists()]
     return files
 
 
@@ -153,7 +170,7 @@ def _digest(files: tuple[Path, ...]) -> str:
 
 def _code(file: Path) -> bytes:
     """The contents of a source file without comments, docstrings, imports and layout; of others, all of it."""
-    if file.suffix == ".c":
+    if file.suffix in (".c", ".h", ".inl"):
         return "".join(re.sub(r"/\*.*?\*/|//[^\n]*", "", file.read_text(), flags=re.DOTALL).split()).encode()
     if file.suffix != ".py":
         return file.read_bytes()

@@ -1,33 +1,36 @@
 """The clips that the benchmark measures: made once, kept in a folder, the same for everyone.
 
-The shipped sample; trees moved by the physics engine MuJoCo (see bench/trees); the same with many more
-vertices; render meshes of trees with leaves in wind; small clips of many kinds (see bench/odd); and any HDF5 clip by
-its path. All are seeded and differ between machines by rounding only. The attribute "recipe" of a file describes how it
-was made; when the recipe changes, the file is made again.
+The shipped sample; trees moved by the physics engine MuJoCo (see bench/trees); render meshes of trees with leaves in
+wind; small clips of many kinds (see bench/odd); files that other programs write (see bench/foreign); and any clip by
+its path. All are seeded. Those of trees/exact.py have the same bits on every machine, which their digests check; others
+of athcodec's own code differ by rounding only. The attribute "recipe" of an HDF5 file, or NAME.recipe beside a file of
+another kind, describes how it was made; when the recipe changes, the file is made again.
 """
 
 from __future__ import annotations
 
 import argparse
+import hashlib
 import json
 import os
 import time
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 import h5py
 import numpy as np
 
 import athcodec
 from athcodec.motion.hierarchy import branch_orders
-from bench import odd
+from bench import foreign, odd
+from bench.clips import files_of, read
 from bench.tables import table
+from bench.trees import exact
 from bench.trees.beams import bend
 from bench.trees.mesh import dress
 from bench.trees.plant import grow
-from bench.trees.refine import refine
 from bench.trees.simulate import MissingEngine, Unstable, simulate
 from bench.trees.wind import Wind
 
@@ -38,10 +41,14 @@ RECIPE_VERSION = 1  # goes up when the code below or in bench/trees gives other 
 SAMPLE = "sample"
 
 NOTE = """
-Seconds: to make the clip, without its source clip; "-" where the file existed. Tips: RMS distance of the
-branches' ends from their mean positions, in per cent of the plant's height. Orders: of the branches,
-trunk 0.
+Seconds: to make the clip; "-" where the file existed. File MB: as it lies on disk.
+Tips: RMS distance of the branches' ends from their mean positions, in per cent of the plant's height. Orders: of
+the branches, trunk 0.
 """
+
+
+class Different(Exception):
+    """A clip that is the same on every machine came out otherwise."""
 
 
 @dataclass(frozen=True)
@@ -54,15 +61,10 @@ class Simulated:
     height: float
     wind_speed: float
     seed: int
-    source: ClassVar[None] = None
 
-    @property
-    def wind(self) -> Wind:
-        return Wind(self.wind_speed, self.height, seed=self.seed)
-
-    def make(self, source: None) -> athcodec.MotionClip:
+    def make(self) -> athcodec.MotionClip:
         plant = grow(self.nodes, self.orders, self.height, self.seed)
-        motion = simulate(plant, self.wind, self.frames)
+        motion = simulate(plant, Wind(self.wind_speed, self.height, seed=self.seed), self.frames)
         return athcodec.MotionClip(
             motion.positions,
             motion.time,
@@ -79,25 +81,6 @@ class Simulated:
 
 
 @dataclass(frozen=True)
-class Refined:
-    """A simulated clip with `factor` vertices per element, and twigs attached to it."""
-
-    source: str
-    frames: int
-    factor: int
-    twigs: int
-    twig_vertices: int
-    seed: int
-
-    def make(self, source: athcodec.MotionClip) -> athcodec.MotionClip:
-        wind = RECIPES[self.source].wind
-        return refine(source, wind, self.frames, self.factor, self.twigs, self.twig_vertices, self.seed)
-
-    def __str__(self) -> str:
-        return f"{self.source}, {self.factor} vertices per element by splines, {self.twigs:,} twigs riding"
-
-
-@dataclass(frozen=True)
 class Canopy:
     """A tree of beams in turbulent wind as a render mesh: bark tubes, and leaves hinged on the outer stems."""
 
@@ -110,9 +93,8 @@ class Canopy:
     species: str
     seed: int
     version: int = 1  # goes up when the code below bench/trees gives other leaves or beams
-    source: ClassVar[None] = None
 
-    def make(self, source: None) -> athcodec.MotionClip:
+    def make(self) -> athcodec.MotionClip:
         plant = grow(self.nodes, self.orders, self.height, self.seed)
         wind = Wind(self.wind_speed, self.height, seed=self.seed)
         tree = athcodec.MotionClip(
@@ -131,22 +113,30 @@ class Canopy:
         return f"{self.height:g} m tree as a mesh: bark tubes and {self.leaves:,} {self.species} leaves in wind"
 
 
-Recipe = Simulated | Refined | Canopy | odd.Odd
+Recipe = Simulated | Canopy | exact.Tree | exact.Cards | odd.Odd | foreign.Foreign
 
 RECIPES: dict[str, Recipe] = {
     "mj_1k_200f": Simulated(1000, 2, 200, 8.0, 11.0, seed=1),
-    "mj_1k_1200f": Simulated(1000, 3, 1200, 8.0, 11.0, seed=2),
-    "mj_4k_200f": Simulated(4000, 3, 200, 10.0, 9.0, seed=3),
-    "mj_4k_1200f": Simulated(4000, 6, 1200, 10.0, 6.5, seed=4),
     # the paper's case: 3 levels of branches, about 8,000 nodes, 200 steps, wind along (-1, 0, 1)
     "mj_8k_200f": Simulated(8000, 2, 200, 12.0, 9.0, seed=5),
-    "mj_8k_1200f": Simulated(8000, 6, 1200, 12.0, 6.5, seed=6),
-    "refined_50k_200f": Refined("mj_4k_200f", 200, 6, 2600, 10, seed=7),
-    "refined_200k_60f": Refined("mj_8k_200f", 60, 12, 10400, 10, seed=8),
     "canopy_4k_60f": Canopy(400, 2, 60, 6.0, 8.0, 260, "broadleaf", seed=11),
     "canopy_15k_200f": Canopy(1000, 2, 200, 8.0, 8.0, 1400, "broadleaf", seed=12),
     "canopy_67k_200f": Canopy(4000, 3, 200, 10.0, 8.0, 10000, "poplar", seed=13),
     "canopy_300k_60f": Canopy(16000, 3, 60, 14.0, 9.0, 16000, "compound", seed=14),
+    # These stand for two clips that cannot be made: see docs/benchmarks.md.
+    "fe_8k_200f": exact.Tree(
+        ((1, 100), (40, 1800), (480, 6100)),
+        frames=200,
+        height=12.0,
+        wind_speed=11.0,
+        intensity=0.2,
+        length=40.0,
+        hertz=0.5,
+        damping=0.1,
+        seed=1,
+        digest="8aa353e6af4d",
+    ),
+    "cards_373x121f": exact.Cards(373, 31, 4, (8.0, 2.0, 2.0), seed=1, digest="6a5c93f6c64e"),
 }
 
 SUITES = {
@@ -154,15 +144,17 @@ SUITES = {
     "full": (SAMPLE, *RECIPES),
     "odd": tuple(odd.CLIPS),
     "odd-quick": odd.FEW,
+    "foreign": tuple(name for name, clip in foreign.CLIPS.items() if not clip.held_out),
+    "held-out": tuple(name for name, clip in foreign.CLIPS.items() if clip.held_out),
 }
-RECIPES |= odd.CLIPS | odd.MESHES
+RECIPES |= odd.CLIPS | odd.MESHES | foreign.CLIPS
 RECIPES["canopy_1k_60f"] = Canopy(120, 2, 60, 4.0, 8.0, 80, "broadleaf", seed=15)
 
 
 def path_of(name: str, folder: Path | None = None) -> Path:
-    """The file of a clip by name, made if it is missing, or of any HDF5 clip by its path.
+    """The file of a clip by name, made if it is missing, or of any clip by its path.
 
-    Raises KeyError for a name that is neither, MissingEngine if MuJoCo is needed and not installed.
+    Raises KeyError for a name that is neither, MissingEngine if the program that makes it is not installed.
     """
     return _found_or_made(name, folder or default_folder())[0]
 
@@ -185,44 +177,62 @@ def _found_or_made(name: str, folder: Path) -> tuple[Path, float | None]:
         if Path(name).is_file():
             return Path(name), None
         names = ", ".join([SAMPLE, *RECIPES])
-        raise KeyError(f"clip: got {name!r}, expected the path of an HDF5 file or one of {names}")
-    path = folder / f"{name}.h5"
-    if _recipe_in(path) == recipe_text(name):
-        return path, None
+        raise KeyError(f"clip: got {name!r}, expected the path of a file or one of {names}")
     recipe = RECIPES[name]
-    source = _found_or_made(recipe.source, folder)[0] if recipe.source else None
+    path = folder / f"{name}{getattr(recipe, 'suffix', '.h5')}"
+    if path.is_file() and _recipe_in(path, name) == recipe_text(name):
+        return path, None
     folder.mkdir(parents=True, exist_ok=True)
-    return path, _make(name, source, path)
+    return path, _make(name, path)
 
 
-def _make(name: str, source_path: Path | None, path: Path) -> float:
-    start = time.perf_counter()
-    source = athcodec.read_hdf5(source_path) if source_path else None
-    try:
-        clip = RECIPES[name].make(source)
-    finally:
-        if source:
-            source.close()
-    clip.metadata["recipe"] = recipe_text(name)
-    path.unlink(missing_ok=True)  # A file there may be damaged, and no file of another kind is replaced.
-    athcodec.write_hdf5(clip, path)
+def _make(name: str, path: Path) -> float:
+    start, recipe = time.perf_counter(), RECIPES[name]
+    if isinstance(recipe, foreign.Foreign) and (why := recipe.missing()):
+        raise MissingEngine(why)
+    for old in files_of(path) if path.exists() else ():  # They may be damaged, or more than will be written.
+        old.unlink()
+    if isinstance(recipe, foreign.Foreign):
+        recipe.write(path)
+    else:
+        athcodec.write_hdf5(recipe.make(), path)
+    if path.suffix == ".h5":
+        with h5py.File(path, "r+") as file:
+            file.attrs["recipe"] = recipe_text(name)
+    else:
+        path.with_name(f"{name}.recipe").write_text(recipe_text(name))
+    expected = getattr(recipe, "digest", None)
+    if expected and (made := digest(path)) != expected:
+        path.unlink()
+        raise Different(
+            f"clip {name}: got digest {made}, expected {expected}, as every machine makes it; "
+            "compare the versions of Python and NumPy, and report both"
+        )
     return time.perf_counter() - start
 
 
+def digest(path: Path) -> str:
+    """Digest of positions, rest pose and branches: the input of a codec."""
+    total = hashlib.sha256()
+    with read(path) as clip:
+        for array in (clip.rest, clip.vertex_branch, clip.branch_parent):
+            total.update(b"" if array is None else array.tobytes())
+        for _, frames in clip.blocks():
+            total.update(frames.tobytes())
+    return total.hexdigest()[:12]
+
+
 def recipe_text(name: str) -> str:
-    """How the clip is made, as JSON, including the recipes of its sources."""
+    """How the clip is made, as JSON."""
     recipe = RECIPES[name]
-    words = {"kind": type(recipe).__name__, "version": RECIPE_VERSION} | asdict(recipe)
-    if recipe.source:
-        words["source"] = json.loads(recipe_text(recipe.source))
-    return json.dumps(words, sort_keys=True)
+    return json.dumps({"kind": type(recipe).__name__, "version": RECIPE_VERSION} | asdict(recipe), sort_keys=True)
 
 
-def _recipe_in(path: Path) -> str | None:
-    """The recipe in a file; None if there is no such file."""
-    if not path.is_file():
-        return None
+def _recipe_in(path: Path, name: str) -> str | None:
+    """The recipe by which a clip's file was made; None if it is not known."""
     try:
+        if path.suffix != ".h5":
+            return path.with_name(f"{name}.recipe").read_text()
         with h5py.File(path, "r") as file:
             return str(file.attrs.get("recipe"))
     except OSError:
@@ -245,7 +255,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "names",
         nargs="*",
         metavar="NAME",
-        help=f"clips to make or find: {', '.join([SAMPLE, *RECIPES])}; or HDF5 clips by path",
+        help=f"clips to make or find: {', '.join([SAMPLE, *RECIPES])}; or clips by path",
     )
     parser.add_argument("--suite", choices=tuple(SUITES), help="a set of clips (quick, where nothing is named)")
     parser.add_argument(
@@ -263,12 +273,16 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     for name in names:
         try:
             path, seconds = _found_or_made(name, folder)
-        except (MissingEngine, Unstable, KeyError) as error:
+        except MissingEngine as error:
+            rows.append({"name": name, "made": f"MISSING: {error}"})
+            continue
+        except (Unstable, Different, KeyError) as error:
             raise SystemExit(f"bench data: {error.args[0]}") from error
-        with athcodec.read_hdf5(path) as clip:
-            rows.append({"name": Path(name).stem} | _row(clip) | {"made": describe(name), "seconds": seconds})
+        with read(path) as clip:
+            size = {"file MB": 1e-6 * sum(file.stat().st_size for file in files_of(path))}
+            rows.append({"name": Path(name).stem} | _row(clip) | size | {"made": describe(name), "seconds": seconds})
     where = args.folder.name if args.folder else f"${FOLDER_VARIABLE} or {DEFAULT_FOLDER}"
-    return {"tables": [table("Clips", rows, NOTE, f"In {where}, as NAME.h5.")], "broken": []}
+    return {"tables": [table("Clips", rows, NOTE, f"In {where}.")], "broken": []}
 
 
 def _wanted(names: Sequence[str], suite: str | None) -> list[str]:

@@ -1,8 +1,8 @@
 /* Times the decoder for decode.py, which says what is measured and why. One thread, no Python in any loop.
  * Prints one JSON object. Hosted C11 over ath.h alone. Judges nothing.
  *
- *     decode FILE.ath once                        one whole decode, the second of this process
- *     decode FILE.ath all ROUNDS SEEKS INSTANCES  the rest: medians over ROUNDS, and one round before them */
+ *     decode FILE.ath once              one whole decode, the second of this process
+ *     decode FILE.ath all ROUNDS SEEKS  the rest: medians over ROUNDS, and one round before them */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -11,7 +11,7 @@
 
 #include "ath.h"
 
-enum { LEVELS = 32, TICKS = 30, RING_BYTES = 64 << 20 };
+enum { LEVELS = 32 };
 
 static const double BETWEEN = 0.37; /* Part of the way to the next frame, so that a blend is shown. */
 
@@ -27,7 +27,6 @@ typedef struct {
 typedef struct {
     ath_segment **segments;
     float *matrices, *exact;
-    size_t matrix_floats, shown_floats;                          /* matrices; these and exact vertices */
     double *prepare_ms, *frames_ms, *positions_us, *matrices_us; /* one per round */
     uint32_t crc;
 } level_run;
@@ -84,12 +83,8 @@ static double quantile(double *values, int count, double share)
     return values[at < 0 ? 0 : at];
 }
 
-static double now_ms(void)
-{
-    struct timespec time;
-    timespec_get(&time, TIME_UTC);
-    return (double)time.tv_sec * 1e3 + (double)time.tv_nsec * 1e-6;
-}
+/* Processor time of this process. */
+static double now_ms(void) { return (double)clock() * 1e3 / CLOCKS_PER_SEC; }
 
 static double *figures(int count) { return (double *)memory_of((size_t)count * sizeof(double)); }
 
@@ -232,10 +227,8 @@ static void ready_level(const opened *clip, int32_t level, int rounds, level_run
     run->segments = (ath_segment **)memory_of((size_t)count * sizeof *run->segments);
     for (int32_t s = 0; s < count; s++)
         run->segments[s] = (ath_segment *)memory_of(ath_segment_size(clip->file, level));
-    run->matrix_floats = 12 * (size_t)nodes;
-    run->shown_floats = run->matrix_floats + 3 * (size_t)vertices;
-    run->matrices = (float *)memory_of(run->shown_floats * sizeof(float));
-    run->exact = run->matrices + run->matrix_floats;
+    run->matrices = (float *)memory_of(12 * (size_t)nodes * sizeof(float));
+    run->exact = (float *)memory_of(3 * (size_t)vertices * sizeof(float));
     run->prepare_ms = figures(rounds + 1);
     run->frames_ms = figures(rounds + 1);
     run->positions_us = figures(rounds + 1);
@@ -432,79 +425,6 @@ static void measure_seeks(const opened *clip, int seeks)
     printf("}");
 }
 
-/* ---- instances ---- */
-
-typedef struct {
-    const opened *clip;
-    const level_run *runs;
-    const int32_t *levels; /* Instance i has levels[i % level_count]. */
-    int level_count, count;
-    float *ring; /* where what is shown goes, one instance behind the other */
-    size_t ring_floats;
-} crowd;
-
-/* Where an instance is in the loop when all start, as a part of it. */
-static double offset_of(int instance)
-{
-    double turns = 0.6180339887498949 * instance;
-    return turns - floor(turns);
-}
-
-/* One second at TICKS pictures a second. */
-static double show_crowd(const crowd *crowd)
-{
-    double start = now_ms(), loop = ath_clips(crowd->clip->file)->duration;
-    size_t at = 0;
-    for (int tick = 0; tick < TICKS; tick++)
-        for (int i = 0; i < crowd->count; i++) {
-            const level_run *run = crowd->runs + crowd->levels[i % crowd->level_count];
-            float *out;
-            double seconds = (double)tick / TICKS + loop * offset_of(i);
-            double frame = ath_frame_at(crowd->clip->file, 0, seconds, ATH_LOOP);
-            if (at + run->shown_floats > crowd->ring_floats) at = 0;
-            out = crowd->ring + at;
-            write_matrices(crowd->clip, run->segments, frame, out, out + run->matrix_floats);
-            at += run->shown_floats;
-        }
-    return now_ms() - start;
-}
-
-static void measure_crowd(const crowd *crowd, int rounds)
-{
-    double *runs = figures(rounds + 1);
-    for (int round = 0; round <= rounds; round++) runs[round] = show_crowd(crowd);
-    int32_t level = crowd->level_count > 1 ? -1 : crowd->levels[0];
-    double ms = median(runs + 1, rounds);
-    put("{", "level", level);
-    put(", ", "instances", crowd->count);
-    put(", ", "pictures", TICKS);
-    put(", ", "ms", ms);
-    put(", ", "per_ms", (double)crowd->count * TICKS / ms);
-    printf("}");
-}
-
-/* Levels 0, 1 and 2 and the deepest, and all of them in turn (level -1). */
-static void measure_instances(const opened *clip, int rounds, int instances, const level_run *runs)
-{
-    int32_t levels[4], count = 0, deepest = clip->info.level_count - 1;
-    size_t largest = 0, most = (size_t)RING_BYTES / sizeof(float);
-    for (int32_t level = 0; level < deepest && level < 3; level++) levels[count++] = level;
-    levels[count++] = deepest;
-    for (int32_t i = 0; i < count; i++)
-        if (runs[levels[i]].shown_floats > largest) largest = runs[levels[i]].shown_floats;
-    crowd crowd = {clip, runs, levels, 1, instances, 0, largest > most ? largest : most};
-    crowd.ring = (float *)memory_of(crowd.ring_floats * sizeof(float));
-    printf(",\n \"instances\": [");
-    for (int32_t i = 0; i < count; i++, crowd.levels++) {
-        measure_crowd(&crowd, rounds);
-        printf(",\n  ");
-    }
-    crowd.levels = levels;
-    crowd.level_count = count;
-    measure_crowd(&crowd, rounds);
-    printf("]");
-}
-
 /* ---- everything ---- */
 
 static int32_t longest_segment(const ath_file *file, int32_t segments)
@@ -529,7 +449,7 @@ static void print_facts(const opened *clip)
     put(", ", "work_bytes", (double)clip->work_bytes);
 }
 
-static void all(opened *clip, int rounds, int seeks, int instances)
+static void all(opened *clip, int rounds, int seeks)
 {
     level_run runs[LEVELS];
     double open_ms, build_ms;
@@ -540,15 +460,14 @@ static void all(opened *clip, int rounds, int seeks, int instances)
     measure_levels(clip, rounds, runs);
     measure_onward(clip, rounds);
     measure_seeks(clip, seeks);
-    measure_instances(clip, rounds, instances, runs);
     printf("}\n");
 }
 
 int main(int argc, char **argv)
 {
     opened clip;
-    if (argc < 3 || (strcmp(argv[2], "once") != 0 && (strcmp(argv[2], "all") != 0 || argc != 6))) {
-        fprintf(stderr, "usage: decode FILE.ath once | all ROUNDS SEEKS INSTANCES\n");
+    if (argc < 3 || (strcmp(argv[2], "once") != 0 && (strcmp(argv[2], "all") != 0 || argc != 5))) {
+        fprintf(stderr, "usage: decode FILE.ath once | all ROUNDS SEEKS\n");
         return 2;
     }
     read_file(argv[1], &clip);
@@ -556,6 +475,6 @@ int main(int argc, char **argv)
     if (strcmp(argv[2], "once") == 0)
         once(&clip);
     else
-        all(&clip, atoi(argv[3]), atoi(argv[4]), atoi(argv[5]));
+        all(&clip, atoi(argv[3]), atoi(argv[4]));
     return 0;
 }

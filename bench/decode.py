@@ -1,9 +1,8 @@
-"""Time and memory of the decoder in C: whole files, levels, playing, seeking, many plants; compared with SZ3 and HDF5.
+"""Processor time and memory of the decoder in C: whole files, levels, playing, seeking.
 
-One thread, and two where Python decodes whole files. The decoder is timed by decode.c, compiled here with the core's
-own sources and flags, so that no Python is in its loops. Runs of whole decoding alternate with SZ3 (pysz, where it is
-installed) and h5py, so that conditions are the same for all. The decoder's frames are compared with those of
-athcodec.open by their checksum.
+The decoder is timed by decode.c, compiled here with the core's own sources and flags, so that no Python is in its
+loops. It has one thread, whose processor time other programs on the machine do not add to. Its frames are compared
+with those of athcodec.open by their checksum.
 """
 
 from __future__ import annotations
@@ -13,39 +12,21 @@ import json
 import re
 import subprocess
 import tempfile
-import time
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from importlib.metadata import version
-from itertools import product
+from collections.abc import Sequence
 from pathlib import Path
 from statistics import median
 from typing import Any
-from unittest.mock import patch
 
-import h5py
 import numpy as np
 
 import athcodec
 from athcodec._native import crc32c
-from athcodec.decoding import segment_decoder
-from athcodec.metrics import ErrorMeter
-from bench.clips import add_ladder, add_number, add_rel_error
+from bench.clips import add_ladder, add_number, add_rel_error, read
 from bench.codecs.coder import CORE, compile_c
-from bench.codecs.program import arrays_of, from_arrays
 from bench.tables import table
 
-try:
-    import pysz
-except ImportError:
-    pysz = None
-
-ROUNDS, SEEKS, INSTANCES = 9, 1000, 1000
-THREADS = (1, 2)  # Threads of Python's positions().
-TABLES = ("target", "whole", "levels", "onward", "memory", "instances")
-GZIP_CHUNK = 1 << 20
-SZ3_LAYOUTS = ("T,N,3", "N,T,3", "3,T,N", "3,N,T", "T,3N", "3N,T")
-SZ3_ALGORITHMS = ("LORENZO_REG", "INTERP_LORENZO", "INTERP")
+ROUNDS, SEEKS = 9, 1000
+TABLES = ("target", "levels", "onward", "memory")
 
 TARGET_NOTE = """
 Targets: for tree_8k at a bound of 1e-4; printed for every clip. Whole decoding: every segment prepared at the
@@ -56,17 +37,6 @@ them, in the file's order; matrices: ath_matrices and ath_exact, what a renderer
 prelude and what ath_ranges names. Seek: a random frame, its segment prepared and the frame
 written; the target is the mean cost of preparing one segment. Memory over positions: all memory
 for playing (table Memory) over one segment's float32 positions.
-"""
-
-WHOLE_NOTE = """
-Readers alternate, {rounds} rounds; ratio: the reader's median over athcodec's. Each writes into memory that it has
-written before, but for Python's rows, whose memory is new. The second athcodec row includes opening the file and
-building its bases, as the others do. Threads share segments: a clip of one segment takes one thread. SZ3 bounds
-values, not distances: its bound is bound/sqrt(3), and a distance reaches the bound only where all three axes do.
-It compresses positions or displacements from the rest pose (then without the rest pose, and without adding
-it again), in {layouts} layouts with {algorithms} algorithms: the configuration with the smallest file, and the
-fastest one. HDF5: float32 positions, gzip 4 with shuffle, chunks of whole frames, exact. Where an .ath file
-was given, these two hold its decoded frames.
 """
 
 LEVELS_NOTE = """
@@ -87,12 +57,6 @@ ones. Nothing else is allocated. Over positions: their sum over the float32 posi
 segment.
 """
 
-INSTANCES_NOTE = """
-Instances of the clip, each at its own time, for one second at 30 pictures a second: matrices
-and exact vertices of each are written one after the other into a buffer of 64 MiB. Segments are
-prepared before and shared. Even mix: levels in rotation.
-"""
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
@@ -107,7 +71,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_ladder(parser, "decades")
     add_number(parser, "--rounds", ROUNDS, "runs of everything")
     add_number(parser, "--seeks", SEEKS, "random frames")
-    add_number(parser, "--instances", INSTANCES, "plants shown at once")
 
 
 def run(args: argparse.Namespace) -> dict[str, Any]:
@@ -118,29 +81,22 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
         program = compile_program(folder)
         for path in args.clips:
             case = Case(path, folder, args.rel_error, program, args.ladder)
-            whole = _whole(case, folder, args.rounds)
-            figures = case.program("all", args.rounds, args.seeks, args.instances)
+            figures = case.program("all", args.rounds, args.seeks)
             rows = {
-                "target": _target_rows(figures, whole),
-                "whole": whole,
+                "target": _target_rows(figures, case.whole(args.rounds)),
                 "levels": level_rows(figures),
                 "onward": onward_rows(figures),
                 "memory": memory_rows(figures),
-                "instances": _instance_rows(figures),
             }
             for key, added in rows.items():
                 tables[key] += [{"clip": path.stem} | row for row in added]
             broken += case.broken(figures["levels"][-1]["crc"])
-    setups = {"layouts": len(SZ3_LAYOUTS), "algorithms": len(SZ3_ALGORITHMS)}
-    whole_note = WHOLE_NOTE.format(rounds=args.rounds, **setups)
     return {
         "tables": [
             table(f"Decoding, bound {args.rel_error:g}, beside the targets", tables["target"], TARGET_NOTE),
-            table("Whole decoding, medians in ms", tables["whole"], whole_note),
             table("Levels, medians", tables["levels"], LEVELS_NOTE),
             table("Going on to a deeper level, medians", tables["onward"], ONWARD_NOTE),
             table("Memory", tables["memory"], MEMORY_NOTE),
-            table("Instances", tables["instances"], INSTANCES_NOTE),
         ],
         "broken": broken,
     }
@@ -150,39 +106,30 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 
 
 class Case:
-    """A clip's float32 positions and its .ath file, with the program that times the decoder on it."""
+    """A clip's .ath file, with the program that times the decoder on it."""
 
     def __init__(self, path: Path, folder: Path, rel_error: float, program: Path, ladder: Sequence[float] = ()) -> None:
         self.path, self._program = path, program
         self.file = path if path.suffix == ".ath" else folder / "clip.ath"
         if path.suffix != ".ath":
-            with athcodec.read_hdf5(path) as clip:
+            with read(path) as clip:
                 athcodec.encode(clip, self.file, rel_error=rel_error, attributes="none", ladder=ladder)
-                self.positions = np.asarray(clip.block(0, clip.frame_count), np.float32)
         with athcodec.open(self.file, strict=True) as decoder:
-            self.bound, self.rest = decoder.file.max_error_bound, np.asarray(decoder.file.rest, np.float32)
-            decoded = np.ascontiguousarray(decoder.positions(), np.float32)
-        if path.suffix == ".ath":
-            self.positions = decoded
-        self.crc, self.max_error = crc32c(decoded), self.error_of(decoded)
-        self.vertex_frames = decoded.shape[0] * decoded.shape[1]
-
-    def error_of(self, decoded: np.ndarray) -> float:
-        meter = ErrorMeter()
-        meter.add(self.positions, decoded)
-        return meter.max_error
+            self.crc = crc32c(np.ascontiguousarray(decoder.positions(), np.float32))
 
     def program(self, *words: object) -> dict[str, Any]:
         command = [str(self._program), str(self.file), *map(str, words)]
         return json.loads(subprocess.run(command, check=True, stdout=subprocess.PIPE).stdout)
 
+    def whole(self, rounds: int) -> dict[str, float]:
+        """Medians of whole decoding and of opening, each round a process of its own."""
+        runs = [self.program("once") for _ in range(rounds)]
+        return {name: median(run[name] for run in runs) for name in runs[0]}
+
     def broken(self, crc: int) -> list[str]:
-        name, lines = self.path.name, []
-        if crc != self.crc:
-            lines.append(f"{name}, frames of decode.c: got CRC-32C {crc:#010x}; expected {self.crc:#010x}")
-        if self.max_error > self.bound:
-            lines.append(f"{name}: got an error of {self.max_error:.6g}; expected at most {self.bound:.6g}")
-        return lines
+        if crc == self.crc:
+            return []
+        return [f"{self.path.name}, frames of decode.c: got CRC-32C {crc:#010x}; expected {self.crc:#010x}"]
 
 
 def compile_program(folder: Path) -> Path:
@@ -195,150 +142,22 @@ def compile_program(folder: Path) -> Path:
     return program
 
 
-# ---- whole decoding, compared with others ----
-
-
-@dataclass(frozen=True)
-class _Reader:
-    """Another reader of the clip's frames; `read` returns the milliseconds of one run."""
-
-    name: str
-    bytes: int
-    max_error: float
-    read: Callable[[], float]
-
-
-def _whole(case: Case, folder: Path, rounds: int) -> list[dict[str, Any]]:
-    others = [*(_python_reader(case, threads) for threads in THREADS), *_sz3_readers(case), _hdf5_reader(case, folder)]
-    decode, opening, read = [], [], {other.name: [] for other in others}
-    for number in range(rounds + 1):  # the first round is a warm-up
-        ours = case.program("once")
-        theirs = {other.name: other.read() for other in others}
-        if number:
-            decode.append(ours["decode_ms"])
-            opening.append(ours["decode_ms"] + ours["opening_ms"])
-            for name, ms in theirs.items():
-                read[name].append(ms)
-    size, error = case.file.stat().st_size, case.max_error
-    rows = [
-        _whole_row(case, "athcodec", decode, decode, size, error),
-        _whole_row(case, "athcodec, opening included", opening, decode, size, error),
-    ]
-    for other in others:
-        rows.append(_whole_row(case, other.name, read[other.name], decode, other.bytes, other.max_error))
-    if pysz is None:
-        rows.insert(2 + len(THREADS), {"reader": "SZ3: not installed (pip install pysz)"})
-    return rows
-
-
-def _whole_row(
-    case: Case, name: str, runs: list[float], ours: list[float], size: int, max_error: float
-) -> dict[str, Any]:
-    middle = median(runs)
-    return {
-        "reader": name,
-        "ms": middle,
-        "min": min(runs),
-        "max": max(runs),
-        "M vertex-frames/s": case.vertex_frames / middle / 1e3,
-        "ratio": middle / median(ours),
-        "bytes": size,
-        "error/bound": max_error / case.bound,
-    }
-
-
-def _python_reader(case: Case, threads: int) -> _Reader:
-    """athcodec.open and all positions, by so many threads."""
-
-    def read() -> float:
-        with patch.object(segment_decoder, "default_jobs", lambda: threads):
-            start = time.perf_counter()
-            with athcodec.open(case.file) as decoder:
-                decoder.positions()
-            return 1e3 * (time.perf_counter() - start)
-
-    name = f"athcodec in Python, opening included, {threads} thread{'s' if threads > 1 else ''}"
-    return _Reader(name, case.file.stat().st_size, case.max_error, read)
-
-
-def _hdf5_reader(case: Case, folder: Path) -> _Reader:
-    file, out = folder / "clip.h5", np.zeros_like(case.positions)
-    frames = max(1, min(len(out), GZIP_CHUNK // out[0].nbytes))
-    with h5py.File(file, "w") as target:
-        stored = target.create_dataset(
-            "positions",
-            data=case.positions,
-            chunks=(frames, *out.shape[1:]),
-            compression="gzip",
-            compression_opts=4,
-            shuffle=True,
-        )
-        size = stored.id.get_storage_size()
-
-    def read() -> float:
-        start = time.perf_counter()
-        with h5py.File(file, "r") as source:
-            source["positions"].read_direct(out)
-        return 1e3 * (time.perf_counter() - start)
-
-    return _Reader("HDF5 gzip 4", size, 0.0, read)
-
-
-def _sz3_readers(case: Case) -> list[_Reader]:
-    """The configuration with the smallest file, and the one that decodes fastest."""
-    if pysz is None:
-        return []
-    setups = [_Sz3(case, *setup) for setup in product((False, True), SZ3_LAYOUTS, SZ3_ALGORITHMS)]
-    smallest = min(setups, key=lambda setup: setup.compressed.nbytes)
-    fastest = min(setups, key=lambda setup: min(setup.read() for _ in range(3)))
-    return [smallest.reader(case, "smallest"), fastest.reader(case, "fastest")]
-
-
-class _Sz3:
-    """The clip compressed by SZ3 in one configuration."""
-
-    def __init__(self, case: Case, displaced: bool, layout: str, algorithm: str) -> None:
-        self.name = f"{'displacements' if displaced else 'positions'} {layout} {algorithm}"
-        self._rest = case.rest if displaced else np.float32(0)
-        self._layout = layout
-        [values] = arrays_of(case.positions - self._rest, layout)
-        self._shape = values.shape
-        config = pysz.szConfig()
-        config.errorBoundMode = pysz.szErrorBoundMode.ABS
-        config.absErrorBound = case.bound / np.sqrt(3)
-        config.cmprAlgo = getattr(pysz.szAlgorithm, algorithm)
-        self.compressed = pysz.sz.compress(values, config)[0]
-
-    def reader(self, case: Case, why: str) -> _Reader:
-        name = f"SZ3 (pysz {version('pysz')}), {why}: {self.name}"
-        return _Reader(name, self.compressed.nbytes, self._max_error(case), self.read)
-
-    def read(self) -> float:
-        start = time.perf_counter()
-        pysz.sz.decompress(self.compressed, np.float32, self._shape)
-        return 1e3 * (time.perf_counter() - start)
-
-    def _max_error(self, case: Case) -> float:
-        values = pysz.sz.decompress(self.compressed, np.float32, self._shape)[0]
-        return case.error_of(from_arrays([values], self._layout, case.positions.shape) + self._rest)
-
-
 # ---- tables ----
 
 
-def _target_rows(figures: dict[str, Any], whole: list[dict[str, Any]]) -> list[dict[str, Any]]:
+def _target_rows(figures: dict[str, Any], whole: dict[str, float]) -> list[dict[str, Any]]:
     levels = level_rows(figures)
     deep, coarse = levels[-1], levels[min(1, len(levels) - 1)]
-    decode, seeks = whole[0], figures["seeks"]
+    seeks, decode_ms = figures["seeks"], whole["decode_ms"]
     one, two = memory_rows(figures)[-2:]
     frames, segment = figures["frames"], deep["prepare"] / figures["segments"]
     whole_ms = deep["prepare"] + deep["write"]
     matrices_ms = coarse["prepare"] + coarse["matrices"] * frames / 1e3
     vertices_ms = coarse["prepare"] + coarse["write"]
     rows = [
-        ("whole decoding", decode["ms"], "ms", "<= 100"),
-        ("whole decoding", decode["M vertex-frames/s"], "M vertex-frames/s", None),
-        *((f"{row['reader']} over athcodec", row.get("ratio"), "times", None) for row in whole[2:]),
+        ("whole decoding", decode_ms, "ms", "<= 100"),
+        ("whole decoding", figures["vertices"] * frames / decode_ms / 1e3, "M vertex-frames/s", None),
+        ("whole decoding, opening included", decode_ms + whole["opening_ms"], "ms", None),
         ("whole decoding over level 1, matrices", whole_ms / matrices_ms, "times", ">= 10"),
         ("whole decoding over level 1, vertices", whole_ms / vertices_ms, "times", ">= 10"),
         ("bytes for level 1", coarse["%"], "% of the file", "<= 15"),
@@ -414,16 +233,3 @@ def memory_rows(figures: dict[str, Any]) -> list[dict[str, Any]]:
                 {"level": level, "prepared": count} | row | whole | {"over positions": whole["sum"] / positions}
             )
     return rows
-
-
-def _instance_rows(figures: dict[str, Any]) -> list[dict[str, Any]]:
-    return [
-        {
-            "level": "even mix" if row["level"] < 0 else str(row["level"]),
-            "instances": row["instances"],
-            "pictures": row["pictures"],
-            "ms": row["ms"],
-            "instances/ms": row["per_ms"],
-        }
-        for row in figures["instances"]
-    ]

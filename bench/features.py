@@ -26,13 +26,11 @@ from athcodec.encoding.progress import silent
 from athcodec.motion.branches.result import with_branches
 from athcodec.motion.polygons import Polygons
 from bench.clips import add_ladder, measure
-from bench.store import Store, read
+from bench.store import Store
 from bench.suite import SUITES, cases
 from bench.tables import environment, table
 
 RESULTS = Path(__file__).parent / "results" / "features.json"
-DOCUMENT = Path(__file__).parent.parent / "spec" / "rationale.md"
-MARKERS = "<!-- features: printed by python -m bench features -->\n", "<!-- end of features -->\n"
 KEYS = {"sizes": ("clip", "bound", "ladder", "feature")}
 BOUNDS = (1e-3, 1e-4)
 SHORT_SEGMENT = 32  # Frames of the segments of files that are to meet.
@@ -99,7 +97,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--features", nargs="+", type=_features, metavar="NAME", help="these alone; A+B leaves out both at once"
     )
     parser.add_argument("--results", type=Path, default=RESULTS, metavar="FILE", help="where figures are kept")
-    parser.add_argument("--document", type=Path, default=DOCUMENT, metavar="FILE", help="where the table is written")
     add_ladder(parser, "none")
 
 
@@ -122,7 +119,6 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
                     print(f"{case.name} {bound:g} {_name(features)} {growth:.2f}", file=sys.stderr, flush=True)
                 broken += [f"{case.name} at {bound:g} without {name}" for name in files.broken]
     sizes = store.contents()["sizes"]
-    write_table(sizes, args.document)
     return {"tables": [table("Features", summary(sizes), NOTE, NOT_JUDGED)], "broken": broken}
 
 
@@ -251,9 +247,9 @@ def _rounded(value: float) -> str:
     return f"{round(value, 2) + 0.0:.2f}"
 
 
-def table_text(sizes: Iterable[Mapping[str, Any]]) -> str:
-    """Return the table of spec/rationale.md between its markers: Markdown, with the clips that were measured below."""
-    sizes = list(sizes)
+def table_text(contents: Mapping[str, Any]) -> str:
+    """Return the table of spec/rationale.md: Markdown, with the clips that were measured below."""
+    sizes = contents["sizes"]
     rows = summary(sizes)
     lines = ["| " + " | ".join(rows[0]) + " |", "|---|--:|--:|--:|--:|--:|--:|---|---|"] if rows else []
     lines += ["| " + " | ".join("-" if cell is None else str(cell) for cell in row.values()) + " |" for row in rows]
@@ -268,21 +264,3 @@ def table_text(sizes: Iterable[Mapping[str, Any]]) -> str:
     clips = "; ".join(f"`{clip}` at {', '.join(bounds)}" for clip, bounds in sorted(files.items()))
     paragraphs = [" ".join(text.split()) for text in (f"Files: {clips}.", SOURCES, NOTE, NOT_JUDGED)]
     return "\n\n".join(["\n".join(lines), *paragraphs]) + "\n"
-
-
-def write_table(sizes: Iterable[Mapping[str, Any]], document: Path) -> None:
-    """Put the table between the markers of a document."""
-    before, _, after = parted(document.read_text())
-    document.write_text(f"{before}{MARKERS[0]}\n{table_text(sizes)}\n{MARKERS[1]}{after}")
-
-
-def parted(text: str) -> tuple[str, str, str]:
-    """Return what a document has before, between and behind the markers."""
-    before, rest = text.split(MARKERS[0])
-    inside, after = rest.split(MARKERS[1])
-    return before, inside, after
-
-
-def stored() -> list[dict[str, Any]]:
-    """Return the figures of the repository."""
-    return read(RESULTS)["sizes"]

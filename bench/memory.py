@@ -1,24 +1,28 @@
 """Peak memory of encoding a clip, and the same clip repeated in time.
 
 It must not grow with the number of frames. All encodings have segments as long as those of the single clip, so that
-only the number of frames differs. Every encoding, and every writing of a longer clip, has its own process
-(memory_worker.py); a process inherits the peak of its parent, so this one allocates little beyond its imports.
+only the number of frames differs. Every encoding, and every writing of a longer clip, has its own process, which runs
+this module; a process inherits the peak of its parent, so the parent allocates little beyond its imports.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import resource
 import subprocess
 import sys
 import tempfile
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 import athcodec
 from athcodec.encoding.segmentation import split_segments
+from athcodec.exporters.hdf5 import Hdf5Writer
 from athcodec.options import MIN_SEGMENT
-from bench.clips import add_clips, add_number, add_rel_error
+from bench.clips import add_clips, add_number, add_rel_error, read
 from bench.tables import table
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -55,13 +59,13 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 
 
 def _segment_frames(path: Path) -> int:
-    with athcodec.read_hdf5(path) as clip:
+    with read(path) as clip:
         segments = split_segments(clip.frame_count, clip.vertex_count)
     return max(MIN_SEGMENT, *(stop - start for start, stop in segments))
 
 
 def _process(*words: str) -> dict[str, int]:
-    command = [sys.executable, "-m", "bench.memory_worker", *words]
+    command = [sys.executable, "-m", "bench.memory", *words]
     done = subprocess.run(command, cwd=ROOT, check=True, stdout=subprocess.PIPE)
     return json.loads(done.stdout)
 
@@ -76,3 +80,62 @@ def _row(peak: dict[str, int]) -> dict[str, float | int]:
         "peak": peak["peak"] / 1e6,
         "peak - imports": (peak["peak"] - peak["imports"]) / 1e6,
     }
+
+
+# ---- the process that is measured ----
+
+
+def _encode(source: str, target: str, rel_error: float, segment_frames: int) -> dict[str, int]:
+    imports = peak_bytes()
+    with athcodec.read(source) as clip:
+        summary = athcodec.encode(clip, target, rel_error=rel_error, segment_frames=segment_frames, attributes="none")
+        frames = clip.frame_count
+    peak = peak_bytes()
+    with athcodec.open(target) as decoder:
+        segments = len(decoder.segments)
+    return {
+        "frames": frames,
+        "segments": segments,
+        "raw_bytes": summary.raw_bytes,
+        "bytes": summary.bytes,
+        "imports": imports,
+        "peak": peak,
+    }
+
+
+def _repeat(source: str, target: str, times: int) -> dict[str, int]:
+    """Writes the clip repeated `times` times, gzip-compressed."""
+    with athcodec.read(source) as clip:
+        period = clip.frame_count / clip.fps
+        time = np.concatenate([clip.time + period * i for i in range(times)])
+        with Hdf5Writer(
+            target,
+            time=time,
+            vertex_branch=clip.vertex_branch,
+            branch_parent=clip.branch_parent,
+            rest=clip.source_rest,
+            dtype=clip.dtype,
+            stem_index=clip.stem_index,
+            edges=clip.edges,
+            metadata=clip.metadata,
+            gzip=True,
+        ) as writer:
+            for _ in range(times):
+                for _, frames in clip.blocks():
+                    writer.add(frames)
+    return {"frames": len(time)}
+
+
+def peak_bytes() -> int:
+    """Largest resident memory of this process so far."""
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return peak if sys.platform == "darwin" else peak * 1024
+
+
+if __name__ == "__main__":  # encode CLIP.h5 OUT.ath REL_ERROR SEGMENT_FRAMES, or repeat CLIP.h5 OUT.h5 TIMES
+    verb, source, target, *numbers = sys.argv[1:]
+    if verb == "encode":
+        result = _encode(source, target, float(numbers[0]), int(numbers[1]))
+    else:
+        result = _repeat(source, target, int(numbers[0]))
+    print(json.dumps(result))

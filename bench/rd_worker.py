@@ -1,84 +1,88 @@
 """The worker processes of rd.py: one encodes a clip with a codec, another decodes and measures.
 
-    python -m bench.rd_worker encode CODEC CLIP.h5 BOUND FILE
-    python -m bench.rd_worker decode CODEC CLIP.h5 BOUND FILE
+    python -m bench.rd_worker encode CODEC CLIP BOUND FILE SECONDS
+    python -m bench.rd_worker decode CODEC CLIP BOUND FILE SECONDS
 
 The second gets only the file from the first, so that its output depends on these bytes alone; it reads the clip after
-decoding. Peak memory is that of the whole process. A codec that crashes ends only its own process. BOUND is a fraction
-of the bounding box's diagonal. Prints one line of JSON.
+decoding. Peak memory is that of the whole process. A codec that crashes ends only its own process, and the system ends
+one that takes more than SECONDS of processor time. BOUND is a fraction of the bounding box's diagonal. Prints one line
+of JSON.
 """
 
 from __future__ import annotations
 
 import json
+import os
+import resource
 import sys
 import time
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from statistics import median
 from typing import Any
 
 import numpy as np
 
 import athcodec
-from athcodec.metrics import MotionMeter, bits_per_vertex_frame
+from athcodec.encoding.bounds import BoundOption
+from athcodec.encoding.branch_trials import best_branches
+from athcodec.encoding.progress import silent
+from athcodec.metrics import ErrorMeter, bits_per_vertex_frame
+from athcodec.motion.branches.result import with_branches
+from bench.clips import read
 from bench.codec_registry import OURS, chosen
-from bench.codecs import Source
+from bench.codecs import Codec, Source
+from bench.codecs.ours import LayeredAthcodec, opened
 from bench.codecs.program import CannotKeep
-from bench.memory_worker import peak_bytes
-
-ENCODES, QUICK_ENCODE = 3, 1.0  # an encoder that takes longer than these seconds runs once
-DECODES, DECODE_SECONDS = 7, 5.0  # fewer decodes, at least three, where they take longer than this together
+from bench.memory import peak_bytes
+from bench.smoothness import measured_levels
 
 
-def encode(codec_name: str, clip_path: str, rel_bound: float, file: Path) -> dict[str, Any]:
-    [codec] = chosen([codec_name]).values()
-    with athcodec.read_hdf5(clip_path) as clip:
-        bound = rel_bound * Source(clip).diagonal
-        runs: list[float] = []
-        if not clip.has_branches and codec.kind != OURS:  # only athcodec finds some
-            clip = clip.replace(vertex_branch=np.zeros(clip.vertex_count, np.int32), branch_parent=np.array([-1]))
-        while not runs or (runs[0] < QUICK_ENCODE and len(runs) < ENCODES):
-            source = _loaded(clip)  # a new one, since codecs may cache results in it
-            seconds, data = _timed(partial(codec.encode, source, bound))
-            runs.append(seconds)
-    peak = peak_bytes()
+def encode(codec: Codec, clip_path: str, rel_bound: float, file: Path, limit: float) -> dict[str, Any]:
+    with read(clip_path) as clip:
+        source = Source(_with_branches(clip, codec, rel_bound))
+        bound = rel_bound * source.diagonal
+        _ = source.rest
+        seconds, cpu_seconds, data = _timed(partial(codec.encode, source, bound), limit)
     file.write_bytes(data)
-    return {
-        "bytes": len(data),
-        "encode_s": median(runs),
-        "encode_runs": len(runs),
-        "encode_peak_bytes": peak,
-        "settings": _words(codec.settings),
-    }
+    figures = {"bytes": len(data), "encode_s": seconds, "encode_cpu_s": cpu_seconds}
+    return figures | {"encode_peak_bytes": peak_bytes(), "settings": _words(codec.settings)}
 
 
-def decode(codec_name: str, clip_path: str, rel_bound: float, file: Path) -> dict[str, Any]:
-    [codec] = chosen([codec_name]).values()
+def decode(codec: Codec, clip_path: str, rel_bound: float, file: Path, limit: float) -> dict[str, Any]:
     data = file.read_bytes()
-    decoded = codec.decode(data)  # a warm-up: only its memory counts
+    codec.decode(data)  # a warm-up: only its memory counts
     peak = peak_bytes()
-    runs: list[float] = []
-    while len(runs) < DECODES and (len(runs) < 3 or sum(runs) < DECODE_SECONDS):
-        seconds, decoded = _timed(lambda: codec.decode(data))
-        runs.append(seconds)
-    with athcodec.read_hdf5(clip_path) as clip:
+    seconds, _, decoded = _timed(partial(codec.decode, data), limit)
+    with read(clip_path) as clip:
         result = _errors(Source(clip), decoded, rel_bound)
         rate = bits_per_vertex_frame(len(data), clip.frame_count, clip.vertex_count)
-    return result | {"decode_s": median(runs), "decode_runs": len(runs), "decode_peak_bytes": peak, "bits": rate}
+        if isinstance(codec, LayeredAthcodec):
+            result |= _levels(data, clip)
+    return result | {"decode_s": seconds, "decode_peak_bytes": peak, "bits": rate}
 
 
-def _loaded(clip: athcodec.MotionClip) -> Source:
-    source = Source(clip)
-    _ = source.positions, source.rest
-    return source
+def _with_branches(clip: athcodec.MotionClip, codec: Codec, rel_bound: float) -> athcodec.MotionClip:
+    """The clip as a codec gets it: where the source names no branches, other codecs are given those that athcodec
+    finds, so that none of them loses for want of an order. Finding them is not counted.
+    """
+    if clip.has_branches or codec.kind == OURS:
+        return clip
+    option = BoundOption(rel_error=rel_bound) if rel_bound else BoundOption(lossless=True)
+    return with_branches(clip, best_branches(clip, option, silent))
 
 
-def _timed(step: Callable[[], Any]) -> tuple[float, Any]:
-    start = time.perf_counter()
+def _timed(step: Callable[[], Any], limit: float) -> tuple[float, float, Any]:
+    """Wall time, processor time with all threads and child processes, and the result of a step of at most `limit` s."""
+    start, used = time.perf_counter(), _cpu_seconds()
+    allowed = int(time.process_time() + limit) + 1
+    resource.setrlimit(resource.RLIMIT_CPU, (allowed, resource.getrlimit(resource.RLIMIT_CPU)[1]))
     result = step()
-    return time.perf_counter() - start, result
+    return time.perf_counter() - start, _cpu_seconds() - used, result
+
+
+def _cpu_seconds() -> float:
+    return sum(os.times()[:4])
 
 
 def _errors(source: Source, decoded: np.ndarray, rel_bound: float) -> dict[str, Any]:
@@ -89,19 +93,29 @@ def _errors(source: Source, decoded: np.ndarray, rel_bound: float) -> dict[str, 
         got = f"{decoded.dtype} {decoded.shape}" if is_array else type(decoded).__name__
         return {"broken": f"got {got}; expected float32 {shape}"}
     bound = rel_bound * source.diagonal
-    meter = MotionMeter(source.clip, bound=bound or 1.0)  # lossless: second differences of 0 in any unit
+    meter = ErrorMeter(source.rest)
     meter.add(source.positions, decoded)
-    figures = meter.figures()
-    errors = {
-        "max": meter.error.max_error / source.diagonal,
-        "rms": meter.error.rms_error / source.diagonal,
-        "kg": meter.error.kg_error,
-        "motion": meter.error.motion_normalised_error,
-        "looks": figures["smoothness"] | figures["shape"],
-    }
-    if not meter.error.max_error <= bound:
-        errors["broken"] = f"got an error of {meter.error.max_error:.6g}; expected at most {bound:.6g}"
+    errors = {"max": meter.max_error / source.diagonal, "rms": meter.rms_error / source.diagonal, "kg": meter.kg_error}
+    if not meter.max_error <= bound:
+        errors["broken"] = f"got an error of {meter.max_error:.6g}; expected at most {bound:.6g}"
     return errors
+
+
+def _levels(data: bytes, clip: athcodec.MotionClip) -> dict[str, float | None]:
+    """How much a level's error exceeds that of the level before, and how much the file jerks at its seams, at worst."""
+    with opened(data) as decoder:
+        meters = measured_levels(decoder, clip)
+
+    def growth(errors: list[float]) -> float | None:
+        return max((after / before for before, after in zip(errors, errors[1:]) if before), default=None)
+
+    worst = max(meters, key=lambda meter: meter.smoothness.tick_ratio or 0).smoothness
+    return {
+        "level_max_ratio": growth([meter.error.max_error for meter in meters]),
+        "level_rms_ratio": growth([meter.error.rms_error for meter in meters]),
+        "tick_ratio": worst.tick_ratio,
+        "source_tick_ratio": worst.source_tick_ratio,
+    }
 
 
 def _words(settings: Any) -> str:
@@ -114,9 +128,10 @@ def _words(settings: Any) -> str:
 
 
 if __name__ == "__main__":
-    verb, name, clip, bound, target = sys.argv[1:]
+    verb, name, clip, bound, target, seconds = sys.argv[1:]
+    [codec] = chosen([name]).values()
     try:
-        result = {"encode": encode, "decode": decode}[verb](name, clip, float(bound), Path(target))
+        result = {"encode": encode, "decode": decode}[verb](codec, clip, float(bound), Path(target), float(seconds))
     except CannotKeep as error:
         result = {"cannot": str(error)}
     print(json.dumps(result))

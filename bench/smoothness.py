@@ -8,10 +8,11 @@ from typing import Any
 
 import numpy as np
 
+import athcodec
 from athcodec.decoding.file_tables import Level
 from athcodec.metrics import MotionMeter, SmoothnessMeter, level_meters
 from bench import plots
-from bench.clips import Encoded, add_clips, add_effort, add_ladder, add_rel_error, add_segment_frames, encoded
+from bench.clips import add_clips, add_effort, add_ladder, add_rel_error, add_segment_frames, encoded
 from bench.tables import table
 
 INCHES = (12, 8)
@@ -44,7 +45,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     for number, path in enumerate(args.clips):
         how = {"effort": args.effort, "ladder": args.ladder, "segment_frames": args.segment_frames}
         with encoded(path, args.rel_error, **how) as result:
-            meters = _measure(result)
+            meters = measured_levels(result.decoder, result.clip)
             rows = [_row(stored, meter) for stored, meter in zip(result.decoder.levels, meters, strict=True)]
         title = f"{path.stem}, bound {args.rel_error:g}"
         tables.append(table(f"Smoothness: {title}", rows, NOTE))
@@ -54,13 +55,13 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     return {"tables": tables, "broken": []}
 
 
-def _measure(result: Encoded) -> list[MotionMeter]:
-    """One for each level."""
-    meters = level_meters(result.decoder, result.clip)
-    for start, stop in result.decoder.segments:
-        source = result.clip.block(start, stop)
+def measured_levels(decoder: athcodec.Decoder, clip: athcodec.MotionClip) -> list[MotionMeter]:
+    """Return a meter for each level, with all frames."""
+    meters = level_meters(decoder, clip)
+    for start, stop in decoder.segments:
+        source = clip.block(start, stop)
         for number, meter in enumerate(meters):
-            meter.add(source, result.decoder.positions(slice(start, stop), number))
+            meter.add(source, decoder.positions(slice(start, stop), number))
     return meters
 
 

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
-import athcodec
 from bench import data
 from bench.trees.simulate import MissingEngine
 
@@ -33,19 +31,8 @@ def _case(word: str) -> Case:
         return Case(Path(word).stem, Path(word), "given on the command line")
     if word not in (data.SAMPLE, *data.RECIPES):
         names = ", ".join([data.SAMPLE, *data.RECIPES])
-        raise SystemExit(f"clip: got {word!r}; expected an HDF5 file or one of {names}")
+        raise SystemExit(f"clip: got {word!r}; expected a file or one of {names}")
     try:
         return Case(word, Path(data.path_of(word)), data.describe(word))
     except MissingEngine as error:
         return Case(word, None, f"{data.describe(word)}: MISSING: {error}")
-
-
-def digest(path: Path) -> str:
-    """Digest of positions, rest pose and branches: the input of a codec."""
-    total = hashlib.sha256()
-    with athcodec.read_hdf5(path) as clip:
-        for array in (clip.rest, clip.vertex_branch, clip.branch_parent):
-            total.update(b"" if array is None else array.tobytes())
-        for _, frames in clip.blocks():
-            total.update(frames.tobytes())
-    return total.hexdigest()[:12]

@@ -48,8 +48,8 @@ def write_json(result: dict[str, Any], file: Path) -> None:
     file.write_text(json.dumps(result, indent=1) + "\n")
 
 
-def as_text(result: dict[str, Any], above: Mapping[str, str] | None = None) -> str:
-    """The output of a verb: tables (below the text `above`, by title), broken lines, machine.
+def as_text(result: dict[str, Any]) -> str:
+    """The output of a verb: tables, broken lines, machine.
 
     Notes that several tables have in common are printed below the first one.
     """
@@ -57,7 +57,7 @@ def as_text(result: dict[str, Any], above: Mapping[str, str] | None = None) -> s
     for part in result["tables"]:
         notes = [note for note in part["notes"] if note not in printed]
         printed.update(notes)
-        parts.append((above or {}).get(part["title"], "") + _table_text(part | {"notes": notes}))
+        parts.append(_table_text(part | {"notes": notes}))
     parts += [f"BROKEN: {line}" for line in result["broken"]]
     parts.append("; ".join([_pairs(result["machine"]), _pairs(result["versions"])]))
     return "\n\n".join([f"`{result['command']}`", *parts])
@@ -68,11 +68,14 @@ def _pairs(values: dict[str, Any]) -> str:
 
 
 def _table_text(part: dict[str, Any]) -> str:
-    rows = part["rows"]
+    return "\n".join([f"### {part['title']}", "", markdown(part["rows"]), *(f"\n{note}" for note in part["notes"])])
+
+
+def markdown(rows: Sequence[Mapping[str, Any]]) -> str:
+    """A table in Markdown."""
     names = list(dict.fromkeys(name for row in rows for name in row))
     columns = [_column(name, [row.get(name) for row in rows]) for name in names]
-    lines = ["| " + " | ".join(cells) + " |" for cells in zip(*columns, strict=True)]
-    return "\n".join([f"### {part['title']}", "", *lines, *(f"\n{note}" for note in part["notes"])])
+    return "\n".join("| " + " | ".join(cells) + " |" for cells in zip(*columns, strict=True))
 
 
 def _column(name: str, values: list[Any]) -> list[str]:

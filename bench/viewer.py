@@ -17,7 +17,7 @@ from typing import Any
 import athcodec
 from athcodec.options import LADDERS
 from bench.browser import chromium
-from bench.clips import add_clips, add_number, add_rel_error, encoded
+from bench.clips import add_clips, add_number, add_rel_error, encoded, read
 from bench.tables import table
 from bench.throttled_server import ThrottledServer
 
@@ -114,7 +114,7 @@ def _picture(clip: Path, rel_error: float, out: Path) -> dict[str, Any]:
 
 def _files(path: Path, folder: Path, rel_error: float) -> dict[str, bytes]:
     """The clip as .ath, as raw float32 and as a GLB with morph targets."""
-    with athcodec.read_hdf5(path) as clip:
+    with read(path) as clip:
         athcodec.encode(clip, folder / "tree.ath", rel_error=rel_error)
         athcodec.write(clip.replace(attributes={}), folder / "tree.glb", animation="morphs")
         return {

@@ -20,7 +20,6 @@ SHOWN = (
     "spec/gltf/README.md",
     "spec/media-type/*",
     "spec/gltf/schema/*.json",
-    "bench/results/report.md",
     "bench/results/*.png",
     "bench/results/*.svg",
     "bench/results/*.webp",

@@ -54,7 +54,8 @@ def as_markdown(results: dict[str, dict]) -> str:
         "",
         "Written by `python -m spec.robustness`. *over limit*: took more memory or work than its limits allow; "
         "*wrong*: neither refused nor",
-        "decoded as it should be.",
+        "decoded as it should be. A section describes the version of athcodec under it; all sections are run again",
+        "before each release.",
         "",
     ]
     for name, result in sorted(results.items()):

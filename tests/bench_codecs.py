@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import struct
-import time
 import zlib
 from pathlib import Path
 
@@ -80,11 +79,12 @@ class Absent(Rounded):
         return "not installed: pip install absent"
 
 
-class Sleeping(Rounded):
-    name = "sleeping"
+class Endless(Rounded):
+    name = "endless"
 
     def encode(self, source, bound):
-        time.sleep(60)
+        while True:
+            pass
 
 
 class Uninstallable(Rounded):

@@ -257,3 +257,10 @@ def test_a_search_finds_the_minimum_of_a_convex_cost():
     best = search.run(3)
     assert best["x"] == 14 and best["name"] == "b" and 4 < best["y"] < 6.5
     assert len(search.known) < 40
+
+
+def test_a_search_ends_with_the_best_so_far_where_processor_time_runs_out(monkeypatch):
+    limited = Search(lambda s: abs(s["x"] - 14), {"x": Ladder(tuple(range(20)), 3)})
+    monkeypatch.setattr("resource.getrlimit", lambda kind: (1, -1) if len(limited.known) > 3 else (-1, -1))
+    monkeypatch.setattr("time.process_time", lambda: 0.9)
+    assert limited.run(3)["x"] == 9 and len(limited.known) == 4

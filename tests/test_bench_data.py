@@ -2,23 +2,23 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import ClassVar
 
 import numpy as np
 import pytest
 
 import athcodec
 from bench import data
-from bench.trees import beams
+from bench.store import read
+from bench.trees import beams, exact
 from bench.trees import simulate as simulation
 from bench.trees.leaves import SPECIES, Leaves, Plates, sheltered
 from bench.trees.mesh import SIDES, dress
 from bench.trees.plant import grow
-from bench.trees.refine import refine
 from bench.trees.ride import Skeleton
 from bench.trees.wind import DIRECTION, Wind
 
@@ -29,6 +29,11 @@ pytestmark = pytest.mark.tools
 SMALL = data.Simulated(nodes=100, orders=2, frames=20, height=4.0, wind_speed=10.0, seed=1)
 BREEZE = Wind(8.0, 8.0, seed=2)
 CANOPY = data.Canopy(nodes=120, orders=1, frames=40, height=5.0, wind_speed=8.0, leaves=80, species="poplar", seed=3)
+
+SMALL_EXACT = {
+    "tree": exact.Tree(((1, 12), (4, 24), (12, 60)), 5, 4.0, 11.0, 0.2, 15.0, 1.0, 0.1, seed=2, digest="6059e8adabcb"),
+    "cards": exact.Cards(20, 4, 4, (8.0, 2.0, 2.0), seed=3, digest="4433ed57c12f"),
+}
 
 
 @pytest.fixture
@@ -43,9 +48,8 @@ class Still:
     """A recipe that needs no engine: two vertices."""
 
     frames: int
-    source: ClassVar[None] = None
 
-    def make(self, source):
+    def make(self):
         positions = np.zeros((self.frames, 2, 3), np.float32) + [[0, 0, 0], [0, 1, 0]]
         return athcodec.MotionClip(positions, np.arange(self.frames), np.zeros(2, int), np.array([-1]))
 
@@ -151,22 +155,9 @@ def test_a_pole_bends_under_a_force_at_its_tip_as_beam_theory_says():
     assert 0.01 < expected < 0.1 and abs(run.nodes()[30, 2]) < 1e-6
 
 
-def test_refined_stems_pass_through_the_nodes_and_twigs_stay_on_them(sample_clip):
-    fine = refine(sample_clip, BREEZE, frames=12, factor=3, twigs=40, twig_vertices=4, seed=6)
-    stems = 3 * 1000 + 1
-    assert (fine.vertex_count, fine.frame_count) == (stems + 160, 12)
-    assert np.allclose(fine.positions[:, :stems:3], sample_clip.block(0, 12), atol=1e-6)
-    ratio = lengths(fine.positions, fine.edges) / lengths(fine.rest, fine.edges)
-    assert np.abs(ratio[:, stems - 1 :] - 1).max() < 1e-3, "twigs are torn off"
-    assert np.abs(ratio - 1).max() < 0.3, "stems are torn apart"
-    twig_tips = fine.positions[:, stems + 3 :: 4] - fine.positions[:, stems::4]
-    assert np.ptp(twig_tips, axis=0).max() > 0.01
-    assert len(fine.edges) == fine.vertex_count - 1
-
-
 @pytest.fixture(scope="module")
 def canopy():
-    return CANOPY.make(None)
+    return CANOPY.make()
 
 
 def still(frames: int) -> Skeleton:
@@ -181,7 +172,7 @@ def test_a_pole_of_beams_bends_and_swings_as_theory_says():
     grown = grow(31, 0, 3.0, seed=1)
     upright = np.linspace(0, 3, 31)[:, None] * [0, 1, 0]
     pole = replace(grown, position=upright, radius=np.full(31, 0.02), foliage=np.zeros(31))
-    stiffness, mass = beams._stiffness(pole), beams._mass(pole)
+    stiffness, mass = beams._stiffness(pole), beams.node_mass(pole)
     force = np.zeros(6 * 31)
     force[6 * 30] = 2.0
     bent = np.linalg.solve(stiffness.toarray(), force)
@@ -223,8 +214,8 @@ def test_a_mesh_has_closed_rings_around_its_stems_and_rigid_leaves_on_them(sampl
 def test_a_canopy_comes_out_the_same_again_and_otherwise_by_its_seed(canopy):
     canopy.check()
     assert (canopy.frame_count, round(canopy.fps, 6), canopy.metadata["unit"]) == (40, 30, "m")
-    assert np.array_equal(canopy.positions, CANOPY.make(None).positions)
-    assert not np.array_equal(canopy.positions, replace(CANOPY, seed=4).make(None).positions)
+    assert np.array_equal(canopy.positions, CANOPY.make().positions)
+    assert not np.array_equal(canopy.positions, replace(CANOPY, seed=4).make().positions)
     assert np.ptp(canopy.rest[:, 1]) == pytest.approx(5.0, rel=0.1)
 
 
@@ -297,7 +288,7 @@ def test_a_clip_is_made_once_and_again_where_its_recipe_changed(recipes, tmp_pat
 def test_clips_are_found_by_name_and_by_path(monkeypatch, recipes, tmp_path):
     sample = athcodec.sample_path()
     assert data.path_of("sample") == sample == data.path_of(str(sample))
-    with pytest.raises(KeyError, match="got 'nothing', expected the path of an HDF5 file or one of sample,"):
+    with pytest.raises(KeyError, match="got 'nothing', expected the path of a file or one of sample,"):
         data.path_of("nothing")
     monkeypatch.setenv(data.FOLDER_VARIABLE, str(tmp_path))
     recipes["still"] = Still(2)
@@ -309,3 +300,69 @@ def test_the_verb_prints_a_table_of_the_clips(tmp_path):
     done = subprocess.run(words, cwd=ROOT, text=True, capture_output=True, timeout=120)
     assert done.returncode == 0, done.stderr
     assert "| sample |    1,001 |    120 |       99 | 0-2" in done.stdout
+
+
+def exact_digests(folder: Path) -> list[str]:
+    """Digests of the small exact clips, which are made anew."""
+    data.RECIPES |= {name: replace(recipe, digest="") for name, recipe in SMALL_EXACT.items()}
+    return [data.digest(data.path_of(name, folder)) for name in SMALL_EXACT]
+
+
+def test_exact_clips_have_the_same_bits_on_every_machine(recipes, tmp_path):
+    assert exact_digests(tmp_path) == [recipe.digest for recipe in SMALL_EXACT.values()]
+
+
+def test_exact_clips_have_the_same_bits_without_wide_vectors_and_with_kernels_of_another_processor(tmp_path):
+    features = np._core._multiarray_umath.__cpu_dispatch__
+    script = "import sys, pathlib, test_bench_data as t; print(*t.exact_digests(pathlib.Path(sys.argv[1])))"
+    environment = {"NPY_DISABLE_CPU_FEATURES": " ".join(features), "OPENBLAS_CORETYPE": "Nehalem"}
+    done = subprocess.run(
+        [sys.executable, "-c", script, str(tmp_path)],
+        cwd=ROOT / "tests",
+        env=os.environ | {"PYTHONPATH": str(ROOT)} | environment,
+        text=True,
+        capture_output=True,
+        timeout=300,
+    )
+    assert done.stdout.split() == [recipe.digest for recipe in SMALL_EXACT.values()], done.stderr
+
+
+def test_an_exact_clip_that_comes_out_otherwise_is_refused_and_not_kept(recipes, tmp_path):
+    recipes["cards"] = replace(SMALL_EXACT["cards"], seed=4)
+    with pytest.raises(data.Different, match=f"clip cards: got digest .*, expected {SMALL_EXACT['cards'].digest}"):
+        data.path_of("cards", tmp_path)
+    assert not list(tmp_path.iterdir())
+
+
+def test_exact_trees_solve_the_equations_of_beams():
+    plant = exact.grow(((1, 12), (4, 24), (12, 60)), 4.0, seed=2)
+    weight, load = np.random.default_rng(1).uniform(1, 1e4, (2, 6, len(plant.parent)))
+    load[:, 0] = 0.0
+    matrix = 1.5 * beams._stiffness(plant).toarray() + np.diag(weight.T.ravel())
+    expected = np.linalg.solve(matrix, load.T.ravel()).reshape(-1, 6).T
+    assert np.allclose(exact.Equations(plant, 1.5, weight).solve(load), expected, rtol=1e-6, atol=1e-9)
+    turns = np.linspace(-3, 3, 1001)
+    assert np.abs(exact.sine(turns) - np.sin(2 * np.pi * turns)).max() < 1e-14
+
+
+def test_exact_cards_are_rigid_and_turn_steadily_between_keys():
+    clip = SMALL_EXACT["cards"].make()
+    cards = clip.positions[:, 20:].reshape(13, 20, 6, 3).astype(np.float64)
+    apart = np.linalg.norm(cards[:, :, :, None] - cards[:, :, None], axis=-1)
+    assert np.ptp(apart, axis=0).max() < 1e-6
+    pace = np.linalg.norm(np.diff(cards[:, :, 5], axis=0), axis=-1).reshape(3, 4, 20)
+    assert np.ptp(pace, axis=1).max() < 1e-6 and np.ptp(pace, axis=0).max() > 1e-3
+    assert (clip.positions[:, :20] == clip.rest[:20]).all() and (clip.positions[0] == clip.rest).all()
+
+
+def test_the_table_of_clips_that_stand_for_others_is_that_of_the_saved_figures():
+    saved = [read(ROOT / "bench" / "results" / f"{name}.json") for name in ("not_made", "stand_ins")]
+    old, new = (result["tables"][0]["rows"] for result in saved)
+    pairs = {(a["clip"], a["bound"], a["ladder"]): (a["bytes"], b["bytes"]) for a, b in zip(old, new, strict=True)}
+    text = (ROOT / "docs" / "benchmarks.md").read_text("utf-8")
+    for bound in ("0.001", "0.0001", "1e-05"):
+        for ladder in ("none", "decades"):
+            sizes = [pairs[clip, bound, ladder] for clip in ("tree_8k_200f", "leaves_373x121f")]
+            cells = [f"{one:,} | {other:,} | {other / one:.2f}" for one, other in sizes]
+            assert f"| {float(bound):.0e}, `{ladder}` | {' | '.join(cells)} |".replace("e-0", "e-") in text
+            assert all(0.5 < other / one < 2 for one, other in sizes)

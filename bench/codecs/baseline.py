@@ -4,13 +4,17 @@ A baseline writes and reads its lossy part; here its positions are decoded as a 
 error exceeds the bound are corrected as in athcodec. So a baseline's step may be coarser than its worst vertex allows,
 and step and corrections are searched together. Settings are searched one after the other, each along its ladder from
 its current value in strides of two and then one, until a round changes nothing: a local search. Of large clips a part
-is searched in one round, and then step and clusters with all vertices.
+is searched in one round, and then step and clusters with all vertices. A search ends early in a process whose processor
+time is limited, with the best of what it has tried.
 """
 
 from __future__ import annotations
 
+import resource
+import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from itertools import product
 
@@ -24,6 +28,7 @@ from bench.codecs.tree import VertexOrder, ordered
 LARGE = 8_000_000  # numbers; larger clips are searched by a part of them
 SEARCHED = 3_000  # vertices of that part
 AGAIN = ("step", "clusters")  # Settings that are searched again with all vertices.
+SEARCH_SHARE = 0.6  # of the processor time that the process has, after which no search tries more
 
 
 @dataclass(frozen=True)
@@ -60,6 +65,10 @@ class Split(Choice):
 Settings = dict[str, float | int | str]
 
 
+class _OutOfTime(Exception):
+    """The process needs the rest of its processor time for the encoding."""
+
+
 @dataclass
 class Search:
     """Coordinate descent over named settings."""
@@ -73,18 +82,25 @@ class Search:
 
     def _cost(self, at: tuple[int, ...]) -> float:
         if at not in self.known:
+            limit = resource.getrlimit(resource.RLIMIT_CPU)[0]
+            if self.known and 0 <= limit * SEARCH_SHARE < time.process_time():  # below 0: no limit
+                raise _OutOfTime
             self.known[at] = self.cost(self.settings(at))
         return self.known[at]
 
     def run(self, rounds: int) -> Settings:
         """Return the best of all settings tried."""
+        with suppress(_OutOfTime):
+            self._run(rounds)
+        return self.settings(min(self.known, key=self.known.get))
+
+    def _run(self, rounds: int) -> None:
         splits = [range(len(axis.values)) if isinstance(axis, Split) else (axis.start,) for axis in self.grid.values()]
         best = min((self._round(first, True) for first in product(*splits)), key=self._cost)
         for _ in range(rounds - 1):
             before, best = best, self._round(best, False)
             if best == before:
                 break
-        return self.settings(min(self.known, key=self.known.get))
 
     def _round(self, best: tuple[int, ...], first: bool) -> tuple[int, ...]:
         for axis, values in enumerate(self.grid.values()):

@@ -6,7 +6,7 @@ from bench.codecs import Codec
 from bench.codecs.acl import SkeletalTracks
 from bench.codecs.coddyac import Coddyac
 from bench.codecs.lengyel import Lengyel
-from bench.codecs.pca import ClusteredPca, GlobalPca, PredictedPca
+from bench.codecs.pca import ClusteredPca, GlobalPca
 
-KINDS = (GlobalPca, Lengyel, PredictedPca, ClusteredPca, Coddyac, SkeletalTracks)
+KINDS = (GlobalPca, ClusteredPca, Lengyel, Coddyac, SkeletalTracks)
 BASELINES: list[Codec] = [kind() for kind in KINDS]

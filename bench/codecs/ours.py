@@ -1,9 +1,12 @@
-"""athcodec: a whole .ath file without attributes, at the default effort."""
+"""athcodec: a whole .ath file at the default effort, as other codecs have it, in layers, and as users make it."""
 
 from __future__ import annotations
 
 import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -14,10 +17,12 @@ from bench.codecs.program import CannotKeep
 
 
 class Athcodec:
-    """The file as users get it, with levels of detail."""
+    """A single layer without attributes, its rest pose within the bound: what other codecs keep, and no more."""
 
     name = kind = "athcodec"
     lossless = False
+    bounds: tuple[float, ...] | None = None  # Bounds at which a suite measures the codec; None: all.
+    options: ClassVar[dict[str, Any]] = {"attributes": "none", "rest_error": "bound", "ladder": "none"}
 
     def __init__(self) -> None:
         self.settings: dict = {}
@@ -30,20 +35,29 @@ class Athcodec:
             file = Path(folder) / "clip.ath"
             limit = {"lossless": True} if self.lossless else {"max_error": bound}
             try:
-                summary = athcodec.encode(
-                    source.clip, file, rest_error="bound", attributes="none", ladder="none", **limit
-                )
+                summary = athcodec.encode(source.clip, file, **self.options, **limit)
             except BoundError as error:
                 raise CannotKeep(str(error)) from error
             self.settings = dict(summary.choices) | {"chunk_bytes": dict(summary.chunk_bytes)}
             return file.read_bytes()
 
     def decode(self, data: bytes) -> np.ndarray:
-        with tempfile.TemporaryDirectory() as folder:
-            file = Path(folder) / "clip.ath"
-            file.write_bytes(data)
-            with athcodec.open(file, strict=True) as decoder:
-                return np.ascontiguousarray(decoder.positions(), np.float32)
+        with opened(data) as decoder:
+            return np.ascontiguousarray(decoder.positions(), np.float32)
+
+
+class LayeredAthcodec(Athcodec):
+    """The same in the default layers, whose levels are measured too."""
+
+    name, bounds = "athcodec, layers", (1e-4,)
+    options: ClassVar[dict[str, Any]] = {"attributes": "none", "rest_error": "bound"}
+
+
+class WholeAthcodec(Athcodec):
+    """All that the source has, at the default options: `athcodec encode SOURCE`."""
+
+    name, bounds = "athcodec, all arrays", (1e-4,)
+    options: ClassVar[dict[str, Any]] = {}
 
 
 class LosslessAthcodec(Athcodec):
@@ -51,3 +65,12 @@ class LosslessAthcodec(Athcodec):
 
     name = "athcodec, lossless"
     lossless = True
+
+
+@contextmanager
+def opened(data: bytes) -> Iterator[athcodec.Decoder]:
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "clip.ath"
+        file.write_bytes(data)
+        with athcodec.open(file, strict=True) as decoder:
+            yield decoder

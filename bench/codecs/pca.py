@@ -1,11 +1,9 @@
-"""Baselines on principal components: global PCA, PCA with linear prediction in time, clustered PCA.
+"""Baselines on principal components: global PCA, clustered PCA.
 
 * Alexa and Mueller, "Representing animations by principal components", Computer Graphics Forum 19(3), 2000:
   the matrix of all frames is a sum of products of a shape and a track in time. Either factor is quantised
   first, the other fitted to it by least squares; trajectories are one per coordinate (shared basis of T
   numbers) or one per vertex (of 3T).
-* Karni and Gotsman, "Compression of soft-body animation sequences", Computers & Graphics 28(1), 2004: the
-  same with the tracks coded by linear prediction in time.
 * Sattler, Sarlette and Klein, "Simple and efficient compression of animation sequences", SCA 2005:
   trajectories in clusters with a basis each (Lloyd's algorithm with the distance to a cluster's basis).
 
@@ -114,17 +112,12 @@ def source_basis(source: Source, order: VertexOrder, trajectories: Trajectories)
     )
 
 
-def write_basis(
-    writer: Writer, basis: np.ndarray, steps: np.ndarray, trajectories: Trajectories, lpc: int = 0
-) -> np.ndarray:
+def write_basis(writer: Writer, basis: np.ndarray, steps: np.ndarray, trajectories: Trajectories) -> np.ndarray:
     """Basis rows (K, length), each at about its step; returns what a reader will decode."""
     exponents = np.minimum(np.rint(2 * np.log2(steps)), COARSEST_BASIS).astype(np.int64)
     writer.table(np.diff(exponents, prepend=COARSEST_BASIS)[None])
     steps = 2.0 ** (exponents / 2)
     tracks = basis.reshape(len(basis), -1, trajectories.frames)
-    if lpc:
-        writer.count(2)
-        return _write_predicted(writer, tracks[:, 0], steps, lpc)
     plain = np.rint(tracks / steps[:, None, None])
     waves = np.rint(tracks @ waves_over_time(trajectories.frames).T / steps[:, None, None])
     kind = writer.count(int(np.log2(1 + np.abs(waves)).sum() < np.log2(1 + np.abs(plain)).sum()))
@@ -136,8 +129,6 @@ def write_basis(
 def read_basis(reader: Reader, trajectories: Trajectories) -> np.ndarray:
     steps = 2.0 ** ((np.cumsum(reader.table()[0]) + COARSEST_BASIS) / 2)
     kind = reader.count()
-    if kind == 2:
-        return _read_predicted(reader, steps)
     width = 3 if trajectories.joint else 1
     tracks = reader.rows().reshape(-1, trajectories.frames)[: width * len(steps)].astype(np.float64)
     tracks = tracks.reshape(len(steps), width, -1)
@@ -149,35 +140,6 @@ def read_basis(reader: Reader, trajectories: Trajectories) -> np.ndarray:
 def _in_threes(tracks: np.ndarray) -> np.ndarray:
     """(R, T) as rows of three axes."""
     return np.pad(tracks, ((0, -len(tracks) % 3), (0, 0))).reshape(-1, 3, tracks.shape[1])
-
-
-# ---- linear prediction in time ----
-
-LPC_BITS = 8
-
-
-def _write_predicted(writer: Writer, tracks: np.ndarray, steps: np.ndarray, degree: int) -> np.ndarray:
-    """Tracks (K, T) quantised, each predicted by the least-squares weights of its own last integers."""
-    q = np.rint(tracks / steps[:, None])
-    past = np.stack([np.pad(q, ((0, 0), (lag, 0)))[:, : q.shape[1]] for lag in range(1, degree + 1)], axis=1)
-    normal = past @ past.transpose(0, 2, 1) + 1e-3 * np.eye(degree)
-    weights = np.linalg.solve(normal, past @ q[:, :, None])[:, :, 0]
-    coded = writer.table(np.clip(np.rint(weights * 2**LPC_BITS), -1 << 20, 1 << 20).astype(np.int64))
-    expected = (past * coded[:, :, None]).sum(axis=1) / 2**LPC_BITS
-    writer.rows(_in_threes(q - np.rint(expected)))
-    return q * steps[:, None]
-
-
-def _read_predicted(reader: Reader, steps: np.ndarray) -> np.ndarray:
-    weights = reader.table()
-    residual = reader.rows()
-    residual = residual.reshape(-1, residual.shape[2])[: len(weights)]
-    degree = weights.shape[1]
-    q = np.zeros((len(weights), residual.shape[1] + degree), np.int64)
-    for t in range(residual.shape[1]):
-        past = q[:, t : t + degree][:, ::-1]
-        q[:, t + degree] = residual[:, t] + np.rint((past * weights).sum(axis=1) / 2**LPC_BITS).astype(np.int64)
-    return q[:, degree:] * steps[:, None]
 
 
 # ---- one group of trajectories ----
@@ -234,7 +196,6 @@ def write_group(
     step: float,
     settings: Settings,
     trajectories: Trajectories,
-    lpc: int = 0,
 ) -> np.ndarray:
     """Motion (N, 3, T) as coefficients times basis; `spectrum`: its singular values and vectors.
 
@@ -248,9 +209,9 @@ def write_group(
         q = quantised(rows @ basis.T / step, settings["dead_zone"])
         shapes = q.astype(np.float64)
         fitted = _inverse(shapes.T @ shapes) @ (shapes.T @ rows) / step
-        decoded = write_basis(writer, fitted, steps, trajectories, lpc)
+        decoded = write_basis(writer, fitted, steps, trajectories)
     else:
-        decoded = write_basis(writer, basis, steps, trajectories, lpc)
+        decoded = write_basis(writer, basis, steps, trajectories)
         q = quantised(fitted_to(decoded, rows) / step, settings["dead_zone"])
     write_coefficients(writer, q, order, trajectories, settings["differences"])
     return trajectories.motion((q * step) @ decoded)
@@ -302,28 +263,19 @@ def read_front(reader: Reader) -> tuple[VertexOrder, Trajectories, np.ndarray, f
 
 class GlobalPca(Baseline):
     name = "global PCA"
-    degrees: tuple[int, ...] = (0,)  # Degrees of linear prediction.
 
     def grid(self, source: Source, bound: float) -> dict[str, Ladder | Choice]:
-        return grid_of("step keep basis joint differences first dead_zone pose lpc order", lpc=Choice(self.degrees))
+        return grid_of("step keep basis joint differences first dead_zone pose order")
 
     def write(self, writer: Writer, source: Source, bound: float, settings: Settings) -> VertexOrder:
         order, trajectories, _, motion, step = write_front(writer, source, bound, settings)
         spectrum = source_basis(source, order, trajectories)
-        write_group(writer, motion, order, spectrum, step, settings, trajectories, settings["lpc"])
+        write_group(writer, motion, order, spectrum, step, settings, trajectories)
         return order
 
     def read(self, reader: Reader) -> tuple[np.ndarray, VertexOrder]:
         order, trajectories, pose, step = read_front(reader)
         return read_group(reader, order, step, trajectories) + pose[:, :, None], order
-
-
-class PredictedPca(GlobalPca):
-    name = "PCA + linear prediction (Karni-Gotsman)"
-    degrees = (2, 1, 3, 4)
-
-    def grid(self, source: Source, bound: float) -> dict[str, Ladder | Choice]:
-        return super().grid(source, bound) | {"joint": Choice((0,)), "first": Choice(("shapes", "tracks"))}
 
 
 class ClusteredPca(Baseline):

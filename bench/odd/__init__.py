@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, ClassVar
+from typing import Any
 
 from athcodec import MotionClip
 from bench.odd import bending, growing, others
@@ -26,9 +26,8 @@ class Odd:
     options: Mapping[str, Any] = field(default_factory=dict)
     plant: bool = True
     version: int = 1  # goes up when the code of this folder gives other motion
-    source: ClassVar[None] = None
 
-    def make(self, source: None = None) -> MotionClip:
+    def make(self) -> MotionClip:
         return MAKERS[self.maker](seed=self.seed, **self.options)
 
     def __str__(self) -> str:

@@ -42,7 +42,7 @@ def bend(
     """(T, N, 3) float32 positions of the plant's nodes, from `spin_up` seconds after the wind began."""
     from scipy.sparse.linalg import splu
 
-    stiffness, mass, drag = _stiffness(plant), _mass(plant), _drag(plant)
+    stiffness, mass, drag = _stiffness(plant), node_mass(plant), node_drag(plant)
     mass_factor, stiffness_factor = rayleigh(_lowest_frequency(stiffness, mass), damping)
     friction = drag * wind.speed
     step = 1.0 / (fps * STEPS)
@@ -118,21 +118,23 @@ def _stiffness(plant: Plant) -> csc_matrix:
     return matrix + _diagonal(np.where(np.arange(size) < 6, matrix.diagonal().max(), 0.0))  # the root is held
 
 
-def _mass(plant: Plant) -> np.ndarray:
+def node_mass(plant: Plant) -> np.ndarray:
     """(6N,) masses and moments of inertia of the nodes, with half of each element beside them."""
-    length = np.linalg.norm(plant.elements, axis=1)
-    half = 0.5 * DENSITY * np.pi * plant.radius**2 * length
-    turned = half * (length**2 / 12 + plant.radius**2)
+    length, section = plant.lengths, np.square(plant.radius)
+    half = 0.5 * DENSITY * np.pi * section * length
+    turned = half * (np.square(length) / 12 + section)
     mass, inertia = half.copy(), turned.copy()
     np.add.at(mass, plant.parent[1:], half[1:])
     np.add.at(inertia, plant.parent[1:], turned[1:])
     leaves = FOLIAGE_MASS * foliage_area(plant)
-    return np.repeat(np.stack([mass + leaves, inertia + leaves * FOLIAGE_SPREAD**2], axis=1), 3, axis=1).ravel()
+    return np.repeat(
+        np.stack([mass + leaves, inertia + leaves * (FOLIAGE_SPREAD * FOLIAGE_SPREAD)], axis=1), 3, axis=1
+    ).ravel()
 
 
-def _drag(plant: Plant) -> np.ndarray:
+def node_drag(plant: Plant) -> np.ndarray:
     """(6N,) force over the square of the wind's speed."""
-    wood = DRAG_OF_WOOD * 2 * plant.radius * np.linalg.norm(plant.elements, axis=1)
+    wood = DRAG_OF_WOOD * 2 * plant.radius * plant.lengths
     drag = 0.5 * AIR * (wood + foliage_area(plant))
     return np.stack([drag, 0 * drag], axis=1).repeat(3, axis=1).ravel()
 

@@ -19,7 +19,6 @@ from bench.trees.beams import bend
 from bench.trees.leaves import Leaves, Species, sheet
 from bench.trees.mesh import Tubes, bark_uv
 from bench.trees.plant import Plant, grow
-from bench.trees.refine import Splines
 from bench.trees.ride import BLOCK_FRAMES, Skeleton
 from bench.trees.wind import Wind
 
@@ -139,7 +138,7 @@ def _smooth(plant: Plant, nodes: np.ndarray, fps: float) -> Skeleton:
         plant.radius,
         np.arange(len(nodes)) / fps,
     )
-    splines = Splines(bare, FINER)
+    splines = _Splines(bare, FINER)
     rest, moved = splines.apply(bare.rest).astype(np.float32), splines.apply(nodes).astype(np.float32)
     parent = np.full(splines.count, -1)
     parent[splines.edges[:, 1]] = splines.edges[:, 0]
@@ -148,7 +147,7 @@ def _smooth(plant: Plant, nodes: np.ndarray, fps: float) -> Skeleton:
     return Skeleton(twice, rest, parent, splines.branch, plant.branch_parent, radius, np.arange(len(twice)) / fps)
 
 
-def _drawn_radius(plant: Plant, splines: Splines, rest: np.ndarray) -> np.ndarray:
+def _drawn_radius(plant: Plant, splines: _Splines, rest: np.ndarray) -> np.ndarray:
     """(V,) with a thicker trunk, its foot wider, and tips that end thin."""
     start, end = splines.controls[:, 1], splines.controls[:, 2]
     same = plant.branch[start] == plant.branch[end]
@@ -160,3 +159,44 @@ def _drawn_radius(plant: Plant, splines: Splines, rest: np.ndarray) -> np.ndarra
     last = np.flatnonzero(np.diff(splines.branch, append=-1))
     radius[last] *= 0.4
     return radius
+
+
+class _Splines:
+    """Vertices on Catmull-Rom splines through the nodes of each stem, `factor` per element, as sums of four nodes.
+
+    Node i of the skeleton is vertex factor * i. (Catmull and Rom, "A class of local interpolating splines", Computer
+    Aided Geometric Design, 1974.)
+    """
+
+    def __init__(self, skeleton: Skeleton, factor: int) -> None:
+        self.count = factor * (len(skeleton.parent) - 1) + 1
+        self.node = -(-np.arange(self.count) // factor)
+        self.branch = skeleton.branch[self.node]
+        self.share = ((np.arange(self.count) - 1) % factor + 1) / factor
+        self.controls, self.weights = _controls(skeleton, self.node, self.share)
+        below = np.arange(-1, self.count - 1)
+        below[1::factor] = factor * skeleton.parent[1:]
+        self.edges = np.stack([below[1:], np.arange(1, self.count)], axis=1)
+
+    def apply(self, nodes: np.ndarray) -> np.ndarray:
+        """(..., count, 3) vertices from (..., N, 3) nodes."""
+        return sum(nodes[..., self.controls[:, k], :] * self.weights[:, k : k + 1] for k in range(4))
+
+
+def _controls(skeleton: Skeleton, node: np.ndarray, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(V, 4) nodes and weights of vertices that lie at the fractions t of the elements below `node`."""
+    parent, branch = skeleton.parent, skeleton.branch
+    start = np.maximum(parent[node], 0)
+    before = np.where((branch[start] == branch[node]) & (start > 0), parent[start], -1)
+    after = np.minimum(node + 1, len(parent) - 1)
+    after = np.where((branch[after] == branch[node]) & (after > node), after, -1)
+    weights = 0.5 * np.stack(
+        [-t + 2 * t**2 - t**3, 2 - 5 * t**2 + 3 * t**3, t + 4 * t**2 - 3 * t**3, t**3 - t**2], axis=1
+    )
+    # a missing neighbour is the mirror image of the other one, so that a stem leaves in its own direction
+    for missing, outer, near, far in ((before < 0, 0, 1, 2), (after < 0, 3, 2, 1)):
+        weights[missing, near] += 2 * weights[missing, outer]
+        weights[missing, far] -= weights[missing, outer]
+        weights[missing, outer] = 0.0
+    weights[node == 0] = [0.0, 0.0, 1.0, 0.0]
+    return np.stack([np.maximum(before, 0), start, node, np.maximum(after, 0)], axis=1), weights

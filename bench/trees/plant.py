@@ -52,6 +52,12 @@ class Plant:
         return self.position - self.position[np.maximum(self.parent, 0)]
 
     @property
+    def lengths(self) -> np.ndarray:
+        """(N,) metres, of the elements."""
+        x, y, z = self.elements.T
+        return np.sqrt(x * x + y * y + z * z)
+
+    @property
     def edges(self) -> np.ndarray:
         """(N - 1, 2) node below and node."""
         return np.stack([self.parent[1:], np.arange(1, len(self.parent))], axis=1).astype(np.int32)
@@ -66,7 +72,7 @@ class Plant:
 
     def preorder(self) -> tuple[np.ndarray, np.ndarray]:
         """Nodes, each followed at once by all that it carries; (N,) how many these are, itself included."""
-        sizes = _sum_above(self.parent, np.ones(len(self.parent))).astype(int)
+        sizes = sum_above(self.parent, np.ones(len(self.parent))).astype(int)
         place, free = np.zeros(len(sizes), int), np.ones(len(sizes), int)
         for node in range(1, len(sizes)):
             below = self.parent[node]
@@ -88,7 +94,7 @@ def grow(nodes: int, orders: int, height: float, seed: int) -> Plant:
     leafy = np.array(grower.order) == orders
     leafy |= np.bincount(parent[1:], minlength=nodes) == 0  # tips of stems whose last fork is lower
     foliage = leafy / leafy.sum()
-    radius = BASE_RADIUS * height * np.sqrt(_sum_above(parent, foliage))
+    radius = BASE_RADIUS * height * np.sqrt(sum_above(parent, foliage))
     return Plant(parent, branch, np.array(grower.branch_parent, np.int32), position, radius, foliage)
 
 
@@ -156,7 +162,7 @@ def _side_direction(direction: np.ndarray, azimuth: float, angle: float) -> np.n
     return np.cos(angle) * direction + np.sin(angle) * outwards
 
 
-def _sum_above(parent: np.ndarray, values: np.ndarray) -> np.ndarray:
+def sum_above(parent: np.ndarray, values: np.ndarray) -> np.ndarray:
     """(N,) each node's value and those of all nodes that it carries."""
     total = values.astype(np.float64).copy()
     for node in range(len(parent) - 1, 0, -1):

@@ -1,8 +1,7 @@
-"""What the nodes of a moving plant carry: rigid frames along the stems, and sway in the wind about them.
+"""The rigid frames that the nodes of a moving plant carry along its stems.
 
 A frame follows its element by the smallest turn from the rest pose, so twist about the element's own axis is
-left out. Sway is a damped oscillator per rider, driven by the drag of the wind at its foot and stepped
-exactly (forces constant within a frame). Riders do not push back on what carries them.
+left out.
 """
 
 from __future__ import annotations
@@ -12,10 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from athcodec import MotionClip
-from bench.trees.wind import Wind
 
 BLOCK_FRAMES = 16
-LARGEST_SWAY = 1.0  # rad
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,34 +90,3 @@ def sideways(direction: np.ndarray, azimuth: np.ndarray, angle: float) -> np.nda
     first /= np.linalg.norm(first, axis=1, keepdims=True)
     across = np.cos(azimuth)[:, None] * first + np.sin(azimuth)[:, None] * np.cross(direction, first)
     return np.cos(angle) * direction + np.sin(angle) * across
-
-
-def drag_at(wind: Wind, feet: np.ndarray, time: np.ndarray) -> np.ndarray:
-    """(T, M, 3) wind speed times velocity over the square of the mean speed, at (T, M, 3) points."""
-    air = np.stack([wind.at(points, seconds) for points, seconds in zip(feet, time, strict=True)])
-    return np.linalg.norm(air, axis=-1, keepdims=True) * air / wind.speed**2
-
-
-def sway(drive: np.ndarray, hertz: np.ndarray, damping: float, step: float) -> np.ndarray:
-    """(T, M, k) responses of M oscillators to (T, M, k) drives, which they follow where these are steady."""
-    omega = 2 * np.pi * hertz[:, None]
-    fast = omega * np.sqrt(1.0 - damping**2)
-    decay = np.exp(-damping * omega * step)
-    cosine, sine = np.cos(fast * step), np.sin(fast * step)
-    lag, speed = np.zeros(drive.shape[1:]), np.zeros(drive.shape[1:])
-    response = np.empty(drive.shape)
-    for frame, target in enumerate(drive):
-        lag = lag - (target - drive[max(0, frame - 1)])
-        pull = (speed + damping * omega * lag) / fast
-        lag, speed = (
-            decay * (cosine * lag + sine * pull),
-            decay * (cosine * speed - sine * (damping * speed + omega * lag) * omega / fast),
-        )
-        response[frame] = target + lag
-    return response
-
-
-def limited(vectors: np.ndarray) -> np.ndarray:
-    """Rotation vectors no longer than LARGEST_SWAY, small ones as they are."""
-    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
-    return vectors * np.tanh(length / LARGEST_SWAY) * LARGEST_SWAY / np.maximum(length, 1e-12)

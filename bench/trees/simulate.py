@@ -226,7 +226,7 @@ class _Run:
 
 def foliage_area(plant: Plant) -> np.ndarray:
     """(N,) drag coefficient times area of each node's foliage, m2."""
-    return FOLIAGE_AREA * plant.height**2 * plant.foliage
+    return FOLIAGE_AREA * (plant.height * plant.height) * plant.foliage
 
 
 def _lowest_frequency(mujoco: ModuleType, model: Any, data: Any, stiffness: np.ndarray) -> float:
