@@ -58,7 +58,7 @@ def test_a_target_size_that_no_bound_reaches_is_refused_with_the_least_size(smal
 @pytest.mark.parametrize("fits_from", [2e-7, 1e-3, 0.09])
 def test_a_target_size_is_looked_for_with_a_counted_number_of_files(too_large, fits_from, small):
     """Where files shrink to just above the target and then jump below it, the next bound was a few per cent away."""
-    source, tried = job.EncodingJob.begin(small, None, job.EncodingOptions(), silent).source, []
+    source, tried = job.EncodingJob.begin(small, small, None, job.EncodingOptions(), silent).source, []
 
     def file_size(bound):
         tried.append(bound)
@@ -366,7 +366,8 @@ def test_a_clip_is_read_in_blocks_and_segments_only(tmp_path, monkeypatch):
     monkeypatch.setattr(clip_module, "BLOCK_BYTES", 32 * 200 * 12)
     clip = endless_clip(600)
     summary = athcodec.encode(clip, tmp_path / "s.ath", segment_frames=32, effort="fast")
-    assert clip.positions.read.min() >= 2 and clip.positions.read.max() <= 5  # Some frames show what is no plant.
+    assert clip.positions.read.min() >= 2 and np.median(clip.positions.read) <= 3
+    assert clip.positions.read.max() <= 7  # Some frames show what is no plant, and in which pose the plant is grown.
     with athcodec.open(summary.path, strict=True) as decoder:
         for start, block in decoder.blocks():
             source = clip.block(start, start + len(block))

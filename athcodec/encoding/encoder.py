@@ -243,13 +243,12 @@ def _begin(
 ) -> tuple[EncodingJob, float]:
     """The job, whose clip has branches by then, and its bound in scene units."""
     clip.check()
-    if not options.keeps_rest:
-        clip = with_grown_pose(clip)
+    grown = clip if options.keeps_rest else with_grown_pose(clip)
     branches = None
     if not clip.has_branches:
         report("branches", 0.0)
-        branches = best_branches(clip, option, report, options.host_rest)
-    job = EncodingJob.begin(clip, branches, options, report)
+        branches = best_branches(grown, option, report, options.host_rest)
+    job = EncodingJob.begin(clip, grown, branches, options, report)
     attempts = itertools.count(1)
 
     def file_size(bound: float) -> float:

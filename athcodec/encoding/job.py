@@ -53,7 +53,7 @@ from athcodec.encoding.summary import Seam, Summary
 from athcodec.encoding.survey import Ath, Survey, survey
 from athcodec.errors import BoundError, ClipError, SourceWarning
 from athcodec.files.threads import ThreadPool, default_jobs
-from athcodec.motion.branches.grown_pose import with_grown_branches, with_grown_pose
+from athcodec.motion.branches.grown_pose import with_grown_branches
 from athcodec.motion.branches.result import Found, with_branches
 from athcodec.motion.clip import ERROR_WEIGHTS, MotionClip
 from athcodec.motion.hierarchy import Hierarchy, derived_edges, hierarchy_of
@@ -255,11 +255,13 @@ class EncodingJob:
     branches: Found | None = None
 
     @classmethod
-    def begin(cls, clip: MotionClip, branches: Found | None, options: EncodingOptions, report: Progress) -> EncodingJob:
-        """Return the job for a clip, all of whose frames are read. branches: those found for a clip without."""
-        clip, factors = _completed(clip, branches, options)
-        hierarchy = hierarchy_of(clip)
-        clip = clip if options.keeps_rest else with_grown_branches(clip, hierarchy)
+    def begin(
+        cls, clip: MotionClip, grown: MotionClip, branches: Found | None, options: EncodingOptions, report: Progress
+    ) -> EncodingJob:
+        """Return the job for a clip, all of whose frames are read. grown: the clip itself, or with a rest pose that
+        shows more of it, which motion is coded about; branches: those found for a clip without."""
+        of_grown, _ = _completed(grown, branches, options)
+        hierarchy = hierarchy_of(of_grown)
         _check_limits(clip, hierarchy)
         pool = ThreadPool(options.jobs or default_jobs())
         thresholds = {} if options.tam is None else {name: getattr(options.tam, name) for name in ("lam", "xi", "eta")}
@@ -279,8 +281,9 @@ class EncodingJob:
                 SourceWarning,
                 stacklevel=2,
             )
-        seen = survey(clip, hierarchy, progress=lambda f: report("survey", f), pool=pool, **thresholds)
-        return cls(cls._source(clip, seen, factors, options, pool), options, report, branches)
+        of_grown = of_grown if options.keeps_rest else with_grown_branches(of_grown, hierarchy)
+        seen = survey(of_grown, hierarchy, progress=lambda f: report("survey", f), pool=pool, **thresholds)
+        return cls(cls._source(clip, branches, seen, options, pool), options, report, branches)
 
     @classmethod
     def resume(cls, clip: MotionClip, draft: Draft, report: Progress = silent, jobs: int | None = None) -> EncodingJob:
@@ -290,17 +293,23 @@ class EncodingJob:
         if got != expected:
             raise ClipError(f"clip: got {got} frames and vertices, expected {expected} as in the draft")
         options = dataclasses.replace(draft.options, jobs=jobs)
-        clip = clip if options.keeps_rest else with_grown_pose(clip)
-        clip, factors = _completed(clip, draft.branches, options)
-        clip = clip if options.keeps_rest else with_grown_branches(clip, seen.hierarchy)
-        source = cls._source(clip, seen, factors, options, ThreadPool(jobs or default_jobs()))
+        source = cls._source(clip, draft.branches, seen, options, ThreadPool(jobs or default_jobs()))
         return cls(source, options, report, draft.branches)
 
     @staticmethod
     def _source(
-        clip: MotionClip, seen: Survey, factors: np.ndarray | None, options: EncodingOptions, pool: ThreadPool
+        clip: MotionClip, branches: Found | None, seen: Survey, options: EncodingOptions, pool: ThreadPool
     ) -> Source:
-        return Source(
+        clip, factors = _completed(clip, branches, options)
+        order, reference = seen.hierarchy.vertex_source, None
+        if not np.array_equal(seen.rest, clip.rest[order]):
+            if not clip.rest_given:
+                pose = np.empty_like(seen.rest)
+                pose[order] = seen.rest
+                clip = clip.replace(rest=pose.astype(clip.rest_dtype), rest_given=False)
+            else:
+                reference = seen.rest
+        source = Source(
             clip,
             seen.hierarchy,
             seen,
@@ -313,6 +322,7 @@ class EncodingJob:
             rest_precision=options.rest_precision,
             without=options.without,
         )
+        return source if reference is None else source.about(reference - source.origin)
 
     @property
     def clip(self) -> MotionClip:

@@ -1,11 +1,12 @@
 """Poses of plants that grow: those in which their parts have their full size.
 
 Maps from a pose in which a part is hardly more than a point say nothing about its shape, so motion is coded about a
-pose that shows every part. A clip whose source has a rest pose keeps it.
+pose that shows every part.
 """
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator
 
 import numpy as np
@@ -15,35 +16,37 @@ from athcodec.motion.clip import MotionClip
 from athcodec.motion.hierarchy import Hierarchy
 
 FRAMES = 64  # Frames of a clip that are looked at.
-GROWN = 0.9  # Size of the first frame, over that of the most grown one, from which it is the rest pose.
+SMALL_LINK = 0.2  # Length of a link, over its largest in any frame, below which it is not grown.
+UNGROWN = 0.02  # Share of the links that may be small in the rest pose alone.
 LINKS = 20_000  # Links that are looked at, about.
 SMALL = 0.5  # Size of a part, over its largest in any frame, below which another pose shows it better.
 
 
 def with_grown_pose(clip: MotionClip) -> MotionClip:
-    """Return the clip with the frame in which most of it has its full size as its rest pose, if it has no rest pose of
-    its own and its first frame shows less. Size: the lengths of the links between vertices, over their largest."""
-    if not _makes_rest_pose(clip):
+    """Return the clip with the frame in which it is most grown as its rest pose, if more of its own is small than of
+    another frame: links between vertices that are much shorter than their largest length."""
+    if clip.frame_count == 1 or clip.vertex_count == 1:
         return clip
     links = links_of(clip)
     if not len(links):
         links = np.stack([np.arange(clip.vertex_count - 1), np.arange(1, clip.vertex_count)], axis=1)
     links = links[:: max(1, len(links) // LINKS)]
     frames = _some_frames(clip)
-    sizes = np.array([np.linalg.norm(pose[links[:, 0]] - pose[links[:, 1]], axis=1) for pose in _poses(clip, frames)])
-    largest = sizes.max(axis=0)
-    grown = (sizes[:, largest > 0] / largest[largest > 0]).sum(axis=1)
-    if not len(links) or grown[0] >= GROWN * grown.max():
+    poses = itertools.chain([clip.rest], _poses(clip, frames))
+    sizes = np.array([np.linalg.norm(pose[links[:, 0]] - pose[links[:, 1]], axis=1) for pose in poses])
+    largest = sizes[1:].max(axis=0)
+    small = (sizes < SMALL_LINK * largest).mean(axis=1)
+    if small[0] <= small[1:].min() + UNGROWN:
         return clip
-    best = int(frames[int(np.argmax(grown))])
+    moving = largest > 0
+    best = int(frames[int(np.argmax((sizes[1:, moving] / largest[moving]).mean(axis=1)))])
     return clip.replace(rest=clip.block(best, best + 1)[0], rest_given=False)
 
 
 def with_grown_branches(clip: MotionClip, hierarchy: Hierarchy) -> MotionClip:
     """Return the clip with a rest pose in which each branch has the shape of the frame where it is largest, if it is
-    much smaller in the rest pose that was made of the motion. Such a branch hangs on its parent as it does in that
-    frame."""
-    if not _makes_rest_pose(clip):
+    much smaller in the rest pose. Such a branch hangs on its parent as it does in that frame."""
+    if clip.frame_count == 1:
         return clip
     frames, source, first = _some_frames(clip), hierarchy.vertex_source, hierarchy.first_vertex
     sizes = np.array([_branch_sizes(pose[source], first) for pose in _poses(clip, frames)])
@@ -61,10 +64,6 @@ def with_grown_branches(clip: MotionClip, hierarchy: Hierarchy) -> MotionClip:
     pose = np.empty_like(rest)
     pose[source] = rest
     return clip.replace(rest=pose.astype(clip.rest_dtype), rest_given=False)
-
-
-def _makes_rest_pose(clip: MotionClip) -> bool:
-    return not clip.rest_given and clip.rest_pose == "first" and clip.frame_count > 1
 
 
 def _some_frames(clip: MotionClip) -> np.ndarray:
