@@ -57,7 +57,7 @@ PIECE = np.dtype(
     )
 )
 NODE = np.dtype(fields("9<f8", "whitening", "<i4", "branch piece first count level last coded rank"))
-CHUNK = np.dtype(fields("<u8", "bytes offset", "<u4", "length checksum segment", "<u2", "kind", "u1", "level reserved"))
+CHUNK = np.dtype(fields("<u8", "bytes offset", "<u4", "length checksum segment", "<u2", "kind", "u1", "level stage"))
 
 
 class CorePlan(ctypes.Structure):
@@ -117,7 +117,8 @@ class Header(ctypes.Structure):
     _fields_ = fields(
         *(c_uint64, "file_length front_length", c_double, "max_error"),
         *(c_uint32, "chunk_count vertex_count branch_count frame_count segment_count"),
-        *(c_int32, "level_count full_level_count clip_count layer_count is_float64 is_predicted has_faces"),
+        *(c_int32, "level_count full_level_count clip_count layer_count is_float64 is_predicted has_faces stage_count"),
+        *(c_uint8 * 32, "stages"),
     )
 
 
@@ -171,6 +172,7 @@ _PLAYING = {  # Functions of core/include/ath.h.
     "ath_prepare_to": (c_int, [c_void_p, c_void_p]),
     "ath_joined_to": (c_int32, [c_void_p, c_int32, c_int32]),
     "ath_joins": (c_void_p, [c_void_p]),
+    "ath_stages": (c_void_p, [c_void_p]),
     "ath_repeats": (c_void_p, [c_void_p]),
     "ath_work_size": (c_size_t, [c_void_p]),
     "ath_segment_size": (c_size_t, [c_void_p, c_int32]),

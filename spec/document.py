@@ -207,8 +207,10 @@ class File:
     def deepest(self) -> int:
         """The deepest complete level."""
         late = [key[1] for key, chunk in self.chunks.items() if key[1] is not None and not chunk.is_there]
-        self.rules.require(0 not in late, "TRUNCATED")
-        return min(late, default=self.header.level_count) - 1
+        levels = self.header.shown[: self.header.level_count]
+        deepest = sum(level < min(late, default=32) for level in levels) - 1
+        self.rules.require(deepest >= 0, "TRUNCATED")
+        return deepest
 
     def positions(self, level: int | None = None) -> np.ndarray:
         """(frames, vertices, 3) in source order, the frames of all clips."""
@@ -224,6 +226,7 @@ class File:
         rules.require(file.rest.rest is not None, "NEEDS_HOST_MESH")
         if file.is_host:
             return np.frombuffer(self.mesh, number).reshape(-1, 3) + np.float32(0)  # 0.0 for -0.0
+        level = self.header.shown[level]
         plans = rules.shown_plans(file, min(level, file.lossy - 1))
         method = self.content(rules.REST)[0]
         if (rules.SOURCE_REST, None, 0) in self.chunks:

@@ -15,6 +15,7 @@ from contextlib import contextmanager, suppress
 from copy import copy
 from dataclasses import dataclass, field, replace
 from functools import partial
+from itertools import pairwise
 
 import numpy as np
 
@@ -275,7 +276,7 @@ class FrontScript:
         self.counts = counts
         self.values = [
             *(counts[f"{name}_count"] - 1 for name in ("vertex", "branch", "frame", "segment")),
-            counts["full_level_count"] - 2,
+            counts["full_level_count"] - 1,
             counts["full_level_count"] - counts["level_count"],
             counts["clip_count"] - 1,
             counts["layer_count"] - 1,
@@ -283,6 +284,9 @@ class FrontScript:
             int(counts["is_predicted"]),
             *_bits(rules.to_bits(counts["max_error"], 64), 63),
         ]
+        shown = counts.get("shown") or range(min(counts["full_level_count"], 32))
+        for before, level in pairwise([-1, *shown]):
+            self.values += [1] * (level - before - 1) + [0]
         self.bits, self.before, self.was_motion, self.place = [8] * (rules.OTHER + 1), rules.OTHER, False, (0, 0)
 
     def add_chunk(self, entry: Entry) -> None:

@@ -153,7 +153,7 @@ class ChunkFile:
 
     def _chunks_at(self, rows: Any) -> list[Chunk]:
         columns = (self._table[name][rows].tolist() for name in CHUNK_FIELDS)
-        return list(map(Chunk, *columns, self._index[rows].tolist()))
+        return list(map(Chunk, *columns, self._index[rows].tolist(), self._table["stage"][rows].tolist()))
 
     def find(self, kind: int) -> Chunk | None:
         """Return the first chunk of a kind (FORMAT.md, "Chunk table"), or None if the file has none."""

@@ -110,6 +110,7 @@ class Header:
     is_predicted: bool = False
     chunk_count: int = 0
     file_length: int = 0
+    stages: tuple[int, ...] = ()  # Of each of the full_level_count levels; (): no stage is left out.
     joins: np.ndarray | None = field(default=None, compare=False)  # (levels, segments) uint8; None: all are 0
     repeats: np.ndarray | None = field(default=None, compare=False)  # (frames,) bool: like the one before; None: none
 
@@ -136,6 +137,7 @@ class Chunk:
     checksum: int
     offset: int = 0
     index: int = -1
+    stage: int | None = None  # Level in the table, which counts what is not shown too; None: `level`.
 
     @property
     def is_motion(self) -> bool:
@@ -165,11 +167,13 @@ def pack_front(header: Header, chunks: list[Chunk], errors: np.ndarray) -> bytes
 
 def _front_stream(header: Header, chunks: list[Chunk], errors: np.ndarray) -> bytes:
     """FORMAT.md, "Front stream"."""
-    names = (name for name, _ in _native.Header._fields_ if hasattr(header, name))
+    names = (name for name, _ in _native.Header._fields_ if name != "stages" and hasattr(header, name))
     counts = _native.Header(**{name: getattr(header, name) for name in names})
+    counts.stages[: header.full_level_count] = header.stages or range(header.full_level_count)
     table = np.zeros(len(chunks), _native.CHUNK)
-    for name in ("length", "segment", "kind", "level"):
+    for name in ("length", "segment", "kind"):
         table[name] = [getattr(chunk, name) for chunk in chunks]
+    table["stage"] = [chunk.level if chunk.stage is None else chunk.stage for chunk in chunks]
     space = _FRONT_BYTES + _FRONT_BYTES_OF_EACH * (len(chunks) + errors.size // len(MEASURES))
     data = np.empty(space + _FRONT_BYTES_OF_FRAME * header.frame_count, np.uint8)
     entries = header.level_count * header.segment_count

@@ -196,7 +196,7 @@ class File:
         self._build: np.ndarray | None = None
         self._refinements: list[np.ndarray] = []
         self._refined = -1  # The deepest level whose segments have what they share.
-        self.poses_read = 0  # The deepest level whose reference pose the core has read.
+        self.poses_read = -1  # The deepest level whose reference pose the core has read.
         self._building = threading.Lock()
 
     @property
@@ -337,6 +337,10 @@ class File:
         """Return how each segment is joined to the one before it, (levels, segments) uint8."""
         shape = self.info.level_count, self.info.segment_count
         return self._array(lib.ath_joins(self._file), np.uint8, math.prod(shape)).reshape(shape)
+
+    def stages(self) -> list[int]:
+        """Return the place of each level, stored or not, among all that FORMAT.md numbers, whether shown or not."""
+        return self._array(lib.ath_stages(self._file), np.uint8, self.info.full_level_count).tolist()
 
     def repeats(self) -> np.ndarray:
         """Return whether each frame repeats the positions of the one before, (frames,) bool."""

@@ -85,9 +85,11 @@ class FileTables(ChunkFile):
     @property
     def header(self) -> ct.Header:
         """The fixed header."""
-        counts = [field.name for field in fields(ct.Header) if field.name not in ("joins", "repeats")]
+        counts = [field.name for field in fields(ct.Header) if field.name not in ("stages", "joins", "repeats")]
         values = {name: getattr(self.core.info, name) for name in counts}
-        return ct.Header(**values, joins=self.core.joins(), repeats=self.core.repeats())
+        return ct.Header(
+            **values, stages=tuple(self.core.stages()), joins=self.core.joins(), repeats=self.core.repeats()
+        )
 
     # ---- clips ----
 

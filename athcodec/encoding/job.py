@@ -29,6 +29,7 @@ from athcodec.decoding.decoder import Decoder
 from athcodec.encoding import polygons, streams, writing
 from athcodec.encoding import quantise as qz
 from athcodec.encoding.choices.joins import End
+from athcodec.encoding.choices.levels import chosen_levels
 from athcodec.encoding.choices.prediction import FoundPrediction, best_prediction, code_predicted_segment, one_map_each
 from athcodec.encoding.features import Feature
 from athcodec.encoding.layers import (
@@ -147,13 +148,14 @@ class Draft:
 
 @dataclass(frozen=True)
 class CodedSegment:
-    """One segment: chunks {(level, kind): payload}, (levels, 3) errors of stopping at each level, and (levels,) joins
-    to the segment before."""
+    """One segment: chunks {(level, kind): payload}, (levels, 3) errors of stopping at each level, (levels,) joins to the
+    segment before, and (levels, 2) flaws of what each level shows (SourceFrames)."""
 
     index: int
     chunks: dict[tuple[int, int], bytes]
     errors: np.ndarray
     joins: np.ndarray
+    flaws: np.ndarray
 
 
 def _check_limits(clip: MotionClip, hierarchy: Hierarchy) -> None:
@@ -539,7 +541,7 @@ class EncodingJob:
         self._add_prelude(store, decided)
         for (level, kind), content in layer_chunks(layers).items():
             store.add(kind, content, level)
-        errors, joins = self._add_motion(store, decided, coded)
+        errors, joins, stages = self._add_motion(store, decided, coded)
         self._add_static(store)
         if self.clip.clip_ranges:
             store.add(ct.CLIPS, self._clips(decided, [np.zeros(len(errors))] * len(self.clip.clip_ranges)))
@@ -555,6 +557,7 @@ class EncodingJob:
             len(self.clip.clip_range_frames),
             len(layers.each),
             decided.choice.predicted is not None,
+            stages=tuple(stages),
             joins=joins,
             repeats=decided.source.repeats,
         )
@@ -643,18 +646,17 @@ class EncodingJob:
         def predict(numbered: tuple[int, list[np.ndarray]]) -> CodedSegment:
             index, block = numbered
             positions, exact = self._positions(block.pop())  # The list no longer holds the block.
-            shown_times = source.shown_times(index)
-            chunks, errors = code_predicted_segment(decided.prelude, decided.choice, positions, exact, shown_times)
-            return CodedSegment(index, chunks, errors, np.zeros(len(errors), int))
+            frames = positions, exact, source.shown_times(index), source.box
+            return CodedSegment(index, *code_predicted_segment(decided.prelude, decided.choice, *frames))
 
-        def code(numbered: tuple[int, list[np.ndarray]]) -> tuple[int, CodedMotion, list[End | None]]:
+        def code(numbered: tuple[int, list[np.ndarray]]) -> tuple[int, CodedMotion, list[End]]:
             index, block = numbered
             motion = self._motion(decided, index, *self._positions(block.pop()))
             return index, motion, motion.ends() if len(source.segments) > 1 else []
 
-        def join(coded: tuple[int, CodedMotion, list[End | None]]) -> CodedSegment:
+        def join(coded: tuple[int, CodedMotion, list[End]]) -> CodedSegment:
             index, motion, ends = coded
-            return CodedSegment(index, *motion.joined_to([] if Feature.JOINS in source.without else ends))
+            return CodedSegment(index, *motion.joined_to(ends, Feature.JOINS not in source.without))
 
         if decided.choice.predicted is not None:
             return pool.ordered(predict, read(segments), at_once)
@@ -668,9 +670,9 @@ class EncodingJob:
             yield one
 
     def _motion(self, decided: _Decided, index: int, positions: np.ndarray, exact: np.ndarray | None) -> CodedMotion:
-        layers = decided.layers.of_segment(decided.source.is_whole_loop(index))
-        goes_on, shown_times = decided.source.goes_on(index), decided.source.shown_times(index)
-        return CodedMotion(decided.prelude, layers, self.segment_count, positions, exact, goes_on, shown_times)
+        source, loops = decided.source, decided.source.is_whole_loop(index)
+        frames = positions, exact, source.goes_on(index), source.shown_times(index), source.box, loops
+        return CodedMotion(decided.prelude, decided.layers.of_segment(loops), self.segment_count, *frames)
 
     @staticmethod
     def _with_those_before(source: Source, segments: Sequence[int]) -> Iterator[int]:
@@ -692,29 +694,33 @@ class EncodingJob:
 
     def _add_motion(
         self, store: writing.ChunkStore, decided: _Decided, coded: Iterable[CodedSegment]
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Return (levels, segments, 3) errors and (levels, segments) joins. Raises ValueError unless each segment comes
-        once."""
+    ) -> tuple[np.ndarray, np.ndarray, list[int]]:
+        """Return (levels, segments, 3) errors and (levels, segments) joins of the levels that are shown, and which of all
+        they are. Raises ValueError unless each segment comes once."""
         levels, count = decided.layers.level_count + self.options.lossless, decided.segment_count
         errors, joins = np.zeros((levels, count, len(MEASURES))), np.zeros((levels, count), np.uint8)
-        missing = set(range(count))
+        flaws, missing = np.zeros((levels, count, 2)), set(range(count))
         for segment in coded:
             if segment.index not in missing:
                 raise ValueError(f"segments: got {segment.index} twice or beyond the last, expected each once")
             missing.remove(segment.index)
             errors[:, segment.index] = segment.errors + decided.source.held_error
             joins[:, segment.index] = segment.joins
+            flaws[:, segment.index] = segment.flaws
             for (level, kind), payload in segment.chunks.items():
                 store.add(kind, payload, level, segment.index)
             self.report("motion", 1 - len(missing) / count)
         if missing:
             raise ValueError(f"segments: got {count - len(missing)}, expected all {count}")
-        return errors, joins
+        frames = [stop - start for start, stop in decided.source.segments]
+        shown = chosen_levels(errors, frames, flaws, self.seen.diagonal, self.options.lossless)
+        store.leave_out(lambda chunk: not decided.layers.level_0.serves(chunk.kind, chunk.level, shown))
+        return errors[shown], joins[shown], shown
 
 
 def _beside_ends(
-    source: Source, coded: Iterable[tuple[int, CodedMotion, list[End | None]]], wanted: frozenset[int]
-) -> Iterator[tuple[int, CodedMotion, list[End | None]]]:
+    source: Source, coded: Iterable[tuple[int, CodedMotion, list[End]]], wanted: frozenset[int]
+) -> Iterator[tuple[int, CodedMotion, list[End]]]:
     """Yield the segments that are wanted, each with the ends that it goes on from."""
     last, last_ends = None, []
     for index, motion, ends in coded:

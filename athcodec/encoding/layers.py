@@ -32,6 +32,7 @@ from athcodec.encoding.choices.joins import (
     end_of,
     seen,
 )
+from athcodec.encoding.choices.levels import SourceFrames
 from athcodec.encoding.features import Feature
 from athcodec.encoding.learned_modes import nested
 from athcodec.encoding.motion import LearnedModes, Plan, SegmentMotion, position_errors
@@ -65,7 +66,7 @@ MOST_LAYERS, MOST_LEVELS = 8, 32  # Limits of a file.
 LEVEL_0_STEP = 4  # Step of the rest pose of level 0, over that of the first layer.
 LEAST_MEETING = 8  # Frames from which on the corrections of a segment meet those of the segments beside it.
 RMS = MEASURES.index("rms")
-LEVEL_TOLERANCE = 1.005  # Largest RMS error of a level, over that of the level before.
+LEVEL_TOLERANCE = 1.0  # Largest RMS error of a level, over that of the level before.
 FINER_MAPS, COARSER_MAPS = 3, 16  # Half octaves by which steps of maps may move for that.
 EVEN_SHARE = 0.05  # Share of the bytes of a segment that corrections may take for that.
 TIGHTER_LIMITS = tuple(2.0 ** (-i / 8) for i in range(1, 17))  # Limits of these corrections, over that of the layer.
@@ -287,7 +288,8 @@ class CodedMotion:
     payload}, and errors of stopping at each level, by each of MEASURES.
 
     layers: with the settings of the segment (Layers.of_segment). exact: the source's own numbers (Source.exact), for
-    one more level. goes_on: whether another segment follows. shown_times: as Source returns them.
+    one more level. goes_on: whether another segment follows. shown_times: as Source returns them. box: corners of the
+    source, (2, 3). loops: whether the segment follows itself.
     """
 
     def __init__(
@@ -299,6 +301,8 @@ class CodedMotion:
         exact: np.ndarray | None,
         goes_on: bool,
         shown_times: np.ndarray,
+        box: np.ndarray,
+        loops: bool,
     ):
         self._exact, self._goes_on, self._shown_times = exact, goes_on, shown_times
         self._output, self._origin, self.positions = prelude.output, prelude.origin, positions
@@ -312,7 +316,10 @@ class CodedMotion:
         self._decoded = np.empty(0)  # Positions of the last level.
         self._met = streams.FREE_ENDS  # Met by the corrections of the last layer.
         self._end_corrections = NO_CORRECTIONS  # Corrections of the last frame.
+        self._corrected: dict[int, Corrections] = {}  # What corrects levels.
         self.joins = [0] * layers.level_count
+        self._source = SourceFrames(positions, shown_times, None, box, self._largest_bound, self._pool)
+        self._loops = loops
         segment = self._first(layers.each[0])
         for level, (before, layer) in enumerate(pairwise(layers.each), layers.level_0.level_count):
             segment = self._refine(layer, segment, round(before.ratio / layer.ratio), level)
@@ -399,8 +406,10 @@ class CodedMotion:
     ) -> tuple[float, ...]:
         """Set the corrections of the level that a layer ends with; return its errors. decoded: positions without."""
         self.chunks.pop((level, ct.CORRECTIONS), None)
+        self._corrected.pop(level, None)
         if corrections is not None and corrections.chunk:
             self.chunks[level, ct.CORRECTIONS] = corrections.chunk
+            self._corrected[level] = corrections
             decoded = corrections.applied(decoded)
         if layer.ratio == 1 and self._exact is not None:
             self._decoded = decoded
@@ -412,13 +421,18 @@ class CodedMotion:
             len(chunk) for key, chunk in self.chunks.items() if key[0] <= level and key != (level, ct.CORRECTIONS)
         )
 
-    def ends(self) -> list[End | None]:
+    def ends(self) -> list[End]:
         """Return what each level of the next segment goes on from."""
-        source = self.positions[:, :, -END_FRAMES:] + self._origin[:, None]
-        ends = [end_of(shown.pose(), source) for shown in self._shown]
-        if ends[-1] is not None:
-            ends[-1] = replace(ends[-1], corrections=self._end_corrections)
-        return ends
+        source, last = self.positions[:, :, -END_FRAMES:] + self._origin[:, None], self._source.last_shown
+        ends = []
+        for level, shown in enumerate(self._shown):
+            pose = shown.pose()
+            ends.append(end_of(pose, source, (last(self._as_shown(level, pose)), last(self.positions))))
+        return [*ends[:-1], replace(ends[-1], corrections=self._end_corrections)]
+
+    def _as_shown(self, level: int, positions: np.ndarray) -> np.ndarray:
+        """Return the joined positions of a level with its corrections."""
+        return self._corrected[level].applied(positions) if level in self._corrected else positions
 
     def _meet(self, start: np.ndarray) -> None:
         """Close the start of the last level, in whose first frame the corrections of an end stand."""
@@ -426,29 +440,39 @@ class CodedMotion:
         ordered = rows[np.lexsort(rows[:, 1::-1].T)]
         self._met = streams.MetEnds(self._met.closed | streams.FIRST, ordered)
 
-    def joined_to(self, ends: Sequence[End | None] = ()) -> tuple[dict[tuple[int, int], bytes], np.ndarray, np.ndarray]:
-        """Return chunks, (levels, 3) errors and (levels,) joins to the ends of the segment before, if there is one. To
-        be called once: memory is freed."""
-        self._join(ends)
+    def joined_to(
+        self, ends: Sequence[End] = (), may_join: bool = True
+    ) -> tuple[dict[tuple[int, int], bytes], np.ndarray, np.ndarray, np.ndarray]:
+        """Return chunks, (levels, 3) errors, (levels,) joins to the ends of the segment before, if there is one, and
+        (levels, 2) flaws (SourceFrames). To be called once: memory is freed."""
+        flaws = self._join(ends, may_join)
         if self.errors[-1][0] > self._largest_bound:
             raise AssertionError(f"decoded error {self.errors[-1][0]} is beyond the bound {self._largest_bound}")
         if self._exact is not None:
             self.chunks[len(self.errors), ct.EXACT] = streams.encode_exact(self._decoded, self._exact)
             self.errors.append((0.0,) * 3)
             self.joins.append(0)
-        coded = self.chunks, np.array(self.errors), np.array(self.joins)
+            flaws.append((0.0, 0.0))
+        coded = self.chunks, np.array(self.errors), np.array(self.joins), np.array(flaws)
         vars(self).clear()
         return coded
 
-    def _join(self, ends: Sequence[End | None]) -> None:
-        """Join the levels to the ends of the segment before, if that is better."""
+    def _join(self, ends: Sequence[End], may_join: bool) -> list[tuple[float, float]]:
+        """Join the levels to the ends of the segment before, if that is better. Return the flaws of each."""
         some = seen(len(self.positions))
         source = self.positions[some] + self._origin[:, None]
-        shown, self._shown = self._shown[::-1], []
-        for level, end in enumerate(ends):
+        before = ends[0].shown[1] if ends else self._source.last_shown(self.positions) if self._loops else None
+        compared = replace(self._source, before=before)
+        shown, self._shown, flaws = self._shown[::-1], [], []
+        for level in range(len(shown)):
             shown_level = shown.pop()  # The list no longer holds its memory.
-            if end is not None and self.positions.shape[2] > END_FRAMES:
-                self._join_level(level, end, shown_level.pose(), shown_level.layer, some, source)
+            positions = shown_level.pose()
+            if ends and may_join and ends[level].can_join and self.positions.shape[2] > END_FRAMES:
+                self._join_level(level, ends[level], positions, shown_level.layer, some, source)
+            positions = self._as_shown(level, positions)
+            own = compared.last_shown(positions) if self._loops else None
+            flaws.append(compared.flaws(positions, ends[level].shown[0] if ends else own))
+        return flaws
 
     def _join_level(
         self, level: int, end: End, positions: np.ndarray, layer: Layer | None, some: slice, source: np.ndarray

@@ -8,7 +8,7 @@ decoder will have (`pose`). Arrays over a segment are vertex-major, (vertices, 3
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from ctypes import addressof
 from dataclasses import dataclass
 from enum import IntEnum
@@ -34,6 +34,7 @@ from athcodec._native import (
     address,
     lib,
 )
+from athcodec.decoding import container as ct
 from athcodec.decoding.container import from_short_float
 from athcodec.files.threads import SERIAL, ThreadPool, ranges
 
@@ -207,6 +208,13 @@ class Plan:
     def has_affines(self, level: int) -> bool:
         """Return whether nodes of the level have maps of their own."""
         return bool(((self.nodes["level"] == level) & (self.nodes["coded"] == 1)).any())
+
+    def serves(self, kind: int, level: int, shown: Sequence[int]) -> bool:
+        """Return whether the chunks of a kind and level are stored where these levels are shown."""
+        if kind == ct.AFFINES:
+            last = self.nodes["last"][(self.nodes["level"] == level) & (self.nodes["coded"] == 1)].max(initial=-1)
+            return any(level <= one <= last for one in shown)
+        return kind != ct.CORRECTIONS or level in shown
 
     @property
     def level_0_stands_alone(self) -> bool:

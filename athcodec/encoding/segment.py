@@ -190,6 +190,11 @@ class Source:
         return stands_still(self.clip)
 
     @property
+    def box(self) -> np.ndarray:
+        """The corners of the box around all frames, (2, 3)."""
+        return np.array([self.seen.low, self.seen.high])
+
+    @property
     def largest_number(self) -> np.floating:
         """The largest coordinate, in the source's type."""
         return np.abs([self.seen.low, self.seen.high]).max().astype(self.clip.dtype)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 import struct
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from typing import BinaryIO
@@ -73,6 +73,10 @@ class ChunkStore:
         place = self.spool.seek(0, 2)
         self.spool.write(payload)
         self.entries.append((Chunk(kind, level, segment, len(payload), crc32c(payload)), place))
+
+    def leave_out(self, is_needless: Callable[[Chunk], bool]) -> None:
+        """Drop chunks of motion."""
+        self.entries = [entry for entry in self.entries if not (entry[0].is_motion and is_needless(entry[0]))]
 
     def replace(self, kind: int, payload: bytes) -> None:
         """Replace the content of the one chunk of a kind."""

@@ -93,7 +93,7 @@ static int is_bad_header(const ath_limits *limits, const ath_header *header, ath
            || is_outside(fault, ATH_BAD_HEADER, ATH_FIELD_BRANCH_COUNT, header->branch_count, 1, header->vertex_count)
            || is_outside(fault, ATH_BAD_HEADER, ATH_FIELD_SEGMENT_COUNT, header->segment_count, least_segments,
                          header->frame_count)
-           || is_outside(fault, ATH_BAD_HEADER, ATH_FIELD_FULL_LEVEL_COUNT, header->full_level_count, 2, ATH_LEVELS)
+           || is_outside(fault, ATH_BAD_HEADER, ATH_FIELD_FULL_LEVEL_COUNT, header->full_level_count, 1, ATH_LEVELS)
            || is_outside(fault, ATH_BAD_HEADER, ATH_FIELD_LEVEL_COUNT, header->level_count, 1, header->full_level_count)
            || is_outside(fault, ATH_BAD_HEADER, ATH_FIELD_CLIP_COUNT, header->clip_count, 1, 255)
            || is_outside(fault, ATH_BAD_HEADER, ATH_FIELD_LAYER_COUNT, header->layer_count, 1,
@@ -152,6 +152,9 @@ int ath_read_header(const uint8_t *bytes, size_t available, const ath_limits *li
     if ((result = check_front(bytes, available, limits, header, fault)) != ATH_OK) return result;
     start_stream(&coder, bytes, header);
     if (is_bad_header(limits, header, fault)) return fault->code;
+    code_stages(&coder, header);
+    int32_t deepest = header->stages[header->full_level_count - 1];
+    if (is_outside(fault, ATH_BAD_HEADER, ATH_FIELD_FULL_LEVEL_COUNT, deepest + 1, 2, ATH_LEVELS)) return fault->code;
     double size =
         (double)TABLE_ENTRY * ((double)header->chunk_count + (double)header->level_count * header->segment_count);
     if (is_outside(fault, ATH_LIMIT_EXCEEDED, ATH_FIELD_TABLE_SIZE, size, 0, limits->table_bytes)) return fault->code;
@@ -192,18 +195,18 @@ static int is_refused(int kind)
 static uint64_t key_of(const ath_chunk *chunk)
 {
     if (ath_is_motion(chunk))
-        return (uint64_t)1 << 62 | (uint64_t)chunk->level << 48 | (uint64_t)chunk->segment << 16 | chunk->kind;
+        return (uint64_t)1 << 62 | (uint64_t)chunk->stage << 48 | (uint64_t)chunk->segment << 16 | chunk->kind;
     return (uint64_t)(ath_kind_id(chunk) < 16 ? 0 : 2) << 62 | (uint64_t)ath_kind_id(chunk);
 }
 
-static int is_bad_chunk(const ath_limits *limits, const ath_header *header, const ath_chunk *chunk, int32_t level,
+static int is_bad_chunk(const ath_limits *limits, const ath_header *header, const ath_chunk *chunk, int32_t stage,
                         ath_fault_info *fault)
 {
     int motion = ath_is_motion(chunk);
     return is_outside(fault, ATH_UNKNOWN_CHUNK, ATH_FIELD_CHUNK_KIND, is_refused(chunk->kind), 0, 0)
            || is_outside(fault, ATH_LIMIT_EXCEEDED, ATH_FIELD_CHUNK_SIZE, chunk->length, 0, limits->chunk_bytes)
            || (motion
-               && (is_outside(fault, ATH_BAD_CHUNK_TABLE, ATH_FIELD_CHUNK_LEVEL, level, 0, header->level_count - 1)
+               && (is_outside(fault, ATH_BAD_CHUNK_TABLE, ATH_FIELD_CHUNK_LEVEL, stage, 0, header->stage_count - 1)
                    || is_outside(fault, ATH_BAD_CHUNK_TABLE, ATH_FIELD_CHUNK_SEGMENT, chunk->segment, 0,
                                  (double)header->segment_count - 1)));
 }
@@ -224,12 +227,13 @@ static int read_chunks(ath_coder *coder, const uint8_t *checksums, const ath_lim
         chunk.offset = offset;
         code_chunk(coder, &model, header->segment_count, &chunk);
         chunk.checksum = u32_at(checksums + CHECKSUM_SIZE * (size_t)i);
-        chunk.level = (uint8_t)(ath_is_motion(&chunk) ? ath_min(model.level, ATH_NO_LEVEL) : (int32_t)ATH_NO_LEVEL);
+        chunk.stage = (uint8_t)(ath_is_motion(&chunk) ? ath_min(model.stage, ATH_NO_LEVEL) : (int32_t)ATH_NO_LEVEL);
+        chunk.level = (uint8_t)(ath_is_motion(&chunk) ? ath_level_of(header, chunk.stage) : (int32_t)ATH_NO_LEVEL);
         chunk.bytes = chunk.length == 0 ? checksums : 0; /* an empty chunk needs no feeding */
         uint64_t key = key_of(&chunk);
         int repeatable = chunk.kind & ATH_OPTIONAL && ath_kind_id(&chunk) >= 32;
         int in_order = i == 0 || key > key_before || (key == key_before && repeatable);
-        if (is_bad_chunk(limits, header, &chunk, model.level, fault)
+        if (is_bad_chunk(limits, header, &chunk, model.stage, fault)
             || is_outside(fault, ATH_BAD_CHUNK_TABLE, ATH_FIELD_CHUNK_PLACE, i, 0, in_order ? i : i - 1.0))
             return ath_fault_at(fault, &chunk, (int32_t)i);
         key_before = key;
@@ -309,6 +313,7 @@ int ath_read_tables(const uint8_t *bytes, size_t available, const ath_limits *li
     ath_coder coder;
     const uint8_t *checksums = bytes + (header->front_length - (uint64_t)CHECKSUM_SIZE * header->chunk_count);
     start_stream(&coder, bytes, header);
+    code_stages(&coder, header);
     int result = read_chunks(&coder, checksums, limits, header, needed, chunks, fault);
     if (result == ATH_OK) result = read_errors(&coder, header, errors, fault);
     if (result == ATH_OK) result = read_joins(&coder, header, joins, fault);
@@ -316,9 +321,9 @@ int ath_read_tables(const uint8_t *bytes, size_t available, const ath_limits *li
     return result != ATH_OK ? result : check_size(available, *needed, ATH_FIELD_PRELUDE_SIZE, fault);
 }
 
-uint32_t ath_first_chunk(const ath_chunk *chunks, uint32_t chunk_count, int32_t kind, int32_t level, uint32_t segment)
+uint32_t ath_first_chunk(const ath_chunk *chunks, uint32_t chunk_count, int32_t kind, int32_t stage, uint32_t segment)
 {
-    const ath_chunk wanted = {0, 0, 0, 0, segment, (uint16_t)kind, (uint8_t)level, 0};
+    const ath_chunk wanted = {0, 0, 0, 0, segment, (uint16_t)kind, 0, (uint8_t)stage};
     uint64_t key = key_of(&wanted);
     uint32_t low = 0, high = chunk_count;
     while (low < high) {
@@ -331,12 +336,12 @@ uint32_t ath_first_chunk(const ath_chunk *chunks, uint32_t chunk_count, int32_t 
     return low;
 }
 
-const ath_chunk *ath_find_chunk(const ath_chunk *chunks, uint32_t chunk_count, int32_t kind, int32_t level,
+const ath_chunk *ath_find_chunk(const ath_chunk *chunks, uint32_t chunk_count, int32_t kind, int32_t stage,
                                 uint32_t segment)
 {
-    const ath_chunk *found = chunks + ath_first_chunk(chunks, chunk_count, kind, level, segment);
+    const ath_chunk *found = chunks + ath_first_chunk(chunks, chunk_count, kind, stage, segment);
     if (found == chunks + chunk_count || found->kind != kind) return 0;
-    return !ath_is_motion(found) || (found->level == level && found->segment == segment) ? found : 0;
+    return !ath_is_motion(found) || (found->stage == stage && found->segment == segment) ? found : 0;
 }
 
 /* ---- heads of chunks ---- */

@@ -15,9 +15,9 @@ int ath_read_tables(const uint8_t *bytes, size_t available, const ath_limits *li
                     ath_fault_info *fault);
 
 /* Returns the index of the first chunk that does not come before this one in file order. */
-uint32_t ath_first_chunk(const ath_chunk *chunks, uint32_t chunk_count, int32_t kind, int32_t level, uint32_t segment);
-/* Returns the chunk of this kind, or null. For the prelude, pass level ATH_NO_LEVEL and segment 0. */
-const ath_chunk *ath_find_chunk(const ath_chunk *chunks, uint32_t chunk_count, int32_t kind, int32_t level,
+uint32_t ath_first_chunk(const ath_chunk *chunks, uint32_t chunk_count, int32_t kind, int32_t stage, uint32_t segment);
+/* Returns the chunk of this kind, or null. For the prelude, pass stage ATH_NO_LEVEL and segment 0. */
+const ath_chunk *ath_find_chunk(const ath_chunk *chunks, uint32_t chunk_count, int32_t kind, int32_t stage,
                                 uint32_t segment);
 
 /* ---- heads of chunks: ATH_OK or ATH_BAD_CHUNK; `body` is what follows the head ---- */

@@ -19,7 +19,7 @@ typedef struct {
     int32_t bits[KNOWN_KINDS + 1]; /* bits of the last length, by kind */
     int32_t before;                /* index of the kind before; KNOWN_KINDS: unknown */
     int32_t was_motion;
-    int32_t level;
+    int32_t stage;
     uint32_t segment;
 } chunk_model;
 
@@ -64,7 +64,7 @@ static void code_counts(ath_coder *coder, ath_header *header)
     header->branch_count = code_from(coder, &counts, 1, branches, header->branch_count);
     header->frame_count = code_from(coder, &counts, 1, 1 << 11, header->frame_count);
     header->segment_count = code_from(coder, &counts, 1, header->frame_count / 4, header->segment_count);
-    header->full_level_count = (int32_t)code_from(coder, &counts, 2, 64, (uint32_t)header->full_level_count);
+    header->full_level_count = (int32_t)code_from(coder, &counts, 1, 64, (uint32_t)header->full_level_count);
     header->level_count =
         header->full_level_count
         - (int32_t)code_from(coder, &counts, 0, 0, (uint32_t)(header->full_level_count - header->level_count));
@@ -78,6 +78,18 @@ static void code_counts(ath_coder *coder, ath_header *header)
     memcpy(&header->max_error, &bits, sizeof bits);
 }
 
+/* Codes which stages are levels. A decoded stage may be ATH_LEVELS or more, which is too many. */
+static void code_stages(ath_coder *coder, ath_header *header)
+{
+    ath_context skipped;
+    context_init(&skipped, 6000);
+    for (int32_t level = 0, stage = 0; level < header->full_level_count; level++, stage++) {
+        while (stage < ATH_LEVELS && coder_bit(coder, &skipped, stage < header->stages[level])) stage++;
+        header->stages[level] = (uint8_t)stage;
+    }
+    header->stage_count = header->stages[header->level_count - 1] + 1;
+}
+
 static void chunk_model_init(chunk_model *model)
 {
     for (int32_t i = 0; i <= KNOWN_KINDS; i++) {
@@ -89,7 +101,7 @@ static void chunk_model_init(chunk_model *model)
     number_model_init(&model->place);
     number_model_init(&model->size);
     model->before = KNOWN_KINDS;
-    model->was_motion = model->level = 0;
+    model->was_motion = model->stage = 0;
     model->segment = 0;
 }
 
@@ -104,28 +116,28 @@ static int32_t code_kind(ath_coder *coder, chunk_model *model, uint16_t *kind)
     return index;
 }
 
-/* Codes level and segment of a motion chunk. They are usually those of the chunk before, or the next ones if this kind
+/* Codes stage and segment of a motion chunk. They are usually those of the chunk before, or the next ones if this kind
  * cannot follow there. */
 static void code_place(ath_coder *coder, chunk_model *model, uint32_t segment_count, int32_t index, ath_chunk *chunk)
 {
-    int32_t level = model->level, next = model->was_motion && index <= model->before;
+    int32_t stage = model->stage, next = model->was_motion && index <= model->before;
     uint32_t segment = model->segment;
     if (next && ++segment >= segment_count) {
         segment = 0;
-        level++;
+        stage++;
     }
-    int usual = coder_bit(coder, &model->usual[model->before], chunk->level == level && chunk->segment == segment);
+    int usual = coder_bit(coder, &model->usual[model->before], chunk->stage == stage && chunk->segment == segment);
     if (!usual) {
-        level =
-            model->level + (int32_t)code_magnitude(coder, &model->place, 16, (uint32_t)(chunk->level - model->level));
-        uint32_t first = level == model->level ? model->segment : 0;
+        stage =
+            model->stage + (int32_t)code_magnitude(coder, &model->place, 16, (uint32_t)(chunk->stage - model->stage));
+        uint32_t first = stage == model->stage ? model->segment : 0;
         segment = first + code_magnitude(coder, &model->place, 16, chunk->segment - first);
     }
-    model->level = level;
+    model->stage = stage;
     model->segment = chunk->segment = segment;
 }
 
-/* Codes kind, level, segment and length. The level, which may not fit ath_chunk, is left in model->level. */
+/* Codes kind, stage, segment and length. The stage, which may not fit ath_chunk, is left in model->stage. */
 static void code_chunk(ath_coder *coder, chunk_model *model, uint32_t segment_count, ath_chunk *chunk)
 {
     int32_t index = code_kind(coder, model, &chunk->kind), motion = ath_is_motion(chunk);

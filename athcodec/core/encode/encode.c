@@ -33,6 +33,7 @@ int64_t ath_encode_front(uint8_t *bytes, size_t capacity, const ath_header *head
     int valid = 1;
     coder_start(&coder, bytes, capacity);
     code_counts(&coder, &counts);
+    code_stages(&coder, &counts);
     chunk_model_init(&keys);
     for (uint32_t i = 0; i < header->chunk_count; i++) {
         ath_chunk chunk = chunks[i];

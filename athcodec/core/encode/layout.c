@@ -33,7 +33,7 @@ static const layout LAYOUTS[] = {
     STRUCT(ath_part) FOUR(ath_part, first, count, branch, index)
     STRUCT(ath_branch) EIGHT(ath_branch, parent, count, attach, flags, lag, first, subtree, depth)
         TWO(ath_branch, rigid, detail) ONE(ath_branch, ring)
-    STRUCT(ath_chunk) EIGHT(ath_chunk, bytes, offset, length, checksum, segment, kind, level, reserved)
+    STRUCT(ath_chunk) EIGHT(ath_chunk, bytes, offset, length, checksum, segment, kind, level, stage)
     STRUCT(ath_polygons) FOUR(ath_polygons, face_count, corner_count, columns, is_mixed)
         TWO(ath_polygons, is_derived, index_type) ONE(ath_polygons, count_type)
     STRUCT(ath_piece) EIGHT(ath_piece, modes, basis, attach_cache, first, count, parent, attach, branch)
@@ -56,7 +56,7 @@ static const layout LAYOUTS[] = {
     STRUCT(ath_header)
         EIGHT(ath_header, file_length, front_length, max_error, chunk_count, vertex_count, branch_count, frame_count, segment_count)
         FOUR(ath_header, level_count, full_level_count, clip_count, layer_count)
-        TWO(ath_header, is_float64, is_predicted) ONE(ath_header, has_faces)
+        FOUR(ath_header, is_float64, is_predicted, has_faces, stage_count) ONE(ath_header, stages)
 };
 /* clang-format on */
 

@@ -122,6 +122,7 @@ int ath_refine_size(ath_file *file, int32_t level, size_t *memory_bytes, ath_fau
     if (!file->rest_known)
         return ath_refuse(why, ATH_NEEDS_HOST_MESH, ATH_FIELD_HOST_MESH, 0, file->info.host_checksum[0],
                           file->info.vertex_count);
+    level = ath_file_stage(file, level);
     for (int32_t q = file->first_layer; level > 0 && q <= ath_layer_of(file, level); q++) {
         ath_layer *layer = &file->layers[q];
         int result = layer->rest_known ? ATH_OK : read_layer_rest(file, q, why);
@@ -140,6 +141,7 @@ int ath_refine(ath_file *file, int32_t level, void *memory, size_t memory_bytes)
     int result = ath_refine_size(file, level, &needed, 0);
     if (result != ATH_OK) return result;
     if (!file->bases || (needed > 0 && !ath_fits(memory, memory_bytes, needed))) return ATH_NO_MEMORY;
+    level = ath_file_stage(file, level);
     for (int32_t q = file->first_layer; level > 0 && q <= ath_layer_of(file, level); q++) {
         ath_layer *layer = &file->layers[q];
         if (layer->plan.bases) continue;

@@ -239,6 +239,7 @@ size_t ath_level_name(const ath_file *file, int32_t level, char *text, size_t ca
 {
     writer out = {text, capacity, 0};
     int32_t layers = (int32_t)file->header.layer_count;
+    level = ath_file_stage(file, level);
     if (level <= file->plan.height) {
         write_text(&out, "depth ");
         put_integer(&out, (uint64_t)level);

@@ -30,6 +30,7 @@ const ath_clip *ath_segment_clip(const ath_file *file, int32_t segment)
 void ath_get_info(const ath_file *file, ath_info *info) { *info = file->info; }
 const double *ath_errors(const ath_file *file) { return file->errors; }
 const uint8_t *ath_joins(const ath_file *file) { return file->joins; }
+const uint8_t *ath_stages(const ath_file *file) { return file->header.stages; }
 const uint8_t *ath_repeats(const ath_file *file) { return file->repeats; }
 const ath_branch *ath_branches(const ath_file *file) { return file->branches; }
 const int32_t *ath_vertex_source(const ath_file *file) { return file->vertex_source; }
@@ -93,15 +94,15 @@ int32_t ath_segment_before(const ath_file *file, int32_t segment)
     return clip->loop && clip->segment_count > 1 ? clip->first_segment + clip->segment_count - 1 : -1;
 }
 
-int32_t ath_join_at(const ath_file *file, int32_t segment, int32_t level)
+int32_t ath_join_at(const ath_file *file, int32_t segment, int32_t stage)
 {
-    int32_t shown = ath_min(level, ath_lossy_levels(file) - 1);
+    int32_t shown = ath_level_of(&file->header, ath_min(stage, ath_lossy_levels(file) - 1));
     return file->has_joins ? file->joins[shown * file->info.segment_count + segment] : 0;
 }
 
 int32_t ath_joined_to(const ath_file *file, int32_t segment, int32_t level)
 {
-    return ath_join_at(file, segment, level) > 0 ? ath_segment_before(file, segment) : -1;
+    return ath_join_at(file, segment, ath_file_stage(file, level)) > 0 ? ath_segment_before(file, segment) : -1;
 }
 
 int32_t ath_segment_of(const ath_file *file, int32_t frame)
@@ -213,12 +214,13 @@ int ath_read_polygons(const ath_file *file, int kind, void *memory, size_t memor
 static void walk_cut(const ath_file *file, int32_t level, ath_part *parts, int32_t count[3])
 {
     const ath_plan *plan = &file->plan;
+    int32_t stage = ath_file_stage(file, level);
     ath_part run = {0, 0, -1, 0};
     int32_t n = 0;
     count[0] = count[1] = count[2] = 0;
     for (int32_t p = 0; p <= plan->piece_count; p++) {
         const ath_piece *piece = plan->pieces + p;
-        int exact = p < plan->piece_count && piece->level <= level;
+        int exact = p < plan->piece_count && piece->level <= stage;
         if (run.count > 0 && !exact) {
             if (parts) parts[count[0]] = run;
             count[0]++;
@@ -231,7 +233,7 @@ static void walk_cut(const ath_file *file, int32_t level, ath_part *parts, int32
         if (exact) run.count += piece->count;
         if (exact) count[2] += piece->count;
         while (n < plan->node_count && plan->nodes[n].piece < p) n++;
-        if (n == plan->node_count || plan->nodes[n].piece != p || !ath_is_shown(plan->nodes + n, level)) continue;
+        if (n == plan->node_count || plan->nodes[n].piece != p || !ath_is_shown(plan->nodes + n, stage)) continue;
         ath_part node = {plan->nodes[n].first, plan->nodes[n].count, plan->nodes[n].branch, count[1]};
         if (parts) parts[count[0]] = node;
         count[0]++;

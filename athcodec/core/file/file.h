@@ -53,8 +53,9 @@ struct ath_file {
     int32_t rest_is_exact;     /* the reference pose is in the very numbers of source_rest */
     int32_t longest;           /* frames of the longest segment */
     int32_t has_joins;
-    uint32_t stems_levels;              /* bit d: level d has STEMS */
-    uint32_t affine_levels[ATH_LEVELS]; /* bit d of entry L: AFFINES of level d serve to show level L */
+    uint32_t stems_levels;              /* bit d: stage d has STEMS */
+    uint32_t affine_levels[ATH_LEVELS]; /* bit d of entry L: AFFINES of stage d serve to show stage L */
+    uint32_t shown_affines;             /* bit d: AFFINES of stage d serve to show a stored level */
 };
 
 enum { ATH_END_FRAMES = 2 }; /* frames at the end of a segment that the next one is joined to */
@@ -69,8 +70,8 @@ const ath_clip *ath_segment_clip(const ath_file *file, int32_t segment);
 int32_t ath_file_frames(const ath_file *file, int32_t segment);
 /* Returns the segment before one in its clip. For the first segment of a loop of several it is the last; -1: none. */
 int32_t ath_segment_before(const ath_file *file, int32_t segment);
-/* Returns how the positions that a level shows are joined: an entry of ath_joins. */
-int32_t ath_join_at(const ath_file *file, int32_t segment, int32_t level);
+/* Returns how the positions that the level of a stage shows are joined: an entry of ath_joins. */
+int32_t ath_join_at(const ath_file *file, int32_t segment, int32_t stage);
 
 /* ---- chunks ---- */
 
@@ -100,7 +101,9 @@ void ath_know_rest(ath_file *file);
 const double *ath_file_waves(const ath_file *file, int32_t segment);
 const double *ath_file_node_waves(const ath_file *file, int32_t segment);
 
-/* ---- levels and layers ---- */
+/* ---- levels and layers: from here on, and in what prepares segments, `level` and `d` are stages ---- */
+
+ATH_INLINE int32_t ath_file_stage(const ath_file *file, int32_t level) { return ath_stage_of(&file->header, level); }
 
 ATH_INLINE int ath_has_stream(const ath_file *file, int32_t level) { return file->stems_levels >> level & 1; }
 
@@ -108,7 +111,7 @@ ATH_INLINE int ath_has_stream(const ath_file *file, int32_t level) { return file
 ATH_INLINE int32_t ath_lossy_levels(const ath_file *file) { return file->plan.height + 1 + file->header.layer_count; }
 
 /* Returns whether the file stores the level behind the last lossy one. */
-ATH_INLINE int ath_file_is_lossless(const ath_file *file) { return file->header.level_count > ath_lossy_levels(file); }
+ATH_INLINE int ath_file_is_lossless(const ath_file *file) { return file->header.stage_count > ath_lossy_levels(file); }
 
 /* Returns the layer of precision of a level: 0 for the levels of the branch hierarchy. */
 ATH_INLINE int32_t ath_layer_of(const ath_file *file, int32_t level)

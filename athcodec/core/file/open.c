@@ -257,20 +257,30 @@ static void plan_levels(ath_file *file)
         for (int32_t level = node->level; node->coded && level <= node->last; level++)
             file->affine_levels[level] |= 1u << node->level;
     }
+    file->shown_affines = 0;
+    for (int32_t level = 0; level < file->info.level_count; level++)
+        file->shown_affines |= file->affine_levels[ath_file_stage(file, level)];
+}
+
+/* Returns whether a stored level needs, or may have, chunks of this kind at a stage. */
+static int may_stand(const ath_file *file, int32_t kind, int32_t d)
+{
+    if (kind == ATH_AFFINES) return file->shown_affines >> d & 1;
+    if (kind == ATH_CORRECTIONS && ath_file_stage(file, ath_level_of(&file->header, d)) != d) return 0;
+    return ath_file_needs(file, kind, d, d);
 }
 
 static int is_wanted(const ath_file *file, const ath_chunk *chunk)
 {
     if (ath_is_shared(chunk->kind) && chunk->segment > 0) return 0;
-    return !ath_is_motion(chunk) || !ath_kind_name(chunk->kind)
-           || ath_file_needs(file, chunk->kind, chunk->level, chunk->level);
+    return !ath_is_motion(chunk) || !ath_kind_name(chunk->kind) || may_stand(file, chunk->kind, chunk->stage);
 }
 
 static int refuse_first_missing(const ath_file *file, int32_t kind, int32_t level, ath_fault_info *fault)
 {
     int32_t segment = 0;
     while (ath_file_chunk(file, kind, level, segment)) segment++;
-    return ath_refuse_missing(fault, kind, level, (uint32_t)segment);
+    return ath_refuse_missing(fault, kind, ath_level_of(&file->header, level), (uint32_t)segment);
 }
 
 /* Checks that the table has the motion chunks that the hierarchy asks for, and no others. */
@@ -285,11 +295,11 @@ static int check_motion_chunks(const ath_file *file, ath_fault_info *fault)
             return ath_fault_at(fault, chunk, c);
         }
         for (int32_t i = 0; i < required; i++)
-            if (chunk->kind == kinds[i]) count[i][chunk->level]++;
+            if (chunk->kind == kinds[i]) count[i][chunk->stage]++;
     }
     for (int32_t i = 0; i < required; i++)
-        for (int32_t d = 0; d < file->info.level_count; d++)
-            if (ath_file_needs(file, kinds[i], d, d) && count[i][d] < file->info.segment_count)
+        for (int32_t d = 0; d < file->header.stage_count; d++)
+            if (may_stand(file, kinds[i], d) && count[i][d] < file->info.segment_count)
                 return refuse_first_missing(file, kinds[i], d, fault);
     return ATH_OK;
 }
@@ -304,7 +314,7 @@ static int check_joins(ath_file *file, ath_fault_info *fault)
         int32_t before = ath_segment_before(file, segment);
         int goes_on = before >= 0 && ath_file_frames(file, before) >= ATH_END_FRAMES;
         file->has_joins = 1;
-        if (goes_on && level < lossy && width <= ath_file_frames(file, segment) - 2) continue;
+        if (goes_on && ath_file_stage(file, level) < lossy && width <= ath_file_frames(file, segment) - 2) continue;
         return ath_refuse_entry(fault, ATH_FIELD_JOIN, level, (uint32_t)segment, 0);
     }
     return ATH_OK;
@@ -355,12 +365,14 @@ static void set_info(ath_file *file, uint64_t prelude)
     info->is_predicted = header->is_predicted;
 }
 
-/* A file may have one level beyond the lossy ones, which is exact. */
+/* A file may have one level beyond the last lossy one, which is exact and goes on from it. */
 static int check_levels(const ath_file *file, ath_fault_info *fault)
 {
-    int32_t lossy = ath_lossy_levels(file), found = file->info.full_level_count;
+    int32_t lossy = ath_lossy_levels(file), last = file->info.full_level_count - 1;
+    int32_t found = ath_file_stage(file, last) + 1;
     int placed = file->plan.height == 0 || !file->header.is_predicted;
-    if (placed && (found == lossy || found == lossy + 1)) return ATH_OK;
+    if (placed && found == lossy) return ATH_OK;
+    if (placed && found == lossy + 1 && last > 0 && ath_file_stage(file, last - 1) == lossy - 1) return ATH_OK;
     return ath_refuse(fault, ATH_BAD_HEADER, ATH_FIELD_FULL_LEVEL_COUNT, found, lossy, lossy + 1);
 }
 
@@ -373,7 +385,7 @@ static int read_prelude(ath_file *file, const ath_limits *limits, ath_fault_info
     if (result != ATH_OK) return result;
     build_plan(file);
     file->info.node_count = file->plan.node_count;
-    file->info.depth_levels = ath_min(file->info.level_count, file->plan.height + 2);
+    file->info.depth_levels = ath_min(file->info.level_count, ath_level_of(&file->header, file->plan.height + 1) + 1);
     if ((result = check_levels(file, fault)) != ATH_OK) return result;
     plan_levels(file);
     if ((result = check_motion_chunks(file, fault)) != ATH_OK) return result;

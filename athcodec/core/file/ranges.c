@@ -68,7 +68,7 @@ static void add_segments(range_list *list, int32_t d, int32_t first, int32_t las
     uint32_t i = ath_first_chunk(file->chunks, file->header.chunk_count, ATH_STEMS, d, (uint32_t)first);
     for (; i < file->header.chunk_count; i++) {
         const ath_chunk *chunk = file->chunks + i;
-        if (!ath_is_motion(chunk) || chunk->level != d || (int32_t)chunk->segment > last) break;
+        if (!ath_is_motion(chunk) || chunk->stage != d || (int32_t)chunk->segment > last) break;
         if (only_end && !ath_shapes_end(chunk->kind)) continue;
         if (is_used(file, chunk->kind, d, list->level, list->all)) add_range(list, chunk, list->all);
     }
@@ -85,8 +85,8 @@ static void add_shared(range_list *list, int32_t d)
 int32_t ath_onward_ranges(const ath_file *file, int32_t from_level, int32_t level, int32_t first_segment,
                           int32_t last_segment, int all, ath_range *ranges, int32_t capacity)
 {
-    range_list list = {file, level, all, 0, ranges, capacity, 0};
-    for (int32_t d = from_level + 1; d <= level; d++) {
+    range_list list = {file, ath_file_stage(file, level), all, 0, ranges, capacity, 0};
+    for (int32_t d = ath_file_stage(file, from_level) + 1; d <= list.level; d++) {
         if (first_segment > 0) add_shared(&list, d);
         add_segments(&list, d, first_segment, last_segment, 0);
     }
@@ -96,12 +96,12 @@ int32_t ath_onward_ranges(const ath_file *file, int32_t from_level, int32_t leve
 int32_t ath_ranges(const ath_file *file, int32_t level, int32_t first_segment, int32_t last_segment, int all,
                    ath_range *ranges, int32_t capacity)
 {
-    range_list list = {file, level, all, 0, ranges, capacity, 0};
+    range_list list = {file, ath_file_stage(file, level), all, 0, ranges, capacity, 0};
     const ath_clip *last = ath_segment_clip(file, last_segment);
     int32_t of_loop = last->first_segment < first_segment ? -1 : ath_joined_to(file, last->first_segment, level);
     int32_t before = ath_joined_to(file, first_segment, level);
     if (before > first_segment) before = -1; /* the end of a loop, which comes last */
-    for (int32_t d = 0; d <= level; d++) {
+    for (int32_t d = 0; d <= list.level; d++) {
         if (before != 0 && first_segment > 0) add_shared(&list, d);
         if (before >= 0) add_segments(&list, d, before, before, 1);
         add_segments(&list, d, first_segment, last_segment, 0);
@@ -112,6 +112,7 @@ int32_t ath_ranges(const ath_file *file, int32_t level, int32_t first_segment, i
 
 static int has_chunks(const ath_file *file, int32_t segment, int32_t level, int only_end)
 {
+    level = ath_file_stage(file, level);
     for (int32_t kind = ATH_STEMS; kind <= ATH_PREDICTED; kind++)
         for (int32_t d = 0; d <= level; d++) {
             if (!is_used(file, kind, d, level, 0) || (only_end && !ath_shapes_end(kind))) continue;

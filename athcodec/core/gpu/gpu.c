@@ -11,7 +11,8 @@ static uint32_t to_words(size_t bytes) { return (uint32_t)(bytes / sizeof(uint32
 /* Exact levels and predicted motion have no rows. */
 static int is_baked(const ath_file *file, int32_t level)
 {
-    return level >= ath_lossy_levels(file) || (file->header.is_predicted && level > 0);
+    int32_t stage = ath_file_stage(file, level);
+    return stage >= ath_lossy_levels(file) || (file->header.is_predicted && stage > 0);
 }
 
 /* ---- bodies of a level ---- */
@@ -20,14 +21,15 @@ static int is_baked(const ath_file *file, int32_t level)
 typedef struct {
     const ath_file *file;
     const ath_plan *plan;
-    int32_t level, p, n; /* the next piece and node */
+    int32_t level, stage, p, n; /* the next piece and node */
     const ath_piece *piece;
     const ath_node *node; /* null: the body is the piece */
 } body_walk;
 
 static body_walk walk_bodies(const ath_file *file, int32_t level)
 {
-    body_walk walk = {file, ath_level_plan(file, level), level, 0, 0, 0, 0};
+    int32_t stage = ath_file_stage(file, level);
+    body_walk walk = {file, ath_level_plan(file, stage), level, stage, 0, 0, 0, 0};
     return walk;
 }
 
@@ -39,10 +41,10 @@ static int next_body(body_walk *walk)
         walk->piece = plan->pieces + walk->p;
         if (walk->n < plan->node_count && nodes[walk->n].piece == walk->p) {
             walk->node = plan->nodes + walk->n++;
-            if (ath_is_shown(walk->node, walk->level)) return 1;
+            if (ath_is_shown(walk->node, walk->stage)) return 1;
         }
         walk->node = 0;
-        if (walk->piece->level > walk->level) continue;
+        if (walk->piece->level > walk->stage) continue;
         walk->p++;
         return 1;
     }
@@ -244,11 +246,12 @@ static void put_order(level_writer *writer, int32_t count)
 
 static void bind_vertices(level_writer *writer, const ath_file *file, int32_t level)
 {
-    const ath_plan *plan = ath_level_plan(file, level);
+    int32_t stage = ath_file_stage(file, level);
+    const ath_plan *plan = ath_level_plan(file, stage);
     const ath_node *node = plan->nodes, *end = node + plan->node_count;
     uint32_t position = 0, matrix = 0;
     for (int32_t v = 0; v < plan->vertex_count;) {
-        while (node < end && (node->first < v || !ath_is_shown(node, level))) node++;
+        while (node < end && (node->first < v || !ath_is_shown(node, stage))) node++;
         int moved = node < end && node->first == v;
         int32_t stop = moved ? v + node->count : node < end ? node->first : plan->vertex_count;
         for (; v < stop; v++) {
@@ -270,7 +273,7 @@ int ath_gpu_build_level(const ath_file *file, int32_t level, void *memory, size_
     level_writer writer;
     if (level < 0 || level >= file->info.level_count) return ATH_BAD_ARGUMENT;
     if (!file->rest_known) return ATH_NEEDS_HOST_MESH;
-    if (!file->bases || !ath_level_plan(file, level)->bases
+    if (!file->bases || !ath_level_plan(file, ath_file_stage(file, level))->bases
         || !ath_fits(memory, memory_bytes, ath_gpu_level_size(file, level)))
         return ATH_NO_MEMORY;
     memset(&writer, 0, sizeof writer);
@@ -723,7 +726,7 @@ static void widen(double box[6], const double x[3])
 
 static void widen_node(const ath_file *file, const ath_segment *segment, const ath_part *part, double box[6])
 {
-    const ath_plan *plan = ath_level_plan(file, segment->level);
+    const ath_plan *plan = ath_level_plan(file, segment->stage);
     const ath_branch *branch = plan->branches + part->branch;
     const double *a = ath_rest_of(plan, branch->attach >= 0 ? branch->attach : branch->first);
     for (size_t t = 0; t < (size_t)segment->frames; t++) {

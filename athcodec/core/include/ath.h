@@ -3,7 +3,7 @@
  *     ath_front -> ath_open -> ath_build        once per file: read the header, the hierarchy and the rest pose
  *     ath_set_host_mesh                         before ath_build, if the rest pose is a mesh that the host has
  *     ath_fault_text                            say in a sentence why a file is refused
- *     ath_refine                                once per level above 0
+ *     ath_refine                                once per level
  *     ath_ranges, ath_feed                      ask which bytes a level needs, and hand them over
  *     ath_prepare, or _start and _step          decode one segment at one level
  *     ath_prepare_to                            write all positions of a segment to memory of yours
@@ -231,13 +231,13 @@ ATH_API size_t ath_build_size(const ath_file *file);
 ATH_API int ath_build(ath_file *file, void *memory, size_t memory_bytes);
 
 /* Levels 0 to info.depth_levels - 1 follow the branch hierarchy at the precision of the first layer. Each further level
- * refines all of the plant by one layer. Level 1 and the refining levels may refine the rest pose, too. Before you
- * prepare a level above 0, and after ath_build, build what the segments share at that level:
+ * refines all of the plant by one layer or more. Any level may refine the rest pose, too. Before you prepare a level,
+ * and after ath_build, build what the segments share at that level:
  *     ath_refine_size reads the rest poses up to that level from their REFINED_REST chunks, which ath_ranges lists
  * until they are read. It gives the memory that ath_refine needs, which may be 0. Returns ATH_OK, ATH_MISSING,
  * ATH_BAD_CHECKSUM, ATH_BAD_CHUNK, ATH_BAD_ARGUMENT or ATH_NEEDS_HOST_MESH.
  *     ath_refine builds what is not built yet, in memory that you keep as long as the file's. Returns the same codes,
- * or ATH_NO_MEMORY. For level 0, and for a level that is built, both calls do nothing. */
+ * or ATH_NO_MEMORY. For a level that is built, both calls do nothing. */
 ATH_API int ath_refine_size(ath_file *file, int32_t level, size_t *memory_bytes, ath_fault_info *fault);
 ATH_API int ath_refine(ath_file *file, int32_t level, void *memory, size_t memory_bytes);
 
@@ -253,7 +253,7 @@ typedef struct ath_info {
     int32_t level_count;      /* stored levels: 0 to level_count - 1 */
     int32_t full_level_count; /* levels of the file before it was truncated */
     int32_t layer_count;      /* layers of precision before truncation; 1: no level refines another */
-    int32_t depth_levels;     /* levels of the first layer; deeper levels are refinements */
+    int32_t depth_levels;     /* levels up to the first of all vertices; deeper levels are refinements */
     int32_t node_count, chunk_count;
     int32_t is_float64;        /* 1: decoded positions are doubles, else floats */
     int32_t rest_is_float64;   /* 1: the rest pose has doubles, else floats */
@@ -355,8 +355,8 @@ typedef struct ath_chunk {
     uint32_t length, checksum;
     uint32_t segment;
     uint16_t kind;
-    uint8_t level; /* ATH_NO_LEVEL: the chunk belongs to no level */
-    uint8_t reserved;
+    uint8_t level; /* the first level that needs the chunk; ATH_NO_LEVEL: it belongs to no level */
+    uint8_t stage; /* Level in the chunk table; deeper than `level` where some are not shown */
 } ath_chunk;
 
 ATH_API const ath_chunk *ath_chunks(const ath_file *file);
@@ -452,6 +452,8 @@ ATH_API int32_t ath_joined_to(const ath_file *file, int32_t segment, int32_t lev
  * is added if velocities are joined, too. */
 enum { ATH_JOIN_SLOPED = 128 };
 ATH_API const uint8_t *ath_joins(const ath_file *file);
+/* Returns the stage of each of the full_level_count levels: what FORMAT.md numbers as a level, whether shown or not. */
+ATH_API const uint8_t *ath_stages(const ath_file *file);
 
 /* Returns frame_count flags: 1 if the frame shows the positions of the frame before. Such frames take no bytes. */
 ATH_API const uint8_t *ath_repeats(const ath_file *file);

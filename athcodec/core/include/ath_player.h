@@ -266,7 +266,7 @@ static void *ath_player_memory_of(ath_player_entry *entry) { return (char *)entr
 /* Builds what the segments share at each level, as far as its bytes are there. */
 static int ath_player_refine(ath_player *p)
 {
-    for (int32_t level = 1; level < p->info.level_count; level++) {
+    for (int32_t level = 0; level < p->info.level_count; level++) {
         size_t size;
         int result = ath_refine_size(p->file, level, &size, &p->fault);
         if (result == ATH_MISSING) return ATH_OK;

@@ -13,12 +13,13 @@ static size_t row_most(int32_t frames) { return KEPT_NUMBER * (1 + 3 * (size_t)f
 
 int ath_can_be_kept(const ath_file *file, int32_t level)
 {
-    return level > file->plan.height && level < ath_min(file->info.level_count, ath_lossy_levels(file)) - 1;
+    return level > file->plan.height && level < ath_min(file->header.stage_count, ath_lossy_levels(file)) - 1;
 }
 
 size_t ath_keep_size(const ath_file *file, int32_t level)
 {
     const ath_plan *plan = &file->plan;
+    level = ath_file_stage(file, level);
     if (!ath_can_be_kept(file, level)) return 0;
     uint64_t T = (uint64_t)file->longest, pieces = (uint64_t)plan->piece_count, size = sizeof(kept_head);
     size += ((uint64_t)plan->vertex_count + 2 * pieces) * row_most(file->longest) + pieces * KEPT_NUMBER;

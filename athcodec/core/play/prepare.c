@@ -114,13 +114,6 @@ struct ath_work {
 
 /* ---- memory ---- */
 
-static uint32_t levels_with_affines(const ath_file *file)
-{
-    uint32_t levels = 0;
-    for (int32_t level = 0; level < file->info.level_count; level++) levels |= file->affine_levels[level];
-    return levels;
-}
-
 static void carve_stems(ath_work *work, const ath_file *file, int32_t d, int32_t frames, ath_arena *arena)
 {
     shapes_reader *shapes = work->shapes + d;
@@ -160,12 +153,11 @@ static uint64_t carve_work(ath_work *work, const ath_file *file, int32_t frames,
 {
     ath_arena arena = {base, 0};
     uint64_t row = 3 * (uint64_t)frames * sizeof(int32_t);
-    uint32_t affines = levels_with_affines(file);
     ath_take(&arena, sizeof *work);
     if (file->has_joins) ath_carve_end(&work->join, file, &arena);
-    for (int32_t d = 0; d < file->info.level_count; d++) {
+    for (int32_t d = 0; d < file->header.stage_count; d++) {
         if (file->stems_levels >> d & 1) carve_stems(work, file, d, frames, &arena);
-        if (affines >> d & 1) {
+        if (file->shown_affines >> d & 1) {
             work->affines[d].model = (affine_model *)ath_take(&arena, sizeof(affine_model));
             work->affines[d].history = (uint32_t *)ath_take(&arena, history_size(frames));
         }
@@ -176,7 +168,7 @@ static uint64_t carve_work(ath_work *work, const ath_file *file, int32_t frames,
         work->prediction = (ath_prediction *)ath_take(&arena, ath_prediction_size(file->plan.vertex_count));
     work->prelude_model = ath_take(&arena, ath_prelude_model_size());
     work->node.rows = (int32_t *)ath_take(&arena, 4 * row);
-    for (int32_t q = 0; q <= ath_layer_of(file, file->info.level_count - 1); q++)
+    for (int32_t q = 0; q <= ath_layer_of(file, file->header.stage_count - 1); q++)
         carve_layer(work->layers + q, file, q, frames, &arena);
     return arena.used;
 }
@@ -226,7 +218,7 @@ int ath_keep(ath_work *work, void *memory, size_t memory_bytes)
 
 void ath_watch(ath_work *work, ath_watcher *watcher) { work->asked.watcher = watcher; }
 const ath_file *ath_watched_file(const ath_work *work) { return work->file; }
-int32_t ath_watched_level(const ath_work *work) { return work->asked.level; }
+int32_t ath_watched_level(const ath_work *work) { return ath_level_of(&work->file->header, work->asked.level); }
 
 /* The observer follows the segment asked for, not the one before it. */
 static ath_watcher *watcher_of(const ath_work *work) { return work->only_end ? 0 : work->asked.watcher; }
@@ -286,6 +278,7 @@ static int32_t steps_of(const ath_file *file, int32_t segment, int32_t level)
 int32_t ath_prepare_steps(const ath_file *file, int32_t segment, int32_t level)
 {
     int32_t before = ath_joined_to(file, segment, level);
+    level = ath_file_stage(file, level);
     return steps_of(file, segment, level) + (before < 0 ? 0 : 1 + steps_of(file, before, level));
 }
 
@@ -364,8 +357,8 @@ static int begin(ath_work *work, const preparation *asked, int32_t index, int32_
     memset(work, 0, sizeof *work);
     memset(segment, 0, sizeof *segment);
     carve_work(work, file, frames, (uint8_t *)work);
-    carve_segment(segment, file, level, frames, (uint8_t *)segment);
-    segment->index = segment->level = -1;
+    carve_segment(segment, file, ath_level_of(&file->header, level), frames, (uint8_t *)segment);
+    segment->index = segment->level = segment->stage = -1;
     work->file = file;
     work->segment = segment;
     work->asked = *asked;
@@ -382,8 +375,8 @@ static int begin(ath_work *work, const preparation *asked, int32_t index, int32_
         if (asked->positions) segment->positions = asked->positions;
     }
     if (asked->from && !work->only_end) {
-        work->first_level = asked->from->level + 1;
-        work->first_layer = ath_layer_of(file, asked->from->level);
+        work->first_level = asked->from->stage + 1;
+        work->first_layer = ath_layer_of(file, asked->from->stage);
         work->shown_before = asked->kept ? 0 : asked->from;
         work->kept = (const uint8_t *)asked->kept;
     }
@@ -398,15 +391,16 @@ static int start(void *memory, size_t work_bytes, const ath_file *file, int32_t 
                  void *segment_memory, size_t segment_bytes, const ath_segment *before, const void *kept)
 {
     ath_work *work = (ath_work *)memory;
-    preparation asked = {file, segment_memory, 0, index, level, before, kept, 0, {0, 0}, 0};
     if (index < 0 || index >= file->info.segment_count || level < 0 || level >= file->info.level_count)
         return ATH_BAD_ARGUMENT;
+    int32_t stage = ath_file_stage(file, level);
+    preparation asked = {file, segment_memory, 0, index, stage, before, kept, 0, {0, 0}, 0};
     if (!file->rest_known) return ATH_NEEDS_HOST_MESH;
-    if (!file->bases || !ath_level_plan(file, level)->bases || !ath_fits(memory, work_bytes, ath_work_size(file))
+    if (!file->bases || !ath_level_plan(file, stage)->bases || !ath_fits(memory, work_bytes, ath_work_size(file))
         || !ath_fits(segment_memory, segment_bytes, ath_segment_size(file, level)))
         return ATH_NO_MEMORY;
     memset(work, 0, sizeof *work);
-    int result = begin(work, &asked, index, level), join = ath_join_at(file, index, level);
+    int result = begin(work, &asked, index, stage), join = ath_join_at(file, index, stage);
     if (result != ATH_OK || join == 0 || work->shown_before) return result; /* `before` is joined already */
     ath_set_join(&work->join, join);
     work->phase = BEFORE;
@@ -422,7 +416,7 @@ int ath_prepare_start(void *memory, size_t work_bytes, const ath_file *file, int
 int ath_follow(ath_work *work, const ath_segment *before)
 {
     if (work->phase != BEFORE) return ATH_OK;
-    if (before->index != ath_segment_before(work->file, work->index) || before->level != work->level)
+    if (before->index != ath_segment_before(work->file, work->index) || before->stage != work->level)
         return ATH_BAD_ARGUMENT;
     ath_take_end(&work->join, before);
     work->phase = CHECKSUMS;
@@ -920,9 +914,10 @@ static int finish(ath_work *work)
     if (finish_stream(work, work->corrections.chunk, &work->corrections.coder)
         || finish_stream(work, work->exact_level.chunk, &work->exact_level.coder))
         return ATH_BAD_CHUNK;
-    ath_cut(work->file, work->level, work->segment->parts);
     work->segment->index = work->index;
-    work->segment->level = work->level;
+    work->segment->stage = work->level;
+    work->segment->level = ath_level_of(&work->file->header, work->level);
+    ath_cut(work->file, work->segment->level, work->segment->parts);
     if (watcher_of(work)) watcher_of(work)->done(watcher_of(work), &work->layers[work->layer].motion, work->segment);
     if (work->keeping.at) work->keeps->bytes = (uint64_t)(work->keeping.at - (uint8_t *)work->keeps);
     work->phase = DONE;
@@ -980,8 +975,8 @@ int ath_goes_on(const ath_file *file, const ath_segment *from, const void *kept,
 {
     const kept_head *head = (const kept_head *)kept;
     if (from->level < 0 || from->level >= level || level >= file->info.level_count) return 0;
-    if (is_last_lossy(file, from->level)) return 1;
-    return head && head->bytes > 0 && head->segment == from->index && head->level == from->level;
+    if (is_last_lossy(file, from->stage)) return 1;
+    return head && head->bytes > 0 && head->segment == from->index && head->level == from->stage;
 }
 
 int ath_prepare_onward(void *work, size_t work_bytes, const ath_file *file, const ath_segment *from, const void *kept,
@@ -989,7 +984,7 @@ int ath_prepare_onward(void *work, size_t work_bytes, const ath_file *file, cons
 {
     if (!ath_goes_on(file, from, kept, level)) return ATH_BAD_ARGUMENT;
     return start(work, work_bytes, file, from->index, level, memory, memory_bytes, from,
-                 is_last_lossy(file, from->level) ? 0 : kept);
+                 is_last_lossy(file, from->stage) ? 0 : kept);
 }
 
 void ath_work_fault(const ath_work *work, ath_fault_info *fault) { *fault = work->fault; }

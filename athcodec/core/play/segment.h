@@ -8,6 +8,7 @@ enum { ATH_MAP = 12 }; /* doubles of a map x = c + R (x0 - a): R row by row, c r
 
 struct ath_segment {
     int32_t index, level; /* level -1: not prepared */
+    int32_t stage;        /* of the level; pieces and nodes go by it */
     int32_t frames;       /* coded frames */
     int32_t exact_vertices, node_count, part_count;
     int32_t is_float64;

@@ -38,25 +38,31 @@ class End:
     """The end of a segment, from which a level of the next one goes on.
 
     positions, source: (N, 3, END_FRAMES), decoded and wanted. usual: the change of velocity in a usual frame.
-    corrections: (K, 6) in the last frame, which stand in the first frame of the next segment as well.
+    corrections: (K, 6) in the last frame, which stand in the first frame of the next segment as well. shown: the last
+    frames as shown, and as the source has them less the origin. Of a segment that is too short only these are known.
     """
 
     positions: np.ndarray
     source: np.ndarray
     usual: float
     corrections: np.ndarray
+    shown: tuple[np.ndarray, np.ndarray]
+
+    @property
+    def can_join(self) -> bool:
+        return self.positions.shape[2] == END_FRAMES
 
     def of(self, some: slice) -> End:
         """Return the end of some of the vertices, as far as a join is chosen and made by it."""
         return replace(self, positions=self.positions[some], source=self.source[some])
 
 
-def end_of(positions: np.ndarray, source: np.ndarray, corrections: np.ndarray = NO_CORRECTIONS) -> End | None:
-    """Return the end of a level; None: the segment is too short."""
+def end_of(positions: np.ndarray, source: np.ndarray, shown: tuple[np.ndarray, np.ndarray]) -> End:
+    """Return the end of a level."""
     if positions.shape[2] <= END_FRAMES:
-        return None
+        return End(positions[:, :, :0], source[:, :, :0], 0.0, NO_CORRECTIONS, shown)
     ends = (numbers[:, :, -END_FRAMES:].copy() for numbers in (positions, source))
-    return End(*ends, _usual(_changes(positions[seen(len(positions))])), corrections)
+    return End(*ends, _usual(_changes(positions[seen(len(positions))])), NO_CORRECTIONS, shown)
 
 
 def end_corrections(away: np.ndarray, limit: float | np.ndarray, step: float, frame: int) -> np.ndarray:

@@ -16,6 +16,7 @@ from athcodec._native import Rounding
 from athcodec.decoding import container as ct
 from athcodec.encoding import quantise as qz
 from athcodec.encoding import streams, writing
+from athcodec.encoding.choices.levels import SourceFrames
 from athcodec.encoding.choices.rest import with_best_rest
 from athcodec.encoding.features import Feature
 from athcodec.encoding.motion import LevelStream, SegmentMotion, position_errors
@@ -173,9 +174,14 @@ def _predicted(prelude: CodedPrelude, choice: Choice, positions: np.ndarray) -> 
 
 
 def code_predicted_segment(
-    prelude: CodedPrelude, choice: Choice, positions: np.ndarray, exact: np.ndarray | None, shown_times: np.ndarray
-) -> tuple[dict[tuple[int, int], bytes], np.ndarray]:
-    """Return chunks and errors like CodedMotion.joined_to; predicted motion is not joined."""
+    prelude: CodedPrelude,
+    choice: Choice,
+    positions: np.ndarray,
+    exact: np.ndarray | None,
+    shown_times: np.ndarray,
+    box: np.ndarray,
+) -> tuple[dict[tuple[int, int], bytes], np.ndarray, np.ndarray, np.ndarray]:
+    """Return what CodedMotion.joined_to does. Predicted motion is not joined, and may jerk."""
     assert choice.predicted is not None
     plan, settings = prelude.plan, choice.settings
     payload, decoded = _predicted(prelude, choice, positions)
@@ -185,12 +191,14 @@ def code_predicted_segment(
 
     last = plan.level_count - 1
     chunks, level_0 = {(last, ct.PREDICTED): payload}, _still(prelude, positions.shape[2])
-    errors = [error(level_0.pose(level, prelude.origin, prelude.dtype)) for level in range(last)]
+    coarse = level_0.pose(0, prelude.origin, prelude.dtype)
+    errors = [error(coarse)]
     for moved in _with_maps(prelude, positions, errors[0][-1]):
         maps = streams.encode_affines(moved, 0)
-        with_maps = error(moved.pose(0, prelude.origin, prelude.dtype))
+        pose = moved.pose(0, prelude.origin, prelude.dtype)
+        with_maps = error(pose)
         if len(maps) <= MAP_SHARE * len(payload) and with_maps[-1] < LESS_ERROR * errors[0][-1]:
-            chunks[0, ct.AFFINES], errors[0] = maps, with_maps
+            chunks[0, ct.AFFINES], errors[0], coarse = maps, with_maps, pose
             break
     errors.append(error(decoded))
     if errors[-1][0] > settings.largest_bound:
@@ -198,7 +206,9 @@ def code_predicted_segment(
     if exact is not None:
         chunks[last + 1, ct.EXACT] = streams.encode_exact(decoded, exact)
         errors.append((0.0, 0.0, 0.0))
-    return chunks, np.array(errors)
+    away = SourceFrames(positions, shown_times, None, box, settings.bound, plan.pool).flaws(coarse, None)[0]
+    flaws = [(away, 0.0)] + [(0.0, 0.0)] * (len(errors) - 1)
+    return chunks, np.array(errors), np.zeros(len(errors), int), np.array(flaws)
 
 
 def _still(prelude: CodedPrelude, frames: int) -> SegmentMotion:

@@ -1,0 +1,100 @@
+"""Which levels a file shows: each is better than the one before it, stays near the plant and moves as smoothly.
+
+The others serve finer levels. Positions are vertex-major, (N, 3, T).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from athcodec._native import MEASURES
+from athcodec.decoding.container import from_short_float, short_floats
+from athcodec.files.threads import ThreadPool, ranges
+
+MOST_AWAY = 0.1  # Largest distance of a vertex from the box of the source, in diagonals.
+MOST_JERK = 1.95  # Largest second difference, over that of the source. Files promise 2.0, also after rounding.
+NEAR = 2  # Frames on either side in which the source's second differences count.
+ENDS = 2  # Frames of a segment that the second differences at its seams take.
+
+
+@dataclass(frozen=True)
+class SourceFrames:
+    """What the levels of a segment are compared with.
+
+    positions: (N, 3, T) of the source, coded frames. shown_times: how many frames of the clip show each. before: the
+    last frames of the source before them, (N, 3, ENDS) or fewer; None: nothing is before them. box: (2, 3) low and high
+    corner of the source in the coordinates of what is decoded.
+    """
+
+    positions: np.ndarray
+    shown_times: np.ndarray
+    before: np.ndarray | None
+    box: np.ndarray
+    bound: float
+    pool: ThreadPool
+
+    def last_shown(self, positions: np.ndarray) -> np.ndarray:
+        """Return the last frames that are shown, (N, 3, ENDS) or fewer."""
+        some = np.repeat(np.arange(-len(self.shown_times[-ENDS:]), 0), self.shown_times[-ENDS:])
+        return positions[:, :, some[-ENDS:]]
+
+    def flaws(self, decoded: np.ndarray, before: np.ndarray | None) -> tuple[float, float]:
+        """Return how far decoded positions leave the box, and their largest second difference over the source's, or over
+        half the bound where that is larger. before: frames like those of the source."""
+        low, high = decoded.min(axis=(0, 2)), decoded.max(axis=(0, 2))
+        away = max(0.0, float((self.box[0] - low).max()), float((high - self.box[1]).max()))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            ratios = self._bends(decoded, before) / self._allowed
+        return away, float(np.nan_to_num(ratios, posinf=np.inf).max(initial=0.0))
+
+    @cached_property
+    def _allowed(self) -> np.ndarray:
+        bends = np.pad(self._bends(self.positions, self.before), NEAR)
+        windows = (
+            np.lib.stride_tricks.sliding_window_view(bends, 2 * NEAR + 1) if len(bends) > 2 * NEAR else bends[:0, None]
+        )
+        return np.maximum(windows.max(axis=1, initial=0.0), self.bound / 2)
+
+    def _bends(self, positions: np.ndarray, before: np.ndarray | None) -> np.ndarray:
+        """Return the RMS over vertices of the second difference at each frame that has one."""
+        shown = np.repeat(np.arange(len(self.shown_times)), self.shown_times)
+
+        def squares(start: int, stop: int) -> np.ndarray:
+            frames = positions[start:stop, :, shown]
+            if before is not None:
+                frames = np.concatenate([before[start:stop], frames], axis=2)
+            bends = np.diff(frames.astype(np.float64), 2, axis=2)
+            return np.einsum("nkt,nkt->t", bends, bends)
+
+        return np.sqrt(sum(self.pool.map(squares, ranges(len(positions), 3 * len(shown)))) / len(positions))
+
+
+def chosen_levels(
+    errors: np.ndarray, frames: Sequence[int], flaws: np.ndarray, diagonal: float, exact: bool
+) -> list[int]:
+    """Return the longest chain of levels up to the last in which no RMS and no largest error exceeds that before.
+
+    errors: (levels, segments, 3), of segments of so many frames. flaws: (levels, segments, 2) of SourceFrames.flaws.
+    exact: whether the last level is the source, which goes on from the level before.
+    """
+    stored = np.vectorize(from_short_float, otypes=[float])(short_floats(errors))
+    measures = np.concatenate([_of_all(table, frames) for table in (errors, stored)], axis=1)
+    limits = MOST_AWAY * diagonal, MOST_JERK
+    last = len(errors) - 1 - exact
+    chains: dict[int, list[int]] = {last: list(range(last, len(errors)))}
+    for level in range(last - 1, -1, -1):
+        if (flaws[level] <= limits).all():
+            better = [chains[after] for after in chains if (measures[after] <= measures[level]).all()]
+            if better:
+                chains[level] = [level, *max(better, key=len)]
+    return max(chains.values(), key=len)
+
+
+def _of_all(errors: np.ndarray, frames: Sequence[int]) -> np.ndarray:
+    """Return the largest and the RMS error of each level over all segments, (levels, 2)."""
+    largest, rms = errors[:, :, MEASURES.index("max")], errors[:, :, MEASURES.index("rms")]
+    return np.stack([largest.max(axis=1), np.sqrt((rms**2 * np.asarray(frames)).sum(axis=1) / sum(frames))], axis=1)
