@@ -169,7 +169,9 @@ def _front_stream(header: Header, chunks: list[Chunk], errors: np.ndarray) -> by
     """FORMAT.md, "Front stream"."""
     names = (name for name, _ in _native.Header._fields_ if name != "stages" and hasattr(header, name))
     counts = _native.Header(**{name: getattr(header, name) for name in names})
-    counts.stages[: header.full_level_count] = header.stages or range(header.full_level_count)
+    first = header.stages[-1] + 1 if header.stages else 0
+    most = min(max(header.full_level_count, 0), len(counts.stages))
+    counts.stages[:most] = [*header.stages, *range(first, first + most)][:most]
     table = np.zeros(len(chunks), _native.CHUNK)
     for name in ("length", "segment", "kind"):
         table[name] = [getattr(chunk, name) for chunk in chunks]

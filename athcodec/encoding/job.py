@@ -148,8 +148,8 @@ class Draft:
 
 @dataclass(frozen=True)
 class CodedSegment:
-    """One segment: chunks {(level, kind): payload}, (levels, 3) errors of stopping at each level, (levels,) joins to the
-    segment before, and (levels, 2) flaws of what each level shows (SourceFrames)."""
+    """One segment: chunks {(level, kind): payload}, (levels, 3) errors of stopping at each level, (levels,) joins to
+    the segment before, and (levels, 2) flaws of what each level shows (SourceFrames)."""
 
     index: int
     chunks: dict[tuple[int, int], bytes]
@@ -695,8 +695,8 @@ class EncodingJob:
     def _add_motion(
         self, store: writing.ChunkStore, decided: _Decided, coded: Iterable[CodedSegment]
     ) -> tuple[np.ndarray, np.ndarray, list[int]]:
-        """Return (levels, segments, 3) errors and (levels, segments) joins of the levels that are shown, and which of all
-        they are. Raises ValueError unless each segment comes once."""
+        """Return (levels, segments, 3) errors and (levels, segments) joins of the levels that are shown, and which of
+        all they are. Raises ValueError unless each segment comes once."""
         levels, count = decided.layers.level_count + self.options.lossless, decided.segment_count
         errors, joins = np.zeros((levels, count, len(MEASURES))), np.zeros((levels, count), np.uint8)
         flaws, missing = np.zeros((levels, count, 2)), set(range(count))

@@ -153,6 +153,7 @@ int ath_read_header(const uint8_t *bytes, size_t available, const ath_limits *li
     start_stream(&coder, bytes, header);
     if (is_bad_header(limits, header, fault)) return fault->code;
     code_stages(&coder, header);
+    header->stage_count = header->stages[header->level_count - 1] + 1;
     int32_t deepest = header->stages[header->full_level_count - 1];
     if (is_outside(fault, ATH_BAD_HEADER, ATH_FIELD_FULL_LEVEL_COUNT, deepest + 1, 2, ATH_LEVELS)) return fault->code;
     double size =

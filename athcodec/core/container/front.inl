@@ -83,11 +83,10 @@ static void code_stages(ath_coder *coder, ath_header *header)
 {
     ath_context skipped;
     context_init(&skipped, 6000);
-    for (int32_t level = 0, stage = 0; level < header->full_level_count; level++, stage++) {
+    for (int32_t level = 0, stage = 0; level < ath_min(header->full_level_count, ATH_LEVELS); level++, stage++) {
         while (stage < ATH_LEVELS && coder_bit(coder, &skipped, stage < header->stages[level])) stage++;
         header->stages[level] = (uint8_t)stage;
     }
-    header->stage_count = header->stages[header->level_count - 1] + 1;
 }
 
 static void chunk_model_init(chunk_model *model)

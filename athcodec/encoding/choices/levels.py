@@ -43,8 +43,8 @@ class SourceFrames:
         return positions[:, :, some[-ENDS:]]
 
     def flaws(self, decoded: np.ndarray, before: np.ndarray | None) -> tuple[float, float]:
-        """Return how far decoded positions leave the box, and their largest second difference over the source's, or over
-        half the bound where that is larger. before: frames like those of the source."""
+        """Return how far decoded positions leave the box, and their largest second difference over the source's, or
+        over half the bound where that is larger. before: frames like those of the source."""
         low, high = decoded.min(axis=(0, 2)), decoded.max(axis=(0, 2))
         away = max(0.0, float((self.box[0] - low).max()), float((high - self.box[1]).max()))
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -54,10 +54,9 @@ class SourceFrames:
     @cached_property
     def _allowed(self) -> np.ndarray:
         bends = np.pad(self._bends(self.positions, self.before), NEAR)
-        windows = (
-            np.lib.stride_tricks.sliding_window_view(bends, 2 * NEAR + 1) if len(bends) > 2 * NEAR else bends[:0, None]
-        )
-        return np.maximum(windows.max(axis=1, initial=0.0), self.bound / 2)
+        count = len(bends) - 2 * NEAR
+        windows = [bends[i : i + count] for i in range(2 * NEAR + 1)]
+        return np.maximum(np.max(windows, axis=0), self.bound / 2)
 
     def _bends(self, positions: np.ndarray, before: np.ndarray | None) -> np.ndarray:
         """Return the RMS over vertices of the second difference at each frame that has one."""
@@ -90,8 +89,13 @@ def chosen_levels(
         if (flaws[level] <= limits).all():
             better = [chains[after] for after in chains if (measures[after] <= measures[level]).all()]
             if better:
-                chains[level] = [level, *max(better, key=len)]
-    return max(chains.values(), key=len)
+                chains[level] = [level, *max(better, key=_length)]
+    return max(chains.values(), key=_length)
+
+
+def _length(chain: list[int]) -> tuple[int, int]:
+    """Return by what the best chain is chosen: of those of one length the one that begins with a coarser level."""
+    return len(chain), -chain[0]
 
 
 def _of_all(errors: np.ndarray, frames: Sequence[int]) -> np.ndarray:
