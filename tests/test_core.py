@@ -334,7 +334,7 @@ def parts(full_ath) -> Parts:
         ({"frame_count": 2**30}, "LIMIT_EXCEEDED header: got Frame_Count 1073741824; the limit is 1048576"),
         ({"branch_count": 9, "vertex_count": 8}, "BAD_HEADER header: got Branch_Count 9; expected 1 to 8"),
         ({"frame_count": 600, "segment_count": 2}, "BAD_HEADER header: got Segment_Count 2; expected 3 to 600"),
-        ({"full_level_count": 33}, "BAD_HEADER header: got Full_Level_Count 33; expected 2 to 32"),
+        ({"full_level_count": 33}, "BAD_HEADER header: got Full_Level_Count 33; expected 1 to 32"),
         ({"full_level_count": 3, "level_count": 0}, "BAD_HEADER header: got Level_Count 0; expected 1 to 3"),
         ({"clip_count": 256}, "BAD_HEADER header: got Clip_Count 256; expected 1 to 255"),
         ({"layer_count": 9}, "BAD_HEADER header: got Layer_Count 9; expected 1 to 8"),
@@ -392,8 +392,9 @@ def test_a_refused_chunk_is_described_by_its_place_and_the_values_found_and_allo
         """Its offset depends on the length of the front, which the change may have changed."""
         return re.sub(r"at byte \d+", "at byte N", refusal(with_last(**change)))
 
-    assert refusal_of_last(level=9) == (
-        f"BAD_CHUNK_TABLE chunk AFFINES of level 9, segment 1 at byte N: got level 9; expected 0 to {levels - 1}"
+    assert refusal_of_last(stage=9) == (
+        f"BAD_CHUNK_TABLE chunk AFFINES of level {levels - 1}, segment 1 at byte N: got level 9; "
+        f"expected 0 to {parts.header.stages[-1]}"
     )
     assert refusal_of_last(segment=99) == (
         f"BAD_CHUNK_TABLE chunk AFFINES of level 1, segment 99 at byte N: got segment 99; expected 0 to {segments - 1}"

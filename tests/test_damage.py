@@ -325,7 +325,7 @@ def test_chunks_out_of_order_or_twice_are_refused(parts):
                 opened(parts.with_chunks(parts.chunks[: i + 1] + parts.chunks[i:]))
 
 
-@pytest.mark.parametrize("change", [{"level": 4}, {"segment": 2}, {"level": 255}])
+@pytest.mark.parametrize("change", [{"stage": 4}, {"segment": 2}, {"stage": 255}])
 def test_a_chunk_of_a_level_or_segment_that_does_not_exist_is_refused(change, parts):
     last = parts.index(ct.CORRECTIONS, 3, 1)
     chunks = list(parts.chunks)

@@ -27,6 +27,7 @@ NO_CORRECTIONS = np.empty((0, 6), np.int32)
 # Ticks are changes of velocity at a seam over those of a usual frame. Up to SMOOTH they are invisible, and beyond ROUGH
 # each weighs ROUGH_WORTH more.
 SMOOTH, ROUGH, ROUGH_WORTH = 1.2, 1.4, 30.0
+STILL = 0.05  # Least change of velocity in a usual frame, over the source's: a level that stands still must not jump.
 ERROR_WORTH = 8.0  # Cost, in ticks, of an error twice as large.
 ORDER_WORTH = 400.0  # Cost, in ticks, of an error twice as large as that of the level before.
 BYTES_WORTH = 40.0  # Cost, in ticks, of twice as many bytes.
@@ -195,9 +196,10 @@ def best_join(end: End, positions: np.ndarray, source: np.ndarray, price: ErrorP
     are joined too; 0: not at all. source: (N, 3, T) of those vertices that are `seen`, in the coordinates of
     `positions`."""
     decoded = _changes(positions)
-    usual = 0.5 * (end.usual + _usual(decoded))  # One side alone may move in straight lines.
+    of_source = _usual(_changes(source))
+    usual = max(0.5 * (end.usual + _usual(decoded)), STILL * of_source)  # One side alone may move in straight lines.
     wanted = _changes(np.concatenate([end.source, source[:, :, : END_FRAMES + 1]], axis=2))
-    wanted *= usual / max(_usual(_changes(source)), 1e-300)
+    wanted *= usual / max(of_source, 1e-300)
     natural = np.maximum(np.concatenate([wanted, decoded[1:]]), usual)  # From the last frame before the seam on.
 
     width = min(max(WIDTHS), positions.shape[2] - END_FRAMES)
