@@ -574,7 +574,7 @@ def test_a_rest_pose_of_level_1_is_read_for_it_and_matrices_are_of_that_of_their
         stream.feed(offset, size)
     assert stream.result_of_preparing(0, 1) == OK
     assert np.array_equal(stream.frame([stream.prepare(0, 0)], 3), before)
-    level_0, *others = (rest_of(stream, level) for level in range(stream.info.depth_levels))
+    level_0, *others = (rest_of(stream, level) for level in range(stream.info.depth_levels - 1))
     assert all(np.array_equal(rest, others[0]) for rest in others) and not np.array_equal(level_0, others[0])
 
 
@@ -705,18 +705,18 @@ def test_threads_prepare_from_one_file_at_the_same_time(player):
 
 
 @pytest.mark.parametrize(
-    "name, options, levels",
+    "name, options, goes",
     [
-        ("tree", {"segment_frames": 50, "ladder": "none", "rel_error": 1e-3}, 1),
-        ("tree", {"segment_frames": 50, "ladder": LADDER, "rel_error": 1e-4}, 3),
-        ("tree", {"segment_frames": 50, "ladder": "none", "rel_error": 1e-3, "lossless": True}, 2),
-        ("growth", {"segment_frames": 50, "ladder": "none", "rel_error": 1e-3}, 1),
-        (None, {"rel_error": 1e-2}, 0),
+        ("tree", {"segment_frames": 50, "ladder": "none", "rel_error": 1e-3}, True),
+        ("tree", {"segment_frames": 50, "ladder": LADDER, "rel_error": 1e-4}, True),
+        ("tree", {"segment_frames": 50, "ladder": "none", "rel_error": 1e-3, "lossless": True}, True),
+        ("growth", {"segment_frames": 50, "ladder": "none", "rel_error": 1e-3}, True),
+        (None, {"rel_error": 1e-2}, False),
     ],
     ids=["transformed", "layers", "lossless", "predicted", "another order"],
 )
 def test_positions_go_to_the_callers_memory_at_levels_of_all_vertices_in_the_order_of_the_source(
-    name, options, levels, scratch
+    name, options, goes, scratch
 ):
     """The segments are joined, too; frames of the growth repeat. What cannot go there is not touched."""
     clip = awkward(6, branches=6, shuffled=True) if name is None else athcodec.read(athcodec.sample_path(name))
@@ -742,7 +742,9 @@ def test_positions_go_to_the_callers_memory_at_levels_of_all_vertices_in_the_ord
             assert not positions.bytes.any()
     repeats = ctypes.string_at(core.ath_repeats(player.address), player.info.frame_count)
     steady = [own for own in player.segments if not any(repeats[player.start_of(own) : player.start_of(own + 1)])]
-    assert steady and went == set(itertools.product(player.levels[player.info.level_count - levels :], steady))
+    assert steady and went == set(
+        itertools.product(player.levels[player.info.depth_levels - 1 :], steady if goes else [])
+    )
 
 
 # ---- going on ----

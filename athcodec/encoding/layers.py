@@ -485,7 +485,8 @@ class CodedMotion:
             limit, share = layer.settings.limit, len(source) / len(positions)
             bytes_ = share * (self._shared_bytes + self._bytes_up_to(level))
             price = CorrectionPrice(limit if np.isscalar(limit) else limit[some], bytes_)
-        join = best_join(end.of(some), positions[some], source, price)
+        largest = max(errors[0] for errors in self.errors[level - 1 : level + 1]) if level > 0 else math.inf
+        join = best_join(end.of(some), positions[some], source, price, largest)
         if join == 0:
             return
         self.joins[level] = join

@@ -30,6 +30,7 @@ SMOOTH, ROUGH, ROUGH_WORTH = 1.2, 1.4, 30.0
 STILL = 0.05  # Least change of velocity in a usual frame, over the source's: a level that stands still must not jump.
 ERROR_WORTH = 8.0  # Cost, in ticks, of an error twice as large.
 ORDER_WORTH = 400.0  # Cost, in ticks, of an error twice as large as that of the level before.
+LARGEST_WORTH = 40.0  # Cost, in ticks, of a largest error twice that of the level before: slopes can throw a part far.
 BYTES_WORTH = 40.0  # Cost, in ticks, of twice as many bytes.
 CORRECTION_BYTES = 0.3  # Bytes of each position beyond the limit: a correction reaches over frames.
 
@@ -191,10 +192,12 @@ def _usual(changes: np.ndarray) -> float:
     return max(float(np.median(changes)), 0.5 * float(np.sqrt((changes**2).mean())))
 
 
-def best_join(end: End, positions: np.ndarray, source: np.ndarray, price: ErrorPrice | CorrectionPrice) -> int:
+def best_join(
+    end: End, positions: np.ndarray, source: np.ndarray, price: ErrorPrice | CorrectionPrice, largest: float
+) -> int:
     """Return how to join a level of a segment to the end of the one before: over how many frames, SLOPED more if slopes
     are joined too; 0: not at all. source: (N, 3, T) of those vertices that are `seen`, in the coordinates of
-    `positions`."""
+    `positions`. largest: the largest error that costs nothing."""
     decoded = _changes(positions)
     of_source = _usual(_changes(source))
     usual = max(0.5 * (end.usual + _usual(decoded)), STILL * of_source)  # One side alone may move in straight lines.
@@ -213,7 +216,9 @@ def best_join(end: End, positions: np.ndarray, source: np.ndarray, price: ErrorP
         moves = [np.diff(np.pad(share, 2), 2) for share in shares]
         joined = np.sqrt(changes.by(*moves))
         tick = float((joined / natural[: len(joined)]).max()) if usual > 0 else 0.0
-        price_of_errors = price(errors.squares[:, : len(shares[0])], errors.by(*shares))
+        after = errors.by(*shares)
+        beyond = max(0.0, float(after.max(initial=0.0)) ** 0.5 / largest - 1.0) if largest > 0 else 0.0
+        price_of_errors = price(errors.squares[:, : len(shares[0])], after) + LARGEST_WORTH * beyond
         return max(tick, SMOOTH) + ROUGH_WORTH * max(0.0, tick - ROUGH) + price_of_errors
 
     widths = [width for width in WIDTHS if width <= positions.shape[2] - END_FRAMES]

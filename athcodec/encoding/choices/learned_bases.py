@@ -8,6 +8,7 @@ from athcodec.encoding.features import Feature
 from athcodec.encoding.settings import Settings
 from athcodec.encoding.trials import Trials
 
+PERIODIC_WORTH = 1.1  # Largest ratio of bytes at which waves are periodic: coarse levels jump at the seam of others.
 EXTRA_TRIALS = 2  # Learning time bases takes as long as this many trials.
 
 
@@ -46,4 +47,6 @@ def best_waves(settings: Settings, trials: Trials) -> Settings:
     """Return the settings with periodic waves for loops of one segment, unless the motion jumps across the seam."""
     if trials.without(Feature.PERIODIC) or not any(sample.whole_loop for sample in trials.samples):
         return settings
-    return trials.cheapest([replace(settings, periodic=True), settings])
+    periodic = replace(settings, periodic=True)
+    of_periodic, of_free = trials.costs([periodic, settings])
+    return periodic if of_periodic <= PERIODIC_WORTH * of_free else settings
