@@ -220,6 +220,7 @@ class Search:
             forms=forms.forms_like(settings.forms, other.trials.source, trials),
             lags=start.lags,
             connected_rest=start.connected_rest,
+            welded_rest=start.welded_rest,
             shape_of=start.shape_of,
             loose=start.loose,
             learned_pieces=None,
