@@ -118,6 +118,7 @@ def _encode(clip: MotionClip, path: str, output: str, args: argparse.Namespace, 
             lossless=args.lossless,
             weights=args.weights,
             effort=args.effort,
+            smoothness=args.smoothness,
             ladder=args.ladder,
             jobs=args.jobs,
             progress=report,
@@ -168,7 +169,7 @@ def _batch_settings(args: argparse.Namespace) -> dict[str, Any]:
     given |= {name: True for name in ("exact_rest", "lossless", "loop", "endless") if getattr(args, name)}
     given |= {
         name: getattr(args, name)
-        for name, usual in (("attributes", "all"), ("effort", "default"))
+        for name, usual in (("attributes", "all"), ("effort", "default"), ("smoothness", "default"))
         if getattr(args, name) != usual
     }
     if args.ladder != ladder_of(DEFAULT_LADDER):

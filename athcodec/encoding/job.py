@@ -63,7 +63,7 @@ from athcodec.motion.polygons import POLYGON_ARRAYS, Polygons, type_code
 from athcodec.motion.presence import parts_hidden_far_away
 from athcodec.motion.thresholds import THRESHOLDS, Thresholds
 from athcodec.motion.units import Length
-from athcodec.options import DEFAULT_LADDER, EFFORTS, MAX_SEGMENT, MIN_SEGMENT, ladder_of, whole
+from athcodec.options import DEFAULT_LADDER, EFFORTS, MAX_SEGMENT, MIN_SEGMENT, SMOOTHNESS, ladder_of, whole
 
 SPOOL_BYTES = 64 << 20  # Bytes of chunks that are held in memory and not in a temporary file.
 CHUNK_BYTES, LEVEL_BYTES = 6, 6  # Bytes of the front for a chunk, and for the errors of a level and segment.
@@ -71,7 +71,7 @@ PREDICTED_SHARE = 0.8  # Largest share of the bytes of layers at which predicted
 REFUSAL_ROUNDS = 12  # Largest number of files that are coded to find the smallest bound that can be kept.
 FEW_BYTES = 2000  # Bytes up to which the file of a small clip may do without coarse levels.
 HELD_SHARE = 1 / 64  # Largest distance, in bounds, of a frame from the pose that is shown in its place.
-SEARCH_SAVES = 0.5  # Largest share of the bytes at its first settings that a search has saved.
+SEARCH_SAVES = 0.4  # Smallest share of the bytes at its first settings that a search has come down to.
 STATIC_METADATA = ("unit", "up_axis")
 
 
@@ -88,6 +88,7 @@ class EncodingOptions:
     weights: str | np.ndarray | None = None
     attributes: str = "all"
     effort: str = "default"
+    smoothness: str = "default"
     jobs: int | None = None
     ladder: tuple[float, ...] = ()  # Largest errors over the diagonal, descending; (): a single layer.
     predicted_frames: int = MAX_SEGMENT  # Longest segment of predicted motion.
@@ -126,6 +127,8 @@ class EncodingOptions:
             raise ValueError(f"jobs: got {self.jobs}; expected at least 1")
         if self.effort not in EFFORTS:
             raise ValueError(f"effort: got {self.effort!r}; expected one of {', '.join(EFFORTS)}")
+        if self.smoothness not in SMOOTHNESS:
+            raise ValueError(f"smoothness: got {self.smoothness!r}; expected one of {', '.join(SMOOTHNESS)}")
 
 
 @dataclass(frozen=True)
@@ -428,7 +431,7 @@ class EncodingJob:
     def _best_prediction(self, bound: float, most_bytes: float) -> FoundPrediction | None:
         """Return the best prediction; None: it is too large, or a hierarchy of maps is asked for, which it lacks."""
         is_out = self.options.tam or Feature.PREDICTED in self.options.without
-        return None if is_out else best_prediction(self._long_segments, bound, most_bytes)
+        return None if is_out else best_prediction(self._long_segments, bound, most_bytes, self.options.smoothness)
 
     @property
     def _long_segments(self) -> Source:
