@@ -41,7 +41,7 @@ from athcodec.encoding.layers import (
     layer_ratios,
     layers_of,
 )
-from athcodec.encoding.progress import Progress, silent
+from athcodec.encoding.progress import MOTION, SURVEY, Progress, Work, allowed_work, silent
 from athcodec.encoding.sample import is_small
 from athcodec.encoding.search import Search
 from athcodec.encoding.segment import CodedPrelude, Source, thread_count
@@ -361,21 +361,28 @@ class EncodingJob:
             choice = still_choice(self.source, ath, bound, ratio)
             return self._layered(ath, choice, CodedPrelude(self.source, ath, choice.settings))
         share = PREDICTED_SHARE if ratio > 1 else 1.0
-        search = Search.of(self.source, ath, bound, self.options.effort, self.report, self.options.jobs, ratios)
+        work = self._allowed_work(len(ratios))
+        search = Search.of(self.source, ath, bound, self.options.effort, work, self.options.jobs, ratios)
         unsearched = share * search.first_cost()
-        prediction = None if search.trials.start.rigid.any() else self._best_prediction(bound, unsearched)
+        prediction = None if search.trials.start.rigid.any() else self._best_prediction(bound, unsearched, work)
         if prediction is not None and prediction.bytes < SEARCH_SAVES * unsearched:
             return self._predicted(prediction.choice)
         try:
             best = self._found_by(search)
-            if self._is_short(best):
-                best = min(best, self._without_levels(bound), key=self._estimated_bytes)
+            if self._is_short(best) and work.fits(work.done):
+                best = min(best, self._without_levels(bound, work), key=self._estimated_bytes)
             if prediction is None or prediction.bytes >= share * self._estimated_bytes(best):
                 return best
         except BoundError:
             if prediction is None:
                 raise
         return self._predicted(prediction.choice)
+
+    def _allowed_work(self, layers: int) -> Work:
+        """Return the work that the decisions about a file may take: what its survey and coding leave of all."""
+        vertices, frames = self.clip.vertex_count, self.clip.frame_count
+        coding = (SURVEY + MOTION * (1 + layers)) * vertices * frames
+        return Work(allowed_work(vertices, frames, self.options.effort) - coding, self.report)
 
     def _found_by(self, search: Search) -> _Decided:
         """Return the best candidate of a search."""
@@ -392,15 +399,15 @@ class EncodingJob:
         small = is_small(self.clip.vertex_count, self.source.segments, options.effort)
         return small and self._estimated_bytes(decided) <= FEW_BYTES
 
-    def _without_levels(self, bound: float) -> _Decided:
+    def _without_levels(self, bound: float, work: Work) -> _Decided:
         """Return the best file with one node for the whole plant, whatever its error."""
         ath = self.seen.ath(Thresholds(bound, self.clip.frame_count, self.seen.largest_distance.max(), 0))
-        return self._found_by(Search.of(self.source, ath, bound, self.options.effort, silent, self.options.jobs))
+        return self._found_by(Search.of(self.source, ath, bound, self.options.effort, work, self.options.jobs))
 
-    def _best_prediction(self, bound: float, most_bytes: float) -> FoundPrediction | None:
+    def _best_prediction(self, bound: float, most_bytes: float, work: Work) -> FoundPrediction | None:
         """Return the best prediction; None: it is too large, or a hierarchy of maps is asked for, which it lacks."""
         is_out = self.options.tam or Feature.PREDICTED in self.options.without
-        return None if is_out else best_prediction(self._long_segments, bound, most_bytes)
+        return None if is_out else best_prediction(self._long_segments, bound, most_bytes, work)
 
     @property
     def _long_segments(self) -> Source:

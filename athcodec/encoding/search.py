@@ -8,18 +8,18 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property
 
 import numpy as np
 
 from athcodec.encoding.choices import forms, learned_bases, learned_pieces, rotations
 from athcodec.encoding.choices.node_steps import best_node_steps, cost_with_maps, inner_nodes
-from athcodec.encoding.choices.reference import MEAN_POSE_TRIALS, mean_pose
+from athcodec.encoding.choices.reference import mean_pose
 from athcodec.encoding.choices.rest import best_slack, with_slack
 from athcodec.encoding.choices.rigid import best_freedom, calm_parts
 from athcodec.encoding.choices.steps import best_level_steps, best_steps, finer_steps, walked
 from athcodec.encoding.features import Feature
-from athcodec.encoding.progress import Progress, TrialCount, expected_trials
+from athcodec.encoding.progress import ANALYSIS, TRIAL, Work, expected_trials
 from athcodec.encoding.sample import ExtrapolationFactors, is_small, sample_plant
 from athcodec.encoding.segment import CodedPrelude, Source, branch_records
 from athcodec.encoding.segment_samples import samples_of
@@ -34,6 +34,8 @@ REFINEMENTS_MAX_GAIN = (
 )
 NEAREST, NEAR_RATIO = 4, 1.12  # Steps are walked for so many other choices, of at most so many times the least bytes.
 SETTLING_ROUNDS = 64  # Largest number of times that the choices of a small clip are changed.
+
+Choose = Callable[[Settings, Trials], Settings]
 
 
 def settled(settings: Settings, trials: Trials) -> Settings:
@@ -63,6 +65,27 @@ def _nearest(settings: Settings, others: list[Settings], trials: Trials) -> list
     return [others[i] for i in np.argsort(costs, kind="stable")[:NEAREST] if costs[i] <= most]
 
 
+# What progress and summaries call a choice.
+CHOICES: dict[Choose, str] = {
+    best_level_steps: "steps of levels",
+    best_freedom: "freedom of rigid parts",
+    forms.best_forms: "forms",
+    rotations.best_rotations: "rotations",
+    rotations.fast_rotations: "rotations",
+    learned_bases.best_bases: "time bases",
+    learned_bases.best_waves: "periodic waves",
+    learned_bases.waves_if_smaller: "time bases",
+    learned_pieces.best_pieces: "learned modes",
+    learned_pieces.best_pieces_in_any_basis: "learned modes",
+    best_steps: "steps",
+    finer_steps: "finer steps",
+    calm_parts: "calm parts",
+    best_slack: "precision of the rest pose",
+    best_node_steps: "maps of coarse levels",
+    settled: "all choices again",
+}
+
+
 @dataclass(eq=False)
 class Search:
     """Finds the settings of a file; ratios: of the steps of its layers to that of the last, descending to 1."""
@@ -75,7 +98,9 @@ class Search:
         source, keeps_shape = self.trials.source, self.trials.start.turn_step > 0  # A few bytes less cost the shape.
         self._forms: np.ndarray | None = None
         self._is_small = is_small(source.clip.vertex_count, source.segments, self.effort) and not keeps_shape
-        self.trials.count.expected = expected_trials(self.effort, self.trials.is_layered, self._is_small)
+        trial = TRIAL + (self.of_sample or self).trials.work_of(ANALYSIS)
+        expected = trial * expected_trials(self.effort, self.trials.is_layered, self._is_small)
+        self.trials.work.expected = min(expected, self.trials.work.allowed)
 
     @classmethod
     def of(
@@ -84,14 +109,14 @@ class Search:
         ath: Ath,
         bound: float,
         effort: str,
-        report: Progress,
+        work: Work,
         jobs: int | None = None,
         ratios: Sequence[int] = (1,),
     ) -> Search:
         """Return the search for a whole plant."""
         samples = samples_of(source)
         start = first_settings(source, ath, bound, samples, ratios)
-        return cls(Trials(source, ath, start, samples, jobs, TrialCount(report)), effort, ratios)
+        return cls(Trials(source, ath, start, samples, jobs, work), effort, ratios)
 
     def first_cost(self) -> float:
         """Return the bytes of a whole file at the settings that the search starts with."""
@@ -118,13 +143,13 @@ class Search:
         else:
             candidates = list(self.refinements())  # Refinements come first: components are of the step that asks first.
             first = self.first_layer()
-        self.trials.count.finish()
+        self.trials.work.finish()
         return first, candidates
 
     @cached_property
     def at_first_step(self) -> Settings:
         """Bases, rotations and modes of a file of one layer, at the step that the search starts with."""
-        choices: list[Callable[[Settings, Trials], Settings]] = [
+        choices: list[Choose] = [
             best_freedom,
             forms.best_forms,
             rotations.best_rotations,
@@ -133,7 +158,7 @@ class Search:
             learned_pieces.best_pieces_in_any_basis,
         ]
         if self.effort == "fast":
-            choices = [partial(rotations.best_rotations, factors=rotations.FAST_FACTORS)]
+            choices = [rotations.fast_rotations]
         return self._after([best_level_steps, *choices, learned_bases.best_waves], self.trials.start)
 
     @cached_property
@@ -147,9 +172,10 @@ class Search:
             choices += [rotations.best_rotations, learned_bases.best_bases, finer_steps]
         return self._after([*choices, best_node_steps], self.at_first_step)
 
-    def _after(self, choices: Sequence[Callable[[Settings, Trials], Settings]], settings: Settings) -> Settings:
+    def _after(self, choices: Sequence[Choose], settings: Settings) -> Settings:
         for choose in choices:
-            settings = choose(settings, self.trials)
+            with self.trials.work.trying(CHOICES[choose]):
+                settings = choose(settings, self.trials)
         return settings
 
     def first_layer(self) -> Settings:
@@ -194,7 +220,6 @@ class Search:
             return self
         other = self.about_mean_pose()
         about_rest, about_mean = self.of_sample or self, other.of_sample or other
-        self.trials.spend(MEAN_POSE_TRIALS)
         cost = about_rest._cost_to_compare()
         if not self._is_small:
             about_mean.at_first_step = about_mean._like(about_rest, about_rest.at_first_step)
@@ -244,7 +269,7 @@ class Search:
             branch_records(sample.source.hierarchy, sample.ath, some),
         )
         samples = [segment.of_plant(sample) for segment in trials.samples]
-        of_sample = Trials(sample.source, sample.ath, some, samples, trials.jobs, trials.count, extrapolation)
+        of_sample = Trials(sample.source, sample.ath, some, samples, trials.jobs, trials.work, extrapolation)
         return Search(of_sample, self.effort, self.ratios)
 
     def _candidates_of_sample(self, sample: Search) -> tuple[Settings, list[Settings]]:

@@ -18,6 +18,7 @@ from athcodec.encoding import quantise as qz
 from athcodec.encoding import streams, writing
 from athcodec.encoding.choices.rest import with_best_rest
 from athcodec.encoding.features import Feature
+from athcodec.encoding.progress import PREDICTION, Work
 from athcodec.encoding.motion import LevelStream, SegmentMotion, position_errors
 from athcodec.encoding.segment import CodedPrelude, Source, plain_settings
 from athcodec.encoding.segment_samples import SegmentSample, typical_segments
@@ -62,7 +63,7 @@ class FoundPrediction:
     twitches: bool
 
 
-def best_prediction(source: Source, bound: float, most_bytes: float) -> FoundPrediction | None:
+def best_prediction(source: Source, bound: float, most_bytes: float, work: Work) -> FoundPrediction | None:
     """Return the best prediction; None: it takes more than `most_bytes`, or cannot keep the bound."""
     ath = one_map_each(source.seen)
     first, *others = (_settings(source, ath, bound, ratio * source.smallest_bound(bound)) for ratio in REST_STEPS)
@@ -77,6 +78,7 @@ def best_prediction(source: Source, bound: float, most_bytes: float) -> FoundPre
     def coded(settings: Settings, lattice: bool = CUBES, error_share: float = 1.0) -> FoundPrediction:
         stepped = replace(settings, step=_largest_step(error_share * settings.limit, lattice))
         choice = Choice(stepped, stepped, None, predicted=lattice, error_share=error_share)
+        work.add(PREDICTION * source.clip.vertex_count * sum(sample.positions.shape[2] for sample in samples))
         try:
             prelude = prelude_of(settings)
             parts = [(sample, *_predicted(prelude, choice, sample.positions)) for sample in samples]
