@@ -350,7 +350,7 @@ def loose_points() -> MotionClip:
 
 
 def test_candidates_for_branches_are_tried_at_the_bound_of_the_file(loose_points, tmp_path, monkeypatch):
-    assert len(finding.candidates(loose_points)) > 1
+    assert len(list(finding.candidates(loose_points))) > 1
     bounds = trial_bounds(loose_points, tmp_path / "a.ath", monkeypatch, max_error=0.02)
     assert len(bounds) > 1
     assert set(bounds) == {0.02}

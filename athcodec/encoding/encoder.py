@@ -19,7 +19,7 @@ from athcodec.encoding.bounds import BoundOption
 from athcodec.encoding.branch_trials import best_branches
 from athcodec.encoding.job import SPOOL_BYTES, CodedSegment, Draft, EncodingJob, EncodingOptions
 from athcodec.encoding.layers import layer_ratios
-from athcodec.encoding.progress import Progress, WeightedProgress, stage_weights
+from athcodec.encoding.progress import BRANCH_SHARE, Progress, WeightedProgress, Work, allowed_work, stage_weights
 from athcodec.encoding.segment_samples import SAMPLES
 from athcodec.encoding.segmentation import split_segments
 from athcodec.encoding.summary import Summary
@@ -244,9 +244,12 @@ def _begin(
     clip.check()
     branches = None
     if not clip.has_branches:
-        report("branches", 0.0)
-        branches = best_branches(clip, option, report, options.host_rest)
+        work = Work(BRANCH_SHARE * allowed_work(clip.vertex_count, clip.frame_count, options.effort), report, "branches")
+        work.report()
+        branches = best_branches(clip, option, work, options.host_rest)
     job = EncodingJob.begin(clip, branches, options, report)
+    if branches is not None:
+        job.spent, job.untried = work.done, tuple(set(work.untried) & {"branches"})
     attempts = itertools.count(1)
 
     def file_size(bound: float) -> float:

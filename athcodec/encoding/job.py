@@ -246,6 +246,8 @@ class EncodingJob:
     options: EncodingOptions
     report: Progress = silent
     branches: Found | None = None
+    spent: float = 0.0  # Work of finding branches.
+    untried: tuple[str, ...] = ()  # What that left out.
 
     @classmethod
     def begin(cls, clip: MotionClip, branches: Found | None, options: EncodingOptions, report: Progress) -> EncodingJob:
@@ -351,8 +353,33 @@ class EncodingJob:
             low, high = (bound, high) if self.file_size(bound) == math.inf else (low, bound)
         return high
 
+    def tried(self, bound: float, work: Work, frames_ratio: float) -> tuple[float, bool]:
+        """Return about the bytes of a file of so many times the frames, as far as the work allowed tells, and whether
+        its motion is predicted; infinite if the bound cannot be kept."""
+        try:
+            self._check(bound)
+            if self.source.still:
+                return self.decide(bound).shared_bytes, False
+            ath = self.seen.ath(self.thresholds(bound))
+            search = Search.of(self.source, ath, bound, self.options.effort, work, self.options.jobs)
+            unsearched = search.first_cost()
+            prediction = self._best_prediction(bound, unsearched, work)
+            if prediction is not None and prediction.bytes < SEARCH_SAVES * unsearched:
+                return frames_ratio * prediction.bytes, True
+            best, predicted = search.tried(frames_ratio), math.inf if prediction is None else prediction.bytes
+            return min((best, False), (frames_ratio * predicted, True))
+        except BoundError:
+            return math.inf, False
+
     def decide(self, bound: float) -> _Decided:
         """Search for settings."""
+        work = self._allowed_work(bound)
+        decided = self._decide(bound, work)
+        untried = tuple(dict.fromkeys([*self.untried, *work.untried]))
+        decided.choice = dataclasses.replace(decided.choice, untried=untried)
+        return decided
+
+    def _decide(self, bound: float, work: Work) -> _Decided:
         self._check(bound)
         ath = self.seen.ath(self.thresholds(bound))
         ratios = self._layer_ratios(ath, bound)
@@ -361,7 +388,6 @@ class EncodingJob:
             choice = still_choice(self.source, ath, bound, ratio)
             return self._layered(ath, choice, CodedPrelude(self.source, ath, choice.settings))
         share = PREDICTED_SHARE if ratio > 1 else 1.0
-        work = self._allowed_work(len(ratios))
         search = Search.of(self.source, ath, bound, self.options.effort, work, self.options.jobs, ratios)
         unsearched = share * search.first_cost()
         prediction = None if search.trials.start.rigid.any() else self._best_prediction(bound, unsearched, work)
@@ -378,11 +404,12 @@ class EncodingJob:
                 raise
         return self._predicted(prediction.choice)
 
-    def _allowed_work(self, layers: int) -> Work:
+    def _allowed_work(self, bound: float) -> Work:
         """Return the work that the decisions about a file may take: what its survey and coding leave of all."""
         vertices, frames = self.clip.vertex_count, self.clip.frame_count
+        layers = len(layer_ratios(self.options.ladder, bound, self.seen.diagonal))
         coding = (SURVEY + MOTION * (1 + layers)) * vertices * frames
-        return Work(allowed_work(vertices, frames, self.options.effort) - coding, self.report)
+        return Work(allowed_work(vertices, frames, self.options.effort) - coding - self.spent, self.report)
 
     def _found_by(self, search: Search) -> _Decided:
         """Return the best candidate of a search."""
@@ -741,4 +768,5 @@ def _summary(
         job.seams(decoder),
         None if job.branches is None else str(job.branches),
         job.clip.not_read,
+        decided.choice.untried,
     )

@@ -22,6 +22,8 @@ TRIAL = 1500  # For a trial, however small.
 CORRECTION = 5  # For a correction.
 POSE = 1.0  # For a vertex of a rest pose that is coded.
 COMPONENT = 0.001  # For a vertex and a pair of frames of which components over time are made.
+FINDING = 60  # For a vertex of a clip whose branches are sought in one way.
+BRANCH_SHARE = 0.45  # Largest share of all work that finding branches takes.
 LEARNING = 0.2  # For a vertex in a frame from which modes are learned.
 LEAST_WORK, WORK = 3e6, 5.0  # An encoding may take so much, and so much more for each vertex in a frame.
 EFFORTS = {"fast": math.inf, "default": 0.7, "best": 7.0}  # Factors on it, which leave room for what is not counted.
@@ -54,10 +56,10 @@ class Work:
     beyond which nothing more is tried; expected: work at the end of the search; untried: choices left out.
     """
 
-    def __init__(self, allowed: float = math.inf, report: Progress = silent):
-        self.allowed, self.expected, self.done = allowed, 1.0, 0
+    def __init__(self, allowed: float = math.inf, report: Progress = silent, stage: str = "search"):
+        self.allowed, self.expected, self.done = allowed, 0.0, 0
         self.untried: dict[str, None] = {}
-        self._report, self._choice, self._lock = report, "", Lock()
+        self._report, self._stage, self._choice, self._lock = report, stage, "", Lock()
 
     def add(self, work: float) -> None:
         """Count work that is done."""
@@ -84,12 +86,12 @@ class Work:
 
     def report(self) -> None:
         """Report what is tried, and how far the search has come."""
-        words = f"search: {self._choice}" if self._choice else "search"
-        self._report(words, min(self.done / self.expected, 0.99))
+        words = f"{self._stage}: {self._choice}" if self._choice not in ("", self._stage) else self._stage
+        self._report(words, min(self.done / max(self.expected, 1.0), 0.99))
 
     def finish(self) -> None:
         """Report the end of the search."""
-        self._report("search", 1.0)
+        self._report(self._stage, 1.0)
 
 
 class WeightedProgress:

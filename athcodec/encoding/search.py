@@ -100,7 +100,8 @@ class Search:
         self._is_small = is_small(source.clip.vertex_count, source.segments, self.effort) and not keeps_shape
         trial = TRIAL + (self.of_sample or self).trials.work_of(ANALYSIS)
         expected = trial * expected_trials(self.effort, self.trials.is_layered, self._is_small)
-        self.trials.work.expected = min(expected, self.trials.work.allowed)
+        work = self.trials.work
+        work.expected = work.expected or min(expected, work.allowed)
 
     @classmethod
     def of(
@@ -122,6 +123,12 @@ class Search:
         """Return the bytes of a whole file at the settings that the search starts with."""
         trials = (self.of_sample or self).trials
         return trials.cost(trials.start)
+
+    def tried(self, frames_ratio: float) -> float:
+        """Return about the bytes of a file of so many times the frames, by the choices that save most."""
+        search = self.of_sample or self
+        settings, trials = search.at_best_step, search.trials
+        return trials.cost(settings) + (frames_ratio - 1) * trials.level_costs(settings).sum()
 
     def decide(self) -> tuple[list[Choice], CodedPrelude]:
         """Return settings to choose from, and hierarchy and poses as coded with them."""
@@ -162,15 +169,20 @@ class Search:
         return self._after([best_level_steps, *choices, learned_bases.best_waves], self.trials.start)
 
     @cached_property
+    def at_best_step(self) -> Settings:
+        """The same at the best steps."""
+        return self.at_first_step if self.effort == "fast" else self._after([best_steps], self.at_first_step)
+
+    @cached_property
     def best(self) -> Settings:
         """Settings of a file of one layer."""
         choices = [calm_parts, best_slack, learned_bases.waves_if_smaller]
-        choices = [best_steps, settled, *choices] if self._is_small else [best_steps, *choices]
+        choices = [settled, *choices] if self._is_small else choices
         if self.effort == "fast":
             choices = []
         if self.effort == "best" and self.trials.source.weights is None:
             choices += [rotations.best_rotations, learned_bases.best_bases, finer_steps]
-        return self._after([*choices, best_node_steps], self.at_first_step)
+        return self._after([*choices, best_node_steps], self.at_best_step)
 
     def _after(self, choices: Sequence[Choose], settings: Settings) -> Settings:
         for choose in choices:
@@ -212,7 +224,7 @@ class Search:
     def about_best_reference(self) -> Search:
         """Return the search about the rest pose or the mean pose of the motion, whichever makes the smaller file. The
         mean pose is tried with what was chosen about the rest pose, and goes on from there; in small clips both are
-        searched."""
+        searched up to their steps."""
         source = self.trials.source
         if self.effort == "fast" or source.host_rest or self.trials.without(Feature.MEAN_POSE):
             return self
@@ -227,7 +239,7 @@ class Search:
 
     def _cost_to_compare(self) -> float:
         """Return what is compared with the cost about another reference pose."""
-        return cost_with_maps(self.best if self._is_small else self.at_first_step, self.trials)
+        return cost_with_maps(self.at_best_step if self._is_small else self.at_first_step, self.trials)
 
     def about_mean_pose(self) -> Search:
         """Return a search about the mean pose of the motion, which has chosen nothing yet."""

@@ -18,8 +18,8 @@ from athcodec.encoding import quantise as qz
 from athcodec.encoding import streams, writing
 from athcodec.encoding.choices.rest import with_best_rest
 from athcodec.encoding.features import Feature
-from athcodec.encoding.progress import PREDICTION, Work
 from athcodec.encoding.motion import LevelStream, SegmentMotion, position_errors
+from athcodec.encoding.progress import PREDICTION, Work
 from athcodec.encoding.segment import CodedPrelude, Source, plain_settings
 from athcodec.encoding.segment_samples import SegmentSample, typical_segments
 from athcodec.encoding.settings import Choice, Settings

@@ -8,7 +8,7 @@ rigidly. attachment.py arranges all but runs and edge graphs alike. Only a few f
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
@@ -69,33 +69,41 @@ def find_branches(clip: MotionClip, method: str = "auto", root: int | None = Non
     return branches
 
 
-def candidates(clip: MotionClip) -> list[Found]:
-    """Return what find_branches finds and, if only a trial shows which makes the smallest file, alternatives: for
+def candidates(clip: MotionClip) -> Iterator[Found]:
+    """Yield what find_branches finds and, if only a trial shows which makes the smallest file, alternatives: for
     motion, or runs that leave many points alone, patches of other sizes, patches without parents and one single branch;
     for a welded mesh, its pieces. A clip that stands still has no patches and no runs."""
     seen = Seen(clip)
     single = Found(np.zeros(clip.vertex_count, np.int32), np.array([-1], np.int32), None, "motion")
     if stands_still(clip):
         first = _first_found(seen, METHODS[:-2], None)
-        return [single] if first is None else [single, first]
+        yield single
+        if first is not None:
+            yield first
+        return
     first = _first_found(seen, METHODS, None) or _by_motion(seen, None)
     if first.method == "skeleton":
-        return [first, dataclasses.replace(first, stem_index=None)]
+        yield first
+        yield dataclasses.replace(first, stem_index=None)
+        return
     lone = np.count_nonzero(np.bincount(first.vertex_branch) == 1)
     if first.method == "components":
         unwelded = pieces(clip)  # Leaves that touch are welded, which is wrong if they move by themselves.
-        return [first] if len(unwelded.branch_parent) == len(first.branch_parent) else [first, unwelded]
+        yield first
+        if len(unwelded.branch_parent) != len(first.branch_parent):
+            yield unwelded
+        return
     if first.method != "motion" and not (first.method == "runs" and lone > LONE_POINTS * clip.vertex_count):
-        return [first]
-    patches = [first] if first.method == "motion" else [first, _by_motion(seen, None)]
-    return [single, *patches, *_more_patches(seen)]
-
-
-def _more_patches(seen: Seen) -> list[Found]:
-    """Return patches of another size than usual, and patches without parents."""
-    if seen.clip.vertex_count >= LARGE_MESH:
-        return [_by_motion(seen, None, LARGE_PATCH), _free_patches(seen, FREE_PATCHES[-1])]
-    return [_by_motion(seen, None, SMALL_PATCH), *(_free_patches(seen, size) for size in FREE_PATCHES)]
+        yield first
+        return
+    yield single
+    yield first
+    if first.method != "motion":
+        yield _by_motion(seen, None)
+    is_large = clip.vertex_count >= LARGE_MESH
+    yield _by_motion(seen, None, LARGE_PATCH if is_large else SMALL_PATCH)
+    for size in FREE_PATCHES[-1:] if is_large else FREE_PATCHES:
+        yield _free_patches(seen, size)
 
 
 def pieces(clip: MotionClip) -> Found:
