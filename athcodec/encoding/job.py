@@ -394,7 +394,10 @@ class EncodingJob:
         if prediction is not None and prediction.bytes < SEARCH_SAVES * unsearched:
             return self._predicted(prediction.choice)
         try:
-            best = self._found_by(search)
+            choices, prelude = search.decide()
+            if prediction is not None and prediction.bytes < share * search.cost:
+                return self._predicted(prediction.choice)
+            best = self._best_of(search, choices, prelude)
             if self._is_short(best) and work.fits(work.done):
                 best = min(best, self._without_levels(bound, work), key=self._estimated_bytes)
             if prediction is None or prediction.bytes >= share * self._estimated_bytes(best):
@@ -411,9 +414,8 @@ class EncodingJob:
         coding = (SURVEY + MOTION * (1 + layers)) * vertices * frames
         return Work(allowed_work(vertices, frames, self.options.effort) - coding - self.spent, self.report)
 
-    def _found_by(self, search: Search) -> _Decided:
-        """Return the best candidate of a search."""
-        choices, prelude = search.decide()
+    def _best_of(self, search: Search, choices: list[Choice], prelude: CodedPrelude) -> _Decided:
+        """Return the best of what a search has found."""
         layered = [self._layered(search.trials.ath, choice, prelude) for choice in choices]
         return layered[0] if len(layered) == 1 else min(layered, key=self._estimated_bytes)
 
@@ -429,7 +431,8 @@ class EncodingJob:
     def _without_levels(self, bound: float, work: Work) -> _Decided:
         """Return the best file with one node for the whole plant, whatever its error."""
         ath = self.seen.ath(Thresholds(bound, self.clip.frame_count, self.seen.largest_distance.max(), 0))
-        return self._found_by(Search.of(self.source, ath, bound, self.options.effort, work, self.options.jobs))
+        search = Search.of(self.source, ath, bound, self.options.effort, work, self.options.jobs)
+        return self._best_of(search, *search.decide())
 
     def _best_prediction(self, bound: float, most_bytes: float, work: Work) -> FoundPrediction | None:
         """Return the best prediction; None: it is too large, or a hierarchy of maps is asked for, which it lacks."""

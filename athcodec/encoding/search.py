@@ -35,6 +35,9 @@ REFINEMENTS_MAX_GAIN = (
 NEAREST, NEAR_RATIO = 4, 1.12  # Steps are walked for so many other choices, of at most so many times the least bytes.
 SETTLING_ROUNDS = 64  # Largest number of times that the choices of a small clip are changed.
 
+FIRST_SHARE = 0.5  # Largest share of the work that is left for what is chosen before steps are walked.
+LEAST_TRIALS = 12  # Trials without which another reference pose is not tried.
+
 Choose = Callable[[Settings, Trials], Settings]
 
 
@@ -65,24 +68,25 @@ def _nearest(settings: Settings, others: list[Settings], trials: Trials) -> list
     return [others[i] for i in np.argsort(costs, kind="stable")[:NEAREST] if costs[i] <= most]
 
 
-# What progress and summaries call a choice.
-CHOICES: dict[Choose, str] = {
-    best_level_steps: "steps of levels",
-    best_freedom: "freedom of rigid parts",
-    forms.best_forms: "forms",
-    rotations.best_rotations: "rotations",
-    rotations.fast_rotations: "rotations",
-    learned_bases.best_bases: "time bases",
-    learned_bases.best_waves: "periodic waves",
-    learned_bases.waves_if_smaller: "time bases",
-    learned_pieces.best_pieces: "learned modes",
-    learned_pieces.best_pieces_in_any_basis: "learned modes",
-    best_steps: "steps",
-    finer_steps: "finer steps",
-    calm_parts: "calm parts",
-    best_slack: "precision of the rest pose",
-    best_node_steps: "maps of coarse levels",
-    settled: "all choices again",
+# What progress and summaries call a choice, and the largest share of the work that is left that it may take. Steps and
+# learned modes save most, and most for their work.
+CHOICES: dict[Choose, tuple[str, float]] = {
+    best_level_steps: ("steps of levels", 0.2),
+    best_freedom: ("freedom of rigid parts", 0.2),
+    forms.best_forms: ("forms", 0.3),
+    rotations.best_rotations: ("rotations", 0.3),
+    rotations.fast_rotations: ("rotations", 1.0),
+    learned_bases.best_bases: ("time bases", 0.6),
+    learned_bases.best_waves: ("periodic waves", 1.0),
+    learned_bases.waves_if_smaller: ("time bases", 1.0),
+    learned_pieces.best_pieces: ("learned modes", 0.7),
+    learned_pieces.best_pieces_in_any_basis: ("learned modes", 0.7),
+    best_steps: ("steps", 0.8),
+    finer_steps: ("finer steps", 1.0),
+    calm_parts: ("calm parts", 0.5),
+    best_slack: ("precision of the rest pose", 0.5),
+    best_node_steps: ("maps of coarse levels", 1.0),
+    settled: ("all choices again", 0.7),
 }
 
 
@@ -124,6 +128,12 @@ class Search:
         trials = (self.of_sample or self).trials
         return trials.cost(trials.start)
 
+    @property
+    def cost_of_best(self) -> float:
+        """Bytes of a file of one layer."""
+        search = self.of_sample or self
+        return search.trials.cost(search.best)
+
     def tried(self, frames_ratio: float) -> float:
         """Return about the bytes of a file of so many times the frames, by the choices that save most."""
         search = self.of_sample or self
@@ -133,6 +143,7 @@ class Search:
     def decide(self) -> tuple[list[Choice], CodedPrelude]:
         """Return settings to choose from, and hierarchy and poses as coded with them."""
         search = self.about_best_reference()
+        self.cost = search.cost_of_best
         trials, (first_layer, candidates) = search.trials, search.candidates()
         prelude = trials.prelude(candidates[0])
         choices = [
@@ -156,6 +167,8 @@ class Search:
     @cached_property
     def at_first_step(self) -> Settings:
         """Bases, rotations and modes of a file of one layer, at the step that the search starts with."""
+        if self.effort == "fast":
+            return self._after([best_level_steps, rotations.fast_rotations, learned_bases.best_waves], self.trials.start)
         choices: list[Choose] = [
             best_freedom,
             forms.best_forms,
@@ -164,9 +177,8 @@ class Search:
             forms.best_forms,
             learned_pieces.best_pieces_in_any_basis,
         ]
-        if self.effort == "fast":
-            choices = [rotations.fast_rotations]
-        return self._after([best_level_steps, *choices, learned_bases.best_waves], self.trials.start)
+        with self.trials.work.trying("steps", FIRST_SHARE):
+            return self._after([best_level_steps, *choices, learned_bases.best_waves], self.trials.start)
 
     @cached_property
     def at_best_step(self) -> Settings:
@@ -186,7 +198,7 @@ class Search:
 
     def _after(self, choices: Sequence[Choose], settings: Settings) -> Settings:
         for choose in choices:
-            with self.trials.work.trying(CHOICES[choose]):
+            with self.trials.work.trying(*CHOICES[choose]):
                 settings = choose(settings, self.trials)
         return settings
 
@@ -230,6 +242,11 @@ class Search:
             return self
         if source.details.any():  # The mean of what turns is smaller than what turns.
             return self
+        work = self.trials.work
+        with work.trying("mean pose"):
+            if not work.fits(LEAST_TRIALS * (self.of_sample or self).trials.work_of_trial):
+                return self
+        work.add(LEARNING * self.trials.source.clip.vertex_count * self.trials.frames)
         other = self.about_mean_pose()
         about_rest, about_mean = self.of_sample or self, other.of_sample or other
         cost = about_rest._cost_to_compare()
