@@ -244,7 +244,9 @@ def _begin(
     clip.check()
     branches = None
     if not clip.has_branches:
-        work = Work(BRANCH_SHARE * allowed_work(clip.vertex_count, clip.frame_count, options.effort), report, "branches")
+        work = Work(
+            BRANCH_SHARE * allowed_work(clip.vertex_count, clip.frame_count, options.effort), report, "branches"
+        )
         work.report()
         branches = best_branches(clip, option, work, options.host_rest)
     job = EncodingJob.begin(clip, branches, options, report)

@@ -19,7 +19,7 @@ from athcodec.encoding.choices.rest import best_slack, with_slack
 from athcodec.encoding.choices.rigid import best_freedom, calm_parts
 from athcodec.encoding.choices.steps import best_level_steps, best_steps, finer_steps, walked
 from athcodec.encoding.features import Feature
-from athcodec.encoding.progress import ANALYSIS, TRIAL, Work, expected_trials
+from athcodec.encoding.progress import ANALYSIS, LEARNING, TRIAL, Work, expected_trials
 from athcodec.encoding.sample import ExtrapolationFactors, is_small, sample_plant
 from athcodec.encoding.segment import CodedPrelude, Source, branch_records
 from athcodec.encoding.segment_samples import samples_of
@@ -168,7 +168,9 @@ class Search:
     def at_first_step(self) -> Settings:
         """Bases, rotations and modes of a file of one layer, at the step that the search starts with."""
         if self.effort == "fast":
-            return self._after([best_level_steps, rotations.fast_rotations, learned_bases.best_waves], self.trials.start)
+            return self._after(
+                [best_level_steps, rotations.fast_rotations, learned_bases.best_waves], self.trials.start
+            )
         choices: list[Choose] = [
             best_freedom,
             forms.best_forms,
