@@ -248,8 +248,8 @@ def _begin(
         work = Work(
             BRANCH_SHARE * allowed_work(clip.vertex_count, clip.frame_count, options.effort), report, "branches"
         )
-        work.report()
-        branches = best_branches(clip, option, work, options.host_rest)
+        with work.trying("branches"):
+            branches = best_branches(clip, option, work, options.host_rest)
     job = EncodingJob.begin(clip, branches, options, report)
     if branches is not None:
         job.spent, job.untried = work.done, tuple(set(work.untried) & {"branches"})

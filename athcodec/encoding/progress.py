@@ -18,6 +18,7 @@ Progress = Callable[[str, float], None]
 # Microseconds of a thread, measured on clips of many kinds.
 SURVEY, MOTION = 0.11, 0.24  # For a vertex in a frame of the survey, and of a layer that is coded.
 ANALYSIS, PREDICTION, MAPS = 0.1, 0.3, 0.03  # For a vertex in a frame that is tried: transformed, predicted, in maps.
+TURNS = 0.06  # For the same where stems turn with what carries them.
 TRIAL = 1000  # For a trial, however small.
 CORRECTION = 5  # For a correction.
 POSE = 1.0  # For a vertex of a rest pose that is coded.

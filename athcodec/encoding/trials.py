@@ -202,7 +202,8 @@ class Trials:
             self._count(progress.TRIAL)
             return math.inf, np.full(self.levels, math.inf)
         corrections = sum(len(one.corrections.rows) for one in coded)
-        self._count(progress.TRIAL + self.work_of(progress.ANALYSIS) + progress.CORRECTION * corrections)
+        each = progress.ANALYSIS + progress.TURNS * any(settings.rotation_step_factors)
+        self._count(progress.TRIAL + self.work_of(each) + progress.CORRECTION * corrections)
         stored = streams.encode_learned_modes(plan, modes)
         mode_bytes = sum(len(stream) * self.extrapolation.rows[level] for level, stream in stored.items())
         return levels.sum() + mode_bytes + self.prelude_bytes(settings), levels
