@@ -41,7 +41,7 @@ from athcodec.encoding.layers import (
     layer_ratios,
     layers_of,
 )
-from athcodec.encoding.progress import MOTION, SURVEY, Progress, Work, allowed_work, silent
+from athcodec.encoding.progress import LEVEL_MOTION, MOTION, SURVEY, Progress, Work, allowed_work, silent
 from athcodec.encoding.sample import is_small
 from athcodec.encoding.search import Search
 from athcodec.encoding.segment import CodedPrelude, Source, thread_count
@@ -411,7 +411,8 @@ class EncodingJob:
         """Return the work that the decisions about a file may take: what its survey and coding leave of all."""
         vertices, frames = self.clip.vertex_count, self.clip.frame_count
         layers = len(layer_ratios(self.options.ladder, bound, self.seen.diagonal))
-        coding = (SURVEY + MOTION * (1 + layers)) * vertices * frames
+        levels = int(self.source.hierarchy.branch_depth.max())
+        coding = (SURVEY + MOTION * (1 + layers) + LEVEL_MOTION * levels) * vertices * frames
         return Work(allowed_work(vertices, frames, self.options.effort) - coding - self.spent, self.report)
 
     def _best_of(self, search: Search, choices: list[Choice], prelude: CodedPrelude) -> _Decided:

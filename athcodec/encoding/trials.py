@@ -56,6 +56,9 @@ class Trials:
     extrapolation: ExtrapolationFactors | None = (
         None  # Factors from the sample to the plant; None: the sample is the plant.
     )
+    map_errors: dict[int, float] = field(
+        init=False, default_factory=dict
+    )  # Errors of maps by level.
     _work_done: int = field(init=False, default=0)  # Work of all trials.
     _known: dict[tuple, tuple[float, np.ndarray]] = field(init=False, default_factory=dict)
     _components: dict[tuple, Components] = field(init=False, default_factory=dict)
@@ -201,9 +204,12 @@ class Trials:
         except BoundError:
             self._count(progress.TRIAL)
             return math.inf, np.full(self.levels, math.inf)
-        corrections = sum(len(one.corrections.rows) for one in coded)
+        coding = sum(
+            progress.BYTE * sum(map(len, one.stems.values())) + progress.CORRECTION * len(one.corrections.rows)
+            for one in coded
+        )
         each = progress.ANALYSIS + progress.TURNS * any(settings.rotation_step_factors)
-        self._count(progress.TRIAL + self.work_of(each) + progress.CORRECTION * corrections)
+        self._count(progress.TRIAL + self.work_of(each) + coding)
         stored = streams.encode_learned_modes(plan, modes)
         mode_bytes = sum(len(stream) * self.extrapolation.rows[level] for level, stream in stored.items())
         return levels.sum() + mode_bytes + self.prelude_bytes(settings), levels

@@ -34,7 +34,7 @@ def best_bases(settings: Settings, trials: Trials) -> Settings:
 def waves_if_smaller(settings: Settings, trials: Trials) -> Settings:
     """Return the settings with waves if learned time bases no longer pay at the final steps. They are learned again at
     these steps, as for the file: a component that is just left out may be kept at another step."""
-    if not any(settings.learned_bases) or not trials.work.fits(trials.work_of_trial):
+    if not any(settings.learned_bases) or not trials.work.fits(2 * trials.work_of_trial):
         return settings
     trials.forget(settings)
     return trials.cheapest([settings, settings.in_waves()])

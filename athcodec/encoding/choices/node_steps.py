@@ -77,9 +77,12 @@ def _level_errors(trials: Trials, bound: float) -> np.ndarray:
     frames[:, source.hierarchy.vertex_source] = np.moveaxis(sample[:, :, some], 2, 0) + source.origin
     nodes = inner_nodes(source, ath, trials.levels)
     errors = np.full(trials.levels, bound)
-    for level in np.flatnonzero(nodes):
-        away = ath.approximation(frames, int(level)) - frames
-        whole = max(bound, math.sqrt((away**2).sum() / (frames.size / 3)))
+    for level in np.flatnonzero(nodes).tolist():
+        if level not in trials.map_errors:
+            away = ath.approximation(frames, level) - frames
+            trials.map_errors[level] = math.sqrt((away**2).sum() / (frames.size / 3))
+            trials.work.add(progress.LEVEL * source.clip.vertex_count)
+        whole = max(bound, trials.map_errors[level])
         errors[level] = whole * math.sqrt(source.clip.vertex_count / nodes[level])
     return errors
 
