@@ -29,20 +29,21 @@ LEAST_TRIALS = 8  # Trials of settings that tell which branches are better.
 def best_branches(clip: MotionClip, option: BoundOption, work: Work, host_rest: bool = False) -> Found:
     """Return the candidate that makes the smallest file of a few frames at the bound, of those that fit the work.
     Predicted motion hardly depends on branches: if two candidates have it, no others are tried."""
-    proposals = candidates(clip)
-    best, second = next(proposals), next(proposals, None)
-    work.add(FINDING * clip.vertex_count)
+    proposals, trial, finding = candidates(clip), _Trial(clip, option, host_rest, work), FINDING * clip.vertex_count
+    best, least, predicted = next(proposals), math.inf, 0
+    work.add(finding)
+    second = next(proposals, None) if work.fits(finding + 2 * trial.least_work) else None
     if second is None:
         return best
-    trial, least, predicted = _Trial(clip, option, host_rest, work), math.inf, 0
     for number, branches in enumerate(chain([best, second], proposals), start=1):
         size, is_predicted = trial.size(branches)
         predicted += is_predicted
         if size < least:
             best, least = branches, size
-        if predicted == number > 1 or not work.fits(FINDING * clip.vertex_count + trial.least_work):
-            break
-        work.add(FINDING * clip.vertex_count)
+        if number > 1:
+            work.add(finding)
+            if predicted == number or not work.fits(finding + trial.least_work):
+                break
     if best.stem_index is None or best.method != "motion" or not work.fits(trial.least_work):
         return best
     unordered = dataclasses.replace(best, stem_index=None)  # The source's order of vertices costs no bytes.

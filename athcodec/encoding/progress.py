@@ -17,16 +17,16 @@ Progress = Callable[[str, float], None]
 
 # Microseconds of a thread, measured on clips of many kinds.
 SURVEY, MOTION = 0.11, 0.24  # For a vertex in a frame of the survey, and of a layer that is coded.
-ANALYSIS, PREDICTION, MAPS = 0.08, 0.3, 0.1  # For a vertex in a frame that is tried: transformed, predicted, in maps.
+ANALYSIS, PREDICTION, MAPS = 0.06, 0.3, 0.1  # For a vertex in a frame that is tried: transformed, predicted, in maps.
 TURNS = 0.03  # For the same where stems turn with what carries them.
 TRIAL = 1000  # For a trial, however small.
 BYTE = 0.3  # For a byte of a stream.
-CORRECTION = 5  # For a correction.
+CORRECTION = 4  # For a correction.
 LEVEL = 6  # For a vertex to which the maps of a level are fitted in a few frames.
 LEVEL_MOTION = 0.06  # For a vertex in a frame at a level of the hierarchy of a file.
 POSE = 1.0  # For a vertex of a rest pose that is coded.
 COMPONENT = 0.001  # For a vertex and a pair of frames of which components over time are made.
-FINDING = 60  # For a vertex of a clip whose branches are sought in one way.
+FINDING = 40  # For a vertex of a clip whose branches are sought in one way.
 BRANCH_SHARE = 0.45  # Largest share of all work that finding branches takes.
 LEARNING = 0.2  # For a vertex in a frame from which modes are learned.
 LEAST_WORK, WORK = 3e6, 5.0  # An encoding may take so much, and so much more for each vertex in a frame.

@@ -35,7 +35,8 @@ REFINEMENTS_MAX_GAIN = (
 NEAREST, NEAR_RATIO = 4, 1.12  # Steps are walked for so many other choices, of at most so many times the least bytes.
 SETTLING_ROUNDS = 64  # Largest number of times that the choices of a small clip are changed.
 
-FIRST_SHARE = 0.5  # Largest share of the work that is left for what is chosen before steps are walked.
+FIRST_SHARE = 0.7  # Largest share of the work that is left for what is chosen before steps are walked.
+LAST_LAYER_SHARE = 0.85  # Largest share of it that the last layer takes, where there are others.
 LEAST_TRIALS = 12  # Trials without which another reference pose is not tried.
 
 Choose = Callable[[Settings, Trials], Settings]
@@ -73,14 +74,14 @@ def _nearest(settings: Settings, others: list[Settings], trials: Trials) -> list
 CHOICES: dict[Choose, tuple[str, float]] = {
     best_level_steps: ("steps of levels", 0.2),
     best_freedom: ("freedom of rigid parts", 0.2),
-    forms.best_forms: ("forms", 0.3),
-    rotations.best_rotations: ("rotations", 0.3),
+    forms.best_forms: ("forms", 0.4),
+    rotations.best_rotations: ("rotations", 0.4),
     rotations.fast_rotations: ("rotations", 1.0),
     learned_bases.best_bases: ("time bases", 0.6),
     learned_bases.best_waves: ("periodic waves", 1.0),
     learned_bases.waves_if_smaller: ("time bases", 1.0),
-    learned_pieces.best_pieces: ("learned modes", 0.7),
-    learned_pieces.best_pieces_in_any_basis: ("learned modes", 0.7),
+    learned_pieces.best_pieces: ("learned modes", 0.8),
+    learned_pieces.best_pieces_in_any_basis: ("learned modes", 0.8),
     best_steps: ("steps", 0.8),
     finer_steps: ("finer steps", 1.0),
     calm_parts: ("calm parts", 0.5),
@@ -142,8 +143,10 @@ class Search:
 
     def decide(self) -> tuple[list[Choice], CodedPrelude]:
         """Return settings to choose from, and hierarchy and poses as coded with them."""
-        search = self.about_best_reference()
-        self.cost = search.cost_of_best
+        share = LAST_LAYER_SHARE if self.trials.is_layered and self.effort != "fast" else 1.0
+        with self.trials.work.trying("reference pose", share):
+            search = self.about_best_reference()
+            self.cost = search.cost_of_best
         trials, (first_layer, candidates) = search.trials, search.candidates()
         prelude = trials.prelude(candidates[0])
         choices = [
@@ -196,7 +199,9 @@ class Search:
             choices = []
         if self.effort == "best" and self.trials.source.weights is None:
             choices += [rotations.best_rotations, learned_bases.best_bases, finer_steps]
-        return self._after([*choices, best_node_steps], self.at_best_step)
+        if not self.trials.is_layered:  # The first of several layers has maps, and chooses their steps itself.
+            choices = [*choices, best_node_steps]
+        return self._after(choices, self.at_best_step)
 
     def _after(self, choices: Sequence[Choose], settings: Settings) -> Settings:
         for choose in choices:

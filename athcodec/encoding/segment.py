@@ -48,7 +48,7 @@ ROWS_AT_ONCE = 1 << 14  # Rows of coefficients whose moments are added at once.
 WORK_BYTES = 1 << 30  # Memory of the segments coded at once, unless `jobs` says how many.
 SAMPLED = 4000  # Number of vertices from which trials find corrections of a sample of them only.
 LEAST_SAMPLED, SPARSE = 1000, 16  # Vertices from which one of so many is enough if it takes enough corrections.
-ENOUGH = 2000  # Corrections that show how many bytes all of them take.
+ENOUGH, ENOUGH_SHARE = 2000, 0.015  # Corrections that show the bytes of all, and more for each vertex in a frame.
 SEGMENT_WORK = 16  # Memory of a segment while it is coded, over its float32 positions.
 
 
@@ -693,7 +693,8 @@ def _some_corrections(
     least, few = 1 if len(decoded) < SAMPLED else 2, None
     if len(decoded) >= LEAST_SAMPLED:
         few = corrections(SPARSE)
-        least = max(least, 1 << int(SPARSE * len(few[0].rows) / ENOUGH).bit_length() >> 1)
+        enough = ENOUGH + ENOUGH_SHARE * len(decoded) * decoded.shape[2]
+        least = max(least, 1 << int(SPARSE * len(few[0].rows) / enough).bit_length() >> 1)
     return few if few is not None and least >= SPARSE else corrections(least)
 
 

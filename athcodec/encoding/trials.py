@@ -56,9 +56,7 @@ class Trials:
     extrapolation: ExtrapolationFactors | None = (
         None  # Factors from the sample to the plant; None: the sample is the plant.
     )
-    map_errors: dict[int, float] = field(
-        init=False, default_factory=dict
-    )  # Errors of maps by level.
+    map_errors: dict[int, float] = field(init=False, default_factory=dict)  # Errors of maps by level.
     _work_done: int = field(init=False, default=0)  # Work of all trials.
     _known: dict[tuple, tuple[float, np.ndarray]] = field(init=False, default_factory=dict)
     _components: dict[tuple, Components] = field(init=False, default_factory=dict)

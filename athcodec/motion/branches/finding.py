@@ -81,29 +81,29 @@ def candidates(clip: MotionClip) -> Iterator[Found]:
         if first is not None:
             yield first
         return
-    first = _first_found(seen, METHODS, None) or _by_motion(seen, None)
-    if first.method == "skeleton":
+    first = _first_found(seen, METHODS[:-1], None)
+    if first is not None and not (first.method == "runs" and _leaves_many_alone(first)):
         yield first
-        yield dataclasses.replace(first, stem_index=None)
-        return
-    lone = np.count_nonzero(np.bincount(first.vertex_branch) == 1)
-    if first.method == "components":
-        unwelded = pieces(clip)  # Leaves that touch are welded, which is wrong if they move by themselves.
-        yield first
-        if len(unwelded.branch_parent) != len(first.branch_parent):
-            yield unwelded
-        return
-    if first.method != "motion" and not (first.method == "runs" and lone > LONE_POINTS * clip.vertex_count):
-        yield first
+        if first.method == "skeleton":
+            yield dataclasses.replace(first, stem_index=None)
+        if first.method == "components":
+            unwelded = pieces(clip)  # Leaves that touch are welded, which is wrong if they move by themselves.
+            if len(unwelded.branch_parent) != len(first.branch_parent):
+                yield unwelded
         return
     yield single
-    yield first
-    if first.method != "motion":
-        yield _by_motion(seen, None)
+    if first is not None:
+        yield first
+    yield _by_motion(seen, None)
     is_large = clip.vertex_count >= LARGE_MESH
     yield _by_motion(seen, None, LARGE_PATCH if is_large else SMALL_PATCH)
     for size in FREE_PATCHES[-1:] if is_large else FREE_PATCHES:
         yield _free_patches(seen, size)
+
+
+def _leaves_many_alone(found: Found) -> bool:
+    """Return whether many branches are a single vertex."""
+    return np.count_nonzero(np.bincount(found.vertex_branch) == 1) > LONE_POINTS * len(found.vertex_branch)
 
 
 def pieces(clip: MotionClip) -> Found:
