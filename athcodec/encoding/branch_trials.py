@@ -16,7 +16,7 @@ from athcodec.encoding.survey import survey
 from athcodec.errors import BoundError
 from athcodec.motion.branches.finding import candidates
 from athcodec.motion.branches.result import Found, with_branches
-from athcodec.motion.clip import MotionClip
+from athcodec.motion.clip import MotionClip, stands_still
 from athcodec.motion.hierarchy import hierarchy_of
 from athcodec.options import DEFAULT_SEGMENT
 
@@ -29,8 +29,9 @@ LEAST_TRIALS = 8  # Trials of settings that tell which branches are better.
 def best_branches(clip: MotionClip, option: BoundOption, work: Work, host_rest: bool = False) -> Found:
     """Return the candidate that makes the smallest file of a few frames at the bound, of those that fit the work.
     Predicted motion hardly depends on branches: if two candidates have it, no others are tried."""
-    proposals, trial, finding = candidates(clip), _Trial(clip, option, host_rest, work), FINDING * clip.vertex_count
+    proposals, trial = candidates(clip), _Trial(clip, option, host_rest, work)
     best, least, predicted = next(proposals), math.inf, 0
+    finding = FINDING * clip.vertex_count if best.method == "motion" and not stands_still(clip) else 0.0
     work.add(finding)
     second = next(proposals, None) if work.fits(finding + 2 * trial.least_work) else None
     if second is None:

@@ -41,7 +41,7 @@ from athcodec.encoding.layers import (
     layer_ratios,
     layers_of,
 )
-from athcodec.encoding.progress import LEVEL_MOTION, MOTION, SURVEY, Progress, Work, allowed_work, silent
+from athcodec.encoding.progress import FILE_BYTE, LEVEL_MOTION, MOTION, SURVEY, Progress, Work, allowed_work, silent
 from athcodec.encoding.sample import is_small
 from athcodec.encoding.search import Search
 from athcodec.encoding.segment import CodedPrelude, Source, thread_count
@@ -390,6 +390,8 @@ class EncodingJob:
         share = PREDICTED_SHARE if ratio > 1 else 1.0
         search = Search.of(self.source, ath, bound, self.options.effort, work, self.options.jobs, ratios)
         unsearched = share * search.first_cost()
+        if math.isfinite(unsearched):
+            work.allowed -= FILE_BYTE * unsearched
         prediction = None if search.trials.start.rigid.any() else self._best_prediction(bound, unsearched, work)
         if prediction is not None and prediction.bytes < SEARCH_SAVES * unsearched:
             return self._predicted(prediction.choice)

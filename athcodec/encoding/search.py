@@ -36,7 +36,7 @@ NEAREST, NEAR_RATIO = 4, 1.12  # Steps are walked for so many other choices, of 
 SETTLING_ROUNDS = 64  # Largest number of times that the choices of a small clip are changed.
 
 FIRST_SHARE = 0.7  # Largest share of the work that is left for what is chosen before steps are walked.
-LAST_LAYER_SHARE = 0.85  # Largest share of it that the last layer takes, where there are others.
+LAST_LAYER_SHARE = 0.7  # Largest share of it that the last layer takes, where there are others.
 LEAST_TRIALS = 12  # Trials without which another reference pose is not tried.
 
 Choose = Callable[[Settings, Trials], Settings]
