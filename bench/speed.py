@@ -27,10 +27,10 @@ DECODES = 7
 SECONDS, MICROSECONDS = 3.0, 5.0  # The limit of encoding, and what each vertex in a frame of the source adds to it.
 
 NOTE = f"""
-Encode: at default effort; CPU: its processor time. CPU/limit: over {SECONDS:g} s and {MICROSECONDS:g} us for each vertex
-in a frame; at most 1. Untried: choices that the encoder left out to keep to it. Decode: opening and all positions as
-one float32 array. Frame: opening and one frame at level 1; read: bytes of the file that this needs. Decode/HDF5: over
-reading the same positions with h5py, gzip and shuffle; above 1: slower.
+Encode: at default effort. CPU: processor time of that, all threads; CPU/limit: over {SECONDS:g} s and
+{MICROSECONDS:g} us for each vertex in a frame, at most 1. Untried: choices that the encoder left out to keep to it.
+Decode: opening and all positions as one float32 array. Frame: opening and one frame at level 1; read: bytes of the
+file that this needs. Decode/HDF5: over reading the same positions with h5py, gzip and shuffle; above 1: slower.
 """
 
 

@@ -248,6 +248,7 @@ def _begin(
         work = Work(
             BRANCH_SHARE * allowed_work(clip.vertex_count, clip.frame_count, options.effort), report, "branches"
         )
+        work.expected = BRANCH_SHARE * allowed_work(clip.vertex_count, clip.frame_count, "default")
         with work.trying("branches"):
             branches = best_branches(clip, option, work, options.host_rest)
     job = EncodingJob.begin(clip, branches, options, report)

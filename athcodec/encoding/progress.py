@@ -74,7 +74,8 @@ class Work:
         """Return whether so much more work is allowed; else the choice that is tried counts as left out."""
         if self.done + work <= self.allowed:
             return True
-        self.untried[self._choice] = None
+        if self._choice:
+            self.untried[self._choice] = None
         return False
 
     @contextmanager

@@ -103,10 +103,6 @@ class Search:
         source, keeps_shape = self.trials.source, self.trials.start.turn_step > 0  # A few bytes less cost the shape.
         self._forms: np.ndarray | None = None
         self._is_small = is_small(source.clip.vertex_count, source.segments, self.effort) and not keeps_shape
-        trial = TRIAL + (self.of_sample or self).trials.work_of(ANALYSIS)
-        expected = trial * expected_trials(self.effort, self.trials.is_layered, self._is_small)
-        work = self.trials.work
-        work.expected = work.expected or min(expected, work.allowed)
 
     @classmethod
     def of(
@@ -122,7 +118,11 @@ class Search:
         """Return the search for a whole plant."""
         samples = samples_of(source)
         start = first_settings(source, ath, bound, samples, ratios)
-        return cls(Trials(source, ath, start, samples, jobs, work), effort, ratios)
+        search = cls(Trials(source, ath, start, samples, jobs, work), effort, ratios)
+        trial = TRIAL + (search.of_sample or search).trials.work_of(ANALYSIS)
+        expected = trial * expected_trials(effort, search.trials.is_layered, search._is_small)
+        work.expected = work.expected or min(expected, work.allowed)
+        return search
 
     def first_cost(self) -> float:
         """Return the bytes of a whole file at the settings that the search starts with."""
