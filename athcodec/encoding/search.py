@@ -35,8 +35,7 @@ REFINEMENTS_MAX_GAIN = (
 NEAREST, NEAR_RATIO = 4, 1.12  # Steps are walked for so many other choices, of at most so many times the least bytes.
 SETTLING_ROUNDS = 64  # Largest number of times that the choices of a small clip are changed.
 
-FIRST_SHARE = 0.7  # Largest share of the work that is left for what is chosen before steps are walked.
-LAST_LAYER_SHARE = 0.7  # Largest share of it that the last layer takes, where there are others.
+STEP_TRIALS, FIRST_LAYER_TRIALS = 10, 10  # Trials for which choices leave work: of steps, and of the first of layers.
 LEAST_TRIALS = 12  # Trials without which another reference pose is not tried.
 
 Choose = Callable[[Settings, Trials], Settings]
@@ -75,6 +74,7 @@ CHOICES: dict[Choose, tuple[str, float]] = {
     best_level_steps: ("steps of levels", 0.2),
     best_freedom: ("freedom of rigid parts", 0.2),
     forms.best_forms: ("forms", 0.4),
+    forms.best_forms_again: ("forms", 0.2),
     rotations.best_rotations: ("rotations", 0.4),
     rotations.fast_rotations: ("rotations", 1.0),
     learned_bases.best_bases: ("time bases", 0.6),
@@ -143,8 +143,8 @@ class Search:
 
     def decide(self) -> tuple[list[Choice], CodedPrelude]:
         """Return settings to choose from, and hierarchy and poses as coded with them."""
-        share = LAST_LAYER_SHARE if self.trials.is_layered and self.effort != "fast" else 1.0
-        with self.trials.work.trying("reference pose", share):
+        of_first_layer = FIRST_LAYER_TRIALS * self.trials.is_layered
+        with self.trials.work.trying("reference pose", (self.of_sample or self)._share_beside(of_first_layer)):
             search = self.about_best_reference()
             self.cost = search.cost_of_best
         trials, (first_layer, candidates) = search.trials, search.candidates()
@@ -179,10 +179,10 @@ class Search:
             forms.best_forms,
             rotations.best_rotations,
             learned_bases.best_bases,
-            forms.best_forms,
+            forms.best_forms_again,
             learned_pieces.best_pieces_in_any_basis,
         ]
-        with self.trials.work.trying("steps", FIRST_SHARE):
+        with self.trials.work.trying("steps", self._share_beside(STEP_TRIALS)):
             return self._after([best_level_steps, *choices, learned_bases.best_waves], self.trials.start)
 
     @cached_property
@@ -202,6 +202,11 @@ class Search:
         if not self.trials.is_layered:  # The first of several layers has maps, and chooses their steps itself.
             choices = [*choices, best_node_steps]
         return self._after(choices, self.at_best_step)
+
+    def _share_beside(self, trials: int) -> float:
+        """Return the share of the work that is left that leaves room for so many more trials, but at least half."""
+        left = self.trials.work.allowed - self.trials.work.done
+        return max(0.5, 1 - trials * self.trials.work_of_trial / left) if left > 0 else 1.0
 
     def _after(self, choices: Sequence[Choose], settings: Settings) -> Settings:
         for choose in choices:

@@ -95,7 +95,8 @@ class Trials:
     @property
     def work_of_trial(self) -> float:
         """The work of a usual trial."""
-        return self._work_done / len(self._known) if self._known else 0.0
+        usual = progress.TRIAL + self.work_of(progress.ANALYSIS + progress.TURNS)
+        return self._work_done / len(self._known) if self._known else usual
 
     def cost(self, settings: Settings) -> float:
         """Return the bytes of a whole file, without maps of nodes; infinite if the bound cannot be kept."""
