@@ -17,10 +17,10 @@ Progress = Callable[[str, float], None]
 
 # Microseconds of a thread, measured on clips of many kinds.
 SURVEY, MOTION = 0.11, 0.24  # For a vertex in a frame of the survey, and of a layer that is coded.
-ANALYSIS, PREDICTION, MAPS = 0.06, 0.3, 0.1  # For a vertex in a frame that is tried: transformed, predicted, in maps.
+ANALYSIS, PREDICTION, MAPS = 0.09, 0.3, 0.1  # For a vertex in a frame that is tried: transformed, predicted, in maps.
 TURNS = 0.03  # For the same where stems turn with what carries them.
 TRIAL = 1000  # For a trial, however small.
-BYTE, FILE_BYTE = 0.3, 1.5  # For a byte of a stream that is tried, and of a file that is coded.
+BYTE, FILE_BYTE = 0.05, 1.5  # For a byte of a stream that is tried, and of a file that is coded.
 CORRECTION = 4  # For a correction.
 LEVEL = 6  # For a vertex to which the maps of a level are fitted in a few frames.
 LEVEL_MOTION = 0.06  # For a vertex in a frame at a level of the hierarchy of a file.

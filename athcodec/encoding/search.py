@@ -222,7 +222,8 @@ class Search:
         first = replace(self.best.coarser(self.ratios[0]), learned_pieces=None)
         if not first.turn_step:  # Else turns are as fine as those of refinements, which have that basis.
             first = first.in_waves()
-            choices.insert(1, learned_bases.best_bases)
+            has_room = self._share_beside(FIRST_LAYER_TRIALS) > 0.5
+            choices.insert(int(has_room), learned_bases.best_bases)  # Bases save more than rotations.
         return self._after([*([] if self.effort == "fast" else choices), best_node_steps], first)
 
     def refinements(self) -> Iterator[Settings]:
