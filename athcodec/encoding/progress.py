@@ -17,7 +17,8 @@ Progress = Callable[[str, float], None]
 
 # Microseconds of a thread, measured on clips of many kinds.
 SURVEY, MOTION = 0.11, 0.24  # For a vertex in a frame of the survey, and of a layer that is coded.
-ANALYSIS, PREDICTION, MAPS = 0.09, 0.3, 0.1  # For a vertex in a frame that is tried: transformed, predicted, in maps.
+ANALYSIS, PREDICTION = 0.09, 0.3  # For a vertex in a frame that is tried: transformed, predicted.
+MAPS = 0.008  # For a vertex in a frame at a level whose maps are tried.
 TURNS = 0.03  # For the same where stems turn with what carries them.
 TRIAL = 1000  # For a trial, however small.
 BYTE, FILE_BYTE = 0.05, 1.5  # For a byte of a stream that is tried, and of a file that is coded.

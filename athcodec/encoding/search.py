@@ -35,7 +35,7 @@ REFINEMENTS_MAX_GAIN = (
 NEAREST, NEAR_RATIO = 4, 1.12  # Steps are walked for so many other choices, of at most so many times the least bytes.
 SETTLING_ROUNDS = 64  # Largest number of times that the choices of a small clip are changed.
 
-STEP_TRIALS, FIRST_LAYER_TRIALS = 10, 10  # Trials for which choices leave work: of steps, and of the first of layers.
+STEP_TRIALS, FIRST_LAYER_TRIALS = 10, 6  # Trials for which choices leave work: of steps, and of the first of layers.
 LEAST_TRIALS = 12  # Trials without which another reference pose is not tried.
 
 Choose = Callable[[Settings, Trials], Settings]
@@ -74,7 +74,7 @@ CHOICES: dict[Choose, tuple[str, float]] = {
     best_level_steps: ("steps of levels", 0.2),
     best_freedom: ("freedom of rigid parts", 0.2),
     forms.best_forms: ("forms", 0.4),
-    forms.best_forms_again: ("forms", 0.2),
+    forms.best_forms_again: ("forms", 0.1),
     rotations.best_rotations: ("rotations", 0.4),
     rotations.fast_rotations: ("rotations", 1.0),
     learned_bases.best_bases: ("time bases", 0.6),

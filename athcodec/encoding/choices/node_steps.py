@@ -36,7 +36,7 @@ def best_node_steps(settings: Settings, trials: Trials) -> Settings:
     for quality in qualities:
         steps = quality * errors
         segment.clear_nodes()
-        trials.work.add(trials.work_of(progress.MAPS))
+        trials.work.add(trials.work_of(progress.MAPS * trials.levels))
         segment.analyse_nodes(sample, steps, settings.rounding)
         if limits is None:
             if _map_bytes(segment, trials) > allowed and quality is not qualities[-1]:
