@@ -35,7 +35,7 @@ REFINEMENTS_MAX_GAIN = (
 NEAREST, NEAR_RATIO = 4, 1.12  # Steps are walked for so many other choices, of at most so many times the least bytes.
 SETTLING_ROUNDS = 64  # Largest number of times that the choices of a small clip are changed.
 
-STEP_TRIALS, FIRST_LAYER_TRIALS = 15, 6  # Trials for which choices leave work: of steps, and of the first of layers.
+STEP_TRIALS, FIRST_LAYER_TRIALS = 12, 6  # Trials for which choices leave work: of steps, and of the first of layers.
 LEAST_TRIALS = 12  # Trials without which another reference pose is not tried.
 
 Choose = Callable[[Settings, Trials], Settings]
