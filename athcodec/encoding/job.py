@@ -414,7 +414,7 @@ class EncodingJob:
         vertices, frames = self.clip.vertex_count, self.clip.frame_count
         layers = len(layer_ratios(self.options.ladder, bound, self.seen.diagonal))
         levels = int(self.source.hierarchy.branch_depth.max())
-        coding = (SURVEY + MOTION * layers + LEVEL_MOTION * levels) * vertices * frames
+        coding = (SURVEY + MOTION * (1 + layers) / 2 + LEVEL_MOTION * levels) * vertices * frames
         return Work(allowed_work(vertices, frames, self.options.effort) - coding - self.spent, self.report)
 
     def _best_of(self, search: Search, choices: list[Choice], prelude: CodedPrelude) -> _Decided:

@@ -16,7 +16,7 @@ from athcodec.encoding.sample import is_small, sample_vertices
 Progress = Callable[[str, float], None]
 
 # Microseconds of a thread, measured on clips of many kinds.
-SURVEY, MOTION = 0.11, 0.16  # For a vertex in a frame of the survey, and of a layer that is coded.
+SURVEY, MOTION = 0.11, 0.24  # For a vertex in a frame of the survey, and of a layer that is coded.
 ANALYSIS, PREDICTION = 0.09, 0.3  # For a vertex in a frame that is tried: transformed, predicted.
 MAPS = 0.008  # For a vertex in a frame at a level whose maps are tried.
 TURNS = 0.03  # For the same where stems turn with what carries them.
