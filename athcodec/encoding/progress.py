@@ -135,7 +135,7 @@ def stage_weights(
     longest, frames = max(stop - start for start, stop in segments), segments[-1][1]
     small = is_small(vertices, segments, effort)
     some = vertices if (part := sample_vertices(vertices, len(segments), effort)) is None else part
-    trial = TRIAL + ANALYSIS * samples * some * longest
+    trial = (ANALYSIS + TURNS) * samples * some * longest
     work = {
         "survey": SURVEY * vertices * frames,
         "search": min(expected_trials(effort, layers > 1, small) * trial, allowed_work(vertices, frames, effort)),
