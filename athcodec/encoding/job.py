@@ -41,7 +41,7 @@ from athcodec.encoding.layers import (
     layer_ratios,
     layers_of,
 )
-from athcodec.encoding.progress import Progress, silent
+from athcodec.encoding.progress import FILE_BYTE, LEVEL_MOTION, MOTION, SURVEY, Progress, Work, allowed_work, silent
 from athcodec.encoding.sample import is_small
 from athcodec.encoding.search import Search
 from athcodec.encoding.segment import CodedPrelude, Source, thread_count
@@ -256,6 +256,8 @@ class EncodingJob:
     options: EncodingOptions
     report: Progress = silent
     branches: Found | None = None
+    spent: float = 0.0  # Work of finding branches.
+    untried: tuple[str, ...] = ()  # What that left out.
 
     @classmethod
     def begin(
@@ -374,17 +376,42 @@ class EncodingJob:
             low, high = (bound, high) if self.file_size(bound) == math.inf else (low, bound)
         return high
 
+    def tried(self, bound: float, work: Work, frames_ratio: float) -> tuple[float, bool]:
+        """Return about the bytes of a file of so many times the frames, as far as the work allowed tells, and whether
+        its motion is predicted; infinite if the bound cannot be kept."""
+        return self._holding(bound)._tried(bound, work, frames_ratio)
+
+    def _tried(self, bound: float, work: Work, frames_ratio: float) -> tuple[float, bool]:
+        try:
+            self._check(bound)
+            if self.source.still:
+                return self.decide(bound).shared_bytes, False
+            ath = self.seen.ath(self.thresholds(bound))
+            search = Search.of(self.source, ath, bound, self.options.effort, work, self.options.jobs)
+            unsearched = search.first_cost()
+            prediction = self._best_prediction(bound, unsearched, work)
+            if prediction is not None and prediction.bytes < SEARCH_SAVES * unsearched:
+                return frames_ratio * prediction.bytes, True
+            best, predicted = search.tried(frames_ratio), math.inf if prediction is None else prediction.bytes
+            return min((best, False), (frames_ratio * predicted, True))
+        except BoundError:
+            return math.inf, False
+
     def decide(self, bound: float) -> _Decided:
         """Search for settings."""
         self._check(bound)
-        return self._holding(bound)._decide(bound)
+        work = self._allowed_work(bound)
+        decided = self._holding(bound)._decide(bound, work)
+        untried = tuple(dict.fromkeys([*self.untried, *work.untried]))
+        decided.choice = dataclasses.replace(decided.choice, untried=untried)
+        return decided
 
     def _holding(self, bound: float) -> EncodingJob:
         """Return the job without frames that others show within a small part of the bound."""
         tolerance = 0.0 if self.options.lossless else HELD_SHARE * self.source.smallest_bound(bound)
         return dataclasses.replace(self, source=self.source.holding(tolerance))
 
-    def _decide(self, bound: float) -> _Decided:
+    def _decide(self, bound: float, work: Work) -> _Decided:
         ath = self.seen.ath(self.thresholds(bound))
         ratios = self._layer_ratios(ath, bound)
         ratio = ratios[0]
@@ -392,15 +419,20 @@ class EncodingJob:
             choice = still_choice(self.source, ath, bound, ratio)
             return self._layered(ath, choice, CodedPrelude(self.source, ath, choice.settings))
         share = PREDICTED_SHARE if ratio > 1 else 1.0
-        search = Search.of(self.source, ath, bound, self.options.effort, self.report, self.options.jobs, ratios)
+        search = Search.of(self.source, ath, bound, self.options.effort, work, self.options.jobs, ratios)
         unsearched = share * search.first_cost()
-        prediction = None if search.trials.start.rigid.any() else self._best_prediction(bound, unsearched)
+        if math.isfinite(unsearched):
+            work.allowed -= FILE_BYTE * unsearched
+        prediction = None if search.trials.start.rigid.any() else self._best_prediction(bound, unsearched, work)
         if prediction is not None and prediction.bytes < SEARCH_SAVES * unsearched:
             return self._predicted(prediction.choice)
         try:
-            best = self._found_by(search)
-            if self._is_short(best):
-                best = min(best, self._without_levels(bound), key=self._estimated_bytes)
+            choices, prelude = search.decide()
+            if prediction is not None and prediction.bytes < share * search.cost:
+                return self._predicted(prediction.choice)
+            best = self._best_of(search, choices, prelude)
+            if self._is_short(best) and work.fits(work.done):
+                best = min(best, self._without_levels(bound, work), key=self._estimated_bytes)
             if prediction is None or prediction.bytes >= share * self._estimated_bytes(best):
                 return best
         except BoundError:
@@ -408,9 +440,16 @@ class EncodingJob:
                 raise
         return self._predicted(prediction.choice)
 
-    def _found_by(self, search: Search) -> _Decided:
-        """Return the best candidate of a search."""
-        choices, prelude = search.decide()
+    def _allowed_work(self, bound: float) -> Work:
+        """Return the work that the decisions about a file may take: what its survey and coding leave of all."""
+        vertices, frames = self.clip.vertex_count, self.clip.frame_count
+        layers = len(layer_ratios(self.options.ladder, bound, self.seen.diagonal))
+        levels = int(self.source.hierarchy.branch_depth.max())
+        coding = (SURVEY + MOTION * (1 + layers) / 2 + LEVEL_MOTION * levels) * vertices * frames
+        return Work(allowed_work(vertices, frames, self.options.effort) - coding - self.spent, self.report)
+
+    def _best_of(self, search: Search, choices: list[Choice], prelude: CodedPrelude) -> _Decided:
+        """Return the best of what a search has found."""
         layered = [self._layered(search.trials.ath, choice, prelude) for choice in choices]
         return layered[0] if len(layered) == 1 else min(layered, key=self._estimated_bytes)
 
@@ -423,15 +462,18 @@ class EncodingJob:
         small = is_small(self.clip.vertex_count, self.source.segments, options.effort)
         return small and self._estimated_bytes(decided) <= FEW_BYTES
 
-    def _without_levels(self, bound: float) -> _Decided:
+    def _without_levels(self, bound: float, work: Work) -> _Decided:
         """Return the best file with one node for the whole plant, whatever its error."""
         ath = self.seen.ath(Thresholds(bound, self.clip.frame_count, self.seen.largest_distance.max(), 0))
-        return self._found_by(Search.of(self.source, ath, bound, self.options.effort, silent, self.options.jobs))
+        search = Search.of(self.source, ath, bound, self.options.effort, work, self.options.jobs)
+        return self._best_of(search, *search.decide())
 
-    def _best_prediction(self, bound: float, most_bytes: float) -> FoundPrediction | None:
+    def _best_prediction(self, bound: float, most_bytes: float, work: Work) -> FoundPrediction | None:
         """Return the best prediction; None: it is too large, or a hierarchy of maps is asked for, which it lacks."""
         is_out = self.options.tam or Feature.PREDICTED in self.options.without
-        return None if is_out else best_prediction(self._long_segments, bound, most_bytes, self.options.smoothness)
+        if is_out:
+            return None
+        return best_prediction(self._long_segments, bound, most_bytes, work, self.options.smoothness)
 
     @property
     def _long_segments(self) -> Source:
@@ -769,4 +811,5 @@ def _summary(
         job.seams(decoder),
         None if job.branches is None else str(job.branches),
         job.clip.not_read,
+        decided.choice.untried,
     )

@@ -48,6 +48,8 @@ ROWS_AT_ONCE = 1 << 14  # Rows of coefficients whose moments are added at once.
 WORK_BYTES = 1 << 30  # Memory of the segments coded at once, unless `jobs` says how many.
 SAMPLED = 4000  # Number of vertices from which trials find corrections of a sample of them only.
 WELD_TOLERANCE = 1e-7  # Size of the cells, in diagonals, in which vertices share a place.
+LEAST_SAMPLED, SPARSE = 1000, 16  # Vertices from which one of so many is enough if it takes enough corrections.
+ENOUGH, ENOUGH_SHARE = 2000, 0.015  # Corrections that show the bytes of all, and more for each vertex in a frame.
 SEGMENT_WORK = 16  # Memory of a segment while it is coded, over its float32 positions.
 
 
@@ -721,11 +723,32 @@ def code_stems(
         bases = learned_bases(prelude.plan, settings, positions)
     segment, decoded = analyse(prelude.plan, prelude.output, settings, positions, learned_modes, bases)
     stems, heads = stem_streams(segment, settings, bases)
-    some = prelude.plan.sample if prelude.plan.vertex_count >= SAMPLED else None
-    if some is None:
-        corrections = find_corrections(decoded, positions, prelude.origin, settings, prelude.plan)
-        return Coded(segment, stems, corrections, np.arange(len(decoded)), heads)
+    return Coded(segment, stems, *_some_corrections(prelude, settings, decoded, positions), heads)
+
+
+def _some_corrections(
+    prelude: CodedPrelude, settings: Settings, decoded: np.ndarray, positions: np.ndarray
+) -> tuple[Corrections, np.ndarray]:
+    """Return the corrections of a sample, and its vertices: fewer if they take many."""
+
+    def corrections(part: int) -> tuple[Corrections, np.ndarray]:
+        return sampled_corrections(prelude.plan, prelude.origin, settings, decoded, positions, part)
+
+    least, few = 1 if len(decoded) < SAMPLED else 2, None
+    if len(decoded) >= LEAST_SAMPLED:
+        few = corrections(SPARSE)
+        enough = ENOUGH + ENOUGH_SHARE * len(decoded) * decoded.shape[2]
+        least = max(least, 1 << int(SPARSE * len(few[0].rows) / enough).bit_length() >> 1)
+    return few if few is not None and least >= SPARSE else corrections(least)
+
+
+def sampled_corrections(
+    plan: Plan, origin: np.ndarray, settings: Settings, decoded: np.ndarray, positions: np.ndarray, part: int
+) -> tuple[Corrections, np.ndarray]:
+    """Return the corrections of one of so many parts of the pieces, and the vertices that they number."""
+    if part == 1:
+        return find_corrections(decoded, positions, origin, settings, plan), np.arange(len(decoded))
+    some = plan.sample(part)
     at, limit = some.vertices, settings.limit
     of_sample = replace(settings, limit=limit if np.isscalar(limit) else limit[at])
-    corrections = find_corrections(decoded[at], positions[at], prelude.origin, of_sample, some)
-    return Coded(segment, stems, corrections, at, heads)
+    return find_corrections(decoded[at], positions[at], origin, of_sample, some), at

@@ -133,3 +133,4 @@ class Choice:
     reference: np.ndarray | None = None  # (N, 3) pose that motion is coded about, less the origin; None: the rest pose.
     predicted: bool | None = None  # Whether vertices are points of the lattice, where motion is predicted.
     error_share: float = 1.0  # Share of the limits that the errors of predicted motion may take.
+    untried: tuple[str, ...] = ()  # What was left out of the search for these, in words.

@@ -19,6 +19,7 @@ from athcodec.encoding import streams, writing
 from athcodec.encoding.choices.rest import with_best_rest
 from athcodec.encoding.features import Feature
 from athcodec.encoding.motion import LevelStream, SegmentMotion, position_errors
+from athcodec.encoding.progress import PREDICTION, Work
 from athcodec.encoding.segment import CodedPrelude, Source, plain_settings
 from athcodec.encoding.segment_samples import SegmentSample, typical_segments
 from athcodec.encoding.settings import Choice, Settings
@@ -66,7 +67,7 @@ class FoundPrediction:
 
 
 def best_prediction(
-    source: Source, bound: float, most_bytes: float, smoothness: str = "default"
+    source: Source, bound: float, most_bytes: float, work: Work, smoothness: str = "default"
 ) -> FoundPrediction | None:
     """Return the best prediction; None: it takes more than `most_bytes`, or cannot keep the bound."""
     ath = one_map_each(source.seen)
@@ -82,6 +83,7 @@ def best_prediction(
     def coded(settings: Settings, lattice: bool = CUBES, error_share: float = 1.0) -> FoundPrediction:
         stepped = replace(settings, step=_largest_step(error_share * settings.limit, lattice))
         choice = Choice(stepped, stepped, None, predicted=lattice, error_share=error_share)
+        work.add(PREDICTION * source.clip.vertex_count * sum(sample.positions.shape[2] for sample in samples))
         try:
             prelude = prelude_of(settings)
             parts = [(sample, *_predicted(prelude, choice, sample.positions)) for sample in samples]
