@@ -63,9 +63,10 @@ class Frames:
             return np.empty((0, *self.shape[1:]), self.dtype)
         if self._kept is None:
             return self._read(start, stop)
-        if not self._is_kept[start:stop].all():
-            self._kept[start:stop] = self._read(start, stop)
-            self._is_kept[start:stop] = True
+        missing = start + np.flatnonzero(~self._is_kept[start:stop])
+        for run in np.split(missing, np.flatnonzero(np.diff(missing) > 1) + 1) if len(missing) else ():
+            self._kept[run[0] : run[-1] + 1] = self._read(int(run[0]), int(run[-1]) + 1)
+            self._is_kept[run] = True
         kept = self._kept[start:stop]
         kept.flags.writeable = False
         return kept
