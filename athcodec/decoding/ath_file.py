@@ -159,7 +159,7 @@ class AthFile(StaticData, SegmentDecoder):
     @property
     def _predicted_error_share(self) -> float | None:
         """The share of the bound that errors of predicted motion reach; None: it is not there."""
-        if not self.core.info.is_predicted or len(self.levels) < 2:
+        if not self.core.info.is_predicted or len(self.levels) < 2 or not self.max_error_bound:
             return None
         return self.levels[1].max_error / self.max_error_bound
 
