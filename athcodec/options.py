@@ -11,6 +11,7 @@ from typing import SupportsIndex
 DEFAULT_REL_ERROR = 1e-4
 LOSSLESS_REL_ERROR = 4e-7  # Error over the diagonal at which a lossless file is about smallest.
 EFFORTS = ("fast", "default", "best")
+SMOOTHNESS = {"default": 1.15, "bytes": 1.0, "motion": 2.0}  # Factors on the bytes that smooth errors may cost.
 LADDERS = {"none": (), "decades": (1e-2, 1e-3, 1e-4, 1e-5)}  # Largest errors over the diagonal.
 DEFAULT_LADDER = "decades"
 MIN_SEGMENT, MAX_SEGMENT, DEFAULT_SEGMENT = 16, 256, 128  # Frames.

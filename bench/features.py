@@ -22,7 +22,7 @@ from athcodec.encoding import Draft, code_segments, draft, write
 from athcodec.encoding.bounds import BoundOption
 from athcodec.encoding.branch_trials import best_branches
 from athcodec.encoding.features import Feature
-from athcodec.encoding.progress import silent
+from athcodec.encoding.progress import Work
 from athcodec.motion.branches.result import with_branches
 from athcodec.motion.polygons import Polygons
 from bench.clips import add_ladder, measure
@@ -139,7 +139,7 @@ class _Files:
 
     def __init__(self, clip: athcodec.MotionClip, bound: float, ladder: tuple[float, ...], path: Path):
         if not clip.has_branches:
-            clip = with_branches(clip, best_branches(clip, BoundOption(rel_error=bound), silent))
+            clip = with_branches(clip, best_branches(clip, BoundOption(rel_error=bound), Work()))
         self._clip, self._bound, self._ladder, self._path = clip, bound, ladder, path
         self._polygons = Polygons.of_attributes(clip.attributes) if clip.faces is None else Polygons.of_rows(clip.faces)
         self._whole: dict[str, tuple[Draft, int]] = {}

@@ -40,8 +40,8 @@ BOUNDS = {
     "odd-quick": (1e-3, 1e-5),
 }  # Other suites are measured at compare.BOUNDS.
 CODECS = {"odd-quick": (Athcodec.name, simple.NAME)}  # Other suites run all codecs.
-KEPT = ("foreign", "held-out")  # Suites whose results are kept in bench/results.
-IN_SHORT = (*KEPT, "odd", "odd-quick")  # Suites that are printed as one table.
+KEPT = ("foreign", "held-out", "odd-quick")  # Suites whose results are kept in bench/results.
+IN_SHORT = (*KEPT, "odd")  # Suites that are printed as one table.
 OUR_SECONDS, SECONDS = 600, 120  # Processor time of one encoding or decoding by athcodec and by others.
 WALL_FACTOR = 60  # Seconds that may pass per second of processor time, before a process is taken to hang.
 ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1"}  # Threads of NumPy's algebra that wait would count as processor time.

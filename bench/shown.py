@@ -111,7 +111,12 @@ SHOWN = {
         BENCHMARKS,
         "speed",
         picked(
-            "Speed", clip="clip", encode_s="encode", decode_s="decode", gzip_HDF5_s="HDF5", frame_at_level_1_s="frame"
+            "Speed",
+            clip="clip",
+            encode_cpu_s="CPU",
+            over_limit="CPU/limit",
+            decode_s="decode",
+            frame_at_level_1_s="frame",
         ),
     ),
     "memory": Shown(

@@ -232,9 +232,7 @@ class File:
         if (rules.SOURCE_REST, None, 0) in self.chunks:
             points, is_exact = rules.source_rest(file, plans), self.content(rules.SOURCE_REST)[0] == 1
         elif is_exact := method & 1:
-            mesh = rules.mesh_of_faces(self.chunks, file.vertex_source) if method & 8 else None
-            body = self.content(rules.REST)[17:]
-            points = rules.decode_exact_rest(body, file.branches, file.rest_is_float64, mesh)
+            points = file.rest.positions
         else:
             points = file.rest.rest if level == 0 else plans[-1].rest
         with np.errstate(all="ignore"):

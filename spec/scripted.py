@@ -22,7 +22,7 @@ import numpy as np
 from spec.document import crc32c, rules
 
 LOOSE, SHEET, WHOLE = rules.LOOSE, rules.SHEET, rules.WHOLE
-REST_EXACT, REST_FLOAT64, IS_HOST, REST_CONNECTED = 1, 2, 4, 8  # Bits of REST's Method.
+REST_EXACT, REST_FLOAT64, IS_HOST, REST_CONNECTED, REST_WELDED = 1, 2, 4, 8, 16  # Bits of REST's Method.
 NO_LEVEL = 255  # Level of a chunk that is not of motion.
 
 RECENT = 32  # corners that a vertex may be said by
@@ -723,19 +723,16 @@ class Plant:
 
     def _decoded_rest(self, branches: list, chunk: bytes, vertex_source: list):
         """The rest pose of REST; `rows` is None where it is exact or the host's."""
-        self.connectivity = None if self.faces is None else self._mesh(vertex_source)
-        origin = struct.unpack_from("<3f", chunk, 1)
+        origin, body, self.connectivity = struct.unpack_from("<3f", chunk, 1), chunk[17:], None
+        if self.faces is not None:
+            self.connectivity, body = rules.mesh_of_faces(self.faces, chunk[0], body, vertex_source)
         if self.mesh is None and not chunk[0] & REST_EXACT:
-            return rules.decode_rest(chunk[17:], branches, rules.f32(chunk, 13), None, self.connectivity)
+            return rules.decode_rest(body, branches, rules.f32(chunk, 13), None, self.connectivity)
         if self.mesh is not None:
             points = (self.mesh[vertex_source] + np.float32(0)).tolist()
         else:
-            points = rules.decode_exact_rest(chunk[17:], branches, bool(chunk[0] & REST_FLOAT64), self.connectivity)
+            points = rules.decode_exact_rest(body, branches, bool(chunk[0] & REST_FLOAT64), self.connectivity)
         return rules.Record(rest=[[x[k] - origin[k] for k in range(3)] for x in points], rows=None)
-
-    def _mesh(self, vertex_source: list):
-        shape, stream = rules.parse_polygons(self.faces, rules.FACES)
-        return rules.build_mesh(*rules.decode_polygons(stream, shape, len(vertex_source)), vertex_source)
 
     def _shapes(self, level: int) -> bytes:
         """SHAPES by its script; its values are used by the streams of STEMS."""

@@ -67,7 +67,7 @@ def test_clips_have_the_frames_and_vertices_that_they_are_known_for(clips):
     assert {name: (clips[name].frame_count, clips[name].vertex_count) for name in SHAPES} == SHAPES
     assert {name for name, clip in clips.items() if not clip.has_branches} == {
         *("grass_unnamed", "grass_interleaved", "grass_shuffled"),
-        *("still", "one_frame", "morph", "morph_narrow", "noise", "vertex", "cube"),
+        *("still", "one_frame", "morph", "morph_narrow", "sheet", "points", "noise", "vertex", "cube"),
     }
     assert set(data.SUITES["odd"]) == set(odd.CLIPS) < set(data.RECIPES)
 

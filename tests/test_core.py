@@ -19,6 +19,7 @@ from plants import awkward
 import athcodec
 from athcodec import errors
 from athcodec.decoding import container as ct
+from athcodec.encoding import search
 from athcodec.encoding.choices import learned_bases
 from athcodec.encoding.settings import Settings
 from athcodec.encoding.trials import Trials
@@ -795,6 +796,7 @@ def refined(request, scratch) -> Player:
     with pytest.MonkeyPatch.context() as patch:
         if request.param == "time bases":
             patch.setattr(learned_bases, "best_bases", all_learned)
+            patch.setitem(search.CHOICES, all_learned, ("time bases", 1.0))
         athcodec.encode(clip, path, **GIVEN | options)
     return Player(path.read_bytes())
 

@@ -19,7 +19,7 @@ from athcodec.errors import AthError
 from athcodec.motion.polygons import Polygons
 from spec.document import File, rules
 
-CONNECTED = 1 << 3  # of Method of REST
+CONNECTED, WELDED = 1 << 3, 1 << 4  # Bits of Method of REST.
 
 
 def grid_faces(rows: int, columns: int, quads: bool = False) -> np.ndarray:
@@ -36,6 +36,11 @@ def shuffled(points: np.ndarray, faces: np.ndarray, seed: int) -> tuple[np.ndarr
     """The same mesh, its vertices by chance."""
     order = np.random.default_rng(seed).permutation(len(points))
     return points[order], np.argsort(order)[faces]
+
+
+def apart(points: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The same mesh, each face with vertices of its own."""
+    return points[faces.reshape(-1)], np.arange(faces.size).reshape(faces.shape)
 
 
 def chunk_bytes(faces: np.ndarray, vertex_count: int) -> int:
@@ -137,18 +142,47 @@ def test_faces_are_not_stored_without_attributes():
         assert decoder.file.faces is None
 
 
+@pytest.mark.parametrize("options", [{}, {"exact_rest": True}], ids=["bound", "exact"])
+@pytest.mark.parametrize("name", ["terrain", "tubes"])
+def test_faces_with_vertices_of_their_own_cost_the_mesh_and_its_map(name, options):
+    points, faces = MESHES[name]
+    clip, welded = still(*apart(points, faces)), still(points, faces)
+    data = encoded(clip, rel_error=1e-4, **options)
+    map_bytes = chunk_bytes(faces, len(points))
+    assert len(data) <= 1.1 * (len(encoded(welded, rel_error=1e-4, **options)) + map_bytes)
+    with opened(data) as decoder:
+        assert np.array_equal(decoder.file.faces, clip.faces)
+        error = np.linalg.norm(decoder.positions(0) - clip.block(0, 1)[0], axis=1).max()
+        assert error <= (0 if options else 1e-4 * np.linalg.norm(np.ptp(points, axis=0)))
+
+
+def test_vertices_that_a_seam_splits_cost_less_than_vertices_close_together():
+    points, faces = MESHES["terrain"]
+    second = np.where(points[faces].mean(axis=1)[:, :1] > np.median(points[:, 0]), faces + len(points), faces)
+    used, faces = np.unique(second, return_inverse=True)
+    split = points[used % len(points)]
+    close = split + 1e-6 * np.linalg.norm(np.ptp(points, axis=0)) * (used >= len(points))[:, None]
+    sizes = [rest_bytes(encoded(still(some, faces.reshape(-1, 3)), rel_error=1e-4)) for some in (split, close)]
+    assert sizes[0] < sizes[1]
+
+
 @pytest.mark.parametrize(
-    "options", [{"ladder": "none"}, {}, {"exact_rest": True}], ids=["one layer", "layers", "exact"]
+    "options",
+    [{"ladder": "none"}, {}, {"exact_rest": True}, {"lossless": True}],
+    ids=["one layer", "layers", "exact", "lossless"],
 )
+@pytest.mark.parametrize("is_split", [False, True], ids=["shared", "apart"])
 @pytest.mark.parametrize("frames", [1, pytest.param(9, marks=pytest.mark.slow)])
-def test_the_document_reads_the_same_connected_rest_pose(options, frames):
+def test_the_document_reads_the_same_connected_rest_pose(options, is_split, frames):
     points, faces = shuffled(terrain(9, 11, 0.05, 4), grid_faces(9, 11, frames > 1), 4)
+    points, faces = apart(points, faces) if is_split else (points, faces)
     time = np.arange(frames) / 10
     swayed = points + 0.5 * np.sin(time)[:, None, None] * points[:, ::-1]
     clip = athcodec.MotionClip(swayed.astype(np.float32), time, rest=points, faces=faces.astype(np.int32))
     data = encoded(clip, rel_error=1e-3, **options)
     file = File(data, strict=True)
-    assert frames > 1 or file.content(rules.REST)[0] & CONNECTED
+    method = file.content(rules.REST)[0]
+    assert frames > 1 or method & (CONNECTED | WELDED) == (CONNECTED | WELDED * is_split)
     with opened(data) as decoder:
         for level in range(decoder.file.level_count):
             assert decoder.positions(level=level).tobytes() == file.positions(level).tobytes()
@@ -170,6 +204,26 @@ def test_random_bytes_as_faces_are_the_same_to_all_or_refused(seed):
     try:
         with opened(data) as decoder:
             found = decoder.file.faces.reshape(-1).tolist()
+    except AthError:
+        found = None
+    assert found == expected
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_random_bytes_as_names_of_places_are_the_same_to_all_or_refused(seed):
+    random = np.random.default_rng(seed)
+    data = encoded(still(*apart(terrain(6, 10, 0.1, 1), grid_faces(6, 10))), rel_error=1e-3)
+    rest = File(data).content(rules.REST)
+    names = bytearray(rest[21 : 21 + int.from_bytes(rest[17:21], "little")])
+    names[random.integers(9, len(names))] = random.integers(1, 256)
+    data = Parts.of(data).with_payload(ct.REST, rest[:21] + bytes(names) + rest[21 + len(names) :])
+    try:
+        expected = File(data, strict=True).positions(0).tobytes()
+    except rules.Invalid:
+        expected = None
+    try:
+        with opened(data) as decoder:
+            found = decoder.positions(level=0).tobytes()
     except AthError:
         found = None
     assert found == expected

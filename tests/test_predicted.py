@@ -139,11 +139,54 @@ def test_growth_takes_at_most_seven_tenths_of_a_simple_codec(fraction, eased, tm
     assert found.bytes <= 0.7 * simple_bytes(positions, bound)
 
 
+def growing_front() -> athcodec.MotionClip:
+    """A front runs from the root along all branches; what it has not reached stands at its tip."""
+    _, rest, vertex_branch, branch_parent = tree()
+    first = np.unique(vertex_branch, return_index=True)[1]
+    below = np.arange(len(rest)) - 1
+    for branch, parent in enumerate(branch_parent):
+        on_parent = np.flatnonzero(vertex_branch == parent)
+        far = np.linalg.norm(rest[on_parent] - rest[first[branch]], axis=1)
+        below[first[branch]] = on_parent[far.argmin()] if parent >= 0 else -1
+    way = np.where(below >= 0, np.linalg.norm(rest - rest[below], axis=1), 0.0)
+    reached, positions = way.copy(), np.repeat(rest[None], FRAMES, axis=0)
+    for v in np.flatnonzero(below >= 0):
+        reached[v] += reached[below[v]]
+    front = reached.max() * np.linspace(0, 1, FRAMES) ** 1.3
+    for v in np.flatnonzero(below >= 0):
+        share = np.clip((front - reached[below[v]]) / max(way[v], 1e-9), 0, 1)[:, None]
+        positions[:, v] = positions[:, below[v]] + share * (rest[v] - rest[below[v]])
+    return clip_of(positions, rest, vertex_branch, branch_parent)
+
+
+@pytest.mark.parametrize("fraction", [1e-3, 1e-4, 1e-5])
+def test_a_growing_front_takes_at_most_six_tenths_of_a_simple_codec(fraction, tmp_path):
+    clip = growing_front()
+    positions = clip.block(0, clip.frame_count).astype(float)
+    bound = fraction * float(np.linalg.norm(np.ptp(positions.reshape(-1, 3), axis=0)))
+    found = size(clip, tmp_path, fraction, rest_error="bound")
+    assert found.choices["motion"] == "predicted"
+    assert found.bytes <= 0.6 * simple_bytes(positions, bound)
+
+
+def test_smoothness_has_a_price_limit(tmp_path):
+    clip, found, shares = growth(), {}, {}
+    for smoothness in ("bytes", "default", "motion"):
+        found[smoothness] = size(clip, tmp_path, 1e-4, smoothness=smoothness).bytes
+        with athcodec.open(tmp_path / "a.ath") as decoder:
+            shares[smoothness] = decoder.file.info()["predicted_error_share"]
+    assert found["bytes"] <= found["default"] <= 1.15 * found["bytes"] + 50
+    assert found["default"] <= found["motion"] <= 2 * found["bytes"] + 50
+    assert shares["bytes"] > 0.9 and shares["motion"] <= min(shares["default"], 0.26)
+    with pytest.raises(ValueError, match="smoothness: got 'calm'"):
+        size(clip, tmp_path, 1e-4, smoothness="calm")
+
+
 @pytest.mark.parametrize(("fraction", "most", "share"), [(1e-3, 1.5, 0.02), (1e-4, 1.0, 0.0), (1e-5, 1.0, 0.0)])
 @pytest.mark.parametrize("eased", [False, True])
-def test_growth_does_not_twitch(fraction, most, share, eased, tmp_path):
+def test_growth_does_not_twitch_where_bytes_are_spent_on_it(fraction, most, share, eased, tmp_path):
     clip = growth(eased)
-    found = size(clip, tmp_path, fraction)
+    found = size(clip, tmp_path, fraction, smoothness="motion")
     meter = SmoothnessMeter(clip.frame_count, found.max_error_bound)
     with athcodec.open(tmp_path / "a.ath") as decoder:
         meter.add(clip.block(0, clip.frame_count), decoder.positions())

@@ -10,6 +10,7 @@ import pytest
 
 import athcodec
 from athcodec.decoding.container import BASIS_IN_WAVES, STEMS
+from athcodec.encoding import search
 from athcodec.encoding.choices import learned_bases
 from athcodec.encoding.motion import waves_over_time
 from athcodec.encoding.time_bases import InWaves, TimeComponents
@@ -97,7 +98,11 @@ def test_a_shared_basis_makes_files_smaller(tmp_path, monkeypatch):
     clip, options = hit_by_a_gust(), {"rel_error": 1e-3, "ladder": "none", "attributes": "none"}
     shared = athcodec.encode(clip, tmp_path / "shared.ath", **options).bytes
 
-    monkeypatch.setattr(learned_bases, "best_bases", lambda settings, trials: settings)
+    def none(settings, trials):
+        return settings
+
+    monkeypatch.setattr(learned_bases, "best_bases", none)
+    monkeypatch.setitem(search.CHOICES, none, ("time bases", 1.0))
     monkeypatch.setattr(learned_bases, "candidates", lambda settings, trials: [])
     assert shared < 0.9 * athcodec.encode(clip, tmp_path / "waves.ath", **options).bytes
 
@@ -108,6 +113,7 @@ def test_layers_in_learned_bases_are_decoded_as_the_document_does(tmp_path, monk
         return replace(settings, learned_bases=(True,) * settings.levels)
 
     monkeypatch.setattr(learned_bases, "best_bases", learned)
+    monkeypatch.setitem(search.CHOICES, learned, ("time bases", 1.0))
     path = tmp_path / "layers.ath"
     athcodec.encode(hit_by_a_gust(), path, rel_error=1e-4, attributes="none", ladder=(1e-2, 1e-3))
     assert_same_as_document(path.read_bytes())

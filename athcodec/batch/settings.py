@@ -26,7 +26,7 @@ from athcodec.errors import ClipError
 from athcodec.files.atomic import is_url
 from athcodec.motion.thresholds import Thresholds
 from athcodec.motion.units import parse_length, parse_size
-from athcodec.options import EFFORTS, HOST, MAX_SEGMENT, METHODS, MIN_SEGMENT, ladder_of
+from athcodec.options import EFFORTS, HOST, MAX_SEGMENT, METHODS, MIN_SEGMENT, SMOOTHNESS, ladder_of
 from athcodec.sources import FORMATS, format_named
 
 BOUNDS = ("max_error", "rel_error", "target_size")  # A clip is encoded with exactly one of these.
@@ -286,6 +286,7 @@ _CHECKS: dict[str, Callable[[Any], Any]] = {
     "weights": _TEXT,
     "attributes": _one_of("all", "none"),
     "effort": _one_of(*EFFORTS),
+    "smoothness": _one_of(*SMOOTHNESS),
     "ladder": lambda value: list(ladder_of(value)),
     "source_format": _format,
     "rest": _one_of("auto", "first", "mean", HOST),

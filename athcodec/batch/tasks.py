@@ -137,6 +137,7 @@ def _done(
             "seconds": round(time.perf_counter() - start, 3),
         }
         | ({"not_read": listed(summary.not_read)} if summary.not_read else {})
+        | ({"untried": list(summary.untried)} if summary.untried else {})
     }
 
 

@@ -23,6 +23,7 @@ from athcodec.options import (
     MIN_SEGMENT,
     RIG_JOINTS,
     SAMPLES,
+    SMOOTHNESS,
     ladder_of,
 )
 
@@ -354,6 +355,13 @@ def _coding_arguments(verb: argparse.ArgumentParser) -> None:
     )
     verb.add_argument(
         "--effort", choices=EFFORTS, default="default", help="how long to look for a smaller file (default: default)"
+    )
+    verb.add_argument(
+        "--smoothness",
+        choices=tuple(SMOOTHNESS),
+        default="default",
+        help="bytes that steady errors of predicted motion, as of growth, may cost: up to 15 %% (default), none "
+        "(bytes), or as many again (motion)",
     )
     verb.add_argument(
         "--ladder",

@@ -125,7 +125,9 @@ def _print_facts(facts: dict[str, Any]) -> None:
         f"{counted(ath['leaves'], 'leaf', 'leaves')} among them{thresholds}"
     )
     unit = f" {facts['unit']}" if facts["unit"] else ""
-    echo(f"Error bound: {facts['max_error_bound']:.4g}{unit}. {_size(facts)}")
+    share = facts["predicted_error_share"]
+    held = "" if share is None else f", errors of predicted motion held to {share:.2g} of it"
+    echo(f"Error bound: {facts['max_error_bound']:.4g}{unit}{held}. {_size(facts)}")
     echo(f"Rest pose: {_rest(facts)}.")
     if len(facts["levels"]) < facts["full_level_count"]:
         echo(f"Holds levels 0 to {len(facts['levels']) - 1} of 0 to {facts['full_level_count'] - 1}.")

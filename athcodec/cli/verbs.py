@@ -63,6 +63,7 @@ from athcodec.motion.hierarchy import branch_orders
 from athcodec.options import DEFAULT_LADDER, DEFAULT_REL_ERROR, HOST, ladder_of
 
 if TYPE_CHECKING:
+    from athcodec.encoding.summary import Summary
     from athcodec.exporters import Written
 
 ROUNDING_SHARE = 0.05  # Part of a level's error above which decode names what float32 adds to it.
@@ -81,13 +82,14 @@ def encode(args: argparse.Namespace) -> int:
             output = streams.target(output, None)
         check_output(output, *paths)
         if args.into:
-            _encode_into(paths, args)
+            summary = _encode_into(paths, args)
         else:
             with clip_to_encode(paths, args) as clip:
-                _encode(clip, paths[0], output, args, attributes=args.attributes, host_rest=args.rest == HOST)
+                summary = _encode(clip, paths[0], output, args, attributes=args.attributes, host_rest=args.rest == HOST)
         with open_file(output, strict=True, gltf_motion=_last_motion(output) if args.into else None) as decoder:
             if not streams.writes:
-                print_files([facts_of(output, decoder)], args.json)
+                untried = {"untried": list(summary.untried)} if args.json else {}
+                print_files([facts_of(output, decoder) | untried], args.json)
     return 0
 
 
@@ -97,15 +99,16 @@ def _last_motion(path: str) -> str:
     return motions_in(path)[-1]
 
 
-def _encode_into(paths: list[str], args: argparse.Namespace) -> None:
+def _encode_into(paths: list[str], args: argparse.Namespace) -> Summary:
     with gltf_to_fill(paths, args) as host, scratch_folder(args.into) as folder:
         encoded = os.path.join(folder, "motion.ath")
         with clip_to_encode(paths, args, lambda _: host.clip) as clip:
-            _encode(clip, paths[0], encoded, args, attributes="none", host_rest=True)
+            summary = _encode(clip, paths[0], encoded, args, attributes="none", host_rest=True)
             host.write(args.into, encoded)
+    return summary
 
 
-def _encode(clip: MotionClip, path: str, output: str, args: argparse.Namespace, **options: Any) -> None:
+def _encode(clip: MotionClip, path: str, output: str, args: argparse.Namespace, **options: Any) -> Summary:
     with naming(path), progress() as report:
         unit = clip.metadata.get("unit")
         summary = athcodec.encode(
@@ -118,6 +121,7 @@ def _encode(clip: MotionClip, path: str, output: str, args: argparse.Namespace, 
             lossless=args.lossless,
             weights=args.weights,
             effort=args.effort,
+            smoothness=args.smoothness,
             ladder=args.ladder,
             jobs=args.jobs,
             progress=report,
@@ -128,6 +132,7 @@ def _encode(clip: MotionClip, path: str, output: str, args: argparse.Namespace, 
         say("hierarchy", summary.found_branches)
     for seam in summary.seams:
         say_seam(seam, path)
+    return summary
 
 
 def batch(args: argparse.Namespace) -> int:
@@ -168,7 +173,7 @@ def _batch_settings(args: argparse.Namespace) -> dict[str, Any]:
     given |= {name: True for name in ("exact_rest", "lossless", "loop", "endless") if getattr(args, name)}
     given |= {
         name: getattr(args, name)
-        for name, usual in (("attributes", "all"), ("effort", "default"))
+        for name, usual in (("attributes", "all"), ("effort", "default"), ("smoothness", "default"))
         if getattr(args, name) != usual
     }
     if args.ladder != ladder_of(DEFAULT_LADDER):

@@ -145,6 +145,7 @@ class AthFile(StaticData, SegmentDecoder):
             "bytes": self.file_length,
             "available_bytes": self.available_length,
             "max_error_bound": self.max_error_bound,
+            "predicted_error_share": self._predicted_error_share,
             "complete": self.complete,
             "full_level_count": self.full_level_count,
             "format": f"{ct.MAJOR}.{ct.MINOR}",
@@ -154,6 +155,13 @@ class AthFile(StaticData, SegmentDecoder):
             "clips": [self._clip_info(clip) for clip in self.clips],
             "levels": [asdict(level) for level in self.levels],
         }
+
+    @property
+    def _predicted_error_share(self) -> float | None:
+        """The share of the bound that errors of predicted motion reach; None: it is not there."""
+        if not self.core.info.is_predicted or len(self.levels) < 2 or not self.max_error_bound:
+            return None
+        return self.levels[1].max_error / self.max_error_bound
 
     def _clip_info(self, clip: Clip) -> dict[str, Any]:
         metadata = metadata_of(self.metadata, clip.name)

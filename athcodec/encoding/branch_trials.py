@@ -4,60 +4,71 @@ from __future__ import annotations
 
 import dataclasses
 import math
-import tempfile
+from itertools import chain
 
 import numpy as np
 
-from athcodec.decoding import container as ct
-from athcodec.encoding import writing
 from athcodec.encoding.bounds import BoundOption
-from athcodec.encoding.job import SPOOL_BYTES, EncodingJob, EncodingOptions
-from athcodec.encoding.progress import Progress
+from athcodec.encoding.job import EncodingJob, EncodingOptions
+from athcodec.encoding.progress import ANALYSIS, FINDING, SURVEY, TRIAL, Work
 from athcodec.encoding.segment import Source
 from athcodec.encoding.survey import survey
 from athcodec.errors import BoundError
 from athcodec.motion.branches.finding import candidates
 from athcodec.motion.branches.result import Found, with_branches
-from athcodec.motion.clip import MotionClip
+from athcodec.motion.clip import MotionClip, stands_still
 from athcodec.motion.hierarchy import hierarchy_of
 from athcodec.options import DEFAULT_SEGMENT
 
 TRIAL_FRAMES = 64  # Frames of a clip that branches are tried on.
 FILLED = 0.8  # Share of a target size that a file fills at the bound at which branches are compared.
+TRIAL_SHARE = 0.3  # Largest share of the work that is left that trying a candidate takes.
+LEAST_TRIALS = 8  # Trials of settings that tell which branches are better.
 
 
-def best_branches(clip: MotionClip, option: BoundOption, report: Progress, host_rest: bool = False) -> Found:
-    """Return the candidate that makes the smallest file of a few frames at the bound."""
-    proposals = candidates(clip)
-    if len(proposals) == 1:
-        return proposals[0]
-    trial = _Trial(clip, option, host_rest)
-    sizes = []
-    for branches in proposals:
-        sizes.append(trial.size(branches))
-        report("branches", len(sizes) / (len(proposals) + 2))
-    best = proposals[int(np.argmin(sizes))]
-    if best.stem_index is None or best.method != "motion":
+def best_branches(clip: MotionClip, option: BoundOption, work: Work, host_rest: bool = False) -> Found:
+    """Return the candidate that makes the smallest file of a few frames at the bound, of those that fit the work.
+    Predicted motion hardly depends on branches: if two candidates have it, no others are tried."""
+    proposals, trial = candidates(clip), _Trial(clip, option, host_rest, work)
+    best, least, predicted = next(proposals), math.inf, 0
+    finding = FINDING * clip.vertex_count if best.method == "motion" and not stands_still(clip) else 0.0
+    work.add(finding)
+    second = next(proposals, None) if work.fits(finding + 2 * trial.least_work) else None
+    if second is None:
+        return best
+    for number, branches in enumerate(chain([best, second], proposals), start=1):
+        size, is_predicted = trial.size(branches)
+        predicted += is_predicted
+        if size < least:
+            best, least = branches, size
+        if number > 1:
+            work.add(finding)
+            if predicted == number or not work.fits(finding + trial.least_work):
+                break
+    if best.stem_index is None or best.method != "motion" or not work.fits(trial.least_work):
         return best
     unordered = dataclasses.replace(best, stem_index=None)  # The source's order of vertices costs no bytes.
-    return unordered if trial.size(unordered) < min(sizes) else best
+    return unordered if trial.size(unordered)[0] < least else best
 
 
 class _Trial:
     """Frames from the middle of a clip, coded on different branches. Sizes are extrapolated to the whole clip."""
 
-    def __init__(self, clip: MotionClip, option: BoundOption, host_rest: bool):
+    def __init__(self, clip: MotionClip, option: BoundOption, host_rest: bool, work: Work):
         start = max(0, (clip.frame_count - TRIAL_FRAMES) // 2)
         stop = min(clip.frame_count, start + TRIAL_FRAMES)
         self._clip = MotionClip(clip.block(start, stop), np.arange(start, stop) / clip.fps, rest=clip.source_rest)
         self._clip.rest_given = clip.rest_given
         self._frames_ratio = clip.frame_count / (stop - start)
-        self._option, self._host_rest = option, host_rest
+        self._option, self._host_rest, self._work = option, host_rest, work
+        self.least_work = LEAST_TRIALS * (TRIAL + ANALYSIS * clip.vertex_count * (stop - start))
 
-    def size(self, branches: Found) -> float:
-        """Return the bytes of the whole clip's file on these branches; infinite if the bound cannot be kept."""
+    def size(self, branches: Found) -> tuple[float, bool]:
+        """Return about the bytes of the whole clip's file on these branches, and whether its motion is predicted;
+        infinite if the bound cannot be kept."""
         clip, lossless, host_rest = with_branches(self._clip, branches), self._option.lossless, self._host_rest
         hierarchy = hierarchy_of(clip)
+        self._work.add(SURVEY * clip.vertex_count * clip.frame_count)
         source = Source(
             clip,
             hierarchy,
@@ -69,23 +80,17 @@ class _Trial:
         job = EncodingJob(source, EncodingOptions(attributes="none", lossless=lossless))
         if self._option.target_size is not None:
             self._option = self._bound_of_target(job)
-        return self._job_size(job, self._option.in_scene_units(source, job.file_size))
+        with self._work.trying("branches", TRIAL_SHARE):
+            return job.tried(self._option.in_scene_units(source, job.file_size), self._work, self._frames_ratio)
 
     def _bound_of_target(self, job: EncodingJob) -> BoundOption:
         """Return the bound at which the branches tried first meet the target size; all are tried at it."""
+        work = Work()
+
+        def size(bound: float) -> float:
+            return job.tried(bound, work, self._frames_ratio)[0]
+
         try:
-            bound = self._option.in_scene_units(job.source, lambda bound: self._job_size(job, bound), FILLED)
+            return BoundOption(max_error=self._option.in_scene_units(job.source, size, FILLED))
         except BoundError:
             return BoundOption()
-        return BoundOption(max_error=bound)
-
-    def _job_size(self, job: EncodingJob, bound: float) -> float:
-        with tempfile.SpooledTemporaryFile(SPOOL_BYTES) as spool:
-            try:
-                entries = job.encode(bound, writing.ChunkStore(spool)).store.entries
-            except BoundError:
-                return math.inf
-        return sum(
-            chunk.length * (self._frames_ratio if chunk.is_motion and chunk.kind != ct.SHAPES else 1)
-            for chunk, _ in entries
-        )

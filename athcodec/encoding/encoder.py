@@ -19,7 +19,7 @@ from athcodec.encoding.bounds import BoundOption
 from athcodec.encoding.branch_trials import best_branches
 from athcodec.encoding.job import SPOOL_BYTES, CodedSegment, Draft, EncodingJob, EncodingOptions
 from athcodec.encoding.layers import layer_ratios
-from athcodec.encoding.progress import Progress, WeightedProgress, stage_weights
+from athcodec.encoding.progress import BRANCH_SHARE, Progress, WeightedProgress, Work, allowed_work, stage_weights
 from athcodec.encoding.segment_samples import SAMPLES
 from athcodec.encoding.segmentation import split_segments
 from athcodec.encoding.summary import Summary
@@ -47,6 +47,7 @@ def encode(
     weights: str | np.ndarray | None = None,
     attributes: str = "all",
     effort: str = "default",
+    smoothness: str = "default",
     ladder: str | Sequence[float] = DEFAULT_LADDER,
     jobs: int | None = None,
     progress: Progress | None = None,
@@ -94,7 +95,10 @@ def encode(
     attributes : {"all", "none"}
         "none" drops faces, edges and named arrays.
     effort : {"fast", "default", "best"}
-        How long settings are searched.
+        How long settings are searched. "default" counts its work, which a thread does in at most about 3 s and 5 us for
+        each vertex in a frame, and "best" may take ten times as long; `Summary.untried` names what did not fit.
+    smoothness : {"default", "bytes", "motion"}
+        How many bytes steady errors of predicted motion, as of growth, may cost: up to 15 %, none, or as many again.
     ladder : {"decades", "none"} or sequence of float
         Largest errors over the diagonal at which a decoder can stop, each about that of a layer of precision: one file
         for every distance, a few percent larger than "none", a single layer for archives. "decades" is 1e-2, 1e-3 and
@@ -103,8 +107,8 @@ def encode(
         Threads; by default one per core, at most 4, fewer for large meshes. The file is the same whatever their number,
         memory grows with it.
     progress : callable, optional
-        Called with the stage ("survey", "search", "motion" ...) and the elapsed fraction of the whole time, which
-        never falls and ends with 1.0.
+        Called with the stage ("survey", "search: learned modes", "motion" ...) and the elapsed fraction of the whole
+        time, which never falls and ends with 1.0.
 
     Returns
     -------
@@ -132,6 +136,7 @@ def encode(
         weights=weights,
         attributes=attributes,
         effort=effort,
+        smoothness=smoothness,
         jobs=jobs,
         ladder=ladder,
     )
@@ -246,9 +251,15 @@ def _begin(
     grown = clip if options.keeps_rest else with_grown_pose(clip)
     branches = None
     if not clip.has_branches:
-        report("branches", 0.0)
-        branches = best_branches(grown, option, report, options.host_rest)
+        work = Work(
+            BRANCH_SHARE * allowed_work(clip.vertex_count, clip.frame_count, options.effort), report, "branches"
+        )
+        work.expected = BRANCH_SHARE * allowed_work(clip.vertex_count, clip.frame_count, "default")
+        with work.trying("branches"):
+            branches = best_branches(grown, option, work, options.host_rest)
     job = EncodingJob.begin(clip, grown, branches, options, report)
+    if branches is not None:
+        job.spent, job.untried = work.done, tuple(set(work.untried) & {"branches"})
     attempts = itertools.count(1)
 
     def file_size(bound: float) -> float:

@@ -42,7 +42,7 @@ from athcodec.encoding.layers import (
     layer_ratios,
     layers_of,
 )
-from athcodec.encoding.progress import Progress, silent
+from athcodec.encoding.progress import FILE_BYTE, LEVEL_MOTION, MOTION, SURVEY, Progress, Work, allowed_work, silent
 from athcodec.encoding.sample import is_small
 from athcodec.encoding.search import Search
 from athcodec.encoding.segment import CodedPrelude, Source, thread_count
@@ -64,7 +64,7 @@ from athcodec.motion.polygons import POLYGON_ARRAYS, Polygons, type_code
 from athcodec.motion.presence import parts_hidden_far_away
 from athcodec.motion.thresholds import THRESHOLDS, Thresholds
 from athcodec.motion.units import Length
-from athcodec.options import DEFAULT_LADDER, EFFORTS, MAX_SEGMENT, MIN_SEGMENT, ladder_of, whole
+from athcodec.options import DEFAULT_LADDER, EFFORTS, MAX_SEGMENT, MIN_SEGMENT, SMOOTHNESS, ladder_of, whole
 
 SPOOL_BYTES = 64 << 20  # Bytes of chunks that are held in memory and not in a temporary file.
 CHUNK_BYTES, LEVEL_BYTES = 6, 6  # Bytes of the front for a chunk, and for the errors of a level and segment.
@@ -72,7 +72,7 @@ PREDICTED_SHARE = 0.8  # Largest share of the bytes of layers at which predicted
 REFUSAL_ROUNDS = 12  # Largest number of files that are coded to find the smallest bound that can be kept.
 FEW_BYTES = 2000  # Bytes up to which the file of a small clip may do without coarse levels.
 HELD_SHARE = 1 / 64  # Largest distance, in bounds, of a frame from the pose that is shown in its place.
-SEARCH_SAVES = 0.5  # Largest share of the bytes at its first settings that a search has saved.
+SEARCH_SAVES = 0.4  # Smallest share of the bytes at its first settings that a search has come down to.
 STATIC_METADATA = ("unit", "up_axis")
 
 
@@ -89,6 +89,7 @@ class EncodingOptions:
     weights: str | np.ndarray | None = None
     attributes: str = "all"
     effort: str = "default"
+    smoothness: str = "default"
     jobs: int | None = None
     ladder: tuple[float, ...] = ()  # Largest errors over the diagonal, descending; (): a single layer.
     predicted_frames: int = MAX_SEGMENT  # Longest segment of predicted motion.
@@ -127,6 +128,8 @@ class EncodingOptions:
             raise ValueError(f"jobs: got {self.jobs}; expected at least 1")
         if self.effort not in EFFORTS:
             raise ValueError(f"effort: got {self.effort!r}; expected one of {', '.join(EFFORTS)}")
+        if self.smoothness not in SMOOTHNESS:
+            raise ValueError(f"smoothness: got {self.smoothness!r}; expected one of {', '.join(SMOOTHNESS)}")
 
 
 @dataclass(frozen=True)
@@ -255,6 +258,8 @@ class EncodingJob:
     options: EncodingOptions
     report: Progress = silent
     branches: Found | None = None
+    spent: float = 0.0  # Work of finding branches.
+    untried: tuple[str, ...] = ()  # What that left out.
 
     @classmethod
     def begin(
@@ -373,17 +378,42 @@ class EncodingJob:
             low, high = (bound, high) if self.file_size(bound) == math.inf else (low, bound)
         return high
 
+    def tried(self, bound: float, work: Work, frames_ratio: float) -> tuple[float, bool]:
+        """Return about the bytes of a file of so many times the frames, as far as the work allowed tells, and whether
+        its motion is predicted; infinite if the bound cannot be kept."""
+        return self._holding(bound)._tried(bound, work, frames_ratio)
+
+    def _tried(self, bound: float, work: Work, frames_ratio: float) -> tuple[float, bool]:
+        try:
+            self._check(bound)
+            if self.source.still:
+                return self.decide(bound).shared_bytes, False
+            ath = self.seen.ath(self.thresholds(bound))
+            search = Search.of(self.source, ath, bound, self.options.effort, work, self.options.jobs)
+            unsearched = search.first_cost()
+            prediction = self._best_prediction(bound, unsearched, work)
+            if prediction is not None and prediction.bytes < SEARCH_SAVES * unsearched:
+                return frames_ratio * prediction.bytes, True
+            best, predicted = search.tried(frames_ratio), math.inf if prediction is None else prediction.bytes
+            return min((best, False), (frames_ratio * predicted, True))
+        except BoundError:
+            return math.inf, False
+
     def decide(self, bound: float) -> _Decided:
         """Search for settings."""
         self._check(bound)
-        return self._holding(bound)._decide(bound)
+        work = self._allowed_work(bound)
+        decided = self._holding(bound)._decide(bound, work)
+        untried = tuple(dict.fromkeys([*self.untried, *work.untried]))
+        decided.choice = dataclasses.replace(decided.choice, untried=untried)
+        return decided
 
     def _holding(self, bound: float) -> EncodingJob:
         """Return the job without frames that others show within a small part of the bound."""
         tolerance = 0.0 if self.options.lossless else HELD_SHARE * self.source.smallest_bound(bound)
         return dataclasses.replace(self, source=self.source.holding(tolerance))
 
-    def _decide(self, bound: float) -> _Decided:
+    def _decide(self, bound: float, work: Work) -> _Decided:
         ath = self.seen.ath(self.thresholds(bound))
         ratios = self._layer_ratios(ath, bound)
         ratio = ratios[0]
@@ -391,15 +421,20 @@ class EncodingJob:
             choice = still_choice(self.source, ath, bound, ratio)
             return self._layered(ath, choice, CodedPrelude(self.source, ath, choice.settings))
         share = PREDICTED_SHARE if ratio > 1 else 1.0
-        search = Search.of(self.source, ath, bound, self.options.effort, self.report, self.options.jobs, ratios)
+        search = Search.of(self.source, ath, bound, self.options.effort, work, self.options.jobs, ratios)
         unsearched = share * search.first_cost()
-        prediction = None if search.trials.start.rigid.any() else self._best_prediction(bound, unsearched)
+        if math.isfinite(unsearched):
+            work.allowed -= FILE_BYTE * unsearched
+        prediction = None if search.trials.start.rigid.any() else self._best_prediction(bound, unsearched, work)
         if prediction is not None and prediction.bytes < SEARCH_SAVES * unsearched:
             return self._predicted(prediction.choice)
         try:
-            best = self._found_by(search)
-            if self._is_short(best):
-                best = min(best, self._without_levels(bound), key=self._estimated_bytes)
+            choices, prelude = search.decide()
+            if prediction is not None and prediction.bytes < share * search.cost:
+                return self._predicted(prediction.choice)
+            best = self._best_of(search, choices, prelude)
+            if self._is_short(best) and work.fits(work.done):
+                best = min(best, self._without_levels(bound, work), key=self._estimated_bytes)
             if prediction is None or prediction.bytes >= share * self._estimated_bytes(best):
                 return best
         except BoundError:
@@ -407,9 +442,16 @@ class EncodingJob:
                 raise
         return self._predicted(prediction.choice)
 
-    def _found_by(self, search: Search) -> _Decided:
-        """Return the best candidate of a search."""
-        choices, prelude = search.decide()
+    def _allowed_work(self, bound: float) -> Work:
+        """Return the work that the decisions about a file may take: what its survey and coding leave of all."""
+        vertices, frames = self.clip.vertex_count, self.clip.frame_count
+        layers = len(layer_ratios(self.options.ladder, bound, self.seen.diagonal))
+        levels = int(self.source.hierarchy.branch_depth.max())
+        coding = (SURVEY + MOTION * (1 + layers) / 2 + LEVEL_MOTION * levels) * vertices * frames
+        return Work(allowed_work(vertices, frames, self.options.effort) - coding - self.spent, self.report)
+
+    def _best_of(self, search: Search, choices: list[Choice], prelude: CodedPrelude) -> _Decided:
+        """Return the best of what a search has found."""
         layered = [self._layered(search.trials.ath, choice, prelude) for choice in choices]
         return layered[0] if len(layered) == 1 else min(layered, key=self._estimated_bytes)
 
@@ -422,15 +464,18 @@ class EncodingJob:
         small = is_small(self.clip.vertex_count, self.source.segments, options.effort)
         return small and self._estimated_bytes(decided) <= FEW_BYTES
 
-    def _without_levels(self, bound: float) -> _Decided:
+    def _without_levels(self, bound: float, work: Work) -> _Decided:
         """Return the best file with one node for the whole plant, whatever its error."""
         ath = self.seen.ath(Thresholds(bound, self.clip.frame_count, self.seen.largest_distance.max(), 0))
-        return self._found_by(Search.of(self.source, ath, bound, self.options.effort, silent, self.options.jobs))
+        search = Search.of(self.source, ath, bound, self.options.effort, work, self.options.jobs)
+        return self._best_of(search, *search.decide())
 
-    def _best_prediction(self, bound: float, most_bytes: float) -> FoundPrediction | None:
+    def _best_prediction(self, bound: float, most_bytes: float, work: Work) -> FoundPrediction | None:
         """Return the best prediction; None: it is too large, or a hierarchy of maps is asked for, which it lacks."""
         is_out = self.options.tam or Feature.PREDICTED in self.options.without
-        return None if is_out else best_prediction(self._long_segments, bound, most_bytes)
+        if is_out:
+            return None
+        return best_prediction(self._long_segments, bound, most_bytes, work, self.options.smoothness)
 
     @property
     def _long_segments(self) -> Source:
@@ -772,4 +817,5 @@ def _summary(
         job.seams(decoder),
         None if job.branches is None else str(job.branches),
         job.clip.not_read,
+        decided.choice.untried,
     )

@@ -193,7 +193,7 @@ def _rests(
         return rest, None, [(prelude.plan.rest, None)] * len(ratios)
     first_step = qz.first_rest_step(rest.step, bound, ratios[0])
     steps = [qz.single(rest.step * max(1.0, ratio / 2)) for ratio in ratios[1:]]
-    branches, mesh = prelude.plan.branches, source.mesh if rest.connected else None
+    branches, mesh = prelude.plan.branches, rest.mesh
     coded = _first_rests(prelude, first_step, source, mesh)
     for step in steps:
         if np.array_equal(rest_steps(branches, step), rest_steps(branches, coded[-1].step)):

@@ -40,7 +40,7 @@ from athcodec.files.threads import SERIAL, ThreadPool, ranges
 
 STEM_ROOT, NODE_ROOT = -1, -2  # Roots of streams in waves that are not learned (core/model/motion.h).
 RANGES, LEAST_RANGE = 24, 1024  # Parts of a plant that threads take at a time, and their least number of vertices.
-RUN, RUNS = 64, 2  # Vertices of a run; one of so many runs is in a sample.
+PERIOD = 128  # Vertices from one run of a sample to the next.
 
 
 class Waves(IntEnum):  # core/model/basis.h
@@ -99,6 +99,7 @@ class Plan:
         if predicted:
             lib.ath_without_stems(self.core, self.pieces.ctypes.data, self.nodes.ctypes.data)
         self.rest = self.bases = None
+        self._samples: dict[int, PlanSample] = {}
 
     @property
     def height(self) -> int:
@@ -163,10 +164,14 @@ class Plan:
         bounds = np.unique(share, return_index=True)[1].tolist()
         return list(zip(bounds, [*bounds[1:], len(self.nodes)]))
 
-    @cached_property
-    def sample(self) -> PlanSample:
-        """The pieces in short runs all along the plant."""
-        pieces = self.pieces[self.pieces["first"] // RUN % RUNS == 0]
+    def sample(self, part: int) -> PlanSample:
+        """Return one of so many parts of the pieces, in short runs all along the plant."""
+        if part not in self._samples:
+            self._samples[part] = self._sample(part)
+        return self._samples[part]
+
+    def _sample(self, part: int) -> PlanSample:
+        pieces = self.pieces[self.pieces["first"] % PERIOD < PERIOD // part]
         first, count = np.cumsum(pieces["count"]) - pieces["count"], pieces["count"]
         vertices = np.arange(count.sum()) + np.repeat(pieces["first"] - first, count)
         pieces["first"] = first

@@ -8,18 +8,18 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property
 
 import numpy as np
 
 from athcodec.encoding.choices import forms, learned_bases, learned_pieces, rotations
 from athcodec.encoding.choices.node_steps import best_node_steps, cost_with_maps, inner_nodes
-from athcodec.encoding.choices.reference import MEAN_POSE_TRIALS, mean_pose
+from athcodec.encoding.choices.reference import mean_pose
 from athcodec.encoding.choices.rest import best_slack, with_slack
 from athcodec.encoding.choices.rigid import best_freedom, calm_parts
 from athcodec.encoding.choices.steps import best_level_steps, best_steps, finer_steps, walked
 from athcodec.encoding.features import Feature
-from athcodec.encoding.progress import Progress, TrialCount, expected_trials
+from athcodec.encoding.progress import ANALYSIS, LEARNING, TRIAL, Work, expected_trials
 from athcodec.encoding.sample import ExtrapolationFactors, is_small, sample_plant
 from athcodec.encoding.segment import CodedPrelude, Source, branch_records
 from athcodec.encoding.segment_samples import samples_of
@@ -34,6 +34,11 @@ REFINEMENTS_MAX_GAIN = (
 )
 NEAREST, NEAR_RATIO = 4, 1.12  # Steps are walked for so many other choices, of at most so many times the least bytes.
 SETTLING_ROUNDS = 64  # Largest number of times that the choices of a small clip are changed.
+
+STEP_TRIALS, FIRST_LAYER_TRIALS = 12, 6  # Trials for which choices leave work: of steps, and of the first of layers.
+LEAST_TRIALS = 12  # Trials without which another reference pose is not tried.
+
+Choose = Callable[[Settings, Trials], Settings]
 
 
 def settled(settings: Settings, trials: Trials) -> Settings:
@@ -63,6 +68,29 @@ def _nearest(settings: Settings, others: list[Settings], trials: Trials) -> list
     return [others[i] for i in np.argsort(costs, kind="stable")[:NEAREST] if costs[i] <= most]
 
 
+# What progress and summaries call a choice, and the largest share of the work that is left that it may take. Steps and
+# learned modes save most, and most for their work.
+CHOICES: dict[Choose, tuple[str, float]] = {
+    best_level_steps: ("steps of levels", 0.2),
+    best_freedom: ("freedom of rigid parts", 0.2),
+    forms.best_forms: ("forms", 0.4),
+    forms.best_forms_again: ("forms", 0.1),
+    rotations.best_rotations: ("rotations", 0.4),
+    rotations.fast_rotations: ("rotations", 1.0),
+    learned_bases.best_bases: ("time bases", 0.6),
+    learned_bases.best_waves: ("periodic waves", 1.0),
+    learned_bases.waves_if_smaller: ("time bases", 1.0),
+    learned_pieces.best_pieces: ("learned modes", 0.8),
+    learned_pieces.best_pieces_in_any_basis: ("learned modes", 0.8),
+    best_steps: ("steps", 0.8),
+    finer_steps: ("finer steps", 1.0),
+    calm_parts: ("calm parts", 0.5),
+    best_slack: ("precision of the rest pose", 0.5),
+    best_node_steps: ("maps of coarse levels", 1.0),
+    settled: ("all choices again", 0.7),
+}
+
+
 @dataclass(eq=False)
 class Search:
     """Finds the settings of a file; ratios: of the steps of its layers to that of the last, descending to 1."""
@@ -75,7 +103,6 @@ class Search:
         source, keeps_shape = self.trials.source, self.trials.start.turn_step > 0  # A few bytes less cost the shape.
         self._forms: np.ndarray | None = None
         self._is_small = is_small(source.clip.vertex_count, source.segments, self.effort) and not keeps_shape
-        self.trials.count.expected = expected_trials(self.effort, self.trials.is_layered, self._is_small)
 
     @classmethod
     def of(
@@ -84,23 +111,42 @@ class Search:
         ath: Ath,
         bound: float,
         effort: str,
-        report: Progress,
+        work: Work,
         jobs: int | None = None,
         ratios: Sequence[int] = (1,),
     ) -> Search:
         """Return the search for a whole plant."""
         samples = samples_of(source)
         start = first_settings(source, ath, bound, samples, ratios)
-        return cls(Trials(source, ath, start, samples, jobs, TrialCount(report)), effort, ratios)
+        search = cls(Trials(source, ath, start, samples, jobs, work), effort, ratios)
+        trial = TRIAL + (search.of_sample or search).trials.work_of(ANALYSIS)
+        expected = trial * expected_trials(effort, search.trials.is_layered, search._is_small)
+        work.expected = work.expected or min(expected, work.allowed)
+        return search
 
     def first_cost(self) -> float:
         """Return the bytes of a whole file at the settings that the search starts with."""
         trials = (self.of_sample or self).trials
         return trials.cost(trials.start)
 
+    @property
+    def cost_of_best(self) -> float:
+        """Bytes of a file of one layer."""
+        search = self.of_sample or self
+        return search.trials.cost(search.best)
+
+    def tried(self, frames_ratio: float) -> float:
+        """Return about the bytes of a file of so many times the frames, by the choices that save most."""
+        search = self.of_sample or self
+        settings, trials = search.at_best_step, search.trials
+        return trials.cost(settings) + (frames_ratio - 1) * trials.level_costs(settings).sum()
+
     def decide(self) -> tuple[list[Choice], CodedPrelude]:
         """Return settings to choose from, and hierarchy and poses as coded with them."""
-        search = self.about_best_reference()
+        of_first_layer = FIRST_LAYER_TRIALS * self.trials.is_layered
+        with self.trials.work.trying("reference pose", (self.of_sample or self)._share_beside(of_first_layer)):
+            search = self.about_best_reference()
+            self.cost = search.cost_of_best
         trials, (first_layer, candidates) = search.trials, search.candidates()
         prelude = trials.prelude(candidates[0])
         choices = [
@@ -118,38 +164,54 @@ class Search:
         else:
             candidates = list(self.refinements())  # Refinements come first: components are of the step that asks first.
             first = self.first_layer()
-        self.trials.count.finish()
+        self.trials.work.finish()
         return first, candidates
 
     @cached_property
     def at_first_step(self) -> Settings:
         """Bases, rotations and modes of a file of one layer, at the step that the search starts with."""
-        choices: list[Callable[[Settings, Trials], Settings]] = [
+        if self.effort == "fast":
+            return self._after(
+                [best_level_steps, rotations.fast_rotations, learned_bases.best_waves], self.trials.start
+            )
+        choices: list[Choose] = [
             best_freedom,
             forms.best_forms,
             rotations.best_rotations,
             learned_bases.best_bases,
-            forms.best_forms,
+            forms.best_forms_again,
             learned_pieces.best_pieces_in_any_basis,
         ]
-        if self.effort == "fast":
-            choices = [partial(rotations.best_rotations, factors=rotations.FAST_FACTORS)]
-        return self._after([best_level_steps, *choices, learned_bases.best_waves], self.trials.start)
+        with self.trials.work.trying("steps", self._share_beside(STEP_TRIALS)):
+            return self._after([best_level_steps, *choices, learned_bases.best_waves], self.trials.start)
+
+    @cached_property
+    def at_best_step(self) -> Settings:
+        """The same at the best steps."""
+        return self.at_first_step if self.effort == "fast" else self._after([best_steps], self.at_first_step)
 
     @cached_property
     def best(self) -> Settings:
         """Settings of a file of one layer."""
         choices = [calm_parts, best_slack, learned_bases.waves_if_smaller]
-        choices = [best_steps, settled, *choices] if self._is_small else [best_steps, *choices]
+        choices = [settled, *choices] if self._is_small else choices
         if self.effort == "fast":
             choices = []
         if self.effort == "best" and self.trials.source.weights is None:
             choices += [rotations.best_rotations, learned_bases.best_bases, finer_steps]
-        return self._after([*choices, best_node_steps], self.at_first_step)
+        if not self.trials.is_layered:  # The first of several layers has maps, and chooses their steps itself.
+            choices = [*choices, best_node_steps]
+        return self._after(choices, self.at_best_step)
 
-    def _after(self, choices: Sequence[Callable[[Settings, Trials], Settings]], settings: Settings) -> Settings:
+    def _share_beside(self, trials: int) -> float:
+        """Return the share of the work that is left that leaves room for so many more trials, but at least half."""
+        left = self.trials.work.allowed - self.trials.work.done
+        return max(0.5, 1 - trials * self.trials.work_of_trial / left) if left > 0 else 1.0
+
+    def _after(self, choices: Sequence[Choose], settings: Settings) -> Settings:
         for choose in choices:
-            settings = choose(settings, self.trials)
+            with self.trials.work.trying(*CHOICES[choose]):
+                settings = choose(settings, self.trials)
         return settings
 
     def first_layer(self) -> Settings:
@@ -160,7 +222,8 @@ class Search:
         first = replace(self.best.coarser(self.ratios[0]), learned_pieces=None)
         if not first.turn_step:  # Else turns are as fine as those of refinements, which have that basis.
             first = first.in_waves()
-            choices.insert(1, learned_bases.best_bases)
+            has_room = self._share_beside(FIRST_LAYER_TRIALS) > 0.5
+            choices.insert(int(has_room), learned_bases.best_bases)  # Bases save more than rotations.
         return self._after([*([] if self.effort == "fast" else choices), best_node_steps], first)
 
     def refinements(self) -> Iterator[Settings]:
@@ -186,15 +249,19 @@ class Search:
     def about_best_reference(self) -> Search:
         """Return the search about the rest pose or the mean pose of the motion, whichever makes the smaller file. The
         mean pose is tried with what was chosen about the rest pose, and goes on from there; in small clips both are
-        searched."""
+        searched up to their steps."""
         source = self.trials.source
         if self.effort == "fast" or source.host_rest or self.trials.without(Feature.MEAN_POSE):
             return self
         if source.details.any():  # The mean of what turns is smaller than what turns.
             return self
+        work = self.trials.work
+        with work.trying("mean pose"):
+            if not work.fits(LEAST_TRIALS * (self.of_sample or self).trials.work_of_trial):
+                return self
+        work.add(LEARNING * self.trials.source.clip.vertex_count * self.trials.frames)
         other = self.about_mean_pose()
         about_rest, about_mean = self.of_sample or self, other.of_sample or other
-        self.trials.spend(MEAN_POSE_TRIALS)
         cost = about_rest._cost_to_compare()
         if not self._is_small:
             about_mean.at_first_step = about_mean._like(about_rest, about_rest.at_first_step)
@@ -202,7 +269,7 @@ class Search:
 
     def _cost_to_compare(self) -> float:
         """Return what is compared with the cost about another reference pose."""
-        return cost_with_maps(self.best if self._is_small else self.at_first_step, self.trials)
+        return cost_with_maps(self.at_best_step if self._is_small else self.at_first_step, self.trials)
 
     def about_mean_pose(self) -> Search:
         """Return a search about the mean pose of the motion, which has chosen nothing yet."""
@@ -220,6 +287,7 @@ class Search:
             forms=forms.forms_like(settings.forms, other.trials.source, trials),
             lags=start.lags,
             connected_rest=start.connected_rest,
+            welded_rest=start.welded_rest,
             shape_of=start.shape_of,
             loose=start.loose,
             learned_pieces=None,
@@ -244,7 +312,7 @@ class Search:
             branch_records(sample.source.hierarchy, sample.ath, some),
         )
         samples = [segment.of_plant(sample) for segment in trials.samples]
-        of_sample = Trials(sample.source, sample.ath, some, samples, trials.jobs, trials.count, extrapolation)
+        of_sample = Trials(sample.source, sample.ath, some, samples, trials.jobs, trials.work, extrapolation)
         return Search(of_sample, self.effort, self.ratios)
 
     def _candidates_of_sample(self, sample: Search) -> tuple[Settings, list[Settings]]:

@@ -47,6 +47,9 @@ REST_ROUNDS = 16  # Steps of a rest pose that are tried until one keeps the boun
 ROWS_AT_ONCE = 1 << 14  # Rows of coefficients whose moments are added at once.
 WORK_BYTES = 1 << 30  # Memory of the segments coded at once, unless `jobs` says how many.
 SAMPLED = 4000  # Number of vertices from which trials find corrections of a sample of them only.
+WELD_TOLERANCE = 1e-7  # Size of the cells, in diagonals, in which vertices share a place.
+LEAST_SAMPLED, SPARSE = 1000, 16  # Vertices from which one of so many is enough if it takes enough corrections.
+ENOUGH, ENOUGH_SHARE = 2000, 0.015  # Corrections that show the bytes of all, and more for each vertex in a frame.
 SEGMENT_WORK = 16  # Memory of a segment while it is coded, over its float32 positions.
 
 
@@ -183,6 +186,27 @@ class Source:
         if Feature.CONNECTED in self.without:
             return None
         return Mesh.of(self.polygons, self.hierarchy.vertex_source)
+
+    @cached_property
+    def welded_mesh(self) -> Mesh | None:
+        """The mesh with the vertices of each branch welded that share their place in the rest pose; None: none do."""
+        if self.mesh is None:
+            return None
+        rest = self.clip.source_rest[self.hierarchy.vertex_source] if self.reference_is_exact else self.rest
+        if not self.reference_is_exact:
+            rest = np.rint(rest / (WELD_TOLERANCE * self.seen.diagonal or 1.0)) + 0.0  # Adding 0 turns -0.0 into 0.0.
+        rows = np.empty(len(rest), [("branch", np.int64), ("position", rest.dtype, (3,))])
+        rows["branch"], rows["position"] = self.hierarchy.vertex_branch(), rest
+        rows = rows[np.argsort(self.hierarchy.vertex_source)].view(f"V{rows.itemsize}")
+        _, first, place = np.unique(rows, return_index=True, return_inverse=True)
+        if len(first) == len(rest):
+            return None
+        names = np.argsort(np.argsort(first))[place].astype(np.int32)  # Places are counted as the source has them.
+        return Mesh.of(self.polygons, self.hierarchy.vertex_source, names)
+
+    def mesh_for(self, settings: Settings) -> Mesh | None:
+        """Return the faces that the rest pose of some settings goes by."""
+        return self.welded_mesh if settings.welded_rest else self.mesh if settings.connected_rest else None
 
     @cached_property
     def still(self) -> bool:
@@ -368,11 +392,11 @@ def _coded_rest(source: Source, branches: np.ndarray, settings: Settings) -> tup
         return head, source.rest
     if source.reference_is_exact:
         pose = source.clip.source_rest[source.hierarchy.vertex_source]
-        head.exact, head.connected = True, settings.connected_rest
-        head.stream = streams.encode_exact_rest(branches, pose, source.mesh if head.connected else None)
+        head.exact, head.mesh = True, source.mesh_for(settings)
+        head.stream = streams.encode_exact_rest(branches, pose, head.mesh)
         return head, pose.astype(np.float64) - source.origin
     coded = _rest_within(source, branches, settings)
-    head.step, head.stream, head.connected = coded.step, coded.stream, coded.connected
+    head.step, head.stream, head.mesh = coded.step, coded.stream, coded.mesh
     return head, coded.decoded
 
 
@@ -380,7 +404,7 @@ def _rest_within(source: Source, branches: np.ndarray, settings: Settings) -> st
     """Return the rest pose at the step of the settings, or at the first finer one that keeps the bound."""
 
     def encode(step: float) -> streams.CodedRest:
-        mesh = source.mesh if settings.connected_rest else None
+        mesh = source.mesh_for(settings)
         return streams.encode_rest(branches, step, source.rest, None, settings.rest_slack, mesh, settings.shape_of)
 
     return _within(settings.bound, source.rest, encode, settings.rest_step)
@@ -704,11 +728,32 @@ def code_stems(
         bases = learned_bases(prelude.plan, settings, positions)
     segment, decoded = analyse(prelude.plan, prelude.output, settings, positions, learned_modes, bases)
     stems, heads = stem_streams(segment, settings, bases)
-    some = prelude.plan.sample if prelude.plan.vertex_count >= SAMPLED else None
-    if some is None:
-        corrections = find_corrections(decoded, positions, prelude.origin, settings, prelude.plan)
-        return Coded(segment, stems, corrections, np.arange(len(decoded)), heads)
+    return Coded(segment, stems, *_some_corrections(prelude, settings, decoded, positions), heads)
+
+
+def _some_corrections(
+    prelude: CodedPrelude, settings: Settings, decoded: np.ndarray, positions: np.ndarray
+) -> tuple[Corrections, np.ndarray]:
+    """Return the corrections of a sample, and its vertices: fewer if they take many."""
+
+    def corrections(part: int) -> tuple[Corrections, np.ndarray]:
+        return sampled_corrections(prelude.plan, prelude.origin, settings, decoded, positions, part)
+
+    least, few = 1 if len(decoded) < SAMPLED else 2, None
+    if len(decoded) >= LEAST_SAMPLED:
+        few = corrections(SPARSE)
+        enough = ENOUGH + ENOUGH_SHARE * len(decoded) * decoded.shape[2]
+        least = max(least, 1 << int(SPARSE * len(few[0].rows) / enough).bit_length() >> 1)
+    return few if few is not None and least >= SPARSE else corrections(least)
+
+
+def sampled_corrections(
+    plan: Plan, origin: np.ndarray, settings: Settings, decoded: np.ndarray, positions: np.ndarray, part: int
+) -> tuple[Corrections, np.ndarray]:
+    """Return the corrections of one of so many parts of the pieces, and the vertices that they number."""
+    if part == 1:
+        return find_corrections(decoded, positions, origin, settings, plan), np.arange(len(decoded))
+    some = plan.sample(part)
     at, limit = some.vertices, settings.limit
     of_sample = replace(settings, limit=limit if np.isscalar(limit) else limit[at])
-    corrections = find_corrections(decoded[at], positions[at], prelude.origin, of_sample, some)
-    return Coded(segment, stems, corrections, at, heads)
+    return find_corrections(decoded[at], positions[at], origin, of_sample, some), at

@@ -14,7 +14,7 @@ from athcodec.encoding.motion import LearnedModes
 
 BEAM = 0  # Form of a branch whose modes are those of a beam; other forms are SHEET, or the vertices in a tube's ring.
 # Fields that distinguish settings of a search: by hierarchy and rest pose, and by motion.
-OF_PRELUDE = "rest_step rest_slack connected_rest lags shape_of forms layer free_rigid".split()
+OF_PRELUDE = "rest_step rest_slack connected_rest welded_rest lags shape_of forms layer free_rigid".split()
 OF_MOTION = (
     "step level_steps turn_step rotation_step_factors periodic learned_bases common_basis learned_pieces".split()
 )
@@ -45,6 +45,7 @@ class Settings:
     free_rigid: bool = False  # Whether rigid branches are loose.
     turn_step: float = 0.0  # Largest step of rotations of rigid pieces, in radians; 0: none.
     connected_rest: bool = False
+    welded_rest: bool = False  # Whether a connected rest pose has vertices at one place coded once.
     rest_slack: float = 0.0  # Distance by which the rest pose may be off to save bits.
     shape_of: np.ndarray | None = None  # (B,) as streams.find_copies returns it; None: the rest pose has no copies.
     common_basis: bool = False  # Whether the levels with learned time bases share one.
@@ -132,3 +133,4 @@ class Choice:
     reference: np.ndarray | None = None  # (N, 3) pose that motion is coded about, less the origin; None: the rest pose.
     predicted: bool | None = None  # Whether vertices are points of the lattice, where motion is predicted.
     error_share: float = 1.0  # Share of the limits that the errors of predicted motion may take.
+    untried: tuple[str, ...] = ()  # What was left out of the search for these, in words.

@@ -60,6 +60,9 @@ class Summary:
         The branches that were found for a clip without, in words; None for a clip that has branches.
     not_read : dict of str to sequence of str
         What the source holds besides, by its kind, named: MotionClip.not_read.
+    untried : tuple of str
+        Choices that were left out, all or in part, because the clip is too small for so much work; effort "best" has
+        room for more.
     """
 
     path: Path
@@ -74,6 +77,7 @@ class Summary:
     seams: tuple[Seam, ...] = ()
     found_branches: str | None = None
     not_read: Mapping[str, Sequence[str]] = field(default_factory=dict)
+    untried: tuple[str, ...] = ()
 
     @property
     def ratio(self) -> float:

@@ -13,11 +13,11 @@ from threading import Lock
 
 import numpy as np
 
-from athcodec.encoding import streams
+from athcodec.encoding import progress, streams
 from athcodec.encoding.features import Feature
 from athcodec.encoding.learned_modes import Components, components, learn
 from athcodec.encoding.motion import LearnedModes, Plan, SegmentMotion
-from athcodec.encoding.progress import TrialCount
+from athcodec.encoding.progress import Work
 from athcodec.encoding.sample import ExtrapolationFactors
 from athcodec.encoding.segment import (
     Coded,
@@ -52,15 +52,17 @@ class Trials:
     start: Settings  # Settings that the search starts with.
     samples: Sequence[SegmentSample]  # From calm to wild.
     jobs: int | None = None
-    count: TrialCount = field(default_factory=TrialCount)  # Count that the whole search reports.
+    work: Work = field(default_factory=Work)  # Work that the whole search may take.
     extrapolation: ExtrapolationFactors | None = (
         None  # Factors from the sample to the plant; None: the sample is the plant.
     )
-    _counted: int = field(init=False, default=0)  # Trials that have been reported.
+    map_errors: dict[int, float] = field(init=False, default_factory=dict)  # Errors of maps by level.
+    _work_done: int = field(init=False, default=0)  # Work of all trials.
     _known: dict[tuple, tuple[float, np.ndarray]] = field(init=False, default_factory=dict)
     _components: dict[tuple, Components] = field(init=False, default_factory=dict)
     _time_components: dict[tuple, tuple[float, list]] = field(init=False, default_factory=dict)
     _preludes: dict[tuple, CodedPrelude] = field(init=False, default_factory=dict)
+    _seen_preludes: set[tuple] = field(init=False, default_factory=set)
     _lock: Lock = field(init=False, default_factory=Lock)  # Threads that try candidates share the preludes.
 
     def __post_init__(self) -> None:
@@ -81,10 +83,20 @@ class Trials:
         """Return whether the file does without a feature."""
         return feature in self.source.without
 
-    def spend(self, trials: int = 0) -> None:
-        """Report progress: the trials since the last report, and other work that takes as long as so many trials."""
-        made, self._counted = len(self._known) - self._counted, len(self._known)
-        self.count.add(made + trials)
+    @property
+    def frames(self) -> int:
+        """Number of frames of all samples."""
+        return sum(sample.positions.shape[2] for sample in self.samples)
+
+    def work_of(self, each: float) -> float:
+        """Return the work of something that takes so much for each vertex in each frame of the samples."""
+        return each * self.source.clip.vertex_count * self.frames
+
+    @property
+    def work_of_trial(self) -> float:
+        """The work of a usual trial."""
+        usual = progress.TRIAL + self.work_of(progress.ANALYSIS + progress.TURNS)
+        return self._work_done / len(self._known) if self._known else usual
 
     def cost(self, settings: Settings) -> float:
         """Return the bytes of a whole file, without maps of nodes; infinite if the bound cannot be kept."""
@@ -95,21 +107,31 @@ class Trials:
         return self._tried(settings)[1]
 
     def costs(self, candidates: Sequence[Settings]) -> list[float]:
-        """Return what each candidate costs; several are tried at once."""
-        by_prelude = {settings.prelude_key: settings for settings in candidates}
+        """Return what each candidate costs; several are tried at once. What no longer fits the work that is allowed
+        costs infinitely much."""
+        keys = [settings.key for settings in candidates]
+        fitting = self._fitting(keys)
+        tried = list({key: settings for settings, key in zip(candidates, keys) if key in fitting}.values())
+        by_prelude = {settings.prelude_key: settings for settings in tried}
         with ThreadPoolExecutor(thread_count(self.jobs, self.source)) as pool:
             list(pool.map(self._keeps_bound, by_prelude.values()))
             # Learning is done in order, because the first candidate of a kind decides what all like it learn.
-            for settings in filter(self._keeps_bound, candidates):
+            for settings in filter(self._keeps_bound, tried):
                 if any(settings.learned_bases):
                     self._learn_time(settings)
                 if settings.learned_pieces is not None:
                     self._learn_modes(settings)
-            costs = []
-            for cost in pool.map(self.cost, candidates):
-                costs.append(cost)
-                self.spend()
-            return costs
+            for _ in pool.map(self.cost, tried):
+                self.work.report()
+        return [self._known[key][0] if key in fitting else math.inf for key in keys]
+
+    def _fitting(self, keys: Sequence[tuple]) -> set[tuple]:
+        """Return the keys of those candidates whose cost is known, or whose trials fit the work that is allowed."""
+        known = {key for key in keys if key in self._known}
+        for key in keys:
+            if key not in known and self.work.fits((1 + len(known - self._known.keys())) * self.work_of_trial):
+                known.add(key)
+        return known
 
     def cheapest(self, candidates: Sequence[Settings]) -> Settings:
         """Return the candidate that makes the smallest file, the first of several."""
@@ -125,6 +147,9 @@ class Trials:
                 return prelude
         prelude = CodedPrelude(self.source, self.ath, settings)
         with self._lock:
+            if key not in self._seen_preludes:  # A prelude that was dropped depends on the order of threads.
+                self._seen_preludes.add(key)
+                self.work.add(progress.POSE * self.source.clip.vertex_count)
             self._preludes[key] = prelude
             while len(self._preludes) > PRELUDES_KEPT:
                 self._preludes.pop(next(iter(self._preludes)))
@@ -173,16 +198,29 @@ class Trials:
         try:
             plan = self.prelude(settings).plan
             modes = self.learned_modes(plan, settings)
-            levels = sum(self._level_bytes(settings, modes, number) for number in range(len(self.samples)))
+            coded = [self.coded(settings, number, modes) for number in range(len(self.samples))]
+            levels = sum(self._level_bytes(one, sample) for one, sample in zip(coded, self.samples))
         except BoundError:
+            self._count(progress.TRIAL)
             return math.inf, np.full(self.levels, math.inf)
+        coding = sum(
+            progress.BYTE * sum(map(len, one.stems.values())) + progress.CORRECTION * len(one.corrections.rows)
+            for one in coded
+        )
+        each = progress.ANALYSIS + progress.TURNS * any(settings.rotation_step_factors)
+        self._count(progress.TRIAL + self.work_of(each) + coding)
         stored = streams.encode_learned_modes(plan, modes)
         mode_bytes = sum(len(stream) * self.extrapolation.rows[level] for level, stream in stored.items())
         return levels.sum() + mode_bytes + self.prelude_bytes(settings), levels
 
-    def _level_bytes(self, settings: Settings, modes: LearnedModes | None, number: int) -> np.ndarray:
+    def _count(self, work: float) -> None:
+        """Count the work of a trial."""
+        self.work.add(work)
+        with self._lock:
+            self._work_done += int(work)
+
+    def _level_bytes(self, coded: Coded, sample: SegmentSample) -> np.ndarray:
         """Return the bytes of the streams of all that a sample stands for, (levels,)."""
-        coded = self.coded(settings, number, modes)
         levels, heads = np.zeros(self.levels), np.zeros(self.levels)
         for level, stream in coded.stems.items():
             levels[level], heads[level] = len(stream), coded.heads[level]
@@ -192,7 +230,7 @@ class Trials:
             counts = np.bincount(level_of_vertex[coded.corrected], minlength=self.levels)
             levels += corrections * (counts / counts.sum())
         levels += (levels - heads) * (self.extrapolation.rows - 1)
-        return levels * self.samples[number].scale
+        return levels * sample.scale
 
     def _keeps_bound(self, settings: Settings) -> bool:
         """Return whether a rest pose keeps the bound; its prelude is there for later calls."""
@@ -217,6 +255,8 @@ class Trials:
         if key not in self._time_components:
             plan = self.prelude(settings).plan
             levels = [*(level for level in range(self.levels) if plan.has_stems(level)), None]
+            longest = max(sample.positions.shape[2] for sample in self.samples)
+            self.work.add(self.work_of(progress.ANALYSIS + progress.COMPONENT * longest))
             learned = [
                 time_components(plan, settings.of_segment(sample.whole_loop), sample.positions, levels)
                 for sample in self.samples
@@ -230,6 +270,8 @@ class Trials:
         if key not in self._components:
             plan, count = uncoded_plan(self.source, self.ath, settings), len(self.source.segments)
             chosen = np.unique(np.linspace(0, count - 1, LEARNING_SEGMENTS).astype(int))
+            frames = sum(self.source.frames_of(segment) for segment in chosen)
+            self.work.add(progress.LEARNING * self.source.clip.vertex_count * frames)
             self._components[key] = components(
                 plan, (analyse_finely(plan, settings, self.source.positions(segment)) for segment in chosen)
             )

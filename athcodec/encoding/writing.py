@@ -10,7 +10,7 @@ import struct
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
-from typing import BinaryIO
+from typing import TYPE_CHECKING, BinaryIO
 
 import numpy as np
 import zstandard
@@ -37,7 +37,11 @@ from athcodec.decoding.container import (
 from athcodec.errors import ClipError, FormatError
 from athcodec.motion.clip import ClipRange
 
+if TYPE_CHECKING:
+    from athcodec.encoding.polygons import Mesh
+
 IS_HOST = 4  # Method of a REST that the host has.
+_IS_CONNECTED, _IS_WELDED = 8, 16  # Bits of Method.
 _REST = struct.Struct("<B3ff")
 _SOURCE_REST = struct.Struct("<Bf")
 _MESH_CHECKSUM = struct.Struct("<II")
@@ -103,7 +107,7 @@ class ChunkStore:
 @dataclass
 class Rest:
     """Head of REST and its stream: the very numbers of the source if `exact`, the checksum of the host's mesh if
-    `is_host`, else steps. If `connected` the pose goes by FACES. Origin and step are numbers of float32."""
+    `is_host`, else steps. `mesh`: the faces that the pose goes by. Origin and step are numbers of float32."""
 
     origin: np.ndarray
     step: float
@@ -111,11 +115,12 @@ class Rest:
     stream: bytes = b""
     exact: bool = False
     is_host: bool = False
-    connected: bool = False
+    mesh: Mesh | None = None
 
 
 def pack_rest(rest: Rest) -> bytes:
-    method = int(rest.exact) | int(rest.source_dtype == np.float64) << 1 | int(rest.connected) << 3
+    by_mesh = 0 if rest.mesh is None else _IS_CONNECTED | (_IS_WELDED if rest.mesh.welds else 0)
+    method = int(rest.exact) | int(rest.source_dtype == np.float64) << 1 | by_mesh
     return _REST.pack(IS_HOST if rest.is_host else method, *rest.origin, rest.step) + rest.stream
 
 

@@ -11,6 +11,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import DTypeLike
 
+KEPT_BYTES = 64 << 20  # Bytes of the positions of clips whose frames are kept.
 FAR = 64  # Distance from the origin, in extents of the plant, beyond which float32 loses too many bits of its shape.
 
 
@@ -33,13 +34,23 @@ class Frames:
         T and N.
     dtype : dtype, optional
         float32 by default.
+    keeps : bool, optional
+        Whether frames that were made are kept, up to KEPT_BYTES in all: for those that are parsed or posed.
     """
 
     def __init__(
-        self, read: Callable[[int, int], np.ndarray], frame_count: int, vertex_count: int, dtype: DTypeLike = np.float32
+        self,
+        read: Callable[[int, int], np.ndarray],
+        frame_count: int,
+        vertex_count: int,
+        dtype: DTypeLike = np.float32,
+        keeps: bool = False,
     ):
         self._read = read
         self.shape, self.dtype = (frame_count, vertex_count, 3), np.dtype(dtype)
+        keeps &= 3 * frame_count * vertex_count * self.dtype.itemsize <= KEPT_BYTES
+        self._kept = np.empty(self.shape, self.dtype) if keeps else None
+        self._is_kept = np.zeros(frame_count, bool)
 
     def __len__(self) -> int:
         return self.shape[0]
@@ -50,4 +61,12 @@ class Frames:
             raise ValueError(f"frames: got a step of {step}, expected 1")
         if start >= stop:
             return np.empty((0, *self.shape[1:]), self.dtype)
-        return self._read(start, stop)
+        if self._kept is None:
+            return self._read(start, stop)
+        missing = start + np.flatnonzero(~self._is_kept[start:stop])
+        for run in np.split(missing, np.flatnonzero(np.diff(missing) > 1) + 1) if len(missing) else ():
+            self._kept[run[0] : run[-1] + 1] = self._read(int(run[0]), int(run[-1]) + 1)
+            self._is_kept[run] = True
+        kept = self._kept[start:stop]
+        kept.flags.writeable = False
+        return kept

@@ -261,7 +261,7 @@ def _rest_pose(motion: _Motion, nodes: Sequence[GltfNode]) -> np.ndarray:
 
 
 def _positions(motion: _Motion, times: np.ndarray) -> Frames:
-    return Frames(lambda start, stop: motion.read(times[start:stop]), len(times), motion.count, motion.dtype)
+    return Frames(lambda start, stop: motion.read(times[start:stop]), len(times), motion.count, motion.dtype, True)
 
 
 # ---- scenes and nodes ----

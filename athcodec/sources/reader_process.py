@@ -48,7 +48,7 @@ def read_apart(path: str | PathLike[str], options: ReadOptions, module: str, cra
         if "joint_parent" in arrays:
             skin = Skin(arrays["joint_parent"], arrays["vertex_joint"], tuple(said["joint_names"]))
         clip = MotionClip(
-            Frames(frames, *shape[:2], dtype),
+            Frames(frames, *shape[:2], dtype, keeps=True),
             arrays["time"],
             rest=arrays["rest"],
             attributes=attributes,

@@ -237,7 +237,7 @@ class FileFrames:
         data = read_plain(self.paths[0], budget)
         self.mesh = parse(data, self.paths[0], budget)
         self._fast = fast_reader(data, self.mesh)
-        self.frames = Frames(self._read, len(self.paths), len(self.mesh.points), self.mesh.points.dtype)
+        self.frames = Frames(self._read, len(self.paths), len(self.mesh.points), self.mesh.points.dtype, True)
 
     def _read(self, start: int, stop: int) -> np.ndarray:
         block = np.empty((stop - start, *self.frames.shape[1:]), self.frames.dtype)

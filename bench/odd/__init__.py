@@ -50,6 +50,8 @@ MAKERS: dict[str, Callable[..., MotionClip]] = {
         others.white_noise,
         others.still_mesh,
         others.morph_targets,
+        others.rippling_sheet,
+        others.drifting_points,
         others.one_vertex,
         others.tumbling_cube,
         others.triangulated_leaf,
@@ -91,6 +93,8 @@ CLIPS: dict[str, Odd] = {
     "one_frame": _odd("still_mesh", "the mesh alone", frames=1, nodes=1000, leaves=420),
     "morph": _morph("20 bumps, 3 at a time", (0.2, 0.5)),
     "morph_narrow": _morph("the same of few vertices", (0.05, 0.2)),
+    "sheet": _odd("rippling_sheet", "bumps move over a sheet", plant=False, side=55, frames=120, bumps=12),
+    "points": _odd("drifting_points", "points drift", plant=False, points=10000, frames=9, noise=1e-4),
     "noise": _odd("white_noise", "another place in every frame", plant=False, frames=100, points=100),
     "vertex": _odd("one_vertex", "one vertex", plant=False, frames=100),
     "cube": _odd("tumbling_cube", "thrown cube, rigid", plant=False, frames=127),
@@ -98,5 +102,8 @@ CLIPS: dict[str, Odd] = {
 
 MESHES = {"triangles": _odd("triangulated_leaf", "a leaf of irregular triangles", frames=60, points=2000)}
 
-SLOW = (*("growth_eased", "grass_unnamed", "grass_interleaved", "grass_shuffled"), *("capture_long", "few_7", "still"))
+SLOW = (
+    *("growth_eased", "grass_unnamed", "grass_interleaved", "grass_shuffled", "points"),
+    *("capture_long", "few_7", "still"),
+)
 FEW = tuple(name for name in CLIPS if name not in SLOW)  # which are measured in a few minutes

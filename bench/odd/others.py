@@ -62,6 +62,31 @@ def morph_targets(
     return _unnamed(base + np.tensordot(mixed, shapes, axes=1))
 
 
+def rippling_sheet(seed: int, side: int, frames: int, bumps: int) -> MotionClip:
+    """A square of triangles over which smooth bumps move."""
+    rng = np.random.default_rng(seed)
+    plane = np.stack(np.meshgrid(*[np.linspace(0.0, 1.0, side)] * 2, indexing="ij"), axis=-1).reshape(-1, 2)
+    time = np.arange(frames)[:, None] / FPS
+    moved = np.zeros((frames, len(plane), 3))
+    for width, speed, height in zip(
+        rng.uniform(0.08, 0.25, bumps), rng.uniform(0.2, 1.2, bumps), rng.normal(size=(bumps, 3))
+    ):
+        centre = rng.random(2) + 0.15 * rng.normal(size=2) * time * np.sin(speed * time)
+        away = np.square(plane - centre[:, None]).sum(axis=-1)
+        moved += 0.05 * (np.sin(2 * np.pi * speed * time) * np.exp(-away / (2 * width**2)))[..., None] * height
+    first = (np.arange(side - 1)[:, None] * side + np.arange(side - 1)).reshape(-1, 1)
+    faces = np.concatenate([first + [0, side, side + 1], first + [0, side + 1, 1]]).astype(np.int32)
+    return _unnamed(np.pad(plane, ((0, 0), (0, 1))) + moved, faces=faces)
+
+
+def drifting_points(seed: int, points: int, frames: int, noise: float) -> MotionClip:
+    """Points of a cube without faces, each on a smooth way of its own, and a little noise."""
+    rng = np.random.default_rng(seed)
+    time = np.arange(frames)[:, None, None] / FPS
+    waves = (np.sin(2 * np.pi * rng.uniform(0.3, 2.0) * time) * rng.normal(0, 0.03, (points, 3)) for _ in range(3))
+    return _unnamed(rng.random((points, 3)) + sum(waves) + noise * rng.normal(size=(frames, points, 3)))
+
+
 def _ball(points: int) -> np.ndarray:
     """(points, 3) evenly over the unit sphere, along a spiral."""
     height = 1.0 - 2.0 * (np.arange(points) + 0.5) / points

@@ -19,10 +19,16 @@ def frame_of(stems: list[Stem], of_vertex: Callable[[], list[int]], follow: Call
         for _ in range(ends):
             values += of_vertex()
         if stem.count > ends:
-            values.append(follow())
-            for _ in range(stem.count - ends if not values[-1] else 0):
+            followed = follow()
+            values += ([0], [1, 0], [1, 1, 0])[followed]
+            for _ in range(stem.count - ends if not followed else 0):
                 values += of_vertex()
     return values
+
+
+def followed_at(share: float) -> int:
+    """Who follows the ends of a stem: none from 1 on, below that all, in two ways."""
+    return 2 if share < 0.5 else int(share < 1)
 
 
 def frame_steps(stems: list[Stem], seed: int, large: int = 12, still: float = 0.5, follow: float = 0.3) -> list[int]:
@@ -33,7 +39,7 @@ def frame_steps(stems: list[Stem], seed: int, large: int = 12, still: float = 0.
         moved = int(chance.random.random() >= still)
         return [1, *(chance.answer("signed", 0) for _ in range(3))] if moved else [0]
 
-    return frame_of(stems, of_vertex, lambda: int(chance.random.random() < follow))
+    return frame_of(stems, of_vertex, lambda: followed_at(chance.random.random() / follow))
 
 
 def frame_points(stems: list[Stem], seed: int) -> list[int]:
@@ -47,7 +53,7 @@ def frame_points(stems: list[Stem], seed: int) -> list[int]:
         asked = ("bit", "unsigned") * 2 if first % 2 else ("signed",) * 2
         return [1, first, *(chance.answer(what, 0) for what in asked)]
 
-    return frame_of(stems, of_vertex, lambda: int(chance.random.random() < 0.3))
+    return frame_of(stems, of_vertex, lambda: followed_at(chance.random.random() / 0.3))
 
 
 def predicted(stems: list[Stem], frames: list, segments: int = 1, lattice: int = 0, **fields) -> Plant:
@@ -106,8 +112,8 @@ def cells(seed: int) -> list[list[float]]:
 PAIR, POINTS = [Stem(-1, 2, flags=WHOLE)], [Stem(-1, 1)] * 64
 LEAVING = [  # both ends of a stem, and those between them: a root that leaves binary32, and others that follow it
     *([0, 1, 1, 20, 0, 1, 1, move, 1, 0, 0, 0, 0] for move in (20, 1, 0, 0, -1, 0, 0)),
-    *([0, 1, 1, 60, 3, 0, 1, 0, 1, move, 1] for move in (2, 0, 0, 1)),
-    *([0, 0, distance, 0, 1, 0, move, 0, 1] for distance, move in ((8, 1), (0, 2))),
+    *([0, 1, 1, 60, 3, 0, 1, 0, 1, move, 1, 0] for move in (2, 0, 0, 1)),
+    *([0, 0, distance, 0, 1, 0, move, 0, 1, 0] for distance, move in ((8, 1), (0, 2))),
 ]
 
 

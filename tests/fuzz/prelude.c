@@ -155,6 +155,7 @@ static ath_mesh *decode_mesh(ath_mesh *mesh, ath_bytes body, int32_t vertices, c
         arena->base = fuzz_memory((size_t)arena->used, 0xa5);
         arena->used = 0;
         ath_carve_mesh(mesh, arena, (uint64_t)vertices, shape.corner_count, work);
+        ath_weld_mesh(mesh, head[9] & 1 && shape.corner_count >= (uint32_t)vertices ? corners : NULL, order);
         ath_build_mesh(mesh, &shape, counts, corners, order);
     }
     free(order);

@@ -353,7 +353,8 @@ static ath_bytes rest_of(ath_bytes chunk, size_t head)
     return rest;
 }
 
-enum { REST_EXACT = 1, REST_FLOAT64 = 2, REST_HOST = 4, REST_CONNECTED = 8 }; /* bits of Method */
+/* Bits of Method. */
+enum { REST_EXACT = 1, REST_FLOAT64 = 2, REST_HOST = 4, REST_CONNECTED = 8, REST_WELDED = 16 };
 
 int ath_parse_rest(ath_bytes chunk, ath_rest_head *head, ath_bytes *body)
 {
@@ -363,7 +364,9 @@ int ath_parse_rest(ath_bytes chunk, ath_rest_head *head, ath_bytes *body)
     head->is_float64 = (method & REST_FLOAT64) != 0;
     head->is_host = method == REST_HOST;
     head->connected = (method & REST_CONNECTED) != 0;
-    if (!head->is_host && method & ~(REST_EXACT | REST_FLOAT64 | REST_CONNECTED)) return ATH_BAD_CHUNK;
+    head->welded = (method & REST_WELDED) != 0;
+    int32_t others = REST_EXACT | REST_FLOAT64 | (head->connected ? REST_CONNECTED | REST_WELDED : 0);
+    if (!head->is_host && method & ~others) return ATH_BAD_CHUNK;
     head->step = (double)f32_at(chunk.bytes + 13);
     *body = rest_of(chunk, 17);
     int valid = is_step(head->step) && (!head->is_host || body->size == sizeof head->host_checksum);
@@ -373,6 +376,15 @@ int ath_parse_rest(ath_bytes chunk, ath_rest_head *head, ath_bytes *body)
         valid = valid && ath_is_finite(head->origin[k]);
     }
     return valid ? ATH_OK : ATH_BAD_CHUNK;
+}
+
+int ath_parse_welds(ath_bytes *body, ath_bytes *welds)
+{
+    if (body->size < 4 || u32_at(body->bytes) > body->size - 4) return ATH_BAD_CHUNK;
+    *welds = rest_of(*body, 4);
+    welds->size = u32_at(body->bytes);
+    *body = rest_of(*body, 4 + welds->size);
+    return ATH_OK;
 }
 
 /* Bits of Index_Type above the type itself. */

@@ -457,14 +457,26 @@ static int choose_steps(prediction *p, const predicted_source *source, int32_t v
 }
 
 /* Returns whether the vertices that would follow the ends of a stem keep their limits. */
-static int may_follow(prediction *p, const predicted_source *source, int32_t tip)
+static int may_follow(prediction *p, const predicted_source *source, int32_t tip, int32_t followed)
 {
-    double scale = stem_scale(&p->around, p->vertices + p->vertices[tip].next, tip, p->head.step);
+    double scale = scale_of(p, tip, followed);
     for (int32_t v = p->vertices[tip].next; v >= 0 && p->vertices[v].tip == tip; v = p->vertices[v].next) {
-        follow_ends(p, v, scale);
+        if (followed == FOLLOW_TIP && v < p->vertices[tip].front[0]) continue;
+        follow_ends(p, v, scale, followed);
         if (!is_within(p, source, p->frame, v)) return 0;
     }
     return 1;
+}
+
+/* Returns how the other vertices of a stem can follow its ends, preferably as before. */
+static int32_t choose_following(prediction *p, const predicted_source *source, int32_t tip)
+{
+    const predicted_vertex *vertex = p->vertices + tip;
+    int32_t before = vertex->followed != FOLLOW_NONE ? vertex->followed : p->model.last_followed;
+    int32_t first = before == FOLLOW_FRONT ? FOLLOW_FRONT : FOLLOW_ENDS, second = FOLLOW_ENDS + FOLLOW_FRONT - first;
+    if (may_follow(p, source, tip, first)) return first;
+    if (may_follow(p, source, tip, second)) return second;
+    return vertex->front[0] < tip && may_follow(p, source, tip, FOLLOW_TIP) ? FOLLOW_TIP : FOLLOW_NONE;
 }
 
 /* Returns 0 if no integers keep the vertex within its limit. */
@@ -481,7 +493,7 @@ static int encode_vertex(ath_coder *coder, prediction *p, const predicted_source
     if (!choose_steps(p, source, v, &way, steps)) return 0;
     code_steps(coder, &p->model, p->head.lattice, p->vertices, v, steps);
     learn_vertex(&p->model, &p->head, p->vertices, &p->around, v, &way);
-    if (vertex->leads) code_followed(coder, &p->model, vertex, may_follow(p, source, v));
+    if (vertex->leads) code_followed(coder, &p->model, vertex, choose_following(p, source, v));
     return 1;
 }
 

@@ -17,22 +17,41 @@ static void take_numbers(ath_file *file)
     if (file->rest_steps) memset(file->rest_steps, 0, numbers * sizeof *file->rest_steps);
 }
 
-static int read_mesh(ath_file *file, ath_fault_info *fault)
+/* Decodes polygons behind what building the mesh needs of its scratch memory. */
+static int read_polygons(ath_file *file, ath_bytes chunk, ath_polygons *shape, uint32_t **counts, int32_t **corners)
 {
-    ath_mesh *mesh = &file->mesh;
-    int32_t vertex_count = (int32_t)file->header.vertex_count;
+    int32_t vertex_count = (int32_t)file->header.vertex_count, *work = file->mesh.work;
     size_t vertices = file->header.vertex_count, building = ath_mesh_work(vertices, MESH_CORNERS * vertices);
-    ath_bytes chunk, body;
+    ath_bytes body;
+    int result = ath_parse_polygons(chunk, shape, &body);
+    if (result != ATH_OK) return result;
+    if (shape->is_derived || !ath_serves_rest(shape, vertex_count)) return ATH_BAD_CHUNK;
+    *corners = work + ath_larger(building, (ath_faces_memory(vertex_count) + 3) / 4);
+    *counts = shape->is_mixed ? (uint32_t *)(void *)(*corners + shape->corner_count) : 0;
+    return ath_decode_faces(work, body, shape, vertex_count, *counts, *corners);
+}
+
+/* Reads which vertices share a place from the front of the body of REST, and FACES. */
+static int read_mesh(ath_file *file, int32_t welded, ath_bytes *body, ath_fault_info *fault)
+{
+    ath_bytes chunk, welds;
     ath_polygons shape;
+    uint32_t *counts;
+    int32_t *corners = 0;
     int result = ath_load(file, ATH_FACES, &chunk, fault); /* without FACES there is no memory for a mesh */
-    if (result == ATH_OK) result = ath_parse_polygons(chunk, &shape, &body);
+    if (result == ATH_OK && welded) {
+        result = ath_load(file, ATH_REST, &chunk, fault);
+        if (result == ATH_OK) result = ath_parse_welds(body, &welds);
+        if (result == ATH_OK) result = read_polygons(file, welds, &shape, &counts, &corners);
+        if (result == ATH_OK && shape.corner_count < file->header.vertex_count) result = ATH_BAD_CHUNK;
+        if (result == ATH_OK) ath_load(file, ATH_FACES, &chunk, fault);
+    }
     if (result != ATH_OK) return fault->code = result;
-    if (shape.is_derived || !ath_serves_rest(&shape, vertex_count)) return ATH_BAD_CHUNK;
-    int32_t *corners = mesh->work + ath_larger(building, (ath_faces_memory(vertex_count) + 3) / 4);
-    uint32_t *counts = shape.is_mixed ? (uint32_t *)(void *)(corners + shape.corner_count) : 0;
-    result = ath_decode_faces(mesh->work, body, &shape, vertex_count, counts, corners);
-    if (result == ATH_OK) ath_build_mesh(mesh, &shape, counts, corners, file->vertex_source);
-    return result;
+    ath_weld_mesh(&file->mesh, corners, file->vertex_source);
+    result = read_polygons(file, chunk, &shape, &counts, &corners);
+    if (result != ATH_OK) return fault->code = result;
+    ath_build_mesh(&file->mesh, &shape, counts, corners, file->vertex_source);
+    return ath_load(file, ATH_REST, &chunk, fault);
 }
 
 int ath_read_reference(ath_file *file, ath_fault_info *fault)
@@ -42,10 +61,7 @@ int ath_read_reference(ath_file *file, ath_fault_info *fault)
     ath_rest_head head;
     int result = ath_load(file, ATH_REST, &chunk, fault);
     if (result == ATH_OK) result = ath_parse_rest(chunk, &head, &body);
-    if (result == ATH_OK && head.connected) {
-        result = read_mesh(file, fault);
-        if (result == ATH_OK) result = ath_load(file, ATH_REST, &chunk, fault);
-    }
+    if (result == ATH_OK && head.connected) result = read_mesh(file, head.welded, &body, fault);
     if (result != ATH_OK) return result;
     file->connected = head.connected ? &file->mesh : 0;
     memcpy(file->info.origin, head.origin, sizeof head.origin);

@@ -8,12 +8,13 @@
 enum { MESH_CORNERS = 8, MESH_FACES = 4 };
 
 /* `corners` holds the vertex of each corner in file order, `opposite` the corner that completes its parallelogram (-1:
- * none). The corners of vertex v are at[first[v]] to at[first[v + 1] - 1]. */
+ * none). The corners of vertex v are at[first[v]] to at[first[v + 1] - 1]. `same` holds the first vertex at the place of
+ * each vertex, which alone is coded and has corners. */
 typedef struct ath_mesh {
-    int32_t vertex_count, corner_count;
-    int32_t *corners, *opposite, *first, *at;
+    int32_t vertex_count, corner_count, place_count;
+    int32_t *corners, *opposite, *first, *at, *same;
     uint8_t *place;        /* place of each corner in its face, for ath_next_corner and ath_corner_before */
-    int32_t *order, *rank; /* vertices in the order of coding, and its inverse */
+    int32_t *order, *rank; /* the place_count vertices in the order of coding, and its inverse */
     int32_t *from;         /* the neighbour that each vertex was coded from */
     int32_t *work;         /* scratch of decoding and building */
 } ath_mesh;
@@ -44,8 +45,10 @@ uint64_t ath_mesh_work(uint64_t vertex_count, uint64_t corner_count);
 /* Places the arrays of a mesh of at most `corner_count` corners. */
 void ath_carve_mesh(ath_mesh *mesh, ath_arena *arena, uint64_t vertex_count, uint64_t corner_count,
                     uint64_t work_bytes);
+/* Fills `same`. names: vertices of the same name, in source order, share a place; null: each has its own. */
+ATH_ENCODER_API void ath_weld_mesh(ath_mesh *mesh, const int32_t *names, const int32_t *vertex_source);
 /* Builds the mesh of faces in source order. counts: null if all have shape->columns corners. `corners` and `counts`
- * must not be in the mesh's memory. */
+ * must not be in the mesh's memory. `same` is filled already. */
 ATH_ENCODER_API void ath_build_mesh(ath_mesh *mesh, const ath_polygons *shape, const uint32_t *counts,
                                     const int32_t *corners, const int32_t *vertex_source);
 #ifdef ATH_ENCODER

@@ -7,13 +7,12 @@
 #include "bits/lattice.inl"
 #include "model/plan.h"
 
-enum { GUESSES = 13, FEATURES = 8, FITS = 3, FITTED = GUESSES - 1, LINE_GUESS = 6 };
+enum { GUESSES = 11, FEATURES = 8, FITS = 3, LINE_GUESS = 5, FRONT_GUESS = 9, OTHER_FRONT = 10 };
 enum { LONGEST_LINE = 24, LONGEST_MEAN = 64, SOLVED_EVERY = 16, FIT_MEMORY = 256, RUNS = 8 };
 
 /* The state of a vertex from frame to frame. */
 typedef struct {
     double line[3], slope[3]; /* the line through the last positions */
-    double older[3];          /* the slope before the last turn */
     double mean[3];
     double error[GUESSES], noise; /* noise: error of the line while the vertex does not turn */
     int32_t age, frames;          /* positions in the line, and in the mean */
@@ -21,12 +20,19 @@ typedef struct {
     uint32_t size[2];             /* sums of the integers' magnitudes in the last two frames */
     int32_t before, above;        /* the vertex that this one follows, and the one that that follows; -1: none */
     int32_t base;                 /* attach vertex, or first vertex, of the stem; -1: this is that vertex */
-    int32_t like;                 /* corresponding vertex of an earlier stem of equal length; -1: none */
     int32_t near;                 /* the vertex whose errors and integers are likely to be similar; -1: none */
     int32_t tip;                  /* the last vertex of the stem; -1: this is an end */
     int32_t earlier, next;        /* neighbours in the order of coding; -1: none */
-    int32_t leads, followed; /* for the last vertex of a stem: whether others lie between the ends, and follow them */
+    double along;                 /* length of the stem at rest, from its base to this vertex */
+    /* The rest is for the last vertex of a stem. */
+    double reach[2];         /* how far its front had got along that length in the last two frames */
+    int32_t front[2];        /* the first vertex that the front had not passed */
+    int32_t leads, followed; /* whether others lie between the ends, and FOLLOW_NONE or how they follow */
 } predicted_vertex;
+
+/* How the vertices between the ends of a stem follow these: all of them as at rest, scaled; all of them, those that the
+ * front has passed as at rest and the others at the tip; or only those others. */
+enum { FOLLOW_NONE, FOLLOW_ENDS, FOLLOW_FRONT, FOLLOW_TIP, FOLLOWINGS };
 
 /* Weights of the features, found by least squares. */
 typedef struct {
@@ -37,9 +43,11 @@ typedef struct {
 typedef struct {
     lattice_model lattice;
     number_model distance;
-    ath_context moved[4][4][3], sign[3][3], copied[RUNS][RUNS], usual[2], followed[2][2];
+    ath_context moved[4][4][3], sign[3][3], copied[RUNS][RUNS], usual[2];
+    ath_context followed[FOLLOWINGS - 1][FOLLOWINGS][FOLLOWINGS];
     predicted_fit fits[FITS];
     int32_t run, last_run, last_distance, last_followed;
+    double advance; /* how far the front of the last stem under way got in a frame */
 } predicted_model;
 
 /* Positions of the frames around the current one, less the origin, vertex_count x 3 each. */
@@ -70,8 +78,8 @@ static void predicted_model_init(predicted_model *model)
     for (int32_t run = 0; run < RUNS; run++)
         for (int32_t last = 0; last < RUNS; last++) context_init(&model->copied[run][last], 6000);
     for (int32_t copied = 0; copied < 2; copied++) context_init(&model->usual[copied], 60000);
-    for (int32_t own = 0; own < 2; own++)
-        for (int32_t last = 0; last < 2; last++) context_init(&model->followed[own][last], 32768);
+    for (int32_t i = 0; i < (FOLLOWINGS - 1) * FOLLOWINGS * FOLLOWINGS; i++)
+        context_init(&model->followed[0][0][0] + i, 32768);
     for (int32_t f = 0; f < FITS; f++) model->fits[f].wait = 1;
     model->last_distance = 1;
 }
@@ -162,27 +170,112 @@ ATH_INLINE double grown(const double *rest, const double *now, int32_t from, int
     return length2 > 1e-60 ? along / length2 : 1.0;
 }
 
-/* Returns the scale of a stem from its ends or, for an end, extrapolates it from the frames before. */
+/* Returns the scale of a stem from its ends or, for an end, extrapolates it from the frames before, up to that at rest. */
 ATH_INLINE double stem_scale(const predicted_frames *frames, const predicted_vertex *vertex, int32_t v, double step)
 {
     if (vertex->tip >= 0) return grown(frames->rest, frames->now, vertex->base, vertex->tip, step);
     double was = grown(frames->rest, frames->was[0], vertex->base, v, step);
-    return was + (was - grown(frames->rest, frames->was[1], vertex->base, v, step));
+    double will = was + (was - grown(frames->rest, frames->was[1], vertex->base, v, step));
+    return was < 1.0 && will > 1.0 ? 1.0 : will;
+}
+
+/* Returns the first vertex of a stem after its base. */
+ATH_INLINE int32_t stem_start(const predicted_vertex *vertices, int32_t tip)
+{
+    return vertices[tip].leads ? vertices[tip].next : tip;
+}
+
+/* Finds the point of a stem at rest that is nearest to its tip. */
+static void learn_front(predicted_model *model, predicted_vertex *vertices, const predicted_frames *frames, int32_t tip)
+{
+    predicted_vertex *vertex = vertices + tip;
+    const double *rest = frames->rest;
+    int32_t base = vertex->base, from = base;
+    if (base < 0) return;
+    size_t b = 3 * (size_t)base;
+    double tip_way[3], least = 0.0, start = 0.0;
+    for (size_t k = 0; k < 3; k++) tip_way[k] = frames->now[3 * (size_t)tip + k] - frames->now[b + k];
+    vertex->front[1] = vertex->front[0];
+    vertex->reach[1] = vertex->reach[0];
+    for (int32_t to = stem_start(vertices, tip); to <= tip; from = to++) {
+        size_t u = 3 * (size_t)from, v = 3 * (size_t)to;
+        double edge[3], way[3], dot = 0.0, length2 = 0.0, off2 = 0.0;
+        for (size_t k = 0; k < 3; k++) {
+            edge[k] = rest[v + k] - rest[u + k];
+            way[k] = tip_way[k] - (rest[u + k] - rest[b + k]);
+            dot = dot + edge[k] * way[k];
+            length2 = length2 + edge[k] * edge[k];
+        }
+        double part = dot > 0.0 ? dot < length2 ? dot / length2 : 1.0 : 0.0;
+        for (size_t k = 0; k < 3; k++) {
+            double off = way[k] - part * edge[k];
+            off2 = off2 + off * off;
+        }
+        if (from == base || off2 < least) {
+            least = off2;
+            vertex->reach[0] = start + part * (vertices[to].along - start);
+            vertex->front[0] = to;
+        }
+        start = vertices[to].along;
+    }
+    double advance = vertex->reach[0] - vertex->reach[1];
+    if (vertex->reach[1] > 0.0 && vertex->reach[0] < vertex->along) model->advance = advance;
+}
+
+/* Guesses that the tip of a stem has moved along the stem at rest, up to a length. */
+static void guess_tip(const predicted_vertex *vertices, const predicted_frames *frames, int32_t tip, double reach,
+                      double guess[3])
+{
+    const double *rest = frames->rest;
+    int32_t base = vertices[tip].base, from = base, to = stem_start(vertices, tip);
+    double start = 0.0;
+    for (; to < tip && !(vertices[to].along >= reach); from = to++) start = vertices[to].along;
+    double left = reach - start, length = vertices[to].along - start;
+    double part = left > 0.0 ? left < length ? left / length : 1.0 : 0.0;
+    size_t b = 3 * (size_t)base, u = 3 * (size_t)from, v = 3 * (size_t)to;
+    for (size_t k = 0; k < 3; k++)
+        guess[k] = (frames->now[b + k] - frames->was[0][3 * (size_t)tip + k])
+                   + ((rest[u + k] - rest[b + k]) + part * (rest[v + k] - rest[u + k]));
+}
+
+/* Guesses where the front of a stem, which has been found for other vertices than the tip, moves a vertex. */
+static void guess_front(const predicted_model *model, const predicted_vertex *vertices, const predicted_frames *frames,
+                        int32_t v, predicted_way *p)
+{
+    const predicted_vertex *vertex = vertices + v;
+    double *guess = p->guess[FRONT_GUESS], *other = p->guess[OTHER_FRONT];
+    if (vertex->base < 0) {
+        memset(guess, 0, sizeof p->guess[0]);
+    } else if (vertex->tip < 0) {
+        const predicted_vertex *base = vertices + vertex->base, *below = base->tip < 0 ? base : vertices + base->tip;
+        double reach = vertex->reach[0], started = below->reach[0] - base->along;
+        guess_tip(vertices, frames, v, reach + (reach - vertex->reach[1]), guess);
+        guess_tip(vertices, frames, v, reach > 0.0 ? reach + model->advance : started, other);
+        return;
+    } else {
+        size_t at = 3 * (size_t)v, t = 3 * (size_t)vertex->tip, u = 3 * (size_t)vertex->before;
+        const double *now = frames->now, *was = frames->was[0];
+        const int32_t *front = vertices[vertex->tip].front;
+        for (size_t k = 0; k < 3; k++)
+            guess[k] = v >= front[0]  ? now[t + k] - was[at + k]
+                       : v < front[1] ? now[u + k] - was[u + k]
+                                      : (now[u + k] - was[at + k]) + (frames->rest[at + k] - frames->rest[u + k]);
+    }
+    memcpy(other, guess, sizeof p->guess[0]);
 }
 
 ATH_INLINE void guess_axis(const predicted_vertex *vertex, const predicted_frames *frames, size_t v, size_t k,
-                           const double scales[2], const double *weights, predicted_way *p)
+                           double scale, const double *weights, predicted_way *p)
 {
     const double *now = frames->now, *was = frames->was[0], *was2 = frames->was[1];
     size_t at = 3 * v + k;
     double x = was[at], own = x - was2[at], before = 0.0, before2 = 0.0, above = 0.0, above2 = 0.0;
-    double joined = 0.0, edge = 0.0, stem = 0.0, like = 0.0, waits = 0.0;
+    double joined = 0.0, stem = 0.0, waits = 0.0;
     if (vertex->before >= 0) {
         size_t u = 3 * (size_t)vertex->before + k;
         before = now[u] - was[u];
         before2 = was[u] - was2[u];
         joined = now[u] - x;
-        edge = joined + scales[0] * (frames->rest[at] - frames->rest[u]);
     }
     if (vertex->above >= 0) {
         size_t u = 3 * (size_t)vertex->above + k;
@@ -192,11 +285,7 @@ ATH_INLINE void guess_axis(const predicted_vertex *vertex, const predicted_frame
     if (vertex->base >= 0) {
         size_t u = 3 * (size_t)vertex->base + k;
         waits = frames->rest[u] - x;
-        stem = (now[u] - x) + scales[1] * (frames->rest[at] - frames->rest[u]);
-    }
-    if (vertex->like >= 0) {
-        size_t u = 3 * (size_t)vertex->like + k;
-        like = now[u] - was[u];
+        stem = (now[u] - x) + scale * (frames->rest[at] - frames->rest[u]);
     }
     double features[FEATURES] = {own,
                                  was2[at] - frames->was[2][at],
@@ -211,10 +300,9 @@ ATH_INLINE void guess_axis(const predicted_vertex *vertex, const predicted_frame
         p->features[k][i] = features[i];
         fitted = fitted + weights[i] * features[i];
     }
-    double guesses[GUESSES] = {0.0,         own,         before, own + (before - before2), edge, joined,
-                               features[6], features[7], like,   vertex->older[k],         stem, waits,
-                               fitted};
-    for (int32_t i = 0; i < GUESSES; i++) p->guess[i][k] = guesses[i];
+    double guesses[FRONT_GUESS] = {own,  0.0,   before, own + (before - before2), joined, features[6],
+                                   stem, waits, fitted};
+    for (int32_t i = 0; i < FRONT_GUESS; i++) p->guess[i][k] = guesses[i];
 }
 
 static void predict_vertex(const predicted_model *model, const ath_predicted_head *head,
@@ -222,17 +310,15 @@ static void predict_vertex(const predicted_model *model, const ath_predicted_hea
                            predicted_way *p)
 {
     const predicted_vertex *vertex = vertices + v, *near = vertex->near >= 0 ? vertices + vertex->near : 0;
-    int32_t inner = vertex->before >= 0 && vertex->near == vertex->before;
-    p->fit = inner ? 2 : vertex->before < 0 ? 0 : 1;
+    p->fit = vertex->before < 0 ? 0 : vertex->near == vertex->before ? 2 : 1;
     const predicted_fit *fit = model->fits + p->fit;
-    double scales[2] = {1.0, 1.0}, best = 0.0;
+    double best = 0.0, scale = stem_scale(frames, vertex, v, head->step);
     int32_t chosen = 0;
-    if (inner) scales[0] = grown(frames->rest, frames->now, vertex->above, vertex->before, head->step);
-    scales[1] = stem_scale(frames, vertex, v, head->step);
-    for (size_t k = 0; k < 3; k++) guess_axis(vertex, frames, (size_t)v, k, scales, fit->weights, p);
+    for (size_t k = 0; k < 3; k++) guess_axis(vertex, frames, (size_t)v, k, scale, fit->weights, p);
+    guess_front(model, vertices, frames, v, p);
     for (int32_t i = 0; i < GUESSES; i++) {
         double error = vertex->error[i];
-        if (near) error = error + near->error[i];
+        if (near) error = error + 2.0 * near->error[i];
         if (i == 0 || error < best) {
             best = error;
             chosen = i;
@@ -252,7 +338,6 @@ ATH_INLINE void learn_line(predicted_vertex *vertex, const double *x, const doub
     for (size_t k = 0; k < 3; k++) {
         double ahead = vertex->line[k] + vertex->slope[k], miss = x[k] - ahead;
         if (turned) {
-            vertex->older[k] = vertex->slope[k];
             vertex->line[k] = x[k];
             vertex->slope[k] = x[k] - last[k];
         } else {
@@ -282,6 +367,7 @@ static void learn_vertex(predicted_model *model, const ath_predicted_head *head,
     vertex->frames = ath_min(vertex->frames + 1, LONGEST_MEAN);
     for (size_t k = 0; k < 3; k++)
         vertex->mean[k] = vertex->mean[k] + (x[k] - vertex->mean[k]) / (double)vertex->frames;
+    if (vertex->tip < 0) learn_front(model, vertices, frames, v);
 }
 
 ATH_INLINE int32_t size_class(uint32_t size) { return size == 0 ? 0 : size < 2 ? 1 : size < 6 ? 2 : 3; }
@@ -323,10 +409,12 @@ ATH_INLINE void code_steps(ath_coder *coder, predicted_model *model, int32_t lat
     vertex->size[0] = sum;
 }
 
-/* Codes whether the vertices between the ends of a stem follow these. */
+/* Codes how the vertices between the ends of a stem follow these. */
 ATH_INLINE void code_followed(ath_coder *coder, predicted_model *model, predicted_vertex *tip, int followed)
 {
-    tip->followed = coder_bit(coder, &model->followed[tip->followed][model->last_followed], followed);
+    int32_t old = tip->followed, last = model->last_followed, value = 0;
+    while (value < FOLLOWINGS - 1 && coder_bit(coder, &model->followed[value][old][last], followed > value)) value++;
+    tip->followed = value;
     model->last_followed = tip->followed;
 }
 
@@ -359,7 +447,7 @@ typedef struct {
     ath_predicted_head head;
     predicted_vertex *vertices;
     double *memory[AROUND];
-    int32_t *last; /* vertices by cell; earlier, first vertices of stems by length */
+    int32_t *last; /* vertices by cell */
     const double *rest, *origin;
     void *positions;
     int32_t is_float64, vertex_count, frame;
@@ -378,17 +466,30 @@ static uint64_t carve_prediction(prediction *p, int32_t vertex_count, uint8_t *b
     return arena.used;
 }
 
+/* Measures the lengths along a stem at rest. */
+static void measure_stem(prediction *p, int32_t base, int32_t tip)
+{
+    double along = 0.0;
+    for (int32_t from = base, to = stem_start(p->vertices, tip); to <= tip; from = to++) {
+        double length2 = 0.0;
+        for (size_t k = 0; k < 3; k++) {
+            double edge = p->rest[3 * (size_t)to + k] - p->rest[3 * (size_t)from + k];
+            length2 = length2 + edge * edge;
+        }
+        along = along + ath_sqrt(length2);
+        p->vertices[to].along = along;
+    }
+}
+
 /* Sets the order of coding: stems in file order, and of each stem first its ends, which are the last vertex and, on a
  * root, the first. A vertex follows the one before it; the first and the last vertex follow the attach vertex. */
 static void follow_stems(prediction *p, const ath_branch *branches, int32_t branch_count)
 {
     int32_t tip_before = -1, first_before = -1, earlier = -1;
-    for (int32_t i = 0; i <= p->vertex_count; i++) p->last[i] = -1;
     for (int32_t b = 0; b < branch_count; b++) {
         const ath_branch *branch = branches + b;
-        int32_t like = p->last[branch->count], first = branch->first, tip = first + branch->count - 1;
+        int32_t first = branch->first, tip = first + branch->count - 1;
         int32_t ends = branch->attach < 0 && tip > first ? 2 : 1, base = ends == 2 ? first : branch->attach;
-        p->last[branch->count] = first;
         for (int32_t i = 0; i < branch->count; i++) {
             int32_t v = i == ends - 1 ? tip : i < ends ? first : first + i - 1;
             predicted_vertex *vertex = p->vertices + v;
@@ -396,13 +497,13 @@ static void follow_stems(prediction *p, const ath_branch *branches, int32_t bran
             vertex->near = i < ends ? tip_before : v == first ? first_before : v - 1;
             vertex->tip = i < ends ? -1 : tip;
             vertex->base = v == base ? -1 : base;
-            vertex->like = like >= 0 ? like + (v - first) : -1;
             vertex->earlier = earlier;
             vertex->next = -1;
             if (earlier >= 0) p->vertices[earlier].next = v;
             earlier = v;
         }
         p->vertices[tip].leads = branch->count > ends;
+        if (base >= 0) measure_stem(p, base, tip);
         tip_before = tip;
         if (branch->count > 1) first_before = first;
     }
@@ -514,25 +615,37 @@ static void place_vertex(prediction *p, int32_t v, const predicted_way *way, con
 ATH_INLINE int follows(const prediction *p, int32_t v)
 {
     int32_t tip = p->vertices[v].tip;
-    return tip >= 0 && p->vertices[tip].followed;
+    if (tip < 0 || p->vertices[tip].followed == FOLLOW_NONE) return 0;
+    return p->vertices[tip].followed != FOLLOW_TIP || v >= p->vertices[tip].front[0];
 }
 
-/* Places a vertex between the ends of its stem as it is at rest. */
-static void follow_ends(prediction *p, int32_t v, double scale)
+/* Places a vertex between the ends of its stem as it is at rest or, if the front has not passed it, at the tip. */
+static void follow_ends(prediction *p, int32_t v, double scale, int32_t followed)
 {
-    size_t from = 3 * (size_t)v, u = 3 * (size_t)p->vertices[v].base;
+    int32_t tip = p->vertices[v].tip;
+    size_t from = 3 * (size_t)v, u = 3 * (size_t)p->vertices[v].base, t = 3 * (size_t)tip;
     size_t at = 3 * (size_t)p->vertex_count * (size_t)p->frame + from;
+    int waits = followed != FOLLOW_ENDS && v >= p->vertices[tip].front[0];
     for (size_t k = 0; k < 3; k++) {
         double x = p->around.now[u + k] + scale * (p->rest[from + k] - p->rest[u + k]);
+        if (waits) x = p->around.now[t + k];
         put_out(p, at, k, is_number(x) ? x : p->around.was[0][from + k]);
         p->around.now[from + k] = put_back(p, at, k);
     }
 }
 
+/* Returns the scale of a stem whose other vertices follow its ends. */
+static double scale_of(const prediction *p, int32_t tip, int32_t followed)
+{
+    if (followed != FOLLOW_ENDS) return 1.0;
+    return grown(p->rest, p->around.now, p->vertices[tip].base, tip, p->head.step);
+}
+
 static void follow(prediction *p, int32_t v)
 {
     predicted_vertex *vertex = p->vertices + v;
-    follow_ends(p, v, stem_scale(&p->around, vertex, v, p->head.step));
+    int32_t followed = p->vertices[vertex->tip].followed;
+    follow_ends(p, v, scale_of(p, vertex->tip, followed), followed);
     vertex->size[1] = vertex->size[0];
     vertex->size[0] = 0;
 }

@@ -290,14 +290,14 @@ static int is_untouched(const ath_mesh *mesh, const ath_branch *branch, int32_t 
 }
 
 /* Codes vertices in the order of the mesh about their neighbours. A vertex without known neighbours is coded as on a
- * stem, since all vertices before it on the stem are known. */
+ * stem, since the places of all vertices before it are known. */
 static int code_connected_rest(ath_coder *coder, rest_model *model, const rest_layer *layer, const ath_branch *branches,
                                int32_t branch_count, int has_copies, double step, const double *source, double *rest)
 {
     ath_mesh *mesh = layer->mesh;
-    int32_t shape = -1; /* the last branch whose role is a shape */
+    int32_t shape = -1, filled = 0; /* the last branch whose role is a shape; vertices filled from their places */
     for (int32_t v = 0; v < mesh->vertex_count; v++) mesh->from[v] = -1;
-    for (int32_t t = 0; t < mesh->vertex_count; t++) {
+    for (int32_t t = 0; t < mesh->place_count; t++) {
         int32_t v = mesh->order[t];
         if (mesh->from[v] == OF_COPY) continue;
         const ath_branch *branch = branch_of(branches, branch_count, v);
@@ -306,6 +306,10 @@ static int code_connected_rest(ath_coder *coder, rest_model *model, const rest_l
         rest_ring ring;
         rest_guess at;
         rest_ring_of(mesh, rest, v, &ring);
+        if (ring.base < 0) {
+            fill_places(mesh, filled, v, rest);
+            filled = v;
+        }
         if (has_copies && ring.base < 0 && is_untouched(mesh, branch, v, t)) {
             int32_t b = (int32_t)(branch - branches);
             int32_t role = code_part(coder, model, layer, branches, b, step_here, source, rest);
@@ -324,6 +328,7 @@ static int code_connected_rest(ath_coder *coder, rest_model *model, const rest_l
         rest_look_beside(predictor, mesh, &ring, rest, layer->before, v, 1.0 / unit, &at);
         code_expected_vertex(coder, model, layer, branch, predictor, &at, v, unit, source, rest);
     }
+    fill_places(mesh, filled, mesh->vertex_count, rest);
     return 1;
 }
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 from athcodec.encoding.features import Feature
@@ -9,7 +10,6 @@ from athcodec.encoding.settings import Settings
 from athcodec.encoding.trials import Trials
 
 PERIODIC_WORTH = 1.1  # Largest ratio of bytes at which waves are periodic: coarse levels jump at the seam of others.
-EXTRA_TRIALS = 2  # Learning time bases takes as long as this many trials.
 
 
 def candidates(settings: Settings, trials: Trials) -> list[Settings]:
@@ -26,18 +26,17 @@ def best_bases(settings: Settings, trials: Trials) -> Settings:
         return settings
     waves = settings.in_waves()
     each, *common = candidates(settings, trials)
-    trials.costs([waves, each, *common])
+    if math.inf in trials.costs([waves, each, *common]):
+        return trials.cheapest([settings, waves, each, *common])
     shorter = trials.level_costs(each) < trials.level_costs(waves)
     mixed = replace(each, learned_bases=tuple(shorter.tolist()))
-    best = trials.cheapest([waves, mixed, *common])
-    trials.spend(EXTRA_TRIALS)
-    return best
+    return trials.cheapest([waves, mixed, *common])
 
 
 def waves_if_smaller(settings: Settings, trials: Trials) -> Settings:
     """Return the settings with waves if learned time bases no longer pay at the final steps. They are learned again at
     these steps, as for the file: a component that is just left out may be kept at another step."""
-    if not any(settings.learned_bases):
+    if not any(settings.learned_bases) or not trials.work.fits(2 * trials.work_of_trial):
         return settings
     trials.forget(settings)
     return trials.cheapest([settings, settings.in_waves()])

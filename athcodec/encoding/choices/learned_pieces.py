@@ -7,20 +7,22 @@ from dataclasses import replace
 
 import numpy as np
 
+from athcodec.encoding import progress
 from athcodec.encoding.choices.forms import in_each_basis
 from athcodec.encoding.features import Feature
 from athcodec.encoding.learned_modes import estimated_bits
 from athcodec.encoding.settings import Settings
 from athcodec.encoding.trials import Trials
 
-EXTRA_TRIALS = 6  # Learning modes and estimating their bits takes as long as this many trials.
 REQUIRED_SAVINGS = (1.0, 1.25)  # Factors by which a piece's estimated bits have to shrink for learned modes.
 
 
 def candidates(settings: Settings, trials: Trials) -> list[Settings]:
     """Return the settings with learned modes for the pieces that take fewer bits with them."""
-    if trials.without(Feature.SHAPES):
+    work = trials.work_of(2 * progress.ANALYSIS)
+    if trials.without(Feature.SHAPES) or not trials.work.fits(work):
         return []
+    trials.work.add(work)
     plain = replace(settings, learned_pieces=None)
     pieces = pieces_that_save(plain, trials, REQUIRED_SAVINGS)
     return [
@@ -42,9 +44,7 @@ def best_pieces_in_any_basis(settings: Settings, trials: Trials) -> Settings:
     starts = in_each_basis(settings, trials)
     if any(settings.learned_bases):  # Time bases were chosen before learned modes were known, too.
         starts.append(settings.in_waves())
-    chosen = min((best_pieces(start, trials) for start in starts), key=trials.cost)
-    trials.spend(EXTRA_TRIALS)
-    return chosen
+    return trials.cheapest([best_pieces(start, trials) for start in starts])
 
 
 def pieces_that_save(plain: Settings, trials: Trials, required_savings: Sequence[float]) -> list[np.ndarray]:

@@ -7,14 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from athcodec.encoding import streams
+from athcodec.encoding import progress, streams
 from athcodec.encoding.motion import Plan, SegmentMotion, position_errors
 from athcodec.encoding.segment import CodedPrelude, Source
 from athcodec.encoding.settings import Settings
 from athcodec.encoding.survey import Ath
 from athcodec.encoding.trials import Trials
 
-EXTRA_TRIALS = 4  # Analysing maps at several steps takes as long as this many trials.
 QUALITIES = (0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0)  # Steps that are tried, over the error of a level.
 FEW_ROOTS, ROOT_QUALITIES = 4, (0.7, 1.4, 2.8)  # Qualities for up to so many roots, whose maps are mostly a few bytes.
 FILE_SHARE, FEW_BYTES = 0.02, 320  # The maps may take this share of the file, or these bytes if that is more.
@@ -33,9 +32,11 @@ def best_node_steps(settings: Settings, trials: Trials) -> Settings:
     allowed = max(least, FILE_SHARE / (1 - FILE_SHARE) * rest)
     qualities = _qualities(trials)
     chosen = limits = None
+    trials.work.add(trials.work_of(progress.ANALYSIS))
     for quality in qualities:
         steps = quality * errors
         segment.clear_nodes()
+        trials.work.add(trials.work_of(progress.MAPS * trials.levels))
         segment.analyse_nodes(sample, steps, settings.rounding)
         if limits is None:
             if _map_bytes(segment, trials) > allowed and quality is not qualities[-1]:
@@ -46,7 +47,6 @@ def best_node_steps(settings: Settings, trials: Trials) -> Settings:
             chosen = steps
         else:
             break
-    trials.spend(EXTRA_TRIALS)
     return replace(settings, node_steps=chosen)
 
 
@@ -77,9 +77,12 @@ def _level_errors(trials: Trials, bound: float) -> np.ndarray:
     frames[:, source.hierarchy.vertex_source] = np.moveaxis(sample[:, :, some], 2, 0) + source.origin
     nodes = inner_nodes(source, ath, trials.levels)
     errors = np.full(trials.levels, bound)
-    for level in np.flatnonzero(nodes):
-        away = ath.approximation(frames, int(level)) - frames
-        whole = max(bound, math.sqrt((away**2).sum() / (frames.size / 3)))
+    for level in np.flatnonzero(nodes).tolist():
+        if level not in trials.map_errors:
+            away = ath.approximation(frames, level) - frames
+            trials.map_errors[level] = math.sqrt((away**2).sum() / (frames.size / 3))
+            trials.work.add(progress.LEVEL * source.clip.vertex_count)
+        whole = max(bound, trials.map_errors[level])
         errors[level] = whole * math.sqrt(source.clip.vertex_count / nodes[level])
     return errors
 

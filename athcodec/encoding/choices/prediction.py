@@ -7,7 +7,7 @@ It suits what waves and modes do not: growth, few frames, noise, jumps, rests. `
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,23 +20,27 @@ from athcodec.encoding.choices.levels import SourceFrames
 from athcodec.encoding.choices.rest import with_best_rest
 from athcodec.encoding.features import Feature
 from athcodec.encoding.motion import LevelStream, SegmentMotion, position_errors
+from athcodec.encoding.progress import PREDICTION, Work
 from athcodec.encoding.segment import CodedPrelude, Source, plain_settings
 from athcodec.encoding.segment_samples import SegmentSample, typical_segments
 from athcodec.encoding.settings import Choice, Settings
 from athcodec.encoding.survey import Ath, Survey
 from athcodec.errors import BoundError
 from athcodec.motion.thresholds import Thresholds
+from athcodec.options import SMOOTHNESS
 
 CUBES, LATTICE = False, True  # Positions are rounded to one of these.
-REST_STEPS = (0.5, 0.25, 0.125, 1.15)  # Steps of the rest pose that are tried, in bounds.
+REST_STEPS = (1.15, 0.5, 0.25, 0.125)  # Steps of the rest pose, in bounds.
+REST_TRIALS = 3  # Steps of the rest pose that are tried, those nearest to the error of the motion.
 STEPS = (0.999, 0.97, 0.9, 0.75, 0.5, 0.3)  # Steps tried, over the largest that reaches every point in the limit.
 TRIAL_SEGMENTS, TRIAL_FRAMES = 3, 64  # Segments of a trial, and frames of each that show whether it may pay.
 STILL = 0.35  # Largest error, in limits, whose second differences stay within 1.4 limits.
+CALMER = (0.5, 0.7)  # Larger errors, in limits, that are tried where those are too dear.
 FINE_STILL = 0.25  # Largest error, in limits, whose second differences stay within one limit.
 FINE = 9e-4  # Bound, in diagonals, below which second differences are held to one limit.
 UNSEEN, INVISIBLE = 1e-5, 1e-6  # Bounds, in diagonals, below which twitches count for less, and for nothing.
 TWITCHING = 0.02  # Share of the vertices that may twitch in any frame.
-MOST_FOR_STILL = 2.0  # Factor on the bytes that errors without twitches may cost.
+HOPELESS = 1.05  # Factor on the bytes allowed at which other steps of the rest pose do not help.
 TOO_MANY = 1.2  # Predicted motion is given up if a few frames promise more than this factor on the bytes allowed.
 MAP_SHARE = 0.02  # Share of the bytes that the maps of level 0 may take.
 MAP_STEPS = (0.1, 0.25, 0.5, 1.0)  # Steps of these maps that are tried, over the error of the rest pose.
@@ -63,10 +67,12 @@ class FoundPrediction:
     twitches: bool
 
 
-def best_prediction(source: Source, bound: float, most_bytes: float) -> FoundPrediction | None:
+def best_prediction(
+    source: Source, bound: float, most_bytes: float, work: Work, smoothness: str = "default"
+) -> FoundPrediction | None:
     """Return the best prediction; None: it takes more than `most_bytes`, or cannot keep the bound."""
     ath = one_map_each(source.seen)
-    first, *others = (_settings(source, ath, bound, ratio * source.smallest_bound(bound)) for ratio in REST_STEPS)
+    by_ratio = {ratio: _settings(source, ath, bound, ratio * source.smallest_bound(bound)) for ratio in REST_STEPS}
     samples = _samples(source)
     preludes: dict[float, CodedPrelude] = {}
 
@@ -78,6 +84,7 @@ def best_prediction(source: Source, bound: float, most_bytes: float) -> FoundPre
     def coded(settings: Settings, lattice: bool = CUBES, error_share: float = 1.0) -> FoundPrediction:
         stepped = replace(settings, step=_largest_step(error_share * settings.limit, lattice))
         choice = Choice(stepped, stepped, None, predicted=lattice, error_share=error_share)
+        work.add(PREDICTION * source.clip.vertex_count * sum(sample.positions.shape[2] for sample in samples))
         try:
             prelude = prelude_of(settings)
             parts = [(sample, *_predicted(prelude, choice, sample.positions)) for sample in samples]
@@ -87,26 +94,39 @@ def best_prediction(source: Source, bound: float, most_bytes: float) -> FoundPre
         twitches = any(_twitches(shown, sample.positions, settings.limit) for sample, _, shown in parts)
         return FoundPrediction(choice, motion + prelude.prelude_bytes, twitches)
 
-    def best(found: Iterable[FoundPrediction]) -> FoundPrediction:
-        return min(found, key=lambda one: one.bytes)
+    def best(share: float, most: float, lattice: bool) -> FoundPrediction:
+        """Return the best prediction whose errors are at most a share of the limit; far above `most`, any."""
+        ratios = sorted(REST_STEPS, key=lambda ratio: abs(math.log(ratio / share)))[:REST_TRIALS]
+        found = coded(by_ratio[ratios[0]], CUBES, share)
+        if found.bytes > HOPELESS * most:
+            return found
+        tried = [found, *(coded(by_ratio[ratio], CUBES, share) for ratio in ratios[1:])]
+        found = min(tried, key=lambda one: one.bytes)
+        if not lattice or Feature.LATTICE in source.without:
+            return found
+        return min(found, coded(found.choice.settings, LATTICE, share), key=lambda one: one.bytes)
 
+    some = by_ratio[0.5]
     try:
-        if sum(_begun(prelude_of(first), first, sample) for sample in samples) > TOO_MANY * most_bytes:
+        if sum(_begun(prelude_of(some), some, sample) for sample in samples) > TOO_MANY * most_bytes:
             return None
     except BoundError:
         return None
-    found = best(coded(own) for own in (first, *others))
-    if Feature.LATTICE not in source.without:
-        found = best([found, coded(found.choice.settings, LATTICE)])
-    if found.twitches:
+    found = best(1.0, math.inf, lattice=True)
+    if found.twitches and smoothness != "bytes":
         relative = source.smallest_bound(bound) / source.seen.diagonal
-        share = _still_share(relative)
-        still = best(coded(own, CUBES, share) for own in (first, *others))
-        if relative < FINE and Feature.LATTICE not in source.without:
-            still = best([still, coded(still.choice.settings, LATTICE, share)])
-        if still.bytes < min(most_bytes, MOST_FOR_STILL * found.bytes):
-            found = still
+        most = min(most_bytes, SMOOTHNESS[smoothness] * found.bytes)
+        for share in _still_shares(relative, smoothness):
+            still = best(share, most, lattice=relative < FINE)
+            if still.bytes < most:
+                return still
     return found if found.bytes < most_bytes else None
+
+
+def _still_shares(relative: float, smoothness: str) -> list[float]:
+    """Return the shares of the limit that errors may be held to, from small to large."""
+    least = _still_share(relative)
+    return [least] if smoothness == "motion" else [least, *(share for share in CALMER if share > least)]
 
 
 def _still_share(relative: float) -> float:

@@ -17,7 +17,6 @@ from athcodec.encoding.settings import Settings
 from athcodec.encoding.survey import Ath
 
 SEGMENTS = 4  # Largest number of segments whose mean is taken.
-MEAN_POSE_TRIALS = 6  # Finding the mean pose, and learned modes about it, takes as long as this many trials.
 
 
 def mean_pose(source: Source, ath: Ath, settings: Settings) -> np.ndarray:

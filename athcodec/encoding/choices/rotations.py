@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -19,12 +20,18 @@ def candidates(settings: Settings, factors: tuple[int, ...] = ROTATION_FACTORS) 
     return [settings.with_rotations(factor) for factor in factors]
 
 
+def fast_rotations(settings: Settings, trials: Trials) -> Settings:
+    """Return the settings with the best of a few factors."""
+    return best_rotations(settings, trials, FAST_FACTORS)
+
+
 def best_rotations(settings: Settings, trials: Trials, factors: tuple[int, ...] = ROTATION_FACTORS) -> Settings:
     """Return the settings with the best factor: one for all levels, one for each level, or one for the roots alone."""
     if trials.without(Feature.ROTATIONS):
         return settings
     uniform = candidates(settings, factors)
-    trials.costs(uniform)
+    if math.inf in trials.costs(uniform):
+        return trials.cheapest([settings, *uniform])
     per_level = np.array([trials.level_costs(candidate) for candidate in uniform])
     mixed = replace(settings, rotation_step_factors=tuple(factors[i] for i in per_level.argmin(axis=0)))
     others = (0,) * (settings.levels - 1)

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import dataclasses
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
@@ -75,37 +75,48 @@ def find_branches(clip: MotionClip, method: str = "auto", root: int | None = Non
     return branches
 
 
-def candidates(clip: MotionClip) -> list[Found]:
-    """Return what find_branches finds and, if only a trial shows which makes the smallest file, alternatives: for
+def candidates(clip: MotionClip) -> Iterator[Found]:
+    """Yield what find_branches finds and, if only a trial shows which makes the smallest file, alternatives: for
     motion, or runs that leave many points alone, patches of other sizes, patches without parents and one single branch;
     for a welded mesh, its pieces. A clip that stands still has no patches and no runs."""
     seen = Seen(clip)
     single = Found(np.zeros(clip.vertex_count, np.int32), np.array([-1], np.int32), None, "motion")
     if stands_still(clip):
         first = _first_found(seen, METHODS[:-2], None)
-        return [single] if first is None else [single, first]
-    first = _first_found(seen, METHODS, None) or _by_motion(seen, None)
-    if first.method == "objects":  # What hangs on a part that grows may move more simply by itself.
-        other = _first_found(seen, METHODS[METHODS.index("objects") + 1 :], None)
-        free = dataclasses.replace(first, branch_parent=np.full_like(first.branch_parent, -1))
-        return [free, first, *([] if other is None else [other])]
-    if first.method == "skeleton":
-        return [first, dataclasses.replace(first, stem_index=None)]
-    lone = np.count_nonzero(np.bincount(first.vertex_branch) == 1)
-    if first.method == "components":
-        unwelded = pieces(clip)  # Leaves that touch are welded, which is wrong if they move by themselves.
-        return [first] if len(unwelded.branch_parent) == len(first.branch_parent) else [first, unwelded]
-    if first.method != "motion" and not (first.method == "runs" and lone > LONE_POINTS * clip.vertex_count):
-        return [first]
-    patches = [first] if first.method == "motion" else [first, _by_motion(seen, None)]
-    return [single, *patches, *_more_patches(seen)]
+        yield single
+        if first is not None:
+            yield first
+        return
+    first = _first_found(seen, METHODS[:-1], None)
+    if first is not None and first.method == "objects":  # What hangs on a part that grows may move more simply alone.
+        yield dataclasses.replace(first, branch_parent=np.full_like(first.branch_parent, -1))
+        yield first
+        other = _first_found(seen, METHODS[METHODS.index("objects") + 1 : -1], None)
+        if other is not None:
+            yield other
+        return
+    if first is not None and not (first.method == "runs" and _leaves_many_alone(first)):
+        yield first
+        if first.method == "skeleton":
+            yield dataclasses.replace(first, stem_index=None)
+        if first.method == "components":
+            unwelded = pieces(clip)  # Leaves that touch are welded, which is wrong if they move by themselves.
+            if len(unwelded.branch_parent) != len(first.branch_parent):
+                yield unwelded
+        return
+    yield single
+    if first is not None:
+        yield first
+    yield _by_motion(seen, None)
+    is_large = clip.vertex_count >= LARGE_MESH
+    yield _by_motion(seen, None, LARGE_PATCH if is_large else SMALL_PATCH)
+    for size in FREE_PATCHES[-1:] if is_large else FREE_PATCHES:
+        yield _free_patches(seen, size)
 
 
-def _more_patches(seen: Seen) -> list[Found]:
-    """Return patches of another size than usual, and patches without parents."""
-    if seen.clip.vertex_count >= LARGE_MESH:
-        return [_by_motion(seen, None, LARGE_PATCH), _free_patches(seen, FREE_PATCHES[-1])]
-    return [_by_motion(seen, None, SMALL_PATCH), *(_free_patches(seen, size) for size in FREE_PATCHES)]
+def _leaves_many_alone(found: Found) -> bool:
+    """Return whether many branches are a single vertex."""
+    return bool(np.count_nonzero(np.bincount(found.vertex_branch) == 1) > LONE_POINTS * len(found.vertex_branch))
 
 
 def pieces(clip: MotionClip) -> Found:

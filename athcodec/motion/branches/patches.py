@@ -22,7 +22,8 @@ def rigid_patches(frames: np.ndarray, links: np.ndarray, patch_vertices: int) ->
         maps = _maps(frames, label)
         current = _misfit(frames, maps, np.arange(len(label)), label)
         beside = label[links[:, 0]] != label[links[:, 1]]
-        vertex, other = np.unique(np.stack([links[beside, 0], label[links[beside, 1]]], axis=1), axis=0).T
+        pairs = np.unique(links[beside, 0] * len(maps) + label[links[beside, 1]])
+        vertex, other = np.divmod(pairs, len(maps))
         misfit = _misfit(frames, maps, vertex, other)
         best = cheapest_of_each(vertex, misfit)
         best = best[misfit[best] < current[vertex[best]]]

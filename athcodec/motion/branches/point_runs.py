@@ -26,6 +26,7 @@ UNLIKE = 4.0  # Its other links must change more than this many times as much.
 OFF_LINE = 0.5  # Part of a link's length that a still point behind it may be off its line.
 CROWD = 1.5  # Part of the length of a point's links within which other steady points are no neighbours on a run.
 CROWDED = 0.25  # Such pairs for each point that make the points a sheet or a body.
+SCATTERED = 0.05  # Links for each point, among its nearest ones, below which points form no runs.
 JOINED = 0.5  # Smallest share of the points that must be linked; with fewer, the points form no runs.
 PAIRS_AT_ONCE = 1 << 13
 
@@ -40,7 +41,7 @@ def run_links(frames: np.ndarray) -> np.ndarray | None:
     for turn in range(ROUNDS):
         steady.add(_near_pairs(frames[-turn, loose], loose))
         links, before = steady.tree(), len(links)
-        if turn == 0 and steady.beside(links) > CROWDED * count:
+        if turn == 0 and (steady.beside(links) > CROWDED * count or len(links) < SCATTERED * count):
             return None
         if len(links) == before:
             break

@@ -1,0 +1,94 @@
+"""Work of the search for settings: it is counted, and keeps to what a clip allows."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from plants import plant
+
+import athcodec
+from athcodec import MotionClip
+from athcodec.encoding import progress
+from athcodec.encoding.job import EncodingJob
+from bench import odd
+
+
+def sheet(**options) -> MotionClip:
+    return odd.MAKERS["rippling_sheet"](seed=1, **{"side": 16, "frames": 40, "bumps": 5} | options)
+
+
+KINDS = {
+    "plant": lambda: plant(seed=1, branches=20, frames=40),
+    "few frames": lambda: plant(seed=2, branches=60, frames=3),
+    "many frames": lambda: plant(seed=3, branches=2, frames=400),
+    "sheet without branches": sheet,
+    "points": lambda: odd.MAKERS["drifting_points"](seed=1, points=300, frames=9, noise=1e-4),
+    "noise": lambda: odd.MAKERS["white_noise"](seed=1, points=40, frames=40),
+    "one vertex": lambda: odd.MAKERS["one_vertex"](seed=1, frames=40),
+    "still": lambda: odd.MAKERS["still_mesh"](seed=1, frames=3, nodes=60, leaves=10),
+}
+
+
+@pytest.fixture
+def works(monkeypatch) -> list[progress.Work]:
+    """The work of every decision about a file."""
+    works: list[progress.Work] = []
+    decide = EncodingJob._decide
+
+    def noted(job: EncodingJob, bound: float, work: progress.Work) -> object:
+        works.append(work)
+        return decide(job, bound, work)
+
+    monkeypatch.setattr(EncodingJob, "_decide", noted)
+    return works
+
+
+def encoded(clip: MotionClip, folder: Path, **options) -> bytes:
+    return athcodec.encode(clip, folder / "a.ath", **options).path.read_bytes()
+
+
+def allow(share: float, monkeypatch) -> None:
+    monkeypatch.setattr(progress, "LEAST_WORK", share * progress.LEAST_WORK)
+    monkeypatch.setattr(progress, "WORK", share * progress.WORK)
+
+
+@pytest.mark.parametrize("share", [1.0, 0.3])
+@pytest.mark.parametrize("kind", KINDS)
+def test_counted_work_keeps_to_what_the_clip_allows(kind, share, works, tmp_path, monkeypatch):
+    allow(share, monkeypatch)
+    encoded(KINDS[kind](), tmp_path)
+    assert works and all(work.done <= work.allowed for work in works)
+
+
+def test_a_search_names_what_it_left_out(works, tmp_path, monkeypatch):
+    clip, path = plant(seed=1, branches=20, frames=40), tmp_path / "a.ath"
+    assert athcodec.encode(clip, path).untried == ()
+    whole = works[-1].done
+    allow(0.1, monkeypatch)
+    assert "all choices again" in athcodec.encode(clip, path).untried
+    assert works[-1].done < whole
+    assert athcodec.encode(clip, path, effort="best").untried == ()
+
+
+def test_branches_that_are_not_tried_are_named(tmp_path, monkeypatch):
+    allow(0.05, monkeypatch)
+    assert "branches" in athcodec.encode(sheet(), tmp_path / "a.ath").untried
+
+
+@pytest.mark.parametrize("share", [0.001, 0.1])
+def test_less_work_gives_a_file_that_keeps_its_bound(share, tmp_path, monkeypatch):
+    allow(share, monkeypatch)
+    for clip in (plant(seed=1, branches=20, frames=40), sheet()):
+        summary = athcodec.encode(clip, tmp_path / "a.ath", rel_error=1e-4)
+        with athcodec.open(tmp_path / "a.ath") as decoder:
+            away = np.linalg.norm(decoder.positions().astype(float) - clip.block(0, clip.frame_count), axis=2)
+        assert summary.untried and away.max() <= summary.max_error_bound
+
+
+@pytest.mark.parametrize("share", [0.02, 0.1, 0.3])
+def test_the_same_is_left_out_with_any_number_of_threads(share, tmp_path, monkeypatch):
+    allow(share, monkeypatch)
+    clip = plant(seed=1, branches=20, frames=40)
+    assert len({encoded(clip, tmp_path, jobs=jobs) for jobs in (1, 2, 4)}) == 1
