@@ -61,6 +61,8 @@ LOOKS = {
         "median_share_above_bound": Column("in the median frame", ".1%"),
         "tick_ratio": TICK_RATIO,
         "source_tick_ratio": Column("source's own"),
+        "acceleration_ratio": Column("over the source's"),
+        "acceleration_ratio_frame": Column("in frame", "d"),
     },
     "shape": {
         "rms_stretch": Column("RMS stretch", ".2%"),

@@ -35,6 +35,8 @@ class MotionMeter:
         As for SmoothnessMeter.
     edges : (E, 2) array of integers, optional
         Pairs of vertices; by default those of `edges_of`.
+    file_bound : float, optional
+        The largest bound of the file, of which this is a level; by default `bound`.
 
     Attributes
     ----------
@@ -54,7 +56,9 @@ class MotionMeter:
         starts: Sequence[int] = (),
         loop: bool = False,
         edges: np.ndarray | None = None,
+        file_bound: float | None = None,
     ) -> None:
+        self._file_bound = bound if file_bound is None else file_bound
         self.bounds = bound if weights is None else bound * weights / weights.max()
         self.error = ErrorMeter(clip.rest, weights)
         self.smoothness = SmoothnessMeter(clip.frame_count, self.bounds, starts, loop)
@@ -82,6 +86,7 @@ class MotionMeter:
         is None.
         """
         error, smoothness = self.error, self.smoothness
+        jerks = smoothness.jerks(self._file_bound)
         return {
             "max_error": error.max_error,
             "rms_error": error.rms_error,
@@ -94,6 +99,8 @@ class MotionMeter:
                 "median_share_above_bound": smoothness.median_share,
                 "tick_ratio": smoothness.tick_ratio,
                 "source_tick_ratio": smoothness.source_tick_ratio,
+                "acceleration_ratio": float(jerks.max(initial=0.0)),
+                "acceleration_ratio_frame": int(jerks.argmax()) if len(jerks) else 0,
             },
             "shape": self._shape(),
         }
@@ -144,6 +151,7 @@ def level_meters(decoder: Decoder, clip: MotionClip) -> list[MotionMeter]:
             starts=[start for start, _ in decoder.segments],
             loop=decoder.clip.loop,
             edges=edges,
+            file_bound=decoder.file.max_error_bound,
         )
         for level in decoder.levels
     ]

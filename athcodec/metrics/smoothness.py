@@ -127,14 +127,13 @@ class SmoothnessMeter:
         """`share` in the median frame; 0 without second differences."""
         return float(np.nanmedian(self.share)) if self._points else 0.0
 
-    @property
-    def jerks(self) -> np.ndarray:
-        """At each frame the decoded acceleration over the source's largest within `NEAR_SEAM` frames, or over half the
-        largest bound if that is larger, (T,); at most 2 at the levels of a file, but for predicted motion."""
+    def jerks(self, bound: float) -> np.ndarray:
+        """Return at each frame the decoded acceleration over the source's largest within `NEAR_SEAM` frames, or over
+        half the bound of the file if that is larger, (T,); at most 2 at the levels of a file, but for predicted motion."""
         frames, series = np.arange(len(self.acceleration)), np.nan_to_num(self.source_acceleration)
         near = frames[:, None] + np.arange(-NEAR_SEAM, NEAR_SEAM + 1)
         near = near % len(frames) if self._loop else near.clip(0, len(frames) - 1)
-        allowed = np.maximum(series[near].max(axis=1), 0.5 * self._bound.max())
+        allowed = np.maximum(series[near].max(axis=1), 0.5 * bound)
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.nan_to_num(self.acceleration / allowed, posinf=inf)
 
