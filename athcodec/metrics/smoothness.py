@@ -129,7 +129,7 @@ class SmoothnessMeter:
 
     def jerks(self, bound: float) -> np.ndarray:
         """Return at each frame the decoded acceleration over the source's largest within `NEAR_SEAM` frames, or over
-        half the bound of the file if that is larger, (T,); at most 2 at the levels of a file, but for predicted motion."""
+        half the bound of the file if that is larger, (T,); at most 2 at a file's levels, but for predicted motion."""
         frames, series = np.arange(len(self.acceleration)), np.nan_to_num(self.source_acceleration)
         near = frames[:, None] + np.arange(-NEAR_SEAM, NEAR_SEAM + 1)
         near = near % len(frames) if self._loop else near.clip(0, len(frames) - 1)
