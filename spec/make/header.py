@@ -73,6 +73,14 @@ def of_range(max_error: int) -> Draft:
     )
 
 
+def shown(*levels: int) -> Draft:
+    """The fork, of which these levels are shown."""
+    draft = fork().with_header(shown=levels, level_count=len(levels), full_level_count=len(levels))
+    for segment in range(2 if 0 not in levels else 0):
+        draft = draft.without(AFFINES, 0, segment)
+    return draft
+
+
 valid("documented: the smallest file, as FORMAT.md has it", documented)
 valid("uneven-segments: 7 frames in 3 segments, of 2, 2 and 3", moving, FORK, 25, frames=7, segments=3, heads=HEADS)
 valid("segment-per-frame: as many segments as frames", lambda: moving(FORK, 26, frames=3, segments=3, heads=HEADS))
@@ -87,6 +95,18 @@ valid(
     "max-error-largest: the largest Max_Error, and errors of segments up and down",
     lambda: replace(fork().with_header(max_error=HIGHEST), errors=tuple(range(8000, 8018))),
 )
+valid("level-0-not-shown: level 0 is not shown and has no maps", lambda: shown(1, 2))
+valid("level-1-not-shown: levels 0 and 2 are shown", lambda: shown(0, 2))
+valid("last-alone-shown: only the last level is shown", lambda: shown(2))
+invalid(
+    "affines-not-shown BAD_CHUNK_TABLE: maps of a level that is not shown",
+    lambda: shown(1, 2).add(*fork().entries[4:5]),
+)
+invalid(
+    "last-not-shown BAD_HEADER: the last level is not shown",
+    lambda: fork().upto(1).with_header(shown=(0, 1), full_level_count=2),
+)
+invalid("level-32-shown BAD_HEADER: level 32 is shown", lambda: shown(0, 1, 32))
 invalid("empty NOT_AN_ATH_FILE: a file of no bytes", b"")
 invalid(
     "magic-other NOT_AN_ATH_FILE: something else", b"PK\x03\x04 something else entirely, longer than a header would be"
