@@ -59,18 +59,20 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     names = dict.fromkeys(name for suite in data.SUITES.values() for name in suite)
     for path in map(data.path_of, names) if args.all else args.clips:
         with encoded(path, args.rel_error, ladder=args.ladder) as result:
-            ath, file = _same_nodes(result), result.decoder.file
+            file = result.decoder.file
+            ath = None if file.header.is_predicted else _same_nodes(result)  # The paper has no such motion.
             meters = measured_levels(result.decoder, result.clip)
             for stored in result.decoder.levels:
                 case = {"clip": path.stem, "level": stored.level}
                 depth = file.header.stages[stored.level]
                 meter, ours = meters[stored.level], meters[stored.level].error
-                paper = _measure_paper(result.clip, ath, depth) if depth <= ath.height else None
+                has_nodes = ath is not None and depth <= ath.height
+                paper = _measure_paper(result.clip, ath, depth) if has_nodes else None
                 row = case | _level_row(stored, ours, paper) | _better(file.levels, stored.level, meter)
                 levels.append(row)
                 broken += _broken_lines(path, stored, ours, result.decoder)
                 broken += _worse_lines(path, row, file.header.is_predicted)
-                if depth <= ath.height:
+                if has_nodes:
                     gaps.append(case | _gap_row(result, ath, stored.level, ours.diagonal))
     return {
         "tables": [
@@ -148,7 +150,7 @@ def _gap_row(result: Encoded, ath: Ath, level: int, diagonal: float) -> dict[str
     clip = result.clip
     frames = np.unique(np.linspace(0, clip.frame_count - 1, GAP_FRAMES).astype(int)).tolist()
     source = np.concatenate([clip.block(frame, frame + 1) for frame in frames])
-    paper = ath.attachment_gaps(source, level)
+    paper = ath.attachment_gaps(source, result.decoder.file.header.stages[level])
     joints = _Joints(result.decoder, level)
     ours = joints.gaps(frames)
     return {

@@ -83,7 +83,7 @@ def test_info_says_as_json_what_programs_need(facts, encoded):
     assert facts["fps"] == pytest.approx(30) and facts["nodes"] == 99
     assert facts["bytes"] == encoded.stat().st_size and facts["complete"] is True
     assert facts["max_error_bound"] == 0.001
-    names = [*(f"depth {depth}" for depth in range(3)), *(f"layer {number} of 3" for number in (1, 2, 3))]
+    names = [*(f"depth {depth}" for depth in range(3)), "layer 2 of 3", "layer 3 of 3"]
     assert [level["name"] for level in facts["levels"]] == names
     for level in facts["levels"]:
         assert {"level", "nodes", "bytes", "max_error", "rms_error"} <= level.keys()
@@ -229,20 +229,20 @@ def test_the_page_of_the_demo_shows_the_leafed_tree(tmp_path, capsys):
 
 
 def test_a_cut_off_file_decodes_to_its_deepest_level_with_one_warning(encoded, facts, tmp_path, capsys):
-    part = cut(encoded, tmp_path / "cut.ath", facts["levels"][4]["bytes"] + 3000)
+    part = cut(encoded, tmp_path / "cut.ath", facts["levels"][3]["bytes"] + 3000)
     assert run("decode", part, tmp_path / "a.h5") == 0
-    warning = r"athcodec: warning: .*cut\.ath: decoded to level 4; cut off .* missing .*level 5.*\n"
+    warning = r"athcodec: warning: .*cut\.ath: decoded to level 3; cut off .* missing .*level 4.*\n"
     assert re.fullmatch(warning, capsys.readouterr().err)
     with athcodec.open(encoded) as decoder, read_hdf5(tmp_path / "a.h5") as clip:
-        assert np.array_equal(clip.block(0, 120), decoder.positions(level=4))
+        assert np.array_equal(clip.block(0, 120), decoder.positions(level=3))
 
 
 def test_info_of_a_cut_off_file_says_what_is_missing(encoded, facts, tmp_path, capsys):
     part = cut(encoded, tmp_path / "cut.ath", facts["levels"][2]["bytes"])
     assert run("info", part, "--json") == 0
     found = json.loads(capsys.readouterr().out)
-    assert found["complete"] is False and "level 5" in found["missing"]
-    assert [level["available"] for level in found["levels"]] == [True, True, True, False, False, False]
+    assert found["complete"] is False and "level 4" in found["missing"]
+    assert [level["available"] for level in found["levels"]] == [True, True, True, False, False]
 
 
 def test_verify_accepts_a_whole_file_and_measures_it(encoded, capsys):
@@ -305,7 +305,7 @@ def test_info_decodes_nothing_unless_asked(encoded, facts, tmp_path, capsys):
     part = cut(encoded, tmp_path / "cut.ath", facts["levels"][2]["bytes"])
     assert run("info", part, "--motion", "--json") == 0
     ratios = [level["tick_ratio"] for level in json.loads(capsys.readouterr().out)["levels"]]
-    assert [ratio is None for ratio in ratios] == [False] * 3 + [True] * 3
+    assert [ratio is None for ratio in ratios] == [False] * 3 + [True] * 2
 
 
 @pytest.mark.parametrize("place", [0.0, 0.01, 0.1, 0.5, 0.9, 0.9999])
@@ -407,8 +407,8 @@ FAILURES = {
     "onto itself": ("truncate FILE FILE --level 0", "FILE: is the input"),
     "beyond the frames": ("decode FILE OUT --frames 100:121", r"FILE: .*100:121.*120"),
     "no frames": ("decode FILE OUT --frames 7:7", "FILE: .*7:7"),
-    "beyond the levels": ("decode FILE OUT --level 6", "FILE: .*got 6.*0 to 5"),
-    "truncate beyond the levels": ("truncate FILE OUT --level 6", "FILE: .*got 6.*0 to 5"),
+    "beyond the levels": ("decode FILE OUT --level 6", "FILE: .*got 6.*0 to 4"),
+    "truncate beyond the levels": ("truncate FILE OUT --level 6", "FILE: .*got 6.*0 to 4"),
     "too close": ("encode SOURCE OUT --max-error 1e-12", "SOURCE: .*1e-12"),
     "too small": ("encode SOURCE OUT --target-size 100 --effort fast", "SOURCE: .*100"),
 }
