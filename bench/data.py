@@ -65,16 +65,7 @@ class Simulated:
     def make(self) -> athcodec.MotionClip:
         plant = grow(self.nodes, self.orders, self.height, self.seed)
         motion = simulate(plant, Wind(self.wind_speed, self.height, seed=self.seed), self.frames)
-        return athcodec.MotionClip(
-            motion.positions,
-            motion.time,
-            plant.branch,
-            plant.branch_parent,
-            rest=plant.position.astype(np.float32),
-            edges=plant.edges,
-            attributes={"radius": plant.radius.astype(np.float32)},
-            metadata={"unit": "m", "up_axis": "y", "fps": 30} | motion.settings,
-        )
+        return plant.clip(motion.positions, motion.time, 30, **motion.settings)
 
     def __str__(self) -> str:
         return f"MuJoCo, {self.height:g} m tree in wind of {self.wind_speed:g} m/s"
@@ -97,16 +88,8 @@ class Canopy:
     def make(self) -> athcodec.MotionClip:
         plant = grow(self.nodes, self.orders, self.height, self.seed)
         wind = Wind(self.wind_speed, self.height, seed=self.seed)
-        tree = athcodec.MotionClip(
-            bend(plant, wind, self.frames, FPS),
-            np.arange(self.frames) / FPS,
-            plant.branch,
-            plant.branch_parent,
-            rest=plant.position.astype(np.float32),
-            edges=plant.edges,
-            attributes={"radius": plant.radius.astype(np.float32)},
-            metadata={"unit": "m", "up_axis": "y", "fps": FPS, "wind_speed": self.wind_speed, "leaves": self.species},
-        )
+        described = {"wind_speed": self.wind_speed, "leaves": self.species}
+        tree = plant.clip(bend(plant, wind, self.frames, FPS), np.arange(self.frames) / FPS, FPS, **described)
         return dress(tree, wind, self.frames, self.leaves, self.seed, self.species)
 
     def __str__(self) -> str:

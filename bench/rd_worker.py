@@ -26,7 +26,7 @@ import numpy as np
 import athcodec
 from athcodec.encoding.bounds import BoundOption
 from athcodec.encoding.branch_trials import best_branches
-from athcodec.encoding.progress import silent
+from athcodec.encoding.progress import Work
 from athcodec.metrics import ErrorMeter, bits_per_vertex_frame
 from athcodec.motion.branches.result import with_branches
 from bench.clips import read
@@ -69,7 +69,7 @@ def _with_branches(clip: athcodec.MotionClip, codec: Codec, rel_bound: float) ->
     if clip.has_branches or codec.kind == OURS:
         return clip
     option = BoundOption(rel_error=rel_bound) if rel_bound else BoundOption(lossless=True)
-    return with_branches(clip, best_branches(clip, option, silent))
+    return with_branches(clip, best_branches(clip, option, Work()))
 
 
 def _timed(step: Callable[[], Any], limit: float) -> tuple[float, float, Any]:

@@ -9,7 +9,8 @@ from pathlib import Path
 import pytest
 
 from bench import clips, data, foreign
-from bench.suite import cases, digest
+from bench.data import digest
+from bench.suite import cases
 from bench.trees.simulate import MissingEngine
 
 ROOT = Path(__file__).resolve().parent.parent

@@ -81,3 +81,11 @@ def test_a_rest_pose_in_which_little_is_grown_is_kept_but_not_what_motion_is_cod
     assert sizes[1] <= 1.3 * sizes[0]
     with athcodec.open(tmp_path / "a.ath") as decoder:
         assert np.linalg.norm(decoder.file.rest - clip.positions[0], axis=1).max() < 0.003 * 1.2
+
+
+@pytest.mark.parametrize("counts", [[-40, 440], [0.5, 399.5], [100, 100]])
+def test_numbers_of_vertices_that_cannot_be_name_no_objects(counts):
+    clip = growing_organs()
+    wrong = clip.replace(attributes={"part_vertex_counts": np.array(counts)})
+    with pytest.raises(athcodec.errors.ClipError, match="several objects in a scene"):
+        athcodec.find_branches(wrong, "objects")

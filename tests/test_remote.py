@@ -532,7 +532,7 @@ def test_the_command_reads_other_systems_and_says_what_it_took(other_url, local,
     assert f"3 requests, {size:,} bytes" in capsys.readouterr().err
     assert cli.main(["decode", other_url, str(out), "--level", "1", "--frames", "200:210", "--stats"]) == 0
     requests, fetched = re.search(r"stats: (\d) requests, ([\d,]+) bytes", capsys.readouterr().err).groups()
-    assert int(requests) <= 4 and int(fetched.replace(",", "")) <= max(READ_AHEAD, local.levels[1].bytes)
+    assert int(requests) <= 4 and int(fetched.replace(",", "")) <= READ_AHEAD + local.levels[1].bytes
     with athcodec.read_hdf5(out) as clip:
         assert np.array_equal(clip.block(0, 10), local.positions(slice(200, 210), level=1))
 

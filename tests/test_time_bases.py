@@ -10,7 +10,7 @@ import pytest
 
 import athcodec
 from athcodec.decoding.container import BASIS_IN_WAVES, STEMS
-from athcodec.encoding import search
+from athcodec.encoding import layers, search
 from athcodec.encoding.choices import learned_bases
 from athcodec.encoding.motion import waves_over_time
 from athcodec.encoding.time_bases import InWaves, TimeComponents
@@ -117,3 +117,18 @@ def test_layers_in_learned_bases_are_decoded_as_the_document_does(tmp_path, monk
     path = tmp_path / "layers.ath"
     athcodec.encode(hit_by_a_gust(), path, rel_error=1e-4, attributes="none", ladder=(1e-2, 1e-3))
     assert_same_as_document(path.read_bytes())
+
+
+def test_a_layer_whose_basis_needs_fewer_rows_than_the_one_before_it_is_decoded(tmp_path, monkeypatch):
+    def learned(settings, trials):
+        return replace(settings, learned_bases=(True,) * settings.levels)
+
+    monkeypatch.setattr(learned_bases, "best_bases", learned)
+    monkeypatch.setitem(search.CHOICES, learned, ("time bases", 1.0))
+    monkeypatch.setattr(layers, "basis_ratio", lambda plan, settings, ratio: 100.0 / ratio)
+    clip, path = hit_by_a_gust(), tmp_path / "layers.ath"
+    athcodec.encode(clip, path, rel_error=1e-4, attributes="none", ladder=(1e-2, 1e-3))
+    with athcodec.open(path, strict=True) as decoder:
+        for level in decoder.levels:
+            error = np.linalg.norm(decoder.positions(level=level.level) - clip.block(0, clip.frame_count), axis=2)
+            assert error.max() <= level.max_error

@@ -245,7 +245,8 @@ def layer_chunks(layers: Layers) -> dict[tuple[int, int], bytes]:
 
 
 class _TimeBases:
-    """The time bases of the layers of one segment: each has more rows of one that is learned for the last layer."""
+    """The time bases of the layers of one segment: each has as many rows as the one before, or more, of one that is
+    learned for the last layer."""
 
     def __init__(self, last: Layer, positions: np.ndarray):
         everything = [None] if last.settings.learned_bases[-1] else []
@@ -264,7 +265,9 @@ class _TimeBases:
         """Return the basis of a stream of the layer's settings, which stands at a level of the file."""
         if self._components is None or not layer.settings.learned_bases[stream]:
             return {}
-        stored = self._components.basis(basis_ratio(layer.plan, layer.settings, layer.ratio))
+        # Rigid parts of a coarse layer may need more rows than a finer one where they are not rigid.
+        least = 0 if self._before is None else len(self._before[1].stored.rows)
+        stored = self._components.basis(basis_ratio(layer.plan, layer.settings, layer.ratio), least=least)
         if stored is None:
             return {}
         basis = StreamBasis(stored, level)

@@ -84,10 +84,10 @@ class TimeComponents:
         self._rows, self._waves = vectors[0], waves
         self._count, self._may_be_in_waves = count, may_be_in_waves
 
-    def basis(self, ratio: float = 1.0, precision: float = 1.0) -> Entries | InWaves | None:
-        """Return the rows that tracks in steps `ratio` times as large need; None: no basis is smaller than waves.
-        precision: how many times as large the steps are that the rows are precise enough for."""
-        rank = self._rank(ratio)
+    def basis(self, ratio: float = 1.0, precision: float = 1.0, least: int = 0) -> Entries | InWaves | None:
+        """Return the rows that tracks in steps `ratio` times as large need, at least so many; None: no basis is smaller
+        than waves. precision: how many times as large the steps are that the rows are precise enough for."""
+        rank = max(self._rank(ratio), least)
         if self._count <= 1 or not 1 <= rank <= len(self._rows) // 2:
             return None
         return self._in_waves(rank, precision) if self._suits_waves else self._entries(rank)

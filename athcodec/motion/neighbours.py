@@ -10,8 +10,8 @@ from athcodec.motion.clip import MotionClip
 
 SAMPLED = 64  # Points whose neighbours are followed.
 FRAMES = 17  # Frames that are looked at, spread over the clip: scans list other points in each.
-APART = 0.1  # Distance, in diagonals, below which points count as neighbours,
-TIMES_APART = 4.0  # as they do below so many times the distance that they had as neighbours.
+APART = 0.1  # Distance, in diagonals, below which points count as neighbours.
+TIMES_APART = 4.0  # Distance of two points, over that as neighbours, from which they are apart.
 
 
 def lost_neighbours(clip: MotionClip) -> float:

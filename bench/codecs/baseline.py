@@ -28,7 +28,7 @@ from bench.codecs.tree import VertexOrder, ordered
 LARGE = 8_000_000  # numbers; larger clips are searched by a part of them
 SEARCHED = 3_000  # vertices of that part
 AGAIN = ("step", "clusters")  # Settings that are searched again with all vertices.
-SEARCH_SHARE = 0.6  # of the processor time that the process has, after which no search tries more
+SEARCH_SHARE = 0.6  # Share of the process's processor time after which no search tries more.
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import reduce
 from operator import add
-from typing import ClassVar
 
 import numpy as np
 
@@ -295,21 +294,12 @@ class Tree:
     damping: float
     seed: int
     digest: str
-    source: ClassVar[None] = None
 
     def make(self) -> MotionClip:
         plant = grow(self.orders, self.height, self.seed)
         gusts = Gusts(plant.position.T, self.wind_speed, self.height, self.intensity, self.length, self.seed)
-        return MotionClip(
-            bend(plant, gusts, self.wind_speed, self.frames, self.hertz, self.damping, 2.0),
-            np.arange(self.frames) / FPS,
-            plant.branch,
-            plant.branch_parent,
-            rest=plant.position.astype(np.float32),
-            edges=plant.edges,
-            attributes={"radius": plant.radius.astype(np.float32)},
-            metadata={"unit": "m", "up_axis": "y", "fps": FPS, "wind_speed": self.wind_speed},
-        )
+        positions = bend(plant, gusts, self.wind_speed, self.frames, self.hertz, self.damping, 2.0)
+        return plant.clip(positions, np.arange(self.frames) / FPS, FPS, wind_speed=self.wind_speed)
 
     def __str__(self) -> str:
         return f"beams, {self.height:g} m tree in gusts of {self.wind_speed:g} m/s"
@@ -329,7 +319,6 @@ class Cards:
     degrees: tuple[float, float, float]
     seed: int
     digest: str
-    source: ClassVar[None] = None
 
     def make(self) -> MotionClip:
         numbers, count = Numbers(self.seed), self.cards

@@ -12,8 +12,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
+
+from athcodec import MotionClip
 
 UP = np.array([0.0, 1.0, 0.0])
 GOLDEN_ANGLE = np.radians(137.508)
@@ -69,6 +72,19 @@ class Plant:
         for node, below in enumerate(self.parent[1:].tolist(), start=1):
             depth[node] = depth[below] + 1
         return np.split(np.argsort(depth, kind="stable"), np.cumsum(np.bincount(depth))[:-1])
+
+    def clip(self, positions: np.ndarray, time: np.ndarray, fps: float, **metadata: Any) -> MotionClip:
+        """The motion of its nodes, (T, N, 3) positions at (T,) seconds."""
+        return MotionClip(
+            positions,
+            time,
+            self.branch,
+            self.branch_parent,
+            rest=self.position.astype(np.float32),
+            edges=self.edges,
+            attributes={"radius": self.radius.astype(np.float32)},
+            metadata={"unit": "m", "up_axis": "y", "fps": fps} | metadata,
+        )
 
     def preorder(self) -> tuple[np.ndarray, np.ndarray]:
         """Nodes, each followed at once by all that it carries; (N,) how many these are, itself included."""

@@ -18,7 +18,7 @@ def soup(count: int) -> list[list[int]]:
     return np.arange(count).reshape(-1, 3).tolist()
 
 
-STRIP = [[i, i + 1, i + 2] if i % 2 else [i + 1, i, i + 2] for i in range(12)]  # of the places of a soup
+STRIP = [[i, i + 1, i + 2] if i % 2 else [i + 1, i, i + 2] for i in range(12)]  # Triangles over the places of a soup.
 SOUP = [Stem(-1, 18), Stem(0, 18, 17, detail=110)]
 LEAF_NAMES = [0, 1, 2, 2, *(v - v % 4 + (v % 4) % 3 for v in range(4, 28)), *range(26, 42), 9, 9]
 

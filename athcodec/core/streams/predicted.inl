@@ -32,7 +32,7 @@ typedef struct {
 
 /* How the vertices between the ends of a stem follow these: all of them as at rest, scaled; all of them, those that the
  * front has passed as at rest and the others at the tip; or only those others. */
-enum { FOLLOW_NONE, FOLLOW_ENDS, FOLLOW_FRONT, FOLLOW_TIP, FOLLOWINGS };
+enum { FOLLOW_NONE, FOLLOW_ENDS, FOLLOW_FRONT, FOLLOW_TIP, FOLLOW_CODES };
 
 /* Weights of the features, found by least squares. */
 typedef struct {
@@ -44,7 +44,7 @@ typedef struct {
     lattice_model lattice;
     number_model distance;
     ath_context moved[4][4][3], sign[3][3], copied[RUNS][RUNS], usual[2];
-    ath_context followed[FOLLOWINGS - 1][FOLLOWINGS][FOLLOWINGS];
+    ath_context followed[FOLLOW_CODES - 1][FOLLOW_CODES][FOLLOW_CODES];
     predicted_fit fits[FITS];
     int32_t run, last_run, last_distance, last_followed;
     double advance; /* how far the front of the last stem under way got in a frame */
@@ -78,7 +78,7 @@ static void predicted_model_init(predicted_model *model)
     for (int32_t run = 0; run < RUNS; run++)
         for (int32_t last = 0; last < RUNS; last++) context_init(&model->copied[run][last], 6000);
     for (int32_t copied = 0; copied < 2; copied++) context_init(&model->usual[copied], 60000);
-    for (int32_t i = 0; i < (FOLLOWINGS - 1) * FOLLOWINGS * FOLLOWINGS; i++)
+    for (int32_t i = 0; i < (FOLLOW_CODES - 1) * FOLLOW_CODES * FOLLOW_CODES; i++)
         context_init(&model->followed[0][0][0] + i, 32768);
     for (int32_t f = 0; f < FITS; f++) model->fits[f].wait = 1;
     model->last_distance = 1;
@@ -413,7 +413,7 @@ ATH_INLINE void code_steps(ath_coder *coder, predicted_model *model, int32_t lat
 ATH_INLINE void code_followed(ath_coder *coder, predicted_model *model, predicted_vertex *tip, int followed)
 {
     int32_t old = tip->followed, last = model->last_followed, value = 0;
-    while (value < FOLLOWINGS - 1 && coder_bit(coder, &model->followed[value][old][last], followed > value)) value++;
+    while (value < FOLLOW_CODES - 1 && coder_bit(coder, &model->followed[value][old][last], followed > value)) value++;
     tip->followed = value;
     model->last_followed = tip->followed;
 }

@@ -56,15 +56,28 @@ def links_of(clip: MotionClip) -> np.ndarray:
     return np.concatenate(pairs)
 
 
+def _parts(clip: MotionClip) -> tuple[np.ndarray, np.ndarray] | None:
+    """Return the vertices of each object of the scene and its copies, of one shape each; None where the clip does not
+    say. Copies that do not fit count as one."""
+    counts, copies = (clip.attributes.get(f"part_{name}") for name in ("vertex_counts", "copies"))
+    if counts is None or counts.ndim != 1 or counts.dtype.kind not in "iu":
+        return None
+    if (counts < 0).any() or counts.sum(dtype=np.int64) != clip.vertex_count:
+        return None
+    one = np.ones_like(counts)
+    if copies is None or copies.shape != counts.shape or copies.dtype.kind not in "iu" or (copies < 1).any():
+        return counts, one
+    return counts, one if (copies > np.maximum(counts, 1)).any() or (counts % copies).any() else copies
+
+
 def parts_of(clip: MotionClip) -> np.ndarray | None:
     """Return the number of the object of the scene, or of the copy of one, that each vertex is of, (N,); None where the
     clip does not say."""
-    counts, copies = (clip.attributes.get(name) for name in ("part_vertex_counts", "part_copies"))
-    if counts is None or counts.ndim != 1 or counts.dtype.kind not in "iu" or counts.sum() != clip.vertex_count:
+    parts = _parts(clip)
+    if parts is None:
         return None
-    if copies is not None and copies.shape == counts.shape and (counts % np.maximum(copies, 1) == 0).all():
-        counts = np.repeat(counts // np.maximum(copies, 1), np.maximum(copies, 1))
-    return numbered(np.repeat(np.arange(len(counts)), counts))
+    each = np.repeat(parts[0] // parts[1], parts[1])
+    return numbered(np.repeat(np.arange(len(each)), each))
 
 
 def affine_share(frames: np.ndarray, label: np.ndarray) -> float:
@@ -93,17 +106,12 @@ def _sums(values: np.ndarray, label: np.ndarray) -> np.ndarray:
 
 def copies_of(clip: MotionClip) -> np.ndarray:
     """Return the number of the copy that each vertex is of, (N,), from 1 on; 0 for none (MotionClip, part_copies)."""
-    counts, copies = (clip.attributes.get(f"part_{name}") for name in ("vertex_counts", "copies"))
-    none = np.zeros(clip.vertex_count, np.int64)
-    if counts is None or copies is None or counts.dtype.kind not in "iu" or copies.dtype.kind not in "iu":
-        return none
-    usable = counts.shape == copies.shape and counts.ndim == 1 and (counts >= 0).all() and (copies >= 1).all()
-    usable = usable and (copies <= np.maximum(counts, 1)).all()
-    if not usable or counts.sum(dtype=np.int64) != len(none) or (counts % copies).any():
-        return none
-    is_copied = np.repeat(copies > 1, counts)
+    parts = _parts(clip)
+    if parts is None:
+        return np.zeros(clip.vertex_count, np.int64)
+    counts, copies = parts
     each = np.repeat(counts // copies, copies)
-    return np.where(is_copied, np.repeat(np.arange(1, len(each) + 1), each), 0)
+    return np.where(np.repeat(copies > 1, counts), np.repeat(np.arange(1, len(each) + 1), each), 0)
 
 
 def _welded(clip: MotionClip, links: np.ndarray) -> np.ndarray:
