@@ -1,7 +1,8 @@
 """Rigid parts: which branches move without bending, which are loose, and how finely they turn (FORMAT.md, Rigid).
 
 A card that is smaller than the bound is noise after affine functions and modes have been quantised to it. As a rigid
-part it keeps its shape whatever the bound, and takes three rows in place of nine.
+part it keeps its shape whatever the bound, and takes three rows in place of nine. A twig of few bounds has no direction
+that its noise would not turn, and throws the leaves on it about. As a rigid part it holds them still.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ from athcodec.motion.algebra import decompose, determinant, multiply
 MOST_BEND = 0.3  # Distance, in bounds, by which a rigid part may bend in the source.
 STIFF_BEND = 0.05  # Distance, in bounds, up to which a part of any size is rigid.
 LARGEST = 20.0  # Size of a part, in bounds, up to which the bound would spoil its shape.
+CARRIER = 8.0  # Size of a part that carries others, in bounds, up to which it is rigid where it bends within the bound.
 FRAMES = 12  # Frames of a segment by which rigid parts are found.
 TURN_STEP = qz.half_octave(-7)  # Largest step of rotations, in radians: their errors are 1 to 2 degrees.
 MOST_TURN = 15  # Half octaves below 1 radian of the finest largest step.
@@ -106,15 +108,16 @@ def _rigid_layers(
     """Return how many of the layers of such bounds, descending, see a branch as rigid, (B,) int32. wanted: (B,) which
     may be; samples: (N, 3, T) each."""
     first, count, rest = source.hierarchy.first_vertex, source.hierarchy.stem_count, source.rest
-    layers = np.zeros(len(count), np.int32)
-    for size in np.unique(count[wanted & (count > 2) & (count <= PIECE_VERTICES)]).tolist():
+    layers, carries = np.zeros(len(count), np.int32), source.hierarchy.subtree_branches > 1
+    for size in np.unique(count[wanted & (count > 2) & ((count <= PIECE_VERTICES) | carries)]).tolist():
         branches = np.flatnonzero(wanted & (count == size))
         vertices = first[branches, None] + np.arange(size)
         bend = np.max([_bends(rest[vertices], sample, vertices) for sample in samples], axis=0)
         extent = np.linalg.norm(np.ptp(rest[vertices], axis=1), axis=1)
         for bound in bounds:  # Refined rotations cost more than refined modes, so only parts that need them have them.
-            stiff = bend <= STIFF_BEND * bound
-            layers[branches] += (bend <= MOST_BEND * bound) & ((extent <= LARGEST * bound) | stiff)
+            keeps = (extent <= LARGEST * bound) | (bend <= STIFF_BEND * bound)
+            keeps &= (bend <= MOST_BEND * bound) & (size <= PIECE_VERTICES)
+            layers[branches] += keeps | (carries[branches] & (extent <= CARRIER * bound) & (bend <= bound))
     return layers
 
 
