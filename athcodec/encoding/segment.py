@@ -233,9 +233,13 @@ class Source:
     def limit(self, bound: float) -> float | np.ndarray:
         """Return what decoded positions are held to: one distance for all vertices, or one each, (N,) in file order."""
         if self.weights is None:
-            return qz.error_limit(bound - self.held_error, self.seen.diagonal)
+            return self.unweighted_limit(bound)
         limits = bound * self.weights - self.held_error
         return np.array([qz.error_limit(limit, self.seen.diagonal) for limit in limits])
+
+    def unweighted_limit(self, bound: float) -> float:
+        """Return what decoded positions of any vertex are held to if weights do not count."""
+        return qz.error_limit(bound - self.held_error, self.seen.diagonal)
 
     def smallest_bound(self, bound: float) -> float:
         """Return the smallest bound of any vertex."""
