@@ -57,7 +57,7 @@ from athcodec.encoding.shape import rest_steps
 
 # Steps of the first layer and of others before the last, over that of a file whose bound is the error that the layer
 # holds. Where there are leaves, corrections take more bytes than finer steps.
-STEP_FACTORS, LEAVES_STEP_FACTORS = (1.7, 1.2), (0.8, 0.8)
+STEP_FACTORS, LEAVES_STEP_FACTORS = (1.7, 1.0), (0.8, 0.8)
 LEAST_ABOVE_BOUND, LEAST_APART = 4.0, 2.5  # Errors of layers over the bound, and over the next error of a ladder.
 MOST_RATIO = 1 << 14  # Ratio of the steps of neighbouring layers.
 ROUNDED = 1 + 1e-9  # Factor before rounding down, because errors are rounded numbers themselves.
@@ -418,9 +418,7 @@ class CodedMotion:
     def _finish_level(self, layer: Layer, level: int, decoded: np.ndarray) -> tuple[float, ...]:
         return self._set_last(layer, level, decoded, self._corrections(decoded, layer))
 
-    def _set_last(
-        self, layer: Layer, level: int, decoded: np.ndarray, corrections: Corrections
-    ) -> tuple[float, ...]:
+    def _set_last(self, layer: Layer, level: int, decoded: np.ndarray, corrections: Corrections) -> tuple[float, ...]:
         """Set the corrections of the level that a layer ends with; return its errors. decoded: positions without."""
         self.chunks.pop((level, ct.CORRECTIONS), None)
         self._corrected.pop(level, None)
