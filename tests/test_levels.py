@@ -24,7 +24,7 @@ def assert_levels_get_better(clip: athcodec.MotionClip, data: bytes) -> None:
     it is within the bound that was given, and always shown."""
     with opened(data, strict=True) as decoder:
         file = decoder.file
-        for before, after in zip(decoder.levels, decoder.levels[1:]):
+        for before, after in zip(file.levels, file.levels[1:]):
             assert after.max_error <= before.max_error and after.rms_error <= before.rms_error
         source = clip.block(0, clip.frame_count).astype(np.float64)
         low, high = source.min(axis=(0, 1)), source.max(axis=(0, 1))
