@@ -123,14 +123,13 @@ def layer_ratios(
     ladder: largest errors over the diagonal, descending. Those close to the bound or to each other make no layer of
     their own. Layers that are too far apart for one to refine the other have more between them. factors: step_factors.
     """
-    errors: list[float] = []
+    errors: list[float] = []  # In bounds.
     for error in ladder:
-        if error * diagonal >= LEAST_ABOVE_BOUND * bound and (not errors or errors[-1] >= LEAST_APART * error):
-            errors.append(error)
+        bounds = ROUNDED * error * diagonal / bound
+        if bounds >= LEAST_ABOVE_BOUND and (not errors or ROUNDED * errors[-1] >= LEAST_APART * bounds):
+            errors.append(bounds)
     # Ratios are rounded down, so that layers hold what the ladder names.
-    ratios = [
-        int(min(ROUNDED * factors[i > 0] * error * diagonal / bound, MOST_RATIO**2)) for i, error in enumerate(errors)
-    ]
+    ratios = [int(min(factors[i > 0] * bounds, MOST_RATIO**2)) for i, bounds in enumerate(errors)]
     return [step for pair in pairwise([*ratios, 1]) for step in _between(*pair)] + [1]
 
 
