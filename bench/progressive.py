@@ -22,6 +22,7 @@ from bench.tables import table
 LOOSEST, OWN_PER_DECADE = 0.1, 4
 BELOW = 0.9  # Share of the bound down to which files are made, so that the last has the errors of whole files too.
 JUST_BELOW = 1 - 1e-6
+ASKED = 3e-4, 1e-2  # Errors between which the worst prefix is sought.
 MEASURES = ("max", "RMS")
 
 NOTE = """
@@ -32,6 +33,10 @@ Max and RMS over the diagonal. Own: bytes of a file of its own with the same lar
 ERRORS_NOTE = """
 The shortest prefix whose largest or RMS error is not above this one, over the diagonal, and a file of its own of just
 this error.
+"""
+
+SIZES_NOTE = """
+Worst: the prefix for any largest error from 3e-4 to 1e-2 over a file of its own of this error, where it is largest.
 """
 
 
@@ -54,12 +59,18 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
             rows += [about | row for row in prefixes]
             at_errors += [about | row for row in _at_errors(prefixes, own)]
             drawn += [about | row for row in _ratios(prefixes, own)]
-        sizes.append({"clip": path.stem} | found | {"more %": 100 * (found["layers"] / found["none"] - 1)})
+        asked = [
+            row["ratio"]
+            for row in drawn
+            if about.items() <= row.items() and row["measure"] == "max" and ASKED[0] <= row["error"] <= ASKED[1]
+        ]
+        more = {"more %": 100 * (found["layers"] / found["none"] - 1), "worst /own": max(asked, default=None)}
+        sizes.append({"clip": path.stem} | found | more)
     result = {
         "tables": [
             table(f"Prefixes of files of {args.rel_error:g}", rows, NOTE),
             table("At an error", at_errors, ERRORS_NOTE),
-            table("Bytes of the whole files", sizes),
+            table("Bytes of the whole files", sizes, SIZES_NOTE),
         ],
         "chart": drawn,
         "broken": [],

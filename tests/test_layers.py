@@ -56,14 +56,14 @@ def check_levels(clip, path, name: str | None = None) -> None:
 
 
 def test_a_ladder_has_a_layer_for_each_error_that_is_well_above_the_bound():
-    assert layer_ratios((1e-2, 1e-3, 1e-4), 1e-4, 1.0) == [200, 20, 1]
-    assert layer_ratios((1e-2, 1e-3, 1e-4), 5e-4, 1.0) == [40, 1]
-    assert layer_ratios((1e-2, 9e-3), 1e-4, 1.0) == [200, 1]
+    assert layer_ratios((1e-2, 1e-3, 1e-4), 1e-4, 1.0) == [170, 10, 1]
+    assert layer_ratios((1e-2, 1e-3, 1e-4), 5e-4, 1.0) == [34, 1]
+    assert layer_ratios((1e-2, 9e-3), 1e-4, 1.0) == [170, 1]
     assert layer_ratios((), 1e-4, 1.0) == layer_ratios((1e-4, 1e-5), 1e-4, 1.0) == [1]
 
 
 def test_errors_far_above_the_bound_get_layers_in_between(bushy_clip, tmp_path):
-    assert layer_ratios((1e-1, 1e-2), 1e-7, 1.0) == [2_000_000, 200_000, 447, 1]
+    assert layer_ratios((1e-1, 1e-2), 1e-7, 1.0) == [1_700_000, 100_000, 316, 1]
     for ladder in ((1e-1,), (1e-2, 1e-3)):
         made = athcodec.encode(bushy_clip, tmp_path / "a.ath", ladder=ladder, effort="fast", lossless=True)
         with athcodec.open(made.path) as played:
@@ -132,8 +132,9 @@ def test_poses_are_as_precise_as_the_deepest_level_that_is_there(layered_ath, bu
         deepest, diagonal = whole.file.rest, np.linalg.norm(np.ptp(bushy_clip.positions.reshape(-1, 3), axis=0))
         assert np.linalg.norm(deepest - bushy_clip.rest, axis=1).max() <= SOURCE_REST_TOLERANCE * diagonal
     errors = [np.abs(pose - poses[-1]).max() for pose in poses]
-    assert refined == [len(poses) - 2, len(poses) - 1]
-    assert errors[0] == errors[refined[0] - 1] > 3 * errors[refined[0]] > errors[refined[1]] == 0
+    *of_first_layer, coarse, fine = refined
+    assert of_first_layer in ([], [1]) and (coarse, fine) == (len(poses) - 2, len(poses) - 1)
+    assert errors[1] == errors[coarse - 1] > 3 * errors[coarse] > errors[fine] == 0
     for level, pose in enumerate(poses):
         athcodec.truncate(layered_ath, tmp_path / "cut.ath", level)
         with athcodec.open(tmp_path / "cut.ath", strict=True) as cut:
@@ -191,7 +192,7 @@ def test_asking_for_the_rest_pose_reads_the_rest_poses_alone_and_once(layered_at
     with athcodec.open(layered_ath) as decoder:
         before = decoder.file.bytes_read
         assert np.array_equal(decoder.file.rest, decoder.file.rest) and np.array_equal(
-            decoder.level_rest(0), decoder.level_rest(1)
+            decoder.level_rest(1), decoder.level_rest(2)
         )
         sizes = [chunk.length for chunk in decoder.file.chunks if chunk.kind in (ct.REFINED_REST, ct.SOURCE_REST)]
         assert decoder.file.bytes_read - before == sum(sizes) > 0

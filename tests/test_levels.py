@@ -8,7 +8,7 @@ import pytest
 from files import Parts, opened
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from plants import awkward_plants, bound_for, diagonal
+from plants import awkward_plants, bound_for, diagonal, distance
 from test_document import assert_same_bits
 
 import athcodec
@@ -24,7 +24,7 @@ def assert_levels_get_better(clip: athcodec.MotionClip, data: bytes) -> None:
     it is within the bound that was given, and always shown."""
     with opened(data, strict=True) as decoder:
         file = decoder.file
-        for before, after in zip(decoder.levels, decoder.levels[1:]):
+        for before, after in zip(file.levels, file.levels[1:]):
             assert after.max_error <= before.max_error and after.rms_error <= before.rms_error
         source = clip.block(0, clip.frame_count).astype(np.float64)
         low, high = source.min(axis=(0, 1)), source.max(axis=(0, 1))
@@ -52,6 +52,36 @@ def coded(clip: athcodec.MotionClip, folder, **options) -> bytes:
 )
 def test_levels_of_any_plant_get_better(plant, ladder, others, scratch):
     assert_levels_get_better(plant, coded(plant, scratch, max_error=bound_for(plant, 1e-3), ladder=ladder, **others))
+
+
+@settings(max_examples=40)
+@given(
+    plant=awkward_plants(),
+    bound=st.floats(-5, -2).map(lambda decades: 10**decades),
+    ladder=st.sampled_from([(1e-1, 1e-2, 1e-3), (3e-2, 4e-3), (5e-3,), (2e-2, 6e-3, 2e-3, 6e-4)]),
+    others=st.sampled_from([{}, {"segment_frames": 16}, {"exact_rest": True}, {"effort": "default"}]),
+    nearly_repeats=st.booleans(),
+    is_weighted=st.booleans(),
+)
+def test_each_level_that_a_ladder_names_holds_the_error(
+    plant, bound, ladder, others, nearly_repeats, is_weighted, scratch
+):
+    bound = bound_for(plant, bound)
+    if nearly_repeats:
+        twice = np.repeat(plant.positions, 2, axis=0)
+        twice[1::2, :, 0] += plant.positions.dtype.type(bound / 100)
+        plant = plant.replace(positions=twice, time=np.arange(len(twice)) / 30)
+    weights = {"weights": np.linspace(0.5, 3, plant.vertex_count)} if is_weighted else {}
+    data = coded(plant, scratch, max_error=bound, ladder=ladder, attributes="none", **others | weights)
+    lengths = [error * diagonal(plant) for error in ladder if error * diagonal(plant) >= 4.001 * bound]
+    with opened(data, strict=True) as decoder:
+        header = decoder.file.header
+        first = header.stages[-1] - header.layer_count + 1
+        for stage, length in enumerate(lengths[: header.layer_count - 1], first):
+            if stage in header.stages:
+                level = decoder.levels[header.stages.index(stage)]
+                assert distance(decoder.positions(level=level.level), plant.positions) <= length
+                assert level.max_error <= length
 
 
 @pytest.mark.parametrize(

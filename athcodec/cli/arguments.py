@@ -368,9 +368,9 @@ def _coding_arguments(verb: argparse.ArgumentParser) -> None:
         metavar="ERROR,...",
         type=_argument(ladder_of),
         default=ladder_of(DEFAULT_LADDER),
-        help="layers of precision to stop at, by their largest errors as fractions of the diagonal, such as 1e-2,1e-3; "
-        "decades: 1e-2, 1e-3 and so on down to the bound; none: one layer, a few percent smaller, for archives "
-        "(default decades)",
+        help="layers of precision to stop at, by the largest errors that they hold, as fractions of the diagonal, such "
+        "as 1e-2,1e-3; decades: 1e-2, 1e-3 and so on down to the bound; none: one layer, a few percent smaller, for "
+        "archives (default decades)",
     )
     verb.add_argument(
         "--rest",

@@ -200,6 +200,12 @@ def from_short_float(stored: int) -> float:
     return float(np.uint32(stored << SHORT_SHIFT).view(np.float32))
 
 
+def short_float_within(length: float) -> float:
+    """Return the largest length up to this one that the error table stores as it is."""
+    [stored] = short_floats(np.array([length]))
+    return from_short_float(stored if from_short_float(stored) <= length else stored - 1)
+
+
 def round_up_singles(values: np.ndarray) -> np.ndarray:
     values = np.asarray(values, np.float64)
     single = values.astype(np.float32)

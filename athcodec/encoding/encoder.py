@@ -100,9 +100,10 @@ def encode(
     smoothness : {"default", "bytes", "motion"}
         How many bytes steady errors of predicted motion, as of growth, may cost: up to 15 %, none, or as many again.
     ladder : {"decades", "none"} or sequence of float
-        Largest errors over the diagonal at which a decoder can stop, each about that of a layer of precision: one file
-        for every distance, a few percent larger than "none", a single layer for archives. "decades" is 1e-2, 1e-3 and
-        so on, down to the bound. A clip that stands still has a single layer in any case.
+        Largest errors over the diagonal at which a decoder can stop, each held by a layer of precision: one file for
+        every distance, a few percent larger than "none", a single layer for archives. "decades" is 1e-2, 1e-3 and so
+        on. Errors below 4 bounds, or less than 2.5 times apart, make no layer of their own. A clip that stands still
+        has a single layer in any case.
     jobs : int, optional
         Threads; by default one per core, at most 4, fewer for large meshes. The file is the same whatever their number,
         memory grows with it.

@@ -41,6 +41,7 @@ from athcodec.encoding.layers import (
     layer_chunks,
     layer_ratios,
     layers_of,
+    step_factors,
 )
 from athcodec.encoding.progress import FILE_BYTE, LEVEL_MOTION, MOTION, SURVEY, Progress, Work, allowed_work, silent
 from athcodec.encoding.sample import is_small
@@ -507,7 +508,7 @@ class EncodingJob:
         still clip has one layer: a rest pose in layers takes up to two thirds more."""
         if self.source.still:
             return [1]
-        ratios = layer_ratios(self.options.ladder, bound, self.seen.diagonal)
+        ratios = layer_ratios(self.options.ladder, bound, self.seen.diagonal, step_factors(self.source))
         return ratios[-min(MOST_LAYERS, MOST_LEVELS - ath.height - 1 - self.options.lossless) :]
 
     def _layered(self, ath: Ath, choice: Choice, prelude: CodedPrelude) -> _Decided:
@@ -758,7 +759,8 @@ class EncodingJob:
         if missing:
             raise ValueError(f"segments: got {count - len(missing)}, expected all {count}")
         frames = [stop - start for start, stop in decided.source.segments]
-        shown = chosen_levels(errors, frames, flaws, self.seen.diagonal, self.options.lossless)
+        first_held = decided.layers.level_0.level_count - 1
+        shown = chosen_levels(errors, frames, flaws, self.seen.diagonal, self.options.lossless, first_held)
         store.leave_out(lambda chunk: not decided.layers.level_0.serves(chunk.kind, chunk.level, shown))
         return errors[shown], joins[shown], shown
 

@@ -55,13 +55,12 @@ from athcodec.encoding.segment import (
 from athcodec.encoding.settings import Choice, Settings
 from athcodec.encoding.shape import rest_steps
 
-COARSER = 2.0  # Step of a layer before the last, over that of a file of its own with the same bound.
-NAMED_SHARE = (
-    0.06  # Share of the bytes up to a layer that corrections may take to keep the error that the ladder names.
-)
-CORRECTIONS_SHARE = 0.015  # Share of a layer's bytes that keeping the tightest of CORRECTED_LIMITS may take.
-CORRECTED_LIMITS = tuple(2.0 ** (i / 8) for i in range(16, -16, -1))  # Limits over that of the layer.
-LEAST_RATIO, MOST_RATIO = 8, 1 << 14  # Ratio of the steps of neighbouring layers.
+# Steps of the first layer and of others before the last, over that of a file whose bound is the error that the layer
+# holds. Where there are leaves, corrections take more bytes than finer steps.
+STEP_FACTORS, LEAVES_STEP_FACTORS = (1.7, 1.0), (0.8, 0.8)
+LEAST_ABOVE_BOUND, LEAST_APART = 4.0, 2.5  # Errors of layers over the bound, and over the next error of a ladder.
+MOST_RATIO = 1 << 14  # Ratio of the steps of neighbouring layers.
+ROUNDED = 1 + 1e-9  # Factor before rounding down, because errors are rounded numbers themselves.
 MOST_LAYERS, MOST_LEVELS = 8, 32  # Limits of a file.
 LEVEL_0_STEP = 4  # Step of the rest pose of level 0, over that of the first layer.
 LEAST_MEETING = 8  # Frames from which on the corrections of a segment meet those of the segments beside it.
@@ -111,18 +110,34 @@ class Layers:
         return len(self.rest.stream) + (0 if refined is None else len(refined.stream))
 
 
-def layer_ratios(ladder: Sequence[float], bound: float, diagonal: float) -> list[int]:
+def step_factors(source: Source) -> tuple[float, float]:
+    """Return the steps of the first layer and of others before the last, over those of files of their errors."""
+    return LEAVES_STEP_FACTORS if source.sheet_like.any() else STEP_FACTORS
+
+
+def layer_ratios(
+    ladder: Sequence[float], bound: float, diagonal: float, factors: tuple[float, float] = STEP_FACTORS
+) -> list[int]:
     """Return the ratio of the step of each layer to that of the last, descending to 1.
 
     ladder: largest errors over the diagonal, descending. Those close to the bound or to each other make no layer of
-    their own. Layers that are too far apart for one to refine the other have more between them.
+    their own. Layers that are too far apart for one to refine the other have more between them. factors: step_factors.
     """
-    ratios: list[int] = []
+    errors: list[float] = []  # In bounds.
     for error in ladder:
-        ratio = round(min(COARSER * error * diagonal / bound, MOST_RATIO**2))
-        if ratio >= LEAST_RATIO and (not ratios or ratios[-1] >= LEAST_RATIO * ratio):
-            ratios.append(ratio)
+        bounds = ROUNDED * error * diagonal / bound
+        if bounds >= LEAST_ABOVE_BOUND and (not errors or ROUNDED * errors[-1] >= LEAST_APART * bounds):
+            errors.append(bounds)
+    # Ratios are rounded down, so that layers hold what the ladder names.
+    ratios = [int(min(factors[i > 0] * bounds, MOST_RATIO**2)) for i, bounds in enumerate(errors)]
     return [step for pair in pairwise([*ratios, 1]) for step in _between(*pair)] + [1]
+
+
+def _held_limit(source: Source, bound: float, layer: int, ratio: int) -> float | np.ndarray:
+    """Return what the positions of a layer before the last are held to: no error in the table exceeds the one that the
+    ladder names."""
+    error = ct.short_float_within(ratio / step_factors(source)[layer > 0] * bound)
+    return np.minimum(source.limit(error), source.unweighted_limit(error))
 
 
 def _between(ratio: int, finer: int) -> list[int]:
@@ -143,7 +158,7 @@ def layers_of(source: Source, prelude: CodedPrelude, choice: Choice, ratios: Seq
         of_layer = replace(
             choice.first_layer if i == 0 else _uniform(prelude.plan, settings),
             step=qz.single(settings.step * ratio),
-            limit=settings.limit * ratio,
+            limit=settings.limit if ratio == 1 else _held_limit(source, settings.bound, i, ratio),
             layer=i,
         )
         layers.append(Layer(plan, of_layer, _modes(plan, choice, of_layer, ratio), ratio, refined))
@@ -400,17 +415,13 @@ class CodedMotion:
         return rows[~np.repeat(layer.plan.is_rigid, count)[rows[:, 0]]]
 
     def _finish_level(self, layer: Layer, level: int, decoded: np.ndarray) -> tuple[float, ...]:
-        is_last = layer.ratio == 1
-        corrections = self._corrections(decoded, layer) if is_last else self._tightest(decoded, layer, level)
-        return self._set_last(layer, level, decoded, corrections)
+        return self._set_last(layer, level, decoded, self._corrections(decoded, layer))
 
-    def _set_last(
-        self, layer: Layer, level: int, decoded: np.ndarray, corrections: Corrections | None
-    ) -> tuple[float, ...]:
+    def _set_last(self, layer: Layer, level: int, decoded: np.ndarray, corrections: Corrections) -> tuple[float, ...]:
         """Set the corrections of the level that a layer ends with; return its errors. decoded: positions without."""
         self.chunks.pop((level, ct.CORRECTIONS), None)
         self._corrected.pop(level, None)
-        if corrections is not None and corrections.chunk:
+        if corrections.chunk:
             self.chunks[level, ct.CORRECTIONS] = corrections.chunk
             self._corrected[level] = corrections
             decoded = corrections.applied(decoded)
@@ -508,34 +519,11 @@ class CodedMotion:
             self._keep_last_level_best(layer, level, positions)
 
     def _corrections(self, decoded: np.ndarray, layer: Layer, factor: float = 1.0) -> Corrections:
-        """Return corrections that bring the positions within the limit times a factor. Rigid parts of layers before the
-        last have none, and keep their shape."""
+        """Return corrections that bring the positions within the limit times a factor."""
         settings = replace(layer.settings, limit=layer.settings.limit * factor)
-        is_last = layer.ratio == 1
-        met = self._met if is_last and factor == 1.0 else replace(self._met, decided=NO_CORRECTIONS)
-        met = met if is_last else streams.FREE_ENDS
-        return find_corrections(
-            decoded, self.positions, self._origin, settings, layer.plan, keeps_all=is_last, ends=met
-        )
-
-    def _tightest(self, decoded: np.ndarray, layer: Layer, level: int) -> Corrections | None:
-        """Return the corrections of the tightest limit that they reach for their share of the bytes so far, if any."""
-
-        def within(factor: float, share: float) -> Corrections | None:
-            corrections = self._corrections(decoded, layer, factor)
-            return corrections if len(corrections.chunk) <= share * bytes_ else None
-
-        bytes_ = self._shared_bytes + self._bytes_up_to(level)
-        best, loosest, tightest = None, 0, len(CORRECTED_LIMITS)
-        if named := within(1 / COARSER, NAMED_SHARE):
-            best, loosest = named, sum(factor >= 1 / COARSER for factor in CORRECTED_LIMITS)
-        while loosest < tightest:
-            middle = (loosest + tightest) // 2
-            if corrections := within(CORRECTED_LIMITS[middle], CORRECTIONS_SHARE):
-                best, loosest = corrections, middle + 1
-            else:
-                tightest = middle
-        return best
+        met = self._met if factor == 1.0 else replace(self._met, decided=NO_CORRECTIONS)
+        met = met if layer.ratio == 1 else streams.FREE_ENDS
+        return find_corrections(decoded, self.positions, self._origin, settings, layer.plan, ends=met)
 
     def error_at(self, shown: SegmentMotion, level: int) -> tuple[float, ...]:
         """Return the errors of a level without corrections."""

@@ -233,9 +233,13 @@ class Source:
     def limit(self, bound: float) -> float | np.ndarray:
         """Return what decoded positions are held to: one distance for all vertices, or one each, (N,) in file order."""
         if self.weights is None:
-            return qz.error_limit(bound - self.held_error, self.seen.diagonal)
+            return self.unweighted_limit(bound)
         limits = bound * self.weights - self.held_error
         return np.array([qz.error_limit(limit, self.seen.diagonal) for limit in limits])
+
+    def unweighted_limit(self, bound: float) -> float:
+        """Return what decoded positions of any vertex are held to if weights do not count."""
+        return qz.error_limit(bound - self.held_error, self.seen.diagonal)
 
     def smallest_bound(self, bound: float) -> float:
         """Return the smallest bound of any vertex."""
@@ -679,23 +683,19 @@ def find_corrections(
     origin: np.ndarray,
     settings: Settings,
     plan: Plan | PlanSample,
-    keeps_all: bool = True,
     ends: streams.MetEnds = streams.FREE_ENDS,
 ) -> Corrections:
-    """Return corrections that keep the limit. If it serves, they move all of a rigid part or of a ring; else a rigid
-    part has none unless each vertex is to keep the limit. ends: what they meet, in correction_step. Raises
-    BoundError."""
-    factor, is_rigid = 1.0, np.repeat(plan.is_rigid, plan.pieces["count"])
-    is_narrow = Feature.WIDE in settings.without
+    """Return corrections that keep the limit. If it serves, they move all of a rigid part or of a ring. ends: what they
+    meet, in correction_step. Raises BoundError."""
+    factor, is_narrow = 1.0, Feature.WIDE in settings.without
     parts = _parts_that_keep_their_shape(plan)
-    limit = settings.limit if keeps_all else np.where(is_rigid, np.inf, settings.limit)
     while True:
         step = qz.single(correction_step(settings.limit) * factor)
         moves = streams.find_rigid_corrections(
             parts, decoded, positions, origin, settings.limit, step, plan.pool, is_narrow, ends.closed
         )
         met = ends.with_moves(moves)
-        rows = streams.find_corrections(decoded, positions, origin, limit, step, plan.pool, is_narrow, met)
+        rows = streams.find_corrections(decoded, positions, origin, settings.limit, step, plan.pool, is_narrow, met)
         if rows is not None:
             return Corrections(rows, step, decoded.shape)
         factor, ends = 0.5 * factor, streams.FREE_ENDS

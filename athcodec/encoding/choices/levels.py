@@ -73,13 +73,19 @@ class SourceFrames:
 
 
 def chosen_levels(
-    errors: np.ndarray, frames: Sequence[int], flaws: np.ndarray, diagonal: float, exact: bool
+    errors: np.ndarray, frames: Sequence[int], flaws: np.ndarray, diagonal: float, exact: bool, first_held: int
 ) -> list[int]:
-    """Return the longest chain of levels up to the last in which no RMS and no largest error exceeds that before.
+    """Return the best chain of levels up to the last in which no RMS and no largest error exceeds that before: the one
+    with most levels that hold errors, of those the longest, of those the one that begins with a coarser level.
 
     errors: (levels, segments, 3), of segments of so many frames. flaws: (levels, segments, 2) of SourceFrames.flaws.
-    exact: whether the last level is the source, which goes on from the level before.
+    exact: whether the last level is the source, which goes on from the level before. first_held: the first level that
+    ends a layer of precision, and so holds an error, as all after it do.
     """
+
+    def rank(chain: list[int]) -> tuple[int, int, int]:
+        return sum(level >= first_held for level in chain), len(chain), -chain[0]
+
     stored = np.vectorize(from_short_float, otypes=[float])(short_floats(errors))
     measures = np.concatenate([_of_all(table, frames) for table in (errors, stored)], axis=1)
     limits = MOST_AWAY * diagonal, MOST_JERK
@@ -89,13 +95,8 @@ def chosen_levels(
         if (flaws[level] <= limits).all():
             better = [chains[after] for after in chains if (measures[after] <= measures[level]).all()]
             if better:
-                chains[level] = [level, *max(better, key=_length)]
-    return max(chains.values(), key=_length)
-
-
-def _length(chain: list[int]) -> tuple[int, int]:
-    """Return by what the best chain is chosen: of those of one length the one that begins with a coarser level."""
-    return len(chain), -chain[0]
+                chains[level] = [level, *max(better, key=rank)]
+    return max(chains.values(), key=rank)
 
 
 def _of_all(errors: np.ndarray, frames: Sequence[int]) -> np.ndarray:
