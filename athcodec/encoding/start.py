@@ -25,7 +25,8 @@ def first_settings(
     """Return the start of a search for the last of layers; ratios: of their steps to that of the last, descending."""
     is_layered, (rigid, turn_step) = len(ratios) > 1, first_rigid(source, bound, samples, ratios)
     relative = bound / source.seen.diagonal if source.seen.diagonal > 0 else 1e-4
-    step, rest_step = bound * qz.first_step_ratio(relative), bound * qz.rest_step_ratio(relative)
+    step, rest_step = bound * qz.first_step_ratio(relative), source.rest_limit(bound) * qz.rest_step_ratio(relative)
+
     settings = plain_settings(source, ath.height + 2, bound, step, rest_step)
     settings = replace(
         settings,
@@ -37,10 +38,7 @@ def first_settings(
         details=source.details if is_layered else settings.details,
         usual_change=usual_change(samples) if source.has_seams else np.inf,
     )
-    if is_layered and not settings.details.any():  # Lags that are best at once are worse where layers refine them.
-        best = replace(settings, lags=rest.lags(source, rest_step, settings.details))
-        return rest.connected_if_smaller(source, ath, best)
-    return rest.with_best_rest(source, ath, settings)
+    return (rest.in_layers if is_layered else rest.with_best_rest)(source, ath, settings)
 
 
 def still_choice(source: Source, ath: Ath, bound: float, ratio: int) -> Choice:
@@ -48,7 +46,7 @@ def still_choice(source: Source, ath: Ath, bound: float, ratio: int) -> Choice:
     precision. ratio: of the first layer's step to that of the last."""
     step, least = STILL_STEP * source.smallest_bound(bound), 0.5 * source.smallest_bound(bound)
     settings = first_settings(source, ath, bound, [SegmentSample(source.positions(0), source.coded_frames)])
-    slack = float(np.min(settings.limit)) - float(np.spacing(source.largest_number))
+    slack = source.rest_limit(float(np.min(settings.limit))) - float(np.spacing(source.largest_number))
     settings = rest.with_slack(source, ath, settings, max(slack, least))
     node_steps = np.full(settings.levels, STILL_STEP * source.seen.diagonal + step)
     settings = replace(settings, step=qz.single(step), node_steps=node_steps)

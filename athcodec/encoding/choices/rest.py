@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -11,9 +12,11 @@ from athcodec.encoding import streams
 from athcodec.encoding.features import Feature
 from athcodec.encoding.segment import Source, branch_records, poses_size
 from athcodec.encoding.settings import Settings
+from athcodec.encoding.shape import LENGTH_STEP
 from athcodec.encoding.survey import Ath
 from athcodec.encoding.trials import Trials
 
+AT_ONCE_SHARE = 0.8  # Largest share of the size of a rest pose to refine at which all layers have one pose.
 CONNECTED_SHARE = 0.8  # Largest share of the size without faces at which layers refine a rest pose that goes by faces.
 REST_SHARE = 0.25  # Share of a file from which on slack is tried for its rest pose.
 REST_SLACKS = (0.5, 0.65, 0.8, 0.95)  # Distances, over the limit, by which a rest pose may be off.
@@ -46,7 +49,20 @@ def with_best_rest(source: Source, ath: Ath, settings: Settings) -> Settings:
     return tried[0] if len(tried) == 1 else min(tried, key=lambda some: poses_size(source, ath, some))
 
 
-def connected_if_smaller(source: Source, ath: Ath, settings: Settings) -> Settings:
+def in_layers(source: Source, ath: Ath, settings: Settings) -> Settings:
+    """Return the settings for layers: each refines the rest pose of the one before, or all have that of the last layer
+    if that is much smaller, as copies are, or if an error is asked for that holds at the last layer alone."""
+    # Lags that are best at once are worse where layers refine them.
+    refined = replace(settings, lags=lags(source, settings.rest_step, settings.details))
+    refined = replace(_connected_if_smaller(source, ath, refined), coarsest_rest_step=LENGTH_STEP * source.rest_error)
+    at_once = replace(with_best_rest(source, ath, settings), coarsest_rest_step=0.0)
+    if source.has_source_rest and source.rest_error < math.inf:
+        return at_once
+    sizes = (poses_size(source, ath, some) for some in (at_once, refined))
+    return at_once if next(sizes) < AT_ONCE_SHARE * next(sizes) else refined
+
+
+def _connected_if_smaller(source: Source, ath: Ath, settings: Settings) -> Settings:
     """Return the settings for layers: with a rest pose that goes by faces if that is much smaller."""
     if source.mesh is None or source.host_rest:
         return settings
@@ -64,7 +80,8 @@ def with_slack(source: Source, ath: Ath, settings: Settings, slack: float) -> Se
 
 def best_slack(settings: Settings, trials: Trials) -> Settings:
     """Return the settings with a rest pose as far off as the motion leaves room for, if it is much of the file."""
-    source, limit = trials.source, float(np.min(settings.limit))
+    source = trials.source
+    limit = source.rest_limit(float(np.min(settings.limit)))
     if source.reference_is_exact or trials.is_layered:
         return settings
     if trials.prelude_bytes(settings) < REST_SHARE * trials.cost(settings):

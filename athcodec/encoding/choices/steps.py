@@ -46,7 +46,7 @@ def walked(
         before, settings = settings, _walk(settings, trials, "step", factor, math.inf, again > 0)
         if trials.source.reference_is_exact:
             break
-        cap = trials.extrapolation.rest_cap * settings.bound
+        cap = trials.extrapolation.rest_cap * trials.source.rest_limit(settings.bound)
         settings = _walk(settings, trials, "rest_step", rest_factor, cap, again > 0)
         if (settings.step, settings.rest_step) == (before.step, before.rest_step):
             break
