@@ -17,6 +17,7 @@ from athcodec.encoding.survey import Ath
 from athcodec.encoding.trials import Trials
 
 AT_ONCE_SHARE = 0.8  # Largest share of the size of a rest pose to refine at which all layers have one pose.
+AT_ONCE_STEP = 0.5  # Step of a rest pose of all layers to start a search from, over that of one to refine.
 CONNECTED_SHARE = 0.8  # Largest share of the size without faces at which layers refine a rest pose that goes by faces.
 REST_SHARE = 0.25  # Share of a file from which on slack is tried for its rest pose.
 REST_SLACKS = (0.5, 0.65, 0.8, 0.95)  # Distances, over the limit, by which a rest pose may be off.
@@ -55,7 +56,8 @@ def in_layers(source: Source, ath: Ath, settings: Settings) -> Settings:
     # Lags that are best at once are worse where layers refine them.
     refined = replace(settings, lags=lags(source, settings.rest_step, settings.details))
     refined = replace(_connected_if_smaller(source, ath, refined), coarsest_rest_step=LENGTH_STEP * source.rest_error)
-    at_once = replace(with_best_rest(source, ath, settings), coarsest_rest_step=0.0)
+    finer = replace(settings, rest_step=qz.single(AT_ONCE_STEP * settings.rest_step), coarsest_rest_step=0.0)
+    at_once = with_best_rest(source, ath, finer)
     if source.has_source_rest and source.rest_error < math.inf:
         return at_once
     sizes = (poses_size(source, ath, some) for some in (at_once, refined))
