@@ -60,8 +60,9 @@ def in_layers(source: Source, ath: Ath, settings: Settings) -> Settings:
     at_once = with_best_rest(source, ath, finer)
     if source.has_source_rest and source.rest_error < math.inf:
         return at_once
-    sizes = (poses_size(source, ath, some) for some in (at_once, refined))
-    return at_once if next(sizes) < AT_ONCE_SHARE * next(sizes) else refined
+    as_fine = replace(refined, rest_step=at_once.rest_step)
+    is_smaller = poses_size(source, ath, at_once) < AT_ONCE_SHARE * poses_size(source, ath, as_fine)
+    return at_once if is_smaller else refined
 
 
 def _connected_if_smaller(source: Source, ath: Ath, settings: Settings) -> Settings:
