@@ -53,6 +53,8 @@ from athcodec.encoding.segment import (
 )
 from athcodec.encoding.settings import Choice, Settings
 from athcodec.encoding.shape import rest_steps
+from athcodec.encoding.survey import Ath
+from athcodec.errors import BoundError
 
 COARSER = 2.0  # Step of a layer before the last, over that of a file of its own with the same bound.
 NAMED_SHARE = (
@@ -209,6 +211,17 @@ def _rests(
     level_0 = None if of_layers[0] is stored else stored.decoded
     before = [coded[-len(ratios) - 1] if level_0 is not None else stored, *of_layers[:-1]]
     return rest, level_0, [(pose.decoded, None if pose is last else pose) for pose, last in zip(of_layers, before)]
+
+
+def poses_size(source: Source, ath: Ath, settings: Settings, ratios: Sequence[int]) -> float:
+    """Return the bytes of hierarchy and rest poses of layers; infinite if the last pose cannot keep the bound."""
+    try:
+        prelude = CodedPrelude(source, ath, settings)
+    except BoundError:
+        return math.inf
+    rest, _, rests = _rests(source, prelude, ratios, settings)
+    refined = sum(len(coded.stream) for _, coded in rests if coded is not None)
+    return len(prelude.hierarchy_stream) + len(rest.stream) + refined
 
 
 def _first_rests(prelude: CodedPrelude, step: float, source: Source, settings: Settings) -> list[streams.CodedRest]:

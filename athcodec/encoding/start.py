@@ -38,7 +38,7 @@ def first_settings(
         details=source.details if is_layered else settings.details,
         usual_change=usual_change(samples) if source.has_seams else np.inf,
     )
-    return (rest.in_layers if is_layered else rest.with_best_rest)(source, ath, settings)
+    return rest.in_layers(source, ath, settings, ratios) if is_layered else rest.with_best_rest(source, ath, settings)
 
 
 def still_choice(source: Source, ath: Ath, bound: float, ratio: int) -> Choice:
