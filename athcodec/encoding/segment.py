@@ -101,7 +101,7 @@ class Source:
         if not self.reference_is_exact:
             precision, diagonal = self.rest_precision, self.seen.diagonal
             self.details, self.keeps_shape = precision.details(self.clip, self.hierarchy, diagonal)
-            if self.reference is None or self.has_source_rest:
+            if not self.exact_rest and (self.reference is None or self.clip.rest_given):
                 self.rest_error = precision.error(self.clip, diagonal)
         self.clip_range_segments = [
             [

@@ -2,23 +2,18 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from athcodec.encoding import layers, streams
 from athcodec.encoding import quantise as qz
+from athcodec.encoding import streams
 from athcodec.encoding.features import Feature
 from athcodec.encoding.segment import Source, branch_records, poses_size
 from athcodec.encoding.settings import Settings
-from athcodec.encoding.shape import LENGTH_STEP
 from athcodec.encoding.survey import Ath
 from athcodec.encoding.trials import Trials
 
-AT_ONCE_SHARE = 0.8  # Largest share of the size of a rest pose to refine at which all layers have one pose.
-AT_ONCE_STEP = 0.5  # Step of a rest pose of all layers to start a search from, over that of one to refine.
 CONNECTED_SHARE = 0.8  # Largest share of the size without faces at which layers refine a rest pose that goes by faces.
 REST_SHARE = 0.25  # Share of a file from which on slack is tried for its rest pose.
 REST_SLACKS = (0.5, 0.65, 0.8, 0.95)  # Distances, over the limit, by which a rest pose may be off.
@@ -51,22 +46,7 @@ def with_best_rest(source: Source, ath: Ath, settings: Settings) -> Settings:
     return tried[0] if len(tried) == 1 else min(tried, key=lambda some: poses_size(source, ath, some))
 
 
-def in_layers(source: Source, ath: Ath, settings: Settings, ratios: Sequence[int]) -> Settings:
-    """Return the settings for layers: each refines the rest pose of the one before, or all have that of the last layer
-    if that is much smaller, or if an error is asked for that holds at the last layer alone. ratios: of their steps."""
-    finer = replace(settings, rest_step=qz.single(AT_ONCE_STEP * settings.rest_step), coarsest_rest_step=0.0)
-    at_once = with_best_rest(source, ath, finer)
-    if source.has_source_rest and source.rest_error < math.inf:
-        return at_once
-    # Lags that are best at once are worse where layers refine them.
-    refined = replace(settings, lags=lags(source, settings.rest_step, settings.details))
-    refined = replace(_connected_if_smaller(source, ath, refined), coarsest_rest_step=LENGTH_STEP * source.rest_error)
-    as_fine = replace(refined, rest_step=at_once.rest_step)
-    sizes = [layers.poses_size(source, ath, some, ratios) for some in (at_once, as_fine)]
-    return at_once if sizes[0] < AT_ONCE_SHARE * sizes[1] else refined
-
-
-def _connected_if_smaller(source: Source, ath: Ath, settings: Settings) -> Settings:
+def connected_if_smaller(source: Source, ath: Ath, settings: Settings) -> Settings:
     """Return the settings for layers: with a rest pose that goes by faces if that is much smaller."""
     if source.mesh is None or source.host_rest:
         return settings
