@@ -97,12 +97,13 @@ class Source:
         self.rest = self.source_rest if self.reference is None else self.reference
         self.sheet_like = ~_thin_branches(self)
         self.details = np.zeros(self.hierarchy.branch_count, np.int32)
-        self.keeps_shape, self.rest_error = self.details > 0, math.inf  # That of a rest pose that is stored.
+        self.keeps_shape, self.rest_error = self.details > 0, math.inf
         if not self.reference_is_exact:
             precision, diagonal = self.rest_precision, self.seen.diagonal
             self.details, self.keeps_shape = precision.details(self.clip, self.hierarchy, diagonal)
-            if not self.exact_rest and (self.reference is None or self.clip.rest_given):
-                self.rest_error = precision.error(self.clip, diagonal)
+            error, is_stored = precision.error(self.clip, diagonal), self.reference is None or self.clip.rest_given
+            if math.isfinite(error) and is_stored and not self.exact_rest:
+                self.rest_error = qz.error_limit(error, diagonal)
         self.clip_range_segments = [
             [
                 (start + a, start + b)
