@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from files import coded
 from moving_meshes import leafed_tree
-from plants import diagonal
+from plants import diagonal, plant
 
 import athcodec
 from athcodec.cli import main
@@ -114,6 +114,19 @@ def test_a_rest_pose_is_as_precise_as_it_is_asked_for_at_every_level(tree, scrat
     with coded(clip, scratch / "tree.ath", rel_error=1e-3, rest_error=rest_error, effort="fast") as decoder:
         for level in range(len(decoder.levels)):
             assert np.linalg.norm(decoder.level_rest(level) - clip.rest, axis=1).max() <= most
+
+
+@pytest.mark.parametrize("is_sample", [True, False])
+def test_a_looser_rest_error_takes_no_more_bytes_and_holds_at_every_level(is_sample, scratch):
+    clip = athcodec.read(athcodec.sample_path("tree")) if is_sample else plant(seed=1, branches=40, longest=30)
+    sizes = []
+    for rest_error in (1e-5, 1e-4, 1e-3, None):
+        with coded(clip, scratch / "plant.ath", rel_error=1e-3, rest_error=rest_error) as decoder:
+            sizes.append((scratch / "plant.ath").stat().st_size)
+            for level in range(len(decoder.levels)):
+                away = np.linalg.norm(decoder.file.rest_at(level) - clip.rest, axis=1).max()
+                assert away <= (rest_error or 1.0) * diagonal(clip)
+    assert (sizes <= 1.02 * np.minimum.accumulate(sizes)).all()
 
 
 def test_the_command_line_takes_a_rest_error(tree, scratch):

@@ -36,7 +36,6 @@ from athcodec.encoding.choices.levels import SourceFrames
 from athcodec.encoding.features import Feature
 from athcodec.encoding.learned_modes import nested
 from athcodec.encoding.motion import LearnedModes, Plan, SegmentMotion, position_errors
-from athcodec.encoding.polygons import Mesh
 from athcodec.encoding.segment import (
     CodedPrelude,
     Corrections,
@@ -54,6 +53,8 @@ from athcodec.encoding.segment import (
 )
 from athcodec.encoding.settings import Choice, Settings
 from athcodec.encoding.shape import rest_steps
+from athcodec.encoding.survey import Ath
+from athcodec.errors import BoundError
 
 # Steps of the first layer and of others before the last, over that of a file whose bound is the error that the layer
 # holds. Where there are leaves, corrections take more bytes than finer steps.
@@ -151,7 +152,7 @@ def _between(ratio: int, finer: int) -> list[int]:
 def layers_of(source: Source, prelude: CodedPrelude, choice: Choice, ratios: Sequence[int]) -> Layers:
     """Return the layers for a choice; prelude: of the last layer."""
     settings = choice.settings
-    rest, level_0, rests = _rests(source, prelude, ratios, settings.bound)
+    rest, level_0, rests = _rests(source, prelude, ratios, settings)
     layers: list[Layer] = []
     for i, (ratio, (pose, refined)) in enumerate(zip(ratios, rests)):
         plan = prelude.plan if len(ratios) == 1 else _plan_on(pose, prelude, i)
@@ -199,22 +200,27 @@ def _uniform(plan: Plan, settings: Settings) -> Settings:
 
 
 def _rests(
-    source: Source, prelude: CodedPrelude, ratios: Sequence[int], bound: float
+    source: Source, prelude: CodedPrelude, ratios: Sequence[int], settings: Settings
 ) -> tuple[writing.Rest, np.ndarray | None, list[tuple[np.ndarray, streams.CodedRest | None]]]:
     """Return the content of REST, what it decodes to if the first layer refines it, and of each layer the decoded pose
     and what refines the pose before."""
-    rest = prelude.rest_chunk
+    rest, at_once = prelude.rest_chunk, [(prelude.plan.rest, None)] * len(ratios)
     if source.exact_rest or len(ratios) == 1 or Feature.REFINED_REST in source.without:
-        return rest, None, [(prelude.plan.rest, None)] * len(ratios)
-    first_step = qz.first_rest_step(rest.step, bound, ratios[0])
-    steps = [qz.single(rest.step * max(1.0, ratio / 2)) for ratio in ratios[1:]]
+        return rest, None, at_once
+    wanted = [qz.first_rest_step(rest.step, settings.bound, ratios[0])]
+    wanted += [qz.single(rest.step * max(1.0, ratio / 2)) for ratio in ratios[1:]]
+    first_step, *steps = (settings.rest_step_of(rest.step, step) for step in wanted)
+    if first_step == rest.step:
+        return rest, None, at_once
     branches, mesh = prelude.plan.branches, rest.mesh
-    coded = _first_rests(prelude, first_step, source, mesh)
+    coded = _first_rests(prelude, first_step, source, settings)
     for step in steps:
         if np.array_equal(rest_steps(branches, step), rest_steps(branches, coded[-1].step)):
             coded.append(coded[-1])
             continue
         coded.append(streams.encode_rest(branches, step, source.rest, coded[-1], mesh=mesh))
+    if max(np.linalg.norm(pose.decoded - source.rest, axis=1).max() for pose in coded) > source.rest_error:
+        return rest, None, at_once
     stored, of_layers = coded[0], coded[-len(ratios) :]
     rest = replace(rest, step=stored.step, stream=stored.stream)
     level_0 = None if of_layers[0] is stored else stored.decoded
@@ -222,16 +228,28 @@ def _rests(
     return rest, level_0, [(pose.decoded, None if pose is last else pose) for pose, last in zip(of_layers, before)]
 
 
-def _first_rests(prelude: CodedPrelude, step: float, source: Source, mesh: Mesh | None) -> list[streams.CodedRest]:
+def poses_size(source: Source, ath: Ath, settings: Settings, ratios: Sequence[int]) -> float:
+    """Return the bytes of hierarchy and rest poses of layers; infinite if the last pose cannot keep the bound."""
+    try:
+        prelude = CodedPrelude(source, ath, settings)
+    except BoundError:
+        return math.inf
+    rest, _, rests = _rests(source, prelude, ratios, settings)
+    refined = sum(len(coded.stream) for _, coded in rests if coded is not None)
+    return len(prelude.hierarchy_stream) + len(rest.stream) + refined
+
+
+def _first_rests(prelude: CodedPrelude, step: float, source: Source, settings: Settings) -> list[streams.CodedRest]:
     """Return the rest pose at the step of the first layer, and before it that of level 0 if that takes few bytes."""
-    plan = prelude.plan
+    plan, mesh = prelude.plan, prelude.rest_chunk.mesh
 
     def encode(step: float, before: streams.CodedRest | None = None) -> streams.CodedRest:
         shape_of = prelude.shape_of if before is None else None
         return streams.encode_rest(plan.branches, step, source.rest, before, mesh=mesh, shape_of=shape_of)
 
     at_once = encode(step)
-    if not plan.level_0_stands_alone or Feature.LEVEL_0_REST in source.without:
+    is_out = Feature.LEVEL_0_REST in source.without or LEVEL_0_STEP * step > settings.coarsest_rest_step
+    if is_out or not plan.level_0_stands_alone:
         return [at_once]
     level_0 = encode(LEVEL_0_STEP * step)
     refined = encode(step, level_0)

@@ -47,6 +47,7 @@ class PlantSample:
             Frames(lambda start, stop: clip.block(start, stop)[:, chosen], clip.frame_count, len(chosen), clip.dtype),
             clip.time,
             rest=clip.source_rest[chosen],
+            metadata=clip.metadata,
             clip_ranges=clip.clip_ranges,
         )
         some.rest_given = clip.rest_given

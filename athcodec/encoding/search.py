@@ -253,7 +253,7 @@ class Search:
         source = self.trials.source
         if self.effort == "fast" or source.host_rest or self.trials.without(Feature.MEAN_POSE):
             return self
-        if source.details.any():  # The mean of what turns is smaller than what turns.
+        if source.keeps_shape.any():  # The mean of what turns is smaller than what turns.
             return self
         work = self.trials.work
         with work.trying("mean pose"):
@@ -285,6 +285,8 @@ class Search:
         like = replace(
             settings,
             forms=forms.forms_like(settings.forms, other.trials.source, trials),
+            rest_step=start.rest_step,
+            coarsest_rest_step=start.coarsest_rest_step,
             lags=start.lags,
             connected_rest=start.connected_rest,
             welded_rest=start.welded_rest,

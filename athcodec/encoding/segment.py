@@ -81,6 +81,8 @@ class Source:
     rest: np.ndarray = field(init=False)  # (N, 3) float64 less the origin: the reference pose.
     origin: np.ndarray = field(init=False)  # (3,) float64
     details: np.ndarray = field(init=False)  # (B,) int32 (FORMAT.md, Detail).
+    keeps_shape: np.ndarray = field(init=False)  # (B,) bool: branches whose faces are to keep their shape.
+    rest_error: float = field(init=False)  # Largest error of the rest pose that is asked for; infinite: none is.
     sheet_like: np.ndarray = field(init=False)  # (B,) bool: branches that do not look like beams.
     clip_range_segments: list[list[tuple[int, int]]] = field(init=False)  # Segments of each clip of the file.
     segments: list[tuple[int, int]] = field(init=False)  # Segments of all clips.
@@ -95,8 +97,13 @@ class Source:
         self.rest = self.source_rest if self.reference is None else self.reference
         self.sheet_like = ~_thin_branches(self)
         self.details = np.zeros(self.hierarchy.branch_count, np.int32)
+        self.keeps_shape, self.rest_error = self.details > 0, math.inf
         if not self.reference_is_exact:
-            self.details = self.rest_precision.details(self.clip, self.hierarchy, self.seen.diagonal)
+            precision, diagonal = self.rest_precision, self.seen.diagonal
+            self.details, self.keeps_shape = precision.details(self.clip, self.hierarchy, diagonal)
+            error, is_stored = precision.error(self.clip, diagonal), self.reference is None or self.clip.rest_given
+            if math.isfinite(error) and is_stored and not self.exact_rest:
+                self.rest_error = qz.error_limit(error, diagonal)
         self.clip_range_segments = [
             [
                 (start + a, start + b)
@@ -248,6 +255,10 @@ class Source:
     def largest_bound(self, bound: float) -> float:
         """Return the largest bound of any vertex."""
         return bound if self.weights is None else bound * float(self.weights.max())
+
+    def rest_limit(self, bound: float) -> float:
+        """Return the largest error of the reference pose."""
+        return bound if self.has_source_rest else min(bound, self.rest_error)
 
     def level_weights(self, levels: int, part: float) -> np.ndarray:
         """Return for each level the weight that such a part of its vertices and those below fall short of, (levels,). A
@@ -411,7 +422,7 @@ def _rest_within(source: Source, branches: np.ndarray, settings: Settings) -> st
         mesh = source.mesh_for(settings)
         return streams.encode_rest(branches, step, source.rest, None, settings.rest_slack, mesh, settings.shape_of)
 
-    return _within(settings.bound, source.rest, encode, settings.rest_step)
+    return _within(source.rest_limit(settings.bound), source.rest, encode, settings.rest_step)
 
 
 def _within(
@@ -444,7 +455,7 @@ def code_source_rest(source: Source, branches: np.ndarray, reference: np.ndarray
     if source.exact_rest:
         pose = source.clip.source_rest[source.hierarchy.vertex_source]
         return writing.pack_exact_source_rest(streams.encode_exact_rest(branches, pose))
-    tolerance = max(bound, qz.SOURCE_REST_TOLERANCE * source.seen.diagonal)
+    tolerance = min(source.rest_error, max(bound, qz.SOURCE_REST_TOLERANCE * source.seen.diagonal))
     pose = source.source_rest
 
     def encode(step: float) -> streams.CodedRest:

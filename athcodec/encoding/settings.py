@@ -46,6 +46,7 @@ class Settings:
     turn_step: float = 0.0  # Largest step of rotations of rigid pieces, in radians; 0: none.
     connected_rest: bool = False
     welded_rest: bool = False  # Whether a connected rest pose has vertices at one place coded once.
+    coarsest_rest_step: float = np.inf  # Largest step of layers' rest poses; 0: all have that of the last, unrefined.
     rest_slack: float = 0.0  # Distance by which the rest pose may be off to save bits.
     shape_of: np.ndarray | None = None  # (B,) as streams.find_copies returns it; None: the rest pose has no copies.
     common_basis: bool = False  # Whether the levels with learned time bases share one.
@@ -98,6 +99,10 @@ class Settings:
         """Return the step of the stems of a level."""
         return qz.single(self.step * self.level_steps[level])
 
+    def rest_step_of(self, last: float, wanted: float) -> float:
+        """Return the step of a layer's rest pose, as near to a wanted one as is allowed; last: of the last layer."""
+        return max(last, min(wanted, self.coarsest_rest_step))
+
     def of_segment(self, whole_loop: bool) -> Settings:
         """Return the settings of a segment, which is all of a loop or not."""
         return replace(self, periodic=self.periodic and whole_loop)
@@ -118,7 +123,7 @@ class Settings:
             largest_bound=ratio * self.largest_bound,
             limit=ratio * self.limit,
             step=qz.single(ratio * self.step),
-            rest_step=qz.first_rest_step(self.rest_step, self.bound, ratio),
+            rest_step=self.rest_step_of(self.rest_step, qz.first_rest_step(self.rest_step, self.bound, ratio)),
             layer=0,
         )
 

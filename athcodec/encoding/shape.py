@@ -56,14 +56,14 @@ class RestPrecision:
             return self.length.in_scene_units(clip.metadata.get("unit"))
         return math.inf if self.fraction is None else self.fraction * diagonal
 
-    def details(self, clip: MotionClip, hierarchy: Hierarchy, diagonal: float) -> np.ndarray:
-        """Return the detail of every branch, (B,) int32, in file order."""
+    def details(self, clip: MotionClip, hierarchy: Hierarchy, diagonal: float) -> tuple[np.ndarray, np.ndarray]:
+        """Return the detail of every branch, (B,) int32, and whether its faces are to keep their shape, (B,) bool, in
+        file order. An error that is asked for is that of all branches, so that they need no detail."""
+        none = np.zeros(hierarchy.branch_count, np.int32)
         if self.of_bound:
-            return np.zeros(hierarchy.branch_count, np.int32)
-        error = self.error(clip, diagonal)
-        if math.isfinite(error):
-            return detail_of(np.full(hierarchy.branch_count, LENGTH_STEP * error))
-        return detail_of(shape_steps(clip, hierarchy, diagonal))
+            return none, none > 0
+        details = detail_of(shape_steps(clip, hierarchy, diagonal))
+        return none if math.isfinite(self.error(clip, diagonal)) else details, details > 0
 
 
 def detail_of(steps: np.ndarray) -> np.ndarray:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -11,11 +12,15 @@ from athcodec.encoding import quantise as qz
 from athcodec.encoding.choices import rest
 from athcodec.encoding.choices.forms import first_forms
 from athcodec.encoding.choices.rigid import first_rigid, loose_branches
+from athcodec.encoding.layers import poses_size
 from athcodec.encoding.segment import Source, plain_settings
 from athcodec.encoding.segment_samples import SegmentSample, usual_change
 from athcodec.encoding.settings import Choice, Settings
+from athcodec.encoding.shape import LENGTH_STEP
 from athcodec.encoding.survey import Ath
 
+AT_ONCE_SHARE = 0.8  # Largest share of the size of a rest pose to refine at which all layers have one pose.
+AT_ONCE_STEP = 0.5  # Step of a rest pose of all layers to start a search from, over that of one to refine.
 STILL_STEP = 1024.0  # Quantisation step, in bounds, that rounds every coefficient of a still stem to zero.
 
 
@@ -25,7 +30,7 @@ def first_settings(
     """Return the start of a search for the last of layers; ratios: of their steps to that of the last, descending."""
     is_layered, (rigid, turn_step) = len(ratios) > 1, first_rigid(source, bound, samples, ratios)
     relative = bound / source.seen.diagonal if source.seen.diagonal > 0 else 1e-4
-    step, rest_step = bound * qz.first_step_ratio(relative), bound * qz.rest_step_ratio(relative)
+    step, rest_step = bound * qz.first_step_ratio(relative), source.rest_limit(bound) * qz.rest_step_ratio(relative)
     settings = plain_settings(source, ath.height + 2, bound, step, rest_step)
     settings = replace(
         settings,
@@ -37,18 +42,34 @@ def first_settings(
         details=source.details if is_layered else settings.details,
         usual_change=usual_change(samples) if source.has_seams else np.inf,
     )
-    if is_layered and not settings.details.any():  # Lags that are best at once are worse where layers refine them.
-        best = replace(settings, lags=rest.lags(source, rest_step, settings.details))
-        return rest.connected_if_smaller(source, ath, best)
-    return rest.with_best_rest(source, ath, settings)
+    return _in_layers(source, ath, settings, ratios) if is_layered else rest.with_best_rest(source, ath, settings)
+
+
+def _in_layers(source: Source, ath: Ath, settings: Settings, ratios: Sequence[int]) -> Settings:
+    """Return the settings for layers: each refines the rest pose of the one before, or all have that of the last layer
+    if that is much smaller, or if an error is asked for that holds at the last layer alone. ratios: of their steps."""
+    finer = replace(settings, rest_step=qz.single(AT_ONCE_STEP * settings.rest_step), coarsest_rest_step=0.0)
+    at_once = rest.with_best_rest(source, ath, finer)
+    if source.has_source_rest and source.rest_error < math.inf:
+        return at_once
+    # Lags that are best at once are worse where layers refine them.
+    refined = replace(
+        settings,
+        lags=rest.lags(source, settings.rest_step, settings.details),
+        coarsest_rest_step=LENGTH_STEP * source.rest_error,
+    )
+    refined = rest.connected_if_smaller(source, ath, refined)
+    as_fine = replace(refined, rest_step=at_once.rest_step)
+    sizes = [poses_size(source, ath, some, ratios) for some in (at_once, as_fine)]
+    return at_once if sizes[0] < AT_ONCE_SHARE * sizes[1] else refined
 
 
 def still_choice(source: Source, ath: Ath, bound: float, ratio: int) -> Choice:
     """Return the choice for a clip all of whose frames are the rest pose: no motion, and a rest pose of the bound's
     precision. ratio: of the first layer's step to that of the last."""
-    step, least = STILL_STEP * source.smallest_bound(bound), 0.5 * source.smallest_bound(bound)
+    step, least = STILL_STEP * source.smallest_bound(bound), 0.5 * source.rest_limit(source.smallest_bound(bound))
     settings = first_settings(source, ath, bound, [SegmentSample(source.positions(0), source.coded_frames)])
-    slack = float(np.min(settings.limit)) - float(np.spacing(source.largest_number))
+    slack = source.rest_limit(float(np.min(settings.limit))) - float(np.spacing(source.largest_number))
     settings = rest.with_slack(source, ath, settings, max(slack, least))
     node_steps = np.full(settings.levels, STILL_STEP * source.seen.diagonal + step)
     settings = replace(settings, step=qz.single(step), node_steps=node_steps)

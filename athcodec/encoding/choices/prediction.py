@@ -72,7 +72,8 @@ def best_prediction(
 ) -> FoundPrediction | None:
     """Return the best prediction; None: it takes more than `most_bytes`, or cannot keep the bound."""
     ath = one_map_each(source.seen)
-    by_ratio = {ratio: _settings(source, ath, bound, ratio * source.smallest_bound(bound)) for ratio in REST_STEPS}
+    limit = source.rest_limit(source.smallest_bound(bound))
+    by_ratio = {ratio: _settings(source, ath, bound, ratio * limit) for ratio in REST_STEPS}
     samples = _samples(source)
     preludes: dict[float, CodedPrelude] = {}
 

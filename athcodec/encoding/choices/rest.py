@@ -64,7 +64,8 @@ def with_slack(source: Source, ath: Ath, settings: Settings, slack: float) -> Se
 
 def best_slack(settings: Settings, trials: Trials) -> Settings:
     """Return the settings with a rest pose as far off as the motion leaves room for, if it is much of the file."""
-    source, limit = trials.source, float(np.min(settings.limit))
+    source = trials.source
+    limit = source.rest_limit(float(np.min(settings.limit)))
     if source.reference_is_exact or trials.is_layered:
         return settings
     if trials.prelude_bytes(settings) < REST_SHARE * trials.cost(settings):

@@ -41,9 +41,9 @@ def first_rigid(
     hierarchy, least = source.hierarchy, source.smallest_bound(bound)
     if Feature.RIGID in source.without:
         return np.zeros(hierarchy.branch_count, np.int32), 0.0
-    wanted = source.sheet_like | (source.details > 0)
+    wanted = source.sheet_like | source.keeps_shape
     rigid = _rigid_layers(source, wanted, [sample.positions for sample in samples], [ratio * least for ratio in ratios])
-    turns = rigid[source.details > 0].any() and Feature.TURN not in source.without
+    turns = rigid[source.keeps_shape].any() and Feature.TURN not in source.without
     return rigid, TURN_STEP if turns else 0.0
 
 

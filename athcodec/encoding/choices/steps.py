@@ -43,18 +43,21 @@ def walked(
 ) -> Settings:
     """Walk step and rest step in turn to the cheapest."""
     for again in range(WALKS):
-        before, settings = settings, _walk(settings, trials, "step", factor, math.inf, again > 0)
+        # The first walks look further ahead: a much coarser step, or a much finer rest pose, may pay where a little of
+        # it does not.
+        coarser, finer = ([], []) if again else ([2], [-4])
+        before, settings = settings, _walk(settings, trials, "step", factor, math.inf, coarser)
         if trials.source.reference_is_exact:
             break
-        cap = trials.extrapolation.rest_cap * settings.bound
-        settings = _walk(settings, trials, "rest_step", rest_factor, cap, again > 0)
+        cap = trials.extrapolation.rest_cap * trials.source.rest_limit(settings.bound)
+        settings = _walk(settings, trials, "rest_step", rest_factor, cap, finer)
         if (settings.step, settings.rest_step) == (before.step, before.rest_step):
             break
     return settings
 
 
-def _walk(settings: Settings, trials: Trials, name: str, factor: float, cap: float, again: bool) -> Settings:
-    """Walk one of the steps, up to a cap."""
+def _walk(settings: Settings, trials: Trials, name: str, factor: float, cap: float, ahead: list[int]) -> Settings:
+    """Walk one of the steps, up to a cap. ahead: exponents of the factor that are tried beside the nearest."""
 
     def moved(exponent: int) -> Settings:
         return replace(settings, **{name: qz.single(min(getattr(settings, name) * factor**exponent, cap))})
@@ -62,8 +65,7 @@ def _walk(settings: Settings, trials: Trials, name: str, factor: float, cap: flo
     def costs_at(exponents) -> dict[int, float]:
         return dict(zip(exponents, trials.costs([moved(exponent) for exponent in exponents])))
 
-    # The first walk looks further ahead: a step that is much coarser may pay where one a little coarser does not.
-    costs = costs_at((-1, 0, 1) if again else (-1, 0, 1, 2))
+    costs = costs_at([-1, 0, 1, *ahead])
     while True:
         best = min(costs, key=costs.get)
         wanted = [e for e in (best - 1, best + 1) if e not in costs and abs(e) <= LONGEST_WALK]
