@@ -56,7 +56,7 @@ def _in_layers(source: Source, ath: Ath, settings: Settings, ratios: Sequence[in
     refined = replace(
         settings,
         lags=rest.lags(source, settings.rest_step, settings.details),
-        coarsest_rest_step=LENGTH_STEP * source.rest_error,
+        coarsest_rest_step=qz.single(LENGTH_STEP * source.rest_error),
     )
     refined = rest.connected_if_smaller(source, ath, refined)
     as_fine = replace(refined, rest_step=at_once.rest_step)
