@@ -26,7 +26,6 @@ from bench import (
     report,
     sample,
     sizes,
-    smoothness,
     speed,
     tables,
     viewer,
@@ -50,7 +49,6 @@ VERBS = {
     "gallery": gallery,
     "gpu": gpu,
     "moving": moving,
-    "smoothness": smoothness,
     "wrappings": wrappings,
 }
 

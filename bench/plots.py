@@ -1,4 +1,4 @@
-"""Pictures by matplotlib, of the extra `bench` alone: prefixes over files of their own, and what other modules draw.
+"""A picture by matplotlib, of the extra `bench` alone: prefixes over files of their own.
 
 Colours are those of Okabe and Ito ("Color universal design", 2008), which colour-blind people can tell apart, without
 the yellow, which is faint on white.
@@ -18,27 +18,16 @@ class NoPlots(Exception):
     """matplotlib is missing; the message says what to do."""
 
 
-def pyplot(inches: tuple[float, float], rows: int = 1):
-    """A function that makes a figure of this size and its axes, or an array of them below each other, without a
-    display. Raises NoPlots.
-    """
+def draw_prefixes(rows: list[dict[str, Any]], file: Path) -> Path:
+    """Draw the bytes of prefixes over those of files of their own, by error. Raises NoPlots."""
     try:
         from matplotlib.backends.backend_agg import FigureCanvasAgg
         from matplotlib.figure import Figure
     except ImportError:
         raise NoPlots(MISSING) from None
-
-    def figure_of():
-        figure = Figure(figsize=inches, dpi=DPI, layout="constrained")
-        FigureCanvasAgg(figure)
-        return figure, figure.subplots(rows, sharex=True)
-
-    return figure_of
-
-
-def draw_prefixes(rows: list[dict[str, Any]], file: Path) -> Path:
-    """Draw the bytes of prefixes over those of files of their own, by error. Raises NoPlots."""
-    figure, axes = pyplot((8, 4.5))()
+    figure = Figure(figsize=(8, 4.5), dpi=DPI, layout="constrained")
+    FigureCanvasAgg(figure)
+    axes = figure.subplots()
     clips = list(dict.fromkeys(row["clip"] for row in rows))
     curves: dict[tuple[str, str, str], list[dict[str, Any]]] = {}
     for row in rows:
@@ -60,9 +49,5 @@ def draw_prefixes(rows: list[dict[str, Any]], file: Path) -> Path:
     axes.set_ylabel("prefix / own")
     axes.grid(True, color="#dddddd", linewidth=0.8)
     axes.legend(fontsize=8)
-    return save(figure, file)
-
-
-def save(figure, file: Path) -> Path:
     figure.savefig(file, metadata={"Software": None})
     return file

@@ -27,7 +27,7 @@ import athcodec
 from athcodec.encoding.bounds import BoundOption
 from athcodec.encoding.branch_trials import best_branches
 from athcodec.encoding.progress import Work
-from athcodec.metrics import ErrorMeter, bits_per_vertex_frame
+from athcodec.metrics import ErrorMeter, bits_per_vertex_frame, level_meters
 from athcodec.motion.branches.result import with_branches
 from bench.clips import read
 from bench.codec_registry import OURS, chosen
@@ -35,7 +35,6 @@ from bench.codecs import Codec, Source
 from bench.codecs.ours import LayeredAthcodec, opened
 from bench.codecs.program import CannotKeep
 from bench.memory import peak_bytes
-from bench.smoothness import measured_levels
 
 
 def encode(codec: Codec, clip_path: str, rel_bound: float, file: Path, limit: float) -> dict[str, Any]:
@@ -104,7 +103,11 @@ def _errors(source: Source, decoded: np.ndarray, rel_bound: float) -> dict[str, 
 def _levels(data: bytes, clip: athcodec.MotionClip) -> dict[str, float | None]:
     """How much a level's error exceeds that of the level before, and how much the file jerks at its seams, at worst."""
     with opened(data) as decoder:
-        meters = measured_levels(decoder, clip)
+        meters = level_meters(decoder, clip)
+        for start, stop in decoder.segments:
+            source = clip.block(start, stop)
+            for number, meter in enumerate(meters):
+                meter.add(source, decoder.positions(slice(start, stop), number))
 
     def growth(errors: list[float]) -> float | None:
         return max((after / before for before, after in zip(errors, errors[1:]) if before), default=None)

@@ -368,19 +368,3 @@ def test_prefixes_are_compared_with_files_of_their_own_at_levels_and_between_the
     assert whole["/own at max"] == pytest.approx(1, abs=0.02)
     steps = [(row["measure"], row["error"]) for row in result["chart"] if row["step"] and row["ladder"] == "layers"]
     assert len(steps) >= 4 and picture.stat().st_size > 10_000
-
-
-def test_smoothness_is_a_table_and_a_picture(sample_positions, tmp_path):
-    pytest.importorskip("matplotlib")
-    words = ["--rel-error", "1e-3", "--segment-frames", "40", "--ladder", "none", "--effort", "fast"]
-    picture = tmp_path / "a.png"
-    text, result = run_bench(tmp_path, "smoothness", *words, "--picture", str(picture))
-    assert picture.read_bytes().startswith(b"\x89PNG")
-    [rows] = tables_of(result)
-    assert [row["level"] for row in rows] == [0, 1, 2, 3]
-    bends = np.diff(sample_positions.astype(float), 2, axis=0)
-    motion = np.sqrt((bends**2).sum(axis=2).mean(axis=1))
-    usual = max(motion[seam - 3 : seam + 1].max() for seam in (40, 80)) / np.median(motion)
-    assert [row["source's"] for row in rows] == pytest.approx([usual] * 4, rel=1e-3)
-    assert all(row["tick ratio"] < 2 * usual for row in rows), "segments go on from the one before"
-    assert "tick ratio" in text

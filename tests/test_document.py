@@ -6,7 +6,9 @@ from __future__ import annotations
 import io
 import subprocess
 import sys
+from contextlib import suppress
 from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 import pytest
@@ -15,7 +17,8 @@ from plants import awkward, bush, chain_plant, plant, tube
 
 import athcodec
 from athcodec.errors import FormatError
-from spec.document import File, rules
+from spec import conformance, document
+from spec.document import TEXT, File, rules
 
 ROOT = Path(__file__).resolve().parent.parent
 VECTORS = ROOT / "spec" / "vectors" / "valid"
@@ -123,6 +126,34 @@ def test_a_prefix_plays_as_far_as_it_goes():
         assert got == expected if isinstance(got, str) else np.array_equal(got, expected)
         with pytest.raises(rules.Invalid, match=r"TRUNCATED|NOT_AN_ATH_FILE"):
             File(data[:size], strict=True)
+
+
+MISTAKES = {  # By a vector that tells it: what the document says, and what a decoder's author could write in its place.
+    "gaps": ("gaps.append(64 if quarters >= 64.0", "gaps.append(65 if quarters >= 64.0"),
+    "rigid-diagonal": ("norm2 * 1e-30:\n            continue", "norm2 * 1e-30:\n            pass"),
+    "sheet-mode-below": ("if after > before * keep:", "if True:"),
+    "tangent-short-above": ("\n    if not squared(tangent) > 1e-200:", "\n    if not squared(tangent) > 1.0625e-200:"),
+    "smallest": ("if self.range < (1 << 32):", "if self.range < (1 << 31):"),
+}
+
+
+def answers(vector: conformance.Vector, own: ModuleType) -> dict[str, str]:
+    def ask(data: bytes, item: str, mesh: bytes | None) -> bytes:
+        try:
+            return File(data, item == "strict", mesh, own).answer(item)
+        except own.Invalid as error:
+            raise conformance.Refused(str(error)) from None
+
+    return {item: conformance.result(ask, vector.path.read_bytes(), item) for item in vector.results}
+
+
+@pytest.mark.parametrize("name", MISTAKES)
+def test_a_vector_tells_a_changed_decoder_from_the_true_one(name):
+    (true, changed), vectors = MISTAKES[name], conformance.vectors()
+    vector = next(vector for vector in vectors if vector.path.stem == name)
+    assert TEXT.count(true) == 1 and answers(vector, rules) == vector.results
+    with suppress(ArithmeticError, LookupError, TypeError):  # with which a changed decoder stops
+        assert answers(vector, document.run(TEXT.replace(true, changed))) != vector.results
 
 
 def run(*words) -> subprocess.CompletedProcess:

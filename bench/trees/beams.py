@@ -1,11 +1,12 @@
-"""The motion of a plant in wind without an engine: elastic beams that sway by small turns, joined again at full length.
+"""The motion of a plant in wind: elastic beams that sway by small turns, joined again at full length.
 
 Every element is a Bernoulli beam clamped to its neighbours, with its mass and its foliage's at the nodes. The equations
 are linear, so one factorisation serves all time steps (Newmark's average acceleration, stable at any step). Nodes are
 then placed by turning every element as its chord turns, which keeps the lengths that linear displacements would stretch
 (after Choi and Ko, "Modal warping: real-time simulation of large rotational deformation and manipulation", IEEE TVCG
-11(1), 2005). Drag and damping are those of simulate.py; the part of the drag that follows the plant's own speed is that
-of the mean wind. The shape as grown is the one under the plant's own weight.
+11(1), 2005). Damping is Rayleigh's: `damping` of critical at the plant's lowest frequency, and at six times that. Drag
+acts on wood and foliage; the part of it that follows the plant's own speed is that of the mean wind. The shape as grown
+is the one under the plant's own weight.
 """
 
 from __future__ import annotations
@@ -16,24 +17,21 @@ import numpy as np
 
 from bench.trees.plant import Plant
 from bench.trees.ride import cross_matrices, rotations
-from bench.trees.simulate import (
-    AIR,
-    DENSITY,
-    DRAG_OF_WOOD,
-    FOLIAGE_MASS,
-    FOLIAGE_SPREAD,
-    SHEAR,
-    SPIN_UP_SECONDS,
-    YOUNG,
-    foliage_area,
-    rayleigh,
-)
 from bench.trees.wind import Wind
 
 if TYPE_CHECKING:
     from scipy.sparse import csc_matrix
 
 STEPS = 3  # Time steps of a frame.
+DENSITY = 900.0  # Density of green wood, kg/m3.
+YOUNG, SHEAR = 8.5e9, 0.6e9  # Pa
+AIR = 1.2  # kg/m3
+DRAG_OF_WOOD = 1.0
+FOLIAGE_AREA = 0.07  # drag coefficient times area of all foliage, over height squared
+FOLIAGE_MASS = 1.2  # kg per m2 of it
+FOLIAGE_SPREAD = 0.05  # radius of gyration of a node's foliage, m
+SECOND_DAMPED = 6.0  # the other damped frequency, over the lowest
+CALM_SECONDS, SPIN_UP_SECONDS = 1.0, 4.0  # the wind rises over the former; the clip begins after the latter
 
 
 def bend(
@@ -116,6 +114,17 @@ def _stiffness(plant: Plant) -> csc_matrix:
     kept = (rows >= 6) & (columns >= 6)
     matrix = coo_matrix((blocks[kept], (rows[kept], columns[kept])), shape=(size, size)).tocsc()
     return matrix + _diagonal(np.where(np.arange(size) < 6, matrix.diagonal().max(), 0.0))  # the root is held
+
+
+def rayleigh(lowest: float, damping: float) -> tuple[float, float]:
+    """Factors of mass and stiffness: `damping` at the lowest frequency and at SECOND_DAMPED times it."""
+    high = SECOND_DAMPED * lowest
+    return 2 * damping * lowest * high / (lowest + high), 2 * damping / (lowest + high)
+
+
+def foliage_area(plant: Plant) -> np.ndarray:
+    """(N,) drag coefficient times area of each node's foliage, m2."""
+    return FOLIAGE_AREA * (plant.height * plant.height) * plant.foliage
 
 
 def node_mass(plant: Plant) -> np.ndarray:
