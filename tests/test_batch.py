@@ -683,5 +683,3 @@ def test_a_full_disk_is_reported_and_a_second_run_does_what_is_missing(limit, ma
     code, err = finished(start(many, out, "--verify"))
     assert code == 0, err
     assert done_once(out) == ALL
-
-
