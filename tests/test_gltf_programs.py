@@ -23,7 +23,7 @@ import athcodec
 from athcodec import MotionClip
 from athcodec.decoding.clip_view import ClipView
 from athcodec.exporters import write
-from athcodec.exporters.fitting import quaternions
+from athcodec.motion.quaternions import quaternions
 from athcodec.sources import read
 
 pytestmark = pytest.mark.programs
