@@ -23,17 +23,14 @@ from athcodec.metrics import ErrorMeter
 from spec.robust.bound import ACTIONS, LARGE, Attack, attacks, broken_promises
 
 
-@settings(STEADY, max_examples=25)
-@given(attacks())
-def test_no_attack_breaks_a_promise(scratch, attack):
-    assert broken_promises(attack, scratch) == []
+@pytest.mark.parametrize("count", [25, pytest.param(3000, marks=pytest.mark.slow)])
+def test_no_attack_breaks_a_promise(count, scratch):
+    @settings(STEADY, max_examples=count)
+    @given(attacks())
+    def attacked(attack):
+        assert broken_promises(attack, scratch) == []
 
-
-@pytest.mark.slow
-@settings(STEADY, max_examples=3000)
-@given(attacks())
-def test_no_attack_of_thousands_breaks_a_promise(scratch, attack):
-    assert broken_promises(attack, scratch) == []
+    attacked()
 
 
 def test_a_stem_with_all_modes_at_its_base_level_knows_them_from_the_layer_before(scratch):
@@ -182,17 +179,10 @@ def clip_at_its_last_bits(seed: int):
     return clip_of(positions, positions[0], branch, parent, dtype), bound, chosen
 
 
-def test_every_bound_ends_in_a_file_within_it_or_in_one_that_can_be_kept(scratch, monkeypatch):
+@pytest.mark.parametrize("seeds", [range(24), pytest.param(range(24, 1000), marks=pytest.mark.slow)])
+def test_every_bound_ends_in_a_file_within_it_or_in_one_that_can_be_kept(seeds, scratch, monkeypatch):
     work = Work(monkeypatch)
-    for seed in range(24):
-        clip, bound, options = clip_at_its_last_bits(seed)
-        encoded_or_refused(clip, bound, options, scratch / "last_bits.ath", work)
-
-
-@pytest.mark.slow
-def test_so_do_the_bounds_of_hundreds_of_clips(scratch, monkeypatch):
-    work = Work(monkeypatch)
-    for seed in range(24, 1000):
+    for seed in seeds:
         clip, bound, options = clip_at_its_last_bits(seed)
         encoded_or_refused(clip, bound, options, scratch / "last_bits.ath", work)
 
