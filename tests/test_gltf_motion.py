@@ -4,7 +4,6 @@ the bound; what does not move keeps its bytes; and a file that lies about its ve
 from __future__ import annotations
 
 import json
-import struct
 from contextlib import closing
 from pathlib import Path
 
@@ -12,6 +11,7 @@ import jsonschema
 import numpy as np
 import pygltflib
 import pytest
+from glb import apart, together
 from referencing import Registry, Resource
 from test_gltf import CUBE, Maker, about, far, leafy, seasons  # noqa: F401, fixtures
 
@@ -30,22 +30,14 @@ BOUND = 1e-4
 
 
 def structure(path):
-    data = Path(path).read_bytes()
-    size = int.from_bytes(data[12:16], "little")
-    return json.loads(data[20 : 20 + size])
+    return apart(Path(path).read_bytes())[0]
 
 
 def rewritten(path, out, change):
     """The file with another structure: change(json)."""
-    data = Path(path).read_bytes()
-    size = int.from_bytes(data[12:16], "little")
-    gltf = json.loads(data[20 : 20 + size])
+    gltf, behind = apart(Path(path).read_bytes())
     change(gltf)
-    text = json.dumps(gltf).encode()
-    text += b" " * (-len(text) % 4)
-    rest = data[20 + size :]
-    head = struct.pack("<4sII", b"glTF", 2, 20 + len(text) + len(rest)) + struct.pack("<II", len(text), 0x4E4F534A)
-    Path(out).write_bytes(head + text + rest)
+    Path(out).write_bytes(together(json.dumps(gltf).encode(), behind))
     return out
 
 

@@ -17,6 +17,7 @@ import pygltflib
 import pytest
 from programs import install_once
 from test_gltf import Maker, as_metres, crown, far, leafy, leafy_ath, seasons, seasons_ath  # noqa: F401, the fixtures too
+from test_gltf_motion import structure
 from test_vat import exr
 
 import athcodec
@@ -139,7 +140,7 @@ def test_what_is_written_is_valid_and_three_plays_it_within_the_stated_error(
             view = ClipView(decoder, level, range(4, 30))
             write(view, path, animation=animation)
             assert_valid(node, path)
-            stated = json.loads(structure(path))["asset"]["extras"]["athcodec"]["max_error"]
+            stated = structure(path)["asset"]["extras"]["athcodec"]["max_error"]
             shown = played(path, view.time - view.time[0])
             assert far(shown, view.block(0, 26)) <= stated + 1e-5
 
@@ -181,7 +182,7 @@ def test_three_lists_clips_by_name_and_plays_each_within_the_stated_error(
         (tmp_path / "none.json").write_text("[]")
         listed = json.loads(node("play.mjs", path, tmp_path / "none.json", tmp_path / "none.bin"))["animations"]
         assert listed == list(seasons)
-        stated = json.loads(structure(path))["asset"]["extras"]["athcodec"]["max_error"]
+        stated = structure(path)["asset"]["extras"]["athcodec"]["max_error"]
         for name in seasons:
             one = decoder.play(name)
             assert far(played(path, one.time - one.time[0], name), one.positions()) <= stated + 1e-5
@@ -205,11 +206,6 @@ def test_a_clip_goes_from_three_through_ath_and_back_to_three(three_file, node, 
 
 def read_as_one_branch(clip):
     return clip.replace(vertex_branch=np.zeros(clip.vertex_count, np.int32), branch_parent=np.array([-1]))
-
-
-def structure(path):
-    data = path.read_bytes()
-    return data[20 : 20 + int.from_bytes(data[12:16], "little")]
 
 
 def test_lines_points_objects_and_colours_are_valid_too(leafy, node, tmp_path):
@@ -282,7 +278,7 @@ def test_an_animal_goes_through_ath_and_is_played_within_the_bound(panda, node, 
         for animation in ("joints", "morphs"):
             write(ClipView(decoder), tmp_path / "b.glb", animation=animation)
             assert_valid(node, tmp_path / "b.glb")
-            stated = json.loads(structure(tmp_path / "b.glb"))["asset"]["extras"]["athcodec"]["max_error"]
+            stated = structure(tmp_path / "b.glb")["asset"]["extras"]["athcodec"]["max_error"]
             shown = played(tmp_path / "b.glb", times[::10])
             assert far(shown, wanted[::10]) <= decoder.file.max_error_bound + stated + 1e-6 * np.abs(wanted).max()
 

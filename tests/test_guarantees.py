@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import os
 import re
 
 import numpy as np
@@ -23,6 +24,7 @@ NO_RATE = {"pc2", "obj", "ply", "pvd"}  # frames have numbers or times there, bu
 WITHOUT_UNIT = {"pc2", "mdd", "obj", "ply", "pvd"}  # formats without a place for a unit or an axis
 NO_STATICS = {"pc2", "mdd"}  # but for what their mesh file holds
 METRES = {"gltf"}  # always metres with y up: the reader gives that
+READ_IN_A_PROCESS = {"usdc", "usda", "alembic"}
 EXACT = {"hdf5", "npz", "usdc", "usda", "pc2", "mdd", "obj", "ply", "pvd"}  # positions bit for bit
 
 
@@ -106,6 +108,7 @@ def test_a_decoded_file_is_within_its_bound_in_every_format(clip, tmp_path, name
             scale = 0.01 if name in METRES else 1
             apart = np.linalg.norm(again.block(0, 5) - expected, axis=2).max()
             assert apart <= summary.max_error_bound * scale * (1 + 1e-5)
+            assert name in NO_STATICS | {"obj"} or np.array_equal(again.attributes["uv"], clip.attributes["uv"])
 
 
 @pytest.mark.formats
@@ -122,12 +125,32 @@ def test_changing_topology_is_refused_by_the_number_of_its_frame(clip, tmp_path,
 
 
 @pytest.mark.parametrize("name", tiered(FORMATS))
-def test_a_failed_write_leaves_no_file(clip, tmp_path, name):
+@pytest.mark.parametrize("older", [False, True])
+def test_a_failed_write_leaves_what_was_there(clip, tmp_path, name, older):
+    if older:
+        write(clip, tmp_path / FORMATS[name])
+    before = {path: path.read_bytes() for path in tmp_path.iterdir()}
     positions = clip.block(0, 9).copy()
     positions[5, 0, 0] = np.nan
+    broken = clip.replace(positions=positions)
+    broken._block_length = lambda most: 3  # so that some frames have been written before
     with pytest.raises(ClipError, match="frame 5"):
-        write(clip.replace(positions=positions), tmp_path / FORMATS[name])
-    assert list(tmp_path.iterdir()) == []
+        write(broken, tmp_path / FORMATS[name])
+    assert {path: path.read_bytes() for path in tmp_path.iterdir()} == before
+
+
+@pytest.mark.parametrize("name", tiered(FORMATS))
+def test_a_changed_file_and_a_closed_clip_are_noticed(clip, tmp_path, name):
+    with there_and_back(clip, tmp_path, name) as again:
+        assert again.unchanged()
+        for path in tmp_path.iterdir():
+            os.utime(path, (1, 1))
+        assert not again.unchanged()
+        with pytest.raises(ClipError, match="changed while it was read"), again.watched():
+            pass
+    if name in READ_IN_A_PROCESS:
+        with pytest.raises(ClipError, match="closed"):
+            again.block(0, 1)
 
 
 def test_every_format_of_the_table_is_tried_here():
@@ -159,6 +182,7 @@ def test_a_point_cache_takes_its_mesh_from_a_file_of_any_format(clip, tmp_path, 
 
 # A file that is damaged, what is read, and how it was written.
 DAMAGED = [("a.npz", "a.npz", {}), ("a.npz", "a.npz", {"gzip": True})]
+DAMAGED += [(name, name, {}) for name in ("a.abc", "a.usda", "a.usdc", "a.usdz")]
 DAMAGED += [(f"a_000{i}.{kind}", f"a_0002.{kind}", {}) for kind in ("obj", "ply") for i in (1, 3)]
 DAMAGED += [(f"a.{kind}", f"a.{kind}", {}) for kind in ("pc2", "mdd")]
 for packing in ({}, {"gzip": True}):
@@ -168,7 +192,27 @@ for packing in ({}, {"gzip": True}):
 
 @pytest.mark.formats
 @pytest.mark.parametrize("name, opened, how", DAMAGED)
-def test_damaged_files_are_refused_with_a_clip_error(tmp_path, name, opened, how):
+def test_damaged_files_are_refused_with_a_clip_error(tmp_path, name, opened, how, capfd):
     written = re.sub(r"_\d+", "", opened)
     athcodec.write(mixed_clip(frames=4), tmp_path / written, **how)
-    assert survives_damage(tmp_path / name, lambda: athcodec.read(tmp_path / opened), cuts=20, changes=40) > 12
+    slow = name.endswith(("abc", "usda", "usdc", "usdz"))  # for which every reading starts a process
+    cuts, changes = (6, 10) if slow else (20, 40)
+    refused = survives_damage(tmp_path / name, lambda: athcodec.read(tmp_path / opened), cuts=cuts, changes=changes)
+    assert refused > (9 if slow else 12)
+    assert "Traceback" not in capfd.readouterr().err
+
+
+OTHERS = {"a.usdc": b"x" * 99, "b.usda": b"#usda 1.0\n", "c.usdz": b"PK\3\4" + bytes(40)}
+OTHERS |= {"a.abc": b"x" * 99, "b.abc": b"Ogawa" + bytes(60)}
+
+
+@pytest.mark.formats
+@pytest.mark.parametrize("name", OTHERS)
+def test_other_files_are_refused_in_one_line(tmp_path, name):
+    kind = "alembic" if name.endswith("abc") else "usd"
+    (tmp_path / name).write_bytes(OTHERS[name])
+    with pytest.raises(ClipError, match=name) as caught:
+        athcodec.read(tmp_path / name, kind)
+    assert "\n" not in str(caught.value)
+    with pytest.raises(FileNotFoundError):
+        athcodec.read(tmp_path / f"none{name}", kind)

@@ -107,24 +107,25 @@ def test_a_shared_basis_makes_files_smaller(tmp_path, monkeypatch):
     assert shared < 0.9 * athcodec.encode(clip, tmp_path / "waves.ath", **options).bytes
 
 
-@pytest.mark.vectors
-def test_layers_in_learned_bases_are_decoded_as_the_document_does(tmp_path, monkeypatch):
+@pytest.fixture
+def learned_everywhere(monkeypatch):
     def learned(settings, trials):
         return replace(settings, learned_bases=(True,) * settings.levels)
 
     monkeypatch.setattr(learned_bases, "best_bases", learned)
     monkeypatch.setitem(search.CHOICES, learned, ("time bases", 1.0))
+
+
+@pytest.mark.vectors
+def test_layers_in_learned_bases_are_decoded_as_the_document_does(tmp_path, learned_everywhere):
     path = tmp_path / "layers.ath"
     athcodec.encode(hit_by_a_gust(), path, rel_error=1e-4, attributes="none", ladder=(1e-2, 1e-3))
     assert_same_as_document(path.read_bytes())
 
 
-def test_a_layer_whose_basis_needs_fewer_rows_than_the_one_before_it_is_decoded(tmp_path, monkeypatch):
-    def learned(settings, trials):
-        return replace(settings, learned_bases=(True,) * settings.levels)
-
-    monkeypatch.setattr(learned_bases, "best_bases", learned)
-    monkeypatch.setitem(search.CHOICES, learned, ("time bases", 1.0))
+def test_a_layer_whose_basis_needs_fewer_rows_than_the_one_before_it_is_decoded(
+    tmp_path, learned_everywhere, monkeypatch
+):
     monkeypatch.setattr(layers, "basis_ratio", lambda plan, settings, ratio: 100.0 / ratio)
     clip, path = hit_by_a_gust(), tmp_path / "layers.ath"
     athcodec.encode(clip, path, rel_error=1e-4, attributes="none", ladder=(1e-2, 1e-3))

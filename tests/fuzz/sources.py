@@ -24,6 +24,7 @@ from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 
+import glb
 import numpy as np
 
 KINDS = ("glb", "pc2", "mdd", "obj", "ply", "xdmf", "npz", "vtu")
@@ -172,8 +173,7 @@ def _text(data: bytes, rng: random.Random) -> bytes:
 
 def _json(data: bytes, rng: random.Random) -> bytes:
     """A member of the JSON of a GLB, whose lengths fit again."""
-    size = struct.unpack_from("<I", data, 12)[0]
-    gltf, rest = json.loads(data[20 : 20 + size]), data[20 + size :]
+    gltf, behind = glb.apart(data)
     places = list(_places(gltf))
     holder, key = rng.choice(places)
     if rng.random() < 0.2 and isinstance(holder, dict):
@@ -186,10 +186,7 @@ def _json(data: bytes, rng: random.Random) -> bytes:
     text = json.dumps(gltf)
     if rng.random() < 0.1:
         text = re.sub(r"\d+", lambda found: "9" * 4400 if rng.random() < 0.05 else found[0], text)
-    packed = text.encode()
-    packed += b" " * (-len(packed) % 4)
-    whole = struct.pack("<II", len(packed), 0x4E4F534A) + packed + rest
-    return struct.pack("<4sII", b"glTF", 2, 12 + len(whole)) + whole
+    return glb.together(text.encode(), behind)
 
 
 def _places(value: object) -> Iterator[tuple]:
