@@ -35,8 +35,7 @@ def assert_same_bits(data: bytes) -> None:
             assert_same_numbers(file.positions(level), np.concatenate([clip.positions(level=level) for clip in played]))
         assert_same_numbers(file.rest(decoder.file.level_count - 1), decoder.file.rest)
         assert [list(clip.time) for clip in played] == file.file.times
-        arrays = [decoder.file.faces, decoder.file.edges, *decoder.file.attributes.values()]
-        assert [array.tobytes() for array in arrays if array is not None] == file.arrays()
+        assert all_arrays(decoder) == file.arrays()
 
 
 def assert_same_numbers(got: np.ndarray, expected: np.ndarray) -> None:
@@ -82,9 +81,9 @@ def test_several_clips_have_the_same_bits(medley_clips, lossless, tmp_path):
     assert_same_bits((tmp_path / "clips.ath").read_bytes())
 
 
-def with_a_bit_changed(parts, random):
-    """A file with one bit of a chunk of the prelude or of motion changed, and a checksum that fits; that chunk."""
-    chosen = [i for i, (chunk, content) in enumerate(parts.chunks) if content and (chunk.is_motion or chunk.kind < 16)]
+def with_a_bit_changed(parts, random, kinds):
+    """A file with one bit of a chunk of these kinds changed, and a checksum that fits; that chunk."""
+    chosen = [i for i, (chunk, content) in enumerate(parts.chunks) if content and chunk.kind in kinds]
     i, chunks = int(random.choice(chosen)), list(parts.chunks)
     content = bytearray(chunks[i][1])
     content[random.integers(len(content))] ^= 1 << random.integers(8)
@@ -93,23 +92,40 @@ def with_a_bit_changed(parts, random):
 
 
 MANY = [pytest.param(name, marks=pytest.mark.vectors) for name in ("layers-mixed", "layers-three", "clips-loops")]
+RESTS = "vertices copies-of-many copies-far connected-quads connected-order welded-apart welded-order".split()
+FACES = ["mixed", "many-quads", "up-and-on"]
 
 
-@pytest.mark.parametrize("name", [*MANY, "clips-time-uneven", "tubes"])
+@pytest.mark.parametrize(
+    "name",
+    [*MANY, "clips-time-uneven", "tubes", *(f"rest-{name}" for name in RESTS), *(f"faces-{name}" for name in FACES)],
+)
 def test_corrupted_chunks_are_refused_alike_or_mean_the_same(name):
+    """Any chunk of the prelude and of motion, or that of the rest pose or the faces which the vector is about."""
     parts, random = Parts.of((VECTORS / f"{name}.ath").read_bytes()), np.random.default_rng(6)
+    every = {chunk.kind for chunk, _ in parts.chunks if chunk.is_motion or chunk.kind < 16}
+    kinds = {"rest": {rules.REST}, "faces": {rules.FACES}}.get(name.split("-")[0], every)
     refused = 0
     for _ in range(40):
-        data, chunk = with_a_bit_changed(parts, random)
+        data, chunk = with_a_bit_changed(parts, random, kinds)
         level = chunk.level if chunk.is_motion else parts.header.level_count - 1
-        got = outcome(lambda data=data, level=level: File(data).positions(level))
-        expected = outcome(lambda data=data, level=level: all_positions(data, level))
-        refused += isinstance(expected, str)
-        if isinstance(expected, str) or isinstance(got, str):
-            assert isinstance(got, str) and got == expected
+        if chunk.kind == rules.FACES:
+            got = outcome(lambda data=data: File(data).arrays())
+            expected = outcome(lambda data=data: all_arrays(opened(data)))
         else:
+            got = outcome(lambda data=data, level=level: File(data).positions(level))
+            expected = outcome(lambda data=data, level=level: all_positions(data, level))
+        refused += isinstance(expected, str)
+        if isinstance(expected, np.ndarray) and isinstance(got, np.ndarray):
             assert_same_numbers(got, expected)
+        else:
+            assert got == expected
     assert 2 < refused < 40
+
+
+def all_arrays(decoder: athcodec.Decoder) -> list[bytes]:
+    arrays = [decoder.file.faces, decoder.file.edges, *decoder.file.attributes.values()]
+    return [array.tobytes() for array in arrays if array is not None]
 
 
 def all_positions(data: bytes, level: int) -> np.ndarray:

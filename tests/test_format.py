@@ -11,7 +11,7 @@ import io
 import re
 import struct
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
@@ -29,6 +29,7 @@ from athcodec._native import BRANCH, crc32c
 from athcodec.decoding import container
 from athcodec.encoding import streams, writing
 from spec.document import TEXT, rules, section, table
+from spec.scripted import Script, write
 
 FORMAT = Path(__file__).resolve().parents[1] / "FORMAT.md"
 VALID = FORMAT.parent / "spec" / "vectors" / "valid"
@@ -363,40 +364,20 @@ def assert_same_numbers(document: object, code: object) -> None:
         test_document.assert_same_numbers(np.array(document, code.dtype), code)
 
 
+class Coin(Script):
+    """Decisions made by chance."""
+
+    def __init__(self, random: np.random.Generator):
+        super().__init__()
+        self.random, self.chance = random, random.uniform(0.15, 0.85)
+
+    def answer(self, asked: str, most: int) -> int:
+        return int(self.random.random() < self.chance)
+
+
 def random_stream(spec: ModuleType, random: np.random.Generator, name: str, *arguments: object) -> bytes:
     """What a function of the document reads as decisions made by chance, up to the first invalid one."""
-    chance = random.uniform(0.15, 0.85)
-    return stream_of(spec, lambda: int(random.random() < chance), name, *arguments)
-
-
-def stream_of(spec: ModuleType, decide: Callable[[], int], name: str, *arguments: object) -> bytes:
-    """What a function of the document reads as these decisions, up to the first invalid one."""
-    made = []
-
-    class Deciding(spec.RangeDecoder):
-        """Keeps the interval's lower end, as an encoder does, instead of reading."""
-
-        def __init__(self, _):
-            self.low, self.range, self.length = 0, spec.MASK, 8
-            made.append(self)
-
-        def narrow(self, bound):
-            bit = decide()
-            self.low, self.range = (self.low, bound) if bit else (self.low + bound, self.range - bound)
-            if self.range < 1 << 32:
-                self.low, self.range, self.length = self.low << 32, self.range << 32, self.length + 4
-            return bit
-
-        def finish(self):
-            pass
-
-    function = getattr(spec, name)
-    with suppress(spec.Invalid):
-        type(function)(function.__code__, function.__globals__ | {"RangeDecoder": Deciding})(b"", *arguments)
-    last, zeros = made[0].low + made[0].range - 1, 0
-    while last >> zeros + 1 << zeros + 1 >= made[0].low and zeros < 8 * made[0].length:
-        zeros += 1
-    return (last >> zeros << zeros).to_bytes(made[0].length, "big").rstrip(b"\0")
+    return write(getattr(spec, name), Coin(random), *arguments, decisions=True)
 
 
 # ---- exact numbers ----
@@ -473,19 +454,6 @@ def assert_same_outcome(spec: ModuleType, stream: bytes, *decoders: Callable) ->
     assert document == code
 
 
-def decisions(n: int, magnitude: int, negative: bool = False) -> list[int]:
-    """Those of one difference."""
-    length = magnitude.bit_length()
-    unary = [1] * length + [0] * (length < n)
-    return unary + [int(bit) for bit in f"{magnitude:b}"[1:]] + [int(negative)] * (length > 0)
-
-
-def exact_stream(spec: ModuleType, n: int, *differences: tuple[int, bool]) -> bytes:
-    """An exact rest pose of one vertex, whose numbers are each 0.0 moved by a difference."""
-    made = iter(sum((decisions(n, *difference) for difference in differences), []))
-    return stream_of(spec, lambda: next(made, 0), "decode_exact_rest", one_vertex(spec), n == 64, None)
-
-
 def one_vertex(spec: ModuleType) -> list:
     return [spec.Record(first=0, count=1, attach=-1, lag=1)]
 
@@ -497,7 +465,7 @@ def one_vertex(spec: ModuleType) -> list:
 )
 def test_numbers_that_are_not_finite_are_refused_alike(spec, dtype, n, beyond, negative, valid):
     """Downwards there is one number more: -0.0."""
-    stream = exact_stream(spec, n, (INFINITY[n] + beyond, negative))
+    stream = write(spec.decode_exact_rest, [(INFINITY[n] + beyond, negative)], one_vertex(spec), n == 64, None)
     number = float(np.finfo(dtype).min if negative else np.finfo(dtype).max)
     for decode in (
         lambda data: spec.decode_exact_rest(data, one_vertex(spec), n == 64),

@@ -1,5 +1,5 @@
-"""Memory of exporting and of reading: that of a few segments, however many frames there are. Each format in a process of
-its own."""
+"""Memory of exporting and of reading: that of a few segments, however many frames there are. Each format in a process
+of its own."""
 
 from __future__ import annotations
 

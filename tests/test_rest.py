@@ -7,14 +7,12 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 import zstandard
-from files import Parts, coded, opened
+from files import coded
 from plants import diagonal
 
 import athcodec
 from athcodec._native import BRANCH
-from athcodec.decoding import container
 from athcodec.encoding import streams
-from athcodec.errors import AthError
 from spec.document import File, rules
 
 
@@ -166,23 +164,6 @@ def test_slack_saves_bytes_and_is_kept():
     tight, loose = (streams.encode_rest(branches, 0.1, points, None, slack) for slack in (0.0, 0.0699))
     assert len(loose.stream) < 0.97 * len(tight.stream)
     assert np.linalg.norm(loose.decoded - points, axis=1).max() <= 0.0699
-
-
-@pytest.mark.parametrize("seed", range(8))
-def test_random_bytes_as_a_rest_pose_are_the_same_positions_to_all_or_refused(scratch, seed):
-    random = np.random.default_rng(seed)
-    athcodec.encode(still(terrain(9, 9, 0.1, seed)), scratch / "file.ath", attributes="none", ladder="none")
-    parts = Parts.of((scratch / "file.ath").read_bytes())
-    rest = parts.payload(container.REST)
-    stream = random.integers(1, 256, len(rest) - 17, np.uint8).tobytes()
-    data = parts.with_payload(container.REST, rest[:17] + stream)
-    outcomes = []
-    for play in (lambda: opened(data).positions(), lambda: File(data).positions()):
-        try:
-            outcomes.append(play().tobytes())
-        except (AthError, rules.Invalid):
-            outcomes.append(None)
-    assert outcomes[0] == outcomes[1]
 
 
 def two_stems(trunk: int, branch: int, lag: int) -> np.ndarray:
