@@ -42,14 +42,14 @@ def files_of(path: Path) -> list[Path]:
     return sorted({path, *frames, *beside})
 
 
-def add_clips(parser: argparse.ArgumentParser) -> None:
+def add_clips(parser: argparse.ArgumentParser, what: str = "motion clips") -> None:
     parser.add_argument(
         "clips",
         nargs="*",
         type=Path,
         metavar="CLIP",
         default=[athcodec.sample_path()],
-        help="motion clips; by default the sample that ships with athcodec",
+        help=f"{what}; by default the sample that ships with athcodec",
     )
 
 

@@ -64,29 +64,26 @@ class Canopy:
     height: float
     wind_speed: float
     leaves: int
-    species: str
     seed: int
     version: int = 1  # goes up when the code below bench/trees gives other leaves or beams
 
     def make(self) -> athcodec.MotionClip:
         plant = grow(self.nodes, self.orders, self.height, self.seed)
         wind = Wind(self.wind_speed, self.height, seed=self.seed)
-        described = {"wind_speed": self.wind_speed, "leaves": self.species}
+        described = {"wind_speed": self.wind_speed, "leaves": "broadleaf"}
         tree = plant.clip(bend(plant, wind, self.frames, FPS), np.arange(self.frames) / FPS, FPS, **described)
-        return dress(tree, wind, self.frames, self.leaves, self.seed, self.species)
+        return dress(tree, wind, self.frames, self.leaves, self.seed)
 
     def __str__(self) -> str:
-        return f"{self.height:g} m tree as a mesh: bark tubes and {self.leaves:,} {self.species} leaves in wind"
+        return f"{self.height:g} m tree as a mesh: bark tubes and {self.leaves:,} broadleaf leaves in wind"
 
 
 Recipe = Canopy | exact.Tree | exact.Cards | odd.Odd | foreign.Foreign
 
 RECIPES: dict[str, Recipe] = {
-    "canopy_1k_60f": Canopy(120, 2, 60, 4.0, 8.0, 80, "broadleaf", seed=15),
-    "canopy_4k_60f": Canopy(400, 2, 60, 6.0, 8.0, 260, "broadleaf", seed=11),
-    "canopy_15k_200f": Canopy(1000, 2, 200, 8.0, 8.0, 1400, "broadleaf", seed=12),
-    "canopy_67k_200f": Canopy(4000, 3, 200, 10.0, 8.0, 10000, "poplar", seed=13),
-    "canopy_300k_60f": Canopy(16000, 3, 60, 14.0, 9.0, 16000, "compound", seed=14),
+    "canopy_1k_60f": Canopy(120, 2, 60, 4.0, 8.0, 80, seed=15),
+    "canopy_4k_60f": Canopy(400, 2, 60, 6.0, 8.0, 260, seed=11),
+    "canopy_15k_200f": Canopy(1000, 2, 200, 8.0, 8.0, 1400, seed=12),
     # These stand for two clips that cannot be made: see docs/benchmarks.md.
     "fe_8k_200f": exact.Tree(
         ((1, 100), (40, 1800), (480, 6100)),

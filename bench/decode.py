@@ -21,7 +21,7 @@ import numpy as np
 
 import athcodec
 from athcodec._native import crc32c
-from bench.clips import add_ladder, add_number, add_rel_error, read
+from bench.clips import add_clips, add_ladder, add_number, add_rel_error, read
 from bench.codecs.coder import CORE, compile_c
 from bench.tables import table
 
@@ -59,14 +59,7 @@ segment.
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "clips",
-        nargs="*",
-        type=Path,
-        metavar="CLIP",
-        default=[athcodec.sample_path()],
-        help="motion clips, which are encoded first, or .ath files; by default the sample that ships with athcodec",
-    )
+    add_clips(parser, "motion clips, which are encoded first, or .ath files")
     add_rel_error(parser)
     add_ladder(parser, "decades")
     add_number(parser, "--rounds", ROUNDS, "runs of everything")

@@ -15,7 +15,7 @@ import athcodec
 from bench import data
 from bench.store import read
 from bench.trees import beams, exact
-from bench.trees.leaves import SPECIES, Leaves, Plates, sheltered
+from bench.trees.leaves import BROADLEAF, Leaves, Plates, sheltered
 from bench.trees.mesh import SIDES, dress
 from bench.trees.plant import grow
 from bench.trees.ride import Skeleton
@@ -26,7 +26,7 @@ ROOT = Path(__file__).resolve().parent.parent
 pytestmark = pytest.mark.tools
 
 BREEZE = Wind(8.0, 8.0, seed=2)
-CANOPY = data.Canopy(nodes=120, orders=1, frames=40, height=5.0, wind_speed=8.0, leaves=80, species="poplar", seed=3)
+CANOPY = data.Canopy(nodes=120, orders=1, frames=40, height=5.0, wind_speed=8.0, leaves=80, seed=3)
 
 SMALL_EXACT = {
     "tree": exact.Tree(((1, 12), (4, 24), (12, 60)), 5, 4.0, 11.0, 0.2, 15.0, 1.0, 0.1, seed=2, digest="6059e8adabcb"),
@@ -122,10 +122,9 @@ def test_a_tree_of_beams_leans_down_wind_sways_and_keeps_its_lengths():
     assert (positions[:, 0] == 0).all()
 
 
-@pytest.mark.parametrize("species", SPECIES)
-def test_a_mesh_has_closed_rings_around_its_stems_and_rigid_leaves_on_them(sample_clip, species):
-    mesh = dress(sample_clip, BREEZE, frames=12, leaves=50, seed=7, species=species)
-    blade, quads = len(SPECIES[species].blade), len(SPECIES[species].faces)
+def test_a_mesh_has_closed_rings_around_its_stems_and_rigid_leaves_on_them(sample_clip):
+    mesh = dress(sample_clip, BREEZE, frames=12, leaves=50, seed=7)
+    blade, quads = len(BROADLEAF.blade), len(BROADLEAF.faces)
     rings = 1001 + 98
     tubes = SIDES * rings
     assert mesh.vertex_count == tubes + 50 * blade and mesh.branch_count == 99 + 50
@@ -148,9 +147,8 @@ def test_a_canopy_comes_out_the_same_again_and_otherwise_by_its_seed(canopy):
     assert np.ptp(canopy.rest[:, 1]) == pytest.approx(5.0, rel=0.1)
 
 
-@pytest.mark.parametrize("species", SPECIES)
-def test_leaves_come_to_rest_in_still_air(species):
-    leaves = Leaves(still(240), SPECIES[species], 40, np.random.default_rng(1))
+def test_leaves_come_to_rest_in_still_air():
+    leaves = Leaves(still(240), BROADLEAF, 40, np.random.default_rng(1))
     plates = Plates(leaves)
     plates.speed[:] = np.random.default_rng(2).normal(0, 10, plates.speed.shape)
     start = plates.energy()
@@ -161,8 +159,7 @@ def test_leaves_come_to_rest_in_still_air(species):
 
 
 def test_leaves_swing_in_the_species_time_and_line_up_with_the_wind():
-    kind = SPECIES["broadleaf"]
-    leaves = Leaves(still(60), kind, 200, np.random.default_rng(1))
+    leaves = Leaves(still(60), BROADLEAF, 200, np.random.default_rng(1))
     plates = Plates(leaves)
     plates.area[:] = 0  # no air
     plates.turn[[0, 3]] = [[np.cos(0.005)], [np.sin(0.005)]]
@@ -171,7 +168,7 @@ def test_leaves_swing_in_the_species_time_and_line_up_with_the_wind():
         plates.step(np.zeros((3, 200)), 1 / 240)
         crossings += last != (plates.turn[3] > 0)
         last = plates.turn[3] > 0
-    assert np.allclose(crossings / 4, kind.hertz[2] * np.sqrt(leaves.stiffness), atol=0.4)
+    assert np.allclose(crossings / 4, BROADLEAF.hertz[2] * np.sqrt(leaves.stiffness), atol=0.4)
     turns = leaves.turned(lambda points, seconds: np.broadcast_to(12.0 * DIRECTION, points.shape), Plates(leaves))
     along = leaves.at(leaves.skeleton.rest, leaves.unturned()), leaves.at(leaves.skeleton.rest, turns[-1])
     into = [(tips.reshape(200, -1, 3)[:, -1] - tips.reshape(200, -1, 3)[:, 0]) @ DIRECTION for tips in along]
@@ -182,7 +179,7 @@ def test_neighbouring_leaves_feel_the_same_gusts_and_far_ones_others():
     plant = grow(60, 1, 4.0, seed=5)
     skeleton = still(150)
     skeleton.positions[:] *= 5.0  # 20 m, so that gusts differ
-    leaves = Leaves(skeleton, SPECIES["broadleaf"], 300, np.random.default_rng(1))
+    leaves = Leaves(skeleton, BROADLEAF, 300, np.random.default_rng(1))
     leaves.axes[:] = leaves.axes[0]  # all stand alike
     leaves.stiffness[:], leaves.length[:] = 1.0, 0.1
     turns = leaves.turned(Wind(6.0, 20.0, length=3.0, seed=4).at, Plates(leaves))[:, :, 2].astype(np.float64)

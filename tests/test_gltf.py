@@ -13,7 +13,7 @@ import pytest
 import trimesh
 from glb import COMPONENTS, TYPES, accessor_of, glb, posed
 from moving_meshes import survives_damage
-from plants import plant, turns
+from plants import distance, plant, turns
 
 import athcodec
 from athcodec.cli import main
@@ -590,10 +590,6 @@ def facts_of(path):
     return pygltflib.GLTF2().load(str(path)).asset.extras
 
 
-def far(a, b):
-    return float(np.linalg.norm(np.asarray(a, float) - b, axis=-1).max())
-
-
 def test_joints_keep_the_error_that_the_file_states_at_every_level(leafy_ath, tmp_path):
     with athcodec.open(leafy_ath) as decoder:
         for level in range(decoder.file.level_count):
@@ -603,7 +599,7 @@ def test_joints_keep_the_error_that_the_file_states_at_every_level(leafy_ath, tm
             facts = facts_of(path)["athcodec"]
             shown = view.block(0, view.frame_count)
             gltf = pygltflib.GLTF2().load(str(path))
-            worst = max(far(posed(gltf, i), shown[i]) for i in range(view.frame_count))
+            worst = max(distance(posed(gltf, i), shown[i]) for i in range(view.frame_count))
             assert worst == pytest.approx(facts["max_error"], rel=1e-3, abs=1e-6)
             assert worst <= 1.1 * max(view.max_error, 1e-5 * np.linalg.norm(np.ptp(view.rest, axis=0)))
             assert facts["level"] == level and facts["joints"] >= decoder.levels[level].nodes
@@ -615,7 +611,7 @@ def test_a_clip_through_ath_and_glb_keeps_the_bound(leafy, leafy_ath, tmp_path):
         for animation, more in (("joints", 1.1 * bound), ("morphs", 1e-6), ("auto", 1.1 * bound)):
             write(ClipView(decoder), tmp_path / "a.glb", animation=animation)
             positions, clip = frames_of(tmp_path / "a.glb")
-            assert far(positions, leafy.block(0, 40)) <= bound + more
+            assert distance(positions, leafy.block(0, 40)) <= bound + more
             assert clip.time == pytest.approx(leafy.time - leafy.time[0], abs=1e-9)
 
 
@@ -626,7 +622,7 @@ def test_what_does_not_move_survives(leafy, tmp_path):
             assert np.array_equal(clip.faces, leafy.faces)
             assert np.array_equal(clip.vertex_branch, leafy.vertex_branch)
             assert np.array_equal(clip.branch_parent, leafy.branch_parent)
-            assert far(clip.rest, leafy.rest) < 1e-5
+            assert distance(clip.rest, leafy.rest) < 1e-5
             for name in ("radius", "species", "uv", "colors"):
                 assert np.array_equal(clip.attributes[name], leafy.attributes[name].astype(clip.attributes[name].dtype))
         assert facts_of(tmp_path / "a.glb")["athcodec"]["left_out"] == ["per_branch"]
@@ -642,7 +638,7 @@ def test_axes_and_units_are_turned_by_a_node_and_vertices_keep_their_numbers(tmp
         first = accessor_of(gltf, gltf.meshes[0].primitives[0].attributes.POSITION)
         assert np.array_equal(first, clip.rest.astype(np.float32))
         found, back = frames_of(tmp_path / "a.glb")
-        assert far(found, expected) < error * np.ptp(expected)
+        assert distance(found, expected) < error * np.ptp(expected)
         assert (back.metadata["unit"], back.metadata["up_axis"]) == ("m", "y")
 
 
@@ -683,7 +679,9 @@ def test_more_than_255_joints_need_wider_numbers(tmp_path):
     clip = plant(seed=8, branches=400, longest=3, frames=4)
     write(clip, tmp_path / "a.glb", animation="joints")
     assert len(pygltflib.GLTF2().load(str(tmp_path / "a.glb")).skins[0].joints) >= 400
-    assert far(frames_of(tmp_path / "a.glb")[0], clip.block(0, 4)) < 2e-4 * np.linalg.norm(np.ptp(clip.rest, axis=0))
+    assert distance(frames_of(tmp_path / "a.glb")[0], clip.block(0, 4)) < 2e-4 * np.linalg.norm(
+        np.ptp(clip.rest, axis=0)
+    )
 
 
 def test_what_stands_still_needs_no_keys(tmp_path):
@@ -750,7 +748,7 @@ def same_clips(path, wanted, error):
         assert list(found) == list(wanted)
         for name, motion in wanted.items():
             assert found[name].clip_ranges[0].loop == (name == "calm")
-            assert far(found[name].block(0, found[name].frame_count), motion.block(0, motion.frame_count)) <= error
+            assert distance(found[name].block(0, found[name].frame_count), motion.block(0, motion.frame_count)) <= error
             assert found[name].time == pytest.approx(motion.time, abs=1e-6)
             for key in ("fps", "start_frame"):
                 assert found[name].metadata[key] == pytest.approx(motion.metadata[key])
@@ -868,7 +866,7 @@ def test_copies_are_nodes_of_one_mesh_and_come_back_as_copies(tmp_path, animatio
     assert written.facts["instances"] == 14 and "instances" not in plain.facts
     assert (tmp_path / "a.glb").stat().st_size < (tmp_path / "plain.glb").stat().st_size
     with read(tmp_path / "a.glb", takes="all") as again:
-        assert far(again.block(0, 24), as_metres(both)) <= written.facts["max_error"] / 100 + 1e-7
+        assert distance(again.block(0, 24), as_metres(both)) <= written.facts["max_error"] / 100 + 1e-7
         assert [each.name for each in again.clip_ranges] == ["calm", "gust"] and again.clip_ranges[0].loop
         assert again.metadata["part_names"] == ["stem", "leaf", "bud"]
         for name in ("part_copies", "part_vertex_counts", "wetness"):
@@ -896,7 +894,7 @@ def test_objects_of_one_shape_show_one_mesh_and_keep_their_names(tmp_path, anima
     assert [sum(node.mesh == mesh for node in gltf.nodes) for mesh in range(len(gltf.meshes))] == [1, 10, 4]
     with read(tmp_path / "a.glb") as again:
         frames = min(again.frame_count, clip.frame_count)
-        assert far(again.block(0, frames), as_metres(clip, frames)) <= written.facts["max_error"] / 100 + 1e-7
+        assert distance(again.block(0, frames), as_metres(clip, frames)) <= written.facts["max_error"] / 100 + 1e-7
         assert again.metadata["part_names"] == names and "part_copies" not in again.attributes
         assert np.array_equal(again.vertex_branch, clip.vertex_branch)
         assert np.array_equal(again.attributes["wetness"], clip.attributes["wetness"])
@@ -908,7 +906,7 @@ def test_copies_that_stand_still_are_instances_on_the_gpu(tmp_path):
     gltf = pygltflib.GLTF2().load(str(tmp_path / "a.glb"))
     assert gltf.extensionsRequired == ["EXT_mesh_gpu_instancing"]
     with read(tmp_path / "a.glb") as again:
-        assert far(again.block(0, 1), as_metres(clip, 1)) <= written.facts["max_error"] / 100 + 1e-7
+        assert distance(again.block(0, 1), as_metres(clip, 1)) <= written.facts["max_error"] / 100 + 1e-7
         for name in ("part_copies", "part_vertex_counts", "wetness"):
             assert np.array_equal(again.attributes[name], clip.attributes[name]), name
         assert np.array_equal(again.vertex_branch, clip.vertex_branch)

@@ -111,19 +111,6 @@ def test_a_decoded_file_is_within_its_bound_in_every_format(clip, tmp_path, name
             assert name in NO_STATICS | {"obj"} or np.array_equal(again.attributes["uv"], clip.attributes["uv"])
 
 
-@pytest.mark.formats
-@pytest.mark.parametrize("kind", ["obj", "ply"])
-def test_changing_topology_is_refused_by_the_number_of_its_frame(clip, tmp_path, kind):
-    athcodec.write(clip, tmp_path / f"a.{kind}")
-    fewer = dataclasses.replace(clip, faces=clip.faces[1:], rest=clip.rest.astype(np.float32))
-    (tmp_path / "other").mkdir()
-    athcodec.write(fewer, tmp_path / "other" / f"a.{kind}")
-    (tmp_path / "other" / f"a_1004.{kind}").rename(tmp_path / f"a_1004.{kind}")
-    with pytest.raises(ClipError, match=rf"a_1004.{kind}: got .*topology that changes"):
-        with athcodec.read(tmp_path / f"a_1001.{kind}") as again:
-            again.block(0, 9)
-
-
 @pytest.mark.parametrize("name", tiered(FORMATS))
 @pytest.mark.parametrize("older", [False, True])
 def test_a_failed_write_leaves_what_was_there(clip, tmp_path, name, older):

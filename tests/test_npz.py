@@ -14,7 +14,6 @@ from test_hdf5 import assert_same_clip
 import athcodec
 from athcodec.errors import ClipError
 from athcodec.motion.clip import MotionClip
-from athcodec.sources import raw
 
 
 @pytest.mark.parametrize("gzip", [False, True])
@@ -67,17 +66,6 @@ def test_other_byte_orders_and_orders_of_axes_are_read(tmp_path):
     np.savez_compressed(tmp_path / "a.npz", positions=np.asfortranarray(motion))
     with pytest.raises(ClipError, match="compressed array in Fortran order"):
         athcodec.read(tmp_path / "a.npz")
-
-
-def test_only_the_frames_asked_for_are_read(tmp_path, monkeypatch):
-    motion = np.random.default_rng(0).random((50, 7, 3))
-    np.savez(tmp_path / "a.npz", positions=motion)
-    with athcodec.read(tmp_path / "a.npz") as clip:
-        made = []
-        monkeypatch.setattr(raw.np, "empty", lambda shape, dtype=float: made.append(shape) or np.zeros(shape, dtype))
-        assert np.array_equal(clip.block(30, 32), motion[30:32])
-        monkeypatch.undo()
-    assert made == [(2, 7, 3)]
 
 
 def test_reading_forward_unpacks_once(tmp_path, monkeypatch):

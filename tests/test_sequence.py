@@ -205,6 +205,15 @@ def test_changing_topology_is_refused_with_the_frame(tmp_path):
                 list(clip.blocks())
 
 
+def test_changing_topology_of_ply_is_refused_with_the_frame(tmp_path):
+    athcodec.write(quad_clip(frames=4), tmp_path / "a.ply")
+    other = athcodec.write(mixed_clip(frames=1), tmp_path / "other.ply").files[0]
+    other.rename(tmp_path / "a_0003.ply")
+    with athcodec.read(tmp_path / "a_0001.ply") as clip:
+        with pytest.raises(ClipError, match=r"a_0003\.ply: got .*topology that changes"):
+            list(clip.blocks())
+
+
 def test_normals_and_names_that_change_from_file_to_file_are_no_topology(tmp_path):
     for i in range(3):
         (tmp_path / f"a_{i}.obj").write_text(

@@ -237,16 +237,23 @@ def add_leaves(stage, place="/root/leaves", count=5, frames=range(101, 111)):
     return instancer, places
 
 
+def leafy_stage(path, grid=True):
+    """A grid, where it is wanted, and leaves."""
+    stage = new_stage(path)
+    if grid:
+        add_grid(stage)
+    _, places = add_leaves(stage)
+    stage.Save()
+    return places
+
+
 def leaf_at(shift, angle, size):
     turn = np.array([[np.cos(angle), np.sin(angle), 0], [-np.sin(angle), np.cos(angle), 0], [0, 0, 1]])
     return (LEAF + [0.1, 0, 0]) * size @ turn + shift + [0, 0, 2]
 
 
 def test_a_point_instancer_is_read_as_copies_of_its_prototypes(tmp_path):
-    stage = new_stage(tmp_path / "a.usda")
-    add_grid(stage)
-    _, places = add_leaves(stage)
-    stage.Save()
+    places = leafy_stage(tmp_path / "a.usda")
     clip, positions = read_all(tmp_path / "a.usda")
     leaves = [f"/root/leaves:prototypes/{name}/blade" for name in ("small", "large")]
     assert clip.metadata["part_names"] == ["/root/grid", *leaves]

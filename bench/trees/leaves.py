@@ -71,27 +71,9 @@ def sheet(along: list[float], half: list[float], fold: list[float]) -> tuple[np.
     return np.array(pairs).reshape(-1, 3), first + [0, 1, 3, 2]
 
 
-def _leaflets(places: list[tuple[float, float, float]], size: float) -> tuple[np.ndarray, np.ndarray]:
-    """Quads at (along, across) that point away by an angle."""
-    card, quad = sheet([0.0, size], [0.2 * size, 0.2 * size], [0.0, 0.0])
-    blades = []
-    for along, across, angle in places:
-        turn = np.array([[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]])
-        blades.append(card @ turn.T + [along, across, 0.1 * abs(across)])
-    return np.concatenate(blades), np.concatenate([quad + 4 * i for i in range(len(places))])
-
-
-SPECIES = {
-    "broadleaf": Species(
-        *sheet([0.2, 0.65, 1.1], [0.22, 0.36, 0.12], [0.0, 0.05, -0.04]), 0.02, 0.6, 0.25, (6.0, 2.5, 3.2), 0.25
-    ),
-    # a long, flat stalk that hardly resists sideways turns and twist
-    "poplar": Species(*sheet([0.45, 1.2], [0.33, 0.33], [0.0, 0.0]), 0.018, 0.66, 0.2, (1.8, 3.2, 1.4), 0.06),
-    "compound": Species(
-        *_leaflets([(0.25, 0.06, 0.9), (0.45, -0.06, -0.7), (0.65, 0.0, 0.0)], 0.6),
-        *(0.035, 0.5, 0.35, (3.6, 1.7, 2.2), 0.2),
-    ),
-}
+BROADLEAF = Species(
+    *sheet([0.2, 0.65, 1.1], [0.22, 0.36, 0.12], [0.0, 0.05, -0.04]), 0.02, 0.6, 0.25, (6.0, 2.5, 3.2), 0.25
+)
 
 
 class Leaves:

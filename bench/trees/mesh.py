@@ -9,20 +9,20 @@ from __future__ import annotations
 import numpy as np
 
 from athcodec import MotionClip
-from bench.trees.leaves import SPECIES, Leaves
+from bench.trees.leaves import BROADLEAF, Leaves
 from bench.trees.ride import BLOCK_FRAMES, Skeleton
 from bench.trees.wind import Wind
 
 SIDES = 6
 
 
-def dress(clip: MotionClip, wind: Wind, frames: int, leaves: int, seed: int, species: str = "poplar") -> MotionClip:
+def dress(clip: MotionClip, wind: Wind, frames: int, leaves: int, seed: int) -> MotionClip:
     """The first frames of a simulated clip as a mesh with so many leaves."""
-    skeleton, kind = Skeleton.of(clip, frames), SPECIES[species]
+    skeleton = Skeleton.of(clip, frames)
     tubes = Tubes(skeleton)
-    cards = Leaves(skeleton, kind, leaves, np.random.default_rng(seed))
+    cards = Leaves(skeleton, BROADLEAF, leaves, np.random.default_rng(seed))
     turns = cards.flown(wind)
-    shape = (tubes.count + len(kind.blade) * leaves, 3)
+    shape = (tubes.count + len(BROADLEAF.blade) * leaves, 3)
     positions, rest = np.empty((frames, *shape), np.float32), np.empty(shape, np.float32)
     for start in range(0, frames, BLOCK_FRAMES):
         block = slice(start, start + BLOCK_FRAMES)
@@ -31,7 +31,7 @@ def dress(clip: MotionClip, wind: Wind, frames: int, leaves: int, seed: int, spe
         positions[block, tubes.count :] = cards.at(nodes, turns[block])
     rest[: tubes.count] = tubes.at(skeleton.rest)
     rest[tubes.count :] = cards.at(skeleton.rest, cards.unturned())
-    leaf_branch = np.repeat(len(skeleton.branch_parent) + np.arange(leaves), len(kind.blade))
+    leaf_branch = np.repeat(len(skeleton.branch_parent) + np.arange(leaves), len(BROADLEAF.blade))
     return MotionClip(
         positions=positions,
         time=skeleton.time,
