@@ -16,7 +16,6 @@ import re
 import struct
 import sys
 import types
-from collections.abc import Iterable
 from contextlib import suppress
 from functools import cached_property, lru_cache
 from pathlib import Path
@@ -140,22 +139,13 @@ class Divisions(ast.NodeTransformer):
         return node
 
 
-def parse() -> ast.Module:
-    """The syntax tree of all blocks, one behind the other; line numbers are those of FORMAT.md."""
+def run(text: str = TEXT) -> types.ModuleType:
+    """Return a module in which all blocks have been executed; line numbers are those of the text."""
     lines, is_code = [], False
-    for line in TEXT.splitlines():
+    for line in text.splitlines():
         is_code = line == "```python" or (is_code and line != "```")
         lines.append(line if is_code and line != "```python" else "")
-    return ast.parse("\n".join(lines), str(FORMAT))
-
-
-def compiled(*statements: ast.stmt) -> types.CodeType:
-    tree = Divisions().visit(ast.Module([*statements], []))
-    return compile(ast.fix_missing_locations(tree), str(FORMAT), "exec")
-
-
-def run(code: Iterable[types.CodeType], **more) -> types.ModuleType:
-    """A module in which the code has been executed, which has `more` names."""
+    tree = ast.fix_missing_locations(Divisions().visit(ast.parse("\n".join(lines), str(FORMAT))))
     module = types.ModuleType("FORMAT")
     names = module.__dict__
 
@@ -165,16 +155,15 @@ def run(code: Iterable[types.CodeType], **more) -> types.ModuleType:
         except UnicodeDecodeError:
             raise names["Invalid"]("BAD_CHUNK") from None
 
-    names.update(TAKEN_FOR_GRANTED | KINDS | {"utf8": utf8} | more)
-    for part in code:
-        exec(part, names)
+    names.update(TAKEN_FOR_GRANTED | KINDS | {"utf8": utf8})
+    exec(compile(tree, str(FORMAT), "exec"), names)
     for name, size in KEPT.items():
         kept = lru_cache(size)(names[name])
         names[name] = lambda *given, kept=kept: kept(*(tuple(x) if isinstance(x, list) else x for x in given))
     return module
 
 
-rules = run([compiled(*parse().body)])
+rules = run()
 KIND_NAMES = {number: name for name, number in KINDS.items()}
 REMAINDERS = [rules.crc32c(bytes([255 ^ byte])) ^ 0xFF000000 for byte in range(256)]
 

@@ -187,8 +187,8 @@ SCRIPTED = {
 
 
 @contextmanager
-def scripted(script: Script) -> Iterator[list[ScriptedCoder]]:
-    """FORMAT.md's code as a writer; the coder that it makes is put into the list."""
+def scripted(script: Script, decisions: bool = False) -> Iterator[list[ScriptedCoder]]:
+    """FORMAT.md's code as a writer; the coder that it makes is put into the list. decisions: see `write`."""
     made: list[ScriptedCoder] = []
 
     def coder(_: bytes) -> ScriptedCoder:
@@ -196,7 +196,8 @@ def scripted(script: Script) -> Iterator[list[ScriptedCoder]]:
         return made[-1]
 
     kept = {name: getattr(rules, name) for name in ("RangeDecoder", *SCRIPTED)}
-    vars(rules).update({name: partial(function, kept[of]) for name, (function, of) in SCRIPTED.items()})
+    if not decisions:
+        vars(rules).update({name: partial(function, kept[of]) for name, (function, of) in SCRIPTED.items()})
     rules.RangeDecoder = coder
     try:
         yield made
@@ -204,12 +205,15 @@ def scripted(script: Script) -> Iterator[list[ScriptedCoder]]:
         vars(rules).update(kept)
 
 
-def write(function: Callable, script: Script | list, *arguments, lowest: bool = False) -> bytes:
+def write(
+    function: Callable, script: Script | list, *arguments, lowest: bool = False, decisions: bool = False
+) -> bytes:
     """The stream that `function` of FORMAT.md's code reads as the script.
 
-    It ends at a value that the function refuses; `lowest`: who goes on behind that reads ones."""
+    It ends at a value that the function refuses; `lowest`: who goes on behind that reads ones. `decisions`: the script
+    has bits alone, and no numbers."""
     script = script if isinstance(script, Script) else Script(*script)
-    with scripted(script) as made, suppress(rules.Invalid):
+    with scripted(script, decisions) as made, suppress(rules.Invalid):
         function(b"", *arguments)
     return made[0].low.to_bytes(made[0].length, "big").rstrip(b"\0") if lowest else made[0].stream()
 

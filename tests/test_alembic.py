@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import gc
-import os
 from fractions import Fraction
 
 import imath
 import numpy as np
 import pytest
 from alembic3d import Abc, AbcCoreAbstract, AbcGeom
-from test_usd import GRID, QUADS, assert_same, awkward_clip, sway, whole_plant
+from test_usd import GRID, QUADS, sway, whole_plant
 
 import athcodec
 from athcodec.errors import ClipError, SourceWarning
@@ -156,29 +155,6 @@ def test_the_option_only_selects_objects_by_name(tmp_path):
         athcodec.read(tmp_path / "a.abc", only=["bark"])
 
 
-def test_what_was_read_is_written_again_as_it_was(tmp_path):
-    whole_plant(tmp_path / "a.usdc")
-    with athcodec.read(tmp_path / "a.usdc") as clip:
-        athcodec.write(clip, tmp_path / "a.abc")
-        with athcodec.read(tmp_path / "a.abc") as again:
-            assert_same(clip, again)
-    assert sorted(os.listdir(tmp_path)) == ["a.abc", "a.usdc"]
-
-
-def test_data_without_a_place_in_alembic_come_back(tmp_path):
-    clip = awkward_clip()
-    athcodec.write(clip, tmp_path / "a.abc")
-    with athcodec.read(tmp_path / "a.abc") as again:
-        for name, values in clip.attributes.items():
-            assert np.array_equal(again.attributes[name], values) and again.attributes[name].dtype == values.dtype, name
-        for name in ("vertex_branch", "branch_parent", "edges", "rest", "stem_index", "faces"):
-            assert np.array_equal(getattr(again, name), getattr(clip, name)), name
-        assert np.allclose(again.time, clip.time, rtol=0, atol=1e-7)
-        assert np.array_equal(again.block(0, 5), clip.block(0, 5))
-        for name in ("unit", "up_axis", "note", "fps", "start_frame"):
-            assert again.metadata[name] == clip.metadata[name]
-
-
 def test_the_alembic_library_reads_what_is_written(tmp_path):
     whole_plant(tmp_path / "a.usdc")
     with athcodec.read(tmp_path / "a.usdc") as clip:
@@ -196,49 +172,6 @@ def test_the_alembic_library_reads_what_is_written(tmp_path):
         assert np.array_equal(np.array(sample), expected[i, :12])
         assert mesh.getTimeSampling().getSampleTime(i) == pytest.approx((101 + i) / FPS, abs=1e-12)
     assert np.isclose(Abc.GetArchiveInfo(archive)["dccFPS"], FPS, rtol=1e-5)
-
-
-def test_a_closed_clip_and_a_changed_file_are_noticed(tmp_path):
-    write_archive(tmp_path / "a.abc")
-    with athcodec.read(tmp_path / "a.abc") as clip:
-        assert clip.unchanged()
-        os.utime(tmp_path / "a.abc", (1, 1))
-        assert not clip.unchanged()
-    with pytest.raises(ClipError, match="closed"):
-        clip.block(0, 1)
-
-
-def test_broken_files_are_refused_in_one_line(tmp_path, capfd):
-    write_archive(tmp_path / "a.abc")
-    data, rng, path = (tmp_path / "a.abc").read_bytes(), np.random.default_rng(5), tmp_path / "b.abc"
-    broken = [data[:cut] for cut in np.linspace(1, len(data) - 1, 5).astype(int)]
-    for _ in range(6):
-        damaged = bytearray(data)
-        for place in rng.integers(0, len(data), 6):
-            damaged[place] = rng.integers(256)
-        broken.append(bytes(damaged))
-    refused = 0
-    for content in [*broken, b"x" * 99, b"Ogawa" + bytes(60)]:
-        path.write_bytes(content)
-        try:
-            with athcodec.read(path, "alembic") as clip:
-                clip.block(0, clip.frame_count)
-        except ClipError as error:
-            refused += 1
-            assert "\n" not in str(error)
-    assert refused >= 7 and capfd.readouterr().err == ""
-    with pytest.raises(FileNotFoundError):
-        athcodec.read(tmp_path / "none.abc", "alembic")
-
-
-def test_a_write_that_fails_leaves_what_was_there(tmp_path, sample_clip):
-    (tmp_path / "a.abc").write_bytes(b"Ogawa, old")
-    broken = sample_clip.block(0, 3).copy()
-    broken[2, 5] = np.inf
-    clip = athcodec.MotionClip(broken, np.arange(3.0), rest=broken[0])
-    with pytest.raises(ClipError, match="frame 2"):
-        athcodec.write(clip, tmp_path / "a.abc")
-    assert os.listdir(tmp_path) == ["a.abc"] and (tmp_path / "a.abc").read_bytes() == b"Ogawa, old"
 
 
 # ---- Blender ----

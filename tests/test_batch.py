@@ -683,14 +683,3 @@ def test_a_full_disk_is_reported_and_a_second_run_does_what_is_missing(limit, ma
     code, err = finished(start(many, out, "--verify"))
     assert code == 0, err
     assert done_once(out) == ALL
-
-
-@pytest.mark.slow
-def test_the_benchmark_compares_numbers_of_workers_and_every_file(tmp_path):
-    words = "-m bench batch --clips 4 --frames 20 --effort fast --json".split()
-    command = [sys.executable, *words, str(tmp_path / "b.json")]
-    subprocess.run(command, cwd=Path(__file__).resolve().parent.parent, check=True, capture_output=True, timeout=120)
-    result = json.loads((tmp_path / "b.json").read_text())
-    runs_of, ratios = (table["rows"] for table in result["tables"])
-    assert [row["workers"] for row in runs_of] == ["loop", "1", "2"] and result["broken"] == []
-    assert ratios[0]["ratio"] == pytest.approx(runs_of[1]["clips s"] / runs_of[2]["clips s"])

@@ -7,6 +7,7 @@ The attacks are those of spec/robust/bound.py; `python -m spec.robustness --only
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import re
 
 import numpy as np
@@ -23,17 +24,14 @@ from athcodec.metrics import ErrorMeter
 from spec.robust.bound import ACTIONS, LARGE, Attack, attacks, broken_promises
 
 
-@settings(STEADY, max_examples=25)
-@given(attacks())
-def test_no_attack_breaks_a_promise(scratch, attack):
-    assert broken_promises(attack, scratch) == []
+@pytest.mark.parametrize("count", [25, pytest.param(3000, marks=pytest.mark.slow)])
+def test_no_attack_breaks_a_promise(count, scratch):
+    @settings(STEADY, max_examples=count)
+    @given(attacks())
+    def attacked(attack):
+        assert broken_promises(attack, scratch) == []
 
-
-@pytest.mark.slow
-@settings(STEADY, max_examples=3000)
-@given(attacks())
-def test_no_attack_of_thousands_breaks_a_promise(scratch, attack):
-    assert broken_promises(attack, scratch) == []
+    attacked()
 
 
 def test_a_stem_with_all_modes_at_its_base_level_knows_them_from_the_layer_before(scratch):
@@ -49,19 +47,18 @@ def test_every_action_alone_keeps_the_bound(action, scratch):
     assert broken_promises(Attack(seed=3, branches=6, actions=(action,), frames=33, segment_frames=16), scratch) == []
 
 
+QUICK = {("1,000 branches on one stem", "fast"), ("1,000 roots", "fast")}
+
+
 @pytest.mark.parametrize(
-    "name",
-    ["1,000 branches on one stem", pytest.param("a chain of 2,000 branches", marks=pytest.mark.slow), "1,000 roots"],
+    "name, effort",
+    [
+        pytest.param(*large, marks=() if large in QUICK else pytest.mark.slow)
+        for large in itertools.product(LARGE, ("fast", "default", "best"))
+    ],
 )
-def test_large_hierarchies_keep_the_bound(name, scratch):
-    assert broken_promises(LARGE[name], scratch) == []
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("effort", ["fast", "default", "best"])
-@pytest.mark.parametrize("attack", LARGE.values(), ids=LARGE)
-def test_all_large_hierarchies_keep_the_bound_at_every_effort(attack, effort, scratch):
-    assert broken_promises(dataclasses.replace(attack, effort=effort), scratch) == []
+def test_large_hierarchies_keep_the_bound_at_every_effort(name, effort, scratch):
+    assert broken_promises(dataclasses.replace(LARGE[name], effort=effort), scratch) == []
 
 
 @pytest.mark.slow
@@ -182,17 +179,10 @@ def clip_at_its_last_bits(seed: int):
     return clip_of(positions, positions[0], branch, parent, dtype), bound, chosen
 
 
-def test_every_bound_ends_in_a_file_within_it_or_in_one_that_can_be_kept(scratch, monkeypatch):
+@pytest.mark.parametrize("seeds", [range(24), pytest.param(range(24, 1000), marks=pytest.mark.slow)])
+def test_every_bound_ends_in_a_file_within_it_or_in_one_that_can_be_kept(seeds, scratch, monkeypatch):
     work = Work(monkeypatch)
-    for seed in range(24):
-        clip, bound, options = clip_at_its_last_bits(seed)
-        encoded_or_refused(clip, bound, options, scratch / "last_bits.ath", work)
-
-
-@pytest.mark.slow
-def test_so_do_the_bounds_of_hundreds_of_clips(scratch, monkeypatch):
-    work = Work(monkeypatch)
-    for seed in range(24, 1000):
+    for seed in seeds:
         clip, bound, options = clip_at_its_last_bits(seed)
         encoded_or_refused(clip, bound, options, scratch / "last_bits.ath", work)
 

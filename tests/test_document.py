@@ -6,7 +6,9 @@ from __future__ import annotations
 import io
 import subprocess
 import sys
+from contextlib import suppress
 from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 import pytest
@@ -15,7 +17,8 @@ from plants import awkward, bush, chain_plant, plant, tube
 
 import athcodec
 from athcodec.errors import FormatError
-from spec.document import File, rules
+from spec import conformance, document
+from spec.document import TEXT, File, rules
 
 ROOT = Path(__file__).resolve().parent.parent
 VECTORS = ROOT / "spec" / "vectors" / "valid"
@@ -32,8 +35,7 @@ def assert_same_bits(data: bytes) -> None:
             assert_same_numbers(file.positions(level), np.concatenate([clip.positions(level=level) for clip in played]))
         assert_same_numbers(file.rest(decoder.file.level_count - 1), decoder.file.rest)
         assert [list(clip.time) for clip in played] == file.file.times
-        arrays = [decoder.file.faces, decoder.file.edges, *decoder.file.attributes.values()]
-        assert [array.tobytes() for array in arrays if array is not None] == file.arrays()
+        assert all_arrays(decoder) == file.arrays()
 
 
 def assert_same_numbers(got: np.ndarray, expected: np.ndarray) -> None:
@@ -79,9 +81,9 @@ def test_several_clips_have_the_same_bits(medley_clips, lossless, tmp_path):
     assert_same_bits((tmp_path / "clips.ath").read_bytes())
 
 
-def with_a_bit_changed(parts, random):
-    """A file with one bit of a chunk of the prelude or of motion changed, and a checksum that fits; that chunk."""
-    chosen = [i for i, (chunk, content) in enumerate(parts.chunks) if content and (chunk.is_motion or chunk.kind < 16)]
+def with_a_bit_changed(parts, random, kinds):
+    """A file with one bit of a chunk of these kinds changed, and a checksum that fits; that chunk."""
+    chosen = [i for i, (chunk, content) in enumerate(parts.chunks) if content and chunk.kind in kinds]
     i, chunks = int(random.choice(chosen)), list(parts.chunks)
     content = bytearray(chunks[i][1])
     content[random.integers(len(content))] ^= 1 << random.integers(8)
@@ -90,23 +92,40 @@ def with_a_bit_changed(parts, random):
 
 
 MANY = [pytest.param(name, marks=pytest.mark.vectors) for name in ("layers-mixed", "layers-three", "clips-loops")]
+RESTS = "vertices copies-of-many copies-far connected-quads connected-order welded-apart welded-order".split()
+FACES = ["mixed", "many-quads", "up-and-on"]
 
 
-@pytest.mark.parametrize("name", [*MANY, "clips-time-uneven", "tubes"])
+@pytest.mark.parametrize(
+    "name",
+    [*MANY, "clips-time-uneven", "tubes", *(f"rest-{name}" for name in RESTS), *(f"faces-{name}" for name in FACES)],
+)
 def test_corrupted_chunks_are_refused_alike_or_mean_the_same(name):
+    """Any chunk of the prelude and of motion, or that of the rest pose or the faces which the vector is about."""
     parts, random = Parts.of((VECTORS / f"{name}.ath").read_bytes()), np.random.default_rng(6)
+    every = {chunk.kind for chunk, _ in parts.chunks if chunk.is_motion or chunk.kind < 16}
+    kinds = {"rest": {rules.REST}, "faces": {rules.FACES}}.get(name.split("-")[0], every)
     refused = 0
     for _ in range(40):
-        data, chunk = with_a_bit_changed(parts, random)
+        data, chunk = with_a_bit_changed(parts, random, kinds)
         level = chunk.level if chunk.is_motion else parts.header.level_count - 1
-        got = outcome(lambda data=data, level=level: File(data).positions(level))
-        expected = outcome(lambda data=data, level=level: all_positions(data, level))
-        refused += isinstance(expected, str)
-        if isinstance(expected, str) or isinstance(got, str):
-            assert isinstance(got, str) and got == expected
+        if chunk.kind == rules.FACES:
+            got = outcome(lambda data=data: File(data).arrays())
+            expected = outcome(lambda data=data: all_arrays(opened(data)))
         else:
+            got = outcome(lambda data=data, level=level: File(data).positions(level))
+            expected = outcome(lambda data=data, level=level: all_positions(data, level))
+        refused += isinstance(expected, str)
+        if isinstance(expected, np.ndarray) and isinstance(got, np.ndarray):
             assert_same_numbers(got, expected)
+        else:
+            assert got == expected
     assert 2 < refused < 40
+
+
+def all_arrays(decoder: athcodec.Decoder) -> list[bytes]:
+    arrays = [decoder.file.faces, decoder.file.edges, *decoder.file.attributes.values()]
+    return [array.tobytes() for array in arrays if array is not None]
 
 
 def all_positions(data: bytes, level: int) -> np.ndarray:
@@ -123,6 +142,34 @@ def test_a_prefix_plays_as_far_as_it_goes():
         assert got == expected if isinstance(got, str) else np.array_equal(got, expected)
         with pytest.raises(rules.Invalid, match=r"TRUNCATED|NOT_AN_ATH_FILE"):
             File(data[:size], strict=True)
+
+
+MISTAKES = {  # By a vector that tells it: what the document says, and what a decoder's author could write in its place.
+    "gaps": ("gaps.append(64 if quarters >= 64.0", "gaps.append(65 if quarters >= 64.0"),
+    "rigid-diagonal": ("norm2 * 1e-30:\n            continue", "norm2 * 1e-30:\n            pass"),
+    "sheet-mode-below": ("if after > before * keep:", "if True:"),
+    "tangent-short-above": ("\n    if not squared(tangent) > 1e-200:", "\n    if not squared(tangent) > 1.0625e-200:"),
+    "smallest": ("if self.range < (1 << 32):", "if self.range < (1 << 31):"),
+}
+
+
+def answers(vector: conformance.Vector, own: ModuleType) -> dict[str, str]:
+    def ask(data: bytes, item: str, mesh: bytes | None) -> bytes:
+        try:
+            return File(data, item == "strict", mesh, own).answer(item)
+        except own.Invalid as error:
+            raise conformance.Refused(str(error)) from None
+
+    return {item: conformance.result(ask, vector.path.read_bytes(), item) for item in vector.results}
+
+
+@pytest.mark.parametrize("name", MISTAKES)
+def test_a_vector_tells_a_changed_decoder_from_the_true_one(name):
+    (true, changed), vectors = MISTAKES[name], conformance.vectors()
+    vector = next(vector for vector in vectors if vector.path.stem == name)
+    assert TEXT.count(true) == 1 and answers(vector, rules) == vector.results
+    with suppress(ArithmeticError, LookupError, TypeError):  # with which a changed decoder stops
+        assert answers(vector, document.run(TEXT.replace(true, changed))) != vector.results
 
 
 def run(*words) -> subprocess.CompletedProcess:

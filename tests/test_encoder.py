@@ -7,7 +7,7 @@ import tracemalloc
 import h5py
 import numpy as np
 import pytest
-from files import coded
+from files import coded, encoded
 from plants import chain_plant, clip_of, plant
 
 import athcodec
@@ -27,10 +27,6 @@ OLDER = MAGIC + b"older"
 @pytest.fixture
 def small():
     return plant(seed=1, branches=5, longest=4, frames=40)
-
-
-def encoded(clip, folder, **options) -> bytes:
-    return athcodec.encode(clip, folder / "e.ath", **{"effort": "fast"} | options).path.read_bytes()
 
 
 # ---- bounds and sizes ----
@@ -90,8 +86,8 @@ def test_a_bound_in_scene_units_is_taken_as_it_is(small, tmp_path):
     assert athcodec.encode(small, tmp_path / "s.ath", max_error=0.0123, effort="fast").max_error_bound == 0.0123
 
 
-def test_a_looser_bound_gives_a_smaller_file(sample_clip, tmp_path):
-    sizes = [len(encoded(sample_clip, tmp_path, rel_error=r)) for r in (1e-5, 1e-4, 1e-3, 1e-2)]
+def test_a_looser_bound_gives_a_smaller_file(sample_clip):
+    sizes = [len(encoded(sample_clip, effort="fast", rel_error=r)) for r in (1e-5, 1e-4, 1e-3, 1e-2)]
     assert sizes == sorted(sizes, reverse=True) and sizes[0] > 4 * sizes[-1]
 
 
@@ -293,28 +289,28 @@ def test_half_of_the_progress_is_about_half_of_the_work(frames, effort, tmp_path
 
 
 @pytest.mark.parametrize("effort", ["fast", "default", "best"])
-def test_the_same_clip_gives_the_same_bytes(effort, bushy_clip, tmp_path):
-    first, second = (encoded(bushy_clip, tmp_path, effort=effort, segment_frames=16) for _ in range(2))
+def test_the_same_clip_gives_the_same_bytes(effort, bushy_clip):
+    first, second = (encoded(bushy_clip, effort=effort, segment_frames=16) for _ in range(2))
     assert first == second
 
 
-def test_encoding_leaves_the_clip_as_it_was(bushy_clip, tmp_path):
+def test_encoding_leaves_the_clip_as_it_was(bushy_clip):
     before = {
         name: getattr(bushy_clip, name).tobytes()
         for name in ("positions", "rest", "time", "vertex_branch", "branch_parent", "stem_index")
     }
-    encoded(bushy_clip, tmp_path)
+    encoded(bushy_clip, effort="fast")
     assert all(getattr(bushy_clip, name).tobytes() == data for name, data in before.items())
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
-def test_arrays_of_any_layout_and_byte_order_give_the_same_file(dtype, tmp_path):
+def test_arrays_of_any_layout_and_byte_order_give_the_same_file(dtype):
     source = plant(seed=1, branches=5, frames=20, dtype=dtype)
     swapped = source.positions.astype(source.positions.dtype.newbyteorder(">"))
     strided = np.asfortranarray(source.positions)
     files = []
     for positions in (source.positions, swapped, strided):
-        files.append(encoded(source.replace(positions=positions), tmp_path))
+        files.append(encoded(source.replace(positions=positions), effort="fast"))
     assert files[0] == files[1] == files[2]
 
 

@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-import tempfile
-from pathlib import Path
-
 import numpy as np
 import pytest
 import zstandard
-from files import Parts, opened
+from files import encoded, opened
 from plants import ring_quads
+from test_document import assert_same_bits
 from test_rest import cards, simple_bytes, terrain, tubes
 
 import athcodec
 from athcodec.decoding import container as ct
 from athcodec.encoding import polygons
-from athcodec.errors import AthError
 from athcodec.motion.polygons import Polygons
 from spec.document import File, rules
 
@@ -54,11 +51,6 @@ def zstd_bytes(faces: np.ndarray) -> int:
 
 def still(points: np.ndarray, faces: np.ndarray) -> athcodec.MotionClip:
     return athcodec.MotionClip(points[None], np.zeros(1), faces=faces.astype(np.int32))
-
-
-def encoded(clip: athcodec.MotionClip, **options) -> bytes:
-    with tempfile.TemporaryDirectory() as folder:
-        return athcodec.encode(clip, Path(folder) / "a.ath", **options).path.read_bytes()
 
 
 def rest_bytes(data: bytes) -> int:
@@ -183,51 +175,4 @@ def test_the_document_reads_the_same_connected_rest_pose(options, is_split, fram
     file = File(data, strict=True)
     method = file.content(rules.REST)[0]
     assert frames > 1 or method & (CONNECTED | WELDED) == (CONNECTED | WELDED * is_split)
-    with opened(data) as decoder:
-        for level in range(decoder.file.level_count):
-            assert decoder.positions(level=level).tobytes() == file.positions(level).tobytes()
-        assert decoder.file.faces.tobytes() == file.arrays()[0]
-
-
-@pytest.mark.parametrize("seed", range(12))
-def test_random_bytes_as_faces_are_the_same_to_all_or_refused(seed):
-    random = np.random.default_rng(seed)
-    chunk = polygons.pack(Polygons.of_rows(random.integers(0, 60, (20, 3))), 60)
-    stream = random.integers(1, 256, random.integers(0, 60), np.uint8).tobytes()
-    shape, _ = rules.parse_polygons(chunk, rules.FACES)
-    try:
-        expected = rules.decode_polygons(stream, shape, 60)[1]
-    except rules.Invalid:
-        expected = None
-    clip = still(terrain(6, 10, 0.1, 1), np.zeros((1, 3), int))
-    data = with_faces(encoded(clip, rel_error=1e-3, ladder="none"), chunk[:9] + stream)
-    try:
-        with opened(data) as decoder:
-            found = decoder.file.faces.reshape(-1).tolist()
-    except AthError:
-        found = None
-    assert found == expected
-
-
-@pytest.mark.parametrize("seed", range(12))
-def test_random_bytes_as_names_of_places_are_the_same_to_all_or_refused(seed):
-    random = np.random.default_rng(seed)
-    data = encoded(still(*apart(terrain(6, 10, 0.1, 1), grid_faces(6, 10))), rel_error=1e-3)
-    rest = File(data).content(rules.REST)
-    names = bytearray(rest[21 : 21 + int.from_bytes(rest[17:21], "little")])
-    names[random.integers(9, len(names))] = random.integers(1, 256)
-    data = Parts.of(data).with_payload(ct.REST, rest[:21] + bytes(names) + rest[21 + len(names) :])
-    try:
-        expected = File(data, strict=True).positions(0).tobytes()
-    except rules.Invalid:
-        expected = None
-    try:
-        with opened(data) as decoder:
-            found = decoder.positions(level=0).tobytes()
-    except AthError:
-        found = None
-    assert found == expected
-
-
-def with_faces(data: bytes, chunk: bytes) -> bytes:
-    return Parts.of(data).with_payload(ct.FACES, chunk)
+    assert_same_bits(data)

@@ -41,16 +41,11 @@ def names(folder: Path) -> set[str]:
 # ---- writers that die ----
 
 
-def test_a_killed_writer_leaves_the_older_file_or_a_whole_one_and_nothing_after_the_next_run(place):
-    row = faults.kill_while_writing(place, 6, seed=6)
-    assert row.tried == 6 and row.wrong == 0
+@pytest.mark.parametrize("rounds", [6, pytest.param(200, marks=pytest.mark.slow)])
+def test_a_killed_writer_leaves_the_older_file_or_a_whole_one_and_nothing_after_the_next_run(rounds, place):
+    row = faults.kill_while_writing(place, rounds, seed=6)
+    assert row.tried == rounds and row.wrong == 0
     assert row.note[0] != "0", "no writer was killed between its first byte and its last: nothing was tested"
-
-
-@pytest.mark.slow
-def test_two_hundred_killed_writers_leave_the_older_file_or_a_whole_one(place):
-    row = faults.kill_while_writing(place, 200, seed=7)
-    assert row.tried == 200 and row.wrong == 0
 
 
 @pytest.mark.parametrize(
@@ -114,13 +109,6 @@ def test_a_full_disk_is_one_line_and_leaves_the_older_file(place):
 def test_a_read_only_folder_or_file_is_one_line_and_left_alone(place):
     row = faults.write_where_not_allowed(place, ("truncate",))
     assert row.tried == 2 and row.wrong == 0
-
-
-@pytest.mark.slow
-def test_a_disk_that_is_really_full_is_one_line_and_leaves_nothing(place):
-    row = faults.fill_small_disk(place, [4, 8])
-    assert row.crashes == row.wrong == 0
-    assert row.tried == 8, row.note
 
 
 def test_hdf5_is_written_where_the_environment_insists_on_its_locks(place, tmp_path):

@@ -8,11 +8,10 @@ around it. Claims about limits, names and offsets are read from the document's t
 from __future__ import annotations
 
 import io
-import math
 import re
 import struct
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
@@ -20,27 +19,35 @@ from types import ModuleType
 import numpy as np
 import pytest
 import test_document
-import zstandard
-from files import Parts, basis_chunk, exact_rest_chunk, opened, roots, still_file
-from plants import clip_of, plant
+from files import Parts, exact_rest_chunk, opened, roots, still_file
+from plants import clip_of
 from test_document import assert_same_bits
 
 import athcodec
 from athcodec import errors
-from athcodec._native import BRANCH, LOOSE, SHAPE_MODES, SHEET, WHOLE, crc32c, lib
+from athcodec._native import BRANCH, crc32c
 from athcodec.decoding import container
 from athcodec.encoding import streams, writing
-from athcodec.encoding.learned_modes import LearnedModes
-from athcodec.encoding.motion import LevelStream, Plan, SegmentMotion
-from athcodec.encoding.time_bases import MOST_SAMPLE
 from spec.document import TEXT, rules, section, table
+from spec.scripted import Script, write
 
 FORMAT = Path(__file__).resolve().parents[1] / "FORMAT.md"
-VECTORS = FORMAT.parent / "spec" / "vectors" / "valid"
+VALID = FORMAT.parent / "spec" / "vectors" / "valid"
 
 
-def seeds(few: int, many: int) -> list:
-    return [*range(few), *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(few, many))]
+# Vectors in one segment and one layer: loose stems, sheets, subtrees that are whole, shapes, corrections, binary64.
+FEW = ["shapes-of-sheets-in-binary64", "clip-named", "loose"]
+MORE = ["whole", "sheet", "corrections-wide", "rotations", "long-stem", "two-roots", "tubes"]
+VECTORS = [*enumerate(FEW), *(pytest.param(3 + i, name, marks=pytest.mark.slow) for i, name in enumerate(MORE))]
+
+
+def parts_of(name: str) -> Parts:
+    return Parts.of((VALID / f"{name}.ath").read_bytes())
+
+
+def branches_of(seed: int) -> np.ndarray:
+    with opened((VALID / f"{FEW[seed % len(FEW)]}.ath").read_bytes()) as decoder:
+        return decoder.file.branches
 
 
 def dump(text: str) -> bytes:
@@ -123,12 +130,6 @@ def test_smallest_file_is_what_the_encoder_writes(spec, tmp_path):
         assert decoder.positions().tolist() == [[[1.0, 2.0, 3.0]]]
 
 
-@pytest.mark.parametrize("dtype", [np.float32, np.float64])
-def test_lossless_files_decode_by_the_document(spec, dtype, tmp_path):
-    clip = plant(seed=12, branches=4, longest=4, frames=18, dtype=dtype)
-    assert_same_bits(athcodec.encode(clip, tmp_path / "a.ath", rel_error=1e-3, lossless=True).path.read_bytes())
-
-
 # ---- the pseudo-code ----
 
 
@@ -197,40 +198,10 @@ def test_trace_of_a_level_is_what_the_code_computes(spec):
         assert rows[name] == [float(x) for x in numbers], name
 
 
-@pytest.mark.parametrize("change", [b"\0", b"\1" * 9])
-def test_a_stream_with_bytes_too_many_is_refused_by_the_document_too(spec, change):
-    stream = streams.encode_temporal(np.array([[0, 3, -20]], np.int32))
-    assert spec.decode_temporal(stream, 1, 3) == [read_basis(stream, 3)] == [[0, 3, -20]]
-    with pytest.raises(spec.Invalid):
-        spec.decode_temporal(stream + change, 1, 3)
-    with pytest.raises(errors.BadChunk):
-        read_basis(stream + change, 3)
-
-
-def test_shuffle_of_the_document_restores_an_array(spec):
-    array = np.arange(30, dtype="<i4").reshape(10, 3) * 70_001
-    data = writing.pack_array("numbers", array)
-    body = data[8 + 4 * array.ndim + len("numbers") :]
-    assert spec.unshuffle(zstandard.decompress(body), array.size, 4) == array.tobytes()
-
-
-@pytest.mark.parametrize(
-    "seed, is_float64, exact",
-    [
-        (1, False, None),
-        pytest.param(2, True, None, marks=pytest.mark.slow),
-        pytest.param(3, False, np.float32, marks=pytest.mark.slow),
-        (4, True, np.float64),
-    ],
-)
-def test_pseudo_code_decodes_every_feature(spec, seed, is_float64, exact):
-    assert_same_bits(HandMade(seed, is_float64, exact).file())
-
-
 @pytest.mark.parametrize("seed", range(4))
 def test_changed_clips_mean_the_same_to_the_document_and_the_code(spec, seed):
     random = np.random.default_rng(seed)
-    parts = Parts.of((VECTORS / "clips-loops.ath").read_bytes())
+    parts = parts_of("clips-loops")
 
     def document(data):
         return by_document(spec.decode_clips(*spec.read_front(data)[:2]))
@@ -306,12 +277,6 @@ def read_times(stream: bytes, frame_count: int) -> np.ndarray:
         return decoder.time
 
 
-def read_basis(stream: bytes, frames: int) -> list[int]:
-    """A learned basis of one row, which moves a vertex along x."""
-    with played(still_file(frames, stems=basis_chunk(stream, frames)), container.STEMS) as decoder:
-        return decoder.positions()[:, 0, 0].tolist()
-
-
 # ---- decisions made by chance ----
 
 
@@ -325,15 +290,16 @@ def assert_same_on_levels(spec: ModuleType, data: bytes, levels: Iterable[int]) 
     return documents
 
 
-@pytest.mark.parametrize("kind", [container.STEMS, container.AFFINES, container.CORRECTIONS, container.SHAPES])
-@pytest.mark.parametrize("seed", seeds(1, 6))
-def test_random_decisions_about_motion_mean_the_same_to_the_document_and_the_code(spec, seed, kind):
-    parts = Parts.of(Sapling(seed).file())
-    random = np.random.default_rng(seed)
+HEADS = {container.STEMS: 8, container.AFFINES: 0, container.CORRECTIONS: 4, container.SHAPES: 0}
+
+
+@pytest.mark.parametrize("seed, name", VECTORS)
+def test_random_decisions_about_motion_mean_the_same_to_the_document_and_the_code(spec, seed, name):
+    parts, random = parts_of(name), np.random.default_rng(seed)
     for i, (chunk, payload) in enumerate(parts.chunks):
-        if chunk.kind != kind:
+        if chunk.kind not in HEADS:
             continue
-        head = {container.STEMS: 8, container.AFFINES: 0, container.CORRECTIONS: 4, container.SHAPES: 0}[kind]
+        head = HEADS[chunk.kind]
         stream = random_stream(spec, random, *motion_function(spec, parts, chunk))
         data = parts.with_chunks([*parts.chunks[:i], (chunk, payload[:head] + stream), *parts.chunks[i + 1 :]])
         assert_same_on_levels(spec, data, range(chunk.level, parts.header.level_count))
@@ -358,10 +324,10 @@ def motion_function(spec: ModuleType, parts: Parts, chunk: container.Chunk) -> t
 
 
 @pytest.mark.parametrize("refines_rest", [False, True])
-@pytest.mark.parametrize("seed", seeds(2, 12))
-def test_random_decisions_about_refinements_mean_the_same_to_the_document_and_the_code(spec, seed, refines_rest):
-    """A layer behind those of a sapling: its rest pose, shapes and stems."""
-    parts, random = Parts.of(Sapling(seed).file()), np.random.default_rng(seed)
+@pytest.mark.parametrize("seed, name", VECTORS)
+def test_random_decisions_about_refinements_mean_the_same_to_the_document_and_the_code(spec, seed, name, refines_rest):
+    """A layer behind that of the vector: its rest pose, shapes and stems."""
+    parts, random = parts_of(name), np.random.default_rng(seed)
     level, ratio, shift = parts.header.level_count, int(random.choice([1, 3, 4, 16, 65535])), int(random.integers(16))
     file = spec.open_file(parts.file())
     branches, rest = file.branches, file.rest
@@ -398,40 +364,20 @@ def assert_same_numbers(document: object, code: object) -> None:
         test_document.assert_same_numbers(np.array(document, code.dtype), code)
 
 
+class Coin(Script):
+    """Decisions made by chance."""
+
+    def __init__(self, random: np.random.Generator):
+        super().__init__()
+        self.random, self.chance = random, random.uniform(0.15, 0.85)
+
+    def answer(self, asked: str, most: int) -> int:
+        return int(self.random.random() < self.chance)
+
+
 def random_stream(spec: ModuleType, random: np.random.Generator, name: str, *arguments: object) -> bytes:
     """What a function of the document reads as decisions made by chance, up to the first invalid one."""
-    chance = random.uniform(0.15, 0.85)
-    return stream_of(spec, lambda: int(random.random() < chance), name, *arguments)
-
-
-def stream_of(spec: ModuleType, decide: Callable[[], int], name: str, *arguments: object) -> bytes:
-    """What a function of the document reads as these decisions, up to the first invalid one."""
-    made = []
-
-    class Deciding(spec.RangeDecoder):
-        """Keeps the interval's lower end, as an encoder does, instead of reading."""
-
-        def __init__(self, _):
-            self.low, self.range, self.length = 0, spec.MASK, 8
-            made.append(self)
-
-        def narrow(self, bound):
-            bit = decide()
-            self.low, self.range = (self.low, bound) if bit else (self.low + bound, self.range - bound)
-            if self.range < 1 << 32:
-                self.low, self.range, self.length = self.low << 32, self.range << 32, self.length + 4
-            return bit
-
-        def finish(self):
-            pass
-
-    function = getattr(spec, name)
-    with suppress(spec.Invalid):
-        type(function)(function.__code__, function.__globals__ | {"RangeDecoder": Deciding})(b"", *arguments)
-    last, zeros = made[0].low + made[0].range - 1, 0
-    while last >> zeros + 1 << zeros + 1 >= made[0].low and zeros < 8 * made[0].length:
-        zeros += 1
-    return (last >> zeros << zeros).to_bytes(made[0].length, "big").rstrip(b"\0")
+    return write(getattr(spec, name), Coin(random), *arguments, decisions=True)
 
 
 # ---- exact numbers ----
@@ -456,26 +402,15 @@ def stems(spec: ModuleType, branches: np.ndarray) -> list:
     return [spec.Record(**{name: int(row[name]) for name in BRANCH.names}) for row in branches]
 
 
-@pytest.mark.parametrize("seed", range(8))
-def test_rest_poses_about_reference_poses_mean_the_same_to_the_document_and_the_code(spec, seed):
-    file, random = HandMade(seed, False, None), np.random.default_rng(seed)
-    far = random.choice([0.01, 1.0, 30.0])
-    coded = streams.encode_source_rest(
-        file.branches, 0.01, file.rest, file.rest + far * random.normal(size=file.rest.shape)
-    )
-    got = spec.decode_source_rest(coded.stream, stems(spec, file.branches), 0.01, file.rest.tolist())
-    assert np.array(got).tobytes() == coded.decoded.tobytes()
-
-
 @pytest.mark.parametrize("dtype", NUMBERS)
 @pytest.mark.parametrize("seed", range(5))
 def test_exact_rest_poses_come_back_bit_for_bit_by_document_and_code(spec, seed, dtype):
-    file = HandMade(seed, False, None)
-    pose = awkward_numbers(np.random.default_rng(seed), file.rest.size, dtype).reshape(-1, 3)
-    stream = streams.encode_exact_rest(file.branches, pose)
-    read = read_exact_rest(stream, file.branches, dtype)
+    branches = branches_of(seed)
+    pose = awkward_numbers(np.random.default_rng(seed), 3 * branches["count"].sum(), dtype).reshape(-1, 3)
+    stream = streams.encode_exact_rest(branches, pose)
+    read = read_exact_rest(stream, branches, dtype)
     assert read.dtype == dtype and read.tobytes() == pose.tobytes()
-    got = spec.decode_exact_rest(stream, stems(spec, file.branches), dtype is np.float64)
+    got = spec.decode_exact_rest(stream, stems(spec, branches), dtype is np.float64)
     assert np.array(got, dtype).tobytes() == pose.tobytes()
 
 
@@ -496,8 +431,8 @@ def test_times_come_back_bit_for_bit_by_document_and_code(spec, seed):
 def test_random_decisions_about_exact_numbers_mean_the_same_to_the_document_and_the_code(spec, seed):
     """Times of a few frames now and then ascend, those of 40 never do."""
     random = np.random.default_rng(seed)
-    file = HandMade(seed, False, None)
-    rows = stems(spec, file.branches)
+    branches = branches_of(seed)
+    rows = stems(spec, branches)
     for count in (1, 1, 2, 2, 2, 3, 3, 3, 40):
         assert_same_outcome(
             spec,
@@ -510,26 +445,13 @@ def test_random_decisions_about_exact_numbers_mean_the_same_to_the_document_and_
             spec,
             random_stream(spec, random, "decode_exact_rest", rows, n == 64, None),
             lambda stream: np.array(spec.decode_exact_rest(stream, rows, n == 64), dtype),
-            lambda stream: read_exact_rest(stream, file.branches, dtype),
+            lambda stream: read_exact_rest(stream, branches, dtype),
         )
 
 
 def assert_same_outcome(spec: ModuleType, stream: bytes, *decoders: Callable) -> None:
     document, code = (outcome(spec, lambda data: decode(data).tobytes(), stream) for decode in decoders)
     assert document == code
-
-
-def decisions(n: int, magnitude: int, negative: bool = False) -> list[int]:
-    """Those of one difference."""
-    length = magnitude.bit_length()
-    unary = [1] * length + [0] * (length < n)
-    return unary + [int(bit) for bit in f"{magnitude:b}"[1:]] + [int(negative)] * (length > 0)
-
-
-def exact_stream(spec: ModuleType, n: int, *differences: tuple[int, bool]) -> bytes:
-    """An exact rest pose of one vertex, whose numbers are each 0.0 moved by a difference."""
-    made = iter(sum((decisions(n, *difference) for difference in differences), []))
-    return stream_of(spec, lambda: next(made, 0), "decode_exact_rest", one_vertex(spec), n == 64, None)
 
 
 def one_vertex(spec: ModuleType) -> list:
@@ -543,7 +465,7 @@ def one_vertex(spec: ModuleType) -> list:
 )
 def test_numbers_that_are_not_finite_are_refused_alike(spec, dtype, n, beyond, negative, valid):
     """Downwards there is one number more: -0.0."""
-    stream = exact_stream(spec, n, (INFINITY[n] + beyond, negative))
+    stream = write(spec.decode_exact_rest, [(INFINITY[n] + beyond, negative)], one_vertex(spec), n == 64, None)
     number = float(np.finfo(dtype).min if negative else np.finfo(dtype).max)
     for decode in (
         lambda data: spec.decode_exact_rest(data, one_vertex(spec), n == 64),
@@ -552,291 +474,8 @@ def test_numbers_that_are_not_finite_are_refused_alike(spec, dtype, n, beyond, n
         assert outcome(spec, decode, stream) == ([[number, 0.0, 0.0]] if valid else "invalid")
 
 
-def test_differences_wrap_around(spec):
-    """From 1.0 half of all numbers away, by either sign, and by magnitudes that no encoder needs."""
-    half = 1 << 63
-    opposite = math.nextafter(-4.0, 0.0)
-    for magnitude, negative, number in (
-        (half, False, opposite),
-        (half, True, opposite),
-        (half + 1, False, math.nextafter(opposite, 0.0)),
-        (half + 1, True, -4.0),
-        (2 * half - 1, True, math.nextafter(1.0, 2.0)),
-    ):
-        there, back = decisions(64, magnitude, negative), decisions(64, magnitude, not negative)
-        assert two_numbers(spec, from_zero(spec, 1.0), there) == [1.0, number]
-        assert two_numbers(spec, from_zero(spec, number), back) == [number, 1.0]
-
-
-def from_zero(spec: ModuleType, number: float) -> list[int]:
-    """Decisions of a number where 0.0 is expected."""
-    at, zero = (spec.ordered(spec.to_bits(x, 64), 64) for x in (number, 0.0))
-    return decisions(64, abs(at - zero), at < zero)
-
-
-def two_numbers(spec: ModuleType, first: list[int], second: list[int]) -> list[float]:
-    """What document and code make of these decisions: x of a stem's two vertices, and times that ascend."""
-    made = iter(first + second)
-    stream = stream_of(spec, lambda: next(made), "decode_times", 2)
-    numbers = spec.decode_times(stream, 2)
-    if numbers[0] < numbers[1]:
-        assert read_times(stream, 2).tolist() == numbers
-    stem, zeros = roots(2), 2 * decisions(64, 0)
-    made = iter(first + zeros + second + zeros)
-    stream = stream_of(spec, lambda: next(made), "decode_exact_rest", stems(spec, stem), True, None)
-    rest = spec.decode_exact_rest(stream, stems(spec, stem), True)
-    assert rest == read_exact_rest(stream, stem, np.float64).tolist() == [[x, 0.0, 0.0] for x in numbers]
-    return numbers
-
-
 def outcome(spec: ModuleType, decode, stream: bytes) -> object:
     try:
         return decode(stream)
     except (spec.Invalid, errors.BadChunk):
         return "invalid"
-
-
-# ---- what the document and the code refuse ----
-
-
-def assert_refused_alike(spec: ModuleType, data: bytes, error: str) -> None:
-    with pytest.raises(spec.Invalid, match=f"^{error}$"):
-        spec.decode(data, 1)
-    with pytest.raises(errors.FormatError) as caught, athcodec.open(io.BytesIO(data)) as decoder:
-        decoder.file.check()
-    assert caught.value.name == error
-
-
-def test_a_branch_in_a_whole_subtree_may_not_be_whole(spec):
-    whole = [
-        (parent, count, flags | WHOLE if b == 6 else flags)
-        for b, (parent, count, flags) in enumerate(HandMade.BRANCHES)
-    ]
-    assert_refused_alike(spec, HandMade(1, False, None, whole).file(), "BAD_CHUNK")
-
-
-def test_rows_may_not_code_more_frequencies_than_their_learned_basis_has(spec):
-    file = HandMade(1, False, None)
-    file.bases = {1: 3}
-    assert_same_bits(file.file())
-    file = HandMade(1, False, None)
-    file.bases, file.excess = {1: 3}, 1
-    assert_refused_alike(spec, file.file(), "BAD_CHUNK")
-
-
-@pytest.mark.parametrize(
-    "values, valid",
-    [([8192, -8192], True), ([-8192, 8192], True), ([8193, 0], False), ([0, -8193], False), ([0, 1 << 20], False)],
-)
-def test_entries_of_a_learned_basis_are_at_most_1(spec, values, valid):
-    stream = streams.encode_temporal(np.array([values], np.int32))
-    for decode in lambda data: spec.decode_temporal(data, 1, 2), lambda data: [read_basis(data, 2)]:
-        assert outcome(spec, decode, stream) == ([values] if valid else "invalid")
-
-
-@pytest.mark.parametrize("kind, level", [(container.STEMS, 1), (container.STEMS, 4), (container.AFFINES, 0)])
-def test_every_stream_that_the_hierarchy_asks_for_must_be_in_the_table(spec, kind, level):
-    file = HandMade(1, False, None)
-    file.leave_out = (kind, level, 1)
-    assert_refused_alike(spec, file.file(), "BAD_CHUNK_TABLE")
-
-
-@pytest.mark.parametrize(
-    "kind, level",
-    [(container.AFFINES, -1), (container.CORRECTIONS, 0), (container.CORRECTIONS, -2), (container.SHAPES, 0)],
-)
-def test_no_stream_that_the_hierarchy_does_not_ask_for_may_be_in_the_table(spec, kind, level):
-    file = HandMade(1, False, None)
-    file.store.add(kind, bytes(4), level % file.plan.level_count, 1)
-    assert_refused_alike(spec, file.file(), "BAD_CHUNK_TABLE")
-
-
-def test_unknown_optional_kinds_are_skipped(spec):
-    file = HandMade(1, False, None)
-    for kind, level in ((0x8000, 255), (0x800F, 255), (0x8018, 0), (0x801F, 1), (0x8022, 255), (0xFFFF, 255)):
-        file.store.add(kind, b"from the future", level)
-    assert_same_bits(file.file())
-
-
-@pytest.mark.parametrize(
-    "kind, level, error",
-    [
-        (0x8001, 255, "UNKNOWN_CHUNK"),
-        (0x0004, 255, "UNKNOWN_CHUNK"),
-        (0x8010, 0, "UNKNOWN_CHUNK"),
-        (0x0020, 255, "UNKNOWN_CHUNK"),
-        (24, 0, "UNKNOWN_CHUNK"),
-        (0x801F, 255, "BAD_CHUNK_TABLE"),
-    ],
-)
-def test_kinds_that_are_not_to_be_skipped_or_in_the_wrong_place_are_refused(spec, kind, level, error):
-    file = HandMade(1, False, None)
-    file.store.add(kind, b"from the future", level)
-    assert_refused_alike(spec, file.file(), error)
-
-
-# ---- files made by hand ----
-
-
-class HandMade:
-    """A file that no encoder would write: random integers in every stream, all flags, learned time bases."""
-
-    SEGMENTS, FRAMES = 2, 37
-    # parent, vertices of the stem, flags; the stem of 70 makes two pieces. Nodes that are loose and have maps
-    # of their own: 2, 3, and 16, which is whole. Loose and no nodes: 14, 17
-    BRANCHES = (-1, 6, 0), (0, 1, 0), (0, 70, LOOSE), (2, 5, SHEET | LOOSE), (3, 3, LOOSE), (2, 9, WHOLE)
-    BRANCHES += (5, 4, SHEET), (-1, 7, SHEET), (7, 2, SHEET | WHOLE), (7, 5, SHEET), (7, 4, 0), (10, 2, 0)
-    BRANCHES += (-1, 1, WHOLE), (12, 2, 0), (12, 3, LOOSE), (-1, 3, 0), (15, 4, LOOSE | WHOLE), (16, 2, LOOSE)
-
-    def __init__(self, seed: int, is_float64: bool, exact: type | None, parts=BRANCHES):
-        self.random = np.random.default_rng(seed)
-        self.is_float64, self.exact, self.parts = is_float64, exact, parts
-        self.bases = {1: 3, 2: 1, 4: 18}  # Basis_Rank
-        self.excess = 0  # frequencies that rows code beyond the rank of their learned basis
-        self.leave_out = ()
-        self.origin = np.array([10.0, -3.5, 0.25])
-        self.branches, self.rest = self._skeleton()
-        self.vertex_count = len(self.rest)
-        self.store = writing.ChunkStore(io.BytesIO())
-        self.plan = Plan(self.branches, self.vertex_count)
-        self.shapes = None
-
-    def _some_shapes(self) -> LearnedModes:
-        """Of about half of the pieces: up to as many as they may have, some small, some with large numbers."""
-        modes = np.minimum(self.plan.pieces["rank"], SHAPE_MODES)
-        counts = self.random.integers(0, 3 * modes + 1) * (self.random.random(len(modes)) < 0.6)
-        integers = np.zeros((counts.sum(), 3, SHAPE_MODES), np.int32)
-        for row, size in zip(integers, np.repeat(modes, counts)):
-            row[:, :size] = np.rint(self.random.normal(0, np.exp2(self.random.uniform(0, 12)), (3, size)))
-            row[self.random.integers(3), self.random.integers(size)] = self.random.choice([-1, 1, 5])
-        integers = integers.reshape(-1, 3 * SHAPE_MODES)
-        units = np.empty(integers.shape)
-        assert lib.ath_unit_shapes(len(integers), integers.ctypes.data, units.ctypes.data)
-        counts = counts.astype(np.int32)
-        return LearnedModes(counts, np.cumsum(counts, dtype=np.int64) - counts, integers, units, units)
-
-    def _skeleton(self) -> tuple[np.ndarray, np.ndarray]:
-        branches, rest = np.zeros(len(self.parts), BRANCH), []
-        for b, (parent, count, flags) in enumerate(self.parts):
-            first = [row["first"] for row in branches[:b]]
-            place = self.random.integers(2) * (self.parts[parent][1] // 2)
-            attach = first[parent] + place if parent >= 0 else -1
-            branches[b]["parent"], branches[b]["count"], branches[b]["flags"] = parent, count, flags
-            branches[b]["attach"], branches[b]["first"] = attach, len(rest)
-            branches[b]["lag"] = self.random.integers(4)
-            at = np.zeros(3) if attach < 0 else rest[attach]
-            for step in self.random.normal(0.3, 0.2, (count, 3)):
-                at = at + step
-                rest.append(at)
-        return branches, np.array(rest)
-
-    def file(self) -> bytes:
-        self._add_prelude()
-        for segment in range(self.SEGMENTS):
-            self._add_segment(segment)
-        levels = self.plan.level_count
-        header = container.Header(
-            self.vertex_count, len(self.branches), self.FRAMES, self.SEGMENTS, levels, levels, 1.0, self.is_float64
-        )
-        out = io.BytesIO()
-        self.store.write(out, header, np.zeros((levels, self.SEGMENTS, 3)))
-        return out.getvalue()
-
-    def _add_prelude(self) -> None:
-        counts = len(self.branches), self.vertex_count
-        permutations = [self.random.permutation(count).astype(np.int32) for count in counts]
-        self.store.add(container.HIERARCHY, streams.encode_hierarchy(self.branches, *permutations))
-        head = writing.Rest(self.origin, 0.01, np.dtype(self.exact or np.float32), exact=bool(self.exact))
-        times = writing.pack_steady_time(np.arange(self.FRAMES) / 24.0)
-        if self.exact:
-            pose = (self.rest + self.origin).astype(self.exact)
-            head.stream = streams.encode_exact_rest(self.branches, pose)
-            self.plan.set_rest(pose.astype(np.float64) - self.origin)
-            times = writing.pack_time(streams.encode_times(self.random.random(self.FRAMES).cumsum()))
-        else:
-            coded = streams.encode_rest(self.branches, 0.01, self.rest)
-            head.stream = coded.stream
-            self.plan.set_rest(coded.decoded)
-        self.store.add(container.REST, writing.pack_rest(head))
-        self.store.add(container.TIME, times)
-        self.shapes = self._some_shapes()
-        for level, stream in streams.encode_learned_modes(self.plan, self.shapes).items():
-            self._add(container.SHAPES, stream, level, 0)
-
-    def _rows(self, *shape: int) -> np.ndarray:
-        """Integers of all sizes, mostly small, with zeros at the high frequencies and whole rows of zeros."""
-        size = np.exp2(self.random.uniform(0, 6, (*shape[:-1], 1)) - 0.2 * np.arange(shape[-1]))
-        filled = self.random.random((*shape[:-2], 1, 1)) < 0.8
-        rows = np.rint(self.random.normal(0, 1, shape) * size) * filled
-        rows.flat[self.random.integers(rows.size, size=9)] = 40_000
-        return rows.astype(np.int32)
-
-    def _basis(self, rank: int, frames: int) -> np.ndarray:
-        """Entries up to the ends of their range."""
-        limit = MOST_SAMPLE
-        basis = self.random.integers(-limit, limit + 1, (rank, frames)).astype(np.int32)
-        basis[0, :3] = limit, -limit, limit
-        return basis
-
-    def _motion(self, frames: int, bases: dict[int, np.ndarray]) -> SegmentMotion:
-        streams = [
-            LevelStream(float(np.float32(0.03 + 0.01 * level)), float(container.ROTATION_FACTORS[level % 3]))
-            for level in range(self.plan.level_count)
-        ]
-        for level, basis in bases.items():
-            streams[level].temporal = basis / MOST_SAMPLE
-        motion = SegmentMotion(self.plan, frames, streams, self.shapes)
-        motion.coefficients[:] = self._rows(*motion.coefficients.shape)
-        motion.tracks[:] = self._rows(*motion.tracks.shape)
-        motion.node_tracks[:] = self._rows(*motion.node_tracks.shape)
-        motion.node_steps[:] = self.random.integers(-13, -4, len(motion.node_steps))
-        ranks = [len(bases.get(level, range(frames))) for level in range(self.plan.level_count)]
-        for p, piece in enumerate(self.plan.pieces):
-            first, low = piece["first"], piece["low_modes"]
-            base_rank = ranks[piece["low_level"] if piece["low_level"] >= 0 else piece["level"]]
-            motion.tracks[p, :, :, base_rank:] = 0
-            motion.coefficients[first : first + low, :, base_rank:] = 0
-            motion.coefficients[first + low : first + piece["count"], :, ranks[piece["level"]] :] = 0
-        return motion
-
-    def _add_segment(self, segment: int) -> None:
-        start, stop = (self.FRAMES * (segment + i) // self.SEGMENTS for i in (0, 1))
-        frames, levels = stop - start, self.plan.level_count
-        bases = {level: self._basis(rank + self.excess, frames) for level, rank in self.bases.items()}
-        motion = self._motion(frames, bases)
-        for level in range(levels):
-            if self.plan.has_stems(level):
-                head = writing.StemsHead(motion.streams[level].step, int(motion.streams[level].rotation_step_factor))
-                if level in bases:
-                    head.basis_kind, head.rank = container.BASIS_AS_SAMPLES, self.bases[level]
-                    head.basis = streams.encode_temporal(bases[level][: head.rank])
-                stream = streams.encode_stems(motion, level)
-                self._add(container.STEMS, writing.pack_stems(head, stream), level, segment)
-            if self.plan.has_affines(level):
-                self._add(container.AFFINES, streams.encode_affines(motion, level), level, segment)
-        self._add(
-            container.CORRECTIONS, writing.pack_corrections(0.125, self._corrections(frames)), levels - 1, segment
-        )
-
-    def _add(self, kind: int, payload: bytes, level: int, segment: int) -> None:
-        if (kind, level, segment) != self.leave_out:
-            self.store.add(kind, payload, level, segment)
-
-    def _corrections(self, frames: int) -> bytes:
-        vectors = self._rows(self.vertex_count, 3, frames).transpose(0, 2, 1)
-        vectors = vectors * (self.random.random((self.vertex_count, frames, 1)) < 0.3)
-        vertex, frame = np.nonzero(vectors.any(axis=2))
-        widths = self.random.integers(0, 3, len(vertex))
-        rows = np.column_stack([vertex, frame, vectors[vertex, frame], widths]).astype(np.int32)
-        return streams.encode_corrections(rows, self.vertex_count, frames)
-
-
-class Sapling(HandMade):
-    """A small one in one segment, cosines alone."""
-
-    SEGMENTS, FRAMES = 1, 9
-    BRANCHES = ((-1, 3, 0), (0, 4, SHEET), (1, 2, 0), (0, 2, LOOSE), (3, 1, WHOLE), (4, 2, 0))
-
-    def __init__(self, seed: int):
-        super().__init__(seed, bool(seed % 2), None, self.BRANCHES)
-        self.bases = {}

@@ -4,7 +4,6 @@ the bound; what does not move keeps its bytes; and a file that lies about its ve
 from __future__ import annotations
 
 import json
-import struct
 from contextlib import closing
 from pathlib import Path
 
@@ -12,8 +11,10 @@ import jsonschema
 import numpy as np
 import pygltflib
 import pytest
+from glb import apart, together
+from plants import distance
 from referencing import Registry, Resource
-from test_gltf import CUBE, Maker, about, far, leafy, seasons  # noqa: F401, fixtures
+from test_gltf import CUBE, Maker, about, leafy, seasons  # noqa: F401, fixtures
 
 import athcodec
 from athcodec.cli import main
@@ -30,22 +31,14 @@ BOUND = 1e-4
 
 
 def structure(path):
-    data = Path(path).read_bytes()
-    size = int.from_bytes(data[12:16], "little")
-    return json.loads(data[20 : 20 + size])
+    return apart(Path(path).read_bytes())[0]
 
 
 def rewritten(path, out, change):
     """The file with another structure: change(json)."""
-    data = Path(path).read_bytes()
-    size = int.from_bytes(data[12:16], "little")
-    gltf = json.loads(data[20 : 20 + size])
+    gltf, behind = apart(Path(path).read_bytes())
     change(gltf)
-    text = json.dumps(gltf).encode()
-    text += b" " * (-len(text) % 4)
-    rest = data[20 + size :]
-    head = struct.pack("<4sII", b"glTF", 2, 20 + len(text) + len(rest)) + struct.pack("<II", len(text), 0x4E4F534A)
-    Path(out).write_bytes(head + text + rest)
+    Path(out).write_bytes(together(json.dumps(gltf).encode(), behind))
     return out
 
 
@@ -98,7 +91,7 @@ def assert_same_motion(source, out, clip=None, **options):
     with read(source, **options) as wanted:
         frames = wanted.block(0, wanted.frame_count)
     assert moved.shape == frames.shape
-    assert far(moved, frames) <= bound + 1e-6 * np.abs(frames).max()
+    assert distance(moved, frames) <= bound + 1e-6 * np.abs(frames).max()
 
 
 def seamed(clip, path, **node):
@@ -178,7 +171,7 @@ def test_the_animation_may_stay_for_programs_that_do_not_know_the_extension(sour
     kept = rewritten(out, tmp_path / "kept.glb", lambda gltf: gltf.pop("extensions"))
     with read(kept) as fallback, read(source) as wanted:
         assert np.array_equal(fallback.block(0, 40), wanted.block(0, 40))
-        assert far(moved, wanted.block(0, 40)) < 0.01
+        assert distance(moved, wanted.block(0, 40)) < 0.01
 
 
 def test_nodes_that_move_and_others_that_share_their_mesh(tmp_path):
@@ -256,7 +249,7 @@ def test_a_mesh_below_an_armature_stays_there_and_what_hangs_on_its_bones_moves_
     (moved, bound), lamp = world(out), 8
     with read(source) as clip:
         frames = np.roll(clip.block(0, clip.frame_count), -lamp, axis=1)  # whose node stands last now
-    assert far(moved, frames) <= bound + 1e-6 * np.abs(frames).max()
+    assert distance(moved, frames) <= bound + 1e-6 * np.abs(frames).max()
     assert np.array_equal(stored_positions(source), stored_positions(out))
     named = {node["name"]: node for node in structure(out)["nodes"]}
     assert named["trunk"].keys() == {"mesh", "name"} and "armature" in named
@@ -328,7 +321,7 @@ def test_decode_verify_and_info_take_the_glb_itself(source, tmp_path, capsys):
         with read(source) as one, read(tmp_path / name) as two:
             assert np.array_equal(one.faces, two.faces)
             size = np.linalg.norm(np.ptp(one.block(0, one.frame_count).reshape(-1, 3), axis=0))
-            assert far(one.block(0, 40), two.block(0, 40)) <= 3 * BOUND * size
+            assert distance(one.block(0, 40), two.block(0, 40)) <= 3 * BOUND * size
 
 
 @pytest.fixture
@@ -361,7 +354,7 @@ def test_a_glb_with_several_motions_is_opened_by_name(stand, tmp_path, capsys):
         with read(source, only=[f"{name}*"]) as wanted, athcodec.open(stand, gltf_motion=name) as decoder:
             shown = decoder.positions(slice(0, 12)) + (wanted.rest - decoder.file.rest)
             assert decoder.file.vertex_count == 8 and len(decoder.file.faces) == 2
-            assert far(shown, wanted.block(0, 12)) <= decoder.file.max_error_bound + 1e-5
+            assert distance(shown, wanted.block(0, 12)) <= decoder.file.max_error_bound + 1e-5
     for choice, said in ((None, "oak.*beech"), ("elm", "oak.*beech")):
         with pytest.raises(ClipError, match=said):
             athcodec.open(stand, gltf_motion=choice)
@@ -380,7 +373,7 @@ def test_motions_of_a_glb_are_written_back_and_cut_each_or_all(stand, tmp_path):
     assert main(["decode", str(stand), str(tmp_path / "oak.glb"), "--gltf-motion", "oak"]) == 0
     with read(tmp_path / "stand.glb", takes="all") as wanted, read(tmp_path / "all.glb", takes="all") as shown:
         assert [each.name for each in shown.clip_ranges] == ["oak sways", "beech sways"]
-        assert far(shown.block(0, 24), wanted.block(0, 24)) <= 3 * BOUND * 4
+        assert distance(shown.block(0, 24), wanted.block(0, 24)) <= 3 * BOUND * 4
     assert "ATH_motion" not in structure(tmp_path / "all.glb").get("extensionsUsed", [])
     left = structure(tmp_path / "oak.glb")
     check_schemas(left)
@@ -435,7 +428,7 @@ def test_a_glb_is_decoded_into_a_glb_that_has_all_it_had(keep, source, tmp_path)
     assert not {"extensions", "extensionsUsed", "skins"} & gltf.keys() and len(gltf["animations"]) == 1
     moved, _ = world(out)
     with read(tmp_path / "again.glb") as again:
-        assert far(again.block(0, 30), moved[5:35]) < 1e-5 * np.abs(moved).max()
+        assert distance(again.block(0, 30), moved[5:35]) < 1e-5 * np.abs(moved).max()
 
 
 def test_seams_parts_and_clips_come_back_too(leafy, seasons, tmp_path):  # noqa: F811
@@ -453,7 +446,7 @@ def test_seams_parts_and_clips_come_back_too(leafy, seasons, tmp_path):  # noqa:
                 read(tmp_path / f"{name}.glb", takes=[take]) as before,
             ):
                 assert again.frame_count == before.frame_count
-                assert far(again.block(0, again.frame_count), world(out, take)[0]) < 1e-5 * 40
+                assert distance(again.block(0, again.frame_count), world(out, take)[0]) < 1e-5 * 40
                 assert again.metadata["start_frame"] == pytest.approx(before.metadata["start_frame"])
 
 

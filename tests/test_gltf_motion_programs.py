@@ -13,7 +13,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from test_gltf import far, leafy, seasons  # noqa: F401, fixtures
+from plants import distance
+from test_gltf import leafy, seasons  # noqa: F401, fixtures
 from test_gltf_motion import encoded, moved_primitives, rewritten, seamed, stored_positions, world
 from test_gltf_programs import node, three_file  # noqa: F401, fixtures
 
@@ -79,7 +80,7 @@ def test_files_are_valid_and_engines_show_what_the_text_says(kind, sources, node
     frames = [0, 7, len(times) - 1]
     for engine in ENGINES:
         shown, facts = played(engine, out, times[frames])
-        assert far(shown, wanted[frames]) < 1e-5 * np.abs(wanted).max(), engine
+        assert distance(shown, wanted[frames]) < 1e-5 * np.abs(wanted).max(), engine
         assert facts["warnings"] == [] and [animation[0] for animation in facts["animations"]] == [name]
 
 
@@ -92,7 +93,7 @@ def test_what_is_decoded_into_the_file_is_valid_and_three_plays_it(kind, sources
     (tmp_path / "times.json").write_text(json.dumps([0.5 + start_of(kind)]))
     node("play.mjs", tmp_path / "again.glb", tmp_path / "times.json", tmp_path / "out.bin")
     shown = np.fromfile(tmp_path / "out.bin", "<f4").reshape(-1, 3)
-    assert far(shown, wanted[12 if kind == "three" else 15]) < 1e-5 * np.abs(wanted).max()
+    assert distance(shown, wanted[12 if kind == "three" else 15]) < 1e-5 * np.abs(wanted).max()
 
 
 @pytest.mark.parametrize("engine", ENGINES)
@@ -104,7 +105,7 @@ def test_clips_play_by_their_names_at_their_times(engine, seasons, played, tmp_p
         with athcodec.open(out, clip=name) as decoder:
             times = decoder.time - decoder.time[0]
         shown, facts = played(engine, out, times[[0, 5, 11]], name)
-        assert far(shown, wanted[[0, 5, 11]]) < 1e-3 * np.abs(wanted).max()  # float32 times of keys
+        assert distance(shown, wanted[[0, 5, 11]]) < 1e-3 * np.abs(wanted).max()  # float32 times of keys
         assert sorted(animation[0] for animation in facts["animations"]) == sorted(seasons)
 
 
@@ -113,7 +114,7 @@ def test_a_skin_that_was_kept_is_not_applied_to_the_motion(engine, sources, play
     out = encoded(sources["joints"], tmp_path / "out.glb", "--keep-animation")
     wanted, _ = world(out)
     shown, _ = played(engine, out, [0.5])
-    assert far(shown, wanted[15:16]) < 1e-5 * np.abs(wanted).max()
+    assert distance(shown, wanted[15:16]) < 1e-5 * np.abs(wanted).max()
 
 
 @pytest.mark.parametrize("engine", ENGINES)
@@ -150,9 +151,9 @@ def test_gltf_transform_leaves_motions_whole(steps, kind, sources, node, played,
     assert json.loads(node("gltf_motion_transform.mjs", *words).splitlines()[-1])["refused"] is None
     assert_valid(node, tmp_path / "again.glb")
     before, after = world(out)[0], world(tmp_path / "again.glb")[0]
-    assert far(before, after) < 1e-9
+    assert distance(before, after) < 1e-9
     shown, _ = played("three", tmp_path / "again.glb", [0.5 + start_of(kind)])
-    assert far(shown[0], after[12 if kind == "three" else 15]) < 1e-5 * np.abs(after).max()
+    assert distance(shown[0], after[12 if kind == "three" else 15]) < 1e-5 * np.abs(after).max()
 
 
 def test_vertices_that_carry_their_numbers_may_be_put_in_another_order(sources, node, tmp_path):  # noqa: F811

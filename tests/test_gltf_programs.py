@@ -15,15 +15,17 @@ from pathlib import Path
 import numpy as np
 import pygltflib
 import pytest
+from plants import distance
 from programs import install_once
-from test_gltf import Maker, as_metres, crown, far, leafy, leafy_ath, seasons, seasons_ath  # noqa: F401, the fixtures too
+from test_gltf import Maker, as_metres, crown, leafy, leafy_ath, seasons, seasons_ath  # noqa: F401, the fixtures too
+from test_gltf_motion import structure
 from test_vat import exr
 
 import athcodec
 from athcodec import MotionClip
 from athcodec.decoding.clip_view import ClipView
 from athcodec.exporters import write
-from athcodec.exporters.fitting import quaternions
+from athcodec.motion.quaternions import quaternions
 from athcodec.sources import read
 
 pytestmark = pytest.mark.programs
@@ -111,7 +113,7 @@ def test_what_three_writes_moves_as_three_plays_it(three_file, played, fps):
         positions = clip.block(0, clip.frame_count)
         assert clip.metadata["fps"] == (fps or 24) and clip.metadata["part_names"] == ["stem", "leaf", "twin"]
         assert clip.skin.joint_parent.tolist() == [-1, 0, 1, 2, 3, -1, -1]
-        assert far(positions, played(three_file, clip.time)) < 1e-5
+        assert distance(positions, played(three_file, clip.time)) < 1e-5
 
 
 @pytest.mark.parametrize("form, error", [("quantize", 1e-5), ("sparse", 1e-5), ("meshopt", 1e-3)])
@@ -119,7 +121,7 @@ def test_other_forms_by_gltf_transform_move_as_three_plays_them(three_file, node
     # Quantised rotations are not quite of length 1, which three.js does not mend.
     node("transform.mjs", three_file, tmp_path / "form.glb", form)
     with read(tmp_path / "form.glb") as clip:
-        assert far(clip.block(0, 25), played(tmp_path / "form.glb", clip.time)) < error
+        assert distance(clip.block(0, 25), played(tmp_path / "form.glb", clip.time)) < error
 
 
 def test_files_beside_each_other_by_gltf_transform_are_the_same_clip(three_file, node, tmp_path):
@@ -139,9 +141,9 @@ def test_what_is_written_is_valid_and_three_plays_it_within_the_stated_error(
             view = ClipView(decoder, level, range(4, 30))
             write(view, path, animation=animation)
             assert_valid(node, path)
-            stated = json.loads(structure(path))["asset"]["extras"]["athcodec"]["max_error"]
+            stated = structure(path)["asset"]["extras"]["athcodec"]["max_error"]
             shown = played(path, view.time - view.time[0])
-            assert far(shown, view.block(0, 26)) <= stated + 1e-5
+            assert distance(shown, view.block(0, 26)) <= stated + 1e-5
 
 
 def test_a_rig_is_valid_and_three_plays_it_within_the_stated_error(leafy_ath, node, played, tmp_path):
@@ -150,7 +152,7 @@ def test_a_rig_is_valid_and_three_plays_it_within_the_stated_error(leafy_ath, no
         view = ClipView(decoder)
         stated = write(view, path, rig=300).facts["max_error"]
         assert_valid(node, path)
-        assert far(played(path, view.time - view.time[0]), view.block(0, view.frame_count)) <= stated + 1e-5
+        assert distance(played(path, view.time - view.time[0]), view.block(0, view.frame_count)) <= stated + 1e-5
 
 
 @pytest.mark.parametrize("animation", ["joints", "morphs"])
@@ -158,7 +160,7 @@ def test_copies_are_valid_and_three_plays_them_within_the_stated_error(animation
     clip, path = crown(), tmp_path / "a.glb"
     stated = write(clip, path, animation=animation, instances=True).facts["max_error"]
     assert_valid(node, path)
-    assert far(played(path, clip.time), as_metres(clip)[:, 30:]) <= stated / 100 + 1e-6, "the stem is lines"
+    assert distance(played(path, clip.time), as_metres(clip)[:, 30:]) <= stated / 100 + 1e-6, "the stem is lines"
 
 
 def test_copies_that_stand_still_are_instances_for_three(node, played, tmp_path):
@@ -167,7 +169,7 @@ def test_copies_that_stand_still_are_instances_for_three(node, played, tmp_path)
     found = json.loads(node("validate.mjs", path))
     notes = {message.partition(" ")[0] for message in found["messages"]}
     assert found["errors"] == found["warnings"] == 0 and notes <= {"UNSUPPORTED_EXTENSION", "UNUSED_OBJECT"}
-    assert far(played(path, [0]), as_metres(clip, 1)[:, 30:]) <= stated / 100 + 1e-6
+    assert distance(played(path, [0]), as_metres(clip, 1)[:, 30:]) <= stated / 100 + 1e-6
 
 
 @pytest.mark.parametrize("animation", ["joints", "morphs"])
@@ -181,15 +183,15 @@ def test_three_lists_clips_by_name_and_plays_each_within_the_stated_error(
         (tmp_path / "none.json").write_text("[]")
         listed = json.loads(node("play.mjs", path, tmp_path / "none.json", tmp_path / "none.bin"))["animations"]
         assert listed == list(seasons)
-        stated = json.loads(structure(path))["asset"]["extras"]["athcodec"]["max_error"]
+        stated = structure(path)["asset"]["extras"]["athcodec"]["max_error"]
         for name in seasons:
             one = decoder.play(name)
-            assert far(played(path, one.time - one.time[0], name), one.positions()) <= stated + 1e-5
+            assert distance(played(path, one.time - one.time[0], name), one.positions()) <= stated + 1e-5
         calm = decoder.play("calm")
         ends = played(path, [0, len(calm.time) / calm.fps, (len(calm.time) - 0.5) / calm.fps], "calm")
-        assert far(ends[1], ends[0]) < 1e-6, "what is repeated goes on without a jump"
+        assert distance(ends[1], ends[0]) < 1e-6, "what is repeated goes on without a jump"
         between = (calm.positions(0) + calm.positions(-1)) / 2
-        assert far(ends[2], between) < 0.1 * far(calm.positions(0), calm.positions(-1)) + stated
+        assert distance(ends[2], between) < 0.1 * distance(calm.positions(0), calm.positions(-1)) + stated
 
 
 def test_a_clip_goes_from_three_through_ath_and_back_to_three(three_file, node, played, tmp_path):
@@ -200,16 +202,11 @@ def test_a_clip_goes_from_three_through_ath_and_back_to_three(three_file, node, 
     with athcodec.open(tmp_path / "a.ath") as decoder:
         write(ClipView(decoder), tmp_path / "b.glb", animation="morphs")
         assert_valid(node, tmp_path / "b.glb")
-        assert far(played(tmp_path / "b.glb", np.arange(25) / 24), before) <= decoder.file.max_error_bound + 1e-5
+        assert distance(played(tmp_path / "b.glb", np.arange(25) / 24), before) <= decoder.file.max_error_bound + 1e-5
 
 
 def read_as_one_branch(clip):
     return clip.replace(vertex_branch=np.zeros(clip.vertex_count, np.int32), branch_parent=np.array([-1]))
-
-
-def structure(path):
-    data = path.read_bytes()
-    return data[20 : 20 + int.from_bytes(data[12:16], "little")]
 
 
 def test_lines_points_objects_and_colours_are_valid_too(leafy, node, tmp_path):
@@ -270,8 +267,8 @@ def test_an_animal_that_people_rigged_walks_as_panda3d_and_three_walk_it(panda, 
     with read(path) as clip:
         positions = clip.block(0, clip.frame_count)
         assert clip.metadata["fps"] == 30 and np.array_equal(clip.faces, panda["faces"])
-        assert far(positions, panda["positions"]) < 1e-4 * size  # Panda3D's matrices are rigid to 1e-5
-        assert far(positions[::10], played(path, clip.time[::10])) < 1e-6 * size
+        assert distance(positions, panda["positions"]) < 1e-4 * size  # Panda3D's matrices are rigid to 1e-5
+        assert distance(positions[::10], played(path, clip.time[::10])) < 1e-6 * size
 
 
 def test_an_animal_goes_through_ath_and_is_played_within_the_bound(panda, node, played, tmp_path):
@@ -282,9 +279,9 @@ def test_an_animal_goes_through_ath_and_is_played_within_the_bound(panda, node, 
         for animation in ("joints", "morphs"):
             write(ClipView(decoder), tmp_path / "b.glb", animation=animation)
             assert_valid(node, tmp_path / "b.glb")
-            stated = json.loads(structure(tmp_path / "b.glb"))["asset"]["extras"]["athcodec"]["max_error"]
+            stated = structure(tmp_path / "b.glb")["asset"]["extras"]["athcodec"]["max_error"]
             shown = played(tmp_path / "b.glb", times[::10])
-            assert far(shown, wanted[::10]) <= decoder.file.max_error_bound + stated + 1e-6 * np.abs(wanted).max()
+            assert distance(shown, wanted[::10]) <= decoder.file.max_error_bound + stated + 1e-6 * np.abs(wanted).max()
 
 
 @pytest.mark.parametrize("bound", [1e-3, 1e-4])

@@ -6,8 +6,8 @@ long ones.
 
 from __future__ import annotations
 
+import itertools
 import threading
-from itertools import count
 
 import numpy as np
 import pytest
@@ -52,7 +52,7 @@ def test_closing_while_others_play_is_an_error_of_theirs_and_no_crash(sample_ath
     def play(seed: int) -> None:
         rng = np.random.default_rng(seed)
         try:
-            for shown in count():
+            for shown in itertools.count():
                 frame = int(rng.integers(decoder.frame_count))
                 if not np.array_equal(decoder.positions(frame), expected[frame]):
                     unexpected.append(frame)
@@ -75,16 +75,12 @@ def test_closing_while_others_play_is_an_error_of_theirs_and_no_crash(sample_ath
 # ---- for long and many ----
 
 
-def test_a_thousand_seeks_do_not_grow_memory(bushy_ath):
-    row = load.seeks(bushy_ath, 1_000)
-    assert row.tried == 1_000 and row.crashes == row.wrong == 0
-    assert row.over_limit == 0, row.note
-
-
-@pytest.mark.slow
-def test_ten_thousand_seeks_do_not_grow_memory(sample_ath):
-    row = load.seeks(sample_ath, 10_000)
-    assert row.tried == 10_000 and row.crashes == row.wrong == row.over_limit == 0, row.note
+@pytest.mark.parametrize(
+    "count, name", [(1_000, "bushy_ath"), pytest.param(10_000, "sample_ath", marks=pytest.mark.slow)]
+)
+def test_thousands_of_seeks_do_not_grow_memory(count, name, request):
+    row = load.seeks(request.getfixturevalue(name), count)
+    assert row.tried == count and row.crashes == row.wrong == row.over_limit == 0, row.note
 
 
 def test_a_thousand_files_are_open_at_once_and_close_in_any_order(full_ath):

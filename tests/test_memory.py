@@ -1,4 +1,5 @@
-"""Memory of exporting: that of a few segments, however many frames there are. Each format in a process of its own."""
+"""Memory of exporting and of reading: that of a few segments, however many frames there are. Each format in a process
+of its own."""
 
 from __future__ import annotations
 
@@ -24,6 +25,15 @@ with athcodec.open(sys.argv[1]) as decoder:
     athcodec.write(ClipView(decoder), sys.argv[2], sys.argv[3], animation="morphs")
 print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
 """
+READ = """
+import resource, sys
+import athcodec
+
+with athcodec.read(sys.argv[1]) as clip:
+    for _ in clip.blocks():
+        pass
+print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
+"""
 STREAMING = [
     kind
     for kind in FORMATS
@@ -47,13 +57,16 @@ def files(tmp_path_factory):
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no resource module")
 @pytest.mark.parametrize("kind", STREAMING, ids=lambda kind: kind.name)
-def test_exporting_more_frames_takes_no_more_memory(kind, files, tmp_path):
-    few, many = (_peak(path, tmp_path / f"{path.stem}{kind.suffixes[0]}", kind.name) for path in files)
+def test_exporting_more_frames_takes_no_more_memory_nor_does_reading_them(kind, files, tmp_path):
+    targets = [tmp_path / f"{path.stem}{kind.suffixes[0]}" for path in files]
+    written = [_peak(EXPORT, path, target, kind.name) for path, target in zip(files, targets)]
+    read = [_peak(READ, target) for target in targets] if kind.name == "usd" else [0, 0]
     added = 12 * VERTICES * FRAMES * (TIMES - 1)  # bytes of the further frames
-    assert many - few < 0.5 * added
+    for few, many in (written, read):
+        assert many - few < 0.5 * added
 
 
-def _peak(source, target, kind: str) -> int:
-    command = [sys.executable, "-c", EXPORT, str(source), str(target), kind]
+def _peak(program: str, *words: object) -> int:
+    command = [sys.executable, "-c", program, *map(str, words)]
     done = subprocess.run(command, check=True, capture_output=True, text=True)
     return int(done.stdout) * (1 if sys.platform == "darwin" else 1024)

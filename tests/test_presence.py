@@ -13,6 +13,7 @@ from imath import IntArray, V3fArray
 from pxr import Gf, Usd, UsdGeom, UsdSkel, Vt
 from test_alembic import filled, matrix
 from test_gltf import Maker
+from test_usd import read_all
 
 import athcodec
 from athcodec import cli
@@ -53,11 +54,6 @@ def add_leaves(stage, frames, place="/leaves"):
         if invisible is not None:
             instancer.CreateInvisibleIdsAttr().Set(invisible, code)
     return instancer
-
-
-def read_all(path, **options):
-    with athcodec.read(path, **options) as clip:
-        return clip, clip.block(0, clip.frame_count)
 
 
 def volume(clip, positions):

@@ -7,15 +7,14 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 import zstandard
-from files import Parts, coded, opened
+from files import coded
 from plants import diagonal
+from test_document import assert_same_bits
 
 import athcodec
 from athcodec._native import BRANCH
-from athcodec.decoding import container
 from athcodec.encoding import streams
-from athcodec.errors import AthError
-from spec.document import File, rules
+from spec.document import rules
 
 
 def terrain(rows: int, columns: int, rough: float, seed: int) -> np.ndarray:
@@ -132,10 +131,7 @@ def test_a_still_mesh_is_encoded_without_a_search(scratch):
 @pytest.mark.parametrize("ladder", ["none", "decades"])
 def test_the_document_plays_the_same_still_mesh(scratch, ladder):
     athcodec.encode(still(terrain(12, 9, 0.1, 7), 2), scratch / "still.ath", rel_error=1e-4, ladder=ladder)
-    data = (scratch / "still.ath").read_bytes()
-    with athcodec.open(scratch / "still.ath") as decoder:
-        for level in range(decoder.file.level_count):
-            assert decoder.positions(level=level).tobytes() == File(data).positions(level).tobytes()
+    assert_same_bits((scratch / "still.ath").read_bytes())
 
 
 @pytest.mark.parametrize("lag", [1, 2, 3, 4, 5, 30, 65535])
@@ -166,23 +162,6 @@ def test_slack_saves_bytes_and_is_kept():
     tight, loose = (streams.encode_rest(branches, 0.1, points, None, slack) for slack in (0.0, 0.0699))
     assert len(loose.stream) < 0.97 * len(tight.stream)
     assert np.linalg.norm(loose.decoded - points, axis=1).max() <= 0.0699
-
-
-@pytest.mark.parametrize("seed", range(8))
-def test_random_bytes_as_a_rest_pose_are_the_same_positions_to_all_or_refused(scratch, seed):
-    random = np.random.default_rng(seed)
-    athcodec.encode(still(terrain(9, 9, 0.1, seed)), scratch / "file.ath", attributes="none", ladder="none")
-    parts = Parts.of((scratch / "file.ath").read_bytes())
-    rest = parts.payload(container.REST)
-    stream = random.integers(1, 256, len(rest) - 17, np.uint8).tobytes()
-    data = parts.with_payload(container.REST, rest[:17] + stream)
-    outcomes = []
-    for play in (lambda: opened(data).positions(), lambda: File(data).positions()):
-        try:
-            outcomes.append(play().tobytes())
-        except (AthError, rules.Invalid):
-            outcomes.append(None)
-    assert outcomes[0] == outcomes[1]
 
 
 def two_stems(trunk: int, branch: int, lag: int) -> np.ndarray:

@@ -7,7 +7,7 @@ import json
 import numpy as np
 import pytest
 from pxr import Sdf, Usd, UsdGeom, UsdSkel
-from test_usd import add_grid, add_leaves, complaints, new_stage
+from test_usd import complaints, leafy_stage
 
 import athcodec
 from athcodec import ClipView, cli
@@ -81,10 +81,7 @@ def several_ath(sample_clip, tmp_path):
 
 
 def test_leaves_of_an_instancer_are_joints_each_and_validators_have_nothing_to_say(tmp_path):
-    stage = new_stage(tmp_path / "a.usda")
-    add_grid(stage)
-    add_leaves(stage)
-    stage.Save()
+    leafy_stage(tmp_path / "a.usda")
     with athcodec.read(tmp_path / "a.usda") as clip:
         written = athcodec.write(clip, tmp_path / "b.usda", rig=20)
         assert written.facts["joints"] >= 7 and written.facts["max_error"] < 0.1
@@ -102,10 +99,7 @@ def test_rigs_that_cannot_be_are_refused(sample_ath, tmp_path):
 
 @pytest.mark.parametrize("suffix", ["usda", "usdc"])
 def test_an_assembly_has_its_instances_on_joints_and_is_as_far_off_as_it_says(tmp_path, suffix):
-    stage = new_stage(tmp_path / "a.usda")
-    add_grid(stage)
-    add_leaves(stage)
-    stage.Save()
+    leafy_stage(tmp_path / "a.usda")
     with athcodec.read(tmp_path / "a.usda") as clip:
         written = athcodec.write(clip, tmp_path / f"b.{suffix}", rig=20, nanite=True)
         positions = clip.block(0, clip.frame_count).astype(np.float64)
@@ -150,9 +144,7 @@ def _instances(stage, instancer, moved, names):
 
 
 def test_an_assembly_needs_a_base_a_rig_and_usd(tmp_path, sample_clip):
-    stage = new_stage(tmp_path / "a.usda")
-    add_leaves(stage)
-    stage.Save()
+    leafy_stage(tmp_path / "a.usda", grid=False)
     with athcodec.read(tmp_path / "a.usda") as clip:
         with pytest.raises(ClipError, match="nanite: got no mesh beside the copies"):
             athcodec.write(clip, tmp_path / "b.usda", rig=20, nanite=True)

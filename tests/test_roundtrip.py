@@ -9,7 +9,20 @@ import pytest
 from files import opened, still_file
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
-from plants import MOTIONS, SHAPES, STEADY, awkward, awkward_plants, bound_for, bush, chain_plant, clip_of, plant, tube
+from plants import (
+    MOTIONS,
+    SHAPES,
+    STEADY,
+    awkward,
+    awkward_plants,
+    bound_for,
+    bush,
+    chain_plant,
+    clip_of,
+    distance,
+    plant,
+    tube,
+)
 
 import athcodec
 from athcodec import MotionClip, Thresholds
@@ -20,11 +33,6 @@ from athcodec.motion.clip import NOT_KEPT
 from athcodec.motion.hierarchy import derived_edges, hierarchy_of
 
 
-def largest_error(decoded: np.ndarray, clip: MotionClip) -> float:
-    source = clip.block(0, clip.frame_count).astype(np.float64)
-    return float(np.linalg.norm(decoded.astype(np.float64) - source, axis=2).max())
-
-
 def assert_comes_back(clip: MotionClip, folder, fraction: float = 1e-3, **options) -> None:
     """Encodes and decodes; the bound, the announced errors and the hierarchy must hold."""
     bound = bound_for(clip, fraction)
@@ -33,7 +41,7 @@ def assert_comes_back(clip: MotionClip, folder, fraction: float = 1e-3, **option
         decoder.file.check()
         decoded = decoder.positions()
         assert decoded.dtype == clip.dtype and decoded.shape == clip.positions.shape
-        assert largest_error(decoded, clip) <= bound == decoder.file.max_error_bound
+        assert distance(decoded, clip.positions) <= bound == decoder.file.max_error_bound
         assert np.array_equal(decoder.file.vertex_branch, clip.vertex_branch)
         assert np.array_equal(decoder.file.branch_parent, clip.branch_parent)
         assert np.array_equal(decoder.time, clip.time)
@@ -157,14 +165,14 @@ def test_chains_fold_the_depths_beyond_29_into_one_level(scratch):
 def test_float64_output_of_a_float32_file_is_within_the_bound_too(bushy_ath, bushy_clip):
     with athcodec.open(bushy_ath) as decoder:
         wide = decoder.positions(dtype=np.float64)
-        assert wide.dtype == np.float64 and largest_error(wide, bushy_clip) <= decoder.file.max_error_bound
+        assert wide.dtype == np.float64 and distance(wide, bushy_clip.positions) <= decoder.file.max_error_bound
 
 
 def test_a_float64_source_gives_float64_and_errors_below_what_float32_could_tell(scratch):
     clip = plant(seed=6, branches=4, frames=16, dtype=np.float64, offset=1e4)
     bound = float(np.spacing(np.float32(1e4))) / 1000
     decoder = reopened(clip, scratch, rel_error=None, max_error=bound)
-    assert decoder.file.dtype == np.float64 and largest_error(decoder.positions(), clip) <= bound
+    assert decoder.file.dtype == np.float64 and distance(decoder.positions(), clip.positions) <= bound
 
 
 def test_a_static_clip_costs_no_more_than_its_rest_pose(scratch):
@@ -211,7 +219,7 @@ def test_a_clip_without_a_rest_pose_gets_one_from_its_frames(rest_pose, scratch)
     expected = source.positions[0] if rest_pose == "first" else source.positions.mean(axis=0, dtype=np.float64)
     decoder = reopened(clip, scratch)
     assert np.linalg.norm(decoder.file.rest - expected, axis=1).max() <= decoder.file.max_error_bound
-    assert largest_error(decoder.positions(), clip) <= decoder.file.max_error_bound
+    assert distance(decoder.positions(), clip.positions) <= decoder.file.max_error_bound
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
@@ -222,7 +230,7 @@ def test_an_exact_rest_pose_comes_back_bit_for_bit(dtype, scratch):
     clip = source.replace(rest=rest)
     decoder = reopened(clip, scratch, exact_rest=True)
     assert decoder.file.rest.dtype == dtype and decoder.file.rest.tobytes() == rest.tobytes()
-    assert largest_error(decoder.positions(), clip) <= decoder.file.max_error_bound
+    assert distance(decoder.positions(), clip.positions) <= decoder.file.max_error_bound
 
 
 # ---- static data ----

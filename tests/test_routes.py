@@ -24,9 +24,10 @@ import numpy as np
 import pygltflib
 import pytest
 from alembic3d import Abc, AbcCoreAbstract, AbcGeom
+from glb import accessor_of, posed
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade, UsdSkel, Vt
 from test_alembic import filled, matrix
-from test_gltf import Maker, accessor_of, transform
+from test_gltf import Maker
 from test_vat import exr, mesh_of, shown_by_matrices, shown_by_positions
 
 import athcodec
@@ -230,7 +231,7 @@ def _samples(schema: Any) -> list[Any]:
 
 def in_gltf(path: Path) -> Found:
     gltf = pygltflib.GLTF2().load(str(path))
-    frames = [_posed(gltf, frame) for frame in range(FRAMES)]
+    frames = [posed(gltf, frame) for frame in range(FRAMES)]
     sampler = gltf.animations[0].samplers[0]
     shown = [node for node in gltf.nodes if node.mesh is not None]
     primitives = [gltf.meshes[node.mesh].primitives[0] for node in shown]
@@ -249,70 +250,6 @@ def in_gltf(path: Path) -> Found:
         start=said.get("start_frame"),
         tolerance=1e-2 if "rig" in path.stem else 1e-3,
     )
-
-
-def _posed(gltf: pygltflib.GLTF2, frame: int) -> np.ndarray:
-    """World places of all vertices at a key of the first animation, by the text of glTF."""
-    nodes = [
-        {
-            "translation": node.translation or [0, 0, 0],
-            "rotation": node.rotation or [0, 0, 0, 1],
-            "scale": node.scale or [1, 1, 1],
-            "weights": None,
-        }
-        for node in gltf.nodes
-    ]
-    for channel in gltf.animations[0].channels:
-        sampler = gltf.animations[0].samplers[channel.sampler]
-        count = gltf.accessors[sampler.input].count
-        keys = accessor_of(gltf, sampler.output)
-        keys = keys.reshape(count, -1)
-        nodes[channel.target.node][channel.target.path] = keys[min(frame, count - 1)]
-    world: dict[int, np.ndarray] = {}
-
-    def place(index: int, above: np.ndarray) -> None:
-        own = nodes[index]
-        world[index] = above @ transform(own["translation"], own["rotation"], own["scale"])
-        for child in gltf.nodes[index].children or ():
-            place(child, world[index])
-
-    for root in gltf.scenes[gltf.scene].nodes:
-        place(root, np.eye(4))
-    return np.concatenate(
-        [_of_node(gltf, i, nodes[i]["weights"], world) for i in world if gltf.nodes[i].mesh is not None]
-    )
-
-
-def _of_node(gltf: pygltflib.GLTF2, index: int, weights: Any, world: dict[int, np.ndarray]) -> np.ndarray:
-    node, primitive = gltf.nodes[index], gltf.meshes[gltf.nodes[index].mesh].primitives[0]
-    points = accessor_of(gltf, primitive.attributes.POSITION).astype(np.float64)
-    for number, weight in enumerate(weights if weights is not None else ()):
-        if weight:
-            points = points + weight * accessor_of(gltf, _target(primitive.targets[number]))
-    matrices = world[index][None]
-    if node.skin is not None:
-        skin = gltf.skins[node.skin]
-        bind = accessor_of(gltf, skin.inverseBindMatrices).reshape(-1, 4, 4).swapaxes(1, 2)
-        bones = np.stack([world[joint] @ own for joint, own in zip(skin.joints, bind)])
-        joints, shares = (accessor_of(gltf, getattr(primitive.attributes, name)) for name in ("JOINTS_0", "WEIGHTS_0"))
-        shares = shares / (255 if shares.dtype == np.uint8 else 65535 if shares.dtype == np.uint16 else 1)
-        matrices = np.einsum("nk,nkij->nij", shares, bones[joints])
-    elif "EXT_mesh_gpu_instancing" in (node.extensions or {}):
-        parts = {
-            name: accessor_of(gltf, accessor)
-            for name, accessor in node.extensions["EXT_mesh_gpu_instancing"]["attributes"].items()
-        }
-        own = [transform(*row) for row in zip(parts["TRANSLATION"], parts["ROTATION"], parts["SCALE"])]
-        return np.concatenate([_moved(points, world[index] @ matrix) for matrix in own])
-    return _moved(points, matrices)
-
-
-def _target(target: Any) -> int:
-    return target["POSITION"] if isinstance(target, dict) else target.POSITION
-
-
-def _moved(points: np.ndarray, matrices: np.ndarray) -> np.ndarray:
-    return (matrices[..., :3, :3] @ points[..., None])[..., 0] + matrices[..., :3, 3]
 
 
 def in_numbered(path: Path) -> Found:

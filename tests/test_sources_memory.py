@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import json
 import lzma
 import os
 import struct
@@ -17,6 +16,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+from glb import glb
 
 import athcodec
 from athcodec.errors import ClipError
@@ -134,12 +134,9 @@ def xdmf_laughs(folder: Path) -> Path:
     return folder / "a.xdmf"
 
 
-def glb(folder: Path, gltf: dict, binary: bytes) -> Path:
+def written(folder: Path, gltf: dict, binary: bytes) -> Path:
     gltf |= {"asset": {"version": "2.0"}, "buffers": [{"byteLength": len(binary)}]}
-    text = json.dumps(gltf).encode()
-    text += b" " * (-len(text) % 4)
-    chunks = struct.pack("<II", len(text), 0x4E4F534A) + text + struct.pack("<II", len(binary), 0x004E4942) + binary
-    (folder / "a.glb").write_bytes(struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks)
+    (folder / "a.glb").write_bytes(glb(gltf, binary))
     return folder / "a.glb"
 
 
@@ -153,20 +150,20 @@ def triangle(count: int) -> dict:
 
 def gltf_nodes(folder: Path) -> Path:
     """One mesh, shown by many nodes."""
-    return glb(folder, triangle(10_000) | {"nodes": [{"mesh": 0}] * 10_000}, bytes(12 * 10_000))
+    return written(folder, triangle(10_000) | {"nodes": [{"mesh": 0}] * 10_000}, bytes(12 * 10_000))
 
 
 def gltf_attributes(folder: Path) -> Path:
     """One accessor, under many names."""
     own = triangle(10_000)
     own["meshes"][0]["primitives"][0]["attributes"] |= {f"_A{i}": 0 for i in range(10_000)}
-    return glb(folder, own | {"nodes": [{"mesh": 0}]}, bytes(12 * 10_000))
+    return written(folder, own | {"nodes": [{"mesh": 0}]}, bytes(12 * 10_000))
 
 
 def gltf_copies(folder: Path) -> Path:
     own = triangle(10_000)
     moved = {"EXT_mesh_gpu_instancing": {"attributes": {"TRANSLATION": 0}}}
-    return glb(folder, own | {"nodes": [{"mesh": 0, "extensions": moved}]}, bytes(12 * 10_000))
+    return written(folder, own | {"nodes": [{"mesh": 0, "extensions": moved}]}, bytes(12 * 10_000))
 
 
 def gltf_meshopt(folder: Path) -> Path:
@@ -174,7 +171,7 @@ def gltf_meshopt(folder: Path) -> Path:
     own = triangle(100 << 20)
     packed = {"buffer": 0, "byteLength": 1 << 20, "byteStride": 12, "count": 100 << 20, "mode": "ATTRIBUTES"}
     own["bufferViews"][0] |= {"extensions": {"EXT_meshopt_compression": packed}}
-    return glb(folder, own | {"nodes": [{"mesh": 0}]}, bytes(1 << 20))
+    return written(folder, own | {"nodes": [{"mesh": 0}]}, bytes(1 << 20))
 
 
 def usda_laughs(folder: Path) -> Path:

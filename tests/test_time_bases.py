@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import io
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from test_document import assert_same_bits
 
 import athcodec
 from athcodec.decoding.container import BASIS_IN_WAVES, STEMS
@@ -49,14 +49,6 @@ def stems_heads(data: bytes) -> list[tuple[int, int, int]]:
     return [(chunk[5], chunk[8], int.from_bytes(chunk[9:13], "little")) for chunk in own]
 
 
-def assert_same_as_document(data: bytes) -> None:
-    document = File(data)
-    with athcodec.open(io.BytesIO(data)) as decoder:
-        for level in range(decoder.file.level_count):
-            fresh = decoder.play(decoder.file.clips[0].name)
-            assert np.array_equal(document.positions(level), fresh.positions(level=level))
-
-
 @pytest.mark.parametrize("rank", [1, 2, 3, 4, 7])
 def test_rows_in_waves_are_orthonormal_and_those_of_the_document(rank):
     waves, rng = waves_over_time(FRAMES), np.random.default_rng(rank)
@@ -91,7 +83,7 @@ def test_levels_share_a_basis_that_lies_with_the_first_of_them(tmp_path):
     with athcodec.open(path) as decoder:
         errors = np.linalg.norm(decoder.play(decoder.file.clips[0].name).positions() - clip.positions, axis=2)
     assert errors.max() <= summary.max_error_bound
-    assert_same_as_document(path.read_bytes())
+    assert_same_bits(path.read_bytes())
 
 
 def test_a_shared_basis_makes_files_smaller(tmp_path, monkeypatch):
@@ -107,24 +99,25 @@ def test_a_shared_basis_makes_files_smaller(tmp_path, monkeypatch):
     assert shared < 0.9 * athcodec.encode(clip, tmp_path / "waves.ath", **options).bytes
 
 
-@pytest.mark.vectors
-def test_layers_in_learned_bases_are_decoded_as_the_document_does(tmp_path, monkeypatch):
+@pytest.fixture
+def learned_everywhere(monkeypatch):
     def learned(settings, trials):
         return replace(settings, learned_bases=(True,) * settings.levels)
 
     monkeypatch.setattr(learned_bases, "best_bases", learned)
     monkeypatch.setitem(search.CHOICES, learned, ("time bases", 1.0))
+
+
+@pytest.mark.vectors
+def test_layers_in_learned_bases_are_decoded_as_the_document_does(tmp_path, learned_everywhere):
     path = tmp_path / "layers.ath"
     athcodec.encode(hit_by_a_gust(), path, rel_error=1e-4, attributes="none", ladder=(1e-2, 1e-3))
-    assert_same_as_document(path.read_bytes())
+    assert_same_bits(path.read_bytes())
 
 
-def test_a_layer_whose_basis_needs_fewer_rows_than_the_one_before_it_is_decoded(tmp_path, monkeypatch):
-    def learned(settings, trials):
-        return replace(settings, learned_bases=(True,) * settings.levels)
-
-    monkeypatch.setattr(learned_bases, "best_bases", learned)
-    monkeypatch.setitem(search.CHOICES, learned, ("time bases", 1.0))
+def test_a_layer_whose_basis_needs_fewer_rows_than_the_one_before_it_is_decoded(
+    tmp_path, learned_everywhere, monkeypatch
+):
     monkeypatch.setattr(layers, "basis_ratio", lambda plan, settings, ratio: 100.0 / ratio)
     clip, path = hit_by_a_gust(), tmp_path / "layers.ath"
     athcodec.encode(clip, path, rel_error=1e-4, attributes="none", ladder=(1e-2, 1e-3))

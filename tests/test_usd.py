@@ -2,12 +2,8 @@
 
 from __future__ import annotations
 
-import json
 import os
-import subprocess
-import sys
 from fractions import Fraction
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,7 +13,6 @@ import athcodec
 from athcodec import cli
 from athcodec.errors import ClipError, SourceWarning
 from athcodec.motion.clip import MotionClip
-from athcodec.motion.frames import Frames
 
 pytestmark = pytest.mark.formats
 
@@ -242,16 +237,23 @@ def add_leaves(stage, place="/root/leaves", count=5, frames=range(101, 111)):
     return instancer, places
 
 
+def leafy_stage(path, grid=True):
+    """A grid, where it is wanted, and leaves."""
+    stage = new_stage(path)
+    if grid:
+        add_grid(stage)
+    _, places = add_leaves(stage)
+    stage.Save()
+    return places
+
+
 def leaf_at(shift, angle, size):
     turn = np.array([[np.cos(angle), np.sin(angle), 0], [-np.sin(angle), np.cos(angle), 0], [0, 0, 1]])
     return (LEAF + [0.1, 0, 0]) * size @ turn + shift + [0, 0, 2]
 
 
 def test_a_point_instancer_is_read_as_copies_of_its_prototypes(tmp_path):
-    stage = new_stage(tmp_path / "a.usda")
-    add_grid(stage)
-    _, places = add_leaves(stage)
-    stage.Save()
+    places = leafy_stage(tmp_path / "a.usda")
     clip, positions = read_all(tmp_path / "a.usda")
     leaves = [f"/root/leaves:prototypes/{name}/blade" for name in ("small", "large")]
     assert clip.metadata["part_names"] == ["/root/grid", *leaves]
@@ -476,14 +478,6 @@ def test_a_file_that_changes_while_it_is_read_is_noticed_and_read_afresh_the_nex
             assert again.metadata["unit"] == "m"
 
 
-def test_reading_a_closed_clip_is_an_error(tmp_path):
-    grid_file(tmp_path / "a.usda")
-    with athcodec.read(tmp_path / "a.usda") as clip:
-        pass
-    with pytest.raises(ClipError, match="closed"):
-        clip.block(0, 1)
-
-
 # ---- export ----
 
 
@@ -507,7 +501,7 @@ def assert_same(a, b):
         assert (x is None) == (y is None) and (x is None or np.array_equal(x, y)), name
 
 
-@pytest.mark.parametrize("suffix", ["usda", "usdc", "usd", "usdz"])
+@pytest.mark.parametrize("suffix", ["usda", "usdc", "usd", "usdz", "abc"])
 def test_what_was_read_is_written_again_as_it_was(tmp_path, suffix):
     whole_plant(tmp_path / "a.usdc")
     out = tmp_path / f"b.{suffix}"
@@ -515,8 +509,8 @@ def test_what_was_read_is_written_again_as_it_was(tmp_path, suffix):
         athcodec.write(clip, out)
         with athcodec.read(out) as again:
             assert_same(clip, again)
-    assert sorted(os.listdir(tmp_path)) == ["a.usdc", out.name]
-    assert complaints(out) == []
+    assert set(os.listdir(tmp_path)) == {"a.usdc", out.name}
+    assert suffix == "abc" or complaints(out) == []
 
 
 def test_usd_reads_our_file_with_samples_of_what_moves_only(tmp_path):
@@ -576,17 +570,18 @@ def awkward_clip():
     )
 
 
-def test_data_without_a_place_in_usd_come_back(tmp_path):
+@pytest.mark.parametrize("suffix", ["usdc", "abc"])
+def test_data_without_a_place_in_a_format_come_back(tmp_path, suffix):
     clip = awkward_clip()
-    athcodec.write(clip, tmp_path / "a.usdc")
-    with athcodec.read(tmp_path / "a.usdc") as again:
+    athcodec.write(clip, tmp_path / f"a.{suffix}")
+    with athcodec.read(tmp_path / f"a.{suffix}") as again:
         for name, values in clip.attributes.items():
             assert np.array_equal(again.attributes[name], values) and again.attributes[name].dtype == values.dtype, name
-        for name in ("vertex_branch", "branch_parent", "edges", "rest", "stem_index"):
+        for name in ("vertex_branch", "branch_parent", "edges", "rest", "stem_index", "faces"):
             assert np.array_equal(getattr(again, name), getattr(clip, name)), name
         assert np.allclose(again.time, clip.time, rtol=0, atol=1e-7)
-        assert again.metadata["up_axis"] == "x" and again.metadata["note"] == "wind from the west"
-        assert again.metadata["start_frame"] == 7
+        for name in ("unit", "up_axis", "note", "fps", "start_frame"):
+            assert again.metadata[name] == clip.metadata[name]
         assert np.array_equal(again.block(0, 5), clip.block(0, 5))
 
 
@@ -599,113 +594,6 @@ def test_a_plant_of_edges_becomes_curves_that_keep_its_order(tmp_path, sample_cl
     with athcodec.read(tmp_path / "a.usdc") as again:
         assert np.array_equal(again.edges, sample_clip.edges)
         assert np.array_equal(again.vertex_branch, sample_clip.vertex_branch)
-
-
-def test_a_clip_from_usd_through_ath_to_usd_keeps_the_bound(tmp_path):
-    whole_plant(tmp_path / "a.usdc")
-    with athcodec.read(tmp_path / "a.usdc") as clip:
-        labelled = clip.replace(vertex_branch=np.zeros(clip.vertex_count, np.int32), branch_parent=np.array([-1]))
-        athcodec.encode(labelled, tmp_path / "a.ath", rel_error=1e-4)
-        with athcodec.open(tmp_path / "a.ath") as decoder:
-            athcodec.write(athcodec.ClipView(decoder, frames=range(2, 9)), tmp_path / "b.usdc")
-            bound = decoder.file.max_error_bound
-        with athcodec.read(tmp_path / "b.usdc") as again:
-            error = np.linalg.norm(again.block(0, 7).astype(float) - clip.block(2, 9), axis=2).max()
-            assert 0 < error <= bound * (1 + 1e-5)
-            assert again.metadata["start_frame"] == 103
-            assert again.metadata["part_names"] == clip.metadata["part_names"]
-            assert np.array_equal(again.attributes["uv"], clip.attributes["uv"])
-
-
-MEASURE = """
-import sys, json, numpy as np, athcodec
-from athcodec.motion.clip import MotionClip
-from athcodec.motion.frames import Frames
-frames = int(sys.argv[1])
-most = 0
-def note(done=None):
-    global most
-    most = max(most, next(int(x.split()[1]) for x in open("/proc/self/status") if x.startswith("RssAnon")))
-def make(start, stop):
-    note()
-    return np.random.default_rng(start).random((stop - start, 20000, 3), np.float32)
-clip = MotionClip(Frames(make, frames, 20000), np.arange(frames) / 24.0)
-athcodec.write(clip, sys.argv[2], progress=lambda stage, done: note())
-written, most = most, 0
-with athcodec.read(sys.argv[2]) as again:
-    for start, block in again.blocks():
-        note()
-print(json.dumps([written, most]))
-"""
-
-
-@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="only Linux says how much memory a process has")
-def test_memory_does_not_grow_with_the_number_of_frames(tmp_path):
-    def measure(frames):
-        command = [sys.executable, "-c", MEASURE, str(frames), str(tmp_path / "a.usdc")]
-        return np.array(json.loads(subprocess.run(command, check=True, capture_output=True).stdout))
-
-    few, many = measure(300), measure(1000)  # 72 and 240 MB
-    assert ((many - few) * 1024 < 60e6).all(), (few, many)
-
-
-def test_an_export_that_fails_leaves_what_was_there(tmp_path, sample_clip):
-    (tmp_path / "a.usdc").write_bytes(b"PXR-USDC, old")
-    broken = Frames(lambda start, stop: np.full((stop - start, 4, 3), np.inf if start else 1, np.float32), 9, 4)
-    clip = MotionClip(broken, np.arange(9.0), rest=np.zeros((4, 3)))
-    clip._block_length = lambda most: 3
-    with pytest.raises(ClipError, match="frame 3"):
-        athcodec.write(clip, tmp_path / "a.usdc")
-    assert os.listdir(tmp_path) == ["a.usdc"] and (tmp_path / "a.usdc").read_bytes() == b"PXR-USDC, old"
-
-
-# ---- broken files ----
-
-
-def is_refused(path) -> bool:
-    """Whether a file cannot be read; the error must be one line that names it, or the place in its motion."""
-    try:
-        with athcodec.read(path) as clip:
-            for _ in clip.blocks():
-                pass
-    except (ClipError, OSError) as error:
-        assert "\n" not in str(error) and (str(path) in str(error) or "positions" in str(error))
-        return True
-    return False
-
-
-@pytest.mark.parametrize("suffix", ["usda", "usdc", "usdz"])
-def test_broken_files_are_refused(tmp_path, suffix, capfd):
-    whole_plant(tmp_path / "a.usdc")
-    with athcodec.read(tmp_path / "a.usdc") as clip:
-        athcodec.write(clip, tmp_path / f"b.{suffix}")
-    data = (tmp_path / f"b.{suffix}").read_bytes()
-    rng, refused = np.random.default_rng(7), 0
-    for i, cut in enumerate(np.linspace(1, len(data) - 1, 6).astype(int)):
-        path = tmp_path / f"cut{i}.{suffix}"
-        path.write_bytes(data[:cut])
-        refused += is_refused(path)
-    assert refused >= 4
-    refused = 0
-    for i in range(10):
-        damaged = bytearray(data)
-        for place in rng.integers(0, len(data), rng.integers(1, 9)):
-            damaged[place] = rng.integers(256)
-        path = tmp_path / f"damaged{i}.{suffix}"
-        path.write_bytes(damaged)
-        refused += is_refused(path)
-    assert refused >= 5 and not is_refused(tmp_path / f"b.{suffix}")
-    assert "Traceback" not in capfd.readouterr().err
-
-
-def test_other_files_are_refused_in_one_line(tmp_path):
-    for name, content in {"a.usdc": b"x" * 99, "b.usda": b"#usda 1.0\n", "c.usdz": b"PK\3\4" + bytes(40)}.items():
-        (tmp_path / name).write_bytes(content)
-        with pytest.raises(ClipError, match=name) as caught:
-            athcodec.read(tmp_path / name, "usd")
-        assert "\n" not in str(caught.value)
-    with pytest.raises(FileNotFoundError):
-        athcodec.read(tmp_path / "none.usd")
 
 
 def test_points_that_appear_are_refused_with_what_to_do(tmp_path):

@@ -12,8 +12,8 @@ import OpenEXR
 import png
 import pygltflib
 import pytest
-from plants import plant
-from test_gltf import accessor_of, far, leafy, leafy_ath  # noqa: F401, the fixtures too
+from plants import distance, plant
+from test_gltf import accessor_of, leafy, leafy_ath  # noqa: F401, the fixtures too
 
 import athcodec
 from athcodec.decoding.clip_view import ClipView
@@ -94,7 +94,7 @@ def test_a_shader_shows_every_level_within_the_stated_error(leafy_ath, tmp_path,
             write(view, folder, half=half)
             frames, facts, _ = shown_by_matrices(folder)
             wanted, size = view.block(0, 27), float(np.linalg.norm(np.ptp(view.rest, axis=0)))
-            assert far(frames, wanted) == pytest.approx(facts["max_error"], rel=0.01, abs=1e-6 * size)
+            assert distance(frames, wanted) == pytest.approx(facts["max_error"], rel=0.01, abs=1e-6 * size)
             rounding = 2e-3 * np.abs(wanted - view.rest).max() if half else 1e-6 * size
             assert facts["max_error"] <= max(view.max_error, 1e-5 * size) + rounding
             assert (facts["level"], facts["frames"], facts["start_frame"]) == (level, 27, 3)
@@ -110,7 +110,7 @@ def test_many_nodes_and_frames_wrap_into_more_rows_and_textures(tmp_path, monkey
     frames, facts, mesh = shown_by_matrices(tmp_path / "a.vat")
     assert facts["nodes_per_row"] == 5 and facts["rows_per_frame"] >= 4 and len(facts["textures"]) >= 3
     assert max(facts["width"], facts["height"]) <= 16
-    assert far(frames, clip.block(0, 11)) <= facts["max_error"] + 1e-5
+    assert distance(frames, clip.block(0, 11)) <= facts["max_error"] + 1e-5
     x, y = (mesh["TEXCOORD_1"] * [facts["width"], facts["height"]]).T
     node = mesh["_NODE"][:, 0].astype(int)
     assert np.allclose(x, 3 * (node % 5) + 0.5, atol=1e-4) and np.allclose(y, node // 5 + 0.5, atol=1e-4)
@@ -128,7 +128,7 @@ def test_openvat_textures_show_every_position(tmp_path, vertices, frames, half):
     shown, facts = shown_by_positions(tmp_path / "a.openvat", pixels)
     assert pixels.shape[1] <= 4096 and not any(side & (side - 1) for side in pixels.shape[:2])
     stated = facts["athcodec"]["max_error"]
-    assert far(shown, moved) <= stated + 1e-6
+    assert distance(shown, moved) <= stated + 1e-6
     span = np.ptp(moved - rest, axis=(0, 1))
     assert stated <= (np.linalg.norm(span) / 65535 / 2 if half else 1e-6) + 1e-6
     assert (facts["athcodec"]["fps"], facts["athcodec"]["start_frame"]) == (24.0, 7)
@@ -141,7 +141,7 @@ def test_the_mesh_is_the_rest_pose_with_all_that_does_not_move(leafy, tmp_path):
     for suffix, name in (("vat", "a.glb"), ("openvat", "a_vat.glb")):
         write(leafy, tmp_path / f"a.{suffix}")
         with read(tmp_path / f"a.{suffix}" / name) as back:
-            assert back.frame_count == 1 and far(back.block(0, 1)[0], leafy.rest) < 1e-5
+            assert back.frame_count == 1 and distance(back.block(0, 1)[0], leafy.rest) < 1e-5
             assert np.array_equal(back.faces, leafy.faces)
             assert np.array_equal(back.attributes["uv"], leafy.attributes["uv"])
             assert np.array_equal(back.vertex_branch, leafy.vertex_branch)

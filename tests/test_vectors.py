@@ -13,7 +13,7 @@ import pytest
 from athcodec import errors
 from athcodec.decoding import container
 from athcodec.decoding.ath_file import AthFile
-from spec import conformance
+from spec import conformance, document, real_size
 
 ROOT = Path(__file__).resolve().parent.parent
 VECTORS = conformance.vectors()
@@ -95,6 +95,16 @@ def test_every_field_has_a_vector_that_breaks_its_range():
     unnamed = {"Kind", "Length", "Checksum", "Level", "Segment"}  # theirs are the table-... vectors
     missing = {name for name in fields - streams - unnamed if name not in reasons}
     assert missing == set()
+
+
+def test_vectors_of_real_size_use_the_features_of_the_format_together():
+    """All kinds of chunks, in the one file those that athcodec puts together."""
+    paths = {name: conformance.FOLDER / f"valid/real-size-{name}.ath" for name in real_size.OPTIONS}
+    uses = {name: real_size.features(path.read_bytes()) for name, path in paths.items()}
+    assert set().union(*uses.values()) >= real_size.FEATURES | set(document.KINDS)
+    others = {"joins", "sloped joins", "loose branches", "exact rest pose", "predicted motion"}
+    assert real_size.FEATURES - uses["all"] <= others
+    assert 50_000 < paths["all"].stat().st_size < 160_000
 
 
 @pytest.mark.vectors

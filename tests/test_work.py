@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
+from files import encoded
 from plants import plant
 
 import athcodec
@@ -45,10 +44,6 @@ def works(monkeypatch) -> list[progress.Work]:
     return works
 
 
-def encoded(clip: MotionClip, folder: Path, **options) -> bytes:
-    return athcodec.encode(clip, folder / "a.ath", **options).path.read_bytes()
-
-
 def allow(share: float, monkeypatch) -> None:
     monkeypatch.setattr(progress, "LEAST_WORK", share * progress.LEAST_WORK)
     monkeypatch.setattr(progress, "WORK", share * progress.WORK)
@@ -56,9 +51,9 @@ def allow(share: float, monkeypatch) -> None:
 
 @pytest.mark.parametrize("share", [1.0, 0.3])
 @pytest.mark.parametrize("kind", KINDS)
-def test_counted_work_keeps_to_what_the_clip_allows(kind, share, works, tmp_path, monkeypatch):
+def test_counted_work_keeps_to_what_the_clip_allows(kind, share, works, monkeypatch):
     allow(share, monkeypatch)
-    encoded(KINDS[kind](), tmp_path)
+    encoded(KINDS[kind]())
     assert works and all(work.done <= work.allowed for work in works)
 
 
@@ -88,7 +83,7 @@ def test_less_work_gives_a_file_that_keeps_its_bound(share, tmp_path, monkeypatc
 
 
 @pytest.mark.parametrize("share", [0.02, 0.1, 0.3])
-def test_the_same_is_left_out_with_any_number_of_threads(share, tmp_path, monkeypatch):
+def test_the_same_is_left_out_with_any_number_of_threads(share, monkeypatch):
     allow(share, monkeypatch)
     clip = plant(seed=1, branches=20, frames=40)
-    assert len({encoded(clip, tmp_path, jobs=jobs) for jobs in (1, 2, 4)}) == 1
+    assert len({encoded(clip, jobs=jobs) for jobs in (1, 2, 4)}) == 1

@@ -23,7 +23,6 @@ import numpy as np
 from alembic3d import Abc, AbcCoreAbstract, AbcGeom
 
 from athcodec.exporters.copies import Copies, one_copy, rows_of_one
-from athcodec.exporters.fitting import rotation_matrices
 from athcodec.exporters.scene_objects import (
     DOMAINS,
     KNOWN_ATTRIBUTES,
@@ -38,6 +37,7 @@ from athcodec.exporters.scene_objects import (
     rows_of,
 )
 from athcodec.exporters.timing import distinct_frame_numbers, frame_rate_of
+from athcodec.motion.quaternions import rotation_matrices
 from athcodec.sources.scene_objects import DESCRIPTOR, FACE_MATERIAL, OWN, turned_corners
 
 SCOPES = {

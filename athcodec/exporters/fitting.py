@@ -20,6 +20,7 @@ import numpy as np
 
 from athcodec.decoding.clip_view import ClipView
 from athcodec.motion.hierarchy import build_hierarchy, hierarchy_of
+from athcodec.motion.quaternions import quaternions
 
 ROUNDS = 8
 CONVERGED = 1e-5
@@ -252,48 +253,3 @@ def _proper(matrices: np.ndarray) -> np.ndarray:
     u, _, v = np.linalg.svd(matrices)
     u[:, :, 2] *= np.sign(np.linalg.det(u @ v))[:, None]
     return u @ v
-
-
-def quaternions(rotations: np.ndarray) -> np.ndarray:
-    """(..., 4) x y z w of rotations (..., 3, 3); by the largest of the four, which keeps all digits."""
-    m = np.moveaxis(rotations, (-2, -1), (0, 1))
-    squares = np.stack(
-        [
-            1 + m[0, 0] - m[1, 1] - m[2, 2],
-            1 - m[0, 0] + m[1, 1] - m[2, 2],
-            1 - m[0, 0] - m[1, 1] + m[2, 2],
-            1 + m[0, 0] + m[1, 1] + m[2, 2],
-        ],
-        axis=-1,
-    )
-    xy, xz, yz = m[0, 1] + m[1, 0], m[0, 2] + m[2, 0], m[1, 2] + m[2, 1]
-    xw, yw, zw = m[2, 1] - m[1, 2], m[0, 2] - m[2, 0], m[1, 0] - m[0, 1]
-    rows = np.stack(
-        [
-            np.stack([squares[..., 0], xy, xz, xw], -1),
-            np.stack([xy, squares[..., 1], yz, yw], -1),
-            np.stack([xz, yz, squares[..., 2], zw], -1),
-            np.stack([xw, yw, zw, squares[..., 3]], -1),
-        ],
-        -2,
-    )
-    best = squares.argmax(axis=-1)
-    found = np.take_along_axis(rows, best[..., None, None], axis=-2)[..., 0, :]
-    return found / np.linalg.norm(found, axis=-1, keepdims=True)
-
-
-def rotation_matrices(quaternion: np.ndarray) -> np.ndarray:
-    """(..., 3, 3) of quaternions (..., 4), taken to length 1."""
-    x, y, z, w = np.moveaxis(quaternion / np.linalg.norm(quaternion, axis=-1, keepdims=True), -1, 0)
-    rows = [
-        1 - 2 * (y * y + z * z),
-        2 * (x * y - z * w),
-        2 * (x * z + y * w),
-        2 * (x * y + z * w),
-        1 - 2 * (x * x + z * z),
-        2 * (y * z - x * w),
-        2 * (x * z - y * w),
-        2 * (y * z + x * w),
-        1 - 2 * (x * x + y * y),
-    ]
-    return np.stack(rows, axis=-1).reshape(*quaternion.shape[:-1], 3, 3)

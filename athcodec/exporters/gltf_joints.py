@@ -12,7 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from athcodec.exporters.fitting import Placed, fit, quaternions, rotation_matrices
+from athcodec.exporters.fitting import Placed, fit
+from athcodec.motion.quaternions import quaternions, rotation_matrices
 
 SLACK = 0.01  # Share of the allowed error below which motion counts as none.
 

@@ -21,12 +21,13 @@ from typing import Any
 import numpy as np
 
 from athcodec.decoding.clip_view import ClipView
-from athcodec.exporters.fitting import allowed_error, portions, quaternions, rotation_matrices
+from athcodec.exporters.fitting import allowed_error, portions
 from athcodec.exporters.gltf_joints import Joints
 from athcodec.exporters.scene_objects import distinct
 from athcodec.motion.branches.finding import find_branches
 from athcodec.motion.branches.result import with_branches
 from athcodec.motion.hierarchy import Hierarchy, hierarchy_of
+from athcodec.motion.quaternions import quaternions, rotation_matrices
 from athcodec.options import RIG_JOINTS
 
 LONGEST_CHAIN = 32

@@ -20,11 +20,12 @@ from pxr import Gf, Sdf, Usd, UsdGeom, UsdSkel, Vt
 
 from athcodec.errors import ClipError
 from athcodec.exporters.copies import Copies, fit_copies
-from athcodec.exporters.fitting import allowed_error, portions, rotation_matrices
+from athcodec.exporters.fitting import allowed_error, portions
 from athcodec.exporters.gltf_joints import Joints
 from athcodec.exporters.rig import hierarchy_to_rig
 from athcodec.exporters.scene_objects import SceneObject
 from athcodec.motion.clip import MotionClip
+from athcodec.motion.quaternions import rotation_matrices
 
 ROOT_PRIM, BASE = "/clip", "/clip/base"
 ROOT_SCHEMA, BINDING_SCHEMA = "NaniteAssemblyRootAPI", "NaniteAssemblySkelBindingAPI"

@@ -6,7 +6,7 @@ to frame trembles, one that changes at a seam between segments ticks, and one th
 vertex crumples faces. `SmoothnessMeter` and `ShapeMeter` measure that, `MotionMeter` all.
 """
 
-from athcodec.metrics.blocks import Spread
+from athcodec.metrics.blocks import Meter, Spread
 from athcodec.metrics.error import ErrorMeter, bits_per_vertex_frame, compare_clips
 from athcodec.metrics.motion import MotionMeter, level_meters
 from athcodec.metrics.shape import ShapeMeter, edges_of, stem_links
@@ -14,6 +14,7 @@ from athcodec.metrics.smoothness import SmoothnessMeter, second_differences, tic
 
 __all__ = [
     "ErrorMeter",
+    "Meter",
     "MotionMeter",
     "ShapeMeter",
     "SmoothnessMeter",

@@ -11,10 +11,10 @@ SLICE_VALUES = 1 << 20
 _SHIFT = 15  # bits of a float32 that a bin leaves away: 256 bins for each power of two
 
 
-def paired(reference: np.ndarray, decoded: np.ndarray, values: int = 0) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+def paired(reference: np.ndarray, decoded: np.ndarray, values: int) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     """The frames of two (k, N, 3) blocks in float64, as many at once as have SLICE_VALUES numbers.
 
-    values: how many a frame makes of itself, where that is more than its positions.
+    values: see Meter.
 
     Raises ValueError where their shapes differ.
     """
@@ -26,6 +26,31 @@ def paired(reference: np.ndarray, decoded: np.ndarray, values: int = 0) -> Itera
     for start in range(0, len(reference), length):
         part = slice(start, start + length)
         yield reference[part].astype(np.float64), decoded[part].astype(np.float64)
+
+
+class Meter:
+    """Accumulates what it measures, block by block."""
+
+    _values = 0
+    """How many numbers a frame makes of itself, where that is more than its positions."""
+
+    def add(self, reference: np.ndarray, decoded: np.ndarray) -> None:
+        """Add the next frames.
+
+        Parameters
+        ----------
+        reference, decoded : (k, N, 3) float arrays
+
+        Raises
+        ------
+        ValueError
+            Where their shapes differ, or there are more frames than the meter expects.
+        """
+        for pair in paired(reference, decoded, self._values):
+            self._add(*pair)
+
+    def _add(self, reference: np.ndarray, decoded: np.ndarray) -> None:
+        raise NotImplementedError
 
 
 class Spread:

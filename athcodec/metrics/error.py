@@ -11,11 +11,11 @@ from math import frexp, inf, sqrt
 import numpy as np
 
 from athcodec.errors import ClipError
-from athcodec.metrics.blocks import paired
+from athcodec.metrics.blocks import Meter
 from athcodec.motion.clip import MotionClip
 
 
-class ErrorMeter:
+class ErrorMeter(Meter):
     """Accumulates the difference between reference and decoded positions, block by block.
 
     Lengths are in the unit of the positions; frames are counted in the order in which they are added. A decoded NaN
@@ -48,21 +48,6 @@ class ErrorMeter:
         self._error_square = self._spread_square = self._motion_square = 0.0
         self._low = np.full(3, inf)
         self._high = np.full(3, -inf)
-
-    def add(self, reference: np.ndarray, decoded: np.ndarray) -> None:
-        """Add the next frames.
-
-        Parameters
-        ----------
-        reference, decoded : (k, N, 3) float arrays
-
-        Raises
-        ------
-        ValueError
-            Where their shapes differ.
-        """
-        for pair in paired(reference, decoded):
-            self._add(*pair)
 
     def _add(self, reference: np.ndarray, decoded: np.ndarray) -> None:
         difference = reference - decoded

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from athcodec.metrics.blocks import Meter
 from athcodec.metrics.error import ErrorMeter
 from athcodec.metrics.shape import ShapeMeter, edges_of, stem_links
 from athcodec.metrics.smoothness import SmoothnessMeter
@@ -19,7 +20,7 @@ TAIL = 0.999
 """The quantile of edges and faces that is given: one in a thousand is worse."""
 
 
-class MotionMeter:
+class MotionMeter(Meter):
     """The meters of error, smoothness and shape together, for the frames of a clip in their order.
 
     Parameters
@@ -63,21 +64,11 @@ class MotionMeter:
         self.error = ErrorMeter(clip.rest, weights)
         self.smoothness = SmoothnessMeter(clip.frame_count, self.bounds, starts, loop)
         self.shape = ShapeMeter(edges_of(clip) if edges is None else edges, clip.polygons)
+        self._values = self.shape._values
 
-    def add(self, reference: np.ndarray, decoded: np.ndarray) -> None:
-        """Add the next frames.
-
-        Parameters
-        ----------
-        reference, decoded : (k, N, 3) float arrays
-
-        Raises
-        ------
-        ValueError
-            Where their shapes differ, or there are more frames than the clip has.
-        """
+    def _add(self, reference: np.ndarray, decoded: np.ndarray) -> None:
         for meter in (self.error, self.smoothness, self.shape):
-            meter.add(reference, decoded)
+            meter._add(reference, decoded)
 
     def figures(self) -> dict[str, Any]:
         """The measurements, by names that JSON uses: "smoothness" and "shape" are dictionaries of their own.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from athcodec.metrics.blocks import Spread, paired
+from athcodec.metrics.blocks import Meter, Spread
 from athcodec.motion.clip import MotionClip, source_stem_index
 
 DEGENERATE_SHARE = 1e-3
@@ -16,7 +16,7 @@ Polygons = tuple[np.ndarray, np.ndarray]
 """Numbers of corners (F,) and the vertex of each corner (C,), face after face."""
 
 
-class ShapeMeter:
+class ShapeMeter(Meter):
     """Accumulates how edges stretch and how faces turn, frame by frame, against the source.
 
     Edges that have no length in the source, and faces that have no area, are left out of that frame and counted: those
@@ -68,25 +68,13 @@ class ShapeMeter:
         """Faces whose decoded area is below 1e-3 of that in the source in any frame."""
         return int(self._degenerate.sum())
 
-    def add(self, reference: np.ndarray, decoded: np.ndarray) -> None:
-        """Add the next frames.
-
-        Parameters
-        ----------
-        reference, decoded : (k, N, 3) float arrays
-
-        Raises
-        ------
-        ValueError
-            Where their shapes differ.
-        """
-        for source, shown in paired(reference, decoded, self._values):
-            rounding = ROUNDING * np.abs(source).max(axis=(1, 2), initial=0.0)[:, None]
-            with np.errstate(invalid="ignore"):
-                if self.edge_count:
-                    self._add_edges(source, shown, rounding)
-                if self.face_count:
-                    self._add_faces(source, shown, rounding)
+    def _add(self, reference: np.ndarray, decoded: np.ndarray) -> None:
+        rounding = ROUNDING * np.abs(reference).max(axis=(1, 2), initial=0.0)[:, None]
+        with np.errstate(invalid="ignore"):
+            if self.edge_count:
+                self._add_edges(reference, decoded, rounding)
+            if self.face_count:
+                self._add_faces(reference, decoded, rounding)
 
     def _add_edges(self, source: np.ndarray, decoded: np.ndarray, rounding: np.ndarray) -> None:
         before, after = (_lengths(frames, self._edges) for frames in (source, decoded))

@@ -7,13 +7,13 @@ from math import inf, nan, sqrt
 
 import numpy as np
 
-from athcodec.metrics.blocks import paired
+from athcodec.metrics.blocks import Meter
 
 NEAR_SEAM = 2
 """Frames on either side of a seam that count as near it."""
 
 
-class SmoothnessMeter:
+class SmoothnessMeter(Meter):
     """Accumulates second differences over frames: of the source, of what is decoded, and of the error between them.
 
     The second difference at frame t is x(t - 1) - 2 x(t) + x(t + 1), in length per frame squared; clips whose frames
@@ -59,33 +59,21 @@ class SmoothnessMeter:
             (2, 0, 0, 3)
         )  # The last frames of source and decoded positions, two at most.
 
-    def add(self, reference: np.ndarray, decoded: np.ndarray) -> None:
-        """Add the next frames.
-
-        Parameters
-        ----------
-        reference, decoded : (k, N, 3) float arrays
-
-        Raises
-        ------
-        ValueError
-            Where their shapes differ, or there are more frames than expected.
-        """
-        for pair in paired(reference, decoded):
-            both = np.stack(pair)
-            if self._added + both.shape[1] > len(self.acceleration):
-                raise ValueError(f"frames: got more than {len(self.acceleration)}, expected so many")
-            if not self._added:
-                self._first = self._last = both[:, :0]
-            first_known = self._added - self._last.shape[1] + 1
-            near = np.concatenate([self._last, both], axis=1)
-            self._measure(first_known, near)
-            self._first = np.concatenate([self._first, both[:, :2]], axis=1)[:, :2]
-            self._last = near[:, -2:]
-            self._added += both.shape[1]
-            if self._loop and self._added == len(self.acceleration) > 1:
-                around = np.concatenate([self._last, self._first], axis=1)
-                self._measure(self._added - 1, around)
+    def _add(self, reference: np.ndarray, decoded: np.ndarray) -> None:
+        both = np.stack([reference, decoded])
+        if self._added + both.shape[1] > len(self.acceleration):
+            raise ValueError(f"frames: got more than {len(self.acceleration)}, expected so many")
+        if not self._added:
+            self._first = self._last = both[:, :0]
+        first_known = self._added - self._last.shape[1] + 1
+        near = np.concatenate([self._last, both], axis=1)
+        self._measure(first_known, near)
+        self._first = np.concatenate([self._first, both[:, :2]], axis=1)[:, :2]
+        self._last = near[:, -2:]
+        self._added += both.shape[1]
+        if self._loop and self._added == len(self.acceleration) > 1:
+            around = np.concatenate([self._last, self._first], axis=1)
+            self._measure(self._added - 1, around)
 
     def _measure(self, first: int, frames: np.ndarray) -> None:
         """Measure at all of the (2, k, N, 3) frames but the first and the last, from frame number `first` on."""

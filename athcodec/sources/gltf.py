@@ -31,8 +31,9 @@ from athcodec.files.reading import closing_on_failure, naming
 from athcodec.motion.clip import DEFAULT_FPS, RESERVED_NAMES, ClipRange, MotionClip, Skin
 from athcodec.motion.frames import Frames, is_far
 from athcodec.motion.joining import join
+from athcodec.motion.quaternions import rotation_matrices
 from athcodec.sources import ReadOptions
-from athcodec.sources.gltf_scene import Scene, key_rate, on_grid, rotation_matrices
+from athcodec.sources.gltf_scene import Scene, key_rate, on_grid
 from athcodec.sources.scene_objects import FACE_MATERIAL, FLIPPED, MATERIAL_NAMES, TWO_SIDES, Facing, presence_metadata
 
 WORK_BYTES = 64 << 20

@@ -16,6 +16,7 @@ import numpy as np
 from athcodec.errors import ClipError
 from athcodec.files.gltf.document import GltfFile
 from athcodec.files.gltf.json import brief, entries, entry, indices, integer, vector
+from athcodec.motion.quaternions import normalized, rotation_matrices
 
 TRS = {"translation": [0.0, 0.0, 0.0], "rotation": [0.0, 0.0, 0.0, 1.0], "scale": [1.0, 1.0, 1.0]}
 POINTER, NODE_VISIBILITY = "KHR_animation_pointer", "KHR_node_visibility"
@@ -70,29 +71,6 @@ def slerp(a: np.ndarray, b: np.ndarray, fraction: np.ndarray) -> np.ndarray:
     first = np.where(near, 1 - fraction, np.sin((1 - fraction) * angle) / safe)
     second = np.where(near, fraction, np.sin(fraction * angle) / safe)
     return a * first + b * second
-
-
-def normalized(quaternions: np.ndarray) -> np.ndarray:
-    """Quaternions (..., 4) at length 1; without a rotation where they have none."""
-    length = np.linalg.norm(quaternions, axis=-1, keepdims=True)
-    return np.where(length > 0, quaternions / np.where(length > 0, length, 1.0), [0.0, 0.0, 0.0, 1.0])
-
-
-def rotation_matrices(quaternions: np.ndarray) -> np.ndarray:
-    """(..., 3, 3) of unit quaternions (..., 4), x y z w."""
-    x, y, z, w = np.moveaxis(normalized(quaternions), -1, 0)
-    rows = [
-        1 - 2 * (y * y + z * z),
-        2 * (x * y - z * w),
-        2 * (x * z + y * w),
-        2 * (x * y + z * w),
-        1 - 2 * (x * x + z * z),
-        2 * (y * z - x * w),
-        2 * (x * z - y * w),
-        2 * (y * z + x * w),
-        1 - 2 * (x * x + y * y),
-    ]
-    return np.stack(rows, axis=-1).reshape(*quaternions.shape[:-1], 3, 3)
 
 
 class Scene:

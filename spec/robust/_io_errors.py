@@ -13,7 +13,6 @@ import io
 import json
 import os
 import random
-import subprocess
 import sys
 import tempfile
 import time
@@ -23,6 +22,7 @@ from pathlib import Path
 
 from spec.robust import Row, ended
 from spec.robust.faults import OLDER, ONE_LINE, Place, is_whole
+from spec.robust.load import compiled
 
 HERE = Path(__file__).resolve().parent
 VERBS = {"encode": "target.ath", "decode": "target.h5", "decode npz": "target.npz", "truncate": "target.ath"}
@@ -32,11 +32,8 @@ DEAD = 70
 
 
 def build(folder: Path) -> Path:
-    """The library. Raises CalledProcessError where there is no C compiler."""
-    library = folder / "faulty.so"
-    source = HERE / "faulty.c"
-    subprocess.run(["cc", "-shared", "-fPIC", "-O1", "-o", library, source, "-ldl"], check=True, capture_output=True)
-    return library
+    """The library. Raises RuntimeError where there is no C compiler."""
+    return compiled(folder, [HERE / "faulty.c"], "-shared", "-fPIC")
 
 
 def each_call(verb: str, folder: Path, sample: int = 0, lasts: bool = False, until: float = float("inf")) -> Row:

@@ -1,5 +1,4 @@
-"""External faults while files are written: writers killed at random moments, full disks, input and output that fails,
-sources that change.
+"""External faults while files are written: writers killed at random moments, full disks, input and output that fails.
 
 All of it runs the command line program in separate processes; `run` returns the rows of the table. A target must not
 exist, be unchanged, or be a complete new file; the next writer to the same place must leave no temporary file; an error
@@ -9,7 +8,6 @@ must be one line, with exit code 1. The tests use the same functions with fewer 
 from __future__ import annotations
 
 import ctypes
-import os
 import random
 import re
 import resource
@@ -25,7 +23,7 @@ from pathlib import Path
 
 import athcodec
 from athcodec.sources import sample_path
-from spec.robust import Row, ended
+from spec.robust import Row
 
 TIMEOUT = 120.0  # seconds after which a command counts as hung
 ONE_LINE = re.compile(r"athcodec: error: [^\n]+\n")
@@ -179,31 +177,6 @@ def _judge_refusal(place: Place, verb: str, row: Row, prepare: Callable[[], None
     target.unlink()
 
 
-def fill_small_disk(place: Place, kilobytes: list[int]) -> Row:
-    """Verbs on a full file system (a tmpfs in a mount namespace): ENOSPC. If the system allows no mount namespace,
-    nothing is tried, as stated in the note."""
-    row = Row("disk full", 0)
-    if subprocess.run(["unshare", "-rm", "true"], capture_output=True).returncode != 0:
-        row.note = "not tried: the system allows no mount namespace here"
-        return row
-    for size in kilobytes:
-        for verb in VERBS:
-            target = place.folder / ("target.h5" if verb.startswith("decode") else "target.ath")
-            command = [sys.executable, "-m", "athcodec", *place.words(verb, target)]
-            script = (
-                'mount -t tmpfs -o size="$2"k none "$1" && cd "$1" && shift 2 && "$@" >&2; code=$?; ls -A .; exit $code'
-            )
-            done = ended(
-                ["unshare", "-rm", "sh", "-c", script, "sh", str(place.folder), str(size), *command], timeout=TIMEOUT
-            )
-            refused = done.returncode == 1 and ONE_LINE.fullmatch(done.stderr) and done.stdout == ""
-            row.tried += 1
-            row.crashes += done.returncode > 1
-            row.wrong += not (refused or (done.returncode == 0 and done.stdout == f"{target.name}\n"))
-    row.note = "tmpfs, the error is ENOSPC"
-    return row
-
-
 # ---- permissions ----
 
 PR_CAPBSET_DROP, CAP_DAC_OVERRIDE = 24, 1
@@ -232,50 +205,6 @@ def write_where_not_allowed(place: Place, verbs: tuple[str, ...]) -> Row:
     return row
 
 
-# ---- sources that change ----
-
-
-def change_source(place: Place, rounds: int, seed: int, until: float = float("inf")) -> Row:
-    """Truncates or overwrites the source at a random moment of an encode: the result must be a file within the bound
-    of the original source, or one line."""
-    rng, row, accepted = random.Random(seed), Row("source changes while it is read", 0), 0
-    original = place.source.read_bytes()
-    target = place.folder / "target.ath"
-    while row.tried < rounds and time.monotonic() < until:
-        process = spawn(place.words("encode", target))
-        time.sleep(rng.uniform(0.2, 1.2))
-        _damage(place.source, rng)
-        try:
-            _, err = process.communicate(timeout=TIMEOUT)
-        except subprocess.TimeoutExpired:
-            process.kill()
-            process.communicate()
-            row.hangs += 1
-        place.source.write_bytes(original)
-        row.tried += 1
-        row.crashes += process.returncode < 0
-        if process.returncode == 0:  # the source had been read completely
-            accepted += 1
-            code, _ = finished(["verify", str(target), "--against", str(place.source)])
-            row.wrong += code != 0
-            target.unlink()
-        else:
-            row.wrong += not ONE_LINE.fullmatch(err) or target.exists()
-        row.wrong += bool(place.left_over(target))
-    row.note = f"{row.tried - accepted} refused, {accepted} done before the change"
-    return row
-
-
-def _damage(path: Path, rng: random.Random) -> None:
-    size = path.stat().st_size
-    if rng.random() < 0.5:
-        os.truncate(path, rng.randrange(size))
-        return
-    with open(path, "r+b") as file:
-        file.seek(rng.randrange(size // 2))
-        file.write(rng.randbytes(size // 4))
-
-
 def run(budget: float) -> list[Row]:
     """All faults, 200 kills among them, within about `budget` seconds."""
     from spec.robust._io_errors import rows as io_errors  # which uses this module
@@ -286,9 +215,7 @@ def run(budget: float) -> list[Row]:
         sizes = [0, 1, 100, 1000, 2048, 4096, 8000]
         return [
             fill_disk(place, VERBS, sizes, start + 0.15 * budget),
-            fill_small_disk(place, [4, 8]),
             write_where_not_allowed(place, VERBS),
-            change_source(place, 60, 1, start + 0.4 * budget),
             kill_while_writing(place, 200, 2, start + 0.7 * budget),
             *io_errors(0.3 * budget),
         ]

@@ -1,7 +1,7 @@
 """The fuzz targets of tests/fuzz, each for an equal part of the time, and the decoder's lines covered by their inputs.
 
 C targets run under AddressSanitizer and UndefinedBehaviorSanitizer with libFuzzer, from a corpus that grows with every
-run; the round trip and the readers of other formats are in Python. Without clang, every seed is tried once.
+run; the readers of other formats are in Python. Without clang, every seed is tried once.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ def run(budget: float) -> list[Row]:
     rows, seconds = [], budget / len(cli.ALL)
     for target in cli.ALL:
         outcome = cli.fuzz(target, seconds)
-        if fuzzer or target.startswith((cli.ROUNDTRIP, cli.SOURCES)):
+        if fuzzer or target.startswith(cli.SOURCES):
             _add_hours(target, seconds / 3600)
         found = {COUNTS[outcome.kind]: 1} if outcome.kind else {}
         rows.append(Row(target, outcome.tried, **found, note=_note(outcome, fuzzer)))
@@ -36,8 +36,6 @@ def run(budget: float) -> list[Row]:
 def _note(outcome: targets.Outcome, fuzzer: bool) -> str:
     if outcome.kind:
         return f"kept {outcome.artifact}" if outcome.artifact else outcome.log.strip().splitlines()[0]
-    if outcome.target == cli.ROUNDTRIP:
-        return "clips encoded and decoded"
     if outcome.target.startswith(cli.SOURCES):
         return "files read"
     return f"{outcome.edges:,} edges" if fuzzer else targets.NO_FUZZER

@@ -35,6 +35,7 @@ HERE = Path(__file__).resolve().parent
 CORE = HERE.parent.parent / "athcodec" / "core"
 TIMEOUT = 300.0  # seconds after which a process counts as hung
 RACE_FOUND = 66  # ThreadSanitizer's exit code
+LIBRARIES = "-lm", "-lpthread", "-ldl"
 GET_HANDLER = 305  # index of PyDataMem_GetHandler in NumPy's table of functions
 
 
@@ -68,7 +69,7 @@ def compiled(folder: Path, sources: list[Path], *options: str) -> Path:
     target = folder / sources[0].stem
     problems = ""
     for compiler in compilers():
-        command = [*compiler.split(), "-std=c11", "-O1", "-g", *options, "-o", target, *sources, "-lm", "-lpthread"]
+        command = [*compiler.split(), "-std=c11", "-O1", "-g", *options, "-o", target, *sources, *LIBRARIES]
         done = ended(command)
         if done.returncode == 0:
             return target

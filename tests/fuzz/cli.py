@@ -6,22 +6,19 @@ Exit code 1 where a target went wrong; the input that did it is kept beside the 
 from __future__ import annotations
 
 import argparse
-import json
 import os
 import re
 import subprocess
 import sys
 import time
 from collections.abc import Sequence
-from importlib.util import find_spec
 from pathlib import Path
 
 from fuzz import coverage, seeds, sources, targets
 from fuzz.targets import BUILD, Outcome
 
-ROUNDTRIP = "roundtrip"
 SOURCES = "sources"
-ALL = (*targets.TARGETS, ROUNDTRIP, *(f"{SOURCES}-{kind}" for kind in sources.KINDS))
+ALL = (*targets.TARGETS, *(f"{SOURCES}-{kind}" for kind in sources.KINDS))
 GRACE = 300
 
 
@@ -29,8 +26,6 @@ def fuzz(
     target: str, seconds: float, corpus: Path = BUILD / "corpus", sanitizer: str = "address", seed: int = 0
 ) -> Outcome:
     """One target for some time. Raises BuildError."""
-    if target == ROUNDTRIP:
-        return roundtrip(seconds, seed)
     if target.startswith(SOURCES):
         return read_sources(target.removeprefix(f"{SOURCES}-"), seconds, seed)
     used = targets.compiler()
@@ -43,33 +38,17 @@ def fuzz(
 
 
 def read_sources(kind: str, seconds: float, seed: int) -> Outcome:
-    """The readers of a format; guided by what they run where atheris is installed."""
-    number, guide = seed or time.time_ns() % 10**9, ["guided"] if find_spec("atheris") else []
-    command = [sys.executable, "-m", "fuzz.sources", kind, str(seconds), str(number), *guide]
+    """The readers of a format, in a process of their own."""
+    number = seed or time.time_ns() % 10**9
+    command = [sys.executable, "-m", "fuzz.sources", kind, str(seconds), str(number)]
     path, target = {"PYTHONPATH": str(targets.HERE.parent)}, f"{SOURCES}-{kind}"
     try:
         done = subprocess.run(command, capture_output=True, text=True, env=os.environ | path, timeout=seconds + GRACE)
     except subprocess.TimeoutExpired as late:
         return Outcome(target, 0, "hang", f"no end {GRACE} s after its time: {late}")
     log = done.stdout + done.stderr
-    tried = re.findall(r"stat::number_of_executed_units:\s+(\d+)" if guide else r'"tried": (\d+)', log)
+    tried = re.findall(r'"tried": (\d+)', log)
     return Outcome(target, int(tried[-1]) if tried else 0, "wrong" if done.returncode else "", log, seconds=seconds)
-
-
-def roundtrip(seconds: float, seed: int) -> Outcome:
-    number = seed or time.time_ns() % 10**9
-    command = [sys.executable, "-m", "fuzz.roundtrip", str(seconds), str(number)]
-    path = {"PYTHONPATH": str(targets.HERE.parent)}
-    try:
-        done = subprocess.run(command, capture_output=True, text=True, env=os.environ | path, timeout=seconds + GRACE)
-    except subprocess.TimeoutExpired as late:
-        return Outcome(ROUNDTRIP, 0, "hang", f"no end {GRACE} s after its time: {late}")
-    lines = [line for line in done.stdout.splitlines() if line.startswith("{")]
-    last = json.loads(lines[-1]) if lines else {"tried": 0, "failure": ""}
-    if done.returncode == 0:
-        return Outcome(ROUNDTRIP, last["tried"], seconds=seconds)
-    kind = "wrong" if last["failure"] else "crash"
-    return Outcome(ROUNDTRIP, last["tried"], kind, f"{last['failure']}\n{done.stderr}")
 
 
 def arguments(argv: Sequence[str] | None) -> argparse.Namespace:
@@ -111,7 +90,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     outcomes = []
     wanted = args.target or ALL
     chosen = [target for target in ALL if target in wanted or SOURCES in wanted and target.startswith(SOURCES)]
-    if any(not target.startswith((SOURCES, ROUNDTRIP)) for target in chosen) and not targets.compiler().fuzzer:
+    if any(not target.startswith(SOURCES) for target in chosen) and not targets.compiler().fuzzer:
         print(f"fuzz: {targets.NO_FUZZER}", flush=True)
     for target in chosen:
         outcomes.append(fuzz(target, args.seconds, args.corpus, args.sanitizer, args.seed))

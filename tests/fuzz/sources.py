@@ -1,9 +1,8 @@
-"""Fuzzing of the readers of other formats: `python -m fuzz.sources KIND SECONDS SEED [guided]`, for cli.py.
+"""Fuzzing of the readers of other formats: `python -m fuzz.sources KIND SECONDS SEED`, for cli.py.
 
 An input is a file of one format. It passes where it gives a clip, or one line of a ClipError, within SECONDS of time
 and MEMORY. Inputs are valid files, mutated by what they are made of: members of JSON, numbers in text, fields of
-headers, arrays of archives. With `guided`, which takes atheris (pip install atheris), libFuzzer chooses what to go on
-with.
+headers, arrays of archives.
 """
 
 from __future__ import annotations
@@ -25,6 +24,7 @@ from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 
+import glb
 import numpy as np
 
 KINDS = ("glb", "pc2", "mdd", "obj", "ply", "xdmf", "npz", "vtu")
@@ -173,8 +173,7 @@ def _text(data: bytes, rng: random.Random) -> bytes:
 
 def _json(data: bytes, rng: random.Random) -> bytes:
     """A member of the JSON of a GLB, whose lengths fit again."""
-    size = struct.unpack_from("<I", data, 12)[0]
-    gltf, rest = json.loads(data[20 : 20 + size]), data[20 + size :]
+    gltf, behind = glb.apart(data)
     places = list(_places(gltf))
     holder, key = rng.choice(places)
     if rng.random() < 0.2 and isinstance(holder, dict):
@@ -187,10 +186,7 @@ def _json(data: bytes, rng: random.Random) -> bytes:
     text = json.dumps(gltf)
     if rng.random() < 0.1:
         text = re.sub(r"\d+", lambda found: "9" * 4400 if rng.random() < 0.05 else found[0], text)
-    packed = text.encode()
-    packed += b" " * (-len(packed) % 4)
-    whole = struct.pack("<II", len(packed), 0x4E4F534A) + packed + rest
-    return struct.pack("<4sII", b"glTF", 2, 12 + len(whole)) + whole
+    return glb.together(text.encode(), behind)
 
 
 def _places(value: object) -> Iterator[tuple]:
@@ -269,44 +265,11 @@ def blind(kind: str, seconds: float, seed: int, runs: int = 1 << 62) -> dict:
     return {"tried": tried, "failure": "", "input": ""}
 
 
-def guided(kind: str, seconds: float, seed: int) -> None:
-    """The same, with what atheris learns of the readers. Does not return."""
-    import atheris
-
-    with atheris.instrument_imports(include=["athcodec.sources"]):
-        import athcodec.sources.gltf
-        import athcodec.sources.mdd
-        import athcodec.sources.npz
-        import athcodec.sources.pc2
-        import athcodec.sources.sequence
-        import athcodec.sources.vtk
-        import athcodec.sources.xdmf  # noqa: F401
-    folder = Path(tempfile.mkdtemp())
-    (folder / "corpus").mkdir()
-    for number, data in enumerate(seeds(kind)):
-        (folder / "corpus" / f"{number}").write_bytes(data)
-
-    def one(data: bytes) -> None:
-        attempt(kind, data, folder)
-
-    def mutate(data: bytes, size: int, number: int) -> bytes:
-        made = mutated(kind, data or seeds(kind)[0], random.Random(number))
-        return made if len(made) <= size else atheris.Mutate(data, size)
-
-    options = [f"-max_total_time={max(1, round(seconds))}", f"-seed={seed or 1}", "-max_len=65536", "-timeout=30"]
-    options += ["-rss_limit_mb=2048", f"-artifact_prefix={folder}/", "-print_final_stats=1"]
-    atheris.Setup([sys.argv[0], *options, str(folder / "corpus")], one, custom_mutator=mutate)
-    atheris.Fuzz()
-
-
 def main() -> None:
     kind, seconds, seed = sys.argv[1], float(sys.argv[2]), int(sys.argv[3])
-    if sys.argv[4:] == ["guided"]:
-        guided(kind, seconds, seed)
-    else:
-        result = blind(kind, seconds, seed)
-        print(json.dumps(result))
-        sys.exit(bool(result["failure"]))
+    result = blind(kind, seconds, seed)
+    print(json.dumps(result))
+    sys.exit(bool(result["failure"]))
 
 
 if __name__ == "__main__":

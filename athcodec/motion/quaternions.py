@@ -1,0 +1,56 @@
+"""Rotations as quaternions x y z w, and as matrices."""
+
+from __future__ import annotations
+
+import numpy as np
+
+
+def normalized(quaternions: np.ndarray) -> np.ndarray:
+    """Quaternions (..., 4) at length 1; without a rotation where they have none."""
+    length = np.linalg.norm(quaternions, axis=-1, keepdims=True)
+    return np.where(length > 0, quaternions / np.where(length > 0, length, 1.0), [0.0, 0.0, 0.0, 1.0])
+
+
+def rotation_matrices(quaternions: np.ndarray) -> np.ndarray:
+    """(..., 3, 3) of unit quaternions (..., 4), x y z w."""
+    x, y, z, w = np.moveaxis(normalized(quaternions), -1, 0)
+    rows = [
+        1 - 2 * (y * y + z * z),
+        2 * (x * y - z * w),
+        2 * (x * z + y * w),
+        2 * (x * y + z * w),
+        1 - 2 * (x * x + z * z),
+        2 * (y * z - x * w),
+        2 * (x * z - y * w),
+        2 * (y * z + x * w),
+        1 - 2 * (x * x + y * y),
+    ]
+    return np.stack(rows, axis=-1).reshape(*quaternions.shape[:-1], 3, 3)
+
+
+def quaternions(rotations: np.ndarray) -> np.ndarray:
+    """(..., 4) x y z w of rotations (..., 3, 3); by the largest of the four, which keeps all digits."""
+    m = np.moveaxis(rotations, (-2, -1), (0, 1))
+    squares = np.stack(
+        [
+            1 + m[0, 0] - m[1, 1] - m[2, 2],
+            1 - m[0, 0] + m[1, 1] - m[2, 2],
+            1 - m[0, 0] - m[1, 1] + m[2, 2],
+            1 + m[0, 0] + m[1, 1] + m[2, 2],
+        ],
+        axis=-1,
+    )
+    xy, xz, yz = m[0, 1] + m[1, 0], m[0, 2] + m[2, 0], m[1, 2] + m[2, 1]
+    xw, yw, zw = m[2, 1] - m[1, 2], m[0, 2] - m[2, 0], m[1, 0] - m[0, 1]
+    rows = np.stack(
+        [
+            np.stack([squares[..., 0], xy, xz, xw], -1),
+            np.stack([xy, squares[..., 1], yz, yw], -1),
+            np.stack([xz, yz, squares[..., 2], zw], -1),
+            np.stack([xw, yw, zw, squares[..., 3]], -1),
+        ],
+        -2,
+    )
+    best = squares.argmax(axis=-1)
+    found = np.take_along_axis(rows, best[..., None, None], axis=-2)[..., 0, :]
+    return found / np.linalg.norm(found, axis=-1, keepdims=True)
