@@ -125,7 +125,7 @@ class UnsupportedFeature(FormatError):
     code, name = 14, "UNSUPPORTED_FEATURE"
 
 
-class LevelUnavailable(AthError, LookupError):
+class LevelUnavailable(AthError, IndexError):
     """The file, or the part of it that is there, has no such level or frame."""
 
 

@@ -444,7 +444,7 @@ def test_attributes_are_read_when_asked_for(full_ath):
 NOT_THERE = {
     "frame beyond": lambda d: d.positions(50),
     "frame before": lambda d: d.positions(-51),
-    "every other frame": lambda d: d.positions(slice(0, 9, 2)),
+    "blocks of every other frame": lambda d: list(d.blocks(frames=slice(0, 9, 2))),
     "level beyond": lambda d: d.positions(0, 6),
     "level before": lambda d: d.positions(0, -1),
     "maps of a frame beyond": lambda d: d.affines(50),

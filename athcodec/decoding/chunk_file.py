@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import os
 import threading
 from collections.abc import Iterator
@@ -41,8 +42,8 @@ class ChunkFile:
         self.bytes_read = 0
         self._lock = threading.Lock()
         self._closes_source = not hasattr(path, "read")
-        self._source = _opened(path, gltf_motion) if self._closes_source else path
-        self.inputs = file_ids(path if self._closes_source else getattr(path, "name", None))
+        self._source = _opened(path, gltf_motion)
+        self.inputs = file_ids(path if isinstance(path, (str, os.PathLike)) else getattr(path, "name", None))
         try:
             self.available_length: int = self._source.seek(0, os.SEEK_END)
             self.core = self._open_core()
@@ -189,8 +190,17 @@ class ChunkFile:
 
 
 def _opened(path: Any, gltf_motion: str | None) -> Any:
-    """Return the file object of a path, a URL, or a motion inside a GLB."""
-    if is_url(path):
+    """Return the file object of a path, a URL, bytes, a file object, or a motion inside a GLB."""
+    if hasattr(path, "read"):
+        if isinstance(path, io.TextIOBase):
+            raise TypeError("path: got a file opened as text; expected one opened with mode 'rb'")
+        return path if getattr(path, "seekable", lambda: True)() else io.BytesIO(path.read())
+    if not isinstance(path, (str, os.PathLike)):
+        try:
+            return io.BytesIO(path if isinstance(path, bytes) else memoryview(path).tobytes())
+        except TypeError:
+            raise TypeError(f"path: got {path!r:.80}; expected a path, a URL, bytes or a binary file object") from None
+    if isinstance(path, str) and is_url(path):
         from athcodec.files.remote import Remote  # The packages behind it take long to import.
 
         return Remote(path)

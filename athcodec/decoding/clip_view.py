@@ -45,7 +45,7 @@ class ClipView:
         self, decoder: Decoder, level: int | None = None, frames: range | None = None, *, all_clips: bool = False
     ):
         self.decoder = decoder
-        self.level = decoder.file.deepest if level is None else whole("level", level)
+        self.level = decoder.level if level is None else whole("level", level)
         if not 0 <= self.level < decoder.file.level_count:
             raise LevelUnavailable(f"level: got {level}; expected 0 to {decoder.file.level_count - 1}")
         played = [decoder.play(clip.name) for clip in decoder.file.clips] if all_clips else [decoder]

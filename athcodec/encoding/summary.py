@@ -38,8 +38,8 @@ class Summary:
 
     Attributes
     ----------
-    path : Path
-        The file.
+    path : Path or None
+        The file; None for a file object.
     bytes, raw_bytes : int
         Its size, and that of the positions as float32.
     max_error_bound : float
@@ -63,9 +63,11 @@ class Summary:
     untried : tuple of str
         Choices that were left out, all or in part, because the clip is too small for so much work; effort "best" has
         room for more.
+    converted : str
+        How the numbers of an array were converted: "positions: int16 became float32"; empty if they were not.
     """
 
-    path: Path
+    path: Path | None
     bytes: int
     raw_bytes: int
     max_error_bound: float
@@ -78,6 +80,7 @@ class Summary:
     found_branches: str | None = None
     not_read: Mapping[str, Sequence[str]] = field(default_factory=dict)
     untried: tuple[str, ...] = ()
+    converted: str = ""
 
     @property
     def ratio(self) -> float:

@@ -356,7 +356,7 @@ class MotionClip:
             raise ValueError(f"max_frames: got {max_frames}, expected at least 1")
         length = max(1, BLOCK_BYTES // (self.vertex_count * 3 * self.dtype.itemsize))
         length = min(length, max_frames or length)
-        chunk_frames = (getattr(self.positions, "chunks", None) or (1,))[0]
+        chunk_frames = int(np.max((getattr(self.positions, "chunks", None) or (1,))[0]))  # dask names the size of each.
         return length - length % chunk_frames if chunk_frames <= length else length
 
     def _check_branches(self, vertex_count: int) -> None:
