@@ -22,7 +22,8 @@ Source: TypeAlias = Any
 """An array (frames, vertices, 3), a MotionClip, a Decoder or ClipView, or a path."""
 OF_ARRAYS = ("faces", "vertex_branch", "branch_parent")
 OF_FILES = ("fps", "unit", "up_axis")
-OF_VIEWS = "time vertex_branch branch_parent rest edges faces attributes metadata stem_index clip_ranges".split()
+OF_VIEWS = "positions time vertex_branch branch_parent stem_index rest edges faces".split()
+OF_VIEWS += ["attributes", "metadata", "clip_ranges"]
 
 
 @contextmanager
@@ -44,9 +45,8 @@ def clip_of(source: Source, **options: Any) -> Iterator[tuple[MotionClip, str]]:
             yield clip, ""
     elif is_view:
         view = ClipView(source) if isinstance(source, Decoder) else source
-        positions = Frames(view.block, view.frame_count, view.vertex_count, view.dtype)
         with keeping(view.inputs):
-            yield MotionClip(positions, **{name: getattr(view, name) for name in OF_VIEWS}), ""
+            yield MotionClip(**{name: getattr(view, name) for name in OF_VIEWS}), ""
     else:
         with nullcontext((source, "") if isinstance(source, MotionClip) else _clip_of_array(source, given)) as made:
             yield made

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from athcodec.arrays import Source, clip_of
+from athcodec.decoding.chunk_file import Openable
 from athcodec.decoding.decoder import Decoder
 from athcodec.errors import ClipError
 from athcodec.metrics.blocks import paired
@@ -39,7 +40,7 @@ class Comparison:
     promised: np.ndarray
 
 
-def compare(source: Source, file: Any, **options: Any) -> Comparison:
+def compare(source: Source, file: Decoder | Openable, **options: Any) -> Comparison:
     """Measure every level of an .ath file against its source, frame by frame.
 
     Parameters

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import athcodec
-from athcodec.cli.printing import counted, progress, say
+from athcodec.cli.printing import progress, say
 from athcodec.decoding.clip_view import ClipView
 from athcodec.decoding.decoder import Decoder
 from athcodec.decoding.file_tables import Level
@@ -28,6 +28,7 @@ from athcodec.errors import (
 from athcodec.files.atomic import check_target, file_ids, is_url, keeping
 from athcodec.files.kinds import kind_of
 from athcodec.files.reading import naming_file
+from athcodec.files.shown import counted
 from athcodec.metrics import ErrorMeter, MotionMeter, SmoothnessMeter, compare_clips, level_meters
 from athcodec.motion.branches.result import with_branches as clip_with_branches
 from athcodec.motion.clip import MotionClip

@@ -8,7 +8,7 @@ import threading
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from functools import cached_property
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, TypeAlias
 
 import numpy as np
 
@@ -29,6 +29,8 @@ from athcodec.errors import (
 from athcodec.files.atomic import file_ids, is_url
 from athcodec.files.plain import open_plain
 
+Openable: TypeAlias = str | os.PathLike[str] | bytes | bytearray | memoryview | BinaryIO
+"""A path, a URL, the bytes of a file, or a file object."""
 CHUNK_FIELDS = ("kind", "level", "segment", "length", "checksum", "offset")
 
 

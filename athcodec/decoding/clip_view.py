@@ -13,6 +13,7 @@ from athcodec.decoding.decoder import Decoder
 from athcodec.errors import LevelUnavailable
 from athcodec.files.atomic import FileId
 from athcodec.motion.clip import DEFAULT_FPS, ClipRange, clip_range_frames, polygons, stated_fps
+from athcodec.motion.frames import Frames
 from athcodec.motion.presence import presence_within
 from athcodec.options import whole
 
@@ -39,6 +40,14 @@ class ClipView:
     ------
     LevelUnavailable
         If the level or the frames do not exist. Methods raise the errors of Decoder besides.
+
+    Examples
+    --------
+    >>> import athcodec
+    >>> with athcodec.open(athcodec.sample_path("grass")) as grass:
+    ...     view = athcodec.ClipView(grass, level=1, frames=range(10, 20))
+    ...     view.frame_count, view.positions[2:5].shape
+    (10, (3, 1400, 3))
     """
 
     def __init__(
@@ -93,6 +102,11 @@ class ClipView:
     def max_error(self) -> float:
         """The largest distance of any vertex in any frame of its clips at this level from the source, scene units."""
         return max(decoder.levels[self.level].max_error for decoder, _ in self._runs)
+
+    @property
+    def positions(self) -> Frames:
+        """Positions (T, N, 3), which are decoded when they are sliced by frames."""
+        return Frames(self.block, self.frame_count, self.vertex_count, self.dtype)
 
     @property
     def time(self) -> np.ndarray:

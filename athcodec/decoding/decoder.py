@@ -22,6 +22,7 @@ from athcodec.decoding.affines import Affines, affines_of, residual_of
 from athcodec.decoding.ath_file import AthFile
 from athcodec.decoding.blending import Blending, Share
 from athcodec.decoding.endless_play import EndlessPlay
+from athcodec.decoding.facts import facts_of, print_facts
 from athcodec.decoding.file_tables import Clip, Level, median_rate
 from athcodec.decoding.indexing import Frames, split_index
 from athcodec.errors import LevelUnavailable
@@ -260,6 +261,10 @@ class Decoder:
             If the error of the deepest level is larger.
         """
         return self.file.level_within(max_error, self.clip.segments)
+
+    def summary(self) -> None:
+        """Print the levels of the file with their bytes and errors, as `athcodec info` does."""
+        print_facts(facts_of(str(getattr(self.file.source, "name", None) or "file"), self))
 
     # ---- motion ----
 
