@@ -86,3 +86,7 @@ class Summary:
     def ratio(self) -> float:
         """Bytes of the raw positions over those of the whole file."""
         return self.raw_bytes / self.bytes
+
+    def __str__(self) -> str:
+        words = f"{self.path or 'file'}: {self.bytes:,} bytes, {self.ratio:.1f} to 1, error at most "
+        return words + f"{self.max_error_bound:.3g}" + (f"; {self.converted}" if self.converted else "")
