@@ -3,6 +3,15 @@
 The codes are those of FORMAT.md, "Errors", and of core/include/ath.h; they never change once released. A message is
 one line:
 what is wrong, where, what was found and what was expected.
+
+Examples
+--------
+>>> import athcodec
+>>> try:
+...     athcodec.open(b"no plant")
+... except athcodec.errors.FormatError as error:
+...     error.name
+'NOT_AN_ATH_FILE'
 """
 
 from __future__ import annotations

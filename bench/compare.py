@@ -36,6 +36,22 @@ median frame, at the level where it is largest, with the source's in the same fr
 default layers. Side information: where the source names no branches, codecs that learn from branches or order
 vertices by them were given those that athcodec finds, and the time for that was not counted; none was given faces.
 """
+OVERVIEW = {
+    "sample": "finite-element tree in wind, the sample",
+    "blender_armature_tree": "Blender: tree on keyed bones",
+    "blender_bent_grass": "Blender: grass displaced by clouds",
+    "shader_card_tree": "leaf cards that a vertex shader moves",
+    "mujoco_cable_vine": "MuJoCo: vine of cables",
+    "helios_bean_8d": "Helios: bean that grows",
+    "lsystem_tree": "L-system: tree that grows",
+}
+OVERVIEW_CAPTION = """
+Sizes of files in kB (1,000 bytes) within 1e-4 of the diagonal of the bounding box of all frames. *With all arrays* is
+`athcodec encode SOURCE` at its default options: faces, names, levels of detail, and a rest pose in which faces keep
+their shape. *Positions* is `--attributes none --rest-error bound --ladder none`, which is all that the other codecs
+keep. *Best other* is the smallest file of SZ3, Blosc2, zfp, meshoptimizer, four kinds of PCA, skeletal tracks, and
+differences with zstd, each tuned for the clip.
+"""
 
 
 def measured(points: Iterable[Point]) -> list[Point]:
@@ -171,3 +187,20 @@ def clips_text(contents: Mapping[str, Any], bounds: Collection[float] = BOUNDS) 
         what = f"`{clip['clip']}`, {clip['frames']} x {clip['vertices']:,}: {clip['what']}"
         parts += [what, markdown(by_codec(points, clip["clip"], bounds))]
     return "\n\n".join(parts) + "\n"
+
+
+def overview_text(suites: Iterable[Mapping[str, Any]]) -> str:
+    """A table of a few clips at 1e-4, in kB, below its options, for readers who want one table."""
+    found = []
+    for contents in suites:
+        for clip in (clip for clip in contents["clips"] if clip["clip"] in OVERVIEW):
+            sizes = sizes_of(contents["points"], clip["clip"])
+            best = best_other(sizes, WHOLE_BOUND)
+            whole, ours = (sizes[codec.name, WHOLE_BOUND] for codec in (WholeAthcodec, Athcodec))
+            files = {"with all arrays": whole, "positions": ours, "best other": best}
+            row = {"clip": OVERVIEW[clip["clip"]], "frames x vertices": f"{clip['frames']} x {clip['vertices']:,}"}
+            row["float32"] = round(12 * clip["frames"] * clip["vertices"] / 1000)
+            row |= {name: round(point["bytes"] / 1000, 1) for name, point in files.items()}
+            found.append(row | {"by": short(best["codec"])})
+    caption = " ".join(OVERVIEW_CAPTION.split())
+    return f"{caption}\n\n{markdown(found)}"

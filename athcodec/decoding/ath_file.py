@@ -81,6 +81,13 @@ class AthFile(StaticData, SegmentDecoder):
         If a GLB has no such motion.
     RemoteError, OSError
         If it cannot be read.
+
+    Examples
+    --------
+    >>> import athcodec
+    >>> with athcodec.AthFile(athcodec.sample_path("grass")) as file:
+    ...     file.vertex_count, file.branch_count, [clip.name for clip in file.clips]
+    (1400, 100, ['calm', 'gale'])
     """
 
     def __init__(

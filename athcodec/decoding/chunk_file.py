@@ -70,6 +70,11 @@ class ChunkFile:
             with self._lock:
                 self._source.close()
 
+    def __del__(self) -> None:
+        """Close a file that nobody can read from any more, as h5py does."""
+        if getattr(self, "_closes_source", False) and hasattr(self, "_source"):
+            self._source.close()
+
     @property
     def source(self) -> Any:
         """The file object that the bytes come from. That of a URL counts its `requests` and `bytes`."""

@@ -137,6 +137,14 @@ class MotionClip:
     ------
     ClipError
         If the structure is wrong; by `block` and `blocks`, at the first position that is not a finite number.
+
+    Examples
+    --------
+    >>> import athcodec, numpy as np
+    >>> positions = np.zeros((60, 20, 3), np.float32)
+    >>> positions[..., 1] = np.linspace(0, 2, 20)  # a stem that stands still
+    >>> athcodec.MotionClip(positions, np.arange(60) / 30, vertex_branch=np.zeros(20, int), branch_parent=[-1])
+    MotionClip(60 frames, 20 vertices, 1 branches, float32)
     """
 
     positions: Any

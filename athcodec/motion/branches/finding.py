@@ -65,6 +65,14 @@ def find_branches(clip: MotionClip, method: str = "auto", root: int | None = Non
         If scipy is missing.
     ValueError
         For a method that does not exist.
+
+    Examples
+    --------
+    >>> import athcodec, numpy as np
+    >>> fork = np.array([[[0, 0, 0], [0, 1, 0], [0, 2, 0], [0, 3, 0], [1, 2, 0]]], np.float32)
+    >>> clip = athcodec.MotionClip(fork, [0.0], edges=[[0, 1], [1, 2], [2, 3], [2, 4]])
+    >>> print(athcodec.find_branches(clip, method="edges"))
+    2 branches by edges: 1 without a parent, up to order 1, 1 to 4 vertices each
     """
     if method != "auto" and method not in METHODS:
         raise ValueError(f"method: got {method!r}, expected auto or one of {', '.join(METHODS)}")

@@ -26,6 +26,15 @@ class Found:
         How they were found: "attributes", "skeleton", "edges", "components", "runs", "motion", or "file".
     taken : str, optional
         The name of the array that was taken for the numbers of branches.
+
+    Examples
+    --------
+    >>> import athcodec, numpy as np
+    >>> fork = np.array([[[0, 0, 0], [0, 1, 0], [0, 2, 0], [0, 3, 0], [1, 2, 0]]], np.float32)
+    >>> clip = athcodec.MotionClip(fork, [0.0], edges=[[0, 1], [1, 2], [2, 3], [2, 4]])
+    >>> found = athcodec.find_branches(clip)
+    >>> found.vertex_branch.tolist(), found.branch_parent.tolist()
+    ([0, 0, 0, 0, 1], [-1, 0])
     """
 
     vertex_branch: np.ndarray
