@@ -27,13 +27,12 @@ OF_VIEWS += ["attributes", "metadata", "clip_ranges"]
 
 
 @contextmanager
-def clip_of(source: Source, **options: Any) -> Iterator[tuple[MotionClip, str]]:
+def clip_of(source: Source, **given: Any) -> Iterator[tuple[MotionClip, str]]:
     """Give a source as a clip, and a sentence on how its numbers were converted, empty if they were not.
 
-    The options are OF_ARRAYS and OF_FILES, None where they are not given. A file that is opened here is closed when the
+    The options are OF_ARRAYS and OF_FILES, as far as they are given. A file that is opened here is closed when the
     block ends. Raises ClipError, ValueError, and the errors of `read`.
     """
-    given = {name: value for name, value in options.items() if value is not None}
     is_path, is_view = isinstance(source, (str, os.PathLike)), isinstance(source, (Decoder, ClipView))
     allowed = OF_FILES if is_path else () if is_view or isinstance(source, MotionClip) else (*OF_ARRAYS, *OF_FILES)
     for name in given.keys() - set(allowed):

@@ -34,7 +34,6 @@ class Comparison:
 
     Examples
     --------
-    >>> import athcodec
     >>> growth = athcodec.sample_path("growth")
     >>> errors = athcodec.compare(growth, athcodec.encode(growth, effort="fast"))
     >>> bool((errors.max_error.max(axis=1) <= errors.promised).all())
@@ -73,7 +72,6 @@ def compare(source: Source, file: Decoder | Openable, **options: Any) -> Compari
 
     Examples
     --------
-    >>> import athcodec
     >>> with athcodec.open(athcodec.sample_path("grass")) as grass:
     ...     coarse = athcodec.compare(grass[:], grass)
     >>> coarse.max_error.shape, float(coarse.max_error[-1].max())

@@ -5,22 +5,22 @@ from __future__ import annotations
 import io
 from collections.abc import Sequence
 from dataclasses import replace
+from inspect import Parameter, Signature, signature
 from os import PathLike
-from typing import BinaryIO, TypedDict, Unpack, overload
+from typing import Any, BinaryIO, TypedDict, Unpack, overload
 
 import numpy as np
 import numpy.typing as npt
 
-from athcodec.arrays import Source, clip_of
+from athcodec.arrays import OF_ARRAYS, OF_FILES, Source, clip_of
 from athcodec.encoding import Summary, encode_clip
 from athcodec.encoding.progress import Progress
 from athcodec.motion.thresholds import Thresholds
 from athcodec.motion.units import Length
-from athcodec.options import DEFAULT_LADDER
 
 
 class EncodeOptions(TypedDict, total=False):
-    """The options of `encode`, for type checkers."""
+    """The options of `encode`; None, where it is not a type of one, is the default."""
 
     faces: npt.ArrayLike | None
     vertex_branch: npt.ArrayLike | None
@@ -51,31 +51,7 @@ def encode(source: Source, target: None = None, **options: Unpack[EncodeOptions]
 @overload
 def encode(source: Source, target: str | PathLike[str] | BinaryIO, **options: Unpack[EncodeOptions]) -> Summary: ...
 def encode(
-    source: Source,
-    target: str | PathLike[str] | BinaryIO | None = None,
-    *,
-    faces: npt.ArrayLike | None = None,
-    vertex_branch: npt.ArrayLike | None = None,
-    branch_parent: npt.ArrayLike | None = None,
-    fps: float | None = None,
-    unit: str | None = None,
-    up_axis: str | None = None,
-    max_error: float | None = None,
-    rel_error: float | None = None,
-    target_size: int | None = None,
-    ladder: str | Sequence[float] = DEFAULT_LADDER,
-    lossless: bool = False,
-    exact_rest: bool = False,
-    host_rest: bool = False,
-    rest_error: float | str | Length | None = None,
-    weights: str | np.ndarray | None = None,
-    attributes: str = "all",
-    effort: str = "default",
-    smoothness: str = "default",
-    segment_frames: int | None = None,
-    tam: Thresholds | None = None,
-    jobs: int | None = None,
-    progress: Progress | None = None,
+    source: Source, target: str | PathLike[str] | BinaryIO | None = None, **options: Unpack[EncodeOptions]
 ) -> Summary | bytes:
     """Compress motion into an .ath file, within an error bound.
 
@@ -125,7 +101,6 @@ def encode(
 
     Examples
     --------
-    >>> import athcodec, numpy as np
     >>> positions = np.zeros((60, 20, 3), np.float32)  # a stem of 20 vertices that bends for 60 frames
     >>> positions[..., 1] = np.linspace(0, 2, 20)
     >>> positions[..., 0] = 0.02 * np.sin(np.arange(60) / 10)[:, None] * positions[..., 1] ** 2
@@ -134,27 +109,17 @@ def encode(
     ...     bool(np.abs(decoder - positions).max() <= 0.001)
     True
     """
+    if unknown := options.keys() - EncodeOptions.__annotations__.keys():
+        raise TypeError(f"encode: got the option {min(unknown)!r}; expected {', '.join(EncodeOptions.__annotations__)}")
+    given: dict[str, Any] = {name: value for name, value in options.items() if value is not None}
+    of_source = {name: given.pop(name) for name in (*OF_ARRAYS, *OF_FILES) if name in given}
     out = io.BytesIO() if target is None else target
-    given = {"faces": faces, "vertex_branch": vertex_branch, "branch_parent": branch_parent}
-    with clip_of(source, **given, fps=fps, unit=unit, up_axis=up_axis) as (clip, converted):
-        summary = encode_clip(
-            clip,
-            out,
-            max_error=max_error,
-            rel_error=rel_error,
-            target_size=target_size,
-            progress=progress,
-            segment_frames=segment_frames,
-            tam=tam,
-            exact_rest=exact_rest,
-            host_rest=host_rest,
-            rest_error=rest_error,
-            lossless=lossless,
-            weights=weights,
-            attributes=attributes,
-            effort=effort,
-            smoothness=smoothness,
-            ladder=ladder,
-            jobs=jobs,
-        )
-    return out.getvalue() if isinstance(out, io.BytesIO) and target is None else replace(summary, converted=converted)
+    with clip_of(source, **of_source) as (clip, converted):
+        summary = replace(encode_clip(clip, out, **given), converted=converted)
+    return out.getvalue() if isinstance(out, io.BytesIO) and target is None else summary
+
+
+# The names for `help` and for completion, which look at the signature.
+_NAMES = [Parameter(name, Parameter.KEYWORD_ONLY, default=None) for name in EncodeOptions.__annotations__]
+_PLACES = [parameter for parameter in signature(encode).parameters.values() if parameter.name != "options"]
+encode.__signature__ = Signature([*_PLACES, *_NAMES])  # type: ignore[attr-defined]

@@ -6,7 +6,6 @@ what is wrong, where, what was found and what was expected.
 
 Examples
 --------
->>> import athcodec
 >>> try:
 ...     athcodec.open(b"no plant")
 ... except athcodec.errors.FormatError as error:

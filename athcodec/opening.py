@@ -63,7 +63,6 @@ def open(
 
     Examples
     --------
-    >>> import athcodec
     >>> with athcodec.open(athcodec.sample_path("grass"), clip="gale") as gale:
     ...     gale.shape, gale.metadata["unit"], gale.level_within(0.05)
     ((150, 1400, 3), 'm', 0)

@@ -64,7 +64,7 @@ def truncate(
 
     Examples
     --------
-    >>> import athcodec, os, tempfile
+    >>> import os, tempfile
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     size = athcodec.truncate(athcodec.sample_path("grass"), os.path.join(folder, "far.ath"), level=0)
     >>> size < os.path.getsize(athcodec.sample_path("grass"))

@@ -478,13 +478,6 @@ def test_a_file_that_cannot_be_opened_as_ath_is_closed(tmp_path):
         athcodec.open(tmp_path / "no.ath")  # an open file would warn, and warnings are errors here
 
 
-def test_str_path_and_file_object_give_the_same(bushy_ath):
-    with athcodec.open(str(bushy_ath)) as by_name, athcodec.open(bushy_ath) as by_path:
-        in_memory = athcodec.open(BytesIO(bushy_ath.read_bytes()))
-        assert np.array_equal(by_name.positions(), by_path.positions())
-        assert np.array_equal(by_name.positions(), in_memory.positions())
-
-
 def test_info_is_json_and_agrees_with_the_summary(bushy_clip, tmp_path):
     summary = athcodec.encode(bushy_clip, tmp_path / "b.ath", rel_error=1e-3, segment_frames=16, effort="fast")
     with athcodec.open(summary.path) as decoder:

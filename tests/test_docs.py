@@ -177,7 +177,8 @@ def test_the_reference_has_every_public_name():
 @pytest.mark.parametrize("name", athcodec.__all__)
 def test_every_public_name_has_an_example_that_runs(name):
     """In its docstring, or else below its name in the reference, whose examples run with those of all pages."""
-    [example] = doctest.DocTestFinder(recurse=False).find(getattr(athcodec, name), name)
+    names = {"athcodec": athcodec, "np": np}
+    [example] = doctest.DocTestFinder(recurse=False).find(getattr(athcodec, name), name, globs=names)
     result = doctest.DocTestRunner().run(example)
     reference = (ROOT / "docs" / "python-reference.md").read_text("utf-8")
     assert result.failed == 0

@@ -84,7 +84,6 @@ class AthFile(StaticData, SegmentDecoder):
 
     Examples
     --------
-    >>> import athcodec
     >>> with athcodec.AthFile(athcodec.sample_path("grass")) as file:
     ...     file.vertex_count, file.branch_count, [clip.name for clip in file.clips]
     (1400, 100, ['calm', 'gale'])

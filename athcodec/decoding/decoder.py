@@ -70,7 +70,6 @@ class Decoder:
 
     Examples
     --------
-    >>> import athcodec
     >>> with athcodec.open(athcodec.sample_path("grass")) as grass:
     ...     grass.shape, grass[10:20].shape, grass[-1, :100].shape, grass.at_level(1)[::30].dtype
     ((150, 1400, 3), (10, 1400, 3), (100, 3), dtype('float32'))

@@ -68,7 +68,7 @@ class Summary:
 
     Examples
     --------
-    >>> import athcodec, io, numpy as np
+    >>> import io
     >>> stem = np.zeros((9, 20, 3), np.int16)
     >>> stem[..., 1] = np.arange(20)
     >>> summary = athcodec.encode(stem, io.BytesIO(), max_error=0.01, vertex_branch=[0] * 20, branch_parent=[-1])

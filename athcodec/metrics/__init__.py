@@ -7,7 +7,6 @@ vertex crumples faces. `SmoothnessMeter` and `ShapeMeter` measure that, `MotionM
 
 Examples
 --------
->>> import athcodec, numpy as np
 >>> meter = athcodec.metrics.ErrorMeter()
 >>> meter.add(np.zeros((2, 5, 3)), np.full((2, 5, 3), 0.1))
 >>> round(meter.max_error, 3)

@@ -140,7 +140,6 @@ class MotionClip:
 
     Examples
     --------
-    >>> import athcodec, numpy as np
     >>> positions = np.zeros((60, 20, 3), np.float32)
     >>> positions[..., 1] = np.linspace(0, 2, 20)  # a stem that stands still
     >>> athcodec.MotionClip(positions, np.arange(60) / 30, vertex_branch=np.zeros(20, int), branch_parent=[-1])

@@ -49,7 +49,6 @@ def join(clips: Mapping[str, MotionClip]) -> MotionClip:
 
     Examples
     --------
-    >>> import athcodec
     >>> with athcodec.read(athcodec.sample_path()) as tree:
     ...     athcodec.join({"first": tree, "again": tree}).frame_count
     240
@@ -99,7 +98,6 @@ def split(clip: MotionClip) -> dict[str, MotionClip]:
 
     Examples
     --------
-    >>> import athcodec
     >>> with athcodec.read(athcodec.sample_path()) as tree:
     ...     list(athcodec.split(athcodec.join({"first": tree, "again": tree})))
     ['first', 'again']
@@ -148,7 +146,6 @@ def in_wind(clip: MotionClip, strength: float, heading: float = 0.0) -> MotionCl
 
     Examples
     --------
-    >>> import athcodec
     >>> with athcodec.read(athcodec.sample_path()) as tree:
     ...     athcodec.in_wind(tree, 8.0, 45.0).metadata["strength"]
     8.0
@@ -194,7 +191,6 @@ def looped(clip: MotionClip, blend: int = 0) -> MotionClip:
 
     Examples
     --------
-    >>> import athcodec
     >>> with athcodec.read(athcodec.sample_path()) as tree:
     ...     athcodec.looped(tree, blend=20).frame_count
     100

@@ -32,7 +32,6 @@ class Thresholds:
 
     Examples
     --------
-    >>> import athcodec
     >>> athcodec.Thresholds(epsilon=0.01, eta=3, xi=0.02, lam=8).eta
     3
     """

@@ -58,7 +58,6 @@ def endless(clip: MotionClip) -> MotionClip:
 
     Examples
     --------
-    >>> import athcodec, numpy as np
     >>> sway = 0.1 * np.sin(np.arange(90) / 5)[:, None, None] * np.ones((1, 20, 3))
     >>> sway[..., 1] = np.linspace(0, 2, 20)
     >>> clip = athcodec.MotionClip(sway, np.arange(90) / 30, vertex_branch=[0] * 20, branch_parent=[-1])

@@ -68,7 +68,6 @@ def find_branches(clip: MotionClip, method: str = "auto", root: int | None = Non
 
     Examples
     --------
-    >>> import athcodec, numpy as np
     >>> fork = np.array([[[0, 0, 0], [0, 1, 0], [0, 2, 0], [0, 3, 0], [1, 2, 0]]], np.float32)
     >>> clip = athcodec.MotionClip(fork, [0.0], edges=[[0, 1], [1, 2], [2, 3], [2, 4]])
     >>> print(athcodec.find_branches(clip, method="edges"))

@@ -29,7 +29,6 @@ class Found:
 
     Examples
     --------
-    >>> import athcodec, numpy as np
     >>> fork = np.array([[[0, 0, 0], [0, 1, 0], [0, 2, 0], [0, 3, 0], [1, 2, 0]]], np.float32)
     >>> clip = athcodec.MotionClip(fork, [0.0], edges=[[0, 1], [1, 2], [2, 3], [2, 4]])
     >>> found = athcodec.find_branches(clip)
