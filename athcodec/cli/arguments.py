@@ -32,6 +32,7 @@ DEMO_FLOOR = {"fern": 4.0, "grass": 9.0}
 """Samples on the floor of the demo's forest, and how many of each around a tree."""
 
 SHELLS = ("bash", "zsh", "tcsh")
+WORDS = "The words that are printed: docs/command-line.md#words."
 TRACEBACK = "show the traceback of an error"
 WRITTEN = (
     "file to write, which replaces an older one of its kind when it is complete, and never an input or any other file; "
@@ -123,12 +124,12 @@ def make_parser() -> argparse.ArgumentParser:
             "A file that was cut off is decoded to its deepest complete level, with a warning.",
         )
     )
-    _info_arguments(verb("info", "show what an .ath file holds, level by level"))
+    _info_arguments(verb("info", "show what an .ath file holds, level by level", WORDS))
     _verify_arguments(
         verb(
             "verify",
             "check that an .ath file is whole and undamaged, and how far off its source it is",
-            "Exit code 1 where a checksum fails, the file is cut off, or a level is further off than it says.",
+            f"Exit code 1 where a checksum fails, the file is cut off, or a level is further off than it says. {WORDS}",
         )
     )
     _truncate_arguments(verb("truncate", "leave out the levels beyond one, without decoding"))

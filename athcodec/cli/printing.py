@@ -18,7 +18,6 @@ from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, T
 from athcodec.decoding.facts import LEVEL_COLUMNS, TICK_RATIO, Column, head, level_rows, print_facts, size_of
 from athcodec.errors import AthError
 from athcodec.files.shown import counted, echo, print_table, redacted
-from athcodec.metrics import ErrorMeter
 from athcodec.options import DEFAULT_REL_ERROR
 
 if TYPE_CHECKING:
@@ -79,14 +78,14 @@ def answer(args: argparse.Namespace, facts: dict[str, Any], text: str) -> None:
         echo(text)
 
 
-def print_demo(facts: dict[str, Any], meters: Sequence[ErrorMeter]) -> None:
+def print_demo(facts: dict[str, Any], diagonal: float) -> None:
     seconds = facts["frames"] / facts["fps"]
     columns = [*(head(name, facts["unit"]) for name in ("max", "RMS")), "max/diag", "RMS/diag", "B/s"]
     cells = []
-    for level, meter in zip(facts["levels"], meters, strict=True):
-        errors = [f"{meter.max_error:.3g}", f"{meter.rms_error:.3g}"]
-        relative = [f"{error / meter.diagonal:.1e}" for error in (meter.max_error, meter.rms_error)]
-        cells.append([*errors, *relative, f"{level['bytes'] / seconds:,.0f}"])
+    for level in facts["levels"]:
+        errors = [level[f"measured_{name}_error"] for name in ("max", "rms")]
+        relative = [f"{error / diagonal:.1e}" for error in errors]
+        cells.append([*(f"{error:.3g}" for error in errors), *relative, f"{level['bytes'] / seconds:,.0f}"])
     echo(
         f"Encoded the sample {Path(facts['file']).stem} within {DEFAULT_REL_ERROR:g} of its diagonal, "
         "decoded every level and measured it against the source:"

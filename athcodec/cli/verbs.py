@@ -22,7 +22,6 @@ from athcodec.cli.clips import (
     check_name,
     check_output,
     clip_to_encode,
-    decode_and_measure,
     gltf_to_fill,
     measure_against,
     motions_of,
@@ -475,10 +474,15 @@ def demo(args: argparse.Namespace) -> int:
         encoded = Path(folder, f"{source.stem}.ath")
         with athcodec.read_hdf5(source) as clip:
             with progress() as report:
-                athcodec.encode(clip, encoded, rel_error=DEFAULT_REL_ERROR, progress=report)
+                summary = athcodec.encode(clip, encoded, rel_error=DEFAULT_REL_ERROR, progress=report)
             with open_file(encoded, strict=True) as decoder:
-                meters = [decode_and_measure(decoder, clip, encoded, d) for d in range(decoder.file.level_count)]
-                facts = facts_of(encoded, decoder)
+                facts, errors = facts_of(encoded, decoder), athcodec.compare(clip, decoder)
+                for level, largest, rms in zip(facts["levels"], errors.max_error, errors.rms_error, strict=True):
+                    level["measured_max_error"] = float(largest.max())
+                    level["measured_rms_error"] = float(np.sqrt(np.mean(rms**2)))
+                    if args.keep is not None:
+                        shown = decoder.at_level(level["level"])
+                        athcodec.write(shown, encoded.with_name(f"{encoded.stem}_level_{shown.level}.h5"))
         page = Path(args.keep or ".", DEMO_PAGE).resolve()
         floor = (
             {athcodec.sample_path(name): each for name, each in DEMO_FLOOR.items()} if args.sample == "tree" else None
@@ -486,11 +490,9 @@ def demo(args: argparse.Namespace) -> int:
         shown = athcodec.sample_path("leafed") if floor else encoded
         made = _export_demo(shown, page, floor)
         if args.json:
-            for level, meter in zip(facts["levels"], meters):
-                level |= {"measured_max_error": meter.max_error, "measured_rms_error": meter.rms_error}
             print_json(facts | {"page": str(page) if made else None})
             return 0
-        print_demo(facts, meters)
+        print_demo(facts, summary.max_error_bound / summary.relative_bound)
         if made:
             echo(f"{shown.name} moves in {page}: open it in a browser.")
         if args.keep is not None:

@@ -14,7 +14,7 @@ Examples
 """
 
 from athcodec.metrics.blocks import Spread
-from athcodec.metrics.error import ErrorMeter, bits_per_vertex_frame, compare_clips
+from athcodec.metrics.error import ErrorMeter, bits_per_vertex_frame
 from athcodec.metrics.motion import MotionMeter, level_meters
 from athcodec.metrics.shape import ShapeMeter, edges_of, stem_links
 from athcodec.metrics.smoothness import SmoothnessMeter, second_differences, tick_ratio
@@ -26,7 +26,6 @@ __all__ = [
     "SmoothnessMeter",
     "Spread",
     "bits_per_vertex_frame",
-    "compare_clips",
     "edges_of",
     "level_meters",
     "second_differences",
