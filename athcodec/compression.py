@@ -62,6 +62,11 @@ def encode(
         float16 are converted, and the summary says so. A path is that of a file that `read` knows.
     target : str, path-like or binary file object, optional
         A path gets its file when that is whole; an older .ath file is replaced, any other refused. None: return bytes.
+    **options
+        Those below.
+
+    Other Parameters
+    ----------------
     faces, vertex_branch, branch_parent, fps, unit, up_axis : optional
         What an array does not say, as in MotionClip; fps is 30 and branches are found unless they are passed. With a
         path, fps, unit and up_axis are those of `read`.

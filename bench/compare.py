@@ -46,11 +46,11 @@ OVERVIEW = {
     "lsystem_tree": "L-system: tree that grows",
 }
 OVERVIEW_CAPTION = """
-Sizes of files in kB (1,000 bytes) within 1e-4 of the diagonal of the bounding box of all frames. *With all arrays* is
+Bytes of files within 1e-4 of the diagonal of the bounding box of all frames. *With all arrays* is
 `athcodec encode SOURCE` at its default options: faces, names, levels of detail, and a rest pose in which faces keep
 their shape. *Positions* is `--attributes none --rest-error bound --ladder none`, which is all that the other codecs
 keep. *Best other* is the smallest file of SZ3, Blosc2, zfp, meshoptimizer, four kinds of PCA, skeletal tracks, and
-differences with zstd, each tuned for the clip.
+differences with zstd, each tuned for the clip, and how many times as large as *positions* it is.
 """
 
 
@@ -190,17 +190,12 @@ def clips_text(contents: Mapping[str, Any], bounds: Collection[float] = BOUNDS) 
 
 
 def overview_text(suites: Iterable[Mapping[str, Any]]) -> str:
-    """A table of a few clips at 1e-4, in kB, below its options, for readers who want one table."""
-    found = []
+    """A table of a few clips at 1e-4, below its options, for readers who want one table."""
+    shown = []
     for contents in suites:
-        for clip in (clip for clip in contents["clips"] if clip["clip"] in OVERVIEW):
-            sizes = sizes_of(contents["points"], clip["clip"])
-            best = best_other(sizes, WHOLE_BOUND)
-            whole, ours = (sizes[codec.name, WHOLE_BOUND] for codec in (WholeAthcodec, Athcodec))
-            files = {"with all arrays": whole, "positions": ours, "best other": best}
-            row = {"clip": OVERVIEW[clip["clip"]], "frames x vertices": f"{clip['frames']} x {clip['vertices']:,}"}
-            row["float32"] = round(12 * clip["frames"] * clip["vertices"] / 1000)
-            row |= {name: round(point["bytes"] / 1000, 1) for name, point in files.items()}
-            found.append(row | {"by": short(best["codec"])})
-    caption = " ".join(OVERVIEW_CAPTION.split())
-    return f"{caption}\n\n{markdown(found)}"
+        clips = [clip for clip in contents["clips"] if clip["clip"] in OVERVIEW]
+        for clip, row in zip(clips, rows(clips, contents["points"], [WHOLE_BOUND])):
+            sizes = {"float32": 12 * clip["frames"] * clip["vertices"], "with all arrays": row["all arrays"]}
+            sizes |= {"positions": row["ours 1e-4"], "best other": row["best other 1e-4"]}
+            shown.append({"clip": OVERVIEW[clip["clip"]], "frames x vertices": row["frames x vertices"]} | sizes)
+    return f"{' '.join(OVERVIEW_CAPTION.split())}\n\n{markdown(shown)}"

@@ -192,7 +192,6 @@ def test_the_help_of_encode_fits_on_a_page():
 
 
 USER = """
-import io
 from pathlib import Path
 
 import numpy as np
@@ -201,22 +200,15 @@ import numpy.typing as npt
 import athcodec
 
 
-def encoded(positions: npt.NDArray[np.float32], path: Path) -> bytes:
+def shown(positions: npt.NDArray[np.float32], path: Path) -> npt.NDArray[np.float32]:
     summary = athcodec.encode(positions, path, fps=24, unit="m", rel_error=1e-3, ladder=(1e-2,))
-    print(f"{summary.bytes:,} bytes, {summary.ratio:.1f} to 1", summary.converted)
-    athcodec.encode(str(path), io.BytesIO(), max_error=0.01)
-    return athcodec.encode(positions)
-
-
-def shown(data: bytes) -> npt.NDArray[np.float32]:
+    data = athcodec.encode(str(path), max_error=0.01)
     with athcodec.open(data) as decoder, athcodec.open(memoryview(data), clip="calm") as calm:
         frames, vertices, three = decoder.shape
-        total = sum(float(frame.max()) for frame in decoder.at_level(0))
-        picked: npt.NDArray[np.float32] = decoder[10:20, ::2]
-        print(decoder, len(calm), frames * vertices * three, total, np.asarray(decoder).mean())
-        errors = athcodec.compare(picked, decoder)
-        print(errors.max_error.max(axis=1), decoder.level_within(0.01), decoder.positions([1, 2], level=0).shape)
-        athcodec.write(decoder, "far.h5")
+        largest = max(float(frame.max()) for frame in decoder.at_level(0))
+        errors = athcodec.compare(decoder[10:20, ::2], calm)
+        print(summary.ratio, len(data), frames * vertices * three, largest, np.asarray(decoder).mean())
+        print(errors.max_error.max(axis=1), decoder.levels[0].max_error, decoder.positions([1, 2], level=0).shape)
         return decoder.at(0.5)
 """
 CHECKERS = {"mypy": ["--strict", "--follow-imports=silent"], "pyright": []}

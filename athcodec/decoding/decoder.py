@@ -539,10 +539,14 @@ class Decoder:
                         show(segments.start, ready)
         return shown.astype(dtype, copy=False)[of_frames]
 
+    @cached_property
+    def _starts(self) -> np.ndarray:
+        """The first frame of each segment."""
+        return np.array([start for start, _ in self.segments])
+
     def _runs_of(self, frames: np.ndarray) -> Iterator[range]:
         """Yield the segments of the file that hold these ascending frames, in runs without a gap."""
-        starts = [start for start, _ in self.segments]
-        needed = np.unique(np.searchsorted(starts, frames, side="right") - 1) + self.clip.first_segment
+        needed = np.unique(np.searchsorted(self._starts, frames, side="right") - 1) + self.clip.first_segment
         for run in np.split(needed, np.flatnonzero(np.diff(needed) > 1) + 1) if len(needed) else ():
             yield range(int(run[0]), int(run[-1]) + 1)
 
