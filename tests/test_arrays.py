@@ -54,7 +54,7 @@ def test_an_index_that_an_array_has_not_is_an_index_error_here_too(index, decode
             sequence[index]
 
 
-@indices("3.5 | [0.5, 2] | np.float64(2.0) | 'positions'")
+@indices("3.5 | [0.5, 2] | np.float64(2.0) | 'positions' | np.s_[0.5:2]")
 def test_a_frame_between_two_is_an_error_that_names_what_shows_it(index, decoder):
     for ask in (decoder.__getitem__, decoder.positions):
         with pytest.raises(TypeError, match=r"at\(seconds\)"):

@@ -652,7 +652,7 @@ JSON = {
     "info": ("info IN", "levels"),
     "verify": ("verify IN", "ok"),
     "truncate": ("truncate IN a.ath --level 0", "bytes_before"),
-    "hierarchy": ("hierarchy SAMPLE --method runs", "branches"),
+    "hierarchy": ("hierarchy SAMPLE --method edges", "branches"),
     "formats": ("formats", "formats"),
     "view": ("view IN --export a.html", "bytes"),
     "demo": ("demo --keep .", "page"),

@@ -12,6 +12,7 @@ from athcodec.options import whole
 
 Frames: TypeAlias = SupportsIndex | slice | Sequence[SupportsIndex] | np.ndarray
 """A frame, or several, as the first index of an array names them."""
+BETWEEN = "; at(seconds) shows the motion between frames"
 
 
 def split_index(index: Any, frame_count: int) -> tuple[np.ndarray, Any]:
@@ -28,7 +29,10 @@ def split_index(index: Any, frame_count: int) -> tuple[np.ndarray, Any]:
     place = next((place for place, key in enumerate(keys) if key is not None), None)
     chosen = Ellipsis if place is None else keys[place]
     if isinstance(chosen, slice):
-        frames = np.arange(*chosen.indices(frame_count))
+        try:
+            frames = np.arange(*chosen.indices(frame_count))
+        except TypeError:
+            raise TypeError(f"frames: got {chosen}, expected whole numbers{BETWEEN}") from None
         keys[place] = slice(None)
         if len(frames) > 1 and frames[0] > frames[1]:
             frames, keys[place] = frames[::-1], slice(None, None, -1)
@@ -39,8 +43,7 @@ def split_index(index: Any, frame_count: int) -> tuple[np.ndarray, Any]:
     if numbers.dtype == bool:
         numbers = np.flatnonzero(numbers)
     elif numbers.size and numbers.dtype.kind not in "iu":
-        hint = "; at(seconds) shows the motion between frames"
-        whole_numbers = [whole("frame", number, hint) for number in numbers.ravel().tolist()]
+        whole_numbers = [whole("frame", number, BETWEEN) for number in numbers.ravel().tolist()]
         numbers = np.reshape(whole_numbers, numbers.shape)
     numbers = numbers.astype(np.intp)
     for number in numbers[(numbers < -frame_count) | (numbers >= frame_count)].ravel()[:1]:
