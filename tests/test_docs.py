@@ -1,7 +1,8 @@
 """The examples of README.md and docs/ do what they say, and the reference of the Python API is complete.
 
 Blocks marked `sh`, `python`, `c` and `js` are run as they stand, in the order of their page; `bash` marks commands that
-install something or take long, which are not.
+install something or take long, which are not, but for those of the README for a file of yours. Blocks marked `py` take
+packages that athcodec does without: `-m programs` runs them.
 """
 
 from __future__ import annotations

@@ -68,10 +68,9 @@ def find_branches(clip: MotionClip, method: str = "auto", root: int | None = Non
 
     Examples
     --------
-    >>> fork = np.array([[[0, 0, 0], [0, 1, 0], [0, 2, 0], [0, 3, 0], [1, 2, 0]]], np.float32)
-    >>> clip = athcodec.MotionClip(fork, [0.0], edges=[[0, 1], [1, 2], [2, 3], [2, 4]])
-    >>> print(athcodec.find_branches(clip, method="edges"))
-    2 branches by edges: 1 without a parent, up to order 1, 1 to 4 vertices each
+    >>> with athcodec.read(athcodec.sample_path()) as tree:
+    ...     len(athcodec.find_branches(tree, "edges").branch_parent)
+    99
     """
     if method != "auto" and method not in METHODS:
         raise ValueError(f"method: got {method!r}, expected auto or one of {', '.join(METHODS)}")

@@ -29,11 +29,9 @@ class Found:
 
     Examples
     --------
-    >>> fork = np.array([[[0, 0, 0], [0, 1, 0], [0, 2, 0], [0, 3, 0], [1, 2, 0]]], np.float32)
-    >>> clip = athcodec.MotionClip(fork, [0.0], edges=[[0, 1], [1, 2], [2, 3], [2, 4]])
-    >>> found = athcodec.find_branches(clip)
-    >>> found.vertex_branch.tolist(), found.branch_parent.tolist()
-    ([0, 0, 0, 0, 1], [-1, 0])
+    >>> with athcodec.read(athcodec.sample_path()) as tree:
+    ...     athcodec.find_branches(tree, "edges").method
+    'edges'
     """
 
     vertex_branch: np.ndarray
