@@ -91,7 +91,7 @@ def compare(source: Source, file: Decoder | Openable, **options: Any) -> Compari
             reference = clip.block(start, stop)
             for level in range(len(largest)):
                 first = start
-                for frames, shown in paired(reference, decoder.positions(slice(start, stop), level)):
+                for frames, shown in paired(reference, decoder.positions(slice(start, stop), level), 0):
                     distance = np.linalg.norm(frames - shown, axis=2)
                     rows = level, slice(first, first := first + len(distance))
                     largest[rows], worst[rows] = distance.max(axis=1), distance.argmax(axis=1)
