@@ -5,10 +5,12 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:  # Type checkers and the reference look here for what __getattr__ returns.
     from athcodec import errors, metrics
+    from athcodec.comparison import Comparison, compare
+    from athcodec.compression import encode
     from athcodec.decoding.ath_file import AthFile
     from athcodec.decoding.clip_view import ClipView
     from athcodec.decoding.decoder import Decoder
-    from athcodec.encoding import Summary, encode
+    from athcodec.encoding import Summary
     from athcodec.encoding.survey import Ath, build_ath
     from athcodec.exporters import write, write_hdf5
     from athcodec.motion.branches.finding import find_branches
@@ -26,12 +28,14 @@ __all__ = [
     "Ath",
     "AthFile",
     "ClipView",
+    "Comparison",
     "Decoder",
     "Found",
     "MotionClip",
     "Summary",
     "Thresholds",
     "build_ath",
+    "compare",
     "encode",
     "endless",
     "errors",
@@ -60,7 +64,9 @@ _LAZY = {
     "opening": ("open",),
     "motion.branches.finding": ("find_branches",),
     "motion.branches.result": ("Found",),
-    "encoding": ("Summary", "encode"),
+    "comparison": ("Comparison", "compare"),
+    "compression": ("encode",),
+    "encoding": ("Summary",),
     "exporters": ("write", "write_hdf5"),
     "motion.joining": ("in_wind", "join", "looped", "split"),
     "sources": ("read", "read_hdf5", "sample_path"),

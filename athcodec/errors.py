@@ -3,6 +3,14 @@
 The codes are those of FORMAT.md, "Errors", and of core/include/ath.h; they never change once released. A message is
 one line:
 what is wrong, where, what was found and what was expected.
+
+Examples
+--------
+>>> try:
+...     athcodec.open(b"no plant")
+... except athcodec.errors.FormatError as error:
+...     error.name
+'NOT_AN_ATH_FILE'
 """
 
 from __future__ import annotations
@@ -125,7 +133,7 @@ class UnsupportedFeature(FormatError):
     code, name = 14, "UNSUPPORTED_FEATURE"
 
 
-class LevelUnavailable(AthError, LookupError):
+class LevelUnavailable(AthError, IndexError):
     """The file, or the part of it that is there, has no such level or frame."""
 
 

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import os
-from typing import BinaryIO, cast
+from typing import cast
 
 from athcodec.decoding.ath_file import AthFile
+from athcodec.decoding.chunk_file import Openable
 from athcodec.decoding.container import Limits
 from athcodec.decoding.decoder import Decoder
 from athcodec.decoding.host_mesh import HostMesh
 
 
 def open(
-    path: str | os.PathLike[str] | BinaryIO,
+    path: Openable,
     *,
     clip: str | None = None,
     strict: bool = False,
@@ -25,9 +26,9 @@ def open(
 
     Parameters
     ----------
-    path : str, path-like or binary file object
-        A path, a URL (`pip install "athcodec[remote]"`), or a seekable file object, which stays open when the decoder
-        is closed.
+    path : str, path-like, bytes or binary file object
+        A path, a URL (`pip install "athcodec[remote]"`), the bytes of a file (any buffer, such as a memoryview), or a
+        file object, which stays open when the decoder is closed; one that cannot seek is read whole.
     clip : str, optional
         The name of the clip to play; by default the first.
     strict : bool
@@ -59,6 +60,12 @@ def open(
         If a GLB has no such motion.
     RemoteError, OSError
         If it cannot be read.
+
+    Examples
+    --------
+    >>> with athcodec.open(athcodec.sample_path("grass"), clip="gale") as gale:
+    ...     gale.shape, gale.metadata["unit"], gale.level_within(0.05)
+    ((150, 1400, 3), 'm', 0)
     """
     mesh_path = host_mesh if isinstance(host_mesh, (str, os.PathLike)) else None
     mesh = None if mesh_path is not None else cast(HostMesh | None, host_mesh)

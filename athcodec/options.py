@@ -23,12 +23,13 @@ HOST = "host"
 """The word for a rest pose that whoever plays the file has: `--rest host`."""
 
 
-def whole(what: str, number: SupportsIndex) -> int:
-    """Return the number as an int, NumPy's integers too. Raises TypeError for any other, such as 3.5 or 3.0."""
+def whole(what: str, number: SupportsIndex, hint: str = "") -> int:
+    """Return the number as an int, NumPy's integers too. Raises TypeError for any other, such as 3.5 or 3.0; its
+    message ends with the hint."""
     try:
         return operator.index(number)
     except TypeError:
-        raise TypeError(f"{what}: got {number!r}, expected a whole number of type int") from None
+        raise TypeError(f"{what}: got {number!r}, expected a whole number of type int{hint}") from None
 
 
 def ladder_of(ladder: str | Sequence[float]) -> tuple[float, ...]:

@@ -61,6 +61,14 @@ def truncate(
         If a file cannot be read or written.
     TypeError
         If not exactly one of `level`, `max_error` and `target_size` is given.
+
+    Examples
+    --------
+    >>> import os, tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     size = athcodec.truncate(athcodec.sample_path("grass"), os.path.join(folder, "far.ath"), level=0)
+    >>> size < os.path.getsize(athcodec.sample_path("grass"))
+    True
     """
     if sum(option is not None for option in (level, max_error, target_size)) != 1:
         raise TypeError("truncate: expected one of level, max_error and target_size")

@@ -32,7 +32,7 @@ from athcodec.motion.branches.result import with_branches
 from bench.clips import read
 from bench.codec_registry import OURS, chosen
 from bench.codecs import Codec, Source
-from bench.codecs.ours import LayeredAthcodec, opened
+from bench.codecs.ours import LayeredAthcodec
 from bench.codecs.program import CannotKeep
 from bench.memory import peak_bytes
 from bench.smoothness import measured_levels
@@ -103,7 +103,7 @@ def _errors(source: Source, decoded: np.ndarray, rel_bound: float) -> dict[str, 
 
 def _levels(data: bytes, clip: athcodec.MotionClip) -> dict[str, float | None]:
     """How much a level's error exceeds that of the level before, and how much the file jerks at its seams, at worst."""
-    with opened(data) as decoder:
+    with athcodec.open(data, strict=True) as decoder:
         meters = measured_levels(decoder, clip)
 
     def growth(errors: list[float]) -> float | None:

@@ -7,10 +7,12 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import athcodec
 from bench import compare, features, rd, shown
 from bench.store import read
 from bench.tables import table
 
+README = rd.ROOT / "README.md"
 RATIONALE, BENCHMARKS = rd.ROOT / "spec" / "rationale.md", rd.ROOT / "docs" / "benchmarks.md"
 
 
@@ -33,7 +35,20 @@ def sections() -> Iterator[tuple[Path, str, str]]:
         file = rd.RESULTS / f"{name}.json"
         if file.exists():
             yield RATIONALE if name == "features" else BENCHMARKS, name, text(read(file))
+    yield README, "overview", compare.overview_text(read(rd.RESULTS / f"{name}.json") for name in ("rd", "foreign"))
+    yield README, "picture", picture_text()
     yield from shown.sections()
+
+
+def picture_text() -> str:
+    """What the moving picture shows, by the file that it shows."""
+    path = athcodec.sample_path("leafed")
+    with athcodec.open(path) as decoder:
+        raw, size = decoder.file.info()["frames"] * decoder.file.vertex_count * 12, path.stat().st_size
+        return (
+            f"{decoder.file.vertex_count:,} vertices in two winds of {len(decoder)} frames each: {raw / 1e6:.0f} MB as "
+            f"float32, {size / 1e3:.0f} kB as the `.ath` file that ships with the package."
+        )
 
 
 def put(document: Path, name: str, text: str) -> None:

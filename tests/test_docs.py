@@ -1,16 +1,22 @@
 """The examples of README.md and docs/ do what they say, and the reference of the Python API is complete.
 
 Blocks marked `sh`, `python`, `c` and `js` are run as they stand, in the order of their page; `bash` marks commands that
-install something or take long, which are not.
+install something or take long, which are not, but for those of the README for a file of yours. Blocks marked `py` take
+packages that athcodec does without: `-m programs` runs them.
 """
 
 from __future__ import annotations
 
 import dataclasses
+import doctest
+import json
+import os
+import pydoc
 import re
 import shlex
 import shutil
 import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -81,6 +87,35 @@ def test_commands_and_python_of_a_page_run(page, files, tmp_path, monkeypatch):
         assert names["maps"].shape[1:] == (3, 4)
 
 
+def test_the_commands_of_the_readme_for_a_file_of_yours_work_as_typed(tmp_path):
+    [commands] = [text for _, text in blocks(ROOT / "README.md", "bash") if "tree.html" in text]
+    programs = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
+    run("bash", "-eu", "-c", commands, cwd=tmp_path, env=os.environ | {"PATH": programs})
+    assert {"tree.h5", "tree.ath", "tree.html"} <= {path.name for path in tmp_path.iterdir()}
+
+
+@pytest.mark.programs
+def test_the_examples_with_packages_that_athcodec_does_not_need_run(files, tmp_path, monkeypatch):
+    shutil.copytree(files, tmp_path, dirs_exist_ok=True)
+    monkeypatch.chdir(tmp_path)
+    for _, text in blocks(ROOT / "docs" / "python.md", "py"):
+        exec(compile(text, "python.md", "exec"), {})
+    assert Path("tree.gif").stat().st_size and Path("half.ath").stat().st_size
+
+
+def test_the_gallery_states_the_figures_of_its_files():
+    text = (ROOT / "docs" / "gallery.md").read_text("utf-8")
+    stated = re.findall(r'<ath-viewer src="([^"]+)"[^>]*>.*?<p>[^<]*: ([^<]*)</p>', text, re.DOTALL)
+    assert len(stated) == 5
+    for source, figures in stated:
+        path = ROOT / "docs" / source
+        with athcodec.open(path) as decoder:
+            frames, size = decoder.file.frame_count, path.stat().st_size / 1000
+            assert (
+                figures == f"{decoder.file.vertex_count:,} points, {frames} frames, {size:.{1 if size < 10 else 0}f} kB"
+            )
+
+
 def run(*command, **options):
     return subprocess.run(list(map(str, command)), capture_output=True, check=True, timeout=120, **options).stdout
 
@@ -138,3 +173,57 @@ def test_the_javascript_program_has_the_positions_of_python(files, tmp_path):
 def test_the_reference_has_every_public_name():
     text = (ROOT / "docs" / "python-reference.md").read_text("utf-8")
     assert set(re.findall(r"^::: athcodec\.(?:\w+\.)?(\w+)$", text, re.MULTILINE)) == set(athcodec.__all__)
+
+
+@pytest.mark.parametrize("name", athcodec.__all__)
+def test_every_public_name_has_an_example_that_runs(name):
+    """In its docstring, or else below its name in the reference, whose examples run with those of all pages."""
+    names = {"athcodec": athcodec, "np": np}
+    [example] = doctest.DocTestFinder(recurse=False).find(getattr(athcodec, name), name, globs=names)
+    result = doctest.DocTestRunner().run(example)
+    reference = (ROOT / "docs" / "python-reference.md").read_text("utf-8")
+    assert result.failed == 0
+    assert result.attempted or re.search(
+        rf"^::: athcodec\.{name}\n\n```python\n[^`]*\b{name}\b", reference, re.MULTILINE
+    )
+
+
+def test_the_help_of_encode_fits_on_a_page():
+    assert len(pydoc.render_doc(athcodec.encode, renderer=pydoc.plaintext).splitlines()) <= 66
+
+
+USER = """
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+import athcodec
+
+
+def shown(positions: npt.NDArray[np.float32], path: Path) -> npt.NDArray[np.float32]:
+    summary = athcodec.encode(positions, path, fps=24, unit="m", rel_error=1e-3, ladder=(1e-2,))
+    data = athcodec.encode(str(path), max_error=0.01)
+    with athcodec.open(data) as decoder, athcodec.open(memoryview(data), clip="calm") as calm:
+        frames, vertices, three = decoder.shape
+        largest = max(float(frame.max()) for frame in decoder.at_level(0))
+        errors = athcodec.compare(decoder[10:20, ::2], calm)
+        print(summary.ratio, len(data), frames * vertices * three, largest, np.asarray(decoder).mean())
+        print(errors.max_error.max(axis=1), decoder.levels[0].max_error, decoder.positions([1, 2], level=0).shape)
+        return decoder.at(0.5)
+"""
+CHECKERS = {"mypy": ["--strict", "--follow-imports=silent"], "pyright": []}
+
+
+@pytest.mark.parametrize("checker", ["mypy", pytest.param("pyright", marks=pytest.mark.tools)])
+def test_a_type_checker_finds_nothing_in_the_script_of_a_user_and_its_mistakes_in_another(checker, tmp_path):
+    (tmp_path / "pyrightconfig.json").write_text(
+        json.dumps({"extraPaths": [str(ROOT)], "typeCheckingMode": "standard"})
+    )
+    command = [sys.executable, "-m", checker, *CHECKERS[checker], "user.py"]
+    mistakes = {"rel_error=1e-3": "rel_eror=1e-3", "path, fps": "5, fps", "at_level(0)": "at_level('fine')"}
+    for wrong, right in [("", ""), *((wrong, right) for right, wrong in mistakes.items())]:
+        (tmp_path / "user.py").write_text(USER.replace(right, wrong))
+        environment = os.environ | {"MYPYPATH": str(ROOT), "MYPY_CACHE_DIR": str(tmp_path / "cache")}
+        done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path, env=environment)
+        assert (done.returncode == 0) == (not wrong), done.stdout + done.stderr

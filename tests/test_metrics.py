@@ -9,9 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from athcodec.errors import ClipError
-from athcodec.metrics import ErrorMeter, blocks, compare_clips
-from athcodec.motion.clip import MotionClip
+from athcodec.metrics import ErrorMeter, blocks
 
 
 @given(st.integers(0, 2**32), st.integers(1, 12), st.integers(1, 9), st.integers(1, 12), st.integers(3, 60))
@@ -75,15 +73,6 @@ def test_motion_is_not_normalised_without_a_rest_pose():
 def test_blocks_of_unequal_shape_are_refused():
     with pytest.raises(ValueError, match=r"\(1, 2, 3\) and \(1, 3, 3\)"):
         ErrorMeter().add(np.zeros((1, 2, 3)), np.zeros((1, 3, 3)))
-
-
-def test_clips_are_compared_frame_by_frame(forked, forked_clip):
-    moved = MotionClip(**(forked | {"positions": forked["positions"] + np.float32(0.5)}))
-    meter = compare_clips(forked_clip, moved)
-    assert meter.rms_error == pytest.approx(np.sqrt(0.75)) and meter.frame_count == 5
-    shorter = MotionClip(**(forked | {"positions": forked["positions"][:3], "time": [0, 1, 2]}))
-    with pytest.raises(ClipError, match=r"got \(3, 6\) .* expected \(5, 6\)"):
-        compare_clips(forked_clip, shorter)
 
 
 @pytest.mark.parametrize("error", [1e-300, 1e-170, 1e-30, 1e180])

@@ -31,6 +31,8 @@ DEMO_PAGE = "athcodec_demo.html"
 DEMO_FLOOR = {"fern": 4.0, "grass": 9.0}
 """Samples on the floor of the demo's forest, and how many of each around a tree."""
 
+SHELLS = ("bash", "zsh", "tcsh")
+WORDS = "The words that are printed: docs/command-line.md#words."
 TRACEBACK = "show the traceback of an error"
 WRITTEN = (
     "file to write, which replaces an older one of its kind when it is complete, and never an input or any other file; "
@@ -54,9 +56,28 @@ class _Parser(argparse.ArgumentParser):
         super()._print_message(shown(message), file)
 
 
+class _Completion(argparse.Action):
+    """Print the script of a shell, made by shtab, and leave."""
+
+    def __call__(
+        self, parser: argparse.ArgumentParser, args: argparse.Namespace, shell: Any, option: Any = None
+    ) -> None:
+        try:
+            import shtab
+        except ImportError:
+            parser.error('--print-completion: needs shtab: pip install "athcodec[completion]"')
+        [verbs] = (action.choices for action in parser._actions if isinstance(action, argparse._SubParsersAction))
+        for action in (action for verb in verbs.values() for action in verb._actions):
+            if re.search(r"IN\b|OUT|FILE|DIR|SOURCE", str(action.metavar)):
+                action.complete = shtab.FILE  # type: ignore[attr-defined]
+        print(shtab.complete(parser, shell))
+        parser.exit()
+
+
 def make_parser() -> argparse.ArgumentParser:
     shared = _Parser(add_help=False)
     shared.add_argument("--debug", action="store_true", default=argparse.SUPPRESS, help=TRACEBACK)
+    shared.add_argument("--json", action="store_true", help="print the result as JSON")
     parser = _Parser(
         prog="athcodec",
         description="A codec for plant motion: levels of detail over its branches, within an error bound.",
@@ -66,6 +87,12 @@ def make_parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action="version", version=f"athcodec {athcodec.__version__}")
     parser.add_argument("--debug", action="store_true", help=TRACEBACK)
+    parser.add_argument(
+        "--print-completion",
+        choices=SHELLS,
+        action=_Completion,
+        help="print a script that lets a shell complete verbs, options and files: docs/command-line.md",
+    )
     choices = parser.add_subparsers(metavar="VERB", required=True)
 
     def verb(name: str, text: str, more: str = "") -> argparse.ArgumentParser:
@@ -97,12 +124,12 @@ def make_parser() -> argparse.ArgumentParser:
             "A file that was cut off is decoded to its deepest complete level, with a warning.",
         )
     )
-    _info_arguments(verb("info", "show what an .ath file holds, level by level"))
+    _info_arguments(verb("info", "show what an .ath file holds, level by level", WORDS))
     _verify_arguments(
         verb(
             "verify",
             "check that an .ath file is whole and undamaged, and how far off its source it is",
-            "Exit code 1 where a checksum fails, the file is cut off, or a level is further off than it says.",
+            f"Exit code 1 where a checksum fails, the file is cut off, or a level is further off than it says. {WORDS}",
         )
     )
     _truncate_arguments(verb("truncate", "leave out the levels beyond one, without decoding"))
@@ -113,8 +140,7 @@ def make_parser() -> argparse.ArgumentParser:
             "Encoding does so by itself; here the result is shown, and saved to be edited.",
         )
     )
-    formats = verb("formats", "list the formats that are read and written, and what each needs")
-    formats.add_argument("--json", action="store_true", help="print as JSON")
+    verb("formats", "list the formats that are read and written, and what each needs")
     _view_arguments(
         verb(
             "view",
@@ -213,7 +239,6 @@ def _encode_arguments(verb: argparse.ArgumentParser) -> None:
         help="threads (default: one per core, at most 4, "
         "fewer for large meshes); the file is the same whatever their number",
     )
-    verb.add_argument("--json", action="store_true", help="print the result as JSON")
 
 
 class _Output(argparse.Action):
@@ -283,7 +308,6 @@ def _batch_arguments(verb: argparse.ArgumentParser) -> None:
     )
     _source_arguments(verb)
     _coding_arguments(verb)
-    verb.add_argument("--json", action="store_true", help="print the result as JSON")
 
 
 def _coding_arguments(verb: argparse.ArgumentParser) -> None:
@@ -533,7 +557,6 @@ def _hierarchy_arguments(verb: argparse.ArgumentParser) -> None:
     )
     verb.add_argument("--save", metavar="FILE.json", help="write the branches there, for encode --hierarchy")
     _source_arguments(verb)
-    verb.add_argument("--json", action="store_true", help="print as JSON")
 
 
 def _info_arguments(verb: argparse.ArgumentParser) -> None:
@@ -547,7 +570,6 @@ def _info_arguments(verb: argparse.ArgumentParser) -> None:
     _host_mesh_argument(verb, ", which --motion takes")
     _gltf_motion_argument(verb)
     _stats_argument(verb)
-    verb.add_argument("--json", action="store_true", help="print as JSON")
 
 
 def _verify_arguments(verb: argparse.ArgumentParser) -> None:
@@ -563,7 +585,6 @@ def _verify_arguments(verb: argparse.ArgumentParser) -> None:
     _host_mesh_argument(verb, " (default: the first SOURCE; without any, only checksums are compared)")
     _gltf_motion_argument(verb)
     _source_arguments(verb)
-    verb.add_argument("--json", action="store_true", help="print the result as JSON")
 
 
 def _truncate_arguments(verb: argparse.ArgumentParser) -> None:

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import athcodec
-from athcodec.cli.printing import counted, progress, say
+from athcodec.cli.printing import progress, say
 from athcodec.decoding.clip_view import ClipView
 from athcodec.decoding.decoder import Decoder
 from athcodec.decoding.file_tables import Level
@@ -28,7 +28,8 @@ from athcodec.errors import (
 from athcodec.files.atomic import check_target, file_ids, is_url, keeping
 from athcodec.files.kinds import kind_of
 from athcodec.files.reading import naming_file
-from athcodec.metrics import ErrorMeter, MotionMeter, SmoothnessMeter, compare_clips, level_meters
+from athcodec.files.shown import counted
+from athcodec.metrics import MotionMeter, SmoothnessMeter, level_meters
 from athcodec.motion.branches.result import with_branches as clip_with_branches
 from athcodec.motion.clip import MotionClip
 from athcodec.motion.joining import BLEND, in_wind
@@ -339,13 +340,6 @@ def refuse_broken_promises(result: dict[str, Any], measured: dict[str, Any]) -> 
             f"{result['file']}: level {level['level']}: got max error {level['max_error']:.6g} against "
             f"{measured['against']}, expected at most {promised:.6g}"
         )
-
-
-def decode_and_measure(decoder: Decoder, clip: MotionClip, encoded: Path, level: int) -> ErrorMeter:
-    decoded = encoded.with_name(f"{encoded.stem}_level_{level}.h5")
-    athcodec.write(ClipView(decoder, level), decoded)
-    with athcodec.read_hdf5(decoded) as again:
-        return compare_clips(clip, again)
 
 
 def check_output(path: str, *inputs: str | None, suffix: str | None = None) -> None:

@@ -10,20 +10,15 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, TextIO
+from typing import TYPE_CHECKING, Any
 
-from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
-from rich.table import Table
-from rich.text import Text
 
-from athcodec.decoding.decoder import Decoder
+from athcodec.decoding.facts import LEVEL_COLUMNS, TICK_RATIO, Column, head, level_rows, print_facts, size_of
 from athcodec.errors import AthError
-from athcodec.files.shown import redacted, shown
-from athcodec.metrics import ErrorMeter
+from athcodec.files.shown import counted, echo, print_table, redacted
 from athcodec.options import DEFAULT_REL_ERROR
-from athcodec.sources import LISTED
 
 if TYPE_CHECKING:
     from athcodec.decoding.clip_view import ClipView
@@ -34,25 +29,12 @@ if TYPE_CHECKING:
 JUMP = 3
 """How many times the ways from frame to frame are what the way over a loop's seam should not be."""
 
-LEVEL_COLUMNS = ["level", "", "nodes", "bytes", "share"]
 MEASURES = ["promised_max_error", "max_error", "rms_error", "kg_error_percent", "motion_normalised_error"]
 LEFT_OUT = {"left_out_edges": "an edge", "left_out_faces": "a face"}
-_TABLE_WIDTH = 250  # wider than any table here: a narrow terminal wraps its lines, nothing is left out
 
 Report = Callable[[str, float], None]
 
 
-class Column(NamedTuple):
-    """How a measure is shown in a table."""
-
-    head: str
-    format: str = ".3g"
-
-    def cell(self, value: float | None) -> str:
-        return "" if value is None else f"{value:{self.format}}"
-
-
-TICK_RATIO = Column("tick ratio")
 LOOKS = {
     "smoothness": {
         "max_second_difference": Column("max"),
@@ -76,173 +58,62 @@ LOOKS = {
 """What is shown of a level beside its errors, by the names of MotionMeter.figures."""
 
 
-def echo(text: str, *, file: TextIO | None = None, flush: bool = False) -> None:
-    """Print lines of text, as `shown`."""
-    print(shown(text), file=file, flush=flush)
-
-
 def print_files(facts: list[dict[str, Any]], as_json: bool) -> None:
-    """Return the facts of a file, or of each motion of a GLB."""
+    """Print the facts of a file, or of each motion of a GLB."""
     if as_json:
-        print_json(facts[0] if len(facts) == 1 else {"motions": facts})
+        print_motions(facts)
         return
     for each in facts:
-        _print_facts(each)
+        print_facts(each)
 
 
-def facts_of(
-    path: str | Path, decoder: Decoder, tick_ratios: Sequence[Sequence[float | None]] | None = None
-) -> dict[str, Any]:
-    """decoder.file.info(), and per level what it adds to the file cut before it. tick_ratios: of each clip at each
-    level, where they were measured."""
-    facts = {"file": os.fspath(path)} | decoder.file.info()
-    facts |= {"unit": decoder.metadata.get("unit"), "missing": decoder.file.missing}
-    facts["raw_bytes"] = facts["frames"] * decoder.file.vertex_count * 12
-    facts["ratio"] = facts["raw_bytes"] / facts["bytes"]
-    before = decoder.file.prelude_length
-    for level in facts["levels"]:
-        level["added_bytes"] = level["bytes"] - before
-        level["share"] = level["added_bytes"] / facts["bytes"]
-        before = level["bytes"]
-    for clip, ratios in zip(facts["clips"], tick_ratios or ()):
-        clip["tick_ratios"] = list(ratios)
-    for level, ratios in zip(facts["levels"], zip(*(tick_ratios or ()))):
-        level["tick_ratio"] = max((ratio for ratio in ratios if ratio is not None), default=None)
-    return facts
+def print_motions(results: list[dict[str, Any]]) -> None:
+    """Print the result of the only motion, or those of all of them, as JSON."""
+    print_json(results[0] if len(results) == 1 else {"motions": results})
 
 
-def _print_facts(facts: dict[str, Any]) -> None:
-    ath = facts["ath"]
-    rate = f" at {facts['fps']:.6g} per second" if facts["fps"] else ""
-    echo(
-        f"{facts['file']}: {counted(facts['vertices'], 'vertex', 'vertices')} on "
-        f"{counted(facts['branches'], 'branch', 'branches')}, {counted(facts['frames'], 'frame')}{rate} in "
-        f"{counted(facts['segments'], 'segment')}, format {facts['format']}"
-    )
-    thresholds = ""
-    if "epsilon" in ath:
-        thresholds = f"; epsilon {ath['epsilon']:.2g}, eta {ath['eta']}, xi {ath['xi']:.2g}, lambda {ath['lam']}"
-    echo(
-        f"ATH: depth {ath['depth']}, {counted(ath['nodes'], 'node')}, "
-        f"{counted(ath['leaves'], 'leaf', 'leaves')} among them{thresholds}"
-    )
-    unit = f" {facts['unit']}" if facts["unit"] else ""
-    share = facts["predicted_error_share"]
-    held = "" if share is None else f", errors of predicted motion held to {share:.2g} of it"
-    echo(f"Error bound: {facts['max_error_bound']:.4g}{unit}{held}. {_size(facts)}")
-    echo(f"Rest pose: {_rest(facts)}.")
-    if len(facts["levels"]) < facts["full_level_count"]:
-        echo(f"Holds levels 0 to {len(facts['levels']) - 1} of 0 to {facts['full_level_count'] - 1}.")
-    if facts["missing"]:
-        echo(f"{facts['available_bytes']:,} bytes are there; missing {facts['missing']}.")
-    if (
-        len(facts["clips"]) > 1
-        or facts["clips"][0]["name"]
-        or any(facts["clips"][0][key] for key in ("loop", "wind", "transitions"))
-    ):
-        _print_clips(facts)
-    for clip in facts["clips"]:
-        _print_presence(clip)
-    _print_levels(facts)
+def answer(args: argparse.Namespace, facts: dict[str, Any], text: str) -> None:
+    """Print a result as JSON, or in words if that was not asked for."""
+    if args.json:
+        print_json(facts)
+    else:
+        echo(text)
 
 
-def _print_presence(clip: dict[str, Any]) -> None:
-    """The objects that some frame does not show, the first `LISTED` of them, and the frames that do."""
-    named = [
-        f"{name} in {', '.join(f'{first} to {stop - 1}' for first, stop in runs) or 'none'}"
-        for name, runs in list(clip["presence"].items())[:LISTED]
-    ]
-    if named:
-        more = len(clip["presence"]) - len(named)
-        of_clip = f" of {clip['name']}" if clip["name"] else ""
-        echo(f"Shown in some frames{of_clip} only: {'; '.join(named)}{f'; and {more:,} more' if more else ''}.")
-
-
-def _rest(facts: dict[str, Any]) -> str:
-    """Where it is, and what it takes."""
-    if facts["host_mesh"]:
-        vertices = counted(facts["vertices"], "vertex", "vertices")
-        return f"a mesh of {vertices} that the host has, checksum {facts['host_mesh']['checksum']}"
-    return f"{facts['rest_bytes']:,} bytes of these"
-
-
-def _print_clips(facts: dict[str, Any]) -> None:
-    """Errors at the seam are those of the deepest stored level."""
-    rows = [
-        [
-            clip["name"],
-            f"{clip['frames']:,}",
-            f"{clip['seconds']:.4g}",
-            f"{clip['segments']:,}",
-            f"{clip['wind']['strength']:g} to {clip['wind']['heading']:g}°" if clip["wind"] else "",
-            f"{clip['transitions']:,}" if clip["transitions"] else "",
-            f"{clip['seam_errors'][len(facts['levels']) - 1]:.3g}" if clip["loop"] else "",
-            *(f"{error:.3g}" for error in clip["max_errors"]),
-        ]
-        for clip in facts["clips"]
-    ]
-    levels = [f"max at {level}" for level in range(len(facts["levels"]))]
-    seam = _head("loop's seam", facts["unit"])
-    print_table(["clip", "frames", "seconds", "segments", "wind", "transitions", seam, *levels], rows)
-
-
-def _print_levels(facts: dict[str, Any]) -> None:
-    measures = {"max": "max_error", "99 %": "p99_error", "RMS": "rms_error"}
-    columns = ["bytes so far", *(_head(f"{name} error", facts["unit"]) for name in measures)]
-    cells = [
-        [f"{level['bytes']:,}", *(f"{level[field]:.3g}" for field in measures.values())] for level in facts["levels"]
-    ]
-    if "tick_ratio" in facts["levels"][0]:
-        columns.append(TICK_RATIO.head)
-        for row, level in zip(cells, facts["levels"], strict=True):
-            row.append(TICK_RATIO.cell(level["tick_ratio"]))
-    print_table([*LEVEL_COLUMNS, *columns], _level_rows(facts, cells))
-
-
-def _level_rows(facts: dict[str, Any], cells: Sequence[Sequence[str]]) -> list[list[str]]:
-    """One row per level, ending in its `cells`, between what the file holds before and behind them."""
-    levels, total = facts["levels"], facts["bytes"]
-
-    def row(level: str, name: str, nodes: str, size: int) -> list[str]:
-        return [level, name, nodes, f"{size:,}", f"{size / total:.1%}"]
-
-    rows = [row("prelude", "", "", levels[0]["bytes"] - levels[0]["added_bytes"])]
-    for level, more in zip(levels, cells, strict=True):
-        name = level["name"] if level["available"] else f"{level['name']} (incomplete)"
-        rows.append(row(f"{level['level']}", name, f"{level['nodes']:,}", level["added_bytes"]) + list(more))
-    behind = total - levels[-1]["bytes"]
-    return [*rows, row("arrays", "", "", behind)] if behind else rows
-
-
-def print_demo(facts: dict[str, Any], meters: Sequence[ErrorMeter]) -> None:
+def print_demo(facts: dict[str, Any], diagonal: float) -> None:
     seconds = facts["frames"] / facts["fps"]
-    columns = [*(_head(name, facts["unit"]) for name in ("max", "RMS")), "max/diag", "RMS/diag", "B/s"]
+    columns = [*(head(name, facts["unit"]) for name in ("max", "RMS")), "max/diag", "RMS/diag", "B/s"]
     cells = []
-    for level, meter in zip(facts["levels"], meters, strict=True):
-        errors = [f"{meter.max_error:.3g}", f"{meter.rms_error:.3g}"]
-        relative = [f"{error / meter.diagonal:.1e}" for error in (meter.max_error, meter.rms_error)]
-        cells.append([*errors, *relative, f"{level['bytes'] / seconds:,.0f}"])
+    for level in facts["levels"]:
+        errors = [level[f"measured_{name}_error"] for name in ("max", "rms")]
+        relative = [f"{error / diagonal:.1e}" for error in errors]
+        cells.append([*(f"{error:.3g}" for error in errors), *relative, f"{level['bytes'] / seconds:,.0f}"])
     echo(
         f"Encoded the sample {Path(facts['file']).stem} within {DEFAULT_REL_ERROR:g} of its diagonal, "
         "decoded every level and measured it against the source:"
     )
-    print_table([*LEVEL_COLUMNS, *columns], _level_rows(facts, cells))
-    echo(_size(facts))
+    print_table([*LEVEL_COLUMNS, *columns], level_rows(facts, cells))
+    echo(size_of(facts))
 
 
-def print_written(written: Written, motion: ClipView, level: Level) -> None:
+def written_facts(written: Written, motion: ClipView, level: Level) -> dict[str, Any]:
     """The files that are there now, and what their format costs."""
-    names = [os.fspath(path) for path in written.files]
-    error = written.facts.get("max_error")
+    counts = {"frames": motion.frame_count, "vertices": motion.vertex_count}
+    facts = {name: written.facts[name] for name in ("animation", "instances", "max_error") if name in written.facts}
+    named = {"level": level.level, "name": level.name, "unit": motion.metadata.get("unit")}
+    return {"files": [os.fspath(path) for path in written.files]} | counts | named | facts
+
+
+def print_written(facts: dict[str, Any]) -> None:
+    names, instances, how = facts["files"], facts.get("instances"), facts.get("animation", "textures")
     echo(
-        f"{names[0]}{f' to {names[-1]}' if len(names) > 1 else ''}: {counted(motion.frame_count, 'frame')}, "
-        f"{counted(motion.vertex_count, 'vertex', 'vertices')}, level {level.level} ({level.name})"
+        f"{names[0]}{f' to {names[-1]}' if len(names) > 1 else ''}: {counted(facts['frames'], 'frame')}, "
+        f"{counted(facts['vertices'], 'vertex', 'vertices')}, level {facts['level']} ({facts['name']})"
     )
-    if error is not None:
-        unit = f" {motion.metadata['unit']}" if motion.metadata.get("unit") else ""
-        how, instances = written.facts.get("animation", "textures"), written.facts.get("instances")
+    if "max_error" in facts:
         how += f" and {counted(instances, 'instance')}" if instances and how in ("joints", "morphs") else ""
-        echo(f"As {how} that is off the level by up to {error:.3g}{unit}.")
+        unit = f" {facts['unit']}" if facts["unit"] else ""
+        echo(f"As {how} that is off the level by up to {facts['max_error']:.3g}{unit}.")
 
 
 def print_verdict(result: dict[str, Any]) -> None:
@@ -259,7 +130,7 @@ def print_verdict(result: dict[str, Any]) -> None:
 
 
 def _print_errors(levels: Sequence[dict[str, Any]], unit: Any) -> None:
-    lengths = [_head(name, unit) for name in ("promised", "max", "RMS")]
+    lengths = [head(name, unit) for name in ("promised", "max", "RMS")]
     rows = [
         [f"{level['level']}", *(f"{level[name]:.4g}" for name in MEASURES), "yes" if level["kept"] else "NO"]
         for level in levels
@@ -341,15 +212,6 @@ def print_outcome(outcome: Any, args: argparse.Namespace) -> None:
         say("failed", f"{record['output']}: {record['reason']}")
 
 
-def print_table(columns: Sequence[str], rows: Sequence[Sequence[str]], justify: str = "right") -> None:
-    table = Table(box=SIMPLE_HEAD, pad_edge=False, show_edge=False, collapse_padding=True)
-    for index, name in enumerate(columns):
-        table.add_column(Text(shown(name)), justify=justify if index else "left", no_wrap=True)
-    for row in rows:
-        table.add_row(*(Text(shown(cell)) for cell in row))
-    Console(file=sys.stdout, width=_TABLE_WIDTH).print(table)
-
-
 def print_json(facts: dict[str, Any]) -> None:
     print(json.dumps(_finite(facts), indent=2).replace("\x7f", "\\u007f"))
 
@@ -363,18 +225,6 @@ def _finite(value: Any) -> Any:
     if isinstance(value, str):
         return redacted(value)
     return None if isinstance(value, float) and not math.isfinite(value) else value
-
-
-def counted(number: int, one: str, many: str = "") -> str:
-    return f"{number:,} {one if number == 1 else many or one + 's'}"
-
-
-def _head(name: str, unit: Any) -> str:
-    return f"{name} ({unit})" if unit else name
-
-
-def _size(facts: dict[str, Any]) -> str:
-    return f"{facts['bytes']:,} bytes; the positions as float32 take {facts['raw_bytes']:,}: {facts['ratio']:.1f} to 1."
 
 
 def say(kind: str, message: str) -> None:

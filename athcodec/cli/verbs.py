@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import json
 import os
 import sys
 import tempfile
@@ -21,7 +22,6 @@ from athcodec.cli.clips import (
     check_name,
     check_output,
     clip_to_encode,
-    decode_and_measure,
     gltf_to_fill,
     measure_against,
     motions_of,
@@ -37,26 +37,27 @@ from athcodec.cli.clips import (
     with_sources,
 )
 from athcodec.cli.printing import (
-    counted,
-    echo,
-    facts_of,
+    answer,
     one_line,
     print_demo,
     print_files,
     print_json,
+    print_motions,
     print_outcome,
     print_preview,
-    print_table,
     print_verdict,
     print_written,
     progress,
     say,
     say_seam,
+    written_facts,
 )
 from athcodec.cli.streams import ATH, STREAM, standard_streams
 from athcodec.decoding.clip_view import ClipView
+from athcodec.decoding.facts import facts_of
 from athcodec.errors import AthError, ClipError
 from athcodec.files.atomic import scratch_folder
+from athcodec.files.shown import counted, echo, print_table
 from athcodec.motion.branches.saving import save
 from athcodec.motion.clip import MotionClip
 from athcodec.motion.hierarchy import branch_orders
@@ -245,8 +246,14 @@ def _decode(args: argparse.Namespace, quiet: bool) -> int:
         for decoder, motion in zip(decoders, motions):
             if decoder.file.missing:
                 say("warning", f"{args.input}: decoded to level {motion.level}; {what_is_missing(decoder)}")
-            if not quiet:
-                print_written(written, motion, decoder.levels[motion.level])
+        results = [
+            written_facts(written, motion, decoder.levels[motion.level]) for decoder, motion in zip(decoders, motions)
+        ]
+        if args.json and not quiet:
+            print_motions(results)
+        elif not quiet:
+            for result in results:
+                print_written(result)
         rounding, level_error = written.facts.get("rounding", 0.0), decoders[0].levels[motions[0].level].max_error
         if rounding > ROUNDING_SHARE * level_error:
             say(
@@ -308,7 +315,7 @@ def verify(args: argparse.Namespace) -> int:
         names = motions_of(args.file, args)
     results = [_verified(args, name) for name in names]
     if args.json:
-        print_json(results[0] if len(results) == 1 else {"motions": results})
+        print_motions(results)
     for result in results:
         if not args.json:
             print_verdict(result)
@@ -359,7 +366,8 @@ def truncate(args: argparse.Namespace) -> int:
     with open_file(args.output, gltf_motion=kept) as decoder:
         last = decoder.file.level_count - 1
     before, after = (os.path.getsize(path) for path in (args.input, args.output))
-    echo(f"{args.output}: levels 0 to {last}, {after:,} of {before:,} bytes")
+    facts = {"file": args.output, "levels": last + 1, "bytes": after, "bytes_before": before}
+    answer(args, facts, f"{args.output}: levels 0 to {last}, {after:,} of {before:,} bytes")
     return 0
 
 
@@ -413,9 +421,10 @@ def view(args: argparse.Namespace) -> int:
         if args.export:
             check_output(args.export, file, args.host_mesh, *floor)
             size = view.export_page(file, args.export, args.clip, args.host_mesh, floor)
-            echo(f"{args.export}: {size:,} bytes, opens in any browser")
+            facts = {"file": args.export, "bytes": size}
+            answer(args, facts, f"{args.export}: {size:,} bytes, opens in any browser")
             return 0
-        ready = partial(_say_where, no_browser=args.no_browser)
+        ready = partial(_say_where, args)
         view.serve(file, args.port, ready, args.clip, args.host_mesh, args.forest, floor)
     return 0
 
@@ -432,15 +441,17 @@ def _export_gallery(args: argparse.Namespace) -> int:
     if not stills:
         say("warning", f"no still pictures: they need Chromium and {picture.INSTALL}")
     size = gallery.export_gallery(args.files, args.export, stills)
-    echo(f"{args.export}: {counted(len(args.files), 'plant')}, {size:,} bytes, for any web host")
+    facts = {"folder": args.export, "plants": len(args.files), "bytes": size}
+    answer(args, facts, f"{args.export}: {counted(len(args.files), 'plant')}, {size:,} bytes, for any web host")
     return 0
 
 
-def _say_where(address: str, no_browser: bool) -> None:
+def _say_where(args: argparse.Namespace, address: str) -> None:
     from athcodec.viewer import view
 
-    print(f"{address} (Ctrl-C ends it)", flush=True)  # our own, with the key that the page asks for
-    if not no_browser:
+    # Printed as it is, with the key that the page asks for.
+    print(json.dumps({"address": address}) if args.json else f"{address} (Ctrl-C ends it)", flush=True)
+    if not args.no_browser:
         view.open_browser(address)
 
 
@@ -452,7 +463,7 @@ def picture(args: argparse.Namespace) -> int:
     with naming(args.file):
         check_output(out, args.file, args.host_mesh, suffix=f".{kind}")
         size = picture.save_picture(args.file, out, kind, args.clip, args.size, args.fps, args.time, args.host_mesh)
-    echo(f"{out}: {size:,} bytes")
+    answer(args, {"file": out, "bytes": size}, f"{out}: {size:,} bytes")
     return 0
 
 
@@ -463,27 +474,39 @@ def demo(args: argparse.Namespace) -> int:
         encoded = Path(folder, f"{source.stem}.ath")
         with athcodec.read_hdf5(source) as clip:
             with progress() as report:
-                athcodec.encode(clip, encoded, rel_error=DEFAULT_REL_ERROR, progress=report)
+                summary = athcodec.encode(clip, encoded, rel_error=DEFAULT_REL_ERROR, progress=report)
             with open_file(encoded, strict=True) as decoder:
-                meters = [decode_and_measure(decoder, clip, encoded, d) for d in range(decoder.file.level_count)]
-                print_demo(facts_of(encoded, decoder), meters)
-        page = Path(args.keep or ".", DEMO_PAGE)
-        if args.sample == "tree":
-            floor = {athcodec.sample_path(name): each for name, each in DEMO_FLOOR.items()}
-            _export_demo(athcodec.sample_path("leafed"), page, floor)
-        else:
-            _export_demo(encoded, page)
+                facts, errors = facts_of(encoded, decoder), athcodec.compare(clip, decoder)
+                for level, largest, rms in zip(facts["levels"], errors.max_error, errors.rms_error, strict=True):
+                    level["measured_max_error"] = float(largest.max())
+                    level["measured_rms_error"] = float(np.sqrt(np.mean(rms**2)))
+                    if args.keep is not None:
+                        shown = decoder.at_level(level["level"])
+                        athcodec.write(shown, encoded.with_name(f"{encoded.stem}_level_{shown.level}.h5"))
+        page = Path(args.keep or ".", DEMO_PAGE).resolve()
+        floor = (
+            {athcodec.sample_path(name): each for name, each in DEMO_FLOOR.items()} if args.sample == "tree" else None
+        )
+        shown = athcodec.sample_path("leafed") if floor else encoded
+        made = _export_demo(shown, page, floor)
+        if args.json:
+            print_json(facts | {"page": str(page) if made else None})
+            return 0
+        print_demo(facts, summary.max_error_bound / summary.relative_bound)
+        if made:
+            echo(f"{shown.name} moves in {page}: open it in a browser.")
         if args.keep is not None:
             echo(f"The file and its decoded levels are in {folder}.")
     return 0
 
 
-def _export_demo(encoded: Path, page: Path, floor: Mapping[Path, float] | None = None) -> None:
+def _export_demo(encoded: Path, page: Path, floor: Mapping[Path, float] | None) -> bool:
+    """Write the page, and return whether that could be done."""
     from athcodec.viewer import view
 
     try:
         view.export_page(encoded, page, floor=floor)
     except OSError as error:  # a folder that is read-only is no reason to fail at the end
         say("warning", f"no page to look at: {one_line(error)}")
-    else:
-        echo(f"{encoded.name} moves in {page.resolve()}: open it in a browser.")
+        return False
+    return True

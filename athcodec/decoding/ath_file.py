@@ -7,14 +7,14 @@ in static_data.py, and the decoding of segments in segment_decoder.py. Playing a
 from __future__ import annotations
 
 import math
-import os
 from dataclasses import asdict
-from typing import Any, BinaryIO
+from typing import Any
 
 import numpy as np
 
 from athcodec._native import WHOLE
 from athcodec.decoding import container as ct
+from athcodec.decoding.chunk_file import Openable
 from athcodec.decoding.container import Limits
 from athcodec.decoding.file_tables import Clip, median_rate
 from athcodec.decoding.host_mesh import HostMesh
@@ -35,9 +35,8 @@ class AthFile(StaticData, SegmentDecoder):
 
     Parameters
     ----------
-    path : str, path-like or binary file object
-        A path, a URL, or a seekable file object, which stays open when this is closed. A path may be that of a GLB with
-        ATH_motion, whose meshes are the host's.
+    path : str, path-like, bytes or binary file object
+        As for `open`. A path may be that of a GLB with ATH_motion, whose meshes are the host's.
     strict : bool
         Refuse a file that is shorter or longer than its header says.
     allow_partial : bool
@@ -82,11 +81,17 @@ class AthFile(StaticData, SegmentDecoder):
         If a GLB has no such motion.
     RemoteError, OSError
         If it cannot be read.
+
+    Examples
+    --------
+    >>> with athcodec.AthFile(athcodec.sample_path("grass")) as file:
+    ...     file.vertex_count, file.branch_count, [clip.name for clip in file.clips]
+    (1400, 100, ['calm', 'gale'])
     """
 
     def __init__(
         self,
-        path: str | os.PathLike[str] | BinaryIO,
+        path: Openable,
         *,
         strict: bool = False,
         allow_partial: bool = False,

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import io
 import os
 import threading
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from functools import cached_property
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, TypeAlias
 
 import numpy as np
 
@@ -28,6 +29,8 @@ from athcodec.errors import (
 from athcodec.files.atomic import file_ids, is_url
 from athcodec.files.plain import open_plain
 
+Openable: TypeAlias = str | os.PathLike[str] | bytes | bytearray | memoryview | BinaryIO
+"""A path, a URL, the bytes of a file, or a file object."""
 CHUNK_FIELDS = ("kind", "level", "segment", "length", "checksum", "offset")
 
 
@@ -41,8 +44,8 @@ class ChunkFile:
         self.bytes_read = 0
         self._lock = threading.Lock()
         self._closes_source = not hasattr(path, "read")
-        self._source = _opened(path, gltf_motion) if self._closes_source else path
-        self.inputs = file_ids(path if self._closes_source else getattr(path, "name", None))
+        self._source = _opened(path, gltf_motion)
+        self.inputs = file_ids(path if isinstance(path, (str, os.PathLike)) else getattr(path, "name", None))
         try:
             self.available_length: int = self._source.seek(0, os.SEEK_END)
             self.core = self._open_core()
@@ -66,6 +69,11 @@ class ChunkFile:
         if self._closes_source:
             with self._lock:
                 self._source.close()
+
+    def __del__(self) -> None:
+        """Close a file that nobody can read from any more, as h5py does."""
+        if getattr(self, "_closes_source", False) and hasattr(self, "_source"):
+            self._source.close()
 
     @property
     def source(self) -> Any:
@@ -189,8 +197,17 @@ class ChunkFile:
 
 
 def _opened(path: Any, gltf_motion: str | None) -> Any:
-    """Return the file object of a path, a URL, or a motion inside a GLB."""
-    if is_url(path):
+    """Return the file object of a path, a URL, bytes, a file object, or a motion inside a GLB."""
+    if hasattr(path, "read"):
+        if isinstance(path, io.TextIOBase):
+            raise TypeError("path: got a file opened as text; expected one opened with mode 'rb'")
+        return path if getattr(path, "seekable", lambda: True)() else io.BytesIO(path.read())
+    if not isinstance(path, (str, os.PathLike)):
+        try:
+            return io.BytesIO(path if isinstance(path, bytes) else memoryview(path).tobytes())
+        except TypeError:
+            raise TypeError(f"path: got {path!r:.80}; expected a path, a URL, bytes or a binary file object") from None
+    if isinstance(path, str) and is_url(path):
         from athcodec.files.remote import Remote  # The packages behind it take long to import.
 
         return Remote(path)

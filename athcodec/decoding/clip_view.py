@@ -13,8 +13,14 @@ from athcodec.decoding.decoder import Decoder
 from athcodec.errors import LevelUnavailable
 from athcodec.files.atomic import FileId
 from athcodec.motion.clip import DEFAULT_FPS, ClipRange, clip_range_frames, polygons, stated_fps
+from athcodec.motion.frames import Frames
 from athcodec.motion.presence import presence_within
 from athcodec.options import whole
+
+
+def _of_file(name: str, text: str) -> Any:
+    """Return a property that is the one of this name of the file."""
+    return property(lambda view: getattr(view.decoder.file, name), doc=text)
 
 
 class ClipView:
@@ -39,17 +45,35 @@ class ClipView:
     ------
     LevelUnavailable
         If the level or the frames do not exist. Methods raise the errors of Decoder besides.
+
+    Examples
+    --------
+    >>> with athcodec.open(athcodec.sample_path("grass")) as grass:
+    ...     view = athcodec.ClipView(grass, level=1, frames=range(10, 20))
+    ...     view.frame_count, view.positions[2:5].shape
+    (10, (3, 1400, 3))
     """
 
     def __init__(
         self, decoder: Decoder, level: int | None = None, frames: range | None = None, *, all_clips: bool = False
     ):
         self.decoder = decoder
-        self.level = decoder.file.deepest if level is None else whole("level", level)
+        self.level = decoder.level if level is None else whole("level", level)
         if not 0 <= self.level < decoder.file.level_count:
             raise LevelUnavailable(f"level: got {level}; expected 0 to {decoder.file.level_count - 1}")
         played = [decoder.play(clip.name) for clip in decoder.file.clips] if all_clips else [decoder]
         self._runs = [(clip, _checked(frames, clip.frame_count)) for clip in played]
+
+    vertex_count = _of_file("vertex_count", "Vertices of the plant, N.")
+    branch_count = _of_file("branch_count", "Branches of the plant, B.")
+    dtype = _of_file("dtype", "Type of the positions, float32 or float64.")
+    rest = _of_file("rest", "Rest pose, (N, 3) float32 or float64, scene units.")
+    vertex_branch = _of_file("vertex_branch", "The branch of each vertex, (N,) int32.")
+    branch_parent = _of_file("branch_parent", "The parent of each branch, (B,) int32, -1 for a root.")
+    stem_index = _of_file("stem_index", "Place of each vertex on its stem, (N,) int32, or None; see MotionClip.")
+    edges = _of_file("edges", "(E, 2) vertex numbers, or None.")
+    faces = _of_file("faces", "(F, k) vertex numbers, or None.")
+    attributes = _of_file("attributes", "Named static arrays, as the source had them.")
 
     @property
     def inputs(self) -> frozenset[FileId]:
@@ -75,24 +99,14 @@ class ClipView:
         return sum(len(frames) for _, frames in self._runs)
 
     @property
-    def vertex_count(self) -> int:
-        """Vertices of the plant, N."""
-        return self.decoder.file.vertex_count
-
-    @property
-    def branch_count(self) -> int:
-        """Branches of the plant, B."""
-        return self.decoder.file.branch_count
-
-    @property
-    def dtype(self) -> np.dtype:
-        """Type of the positions, float32 or float64."""
-        return self.decoder.file.dtype
-
-    @property
     def max_error(self) -> float:
         """The largest distance of any vertex in any frame of its clips at this level from the source, scene units."""
         return max(decoder.levels[self.level].max_error for decoder, _ in self._runs)
+
+    @property
+    def positions(self) -> Frames:
+        """Positions (T, N, 3), which are decoded when they are sliced by frames."""
+        return Frames(self.block, self.frame_count, self.vertex_count, self.dtype)
 
     @property
     def time(self) -> np.ndarray:
@@ -110,41 +124,6 @@ class ClipView:
         if len(self._runs) > 1:
             return dict(self.decoder.file.metadata)
         return presence_within(self.decoder.metadata, self._runs[0][1])
-
-    @property
-    def rest(self) -> np.ndarray:
-        """Rest pose, (N, 3) float32 or float64, scene units."""
-        return self.decoder.file.rest
-
-    @property
-    def vertex_branch(self) -> np.ndarray:
-        """The branch of each vertex, (N,) int32."""
-        return self.decoder.file.vertex_branch
-
-    @property
-    def branch_parent(self) -> np.ndarray:
-        """The parent of each branch, (B,) int32, -1 for a root."""
-        return self.decoder.file.branch_parent
-
-    @property
-    def stem_index(self) -> np.ndarray | None:
-        """Place of each vertex on its stem, (N,) int32, or None; see MotionClip."""
-        return self.decoder.file.stem_index
-
-    @property
-    def edges(self) -> np.ndarray | None:
-        """(E, 2) vertex numbers, or None."""
-        return self.decoder.file.edges
-
-    @property
-    def faces(self) -> np.ndarray | None:
-        """(F, k) vertex numbers, or None."""
-        return self.decoder.file.faces
-
-    @property
-    def attributes(self) -> dict[str, np.ndarray]:
-        """Named static arrays, as the source had them."""
-        return self.decoder.file.attributes
 
     @property
     def polygons(self) -> tuple[np.ndarray, np.ndarray] | None:

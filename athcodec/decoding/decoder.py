@@ -5,6 +5,7 @@ The `AthFile` behind a `Decoder` holds what all clips share, and reads and decod
 
 from __future__ import annotations
 
+import math
 import threading
 from bisect import bisect_right
 from collections.abc import Iterator, Mapping, Sequence
@@ -21,7 +22,9 @@ from athcodec.decoding.affines import Affines, affines_of, residual_of
 from athcodec.decoding.ath_file import AthFile
 from athcodec.decoding.blending import Blending, Share
 from athcodec.decoding.endless_play import EndlessPlay
+from athcodec.decoding.facts import facts_of, print_facts
 from athcodec.decoding.file_tables import Clip, Level, median_rate
+from athcodec.decoding.indexing import Frames, split_index
 from athcodec.errors import LevelUnavailable
 from athcodec.motion.joining import metadata_of, wind_of
 from athcodec.motion.transitions import transitions_of
@@ -31,11 +34,12 @@ SHOWN_TYPES = (np.dtype(np.float32), np.dtype(np.float64))  # Types that the cor
 
 
 class Decoder:
-    """One clip of an .ath file, at any of its levels; a context manager.
+    """One clip of an .ath file, an array-like of shape (frames, vertices, 3); a context manager.
 
-    Positions come in the source's vertex order, in scene units. Frames, segments, times and errors are those of the
-    clip, counted from its first frame. `file` has what all clips share, such as vertices, levels and the rest pose.
-    Threads may share a decoder.
+    Indices, `len`, iteration and `np.asarray` mean what they mean for a NumPy array, and decode only the segments of
+    frames that they need. Positions come in the source's vertex order, in scene units. Frames, segments, times and
+    errors are those of the clip, counted from its first frame. `file` has what all clips share, such as vertices,
+    levels and the rest pose. Threads may share a decoder.
 
     Parameters
     ----------
@@ -45,6 +49,8 @@ class Decoder:
         Name of the clip to play; by default the first.
     closes_file : bool
         Whether closing the decoder closes the file.
+    level : int, optional
+        The level to show; by default the deepest that is complete.
 
     Attributes
     ----------
@@ -61,10 +67,18 @@ class Decoder:
         By methods that take a level or frames, if the file has no such ones, or was cut off before them.
     FormatError
         By the same methods, if the bytes are damaged.
+
+    Examples
+    --------
+    >>> with athcodec.open(athcodec.sample_path("grass")) as grass:
+    ...     grass.shape, grass[10:20].shape, grass[-1, :100].shape, grass.at_level(1)[::30].dtype
+    ((150, 1400, 3), (10, 1400, 3), (100, 3), dtype('float32'))
     """
 
-    def __init__(self, file: AthFile, clip: str | None = None, *, closes_file: bool = False):
-        self.file, self._closes_file = file, closes_file
+    def __init__(self, file: AthFile, clip: str | None = None, *, closes_file: bool = False, level: int | None = None):
+        self.file, self._closes_file, self._level = file, closes_file, level
+        if level is not None:
+            self._level = self._checked_level(level)
         self.clip: Clip = file.clips[0] if clip is None else file.clip_named(clip)
         self._lock = threading.Lock()
         # The segment that was decoded last, after its number and level.
@@ -89,7 +103,22 @@ class Decoder:
         ClipUnavailable
             If no clip has that name.
         """
-        return Decoder(self.file, name)
+        return Decoder(self.file, name, level=self._level)
+
+    def at_level(self, level: int | None) -> Decoder:
+        """Return a decoder that shows another level of the same clip; both may be used at the same time.
+
+        Parameters
+        ----------
+        level : int or None
+            Level of detail; None for the deepest that is complete.
+
+        Returns
+        -------
+        Decoder
+            It shares the file and is usable until that is closed.
+        """
+        return Decoder(self.file, self.clip.name, level=level)
 
     def close(self) -> None:
         """Close the file, if the decoder comes from `athcodec.open`."""
@@ -101,6 +130,59 @@ class Decoder:
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+    def __repr__(self) -> str:
+        name = f" {self.clip.name!r}" if self.clip.name else ""
+        last = self.file.level_count - 1
+        shown = self.levels[last if self._level is None else self._level]
+        unit = self.metadata.get("unit")
+        return (
+            f"<Decoder{name}: {self.frame_count:,} frames of {self.file.vertex_count:,} vertices, {self.dtype}, "
+            f"level {shown.level} of 0 to {last}, {self.file.file_length:,} bytes, error at most "
+            f"{shown.max_error:.3g}{f' {unit}' if unit else ''}>"
+        )
+
+    # ---- the array ----
+
+    @property
+    def shape(self) -> tuple[int, int, int]:
+        """Frames, vertices and 3."""
+        return self.frame_count, self.file.vertex_count, 3
+
+    @property
+    def ndim(self) -> int:
+        """Number of dimensions, 3."""
+        return 3
+
+    @property
+    def size(self) -> int:
+        """Number of coordinates."""
+        return math.prod(self.shape)
+
+    @property
+    def dtype(self) -> np.dtype:
+        """Type of the positions, float32 or float64."""
+        return self.file.dtype
+
+    @property
+    def level(self) -> int:
+        """The level that is shown: that of `at_level`, or the deepest that is complete."""
+        return self.file.deepest if self._level is None else self._level
+
+    def __len__(self) -> int:
+        return self.frame_count
+
+    def __getitem__(self, index: Any) -> Any:
+        return self._indexed(index, self.level, self.dtype)
+
+    def __iter__(self) -> Iterator[np.ndarray]:
+        for _, block in self.blocks():
+            yield from block
+
+    def __array__(self, dtype: npt.DTypeLike | None = None, copy: bool | None = None) -> np.ndarray:
+        if copy is False:
+            raise ValueError("Decoder: got copy=False; expected None or True, because the array is decoded")
+        return self.positions(dtype=dtype)
 
     # ---- what the clip holds ----
 
@@ -179,19 +261,23 @@ class Decoder:
         """
         return self.file.level_within(max_error, self.clip.segments)
 
+    def summary(self) -> None:
+        """Print the levels of the file with their bytes and errors, as `athcodec info` does."""
+        print_facts(facts_of(str(getattr(self.file.source, "name", None) or "file"), self))
+
     # ---- motion ----
 
     def positions(
-        self, frames: int | slice | None = None, level: int | None = None, dtype: npt.DTypeLike | None = None
+        self, frames: Frames | None = None, level: int | None = None, dtype: npt.DTypeLike | None = None
     ) -> np.ndarray:
         """Return the positions of all vertices in one or several frames. Threads share the segments.
 
         Parameters
         ----------
-        frames : int or slice, optional
-            A frame, negative from the end, or a run of frames with step 1; by default all.
+        frames : int, slice or sequence of int, optional
+            Frames as an index of the decoder has them; by default all.
         level : int, optional
-            Level of detail; by default the deepest that is complete.
+            Level of detail; by default the decoder's own, the deepest that is complete unless `at_level` chose it.
         dtype : numpy dtype, optional
             By default that of the file, float32 or float64.
 
@@ -200,29 +286,34 @@ class Decoder:
         numpy.ndarray
             (N, 3) for one frame, else (frames, N, 3), scene units.
         """
-        level, (first, last) = self._checked_level(level), self._checked_frames(frames)
-        dtype = np.dtype(dtype or self.file.dtype)
-        shown = np.empty((last - first, self.file.vertex_count, 3), dtype if dtype in SHOWN_TYPES else self.file.dtype)
+        index = slice(None) if frames is None else frames
+        return self._indexed(index, self._checked_level(level), np.dtype(dtype or self.dtype))
 
-        def show(segment: int, ready: core_file.Segment) -> None:
-            start, stop = self.segments[segment - self.clip.first_segment]
-            for frame in range(max(start, first), min(stop, last)):
-                self.file.core.positions(ready, self.clip.first_frame + frame, shown[frame - first])
+    def at(self, seconds: npt.ArrayLike) -> np.ndarray:
+        """Return the positions at a time, interpolated between frames as players do.
 
-        def room(segment: int) -> np.ndarray | None:
-            start, stop = self.segments[segment - self.clip.first_segment]
-            is_all = first <= start and stop <= last and shown.dtype == self.file.dtype
-            return shown[start - first : stop - first] if is_all else None
+        Parameters
+        ----------
+        seconds : float or array of float
+            Time since the first frame. A loop goes on from its first frame; another clip keeps its first or last one.
 
-        segments = self._in_file(self._segments_of(first, last))
-        if len(segments) > 1:
-            self.file.show_all(segments, level, show, room)
-        elif len(segments) == 1:
-            with self._prepared(segments.start, level, room(segments.start)) as ready:
-                if not ready.gone:
-                    show(segments.start, ready)
-        out = shown.astype(dtype, copy=False)
-        return out if frames is None or isinstance(frames, slice) else out[0]
+        Returns
+        -------
+        numpy.ndarray
+            (N, 3) float32, scene units, after the dimensions of `seconds`.
+
+        Raises
+        ------
+        ValueError
+            If a time is not a finite number.
+        """
+        times = np.asarray(seconds, np.float64)
+        if not np.isfinite(times).all():
+            raise ValueError(f"seconds: got {seconds!r}; expected finite numbers")
+        shown = np.empty((*times.shape, self.file.vertex_count, 3), np.float32)
+        for place in np.ndindex(times.shape):
+            shown[place] = self.blended_places([(float(times[place]), 1.0)])
+        return shown
 
     def blocks(
         self, level: int | None = None, dtype: npt.DTypeLike | None = None, frames: int | slice | None = None
@@ -241,7 +332,7 @@ class Decoder:
         block : numpy.ndarray
             (k, N, 3), scene units.
         """
-        level, (first, last) = self._checked_level(level), self._checked_frames(frames)
+        level, (first, last) = self._checked_level(level), self._checked_run(frames)
         segments = self._segments_of(first, last)
         if len(segments) > 1:
             self.file.prefetch(self._in_file(segments), level)
@@ -393,7 +484,7 @@ class Decoder:
         Affines
             Maps from the reference pose of the level, `level_rest`, to the frame.
         """
-        level, (index, _) = self._checked_level(level), self._checked_frames(frame)
+        level, (index, _) = self._checked_level(level), self._checked_run(frame)
         with self._prepared(self.clip.first_segment + self._segment_of(index), level) as ready:
             return affines_of(self.file, ready, level, self.clip.first_frame + index, f"frame {index}")
 
@@ -417,23 +508,54 @@ class Decoder:
 
     def _checked_level(self, level: int | None) -> int:
         if level is None:
-            return self.file.deepest
+            return self.level
         if not 0 <= (level := whole("level", level)) < self.file.level_count:
             raise LevelUnavailable(f"level: got {level}; expected 0 to {self.file.level_count - 1}")
         return level
 
-    def _checked_frames(self, frames: int | slice | None) -> tuple[int, int]:
-        if frames is None:
-            return 0, self.frame_count
-        if isinstance(frames, slice):
-            start, stop, step = frames.indices(self.frame_count)
-            if step != 1:
-                raise LevelUnavailable(f"frames: got a step of {step}; expected 1")
-            return start, max(stop, start)
-        index = whole("frame", frames) + (self.frame_count if frames < 0 else 0)
-        if not 0 <= index < self.frame_count:
-            raise LevelUnavailable(f"frame: got {frames}; expected 0 to {self.frame_count - 1}")
-        return index, index + 1
+    def _indexed(self, index: Any, level: int, dtype: np.dtype) -> np.ndarray:
+        """Return what a NumPy index picks of all positions, after decoding the frames that it reads."""
+        frames, of_frames = split_index(index, self.frame_count)
+        shown = np.empty((len(frames), *self.shape[1:]), dtype if dtype in SHOWN_TYPES else self.dtype)
+
+        def rows(segment: int) -> slice:
+            return slice(*np.searchsorted(frames, self.segments[segment - self.clip.first_segment]))
+
+        def show(segment: int, ready: core_file.Segment) -> None:
+            for row in range(rows(segment).start, rows(segment).stop):
+                self.file.core.positions(ready, self.clip.first_frame + int(frames[row]), shown[row])
+
+        def room(segment: int) -> np.ndarray | None:
+            start, stop = self.segments[segment - self.clip.first_segment]
+            out = shown[rows(segment)]
+            return out if len(out) == stop - start and shown.dtype == self.dtype else None
+
+        for segments in self._runs_of(frames):
+            if len(segments) > 1:
+                self.file.show_all(segments, level, show, room)
+            else:
+                with self._prepared(segments.start, level, room(segments.start)) as ready:
+                    if not ready.gone:
+                        show(segments.start, ready)
+        return shown.astype(dtype, copy=False)[of_frames]
+
+    @cached_property
+    def _starts(self) -> np.ndarray:
+        """The first frame of each segment."""
+        return np.array([start for start, _ in self.segments])
+
+    def _runs_of(self, frames: np.ndarray) -> Iterator[range]:
+        """Yield the segments of the file that hold these ascending frames, in runs without a gap."""
+        needed = np.unique(np.searchsorted(self._starts, frames, side="right") - 1) + self.clip.first_segment
+        for run in np.split(needed, np.flatnonzero(np.diff(needed) > 1) + 1) if len(needed) else ():
+            yield range(int(run[0]), int(run[-1]) + 1)
+
+    def _checked_run(self, frames: int | slice | None) -> tuple[int, int]:
+        """Return the first frame of a run with step 1, and the frame behind its last one."""
+        numbers, _ = split_index(slice(None) if frames is None else frames, self.frame_count)
+        if len(numbers) and numbers[-1] - numbers[0] >= len(numbers):
+            raise LevelUnavailable(f"frames: got {frames}; expected frames with step 1")
+        return (int(numbers[0]), int(numbers[-1]) + 1) if len(numbers) else (0, 0)
 
     @contextmanager
     def _prepared(self, segment: int, level: int, to: np.ndarray | None = None) -> Iterator[core_file.Segment]:

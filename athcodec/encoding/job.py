@@ -561,7 +561,7 @@ class EncodingJob:
 
     def write(
         self,
-        path: str | PathLike[str],
+        path: str | PathLike[str] | None,
         out: BinaryIO,
         spool: IO[bytes],
         decided: _Decided,
@@ -577,7 +577,7 @@ class EncodingJob:
             out.seek(0)
             chunks = result.store.write(out, result.header, result.errors)
         with AthFile(out, strict=True) as file, Decoder(file) as decoder:  # The file gets its name after this check.
-            summary = _summary(Path(path), self, decided, result, chunks, decoder)
+            summary = _summary(path and Path(path), self, decided, result, chunks, decoder)
         self.report("done", 1.0)
         return summary
 
@@ -785,7 +785,7 @@ def _polygons(clip: MotionClip, options: EncodingOptions) -> Polygons | None:
 
 
 def _summary(
-    path: Path, job: EncodingJob, decided: _Decided, result: _Result, chunks: list[ct.Chunk], decoder: Decoder
+    path: Path | None, job: EncodingJob, decided: _Decided, result: _Result, chunks: list[ct.Chunk], decoder: Decoder
 ) -> Summary:
     sizes: dict[str, int] = {}
     for chunk in chunks:

@@ -38,8 +38,8 @@ class Summary:
 
     Attributes
     ----------
-    path : Path
-        The file.
+    path : Path or None
+        The file; None for a file object.
     bytes, raw_bytes : int
         Its size, and that of the positions as float32.
     max_error_bound : float
@@ -63,9 +63,20 @@ class Summary:
     untried : tuple of str
         Choices that were left out, all or in part, because the clip is too small for so much work; effort "best" has
         room for more.
+    converted : str
+        How the numbers of an array were converted: "positions: int16 became float32"; empty if they were not.
+
+    Examples
+    --------
+    >>> import io
+    >>> stem = np.zeros((9, 20, 3), np.int16)
+    >>> stem[..., 1] = np.arange(20)
+    >>> summary = athcodec.encode(stem, io.BytesIO(), max_error=0.01, vertex_branch=[0] * 20, branch_parent=[-1])
+    >>> summary.raw_bytes, summary.converted
+    (2160, 'positions: int16 became float32')
     """
 
-    path: Path
+    path: Path | None
     bytes: int
     raw_bytes: int
     max_error_bound: float
@@ -78,8 +89,13 @@ class Summary:
     found_branches: str | None = None
     not_read: Mapping[str, Sequence[str]] = field(default_factory=dict)
     untried: tuple[str, ...] = ()
+    converted: str = ""
 
     @property
     def ratio(self) -> float:
         """Bytes of the raw positions over those of the whole file."""
         return self.raw_bytes / self.bytes
+
+    def __str__(self) -> str:
+        words = f"{self.path or 'file'}: {self.bytes:,} bytes, {self.ratio:.1f} to 1, error at most "
+        return words + f"{self.max_error_bound:.3g}" + (f"; {self.converted}" if self.converted else "")

@@ -10,9 +10,7 @@ from math import frexp, inf, sqrt
 
 import numpy as np
 
-from athcodec.errors import ClipError
 from athcodec.metrics.blocks import Meter
-from athcodec.motion.clip import MotionClip
 
 
 class ErrorMeter(Meter):
@@ -103,19 +101,6 @@ class ErrorMeter(Meter):
     def diagonal(self) -> float:
         """Diagonal of the reference's bounding box over all frames; 0 before any block."""
         return float(np.linalg.norm(self._high - self._low)) if self._points else 0.0
-
-
-def compare_clips(reference: MotionClip, decoded: MotionClip) -> ErrorMeter:
-    """The filled meter of two clips of equally many frames and vertices, in the same vertex order; else
-    ClipError.
-    """
-    shapes = [(clip.frame_count, clip.vertex_count) for clip in (reference, decoded)]
-    if shapes[0] != shapes[1]:
-        raise ClipError(f"decoded clip: got {shapes[1]} frames and vertices, expected {shapes[0]} as in the reference")
-    meter = ErrorMeter(reference.rest)
-    for start, frames in reference.blocks():
-        meter.add(frames, decoded.block(start, start + len(frames)))
-    return meter
 
 
 def bits_per_vertex_frame(byte_count: int, frame_count: int, vertex_count: int) -> float:

@@ -137,6 +137,13 @@ class MotionClip:
     ------
     ClipError
         If the structure is wrong; by `block` and `blocks`, at the first position that is not a finite number.
+
+    Examples
+    --------
+    >>> positions = np.zeros((60, 20, 3), np.float32)
+    >>> positions[..., 1] = np.linspace(0, 2, 20)  # a stem that stands still
+    >>> athcodec.MotionClip(positions, np.arange(60) / 30, vertex_branch=np.zeros(20, int), branch_parent=[-1])
+    MotionClip(60 frames, 20 vertices, 1 branches, float32)
     """
 
     positions: Any
@@ -356,7 +363,7 @@ class MotionClip:
             raise ValueError(f"max_frames: got {max_frames}, expected at least 1")
         length = max(1, BLOCK_BYTES // (self.vertex_count * 3 * self.dtype.itemsize))
         length = min(length, max_frames or length)
-        chunk_frames = (getattr(self.positions, "chunks", None) or (1,))[0]
+        chunk_frames = int(np.max((getattr(self.positions, "chunks", None) or (1,))[0]))  # dask names the size of each.
         return length - length % chunk_frames if chunk_frames <= length else length
 
     def _check_branches(self, vertex_count: int) -> None:

@@ -46,6 +46,12 @@ def join(clips: Mapping[str, MotionClip]) -> MotionClip:
     ------
     ClipError
         If the clips are not of one plant, a name cannot be stored, or one of them is several clips already.
+
+    Examples
+    --------
+    >>> with athcodec.read(athcodec.sample_path()) as tree:
+    ...     athcodec.join({"first": tree, "again": tree}).frame_count
+    240
     """
     if not clips:
         raise ClipError("clips: got none, expected at least one")
@@ -89,6 +95,12 @@ def split(clip: MotionClip) -> dict[str, MotionClip]:
     -------
     dict of str to MotionClip
         By name; a single clip without a name is "". Closing any of them closes all.
+
+    Examples
+    --------
+    >>> with athcodec.read(athcodec.sample_path()) as tree:
+    ...     list(athcodec.split(athcodec.join({"first": tree, "again": tree})))
+    ['first', 'again']
     """
     if len(clip.clip_ranges) < 2:
         return {_only_clip_range("", clip).name: clip}
@@ -131,6 +143,12 @@ def in_wind(clip: MotionClip, strength: float, heading: float = 0.0) -> MotionCl
     ------
     ClipError
         If a number is not finite, or the strength below 0.
+
+    Examples
+    --------
+    >>> with athcodec.read(athcodec.sample_path()) as tree:
+    ...     athcodec.in_wind(tree, 8.0, 45.0).metadata["strength"]
+    8.0
     """
     if not (math.isfinite(strength) and strength >= 0 and math.isfinite(heading)):
         raise ClipError(
@@ -170,6 +188,12 @@ def looped(clip: MotionClip, blend: int = 0) -> MotionClip:
     ------
     ClipError
         If the clip is several clips, or has too few frames to blend.
+
+    Examples
+    --------
+    >>> with athcodec.read(athcodec.sample_path()) as tree:
+    ...     athcodec.looped(tree, blend=20).frame_count
+    100
     """
     clip_range = _only_clip_range("", clip)
     if not 0 <= whole("blend", blend) <= clip.frame_count // 3:

@@ -29,6 +29,11 @@ class Thresholds:
     ------
     ValueError
         For a negative threshold.
+
+    Examples
+    --------
+    >>> athcodec.Thresholds(epsilon=0.01, eta=3, xi=0.02, lam=8).eta
+    3
     """
 
     epsilon: float

@@ -55,6 +55,14 @@ def endless(clip: MotionClip) -> MotionClip:
     ------
     ClipError
         If it is several clips, or no two of its frames are alike enough.
+
+    Examples
+    --------
+    >>> sway = 0.1 * np.sin(np.arange(90) / 5)[:, None, None] * np.ones((1, 20, 3))
+    >>> sway[..., 1] = np.linspace(0, 2, 20)
+    >>> clip = athcodec.MotionClip(sway, np.arange(90) / 30, vertex_branch=[0] * 20, branch_parent=[-1])
+    >>> "transitions" in athcodec.endless(clip).metadata
+    True
     """
     if len(clip.clip_ranges) > 1:
         raise ClipError(f"endless: got {len(clip.clip_ranges)} clips in one, expected a single one")

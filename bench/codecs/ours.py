@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import tempfile
-from collections.abc import Iterator
-from contextlib import contextmanager
-from pathlib import Path
+from io import BytesIO
 from typing import Any, ClassVar
 
 import numpy as np
@@ -31,18 +28,16 @@ class Athcodec:
         return None
 
     def encode(self, source: Source, bound: float) -> bytes:
-        with tempfile.TemporaryDirectory() as folder:
-            file = Path(folder) / "clip.ath"
-            limit = {"lossless": True} if self.lossless else {"max_error": bound}
-            try:
-                summary = athcodec.encode(source.clip, file, **self.options, **limit)
-            except BoundError as error:
-                raise CannotKeep(str(error)) from error
-            self.settings = dict(summary.choices) | {"chunk_bytes": dict(summary.chunk_bytes)}
-            return file.read_bytes()
+        out, limit = BytesIO(), {"lossless": True} if self.lossless else {"max_error": bound}
+        try:
+            summary = athcodec.encode(source.clip, out, **self.options, **limit)
+        except BoundError as error:
+            raise CannotKeep(str(error)) from error
+        self.settings = dict(summary.choices) | {"chunk_bytes": dict(summary.chunk_bytes)}
+        return out.getvalue()
 
     def decode(self, data: bytes) -> np.ndarray:
-        with opened(data) as decoder:
+        with athcodec.open(data, strict=True) as decoder:
             return np.ascontiguousarray(decoder.positions(), np.float32)
 
 
@@ -65,12 +60,3 @@ class LosslessAthcodec(Athcodec):
 
     name = "athcodec, lossless"
     lossless = True
-
-
-@contextmanager
-def opened(data: bytes) -> Iterator[athcodec.Decoder]:
-    with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / "clip.ath"
-        file.write_bytes(data)
-        with athcodec.open(file, strict=True) as decoder:
-            yield decoder

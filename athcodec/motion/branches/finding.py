@@ -65,6 +65,12 @@ def find_branches(clip: MotionClip, method: str = "auto", root: int | None = Non
         If scipy is missing.
     ValueError
         For a method that does not exist.
+
+    Examples
+    --------
+    >>> with athcodec.read(athcodec.sample_path()) as tree:
+    ...     len(athcodec.find_branches(tree, "edges").branch_parent)
+    99
     """
     if method != "auto" and method not in METHODS:
         raise ValueError(f"method: got {method!r}, expected auto or one of {', '.join(METHODS)}")

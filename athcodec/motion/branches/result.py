@@ -26,6 +26,12 @@ class Found:
         How they were found: "attributes", "skeleton", "edges", "components", "runs", "motion", or "file".
     taken : str, optional
         The name of the array that was taken for the numbers of branches.
+
+    Examples
+    --------
+    >>> with athcodec.read(athcodec.sample_path()) as tree:
+    ...     athcodec.find_branches(tree, "edges").method
+    'edges'
     """
 
     vertex_branch: np.ndarray

@@ -1,0 +1,100 @@
+"""Errors of a file against its source: `athcodec.compare`."""
+
+from __future__ import annotations
+
+from contextlib import nullcontext
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from athcodec.arrays import Source, clip_of
+from athcodec.decoding.chunk_file import Openable
+from athcodec.decoding.decoder import Decoder
+from athcodec.errors import ClipError
+from athcodec.metrics.blocks import paired
+from athcodec.motion.joining import split
+from athcodec.opening import open
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """Distances between the vertices of a file and of its source, in scene units.
+
+    Attributes
+    ----------
+    time : (T,) float64 array
+        Seconds of the frames.
+    max_error, rms_error : (levels, T) float64 array
+        Largest distance and root mean square of the distances in each frame at each level.
+    worst_vertex : (levels, T) int64 array
+        The vertex that is furthest off.
+    promised : (levels,) float64 array
+        The largest error that the file states for each level.
+
+    Examples
+    --------
+    >>> growth = athcodec.sample_path("growth")
+    >>> errors = athcodec.compare(growth, athcodec.encode(growth, effort="fast"))
+    >>> bool((errors.max_error.max(axis=1) <= errors.promised).all())
+    True
+    """
+
+    time: np.ndarray
+    max_error: np.ndarray
+    rms_error: np.ndarray
+    worst_vertex: np.ndarray
+    promised: np.ndarray
+
+
+def compare(source: Source, file: Decoder | Openable, **options: Any) -> Comparison:
+    """Measure every level of an .ath file against its source, frame by frame.
+
+    Parameters
+    ----------
+    source : (frames, vertices, 3) array, MotionClip, Decoder, str or path-like
+        As for `encode`; of several clips the one that has the name of the file's.
+    file : Decoder, or str, path-like, bytes or binary file object
+        The file, or a decoder, of which the clip is compared.
+    **options
+        Parameters of `open`: clip, host_mesh ...
+
+    Returns
+    -------
+    Comparison
+
+    Raises
+    ------
+    ClipError
+        If frames or vertices of source and file are not equally many.
+    FormatError
+        If the file is damaged.
+
+    Examples
+    --------
+    >>> with athcodec.open(athcodec.sample_path("grass")) as grass:
+    ...     coarse = athcodec.compare(grass[:], grass)
+    >>> coarse.max_error.shape, float(coarse.max_error[-1].max())
+    ((3, 150), 0.0)
+    """
+    opened = nullcontext(file) if isinstance(file, Decoder) else open(file, **options)
+    with opened as decoder, clip_of(source) as (whole, _):
+        clip = split(whole).get(decoder.clip.name, whole)
+        got, expected = (clip.frame_count, clip.vertex_count), decoder.shape[:2]
+        if got != expected:
+            raise ClipError(f"source: got {got} frames and vertices, expected {expected} as in the .ath file")
+        if decoder.file.needs_host_mesh:
+            decoder.file.set_host_mesh(clip)
+        shape = decoder.file.deepest + 1, decoder.frame_count
+        largest, rms, worst = np.empty(shape), np.empty(shape), np.empty(shape, np.int64)
+        for start, stop in decoder.segments:
+            reference = clip.block(start, stop)
+            for level in range(len(largest)):
+                first = start
+                for frames, shown in paired(reference, decoder.positions(slice(start, stop), level), 0):
+                    distance = np.linalg.norm(frames - shown, axis=2)
+                    rows = level, slice(first, first := first + len(distance))
+                    largest[rows], worst[rows] = distance.max(axis=1), distance.argmax(axis=1)
+                    rms[rows] = np.sqrt((distance**2).mean(axis=1))
+        promised = np.array([level.max_error for level in decoder.levels[: len(largest)]])
+        return Comparison(decoder.time, largest, rms, worst, promised)

@@ -1,0 +1,161 @@
+"""What `athcodec info` says of an .ath file, as values for programs and as a table for people."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from athcodec.files.shown import counted, echo, print_table
+
+if TYPE_CHECKING:
+    from athcodec.decoding.decoder import Decoder
+
+LEVEL_COLUMNS = ["level", "", "nodes", "bytes", "share"]
+NAMED_OBJECTS = 8  # Objects that are named of those that some frames do not show.
+
+
+class Column(NamedTuple):
+    """How a measure is shown in a table."""
+
+    head: str
+    format: str = ".3g"
+
+    def cell(self, value: float | None) -> str:
+        return "" if value is None else f"{value:{self.format}}"
+
+
+TICK_RATIO = Column("tick ratio")
+
+
+def facts_of(
+    path: str | os.PathLike[str], decoder: Decoder, tick_ratios: Sequence[Sequence[float | None]] | None = None
+) -> dict[str, Any]:
+    """decoder.file.info(), and per level what it adds to the file cut before it. tick_ratios: of each clip at each
+    level, where they were measured."""
+    facts = {"file": os.fspath(path)} | decoder.file.info()
+    facts |= {"unit": decoder.metadata.get("unit"), "missing": decoder.file.missing}
+    facts["raw_bytes"] = facts["frames"] * decoder.file.vertex_count * 12
+    facts["ratio"] = facts["raw_bytes"] / facts["bytes"]
+    before = decoder.file.prelude_length
+    for level in facts["levels"]:
+        level["added_bytes"] = level["bytes"] - before
+        level["share"] = level["added_bytes"] / facts["bytes"]
+        before = level["bytes"]
+    for clip, ratios in zip(facts["clips"], tick_ratios or ()):
+        clip["tick_ratios"] = list(ratios)
+    for level, ratios in zip(facts["levels"], zip(*(tick_ratios or ()))):
+        level["tick_ratio"] = max((ratio for ratio in ratios if ratio is not None), default=None)
+    return facts
+
+
+def print_facts(facts: dict[str, Any]) -> None:
+    """Print the facts of a file as `athcodec info` does."""
+    ath = facts["ath"]
+    rate = f" at {facts['fps']:.6g} per second" if facts["fps"] else ""
+    echo(
+        f"{facts['file']}: {counted(facts['vertices'], 'vertex', 'vertices')} on "
+        f"{counted(facts['branches'], 'branch', 'branches')}, {counted(facts['frames'], 'frame')}{rate} in "
+        f"{counted(facts['segments'], 'segment')}, format {facts['format']}"
+    )
+    thresholds = ""
+    if "epsilon" in ath:
+        thresholds = f"; epsilon {ath['epsilon']:.2g}, eta {ath['eta']}, xi {ath['xi']:.2g}, lambda {ath['lam']}"
+    echo(
+        f"ATH: depth {ath['depth']}, {counted(ath['nodes'], 'node')}, "
+        f"{counted(ath['leaves'], 'leaf', 'leaves')} among them{thresholds}"
+    )
+    unit = f" {facts['unit']}" if facts["unit"] else ""
+    share = facts["predicted_error_share"]
+    held = "" if share is None else f", errors of predicted motion held to {share:.2g} of it"
+    echo(f"Error bound: {facts['max_error_bound']:.4g}{unit}{held}. {size_of(facts)}")
+    echo(f"Rest pose: {_rest(facts)}.")
+    if len(facts["levels"]) < facts["full_level_count"]:
+        echo(f"Holds levels 0 to {len(facts['levels']) - 1} of 0 to {facts['full_level_count'] - 1}.")
+    if facts["missing"]:
+        echo(f"{facts['available_bytes']:,} bytes are there; missing {facts['missing']}.")
+    if (
+        len(facts["clips"]) > 1
+        or facts["clips"][0]["name"]
+        or any(facts["clips"][0][key] for key in ("loop", "wind", "transitions"))
+    ):
+        _print_clips(facts)
+    for clip in facts["clips"]:
+        _print_presence(clip)
+    _print_levels(facts)
+
+
+def _print_presence(clip: dict[str, Any]) -> None:
+    """The objects that some frame does not show, the first `NAMED_OBJECTS` of them, and the frames that do."""
+    named = [
+        f"{name} in {', '.join(f'{first} to {stop - 1}' for first, stop in runs) or 'none'}"
+        for name, runs in list(clip["presence"].items())[:NAMED_OBJECTS]
+    ]
+    if named:
+        more = len(clip["presence"]) - len(named)
+        of_clip = f" of {clip['name']}" if clip["name"] else ""
+        echo(f"Shown in some frames{of_clip} only: {'; '.join(named)}{f'; and {more:,} more' if more else ''}.")
+
+
+def _rest(facts: dict[str, Any]) -> str:
+    """Where it is, and what it takes."""
+    if facts["host_mesh"]:
+        vertices = counted(facts["vertices"], "vertex", "vertices")
+        return f"a mesh of {vertices} that the host has, checksum {facts['host_mesh']['checksum']}"
+    return f"{facts['rest_bytes']:,} bytes of these"
+
+
+def _print_clips(facts: dict[str, Any]) -> None:
+    """Errors at the seam are those of the deepest stored level."""
+    rows = [
+        [
+            clip["name"],
+            f"{clip['frames']:,}",
+            f"{clip['seconds']:.4g}",
+            f"{clip['segments']:,}",
+            f"{clip['wind']['strength']:g} to {clip['wind']['heading']:g}°" if clip["wind"] else "",
+            f"{clip['transitions']:,}" if clip["transitions"] else "",
+            f"{clip['seam_errors'][len(facts['levels']) - 1]:.3g}" if clip["loop"] else "",
+            *(f"{error:.3g}" for error in clip["max_errors"]),
+        ]
+        for clip in facts["clips"]
+    ]
+    levels = [f"max at {level}" for level in range(len(facts["levels"]))]
+    seam = head("loop's seam", facts["unit"])
+    print_table(["clip", "frames", "seconds", "segments", "wind", "transitions", seam, *levels], rows)
+
+
+def _print_levels(facts: dict[str, Any]) -> None:
+    measures = {"max": "max_error", "99 %": "p99_error", "RMS": "rms_error"}
+    columns = ["bytes so far", *(head(f"{name} error", facts["unit"]) for name in measures)]
+    cells = [
+        [f"{level['bytes']:,}", *(f"{level[field]:.3g}" for field in measures.values())] for level in facts["levels"]
+    ]
+    if "tick_ratio" in facts["levels"][0]:
+        columns.append(TICK_RATIO.head)
+        for row, level in zip(cells, facts["levels"], strict=True):
+            row.append(TICK_RATIO.cell(level["tick_ratio"]))
+    print_table([*LEVEL_COLUMNS, *columns], level_rows(facts, cells))
+
+
+def level_rows(facts: dict[str, Any], cells: Sequence[Sequence[str]]) -> list[list[str]]:
+    """One row per level, ending in its `cells`, between what the file holds before and behind them."""
+    levels, total = facts["levels"], facts["bytes"]
+
+    def row(level: str, name: str, nodes: str, size: int) -> list[str]:
+        return [level, name, nodes, f"{size:,}", f"{size / total:.1%}"]
+
+    rows = [row("prelude", "", "", levels[0]["bytes"] - levels[0]["added_bytes"])]
+    for level, more in zip(levels, cells, strict=True):
+        name = level["name"] if level["available"] else f"{level['name']} (incomplete)"
+        rows.append(row(f"{level['level']}", name, f"{level['nodes']:,}", level["added_bytes"]) + list(more))
+    behind = total - levels[-1]["bytes"]
+    return [*rows, row("arrays", "", "", behind)] if behind else rows
+
+
+def head(name: str, unit: Any) -> str:
+    return f"{name} ({unit})" if unit else name
+
+
+def size_of(facts: dict[str, Any]) -> str:
+    return f"{facts['bytes']:,} bytes; the positions as float32 take {facts['raw_bytes']:,}: {facts['ratio']:.1f} to 1."
