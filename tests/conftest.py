@@ -81,13 +81,17 @@ def browser():
 def opened(browser):
     """A function that opens an address and waits for a condition; the page must not have logged anything at the end."""
     pages, errors = [], []
-    said = re.compile("GL Driver Message")  # Chromium's own, about reading pixels back
+    said = ["GL Driver Message"]  # Chromium's own, about reading pixels back
 
-    def visit(address: str, until: str = "athcodecViewer.motion?.complete", **options):
+    def visit(address: str, until: str = "athcodecViewer.motion?.complete", quiet: str | None = None, **options):
+        said.extend([quiet] if quiet else [])
         page = browser.new_page(**{"viewport": {"width": 1000, "height": 700}} | options)
         pages.append(page)
         page.set_default_timeout(SLOWEST)
-        page.on("console", lambda message: None if said.search(message.text) else errors.append(message.text))
+        page.on(
+            "console",
+            lambda message: None if any(map(message.text.__contains__, said)) else errors.append(message.text),
+        )
         page.on("pageerror", lambda error: errors.append(str(error)))
         page.goto(address)
         page.wait_for_function(f"() => {until}")

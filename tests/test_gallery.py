@@ -17,6 +17,7 @@ import athcodec
 from athcodec import cli
 from athcodec.viewer import gallery, picture
 from athcodec.viewer.build_viewer import modules
+from bench.throttled_server import WEB, ThrottledServer
 
 pytestmark = pytest.mark.web
 
@@ -178,7 +179,7 @@ def test_attributes_of_an_element_say_what_it_shows(shown, tmp_path):
       globalThis.tuft = document.createElement("ath-viewer");
       const wanted = { src: "plants/grass.ath", clip: "gale", level: 0, alt: "Grass", speed: 4, "camera-controls": "" };
       for (const [name, value] of Object.entries(wanted)) tuft.setAttribute(name, value);
-      tuft.style.cssText = "display: block; width: 160px; height: 120px";
+      tuft.style.cssText = "display: block; width: 320px; height: 240px";
       document.body.prepend(tuft);
     }""")
     shown.wait_for_function("() => tuft.currentTime > 1 && tuft.ath.motion.level === 0")
@@ -212,6 +213,44 @@ def test_an_element_shows_a_forest_with_plants_on_its_floor(shown, tmp_path):
     shown.wait_for_function(drawn)
     shown.evaluate("wood.remove()")
     assert shown.evaluate("wood.forests.length") == 0
+
+
+NO_WEBGL = """HTMLCanvasElement.prototype.getContext = () => null"""
+
+
+@pytest.mark.browser
+def test_a_browser_that_cannot_draw_shows_stills_and_plain_sentences(browser, sample_ath):
+    page, still = browser.new_page(), (DOCS / "gallery" / "fern.webp").read_bytes()
+    page.set_default_timeout(SLOWEST)
+    page.add_init_script(NO_WEBGL)
+    head = re.search(r'<script type="importmap">.*?</script>', (WEB / "index.html").read_text("utf-8"))[0]
+    head += '<link rel="stylesheet" href="gallery.css"><script type="module" src="ath-viewer.js"></script>'
+    card = '<ath-viewer src="/tree.ath" scenery><img src="fern.webp" alt=""></ath-viewer>'
+    cards = f'<!doctype html>{head}<ul class="ath-gallery"><li>{card}</li></ul>'
+    page.route("**/cards.html", lambda route: route.fulfill(body=cards, content_type="text/html"))
+    page.route("**/fern.webp", lambda route: route.fulfill(body=still, content_type="image/webp"))
+    with ThrottledServer({"tree.ath": sample_ath.read_bytes()}) as line:
+        page.goto(f"{line.address}cards.html")
+        page.wait_for_function("() => document.querySelector('ath-viewer').shadowRoot.querySelector('[role=alert]')")
+        assert page.locator("ath-viewer [role=alert]").inner_text() == "This browser cannot draw in 3D"
+        box, card = (page.locator(each).bounding_box() for each in ("img", "ath-viewer"))
+        assert page.locator("img").is_visible() and box == card
+        page.goto(f"{line.address}forest.html?file=/tree.ath&count=30")
+        page.wait_for_selector("#message")
+        assert "cannot draw in 3D" in page.inner_text("#message h2") and "index.html" in page.url
+    page.close()
+
+
+@pytest.mark.browser
+def test_without_webgpu_the_forest_is_drawn_on_webgl(opened, sample_ath):
+    with ThrottledServer({"tree.ath": sample_ath.read_bytes()}) as line:
+        address = f"{line.address}forest.html?file=/tree.ath&count=30"
+        page = opened(
+            address,
+            "globalThis.athcodecViewer?.forests()[0]?.counts.some((count) => count > 0)",
+            quiet="No available adapters",
+        )
+        assert page.evaluate("athcodecViewer.forests()[0].count") == 30
 
 
 @pytest.mark.browser

@@ -371,6 +371,73 @@ def test_the_address_brings_back_what_is_looked_at(opened, windy):
         assert page.evaluate(VIEW) == pytest.approx(view, rel=1e-3)
 
 
+def test_an_address_that_is_changed_in_an_open_page_is_followed(opened, windy):
+    with ThrottledServer({"tree.ath": windy}) as line:
+        page = opened(line.page("tree.ath"))
+        page.evaluate("location.hash = 'colour=order&detail=1&clip=gale&t=0.5'")
+        page.wait_for_function("() => athcodecViewer.state.time === 0.5 && athcodecViewer.motion.clip.name === 'gale'")
+        assert chosen(page, "colour") == "order" and chosen(page, "level-choice") == "1"
+        page.evaluate("location.hash = ''")
+        page.wait_for_function("() => athcodecViewer.state.playing && athcodecViewer.motion.clip.name === 'calm'")
+        assert chosen(page, "colour") == "plain" and chosen(page, "level-choice") == "auto"
+
+
+def test_while_nothing_is_on_the_stage_no_control_reaches_for_a_plant(opened, windy):
+    """Figures are open, and a wind is chosen; what goes wrong would be in the log."""
+    with ThrottledServer({"tree.ath": windy}) as line:
+        page = opened(line.page("tree.ath"))
+        page.click("summary:has-text('Figures')")
+        page.evaluate("athcodecViewer.setWind(5, 30)")
+        page.click("#replay button[data-mbit='1']")
+        assert page.evaluate("athcodecViewer.plants.length === 0 && document.querySelector('footer').inert")
+        for key in ("c", "d", "f", "n", ".", "l", "]"):
+            page.keyboard.press(key)
+        page.evaluate("athcodecViewer.state.dirty = true")
+        page.wait_for_function("() => athcodecViewer.plants.length === 1 && !document.querySelector('footer').inert")
+
+
+PLACED = (Path(__file__).parent / "node" / "placed.js").read_text("utf-8")
+
+
+@pytest.mark.parametrize("size", [(1440, 900), (1024, 768), (1280, 640), (1100, 760), (844, 390), (390, 844)])
+def test_no_card_covers_the_plant(opened, sample_ath, size):
+    with ThrottledServer({"tree.ath": sample_ath.read_bytes()}) as line:
+        page = opened(line.page("tree.ath"), viewport=dict(zip(("width", "height"), size)))
+        for panel in ("as it opens", "the other way"):
+            page.wait_for_timeout(300)  # cards are measured when the browser has laid them out
+            found = page.evaluate(PLACED)
+            assert found["over"] == found["outside"] == [] and found["share"] > 0.3, (panel, found)
+            page.click("#toggle-panel")
+
+
+def test_who_wants_less_motion_sees_a_still_first_frame_and_a_button(opened, sample_ath):
+    with ThrottledServer({"tree.ath": sample_ath.read_bytes()}) as line:
+        page = opened(line.page("tree.ath"), reduced_motion="reduce")
+        page.wait_for_timeout(500)
+        assert page.evaluate("athcodecViewer.motion.frame") == 0 and page.get_attribute("#play", "aria-label") == "Play"
+        page.click("#play")
+        page.wait_for_function("() => athcodecViewer.motion.frame > 1")
+
+
+def test_a_lost_context_is_restored(opened, sample_ath):
+    with ThrottledServer({"tree.ath": sample_ath.read_bytes()}) as line:
+        page = opened(line.page("tree.ath"), quiet="WebGL")
+        page.evaluate(f"globalThis.seen = () => ({PIXELS})(athcodecViewer.stage)")
+        colours = "new Set(seen()).size"
+        before = page.evaluate(f"athcodecViewer.setPlaying(false), {colours}")
+        page.evaluate("""async () => {
+          const { canvas, renderer } = athcodecViewer.stage;
+          const lost = renderer.getContext().getExtension("WEBGL_lose_context");
+          const told = (type) => new Promise((done) => canvas.addEventListener(type, () => setTimeout(done)));
+          const gone = told("webglcontextlost"), back = told("webglcontextrestored");
+          lost.loseContext();
+          await gone;
+          lost.restoreContext();
+          await back;
+        }""")
+        assert page.evaluate(colours) > 0.8 * before > 20
+
+
 def test_what_an_address_names_and_is_not_there_is_passed_over(opened, sample_ath):
     with ThrottledServer({"tree.ath": sample_ath.read_bytes()}) as line:
         page = opened(line.page("tree.ath") + "#clip=none&detail=99&view=a+b&wind=x&colour=none&split=z&t=soon")

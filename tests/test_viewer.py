@@ -26,6 +26,7 @@ from plants import bending_tube, clip_of
 import athcodec
 from athcodec import cli
 from athcodec.decoding import container as ct
+from athcodec.exporters import write
 from athcodec.viewer import view
 from athcodec.viewer.build_viewer import MOST_BYTES, own_bytes
 from bench import throttled_server
@@ -162,6 +163,21 @@ def test_the_bundles_are_small_and_their_licences_are_there():
     licences = (WEB / "LICENSES.txt").read_text("utf-8")
     assert re.search(r"three 0\.187\.0.*The MIT License.*three\.js authors", licences, re.DOTALL)
     assert "fzstd" in licences
+
+
+def test_no_view_of_the_page_imports_another_or_does_anything_where_it_is_imported():
+    """Each gives its commands to the controller, app.js, when main.js begins it; there is no document in Node."""
+    page, main = VIEWER / "page", (VIEWER / "page" / "main.js").read_text("utf-8")
+    views = re.findall(r'^import \w+ from "\./(\w+)\.js";$', main, re.M)
+    assert len(views) > 10
+    for name in views:
+        imported = set(re.findall(r'from "\./(\w+)\.js"', (page / f"{name}.js").read_text("utf-8")))
+        assert not imported & {*views, "main"}, name
+    script = f"""import {{ register }} from "node:module";
+      register({json.dumps((ROOT / "tests" / "node" / "page_modules.mjs").as_uri())});
+      for (const view of {json.dumps(views)}) await import({json.dumps(page.as_uri())} + `/${{view}}.js`);"""
+    done = subprocess.run(["node", "--input-type=module", "-e", script], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
 
 
 @pytest.mark.programs
@@ -315,6 +331,9 @@ class HeldServer(ThrottledServer):
         super().__exit__(*error)
 
 
+READBACK = (ROOT / "tests" / "node" / "readback.js").read_text("utf-8")
+
+
 def settle(page, line: ThrottledServer) -> None:
     """Waits until many pictures have been drawn, for each of which the worker is asked, and nothing was fetched."""
     before = None
@@ -341,6 +360,7 @@ def test_every_level_shows_the_positions_that_python_decodes(opened, sample_ath)
     """In the worker, in the texture, and as the vertex shader reads it."""
     with ThrottledServer({"tree.ath": sample_ath.read_bytes()}) as line, athcodec.open(sample_ath) as decoder:
         page = opened(line.page("tree.ath"))
+        page.evaluate(READBACK)
         size = float(np.ptp(decoder.positions(0), axis=0).max())
         for level in range(decoder.file.level_count):
             for frame in (0, 41, decoder.frame_count - 1):
@@ -350,8 +370,8 @@ def test_every_level_shows_the_positions_that_python_decodes(opened, sample_ath)
                 assert np.array_equal(decoded.astype(np.float32), wanted.astype(np.float32))
                 assert page.evaluate(f"athcodecViewer.shown({seconds}, {level})")["level"] == level
                 drawn = wanted if level > 0 else drawn_at_level_0(decoder, frame)
-                for way in ("uploaded", "onGraphics"):
-                    shown = positions_of(page, f"athcodecViewer.{way}()")
+                for way in ("athcodecViewer.uploaded", "onGraphics"):
+                    shown = positions_of(page, f"{way}()")
                     assert np.abs(shown - drawn).max() < 1e-6 * size, (level, frame, way)
 
 
@@ -393,6 +413,7 @@ def play(page, clip) -> None:
 def test_every_clip_shows_the_positions_that_python_decodes_of_it(opened, medley_ath):
     with ThrottledServer({"tree.ath": medley_ath.read_bytes()}) as line, athcodec.open(medley_ath) as first:
         page = opened(line.page("tree.ath"))
+        page.evaluate(READBACK)
         for index, clip in reversed(list(enumerate(first.file.clips))):
             play(page, index)
             decoder = first.play(clip.name)
@@ -402,7 +423,7 @@ def test_every_clip_shows_the_positions_that_python_decodes_of_it(opened, medley
                     decoded = positions_of(page, f"athcodecViewer.decoded({seconds}, {level})")
                     assert np.abs(decoded - wanted).max() < 1e-6 * np.ptp(wanted)  # times are rounded
                     page.evaluate(f"athcodecViewer.shown({seconds}, {level})")
-                    shown = positions_of(page, "athcodecViewer.onGraphics()")
+                    shown = positions_of(page, "onGraphics()")
                     drawn = wanted if level > 0 else drawn_at_level_0(decoder, frame)
                     assert np.abs(shown - drawn).max() < 2e-6 * np.ptp(wanted), (clip.name, level, frame)
 
@@ -624,7 +645,7 @@ def test_a_tree_that_sharpens_as_bytes_come_does_not_jump(opened, sample_ath):
 
 
 FOREST = """async ([from, to]) => {
-  const three = await import("three"), { ATHForest, ATHLoader, MOTION_PARS } = await import("athcodec-three");
+  const three = await import("three"), { ATHForest, ATHLoader } = await import("athcodec-three");
   const { stage, plants } = athcodecViewer, { ath } = plants[0], clock = { now: performance.now() };
   performance.now = () => clock.now;
   const loader = new ATHLoader(), forest = new ATHForest(ath);
@@ -636,36 +657,15 @@ FOREST = """async ([from, to]) => {
     forest.update(stage.camera, stage.pixels, 0.2);
     return forest.children.find(({ visible }) => visible);
   };
-  // Where the vertex shader puts the vertices of what is drawn, by their numbers in the source.
-  const read = (drawn) => {
-    const WIDTH = 256, all = drawn.geometry.attributes, count = all.position.count, height = Math.ceil(count / WIDTH);
-    const geometry = new three.BufferGeometry();
-    const each = (array) => Float32Array.from({ length: 4 * count }, (_, i) => array[i % 4]);
-    for (const name of ["position", "athPart", "athPartBefore"]) if (all[name]) geometry.setAttribute(name, all[name]);
-    for (const name of ["athPlace", "athTurn", "athFading"]) if (all[name])
-      geometry.setAttribute(name, new three.BufferAttribute(each(all[name].array), 4));
-    geometry.setAttribute("pixel", new three.BufferAttribute(Float32Array.from({ length: 2 * count }, (_, i) =>
-      (i % 2 ? (Math.floor(i / 2 / WIDTH) + 0.5) / height : ((i / 2) % WIDTH + 0.5) / WIDTH) * 2 - 1), 2));
-    const shader = { uniforms: {}, vertexShader: "" };
-    drawn.material.onBeforeCompile({ uniforms: shader.uniforms, vertexShader: "" }, stage.renderer);
-    const material = new three.ShaderMaterial({
-      uniforms: shader.uniforms, depthTest: false,
-      defines: { ATH_FOREST: 1, ...(all.athFading ? { ATH_FADING: 1 } : {}) },
-      vertexShader: `attribute vec2 pixel; varying vec3 moved; ${MOTION_PARS}
-        void main() { moved = athMoved(position, athPart); gl_Position = vec4(pixel, 0.0, 1.0); gl_PointSize = 1.0; }`,
-      fragmentShader: "varying vec3 moved; void main() { gl_FragColor = vec4(moved, 1.0); }",
-    });
-    const points = new three.Points(geometry, material), scene = new three.Scene();
-    points.frustumCulled = false;
-    scene.add(points);
-    const target = new three.WebGLRenderTarget(WIDTH, height, { type: three.FloatType, format: three.RGBAFormat,
-      minFilter: three.NearestFilter, magFilter: three.NearestFilter, depthBuffer: false });
-    stage.renderer.setRenderTarget(target);
-    stage.renderer.render(scene, new three.OrthographicCamera());
-    const pixels = new Float32Array(4 * WIDTH * height);
-    stage.renderer.readRenderTargetPixels(target, 0, 0, WIDTH, height, pixels);
-    stage.renderer.setRenderTarget(null);
-    return Array.from({ length: 3 * count }, (_, i) => pixels[4 * Math.floor(i / 3) + (i % 3)]);
+  const read = ({ geometry: { attributes: all }, material }) => {
+    const attributes = {}, shader = { uniforms: {}, vertexShader: "" }, { count } = all.position;
+    const repeated = (array) => Float32Array.from({ length: 4 * count }, (_, i) => array[i % 4]);
+    const each = ({ array }) => new three.BufferAttribute(repeated(array), 4);
+    for (const name of ["position", "athPart", "athPartBefore"]) if (all[name]) attributes[name] = all[name];
+    for (const name of ["athPlace", "athTurn", "athFading"]) if (all[name]) attributes[name] = each(all[name]);
+    material.onBeforeCompile(shader, stage.renderer);
+    const defines = { ATH_FOREST: 1, ...(all.athFading ? { ATH_FADING: 1 } : {}) };
+    return readback(attributes, shader.uniforms, { defines });
   };
   const finest = (drawn) => drawn.geometry.attributes.position.count === ath.rest.length / 3;
   const found = { shown: [], fading: [] };
@@ -673,7 +673,7 @@ FOREST = """async ([from, to]) => {
   for (const passed of [0.01, 0.04, 0.06, 0.3]) {
     const drawn = update(to, passed);
     if (!finest(drawn)) throw new Error("another geometry");
-    found.shown.push(read(drawn));
+    found.shown.push(await read(drawn));
     found.fading.push(forest.fading);
   }
   found.levels = [];
@@ -689,6 +689,7 @@ def test_an_instance_of_a_forest_fades_from_level_to_level(opened, sample_ath):
     with ThrottledServer({"tree.ath": sample_ath.read_bytes()}) as line, athcodec.open(sample_ath) as decoder:
         page = opened(line.page("tree.ath"))
         page.evaluate("athcodecViewer.setPlaying(false)")
+        page.evaluate(READBACK)
         found = page.evaluate(FOREST, [1, decoder.file.level_count - 1])
     before, after = np.array(found["levels"])
     apart = np.abs(before - after).max()
@@ -874,6 +875,33 @@ def test_the_intact_levels_of_a_damaged_file_play(opened, sample_ath):
 
 
 @browser_test
+def test_a_glb_with_a_motion_is_shown_with_its_materials_by_view_and_by_an_exported_page(opened, tmp_path):
+    clip = bending_tube()
+    clip.attributes = {"colors": np.tile(np.float32([0.8, 0.1, 0.1]), (clip.vertex_count, 1))}
+    clip.check()
+    write(clip, tmp_path / "plain.glb", animation="morphs")
+    assert cli.main(["encode", str(tmp_path / "plain.glb"), "--into", str(tmp_path / "tube.glb")]) == 0
+    view.export_page(tmp_path / "tube.glb", tmp_path / "page.html")
+    with athcodec.open(tmp_path / "tube.glb") as decoder, viewing(str(tmp_path / "tube.glb")) as address:
+        wanted, seconds = decoder.positions(20), float(decoder.time[20] - decoder.time[0])
+        for place in (address, (tmp_path / "page.html").as_uri()):
+            page = opened(place)
+            assert page.inner_text("#name") == "tube.glb"
+            deepest = decoder.file.level_count - 1
+            shown = positions_of(page, f"athcodecViewer.decoded({seconds}, {deepest})")
+            assert np.abs(shown - wanted).max() < 1e-5 * np.abs(wanted).max()
+            drawn = "athcodecViewer.plants[0].space"
+            assert page.evaluate(f"{drawn}.isMesh && {drawn}.material.isMeshStandardMaterial")
+            page.click("#colour [data-value=distance]")
+            assert page.evaluate(f"{drawn}.material.isMeshLambertMaterial")
+            page.click("#compare [data-value=levels]")
+            page.wait_for_function("() => athcodecViewer.plants.length === 2 && athcodecViewer.counters.pictures > 3")
+    with ThrottledServer({"plain.glb": (tmp_path / "plain.glb").read_bytes()}) as line:
+        page = opened(line.page("plain.glb"), "document.getElementById('message').checkVisibility()")
+        assert "no plant that moves" in page.inner_text("#message h2") and "--into" in page.inner_text("#message p")
+
+
+@browser_test
 def test_an_exported_page_plays_from_the_disk(opened, sample_ath, tmp_path):
     page_file = tmp_path / "page.html"
     view.export_page(sample_ath, page_file)
@@ -1022,10 +1050,11 @@ def test_normals_turn_with_the_surface_at_every_level(opened, tmp_path):
     athcodec.encode(clip, path, rel_error=1e-3)
     with ThrottledServer({"tube.ath": path.read_bytes()}) as line, athcodec.open(path) as decoder:
         page = opened(line.page("tube.ath"))
+        page.evaluate(READBACK)
         page.wait_for_function("() => athcodecViewer.plants[0].ath.geometry?.hasAttribute('normal')")
         for level in range(decoder.file.level_count):
             page.evaluate(f"athcodecViewer.shown({decoder.time[20] - decoder.time[0]}, {level})")
-            shown = positions_of(page, "athcodecViewer.onGraphics('normals')")
+            shown = positions_of(page, "onGraphics('normals')")
             wanted = smooth_normals(decoder.positions(20, level).astype(float), quads)
             turned = np.abs(wanted - smooth_normals(clip.rest.astype(float), quads)).max()
             assert turned > 0.3 and (shown * wanted).sum(axis=1).min() > np.cos(np.radians(8)), level
@@ -1054,15 +1083,3 @@ def test_the_page_works_by_keyboard(opened, sample_ath):
         with page.expect_download() as download:
             page.keyboard.press("p")
         assert Path(download.value.path()).read_bytes()[:4] == b"\x89PNG"
-
-
-@browser_test
-@pytest.mark.parametrize("size, scheme", [((390, 800), "light"), ((390, 800), "dark"), ((1280, 800), "dark")])
-def test_no_control_lies_outside_the_screen(opened, sample_ath, size, scheme):
-    with ThrottledServer({"tree.ath": sample_ath.read_bytes()}) as line:
-        page = opened(line.page("tree.ath"), color_scheme=scheme)
-        page.set_viewport_size(dict(zip(("width", "height"), size, strict=True)))
-        assert page.evaluate("document.documentElement.scrollWidth") <= size[0]
-        for name in ("header", "footer", "#toggle-panel", "#play", "#time", "#speed"):
-            box = page.locator(name).bounding_box()
-            assert box["x"] >= 0 and box["x"] + box["width"] <= size[0] and box["y"] + box["height"] <= size[1], name

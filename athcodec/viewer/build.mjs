@@ -12,10 +12,16 @@ const modules = process.env.NODE_PATH, require = createRequire(join(modules, "x.
 const esbuild = require("esbuild");
 mkdirSync(out, { recursive: true });
 
+// Shaders without comments and indentation, which esbuild leaves in texts.
+const glsl = { name: "glsl", setup: ({ onLoad }) => onLoad({ filter: /viewer.(src|page).\w+\.js$/ }, ({ path }) => ({
+  contents: readFileSync(path, "utf8").replace(/\/\* glsl \*\/`[^`]*/g, (text) => text.replace(/ *\/\/.*/g, "").replace(/\n\s+/g, "\n")
+    .replace(/^[^#\n]+$/gm, (line) => line.replace(/ ?([,;{}=*<>?:+/]) ?/g, "$1").replace(/\b0\.(?=\d)/g, ".").replace(/(\d)\.0\b/g, "$1."))),
+})) };
+
 async function bundle(entry, name, external) {
   await esbuild.build({
     ...entry, outfile: join(out, name), bundle: true, minify: true, format: "esm", target: "es2022", external,
-    nodePaths: [modules], loader: { ".wgsl": "text" }, legalComments: "none", charset: "utf8", logLevel: "error",
+    nodePaths: [modules], plugins: [glsl], loader: { ".wgsl": "text" }, legalComments: "none", charset: "utf8", logLevel: "error",
   });
   return readFileSync(join(out, name), "utf8");
 }
@@ -26,14 +32,17 @@ function names(text) {
     .flatMap(([, list]) => list.split(",").map((name) => name.trim().split(" as ")[0]));
 }
 
-const orbit = "three/addons/controls/OrbitControls.js", outside = ["three", "three/webgpu", "athcodec-three", "athcodec-three/webgpu", orbit];
+const orbit = "three/addons/controls/OrbitControls.js", outside = ["three", "three/webgpu", "athcodec-three", "athcodec-three/webgpu", "athcodec-three/model", orbit];
 const loader = await bundle({ entryPoints: [join(here, "src/index.js")] }, "ATHLoader.js", outside);
 await bundle({ entryPoints: [join(here, "src/webgpu.js")] }, "ATHForestGPU.js", outside);
 await bundle({ entryPoints: [join(here, "src/ath_worker.js")] }, "ath_worker.js", []);
 const element = await bundle({ entryPoints: [join(here, "src/element.js")] }, "ath-viewer.js", outside);
 const viewer = await bundle({ entryPoints: [join(here, "page/main.js")] }, "viewer.js", outside);
+const gltf = "three/addons/loaders/GLTFLoader.js", alias = { [gltf]: join(modules, gltf.replace("addons", "examples/jsm")) };
+const model = await bundle({ entryPoints: [join(here, "page/model.js")], alias }, "model.js", outside);
 const controls = await bundle({ entryPoints: [join(modules, "three/examples/jsm/controls/OrbitControls.js")] }, "OrbitControls.js", ["three"]);
-const used = [...new Set([loader, viewer, element, controls].flatMap(names))].sort();
+// Scripts that look at what is drawn take WebGLRenderTarget, which is in the bundle anyway.
+const used = [...new Set([loader, viewer, element, model, controls].flatMap(names)), "WebGLRenderTarget"].sort();
 await bundle({ stdin: { contents: `export { ${used.join(", ")} } from "three";`, resolveDir: modules } }, "three.js", []);
 await bundle({ entryPoints: [join(here, "page/forest.js")] }, "forest.js", outside);
 await bundle({ stdin: { contents: 'export * from "three/webgpu";', resolveDir: modules } }, "three.webgpu.js", []);

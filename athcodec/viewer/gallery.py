@@ -15,7 +15,7 @@ from athcodec.errors import AthError
 from athcodec.files.atomic import check_target, file_ids, is_url, keeping, new_file
 from athcodec.opening import open as open_ath
 from athcodec.viewer import picture
-from athcodec.viewer.view import WEB, file_name
+from athcodec.viewer.view import WEB, file_name, refuse_glb
 
 PAGE = WEB / "gallery.html"
 VIEWER = (
@@ -26,6 +26,7 @@ VIEWER = (
     "ath_worker.js",
     "gallery.css",
     "index.html",
+    "model.js",
     "three.js",
     "viewer.css",
     "viewer.js",
@@ -90,6 +91,8 @@ def facts_of(path: str | os.PathLike[str]) -> str:
     """How large a plant's motion is, in words and figures. Raises AthError for what a gallery cannot hold, OSError."""
     if is_url(path):
         raise AthError(f"{path}: got a URL, expected a file that can be copied into the gallery")
+    with open(path, "rb") as file:
+        refuse_glb(file.read(4))
     with open_ath(path) as decoder:
         vertices = decoder.file.vertex_count
         frames = [clip.frame_count for clip in decoder.file.clips]

@@ -40,7 +40,7 @@ _STILL_AT = 0.7  # Time of a still picture, over the clip's duration.
 _TIMEOUT = 120_000  # ms
 _WHOLE = "() => globalThis.athcodecViewer?.motion?.complete"
 _ALONE = """() => {
-  document.body.classList.add("no-panel");
+  athcodecViewer.stage.keepClear([]);
   athcodecViewer.stage.fit();
   athcodecViewer.frameView();
 }"""

@@ -76,8 +76,8 @@ def export_page(
     with keeping(file_ids(path, mesh_file, *(floor or ()))):
         check_target(page, ".html")
         data = _read(path)
-        _refuse_glb(data[:4])
-        mesh = _checked(io.BytesIO(data), clip, host_mesh)
+        is_glb = _is_glb(data)
+        mesh = _checked(path if is_glb else io.BytesIO(data), clip, host_mesh, is_glb)
         text = self_contained(data, file_name(path), clip, mesh, _read_floor(floor)).encode()
         with new_file(page) as out:
             out.write(text)
@@ -87,23 +87,28 @@ def export_page(
 def _read_floor(floor: Floor | None) -> list[tuple[bytes, float]]:
     files = [(_read(path), each) for path, each in (floor or {}).items()]
     for data, _ in files:
-        _refuse_glb(data[:4])
+        refuse_glb(data)
         _checked(io.BytesIO(data), None, None)
     return files
 
 
-def _checked(path: Any, clip: str | None, host_mesh: HostMesh | None) -> bytes | None:
-    """Opens the file as the page will; gives the host's mesh as the page takes it, float32, for a file that needs one.
-    Raises AthError, OSError."""
+def _checked(path: Any, clip: str | None, host_mesh: HostMesh | None, has_mesh: bool = False) -> bytes | None:
+    """Opens the file as the page will; gives the host's mesh as the page takes it, float32, for a file that needs one
+    and is not in a GLB that has it. Raises AthError, OSError."""
     with open_ath(path, clip=clip, host_mesh=host_mesh) as decoder:
-        return None if decoder.file.host_checksum is None else decoder.level_rest(0).astype("<f4").tobytes()
+        needs_none = has_mesh or decoder.file.host_checksum is None
+        return None if needs_none else decoder.level_rest(0).astype("<f4").tobytes()
 
 
-def _refuse_glb(head: bytes) -> None:
-    if head == b"glTF":
+def _is_glb(data: bytes) -> bool:
+    return data[:4] == b"glTF"
+
+
+def refuse_glb(data: bytes) -> None:
+    if _is_glb(data):
         raise ClipError(
-            "got a GLB, expected an .ath file: pages with the plugins of athcodec-three show it; decode to .npz and "
-            "encode make an .ath file of it"
+            "got a GLB, expected an .ath file: athcodec view FILE.glb shows it alone; decode to .npz and encode make "
+            "an .ath file of it"
         )
 
 
@@ -126,6 +131,8 @@ def self_contained(
     """The page with everything inside: styles, modules as data URLs, the worker and the file as text."""
     text = PAGE.read_text("utf-8")
     modules = json.loads(_MAP.search(text)[1])["imports"]
+    if not _is_glb(data):
+        del modules["athcodec-three/model"]
     inside = json.dumps({"imports": {name: _data_url(WEB / file) for name, file in modules.items()}})
     main = _script((WEB / "viewer.js").read_text("utf-8"))
     worker = _script((WEB / "ath_worker.js").read_text("utf-8"))
@@ -205,10 +212,10 @@ def serve(
         As `export_page`.
     """
     _check_server(path)
-    if not is_url(path):
-        with open(path, "rb") as file:
-            _refuse_glb(file.read(4))
-    mesh = _checked(path, clip, host_mesh)
+    is_glb = file_name(path).lower().endswith(".glb")  # as the page tells it
+    if forest and is_glb:
+        raise ClipError("--forest: got a GLB, expected an .ath file")
+    mesh = _checked(path, clip, host_mesh, is_glb)
     grown = _read_floor(floor)
     import asyncio
 

@@ -229,21 +229,13 @@ cases.parsed = async () => {
 
 // What bound materials make of a shader.
 cases.bound = async () => {
-  const { ath, motion } = await load(), warnings = [];
-  console.warn = (text) => warnings.push(text);
-  const { MeshLambertMaterial } = three, compiled = (material) => {
+  const { motion } = await load(), { MeshLambertMaterial } = three, compiled = (material) => {
     const shader = { uniforms: {}, vertexShader: "#include <common>\n#include <begin_vertex>" };
     material.onBeforeCompile(shader);
     return { uses: Object.values(shader.uniforms).includes(motion.uniforms.athData), times: shader.vertexShader.split("uniform highp sampler2D athData;").length - 1 };
   };
   const twice = motion.bind(motion.bind(new MeshLambertMaterial())), other = motion.clone();
-  const found = { twice: compiled(twice), other: compiled(motion.bind(other.bind(new MeshLambertMaterial()))) };
-  const clones = [twice.clone(), twice.clone()];
-  for (let i = 0; i < 3; i++) clones.forEach(compiled);
-  found.warnings = warnings.length;
-  found.clone = compiled(motion.bind(clones[0]));
-  found.text = warnings[0];
-  return (found);
+  return { twice: compiled(twice), other: compiled(motion.bind(other.bind(new MeshLambertMaterial()))), clone: compiled(twice.clone().clone()) };
 };
 
 // Boxes, spheres and rays against the vertices that are shown.
@@ -274,6 +266,24 @@ cases.rays = async () => {
     found[mode] = rows;
   }
   return (found);
+};
+
+// What a program sets on the object lasts, whatever arrives behind it, and clones are whole.
+cases.object = async () => {
+  const early = Number(words[0]), { line, ath, motion } = await load(early), { Box3, Vector3 } = three, { object } = ath, [first] = object.children;
+  const size = new Box3().setFromObject(object).getSize(new Vector3()), found = { default: [first.castShadow, first.receiveShadow], size: size.toArray() };
+  object.traverse((each) => Object.assign(each, { castShadow: false, renderOrder: 7, name: "mine" }));
+  line.allow(Infinity);
+  await ath.arrays;
+  const [drawn] = object.children, twin = object.clone().clone().children[0], { customDepthMaterial, customDistanceMaterial } = drawn;
+  found.kept = [object.children.length, drawn.castShadow, drawn.receiveShadow, drawn.renderOrder, drawn.name];
+  found.same = drawn === first;
+  found.look = [drawn.isMesh === true, drawn.material.vertexColors, drawn.geometry.hasAttribute("color")];
+  found.twin = customDepthMaterial !== undefined && twin !== drawn && twin.customDepthMaterial === customDepthMaterial
+    && twin.customDistanceMaterial === customDistanceMaterial && twin.onBeforeRender === drawn.onBeforeRender && twin.geometry === drawn.geometry;
+  const normals = ath.geometry.getAttribute("normal").array;
+  found.flat = normals.filter((_, i) => i % 3 === 0 && !(Math.hypot(...normals.subarray(i, i + 3)) > 0.999)).length;
+  return found;
 };
 
 // Fifty loads: how many instances of the decoder are left after every ten.

@@ -5,8 +5,7 @@ import { readFileSync } from "node:fs";
 import { register } from "node:module";
 
 const WEB = new URL("../../athcodec/viewer/web/", import.meta.url), HASTE = 20;
-const resolve = `export const resolve = (name, context, next) => next(name === "three" ? ${JSON.stringify(new URL("three.js", WEB).href)} : name, context);`;
-register(`data:text/javascript,${encodeURIComponent(resolve)}`);
+register(new URL("page_modules.mjs", import.meta.url));
 
 const clock = performance.now.bind(performance), later = globalThis.setTimeout;
 performance.now = () => HASTE * clock();

@@ -1,10 +1,10 @@
-// State that the parts of the page share: what is open, what is on the stage, and how it plays.
+// The page's controller, and the state that its views share: what is open, what is on the stage, and how it plays.
 
 import { ATHLoader } from "athcodec-three";
 
 export const loader = new ATHLoader();
 
-/** `coming`: settles once the first file can be shown, `staged` once there is a stage; `plants`: on it, the one that is asked about
+/** The controller: each view adds its commands to it, and calls those of others by it. `coming`: settles once the first file can be shown, `staged` once there is a stage; `plants`: on it, the one that is asked about
  * last; `opened`: the files, each with its `fileName` and `source`; `floor`: what grows on a forest's floor, {source, each}: a URL
  * or bytes, and how many to a tree. */
 export const app = { stage: null, staged: null, coming: null, plants: [], opened: [], floor: [] };

@@ -3,48 +3,43 @@
 import { Box3, Vector3 } from "three";
 
 import { app, counters, main, state } from "./app.js";
-import { clipControls } from "./clips.js";
-import { forestOff, forestOn, forestRadius, forestSwitch } from "./forests.js";
-import { colour, compare, level, levelControls, setLevel, show, splitLabels } from "./look.js";
 import { Plant } from "./plant.js";
-import { applyWind, windControl } from "./wind.js";
-import { describe } from "./story.js";
-import { fromTheStart, setLoop } from "./time.js";
 
 /** Plants and panes; under the split the right one is asked about. `first`: that of the first file, if there is one. */
-export function arrange(first = null) {
+function arrange(first = null) {
   const { stage, opened, plants: before } = app;
   for (const plant of before) {
     plant.dispose();
     if (plant.motion !== plant.ath.motion) plant.motion.dispose();
   }
   const [ath] = opened, plants = [first ?? new Plant(ath)];
-  if (compare.value === "levels") plants.unshift(new Plant(ath, ath.motion.clone()));
-  if (compare.value === "file" && opened[1]) plants.push(new Plant(opened[1]));
+  if (app.compare.value === "levels") plants.unshift(new Plant(ath, ath.motion.clone()));
+  if (app.compare.value === "file" && opened[1]) plants.push(new Plant(opened[1]));
   app.plants = plants;
   for (const plant of plants) {
-    if (plant.show !== show.value) plant.setShow(show.value);
-    if (plant.colour !== colour.value) plant.setColour(colour.value);
+    if (plant.show !== app.show.value) plant.setShow(app.show.value);
+    if (plant.colour !== app.colour.value) plant.setColour(app.colour.value);
     plant.beside = plants;
     plant.onPaint = () => { state.dirty = true; };
     plant.motion.addEventListener("frame", () => pictured(plant));
-    plant.motion.addEventListener("clip", fromTheStart);
+    plant.motion.addEventListener("clip", app.fromTheStart);
     plant.motion.addEventListener("ready", () => { state.dirty = true; });
   }
-  if (plants.length > 1) forestSwitch(false);
+  if (plants.length > 1) app.forestSwitch(false);
   stage.setPanes(plants.map((plant) => ({
     scene: stage.scene([plant.root]), before: (width, height) => plant.prepare(width, height),
   })));
   place();
-  levelControls();
-  setLevel(level.value ?? "auto");
-  clipControls();
-  windControl();
-  applyWind();
-  setLoop(state.loop);
-  describe();
-  splitLabels();
-  if (state.forest) forestOn();
+  app.levelControls();
+  app.setLevel(app.level.value ?? "auto");
+  app.clipControls();
+  app.windControl();
+  app.applyWind();
+  app.setLoop(state.loop);
+  app.describe();
+  app.enableControls(true);
+  app.splitLabels();
+  if (state.forest) app.forestOn();
 }
 
 function pictured(plant) {
@@ -53,15 +48,16 @@ function pictured(plant) {
 }
 
 /** Takes what is on the stage away, before a file is loaded anew. */
-export function clear() {
-  if (state.forest) forestOff();
+function clear() {
+  if (state.forest) app.forestOff();
   for (const plant of app.plants.splice(0)) plant.dispose();
+  app.enableControls(false);
   app.stage.setPanes([{ scene: app.stage.scene([]) }]);
   app.stage.render();
 }
 
 /** The meadow alone, where no file is open. */
-export function bare() {
+function bare() {
   const { stage } = app;
   if (!stage || app.plants.length > 0) return;
   stage.setPanes([{ scene: stage.scene([]) }]);
@@ -71,36 +67,37 @@ export function bare() {
 // The world's box of all rest poses.
 function box() {
   const all = new Box3();
-  for (const { ath, root } of app.plants) {
-    root.updateMatrixWorld(true);
-    all.union(ath.box.clone().applyMatrix4(root.matrixWorld));
-  }
+  for (const { box } of app.plants) all.union(box);
   return all;
 }
 
-export function place() {
+function place() {
   const all = box(), size = all.getSize(new Vector3());
   const plant = 1.9 * Math.max(size.x, size.y, size.z);
-  app.stage.placeGround(all.min.y, state.forest ? Math.max(plant, 2.6 * forestRadius()) : plant, plant);
+  app.stage.placeGround(all.min.y, state.forest ? Math.max(plant, 2.6 * app.forestRadius()) : plant, plant);
 }
 
 /** The whole plant, or of a forest what is near, in view. */
-export function frameView() {
+function frameView() {
   const { stage } = app, all = box(), size = all.getSize(new Vector3()), most = Math.max(size.x, size.y, size.z);
   if (!state.forest) {
     stage.fog(0, 0);
     stage.look(all, { height: all.min.y, size: 1.9 * most });
     return;
   }
-  stage.lookOver(all, forestRadius());
+  stage.lookOver(all, app.forestRadius());
 }
 
 /** Frames the view anew, as long as nobody moved it by hand. */
-export function reframe() {
+function reframe() {
   if (app.plants.length > 0 && !app.stage.moved) frameView();
 }
 
-export function resetView() {
+function resetView() {
   app.stage.moved = false;
   frameView();
+}
+
+export default function begin() {
+  Object.assign(app, { arrange, clear, bare, place, frameView, reframe, resetView });
 }

@@ -1,14 +1,11 @@
 // The clips of a file.
 
 import { app, state } from "./app.js";
-import { plantForest } from "./forests.js";
-import { fromTheStart, limit, setLoop, setPlaying } from "./time.js";
 import { $ } from "./ui.js";
-import { windControl } from "./wind.js";
 
 const FADE = 0.4; // seconds, from one clip to the next
 
-export function clipControls() {
+function clipControls() {
   const { clips, clip } = app.opened[0].motion, select = $("clip");
   select.replaceChildren(...clips.map(({ index, name, loop }) => new Option(loop ? `${name} ↻` : name, index)));
   select.value = clip.index;
@@ -16,27 +13,30 @@ export function clipControls() {
 }
 
 /** A second file may have no clip of that name. */
-export function playIn(motion, name) {
+function playIn(motion, name) {
   if (motion.clips.some((clip) => clip.name === name)) motion.play(name, { fade: state.playing && !state.forest ? FADE : 0 });
 }
 
-export function playClip(index) {
-  const ended = state.time >= limit(), [{ motion }] = app.plants;
+function playClip(index) {
+  const ended = state.time >= app.limit(), [{ motion }] = app.plants;
   state.wind = null;
   for (const plant of app.plants) playIn(plant.motion, motion.clips[index].name);
   clipControls();
   $("clip").value = index;
-  fromTheStart();
-  setLoop(null);
-  windControl();
-  if (ended) setPlaying(true);
-  if (state.forest) plantForest();
+  app.fromTheStart();
+  app.setLoop(null);
+  app.windControl();
+  if (ended) app.setPlaying(true);
+  if (state.forest) app.plantForest();
   state.dirty = true;
 }
 
-export function nextClip(by) {
+function nextClip(by) {
   const { clips, clip } = app.plants[0].motion;
   playClip((clip.index + by + clips.length) % clips.length);
 }
 
-$("clip").addEventListener("change", () => playClip(Number($("clip").value)));
+export default function begin() {
+  Object.assign(app, { clipControls, playIn, playClip, nextClip });
+  $("clip").addEventListener("change", () => playClip(Number($("clip").value)));
+}

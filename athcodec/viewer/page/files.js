@@ -1,17 +1,12 @@
 // Files: where they come from, how they are opened, and what is said where they cannot be.
 
 import { app, counters, loader, state } from "./app.js";
-import { arrange, bare, clear, frameView } from "./arrange.js";
-import { playIn } from "./clips.js";
-import { compare } from "./look.js";
 import { Plant } from "./plant.js";
-import { restore } from "./address.js";
 import { floorOf } from "./places.js";
-import { loadingStory, replayed, tellSizes, watchArrival } from "./story.js";
+import { discard } from "./sky.js";
 import { shownWithout, wordsOf } from "./trouble.js";
 import { $ } from "./ui.js";
 
-const message = $("message");
 let first = true, asked = 0; // whether nothing has been open yet; the newest wish to open a file
 
 // A page that carries its file and its worker: see serve.py.
@@ -30,12 +25,14 @@ function bytesOf(element) {
   return Uint8Array.from(atob(element.textContent.trim()), (character) => character.charCodeAt(0)).buffer;
 }
 
-// The mesh of a file that does not hold its rest pose: binary32, as it was in the file's source.
-async function fetchMesh(url) {
+async function fetched(url) {
   const answer = await fetch(url).catch(({ message: status }) => ({ ok: false, status }));
   if (!answer.ok) throw Object.assign(new Error(`${url}: got status ${answer.status}`), { codeName: "HTTP" });
-  loader.setHostMesh(new Float32Array(await answer.arrayBuffer()));
+  return answer.arrayBuffer();
 }
+
+// The mesh of a file that does not hold its rest pose: binary32, as it was in the file's source.
+const fetchMesh = async (url) => loader.setHostMesh(new Float32Array(await fetched(url)));
 
 // With one of its clips.
 function openFirst(source, name, clip = null) {
@@ -48,7 +45,7 @@ function openFirst(source, name, clip = null) {
 const nameOf = (path) => decodeURIComponent(path.split("/").pop().split("?")[0]);
 
 /** Opens what the page carries or its address names. */
-export function begin() {
+function openAddress() {
   if (embedded()) return;
   const wanted = new URLSearchParams(location.search), url = wanted.get("file"), second = wanted.get("compare");
   app.floor = floorOf(wanted);
@@ -59,25 +56,26 @@ export function begin() {
 }
 
 function ask() {
-  say("No file yet", "Drop an .ath file here, or open one. It stays on this computer.");
-  loadingStory(null);
+  say("No file yet", "Drop an .ath file or a GLB that holds one here, or open it. It stays on this computer.");
+  app.loadingStory(null);
 }
 
 function say(title, text, technical = "", again = null) {
+  const message = $("message");
   message.querySelector("h2").textContent = title;
   message.querySelector("p").textContent = text;
   message.querySelector("small").textContent = technical;
   $("again").hidden = !again;
   $("again").onclick = again;
   message.hidden = false;
-  breath().then(() => app.staged).then(bare);
+  breath().then(() => app.staged).then(app.bare);
 }
 
 /** Says that nothing can be shown. */
-export function refuse(error, again = null) {
+function refuse(error, again = null) {
   const { title, advice, passing } = wordsOf(error.codeName);
   say(title, advice, error.message, passing ? again : null);
-  loadingStory(null);
+  app.loadingStory(null);
 }
 
 // A fault of the file that is shown stays in view as long as the file does.
@@ -90,23 +88,30 @@ function complain(failure, motion, again) {
   box.hidden = false;
 }
 
-// A URL, or {bytes}.
-function load(source) {
-  return typeof source === "string" ? loader.loadAsync(source) : loader.parseAsync(source.bytes);
+// A URL, or {bytes}; a GLB comes whole.
+async function load(source) {
+  const byName = typeof source === "string", isModel = byName ? /\.glb([?#]|$)/i.test(source) : new TextDecoder().decode(source.bytes.slice(0, 4)) === "glTF";
+  if (!isModel) return byName ? loader.loadAsync(source) : loader.parseAsync(source.bytes);
+  const { bandwidth, clip } = loader, { openModel } = await import("athcodec-three/model"); // settings of this file
+  const bytes = byName ? await fetched(source) : source.bytes, opening = openModel(bytes, loader.setBandwidth(bandwidth).setClip(clip));
+  return opening.finally(() => loader.setBandwidth(null).setClip(null));
 }
 
 function close(files) {
-  for (const each of files) each.dispose();
+  for (const each of files) {
+    discard(each.model);
+    for (const ath of [each, ...each.others ?? []]) ath.dispose();
+  }
 }
 
 /** Opens a URL or {bytes}, in place of what is open or beside it. `again`: what is to stay as it is, of a file that is loaded anew. */
-export async function open(source, name, beside = false, again = null) {
+async function open(source, name, beside = false, again = null) {
   const wish = ++asked, retry = () => open(source, name, beside, again);
-  message.hidden = true;
+  $("message").hidden = true;
   if (!beside) {
     Object.assign(counters, { started: performance.now(), firstPicture: null, firstMotion: null, arrived: {}, pictures: 0 });
     $("trouble").hidden = true;
-    loadingStory(name);
+    app.loadingStory(name);
   }
   let ath;
   try {
@@ -122,10 +127,10 @@ export async function open(source, name, beside = false, again = null) {
     return;
   }
   Object.assign(ath, { fileName: name, source });
-  if (!beside) watchArrival(ath);
+  if (!beside) app.watchArrival(ath);
   if (beside) {
     close(app.opened.splice(1));
-    playIn(ath.motion, app.opened[0].motion.clip.name);
+    app.playIn(ath.motion, app.opened[0].motion.clip.name);
   } else {
     close(app.opened.splice(0));
     Object.assign(state, { time: 0, turns: 0, loop: null, wind: null }, again);
@@ -134,7 +139,7 @@ export async function open(source, name, beside = false, again = null) {
   const tell = (failure) => complain(failure, ath.motion, typeof source === "string" ? retry : null);
   for (const type of ["stopped", "damaged"]) ath.motion.addEventListener(type, tell);
   if (ath.motion.failure) tell(ath.motion.failure);
-  compare.set(beside ? "file" : "off");
+  app.compare.set(beside ? "file" : "off");
   await show(ath, beside, again, () => wish === asked);
 }
 
@@ -150,10 +155,10 @@ async function show(ath, beside, again, isWanted) {
     plant?.dispose();
     return;
   }
-  arrange(plant);
-  if (!app.stage.moved) frameView();
-  tellSizes();
-  if (first) restore();
+  app.arrange(plant);
+  if (!app.stage.moved) app.frameView();
+  app.tellSizes();
+  if (first) app.restore();
   first = false;
 }
 
@@ -161,11 +166,11 @@ async function show(ath, beside, again, isWanted) {
 const breath = () => new Promise((done) => { setTimeout(done); });
 
 /** Plays the loading of the first file again, at so many bits a second. */
-export async function loadAgain(bandwidth) {
+async function loadAgain(bandwidth) {
   const [{ source, fileName, motion: { clip } }] = app.opened;
-  clear();
+  app.clear();
   close(app.opened.splice(0));
-  replayed(bandwidth);
+  app.replayed(bandwidth);
   loader.setBandwidth(bandwidth).setClip(clip.name || null);
   const done = open(source, fileName, false, { loop: state.loop });
   loader.setBandwidth(null).setClip(null);
@@ -174,32 +179,34 @@ export async function loadAgain(bandwidth) {
 
 async function openFile(file, beside) {
   if (!file) return;
-  replayed(null);
+  app.replayed(null);
   await open({ bytes: await file.arrayBuffer() }, file.name, beside && app.opened.length > 0);
 }
 
 /** Asks for a file. */
-export function choose(beside = "") {
+function choose(beside = "") {
   $("file").dataset.beside = beside;
   $("file").click();
 }
 
-$("open").addEventListener("click", () => choose());
-$("message-open").addEventListener("click", () => choose());
-$("file").addEventListener("change", async () => {
-  await openFile($("file").files[0], $("file").dataset.beside === "yes");
-  $("file").value = "";
-});
-
-let dragging = 0;
-addEventListener("dragenter", (event) => { event.preventDefault(); dragging++; $("drop").hidden = false; });
-addEventListener("dragleave", () => { if (--dragging <= 0) $("drop").hidden = true; });
-addEventListener("dragover", (event) => event.preventDefault());
-addEventListener("drop", async (event) => {
-  event.preventDefault();
-  dragging = 0;
-  $("drop").hidden = true;
-  const files = [...event.dataTransfer.files];
-  await openFile(files[0], event.shiftKey);
-  if (files[1]) await openFile(files[1], true);
-});
+export default function begin() {
+  Object.assign(app, { openAddress, refuse, open, loadAgain, choose });
+  $("open").addEventListener("click", () => choose());
+  $("message-open").addEventListener("click", () => choose());
+  $("file").addEventListener("change", async () => {
+    await openFile($("file").files[0], $("file").dataset.beside === "yes");
+    $("file").value = "";
+  });
+  let dragging = 0;
+  addEventListener("dragenter", (event) => { event.preventDefault(); dragging++; $("drop").hidden = false; });
+  addEventListener("dragleave", () => { if (--dragging <= 0) $("drop").hidden = true; });
+  addEventListener("dragover", (event) => event.preventDefault());
+  addEventListener("drop", async (event) => {
+    event.preventDefault();
+    dragging = 0;
+    $("drop").hidden = true;
+    const files = [...event.dataTransfer.files];
+    await openFile(files[0], event.shiftKey);
+    if (files[1]) await openFile(files[1], true);
+  });
+}

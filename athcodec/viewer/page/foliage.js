@@ -2,14 +2,10 @@
 
 import { BufferAttribute, BufferGeometry, Color, Vector3 } from "three";
 
+import { chance } from "./chance.js";
+
 const BARK = new Color(0x6a543c), LEAVES = [0x4f7a34, 0x6b9440, 0x86a94a].map((hex) => new Color(hex));
 const MOST_LEAVES = 2600;
-
-// Random numbers from 0 to 1, equal in every run.
-const chance = (i, salt) => {
-  const x = Math.sin(12.9898 * i + 78.233 * salt) * 43758.5453;
-  return x - Math.floor(x);
-};
 
 /** A function that makes leafed geometry of lines. Fewer lines carry fewer, larger leaves, that together cover as much. */
 export function foliage(ath, radius) {

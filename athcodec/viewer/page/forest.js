@@ -1,39 +1,28 @@
 // A forest of one plant in the wind, on WebGPU. The address says what is shown: ?file=URL&count=10000, and on its floor
 // &floor=URL&each=4; with &drawn=0 it is only computed, for measurements
 
-import { ATHLoader } from "athcodec-three";
+import { ATHLoader, radii } from "athcodec-three";
 import { ATHForest } from "athcodec-three/webgpu";
 import { ACESFilmicToneMapping, DoubleSide, MeshStandardNodeMaterial, PerspectiveCamera, Scene, Vector3, WebGPURenderer } from "three/webgpu";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 
+import { chance } from "./chance.js";
 import { foliage } from "./foliage.js";
 import { Stage, SUN } from "./forest_stage.js";
 import { forestMaterial } from "./forest_surfaces.js";
-import { floorOf, floorPlaces, rooted } from "./places.js";
+import { feet, floorOf, floorPlaces, forestReach, rooted, treePlaces } from "./places.js";
+import { wordsOf } from "./trouble.js";
 import { Walk } from "./walk.js";
-import { radii } from "../src/radii.js";
 
 const $ = (id) => document.getElementById(id), asked = new URLSearchParams(location.search);
-const SPACING = 1.5; // Distance between plants, in radii of one.
+const COUNT = Number(asked.get("count") ?? 10000);
+const SPREAD = 0.85; // How far plants are apart: see forestReach.
 const EYES = 0.28, PACE = 0.7; // Height of a walker's eyes, and way per second, in radii.
 const SLOW_MS = 40, SLOW_FRAMES = 12; // After so many pictures as slow as this, less is drawn.
 const state = { frames: 0, milliseconds: 0, forest: null, ath: null, error: null };
 window.athcodecForest = state;
 
-const chance = (i, salt) => {
-  const x = Math.sin(12.9898 * (i + 1) + 78.233 * salt) * 43758.5453;
-  return x - Math.floor(x);
-};
-
-// Plants on a spiral, so that any number of them is round and even, a little off their places.
-function planted(count, spacing, clips, flat) {
-  return Array.from({ length: count }, (_, i) => {
-    const away = spacing * 0.62 * Math.sqrt(i + 0.5), turn = 2.399963 * i + 0.25 * chance(i, 1), size = 0.7 + 0.6 * chance(i, 2);
-    const x = away * Math.cos(turn), z = away * Math.sin(turn), tint = Math.floor(200 + 55 * chance(i, 3));
-    return { ...flat(x, z), size, angle: 2 * Math.PI * chance(i, 4), seconds: 100 * chance(i, 5), clip: clips[i % clips.length].name,
-      tint: (tint << 16) | (Math.floor(215 + 40 * chance(i, 6)) << 8) | 205 };
-  });
-}
+const tintOf = (i) => (Math.floor(200 + 55 * chance(i, 3)) << 16) | (Math.floor(215 + 40 * chance(i, 6)) << 8) | 205;
 
 // How strong the clips' own winds are; null: they are not told apart.
 function windsOf({ motion: { clips }, metadata }) {
@@ -49,41 +38,54 @@ function floors(renderer, trees, reach) {
     const material = () => forestMaterial(ath.metadata, SUN);
     const forest = new ATHForest(renderer, ath, { material }), clipOf = (i) => clips[winds ? 0 : i % clips.length].name;
     forest.setInstances(rooted(floorPlaces(trees, each, reach, kind), ath).map((place, i) => ({ ...place, clip: clipOf(i) })));
-    if (ath.metadata.up_axis === "z") forest.rotation.x = -Math.PI / 2;
     return { forest, winds };
   }));
 }
 
-async function start() {
-  if (!navigator.gpu) throw new Error("This browser has no WebGPU");
+// The renderer, where the browser has WebGPU.
+async function makeRenderer() {
+  if (!await navigator.gpu?.requestAdapter()) return null;
   const renderer = new WebGPURenderer({ canvas: $("canvas"), antialias: true });
-  await renderer.init();
-  if (!renderer.backend.isWebGPUBackend) throw new Error("This browser gives no WebGPU device");
+  return renderer.init().then(() => (renderer.backend.isWebGPUBackend ? renderer : null), () => null);
+}
+
+async function start() {
+  const renderer = await makeRenderer();
+  if (!renderer) {
+    location.replace(`index.html${location.search}#forest=${COUNT}`); // the viewer, which draws forests on WebGL
+    return;
+  }
   const ath = await new ATHLoader().loadAsync(asked.get("file"));
-  const isMesh = ath.hasFaces, upright = ath.metadata.up_axis === "z", { radius } = ath.sphere, spacing = SPACING * radius;
-  const count = Number(asked.get("count") ?? 10000), isDrawn = asked.get("drawn") !== "0";
+  const isMesh = ath.hasFaces, { radius } = ath.sphere;
+  const isDrawn = asked.get("drawn") !== "0";
   const forest = new ATHForest(renderer, ath, {
     shape: isMesh ? undefined : foliage(ath, radii(ath)),
     material: () => (isMesh ? forestMaterial(ath.metadata, SUN) : new MeshStandardNodeMaterial({ roughness: 0.85, side: DoubleSide })),
   });
   const winds = windsOf(ath), { clips } = ath.motion;
-  const trees = planted(count, spacing, winds ? clips.slice(0, 1) : clips, upright ? (x, z) => ({ x, y: -z, z: 0 }) : (x, z) => ({ x, y: 0, z }));
+  const kinds = winds ? 1 : clips.length, trees = treePlaces(ath, COUNT, forestReach(ath, COUNT, SPREAD))
+    .map((place, i) => ({ ...place, clip: clips[i % kinds].name, tint: tintOf(i) }));
   forest.setInstances(trees);
-  const floor = await floors(renderer, trees.map(({ x, y, z }) => (upright ? [x, -y] : [x, z])), 0.6 * spacing);
+  const floor = await floors(renderer, feet(trees, ath), 0.9 * radius);
   const scene = new Scene(), camera = new PerspectiveCamera(40, 1, 0.02 * radius, 400 * radius), controls = new OrbitControls(camera, $("canvas"));
   const stage = new Stage(scene, radius), isSoftware = /swiftshader|llvmpipe/i.test(renderer.backend.device.adapterInfo?.architecture ?? "");
   const walk = new Walk(camera, $("canvas"), $("stick"), { height: EYES * radius, speed: PACE * radius, changed: (on) => walks(on) });
   renderer.toneMapping = ACESFilmicToneMapping;
   renderer.shadowMap.enabled = true;
   stage.shadows = asked.get("quality") === "full" || !isSoftware;
-  if (upright) forest.rotation.x = -Math.PI / 2;
   scene.add(forest, ...floor.map((each) => each.forest));
   camera.position.set(3 * radius, 2.4 * radius, 8 * radius);
   controls.target.set(0, 0.9 * radius, 0);
   controls.maxPolarAngle = 0.49 * Math.PI;
   controls.maxDistance = 150 * radius;
   controls.enableDamping = true;
-  Object.assign(state, { ath, forest, floor: floor.map((each) => each.forest), renderer, camera, controls, scene, walk, time: null, playing: true });
+  Object.assign(state, { ath, forest, floor: floor.map((each) => each.forest), renderer, camera, controls, scene, walk, time: null, seconds: 0, playing: true });
+  const moves = (on) => {
+    state.moves = on;
+    $("play").textContent = on ? "Pause" : "Play";
+  };
+  moves(!matchMedia("(prefers-reduced-motion: reduce)").matches);
+  $("play").addEventListener("click", () => moves(!state.moves));
   const walks = (on) => {
     $("walk").setAttribute("aria-pressed", on);
     controls.enabled = !on;
@@ -127,14 +129,15 @@ async function start() {
     }
     if (!walk.on) controls.update();
     const begun = performance.now();
-    for (const each of [forest, ...state.floor]) each.update(camera, height, state.time ?? ms / 1000);
+    if (state.moves) state.seconds += passed / 1000;
+    for (const each of [forest, ...state.floor]) each.update(camera, height, state.time ?? state.seconds);
     state.milliseconds = performance.now() - begun;
     if (isDrawn) renderer.render(scene, camera);
     state.frames++;
   };
   const tell = () => {
     const kilobytes = [forest, ...state.floor].reduce((sum, { bytesOfMotion }) => sum + bytesOfMotion, 0) / 1000;
-    $("status").textContent = `${count.toLocaleString("en")} plants, ${Math.round(kilobytes).toLocaleString("en")} kB of motion on the graphics card`;
+    $("status").textContent = `${COUNT.toLocaleString("en")} plants, ${Math.round(kilobytes).toLocaleString("en")} kB of motion on the graphics card`;
   };
   for (const each of [forest, ...state.floor]) each.addEventListener("level", tell);
   renderer.setAnimationLoop((ms) => { if (state.playing) draw(ms); });
@@ -142,7 +145,8 @@ async function start() {
 }
 
 start().catch((error) => {
+  const { title, advice } = wordsOf(error.codeName);
   state.error = error.message;
-  $("status").textContent = error.message;
-  $("status").className = "wrong";
+  Object.assign($("status"), { textContent: error.codeName ? `${title}. ${advice}` : error.message, title: error.message, className: "wrong" });
+  $("controls").hidden = true; // which would move nothing
 });

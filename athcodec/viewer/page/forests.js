@@ -3,28 +3,25 @@
 import { Color, DoubleSide, LineBasicMaterial, MeshLambertMaterial } from "three";
 import { ATHForest } from "athcodec-three";
 
-import { app, main, state } from "./app.js";
-import { arrange, frameView, place } from "./arrange.js";
+import { app, loader, main, state } from "./app.js";
 import { nodeColour } from "./colours.js";
-import { clearFloor, forests, growFloor } from "./floor.js";
-import { colour, compare, level, setLevel, show } from "./look.js";
 import { feet, forestReach, treePlaces } from "./places.js";
-import { shadowed } from "./grove.js";
+import { Floor, ground, shadowed } from "./grove.js";
 import { outlined, surfaceMaterial } from "./surfaces.js";
-import { setLoop } from "./time.js";
-import { $, countText } from "./ui.js";
-import { windControl } from "./wind.js";
+import { $, countText, note } from "./ui.js";
+
+let floor = null;
 
 const chosenCount = () => state.forestCount ?? Math.round(10 ** ($("forest-count").value / 25));
 
-export const forestRadius = () => forestReach(app.plants[0].ath, chosenCount(), Number($("forest-spread").value));
+const forestRadius = () => forestReach(app.plants[0].ath, chosenCount(), Number($("forest-spread").value));
 
 function instances(count) {
   const { ath } = app.plants[0], { clips } = ath.motion, clipOf = (i) => ($("forest-mix").checked ? i % clips.length : undefined);
   return treePlaces(ath, count, forestRadius()).map((place, i) => ({ ...place, clip: clipOf(i) }));
 }
 
-const surfaces = () => (colour.value === "plain" ? app.plants[0].surfaces : null);
+const surfaces = () => (app.colour.value === "plain" ? app.plants[0].surfaces : null);
 
 function forestMaterial(lines, of) {
   if (surfaces() && !lines) return surfaceMaterial(surfaces());
@@ -35,18 +32,18 @@ function forestMaterial(lines, of) {
 
 // Bark, leaves or the file's own colours; by level where nodes are told apart.
 function tintForest(material, lines, of) {
-  const plain = colour.value === "plain", stored = lines || app.plants[0].ath.geometry.hasAttribute("color");
+  const plain = app.colour.value === "plain", stored = lines || app.plants[0].ath.geometry.hasAttribute("color");
   if (material.vertexColors !== (plain && stored)) material.needsUpdate = true;
   material.vertexColors = plain && stored;
   material.color = plain ? new Color(stored ? 0xffffff : 0x6f8f4a) : new Color().setRGB(...nodeColour(of + 1));
 }
 
-export function colourForest() {
+function colourForest() {
   if (state.forest && app.plants[0].surfaces) forestOn(); // in other materials
   else state.forest?.children.forEach((drawn) => tintForest(drawn.material, drawn.isLineSegments, drawn.userData.level));
 }
 
-export function forestOn() {
+function forestOn() {
   const [plant] = app.plants;
   state.forest?.removeFromParent();
   state.forest?.dispose();
@@ -55,56 +52,62 @@ export function forestOn() {
   forest.levelOfDetail = $("forest-lod").checked;
   forest.addEventListener("level", () => { state.dirty = true; });
   plant.root.add(forest);
-  setLoop(state.loop);
+  app.setLoop(state.loop);
   plantForest();
   for (const child of plant.root.children) if (child !== forest) child.visible = false;
   plant.motion.setLevel(plant.motion.levelCount - 1); // near instances show all of it
 }
 
-export function plantForest() {
+function plantForest() {
   const trees = instances(chosenCount()), { ath } = app.plants[0], mixed = $("forest-mix").checked;
   state.forest.setInstances(trees);
-  place();
+  app.place();
   growFloor(feet(trees, ath), forestRadius() / Math.sqrt(chosenCount()), ath.motion.clip.name, mixed);
   state.dirty = true;
 }
 
-export function forestOff() {
+function forestOff() {
   state.forest.removeFromParent();
   state.forest.dispose();
   state.forest = null;
-  clearFloor();
+  floor?.clear();
   $("forest").checked = false;
   $("forest-rows").hidden = true;
-  app.plants[0].setShow(show.value);
-  setLevel(level.value);
-  setLoop(state.loop);
-  place();
+  app.plants[0].setShow(app.show.value);
+  app.setLevel(app.level.value);
+  app.setLoop(state.loop);
+  app.place();
 }
 
-export function forestSwitch(on) {
+function forestSwitch(on) {
   if (on === Boolean(state.forest)) return;
+  if (on && app.opened[0]?.model) {
+    $("forest").checked = false;
+    note("A forest takes an .ath file");
+    return;
+  }
   $("forest").checked = on;
   $("forest-rows").hidden = !on;
   if (on && app.plants.length > 1) {
-    compare.set("off");
+    app.compare.set("off");
     for (const each of app.opened.splice(1)) each.dispose();
-    arrange();
+    app.arrange();
   }
   if (on) forestOn();
   else forestOff();
-  windControl();
-  frameView();
+  app.windControl();
+  app.frameView();
 }
 
 /** So many instances, whatever the slider allows. */
-export function forestOf(count, levelOfDetail = true) {
+function forestOf(count, levelOfDetail = true) {
   state.forestCount = count;
   $("forest-lod").checked = levelOfDetail;
   if (!state.forest) forestSwitch(true);
+  if (!state.forest) return; // a GLB
   state.forest.levelOfDetail = levelOfDetail;
   plantForest();
-  frameView();
+  app.frameView();
   forestNumbers();
 }
 
@@ -116,7 +119,7 @@ function forestNumbers() {
   $("forest-spread").setAttribute("aria-valuetext", `${spread} times as far apart`);
 }
 
-export function forestBars() {
+function forestBars() {
   const { counts, culled } = state.forest, most = Math.max(1, ...counts, culled);
   const { motion } = main(), all = [...counts.map((count, of) => [of < motion.levelCount - 1 ? `Detail ${of}` : "Full", count]), ["Unseen", culled]];
   if ($("forest-bars").children.length !== all.length)
@@ -133,9 +136,39 @@ export function forestBars() {
   });
 }
 
-$("forest").addEventListener("change", () => forestSwitch($("forest").checked));
-for (const id of ["forest-count", "forest-spread"]) $(id).addEventListener("input", () => { delete state.forestCount; forestNumbers(); plantForest(); });
-$("forest-count").addEventListener("change", frameView);
-$("forest-mix").addEventListener("change", plantForest);
-$("forest-lod").addEventListener("change", () => { for (const forest of forests()) forest.levelOfDetail = $("forest-lod").checked; state.dirty = true; });
-forestNumbers();
+/** Plants the floor between trees at [x, z]. */
+function growFloor(trees, reach, clip, mixed) {
+  if (app.floor.length === 0) return;
+  floor ??= new Floor(app.floor, loader, () => { state.dirty = true; });
+  floor.grow(trees, reach, clip, mixed, (plant, forest) => {
+    if (!state.forest) return;
+    const { scene } = app.stage.panes[0];
+    forest.levelOfDetail = state.forest.levelOfDetail;
+    ground(plant, scene.getObjectByName("ground").position.y);
+    scene.add(plant.root);
+  });
+}
+
+/** All forests that are shown, that of the trees first. */
+const forests = () => (state.forest ? [state.forest, ...floor?.forests ?? []] : []);
+
+/** Gets what has come of them ready to be drawn: once per frame. */
+function bakeForests() {
+  state.forest.bakeReady();
+  floor?.bakeReady();
+}
+
+/** Before each picture. */
+function updateForests(seconds) {
+  for (const forest of forests()) forest.update(app.stage.camera, app.stage.pixels, seconds);
+}
+
+export default function begin() {
+  Object.assign(app, { forests, bakeForests, updateForests, forestRadius, colourForest, forestOn, plantForest, forestOff, forestSwitch, forestOf, forestBars });
+  $("forest").addEventListener("change", () => forestSwitch($("forest").checked));
+  for (const id of ["forest-count", "forest-spread"]) $(id).addEventListener("input", () => { delete state.forestCount; forestNumbers(); plantForest(); });
+  $("forest-count").addEventListener("change", app.frameView);
+  $("forest-mix").addEventListener("change", plantForest);
+  $("forest-lod").addEventListener("change", () => { for (const forest of forests()) forest.levelOfDetail = $("forest-lod").checked; state.dirty = true; });
+  forestNumbers();
+}

@@ -2,14 +2,11 @@
 
 import { BufferAttribute, BufferGeometry, CircleGeometry, Color, Group, InstancedMesh, Matrix4, Mesh, MeshLambertMaterial, Object3D, Vector3 } from "three";
 
+import { chance } from "./chance.js";
+
 const REACH = 60; // Radius of the disc, over the radius of the meadow.
 const BLADES = 26000, TALL = 0.015, WIDE = 0.0015; // Number of blades; height and width over the meadow's radius.
 const COLOURS = { day: [0x687d45, 0x90a060], dusk: [0x4a5a38, 0x66744a] };
-
-const chance = (i, salt) => {
-  const x = Math.sin(12.9898 * i + 78.233 * salt) * 43758.5453;
-  return x - Math.floor(x);
-};
 
 const NOISE = /* glsl */`
 varying vec2 athMeadow;

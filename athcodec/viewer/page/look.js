@@ -1,59 +1,31 @@
 // How the plant is looked at: its detail, its colours, what of it is shown, and two of it under one split.
 
 import { app, main, state } from "./app.js";
-import { arrange } from "./arrange.js";
 import { heatGradient } from "./colours.js";
-import { choose } from "./files.js";
-import { colourForest } from "./forests.js";
 import { $, Choice, detailText, lengthText, rateText, upper } from "./ui.js";
 
 const MOST_BUTTONS = 9;
 
-export const level = new Choice($("level-choice"), (value) => setLevel(value));
-export const colour = new Choice($("colour"), (value) => {
-  for (const plant of app.plants) plant.setColour(value);
-  $("scale").hidden = value !== "distance";
-  colourForest();
-  state.dirty = true;
-});
-export const show = new Choice($("show"), (value) => {
-  for (const plant of app.plants) plant.setShow(value);
-  state.dirty = true;
-});
-export const compare = new Choice($("compare"), (value) => {
-  if (value === "file") {
-    choose("yes");
-    compare.set(app.plants.length > 1 && app.opened.length > 1 ? "file" : "off");
-    return;
-  }
-  for (const each of app.opened.splice(1)) each.dispose();
-  arrange();
-});
-colour.set("plain");
-show.set("mesh");
-compare.set("off");
-$("scale").querySelector("i").style.background = heatGradient;
-
 /** The error of a level in its clip, as text. */
-export const within = ({ ath, motion }, of) => lengthText(motion.error(of).max, ath.metadata.unit);
+const within = ({ ath, motion }, of) => lengthText(motion.error(of).max, ath.metadata.unit);
 
-export function levelControls() {
+function levelControls() {
   const most = Math.max(...app.plants.map(({ motion }) => motion.levelCount)) - 1;
   const values = ["auto", ...Array.from({ length: most + 1 }, (_, i) => String(i))];
   const deepest = app.plants.find(({ motion }) => motion.levelCount > most);
   const titles = values.slice(1).map((value) => `${upper(detailText(deepest.motion, Number(value)))}, error up to ${within(deepest, value)}`);
-  if (values.length <= MOST_BUTTONS) level.fill(values, ["Auto", ...values.slice(1)], ["As much detail as can be seen", ...titles]);
-  else level.fill(["auto"], ["Auto"], ["As much detail as can be seen"]);
+  if (values.length <= MOST_BUTTONS) app.level.fill(values, ["Auto", ...values.slice(1)], ["As much detail as can be seen", ...titles]);
+  else app.level.fill(["auto"], ["Auto"], ["As much detail as can be seen"]);
   for (const id of ["level", "compare-level"]) $(id).max = most;
   $("compare-level").value = Math.min(1, most);
   $("level").value = most;
 }
 
-export function setLevel(value) {
-  level.set(value);
+function setLevel(value) {
+  app.level.set(value);
   const right = main();
   for (const plant of app.plants) {
-    const left = plant !== right && compare.value === "levels";
+    const left = plant !== right && app.compare.value === "levels";
     plant.motion.setLevel(left ? Number($("compare-level").value) : value === "auto" ? "auto" : Number(value));
   }
   if (value !== "auto") $("level").value = value;
@@ -68,18 +40,18 @@ function readOut() {
     $(id).setAttribute("aria-valuetext", `${detailText(plant.motion, of)}, error up to ${within(plant, of)}`);
   }
   $("compare-level-value").value = $("compare-level").value;
-  $("compare-level-row").hidden = compare.value !== "levels";
+  $("compare-level-row").hidden = app.compare.value !== "levels";
 }
 
-export function changeLevel(by) {
-  const { motion } = main(), from = motion.automatic ? motion.target : Number(level.value);
+function changeLevel(by) {
+  const { motion } = main(), from = motion.automatic ? motion.target : Number(app.level.value);
   setLevel(String(Math.max(0, Math.min(motion.levelCount - 1, from + by))));
 }
 
 /** Says what the level that is shown means on the screen. */
-export function tellLevel() {
-  const { motion, root } = main(), shown = Math.max(motion.level, 0), error = `error up to ${within(main(), shown)}`;
-  const { camera, pixels } = app.stage, off = motion.pixelError(shown, camera, pixels, root.matrixWorld);
+function tellLevel() {
+  const { motion, space } = main(), shown = Math.max(motion.level, 0), error = `error up to ${within(main(), shown)}`;
+  const { camera, pixels } = app.stage, off = motion.pixelError(shown, camera, pixels, space.matrixWorld);
   const name = upper(detailText(motion, shown));
   $("level-hint").textContent = state.forest ? "Each plant as its distance asks for"
     : motion.level < motion.target && !motion.failure ? `${name} now, ${error}; ${detailText(motion, motion.target)} is on its way`
@@ -88,59 +60,84 @@ export function tellLevel() {
   readOut();
 }
 
-$("level").addEventListener("input", () => setLevel($("level").value));
-$("compare-level").addEventListener("input", () => setLevel(level.value));
-
 // ---- the split ----
 
-const split = $("split");
-
-export function setSplit(share) {
+function setSplit(share) {
   app.stage.split = Math.max(0.02, Math.min(share, 0.98));
   $("stage").style.setProperty("--split", app.stage.split);
-  split.setAttribute("aria-valuenow", Math.round(100 * app.stage.split));
-  split.setAttribute("aria-valuetext", `${Math.round(100 * app.stage.split)} % of the picture on the left`);
+  $("split").setAttribute("aria-valuenow", Math.round(100 * app.stage.split));
+  $("split").setAttribute("aria-valuetext", `${Math.round(100 * app.stage.split)} % of the picture on the left`);
   app.stage.changed();
 }
 
 /** Sets what is on either side. */
-export function splitLabels() {
+function splitLabels() {
   const two = app.plants.length > 1;
   $("split-view").hidden = !two;
   if (!two) return;
   app.plants.forEach(({ ath, motion }, i) => {
     const of = Math.max(motion.level, 0), name = upper(detailText(motion, of)), error = `error up to ${within(app.plants[i], of)}`;
-    const text = compare.value === "file" ? `${ath.fileName}: ${name}, ${error}` : `${name} · ${error} · ${rateText(motion.bitRate(of))}`;
+    const text = app.compare.value === "file" ? `${ath.fileName}: ${name}, ${error}` : `${name} · ${error} · ${rateText(motion.bitRate(of))}`;
     const tag = $(i === 0 ? "split-left" : "split-right");
     if (tag.textContent !== text) tag.textContent = text;
   });
 }
 
-split.addEventListener("pointerdown", (event) => {
-  split.setPointerCapture(event.pointerId);
-  event.preventDefault();
-  split.focus({ preventScroll: true });
-});
-split.addEventListener("pointermove", (event) => {
-  if (!split.hasPointerCapture(event.pointerId)) return;
-  const { left, width } = $("split-view").getBoundingClientRect();
-  setSplit((event.clientX - left) / width);
-});
-split.addEventListener("keydown", (event) => {
-  const by = { ArrowLeft: -0.02, ArrowRight: 0.02, PageDown: -0.1, PageUp: 0.1, Home: -1, End: 1 }[event.key];
-  if (!by) return;
-  event.preventDefault();
-  setSplit(app.stage.split + by);
-});
-
 // ---- the heat map's legend ----
 
-export function tellScale() {
-  if (colour.value !== "distance") return;
+function tellScale() {
+  if (app.colour.value !== "distance") return;
   const plant = main(), { unit } = plant.ath.metadata, { motion, heatMost } = plant, none = !(heatMost > 0) || motion.level >= motion.levelCount - 1;
   const text = (length) => lengthText(length, unit), onlyRight = none && app.plants.length < 2;
   $("scale-title").textContent = onlyRight ? "This is the full detail: choose less to see its error" : "Error against the full detail";
   $("scale-low").textContent = text(0);
   $("scale-middle").textContent = text(heatMost / 4);
   $("scale-high").textContent = text(heatMost);
+}
+
+export default function begin() {
+  Object.assign(app, { within, levelControls, setLevel, changeLevel, tellLevel, setSplit, splitLabels, tellScale });
+  app.level = new Choice($("level-choice"), (value) => setLevel(value));
+  app.colour = new Choice($("colour"), (value) => {
+    for (const plant of app.plants) plant.setColour(value);
+    $("scale").hidden = value !== "distance";
+    app.colourForest();
+    state.dirty = true;
+  });
+  app.show = new Choice($("show"), (value) => {
+    for (const plant of app.plants) plant.setShow(value);
+    state.dirty = true;
+  });
+  app.compare = new Choice($("compare"), (value) => {
+    if (value === "file") {
+      app.choose("yes");
+      app.compare.set(app.plants.length > 1 && app.opened.length > 1 ? "file" : "off");
+      return;
+    }
+    for (const each of app.opened.splice(1)) each.dispose();
+    app.arrange();
+  });
+  app.colour.set("plain");
+  app.show.set("mesh");
+  app.compare.set("off");
+  $("scale").querySelector("i").style.background = heatGradient;
+  $("level").addEventListener("input", () => setLevel($("level").value));
+  $("compare-level").addEventListener("input", () => setLevel(app.level.value));
+  const split = $("split");
+  split.addEventListener("pointerdown", (event) => {
+    split.setPointerCapture(event.pointerId);
+    event.preventDefault();
+    split.focus({ preventScroll: true });
+  });
+  split.addEventListener("pointermove", (event) => {
+    if (!split.hasPointerCapture(event.pointerId)) return;
+    const { left, width } = $("split-view").getBoundingClientRect();
+    setSplit((event.clientX - left) / width);
+  });
+  split.addEventListener("keydown", (event) => {
+    const by = { ArrowLeft: -0.02, ArrowRight: 0.02, PageDown: -0.1, PageUp: 0.1, Home: -1, End: 1 }[event.key];
+    if (!by) return;
+    event.preventDefault();
+    setSplit(app.stage.split + by);
+  });
 }

@@ -1,33 +1,34 @@
 // The viewer: opens a file by ?file=URL, by dropping it, or one that the page itself carries, and plays it.
 
 import { BufferGeometry, LineSegments, Mesh } from "three";
-import { dataTexture, injectMotion, motionUniforms } from "athcodec-three";
+import { dataTexture, injectMotion, limbMaterial, motionUniforms } from "athcodec-three";
 
-import { write } from "./address.js";
+import address from "./address.js";
 import { app, counters, loader, state } from "./app.js";
-import { reframe } from "./arrange.js";
-import { begin, refuse } from "./files.js";
-import { bakeForests, forests, updateForests } from "./floor.js";
-import { limbMaterial } from "../src/limbs.js";
-import { setSplit, splitLabels, tellLevel, tellScale } from "./look.js";
-import { togglePanel } from "./panel.js";
+import arrange from "./arrange.js";
+import camera from "./camera.js";
+import clips from "./clips.js";
+import files from "./files.js";
+import forests from "./forests.js";
+import keys from "./keys.js";
+import look from "./look.js";
+import panel from "./panel.js";
 import { lineMaterial, meshMaterial } from "./plant.js";
+import scripts from "./scripts.js";
+import sharing from "./sharing.js";
 import { Stage } from "./stage.js";
-import { markFirst, tellFacts } from "./story.js";
-import { advance, tellTime } from "./time.js";
+import story from "./story.js";
+import time from "./time.js";
 import { $ } from "./ui.js";
-import { breeze } from "./wind.js";
-import "./camera.js";
-import "./keys.js";
-import "./scripts.js";
-import "./sharing.js";
+import wind from "./wind.js";
 
 const TELL_MS = 250, PATIENCE_MS = 2000;
 
 let last = 0;
 
 function setStage() {
-  const stage = app.stage = new Stage($("canvas"), () => { state.dirty = true; }, reframe);
+  const stage = app.stage = new Stage($("canvas"), () => { state.dirty = true; }, app.reframe);
+  stage.keepClear(document.querySelectorAll("header, nav, #panel, footer, #scale"));
   const unmoved = motionUniforms();
   unmoved.athData.value = dataTexture(new Float32Array(4096));
   stage.warm([new Mesh(new BufferGeometry(), limbMaterial(unmoved)), new Mesh(new BufferGeometry(), injectMotion(meshMaterial(), unmoved)),
@@ -44,15 +45,16 @@ function tick(now) {
     return;
   }
   stage.controls.update();
-  if (state.playing) advance(passed);
-  for (const { motion, root } of plants) {
-    if (!state.forest) motion.update(stage.camera, stage.pixels, root).setTime(motion.start + state.time);
+  if (state.playing) app.advance(passed);
+  for (const { ath: { others = [] }, motion, space } of plants) {
+    for (const other of others) other.motion.update(stage.camera, stage.pixels, space).setTime(other.motion.start + state.time);
+    if (!state.forest) motion.update(stage.camera, stage.pixels, space).setTime(motion.start + state.time);
     else motion.setTime(motion.start);
   }
   if (state.forest) {
-    bakeForests();
-    state.dirty ||= forests().some(({ fading }) => fading);
-    if (state.playing || state.dirty) updateForests(state.turns + state.time);
+    app.bakeForests();
+    state.dirty ||= app.forests().some(({ fading }) => fading);
+    if (state.playing || state.dirty) app.updateForests(state.turns + state.time);
   }
   if (state.dirty || (state.playing && state.forest)) draw();
   count(now);
@@ -61,10 +63,10 @@ function tick(now) {
 function draw() {
   state.dirty = false;
   const start = performance.now();
-  app.stage.breeze(state.turns + state.time, ...breeze());
+  app.stage.breeze(state.turns + state.time, ...app.breeze());
   app.stage.render();
   $("canvas").classList.add("drawn");
-  if (app.plants.length > 0) markFirst();
+  if (app.plants.length > 0) app.markFirst();
   counters.frames++;
   counters.frameMs = counters.frameMs * 0.8 + 0.2 * (performance.now() - start);
 }
@@ -74,7 +76,7 @@ function count(now) {
   if (passed < TELL_MS) return;
   counters.fps = (counters.frames * 1000) / passed;
   Object.assign(counters, { frames: 0, since: now });
-  for (const tell of [tellFacts, tellLevel, tellScale, tellTime, splitLabels, write]) tell();
+  for (const tell of [app.tellFacts, app.tellLevel, app.tellScale, app.tellTime, app.splitLabels, app.write]) tell();
 }
 
 const painted = () => new Promise((done) => { requestAnimationFrame(() => setTimeout(done)); });
@@ -85,14 +87,15 @@ async function setUp() {
   await Promise.race([Promise.all([painted(), app.coming]), late()]);
   try {
     setStage();
-    setSplit(0.5);
+    app.setSplit(0.5);
     requestAnimationFrame(tick);
   } catch (error) {
-    refuse(Object.assign(error, { codeName: "GRAPHICS" }));
+    app.refuse(Object.assign(error, { codeName: "GRAPHICS" }));
   }
 }
 
-if (matchMedia("(max-width: 680px)").matches) togglePanel();
-begin();
+for (const begin of [address, arrange, camera, clips, files, forests, look, panel, sharing, story, time, wind, scripts, keys]) begin();
+if (matchMedia("(prefers-reduced-motion: reduce)").matches) app.setPlaying(false);
+app.openAddress();
 loader.preload();
 app.staged = setUp();

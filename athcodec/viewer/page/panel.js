@@ -1,16 +1,28 @@
-// The settings, and on small screens what is told of the file: shown or not.
+// The settings, and on small screens what is told of the file: shown or not; whether there is a plant for them.
 
 import { app } from "./app.js";
 import { $ } from "./ui.js";
 
-export function togglePanel() {
+const NEED_A_PLANT = "footer, #clip, #panel section:not(.grid), #picture, #video, #link, #embed";
+
+function togglePanel() {
   const hidden = document.body.classList.toggle("no-panel");
   $("toggle-panel").setAttribute("aria-expanded", String(!hidden));
   app.stage?.fit();
 }
 
-$("toggle-panel").addEventListener("click", togglePanel);
+/** Whether the controls of a plant can be used: while there is none on the stage, they would reach into nothing. */
+function enableControls(enabled) {
+  for (const each of document.querySelectorAll(NEED_A_PLANT)) each.inert = !enabled;
+}
 
-$("more").addEventListener("click", () => {
-  $("more").setAttribute("aria-expanded", String(document.body.classList.toggle("told")));
-});
+export default function begin() {
+  Object.assign(app, { togglePanel, enableControls });
+  enableControls(false);
+  if (matchMedia("(max-width: 680px), (max-height: 480px)").matches) togglePanel();
+  $("toggle-panel").addEventListener("click", togglePanel);
+  $("more").addEventListener("click", () => {
+    $("more").setAttribute("aria-expanded", String(document.body.classList.toggle("told")));
+    app.stage?.fit();
+  });
+}

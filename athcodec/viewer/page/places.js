@@ -1,12 +1,8 @@
 // Where the plants of a forest stand: trees evenly and a little off their places, those of the floor in groups between them.
 
-const MOST = 12000; // Plants of one kind at most; in large forests only the trees in the middle have them.
+import { chance } from "./chance.js";
 
-// Random numbers from 0 to 1, equal in every run.
-const chance = (i, salt) => {
-  const x = Math.sin(12.9898 * (i + 1) + 78.233 * salt) * 43758.5453;
-  return x - Math.floor(x);
-};
+const MOST = 12000; // Plants of one kind at most; in large forests only the trees in the middle have them.
 
 const GOLDEN = Math.PI * (3 - Math.sqrt(5));
 
@@ -32,10 +28,10 @@ export const feet = (trees, { metadata }) => trees.map(({ x, y, z }) => (metadat
 export function floorPlaces(trees, each, reach, kind) {
   return Array.from({ length: Math.min(MOST, Math.round(each * trees.length)) }, (_, i) => {
     const [x, z] = trees[Math.floor(i / each)], group = Math.floor((i % each) / 3), salt = 20 * kind;
-    const turn = 2 * Math.PI * chance(Math.floor(i / each) * 7 + group, salt), far = reach * (0.12 + 0.88 * chance(Math.floor(i / each) * 5 + group, salt + 1));
-    const apart = 0.16 * reach * Math.sqrt(chance(i, salt + 2)), way = 2 * Math.PI * chance(i, salt + 3);
+    const turn = 2 * Math.PI * chance(Math.floor(i / each) * 7 + group + 1, salt), far = reach * (0.12 + 0.88 * chance(Math.floor(i / each) * 5 + group + 1, salt + 1));
+    const apart = 0.16 * reach * Math.sqrt(chance(i + 1, salt + 2)), way = 2 * Math.PI * chance(i + 1, salt + 3);
     return { x: x + far * Math.cos(turn) + apart * Math.cos(way), z: z + far * Math.sin(turn) + apart * Math.sin(way),
-      size: 0.8 + 0.8 * chance(i, salt + 4), angle: 2 * Math.PI * chance(i, salt + 5), seconds: 100 * chance(i, salt + 6) };
+      size: 0.8 + 0.8 * chance(i + 1, salt + 4), angle: 2 * Math.PI * chance(i + 1, salt + 5), seconds: 100 * chance(i + 1, salt + 6) };
   });
 }
 

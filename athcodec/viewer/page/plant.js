@@ -1,10 +1,9 @@
 // One plant on the stage: what of it is drawn, and in which colours, for one motion of a loaded file.
 
 import { BufferAttribute, BufferGeometry, DoubleSide, Group, InstancedBufferAttribute, LineBasicMaterial, LineSegments, Mesh, MeshLambertMaterial } from "three";
+import { limbDepth, limbGeometry, limbMaterial, radii, setRadii, upright } from "athcodec-three";
 
 import { barkColour, heat, nodeColour, orderColour } from "./colours.js";
-import { limbDepth, limbGeometry, limbMaterial, setRadii } from "../src/limbs.js";
-import { radii } from "../src/radii.js";
 import { outlined, surfaceDepth, surfaceMaterial, surfacesOf } from "./surfaces.js";
 
 const LEAF = [0.16, 0.29, 0.07], OVER = [0.55, 0.2, 0.06];
@@ -13,12 +12,12 @@ const SLIMMEST = 4; // order from which on bark is as pale as it gets
 export const meshMaterial = () => new MeshLambertMaterial({ vertexColors: true, side: DoubleSide });
 export const lineMaterial = () => new LineBasicMaterial({ vertexColors: true });
 
-// A geometry of its own for another motion: all but athPart is shared.
-function sharing(geometry) {
+// A geometry of its own for another motion: all but athPart is shared, and the colours if `withColour`.
+function sharing(geometry, withColour = false) {
   const copy = new BufferGeometry();
   copy.setIndex(geometry.index);
   for (const [name, attribute] of Object.entries(geometry.attributes))
-    if (!name.startsWith("athPart") && name !== "color") copy.setAttribute(name, attribute);
+    if (!name.startsWith("athPart") && (withColour || name !== "color")) copy.setAttribute(name, attribute);
   copy.userData = geometry.userData;
   return copy;
 }
@@ -28,6 +27,7 @@ const coloured = ({ userData: { source, other } }) => [["color", source], ...(ot
 
 export class Plant {
   root = new Group();
+  space = this.root; // what the motion's own axes are those of
   colour = "plain";
   show = "mesh";
   heatMost = 0;
@@ -37,15 +37,14 @@ export class Plant {
   #radii;
   #drawn = [];
   #surface = null;
+  #model = null; // what a GLB shows
   #stale = true;
 
   constructor(ath, motion = ath.motion) {
     this.ath = ath;
     this.motion = motion;
-    const up = ath.metadata.up_axis;
     this.root.rotation.order = "YXZ";
-    if (up === "z") this.root.rotation.x = -Math.PI / 2;
-    if (up === "x") this.root.rotation.z = Math.PI / 2;
+    upright(this.root, ath.metadata);
     this.root.updateMatrixWorld(true);
     const { depth } = ath.branches, branch = ath.vertexBranch;
     this.#orders = branch.map((b) => depth[b]);
@@ -66,13 +65,13 @@ export class Plant {
   }
 
   #clear() {
-    for (const { object, geometry, other } of this.#drawn) {
-      this.root.remove(object);
+    for (const { object, geometry, other, plain, tinted } of this.#drawn) {
+      object.removeFromParent();
+      if (plain) this.motion.detach(plain.geometry);
       this.motion.detach(geometry);
-      geometry.dispose();
-      object.material.dispose();
-      other?.dispose();
+      for (const part of [geometry, object.material, other, ...Object.values({ ...plain }), tinted?.material]) part?.dispose();
     }
+    this.#model?.removeFromParent();
     this.#surface?.dispose();
     this.#surface = null;
     this.#drawn = [];
@@ -85,7 +84,7 @@ export class Plant {
       return;
     }
     this.#radii = radii(this.ath);
-    for (const { kind, geometry } of this.#drawn) if (kind === "mesh") setRadii(geometry, this.#radii);
+    for (const { kind, geometry } of this.#drawn) if (kind === "mesh" && geometry.userData.other) setRadii(geometry, this.#radii);
     this.paint();
   }
 
@@ -93,6 +92,12 @@ export class Plant {
   turn(degrees) {
     this.root.rotation.y = -degrees * Math.PI / 180;
     this.root.updateMatrixWorld(true);
+  }
+
+  /** The box of the rest pose in the world. */
+  get box() {
+    this.root.updateMatrixWorld(true);
+    return this.ath.box.clone().applyMatrix4(this.space.matrixWorld);
   }
 
   /** Surfaces that the file's texture coordinates tell apart, see surfacesOf; null: none. */
@@ -108,8 +113,9 @@ export class Plant {
 
   // Bark and leaves as they look near by, or colours that tell something.
   #dress() {
+    for (const { object, plain, tinted } of this.#drawn) if (plain) Object.assign(object, this.colour === "plain" ? plain : tinted);
     const drawn = this.#drawn.find(({ kind }) => kind === "mesh"), wanted = Boolean(this.colour === "plain" && this.ath.hasFaces && this.surfaces);
-    if (!drawn || wanted === Boolean(drawn.other)) return;
+    if (!drawn || drawn.plain || wanted === Boolean(drawn.other)) return;
     if (wanted) this.#surface ??= this.motion.bind(surfaceMaterial(this.surfaces));
     [drawn.object.material, drawn.other] = wanted ? [this.#surface, drawn.object.material] : [drawn.other, null];
   }
@@ -119,6 +125,10 @@ export class Plant {
     if (this.#drawn.some((drawn) => drawn.kind === kind)) return;
     const { ath, motion } = this;
     let object;
+    if (kind === "mesh" && ath.model) {
+      this.#addModel();
+      return;
+    }
     if (kind === "skeleton") {
       object = new LineSegments(motion.attach(this.#lines()), motion.bind(lineMaterial()));
       object.renderOrder = 1;
@@ -136,8 +146,28 @@ export class Plant {
     const Colours = geometry.isInstancedBufferGeometry ? InstancedBufferAttribute : BufferAttribute;
     for (const [name, list] of coloured(geometry)) geometry.setAttribute(name, new Colours(new Float32Array(3 * list.length), 3));
     object.frustumCulled = false;
+    if (this.space !== this.root) object.applyMatrix4(this.root.matrixWorld.clone().invert().multiply(this.space.matrixWorld));
     this.#drawn.push({ kind, geometry, object });
     this.root.add(object);
+    this.#dress();
+  }
+
+  // All that a GLB shows: its meshes in their own materials or, with another geometry, in colours that tell something.
+  #addModel() {
+    const { ath, motion } = this, model = this.#model = ath.model.clone();
+    model.traverse((object) => {
+      object.castShadow = object.receiveShadow = true;
+      if (object.userData.ATH_motion?.motion !== ath.number) return;
+      const plain = { geometry: motion.attach(sharing(object.geometry, true)), material: motion.bind(object.material.clone()) };
+      const geometry = motion.attach(sharing(object.geometry)), tinted = { geometry, material: motion.bind(meshMaterial()) };
+      const { source } = geometry.userData;
+      geometry.setAttribute("color", new BufferAttribute(new Float32Array(3 * source.length), 3));
+      motion.bindShadows(object);
+      this.#drawn.push({ kind: "mesh", geometry, object, plain, tinted });
+      this.space = object;
+    });
+    this.root.add(model);
+    this.root.updateMatrixWorld(true);
     this.#dress();
   }
 
@@ -228,7 +258,7 @@ export class Plant {
     const stored = leafy ? this.ath.geometry.getAttribute("color") : null;
     const line = this.show === "both" && this.colour === "plain" ? OVER : null;
     for (const { kind, geometry, object } of this.#drawn) {
-      if (!object.visible) continue;
+      if (!object.visible || object.geometry !== geometry) continue; // a GLB in its own materials
       const fixed = kind === "skeleton" ? line : null, own = stored && kind === "mesh";
       const vertexColour = leafy && kind !== "skeleton" ? this.#leafColours() : colourOf;
       for (const [name, source] of coloured(geometry)) {

@@ -1,8 +1,6 @@
 // Sharing: pictures, videos, links; and the page over the whole screen.
 
 import { app, state } from "./app.js";
-import { write } from "./address.js";
-import { limit, setPlaying } from "./time.js";
 import { $, note } from "./ui.js";
 
 const MOST_SECONDS = 10, FRAMES = 30, BITS = 12e6;
@@ -11,12 +9,12 @@ const TYPES = ["video/webm;codecs=vp9", "video/webm;codecs=vp8", "video/webm", "
 function save(blob, ending) {
   const link = document.createElement("a");
   link.href = URL.createObjectURL(blob);
-  link.download = `${app.opened[0].fileName.replace(/\.ath$/, "")}_${state.time.toFixed(2)}s.${ending}`;
+  link.download = `${app.opened[0].fileName.replace(/\.(ath|glb)$/, "")}_${state.time.toFixed(2)}s.${ending}`;
   link.click();
   setTimeout(() => URL.revokeObjectURL(link.href), 1000);
 }
 
-export function picture() {
+function picture() {
   app.stage.render();
   $("canvas").toBlob((blob) => save(blob, "png"));
 }
@@ -24,7 +22,7 @@ export function picture() {
 let recorder = null;
 
 /** One round of what plays, ten seconds of it at most; ends earlier where it is asked for again. */
-export function video() {
+function video() {
   if (recorder) {
     recorder.stop();
     return;
@@ -34,7 +32,7 @@ export function video() {
     note("This browser cannot record videos");
     return;
   }
-  record(type, Math.min(MOST_SECONDS, limit() / state.speed || MOST_SECONDS));
+  record(type, Math.min(MOST_SECONDS, app.limit() / state.speed || MOST_SECONDS));
 }
 
 function record(type, seconds) {
@@ -49,7 +47,7 @@ function record(type, seconds) {
     $("video").textContent = "Save video";
     save(new Blob(pieces, { type }), type.slice(6, 10));
   };
-  setPlaying(true);
+  app.setPlaying(true);
   recorder.start();
   $("video").textContent = "Stop recording";
   note(`Recording ${seconds.toFixed(1)} seconds`);
@@ -68,26 +66,29 @@ async function copy(text, what) {
   }
 }
 
-export function copyLink() {
-  write();
+function copyLink() {
+  app.write();
   copy(location.href, "Link");
 }
 
-export function copyEmbed() {
-  write();
+function copyEmbed() {
+  app.write();
   const address = location.href.replaceAll("&", "&amp;").replaceAll('"', "&quot;");
   copy(`<iframe src="${address}" width="800" height="600" allow="fullscreen" title="${document.title.replaceAll('"', "&quot;")}"></iframe>`, "Embed code");
 }
 
-export function fullscreen() {
+function fullscreen() {
   if (document.fullscreenElement) document.exitFullscreen();
   else document.documentElement.requestFullscreen().catch(() => note("This browser does not let the page fill the screen"));
 }
 
-$("picture").addEventListener("click", picture);
-$("video").addEventListener("click", video);
-$("link").addEventListener("click", copyLink);
-$("embed").addEventListener("click", copyEmbed);
-$("fullscreen").addEventListener("click", fullscreen);
-$("fullscreen").hidden = !document.fullscreenEnabled;
-addEventListener("fullscreenchange", () => $("fullscreen").setAttribute("aria-pressed", String(Boolean(document.fullscreenElement))));
+export default function begin() {
+  Object.assign(app, { picture, video, fullscreen });
+  $("picture").addEventListener("click", picture);
+  $("video").addEventListener("click", video);
+  $("link").addEventListener("click", copyLink);
+  $("embed").addEventListener("click", copyEmbed);
+  $("fullscreen").addEventListener("click", fullscreen);
+  $("fullscreen").hidden = !document.fullscreenEnabled;
+  addEventListener("fullscreenchange", () => $("fullscreen").setAttribute("aria-pressed", String(Boolean(document.fullscreenElement))));
+}

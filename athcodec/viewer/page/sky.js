@@ -51,12 +51,21 @@ function dome(sky, ground) {
   return new Mesh(new SphereGeometry(1, 48, 24), material);
 }
 
+/** Frees what an object and those in it take on the GPU. */
+export function discard(object) {
+  object?.traverse((each) => {
+    const textures = Object.values(each.material ?? {}).filter((value) => value?.isTexture);
+    for (const part of [each, each.geometry, each.material, ...textures]) part?.dispose?.();
+  });
+}
+
 export class Sky {
   dark = false;
   #around = new Map(); // the light from all sides, by day and at dusk
 
-  constructor(renderer) {
-    this.renderer = renderer;
+  /** rendererOf(): the renderer that draws the light. */
+  constructor(rendererOf) {
+    this.rendererOf = rendererOf;
   }
 
   get colours() {
@@ -69,11 +78,17 @@ export class Sky {
 
   get #environment() {
     if (!this.#around.has(this.dark)) {
-      const maker = new PMREMGenerator(this.renderer), scene = new Scene().add(dome(this.colours, true));
+      const maker = new PMREMGenerator(this.rendererOf()), scene = new Scene().add(dome(this.colours, true));
       this.#around.set(this.dark, maker.fromScene(scene, 0, 0.1, 10).texture);
       maker.dispose();
     }
     return this.#around.get(this.dark);
+  }
+
+  /** Lets go of what a renderer has drawn. */
+  forget() {
+    for (const texture of this.#around.values()) texture.dispose();
+    this.#around.clear();
   }
 
   /** Dome and lights of a scene, for the theme; those before are taken away. */
@@ -92,6 +107,7 @@ export class Sky {
     sky.children.at(-1).name = "fill";
     if (old) this.#reach(sun, old.getObjectByName("sun"));
     scene.add(sky);
+    discard(old);
   }
 
   /** The light of the whole sky, or more of what fills shadows in its place. */

@@ -1,11 +1,13 @@
 // The stage: renderer, camera and light, and one or two panes, each with its own scene; two share the view, on either side of a split.
 
-import { ACESFilmicToneMapping, Box3, Fog, PCFShadowMap, PerspectiveCamera, Scene, Vector3, WebGLRenderer } from "three";
+import { ACESFilmicToneMapping, Box3, DirectionalLight, Fog, HemisphereLight, NoToneMapping, PerspectiveCamera, Scene, Vector3 } from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 
+import { Easel } from "./easel.js";
 import { blow, meadow, tintMeadow } from "./ground.js";
-import { Sky } from "./sky.js";
+import { discard } from "./sky.js";
 
+const TONE = { toneMapping: ACESFilmicToneMapping, toneMappingExposure: 0.82 }, PLAIN = { toneMapping: NoToneMapping };
 const SLOW_MS = 20, PATIENCE = 24; // pictures that are slow, one behind the other, before there is less to draw
 const SHADED = 12; // plants, across a forest
 const SOFTWARE = /swiftshader|llvmpipe|software|basic render/i;
@@ -30,18 +32,18 @@ export class Stage {
 
   moved = false; // by hand, since the whole was last in view
 
+  cards = [];
+
   #toned = null;
 
   #sized = new ResizeObserver(() => this.fit());
 
-  constructor(canvas, changed, resized) {
-    this.canvas = canvas;
-    const context = canvas.getContext("webgl2", { alpha: false, antialias: true, powerPreference: "high-performance" }) ?? undefined;
-    this.renderer = new WebGLRenderer({ canvas, context });
-    Object.assign(this.renderer, { toneMapping: ACESFilmicToneMapping, toneMappingExposure: 0.82 });
-    this.renderer.shadowMap.enabled = true;
-    this.renderer.shadowMap.type = PCFShadowMap;
-    this.sky = new Sky(this.renderer);
+  /** easel: what draws it, by default one on the canvas itself. scenery: sky, meadow and shadows, or light alone. */
+  constructor(canvas, changed, resized, easel = new Easel(canvas), scenery = true) {
+    Object.assign(this, { canvas, easel, scenery, sky: easel.sky, tone: scenery ? TONE : PLAIN });
+    Object.assign(this.renderer, this.tone);
+    easel.stages.add(this);
+    this.steady ||= !scenery;
     if (!this.steady && isSoftware(this.renderer.getContext())) this.less = QUALITY.length - 1;
     this.camera = new PerspectiveCamera(38, 1, 0.01, 1000);
     this.controls = new OrbitControls(this.camera, canvas);
@@ -65,7 +67,18 @@ export class Stage {
     this.#sized.disconnect();
     this.dark.removeEventListener("change", this.#toned);
     this.controls.dispose();
-    this.renderer.dispose();
+    this.setPanes([]);
+    this.easel.leave(this);
+  }
+
+  get renderer() {
+    return this.easel.renderer;
+  }
+
+  /** After a context was lost, what had been drawn for later has to be drawn again. */
+  restore() {
+    this.#tint();
+    this.changed();
   }
 
   /** Takes the size that the page leaves. */
@@ -77,16 +90,32 @@ export class Stage {
 
   #resize() {
     const { clientWidth: width, clientHeight: height } = this.canvas.parentElement;
-    const ratio = Math.min(devicePixelRatio, this.quality.ratio);
-    const inset = parseInt(getComputedStyle(this.canvas.parentElement).getPropertyValue("--inset"), 10) || 0;
-    const sized = width !== this.width || height !== this.height || ratio !== this.renderer.getPixelRatio();
-    if (!sized && inset === this.inset) return false;
-    if (sized) {
-      this.renderer.setPixelRatio(ratio);
-      this.renderer.setSize(width, height, false);
-    }
-    Object.assign(this, { width, height, inset });
+    const ratio = Math.min(devicePixelRatio, this.quality.ratio), room = this.#free(width, height);
+    if (String([width, height, ratio, room]) === String([this.width, this.height, this.ratio, this.room])) return false;
+    if (width !== this.width || height !== this.height || ratio !== this.ratio)
+      Object.assign(this.canvas, { width: Math.floor(width * ratio), height: Math.floor(height * ratio) });
+    Object.assign(this, { width, height, ratio, room });
+    const { style } = this.canvas.parentElement, insets = { left: room[0], top: room[1], right: width - room[2], bottom: height - room[3] };
+    for (const [side, inset] of Object.entries(insets)) style.setProperty(`--${side}`, `${inset}px`);
     return true;
+  }
+
+  // The best part of the picture beside the cards, [left, top, right, bottom]: each card takes all that lies on one side of it.
+  #free(width, height) {
+    const { x, y } = this.canvas.parentElement.getBoundingClientRect(), value = ([l, t, r, b]) => Math.min(r - l, b - t) + 0.1 * Math.max(r - l, b - t);
+    let rooms = [[0, 0, width, height]];
+    for (const card of this.cards.filter((each) => each.checkVisibility({ visibilityProperty: true }))) {
+      const rect = card.getBoundingClientRect(), [left, top, right, bottom] = [rect.left - x, rect.top - y, rect.right - x, rect.bottom - y];
+      rooms = rooms.flatMap(([l, t, r, b]) => (left >= r || right <= l || top >= b || bottom <= t ? [[l, t, r, b]]
+        : [[l, t, left, b], [right, t, r, b], [l, t, r, top], [l, bottom, r, b]]));
+    }
+    return rooms.reduce((best, room) => (value(room) > value(best) ? room : best));
+  }
+
+  /** Elements that lie over the picture: what is looked at keeps clear of them. */
+  keepClear(cards) {
+    this.cards = [...cards];
+    for (const card of cards) this.#sized.observe(card);
   }
 
   /** Has what plants are drawn with compiled before there are any; nothing waits for it. */
@@ -101,11 +130,14 @@ export class Stage {
     if (this.renderer.extensions.has("KHR_parallel_shader_compile")) await this.renderer.compileAsync(scene, this.camera);
     else this.renderer.compile(scene, this.camera);
     scene.remove(...objects);
+    discard(scene);
   }
 
   /** A pane's scene; `content` is added to it. */
   scene(content) {
-    const scene = new Scene();
+    const scene = new Scene(), plain = new DirectionalLight(0xfff2dd, 2.4);
+    plain.position.set(0.6, 1, 0.7);
+    if (!this.scenery) return scene.add(new HemisphereLight(0xeaf2ff, 0x8a8371, 1.9), plain, ...content);
     scene.add(meadow(), ...content);
     scene.fog = new Fog(this.sky.horizon, 1, 2);
     this.#tint([scene]);
@@ -113,6 +145,7 @@ export class Stage {
   }
 
   #tint(scenes = this.panes.map(({ scene }) => scene)) {
+    if (!this.scenery) return;
     this.sky.dark = this.dark.matches;
     for (const scene of scenes) {
       this.sky.light(scene);
@@ -148,6 +181,7 @@ export class Stage {
   }
 
   setPanes(panes) {
+    for (const { scene } of this.panes) for (const name of ["ground", "sky"]) discard(scene.getObjectByName(name));
     this.panes = panes;
     this.#tint();
     this.changed();
@@ -156,7 +190,7 @@ export class Stage {
   /** The whole of a box (in the world) in view, from any side; `ground`: its height and size. */
   look(box, ground) {
     const size = box.getSize(new Vector3()), across = Math.hypot(size.x, size.z), half = Math.tan(this.camera.fov * Math.PI / 360);
-    const aspect = (this.width - this.inset) / this.height;
+    const [left, top, right, bottom] = this.room, aspect = (right - left) / (bottom - top);
     const distance = 0.35 * across + 0.62 * Math.max(size.y, 0.84 * across / aspect, 1e-6) / half;
     box.getCenter(this.controls.target);
     this.camera.position.copy(this.controls.target).add(new Vector3(0.35, 0.16, 0.92).normalize().multiplyScalar(distance));
@@ -180,6 +214,7 @@ export class Stage {
 
   /** size: of all that stands on it; plant: of a single plant, which the blades of grass are as large as. */
   placeGround(height, size, plant = size) {
+    if (!this.scenery) return;
     for (const { scene } of this.panes) {
       const ground = scene.getObjectByName("ground");
       ground.position.y = height;
@@ -201,29 +236,33 @@ export class Stage {
 
   /** The wind in the grass: seconds that passed, strength from 0 to 1, heading in degrees. */
   breeze(seconds, strength, heading) {
-    for (const { scene } of this.panes) blow(scene.getObjectByName("ground"), seconds, strength, heading);
+    if (this.scenery) for (const { scene } of this.panes) blow(scene.getObjectByName("ground"), seconds, strength, heading);
   }
 
-  /** Height of the picture in pixels of the device. */
+  /** Height of what is looked at in pixels of the device. */
   get pixels() {
-    return this.height * this.renderer.getPixelRatio();
+    return (this.room[3] - this.room[1]) * this.ratio;
   }
 
-  // The part behind the settings is drawn too, and counts for nothing else.
+  // The part behind the cards is drawn too, and counts for nothing else.
   render() {
-    const { renderer, camera, panes, width, height } = this, seen = width - this.inset, left = this.split * seen;
-    camera.aspect = seen / height;
-    camera.setViewOffset(seen, height, 0, 0, width, height);
+    this.easel.draw(this.canvas, this.scenery, this.tone, (renderer) => this.#paint(renderer));
+  }
+
+  #paint(renderer) {
+    const { camera, canvas, panes, width, height, ratio, room: [left, top, right, bottom] } = this, middle = ratio * (left + this.split * (right - left));
+    camera.aspect = (right - left) / (bottom - top);
+    camera.setViewOffset(right - left, bottom - top, -left, -top, width, height);
     camera.updateMatrixWorld();
     renderer.setScissorTest(panes.length > 1);
     for (const { scene } of panes) {
       const dome = scene.getObjectByName("dome");
-      dome.position.copy(camera.position);
-      dome.scale.setScalar(camera.far * 0.5);
+      dome?.position.copy(camera.position);
+      dome?.scale.setScalar(camera.far * 0.5);
     }
     panes.forEach(({ scene, before }, i) => {
-      before?.(width * renderer.getPixelRatio(), this.pixels);
-      if (panes.length > 1) renderer.setScissor(i * left, 0, i === 0 ? left : width - left, height);
+      before?.(canvas.width, canvas.height);
+      if (panes.length > 1) renderer.setScissor(i * middle, 0, i === 0 ? middle : canvas.width - middle, canvas.height);
       renderer.render(scene, camera);
     });
   }

@@ -144,10 +144,10 @@ function given(shader, fragment, [stem, leaf]) {
   shader.fragmentShader = `#define ATH_STEM ${STEMS.indexOf(stem)}\n#define ATH_LEAF ${LEAVES.indexOf(leaf)}\n${fragment}`;
 }
 
-// Soft edges, where the picture is of nothing that shines through it.
+// Soft edges, where something is behind all of the picture: only a scene with a sky has haze.
 function soften(material) {
-  material.onBeforeRender = (renderer) => {
-    material.alphaToCoverage = !renderer.getContextAttributes().alpha;
+  material.onBeforeRender = (renderer, scene) => {
+    material.alphaToCoverage = scene.fog !== null;
     material.onBeforeRender = () => {};
   };
   return material;

@@ -7,7 +7,7 @@ const SPEEDS = ["0.1", "0.25", "0.5", "1", "2", "4"];
 
 const loops = () => app.plants.some(({ motion }) => motion.loops);
 
-export function setPlaying(playing) {
+function setPlaying(playing) {
   if (playing && !loops() && state.time >= limit()) state.time = 0;
   state.playing = playing;
   document.body.classList.toggle("paused", !playing);
@@ -15,29 +15,29 @@ export function setPlaying(playing) {
   state.dirty = true;
 }
 
-export function seek(seconds) {
+function seek(seconds) {
   state.time = Math.max(0, Math.min(seconds, limit()));
   state.dirty = true;
 }
 
 /** Where the clip ends: a loop has the way back to its first frame too. */
-export function limit() {
+function limit() {
   return Math.max(...app.plants.map(({ motion }) => motion.duration), 0);
 }
 
 /** By frames; pauses. */
-export function step(frames) {
+function step(frames) {
   setPlaying(false);
   const { duration, frameCount } = app.plants[0].motion.clip, rate = duration > 0 ? (frameCount - 1) / duration : 1;
   seek(Math.min((Math.round(state.time * rate) + frames) / rate, duration));
 }
 
-export function toEnd() {
+function toEnd() {
   setPlaying(false);
   seek(app.plants[0].motion.clip.duration);
 }
 
-export function advance(seconds) {
+function advance(seconds) {
   state.time += seconds * state.speed;
   const beyond = state.time - limit();
   if (beyond < 0) return;
@@ -50,26 +50,26 @@ export function advance(seconds) {
   }
 }
 
-export function fromTheStart() {
+function fromTheStart() {
   Object.assign(state, { time: 0, turns: 0 });
 }
 
 /** null: as is usual for the file. A forest always loops. */
-export function setLoop(loop) {
+function setLoop(loop) {
   state.loop = loop;
   for (const { motion } of app.plants) motion.wrap = state.forest || loop ? "loop" : loop === null ? motion.usualWrap : "clamp";
   $("loop").setAttribute("aria-pressed", String(loops()));
   $("loop").disabled = Boolean(state.forest);
 }
 
-export function changeSpeed(by) {
+function changeSpeed(by) {
   const at = SPEEDS.indexOf($("speed").value) + by;
   $("speed").value = SPEEDS[Math.max(0, Math.min(SPEEDS.length - 1, at))];
   state.speed = Number($("speed").value);
 }
 
 /** The slider and the clock as they are now. */
-export function tellTime() {
+function tellTime() {
   const [{ motion }] = app.plants, slider = $("time"), end = limit();
   const time = motion.switching === "waiting" ? 0 : Math.min(state.time, end);
   slider.max = end;
@@ -78,13 +78,16 @@ export function tellTime() {
   $("clock").value = `${time.toFixed(2)} s`;
 }
 
-$("play").addEventListener("click", () => setPlaying(!state.playing));
-$("loop").addEventListener("click", () => setLoop(!loops()));
-$("speed").addEventListener("change", () => { state.speed = Number($("speed").value); });
-$("time").addEventListener("input", () => seek(Number($("time").value)));
-$("time").addEventListener("keydown", (event) => {
-  const frames = { ArrowLeft: -1, ArrowDown: -1, ArrowRight: 1, ArrowUp: 1, PageDown: -10, PageUp: 10 }[event.key];
-  if (!frames) return;
-  event.preventDefault();
-  step(event.shiftKey ? 10 * frames : frames);
-});
+export default function begin() {
+  Object.assign(app, { setPlaying, seek, limit, step, toEnd, advance, fromTheStart, setLoop, changeSpeed, tellTime });
+  $("play").addEventListener("click", () => setPlaying(!state.playing));
+  $("loop").addEventListener("click", () => setLoop(!loops()));
+  $("speed").addEventListener("change", () => { state.speed = Number($("speed").value); });
+  $("time").addEventListener("input", () => seek(Number($("time").value)));
+  $("time").addEventListener("keydown", (event) => {
+    const frames = { ArrowLeft: -1, ArrowDown: -1, ArrowRight: 1, ArrowUp: 1, PageDown: -10, PageUp: 10 }[event.key];
+    if (!frames) return;
+    event.preventDefault();
+    step(event.shiftKey ? 10 * frames : frames);
+  });
+}

@@ -7,6 +7,7 @@ const CUT = ["The file is cut off too early", "Its end is missing, as after a do
 
 const WORDS = {
   NOT_AN_ATH_FILE: ["This is not an .ath file", "It begins as another kind of file. If it came from the web, its address may lead to a page about the file and not to the file."],
+  NO_MOTION: ["This GLB holds no plant that moves", "athcodec encode FILE.glb --into OUT.glb puts the motion of its animation into it."],
   UNSUPPORTED_VERSION: ["This file is of another version of the format", "A newer viewer may show it, or the file can be made again from its source."],
   HTTP: NETWORK, NETWORK, MISSING: CUT, TRUNCATED: CUT,
   NEEDS_HOST_MESH: ["This file needs the mesh that it was made for", "It holds the motion alone. Open it together with its mesh: athcodec view FILE --host-mesh MESH."],

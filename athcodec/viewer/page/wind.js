@@ -7,7 +7,6 @@ import { $ } from "./ui.js";
 
 const ROUND = 40; // radius of the disc, in its own units
 const LIGHT = 0.35; // breeze, where none is told
-const disc = $("wind");
 let range = null; // {least, most, headings} of the clips
 
 function windsOf({ clips, metadata }) {
@@ -17,7 +16,7 @@ function windsOf({ clips, metadata }) {
 const isTurned = () => range.headings.length === 1;
 
 /** Where the clips allow it. */
-export function windControl() {
+function windControl() {
   const [ath] = app.opened, winds = windsOf({ clips: ath.motion.clips, metadata: ath.metadata });
   const strengths = [...new Set(winds.map(({ strength }) => strength))], headings = [...new Set(winds.map(({ heading = 0 }) => heading))];
   range = strengths.length > 1 || headings.length > 1 ? { least: Math.min(...strengths), most: Math.max(...strengths), headings } : null;
@@ -35,8 +34,8 @@ function turnPlants() {
 }
 
 /** The wind of what plays, as the grass has it: strength from 0 to 1, heading. */
-export function breeze() {
-  if (!range) return [LIGHT, 0];
+function breeze() {
+  if (!range || app.opened.length === 0) return [LIGHT, 0];
   const [strength, heading] = now();
   return [strength / range.most, heading];
 }
@@ -62,7 +61,7 @@ function now() {
 }
 
 function mark() {
-  const [strength, heading] = now(), [x, y] = placeOf(strength, heading), handle = $("wind-handle"), arrow = $("wind-arrow");
+  const disc = $("wind"), [strength, heading] = now(), [x, y] = placeOf(strength, heading), handle = $("wind-handle"), arrow = $("wind-arrow");
   handle.setAttribute("cx", x);
   handle.setAttribute("cy", y);
   arrow.setAttribute("x2", x);
@@ -76,7 +75,7 @@ function mark() {
 }
 
 /** Shows the plants in the wind that is chosen, if one is. */
-export function applyWind() {
+function applyWind() {
   if (!state.wind || !range || state.forest) return;
   const [strength, heading] = state.wind;
   for (const { motion } of app.plants) motion.wind(strength, isTurned() ? range.headings[0] : heading);
@@ -86,7 +85,7 @@ export function applyWind() {
   select.value = "wind";
 }
 
-export function setWind(strength, heading) {
+function setWind(strength, heading) {
   if (!range) return;
   state.wind = [Math.max(range.least, Math.min(strength, range.most)), ((heading % 360) + 360) % 360];
   applyWind();
@@ -95,21 +94,25 @@ export function setWind(strength, heading) {
 }
 
 function dragTo({ clientX, clientY }) {
-  const { left, top, width, height } = disc.getBoundingClientRect(), scale = 100 / width;
+  const { left, top, width, height } = $("wind").getBoundingClientRect(), scale = 100 / width;
   const x = (clientX - left - width / 2) * scale, y = (clientY - top - height / 2) * scale;
   setWind(range.most * Math.hypot(x, y) / ROUND, Math.atan2(x, -y) * 180 / Math.PI);
 }
 
-disc.addEventListener("pointerdown", (event) => {
-  disc.setPointerCapture(event.pointerId);
-  disc.focus({ preventScroll: true });
-  dragTo(event);
-});
-disc.addEventListener("pointermove", (event) => { if (disc.hasPointerCapture(event.pointerId)) dragTo(event); });
-disc.addEventListener("keydown", (event) => {
-  const by = { ArrowUp: [0.05, 0], ArrowDown: [-0.05, 0], ArrowLeft: [0, -10], ArrowRight: [0, 10] }[event.key];
-  if (!by) return;
-  event.preventDefault();
-  const [strength, heading] = now();
-  setWind(strength + by[0] * (range.most - range.least), heading + by[1]);
-});
+export default function begin() {
+  Object.assign(app, { windControl, breeze, applyWind, setWind });
+  const disc = $("wind");
+  disc.addEventListener("pointerdown", (event) => {
+    disc.setPointerCapture(event.pointerId);
+    disc.focus({ preventScroll: true });
+    dragTo(event);
+  });
+  disc.addEventListener("pointermove", (event) => { if (disc.hasPointerCapture(event.pointerId)) dragTo(event); });
+  disc.addEventListener("keydown", (event) => {
+    const by = { ArrowUp: [0.05, 0], ArrowDown: [-0.05, 0], ArrowLeft: [0, -10], ArrowRight: [0, 10] }[event.key];
+    if (!by) return;
+    event.preventDefault();
+    const [strength, heading] = now();
+    setWind(strength + by[0] * (range.most - range.least), heading + by[1]);
+  });
+}

@@ -6,7 +6,7 @@ import { DynamicDrawUsage, Frustum, Group, InstancedBufferAttribute, InstancedBu
   Matrix4, Mesh, MeshStandardMaterial, Sphere, Vector3, BufferAttribute, DoubleSide } from "three";
 
 import { dataTexture, eased, roundOf } from "./ATHMotion.js";
-import { clustered, gather } from "./geometry.js";
+import { clustered, gather, upright } from "./geometry.js";
 import { injectMotion, motionUniforms, shadowMaterials } from "./shader.js";
 
 const MOST_TEXELS = 4 << 20; // Texels of one level: 64 MiB. Longer clips are played at fewer frames a second.
@@ -54,6 +54,7 @@ export class ATHForest extends Group {
     this.#material = material;
     this.#depthMaterial = depthMaterial;
     this.name = "ath forest";
+    upright(this, ath.metadata);
   }
 
   get count() {

@@ -1,7 +1,8 @@
 // Branches of files without faces as round limbs: see index.d.ts.
 
-import { Color, InstancedBufferAttribute, Mesh, Vector4 } from "three";
+import { Color, Mesh, Vector4 } from "three";
 
+import { setValues, upright } from "./geometry.js";
 import { limbGeometry, limbMaterial, setRadii } from "./limbs.js";
 import { radii } from "./radii.js";
 
@@ -20,6 +21,7 @@ export class ATHLimbs extends Mesh {
     this.#motion = motion;
     this.#onArrays = () => setRadii(geometry, radii(ath));
     ath.addEventListener("arrays", this.#onArrays);
+    upright(this, ath.metadata);
     this.frustumCulled = false; // an instance's own box is no edge's
     this.setColor(color);
   }
@@ -30,7 +32,7 @@ export class ATHLimbs extends Mesh {
     for (const [name, vertices] of [["color", source], ["colorOther", other]]) {
       const values = Float32Array.from({ length: 3 * vertices.length });
       vertices.forEach((vertex, i) => values.set(flat ?? color(vertex), 3 * i));
-      this.geometry.setAttribute(name, new InstancedBufferAttribute(values, 3));
+      setValues(this.geometry, name, values, 3);
     }
     return this;
   }

@@ -2,10 +2,10 @@
 // ath_worker.js, beside this module.
 
 import { Box3, Group, LineBasicMaterial, LineSegments, Loader, Mesh, MeshStandardMaterial, EventDispatcher, DoubleSide,
-  LoaderUtils, Vector3 } from "three";
+  LoaderUtils, Object3D, Vector3 } from "three";
 
 import { ATHMotion, eased, failureOf, restBounds } from "./ATHMotion.js";
-import { addAttributes, lineGeometry, meshGeometry, polygonsOf } from "./geometry.js";
+import { addAttributes, lineGeometry, meshGeometry, polygonsOf, upright } from "./geometry.js";
 import { Presence } from "./presence.js";
 
 const EASING_MS = 16; // between two steps of the rest pose
@@ -26,6 +26,9 @@ function bytesOf(data) {
   if (!/Buffer/.test(Object.prototype.toString.call(data))) throw new TypeError("buffer: got something else, expected an ArrayBuffer or a view of one");
   return new Uint8Array(data).slice();
 }
+
+const noWorker = (message) => ({ codeName: "WORKER",
+  message: `ath_worker.js: got no worker (${message ?? "not found or not allowed"}), expected it beside the loader or where setDecoderPath() says` });
 
 const aborted = () => failureOf({ message: "loading was aborted", codeName: "AbortError" });
 
@@ -274,6 +277,8 @@ export class ATH extends EventDispatcher {
   #geometry = null;
   #lines = null;
   #object = null;
+  #drawn = null;
+  #material = null;
   #loaded = null;
   #presence = new Presence();
 
@@ -321,10 +326,10 @@ export class ATH extends EventDispatcher {
     return this.#lines;
   }
 
-  /** Something to add to a scene: a Mesh of the faces, LineSegments where there are none. */
+  /** Something to add to a scene, upright: a Mesh of the faces, LineSegments where there are none. */
   get object() {
     if (!this.#object) {
-      this.#object = new Group();
+      this.#object = upright(new Group(), this.metadata);
       this.#object.name = "ath";
       this.#draw();
     }
@@ -335,19 +340,23 @@ export class ATH extends EventDispatcher {
     this.#presence.show(this, [this.#geometry, this.#lines].filter(Boolean), fresh);
   }
 
+  // Arrays that come later change what is drawn, which stays the object that it is; only lines give way to faces.
   #draw() {
-    const { geometry, motion } = this;
-    for (const old of [...this.#object.children]) {
-      old.removeFromParent();
-      old.material.dispose();
+    const { geometry, motion } = this, old = this.#drawn;
+    if (!old || (geometry && !old.isMesh)) {
+      const material = geometry ? new MeshStandardMaterial({ color: 0x8a9a6b, roughness: 0.8, side: DoubleSide }) : new LineBasicMaterial({ color: 0x6b5b45 });
+      this.#material = motion.bind(material);
+      this.#drawn = geometry ? new Mesh(geometry, material) : new LineSegments(this.lines, material);
+      if (old) Object3D.prototype.copy.call(this.#drawn, old);
+      else this.#drawn.castShadow = this.#drawn.receiveShadow = true;
+      this.#object.add(motion.bindShadows(this.#drawn));
+      old?.removeFromParent();
+      old?.material.dispose();
     }
-    if (!geometry) {
-      this.#object.add(motion.bindShadows(new LineSegments(this.lines, motion.bind(new LineBasicMaterial({ color: 0x6b5b45 })))));
-      return;
-    }
-    const vertexColors = geometry.hasAttribute("color"), color = vertexColors ? 0xffffff : 0x8a9a6b;
-    const material = new MeshStandardMaterial({ color, vertexColors, roughness: 0.8, side: DoubleSide });
-    this.#object.add(motion.bindShadows(new Mesh(geometry, motion.bind(material))));
+    const { vertexColors } = this.#material;
+    if (!geometry?.hasAttribute("color") || vertexColors) return;
+    this.#material.color.set(0xffffff);
+    Object.assign(this.#material, { vertexColors: true, needsUpdate: true });
   }
 
   /** Edges (u, v) in any case, the file's or those that follow from the branches. */
@@ -395,7 +404,7 @@ export class ATH extends EventDispatcher {
 
   dispose() {
     for (const geometry of [this.#geometry, this.#lines]) geometry?.dispose();
-    for (const drawn of this.#object?.children ?? []) drawn.material.dispose();
+    this.#material?.dispose();
     this.#channel.close();
   }
 }
@@ -530,18 +539,28 @@ export class ATHLoader extends Loader {
   }
 
   #start() {
-    // a page from the disk may have no module as a worker from its own memory; the bundle is both
-    const type = this.workerURL?.startsWith("blob:") ? "classic" : "module";
-    const worker = this.workerURL ? new Worker(this.workerURL, { type })
-      : new Worker(new URL("./ath_worker.js", import.meta.url), { type: "module" }); // as bundlers expect it
+    const worker = this.#make();
     Object.assign(worker, { files: 0, channels: new Map() });
     worker.onmessage = ({ data }) => worker.channels.get(data.file)?.receive(data);
     worker.onerror = ({ message }) => {
-      const text = `ath_worker.js: got no worker (${message ?? "not found"}), expected it beside the loader`;
-      for (const channel of worker.channels.values()) channel.receive({ type: "failed", message: text, codeName: "WORKER" });
+      this.workerPool.splice(this.workerPool.indexOf(worker), 1); // the next file tries anew
+      for (const channel of worker.channels.values()) channel.receive({ type: "failed", ...noWorker(message) });
     };
     this.workerPool.push(worker);
     return worker;
+  }
+
+  // A page may start workers of its own origin alone: elsewhere a module of its memory imports the script.
+  #make() {
+    const { href, origin } = globalThis.location ?? {};
+    try {
+      const url = new URL(this.workerURL ?? new URL("./ath_worker.js", import.meta.url), href), isHere = url.origin === origin || !/^http/.test(origin);
+      const script = isHere ? url : URL.createObjectURL(new Blob([`import ${JSON.stringify(url.href)};`], { type: "text/javascript" }));
+      // a page from the disk may have no module as a worker from its own memory; the bundle is both
+      return new Worker(script, { type: url.protocol === "blob:" ? "classic" : "module" });
+    } catch ({ message }) {
+      throw failureOf(noWorker(message));
+    }
   }
 
   /** Ends all workers; what was loaded shows its last picture from then on. */

@@ -1,11 +1,11 @@
 // The motion of one loaded plant: what time and level it shows, what of it is here, and how it gets into a material.
 // Decoding is the worker's; this holds the textures that the vertex shaders read.
 
-import { Box3, BufferAttribute, DataTexture, EventDispatcher, FloatType, InstancedBufferAttribute, MathUtils, NearestFilter, RGBAFormat, Sphere,
+import { Box3, DataTexture, EventDispatcher, FloatType, MathUtils, NearestFilter, RGBAFormat, Sphere,
   Vector3 } from "three";
 
 import { EndlessPlay, transitionsOf } from "./endless.js";
-import { Followed, setRest } from "./geometry.js";
+import { Followed, setRest, setValues } from "./geometry.js";
 import { injectMotion, motionUniforms, shadowMaterials } from "./shader.js";
 import { WIDTH } from "./texels.js";
 
@@ -488,7 +488,10 @@ export class ATHMotion extends EventDispatcher {
   /** Lets shadows of an object move as it does. */
   bindShadows(object) {
     if (this.mode === "positions") return object;
-    return Object.assign(object, this.#shadows ??= shadowMaterials(this.uniforms), { onBeforeRender: this.#forNodes });
+    const { clone } = Object.getPrototypeOf(object); // which leaves out what is added here
+    return Object.assign(object, this.#shadows ??= shadowMaterials(this.uniforms), {
+      onBeforeRender: this.#forNodes, clone: (...words) => this.bindShadows(clone.apply(object, words)),
+    });
   }
 
   // Node renderers pass over what bind() does to a material: there the worker moves the vertices.
@@ -532,11 +535,9 @@ export class ATHMotion extends EventDispatcher {
   }
 
   #setPart(geometry, name, source) {
-    const there = geometry.getAttribute(name), array = there?.array ?? new Float32Array(source.length);
-    const parts = this.#known?.vertices;
+    const array = geometry.getAttribute(name)?.array ?? new Float32Array(source.length), parts = this.#known?.vertices;
     if (parts) for (let i = 0; i < source.length; i++) array[i] = parts[source[i]];
-    if (there) there.needsUpdate = true;
-    else geometry.setAttribute(name, new (geometry.isInstancedBufferGeometry ? InstancedBufferAttribute : BufferAttribute)(array, 1));
+    setValues(geometry, name, array, 1);
   }
 
   /** Per vertex in source order, the branch (file order) whose node moves it at a level; its own where it moves alone. */

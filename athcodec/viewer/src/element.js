@@ -1,16 +1,20 @@
 // <ath-viewer src="oak.ath">: see element.d.ts.
 
-import { DirectionalLight, HemisphereLight, PerspectiveCamera, Scene, Vector3, WebGLRenderer } from "three";
-import { OrbitControls } from "three/addons/controls/OrbitControls.js";
+import { PerspectiveCamera, Vector3 } from "three";
 import { ATHLoader } from "athcodec-three";
 
+import { Easel } from "../page/easel.js";
 import { ground, Grove } from "../page/grove.js";
 import { floorIn } from "../page/places.js";
 import { Plant } from "../page/plant.js";
 import { Stage } from "../page/stage.js";
+import { wordsOf } from "../page/trouble.js";
 
 const STYLE = `:host { display: block; position: relative; min-height: 150px; overflow: hidden; }
 div, canvas, ::slotted(*) { position: absolute; inset: 0; width: 100%; height: 100%; }
+button, p { position: absolute; left: 12px; bottom: 12px; margin: 0; padding: 8px 14px; max-width: calc(100% - 24px); border: 0; border-radius: 12px;
+  background: Canvas; color: CanvasText; font: 14px/1.4 system-ui, sans-serif; }
+button { cursor: pointer; }
 ::slotted(*) { object-fit: cover; }
 canvas { display: block; outline-offset: -2px; opacity: 0; transition: opacity .5s; }
 canvas.drawn { opacity: 1; }
@@ -23,73 +27,12 @@ const FORGET_MS = 4000; // out of view, after which a lazy one gives back what i
 
 let loader = null;
 
-// A plant without scenery is drawn in light, with nothing behind it.
-class Bare {
-  camera = new PerspectiveCamera(38, 1, 0.01, 1000);
-  #scene = new Scene();
+const easel = new Easel(); // of all elements
 
-  constructor(canvas, changed) {
-    this.canvas = canvas;
-    this.changed = changed;
-    this.renderer = new WebGLRenderer({ canvas, antialias: true, alpha: true });
-    this.controls = new OrbitControls(this.camera, canvas);
-    this.controls.enableDamping = true;
-    this.controls.addEventListener("change", changed);
-    const sun = new DirectionalLight(0xfff2dd, 2.4);
-    sun.position.set(0.6, 1, 0.7);
-    this.#scene.add(new HemisphereLight(0xeaf2ff, 0x8a8371, 1.9), sun);
-    this.sized = new ResizeObserver(() => this.#resize());
-    this.sized.observe(canvas.parentElement);
-    this.#resize();
-  }
-
-  get pixels() {
-    return this.canvas.height;
-  }
-
-  #resize() {
-    const { clientWidth: width, clientHeight: height } = this.canvas.parentElement;
-    if (width === 0 || height === 0) return;
-    this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
-    this.renderer.setSize(width, height, false);
-    this.camera.aspect = width / height;
-    this.camera.updateProjectionMatrix();
-    this.changed();
-  }
-
-  // The whole plant in view.
-  show(plant) {
-    const box = plant.ath.box.clone().applyMatrix4(plant.root.matrixWorld), size = box.getSize(new Vector3()), { camera } = this;
-    const half = Math.tan(camera.fov * Math.PI / 360), across = Math.hypot(size.x, size.z);
-    const distance = 0.35 * across + 0.6 * Math.max(size.y, across / camera.aspect, 1e-6) / half;
-    this.plant = plant;
-    this.#scene.add(plant.root);
-    box.getCenter(this.controls.target);
-    camera.position.copy(this.controls.target).add(new Vector3(0.35, 0.16, 0.92).normalize().multiplyScalar(distance));
-    Object.assign(camera, { near: distance / 500, far: distance * 60 }).updateProjectionMatrix();
-    this.controls.update();
-  }
-
-  took() {} // The time that a picture takes never leaves anything out.
-
-  breeze() {} // no grass
-
-  render() {
-    this.plant.prepare(this.canvas.width, this.canvas.height);
-    this.renderer.render(this.#scene, this.camera);
-  }
-
-  dispose() {
-    this.sized.disconnect();
-    this.controls.dispose();
-    this.renderer.dispose();
-  }
-}
-
-// On the meadow and under the sky of the viewer's page.
-class Scenery extends Stage {
-  constructor(canvas, changed) {
-    super(canvas, changed, () => this.#fit());
+// The viewer's stage, with its scenery or without.
+class Stand extends Stage {
+  constructor(canvas, changed, scenery) {
+    super(canvas, changed, () => this.#fit(), easel, scenery);
   }
 
   #box = null;
@@ -108,7 +51,7 @@ class Scenery extends Stage {
   show(plant, reach) {
     this.#reach = reach;
     this.setPanes([{ scene: this.scene([plant.root]), before: (width, height) => plant.prepare(width, height) }]);
-    this.#box = plant.ath.box.clone().applyMatrix4(plant.root.matrixWorld);
+    this.#box = plant.box;
     this.#fit();
   }
 
@@ -127,6 +70,8 @@ export class ATHViewerElement extends HTMLElement {
   }
 
   #stand = document.createElement("div"); // Frame of the canvas.
+  #said = null;  // what is wrong, or a button
+  #still = matchMedia("(prefers-reduced-motion: reduce)").matches; // until somebody wants motion
   #canvas = null;
   #stage = null; // null where it is lazy and out of view
   #plant = null;
@@ -172,7 +117,6 @@ export class ATHViewerElement extends HTMLElement {
     this.#go();
   }
 
-  // A browser has few contexts of WebGL: those out of view give theirs back, and get another one with another canvas.
   #wake() {
     if (this.#stage || !this.isConnected) return;
     this.#canvas = document.createElement("canvas");
@@ -180,10 +124,10 @@ export class ATHViewerElement extends HTMLElement {
     this.#canvas.setAttribute("aria-label", this.getAttribute("alt") ?? "Moving plant");
     this.#stand.replaceChildren(this.#canvas);
     try {
-      this.#stage = new (this.hasAttribute("scenery") ? Scenery : Bare)(this.#canvas, () => { this.#dirty = true; });
+      this.#stage = new Stand(this.#canvas, () => { this.#dirty = true; }, this.hasAttribute("scenery"));
     } catch (error) { // a browser without WebGL
       this.#canvas.remove();
-      this.#tell("error", Object.assign(error, { codeName: "GRAPHICS" }));
+      this.#fail(Object.assign(error, { codeName: "GRAPHICS" }));
       return;
     }
     this.#steer();
@@ -197,7 +141,6 @@ export class ATHViewerElement extends HTMLElement {
     if (!this.#stage) return;
     this.#clear();
     this.#stage.dispose();
-    this.#stage.renderer.forceContextLoss();
     this.#stage = null;
     this.#canvas.remove();
   }
@@ -205,6 +148,7 @@ export class ATHViewerElement extends HTMLElement {
   attributeChangedCallback(name, before, value) {
     if (!this.#stage || before === value) return;
     if (name === "src") this.#load();
+    if (name === "paused" && value === null) this.#start();
     if (name === "clip" || name === "wind") this.#play();
     if (name === "level") this.#setLevel();
     if (name === "alt") this.#canvas.setAttribute("aria-label", value ?? "Moving plant");
@@ -231,6 +175,12 @@ export class ATHViewerElement extends HTMLElement {
 
   play() {
     this.paused = false;
+    this.#start();
+  }
+
+  #start() {
+    this.#still = false;
+    this.#say();
   }
 
   pause() {
@@ -273,6 +223,18 @@ export class ATHViewerElement extends HTMLElement {
     this.dispatchEvent(new CustomEvent(type, { detail }));
   }
 
+  // In front of the picture, in place of what was said before.
+  #say(element = null, words = {}) {
+    this.#said?.remove();
+    this.#said = element && Object.assign(document.createElement(element), words);
+    if (element) this.shadowRoot.append(this.#said);
+  }
+
+  #fail(error) {
+    this.#say("p", { role: "alert", textContent: wordsOf(error.codeName).title, title: error.message });
+    this.#tell("error", error);
+  }
+
   async #load() {
     const wish = ++this.#wish, { src } = this;
     if (!src) {
@@ -288,11 +250,12 @@ export class ATHViewerElement extends HTMLElement {
       if (wish === this.#wish) this.#show(ath);
       else ath.dispose();
     } catch (error) {
-      if (wish === this.#wish) this.#tell("error", error);
+      if (wish === this.#wish) this.#fail(error);
     }
   }
 
   #clear() {
+    this.#say();
     this.#wish++;
     this.#grove?.dispose();
     this.#grove = null;
@@ -310,11 +273,15 @@ export class ATHViewerElement extends HTMLElement {
     motion.addEventListener("progress", ({ loaded, total }) => this.#tell("progress", { loaded, total }));
     for (const type of ["stopped", "damaged"]) motion.addEventListener(type, (event) => this.#tell("error", event));
     this.#seconds = 0;
-    if (this.#trees > 0) this.#grove = new Grove(plant, this.#trees, changed);
+    if (this.#trees > 0) {
+      const files = floorIn(this.getAttribute("floor") ?? "").map(({ source, each }) => ({ source: new URL(source, document.baseURI).href, each }));
+      this.#grove = new Grove(plant, this.#trees, files, ATHViewerElement.loader, changed);
+    }
     this.#stage.show(plant, this.#grove?.reach ?? 0);
-    if (this.#grove) this.#grow();
+    if (this.#grove) this.#grove.grow((each) => this.#stage.add(each));
     else this.#setLevel();
     if (this.hasAttribute("wind") && !this.#grove) this.#play();
+    if (this.#still && !this.paused) this.#say("button", { textContent: "▶ Play", onclick: () => this.play() });
     this.#dirty = true;
     this.#go();
     this.#tell("load", { ath });
@@ -322,15 +289,6 @@ export class ATHViewerElement extends HTMLElement {
 
   get #trees() {
     return this.hasAttribute("scenery") ? Math.round(Math.min(MOST_TREES, Number(this.getAttribute("forest")) || 0)) : 0;
-  }
-
-  #grow() {
-    const stage = this.#stage, tell = (error) => this.#tell("error", error);
-    const files = floorIn(this.getAttribute("floor") ?? "").map(({ source, each }) => ({ source: new URL(source, document.baseURI).href, each }));
-    this.#grove.grow(files, ATHViewerElement.loader, (plant) => {
-      stage.add(plant);
-      this.#dirty = true;
-    }).catch(tell);
   }
 
   #play() {
@@ -360,16 +318,17 @@ export class ATHViewerElement extends HTMLElement {
     this.#frame = requestAnimationFrame((next) => this.#tick(next));
     const passed = this.#last ? Math.min(LONGEST, (now - this.#last) / 1000) : 0, { ath: { motion }, root } = this.#plant;
     this.#last = now;
-    if (!this.paused) this.#seconds += passed * (Number(this.getAttribute("speed")) || 1);
+    const plays = !this.paused && !this.#still;
+    if (plays) this.#seconds += passed * (Number(this.getAttribute("speed")) || 1);
     const { controls, camera, pixels } = this.#stage;
     controls.update();
     if (this.#grove) {
-      this.#dirty ||= !this.paused || this.#grove.forests.some(({ fading }) => fading);
+      this.#dirty ||= plays || this.#grove.forests.some(({ fading }) => fading);
       this.#grove.update(camera, pixels, this.#seconds);
     } else motion.update(camera, pixels, root).setTime(this.#seconds);
     if (!this.#dirty) return;
     this.#dirty = false;
-    if (!this.paused) this.#stage.took(1000 * passed);
+    if (plays) this.#stage.took(1000 * passed);
     this.#stage.breeze(this.#seconds, BREEZE, 0);
     this.#stage.render();
     this.#canvas.classList.add("drawn");

@@ -1,7 +1,7 @@
 // BufferGeometries of a file: faces as triangles, edges as lines. A geometry's vertices are the file's, in source
 // order, or, where uv or normals are stored per corner, one per corner: `userData.source` says which vertex each is.
 
-import { BufferAttribute, BufferGeometry, ShapeUtils, Vector2, Vector3 } from "three";
+import { BufferAttribute, BufferGeometry, InstancedBufferAttribute, ShapeUtils, Vector2, Vector3 } from "three";
 
 import { normals } from "./normals.js";
 
@@ -11,6 +11,20 @@ export function polygonsOf(statics, attributes) {
   const { face_vertex_counts: counts, face_vertex_indices: indices } = attributes;
   if (statics.faces) return statics.faces;
   return counts && indices ? { array: Uint32Array.from(indices.array, Number), counts: counts.array } : null;
+}
+
+/** Stands an object of a file upright, in the axes of three.js: y is up. */
+export function upright(object, { up_axis: up }) {
+  if (up === "z") object.rotation.x = -Math.PI / 2;
+  if (up === "x") object.rotation.z = Math.PI / 2;
+  return object;
+}
+
+/** Puts numbers into an attribute: another one in its place would leave the buffer of the first on the GPU. */
+export function setValues(geometry, name, values, size) {
+  const there = geometry.getAttribute(name), Attribute = geometry.isInstancedBufferGeometry ? InstancedBufferAttribute : BufferAttribute;
+  if (there?.array.length !== values.length) geometry.setAttribute(name, new Attribute(values, size));
+  else Object.assign(there, { array: values, needsUpdate: true });
 }
 
 /** A mesh; `normal` is always there, computed where the file has none. */
@@ -107,7 +121,7 @@ export function addAttributes(geometry, ath, attributes) {
     const scale = found.array instanceof Uint8Array ? 1 / 255 : 1;
     const order = perCorner ? Uint32Array.from({ length: rows }, (_, i) => i) : source;
     const values = gather(new Float32Array(size * source.length), found.array, order, size).map((value) => value * scale);
-    geometry.setAttribute(attribute, new BufferAttribute(values, size));
+    setValues(geometry, attribute, values, size);
     if (name === "normals") geometry.userData.faces = null; // The normals of `setRest` are computed.
   }
 }

@@ -13,7 +13,7 @@ import time from "../../gpu/time.wgsl";
 import vertices from "../../gpu/vertices.wgsl";
 import { Kernels, Passes } from "../../gpu/passes.mjs";
 import { roundOf } from "./ATHMotion.js";
-import { clustered } from "./geometry.js";
+import { clustered, upright } from "./geometry.js";
 import { Mixture, Play } from "./gpu_blend.js";
 
 const MOST_SHAPES = 32;
@@ -75,6 +75,7 @@ export class ATHForest extends Group {
     if (!this.#device) throw new Error("ATHForest: got a renderer without WebGPU, expected one after init(); ATHForest of athcodec-three is for WebGL");
     this.#renderer = renderer;
     this.#ath = ath;
+    upright(this, ath.metadata);
     this.#play = new Play(ath.channel);
     this.#geometry = geometry;
     this.#material = material;

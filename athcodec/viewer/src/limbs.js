@@ -2,6 +2,8 @@
 // cylinder. Widths are the attribute "radius" or, without one, follow from how much grows beyond an edge.
 
 import { BufferAttribute, InstancedBufferAttribute, InstancedBufferGeometry, ShaderMaterial, Vector2 } from "three";
+
+import { setValues } from "./geometry.js";
 import { MOTION_PARS } from "./shader.js";
 
 // One instance per edge, of four corners: `position` says which end, and which side. Attributes of the far end have
@@ -76,7 +78,7 @@ export function setRadii(geometry, perVertex) {
   for (const [name, vertices] of [["radius", geometry.userData.source], ["radiusOther", geometry.userData.other]]) {
     const out = new Float32Array(vertices.length);
     for (let i = 0; i < vertices.length; i++) out[i] = perVertex[vertices[i]];
-    geometry.setAttribute(name, new InstancedBufferAttribute(out, 1));
+    setValues(geometry, name, out, 1);
   }
 }
 

@@ -111,22 +111,10 @@ vec3 objectTangent = vec3(tangent.xyz);
 `;
 
 const bound = new WeakMap(); // material: the uniforms that it reads
-const warned = new WeakSet();
-
-// A clone has no onBeforeCompile.
-function cloneOf(material) {
-  const clone = Object.getPrototypeOf(material).clone.call(material), uniforms = bound.get(material);
-  clone.onBeforeCompile = () => {
-    if (bound.has(clone) || warned.has(uniforms)) return;
-    warned.add(uniforms);
-    console.warn("athcodec-three: got a clone of a bound material, which draws the rest pose; motion.bind(clone) lets it move");
-  };
-  return clone;
-}
 
 /** Lets `material` draw geometries of a motion. `uniforms`: athData, athStride, athForest, shared by all materials
  * of one motion; where a forest fades athDataBefore and athBefore. Other changes in onBeforeCompile have to come before. A
- * material that is bound already draws the motion that it was bound to last. */
+ * material that is bound already draws the motion that it was bound to last; its clones are bound as it is. */
 export function injectMotion(material, uniforms, forest = false) {
   const known = bound.get(material);
   if (known === uniforms) return material;
@@ -136,7 +124,7 @@ export function injectMotion(material, uniforms, forest = false) {
     return material;
   }
   const defines = [...(forest ? ["ATH_FOREST"] : []), ...(uniforms.athBefore ? ["ATH_FADING"] : [])];
-  const before = material.onBeforeCompile, key = `ath ${defines} ${material.customProgramCacheKey()}`;
+  const { onBeforeCompile: before, customProgramCacheKey: keyBefore } = material, key = `ath ${defines} ${material.customProgramCacheKey()}`;
   material.onBeforeCompile = (shader, renderer) => {
     before.call(material, shader, renderer);
     Object.assign(shader.uniforms, bound.get(material));
@@ -146,7 +134,10 @@ export function injectMotion(material, uniforms, forest = false) {
       .replace("#include <beginnormal_vertex>", NORMAL);
   };
   material.customProgramCacheKey = () => key;
-  material.clone = () => cloneOf(material);
+  material.clone = () => {
+    const clone = Object.getPrototypeOf(material).clone.call(material);
+    return injectMotion(Object.assign(clone, { onBeforeCompile: before, customProgramCacheKey: keyBefore }), bound.get(material), forest);
+  };
   material.needsUpdate = true;
   return material;
 }

@@ -82,7 +82,9 @@ export class ATH extends EventDispatcher<{ arrays: {} }> {
   readonly attributes: Record<string, StaticArray>;
   /** Resolves with `attributes`. */
   readonly arrays: Promise<Record<string, StaticArray>>;
-  /** A Mesh of the faces, or LineSegments where there are none; with materials that can be replaced by bound ones. */
+  /** A Mesh of the faces, or LineSegments where there are none, that casts and receives shadows; with materials that can be replaced
+   * by bound ones. It is turned so that y is up where `metadata.up_axis` is another axis. Its clones are other plants in the same
+   * motion. */
   readonly object: Group;
   readonly hasFaces: boolean;
   /** Faces as triangles, normals computed where the file has none; null where there are no faces. `userData.source`: the

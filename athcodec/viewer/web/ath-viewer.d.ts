@@ -4,8 +4,9 @@
  *     <script type="module">import "athcodec-three/viewer";</script>
  *     <ath-viewer src="oak.ath" camera-controls alt="An oak in the wind"></ath-viewer>
  *
- * It is as large as its style says, transparent behind the plant, and draws only what is in view. What stands in it, such as a picture, is
- * shown until the plant is. Attributes, of which all but the last four can change:
+ * It is as large as its style says, transparent behind the plant, and draws only what is in view; all elements share one WebGL context.
+ * What stands in it, such as a picture, is shown until the plant is; where that cannot be drawn, a sentence says so. For visitors who
+ * want less motion it stands still until its button, or play(), starts it. Attributes, of which all but the last four can change:
  *
  * * src: the file's address;
  * * clip: the name of the clip that plays (default: the first);
