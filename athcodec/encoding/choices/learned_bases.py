@@ -9,7 +9,7 @@ from athcodec.encoding.features import Feature
 from athcodec.encoding.settings import Settings
 from athcodec.encoding.trials import Trials
 
-PERIODIC_WORTH = 1.1  # Largest ratio of bytes at which waves are periodic: coarse levels jump at the seam of others.
+PERIODIC_WORTH = 1.3  # Largest ratio of bytes at which waves are periodic: coarse levels jump at the seam of others.
 
 
 def candidates(settings: Settings, trials: Trials) -> list[Settings]:
