@@ -174,20 +174,23 @@ def plant_colours(plant: Growing) -> np.ndarray:
 
 
 def encoded(name: str) -> bytes:
-    """As athcodec writes it; one that has layers about the mean pose, whether it pays or not."""
+    """As athcodec writes it; one has layers about the mean pose, and one refines its rest pose, paying or not."""
     import athcodec
+    from athcodec.encoding import start
     from athcodec.encoding.search import Search
 
-    best = Search.about_best_reference
+    best, share = Search.about_best_reference, start.AT_ONCE_SHARE
     if name == "all":
         Search.about_best_reference = Search.about_mean_pose
+    if name == "refined-rest":
+        start.AT_ONCE_SHARE = 0.0
     try:
         with tempfile.TemporaryDirectory() as folder:
             target = Path(folder) / "clip.ath"
             athcodec.encode(clip(name), target, **OPTIONS[name])
             return target.read_bytes()
     finally:
-        Search.about_best_reference = best
+        Search.about_best_reference, start.AT_ONCE_SHARE = best, share
 
 
 def features(data: bytes) -> set[str]:
@@ -199,7 +202,7 @@ def features(data: bytes) -> set[str]:
     for (kind, level, _), chunk in file.chunks.items():
         if kind == rules.STEMS:
             heads.append(chunk.bytes[2 if level > of_refinements else 0 :])
-    joins = [join for row in header.joins for join in row]
+    joins = [join for row in header.joins.values() for join in row]
     shown = {
         "several clips": len(file.clips) > 1,
         "a loop": any(clip.seams is not None for clip in file.clips),
