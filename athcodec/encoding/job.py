@@ -426,7 +426,9 @@ class EncodingJob:
         unsearched = share * search.first_cost()
         if math.isfinite(unsearched):
             work.allowed -= FILE_BYTE * unsearched
-        prediction = None if search.trials.start.rigid.any() else self._best_prediction(bound, unsearched, work)
+        start = search.trials.start
+        is_rigid = (start.rigid > start.layer).any()  # Also in the last layer.
+        prediction = None if is_rigid else self._best_prediction(bound, unsearched, work)
         if prediction is not None and prediction.bytes < SEARCH_SAVES * unsearched:
             return self._predicted(prediction.choice)
         try:
