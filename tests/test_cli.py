@@ -688,7 +688,7 @@ def test_bash_completes_verbs_options_and_files(encoded, tmp_path, capsys, monke
         asked = f"COMP_WORDS=({' '.join(line)}); COMP_CWORD={len(line) - 1}; _shtab_athcodec; echo ${{COMPREPLY[@]}}"
         shown = subprocess.run(["bash", "-c", f"{script}\n{asked}"], capture_output=True, text=True, check=True)
         assert wanted in shown.stdout
-    monkeypatch.setitem(sys.modules, "shtab", None)  # as where it is not installed
+    monkeypatch.setitem(sys.modules, "shtab", None)  # Importing it fails as where it is not installed.
     with pytest.raises(SystemExit) as refused:
         run("--print-completion", "zsh")
     assert refused.value.code == 2 and "athcodec[completion]" in capsys.readouterr().err

@@ -228,7 +228,7 @@ def _rests(
     return rest, level_0, [(pose.decoded, None if pose is last else pose) for pose, last in zip(of_layers, before)]
 
 
-def poses_size(source: Source, ath: Ath, settings: Settings, ratios: Sequence[int]) -> float:
+def layered_poses_size(source: Source, ath: Ath, settings: Settings, ratios: Sequence[int]) -> float:
     """Return the bytes of hierarchy and rest poses of layers; infinite if the last pose cannot keep the bound."""
     try:
         prelude = CodedPrelude(source, ath, settings)

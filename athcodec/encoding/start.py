@@ -12,7 +12,7 @@ from athcodec.encoding import quantise as qz
 from athcodec.encoding.choices import rest
 from athcodec.encoding.choices.forms import first_forms
 from athcodec.encoding.choices.rigid import first_rigid, loose_branches
-from athcodec.encoding.layers import poses_size
+from athcodec.encoding.layers import layered_poses_size
 from athcodec.encoding.segment import Source, plain_settings
 from athcodec.encoding.segment_samples import SegmentSample, usual_change
 from athcodec.encoding.settings import Choice, Settings
@@ -60,7 +60,7 @@ def _in_layers(source: Source, ath: Ath, settings: Settings, ratios: Sequence[in
     )
     refined = rest.connected_if_smaller(source, ath, refined)
     as_fine = replace(refined, rest_step=at_once.rest_step)
-    sizes = [poses_size(source, ath, some, ratios) for some in (at_once, as_fine)]
+    sizes = [layered_poses_size(source, ath, some, ratios) for some in (at_once, as_fine)]
     return at_once if sizes[0] < AT_ONCE_SHARE * sizes[1] else refined
 
 

@@ -212,7 +212,7 @@ def serve(
         As `export_page`.
     """
     _check_server(path)
-    is_glb = file_name(path).lower().endswith(".glb")  # as the page tells it
+    is_glb = file_name(path).lower().endswith(".glb")  # The page tells it by the name, too.
     if forest and is_glb:
         raise ClipError("--forest: got a GLB, expected an .ath file")
     mesh = _checked(path, clip, host_mesh, is_glb)
