@@ -1,10 +1,10 @@
 """The clips that the benchmark measures: made once, kept in a folder, the same for everyone.
 
-The shipped sample; trees moved by the physics engine MuJoCo (see bench/trees); render meshes of trees with leaves in
-wind; small clips of many kinds (see bench/odd); files that other programs write (see bench/foreign); and any clip by
-its path. All are seeded. Those of trees/exact.py have the same bits on every machine, which their digests check; others
-of athcodec's own code differ by rounding only. The attribute "recipe" of an HDF5 file, or NAME.recipe beside a file of
-another kind, describes how it was made; when the recipe changes, the file is made again.
+The shipped sample; render meshes of trees with leaves in wind (see bench/trees); small clips of many kinds (see
+bench/odd); files that other programs write (see bench/foreign); and any clip by its path. All are seeded. Those of
+trees/exact.py have the same bits on every machine, which their digests check; others of athcodec's own code differ by
+rounding only. The attribute "recipe" of an HDF5 file, or NAME.recipe beside a file of another kind, describes how it was
+made; when the recipe changes, the file is made again.
 """
 
 from __future__ import annotations
@@ -31,7 +31,6 @@ from bench.trees import exact
 from bench.trees.beams import bend
 from bench.trees.mesh import dress
 from bench.trees.plant import grow
-from bench.trees.simulate import MissingEngine, Unstable, simulate
 from bench.trees.wind import Wind
 
 FOLDER_VARIABLE = "ATHCODEC_BENCH_DATA"
@@ -49,26 +48,6 @@ the branches, trunk 0.
 
 class Different(Exception):
     """A clip that is the same on every machine came out otherwise."""
-
-
-@dataclass(frozen=True)
-class Simulated:
-    """A tree of so many nodes with branches of the orders 0 to `orders`, simulated in turbulent wind."""
-
-    nodes: int
-    orders: int
-    frames: int
-    height: float
-    wind_speed: float
-    seed: int
-
-    def make(self) -> athcodec.MotionClip:
-        plant = grow(self.nodes, self.orders, self.height, self.seed)
-        motion = simulate(plant, Wind(self.wind_speed, self.height, seed=self.seed), self.frames)
-        return plant.clip(motion.positions, motion.time, 30, **motion.settings)
-
-    def __str__(self) -> str:
-        return f"MuJoCo, {self.height:g} m tree in wind of {self.wind_speed:g} m/s"
 
 
 @dataclass(frozen=True)
@@ -96,12 +75,9 @@ class Canopy:
         return f"{self.height:g} m tree as a mesh: bark tubes and {self.leaves:,} {self.species} leaves in wind"
 
 
-Recipe = Simulated | Canopy | exact.Tree | exact.Cards | odd.Odd | foreign.Foreign
+Recipe = Canopy | exact.Tree | exact.Cards | odd.Odd | foreign.Foreign
 
 RECIPES: dict[str, Recipe] = {
-    "mj_1k_200f": Simulated(1000, 2, 200, 8.0, 11.0, seed=1),
-    # the paper's case: 3 levels of branches, about 8,000 nodes, 200 steps, wind along (-1, 0, 1)
-    "mj_8k_200f": Simulated(8000, 2, 200, 12.0, 9.0, seed=5),
     "canopy_4k_60f": Canopy(400, 2, 60, 6.0, 8.0, 260, "broadleaf", seed=11),
     "canopy_15k_200f": Canopy(1000, 2, 200, 8.0, 8.0, 1400, "broadleaf", seed=12),
     "canopy_67k_200f": Canopy(4000, 3, 200, 10.0, 8.0, 10000, "poplar", seed=13),
@@ -123,7 +99,7 @@ RECIPES: dict[str, Recipe] = {
 }
 
 SUITES = {
-    "quick": (SAMPLE, "mj_1k_200f", "canopy_4k_60f"),
+    "quick": (SAMPLE, "canopy_4k_60f"),
     "full": (SAMPLE, *RECIPES),
     "odd": tuple(odd.CLIPS),
     "odd-quick": odd.FEW,
@@ -137,7 +113,7 @@ RECIPES["canopy_1k_60f"] = Canopy(120, 2, 60, 4.0, 8.0, 80, "broadleaf", seed=15
 def path_of(name: str, folder: Path | None = None) -> Path:
     """The file of a clip by name, made if it is missing, or of any clip by its path.
 
-    Raises KeyError for a name that is neither, MissingEngine if the program that makes it is not installed.
+    Raises KeyError for a name that is neither, foreign.MissingProgram if the program that makes it is not installed.
     """
     return _found_or_made(name, folder or default_folder())[0]
 
@@ -172,7 +148,7 @@ def _found_or_made(name: str, folder: Path) -> tuple[Path, float | None]:
 def _make(name: str, path: Path) -> float:
     start, recipe = time.perf_counter(), RECIPES[name]
     if isinstance(recipe, foreign.Foreign) and (why := recipe.missing()):
-        raise MissingEngine(why)
+        raise foreign.MissingProgram(why)
     for old in files_of(path) if path.exists() else ():  # They may be damaged, or more than will be written.
         old.unlink()
     if isinstance(recipe, foreign.Foreign):
@@ -256,10 +232,10 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     for name in names:
         try:
             path, seconds = _found_or_made(name, folder)
-        except MissingEngine as error:
+        except foreign.MissingProgram as error:
             rows.append({"name": name, "made": f"MISSING: {error}"})
             continue
-        except (Unstable, Different, KeyError) as error:
+        except (Different, KeyError) as error:
             raise SystemExit(f"bench data: {error.args[0]}") from error
         with read(path) as clip:
             size = {"file MB": 1e-6 * sum(file.stat().st_size for file in files_of(path))}

@@ -77,7 +77,7 @@ SOURCES = """
 Clips that `python -m bench data` does not make were given by their paths: `leaves_373x121f`; `growing_front`, the
 sample tree along whose branches a front runs, what it has not reached standing at its tip; `sample_loop`, the sample
 with 20 frames of its end blended into its start; `bean_8_days`, a bean plant that the Helios simulator grew; `utm`, a
-scanned stem in UTM coordinates.
+scanned stem in UTM coordinates; `mj_1k_200f`, a tree of 1,000 rigid links on hinges in wind.
 """
 
 NOT_JUDGED = """

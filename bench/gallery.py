@@ -52,7 +52,7 @@ def _encoded(folder: Path) -> dict[str, Path]:
     made = {}
     for name, source, bound in (
         ("growth", athcodec.sample_path("growth"), 1e-4),
-        ("bare", data.path_of("mj_8k_200f"), 1e-3),
+        ("bare", data.path_of("fe_8k_200f"), 1e-3),
     ):
         made[name] = folder / f"{name}.ath"
         with athcodec.read(source) as clip:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from bench import data
-from bench.trees.simulate import MissingEngine
+from bench.foreign import MissingProgram
 
 SUITES = tuple(data.SUITES)
 
@@ -34,5 +34,5 @@ def _case(word: str) -> Case:
         raise SystemExit(f"clip: got {word!r}; expected a file or one of {names}")
     try:
         return Case(word, Path(data.path_of(word)), data.describe(word))
-    except MissingEngine as error:
+    except MissingProgram as error:
         return Case(word, None, f"{data.describe(word)}: MISSING: {error}")

@@ -15,7 +15,6 @@ import athcodec
 from bench import data
 from bench.store import read
 from bench.trees import beams, exact
-from bench.trees import simulate as simulation
 from bench.trees.leaves import SPECIES, Leaves, Plates, sheltered
 from bench.trees.mesh import SIDES, dress
 from bench.trees.plant import grow
@@ -26,7 +25,6 @@ ROOT = Path(__file__).resolve().parent.parent
 
 pytestmark = pytest.mark.tools
 
-SMALL = data.Simulated(nodes=100, orders=2, frames=20, height=4.0, wind_speed=10.0, seed=1)
 BREEZE = Wind(8.0, 8.0, seed=2)
 CANOPY = data.Canopy(nodes=120, orders=1, frames=40, height=5.0, wind_speed=8.0, leaves=80, species="poplar", seed=3)
 
@@ -92,69 +90,6 @@ def test_gusts_have_the_intensity_asked_for_and_travel_with_the_wind():
     assert np.abs(near - wind.at(points[:50], 0.0)).max() < np.abs(gusts).max() / 5
 
 
-@pytest.mark.programs
-def test_a_simulated_plant_moves_keeps_its_lengths_and_comes_out_the_same_again(recipes, tmp_path):
-    recipes["small"] = SMALL
-    files = [data.path_of("small", tmp_path / folder) for folder in ("one", "two")]
-    with athcodec.read_hdf5(files[0]) as clip, athcodec.read_hdf5(files[1]) as again:
-        clip.check()
-        positions = clip.block(0, 20)
-        assert np.array_equal(positions, again.block(0, 20))
-        assert (clip.vertex_count, clip.frame_count, clip.metadata["unit"]) == (100, 20, "m")
-        assert np.allclose(lengths(positions, clip.edges), lengths(clip.rest, clip.edges), rtol=1e-4)
-        assert 0.001 < data.tip_motion(clip) < 0.1
-        assert (positions[:, 0] == 0).all() and 0.2 < clip.metadata["lowest_hz"] < 5
-        down_wind = (positions - clip.rest).mean(axis=(0, 1)) @ DIRECTION
-        assert down_wind > 0.01
-
-
-def test_without_the_engine_a_message_says_what_to_install(monkeypatch, tmp_path):
-    monkeypatch.setitem(sys.modules, "mujoco", None)
-    with pytest.raises(simulation.MissingEngine, match="not installed, expected `pip install mujoco`"):
-        data.path_of("mj_1k_200f", tmp_path)
-    assert not list(tmp_path.iterdir())
-
-
-@pytest.mark.programs
-def test_forces_around_hinges_are_those_of_the_engine():
-    mujoco = simulation.engine()
-    plant = grow(60, 2, 4.0, seed=5)
-    links = simulation._Links(plant)
-    model, bodies, _ = links.model(mujoco)
-    state, rng = mujoco.MjData(model), np.random.default_rng(0)
-    state.qpos[:] = rng.normal(0, 0.2, model.nq)
-    mujoco.mj_forward(model, state)
-    run = simulation._Run(mujoco, model, state, links, bodies, BREEZE, 0.1)
-    force = rng.normal(size=(60, 3))
-    force[0] = 0
-    expected = np.zeros(model.nv)
-    for body, push in zip(bodies[1:], force[1:], strict=True):
-        mujoco.mj_applyFT(model, state, push, np.zeros(3), state.xipos[body], body, expected)
-    assert np.allclose(run._around_hinges(state.xipos[bodies], force), expected, atol=1e-12)
-
-
-@pytest.mark.programs
-def test_a_pole_bends_under_a_force_at_its_tip_as_beam_theory_says():
-    mujoco = simulation.engine()
-    grown = grow(31, 0, 3.0, seed=1)
-    upright = np.linspace(0, 3, 31)[:, None] * [0, 1, 0]
-    pole = replace(grown, position=upright, radius=np.full(31, 0.02))
-    links = simulation._Links(pole)
-    model, bodies, stiffness = links.model(mujoco)
-    state = mujoco.MjData(model)
-    model.dof_damping[:] = 0.2 * stiffness
-    run = simulation._Run(mujoco, model, state, links, bodies, BREEZE, 0.0)
-    force = np.zeros((31, 3))
-    force[30, 0] = 2.0
-    for _ in range(2000):
-        mujoco.mj_step1(model, state)
-        state.qfrc_applied[:] = run._around_hinges(run.nodes(), force)
-        mujoco.mj_step2(model, state)
-    expected = 2.0 * 3.0**3 / (3 * simulation.YOUNG * np.pi / 4 * 0.02**4)
-    assert run.nodes()[30, 0] == pytest.approx(expected, rel=0.06)  # 1 + 3 / (2 * 30) by the hinges
-    assert 0.01 < expected < 0.1 and abs(run.nodes()[30, 2]) < 1e-6
-
-
 @pytest.fixture(scope="module")
 def canopy():
     return CANOPY.make()
@@ -176,9 +111,9 @@ def test_a_pole_of_beams_bends_and_swings_as_theory_says():
     force = np.zeros(6 * 31)
     force[6 * 30] = 2.0
     bent = np.linalg.solve(stiffness.toarray(), force)
-    moment = simulation.YOUNG * np.pi / 4 * 0.02**4
+    moment = beams.YOUNG * np.pi / 4 * 0.02**4
     assert bent[6 * 30] == pytest.approx(2.0 * 3.0**3 / (3 * moment), rel=1e-4)
-    expected = 1.8751**2 / 3.0**2 * np.sqrt(moment / (simulation.DENSITY * np.pi * 0.02**2))
+    expected = 1.8751**2 / 3.0**2 * np.sqrt(moment / (beams.DENSITY * np.pi * 0.02**2))
     assert beams._lowest_frequency(stiffness, mass) == pytest.approx(expected, rel=0.01)
     assert np.allclose(lengths(beams._placed(pole, bent.reshape(-1, 6)[:, :3]), pole.edges), 0.1)
 

@@ -11,7 +11,6 @@ import pytest
 from bench import clips, data, foreign
 from bench.data import digest
 from bench.suite import cases
-from bench.trees.simulate import MissingEngine
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -37,7 +36,7 @@ def test_a_program_that_is_not_installed_is_named_with_the_line_that_installs_it
     monkeypatch.setattr(foreign, "find_spec", lambda name: None)
     monkeypatch.setenv(data.FOLDER_VARIABLE, str(tmp_path))
     words = "Helios: not installed, expected `pip install pyhelios3d usd-core`"
-    with pytest.raises(MissingEngine, match=words):
+    with pytest.raises(foreign.MissingProgram, match=words):
         data.path_of("helios_bean_8d", tmp_path)
     result = data.run(argparse.Namespace(names=["helios_bean_8d"], suite=None, folder=tmp_path))
     assert result["tables"][0]["rows"] == [{"name": "helios_bean_8d", "made": f"MISSING: {words}"}]

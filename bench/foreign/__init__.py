@@ -33,6 +33,10 @@ PROGRAMS: dict[str, tuple[str, dict[str, str]]] = {
 }
 
 
+class MissingProgram(Exception):
+    """The program that makes a clip is not installed."""
+
+
 @dataclass(frozen=True)
 class Foreign:
     """A clip by the module of its program, its maker there and what that is given, and the end of its file's name."""

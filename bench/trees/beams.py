@@ -4,8 +4,9 @@ Every element is a Bernoulli beam clamped to its neighbours, with its mass and i
 are linear, so one factorisation serves all time steps (Newmark's average acceleration, stable at any step). Nodes are
 then placed by turning every element as its chord turns, which keeps the lengths that linear displacements would stretch
 (after Choi and Ko, "Modal warping: real-time simulation of large rotational deformation and manipulation", IEEE TVCG
-11(1), 2005). Drag and damping are those of simulate.py; the part of the drag that follows the plant's own speed is that
-of the mean wind. The shape as grown is the one under the plant's own weight.
+11(1), 2005). Drag acts on the wood across its axis and on the foliage; the part of it that follows the plant's own
+speed is that of the mean wind. Damping is Rayleigh's: a part of critical at the plant's lowest frequency, and at six
+times that. The shape as grown is the one under the plant's own weight.
 """
 
 from __future__ import annotations
@@ -16,24 +17,21 @@ import numpy as np
 
 from bench.trees.plant import Plant
 from bench.trees.ride import cross_matrices, rotations
-from bench.trees.simulate import (
-    AIR,
-    DENSITY,
-    DRAG_OF_WOOD,
-    FOLIAGE_MASS,
-    FOLIAGE_SPREAD,
-    SHEAR,
-    SPIN_UP_SECONDS,
-    YOUNG,
-    foliage_area,
-    rayleigh,
-)
 from bench.trees.wind import Wind
 
 if TYPE_CHECKING:
     from scipy.sparse import csc_matrix
 
 STEPS = 3  # Time steps of a frame.
+DENSITY = 900.0  # Density of green wood, kg/m3.
+YOUNG, SHEAR = 8.5e9, 0.6e9  # Pa
+AIR = 1.2  # kg/m3
+DRAG_OF_WOOD = 1.0
+FOLIAGE_AREA = 0.07  # Drag coefficient times area of all foliage, over the square of the height.
+FOLIAGE_MASS = 1.2  # kg per m2 of it
+FOLIAGE_SPREAD = 0.05  # Radius of gyration of a node's foliage, m.
+SECOND_DAMPED = 6.0  # The other damped frequency, over the lowest.
+CALM_SECONDS, SPIN_UP_SECONDS = 1.0, 4.0  # The wind rises over the former; the clip begins after the latter.
 
 
 def bend(
@@ -137,6 +135,17 @@ def node_drag(plant: Plant) -> np.ndarray:
     wood = DRAG_OF_WOOD * 2 * plant.radius * plant.lengths
     drag = 0.5 * AIR * (wood + foliage_area(plant))
     return np.stack([drag, 0 * drag], axis=1).repeat(3, axis=1).ravel()
+
+
+def foliage_area(plant: Plant) -> np.ndarray:
+    """(N,) drag coefficient times area of each node's foliage, m2."""
+    return FOLIAGE_AREA * (plant.height * plant.height) * plant.foliage
+
+
+def rayleigh(lowest: float, damping: float) -> tuple[float, float]:
+    """Factors of mass and stiffness: `damping` at the lowest frequency and at SECOND_DAMPED times it."""
+    high = SECOND_DAMPED * lowest
+    return 2 * damping * lowest * high / (lowest + high), 2 * damping / (lowest + high)
 
 
 def _lowest_frequency(stiffness: csc_matrix, mass: np.ndarray) -> float:

@@ -18,10 +18,9 @@ from operator import add
 import numpy as np
 
 from athcodec import MotionClip
-from bench.trees.beams import node_drag, node_mass
+from bench.trees.beams import CALM_SECONDS, SHEAR, YOUNG, node_drag, node_mass, rayleigh
 from bench.trees.plant import BASE_RADIUS, FIRST_FORK, Plant, sum_above
 from bench.trees.ride import cross_matrices
-from bench.trees.simulate import CALM_SECONDS, SHEAR, YOUNG, rayleigh
 from bench.trees.wind import DIRECTION
 
 FPS, STEPS = 30.0, 2  # Frames a second, time steps of a frame.

@@ -16,8 +16,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bench.trees.beams import AIR
 from bench.trees.ride import Skeleton, sideways
-from bench.trees.simulate import AIR
 from bench.trees.wind import DIRECTION, Wind
 
 LEAF_ANGLE = np.radians(60.0)  # to its twig
