@@ -3,8 +3,8 @@
 The shipped sample; render meshes of trees with leaves in wind (see bench/trees); small clips of many kinds (see
 bench/odd); files that other programs write (see bench/foreign); and any clip by its path. All are seeded. Those of
 trees/exact.py have the same bits on every machine, which their digests check; others of athcodec's own code differ by
-rounding only. The attribute "recipe" of an HDF5 file, or NAME.recipe beside a file of another kind, describes how it was
-made; when the recipe changes, the file is made again.
+rounding only. The attribute "recipe" of an HDF5 file, or NAME.recipe beside a file of another kind, describes how it
+was made; when the recipe changes, the file is made again.
 """
 
 from __future__ import annotations
