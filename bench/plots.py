@@ -18,9 +18,10 @@ class NoPlots(Exception):
     """matplotlib is missing; the message says what to do."""
 
 
-def pyplot(inches: tuple[float, float], rows: int = 1):
-    """A function that makes a figure of this size and its axes, or an array of them below each other, without a
-    display. Raises NoPlots.
+def pyplot(inches: tuple[float, float], rows: int = 1, columns: int = 1):
+    """A function that makes a figure of this size and its axes, or an array of them, without a display.
+
+    Raises NoPlots.
     """
     try:
         from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -31,7 +32,7 @@ def pyplot(inches: tuple[float, float], rows: int = 1):
     def figure_of():
         figure = Figure(figsize=inches, dpi=DPI, layout="constrained")
         FigureCanvasAgg(figure)
-        return figure, figure.subplots(rows, sharex=True)
+        return figure, figure.subplots(rows, columns)
 
     return figure_of
 

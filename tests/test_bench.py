@@ -370,12 +370,9 @@ def test_prefixes_are_compared_with_files_of_their_own_at_levels_and_between_the
     assert len(steps) >= 4 and picture.stat().st_size > 10_000
 
 
-def test_smoothness_is_a_table_and_a_picture(sample_positions, tmp_path):
-    pytest.importorskip("matplotlib")
+def test_smoothness_of_clips_is_a_table(sample_positions, tmp_path):
     words = ["--rel-error", "1e-3", "--segment-frames", "40", "--ladder", "none", "--effort", "fast"]
-    picture = tmp_path / "a.png"
-    text, result = run_bench(tmp_path, "smoothness", *words, "--picture", str(picture))
-    assert picture.read_bytes().startswith(b"\x89PNG")
+    text, result = run_bench(tmp_path, "smoothness", *words)
     [rows] = tables_of(result)
     assert [row["level"] for row in rows] == [0, 1, 2, 3]
     bends = np.diff(sample_positions.astype(float), 2, axis=0)
@@ -384,3 +381,16 @@ def test_smoothness_is_a_table_and_a_picture(sample_positions, tmp_path):
     assert [row["source's"] for row in rows] == pytest.approx([usual] * 4, rel=1e-3)
     assert all(row["tick ratio"] < 2 * usual for row in rows), "segments go on from the one before"
     assert "tick ratio" in text
+
+
+def test_a_sheet_shows_level_1_of_all_loops_of_a_file_over_their_wraps(tmp_path):
+    pytest.importorskip("matplotlib")
+    fern, sheet = athcodec.sample_path("fern"), tmp_path / "a.png"
+    for name in ("calm", "gale"):
+        with athcodec.open(fern, clip=name) as decoder:
+            clip = athcodec.MotionClip(decoder.positions(level=1), decoder.time)
+        athcodec.write_hdf5(clip, tmp_path / f"fern.{name}.h5")
+    text, result = run_bench(tmp_path, "smoothness", str(fern), "--sheet", str(sheet), "--before", str(tmp_path))
+    assert sheet.read_bytes().startswith(b"\x89PNG")
+    assert [row["level"] for rows in tables_of(result) for row in rows] == [0, 1, 2, 3, 4] * 2
+    assert "fern gale" in text and all(row["over source"] <= 2 for rows in tables_of(result) for row in rows)
