@@ -72,6 +72,17 @@ def test_branches_that_are_not_tried_are_named(tmp_path, monkeypatch):
     assert "branches" in athcodec.encode(sheet(), tmp_path / "a.ath").untried
 
 
+def test_time_bases_of_motion_that_sums_a_few_shapes_are_learned_where_work_is_short():
+    rng, cards = np.random.default_rng(1), 60
+    rest = np.repeat(rng.normal(size=(cards, 3)), 6, axis=0) + 0.05 * rng.normal(size=(6 * cards, 3))
+    weights = 0.06 * np.cumsum(rng.normal(size=(120, 3)), axis=0)
+    moved = rest + np.tensordot(weights, rng.normal(size=(3, 6 * cards, 3)), 1)
+    branches = np.repeat(np.arange(cards), 6), np.minimum(np.arange(cards), 1) - 1
+    clip = MotionClip(moved, np.arange(120) / 30, *branches)
+    in_waves, learned = (athcodec.encode(clip, effort=effort, ladder="none") for effort in ("fast", "default"))
+    assert len(learned) < 0.75 * len(in_waves)
+
+
 @pytest.mark.parametrize("share", [0.001, 0.1])
 def test_less_work_gives_a_file_that_keeps_its_bound(share, tmp_path, monkeypatch):
     allow(share, monkeypatch)

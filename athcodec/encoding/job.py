@@ -393,10 +393,11 @@ class EncodingJob:
             search = Search.of(self.source, ath, bound, self.options.effort, work, self.options.jobs)
             unsearched = search.first_cost()
             prediction = self._best_prediction(bound, unsearched, work)
-            if prediction is not None and prediction.bytes < SEARCH_SAVES * unsearched:
+            if prediction is None:  # First settings rank branches as the work that is left for a search hardly does.
+                return search.untried(frames_ratio), False
+            if prediction.bytes < SEARCH_SAVES * unsearched:
                 return frames_ratio * prediction.bytes, True
-            best, predicted = search.tried(frames_ratio), math.inf if prediction is None else prediction.bytes
-            return min((best, False), (frames_ratio * predicted, True))
+            return min((search.tried(frames_ratio), False), (frames_ratio * prediction.bytes, True))
         except BoundError:
             return math.inf, False
 

@@ -36,6 +36,7 @@ NEAREST, NEAR_RATIO = 4, 1.12  # Steps are walked for so many other choices, of 
 SETTLING_ROUNDS = 64  # Largest number of times that the choices of a small clip are changed.
 
 STEP_TRIALS, FIRST_LAYER_TRIALS = 12, 6  # Trials for which choices leave work: of steps, and of the first of layers.
+SEARCHED_SHARE = 0.5  # Share of the bytes of motion at its first settings that a search usually comes down to.
 LEAST_TRIALS = 12  # Trials without which another reference pose is not tried.
 
 Choose = Callable[[Settings, Trials], Settings]
@@ -141,6 +142,12 @@ class Search:
         settings, trials = search.at_best_step, search.trials
         return trials.cost(settings) + (frames_ratio - 1) * trials.level_costs(settings).sum()
 
+    def untried(self, frames_ratio: float) -> float:
+        """Return about the same from the settings that the search starts with."""
+        trials = (self.of_sample or self).trials
+        motion = trials.level_costs(trials.start).sum()
+        return trials.cost(trials.start) + (SEARCHED_SHARE * frames_ratio - 1) * motion
+
     def decide(self) -> tuple[list[Choice], CodedPrelude]:
         """Return settings to choose from, and hierarchy and poses as coded with them."""
         of_first_layer = FIRST_LAYER_TRIALS * self.trials.is_layered
@@ -182,6 +189,9 @@ class Search:
             forms.best_forms_again,
             learned_pieces.best_pieces_in_any_basis,
         ]
+        work = self.trials.work
+        if work.allowed - work.done < expected_trials(self.effort, False, False) * self.trials.work_of_trial:
+            choices.insert(0, learned_bases.best_bases)  # Time bases may save most; again where work is left.
         with self.trials.work.trying("steps", self._share_beside(STEP_TRIALS)):
             return self._after([best_level_steps, *choices, learned_bases.best_waves], self.trials.start)
 
