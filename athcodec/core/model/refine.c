@@ -110,7 +110,7 @@ ATH_HOT void ath_to_local(const ath_plan *plan, int32_t T, const ath_piece *piec
 ATH_HOT static void project_modes(const ath_plan *plan, int32_t T, const ath_piece *piece, int32_t first, int32_t stop,
                                   const double *local, double *ATH_RESTRICT rows)
 {
-    double weight[ATH_PIECE_VERTICES], tip = ath_tip_weight(piece, plan->rest);
+    double weight[ATH_PIECE_VERTICES], tip = piece->tip_weight;
     const double *x[ATH_PIECE_VERTICES];
     int32_t last = piece->count - 1, count;
     for (int32_t from = 0; from < 3 * T; from += count) {

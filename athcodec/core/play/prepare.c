@@ -396,7 +396,8 @@ static int start(void *memory, size_t work_bytes, const ath_file *file, int32_t 
     int32_t stage = ath_file_stage(file, level);
     preparation asked = {file, segment_memory, 0, index, stage, before, kept, 0, {0, 0}, 0};
     if (!file->rest_known) return ATH_NEEDS_HOST_MESH;
-    if (!file->bases || !ath_level_plan(file, stage)->bases || !ath_fits(memory, work_bytes, ath_work_size(file))
+    if (stage > file->built_level || !ath_level_plan(file, stage)->bases
+        || !ath_fits(memory, work_bytes, ath_work_size(file))
         || !ath_fits(segment_memory, segment_bytes, ath_segment_size(file, level)))
         return ATH_NO_MEMORY;
     memset(work, 0, sizeof *work);
