@@ -107,9 +107,12 @@ const double *ath_pose_rows(const ath_plan *plan, const ath_motion *motion, int3
 /* Places a piece from its integers. */
 const double *ath_pose_piece(const ath_plan *plan, const ath_motion *motion, int32_t p, const ath_piece_rows *rows,
                              const ath_scratch *scratch);
-/* Places a piece from its integers after ath_turned_attach. */
-const double *ath_pose_turned(const ath_plan *plan, const ath_motion *motion, int32_t p, const ath_piece_rows *rows,
-                              const ath_scratch *scratch);
+/* After ath_turned_attach, fills the coefficients over time, and notes which rows are not all 0 (ATH_PIECE_VERTICES). */
+void ath_pose_tracks(const ath_motion *motion, const ath_piece *piece, const ath_piece_rows *rows,
+                     const ath_scratch *scratch, uint8_t *used);
+/* Places a piece after ath_pose_tracks. */
+const double *ath_pose_used(const ath_plan *plan, const ath_motion *motion, const ath_piece *piece,
+                            const ath_piece_rows *rows, const uint8_t *used, const ath_scratch *scratch);
 
 /* Turns R towards the rotation nearest to H, whose column k is what rest axis k became. Leaves R if H vanishes. */
 void ath_turn_to(const double H[9], int32_t steps, double R[9]);
