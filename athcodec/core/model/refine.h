@@ -7,6 +7,10 @@
 
 /* Returns the number of frequencies, at most `most`, up to which a row is not all 0. */
 int32_t ath_row_extent(const int32_t *row, int32_t frames, int32_t most);
+/* Returns whether all integers are 0. */
+int ath_is_zero(const int32_t *integers, int32_t count);
+/* Returns how many rows of a piece, from the first, have predictions. */
+int32_t ath_predicted_modes(const ath_piece *piece, const ath_piece_before *before, const ath_piece_rows *rows);
 /* Predict the integers of a piece's translation and of its rotation. For pieces that were rigid in the layer before,
  * scratch->at is the attach frame, before this track is applied. */
 void ath_predict_shift(const ath_motion *motion, const ath_piece *piece, const ath_piece_before *before,
