@@ -26,23 +26,28 @@ typedef struct {
     double shift[3], turn[1 + MOST_TERMS][9], rest;
 } row_sums;
 
-ATH_INLINE double larger(double most, double number)
+/* Returns a sum of products in no order that FORMAT.md states. */
+ATH_INLINE double quick_sum(int32_t count, const double *a, const double *b)
 {
-    double size = number < 0.0 ? -number : number;
-    return size > most ? size : most;
+    double lane[ATH_LANES], rest = 0.0;
+    ath_lanes sum, other;
+    int32_t i = 0;
+    lanes_set(&sum, 0.0);
+    other = sum;
+    for (; i + 2 * ATH_LANES <= count; i += 2 * ATH_LANES) {
+        lanes_add_product(&sum, a + i, b + i);
+        lanes_add_product(&other, a + i + ATH_LANES, b + i + ATH_LANES);
+    }
+    for (; i < count; i++) rest = rest + a[i] * b[i];
+    lanes_store(lane, &sum);
+    for (int32_t j = 0; j < ATH_LANES; j++) rest = rest + lane[j];
+    lanes_store(lane, &other);
+    for (int32_t j = 0; j < ATH_LANES; j++) rest = rest + lane[j];
+    return rest;
 }
 
-/* Returns the largest magnitude, or that of other numbers beside one that is not a number. */
-ATH_HOT static double largest(const double *numbers, int32_t count)
-{
-    double most[2 * ATH_LANES] = {0.0};
-    int32_t i = 0;
-    for (; i + 2 * ATH_LANES <= count; i += 2 * ATH_LANES)
-        for (int32_t j = 0; j < 2 * ATH_LANES; j++) most[j] = larger(most[j], numbers[i + j]);
-    for (; i < count; i++) most[0] = larger(most[0], numbers[i]);
-    for (int32_t j = 1; j < 2 * ATH_LANES; j++) most[0] = larger(most[0], most[j]);
-    return most[0];
-}
+/* Returns a number that none of these is larger than. */
+static double bound_of(const double *numbers, int32_t count) { return ath_sqrt(quick_sum(count, numbers, numbers)); }
 
 static void weigh_rest(const ath_plan *plan, const ath_piece *piece, vertex_row *weight)
 {
@@ -76,7 +81,7 @@ static int find_placing_sums(const ath_placing *placing, const ath_piece *piece,
     weigh_rest(placing->plan, piece, sums->weight[0]);
     sums->count = 1;
     sums->reach =
-        4.0 * largest(sums->weight[0][0], 3 * ATH_PIECE_VERTICES) + largest(placing->scratch->at.point, 3 * T);
+        4.0 * bound_of(sums->weight[0][0], 3 * ATH_PIECE_VERTICES) + bound_of(placing->scratch->at.point, 3 * T);
     for (int32_t s = 0; s < 3 * ath_rank(piece); s++) {
         const double *track = placing->scratch->rows + (size_t)s * (size_t)T;
         if (!placing->used[s / 3] || (ath_is_shape_row(piece, placing->rows, s / 3) && s >= placing->rows->shape_count))
@@ -84,7 +89,7 @@ static int find_placing_sums(const ath_placing *placing, const ath_piece *piece,
         if (sums->count > MOST_TERMS) return 0;
         vertex_row *weight = sums->weight[sums->count];
         weigh_row(placing->plan, piece, placing->rows, s, weight);
-        sums->reach = sums->reach + 4.0 * largest(track, T); /* bases and shapes are orthonormal */
+        sums->reach = sums->reach + 4.0 * bound_of(track, T); /* bases and shapes are orthonormal */
         sums->track[sums->count++] = track;
     }
     return 1;
@@ -100,26 +105,6 @@ ATH_HOT static void find_moves(int32_t T, const ath_frames *at, const ath_frames
             for (int32_t t = 0; t < T; t++)
                 moves[(3 + 3 * i + k) * T + t] = R[i * T + t] * S[k * T + t] + R[(3 + i) * T + t] * S[(3 + k) * T + t]
                                                  + R[(6 + i) * T + t] * S[(6 + k) * T + t];
-}
-
-/* Returns a sum of products in no order that FORMAT.md states. */
-ATH_INLINE double quick_sum(int32_t count, const double *a, const double *b)
-{
-    double lane[ATH_LANES], rest = 0.0;
-    ath_lanes sum, other;
-    int32_t i = 0;
-    lanes_set(&sum, 0.0);
-    other = sum;
-    for (; i + 2 * ATH_LANES <= count; i += 2 * ATH_LANES) {
-        lanes_add_product(&sum, a + i, b + i);
-        lanes_add_product(&other, a + i + ATH_LANES, b + i + ATH_LANES);
-    }
-    for (; i < count; i++) rest = rest + a[i] * b[i];
-    lanes_store(lane, &sum);
-    for (int32_t j = 0; j < ATH_LANES; j++) rest = rest + lane[j];
-    lanes_store(lane, &other);
-    for (int32_t j = 0; j < ATH_LANES; j++) rest = rest + lane[j];
-    return rest;
 }
 
 ATH_HOT static void find_row_sums(int32_t vertices, vertex_row *rest, vertex_row *weight, const placing_sums *terms,
@@ -184,15 +169,14 @@ int ath_foresee_modes(const ath_plan *plan, const ath_motion *motion, int32_t p,
     if (modes > 0) {
         weigh_rest(plan, piece, rest);
         find_moves(T, &scratch->at, &placing->scratch->at, moves);
-        reach = terms.reach + 4.0 * largest(rest[0], 3 * ATH_PIECE_VERTICES) + largest(scratch->at.point, 3 * T);
+        reach = terms.reach + 4.0 * bound_of(rest[0], 3 * ATH_PIECE_VERTICES) + bound_of(scratch->at.point, 3 * T);
     }
-    for (int32_t s = 0; s < 3 * ath_rank(piece); s++) {
+    for (int32_t s = 0; s < 3 * modes; s++) {
         int32_t r = s / 3, *predicted = ath_row(rows->predicted_modes, r, T) + s % 3 * T;
         const ath_stream *stream = ath_mode_stream(motion, piece, r);
         const int32_t *coarse = rows->coarse_modes ? rows->coarse_modes + (size_t)s * (size_t)T : 0;
         double step = ath_row_step(motion, piece, rows, r);
-        memset(predicted, 0, (size_t)T * sizeof *predicted);
-        if (r >= modes || (ath_is_shape_row(piece, rows, r) && s >= rows->shape_count)) continue;
+        if (ath_is_shape_row(piece, rows, r) && s >= rows->shape_count) continue;
         if (coarse && ath_is_zero(coarse, T)) continue;
         weigh_row(plan, piece, rows, s, weight);
         for (int32_t k = 0; k < 3; k++) weight[k][piece->count - 1] *= piece->tip_weight;

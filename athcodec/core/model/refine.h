@@ -31,7 +31,8 @@ typedef struct {
     const uint8_t *used;
 } ath_placing;
 
-/* Predicts the same integers from what places the vertices. Returns 0 where rounding leaves one of them in doubt. */
+/* Predicts the same integers, into rows of zeros, from what places the vertices. Returns 0 where rounding leaves one of
+ * them in doubt. */
 int ath_foresee_modes(const ath_plan *plan, const ath_motion *motion, int32_t p, const ath_piece_before *before,
                       const ath_placing *placing, const ath_scratch *scratch, ath_piece_rows *rows);
 /* out = R^T (x - c), 3 x frames */

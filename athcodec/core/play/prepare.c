@@ -333,6 +333,8 @@ static void ready_layer(ath_work *work, int32_t q)
     layer->rows.shapes = layer->unit_shapes;
     memset(layer->shape_integers, 0, ATH_MOST_SHAPES * ATH_SHAPE_NUMBERS * sizeof(int32_t));
     memset(layer->rows.modes, 0, (size_t)work->file->plan.longest * row);
+    if (q > 0) memset(layer->rows.predicted_modes, 0, (size_t)work->file->plan.longest * row);
+    layer->rows.reach = 0;
     memset(layer->rows.rotation, 0, row);
     memset(layer->rows.shift, 0, row);
 }
@@ -648,7 +650,11 @@ static void clear_row(int32_t *row, int32_t frames, int32_t *count)
 static void clear_piece(layer_work *layer, const ath_piece *piece)
 {
     int32_t T = layer->motion.frames;
-    for (int32_t m = 0; m < piece->count; m++) clear_row(ath_row(layer->rows.modes, m, T), T, layer->counts + m);
+    for (int32_t m = 0; m < piece->count; m++) {
+        int32_t reach = layer->rows.reach;
+        clear_row(ath_row(layer->rows.modes, m, T), T, layer->counts + m);
+        if (reach > 0) clear_row(ath_row(layer->rows.predicted_modes, m, T), T, &reach);
+    }
     memset(layer->shape_integers, 0, (size_t)layer->rows.shape_count * ATH_SHAPE_NUMBERS * sizeof(int32_t));
     layer->rows.shape_count = 0;
     clear_row(layer->rows.shift, T, layer->counts + SHIFT_SLOT);
@@ -735,6 +741,7 @@ static void look_before(ath_work *work, int32_t q, int32_t p)
     }
     if (!same && before->frequencies > 0) before->frequencies = T;
     int alike = (coarse->rows.shape_count > 0) == (layer->rows.shape_count > 0);
+    layer->rows.reach = before->frequencies;
     layer->rows.coarse_modes = same && alike ? coarse->rows.modes : 0;
     layer->rows.coarse_rotation = same ? coarse->rows.rotation : 0;
     layer->rows.coarse_shift = same ? coarse->rows.shift : 0;
