@@ -54,6 +54,7 @@ PIECE = np.dtype(
     fields(
         *("<i8", "modes basis attach_cache"),
         *("<i4", "first count parent attach branch flags rank level low_level low_modes last_attached ring"),
+        *("<i4", "modes_level tip_weight"),
     )
 )
 NODE = np.dtype(fields("9<f8", "whitening", "<i4", "branch piece first count level last coded rank"))
@@ -201,7 +202,7 @@ _ENCODING = {  # Functions of core/model/*.h and core/encode/encode.h.
     "ath_build_plan": (None, [POINTER(CorePlan), *[c_void_p] * 3, c_int]),
     "ath_basis_table_size": (c_size_t, [c_int32]),
     "ath_basis_layout": (c_int64, [c_void_p, c_int32, *[c_void_p] * 3]),
-    "ath_basis_modes": (None, [c_void_p, c_int32, c_int32, *[c_void_p] * 4]),
+    "ath_basis_modes": (None, [c_void_p, c_int32, c_int32, *[c_void_p] * 3]),
     "ath_basis_sheets": (None, [c_void_p, c_int32, c_int32, c_void_p, c_void_p]),
     "ath_principal": (None, [c_int32, c_int32, *[c_void_p] * 4]),
     "ath_plan_nodes": (None, [POINTER(CorePlan), c_void_p]),

@@ -21,7 +21,6 @@ typedef struct {
     ath_file *file;
     ath_info info;
     void *work;
-    double open_ms, build_ms;
 } opened;
 
 typedef struct {
@@ -119,33 +118,16 @@ static void read_file(const char *path, opened *clip)
 static void open_and_build(opened *clip)
 {
     size_t front;
-    double start = now_ms();
     ath_fault_info fault;
     expect_no_fault("ath_front", ath_front(clip->bytes, clip->size, 0, &front, &clip->open_bytes, &fault), &fault);
     clip->file = (ath_file *)memory_of(clip->open_bytes);
     expect_no_fault("ath_open", ath_open(clip->file, clip->open_bytes, clip->bytes, clip->size, 0, &fault), &fault);
-    double middle = now_ms();
     clip->build_bytes = ath_build_size(clip->file);
     expect_ok("ath_build", ath_build(clip->file, memory_of(clip->build_bytes), clip->build_bytes));
     ath_get_info(clip->file, &clip->info);
     clip->build_bytes += refine(clip->file, clip->info.level_count - 1);
-    clip->build_ms = now_ms() - middle;
-    clip->open_ms = middle - start;
     clip->work_bytes = ath_work_size(clip->file);
     clip->work = memory_of(clip->work_bytes);
-}
-
-static void time_opening(opened *clip, int rounds, double *open_ms, double *build_ms)
-{
-    double *opens = figures(rounds), *builds = figures(rounds);
-    for (int round = 0; round < rounds; round++) {
-        opened again = *clip;
-        open_and_build(&again);
-        opens[round] = again.open_ms;
-        builds[round] = again.build_ms;
-    }
-    *open_ms = median(opens, rounds);
-    *build_ms = median(builds, rounds);
 }
 
 /* ---- decoding ---- */
@@ -409,19 +391,17 @@ static void measure_seeks(const opened *clip, int seeks)
     int32_t deepest = clip->info.level_count - 1;
     ath_segment *segment = (ath_segment *)memory_of(ath_segment_size(clip->file, deepest));
     float *xyz = (float *)memory_of(frame_floats(clip) * sizeof(float));
-    double *whole = figures(seeks), *preparing = figures(seeks);
+    double *whole = figures(seeks);
     uint64_t state = 1;
     for (int i = 0; i < seeks; i++) {
         int32_t frame = random_frame(&state, clip->info.frame_count);
         double start = now_ms();
         prepare(clip, ath_segment_of(clip->file, frame), deepest, segment);
-        preparing[i] = now_ms() - start;
         write_frame(clip, &segment, 1, (double)frame, ATH_SOURCE_ORDER, xyz);
         whole[i] = now_ms() - start;
     }
     put(",\n \"seeks\": {", "median_ms", quantile(whole, seeks, 0.5));
     put(", ", "p99_ms", quantile(whole, seeks, 0.99));
-    put(", ", "prepare_ms", quantile(preparing, seeks, 0.5));
     printf("}");
 }
 
@@ -452,11 +432,7 @@ static void print_facts(const opened *clip)
 static void all(opened *clip, int rounds, int seeks)
 {
     level_run runs[LEVELS];
-    double open_ms, build_ms;
     print_facts(clip);
-    time_opening(clip, rounds, &open_ms, &build_ms);
-    put(",\n ", "open_ms", open_ms);
-    put(", ", "build_ms", build_ms);
     measure_levels(clip, rounds, runs);
     measure_onward(clip, rounds);
     measure_seeks(clip, seeks);

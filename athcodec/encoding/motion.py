@@ -125,9 +125,7 @@ class Plan:
 
         def fill_modes(first: int, stop: int) -> None:
             work = np.empty(2 * PIECE_VERTICES**2)
-            lib.ath_basis_modes(
-                self.pieces.ctypes.data, first, stop, at, gaps.ctypes.data, work.ctypes.data, self.bases.ctypes.data
-            )
+            lib.ath_basis_modes(self.pieces.ctypes.data, first, stop, at, work.ctypes.data, self.bases.ctypes.data)
 
         def fill_sheets(first: int, stop: int) -> None:
             lib.ath_basis_sheets(self.pieces.ctypes.data, first, stop, at, self.bases.ctypes.data)

@@ -40,8 +40,8 @@ ATH_INLINE uint32_t coarse_steps(int32_t predicted, uint32_t ratio)
  * row that follows it. Either may be null. */
 typedef struct {
     const int32_t *row, *coarse, *below;
-    int32_t frames;
-    uint32_t ratio[3]; /* step of the layer before over this one's, by axis */
+    int32_t frames, reach; /* reach: decoder, integers behind which both predictions and rows are 0 */
+    uint32_t ratio[3];     /* step of the layer before over this one's, by axis */
 } row_prediction;
 
 /* Magnitudes of the layer before around a row, in its own steps, and their sums over the axes; then those of the row
@@ -135,8 +135,9 @@ static int32_t code_refined_row(ath_coder *coder, refinement_model *refinement, 
         finish_frequency(&differences, k);
     }
     *coder = own_coder;
-    for (int32_t axis = 0; axis < 3 && !ENCODING; axis++)
-        memcpy(row + axis * frames + count, predicted + axis * frames + count, (size_t)(frames - count) * sizeof *row);
+    for (int32_t axis = 0; axis < 3 && !ENCODING && count < prediction->reach; axis++)
+        memcpy(row + axis * frames + count, predicted + axis * frames + count,
+               (size_t)(prediction->reach - count) * sizeof *row);
     finish_row(model, &differences, slot, count);
     return count;
 }

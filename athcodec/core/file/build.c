@@ -29,18 +29,25 @@ size_t ath_build_size(const ath_file *file)
     return ath_size_or_most(carve_build(&counted, 0));
 }
 
+/* Fills the bases that levels up to one take: the picture of a coarse level does not wait for all of them. */
+static void build_to(ath_file *file, int32_t level)
+{
+    if (level <= file->built_level) return;
+    if (file->bases_count > 0)
+        ath_basis_fill(file->pieces, file->plan.piece_count, file->built_level + 1, level, file->rest, 0,
+                       (double *)file->scratch, file->bases);
+    file->built_level = level;
+}
+
 int ath_build(ath_file *file, void *memory, size_t memory_bytes)
 {
     ath_file counted = *file;
     if (!file->rest_known) return ATH_NEEDS_HOST_MESH;
     if (!ath_fits(memory, memory_bytes, carve_build(&counted, 0))) return ATH_NO_MEMORY;
     carve_build(file, (uint8_t *)memory);
-    if (file->bases_count > 0) { /* lay out again, since a layer may have overwritten the gaps */
-        ath_basis_layout(file->pieces, file->plan.piece_count, file->rest, file->gaps, (int32_t *)file->scratch);
-        ath_basis_fill(file->pieces, file->plan.piece_count, file->rest, file->gaps, 0, (double *)file->scratch,
-                       file->bases);
-    }
     file->plan.bases = file->bases;
+    file->built_level = -1;
+    build_to(file, 0);
     for (int32_t kind = 0; kind < ATH_WAVE_KINDS; kind++)
         for (int32_t frames = 1; frames <= ATH_SEGMENT_FRAMES; frames++)
             if (file->waves[kind][frames]) ath_waves(frames, kind, file->waves[kind][frames]);
@@ -142,13 +149,13 @@ int ath_refine(ath_file *file, int32_t level, void *memory, size_t memory_bytes)
     if (result != ATH_OK) return result;
     if (!file->bases || (needed > 0 && !ath_fits(memory, memory_bytes, needed))) return ATH_NO_MEMORY;
     level = ath_file_stage(file, level);
+    build_to(file, level);
     for (int32_t q = file->first_layer; level > 0 && q <= ath_layer_of(file, level); q++) {
         ath_layer *layer = &file->layers[q];
         if (layer->plan.bases) continue;
         double *bases = (double *)ath_take(&arena, layer->bases_count * sizeof(double));
         if (layer->bases_count > 0) {
-            ath_basis_layout(layer->pieces, layer->plan.piece_count, layer->rest, file->gaps, (int32_t *)file->scratch);
-            ath_basis_fill(layer->pieces, layer->plan.piece_count, layer->rest, file->gaps, known_bases(file, q),
+            ath_basis_fill(layer->pieces, layer->plan.piece_count, 0, INT32_MAX, layer->rest, known_bases(file, q),
                            (double *)file->scratch, bases);
             layer->plan.bases = bases;
         } else {
@@ -157,6 +164,7 @@ int ath_refine(ath_file *file, int32_t level, void *memory, size_t memory_bytes)
                 layer->pieces[p].modes = before[p].modes;
                 layer->pieces[p].basis = before[p].basis;
                 layer->pieces[p].rank = before[p].rank;
+                layer->pieces[p].tip_weight = before[p].tip_weight;
             }
             layer->plan.bases = plan_before(file, q)->bases;
         }

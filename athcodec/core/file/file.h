@@ -47,6 +47,7 @@ struct ath_file {
     double
         *waves[ATH_WAVE_KINDS][ATH_SEGMENT_FRAMES + 1]; /* by kind and number of frames; null: no segment needs them */
     uint64_t bases_count;
+    int32_t built_level;       /* level up to which `bases` are filled; -1: none */
     int32_t rest_known;        /* 0 until the host gives it */
     int32_t source_rest_known; /* 0 until SOURCE_REST has been read */
     int32_t first_layer;       /* 0 where level 1 has a rest pose of its own, else 1 */

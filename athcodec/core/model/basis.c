@@ -309,7 +309,8 @@ static int same_gaps(const uint8_t *a, const uint8_t *b, int32_t n)
     return 1;
 }
 
-double ath_tip_weight(const ath_piece *piece, const double *rest)
+/* Returns 2 for a nearly straight cantilever, whose errors are largest at the tip, else 1. */
+static int32_t tip_weight(const ath_piece *piece, const double *rest)
 {
     const double *base = rest + 3 * (size_t)(piece->attach >= 0 ? piece->attach : piece->first), *before = base;
     double way = 0.0;
@@ -318,22 +319,20 @@ double ath_tip_weight(const ath_piece *piece, const double *rest)
         way = way + distance(here, before);
         before = here;
     }
-    return !(piece->flags & ATH_SHEET) && piece->count > 1 && 2.0 * way <= 3.0 * distance(before, base) ? 2.0 : 1.0;
+    return !(piece->flags & ATH_SHEET) && piece->count > 1 && 2.0 * way <= 3.0 * distance(before, base) ? 2 : 1;
 }
 
 /* Returns the piece whose basis piece p shares, since gaps and weights are equal. `table` is an open-addressing hash of
  * the pieces that own their basis. A hostile file may make all of them collide: after MOST_PROBES probes a piece gets
  * its own basis with the same numbers. */
-static int32_t owner_of_basis(const ath_piece *pieces, int32_t p, const double *rest, const uint8_t *gaps,
-                              int32_t *table, uint32_t mask)
+static int32_t owner_of_basis(const ath_piece *pieces, int32_t p, const uint8_t *gaps, int32_t *table, uint32_t mask)
 {
     const uint8_t *mine = gaps + pieces[p].first;
-    double tip = ath_tip_weight(pieces + p, rest);
     uint32_t at = gaps_hash(mine, pieces[p].count) & mask;
     for (int32_t probe = 0; table[at] >= 0; probe++) {
         const ath_piece *other = pieces + table[at];
         if (other->count == pieces[p].count && same_gaps(mine, gaps + other->first, other->count)
-            && ath_tip_weight(other, rest) == tip)
+            && other->tip_weight == pieces[p].tip_weight)
             return table[at];
         if (probe == MOST_PROBES) return p;
         at = (at + 1) & mask;
@@ -357,10 +356,14 @@ int64_t ath_basis_layout(ath_piece *pieces, int32_t piece_count, const double *r
     for (int32_t p = 0; p < piece_count; p++) {
         ath_piece *piece = pieces + p;
         piece_gaps(piece, rest, gaps + piece->first);
-        int32_t owner = owner_of_basis(pieces, p, rest, gaps, table, (uint32_t)size - 1);
+        piece->tip_weight = tip_weight(piece, rest);
+        ath_piece *owner = pieces + owner_of_basis(pieces, p, gaps, table, (uint32_t)size - 1);
+        int32_t level = ath_base_level(piece);
         piece->rank = piece->count;
-        piece->modes = owner == p ? next : pieces[owner].modes;
-        if (owner == p) next += (int64_t)piece->count * piece->count;
+        piece->modes = owner == piece ? next : owner->modes;
+        piece->modes_level = -1;
+        owner->modes_level = owner == piece ? level : ath_min(owner->modes_level, level);
+        if (owner == piece) next += (int64_t)piece->count * piece->count;
         piece->basis = piece->modes;
         if (piece->flags & ATH_SHEET) {
             piece->basis = next;
@@ -371,56 +374,59 @@ int64_t ath_basis_layout(ath_piece *pieces, int32_t piece_count, const double *r
 }
 
 /* Copies a piece's modes from another plan and returns 1 if they are the same there. */
-static int take_modes(const ath_plan *before, int32_t p, const ath_piece *piece, const double *rest,
-                      const uint8_t *gaps, double *modes)
+static int take_modes(const ath_plan *before, int32_t p, const ath_piece *piece, const uint8_t *gaps, double *modes)
 {
     uint8_t known[ATH_PIECE_VERTICES];
     if (!before) return 0;
     const ath_piece *other = before->pieces + p;
     piece_gaps(other, before->rest, known);
-    if (!same_gaps(known, gaps, piece->count) || ath_tip_weight(other, before->rest) != ath_tip_weight(piece, rest))
-        return 0;
+    if (!same_gaps(known, gaps, piece->count) || other->tip_weight != piece->tip_weight) return 0;
     memcpy(modes, before->bases + other->modes, (size_t)piece->count * (size_t)piece->count * sizeof *modes);
     return 1;
 }
 
-static void fill_modes(const ath_piece *pieces, int32_t first, int32_t stop, const double *rest, const uint8_t *gaps,
-                       const ath_plan *before, double *work, double *bases)
+static int is_between(int32_t level, int32_t first, int32_t last) { return first <= level && level <= last; }
+
+static void fill_modes(const ath_piece *pieces, int32_t first, int32_t stop, int32_t first_level, int32_t last_level,
+                       const double *rest, const ath_plan *before, double *work, double *bases)
 {
-    int64_t laid_out = 0; /* end of what earlier pieces fill: modes beyond it are the piece's own */
-    for (int32_t p = 0; p < stop; p++) {
+    uint8_t gaps[ATH_PIECE_VERTICES];
+    for (int32_t p = first; p < stop; p++) {
         const ath_piece *piece = pieces + p;
-        int64_t last = piece->flags & ATH_SHEET ? piece->basis : piece->modes;
-        if (p >= first && piece->modes >= laid_out
-            && !take_modes(before, p, piece, rest, gaps + piece->first, bases + piece->modes))
-            cantilever(piece->count, gaps + piece->first, 0.1, 0.001, ath_tip_weight(piece, rest), bases + piece->modes,
-                       work);
-        last += (int64_t)piece->count * piece->count;
-        if (last > laid_out) laid_out = last;
+        if (!is_between(piece->modes_level, first_level, last_level)) continue;
+        piece_gaps(piece, rest, gaps);
+        if (!take_modes(before, p, piece, gaps, bases + piece->modes))
+            cantilever(piece->count, gaps, 0.1, 0.001, piece->tip_weight, bases + piece->modes, work);
     }
 }
 
-void ath_basis_modes(const ath_piece *pieces, int32_t first, int32_t stop, const double *rest, const uint8_t *gaps,
-                     double *work, double *bases)
-{
-    fill_modes(pieces, first, stop, rest, gaps, 0, work, bases);
-}
-
-void ath_basis_sheets(ath_piece *pieces, int32_t first, int32_t stop, const double *rest, double *bases)
+static void fill_sheets(ath_piece *pieces, int32_t first, int32_t stop, int32_t first_level, int32_t last_level,
+                        const double *rest, double *bases)
 {
     for (ath_piece *piece = pieces + first; piece < pieces + stop; piece++)
-        if (piece->flags & ATH_SHEET) {
+        if (piece->flags & ATH_SHEET && is_between(ath_base_level(piece), first_level, last_level)) {
             const double *modes = bases + piece->modes;
             double *basis = bases + piece->basis;
             piece->rank = piece->ring > 0 ? tube(piece, rest, modes, basis) : sheet(piece, rest, modes, basis);
         }
 }
 
-void ath_basis_fill(ath_piece *pieces, int32_t piece_count, const double *rest, const uint8_t *gaps,
+void ath_basis_modes(const ath_piece *pieces, int32_t first, int32_t stop, const double *rest, double *work,
+                     double *bases)
+{
+    fill_modes(pieces, first, stop, 0, INT32_MAX, rest, 0, work, bases);
+}
+
+void ath_basis_sheets(ath_piece *pieces, int32_t first, int32_t stop, const double *rest, double *bases)
+{
+    fill_sheets(pieces, first, stop, 0, INT32_MAX, rest, bases);
+}
+
+void ath_basis_fill(ath_piece *pieces, int32_t piece_count, int32_t first_level, int32_t last_level, const double *rest,
                     const ath_plan *before, double *work, double *bases)
 {
-    fill_modes(pieces, 0, piece_count, rest, gaps, before, work, bases);
-    ath_basis_sheets(pieces, 0, piece_count, rest, bases);
+    fill_modes(pieces, 0, piece_count, first_level, last_level, rest, before, work, bases);
+    fill_sheets(pieces, 0, piece_count, first_level, last_level, rest, bases);
 }
 
 /* Series of cos(x) and sin(x) for 0 <= x <= pi/4. */

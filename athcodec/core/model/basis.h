@@ -6,20 +6,18 @@
 
 /* int32_t that ath_basis_layout needs as `table`. */
 ATH_ENCODER_API size_t ath_basis_table_size(int32_t piece_count);
-/* Fills the pieces' offsets and `gaps` (vertex_count bytes). Returns the doubles that all bases need together. */
+/* Fills the pieces' offsets, levels and tip weights, and `gaps` (vertex_count bytes, scratch). Returns the doubles that all bases
+ * need together. */
 ATH_ENCODER_API int64_t ath_basis_layout(ath_piece *pieces, int32_t piece_count, const double *rest, uint8_t *gaps,
                                          int32_t *table);
-/* Returns the weight of a piece's last vertex in products of its modes, which are orthonormal under that weight: 2 for
- * a nearly straight cantilever, whose errors are largest at the tip, else 1. */
-double ath_tip_weight(const ath_piece *piece, const double *rest);
-/* Fills the bases. `before` is null, or a plan of the same pieces about another rest pose: equal modes are copied from
- * it. work: ATH_BASIS_WORK doubles. */
+/* Fills the bases that some of the levels are the first to take. `before` is null, or a plan of the same pieces about
+ * another rest pose: equal modes are copied from it. work: ATH_BASIS_WORK doubles. */
 enum { ATH_BASIS_WORK = 2 * ATH_PIECE_VERTICES * ATH_PIECE_VERTICES };
-void ath_basis_fill(ath_piece *pieces, int32_t piece_count, const double *rest, const uint8_t *gaps,
+void ath_basis_fill(ath_piece *pieces, int32_t piece_count, int32_t first_level, int32_t last_level, const double *rest,
                     const ath_plan *before, double *work, double *bases);
 /* Fill the bases of a range of pieces in two passes: a sheet may need the modes of any piece. */
 ATH_ENCODER_API void ath_basis_modes(const ath_piece *pieces, int32_t first, int32_t stop, const double *rest,
-                                     const uint8_t *gaps, double *work, double *bases);
+                                     double *work, double *bases);
 ATH_ENCODER_API void ath_basis_sheets(ath_piece *pieces, int32_t first, int32_t stop, const double *rest,
                                       double *bases);
 /* Fills n x n: the modes of an evenly spaced beam that leaves its base in any direction. work: 2 n x n doubles. */

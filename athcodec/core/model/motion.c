@@ -525,8 +525,8 @@ void ath_inverse_row(const ath_motion *motion, const ath_piece *piece, const ath
                       ath_row(rows->modes, r, motion->frames), track);
 }
 
-static const double *place_used(const ath_plan *plan, const ath_motion *motion, const ath_piece *piece,
-                                const ath_piece_rows *rows, const uint8_t *used, const ath_scratch *scratch)
+const double *ath_pose_used(const ath_plan *plan, const ath_motion *motion, const ath_piece *piece,
+                            const ath_piece_rows *rows, const uint8_t *used, const ath_scratch *scratch)
 {
     ath_scratch here = *scratch;
     if (piece->attach_cache >= 0) here.placed = cached_vertices(motion, piece);
@@ -547,28 +547,27 @@ const double *ath_pose_rows(const ath_plan *plan, const ath_motion *motion, int3
     uint8_t used[ATH_PIECE_VERTICES];
     for (int32_t m = 0; m < ath_rank(piece); m++)
         used[m] = (uint8_t)any_nonzero(row_of(motion, scratch, m), 3 * motion->frames);
-    return place_used(plan, motion, piece, rows, used, scratch);
+    return ath_pose_used(plan, motion, piece, rows, used, scratch);
 }
 
 const double *ath_pose_piece(const ath_plan *plan, const ath_motion *motion, int32_t p, const ath_piece_rows *rows,
                              const ath_scratch *scratch)
 {
+    uint8_t used[ATH_PIECE_VERTICES];
     ath_turned_attach(plan, motion, p, rows, scratch);
-    return ath_pose_turned(plan, motion, p, rows, scratch);
+    ath_pose_tracks(motion, plan->pieces + p, rows, scratch, used);
+    return ath_pose_used(plan, motion, plan->pieces + p, rows, used, scratch);
 }
 
-const double *ath_pose_turned(const ath_plan *plan, const ath_motion *motion, int32_t p, const ath_piece_rows *rows,
-                              const ath_scratch *scratch)
+void ath_pose_tracks(const ath_motion *motion, const ath_piece *piece, const ath_piece_rows *rows,
+                     const ath_scratch *scratch, uint8_t *used)
 {
-    const ath_piece *piece = plan->pieces + p;
-    uint8_t used[ATH_PIECE_VERTICES];
     for (int32_t m = 0; m < ath_rank(piece); m++) {
         used[m] = 0;
         if (rows->counts && rows->counts[m] == 0) continue;
         ath_inverse_row(motion, piece, rows, m, row_of(motion, scratch, m));
         used[m] = (uint8_t)any_nonzero(row_of(motion, scratch, m), 3 * motion->frames);
     }
-    return place_used(plan, motion, piece, rows, used, scratch);
 }
 
 /* Makes a row orthogonal to those before, of length 1, and rounds it to floats. */

@@ -50,6 +50,7 @@ typedef struct {
     const double *shapes; /* shape_count x ATH_SHAPE_NUMBERS: axis a of mode m at 3 m + a */
     int32_t *predicted_modes, *predicted_rotation,
         *predicted_shift; /* null unless this is a refinement; as large as the rows */
+    int32_t reach;        /* decoder: frequencies behind which all predictions are 0 */
     const int32_t *coarse_modes, *coarse_rotation,
         *coarse_shift;               /* rows of the layer before; null where their basis is another */
     const double *coarse_turn_steps; /* rotation steps of the layer before; null: the piece was not rigid there */
@@ -107,9 +108,12 @@ const double *ath_pose_rows(const ath_plan *plan, const ath_motion *motion, int3
 /* Places a piece from its integers. */
 const double *ath_pose_piece(const ath_plan *plan, const ath_motion *motion, int32_t p, const ath_piece_rows *rows,
                              const ath_scratch *scratch);
-/* Places a piece from its integers after ath_turned_attach. */
-const double *ath_pose_turned(const ath_plan *plan, const ath_motion *motion, int32_t p, const ath_piece_rows *rows,
-                              const ath_scratch *scratch);
+/* After ath_turned_attach, fills the coefficients over time, and notes which rows are not all 0 (ATH_PIECE_VERTICES). */
+void ath_pose_tracks(const ath_motion *motion, const ath_piece *piece, const ath_piece_rows *rows,
+                     const ath_scratch *scratch, uint8_t *used);
+/* Places a piece after ath_pose_tracks. */
+const double *ath_pose_used(const ath_plan *plan, const ath_motion *motion, const ath_piece *piece,
+                            const ath_piece_rows *rows, const uint8_t *used, const ath_scratch *scratch);
 
 /* Turns R towards the rotation nearest to H, whose column k is what rest axis k became. Leaves R if H vanishes. */
 void ath_turn_to(const double H[9], int32_t steps, double R[9]);

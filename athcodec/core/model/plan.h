@@ -23,6 +23,8 @@ typedef struct ath_piece {
     int32_t low_modes;
     int32_t last_attached; /* last piece that hangs on it, -1: none */
     int32_t ring;          /* vertices of each of its rings, 0: it has none */
+    int32_t modes_level;   /* first level that takes its modes; -1: an earlier piece has the same */
+    int32_t tip_weight;    /* weight of its last vertex in products of its modes, which are orthonormal under it */
 } ath_piece;
 
 /* A node of the ATH: the subtree of a branch, moved by one affine map per frame at levels `level` to `last`. */

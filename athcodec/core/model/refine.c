@@ -32,7 +32,7 @@ static int32_t nearest_or_none(double units, double least)
     return units < 0.0 ? -whole : whole;
 }
 
-static int is_zero(const int32_t *integers, int32_t count)
+int ath_is_zero(const int32_t *integers, int32_t count)
 {
     int32_t i = 0;
     for (; i + PREDICTED <= count; i += PREDICTED) {
@@ -63,7 +63,7 @@ static void predict_track(const ath_stream *stream, int32_t T, int32_t frequenci
             double sums[PREDICTED];
             int32_t stop = ath_min(k + PREDICTED, count), first = ath_min(k, stream->temporal_rank - PREDICTED);
             if (first < 0) break;
-            if (known && is_zero(known + k, stop - k)) continue;
+            if (known && ath_is_zero(known + k, stop - k)) continue;
             project_waves(T, stream->temporal + (size_t)first * (size_t)T, row, sums);
             for (int32_t i = k; i < stop; i++)
                 predicted[axis * T + i] = nearest_or_none(sums[i - first] / steps[axis], least);
@@ -110,7 +110,7 @@ ATH_HOT void ath_to_local(const ath_plan *plan, int32_t T, const ath_piece *piec
 ATH_HOT static void project_modes(const ath_plan *plan, int32_t T, const ath_piece *piece, int32_t first, int32_t stop,
                                   const double *local, double *ATH_RESTRICT rows)
 {
-    double weight[ATH_PIECE_VERTICES], tip = ath_tip_weight(piece, plan->rest);
+    double weight[ATH_PIECE_VERTICES], tip = piece->tip_weight;
     const double *x[ATH_PIECE_VERTICES];
     int32_t last = piece->count - 1, count;
     for (int32_t from = 0; from < 3 * T; from += count) {
@@ -189,11 +189,16 @@ ATH_HOT static void shape_tracks(int32_t T, const ath_piece *piece, const ath_pi
         lanes_sum(T, s < rows->shape_count ? count : 0, rows->shapes + s * ATH_SHAPE_NUMBERS, x, 0.0, track);
 }
 
+int32_t ath_predicted_modes(const ath_piece *piece, const ath_piece_before *before, const ath_piece_rows *rows)
+{
+    int32_t modes = before->frequencies > 0 ? ath_min(before->modes, ath_rank(piece)) : 0;
+    return modes > 0 && rows->shape_count > 0 ? ath_max(modes, ath_shape_modes(piece)) : modes;
+}
+
 void ath_predict_modes(const ath_plan *plan, const ath_motion *motion, const ath_piece *piece,
                        const ath_piece_before *before, const ath_scratch *scratch, ath_piece_rows *rows)
 {
-    int32_t T = motion->frames, modes = before->frequencies > 0 ? ath_min(before->modes, ath_rank(piece)) : 0;
-    if (modes > 0 && rows->shape_count > 0) modes = ath_max(modes, ath_shape_modes(piece));
+    int32_t T = motion->frames, modes = ath_predicted_modes(piece, before, rows);
     if (modes > 0) {
         ath_to_local(plan, T, piece, &scratch->at, before->placed, scratch->placed);
         if (rows->shape_count > 0) ath_project(plan, T, piece, modes, scratch->placed, scratch->rows);
@@ -202,7 +207,7 @@ void ath_predict_modes(const ath_plan *plan, const ath_motion *motion, const ath
         const ath_stream *stream = ath_mode_stream(motion, piece, r);
         const int32_t *coarse = rows->coarse_modes ? rows->coarse_modes + (size_t)r * 3 * (size_t)T : 0;
         double *track = scratch->rows + (size_t)r * 3 * (size_t)T;
-        int has_prediction = !coarse || !is_zero(coarse, 3 * T);
+        int has_prediction = !coarse || !ath_is_zero(coarse, 3 * T);
         if (has_prediction && rows->shape_count == 0)
             project_modes(plan, T, piece, r, r + 1, scratch->placed, scratch->rows);
         if (has_prediction && ath_is_shape_row(piece, rows, r)) {
@@ -222,7 +227,7 @@ int32_t ath_row_extent(const int32_t *row, int32_t T, int32_t most)
     for (int32_t axis = 0; axis < 3; axis++) {
         const int32_t *own = row + axis * T;
         int32_t k = most;
-        while (k - count >= PREDICTED && is_zero(own + k - PREDICTED, PREDICTED)) k -= PREDICTED;
+        while (k - count >= PREDICTED && ath_is_zero(own + k - PREDICTED, PREDICTED)) k -= PREDICTED;
         while (k > count && own[k - 1] == 0) k--;
         count = k;
     }

@@ -64,6 +64,8 @@ typedef struct {
     double *unit_shapes;
     ath_piece_before before; /* the piece in the layer before */
     double turn_steps[3];    /* rotation steps in the layer before */
+    const double *placed;    /* null: the piece is not placed in this layer */
+    uint8_t used[ATH_PIECE_VERTICES];
 } layer_work;
 
 /* The segment that is asked for, and what its preparation starts from. */
@@ -331,6 +333,8 @@ static void ready_layer(ath_work *work, int32_t q)
     layer->rows.shapes = layer->unit_shapes;
     memset(layer->shape_integers, 0, ATH_MOST_SHAPES * ATH_SHAPE_NUMBERS * sizeof(int32_t));
     memset(layer->rows.modes, 0, (size_t)work->file->plan.longest * row);
+    if (q > 0) memset(layer->rows.predicted_modes, 0, (size_t)work->file->plan.longest * row);
+    layer->rows.reach = 0;
     memset(layer->rows.rotation, 0, row);
     memset(layer->rows.shift, 0, row);
 }
@@ -396,7 +400,8 @@ static int start(void *memory, size_t work_bytes, const ath_file *file, int32_t 
     int32_t stage = ath_file_stage(file, level);
     preparation asked = {file, segment_memory, 0, index, stage, before, kept, 0, {0, 0}, 0};
     if (!file->rest_known) return ATH_NEEDS_HOST_MESH;
-    if (!file->bases || !ath_level_plan(file, stage)->bases || !ath_fits(memory, work_bytes, ath_work_size(file))
+    if (stage > file->built_level || !ath_level_plan(file, stage)->bases
+        || !ath_fits(memory, work_bytes, ath_work_size(file))
         || !ath_fits(segment_memory, segment_bytes, ath_segment_size(file, level)))
         return ATH_NO_MEMORY;
     memset(work, 0, sizeof *work);
@@ -645,7 +650,11 @@ static void clear_row(int32_t *row, int32_t frames, int32_t *count)
 static void clear_piece(layer_work *layer, const ath_piece *piece)
 {
     int32_t T = layer->motion.frames;
-    for (int32_t m = 0; m < piece->count; m++) clear_row(ath_row(layer->rows.modes, m, T), T, layer->counts + m);
+    for (int32_t m = 0; m < piece->count; m++) {
+        int32_t reach = layer->rows.reach;
+        clear_row(ath_row(layer->rows.modes, m, T), T, layer->counts + m);
+        if (reach > 0) clear_row(ath_row(layer->rows.predicted_modes, m, T), T, &reach);
+    }
     memset(layer->shape_integers, 0, (size_t)layer->rows.shape_count * ATH_SHAPE_NUMBERS * sizeof(int32_t));
     layer->rows.shape_count = 0;
     clear_row(layer->rows.shift, T, layer->counts + SHIFT_SLOT);
@@ -702,9 +711,8 @@ static int refine_shapes(ath_work *work, int32_t q, const ath_piece *piece)
     return ATH_OK;
 }
 
-/* Collects what this layer predicts piece p from: the piece's rows and positions in the layer before. placed: its
- * positions in that layer. */
-static void look_before(ath_work *work, int32_t q, int32_t p, const double *placed)
+/* Collects what this layer predicts piece p from: the piece's rows in the layer before. */
+static void look_before(ath_work *work, int32_t q, int32_t p)
 {
     layer_work *layer = work->layers + q;
     const layer_work *coarse = layer - 1;
@@ -712,7 +720,6 @@ static void look_before(ath_work *work, int32_t q, int32_t p, const double *plac
     ath_piece_before *before = &layer->before;
     int32_t T = layer->motion.frames, root = work->streams[layer->plan->pieces[p].level].root;
     int same = ath_base_stream(&coarse->motion, piece)->root == root;
-    before->placed = placed;
     before->rotation = coarse->scratch.rotation;
     before->shift = coarse->scratch.shift;
     before->frames = 0;
@@ -734,12 +741,41 @@ static void look_before(ath_work *work, int32_t q, int32_t p, const double *plac
     }
     if (!same && before->frequencies > 0) before->frequencies = T;
     int alike = (coarse->rows.shape_count > 0) == (layer->rows.shape_count > 0);
+    layer->rows.reach = before->frequencies;
     layer->rows.coarse_modes = same && alike ? coarse->rows.modes : 0;
     layer->rows.coarse_rotation = same ? coarse->rows.rotation : 0;
     layer->rows.coarse_shift = same ? coarse->rows.shift : 0;
 }
 
-static int refine_piece(ath_work *work, int32_t q, int32_t p, const double **placed)
+static const double *placed_piece(layer_work *layer, int32_t p)
+{
+    if (!layer->placed)
+        layer->placed = ath_pose_used(layer->plan, &layer->motion, layer->plan->pieces + p, &layer->rows, layer->used,
+                                      &layer->scratch);
+    return layer->placed;
+}
+
+/* Places the piece after ath_turned_attach, in a layer before the last only if other pieces hang on it. */
+static void pose_piece(const ath_work *work, layer_work *layer, int32_t p)
+{
+    const ath_piece *piece = layer->plan->pieces + p;
+    ath_pose_tracks(&layer->motion, piece, &layer->rows, &layer->scratch, layer->used);
+    layer->placed = 0;
+    if (piece->attach_cache >= 0 || layer == work->layers + work->layer) placed_piece(layer, p);
+}
+
+static void predict_modes(layer_work *layer, int32_t p)
+{
+    layer_work *coarse = layer - 1;
+    ath_placing placing = {coarse->plan, &coarse->rows, &coarse->scratch, coarse->used};
+    if (ath_foresee_modes(layer->plan, &layer->motion, p, &layer->before, &placing, &layer->scratch, &layer->rows))
+        return;
+    layer->before.placed = placed_piece(coarse, p);
+    ath_predict_modes(layer->plan, &layer->motion, layer->plan->pieces + p, &layer->before, &layer->scratch,
+                      &layer->rows);
+}
+
+static int refine_piece(ath_work *work, int32_t q, int32_t p)
 {
     layer_work *layer = work->layers + q;
     const ath_piece *piece = layer->plan->pieces + p;
@@ -747,15 +783,15 @@ static int refine_piece(ath_work *work, int32_t q, int32_t p, const double **pla
     stems_reader *reader = work->stems + piece->level;
     ath_coder coder = reader->coder;
     if (refine_shapes(work, q, piece) != ATH_OK) return ATH_BAD_CHUNK;
-    look_before(work, q, p, *placed);
+    look_before(work, q, p);
     ath_predict_tracks(layer->plan, &layer->motion, piece, &layer->before, &layer->scratch, &layer->rows);
     code_refined_tracks(&coder, reader->refined, layer->plan, stream, &layer->motion, piece, &layer->rows);
     ath_turned_attach(layer->plan, &layer->motion, p, &layer->rows, &layer->scratch);
-    ath_predict_modes(layer->plan, &layer->motion, piece, &layer->before, &layer->scratch, &layer->rows);
+    predict_modes(layer, p);
     code_refined_modes(&coder, reader->refined, stream, &layer->motion, piece, &layer->rows);
     reader->coder = coder;
     if (reader->refined->rows.invalid) return blame(work, reader->chunk, ATH_BAD_CHUNK);
-    *placed = ath_pose_turned(layer->plan, &layer->motion, p, &layer->rows, &layer->scratch);
+    pose_piece(work, layer, p);
     return ATH_OK;
 }
 
@@ -844,14 +880,15 @@ static int place_piece(ath_work *work, int32_t p)
     const ath_piece *piece = work->file->plan.pieces + p;
     layer_work *layer = work->layers + work->first_layer;
     size_t vertex = (size_t)work->exact;
-    const double *placed = ath_pose_piece(layer->plan, &layer->motion, p, &layer->rows, &layer->scratch);
+    ath_turned_attach(layer->plan, &layer->motion, p, &layer->rows, &layer->scratch);
+    pose_piece(work, layer, p);
     for (int32_t q = work->first_layer + 1; q <= work->layer; q++)
-        if (refine_piece(work, q, p, &placed) != ATH_OK) return ATH_BAD_CHUNK;
+        if (refine_piece(work, q, p) != ATH_OK) return ATH_BAD_CHUNK;
     layer = work->layers + work->layer;
     if (work->keeping.at)
         ath_keep_piece(&work->keeping, piece, &layer->rows, layer->shape_integers, layer->motion.frames);
     if (watcher_of(work)) watch_piece(work, p);
-    ath_store_vertices(work->segment, work->file->info.origin, vertex, piece->count, placed);
+    ath_store_vertices(work->segment, work->file->info.origin, vertex, piece->count, layer->placed);
     ath_keep_end(work->segment, vertex, (size_t)piece->count);
     if (work->join.width > 0)
         ath_join_vertices(&work->join, work->segment, vertex, (size_t)piece->count, watcher_of(work));

@@ -72,7 +72,7 @@ static int32_t code_refined_shapes(ath_coder *coder, refined_shape_model *model,
         const int32_t *known = s < coarse_count ? coarse + s * ATH_SHAPE_NUMBERS : nothing;
         int32_t predicted[ATH_SHAPE_NUMBERS];
         uint32_t ratio = 1u << shift;
-        row_prediction prediction = {predicted, known, 0, ATH_SHAPE_MODES, {ratio, ratio, ratio}};
+        row_prediction prediction = {predicted, known, 0, ATH_SHAPE_MODES, ATH_SHAPE_MODES, {ratio, ratio, ratio}};
         for (int32_t i = 0; i < ATH_SHAPE_NUMBERS; i++) predicted[i] = shifted(known[i], shift);
         above_count =
             code_refined_row(coder, &model->rows, modes, s, above_count, &prediction, integers + s * ATH_SHAPE_NUMBERS);
@@ -111,14 +111,19 @@ static void code_piece(ath_coder *coder, coefficient_model *model, const ath_pla
     }
 }
 
+static void note_extent(const ath_piece_rows *rows, int32_t slot, const int32_t *row, int32_t frames, int32_t count)
+{
+    if (rows->counts) rows->counts[slot] = ath_row_extent(row, frames, ath_max(count, rows->reach));
+}
+
 static void code_refined_track(ath_coder *coder, refinement_model *model, const ath_stream *stream,
                                const ath_motion *motion, int32_t slot, const uint32_t ratios[3],
                                const int32_t *predicted, const int32_t *coarse, const ath_piece_rows *rows,
                                int32_t *row)
 {
-    row_prediction prediction = {predicted, coarse, 0, motion->frames, {ratios[0], ratios[1], ratios[2]}};
-    code_refined_row(coder, model, stream->temporal_rank, slot, -1, &prediction, row);
-    note_count(rows, slot, ath_row_extent(row, motion->frames, motion->frames));
+    row_prediction prediction = {predicted, coarse, 0, motion->frames, rows->reach, {ratios[0], ratios[1], ratios[2]}};
+    int32_t count = code_refined_row(coder, model, stream->temporal_rank, slot, -1, &prediction, row);
+    note_extent(rows, slot, row, motion->frames, count);
 }
 
 /* The stream of a refinement holds a piece's tracks first, since the predictions of the modes need the attach frame
@@ -144,7 +149,7 @@ static void code_refined_modes(ath_coder *coder, refinement_model *model, const 
 {
     int32_t T = motion->frames, above_count = -1;
     uint32_t ratio = (uint32_t)motion->ratio;
-    row_prediction prediction = {0, 0, 0, T, {ratio, ratio, ratio}};
+    row_prediction prediction = {0, 0, 0, T, rows->reach, {ratio, ratio, ratio}};
     for (int32_t m = 0; m < ath_rank(piece); m++) {
         if (ath_is_shape_row(piece, rows, m) && 3 * m >= rows->shape_count) continue;
         prediction.row = ath_row(rows->predicted_modes, m, T);
@@ -153,7 +158,7 @@ static void code_refined_modes(ath_coder *coder, refinement_model *model, const 
         prediction.below = m + 1 < ath_rank(piece) ? (coarse ? coarse : prediction.row) + 3 * T : 0;
         above_count = code_refined_row(coder, model, stream->temporal_rank, m, above_count, &prediction,
                                        ath_row(rows->modes, m, T));
-        note_count(rows, m, ath_row_extent(ath_row(rows->modes, m, T), T, T));
+        note_extent(rows, m, ath_row(rows->modes, m, T), T, above_count);
     }
 }
 

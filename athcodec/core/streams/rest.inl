@@ -219,7 +219,7 @@ static void refine_rest_row(ath_coder *coder, rest_model *model, const rest_laye
                             const double *basis, double step, const double base[3], int32_t *row)
 {
     int32_t predicted[3 * REST_RUN] = {0}, known[3 * REST_RUN] = {0};
-    row_prediction prediction = {predicted, known, 0, REST_RUN, {1, 1, 1}};
+    row_prediction prediction = {predicted, known, 0, REST_RUN, REST_RUN, {1, 1, 1}};
     steps_of_run(n, basis, step, 0.5, base, layer->before + 3 * (size_t)first, predicted);
     for (int32_t i = 0; i < 3 * n; i++) {
         int32_t at = i / n * REST_RUN + i % n;
