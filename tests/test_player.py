@@ -6,7 +6,7 @@ import ctypes
 import subprocess
 import sys
 import threading
-from ctypes import POINTER, byref, c_double, c_float, c_int32, c_size_t, c_uint32, c_void_p
+from ctypes import POINTER, byref, c_double, c_float, c_int32, c_size_t, c_uint32, c_uint64, c_void_p
 
 import numpy as np
 import pytest
@@ -25,7 +25,8 @@ pytestmark = pytest.mark.formats
 
 CLAMP, LOOP, PING_PONG, AS_MARKED = range(4)
 FILE_ORDER, SOURCE_ORDER = range(2)
-OK, BAD_CHUNK, MORE, MISSING, NO_MEMORY, BAD_ARGUMENT = 0, 9, 64, 66, 68, 69
+OK, BAD_CHUNK, MORE, HELD, MISSING, NO_MEMORY, BAD_ARGUMENT = 0, 9, 64, 65, 66, 68, 69
+BUDGET, EXACT = 150_000, 2**31 - 1
 IMPLEMENTATION = '#define ATH_PLAYER_IMPLEMENTATION\n#include "ath_player.h"\n'
 
 Allocate = ctypes.CFUNCTYPE(c_void_p, c_void_p, c_size_t)
@@ -39,6 +40,10 @@ class Options(ctypes.Structure):
 
 class Share(ctypes.Structure):
     _fields_ = [("clip", c_int32), ("level", c_int32), ("wrap", c_int32), ("seconds", c_double), ("weight", c_double)]
+
+
+class Moment(ctypes.Structure):
+    _fields_ = [("frame", c_double), ("level", c_int32), ("count", c_int32), ("segments", c_void_p * 2)]
 
 
 class Transition(ctypes.Structure):
@@ -61,6 +66,7 @@ def lib(tmp_path_factory):
     loaded = ctypes.CDLL(str(folder / "player.so"))
     for name in ("begin", "file", "fault"):
         getattr(loaded, f"ath_player_{name}").restype = c_void_p
+    loaded.ath_player_prepared.restype = c_uint64
     return loaded
 
 
@@ -91,7 +97,7 @@ class Memory:
 
 
 class Player:
-    def __init__(self, lib, data: bytes, memory: Memory | None = None, **options):
+    def __init__(self, lib, data: bytes, memory: Memory | None = None, budget: int = EXACT, **options):
         self.lib, self.data = lib, data
         self.player, self.fault = c_void_p(), Fault()
         if memory:
@@ -99,6 +105,8 @@ class Player:
         self.result = lib.ath_player_open(
             byref(self.player), data, c_size_t(len(data)), byref(Options(**options)), byref(self.fault)
         )
+        if self.player:
+            lib.ath_player_set_budget(self.player, budget)
 
     def __enter__(self) -> Player:
         return self
@@ -111,7 +119,12 @@ class Player:
         result = self.lib.ath_player_positions(
             self.player, clip, c_double(seconds), wrap, level, order, xyz.ctypes, c_size_t(12)
         )
-        return xyz if result == OK else result
+        return xyz if result in (OK, HELD) else result
+
+    def level(self, seconds, level=-1, clip=0, wrap=CLAMP):
+        moment = Moment()
+        assert self.lib.ath_player_show(self.player, clip, c_double(seconds), wrap, level, byref(moment)) == OK
+        return moment.level
 
     def blended(self, count, shares, order=SOURCE_ORDER):
         xyz = np.full((count, 3), np.nan, np.float32)
@@ -138,7 +151,7 @@ class Player:
         return out
 
     def ahead(self) -> int:
-        return self.lib.ath_player_ahead(self.player, 10**6)
+        return self.lib.ath_player_ahead(self.player, EXACT)
 
 
 @pytest.mark.parametrize(
@@ -325,7 +338,7 @@ def test_the_segment_that_comes_is_there_when_its_time_comes(lib, sample_ath, wr
         start, end = times
         for time in np.arange(start, end, 1 / 60):
             player.positions(1001, time, wrap=wrap)
-            player.lib.ath_player_ahead(player.player, 200)
+            player.lib.ath_player_ahead(player.player, 40_000)
         while player.ahead() == MORE:
             pass
         assert player.ahead() == OK  # nothing is left to do
@@ -342,7 +355,7 @@ def test_jobs_run_on_other_threads_while_this_one_shows(lib, sample_ath):
         for _ in range(5):
             for frame in range(0, len(wanted), 3):
                 job = c_void_p(lib.ath_player_begin(player.player))
-                thread = threading.Thread(target=lib.ath_player_run, args=(job, 10**6)) if job else None
+                thread = threading.Thread(target=lib.ath_player_run, args=(job, EXACT)) if job else None
                 if thread:
                     thread.start()
                     jobs += 1
@@ -573,7 +586,7 @@ int main(int argc, char **argv)
         int result = ath_player_positions(player, 0, 0.31 * i, ATH_PING_PONG, level, ATH_FILE_ORDER, xyz, 12);
         if (result != ATH_OK) return 4;
         ath_player_normals(lines, count / 2, xyz, 12, info.vertex_count, normals);
-        ath_player_ahead(player, 20 * i);
+        ath_player_ahead(player, 4000 * i);
         shown++;
     }
     ath_player_close(player);

@@ -29,7 +29,6 @@ from athcodec.decoding import container as ct
 from athcodec.exporters import write
 from athcodec.viewer import view
 from athcodec.viewer.build_viewer import MOST_BYTES, own_bytes
-from bench import throttled_server
 from bench.throttled_server import WEB, ThrottledServer
 from bench.trees.plant import grow
 
@@ -306,7 +305,9 @@ def windy_ath(gusty_tree, tmp_path_factory):
 
 
 class HeldServer(ThrottledServer):
-    """A line that can be held after some more bytes of its files, until it is released."""
+    """A line that can be held after some more bytes of its files, or up to 63 before, until it is released."""
+
+    packet = 64
 
     def __init__(self, files: dict[str, bytes], after: float = math.inf, **options):
         super().__init__(files, **options)
@@ -376,13 +377,12 @@ def test_every_level_shows_the_positions_that_python_decodes(opened, sample_ath)
 
 
 @browser_test
-def test_what_is_drawn_has_the_rest_pose_of_level_1_once_that_is_here(opened, stepwise_ath, monkeypatch):
+def test_what_is_drawn_has_the_rest_pose_of_level_1_once_that_is_here(opened, stepwise_ath):
     """Lines and limbs are there before it, with that of level 0."""
     with athcodec.open(stepwise_ath) as decoder:
         rests = [decoder.level_rest(level).astype(np.float32) for level in (0, 1)]
         assert not np.array_equal(*rests) and decoder.levels[0].bytes + 100 < decoder.levels[1].bytes
         after = decoder.levels[0].bytes + 100
-    monkeypatch.setattr(throttled_server, "PACKET", 100)
     with HeldServer({"tree.ath": stepwise_ath.read_bytes()}, after=after) as line:
         page = opened(line.page("tree.ath"), "athcodecViewer.motion?.level === 0")
         page.evaluate("athcodecViewer.plants[0].ath.lines")
