@@ -7,9 +7,11 @@ import subprocess
 import sys
 import threading
 from ctypes import POINTER, byref, c_double, c_float, c_int32, c_size_t, c_uint32, c_uint64, c_void_p
+from pathlib import Path
 
 import numpy as np
 import pytest
+from counting import COUNTER
 from files import Parts, coded
 from fuzz.targets import CORE
 from header import Fade
@@ -27,6 +29,7 @@ CLAMP, LOOP, PING_PONG, AS_MARKED = range(4)
 FILE_ORDER, SOURCE_ORDER = range(2)
 OK, BAD_CHUNK, MORE, HELD, MISSING, NO_MEMORY, BAD_ARGUMENT = 0, 9, 64, 65, 66, 68, 69
 BUDGET, EXACT = 150_000, 2**31 - 1
+SHIPPED = Path(athcodec.__file__).parent / "sample" / "leafed_tree.ath"
 IMPLEMENTATION = '#define ATH_PLAYER_IMPLEMENTATION\n#include "ath_player.h"\n'
 
 Allocate = ctypes.CFUNCTYPE(c_void_p, c_void_p, c_size_t)
@@ -57,16 +60,19 @@ class Endless(ctypes.Structure):
 
 @pytest.fixture(scope="module")
 def lib(tmp_path_factory):
-    """The decoder as one file and the player, as an engine would compile them."""
+    """The decoder as one file and the player, as an engine would compile them, but with their work counted."""
     folder = tmp_path_factory.mktemp("player")
     (folder / "player.c").write_text(IMPLEMENTATION)
+    (folder / "counter.c").write_text(COUNTER)
     run(sys.executable, CORE / "amalgamate.py", folder / "ath.c")
-    flags = ["-O2", "-g", "-shared", "-fPIC", "-DATH_STATIC", "-fvisibility=default", "-I", CORE / "include"]
+    flags = ["-O2", "-g", "-fPIC", "-DATH_STATIC", "-fvisibility=default", "-I", CORE / "include"]
+    run("cc", *flags, "-c", folder / "counter.c", "-o", folder / "counter.o")
+    flags += ["-shared", "-fsanitize-coverage=trace-pc", folder / "counter.o"]
     run("cc", *flags, folder / "ath.c", folder / "player.c", "-lm", "-o", folder / "player.so")
     loaded = ctypes.CDLL(str(folder / "player.so"))
     for name in ("begin", "file", "fault"):
         getattr(loaded, f"ath_player_{name}").restype = c_void_p
-    loaded.ath_player_prepared.restype = c_uint64
+    loaded.ath_player_prepared.restype = loaded.counted_blocks.restype = c_uint64
     return loaded
 
 
@@ -271,6 +277,115 @@ def test_a_mesh_of_the_host_is_asked_for(lib, scratch, sample_clip):
     mesh = np.ascontiguousarray(sample_clip.source_rest, np.float32)
     with Player(lib, path.read_bytes(), host_mesh=mesh.ctypes.data, host_stride=12, host_vertices=len(mesh)) as player:
         assert isinstance(player.positions(len(mesh), 1.0), np.ndarray)
+
+
+# ---- in slices ----
+
+
+class Counted:
+    """The work of calls of a player: vertex-frames as the player tells them, and basic blocks that they execute."""
+
+    def __init__(self, player: Player):
+        self.player, self.calls = player, []
+
+    def __call__(self, function, *arguments, **options):
+        before = self._now()
+        result = function(*arguments, **options)
+        self.calls.append(self._now() - before)
+        return result
+
+    def _now(self) -> np.ndarray:
+        lib = self.player.lib
+        return np.array([lib.ath_player_prepared(self.player.player), lib.counted_blocks()], np.int64)
+
+    @property
+    def largest(self) -> np.ndarray:
+        return np.max(self.calls, axis=0)
+
+
+def check_calls(lib, path: Path) -> None:
+    """No call takes more than the budget, one step and level 0, and as many blocks for that and for showing it."""
+    rng, data = np.random.default_rng(5), path.read_bytes()
+    with athcodec.open(path) as file:
+        count, levels, clips = file.file.vertex_count, file.file.level_count, len(file.file.clips)
+        step = max(16384, 64 * 80 * levels)  # segments of all these files are shorter than 80 frames
+    with Player(lib, data) as player:
+        exact, coarsest = Counted(player), Counted(player)
+        for seconds in (0.0, 0.1):
+            exact(player.positions, count, seconds)
+            coarsest(player.positions, count, seconds, 0)
+    with Player(lib, data, budget=BUDGET) as player:
+        counted = Counted(player)
+        for i in range(400):
+            if i % 40 == 0:  # a seek, to another level and clip
+                start, level, clip = rng.uniform(0, 5), int(rng.integers(-1, levels)), int(rng.integers(clips))
+            counted(player.positions, count, start + i / 60, level, clip, LOOP)
+            counted(lib.ath_player_ahead, player.player, BUDGET)
+    (frames, blocks), (_, shown) = exact.calls
+    most = BUDGET + step + coarsest.largest[0]
+    print(path.name, "longest call:", *counted.largest, "of", frames, "vertex-frames and", blocks, "blocks")
+    assert counted.largest[0] <= most
+    assert counted.largest[1] <= 2 * (shown + most * (blocks - shown) / frames)
+
+
+def test_no_call_prepares_more_than_its_budget_one_step_and_level_0(lib, sample_ath, medley_ath):
+    """Playing, seeking, and changing clips and levels; the first path is that of the tree that is shipped."""
+    for path in (SHIPPED, sample_ath, medley_ath):
+        check_calls(lib, path)
+
+
+def test_a_level_is_shown_at_once_and_grows_to_the_one_that_is_asked_for(lib):
+    with athcodec.open(SHIPPED) as file, Player(lib, SHIPPED.read_bytes(), budget=BUDGET) as player:
+        deepest = file.file.level_count - 1
+        for frame in (100, 3):
+            seconds = file.time[frame] - file.time[0]
+            levels = [player.level(seconds)]
+            while levels[-1] < deepest:
+                levels.append(player.level(seconds))
+            assert levels == sorted(levels) and 0 == levels[0] < levels[20] < deepest
+            np.testing.assert_array_equal(player.positions(file.file.vertex_count, seconds), file.positions(frame))
+
+
+def test_a_deeper_level_stays_until_the_coarser_one_is_prepared_but_not_in_matrices(lib, sample_ath):
+    with athcodec.open(sample_ath) as file, Player(lib, sample_ath.read_bytes()) as player:
+        deepest, shown = file.file.level_count - 1, c_int32(-1)
+        assert player.level(0.0) == deepest
+        lib.ath_player_set_budget(player.player, 1)
+        assert player.level(0.0, deepest - 1) == deepest
+        matrices, exact = np.empty((1001, 12), np.float32), np.empty((1001, 3), np.float32)
+        arguments = 0, c_double(0.0), CLAMP, deepest - 1, matrices.ctypes, exact.ctypes, byref(shown)
+        assert lib.ath_player_matrices(player.player, *arguments) == OK and shown.value < deepest
+        while player.level(0.0, deepest - 1) == deepest:
+            pass
+        assert player.level(0.0, deepest - 1) == deepest - 1
+
+
+def test_where_the_next_segment_is_not_prepared_the_last_frame_is_held(lib, sample_ath):
+    with athcodec.open(sample_ath) as file, Player(lib, sample_ath.read_bytes()) as player:
+        last, after = file.time[39] - file.time[0], file.time[40] - file.time[0]
+        wanted = player.positions(1001, last)
+        lib.ath_player_set_budget(player.player, 0)
+        np.testing.assert_array_equal(player.positions(1001, (last + after) / 2), wanted)
+
+
+def test_moments_that_are_shown_in_turn_are_all_prepared(lib, sample_ath):
+    with athcodec.open(sample_ath) as file, Player(lib, sample_ath.read_bytes(), budget=5000) as player:
+        deepest = file.file.level_count - 1
+        for _ in range(500):
+            levels = [player.level(seconds) for seconds in (0.1, 2.1, 3.1)]
+        assert levels == [deepest] * 3
+
+
+def test_damage_is_found_once_and_told_again_without_work(lib, sample_ath):
+    parts = Parts.of(sample_ath.read_bytes())
+    deepest = max(chunk.level for chunk, _ in parts.chunks if chunk.kind == ct.STEMS)
+    with Player(lib, parts.with_payload(ct.STEMS, b"\xff" * 40, deepest), budget=BUDGET) as player:
+        shown = Counted(player)
+        while isinstance(shown(player.positions, 1001, 0.0), np.ndarray):
+            pass
+        assert [shown(player.positions, 1001, 0.0) for _ in range(3)] == [BAD_CHUNK] * 3
+        assert not np.any([vertex_frames for vertex_frames, _ in shown.calls[-3:]])
+        assert isinstance(player.positions(1001, 0.0, level=0), np.ndarray)
 
 
 # ---- memory ----
