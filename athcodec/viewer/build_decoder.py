@@ -33,6 +33,7 @@ SMALL = (
     "fault_text.c",
     "file.c",
     "gpu.c",
+    "join.c",
     "keep.c",
     "mesh.c",
     "open.c",
