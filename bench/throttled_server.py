@@ -17,24 +17,17 @@ TYPES = {".html": "text/html", ".js": "text/javascript", ".css": "text/css"}
 class ThrottledServer(ThreadingHTTPServer):
     """Serves the viewer, and `files` by name, on 127.0.0.1: a context manager.
 
-    rate: bytes a second of files (None: unlimited); the page is not throttled. packet: bytes that are sent at once.
-    latency: seconds before each response with a file. ranges: whether byte ranges are supported. `log`: [name, first
-    byte, bytes sent] per file response.
+    rate: bytes a second of files (None: unlimited); the page is not throttled. latency: seconds before each response
+    with a file. ranges: whether byte ranges are supported. `log`: [name, first byte, bytes sent] per file response.
     """
 
     daemon_threads = True
     block_on_close = False
+    packet = 1460  # bytes that are sent at once
 
-    def __init__(
-        self,
-        files: dict[str, bytes],
-        rate: float | None = None,
-        latency: float = 0.0,
-        ranges: bool = True,
-        packet: int = 1460,
-    ):
+    def __init__(self, files: dict[str, bytes], rate: float | None = None, latency: float = 0.0, ranges: bool = True):
         super().__init__(("127.0.0.1", 0), _Handler)
-        self.files, self.rate, self.latency, self.ranges, self.packet = files, rate, latency, ranges, packet
+        self.files, self.rate, self.latency, self.ranges = files, rate, latency, ranges
         self.log: list[list] = []
         self._free_at, self._lock = 0.0, threading.Lock()
 

@@ -381,7 +381,8 @@ def test_what_is_drawn_has_the_rest_pose_of_level_1_once_that_is_here(opened, st
         rests = [decoder.level_rest(level).astype(np.float32) for level in (0, 1)]
         assert not np.array_equal(*rests) and decoder.levels[0].bytes + 100 < decoder.levels[1].bytes
         after = decoder.levels[0].bytes + 100
-    with HeldServer({"tree.ath": stepwise_ath.read_bytes()}, after=after, packet=100) as line:
+    with HeldServer({"tree.ath": stepwise_ath.read_bytes()}, after=after) as line:
+        line.packet = 100
         page = opened(line.page("tree.ath"), "athcodecViewer.motion?.level === 0")
         page.evaluate("athcodecViewer.plants[0].ath.lines")
         drawn = """(() => {
@@ -628,7 +629,8 @@ def test_a_tree_that_sharpens_as_bytes_come_does_not_jump(opened, sample_ath):
         first, deepest = decoder.levels[0].bytes, decoder.file.level_count - 1
         apart = np.abs(decoder.positions(6, 0) - decoder.positions(6, deepest)).max()
         apart += 2 * np.abs(decoder.level_rest(0) - decoder.level_rest(1)).max()
-    with HeldServer({"tree.ath": sample_ath.read_bytes()}, after=first + 100, packet=100) as line:
+    with HeldServer({"tree.ath": sample_ath.read_bytes()}, after=first + 100) as line:
+        line.packet = 100
         page = opened(line.page("tree.ath"), "athcodecViewer.motion?.level === 0")
         page.evaluate("athcodecViewer.setPlaying(false)")
         page.evaluate(WATCHED)
