@@ -12,7 +12,6 @@ of JSON.
 from __future__ import annotations
 
 import json
-import os
 import resource
 import sys
 import time
@@ -36,6 +35,7 @@ from bench.codecs.ours import LayeredAthcodec
 from bench.codecs.program import CannotKeep
 from bench.memory import peak_bytes
 from bench.smoothness import measured_levels
+from bench.speed import processor_seconds
 
 
 def encode(codec: Codec, clip_path: str, rel_bound: float, file: Path, limit: float) -> dict[str, Any]:
@@ -74,15 +74,11 @@ def _with_branches(clip: athcodec.MotionClip, codec: Codec, rel_bound: float) ->
 
 def _timed(step: Callable[[], Any], limit: float) -> tuple[float, float, Any]:
     """Wall time, processor time with all threads and child processes, and the result of a step of at most `limit` s."""
-    start, used = time.perf_counter(), _cpu_seconds()
+    start, used = time.perf_counter(), processor_seconds()
     allowed = int(time.process_time() + limit) + 1
     resource.setrlimit(resource.RLIMIT_CPU, (allowed, resource.getrlimit(resource.RLIMIT_CPU)[1]))
     result = step()
-    return time.perf_counter() - start, _cpu_seconds() - used, result
-
-
-def _cpu_seconds() -> float:
-    return sum(os.times()[:4])
+    return time.perf_counter() - start, processor_seconds() - used, result
 
 
 def _errors(source: Source, decoded: np.ndarray, rel_bound: float) -> dict[str, Any]:

@@ -52,9 +52,9 @@ def _row(path: Path, rel_error: float) -> dict[str, Any]:
         file, gzip = Path(folder) / "clip.ath", Path(folder) / "clip.h5"
         work, middle = clip.frame_count * clip.vertex_count, clip.frame_count // 2
         athcodec.write_hdf5(clip.replace(attributes={}), gzip, gzip=True)
-        start, cpu = time.perf_counter(), _processor_seconds()
+        start, cpu = time.perf_counter(), processor_seconds()
         summary = athcodec.encode(clip, file, rel_error=rel_error)
-        encode, cpu = time.perf_counter() - start, _processor_seconds() - cpu
+        encode, cpu = time.perf_counter() - start, processor_seconds() - cpu
         bytes_read = [0]
 
         def decode() -> None:
@@ -87,7 +87,8 @@ def _row(path: Path, rel_error: float) -> dict[str, Any]:
     }
 
 
-def _processor_seconds() -> float:
+def processor_seconds() -> float:
+    """Return the processor time of this process, with its threads and the children that it waited for, to 1 us."""
     used = map(resource.getrusage, (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
     return sum(one.ru_utime + one.ru_stime for one in used)
 

@@ -12,7 +12,6 @@ import athcodec
 
 WEB = Path(athcodec.__file__).parent / "viewer" / "web"
 TYPES = {".html": "text/html", ".js": "text/javascript", ".css": "text/css"}
-PACKET = 1460  # bytes
 
 
 class ThrottledServer(ThreadingHTTPServer):
@@ -24,6 +23,7 @@ class ThrottledServer(ThreadingHTTPServer):
 
     daemon_threads = True
     block_on_close = False
+    packet = 1460  # bytes that are sent at once
 
     def __init__(self, files: dict[str, bytes], rate: float | None = None, latency: float = 0.0, ranges: bool = True):
         super().__init__(("127.0.0.1", 0), _Handler)
@@ -100,8 +100,8 @@ class _Handler(BaseHTTPRequestHandler):
         try:
             if entry is None:
                 self.wfile.write(body)
-            for at in range(0, len(body) if entry else 0, PACKET):
-                packet = body[at : at + PACKET]
+            for at in range(0, len(body) if entry else 0, self.server.packet):
+                packet = body[at : at + self.server.packet]
                 self.server.wait(len(packet))
                 entry[2] += len(packet)  # before the client can have it, and ask
                 self.wfile.write(packet)

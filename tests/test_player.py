@@ -6,10 +6,13 @@ import ctypes
 import subprocess
 import sys
 import threading
-from ctypes import POINTER, byref, c_double, c_float, c_int32, c_size_t, c_uint32, c_void_p
+from ctypes import POINTER, byref, c_double, c_float, c_int32, c_size_t, c_uint32, c_uint64, c_void_p
+from functools import partial
+from pathlib import Path
 
 import numpy as np
 import pytest
+from counting import COUNTER
 from files import Parts, coded
 from fuzz.targets import CORE
 from header import Fade
@@ -25,7 +28,9 @@ pytestmark = pytest.mark.formats
 
 CLAMP, LOOP, PING_PONG, AS_MARKED = range(4)
 FILE_ORDER, SOURCE_ORDER = range(2)
-OK, BAD_CHUNK, MORE, MISSING, NO_MEMORY, BAD_ARGUMENT = 0, 9, 64, 66, 68, 69
+OK, BAD_CHUNK, MORE, HELD, MISSING, NO_MEMORY, BAD_ARGUMENT = 0, 9, 64, 65, 66, 68, 69
+BUDGET, EXACT = 150_000, 2**31 - 1
+SHIPPED = Path(athcodec.__file__).parent / "sample" / "leafed_tree.ath"
 IMPLEMENTATION = '#define ATH_PLAYER_IMPLEMENTATION\n#include "ath_player.h"\n'
 
 Allocate = ctypes.CFUNCTYPE(c_void_p, c_void_p, c_size_t)
@@ -41,6 +46,10 @@ class Share(ctypes.Structure):
     _fields_ = [("clip", c_int32), ("level", c_int32), ("wrap", c_int32), ("seconds", c_double), ("weight", c_double)]
 
 
+class Moment(ctypes.Structure):
+    _fields_ = [("frame", c_double), ("level", c_int32), ("count", c_int32), ("segments", c_void_p * 2)]
+
+
 class Transition(ctypes.Structure):
     _fields_ = [("leave", c_int32), ("enter", c_int32), ("frames", c_int32)]
 
@@ -52,15 +61,19 @@ class Endless(ctypes.Structure):
 
 @pytest.fixture(scope="module")
 def lib(tmp_path_factory):
-    """The decoder as one file and the player, as an engine would compile them."""
+    """The decoder as one file and the player, as an engine would compile them, but with their work counted."""
     folder = tmp_path_factory.mktemp("player")
     (folder / "player.c").write_text(IMPLEMENTATION)
+    (folder / "counter.c").write_text(COUNTER)
     run(sys.executable, CORE / "amalgamate.py", folder / "ath.c")
-    flags = ["-O2", "-g", "-shared", "-fPIC", "-DATH_STATIC", "-fvisibility=default", "-I", CORE / "include"]
+    flags = ["-O2", "-g", "-fPIC", "-DATH_STATIC", "-fvisibility=default", "-I", CORE / "include"]
+    run("cc", *flags, "-c", folder / "counter.c", "-o", folder / "counter.o")
+    flags += ["-shared", "-fsanitize-coverage=trace-pc", folder / "counter.o"]
     run("cc", *flags, folder / "ath.c", folder / "player.c", "-lm", "-o", folder / "player.so")
     loaded = ctypes.CDLL(str(folder / "player.so"))
     for name in ("begin", "file", "fault"):
         getattr(loaded, f"ath_player_{name}").restype = c_void_p
+    loaded.ath_player_prepared.restype = loaded.counted_blocks.restype = c_uint64
     return loaded
 
 
@@ -91,7 +104,7 @@ class Memory:
 
 
 class Player:
-    def __init__(self, lib, data: bytes, memory: Memory | None = None, **options):
+    def __init__(self, lib, data: bytes, memory: Memory | None = None, budget: int = EXACT, **options):
         self.lib, self.data = lib, data
         self.player, self.fault = c_void_p(), Fault()
         if memory:
@@ -99,6 +112,8 @@ class Player:
         self.result = lib.ath_player_open(
             byref(self.player), data, c_size_t(len(data)), byref(Options(**options)), byref(self.fault)
         )
+        if self.player:
+            lib.ath_player_set_budget(self.player, budget)
 
     def __enter__(self) -> Player:
         return self
@@ -111,7 +126,12 @@ class Player:
         result = self.lib.ath_player_positions(
             self.player, clip, c_double(seconds), wrap, level, order, xyz.ctypes, c_size_t(12)
         )
-        return xyz if result == OK else result
+        return xyz if result in (OK, HELD) else result
+
+    def level(self, seconds, level=-1, clip=0, wrap=CLAMP):
+        moment = Moment()
+        assert self.lib.ath_player_show(self.player, clip, c_double(seconds), wrap, level, byref(moment)) == OK
+        return moment.level
 
     def blended(self, count, shares, order=SOURCE_ORDER):
         xyz = np.full((count, 3), np.nan, np.float32)
@@ -138,7 +158,7 @@ class Player:
         return out
 
     def ahead(self) -> int:
-        return self.lib.ath_player_ahead(self.player, 10**6)
+        return self.lib.ath_player_ahead(self.player, EXACT)
 
 
 @pytest.mark.parametrize(
@@ -260,6 +280,93 @@ def test_a_mesh_of_the_host_is_asked_for(lib, scratch, sample_clip):
         assert isinstance(player.positions(len(mesh), 1.0), np.ndarray)
 
 
+# ---- in slices ----
+
+
+def works(player: Player, *calls) -> np.ndarray:
+    """Vertex-frames as the player tells them, and basic blocks that are executed, of each call."""
+    lib, totals = player.lib, []
+    for call in (lambda: None, *calls):
+        call()
+        totals.append((lib.ath_player_prepared(player.player), lib.counted_blocks()))
+    return np.diff(np.array(totals, np.int64), axis=0)
+
+
+@pytest.mark.parametrize("name", ["shipped tree", "sample", "medley"])
+def test_no_call_prepares_more_than_its_budget_one_step_and_level_0(name, lib, sample_ath, medley_ath):
+    """Playing, seeking, and changing clips and levels."""
+    path, rng = {"sample": sample_ath, "medley": medley_ath}.get(name, SHIPPED), np.random.default_rng(5)
+    with athcodec.open(path) as file:
+        count, levels, clips = file.file.vertex_count, file.file.level_count, len(file.file.clips)
+    with Player(lib, path.read_bytes()) as player:
+        shows = (partial(player.positions, count, 0.0, level) for level in (-1, -1, 0))
+        (frames, blocks), (_, shown), (coarsest, _) = works(player, *shows)
+    calls = []
+    with Player(lib, path.read_bytes(), budget=BUDGET) as player:
+        for _ in range(10):
+            start, level, clip = rng.uniform(0, 5), int(rng.integers(-1, levels)), int(rng.integers(clips))
+            for i in range(40):
+                calls.append(partial(player.positions, count, start + i / 60, level, clip, LOOP))
+                calls.append(partial(lib.ath_player_ahead, player.player, BUDGET))
+        largest = works(player, *calls).max(axis=0)
+    print(f"{name}: {largest[0]} of {frames} vertex-frames, {largest[1]} of {blocks} blocks in the longest call")
+    most = BUDGET + max(16384, 64 * 80 * levels) + coarsest  # segments of these files are shorter than 80 frames
+    assert largest[0] <= most and largest[1] <= 2 * (shown + most * (blocks - shown) / frames)
+
+
+def test_a_level_is_shown_at_once_and_grows_to_the_one_that_is_asked_for(lib):
+    with athcodec.open(SHIPPED) as file, Player(lib, SHIPPED.read_bytes(), budget=BUDGET) as player:
+        deepest = file.file.level_count - 1
+        for frame in (100, 3):
+            seconds = file.time[frame] - file.time[0]
+            levels = [player.level(seconds)]
+            while levels[-1] < deepest:
+                levels.append(player.level(seconds))
+            assert levels == sorted(levels) and 0 == levels[0] < levels[20] < deepest
+            np.testing.assert_array_equal(player.positions(file.file.vertex_count, seconds), file.positions(frame))
+
+
+def test_a_deeper_level_stays_until_the_coarser_one_is_prepared_but_not_in_matrices(lib, sample_ath):
+    with athcodec.open(sample_ath) as file, Player(lib, sample_ath.read_bytes()) as player:
+        deepest, shown = file.file.level_count - 1, c_int32(-1)
+        assert player.level(0.0) == deepest
+        lib.ath_player_set_budget(player.player, 1)
+        assert player.level(0.0, deepest - 1) == deepest
+        matrices, exact = np.empty((1001, 12), np.float32), np.empty((1001, 3), np.float32)
+        arguments = 0, c_double(0.0), CLAMP, deepest - 1, matrices.ctypes, exact.ctypes, byref(shown)
+        assert lib.ath_player_matrices(player.player, *arguments) == OK and shown.value < deepest
+        while player.level(0.0, deepest - 1) == deepest:
+            pass
+        assert player.level(0.0, deepest - 1) == deepest - 1
+
+
+def test_where_the_next_segment_is_not_prepared_the_last_frame_is_held(lib, sample_ath):
+    with athcodec.open(sample_ath) as file, Player(lib, sample_ath.read_bytes()) as player:
+        last, after = file.time[39] - file.time[0], file.time[40] - file.time[0]
+        wanted = player.positions(1001, last)
+        lib.ath_player_set_budget(player.player, 0)
+        np.testing.assert_array_equal(player.positions(1001, (last + after) / 2), wanted)
+
+
+def test_moments_that_are_shown_in_turn_are_all_prepared(lib, sample_ath):
+    with athcodec.open(sample_ath) as file, Player(lib, sample_ath.read_bytes(), budget=5000) as player:
+        deepest = file.file.level_count - 1
+        for _ in range(500):
+            levels = [player.level(seconds) for seconds in (0.1, 2.1, 3.1)]
+        assert levels == [deepest] * 3
+
+
+def test_damage_is_found_once_and_told_again_without_work(lib, sample_ath):
+    parts = Parts.of(sample_ath.read_bytes())
+    deepest = max(chunk.level for chunk, _ in parts.chunks if chunk.kind == ct.STEMS)
+    with Player(lib, parts.with_payload(ct.STEMS, b"\xff" * 40, deepest), budget=BUDGET) as player:
+        while isinstance(player.positions(1001, 0.0), np.ndarray):
+            pass
+        assert works(player, lambda: player.positions(1001, 0.0))[0, 0] == 0
+        assert player.positions(1001, 0.0) == BAD_CHUNK
+        assert isinstance(player.positions(1001, 0.0, level=0), np.ndarray)
+
+
 # ---- memory ----
 
 
@@ -325,7 +432,7 @@ def test_the_segment_that_comes_is_there_when_its_time_comes(lib, sample_ath, wr
         start, end = times
         for time in np.arange(start, end, 1 / 60):
             player.positions(1001, time, wrap=wrap)
-            player.lib.ath_player_ahead(player.player, 200)
+            player.lib.ath_player_ahead(player.player, 40_000)
         while player.ahead() == MORE:
             pass
         assert player.ahead() == OK  # nothing is left to do
@@ -342,7 +449,7 @@ def test_jobs_run_on_other_threads_while_this_one_shows(lib, sample_ath):
         for _ in range(5):
             for frame in range(0, len(wanted), 3):
                 job = c_void_p(lib.ath_player_begin(player.player))
-                thread = threading.Thread(target=lib.ath_player_run, args=(job, 10**6)) if job else None
+                thread = threading.Thread(target=lib.ath_player_run, args=(job, EXACT)) if job else None
                 if thread:
                     thread.start()
                     jobs += 1
@@ -573,7 +680,7 @@ int main(int argc, char **argv)
         int result = ath_player_positions(player, 0, 0.31 * i, ATH_PING_PONG, level, ATH_FILE_ORDER, xyz, 12);
         if (result != ATH_OK) return 4;
         ath_player_normals(lines, count / 2, xyz, 12, info.vertex_count, normals);
-        ath_player_ahead(player, 20 * i);
+        ath_player_ahead(player, 4000 * i);
         shown++;
     }
     ath_player_close(player);

@@ -29,7 +29,6 @@ from athcodec.decoding import container as ct
 from athcodec.exporters import write
 from athcodec.viewer import view
 from athcodec.viewer.build_viewer import MOST_BYTES, own_bytes
-from bench import throttled_server
 from bench.throttled_server import WEB, ThrottledServer
 from bench.trees.plant import grow
 
@@ -306,7 +305,7 @@ def windy_ath(gusty_tree, tmp_path_factory):
 
 
 class HeldServer(ThrottledServer):
-    """A line that can be held after some more bytes of its files, until it is released."""
+    """A line that can be held after some more bytes of its files, in whole packets, until it is released."""
 
     def __init__(self, files: dict[str, bytes], after: float = math.inf, **options):
         super().__init__(files, **options)
@@ -376,14 +375,14 @@ def test_every_level_shows_the_positions_that_python_decodes(opened, sample_ath)
 
 
 @browser_test
-def test_what_is_drawn_has_the_rest_pose_of_level_1_once_that_is_here(opened, stepwise_ath, monkeypatch):
+def test_what_is_drawn_has_the_rest_pose_of_level_1_once_that_is_here(opened, stepwise_ath):
     """Lines and limbs are there before it, with that of level 0."""
     with athcodec.open(stepwise_ath) as decoder:
         rests = [decoder.level_rest(level).astype(np.float32) for level in (0, 1)]
         assert not np.array_equal(*rests) and decoder.levels[0].bytes + 100 < decoder.levels[1].bytes
         after = decoder.levels[0].bytes + 100
-    monkeypatch.setattr(throttled_server, "PACKET", 100)
     with HeldServer({"tree.ath": stepwise_ath.read_bytes()}, after=after) as line:
+        line.packet = 100
         page = opened(line.page("tree.ath"), "athcodecViewer.motion?.level === 0")
         page.evaluate("athcodecViewer.plants[0].ath.lines")
         drawn = """(() => {
@@ -631,6 +630,7 @@ def test_a_tree_that_sharpens_as_bytes_come_does_not_jump(opened, sample_ath):
         apart = np.abs(decoder.positions(6, 0) - decoder.positions(6, deepest)).max()
         apart += 2 * np.abs(decoder.level_rest(0) - decoder.level_rest(1)).max()
     with HeldServer({"tree.ath": sample_ath.read_bytes()}, after=first + 100) as line:
+        line.packet = 100
         page = opened(line.page("tree.ath"), "athcodecViewer.motion?.level === 0")
         page.evaluate("athcodecViewer.setPlaying(false)")
         page.evaluate(WATCHED)
@@ -786,6 +786,7 @@ def test_it_moves_before_a_seventh_of_the_file_has_come(opened, gusty_ath):
     with HeldServer({"tree.ath": data}, after=len(data) / 7) as line:
         page = opened(line.page("tree.ath"), "athcodecViewer.counters.firstMotion")
         assert line.log[0][1] == 0 and line.sent("tree.ath") <= len(data) / 7
+        page.evaluate("athcodecViewer.setLevel(String(athcodecViewer.motion.levelCount - 1))")
         line.release()
         page.wait_for_function("() => athcodecViewer.motion.complete", timeout=60_000)
         assert line.sent("tree.ath") <= 1.01 * len(data) and len(line.log) > 3

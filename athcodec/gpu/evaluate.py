@@ -323,9 +323,10 @@ def turned_towards(H: np.ndarray, R: np.ndarray) -> np.ndarray:
     """A step of Newton's method to the rotations nearest to H."""
     C = H @ np.swapaxes(R, 1, 2)
     axial = np.stack([C[:, 2, 1] - C[:, 1, 2], C[:, 0, 2] - C[:, 2, 0], C[:, 1, 0] - C[:, 0, 1]], -1)
-    most = np.maximum(np.trace(C, axis1=1, axis2=2), 1) + np.float32(1e-6)
-    A = most[:, None, None] * np.eye(3, dtype=np.float32) - (C + np.swapaxes(C, 1, 2)) / 2
-    a, b, c, d, e, f = A[:, 0, 0], A[:, 1, 1], A[:, 2, 2], A[:, 0, 1], A[:, 0, 2], A[:, 1, 2]
+    spare = np.maximum(1 - np.trace(C, axis1=1, axis2=2), 0) + np.float32(1e-6)
+    x, y, z = np.diagonal(C, axis1=1, axis2=2).T
+    a, b, c = y + z + spare, x + z + spare, x + y + spare  # differences from the trace would lose precision
+    d, e, f = (-(C[:, i, j] + C[:, j, i]) / 2 for i, j in ((0, 1), (0, 2), (1, 2)))
     adjugate = np.stack(
         [
             np.stack([b * c - f * f, e * f - d * c, d * f - e * b], -1),

@@ -18,10 +18,21 @@ const glsl = { name: "glsl", setup: ({ onLoad }) => onLoad({ filter: /viewer.(sr
     .replace(/^[^#\n]+$/gm, (line) => line.replace(/ ?([,;{}=*<>?:+/]) ?/g, "$1").replace(/\b0\.(?=\d)/g, ".").replace(/(\d)\.0\b/g, "$1."))),
 })) };
 
+// What only models need of three.js comes from its sources, and the classes that these import from the bundle of all pages.
+const page = { path: "three", external: true, sideEffects: false };
+const onlyModels = (used) => ({ name: "three", setup({ onResolve, onLoad }) {
+  onResolve({ filter: /^three$/ }, () => ({ path: "three", namespace: "split", sideEffects: false }));
+  onResolve({ filter: /^page$/, namespace: "split" }, () => page);
+  onResolve({ filter: /^\..*\/[A-Z]\w+\.js$/ }, ({ path, importer }) => // except in files that list others
+    (!/(Core|Geometries|Materials|Curves)\.js$/.test(importer) && used.includes(/(\w+)\.js$/.exec(path.replace("MathUtils", ""))?.[1]) ? page : null));
+  onLoad({ filter: /./, namespace: "split" }, () => ({
+    contents: `export { ${used.join(", ")} } from "page"; export * from "three/src/Three.Core.js";`, resolveDir: modules }));
+} });
+
 async function bundle(entry, name, external) {
   await esbuild.build({
     ...entry, outfile: join(out, name), bundle: true, minify: true, format: "esm", target: "es2022", external,
-    nodePaths: [modules], plugins: [glsl], loader: { ".wgsl": "text" }, legalComments: "none", charset: "utf8", logLevel: "error",
+    nodePaths: [modules], plugins: [glsl, ...entry.plugins ?? []], loader: { ".wgsl": "text" }, legalComments: "none", charset: "utf8", logLevel: "error",
   });
   return readFileSync(join(out, name), "utf8");
 }
@@ -39,10 +50,11 @@ await bundle({ entryPoints: [join(here, "src/ath_worker.js")] }, "ath_worker.js"
 const element = await bundle({ entryPoints: [join(here, "src/element.js")] }, "ath-viewer.js", outside);
 const viewer = await bundle({ entryPoints: [join(here, "page/main.js")] }, "viewer.js", outside);
 const gltf = "three/addons/loaders/GLTFLoader.js", alias = { [gltf]: join(modules, gltf.replace("addons", "examples/jsm")) };
-const model = await bundle({ entryPoints: [join(here, "page/model.js")], alias }, "model.js", outside);
 const controls = await bundle({ entryPoints: [join(modules, "three/examples/jsm/controls/OrbitControls.js")] }, "OrbitControls.js", ["three"]);
-// Scripts that look at what is drawn take WebGLRenderTarget, which is in the bundle anyway.
-const used = [...new Set([loader, viewer, element, model, controls].flatMap(names)), "WebGLRenderTarget"].sort();
+// Models and scripts that look at what is drawn take these, which are in the bundle anyway.
+const inside = ["ColorManagement", "Line", "Material", "MeshBasicMaterial", "OrthographicCamera", "Texture", "WebGLRenderTarget"];
+const used = [...new Set([loader, viewer, element, controls].flatMap(names)), ...inside].sort();
+await bundle({ entryPoints: [join(here, "page/model.js")], alias, plugins: [onlyModels(used)] }, "model.js", outside.filter((name) => name !== "three"));
 await bundle({ stdin: { contents: `export { ${used.join(", ")} } from "three";`, resolveDir: modules } }, "three.js", []);
 await bundle({ entryPoints: [join(here, "page/forest.js")] }, "forest.js", outside);
 await bundle({ stdin: { contents: 'export * from "three/webgpu";', resolveDir: modules } }, "three.webgpu.js", []);
@@ -58,5 +70,5 @@ copyFileSync(join(here, "src/element.d.ts"), join(out, "ath-viewer.d.ts"));
 copyFileSync(join(here, "src/webgpu.d.ts"), join(out, "ATHForestGPU.d.ts"));
 const licence = (name) => readFileSync(join(modules, name, "LICENSE"), "utf8").trim();
 const version = (name) => JSON.parse(readFileSync(join(modules, name, "package.json"), "utf8")).version;
-writeFileSync(join(out, "LICENSES.txt"), [["three", "three.js, three.webgpu.js, OrbitControls.js"], ["fzstd", "in ath_worker.js"]]
+writeFileSync(join(out, "LICENSES.txt"), [["three", "three.js, three.webgpu.js, OrbitControls.js, model.js"], ["fzstd", "in ath_worker.js"]]
   .map(([name, where]) => `${name} ${version(name)} (${where})\n\n${licence(name)}\n`).join(`\n${"-".repeat(80)}\n\n`));

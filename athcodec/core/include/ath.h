@@ -433,6 +433,10 @@ ATH_API int ath_prepare_start(void *work, size_t work_bytes, const ath_file *fil
  * Returns ATH_MORE until the segment can be played, then ATH_OK. After ATH_BAD_CHECKSUM or ATH_BAD_CHUNK the segment
  * cannot be played, and further steps return ATH_BAD_ARGUMENT. */
 ATH_API int ath_prepare_step(ath_work *work, int32_t steps);
+/* Does the same, but runs steps until their cost exceeds *cost, and subtracts it. The unit is a vertex-frame: the time
+ * of placing one vertex in one frame at one layer of precision, mostly 5 to 20 nanoseconds. A step costs at most 64
+ * vertices in all frames of the segment, as often as there are layers, or 16384. */
+ATH_API int ath_prepare_within(ath_work *work, int32_t *cost);
 /* A segment may be joined to the one before it in its clip (the first of a loop to the last), so that motion does not
  * tick where they meet. Its preparation needs the end of that segment, and decodes it anew in its first steps
  * (ATH_MISSING if bytes are missing), unless you pass the prepared segment to ath_follow.

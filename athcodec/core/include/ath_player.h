@@ -1,5 +1,5 @@
 /* athcodec: plays an .ath file that is in memory. This optional header on top of ath.h allocates memory, caches
- * prepared segments, and prepares the next one ahead.
+ * prepared segments, and prepares them in slices, so that no call takes long.
  *
  *     #define ATH_PLAYER_IMPLEMENTATION      in one C or C++ file, before the include
  *     #include "ath_player.h"
@@ -11,13 +11,18 @@
  *     ath_player_wind_positions              blend several clips by the wind
  *     ath_player_show                        get the segments of a moment, for any other function of ath.h
  *     ath_player_endless_positions           play a clip endlessly, over transitions between similar frames
+ *     ath_player_set_budget                  choose between short calls and exact levels
  *     ath_player_ahead                       prepare the next segment, a bounded piece of work per drawn frame
- *     ath_player_begin, _run, _end           prepare it as a job of your own job system, on any thread
+ *     ath_player_begin, _run, _end           prepare segments as jobs of your own job system, on any thread
  *     ath_player_triangles, _lines           get the topology
  *     ath_player_normals, _tangents          compute what shading needs
  *
  * Memory comes from malloc or from your functions. Leave the bytes of the file in place until you close the player. For
  * downloads that grow, and to decide yourself what is in memory, use ath.h.
+ *
+ * Time. A call that shows something prepares segments for its budget, about 2 ms, and at most one step of ath.h more.
+ * Until the level that you ask for is prepared, it shows the best level that is: a deeper one, else a coarser one. If
+ * there is none, it prepares level 0 at once. If the level is prepared for only one of two frames, that one is held.
  *
  * Threads. Use a player from one thread at a time. Only ath_player_run may run on other threads meanwhile, each job on
  * one. Hand the job over and back by a queue of yours.
@@ -33,7 +38,7 @@ extern "C" {
 #endif
 
 typedef struct ath_player ath_player;
-typedef struct ath_player_job ath_player_job; /* the preparation of one segment ahead of its time */
+typedef struct ath_player_job ath_player_job; /* the preparation of one segment */
 
 /* Options; zeros are the defaults. */
 typedef struct ath_player_options {
@@ -59,6 +64,15 @@ const ath_file *ath_player_file(const ath_player *player);
 /* Returns the fault behind the last error. */
 const ath_fault_info *ath_player_fault(const ath_player *player);
 
+/* Budgets in the unit of ath_prepare_within, vertex-frames. */
+enum { ATH_PLAYER_BUDGET = 150000, ATH_PLAYER_EXACT = 0x7fffffff };
+
+/* Sets what each later call that shows something may spend, at first ATH_PLAYER_BUDGET. With 0, jobs alone prepare the
+ * levels above 0. With ATH_PLAYER_EXACT, as for offline rendering, each call waits for the level that it asks for. */
+void ath_player_set_budget(ath_player *player, int32_t vertex_frames);
+/* Returns the vertex-frames that all calls of this player except ath_player_run have prepared so far. */
+uint64_t ath_player_prepared(const ath_player *player);
+
 /* The segments that show a moment, all at one level. They last until the next call that shows something. */
 typedef struct ath_player_moment {
     double frame; /* pass it to ath_positions, ath_matrices and the like */
@@ -66,21 +80,22 @@ typedef struct ath_player_moment {
     const ath_segment *segments[2];
 } ath_player_moment;
 
-/* Gets the segments that show a clip at a time in seconds since its first frame, and prepares those that are not ready.
- * level: -1 for the deepest. If bytes of the level are missing, the deepest level that is there is shown. Returns
- * ATH_OK, ATH_MISSING: not even level 0 is there, ATH_BAD_CHECKSUM, ATH_BAD_CHUNK, ATH_BAD_ARGUMENT: there is no such
- * clip, or ATH_NO_MEMORY. */
+/* Gets the segments that show a clip at a time in seconds since its first frame, and prepares those that are not ready,
+ * as far as the budget goes. moment->level is the level that is shown. level: -1 for the deepest. If bytes of the level
+ * are missing, the deepest level that is there replaces it. Returns ATH_OK, ATH_MISSING: not even level 0 is there,
+ * ATH_BAD_CHECKSUM, ATH_BAD_CHUNK, ATH_BAD_ARGUMENT: there is no such clip, or ATH_NO_MEMORY. */
 int ath_player_show(ath_player *player, int32_t clip, double seconds, ath_wrap wrap, int32_t level,
                     ath_player_moment *moment);
-/* Calls ath_player_show and then ath_positions. */
+/* Calls ath_player_show and then ath_positions, which returns ATH_HELD for a frame without its blend. */
 int ath_player_positions(ath_player *player, int32_t clip, double seconds, ath_wrap wrap, int32_t level,
                          ath_order order, float *xyz, size_t stride);
-/* Calls ath_player_show and then ath_matrices and ath_exact, of 12 and 3 floats without gaps. `matrices` and `exact`
- * need room for the largest counts that ath_cut_size gives for levels up to `level`. *shown is the level whose ath_cut
- * they belong to; `shown` may be null. */
+/* Calls ath_player_show, though never for a deeper level, and then ath_matrices and ath_exact, of 12 and 3 floats
+ * without gaps. `matrices` and `exact` need room for the largest counts that ath_cut_size gives for levels up to
+ * `level`. *shown is the level whose ath_cut they belong to; `shown` may be null. */
 int ath_player_matrices(ath_player *player, int32_t clip, double seconds, ath_wrap wrap, int32_t level, float *matrices,
                         float *exact, int32_t *shown);
-/* Calls ath_faded_positions for all levels of a fade. ATH_NOT_PREPARED: bytes of one of the levels are missing. */
+/* Calls ath_faded_positions for all levels of a fade. Pass to ath_fade_to the level that ath_player_show gives: the best
+ * level that is prepared replaces one that is not. */
 int ath_player_faded_positions(ath_player *player, int32_t clip, double seconds, ath_wrap wrap, const ath_fade *fade,
                                ath_order order, float *xyz, size_t stride);
 
@@ -126,14 +141,14 @@ int ath_player_endless_begin(const ath_player *player, ath_player_endless *play,
 int ath_player_endless_positions(ath_player *player, ath_player_endless *play, double seconds, int32_t level,
                                  ath_order order, float *xyz, size_t stride);
 
-/* Prepares what comes after what was shown last, in the direction and with the wrap of that, for `steps` steps (see
- * ath_prepare_step). Returns ATH_MORE; ATH_OK: nothing is left to do until time goes on; or an error. */
-int ath_player_ahead(ath_player *player, int32_t steps);
+/* Prepares what was asked for last and then what comes after it, in its direction and with its wrap, for a budget.
+ * Returns ATH_MORE; ATH_OK: nothing is left to do until time goes on; or an error. */
+int ath_player_ahead(ath_player *player, int32_t vertex_frames);
 
-/* Returns that preparation as a job; null: nothing is left to do, or there is no memory. */
+/* Returns the first of these preparations as a job; null: nothing is left to do, or there is no memory. */
 ath_player_job *ath_player_begin(ath_player *player);
-/* Runs `steps` steps of a job on any thread. Returns ATH_MORE until it is done. */
-int ath_player_run(ath_player_job *job, int32_t steps);
+/* Runs a job for a budget, on any thread. Returns ATH_MORE until it is done. */
+int ath_player_run(ath_player_job *job, int32_t vertex_frames);
 /* Takes over the segment of a job, if that is done, and frees the job. */
 void ath_player_end(ath_player *player, ath_player_job *job);
 
@@ -171,8 +186,6 @@ void ath_player_tangents(const uint32_t *triangles, size_t count, const float *x
 extern "C" {
 #endif
 
-enum { ATH_PLAYER_ALL_STEPS = 0x7fffffff };
-
 /* A segment that is prepared, or that a job prepares. Its memory stands behind the entry. */
 typedef struct ath_player_entry {
     struct ath_player_entry *next;
@@ -208,15 +221,21 @@ struct ath_player {
     ath_player_block *blocks;
     ath_player_entry *entries;
     ath_player_job *jobs, *idle; /* running jobs; jobs whose work memory waits for the next segment */
-    ath_player_job *own;         /* the job of ath_player_ahead, one of `jobs` */
+    ath_player_job *own;         /* the job that the player's thread runs, one of `jobs` */
     size_t cached;
-    uint64_t calls;
-    int32_t deepest; /* deepest level that is built */
+    uint64_t calls, prepared;
+    int32_t budget, left; /* of each call, and what is left of it in this one */
+    int32_t dropped;      /* jobs that were dropped for others since one was done */
+    int32_t deepest;      /* deepest level that is built */
     int32_t track_count;
     ath_player_track tracks[ATH_BLEND_CLIPS];
     void *blending;  /* scratch memory of blends; null: no blend was shown */
     double *weights; /* by the wind, one per clip */
 };
+
+/* Number of jobs in a row that are dropped for another segment before one is finished, so that a player that shows
+ * several moments in turn gets on with one of them. */
+enum { ATH_PLAYER_DROPS = 8 };
 
 enum { ATH_PLAYER_HEAD = 64 }; /* bytes in front of aligned memory, which hold any of the structs above */
 
@@ -315,6 +334,7 @@ int ath_player_open(ath_player **player, const uint8_t *bytes, size_t size, cons
     if (!p) return ATH_NO_MEMORY;
     memset(p, 0, sizeof *p);
     p->options = own;
+    p->budget = ATH_PLAYER_BUDGET;
     result = ath_player_build(p, bytes, size, file_size);
     if (fault) *fault = p->fault;
     if (result != ATH_OK) {
@@ -352,6 +372,8 @@ void ath_player_close(ath_player *player)
     ath_player_give(&options, player);
 }
 
+void ath_player_set_budget(ath_player *player, int32_t vertex_frames) { player->budget = vertex_frames; }
+uint64_t ath_player_prepared(const ath_player *player) { return player->prepared; }
 const ath_file *ath_player_file(const ath_player *player) { return player->file; }
 const ath_fault_info *ath_player_fault(const ath_player *player) { return &player->fault; }
 
@@ -427,7 +449,6 @@ static int ath_player_start(ath_player *p, int32_t segment, int32_t level, ath_p
         job->entry->size = ATH_PLAYER_HEAD + size;
         job->entry->segment = segment;
         job->entry->level = level;
-        job->entry->used = p->calls;
         result =
             ath_prepare_start(job->work, work_size, p->file, segment, level, ath_player_memory_of(job->entry), size);
     }
@@ -443,9 +464,22 @@ static int ath_player_start(ath_player *p, int32_t segment, int32_t level, ath_p
     return ATH_OK;
 }
 
-int ath_player_run(ath_player_job *job, int32_t steps)
+/* Runs a job for what is left of a budget. Returns what that cost. */
+static int64_t ath_player_spend(ath_player_job *job, int32_t *budget)
 {
-    if (job->result == ATH_MORE) job->result = ath_prepare_step(job->work, steps);
+    int64_t cost = 0;
+    while (job->result == ATH_MORE && *budget > 0) {
+        int32_t left = *budget;
+        job->result = ath_prepare_within(job->work, &left);
+        cost += (int64_t)*budget - left;
+        if (*budget != ATH_PLAYER_EXACT) *budget = left;
+    }
+    return cost;
+}
+
+int ath_player_run(ath_player_job *job, int32_t vertex_frames)
+{
+    ath_player_spend(job, &vertex_frames);
     return job->result;
 }
 
@@ -457,31 +491,56 @@ void ath_player_end(ath_player *player, ath_player_job *job)
     if (player->own == job) player->own = NULL;
     if (job->result != ATH_OK && job->result != ATH_MORE) ath_work_fault(job->work, &player->fault);
     if (job->result == ATH_OK && !ath_player_find(player, job->entry->segment, job->entry->level)) {
+        job->entry->used = player->calls;
         ath_player_insert(player, job->entry);
         job->entry = NULL;
     }
     ath_player_retire(player, job);
 }
 
-/* Gets a segment at a level, and prepares it if it is not cached. */
-static int ath_player_segment(ath_player *p, int32_t segment, int32_t level, const ath_segment **found)
+/* Returns the job that prepares a segment at a level; null: none. */
+static ath_player_job *ath_player_job_of(const ath_player *p, int32_t segment, int32_t level)
 {
-    ath_player_job *job = p->own;
-    if (job && job->entry->segment == segment && job->entry->level == level) {
-        ath_player_run(job, ATH_PLAYER_ALL_STEPS);
-        ath_player_end(p, job);
-    }
-    ath_player_entry *entry = ath_player_find(p, segment, level);
-    if (!entry) {
-        int result = ath_player_start(p, segment, level, &job);
+    ath_player_job *job = p->jobs;
+    while (job && (job->entry->segment != segment || job->entry->level != level)) job = job->next;
+    return job;
+}
+
+/* Gets the job to run for a segment: the player's own. It drops the one for another segment, or has that finished. */
+static int ath_player_own_job(ath_player *p, int32_t segment, int32_t level, ath_player_job **job)
+{
+    if (p->own && p->own != ath_player_job_of(p, segment, level) && p->dropped++ < ATH_PLAYER_DROPS)
+        ath_player_end(p, p->own);
+    int result = p->own ? ATH_OK : ath_player_start(p, segment, level, &p->own);
+    *job = p->own;
+    return result;
+}
+
+/* Prepares a segment at a level for a budget. Returns ATH_OK: it is cached, or a job of the caller's prepares it;
+ * ATH_MORE; or an error. The player's own job is kept if it has failed, since another one would only fail again. */
+static int ath_player_prepare(ath_player *p, int32_t segment, int32_t level, int32_t *budget)
+{
+    ath_player_entry *entry;
+    while (!(entry = ath_player_find(p, segment, level))) {
+        ath_player_job *job = ath_player_job_of(p, segment, level);
+        int is_exact = *budget == ATH_PLAYER_EXACT, result = ATH_OK;
+        if (job && job != p->own && !is_exact) return ATH_OK;
+        if (*budget <= 0) return ATH_MORE;
+        if (!is_exact)
+            result = ath_player_own_job(p, segment, level, &job);
+        else if (!job || job != p->own)
+            result = ath_player_start(p, segment, level, &job);
         if (result != ATH_OK) return result;
-        result = ath_player_run(job, ATH_PLAYER_ALL_STEPS);
-        ath_player_end(p, job);
-        if (result != ATH_OK) return result;
-        entry = ath_player_find(p, segment, level);
+        p->prepared += (uint64_t)ath_player_spend(job, budget);
+        result = job->result;
+        if (result == ATH_MORE) return result;
+        int has_failed = result != ATH_OK && job->entry->segment == segment && job->entry->level == level;
+        if (has_failed) ath_work_fault(job->work, &p->fault);
+        if (!has_failed || job != p->own) ath_player_end(p, job);
+        if (has_failed) return result;
+        p->dropped = 0;
     }
     entry->used = p->calls;
-    *found = (const ath_segment *)ath_player_memory_of(entry);
     return ATH_OK;
 }
 
@@ -495,19 +554,52 @@ static int32_t ath_player_level_of(const ath_player *p, int32_t segment, int32_t
     return level < 0 || level > ready ? ready : level;
 }
 
-static int ath_player_moment_at(ath_player *p, double frame, int32_t level, ath_player_moment *moment)
+/* Returns the best level up to `most` that is prepared of a segment, `level` or else a deeper one, or else a coarser
+ * one; -1: none. */
+static int32_t ath_player_best(const ath_player *p, int32_t segment, int32_t level, int32_t most)
+{
+    for (int32_t best = level; best <= most; best++)
+        if (ath_player_find(p, segment, best)) return best;
+    while (level >= 0 && !ath_player_find(p, segment, level)) level--;
+    return level;
+}
+
+/* Returns the level to prepare next on the way to a level: first the deepest of at most an eighth of its size. */
+static int32_t ath_player_aim(const ath_player *p, int32_t segment, int32_t level)
+{
+    int32_t aim = level;
+    if (ath_player_find(p, segment, level) || ath_player_job_of(p, segment, level)) return level;
+    while (aim > 0 && ath_segment_size(p->file, aim) > ath_segment_size(p->file, level) / 8) aim--;
+    return ath_player_best(p, segment, aim, p->deepest) < aim ? aim : level;
+}
+
+/* Gets the segments of a moment at a level or, until they are prepared, at the best level up to `most`. */
+static int ath_player_moment_at(ath_player *p, double frame, int32_t level, int32_t most, ath_player_moment *moment)
 {
     ath_blend blend = ath_blend_at(p->file, frame);
-    int32_t count = blend.segment[1] != blend.segment[0] ? 2 : 1;
-    moment->frame = frame;
-    moment->segment_count = 0;
+    int32_t count = blend.segment[1] != blend.segment[0] ? 2 : 1, exactly = ATH_PLAYER_EXACT;
+    int result = ATH_OK;
     for (int32_t i = 0; i < count; i++) level = ath_player_level_of(p, blend.segment[i], level);
+    moment->frame = frame;
     moment->level = level;
+    moment->segment_count = 0;
     if (level < 0) return ATH_MISSING;
+    int32_t best = ath_player_best(p, blend.segment[0], level, most);
+    if (best >= 0)
+        ath_player_find(p, blend.segment[0], best)->used = p->calls;
+    else if (p->left != exactly)
+        result = ath_player_prepare(p, blend.segment[0], 0, &exactly);
+    if (result == ATH_OK && p->left != exactly)
+        result = ath_player_prepare(p, blend.segment[0], ath_player_aim(p, blend.segment[0], level), &p->left);
+    for (int32_t i = 0; i < count && result == ATH_OK; i++)
+        result = ath_player_prepare(p, blend.segment[i], level, &p->left);
+    if (result != ATH_OK && result != ATH_MORE) return result;
+    moment->level = ath_player_best(p, blend.segment[0], level, most);
     for (int32_t i = 0; i < count; i++) {
-        int result = ath_player_segment(p, blend.segment[i], level, &moment->segments[i]);
-        if (result != ATH_OK) return result;
-        moment->segment_count = i + 1;
+        ath_player_entry *entry = ath_player_find(p, blend.segment[i], moment->level);
+        if (!entry) continue;
+        entry->used = p->calls;
+        moment->segments[moment->segment_count++] = (const ath_segment *)ath_player_memory_of(entry);
     }
     return ATH_OK;
 }
@@ -544,6 +636,7 @@ static int ath_player_move(ath_player *p, const ath_player_share *shares, int32_
     }
     for (int32_t i = 0; i < count; i++) p->tracks[i] = tracks[i];
     p->track_count = count;
+    p->left = p->budget;
     p->calls++;
     return ATH_OK;
 }
@@ -561,7 +654,7 @@ int ath_player_show(ath_player *player, int32_t clip, double seconds, ath_wrap w
 {
     double frame;
     int result = ath_player_move_one(player, clip, seconds, wrap, level, &frame);
-    return result == ATH_OK ? ath_player_moment_at(player, frame, level, moment) : result;
+    return result == ATH_OK ? ath_player_moment_at(player, frame, level, player->deepest, moment) : result;
 }
 
 int ath_player_positions(ath_player *player, int32_t clip, double seconds, ath_wrap wrap, int32_t level,
@@ -578,7 +671,10 @@ int ath_player_matrices(ath_player *player, int32_t clip, double seconds, ath_wr
 {
     const size_t size = sizeof(float);
     ath_player_moment now;
-    int result = ath_player_show(player, clip, seconds, wrap, level, &now);
+    double frame;
+    int result = ath_player_move_one(player, clip, seconds, wrap, level, &frame);
+    if (result == ATH_OK)
+        result = ath_player_moment_at(player, frame, level, level < 0 ? player->deepest : level, &now);
     if (result != ATH_OK) return result;
     if (shown) *shown = now.level;
     result = ath_matrices(player->file, now.segments, now.segment_count, now.frame, matrices, 12 * size);
@@ -591,16 +687,18 @@ int ath_player_faded_positions(ath_player *player, int32_t clip, double seconds,
 {
     const ath_segment *segments[2 * ATH_FADE_LEVELS];
     int32_t count = 0, latest = fade->count > 0 ? fade->level[fade->count - 1] : 0;
+    ath_fade shown = *fade;
     double frame;
     int result = ath_player_move_one(player, clip, seconds, wrap, latest, &frame);
     if (result != ATH_OK) return result;
     for (int32_t i = 0; i < fade->count; i++) {
         ath_player_moment moment;
-        result = ath_player_moment_at(player, frame, fade->level[i], &moment);
+        result = ath_player_moment_at(player, frame, fade->level[i], player->deepest, &moment);
         if (result != ATH_OK) return result;
+        shown.level[i] = moment.level;
         for (int32_t k = 0; k < moment.segment_count; k++) segments[count++] = moment.segments[k];
     }
-    return ath_faded_positions(player->file, segments, count, frame, fade, order, xyz, stride);
+    return ath_faded_positions(player->file, segments, count, frame, &shown, order, xyz, stride);
 }
 
 /* ---- several clips ---- */
@@ -630,7 +728,7 @@ int ath_player_blended_positions(ath_player *player, const ath_player_share *sha
     if (result != ATH_OK) return result;
     if (count > 1 && !player->blending && !(player->blending = ath_player_block_of(player, size))) return ATH_NO_MEMORY;
     for (int32_t i = 0; i < count; i++) {
-        result = ath_player_moment_at(player, player->tracks[i].frame, used[i].level, moments + i);
+        result = ath_player_moment_at(player, player->tracks[i].frame, used[i].level, player->deepest, moments + i);
         if (result != ATH_OK) return result;
         ath_share share = {moments[i].segments, moments[i].segment_count, moments[i].frame, used[i].weight};
         blended[i] = share;
@@ -814,33 +912,39 @@ static int32_t ath_player_next(const ath_player *p, const ath_player_track *now)
     return -1;
 }
 
-/* Returns whether a segment waits to be prepared. *level is the level to show, then the level to prepare. */
-static int ath_player_wants(const ath_player *p, int32_t segment, int32_t *level)
+/* Gets one of the segments to prepare, from place 0 on: three for each clip that is shown, then the next one of each;
+ * -1: none. Returns 0 after the last place. */
+static int ath_player_wish(const ath_player *p, int32_t place, int32_t *segment, int32_t *level)
 {
-    if (segment < 0) return 0;
-    *level = ath_player_level_of(p, segment, *level);
-    if (*level < 0 || ath_player_find(p, segment, *level)) return 0;
-    for (const ath_player_job *job = p->jobs; job; job = job->next)
-        if (job->entry->segment == segment && job->entry->level == *level) return 0;
+    int32_t shown = 3 * p->track_count;
+    if (place >= shown + p->track_count) return 0;
+    const ath_player_track *track = p->tracks + (place < shown ? place / 3 : place - shown);
+    ath_blend blend = ath_blend_at(p->file, track->frame);
+    *segment = place < shown ? blend.segment[place % 3 / 2] : ath_player_next(p, track);
+    *level = track->level;
+    for (int32_t i = 0; place < shown && i < 2; i++) *level = ath_player_level_of(p, blend.segment[i], *level);
+    if (place >= shown && *segment >= 0) *level = ath_player_level_of(p, *segment, *level);
+    if (*level < 0) *segment = -1;
+    if (place < shown && place % 3 == 0 && *segment >= 0) *level = ath_player_aim(p, *segment, *level);
     return 1;
 }
 
 ath_player_job *ath_player_begin(ath_player *player)
 {
     ath_player_job *job = NULL;
-    for (int32_t i = 0; i < player->track_count && !job; i++) {
-        int32_t level = player->tracks[i].level, next = ath_player_next(player, player->tracks + i);
-        if (ath_player_wants(player, next, &level)) ath_player_start(player, next, level, &job);
-    }
+    int32_t segment, level;
+    for (int32_t i = 0; !job && ath_player_wish(player, i, &segment, &level); i++)
+        if (segment >= 0 && !ath_player_find(player, segment, level) && !ath_player_job_of(player, segment, level))
+            ath_player_start(player, segment, level, &job);
     return job;
 }
 
-int ath_player_ahead(ath_player *player, int32_t steps)
+int ath_player_ahead(ath_player *player, int32_t vertex_frames)
 {
-    if (!player->own) player->own = ath_player_begin(player);
-    if (!player->own) return ATH_OK;
-    int result = ath_player_run(player->own, steps);
-    if (result != ATH_MORE) ath_player_end(player, player->own);
+    int result = ATH_OK;
+    int32_t segment, level;
+    for (int32_t i = 0; result == ATH_OK && ath_player_wish(player, i, &segment, &level); i++)
+        if (segment >= 0) result = ath_player_prepare(player, segment, level, &vertex_frames);
     return result;
 }
 

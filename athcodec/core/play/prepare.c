@@ -488,12 +488,17 @@ static void next_to_check(ath_work *work)
     if (work->next++ == work->level) next_phase(work, HEADS);
 }
 
+static uint32_t size_to_check(const ath_work *work, const ath_chunk *chunk)
+{
+    uint32_t left = chunk->length - work->crc_at;
+    return left < (uint32_t)CHECKSUM_STEP ? left : (uint32_t)CHECKSUM_STEP;
+}
+
 static int check_some(ath_work *work)
 {
     const ath_chunk *chunk = chunk_to_check(work);
     if (chunk && work->crc_at < chunk->length) {
-        uint32_t left = chunk->length - work->crc_at,
-                 size = left < (uint32_t)CHECKSUM_STEP ? left : (uint32_t)CHECKSUM_STEP;
+        uint32_t size = size_to_check(work, chunk);
         work->crc = ath_crc32c(work->crc, chunk->bytes + work->crc_at, size);
         work->crc_at += size;
     }
@@ -983,18 +988,55 @@ static int do_piece(ath_work *work)
     return result;
 }
 
-int ath_prepare_step(ath_work *work, int32_t steps)
+static int do_step(ath_work *work)
 {
-    int result = ATH_OK;
-    if (work->phase == FAILED) return ATH_BAD_ARGUMENT;
-    for (; steps > 0 && work->phase != DONE && result == ATH_OK; steps--)
-        result = work->phase == BEFORE      ? go_back(work)
+    int result = work->phase == FAILED      ? ATH_BAD_ARGUMENT
+                 : work->phase == DONE      ? ATH_OK
+                 : work->phase == BEFORE    ? go_back(work)
                  : work->phase == CHECKSUMS ? check_some(work)
                  : work->phase == HEADS     ? open_level(work)
                  : work->phase == FRAMES    ? do_frames(work)
                                             : do_piece(work);
     if (result != ATH_OK) work->phase = FAILED;
     return result != ATH_OK || work->phase == DONE ? result : ATH_MORE;
+}
+
+int ath_prepare_step(ath_work *work, int32_t steps)
+{
+    int result = ATH_MORE;
+    for (; steps > 0 && result == ATH_MORE; steps--) result = do_step(work);
+    return result;
+}
+
+/* Returns what the next step costs. The factors are ratios of times that were measured. */
+static int32_t cost_of_step(const ath_work *work)
+{
+    const ath_plan *plan = &work->file->plan;
+    int32_t frames = work->segment->frames, cost = 16, p = work->next, n = work->next_node;
+    if (work->phase == CHECKSUMS) {
+        const ath_chunk *chunk = chunk_to_check(work);
+        cost += chunk ? (int32_t)size_to_check(work, chunk) / 8 : 0;
+    } else if (work->phase == FRAMES) {
+        cost *= ath_min(plan->vertex_count, 1024);
+    } else if (work->phase != PIECES || p == plan->piece_count) {
+        cost *= frames;
+    } else {
+        int32_t layers = work->layer - work->first_layer + (work->exact_level.chunk ? 16 : 1);
+        if (plan->pieces[p].level <= work->level) cost += plan->pieces[p].count * layers * frames;
+        if (n < plan->node_count && plan->nodes[n].piece == p && ath_is_shown(plan->nodes + n, work->level))
+            cost += 6 * frames;
+    }
+    return cost;
+}
+
+int ath_prepare_within(ath_work *work, int32_t *cost)
+{
+    int result = ATH_MORE;
+    while (*cost > 0 && result == ATH_MORE) {
+        *cost -= cost_of_step(work);
+        result = do_step(work);
+    }
+    return result;
 }
 
 int ath_prepare(void *work, size_t work_bytes, const ath_file *file, int32_t segment, int32_t level, void *memory,

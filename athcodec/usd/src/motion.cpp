@@ -59,6 +59,7 @@ std::shared_ptr<Motion> Motion::Open(const std::string &path, std::string *why)
         *why = FaultText(fault, result);
         return nullptr;
     }
+    ath_player_set_budget(motion->_player, ATH_PLAYER_EXACT);
     ath_get_info(motion->File(), &motion->_info);
     return motion;
 }
