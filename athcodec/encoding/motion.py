@@ -8,6 +8,7 @@ decoder will have (`pose`). Arrays over a segment are vertex-major, (vertices, 3
 from __future__ import annotations
 
 import math
+import mmap
 from collections.abc import Callable, Sequence
 from ctypes import addressof
 from dataclasses import dataclass
@@ -15,6 +16,7 @@ from enum import IntEnum
 from functools import cached_property, lru_cache
 
 import numpy as np
+from numpy.typing import DTypeLike
 
 from athcodec._native import (
     BRANCH,
@@ -41,6 +43,17 @@ from athcodec.files.threads import SERIAL, ThreadPool, ranges
 STEM_ROOT, NODE_ROOT = -1, -2  # Roots of streams in waves that are not learned (core/model/motion.h).
 RANGES, LEAST_RANGE = 24, 1024  # Parts of a plant that threads take at a time, and their least number of vertices.
 PERIOD = 128  # Vertices from one run of a sample to the next.
+LARGE_BYTES = 8 << 20  # Bytes from which on an array has memory of its own.
+_PRIVATE = {"flags": mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS} if hasattr(mmap, "MAP_ANONYMOUS") else {}
+
+
+def zeros(shape: tuple[int, ...], dtype: DTypeLike = np.float64) -> np.ndarray:
+    """Return zeros. The memory of a large array goes back to the system with it, whereas allocators keep freed memory
+    for each thread."""
+    size = math.prod(shape) * np.dtype(dtype).itemsize
+    if size < LARGE_BYTES:
+        return np.zeros(shape, dtype)
+    return np.frombuffer(mmap.mmap(-1, size, **_PRIVATE), dtype).reshape(shape)
 
 
 class Waves(IntEnum):  # core/model/basis.h
@@ -293,23 +306,26 @@ class SegmentMotion:
             )
         self.plan, self.frames, self.streams, self.learned_modes = plan, frames, streams, learned_modes
         core = plan.core
-        self.coefficients = np.zeros((plan.vertex_count, 3, frames), np.int32)
-        self.tracks = np.zeros((core.piece_count, 2, 3, frames), np.int32)
-        self.node_tracks = np.zeros((core.node_count, 4, 3, frames), np.int32)
-        self.node_steps = np.zeros(core.node_count, np.int32)
+        self.coefficients = zeros((plan.vertex_count, 3, frames), np.int32)
+        self.tracks = zeros((core.piece_count, 2, 3, frames), np.int32)
+        node_count = 0 if before is not None else core.node_count  # Refinements have no maps.
+        self.node_tracks = zeros((node_count, 4, 3, frames), np.int32)
+        self.node_steps = np.zeros(node_count, np.int32)
         self._attach_caches: np.ndarray | None = None
         self.waves = waves_over_time(frames, Waves.PERIODIC if periodic else Waves.SMOOTH)
         self.node_waves = waves_over_time(frames, Waves.PERIODIC if periodic else Waves.BEAM)
         self.before, self.ratio = before, ratio
         if before is not None:
-            self.predicted, self.predicted_tracks = np.zeros_like(self.coefficients), np.zeros_like(self.tracks)
+            self.predicted, self.predicted_tracks = (
+                zeros(integers.shape, np.int32) for integers in (self.coefficients, self.tracks)
+            )
             self.known = self._known(before)
         self.coarse = None
         if layered:
             if before is None:
-                self.placed = np.zeros((plan.vertex_count, 3, frames))
-                self.placed_tracks = np.zeros(self.tracks.shape)
-                self.placed_frames = np.zeros((core.piece_count, 12, frames))  # Only rigid pieces use theirs.
+                self.placed = zeros((plan.vertex_count, 3, frames))
+                self.placed_tracks = zeros(self.tracks.shape)
+                self.placed_frames = zeros((core.piece_count, 12, frames))  # Only rigid pieces use theirs.
             else:  # A piece is read before it is replaced.
                 self.placed, self.placed_tracks = before.placed, before.placed_tracks
                 self.placed_frames = before.placed_frames
@@ -431,7 +447,7 @@ class SegmentMotion:
     def _piecewise(self, call: Callable[[Motion, int, int], None]) -> None:
         """Call with a motion and each range of pieces, those that others hang on first."""
         if self._attach_caches is None:
-            self._attach_caches = np.empty(lib.ath_attach_cache_size(self.plan.core.attach_cache_rows, self.frames))
+            self._attach_caches = zeros((lib.ath_attach_cache_size(self.plan.core.attach_cache_rows, self.frames),))
             self.motion.attach_caches = self._attach_caches.ctypes.data
         carrying, carried = self.plan.piece_ranges
         for first, stop in carrying:
@@ -459,7 +475,7 @@ class SegmentMotion:
 
     def pose(self, level: int, origin: np.ndarray, dtype) -> np.ndarray:
         """Return positions at `level` without corrections, (N, 3, frames) float32 or float64, origin added."""
-        positions = np.empty((self.plan.vertex_count, 3, self.frames), dtype)
+        positions = zeros((self.plan.vertex_count, 3, self.frames), dtype)
         into = level, address(origin, np.float64, 3), positions.dtype == np.float64, positions.ctypes.data
         self._piecewise(
             lambda motion, first, stop: lib.ath_pose(self.plan.core, motion, self.integers, first, stop, *into)
@@ -475,7 +491,7 @@ def gather(block: np.ndarray, vertex_source: np.ndarray, origin: np.ndarray, poo
     vertex_source: (N,) int32, the N of its M vertices that are wanted."""
     frames, vertices = len(block), len(vertex_source)
     block = np.ascontiguousarray(block)
-    out = np.empty((vertices, 3, frames))
+    out = zeros((vertices, 3, frames))
 
     def fill(start: int, stop: int) -> None:
         lib.ath_gather(

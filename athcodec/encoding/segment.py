@@ -28,6 +28,7 @@ from athcodec.encoding.motion import (
     PlanSample,
     SegmentMotion,
     gather,
+    zeros,
 )
 from athcodec.encoding.polygons import Mesh
 from athcodec.encoding.segmentation import split_segments
@@ -45,12 +46,12 @@ from athcodec.motion.polygons import Polygons
 FINER = 32  # Step of a layer over the step at which bases and modes are learned.
 REST_ROUNDS = 16  # Steps of a rest pose that are tried until one keeps the bound; the last is 1/28 of the first.
 ROWS_AT_ONCE = 1 << 14  # Rows of coefficients whose moments are added at once.
-WORK_BYTES = 1 << 30  # Memory of the segments coded at once, unless `jobs` says how many.
+WORK_BYTES = 1 << 28  # Memory of the segments coded at once, unless `jobs` says how many.
 SAMPLED = 4000  # Number of vertices from which trials find corrections of a sample of them only.
 WELD_TOLERANCE = 1e-7  # Size of the cells, in diagonals, in which vertices share a place.
 LEAST_SAMPLED, SPARSE = 1000, 16  # Vertices from which one of so many is enough if it takes enough corrections.
 ENOUGH, ENOUGH_SHARE = 2000, 0.015  # Corrections that show the bytes of all, and more for each vertex in a frame.
-SEGMENT_WORK = 16  # Memory of a segment while it is coded, over its float32 positions.
+SEGMENT_WORK = 9  # Memory of a segment while it is coded, over its float32 positions.
 
 
 def thread_count(jobs: int | None, source: Source) -> int:
@@ -605,7 +606,8 @@ class Corrections:
 
     def applied(self, decoded: np.ndarray) -> np.ndarray:
         """Return the corrected positions."""
-        corrected = decoded.copy()
+        corrected = zeros(decoded.shape, decoded.dtype)
+        corrected[:] = decoded
         streams.apply_corrections(corrected, self.rows, self.step)
         return corrected
 
@@ -647,7 +649,7 @@ def analyse(
     levels = level_streams(settings, plan.level_count, bases)
     segment = SegmentMotion(plan, positions.shape[2], levels, learned_modes, before, ratio, layered, settings.periodic)
     origin, dtype = output
-    decoded = np.empty(positions.shape, dtype)
+    decoded = zeros(positions.shape, dtype)
     segment.analyse(positions, settings.rounding, origin, decoded)
     if before is not None:
         segment.forget_caches()  # Maps of nodes alone need the caches, and a refinement has none.
