@@ -145,6 +145,7 @@ def _packed(counts: np.ndarray, rows: list[np.ndarray]) -> LearnedModes:
 
 def estimated_bits(integers: np.ndarray, pieces: np.ndarray, piece_count: int) -> np.ndarray:
     """Return about how many bits integers (K, ...) of pieces (K,) take in a stream, (piece_count,)."""
-    magnitudes = np.abs(integers).astype(np.float64)
-    bits = (2.0 * qz.bits(magnitudes) + (magnitudes > 0)).sum(axis=tuple(range(1, integers.ndim)))
-    return np.bincount(pieces, bits, piece_count)
+    rows = integers.reshape(len(pieces), -1)
+    busy = np.flatnonzero(rows)
+    bits = 2.0 * qz.bits(np.abs(rows.reshape(-1)[busy]).astype(np.float64)) + 1.0
+    return np.bincount(pieces[busy // max(rows.shape[1], 1)], bits, piece_count)

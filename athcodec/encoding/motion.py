@@ -43,7 +43,7 @@ from athcodec.files.threads import SERIAL, ThreadPool, ranges
 STEM_ROOT, NODE_ROOT = -1, -2  # Roots of streams in waves that are not learned (core/model/motion.h).
 RANGES, LEAST_RANGE = 24, 1024  # Parts of a plant that threads take at a time, and their least number of vertices.
 PERIOD = 128  # Vertices from one run of a sample to the next.
-LARGE_BYTES = 8 << 20  # Bytes from which on an array has memory of its own.
+LARGE_BYTES = 2 << 20  # Bytes from which on an array has memory of its own.
 _PRIVATE = {"flags": mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS} if hasattr(mmap, "MAP_ANONYMOUS") else {}
 
 
@@ -53,7 +53,10 @@ def zeros(shape: tuple[int, ...], dtype: DTypeLike = np.float64) -> np.ndarray:
     size = math.prod(shape) * np.dtype(dtype).itemsize
     if size < LARGE_BYTES:
         return np.zeros(shape, dtype)
-    return np.frombuffer(mmap.mmap(-1, size, **_PRIVATE), dtype).reshape(shape)
+    memory = mmap.mmap(-1, size, **_PRIVATE)
+    if hasattr(mmap, "MADV_HUGEPAGE"):
+        memory.madvise(mmap.MADV_HUGEPAGE)
+    return np.frombuffer(memory, dtype).reshape(shape)
 
 
 class Waves(IntEnum):  # core/model/basis.h
@@ -507,6 +510,20 @@ def gather(block: np.ndarray, vertex_source: np.ndarray, origin: np.ndarray, poo
 
     pool.map(fill, ranges(vertices, 3 * frames))
     return out
+
+
+def squared_bends(positions: np.ndarray) -> np.ndarray:
+    """Return the sums of the squared second differences over time of positions, (N, 3, T), at each frame but the first
+    and the last, (T - 2,)."""
+    positions, sums = np.ascontiguousarray(positions), np.zeros(max(positions.shape[2] - 2, 0))
+    lib.ath_add_bends(
+        3 * len(positions),
+        positions.shape[2],
+        positions.dtype == np.float64,
+        address(positions, positions.dtype, positions.size),
+        sums.ctypes.data,
+    )
+    return sums
 
 
 def position_errors(

@@ -14,6 +14,7 @@ from itertools import product
 
 import numpy as np
 
+from athcodec.encoding.motion import squared_bends
 from athcodec.files.threads import ranges
 
 END_FRAMES = 2  # Last frames of a segment that a join starts from.
@@ -199,10 +200,7 @@ def _parts(count: int, frames: int) -> Iterator[slice]:
 
 def _changes(positions: np.ndarray) -> np.ndarray:
     """Return the RMS over vertices of the change of velocity at each frame but the first and the last."""
-    total = np.zeros(positions.shape[2] - 2)
-    for part in _parts(*positions.shape[::2]):
-        total += _squares(np.diff(positions[part].astype(np.float64), 2, axis=2)).sum(axis=0)
-    return np.sqrt(total / len(positions))
+    return np.sqrt(sum(squared_bends(positions[part]) for part in _parts(*positions.shape[::2])) / len(positions))
 
 
 def _usual(changes: np.ndarray) -> float:
