@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Future
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
@@ -38,7 +38,7 @@ from athcodec.encoding.choices.joins import (
 from athcodec.encoding.choices.levels import SourceFrames
 from athcodec.encoding.features import Feature
 from athcodec.encoding.learned_modes import nested
-from athcodec.encoding.motion import LearnedModes, Plan, SegmentMotion, position_errors
+from athcodec.encoding.motion import LearnedModes, Plan, SegmentMotion, position_errors, zeros
 from athcodec.encoding.segment import (
     CodedPrelude,
     Corrections,
@@ -409,6 +409,7 @@ class CodedMotion:
         last = plan.level_count - 1
         self._correct(decoded, layer, last)
         segment.analyse_nodes(self.positions, settings.node_steps, settings.rounding)
+        self._room = zeros(self.positions.shape)
         shown = [self._at_level_0(segment, settings), *[segment] * (plan.level_count - 2)]
         self.errors = _EvenLevels(self, shown, settings).errors
         self._keep_last_level_best(layer, last, decoded)
@@ -418,6 +419,7 @@ class CodedMotion:
         for level, nodes in enumerate(shown):
             self._finish(level, self._pose_to_join(nodes, level))
         segment.forget_caches()
+        del self._room
         self._finish(last, decoded, layer)
         return segment
 
@@ -480,10 +482,10 @@ class CodedMotion:
         if corrections.chunk:
             self.chunks[level, ct.CORRECTIONS] = corrections.chunk
             self._corrected[level] = corrections
-            decoded = corrections.applied(decoded)
-        if layer.ratio == 1 and self._exact is not None:
-            self._decoded = decoded
-        return self.error(decoded)
+        with self._corrected_as_shown(level, decoded):
+            if layer.ratio == 1 and self._exact is not None:
+                self._decoded = decoded.copy()
+            return self.error(decoded)
 
     def _bytes_up_to(self, level: int) -> int:
         """Return the bytes of this level and those before it, without its corrections."""
@@ -491,9 +493,9 @@ class CodedMotion:
             len(chunk) for key, chunk in self.chunks.items() if key[0] <= level and key != (level, ct.CORRECTIONS)
         )
 
-    def _as_shown(self, level: int, positions: np.ndarray) -> np.ndarray:
-        """Return the joined positions of a level with its corrections."""
-        return self._corrected[level].applied(positions) if level in self._corrected else positions
+    def _corrected_as_shown(self, level: int, positions: np.ndarray) -> AbstractContextManager[None]:
+        """Return a context in which the positions of a level have its corrections."""
+        return self._corrected[level].applied(positions) if level in self._corrected else nullcontext()
 
     def _meet(self, start: np.ndarray) -> None:
         """Close the start of the last level, in whose first frame the corrections of an end stand."""
@@ -505,7 +507,8 @@ class CodedMotion:
         """Add a level's end, join the level to the segment before if that is better, and add its flaws. positions: not
         corrected, which change; layer: the one that ends with the level."""
         if self._after is not None:
-            shown = self._source.last_shown(self._as_shown(level, positions))
+            with self._corrected_as_shown(level, positions):
+                shown = self._source.last_shown(positions)
             ends = end_of(positions, self._wanted_end, (shown, self._source_end), self._end_corrections)
             self._after.add(level, ends)
         end = None if self._before is None else self._before.take(level)
@@ -514,9 +517,9 @@ class CodedMotion:
             self._source = replace(self._source, before=known if end is None else end.shown[1])
         if end is not None and self._may_join and end.can_join and positions.shape[2] > END_FRAMES:
             self._join_level(level, end, positions, layer)
-        positions = self._as_shown(level, positions)
-        own = self._source.last_shown(positions) if self._loops else None
-        self.flaws.append(self._source.flaws(positions, own if end is None else end.shown[0]))
+        with self._corrected_as_shown(level, positions):
+            own = self._source.last_shown(positions) if self._loops else None
+            self.flaws.append(self._source.flaws(positions, own if end is None else end.shown[0]))
 
     @cached_property
     def _wanted_end(self) -> np.ndarray:
@@ -568,13 +571,13 @@ class CodedMotion:
 
     def pose(self, shown: SegmentMotion, level: int) -> np.ndarray:
         """Return the output of a level, neither joined nor corrected."""
-        return shown.pose(level, *self._output)
+        return shown.pose(level, *self._output, self._room)
 
     def _pose_to_join(self, shown: SegmentMotion, level: int) -> np.ndarray:
         """Return a level without corrections as float64, to be joined. What stems place is rounded before and after,
         what maps place only after."""
         origin, dtype = self._output
-        positions, pieces = shown.pose(level, origin, np.float64), shown.plan.pieces
+        positions, pieces = shown.pose(level, origin, np.float64, self._room), shown.plan.pieces
         for piece in pieces[pieces["level"] <= level]:
             of_stem = positions[piece["first"] : piece["first"] + piece["count"]]
             of_stem[:] = of_stem.astype(dtype)

@@ -476,9 +476,14 @@ class SegmentMotion:
     def _source(self, source: np.ndarray) -> int:
         return address(source, np.float64, self.plan.vertex_count * 3 * self.frames)
 
-    def pose(self, level: int, origin: np.ndarray, dtype) -> np.ndarray:
-        """Return positions at `level` without corrections, (N, 3, frames) float32 or float64, origin added."""
-        positions = zeros((self.plan.vertex_count, 3, self.frames), dtype)
+    def pose(self, level: int, origin: np.ndarray, dtype, room: np.ndarray | None = None) -> np.ndarray:
+        """Return positions at `level` without corrections, (N, 3, frames) float32 or float64, origin added. room: as
+        many float64, whose memory is to hold them."""
+        shape = self.plan.vertex_count, 3, self.frames
+        if room is None:
+            positions = zeros(shape, dtype)
+        else:
+            positions = room.reshape(-1).view(dtype)[: math.prod(shape)].reshape(shape)
         into = level, address(origin, np.float64, 3), positions.dtype == np.float64, positions.ctypes.data
         self._piecewise(
             lambda motion, first, stop: lib.ath_pose(self.plan.core, motion, self.integers, first, stop, *into)

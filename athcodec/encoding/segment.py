@@ -7,7 +7,8 @@ predicted from what the decoder will have, corrections are found on what it will
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from weakref import WeakValueDictionary
@@ -604,12 +605,14 @@ class Corrections:
             return b""
         return writing.pack_corrections(self.step, streams.encode_corrections(self.rows, self.shape[0], self.shape[2]))
 
-    def applied(self, decoded: np.ndarray) -> np.ndarray:
-        """Return the corrected positions."""
-        corrected = zeros(decoded.shape, decoded.dtype)
-        corrected[:] = decoded
-        streams.apply_corrections(corrected, self.rows, self.step)
-        return corrected
+    @contextmanager
+    def applied(self, decoded: np.ndarray) -> Iterator[None]:
+        """Correct the positions as long as the context lasts."""
+        vertices = np.unique(self.rows[:, 0])
+        before = decoded[vertices]
+        streams.apply_corrections(decoded, self.rows, self.step)
+        yield
+        decoded[vertices] = before
 
 
 @dataclass
