@@ -43,6 +43,7 @@ from athcodec.encoding.layers import (
     layers_of,
     step_factors,
 )
+from athcodec.encoding.motion import release_memory
 from athcodec.encoding.progress import FILE_BYTE, LEVEL_MOTION, MOTION, SURVEY, Progress, Work, allowed_work, silent
 from athcodec.encoding.sample import is_small
 from athcodec.encoding.search import Search
@@ -718,6 +719,7 @@ class EncodingJob:
         source, loops = decided.source, decided.source.is_whole_loop(index)
         frames = positions, exact, source.goes_on(index), source.shown_times(index), source.box, loops
         layers = decided.layers.of_segment(loops)
+        release_memory()
         motion = CodedMotion(decided.prelude, layers, self.segment_count, *frames, before, after)
         numbers = (np.array(each) for each in (motion.errors, motion.joins, motion.flaws))
         return CodedSegment(index, motion.chunks, *numbers)

@@ -418,7 +418,7 @@ class CodedMotion:
                 self.chunks[level, ct.AFFINES] = streams.encode_affines(nodes, level)
         for level, nodes in enumerate(shown):
             self._finish(level, self._pose_to_join(nodes, level))
-        segment.forget_caches()
+        segment.forget_nodes()
         del self._room
         self._finish(last, decoded, layer)
         return segment
@@ -527,7 +527,7 @@ class CodedMotion:
 
     @cached_property
     def _wanted_start(self) -> SourceStart:
-        return SourceStart.of(self.positions[seen(len(self.positions))], self._origin)
+        return SourceStart(self.positions[seen(len(self.positions))], self._origin)
 
     def _join_level(self, level: int, end: End, positions: np.ndarray, layer: Layer | None) -> None:
         """Join one level, whose positions change; layer: the one that ends with it."""

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 import mmap
 from collections.abc import Callable, Sequence
-from ctypes import addressof
+from ctypes import addressof, c_size_t
 from dataclasses import dataclass
 from enum import IntEnum
 from functools import cached_property, lru_cache
@@ -57,6 +57,12 @@ def zeros(shape: tuple[int, ...], dtype: DTypeLike = np.float64) -> np.ndarray:
     if hasattr(mmap, "MADV_HUGEPAGE"):
         memory.madvise(mmap.MADV_HUGEPAGE)
     return np.frombuffer(memory, dtype).reshape(shape)
+
+
+def release_memory() -> None:
+    """Give memory that the allocator keeps for later arrays back to the system, if it is one that keeps much."""
+    if (trim := getattr(lib, "malloc_trim", None)) is not None:
+        trim(c_size_t(0))
 
 
 class Waves(IntEnum):  # core/model/basis.h
@@ -398,6 +404,10 @@ class SegmentMotion:
     def forget_caches(self) -> None:
         """Free what `analyse` and `pose` leave for `analyse_nodes`."""
         self._attach_caches = None
+
+    def forget_nodes(self) -> None:
+        """Free the maps of nodes, and what they are made of."""
+        self._attach_caches = self.node_tracks = self.integers.node_tracks = None
 
     def forget_before(self) -> None:
         """Free the layer before, which nothing more is predicted from, and what is predicted from it."""

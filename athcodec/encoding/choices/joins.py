@@ -7,7 +7,6 @@ Positions are vertex-major, (N, 3, T), as decoded, not corrected.
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from itertools import product
@@ -154,24 +153,22 @@ class CorrectionPrice:
 
 
 class _Moved:
-    """Squared lengths of vectors in some frames that move by shares of two ways, (N, 3) each. vectors: returns those of
-    a part of the N, (n, 3, frames), so that few are in memory at a time."""
+    """Squared lengths of vectors in some frames, or their means, that move by shares of two ways, (N, 3) each. vectors:
+    returns those of a part of the N, (n, 3, frames), so that few are in memory at a time."""
 
-    def __init__(self, vectors: Callable[[slice], np.ndarray], jump: np.ndarray, slope: np.ndarray):
-        columns: list[tuple[np.ndarray, ...]] = []
+    def __init__(
+        self, vectors: Callable[[slice], np.ndarray], jump: np.ndarray, slope: np.ndarray, are_means: bool = False
+    ):
+        rows: list[list[np.ndarray]] = []
         for part in _parts(len(jump), max(WIDTHS)):
-            of_part = vectors(part)
-            along = ((of_part * way[part, :, None]).sum(axis=1) for way in (jump, slope))
-            columns.append((_squares(of_part), *along))
-        self.squares, *self._along = (np.concatenate(column) for column in zip(*columns))
+            of_part, ways = vectors(part), (jump[part], slope[part])
+            numbers = [_squares(of_part), *((of_part * way[:, :, None]).sum(axis=1) for way in ways)]
+            rows.append([each.sum(axis=0, keepdims=True) for each in numbers] if are_means else numbers)
+        self.squares, *self._along = (np.concatenate(each) for each in zip(*rows))
         self._ways = [(a * b).sum(axis=1, keepdims=True) for a, b in ((jump, jump), (jump, slope), (slope, slope))]
-
-    def mean(self) -> _Moved:
-        """Return the means over vertices."""
-        means = copy.copy(self)
-        means.squares = self.squares.mean(axis=0)
-        means._along, means._ways = ([array.mean(axis=0) for array in arrays] for arrays in (self._along, self._ways))
-        return means
+        if are_means:
+            self.squares, *self._along = (each.sum(axis=0) / len(jump) for each in (self.squares, *self._along))
+            self._ways = [each.mean(axis=0) for each in self._ways]
 
     def by(self, jumps: np.ndarray, slopes: np.ndarray) -> np.ndarray:
         """Return the squared lengths in the first frames after the move, (N, width)."""
@@ -208,18 +205,16 @@ def _usual(changes: np.ndarray) -> float:
     return max(float(np.median(changes)), 0.5 * float(np.sqrt((changes**2).mean())))
 
 
-@dataclass(frozen=True)
 class SourceStart:
-    """What all levels of a segment are compared with: the source's first frames, (N, 3, widest join) or fewer, and its
-    change of velocity in a usual frame."""
+    """What all levels of a segment are compared with: the source's first frames, and its change of velocity in a usual
+    frame. positions: (N, 3, T) less an origin."""
 
-    frames: np.ndarray
-    usual: float
+    def __init__(self, positions: np.ndarray, origin: np.ndarray):
+        self.usual, self._frames, self._origin = _usual(_changes(positions)), positions, origin[:, None]
 
-    @classmethod
-    def of(cls, positions: np.ndarray, origin: np.ndarray) -> SourceStart:
-        """Return the start of positions less an origin, (N, 3, T)."""
-        return cls(positions[:, :, : max(WIDTHS)] + origin[:, None], _usual(_changes(positions)))
+    def frames(self, vertices: slice, count: int) -> np.ndarray:
+        """Return the first frames of some of the vertices."""
+        return self._frames[vertices, :, :count] + self._origin
 
 
 def best_join(
@@ -228,21 +223,21 @@ def best_join(
     """Return how to join a level of a segment to the end of the one before: over how many frames, SLOPED more if slopes
     are joined too; 0: not at all. positions: (N, 3, T) of those vertices that are `seen`, as in the other arguments.
     largest: the largest error that costs nothing."""
-    decoded, source, of_source = _changes(positions), start.frames, start.usual
+    decoded, of_source = _changes(positions), start.usual
     usual = max(0.5 * (end.usual + _usual(decoded)), STILL * of_source)  # One side alone may move in straight lines.
-    wanted = _changes(np.concatenate([end.source, source[:, :, : END_FRAMES + 1]], axis=2))
+    wanted = _changes(np.concatenate([end.source, start.frames(slice(None), END_FRAMES + 1)], axis=2))
     wanted *= usual / max(of_source, 1e-300)
     natural = np.maximum(np.concatenate([wanted, decoded[1:]]), usual)  # From the last frame before the seam on.
 
     width = min(max(WIDTHS), positions.shape[2] - END_FRAMES)
     ways = _ways(end, positions)
-    errors = _Moved(lambda part: positions[part, :, :width] - source[part, :, :width], *ways)
+    errors = _Moved(lambda part: positions[part, :, :width] - start.frames(part, width), *ways)
 
     def bends(part: slice) -> np.ndarray:
         shown = (end.positions[part], positions[part, :, : width + 2])
         return np.diff(np.concatenate(shown, axis=2, dtype=np.float64), 2, axis=2)
 
-    changes = _Moved(bends, *ways).mean()
+    changes = _Moved(bends, *ways, are_means=True)
 
     def cost(join: int) -> float:
         shares = _shares(join)
