@@ -14,7 +14,7 @@ import math
 import tempfile
 import warnings
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
@@ -499,7 +499,8 @@ class EncodingJob:
         for segment, frames in typical_segments(decided.source):
             if segment not in decided.tried:
                 positions = decided.source.positions(segment)
-                decided.tried[segment] = self._coded(decided, segment, positions, self._exact(segment))
+                motion = self._motion(decided, segment, positions, self._exact(segment))
+                decided.tried[segment] = _finished((segment, motion))
             coded = decided.tried[segment]
             lossy = [data for (_, kind), data in coded.chunks.items() if kind != ct.EXACT]
             front = CHUNK_BYTES * len(lossy) + LEVEL_BYTES * len(coded.errors)
@@ -695,18 +696,25 @@ class EncodingJob:
             frames = positions, exact, source.shown_times(index), source.box
             return CodedSegment(index, *code_predicted_segment(decided.prelude, decided.choice, *frames))
 
-        def code(read: tuple[int, list[np.ndarray], Ends | None, Ends | None]) -> CodedSegment:
+        def begin(read: tuple[int, list[np.ndarray], Ends | None, Ends | None]) -> tuple[int, CodedMotion]:
             index, block, before, after = read
-            with nullcontext() if after is None else after.failing():
-                return self._coded(decided, index, *self._positions(block.pop()), before, after)
+            return index, self._motion(decided, index, *self._positions(block.pop()), before, after)
 
         if decided.choice.predicted is not None:
             return pool.ordered(predict, ((index, [source.block(index)]) for index in segments), at_once)
         order = self._in_order(source, segments)
-        coded = pool.ordered(code, self._linked(decided, order), at_once - 1)
+        begun = pool.ordered(begin, self._linked(decided, order), at_once - 1)
+        coded = pool.ordered(_finished, self._halfway(begun), 0)
         return (one for one, (_, is_wanted) in zip(coded, order) if is_wanted)
 
-    def _coded(
+    def _halfway(self, begun: Iterable[tuple[int, CodedMotion]]) -> Iterator[tuple[int, CodedMotion]]:
+        """Report each segment whose first layer is coded."""
+        for done, one in enumerate(begun):
+            self.report("motion", min((done + 0.5) / self.segment_count, 1.0))
+            yield one
+            del one
+
+    def _motion(
         self,
         decided: _Decided,
         index: int,
@@ -714,15 +722,13 @@ class EncodingJob:
         exact: np.ndarray | None,
         before: Ends | None = None,
         after: Ends | None = None,
-    ) -> CodedSegment:
+    ) -> CodedMotion:
         """Return a segment, which goes on from the ends of the one before it and leaves its own."""
         source, loops = decided.source, decided.source.is_whole_loop(index)
         frames = positions, exact, source.goes_on(index), source.shown_times(index), source.box, loops
         layers = decided.layers.of_segment(loops)
         release_memory()
-        motion = CodedMotion(decided.prelude, layers, self.segment_count, *frames, before, after)
-        numbers = (np.array(each) for each in (motion.errors, motion.joins, motion.flaws))
-        return CodedSegment(index, motion.chunks, *numbers)
+        return CodedMotion(decided.prelude, layers, self.segment_count, *frames, before, after)
 
     @staticmethod
     def _in_order(source: Source, segments: Sequence[int]) -> list[tuple[int, bool]]:
@@ -777,6 +783,15 @@ class EncodingJob:
         shown = chosen_levels(errors, frames, flaws, self.seen.diagonal, self.options.lossless, first_held)
         store.leave_out(lambda chunk: not decided.layers.level_0.serves(chunk.kind, chunk.level, shown))
         return errors[shown], joins[shown], shown
+
+
+def _finished(begun: tuple[int, CodedMotion]) -> CodedSegment:
+    """Return a segment whose first layer is coded. Its memory is freed, whoever holds it."""
+    index, motion = begun
+    motion.finish()
+    coded = CodedSegment(index, motion.chunks, *map(np.array, (motion.errors, motion.joins, motion.flaws)))
+    vars(motion).clear()
+    return coded
 
 
 def _polygons(clip: MotionClip, options: EncodingOptions) -> Polygons | None:

@@ -386,9 +386,17 @@ class CodedMotion:
         self._source_end = self._source.last_shown(positions)
         self._loops, self._before, self._after = loops, before, after
         self._may_join = Feature.JOINS not in layers.each[-1].settings.without
-        segment = self._first(layers.each[0])
-        for level, (coarse, layer) in enumerate(pairwise(layers.each), layers.level_0.level_count):
-            segment = self._refine(layer, segment, round(coarse.ratio / layer.ratio), level)
+        self._layers = layers.each
+        with self._failing():
+            self._segment = self._first(layers.each[0])
+
+    def finish(self) -> None:
+        """Code what is left: the first layer is there once the object is made."""
+        segment = self._segment
+        del self._segment
+        with self._failing():
+            for level, (coarse, layer) in enumerate(pairwise(self._layers), self._level_0.level_count):
+                segment = self._refine(layer, segment, round(coarse.ratio / layer.ratio), level)
         if self.errors[-1][0] > self._largest_bound:
             raise AssertionError(f"decoded error {self.errors[-1][0]} is beyond the bound {self._largest_bound}")
         if self._exact is not None:
@@ -396,6 +404,9 @@ class CodedMotion:
             self.errors.append((0.0,) * 3)
             self.joins.append(0)
             self.flaws.append((0.0, 0.0))
+
+    def _failing(self) -> AbstractContextManager[None]:
+        return nullcontext() if self._after is None else self._after.failing()
 
     def _first(self, layer: Layer) -> SegmentMotion:
         """Code the levels of the branch hierarchy."""
@@ -413,14 +424,15 @@ class CodedMotion:
         shown = [self._at_level_0(segment, settings), *[segment] * (plan.level_count - 2)]
         self.errors = _EvenLevels(self, shown, settings).errors
         self._keep_last_level_best(layer, last, decoded)
+        del decoded  # Levels with maps are in memory before the last one is posed again.
         for level, nodes in enumerate(shown):
             if plan.has_affines(level):
                 self.chunks[level, ct.AFFINES] = streams.encode_affines(nodes, level)
         for level, nodes in enumerate(shown):
             self._finish(level, self._pose_to_join(nodes, level))
+        self._finish(last, self.pose(segment, last), layer)
         segment.forget_nodes()
         del self._room
-        self._finish(last, decoded, layer)
         return segment
 
     def _keep_last_level_best(self, layer: Layer, level: int, decoded: np.ndarray) -> None:
