@@ -32,7 +32,7 @@ NOTE = """
 Times: repetitions of the clip in a gzip-compressed HDF5 file; all in segments of the same length.
 Positions: raw size of the clip. Peak: largest resident memory of the process; imports: the same
 before anything is read. A few segments are processed at once: clips with fewer need less.
-HDF5's chunk cache, at most 64 MiB, is included: it fills as a clip gets longer.
+HDF5's chunk cache, at most 16 MiB, is included: it fills as a clip gets longer.
 """
 
 

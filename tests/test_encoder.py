@@ -394,6 +394,12 @@ def test_memory_does_not_grow_with_the_number_of_frames(tmp_path, monkeypatch):
     assert long - short < raw / 4
 
 
+def test_the_layers_of_a_segment_are_in_memory_one_at_a_time(tmp_path):
+    peak_memory(endless_clip(64, at_once=64), tmp_path)  # what is made once, such as imports, is not counted
+    segment = 32 * 2000 * 12
+    assert peak_memory(endless_clip(128, 2000, at_once=128), tmp_path) < 22 * segment
+
+
 @pytest.mark.parametrize("jobs", [0, -1])
 def test_no_threads_at_all_are_refused(tmp_path, jobs):
     with pytest.raises(ValueError, match="jobs: got"):

@@ -237,6 +237,6 @@ def test_squared_lengths_of_vectors_that_move_follow_from_those_before():
     vectors, jump, slope = rng.normal(size=(5, 3, 9)), *rng.normal(size=(2, 5, 3))
     jumps, slopes = rng.normal(size=(2, 7))
     moved = vectors[:, :, :7] + jump[:, :, None] * jumps + slope[:, :, None] * slopes
-    found = joins._Moved(vectors, jump, slope)
-    np.testing.assert_allclose(found.by(jumps, slopes), (moved**2).sum(axis=1))
-    np.testing.assert_allclose(found.mean().by(jumps, slopes), (moved**2).sum(axis=1).mean(axis=0))
+    of_each, means = (joins._Moved(lambda part: vectors[part], jump, slope, some) for some in (False, True))
+    np.testing.assert_allclose(of_each.by(jumps, slopes), (moved**2).sum(axis=1))
+    np.testing.assert_allclose(means.by(jumps, slopes), (moved**2).sum(axis=1).mean(axis=0))

@@ -18,7 +18,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
-from typing import IO, Any, BinaryIO
+from typing import IO, BinaryIO
 
 import numpy as np
 
@@ -28,7 +28,6 @@ from athcodec.decoding.ath_file import AthFile
 from athcodec.decoding.decoder import Decoder
 from athcodec.encoding import polygons, streams, writing
 from athcodec.encoding import quantise as qz
-from athcodec.encoding.choices.joins import End
 from athcodec.encoding.choices.levels import chosen_levels
 from athcodec.encoding.choices.prediction import FoundPrediction, best_prediction, code_predicted_segment, one_map_each
 from athcodec.encoding.features import Feature
@@ -36,6 +35,7 @@ from athcodec.encoding.layers import (
     MOST_LAYERS,
     MOST_LEVELS,
     CodedMotion,
+    Ends,
     Layer,
     Layers,
     layer_chunks,
@@ -43,6 +43,7 @@ from athcodec.encoding.layers import (
     layers_of,
     step_factors,
 )
+from athcodec.encoding.motion import release_memory
 from athcodec.encoding.progress import FILE_BYTE, LEVEL_MOTION, MOTION, SURVEY, Progress, Work, allowed_work, silent
 from athcodec.encoding.sample import is_small
 from athcodec.encoding.search import Search
@@ -498,8 +499,9 @@ class EncodingJob:
         total = float(decided.shared_bytes)
         for segment, frames in typical_segments(decided.source):
             if segment not in decided.tried:
-                motion = self._motion(decided, segment, decided.source.positions(segment), self._exact(segment))
-                decided.tried[segment] = CodedSegment(segment, *motion.joined_to())
+                positions = decided.source.positions(segment)
+                motion = self._motion(decided, segment, positions, self._exact(segment))
+                decided.tried[segment] = _finished((segment, motion))
             coded = decided.tried[segment]
             lossy = [data for (_, kind), data in coded.chunks.items() if kind != ct.EXACT]
             front = CHUNK_BYTES * len(lossy) + LEVEL_BYTES * len(coded.errors)
@@ -689,50 +691,66 @@ class EncodingJob:
         at_once = thread_count(self.options.jobs, source)
         pool = ThreadPool(at_once, beside=source.pool.jobs > 1)
 
-        def read(some: Iterable[int]) -> Iterator[tuple[int, list[np.ndarray]]]:
-            return ((index, [source.block(index)]) for index in some)
-
-        def predict(numbered: tuple[int, list[np.ndarray]]) -> CodedSegment:
-            index, block = numbered
+        def predict(read: tuple[int, list[np.ndarray]]) -> CodedSegment:
+            index, block = read
             positions, exact = self._positions(block.pop())  # The list no longer holds the block.
             frames = positions, exact, source.shown_times(index), source.box
             return CodedSegment(index, *code_predicted_segment(decided.prelude, decided.choice, *frames))
 
-        def code(numbered: tuple[int, list[np.ndarray]]) -> tuple[int, CodedMotion, list[End]]:
-            index, block = numbered
-            motion = self._motion(decided, index, *self._positions(block.pop()))
-            return index, motion, motion.ends() if len(source.segments) > 1 else []
-
-        def join(coded: tuple[int, CodedMotion, list[End]]) -> CodedSegment:
-            index, motion, ends = coded
-            return CodedSegment(index, *motion.joined_to(ends, Feature.JOINS not in source.without))
+        def begin(read: tuple[int, list[np.ndarray], Ends | None, Ends | None]) -> tuple[int, CodedMotion]:
+            index, block, before, after = read
+            return index, self._motion(decided, index, *self._positions(block.pop()), before, after)
 
         if decided.choice.predicted is not None:
-            return pool.ordered(predict, read(segments), at_once)
-        coded = pool.ordered(code, read(self._with_those_before(source, segments)), at_once - 1)
-        return pool.ordered(join, _beside_ends(source, self._halfway(coded), frozenset(segments)), 0)
+            return pool.ordered(predict, ((index, [source.block(index)]) for index in segments), at_once)
+        order = self._in_order(source, segments)
+        begun = pool.ordered(begin, self._linked(decided, order), at_once - 1)
+        coded = pool.ordered(_finished, self._halfway(begun), 0)
+        return (one for one, (_, is_wanted) in zip(coded, order) if is_wanted)
 
-    def _halfway(self, coded: Iterable[Any]) -> Iterator[Any]:
-        """Report each segment that is coded, but not yet joined."""
-        for done, one in enumerate(coded):
+    def _halfway(self, begun: Iterable[tuple[int, CodedMotion]]) -> Iterator[tuple[int, CodedMotion]]:
+        """Report each segment whose first layer is coded."""
+        for done, one in enumerate(begun):
             self.report("motion", min((done + 0.5) / self.segment_count, 1.0))
             yield one
+            del one
 
-    def _motion(self, decided: _Decided, index: int, positions: np.ndarray, exact: np.ndarray | None) -> CodedMotion:
+    def _motion(
+        self,
+        decided: _Decided,
+        index: int,
+        positions: np.ndarray,
+        exact: np.ndarray | None,
+        before: Ends | None = None,
+        after: Ends | None = None,
+    ) -> CodedMotion:
+        """Return a segment, which goes on from the ends of the one before it and leaves its own."""
         source, loops = decided.source, decided.source.is_whole_loop(index)
         frames = positions, exact, source.goes_on(index), source.shown_times(index), source.box, loops
-        return CodedMotion(decided.prelude, decided.layers.of_segment(loops), self.segment_count, *frames)
+        layers = decided.layers.of_segment(loops)
+        release_memory()
+        return CodedMotion(decided.prelude, layers, self.segment_count, *frames, before, after)
 
     @staticmethod
-    def _with_those_before(source: Source, segments: Sequence[int]) -> Iterator[int]:
-        """Yield the segments, each right after the one that it is joined to."""
-        last = None
+    def _in_order(source: Source, segments: Sequence[int]) -> list[tuple[int, bool]]:
+        """Return the segments, and whether each is wanted: right before it stands the one that it is joined to, which
+        may be there for its ends alone."""
+        order: list[tuple[int, bool]] = []
         for index in segments:
             before = source.segment_before(index)
-            if before is not None and before != last:
-                yield before
-            yield index
-            last = index
+            if before is not None and (not order or before != order[-1][0]):
+                order.append((before, False))
+            order.append((index, True))
+        return order
+
+    @staticmethod
+    def _linked(decided: _Decided, order: Sequence[tuple[int, bool]]) -> Iterator[tuple[int, Ends | None, Ends | None]]:
+        """Yield each segment with the ends that it goes on from, and with room for its own if the next one does."""
+        goes_on = [is_wanted and decided.source.segment_before(index) is not None for index, is_wanted in order]
+        ends = None
+        for (index, _), follows in zip(order, [*goes_on[1:], False]):
+            before, ends = ends, Ends(decided.layers.level_count) if follows else None
+            yield index, [decided.source.block(index)], before, ends
 
     def _positions(self, block: np.ndarray) -> tuple[np.ndarray, np.ndarray | None]:
         """Return what is coded of a block, and its very numbers if these are to come back."""
@@ -768,16 +786,13 @@ class EncodingJob:
         return errors[shown], joins[shown], shown
 
 
-def _beside_ends(
-    source: Source, coded: Iterable[tuple[int, CodedMotion, list[End]]], wanted: frozenset[int]
-) -> Iterator[tuple[int, CodedMotion, list[End]]]:
-    """Yield the segments that are wanted, each with the ends that it goes on from."""
-    last, last_ends = None, []
-    for index, motion, ends in coded:
-        before = source.segment_before(index)
-        if index in wanted and (before is None or before == last):
-            yield index, motion, [] if before is None else last_ends
-        last, last_ends = index, ends
+def _finished(begun: tuple[int, CodedMotion]) -> CodedSegment:
+    """Return a segment whose first layer is coded. Its memory is freed, whoever holds it."""
+    index, motion = begun
+    motion.finish()
+    coded = CodedSegment(index, motion.chunks, *map(np.array, (motion.errors, motion.joins, motion.flaws)))
+    vars(motion).clear()
+    return coded
 
 
 def _polygons(clip: MotionClip, options: EncodingOptions) -> Polygons | None:

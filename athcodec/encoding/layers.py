@@ -8,9 +8,11 @@ it, motion, rest pose and learned modes. A refinement is coded about the positio
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Iterator, Sequence
+from concurrent.futures import Future
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -26,6 +28,7 @@ from athcodec.encoding.choices.joins import (
     CorrectionPrice,
     End,
     ErrorPrice,
+    SourceStart,
     apply_join,
     best_join,
     end_corrections,
@@ -35,7 +38,7 @@ from athcodec.encoding.choices.joins import (
 from athcodec.encoding.choices.levels import SourceFrames
 from athcodec.encoding.features import Feature
 from athcodec.encoding.learned_modes import nested
-from athcodec.encoding.motion import LearnedModes, Plan, SegmentMotion, position_errors
+from athcodec.encoding.motion import LearnedModes, Plan, SegmentMotion, position_errors, zeros
 from athcodec.encoding.segment import (
     CodedPrelude,
     Corrections,
@@ -311,21 +314,44 @@ class _TimeBases:
         return {stream: basis}
 
 
-@dataclass(frozen=True)
-class _ShownLevel:
-    """The positions of a level before they are joined and corrected, and the layer that ends with it, if any."""
+class Ends:
+    """The ends of the levels of a segment, for which the next segment may wait on another thread."""
 
-    pose: Callable[[], np.ndarray]
-    layer: Layer | None = None
+    def __init__(self, levels: int):
+        self._levels: list[Future[End]] = [Future() for _ in range(levels)]
+
+    def add(self, level: int, end: End) -> None:
+        self._levels[level].set_result(end)
+
+    def take(self, level: int) -> End:
+        """Return the end of a level as soon as it is known. Only its one caller holds it then."""
+        end = self._levels[level].result()
+        self._levels[level] = Future()
+        return end
+
+    @contextmanager
+    def failing(self) -> Iterator[None]:
+        """Let the segment that waits fail as this one does."""
+        try:
+            yield
+        except BaseException as error:
+            for level in self._levels:
+                if not level.done():
+                    level.set_exception(error)
+            raise
 
 
 class CodedMotion:
-    """The motion of one segment in layers, all but how it goes on from the segment before it: chunks {(level, kind):
-    payload}, and errors of stopping at each level, by each of MEASURES.
+    """The motion of one segment in layers. Each level is joined to the segment before and measured as soon as it is
+    coded, so that the positions of one level are in memory at a time.
+
+    chunks: {(level, kind): payload}. errors: those of stopping at each level, by each of MEASURES. joins: those to the
+    segment before. flaws: those of what each level shows (SourceFrames).
 
     layers: with the settings of the segment (Layers.of_segment). exact: the source's own numbers (Source.exact), for
     one more level. goes_on: whether another segment follows. shown_times: as Source returns them. box: corners of the
-    source, (2, 3). loops: whether the segment follows itself.
+    source, (2, 3). loops: whether the segment follows itself. before, after: the ends of the segment before, which this
+    one is joined to, and those of this one; None: nobody asks for them.
     """
 
     def __init__(
@@ -339,6 +365,8 @@ class CodedMotion:
         shown_times: np.ndarray,
         box: np.ndarray,
         loops: bool,
+        before: Ends | None = None,
+        after: Ends | None = None,
     ):
         self._exact, self._goes_on, self._shown_times = exact, goes_on, shown_times
         self._output, self._origin, self.positions = prelude.output, prelude.origin, positions
@@ -348,17 +376,37 @@ class CodedMotion:
         self._bases = _TimeBases(layers.each[-1], positions) if self._layered else None
         self.chunks: dict[tuple[int, int], bytes] = {}
         self.errors: list[tuple[float, ...]] = []
-        self._shown: list[_ShownLevel] = []
+        self.flaws: list[tuple[float, float]] = []
         self._decoded = np.empty(0)  # Positions of the last level.
         self._met = streams.FREE_ENDS  # Met by the corrections of the last layer.
         self._end_corrections = NO_CORRECTIONS  # Corrections of the last frame.
         self._corrected: dict[int, Corrections] = {}  # What corrects levels.
         self.joins = [0] * layers.level_count
         self._source = SourceFrames(positions, shown_times, None, box, self._largest_bound, self._pool)
-        self._loops = loops
-        segment = self._first(layers.each[0])
-        for level, (before, layer) in enumerate(pairwise(layers.each), layers.level_0.level_count):
-            segment = self._refine(layer, segment, round(before.ratio / layer.ratio), level)
+        self._source_end = self._source.last_shown(positions)
+        self._loops, self._before, self._after = loops, before, after
+        self._may_join = Feature.JOINS not in layers.each[-1].settings.without
+        self._layers = layers.each
+        with self._failing():
+            self._segment = self._first(layers.each[0])
+
+    def finish(self) -> None:
+        """Code what is left: the first layer is there once the object is made."""
+        segment = self._segment
+        del self._segment
+        with self._failing():
+            for level, (coarse, layer) in enumerate(pairwise(self._layers), self._level_0.level_count):
+                segment = self._refine(layer, segment, round(coarse.ratio / layer.ratio), level)
+        if self.errors[-1][0] > self._largest_bound:
+            raise AssertionError(f"decoded error {self.errors[-1][0]} is beyond the bound {self._largest_bound}")
+        if self._exact is not None:
+            self.chunks[len(self.errors), ct.EXACT] = streams.encode_exact(self._decoded, self._exact)
+            self.errors.append((0.0,) * 3)
+            self.joins.append(0)
+            self.flaws.append((0.0, 0.0))
+
+    def _failing(self) -> AbstractContextManager[None]:
+        return nullcontext() if self._after is None else self._after.failing()
 
     def _first(self, layer: Layer) -> SegmentMotion:
         """Code the levels of the branch hierarchy."""
@@ -369,18 +417,22 @@ class CodedMotion:
         )
         stems, _ = stem_streams(segment, settings, bases)
         self.chunks |= {(level, ct.STEMS): data for level, data in stems.items()}
-        self._finish_with(decoded, layer, plan.level_count - 1)
+        last = plan.level_count - 1
+        self._correct(decoded, layer, last)
         segment.analyse_nodes(self.positions, settings.node_steps, settings.rounding)
+        self._room = zeros(self.positions.shape)
         shown = [self._at_level_0(segment, settings), *[segment] * (plan.level_count - 2)]
         self.errors = _EvenLevels(self, shown, settings).errors
-        self._shown = [
-            _ShownLevel(partial(self._pose_to_join, motion, level)) for level, motion in enumerate(shown)
-        ] + self._shown
-        self._keep_last_level_best(layer, plan.level_count - 1, self._shown[-1].pose())
+        self._keep_last_level_best(layer, last, decoded)
+        del decoded  # Levels with maps are in memory before the last one is posed again.
         for level, nodes in enumerate(shown):
             if plan.has_affines(level):
                 self.chunks[level, ct.AFFINES] = streams.encode_affines(nodes, level)
-            nodes.forget_caches()
+        for level, nodes in enumerate(shown):
+            self._finish(level, self._pose_to_join(nodes, level))
+        self._finish(last, self.pose(segment, last), layer)
+        segment.forget_nodes()
+        del self._room
         return segment
 
     def _keep_last_level_best(self, layer: Layer, level: int, decoded: np.ndarray) -> None:
@@ -414,15 +466,15 @@ class CodedMotion:
         head = stems_head(settings, last, bases)
         self.chunks[level, ct.STEMS] = writing.pack_refined_stems(ratio, head, streams.encode_refinement(segment, last))
         segment.forget_before()
-        self._finish_with(decoded, layer, level)
+        self._correct(decoded, layer, level)
+        self._finish(level, decoded, layer)
         return segment
 
-    def _finish_with(self, decoded: np.ndarray, layer: Layer, level: int) -> None:
+    def _correct(self, decoded: np.ndarray, layer: Layer, level: int) -> None:
         """Set corrections and errors of the level that a layer ends with; decoded: positions without corrections."""
         if layer.ratio == 1 and self._goes_on and decoded.shape[2] >= LEAST_MEETING:
             self._end_corrections = self._corrections_of_end(layer, decoded)
             self._met = streams.MetEnds(streams.LAST, self._end_corrections)
-        self._shown.append(_ShownLevel(lambda: decoded, layer))
         self.errors.append(self._finish_level(layer, level, decoded))
 
     def _corrections_of_end(self, layer: Layer, decoded: np.ndarray) -> np.ndarray:
@@ -442,10 +494,10 @@ class CodedMotion:
         if corrections.chunk:
             self.chunks[level, ct.CORRECTIONS] = corrections.chunk
             self._corrected[level] = corrections
-            decoded = corrections.applied(decoded)
-        if layer.ratio == 1 and self._exact is not None:
-            self._decoded = decoded
-        return self.error(decoded)
+        with self._corrected_as_shown(level, decoded):
+            if layer.ratio == 1 and self._exact is not None:
+                self._decoded = decoded.copy()
+            return self.error(decoded)
 
     def _bytes_up_to(self, level: int) -> int:
         """Return the bytes of this level and those before it, without its corrections."""
@@ -453,18 +505,9 @@ class CodedMotion:
             len(chunk) for key, chunk in self.chunks.items() if key[0] <= level and key != (level, ct.CORRECTIONS)
         )
 
-    def ends(self) -> list[End]:
-        """Return what each level of the next segment goes on from."""
-        source, last = self.positions[:, :, -END_FRAMES:] + self._origin[:, None], self._source.last_shown
-        ends = []
-        for level, shown in enumerate(self._shown):
-            pose = shown.pose()
-            ends.append(end_of(pose, source, (last(self._as_shown(level, pose)), last(self.positions))))
-        return [*ends[:-1], replace(ends[-1], corrections=self._end_corrections)]
-
-    def _as_shown(self, level: int, positions: np.ndarray) -> np.ndarray:
-        """Return the joined positions of a level with its corrections."""
-        return self._corrected[level].applied(positions) if level in self._corrected else positions
+    def _corrected_as_shown(self, level: int, positions: np.ndarray) -> AbstractContextManager[None]:
+        """Return a context in which the positions of a level have its corrections."""
+        return self._corrected[level].applied(positions) if level in self._corrected else nullcontext()
 
     def _meet(self, start: np.ndarray) -> None:
         """Close the start of the last level, in whose first frame the corrections of an end stand."""
@@ -472,60 +515,51 @@ class CodedMotion:
         ordered = rows[np.lexsort(rows[:, 1::-1].T)]
         self._met = streams.MetEnds(self._met.closed | streams.FIRST, ordered)
 
-    def joined_to(
-        self, ends: Sequence[End] = (), may_join: bool = True
-    ) -> tuple[dict[tuple[int, int], bytes], np.ndarray, np.ndarray, np.ndarray]:
-        """Return chunks, (levels, 3) errors, (levels,) joins to the ends of the segment before, if there is one, and
-        (levels, 2) flaws (SourceFrames). To be called once: memory is freed."""
-        flaws = self._join(ends, may_join)
-        if self.errors[-1][0] > self._largest_bound:
-            raise AssertionError(f"decoded error {self.errors[-1][0]} is beyond the bound {self._largest_bound}")
-        if self._exact is not None:
-            self.chunks[len(self.errors), ct.EXACT] = streams.encode_exact(self._decoded, self._exact)
-            self.errors.append((0.0,) * 3)
-            self.joins.append(0)
-            flaws.append((0.0, 0.0))
-        coded = self.chunks, np.array(self.errors), np.array(self.joins), np.array(flaws)
-        vars(self).clear()
-        return coded
+    def _finish(self, level: int, positions: np.ndarray, layer: Layer | None = None) -> None:
+        """Add a level's end, join the level to the segment before if that is better, and add its flaws. positions: not
+        corrected, which change; layer: the one that ends with the level."""
+        if self._after is not None:
+            with self._corrected_as_shown(level, positions):
+                shown = self._source.last_shown(positions)
+            ends = end_of(positions, self._wanted_end, (shown, self._source_end), self._end_corrections)
+            self._after.add(level, ends)
+        end = None if self._before is None else self._before.take(level)
+        if level == 0:
+            known = self._source_end if self._loops else None
+            self._source = replace(self._source, before=known if end is None else end.shown[1])
+        if end is not None and self._may_join and end.can_join and positions.shape[2] > END_FRAMES:
+            self._join_level(level, end, positions, layer)
+        with self._corrected_as_shown(level, positions):
+            own = self._source.last_shown(positions) if self._loops else None
+            self.flaws.append(self._source.flaws(positions, own if end is None else end.shown[0]))
 
-    def _join(self, ends: Sequence[End], may_join: bool) -> list[tuple[float, float]]:
-        """Join the levels to the ends of the segment before, if that is better. Return the flaws of each."""
-        some = seen(len(self.positions))
-        source = self.positions[some] + self._origin[:, None]
-        before = ends[0].shown[1] if ends else self._source.last_shown(self.positions) if self._loops else None
-        compared = replace(self._source, before=before)
-        shown, self._shown, flaws = self._shown[::-1], [], []
-        for level in range(len(shown)):
-            shown_level = shown.pop()  # The list no longer holds its memory.
-            positions = shown_level.pose()
-            if ends and may_join and ends[level].can_join and self.positions.shape[2] > END_FRAMES:
-                self._join_level(level, ends[level], positions, shown_level.layer, some, source)
-            positions = self._as_shown(level, positions)
-            own = compared.last_shown(positions) if self._loops else None
-            flaws.append(compared.flaws(positions, ends[level].shown[0] if ends else own))
-        return flaws
+    @cached_property
+    def _wanted_end(self) -> np.ndarray:
+        return self.positions[:, :, -END_FRAMES:] + self._origin[:, None]
 
-    def _join_level(
-        self, level: int, end: End, positions: np.ndarray, layer: Layer | None, some: slice, source: np.ndarray
-    ) -> None:
-        """Join one level, whose positions change; layer: the one that ends with it; source: of some vertices."""
+    @cached_property
+    def _wanted_start(self) -> SourceStart:
+        return SourceStart(self.positions[seen(len(self.positions))], self._origin)
+
+    def _join_level(self, level: int, end: End, positions: np.ndarray, layer: Layer | None) -> None:
+        """Join one level, whose positions change; layer: the one that ends with it."""
+        some = seen(len(positions))
         if layer is None:
             most_rms = self.errors[level - 1][RMS] if level > 0 else math.inf
             price = ErrorPrice(self.errors[level][RMS], most_rms, positions.shape[2])
         else:
-            limit, share = layer.settings.limit, len(source) / len(positions)
+            limit, share = layer.settings.limit, len(positions[some]) / len(positions)
             bytes_ = share * (self._shared_bytes + self._bytes_up_to(level))
             price = CorrectionPrice(limit if np.isscalar(limit) else limit[some], bytes_)
         largest = max(errors[0] for errors in self.errors[level - 1 : level + 1]) if level > 0 else math.inf
-        join = best_join(end.of(some), positions[some], source, price, largest)
+        join = best_join(end.of(some), positions[some], self._wanted_start, price, largest)
         if join == 0:
             return
         self.joins[level] = join
         apply_join(end, positions, join)
         if layer is None:
             positions = positions.astype(self._output[1])
-            size = np.abs(positions).max()
+            size = max(positions.max(), -positions.min())
             # A decoder joins maps. It may round a position to the other side, and slopes make last bits larger.
             last_bits = 16 * (1 + join % SLOPED) * float(np.spacing(np.float64(size)))
             self.errors[level] = self.error(positions, 2 * float(np.spacing(size)) + last_bits)
@@ -549,15 +583,16 @@ class CodedMotion:
 
     def pose(self, shown: SegmentMotion, level: int) -> np.ndarray:
         """Return the output of a level, neither joined nor corrected."""
-        return shown.pose(level, *self._output)
+        return shown.pose(level, *self._output, self._room)
 
     def _pose_to_join(self, shown: SegmentMotion, level: int) -> np.ndarray:
         """Return a level without corrections as float64, to be joined. What stems place is rounded before and after,
         what maps place only after."""
         origin, dtype = self._output
-        positions, pieces = shown.pose(level, origin, np.float64), shown.plan.pieces
-        of_stems = np.repeat(pieces["level"] <= level, pieces["count"])
-        positions[of_stems] = positions[of_stems].astype(dtype)
+        positions, pieces = shown.pose(level, origin, np.float64, self._room), shown.plan.pieces
+        for piece in pieces[pieces["level"] <= level]:
+            of_stem = positions[piece["first"] : piece["first"] + piece["count"]]
+            of_stem[:] = of_stem.astype(dtype)
         return positions
 
     def error(self, decoded: np.ndarray, rounding: float = 0.0) -> tuple[float, ...]:

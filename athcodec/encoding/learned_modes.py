@@ -8,6 +8,7 @@ frame falls with the number of frames. FORMAT.md, "SHAPES".
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
@@ -145,6 +146,6 @@ def _packed(counts: np.ndarray, rows: list[np.ndarray]) -> LearnedModes:
 
 def estimated_bits(integers: np.ndarray, pieces: np.ndarray, piece_count: int) -> np.ndarray:
     """Return about how many bits integers (K, ...) of pieces (K,) take in a stream, (piece_count,)."""
-    magnitudes = np.abs(integers).astype(np.float64)
-    bits = (2.0 * qz.bits(magnitudes) + (magnitudes > 0)).sum(axis=tuple(range(1, integers.ndim)))
-    return np.bincount(pieces, bits, piece_count)
+    busy = np.flatnonzero(integers)
+    bits = 2.0 * qz.bits(np.abs(integers.reshape(-1)[busy]).astype(np.float64)) + 1.0
+    return np.bincount(pieces[busy // math.prod(integers.shape[1:])], bits, piece_count)

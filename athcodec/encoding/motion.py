@@ -8,13 +8,15 @@ decoder will have (`pose`). Arrays over a segment are vertex-major, (vertices, 3
 from __future__ import annotations
 
 import math
+import mmap
 from collections.abc import Callable, Sequence
-from ctypes import addressof
+from ctypes import addressof, c_size_t
 from dataclasses import dataclass
 from enum import IntEnum
 from functools import cached_property, lru_cache
 
 import numpy as np
+from numpy.typing import DTypeLike
 
 from athcodec._native import (
     BRANCH,
@@ -41,6 +43,26 @@ from athcodec.files.threads import SERIAL, ThreadPool, ranges
 STEM_ROOT, NODE_ROOT = -1, -2  # Roots of streams in waves that are not learned (core/model/motion.h).
 RANGES, LEAST_RANGE = 24, 1024  # Parts of a plant that threads take at a time, and their least number of vertices.
 PERIOD = 128  # Vertices from one run of a sample to the next.
+LARGE_BYTES = 2 << 20  # Bytes from which on an array has memory of its own.
+_PRIVATE = {"flags": mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS} if hasattr(mmap, "MAP_ANONYMOUS") else {}
+
+
+def zeros(shape: tuple[int, ...], dtype: DTypeLike = np.float64) -> np.ndarray:
+    """Return zeros. The memory of a large array goes back to the system with it, whereas allocators keep freed memory
+    for each thread."""
+    size = math.prod(shape) * np.dtype(dtype).itemsize
+    if size < LARGE_BYTES:
+        return np.zeros(shape, dtype)
+    memory = mmap.mmap(-1, size, **_PRIVATE)
+    if hasattr(mmap, "MADV_HUGEPAGE"):
+        memory.madvise(mmap.MADV_HUGEPAGE)
+    return np.frombuffer(memory, dtype).reshape(shape)
+
+
+def release_memory() -> None:
+    """Give memory that the allocator keeps for later arrays back to the system, if it is one that keeps much."""
+    if (trim := getattr(lib, "malloc_trim", None)) is not None:
+        trim(c_size_t(0))
 
 
 class Waves(IntEnum):  # core/model/basis.h
@@ -291,23 +313,26 @@ class SegmentMotion:
             )
         self.plan, self.frames, self.streams, self.learned_modes = plan, frames, streams, learned_modes
         core = plan.core
-        self.coefficients = np.zeros((plan.vertex_count, 3, frames), np.int32)
-        self.tracks = np.zeros((core.piece_count, 2, 3, frames), np.int32)
-        self.node_tracks = np.zeros((core.node_count, 4, 3, frames), np.int32)
-        self.node_steps = np.zeros(core.node_count, np.int32)
+        self.coefficients = zeros((plan.vertex_count, 3, frames), np.int32)
+        self.tracks = zeros((core.piece_count, 2, 3, frames), np.int32)
+        node_count = 0 if before is not None else core.node_count  # Refinements have no maps.
+        self.node_tracks = zeros((node_count, 4, 3, frames), np.int32)
+        self.node_steps = np.zeros(node_count, np.int32)
         self._attach_caches: np.ndarray | None = None
         self.waves = waves_over_time(frames, Waves.PERIODIC if periodic else Waves.SMOOTH)
         self.node_waves = waves_over_time(frames, Waves.PERIODIC if periodic else Waves.BEAM)
         self.before, self.ratio = before, ratio
         if before is not None:
-            self.predicted, self.predicted_tracks = np.zeros_like(self.coefficients), np.zeros_like(self.tracks)
+            self.predicted, self.predicted_tracks = (
+                zeros(integers.shape, np.int32) for integers in (self.coefficients, self.tracks)
+            )
             self.known = self._known(before)
         self.coarse = None
         if layered:
             if before is None:
-                self.placed = np.zeros((plan.vertex_count, 3, frames))
-                self.placed_tracks = np.zeros(self.tracks.shape)
-                self.placed_frames = np.zeros((core.piece_count, 12, frames))  # Only rigid pieces use theirs.
+                self.placed = zeros((plan.vertex_count, 3, frames))
+                self.placed_tracks = zeros(self.tracks.shape)
+                self.placed_frames = zeros((core.piece_count, 12, frames))  # Only rigid pieces use theirs.
             else:  # A piece is read before it is replaced.
                 self.placed, self.placed_tracks = before.placed, before.placed_tracks
                 self.placed_frames = before.placed_frames
@@ -378,6 +403,10 @@ class SegmentMotion:
         """Free what `analyse` and `pose` leave for `analyse_nodes`."""
         self._attach_caches = None
 
+    def forget_nodes(self) -> None:
+        """Free the maps of nodes, and what they are made of."""
+        self._attach_caches = self.node_tracks = self.integers.node_tracks = None
+
     def forget_before(self) -> None:
         """Free the layer before, which nothing more is predicted from, and what is predicted from it."""
         before, self.before = self.before, None
@@ -429,7 +458,7 @@ class SegmentMotion:
     def _piecewise(self, call: Callable[[Motion, int, int], None]) -> None:
         """Call with a motion and each range of pieces, those that others hang on first."""
         if self._attach_caches is None:
-            self._attach_caches = np.empty(lib.ath_attach_cache_size(self.plan.core.attach_cache_rows, self.frames))
+            self._attach_caches = zeros((lib.ath_attach_cache_size(self.plan.core.attach_cache_rows, self.frames),))
             self.motion.attach_caches = self._attach_caches.ctypes.data
         carrying, carried = self.plan.piece_ranges
         for first, stop in carrying:
@@ -455,9 +484,14 @@ class SegmentMotion:
     def _source(self, source: np.ndarray) -> int:
         return address(source, np.float64, self.plan.vertex_count * 3 * self.frames)
 
-    def pose(self, level: int, origin: np.ndarray, dtype) -> np.ndarray:
-        """Return positions at `level` without corrections, (N, 3, frames) float32 or float64, origin added."""
-        positions = np.empty((self.plan.vertex_count, 3, self.frames), dtype)
+    def pose(self, level: int, origin: np.ndarray, dtype, room: np.ndarray | None = None) -> np.ndarray:
+        """Return positions at `level` without corrections, (N, 3, frames) float32 or float64, origin added. room: as
+        many float64, whose memory is to hold them."""
+        shape = self.plan.vertex_count, 3, self.frames
+        if room is None:
+            positions = zeros(shape, dtype)
+        else:
+            positions = room.reshape(-1).view(dtype)[: math.prod(shape)].reshape(shape)
         into = level, address(origin, np.float64, 3), positions.dtype == np.float64, positions.ctypes.data
         self._piecewise(
             lambda motion, first, stop: lib.ath_pose(self.plan.core, motion, self.integers, first, stop, *into)
@@ -473,7 +507,7 @@ def gather(block: np.ndarray, vertex_source: np.ndarray, origin: np.ndarray, poo
     vertex_source: (N,) int32, the N of its M vertices that are wanted."""
     frames, vertices = len(block), len(vertex_source)
     block = np.ascontiguousarray(block)
-    out = np.empty((vertices, 3, frames))
+    out = zeros((vertices, 3, frames))
 
     def fill(start: int, stop: int) -> None:
         lib.ath_gather(
@@ -489,6 +523,20 @@ def gather(block: np.ndarray, vertex_source: np.ndarray, origin: np.ndarray, poo
 
     pool.map(fill, ranges(vertices, 3 * frames))
     return out
+
+
+def squared_bends(positions: np.ndarray) -> np.ndarray:
+    """Return the sums of the squared second differences over time of positions, (N, 3, T), at each frame but the first
+    and the last, (T - 2,)."""
+    positions, sums = np.ascontiguousarray(positions), np.zeros(max(positions.shape[2] - 2, 0))
+    lib.ath_add_bends(
+        3 * len(positions),
+        positions.shape[2],
+        positions.dtype == np.float64,
+        address(positions, positions.dtype, positions.size),
+        sums.ctypes.data,
+    )
+    return sums
 
 
 def position_errors(

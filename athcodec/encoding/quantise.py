@@ -139,16 +139,18 @@ MESH = 1000  # Vertices from which on a stem may be a whole mesh.
 SHORT_STEM = 16  # Vertices up to which many stems are likely to be alike, which a lag of them all tells apart.
 
 
-def rest_lag(stem: np.ndarray, attach: np.ndarray | None, step: float) -> int:
-    """Return the lag, 1 or more, that leaves the least of a stem's rest pose, (n, 3), to code (FORMAT.md, Lag)."""
-    chain = stem if attach is None else np.vstack([attach, stem])
-    steps = np.diff(chain[: MESH if len(chain) <= MESH else 4 * MESH], axis=0)  # A sample does for long stems.
-    longest = LONGEST_LAG if len(chain) <= MESH else LONGEST_ROW
-    none = len(stem)  # No step is that many vertices ago.
+def rest_lags(stems: np.ndarray, attach: np.ndarray | None, step: float) -> np.ndarray:
+    """Return the lags, 1 or more, that leave the least of stems' rest poses, (B, n, 3), to code (FORMAT.md, Lag).
+    attach: (B, 3) attach points; None: there are none."""
+    none = stems.shape[1]  # No step is that many vertices ago.
+    chains = stems if attach is None else np.concatenate([attach[:, None], stems], axis=1)
+    is_mesh = chains.shape[1] > MESH
+    steps = np.diff(chains[:, : 4 * MESH if is_mesh else MESH], axis=1)  # A sample does for long stems.
+    tried = np.array([none, *range(1, min(steps.shape[1], LONGEST_ROW if is_mesh else LONGEST_LAG))])
 
-    def cost(lag: int) -> float:
+    def costs(lag: int) -> np.ndarray:
         residual = steps.copy()
-        residual[lag:] -= steps[: max(0, len(steps) - lag)]
-        return float(bits(np.abs(residual) / step).sum())
+        residual[:, lag:] -= steps[:, : max(0, steps.shape[1] - lag)]
+        return bits(np.abs(residual) / step).sum(axis=(1, 2))
 
-    return min([none, *range(1, min(len(steps), longest))], key=cost)
+    return tried[np.argmin([costs(lag) for lag in tried], axis=0)]

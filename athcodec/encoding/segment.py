@@ -7,7 +7,8 @@ predicted from what the decoder will have, corrections are found on what it will
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from weakref import WeakValueDictionary
@@ -28,6 +29,7 @@ from athcodec.encoding.motion import (
     PlanSample,
     SegmentMotion,
     gather,
+    zeros,
 )
 from athcodec.encoding.polygons import Mesh
 from athcodec.encoding.segmentation import split_segments
@@ -45,12 +47,12 @@ from athcodec.motion.polygons import Polygons
 FINER = 32  # Step of a layer over the step at which bases and modes are learned.
 REST_ROUNDS = 16  # Steps of a rest pose that are tried until one keeps the bound; the last is 1/28 of the first.
 ROWS_AT_ONCE = 1 << 14  # Rows of coefficients whose moments are added at once.
-WORK_BYTES = 1 << 30  # Memory of the segments coded at once, unless `jobs` says how many.
+WORK_BYTES = 1 << 28  # Memory of the segments coded at once, unless `jobs` says how many.
 SAMPLED = 4000  # Number of vertices from which trials find corrections of a sample of them only.
 WELD_TOLERANCE = 1e-7  # Size of the cells, in diagonals, in which vertices share a place.
 LEAST_SAMPLED, SPARSE = 1000, 16  # Vertices from which one of so many is enough if it takes enough corrections.
 ENOUGH, ENOUGH_SHARE = 2000, 0.015  # Corrections that show the bytes of all, and more for each vertex in a frame.
-SEGMENT_WORK = 16  # Memory of a segment while it is coded, over its float32 positions.
+SEGMENT_WORK = 9  # Memory of a segment while it is coded, over its float32 positions.
 
 
 def thread_count(jobs: int | None, source: Source) -> int:
@@ -603,11 +605,14 @@ class Corrections:
             return b""
         return writing.pack_corrections(self.step, streams.encode_corrections(self.rows, self.shape[0], self.shape[2]))
 
-    def applied(self, decoded: np.ndarray) -> np.ndarray:
-        """Return the corrected positions."""
-        corrected = decoded.copy()
-        streams.apply_corrections(corrected, self.rows, self.step)
-        return corrected
+    @contextmanager
+    def applied(self, decoded: np.ndarray) -> Iterator[None]:
+        """Correct the positions as long as the context lasts."""
+        vertices = np.unique(self.rows[:, 0])
+        before = decoded[vertices]
+        streams.apply_corrections(decoded, self.rows, self.step)
+        yield
+        decoded[vertices] = before
 
 
 @dataclass
@@ -647,7 +652,7 @@ def analyse(
     levels = level_streams(settings, plan.level_count, bases)
     segment = SegmentMotion(plan, positions.shape[2], levels, learned_modes, before, ratio, layered, settings.periodic)
     origin, dtype = output
-    decoded = np.empty(positions.shape, dtype)
+    decoded = zeros(positions.shape, dtype)
     segment.analyse(positions, settings.rounding, origin, decoded)
     if before is not None:
         segment.forget_caches()  # Maps of nodes alone need the caches, and a refinement has none.

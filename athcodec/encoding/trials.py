@@ -24,11 +24,11 @@ from athcodec.encoding.segment import (
     CodedPrelude,
     Source,
     StreamBasis,
-    analyse,
     analyse_finely,
     basis_ratio,
     code_stems,
     level_bases,
+    level_streams,
     thread_count,
     time_components,
     uncoded_plan,
@@ -168,10 +168,12 @@ class Trials:
 
     def analysed(self, settings: Settings, number: int, modes: LearnedModes | None) -> SegmentMotion:
         """Return a sample in its integers."""
-        prelude, sample = self.prelude(settings), self.samples[number]
+        plan, sample = self.prelude(settings).plan, self.samples[number]
         of_sample = settings.of_segment(sample.whole_loop)
-        bases = self._bases(settings, number)
-        return analyse(prelude.plan, prelude.output, of_sample, sample.positions, modes, bases)[0]
+        levels = level_streams(of_sample, plan.level_count, self._bases(settings, number))
+        segment = SegmentMotion(plan, sample.positions.shape[2], levels, modes, periodic=of_sample.periodic)
+        segment.analyse(sample.positions, of_sample.rounding)
+        return segment
 
     def coded(self, settings: Settings, number: int, modes: LearnedModes | None) -> Coded:
         """Return the streams of a sample."""

@@ -40,7 +40,7 @@ from athcodec.sources import ReadOptions
 from athcodec.sources.reader_process import read_apart
 from athcodec.sources.schema import clip_of_arrays
 
-CHUNK_CACHE_BYTES = 64 << 20
+CHUNK_CACHE_BYTES = 16 << 20
 GROWTH = {
     h5py.h5z.FILTER_SHUFFLE: 1,
     h5py.h5z.FILTER_FLETCHER32: 1,

@@ -157,4 +157,4 @@ def _lags(order: VertexOrder, pose: np.ndarray, step: float) -> list[np.ndarray]
     counts = order.branches["count"]
     sizes, examples, kinds = np.unique(counts, return_index=True, return_inverse=True)
     stems = (pose[order.branches["first"][b] :][:size] for size, b in zip(sizes, examples))
-    return [np.zeros_like(counts), np.array([quantise.rest_lag(stem, None, step) for stem in stems])[kinds]]
+    return [np.zeros_like(counts), np.array([quantise.rest_lags(stem[None], None, step)[0] for stem in stems])[kinds]]

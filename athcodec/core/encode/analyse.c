@@ -227,28 +227,51 @@ static void add_carried(const ath_plan *plan, int32_t T, const ath_piece *root, 
     for (int32_t i = 0; i < 9 && carried2 > 0.0; i++) H[i] += own2 / carried2 * products[i];
 }
 
-/* Fills the rotation nearest to H: its quaternion is the first eigenvector of a matrix (Horn, "Closed-form solution of
- * absolute orientation using unit quaternions", J. Opt. Soc. Am. A 4(4), 1987). */
+static double determinant(const double m[9])
+{
+    return m[0] * (m[4] * m[8] - m[5] * m[7]) - m[1] * (m[3] * m[8] - m[5] * m[6]) + m[2] * (m[3] * m[7] - m[4] * m[6]);
+}
+
+/* Fills the rotation nearest to H by its singular vectors, whatever H is. */
+static void rotation_of_vectors(const double H[9], double R[9])
+{
+    double left[9], stretch[3], right[9];
+    ath_decompose(1, H, left, stretch, right);
+    double sign = determinant(left) * determinant(right) < 0.0 ? -1.0 : 1.0;
+    for (int32_t i = 0; i < 3; i++)
+        for (int32_t k = 0; k < 3; k++)
+            R[3 * i + k] =
+                left[3 * i] * right[k] + left[3 * i + 1] * right[3 + k] + sign * left[3 * i + 2] * right[6 + k];
+}
+
+/* Replaces R by the rotation nearest to H, for which the product of H and the transpose of R is symmetric. Newton's
+ * method finds it from a rotation nearby in few steps, each of which solves for the turn that makes it so. */
 static void nearest_rotation(const double H[9], double R[9])
 {
-    double matrix[16], work[16], values[4], q[16];
-    matrix[0] = H[0] + H[4] + H[8];
-    matrix[5] = H[0] - H[4] - H[8];
-    matrix[10] = H[4] - H[0] - H[8];
-    matrix[15] = H[8] - H[0] - H[4];
-    matrix[1] = matrix[4] = H[7] - H[5];
-    matrix[2] = matrix[8] = H[2] - H[6];
-    matrix[3] = matrix[12] = H[3] - H[1];
-    matrix[6] = matrix[9] = H[1] + H[3];
-    matrix[7] = matrix[13] = H[2] + H[6];
-    matrix[11] = matrix[14] = H[5] + H[7];
-    ath_principal(1, 4, matrix, work, values, q);
-    for (int32_t i = 0; i < 3; i++)
-        for (int32_t k = 0; k < 3; k++) {
-            int32_t other = 3 - i - k;
-            double turn = (k - i + 3) % 3 == 1 ? -q[0] : q[0];
-            R[3 * i + k] = 2.0 * (q[i + 1] * q[k + 1] + (i == k ? q[0] * q[0] - 0.5 : turn * q[other + 1]));
-        }
+    enum { STEPS = 8 };
+    static const double far_turn = 0.25, close_turn = 1e-13; /* squared radians */
+    double turned[9], last[9], q[9], M[9], S[9];
+    memcpy(turned, R, sizeof turned);
+    for (int32_t step = 0; step < STEPS; step++) {
+        memcpy(last, turned, sizeof last);
+        for (int32_t i = 0; i < 3; i++)
+            for (int32_t k = 0; k < 3; k++)
+                M[3 * i + k] = H[3 * i] * last[3 * k] + H[3 * i + 1] * last[3 * k + 1] + H[3 * i + 2] * last[3 * k + 2];
+        double turn[3] = {M[7] - M[5], M[2] - M[6], M[3] - M[1]}, trace = M[0] + M[4] + M[8];
+        for (int32_t i = 0; i < 3; i++)
+            for (int32_t k = 0; k < 3; k++) S[3 * i + k] = (i == k ? trace : 0.0) - 0.5 * (M[3 * i + k] + M[3 * k + i]);
+        ath_solve(3, 1, S, turn); /* NaN if S is not positive definite, so far from the nearest rotation */
+        double size2 = turn[0] * turn[0] + turn[1] * turn[1] + turn[2] * turn[2];
+        if (!(size2 < far_turn)) break;
+        rational_rotation(0.25 * turn[0], 0.25 * turn[1], 0.25 * turn[2], q);
+        for (int32_t i = 0; i < 3; i++)
+            for (int32_t k = 0; k < 3; k++)
+                turned[3 * i + k] = q[3 * i] * last[k] + q[3 * i + 1] * last[3 + k] + q[3 * i + 2] * last[6 + k];
+        if (size2 > close_turn) continue;
+        memcpy(R, turned, sizeof turned);
+        return;
+    }
+    rotation_of_vectors(H, R);
 }
 
 /* Fills the piece's own rotation relative to its predicted one, as rotation vectors over time, unwrapped. local: its

@@ -79,6 +79,10 @@ ATH_ENCODER_API void ath_differences(int32_t vertex_count, int32_t frames, int32
                                      const double *rest, const double *positions, double xi, double *mean,
                                      double *largest, int32_t *most_beyond);
 
+/* Adds the squared second differences over time of rows of positions, float or (is_float64) double, to `sums`, frames -
+ * 2. */
+ATH_ENCODER_API void ath_add_bends(int64_t rows, int32_t frames, int is_float64, const void *positions, double *sums);
+
 /* Gathers some of the source's positions, (frames, source_count, 3) in its order, float or (is_float64) double, into
  * vertex-major doubles less the origin. */
 ATH_ENCODER_API void ath_gather(int32_t vertex_count, int32_t frames, const int32_t *vertex_source,

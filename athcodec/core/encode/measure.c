@@ -63,6 +63,20 @@ int64_t ath_add_moments(int64_t count, int32_t frames, const int32_t *rows, doub
     return kept;
 }
 
+ATH_HOT
+void ath_add_bends(int64_t rows, int32_t frames, int is_float64, const void *positions, double *sums)
+{
+    const double *wide = (const double *)positions;
+    const float *narrow = (const float *)positions;
+    for (int64_t row = 0; row < rows; row++, wide += frames, narrow += frames)
+        for (int32_t t = 0; t + 2 < frames; t++) {
+            double bend = is_float64 ? (wide[t + 2] - wide[t + 1]) - (wide[t + 1] - wide[t])
+                                     : ((double)narrow[t + 2] - (double)narrow[t + 1])
+                                           - ((double)narrow[t + 1] - (double)narrow[t]);
+            sums[t] += bend * bend;
+        }
+}
+
 void ath_gather(int32_t vertex_count, int32_t frames, const int32_t *vertex_source, int32_t source_count,
                 int is_float64, const void *source, const double origin[3], double *out)
 {

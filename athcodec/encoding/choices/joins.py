@@ -7,12 +7,13 @@ Positions are vertex-major, (N, 3, T), as decoded, not corrected.
 
 from __future__ import annotations
 
-import copy
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
 
+from athcodec.encoding.motion import squared_bends
 from athcodec.files.threads import ranges
 
 END_FRAMES = 2  # Last frames of a segment that a join starts from.
@@ -59,12 +60,16 @@ class End:
         return replace(self, positions=self.positions[some], source=self.source[some])
 
 
-def end_of(positions: np.ndarray, source: np.ndarray, shown: tuple[np.ndarray, np.ndarray]) -> End:
-    """Return the end of a level."""
+def end_of(
+    positions: np.ndarray, source: np.ndarray, shown: tuple[np.ndarray, np.ndarray], corrections: np.ndarray
+) -> End:
+    """Return the end of a level, whose positions are not corrected. source: (N, 3, END_FRAMES) or fewer."""
     if positions.shape[2] <= END_FRAMES:
-        return End(positions[:, :, :0], source[:, :, :0], 0.0, NO_CORRECTIONS, shown)
-    ends = (numbers[:, :, -END_FRAMES:].copy() for numbers in (positions, source))
-    return End(*ends, _usual(_changes(positions[seen(len(positions))])), NO_CORRECTIONS, shown)
+        return End(np.empty((len(positions), 3, 0)), source[:, :, :0], 0.0, corrections, shown)
+    last = positions[:, :, -END_FRAMES:].copy()
+    if np.array_equal(last, shown[0]):  # Then memory holds them once.
+        shown = last, shown[1]
+    return End(last, source, _usual(_changes(positions[seen(len(positions))])), corrections, shown)
 
 
 def end_corrections(away: np.ndarray, limit: float | np.ndarray, step: float, frame: int) -> np.ndarray:
@@ -148,19 +153,22 @@ class CorrectionPrice:
 
 
 class _Moved:
-    """Squared lengths of vectors in some frames, (N, 3, frames), that move by shares of two ways, (N, 3) each."""
+    """Squared lengths of vectors in some frames, or their means, that move by shares of two ways, (N, 3) each. vectors:
+    returns those of a part of the N, (n, 3, frames), so that few are in memory at a time."""
 
-    def __init__(self, vectors: np.ndarray, jump: np.ndarray, slope: np.ndarray):
-        self.squares = _squares(vectors)
-        self._along = [(vectors * way[:, :, None]).sum(axis=1) for way in (jump, slope)]
+    def __init__(
+        self, vectors: Callable[[slice], np.ndarray], jump: np.ndarray, slope: np.ndarray, are_means: bool = False
+    ):
+        rows: list[list[np.ndarray]] = []
+        for part in _parts(len(jump), max(WIDTHS)):
+            of_part, ways = vectors(part), (jump[part], slope[part])
+            numbers = [_squares(of_part), *((of_part * way[:, :, None]).sum(axis=1) for way in ways)]
+            rows.append([each.sum(axis=0, keepdims=True) for each in numbers] if are_means else numbers)
+        self.squares, *self._along = (np.concatenate(each) for each in zip(*rows))
         self._ways = [(a * b).sum(axis=1, keepdims=True) for a, b in ((jump, jump), (jump, slope), (slope, slope))]
-
-    def mean(self) -> _Moved:
-        """Return the means over vertices."""
-        means = copy.copy(self)
-        means.squares = self.squares.mean(axis=0)
-        means._along, means._ways = ([array.mean(axis=0) for array in arrays] for arrays in (self._along, self._ways))
-        return means
+        if are_means:
+            self.squares, *self._along = (each.sum(axis=0) / len(jump) for each in (self.squares, *self._along))
+            self._ways = [each.mean(axis=0) for each in self._ways]
 
     def by(self, jumps: np.ndarray, slopes: np.ndarray) -> np.ndarray:
         """Return the squared lengths in the first frames after the move, (N, width)."""
@@ -182,9 +190,14 @@ def _squares(away: np.ndarray) -> np.ndarray:
     return np.square(away, dtype=np.float64).sum(axis=1)
 
 
+def _parts(count: int, frames: int) -> Iterator[slice]:
+    """Yield few vertices at a time."""
+    return (slice(*part) for part in ranges(count, 16 * frames))
+
+
 def _changes(positions: np.ndarray) -> np.ndarray:
     """Return the RMS over vertices of the change of velocity at each frame but the first and the last."""
-    return np.sqrt(_squares(np.diff(positions.astype(np.float64), 2, axis=2)).mean(axis=0))
+    return np.sqrt(sum(squared_bends(positions[part]) for part in _parts(*positions.shape[::2])) / len(positions))
 
 
 def _usual(changes: np.ndarray) -> float:
@@ -192,24 +205,39 @@ def _usual(changes: np.ndarray) -> float:
     return max(float(np.median(changes)), 0.5 * float(np.sqrt((changes**2).mean())))
 
 
+class SourceStart:
+    """What all levels of a segment are compared with: the source's first frames, and its change of velocity in a usual
+    frame. positions: (N, 3, T) less an origin."""
+
+    def __init__(self, positions: np.ndarray, origin: np.ndarray):
+        self.usual, self._frames, self._origin = _usual(_changes(positions)), positions, origin[:, None]
+
+    def frames(self, vertices: slice, count: int) -> np.ndarray:
+        """Return the first frames of some of the vertices."""
+        return self._frames[vertices, :, :count] + self._origin
+
+
 def best_join(
-    end: End, positions: np.ndarray, source: np.ndarray, price: ErrorPrice | CorrectionPrice, largest: float
+    end: End, positions: np.ndarray, start: SourceStart, price: ErrorPrice | CorrectionPrice, largest: float
 ) -> int:
     """Return how to join a level of a segment to the end of the one before: over how many frames, SLOPED more if slopes
-    are joined too; 0: not at all. source: (N, 3, T) of those vertices that are `seen`, in the coordinates of
-    `positions`. largest: the largest error that costs nothing."""
-    decoded = _changes(positions)
-    of_source = _usual(_changes(source))
+    are joined too; 0: not at all. positions: (N, 3, T) of those vertices that are `seen`, as in the other arguments.
+    largest: the largest error that costs nothing."""
+    decoded, of_source = _changes(positions), start.usual
     usual = max(0.5 * (end.usual + _usual(decoded)), STILL * of_source)  # One side alone may move in straight lines.
-    wanted = _changes(np.concatenate([end.source, source[:, :, : END_FRAMES + 1]], axis=2))
+    wanted = _changes(np.concatenate([end.source, start.frames(slice(None), END_FRAMES + 1)], axis=2))
     wanted *= usual / max(of_source, 1e-300)
     natural = np.maximum(np.concatenate([wanted, decoded[1:]]), usual)  # From the last frame before the seam on.
 
     width = min(max(WIDTHS), positions.shape[2] - END_FRAMES)
-    ways, away = _ways(end, positions), positions[:, :, :width] - source[:, :, :width]
-    errors = _Moved(away, *ways)
-    shown = np.concatenate([end.positions, positions[:, :, : width + 2]], axis=2, dtype=np.float64)
-    changes = _Moved(np.diff(shown, 2, axis=2), *ways).mean()
+    ways = _ways(end, positions)
+    errors = _Moved(lambda part: positions[part, :, :width] - start.frames(part, width), *ways)
+
+    def bends(part: slice) -> np.ndarray:
+        shown = (end.positions[part], positions[part, :, : width + 2])
+        return np.diff(np.concatenate(shown, axis=2, dtype=np.float64), 2, axis=2)
+
+    changes = _Moved(bends, *ways, are_means=True)
 
     def cost(join: int) -> float:
         shares = _shares(join)

@@ -13,6 +13,7 @@ import numpy as np
 
 from athcodec._native import MEASURES
 from athcodec.decoding.container import from_short_float, short_floats
+from athcodec.encoding.motion import squared_bends
 from athcodec.files.threads import ThreadPool, ranges
 
 MOST_AWAY = 0.1  # Largest distance of a vertex from the box of the source, in diagonals.
@@ -63,11 +64,13 @@ class SourceFrames:
         shown = np.repeat(np.arange(len(self.shown_times)), self.shown_times)
 
         def squares(start: int, stop: int) -> np.ndarray:
-            frames = positions[start:stop, :, shown]
-            if before is not None:
-                frames = np.concatenate([before[start:stop], frames], axis=2)
-            bends = np.diff(frames.astype(np.float64), 2, axis=2)
-            return np.einsum("nkt,nkt->t", bends, bends)
+            frames = positions[start:stop]
+            frames = frames if len(shown) == frames.shape[2] else frames[:, :, shown]
+            bends = squared_bends(frames)
+            if before is None:
+                return bends
+            first = np.concatenate([before[start:stop], frames[:, :, :2]], axis=2)
+            return np.concatenate([squared_bends(first), bends])
 
         return np.sqrt(sum(self.pool.map(squares, ranges(len(positions), 3 * len(shown)))) / len(positions))
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from athcodec.encoding.segment import Source, branch_records, poses_size
 from athcodec.encoding.settings import Settings
 from athcodec.encoding.survey import Ath
 from athcodec.encoding.trials import Trials
+from athcodec.files.threads import ranges
 
 CONNECTED_SHARE = 0.8  # Largest share of the size without faces at which layers refine a rest pose that goes by faces.
 REST_SHARE = 0.25  # Share of a file from which on slack is tried for its rest pose.
@@ -22,11 +24,15 @@ REST_SLACKS = (0.5, 0.65, 0.8, 0.95)  # Distances, over the limit, by which a re
 def lags(source: Source, step: float, details: np.ndarray) -> np.ndarray:
     """Return the predictors of the rest pose, (B,) int32: 0 for a beam's modes, or the lag that does best."""
     hierarchy = source.hierarchy
+    first, count, attach = hierarchy.first_vertex, hierarchy.stem_count, hierarchy.attach
     lags = np.zeros(hierarchy.branch_count, np.int32)
-    for b in np.flatnonzero((source.sheet_like | (details > 0)) & (not source.host_rest)):
-        first, count = hierarchy.first_vertex[b], hierarchy.stem_count[b]
-        attach = hierarchy.attach[b]
-        lags[b] = qz.rest_lag(source.rest[first : first + count], source.rest[attach] if attach >= 0 else None, step)
+    wanted = (source.sheet_like | (details > 0)) & (not source.host_rest)
+    for size, is_attached in product(np.unique(count[wanted]).tolist(), (False, True)):
+        alike = np.flatnonzero(wanted & (count == size) & ((attach >= 0) == is_attached))
+        for part in ranges(len(alike), 3 * size):
+            branches = alike[slice(*part)]
+            bases = source.rest[attach[branches]] if is_attached else None
+            lags[branches] = qz.rest_lags(source.rest[first[branches, None] + np.arange(size)], bases, step)
     return lags
 
 
