@@ -25,6 +25,8 @@ const onlyModels = (used) => ({ name: "three", setup({ onResolve, onLoad }) {
   onResolve({ filter: /^page$/, namespace: "split" }, () => page);
   onResolve({ filter: /^\..*\/[A-Z]\w+\.js$/ }, ({ path, importer }) => // except in files that list others
     (!/(Core|Geometries|Materials|Curves)\.js$/.test(importer) && used.includes(/(\w+)\.js$/.exec(path.replace("MathUtils", ""))?.[1]) ? page : null));
+  onLoad({ filter: /Three.Core\.js$/ }, ({ path }) => // without its warning of a second three.js in the page
+    ({ contents: readFileSync(path, "utf8").match(/^export .*/gm).join("\n"), resolveDir: dirname(path) }));
   onLoad({ filter: /./, namespace: "split" }, () => ({
     contents: `export { ${used.join(", ")} } from "page"; export * from "three/src/Three.Core.js";`, resolveDir: modules }));
 } });
