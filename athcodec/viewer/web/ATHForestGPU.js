@@ -500,10 +500,10 @@ fn moved_by_modes(body: Body, top: u32, i: u32) -> vec3<f32> {
 fn turned_towards(H: mat3x3<f32>, R: mat3x3<f32>) -> mat3x3<f32> {
     let C = H * transpose(R);
     let axial = vec3<f32>(C[1].z - C[2].y, C[2].x - C[0].z, C[0].y - C[1].x);
-    let most = max(C[0].x + C[1].y + C[2].z, 1.0) + 1e-6;
-    let a = most - C[0].x;
-    let b = most - C[1].y;
-    let c = most - C[2].z;
+    let spare = max(1.0 - (C[0].x + C[1].y + C[2].z), 0.0) + 1e-6;
+    let a = C[1].y + C[2].z + spare; // Differences from the trace would lose precision.
+    let b = C[0].x + C[2].z + spare;
+    let c = C[0].x + C[1].y + spare;
     let d = -0.5 * (C[1].x + C[0].y);
     let e = -0.5 * (C[2].x + C[0].z);
     let f = -0.5 * (C[2].y + C[1].z);
