@@ -25,6 +25,8 @@ const onlyModels = (used) => ({ name: "three", setup({ onResolve, onLoad }) {
   onResolve({ filter: /^page$/, namespace: "split" }, () => page);
   onResolve({ filter: /^\..*\/[A-Z]\w+\.js$/ }, ({ path, importer }) => // except in files that list others
     (!/(Core|Geometries|Materials|Curves)\.js$/.test(importer) && used.includes(/(\w+)\.js$/.exec(path.replace("MathUtils", ""))?.[1]) ? page : null));
+  onLoad({ filter: /Three.Core\.js$/ }, ({ path }) => // without its warning of a second three.js in the page
+    ({ contents: readFileSync(path, "utf8").match(/^export .*/gm).join("\n"), resolveDir: dirname(path) }));
   onLoad({ filter: /./, namespace: "split" }, () => ({
     contents: `export { ${used.join(", ")} } from "page"; export * from "three/src/Three.Core.js";`, resolveDir: modules }));
 } });
@@ -51,8 +53,8 @@ const element = await bundle({ entryPoints: [join(here, "src/element.js")] }, "a
 const viewer = await bundle({ entryPoints: [join(here, "page/main.js")] }, "viewer.js", outside);
 const gltf = "three/addons/loaders/GLTFLoader.js", alias = { [gltf]: join(modules, gltf.replace("addons", "examples/jsm")) };
 const controls = await bundle({ entryPoints: [join(modules, "three/examples/jsm/controls/OrbitControls.js")] }, "OrbitControls.js", ["three"]);
-// Models and scripts that look at what is drawn take these, which are in the bundle anyway.
-const inside = ["ColorManagement", "Line", "Material", "MeshBasicMaterial", "OrthographicCamera", "Texture", "WebGLRenderTarget"];
+// Models and scripts that look at what is drawn take these. All but Points are in the bundle anyway.
+const inside = ["ColorManagement", "Line", "Material", "MeshBasicMaterial", "OrthographicCamera", "Points", "Texture", "WebGLRenderTarget"];
 const used = [...new Set([loader, viewer, element, controls].flatMap(names)), ...inside].sort();
 await bundle({ entryPoints: [join(here, "page/model.js")], alias, plugins: [onlyModels(used)] }, "model.js", outside.filter((name) => name !== "three"));
 await bundle({ stdin: { contents: `export { ${used.join(", ")} } from "three";`, resolveDir: modules } }, "three.js", []);
