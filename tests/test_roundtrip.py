@@ -79,28 +79,10 @@ def test_degenerate_plants_stay_within_the_bound(scratch, clip, fraction, segmen
     assert_comes_back(clip, scratch, fraction, segment_frames=segment_frames)
 
 
-@pytest.mark.slow
-@settings(STEADY, max_examples=3000)
-@given(
-    awkward_plants(),
-    st.sampled_from([1e-1, 1e-2, 1e-3, 1e-4, 1e-5]),
-    st.integers(16, 256),
-    st.sampled_from(["fast", "default", "best"]),
-    st.booleans(),
-)
-def test_many_degenerate_plants_stay_within_the_bound(scratch, clip, fraction, segment_frames, effort, exact_rest):
-    assert_comes_back(clip, scratch, fraction, segment_frames=segment_frames, effort=effort, exact_rest=exact_rest)
-
-
 @pytest.mark.parametrize("shape", SHAPES)
 @pytest.mark.parametrize("motion", MOTIONS)
 def test_every_stem_shape_survives_every_motion(shape, motion, scratch):
     assert_comes_back(awkward(seed=1, branches=8, roots=2, shape=shape, motion=motion), scratch, 1e-4)
-
-
-@pytest.mark.parametrize("effort", ["fast", "default", "best"])
-def test_every_effort_keeps_the_bound(effort, scratch):
-    assert_comes_back(plant(seed=4, branches=15, frames=40), scratch, 1e-4, effort=effort)
 
 
 @pytest.mark.parametrize(
@@ -318,14 +300,6 @@ def test_metadata_come_back_unchanged(metadata, scratch):
 def test_a_clip_without_static_data_has_none_in_its_file(scratch):
     file = reopened(plant(frames=3), scratch).file
     assert file.faces is None and file.edges is None and file.attributes == {} and file.metadata == {}
-
-
-def test_attributes_none_keeps_the_motion_and_the_units_alone(full_clip, scratch):
-    bare, full = (reopened(full_clip, scratch, attributes=which) for which in ("none", "all"))
-    assert bare.file.faces is None and bare.file.edges is None and bare.file.attributes == {}
-    assert bare.metadata == {"unit": "m", "up_axis": "y"} and full.metadata == full_clip.metadata
-    apart = np.linalg.norm(bare.positions().astype(float) - full.positions(), axis=2).max()
-    assert apart <= 2 * bare.file.max_error_bound and bare.file.file_length < full.file.file_length
 
 
 TOO_MUCH = {

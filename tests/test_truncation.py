@@ -81,12 +81,6 @@ def test_any_byte_behind_the_prelude_is_a_place_to_stop(whole):
         assert_plays_as_far_as_it_goes(whole, int(size))
 
 
-@pytest.mark.slow
-def test_every_byte_of_a_small_file_behind_the_prelude_is_a_place_to_stop(full):
-    for size in range(full.prelude, len(full.data)):
-        assert_plays_as_far_as_it_goes(full, size)
-
-
 def test_files_cut_inside_the_prelude_are_refused(bushy, full):
     for whole in (bushy, full):
         for size in range(whole.prelude):
