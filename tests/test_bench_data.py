@@ -74,17 +74,6 @@ def test_a_plant_has_the_nodes_and_orders_asked_for_and_thins_towards_its_tips(n
         assert set(plant.parent[carried[1:]]) <= set(carried)
 
 
-def test_gusts_have_the_intensity_asked_for_and_travel_with_the_wind():
-    wind = Wind(10.0, 10.0, intensity=0.2, seed=4)
-    points = np.random.default_rng(1).uniform(0, 2000, (4000, 3)) * [1, 0, 1] + [0, 10, 0]
-    gusts = wind.at(points, 0.0) - 10.0 * DIRECTION
-    assert np.sqrt((gusts**2).mean()) == pytest.approx(2.0, rel=0.15)
-    later = wind.at(points[:50] + 3.0 * 10.0 * DIRECTION, 3.0)
-    assert np.abs(later - wind.at(points[:50], 0.0)).max() < 0.05
-    near = wind.at(points[:50] + [0.1, 0, 0], 0.0)
-    assert np.abs(near - wind.at(points[:50], 0.0)).max() < np.abs(gusts).max() / 5
-
-
 @pytest.fixture(scope="module")
 def canopy():
     return CANOPY.make()

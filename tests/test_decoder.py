@@ -373,26 +373,6 @@ def test_the_frames_of_a_segment_in_turn_read_and_decode_it_once(played, monkeyp
     assert prepared == [(1, last), (0, last), (1, 0), (1, last)] and decoder.file.bytes_read > before
 
 
-def test_several_threads_at_once_see_what_one_alone_does(played):
-    decoder, _ = played
-    alone = [decoder.positions(level=level) for level in range(decoder.file.level_count)]
-    maps = [decoder.affines(5, level).matrices for level in range(decoder.file.level_count)]
-
-    def watch(seed: int) -> int:
-        """Frames, runs of frames and maps of any level, at random; how many were looked at."""
-        rng = np.random.default_rng(seed)
-        for _ in range(40):
-            level, frame = int(rng.integers(decoder.file.level_count)), int(rng.integers(decoder.frame_count))
-            run = slice(frame, frame + int(rng.integers(1, 20)))
-            assert np.array_equal(decoder.positions(frame, level), alone[level][frame])
-            assert np.array_equal(decoder.positions(run, level), alone[level][run])
-            assert np.array_equal(decoder.affines(5, level).matrices, maps[level])
-        return 40
-
-    with ThreadPoolExecutor(6) as threads:
-        assert list(threads.map(watch, range(6))) == [40] * 6
-
-
 class Sluggish(BytesIO):
     """A file that lets other threads in between a seek and the read that it is for."""
 

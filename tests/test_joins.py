@@ -13,7 +13,6 @@ import athcodec
 from athcodec.decoding import core_file, segment_decoder
 from athcodec.decoding.container import Limits
 from athcodec.encoding import encoder
-from athcodec.encoding.choices import joins
 from athcodec.errors import BadChecksum, LimitExceeded
 from athcodec.motion.joining import looped
 from athcodec.sources import read_hdf5, sample_path
@@ -230,13 +229,3 @@ def test_damage_that_one_of_the_threads_meets_is_refused(many, threads):
         with pytest.raises(BadChecksum, match="segment 5"):
             decoder.positions()
         assert np.array_equal(decoder.positions(slice(0, 36)), intact)
-
-
-def test_squared_lengths_of_vectors_that_move_follow_from_those_before():
-    rng = np.random.default_rng(1)
-    vectors, jump, slope = rng.normal(size=(5, 3, 9)), *rng.normal(size=(2, 5, 3))
-    jumps, slopes = rng.normal(size=(2, 7))
-    moved = vectors[:, :, :7] + jump[:, :, None] * jumps + slope[:, :, None] * slopes
-    found = joins._Moved(vectors, jump, slope)
-    np.testing.assert_allclose(found.by(jumps, slopes), (moved**2).sum(axis=1))
-    np.testing.assert_allclose(found.mean().by(jumps, slopes), (moved**2).sum(axis=1).mean(axis=0))
