@@ -138,18 +138,6 @@ def test_a_canopy_comes_out_the_same_again_and_otherwise_by_its_seed(canopy):
     assert np.ptp(canopy.rest[:, 1]) == pytest.approx(5.0, rel=0.1)
 
 
-@pytest.mark.parametrize("species", SPECIES)
-def test_leaves_come_to_rest_in_still_air(species):
-    leaves = Leaves(still(240), SPECIES[species], 40, np.random.default_rng(1))
-    plates = Plates(leaves)
-    plates.speed[:] = np.random.default_rng(2).normal(0, 10, plates.speed.shape)
-    start = plates.energy()
-    for _ in range(1920):
-        plates.step(np.zeros((3, 40)), 1 / 240)
-        assert (plates.energy() < 1.1 * start).all()
-    assert (plates.energy() < 1e-3 * start).all()
-
-
 def test_leaves_swing_in_the_species_time_and_line_up_with_the_wind():
     kind = SPECIES["broadleaf"]
     leaves = Leaves(still(60), kind, 200, np.random.default_rng(1))

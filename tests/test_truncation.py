@@ -131,15 +131,6 @@ def test_segments_that_arrived_play_deeper_than_those_that_did_not(bushy):
         decoder.positions(stop, 3)
 
 
-def test_a_prefix_cut_after_a_level_plays_that_level_bit_for_bit(whole):
-    for level in whole.levels:
-        decoder = whole.cut(level.bytes)
-        assert decoder.file.deepest == level.level
-        assert np.array_equal(decoder.positions(), whole.positions[level.level])
-        with pytest.raises(LevelUnavailable):
-            whole.cut(level.bytes - 1).positions(level=level.level)
-
-
 # ---- truncate ----
 
 
