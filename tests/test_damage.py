@@ -377,7 +377,7 @@ def both_readings(data: bytes, limits: Limits) -> str:
         assert getattr(file.header, name) == getattr(header, name)
     assert np.array_equal(file.errors, header.errors)
     assert file.header.repeats.tolist() == list(map(bool, header.repeats))
-    assert file.joins.tolist() == [[join.width + 128 * join.is_sloped for join in row] for row in header.joins]
+    assert file.joins.tolist() == [[join.width + 128 * join.is_sloped for join in row] for row in header.joins.values()]
     assert [astuple(chunk)[:6] for chunk in file.chunks] == chunks
     return "opened"
 
