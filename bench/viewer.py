@@ -1,8 +1,7 @@
-"""The viewer in Chromium: time to first motion on a slow connection, long tasks, forests.
+"""The viewer in Chromium: time to first motion on a slow connection and long tasks.
 
 The page is loaded and empty when a file is requested, as in a viewer that opens several files; the same is assumed for
-the other formats. These count as shown when their last byte has arrived; parsing is not included. Rendering is in
-software: only ratios of frame times are meaningful for a graphics processor.
+the other formats. These count as shown when their last byte has arrived; parsing is not included.
 """
 
 from __future__ import annotations
@@ -23,8 +22,6 @@ from bench.throttled_server import ThrottledServer
 
 MEGABIT = 125_000
 SLOW = 10_000  # bytes a second
-ROUNDS = 7
-INSTANCES = 10, 30, 100, 300, 1000
 MOST_SECONDS, MOST_SHARE, LONGEST_TASK = 0.5, 0.1, 50
 
 OBSERVE = """new Promise((found) => {
@@ -58,10 +55,6 @@ The longest task of the page's main thread in each round, while a file streams i
 clock, as the long-task observer has it (0: none over 50 ms), and in processor time of that thread, to which other
 programs on the machine add nothing. Over 50 ms: tasks of all rounds, by the clock.
 """
-NOTE_FOREST = """
-Milliseconds from choosing levels until the picture is drawn, in software, the fastest of seven, alternating;
-vertices are those drawn.
-"""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -69,7 +62,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_rel_error(parser)
     add_number(parser, "--line", 10.0, "megabits a second", "MBIT")
     add_number(parser, "--rounds", 5, "how often a file is opened")
-    add_number(parser, "--instances", INSTANCES, "plants of the forests")
     parser.add_argument(
         "--picture", type=Path, metavar="FILE.png", help="measure nothing: write a picture of the page with two levels"
     )
@@ -78,7 +70,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> dict[str, Any]:
     if args.picture:
         return _picture(args.clips[0], args.rel_error, args.picture)
-    starts, tasks, forests, broken = [], [], [], []
+    starts, tasks, broken = [], [], []
     with tempfile.TemporaryDirectory() as folder, chromium() as browser:
         for path in args.clips:
             files = _files(path, Path(folder), args.rel_error)
@@ -86,12 +78,10 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
             starts += [{"clip": path.stem} | row for row in found["starts"]]
             tasks.append({"clip": path.stem} | found["tasks"])
             broken += _missed_targets(path.stem, found)
-            forests += [{"clip": path.stem} | row for row in _forests(browser, files["tree.ath"], args.instances)]
     return {
         "tables": [
             table(f"First motion at {args.line:g} Mbit/s", starts, NOTE_START),
             table("Tasks of the main thread, ms", tasks, NOTE_TASKS),
-            table("Forest", forests, NOTE_FOREST),
         ],
         "broken": broken,
     }
@@ -219,35 +209,3 @@ def _missed_targets(clip: str, found: dict[str, Any]) -> list[str]:
             f"longest), expected none over {LONGEST_TASK} ms"
         )
     return broken
-
-
-def _forests(browser, data: bytes, counts: list[int]) -> list[dict[str, Any]]:
-    rows = []
-    with ThrottledServer({"tree.ath": data}) as server:
-        page = _page(browser, server, "tree.ath")
-        page.wait_for_function("() => athcodecViewer.motion?.complete")
-        page.evaluate("athcodecViewer.setPlaying(false)")
-        page.evaluate("athcodecViewer.forestOf(10)")
-        page.wait_for_function("() => athcodecViewer.state.forest.baked.length === athcodecViewer.motion.levelCount")
-        for count in counts:
-            page.evaluate(f"athcodecViewer.forestOf({count})")
-            both: dict[bool, list[dict[str, Any]]] = {True: [], False: []}
-            for _ in range(ROUNDS):  # alternating, so that other load on the machine affects both
-                for detail, timings in both.items():
-                    page.evaluate(f"athcodecViewer.state.forest.levelOfDetail = {json.dumps(detail)}")
-                    timings.append(page.evaluate("athcodecViewer.timeForest(1)"))
-            on, off = (min(timings, key=lambda timing: timing["ms"]) for timings in both.values())
-            rows.append(
-                {
-                    "instances": count,
-                    "in view": count - on["unseen"],
-                    "by level": on["counts"],
-                    "detail on": on["ms"],
-                    "detail off": off["ms"],
-                    "off / on": off["ms"] / on["ms"],
-                    "vertices on": on["vertices"],
-                    "vertices off": off["vertices"],
-                }
-            )
-        page.close()
-    return rows

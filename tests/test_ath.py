@@ -81,14 +81,6 @@ def test_maps_are_the_least_squares_solution():
         np.testing.assert_allclose(ath.affine(clip, node), expected, atol=1e-10)
 
 
-def test_maps_of_all_nodes_are_those_of_the_nodes_one_by_one():
-    clip = bushy_clip(noise=0.2)
-    ath = build_ath(clip, max_error=0.0)
-    matrices = ath.affines(clip)
-    for node in range(ath.node_count):
-        np.testing.assert_array_equal(matrices[:, node], ath.affine(clip, node))
-
-
 def test_rigid_motion_far_from_the_origin_is_one_node():
     rest = bushy_clip(0.0).rest + 1000.0
     moved = rest @ np.swapaxes(rotations(FRAMES), 1, 2) + np.linspace(0, 50, FRAMES)[:, None, None]
@@ -258,12 +250,6 @@ def test_epsilon_bounds_the_mean_distance_and_xi_the_largest():
         assert build_ath(clip, epsilon, 0, xi, 0).node_count > 1
 
 
-def test_max_error_is_epsilon_and_xi(sample_clip):
-    short, long = build_ath(sample_clip, max_error=0.02), build_ath(sample_clip, 0.02, 0, 0.02, 0)
-    assert short.thresholds == long.thresholds == Thresholds(0.02, 0, 0.02, 0)
-    np.testing.assert_array_equal(short.node_branch, long.node_branch)
-
-
 @pytest.mark.parametrize(
     "arguments",
     [
@@ -304,15 +290,6 @@ def test_the_depth_limit_takes_what_is_below_whole():
     assert ath.height == 1 and ath.node_count == 3
     assert ath.whole.tolist() == [False, True, True]
     assert build_ath(clip, max_error=0.0, max_depth=0).whole.tolist() == [True]
-
-
-def test_whole_branches_are_the_nodes_whose_subtree_moves_as_one():
-    clip = bushy_clip(noise=0.3)
-    # file order: 0, (1, 3, 4), (2, 5)
-    cut = build_ath(clip, max_error=0.0, max_depth=1)
-    assert cut.whole_branches().tolist() == [False, True, False, False, True, False]
-    assert build_ath(clip, max_error=np.inf).whole_branches().tolist() == [True] + 5 * [False]
-    assert not build_ath(clip, max_error=0.0).whole_branches().any()
 
 
 def test_several_roots_are_nodes_of_depth_zero():

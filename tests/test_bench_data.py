@@ -15,7 +15,7 @@ import athcodec
 from bench import data
 from bench.store import read
 from bench.trees import beams, exact
-from bench.trees.leaves import SPECIES, Leaves, Plates, sheltered
+from bench.trees.leaves import SPECIES, Leaves, Plates
 from bench.trees.mesh import SIDES, dress
 from bench.trees.plant import grow
 from bench.trees.ride import Skeleton
@@ -72,22 +72,6 @@ def test_a_plant_has_the_nodes_and_orders_asked_for_and_thins_towards_its_tips(n
         begin = int(np.flatnonzero(order == node)[0])
         carried = order[begin : begin + sizes[node]]
         assert set(plant.parent[carried[1:]]) <= set(carried)
-
-
-def test_a_plant_refuses_fewer_nodes_than_its_orders_need():
-    with pytest.raises(ValueError, match="got 6 nodes for orders 0 to 2, expected at least 7"):
-        grow(6, 2, 5.0, seed=1)
-
-
-def test_gusts_have_the_intensity_asked_for_and_travel_with_the_wind():
-    wind = Wind(10.0, 10.0, intensity=0.2, seed=4)
-    points = np.random.default_rng(1).uniform(0, 2000, (4000, 3)) * [1, 0, 1] + [0, 10, 0]
-    gusts = wind.at(points, 0.0) - 10.0 * DIRECTION
-    assert np.sqrt((gusts**2).mean()) == pytest.approx(2.0, rel=0.15)
-    later = wind.at(points[:50] + 3.0 * 10.0 * DIRECTION, 3.0)
-    assert np.abs(later - wind.at(points[:50], 0.0)).max() < 0.05
-    near = wind.at(points[:50] + [0.1, 0, 0], 0.0)
-    assert np.abs(near - wind.at(points[:50], 0.0)).max() < np.abs(gusts).max() / 5
 
 
 @pytest.fixture(scope="module")
@@ -154,18 +138,6 @@ def test_a_canopy_comes_out_the_same_again_and_otherwise_by_its_seed(canopy):
     assert np.ptp(canopy.rest[:, 1]) == pytest.approx(5.0, rel=0.1)
 
 
-@pytest.mark.parametrize("species", SPECIES)
-def test_leaves_come_to_rest_in_still_air(species):
-    leaves = Leaves(still(240), SPECIES[species], 40, np.random.default_rng(1))
-    plates = Plates(leaves)
-    plates.speed[:] = np.random.default_rng(2).normal(0, 10, plates.speed.shape)
-    start = plates.energy()
-    for _ in range(1920):
-        plates.step(np.zeros((3, 40)), 1 / 240)
-        assert (plates.energy() < 1.1 * start).all()
-    assert (plates.energy() < 1e-3 * start).all()
-
-
 def test_leaves_swing_in_the_species_time_and_line_up_with_the_wind():
     kind = SPECIES["broadleaf"]
     leaves = Leaves(still(60), kind, 200, np.random.default_rng(1))
@@ -198,13 +170,6 @@ def test_neighbouring_leaves_feel_the_same_gusts_and_far_ones_others():
     near, far = (apart > 0) & (apart < 1), apart > 8
     assert near.sum() > 50 and np.median(alike[near]) > 0.4
     assert np.median(alike[near]) > np.median(np.abs(alike[far])) + 0.2
-
-
-def test_leaves_behind_others_get_less_wind():
-    points = np.array([1.0, 0.0, -1.0])[:, None] * -DIRECTION + [0.001, 0.001, 0.001]
-    left = sheltered(points, np.full(3, 0.05), 0.5)
-    assert left[0] == 1 and 1 > left[1] > left[2] > 0.5
-    assert sheltered(points + [[0, 0, 0], [0, 2, 0], [0, 4, 0]], np.full(3, 0.05), 0.5).min() == 1
 
 
 def test_a_clip_is_made_once_and_again_where_its_recipe_changed(recipes, tmp_path):

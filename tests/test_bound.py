@@ -1,7 +1,7 @@
 """The bound, attacked: whatever a clip does, no vertex is further off than was promised, at any level, in any
 frame.
 
-The attacks are those of spec/robust/bound.py; `python -m spec.robustness --only bound` runs them for hours.
+The attacks are those of attacks.py; `pytest -m slow` draws thousands of them.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ import re
 
 import numpy as np
 import pytest
+from attacks import ACTIONS, LARGE, Attack, attacks, broken_promises
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from plants import STEADY, clip_of, plant
@@ -21,7 +22,6 @@ from athcodec.encoding import job, streams
 from athcodec.encoding import quantise as qz
 from athcodec.errors import BoundError, ClipError
 from athcodec.metrics import ErrorMeter
-from spec.robust.bound import ACTIONS, LARGE, Attack, attacks, broken_promises
 
 
 @pytest.mark.parametrize("count", [25, pytest.param(3000, marks=pytest.mark.slow)])

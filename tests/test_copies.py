@@ -7,7 +7,6 @@ import pytest
 
 from athcodec._native import BRANCH
 from athcodec.encoding import streams
-from spec.document import rules
 
 STEP = 0.02
 REACH = 0.6989 * STEP  # of a lattice point at most
@@ -74,11 +73,3 @@ def test_needles_take_two_directions_and_no_twist():
     rest = coded(branches, pose)
     assert bits_each(rest, coded(branches[:1], pose[:20], copies=False), 200) < 20
     assert np.linalg.norm(rest.decoded - pose, axis=1).max() <= REACH
-
-
-@pytest.mark.parametrize("shape", [LEAF, LEAF[:2], np.zeros((3, 3))])
-def test_copies_mean_the_same_to_encoder_and_document(shape):
-    branches, pose = parts([shape] * 40, 3, 0.2, True)
-    rest = coded(branches, pose)
-    records = [rules.Record(**{name: int(branch[name]) for name in BRANCH.names}) for branch in branches]
-    assert np.array(rules.decode_rest(rest.stream, records, STEP).rest).tobytes() == rest.decoded.tobytes()

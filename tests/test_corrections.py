@@ -38,26 +38,6 @@ def waves(amplitude: float) -> np.ndarray:
     return amplitude * np.sin(2 * np.pi * np.arange(FRAMES) / period + phase)
 
 
-@pytest.mark.parametrize("dtype", [np.float32, np.float64])
-@pytest.mark.parametrize("sigma", [0.3, 1.0, 5.0, 1e3])
-def test_noise_of_any_size_is_brought_within_the_limit(sigma, dtype):
-    error = np.random.default_rng(3).normal(scale=sigma * 1e-3, size=(VERTICES, 3, FRAMES))
-    _, left = found(error, 1e-3, dtype)
-    assert lengths(left).max() <= 1e-3
-
-
-def test_every_vertex_keeps_a_limit_of_its_own():
-    limits = np.geomspace(1e-3, 1e-2, VERTICES)
-    _, left = found(waves(4e-3), limits)
-    assert (lengths(left).max(axis=1) <= limits).all()
-
-
-@pytest.mark.parametrize("frames", range(1, 8))
-def test_segments_shorter_than_a_footprint_are_corrected(frames):
-    _, left = found(np.full((VERTICES, 3, frames), 2e-3), 1e-3)
-    assert lengths(left).max() <= 1e-3
-
-
 def test_what_is_within_the_limit_is_left_alone():
     rows, _ = found(waves(0.5e-3), 1e-3)
     assert len(rows) == 0

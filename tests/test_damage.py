@@ -12,7 +12,6 @@ import struct
 import sys
 import tracemalloc
 from collections.abc import Sequence
-from contextlib import suppress
 from dataclasses import astuple, fields, replace
 from io import BytesIO
 from itertools import product
@@ -30,7 +29,6 @@ from athcodec.decoding import container as ct
 from athcodec.decoding import core_file
 from athcodec.decoding.ath_file import AthFile
 from athcodec.decoding.container import Limits
-from athcodec.encoding import streams, writing
 from athcodec.errors import (
     BadChecksum,
     BadChunk,
@@ -387,7 +385,7 @@ def both_readings(data: bytes, limits: Limits) -> str:
         assert getattr(file.header, name) == getattr(header, name)
     assert np.array_equal(file.errors, header.errors)
     assert file.header.repeats.tolist() == list(map(bool, header.repeats))
-    assert file.joins.tolist() == [[join.width + 128 * join.is_sloped for join in row] for row in header.joins]
+    assert file.joins.tolist() == [[join.width + 128 * join.is_sloped for join in row] for row in header.joins.values()]
     assert [astuple(chunk)[:6] for chunk in file.chunks] == chunks
     return "opened"
 
@@ -535,41 +533,6 @@ def attribute(
     body: bytes = b"", kind: int = 3, size: int = 4, shape: Sequence[int] = (4,), name: bytes = b"a"
 ) -> bytes:
     return struct.pack(f"<BBHI{len(shape)}I", kind, len(shape), len(name), size, *shape) + name + body
-
-
-def assert_whole_or_not_it(stream: bytes, whole: np.ndarray, decode) -> None:
-    """Cut short anywhere a stream is refused or means something else, with more behind it it is refused."""
-    assert decode(stream).tobytes() == whole.tobytes()
-    for size in range(len(stream)):
-        with suppress(BadChunk):
-            assert decode(stream[:size]).tobytes() != whole.tobytes()
-    for more in (b"\x00", b"\x01" * 12):
-        with pytest.raises(BadChunk):
-            decode(stream + more)
-
-
-@pytest.mark.parametrize("dtype", [np.float32, np.float64])
-def test_an_exact_rest_pose_that_is_not_whole_is_refused_or_another(dtype, parts):
-    parts = Parts.of(parts.without(ct.SOURCE_REST))
-    decoder = opened(parts.file())
-    pose = np.random.default_rng(5).normal(size=(decoder.file.vertex_count, 3)).astype(dtype)
-
-    def decode(stream):
-        head = writing.Rest(decoder.file.origin, 1.0, pose.dtype, stream, exact=True)
-        return opened(parts.with_payload(ct.REST, writing.pack_rest(head))).file.rest[
-            decoder.file.hierarchy.vertex_source
-        ]
-
-    assert_whole_or_not_it(streams.encode_exact_rest(decoder.file.branches, pose), pose, decode)
-
-
-def test_uneven_times_that_are_not_whole_are_refused_or_others(parts):
-    uneven = np.random.default_rng(6).random(20).cumsum()
-    assert_whole_or_not_it(
-        streams.encode_times(uneven),
-        uneven,
-        lambda stream: opened(parts.with_payload(ct.TIME, writing.pack_time(stream))).time,
-    )
 
 
 def with_step(parts: Parts, kind: int, step: float) -> bytes:

@@ -7,7 +7,6 @@ import pytest
 import zstandard
 from files import encoded, opened
 from plants import ring_quads
-from test_document import assert_same_bits
 from test_rest import cards, simple_bytes, terrain, tubes
 
 import athcodec
@@ -16,7 +15,7 @@ from athcodec.encoding import polygons
 from athcodec.motion.polygons import Polygons
 from spec.document import File, rules
 
-CONNECTED, WELDED = 1 << 3, 1 << 4  # Bits of Method of REST.
+CONNECTED = 1 << 3  # A bit of Method of REST.
 
 
 def grid_faces(rows: int, columns: int, quads: bool = False) -> np.ndarray:
@@ -156,23 +155,3 @@ def test_vertices_that_a_seam_splits_cost_less_than_vertices_close_together():
     close = split + 1e-6 * np.linalg.norm(np.ptp(points, axis=0)) * (used >= len(points))[:, None]
     sizes = [rest_bytes(encoded(still(some, faces.reshape(-1, 3)), rel_error=1e-4)) for some in (split, close)]
     assert sizes[0] < sizes[1]
-
-
-@pytest.mark.parametrize(
-    "options",
-    [{"ladder": "none"}, {}, {"exact_rest": True}, {"lossless": True}],
-    ids=["one layer", "layers", "exact", "lossless"],
-)
-@pytest.mark.parametrize("is_split", [False, True], ids=["shared", "apart"])
-@pytest.mark.parametrize("frames", [1, pytest.param(9, marks=pytest.mark.slow)])
-def test_the_document_reads_the_same_connected_rest_pose(options, is_split, frames):
-    points, faces = shuffled(terrain(9, 11, 0.05, 4), grid_faces(9, 11, frames > 1), 4)
-    points, faces = apart(points, faces) if is_split else (points, faces)
-    time = np.arange(frames) / 10
-    swayed = points + 0.5 * np.sin(time)[:, None, None] * points[:, ::-1]
-    clip = athcodec.MotionClip(swayed.astype(np.float32), time, rest=points, faces=faces.astype(np.int32))
-    data = encoded(clip, rel_error=1e-3, **options)
-    file = File(data, strict=True)
-    method = file.content(rules.REST)[0]
-    assert frames > 1 or method & (CONNECTED | WELDED) == (CONNECTED | WELDED * is_split)
-    assert_same_bits(data)

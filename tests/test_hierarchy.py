@@ -237,26 +237,3 @@ def test_a_hierarchy_comes_back_from_its_parts(tree):
     h = build_hierarchy(*tree)
     again = Hierarchy.from_parts(h.branch_parent, h.stem_count, h.attach, h.vertex_source, h.branch_source)
     assert all(np.array_equal(getattr(h, name), getattr(again, name)) for name in h.__dataclass_fields__)
-
-
-@pytest.mark.parametrize(
-    "parent, count, attach, message",
-    [
-        ([0], [1], [-1], "branch 0 has parent 0"),
-        ([-1, -1, 0], [1, 1, 1], [-1, -1, 0], "branch 2 lies outside"),
-        ([-1, -1, 0, 2], [1, 1, 1, 1], [-1, -1, 0, 2], "branch 2 lies outside"),
-        ([-1, 0], [2, 0], [-1, 0], "branch 1 has 0 vertices"),
-        ([-1, 0], [2, 1], [-1, 2], "branch 1 hangs on vertex 2, expected 0 to 1"),
-        ([-1, 0], [2, 1], [0, 1], "branch 0 hangs on vertex 0, expected -1 to -1"),
-        ([-1, 0], [2**31 - 2, 9], [-1, 0], "vertices in all"),
-        ([], [], [], "at least 1"),
-    ],
-)
-def test_parts_that_are_no_hierarchy_are_refused(parent, count, attach, message):
-    with pytest.raises(ClipError, match=message):
-        Hierarchy.from_parts(parent, count, attach)
-
-
-def test_a_permutation_must_be_one():
-    with pytest.raises(ClipError, match="vertex_source: got no permutation"):
-        Hierarchy.from_parts([-1], [3], [-1], vertex_source=np.array([0, 1, 1]))

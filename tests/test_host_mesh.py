@@ -19,7 +19,7 @@ from test_core import FILE_ORDER, OK, Fault, Memory, Player, core, text_of
 from test_wasm import run_node
 
 import athcodec
-from athcodec import batch, cli, encoding
+from athcodec import batch, cli
 from athcodec.decoding import container as ct
 from athcodec.errors import BadChunk, ClipError, NeedsHostMesh, WrongHostMesh
 from athcodec.motion.clip import MotionClip
@@ -128,14 +128,6 @@ def test_several_clips_and_loops_share_the_mesh(source, mesh, tmp_path):
         for name, clip in clips.items():
             assert_kept(decoder.play(name), clip)
         assert decoder.clip.seam_errors[-1] <= 2 * decoder.file.max_error_bound
-
-
-def test_a_file_in_three_steps_is_that_of_one(source, hosted, tmp_path):
-    options = FAST | {"rel_error": 1e-4, "segment_frames": 16}
-    draft = encoding.draft(source, **options)
-    coded = encoding.code_segments(source, draft, range(draft.segment_count))
-    encoding.write(source, draft, coded, tmp_path / "a.ath")
-    assert (tmp_path / "a.ath").read_bytes() == hosted
 
 
 def test_minus_zero_is_zero(source, tmp_path):

@@ -6,9 +6,7 @@ from io import BytesIO
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
-from plants import STEADY, awkward_plants, bound_for, chain_plant, plant
+from plants import chain_plant, plant
 
 import athcodec
 from athcodec import Thresholds
@@ -244,14 +242,6 @@ def test_several_clips_share_the_layers_of_their_rest_pose(medley_clips, tmp_pat
     athcodec.encode(athcodec.join(medley_clips), path, rel_error=1e-4, segment_frames=16, ladder="decades")
     for name, clip in medley_clips.items():
         check_levels(clip, path, name)
-
-
-@settings(STEADY, max_examples=25)
-@given(clip=awkward_plants(), fraction=st.sampled_from([1e-3, 1e-5, 1e-6]))
-def test_awkward_plants_keep_their_bound(clip, fraction, scratch):
-    bound = bound_for(clip, fraction)
-    athcodec.encode(clip, scratch / "a.ath", max_error=bound, segment_frames=16, effort="fast", ladder=LADDER)
-    check_levels(clip, scratch / "a.ath")
 
 
 def test_layers_take_no_more_memory_than_the_limit(tmp_path):

@@ -8,7 +8,7 @@ import pytest
 from files import Parts, opened
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from plants import awkward_plants, bound_for, diagonal, distance
+from plants import awkward_plants, blown_tree, bound_for, diagonal, distance
 from test_document import assert_same_bits
 
 import athcodec
@@ -87,9 +87,10 @@ def test_each_level_that_a_ladder_names_holds_the_error(
 @pytest.mark.parametrize(
     "options", [{}, {"segment_frames": 16, "ladder": LADDER}, {"tam": athcodec.Thresholds(0, 0, 0, 0)}]
 )
-def test_levels_of_clips_loops_and_growth_get_better(options, medley_clips, tmp_path):
+def test_levels_of_clips_loops_growth_and_storms_get_better(options, medley_clips, tmp_path):
     growth = athcodec.read(athcodec.sample_path("growth"))
-    for clip in (athcodec.join(medley_clips), growth, athcodec.read(athcodec.sample_path("tree"))):
+    tree = athcodec.read(athcodec.sample_path("tree"))
+    for clip in (athcodec.join(medley_clips), growth, tree, blown_tree(0, branches=60, frames=40)):
         assert_levels_get_better(clip, coded(clip, tmp_path, rel_error=1e-3, **options))
 
 

@@ -8,7 +8,7 @@ from plants import clip_of, plant
 import athcodec
 from athcodec.cli import main
 from athcodec.decoding import container as ct
-from athcodec.errors import BadChunk, BadChunkTable, BadHeader
+from athcodec.errors import BadChunk, BadChunkTable
 
 
 def bits(array: np.ndarray) -> bytes:
@@ -83,14 +83,6 @@ def test_a_missing_or_corrupted_exact_level_is_refused_by_name():
         with pytest.raises(BadChunk, match="EXACT"):
             decoder.positions(0)
         assert decoder.positions(0, last - 1).shape == (clip.vertex_count, 3)
-
-
-def test_a_level_count_that_the_hierarchy_does_not_have_is_refused():
-    clip = plant(seed=6, branches=5, frames=20)
-    parts = Parts.of(encoded(clip, lossless=True))
-    parts.header.full_level_count += 1
-    with pytest.raises(BadHeader):
-        opened(parts.file())
 
 
 def test_the_command_line_makes_lossless_files_as_small_as_the_api_does(tmp_path):

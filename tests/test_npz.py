@@ -80,15 +80,6 @@ def test_reading_forward_unpacks_once(tmp_path, monkeypatch):
     assert len(opened) == 2
 
 
-def test_branches_are_derived_from_edges_as_in_hdf5(forked, tmp_path):
-    arrays = {name: forked[name] for name in ("positions", "time", "rest", "edges")}
-    np.savez(tmp_path / "a.npz", **arrays)
-    with athcodec.read(tmp_path / "a.npz") as clip:
-        assert clip.vertex_branch.tolist() == [0, 0, 0, 1, 0, 0] and clip.branch_parent.tolist() == [-1, 0]
-    with athcodec.read(tmp_path / "a.npz", root=3) as clip:
-        assert clip.stem_index.tolist() == [3, 2, 1, 0, 0, 1]
-
-
 def saved(path, compressed=False, **arrays):
     (np.savez_compressed if compressed else np.savez)(path, **arrays)
 

@@ -11,7 +11,6 @@ from plants import diagonal, distance
 
 import athcodec
 from athcodec.decoding import container as ct
-from athcodec.encoding import encoder
 from athcodec.encoding.quantise import SOURCE_REST_TOLERANCE
 from athcodec.encoding.search import Search
 from athcodec.errors import BadChecksum, Truncated
@@ -123,11 +122,3 @@ def test_joined_clips_share_both_poses(medley_clips, tmp_path):
         assert distance(decoder.file.rest, joined.rest) <= SOURCE_REST_TOLERANCE * diagonal(joined)
         for clip in decoder.file.clips:
             assert np.array_equal(decoder.play(clip.name).level_rest(), decoder.level_rest())
-
-
-def test_drafts_hold_the_reference_pose(bushy_clip, tmp_path):
-    athcodec.encode(bushy_clip, tmp_path / "whole.ath", **OPTIONS)
-    draft = encoder.draft(bushy_clip, **OPTIONS)
-    coded = list(encoder.code_segments(bushy_clip, draft, range(draft.segment_count)))
-    encoder.write(bushy_clip, draft, coded, tmp_path / "steps.ath")
-    assert (tmp_path / "steps.ath").read_bytes() == (tmp_path / "whole.ath").read_bytes()

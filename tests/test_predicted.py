@@ -10,17 +10,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 import zstandard
-from files import Parts, opened
+from files import opened
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from plants import STEADY, awkward, awkward_plants, bound_for, clip_of, grow, plant, random_hierarchy, sway
 
 import athcodec
 from athcodec import encoding
-from athcodec.decoding import container as ct
 from athcodec.encoding import search
 from athcodec.encoding.choices import prediction
-from athcodec.errors import BadChunkTable
 from athcodec.metrics import SmoothnessMeter
 from bench.odd.growing import unfolding_leaves
 from spec.document import File
@@ -301,13 +299,6 @@ def test_a_target_size_is_met(target, always, tmp_path):
 
 
 # ---- files cut short, changed, damaged ----
-
-
-def test_a_segment_without_its_chunk_is_refused(predicted_ath):
-    parts = Parts.of(predicted_ath.read_bytes())
-    del parts.chunks[parts.index(ct.PREDICTED, 1, 1)]
-    with pytest.raises(BadChunkTable):
-        opened(parts.file())
 
 
 def test_a_copy_of_the_rest_pose_keeps_the_bound_as_it_is_put_out(tmp_path):

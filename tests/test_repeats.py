@@ -128,11 +128,3 @@ def test_poses_that_are_held_but_for_rounding_are_coded_once_and_every_frame_kee
             shown = np.linalg.norm(decoder.positions(level=level.level) - noisy.positions.astype(np.float64), axis=2)
             assert shown.max() <= level.max_error
         assert len(decoder.file.time) == 120
-
-
-def test_a_lossless_file_leaves_out_only_frames_that_are_equal_to_the_bit(poses, tmp_path):
-    clip = held(poses, 2)
-    noisy = clip.replace(positions=clip.positions + np.float32(1e-9) * (np.arange(80) % 2)[:, None, None])
-    athcodec.encode(noisy, tmp_path / "noisy.ath", **FEW | {"lossless": True})
-    with athcodec.open(tmp_path / "noisy.ath") as decoder:
-        assert np.array_equal(decoder.positions(), noisy.positions)

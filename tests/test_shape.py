@@ -7,12 +7,10 @@ import pytest
 from files import coded
 from moving_meshes import leafed_tree
 from plants import diagonal, plant
-from test_document import assert_same_bits
 
 import athcodec
 from athcodec.cli import main
 from athcodec.errors import BoundError
-from spec.document import File
 
 
 @pytest.fixture(scope="module")
@@ -80,18 +78,6 @@ def test_every_level_and_its_reference_pose_keep_the_shape_of_cards(tree, scratc
             assert np.quantile(shape_errors(decoded, source_of(tree), tree.faces)[0], 0.99) <= 0.15
             stretch, angle = shape_errors(decoder.level_rest(level), tree.rest.astype(float), tree.faces)
             assert np.quantile(stretch, 0.99) <= 0.04 and np.quantile(angle, 0.99) <= 2.0
-
-
-@pytest.mark.parametrize(
-    "size, options",
-    [(0.115, {"rel_error": 1e-2, "ladder": "none"}), (0.115, {"rel_error": 1e-4}), (0.8, {"rel_error": 1e-3})],
-)
-def test_the_document_plays_the_same_cards(scratch, size, options):
-    athcodec.encode(leafed_tree(cards=30, frames=8, size=size), scratch / "tree.ath", attributes="none", **options)
-    document = File((scratch / "tree.ath").read_bytes())
-    branches = document.file.branches
-    assert any(branch.rigid for branch in branches) and any(branch.detail for branch in branches)
-    assert_same_bits((scratch / "tree.ath").read_bytes())
 
 
 def test_a_rest_pose_of_the_bound_takes_fewer_bytes_and_loses_shape(tree, scratch):

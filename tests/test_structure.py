@@ -30,40 +30,6 @@ def test_decoding_imports_nothing_of_encoding(module):
     assert done.stdout.strip() == "[]"
 
 
-FORBIDDEN = {
-    "files/plain.py": "from athcodec.motion.clip import MotionClip",
-    "motion/units.py": "def f():\n    from athcodec.decoding import decoder",
-    "decoding/container.py": "import athcodec.encoding.streams",
-    "encoding/features.py": "import athcodec.sources.raw",
-    "exporters/mdd.py": "def f():\n    import athcodec.encoding",
-    "motion/hierarchy.py": "import athcodec.motion.joining, athcodec.motion.branches.finding",
-}
-
-
-@pytest.mark.parametrize("module", [None, *FORBIDDEN])
-def test_an_import_of_a_floor_above_or_in_a_circle_breaks_the_contract_of_the_folders(module, tmp_path):
-    """The linter runs over a copy of the package, as it is and with one import too many."""
-    shutil.copytree(
-        ROOT / "athcodec",
-        tmp_path / "athcodec",
-        ignore=lambda folder, names: [
-            name
-            for name in names
-            if not (Path(folder, name).is_dir() or name.endswith(".py")) or name == "node_modules"
-        ],
-    )
-    if module is not None:
-        with open(tmp_path / "athcodec" / module, "a", encoding="utf-8") as file:
-            file.write(f"\n{FORBIDDEN[module]}\n")
-    program = (  # An editable installation finds its own package first, by a finder that is an object and not a class.
-        "import sys; sys.path.insert(0, '.'); sys.meta_path[:] = [it for it in sys.meta_path if isinstance(it, type)]; "
-        "from importlinter.cli import lint_imports; "
-        f"sys.exit(lint_imports({str(ROOT / 'pyproject.toml')!r}, no_cache=True))"
-    )
-    done = subprocess.run([sys.executable, "-c", program], cwd=tmp_path, capture_output=True, text=True)
-    assert done.returncode == (module is not None), done.stdout + done.stderr
-
-
 CORE = ROOT / "athcodec" / "core"
 FLOORS = ("include", "bits", "container", "model", "streams", "file", "play", "gpu", "encode")
 """Folders of the C core. Each may include, and call, only itself and those before it."""

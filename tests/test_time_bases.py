@@ -1,4 +1,4 @@
-"""Learned bases over time: precise where their tracks are large, shared by the levels of a layer, worth their bytes."""
+"""Learned bases over time: shared by the levels of a layer, worth their bytes."""
 
 from __future__ import annotations
 
@@ -12,24 +12,9 @@ import athcodec
 from athcodec.decoding.container import BASIS_IN_WAVES, STEMS
 from athcodec.encoding import layers, search
 from athcodec.encoding.choices import learned_bases
-from athcodec.encoding.motion import waves_over_time
-from athcodec.encoding.time_bases import InWaves, TimeComponents
 from bench.odd.bending import FPS, Bones, clip_of, gusty
 from bench.trees.plant import grow
-from spec.document import File, rules
-
-FRAMES = 96
-
-
-def tracks(rng: np.random.Generator, count: int, rank: int) -> np.ndarray:
-    """(count, FRAMES) of smooth rows, each ten times as quiet as the one before."""
-    time = np.linspace(0, 1, FRAMES)
-    rows = [np.sin((3 + 2 * r) * time + r) * np.exp(-(((time - 0.5) * 4) ** 2)) for r in range(rank)]
-    return rng.normal(size=(count, rank)) * 1000 * 0.1 ** np.arange(rank) @ rows
-
-
-def components(data: np.ndarray) -> TimeComponents:
-    return TimeComponents(data.T @ data, len(data), waves_over_time(FRAMES))
+from spec.document import File
 
 
 def hit_by_a_gust(seed: int = 5, frames: int = 90) -> athcodec.MotionClip:
@@ -47,30 +32,6 @@ def stems_heads(data: bytes) -> list[tuple[int, int, int]]:
     file = File(data)
     own = [file.content(*key) for key in file.chunks if key[0] == STEMS]
     return [(chunk[5], chunk[8], int.from_bytes(chunk[9:13], "little")) for chunk in own]
-
-
-@pytest.mark.parametrize("rank", [1, 2, 3, 4, 7])
-def test_rows_in_waves_are_orthonormal_and_those_of_the_document(rank):
-    waves, rng = waves_over_time(FRAMES), np.random.default_rng(rank)
-    integers = rng.integers(-300, 300, (rank, FRAMES)).astype(np.int32)
-    stored = InWaves(waves, rng.integers(-20, 0, rank).astype(np.int32), integers)
-    assert abs(stored.rows @ stored.rows.T - np.eye(rank)).max() < 1e-5
-    for known in (0, rank // 2):
-        rows = rules.decode_basis(stored.stream(known), stored.rows[:known].tolist(), rank, FRAMES, waves.tolist())
-        assert np.array(rows).tobytes() == stored.rows.tobytes()
-
-
-def test_a_basis_leaves_less_of_its_tracks_than_their_steps_do():
-    data = tracks(np.random.default_rng(1), 500, 4)
-    stored = components(data).basis()
-    assert isinstance(stored, InWaves) and len(stored.rows) <= 4
-    left = data - data @ stored.rows.T @ stored.rows
-    assert np.sqrt((left**2).mean()) < 0.25
-
-
-def test_a_basis_of_sudden_motion_is_stored_by_its_entries():
-    data = np.outer(np.arange(1.0, 400.0), np.arange(FRAMES) // 20 % 2)
-    assert not isinstance(components(data).basis(), InWaves)
 
 
 def test_levels_share_a_basis_that_lies_with_the_first_of_them(tmp_path):
@@ -106,13 +67,6 @@ def learned_everywhere(monkeypatch):
 
     monkeypatch.setattr(learned_bases, "best_bases", learned)
     monkeypatch.setitem(search.CHOICES, learned, ("time bases", 1.0))
-
-
-@pytest.mark.vectors
-def test_layers_in_learned_bases_are_decoded_as_the_document_does(tmp_path, learned_everywhere):
-    path = tmp_path / "layers.ath"
-    athcodec.encode(hit_by_a_gust(), path, rel_error=1e-4, attributes="none", ladder=(1e-2, 1e-3))
-    assert_same_bits(path.read_bytes())
 
 
 def test_a_layer_whose_basis_needs_fewer_rows_than_the_one_before_it_is_decoded(

@@ -1,5 +1,5 @@
-"""Bark: tubes whose rings move as they are are found, keep their thickness at loose bounds, and decode to the same bits
-everywhere. And leaves that turn far from frame to frame."""
+"""Bark: tubes whose rings move as they are are found and keep their thickness at loose bounds. And leaves that turn far
+from frame to frame."""
 
 from __future__ import annotations
 
@@ -8,13 +8,10 @@ import pytest
 from files import coded
 from moving_meshes import leafed_tree
 from plants import clip_of, ring_quads, tube
-from test_document import assert_same_bits
 
-import athcodec
 from athcodec.encoding import streams
 from athcodec.encoding.choices.rings import ring_sizes
 from athcodec.motion.clip import MotionClip
-from spec.document import File
 
 SIDES, RINGS, TWIGS = 6, 12, 9
 RADIUS = 0.004
@@ -103,15 +100,6 @@ def test_twigs_keep_their_thickness_at_loose_bounds(scratch, bound, options):
         decoded = decoder.positions().astype(np.float64)
     stretch = np.abs(around_rings(decoded) / around_rings(np.asarray(clip.positions, np.float64)) - 1)
     assert np.quantile(stretch, 0.999) < 0.06
-
-
-@pytest.mark.parametrize(
-    "options", [{"rel_error": 1e-3, "ladder": "none"}, pytest.param({"rel_error": 1e-5}, marks=pytest.mark.vectors)]
-)
-def test_the_document_plays_the_same_tubes(scratch, options):
-    data = athcodec.encode(twigs(12), scratch / "twigs.ath", attributes="none", **options).path.read_bytes()
-    assert any(branch.ring for branch in File(data).file.branches)
-    assert_same_bits(data)
 
 
 def test_leaves_that_turn_by_more_than_a_right_angle_between_frames_do_not_tumble(scratch):

@@ -1,4 +1,4 @@
-"""Waves over time: orthonormal, smooth first, the same bits as the document's; what they are good for."""
+"""Waves over time: the same bits as the document's; what they are good for."""
 
 from __future__ import annotations
 
@@ -12,38 +12,11 @@ from spec.document import File, rules
 FRAMES = (1, 2, 3, 4, 5, 8, 31, 64, 121, 200, 255, 256, 270)
 
 
-@pytest.mark.parametrize("kind", Waves)
-@pytest.mark.parametrize("frames", FRAMES)
-def test_waves_are_orthonormal(frames, kind):
-    waves = waves_over_time(frames, kind)
-    assert abs(waves @ waves.T - np.eye(frames)).max() < 1e-12
-
-
 @pytest.mark.parametrize("frames", FRAMES)
 def test_waves_are_those_of_the_document_bit_for_bit(frames):
     for periodic, of_stems, of_nodes in ((False, Waves.SMOOTH, Waves.BEAM), (True, Waves.PERIODIC, Waves.PERIODIC)):
         assert waves_over_time(frames, of_stems).tolist() == rules.waves_over_time(frames, periodic)
         assert waves_over_time(frames, of_nodes).tolist() == rules.node_waves_over_time(frames, periodic)
-
-
-@pytest.mark.parametrize(("kind", "order"), [(Waves.SMOOTH, 3), (Waves.BEAM, 2)])
-@pytest.mark.parametrize("frames", FRAMES)
-def test_waves_bend_in_ascending_order(frames, kind, order):
-    waves = waves_over_time(frames, kind)
-    bent = np.diff(waves, order, axis=1) if frames > order else np.zeros((frames, 1))
-    bending = bent @ bent.T
-    energy = bending.diagonal()
-    assert abs(bending - np.diag(energy)).max() < 1e-11, "they are eigenvectors"
-    assert (energy[:order] < 1e-24).all(), "the first make up steady motion, and accelerated motion"
-    assert (np.diff(energy[order - 1 :]) > 0).all()
-    assert (waves[:, 0] > 0).all()
-
-
-def test_periodic_waves_do_not_know_where_a_loop_begins():
-    waves = waves_over_time(60, Waves.PERIODIC)
-    track = np.random.default_rng(1).normal(size=60)
-    energy = [np.add.reduceat((waves @ np.roll(track, turn)) ** 2, [0, *range(1, 60, 2)]) for turn in (0, 17)]
-    np.testing.assert_allclose(*energy, rtol=1e-9)
 
 
 def encoded_loop(clip, path, blend: int):

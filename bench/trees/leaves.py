@@ -198,13 +198,6 @@ class Plates:
         self.stiffness = self.inertia * omega**2
         self.damping = 2 * species.damping * self.inertia * omega
 
-    def energy(self) -> np.ndarray:
-        """(L,) of motion and of the stalk, joules."""
-        angle = _rotation_vectors(self.turn)
-        square = (angle**2).sum(axis=0)
-        stored = 0.5 * (self.stiffness * angle**2).sum(axis=0) * (1 + 0.5 * square / STIFFER**2)
-        return 0.5 * (self.inertia * self.speed**2).sum(axis=0) + stored
-
     def step(self, air: np.ndarray, seconds: float) -> None:
         """air: (3, L) relative to the hinge, in the axes of the leaf at rest."""
         wind = _turned_back(self.turn, air)
