@@ -17,8 +17,10 @@ import athcodec
 from athcodec._native import LOOSE
 from athcodec.decoding.file_tables import Level
 from athcodec.encoding.survey import Ath, Gaps
-from athcodec.metrics import ErrorMeter
-from bench.clips import Encoded, add_clips, add_ladder, add_rel_error, encoded, measure
+from athcodec.metrics import ErrorMeter, MotionMeter
+from bench import data
+from bench.clips import Encoded, add_clips, add_ladder, add_rel_error, encoded
+from bench.smoothness import measured_levels
 from bench.tables import table
 
 GAP_FRAMES = 9
@@ -29,7 +31,9 @@ Bytes: the file cut after this level, with rest pose and hierarchy, without attr
 diagonal of the bounding box of all frames, measured on decoded positions. Ratio: our RMS over the paper's.
 Above a level's nodes our stems are exact, the paper's are affine maps; the paper's maps are not quantised, so
 where pieces are rigid they have no error at all and ours have that of the bound. The last level is the
-original within the bound; the paper gets there by its residuals.
+original within the bound; the paper gets there by its residuals. Of the one before: the larger ratio of the
+stored largest and RMS errors to those of the level before. Second difference: the largest RMS over vertices, over
+the source's within two frames, or half the bound.
 """
 
 GAPS_NOTE = """
@@ -47,22 +51,27 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_clips(parser)
     add_rel_error(parser)
     add_ladder(parser, "decades")
+    parser.add_argument("--all", action="store_true", help="all clips of all suites, made if they are missing")
 
 
 def run(args: argparse.Namespace) -> dict[str, Any]:
     levels, gaps, broken = [], [], []
-    for path in args.clips:
+    names = dict.fromkeys(name for suite in data.SUITES.values() for name in suite)
+    for path in map(data.path_of, names) if args.all else args.clips:
         with encoded(path, args.rel_error, ladder=args.ladder) as result:
             file = result.decoder.file
             ath = None if file.header.is_predicted else _same_nodes(result)  # The paper has no such motion.
+            meters = measured_levels(result.decoder, result.clip)
             for stored in result.decoder.levels:
                 case = {"clip": path.stem, "level": stored.level}
                 depth = file.header.stages[stored.level]
-                ours = measure(result.clip, result.decoder, stored.level)
+                meter, ours = meters[stored.level], meters[stored.level].error
                 has_nodes = ath is not None and depth <= ath.height
                 paper = _measure_paper(result.clip, ath, depth) if has_nodes else None
-                levels.append(case | _level_row(stored, ours, paper))
+                row = case | _level_row(stored, ours, paper) | _better(file.levels, stored.level, meter)
+                levels.append(row)
                 broken += _broken_lines(path, stored, ours, result.decoder)
+                broken += _worse_lines(path, row, file.header.is_predicted)
                 if has_nodes:
                     gaps.append(case | _gap_row(result, ath, stored.level, ours.diagonal))
     return {
@@ -102,6 +111,27 @@ def _level_row(stored: Level, ours: ErrorMeter, paper: ErrorMeter | None) -> dic
         "paper RMS": paper and paper.rms_error / diagonal,
         "ratio": ours.rms_error / paper.rms_error if paper and paper.rms_error else None,
     }
+
+
+def _better(levels: list[Level], level: int, meter: MotionMeter) -> dict[str, float | None]:
+    """How much worse than the level before, and than the source's own second differences, a level is."""
+    before, this = levels[max(level - 1, 0)], levels[level]
+    pairs = (this.max_error, before.max_error), (this.rms_error, before.rms_error)
+    worse = max(own / other if other else float(own > 0) for own, other in pairs)
+    return {
+        "of the one before": worse if level else None,
+        "second difference": meter.figures()["smoothness"]["acceleration_ratio"],
+    }
+
+
+def _worse_lines(path: Path, row: dict[str, Any], may_jerk: bool) -> list[str]:
+    """A line if a level is worse than the one before it, or jerks."""
+    limits = {"of the one before": 1.0} | ({} if may_jerk else {"second difference": 2.0})
+    return [
+        f"{path.name}, level {row['level']}: got {row[name]:.3f} {name}; expected at most {limit:g}"
+        for name, limit in limits.items()
+        if (row[name] or 0.0) > limit
+    ]
 
 
 def _broken_lines(path: Path, stored: Level, ours: ErrorMeter, decoder: athcodec.Decoder) -> list[str]:
