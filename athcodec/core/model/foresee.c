@@ -3,8 +3,9 @@
  * Vertices are sums of terms: their rest positions, and what tracks over time add. So is what their projection makes of
  * them: each term, turned, times weights that do not change. Summing in this order takes far less time, but rounds
  * otherwise. So an integer is taken only if it is further from the middle between two than both sums can be apart. */
+#include "model/foresee.h"
+
 #include "model/lanes.h"
-#include "model/refine.h"
 
 enum { MOST_TERMS = 16 };
 

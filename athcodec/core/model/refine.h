@@ -23,18 +23,6 @@ void ath_predict_tracks(const ath_plan *plan, const ath_motion *motion, const at
 /* Predicts the integers of a piece's modes from its vertices in the layer before, seen from scratch->at. */
 void ath_predict_modes(const ath_plan *plan, const ath_motion *motion, const ath_piece *piece,
                        const ath_piece_before *before, const ath_scratch *scratch, ath_piece_rows *rows);
-/* What places a piece in the layer before: its rows and tracks (see ath_pose_tracks), in its attach frame. */
-typedef struct {
-    const ath_plan *plan;
-    const ath_piece_rows *rows;
-    const ath_scratch *scratch;
-    const uint8_t *used;
-} ath_placing;
-
-/* Predicts the same integers, into rows of zeros, from what places the vertices. Returns 0 where rounding leaves one of
- * them in doubt. */
-int ath_foresee_modes(const ath_plan *plan, const ath_motion *motion, int32_t p, const ath_piece_before *before,
-                      const ath_placing *placing, const ath_scratch *scratch, ath_piece_rows *rows);
 /* out = R^T (x - c), 3 x frames */
 void ath_into_rest_space(int32_t frames, const ath_frames *at, const double *x, double *out);
 /* Fills the vertices of a piece in its attach frame, less those of the rest pose. */

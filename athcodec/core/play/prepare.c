@@ -2,6 +2,7 @@
  * piece is placed as soon as its integers are decoded, so that only attach caches are kept. */
 #include "play/prepare.h"
 #include "bits/exact.inl"
+#include "model/foresee.h"
 #include "model/maps.h"
 #include "model/refine.h"
 #include "play/join.h"
