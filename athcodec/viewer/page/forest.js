@@ -1,5 +1,5 @@
 // A forest of one plant in the wind, on WebGPU. The address says what is shown: ?file=URL&count=10000, and on its floor
-// &floor=URL&each=4; with &drawn=0 it is only computed, for measurements
+// &floor=URL&each=4
 
 import { ATHLoader, radii } from "athcodec-three";
 import { ATHForest } from "athcodec-three/webgpu";
@@ -57,7 +57,6 @@ async function start() {
   }
   const ath = await new ATHLoader().loadAsync(asked.get("file"));
   const isMesh = ath.hasFaces, { radius } = ath.sphere;
-  const isDrawn = asked.get("drawn") !== "0";
   const forest = new ATHForest(renderer, ath, {
     shape: isMesh ? undefined : foliage(ath, radii(ath)),
     material: () => (isMesh ? forestMaterial(ath.metadata, SUN) : new MeshStandardNodeMaterial({ roughness: 0.85, side: DoubleSide })),
@@ -132,7 +131,7 @@ async function start() {
     if (state.moves) state.seconds += passed / 1000;
     for (const each of [forest, ...state.floor]) each.update(camera, height, state.time ?? state.seconds);
     state.milliseconds = performance.now() - begun;
-    if (isDrawn) renderer.render(scene, camera);
+    renderer.render(scene, camera);
     state.frames++;
   };
   const tell = () => {

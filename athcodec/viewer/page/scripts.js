@@ -20,18 +20,5 @@ export default function begin() {
       return [...await motion.positions(motion.start + seconds, level)];
     },
     uploaded: () => [...main().motion.uploaded()],
-    /** Milliseconds from choosing what to draw until it is drawn: the fastest of some frames. */
-    timeForest(frames) {
-      const { stage } = app, gl = stage.renderer.getContext(), pixel = new Uint8Array(4), times = [];
-      for (let i = 0; i < frames; i++) {
-        const start = performance.now();
-        app.updateForests(state.time + i / 30);
-        stage.render();
-        gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, pixel); // waits for the picture
-        times.push(performance.now() - start);
-      }
-      const { counts, culled, vertices } = state.forest;
-      return { ms: Math.min(...times), counts, unseen: culled, vertices };
-    },
   };
 }
