@@ -6,9 +6,11 @@ import math
 from dataclasses import replace
 
 from athcodec.encoding.features import Feature
+from athcodec.encoding.quantise import single
 from athcodec.encoding.settings import Settings
 from athcodec.encoding.trials import Trials
 
+FINER = 0.5  # Step at which learned time bases are tried too: an error of one of their numbers lasts over all frames.
 PERIODIC_WORTH = 1.3  # Largest ratio of bytes at which waves are periodic: coarse levels jump at the seam of others.
 
 
@@ -30,7 +32,10 @@ def best_bases(settings: Settings, trials: Trials) -> Settings:
         return trials.cheapest([settings, waves, each, *common])
     shorter = trials.level_costs(each) < trials.level_costs(waves)
     mixed = replace(each, learned_bases=tuple(shorter.tolist()))
-    return trials.cheapest([waves, mixed, *common])
+    best = trials.cheapest([waves, mixed, *common])
+    if shorter.all() or not shorter.any() or not trials.work.fits(2 * trials.work_of_trial):
+        return best
+    return trials.cheapest([best, replace(each, step=single(FINER * each.step))])  # They may lose by their step alone.
 
 
 def waves_if_smaller(settings: Settings, trials: Trials) -> Settings:
