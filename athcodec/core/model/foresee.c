@@ -7,6 +7,8 @@
 
 #include "model/lanes.h"
 
+#include <string.h>
+
 enum { MOST_TERMS = 16 };
 
 /* At most so far are two sums apart, over the product of `reach`, the frames and 1 / step: 512 roundings of 2^-53, and
@@ -129,6 +131,7 @@ ATH_HOT static void foresee_track(int32_t T, const placing_sums *terms, const ro
     for (int32_t from = 0; from < T; from += ATH_LANES) {
         int32_t t = ath_min(from, T - ATH_LANES);
         ath_lanes turned[9], sum;
+        memset(turned, 0, sizeof turned); /* Compilers do not see that all of them are set. */
         for (int32_t k = 0; k < 9; k++) lanes_set(&turned[k], row->turn[0][k]);
         for (int32_t j = 1; j < terms->count; j++)
             for (int32_t k = 0; k < 9; k++) lanes_add_scaled(&turned[k], row->turn[j][k], terms->track[j] + t);
