@@ -7,8 +7,6 @@
 
 #include "model/lanes.h"
 
-#include <string.h>
-
 enum { MOST_TERMS = 16 };
 
 /* At most so far are two sums apart, over the product of `reach`, the frames and 1 / step: 512 roundings of 2^-53, and
