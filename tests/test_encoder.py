@@ -387,7 +387,7 @@ def peak_memory(clip: MotionClip, folder) -> int:
 def test_memory_does_not_grow_with_the_number_of_frames(tmp_path, monkeypatch):
     monkeypatch.setattr(clip_module, "BLOCK_BYTES", 32 * 200 * 12)
     monkeypatch.setattr("athcodec.encoding.encoder.SPOOL_BYTES", 1 << 16)
-    peak_memory(endless_clip(64), tmp_path)  # what is made once, such as imports, is not counted
+    peak_memory(endless_clip(64), tmp_path)  # What is made once, such as imports, is not counted.
     short, long = (peak_memory(endless_clip(frames), tmp_path) for frames in (320, 1600))
     raw = 1600 * 200 * 12
     assert long < 1.2 * short + 200_000, "but for a few numbers per frame and segment"
@@ -395,7 +395,7 @@ def test_memory_does_not_grow_with_the_number_of_frames(tmp_path, monkeypatch):
 
 
 def test_the_layers_of_a_segment_are_in_memory_one_at_a_time(tmp_path):
-    peak_memory(endless_clip(64, at_once=64), tmp_path)  # what is made once, such as imports, is not counted
+    peak_memory(endless_clip(64, at_once=64), tmp_path)  # What is made once, such as imports, is not counted.
     segment = 32 * 2000 * 12
     assert peak_memory(endless_clip(128, 2000, at_once=128), tmp_path) < 22 * segment
 

@@ -496,7 +496,7 @@ def test_a_file_that_ends_within_a_chunk_is_fetched_once_and_said_to_be_cut_off(
         moves = [
             chunk for chunk in decoder.file.chunks if chunk.segment == 0 and chunk.level < decoder.file.level_count
         ]
-    chunk = max(moves, key=lambda chunk: chunk.length)  # of the clip that plays
+    chunk = max(moves, key=lambda chunk: chunk.length)  # It belongs to the clip that plays.
     data = path.read_bytes()[: chunk.offset + chunk.length // 2]
     with ThrottledServer({"tree.ath": data}) as line:
         page = opened(line.page("tree.ath"), "document.getElementById('trouble').checkVisibility()")

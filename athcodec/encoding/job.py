@@ -395,7 +395,7 @@ class EncodingJob:
             unsearched = search.first_cost()
             prediction = self._best_prediction(bound, unsearched, work)
             if prediction is None:  # First settings rank branches as the work that is left for a search hardly does.
-                return search.untried(frames_ratio), False
+                return search.expected(frames_ratio), False
             if prediction.bytes < SEARCH_SAVES * unsearched:
                 return frames_ratio * prediction.bytes, True
             return min((search.tried(frames_ratio), False), (frames_ratio * prediction.bytes, True))

@@ -139,14 +139,15 @@ class Search:
     def tried(self, frames_ratio: float) -> float:
         """Return about the bytes of a file of so many times the frames, by the choices that save most."""
         search = self.of_sample or self
-        settings, trials = search.at_best_step, search.trials
-        return trials.cost(settings) + (frames_ratio - 1) * trials.level_costs(settings).sum()
+        return search._cost_of_frames(search.at_best_step, frames_ratio)
 
-    def untried(self, frames_ratio: float) -> float:
-        """Return about the same from the settings that the search starts with."""
-        trials = (self.of_sample or self).trials
-        motion = trials.level_costs(trials.start).sum()
-        return trials.cost(trials.start) + (SEARCHED_SHARE * frames_ratio - 1) * motion
+    def expected(self, frames_ratio: float) -> float:
+        """Return about the same from the settings that the search starts with, without searching."""
+        search = self.of_sample or self
+        return search._cost_of_frames(search.trials.start, SEARCHED_SHARE * frames_ratio)
+
+    def _cost_of_frames(self, settings: Settings, frames_ratio: float) -> float:
+        return self.trials.cost(settings) + (frames_ratio - 1) * self.trials.level_costs(settings).sum()
 
     def decide(self) -> tuple[list[Choice], CodedPrelude]:
         """Return settings to choose from, and hierarchy and poses as coded with them."""

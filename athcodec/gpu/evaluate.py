@@ -325,7 +325,7 @@ def turned_towards(H: np.ndarray, R: np.ndarray) -> np.ndarray:
     axial = np.stack([C[:, 2, 1] - C[:, 1, 2], C[:, 0, 2] - C[:, 2, 0], C[:, 1, 0] - C[:, 0, 1]], -1)
     spare = np.maximum(1 - np.trace(C, axis1=1, axis2=2), 0) + np.float32(1e-6)
     x, y, z = np.diagonal(C, axis1=1, axis2=2).T
-    a, b, c = y + z + spare, x + z + spare, x + y + spare  # differences from the trace would lose precision
+    a, b, c = y + z + spare, x + z + spare, x + y + spare  # Differences from the trace would lose precision.
     d, e, f = (-(C[:, i, j] + C[:, j, i]) / 2 for i, j in ((0, 1), (0, 2), (1, 2)))
     adjugate = np.stack(
         [

@@ -225,8 +225,9 @@ ATH_API int ath_open(void *memory, size_t memory_bytes, const uint8_t *bytes, si
 ATH_API int ath_set_host_mesh(ath_file *file, const void *xyz, size_t stride, int32_t vertex_count,
                               ath_fault_info *fault);
 
-/* Computes what all segments share at level 0, in memory of ath_build_size bytes, which depends on the plant and its rest
- * pose, and in which ath_refine goes on. Call ath_build once, before you prepare anything. Returns ATH_OK, ATH_NO_MEMORY or ATH_NEEDS_HOST_MESH. */
+/* Computes what all segments share at level 0, in memory of ath_build_size bytes, which depends on the plant and its
+ * rest pose, and in which ath_refine goes on. Call ath_build once, before you prepare anything. Returns ATH_OK,
+ * ATH_NO_MEMORY or ATH_NEEDS_HOST_MESH. */
 ATH_API size_t ath_build_size(const ath_file *file);
 ATH_API int ath_build(ath_file *file, void *memory, size_t memory_bytes);
 
