@@ -33,8 +33,8 @@ from athcodec.options import MAX_SEGMENT
 PIECE_VERTICES = 64
 SEGMENT_FRAMES = MAX_SEGMENT
 SHAPE_MODES = 16
-SHEET, LOOSE, WHOLE = 1, 2, 4
-RIGID = 8
+SHEET, LOOSE, WHOLE, STILL = 1, 2, 4, 8
+RIGID = 16
 """Of a piece in a layer."""
 SHORT_SHIFT, SHORT_FLOATS = 18, 255 << 5
 """Of the error table: floats without sign, of which the top bits of binary32 are stored."""

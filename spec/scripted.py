@@ -454,7 +454,7 @@ def hierarchy_script(stems: list[Stem], branch_source: list | None = None, verte
         while ancestor != stem.parent:
             up, ancestor = up + 1, stems[ancestor].parent
         script += [up] if b > 0 else []
-        script += [stem.count - 1, stem.flags & 1, stem.flags >> 1 & 1, stem.flags >> 2 & 1, stem.lag - lag]
+        script += [stem.count - 1, *(stem.flags >> i & 1 for i in range(4)), stem.lag - lag]
         lag = stem.lag
     last_place = [0] * len(stems)
     for stem in stems:

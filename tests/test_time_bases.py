@@ -9,9 +9,11 @@ import pytest
 from test_document import assert_same_bits
 
 import athcodec
+from athcodec import encoding
 from athcodec.decoding.container import BASIS_IN_WAVES, STEMS
 from athcodec.encoding import layers, search
 from athcodec.encoding.choices import learned_bases
+from athcodec.encoding.features import Feature
 from bench.odd.bending import FPS, Bones, clip_of, gusty
 from bench.trees.plant import grow
 from spec.document import File
@@ -58,6 +60,32 @@ def test_a_shared_basis_makes_files_smaller(tmp_path, monkeypatch):
     monkeypatch.setitem(search.CHOICES, none, ("time bases", 1.0))
     monkeypatch.setattr(learned_bases, "candidates", lambda settings, trials: [])
     assert shared < 0.9 * athcodec.encode(clip, tmp_path / "waves.ath", **options).bytes
+
+
+def sum_of_shapes(count: int = 5, side: int = 20, frames: int = 120) -> athcodec.MotionClip:
+    """A sheet that bends far by smooth shapes, whose weights walk at random."""
+    rng, (x, y) = np.random.default_rng(3), np.meshgrid(*(np.linspace(0, 1, side),) * 2, indexing="ij")
+    waves = [np.sin((1 + i) * x + (2 - i / 2) * y + i) * x for i in range(count)]
+    shapes = np.stack(waves)[..., None] * rng.normal(size=(count, 1, 1, 3))
+    weights = 0.03 * np.cumsum(rng.normal(size=(frames, count)), axis=0)
+    rest = np.stack([x, y, 0 * x], axis=-1)
+    return athcodec.MotionClip((rest + np.tensordot(weights, shapes, 1)).reshape(frames, -1, 3), np.arange(frames) / 30)
+
+
+@pytest.mark.parametrize("bound", [1e-3, 1e-5])
+def test_a_sum_of_a_few_shapes_takes_less_than_shapes_and_weights_do_as_short_integers(bound):
+    clip, count = sum_of_shapes(), 5
+    short_integers = 2 * count * (3 * clip.vertex_count + clip.frame_count)
+    assert len(athcodec.encode(clip, rel_error=bound, ladder="none")) < short_integers
+
+
+def test_branches_whose_bending_turns_nothing_make_a_sum_of_shapes_smaller(tmp_path):
+    def size(**without) -> int:
+        plan = encoding.draft(clip, rel_error=1e-4, ladder="none", **without)
+        return encoding.write(clip, plan, encoding.code_segments(clip, plan, [0]), tmp_path / "a.ath").bytes
+
+    clip = sum_of_shapes()
+    assert size() < 0.8 * size(without=frozenset({Feature.STILL}))
 
 
 @pytest.fixture

@@ -15,6 +15,7 @@ class Feature(Enum):
     WAVE_BASES = "learned time bases in waves"
     SHEETS = "affine functions first"
     RINGS = "tubes of rings"
+    STILL = "branches whose bending turns nothing"
     LOOSE = "loose branches"
     RIGID = "rigid parts"
     FREE_RIGID = "loose rigid parts"

@@ -815,6 +815,7 @@ def _summary(
         "motion": "transformed" if decided.choice.predicted is None else "predicted",
         "step_ratio": settings.step / bound,
         "rest_step_ratio": settings.rest_step / bound,
+        "still": settings.still,
         "rotations": list(settings.rotation_step_factors),
         "learned": list(settings.learned_bases),
         "common_basis": settings.common_basis,

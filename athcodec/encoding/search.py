@@ -53,7 +53,7 @@ def settled(settings: Settings, trials: Trials) -> Settings:
         starts = [plain, *_nearest(plain, turned + in_forms, trials)]
         learned = [candidate for start in starts for candidate in learned_pieces.candidates(start, trials)]
         in_time = [settings.in_waves(), *learned_bases.candidates(settings, trials)]
-        others = _nearest(settings, starts + learned + in_time, trials)
+        others = _nearest(settings, starts + learned + in_time + rotations.turned_over(settings, trials), trials)
         best = trials.cheapest([settings, *(walked(other, trials) for other in others)])
         if best is settings:
             break
@@ -76,6 +76,7 @@ CHOICES: dict[Choose, tuple[str, float]] = {
     best_freedom: ("freedom of rigid parts", 0.2),
     forms.best_forms: ("forms", 0.4),
     forms.best_forms_again: ("forms", 0.1),
+    rotations.still_if_smaller: ("branches whose bending turns nothing", 0.4),
     rotations.best_rotations: ("rotations", 0.4),
     rotations.fast_rotations: ("rotations", 1.0),
     learned_bases.best_bases: ("time bases", 0.6),
@@ -144,7 +145,9 @@ class Search:
     def expected(self, frames_ratio: float) -> float:
         """Return about the same from the settings that the search starts with, without searching."""
         search = self.of_sample or self
-        return search._cost_of_frames(search.trials.start, SEARCHED_SHARE * frames_ratio)
+        trials = search.trials
+        start = trials.cheapest([trials.start, *rotations.turned_over(trials.start, trials)[:1]])
+        return search._cost_of_frames(start, SEARCHED_SHARE * frames_ratio)
 
     def _cost_of_frames(self, settings: Settings, frames_ratio: float) -> float:
         return self.trials.cost(settings) + (frames_ratio - 1) * self.trials.level_costs(settings).sum()
@@ -184,6 +187,7 @@ class Search:
             )
         choices: list[Choose] = [
             best_freedom,
+            rotations.still_if_smaller,
             forms.best_forms,
             rotations.best_rotations,
             learned_bases.best_bases,
@@ -192,7 +196,7 @@ class Search:
         ]
         work = self.trials.work
         if work.allowed - work.done < expected_trials(self.effort, False, False) * self.trials.work_of_trial:
-            choices.insert(0, learned_bases.best_bases)  # Time bases may save most; again where work is left.
+            choices.insert(2, learned_bases.best_bases)  # Time bases may save most; again where work is left.
         with self.trials.work.trying("steps", self._share_beside(STEP_TRIALS)):
             return self._after([best_level_steps, *choices, learned_bases.best_waves], self.trials.start)
 

@@ -15,7 +15,7 @@ from weakref import WeakValueDictionary
 
 import numpy as np
 
-from athcodec._native import BRANCH, LOOSE, SHEET, WHOLE, Rounding, address, lib
+from athcodec._native import BRANCH, LOOSE, SHEET, STILL, WHOLE, Rounding, address, lib
 from athcodec.decoding import container as ct
 from athcodec.encoding import quantise as qz
 from athcodec.encoding import streams, writing
@@ -341,7 +341,10 @@ def branch_records(hierarchy: Hierarchy, ath: Ath, settings: Settings) -> np.nda
     branches["attach"], branches["first"] = hierarchy.attach, hierarchy.first_vertex
     free = settings.free_rigid & (settings.rigid > settings.layer) & (hierarchy.branch_parent >= 0)
     branches["flags"] = (
-        SHEET * (settings.forms != BEAM) + WHOLE * ath.whole_branches() + LOOSE * (settings.loose | free)
+        SHEET * (settings.forms != BEAM)
+        + LOOSE * (settings.loose | free)
+        + WHOLE * ath.whole_branches()
+        + STILL * settings.still
     )
     branches["rigid"] = settings.rigid
     branches["lag"], branches["detail"] = settings.lags, settings.details

@@ -14,12 +14,14 @@ from athcodec.encoding.motion import LearnedModes
 
 BEAM = 0  # Form of a branch whose modes are those of a beam; other forms are SHEET, or the vertices in a tube's ring.
 # Fields that distinguish settings of a search: by hierarchy and rest pose, and by motion.
-OF_PRELUDE = "rest_step rest_slack connected_rest welded_rest lags shape_of forms layer free_rigid".split()
+OF_PRELUDE = "rest_step rest_slack connected_rest welded_rest lags shape_of forms still layer free_rigid".split()
 OF_MOTION = (
     "step level_steps turn_step rotation_step_factors periodic learned_bases common_basis learned_pieces".split()
 )
 # Fields that a large plant takes from its sample as they are.
-OF_SAMPLE = "step level_steps rest_step rotation_step_factors free_rigid learned_bases common_basis periodic".split()
+OF_SAMPLE = (
+    "step level_steps rest_step rotation_step_factors free_rigid still learned_bases common_basis periodic".split()
+)
 OF_BRANCHES = "forms loose lags details rigid".split()  # Arrays with an entry for each branch.
 
 
@@ -42,6 +44,7 @@ class Settings:
     learned_bases: tuple[bool, ...]  # Whether each level has a learned time basis.
     node_steps: np.ndarray  # (levels,) steps of the maps of nodes, as SegmentMotion.analyse_nodes takes them.
     layer: int = 0  # Number of the layer of precision that the settings are for.
+    still: bool = False  # Whether bending of branches turns nothing that they carry.
     free_rigid: bool = False  # Whether rigid branches are loose.
     turn_step: float = 0.0  # Largest step of rotations of rigid pieces, in radians; 0: none.
     connected_rest: bool = False

@@ -99,9 +99,11 @@ class TimeComponents:
 
     @cached_property
     def _suits_waves(self) -> bool:
-        """Whether the rows are smaller in waves."""
+        """Whether the rows are smaller in waves, or samples too coarse for them."""
         rank = max(self._rank(1.0), 1)
-        return self._may_be_in_waves and len(self._in_waves(rank, 1.0).stream()) < len(self._entries(rank).stream())
+        is_coarse = MOST_SAMPLE * PRECISION < np.sqrt(self._energies[0])
+        in_waves, entries = self._in_waves(rank, 1.0), self._entries(rank)
+        return self._may_be_in_waves and (is_coarse or len(in_waves.stream()) < len(entries.stream()))
 
     def _entries(self, rank: int) -> Entries:
         return Entries(np.rint(self._rows[:rank] * MOST_SAMPLE).astype(np.int32))

@@ -287,4 +287,4 @@ def distinct(candidates: Iterable[Settings]) -> list[Settings]:
 
 def _before_modes(settings: Settings) -> tuple:
     """Return what decides the motion that is left for the modes of a piece."""
-    return settings.rotation_step_factors, settings.forms.tobytes()
+    return settings.rotation_step_factors, settings.forms.tobytes(), settings.still

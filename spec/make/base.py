@@ -143,6 +143,10 @@ def exact_rest(stems: list[Stem], numbers: list, is_float64: bool, **fields) -> 
 FUTURE = b"from the future"
 LAYER_HEADS = {level: stems_head(0.5 / 4 ** max(level - 2, 0), level % 3) for level in range(12)}
 MIXED = stems_of("-1 4, 0 3 2 SHEET, 1 2 1 LOOSE, 0 70 3, 3 5 66 SHEET LOOSE, -1 6 0 SHEET, 5 3 4 WHOLE, 6 2 1")
+UNTURNED = stems_of(
+    "-1 70 STILL, 0 5 66, 1 4 3 SHEET STILL, 2 3 1, 0 9 5 SHEET STILL ring=3, 4 3 7 STILL rigid=1, 5 2 1,"
+    "-1 6 SHEET STILL, 7 4 4 WHOLE STILL, 8 3 2"
+)
 
 
 def refinements(stems: list[Stem], seed: int, large: int = 12, **fields) -> Plant:

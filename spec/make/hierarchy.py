@@ -45,6 +45,9 @@ for title, make in {
     "whole-alone: a root that is WHOLE and all there is: h is 0": lambda: moving(
         [Stem(-1, 3, 0, WHOLE)], 12, heads=HEADS
     ),
+    "unturned: branches whose bending turns nothing: beams, sheets, a tube, rigid and WHOLE ones": lambda: moving(
+        UNTURNED, 13, heads=HEADS
+    ),
     "permutations: branches and vertices numbered otherwise in the source": lambda: moving(
         [Stem(-1, 3), Stem(0, 2, 1), Stem(0, 1, 2)], 22, branch_source=[2, 0, 1], vertex_source=[5, 0, 3, 1, 4, 2]
     ),

@@ -162,6 +162,7 @@ for title, make in {
         40,
         heads={level: stems_head(0.5 / 4 ** max(level - 2, 0), 16 * level | level % 3) for level in range(12)},
     ),
+    "layers-unturned: branches whose bending turns nothing": refinements(UNTURNED, 46, frames=9, segments=2),
     "layers-tubes: the same in layers": refinements(TUBES, 42, frames=9, segments=2),
     "layers-mixed: rotations, loose stems, sheets, a stem of two pieces and a subtree that is whole": refinements(
         MIXED, 32, frames=9, segments=2

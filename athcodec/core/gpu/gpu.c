@@ -182,7 +182,7 @@ static void set_tangent(level_writer *writer, const ath_plan *plan, const ath_pi
         tangent[k] = to[k] - from[k];
         length2 = length2 + tangent[k] * tangent[k];
     }
-    if (parent->flags & (ATH_SHEET | ATH_RIGID) || !(length2 > 1e-200)) return;
+    if (parent->flags & (ATH_SHEET | ATH_RIGID | ATH_STILL) || !(length2 > 1e-200)) return;
     set_floats(body->tangent, tangent);
     body->flags |= ATH_GPU_FOLLOWS;
     body->way = writer->bases_used;
@@ -220,7 +220,7 @@ static void put_body(level_writer *writer, const body_walk *walk, int32_t b)
         body->basis = basis_of_node(writer, walk);
         return;
     }
-    if (piece->flags & ATH_SHEET && !(piece->flags & ATH_RIGID) && piece->last_attached >= 0)
+    if ((piece->flags & (ATH_SHEET | ATH_RIGID | ATH_STILL)) == ATH_SHEET && piece->last_attached >= 0)
         body->flags |= ATH_GPU_FITTED;
     body->first = (int32_t)head->position_count;
     body->count = piece->count;

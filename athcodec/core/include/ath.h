@@ -283,14 +283,15 @@ ATH_API int32_t ath_clip_named(const ath_file *file, const char *name);
  * that do not loop. It is known for all info.full_level_count levels, stored or not. */
 ATH_API double ath_seam_error(const ath_file *file, int32_t clip, int32_t level);
 
-enum { ATH_SHEET = 1, ATH_LOOSE = 2, ATH_WHOLE = 4 };
+enum { ATH_SHEET = 1, ATH_LOOSE = 2, ATH_WHOLE = 4, ATH_STILL = 8 };
 
 /* A branch. Parents come before children; the subtree of branch b is the branches b to b + subtree - 1. */
 typedef struct ath_branch {
     int32_t parent;  /* branch with a smaller index; -1 for a root */
     int32_t count;   /* vertices of the stem, at least 1 */
     int32_t attach;  /* vertex of the parent's stem that the branch hangs on; -1 for a root */
-    int32_t flags;   /* ATH_SHEET: flat or compact; ATH_LOOSE: not attached; ATH_WHOLE: its subtree moves as one */
+    int32_t flags;   /* ATH_SHEET: flat or compact; ATH_LOOSE: not attached; ATH_WHOLE: its subtree moves as one;
+                        ATH_STILL: what it carries does not turn as it bends */
     int32_t lag;     /* vertices after which the rest pose tends to repeat its steps; 0: a beam */
     int32_t first;   /* first vertex */
     int32_t subtree; /* branches in the subtree, this one included */

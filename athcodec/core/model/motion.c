@@ -78,7 +78,7 @@ void ath_attach(const ath_plan *plan, const ath_motion *motion, const ath_piece 
     ath_frames base = cached_frames(motion, parent);
     const double *here = cached_vertex(motion, parent, piece->attach);
     copy_rows(at.point, here, 3 * (size_t)T);
-    if (!(parent->flags & (ATH_SHEET | ATH_RIGID))) {
+    if (!(parent->flags & (ATH_SHEET | ATH_RIGID | ATH_STILL))) {
         int32_t last = parent->first + parent->count - 1;
         int32_t before = piece->attach - 1, after = ath_min(piece->attach + 1, last);
         const double *from = before < parent->first ? base.point : cached_vertex(motion, parent, before);
@@ -375,7 +375,7 @@ static void carry(const ath_plan *plan, const ath_motion *motion, const ath_piec
     if (piece->attach_cache < 0) return;
     ath_frames at = cached_frames(motion, piece);
     copy_rows(at.point, scratch->at.point, 3 * (size_t)T);
-    if (piece->flags & ATH_SHEET && !(piece->flags & ATH_RIGID))
+    if ((piece->flags & (ATH_SHEET | ATH_RIGID | ATH_STILL)) == ATH_SHEET)
         turn_with_sheet(plan, T, piece, scratch, at.rotation);
     else
         copy_rows(at.rotation, scratch->at.rotation, 9 * (size_t)T);

@@ -4,7 +4,7 @@
 
 #include "bits/format.h"
 
-enum { ATH_RIGID = 8 }; /* flag of a piece that turns and moves without bending */
+enum { ATH_RIGID = 16 }; /* flag of a piece that turns and moves without bending */
 
 /* A run of at most ATH_PIECE_VERTICES vertices of one stem, with one spatial basis. The first piece of a branch hangs
  * on the parent's stem, the others on the last vertex of the piece before. */

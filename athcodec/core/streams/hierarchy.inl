@@ -28,7 +28,7 @@ typedef struct {
     number_model up, count, attach, lag;
     branch_number_model rigid, detail, ring;
     permutation_model branch_source, vertex_source;
-    ath_context flag[3][2];
+    ath_context flag[4][2];
 } hierarchy_model;
 
 static void permutation_model_init(permutation_model *model)
@@ -59,14 +59,14 @@ static void hierarchy_model_init(hierarchy_model *model)
     branch_number_model_init(&model->ring);
     permutation_model_init(&model->branch_source);
     permutation_model_init(&model->vertex_source);
-    for (int32_t i = 0; i < 3; i++)
+    for (int32_t i = 0; i < 4; i++)
         for (int32_t j = 0; j < 2; j++) context_init(&model->flag[i][j], 16384);
 }
 
 static int32_t code_flags(ath_coder *coder, hierarchy_model *model, int32_t before, int32_t flags)
 {
     int32_t coded = 0;
-    for (int32_t i = 0; i < 3; i++) coded |= coder_bit(coder, &model->flag[i][before >> i & 1], flags >> i & 1) << i;
+    for (int32_t i = 0; i < 4; i++) coded |= coder_bit(coder, &model->flag[i][before >> i & 1], flags >> i & 1) << i;
     return coded;
 }
 

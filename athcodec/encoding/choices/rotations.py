@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from athcodec.decoding.container import ROTATION_FACTORS
+from athcodec.encoding.choices import learned_bases
 from athcodec.encoding.features import Feature
 from athcodec.encoding.settings import Settings
 from athcodec.encoding.trials import Trials
@@ -18,6 +19,23 @@ FAST_FACTORS = ROTATION_FACTORS[:2]  # The factors that a fast search tries.
 def candidates(settings: Settings, factors: tuple[int, ...] = ROTATION_FACTORS) -> list[Settings]:
     """Return the settings with each rotation factor at all levels."""
     return [settings.with_rotations(factor) for factor in factors]
+
+
+def still_if_smaller(settings: Settings, trials: Trials) -> Settings:
+    """Return the settings with branches whose bending turns what they carry, or does not: a sum of a few shapes has as
+    few tracks only in frames that do not turn."""
+    if trials.without(Feature.STILL):
+        return settings
+    tried = [settings, *learned_bases.candidates(settings, trials)[:1], *turned_over(settings, trials)[:2]]
+    return replace(settings, still=trials.cheapest(tried).still)
+
+
+def turned_over(settings: Settings, trials: Trials) -> list[Settings]:
+    """Return the settings with the other kind of branches, in each time basis."""
+    if trials.without(Feature.STILL):
+        return []
+    other = replace(settings, still=not settings.still, learned_pieces=None)
+    return [other.in_waves(), *learned_bases.candidates(other, trials)]
 
 
 def fast_rotations(settings: Settings, trials: Trials) -> Settings:
