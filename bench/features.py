@@ -46,15 +46,6 @@ OPTIONS: Mapping[Feature, dict[str, Any]] = {  # Options, beside those of all fi
 }
 # Options of the file without a feature that no search omits.
 OPTIONS_WITHOUT: Mapping[Feature, dict[str, Any]] = {Feature.HOST: {}, Feature.ATTRIBUTES: {}}
-GONE = {  # Features that a format before this one had, by their names among the figures.
-    "factors": "rotation factors 1 and 4 beside 2 and 8",
-    "tips": "rotations of tips alone",
-    "memory": "memories of predicted motion but for one",
-    "common": "the flag Common of predicted motion",
-    "memory+common": "both",
-    "plain_rest": "plain vertices of rest poses",
-    "bent": "bent copies in rest poses",
-}
 OTHERS = {  # Features that no encoder leaves out; measured by one that was changed for it.
     "sides": "open sides as guesses of faces",
     "adaptive": "adaptive vertices of rest poses",
@@ -69,8 +60,7 @@ have no attributes, a rest pose of the bound and, unless they are named as such,
 {Feature.RIGID.value}, {Feature.FREE_RIGID.value} and {Feature.TURN.value} have rest poses that keep faces, those for
 {Feature.CONNECTED.value}, {OTHERS["sides"]} and {Feature.ATTRIBUTES.value} all attributes, those for
 {Feature.JOINS.value} and {Feature.STRAIGHT.value} segments of {SHORT_SEGMENT} frames. Files below {LEAST_BYTES} bytes,
-of which a byte is many per cent, are left out. What saves less than {LEAST:g} % everywhere is marked. What has left the
-format was measured by the last encoder that had it, and so were the others.
+of which a byte is many per cent, are left out. What saves less than {LEAST:g} % everywhere is marked.
 """
 
 SOURCES = """
@@ -199,6 +189,7 @@ class _Files:
             Feature.WAVE_BASES: learned,
             Feature.SHEETS: bool((settings.forms == SHEET).any()),
             Feature.RINGS: bool((settings.forms > SHEET).any()),
+            Feature.STILL: settings.still,
             Feature.LOOSE: bool(settings.loose.any()),
             Feature.RIGID: bool(settings.rigid.any()),
             Feature.FREE_RIGID: settings.free_rigid,
@@ -223,7 +214,6 @@ def summary(sizes: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:
         growth.setdefault(own["feature"], {})[name] = 100 * (own["without"] / own["with"] - 1)
     rows = []
     titles = {feature.name.lower(): feature.value for feature in Feature} | OTHERS
-    titles |= {name: f"{title} (gone)" for name, title in GONE.items()}
     for name in [name for name in titles if name in growth] + sorted(growth.keys() - titles.keys()):
         values = growth[name]
         used, most = [value for value in values.values() if value], max(values, key=lambda file: values[file])

@@ -17,7 +17,9 @@ from programs import blender_python
 from s3 import S3Server
 
 import athcodec
+from athcodec import encoding
 from athcodec.decoding import core_file, segment_decoder
+from athcodec.encoding.features import Feature
 from athcodec.motion.clip import MotionClip
 from athcodec.sources import read_hdf5, sample_path
 
@@ -245,11 +247,12 @@ def medley_ath(medley_clips, tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def full_ath(full_clip, tmp_path_factory):
-    """The full clip in two segments."""
+    """The full clip in two segments, with branches that turn what they carry: others need fewer kinds of chunks."""
     path = tmp_path_factory.mktemp("full") / "full.ath"
     tam = athcodec.Thresholds(0, 0, 0, 0)  # with modes, whatever is smaller
-    athcodec.encode(full_clip, path, rel_error=1e-4, segment_frames=16, tam=tam, ladder="none", rest_error="bound")
-    return path
+    options = {"segment_frames": 16, "tam": tam, "ladder": "none", "rest_error": "bound"}
+    plan = encoding.draft(full_clip, rel_error=1e-4, without=frozenset({Feature.STILL}), **options)
+    return encoding.write(full_clip, plan, encoding.code_segments(full_clip, plan, [0, 1]), path).path
 
 
 @pytest.fixture(scope="session")

@@ -14,10 +14,12 @@ from athcodec.encoding.settings import Settings
 from athcodec.encoding.survey import Ath
 from athcodec.encoding.trials import Trials
 
-QUALITIES = (0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0)  # Steps that are tried, over the error of a level.
+# Steps that are tried, over the error of a level.
+QUALITIES = (0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0, 16.0, 32.0, 64.0, 128.0)
 FEW_ROOTS, ROOT_QUALITIES = 4, (0.7, 1.4, 2.8)  # Qualities for up to so many roots, whose maps are mostly a few bytes.
 FILE_SHARE, FEW_BYTES = 0.02, 320  # The maps may take this share of the file, or these bytes if that is more.
 SMALL_FILE_SHARE = 0.04  # A file without layers may give its maps this share if that is less than FEW_BYTES.
+FAR = 1.5  # Times what the maps may take, beyond which the next of the steps is not tried.
 ERROR_TOLERANCE = 1.08  # Cheaper maps may err by this much more than the finest ones.
 FRAMES = 8  # Frames by which the error of a level is measured.
 
@@ -33,13 +35,18 @@ def best_node_steps(settings: Settings, trials: Trials) -> Settings:
     qualities = _qualities(trials)
     chosen = limits = None
     trials.work.add(trials.work_of(progress.ANALYSIS))
-    for quality in qualities:
+    first = 0
+    for number, quality in enumerate(qualities):
+        if number < first:
+            continue
         steps = quality * errors
         segment.clear_nodes()
         trials.work.add(trials.work_of(progress.MAPS * trials.levels))
         segment.analyse_nodes(sample, steps, settings.rounding)
         if limits is None:
-            if _map_bytes(segment, trials) > allowed and quality is not qualities[-1]:
+            size = _map_bytes(segment, trials)
+            if size > allowed and quality is not qualities[-1]:
+                first = min(number + 1 + (size > FAR * allowed), len(qualities) - 1)
                 continue
             chosen, limits = steps, _errors_of_maps(prelude, segment, sample)
             limits[1:] = np.minimum(ERROR_TOLERANCE * limits[1:], limits[:-1])  # Deeper levels stay better.
