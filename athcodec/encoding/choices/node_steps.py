@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_left
 from dataclasses import replace
 
 import numpy as np
@@ -19,7 +20,6 @@ QUALITIES = (0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0, 16.0, 32.0, 64.0
 FEW_ROOTS, ROOT_QUALITIES = 4, (0.7, 1.4, 2.8)  # Qualities for up to so many roots, whose maps are mostly a few bytes.
 FILE_SHARE, FEW_BYTES = 0.02, 320  # The maps may take this share of the file, or these bytes if that is more.
 SMALL_FILE_SHARE = 0.04  # A file without layers may give its maps this share if that is less than FEW_BYTES.
-FAR = 1.5  # Times what the maps may take, beyond which the next of the steps is not tried.
 ERROR_TOLERANCE = 1.08  # Cheaper maps may err by this much more than the finest ones.
 FRAMES = 8  # Frames by which the error of a level is measured.
 
@@ -32,28 +32,27 @@ def best_node_steps(settings: Settings, trials: Trials) -> Settings:
     rest = trials.level_costs(settings).sum() + trials.prelude_bytes(settings)
     least = min(FEW_BYTES, SMALL_FILE_SHARE * rest) if _is_played_whole(trials) else FEW_BYTES
     allowed = max(least, FILE_SHARE / (1 - FILE_SHARE) * rest)
-    qualities = _qualities(trials)
-    chosen = limits = None
+    tried = [quality * errors for quality in _qualities(trials)]
     trials.work.add(trials.work_of(progress.ANALYSIS))
-    first = 0
-    for number, quality in enumerate(qualities):
-        if number < first:
-            continue
-        steps = quality * errors
+
+    def analyse(number: int) -> np.ndarray:
         segment.clear_nodes()
         trials.work.add(trials.work_of(progress.MAPS * trials.levels))
-        segment.analyse_nodes(sample, steps, settings.rounding)
-        if limits is None:
-            size = _map_bytes(segment, trials)
-            if size > allowed and quality is not qualities[-1]:
-                first = min(number + 1 + (size > FAR * allowed), len(qualities) - 1)
-                continue
-            chosen, limits = steps, _errors_of_maps(prelude, segment, sample)
-            limits[1:] = np.minimum(ERROR_TOLERANCE * limits[1:], limits[:-1])  # Deeper levels stay better.
-        elif (_errors_of_maps(prelude, segment, sample) <= limits).all():
-            chosen = steps
-        else:
+        segment.analyse_nodes(sample, tried[number], settings.rounding)
+        return tried[number]
+
+    def fits(number: int) -> bool:
+        analyse(number)
+        return _map_bytes(segment, trials) <= allowed
+
+    finest = bisect_left(range(len(tried) - 1), True, key=fits)
+    chosen, limits = analyse(finest), _errors_of_maps(prelude, segment, sample)
+    limits[1:] = np.minimum(ERROR_TOLERANCE * limits[1:], limits[:-1])  # Deeper levels stay better.
+    for number in range(finest + 1, len(tried)):
+        steps = analyse(number)
+        if not (_errors_of_maps(prelude, segment, sample) <= limits).all():
             break
+        chosen = steps
     return replace(settings, node_steps=chosen)
 
 
