@@ -359,4 +359,7 @@ class Search:
         if chosen.learned_saving is None:
             return settings
         [pieces] = learned_pieces.pieces_that_save(settings, trials, [chosen.learned_saving])
-        return replace(settings, learned_pieces=pieces)
+        learned = replace(settings, learned_pieces=pieces)
+        if not trials.work.fits(2 * trials.work_of_trial):
+            return learned
+        return trials.cheapest([learned, settings])  # A sample errs by more than some savings.
