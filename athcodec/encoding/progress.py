@@ -134,7 +134,7 @@ def stage_weights(
     found; sizes: whether a target size is to be met; motion: whether motion is coded too."""
     longest, frames = max(stop - start for start, stop in segments), segments[-1][1]
     small = is_small(vertices, segments, effort)
-    some = vertices if (part := sample_vertices(vertices, len(segments), effort)) is None else part
+    some = vertices if (part := sample_vertices(vertices, len(segments), longest, effort)) is None else part
     trial = (ANALYSIS + TURNS) * samples * some * longest
     work = {
         "survey": SURVEY * vertices * frames,

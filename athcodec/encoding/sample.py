@@ -123,7 +123,8 @@ def _counts(plan: Plan) -> tuple[np.ndarray, np.ndarray]:
 def sample_plant(source: Source, ath: Ath, effort: str) -> PlantSample | None:
     """Return a sample of a large plant with a branch of every level; None: the plant is small, or effort is "best". The
     sample grows with the clip, so that the search keeps its share of the work."""
-    wanted = sample_vertices(source.clip.vertex_count, len(source.segments), effort)
+    frames = -(-source.coded_frames // len(source.segments))
+    wanted = sample_vertices(source.clip.vertex_count, len(source.segments), frames, effort)
     if wanted is None:
         return None
     branches = _even_branches(source.hierarchy, wanted, int(ath.node_branch[ath.node_depth.argmax()]))
@@ -137,12 +138,12 @@ def is_small(vertices: int, segments: list[tuple[int, int]], effort: str) -> boo
     return vertices * segments[-1][1] <= SMALL and len(segments) == 1 and effort != "fast"
 
 
-def sample_vertices(vertices: int, segments: int, effort: str) -> int | None:
-    """Return about how many vertices a sample has; None: the plant is not sampled."""
+def sample_vertices(vertices: int, segments: int, frames: int, effort: str) -> int | None:
+    """Return about how many vertices a sample has; None: the plant is not sampled. frames: of a segment."""
     if vertices <= LARGE or effort == "best":
         return None
     least = min(max(int(vertices * LEAST_SHARE), LEAST_SAMPLE), ENOUGH)
-    return min(max(int(vertices * segments * SEGMENT_SHARE), least), MOST_SAMPLE)
+    return min(max(int(vertices * segments * SEGMENT_SHARE), least, SMALL // frames), MOST_SAMPLE)
 
 
 def _even_branches(hierarchy: Hierarchy, wanted: int, deepest: int) -> np.ndarray:
