@@ -88,7 +88,7 @@ class TimeComponents:
         """Return the rows that tracks in steps `ratio` times as large need, at least so many; None: no basis is smaller
         than waves. precision: how many times as large the steps are that the rows are precise enough for."""
         rank = max(self._rank(ratio), least)
-        if self._count <= 1 or not 1 <= rank <= len(self._rows) // 2:
+        if self._count <= 1 or not 1 <= rank < len(self._rows):
             return None
         return self._in_waves(rank, precision) if self._suits_waves else self._entries(rank)
 
