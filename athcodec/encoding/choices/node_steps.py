@@ -16,9 +16,9 @@ from athcodec.encoding.survey import Ath
 from athcodec.encoding.trials import Trials
 
 # Steps that are tried, over the error of a level.
-QUALITIES = (0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0, 16.0, 32.0, 64.0, 128.0)
+QUALITIES = (0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0)
 # Qualities for up to so many roots, whose maps are mostly a few bytes.
-FEW_ROOTS, ROOT_QUALITIES = 4, (0.7, 1.4, 2.8, 5.6, 11.0, 22.0, 45.0, 90.0, 180.0, 360.0)
+FEW_ROOTS, ROOT_QUALITIES = 4, (0.7, 1.4, 2.8)
 FILE_SHARE, FEW_BYTES = 0.02, 320  # The maps may take this share of the file, or these bytes if that is more.
 SMALL_FILE_SHARE = 0.04  # A file without layers may give its maps this share if that is less than FEW_BYTES.
 ERROR_TOLERANCE = 1.08  # Cheaper maps may err by this much more than the finest ones.
@@ -27,7 +27,8 @@ FRAMES = 8  # Frames by which the error of a level is measured.
 
 def best_node_steps(settings: Settings, trials: Trials) -> Settings:
     """Return the settings with maps that keep to their share of the file, no finer than the levels' errors ask for."""
-    prelude, errors = trials.prelude(settings), _level_errors(trials, settings.bound)
+    prelude = trials.prelude(settings)
+    errors = _level_errors(trials, prelude.plan, settings.bound)
     sample = trials.samples[trials.middle].positions
     segment = trials.analysed(settings, trials.middle, trials.learned_modes(prelude.plan, settings))
     rest = trials.level_costs(settings).sum() + trials.prelude_bytes(settings)
@@ -75,14 +76,14 @@ def inner_nodes(source: Source, ath: Ath, levels: int) -> np.ndarray:
     return np.bincount(hierarchy.branch_depth[branches], minlength=levels)
 
 
-def _level_errors(trials: Trials, bound: float) -> np.ndarray:
+def _level_errors(trials: Trials, plan: Plan, bound: float) -> np.ndarray:
     """Return the error in all vertices of a node together that would double the error of its level, (levels,). A level
     errs by the RMS that independent least-squares maps leave in a few frames, or by the bound if that is more."""
     source, ath, sample = trials.source, trials.ath, trials.samples[trials.middle].positions
     some = np.linspace(0, sample.shape[2] - 1, min(FRAMES, sample.shape[2])).astype(int)
     frames = np.empty((len(some), *sample.shape[:2]))
     frames[:, source.hierarchy.vertex_source] = np.moveaxis(sample[:, :, some], 2, 0) + source.origin
-    nodes = inner_nodes(source, ath, trials.levels)
+    nodes = np.bincount(plan.nodes["level"], plan.nodes["coded"], trials.levels)
     errors = np.full(trials.levels, bound)
     for level in np.flatnonzero(nodes).tolist():
         if level not in trials.map_errors:
