@@ -107,8 +107,7 @@ def compile_decoder(template: str) -> bytes:
             speed = "-Os" if path.name in SMALL else "-O3"
             vectors = "-fno-vectorize" if path.name in SCALAR else "-fvectorize"
             _zig(folder, speed, vectors, "-c", str(path), "-o", f"{path.stem}.o")
-        objects = [f"{path.stem}.o" for path in sources]
-        _zig(folder, "-O3", *LINKING, *wanted, *objects, "-o", "decoder.wasm")
+        _zig(folder, "-O3", *LINKING, *wanted, *(f"{path.stem}.o" for path in sources), "-o", "decoder.wasm")
         return (Path(folder) / "decoder.wasm").read_bytes()
 
 
