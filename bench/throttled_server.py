@@ -87,7 +87,7 @@ class _Handler(BaseHTTPRequestHandler):
         if first >= len(data):
             self._respond(416, b"", {"Content-Range": f"bytes */{len(data)}"})
             return
-        headers = {"Content-Type": "application/octet-stream", "ETag": f'"{len(data)}"'}
+        headers = {"Content-Type": TYPES.get(Path(name).suffix, "application/octet-stream"), "ETag": f'"{len(data)}"'}
         if requested:
             headers["Content-Range"] = f"bytes {first}-{last}/{len(data)}"
         self._respond(206 if requested else 200, data[first : last + 1], headers, entry)

@@ -16,11 +16,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from files import coded
-from plants import bending_tube, ring_quads, tube
+from plants import bending_tube, distance, ring_quads, tube
 from programs import CACHE, install_once
+from test_gltf_motion import encoded
 
 import athcodec
 from athcodec.decoding import container as ct
+from athcodec.exporters import write
 from athcodec.motion.clip import MotionClip
 from athcodec.motion.joining import in_wind
 from athcodec.viewer.build_viewer import modules
@@ -122,46 +124,91 @@ createRoot(document.getElementById('root')).render(
 """
 
 
-@pytest.mark.programs
-@pytest.mark.browser
-def test_an_app_that_vite_builds_shows_a_plant_for_each_component_as_the_document_says(browser, sample_ath, tmp_path):
-    packages = "three@0.187.0 react@19 react-dom@19 @react-three/fiber@9 vite@7".split()
+@pytest.fixture
+def app(browser, tmp_path):
+    """A function that opens the page that Vite builds of sources, with the package as its tarball has it."""
+    packages = "three@0.187.0 react@19 react-dom@19 @react-three/fiber@9 vite@7 @babylonjs/core@8 @babylonjs/loaders@8"
     folder = CACHE / "vite"
 
-    def npm(*words: str, cwd: Path) -> str:
-        return subprocess.run(["npm", *words], cwd=cwd, check=True, capture_output=True, text=True).stdout
+    def npm(*words: object, cwd: Path) -> str:
+        return subprocess.run(["npm", *map(str, words)], cwd=cwd, check=True, capture_output=True, text=True).stdout
+
+    tarball = tmp_path / npm("pack", "--silent", "--pack-destination", tmp_path, cwd=WEB.parent).split()[-1]
 
     def install() -> None:
         (folder / "package.json").write_text('{"name": "checks", "private": true, "type": "module"}')
-        npm("install", "--no-audit", "--no-fund", *packages, cwd=folder)
+        npm("install", "--no-audit", "--no-fund", *packages.split(), tarball, cwd=folder)
 
-    install_once(folder, " ".join(packages), install)
-    tarball = npm("pack", "--silent", "--pack-destination", str(tmp_path), cwd=WEB.parent).split()[-1]
-    shutil.unpack_archive(tmp_path / tarball, tmp_path)
-    shutil.copytree(tmp_path / "package", folder / "node_modules" / "athcodec-three", dirs_exist_ok=True)
-    text = (ROOT / "docs" / "three-js.md").read_text("utf-8")
-    (folder / "Plant.jsx").write_text(re.search(r"```jsx\n(.*?)```", text, re.S)[1])
-    (folder / "main.jsx").write_text(USES)
-    (folder / "index.html").write_text('<div id="root"></div><script type="module" src="/main.jsx"></script>')
-    (folder / "vite.config.js").write_text(
-        'export default { esbuild: { jsx: "automatic" }, build: { emptyOutDir: true } };'
-    )
-    npm("exec", "vite", "build", cwd=folder)
-    dist = {str(path.relative_to(folder / "dist")): path for path in (folder / "dist").rglob("*") if path.is_file()}
+    install_once(folder, f"{packages} {hashlib.sha256(tarball.read_bytes()).hexdigest()}", install)
+    (tmp_path / "node_modules").symlink_to(folder / "node_modules")
     page, errors = browser.new_page(viewport={"width": 400, "height": 300}), []
     page.on("pageerror", lambda error: errors.append(str(error)))
-    with ThrottledServer({"tree.ath": sample_ath.read_bytes()}) as line:
-        page.route(
-            lambda url: url.removeprefix(line.address) in dist,
-            lambda route: route.fulfill(path=dist[route.request.url.removeprefix(line.address)]),
-        )
-        page.goto(f"{line.address}index.html")
-        plants = "scene.children.filter(({ name, children }) => name === 'ath' && children.length === 1)"
-        page.wait_for_function(f"() => globalThis.scene && {plants}.length === 2", timeout=120_000)
-        assert page.evaluate(f"{plants}.map(({{ position }}) => position.x)") == [-2, 2]
-        assert page.evaluate(f"{plants}.every(({{ children: [{{ customDepthMaterial }}] }}) => customDepthMaterial)")
+    with ThrottledServer({}) as line:
+
+        def visit(body: str, files: dict[str, bytes]):
+            begin = f'{body}<script type="module" src="/{next(iter(files))}"></script>'
+            files |= {
+                "index.html": begin.encode(),
+                "vite.config.js": b'export default { esbuild: { jsx: "automatic" } };',
+            }
+            for name, data in files.items():
+                (tmp_path / name).write_bytes(data)
+            npm("exec", "vite", "build", cwd=tmp_path)
+            dist = tmp_path / "dist"
+            line.files = files | {path.relative_to(dist).as_posix(): path.read_bytes() for path in dist.rglob("*.*")}
+            page.goto(f"{line.address}index.html")
+            return page
+
+        yield visit
     page.close()
     assert errors == []
+
+
+def snippet(document: str, pattern: str) -> str:
+    return re.search(pattern + r"(.*?)```", (ROOT / "docs" / document).read_text("utf-8"), re.S)[1]
+
+
+@pytest.mark.programs
+@pytest.mark.browser
+def test_an_app_that_vite_builds_shows_a_plant_for_each_component_as_the_document_says(app, sample_ath):
+    sources = {"main.jsx": USES.encode(), "Plant.jsx": snippet("three-js.md", "```jsx\n").encode()}
+    page = app('<div id="root"></div>', sources | {"tree.ath": sample_ath.read_bytes()})
+    plants = "scene.children.filter(({ name, children }) => name === 'ath' && children.length === 1)"
+    page.wait_for_function(f"() => globalThis.scene && {plants}.length === 2", timeout=120_000)
+    assert page.evaluate(f"{plants}.map(({{ position }}) => position.x)") == [-2, 2]
+    assert page.evaluate(f"{plants}.every(({{ children: [{{ customDepthMaterial }}] }}) => customDepthMaterial)")
+
+
+BABYLON = """
+import { FreeCamera } from '@babylonjs/core/Cameras/freeCamera';
+import { Engine } from '@babylonjs/core/Engines/engine';
+import { Vector3 } from '@babylonjs/core/Maths/math.vector';
+import { Scene } from '@babylonjs/core/scene';
+const engine = new Engine(document.querySelector('canvas')), scene = new Scene(engine);
+new FreeCamera('camera', new Vector3(0, 5, -20), scene);
+%s
+engine.runRenderLoop(() => scene.render());
+Object.assign(globalThis, { scene, meshes, animationGroups });
+"""
+
+
+@pytest.mark.programs
+@pytest.mark.browser
+def test_babylon_plays_the_clip_and_level_of_a_glb_as_the_document_says(app, tmp_path):
+    calm = bending_tube()
+    storm = calm.replace(positions=calm.rest + 2 * (calm.positions - calm.rest))
+    write(athcodec.join({"calm": calm, "storm": storm}), tmp_path / "tree.glb", animation="morphs")
+    path = encoded(tmp_path / "tree.glb", tmp_path / "tree_motion.glb")
+    code = BABYLON % snippet("gltf.md", r"\*\*Babylon.js\*\*[^`]*```js\n")
+    page = app("<canvas></canvas>", {"main.js": code.encode(), path.name: path.read_bytes()})
+    page.wait_for_function("() => globalThis.meshes && scene.getFrameId() > 3", timeout=120_000)
+    assert page.evaluate("animationGroups.filter(({ isPlaying }) => isPlaying).map(({ name }) => name)") == ["storm"]
+    page.evaluate("animationGroups.find(({ name }) => name === 'storm').pause().goToFrame(30); scene.render()")
+    shown = page.evaluate("[...meshes.find(({ metadata }) => metadata?.ATH_motion).getVerticesData('position')]")
+    with athcodec.open(path, clip="storm") as decoder:
+        wanted, deepest = decoder.positions(15, level=2), decoder.positions(15)
+    off = distance(np.reshape(shown, wanted.shape), wanted)
+    assert off < 1e-5 * np.abs(wanted).max() and off < 0.01 * distance(wanted, deepest)
 
 
 def test_damage_is_named_and_other_segments_are_shown_at_their_deepest_level(layered_ath, tmp_path):
@@ -342,9 +389,7 @@ def test_shadows_move_with_the_plant_in_every_mode(browser, mode, tmp_path):
 
 CDN = "https://cdn.example.org/"
 COUNTED = (NODE / "counted.js").read_text("utf-8")
-ELSEWHERE = re.search(
-    r"```html\n(<script type=\"importmap\">.*?)```", (ROOT / "docs" / "three-js.md").read_text("utf-8"), re.S
-)[1]
+ELSEWHERE = snippet("three-js.md", '```html\n(?=<script type="importmap">)')
 
 
 @pytest.fixture

@@ -45,13 +45,15 @@ SMALL = (
     "rest.c",
 )
 """Run once per file, or little: compiled for size, all else for speed."""
+SCALAR = (*SMALL, "prepare.c")
+"""Vectors make the loops of these files larger and no faster."""
 FLAGS = [
     "-target",
     "wasm32-freestanding",
     "-mcpu=generic+bulk_memory+bulk_memory_opt+nontrapping_fptoint+sign_ext+simd128",
     "-std=c11",
-    "-fno-unroll-loops",
-    "-DATH_STATIC",  # unrolled it is larger, and no faster
+    "-fno-unroll-loops",  # unrolled it is larger, and no faster
+    "-DATH_STATIC",
     # the bits of positions are part of the format, as in core/CMakeLists.txt
     "-ffp-contract=off",
     "-fno-math-errno",
@@ -98,21 +100,14 @@ def compile_decoder(template: str) -> bytes:
     """The decoder as a WebAssembly module."""
     check_compiler()
     wanted = [f"-Wl,--export={name}" for name in ["__heap_base", *exports(template)]]
-    sources = [*decoder_sources(), VIEWER / "wasm.c"]
-    small = [path for path in sources if path.name in SMALL]
+    # functions of one kind beside each other compress better
+    sources = sorted([*decoder_sources(), VIEWER / "wasm.c"], key=lambda path: path.name in SMALL)
     with tempfile.TemporaryDirectory() as folder:
-        for path in small:
-            _zig(folder, "-Os", "-c", str(path), "-o", f"{path.stem}.o")
-        _zig(
-            folder,
-            "-O3",
-            *LINKING,
-            *wanted,
-            *(str(path) for path in sources if path not in small),
-            *(f"{path.stem}.o" for path in small),
-            "-o",
-            "decoder.wasm",
-        )
+        for path in sources:
+            speed = "-Os" if path.name in SMALL else "-O3"
+            vectors = "-fno-vectorize" if path.name in SCALAR else "-fvectorize"
+            _zig(folder, speed, vectors, "-c", str(path), "-o", f"{path.stem}.o")
+        _zig(folder, "-O3", *LINKING, *wanted, *(f"{path.stem}.o" for path in sources), "-o", "decoder.wasm")
         return (Path(folder) / "decoder.wasm").read_bytes()
 
 
