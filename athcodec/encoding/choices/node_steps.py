@@ -16,7 +16,7 @@ from athcodec.encoding.survey import Ath
 from athcodec.encoding.trials import Trials
 
 # Steps that are tried, over the error of a level.
-QUALITIES = (0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0)
+QUALITIES = (0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0, 16.0, 32.0, 64.0, 128.0)
 # Qualities for up to so many roots, whose maps are mostly a few bytes.
 FEW_ROOTS, ROOT_QUALITIES = 4, (0.7, 1.4, 2.8)
 FILE_SHARE, FEW_BYTES = 0.02, 320  # The maps may take this share of the file, or these bytes if that is more.
