@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import argparse
 import resource
+import sys
 import tempfile
 import time
 from collections.abc import Callable
@@ -19,6 +20,7 @@ from typing import Any
 import h5py
 
 import athcodec
+from athcodec.encoding import sample
 from bench import data
 from bench.clips import add_clips, add_rel_error, read
 from bench.tables import table
@@ -33,18 +35,29 @@ Decode: opening and all positions as one float32 array. Frame: opening and one f
 file that this needs. Decode/HDF5: over reading the same positions with h5py, gzip and shuffle; above 1: slower.
 """
 
+SAMPLE_NOTE = """
+Whole: bytes where all of a plant is tried, and not a sample of it. CPU/whole: processor time over that of then.
+Differ: which of the choices that a summary names are others then, beside steps.
+"""
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_clips(parser)
     add_rel_error(parser)
     parser.add_argument("--all", action="store_true", help="all clips of all suites, made if they are missing")
+    parser.add_argument("--sample", action="store_true", help="also how choices made on a sample of the plant compare")
 
 
 def run(args: argparse.Namespace) -> dict[str, Any]:
     names = dict.fromkeys(name for suite in data.SUITES.values() for name in suite)
     rows = [_row(path, args.rel_error) for path in (map(data.path_of, names) if args.all else args.clips)]
+    tables = [table(f"Speed, bound {args.rel_error:g}, medians in seconds", rows, NOTE)]
+    if args.sample:
+        tables.append(
+            table("Samples of plants", [_sample_row(path, args.rel_error) for path in args.clips], SAMPLE_NOTE)
+        )
     slow = [f"{row['clip']}: {row['CPU/limit']:.2f} of the limit" for row in rows if row["CPU/limit"] > 1]
-    return {"tables": [table(f"Speed, bound {args.rel_error:g}, medians in seconds", rows, NOTE)], "broken": slow}
+    return {"tables": tables, "broken": slow}
 
 
 def _row(path: Path, rel_error: float) -> dict[str, Any]:
@@ -84,6 +97,29 @@ def _row(path: Path, rel_error: float) -> dict[str, Any]:
         "frame": seconds[2],
         "read": bytes_read[0],
         "decode/HDF5": seconds[0] / seconds[1],
+    }
+
+
+def _sample_row(path: Path, rel_error: float) -> dict[str, Any]:
+    """Compare a file whose choices are made on a sample of the plant with one whose choices are made on all of it."""
+    summaries, seconds, large = [], [], sample.LARGE
+    try:
+        for sample.LARGE in (large, sys.maxsize):
+            with tempfile.TemporaryDirectory() as folder, read(path) as clip:
+                cpu = processor_seconds()
+                summaries.append(athcodec.encode(clip, Path(folder) / "clip.ath", rel_error=rel_error))
+                seconds.append(processor_seconds() - cpu)
+    finally:
+        sample.LARGE = large
+    by_sample, by_whole = summaries
+    differ = [name for name, value in by_sample.choices.items() if value != by_whole.choices[name]]
+    return {
+        "clip": path.stem,
+        "bytes": by_sample.bytes,
+        "whole": by_whole.bytes,
+        "bytes/whole": by_sample.bytes / by_whole.bytes,
+        "CPU/whole": seconds[0] / seconds[1],
+        "differ": ", ".join(name for name in differ if not name.endswith("step_ratio")),
     }
 
 
