@@ -195,6 +195,12 @@ def test_runs_of_points_are_found_whatever_their_order(name, order):
     assert "drift" in RUNS[name] or not turned[place == 0].any(), "a run does not begin at its base"
 
 
+@pytest.mark.parametrize("frames", [1, 2, 3])
+def test_branches_of_points_are_sought_in_few_frames_too(frames):
+    clip = runs_of_points([8] * 60, frames=frames, order="shuffled")
+    assert len(athcodec.find_branches(bare(clip)).vertex_branch) == clip.vertex_count
+
+
 @pytest.fixture(scope="module")
 def named_grass(tmp_path_factory) -> int:
     """Bytes of a meadow whose blades are named, in order."""

@@ -423,3 +423,28 @@ def test_segments_are_short_enough_for_a_decoder_within_its_default_memory():
         segments = split_segments(1_000, vertices, memory=Limits.memory_bytes)
         assert [start for start, _ in segments[1:]] == [stop for _, stop in segments[:-1]]
         assert max(decoding_bytes(vertices, stop - start) for start, stop in segments) <= Limits.memory_bytes
+
+
+@pytest.mark.parametrize("ladder", ["none", "decades"])
+def test_parts_that_jump_take_no_more_than_in_short_segments(tmp_path, ladder):
+    rng = np.random.default_rng(5)
+    frames, leaves = np.arange(96), 40
+    places = np.stack([rng.normal(size=(leaves, 3)), rng.normal(size=(leaves, 3)) * [3, 0.01, 3]])
+    fallen = (frames[:, None] >= rng.integers(10, 90, leaves)).astype(int)
+    turned = rng.normal(size=(2, leaves, 5, 3)) * 0.1
+    sway = 0.02 * np.sin(0.2 * frames[:, None] + rng.uniform(0, 6.28, leaves)) * (fallen == 0)
+    at = np.arange(leaves)
+    positions = places[fallen, at][:, :, None] + turned[fallen, at] + sway[:, :, None, None]
+    moved = positions.reshape(len(frames), -1, 3)
+    clip = clip_of(moved, moved[0], np.repeat(at, 5), np.full(leaves, -1))
+    given = {"rel_error": 1e-4, "ladder": ladder}
+    whole = athcodec.encode(clip, tmp_path / "a.ath", **given).bytes
+    assert whole <= 1.02 * athcodec.encode(clip, tmp_path / "b.ath", segment_frames=32, **given).bytes
+
+
+def test_a_branch_may_have_more_vertices_than_the_largest_lag(tmp_path):
+    moved = np.random.default_rng(0).normal(size=(2, 65_600, 3)).astype(np.float32)
+    clip = clip_of(moved, moved[0], np.zeros(65_600, np.int32), np.array([-1]))
+    summary = athcodec.encode(clip, tmp_path / "a.ath", rel_error=1e-2, effort="fast")
+    with athcodec.open(tmp_path / "a.ath") as decoder:
+        assert np.linalg.norm(decoder.positions() - moved, axis=2).max() <= summary.max_error_bound

@@ -75,6 +75,7 @@ REFUSAL_ROUNDS = 12  # Largest number of files that are coded to find the smalle
 FEW_BYTES = 2000  # Bytes up to which the file of a small clip may do without coarse levels.
 HELD_SHARE = 1 / 64  # Largest distance, in bounds, of a frame from the pose that is shown in its place.
 SEARCH_SAVES = 0.4  # Smallest share of the bytes at its first settings that a search has come down to.
+SHORT_SEGMENT = 32  # Frames of the segments of what jumps.
 STATIC_METADATA = ("unit", "up_axis")
 
 
@@ -426,6 +427,9 @@ class EncodingJob:
         share = PREDICTED_SHARE if ratio > 1 else 1.0
         search = Search.of(self.source, ath, bound, self.options.effort, work, self.options.jobs, ratios)
         unsearched = share * search.first_cost()
+        short = self._in_short_segments()
+        if len(short.source.segments) > len(self.source.segments) and search.jumps(short.source):
+            return short._decide(bound, work)
         if math.isfinite(unsearched):
             work.allowed -= FILE_BYTE * unsearched
         start = search.trials.start
@@ -446,6 +450,13 @@ class EncodingJob:
             if prediction is None:
                 raise
         return self._predicted(prediction.choice)
+
+    def _in_short_segments(self) -> EncodingJob:
+        """Return the job in short segments unless their length is given."""
+        options = self.options
+        if options.segment_frames is None:
+            options = dataclasses.replace(options, segment_frames=SHORT_SEGMENT)
+        return dataclasses.replace(self, source=self.source.in_segments(options.segment_frames), options=options)
 
     def _allowed_work(self, bound: float) -> Work:
         """Return the work that the decisions about a file may take: what its survey and coding leave of all."""
@@ -522,12 +533,15 @@ class EncodingJob:
         return _Decided(ath, choice, prelude, layers, source)
 
     def draft(self, decided: _Decided) -> Draft:
+        options = self.options
+        if decided.choice.predicted is None:
+            options = dataclasses.replace(options, segment_frames=decided.source.segment_frames)
         return Draft(
             decided.choice,
             self.seen,
             decided.segment_count,
             self.branches,
-            self.options,
+            options,
             decided.fingerprint,
             decided.ath.thresholds,
         )
@@ -705,13 +719,13 @@ class EncodingJob:
             return pool.ordered(predict, ((index, [source.block(index)]) for index in segments), at_once)
         order = self._in_order(source, segments)
         begun = pool.ordered(begin, self._linked(decided, order), at_once - 1)
-        coded = pool.ordered(_finished, self._halfway(begun), 0)
+        coded = pool.ordered(_finished, self._halfway(begun, decided.segment_count), 0)
         return (one for one, (_, is_wanted) in zip(coded, order) if is_wanted)
 
-    def _halfway(self, begun: Iterable[tuple[int, CodedMotion]]) -> Iterator[tuple[int, CodedMotion]]:
-        """Report each segment whose first layer is coded."""
+    def _halfway(self, begun: Iterable[tuple[int, CodedMotion]], count: int) -> Iterator[tuple[int, CodedMotion]]:
+        """Report each of `count` segments whose first layer is coded."""
         for done, one in enumerate(begun):
-            self.report("motion", min((done + 0.5) / self.segment_count, 1.0))
+            self.report("motion", min((done + 0.5) / count, 1.0))
             yield one
             del one
 
@@ -729,7 +743,7 @@ class EncodingJob:
         frames = positions, exact, source.goes_on(index), source.shown_times(index), source.box, loops
         layers = decided.layers.of_segment(loops)
         release_memory()
-        return CodedMotion(decided.prelude, layers, self.segment_count, *frames, before, after)
+        return CodedMotion(decided.prelude, layers, decided.segment_count, *frames, before, after)
 
     @staticmethod
     def _in_order(source: Source, segments: Sequence[int]) -> list[tuple[int, bool]]:

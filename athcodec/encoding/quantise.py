@@ -134,7 +134,11 @@ def bits(numbers: np.ndarray) -> np.ndarray:
 
 
 BIT_PARTS = 2.0**16  # Parts of a bit in which estimates count.
-LONGEST_LAG, LONGEST_ROW = 40, 600  # Largest lags, in vertices, of stems and of stems that may be whole meshes.
+LONGEST_LAG, LONGEST_ROW = (
+    40,
+    600,
+)  # Largest lags, in vertices, that are tried of stems, and of stems that may be whole meshes.
+MOST_LAG = 65535  # Largest lag of a file.
 MESH = 1000  # Vertices from which on a stem may be a whole mesh.
 SHORT_STEM = 16  # Vertices up to which many stems are likely to be alike, which a lag of them all tells apart.
 
@@ -142,7 +146,7 @@ SHORT_STEM = 16  # Vertices up to which many stems are likely to be alike, which
 def rest_lags(stems: np.ndarray, attach: np.ndarray | None, step: float) -> np.ndarray:
     """Return the lags, 1 or more, that leave the least of stems' rest poses, (B, n, 3), to code (FORMAT.md, Lag).
     attach: (B, 3) attach points; None: there are none."""
-    none = stems.shape[1]  # No step is that many vertices ago.
+    none = min(stems.shape[1], MOST_LAG)  # No step, or hardly any, is that many vertices ago.
     chains = stems if attach is None else np.concatenate([attach[:, None], stems], axis=1)
     is_mesh = chains.shape[1] > MESH
     steps = np.diff(chains[:, : 4 * MESH if is_mesh else MESH], axis=1)  # A sample does for long stems.

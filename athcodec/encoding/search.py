@@ -37,6 +37,7 @@ SETTLING_ROUNDS = 64  # Largest number of times that the choices of a small clip
 
 STEP_TRIALS, FIRST_LAYER_TRIALS = 12, 6  # Trials for which choices leave work: of steps, and of the first of layers.
 SEARCHED_SHARE = 0.5  # Share of the bytes of motion at its first settings that a search usually comes down to.
+SHORT_SHARE = 0.8  # Share of the bytes at which short segments are taken.
 LEAST_TRIALS = 12  # Trials without which another reference pose is not tried.
 
 Choose = Callable[[Settings, Trials], Settings]
@@ -125,6 +126,16 @@ class Search:
         expected = trial * expected_trials(effort, search.trials.is_layered, search._is_small)
         work.expected = work.expected or min(expected, work.allowed)
         return search
+
+    def jumps(self, short: Source) -> bool:
+        """Return whether a file is much smaller in short segments, the source in which is given: what jumps is seen in
+        all waves of its segment, and learned time bases do not always help."""
+        trials = (self.of_sample or self).trials
+        in_short = Search(replace(self.trials, source=short, samples=samples_of(short)), self.effort, self.ratios)
+        most = in_short.first_cost() / SHORT_SHARE
+        return most < self.first_cost() and most < min(
+            trials.costs(learned_bases.candidates(trials.start, trials)), default=math.inf
+        )
 
     def first_cost(self) -> float:
         """Return the bytes of a whole file at the settings that the search starts with."""

@@ -86,7 +86,7 @@ def _other_lags(source: Source, settings: Settings) -> list[Settings]:
     no_beam = np.maximum(best, 1)
     others = [np.minimum(best, 1), no_beam, np.ones_like(best), np.where(count <= qz.SHORT_STEM, count, no_beam)]
     if source.still:
-        others += [np.full_like(best, 3), np.full_like(best, 4), np.minimum(2 * no_beam, 65535)]
+        others += [np.full_like(best, 3), np.full_like(best, 4), np.minimum(2 * no_beam, qz.MOST_LAG)]
     tried = {lag.astype(np.int32).tobytes() for lag in others} - {best.tobytes()}
     return [replace(settings, lags=np.frombuffer(lag, np.int32)) for lag in sorted(tried)]
 

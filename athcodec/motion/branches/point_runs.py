@@ -39,7 +39,7 @@ def run_links(frames: np.ndarray) -> np.ndarray | None:
     count, steady = frames.shape[1], _Steady(frames)
     links, loose = np.zeros((0, 2), np.int64), np.arange(count)
     for turn in range(ROUNDS):
-        steady.add(_near_pairs(frames[-turn, loose], loose))
+        steady.add(_near_pairs(frames[-turn % len(frames), loose], loose))
         links, before = steady.tree(), len(links)
         if turn == 0 and (steady.beside(links) > CROWDED * count or len(links) < SCATTERED * count):
             return None
