@@ -197,8 +197,12 @@ def test_runs_of_points_are_found_whatever_their_order(name, order):
 
 @pytest.mark.parametrize("frames", [1, 2, 3])
 def test_branches_of_points_are_sought_in_few_frames_too(frames):
-    clip = runs_of_points([8] * 60, frames=frames, order="shuffled")
-    assert len(athcodec.find_branches(bare(clip)).vertex_branch) == clip.vertex_count
+    rng, time, along = np.random.default_rng(1), np.arange(frames)[:, None, None], np.linspace(0, 0.3, 8)
+    base, phase = rng.uniform(0, 5, (600, 2)).T[..., None], rng.uniform(0, 6, (600, 1))
+    bent = base[0] + 0.3 * along**2 * np.sin(time + phase), base[1] + 0.2 * along**2 * np.cos(2 * time + phase)
+    points = np.stack([*bent, along + 0 * bent[0]], axis=-1).reshape(frames, -1, 3)[:, rng.permutation(4800)]
+    found = athcodec.find_branches(MotionClip(points.astype(np.float32), np.arange(float(frames))))
+    assert len(found.vertex_branch) == 4800
 
 
 @pytest.fixture(scope="module")

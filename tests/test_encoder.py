@@ -428,11 +428,12 @@ def test_segments_are_short_enough_for_a_decoder_within_its_default_memory():
 @pytest.mark.parametrize("ladder", ["none", "decades"])
 def test_parts_that_jump_take_no_more_than_in_short_segments(tmp_path, ladder):
     rng = np.random.default_rng(5)
-    frames, leaves = np.arange(96), 40
+    frames, leaves = np.arange(200), 40
     places = np.stack([rng.normal(size=(leaves, 3)), rng.normal(size=(leaves, 3)) * [3, 0.01, 3]])
-    fallen = (frames[:, None] >= rng.integers(10, 90, leaves)).astype(int)
+    fallen = (frames[:, None] >= rng.integers(1, 199, leaves)).astype(int)
     turned = rng.normal(size=(2, leaves, 5, 3)) * 0.1
-    sway = 0.02 * np.sin(0.2 * frames[:, None] + rng.uniform(0, 6.28, leaves)) * (fallen == 0)
+    phase = rng.uniform(0.3, 0.9, leaves) * frames[:, None] + rng.uniform(0, 6.28, leaves)
+    sway = 0.1 * np.sin(phase) * (fallen == 0)
     at = np.arange(leaves)
     positions = places[fallen, at][:, :, None] + turned[fallen, at] + sway[:, :, None, None]
     moved = positions.reshape(len(frames), -1, 3)
