@@ -177,6 +177,7 @@ _PLAYING = {  # Functions of core/include/ath.h.
     "ath_repeats": (c_void_p, [c_void_p]),
     "ath_work_size": (c_size_t, [c_void_p]),
     "ath_segment_size": (c_size_t, [c_void_p, c_int32]),
+    "ath_segment_size_to": (c_size_t, [c_void_p, c_int32, c_int32]),
     "ath_prepare_start": (c_int, [c_void_p, c_size_t, c_void_p, c_int32, c_int32, c_void_p, c_size_t]),
     "ath_prepare_step": (c_int, [c_void_p, c_int32]),
     "ath_prepare_onward": (c_int, [c_void_p, c_size_t, *[c_void_p] * 3, c_int32, c_void_p, c_size_t]),
