@@ -1001,14 +1001,14 @@ static int do_piece(ath_work *work)
 
 static int do_step(ath_work *work)
 {
-    int result = work->phase == FAILED      ? ATH_BAD_ARGUMENT
-                 : work->phase == DONE      ? ATH_OK
+    int result = work->phase == FAILED       ? ATH_BAD_ARGUMENT
+                 : work->phase == DONE       ? ATH_OK
                  : !work->segment->positions ? ATH_NO_MEMORY
-                 : work->phase == BEFORE    ? go_back(work)
-                 : work->phase == CHECKSUMS ? check_some(work)
-                 : work->phase == HEADS     ? open_level(work)
-                 : work->phase == FRAMES    ? do_frames(work)
-                                            : do_piece(work);
+                 : work->phase == BEFORE     ? go_back(work)
+                 : work->phase == CHECKSUMS  ? check_some(work)
+                 : work->phase == HEADS      ? open_level(work)
+                 : work->phase == FRAMES     ? do_frames(work)
+                                             : do_piece(work);
     if (result != ATH_OK) work->phase = FAILED;
     return result != ATH_OK || work->phase == DONE ? result : ATH_MORE;
 }

@@ -202,7 +202,7 @@ ATH_INLINE void rest_note(rest_memory *memory, const rest_guess *at, const doubl
 }
 
 ATH_HOT static void rest_learn(rest_predictor *predictor, rest_guess *at, double per_unit, const double point[3],
-                       const int32_t integers[3])
+                               const int32_t integers[3])
 {
     double offset[3], squares = 0.0, usual, noise;
     rest_term(offset, at->base, point, per_unit);
