@@ -52,7 +52,7 @@ def fields(*types_and_names: Any) -> list[tuple[str, Any]]:
 BRANCH = np.dtype(fields("<i4", "parent count attach flags lag first subtree depth rigid detail ring"))
 PIECE = np.dtype(
     fields(
-        *("<i8", "modes basis attach_cache"),
+        *("<i8", "modes basis attach_cache", "<u8", "attached"),
         *("<i4", "first count parent attach branch flags rank level low_level low_modes last_attached ring"),
         *("<i4", "modes_level tip_weight"),
     )

@@ -193,22 +193,23 @@ ATH_INLINE void weigh_shape(int32_t modes, const double *shape, double mode[][PL
 }
 
 ATH_INLINE void weigh_terms(const ath_plan *plan, const ath_piece *piece, const ath_piece_rows *rows,
-                            const placing_terms *terms, int32_t first, int32_t count, placed_vertices *vertices)
+                            const placing_terms *terms, const int32_t *place, int32_t count, placed_vertices *vertices)
 {
-    const double *basis = plan->bases + piece->basis + first, *a = ath_rest_attach(plan, piece);
+    const double *basis = plan->bases + piece->basis, *a = ath_rest_attach(plan, piece);
     double mode[ATH_SHAPE_MODES][PLACED_VERTICES];
     for (int32_t i = 0; i < count; i++) {
-        const double *x0 = ath_rest_of(plan, piece->first + first + i);
+        const double *x0 = ath_rest_of(plan, piece->first + place[i]);
         for (int32_t k = 0; k < 3; k++) vertices->rest[k][i] = x0[k] - a[k];
     }
     if (terms->shape_count > 0)
         for (int32_t m = 0; m < ath_shape_modes(piece); m++)
-            for (int32_t i = 0; i < PLACED_VERTICES; i++) mode[m][i] = i < count ? basis[m * piece->count + i] : 0.0;
+            for (int32_t i = 0; i < PLACED_VERTICES; i++)
+                mode[m][i] = i < count ? basis[m * piece->count + place[i]] : 0.0;
     for (int32_t j = 0; j < terms->shape_count; j++)
         weigh_shape(ath_shape_modes(piece), rows->shapes + terms->shape[j] * ATH_SHAPE_NUMBERS, mode,
                     vertices->weight[j]);
     for (int32_t j = terms->shape_count; j < terms->count; j++)
-        for (int32_t i = 0; i < count; i++) vertices->weight[j][0][i] = basis[terms->mode[j] * piece->count + i];
+        for (int32_t i = 0; i < count; i++) vertices->weight[j][0][i] = basis[terms->mode[j] * piece->count + place[i]];
 }
 
 /* Sums the terms of vertex v in PLACED_FRAMES frames from t on. */
@@ -250,8 +251,8 @@ ATH_INLINE void add_terms(int32_t t, const placing_terms *terms, const placed_ve
     lanes_store(sum[2] + ATH_LANES, &z1);
 }
 
-/* x := c + R x for `count` vertices in ATH_LANES frames */
-ATH_INLINE void move_vertices(int32_t T, int32_t count, const double *R, const double *c,
+/* x := c + R x for `count` vertices in ATH_LANES frames. Vertex i goes to row place[i]. */
+ATH_INLINE void move_vertices(int32_t T, const int32_t *place, int32_t count, const double *R, const double *c,
                               double sums[][3][PLACED_FRAMES], int32_t from, double *out)
 {
     ath_lanes rows[3][3], centre[3], x[3];
@@ -259,9 +260,9 @@ ATH_INLINE void move_vertices(int32_t T, int32_t count, const double *R, const d
         for (int32_t j = 0; j < 3; j++) lanes_load(&rows[k][j], R + (3 * k + j) * T);
         lanes_load(&centre[k], c + k * T);
     }
-    for (int32_t i = 0; i < count; i++, out += 3 * T) {
+    for (int32_t i = 0; i < count; i++) {
         for (int32_t k = 0; k < 3; k++) lanes_load(&x[k], sums[i][k] + from);
-        for (int32_t k = 0; k < 3; k++) lanes_move(out + k * T, &centre[k], rows[k], x);
+        for (int32_t k = 0; k < 3; k++) lanes_move(out + (3 * place[i] + k) * T, &centre[k], rows[k], x);
     }
 }
 
@@ -282,26 +283,29 @@ ATH_INLINE void place_frame(int32_t t, const placing_terms *terms, const placed_
 }
 
 /* placed = c + R (x0 - a + sum over terms of weight * track), shapes first, without tracks of zeros. A few vertices
- * pass through a few frames at a time, while tracks and attach frames stay in the innermost cache. */
+ * pass through a few frames at a time, while tracks and attach frames stay in the innermost cache. wanted: bit v asks
+ * for vertex v. */
 ATH_HOT static void place(const ath_plan *plan, const ath_motion *motion, const ath_piece *piece,
-                          const ath_piece_rows *rows, const uint8_t *used, const ath_scratch *scratch)
+                          const ath_piece_rows *rows, const uint8_t *used, uint64_t wanted, const ath_scratch *scratch)
 {
-    int32_t T = motion->frames, count;
+    int32_t T = motion->frames, places[ATH_PIECE_VERTICES], total = 0, count;
     placing_terms terms = terms_of(piece, rows, T, used, scratch->rows);
     placed_vertices vertices;
     double sums[PLACED_VERTICES][3][PLACED_FRAMES], *out = scratch->placed;
     const double *R = scratch->at.rotation, *c = scratch->at.point;
-    for (int32_t first = 0; first < piece->count; first += count, out += count * 3 * T) {
+    for (int32_t v = 0; v < piece->count; v++)
+        if (wanted >> v & 1) places[total++] = v;
+    for (const int32_t *at = places; at < places + total; at += count) {
         int32_t t = 0;
-        count = ath_min(PLACED_VERTICES, piece->count - first);
-        weigh_terms(plan, piece, rows, &terms, first, count, &vertices);
+        count = ath_min(PLACED_VERTICES, total - (int32_t)(at - places));
+        weigh_terms(plan, piece, rows, &terms, at, count, &vertices);
         for (; t + PLACED_FRAMES <= T; t += PLACED_FRAMES) {
             for (int32_t i = 0; i < count; i++) add_terms(t, &terms, &vertices, i, sums[i]);
             for (int32_t from = 0; from < PLACED_FRAMES; from += ATH_LANES)
-                move_vertices(T, count, R + t + from, c + t + from, sums, from, out + t + from);
+                move_vertices(T, at, count, R + t + from, c + t + from, sums, from, out + t + from);
         }
         for (; t < T; t++)
-            for (int32_t i = 0; i < count; i++) place_frame(t, &terms, &vertices, i, &scratch->at, out + i * 3 * T);
+            for (int32_t i = 0; i < count; i++) place_frame(t, &terms, &vertices, i, &scratch->at, out + at[i] * 3 * T);
     }
 }
 
@@ -369,13 +373,18 @@ static void turn_with_sheet(const ath_plan *plan, int32_t T, const ath_piece *pi
     }
 }
 
+static int turns_with_sheet(const ath_piece *piece)
+{
+    return (piece->flags & (ATH_SHEET | ATH_RIGID | ATH_STILL)) == ATH_SHEET;
+}
+
 static void carry(const ath_plan *plan, const ath_motion *motion, const ath_piece *piece, const ath_scratch *scratch)
 {
     int32_t T = motion->frames;
     if (piece->attach_cache < 0) return;
     ath_frames at = cached_frames(motion, piece);
     copy_rows(at.point, scratch->at.point, 3 * (size_t)T);
-    if ((piece->flags & (ATH_SHEET | ATH_RIGID | ATH_STILL)) == ATH_SHEET)
+    if (turns_with_sheet(piece))
         turn_with_sheet(plan, T, piece, scratch, at.rotation);
     else
         copy_rows(at.rotation, scratch->at.rotation, 9 * (size_t)T);
@@ -525,14 +534,26 @@ void ath_inverse_row(const ath_motion *motion, const ath_piece *piece, const ath
                       ath_row(rows->modes, r, motion->frames), track);
 }
 
-const double *ath_pose_used(const ath_plan *plan, const ath_motion *motion, const ath_piece *piece,
-                            const ath_piece_rows *rows, const uint8_t *used, const ath_scratch *scratch)
+static const double *pose(const ath_plan *plan, const ath_motion *motion, const ath_piece *piece,
+                          const ath_piece_rows *rows, const uint8_t *used, uint64_t wanted, const ath_scratch *scratch)
 {
     ath_scratch here = *scratch;
     if (piece->attach_cache >= 0) here.placed = cached_vertices(motion, piece);
-    place(plan, motion, piece, rows, used, &here);
+    place(plan, motion, piece, rows, used, wanted, &here);
     carry(plan, motion, piece, &here);
     return here.placed;
+}
+
+const double *ath_pose_used(const ath_plan *plan, const ath_motion *motion, const ath_piece *piece,
+                            const ath_piece_rows *rows, const uint8_t *used, const ath_scratch *scratch)
+{
+    return pose(plan, motion, piece, rows, used, UINT64_MAX, scratch);
+}
+
+void ath_pose_attached(const ath_plan *plan, const ath_motion *motion, const ath_piece *piece,
+                       const ath_piece_rows *rows, const uint8_t *used, const ath_scratch *scratch)
+{
+    pose(plan, motion, piece, rows, used, turns_with_sheet(piece) ? UINT64_MAX : piece->attached, scratch);
 }
 
 static double *row_of(const ath_motion *motion, const ath_scratch *scratch, int32_t m)

@@ -115,6 +115,10 @@ void ath_pose_tracks(const ath_motion *motion, const ath_piece *piece, const ath
 const double *ath_pose_used(const ath_plan *plan, const ath_motion *motion, const ath_piece *piece,
                             const ath_piece_rows *rows, const uint8_t *used, const ath_scratch *scratch);
 
+/* Does the same, but places no vertices that the pieces that hang on it do not need. */
+void ath_pose_attached(const ath_plan *plan, const ath_motion *motion, const ath_piece *piece,
+                       const ath_piece_rows *rows, const uint8_t *used, const ath_scratch *scratch);
+
 /* Turns R towards the rotation nearest to H, whose column k is what rest axis k became. Leaves R if H vanishes. */
 void ath_turn_to(const double H[9], int32_t steps, double R[9]);
 /* x := c + R x, 3 x frames */

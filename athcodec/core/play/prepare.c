@@ -771,13 +771,16 @@ static const double *placed_piece(layer_work *layer, int32_t p)
     return layer->placed;
 }
 
-/* Places the piece after ath_turned_attach, in a layer before the last only if other pieces hang on it. */
+/* Places the piece after ath_turned_attach, in a layer before the last only what other pieces hang on. */
 static void pose_piece(const ath_work *work, layer_work *layer, int32_t p)
 {
     const ath_piece *piece = layer->plan->pieces + p;
     ath_pose_tracks(&layer->motion, piece, &layer->rows, &layer->scratch, layer->used);
     layer->placed = 0;
-    if (piece->attach_cache >= 0 || layer == work->layers + work->layer) placed_piece(layer, p);
+    if (layer == work->layers + work->layer)
+        placed_piece(layer, p);
+    else if (piece->attach_cache >= 0)
+        ath_pose_attached(layer->plan, &layer->motion, piece, &layer->rows, layer->used, &layer->scratch);
 }
 
 static void predict_modes(layer_work *layer, int32_t p)
