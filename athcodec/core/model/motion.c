@@ -534,26 +534,15 @@ void ath_inverse_row(const ath_motion *motion, const ath_piece *piece, const ath
                       ath_row(rows->modes, r, motion->frames), track);
 }
 
-static const double *pose(const ath_plan *plan, const ath_motion *motion, const ath_piece *piece,
-                          const ath_piece_rows *rows, const uint8_t *used, uint64_t wanted, const ath_scratch *scratch)
+const double *ath_pose_used(const ath_plan *plan, const ath_motion *motion, const ath_piece *piece,
+                            const ath_piece_rows *rows, const uint8_t *used, uint64_t wanted,
+                            const ath_scratch *scratch)
 {
     ath_scratch here = *scratch;
     if (piece->attach_cache >= 0) here.placed = cached_vertices(motion, piece);
-    place(plan, motion, piece, rows, used, wanted, &here);
+    place(plan, motion, piece, rows, used, turns_with_sheet(piece) ? ATH_ALL_VERTICES : wanted, &here);
     carry(plan, motion, piece, &here);
     return here.placed;
-}
-
-const double *ath_pose_used(const ath_plan *plan, const ath_motion *motion, const ath_piece *piece,
-                            const ath_piece_rows *rows, const uint8_t *used, const ath_scratch *scratch)
-{
-    return pose(plan, motion, piece, rows, used, UINT64_MAX, scratch);
-}
-
-void ath_pose_attached(const ath_plan *plan, const ath_motion *motion, const ath_piece *piece,
-                       const ath_piece_rows *rows, const uint8_t *used, const ath_scratch *scratch)
-{
-    pose(plan, motion, piece, rows, used, turns_with_sheet(piece) ? UINT64_MAX : piece->attached, scratch);
 }
 
 static double *row_of(const ath_motion *motion, const ath_scratch *scratch, int32_t m)
@@ -568,7 +557,7 @@ const double *ath_pose_rows(const ath_plan *plan, const ath_motion *motion, int3
     uint8_t used[ATH_PIECE_VERTICES];
     for (int32_t m = 0; m < ath_rank(piece); m++)
         used[m] = (uint8_t)any_nonzero(row_of(motion, scratch, m), 3 * motion->frames);
-    return ath_pose_used(plan, motion, piece, rows, used, scratch);
+    return ath_pose_used(plan, motion, piece, rows, used, ATH_ALL_VERTICES, scratch);
 }
 
 const double *ath_pose_piece(const ath_plan *plan, const ath_motion *motion, int32_t p, const ath_piece_rows *rows,
@@ -577,7 +566,7 @@ const double *ath_pose_piece(const ath_plan *plan, const ath_motion *motion, int
     uint8_t used[ATH_PIECE_VERTICES];
     ath_turned_attach(plan, motion, p, rows, scratch);
     ath_pose_tracks(motion, plan->pieces + p, rows, scratch, used);
-    return ath_pose_used(plan, motion, plan->pieces + p, rows, used, scratch);
+    return ath_pose_used(plan, motion, plan->pieces + p, rows, used, ATH_ALL_VERTICES, scratch);
 }
 
 void ath_pose_tracks(const ath_motion *motion, const ath_piece *piece, const ath_piece_rows *rows,

@@ -85,13 +85,6 @@ static void split_branch(const ath_branch *branches, int32_t b, ath_piece *piece
     }
 }
 
-/* Notes which vertices of the pieces below set attach frames: the attach vertex, and its neighbours for the tangent. */
-static void mark_attached(ath_piece *pieces, const ath_piece *piece)
-{
-    uint64_t vertex = (uint64_t)1 << (piece->attach - pieces[piece->parent].first);
-    pieces[piece->parent].attached |= vertex >> 1 | vertex | vertex << 1;
-}
-
 /* Places attach caches on a stack, since in depth-first order those on top are done with first. A cache is freed when
  * the last piece has been attached to it, before that piece gets its own: a long chain never holds more than one. */
 static void place_attach_caches(ath_plan *plan, ath_piece *pieces, int32_t *stack, int keep)
@@ -103,8 +96,10 @@ static void place_attach_caches(ath_plan *plan, ath_piece *pieces, int32_t *stac
     for (int32_t p = 0; p < plan->piece_count; p++) plan->longest = ath_max(plan->longest, pieces[p].count);
     for (int32_t p = 0; p < plan->piece_count; p++)
         if (pieces[p].parent >= 0) {
-            pieces[pieces[p].parent].last_attached = p;
-            mark_attached(pieces, pieces + p);
+            ath_piece *parent = pieces + pieces[p].parent;
+            uint64_t vertex = (uint64_t)1 << (pieces[p].attach - parent->first);
+            parent->attached |= vertex >> 1 | vertex | vertex << 1; /* the neighbours give the tangent */
+            parent->last_attached = p;
         }
     for (int32_t p = 0; p < plan->piece_count; p++) {
         while (!keep && height > 0 && pieces[stack[height - 1]].last_attached <= p)

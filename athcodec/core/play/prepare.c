@@ -767,7 +767,7 @@ static const double *placed_piece(layer_work *layer, int32_t p)
 {
     if (!layer->placed)
         layer->placed = ath_pose_used(layer->plan, &layer->motion, layer->plan->pieces + p, &layer->rows, layer->used,
-                                      &layer->scratch);
+                                      ATH_ALL_VERTICES, &layer->scratch);
     return layer->placed;
 }
 
@@ -780,7 +780,7 @@ static void pose_piece(const ath_work *work, layer_work *layer, int32_t p)
     if (layer == work->layers + work->layer)
         placed_piece(layer, p);
     else if (piece->attach_cache >= 0)
-        ath_pose_attached(layer->plan, &layer->motion, piece, &layer->rows, layer->used, &layer->scratch);
+        ath_pose_used(layer->plan, &layer->motion, piece, &layer->rows, layer->used, piece->attached, &layer->scratch);
 }
 
 static void predict_modes(layer_work *layer, int32_t p)
