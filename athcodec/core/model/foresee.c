@@ -73,20 +73,10 @@ ATH_HOT static void weigh_row(const ath_plan *plan, const ath_piece *piece, cons
         memcpy(weight[s % 3], basis + s / 3 * n, (size_t)n * sizeof *basis);
         return;
     }
-    const double *shape = rows->shapes + s * ATH_SHAPE_NUMBERS;
     for (int32_t from = 0; from < n; from += ATH_LANES) {
         int32_t v = ath_min(from, n - ATH_LANES);
-        ath_lanes x, y, z;
-        lanes_set(&x, 0.0);
-        y = z = x;
-        for (int32_t m = 0; m < ath_shape_modes(piece); m++) {
-            lanes_add_scaled(&x, shape[3 * m], basis + m * n + v);
-            lanes_add_scaled(&y, shape[3 * m + 1], basis + m * n + v);
-            lanes_add_scaled(&z, shape[3 * m + 2], basis + m * n + v);
-        }
-        lanes_store(weight[0] + v, &x);
-        lanes_store(weight[1] + v, &y);
-        lanes_store(weight[2] + v, &z);
+        lanes_of_shape(ath_shape_modes(piece), rows->shapes + s * ATH_SHAPE_NUMBERS, basis + v, n, weight[0] + v,
+                       weight[1] + v, weight[2] + v);
     }
 }
 

@@ -173,25 +173,6 @@ typedef struct {
     double rest[3][PLACED_VERTICES], weight[ATH_TERMS][3][PLACED_VERTICES]; /* modes: axis 0 only */
 } placed_vertices;
 
-ATH_INLINE void weigh_shape(int32_t modes, const double *shape, double mode[][PLACED_VERTICES],
-                            double weight[3][PLACED_VERTICES])
-{
-    for (int32_t v = 0; v < PLACED_VERTICES; v += ATH_LANES) {
-        ath_lanes x, y, z;
-        lanes_set(&x, 0.0);
-        lanes_set(&y, 0.0);
-        lanes_set(&z, 0.0);
-        for (int32_t m = 0; m < modes; m++) {
-            lanes_add_scaled(&x, shape[3 * m], mode[m] + v);
-            lanes_add_scaled(&y, shape[3 * m + 1], mode[m] + v);
-            lanes_add_scaled(&z, shape[3 * m + 2], mode[m] + v);
-        }
-        lanes_store(weight[0] + v, &x);
-        lanes_store(weight[1] + v, &y);
-        lanes_store(weight[2] + v, &z);
-    }
-}
-
 ATH_INLINE void weigh_terms(const ath_plan *plan, const ath_piece *piece, const ath_piece_rows *rows,
                             const placing_terms *terms, const int32_t *place, int32_t count, placed_vertices *vertices)
 {
@@ -206,8 +187,10 @@ ATH_INLINE void weigh_terms(const ath_plan *plan, const ath_piece *piece, const 
             for (int32_t i = 0; i < PLACED_VERTICES; i++)
                 mode[m][i] = i < count ? basis[m * piece->count + place[i]] : 0.0;
     for (int32_t j = 0; j < terms->shape_count; j++)
-        weigh_shape(ath_shape_modes(piece), rows->shapes + terms->shape[j] * ATH_SHAPE_NUMBERS, mode,
-                    vertices->weight[j]);
+        for (int32_t v = 0; v < PLACED_VERTICES; v += ATH_LANES)
+            lanes_of_shape(ath_shape_modes(piece), rows->shapes + terms->shape[j] * ATH_SHAPE_NUMBERS, mode[0] + v,
+                           PLACED_VERTICES, vertices->weight[j][0] + v, vertices->weight[j][1] + v,
+                           vertices->weight[j][2] + v);
     for (int32_t j = terms->shape_count; j < terms->count; j++)
         for (int32_t i = 0; i < count; i++) vertices->weight[j][0][i] = basis[terms->mode[j] * piece->count + place[i]];
 }

@@ -95,8 +95,7 @@ static void code_expected_vertex(ath_coder *coder, rest_model *model, const rest
 {
     double per_unit = 1.0 / unit, expected[3], *out = rest + 3 * (size_t)v;
     int32_t integers[3] = {0, 0, 0};
-    rest_expected(&predictor->all, at, expected);
-    for (int32_t k = 0; k < 3; k++) expected[k] = at->base[k] + expected[k] * unit;
+    for (int32_t k = 0; k < 3; k++) expected[k] = at->base[k] + rest_expected(&predictor->all, at, k) * unit;
 #ifdef ATH_ENCODING
     double units[3];
     rest_term(units, expected, source + (out - rest), per_unit);

@@ -163,8 +163,7 @@ static void copy_start(const copy_model *model, const ath_branch *branch, const 
 {
     copy_guess(model, branch, shape, place, rest, 1.0 / own, at);
     at->phase = (rest_memory *)&model->first;
-    rest_expected(&model->first, at, expected);
-    for (int32_t k = 0; k < 3; k++) expected[k] = at->base[k] + expected[k] * own;
+    for (int32_t k = 0; k < 3; k++) expected[k] = at->base[k] + rest_expected(&model->first, at, k) * own;
 }
 
 static int code_copy_place(ath_coder *coder, copy_model *model, rest_shape *shape, double lever, double unit,

@@ -129,30 +129,22 @@ static void rest_look_around(rest_predictor *predictor, const ath_branch *branch
     rest_guess_all(at->filter, at);
 }
 
-/* Fills the weighted means of the guesses. Guesses that were good nearby weigh by far the most. */
-ATH_HOT static void rest_expected(const rest_memory *all, const rest_guess *at, double expected[3])
+/* Returns the weighted mean of the guesses on one axis. Guesses that were good nearby weigh by far the most. */
+static double rest_expected(const rest_memory *all, const rest_guess *at, int32_t k)
 {
-    double weight[3 * REST_GUESSES], error[3 * REST_GUESSES], least[3 * REST_GUESSES], lowest[3];
-    const double *before = (const double *)all->error, *here = (const double *)at->phase->error;
-    int32_t count = 3 * at->guess_count;
-    for (int32_t i = 0; i < count; i++) error[i] = (before[i] + 0.05) * (here[i] + 0.05);
-    for (int32_t k = 0; k < 3; k++) {
-        lowest[k] = error[k];
-        for (int32_t i = k + 3; i < count; i += 3) lowest[k] = error[i] < lowest[k] ? error[i] : lowest[k];
-        for (int32_t i = k; i < 3 * REST_GUESSES; i += 3) least[i] = lowest[k];
+    double sum = 0.0, weights = 0.0, error[REST_GUESSES], least = 0.0;
+    for (int32_t g = 0; g < at->guess_count; g++) {
+        error[g] = (all->error[g][k] + 0.05) * (at->phase->error[g][k] + 0.05);
+        if (g == 0 || error[g] < least) least = error[g];
     }
-    for (int32_t i = 0; i < count; i++) {
-        double ratio = least[i] / error[i], square = ratio * ratio;
-        weight[i] = square * square;
+    for (int32_t g = 0; g < at->guess_count; g++) {
+        double weight = least / error[g];
+        weight = weight * weight;
+        weight = weight * weight;
+        sum = sum + weight * at->guesses[g][k];
+        weights = weights + weight;
     }
-    for (int32_t k = 0; k < 3; k++) {
-        double sum = 0.0, weights = 0.0;
-        for (int32_t g = 0; g < at->guess_count; g++) {
-            sum = sum + weight[3 * g + k] * at->guesses[g][k];
-            weights = weights + weight[3 * g + k];
-        }
-        expected[k] = sum / weights;
-    }
+    return sum / weights;
 }
 
 /* Clips large errors, so that outliers do not spoil the mean. */
