@@ -170,8 +170,9 @@ ATH_HOT int ath_foresee_modes(const ath_plan *plan, const ath_motion *motion, in
     row_sums sums;
     vertex_row rest[3], weight[3];
     double *moves = scratch->placed;
-    if (modes > 0 && ath_min(T, piece->count) < ATH_LANES) return 0;
-    if (modes > 0 && !find_placing_sums(placing, placing->plan->pieces + p, T, &terms)) return 0;
+    if (modes > 0
+        && (ath_min(T, piece->count) < ATH_LANES || !find_placing_sums(placing, placing->plan->pieces + p, T, &terms)))
+        return 0;
     double reach = 0.0;
     if (modes > 0) {
         weigh_rest(plan, piece, rest);

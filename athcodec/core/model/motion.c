@@ -437,23 +437,18 @@ void ath_turn_ratios(const ath_motion *motion, const ath_turning *turning, const
     }
 }
 
-void ath_into_axes(int32_t T, const ath_turning *turning, double *track)
+/* Number k of a vector becomes its product with the numbers from k * row on, `step` apart. */
+static void change_axes(int32_t T, const ath_turning *turning, int32_t row, int32_t step, double *track)
 {
-    const double *A = turning->axes;
     for (int32_t t = 0; turning->own_axes && t < T; t++) {
         double x = track[t], y = track[T + t], z = track[2 * T + t];
-        for (int32_t k = 0; k < 3; k++) track[k * T + t] = A[3 * k] * x + A[3 * k + 1] * y + A[3 * k + 2] * z;
+        const double *A = turning->axes;
+        for (int32_t k = 0; k < 3; k++, A += row) track[k * T + t] = A[0] * x + A[step] * y + A[2 * step] * z;
     }
 }
 
-void ath_out_of_axes(int32_t T, const ath_turning *turning, double *track)
-{
-    const double *A = turning->axes;
-    for (int32_t t = 0; turning->own_axes && t < T; t++) {
-        double x = track[t], y = track[T + t], z = track[2 * T + t];
-        for (int32_t k = 0; k < 3; k++) track[k * T + t] = A[k] * x + A[3 + k] * y + A[6 + k] * z;
-    }
-}
+void ath_into_axes(int32_t T, const ath_turning *turning, double *track) { change_axes(T, turning, 3, 1, track); }
+void ath_out_of_axes(int32_t T, const ath_turning *turning, double *track) { change_axes(T, turning, 1, 3, track); }
 
 double ath_shift_step(const ath_piece *piece, const ath_stream *stream)
 {
