@@ -76,7 +76,7 @@ ATH_HOT static void weigh_row(const ath_plan *plan, const ath_piece *piece, cons
     for (int32_t from = 0; from < n; from += ATH_LANES) {
         int32_t v = ath_min(from, n - ATH_LANES);
         lanes_of_shape(ath_shape_modes(piece), rows->shapes + s * ATH_SHAPE_NUMBERS, basis + v, n, weight[0] + v,
-                       weight[1] + v, weight[2] + v);
+                       ATH_PIECE_VERTICES);
     }
 }
 

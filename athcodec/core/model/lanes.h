@@ -86,17 +86,15 @@ ATH_INLINE void lanes_store(double *to, const ath_lanes *from)
 
 #endif
 
-/* Fills how far a shape moves ATH_LANES vertices along each axis, from its modes, the rows of `mode`. */
-ATH_INLINE void lanes_of_shape(int32_t modes, const double *shape, const double *mode, int32_t row_size, double *x,
-                               double *y, double *z)
+/* Fills a row per axis with how far a shape moves ATH_LANES vertices, from its modes, the rows of `mode`. */
+ATH_INLINE void lanes_of_shape(int32_t modes, const double *shape, const double *mode, int32_t mode_size, double *to,
+                               int32_t to_size)
 {
     ath_lanes sum[3];
     for (int32_t k = 0; k < 3; k++) lanes_set(&sum[k], 0.0);
     for (int32_t m = 0; m < modes; m++)
-        for (int32_t k = 0; k < 3; k++) lanes_add_scaled(&sum[k], shape[3 * m + k], mode + m * row_size);
-    lanes_store(x, &sum[0]);
-    lanes_store(y, &sum[1]);
-    lanes_store(z, &sum[2]);
+        for (int32_t k = 0; k < 3; k++) lanes_add_scaled(&sum[k], shape[3 * m + k], mode + m * mode_size);
+    for (int32_t k = 0; k < 3; k++) lanes_store(to + k * to_size, &sum[k]);
 }
 
 #if defined(__has_builtin)

@@ -189,8 +189,7 @@ ATH_INLINE void weigh_terms(const ath_plan *plan, const ath_piece *piece, const 
     for (int32_t j = 0; j < terms->shape_count; j++)
         for (int32_t v = 0; v < PLACED_VERTICES; v += ATH_LANES)
             lanes_of_shape(ath_shape_modes(piece), rows->shapes + terms->shape[j] * ATH_SHAPE_NUMBERS, mode[0] + v,
-                           PLACED_VERTICES, vertices->weight[j][0] + v, vertices->weight[j][1] + v,
-                           vertices->weight[j][2] + v);
+                           PLACED_VERTICES, vertices->weight[j][0] + v, PLACED_VERTICES);
     for (int32_t j = terms->shape_count; j < terms->count; j++)
         for (int32_t i = 0; i < count; i++) vertices->weight[j][0][i] = basis[terms->mode[j] * piece->count + place[i]];
 }
@@ -471,14 +470,6 @@ void ath_inverse_track(const ath_stream *stream, int32_t T, int32_t count, doubl
         ath_inverse_temporal(stream, T, count, step, quantised + axis * T, track + axis * T);
 }
 
-static void rotation_track(const ath_stream *stream, int32_t T, int32_t count, const ath_turning *turning,
-                           const int32_t *quantised, double *track)
-{
-    for (int32_t axis = 0; axis < 3; axis++)
-        ath_inverse_temporal(stream, T, count, turning->steps[axis], quantised + axis * T, track + axis * T);
-    ath_out_of_axes(T, turning, track);
-}
-
 static int32_t count_of(const ath_piece_rows *rows, int32_t slot, const ath_stream *stream)
 {
     return rows->counts ? rows->counts[slot] : stream->temporal_rank;
@@ -499,7 +490,10 @@ void ath_turned_attach(const ath_plan *plan, const ath_motion *motion, int32_t p
     }
     if (ath_has_rotation(plan, piece, base)) {
         ath_turning turning = ath_turning_of(plan, piece, base);
-        rotation_track(base, T, count_of(rows, ROTATION_SLOT, base), &turning, rows->rotation, scratch->rotation);
+        for (int32_t axis = 0; axis < 3; axis++)
+            ath_inverse_temporal(base, T, count_of(rows, ROTATION_SLOT, base), turning.steps[axis],
+                                 rows->rotation + axis * T, scratch->rotation + axis * T);
+        ath_out_of_axes(T, &turning, scratch->rotation);
         ath_turn(T, scratch->rotation, scratch->at.rotation);
     }
 }
