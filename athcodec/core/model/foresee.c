@@ -48,7 +48,7 @@ ATH_INLINE double quick_sum(int32_t count, const double *a, const double *b)
 }
 
 /* Returns a number that none of these is larger than. */
-ATH_INLINE double bound_of(const double *numbers, int32_t count)
+ATH_HOT static double bound_of(const double *numbers, int32_t count)
 {
     return ath_sqrt(quick_sum(count, numbers, numbers));
 }
@@ -81,7 +81,7 @@ ATH_HOT static void weigh_row(const ath_plan *plan, const ath_piece *piece, cons
 }
 
 /* Returns 0 if there are too many terms. */
-ATH_INLINE int find_placing_sums(const ath_placing *placing, const ath_piece *piece, int32_t T, placing_sums *sums)
+ATH_HOT static int find_placing_sums(const ath_placing *placing, const ath_piece *piece, int32_t T, placing_sums *sums)
 {
     weigh_rest(placing->plan, piece, sums->weight[0]);
     sums->count = 1;

@@ -54,8 +54,10 @@ ATH_HOT void ath_follow_tangents(int32_t T, const double *tangent, const double 
         turn_lanes(TURN_LANES, T, tangent, from + t, to + t, parent + t, turned);
         for (int32_t k = 0; k < 9; k++) memcpy(out + k * T + t, turned[k], sizeof turned[k]);
     }
-    turn_lanes(T - t, T, tangent, from + t, to + t, parent + t, turned);
-    for (int32_t k = 0; k < 9; k++) memcpy(out + k * T + t, turned[k], (size_t)(T - t) * sizeof(double));
+    for (; t < T; t++) {
+        turn_lanes(1, T, tangent, from + t, to + t, parent + t, turned);
+        for (int32_t k = 0; k < 9; k++) out[k * T + t] = turned[k][0];
+    }
 }
 
 ATH_HOT void ath_turn(int32_t T, const double *omega, double *ATH_RESTRICT R)

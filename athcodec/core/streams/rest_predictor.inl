@@ -180,8 +180,8 @@ ATH_INLINE void rest_learn_axis(int32_t n, rest_filter *filter, const rest_guess
 }
 
 /* Notes the errors of the guesses for a vertex at `offset`, and its coded integers. */
-ATH_INLINE void rest_note(rest_memory *memory, const rest_guess *at, const double offset[3], const int32_t integers[3],
-                          double rate)
+ATH_HOT static void rest_note(rest_memory *memory, const rest_guess *at, const double offset[3],
+                              const int32_t integers[3], double rate)
 {
     double repeated[3 * REST_GUESSES], *mean = (double *)memory->error;
     const double *guess = (const double *)at->guesses;
