@@ -90,11 +90,17 @@ ATH_INLINE void lanes_store(double *to, const ath_lanes *from)
 ATH_INLINE void lanes_of_shape(int32_t modes, const double *shape, const double *mode, int32_t mode_size, double *to,
                                int32_t to_size)
 {
-    ath_lanes sum[3];
-    for (int32_t k = 0; k < 3; k++) lanes_set(&sum[k], 0.0);
-    for (int32_t m = 0; m < modes; m++)
-        for (int32_t k = 0; k < 3; k++) lanes_add_scaled(&sum[k], shape[3 * m + k], mode + m * mode_size);
-    for (int32_t k = 0; k < 3; k++) lanes_store(to + k * to_size, &sum[k]);
+    ath_lanes x, y, z;
+    lanes_set(&x, 0.0);
+    y = z = x;
+    for (int32_t m = 0; m < modes; m++, shape += 3, mode += mode_size) {
+        lanes_add_scaled(&x, shape[0], mode);
+        lanes_add_scaled(&y, shape[1], mode);
+        lanes_add_scaled(&z, shape[2], mode);
+    }
+    lanes_store(to, &x);
+    lanes_store(to + to_size, &y);
+    lanes_store(to + 2 * to_size, &z);
 }
 
 #if defined(__has_builtin)
