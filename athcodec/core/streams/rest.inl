@@ -42,8 +42,7 @@ typedef struct {
     rest_vertices single[2]; /* for branches without detail, and with detail */
     copy_model copies;
     double work[2 * REST_RUN * REST_RUN];
-    double
-        bases[REST_BASES]; /* for runs of 1, 2, ... REST_RUN vertices, made when first needed; refinements keep them */
+    double bases[REST_BASES]; /* for runs of 1, 2, ... REST_RUN vertices, made when needed, and kept by refinements */
     uint8_t made[REST_RUN + 1];
 } rest_model;
 
