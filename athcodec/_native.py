@@ -52,7 +52,7 @@ def fields(*types_and_names: Any) -> list[tuple[str, Any]]:
 BRANCH = np.dtype(fields("<i4", "parent count attach flags lag first subtree depth rigid detail ring"))
 PIECE = np.dtype(
     fields(
-        *("<i8", "modes basis attach_cache"),
+        *("<i8", "modes basis attach_cache", "<u8", "attached"),
         *("<i4", "first count parent attach branch flags rank level low_level low_modes last_attached ring"),
         *("<i4", "modes_level tip_weight"),
     )
@@ -177,6 +177,7 @@ _PLAYING = {  # Functions of core/include/ath.h.
     "ath_repeats": (c_void_p, [c_void_p]),
     "ath_work_size": (c_size_t, [c_void_p]),
     "ath_segment_size": (c_size_t, [c_void_p, c_int32]),
+    "ath_segment_size_to": (c_size_t, [c_void_p, c_int32, c_int32]),
     "ath_prepare_start": (c_int, [c_void_p, c_size_t, c_void_p, c_int32, c_int32, c_void_p, c_size_t]),
     "ath_prepare_step": (c_int, [c_void_p, c_int32]),
     "ath_prepare_onward": (c_int, [c_void_p, c_size_t, *[c_void_p] * 3, c_int32, c_void_p, c_size_t]),

@@ -726,9 +726,15 @@ def test_positions_go_to_the_callers_memory_at_levels_of_all_vertices_in_the_ord
     athcodec.encode(clip, scratch / "to.ath", attributes="none", effort="fast", **options)
     player, went = Player((scratch / "to.ath").read_bytes()), set()
     for level, segment in itertools.product(player.levels, player.segments):
-        alone, work, into = player.prepare(segment, level), player.work(), player.room(level)
+        alone, work = player.prepare(segment, level), player.work()
+        into = Memory(core.ath_segment_size_to(player.address, segment, level))
         frames = range(player.start_of(segment), player.start_of(segment + 1))
         assert player.start(segment, level, work, into) == OK
+        if into.size < core.ath_segment_size(player.address, level):
+            assert core.ath_prepare_step(work.address, 1) == NO_MEMORY, (
+                "only ath_prepare_to gives it room for positions"
+            )
+            assert player.start(segment, level, work, into) == OK
         number = 8 if player.info.is_float64 else 4
         positions = Memory(len(frames) * player.info.vertex_count * 3 * number)
         result = core.ath_prepare_to(work.address, positions.address)

@@ -403,6 +403,10 @@ class File:
     def segment_size(self, level: int) -> int:
         return lib.ath_segment_size(self._file, level)
 
+    def segment_size_to(self, segment: int, level: int) -> int:
+        """Return the bytes of a segment whose positions go to an array if the core can write there."""
+        return lib.ath_segment_size_to(self._file, segment, level)
+
     def goes_on(self, before: Segment, segment: int, level: int) -> bool:
         """Return whether a prepared segment is this one, at a level from which decoding can go on to this level."""
         same = lib.ath_segment_index(before.pointer) == segment and not before.gone

@@ -60,7 +60,8 @@ class SegmentDecoder(ChunkFile):
         FormatError
             If it is damaged, or needs more memory than is allowed.
         """
-        what, size = f"level {level}, segment {segment}", self.core.segment_size(level)
+        what = f"level {level}, segment {segment}"
+        size = self.core.segment_size(level) if to is None else self.core.segment_size_to(segment, level)
         needed = self._checked_need(level, what)
         before = joined_to = None
         if spare and needed + len(spare.memory) <= self.limits.memory_bytes:
@@ -113,7 +114,8 @@ class SegmentDecoder(ChunkFile):
 
     def _show_run(self, run: range, level: int, follows: bool, show: Show, room: Room) -> core_file.CoreError | None:
         """Return a fault rather than raise it, because the other runs need the file's bytes until they end."""
-        work, size = core_file.Work(self.core.work_size()), self.core.segment_size(level)
+        work, full = core_file.Work(self.core.work_size()), self.core.segment_size(level)
+        size = max(full if room(segment) is None else self.core.segment_size_to(segment, level) for segment in run)
         ready, spare = core_file.Segment(size), None
         for segment in run:
             joined_to = None

@@ -38,7 +38,7 @@ static const layout LAYOUTS[] = {
         TWO(ath_polygons, is_derived, index_type) ONE(ath_polygons, count_type)
     STRUCT(ath_piece) EIGHT(ath_piece, modes, basis, attach_cache, first, count, parent, attach, branch)
         FOUR(ath_piece, flags, rank, level, low_level) FOUR(ath_piece, low_modes, last_attached, ring, modes_level)
-        ONE(ath_piece, tip_weight)
+        TWO(ath_piece, tip_weight, attached)
     STRUCT(ath_node) EIGHT(ath_node, whitening, branch, piece, first, count, level, last, coded) ONE(ath_node, rank)
     STRUCT(ath_plan)
         EIGHT(ath_plan, vertex_count, branch_count, piece_count, node_count, attach_cache_rows, height, longest, branches)

@@ -88,7 +88,7 @@ static int decode_layer_rest(ath_file *file, int32_t q, ath_bytes chunk)
     double step;
     int result = ath_parse_refined_rest(chunk, &step, &body);
     if (result == ATH_OK)
-        result = ath_decode_rest(file->scratch, body.bytes, body.size, file->branches, file->info.branch_count, step,
+        result = ath_decode_rest(file->model, body.bytes, body.size, file->branches, file->info.branch_count, step,
                                  file->connected, rest_steps_before(file, q), plan_before(file, q)->rest,
                                  layer->rest_steps, layer->rest);
     return result;

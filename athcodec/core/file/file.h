@@ -38,6 +38,7 @@ struct ath_file {
     ath_piece *pieces;
     ath_node *nodes;
     uint8_t *gaps;
+    void *model;                  /* ath_prelude_model_size bytes */
     void *scratch;                /* for opening and building */
     double *bases;                /* null until ath_build */
     ath_mesh mesh;                /* only where the file has FACES */
@@ -92,8 +93,6 @@ ATH_INLINE int ath_shapes_end(int32_t kind) { return kind != ATH_CORRECTIONS && 
 
 /* ---- rest poses and waves ---- */
 
-/* Returns where in the scratch memory, behind the models, the rotations of branches stand. */
-size_t ath_turns_place(void);
 /* Reads REST: the reference pose, or which mesh of the host's it is. */
 int ath_read_reference(ath_file *file, ath_fault_info *fault);
 /* Completes what follows from the reference pose. */

@@ -13,7 +13,7 @@ static int32_t most_pieces(const ath_header *header)
 static uint64_t scratch_size(const ath_header *header)
 {
     uint64_t size = ath_larger(header->vertex_count, ath_basis_table_size(most_pieces(header))) * sizeof(int32_t);
-    size = ath_larger(size, ath_turns_place() + (uint64_t)header->branch_count * 9 * sizeof(double));
+    size = ath_larger(size, (uint64_t)header->branch_count * 9 * sizeof(double)); /* turns of SOURCE_REST */
     return ath_larger(size, ATH_BASIS_WORK * sizeof(double));
 }
 
@@ -63,6 +63,7 @@ static uint64_t carve_file(ath_file *file, const ath_header *header, uint8_t *ba
     file->pieces = (ath_piece *)ath_take(&arena, (uint64_t)most_pieces(header) * sizeof(ath_piece));
     file->nodes = (ath_node *)ath_take(&arena, branches * sizeof(ath_node));
     file->gaps = (uint8_t *)ath_take(&arena, vertices);
+    file->model = ath_take(&arena, ath_prelude_model_size());
     file->scratch = ath_take(&arena, scratch_size(header));
     carve_layers(file, header, &arena);
     if (header->has_faces)
@@ -199,7 +200,7 @@ static int read_hierarchy(ath_file *file, const ath_limits *limits, ath_fault_in
     int result = ath_load(file, ATH_HIERARCHY, &chunk, fault);
     if (result != ATH_OK) return result;
     memset(file->branches, 0, (size_t)branch_count * sizeof *file->branches);
-    result = ath_decode_hierarchy(file->scratch, chunk.bytes, chunk.size, branch_count, vertex_count, file->branches,
+    result = ath_decode_hierarchy(file->model, chunk.bytes, chunk.size, branch_count, vertex_count, file->branches,
                                   file->branch_source, file->vertex_source);
     if (result != ATH_OK) return result;
     return check_depth(file, limits, fault);
@@ -341,7 +342,7 @@ static int read_time(ath_file *file, ath_fault_info *fault)
     int result = ath_load(file, ATH_TIME, &chunk, fault);
     if (result == ATH_OK) result = ath_parse_time(chunk, file->info.clip_count, &method, &body);
     if (result == ATH_OK && method == 2)
-        result = ath_decode_times(file->scratch, body.bytes, body.size, file->info.frame_count, file->times);
+        result = ath_decode_times(file->model, body.bytes, body.size, file->info.frame_count, file->times);
     for (int32_t i = 0; result == ATH_OK && i < file->info.clip_count; i++) result = time_clip(file, i, method, body);
     return result;
 }

@@ -2,8 +2,6 @@
 #include "file/file.h"
 #include "streams/decode.h"
 
-size_t ath_turns_place(void) { return (ath_prelude_model_size() + 15) & ~(size_t)15; }
-
 static int has_source_rest(const ath_file *file)
 {
     return ath_find_chunk(file->chunks, file->header.chunk_count, ATH_SOURCE_REST, ATH_NO_LEVEL, 0) != 0;
@@ -73,11 +71,11 @@ int ath_read_reference(ath_file *file, ath_fault_info *fault)
         memcpy(file->info.host_checksum, head.host_checksum, sizeof head.host_checksum);
     } else if (head.exact) {
         result =
-            ath_decode_exact_rest(file->scratch, body.bytes, body.size, file->branches, (int32_t)header->branch_count,
+            ath_decode_exact_rest(file->model, body.bytes, body.size, file->branches, (int32_t)header->branch_count,
                                   file->connected, head.is_float64, file->source_rest);
         take_numbers(file);
     } else {
-        result = ath_decode_rest(file->scratch, body.bytes, body.size, file->branches, (int32_t)header->branch_count,
+        result = ath_decode_rest(file->model, body.bytes, body.size, file->branches, (int32_t)header->branch_count,
                                  head.step, file->connected, 0, 0, file->rest_steps, file->rest);
         if (!has_source_rest(file)) file->source_rest = 0;
     }
@@ -202,14 +200,14 @@ static int read_source_rest(ath_file *file, ath_fault_info *fault)
 {
     ath_bytes chunk, body;
     ath_source_rest_head head;
-    double *turns = (double *)(void *)((uint8_t *)file->scratch + ath_turns_place());
+    double *turns = (double *)file->scratch;
     int result = ath_load(file, ATH_SOURCE_REST, &chunk, fault);
     if (result == ATH_OK) result = ath_parse_source_rest(chunk, &head, &body);
     if (result != ATH_OK) return result;
     if (head.exact)
-        return ath_decode_exact_rest(file->scratch, body.bytes, body.size, file->branches, file->info.branch_count, 0,
+        return ath_decode_exact_rest(file->model, body.bytes, body.size, file->branches, file->info.branch_count, 0,
                                      file->info.rest_is_float64, file->source_rest);
-    result = ath_decode_source_rest(file->scratch, body.bytes, body.size, file->branches, file->info.branch_count,
+    result = ath_decode_source_rest(file->model, body.bytes, body.size, file->branches, file->info.branch_count,
                                     head.step, finest_reference(file), turns, file->source_rest);
     for (size_t i = 0; i < 3 * (size_t)file->header.vertex_count; i++)
         file->source_rest[i] = file->source_rest[i] + file->info.origin[i % 3];

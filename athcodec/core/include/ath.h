@@ -451,8 +451,11 @@ ATH_API int ath_follow(ath_work *work, const ath_segment *before);
  * floats (doubles if info.is_float64 is 1) per vertex, as ath_positions would copy them. Leave them in place while you
  * use the segment. Their part of the segment's own memory stays unused. Returns ATH_BAD_ARGUMENT, and changes nothing,
  * if ath_positions would not just copy: the file's order differs from the source's, frames repeat, or the level has
- * nodes. */
+ * nodes.
+ *     ath_segment_size_to: returns the bytes that ath_prepare_start needs as `memory` if ath_prepare_to follows: without
+ * that part, or ath_segment_size where the positions cannot be written elsewhere or the segment is joined. */
 ATH_API int ath_prepare_to(ath_work *work, void *positions);
+ATH_API size_t ath_segment_size_to(const ath_file *file, int32_t segment, int32_t level);
 ATH_API int32_t ath_joined_to(const ath_file *file, int32_t segment, int32_t level);
 /* Returns level_count x segment_count numbers of frames over which segments are joined; 0: not joined. ATH_JOIN_SLOPED
  * is added if velocities are joined, too. */

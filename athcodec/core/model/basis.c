@@ -84,7 +84,7 @@ ATH_HOT static void diagonalise(int32_t n, double *d, double *e, double *q)
             double s = 1.0, c = 1.0, p = 0.0;
             int32_t i = m - 1;
             for (; i >= l; i--) {
-                double f = s * e[i], b = c * e[i];
+                double f = s * e[i], b = c * e[i], c_before = c, s_before = s;
                 r = ath_sqrt(f * f + g * g);
                 e[i + 1] = r;
                 if (r == 0.0) {
@@ -99,8 +99,10 @@ ATH_HOT static void diagonalise(int32_t n, double *d, double *e, double *q)
                 p = s * r;
                 d[i + 1] = g + p;
                 g = c * r - b;
-                rotate_rows(n, c, s, q + i * n, q + (i + 1) * n);
+                /* Rows turn one rotation later, when they no longer wait for its numbers. */
+                if (i < m - 1) rotate_rows(n, c_before, s_before, q + (i + 1) * n, q + (i + 2) * n);
             }
+            if (i < m - 1) rotate_rows(n, c, s, q + (i + 1) * n, q + (i + 2) * n);
             if (r == 0.0 && i >= l) continue;
             d[l] = d[l] - p;
             e[l] = g;

@@ -48,7 +48,10 @@ ATH_INLINE double quick_sum(int32_t count, const double *a, const double *b)
 }
 
 /* Returns a number that none of these is larger than. */
-static double bound_of(const double *numbers, int32_t count) { return ath_sqrt(quick_sum(count, numbers, numbers)); }
+ATH_HOT static double bound_of(const double *numbers, int32_t count)
+{
+    return ath_sqrt(quick_sum(count, numbers, numbers));
+}
 
 static void weigh_rest(const ath_plan *plan, const ath_piece *piece, vertex_row *weight)
 {
@@ -58,7 +61,8 @@ static void weigh_rest(const ath_plan *plan, const ath_piece *piece, vertex_row 
         for (int32_t k = 0; k < 3; k++) weight[k][v] = ath_rest_of(plan, piece->first + v)[k] - a[k];
 }
 
-/* Fills the weights of shape s or, from the number of shapes on, of a mode along one axis. */
+/* Fills the weights of shape s or, from the number of shapes on, of a mode along one axis. The piece has at least
+ * ATH_LANES vertices. */
 ATH_HOT static void weigh_row(const ath_plan *plan, const ath_piece *piece, const ath_piece_rows *rows, int32_t s,
                               vertex_row *ATH_RESTRICT weight)
 {
@@ -69,15 +73,15 @@ ATH_HOT static void weigh_row(const ath_plan *plan, const ath_piece *piece, cons
         memcpy(weight[s % 3], basis + s / 3 * n, (size_t)n * sizeof *basis);
         return;
     }
-    for (int32_t m = 0; m < ath_shape_modes(piece); m++)
-        for (int32_t k = 0; k < 3; k++) {
-            double number = rows->shapes[s * ATH_SHAPE_NUMBERS + 3 * m + k];
-            for (int32_t v = 0; v < n; v++) weight[k][v] = weight[k][v] + number * basis[m * n + v];
-        }
+    for (int32_t from = 0; from < n; from += ATH_LANES) {
+        int32_t v = ath_min(from, n - ATH_LANES);
+        lanes_of_shape(ath_shape_modes(piece), rows->shapes + s * ATH_SHAPE_NUMBERS, basis + v, n, weight[0] + v,
+                       ATH_PIECE_VERTICES);
+    }
 }
 
 /* Returns 0 if there are too many terms. */
-static int find_placing_sums(const ath_placing *placing, const ath_piece *piece, int32_t T, placing_sums *sums)
+ATH_HOT static int find_placing_sums(const ath_placing *placing, const ath_piece *piece, int32_t T, placing_sums *sums)
 {
     weigh_rest(placing->plan, piece, sums->weight[0]);
     sums->count = 1;
@@ -157,8 +161,8 @@ ATH_HOT static int foresee_integers(int32_t T, int32_t count, const double *wave
     return 1;
 }
 
-int ath_foresee_modes(const ath_plan *plan, const ath_motion *motion, int32_t p, const ath_piece_before *before,
-                      const ath_placing *placing, const ath_scratch *scratch, ath_piece_rows *rows)
+ATH_HOT int ath_foresee_modes(const ath_plan *plan, const ath_motion *motion, int32_t p, const ath_piece_before *before,
+                              const ath_placing *placing, const ath_scratch *scratch, ath_piece_rows *rows)
 {
     const ath_piece *piece = plan->pieces + p;
     int32_t T = motion->frames, modes = ath_predicted_modes(piece, before, rows);
@@ -166,7 +170,9 @@ int ath_foresee_modes(const ath_plan *plan, const ath_motion *motion, int32_t p,
     row_sums sums;
     vertex_row rest[3], weight[3];
     double *moves = scratch->placed;
-    if (modes > 0 && (T < ATH_LANES || !find_placing_sums(placing, placing->plan->pieces + p, T, &terms))) return 0;
+    if (modes > 0
+        && (ath_min(T, piece->count) < ATH_LANES || !find_placing_sums(placing, placing->plan->pieces + p, T, &terms)))
+        return 0;
     double reach = 0.0;
     if (modes > 0) {
         weigh_rest(plan, piece, rest);

@@ -86,6 +86,23 @@ ATH_INLINE void lanes_store(double *to, const ath_lanes *from)
 
 #endif
 
+/* Fills a row per axis with how far a shape moves ATH_LANES vertices, from its modes, the rows of `mode`. */
+ATH_INLINE void lanes_of_shape(int32_t modes, const double *shape, const double *mode, int32_t mode_size, double *to,
+                               int32_t to_size)
+{
+    ath_lanes x, y, z;
+    lanes_set(&x, 0.0);
+    y = z = x;
+    for (int32_t m = 0; m < modes; m++, shape += 3, mode += mode_size) {
+        lanes_add_scaled(&x, shape[0], mode);
+        lanes_add_scaled(&y, shape[1], mode);
+        lanes_add_scaled(&z, shape[2], mode);
+    }
+    lanes_store(to, &x);
+    lanes_store(to + to_size, &y);
+    lanes_store(to + 2 * to_size, &z);
+}
+
 #if defined(__has_builtin)
 #if __has_builtin(__builtin_shufflevector) && __has_builtin(__builtin_convertvector)
 #define ATH_TRANSPOSES

@@ -173,42 +173,25 @@ typedef struct {
     double rest[3][PLACED_VERTICES], weight[ATH_TERMS][3][PLACED_VERTICES]; /* modes: axis 0 only */
 } placed_vertices;
 
-ATH_INLINE void weigh_shape(int32_t modes, const double *shape, double mode[][PLACED_VERTICES],
-                            double weight[3][PLACED_VERTICES])
-{
-    for (int32_t v = 0; v < PLACED_VERTICES; v += ATH_LANES) {
-        ath_lanes x, y, z;
-        lanes_set(&x, 0.0);
-        lanes_set(&y, 0.0);
-        lanes_set(&z, 0.0);
-        for (int32_t m = 0; m < modes; m++) {
-            lanes_add_scaled(&x, shape[3 * m], mode[m] + v);
-            lanes_add_scaled(&y, shape[3 * m + 1], mode[m] + v);
-            lanes_add_scaled(&z, shape[3 * m + 2], mode[m] + v);
-        }
-        lanes_store(weight[0] + v, &x);
-        lanes_store(weight[1] + v, &y);
-        lanes_store(weight[2] + v, &z);
-    }
-}
-
 ATH_INLINE void weigh_terms(const ath_plan *plan, const ath_piece *piece, const ath_piece_rows *rows,
-                            const placing_terms *terms, int32_t first, int32_t count, placed_vertices *vertices)
+                            const placing_terms *terms, const int32_t *place, int32_t count, placed_vertices *vertices)
 {
-    const double *basis = plan->bases + piece->basis + first, *a = ath_rest_attach(plan, piece);
+    const double *basis = plan->bases + piece->basis, *a = ath_rest_attach(plan, piece);
     double mode[ATH_SHAPE_MODES][PLACED_VERTICES];
     for (int32_t i = 0; i < count; i++) {
-        const double *x0 = ath_rest_of(plan, piece->first + first + i);
+        const double *x0 = ath_rest_of(plan, piece->first + place[i]);
         for (int32_t k = 0; k < 3; k++) vertices->rest[k][i] = x0[k] - a[k];
     }
     if (terms->shape_count > 0)
         for (int32_t m = 0; m < ath_shape_modes(piece); m++)
-            for (int32_t i = 0; i < PLACED_VERTICES; i++) mode[m][i] = i < count ? basis[m * piece->count + i] : 0.0;
+            for (int32_t i = 0; i < PLACED_VERTICES; i++)
+                mode[m][i] = i < count ? basis[m * piece->count + place[i]] : 0.0;
     for (int32_t j = 0; j < terms->shape_count; j++)
-        weigh_shape(ath_shape_modes(piece), rows->shapes + terms->shape[j] * ATH_SHAPE_NUMBERS, mode,
-                    vertices->weight[j]);
+        for (int32_t v = 0; v < PLACED_VERTICES; v += ATH_LANES)
+            lanes_of_shape(ath_shape_modes(piece), rows->shapes + terms->shape[j] * ATH_SHAPE_NUMBERS, mode[0] + v,
+                           PLACED_VERTICES, vertices->weight[j][0] + v, PLACED_VERTICES);
     for (int32_t j = terms->shape_count; j < terms->count; j++)
-        for (int32_t i = 0; i < count; i++) vertices->weight[j][0][i] = basis[terms->mode[j] * piece->count + i];
+        for (int32_t i = 0; i < count; i++) vertices->weight[j][0][i] = basis[terms->mode[j] * piece->count + place[i]];
 }
 
 /* Sums the terms of vertex v in PLACED_FRAMES frames from t on. */
@@ -250,8 +233,8 @@ ATH_INLINE void add_terms(int32_t t, const placing_terms *terms, const placed_ve
     lanes_store(sum[2] + ATH_LANES, &z1);
 }
 
-/* x := c + R x for `count` vertices in ATH_LANES frames */
-ATH_INLINE void move_vertices(int32_t T, int32_t count, const double *R, const double *c,
+/* x := c + R x for `count` vertices in ATH_LANES frames. Vertex i goes to row place[i]. */
+ATH_INLINE void move_vertices(int32_t T, const int32_t *place, int32_t count, const double *R, const double *c,
                               double sums[][3][PLACED_FRAMES], int32_t from, double *out)
 {
     ath_lanes rows[3][3], centre[3], x[3];
@@ -259,9 +242,9 @@ ATH_INLINE void move_vertices(int32_t T, int32_t count, const double *R, const d
         for (int32_t j = 0; j < 3; j++) lanes_load(&rows[k][j], R + (3 * k + j) * T);
         lanes_load(&centre[k], c + k * T);
     }
-    for (int32_t i = 0; i < count; i++, out += 3 * T) {
+    for (int32_t i = 0; i < count; i++) {
         for (int32_t k = 0; k < 3; k++) lanes_load(&x[k], sums[i][k] + from);
-        for (int32_t k = 0; k < 3; k++) lanes_move(out + k * T, &centre[k], rows[k], x);
+        for (int32_t k = 0; k < 3; k++) lanes_move(out + (3 * place[i] + k) * T, &centre[k], rows[k], x);
     }
 }
 
@@ -282,26 +265,29 @@ ATH_INLINE void place_frame(int32_t t, const placing_terms *terms, const placed_
 }
 
 /* placed = c + R (x0 - a + sum over terms of weight * track), shapes first, without tracks of zeros. A few vertices
- * pass through a few frames at a time, while tracks and attach frames stay in the innermost cache. */
+ * pass through a few frames at a time, while tracks and attach frames stay in the innermost cache. wanted: bit v asks
+ * for vertex v. */
 ATH_HOT static void place(const ath_plan *plan, const ath_motion *motion, const ath_piece *piece,
-                          const ath_piece_rows *rows, const uint8_t *used, const ath_scratch *scratch)
+                          const ath_piece_rows *rows, const uint8_t *used, uint64_t wanted, const ath_scratch *scratch)
 {
-    int32_t T = motion->frames, count;
+    int32_t T = motion->frames, places[ATH_PIECE_VERTICES], total = 0, count;
     placing_terms terms = terms_of(piece, rows, T, used, scratch->rows);
     placed_vertices vertices;
     double sums[PLACED_VERTICES][3][PLACED_FRAMES], *out = scratch->placed;
     const double *R = scratch->at.rotation, *c = scratch->at.point;
-    for (int32_t first = 0; first < piece->count; first += count, out += count * 3 * T) {
+    for (int32_t v = 0; v < piece->count; v++)
+        if (wanted >> v & 1) places[total++] = v;
+    for (const int32_t *at = places; at < places + total; at += count) {
         int32_t t = 0;
-        count = ath_min(PLACED_VERTICES, piece->count - first);
-        weigh_terms(plan, piece, rows, &terms, first, count, &vertices);
+        count = ath_min(PLACED_VERTICES, total - (int32_t)(at - places));
+        weigh_terms(plan, piece, rows, &terms, at, count, &vertices);
         for (; t + PLACED_FRAMES <= T; t += PLACED_FRAMES) {
             for (int32_t i = 0; i < count; i++) add_terms(t, &terms, &vertices, i, sums[i]);
             for (int32_t from = 0; from < PLACED_FRAMES; from += ATH_LANES)
-                move_vertices(T, count, R + t + from, c + t + from, sums, from, out + t + from);
+                move_vertices(T, at, count, R + t + from, c + t + from, sums, from, out + t + from);
         }
         for (; t < T; t++)
-            for (int32_t i = 0; i < count; i++) place_frame(t, &terms, &vertices, i, &scratch->at, out + i * 3 * T);
+            for (int32_t i = 0; i < count; i++) place_frame(t, &terms, &vertices, i, &scratch->at, out + at[i] * 3 * T);
     }
 }
 
@@ -369,13 +355,18 @@ static void turn_with_sheet(const ath_plan *plan, int32_t T, const ath_piece *pi
     }
 }
 
+static int turns_with_sheet(const ath_piece *piece)
+{
+    return (piece->flags & (ATH_SHEET | ATH_RIGID | ATH_STILL)) == ATH_SHEET;
+}
+
 static void carry(const ath_plan *plan, const ath_motion *motion, const ath_piece *piece, const ath_scratch *scratch)
 {
     int32_t T = motion->frames;
     if (piece->attach_cache < 0) return;
     ath_frames at = cached_frames(motion, piece);
     copy_rows(at.point, scratch->at.point, 3 * (size_t)T);
-    if ((piece->flags & (ATH_SHEET | ATH_RIGID | ATH_STILL)) == ATH_SHEET)
+    if (turns_with_sheet(piece))
         turn_with_sheet(plan, T, piece, scratch, at.rotation);
     else
         copy_rows(at.rotation, scratch->at.rotation, 9 * (size_t)T);
@@ -445,23 +436,18 @@ void ath_turn_ratios(const ath_motion *motion, const ath_turning *turning, const
     }
 }
 
-void ath_into_axes(int32_t T, const ath_turning *turning, double *track)
+/* Number k of a vector becomes its product with the numbers from k * row on, `step` apart. */
+static void change_axes(int32_t T, const ath_turning *turning, int32_t row, int32_t step, double *track)
 {
-    const double *A = turning->axes;
     for (int32_t t = 0; turning->own_axes && t < T; t++) {
         double x = track[t], y = track[T + t], z = track[2 * T + t];
-        for (int32_t k = 0; k < 3; k++) track[k * T + t] = A[3 * k] * x + A[3 * k + 1] * y + A[3 * k + 2] * z;
+        const double *A = turning->axes;
+        for (int32_t k = 0; k < 3; k++, A += row) track[k * T + t] = A[0] * x + A[step] * y + A[2 * step] * z;
     }
 }
 
-void ath_out_of_axes(int32_t T, const ath_turning *turning, double *track)
-{
-    const double *A = turning->axes;
-    for (int32_t t = 0; turning->own_axes && t < T; t++) {
-        double x = track[t], y = track[T + t], z = track[2 * T + t];
-        for (int32_t k = 0; k < 3; k++) track[k * T + t] = A[k] * x + A[3 + k] * y + A[6 + k] * z;
-    }
-}
+void ath_into_axes(int32_t T, const ath_turning *turning, double *track) { change_axes(T, turning, 3, 1, track); }
+void ath_out_of_axes(int32_t T, const ath_turning *turning, double *track) { change_axes(T, turning, 1, 3, track); }
 
 double ath_shift_step(const ath_piece *piece, const ath_stream *stream)
 {
@@ -484,14 +470,6 @@ void ath_inverse_track(const ath_stream *stream, int32_t T, int32_t count, doubl
         ath_inverse_temporal(stream, T, count, step, quantised + axis * T, track + axis * T);
 }
 
-static void rotation_track(const ath_stream *stream, int32_t T, int32_t count, const ath_turning *turning,
-                           const int32_t *quantised, double *track)
-{
-    for (int32_t axis = 0; axis < 3; axis++)
-        ath_inverse_temporal(stream, T, count, turning->steps[axis], quantised + axis * T, track + axis * T);
-    ath_out_of_axes(T, turning, track);
-}
-
 static int32_t count_of(const ath_piece_rows *rows, int32_t slot, const ath_stream *stream)
 {
     return rows->counts ? rows->counts[slot] : stream->temporal_rank;
@@ -512,7 +490,10 @@ void ath_turned_attach(const ath_plan *plan, const ath_motion *motion, int32_t p
     }
     if (ath_has_rotation(plan, piece, base)) {
         ath_turning turning = ath_turning_of(plan, piece, base);
-        rotation_track(base, T, count_of(rows, ROTATION_SLOT, base), &turning, rows->rotation, scratch->rotation);
+        for (int32_t axis = 0; axis < 3; axis++)
+            ath_inverse_temporal(base, T, count_of(rows, ROTATION_SLOT, base), turning.steps[axis],
+                                 rows->rotation + axis * T, scratch->rotation + axis * T);
+        ath_out_of_axes(T, &turning, scratch->rotation);
         ath_turn(T, scratch->rotation, scratch->at.rotation);
     }
 }
@@ -526,11 +507,12 @@ void ath_inverse_row(const ath_motion *motion, const ath_piece *piece, const ath
 }
 
 const double *ath_pose_used(const ath_plan *plan, const ath_motion *motion, const ath_piece *piece,
-                            const ath_piece_rows *rows, const uint8_t *used, const ath_scratch *scratch)
+                            const ath_piece_rows *rows, const uint8_t *used, uint64_t wanted,
+                            const ath_scratch *scratch)
 {
     ath_scratch here = *scratch;
     if (piece->attach_cache >= 0) here.placed = cached_vertices(motion, piece);
-    place(plan, motion, piece, rows, used, &here);
+    place(plan, motion, piece, rows, used, turns_with_sheet(piece) ? ATH_ALL_VERTICES : wanted, &here);
     carry(plan, motion, piece, &here);
     return here.placed;
 }
@@ -547,7 +529,7 @@ const double *ath_pose_rows(const ath_plan *plan, const ath_motion *motion, int3
     uint8_t used[ATH_PIECE_VERTICES];
     for (int32_t m = 0; m < ath_rank(piece); m++)
         used[m] = (uint8_t)any_nonzero(row_of(motion, scratch, m), 3 * motion->frames);
-    return ath_pose_used(plan, motion, piece, rows, used, scratch);
+    return ath_pose_used(plan, motion, piece, rows, used, ATH_ALL_VERTICES, scratch);
 }
 
 const double *ath_pose_piece(const ath_plan *plan, const ath_motion *motion, int32_t p, const ath_piece_rows *rows,
@@ -556,7 +538,7 @@ const double *ath_pose_piece(const ath_plan *plan, const ath_motion *motion, int
     uint8_t used[ATH_PIECE_VERTICES];
     ath_turned_attach(plan, motion, p, rows, scratch);
     ath_pose_tracks(motion, plan->pieces + p, rows, scratch, used);
-    return ath_pose_used(plan, motion, plan->pieces + p, rows, used, scratch);
+    return ath_pose_used(plan, motion, plan->pieces + p, rows, used, ATH_ALL_VERTICES, scratch);
 }
 
 void ath_pose_tracks(const ath_motion *motion, const ath_piece *piece, const ath_piece_rows *rows,

@@ -95,7 +95,12 @@ static void place_attach_caches(ath_plan *plan, ath_piece *pieces, int32_t *stac
     plan->longest = 0;
     for (int32_t p = 0; p < plan->piece_count; p++) plan->longest = ath_max(plan->longest, pieces[p].count);
     for (int32_t p = 0; p < plan->piece_count; p++)
-        if (pieces[p].parent >= 0) pieces[pieces[p].parent].last_attached = p;
+        if (pieces[p].parent >= 0) {
+            ath_piece *parent = pieces + pieces[p].parent;
+            uint64_t vertex = (uint64_t)1 << (pieces[p].attach - parent->first);
+            parent->attached |= vertex >> 1 | vertex | vertex << 1; /* the neighbours give the tangent */
+            parent->last_attached = p;
+        }
     for (int32_t p = 0; p < plan->piece_count; p++) {
         while (!keep && height > 0 && pieces[stack[height - 1]].last_attached <= p)
             used = pieces[stack[--height]].attach_cache;

@@ -12,6 +12,7 @@ typedef struct ath_piece {
     int64_t modes;        /* offset of its cantilever modes in the bases */
     int64_t basis;        /* offset of its basis in the bases: `rank` rows of `count` */
     int64_t attach_cache; /* place, in vertices, of its frames for the pieces that hang on it; -1: none does */
+    uint64_t attached;    /* bit v: its frames need vertex v where pieces hang on it */
     int32_t first, count; /* vertices */
     int32_t parent;       /* piece, -1 for a root */
     int32_t attach;       /* vertex, -1 for a root */

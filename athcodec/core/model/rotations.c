@@ -1,7 +1,7 @@
 /* Rotations at every frame: least turns, nearest rotations, quaternions (FORMAT.md, "Reconstruction"). */
 #include "model/rotations.h"
 
-enum { TURN_LANES = 16 };
+enum { TURN_LANES = 4 };
 
 /* Beyond a right angle the turn shrinks, so that the result is R itself where the directions are opposed. */
 ATH_INLINE void turn_lanes(int32_t count, int32_t T, const double *tangent, const double *from, const double *to,
@@ -49,12 +49,14 @@ ATH_HOT void ath_follow_tangents(int32_t T, const double *tangent, const double 
                                  const double *parent, double *out)
 {
     double turned[9][TURN_LANES]; /* a local copy is not aliased, so that compilers use SIMD */
-    int32_t count;
-    for (int32_t start = 0; start < T; start += count, from += count, to += count, parent += count, out += count) {
-        count = ath_min(TURN_LANES, T - start);
-        turn_lanes(count, T, tangent, from, to, parent, turned);
-        for (int32_t k = 0; k < 9; k++)
-            for (int32_t t = 0; t < count; t++) out[k * T + t] = turned[k][t];
+    int32_t t = 0;
+    for (; t + TURN_LANES <= T; t += TURN_LANES) {
+        turn_lanes(TURN_LANES, T, tangent, from + t, to + t, parent + t, turned);
+        for (int32_t k = 0; k < 9; k++) memcpy(out + k * T + t, turned[k], sizeof turned[k]);
+    }
+    for (; t < T; t++) {
+        turn_lanes(1, T, tangent, from + t, to + t, parent + t, turned);
+        for (int32_t k = 0; k < 9; k++) out[k * T + t] = turned[k][0];
     }
 }
 

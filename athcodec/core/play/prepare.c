@@ -73,6 +73,7 @@ typedef struct {
 typedef struct {
     const ath_file *file;
     void *memory;    /* memory of the segment */
+    int32_t is_full; /* 1: that memory has room for positions */
     void *positions; /* destination of the positions; null: that memory */
     int32_t index, level;
     const ath_segment *from; /* this segment at an earlier level; null: none */
@@ -176,7 +177,8 @@ static uint64_t carve_work(ath_work *work, const ath_file *file, int32_t frames,
     return arena.used;
 }
 
-static uint64_t carve_segment(ath_segment *segment, const ath_file *file, int32_t level, int32_t frames, uint8_t *base)
+static uint64_t carve_segment(ath_segment *segment, const ath_file *file, int32_t level, int32_t frames, int is_full,
+                              uint8_t *base)
 {
     ath_arena arena = {base, 0};
     uint64_t T = (uint64_t)frames, number = ath_number_size(file->info.is_float64);
@@ -186,9 +188,9 @@ static uint64_t carve_segment(ath_segment *segment, const ath_file *file, int32_
     ath_take(&arena, sizeof *segment);
     segment->parts = (ath_part *)ath_take(&arena, (uint64_t)segment->part_count * sizeof(ath_part));
     segment->maps = (double *)ath_take(&arena, T * (uint64_t)segment->node_count * ATH_MAP * sizeof(double));
-    segment->positions = ath_take(&arena, T * (uint64_t)segment->exact_vertices * 3 * number);
     if (file->has_joins)
         segment->end = ath_take(&arena, ATH_END_FRAMES * (uint64_t)segment->exact_vertices * 3 * number);
+    if (is_full) segment->positions = ath_take(&arena, T * (uint64_t)segment->exact_vertices * 3 * number);
     return arena.used;
 }
 
@@ -201,7 +203,24 @@ size_t ath_work_size(const ath_file *file)
 size_t ath_segment_size(const ath_file *file, int32_t level)
 {
     ath_segment counted;
-    return ath_size_or_most(carve_segment(&counted, file, level, file->longest, 0));
+    return ath_size_or_most(carve_segment(&counted, file, level, file->longest, 1, 0));
+}
+
+/* Returns whether ath_positions only copies the positions of a segment at a level. */
+static int are_copied(const ath_file *file, int32_t index, int32_t level)
+{
+    int32_t exact, frames = ath_segment_start(file, index + 1) - ath_segment_start(file, index), vertex = 0;
+    ath_cut_size(file, level, 0, 0, &exact);
+    if (exact < file->plan.vertex_count || frames != ath_file_frames(file, index)) return 0;
+    while (vertex < exact && file->vertex_source[vertex] == vertex) vertex++;
+    return vertex == exact;
+}
+
+size_t ath_segment_size_to(const ath_file *file, int32_t segment, int32_t level)
+{
+    ath_segment counted;
+    int is_full = !are_copied(file, segment, level) || ath_joined_to(file, segment, level) >= 0;
+    return ath_size_or_most(carve_segment(&counted, file, level, file->longest, is_full, 0));
 }
 
 int ath_keep(ath_work *work, void *memory, size_t memory_bytes)
@@ -362,7 +381,7 @@ static int begin(ath_work *work, const preparation *asked, int32_t index, int32_
     memset(work, 0, sizeof *work);
     memset(segment, 0, sizeof *segment);
     carve_work(work, file, frames, (uint8_t *)work);
-    carve_segment(segment, file, ath_level_of(&file->header, level), frames, (uint8_t *)segment);
+    carve_segment(segment, file, ath_level_of(&file->header, level), frames, asked->is_full, (uint8_t *)segment);
     segment->index = segment->level = segment->stage = -1;
     work->file = file;
     work->segment = segment;
@@ -399,11 +418,12 @@ static int start(void *memory, size_t work_bytes, const ath_file *file, int32_t 
     if (index < 0 || index >= file->info.segment_count || level < 0 || level >= file->info.level_count)
         return ATH_BAD_ARGUMENT;
     int32_t stage = ath_file_stage(file, level);
-    preparation asked = {file, segment_memory, 0, index, stage, before, kept, 0, {0, 0}, 0};
+    int is_full = segment_bytes >= ath_segment_size(file, level);
+    preparation asked = {file, segment_memory, is_full, 0, index, stage, before, kept, 0, {0, 0}, 0};
     if (!file->rest_known) return ATH_NEEDS_HOST_MESH;
     if (stage > file->built_level || !ath_level_plan(file, stage)->bases
         || !ath_fits(memory, work_bytes, ath_work_size(file))
-        || !ath_fits(segment_memory, segment_bytes, ath_segment_size(file, level)))
+        || !ath_fits(segment_memory, segment_bytes, ath_segment_size_to(file, index, level)))
         return ATH_NO_MEMORY;
     memset(work, 0, sizeof *work);
     int result = begin(work, &asked, index, stage), join = ath_join_at(file, index, stage);
@@ -429,19 +449,9 @@ int ath_follow(ath_work *work, const ath_segment *before)
     return ATH_OK;
 }
 
-static int is_in_source_order(const ath_file *file)
-{
-    int32_t vertex = 0;
-    while (vertex < file->plan.vertex_count && file->vertex_source[vertex] == vertex) vertex++;
-    return vertex == file->plan.vertex_count;
-}
-
 int ath_prepare_to(ath_work *work, void *positions)
 {
-    const ath_file *file = work->file;
-    int32_t index = work->asked.index, shown = ath_segment_start(file, index + 1) - ath_segment_start(file, index);
-    if (work->segment->exact_vertices < file->plan.vertex_count || shown != work->segment->frames
-        || !is_in_source_order(file))
+    if (!are_copied(work->file, work->asked.index, ath_level_of(&work->file->header, work->asked.level)))
         return ATH_BAD_ARGUMENT;
     work->asked.positions = work->segment->positions = positions;
     return ATH_OK;
@@ -757,17 +767,20 @@ static const double *placed_piece(layer_work *layer, int32_t p)
 {
     if (!layer->placed)
         layer->placed = ath_pose_used(layer->plan, &layer->motion, layer->plan->pieces + p, &layer->rows, layer->used,
-                                      &layer->scratch);
+                                      ATH_ALL_VERTICES, &layer->scratch);
     return layer->placed;
 }
 
-/* Places the piece after ath_turned_attach, in a layer before the last only if other pieces hang on it. */
+/* Places the piece after ath_turned_attach, in a layer before the last only what other pieces hang on. */
 static void pose_piece(const ath_work *work, layer_work *layer, int32_t p)
 {
     const ath_piece *piece = layer->plan->pieces + p;
     ath_pose_tracks(&layer->motion, piece, &layer->rows, &layer->scratch, layer->used);
     layer->placed = 0;
-    if (piece->attach_cache >= 0 || layer == work->layers + work->layer) placed_piece(layer, p);
+    if (layer == work->layers + work->layer)
+        placed_piece(layer, p);
+    else if (piece->attach_cache >= 0)
+        ath_pose_used(layer->plan, &layer->motion, piece, &layer->rows, layer->used, piece->attached, &layer->scratch);
 }
 
 static void predict_modes(layer_work *layer, int32_t p)
@@ -991,13 +1004,14 @@ static int do_piece(ath_work *work)
 
 static int do_step(ath_work *work)
 {
-    int result = work->phase == FAILED      ? ATH_BAD_ARGUMENT
-                 : work->phase == DONE      ? ATH_OK
-                 : work->phase == BEFORE    ? go_back(work)
-                 : work->phase == CHECKSUMS ? check_some(work)
-                 : work->phase == HEADS     ? open_level(work)
-                 : work->phase == FRAMES    ? do_frames(work)
-                                            : do_piece(work);
+    int result = work->phase == FAILED       ? ATH_BAD_ARGUMENT
+                 : work->phase == DONE       ? ATH_OK
+                 : !work->segment->positions ? ATH_NO_MEMORY
+                 : work->phase == BEFORE     ? go_back(work)
+                 : work->phase == CHECKSUMS  ? check_some(work)
+                 : work->phase == HEADS      ? open_level(work)
+                 : work->phase == FRAMES     ? do_frames(work)
+                                             : do_piece(work);
     if (result != ATH_OK) work->phase = FAILED;
     return result != ATH_OK || work->phase == DONE ? result : ATH_MORE;
 }

@@ -39,11 +39,11 @@ typedef struct {
         refinement_model refined_modes;
     };
     uint32_t history[HISTORY_ROWS * REST_RUN];
-    double bases[REST_BASES]; /* for runs of 1, 2, ... REST_RUN vertices, made when first needed */
-    double work[2 * REST_RUN * REST_RUN];
-    uint8_t made[REST_RUN + 1];
     rest_vertices single[2]; /* for branches without detail, and with detail */
     copy_model copies;
+    double work[2 * REST_RUN * REST_RUN];
+    double bases[REST_BASES]; /* for runs of 1, 2, ... REST_RUN vertices, made when needed, and kept by refinements */
+    uint8_t made[REST_RUN + 1];
 } rest_model;
 
 static void rest_model_init(rest_model *model, int is_refinement)
@@ -54,7 +54,7 @@ static void rest_model_init(rest_model *model, int is_refinement)
         refinement_model_init(&model->refined_modes, REST_RUN, model->history);
     else
         coefficient_model_init(&model->modes, REST_RUN, model->history);
-    memset(model->made, 0, sizeof model->made);
+    if (ENCODING || !is_refinement) memset(model->made, 0, sizeof model->made);
     for (int32_t i = 0; i < 2; i++) {
         lattice_model_init(&model->single[i].lattice);
         rest_predictor_init(&model->single[i].predictor);
@@ -204,12 +204,14 @@ static const double *rest_basis(rest_model *model, int32_t n)
     return basis;
 }
 
+/* coarse: null, or three axes of n integers; where one is 0, so is the step. */
 static void steps_of_run(int32_t n, const double *basis, double step, double half, const double base[3],
-                         const double *run, int32_t *row)
+                         const double *run, const int32_t *coarse, int32_t *row)
 {
     for (int32_t k = 0; k < 3; k++)
         for (int32_t m = 0; m < n; m++) {
             double sum = 0.0;
+            if (coarse && coarse[k * n + m] == 0) continue;
             for (int32_t i = 0; i < n; i++) sum = sum + basis[m * n + i] * (run[3 * i + k] - base[k]);
             row[k * REST_RUN + m] = steps_in(sum, step, half);
         }
@@ -220,12 +222,9 @@ static void refine_rest_row(ath_coder *coder, rest_model *model, const rest_laye
 {
     int32_t predicted[3 * REST_RUN] = {0}, known[3 * REST_RUN] = {0};
     row_prediction prediction = {predicted, known, 0, REST_RUN, REST_RUN, {1, 1, 1}};
-    steps_of_run(n, basis, step, 0.5, base, layer->before + 3 * (size_t)first, predicted);
-    for (int32_t i = 0; i < 3 * n; i++) {
-        int32_t at = i / n * REST_RUN + i % n;
-        known[at] = layer->coarse[3 * (size_t)first + (size_t)i];
-        if (known[at] == 0) predicted[at] = 0;
-    }
+    const int32_t *coarse = layer->coarse + 3 * (size_t)first;
+    steps_of_run(n, basis, step, 0.5, base, layer->before + 3 * (size_t)first, coarse, predicted);
+    for (int32_t k = 0; k < 3; k++) memcpy(known + k * REST_RUN, coarse + k * n, (size_t)n * sizeof *known);
     code_refined_row(coder, &model->refined_modes, n, 0, -1, &prediction, row);
 }
 
@@ -236,13 +235,13 @@ static void code_rest_run(ath_coder *coder, rest_model *model, const rest_layer 
     int32_t row[3 * REST_RUN] = {0};
     const double *basis = rest_basis(model, n);
     double *run = rest + 3 * (size_t)first;
-    if (ENCODING) steps_of_run(n, basis, step, 0.55, base, source + 3 * (size_t)first, row);
+    if (ENCODING) steps_of_run(n, basis, step, 0.55, base, source + 3 * (size_t)first, 0, row);
     if (layer->coarse)
         refine_rest_row(coder, model, layer, first, n, basis, step, base, row);
     else
         code_row(coder, &model->modes, REST_RUN, n, 0, -1, row);
-    for (int32_t i = 0; layer->steps && i < 3 * n; i++)
-        layer->steps[3 * (size_t)first + (size_t)i] = row[i / n * REST_RUN + i % n];
+    for (int32_t k = 0; layer->steps && k < 3; k++)
+        memcpy(layer->steps + 3 * first + k * n, row + k * REST_RUN, (size_t)n * sizeof *row);
     for (int32_t i = 0; i < n; i++)
         for (int32_t k = 0; k < 3; k++) {
             double sum = 0.0;

@@ -154,14 +154,15 @@ ATH_INLINE void rest_note_error(double *mean, double error, double rate)
     *mean = *mean + ((error < most ? error : most) - *mean) * rate;
 }
 
-/* Takes a step of recursive least squares. Older samples lose weight only in the direction that is learned from. */
-static void rest_learn_axis(rest_filter *filter, const rest_guess *at, int32_t k, double noise, double offset)
+/* Takes a step of recursive least squares. Older samples lose weight only in the direction that is learned from. The
+ * matrix is symmetric. */
+ATH_INLINE void rest_learn_axis(int32_t n, rest_filter *filter, const rest_guess *at, int32_t k, double noise,
+                                double offset)
 {
-    double gain[REST_TERMS], known = 0.0, error = offset;
-    int32_t n = at->term_count;
+    double gain[REST_TERMS] = {0.0}, part[REST_TERMS], known = 0.0, error = offset;
+    for (int32_t l = 0; l < n; l++)
+        for (int32_t j = 0; j < n; j++) gain[j] = gain[j] + filter->spread[l][j] * at->terms[l][k];
     for (int32_t j = 0; j < n; j++) {
-        gain[j] = 0.0;
-        for (int32_t l = 0; l < n; l++) gain[j] = gain[j] + filter->spread[j][l] * at->terms[l][k];
         known = known + gain[j] * at->terms[j][k];
         error = error - filter->weight[j] * at->terms[j][k];
     }
@@ -169,30 +170,31 @@ static void rest_learn_axis(rest_filter *filter, const rest_guess *at, int32_t k
     double step = error / (noise + known);
     double less = (known - REST_FORGET * noise) / (known * (noise + known));
     for (int32_t j = 0; j < n; j++) {
-        double part = gain[j] * less;
+        part[j] = gain[j] * less;
         filter->weight[j] = filter->weight[j] + gain[j] * step;
-        for (int32_t l = 0; l <= j; l++) {
-            filter->spread[j][l] = filter->spread[j][l] - part * gain[l];
-            filter->spread[l][j] = filter->spread[j][l];
-        }
+    }
+    for (int32_t l = 0; l < n; l++) {
+        for (int32_t j = 0; j < n; j++) filter->spread[l][j] = filter->spread[l][j] - part[j] * gain[l];
+        for (int32_t j = 0; j < l; j++) filter->spread[l][j] = filter->spread[j][l];
     }
 }
 
 /* Notes the errors of the guesses for a vertex at `offset`, and its coded integers. */
-static void rest_note(rest_memory *memory, const rest_guess *at, const double offset[3], const int32_t integers[3],
-                      double rate)
+ATH_HOT static void rest_note(rest_memory *memory, const rest_guess *at, const double offset[3],
+                              const int32_t integers[3], double rate)
 {
-    for (int32_t k = 0; k < 3; k++) {
-        for (int32_t g = 0; g < at->guess_count; g++) {
-            double error = offset[k] - at->guesses[g][k];
-            rest_note_error(&memory->error[g][k], error * error, rate);
-        }
-        memory->mean[k] = averaged(memory->mean[k], integers[k]);
+    double repeated[3 * REST_GUESSES], *mean = (double *)memory->error;
+    const double *guess = (const double *)at->guesses;
+    for (int32_t i = 0; i < 3 * REST_GUESSES; i++) repeated[i] = offset[i % 3];
+    for (int32_t i = 0; i < 3 * at->guess_count; i++) {
+        double error = repeated[i] - guess[i];
+        rest_note_error(mean + i, error * error, rate);
     }
+    for (int32_t k = 0; k < 3; k++) memory->mean[k] = averaged(memory->mean[k], integers[k]);
 }
 
-static void rest_learn(rest_predictor *predictor, rest_guess *at, double per_unit, const double point[3],
-                       const int32_t integers[3])
+ATH_HOT static void rest_learn(rest_predictor *predictor, rest_guess *at, double per_unit, const double point[3],
+                               const int32_t integers[3])
 {
     double offset[3], squares = 0.0, usual, noise;
     rest_term(offset, at->base, point, per_unit);
@@ -205,7 +207,11 @@ static void rest_learn(rest_predictor *predictor, rest_guess *at, double per_uni
     squares = squares / 3.0;
     usual = 0.3 + at->filter->noise;
     noise = usual + squares + 0.1 * squares * (squares / usual);
-    for (int32_t k = 0; k < 3; k++) rest_learn_axis(at->filter, at, k, noise, offset[k]);
+    for (int32_t k = 0; k < 3; k++)
+        if (at->term_count == REST_OWN_TERMS) /* a constant is much faster */
+            rest_learn_axis(REST_OWN_TERMS, at->filter, at, k, noise, offset[k]);
+        else
+            rest_learn_axis(at->term_count, at->filter, at, k, noise, offset[k]);
     double most = 8.0 * at->filter->noise + 4.0;
     at->filter->noise = at->filter->noise + ((squares < most ? squares : most) - at->filter->noise) * 0.1;
     memcpy(at->increment, offset, sizeof offset);

@@ -91,7 +91,7 @@ static void code_bent_run(ath_coder *coder, rest_model *model, const bent_pose *
             local[3 * i + k] = R[k] * (x[0] - base[0]) + R[3 + k] * (x[1] - base[1]) + R[6 + k] * (x[2] - base[2])
                                - (run[3 * i + k] - from[k]);
     }
-    if (ENCODING) steps_of_run(n, basis, pose->step, 0.55, nothing, local, row);
+    if (ENCODING) steps_of_run(n, basis, pose->step, 0.55, nothing, local, 0, row);
     code_row(coder, &model->modes, REST_RUN, n, 0, -1, row);
     for (int32_t i = 0; i < n; i++) {
         double x[3], *out = pose->rest + 3 * (size_t)(first + i);
