@@ -428,7 +428,8 @@ class EncodingJob:
         search = Search.of(self.source, ath, bound, self.options.effort, work, self.options.jobs, ratios)
         unsearched = share * search.first_cost()
         short = self._in_short_segments()
-        if len(short.source.segments) > len(self.source.segments) and search.jumps(short.source):
+        frames = short.source.coded_frames / len(short.source.segments)  # Fewer than a segment has where many are held.
+        if frames > SHORT_SEGMENT / 2 and short.source.segments != self.source.segments and search.jumps(short.source):
             return short._decide(bound, work)
         if math.isfinite(unsearched):
             work.allowed -= FILE_BYTE * unsearched
