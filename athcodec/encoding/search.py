@@ -133,9 +133,7 @@ class Search:
         trials = (self.of_sample or self).trials
         in_short = Search(replace(self.trials, source=short, samples=samples_of(short)), self.effort, self.ratios)
         most = in_short.first_cost() / SHORT_SHARE
-        return most < self.first_cost() and most < min(
-            trials.costs(learned_bases.candidates(trials.start, trials)), default=math.inf
-        )
+        return most < self.first_cost() and most < trials.cost(trials.start.in_learned_bases())
 
     def first_cost(self) -> float:
         """Return the bytes of a whole file at the settings that the search starts with."""

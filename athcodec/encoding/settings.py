@@ -114,6 +114,10 @@ class Settings:
         """Return the settings with one rotation factor for all levels."""
         return replace(self, rotation_step_factors=(factor,) * self.levels)
 
+    def in_learned_bases(self) -> Settings:
+        """Return the settings with a learned time basis of its own for each level."""
+        return replace(self, learned_bases=(True,) * self.levels, common_basis=False)
+
     def in_waves(self) -> Settings:
         """Return the settings without learned time bases."""
         return replace(self, learned_bases=(False,) * self.levels, common_basis=False)

@@ -19,8 +19,7 @@ from athcodec.encoding.settings import Choice, Settings
 from athcodec.encoding.shape import LENGTH_STEP
 from athcodec.encoding.survey import Ath
 
-AT_ONCE_SHARE = 0.8  # Largest share of the size of a rest pose to refine at which all layers have one pose.
-AT_ONCE_STEP = 0.5  # Step of a rest pose of all layers to start a search from, over that of one to refine.
+AT_ONCE_SHARE = 0.9  # Largest share of the size of a rest pose to refine at which all layers have one pose.
 STILL_STEP = 1024.0  # Quantisation step, in bounds, that rounds every coefficient of a still stem to zero.
 
 
@@ -48,8 +47,7 @@ def first_settings(
 def _in_layers(source: Source, ath: Ath, settings: Settings, ratios: Sequence[int]) -> Settings:
     """Return the settings for layers: each refines the rest pose of the one before, or all have that of the last layer
     if that is much smaller, or if an error is asked for that holds at the last layer alone. ratios: of their steps."""
-    finer = replace(settings, rest_step=qz.single(AT_ONCE_STEP * settings.rest_step), coarsest_rest_step=0.0)
-    at_once = rest.with_best_rest(source, ath, finer)
+    at_once = rest.with_best_rest(source, ath, replace(settings, coarsest_rest_step=0.0))
     if source.has_source_rest and source.rest_error < math.inf:
         return at_once
     # Lags that are best at once are worse where layers refine them.
@@ -59,8 +57,7 @@ def _in_layers(source: Source, ath: Ath, settings: Settings, ratios: Sequence[in
         coarsest_rest_step=qz.single(LENGTH_STEP * source.rest_error),
     )
     refined = rest.connected_if_smaller(source, ath, refined)
-    as_fine = replace(refined, rest_step=at_once.rest_step)
-    sizes = [layered_poses_size(source, ath, some, ratios) for some in (at_once, as_fine)]
+    sizes = [layered_poses_size(source, ath, some, ratios) for some in (at_once, refined)]
     return at_once if sizes[0] < AT_ONCE_SHARE * sizes[1] else refined
 
 

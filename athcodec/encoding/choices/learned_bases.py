@@ -15,11 +15,12 @@ PERIODIC_WORTH = 1.3  # Largest ratio of bytes at which waves are periodic: coar
 
 
 def candidates(settings: Settings, trials: Trials) -> list[Settings]:
-    """Return the settings with learned time bases at all levels, each level's own or one for all."""
+    """Return the settings with learned time bases at all levels: each level's own or one for all; layers have one."""
     if trials.without(Feature.TIME_BASES):
         return []
-    each = replace(settings.in_waves(), learned_bases=(True,) * settings.levels)
-    return [each] if trials.without(Feature.COMMON_BASIS) else [each, replace(each, common_basis=True)]
+    each = settings.in_learned_bases()
+    common = [] if trials.without(Feature.COMMON_BASIS) else [replace(each, common_basis=True)]
+    return common if common and trials.is_layered else [each, *common]
 
 
 def best_bases(settings: Settings, trials: Trials) -> Settings:
@@ -32,7 +33,7 @@ def best_bases(settings: Settings, trials: Trials) -> Settings:
         return trials.cheapest([settings, waves, each, *common])
     shorter = trials.level_costs(each) < trials.level_costs(waves)
     mixed = replace(each, learned_bases=tuple(shorter.tolist()))
-    best = trials.cheapest([waves, mixed, *common])
+    best = trials.cheapest([waves, each if each.common_basis else mixed, *common])
     if shorter.all() or not shorter.any() or not trials.work.fits(2 * trials.work_of_trial):
         return best
     return trials.cheapest([best, replace(each, step=single(FINER * each.step))])  # They may lose by their step alone.
