@@ -9,10 +9,11 @@ enum { WAVES = 8 }; /* waves that a row is projected on at once */
 static double absolute(double x) { return x < 0.0 ? -x : x; }
 
 /* Uniform quantiser with a dead zone: zero below `dead_zone` steps, rounding biased towards zero by as much. */
-static int32_t quantise(double value, double dead_zone)
+ATH_INLINE int32_t quantise(double value, double dead_zone)
 {
     double units = absolute(value) + (1.0 - dead_zone);
-    int32_t magnitude = units >= 1.0 ? units > 1073741823.0 ? 1073741823 : (int32_t)units : 0;
+    units = units < 1073741823.0 ? units : 1073741823.0;
+    int32_t magnitude = (int32_t)(units >= 1.0 ? units : 0.0);
     return value < 0.0 ? -magnitude : magnitude;
 }
 
@@ -38,8 +39,8 @@ ATH_INLINE void sums_of_waves(const double *waves, int32_t count, int32_t T, con
 ATH_HOT static int32_t forward_temporal(const ath_stream *stream, int32_t T, double step, double dead_zone,
                                         int32_t known, const double *row, double *units)
 {
-    double length2 = 0.0, inverse = 1.0 / step;
-    for (int32_t t = 0; t < T; t++) length2 += row[t] * row[t];
+    double length2, inverse = 1.0 / step;
+    sums_of_waves(row, 1, T, row, 1.0, &length2);
     length2 *= inverse * inverse;
     double least = 0.9 * dead_zone * dead_zone, left = length2;
     int is_sharp = stream->temporal_rank == T && 1e-12 * length2 < 0.01 * least; /* a learned basis has rounded rows */
@@ -75,6 +76,7 @@ static void drop_lone_ones(int32_t T, int32_t rank, double units[3][ATH_SEGMENT_
         for (int32_t k = rank - 1; k >= 0; k--) {
             int32_t *q = quantised + axis * T + k;
             if ((*q != 1 && *q != -1) || (predicted && predicted[axis * T + k] != 0)) continue;
+            if (absolute(units[axis][k]) >= least[0]) continue;
             int32_t busy = busy_neighbours(quantised, T, rank, axis, k);
             if (busy < 2 && absolute(units[axis][k]) < least[busy]) *q = 0;
         }
@@ -159,8 +161,8 @@ static void settle_ends(const ath_stream *stream, int32_t T, double step, const 
 }
 
 /* Quantises a track of three axes about its prediction, if there is one, and replaces it by the decoded track. */
-static void code_track(const ath_stream *stream, int32_t T, const double steps[3], const ath_rounding *rounding,
-                       double *track, const int32_t *predicted, int32_t *quantised)
+ATH_HOT static void code_track(const ath_stream *stream, int32_t T, const double steps[3], const ath_rounding *rounding,
+                               double *track, const int32_t *predicted, int32_t *quantised)
 {
     double units[3][ATH_SEGMENT_FRAMES];
     int32_t longest = 0;
@@ -208,23 +210,43 @@ static int32_t turned_vertices(const ath_plan *plan, const ath_piece *piece)
     return (next < plan->branch_count ? plan->branches[next].first : plan->vertex_count) - piece->first;
 }
 
-/* Adds to H the vertices of the branches that a root carries: products of their positions in frame t and in the rest
- * pose, weighted so that together they count as much as the root's own. source: positions of the whole plant. own2: sum
- * of the squared distances of the root's vertices from its base. */
-static void add_carried(const ath_plan *plan, int32_t T, const ath_piece *root, int32_t t, const double *source,
-                        double own2, double H[9])
+typedef double products[9][ATH_SEGMENT_FRAMES]; /* of positions in each frame and in the rest pose */
+
+/* Fills the products of `count` vertices, x from `from`, and d from `a`; returns the sum of d^2. from: 0: no vertex. */
+ATH_HOT static double sum_products(const ath_plan *plan, int32_t T, int32_t vertex, int32_t count, const double a[3],
+                                   const double *x, const double *from, products H)
 {
-    const double *a = ath_rest_attach(plan, root), *first = source + (size_t)root->first * 3 * (size_t)T;
-    double products[9] = {0}, carried2 = 0.0;
-    for (int32_t i = root->count, count = turned_vertices(plan, root); i < count; i++) {
-        const double *x0 = ath_rest_of(plan, root->first + i), *x = first + (size_t)i * 3 * (size_t)T;
+    double size2 = 0.0;
+    for (int32_t k = 0; k < 9; k++) memset(H[k], 0, (size_t)T * sizeof(double));
+    for (int32_t i = 0; i < count; i++, x += 3 * (size_t)T) {
+        const double *x0 = ath_rest_of(plan, vertex + i);
+        double d[3];
         for (int32_t k = 0; k < 3; k++) {
-            double d = x0[k] - a[k];
-            carried2 += d * d;
-            for (int32_t j = 0; j < 3; j++) products[3 * j + k] += (x[j * T + t] - first[j * T + t]) * d;
+            d[k] = x0[k] - a[k];
+            size2 += d[k] * d[k];
         }
+        for (int32_t j = 0; j < 3; j++)
+            for (int32_t t = 0; t < T; t++) {
+                double own = from ? x[j * T + t] - from[j * T + t] : x[j * T + t];
+                for (int32_t k = 0; k < 3; k++) H[3 * j + k][t] += own * d[k];
+            }
     }
-    for (int32_t i = 0; i < 9 && carried2 > 0.0; i++) H[i] += own2 / carried2 * products[i];
+    return size2;
+}
+
+/* Adds to H the vertices of the branches that a root carries, weighted so that together they count as much as the
+ * root's own. source: positions of the whole plant. own2: sum of the squared distances of the root's vertices from its
+ * base. */
+static void add_carried(const ath_plan *plan, int32_t T, const ath_piece *root, const double *source, double own2,
+                        products H)
+{
+    const double *first = source + (size_t)root->first * 3 * (size_t)T;
+    products carried;
+    double carried2 =
+        sum_products(plan, T, root->first + root->count, turned_vertices(plan, root) - root->count,
+                     ath_rest_attach(plan, root), first + (size_t)root->count * 3 * (size_t)T, first, carried);
+    for (int32_t k = 0; k < 9 && carried2 > 0.0; k++)
+        for (int32_t t = 0; t < T; t++) H[k][t] += own2 / carried2 * carried[k][t];
 }
 
 static double determinant(const double m[9])
@@ -260,7 +282,7 @@ static void nearest_rotation(const double H[9], double R[9])
         double turn[3] = {M[7] - M[5], M[2] - M[6], M[3] - M[1]}, trace = M[0] + M[4] + M[8];
         for (int32_t i = 0; i < 3; i++)
             for (int32_t k = 0; k < 3; k++) S[3 * i + k] = (i == k ? trace : 0.0) - 0.5 * (M[3 * i + k] + M[3 * k + i]);
-        ath_solve(3, 1, S, turn); /* NaN if S is not positive definite, so far from the nearest rotation */
+        ath_solve3(S, turn); /* NaN if S is not positive definite, so far from the nearest rotation */
         double size2 = turn[0] * turn[0] + turn[1] * turn[1] + turn[2] * turn[2];
         if (!(size2 < far_turn)) break;
         rational_rotation(0.25 * turn[0], 0.25 * turn[1], 0.25 * turn[2], q);
@@ -284,21 +306,15 @@ static void fit_rotation(const ath_plan *plan, int32_t T, const ath_piece *piece
 {
     int rigid = (piece->flags & ATH_RIGID) != 0;
     double a[3], q[4] = {1.0, 0.0, 0.0, 0.0}, R[9] = {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0};
+    products sums;
     memcpy(a, ath_rest_attach(plan, piece), sizeof a);
     if (rigid) rest_centre(plan, piece, a);
+    double size2 = sum_products(plan, T, piece->first, piece->count, a, local, 0, sums);
+    if (carried) add_carried(plan, T, piece, carried, size2, sums);
+    double prior = 1e-6 * size2 + (rigid ? 0.0 : step * step * (double)piece->count);
     for (int32_t t = 0; t < T; t++) {
-        double H[9] = {0}, size2 = 0.0, own[3];
-        for (int32_t i = 0; i < piece->count; i++) {
-            const double *x0 = ath_rest_of(plan, piece->first + i), *x = local + (size_t)i * 3 * (size_t)T;
-            for (int32_t k = 0; k < 3; k++) {
-                double d = x0[k] - a[k];
-                size2 += d * d;
-                for (int32_t j = 0; j < 3; j++) H[3 * j + k] += x[j * T + t] * d;
-            }
-        }
-        if (carried) add_carried(plan, T, piece, t, carried, size2, H);
-        double prior = 1e-6 * size2 + (rigid ? 0.0 : step * step * (double)piece->count);
-        for (int32_t k = 0; k < 9; k++) H[k] += prior * R[k];
+        double H[9], own[3];
+        for (int32_t k = 0; k < 9; k++) H[k] = sums[k][t] + prior * R[k];
         if (rigid)
             nearest_rotation(H, R);
         else
@@ -370,8 +386,8 @@ static void shift_of_all(const ath_plan *plan, int32_t T, const ath_piece *piece
         }
 }
 
-/* Codes the piece's own translation and rotation; leaves its vertices in the turned frame in `local`. A rigid piece is
- * turned first, so that the one does not stand for the other. */
+/* Codes the piece's own translation and rotation. local: room for its vertices. A rigid piece is turned first, so that
+ * the one does not stand for the other. */
 static void analyse_tracks(const ath_plan *plan, const ath_motion *motion, const ath_piece *piece,
                            const ath_piece_before *before, ath_piece_rows *rows, const ath_scratch *scratch,
                            const double *source, const ath_rounding *rounding, double *local)
@@ -384,8 +400,8 @@ static void analyse_tracks(const ath_plan *plan, const ath_motion *motion, const
         shift_of_first(plan, T, piece, scratch, source);
         code_shift(motion, piece, before, rows, scratch, rounding);
     }
-    to_local(T, piece, &scratch->at, source, local);
     if (ath_has_rotation(plan, piece, base)) {
+        to_local(T, piece, &scratch->at, source, local);
         ath_turning turning = ath_turning_of(plan, piece, base);
         int carries = turned_vertices(plan, piece) > piece->count;
         fit_rotation(plan, T, piece, base->step, local, carries ? source : 0, scratch->track);

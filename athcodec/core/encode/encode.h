@@ -139,6 +139,7 @@ ATH_ENCODER_API void ath_decompose(int64_t count, const double *matrices, double
 /* Replaces rows, n x columns, by the solution of matrix * x = rows. The matrix is positive definite and is
  * destroyed. */
 ATH_ENCODER_API void ath_solve(int32_t n, int32_t columns, double *matrix, double *rows);
+void ath_solve3(double matrix[9], double row[3]);
 
 /* Measures the largest distance and the sum of squared distances between positions and source (plus origin). shown: how
  * many frames of the clip show each frame. rounding: error that a decoder may add. histogram: ATH_SHORT_FLOATS counts

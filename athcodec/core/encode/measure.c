@@ -43,6 +43,7 @@ void ath_differences(int32_t vertex_count, int32_t frames, int32_t piece_count, 
         }
 }
 
+ATH_HOT
 int64_t ath_add_moments(int64_t count, int32_t frames, const int32_t *rows, double least, double *moments)
 {
     int64_t kept = 0;
@@ -91,6 +92,7 @@ void ath_gather(int32_t vertex_count, int32_t frames, const int32_t *vertex_sour
                 }
 }
 
+ATH_HOT
 void ath_store_positions(const double *placed, int32_t first, int32_t count, int32_t T, const double origin[3],
                          int is_float64, void *positions)
 {
