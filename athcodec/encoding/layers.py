@@ -38,7 +38,7 @@ from athcodec.encoding.choices.joins import (
 from athcodec.encoding.choices.levels import SourceFrames
 from athcodec.encoding.features import Feature
 from athcodec.encoding.learned_modes import nested
-from athcodec.encoding.motion import LearnedModes, Plan, SegmentMotion, position_errors, zeros
+from athcodec.encoding.motion import LearnedModes, Plan, SegmentMotion, empty, position_errors
 from athcodec.encoding.segment import (
     CodedPrelude,
     Corrections,
@@ -420,7 +420,7 @@ class CodedMotion:
         last = plan.level_count - 1
         self._correct(decoded, layer, last)
         segment.analyse_nodes(self.positions, settings.node_steps, settings.rounding)
-        self._room = zeros(self.positions.shape)
+        self._room = empty(self.positions.shape)
         shown = [self._at_level_0(segment, settings), *[segment] * (plan.level_count - 2)]
         self.errors = _EvenLevels(self, shown, settings).errors
         self._keep_last_level_best(layer, last, decoded)

@@ -9,15 +9,14 @@ frame falls with the number of frames. FORMAT.md, "SHAPES".
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
 
 from athcodec._native import SHAPE_MODES, address, lib
 from athcodec.encoding import quantise as qz
-from athcodec.encoding.motion import LEARNED_NUMBERS, LearnedModes, Plan, SegmentMotion
-from athcodec.motion.algebra import multiply, principal, solve
+from athcodec.encoding.motion import LEARNED_NUMBERS, LearnedModes, Plan, SegmentMotion, empty, zeros
 
 FAINT = 0.15  # Bend of rings, in steps, below which a learned mode drops it: it would stretch rings that turn.
 
@@ -26,122 +25,65 @@ FAINT = 0.15  # Bend of rings, in steps, below which a learned mode drops it: it
 class Components:
     """Principal components of pieces' first modes over all frames analysed, in scene units.
 
-    A group holds pieces with the same number of modes: pieces (G,), lengths (G, 3 modes) in descending order, and unit
-    vectors (G, 3 modes, 3 modes), a row each.
+    sizes: (P,) int32, modes of each piece. Of each piece in turn: 3 modes lengths in descending order, and as many unit
+    vectors, a row each.
     """
 
     frames: int
-    groups: list[tuple[np.ndarray, np.ndarray, np.ndarray]]
+    sizes: np.ndarray
+    lengths: np.ndarray
+    vectors: np.ndarray
 
 
 def components(plan: Plan, segments: Iterable[SegmentMotion]) -> Components:
     """Return the components of segments that were analysed with a fine step and without learned modes, so that they
     describe the motion and not its rounding."""
-    sizes = np.minimum(plan.pieces["rank"], SHAPE_MODES)
-    groups = [
-        (pieces, np.zeros((len(pieces), 3 * size, 3 * size)))
-        for size in np.unique(sizes)
-        for pieces in [np.flatnonzero(sizes == size)]
-    ]
-    frames = 0
+    sizes, frames = np.minimum(plan.pieces["rank"], SHAPE_MODES).astype(np.int32), 0
+    moments = zeros((int((9 * sizes.astype(np.int64) ** 2).sum()),))
     for segment in segments:
         frames += segment.frames
-        for pieces, total in groups:
-            for part in _parts(pieces, segment.frames * total.shape[1]):
-                rows = _tracks(plan, segment, pieces[part], total.shape[1] // 3)
-                total[part] += multiply(rows, rows.transpose(0, 2, 1))
+        steps = np.array([stream.step for stream in segment.streams])
+        arrays = (array.ctypes.data for array in (sizes, steps, segment.coefficients, moments))
+        lib.ath_add_mode_moments(plan.core, segment.frames, *arrays)
         del segment  # The next segment is made after this one has been freed.
-    return Components(frames, [(pieces, *_principal(total)) for pieces, total in groups])
-
-
-def _principal(moments: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    values, vectors = principal(moments)
-    return np.sqrt(np.maximum(values, 0.0)), vectors
-
-
-def _parts(pieces: np.ndarray, row_bytes: int) -> Iterator[slice]:
-    """Yield few enough pieces at a time that memory does not grow with their number."""
-    count = max(1, (16 << 20) // (8 * row_bytes))
-    return (slice(at, at + count) for at in range(0, len(pieces), count))
-
-
-def _mode_weights(pieces: np.ndarray) -> np.ndarray:
-    """Return the weights of the modes of pieces, (P, SHAPE_MODES)."""
-    kinds, kind = np.unique(pieces[["flags", "count", "ring"]], return_index=True, return_inverse=True)[1:]
-    weights = np.empty((len(kinds), SHAPE_MODES))
-    for row, piece in zip(weights, pieces[kinds]):
-        lib.ath_mode_weights(np.array(piece).ctypes.data, address(row, np.float64, SHAPE_MODES))
-    return weights[kind]
-
-
-def _tracks(plan: Plan, segment: SegmentMotion, pieces: np.ndarray, size: int) -> np.ndarray:
-    """Return the tracks of the first modes over temporal frequency, (pieces, 3 size, frames) float64 in scene units."""
-    slots = plan.pieces["first"][pieces][:, None] + np.arange(size)
-    steps = np.array([stream.step for stream in segment.streams])
-    weight = _mode_weights(plan.pieces[pieces])[:, :size]
-    scale = steps[plan.pieces["level"][pieces]][:, None] * weight
-    rows = segment.coefficients[slots] * scale[:, :, None, None]
-    return rows.reshape(len(pieces), 3 * size, segment.frames)
-
-
-def _across(pieces: np.ndarray, size: int) -> np.ndarray:
-    """Return (P, size) bool: which numbers of a learned mode belong to modes that bend rings."""
-    rings = -(-pieces["count"] // np.maximum(pieces["ring"], 1))
-    return (pieces["ring"] > 0)[:, None] & (np.arange(size) // 3 >= rings[:, None])
+    lengths, vectors = np.empty(3 * int(sizes.sum())), empty(moments.shape)
+    lib.ath_mode_components(len(sizes), *(array.ctypes.data for array in (sizes, moments, lengths, vectors)))
+    return Components(frames, sizes, lengths, vectors)
 
 
 def learn(plan: Plan, seen: Components, step: float, wanted: np.ndarray | None = None) -> LearnedModes:
     """Return the modes that a motion step makes worth storing, of the pieces `wanted`, (P,) bool, or of all."""
-    counts = np.zeros(len(plan.pieces), np.int32)
-    rows: dict[int, np.ndarray] = {}
     least = step * np.sqrt(seen.frames)
-    for pieces, lengths, vectors in seen.groups:
-        scale = np.minimum(lengths / (qz.MODE_STEP * least), qz.LARGEST_MODE)
-        numbers = np.rint(vectors * scale[:, :, None]).astype(np.int32)
-        faint = np.abs(vectors * lengths[:, :, None]) < FAINT * least
-        numbers[_across(plan.pieces[pieces], numbers.shape[2])[:, None] & faint] = 0
-        kept = (lengths > qz.LEAST_MODE * least) & numbers.any(axis=2)
-        if wanted is not None:
-            kept &= wanted[pieces, None]
-        counts[pieces] = np.cumprod(kept, axis=1).sum(axis=1)
-        rows |= {int(p): numbers[i, : counts[p]] for i, p in enumerate(pieces)}
-    return _packed(counts, [rows[p] for p in np.flatnonzero(counts)])
+    wanted = np.full(len(plan.pieces), True if wanted is None else wanted)
+    counts = np.zeros(len(plan.pieces), np.int32)
+    integers = zeros((3 * int(seen.sizes[wanted].sum()), LEARNED_NUMBERS), np.int32)
+    count = lib.ath_learn_modes(
+        plan.core,
+        *(array.ctypes.data for array in (seen.sizes, wanted, seen.lengths, seen.vectors)),
+        *(qz.MODE_STEP * least, qz.LARGEST_MODE, qz.LEAST_MODE * least, FAINT * least),
+        counts.ctypes.data,
+        integers.ctypes.data,
+    )
+    return _modes(counts, integers[:count].copy())
 
 
 def nested(plan: Plan, modes: LearnedModes, wanted: np.ndarray, digits: int) -> LearnedModes:
     """Return the modes of the pieces `wanted`, (P,) bool, with so many binary digits less. Those of a piece end before
     the first that vanishes."""
+    piece = np.repeat(np.arange(len(modes.counts)), modes.counts)
     integers = np.sign(modes.integers) * (np.abs(modes.integers) + (1 << digits - 1) >> digits)
-    counts, rows = np.zeros_like(modes.counts), []
-    for piece in np.flatnonzero(wanted & (modes.counts > 0)):
-        numbers = integers[modes.first[piece] : modes.first[piece] + modes.counts[piece]]
-        counts[piece] = count = np.cumprod(numbers.any(axis=1)).sum()
-        size = min(int(plan.pieces["rank"][piece]), SHAPE_MODES)
-        if count:
-            rows.append(
-                numbers[:count].reshape(count, 3, SHAPE_MODES)[:, :, :size].transpose(0, 2, 1).reshape(count, -1)
-            )
-    return _packed(counts, rows)
+    gone = np.cumsum(~(integers.any(axis=1) & wanted[piece]))
+    kept = gone == np.append(0, gone)[modes.first[piece]]
+    sizes = np.minimum(plan.pieces["rank"][piece[kept]], SHAPE_MODES)
+    integers = integers[kept] * np.tile(np.arange(SHAPE_MODES) < sizes[:, None], 3)
+    return _modes(np.bincount(piece[kept], minlength=len(modes.counts)).astype(np.int32), integers.astype(np.int32))
 
 
-def _packed(counts: np.ndarray, rows: list[np.ndarray]) -> LearnedModes:
-    integers = np.zeros((int(counts.sum()), 3, SHAPE_MODES), np.int32)
-    units, duals = np.zeros((2, len(integers), LEARNED_NUMBERS))
-    first = np.cumsum(counts, dtype=np.int64) - counts
-    at = 0
-    for numbers in rows:
-        count, size = len(numbers), numbers.shape[1] // 3
-        integers[at : at + count, :, :size] = numbers.reshape(count, size, 3).transpose(0, 2, 1)
-        at += count
-    integers = integers.reshape(-1, LEARNED_NUMBERS)
+def _modes(counts: np.ndarray, integers: np.ndarray) -> LearnedModes:
+    units, duals = np.zeros((2, *integers.shape))
     lib.ath_unit_shapes(len(integers), address(integers, np.int32, 0), address(units, np.float64, 0))
-    at = 0
-    for numbers in rows:
-        of_piece = units[at : at + len(numbers)]
-        products = multiply(of_piece, of_piece.T) + 1e-4 * np.eye(len(of_piece))  # A few modes are nearly alike.
-        duals[at : at + len(of_piece)] = solve(products, of_piece)
-        at += len(of_piece)
-    return LearnedModes(counts, first, integers, units, duals)
+    lib.ath_mode_duals(len(counts), *(array.ctypes.data for array in (counts, units, duals)))
+    return LearnedModes(counts, np.cumsum(counts, dtype=np.int64) - counts, integers, units, duals)
 
 
 def estimated_bits(integers: np.ndarray, pieces: np.ndarray, piece_count: int) -> np.ndarray:

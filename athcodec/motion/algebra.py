@@ -74,13 +74,6 @@ def principal(moments: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return values, vectors
 
 
-def solve(matrix: np.ndarray, rows: np.ndarray) -> np.ndarray:
-    """Return the solutions, (n, m), for a positive definite matrix (n, n) and right-hand sides (n, m)."""
-    out, scratch = np.array(rows, np.float64, order="C"), np.array(matrix, np.float64, order="C")
-    lib.ath_solve(*out.shape, address(scratch, np.float64, 0), address(out, np.float64, 0))
-    return out
-
-
 def length(vector: np.ndarray) -> float:
     """Return the norm of one vector. Without an axis, numpy.linalg.norm would ask BLAS, whose sums have no fixed
     order."""

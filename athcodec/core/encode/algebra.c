@@ -150,7 +150,7 @@ ATH_INLINE void factorise(int32_t n, double *matrix)
         }
 }
 
-ATH_INLINE void solve(int32_t n, int32_t columns, double *matrix, double *rows)
+ATH_HOT void ath_solve(int32_t n, int32_t columns, double *matrix, double *rows)
 {
     factorise(n, matrix);
     for (int32_t pass = 0; pass < 2; pass++)
@@ -165,6 +165,13 @@ ATH_INLINE void solve(int32_t n, int32_t columns, double *matrix, double *rows)
         }
 }
 
-ATH_HOT void ath_solve(int32_t n, int32_t columns, double *matrix, double *rows) { solve(n, columns, matrix, rows); }
-
-void ath_solve3(double matrix[9], double row[3]) { solve(3, 1, matrix, row); }
+void ath_solve3(const double m[9], double row[3])
+{
+    double a = ath_sqrt(m[0]), b = m[3] / a, d = m[6] / a;
+    double c = ath_sqrt(m[4] - b * b), e = (m[7] - d * b) / c, f = ath_sqrt(m[8] - d * d - e * e);
+    double x = row[0] / a, y = (row[1] - b * x) / c, z = (row[2] - d * x - e * y) / f / f;
+    y = (y - e * z) / c;
+    row[0] = (x - b * y - d * z) / a;
+    row[1] = y;
+    row[2] = z;
+}

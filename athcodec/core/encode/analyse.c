@@ -1,6 +1,7 @@
 /* From positions to quantised coefficients, piece by piece in closed loop: every piece is predicted from what the
  * decoder will have of its parent. Encoder only. */
 #include "encode/encode.h"
+#include "model/basis.h"
 #include "model/lanes.h"
 
 enum { FIRST_ROTATION_STEPS = 30, ROTATION_STEPS = 5 };
@@ -104,59 +105,62 @@ static void both_ends(const double *row, int32_t T, double parts[2 * ATH_END_PAR
     end_parts(row, T, -1, parts + ATH_END_PARTS);
 }
 
-/* An integer that may be rounded the other way: its parts at the ends, plain and weighted, and the cost of a step. */
+/* Integers that may be rounded the other way: their parts at the ends, plain and weighted, how far they lean already, and
+ * the cost of a step. */
 typedef struct {
-    int32_t k;
-    double parts[2 * ATH_END_PARTS], pull[2 * ATH_END_PARTS], cost;
-} end_integer;
+    int32_t k[ATH_SEGMENT_FRAMES];
+    double parts[2 * ATH_END_PARTS][ATH_SEGMENT_FRAMES], pull[2 * ATH_END_PARTS][ATH_SEGMENT_FRAMES];
+    double lean[ATH_SEGMENT_FRAMES], cost[ATH_SEGMENT_FRAMES], fall[ATH_SEGMENT_FRAMES], rise[ATH_SEGMENT_FRAMES];
+} end_integers;
 
 /* Rounds integers of a row the other way if that brings its ends closer, whose errors are the largest and are seen
  * where segments meet. units: the exact values less the prediction; row: the integers. The gain, in squared steps, is
  * the change of the integer's own error and of those of the ends. */
-static void settle_ends(const ath_stream *stream, int32_t T, double step, const ath_rounding *rounding,
-                        const double *row, const double *units, const int32_t *predicted, int32_t *quantised)
+ATH_HOT static void settle_ends(const ath_stream *stream, int32_t T, double step, const ath_rounding *rounding,
+                                const double *row, const double *units, const int32_t *predicted, int32_t *quantised)
 {
-    enum { LEAST_FRAMES = 8 };
+    enum { LEAST_FRAMES = 8, PARTS = 2 * ATH_END_PARTS };
     static const double least = 1e-3, emptied = 0.25; /* extra gain for an integer that becomes 0 */
-    end_integer found[ATH_SEGMENT_FRAMES];
-    double left[2 * ATH_END_PARTS];
+    end_integers found;
+    double left[PARTS], own[PARTS];
     int32_t rank = row_extent(quantised, stream->temporal_rank), count = 0;
     if (T < LEAST_FRAMES || rank == 0 || rounding->ends[0] == 0.0) return;
     both_ends(row, T, left);
-    for (int32_t i = 0; i < 2 * ATH_END_PARTS; i++) left[i] /= step;
+    for (int32_t i = 0; i < PARTS; i++) left[i] /= step;
     for (int32_t k = 0; k < stream->temporal_rank; k++) {
         double value = (double)(quantised[k] + (predicted ? predicted[k] : 0));
         if (quantised[k] == 0 && value == 0.0) continue;
-        end_integer *own = found + count;
-        *own = (end_integer){.k = k, .cost = 1.0};
-        both_ends(stream->temporal + (size_t)k * (size_t)T, T, own->parts);
-        for (int32_t i = 0; i < 2 * ATH_END_PARTS; i++) {
-            left[i] -= value * own->parts[i];
-            own->pull[i] = rounding->ends[i % ATH_END_PARTS] * own->parts[i];
-            own->cost += own->pull[i] * own->parts[i];
+        both_ends(stream->temporal + (size_t)k * (size_t)T, T, own);
+        found.k[count] = k;
+        found.cost[count] = 1.0;
+        for (int32_t i = 0; i < PARTS; i++) {
+            left[i] -= value * own[i];
+            found.parts[i][count] = own[i];
+            found.pull[i][count] = rounding->ends[i % ATH_END_PARTS] * own[i];
+            found.cost[count] += found.pull[i][count] * own[i];
         }
         count += quantised[k] != 0;
     }
     for (int32_t turned = 0; turned < rank; turned++) {
         double most = least;
-        const end_integer *chosen = 0;
-        int32_t by = 0;
-        for (const end_integer *own = found; own < found + count; own++) {
-            int32_t q = quantised[own->k];
-            if (q == 0) continue;
-            double lean = units[own->k] - (double)q;
-            for (int32_t i = 0; i < 2 * ATH_END_PARTS; i++) lean += own->pull[i] * left[i];
-            for (int32_t d = -1; d <= 1; d += 2) {
-                double worth = 2.0 * d * lean - own->cost + (q + d == 0 ? emptied : 0.0);
-                if (worth <= most) continue;
-                most = worth;
-                chosen = own;
-                by = d;
-            }
+        int32_t chosen = -1, by = 0;
+        for (int32_t c = 0; c < count; c++) found.lean[c] = units[found.k[c]] - (double)quantised[found.k[c]];
+        for (int32_t i = 0; i < PARTS; i++)
+            for (int32_t c = 0; c < count; c++) found.lean[c] += found.pull[i][c] * left[i];
+        for (int32_t c = 0; c < count; c++) {
+            int32_t q = quantised[found.k[c]];
+            found.fall[c] = -2.0 * found.lean[c] - found.cost[c] + (q == 1 ? emptied : 0.0);
+            found.rise[c] = 2.0 * found.lean[c] - found.cost[c] + (q == -1 ? emptied : 0.0);
         }
-        if (!chosen) return;
-        quantised[chosen->k] += by;
-        for (int32_t i = 0; i < 2 * ATH_END_PARTS; i++) left[i] -= by * chosen->parts[i];
+        for (int32_t c = 0; c < count; c++) {
+            if (!(found.fall[c] > most || found.rise[c] > most) || quantised[found.k[c]] == 0) continue;
+            by = found.fall[c] > most && found.fall[c] >= found.rise[c] ? -1 : 1;
+            most = by < 0 ? found.fall[c] : found.rise[c];
+            chosen = c;
+        }
+        if (chosen < 0) return;
+        quantised[found.k[chosen]] += by;
+        for (int32_t i = 0; i < PARTS; i++) left[i] -= by * found.parts[i][chosen];
     }
 }
 
@@ -472,6 +476,8 @@ static const double *analyse_piece(const ath_plan *plan, const ath_motion *motio
         ath_coarse_rows(motion, piece, p, &rows);
     }
     if (motion->decoded) memset(scratch->rotation, 0, 6 * (size_t)T * sizeof(double));
+    for (int32_t r = ath_rank(piece); r < piece->count; r++)
+        memset(ath_row(rows.modes, r, T), 0, 3 * (size_t)T * sizeof(int32_t));
     analyse_tracks(plan, motion, piece, motion->before ? &before : 0, &rows, scratch, source, rounding,
                    scratch->placed);
     if (motion->before) ath_predict_modes(plan, motion, piece, &before, scratch, &rows);
@@ -499,11 +505,6 @@ void ath_analyse(const ath_plan *plan, const ath_motion *motion, const ath_integ
         if (positions)
             ath_store_positions(placed, piece->first, piece->count, motion->frames, origin, is_float64, positions);
     }
-}
-
-void ath_mode_weights(const ath_piece *piece, double weights[ATH_SHAPE_MODES])
-{
-    for (int32_t m = 0; m < ATH_SHAPE_MODES; m++) weights[m] = ath_mode_weight(piece, m);
 }
 
 /* Averages the residual in the attach frame, e = R'(x - c) - d, over the subtree. Tracks r < rank become the mean of e
@@ -585,5 +586,114 @@ void ath_analyse_nodes(const ath_plan *plan, const ath_motion *motion, const ath
         const ath_node *node = plan->nodes + n;
         ath_node_rows rows = ath_rows_of_node(integers, motion->frames, n);
         if (node->coded) analyse_node(plan, motion, node, &rows, &scratch, source, level_steps[node->level], rounding);
+    }
+}
+
+enum { MOMENT_FRAMES = 32 };
+
+/* Fills the moments of one piece, n x n; the sums over time stay in order. weight: scale of each mode. */
+ATH_HOT static void mode_moments(int32_t frames, int32_t n, const double *weight, const int32_t *rows, double *moments)
+{
+    double turned[MOMENT_FRAMES][ATH_SHAPE_NUMBERS];
+    memset(moments, 0, (size_t)n * (size_t)n * sizeof *moments);
+    for (int32_t start = 0; start < frames; start += MOMENT_FRAMES) {
+        int32_t count = ath_min(MOMENT_FRAMES, frames - start);
+        for (int32_t j = 0; j < n; j++)
+            for (int32_t t = 0; t < count; t++)
+                turned[t][j] = (double)rows[(size_t)j * (size_t)frames + (size_t)(start + t)] * weight[j / 3];
+        for (int32_t t = 0; t < count; t++)
+            for (int32_t i = 0; i < n; i++)
+                for (int32_t j = 0; j < n; j++) moments[i * n + j] += turned[t][i] * turned[t][j];
+    }
+}
+
+void ath_add_mode_moments(const ath_plan *plan, int32_t frames, const int32_t *sizes, const double *steps,
+                          const int32_t *coefficients, double *moments)
+{
+    for (int32_t p = 0; p < plan->piece_count; p++) {
+        const ath_piece *piece = plan->pieces + p;
+        double weight[ATH_SHAPE_MODES], own[ATH_SHAPE_NUMBERS * ATH_SHAPE_NUMBERS];
+        int32_t n = 3 * sizes[p];
+        for (int32_t m = 0; m < sizes[p]; m++) weight[m] = steps[piece->level] * ath_mode_weight(piece, m);
+        mode_moments(frames, n, weight, coefficients + (size_t)piece->first * 3 * (size_t)frames, own);
+        for (int32_t i = 0; i < n * n; i++) moments[i] += own[i];
+        moments += n * n;
+    }
+}
+
+void ath_mode_components(int32_t piece_count, const int32_t *sizes, double *moments, double *lengths, double *vectors)
+{
+    double work[ATH_SHAPE_NUMBERS * ATH_SHAPE_NUMBERS];
+    for (int32_t p = 0; p < piece_count; p++) {
+        int32_t n = 3 * sizes[p];
+        ath_principal(1, n, moments, work, lengths, vectors);
+        for (int32_t i = 0; i < n; i++) lengths[i] = ath_sqrt(lengths[i] > 0.0 ? lengths[i] : 0.0);
+        moments += n * n;
+        vectors += n * n;
+        lengths += n;
+    }
+}
+
+/* Rounds to the nearest whole number, of two to the even one. */
+static int32_t nearest(double x)
+{
+    volatile double up = x + 6755399441055744.0;
+    return (int32_t)(up - 6755399441055744.0);
+}
+
+/* Fills one mode in whole numbers. Returns 0 if they all are 0. */
+static int learn_mode(const ath_piece *piece, int32_t n, double length, const double *vector, double scale,
+                      double faint, int32_t *integers)
+{
+    int any = 0;
+    int32_t rings = piece->ring > 0 ? ath_rings(piece) : ATH_SHAPE_MODES;
+    memset(integers, 0, ATH_SHAPE_NUMBERS * sizeof *integers);
+    for (int32_t i = 0; i < n; i++) {
+        if (i / 3 >= rings && absolute(vector[i] * length) < faint) continue;
+        integers[i % 3 * ATH_SHAPE_MODES + i / 3] = nearest(vector[i] * scale);
+        any |= integers[i % 3 * ATH_SHAPE_MODES + i / 3] != 0;
+    }
+    return any;
+}
+
+int64_t ath_learn_modes(const ath_plan *plan, const int32_t *sizes, const uint8_t *wanted, const double *lengths,
+                        const double *vectors, double step, double most, double least, double faint, int32_t *counts,
+                        int32_t *integers)
+{
+    int64_t count = 0;
+    for (int32_t p = 0; p < plan->piece_count; p++) {
+        int32_t n = 3 * sizes[p];
+        counts[p] = 0;
+        for (int32_t i = 0; i < n && wanted[p] && lengths[i] > least; i++) {
+            double scale = lengths[i] / step < most ? lengths[i] / step : most;
+            if (!learn_mode(plan->pieces + p, n, lengths[i], vectors + i * n, scale, faint,
+                            integers + ATH_SHAPE_NUMBERS * count))
+                break;
+            counts[p]++;
+            count++;
+        }
+        lengths += n;
+        vectors += n * n;
+    }
+    return count;
+}
+
+void ath_mode_duals(int32_t piece_count, const int32_t *counts, const double *units, double *duals)
+{
+    static const double alike = 1e-4; /* a few modes are nearly alike */
+    double products[ATH_SHAPE_NUMBERS * ATH_SHAPE_NUMBERS];
+    for (int32_t p = 0; p < piece_count; p++) {
+        int32_t n = counts[p];
+        for (int32_t i = 0; i < n; i++)
+            for (int32_t j = 0; j < n; j++) {
+                double sum = 0.0;
+                for (int32_t k = 0; k < ATH_SHAPE_NUMBERS; k++)
+                    sum += units[i * ATH_SHAPE_NUMBERS + k] * units[j * ATH_SHAPE_NUMBERS + k];
+                products[i * n + j] = sum + (i == j ? alike : 0.0);
+            }
+        memcpy(duals, units, (size_t)n * ATH_SHAPE_NUMBERS * sizeof *duals);
+        ath_solve(n, ATH_SHAPE_NUMBERS, products, duals);
+        units += n * ATH_SHAPE_NUMBERS;
+        duals += n * ATH_SHAPE_NUMBERS;
     }
 }
