@@ -38,7 +38,7 @@ from athcodec.encoding.choices.joins import (
 from athcodec.encoding.choices.levels import SourceFrames
 from athcodec.encoding.features import Feature
 from athcodec.encoding.learned_modes import nested
-from athcodec.encoding.motion import LearnedModes, Plan, SegmentMotion, empty, position_errors
+from athcodec.encoding.motion import LearnedModes, Plan, SegmentMotion, position_errors, zeros
 from athcodec.encoding.segment import (
     CodedPrelude,
     Corrections,
@@ -420,7 +420,7 @@ class CodedMotion:
         last = plan.level_count - 1
         self._correct(decoded, layer, last)
         segment.analyse_nodes(self.positions, settings.node_steps, settings.rounding)
-        self._room = empty(self.positions.shape)
+        self._room = zeros(self.positions.shape)
         shown = [self._at_level_0(segment, settings), *[segment] * (plan.level_count - 2)]
         self.errors = _EvenLevels(self, shown, settings).errors
         self._keep_last_level_best(layer, last, decoded)
@@ -590,9 +590,9 @@ class CodedMotion:
         what maps place only after."""
         origin, dtype = self._output
         positions, pieces = shown.pose(level, origin, np.float64, self._room), shown.plan.pieces
-        for piece in pieces[pieces["level"] <= level]:
-            of_stem = positions[piece["first"] : piece["first"] + piece["count"]]
-            of_stem[:] = of_stem.astype(dtype)
+        is_stem = np.repeat(pieces["level"] <= level, pieces["count"])
+        for run in np.split(positions, np.flatnonzero(np.diff(is_stem)) + 1)[not is_stem[0] :: 2]:
+            run[:] = run.astype(dtype)
         return positions
 
     def error(self, decoded: np.ndarray, rounding: float = 0.0) -> tuple[float, ...]:

@@ -16,7 +16,7 @@ import numpy as np
 
 from athcodec._native import SHAPE_MODES, address, lib
 from athcodec.encoding import quantise as qz
-from athcodec.encoding.motion import LEARNED_NUMBERS, LearnedModes, Plan, SegmentMotion, empty, zeros
+from athcodec.encoding.motion import LEARNED_NUMBERS, LearnedModes, Plan, SegmentMotion, zeros
 
 FAINT = 0.15  # Bend of rings, in steps, below which a learned mode drops it: it would stretch rings that turn.
 
@@ -46,7 +46,7 @@ def components(plan: Plan, segments: Iterable[SegmentMotion]) -> Components:
         arrays = (array.ctypes.data for array in (sizes, steps, segment.coefficients, moments))
         lib.ath_add_mode_moments(plan.core, segment.frames, *arrays)
         del segment  # The next segment is made after this one has been freed.
-    lengths, vectors = np.empty(3 * int(sizes.sum())), empty(moments.shape)
+    lengths, vectors = np.empty(3 * int(sizes.sum())), zeros(moments.shape)
     lib.ath_mode_components(len(sizes), *(array.ctypes.data for array in (sizes, moments, lengths, vectors)))
     return Components(frames, sizes, lengths, vectors)
 

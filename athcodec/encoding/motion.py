@@ -14,7 +14,6 @@ from ctypes import addressof, c_size_t
 from dataclasses import dataclass
 from enum import IntEnum
 from functools import cached_property, lru_cache
-from threading import Lock
 
 import numpy as np
 from numpy.typing import DTypeLike
@@ -45,10 +44,6 @@ STEM_ROOT, NODE_ROOT = -1, -2  # Roots of streams in waves that are not learned 
 RANGES, LEAST_RANGE = 24, 1024  # Parts of a plant that threads take at a time, and their least number of vertices.
 PERIOD = 128  # Vertices from one run of a sample to the next.
 LARGE_BYTES = 2 << 20  # Bytes from which on an array has memory of its own.
-KEPT_BYTES, KEPT_RATIO = (
-    64 << 20,
-    1.25,
-)  # Memory that is kept for later arrays, at most so many times as large as these.
 _PRIVATE = {"flags": mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS} if hasattr(mmap, "MAP_ANONYMOUS") else {}
 
 
@@ -58,52 +53,14 @@ def zeros(shape: tuple[int, ...], dtype: DTypeLike = np.float64) -> np.ndarray:
     size = math.prod(shape) * np.dtype(dtype).itemsize
     if size < LARGE_BYTES:
         return np.zeros(shape, dtype)
-    return np.frombuffer(_mapped(size), dtype).reshape(shape)
-
-
-class _Lease:
-    """Memory of an array, which goes to a later array when this one is freed. Fresh memory costs as much time as what
-    is written into it, because the system clears it."""
-
-    def __init__(self, memory: mmap.mmap, shape: tuple[int, ...], dtype: DTypeLike):
-        self._memory = memory
-        array = np.frombuffer(memory, dtype, math.prod(shape)).reshape(shape)
-        self.__array_interface__ = array.__array_interface__
-
-    def __del__(self) -> None:
-        if sum(map(len, _kept)) + len(self._memory) <= KEPT_BYTES:
-            _kept.append(self._memory)
-
-
-_kept: list[mmap.mmap] = []  # Memory of freed arrays, the oldest first. Others only append to it without the lock.
-_kept_lock = Lock()
-
-
-def empty(shape: tuple[int, ...], dtype: DTypeLike = np.float64) -> np.ndarray:
-    """Return an array of any numbers, in memory of an array that was freed if there is some."""
-    size = math.prod(shape) * np.dtype(dtype).itemsize
-    if size < LARGE_BYTES:
-        return np.empty(shape, dtype)
-    with _kept_lock:
-        fitting = [memory for memory in _kept if size <= len(memory) <= KEPT_RATIO * size]
-        memory = min(fitting, key=len, default=None)
-        if memory is not None:
-            _kept.remove(memory)
-        while memory is None and sum(map(len, _kept)) > max(0, KEPT_BYTES - size):
-            del _kept[0]
-    return np.asarray(_Lease(_mapped(size) if memory is None else memory, shape, dtype))
-
-
-def _mapped(size: int) -> mmap.mmap:
     memory = mmap.mmap(-1, size, **_PRIVATE)
     if hasattr(mmap, "MADV_HUGEPAGE"):
         memory.madvise(mmap.MADV_HUGEPAGE)
-    return memory
+    return np.frombuffer(memory, dtype).reshape(shape)
 
 
 def release_memory() -> None:
-    """Give memory that is kept for later arrays back to the system, as far as the allocator lets go of it."""
-    _kept.clear()
+    """Give memory that the allocator keeps for later arrays back to the system, if it is one that keeps much."""
     if (trim := getattr(lib, "malloc_trim", None)) is not None:
         trim(c_size_t(0))
 
@@ -348,9 +305,7 @@ class SegmentMotion:
         ratio: int = 1,
         layered: bool = False,
         periodic: bool = False,
-        filled: bool = False,
     ):
-        """filled: whether `analyse` fills the coefficients; else they are 0."""
         if not 1 <= frames <= SEGMENT_FRAMES or len(streams) != plan.level_count:
             raise ValueError(
                 f"segment of {frames} frames, {len(streams)} streams: expected 1 to {SEGMENT_FRAMES} "
@@ -358,7 +313,7 @@ class SegmentMotion:
             )
         self.plan, self.frames, self.streams, self.learned_modes = plan, frames, streams, learned_modes
         core = plan.core
-        self.coefficients = (empty if filled else zeros)((plan.vertex_count, 3, frames), np.int32)
+        self.coefficients = zeros((plan.vertex_count, 3, frames), np.int32)
         self.tracks = zeros((core.piece_count, 2, 3, frames), np.int32)
         node_count = 0 if before is not None else core.node_count  # Refinements have no maps.
         self.node_tracks = zeros((node_count, 4, 3, frames), np.int32)
@@ -375,9 +330,9 @@ class SegmentMotion:
         self.coarse = None
         if layered:
             if before is None:
-                self.placed = empty((plan.vertex_count, 3, frames))
-                self.placed_tracks = empty(self.tracks.shape)
-                self.placed_frames = empty((core.piece_count, 12, frames))  # Only rigid pieces use theirs.
+                self.placed = zeros((plan.vertex_count, 3, frames))
+                self.placed_tracks = zeros(self.tracks.shape)
+                self.placed_frames = zeros((core.piece_count, 12, frames))  # Only rigid pieces use theirs.
             else:  # A piece is read before it is replaced.
                 self.placed, self.placed_tracks = before.placed, before.placed_tracks
                 self.placed_frames = before.placed_frames
@@ -503,7 +458,7 @@ class SegmentMotion:
     def _piecewise(self, call: Callable[[Motion, int, int], None]) -> None:
         """Call with a motion and each range of pieces, those that others hang on first."""
         if self._attach_caches is None:
-            self._attach_caches = empty((lib.ath_attach_cache_size(self.plan.core.attach_cache_rows, self.frames),))
+            self._attach_caches = zeros((lib.ath_attach_cache_size(self.plan.core.attach_cache_rows, self.frames),))
             self.motion.attach_caches = self._attach_caches.ctypes.data
         carrying, carried = self.plan.piece_ranges
         for first, stop in carrying:
@@ -534,7 +489,7 @@ class SegmentMotion:
         many float64, whose memory is to hold them."""
         shape = self.plan.vertex_count, 3, self.frames
         if room is None:
-            positions = empty(shape, dtype)
+            positions = zeros(shape, dtype)
         else:
             positions = room.reshape(-1).view(dtype)[: math.prod(shape)].reshape(shape)
         into = level, address(origin, np.float64, 3), positions.dtype == np.float64, positions.ctypes.data
@@ -552,7 +507,7 @@ def gather(block: np.ndarray, vertex_source: np.ndarray, origin: np.ndarray, poo
     vertex_source: (N,) int32, the N of its M vertices that are wanted."""
     frames, vertices = len(block), len(vertex_source)
     block = np.ascontiguousarray(block)
-    out = empty((vertices, 3, frames))
+    out = zeros((vertices, 3, frames))
 
     def fill(start: int, stop: int) -> None:
         lib.ath_gather(
@@ -582,6 +537,14 @@ def squared_bends(positions: np.ndarray) -> np.ndarray:
         sums.ctypes.data,
     )
     return sums
+
+
+def box_of(positions: np.ndarray) -> np.ndarray:
+    """Return the corners of the box around positions, (N, 3, T), as (2, 3) float64."""
+    box, (vertices, _, frames) = np.empty((2, 3)), positions.shape
+    at = address(positions, positions.dtype, positions.size)
+    lib.ath_box(vertices, frames, positions.dtype == np.float64, at, box.ctypes.data)
+    return box
 
 
 def position_errors(

@@ -28,8 +28,8 @@ from athcodec.encoding.motion import (
     Plan,
     PlanSample,
     SegmentMotion,
-    empty,
     gather,
+    zeros,
 )
 from athcodec.encoding.polygons import Mesh
 from athcodec.encoding.segmentation import split_segments
@@ -541,7 +541,7 @@ def analyse_finely(plan: Plan, settings: Settings, positions: np.ndarray) -> Seg
     """A segment at a step FINER times smaller, in nothing learned, to learn bases and modes from."""
     fine = replace(settings, step=qz.single(settings.step / FINER), turn_step=settings.turn_step / FINER)
     segment = SegmentMotion(
-        plan, positions.shape[2], level_streams(fine, plan.level_count, {}), periodic=settings.periodic, filled=True
+        plan, positions.shape[2], level_streams(fine, plan.level_count, {}), periodic=settings.periodic
     )
     segment.analyse(positions, Rounding(qz.DEAD_ZONE))
     return segment
@@ -653,11 +653,9 @@ def analyse(
     """Return the integers of the stems, and the positions at the last level without corrections; output: origin and
     type of the positions. bases: of the levels that learn theirs; before, ratio, layered: as SegmentMotion has them."""
     levels = level_streams(settings, plan.level_count, bases)
-    segment = SegmentMotion(
-        plan, positions.shape[2], levels, learned_modes, before, ratio, layered, settings.periodic, filled=True
-    )
+    segment = SegmentMotion(plan, positions.shape[2], levels, learned_modes, before, ratio, layered, settings.periodic)
     origin, dtype = output
-    decoded = empty(positions.shape, dtype)
+    decoded = zeros(positions.shape, dtype)
     segment.analyse(positions, settings.rounding, origin, decoded)
     if before is not None:
         segment.forget_caches()  # Maps of nodes alone need the caches, and a refinement has none.

@@ -171,9 +171,7 @@ class Trials:
         plan, sample = self.prelude(settings).plan, self.samples[number]
         of_sample = settings.of_segment(sample.whole_loop)
         levels = level_streams(of_sample, plan.level_count, self._bases(settings, number))
-        segment = SegmentMotion(
-            plan, sample.positions.shape[2], levels, modes, periodic=of_sample.periodic, filled=True
-        )
+        segment = SegmentMotion(plan, sample.positions.shape[2], levels, modes, periodic=of_sample.periodic)
         segment.analyse(sample.positions, of_sample.rounding)
         return segment
 

@@ -476,8 +476,6 @@ static const double *analyse_piece(const ath_plan *plan, const ath_motion *motio
         ath_coarse_rows(motion, piece, p, &rows);
     }
     if (motion->decoded) memset(scratch->rotation, 0, 6 * (size_t)T * sizeof(double));
-    for (int32_t r = ath_rank(piece); r < piece->count; r++)
-        memset(ath_row(rows.modes, r, T), 0, 3 * (size_t)T * sizeof(int32_t));
     analyse_tracks(plan, motion, piece, motion->before ? &before : 0, &rows, scratch, source, rounding,
                    scratch->placed);
     if (motion->before) ath_predict_modes(plan, motion, piece, &before, scratch, &rows);

@@ -155,6 +155,14 @@ void ath_solve(int32_t n, int32_t columns, double *matrix, double *rows);
 /* Does the same for 3 x 3 and one column. */
 void ath_solve3(const double matrix[9], double row[3]);
 
+/* Fills the lowest and the highest corner of vertex-major positions. */
+ATH_ENCODER_API void ath_box(int32_t vertex_count, int32_t frames, int is_float64, const void *positions,
+                             double box[6]);
+/* Adds, for each frame but the first and last, the vertices whose error's second difference is above their limit, and
+ * those of them where it is larger than that of the source. */
+ATH_ENCODER_API void ath_twitches(int32_t vertex_count, int32_t frames, int is_float64, const void *shown,
+                                  const double *source, const double *limits, int64_t *above, int64_t *seen);
+
 /* Measures the largest distance and the sum of squared distances between positions and source (plus origin). shown: how
  * many frames of the clip show each frame. rounding: error that a decoder may add. histogram: ATH_SHORT_FLOATS counts
  * of distances, rounded up as in the error table, which are added to. */

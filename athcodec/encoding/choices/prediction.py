@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from athcodec._native import Rounding
+from athcodec._native import Rounding, address, lib
 from athcodec.decoding import container as ct
 from athcodec.encoding import quantise as qz
 from athcodec.encoding import streams, writing
@@ -143,10 +143,12 @@ def _twitches(shown: np.ndarray, positions: np.ndarray, limit: np.ndarray | floa
     vertices in some frames only, or of vertices that hardly jerk themselves."""
     if positions.shape[2] < 3:
         return False
-    moved = np.linalg.norm(np.diff(positions, 2, axis=2), axis=1)
-    error = np.linalg.norm(np.diff(shown - positions, 2, axis=2), axis=1)
-    above = error > np.reshape(limit, (-1, 1))
-    share, seen = above.mean(axis=0), (above & (error > moved)).mean(axis=0)
+    vertices, _, frames = positions.shape
+    counts, limits = np.zeros((2, frames - 2), np.int64), np.array(np.broadcast_to(limit, vertices), np.float64)
+    arrays = (shown, shown.dtype, shown.size), (positions, np.float64, shown.size), (limits, np.float64, vertices)
+    into = (row.ctypes.data for row in counts)
+    lib.ath_twitches(vertices, frames, shown.dtype == np.float64, *(address(*array) for array in arrays), *into)
+    share, seen = counts / vertices
     return share.max() > max(TWITCHING, 2 * np.median(share)) or seen.max() > TWITCHING
 
 
