@@ -9,14 +9,15 @@ frame falls with the number of frames. FORMAT.md, "SHAPES".
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
 from athcodec._native import SHAPE_MODES, address, lib
 from athcodec.encoding import quantise as qz
-from athcodec.encoding.motion import LEARNED_NUMBERS, LearnedModes, Plan, SegmentMotion, zeros
+from athcodec.encoding.motion import LEARNED_NUMBERS, LearnedModes, Plan, SegmentMotion
+from athcodec.motion.algebra import multiply, principal, solve
 
 FAINT = 0.15  # Bend of rings, in steps, below which a learned mode drops it: it would stretch rings that turn.
 
@@ -25,46 +26,92 @@ FAINT = 0.15  # Bend of rings, in steps, below which a learned mode drops it: it
 class Components:
     """Principal components of pieces' first modes over all frames analysed, in scene units.
 
-    sizes: (P,) int32, modes of each piece. Of each piece in turn: 3 modes lengths in descending order, and as many unit
-    vectors, a row each.
+    A group holds pieces with the same number of modes: pieces (G,), lengths (G, 3 modes) in descending order, and unit
+    vectors (G, 3 modes, 3 modes), a row each.
     """
 
     frames: int
-    sizes: np.ndarray
-    lengths: np.ndarray
-    vectors: np.ndarray
+    groups: list[tuple[np.ndarray, np.ndarray, np.ndarray]]
 
 
 def components(plan: Plan, segments: Iterable[SegmentMotion]) -> Components:
     """Return the components of segments that were analysed with a fine step and without learned modes, so that they
     describe the motion and not its rounding."""
-    sizes, frames = np.minimum(plan.pieces["rank"], SHAPE_MODES).astype(np.int32), 0
-    moments = zeros((int((9 * sizes.astype(np.int64) ** 2).sum()),))
+    sizes = np.minimum(plan.pieces["rank"], SHAPE_MODES)
+    groups = [
+        (pieces, np.zeros((len(pieces), 3 * size, 3 * size)))
+        for size in np.unique(sizes)
+        for pieces in [np.flatnonzero(sizes == size)]
+    ]
+    frames = 0
     for segment in segments:
         frames += segment.frames
-        steps = np.array([stream.step for stream in segment.streams])
-        arrays = (array.ctypes.data for array in (sizes, steps, segment.coefficients, moments))
-        lib.ath_add_mode_moments(plan.core, segment.frames, *arrays)
+        for pieces, total in groups:
+            for part in _parts(pieces, segment.frames * total.shape[1]):
+                rows = _tracks(plan, segment, pieces[part], total.shape[1] // 3)
+                total[part] += multiply(rows, rows.transpose(0, 2, 1))
         del segment  # The next segment is made after this one has been freed.
-    lengths, vectors = np.empty(3 * int(sizes.sum())), zeros(moments.shape)
-    lib.ath_mode_components(len(sizes), *(array.ctypes.data for array in (sizes, moments, lengths, vectors)))
-    return Components(frames, sizes, lengths, vectors)
+    return Components(frames, [(pieces, *_principal(total)) for pieces, total in groups])
+
+
+def _principal(moments: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    values, vectors = principal(moments)
+    return np.sqrt(np.maximum(values, 0.0)), vectors
+
+
+def _parts(pieces: np.ndarray, row_bytes: int) -> Iterator[slice]:
+    """Yield few enough pieces at a time that memory does not grow with their number."""
+    count = max(1, (16 << 20) // (8 * row_bytes))
+    return (slice(at, at + count) for at in range(0, len(pieces), count))
+
+
+def _mode_weights(pieces: np.ndarray) -> np.ndarray:
+    """Return the weights of the modes of pieces, (P, SHAPE_MODES)."""
+    kinds, kind = np.unique(pieces[["flags", "count", "ring"]], return_index=True, return_inverse=True)[1:]
+    weights = np.empty((len(kinds), SHAPE_MODES))
+    for row, piece in zip(weights, pieces[kinds]):
+        lib.ath_mode_weights(np.array(piece).ctypes.data, address(row, np.float64, SHAPE_MODES))
+    return weights[kind]
+
+
+def _tracks(plan: Plan, segment: SegmentMotion, pieces: np.ndarray, size: int) -> np.ndarray:
+    """Return the tracks of the first modes over temporal frequency, (pieces, 3 size, frames) float64 in scene units."""
+    slots = plan.pieces["first"][pieces][:, None] + np.arange(size)
+    steps = np.array([stream.step for stream in segment.streams])
+    weight = _mode_weights(plan.pieces[pieces])[:, :size]
+    scale = steps[plan.pieces["level"][pieces]][:, None] * weight
+    rows = segment.coefficients[slots] * scale[:, :, None, None]
+    return rows.reshape(len(pieces), 3 * size, segment.frames)
+
+
+def _across(pieces: np.ndarray, size: int) -> np.ndarray:
+    """Return (P, size) bool: which numbers of a learned mode belong to modes that bend rings."""
+    rings = -(-pieces["count"] // np.maximum(pieces["ring"], 1))
+    return (pieces["ring"] > 0)[:, None] & (np.arange(size) // 3 >= rings[:, None])
 
 
 def learn(plan: Plan, seen: Components, step: float, wanted: np.ndarray | None = None) -> LearnedModes:
     """Return the modes that a motion step makes worth storing, of the pieces `wanted`, (P,) bool, or of all."""
+    counts, learned = np.zeros(len(plan.pieces), np.int32), []
     least = step * np.sqrt(seen.frames)
-    wanted = np.full(len(plan.pieces), True if wanted is None else wanted)
-    counts = np.zeros(len(plan.pieces), np.int32)
-    integers = zeros((3 * int(seen.sizes[wanted].sum()), LEARNED_NUMBERS), np.int32)
-    count = lib.ath_learn_modes(
-        plan.core,
-        *(array.ctypes.data for array in (seen.sizes, wanted, seen.lengths, seen.vectors)),
-        *(qz.MODE_STEP * least, qz.LARGEST_MODE, qz.LEAST_MODE * least, FAINT * least),
-        counts.ctypes.data,
-        integers.ctypes.data,
-    )
-    return _modes(counts, integers[:count].copy())
+    for pieces, lengths, vectors in seen.groups:
+        if wanted is not None:
+            pieces, lengths, vectors = (array[wanted[pieces]] for array in (pieces, lengths, vectors))
+        scale = np.minimum(lengths / (qz.MODE_STEP * least), qz.LARGEST_MODE)
+        numbers = np.rint(vectors * scale[:, :, None]).astype(np.int32)
+        across = _across(plan.pieces[pieces], numbers.shape[2])
+        rings = np.flatnonzero(across.any(axis=1))
+        faint = np.abs(vectors[rings] * lengths[rings, :, None]) < FAINT * least
+        numbers[rings] *= ~(across[rings, None] & faint)
+        kept = np.cumprod((lengths > qz.LEAST_MODE * least) & numbers.any(axis=2), axis=1) > 0
+        counts[pieces] = kept.sum(axis=1)
+        learned.append((pieces[np.nonzero(kept)[0]], numbers[kept]))
+    integers = np.zeros((int(counts.sum()), 3, SHAPE_MODES), np.int32)
+    piece = np.repeat(np.arange(len(counts)), counts)
+    for pieces, numbers in learned:
+        size = numbers.shape[1] // 3
+        integers[np.isin(piece, pieces), :, :size] = numbers.reshape(-1, size, 3).transpose(0, 2, 1)
+    return _with_duals(counts, integers.reshape(-1, LEARNED_NUMBERS))
 
 
 def nested(plan: Plan, modes: LearnedModes, wanted: np.ndarray, digits: int) -> LearnedModes:
@@ -76,14 +123,17 @@ def nested(plan: Plan, modes: LearnedModes, wanted: np.ndarray, digits: int) -> 
     kept = gone == np.append(0, gone)[modes.first[piece]]
     sizes = np.minimum(plan.pieces["rank"][piece[kept]], SHAPE_MODES)
     integers = integers[kept] * np.tile(np.arange(SHAPE_MODES) < sizes[:, None], 3)
-    return _modes(np.bincount(piece[kept], minlength=len(modes.counts)).astype(np.int32), integers.astype(np.int32))
+    return _with_duals(np.bincount(piece[kept], minlength=len(modes.counts)).astype(np.int32), integers)
 
 
-def _modes(counts: np.ndarray, integers: np.ndarray) -> LearnedModes:
-    units, duals = np.zeros((2, *integers.shape))
+def _with_duals(counts: np.ndarray, integers: np.ndarray) -> LearnedModes:
+    (units, duals), first = np.zeros((2, *integers.shape)), np.cumsum(counts, dtype=np.int64) - counts
     lib.ath_unit_shapes(len(integers), address(integers, np.int32, 0), address(units, np.float64, 0))
-    lib.ath_mode_duals(len(counts), *(array.ctypes.data for array in (counts, units, duals)))
-    return LearnedModes(counts, np.cumsum(counts, dtype=np.int64) - counts, integers, units, duals)
+    for count in np.unique(counts[counts > 0]).tolist():
+        rows = first[counts == count, None] + np.arange(count)
+        products = multiply(units[rows], units[rows].transpose(0, 2, 1))
+        duals[rows] = solve(products + 1e-4 * np.eye(count), units[rows])  # A few modes are nearly alike.
+    return LearnedModes(counts, first, integers, units, duals)
 
 
 def estimated_bits(integers: np.ndarray, pieces: np.ndarray, piece_count: int) -> np.ndarray:

@@ -539,14 +539,6 @@ def squared_bends(positions: np.ndarray) -> np.ndarray:
     return sums
 
 
-def box_of(positions: np.ndarray) -> np.ndarray:
-    """Return the corners of the box around positions, (N, 3, T), as (2, 3) float64."""
-    box, (vertices, _, frames) = np.empty((2, 3)), positions.shape
-    at = address(positions, positions.dtype, positions.size)
-    lib.ath_box(vertices, frames, positions.dtype == np.float64, at, box.ctypes.data)
-    return box
-
-
 def position_errors(
     positions: np.ndarray,
     source: np.ndarray,

@@ -74,6 +74,13 @@ def principal(moments: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return values, vectors
 
 
+def solve(matrices: np.ndarray, rows: np.ndarray) -> np.ndarray:
+    """Return the solutions, (K, n, m), for positive definite matrices (K, n, n) and right-hand sides (K, n, m)."""
+    out, scratch = np.array(rows, np.float64, order="C"), np.array(matrices, np.float64, order="C")
+    lib.ath_solve(*out.shape, address(scratch, np.float64, 0), address(out, np.float64, 0))
+    return out
+
+
 def length(vector: np.ndarray) -> float:
     """Return the norm of one vector. Without an axis, numpy.linalg.norm would ask BLAS, whose sums have no fixed
     order."""

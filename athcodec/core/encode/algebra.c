@@ -1,39 +1,20 @@
 /* Products and decompositions of small matrices for the encoder, summed in one order: BLAS and LAPACK give other bits
  * with other processors and threads. */
 #include "encode/encode.h"
-#include "model/lanes.h"
 
-enum { MOST_SWEEPS = 40, SUMS = 4 };
-
-/* Fills one row of a product, a few columns at a time, whose sums stay in registers. */
-ATH_INLINE void multiply_row(int64_t inner, int64_t columns, const double *a, const double *b, double *out)
-{
-    int64_t c = 0;
-    for (; c + SUMS * ATH_LANES <= columns; c += SUMS * ATH_LANES) {
-        ath_lanes sums[SUMS];
-        for (int32_t i = 0; i < SUMS; i++) lanes_set(sums + i, 0.0);
-        for (int64_t k = 0; k < inner; k++)
-            for (int32_t i = 0; i < SUMS; i++) lanes_add_scaled(sums + i, a[k], b + k * columns + c + i * ATH_LANES);
-        for (int32_t i = 0; i < SUMS; i++) lanes_store(out + c + i * ATH_LANES, sums + i);
-    }
-    for (; c + ATH_LANES <= columns; c += ATH_LANES) {
-        ath_lanes sum;
-        lanes_set(&sum, 0.0);
-        for (int64_t k = 0; k < inner; k++) lanes_add_scaled(&sum, a[k], b + k * columns + c);
-        lanes_store(out + c, &sum);
-    }
-    for (; c < columns; c++) {
-        double sum = 0.0;
-        for (int64_t k = 0; k < inner; k++) sum += a[k] * b[k * columns + c];
-        out[c] = sum;
-    }
-}
+enum { MOST_SWEEPS = 40 };
 
 ATH_HOT void ath_multiply(int64_t count, int64_t rows, int64_t inner, int64_t columns, const double *a, int64_t a_step,
-                          const double *b, int64_t b_step, double *out)
+                          const double *b, int64_t b_step, double *ATH_RESTRICT out)
 {
     for (int64_t i = 0; i < count; i++, a += a_step, b += b_step)
-        for (int64_t r = 0; r < rows; r++, out += columns) multiply_row(inner, columns, a + r * inner, b, out);
+        for (int64_t r = 0; r < rows; r++, out += columns) {
+            for (int64_t c = 0; c < columns; c++) out[c] = 0.0;
+            for (int64_t k = 0; k < inner; k++) {
+                double factor = a[r * inner + k];
+                for (int64_t c = 0; c < columns; c++) out[c] += factor * b[k * columns + c];
+            }
+        }
 }
 
 static double dot3(const double *a, const double *b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
@@ -140,7 +121,7 @@ void ath_decompose(int64_t count, const double *matrices, double *left, double *
 }
 
 /* Replaces the lower triangle of a positive definite matrix by its Cholesky factor. */
-ATH_INLINE void factorise(int32_t n, double *matrix)
+static void factorise(int32_t n, double *matrix)
 {
     for (int32_t i = 0; i < n; i++)
         for (int32_t j = 0; j <= i; j++) {
@@ -150,7 +131,7 @@ ATH_INLINE void factorise(int32_t n, double *matrix)
         }
 }
 
-ATH_HOT void ath_solve(int32_t n, int32_t columns, double *matrix, double *rows)
+static void solve(int32_t n, int32_t columns, double *matrix, double *rows)
 {
     factorise(n, matrix);
     for (int32_t pass = 0; pass < 2; pass++)
@@ -163,6 +144,11 @@ ATH_HOT void ath_solve(int32_t n, int32_t columns, double *matrix, double *rows)
             }
             for (int32_t c = 0; c < columns; c++) row[c] /= matrix[i * n + i];
         }
+}
+
+ATH_HOT void ath_solve(int64_t count, int32_t n, int32_t columns, double *matrices, double *rows)
+{
+    for (int64_t i = 0; i < count; i++, matrices += n * n, rows += n * columns) solve(n, columns, matrices, rows);
 }
 
 void ath_solve3(const double m[9], double row[3])

@@ -1,7 +1,6 @@
 /* From positions to quantised coefficients, piece by piece in closed loop: every piece is predicted from what the
  * decoder will have of its parent. Encoder only. */
 #include "encode/encode.h"
-#include "model/basis.h"
 #include "model/lanes.h"
 
 enum { FIRST_ROTATION_STEPS = 30, ROTATION_STEPS = 5 };
@@ -58,28 +57,22 @@ ATH_HOT static int32_t forward_temporal(const ath_stream *stream, int32_t T, dou
     return stream->temporal_rank;
 }
 
-/* Counts the integers near (axis, k) that are not 0. */
-static int32_t busy_neighbours(const int32_t *quantised, int32_t T, int32_t rank, int32_t axis, int32_t k)
-{
-    int32_t count = 0;
-    for (int32_t a = 0; a < 3; a++)
-        for (int32_t j = ath_max(k - 2, 0); j <= ath_min(k + 2, rank - 1); j++)
-            count += quantised[a * T + j] != 0 && (a != axis || j != k);
-    return count;
-}
-
 /* An isolated 1 costs many bits and removes little error, so its threshold is higher than with neighbours. */
 static void drop_lone_ones(int32_t T, int32_t rank, double units[3][ATH_SEGMENT_FRAMES], const int32_t *predicted,
                            int32_t *quantised)
 {
     static const double least[2] = {1.1, 0.9};
+    int32_t busy[ATH_SEGMENT_FRAMES + 4] = {0}; /* integers that are not 0, by k + 2 */
+    for (int32_t i = 0; i < 3 * T; i += T)
+        for (int32_t k = 0; k < rank; k++) busy[k + 2] += quantised[i + k] != 0;
     for (int32_t axis = 0; axis < 3; axis++)
         for (int32_t k = rank - 1; k >= 0; k--) {
             int32_t *q = quantised + axis * T + k;
             if ((*q != 1 && *q != -1) || (predicted && predicted[axis * T + k] != 0)) continue;
-            if (absolute(units[axis][k]) >= least[0]) continue;
-            int32_t busy = busy_neighbours(quantised, T, rank, axis, k);
-            if (busy < 2 && absolute(units[axis][k]) < least[busy]) *q = 0;
+            int32_t beside = busy[k] + busy[k + 1] + busy[k + 2] + busy[k + 3] + busy[k + 4] - 1;
+            if (beside > 1 || absolute(units[axis][k]) >= least[beside]) continue;
+            *q = 0;
+            busy[k + 2]--;
         }
 }
 
@@ -505,6 +498,11 @@ void ath_analyse(const ath_plan *plan, const ath_motion *motion, const ath_integ
     }
 }
 
+void ath_mode_weights(const ath_piece *piece, double weights[ATH_SHAPE_MODES])
+{
+    for (int32_t m = 0; m < ATH_SHAPE_MODES; m++) weights[m] = ath_mode_weight(piece, m);
+}
+
 /* Averages the residual in the attach frame, e = R'(x - c) - d, over the subtree. Tracks r < rank become the mean of e
  * * w_r, track 3 the mean of e, `centre` the mean of w. */
 static void node_moments(const ath_plan *plan, const ath_node *node, int32_t T, const ath_scratch *scratch,
@@ -584,114 +582,5 @@ void ath_analyse_nodes(const ath_plan *plan, const ath_motion *motion, const ath
         const ath_node *node = plan->nodes + n;
         ath_node_rows rows = ath_rows_of_node(integers, motion->frames, n);
         if (node->coded) analyse_node(plan, motion, node, &rows, &scratch, source, level_steps[node->level], rounding);
-    }
-}
-
-enum { MOMENT_FRAMES = 32 };
-
-/* Fills the moments of one piece, n x n; the sums over time stay in order. weight: scale of each mode. */
-ATH_HOT static void mode_moments(int32_t frames, int32_t n, const double *weight, const int32_t *rows, double *moments)
-{
-    double turned[MOMENT_FRAMES][ATH_SHAPE_NUMBERS];
-    memset(moments, 0, (size_t)n * (size_t)n * sizeof *moments);
-    for (int32_t start = 0; start < frames; start += MOMENT_FRAMES) {
-        int32_t count = ath_min(MOMENT_FRAMES, frames - start);
-        for (int32_t j = 0; j < n; j++)
-            for (int32_t t = 0; t < count; t++)
-                turned[t][j] = (double)rows[(size_t)j * (size_t)frames + (size_t)(start + t)] * weight[j / 3];
-        for (int32_t t = 0; t < count; t++)
-            for (int32_t i = 0; i < n; i++)
-                for (int32_t j = 0; j < n; j++) moments[i * n + j] += turned[t][i] * turned[t][j];
-    }
-}
-
-void ath_add_mode_moments(const ath_plan *plan, int32_t frames, const int32_t *sizes, const double *steps,
-                          const int32_t *coefficients, double *moments)
-{
-    for (int32_t p = 0; p < plan->piece_count; p++) {
-        const ath_piece *piece = plan->pieces + p;
-        double weight[ATH_SHAPE_MODES], own[ATH_SHAPE_NUMBERS * ATH_SHAPE_NUMBERS];
-        int32_t n = 3 * sizes[p];
-        for (int32_t m = 0; m < sizes[p]; m++) weight[m] = steps[piece->level] * ath_mode_weight(piece, m);
-        mode_moments(frames, n, weight, coefficients + (size_t)piece->first * 3 * (size_t)frames, own);
-        for (int32_t i = 0; i < n * n; i++) moments[i] += own[i];
-        moments += n * n;
-    }
-}
-
-void ath_mode_components(int32_t piece_count, const int32_t *sizes, double *moments, double *lengths, double *vectors)
-{
-    double work[ATH_SHAPE_NUMBERS * ATH_SHAPE_NUMBERS];
-    for (int32_t p = 0; p < piece_count; p++) {
-        int32_t n = 3 * sizes[p];
-        ath_principal(1, n, moments, work, lengths, vectors);
-        for (int32_t i = 0; i < n; i++) lengths[i] = ath_sqrt(lengths[i] > 0.0 ? lengths[i] : 0.0);
-        moments += n * n;
-        vectors += n * n;
-        lengths += n;
-    }
-}
-
-/* Rounds to the nearest whole number, of two to the even one. */
-static int32_t nearest(double x)
-{
-    volatile double up = x + 6755399441055744.0;
-    return (int32_t)(up - 6755399441055744.0);
-}
-
-/* Fills one mode in whole numbers. Returns 0 if they all are 0. */
-static int learn_mode(const ath_piece *piece, int32_t n, double length, const double *vector, double scale,
-                      double faint, int32_t *integers)
-{
-    int any = 0;
-    int32_t rings = piece->ring > 0 ? ath_rings(piece) : ATH_SHAPE_MODES;
-    memset(integers, 0, ATH_SHAPE_NUMBERS * sizeof *integers);
-    for (int32_t i = 0; i < n; i++) {
-        if (i / 3 >= rings && absolute(vector[i] * length) < faint) continue;
-        integers[i % 3 * ATH_SHAPE_MODES + i / 3] = nearest(vector[i] * scale);
-        any |= integers[i % 3 * ATH_SHAPE_MODES + i / 3] != 0;
-    }
-    return any;
-}
-
-int64_t ath_learn_modes(const ath_plan *plan, const int32_t *sizes, const uint8_t *wanted, const double *lengths,
-                        const double *vectors, double step, double most, double least, double faint, int32_t *counts,
-                        int32_t *integers)
-{
-    int64_t count = 0;
-    for (int32_t p = 0; p < plan->piece_count; p++) {
-        int32_t n = 3 * sizes[p];
-        counts[p] = 0;
-        for (int32_t i = 0; i < n && wanted[p] && lengths[i] > least; i++) {
-            double scale = lengths[i] / step < most ? lengths[i] / step : most;
-            if (!learn_mode(plan->pieces + p, n, lengths[i], vectors + i * n, scale, faint,
-                            integers + ATH_SHAPE_NUMBERS * count))
-                break;
-            counts[p]++;
-            count++;
-        }
-        lengths += n;
-        vectors += n * n;
-    }
-    return count;
-}
-
-void ath_mode_duals(int32_t piece_count, const int32_t *counts, const double *units, double *duals)
-{
-    static const double alike = 1e-4; /* a few modes are nearly alike */
-    double products[ATH_SHAPE_NUMBERS * ATH_SHAPE_NUMBERS];
-    for (int32_t p = 0; p < piece_count; p++) {
-        int32_t n = counts[p];
-        for (int32_t i = 0; i < n; i++)
-            for (int32_t j = 0; j < n; j++) {
-                double sum = 0.0;
-                for (int32_t k = 0; k < ATH_SHAPE_NUMBERS; k++)
-                    sum += units[i * ATH_SHAPE_NUMBERS + k] * units[j * ATH_SHAPE_NUMBERS + k];
-                products[i * n + j] = sum + (i == j ? alike : 0.0);
-            }
-        memcpy(duals, units, (size_t)n * ATH_SHAPE_NUMBERS * sizeof *duals);
-        ath_solve(n, ATH_SHAPE_NUMBERS, products, duals);
-        units += n * ATH_SHAPE_NUMBERS;
-        duals += n * ATH_SHAPE_NUMBERS;
     }
 }

@@ -122,21 +122,8 @@ ATH_ENCODER_API void ath_pose_nodes(const ath_plan *plan, const ath_motion *moti
                                     int32_t first, int32_t stop, int32_t level, const double origin[3], int is_float64,
                                     void *positions);
 
-/* Add the second moments of each piece's first modes over a segment: a matrix of n x n for n = 3 * sizes[p] numbers,
- * mode by mode, one piece behind the other. steps: of the streams, by level. */
-ATH_ENCODER_API void ath_add_mode_moments(const ath_plan *plan, int32_t frames, const int32_t *sizes,
-                                          const double *steps, const int32_t *coefficients, double *moments);
-/* Fill the lengths, n each, and the unit vectors of the components of such moments, which are destroyed. */
-ATH_ENCODER_API void ath_mode_components(int32_t piece_count, const int32_t *sizes, double *moments, double *lengths,
-                                         double *vectors);
-/* Learns modes of the pieces that are `wanted` from these components: as many as are longer than `least`, in integers
- * of `step`. faint: bend of a ring that becomes 0. Fills how many each piece has, and the modes, ATH_SHAPE_NUMBERS
- * each. Returns their number. */
-ATH_ENCODER_API int64_t ath_learn_modes(const ath_plan *plan, const int32_t *sizes, const uint8_t *wanted,
-                                        const double *lengths, const double *vectors, double step, double most,
-                                        double least, double faint, int32_t *counts, int32_t *integers);
-/* Fills the vectors by which modes of unit length give their tracks. */
-ATH_ENCODER_API void ath_mode_duals(int32_t piece_count, const int32_t *counts, const double *units, double *duals);
+/* Fills the steps of a piece's first ATH_SHAPE_MODES modes over that of their stream. */
+ATH_ENCODER_API void ath_mode_weights(const ath_piece *piece, double weights[ATH_SHAPE_MODES]);
 
 /* Adds the second moments over time of rows of integers to the lower half of `moments`, frames x frames. Only rows
  * whose squares add up to more than `least` count. Returns their number. */
@@ -149,19 +136,11 @@ ATH_ENCODER_API void ath_multiply(int64_t count, int64_t rows, int64_t inner, in
                                   int64_t a_step, const double *b, int64_t b_step, double *out);
 /* Decomposes 3 x 3 matrices: left (columns) times the 3 singular values, in descending order, times right (rows). */
 ATH_ENCODER_API void ath_decompose(int64_t count, const double *matrices, double *left, double *stretch, double *right);
-/* Replaces rows, n x columns, by the solution of matrix * x = rows. The matrix is positive definite and is
- * destroyed. */
-void ath_solve(int32_t n, int32_t columns, double *matrix, double *rows);
+/* Replaces `count` times rows, n x columns, by the solution of matrix * x = rows. The matrices are positive definite and
+ * are destroyed. */
+ATH_ENCODER_API void ath_solve(int64_t count, int32_t n, int32_t columns, double *matrices, double *rows);
 /* Does the same for 3 x 3 and one column. */
 void ath_solve3(const double matrix[9], double row[3]);
-
-/* Fills the lowest and the highest corner of vertex-major positions. */
-ATH_ENCODER_API void ath_box(int32_t vertex_count, int32_t frames, int is_float64, const void *positions,
-                             double box[6]);
-/* Adds, for each frame but the first and last, the vertices whose error's second difference is above their limit, and
- * those of them where it is larger than that of the source. */
-ATH_ENCODER_API void ath_twitches(int32_t vertex_count, int32_t frames, int is_float64, const void *shown,
-                                  const double *source, const double *limits, int64_t *above, int64_t *seen);
 
 /* Measures the largest distance and the sum of squared distances between positions and source (plus origin). shown: how
  * many frames of the clip show each frame. rounding: error that a decoder may add. histogram: ATH_SHORT_FLOATS counts

@@ -78,52 +78,6 @@ void ath_add_bends(int64_t rows, int32_t frames, int is_float64, const void *pos
         }
 }
 
-ATH_HOT
-void ath_box(int32_t vertex_count, int32_t frames, int is_float64, const void *positions, double box[6])
-{
-    for (int32_t axis = 0; axis < 3; axis++) {
-        double low = ath_number_at(positions, (size_t)axis * (size_t)frames, is_float64), high = low;
-        for (int32_t v = 0; v < vertex_count; v++) {
-            size_t at = ((size_t)v * 3 + (size_t)axis) * (size_t)frames;
-            for (int32_t t = 0; t < frames; t++) {
-                double x = ath_number_at(positions, at + (size_t)t, is_float64);
-                low = x < low ? x : low;
-                high = x > high ? x : high;
-            }
-        }
-        box[axis] = low;
-        box[3 + axis] = high;
-    }
-}
-
-/* Returns the length of the second difference of three rows. */
-static double bend_length(const double *rows, int32_t frames, int32_t t)
-{
-    double sum = 0.0;
-    for (int32_t axis = 0; axis < 3; axis++, rows += frames) {
-        double bend = (rows[t + 2] - rows[t + 1]) - (rows[t + 1] - rows[t]);
-        sum = axis == 0 ? bend * bend : sum + bend * bend;
-    }
-    return ath_sqrt(sum);
-}
-
-ATH_HOT
-void ath_twitches(int32_t vertex_count, int32_t frames, int is_float64, const void *shown, const double *source,
-                  const double *limits, int64_t *above, int64_t *seen)
-{
-    double error[3 * ATH_SEGMENT_FRAMES];
-    for (int32_t v = 0; v < vertex_count; v++) {
-        const double *rows = source + (size_t)v * 3 * (size_t)frames;
-        for (int32_t i = 0; i < 3 * frames; i++)
-            error[i] = ath_number_at(shown, (size_t)v * 3 * (size_t)frames + (size_t)i, is_float64) - rows[i];
-        for (int32_t t = 0; t + 2 < frames; t++) {
-            double bend = bend_length(error, frames, t);
-            above[t] += bend > limits[v];
-            seen[t] += bend > limits[v] && bend > bend_length(rows, frames, t);
-        }
-    }
-}
-
 void ath_gather(int32_t vertex_count, int32_t frames, const int32_t *vertex_source, int32_t source_count,
                 int is_float64, const void *source, const double origin[3], double *out)
 {

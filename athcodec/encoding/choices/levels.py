@@ -13,7 +13,7 @@ import numpy as np
 
 from athcodec._native import MEASURES
 from athcodec.decoding.container import from_short_float, short_floats
-from athcodec.encoding.motion import box_of, squared_bends
+from athcodec.encoding.motion import squared_bends
 from athcodec.files.threads import ThreadPool, ranges
 
 MOST_AWAY = 0.1  # Largest distance of a vertex from the box of the source, in diagonals.
@@ -46,7 +46,9 @@ class SourceFrames:
     def flaws(self, decoded: np.ndarray, before: np.ndarray | None) -> tuple[float, float]:
         """Return how far decoded positions leave the box, and their largest second difference over the source's, or
         over half the bound where that is larger. before: frames like those of the source."""
-        low, high = box_of(decoded)
+        rows = decoded.reshape(len(decoded), -1)  # Extremes of whole rows are found side by side.
+        low, high = (ends.reshape(3, -1) for ends in (rows.min(axis=0), rows.max(axis=0)))
+        low, high = low.min(axis=1), high.max(axis=1)
         away = max(0.0, float((self.box[0] - low).max()), float((high - self.box[1]).max()))
         with np.errstate(divide="ignore", invalid="ignore"):
             ratios = self._bends(decoded, before) / self._allowed

@@ -9,10 +9,11 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 
-from athcodec._native import Rounding, address, lib
+from athcodec._native import Rounding
 from athcodec.decoding import container as ct
 from athcodec.encoding import quantise as qz
 from athcodec.encoding import streams, writing
@@ -26,6 +27,7 @@ from athcodec.encoding.segment_samples import SegmentSample, typical_segments
 from athcodec.encoding.settings import Choice, Settings
 from athcodec.encoding.survey import Ath, Survey
 from athcodec.errors import BoundError
+from athcodec.files.threads import ranges
 from athcodec.motion.thresholds import Thresholds
 from athcodec.options import SMOOTHNESS
 
@@ -73,9 +75,12 @@ def best_prediction(
     """Return the best prediction; None: it takes more than `most_bytes`, or cannot keep the bound."""
     ath = one_map_each(source.seen)
     limit = source.rest_limit(source.smallest_bound(bound))
-    by_ratio = {ratio: _settings(source, ath, bound, ratio * limit) for ratio in REST_STEPS}
     samples = _samples(source)
     preludes: dict[float, CodedPrelude] = {}
+
+    @cache
+    def by_ratio(ratio: float) -> Settings:
+        return _settings(source, ath, bound, ratio * limit)
 
     def prelude_of(settings: Settings) -> CodedPrelude:
         if settings.rest_step not in preludes:
@@ -98,16 +103,16 @@ def best_prediction(
     def best(share: float, most: float, lattice: bool) -> FoundPrediction:
         """Return the best prediction whose errors are at most a share of the limit; far above `most`, any."""
         ratios = sorted(REST_STEPS, key=lambda ratio: abs(math.log(ratio / share)))[:REST_TRIALS]
-        found = coded(by_ratio[ratios[0]], CUBES, share)
+        found = coded(by_ratio(ratios[0]), CUBES, share)
         if found.bytes > HOPELESS * most:
             return found
-        tried = [found, *(coded(by_ratio[ratio], CUBES, share) for ratio in ratios[1:])]
+        tried = [found, *(coded(by_ratio(ratio), CUBES, share) for ratio in ratios[1:])]
         found = min(tried, key=lambda one: one.bytes)
         if not lattice or Feature.LATTICE in source.without:
             return found
         return min(found, coded(found.choice.settings, LATTICE, share), key=lambda one: one.bytes)
 
-    some = by_ratio[0.5]
+    some = by_ratio(0.5)
     try:
         if sum(_begun(prelude_of(some), some, sample) for sample in samples) > TOO_MANY * most_bytes:
             return None
@@ -143,13 +148,20 @@ def _twitches(shown: np.ndarray, positions: np.ndarray, limit: np.ndarray | floa
     vertices in some frames only, or of vertices that hardly jerk themselves."""
     if positions.shape[2] < 3:
         return False
-    vertices, _, frames = positions.shape
-    counts, limits = np.zeros((2, frames - 2), np.int64), np.array(np.broadcast_to(limit, vertices), np.float64)
-    arrays = (shown, shown.dtype, shown.size), (positions, np.float64, shown.size), (limits, np.float64, vertices)
-    into = (row.ctypes.data for row in counts)
-    lib.ath_twitches(vertices, frames, shown.dtype == np.float64, *(address(*array) for array in arrays), *into)
-    share, seen = counts / vertices
+    limits, counts = np.broadcast_to(limit, len(positions)), np.zeros((2, positions.shape[2] - 2), np.int64)
+    for start, stop in ranges(len(positions), positions[0].size):
+        wanted = positions[start:stop]
+        error = _bends(shown[start:stop] - wanted)
+        above = error > limits[start:stop, None]
+        some = above.any(axis=1)
+        counts += above.sum(axis=0), (above[some] & (error[some] > _bends(wanted[some]))).sum(axis=0)
+    share, seen = counts / len(positions)
     return share.max() > max(TWITCHING, 2 * np.median(share)) or seen.max() > TWITCHING
+
+
+def _bends(positions: np.ndarray) -> np.ndarray:
+    """Return the lengths of second differences over frames, (N, T - 2)."""
+    return np.linalg.norm(np.diff(positions, 2, axis=2), axis=1)
 
 
 def _largest_step(limit: np.ndarray | float, lattice: bool) -> float:
