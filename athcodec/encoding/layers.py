@@ -234,7 +234,7 @@ def _rests(
 def layered_poses_size(source: Source, ath: Ath, settings: Settings, ratios: Sequence[int]) -> float:
     """Return the bytes of hierarchy and rest poses of layers; infinite if the last pose cannot keep the bound."""
     try:
-        prelude = CodedPrelude(source, ath, settings)
+        prelude = CodedPrelude(source, ath, settings, bases=False)
     except BoundError:
         return math.inf
     rest, _, rests = _rests(source, prelude, ratios, settings)

@@ -94,9 +94,14 @@ def learn(plan: Plan, seen: Components, step: float, wanted: np.ndarray | None =
     """Return the modes that a motion step makes worth storing, of the pieces `wanted`, (P,) bool, or of all."""
     counts, learned = np.zeros(len(plan.pieces), np.int32), []
     least = step * np.sqrt(seen.frames)
-    for pieces, lengths, vectors in seen.groups:
-        if wanted is not None:
-            pieces, lengths, vectors = (array[wanted[pieces]] for array in (pieces, lengths, vectors))
+    wanted = np.ones(len(counts), bool) if wanted is None else wanted
+    parts = (
+        (group[some[part]], lengths[some[part]], vectors[some[part]])
+        for group, lengths, vectors in seen.groups
+        for some in [np.flatnonzero(wanted[group])]
+        for part in _parts(some, vectors[:1].size)
+    )
+    for pieces, lengths, vectors in parts:
         scale = np.minimum(lengths / (qz.MODE_STEP * least), qz.LARGEST_MODE)
         numbers = np.rint(vectors * scale[:, :, None]).astype(np.int32)
         across = _across(plan.pieces[pieces], numbers.shape[2])
@@ -130,9 +135,10 @@ def _with_duals(counts: np.ndarray, integers: np.ndarray) -> LearnedModes:
     (units, duals), first = np.zeros((2, *integers.shape)), np.cumsum(counts, dtype=np.int64) - counts
     lib.ath_unit_shapes(len(integers), address(integers, np.int32, 0), address(units, np.float64, 0))
     for count in np.unique(counts[counts > 0]).tolist():
-        rows = first[counts == count, None] + np.arange(count)
-        products = multiply(units[rows], units[rows].transpose(0, 2, 1))
-        duals[rows] = solve(products + 1e-4 * np.eye(count), units[rows])  # A few modes are nearly alike.
+        all_rows = first[counts == count, None] + np.arange(count)
+        for rows in (all_rows[part] for part in _parts(all_rows, 4 * count * LEARNED_NUMBERS)):
+            products = multiply(units[rows], units[rows].transpose(0, 2, 1))
+            duals[rows] = solve(products + 1e-4 * np.eye(count), units[rows])  # A few modes are nearly alike.
     return LearnedModes(counts, first, integers, units, duals)
 
 

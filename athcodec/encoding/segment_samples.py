@@ -58,16 +58,10 @@ def typical_segments(source: Source) -> list[tuple[int, int]]:
 
 def usual_change(samples: Sequence[SegmentSample]) -> float:
     """Return the RMS change of velocity, in length per frame squared; infinite if all samples are too short."""
-    changes = [_mean_change(sample.positions) for sample in samples if sample.positions.shape[2] > 2]
-    return float(np.sqrt(np.mean(changes))) if changes else np.inf
-
-
-def _mean_change(positions: np.ndarray) -> float:
-    """Return the mean squared change of velocity."""
-    squares = np.empty((len(positions), positions.shape[2] - 2))
-    for start, stop in ranges(len(positions), positions[0].size):
-        squares[start:stop] = (np.diff(positions[start:stop], 2, axis=2) ** 2).sum(axis=1)
-    return squares.mean()
+    long = [sample.positions for sample in samples if sample.positions.shape[2] > 2]
+    parts = [[positions[slice(*part)] for part in ranges(len(positions), positions[0].size)] for positions in long]
+    squares = [np.concatenate([(np.diff(part, 2, axis=2) ** 2).sum(axis=1) for part in some]) for some in parts]
+    return float(np.sqrt(np.mean([square.mean() for square in squares]))) if squares else np.inf
 
 
 def _middle(positions: np.ndarray) -> np.ndarray:

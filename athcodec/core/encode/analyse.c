@@ -103,7 +103,7 @@ static void both_ends(const double *row, int32_t T, double parts[2 * ATH_END_PAR
 typedef struct {
     int32_t k[ATH_SEGMENT_FRAMES];
     double parts[2 * ATH_END_PARTS][ATH_SEGMENT_FRAMES], pull[2 * ATH_END_PARTS][ATH_SEGMENT_FRAMES];
-    double lean[ATH_SEGMENT_FRAMES], cost[ATH_SEGMENT_FRAMES], fall[ATH_SEGMENT_FRAMES], rise[ATH_SEGMENT_FRAMES];
+    double lean[ATH_SEGMENT_FRAMES], cost[ATH_SEGMENT_FRAMES];
 } end_integers;
 
 /* Rounds integers of a row the other way if that brings its ends closer, whose errors are the largest and are seen
@@ -140,16 +140,13 @@ ATH_HOT static void settle_ends(const ath_stream *stream, int32_t T, double step
         for (int32_t c = 0; c < count; c++) found.lean[c] = units[found.k[c]] - (double)quantised[found.k[c]];
         for (int32_t i = 0; i < PARTS; i++)
             for (int32_t c = 0; c < count; c++) found.lean[c] += found.pull[i][c] * left[i];
-        for (int32_t c = 0; c < count; c++) {
-            int32_t q = quantised[found.k[c]];
-            found.fall[c] = -2.0 * found.lean[c] - found.cost[c] + (q == 1 ? emptied : 0.0);
-            found.rise[c] = 2.0 * found.lean[c] - found.cost[c] + (q == -1 ? emptied : 0.0);
-        }
-        for (int32_t c = 0; c < count; c++) {
-            if (!(found.fall[c] > most || found.rise[c] > most) || quantised[found.k[c]] == 0) continue;
-            by = found.fall[c] > most && found.fall[c] >= found.rise[c] ? -1 : 1;
-            most = by < 0 ? found.fall[c] : found.rise[c];
+        for (int32_t i = 0; i < 2 * count; i++) {
+            int32_t c = i / 2, d = i % 2 ? 1 : -1, q = quantised[found.k[c]];
+            double worth = 2.0 * d * found.lean[c] - found.cost[c] + (q + d == 0 ? emptied : 0.0);
+            if (q == 0 || worth <= most) continue;
+            most = worth;
             chosen = c;
+            by = d;
         }
         if (chosen < 0) return;
         quantised[found.k[chosen]] += by;
