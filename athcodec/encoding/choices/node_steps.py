@@ -36,14 +36,11 @@ def best_node_steps(settings: Settings, trials: Trials) -> Settings:
     allowed = max(least, FILE_SHARE / (1 - FILE_SHARE) * rest)
     tried = [quality * errors for quality in _qualities(trials)]
     trials.work.add(trials.work_of(progress.ANALYSIS))
-    analysed: list[int] = []
 
     def analyse(number: int) -> np.ndarray:
+        segment.clear_nodes()
         trials.work.add(trials.work_of(progress.MAPS * trials.levels))
-        if analysed[-1:] != [number]:
-            segment.clear_nodes()
-            segment.analyse_nodes(sample, tried[number], settings.rounding)
-            analysed.append(number)
+        segment.analyse_nodes(sample, tried[number], settings.rounding)
         return tried[number]
 
     def fits(number: int) -> bool:

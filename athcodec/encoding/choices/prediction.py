@@ -75,12 +75,9 @@ def best_prediction(
     """Return the best prediction; None: it takes more than `most_bytes`, or cannot keep the bound."""
     ath = one_map_each(source.seen)
     limit = source.rest_limit(source.smallest_bound(bound))
+    by_ratio = cache(lambda ratio: _settings(source, ath, bound, ratio * limit))
     samples = _samples(source)
     preludes: dict[float, CodedPrelude] = {}
-
-    @cache
-    def by_ratio(ratio: float) -> Settings:
-        return _settings(source, ath, bound, ratio * limit)
 
     def prelude_of(settings: Settings) -> CodedPrelude:
         if settings.rest_step not in preludes:
@@ -150,18 +147,12 @@ def _twitches(shown: np.ndarray, positions: np.ndarray, limit: np.ndarray | floa
         return False
     limits, counts = np.broadcast_to(limit, len(positions)), np.zeros((2, positions.shape[2] - 2), np.int64)
     for start, stop in ranges(len(positions), positions[0].size):
-        wanted = positions[start:stop]
-        error = _bends(shown[start:stop] - wanted)
+        rows = shown[start:stop] - positions[start:stop], positions[start:stop]
+        error, moved = (np.linalg.norm(np.diff(some, 2, axis=2), axis=1) for some in rows)
         above = error > limits[start:stop, None]
-        some = above.any(axis=1)
-        counts += above.sum(axis=0), (above[some] & (error[some] > _bends(wanted[some]))).sum(axis=0)
+        counts += above.sum(axis=0), (above & (error > moved)).sum(axis=0)
     share, seen = counts / len(positions)
     return share.max() > max(TWITCHING, 2 * np.median(share)) or seen.max() > TWITCHING
-
-
-def _bends(positions: np.ndarray) -> np.ndarray:
-    """Return the lengths of second differences over frames, (N, T - 2)."""
-    return np.linalg.norm(np.diff(positions, 2, axis=2), axis=1)
 
 
 def _largest_step(limit: np.ndarray | float, lattice: bool) -> float:
