@@ -140,13 +140,16 @@ ATH_HOT static void settle_ends(const ath_stream *stream, int32_t T, double step
         for (int32_t c = 0; c < count; c++) found.lean[c] = units[found.k[c]] - (double)quantised[found.k[c]];
         for (int32_t i = 0; i < PARTS; i++)
             for (int32_t c = 0; c < count; c++) found.lean[c] += found.pull[i][c] * left[i];
-        for (int32_t i = 0; i < 2 * count; i++) {
-            int32_t c = i / 2, d = i % 2 ? 1 : -1, q = quantised[found.k[c]];
-            double worth = 2.0 * d * found.lean[c] - found.cost[c] + (q + d == 0 ? emptied : 0.0);
-            if (q == 0 || worth <= most) continue;
-            most = worth;
-            chosen = c;
-            by = d;
+        for (int32_t c = 0; c < count; c++) {
+            int32_t q = quantised[found.k[c]];
+            if (q == 0 || 2.0 * absolute(found.lean[c]) - found.cost[c] + emptied <= most) continue;
+            for (int32_t d = -1; d <= 1; d += 2) {
+                double worth = 2.0 * d * found.lean[c] - found.cost[c] + (q + d == 0 ? emptied : 0.0);
+                if (worth <= most) continue;
+                most = worth;
+                chosen = c;
+                by = d;
+            }
         }
         if (chosen < 0) return;
         quantised[found.k[chosen]] += by;
