@@ -222,7 +222,7 @@ _ENCODING = {  # Functions of core/model/*.h and core/encode/encode.h.
     "ath_add_moments": (c_int64, [c_int64, c_int32, c_void_p, c_double, c_void_p]),
     "ath_multiply": (None, [*[c_int64] * 4, c_void_p, c_int64, c_void_p, c_int64, c_void_p]),
     "ath_decompose": (None, [c_int64, *[c_void_p] * 4]),
-    "ath_solve": (None, [c_int32, c_int32, c_void_p, c_void_p]),
+    "ath_solve": (None, [c_int64, c_int32, c_int32, c_void_p, c_void_p]),
     "ath_error": (None, [c_int32, c_int32, c_void_p, c_int, *[c_void_p] * 3, c_double, *[c_void_p] * 3]),
     "ath_find_corrections": (
         c_int64,

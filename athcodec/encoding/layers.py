@@ -234,7 +234,7 @@ def _rests(
 def layered_poses_size(source: Source, ath: Ath, settings: Settings, ratios: Sequence[int]) -> float:
     """Return the bytes of hierarchy and rest poses of layers; infinite if the last pose cannot keep the bound."""
     try:
-        prelude = CodedPrelude(source, ath, settings)
+        prelude = CodedPrelude(source, ath, settings, bases=False)
     except BoundError:
         return math.inf
     rest, _, rests = _rests(source, prelude, ratios, settings)
@@ -590,9 +590,9 @@ class CodedMotion:
         what maps place only after."""
         origin, dtype = self._output
         positions, pieces = shown.pose(level, origin, np.float64, self._room), shown.plan.pieces
-        for piece in pieces[pieces["level"] <= level]:
-            of_stem = positions[piece["first"] : piece["first"] + piece["count"]]
-            of_stem[:] = of_stem.astype(dtype)
+        is_stem = np.repeat(pieces["level"] <= level, pieces["count"])
+        for run in np.split(positions, np.flatnonzero(np.diff(is_stem)) + 1)[not is_stem[0] :: 2]:
+            run[:] = run.astype(dtype)
         return positions
 
     def error(self, decoded: np.ndarray, rounding: float = 0.0) -> tuple[float, ...]:

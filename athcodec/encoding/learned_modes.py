@@ -92,55 +92,53 @@ def _across(pieces: np.ndarray, size: int) -> np.ndarray:
 
 def learn(plan: Plan, seen: Components, step: float, wanted: np.ndarray | None = None) -> LearnedModes:
     """Return the modes that a motion step makes worth storing, of the pieces `wanted`, (P,) bool, or of all."""
-    counts = np.zeros(len(plan.pieces), np.int32)
-    rows: dict[int, np.ndarray] = {}
+    counts, learned = np.zeros(len(plan.pieces), np.int32), []
     least = step * np.sqrt(seen.frames)
-    for pieces, lengths, vectors in seen.groups:
+    wanted = np.ones(len(counts), bool) if wanted is None else wanted
+    parts = (
+        (group[some[part]], lengths[some[part]], vectors[some[part]])
+        for group, lengths, vectors in seen.groups
+        for some in [np.flatnonzero(wanted[group])]
+        for part in _parts(some, vectors[:1].size)
+    )
+    for pieces, lengths, vectors in parts:
         scale = np.minimum(lengths / (qz.MODE_STEP * least), qz.LARGEST_MODE)
         numbers = np.rint(vectors * scale[:, :, None]).astype(np.int32)
-        faint = np.abs(vectors * lengths[:, :, None]) < FAINT * least
-        numbers[_across(plan.pieces[pieces], numbers.shape[2])[:, None] & faint] = 0
-        kept = (lengths > qz.LEAST_MODE * least) & numbers.any(axis=2)
-        if wanted is not None:
-            kept &= wanted[pieces, None]
-        counts[pieces] = np.cumprod(kept, axis=1).sum(axis=1)
-        rows |= {int(p): numbers[i, : counts[p]] for i, p in enumerate(pieces)}
-    return _packed(counts, [rows[p] for p in np.flatnonzero(counts)])
+        across = _across(plan.pieces[pieces], numbers.shape[2])
+        rings = np.flatnonzero(across.any(axis=1))
+        faint = np.abs(vectors[rings] * lengths[rings, :, None]) < FAINT * least
+        numbers[rings] *= ~(across[rings, None] & faint)
+        kept = np.cumprod((lengths > qz.LEAST_MODE * least) & numbers.any(axis=2), axis=1) > 0
+        counts[pieces] = kept.sum(axis=1)
+        learned.append((pieces[np.nonzero(kept)[0]], numbers[kept]))
+    integers = np.zeros((int(counts.sum()), 3, SHAPE_MODES), np.int32)
+    piece = np.repeat(np.arange(len(counts)), counts)
+    for pieces, numbers in learned:
+        size = numbers.shape[1] // 3
+        integers[np.isin(piece, pieces), :, :size] = numbers.reshape(-1, size, 3).transpose(0, 2, 1)
+    return _with_duals(counts, integers.reshape(-1, LEARNED_NUMBERS))
 
 
 def nested(plan: Plan, modes: LearnedModes, wanted: np.ndarray, digits: int) -> LearnedModes:
     """Return the modes of the pieces `wanted`, (P,) bool, with so many binary digits less. Those of a piece end before
     the first that vanishes."""
+    piece = np.repeat(np.arange(len(modes.counts)), modes.counts)
     integers = np.sign(modes.integers) * (np.abs(modes.integers) + (1 << digits - 1) >> digits)
-    counts, rows = np.zeros_like(modes.counts), []
-    for piece in np.flatnonzero(wanted & (modes.counts > 0)):
-        numbers = integers[modes.first[piece] : modes.first[piece] + modes.counts[piece]]
-        counts[piece] = count = np.cumprod(numbers.any(axis=1)).sum()
-        size = min(int(plan.pieces["rank"][piece]), SHAPE_MODES)
-        if count:
-            rows.append(
-                numbers[:count].reshape(count, 3, SHAPE_MODES)[:, :, :size].transpose(0, 2, 1).reshape(count, -1)
-            )
-    return _packed(counts, rows)
+    gone = np.cumsum(~(integers.any(axis=1) & wanted[piece]))
+    kept = gone == np.append(0, gone)[modes.first[piece]]
+    sizes = np.minimum(plan.pieces["rank"][piece[kept]], SHAPE_MODES)
+    integers = integers[kept] * np.tile(np.arange(SHAPE_MODES) < sizes[:, None], 3)
+    return _with_duals(np.bincount(piece[kept], minlength=len(modes.counts)).astype(np.int32), integers)
 
 
-def _packed(counts: np.ndarray, rows: list[np.ndarray]) -> LearnedModes:
-    integers = np.zeros((int(counts.sum()), 3, SHAPE_MODES), np.int32)
-    units, duals = np.zeros((2, len(integers), LEARNED_NUMBERS))
-    first = np.cumsum(counts, dtype=np.int64) - counts
-    at = 0
-    for numbers in rows:
-        count, size = len(numbers), numbers.shape[1] // 3
-        integers[at : at + count, :, :size] = numbers.reshape(count, size, 3).transpose(0, 2, 1)
-        at += count
-    integers = integers.reshape(-1, LEARNED_NUMBERS)
+def _with_duals(counts: np.ndarray, integers: np.ndarray) -> LearnedModes:
+    (units, duals), first = np.zeros((2, *integers.shape)), np.cumsum(counts, dtype=np.int64) - counts
     lib.ath_unit_shapes(len(integers), address(integers, np.int32, 0), address(units, np.float64, 0))
-    at = 0
-    for numbers in rows:
-        of_piece = units[at : at + len(numbers)]
-        products = multiply(of_piece, of_piece.T) + 1e-4 * np.eye(len(of_piece))  # A few modes are nearly alike.
-        duals[at : at + len(of_piece)] = solve(products, of_piece)
-        at += len(of_piece)
+    for count in np.unique(counts[counts > 0]).tolist():
+        all_rows = first[counts == count, None] + np.arange(count)
+        for rows in (all_rows[part] for part in _parts(all_rows, 4 * count * LEARNED_NUMBERS)):
+            products = multiply(units[rows], units[rows].transpose(0, 2, 1))
+            duals[rows] = solve(products + 1e-4 * np.eye(count), units[rows])  # A few modes are nearly alike.
     return LearnedModes(counts, first, integers, units, duals)
 
 

@@ -132,13 +132,13 @@ class Plan:
     def level_count(self) -> int:
         return self.height + 2
 
-    def set_rest(self, rest: np.ndarray) -> None:
-        """Build the bases on a decoded rest pose, (N, 3) float64."""
+    def set_rest(self, rest: np.ndarray, bases: bool = True) -> None:
+        """Set the decoded rest pose, (N, 3) float64, and build the bases on it, if they are wanted."""
         vertices, pieces = self.vertex_count, len(self.pieces)
         self.rest = np.ascontiguousarray(rest, np.float64)
         self.core.rest = at = address(self.rest, np.float64, 3 * vertices)
         lib.ath_plan_nodes(self.core, self.nodes.ctypes.data)
-        if self.predicted:
+        if self.predicted or not bases:
             return
         gaps = np.empty(vertices, np.uint8)
         table = np.empty(lib.ath_basis_table_size(pieces), np.int32)

@@ -386,14 +386,14 @@ def uncoded_plan(source: Source, ath: Ath, settings: Settings) -> Plan:
 class CodedPrelude:
     """Hierarchy and rest pose as the decoder will have them, for one choice of settings."""
 
-    def __init__(self, source: Source, ath: Ath, settings: Settings, predicted: bool = False):
+    def __init__(self, source: Source, ath: Ath, settings: Settings, predicted: bool = False, bases: bool = True):
         hierarchy = source.hierarchy
         self.origin, self.dtype = source.origin, np.dtype(source.clip.dtype)
         branches = branch_records(hierarchy, ath, settings)
         self.plan = Plan(branches, hierarchy.vertex_count, source.pool, predicted=predicted, layer=settings.layer)
         self.shape_of = settings.shape_of
         self.rest_chunk, rest = _coded_rest(source, branches, settings)
-        self.plan.set_rest(rest)
+        self.plan.set_rest(rest, bases)
         self.hierarchy_stream = streams.encode_hierarchy(branches, hierarchy.branch_source, hierarchy.vertex_source)
         self.source_rest = code_source_rest(source, branches, self.plan.rest, settings.bound)
         self.prelude_bytes = len(self.hierarchy_stream) + len(self.rest_chunk.stream) + len(self.source_rest)

@@ -74,9 +74,9 @@ def principal(moments: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return values, vectors
 
 
-def solve(matrix: np.ndarray, rows: np.ndarray) -> np.ndarray:
-    """Return the solutions, (n, m), for a positive definite matrix (n, n) and right-hand sides (n, m)."""
-    out, scratch = np.array(rows, np.float64, order="C"), np.array(matrix, np.float64, order="C")
+def solve(matrices: np.ndarray, rows: np.ndarray) -> np.ndarray:
+    """Return the solutions, (K, n, m), for positive definite matrices (K, n, n) and right-hand sides (K, n, m)."""
+    out, scratch = np.array(rows, np.float64, order="C"), np.array(matrices, np.float64, order="C")
     lib.ath_solve(*out.shape, address(scratch, np.float64, 0), address(out, np.float64, 0))
     return out
 

@@ -4,8 +4,8 @@
 
 enum { MOST_SWEEPS = 40 };
 
-void ath_multiply(int64_t count, int64_t rows, int64_t inner, int64_t columns, const double *a, int64_t a_step,
-                  const double *b, int64_t b_step, double *out)
+ATH_HOT void ath_multiply(int64_t count, int64_t rows, int64_t inner, int64_t columns, const double *a, int64_t a_step,
+                          const double *b, int64_t b_step, double *ATH_RESTRICT out)
 {
     for (int64_t i = 0; i < count; i++, a += a_step, b += b_step)
         for (int64_t r = 0; r < rows; r++, out += columns) {
@@ -131,7 +131,7 @@ static void factorise(int32_t n, double *matrix)
         }
 }
 
-void ath_solve(int32_t n, int32_t columns, double *matrix, double *rows)
+static void solve(int32_t n, int32_t columns, double *matrix, double *rows)
 {
     factorise(n, matrix);
     for (int32_t pass = 0; pass < 2; pass++)
@@ -144,4 +144,19 @@ void ath_solve(int32_t n, int32_t columns, double *matrix, double *rows)
             }
             for (int32_t c = 0; c < columns; c++) row[c] /= matrix[i * n + i];
         }
+}
+
+ATH_HOT void ath_solve(int64_t count, int32_t n, int32_t columns, double *matrices, double *rows)
+{
+    for (int64_t i = 0; i < count; i++, matrices += n * n, rows += n * columns) solve(n, columns, matrices, rows);
+}
+
+void ath_solve3(const double m[9], double row[3])
+{
+    double a = ath_sqrt(m[0]), b = m[3] / a, d = m[6] / a;
+    double c = ath_sqrt(m[4] - b * b), e = (m[7] - d * b) / c, f = ath_sqrt(m[8] - d * d - e * e);
+    double x = row[0] / a, y = (row[1] - b * x) / c;
+    row[2] = (row[2] - d * x - e * y) / f / f;
+    row[1] = (y - e * row[2]) / c;
+    row[0] = (x - b * row[1] - d * row[2]) / a;
 }

@@ -9,10 +9,11 @@ enum { WAVES = 8 }; /* waves that a row is projected on at once */
 static double absolute(double x) { return x < 0.0 ? -x : x; }
 
 /* Uniform quantiser with a dead zone: zero below `dead_zone` steps, rounding biased towards zero by as much. */
-static int32_t quantise(double value, double dead_zone)
+ATH_INLINE int32_t quantise(double value, double dead_zone)
 {
     double units = absolute(value) + (1.0 - dead_zone);
-    int32_t magnitude = units >= 1.0 ? units > 1073741823.0 ? 1073741823 : (int32_t)units : 0;
+    units = units < 1073741823.0 ? units : 1073741823.0;
+    int32_t magnitude = (int32_t)(units >= 1.0 ? units : 0.0);
     return value < 0.0 ? -magnitude : magnitude;
 }
 
@@ -38,8 +39,8 @@ ATH_INLINE void sums_of_waves(const double *waves, int32_t count, int32_t T, con
 ATH_HOT static int32_t forward_temporal(const ath_stream *stream, int32_t T, double step, double dead_zone,
                                         int32_t known, const double *row, double *units)
 {
-    double length2 = 0.0, inverse = 1.0 / step;
-    for (int32_t t = 0; t < T; t++) length2 += row[t] * row[t];
+    double length2, inverse = 1.0 / step;
+    sums_of_waves(row, 1, T, row, 1.0, &length2);
     length2 *= inverse * inverse;
     double least = 0.9 * dead_zone * dead_zone, left = length2;
     int is_sharp = stream->temporal_rank == T && 1e-12 * length2 < 0.01 * least; /* a learned basis has rounded rows */
@@ -56,27 +57,22 @@ ATH_HOT static int32_t forward_temporal(const ath_stream *stream, int32_t T, dou
     return stream->temporal_rank;
 }
 
-/* Counts the integers near (axis, k) that are not 0. */
-static int32_t busy_neighbours(const int32_t *quantised, int32_t T, int32_t rank, int32_t axis, int32_t k)
-{
-    int32_t count = 0;
-    for (int32_t a = 0; a < 3; a++)
-        for (int32_t j = ath_max(k - 2, 0); j <= ath_min(k + 2, rank - 1); j++)
-            count += quantised[a * T + j] != 0 && (a != axis || j != k);
-    return count;
-}
-
 /* An isolated 1 costs many bits and removes little error, so its threshold is higher than with neighbours. */
 static void drop_lone_ones(int32_t T, int32_t rank, double units[3][ATH_SEGMENT_FRAMES], const int32_t *predicted,
                            int32_t *quantised)
 {
     static const double least[2] = {1.1, 0.9};
+    int32_t busy[ATH_SEGMENT_FRAMES + 4] = {0}; /* integers that are not 0, by k + 2 */
+    for (int32_t i = 0; i < 3 * T; i += T)
+        for (int32_t k = 0; k < rank; k++) busy[k + 2] += quantised[i + k] != 0;
     for (int32_t axis = 0; axis < 3; axis++)
         for (int32_t k = rank - 1; k >= 0; k--) {
             int32_t *q = quantised + axis * T + k;
             if ((*q != 1 && *q != -1) || (predicted && predicted[axis * T + k] != 0)) continue;
-            int32_t busy = busy_neighbours(quantised, T, rank, axis, k);
-            if (busy < 2 && absolute(units[axis][k]) < least[busy]) *q = 0;
+            int32_t beside = busy[k] + busy[k + 1] + busy[k + 2] + busy[k + 3] + busy[k + 4] - 1;
+            if (beside > 1 || absolute(units[axis][k]) >= least[beside]) continue;
+            *q = 0;
+            busy[k + 2]--;
         }
 }
 
@@ -102,65 +98,68 @@ static void both_ends(const double *row, int32_t T, double parts[2 * ATH_END_PAR
     end_parts(row, T, -1, parts + ATH_END_PARTS);
 }
 
-/* An integer that may be rounded the other way: its parts at the ends, plain and weighted, and the cost of a step. */
+/* Integers that may be rounded the other way: their parts at the ends, plain and weighted, how far they lean already, and
+ * the cost of a step. */
 typedef struct {
-    int32_t k;
-    double parts[2 * ATH_END_PARTS], pull[2 * ATH_END_PARTS], cost;
-} end_integer;
+    int32_t k[ATH_SEGMENT_FRAMES];
+    double parts[2 * ATH_END_PARTS][ATH_SEGMENT_FRAMES], pull[2 * ATH_END_PARTS][ATH_SEGMENT_FRAMES];
+    double lean[ATH_SEGMENT_FRAMES], cost[ATH_SEGMENT_FRAMES];
+} end_integers;
 
 /* Rounds integers of a row the other way if that brings its ends closer, whose errors are the largest and are seen
  * where segments meet. units: the exact values less the prediction; row: the integers. The gain, in squared steps, is
  * the change of the integer's own error and of those of the ends. */
-static void settle_ends(const ath_stream *stream, int32_t T, double step, const ath_rounding *rounding,
-                        const double *row, const double *units, const int32_t *predicted, int32_t *quantised)
+ATH_HOT static void settle_ends(const ath_stream *stream, int32_t T, double step, const ath_rounding *rounding,
+                                const double *row, const double *units, const int32_t *predicted, int32_t *quantised)
 {
-    enum { LEAST_FRAMES = 8 };
+    enum { LEAST_FRAMES = 8, PARTS = 2 * ATH_END_PARTS };
     static const double least = 1e-3, emptied = 0.25; /* extra gain for an integer that becomes 0 */
-    end_integer found[ATH_SEGMENT_FRAMES];
-    double left[2 * ATH_END_PARTS];
+    end_integers found;
+    double left[PARTS], own[PARTS];
     int32_t rank = row_extent(quantised, stream->temporal_rank), count = 0;
     if (T < LEAST_FRAMES || rank == 0 || rounding->ends[0] == 0.0) return;
     both_ends(row, T, left);
-    for (int32_t i = 0; i < 2 * ATH_END_PARTS; i++) left[i] /= step;
+    for (int32_t i = 0; i < PARTS; i++) left[i] /= step;
     for (int32_t k = 0; k < stream->temporal_rank; k++) {
         double value = (double)(quantised[k] + (predicted ? predicted[k] : 0));
         if (quantised[k] == 0 && value == 0.0) continue;
-        end_integer *own = found + count;
-        *own = (end_integer){.k = k, .cost = 1.0};
-        both_ends(stream->temporal + (size_t)k * (size_t)T, T, own->parts);
-        for (int32_t i = 0; i < 2 * ATH_END_PARTS; i++) {
-            left[i] -= value * own->parts[i];
-            own->pull[i] = rounding->ends[i % ATH_END_PARTS] * own->parts[i];
-            own->cost += own->pull[i] * own->parts[i];
+        both_ends(stream->temporal + (size_t)k * (size_t)T, T, own);
+        found.k[count] = k;
+        found.cost[count] = 1.0;
+        for (int32_t i = 0; i < PARTS; i++) {
+            left[i] -= value * own[i];
+            found.parts[i][count] = own[i];
+            found.pull[i][count] = rounding->ends[i % ATH_END_PARTS] * own[i];
+            found.cost[count] += found.pull[i][count] * own[i];
         }
         count += quantised[k] != 0;
     }
     for (int32_t turned = 0; turned < rank; turned++) {
         double most = least;
-        const end_integer *chosen = 0;
-        int32_t by = 0;
-        for (const end_integer *own = found; own < found + count; own++) {
-            int32_t q = quantised[own->k];
-            if (q == 0) continue;
-            double lean = units[own->k] - (double)q;
-            for (int32_t i = 0; i < 2 * ATH_END_PARTS; i++) lean += own->pull[i] * left[i];
+        int32_t chosen = -1, by = 0;
+        for (int32_t c = 0; c < count; c++) found.lean[c] = units[found.k[c]] - (double)quantised[found.k[c]];
+        for (int32_t i = 0; i < PARTS; i++)
+            for (int32_t c = 0; c < count; c++) found.lean[c] += found.pull[i][c] * left[i];
+        for (int32_t c = 0; c < count; c++) {
+            int32_t q = quantised[found.k[c]];
+            if (q == 0 || 2.0 * absolute(found.lean[c]) - found.cost[c] + emptied <= most) continue;
             for (int32_t d = -1; d <= 1; d += 2) {
-                double worth = 2.0 * d * lean - own->cost + (q + d == 0 ? emptied : 0.0);
+                double worth = 2.0 * d * found.lean[c] - found.cost[c] + (q + d == 0 ? emptied : 0.0);
                 if (worth <= most) continue;
                 most = worth;
-                chosen = own;
+                chosen = c;
                 by = d;
             }
         }
-        if (!chosen) return;
-        quantised[chosen->k] += by;
-        for (int32_t i = 0; i < 2 * ATH_END_PARTS; i++) left[i] -= by * chosen->parts[i];
+        if (chosen < 0) return;
+        quantised[found.k[chosen]] += by;
+        for (int32_t i = 0; i < PARTS; i++) left[i] -= by * found.parts[i][chosen];
     }
 }
 
 /* Quantises a track of three axes about its prediction, if there is one, and replaces it by the decoded track. */
-static void code_track(const ath_stream *stream, int32_t T, const double steps[3], const ath_rounding *rounding,
-                       double *track, const int32_t *predicted, int32_t *quantised)
+ATH_HOT static void code_track(const ath_stream *stream, int32_t T, const double steps[3], const ath_rounding *rounding,
+                               double *track, const int32_t *predicted, int32_t *quantised)
 {
     double units[3][ATH_SEGMENT_FRAMES];
     int32_t longest = 0;
@@ -208,23 +207,43 @@ static int32_t turned_vertices(const ath_plan *plan, const ath_piece *piece)
     return (next < plan->branch_count ? plan->branches[next].first : plan->vertex_count) - piece->first;
 }
 
-/* Adds to H the vertices of the branches that a root carries: products of their positions in frame t and in the rest
- * pose, weighted so that together they count as much as the root's own. source: positions of the whole plant. own2: sum
- * of the squared distances of the root's vertices from its base. */
-static void add_carried(const ath_plan *plan, int32_t T, const ath_piece *root, int32_t t, const double *source,
-                        double own2, double H[9])
+typedef double products[9][ATH_SEGMENT_FRAMES]; /* of positions in each frame and in the rest pose */
+
+/* Fills the products of `count` vertices, x from `from`, and d from `a`; returns the sum of d^2. from: 0: no vertex. */
+ATH_HOT static double sum_products(const ath_plan *plan, int32_t T, int32_t vertex, int32_t count, const double a[3],
+                                   const double *x, const double *from, products H)
 {
-    const double *a = ath_rest_attach(plan, root), *first = source + (size_t)root->first * 3 * (size_t)T;
-    double products[9] = {0}, carried2 = 0.0;
-    for (int32_t i = root->count, count = turned_vertices(plan, root); i < count; i++) {
-        const double *x0 = ath_rest_of(plan, root->first + i), *x = first + (size_t)i * 3 * (size_t)T;
+    double size2 = 0.0;
+    for (int32_t k = 0; k < 9; k++) memset(H[k], 0, (size_t)T * sizeof(double));
+    for (int32_t i = 0; i < count; i++, x += 3 * (size_t)T) {
+        const double *x0 = ath_rest_of(plan, vertex + i);
+        double d[3];
         for (int32_t k = 0; k < 3; k++) {
-            double d = x0[k] - a[k];
-            carried2 += d * d;
-            for (int32_t j = 0; j < 3; j++) products[3 * j + k] += (x[j * T + t] - first[j * T + t]) * d;
+            d[k] = x0[k] - a[k];
+            size2 += d[k] * d[k];
         }
+        for (int32_t j = 0; j < 3; j++)
+            for (int32_t t = 0; t < T; t++) {
+                double own = from ? x[j * T + t] - from[j * T + t] : x[j * T + t];
+                for (int32_t k = 0; k < 3; k++) H[3 * j + k][t] += own * d[k];
+            }
     }
-    for (int32_t i = 0; i < 9 && carried2 > 0.0; i++) H[i] += own2 / carried2 * products[i];
+    return size2;
+}
+
+/* Adds to H the vertices of the branches that a root carries, weighted so that together they count as much as the
+ * root's own. source: positions of the whole plant. own2: sum of the squared distances of the root's vertices from its
+ * base. */
+static void add_carried(const ath_plan *plan, int32_t T, const ath_piece *root, const double *source, double own2,
+                        products H)
+{
+    const double *first = source + (size_t)root->first * 3 * (size_t)T;
+    products carried;
+    double carried2 =
+        sum_products(plan, T, root->first + root->count, turned_vertices(plan, root) - root->count,
+                     ath_rest_attach(plan, root), first + (size_t)root->count * 3 * (size_t)T, first, carried);
+    for (int32_t k = 0; k < 9 && carried2 > 0.0; k++)
+        for (int32_t t = 0; t < T; t++) H[k][t] += own2 / carried2 * carried[k][t];
 }
 
 static double determinant(const double m[9])
@@ -260,7 +279,7 @@ static void nearest_rotation(const double H[9], double R[9])
         double turn[3] = {M[7] - M[5], M[2] - M[6], M[3] - M[1]}, trace = M[0] + M[4] + M[8];
         for (int32_t i = 0; i < 3; i++)
             for (int32_t k = 0; k < 3; k++) S[3 * i + k] = (i == k ? trace : 0.0) - 0.5 * (M[3 * i + k] + M[3 * k + i]);
-        ath_solve(3, 1, S, turn); /* NaN if S is not positive definite, so far from the nearest rotation */
+        ath_solve3(S, turn); /* NaN if S is not positive definite, so far from the nearest rotation */
         double size2 = turn[0] * turn[0] + turn[1] * turn[1] + turn[2] * turn[2];
         if (!(size2 < far_turn)) break;
         rational_rotation(0.25 * turn[0], 0.25 * turn[1], 0.25 * turn[2], q);
@@ -284,21 +303,15 @@ static void fit_rotation(const ath_plan *plan, int32_t T, const ath_piece *piece
 {
     int rigid = (piece->flags & ATH_RIGID) != 0;
     double a[3], q[4] = {1.0, 0.0, 0.0, 0.0}, R[9] = {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0};
+    products sums;
     memcpy(a, ath_rest_attach(plan, piece), sizeof a);
     if (rigid) rest_centre(plan, piece, a);
+    double size2 = sum_products(plan, T, piece->first, piece->count, a, local, 0, sums);
+    if (carried) add_carried(plan, T, piece, carried, size2, sums);
+    double prior = 1e-6 * size2 + (rigid ? 0.0 : step * step * (double)piece->count);
     for (int32_t t = 0; t < T; t++) {
-        double H[9] = {0}, size2 = 0.0, own[3];
-        for (int32_t i = 0; i < piece->count; i++) {
-            const double *x0 = ath_rest_of(plan, piece->first + i), *x = local + (size_t)i * 3 * (size_t)T;
-            for (int32_t k = 0; k < 3; k++) {
-                double d = x0[k] - a[k];
-                size2 += d * d;
-                for (int32_t j = 0; j < 3; j++) H[3 * j + k] += x[j * T + t] * d;
-            }
-        }
-        if (carried) add_carried(plan, T, piece, t, carried, size2, H);
-        double prior = 1e-6 * size2 + (rigid ? 0.0 : step * step * (double)piece->count);
-        for (int32_t k = 0; k < 9; k++) H[k] += prior * R[k];
+        double H[9], own[3];
+        for (int32_t k = 0; k < 9; k++) H[k] = sums[k][t] + prior * R[k];
         if (rigid)
             nearest_rotation(H, R);
         else
@@ -370,8 +383,8 @@ static void shift_of_all(const ath_plan *plan, int32_t T, const ath_piece *piece
         }
 }
 
-/* Codes the piece's own translation and rotation; leaves its vertices in the turned frame in `local`. A rigid piece is
- * turned first, so that the one does not stand for the other. */
+/* Codes the piece's own translation and rotation. local: room for its vertices. A rigid piece is turned first, so that
+ * the one does not stand for the other. */
 static void analyse_tracks(const ath_plan *plan, const ath_motion *motion, const ath_piece *piece,
                            const ath_piece_before *before, ath_piece_rows *rows, const ath_scratch *scratch,
                            const double *source, const ath_rounding *rounding, double *local)
@@ -384,8 +397,8 @@ static void analyse_tracks(const ath_plan *plan, const ath_motion *motion, const
         shift_of_first(plan, T, piece, scratch, source);
         code_shift(motion, piece, before, rows, scratch, rounding);
     }
-    to_local(T, piece, &scratch->at, source, local);
     if (ath_has_rotation(plan, piece, base)) {
+        to_local(T, piece, &scratch->at, source, local);
         ath_turning turning = ath_turning_of(plan, piece, base);
         int carries = turned_vertices(plan, piece) > piece->count;
         fit_rotation(plan, T, piece, base->step, local, carries ? source : 0, scratch->track);

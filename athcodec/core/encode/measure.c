@@ -43,7 +43,7 @@ void ath_differences(int32_t vertex_count, int32_t frames, int32_t piece_count, 
         }
 }
 
-int64_t ath_add_moments(int64_t count, int32_t frames, const int32_t *rows, double least, double *moments)
+ATH_HOT int64_t ath_add_moments(int64_t count, int32_t frames, const int32_t *rows, double least, double *moments)
 {
     int64_t kept = 0;
     for (int64_t i = 0; i < count; i++, rows += frames) {
@@ -91,8 +91,8 @@ void ath_gather(int32_t vertex_count, int32_t frames, const int32_t *vertex_sour
                 }
 }
 
-void ath_store_positions(const double *placed, int32_t first, int32_t count, int32_t T, const double origin[3],
-                         int is_float64, void *positions)
+ATH_HOT void ath_store_positions(const double *placed, int32_t first, int32_t count, int32_t T, const double origin[3],
+                                 int is_float64, void *positions)
 {
     for (int32_t row = 0; row < 3 * count; row++) {
         const double *from = placed + (size_t)row * (size_t)T;

@@ -46,7 +46,7 @@ class SourceFrames:
     def flaws(self, decoded: np.ndarray, before: np.ndarray | None) -> tuple[float, float]:
         """Return how far decoded positions leave the box, and their largest second difference over the source's, or
         over half the bound where that is larger. before: frames like those of the source."""
-        low, high = decoded.min(axis=(0, 2)), decoded.max(axis=(0, 2))
+        low, high = decoded.min(axis=0).min(axis=1), decoded.max(axis=0).max(axis=1)
         away = max(0.0, float((self.box[0] - low).max()), float((high - self.box[1]).max()))
         with np.errstate(divide="ignore", invalid="ignore"):
             ratios = self._bends(decoded, before) / self._allowed

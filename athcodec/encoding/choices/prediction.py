@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 
@@ -26,6 +27,7 @@ from athcodec.encoding.segment_samples import SegmentSample, typical_segments
 from athcodec.encoding.settings import Choice, Settings
 from athcodec.encoding.survey import Ath, Survey
 from athcodec.errors import BoundError
+from athcodec.files.threads import ranges
 from athcodec.motion.thresholds import Thresholds
 from athcodec.options import SMOOTHNESS
 
@@ -73,7 +75,7 @@ def best_prediction(
     """Return the best prediction; None: it takes more than `most_bytes`, or cannot keep the bound."""
     ath = one_map_each(source.seen)
     limit = source.rest_limit(source.smallest_bound(bound))
-    by_ratio = {ratio: _settings(source, ath, bound, ratio * limit) for ratio in REST_STEPS}
+    by_ratio = cache(lambda ratio: _settings(source, ath, bound, ratio * limit))
     samples = _samples(source)
     preludes: dict[float, CodedPrelude] = {}
 
@@ -98,16 +100,16 @@ def best_prediction(
     def best(share: float, most: float, lattice: bool) -> FoundPrediction:
         """Return the best prediction whose errors are at most a share of the limit; far above `most`, any."""
         ratios = sorted(REST_STEPS, key=lambda ratio: abs(math.log(ratio / share)))[:REST_TRIALS]
-        found = coded(by_ratio[ratios[0]], CUBES, share)
+        found = coded(by_ratio(ratios[0]), CUBES, share)
         if found.bytes > HOPELESS * most:
             return found
-        tried = [found, *(coded(by_ratio[ratio], CUBES, share) for ratio in ratios[1:])]
+        tried = [found, *(coded(by_ratio(ratio), CUBES, share) for ratio in ratios[1:])]
         found = min(tried, key=lambda one: one.bytes)
         if not lattice or Feature.LATTICE in source.without:
             return found
         return min(found, coded(found.choice.settings, LATTICE, share), key=lambda one: one.bytes)
 
-    some = by_ratio[0.5]
+    some = by_ratio(0.5)
     try:
         if sum(_begun(prelude_of(some), some, sample) for sample in samples) > TOO_MANY * most_bytes:
             return None
@@ -143,10 +145,13 @@ def _twitches(shown: np.ndarray, positions: np.ndarray, limit: np.ndarray | floa
     vertices in some frames only, or of vertices that hardly jerk themselves."""
     if positions.shape[2] < 3:
         return False
-    moved = np.linalg.norm(np.diff(positions, 2, axis=2), axis=1)
-    error = np.linalg.norm(np.diff(shown - positions, 2, axis=2), axis=1)
-    above = error > np.reshape(limit, (-1, 1))
-    share, seen = above.mean(axis=0), (above & (error > moved)).mean(axis=0)
+    limits, counts = np.broadcast_to(limit, len(positions)), np.zeros((2, positions.shape[2] - 2), np.int64)
+    for start, stop in ranges(len(positions), positions[0].size):
+        rows = shown[start:stop] - positions[start:stop], positions[start:stop]
+        error, moved = (np.linalg.norm(np.diff(some, 2, axis=2), axis=1) for some in rows)
+        above = error > limits[start:stop, None]
+        counts += above.sum(axis=0), (above & (error > moved)).sum(axis=0)
+    share, seen = counts / len(positions)
     return share.max() > max(TWITCHING, 2 * np.median(share)) or seen.max() > TWITCHING
 
 
