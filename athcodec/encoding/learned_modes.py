@@ -99,7 +99,7 @@ def learn(plan: Plan, seen: Components, step: float, wanted: np.ndarray | None =
         (group[some[part]], lengths[some[part]], vectors[some[part]])
         for group, lengths, vectors in seen.groups
         for some in [np.flatnonzero(wanted[group])]
-        for part in _parts(some, vectors[:1].size)
+        for part in _parts(some, 4 * vectors[:1].size)
     )
     for pieces, lengths, vectors in parts:
         scale = np.minimum(lengths / (qz.MODE_STEP * least), qz.LARGEST_MODE)
@@ -136,7 +136,7 @@ def _with_duals(counts: np.ndarray, integers: np.ndarray) -> LearnedModes:
     lib.ath_unit_shapes(len(integers), address(integers, np.int32, 0), address(units, np.float64, 0))
     for count in np.unique(counts[counts > 0]).tolist():
         all_rows = first[counts == count, None] + np.arange(count)
-        for rows in (all_rows[part] for part in _parts(all_rows, 4 * count * LEARNED_NUMBERS)):
+        for rows in (all_rows[part] for part in _parts(all_rows, 16 * count * LEARNED_NUMBERS)):
             products = multiply(units[rows], units[rows].transpose(0, 2, 1))
             duals[rows] = solve(products + 1e-4 * np.eye(count), units[rows])  # A few modes are nearly alike.
     return LearnedModes(counts, first, integers, units, duals)
