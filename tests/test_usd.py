@@ -42,6 +42,7 @@ def new_stage(path, first=101, last=110, fps=FPS):
 
 def add_grid(stage, place="/root/grid", frames=range(101, 111), points=sway):
     mesh = UsdGeom.Mesh.Define(stage, place)
+    mesh.CreateSubdivisionSchemeAttr("none")
     mesh.CreateFaceVertexCountsAttr([4] * len(QUADS))
     mesh.CreateFaceVertexIndicesAttr(QUADS.reshape(-1).tolist())
     for frame in frames:
@@ -140,6 +141,7 @@ def whole_plant(path):
     api.CreatePrimvar("branch_id", Sdf.ValueTypeNames.IntArray, "vertex").Set([0] * 6 + [1] * 6)
     api.CreatePrimvar("age", Sdf.ValueTypeNames.FloatArray, "uniform").Set([1, 2, 3, 4, 5, 6])
     leaf = UsdGeom.Mesh.Define(stage, "/root/leaf")
+    leaf.CreateSubdivisionSchemeAttr("none")
     leaf.CreateFaceVertexCountsAttr([3])
     leaf.CreateFaceVertexIndicesAttr([0, 2, 1])
     leaf.CreatePointsAttr(vec3([[0, 0, 1], [1, 0, 1], [0, 1, 1]]))
@@ -216,6 +218,7 @@ def add_leaves(stage, place="/root/leaves", count=5, frames=range(101, 111)):
     instancer.AddTranslateOp().Set(Gf.Vec3d(0, 0, 2))
     for name, size in (("small", 1), ("large", 2), ("thorn", 3)):
         mesh = UsdGeom.Mesh.Define(stage, f"{place}/prototypes/{name}/blade")
+        mesh.CreateSubdivisionSchemeAttr("none")
         mesh.CreatePointsAttr(vec3(LEAF))
         mesh.CreateFaceVertexCountsAttr([3, 3])
         mesh.CreateFaceVertexIndicesAttr([0, 1, 3, 1, 2, 3])
@@ -344,6 +347,32 @@ def test_what_is_not_read_is_named_once(tmp_path, capsys):
     assert line.endswith(
         f"Cube /root/box0, /root/box1; Material /root/bark {kept}; Camera /eye; attribute /root/grid.wet"
     )
+
+
+def test_the_scheme_of_a_surface_comes_back_and_what_else_is_authored_is_named(tmp_path, capsys):
+    stage = new_stage(tmp_path / "a.usda")
+    mesh = add_grid(stage)
+    mesh.CreateSubdivisionSchemeAttr("loop")
+    mesh.CreateHoleIndicesAttr([1])
+    mesh.CreateCornerIndicesAttr([])
+    mesh.CreateInterpolateBoundaryAttr("edgeAndCorner")  # as where nothing says it
+    mesh.CreateVelocitiesAttr(vec3(GRID))
+    mesh.GetPrim().SetCustomData({"author": "me"})
+    mesh.GetPrim().CreateAttribute("userProperties:height", Sdf.ValueTypeNames.Float).Set(3.5)
+    add_grid(stage, "/root/smooth").GetPrim().RemoveProperty("subdivisionScheme")
+    stage.Save()
+    with pytest.warns(SourceWarning, match="not read: subdivision /root/grid.holeIndices$"):
+        clip, _ = read_all(tmp_path / "a.usda")
+    named = [f"/root/grid.{name}" for name in ("userProperties:height", "velocities", "customData")]
+    assert clip.not_read == {"subdivision": ["/root/grid.holeIndices"], "attribute": named}
+    assert cli.main(["encode", str(tmp_path / "a.usda"), str(tmp_path / "a.ath")]) == 0
+    assert cli.main(["decode", str(tmp_path / "a.ath"), str(tmp_path / "b.usda")]) == 0
+    again = Usd.Stage.Open(str(tmp_path / "b.usda"))
+    meshes = map(UsdGeom.Mesh, again.GetDefaultPrim().GetChildren())
+    assert [each.GetSubdivisionSchemeAttr().Get() for each in meshes] == ["loop", "catmullClark"]
+    assert "not written" not in capsys.readouterr().err
+    assert cli.main(["decode", str(tmp_path / "a.ath"), str(tmp_path / "b.glb")]) == 0
+    assert "subdivisionScheme grid, smooth" in capsys.readouterr().err
 
 
 def test_arrays_that_change_in_a_single_frame_are_named_and_those_with_equal_samples_stay(tmp_path):

@@ -14,7 +14,7 @@ import numpy as np
 
 from athcodec.motion.joining import OWN as CLIPS
 from athcodec.motion.presence import PRESENCE, presence_of_parts, stated_presence
-from athcodec.sources.scene_objects import FACE_MATERIAL, MATERIAL_NAMES, SCENE_KEYS, ArrayDescriptor
+from athcodec.sources.scene_objects import FACE_MATERIAL, MATERIAL_NAMES, SCENE_KEYS, SCHEME, ArrayDescriptor
 
 # kept by the formats themselves, or by their objects
 KNOWN_METADATA = ("fps", "start_frame", "part_names", "part_kinds", "part_usd", "domains", PRESENCE)
@@ -86,14 +86,15 @@ def lost_arrays(motion: Any, kept: Collection[str]) -> dict[str, dict[str, list[
 
 
 def not_written(motion: Any, kept: Sequence[str]) -> dict[str, list[str]]:
-    """The names of objects with presence, or with faces of two sides, that a format does not keep."""
+    """The names of objects with presence, faces of two sides, or subdivision, that a format does not keep."""
     metadata, is_one_clip = getattr(motion, "metadata", None) or {}, len(getattr(motion, "clip_ranges", ())) < 2
     clips = metadata.get(CLIPS) if not is_one_clip else None
     every = [metadata, *(clips.values() if isinstance(clips, dict) else ())]
     presence = dict.fromkeys(name for own in every if isinstance(own, dict) for name in stated_presence(own))
     names, details = metadata.get("part_names"), metadata.get("part_usd")
-    pairs = zip(names, details) if isinstance(names, list) and isinstance(details, list) else ()
+    pairs = list(zip(names, details)) if isinstance(names, list) and isinstance(details, list) else []
     lost = {"doubleSided": [name for name, detail in pairs if is_double_sided(detail)]}
+    lost[SCHEME] = [name for name, detail in pairs if isinstance(detail, dict) and SCHEME in detail]
     lost = {kind: names for kind, names in lost.items() if names and kind not in kept}
     return lost if not presence or is_one_clip and "presence" in kept else lost | {"presence": list(presence)}
 

@@ -45,7 +45,7 @@ from athcodec.exporters.timing import distinct_frame_numbers, frame_rate_of
 from athcodec.exporters.usd_rig import write_rig
 from athcodec.files.atomic import new_files
 from athcodec.motion.units import METRES, unit_symbol
-from athcodec.sources.scene_objects import FACE_MATERIAL, OWN
+from athcodec.sources.scene_objects import FACE_MATERIAL, OWN, SCHEME
 
 SAVE_BYTES = 16 << 20
 PRIMVARS = {"uv": "st", "colors": "displayColor"}
@@ -265,7 +265,7 @@ def _identifier(name: str) -> str:
 def _define(stage: Usd.Stage, place: str, obj: SceneObject) -> UsdGeom.PointBased:
     if obj.kind == "mesh":
         schema = mesh = UsdGeom.Mesh.Define(stage, place)
-        mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
+        mesh.CreateSubdivisionSchemeAttr(obj.details.get(SCHEME, UsdGeom.Tokens.none))
         mesh.CreateFaceVertexCountsAttr(_int_array(obj.faces[0]))
         mesh.CreateFaceVertexIndicesAttr(_int_array(obj.faces[1]))
         if is_double_sided(obj.details):

@@ -10,7 +10,7 @@ attribute "face_material" says the number for each face.
 
 Points are float32 in USD and so they are here, unless a transform places them far from the origin. The stage is opened
 as it is composed (layers, payloads, value clips); what else it holds, such as layers that cannot be found, patches,
-tetrahedra, what is in materials, is named in the clip's `not_read`; velocities are not read. A stage is opened by its
+tetrahedra, what is in materials, velocities, creases, is named in the clip's `not_read`. A stage is opened by its
 structure; positions are read frame by frame. USD trusts the lengths of arrays in a binary file even where it is
 damaged: it is imported by the process of reader_main.py alone, under a limit of memory.
 """
@@ -39,6 +39,7 @@ from athcodec.sources import ReadOptions
 from athcodec.sources.crate import check_crates
 from athcodec.sources.scene_objects import (
     OWN,
+    SCHEME,
     ArrayDescriptor,
     SceneObject,
     Static,
@@ -56,6 +57,11 @@ READ = frozenset(
 WHOLE = ("Material",)  # prims that are named without those below them
 KNOWN = ("Material", "Camera", "GeomSubset")
 PLACES = ("positions", "orientations", "orientationsf", "scales", "protoIndices", "ids", "invisibleIds")
+OBJECT_PROPERTIES = frozenset(  # Attributes of objects that are read, or are found again when they are written.
+    (*PLACES, "points", "extent", "normals", "widths", "orientation", "doubleSided", SCHEME, "faceVertexCounts")
+    + ("faceVertexIndices", "curveVertexCounts", "type", "basis", "wrap", "visibility", "purpose", "xformOpOrder")
+)
+NAMESPACES = ("primvars", "xformOp", "material", "skel", "subsetFamily")  # Read, or named by other functions.
 PURPOSES = (UsdGeom.Tokens.default_, UsdGeom.Tokens.render)
 NAMES = {"st": "uv", "displayColor": "colors"}
 DOMAINS = {"vertex": "vertex", "varying": "vertex", "faceVarying": "corner", "uniform": "face", "constant": "constant"}
@@ -222,10 +228,22 @@ def _object(prim: Usd.Prim, only: Sequence[str], not_read: dict[str, list[str]])
     if UsdGeom.Imageable(prim).ComputePurpose() not in PURPOSES:
         not_read.setdefault("hidden", []).append(path)
     elif points.HasAuthoredValue():
-        return _Prim(kind, prim.GetName(), path, prim=prim, points=points)
+        return _Prim(kind, prim.GetName(), path, left_out=list(_unread(prim)), prim=prim, points=points)
     else:
         not_read.setdefault("empty", []).append(path)
     return None
+
+
+def _unread(prim: Usd.Prim) -> Iterator[str]:
+    """The names of attributes and metadata that are authored on an object, differ from their fallback and are not
+    read."""
+    for attribute in prim.GetAuthoredAttributes():
+        name, value = attribute.GetName(), attribute.Get(Usd.TimeCode.EarliestTime())
+        if name in OBJECT_PROPERTIES or name.partition(":")[0] in NAMESPACES or _is_array(value) and not len(value):
+            continue
+        if value is not None and value != prim.GetPrimDefinition().GetAttributeFallbackValue(name):
+            yield name
+    yield from (key for key in ("customData", "assetInfo") if prim.HasAuthoredMetadata(key))
 
 
 def _is_material_subset(prim: Usd.Prim) -> bool:
@@ -390,6 +408,7 @@ class _Instances:
 
     def add_arrays(self, obj: _Prim, codes: np.ndarray) -> None:
         """Adds the static arrays that the instancer has for each of its copies."""
+        obj.left_out += _unread(self.instancer.GetPrim())
         for primvar in UsdGeom.PrimvarsAPI(self.instancer).GetPrimvarsWithValues():
             name, values = str(primvar.GetPrimvarName()), _numbers(primvar.ComputeFlattened(codes[0]))
             changes = _changes(primvar, codes) or self.all.follows_ids
@@ -535,6 +554,7 @@ def _topology(obj: _Prim, codes: np.ndarray) -> None:
         obj.face_indices = _fixed(obj, mesh.GetFaceVertexIndicesAttr(), codes)
         if mesh.GetDoubleSidedAttr().Get():
             obj.details["doubleSided"] = "true"
+        _note(obj, SCHEME, mesh.GetSubdivisionSchemeAttr(), "none")
         _bind_materials(obj)
     elif obj.kind == "curves":
         obj.curve_counts = _fixed(obj, UsdGeom.Curves(obj.prim).GetCurveVertexCountsAttr(), codes)
