@@ -375,6 +375,16 @@ def test_the_scheme_of_a_surface_comes_back_and_what_else_is_authored_is_named(t
     assert "subdivisionScheme grid, smooth" in capsys.readouterr().err
 
 
+def test_a_primvar_without_usable_indices_is_named_and_does_not_refuse_the_stage(tmp_path):
+    stage = new_stage(tmp_path / "a.usda")
+    prim = add_grid(stage).GetPrim()
+    UsdGeom.PrimvarsAPI(prim).CreatePrimvar("hue", Sdf.ValueTypeNames.FloatArray, "vertex").Set([1.0])
+    prim.CreateAttribute("primvars:hue:indices", Sdf.ValueTypeNames.UIntArray).Set([0] * 12)
+    stage.Save()
+    clip, _ = read_all(tmp_path / "a.usda")
+    assert clip.not_read == {"attribute": ["/root/grid.hue"]}
+
+
 def test_arrays_that_change_in_a_single_frame_are_named_and_those_with_equal_samples_stay(tmp_path):
     stage = new_stage(tmp_path / "a.usda")
     primvars = UsdGeom.PrimvarsAPI(add_grid(stage))

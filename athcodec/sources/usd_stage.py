@@ -410,7 +410,7 @@ class _Instances:
         """Adds the static arrays that the instancer has for each of its copies."""
         obj.left_out += _unread(self.instancer.GetPrim())
         for primvar in UsdGeom.PrimvarsAPI(self.instancer).GetPrimvarsWithValues():
-            name, values = str(primvar.GetPrimvarName()), _numbers(primvar.ComputeFlattened(codes[0]))
+            name, values = str(primvar.GetPrimvarName()), _numbers(_flattened(primvar, codes[0]))
             changes = _changes(primvar, codes) or self.all.follows_ids
             if values is None or changes or len(values) <= self.rows.max(initial=-1):
                 obj.left_out.append(name)
@@ -678,7 +678,7 @@ def _statics(obj: _Prim, codes: np.ndarray, matrix: np.ndarray) -> None:
         if primvar.HasValue() and _changes(primvar, codes):
             obj.left_out.append(primvar.GetPrimvarName())
         elif primvar.HasValue():
-            values = primvar.ComputeFlattened(codes[0])
+            values = _flattened(primvar, codes[0])
             name = _said(primvar.GetAttr(), "name") or primvar.GetPrimvarName()
             _keep(
                 obj,
@@ -734,11 +734,22 @@ def _keep_unless_it_changes(
         _keep(obj, name, attribute.Get(codes[0]), interpolation)
 
 
+def _flattened(primvar: UsdGeom.Primvar, code: float) -> Any:
+    """The values of a primvar at a time, without its indices; None where USD finds it faulty."""
+    try:
+        return primvar.ComputeFlattened(code)
+    except Tf.ErrorException:
+        return None
+
+
 def _changes(source: Usd.Attribute | UsdGeom.Primvar, codes: np.ndarray) -> bool:
     """Whether an array has other values in any frame than in the first."""
     if not source.ValueMightBeTimeVarying():
         return False
-    read = source.ComputeFlattened if isinstance(source, UsdGeom.Primvar) else source.Get
+
+    def read(code: float) -> Any:
+        return _flattened(source, code) if isinstance(source, UsdGeom.Primvar) else source.Get(code)
+
     first = np.array(read(codes[0]))
     samples = source.GetTimeSamplesInInterval(_interval(codes))
     return any(not np.array_equal(np.array(read(code)), first) for code in (*samples, codes[-1]))
