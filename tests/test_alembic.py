@@ -91,7 +91,7 @@ def test_subdivision_surfaces_are_read_as_their_cage_and_what_shapes_them_is_nam
         assert np.array_equal(clip.block(0, 4), [sway(i) for i in range(4)]) and np.array_equal(clip.faces, QUADS)
         assert clip.metadata["part_usd"] == [{"subdivisionScheme": "catmullClark"}]
         assert clip.not_read["subdivision"] == ["/grid.creaseIndices", "/grid.interpolateBoundary"]
-        assert clip.not_read["attribute"] == ["/grid.velocities", "/grid.userProperties:height"]
+        assert clip.not_read["attribute"] == ["/grid.velocities", "/grid.userProperties"]
 
 
 def test_instances_are_read_as_copies_and_what_is_not_read_is_named(tmp_path):

@@ -210,8 +210,8 @@ def _clip(archive: Any, options: ReadOptions) -> MotionClip:
         obj.is_still = not obj.moves and len(obj.track.times) < 2
         obj.shown = np.stack([place.shown(times) for place in obj.places], axis=1)
         _topology(obj)
-        _name_unread(obj)
         _statics(obj, times[0])
+        _name_unread(obj)
         if len(obj.places) > 1:
             obj.statics.pop("normals", None)  # they turn with each copy
             obj.repeat(len(obj.places))
@@ -374,8 +374,7 @@ def _name_unread(obj: _Object) -> None:
             values = np.array(found.getValue())
             obj.left_out += [name] * bool(values.size if values.ndim else values)
     further = obj.schema.getUserProperties()
-    for i in range(further.getNumProperties() if further.valid() else 0):
-        obj.left_out.append(f"userProperties:{further.getPropertyHeader(i).getName()}")
+    obj.left_out += ["userProperties"] * bool(further.valid() and further.getNumProperties())
 
 
 def _bind_materials(obj: _Object) -> None:

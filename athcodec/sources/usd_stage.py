@@ -57,11 +57,11 @@ READ = frozenset(
 WHOLE = ("Material",)  # prims that are named without those below them
 KNOWN = ("Material", "Camera", "GeomSubset")
 PLACES = ("positions", "orientations", "orientationsf", "scales", "protoIndices", "ids", "invisibleIds")
-OBJECT_PROPERTIES = frozenset(  # Attributes of objects that are read, or are found again when they are written.
+OBJECT_PROPERTIES = frozenset(  # Attributes of objects, or their namespaces, that are read or named one by one.
     (*PLACES, "points", "extent", "normals", "widths", "orientation", "doubleSided", SCHEME, "faceVertexCounts")
     + ("faceVertexIndices", "curveVertexCounts", "type", "basis", "wrap", "visibility", "purpose", "xformOpOrder")
+    + ("primvars", "xformOp", "material", "skel", "subsetFamily")
 )
-NAMESPACES = ("primvars", "xformOp", "material", "skel", "subsetFamily")  # Read, or named by other functions.
 PURPOSES = (UsdGeom.Tokens.default_, UsdGeom.Tokens.render)
 NAMES = {"st": "uv", "displayColor": "colors"}
 DOMAINS = {"vertex": "vertex", "varying": "vertex", "faceVarying": "corner", "uniform": "face", "constant": "constant"}
@@ -228,22 +228,23 @@ def _object(prim: Usd.Prim, only: Sequence[str], not_read: dict[str, list[str]])
     if UsdGeom.Imageable(prim).ComputePurpose() not in PURPOSES:
         not_read.setdefault("hidden", []).append(path)
     elif points.HasAuthoredValue():
-        return _Prim(kind, prim.GetName(), path, left_out=list(_unread(prim)), prim=prim, points=points)
+        return _Prim(kind, prim.GetName(), path, prim=prim, points=points)
     else:
         not_read.setdefault("empty", []).append(path)
     return None
 
 
-def _unread(prim: Usd.Prim) -> Iterator[str]:
-    """The names of attributes and metadata that are authored on an object, differ from their fallback and are not
-    read."""
+def _unread(prim: Usd.Prim) -> list[str]:
+    """The names of attributes, or their namespaces, and metadata that are authored on an object, differ from their
+    fallback and are not read."""
+    found = {}
     for attribute in prim.GetAuthoredAttributes():
         name, value = attribute.GetName(), attribute.Get(Usd.TimeCode.EarliestTime())
-        if name in OBJECT_PROPERTIES or name.partition(":")[0] in NAMESPACES or _is_array(value) and not len(value):
-            continue
-        if value is not None and value != prim.GetPrimDefinition().GetAttributeFallbackValue(name):
-            yield name
-    yield from (key for key in ("customData", "assetInfo") if prim.HasAuthoredMetadata(key))
+        is_empty = value is None or _is_array(value) and not len(value)
+        if not is_empty and value != prim.GetPrimDefinition().GetAttributeFallbackValue(name):
+            found[name.partition(":")[0]] = None
+    metadata = [key for key in ("customData", "assetInfo") if prim.HasAuthoredMetadata(key)]
+    return [name for name in found if name not in OBJECT_PROPERTIES] + metadata
 
 
 def _is_material_subset(prim: Usd.Prim) -> bool:
@@ -697,6 +698,7 @@ def _statics(obj: _Prim, codes: np.ndarray, matrix: np.ndarray) -> None:
     if obj.ids is not None:  # Arrays that keep their order do not follow the points.
         obj.left_out += [name for name, static in obj.statics.items() if static.domain == "vertex"]
         obj.statics = {name: static for name, static in obj.statics.items() if static.domain != "vertex"}
+    obj.left_out += _unread(obj.prim)
     rest = obj.statics.get("rest")
     if rest is not None and rest.values.shape[1:] == (3,) and rest.values.dtype.kind == "f":
         placed = transformed(rest.values, matrix)
