@@ -565,6 +565,10 @@ def test_usd_reads_our_file_with_samples_of_what_moves_only(tmp_path):
     assert [prim.GetName() for prim in prims] == ["grid", "leaf", "hair", "dust"]
     assert [prim.GetTypeName() for prim in prims] == ["Mesh", "Mesh", "BasisCurves", "Points"]
     assert UsdGeom.Mesh(prims[0]).GetSubdivisionSchemeAttr().Get() == "none"
+    arrays = [
+        {str(each.GetPrimvarName()) for each in UsdGeom.PrimvarsAPI(prim).GetAuthoredPrimvars()} for prim in prims
+    ]
+    assert arrays == [{"st", "branch_id", "age", "normals"}] * 2 + [{"branch_id", "normals"}] * 2
     for i, code in enumerate(range(101, 111)):
         points = np.concatenate([np.array(UsdGeom.PointBased(prim).GetPointsAttr().Get(code)) for prim in prims])
         assert np.array_equal(points, expected[i])

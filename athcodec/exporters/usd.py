@@ -391,6 +391,8 @@ def _write_array(name: str, values: np.ndarray, domain: str, objects: list[Scene
     if any(found is None for found in placed):
         return False
     for target, rows in placed:
+        if not len(rows):  # An object that has no faces or corners has no values for them.
+            continue
         primvar = UsdGeom.PrimvarsAPI(target).CreatePrimvar(
             PRIMVARS.get(name, _identifier(name)), type_name, INTERPOLATION[domain], element_size
         )
@@ -417,11 +419,15 @@ def _placed_rows(rows: np.ndarray, domain: str, obj: SceneObject) -> tuple[Any, 
 
 
 def _write_radius(values: np.ndarray, domain: str, objects: list[SceneObject]) -> bool:
-    """As widths of curves and points; of meshes as a primvar."""
+    """As widths of curves and points; of meshes as a primvar, but for the zeros that a reader gives to meshes without
+    one beside such."""
+    beside = domain == "vertex" and any(obj.kind != "mesh" for obj in objects)
     placed = [_placed_rows(rows_of(values, domain, obj), domain, obj) for obj in objects]
     if any(found is None or found[0] is not obj.target for found, obj in zip(placed, objects)):
         return False
     for obj, (_, rows) in zip(objects, placed):
+        if obj.kind == "mesh" and beside and not rows.any():
+            continue
         if obj.kind == "mesh":
             primvar = UsdGeom.PrimvarsAPI(obj.target).CreatePrimvar(
                 "radius", Sdf.ValueTypeNames.FloatArray, INTERPOLATION[domain]
