@@ -18,7 +18,7 @@ from plants import distance, plant, turns
 import athcodec
 from athcodec.cli import main
 from athcodec.decoding.clip_view import ClipView
-from athcodec.errors import ClipError, SourceWarning
+from athcodec.errors import ClipError, GuessWarning, SourceWarning
 from athcodec.exporters import gltf as gltf_exporter
 from athcodec.exporters import write
 from athcodec.exporters.fitting import allowed_error
@@ -349,8 +349,10 @@ def test_sampled_keys_come_back_one_per_frame(tmp_path, fps, times):
 
 
 def test_sparse_keys_are_sampled_at_30_or_as_asked(tmp_path):
-    path = moving_cube([(0, "translation", [0, 1.2345, 3], np.zeros((3, 3)), "LINEAR")]).save(tmp_path / "a.glb")
-    assert frames_of(path)[1].metadata["fps"] == 30 and frames_of(path)[1].frame_count == 91
+    path = moving_cube([(0, "translation", [0, 1.234, 1.238, 3], np.eye(4)[:, 1:], "LINEAR")]).save(tmp_path / "a.glb")
+    with pytest.warns(GuessWarning, match="2 of 4 key times lie between frames at 30 per second, .*; --fps 250 has"):
+        clip = frames_of(path)[1]
+    assert clip.metadata["fps"] == 30 and clip.frame_count == 91
     with read(path, fps=24000 / 1001) as clip:
         assert clip.metadata["fps"] == 24000 / 1001 and clip.frame_count == 72
     with pytest.raises(ClipError, match="expected at most"):

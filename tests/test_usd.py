@@ -11,7 +11,7 @@ from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade, UsdSkel, UsdValidation, Vt
 
 import athcodec
 from athcodec import cli
-from athcodec.errors import ClipError, SourceWarning
+from athcodec.errors import ClipError, GuessWarning, SourceWarning
 from athcodec.motion.clip import MotionClip
 
 pytestmark = pytest.mark.formats
@@ -103,6 +103,11 @@ def test_frames_are_the_samples_where_the_stage_has_no_range_or_at_the_rate_of_f
     clip, positions = read_all(tmp_path / "a.usda", fps=48.0)
     assert np.allclose(clip.time, np.arange(8) / 48) and clip.metadata["fps"] == 48
     assert np.allclose(positions[1], (sway(2) + sway(3)) / 2, atol=1e-6)
+    stage.SetStartTimeCode(2)
+    stage.SetEndTimeCode(6)
+    stage.Save()
+    with pytest.warns(GuessWarning, match="a.usda: 1 of 3 key times lie between frames at 24 per second"):
+        assert read_all(tmp_path / "a.usda")[0].frame_count == 5
 
 
 def test_units_without_a_symbol_are_kept_in_metres_and_missing_ones_stay_missing(tmp_path):

@@ -49,6 +49,7 @@ from athcodec.sources.scene_objects import (
     rows_by_id,
     transformed,
 )
+from athcodec.sources.timing import warn_of_missed
 
 MAX_FRAMES = 1 << 24
 READ = frozenset(
@@ -630,6 +631,10 @@ def _time_codes(stage: Usd.Stage, objects: list[_Prim], fps: float | None, irreg
         start, end = (samples[0], samples[-1]) if samples else (0.0, 0.0)
     if not (math.isfinite(start) and math.isfinite(end)):
         raise ClipError(f"time codes: got {start} to {end}, expected finite numbers")
+    elif not fps:
+        times = np.array([time for time in _sampled(objects) if start <= time <= end])
+        missed = np.abs(times - start - np.round(times - start)) > 1e-3
+        warn_of_missed(times / own, missed, own, stage.GetRootLayer().realPath)
     step = own / fps if fps else 1.0
     count = math.floor((end - start) / step + 1e-6) + 1
     if count > MAX_FRAMES:
