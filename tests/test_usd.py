@@ -312,6 +312,17 @@ def test_copies_are_written_as_instances_again(tmp_path, capsys):
         assert again.attributes["part_copies"].tolist() == [1, 20, 20] and off <= 1.01 * decoder.file.max_error_bound
 
 
+def test_copies_that_are_written_as_one_mesh_although_instances_were_asked_for_are_named(tmp_path):
+    stage = new_stage(tmp_path / "a.usda")
+    instancer, _ = add_leaves(stage)
+    instancer.CreateScalesAttr([(-1, 1, 1), (1, 1, 1), (1, 1, 1), (1, 1, 1), (1, 1, 1)])
+    stage.Save()
+    for name in ("b.usda", "b.abc", "b.glb"):
+        with athcodec.read(tmp_path / "a.usda") as clip:
+            [lost] = athcodec.write(clip, tmp_path / name, instances=True).facts["not_written"].items()
+        assert lost[0].startswith("copies as instances (mirrored") and "small/blade (3 in one mesh)" in lost[1][0], name
+
+
 def test_what_of_a_point_instancer_is_never_seen_is_not_read(tmp_path):
     stage = new_stage(tmp_path / "a.usda")
     instancer, _ = add_leaves(stage)

@@ -47,7 +47,7 @@ from athcodec.exporters.gltf_build import (
 from athcodec.exporters.gltf_copies import PATHS, GltfCopies, Movers, unit_quaternion, with_copies
 from athcodec.exporters.gltf_joints import Joints, fit_joints
 from athcodec.exporters.rig import fit_rig
-from athcodec.exporters.scene_objects import lost_arrays
+from athcodec.exporters.scene_objects import NOT_WRITTEN, lost_arrays
 from athcodec.files.atomic import new_file
 
 MOST_JOINTS = 65536
@@ -77,7 +77,9 @@ def _write(
     motion: Any, path: str | PathLike[str], options: WriteOptions, report: Callable[[float], None]
 ) -> dict[str, Any]:
     meshes, left_out = meshes_of(motion, Path(fspath(path)).stem)
-    found = with_copies(motion, meshes) if options.instances and options.rig is None else list(meshes)
+    found, lost_copies = list(meshes), {}
+    if options.instances and options.rig is None:
+        found, lost_copies = with_copies(motion, meshes)
     write = _writer(motion, options, found, lambda done: report(0.95 * done))
     facts = {
         "animation": write.name if options.rig is None else "a rig",
@@ -101,7 +103,8 @@ def _write(
     facts |= {"max_error": write.max_error, "vertices": motion.vertex_count}
     with new_file(path) as out:
         glb.write(out, later)
-    return facts | lost_arrays(motion, set(motion.attributes) - set(left_out))
+    lost = lost_arrays(motion, set(motion.attributes) - set(left_out)).get(NOT_WRITTEN, {}) | lost_copies
+    return facts | ({NOT_WRITTEN: lost} if lost else {})
 
 
 def _writer(

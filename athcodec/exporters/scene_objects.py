@@ -37,6 +37,7 @@ class SceneObject:
     corner_rows: slice
     details: dict[str, str]
     copies: int = 1  # its vertices and faces are so many copies of one shape
+    stated_copies: int = 1  # as many as the clip says, though a format may not have them as instances
     target: Any = None  # The writer's own object for it.
     instancer: Any = None  # and of its copies
     width: float = 0.0  # the largest, of curves and points
@@ -67,15 +68,24 @@ def objects_of(motion: Any) -> list[SceneObject]:
     is_one_clip = len(getattr(motion, "clip_ranges", ())) < 2
     presence = presence_of_parts(motion.metadata, names, copy_counts, motion.frame_count) if is_one_clip else {}
     for number, (obj, copies) in enumerate(zip(objects, copy_counts)):
-        obj.shown = presence.get(number)
+        obj.shown, obj.stated_copies = presence.get(number), copies
         obj.copies = copies if 1 < copies <= obj.count and _repeats(obj, copies) else 1
     return objects
 
 
-def hidden_copies(objects: list[SceneObject]) -> dict[str, Any]:
-    """Return the sentence about objects whose copies are hidden one by one, but are not written as instances."""
+def hidden_copies(objects: list[SceneObject], instances: bool = False) -> dict[str, Any]:
+    """Return the sentence about objects whose copies are hidden one by one, but are not written as instances; and about
+    all that are not, where `instances` were asked for."""
     names = [obj.name for obj in objects if obj.copies == 1 and obj.shown is not None and obj.shown.shape[1] > 1]
-    return {NOT_WRITTEN: {"presence of copies, which instances keep": names}} if names else {}
+    lost = {"presence of copies, which instances keep": names} if names else {}
+    lost |= lost_copies(objects) if instances else {}
+    return {NOT_WRITTEN: lost} if lost else {}
+
+
+def lost_copies(objects: list[SceneObject]) -> dict[str, list[str]]:
+    """Return the names of objects whose copies are written as one mesh, in place of instances."""
+    names = [f"{obj.name} ({obj.stated_copies} in one mesh)" for obj in objects if obj.copies == 1 < obj.stated_copies]
+    return {"copies as instances (mirrored, sheared, bent or of different materials)": names} if names else {}
 
 
 def lost_arrays(motion: Any, kept: Collection[str]) -> dict[str, dict[str, list[str]]]:

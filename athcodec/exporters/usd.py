@@ -160,7 +160,7 @@ def _write(motion: Any, name: str, options: WriteOptions, report: Callable[[floa
         return _write_rigged(stage, motion, joints, objects, codes, report) | hidden_copies(objects)
     _write_places(stage, [(objects[number], copies) for number, copies in instanced.items()], codes)
     _write_frames(stage, motion, objects, codes, report)
-    return cost_of(instanced) | hidden_copies(objects)
+    return cost_of(instanced) | hidden_copies(objects, options.instances)
 
 
 def _time_codes(motion: Any) -> np.ndarray:
