@@ -69,18 +69,29 @@ def test_meshes_below_moving_transforms_are_read_in_world_space(tmp_path):
         assert np.allclose(clip.time, np.arange(10) / FPS, rtol=0, atol=1e-12)
 
 
-def test_subdivision_surfaces_are_read_as_their_cage(tmp_path):
+def test_subdivision_surfaces_are_read_as_their_cage_and_what_shapes_them_is_named(tmp_path):
     archive = Abc.OArchive(str(tmp_path / "a.abc"))
     sampling = Abc.Argument(archive.addTimeSampling(AbcCoreAbstract.TimeSampling(1 / 24, 0)))
     surface = AbcGeom.OSubD(archive.getTop(), "grid", sampling)
     counts = filled(imath.IntArray, np.full(len(QUADS), 4))
     corners = filled(imath.IntArray, QUADS[:, ::-1].reshape(-1))
+    crease = [filled(imath.IntArray, [0, 1]), filled(imath.IntArray, [2]), filled(imath.FloatArray, [3])]
     for i in range(4):
-        surface.getSchema().set(AbcGeom.OSubDSchemaSample(filled(imath.V3fArray, sway(i)), corners, counts))
+        points = filled(imath.V3fArray, sway(i))
+        sample = AbcGeom.OSubDSchemaSample(points, corners, counts, *crease)
+        sample.setInterpolateBoundary(1)
+        sample.setVelocities(points)
+        surface.getSchema().set(sample)
+    Abc.OFloatProperty(surface.getSchema().getUserProperties(), "height").setValue(3.5)
     del archive, surface
     gc.collect()
-    with athcodec.read(tmp_path / "a.abc") as clip:
+    with pytest.warns(SourceWarning, match="not read: subdivision /grid.creaseIndices, /grid.interpolateBoundary$"):
+        clip = athcodec.read(tmp_path / "a.abc")
+    with clip:
         assert np.array_equal(clip.block(0, 4), [sway(i) for i in range(4)]) and np.array_equal(clip.faces, QUADS)
+        assert clip.metadata["part_usd"] == [{"subdivisionScheme": "catmullClark"}]
+        assert clip.not_read["subdivision"] == ["/grid.creaseIndices", "/grid.interpolateBoundary"]
+        assert clip.not_read["attribute"] == ["/grid.velocities", "/grid.userProperties"]
 
 
 def test_instances_are_read_as_copies_and_what_is_not_read_is_named(tmp_path):

@@ -35,6 +35,7 @@ def stage_of(path, last=6, first=1):
 
 def add_mesh(stage, place, points=LEAF, faces=((0, 1, 2),)):
     mesh = UsdGeom.Mesh.Define(stage, place)
+    mesh.CreateSubdivisionSchemeAttr("none")
     mesh.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(points))
     mesh.CreateFaceVertexCountsAttr([len(face) for face in faces])
     mesh.CreateFaceVertexIndicesAttr(np.concatenate(faces).tolist())

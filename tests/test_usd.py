@@ -11,7 +11,7 @@ from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade, UsdSkel, UsdValidation, Vt
 
 import athcodec
 from athcodec import cli
-from athcodec.errors import ClipError, SourceWarning
+from athcodec.errors import ClipError, GuessWarning, SourceWarning
 from athcodec.motion.clip import MotionClip
 
 pytestmark = pytest.mark.formats
@@ -42,6 +42,7 @@ def new_stage(path, first=101, last=110, fps=FPS):
 
 def add_grid(stage, place="/root/grid", frames=range(101, 111), points=sway):
     mesh = UsdGeom.Mesh.Define(stage, place)
+    mesh.CreateSubdivisionSchemeAttr("none")
     mesh.CreateFaceVertexCountsAttr([4] * len(QUADS))
     mesh.CreateFaceVertexIndicesAttr(QUADS.reshape(-1).tolist())
     for frame in frames:
@@ -102,6 +103,11 @@ def test_frames_are_the_samples_where_the_stage_has_no_range_or_at_the_rate_of_f
     clip, positions = read_all(tmp_path / "a.usda", fps=48.0)
     assert np.allclose(clip.time, np.arange(8) / 48) and clip.metadata["fps"] == 48
     assert np.allclose(positions[1], (sway(2) + sway(3)) / 2, atol=1e-6)
+    stage.SetStartTimeCode(2)
+    stage.SetEndTimeCode(6)
+    stage.Save()
+    with pytest.warns(GuessWarning, match="a.usda: 1 of 3 key times lie between frames at 24 per second"):
+        assert read_all(tmp_path / "a.usda")[0].frame_count == 5
 
 
 def test_units_without_a_symbol_are_kept_in_metres_and_missing_ones_stay_missing(tmp_path):
@@ -140,6 +146,7 @@ def whole_plant(path):
     api.CreatePrimvar("branch_id", Sdf.ValueTypeNames.IntArray, "vertex").Set([0] * 6 + [1] * 6)
     api.CreatePrimvar("age", Sdf.ValueTypeNames.FloatArray, "uniform").Set([1, 2, 3, 4, 5, 6])
     leaf = UsdGeom.Mesh.Define(stage, "/root/leaf")
+    leaf.CreateSubdivisionSchemeAttr("none")
     leaf.CreateFaceVertexCountsAttr([3])
     leaf.CreateFaceVertexIndicesAttr([0, 2, 1])
     leaf.CreatePointsAttr(vec3([[0, 0, 1], [1, 0, 1], [0, 1, 1]]))
@@ -216,6 +223,7 @@ def add_leaves(stage, place="/root/leaves", count=5, frames=range(101, 111)):
     instancer.AddTranslateOp().Set(Gf.Vec3d(0, 0, 2))
     for name, size in (("small", 1), ("large", 2), ("thorn", 3)):
         mesh = UsdGeom.Mesh.Define(stage, f"{place}/prototypes/{name}/blade")
+        mesh.CreateSubdivisionSchemeAttr("none")
         mesh.CreatePointsAttr(vec3(LEAF))
         mesh.CreateFaceVertexCountsAttr([3, 3])
         mesh.CreateFaceVertexIndicesAttr([0, 1, 3, 1, 2, 3])
@@ -304,6 +312,17 @@ def test_copies_are_written_as_instances_again(tmp_path, capsys):
         assert again.attributes["part_copies"].tolist() == [1, 20, 20] and off <= 1.01 * decoder.file.max_error_bound
 
 
+def test_copies_that_are_written_as_one_mesh_although_instances_were_asked_for_are_named(tmp_path):
+    stage = new_stage(tmp_path / "a.usda")
+    instancer, _ = add_leaves(stage)
+    instancer.CreateScalesAttr([(-1, 1, 1), (1, 1, 1), (1, 1, 1), (1, 1, 1), (1, 1, 1)])
+    stage.Save()
+    for name in ("b.usda", "b.abc", "b.glb"):
+        with athcodec.read(tmp_path / "a.usda") as clip:
+            [lost] = athcodec.write(clip, tmp_path / name, instances=True).facts["not_written"].items()
+        assert lost[0].startswith("copies as instances (mirrored") and "small/blade (3 in one mesh)" in lost[1][0], name
+
+
 def test_what_of_a_point_instancer_is_never_seen_is_not_read(tmp_path):
     stage = new_stage(tmp_path / "a.usda")
     instancer, _ = add_leaves(stage)
@@ -344,6 +363,42 @@ def test_what_is_not_read_is_named_once(tmp_path, capsys):
     assert line.endswith(
         f"Cube /root/box0, /root/box1; Material /root/bark {kept}; Camera /eye; attribute /root/grid.wet"
     )
+
+
+def test_the_scheme_of_a_surface_comes_back_and_what_else_is_authored_is_named(tmp_path, capsys):
+    stage = new_stage(tmp_path / "a.usda")
+    mesh = add_grid(stage)
+    mesh.CreateSubdivisionSchemeAttr("loop")
+    mesh.CreateHoleIndicesAttr([1])
+    mesh.CreateCornerIndicesAttr([])
+    mesh.CreateInterpolateBoundaryAttr("edgeAndCorner")  # as where nothing says it
+    mesh.CreateVelocitiesAttr(vec3(GRID))
+    mesh.GetPrim().SetCustomData({"author": "me"})
+    mesh.GetPrim().CreateAttribute("userProperties:height", Sdf.ValueTypeNames.Float).Set(3.5)
+    add_grid(stage, "/root/smooth").GetPrim().RemoveProperty("subdivisionScheme")
+    stage.Save()
+    with pytest.warns(SourceWarning, match="not read: subdivision /root/grid.holeIndices$"):
+        clip, _ = read_all(tmp_path / "a.usda")
+    named = [f"/root/grid.{name}" for name in ("userProperties", "velocities", "customData")]
+    assert clip.not_read == {"subdivision": ["/root/grid.holeIndices"], "attribute": named}
+    assert cli.main(["encode", str(tmp_path / "a.usda"), str(tmp_path / "a.ath")]) == 0
+    assert cli.main(["decode", str(tmp_path / "a.ath"), str(tmp_path / "b.usda")]) == 0
+    again = Usd.Stage.Open(str(tmp_path / "b.usda"))
+    meshes = map(UsdGeom.Mesh, again.GetDefaultPrim().GetChildren())
+    assert [each.GetSubdivisionSchemeAttr().Get() for each in meshes] == ["loop", "catmullClark"]
+    assert "not written" not in capsys.readouterr().err
+    assert cli.main(["decode", str(tmp_path / "a.ath"), str(tmp_path / "b.glb")]) == 0
+    assert "subdivisionScheme grid, smooth" in capsys.readouterr().err
+
+
+def test_a_primvar_without_usable_indices_is_named_and_does_not_refuse_the_stage(tmp_path):
+    stage = new_stage(tmp_path / "a.usda")
+    prim = add_grid(stage).GetPrim()
+    UsdGeom.PrimvarsAPI(prim).CreatePrimvar("hue", Sdf.ValueTypeNames.FloatArray, "vertex").Set([1.0])
+    prim.CreateAttribute("primvars:hue:indices", Sdf.ValueTypeNames.UIntArray).Set([0] * 12)
+    stage.Save()
+    clip, _ = read_all(tmp_path / "a.usda")
+    assert clip.not_read == {"attribute": ["/root/grid.hue"]}
 
 
 def test_arrays_that_change_in_a_single_frame_are_named_and_those_with_equal_samples_stay(tmp_path):
@@ -526,6 +581,10 @@ def test_usd_reads_our_file_with_samples_of_what_moves_only(tmp_path):
     assert [prim.GetName() for prim in prims] == ["grid", "leaf", "hair", "dust"]
     assert [prim.GetTypeName() for prim in prims] == ["Mesh", "Mesh", "BasisCurves", "Points"]
     assert UsdGeom.Mesh(prims[0]).GetSubdivisionSchemeAttr().Get() == "none"
+    arrays = [
+        {str(each.GetPrimvarName()) for each in UsdGeom.PrimvarsAPI(prim).GetAuthoredPrimvars()} for prim in prims
+    ]
+    assert arrays == [{"st", "branch_id", "age", "normals"}] * 2 + [{"branch_id", "normals"}] * 2
     for i, code in enumerate(range(101, 111)):
         points = np.concatenate([np.array(UsdGeom.PointBased(prim).GetPointsAttr().Get(code)) for prim in prims])
         assert np.array_equal(points, expected[i])

@@ -30,7 +30,7 @@ MOST_RIGGED = 65535
 RIGS = ("usd", "gltf")
 HAVE_TRANSFORMS = ("usd", "gltf", "alembic")  # They hold the place of a plant that is far from the origin.
 SINGLES = (*HAVE_TRANSFORMS, "pc2", "mdd")  # Formats whose points are float32.
-KEPT = ("presence", "doubleSided")
+KEPT = ("presence", "doubleSided", "subdivisionScheme")
 FILES = "files"  # in what write_clip returns: the names of the files where they are not the one that was asked for
 
 

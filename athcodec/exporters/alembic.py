@@ -72,7 +72,7 @@ def write_clip(
         if said != b"done":
             reason = said.decode("utf-8", "replace") or "Alembic's library has ended its process: is the disk full?"
             raise OSError(errno.EIO, f"cannot be written: {reason}", path)
-    return cost_of(instanced) | hidden_copies(objects)
+    return cost_of(instanced) | hidden_copies(objects, options.instances)
 
 
 def _send(process: subprocess.Popen, head: Any, motion: Any, report: Callable[[float], None]) -> bytes:

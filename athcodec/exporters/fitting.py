@@ -26,6 +26,7 @@ ROUNDS = 8
 CONVERGED = 1e-5
 SMALLEST_SCALE = 1e-4
 HELD = 1e-9  # how much, of a part's own extent, the rotation of the frame before counts
+FLOAT32_EXTENT = 1e-5  # Smallest extent, over the distance from the origin, that float32 holds well enough to scale.
 ROUGHLY = 8  # one frame in so many is looked at first
 WORK_BYTES = 32 << 20
 FINEST = 1e-5  # Smallest tolerance of a fit, over the clip's size.
@@ -66,7 +67,8 @@ class Parts:
         axes[:, :, 0] *= np.sign(np.linalg.det(axes))[:, None]
         local = np.einsum("nij,ni->nj", np.repeat(axes, count, axis=0), away)
         extent = np.maximum.reduceat(np.abs(local), starts)
-        return cls(order, first, count, middle, axes, np.maximum(spread, 0.0), extent)
+        spread = np.where(spread > (FLOAT32_EXTENT * np.abs(middle).max(axis=1, keepdims=True)) ** 2, spread, 0.0)
+        return cls(order, first, count, middle, axes, spread, extent)
 
     def vertex_part(self) -> np.ndarray:
         """(N,) the part of each vertex of the clip, 0 where none holds it."""

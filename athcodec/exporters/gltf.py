@@ -4,9 +4,9 @@
 clip), all side by side below one node. A joint has translation, rotation and three scales; a part that this leaves
 further off than the level itself is (of a clip: fitting.OF_CLIP of its size) is cut into shorter ones (fitting.py).
 "morphs": a morph target per frame, exact but for float32, and large. "auto": the smaller of both for a
-short clip, else joints. options.rig makes a hierarchy of joints for engines (rig.py), options.instances nodes of copies
-of one shape (gltf_copies.py). Some engines, three.js among them, move triangles only: lines and points stand still
-there.
+short clip, else joints, or morph targets where float32 puts joints further off and they are not too large.
+options.rig makes a hierarchy of joints for engines (rig.py), options.instances nodes of copies of one shape
+(gltf_copies.py). Some engines, three.js among them, move triangles only: lines and points stand still there.
 
 Each of several clips is an animation of its name over the same joints or targets, and moves all that any of them
 moves: players may go from one to the other. glTF knows no loops: theirs end with the first frame again, and have
@@ -47,7 +47,7 @@ from athcodec.exporters.gltf_build import (
 from athcodec.exporters.gltf_copies import PATHS, GltfCopies, Movers, unit_quaternion, with_copies
 from athcodec.exporters.gltf_joints import Joints, fit_joints
 from athcodec.exporters.rig import fit_rig
-from athcodec.exporters.scene_objects import lost_arrays
+from athcodec.exporters.scene_objects import NOT_WRITTEN, lost_arrays
 from athcodec.files.atomic import new_file
 
 MOST_JOINTS = 65536
@@ -77,7 +77,9 @@ def _write(
     motion: Any, path: str | PathLike[str], options: WriteOptions, report: Callable[[float], None]
 ) -> dict[str, Any]:
     meshes, left_out = meshes_of(motion, Path(fspath(path)).stem)
-    found = with_copies(motion, meshes) if options.instances and options.rig is None else list(meshes)
+    found, lost_copies = list(meshes), {}
+    if options.instances and options.rig is None:
+        found, lost_copies = with_copies(motion, meshes)
     write = _writer(motion, options, found, lambda done: report(0.95 * done))
     facts = {
         "animation": write.name if options.rig is None else "a rig",
@@ -101,7 +103,8 @@ def _write(
     facts |= {"max_error": write.max_error, "vertices": motion.vertex_count}
     with new_file(path) as out:
         glb.write(out, later)
-    return facts | lost_arrays(motion, set(motion.attributes) - set(left_out))
+    lost = lost_arrays(motion, set(motion.attributes) - set(left_out)).get(NOT_WRITTEN, {}) | lost_copies
+    return facts | ({NOT_WRITTEN: lost} if lost else {})
 
 
 def _writer(
@@ -149,21 +152,24 @@ def write_rest(motion: Any, path: str, name: str, more: Mapping[str, np.ndarray]
 
 def _smaller(motion: Any, vertex_count: int, joints: Joints | None) -> str:
     morphs = motion.frame_count * (12 * vertex_count + 4 * motion.frame_count + BYTES_PER_TARGET)
-    if joints is None:
+    fits = joints is not None and joints.max_error <= allowed_error(motion)
+    if joints is None or not fits and _morphs_fit(motion, vertex_count):
         return "morphs"
     is_short = motion.frame_count <= SHORT_FRAMES and morphs <= SHORT_BYTES
     size = len(joints.bind) * (BYTES_PER_JOINT_KEY * motion.frame_count + BYTES_PER_JOINT)
     return "morphs" if is_short and morphs < size else "joints"
 
 
+def _morphs_fit(motion: Any, vertex_count: int) -> bool:
+    return motion.frame_count <= MORPH_FRAMES and 12 * motion.frame_count * vertex_count <= MORPH_BYTES
+
+
 def check_morphs(motion: Any, vertex_count: int) -> None:
     """Raises ClipError where a motion of so many vertices is more than morph targets can sensibly hold."""
-    size = 12 * motion.frame_count * vertex_count
-    if motion.frame_count > MORPH_FRAMES or size > MORPH_BYTES:
+    if not _morphs_fit(motion, vertex_count):
         raise ClipError(
-            f"morph targets: got {motion.frame_count} frames of {vertex_count} vertices, "
-            f"{size} bytes; expected at most {MORPH_FRAMES} frames and {MORPH_BYTES} bytes: choose joints, "
-            "or fewer frames"
+            f"morph targets: got {motion.frame_count} frames of {vertex_count} vertices, expected at most "
+            f"{MORPH_FRAMES} frames and {MORPH_BYTES} bytes, 12 a vertex and frame: choose joints or fewer frames"
         )
 
 

@@ -19,7 +19,7 @@ from athcodec.exporters.copies import Copies, fit_copies
 from athcodec.exporters.fitting import allowed_error
 from athcodec.exporters.gltf_build import Glb, GltfMesh, add_mesh
 from athcodec.exporters.gltf_joints import SLACK, hold
-from athcodec.exporters.scene_objects import SceneObject, objects_of
+from athcodec.exporters.scene_objects import SceneObject, lost_copies, objects_of
 
 INSTANCING = "EXT_mesh_gpu_instancing"
 PATHS = ("translation", "rotation", "scale")
@@ -84,12 +84,13 @@ class GltfCopies:
             glb.json[key] = [INSTANCING]
 
 
-def with_copies(motion: Any, found: list[GltfMesh]) -> list[GltfMesh | GltfCopies]:
+def with_copies(motion: Any, found: list[GltfMesh]) -> tuple[list[GltfMesh | GltfCopies], dict[str, list[str]]]:
     """The meshes, those that are copies of one shape as such: where transforms keep them within what the level is off,
-    and they have one set of texture coordinates and colours. Attributes that copies lose all meshes lose."""
+    and they have one set of texture coordinates and colours. Attributes that copies lose all meshes lose. And the names
+    of objects whose copies stay one mesh."""
     runs, allowed = list(_runs(objects_of(motion))), allowed_error(motion)
     if sum(len(run) for run in runs) != len(found):
-        return list(found)
+        return list(found), {}
     together = [_together(run) for run in runs]
     fits = fit_copies(motion, together, allowed)
     shapes: list[GltfMesh | GltfCopies] = []
@@ -98,13 +99,13 @@ def with_copies(motion: Any, found: list[GltfMesh]) -> list[GltfMesh | GltfCopie
         own = [next(waiting) for _ in run]
         made = _as_copies(_joined(own), obj, fits[number]) if number in fits else None
         if made is None:
-            shapes += own
+            shapes, obj.copies = shapes + own, 1
             continue
         made.names = [shape.name for shape in own] if len(run) > 1 else None
         _hold(motion, made.copies, allowed)
         shapes.append(made)
     lost = {key for shape in shapes if isinstance(shape, GltfCopies) for key in shape.lost}
-    return [_without(shape, lost) for shape in shapes] if lost else shapes
+    return [_without(shape, lost) for shape in shapes] if lost else shapes, lost_copies(together)
 
 
 def _runs(objects: list[SceneObject]) -> Iterator[list[SceneObject]]:

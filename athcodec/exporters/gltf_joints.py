@@ -52,7 +52,8 @@ def fit_joints(
 ) -> Joints | None:
     """Joints that are at most about `allowed` off; None where that takes more than `most`. chosen (N,) bool: the
     vertices that they are to move, all by default."""
-    moving = fit(motion, Placed, allowed, most, lambda done: report(0.7 * done), chosen)
+    fitted = (1 - 4 * SLACK) * allowed  # `hold` takes up to 3 of these SLACKs, rounding some of the fourth.
+    moving = fit(motion, Placed, fitted, most, lambda done: report(0.7 * done), chosen)
     if moving is None:
         return None
     parts, poses = moving.parts, [moving.places, *moving.values]
@@ -88,7 +89,8 @@ def _measured(motion: Any, joints: Joints, chosen: np.ndarray | None, report: Ca
 def hold(poses: Sequence[np.ndarray], still: Sequence[np.ndarray], extent: np.ndarray, slack: float) -> None:
     """Makes constant, as in the first frame or better as at rest, what moves no vertex by `slack`: of translations,
     rotations and scales (T, K, width), those at rest (K, width), and how far vertices go along the axes (K, 3)."""
-    around = np.sqrt((extent**2).sum(axis=1, keepdims=True) - extent**2)  # from each axis
+    scaled = extent * np.abs(poses[2]).max(axis=0)
+    around = np.sqrt((scaled**2).sum(axis=1, keepdims=True) - scaled**2)  # from each axis
     moves = (
         lambda values, constant: values - constant,
         lambda values, constant: _turns(constant, values) * around,

@@ -14,7 +14,7 @@ import numpy as np
 
 from athcodec.motion.joining import OWN as CLIPS
 from athcodec.motion.presence import PRESENCE, presence_of_parts, stated_presence
-from athcodec.sources.scene_objects import FACE_MATERIAL, MATERIAL_NAMES, SCENE_KEYS, ArrayDescriptor
+from athcodec.sources.scene_objects import FACE_MATERIAL, MATERIAL_NAMES, SCENE_KEYS, SCHEME, ArrayDescriptor
 
 # kept by the formats themselves, or by their objects
 KNOWN_METADATA = ("fps", "start_frame", "part_names", "part_kinds", "part_usd", "domains", PRESENCE)
@@ -37,6 +37,7 @@ class SceneObject:
     corner_rows: slice
     details: dict[str, str]
     copies: int = 1  # its vertices and faces are so many copies of one shape
+    stated_copies: int = 1  # as many as the clip says, though a format may not have them as instances
     target: Any = None  # The writer's own object for it.
     instancer: Any = None  # and of its copies
     width: float = 0.0  # the largest, of curves and points
@@ -67,15 +68,24 @@ def objects_of(motion: Any) -> list[SceneObject]:
     is_one_clip = len(getattr(motion, "clip_ranges", ())) < 2
     presence = presence_of_parts(motion.metadata, names, copy_counts, motion.frame_count) if is_one_clip else {}
     for number, (obj, copies) in enumerate(zip(objects, copy_counts)):
-        obj.shown = presence.get(number)
+        obj.shown, obj.stated_copies = presence.get(number), copies
         obj.copies = copies if 1 < copies <= obj.count and _repeats(obj, copies) else 1
     return objects
 
 
-def hidden_copies(objects: list[SceneObject]) -> dict[str, Any]:
-    """Return the sentence about objects whose copies are hidden one by one, but are not written as instances."""
+def hidden_copies(objects: list[SceneObject], instances: bool = False) -> dict[str, Any]:
+    """Return the sentence about objects whose copies are hidden one by one, but are not written as instances; and about
+    all that are not, where `instances` were asked for."""
     names = [obj.name for obj in objects if obj.copies == 1 and obj.shown is not None and obj.shown.shape[1] > 1]
-    return {NOT_WRITTEN: {"presence of copies, which instances keep": names}} if names else {}
+    lost = {"presence of copies, which instances keep": names} if names else {}
+    lost |= lost_copies(objects) if instances else {}
+    return {NOT_WRITTEN: lost} if lost else {}
+
+
+def lost_copies(objects: list[SceneObject]) -> dict[str, list[str]]:
+    """Return the names of objects whose copies are written as one mesh, in place of instances."""
+    names = [f"{obj.name} ({obj.stated_copies} in one mesh)" for obj in objects if obj.copies == 1 < obj.stated_copies]
+    return {"copies as instances (mirrored, sheared, bent or of different materials)": names} if names else {}
 
 
 def lost_arrays(motion: Any, kept: Collection[str]) -> dict[str, dict[str, list[str]]]:
@@ -86,14 +96,15 @@ def lost_arrays(motion: Any, kept: Collection[str]) -> dict[str, dict[str, list[
 
 
 def not_written(motion: Any, kept: Sequence[str]) -> dict[str, list[str]]:
-    """The names of objects with presence, or with faces of two sides, that a format does not keep."""
+    """The names of objects with presence, faces of two sides, or subdivision, that a format does not keep."""
     metadata, is_one_clip = getattr(motion, "metadata", None) or {}, len(getattr(motion, "clip_ranges", ())) < 2
     clips = metadata.get(CLIPS) if not is_one_clip else None
     every = [metadata, *(clips.values() if isinstance(clips, dict) else ())]
     presence = dict.fromkeys(name for own in every if isinstance(own, dict) for name in stated_presence(own))
     names, details = metadata.get("part_names"), metadata.get("part_usd")
-    pairs = zip(names, details) if isinstance(names, list) and isinstance(details, list) else ()
+    pairs = list(zip(names, details)) if isinstance(names, list) and isinstance(details, list) else []
     lost = {"doubleSided": [name for name, detail in pairs if is_double_sided(detail)]}
+    lost[SCHEME] = [name for name, detail in pairs if isinstance(detail, dict) and SCHEME in detail]
     lost = {kind: names for kind, names in lost.items() if names and kind not in kept}
     return lost if not presence or is_one_clip and "presence" in kept else lost | {"presence": list(presence)}
 

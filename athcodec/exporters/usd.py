@@ -45,7 +45,7 @@ from athcodec.exporters.timing import distinct_frame_numbers, frame_rate_of
 from athcodec.exporters.usd_rig import write_rig
 from athcodec.files.atomic import new_files
 from athcodec.motion.units import METRES, unit_symbol
-from athcodec.sources.scene_objects import FACE_MATERIAL, OWN
+from athcodec.sources.scene_objects import FACE_MATERIAL, OWN, SCHEME
 
 SAVE_BYTES = 16 << 20
 PRIMVARS = {"uv": "st", "colors": "displayColor"}
@@ -160,7 +160,7 @@ def _write(motion: Any, name: str, options: WriteOptions, report: Callable[[floa
         return _write_rigged(stage, motion, joints, objects, codes, report) | hidden_copies(objects)
     _write_places(stage, [(objects[number], copies) for number, copies in instanced.items()], codes)
     _write_frames(stage, motion, objects, codes, report)
-    return cost_of(instanced) | hidden_copies(objects)
+    return cost_of(instanced) | hidden_copies(objects, options.instances)
 
 
 def _time_codes(motion: Any) -> np.ndarray:
@@ -265,7 +265,7 @@ def _identifier(name: str) -> str:
 def _define(stage: Usd.Stage, place: str, obj: SceneObject) -> UsdGeom.PointBased:
     if obj.kind == "mesh":
         schema = mesh = UsdGeom.Mesh.Define(stage, place)
-        mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
+        mesh.CreateSubdivisionSchemeAttr(obj.details.get(SCHEME, UsdGeom.Tokens.none))
         mesh.CreateFaceVertexCountsAttr(_int_array(obj.faces[0]))
         mesh.CreateFaceVertexIndicesAttr(_int_array(obj.faces[1]))
         if is_double_sided(obj.details):
@@ -391,6 +391,8 @@ def _write_array(name: str, values: np.ndarray, domain: str, objects: list[Scene
     if any(found is None for found in placed):
         return False
     for target, rows in placed:
+        if not len(rows):  # An object that has no faces or corners has no values for them.
+            continue
         primvar = UsdGeom.PrimvarsAPI(target).CreatePrimvar(
             PRIMVARS.get(name, _identifier(name)), type_name, INTERPOLATION[domain], element_size
         )
@@ -417,11 +419,15 @@ def _placed_rows(rows: np.ndarray, domain: str, obj: SceneObject) -> tuple[Any, 
 
 
 def _write_radius(values: np.ndarray, domain: str, objects: list[SceneObject]) -> bool:
-    """As widths of curves and points; of meshes as a primvar."""
+    """As widths of curves and points; of meshes as a primvar, but for the zeros that a reader gives to meshes without
+    one beside such."""
+    beside = domain == "vertex" and any(obj.kind != "mesh" for obj in objects)
     placed = [_placed_rows(rows_of(values, domain, obj), domain, obj) for obj in objects]
     if any(found is None or found[0] is not obj.target for found, obj in zip(placed, objects)):
         return False
     for obj, (_, rows) in zip(objects, placed):
+        if obj.kind == "mesh" and beside and not rows.any():
+            continue
         if obj.kind == "mesh":
             primvar = UsdGeom.PrimvarsAPI(obj.target).CreatePrimvar(
                 "radius", Sdf.ValueTypeNames.FloatArray, INTERPOLATION[domain]

@@ -134,7 +134,7 @@ class Format:
     holds_several : bool, optional
         Whether a file can be written with several clips of one plant.
     keeps : tuple of str, optional
-        What its files can say of objects besides: "presence", "doubleSided".
+        What its files can say of objects besides: "presence", "doubleSided", "subdivisionScheme".
     """
 
     name: str

@@ -6,7 +6,7 @@ everywhere else here. An Alembic file names no unit and no axis; Y is up by cust
 alone. The names of face sets become those of materials: attribute "face_material", metadata "material_names". What has
 instances, and a shape that stays as it is, becomes one object, of as many copies. Visibility becomes presence, and its
 samples count as frames; an object that says it is visible is shown below a hidden one. Objects that are never shown,
-NURBS patches, materials and others are named in the clip's `not_read`; velocities are not read. It is imported by the
+NURBS patches, materials, velocities, creases and others are named in the clip's `not_read`. It is imported by the
 process of reader_main.py alone.
 """
 
@@ -29,6 +29,8 @@ from athcodec.sources import ReadOptions
 from athcodec.sources.scene_objects import (
     DESCRIPTOR,
     OWN,
+    SCHEME,
+    SURFACE,
     ArrayDescriptor,
     SceneObject,
     clip_of_objects,
@@ -54,6 +56,7 @@ SCOPES = {
     AbcGeom.GeometryScope.kConstantScope: "constant",
 }
 NAMED_PARAMS = (("uv", "getUVsParam"), ("normals", "getNormalsParam"), ("radius", "getWidthsParam"))
+UNREAD = (*SURFACE, "faceVaryingInterpolateBoundary", "velocities", "knots", "orders", "positionWeights")
 PARAMS = tuple(
     getattr(AbcGeom, f"I{name}GeomParam")
     for name in (
@@ -208,6 +211,7 @@ def _clip(archive: Any, options: ReadOptions) -> MotionClip:
         obj.shown = np.stack([place.shown(times) for place in obj.places], axis=1)
         _topology(obj)
         _statics(obj, times[0])
+        _name_unread(obj)
         if len(obj.places) > 1:
             obj.statics.pop("normals", None)  # they turn with each copy
             obj.repeat(len(obj.places))
@@ -357,6 +361,20 @@ def _topology(obj: _Object) -> None:
     obj.check()
     if obj.kind == "mesh":
         _bind_materials(obj)
+    if hasattr(obj.schema, "getSubdivisionSchemeProperty"):
+        scheme = obj.schema.getSubdivisionSchemeProperty()
+        obj.details[SCHEME] = scheme.getValue().replace("-c", "C") if scheme.valid() else "catmullClark"
+
+
+def _name_unread(obj: _Object) -> None:
+    """Names the properties of an object that hold something and are not read."""
+    for name in UNREAD:
+        found = getattr(obj.schema, f"get{name[0].upper()}{name[1:]}Property", Abc.IInt32Property)()
+        if found.valid() and found.getNumSamples():
+            values = np.array(found.getValue())
+            obj.left_out += [name] * bool(values.size if values.ndim else values)
+    further = obj.schema.getUserProperties()
+    obj.left_out += ["userProperties"] * bool(further.valid() and further.getNumProperties())
 
 
 def _bind_materials(obj: _Object) -> None:

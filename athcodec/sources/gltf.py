@@ -33,8 +33,9 @@ from athcodec.motion.frames import Frames, is_far
 from athcodec.motion.joining import join
 from athcodec.motion.quaternions import rotation_matrices
 from athcodec.sources import ReadOptions
-from athcodec.sources.gltf_scene import Scene, key_rate, on_grid
+from athcodec.sources.gltf_scene import Scene, key_rate, off_grid, on_grid
 from athcodec.sources.scene_objects import FACE_MATERIAL, FLIPPED, MATERIAL_NAMES, TWO_SIDES, Facing, presence_metadata
+from athcodec.sources.timing import warn_of_missed
 
 WORK_BYTES = 64 << 20
 MOST_VERTICES = 1 << 27
@@ -685,7 +686,10 @@ def _sampling(motion: _Motion, wanted: float | None) -> Sampling:
     if not len(keys):
         return Sampling(DEFAULT_FPS, np.zeros(1), {})
     said = _said(scene)
-    fps = wanted or _said_rate(said, keys) or key_rate(keys) or DEFAULT_FPS
+    fps = wanted or _said_rate(said, keys) or key_rate(keys)
+    if fps is None:
+        fps = DEFAULT_FPS
+        warn_of_missed(keys, off_grid(keys, fps), fps, scene.file.path)
     count = float(keys[-1] - keys[0]) * fps
     if not count < MOST_FRAMES:
         raise ClipError(f"animations: got {count:.0f} frames, expected at most {MOST_FRAMES}; sample at a lower rate")

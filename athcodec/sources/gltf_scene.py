@@ -310,10 +310,16 @@ def key_rate(keys: np.ndarray) -> float | None:
 
 
 def on_grid(keys: np.ndarray, rate: float) -> bool:
-    """Whether all keys, rounded to float32 as they are, lie on frames of a rate, from the first key on."""
+    """Whether all keys lie on frames of a rate, from the first key on."""
+    return not off_grid(keys, rate).any()
+
+
+def off_grid(keys: np.ndarray, rate: float) -> np.ndarray:
+    """(K,) whether keys, rounded to float32 as they are, lie between frames of a rate, from the first key on."""
     places = (keys - keys[0]) * rate
     blur = 0.01 + float(np.abs(keys).max()) * 4e-7 * rate
-    return blur < 0.3 and bool(np.abs(places - np.round(places)).max() <= blur)
+    off: np.ndarray = (np.abs(places - np.round(places)) > blur) | (blur >= 0.3)
+    return off
 
 
 def _exact(rate: float, keys: np.ndarray) -> float:

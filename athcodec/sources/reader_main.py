@@ -14,6 +14,7 @@ import json
 import os
 import re
 import sys
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -21,7 +22,7 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
-from athcodec.errors import ClipError
+from athcodec.errors import ClipError, GuessWarning
 from athcodec.files.reading import no_room
 from athcodec.motion.clip import MotionClip
 from athcodec.sources import ReadOptions
@@ -45,8 +46,9 @@ def main() -> None:
         path, limit = wanted.pop("path"), wanted["max_memory"]
         limit_memory(limit)
         with _answering(answers, limit):
-            clip = module.open_clip(path, ReadOptions(**wanted))
-            _send(answers, _described(clip))
+            with warnings.catch_warnings(record=True, action="always", category=GuessWarning) as guesses:
+                clip = module.open_clip(path, ReadOptions(**wanted))
+            _send(answers, _described(clip, [str(guess.message) for guess in guesses]))
         for line in asked:
             start, stop = map(int, line.split())
             with _answering(answers, limit):
@@ -85,8 +87,8 @@ def _send(answers: BinaryIO, data: bytes) -> None:
     answers.flush()
 
 
-def _described(clip: MotionClip) -> bytes:
-    """All but the positions, as an .npz."""
+def _described(clip: MotionClip, guesses: list[str]) -> bytes:
+    """All but the positions, with the texts of warnings, as an .npz."""
     arrays = {f"attributes/{name}": values for name, values in clip.attributes.items()}
     arrays |= {name: getattr(clip, name) for name in ("time", *ARRAYS) if getattr(clip, name) is not None}
     arrays["rest"] = clip.source_rest
@@ -97,6 +99,7 @@ def _described(clip: MotionClip) -> bytes:
         "metadata": clip.metadata,
         "not_read": {kind: list(names) for kind, names in clip.not_read.items()},
         "files": clip.unchanged.stamps,
+        "guesses": guesses,
     }
     if clip.skin is not None:
         arrays |= {"joint_parent": clip.skin.joint_parent, "vertex_joint": clip.skin.vertex_joint}

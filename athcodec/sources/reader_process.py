@@ -12,13 +12,14 @@ import os
 import subprocess
 import sys
 import threading
+import warnings
 import weakref
 from os import PathLike, fspath
 from typing import Any
 
 import numpy as np
 
-from athcodec.errors import ClipError
+from athcodec.errors import ClipError, GuessWarning
 from athcodec.files.plain import open_plain
 from athcodec.files.reading import FileWatch, closing_on_failure, naming
 from athcodec.motion.clip import MotionClip, Skin
@@ -39,6 +40,8 @@ def read_apart(path: str | PathLike[str], options: ReadOptions, module: str, cra
         arrays = {name: found[name] for name in found.files}
         attributes = {name.split("/", 1)[1]: values for name, values in arrays.items() if "/" in name}
         said = json.loads(arrays["said"].tobytes())
+        for guess in said["guesses"]:
+            warnings.warn(guess, GuessWarning, stacklevel=2)
         shape, dtype = tuple(said["shape"]), np.dtype(said["dtype"])
 
         def frames(start: int, stop: int) -> np.ndarray:

@@ -30,6 +30,8 @@ CHANGING = (
     "with --only"
 )
 TWO_SIDES = {"doubleSided": True}  # glTF's material of faces that are seen from both sides and have no other
+SCHEME = "subdivisionScheme"  # in the details of a mesh, as USD has it; without it the faces are the surface
+SURFACE = ("holes", "holeIndices", "creaseIndices", "cornerIndices", "interpolateBoundary")  # They shape that surface.
 OWN = "athcodec"  # the namespace of what our writers add to files of other formats
 SCENE_KEYS = {"unit": str, "up_axis": str, "fps": float}  # Members of the metadata that some formats have no place for.
 KNOWN_METADATA = ("fps", "start_frame", "meters_per_unit", "part_names", "part_kinds", "part_usd", "domains", PRESENCE)
@@ -230,7 +232,9 @@ def clip_of_objects(
     polygons = _faces(objects, attributes)
     metadata = metadata | _names_and_kinds(objects)
     left_out = [f"{obj.path}.{name}" for obj in objects for name in obj.left_out if name not in options.skip]
-    not_read = more.pop("not_read", {}) | ({"attribute": left_out} if left_out else {})
+    shaping = [name for name in left_out if name.rpartition(".")[2] in SURFACE]
+    kinds = {"subdivision": shaping, "attribute": [name for name in left_out if name not in shaping]}
+    not_read = more.pop("not_read", {}) | {kind: names for kind, names in kinds.items() if names}
     if flipped := [obj.path for obj in objects if obj.is_flipped]:
         not_read[FLIPPED] = flipped
     return MotionClip(

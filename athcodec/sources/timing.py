@@ -5,13 +5,16 @@ Where a file has no rate and none is given, frames come DEFAULT_FPS a second, an
 
 from __future__ import annotations
 
+import warnings
 from typing import Any
 
 import numpy as np
 
+from athcodec.errors import GuessWarning
 from athcodec.motion.clip import DEFAULT_FPS
 
 DROP_FRAME = 1000 / 1001
+SAME_TIME = 1e-5  # Largest difference of equal times, in seconds.
 
 
 def numbered_times(numbers: np.ndarray, fps: float | None) -> tuple[np.ndarray, dict[str, Any]]:
@@ -43,6 +46,18 @@ def times_in_seconds(stored: np.ndarray, fps: float | None) -> tuple[np.ndarray,
             return (numbers - numbers[0]) / rate, {"fps": float(rate)} | _start(numbers[0])
     metadata = {} if fps is None else {"fps": float(fps)} | _start(round(float(times[0] * fps), 3))
     return times - times[0], metadata
+
+
+def warn_of_missed(keys: np.ndarray, missed: np.ndarray, fps: float, name: str) -> None:
+    """A GuessWarning where keys of a file, at ascending seconds (K,), are missed by the frames."""
+    if missed.any():
+        step = max(np.diff(keys).min(initial=0.25 / fps), SAME_TIME)
+        warnings.warn(
+            f"{name}: {missed.sum()} of {len(keys)} key times lie between frames at {fps:g} per second, and what moves "
+            f"there alone is missed; --fps {1 / step:.4g} has frames closer to them",
+            GuessWarning,
+            stacklevel=2,
+        )
 
 
 def whole(number: float) -> int | float:

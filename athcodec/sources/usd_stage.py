@@ -10,7 +10,7 @@ attribute "face_material" says the number for each face.
 
 Points are float32 in USD and so they are here, unless a transform places them far from the origin. The stage is opened
 as it is composed (layers, payloads, value clips); what else it holds, such as layers that cannot be found, patches,
-tetrahedra, what is in materials, is named in the clip's `not_read`; velocities are not read. A stage is opened by its
+tetrahedra, what is in materials, velocities, creases, is named in the clip's `not_read`. A stage is opened by its
 structure; positions are read frame by frame. USD trusts the lengths of arrays in a binary file even where it is
 damaged: it is imported by the process of reader_main.py alone, under a limit of memory.
 """
@@ -39,6 +39,7 @@ from athcodec.sources import ReadOptions
 from athcodec.sources.crate import check_crates
 from athcodec.sources.scene_objects import (
     OWN,
+    SCHEME,
     ArrayDescriptor,
     SceneObject,
     Static,
@@ -48,6 +49,7 @@ from athcodec.sources.scene_objects import (
     rows_by_id,
     transformed,
 )
+from athcodec.sources.timing import warn_of_missed
 
 MAX_FRAMES = 1 << 24
 READ = frozenset(
@@ -56,6 +58,11 @@ READ = frozenset(
 WHOLE = ("Material",)  # prims that are named without those below them
 KNOWN = ("Material", "Camera", "GeomSubset")
 PLACES = ("positions", "orientations", "orientationsf", "scales", "protoIndices", "ids", "invisibleIds")
+OBJECT_PROPERTIES = frozenset(  # Attributes of objects, or their namespaces, that are read or named one by one.
+    (*PLACES, "points", "extent", "normals", "widths", "orientation", "doubleSided", SCHEME, "faceVertexCounts")
+    + ("faceVertexIndices", "curveVertexCounts", "type", "basis", "wrap", "visibility", "purpose", "xformOpOrder")
+    + ("primvars", "xformOp", "material", "skel", "subsetFamily")
+)
 PURPOSES = (UsdGeom.Tokens.default_, UsdGeom.Tokens.render)
 NAMES = {"st": "uv", "displayColor": "colors"}
 DOMAINS = {"vertex": "vertex", "varying": "vertex", "faceVarying": "corner", "uniform": "face", "constant": "constant"}
@@ -228,6 +235,19 @@ def _object(prim: Usd.Prim, only: Sequence[str], not_read: dict[str, list[str]])
     return None
 
 
+def _unread(prim: Usd.Prim) -> list[str]:
+    """The names of attributes, or their namespaces, and metadata that are authored on an object, differ from their
+    fallback and are not read."""
+    found = {}
+    for attribute in prim.GetAuthoredAttributes():
+        name, value = attribute.GetName(), attribute.Get(Usd.TimeCode.EarliestTime())
+        is_empty = value is None or _is_array(value) and not len(value)
+        if not is_empty and value != prim.GetPrimDefinition().GetAttributeFallbackValue(name):
+            found[name.partition(":")[0]] = None
+    metadata = [key for key in ("customData", "assetInfo") if prim.HasAuthoredMetadata(key)]
+    return [name for name in found if name not in OBJECT_PROPERTIES] + metadata
+
+
 def _is_material_subset(prim: Usd.Prim) -> bool:
     return prim.IsA(UsdGeom.Subset) and UsdGeom.Subset(prim).GetFamilyNameAttr().Get() == UsdShade.Tokens.materialBind
 
@@ -390,8 +410,9 @@ class _Instances:
 
     def add_arrays(self, obj: _Prim, codes: np.ndarray) -> None:
         """Adds the static arrays that the instancer has for each of its copies."""
+        obj.left_out += _unread(self.instancer.GetPrim())
         for primvar in UsdGeom.PrimvarsAPI(self.instancer).GetPrimvarsWithValues():
-            name, values = str(primvar.GetPrimvarName()), _numbers(primvar.ComputeFlattened(codes[0]))
+            name, values = str(primvar.GetPrimvarName()), _numbers(_flattened(primvar, codes[0]))
             changes = _changes(primvar, codes) or self.all.follows_ids
             if values is None or changes or len(values) <= self.rows.max(initial=-1):
                 obj.left_out.append(name)
@@ -535,6 +556,7 @@ def _topology(obj: _Prim, codes: np.ndarray) -> None:
         obj.face_indices = _fixed(obj, mesh.GetFaceVertexIndicesAttr(), codes)
         if mesh.GetDoubleSidedAttr().Get():
             obj.details["doubleSided"] = "true"
+        _note(obj, SCHEME, mesh.GetSubdivisionSchemeAttr(), "none")
         _bind_materials(obj)
     elif obj.kind == "curves":
         obj.curve_counts = _fixed(obj, UsdGeom.Curves(obj.prim).GetCurveVertexCountsAttr(), codes)
@@ -609,6 +631,10 @@ def _time_codes(stage: Usd.Stage, objects: list[_Prim], fps: float | None, irreg
         start, end = (samples[0], samples[-1]) if samples else (0.0, 0.0)
     if not (math.isfinite(start) and math.isfinite(end)):
         raise ClipError(f"time codes: got {start} to {end}, expected finite numbers")
+    elif not fps:
+        times = np.array([time for time in _sampled(objects) if start <= time <= end])
+        missed = np.abs(times - start - np.round(times - start)) > 1e-3
+        warn_of_missed(times / own, missed, own, stage.GetRootLayer().realPath)
     step = own / fps if fps else 1.0
     count = math.floor((end - start) / step + 1e-6) + 1
     if count > MAX_FRAMES:
@@ -658,7 +684,7 @@ def _statics(obj: _Prim, codes: np.ndarray, matrix: np.ndarray) -> None:
         if primvar.HasValue() and _changes(primvar, codes):
             obj.left_out.append(primvar.GetPrimvarName())
         elif primvar.HasValue():
-            values = primvar.ComputeFlattened(codes[0])
+            values = _flattened(primvar, codes[0])
             name = _said(primvar.GetAttr(), "name") or primvar.GetPrimvarName()
             _keep(
                 obj,
@@ -677,6 +703,7 @@ def _statics(obj: _Prim, codes: np.ndarray, matrix: np.ndarray) -> None:
     if obj.ids is not None:  # Arrays that keep their order do not follow the points.
         obj.left_out += [name for name, static in obj.statics.items() if static.domain == "vertex"]
         obj.statics = {name: static for name, static in obj.statics.items() if static.domain != "vertex"}
+    obj.left_out += _unread(obj.prim)
     rest = obj.statics.get("rest")
     if rest is not None and rest.values.shape[1:] == (3,) and rest.values.dtype.kind == "f":
         placed = transformed(rest.values, matrix)
@@ -714,11 +741,22 @@ def _keep_unless_it_changes(
         _keep(obj, name, attribute.Get(codes[0]), interpolation)
 
 
+def _flattened(primvar: UsdGeom.Primvar, code: float) -> Any:
+    """The values of a primvar at a time, without its indices; None where USD finds it faulty."""
+    try:
+        return primvar.ComputeFlattened(code)
+    except Tf.ErrorException:
+        return None
+
+
 def _changes(source: Usd.Attribute | UsdGeom.Primvar, codes: np.ndarray) -> bool:
     """Whether an array has other values in any frame than in the first."""
     if not source.ValueMightBeTimeVarying():
         return False
-    read = source.ComputeFlattened if isinstance(source, UsdGeom.Primvar) else source.Get
+
+    def read(code: float) -> Any:
+        return _flattened(source, code) if isinstance(source, UsdGeom.Primvar) else source.Get(code)
+
     first = np.array(read(codes[0]))
     samples = source.GetTimeSamplesInInterval(_interval(codes))
     return any(not np.array_equal(np.array(read(code)), first) for code in (*samples, codes[-1]))

@@ -36,6 +36,7 @@ def run_links(frames: np.ndarray) -> np.ndarray | None:
 
     frames: (F, N, 3) positions in a few frames.
     """
+    frames = np.ldexp(frames, -np.frexp(np.abs(frames).max())[1])  # Squares of tiny or huge positions would be lost.
     count, steady = frames.shape[1], _Steady(frames)
     links, loose = np.zeros((0, 2), np.int64), np.arange(count)
     for turn in range(ROUNDS):

@@ -212,7 +212,7 @@ void DefineObject(const SdfPrimSpecHandle &root, const std::string &name, const 
         const auto corners = faces.corners.begin() + object->first_corner;
         std::vector<int> own(corners, corners + object->corner_count);
         for (int &vertex : own) vertex -= int(object->first);
-        Token(object->prim, "subdivisionScheme", "none");
+        Token(object->prim, "subdivisionScheme", Text(object->details, "subdivisionScheme").value_or("none"));
         Ints(object->prim, "faceVertexCounts", std::vector<int>(counts, counts + object->face_count));
         Ints(object->prim, "faceVertexIndices", own);
         if (Text(object->details, "doubleSided") == "true")
