@@ -387,7 +387,14 @@ def test_smoothness_of_clips_is_a_table(sample_positions, tmp_path):
     assert "tick ratio" in text
 
 
-def test_smoothness_of_a_file_has_a_table_for_each_level_of_each_clip(tmp_path):
-    text, result = run_bench(tmp_path, "smoothness", str(athcodec.sample_path("fern")))
+def test_a_sheet_shows_level_1_of_all_loops_of_a_file_over_their_wraps(tmp_path):
+    pytest.importorskip("matplotlib")
+    fern, sheet = athcodec.sample_path("fern"), tmp_path / "a.png"
+    for name in ("calm", "gale"):
+        with athcodec.open(fern, clip=name) as decoder:
+            clip = athcodec.MotionClip(decoder.positions(level=1), decoder.time)
+        athcodec.write_hdf5(clip, tmp_path / f"fern.{name}.h5")
+    text, result = run_bench(tmp_path, "smoothness", str(fern), "--sheet", str(sheet), "--before", str(tmp_path))
+    assert sheet.read_bytes().startswith(b"\x89PNG")
     assert [row["level"] for rows in tables_of(result) for row in rows] == [0, 1, 2, 3, 4] * 2
     assert "fern gale" in text and all(row["over source"] <= 2 for rows in tables_of(result) for row in rows)
