@@ -14,7 +14,6 @@ from typing import Any
 
 import numpy as np
 
-from bench import plots
 from bench.clips import Encoded, add_clips, add_ladder, add_rel_error, encoded, measure
 from bench.curves import Curve
 from bench.tables import table
@@ -44,11 +43,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_clips(parser)
     add_rel_error(parser)
     add_ladder(parser, "decades")
-    parser.add_argument("--picture", type=Path, metavar="FILE.png", help="draw prefix/own over the error there")
 
 
 def run(args: argparse.Namespace) -> dict[str, Any]:
-    rows, at_errors, drawn, sizes = [], [], [], []
+    rows, at_errors, sizes = [], [], []
     for path in args.clips:
         own = _own_files(path, args.rel_error)
         found = {}
@@ -58,29 +56,17 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
             about = {"clip": path.stem, "ladder": name}
             rows += [about | row for row in prefixes]
             at_errors += [about | row for row in _at_errors(prefixes, own)]
-            drawn += [about | row for row in _ratios(prefixes, own)]
-        asked = [
-            row["ratio"]
-            for row in drawn
-            if about.items() <= row.items() and row["measure"] == "max" and ASKED[0] <= row["error"] <= ASKED[1]
-        ]
-        more = {"more %": 100 * (found["layers"] / found["none"] - 1), "worst /own": max(asked, default=None)}
+        worst = max(_ratios(prefixes, own["max"]), default=None)
+        more = {"more %": 100 * (found["layers"] / found["none"] - 1), "worst /own": worst}
         sizes.append({"clip": path.stem} | found | more)
-    result = {
+    return {
         "tables": [
             table(f"Prefixes of files of {args.rel_error:g}", rows, NOTE),
             table("At an error", at_errors, ERRORS_NOTE),
             table("Bytes of the whole files", sizes, SIZES_NOTE),
         ],
-        "chart": drawn,
         "broken": [],
     }
-    if args.picture:
-        try:
-            plots.draw_prefixes(drawn, args.picture)
-        except plots.NoPlots as error:
-            raise SystemExit(str(error)) from None
-    return result
 
 
 def _own_files(path: Path, rel_error: float) -> dict[str, Curve]:
@@ -127,14 +113,13 @@ def _at_errors(prefixes: list[dict[str, Any]], own: dict[str, Curve]) -> Iterato
             yield {"error": error} | row
 
 
-def _ratios(prefixes: list[dict[str, Any]], own: dict[str, Curve]) -> Iterator[dict[str, Any]]:
-    """The corners of what the picture shows: at the errors of both, and just below those of the prefixes."""
-    for kind, curve in own.items():
-        steps = {prefix[kind] for prefix in prefixes}
-        for error in sorted({*curve.errors.tolist(), *steps, *(JUST_BELOW * step for step in steps)}):
-            if found := _at(error, kind, prefixes, curve):
-                prefix, size = found
-                yield {"measure": kind, "error": error, "ratio": prefix["bytes"] / size, "step": error in steps}
+def _ratios(prefixes: list[dict[str, Any]], own: Curve) -> Iterator[float]:
+    """Prefix over own file at the errors of ASKED that both have, and just below those of the prefixes."""
+    steps = {prefix["max"] for prefix in prefixes}
+    for error in {*own.errors.tolist(), *steps, *(JUST_BELOW * step for step in steps)}:
+        if ASKED[0] <= error <= ASKED[1] and (found := _at(error, "max", prefixes, own)):
+            prefix, size = found
+            yield prefix["bytes"] / size
 
 
 def _at(error: float, kind: str, prefixes: list[dict[str, Any]], own: Curve) -> tuple[dict[str, Any], float] | None:

@@ -358,9 +358,7 @@ def test_fingerprints_of_code_ignore_comments_and_layout_alone(tmp_path):
 
 @pytest.mark.slow
 def test_prefixes_are_compared_with_files_of_their_own_at_levels_and_between_them(tmp_path, bushy_file):
-    pytest.importorskip("matplotlib")
-    picture = tmp_path / "ratios.png"
-    _, result = run_bench(tmp_path, "progressive", bushy_file, "--rel-error", "1e-3", "--picture", picture)
+    _, result = run_bench(tmp_path, "progressive", bushy_file, "--rel-error", "1e-3")
     prefixes, at_errors, _ = tables_of(result)
     errors = {(row["ladder"], row["level"]): row for row in prefixes}
     assert {row["error"] for row in at_errors} >= {1e-2, 3e-3, 1e-3}
@@ -374,8 +372,6 @@ def test_prefixes_are_compared_with_files_of_their_own_at_levels_and_between_the
             )
     [whole] = [row for row in at_errors if row["error"] == 1e-3 and row["ladder"] == "none"]
     assert whole["/own at max"] == pytest.approx(1, abs=0.02)
-    steps = [(row["measure"], row["error"]) for row in result["chart"] if row["step"] and row["ladder"] == "layers"]
-    assert len(steps) >= 4 and picture.stat().st_size > 10_000
 
 
 def test_smoothness_of_clips_is_a_table(sample_positions, tmp_path):
