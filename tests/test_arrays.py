@@ -171,7 +171,7 @@ def test_what_is_no_file_is_refused_by_its_type(bushy_ath):
 HEIGHT, TIME = np.arange(12) * 6.0, np.arange(20)[:, None] / 5
 BENT = np.round(np.sin(TIME) * HEIGHT**2 / 100)
 STEM = np.stack([BENT, BENT * 0 + HEIGHT, BENT * 0], axis=-1)  # Whole numbers between -60 and 66.
-BRANCHES = {"vertex_branch": np.zeros(12, int), "branch_parent": [-1]}
+BRANCHES = {"vertex_branch": [0] * 12, "branch_parent": [-1]}
 
 
 @pytest.mark.parametrize("dtype", "f2 f4 >f4 f8 g i1 u1 i2 u2 i4 u4 i8 u8".split())
@@ -192,9 +192,10 @@ def test_anything_that_slices_by_frames_gives_the_file_of_the_array(tmp_path):
     mapped[:] = STEM
     with h5py.File(tmp_path / "a.h5", "w") as file:
         stored, lazy = file.create_dataset("p", data=STEM, chunks=(7, 12, 3)), dask.array.from_array(STEM, (6, 12, 3))
-        for source in (mapped, stored, lazy, STEM.tolist(), list(STEM), np.ma.MaskedArray(STEM)):
+        laid_out = STEM.astype(">f8"), np.asfortranarray(STEM), np.asfortranarray(STEM.astype(">f8"))
+        for source in (mapped, stored, lazy, STEM.tolist(), list(STEM), np.ma.MaskedArray(STEM), *laid_out):
             assert athcodec.encode(source, **MAX, **said, **BRANCHES) == expected
-    clip = athcodec.MotionClip(STEM, np.arange(20) / 24, metadata={"unit": "cm", "up_axis": "y"}, **BRANCHES)
+    clip = athcodec.MotionClip(STEM, (np.arange(20) / 24).tolist(), metadata={"unit": "cm", "up_axis": "y"}, **BRANCHES)
     assert athcodec.encode(clip, **MAX) == expected
     athcodec.write(clip, tmp_path / "clip.h5")
     with athcodec.read(tmp_path / "clip.h5") as read:

@@ -117,29 +117,12 @@ def test_info_prints_the_papers_table_and_one_row_per_level(encoded, facts, caps
         assert re.search(r"^ *" + r" +".join(map(re.escape, map(str, cells))), out, re.MULTILINE)
 
 
-def test_a_file_is_not_larger_than_its_target_size(tmp_path, capsys):
-    assert run("encode", SAMPLE, tmp_path / "a.ath", "--target-size", "9kB", "--effort", "fast") == 0
-    assert 8_500 < (tmp_path / "a.ath").stat().st_size <= 9_000
-
-
 def test_without_attributes_only_the_unit_is_kept(tmp_path):
     how = "--attributes none --effort fast --rel-error 1e-2".split()
     assert run("encode", SAMPLE, tmp_path / "a.ath", *how) == 0
     with athcodec.open(tmp_path / "a.ath") as decoder:
         assert decoder.metadata == {"unit": "m", "up_axis": "y"}
         assert decoder.file.edges is None and decoder.file.attributes == {}
-
-
-def test_an_exact_rest_pose_is_that_of_the_source_or_the_mean(tmp_path):
-    with read_hdf5(SAMPLE, rest="mean") as clip:
-        mean = clip.rest
-    options = ["--exact-rest", "--effort", "fast", "--rel-error", "1e-2"]
-    assert run("encode", SAMPLE, tmp_path / "a.ath", *options) == 0
-    assert run("encode", SAMPLE, tmp_path / "b.ath", *options, "--rest", "mean") == 0
-    with h5py.File(SAMPLE) as source, athcodec.open(tmp_path / "a.ath") as decoder:
-        assert np.array_equal(decoder.file.rest, source["rest"][()])
-    with athcodec.open(tmp_path / "b.ath") as decoder:
-        assert np.array_equal(decoder.file.rest, mean)
 
 
 def test_thresholds_of_the_paper_are_taken_in_the_units_given(tmp_path, capsys):

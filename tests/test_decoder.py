@@ -174,46 +174,35 @@ def test_the_parts_of_a_level_share_out_the_vertices(played):
     assert parts.is_stem.all() and len(parts.branch) == decoder.file.branch_count
 
 
-def test_the_map_of_a_part_that_moves_as_one_gives_its_positions(played):
-    decoder, source = played
-    for level in range(decoder.file.core.info.depth_levels - 1):
-        pose = base_pose(decoder, level)
-        for frame in shown_frames(decoder):
-            parts = decoder.affines(frame, level)
-            shown = decoder.positions(frame, level, np.float64)[decoder.file.hierarchy.vertex_source]
-            moved = applied(np.repeat(parts.matrices, parts.vertex_count, axis=0), pose[:, None])[:, 0]
-            as_one = np.repeat(~parts.is_stem, parts.vertex_count)
-            assert as_one.any() and np.abs(moved - shown)[as_one].max() < 1e-6 * size_of(source)
+def assert_maps_hang_together(decoder, frame: int, level: int, most: float) -> tuple[int, int]:
+    """Maps give the positions of parts that move as one, hold these to their parents' stems, and with residuals give
+    the full positions. Return the numbers of such vertices and of such parts."""
+    hierarchy, pose, parts = decoder.file.hierarchy, base_pose(decoder, level), decoder.affines(frame, level)
+    order = hierarchy.vertex_source
+    shown, full = (decoder.positions(frame, at, np.float64)[order] for at in (level, None))
+    matrices, as_one = (np.repeat(values, parts.vertex_count, axis=0) for values in (parts.matrices, ~parts.is_stem))
+    assert np.abs(applied(matrices, pose[:, None])[:, 0] - shown)[as_one].max(initial=0) < most
+    residual = decoder.residual(frame, level)[order]
+    assert np.abs(applied(matrices, residual[:, None])[:, 0] - full).max() < most
+    branch = hierarchy.vertex_branch()[parts.first_vertex]
+    loose = decoder.file.branches["flags"][branch] & LOOSE > 0
+    hung = ~parts.is_stem & (hierarchy.attach[branch] >= 0) & ~loose
+    attach = hierarchy.attach[branch][hung]
+    placed = applied(parts.matrices[hung], pose[attach, None])[:, 0]
+    assert np.abs(placed - shown[attach]).max(initial=0) < most
+    return int(as_one.sum()), int(hung.sum())
 
 
-def test_every_subtree_stays_attached_to_its_parents_stem(played):
+def test_maps_hang_together(played):
     decoder, source = played
     assert not (decoder.file.branches["flags"] & LOOSE).any()
-    hierarchy, attached = decoder.file.hierarchy, 0
-    for level in range(decoder.file.level_count - 1):
-        pose = base_pose(decoder, level)
-        for frame in shown_frames(decoder):
-            parts = decoder.affines(frame, level)
-            shown = decoder.positions(frame, level, np.float64)[hierarchy.vertex_source]
-            branch = hierarchy.vertex_branch()[parts.first_vertex]
-            attach = hierarchy.attach[branch]
-            children = np.flatnonzero(~parts.is_stem & (attach >= 0))
-            hung = applied(parts.matrices[children], pose[attach[children], None])[:, 0]
-            assert np.abs(hung - shown[attach[children]]).max(initial=0) < 1e-6 * size_of(source)
-            attached += len(children)
-    assert attached > 0 or decoder.file.branch_count == 1
-
-
-def test_a_map_applied_to_its_residual_gives_the_full_positions(played):
-    decoder, source = played
-    order = decoder.file.hierarchy.vertex_source
+    attached = 0
     for level in range(decoder.file.level_count):
-        for frame in shown_frames(decoder)[:2]:
-            parts, residual = decoder.affines(frame, level), decoder.residual(frame, level)
-            full = decoder.positions(frame, dtype=np.float64)[order]
-            matrices = np.repeat(parts.matrices, parts.vertex_count, axis=0)
-            restored = applied(matrices, residual[order][:, None])[:, 0]
-            assert np.abs(restored - full).max() < 1e-6 * size_of(source)
+        for frame in shown_frames(decoder):
+            as_one, hung = assert_maps_hang_together(decoder, frame, level, 1e-6 * size_of(source))
+            assert as_one or level >= decoder.file.core.info.depth_levels - 1
+            attached += hung
+    assert attached > 0 or decoder.file.branch_count == 1
 
 
 # ---- frames ----
@@ -516,24 +505,9 @@ def test_allow_partial_changes_nothing_about_an_intact_file(bushy_ath):
 def test_maps_hang_together_on_degenerate_plants(scratch, clip):
     size = size_of(clip.positions) or 1.0
     with coded(clip, scratch / "maps.ath", max_error=1e-3 * size, segment_frames=16, effort="fast") as decoder:
-        hierarchy = decoder.file.hierarchy
-        full = decoder.positions(17)[hierarchy.vertex_source]
         for level in range(decoder.file.level_count):
-            pose = base_pose(decoder, level)
-            parts = decoder.affines(17, level)
-            assert len(parts.branch) == decoder.levels[level].nodes
-            matrices = np.repeat(parts.matrices, parts.vertex_count, axis=0)
-            as_one = np.repeat(~parts.is_stem, parts.vertex_count)
-            shown = decoder.positions(17, level)[hierarchy.vertex_source]
-            assert np.abs(applied(matrices, pose[:, None])[:, 0] - shown)[as_one].max(initial=0) < 1e-9 * size
-            residual = decoder.residual(17, level)[hierarchy.vertex_source]
-            assert np.abs(applied(matrices, residual[:, None])[:, 0] - full).max() < 1e-9 * size
-            branch = hierarchy.vertex_branch()[parts.first_vertex]
-            loose = decoder.file.branches["flags"][branch] & LOOSE > 0
-            hung = ~parts.is_stem & (hierarchy.attach[branch] >= 0) & ~loose
-            attach = hierarchy.attach[branch][hung]
-            placed = applied(parts.matrices[hung], pose[attach, None])[:, 0]
-            assert np.abs(placed - shown[attach]).max(initial=0) < 1e-9 * size
+            assert len(decoder.affines(17, level).branch) == decoder.levels[level].nodes
+            assert_maps_hang_together(decoder, 17, level, 1e-9 * size)
 
 
 @pytest.mark.parametrize("clip", [tube(8, 6, 3), plant(3, branches=6, frames=3)], ids=["one solid stem", "thin stems"])

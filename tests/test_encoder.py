@@ -303,28 +303,6 @@ def test_encoding_leaves_the_clip_as_it_was(bushy_clip):
     assert all(getattr(bushy_clip, name).tobytes() == data for name, data in before.items())
 
 
-@pytest.mark.parametrize("dtype", [np.float32, np.float64])
-def test_arrays_of_any_layout_and_byte_order_give_the_same_file(dtype):
-    source = plant(seed=1, branches=5, frames=20, dtype=dtype)
-    swapped = source.positions.astype(source.positions.dtype.newbyteorder(">"))
-    strided = np.asfortranarray(source.positions)
-    files = []
-    for positions in (source.positions, swapped, strided):
-        files.append(encoded(source.replace(positions=positions), effort="fast"))
-    assert files[0] == files[1] == files[2]
-
-
-def test_plain_lists_can_be_encoded(tmp_path):
-    clip = MotionClip(
-        positions=np.zeros((2, 3, 3)) + [[[0.0], [1], [2]], [[0], [1], [2.5]]],
-        time=[0, 1],
-        vertex_branch=[0, 0, 0],
-        branch_parent=[-1],
-    )
-    with coded(clip, tmp_path / "s.ath", rel_error=1e-3) as decoder:
-        assert np.abs(decoder.positions() - clip.positions).max() <= decoder.file.max_error_bound
-
-
 # ---- memory ----
 
 

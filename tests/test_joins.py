@@ -7,12 +7,10 @@ import io
 import numpy as np
 import pytest
 from files import Parts
-from plants import plant
 
 import athcodec
 from athcodec.decoding import core_file, segment_decoder
 from athcodec.decoding.container import Limits
-from athcodec.encoding import encoder
 from athcodec.encoding.choices import joins
 from athcodec.errors import BadChecksum, LimitExceeded
 from athcodec.motion.joining import looped
@@ -133,33 +131,6 @@ def test_a_segment_goes_on_from_one_alone(coded):
     chunks = [(c, first.get((c.kind, c.level), data) if c.segment == 0 else data) for c, data in parts.chunks]
     with athcodec.open(io.BytesIO(parts.with_chunks(chunks))) as other:
         assert np.array_equal(other.positions(slice(start, stop)), expected)
-
-
-def test_segments_coded_apart_are_those_of_one_run(tmp_path):
-    """A process that codes some of the segments joins them to ones that it does not hand over."""
-    with read_hdf5(sample_path()) as clip:
-        options = {"rel_error": 1e-3, "segment_frames": SEGMENT, "ladder": "none", "effort": "fast"}
-        athcodec.encode(clip, tmp_path / "whole.ath", **options)
-        draft = encoder.draft(clip, **options)
-        apart = [own for s in (2, 0, 1) for own in encoder.code_segments(clip, draft, [s])]
-        encoder.write(clip, draft, apart, tmp_path / "apart.ath")
-    assert (tmp_path / "apart.ath").read_bytes() == (tmp_path / "whole.ath").read_bytes()
-
-
-@pytest.mark.parametrize("frames", [17, 33, 50])
-def test_short_segments_keep_the_bound(frames, tmp_path):
-    clip = plant(frames, frames=frames)
-    athcodec.encode(clip, tmp_path / "short.ath", rel_error=1e-4, segment_frames=16, effort="fast")
-    with athcodec.open(tmp_path / "short.ath") as decoder:
-        away = np.linalg.norm(decoder.positions() - clip.block(0, frames), axis=2)
-        assert away.max() <= decoder.file.max_error_bound
-
-
-def test_a_clip_of_one_segment_has_no_joins(tmp_path):
-    with read_hdf5(sample_path()) as clip:
-        athcodec.encode(clip, tmp_path / "one.ath", rel_error=1e-3, effort="fast")
-    with athcodec.open(tmp_path / "one.ath") as decoder:
-        assert len(decoder.segments) == 1 and not decoder.file.joins.any()
 
 
 def test_the_end_of_a_segment_is_part_of_what_the_next_one_needs(coded):

@@ -92,12 +92,3 @@ def test_the_command_line_makes_lossless_files_as_small_as_the_api_does(tmp_path
     with athcodec.read_hdf5(sample) as clip:
         athcodec.encode(clip, tmp_path / "api.ath", lossless=True, effort="fast")
     assert (tmp_path / "cli.ath").read_bytes() == (tmp_path / "api.ath").read_bytes()
-
-
-def test_the_command_line_writes_lossless_files(tmp_path):
-    athcodec.write_hdf5(plant(seed=8, branches=5, frames=20), tmp_path / "a.h5")
-    assert main(["encode", str(tmp_path / "a.h5"), str(tmp_path / "a.ath"), "--lossless"]) == 0
-    assert main(["verify", str(tmp_path / "a.ath"), "--against", str(tmp_path / "a.h5")]) == 0
-    assert main(["decode", str(tmp_path / "a.ath"), str(tmp_path / "b.h5")]) == 0
-    with athcodec.read_hdf5(tmp_path / "a.h5") as a, athcodec.read_hdf5(tmp_path / "b.h5") as b:
-        assert bits(a.block(0, 20)) == bits(b.block(0, 20))

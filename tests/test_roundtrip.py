@@ -98,11 +98,6 @@ def test_every_stem_shape_survives_every_motion(shape, motion, scratch):
     assert_comes_back(awkward(seed=1, branches=8, roots=2, shape=shape, motion=motion), scratch, 1e-4)
 
 
-@pytest.mark.parametrize("effort", ["fast", "default", "best"])
-def test_every_effort_keeps_the_bound(effort, scratch):
-    assert_comes_back(plant(seed=4, branches=15, frames=40), scratch, 1e-4, effort=effort)
-
-
 @pytest.mark.parametrize(
     "clip",
     [
