@@ -15,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 from hypothesis import strategies as st
+from plants import subtree
 
 import athcodec
 from athcodec import MotionClip, Thresholds
@@ -60,7 +61,7 @@ class Attack:
         positions = np.repeat(rest[None], self.frames, axis=0)
         if self.rest == "unrelated":
             rest = rng.normal(size=rest.shape) * 10.0 ** rng.uniform(-3, 3)
-        some = _subtree(parents, int(rng.integers(len(parents))))[labels]
+        some = subtree(parents, int(rng.integers(len(parents))))[labels]
         with np.errstate(over="ignore", invalid="ignore"):
             for action in self.actions:
                 positions = _act(rng, action, positions, some)
@@ -124,13 +125,6 @@ def _rest(rng, kind: str, labels: np.ndarray, parents: np.ndarray) -> np.ndarray
         start = rest[first[parent]] if parent >= 0 else 3 * rng.normal(size=3)
         rest[mine] = start + np.cumsum(0.3 * steps[mine], axis=0)
     return rest
-
-
-def _subtree(parents: np.ndarray, root: int) -> np.ndarray:
-    inside = np.arange(len(parents)) == root
-    for branch, parent in enumerate(parents):
-        inside[branch] |= parent >= 0 and inside[parent]
-    return inside
 
 
 def _act(rng, action: str, positions: np.ndarray, some: np.ndarray) -> np.ndarray:

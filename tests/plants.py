@@ -155,7 +155,7 @@ def _stem(rng: np.random.Generator, count: int, shape: str) -> np.ndarray:
     return np.cumsum(steps, axis=0) * 0.3
 
 
-def _subtree(branch_parent: np.ndarray, root: int) -> np.ndarray:
+def subtree(branch_parent: np.ndarray, root: int) -> np.ndarray:
     """(B,) bool: the branches of a subtree, where parents have smaller numbers."""
     inside = np.arange(len(branch_parent)) == root
     for branch, parent in enumerate(branch_parent):
@@ -170,7 +170,7 @@ def _moved(rng, rest, vertex_branch, branch_parent, frames: int, motion: str) ->
     if motion == "noise":
         return still + 0.3 * rng.normal(size=still.shape)
     moving = sway(rng, rest, frames, rough=1e-3)
-    some = _subtree(branch_parent, int(rng.integers(len(branch_parent))))[vertex_branch]
+    some = subtree(branch_parent, int(rng.integers(len(branch_parent))))[vertex_branch]
     centre, later = rest[some].mean(axis=0), slice(frames // 2, None)
     if motion == "teleport":
         late = moving[later]
