@@ -400,14 +400,11 @@ def _placed_rows(rows: np.ndarray, domain: str, obj: SceneObject) -> tuple[Any, 
 
 
 def _write_radius(values: np.ndarray, domain: str, objects: list[SceneObject]) -> bool:
-    """As widths of curves and points; of meshes as a primvar, but for the zeros that readers give them beside such."""
-    beside = domain == "vertex" and any(obj.kind != "mesh" for obj in objects)
+    """As widths of curves and points; of meshes as a primvar."""
     placed = [_placed_rows(rows_of(values, domain, obj), domain, obj) for obj in objects]
     if any(found is None or found[0] is not obj.target for found, obj in zip(placed, objects)):
         return False
     for obj, (_, rows) in zip(objects, placed):
-        if obj.kind == "mesh" and beside and not rows.any():
-            continue
         if obj.kind == "mesh":
             primvar = UsdGeom.PrimvarsAPI(obj.target).CreatePrimvar(
                 "radius", Sdf.ValueTypeNames.FloatArray, INTERPOLATION[domain]

@@ -61,16 +61,8 @@ PLACES = ("positions", "orientations", "orientationsf", "scales", "protoIndices"
 OBJECT_PROPERTIES = frozenset(  # Attributes of objects, or their namespaces, that are read or named one by one.
     (*PLACES, "points", "extent", "normals", "widths", "orientation", "doubleSided", SCHEME, "faceVertexCounts")
     + ("faceVertexIndices", "curveVertexCounts", "type", "basis", "wrap", "visibility", "purpose", "xformOpOrder")
-    + (
-        "primvars",
-        "xformOp",
-        "material",
-        "skel",
-        "subsetFamily",
-        "creaseLengths",
-        "creaseSharpnesses",
-        "cornerSharpnesses",
-    )
+    + ("creaseLengths", "creaseSharpnesses", "cornerSharpnesses", "primvars", "xformOp", "material", "skel")
+    + ("subsetFamily",)
 )
 PURPOSES = (UsdGeom.Tokens.default_, UsdGeom.Tokens.render)
 NAMES = {"st": "uv", "displayColor": "colors"}
