@@ -246,12 +246,6 @@ def test_a_folder_that_does_not_exist_is_an_os_error(small, tmp_path):
         athcodec.encode(small, tmp_path / "nowhere" / "s.ath", effort="fast")
 
 
-def test_a_name_without_a_folder_is_a_file_here(small, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    athcodec.encode(small, "here.ath", effort="fast")
-    assert [path.name for path in tmp_path.iterdir()] == ["here.ath"]
-
-
 # ---- progress and determinism ----
 
 

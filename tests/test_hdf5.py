@@ -11,7 +11,6 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-import athcodec
 from athcodec.errors import ClipError
 from athcodec.exporters import write_hdf5
 from athcodec.exporters.hdf5 import Hdf5Writer
@@ -49,12 +48,6 @@ def assert_same_array(a, b):
     assert (a is None) == (b is None)
     if a is not None:
         assert a.dtype == b.dtype and a.shape == b.shape and a.tobytes() == b.tobytes()
-
-
-@pytest.mark.parametrize("write, name", [(athcodec.encode, "a.ath"), (athcodec.write, "a.h5"), (write_hdf5, "a.h5")])
-def test_whatever_writes_a_clip_takes_the_clip_and_then_the_path(write, name, forked_clip, tmp_path):
-    write(forked_clip, tmp_path / name)
-    assert (tmp_path / name).stat().st_size > 0
 
 
 @pytest.mark.parametrize("gzip", [False, True])

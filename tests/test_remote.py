@@ -496,14 +496,6 @@ def test_a_failing_server_is_one_line_and_leaves_no_file(verb, server, tmp_path,
     assert list(tmp_path.iterdir()) == []
 
 
-def test_messages_keep_passwords_and_keys_to_themselves(server):
-    server.fault = overloaded
-    secret = server.url.replace("http://", "http://me:hush@") + "?signature=hush"
-    with pytest.raises(RemoteError) as caught:
-        Remote(secret, retries=0)
-    assert "hush" not in str(caught.value) and "/tree.ath" in str(caught.value)
-
-
 @pytest.fixture(params=["file", "memory", "s3"])
 def other_url(request, large_ath):
     """The URL of the large file on another file system than HTTP."""

@@ -87,12 +87,6 @@ def test_a_moving_mesh_below_a_moving_transform_is_read_in_world_space(tmp_path,
     assert np.allclose(clip.time, np.arange(10) / FPS, rtol=0, atol=1e-12)
 
 
-def test_points_without_a_transform_are_read_bit_for_bit(tmp_path):
-    grid_file(tmp_path / "a.usdc")
-    _, positions = read_all(tmp_path / "a.usdc")
-    assert np.array_equal(positions, np.stack([sway(frame) for frame in range(101, 111)]))
-
-
 def test_frames_are_the_samples_where_the_stage_has_no_range_or_at_the_rate_of_fps(tmp_path):
     stage = new_stage(tmp_path / "a.usda", first=None, fps=24.0)
     add_grid(stage, frames=[2, 3, 5.5])

@@ -86,16 +86,6 @@ class Plant:
             metadata={"unit": "m", "up_axis": "y", "fps": fps} | metadata,
         )
 
-    def preorder(self) -> tuple[np.ndarray, np.ndarray]:
-        """Nodes, each followed at once by all that it carries; (N,) how many these are, itself included."""
-        sizes = sum_above(self.parent, np.ones(len(self.parent))).astype(int)
-        place, free = np.zeros(len(sizes), int), np.ones(len(sizes), int)
-        for node in range(1, len(sizes)):
-            below = self.parent[node]
-            place[node] = place[below] + free[below]
-            free[below] += sizes[node]
-        return np.argsort(place), sizes
-
 
 def grow(nodes: int, orders: int, height: float, seed: int) -> Plant:
     """A plant of exactly `nodes` nodes with stems of the orders 0 to `orders`. ValueError for too few."""
