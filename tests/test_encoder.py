@@ -241,11 +241,6 @@ def test_an_existing_file_is_there_until_the_new_one_is_whole(small, tmp_path):
         assert decoder.file.file_length == summary.bytes
 
 
-def test_a_folder_that_does_not_exist_is_an_os_error(small, tmp_path):
-    with pytest.raises(OSError):
-        athcodec.encode(small, tmp_path / "nowhere" / "s.ath", effort="fast")
-
-
 # ---- progress and determinism ----
 
 

@@ -310,11 +310,6 @@ def test_metadata_come_back_unchanged(metadata, scratch):
     assert reopened(plant(frames=3).replace(metadata=metadata), scratch).metadata == metadata
 
 
-def test_a_clip_without_static_data_has_none_in_its_file(scratch):
-    file = reopened(plant(frames=3), scratch).file
-    assert file.faces is None and file.edges is None and file.attributes == {} and file.metadata == {}
-
-
 def test_attributes_none_keeps_the_motion_and_the_units_alone(full_clip, scratch):
     bare, full = (reopened(full_clip, scratch, attributes=which) for which in ("none", "all"))
     assert bare.file.faces is None and bare.file.edges is None and bare.file.attributes == {}
