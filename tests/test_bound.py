@@ -107,13 +107,10 @@ def test_plants_too_small_for_the_steps_of_a_file_are_refused(scale, is_float64,
         assert np.abs(decoder.positions().astype(np.float64) - clip.positions).max() <= 2e-35
 
 
-@pytest.mark.parametrize("scale", [1e-42, 1e-40])
-def test_points_of_denormal_positions_are_refused_without_another_warning(scale, scratch):
-    frames = np.linspace(0, 1, 7)[:, None] * [1, 2, 3] + 0.01 * np.random.default_rng(0).random((20, 7, 3))
+def test_points_of_denormal_positions_are_refused_without_another_warning(scratch):
+    frames = (1e-42 * np.random.default_rng(0).random((20, 7, 3))).astype(np.float32)
     with pytest.raises(BoundError, match="the smallest that a file can hold"):
-        athcodec.encode(
-            athcodec.MotionClip((frames * scale).astype(np.float32), np.arange(20) / 24), scratch / "tiny.ath"
-        )
+        athcodec.encode(athcodec.MotionClip(frames, np.arange(20) / 24), scratch / "tiny.ath")
 
 
 def test_a_clip_without_any_extent_has_a_bound_that_a_file_can_hold(scratch):

@@ -158,7 +158,8 @@ def layers_of(source: Source, prelude: CodedPrelude, choice: Choice, ratios: Seq
     rest, level_0, rests = _rests(source, prelude, ratios, settings)
     layers: list[Layer] = []
     for i, (ratio, (pose, refined)) in enumerate(zip(ratios, rests)):
-        plan = prelude.plan if len(ratios) == 1 else _plan_on(pose, prelude, i)
+        before = layers[-1].plan if layers else prelude.plan
+        plan = prelude.plan if len(ratios) == 1 else _plan_on(pose, prelude, before, i)
         of_layer = replace(
             choice.first_layer if i == 0 else _uniform(prelude.plan, settings),
             step=qz.single(settings.step * ratio),
@@ -167,12 +168,12 @@ def layers_of(source: Source, prelude: CodedPrelude, choice: Choice, ratios: Seq
         )
         layers.append(Layer(plan, of_layer, _modes(plan, choice, of_layer, ratio), ratio, refined))
     source_rest = code_source_rest(source, prelude.plan.branches, layers[-1].plan.rest, settings.bound)
-    return Layers(rest, source_rest, layers[0].plan if level_0 is None else _plan_on(level_0, prelude), layers)
+    return Layers(rest, source_rest, layers[0].plan if level_0 is None else _plan_on(level_0, prelude, None), layers)
 
 
-def _plan_on(pose: np.ndarray, prelude: CodedPrelude, layer: int = 0) -> Plan:
+def _plan_on(pose: np.ndarray, prelude: CodedPrelude, before: Plan | None, layer: int = 0) -> Plan:
     plan = Plan(prelude.plan.branches.copy(), prelude.plan.vertex_count, prelude.plan.pool, layer > 0, layer=layer)
-    plan.set_rest(pose)
+    plan.set_rest(pose, like=before)
     return plan
 
 

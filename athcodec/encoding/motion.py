@@ -132,8 +132,9 @@ class Plan:
     def level_count(self) -> int:
         return self.height + 2
 
-    def set_rest(self, rest: np.ndarray, bases: bool = True) -> None:
-        """Set the decoded rest pose, (N, 3) float64, and build the bases on it, if they are wanted."""
+    def set_rest(self, rest: np.ndarray, bases: bool = True, like: Plan | None = None) -> None:
+        """Set the decoded rest pose, (N, 3) float64, and build the bases on it, if they are wanted. like: a plan whose
+        bases serve if it has the same pose and pieces."""
         vertices, pieces = self.vertex_count, len(self.pieces)
         self.rest = np.ascontiguousarray(rest, np.float64)
         self.core.rest = at = address(self.rest, np.float64, 3 * vertices)
@@ -143,6 +144,10 @@ class Plan:
         gaps = np.empty(vertices, np.uint8)
         table = np.empty(lib.ath_basis_table_size(pieces), np.int32)
         size = lib.ath_basis_layout(self.pieces.ctypes.data, pieces, at, gaps.ctypes.data, table.ctypes.data)
+        shape = ["first", "count", "flags", "modes", "basis"]
+        if like is not None and like.rest is self.rest and np.array_equal(like.pieces[shape], self.pieces[shape]):
+            self.bases, self.core.bases, self.pieces["rank"] = like.bases, like.core.bases, like.pieces["rank"]
+            return
         self.bases = np.empty(size)
 
         def fill_modes(first: int, stop: int) -> None:

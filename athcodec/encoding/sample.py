@@ -55,6 +55,7 @@ class PlantSample:
             source,
             clip=some,
             hierarchy=self._hierarchy(source.hierarchy, np.searchsorted(chosen, places)),
+            shapes=None,
             weights=None if source.weights is None else source.weights[self.vertices],
             reference=None if source.reference is None else source.reference[self.vertices],
         )

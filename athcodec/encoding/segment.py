@@ -79,6 +79,7 @@ class Source:
     held_error: float = 0.0  # Largest distance of any vertex in a held frame from the pose that stands for it.
     polygons: Polygons | None = None  # Polygons that the file stores as FACES.
     without: frozenset[Feature] = frozenset()  # Features that the file does without.
+    shapes: tuple[np.ndarray, np.ndarray] | None = None  # Details and keeps_shape of an inexact reference, if known.
     source_rest: np.ndarray = field(init=False)  # (N, 3) float64 less the origin.
     rest: np.ndarray = field(init=False)  # (N, 3) float64 less the origin: the reference pose.
     origin: np.ndarray = field(init=False)  # (3,) float64
@@ -102,7 +103,8 @@ class Source:
         self.keeps_shape, self.rest_error = self.details > 0, math.inf
         if not self.reference_is_exact:
             precision, diagonal = self.rest_precision, self.seen.diagonal
-            self.details, self.keeps_shape = precision.details(self.clip, self.hierarchy, diagonal)
+            self.shapes = self.shapes or precision.details(self.clip, self.hierarchy, diagonal)
+            self.details, self.keeps_shape = self.shapes
             error, is_stored = precision.error(self.clip, diagonal), self.reference is None or self.clip.rest_given
             if math.isfinite(error) and is_stored and not self.exact_rest:
                 self.rest_error = qz.error_limit(error, diagonal)

@@ -79,48 +79,18 @@ class WriteOptions:
 
 
 FORMATS = (
-    Format("hdf5", "HDF5 of athcodec's schema", (".h5", ".hdf5", ".hdf"), "athcodec.exporters.hdf5", keeps=KEPT),
-    Format("npz", "NumPy archive of the same schema", (".npz",), "athcodec.exporters.npz", keeps=KEPT),
-    Format(
-        "usd",
-        "USD: time-sampled points",
-        (".usd", ".usdc", ".usda", ".usdz"),
-        "athcodec.exporters.usd",
-        "usd",
-        ("pxr",),
-        keeps=KEPT,
-    ),
-    Format(
-        "gltf",
-        "glTF: joints or morph targets",
-        (".glb",),
-        "athcodec.exporters.gltf",
-        holds_several=True,
-        keeps=("doubleSided",),
-    ),
-    Format(
-        "alembic",
-        "Alembic: samples of points",
-        (".abc",),
-        "athcodec.exporters.alembic",
-        "alembic",
-        ("alembic3d",),
-        keeps=("presence",),
-    ),
-    Format("pc2", "PC2 point cache", (".pc2",), "athcodec.exporters.pc2"),
-    Format("mdd", "MDD point cache", (".mdd",), "athcodec.exporters.mdd"),
-    Format("sequence", "numbered OBJ or PLY files", (".obj", ".ply"), "athcodec.exporters.sequence"),
-    Format("xdmf", "XDMF time series", (".xdmf", ".xmf"), "athcodec.exporters.xdmf"),
-    Format("vtk", "VTU series with a PVD index", (".pvd", ".vtu"), "athcodec.exporters.vtk"),
-    Format("vat", "vertex animation textures: node matrices", (".vat",), "athcodec.exporters.vat", "vat", ("OpenEXR",)),
-    Format(
-        "openvat",
-        "vertex animation textures: positions, as OpenVAT has them",
-        (".openvat",),
-        "athcodec.exporters.openvat",
-        "vat",
-        ("OpenEXR",),
-    ),
+    Format("hdf5", "HDF5 of athcodec's schema", (".h5", ".hdf5", ".hdf"), keeps=KEPT),
+    Format("npz", "NumPy archive of the same schema", (".npz",), keeps=KEPT),
+    Format("usd", "USD: time-sampled points", (".usd", ".usdc", ".usda", ".usdz"), "usd", ("pxr",), keeps=KEPT),
+    Format("gltf", "glTF: joints or morph targets", (".glb",), holds_several=True, keeps=("doubleSided",)),
+    Format("alembic", "Alembic: samples of points", (".abc",), "alembic", ("alembic3d",), keeps=("presence",)),
+    Format("pc2", "PC2 point cache", (".pc2",)),
+    Format("mdd", "MDD point cache", (".mdd",)),
+    Format("sequence", "numbered OBJ or PLY files", (".obj", ".ply")),
+    Format("xdmf", "XDMF time series", (".xdmf", ".xmf")),
+    Format("vtk", "VTU series with a PVD index", (".pvd", ".vtu")),
+    Format("vat", "vertex animation textures: node matrices", (".vat",), "vat", ("OpenEXR",)),
+    Format("openvat", "vertex animation textures: positions, as OpenVAT has them", (".openvat",), "vat", ("OpenEXR",)),
 )
 
 
@@ -192,7 +162,7 @@ def write(
     report = progress or (lambda stage, fraction: None)
     with keeping(getattr(motion, "inputs", ())):
         check_target(path, kind.suffixes[0])
-        module = importlib.import_module(kind.module)
+        module = importlib.import_module(f"{__name__}.{kind.name}")
         is_rounded = kind.name in SINGLES and motion.dtype == np.float64
         shown = in_singles(motion, kind.name in HAVE_TRANSFORMS) if is_rounded else motion
         facts = dict(module.write_clip(shown, path, wanted, lambda done: report("export", done)) or {})

@@ -24,21 +24,9 @@ from athcodec.exporters.scene_objects import hidden_copies, objects_of
 from athcodec.files.atomic import new_files
 
 STATIC = (
-    "frame_count",
-    "vertex_count",
-    "branch_count",
-    "time",
-    "fps",
-    "metadata",
-    "rest",
-    "vertex_branch",
-    "branch_parent",
-    "stem_index",
-    "edges",
-    "faces",
-    "attributes",
-    "polygons",
+    "frame_count vertex_count branch_count time fps metadata rest vertex_branch branch_parent stem_index edges".split()
 )
+STATIC += ["faces", "attributes", "polygons"]
 WRITER = "athcodec.exporters.alembic_archive"
 
 

@@ -77,9 +77,8 @@ def _write(
     motion: Any, path: str | PathLike[str], options: WriteOptions, report: Callable[[float], None]
 ) -> dict[str, Any]:
     meshes, left_out = meshes_of(motion, Path(fspath(path)).stem)
-    found, lost_copies = list(meshes), {}
-    if options.instances and options.rig is None:
-        found, lost_copies = with_copies(motion, meshes)
+    has_copies = options.instances and options.rig is None
+    found, lost_copies = with_copies(motion, meshes) if has_copies else (list(meshes), {})
     write = _writer(motion, options, found, lambda done: report(0.95 * done))
     facts = {
         "animation": write.name if options.rig is None else "a rig",
@@ -340,15 +339,8 @@ class _Morphed:
         for _ in range(self._motion.frame_count):
             accessors.append([])
             for mesh, shape in zip(meshes, found):
-                index = glb.accessor(
-                    view,
-                    np.dtype(np.float32),
-                    len(shape.source),
-                    3,
-                    byteOffset=place,
-                    min=[UNKNOWN_BOUND] * 3,
-                    max=[UNKNOWN_BOUND] * 3,
-                )
+                bounds = {"min": [UNKNOWN_BOUND] * 3, "max": [UNKNOWN_BOUND] * 3}
+                index = glb.accessor(view, np.dtype(np.float32), len(shape.source), 3, byteOffset=place, **bounds)
                 accessors[-1].append(glb.json["accessors"][index])
                 for primitive in glb.json["meshes"][mesh]["primitives"]:
                     primitive.setdefault("targets", []).append({"POSITION": index})

@@ -86,8 +86,7 @@ class GltfCopies:
 
 def with_copies(motion: Any, found: list[GltfMesh]) -> tuple[list[GltfMesh | GltfCopies], dict[str, list[str]]]:
     """The meshes, those that are copies of one shape as such: where transforms keep them within what the level is off,
-    and they have one set of texture coordinates and colours. Attributes that copies lose all meshes lose. And the names
-    of objects whose copies stay one mesh."""
+    and they have one set of texture coordinates and colours; and lost_copies. Attributes that copies lose all lose."""
     runs, allowed = list(_runs(objects_of(motion))), allowed_error(motion)
     if sum(len(run) for run in runs) != len(found):
         return list(found), {}

@@ -50,32 +50,13 @@ from athcodec.sources.scene_objects import FACE_MATERIAL, OWN, SCHEME
 SAVE_BYTES = 16 << 20
 PRIMVARS = {"uv": "st", "colors": "displayColor"}
 TYPES = {  # By a row's shape and kind; the shape None stands for any number of values per row.
-    "f": {(): "Float", (2,): "Float2", (3,): "Float3", (4,): "Float4"},
-    "d": {(): "Double", (2,): "Double2", (3,): "Double3", (4,): "Double4"},
-    "e": {(): "Half", (2,): "Half2", (3,): "Half3", (4,): "Half4"},
-    "i": {(): "Int", (2,): "Int2", (3,): "Int3", (4,): "Int4"},
-    "u": {(): "UInt"},
-    "q": {(): "Int64"},
-    "Q": {(): "UInt64"},
-    "B": {(): "UChar"},
-    "?": {(): "Bool"},
+    **{
+        kind: {(): name} | {(n,): f"{name}{n}" for n in (2, 3, 4)}
+        for kind, name in zip("fdei", ("Float", "Double", "Half", "Int"))
+    },
+    **{kind: {(): name} for kind, name in zip("uqQB?", ("UInt", "Int64", "UInt64", "UChar", "Bool"))},
 }
-WIDER = {
-    "?": "?",
-    "b": "i",
-    "h": "i",
-    "H": "i",
-    "B": "B",
-    "i": "i",
-    "I": "u",
-    "l": "q",
-    "q": "q",
-    "L": "Q",
-    "Q": "Q",
-    "e": "e",
-    "f": "f",
-    "d": "d",
-}
+WIDER = dict(zip("?bhHBiIlqLQefd", "?iiiBiuqqQQefd"))
 NUMPY = {"i": "<i4", "u": "<u4", "q": "<i8", "Q": "<u8", "B": "u1", "?": "?", "e": "<f2", "f": "<f4", "d": "<f8"}
 MATERIALS = "materials"
 WIND = "wind"  # in what is known of an assembly: the text of its JSON
@@ -419,15 +400,11 @@ def _placed_rows(rows: np.ndarray, domain: str, obj: SceneObject) -> tuple[Any, 
 
 
 def _write_radius(values: np.ndarray, domain: str, objects: list[SceneObject]) -> bool:
-    """As widths of curves and points; of meshes as a primvar, but for the zeros that a reader gives to meshes without
-    one beside such."""
-    beside = domain == "vertex" and any(obj.kind != "mesh" for obj in objects)
+    """As widths of curves and points; of meshes as a primvar."""
     placed = [_placed_rows(rows_of(values, domain, obj), domain, obj) for obj in objects]
     if any(found is None or found[0] is not obj.target for found, obj in zip(placed, objects)):
         return False
     for obj, (_, rows) in zip(objects, placed):
-        if obj.kind == "mesh" and beside and not rows.any():
-            continue
         if obj.kind == "mesh":
             primvar = UsdGeom.PrimvarsAPI(obj.target).CreatePrimvar(
                 "radius", Sdf.ValueTypeNames.FloatArray, INTERPOLATION[domain]
@@ -472,14 +449,8 @@ def _write_frames(
     stage: Usd.Stage, motion: Any, objects: list[SceneObject], codes: np.ndarray, report: Callable[[float], None]
 ) -> None:
     layer = stage.GetRootLayer()
-    places = [
-        (
-            obj,
-            None if obj.copies > 1 else obj.target.GetPointsAttr().GetPath(),
-            _whole(obj).CreateExtentAttr().GetPath(),
-        )
-        for obj in objects
-    ]
+    points = [None if obj.copies > 1 else obj.target.GetPointsAttr().GetPath() for obj in objects]
+    places = [(obj, path, _whole(obj).CreateExtentAttr().GetPath()) for obj, path in zip(objects, points)]
     unsaved = 0
     for start, block in motion.blocks():
         for row, positions in enumerate(block.astype(np.float32, copy=False)):

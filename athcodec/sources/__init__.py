@@ -30,26 +30,14 @@ from athcodec.motion.units import METRES, unit_symbol
 from athcodec.options import MAX_MEMORY, SAMPLES
 
 # Parts of a scene that are not read and are no shapes.
-NO_SHAPES = frozenset(
-    (
-        "Material",
-        "Camera",
-        "Light",
-        "GeomSubset",
-        "FaceSet",
-        "SkelAnimation",
-        "attribute",
-        "element",
-        "empty",
-        "field",
-        "hidden",
-        "statement",
-        "other",
-        *NOT_KEPT.values(),
-    )
+NO_SHAPES = frozenset("Material Camera Light GeomSubset FaceSet SkelAnimation".split()).union(
+    "attribute element empty field hidden statement other".split(), NOT_KEPT.values()
 )
 LISTED = 8
-MEANINGS = {"Material": " (names are kept for each face, contents only in a GLB by `encode --into`)"}
+MEANINGS = {
+    "Material": " (names are kept for each face, contents only in a GLB by `encode --into`)",
+    "attribute": " (they change in time, do not fit their object, or are of a kind that is not kept)",
+}
 ATH, ATH_MAGIC = ".ath", b"\x89ATH\r\n\x1a\n"
 NO_SOURCES = {
     ATH: "is an .ath file already; `athcodec decode` writes other formats, `athcodec truncate` fewer levels",
@@ -120,11 +108,9 @@ class Format:
     Parameters
     ----------
     name, title : str
-        What a user calls it by, and what it is in words.
+        What a user calls it by, as its module is called, too; and what it is in words.
     suffixes : tuple of str
         Of its files, in lower case, with the dot.
-    module : str
-        The module that reads or writes it.
     extra : str, optional
         The optional dependencies of athcodec that it takes.
     needs : tuple of str, optional
@@ -140,7 +126,6 @@ class Format:
     name: str
     title: str
     suffixes: tuple[str, ...]
-    module: str
     extra: str = ""
     needs: tuple[str, ...] = ()
     magic: tuple[bytes, ...] = ()
@@ -169,46 +154,26 @@ class Format:
 
 
 FORMATS = (
-    Format(
-        "hdf5",
-        "HDF5 of athcodec's schema",
-        (".h5", ".hdf5", ".hdf"),
-        "athcodec.sources.hdf5",
-        magic=(b"\x89HDF\r\n\x1a\n",),
-    ),
-    Format("npz", "NumPy archive of the same schema", (".npz",), "athcodec.sources.npz"),
+    Format("hdf5", "HDF5 of athcodec's schema", (".h5", ".hdf5", ".hdf"), magic=(b"\x89HDF\r\n\x1a\n",)),
+    Format("npz", "NumPy archive of the same schema", (".npz",)),
     Format(
         "usd",
         "USD: meshes, curves and points, UsdSkel",
         (".usd", ".usdc", ".usda", ".usdz"),
-        "athcodec.sources.usd",
         "usd",
         ("pxr",),
         (b"PXR-USDC", b"#usda"),
     ),
-    Format(
-        "gltf", "glTF: skins, nodes and morph targets", (".glb", ".gltf"), "athcodec.sources.gltf", magic=(b"glTF",)
-    ),
-    Format(
-        "alembic",
-        "Alembic: meshes, curves and points",
-        (".abc",),
-        "athcodec.sources.alembic",
-        "alembic",
-        ("alembic3d",),
-        (b"Ogawa",),
-    ),
-    Format("pc2", "PC2 point cache; its mesh by --mesh", (".pc2",), "athcodec.sources.pc2", magic=(b"POINTCACHE2\0",)),
-    Format("mdd", "MDD point cache; its mesh by --mesh", (".mdd",), "athcodec.sources.mdd"),
-    Format(
-        "sequence", "numbered OBJ or PLY files, named by any one of them", (".obj", ".ply"), "athcodec.sources.sequence"
-    ),
-    Format("xdmf", "XDMF time series", (".xdmf", ".xmf"), "athcodec.sources.xdmf"),
+    Format("gltf", "glTF: skins, nodes and morph targets", (".glb", ".gltf"), magic=(b"glTF",)),
+    Format("alembic", "Alembic: meshes, curves and points", (".abc",), "alembic", ("alembic3d",), (b"Ogawa",)),
+    Format("pc2", "PC2 point cache; its mesh by --mesh", (".pc2",), magic=(b"POINTCACHE2\0",)),
+    Format("mdd", "MDD point cache; its mesh by --mesh", (".mdd",)),
+    Format("sequence", "numbered OBJ or PLY files, named by any one of them", (".obj", ".ply")),
+    Format("xdmf", "XDMF time series", (".xdmf", ".xmf")),
     Format(
         "vtk",
         "VTU, VTP, VTK (with athcodec[mesh]) or PVD series, named by any one of its files",
         (".vtu", ".vtp", ".vtk", ".pvd"),
-        "athcodec.sources.vtk",
     ),
 )
 
@@ -262,7 +227,7 @@ def read(
     with naming_file(path):
         kind = find_format(path) if format is None else format_named(format, FORMATS)
         kind.check()
-        clip: MotionClip = importlib.import_module(kind.module).read_clip(path, wanted)
+        clip: MotionClip = importlib.import_module(f"{__name__}.{kind.name}").read_clip(path, wanted)
     lost = {kind: names for kind, names in clip.not_read.items() if kind not in NO_SHAPES}
     with closing_on_failure(clip):
         if lost:

@@ -220,7 +220,7 @@ def _clip(archive: Any, options: ReadOptions) -> MotionClip:
             obj.face_outward(lambda frame, obj=obj: _matrix(obj, times[frame]), frames, is_reversed=True)
         first += obj.count
     if first == 0:
-        raise ClipError("points: got none, expected at least one")
+        raise ClipError(f"{objects[0].path}: got no points, expected at least one")
 
     def sample(obj: _Object, frame: int) -> tuple[np.ndarray, np.ndarray]:
         try:

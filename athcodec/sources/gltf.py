@@ -33,7 +33,7 @@ from athcodec.motion.frames import Frames, is_far
 from athcodec.motion.joining import join
 from athcodec.motion.quaternions import rotation_matrices
 from athcodec.sources import ReadOptions
-from athcodec.sources.gltf_scene import Scene, key_rate, off_grid, on_grid
+from athcodec.sources.gltf_scene import Scene, key_rate, off_grid
 from athcodec.sources.scene_objects import FACE_MATERIAL, FLIPPED, MATERIAL_NAMES, TWO_SIDES, Facing, presence_metadata
 from athcodec.sources.timing import warn_of_missed
 
@@ -726,7 +726,7 @@ def _returns(motion: _Motion, keys: np.ndarray) -> bool:
 def _said_rate(said: dict, keys: np.ndarray) -> float | None:
     """Return the frame rate that the file states, if its keys agree."""
     fps = said.get("fps")
-    return float(fps) if _is_number(fps) and 0 < fps < 1e6 and on_grid(keys, fps) else None
+    return float(fps) if _is_number(fps) and 0 < fps < 1e6 and not off_grid(keys, fps).any() else None
 
 
 def _is_number(value: Any) -> bool:

@@ -304,14 +304,9 @@ def key_rate(keys: np.ndarray) -> float | None:
         return None
     step = float(np.median(np.diff(keys)))
     for rate in ((1 / step if step > 0 else 0.0), *RATES):
-        if SLOWEST <= rate <= FASTEST and on_grid(keys, rate):
+        if SLOWEST <= rate <= FASTEST and not off_grid(keys, rate).any():
             return _exact(rate, keys)
     return None
-
-
-def on_grid(keys: np.ndarray, rate: float) -> bool:
-    """Whether all keys lie on frames of a rate, from the first key on."""
-    return not off_grid(keys, rate).any()
 
 
 def off_grid(keys: np.ndarray, rate: float) -> np.ndarray:
@@ -328,6 +323,6 @@ def _exact(rate: float, keys: np.ndarray) -> float:
     measured = max(round(span * rate), 1) / span
     whole = round(measured)
     for likely, off in ((float(whole), 2e-4), (whole * 1000 / 1001, 2e-4), (round(measured, 2), 1e-6)):
-        if abs(measured - likely) <= off * likely and on_grid(keys, likely):
+        if abs(measured - likely) <= off * likely and not off_grid(keys, likely).any():
             return likely
     return measured

@@ -61,7 +61,8 @@ PLACES = ("positions", "orientations", "orientationsf", "scales", "protoIndices"
 OBJECT_PROPERTIES = frozenset(  # Attributes of objects, or their namespaces, that are read or named one by one.
     (*PLACES, "points", "extent", "normals", "widths", "orientation", "doubleSided", SCHEME, "faceVertexCounts")
     + ("faceVertexIndices", "curveVertexCounts", "type", "basis", "wrap", "visibility", "purpose", "xformOpOrder")
-    + ("primvars", "xformOp", "material", "skel", "subsetFamily")
+    + ("creaseLengths", "creaseSharpnesses", "cornerSharpnesses", "primvars", "xformOp", "material", "skel")
+    + ("subsetFamily",)
 )
 PURPOSES = (UsdGeom.Tokens.default_, UsdGeom.Tokens.render)
 NAMES = {"st": "uv", "displayColor": "colors"}
@@ -350,9 +351,8 @@ class _Copies:
         following = np.minimum.accumulate(np.where(absent, states[-1], states[:, None])[::-1], axis=0)[::-1]
         starts, stops = (np.searchsorted(self._states, states, side) for side in ("left", "right"))
         frames = np.where(last >= 0, stops[last] - 1, starts[following])
-        self._sources = frames * len(self.names) + np.arange(
-            len(self.names)
-        )  # A frame that has the copy, and the copy.
+        # A frame that has the copy, and the copy.
+        self._sources = frames * len(self.names) + np.arange(len(self.names))
         self._held = np.unique(self._sources[absent])
         self._places = np.zeros((len(self._held), 4, 4))
         frames, copies = np.divmod(self._held, max(len(self.names), 1))
@@ -412,7 +412,7 @@ class _Instances:
         """Adds the static arrays that the instancer has for each of its copies."""
         obj.left_out += _unread(self.instancer.GetPrim())
         for primvar in UsdGeom.PrimvarsAPI(self.instancer).GetPrimvarsWithValues():
-            name, values = str(primvar.GetPrimvarName()), _numbers(_flattened(primvar, codes[0]))
+            name, values = str(primvar.GetPrimvarName()), _numbers(_value(primvar, codes[0]))
             changes = _changes(primvar, codes) or self.all.follows_ids
             if values is None or changes or len(values) <= self.rows.max(initial=-1):
                 obj.left_out.append(name)
@@ -535,7 +535,7 @@ def _measure(objects: list[_Prim], codes: np.ndarray, matrix: Callable[[_Prim, i
             obj.face_outward(lambda frame, obj=obj: matrix(obj, frame), frames, is_reversed)
         first += obj.count
     if first == 0:
-        raise ClipError("points: got none, expected at least one")
+        raise ClipError(f"{objects[0].path}: got no points, expected at least one")
 
 
 def _follow_ids(obj: _Prim, codes: np.ndarray) -> None:
@@ -684,16 +684,9 @@ def _statics(obj: _Prim, codes: np.ndarray, matrix: np.ndarray) -> None:
         if primvar.HasValue() and _changes(primvar, codes):
             obj.left_out.append(primvar.GetPrimvarName())
         elif primvar.HasValue():
-            values = _flattened(primvar, codes[0])
+            values = _value(primvar, codes[0])
             name = _said(primvar.GetAttr(), "name") or primvar.GetPrimvarName()
-            _keep(
-                obj,
-                NAMES.get(name, name),
-                values,
-                primvar.GetInterpolation(),
-                primvar.GetElementSize(),
-                primvar.GetAttr(),
-            )
+            _keep(obj, NAMES.get(name, name), values, primvar.GetInterpolation(), primvar)
     _rename_first_uv(obj)
     schema = UsdGeom.PointBased(obj.prim)
     _keep_unless_it_changes(obj, codes, "normals", schema.GetNormalsAttr(), schema.GetNormalsInterpolation())
@@ -741,10 +734,10 @@ def _keep_unless_it_changes(
         _keep(obj, name, attribute.Get(codes[0]), interpolation)
 
 
-def _flattened(primvar: UsdGeom.Primvar, code: float) -> Any:
-    """The values of a primvar at a time, without its indices; None where USD finds it faulty."""
+def _value(source: Usd.Attribute | UsdGeom.Primvar, code: float) -> Any:
+    """What an array holds at a time, without indices; None where USD finds it faulty."""
     try:
-        return primvar.ComputeFlattened(code)
+        return source.ComputeFlattened(code) if isinstance(source, UsdGeom.Primvar) else source.Get(code)
     except Tf.ErrorException:
         return None
 
@@ -753,29 +746,20 @@ def _changes(source: Usd.Attribute | UsdGeom.Primvar, codes: np.ndarray) -> bool
     """Whether an array has other values in any frame than in the first."""
     if not source.ValueMightBeTimeVarying():
         return False
-
-    def read(code: float) -> Any:
-        return _flattened(source, code) if isinstance(source, UsdGeom.Primvar) else source.Get(code)
-
-    first = np.array(read(codes[0]))
-    samples = source.GetTimeSamplesInInterval(_interval(codes))
-    return any(not np.array_equal(np.array(read(code)), first) for code in (*samples, codes[-1]))
+    first, samples = np.array(_value(source, codes[0])), source.GetTimeSamplesInInterval(_interval(codes))
+    return any(not np.array_equal(np.array(_value(source, code)), first) for code in (*samples, codes[-1]))
 
 
-def _keep(
-    obj: _Prim,
-    name: str,
-    values: Any,
-    interpolation: str,
-    element_size: int = 1,
-    attribute: Usd.Attribute | None = None,
-) -> None:
+def _keep(obj: _Prim, name: str, values: Any, interpolation: str, primvar: UsdGeom.Primvar | None = None) -> None:
     """Keeps a static array if it has numbers, and rows that fit the prim; notes the names of others."""
-    values = _numbers(values)
+    values, element_size = _numbers(values), 1 if primvar is None else primvar.GetElementSize()
     if values is not None and element_size > 1 and len(values) % element_size == 0:
         values = values.reshape(-1, element_size, *values.shape[1:])
         values = values[..., 0] if values.shape[2:] == (1,) else values
-    obj.keep(name, DOMAINS.get(interpolation), _as_written(values, attribute))
+    said = None if primvar is None else _said(primvar.GetAttr(), "dtype")
+    if values is not None and said in WRITTEN_DTYPES:  # exporters/usd.py chose one that USD has
+        values = values.astype(said)
+    obj.keep(name, DOMAINS.get(interpolation), values)
 
 
 def _numbers(values: Any) -> np.ndarray | None:
@@ -792,12 +776,6 @@ def _numbers(values: Any) -> np.ndarray | None:
 
 def _is_array(values: Any) -> bool:
     return type(values).__module__.startswith("pxr.Vt")
-
-
-def _as_written(values: np.ndarray | None, attribute: Usd.Attribute | None) -> np.ndarray | None:
-    """In the dtype that an array had before exporters/usd.py chose one that USD has."""
-    said = _said(attribute, "dtype") if attribute else None
-    return values.astype(said) if values is not None and said in WRITTEN_DTYPES else values
 
 
 def _said(attribute: Usd.Attribute, key: str) -> str | None:
@@ -954,11 +932,9 @@ def _points(obj: _Prim, codes: np.ndarray, frame: int) -> np.ndarray:
     if obj.skeleton is not None:
         points = obj.skeleton.deform(points, code)
     points = np.array(points, np.float32).reshape(-1, 3)
-    return (
-        points
-        if ids is None
-        else obj.ordered(points, _array(ids.Get(code + 1e-6), np.int64), _frame_name(codes, frame))
-    )
+    if ids is None:
+        return points
+    return obj.ordered(points, _array(ids.Get(code + 1e-6), np.int64), _frame_name(codes, frame))
 
 
 def _frame_name(codes: np.ndarray, frame: int) -> str:

@@ -372,6 +372,7 @@ bool Primvar(const std::string &name, const StaticArray &array, const std::strin
     }
     const Typed typed = TypedValues(name, array, RowsOf(domain, *object));
     if (!typed.type) return false;
+    if (RowsOf(domain, *object).count == 0) return true; // without faces there are no values for them
     const std::string own = name == "uv" ? "st" : name == "colors" ? "displayColor" : Identifier(name, "array");
     const auto spec = Attribute(object->prim, ("primvars:" + own).c_str(), typed.type);
     spec->SetDefaultValue(typed.values);
