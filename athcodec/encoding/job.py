@@ -429,8 +429,11 @@ class EncodingJob:
         unsearched = share * search.first_cost()
         short = self._in_short_segments()
         frames = short.source.coded_frames / len(short.source.segments)  # Fewer than a segment has where many are held.
-        if frames > SHORT_SEGMENT / 2 and short.source.segments != self.source.segments and search.jumps(short.source):
-            return short._decide(bound, work)
+        if frames > SHORT_SEGMENT / 2 and short.source.segments != self.source.segments:
+            done = work.done
+            if search.jumps(short.source):
+                return short._decide(bound, work)
+            work.allowed += work.done - done  # What does not jump has all its work left.
         if math.isfinite(unsearched):
             work.allowed -= FILE_BYTE * unsearched
         start = search.trials.start
