@@ -337,7 +337,7 @@ def _coding_arguments(verb: argparse.ArgumentParser) -> None:
         metavar="FRAMES",
         type=_argument(_segment_frames),
         help=f"longest segment, {MIN_SEGMENT} to {MAX_SEGMENT} frames (default {DEFAULT_SEGMENT}, or all of a small "
-        "clip, or short ones of what jumps); what is decoded at once, so shorter ones seek faster and make larger files",
+        "clip, short ones of what jumps); what is decoded at once, so shorter ones seek faster and make larger files",
     )
     verb.add_argument(
         "--tam",
