@@ -60,7 +60,9 @@ def usd(folder: Path, tmp_path: Path) -> Path:
     stage = tmp_path / "own" / "stage.usda"
     stage.parent.mkdir()
     stage.write_text(
-        f"#usda 1.0\n(\n    subLayers = [@{away}@]\n    startTimeCode = 0\n    endTimeCode = 9\n)\n", "utf-8"
+        f"#usda 1.0\n(\n    subLayers = [@{away}@]\n    startTimeCode = 0\n    endTimeCode = 9\n"
+        "    timeCodesPerSecond = 30\n)\n",
+        "utf-8",
     )
     return stage
 
