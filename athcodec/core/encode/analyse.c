@@ -207,7 +207,8 @@ static int32_t turned_vertices(const ath_plan *plan, const ath_piece *piece)
     return (next < plan->branch_count ? plan->branches[next].first : plan->vertex_count) - piece->first;
 }
 
-typedef double products[9][ATH_SEGMENT_FRAMES]; /* of positions in each frame and in the rest pose */
+/* Products of positions in each frame and in the rest pose. */
+typedef double products[9][ATH_SEGMENT_FRAMES];
 
 /* Fills the products of `count` vertices, x from `from`, and d from `a`; returns the sum of d^2. from: 0: no vertex. */
 ATH_HOT static double sum_products(const ath_plan *plan, int32_t T, int32_t vertex, int32_t count, const double a[3],

@@ -98,7 +98,7 @@ static void place_attach_caches(ath_plan *plan, ath_piece *pieces, int32_t *stac
         if (pieces[p].parent >= 0) {
             ath_piece *parent = pieces + pieces[p].parent;
             uint64_t vertex = (uint64_t)1 << (pieces[p].attach - parent->first);
-            parent->attached |= vertex >> 1 | vertex | vertex << 1; /* the neighbours give the tangent */
+            parent->attached |= vertex >> 1 | vertex | vertex << 1; /* The neighbours give the tangent. */
             parent->last_attached = p;
         }
     for (int32_t p = 0; p < plan->piece_count; p++) {

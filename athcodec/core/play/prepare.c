@@ -418,12 +418,13 @@ static int start(void *memory, size_t work_bytes, const ath_file *file, int32_t 
     if (index < 0 || index >= file->info.segment_count || level < 0 || level >= file->info.level_count)
         return ATH_BAD_ARGUMENT;
     int32_t stage = ath_file_stage(file, level);
-    int is_full = segment_bytes >= ath_segment_size(file, level);
+    size_t full = ath_segment_size(file, level);
+    int is_full = segment_bytes >= full;
     preparation asked = {file, segment_memory, is_full, 0, index, stage, before, kept, 0, {0, 0}, 0};
     if (!file->rest_known) return ATH_NEEDS_HOST_MESH;
     if (stage > file->built_level || !ath_level_plan(file, stage)->bases
         || !ath_fits(memory, work_bytes, ath_work_size(file))
-        || !ath_fits(segment_memory, segment_bytes, ath_segment_size_to(file, index, level)))
+        || !ath_fits(segment_memory, segment_bytes, is_full ? full : ath_segment_size_to(file, index, level)))
         return ATH_NO_MEMORY;
     memset(work, 0, sizeof *work);
     int result = begin(work, &asked, index, stage), join = ath_join_at(file, index, stage);

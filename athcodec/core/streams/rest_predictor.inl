@@ -208,7 +208,7 @@ ATH_HOT static void rest_learn(rest_predictor *predictor, rest_guess *at, double
     usual = 0.3 + at->filter->noise;
     noise = usual + squares + 0.1 * squares * (squares / usual);
     for (int32_t k = 0; k < 3; k++)
-        if (at->term_count == REST_OWN_TERMS) /* a constant is much faster */
+        if (at->term_count == REST_OWN_TERMS) /* Code for a constant is much faster. */
             rest_learn_axis(REST_OWN_TERMS, at->filter, at, k, noise, offset[k]);
         else
             rest_learn_axis(at->term_count, at->filter, at, k, noise, offset[k]);
