@@ -366,7 +366,7 @@ def test_the_scheme_of_a_surface_comes_back_and_what_else_is_authored_is_named(t
     mesh.CreateSubdivisionSchemeAttr("loop")
     mesh.CreateHoleIndicesAttr([1])
     mesh.CreateCornerIndicesAttr([])
-    mesh.CreateInterpolateBoundaryAttr("edgeAndCorner")  # as where nothing says it
+    mesh.CreateInterpolateBoundaryAttr("edgeAndCorner")  # This is USD's fallback.
     mesh.CreateVelocitiesAttr(vec3(GRID))
     mesh.GetPrim().SetCustomData({"author": "me"})
     mesh.GetPrim().CreateAttribute("userProperties:height", Sdf.ValueTypeNames.Float).Set(3.5)

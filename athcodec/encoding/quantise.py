@@ -134,11 +134,8 @@ def bits(numbers: np.ndarray) -> np.ndarray:
 
 
 BIT_PARTS = 2.0**16  # Parts of a bit in which estimates count.
-LONGEST_LAG, LONGEST_ROW = (
-    40,
-    600,
-)  # Largest lags, in vertices, that are tried of stems, and of stems that may be whole meshes.
-MOST_LAG = 65535  # Largest lag of a file.
+# Largest lags, in vertices, that are tried for stems and for stems that may be whole meshes, and that a file can hold.
+LONGEST_LAG, LONGEST_ROW, MOST_LAG = 40, 600, 65535
 MESH = 1000  # Vertices from which on a stem may be a whole mesh.
 SHORT_STEM = 16  # Vertices up to which many stems are likely to be alike, which a lag of them all tells apart.
 

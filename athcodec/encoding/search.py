@@ -132,8 +132,9 @@ class Search:
         all waves of its segment, and learned time bases do not always help."""
         trials = (self.of_sample or self).trials
         in_short = Search(replace(self.trials, source=short, samples=samples_of(short)), self.effort, self.ratios)
-        most = in_short.first_cost() / SHORT_SHARE  # A search that goes on shall not know what was learned for this.
-        return most < self.first_cost() and most < replace(trials).cost(trials.start.in_learned_bases())
+        most = in_short.first_cost() / SHORT_SHARE
+        apart = replace(trials)  # What a search chooses later may not depend on what was learned here.
+        return most < self.first_cost() and most < apart.cost(trials.start.in_learned_bases())
 
     def first_cost(self) -> float:
         """Return the bytes of a whole file at the settings that the search starts with."""

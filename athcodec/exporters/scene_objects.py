@@ -37,7 +37,7 @@ class SceneObject:
     corner_rows: slice
     details: dict[str, str]
     copies: int = 1  # its vertices and faces are so many copies of one shape
-    stated_copies: int = 1  # as many as the clip says, though a format may not have them as instances
+    stated_copies: int = 1  # The clip says so many; `copies` is 1 where they cannot be instances.
     target: Any = None  # The writer's own object for it.
     instancer: Any = None  # and of its copies
     width: float = 0.0  # the largest, of curves and points

@@ -50,13 +50,32 @@ from athcodec.sources.scene_objects import FACE_MATERIAL, OWN, SCHEME
 SAVE_BYTES = 16 << 20
 PRIMVARS = {"uv": "st", "colors": "displayColor"}
 TYPES = {  # By a row's shape and kind; the shape None stands for any number of values per row.
-    **{
-        kind: {(): name} | {(n,): f"{name}{n}" for n in (2, 3, 4)}
-        for kind, name in zip("fdei", ("Float", "Double", "Half", "Int"))
-    },
-    **{kind: {(): name} for kind, name in zip("uqQB?", ("UInt", "Int64", "UInt64", "UChar", "Bool"))},
+    "f": {(): "Float", (2,): "Float2", (3,): "Float3", (4,): "Float4"},
+    "d": {(): "Double", (2,): "Double2", (3,): "Double3", (4,): "Double4"},
+    "e": {(): "Half", (2,): "Half2", (3,): "Half3", (4,): "Half4"},
+    "i": {(): "Int", (2,): "Int2", (3,): "Int3", (4,): "Int4"},
+    "u": {(): "UInt"},
+    "q": {(): "Int64"},
+    "Q": {(): "UInt64"},
+    "B": {(): "UChar"},
+    "?": {(): "Bool"},
 }
-WIDER = dict(zip("?bhHBiIlqLQefd", "?iiiBiuqqQQefd"))
+WIDER = {
+    "?": "?",
+    "b": "i",
+    "h": "i",
+    "H": "i",
+    "B": "B",
+    "i": "i",
+    "I": "u",
+    "l": "q",
+    "q": "q",
+    "L": "Q",
+    "Q": "Q",
+    "e": "e",
+    "f": "f",
+    "d": "d",
+}
 NUMPY = {"i": "<i4", "u": "<u4", "q": "<i8", "Q": "<u8", "B": "u1", "?": "?", "e": "<f2", "f": "<f4", "d": "<f8"}
 MATERIALS = "materials"
 WIND = "wind"  # in what is known of an assembly: the text of its JSON

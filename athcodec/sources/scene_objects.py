@@ -30,7 +30,7 @@ CHANGING = (
     "with --only"
 )
 TWO_SIDES = {"doubleSided": True}  # glTF's material of faces that are seen from both sides and have no other
-SCHEME = "subdivisionScheme"  # in the details of a mesh, as USD has it; without it the faces are the surface
+SCHEME = "subdivisionScheme"  # The key of USD's word in the details of a mesh; without it the faces are the surface.
 SURFACE = ("holes", "holeIndices", "creaseIndices", "cornerIndices", "interpolateBoundary")  # They shape that surface.
 OWN = "athcodec"  # the namespace of what our writers add to files of other formats
 SCENE_KEYS = {"unit": str, "up_axis": str, "fps": float}  # Members of the metadata that some formats have no place for.

@@ -631,7 +631,7 @@ def _time_codes(stage: Usd.Stage, objects: list[_Prim], fps: float | None, irreg
         start, end = (samples[0], samples[-1]) if samples else (0.0, 0.0)
     if not (math.isfinite(start) and math.isfinite(end)):
         raise ClipError(f"time codes: got {start} to {end}, expected finite numbers")
-    elif not fps:
+    if not fps:
         times = np.array([time for time in _sampled(objects) if start <= time <= end])
         missed = np.abs(times - start - np.round(times - start)) > 1e-3
         warn_of_missed(times / own, missed, own, stage.GetRootLayer().realPath)
