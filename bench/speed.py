@@ -18,8 +18,11 @@ from statistics import median
 from typing import Any
 
 import h5py
+import scipy.sparse.csgraph
+import scipy.spatial  # noqa: F401
 
 import athcodec
+import athcodec.encoding.encoder
 from athcodec.encoding import sample
 from bench import data
 from bench.clips import add_clips, add_rel_error, read

@@ -9,6 +9,7 @@ from itertools import chain
 import numpy as np
 
 from athcodec.encoding.bounds import BoundOption
+from athcodec.encoding.choices.prediction import Way
 from athcodec.encoding.job import EncodingJob, EncodingOptions
 from athcodec.encoding.progress import ANALYSIS, FINDING, SURVEY, TRIAL, Work
 from athcodec.encoding.segment import Source
@@ -61,6 +62,7 @@ class _Trial:
         self._clip.rest_given = clip.rest_given
         self._frames_ratio = clip.frame_count / (stop - start)
         self._option, self._host_rest, self._work = option, host_rest, work
+        self._way: Way | None = None  # The best way to predict motion hardly depends on branches.
         self.least_work = LEAST_TRIALS * (TRIAL + ANALYSIS * clip.vertex_count * (stop - start))
 
     def size(self, branches: Found) -> tuple[float, bool]:
@@ -81,7 +83,9 @@ class _Trial:
         if self._option.target_size is not None:
             self._option = self._bound_of_target(job)
         with self._work.trying("branches", TRIAL_SHARE):
-            return job.tried(self._option.in_scene_units(source, job.file_size), self._work, self._frames_ratio)
+            bound = self._option.in_scene_units(source, job.file_size)
+            size, is_predicted, self._way = job.tried(bound, self._work, self._frames_ratio, self._way)
+            return size, is_predicted
 
     def _bound_of_target(self, job: EncodingJob) -> BoundOption:
         """Return the bound at which the branches tried first meet the target size; all are tried at it."""

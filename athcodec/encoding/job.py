@@ -29,7 +29,13 @@ from athcodec.decoding.decoder import Decoder
 from athcodec.encoding import polygons, streams, writing
 from athcodec.encoding import quantise as qz
 from athcodec.encoding.choices.levels import chosen_levels
-from athcodec.encoding.choices.prediction import FoundPrediction, best_prediction, code_predicted_segment, one_map_each
+from athcodec.encoding.choices.prediction import (
+    FoundPrediction,
+    Way,
+    best_prediction,
+    code_predicted_segment,
+    one_map_each,
+)
 from athcodec.encoding.features import Feature
 from athcodec.encoding.layers import (
     MOST_LAYERS,
@@ -44,7 +50,18 @@ from athcodec.encoding.layers import (
     step_factors,
 )
 from athcodec.encoding.motion import release_memory
-from athcodec.encoding.progress import FILE_BYTE, LEVEL_MOTION, MOTION, SURVEY, Progress, Work, allowed_work, silent
+from athcodec.encoding.progress import (
+    FILE_BYTE,
+    LEVEL_MOTION,
+    MOTION,
+    POSES,
+    READING,
+    SURVEY,
+    Progress,
+    Work,
+    allowed_work,
+    silent,
+)
 from athcodec.encoding.sample import is_small
 from athcodec.encoding.search import Search
 from athcodec.encoding.segment import CodedPrelude, Source, thread_count
@@ -381,27 +398,30 @@ class EncodingJob:
             low, high = (bound, high) if self.file_size(bound) == math.inf else (low, bound)
         return high
 
-    def tried(self, bound: float, work: Work, frames_ratio: float) -> tuple[float, bool]:
-        """Return about the bytes of a file of so many times the frames, as far as the work allowed tells, and whether
-        its motion is predicted; infinite if the bound cannot be kept."""
-        return self._holding(bound)._tried(bound, work, frames_ratio)
+    def tried(
+        self, bound: float, work: Work, frames_ratio: float, way: Way | None = None
+    ) -> tuple[float, bool, Way | None]:
+        """Return about the bytes of a file of so many times the frames, as far as the work allowed tells, whether its
+        motion is predicted, and the best way of that, unless one is given; infinite if the bound cannot be kept."""
+        return self._holding(bound)._tried(bound, work, frames_ratio, way)
 
-    def _tried(self, bound: float, work: Work, frames_ratio: float) -> tuple[float, bool]:
+    def _tried(self, bound: float, work: Work, frames_ratio: float, way: Way | None) -> tuple[float, bool, Way | None]:
         try:
             self._check(bound)
             if self.source.still:
-                return self.decide(bound).shared_bytes, False
+                return self.decide(bound).shared_bytes, False, None
             ath = self.seen.ath(self.thresholds(bound))
             search = Search.of(self.source, ath, bound, self.options.effort, work, self.options.jobs)
             unsearched = search.first_cost()
-            prediction = self._best_prediction(bound, unsearched, work)
+            prediction = self._best_prediction(bound, unsearched, work, way)
             if prediction is None:  # First settings rank branches as the work that is left for a search hardly does.
-                return search.expected(frames_ratio), False
+                return search.expected(frames_ratio), False, way
+            predicted = frames_ratio * prediction.bytes, True, prediction.way
             if prediction.bytes < SEARCH_SAVES * unsearched:
-                return frames_ratio * prediction.bytes, True
-            return min((search.tried(frames_ratio), False), (frames_ratio * prediction.bytes, True))
+                return predicted
+            return min((search.tried(frames_ratio), False, prediction.way), predicted)
         except BoundError:
-            return math.inf, False
+            return math.inf, False, way
 
     def decide(self, bound: float) -> _Decided:
         """Search for settings."""
@@ -436,6 +456,7 @@ class EncodingJob:
             work.allowed += work.done - done  # What does not jump has all its work left.
         if math.isfinite(unsearched):
             work.allowed -= FILE_BYTE * unsearched
+            search.keep_work_of_maps()
         start = search.trials.start
         is_rigid = (start.rigid > start.layer).any()  # Also in the last layer.
         prediction = None if is_rigid else self._best_prediction(bound, unsearched, work)
@@ -467,7 +488,8 @@ class EncodingJob:
         vertices, frames = self.clip.vertex_count, self.clip.frame_count
         layers = len(layer_ratios(self.options.ladder, bound, self.seen.diagonal))
         levels = int(self.source.hierarchy.branch_depth.max())
-        coding = (SURVEY + MOTION * (1 + layers) / 2 + LEVEL_MOTION * levels) * vertices * frames
+        coding = (READING + SURVEY + MOTION * (1 + layers) / 2 + LEVEL_MOTION * levels) * vertices * frames
+        coding += POSES * vertices
         return Work(allowed_work(vertices, frames, self.options.effort) - coding - self.spent, self.report)
 
     def _best_of(self, search: Search, choices: list[Choice], prelude: CodedPrelude) -> _Decided:
@@ -490,12 +512,14 @@ class EncodingJob:
         search = Search.of(self.source, ath, bound, self.options.effort, work, self.options.jobs)
         return self._best_of(search, *search.decide())
 
-    def _best_prediction(self, bound: float, most_bytes: float, work: Work) -> FoundPrediction | None:
+    def _best_prediction(
+        self, bound: float, most_bytes: float, work: Work, way: Way | None = None
+    ) -> FoundPrediction | None:
         """Return the best prediction; None: it is too large, or a hierarchy of maps is asked for, which it lacks."""
         is_out = self.options.tam or Feature.PREDICTED in self.options.without
         if is_out:
             return None
-        return best_prediction(self._long_segments, bound, most_bytes, work, self.options.smoothness)
+        return best_prediction(self._long_segments, bound, most_bytes, work, self.options.smoothness, way)
 
     @property
     def _long_segments(self) -> Source:

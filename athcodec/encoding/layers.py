@@ -71,6 +71,7 @@ LEAST_MEETING = 8  # Frames from which on the corrections of a segment meet thos
 RMS = MEASURES.index("rms")
 LEVEL_TOLERANCE = 1.0  # Largest RMS error of a level, over that of the level before.
 FINER_MAPS, COARSER_MAPS = 3, 16  # Half octaves by which steps of maps may move for that.
+MOST_POSES = 6  # Largest number of poses for each level by which steps of maps are moved.
 EVEN_SHARE = 0.05  # Share of the bytes of a segment that corrections may take for that.
 TIGHTER_LIMITS = tuple(2.0 ** (-i / 8) for i in range(1, 17))  # Limits of these corrections, over that of the layer.
 LEVEL_0_SHARE, LEVEL_0_BYTES = 1.03, 24  # Factor and bytes that a rest pose of level 0 may add to the first layer's.
@@ -609,7 +610,7 @@ class _EvenLevels:
 
     def __init__(self, coder: CodedMotion, shown: list[SegmentMotion], settings: Settings):
         self._coder, self._shown, self._steps = coder, shown, settings.node_steps.copy()
-        self._rounding = settings.rounding
+        self._rounding, self._poses = settings.rounding, MOST_POSES * len(shown)
         self.errors = [coder.error_at(motion, level) for level, motion in enumerate(shown)] + coder.errors
         for level in range(1, len(shown)):
             self._move(level, level, level, 0.5**0.5, FINER_MAPS)
@@ -633,7 +634,7 @@ class _EvenLevels:
         for _ in range(most):
             before = self.errors, self._steps
             excess = self._excess(worse, last)
-            if not self._is_worse(worse):
+            if self._poses <= 0 or not self._is_worse(worse):
                 return
             self._set(level, factor)
             if not self._excess(worse, last) < excess:
@@ -649,6 +650,7 @@ class _EvenLevels:
         self._analyse(moved)
         for level in range(moved, min(last + 1, len(self._shown))):
             self.errors[level] = self._coder.error_at(self._shown[level], level)
+            self._poses -= 1
 
     def _analyse(self, level: int) -> None:
         self._shown[level].analyse_nodes(self._coder.positions, self._steps, self._rounding, level)

@@ -16,6 +16,8 @@ from athcodec.encoding.sample import is_small, sample_vertices
 Progress = Callable[[str, float], None]
 
 # Microseconds of a thread, measured on clips of many kinds.
+READING = 0.2  # For a vertex in a frame that is read; formats differ.
+POSES = 20  # For a vertex whose poses are compared before anything is tried.
 SURVEY, MOTION = 0.11, 0.24  # For a vertex in a frame of the survey, and of a layer that is coded.
 ANALYSIS, PREDICTION = 0.09, 0.3  # For a vertex in a frame that is tried: transformed, predicted.
 MAPS = 0.008  # For a vertex in a frame at a level whose maps are tried.
@@ -23,15 +25,16 @@ TURNS = 0.03  # For the same where stems turn with what carries them.
 TRIAL = 1000  # For a trial, however small.
 BYTE, FILE_BYTE = 0.15, 2.0  # For a byte of a stream that is tried, and of a file that is coded.
 CORRECTION = 4  # For a correction.
-LEVEL = 6  # For a vertex to which the maps of a level are fitted in a few frames.
-LEVEL_MOTION = 0.06  # For a vertex in a frame at a level of the hierarchy of a file.
-POSE = 1.0  # For a vertex of a rest pose that is coded.
+LEVEL = 1.7  # For a vertex to which the maps of a level are fitted in a few frames.
+LEVEL_MOTION = 0.09  # For a vertex in a frame at a level of the hierarchy of a file.
+START = 25  # For a vertex of which the settings that a search starts with are found.
+POSE = 2.5  # For a vertex of a rest pose that is coded.
 COMPONENT = 0.001  # For a vertex and a pair of frames of which components over time are made.
 FINDING = 60  # For a vertex whose branch is sought by motion.
 BRANCH_SHARE = 0.45  # Largest share of all work that finding branches takes.
 LEARNING = 0.2  # For a vertex in a frame from which modes are learned.
 LEAST_WORK, WORK = 3e6, 5.0  # An encoding may take so much, and so much more for each vertex in a frame.
-EFFORTS = {"fast": math.inf, "default": 0.8, "best": 8.0}  # Factors on it, which leave room for what is not counted.
+EFFORTS = {"fast": math.inf, "default": 1.2, "best": 8.0}  # Factors on it.
 
 TRIALS = {"fast": 7, "default": 31, "best": 50}  # Trials that a search is expected to take as long as, by effort.
 LAYER_TRIALS = {"fast": 3, "default": 24, "best": 10}  # Trials that layers of precision take in addition.

@@ -13,13 +13,13 @@ from functools import cached_property
 import numpy as np
 
 from athcodec.encoding.choices import forms, learned_bases, learned_pieces, rotations
-from athcodec.encoding.choices.node_steps import best_node_steps, cost_with_maps, inner_nodes
+from athcodec.encoding.choices.node_steps import best_node_steps, cost_with_maps, inner_nodes, work_of_steps
 from athcodec.encoding.choices.reference import mean_pose
 from athcodec.encoding.choices.rest import best_slack, with_slack
 from athcodec.encoding.choices.rigid import best_freedom, calm_parts
 from athcodec.encoding.choices.steps import best_level_steps, best_steps, finer_steps, walked
 from athcodec.encoding.features import Feature
-from athcodec.encoding.progress import ANALYSIS, LEARNING, TRIAL, Work, expected_trials
+from athcodec.encoding.progress import ANALYSIS, LEARNING, START, TRIAL, Work, expected_trials
 from athcodec.encoding.sample import ExtrapolationFactors, is_small, sample_plant
 from athcodec.encoding.segment import CodedPrelude, Source, branch_records
 from athcodec.encoding.segment_samples import samples_of
@@ -121,6 +121,7 @@ class Search:
         """Return the search for a whole plant."""
         samples = samples_of(source)
         start = first_settings(source, ath, bound, samples, ratios)
+        work.add(START * source.clip.vertex_count)
         search = cls(Trials(source, ath, start, samples, jobs, work), effort, ratios)
         trial = TRIAL + (search.of_sample or search).trials.work_of(ANALYSIS)
         expected = trial * expected_trials(effort, search.trials.is_layered, search._is_small)
@@ -135,6 +136,10 @@ class Search:
         most = in_short.first_cost() / SHORT_SHARE
         apart = replace(trials)  # What a search chooses later may not depend on what was learned here.
         return most < self.first_cost() and most < apart.cost(trials.start.in_learned_bases())
+
+    def keep_work_of_maps(self) -> None:
+        """Leave the work of choosing maps of coarse levels, which comes last and is always done."""
+        self.trials.work.allowed -= work_of_steps((self.of_sample or self).trials)
 
     def first_cost(self) -> float:
         """Return the bytes of a whole file at the settings that the search starts with."""

@@ -50,7 +50,7 @@ ROWS_AT_ONCE = 1 << 14  # Rows of coefficients whose moments are added at once.
 WORK_BYTES = 1 << 28  # Memory of the segments coded at once, unless `jobs` says how many.
 SAMPLED = 4000  # Number of vertices from which trials find corrections of a sample of them only.
 WELD_TOLERANCE = 1e-7  # Size of the cells, in diagonals, in which vertices share a place.
-LEAST_SAMPLED, SPARSE = 1000, 16  # Vertices from which one of so many is enough if it takes enough corrections.
+LEAST_SAMPLED, SPARSE = 256, 16  # Vertices from which one of so many is enough if it takes enough corrections.
 ENOUGH, ENOUGH_SHARE = 2000, 0.015  # Corrections that show the bytes of all, and more for each vertex in a frame.
 SEGMENT_WORK = 9  # Memory of a segment while it is coded, over its float32 positions.
 

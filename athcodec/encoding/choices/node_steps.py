@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_left
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -23,6 +24,17 @@ FILE_SHARE, FEW_BYTES = 0.02, 320  # The maps may take this share of the file, o
 SMALL_FILE_SHARE = 0.04  # A file without layers may give its maps this share if that is less than FEW_BYTES.
 ERROR_TOLERANCE = 1.08  # Cheaper maps may err by this much more than the finest ones.
 FRAMES = 8  # Frames by which the error of a level is measured.
+USUAL_TRIALS = 6  # Steps that are usually tried.
+
+
+def work_of_steps(trials: Trials) -> float:
+    """Return about the work of choosing steps, which is done however little is left."""
+    levels, vertices = trials.levels, trials.source.clip.vertex_count
+    if levels == 1:
+        return 0.0
+    return (
+        trials.work_of(progress.ANALYSIS + USUAL_TRIALS * progress.MAPS * levels) + progress.LEVEL * vertices * levels
+    )
 
 
 def best_node_steps(settings: Settings, trials: Trials) -> Settings:
@@ -30,12 +42,11 @@ def best_node_steps(settings: Settings, trials: Trials) -> Settings:
     prelude = trials.prelude(settings)
     errors = _level_errors(trials, prelude.plan, settings.bound)
     sample = trials.samples[trials.middle].positions
-    segment = trials.analysed(settings, trials.middle, trials.learned_modes(prelude.plan, settings))
+    segment = _analysed(settings, trials)
     rest = trials.level_costs(settings).sum() + trials.prelude_bytes(settings)
     least = min(FEW_BYTES, SMALL_FILE_SHARE * rest) if _is_played_whole(trials) else FEW_BYTES
     allowed = max(least, FILE_SHARE / (1 - FILE_SHARE) * rest)
     tried = [quality * errors for quality in _qualities(trials)]
-    trials.work.add(trials.work_of(progress.ANALYSIS))
 
     def analyse(number: int) -> np.ndarray:
         segment.clear_nodes()
@@ -48,25 +59,33 @@ def best_node_steps(settings: Settings, trials: Trials) -> Settings:
         return _map_bytes(segment, trials) <= allowed
 
     finest = bisect_left(range(len(tried) - 1), True, key=fits)
-    chosen, limits = analyse(finest), _errors_of_maps(prelude, segment, sample)
+    chosen, limits = analyse(finest), np.array(list(_errors_of_maps(prelude, segment, sample)))
     limits[1:] = np.minimum(ERROR_TOLERANCE * limits[1:], limits[:-1])  # Deeper levels stay better.
     for number in range(finest + 1, len(tried)):
         steps = analyse(number)
-        if not (_errors_of_maps(prelude, segment, sample) <= limits).all():
+        if any(error > limit for error, limit in zip(_errors_of_maps(prelude, segment, sample), limits)):
             break
         chosen = steps
     return replace(settings, node_steps=chosen)
 
 
 def cost_with_maps(settings: Settings, trials: Trials) -> float:
-    """Return the bytes of a whole file with the maps of nodes; of layers without, because others choose their steps."""
+    """Return the bytes of a whole file with maps of nodes as fine as their levels' errors; of layers without, because
+    others choose their steps."""
     if trials.is_layered:
         return trials.cost(settings)
-    settings = best_node_steps(settings, trials)
-    modes = trials.learned_modes(trials.prelude(settings).plan, settings)
-    segment = trials.analysed(settings, trials.middle, modes)
-    segment.analyse_nodes(trials.samples[trials.middle].positions, settings.node_steps, settings.rounding)
+    segment = _analysed(settings, trials)
+    steps = _level_errors(trials, segment.plan, settings.bound)
+    segment.analyse_nodes(trials.samples[trials.middle].positions, steps, settings.rounding)
+    trials.work.add(trials.work_of(progress.MAPS * trials.levels))
     return trials.cost(settings) + _map_bytes(segment, trials)
+
+
+def _analysed(settings: Settings, trials: Trials) -> SegmentMotion:
+    """Return the sample that maps are tried on, which has none yet."""
+    modes = trials.learned_modes(trials.prelude(settings).plan, settings)
+    trials.work.add(trials.work_of(progress.ANALYSIS))
+    return trials.analysed(settings, trials.middle, modes)
 
 
 def inner_nodes(source: Source, ath: Ath, levels: int) -> np.ndarray:
@@ -121,7 +140,8 @@ def _map_levels(plan: Plan) -> list[int]:
     return [level for level in range(plan.level_count) if plan.has_affines(level)]
 
 
-def _errors_of_maps(prelude: CodedPrelude, segment: SegmentMotion, sample: np.ndarray) -> np.ndarray:
-    """Return the RMS errors of a sample at the levels that have maps."""
-    poses = (segment.pose(level, prelude.origin, prelude.dtype) for level in _map_levels(prelude.plan))
-    return np.array([position_errors(pose, sample, prelude.origin, prelude.plan.pool)[2] for pose in poses])
+def _errors_of_maps(prelude: CodedPrelude, segment: SegmentMotion, sample: np.ndarray) -> Iterator[float]:
+    """Yield the RMS errors of a sample at the levels that have maps."""
+    for level in _map_levels(prelude.plan):
+        pose = segment.pose(level, prelude.origin, prelude.dtype)
+        yield position_errors(pose, sample, prelude.origin, prelude.plan.pool)[2]

@@ -10,6 +10,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cache
+from typing import NamedTuple
 
 import numpy as np
 
@@ -60,19 +61,30 @@ def _settings(source: Source, ath: Ath, bound: float, rest_step: float) -> Setti
     return with_best_rest(source, ath, settings)
 
 
+class Way(NamedTuple):
+    """How motion is predicted: the step of the rest pose, in bounds, what positions are rounded to, and the largest
+    error, over the limit."""
+
+    rest_ratio: float
+    lattice: bool = CUBES
+    error_share: float = 1.0
+
+
 @dataclass(frozen=True)
 class FoundPrediction:
     """The choice that makes the smallest file with predicted motion, and its bytes but for what all files have."""
 
+    way: Way
     choice: Choice
     bytes: float
     twitches: bool
 
 
 def best_prediction(
-    source: Source, bound: float, most_bytes: float, work: Work, smoothness: str = "default"
+    source: Source, bound: float, most_bytes: float, work: Work, smoothness: str = "default", only: Way | None = None
 ) -> FoundPrediction | None:
-    """Return the best prediction; None: it takes more than `most_bytes`, or cannot keep the bound."""
+    """Return the best prediction, in one way only if that is known; None: it takes more than `most_bytes`, or cannot
+    keep the bound."""
     ath = one_map_each(source.seen)
     limit = source.rest_limit(source.smallest_bound(bound))
     by_ratio = cache(lambda ratio: _settings(source, ath, bound, ratio * limit))
@@ -84,31 +96,35 @@ def best_prediction(
             preludes[settings.rest_step] = CodedPrelude(source, ath, settings, predicted=True)
         return preludes[settings.rest_step]
 
-    def coded(settings: Settings, lattice: bool = CUBES, error_share: float = 1.0) -> FoundPrediction:
-        stepped = replace(settings, step=_largest_step(error_share * settings.limit, lattice))
-        choice = Choice(stepped, stepped, None, predicted=lattice, error_share=error_share)
+    def coded(way: Way) -> FoundPrediction:
+        settings = by_ratio(way.rest_ratio)
+        stepped = replace(settings, step=_largest_step(way.error_share * settings.limit, way.lattice))
+        choice = Choice(stepped, stepped, None, predicted=way.lattice, error_share=way.error_share)
         work.add(PREDICTION * source.clip.vertex_count * sum(sample.positions.shape[2] for sample in samples))
         try:
             prelude = prelude_of(settings)
             parts = [(sample, *_predicted(prelude, choice, sample.positions)) for sample in samples]
         except BoundError:
-            return FoundPrediction(choice, math.inf, False)
+            return FoundPrediction(way, choice, math.inf, False)
         motion = sum(len(payload) * sample.scale for sample, payload, _ in parts)
         twitches = any(_twitches(shown, sample.positions, settings.limit) for sample, _, shown in parts)
-        return FoundPrediction(choice, motion + prelude.prelude_bytes, twitches)
+        return FoundPrediction(way, choice, motion + prelude.prelude_bytes, twitches)
 
     def best(share: float, most: float, lattice: bool) -> FoundPrediction:
         """Return the best prediction whose errors are at most a share of the limit; far above `most`, any."""
         ratios = sorted(REST_STEPS, key=lambda ratio: abs(math.log(ratio / share)))[:REST_TRIALS]
-        found = coded(by_ratio(ratios[0]), CUBES, share)
+        found = coded(Way(ratios[0], error_share=share))
         if found.bytes > HOPELESS * most:
             return found
-        tried = [found, *(coded(by_ratio(ratio), CUBES, share) for ratio in ratios[1:])]
+        tried = [found, *(coded(Way(ratio, error_share=share)) for ratio in ratios[1:])]
         found = min(tried, key=lambda one: one.bytes)
         if not lattice or Feature.LATTICE in source.without:
             return found
-        return min(found, coded(found.choice.settings, LATTICE, share), key=lambda one: one.bytes)
+        return min(found, coded(found.way._replace(lattice=LATTICE)), key=lambda one: one.bytes)
 
+    if only is not None:
+        found = coded(only)
+        return found if found.bytes < most_bytes else None
     some = by_ratio(0.5)
     try:
         if sum(_begun(prelude_of(some), some, sample) for sample in samples) > TOO_MANY * most_bytes:
