@@ -29,12 +29,13 @@ LEVEL = 1.7  # For a vertex to which the maps of a level are fitted in a few fra
 LEVEL_MOTION = 0.09  # For a vertex in a frame at a level of the hierarchy of a file.
 START = 25  # For a vertex of which the settings that a search starts with are found.
 POSE = 2.5  # For a vertex of a rest pose that is coded.
-COMPONENT = 0.001  # For a vertex and a pair of frames of which components over time are made.
+COMPONENT = 0.002  # For a vertex and a pair of frames of which components over time are made.
+EIGENVECTOR = 0.0013  # For three frames, each any of a segment, of which a level's components over time are made.
 FINDING = 60  # For a vertex whose branch is sought by motion.
 BRANCH_SHARE = 0.45  # Largest share of all work that finding branches takes.
 LEARNING = 0.2  # For a vertex in a frame from which modes are learned.
 LEAST_WORK, WORK = 3e6, 5.0  # An encoding may take so much, and so much more for each vertex in a frame.
-EFFORTS = {"fast": math.inf, "default": 1.2, "best": 8.0}  # Factors on it.
+EFFORTS = {"fast": math.inf, "default": 1.15, "best": 8.0}  # Factors on it.
 
 TRIALS = {"fast": 7, "default": 31, "best": 50}  # Trials that a search is expected to take as long as, by effort.
 LAYER_TRIALS = {"fast": 3, "default": 24, "best": 10}  # Trials that layers of precision take in addition.

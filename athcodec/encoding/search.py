@@ -38,7 +38,7 @@ SETTLING_ROUNDS = 64  # Largest number of times that the choices of a small clip
 STEP_TRIALS, FIRST_LAYER_TRIALS = 12, 6  # Trials for which choices leave work: of steps, and of the first of layers.
 SEARCHED_SHARE = 0.5  # Share of the bytes of motion at its first settings that a search usually comes down to.
 SHORT_SHARE = 0.75  # Share of the bytes at which short segments are taken.
-LEAST_TRIALS = 12  # Trials without which another reference pose is not tried.
+LEAST_TRIALS = 36  # Trials without which another reference pose is not tried.
 
 Choose = Callable[[Settings, Trials], Settings]
 

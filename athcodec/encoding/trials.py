@@ -259,6 +259,7 @@ class Trials:
             levels = [*(level for level in range(self.levels) if plan.has_stems(level)), None]
             longest = max(sample.positions.shape[2] for sample in self.samples)
             self.work.add(self.work_of(progress.ANALYSIS + progress.COMPONENT * longest))
+            self.work.add(progress.EIGENVECTOR * longest**3 * len(levels) * len(self.samples))
             learned = [
                 time_components(plan, settings.of_segment(sample.whole_loop), sample.positions, levels)
                 for sample in self.samples

@@ -43,9 +43,7 @@ def best_node_steps(settings: Settings, trials: Trials) -> Settings:
     errors = _level_errors(trials, prelude.plan, settings.bound)
     sample = trials.samples[trials.middle].positions
     segment = _analysed(settings, trials)
-    rest = trials.level_costs(settings).sum() + trials.prelude_bytes(settings)
-    least = min(FEW_BYTES, SMALL_FILE_SHARE * rest) if _is_played_whole(trials) else FEW_BYTES
-    allowed = max(least, FILE_SHARE / (1 - FILE_SHARE) * rest)
+    allowed = _allowed_bytes(settings, trials)
     tried = [quality * errors for quality in _qualities(trials)]
 
     def analyse(number: int) -> np.ndarray:
@@ -78,7 +76,14 @@ def cost_with_maps(settings: Settings, trials: Trials) -> float:
     steps = _level_errors(trials, segment.plan, settings.bound)
     segment.analyse_nodes(trials.samples[trials.middle].positions, steps, settings.rounding)
     trials.work.add(trials.work_of(progress.MAPS * trials.levels))
-    return trials.cost(settings) + _map_bytes(segment, trials)
+    return trials.cost(settings) + min(_map_bytes(segment, trials), _allowed_bytes(settings, trials))
+
+
+def _allowed_bytes(settings: Settings, trials: Trials) -> float:
+    """Return the bytes that maps may take."""
+    rest = trials.level_costs(settings).sum() + trials.prelude_bytes(settings)
+    least = min(FEW_BYTES, SMALL_FILE_SHARE * rest) if _is_played_whole(trials) else FEW_BYTES
+    return max(least, FILE_SHARE / (1 - FILE_SHARE) * rest)
 
 
 def _analysed(settings: Settings, trials: Trials) -> SegmentMotion:
