@@ -83,7 +83,7 @@ from athcodec.motion.polygons import POLYGON_ARRAYS, Polygons, type_code
 from athcodec.motion.presence import parts_hidden_far_away
 from athcodec.motion.thresholds import THRESHOLDS, Thresholds
 from athcodec.motion.units import Length
-from athcodec.options import DEFAULT_LADDER, EFFORTS, MAX_SEGMENT, MIN_SEGMENT, SMOOTHNESS, ladder_of, whole
+from athcodec.options import DEFAULT_LADDER, EFFORTS, LADDERS, MAX_SEGMENT, MIN_SEGMENT, SMOOTHNESS, ladder_of, whole
 
 SPOOL_BYTES = 64 << 20  # Bytes of chunks that are held in memory and not in a temporary file.
 CHUNK_BYTES, LEVEL_BYTES = 6, 6  # Bytes of the front for a chunk, and for the errors of a level and segment.
@@ -446,6 +446,8 @@ class EncodingJob:
             return self._layered(ath, choice, CodedPrelude(self.source, ath, choice.settings))
         share = PREDICTED_SHARE if ratio > 1 else 1.0
         search = Search.of(self.source, ath, bound, self.options.effort, work, self.options.jobs, ratios)
+        if self.options.ladder == LADDERS[DEFAULT_LADDER] and search.levels_need_own_bases():
+            return self._with_one_layer()._decide(bound, work)
         unsearched = share * search.first_cost()
         short = self._in_short_segments()
         frames = short.source.coded_frames / len(short.source.segments)  # Fewer than a segment has where many are held.
@@ -475,6 +477,9 @@ class EncodingJob:
             if prediction is None:
                 raise
         return self._predicted(prediction.choice)
+
+    def _with_one_layer(self) -> EncodingJob:
+        return dataclasses.replace(self, options=dataclasses.replace(self.options, ladder=()))
 
     def _in_short_segments(self) -> EncodingJob:
         """Return the job in short segments unless their length is given."""
@@ -564,6 +569,8 @@ class EncodingJob:
         options = self.options
         if decided.choice.predicted is None:
             options = dataclasses.replace(options, segment_frames=decided.source.segment_frames)
+        if len(decided.layers.each) == 1:
+            options = dataclasses.replace(options, ladder=())
         return Draft(
             decided.choice,
             self.seen,

@@ -61,7 +61,7 @@ from athcodec.errors import BoundError
 
 # Steps of the first layer and of others before the last, over that of a file whose bound is the error that the layer
 # holds. Where there are leaves, corrections take more bytes than finer steps.
-STEP_FACTORS, LEAVES_STEP_FACTORS = (1.7, 1.0), (0.8, 0.8)
+STEP_FACTORS, LEAVES_STEP_FACTORS = (1.7, 1.25), (0.8, 0.8)
 LEAST_ABOVE_BOUND, LEAST_APART = 4.0, 2.5  # Errors of layers over the bound, and over the next error of a ladder.
 MOST_RATIO = 1 << 14  # Ratio of the steps of neighbouring layers.
 ROUNDED = 1 + 1e-9  # Factor before rounding down, because errors are rounded numbers themselves.

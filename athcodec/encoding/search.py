@@ -38,6 +38,7 @@ SETTLING_ROUNDS = 64  # Largest number of times that the choices of a small clip
 STEP_TRIALS, FIRST_LAYER_TRIALS = 12, 6  # Trials for which choices leave work: of steps, and of the first of layers.
 SEARCHED_SHARE = 0.5  # Share of the bytes of motion at its first settings that a search usually comes down to.
 SHORT_SHARE = 0.75  # Share of the bytes at which short segments are taken.
+OWN_BASES_SHARE = 0.8  # Share of the bytes at which time bases of each level are taken, which layers cannot have.
 LEAST_TRIALS = 36  # Trials without which another reference pose is not tried.
 
 Choose = Callable[[Settings, Trials], Settings]
@@ -136,6 +137,19 @@ class Search:
         most = in_short.first_cost() / SHORT_SHARE
         apart = replace(trials)  # What a search chooses later may not depend on what was learned here.
         return most < self.first_cost() and most < apart.cost(trials.start.in_learned_bases())
+
+    def levels_need_own_bases(self) -> bool:
+        """Return whether a file is much smaller if each level learns a time basis of its own, as only a single layer
+        can."""
+        trials = (self.of_sample or self).trials
+        start, apart = trials.start, replace(trials)  # What a search chooses later may not depend on what is learned.
+        own = start.in_learned_bases()
+        if not trials.is_layered or trials.levels <= 2 or trials.without(Feature.TIME_BASES):
+            return False
+        for other in (start, replace(own, common_basis=True)):
+            if apart.costs([own])[0] > OWN_BASES_SHARE * apart.costs([other])[0]:
+                return False
+        return True
 
     def keep_work_of_maps(self) -> None:
         """Leave the work of choosing maps of coarse levels, which comes last and is always done."""
