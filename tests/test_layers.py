@@ -54,14 +54,14 @@ def check_levels(clip, path, name: str | None = None) -> None:
 
 
 def test_a_ladder_has_a_layer_for_each_error_that_is_well_above_the_bound():
-    assert layer_ratios((1e-2, 1e-3, 1e-4), 1e-4, 1.0) == [170, 10, 1]
+    assert layer_ratios((1e-2, 1e-3, 1e-4), 1e-4, 1.0) == [170, 12, 1]
     assert layer_ratios((1e-2, 1e-3, 1e-4), 5e-4, 1.0) == [34, 1]
     assert layer_ratios((1e-2, 9e-3), 1e-4, 1.0) == [170, 1]
     assert layer_ratios((), 1e-4, 1.0) == layer_ratios((1e-4, 1e-5), 1e-4, 1.0) == [1]
 
 
 def test_errors_far_above_the_bound_get_layers_in_between(bushy_clip, tmp_path):
-    assert layer_ratios((1e-1, 1e-2), 1e-7, 1.0) == [1_700_000, 100_000, 316, 1]
+    assert layer_ratios((1e-1, 1e-2), 1e-7, 1.0) == [1_700_000, 125_000, 353, 1]
     for ladder in ((1e-1,), (1e-2, 1e-3)):
         made = athcodec.encode(bushy_clip, tmp_path / "a.ath", ladder=ladder, effort="fast", lossless=True)
         with athcodec.open(made.path) as played:

@@ -29,6 +29,25 @@ def hit_by_a_gust(seed: int = 5, frames: int = 90) -> athcodec.MotionClip:
     return clip_of(bones, bones.bent(turns))
 
 
+def in_series_of_levels(seed: int = 5, frames: int = 128, count: int = 12) -> athcodec.MotionClip:
+    """A shrub each level of which bends by a few series of its own, as plants do that grow by rules."""
+    bones, rng = Bones.of(grow(400, 4, 8.0, seed)), np.random.default_rng(seed)
+    depth = np.zeros(len(bones.branch_parent), int)
+    for branch, parent in enumerate(bones.branch_parent):
+        depth[branch] = depth[parent] + 1 if parent >= 0 else 0
+    series, mix = rng.normal(size=(frames, depth.max() + 1, count)), rng.normal(size=(len(depth), count))
+    turns = 0.05 * np.einsum("tbk,bk->tb", series[:, depth], mix)
+    return clip_of(bones, bones.bent(turns[..., None] * np.array([1, 0, 0.5])))
+
+
+def test_levels_that_need_bases_of_their_own_get_one_layer_unless_layers_are_named(tmp_path):
+    def size(**options) -> int:
+        return athcodec.encode(clip, tmp_path / "a.ath", attributes="none", **options).bytes
+
+    clip = in_series_of_levels()
+    assert size() <= 1.01 * size(ladder="none") < 0.8 * size(ladder=(1e-2, 1e-3))
+
+
 def stems_heads(data: bytes) -> list[tuple[int, int, int]]:
     """Basis, Basis_Level and Basis_Length of each level with STEMS, of files of one segment and layer."""
     file = File(data)
