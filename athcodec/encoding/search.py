@@ -23,7 +23,7 @@ from athcodec.encoding.progress import ANALYSIS, LEARNING, TRIAL, Work, expected
 from athcodec.encoding.sample import ExtrapolationFactors, is_small, sample_plant
 from athcodec.encoding.segment import CodedPrelude, Source, branch_records
 from athcodec.encoding.segment_samples import samples_of
-from athcodec.encoding.settings import OF_BRANCHES, OF_SAMPLE, Choice, Settings
+from athcodec.encoding.settings import OF_SAMPLE, Choice, Settings
 from athcodec.encoding.start import first_settings
 from athcodec.encoding.survey import Ath
 from athcodec.encoding.trials import Trials, distinct
@@ -328,12 +328,7 @@ class Search:
         sample = sample_plant(trials.source, trials.ath, self.effort)
         if sample is None:
             return None
-        some = replace(
-            start,
-            **{name: getattr(start, name)[sample.branches] for name in OF_BRANCHES},
-            limit=start.limit if np.isscalar(start.limit) else start.limit[sample.vertices],
-            shape_of=None,
-        )
+        some = sample.like(replace(start, shape_of=None))
         extrapolation = ExtrapolationFactors.of(
             branch_records(trials.source.hierarchy, trials.ath, start),
             branch_records(sample.source.hierarchy, sample.ath, some),
