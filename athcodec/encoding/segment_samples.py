@@ -66,6 +66,8 @@ def usual_change(samples: Sequence[SegmentSample]) -> float:
 def _middle(positions: np.ndarray) -> np.ndarray:
     """Return at most DEFAULT_SEGMENT frames of a segment, so that longer segments do not slow the search."""
     first = max(0, positions.shape[2] - DEFAULT_SEGMENT) // 2
+    if positions.shape[2] <= DEFAULT_SEGMENT:
+        return positions  # A copy would be another array than the one that all callers share.
     return np.ascontiguousarray(positions[:, :, first : first + DEFAULT_SEGMENT])
 
 
