@@ -532,7 +532,8 @@ class CodedMotion:
             self._join_level(level, end, positions, layer)
         with self._corrected_as_shown(level, positions):
             own = self._source.last_shown(positions) if self._loops else None
-            self.flaws.append(self._source.flaws(positions, own if end is None else end.shown[0]))
+            shown = own if end is None else end.shown[0]
+            self.flaws.append(self._source.flaws(positions, shown, self.errors[level][0]))
 
     @cached_property
     def _wanted_end(self) -> np.ndarray:
