@@ -20,7 +20,8 @@ from athcodec.motion.frames import Frames
 from athcodec.motion.hierarchy import Hierarchy
 
 LARGE = 5_000  # Vertices up to which a plant is not sampled.
-LEAST_SAMPLE, MOST_SAMPLE = 3_500, 1 << 16  # Vertices of a sample.
+LEAST_SAMPLE, ENOUGH, MOST_SAMPLE = 3_500, 4_000, 1 << 16  # Vertices of a sample; LEAST_SHARE up to ENOUGH.
+LEAST_SHARE = 0.4  # Least share of the plant in a sample.
 SEGMENT_SHARE = 1 / 64  # Share of the plant that each segment of the clip adds to a sample.
 SMALL = 1 << 18  # Vertices times frames up to which trials are so cheap that choices are made again.
 SUBTREES = 8  # Least number of subtrees in a sample.
@@ -158,7 +159,8 @@ def sample_vertices(vertices: int, segments: int, frames: int, effort: str) -> i
     """Return about how many vertices a sample has; None: the plant is not sampled. frames: of a segment."""
     if vertices <= LARGE or effort == "best":
         return None
-    return min(max(int(vertices * segments * SEGMENT_SHARE), LEAST_SAMPLE, SMALL // frames), MOST_SAMPLE)
+    least = min(max(int(vertices * LEAST_SHARE), LEAST_SAMPLE), ENOUGH)
+    return min(max(int(vertices * segments * SEGMENT_SHARE), least, SMALL // frames), MOST_SAMPLE)
 
 
 def _even_branches(hierarchy: Hierarchy, wanted: int, deepest: int) -> np.ndarray:
