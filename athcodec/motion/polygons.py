@@ -59,8 +59,8 @@ class Polygons:
         """Return the polygons whose corners all are among these vertices, ascending, by their numbers there."""
         number = np.minimum(np.searchsorted(vertices, self.corners), len(vertices) - 1).astype(np.int32)
         counts = np.full(self.face_count, self.columns, np.uint32) if self.counts is None else self.counts
-        face, gone = np.repeat(np.arange(self.face_count), counts), vertices[number] != self.corners
-        kept = np.bincount(face, gone, self.face_count) == 0
+        face = np.repeat(np.arange(self.face_count), counts)
+        kept = np.bincount(face, vertices[number] != self.corners, self.face_count) == 0
         some = None if self.counts is None else counts[kept]
         return replace(self, corners=number[kept[face]], counts=some, face_count=int(kept.sum()))
 

@@ -265,28 +265,27 @@ static void rotation_of_vectors(const double H[9], double R[9])
 }
 
 /* Turns rotations, one in each lane, by a step of Newton's method towards those nearest to H, for which the product of H
- * and the transpose of R is symmetric. Fills the squares of the turns: FAR where R is far from the nearest rotation. */
+ * and the transpose of R is symmetric. Fills the squares of the turns; 1 where R is too far from the nearest rotation. */
 ATH_INLINE void turn_closer(double H[9][ATH_LANES], double R[9][ATH_LANES], double size2[ATH_LANES])
 {
     for (int32_t l = 0; l < ATH_LANES; l++) {
         double M[9], q[9], last[9];
         for (int32_t k = 0; k < 9; k++) last[k] = R[k][l];
-        for (int32_t i = 0; i < 3; i++)
-            for (int32_t k = 0; k < 3; k++)
-                M[3 * i + k] =
-                    H[3 * i][l] * last[3 * k] + H[3 * i + 1][l] * last[3 * k + 1] + H[3 * i + 2][l] * last[3 * k + 2];
+        for (int32_t k = 0; k < 9; k++)
+            M[k] = H[k - k % 3][l] * last[k % 3 * 3] + H[k - k % 3 + 1][l] * last[k % 3 * 3 + 1]
+                   + H[k - k % 3 + 2][l] * last[k % 3 * 3 + 2];
         double wx = M[7] - M[5], wy = M[2] - M[6], wz = M[3] - M[1];
         double a = M[4] + M[8], b = M[0] + M[8], c = M[0] + M[4];
         double d = -0.5 * (M[1] + M[3]), e = -0.5 * (M[2] + M[6]), f = -0.5 * (M[5] + M[7]);
         double xx = b * c - f * f, xy = e * f - d * c, xz = d * f - e * b, yy = a * c - e * e, yz = d * e - a * f;
         double zz = a * b - d * d, all = a * xx + d * xy + e * xz, scale = 1.0 / all;
         double x = (xx * wx + xy * wy + xz * wz) * scale, y = (xy * wx + yy * wy + yz * wz) * scale;
-        double z = (xz * wx + yz * wy + zz * wz) * scale, turn2 = x * x + y * y + z * z;
-        size2[l] = ((a > 0.0) & (zz > 0.0) & (all > 0.0)) ? turn2 : 1.0; /* else the matrix is not positive definite */
+        double z = (xz * wx + yz * wy + zz * wz) * scale;
+        size2[l] = ((a > 0.0) & (zz > 0.0) & (all > 0.0)) ? x * x + y * y + z * z : 1.0; /* if positive definite */
         rational_rotation(0.25 * x, 0.25 * y, 0.25 * z, q);
-        for (int32_t i = 0; i < 3; i++)
-            for (int32_t k = 0; k < 3; k++)
-                R[3 * i + k][l] = q[3 * i] * last[k] + q[3 * i + 1] * last[3 + k] + q[3 * i + 2] * last[6 + k];
+        for (int32_t k = 0; k < 9; k++)
+            R[k][l] =
+                q[k - k % 3] * last[k % 3] + q[k - k % 3 + 1] * last[3 + k % 3] + q[k - k % 3 + 2] * last[6 + k % 3];
     }
 }
 
@@ -295,21 +294,19 @@ ATH_HOT static void nearest_rotations(double H[9][ATH_LANES], const double befor
 {
     enum { STEPS = 8 };
     static const double far_turn = 0.25, close_turn = 1e-13; /* squared radians */
-    double size2[ATH_LANES], own[9], nearest[9];
-    uint8_t is_far[ATH_LANES] = {0};
+    double size2[ATH_LANES], most[ATH_LANES] = {0.0}, own[9], nearest[9];
     int32_t is_apart = 1;
-    for (int32_t k = 0; k < 9; k++)
-        for (int32_t l = 0; l < ATH_LANES; l++) R[k][l] = before[k];
+    for (int32_t i = 0; i < 9 * ATH_LANES; i++) R[i / ATH_LANES][i % ATH_LANES] = before[i / ATH_LANES];
     for (int32_t step = 0; step < STEPS && is_apart; step++) {
         turn_closer(H, R, size2);
         is_apart = 0;
         for (int32_t l = 0; l < ATH_LANES; l++) {
-            is_far[l] |= !(size2[l] < far_turn);
-            is_apart |= !is_far[l] && size2[l] > close_turn;
+            most[l] = size2[l] < most[l] ? most[l] : size2[l];
+            is_apart |= most[l] < far_turn && size2[l] > close_turn;
         }
     }
     for (int32_t l = 0; l < ATH_LANES; l++) {
-        if (!is_far[l] && size2[l] <= close_turn) continue;
+        if (most[l] < far_turn && size2[l] <= close_turn) continue;
         for (int32_t k = 0; k < 9; k++) own[k] = H[k][l];
         rotation_of_vectors(own, nearest);
         for (int32_t k = 0; k < 9; k++) R[k][l] = nearest[k];
@@ -326,7 +323,7 @@ static void fit_rotation(const ath_plan *plan, int32_t T, const ath_piece *piece
 {
     int rigid = (piece->flags & ATH_RIGID) != 0;
     double a[3], q[4] = {1.0, 0.0, 0.0, 0.0}, R[9] = {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0};
-    double together[9][ATH_LANES], turned[9][ATH_LANES]; /* of rigid pieces, a few frames at a time */
+    double few[9][ATH_LANES], turned[9][ATH_LANES]; /* products and rotations of a rigid piece in a few frames */
     products sums;
     memcpy(a, ath_rest_attach(plan, piece), sizeof a);
     if (rigid) rest_centre(plan, piece, a);
@@ -336,9 +333,9 @@ static void fit_rotation(const ath_plan *plan, int32_t T, const ath_piece *piece
     for (int32_t t = 0; t < T; t++) {
         double H[9], own[3];
         int32_t lane = t % ATH_LANES;
-        for (int32_t l = 0; rigid && lane == 0 && l < ATH_LANES; l++)
-            for (int32_t k = 0; k < 9; k++) together[k][l] = sums[k][ath_min(t + l, T - 1)] + prior * R[k];
-        if (rigid && lane == 0) nearest_rotations(together, R, turned);
+        for (int32_t i = 0; rigid && lane == 0 && i < 9 * ATH_LANES; i++)
+            few[i % 9][i / 9] = sums[i % 9][ath_min(t + i / 9, T - 1)] + prior * R[i % 9];
+        if (rigid && lane == 0) nearest_rotations(few, R, turned);
         for (int32_t k = 0; k < 9; k++) H[k] = sums[k][t] + prior * R[k];
         for (int32_t k = 0; rigid && k < 9; k++) R[k] = turned[k][lane];
         if (!rigid) ath_turn_to(H, t == 0 ? FIRST_ROTATION_STEPS : ROTATION_STEPS, R);

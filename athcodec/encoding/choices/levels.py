@@ -44,13 +44,10 @@ class SourceFrames:
         some = np.repeat(np.arange(-len(self.shown_times[-ENDS:]), 0), self.shown_times[-ENDS:])
         return positions[:, :, some[-ENDS:]]
 
-    def flaws(
-        self, decoded: np.ndarray, before: np.ndarray | None, largest_error: float = np.inf
-    ) -> tuple[float, float]:
+    def flaws(self, decoded: np.ndarray, before: np.ndarray | None, away: float = np.inf) -> tuple[float, float]:
         """Return how far decoded positions leave the box, and their largest second difference over the source's, or
-        over half the bound where that is larger. before: frames like those of the source. largest_error: if it is small
-        enough for any level, it stands for the distance from the box, which is no larger."""
-        away = largest_error
+        over half the bound where that is larger. before: frames like those of the source. away: the largest error,
+        which stands for the way out of the box if that is short enough."""
         if away > MOST_AWAY * length(self.box[1] - self.box[0]):
             low, high = decoded.min(axis=0).min(axis=1), decoded.max(axis=0).max(axis=1)
             away = max(0.0, float((self.box[0] - low).max()), float((high - self.box[1]).max()))

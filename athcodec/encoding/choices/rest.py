@@ -63,9 +63,8 @@ def judge(source: Source, ath: Ath, size: Callable[..., float]) -> Callable[...,
     sample = sample_plant(source, ath, "default") if large else None
     if sample is None:
         return partial(size, source, ath)
-    chosen = np.sort(source.hierarchy.vertex_source[sample.vertices])
-    faces = None if source.polygons is None else source.polygons.among(chosen)
-    some = replace(sample.source, polygons=faces)
+    chosen, faces = np.sort(source.hierarchy.vertex_source[sample.vertices]), source.polygons
+    some = replace(sample.source, polygons=faces and faces.among(chosen))
     return lambda settings, *words: size(some, sample.ath, sample.like(settings), *words)
 
 
