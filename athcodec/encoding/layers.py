@@ -579,10 +579,6 @@ class CodedMotion:
         met = met if layer.ratio == 1 else streams.FREE_ENDS
         return find_corrections(decoded, self.positions, self._origin, settings, layer.plan, ends=met)
 
-    def error_at(self, shown: SegmentMotion, level: int) -> tuple[float, ...]:
-        """Return the errors of a level without corrections."""
-        return self.error(self.pose(shown, level))
-
     def pose(self, shown: SegmentMotion, level: int) -> np.ndarray:
         """Return the output of a level, neither joined nor corrected."""
         return shown.pose(level, *self._output, self._room)
@@ -611,7 +607,7 @@ class _EvenLevels:
     def __init__(self, coder: CodedMotion, shown: list[SegmentMotion], settings: Settings):
         self._coder, self._shown, self._steps = coder, shown, settings.node_steps.copy()
         self._rounding = settings.rounding
-        self.errors = [coder.error_at(motion, level) for level, motion in enumerate(shown)] + coder.errors
+        self.errors = [coder.error(coder.pose(*each)) for each in zip(shown, range(len(shown)))] + coder.errors
         for level in range(1, len(shown)):
             self._move(level, level, level, 0.5**0.5, FINER_MAPS)
         for level in range(len(shown), 0, -1):
@@ -649,7 +645,7 @@ class _EvenLevels:
         self._steps[moved] *= factor
         self._analyse(moved)
         for level in range(moved, min(last + 1, len(self._shown))):
-            self.errors[level] = self._coder.error_at(self._shown[level], level)
+            self.errors[level] = self._coder.error(self._coder.pose(self._shown[level], level))
 
     def _analyse(self, level: int) -> None:
         self._shown[level].analyse_nodes(self._coder.positions, self._steps, self._rounding, level)

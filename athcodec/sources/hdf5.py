@@ -118,7 +118,7 @@ def _read(file: h5py.File, options: ReadOptions) -> MotionClip:
         if isinstance(metadata.get(name), str):
             metadata[name] = _parsed(name, metadata[name])
     attributes = _static_arrays(file, options.skip, budget)
-    if positions.compression is not None:  # Encoding reads them several times.
+    if positions.compression is not None and positions.shape[2:] == (3,):  # Encoding reads them several times.
         positions = Frames(
             lambda start, stop, packed=positions: packed[start:stop], *positions.shape[:2], positions.dtype, keeps=True
         )

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
 from itertools import product
 
 import numpy as np
@@ -62,7 +61,7 @@ def judge(source: Source, ath: Ath, size: Callable[..., float]) -> Callable[...,
     large = source.clip.vertex_count > JUDGED_BY_SAMPLE and not source.still
     sample = sample_plant(source, ath, "default") if large else None
     if sample is None:
-        return partial(size, source, ath)
+        return lambda *words: size(source, ath, *words)
     chosen, faces = np.sort(source.hierarchy.vertex_source[sample.vertices]), source.polygons
     some = replace(sample.source, polygons=faces and faces.among(chosen))
     return lambda settings, *words: size(some, sample.ath, sample.like(settings), *words)
