@@ -34,7 +34,6 @@ from athcodec.errors import ClipError
 from athcodec.files.plain import open_plain
 from athcodec.files.reading import Budget, FileWatch, closing_on_failure, naming
 from athcodec.motion.clip import RESERVED_NAMES, MotionClip
-from athcodec.motion.frames import Frames
 from athcodec.motion.presence import PRESENCE
 from athcodec.motion.thresholds import THRESHOLDS
 from athcodec.sources import ReadOptions
@@ -118,10 +117,6 @@ def _read(file: h5py.File, options: ReadOptions) -> MotionClip:
         if isinstance(metadata.get(name), str):
             metadata[name] = _parsed(name, metadata[name])
     attributes = _static_arrays(file, options.skip, budget)
-    if positions.compression is not None and positions.shape[2:] == (3,):  # Encoding reads them several times.
-        positions = Frames(
-            lambda start, stop, packed=positions: packed[start:stop], *positions.shape[:2], positions.dtype, keeps=True
-        )
     return clip_of_arrays(
         positions,
         lambda name: _array(file, name, budget),
