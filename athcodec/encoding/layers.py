@@ -533,7 +533,8 @@ class CodedMotion:
             self._join_level(level, end, positions, layer)
         with self._corrected_as_shown(level, positions):
             own = self._source.last_shown(positions) if self._loops else None
-            self.flaws.append(self._source.flaws(positions, own if end is None else end.shown[0]))
+            shown = own if end is None else end.shown[0]
+            self.flaws.append(self._source.flaws(positions, shown, self.errors[level][0]))
 
     @cached_property
     def _wanted_end(self) -> np.ndarray:
@@ -579,10 +580,6 @@ class CodedMotion:
         met = met if layer.ratio == 1 else streams.FREE_ENDS
         return find_corrections(decoded, self.positions, self._origin, settings, layer.plan, ends=met)
 
-    def error_at(self, shown: SegmentMotion, level: int) -> tuple[float, ...]:
-        """Return the errors of a level without corrections."""
-        return self.error(self.pose(shown, level))
-
     def pose(self, shown: SegmentMotion, level: int) -> np.ndarray:
         """Return the output of a level, neither joined nor corrected."""
         return shown.pose(level, *self._output, self._room)
@@ -611,7 +608,7 @@ class _EvenLevels:
     def __init__(self, coder: CodedMotion, shown: list[SegmentMotion], settings: Settings):
         self._coder, self._shown, self._steps = coder, shown, settings.node_steps.copy()
         self._rounding, self._poses = settings.rounding, MOST_POSES * len(shown)
-        self.errors = [coder.error_at(motion, level) for level, motion in enumerate(shown)] + coder.errors
+        self.errors = [coder.error(coder.pose(*each)) for each in zip(shown, range(len(shown)))] + coder.errors
         for level in range(1, len(shown)):
             self._move(level, level, level, 0.5**0.5, FINER_MAPS)
         for level in range(len(shown), 0, -1):
@@ -649,7 +646,7 @@ class _EvenLevels:
         self._steps[moved] *= factor
         self._analyse(moved)
         for level in range(moved, min(last + 1, len(self._shown))):
-            self.errors[level] = self._coder.error_at(self._shown[level], level)
+            self.errors[level] = self._coder.error(self._coder.pose(self._shown[level], level))
             self._poses -= 1
 
     def _analyse(self, level: int) -> None:

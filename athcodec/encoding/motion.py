@@ -144,7 +144,7 @@ class Plan:
         gaps = np.empty(vertices, np.uint8)
         table = np.empty(lib.ath_basis_table_size(pieces), np.int32)
         size = lib.ath_basis_layout(self.pieces.ctypes.data, pieces, at, gaps.ctypes.data, table.ctypes.data)
-        shape = ["first", "count", "flags", "modes", "basis"]
+        shape = ["first", "count", "modes", "basis"]  # Sheets and tubes alone have a basis that is not their modes.
         if like is not None and like.rest is self.rest and np.array_equal(like.pieces[shape], self.pieces[shape]):
             self.bases, self.core.bases, self.pieces["rank"] = like.bases, like.core.bases, like.pieces["rank"]
             return
@@ -191,16 +191,14 @@ class Plan:
 
     def sample(self, part: int) -> PlanSample:
         """Return one of so many parts of the pieces, in short runs all along the plant."""
-        if part not in self._samples:
-            self._samples[part] = self._sample(part)
-        return self._samples[part]
-
-    def _sample(self, part: int) -> PlanSample:
+        if part in self._samples:
+            return self._samples[part]
         pieces = self.pieces[self.pieces["first"] % PERIOD < PERIOD // part]
         first, count = np.cumsum(pieces["count"]) - pieces["count"], pieces["count"]
         vertices = np.arange(count.sum()) + np.repeat(pieces["first"] - first, count)
         pieces["first"] = first
-        return PlanSample(vertices, pieces, self.pool)
+        self._samples[part] = PlanSample(vertices, pieces, self.pool)
+        return self._samples[part]
 
     @property
     def base_level(self) -> np.ndarray:
@@ -259,11 +257,6 @@ class PlanSample:
     vertices: np.ndarray
     pieces: np.ndarray
     pool: ThreadPool
-
-    @property
-    def is_rigid(self) -> np.ndarray:
-        """Per piece whether it turns and moves as it is, (P,)."""
-        return self.pieces["flags"] & RIGID > 0
 
 
 LEARNED_NUMBERS = 3 * SHAPE_MODES  # Numbers of a learned mode.
@@ -403,10 +396,6 @@ class SegmentMotion:
                 ("duals", self.learned_modes.duals),
             ):
                 setattr(self.integers, name, array.ctypes.data)
-
-    def forget_caches(self) -> None:
-        """Free what `analyse` and `pose` leave for `analyse_nodes`."""
-        self._attach_caches = None
 
     def forget_nodes(self) -> None:
         """Free the maps of nodes, and what they are made of."""

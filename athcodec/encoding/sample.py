@@ -10,15 +10,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from athcodec.encoding import quantise as qz
+from athcodec.encoding import streams
 from athcodec.encoding.motion import Plan
-from athcodec.encoding.segment import Source
+from athcodec.encoding.segment import Source, branch_records
+from athcodec.encoding.settings import OF_BRANCHES, Settings
 from athcodec.encoding.survey import Ath
 from athcodec.motion.clip import MotionClip
 from athcodec.motion.frames import Frames
 from athcodec.motion.hierarchy import Hierarchy
 
 LARGE = 5_000  # Vertices up to which a plant is not sampled.
-LEAST_SAMPLE, ENOUGH, MOST_SAMPLE = 3_500, 6_000, 1 << 16  # Vertices of a sample; LEAST_SHARE up to ENOUGH.
+LEAST_SAMPLE, ENOUGH, MOST_SAMPLE = 3_500, 4_000, 1 << 16  # Vertices of a sample; LEAST_SHARE up to ENOUGH.
 LEAST_SHARE = 0.4  # Least share of the plant in a sample.
 SEGMENT_SHARE = 1 / 64  # Share of the plant that each segment of the clip adds to a sample.
 SMALL = 1 << 18  # Vertices times frames up to which trials are so cheap that choices are made again.
@@ -56,11 +58,25 @@ class PlantSample:
             clip=some,
             hierarchy=self._hierarchy(source.hierarchy, np.searchsorted(chosen, places)),
             shapes=None,
+            polygons=None,  # Trials go without faces.
             weights=None if source.weights is None else source.weights[self.vertices],
             reference=None if source.reference is None else source.reference[self.vertices],
         )
         sample.segments, sample.repeats = source.segments, source.repeats
         return sample
+
+    def like(self, settings: Settings) -> Settings:
+        """Return the settings of the whole plant for the sample, with copies of its own branches."""
+        some = replace(
+            settings,
+            **{name: getattr(settings, name)[self.branches] for name in OF_BRANCHES},
+            limit=settings.limit if np.isscalar(settings.limit) else settings.limit[self.vertices],
+            shape_of=None,
+        )
+        if settings.shape_of is None:
+            return some
+        branches = branch_records(self.source.hierarchy, self.ath, some)
+        return replace(some, shape_of=streams.find_copies(branches, some.rest_step, self.source.rest, some.rest_slack))
 
     def _hierarchy(self, whole: Hierarchy, vertex_source: np.ndarray) -> Hierarchy:
         parent, attach = whole.branch_parent[self.branches], whole.attach[self.branches]

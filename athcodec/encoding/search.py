@@ -23,7 +23,7 @@ from athcodec.encoding.progress import ANALYSIS, LEARNING, START, TRIAL, Work, e
 from athcodec.encoding.sample import ExtrapolationFactors, is_small, sample_plant
 from athcodec.encoding.segment import CodedPrelude, Source, branch_records
 from athcodec.encoding.segment_samples import samples_of
-from athcodec.encoding.settings import OF_BRANCHES, OF_SAMPLE, Choice, Settings
+from athcodec.encoding.settings import OF_SAMPLE, Choice, Settings
 from athcodec.encoding.start import first_settings
 from athcodec.encoding.survey import Ath
 from athcodec.encoding.trials import Trials, distinct
@@ -32,6 +32,7 @@ LEARNED_MODES_MAX_GAIN = 1.5  # Largest ratio by which learned modes have shrunk
 REFINEMENTS_MAX_GAIN = (
     1.05  # Largest gain of settings that suit refinements better than the single layer that trials code.
 )
+SURE_SAVING = 0.05  # Estimated share of all bits from which on learned modes make the file of any plant smaller.
 NEAREST, NEAR_RATIO = 4, 1.12  # Steps are walked for so many other choices, of at most so many times the least bytes.
 SETTLING_ROUNDS = 64  # Largest number of times that the choices of a small clip are changed.
 
@@ -347,12 +348,7 @@ class Search:
         sample = sample_plant(trials.source, trials.ath, self.effort)
         if sample is None:
             return None
-        some = replace(
-            start,
-            **{name: getattr(start, name)[sample.branches] for name in OF_BRANCHES},
-            limit=start.limit if np.isscalar(start.limit) else start.limit[sample.vertices],
-            shape_of=None,
-        )
+        some = sample.like(replace(start, shape_of=None))
         extrapolation = ExtrapolationFactors.of(
             branch_records(trials.source.hierarchy, trials.ath, start),
             branch_records(sample.source.hierarchy, sample.ath, some),
@@ -387,8 +383,8 @@ class Search:
             settings = with_slack(trials.source, trials.ath, settings, chosen.rest_slack)
         if chosen.learned_saving is None:
             return settings
-        [pieces] = learned_pieces.pieces_that_save(settings, trials, [chosen.learned_saving])
+        [(pieces, saved)] = learned_pieces.pieces_that_save(settings, trials, [chosen.learned_saving])
         learned = replace(settings, learned_pieces=pieces)
-        if not trials.work.fits(2 * trials.work_of_trial):
+        if saved >= SURE_SAVING or not trials.work.fits(2 * trials.work_of_trial):
             return learned
         return trials.cheapest([learned, settings])  # A sample errs by more than some savings.

@@ -15,7 +15,7 @@ from weakref import WeakValueDictionary
 
 import numpy as np
 
-from athcodec._native import BRANCH, LOOSE, SHEET, STILL, WHOLE, Rounding, address, lib
+from athcodec._native import BRANCH, LOOSE, RIGID, SHEET, STILL, WHOLE, Rounding, address, lib
 from athcodec.decoding import container as ct
 from athcodec.encoding import quantise as qz
 from athcodec.encoding import streams, writing
@@ -660,7 +660,7 @@ def analyse(
     decoded = zeros(positions.shape, dtype)
     segment.analyse(positions, settings.rounding, origin, decoded)
     if before is not None:
-        segment.forget_caches()  # Maps of nodes alone need the caches, and a refinement has none.
+        segment.forget_nodes()  # A refinement has no maps.
     return segment, decoded
 
 
@@ -728,7 +728,8 @@ def find_corrections(
 
 def _parts_that_keep_their_shape(plan: Plan | PlanSample) -> tuple[np.ndarray, np.ndarray]:
     """Return first vertices and numbers of vertices of rigid pieces, and of the rings of others."""
-    rigid, tubes = plan.pieces[plan.is_rigid], plan.pieces[~plan.is_rigid & (plan.pieces["ring"] > 0)]
+    is_rigid = plan.pieces["flags"] & RIGID > 0
+    rigid, tubes = plan.pieces[is_rigid], plan.pieces[~is_rigid & (plan.pieces["ring"] > 0)]
     count = -(-tubes["count"] // np.maximum(tubes["ring"], 1))
     rings, number = np.repeat(tubes, count), np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
     offset = number * rings["ring"]

@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from athcodec.encoding.motion import squared_bends
 from athcodec.encoding.sample import PlantSample
 from athcodec.encoding.segment import Source
-from athcodec.files.threads import ranges
 from athcodec.options import DEFAULT_SEGMENT
 
 SAMPLES = 3  # Largest number of segments that stand for several clips.
@@ -59,14 +59,15 @@ def typical_segments(source: Source) -> list[tuple[int, int]]:
 def usual_change(samples: Sequence[SegmentSample]) -> float:
     """Return the RMS change of velocity, in length per frame squared; infinite if all samples are too short."""
     long = [sample.positions for sample in samples if sample.positions.shape[2] > 2]
-    parts = [[positions[slice(*part)] for part in ranges(len(positions), positions[0].size)] for positions in long]
-    squares = [np.concatenate([(np.diff(part, 2, axis=2) ** 2).sum(axis=1) for part in some]) for some in parts]
-    return float(np.sqrt(np.mean([square.mean() for square in squares]))) if squares else np.inf
+    squares = [squared_bends(positions).mean() / len(positions) for positions in long]
+    return float(np.sqrt(np.mean(squares))) if squares else np.inf
 
 
 def _middle(positions: np.ndarray) -> np.ndarray:
     """Return at most DEFAULT_SEGMENT frames of a segment, so that longer segments do not slow the search."""
     first = max(0, positions.shape[2] - DEFAULT_SEGMENT) // 2
+    if positions.shape[2] <= DEFAULT_SEGMENT:
+        return positions  # A copy would be another array than the one that all callers share.
     return np.ascontiguousarray(positions[:, :, first : first + DEFAULT_SEGMENT])
 
 

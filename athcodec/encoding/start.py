@@ -57,8 +57,8 @@ def _in_layers(source: Source, ath: Ath, settings: Settings, ratios: Sequence[in
         coarsest_rest_step=qz.single(LENGTH_STEP * source.rest_error),
     )
     refined = rest.connected_if_smaller(source, ath, refined)
-    sizes = [layered_poses_size(source, ath, some, ratios) for some in (at_once, refined)]
-    return at_once if sizes[0] < AT_ONCE_SHARE * sizes[1] else refined
+    size = rest.judge(source, ath, layered_poses_size)
+    return at_once if size(at_once, ratios) < AT_ONCE_SHARE * size(refined, ratios) else refined
 
 
 def still_choice(source: Source, ath: Ath, bound: float, ratio: int) -> Choice:

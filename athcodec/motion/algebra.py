@@ -37,8 +37,8 @@ def multiply(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 def largest_distance(one: np.ndarray, other: np.ndarray) -> float:
     """Return the largest distance of any point of a pose, (N, 3), from where it is in another."""
-    difference = one.astype(np.float64) - other
-    return math.sqrt(float((difference**2).sum(axis=1).max()))
+    x, y, z = np.square(one.astype(np.float64) - other).T  # A sum over three columns is faster than one over an axis.
+    return math.sqrt(float((x + y + z).max()))
 
 
 def _stack(matrices: np.ndarray, batch: tuple[int, ...]) -> tuple[np.ndarray, int]:

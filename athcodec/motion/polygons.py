@@ -4,7 +4,7 @@ count."""
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -54,6 +54,15 @@ class Polygons:
             return None
         corners = np.ascontiguousarray(indices, np.int32)
         return cls(corners, np.ascontiguousarray(counts, np.uint32), len(counts), 0, indices.dtype, counts.dtype)
+
+    def among(self, vertices: np.ndarray) -> Polygons:
+        """Return the polygons whose corners all are among these vertices, ascending, by their numbers there."""
+        number = np.minimum(np.searchsorted(vertices, self.corners), len(vertices) - 1).astype(np.int32)
+        counts = np.full(self.face_count, self.columns, np.uint32) if self.counts is None else self.counts
+        face = np.repeat(np.arange(self.face_count), counts)
+        kept = np.bincount(face, vertices[number] != self.corners, self.face_count) == 0
+        some = None if self.counts is None else counts[kept]
+        return replace(self, corners=number[kept[face]], counts=some, face_count=int(kept.sum()))
 
     @property
     def shape(self) -> CorePolygons:

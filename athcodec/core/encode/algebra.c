@@ -150,13 +150,3 @@ ATH_HOT void ath_solve(int64_t count, int32_t n, int32_t columns, double *matric
 {
     for (int64_t i = 0; i < count; i++, matrices += n * n, rows += n * columns) solve(n, columns, matrices, rows);
 }
-
-void ath_solve3(const double m[9], double row[3])
-{
-    double a = ath_sqrt(m[0]), b = m[3] / a, d = m[6] / a;
-    double c = ath_sqrt(m[4] - b * b), e = (m[7] - d * b) / c, f = ath_sqrt(m[8] - d * d - e * e);
-    double x = row[0] / a, y = (row[1] - b * x) / c;
-    row[2] = (row[2] - d * x - e * y) / f / f;
-    row[1] = (y - e * row[2]) / c;
-    row[0] = (x - b * row[1] - d * row[2]) / a;
-}

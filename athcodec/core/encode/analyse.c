@@ -264,34 +264,53 @@ static void rotation_of_vectors(const double H[9], double R[9])
                 left[3 * i] * right[k] + left[3 * i + 1] * right[3 + k] + sign * left[3 * i + 2] * right[6 + k];
 }
 
-/* Replaces R by the rotation nearest to H, for which the product of H and the transpose of R is symmetric. Newton's
- * method finds it from a rotation nearby in few steps, each of which solves for the turn that makes it so. */
-static void nearest_rotation(const double H[9], double R[9])
+/* Turns rotations, one in each lane, by a step of Newton's method towards those nearest to H, for which the product of H
+ * and the transpose of R is symmetric. Fills the squares of the turns; 1 where R is too far from the nearest rotation. */
+ATH_INLINE void turn_closer(double H[9][ATH_LANES], double R[9][ATH_LANES], double size2[ATH_LANES])
+{
+    for (int32_t l = 0; l < ATH_LANES; l++) {
+        double M[9], q[9], last[9];
+        for (int32_t k = 0; k < 9; k++) last[k] = R[k][l];
+        for (int32_t k = 0; k < 9; k++)
+            M[k] = H[k - k % 3][l] * last[k % 3 * 3] + H[k - k % 3 + 1][l] * last[k % 3 * 3 + 1]
+                   + H[k - k % 3 + 2][l] * last[k % 3 * 3 + 2];
+        double wx = M[7] - M[5], wy = M[2] - M[6], wz = M[3] - M[1];
+        double a = M[4] + M[8], b = M[0] + M[8], c = M[0] + M[4];
+        double d = -0.5 * (M[1] + M[3]), e = -0.5 * (M[2] + M[6]), f = -0.5 * (M[5] + M[7]);
+        double xx = b * c - f * f, xy = e * f - d * c, xz = d * f - e * b, yy = a * c - e * e, yz = d * e - a * f;
+        double zz = a * b - d * d, all = a * xx + d * xy + e * xz, scale = 1.0 / all;
+        double x = (xx * wx + xy * wy + xz * wz) * scale, y = (xy * wx + yy * wy + yz * wz) * scale;
+        double z = (xz * wx + yz * wy + zz * wz) * scale;
+        size2[l] = ((a > 0.0) & (zz > 0.0) & (all > 0.0)) ? x * x + y * y + z * z : 1.0; /* if positive definite */
+        rational_rotation(0.25 * x, 0.25 * y, 0.25 * z, q);
+        for (int32_t k = 0; k < 9; k++)
+            R[k][l] =
+                q[k - k % 3] * last[k % 3] + q[k - k % 3 + 1] * last[3 + k % 3] + q[k - k % 3 + 2] * last[6 + k % 3];
+    }
+}
+
+/* Fills the rotations nearest to H in a few frames, from the rotation `before` them. */
+ATH_HOT static void nearest_rotations(double H[9][ATH_LANES], const double before[9], double R[9][ATH_LANES])
 {
     enum { STEPS = 8 };
     static const double far_turn = 0.25, close_turn = 1e-13; /* squared radians */
-    double turned[9], last[9], q[9], M[9], S[9];
-    memcpy(turned, R, sizeof turned);
-    for (int32_t step = 0; step < STEPS; step++) {
-        memcpy(last, turned, sizeof last);
-        for (int32_t i = 0; i < 3; i++)
-            for (int32_t k = 0; k < 3; k++)
-                M[3 * i + k] = H[3 * i] * last[3 * k] + H[3 * i + 1] * last[3 * k + 1] + H[3 * i + 2] * last[3 * k + 2];
-        double turn[3] = {M[7] - M[5], M[2] - M[6], M[3] - M[1]}, trace = M[0] + M[4] + M[8];
-        for (int32_t i = 0; i < 3; i++)
-            for (int32_t k = 0; k < 3; k++) S[3 * i + k] = (i == k ? trace : 0.0) - 0.5 * (M[3 * i + k] + M[3 * k + i]);
-        ath_solve3(S, turn); /* NaN if S is not positive definite, so far from the nearest rotation */
-        double size2 = turn[0] * turn[0] + turn[1] * turn[1] + turn[2] * turn[2];
-        if (!(size2 < far_turn)) break;
-        rational_rotation(0.25 * turn[0], 0.25 * turn[1], 0.25 * turn[2], q);
-        for (int32_t i = 0; i < 3; i++)
-            for (int32_t k = 0; k < 3; k++)
-                turned[3 * i + k] = q[3 * i] * last[k] + q[3 * i + 1] * last[3 + k] + q[3 * i + 2] * last[6 + k];
-        if (size2 > close_turn) continue;
-        memcpy(R, turned, sizeof turned);
-        return;
+    double size2[ATH_LANES], most[ATH_LANES] = {0.0}, own[9], nearest[9];
+    int32_t is_apart = 1;
+    for (int32_t i = 0; i < 9 * ATH_LANES; i++) R[i / ATH_LANES][i % ATH_LANES] = before[i / ATH_LANES];
+    for (int32_t step = 0; step < STEPS && is_apart; step++) {
+        turn_closer(H, R, size2);
+        is_apart = 0;
+        for (int32_t l = 0; l < ATH_LANES; l++) {
+            most[l] = size2[l] < most[l] ? most[l] : size2[l];
+            is_apart |= most[l] < far_turn && size2[l] > close_turn;
+        }
     }
-    rotation_of_vectors(H, R);
+    for (int32_t l = 0; l < ATH_LANES; l++) {
+        if (most[l] < far_turn && size2[l] <= close_turn) continue;
+        for (int32_t k = 0; k < 9; k++) own[k] = H[k][l];
+        rotation_of_vectors(own, nearest);
+        for (int32_t k = 0; k < 9; k++) R[k][l] = nearest[k];
+    }
 }
 
 /* Fills the piece's own rotation relative to its predicted one, as rotation vectors over time, unwrapped. local: its
@@ -304,6 +323,7 @@ static void fit_rotation(const ath_plan *plan, int32_t T, const ath_piece *piece
 {
     int rigid = (piece->flags & ATH_RIGID) != 0;
     double a[3], q[4] = {1.0, 0.0, 0.0, 0.0}, R[9] = {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0};
+    double few[9][ATH_LANES], turned[9][ATH_LANES]; /* products and rotations of a rigid piece in a few frames */
     products sums;
     memcpy(a, ath_rest_attach(plan, piece), sizeof a);
     if (rigid) rest_centre(plan, piece, a);
@@ -312,11 +332,13 @@ static void fit_rotation(const ath_plan *plan, int32_t T, const ath_piece *piece
     double prior = 1e-6 * size2 + (rigid ? 0.0 : step * step * (double)piece->count);
     for (int32_t t = 0; t < T; t++) {
         double H[9], own[3];
+        int32_t lane = t % ATH_LANES;
+        for (int32_t i = 0; rigid && lane == 0 && i < 9 * ATH_LANES; i++)
+            few[i % 9][i / 9] = sums[i % 9][ath_min(t + i / 9, T - 1)] + prior * R[i % 9];
+        if (rigid && lane == 0) nearest_rotations(few, R, turned);
         for (int32_t k = 0; k < 9; k++) H[k] = sums[k][t] + prior * R[k];
-        if (rigid)
-            nearest_rotation(H, R);
-        else
-            ath_turn_to(H, t == 0 ? FIRST_ROTATION_STEPS : ROTATION_STEPS, R);
+        for (int32_t k = 0; rigid && k < 9; k++) R[k] = turned[k][lane];
+        if (!rigid) ath_turn_to(H, t == 0 ? FIRST_ROTATION_STEPS : ROTATION_STEPS, R);
         ath_rotation_vector(R, q, own);
         for (int32_t k = 0; k < 3; k++) omega[k * T + t] = own[k];
     }

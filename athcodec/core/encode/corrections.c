@@ -27,11 +27,6 @@ typedef struct {
     double cost; /* bits for each frame that it brings within the limit */
 } candidate;
 
-static double number_at(int is_float64, const void *positions, size_t at)
-{
-    return is_float64 ? ((const double *)positions)[at] : (double)((const float *)positions)[at];
-}
-
 static double square(const double e[3]) { return e[0] * e[0] + e[1] * e[1] + e[2] * e[2]; }
 
 static int32_t length_of(int32_t steps) { return steps < 0 ? -steps : steps; }
@@ -81,7 +76,7 @@ static void open_track(track *track, int32_t v, const void *positions, const dou
     for (size_t k = 0; k < 3; k++)
         for (size_t t = 0; t < T; t++) {
             size_t at = ((size_t)v * 3 + k) * T + t;
-            track->decoded[t][k] = number_at(track->is_float64, positions, at);
+            track->decoded[t][k] = ath_number_at(positions, at, track->is_float64);
             track->wanted[t][k] = source[at] + origin[k];
             track->error[t][k] = track->decoded[t][k] - track->wanted[t][k];
         }
@@ -100,7 +95,8 @@ ATH_HOT static int is_within(int32_t frames, int is_float64, const void *positio
     for (size_t k = 0; k < 3; k++) {
         size_t row = first + k * (size_t)frames;
         for (int32_t t = 0; t < frames; t++) {
-            double error = number_at(is_float64, positions, row + (size_t)t) - (source[row + (size_t)t] + origin[k]);
+            double error =
+                ath_number_at(positions, row + (size_t)t, is_float64) - (source[row + (size_t)t] + origin[k]);
             squares[t] += error * error;
         }
     }
@@ -374,7 +370,7 @@ ATH_HOT static void open_part(rigid_part *part)
         for (size_t k = 0; k < 3; k++) {
             size_t row = ((size_t)v * 3 + k) * (size_t)frames;
             for (int32_t t = 0; t < frames; t++) {
-                double decoded = number_at(part->is_float64, part->positions, row + (size_t)t);
+                double decoded = ath_number_at(part->positions, row + (size_t)t, part->is_float64);
                 double away = part->source[row + (size_t)t] + part->origin[k] - decoded;
                 least[k][t] = v == part->first || away < least[k][t] ? away : least[k][t];
                 most[k][t] = v == part->first || away > most[k][t] ? away : most[k][t];
@@ -398,7 +394,7 @@ static double beyond_with(const rigid_part *part, int32_t t, const int32_t q[3],
         double error[3];
         for (int32_t k = 0; k < 3; k++) {
             size_t at = ((size_t)v * 3 + (size_t)k) * (size_t)part->frames + (size_t)t;
-            double sum = number_at(part->is_float64, part->positions, at);
+            double sum = ath_number_at(part->positions, at, part->is_float64);
             double parts = part->parts[t][k] + (double)q[k] * more;
             if (parts != 0.0) sum = ath_corrected(sum, parts, part->step);
             error[k] = (part->is_float64 ? sum : ath_single(sum)) - (part->source[at] + part->origin[k]);
@@ -488,11 +484,8 @@ static void apply_to_vertex(int32_t frames, int is_float64, void *positions, siz
         for (size_t t = 0; t < (size_t)frames; t++) {
             size_t at = first + k * (size_t)frames + t;
             if (parts[t][k] == 0.0) continue;
-            double sum = ath_corrected(number_at(is_float64, positions, at), parts[t][k], step);
-            if (is_float64)
-                ((double *)positions)[at] = sum;
-            else
-                ((float *)positions)[at] = (float)sum;
+            double sum = ath_corrected(ath_number_at(positions, at, is_float64), parts[t][k], step);
+            ath_put_number(positions, at, is_float64, sum);
         }
 }
 

@@ -210,11 +210,6 @@ int64_t ath_encode_refined_shapes(void *memory, uint8_t *bytes, size_t capacity,
     return written(&coder, valid);
 }
 
-static double number_at(const void *numbers, int is_float64, size_t at)
-{
-    return is_float64 ? ((const double *)numbers)[at] : (double)((const float *)numbers)[at];
-}
-
 int64_t ath_encode_exact(void *memory, uint8_t *bytes, size_t capacity, int32_t vertex_count, int32_t frames,
                          int is_float64, const void *positions, const void *source)
 {
@@ -229,8 +224,8 @@ int64_t ath_encode_exact(void *memory, uint8_t *bytes, size_t capacity, int32_t 
             double known[3], number[3];
             for (size_t k = 0; k < 3; k++) {
                 size_t at = (v * 3 + k) * (size_t)frames + t;
-                known[k] = number_at(positions, is_float64, at);
-                number[k] = number_at(source, is_float64, at);
+                known[k] = ath_number_at(positions, at, is_float64);
+                number[k] = ath_number_at(source, at, is_float64);
             }
             valid = code_exact_point(&coder, model, is_float64, known, length, number);
         }

@@ -137,9 +137,8 @@ ATH_ENCODER_API void ath_multiply(int64_t count, int64_t rows, int64_t inner, in
 /* Decomposes 3 x 3 matrices: left (columns) times the 3 singular values, in descending order, times right (rows). */
 ATH_ENCODER_API void ath_decompose(int64_t count, const double *matrices, double *left, double *stretch, double *right);
 /* Replaces `count` times rows, n x columns, by the solution of matrix * x = rows. The matrices are positive definite and
- * are destroyed. ath_solve3 does the same for one of 3 x 3 and one column. */
+ * are destroyed. */
 ATH_ENCODER_API void ath_solve(int64_t count, int32_t n, int32_t columns, double *matrices, double *rows);
-void ath_solve3(const double matrix[9], double row[3]);
 
 /* Measures the largest distance and the sum of squared distances between positions and source (plus origin). shown: how
  * many frames of the clip show each frame. rounding: error that a decoder may add. histogram: ATH_SHORT_FLOATS counts

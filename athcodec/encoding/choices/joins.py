@@ -108,18 +108,12 @@ def _shares(join: int) -> tuple[np.ndarray, np.ndarray]:
     return jumps, slopes if is_sloped else np.zeros(width)
 
 
-def offsets(end: End, positions: np.ndarray, join: int) -> np.ndarray:
-    """Return what a join adds to its frames, (N, 3, width) float64."""
-    (jump, slope), (jumps, slopes) = _ways(end, positions), _shares(join)
-    return jump[:, :, None] * jumps + slope[:, :, None] * slopes
-
-
 def apply_join(end: End, positions: np.ndarray, join: int) -> None:
     """Join the positions in place, as a decoder does, bit for bit unless maps of nodes make them."""
-    width = join % SLOPED
-    for part in (slice(*some) for some in ranges(len(positions), 3 * width)):
-        moved = positions[part, :, :width]
-        moved[:] = moved + offsets(end.of(part), positions[part], join)
+    jumps, slopes = _shares(join)
+    for part in (slice(*some) for some in ranges(len(positions), 3 * len(jumps))):
+        moved, (jump, slope) = positions[part, :, : len(jumps)], _ways(end.of(part), positions[part])
+        moved[:] = moved + (jump[:, :, None] * jumps + slope[:, :, None] * slopes)
 
 
 class ErrorPrice:

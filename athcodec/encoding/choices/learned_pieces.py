@@ -27,7 +27,7 @@ def candidates(settings: Settings, trials: Trials) -> list[Settings]:
     pieces = pieces_that_save(plain, trials, REQUIRED_SAVINGS)
     return [
         replace(plain, learned_pieces=some, learned_saving=saving)
-        for saving, some in zip(REQUIRED_SAVINGS, pieces)
+        for saving, (some, _) in zip(REQUIRED_SAVINGS, pieces)
         if some.any()
     ]
 
@@ -47,8 +47,11 @@ def best_pieces_in_any_basis(settings: Settings, trials: Trials) -> Settings:
     return trials.cheapest([best_pieces(start, trials) for start in starts])
 
 
-def pieces_that_save(plain: Settings, trials: Trials, required_savings: Sequence[float]) -> list[np.ndarray]:
-    """Return (P,) bool for each required saving: pieces whose estimated bits shrink by that factor."""
+def pieces_that_save(
+    plain: Settings, trials: Trials, required_savings: Sequence[float]
+) -> list[tuple[np.ndarray, float]]:
+    """Return for each required saving the pieces whose estimated bits shrink by that factor, (P,) bool, and what share
+    of all bits they save."""
     plan = trials.prelude(plain).plan
     modes = trials.learned_modes(plan, plain, everywhere=True)
     piece_count = len(modes.counts)
@@ -62,4 +65,6 @@ def pieces_that_save(plain: Settings, trials: Trials, required_savings: Sequence
         for tried in (None, modes)
     )
     price = estimated_bits(modes.integers, np.repeat(np.arange(piece_count), modes.counts), piece_count)
-    return [(modes.counts > 0) & ((bits_with + price) * saving < bits_without) for saving in required_savings]
+    chosen = [(modes.counts > 0) & ((bits_with + price) * saving < bits_without) for saving in required_savings]
+    saved = bits_without - bits_with - price
+    return [(pieces, float(saved[pieces].sum() / max(bits_without.sum(), 1.0))) for pieces in chosen]

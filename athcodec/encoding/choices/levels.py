@@ -15,6 +15,7 @@ from athcodec._native import MEASURES
 from athcodec.decoding.container import from_short_float, short_floats
 from athcodec.encoding.motion import squared_bends
 from athcodec.files.threads import ThreadPool, ranges
+from athcodec.motion.algebra import length
 
 MOST_AWAY = 0.1  # Largest distance of a vertex from the box of the source, in diagonals.
 MOST_JERK = 1.95  # Largest second difference, over that of the source. Files promise 2.0, also after rounding.
@@ -43,11 +44,13 @@ class SourceFrames:
         some = np.repeat(np.arange(-len(self.shown_times[-ENDS:]), 0), self.shown_times[-ENDS:])
         return positions[:, :, some[-ENDS:]]
 
-    def flaws(self, decoded: np.ndarray, before: np.ndarray | None) -> tuple[float, float]:
+    def flaws(self, decoded: np.ndarray, before: np.ndarray | None, away: float = np.inf) -> tuple[float, float]:
         """Return how far decoded positions leave the box, and their largest second difference over the source's, or
-        over half the bound where that is larger. before: frames like those of the source."""
-        low, high = decoded.min(axis=0).min(axis=1), decoded.max(axis=0).max(axis=1)
-        away = max(0.0, float((self.box[0] - low).max()), float((high - self.box[1]).max()))
+        over half the bound where that is larger. before: frames like those of the source. away: the largest error,
+        which stands for the way out of the box if that is short enough."""
+        if away > MOST_AWAY * length(self.box[1] - self.box[0]):
+            low, high = decoded.min(axis=0).min(axis=1), decoded.max(axis=0).max(axis=1)
+            away = max(0.0, float((self.box[0] - low).max()), float((high - self.box[1]).max()))
         with np.errstate(divide="ignore", invalid="ignore"):
             ratios = self._bends(decoded, before) / self._allowed
         return away, float(np.nan_to_num(ratios, posinf=np.inf).max(initial=0.0))

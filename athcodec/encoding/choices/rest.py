@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from itertools import product
 
@@ -10,6 +11,7 @@ import numpy as np
 from athcodec.encoding import quantise as qz
 from athcodec.encoding import streams
 from athcodec.encoding.features import Feature
+from athcodec.encoding.sample import sample_plant
 from athcodec.encoding.segment import Source, branch_records, poses_size
 from athcodec.encoding.settings import Settings
 from athcodec.encoding.survey import Ath
@@ -17,6 +19,7 @@ from athcodec.encoding.trials import Trials
 from athcodec.files.threads import ranges
 
 CONNECTED_SHARE = 0.8  # Largest share of the size without faces at which layers refine a rest pose that goes by faces.
+JUDGED_BY_SAMPLE = 30_000  # Vertices of a plant from which on a sample of it tells which rest pose is smaller.
 REST_SHARE = 0.25  # Share of a file from which on slack is tried for its rest pose.
 REST_SLACKS = (0.5, 0.65, 0.8, 0.95)  # Distances, over the limit, by which a rest pose may be off.
 
@@ -48,18 +51,30 @@ def candidates(source: Source, ath: Ath, settings: Settings) -> list[Settings]:
 
 def with_best_rest(source: Source, ath: Ath, settings: Settings) -> Settings:
     """Return the settings that make hierarchy and rest pose smallest."""
-    tried = candidates(source, ath, settings)
-    return tried[0] if len(tried) == 1 else min(tried, key=lambda some: poses_size(source, ath, some))
+    tried, size = candidates(source, ath, settings), judge(source, ath, poses_size)
+    return tried[0] if len(tried) == 1 else min(tried, key=size)
+
+
+def judge(source: Source, ath: Ath, size: Callable[..., float]) -> Callable[..., float]:
+    """Return a function that judges settings by `size` of a source, an ath and settings: on a sample of a large plant,
+    unless the rest pose is all of the file."""
+    large = source.clip.vertex_count > JUDGED_BY_SAMPLE and not source.still
+    sample = sample_plant(source, ath, "default") if large else None
+    if sample is None:
+        return lambda *words: size(source, ath, *words)
+    chosen, faces = np.sort(source.hierarchy.vertex_source[sample.vertices]), source.polygons
+    some = replace(sample.source, polygons=faces and faces.among(chosen))
+    return lambda settings, *words: size(some, sample.ath, sample.like(settings), *words)
 
 
 def connected_if_smaller(source: Source, ath: Ath, settings: Settings) -> Settings:
     """Return the settings for layers: with a rest pose that goes by faces if that is much smaller."""
     if source.mesh is None or source.host_rest:
         return settings
-    connected = min(_by_faces(source, settings), key=lambda some: poses_size(source, ath, some))
+    size = judge(source, ath, poses_size)
+    connected = min(_by_faces(source, settings), key=size)
     share = 1.0 if source.reference_is_exact else CONNECTED_SHARE
-    is_smaller = poses_size(source, ath, connected) < share * poses_size(source, ath, settings)
-    return connected if is_smaller else settings
+    return connected if size(connected) < share * size(settings) else settings
 
 
 def with_slack(source: Source, ath: Ath, settings: Settings, slack: float) -> Settings:
