@@ -827,14 +827,11 @@ static void correct_vertex(const corrections_reader *reader, const correction_ro
 {
     ath_corrected_parts parts;
     correction_parts(row, segment->frames, parts);
-    for (int32_t t = 0; t < segment->frames; t++) {
-        if (!is_reached(row, t)) {
-            t += CORRECTION_BLOCK - 1;
-            continue;
-        }
-        for (size_t k = 0; k < 3; k++)
-            correct(segment, ((size_t)t * (size_t)segment->exact_vertices + vertex) * 3 + k, parts[t][k], reader->step);
-    }
+    for (int32_t from = 0; from < segment->frames; from += CORRECTION_BLOCK)
+        for (int32_t t = from; is_reached(row, from) && t < ath_min(from + CORRECTION_BLOCK, segment->frames); t++)
+            for (size_t k = 0; k < 3; k++)
+                correct(segment, ((size_t)t * (size_t)segment->exact_vertices + vertex) * 3 + k, parts[t][k],
+                        reader->step);
 }
 
 static void watch_corrections(const ath_work *work, const correction_row *row, int32_t position)
