@@ -31,6 +31,7 @@ from athcodec.files.plain import open_plain
 
 Openable: TypeAlias = str | os.PathLike[str] | bytes | bytearray | memoryview | BinaryIO
 """A path, a URL, the bytes of a file, or a file object."""
+KNOWN_KINDS = np.isin(np.arange(1 << 16), list(ct.KIND_NAMES))
 CHUNK_FIELDS = ("kind", "level", "segment", "length", "checksum", "offset")
 
 
@@ -146,9 +147,7 @@ class ChunkFile:
 
     def _set_table(self) -> None:
         table = self.core.chunks()
-        self._index = np.flatnonzero(
-            np.isin(table["kind"], list(ct.KIND_NAMES), kind="table")
-        )  # Chunks of unknown kinds are left out.
+        self._index = np.flatnonzero(KNOWN_KINDS[table["kind"]])  # Chunks of unknown kinds are left out.
         self._table = table[self._index]
 
     @cached_property

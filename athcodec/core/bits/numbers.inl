@@ -7,7 +7,7 @@
 enum { NUMBER_CLASSES = 28, NUMBER_BINS = 30, MAGNITUDE_CLIP = 1 << 20 };
 
 typedef struct {
-    ath_context size[NUMBER_CLASSES][NUMBER_BINS];
+    ath_context size[NUMBER_CLASSES][NUMBER_BINS + 2]; /* rows of whole cache lines */
     ath_context mantissa[NUMBER_BINS][4];
 } number_model;
 
@@ -38,9 +38,14 @@ ATH_INLINE uint32_t averaged(uint32_t mean, int32_t value) { return mean - (mean
 /* Returns the half-octave class of an expected magnitude in 1/16. Classes begin at 0, 1, 2, 3, 4, 6, 8, 12, 16, ... */
 ATH_INLINE int32_t number_class(uint32_t expected)
 {
-    int32_t length = bit_length(expected);
-    if (length < 2) return length;
-    int32_t half_octave = 2 * length - 2 + (int32_t)(expected >> (length - 2) & 1);
+    static const uint8_t small[128] = {
+        0,  1,  2,  3,  4,  4,  5,  5,  6,  6,  6,  6,  7,  7,  7,  7,  8,  8,  8,  8,  8,  8,  8,  8,  9,  9,
+        9,  9,  9,  9,  9,  9,  10, 10, 10, 10, 10, 10, 10, 10, 10, 10, 10, 10, 10, 10, 10, 10, 11, 11, 11, 11,
+        11, 11, 11, 11, 11, 11, 11, 11, 11, 11, 11, 11, 12, 12, 12, 12, 12, 12, 12, 12, 12, 12, 12, 12, 12, 12,
+        12, 12, 12, 12, 12, 12, 12, 12, 12, 12, 12, 12, 12, 12, 12, 12, 12, 12, 13, 13, 13, 13, 13, 13, 13, 13,
+        13, 13, 13, 13, 13, 13, 13, 13, 13, 13, 13, 13, 13, 13, 13, 13, 13, 13, 13, 13, 13, 13, 13, 13};
+    if (expected < sizeof small) return small[expected];
+    int32_t length = bit_length(expected), half_octave = 2 * length - 2 + (int32_t)(expected >> (length - 2) & 1);
     return half_octave < NUMBER_CLASSES ? half_octave : NUMBER_CLASSES - 1;
 }
 

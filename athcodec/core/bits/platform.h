@@ -104,7 +104,7 @@ ATH_INLINE void ath_put_number(void *numbers, size_t at, int is_float64, double 
 
 ATH_INLINE size_t ath_size_or_most(uint64_t size) { return size < SIZE_MAX ? (size_t)size : SIZE_MAX; }
 
-/* Cuts one block of memory into parts aligned to 16. If the base is null, it only counts. */
+/* Cuts one block of memory into parts of whole cache lines. If the base is null, it only counts. */
 typedef struct {
     uint8_t *base;
     uint64_t used;
@@ -113,7 +113,7 @@ typedef struct {
 ATH_INLINE void *ath_take(ath_arena *arena, uint64_t size)
 {
     uint8_t *at = arena->base ? arena->base + arena->used : 0;
-    arena->used += (size + 15) & ~(uint64_t)15;
+    arena->used += (size + 63) & ~(uint64_t)63;
     return at;
 }
 

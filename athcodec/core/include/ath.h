@@ -13,9 +13,9 @@
  *     ath_fade_to, ath_faded_positions          go from one level to the next without a jump
  *     ath_blended_positions, ath_wind_weights   blend several clips, such as calm and storm
  *
- * Memory. No function allocates, and there are no globals. You ask for a size, provide that many bytes aligned to 16,
- * and keep them while they are in use. To free an object, free its memory. An ath_file holds pointers into the bytes
- * that you fed to it: leave these bytes in place until you feed them anew or drop them.
+ * Memory. No function allocates, and there are no globals. You ask for a size, provide that many bytes aligned to 16
+ * (decoding is fastest with 64), and keep them while they are in use. To free an object, free its memory. An ath_file
+ * holds pointers into the bytes that you fed to it: leave these bytes in place until you feed them anew or drop them.
  *
  * Threads. Functions that take a const object may run in parallel on it. One ath_work serves one thread at a time; any
  * number of them may prepare segments of one ath_file while others play. While ath_feed, ath_drop, ath_refine_size or

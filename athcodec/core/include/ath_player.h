@@ -239,13 +239,13 @@ enum { ATH_PLAYER_DROPS = 8 };
 
 enum { ATH_PLAYER_HEAD = 64 }; /* bytes in front of aligned memory, which hold any of the structs above */
 
-/* Aligns memory of malloc to 16 and puts malloc's pointer in front of it. */
+/* Aligns memory of malloc to 64 and puts malloc's pointer in front of it. */
 static void *ath_player_aligned(size_t size)
 {
-    const size_t extra = 16 + sizeof(void *);
+    const size_t extra = 64 + sizeof(void *);
     char *memory = size <= SIZE_MAX - extra ? (char *)malloc(size + extra) : NULL;
     if (!memory) return NULL;
-    char *aligned = memory + extra - (uintptr_t)(memory + extra) % 16;
+    char *aligned = memory + extra - (uintptr_t)(memory + extra) % 64;
     memcpy(aligned - sizeof(void *), &memory, sizeof memory);
     return aligned;
 }

@@ -13,7 +13,7 @@ enum { MOST_TERMS = 16 };
  * the absolute weights of a row add up to at most 128. */
 #define APART (512.0 * 128.0 / 9007199254740992.0)
 
-typedef double vertex_row[ATH_PIECE_VERTICES]; /* zeros behind the last vertex */
+typedef double vertex_row[ATH_PIECE_VERTICES]; /* zeros behind the last vertex, as far as sums read */
 
 typedef struct {
     int32_t count;
@@ -40,11 +40,9 @@ ATH_INLINE double quick_sum(int32_t count, const double *a, const double *b)
         lanes_add_product(&other, a + i + ATH_LANES, b + i + ATH_LANES);
     }
     for (; i < count; i++) rest = rest + a[i] * b[i];
+    lanes_add(&sum, &other);
     lanes_store(lane, &sum);
-    for (int32_t j = 0; j < ATH_LANES; j++) rest = rest + lane[j];
-    lanes_store(lane, &other);
-    for (int32_t j = 0; j < ATH_LANES; j++) rest = rest + lane[j];
-    return rest;
+    return rest + ((lane[0] + lane[2]) + (lane[1] + lane[3]));
 }
 
 /* Returns a number that none of these is larger than. */
@@ -61,6 +59,12 @@ static void weigh_rest(const ath_plan *plan, const ath_piece *piece, vertex_row 
         for (int32_t k = 0; k < 3; k++) weight[k][v] = ath_rest_of(plan, piece->first + v)[k] - a[k];
 }
 
+/* Returns the numbers of a vertex_row that sums read. */
+ATH_INLINE size_t summed_vertices(int32_t vertices)
+{
+    return (size_t)(vertices + 2 * ATH_LANES - 1) / (2 * ATH_LANES) * (2 * ATH_LANES);
+}
+
 /* Fills the weights of shape s or, from the number of shapes on, of a mode along one axis. The piece has at least
  * ATH_LANES vertices. */
 ATH_HOT static void weigh_row(const ath_plan *plan, const ath_piece *piece, const ath_piece_rows *rows, int32_t s,
@@ -68,7 +72,7 @@ ATH_HOT static void weigh_row(const ath_plan *plan, const ath_piece *piece, cons
 {
     const double *basis = plan->bases + piece->basis;
     int32_t n = piece->count;
-    memset(weight, 0, 3 * sizeof *weight);
+    for (int32_t k = 0; k < 3; k++) memset(weight[k], 0, summed_vertices(n) * sizeof *weight[k]);
     if (!ath_is_shape_row(piece, rows, s / 3)) {
         memcpy(weight[s % 3], basis + s / 3 * n, (size_t)n * sizeof *basis);
         return;
@@ -115,7 +119,7 @@ ATH_HOT static void find_moves(int32_t T, const ath_frames *at, const ath_frames
 ATH_HOT static void find_row_sums(int32_t vertices, vertex_row *rest, vertex_row *weight, const placing_sums *terms,
                                   row_sums *row)
 {
-    int32_t count = (vertices + 2 * ATH_LANES - 1) / (2 * ATH_LANES) * (2 * ATH_LANES);
+    int32_t count = (int32_t)summed_vertices(vertices);
     row->rest = 0.0;
     for (int32_t i = 0; i < 3; i++) {
         row->shift[i] = 0.0;

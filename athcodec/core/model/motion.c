@@ -482,7 +482,6 @@ void ath_turned_attach(const ath_plan *plan, const ath_motion *motion, int32_t p
     const ath_piece *piece = plan->pieces + p;
     const ath_stream *base = ath_base_stream(motion, piece);
     ath_attach(plan, motion, piece, scratch->at);
-    memset(scratch->rotation, 0, 6 * (size_t)T * sizeof(double));
     if (ath_has_shift(piece)) {
         ath_inverse_track(base, T, count_of(rows, SHIFT_SLOT, base), ath_shift_step(piece, base), rows->shift,
                           scratch->shift);

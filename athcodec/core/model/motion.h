@@ -59,7 +59,7 @@ typedef struct {
 /* A piece as the layer before has it. */
 typedef struct {
     const double *placed;           /* count x 3 x frames */
-    const double *rotation, *shift; /* 3 x frames */
+    const double *rotation, *shift; /* 3 x frames; null: nothing */
     const double *frames;           /* attach point and rotation once moved and turned; null: it was not rigid */
     int32_t frequencies, modes;     /* reached by its rows; 0 frequencies: nothing is predicted */
 } ath_piece_before;
@@ -81,7 +81,7 @@ typedef struct {
     double *placed; /* positions, as large as `rows` */
     ath_frames at;
     double *track;            /* 3 x frames */
-    double *rotation, *shift; /* 3 x frames each, contiguous: the tracks that a refinement predicts from */
+    double *rotation, *shift; /* 3 x frames each, contiguous: the tracks that a refinement predicts from, if coded */
 } ath_scratch;
 
 /* A piece's rotation rows are steps about axes, the rows of `axes`. */

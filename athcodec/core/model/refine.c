@@ -52,7 +52,7 @@ static void predict_track(const ath_stream *stream, int32_t T, int32_t frequenci
 {
     int32_t count = ath_min(frequencies, stream->temporal_rank);
     memset(predicted, 0, 3 * (size_t)T * sizeof *predicted);
-    for (int32_t axis = 0; axis < 3 && count > 0; axis++) {
+    for (int32_t axis = 0; axis < 3 && count > 0 && track; axis++) {
         const double *row = track + axis * T;
         double least = coarse ? 0.5 : 0.5 * (double)ratios[axis];
         int32_t k = 0, any = 0;

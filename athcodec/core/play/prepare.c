@@ -737,8 +737,8 @@ static void look_before(ath_work *work, int32_t q, int32_t p)
     ath_piece_before *before = &layer->before;
     int32_t T = layer->motion.frames, root = work->streams[layer->plan->pieces[p].level].root;
     int same = ath_base_stream(&coarse->motion, piece)->root == root;
-    before->rotation = coarse->scratch.rotation;
-    before->shift = coarse->scratch.shift;
+    before->rotation = coarse->counts[ROTATION_SLOT] > 0 ? coarse->scratch.rotation : 0;
+    before->shift = coarse->counts[SHIFT_SLOT] > 0 ? coarse->scratch.shift : 0;
     before->frames = 0;
     layer->rows.coarse_turn_steps = 0;
     if (piece->flags & ATH_RIGID) {
@@ -827,14 +827,11 @@ static void correct_vertex(const corrections_reader *reader, const correction_ro
 {
     ath_corrected_parts parts;
     correction_parts(row, segment->frames, parts);
-    for (int32_t t = 0; t < segment->frames; t++) {
-        if (!is_reached(row, t)) {
-            t += CORRECTION_BLOCK - 1;
-            continue;
-        }
-        for (size_t k = 0; k < 3; k++)
-            correct(segment, ((size_t)t * (size_t)segment->exact_vertices + vertex) * 3 + k, parts[t][k], reader->step);
-    }
+    for (int32_t from = 0; from < segment->frames; from += CORRECTION_BLOCK)
+        for (int32_t t = from; is_reached(row, from) && t < ath_min(from + CORRECTION_BLOCK, segment->frames); t++)
+            for (size_t k = 0; k < 3; k++)
+                correct(segment, ((size_t)t * (size_t)segment->exact_vertices + vertex) * 3 + k, parts[t][k],
+                        reader->step);
 }
 
 static void watch_corrections(const ath_work *work, const correction_row *row, int32_t position)
@@ -894,14 +891,24 @@ static void watch_piece(const ath_work *work, int32_t p)
     watcher->piece(watcher, layer->plan, &layer->motion, p, &layer->rows);
 }
 
+/* Returns whether nothing depends on where a layer before the last has a piece. */
+static int is_idle(const layer_work *layer, const ath_piece *piece)
+{
+    int32_t any = layer->counts[SHIFT_SLOT] | layer->counts[ROTATION_SLOT];
+    for (int32_t m = 0; m < ath_rank(piece); m++) any |= layer->counts[m];
+    return any == 0 && piece->attach_cache < 0;
+}
+
 /* Places the piece at the first layer, then refines it layer by layer. */
 static int place_piece(ath_work *work, int32_t p)
 {
     const ath_piece *piece = work->file->plan.pieces + p;
     layer_work *layer = work->layers + work->first_layer;
     size_t vertex = (size_t)work->exact;
-    ath_turned_attach(layer->plan, &layer->motion, p, &layer->rows, &layer->scratch);
-    pose_piece(work, layer, p);
+    if (work->first_layer == work->layer || !is_idle(layer, layer->plan->pieces + p)) {
+        ath_turned_attach(layer->plan, &layer->motion, p, &layer->rows, &layer->scratch);
+        pose_piece(work, layer, p);
+    }
     for (int32_t q = work->first_layer + 1; q <= work->layer; q++)
         if (refine_piece(work, q, p) != ATH_OK) return ATH_BAD_CHUNK;
     layer = work->layers + work->layer;

@@ -362,8 +362,9 @@ static void correction_parts(const correction_row *row, int32_t frames, ath_corr
 {
     for (int32_t t = 0; t < frames; t += CORRECTION_BLOCK)
         if (is_reached(row, t)) memset(parts + t, 0, CORRECTION_BLOCK * sizeof parts[0]);
-    for (int32_t t = 0; t < frames; t++)
-        if (has_correction(row, t)) ath_add_correction(frames, t, row->of + t, parts);
+    for (int32_t from = 0, b = 1; from < frames; from += CORRECTION_BLOCK, b++)
+        for (int32_t bits = row->blocks[b], t = from; bits; bits >>= 1, t++)
+            if (bits & 1) ath_add_correction(frames, t, row->of + t, parts);
 }
 #endif
 

@@ -4,6 +4,7 @@
 
 #include "bits/refinements.inl"
 #include "model/basis.h"
+#include "model/lanes.h"
 #include "model/motion.h"
 #include "streams/rest_connected.inl"
 #include "streams/rest_copies.inl"
@@ -228,6 +229,17 @@ static void refine_rest_row(ath_coder *coder, rest_model *model, const rest_laye
     code_refined_row(coder, &model->refined_modes, n, 0, -1, &prediction, row);
 }
 
+ATH_HOT static void sum_modes(int32_t n, const double *basis, const int32_t *steps, double *sums)
+{
+    double weight[REST_RUN];
+    const double *modes[REST_RUN];
+    for (int32_t m = 0; m < n; m++) {
+        weight[m] = (double)steps[m];
+        modes[m] = basis + m * n;
+    }
+    lanes_sum(n, n, weight, modes, 0.0, sums);
+}
+
 /* Codes `n` vertices of a beam from `first` on, by the modes of a beam that hangs on `base`. */
 static void code_rest_run(ath_coder *coder, rest_model *model, const rest_layer *layer, int32_t first, int32_t n,
                           const double base[3], double step, const double *source, double *rest)
@@ -242,12 +254,11 @@ static void code_rest_run(ath_coder *coder, rest_model *model, const rest_layer 
         code_row(coder, &model->modes, REST_RUN, n, 0, -1, row);
     for (int32_t k = 0; layer->steps && k < 3; k++)
         memcpy(layer->steps + 3 * first + k * n, row + k * REST_RUN, (size_t)n * sizeof *row);
-    for (int32_t i = 0; i < n; i++)
-        for (int32_t k = 0; k < 3; k++) {
-            double sum = 0.0;
-            for (int32_t m = 0; m < n; m++) sum = sum + basis[m * n + i] * (double)row[k * REST_RUN + m];
-            run[3 * i + k] = base[k] + sum * step;
-        }
+    for (int32_t k = 0; k < 3; k++) {
+        double sums[REST_RUN];
+        sum_modes(n, basis, row + k * REST_RUN, sums);
+        for (int32_t i = 0; i < n; i++) run[3 * i + k] = base[k] + sums[i] * step;
+    }
 }
 
 /* Cuts a beam into runs of nearly equal length. Each hangs on the vertex before it. */
