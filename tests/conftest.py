@@ -107,6 +107,20 @@ def opened(browser):
 
 
 @pytest.fixture
+def opened_file(opened):
+    """A function that opens the viewer with the bytes of a file, which a server has until the test ends."""
+    from bench.throttled_server import ThrottledServer
+
+    with ThrottledServer({}) as line:
+
+        def visit(data: bytes, *until: str, **options):
+            line.files["tree.ath"] = data
+            return opened(line.page("tree.ath"), *until, **options)
+
+        yield visit
+
+
+@pytest.fixture
 def sample_file():
     return sample_path()
 

@@ -38,9 +38,8 @@ def windy(tmp_path_factory):
 
 
 @pytest.fixture
-def page(opened, sample_ath):
-    with ThrottledServer({"tree.ath": sample_ath.read_bytes()}) as line:
-        yield opened(line.page("tree.ath"))
+def page(opened_file, sample_ath):
+    return opened_file(sample_ath.read_bytes())
 
 
 def centre(page, selector: str) -> tuple[float, float]:
@@ -99,9 +98,7 @@ def test_the_loading_is_played_again_at_the_rate_that_is_chosen(page, sample_ath
     """Without a server's help: the bytes come no faster than such a line has them."""
     page.evaluate("athcodecViewer.setLevel('1')")
     page.click("#replay button[data-mbit='1']")
-    page.wait_for_function(
-        "() => athcodecViewer.motion?.readyLevel >= 1 && athcodecViewer.counters.arrived.first", timeout=60_000
-    )
+    page.wait_for_function("() => athcodecViewer.motion?.readyLevel >= 1 && athcodecViewer.counters.arrived.first")
     page.evaluate("athcodecViewer.setLevel('auto')")
     page.wait_for_function("() => athcodecViewer.counters.arrived.whole")
     fetched, seconds = page.evaluate(
@@ -145,20 +142,19 @@ def test_the_view_turns_and_zooms_by_keys_and_a_double_tap_resets_it(page):
     assert page.evaluate(VIEW) == pytest.approx(before)
 
 
-def test_a_double_tap_fits_by_touch(opened, sample_ath):
-    with ThrottledServer({"tree.ath": sample_ath.read_bytes()}) as line:
-        page = opened(line.page("tree.ath"), has_touch=True, viewport={"width": 390, "height": 844})
-        page.evaluate("athcodecViewer.setPlaying(false)")
-        before, fingers = page.evaluate(VIEW), Fingers(page)
-        page.evaluate("athcodecViewer.moveView(1, 0.2)")
-        assert page.evaluate(VIEW) != pytest.approx(before)
-        for _ in range(2):
-            fingers.tap((200, 500))
-        page.wait_for_function("() => !athcodecViewer.stage.moved")
-        assert page.evaluate(VIEW) == pytest.approx(before, rel=1e-3)
-        page.touchscreen.tap(*centre(page, "#toggle-panel"))
-        page.touchscreen.tap(*centre(page, "#colour [data-value=order]"))
-        assert chosen(page, "colour") == "order"
+def test_a_double_tap_fits_by_touch(opened_file, sample_ath):
+    page = opened_file(sample_ath.read_bytes(), has_touch=True, viewport={"width": 390, "height": 844})
+    page.evaluate("athcodecViewer.setPlaying(false)")
+    before, fingers = page.evaluate(VIEW), Fingers(page)
+    page.evaluate("athcodecViewer.moveView(1, 0.2)")
+    assert page.evaluate(VIEW) != pytest.approx(before)
+    for _ in range(2):
+        fingers.tap((200, 500))
+    page.wait_for_function("() => !athcodecViewer.stage.moved")
+    assert page.evaluate(VIEW) == pytest.approx(before, rel=1e-3)
+    page.touchscreen.tap(*centre(page, "#toggle-panel"))
+    page.touchscreen.tap(*centre(page, "#colour [data-value=order]"))
+    assert chosen(page, "colour") == "order"
 
 
 def test_two_levels_lie_under_one_split_that_is_dragged_and_moved_by_keys(page):
@@ -197,97 +193,93 @@ def test_no_number_promises_more_than_is_shown(page):
         assert ("less than a pixel" in page.inner_text("#level-hint")) == (off <= 1)
 
 
-def test_wind_is_chosen_on_a_disc(opened, windy):
-    with ThrottledServer({"tree.ath": windy}) as line:
-        page = opened(line.page("tree.ath"))
-        assert page.input_value("#clip") == "0" and page.inner_text("#wind-text").startswith("2.0")
-        x, y = centre(page, "#wind")
-        page.mouse.click(x + 25, y)
-        strength, heading = page.evaluate("athcodecViewer.state.wind")
-        assert 2 < strength < 10 and heading == pytest.approx(90, abs=1)
-        assert page.input_value("#clip") == "wind"
-        page.wait_for_function("() => athcodecViewer.motion.level >= 0")
-        page.keyboard.press("ArrowUp")
-        page.keyboard.press("ArrowLeft")
-        stronger, turned = page.evaluate("athcodecViewer.state.wind")
-        assert stronger > strength and turned == pytest.approx(heading - 10)
-        assert "heading 8" in page.get_attribute("#wind", "aria-valuetext")
-        page.select_option("#clip", label="gale")
-        assert page.evaluate("athcodecViewer.state.wind") is None and page.inner_text("#wind-text").startswith("10.0")
+def test_wind_is_chosen_on_a_disc(opened_file, windy):
+    page = opened_file(windy)
+    assert page.input_value("#clip") == "0" and page.inner_text("#wind-text").startswith("2.0")
+    x, y = centre(page, "#wind")
+    page.mouse.click(x + 25, y)
+    strength, heading = page.evaluate("athcodecViewer.state.wind")
+    assert 2 < strength < 10 and heading == pytest.approx(90, abs=1)
+    assert page.input_value("#clip") == "wind"
+    page.wait_for_function("() => athcodecViewer.motion.level >= 0")
+    page.keyboard.press("ArrowUp")
+    page.keyboard.press("ArrowLeft")
+    stronger, turned = page.evaluate("athcodecViewer.state.wind")
+    assert stronger > strength and turned == pytest.approx(heading - 10)
+    assert "heading 8" in page.get_attribute("#wind", "aria-valuetext")
+    page.select_option("#clip", label="gale")
+    assert page.evaluate("athcodecViewer.state.wind") is None and page.inner_text("#wind-text").startswith("10.0")
 
 
-def test_where_all_clips_blow_one_way_the_plant_is_turned_with_its_wind(opened):
-    with ThrottledServer({"tree.ath": athcodec.sample_path("grass").read_bytes()}) as line:
-        page = opened(line.page("tree.ath"))
-        assert page.is_visible("#wind-note")
-        x, y = centre(page, "#wind")
-        page.mouse.click(x + 25, y)
-        strength, heading = page.evaluate("athcodecViewer.state.wind")
-        assert strength > 0 and heading == pytest.approx(90, abs=1)
-        turned = "athcodecViewer.plants[0].root.rotation.y"
-        assert page.evaluate(turned) == pytest.approx(-np.radians(heading))
-        page.evaluate("athcodecViewer.forestSwitch(true)")
-        assert page.evaluate(turned) == 0
-        page.evaluate("athcodecViewer.forestSwitch(false)")
-        page.select_option("#clip", index=1)
-        assert page.evaluate(turned) == 0
+def test_where_all_clips_blow_one_way_the_plant_is_turned_with_its_wind(opened_file):
+    page = opened_file(athcodec.sample_path("grass").read_bytes())
+    assert page.is_visible("#wind-note")
+    x, y = centre(page, "#wind")
+    page.mouse.click(x + 25, y)
+    strength, heading = page.evaluate("athcodecViewer.state.wind")
+    assert strength > 0 and heading == pytest.approx(90, abs=1)
+    turned = "athcodecViewer.plants[0].root.rotation.y"
+    assert page.evaluate(turned) == pytest.approx(-np.radians(heading))
+    page.evaluate("athcodecViewer.forestSwitch(true)")
+    assert page.evaluate(turned) == 0
+    page.evaluate("athcodecViewer.forestSwitch(false)")
+    page.select_option("#clip", index=1)
+    assert page.evaluate(turned) == 0
 
 
-def test_every_control_answers_to_a_finger(opened, windy):
-    with ThrottledServer({"tree.ath": windy}) as line:
-        page = opened(line.page("tree.ath"), has_touch=True, viewport={"width": 390, "height": 844})
-        fingers = Fingers(page)
+def test_every_control_answers_to_a_finger(opened_file, windy):
+    page = opened_file(windy, has_touch=True, viewport={"width": 390, "height": 844})
+    fingers = Fingers(page)
 
-        def tapped(selector: str, then: str):
-            page.locator(selector).tap()
-            return page.evaluate(then)
+    def tapped(selector: str, then: str):
+        page.locator(selector).tap()
+        return page.evaluate(then)
 
-        def dragged(selector: str, x: float, y: float) -> None:
-            page.locator(selector).scroll_into_view_if_needed()
-            start = centre(page, selector)
-            fingers.go((start, (start[0] + x, start[1] + y)))
+    def dragged(selector: str, x: float, y: float) -> None:
+        page.locator(selector).scroll_into_view_if_needed()
+        start = centre(page, selector)
+        fingers.go((start, (start[0] + x, start[1] + y)))
 
-        assert tapped("#play", "athcodecViewer.state.playing") is False
-        page.locator("#time").tap(position={"x": 80, "y": 15})
-        assert page.evaluate("athcodecViewer.state.time") > 0.3
-        assert tapped("#loop", "athcodecViewer.motion.wrap") in ("loop", "clamp")
-        assert not page.is_visible("#replay")
-        tapped("#more", "0")
-        assert page.is_visible("#replay") and page.get_attribute("#more", "aria-expanded") == "true"
-        distance = "athcodecViewer.stage.controls.getDistance()"
-        far = page.evaluate(distance)
-        fingers.go(((160, 400), (60, 400)), ((230, 400), (330, 400)))
-        page.wait_for_function(f"() => {distance} < {0.8 * far}")
-        tapped("#toggle-panel", "0")
-        assert tapped("#level-choice [data-value='1']", "athcodecViewer.motion.target") == 1
-        assert tapped("#colour [data-value=node]", "athcodecViewer.plants[0].colour") == "node"
-        assert tapped("#show [data-value=skeleton]", "athcodecViewer.plants[0].show") == "skeleton"
-        assert tapped("#compare [data-value=levels]", "athcodecViewer.plants.length") == 2
-        dragged("#split svg", -80, 0)
-        assert page.evaluate("athcodecViewer.stage.split") == pytest.approx(0.5 - 80 / 390, abs=0.02)
-        tapped("#compare [data-value=off]", "0")
-        dragged("#wind", 25, 0)
-        assert page.evaluate("athcodecViewer.state.wind[1]") == pytest.approx(90, abs=2)
-        assert tapped("#forest", "Boolean(athcodecViewer.state.forest)") is True
+    assert tapped("#play", "athcodecViewer.state.playing") is False
+    page.locator("#time").tap(position={"x": 80, "y": 15})
+    assert page.evaluate("athcodecViewer.state.time") > 0.3
+    assert tapped("#loop", "athcodecViewer.motion.wrap") in ("loop", "clamp")
+    assert not page.is_visible("#replay")
+    tapped("#more", "0")
+    assert page.is_visible("#replay") and page.get_attribute("#more", "aria-expanded") == "true"
+    distance = "athcodecViewer.stage.controls.getDistance()"
+    far = page.evaluate(distance)
+    fingers.go(((160, 400), (60, 400)), ((230, 400), (330, 400)))
+    page.wait_for_function(f"() => {distance} < {0.8 * far}")
+    tapped("#toggle-panel", "0")
+    assert tapped("#level-choice [data-value='1']", "athcodecViewer.motion.target") == 1
+    assert tapped("#colour [data-value=node]", "athcodecViewer.plants[0].colour") == "node"
+    assert tapped("#show [data-value=skeleton]", "athcodecViewer.plants[0].show") == "skeleton"
+    assert tapped("#compare [data-value=levels]", "athcodecViewer.plants.length") == 2
+    dragged("#split svg", -80, 0)
+    assert page.evaluate("athcodecViewer.stage.split") == pytest.approx(0.5 - 80 / 390, abs=0.02)
+    tapped("#compare [data-value=off]", "0")
+    dragged("#wind", 25, 0)
+    assert page.evaluate("athcodecViewer.state.wind[1]") == pytest.approx(90, abs=2)
+    assert tapped("#forest", "Boolean(athcodecViewer.state.forest)") is True
 
 
 REACHABLE = """() => [...document.querySelectorAll("button, input, select, summary, [tabindex]")]
   .filter((each) => each.checkVisibility() && each.tabIndex >= 0 && !each.disabled)"""
 
 
-def test_every_control_is_reached_by_tab(opened, windy):
-    with ThrottledServer({"tree.ath": windy}) as line:
-        page = opened(line.page("tree.ath"))
-        page.evaluate("athcodecViewer.setPlaying(false)")
-        page.click("#compare [data-value=levels]")
-        wanted = page.evaluate(f"globalThis.wanted = ({REACHABLE})(); wanted.length")
-        page.evaluate("""() => {
-          globalThis.reached = new Set();
-          document.addEventListener("focusin", ({ target }) => reached.add(target));
-        }""")
-        for _ in range(wanted + 2):
-            page.keyboard.press("Tab")
-        assert page.evaluate("wanted.filter((each) => !reached.has(each)).map((each) => each.outerHTML)") == []
+def test_every_control_is_reached_by_tab(opened_file, windy):
+    page = opened_file(windy)
+    page.evaluate("athcodecViewer.setPlaying(false)")
+    page.click("#compare [data-value=levels]")
+    wanted = page.evaluate(f"globalThis.wanted = ({REACHABLE})(); wanted.length")
+    page.evaluate("""() => {
+      globalThis.reached = new Set();
+      document.addEventListener("focusin", ({ target }) => reached.add(target));
+    }""")
+    for _ in range(wanted + 2):
+        page.keyboard.press("Tab")
+    assert page.evaluate("wanted.filter((each) => !reached.has(each)).map((each) => each.outerHTML)") == []
 
 
 PIXELS = """(stage) => {
@@ -347,95 +339,88 @@ def test_arrows_on_the_time_go_from_frame_to_frame(page):
 
 
 @pytest.mark.parametrize("size", [(1000, 700), (390, 844)])
-def test_the_thumb_of_the_time_runs_on_its_track(opened, sample_ath, size):
-    with ThrottledServer({"tree.ath": sample_ath.read_bytes()}) as line:
-        page = opened(line.page("tree.ath"), viewport=dict(zip(("width", "height"), size)))
-        assert centre(page, "#time")[1] == pytest.approx(centre(page, "#ready")[1], abs=0.5)
+def test_the_thumb_of_the_time_runs_on_its_track(opened_file, sample_ath, size):
+    page = opened_file(sample_ath.read_bytes(), viewport=dict(zip(("width", "height"), size)))
+    assert centre(page, "#time")[1] == pytest.approx(centre(page, "#ready")[1], abs=0.5)
 
 
-def test_the_address_brings_back_what_is_looked_at(opened, windy):
-    with ThrottledServer({"tree.ath": windy}) as line:
-        page = opened(line.page("tree.ath"))
-        page.select_option("#clip", label="across")
-        page.wait_for_function("() => !athcodecViewer.motion.switching")
-        page.click("#colour [data-value=order]")
-        page.evaluate("athcodecViewer.setLevel('1')")
-        page.evaluate("athcodecViewer.moveView(0.5, 0.1, 0.8)")
-        page.evaluate("athcodecViewer.setPlaying(false)")
-        page.evaluate("athcodecViewer.seek(1)")
-        page.wait_for_function("() => location.hash.includes('t=1')")
-        view, address = page.evaluate(VIEW), page.evaluate("location.href")
-        page = opened(address, "athcodecViewer.state.time === 1")
-        assert page.evaluate("athcodecViewer.motion.clip.name") == "across"
-        assert chosen(page, "colour") == "order" and chosen(page, "level-choice") == "1"
-        assert page.evaluate(VIEW) == pytest.approx(view, rel=1e-3)
+def test_the_address_brings_back_what_is_looked_at(opened, opened_file, windy):
+    page = opened_file(windy)
+    page.select_option("#clip", label="across")
+    page.wait_for_function("() => !athcodecViewer.motion.switching")
+    page.click("#colour [data-value=order]")
+    page.evaluate("athcodecViewer.setLevel('1')")
+    page.evaluate("athcodecViewer.moveView(0.5, 0.1, 0.8)")
+    page.evaluate("athcodecViewer.setPlaying(false)")
+    page.evaluate("athcodecViewer.seek(1)")
+    page.wait_for_function("() => location.hash.includes('t=1')")
+    view, address = page.evaluate(VIEW), page.evaluate("location.href")
+    page = opened(address, "athcodecViewer.state.time === 1")
+    assert page.evaluate("athcodecViewer.motion.clip.name") == "across"
+    assert chosen(page, "colour") == "order" and chosen(page, "level-choice") == "1"
+    assert page.evaluate(VIEW) == pytest.approx(view, rel=1e-3)
 
 
-def test_an_address_that_is_changed_in_an_open_page_is_followed(opened, windy):
-    with ThrottledServer({"tree.ath": windy}) as line:
-        page = opened(line.page("tree.ath"))
-        page.evaluate("location.hash = 'colour=order&detail=1&clip=gale&t=0.5'")
-        page.wait_for_function("() => athcodecViewer.state.time === 0.5 && athcodecViewer.motion.clip.name === 'gale'")
-        assert chosen(page, "colour") == "order" and chosen(page, "level-choice") == "1"
-        page.evaluate("location.hash = ''")
-        page.wait_for_function("() => athcodecViewer.state.playing && athcodecViewer.motion.clip.name === 'calm'")
-        assert chosen(page, "colour") == "plain" and chosen(page, "level-choice") == "auto"
+def test_an_address_that_is_changed_in_an_open_page_is_followed(opened_file, windy):
+    page = opened_file(windy)
+    page.evaluate("location.hash = 'colour=order&detail=1&clip=gale&t=0.5'")
+    page.wait_for_function("() => athcodecViewer.state.time === 0.5 && athcodecViewer.motion.clip.name === 'gale'")
+    assert chosen(page, "colour") == "order" and chosen(page, "level-choice") == "1"
+    page.evaluate("location.hash = ''")
+    page.wait_for_function("() => athcodecViewer.state.playing && athcodecViewer.motion.clip.name === 'calm'")
+    assert chosen(page, "colour") == "plain" and chosen(page, "level-choice") == "auto"
 
 
-def test_while_nothing_is_on_the_stage_no_control_reaches_for_a_plant(opened, windy):
+def test_while_nothing_is_on_the_stage_no_control_reaches_for_a_plant(opened_file, windy):
     """Figures are open, and a wind is chosen; what goes wrong would be in the log."""
-    with ThrottledServer({"tree.ath": windy}) as line:
-        page = opened(line.page("tree.ath"))
-        page.click("summary:has-text('Figures')")
-        page.evaluate("athcodecViewer.setWind(5, 30)")
-        page.click("#replay button[data-mbit='1']")
-        assert page.evaluate("athcodecViewer.plants.length === 0 && document.querySelector('footer').inert")
-        for key in ("c", "d", "f", "n", ".", "l", "]"):
-            page.keyboard.press(key)
-        page.evaluate("athcodecViewer.state.dirty = true")
-        page.wait_for_function("() => athcodecViewer.plants.length === 1 && !document.querySelector('footer').inert")
+    page = opened_file(windy)
+    page.click("summary:has-text('Figures')")
+    page.evaluate("athcodecViewer.setWind(5, 30)")
+    page.click("#replay button[data-mbit='1']")
+    assert page.evaluate("athcodecViewer.plants.length === 0 && document.querySelector('footer').inert")
+    for key in ("c", "d", "f", "n", ".", "l", "]"):
+        page.keyboard.press(key)
+    page.evaluate("athcodecViewer.state.dirty = true")
+    page.wait_for_function("() => athcodecViewer.plants.length === 1 && !document.querySelector('footer').inert")
 
 
 PLACED = (Path(__file__).parent / "node" / "placed.js").read_text("utf-8")
 
 
 @pytest.mark.parametrize("size", [(1440, 900), (1024, 768), (1280, 640), (1100, 760), (844, 390), (390, 844)])
-def test_no_card_covers_the_plant(opened, sample_ath, size):
-    with ThrottledServer({"tree.ath": sample_ath.read_bytes()}) as line:
-        page = opened(line.page("tree.ath"), viewport=dict(zip(("width", "height"), size)))
-        for panel in ("as it opens", "the other way"):
-            page.wait_for_timeout(300)  # cards are measured when the browser has laid them out
-            found = page.evaluate(PLACED)
-            assert found["over"] == found["outside"] == [] and found["share"] > 0.3, (panel, found)
-            page.click("#toggle-panel")
+def test_no_card_covers_the_plant(opened_file, sample_ath, size):
+    page = opened_file(sample_ath.read_bytes(), viewport=dict(zip(("width", "height"), size)))
+    for panel in ("as it opens", "the other way"):
+        page.wait_for_timeout(300)  # cards are measured when the browser has laid them out
+        found = page.evaluate(PLACED)
+        assert found["over"] == found["outside"] == [] and found["share"] > 0.3, (panel, found)
+        page.click("#toggle-panel")
 
 
-def test_who_wants_less_motion_sees_a_still_first_frame_and_a_button(opened, sample_ath):
-    with ThrottledServer({"tree.ath": sample_ath.read_bytes()}) as line:
-        page = opened(line.page("tree.ath"), reduced_motion="reduce")
-        page.wait_for_timeout(500)
-        assert page.evaluate("athcodecViewer.motion.frame") == 0 and page.get_attribute("#play", "aria-label") == "Play"
-        page.click("#play")
-        page.wait_for_function("() => athcodecViewer.motion.frame > 1")
+def test_who_wants_less_motion_sees_a_still_first_frame_and_a_button(opened_file, sample_ath):
+    page = opened_file(sample_ath.read_bytes(), reduced_motion="reduce")
+    page.wait_for_timeout(500)
+    assert page.evaluate("athcodecViewer.motion.frame") == 0 and page.get_attribute("#play", "aria-label") == "Play"
+    page.click("#play")
+    page.wait_for_function("() => athcodecViewer.motion.frame > 1")
 
 
-def test_a_lost_context_is_restored(opened, sample_ath):
-    with ThrottledServer({"tree.ath": sample_ath.read_bytes()}) as line:
-        page = opened(line.page("tree.ath"), quiet="WebGL")
-        page.evaluate(f"globalThis.seen = () => ({PIXELS})(athcodecViewer.stage)")
-        colours = "new Set(seen()).size"
-        before = page.evaluate(f"athcodecViewer.setPlaying(false), {colours}")
-        page.evaluate("""async () => {
-          const { canvas, renderer } = athcodecViewer.stage;
-          const lost = renderer.getContext().getExtension("WEBGL_lose_context");
-          const told = (type) => new Promise((done) => canvas.addEventListener(type, () => setTimeout(done)));
-          const gone = told("webglcontextlost"), back = told("webglcontextrestored");
-          lost.loseContext();
-          await gone;
-          lost.restoreContext();
-          await back;
-        }""")
-        assert page.evaluate(colours) > 0.8 * before > 20
+def test_a_lost_context_is_restored(opened_file, sample_ath):
+    page = opened_file(sample_ath.read_bytes(), quiet="WebGL")
+    page.evaluate(f"globalThis.seen = () => ({PIXELS})(athcodecViewer.stage)")
+    colours = "new Set(seen()).size"
+    before = page.evaluate(f"athcodecViewer.setPlaying(false), {colours}")
+    page.evaluate("""async () => {
+      const { canvas, renderer } = athcodecViewer.stage;
+      const lost = renderer.getContext().getExtension("WEBGL_lose_context");
+      const told = (type) => new Promise((done) => canvas.addEventListener(type, () => setTimeout(done)));
+      const gone = told("webglcontextlost"), back = told("webglcontextrestored");
+      lost.loseContext();
+      await gone;
+      lost.restoreContext();
+      await back;
+    }""")
+    assert page.evaluate(colours) > 0.8 * before > 20
 
 
 def test_what_an_address_names_and_is_not_there_is_passed_over(opened, sample_ath):
@@ -444,17 +429,16 @@ def test_what_an_address_names_and_is_not_there_is_passed_over(opened, sample_at
         assert page.evaluate("athcodecViewer.motion.automatic") and chosen(page, "colour") == "plain"
 
 
-def test_links_and_embed_code_are_copied(opened, sample_ath):
-    with ThrottledServer({"tree.ath": sample_ath.read_bytes()}) as line:
-        page = opened(line.page("tree.ath"))
-        page.context.grant_permissions(["clipboard-read", "clipboard-write"])
-        page.click("#link")
-        page.wait_for_function("() => !document.getElementById('note').hidden")
-        assert page.evaluate("navigator.clipboard.readText()") == page.evaluate("location.href")
-        assert "this computer" in page.inner_text("#note")
-        page.click("#embed")
-        page.wait_for_function("() => document.getElementById('note').textContent.startsWith('Embed')")
-        assert page.evaluate("navigator.clipboard.readText()").startswith('<iframe src="http')
+def test_links_and_embed_code_are_copied(opened_file, sample_ath):
+    page = opened_file(sample_ath.read_bytes())
+    page.context.grant_permissions(["clipboard-read", "clipboard-write"])
+    page.click("#link")
+    page.wait_for_function("() => !document.getElementById('note').hidden")
+    assert page.evaluate("navigator.clipboard.readText()") == page.evaluate("location.href")
+    assert "this computer" in page.inner_text("#note")
+    page.click("#embed")
+    page.wait_for_function("() => document.getElementById('note').textContent.startsWith('Embed')")
+    assert page.evaluate("navigator.clipboard.readText()").startswith('<iframe src="http')
 
 
 def test_a_video_is_saved(page):

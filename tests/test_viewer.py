@@ -339,7 +339,7 @@ def settle(page, line: ThrottledServer) -> None:
     while before != line.log:
         before = [list(answer) for answer in line.log]
         pictures = page.evaluate("athcodecViewer.counters.pictures")
-        page.wait_for_function(f"() => athcodecViewer.counters.pictures >= {pictures + 20}", timeout=60_000)
+        page.wait_for_function(f"() => athcodecViewer.counters.pictures >= {pictures + 20}")
 
 
 def positions_of(page, call: str) -> np.ndarray:
@@ -399,13 +399,13 @@ def test_what_is_drawn_has_the_rest_pose_of_level_1_once_that_is_here(opened, st
             assert found["lines"] == found["rest"] and found["limbs"]
             assert abs(2 * found["radius"] - np.linalg.norm(np.ptp(rest, axis=0))) < 1e-5 * found["radius"]
             line.release()
-            page.wait_for_function("() => athcodecViewer.motion.level > 0", timeout=60_000)
+            page.wait_for_function("() => athcodecViewer.motion.level > 0")
 
 
 def play(page, clip) -> None:
     """Another clip, and waits until nothing is left of the one before."""
     page.evaluate(f"athcodecViewer.playClip({clip})")
-    page.wait_for_function("() => !athcodecViewer.motion.switching && athcodecViewer.motion.complete", timeout=60_000)
+    page.wait_for_function("() => !athcodecViewer.motion.switching && athcodecViewer.motion.complete")
 
 
 @browser_test
@@ -463,7 +463,7 @@ def test_the_clip_before_goes_on_until_the_next_is_here_and_fades_into_it(opened
         page.evaluate("athcodecViewer.setPlaying(false)")
         line.hold()
         page.evaluate(f"void (globalThis.fading = ({FADE})({decoder.file.level_count - 1}))")
-        page.wait_for_function("() => globalThis.waiting?.length > 0", timeout=60_000)
+        page.wait_for_function("() => globalThis.waiting?.length > 0")
         line.release()
         found = page.evaluate("fading")
         gust = decoder.file.clips[1]
@@ -573,7 +573,7 @@ def segmented(tmp_path_factory):
 
 @browser_test
 @pytest.mark.parametrize("case", ["asked", "segment"])
-def test_no_vertex_jumps_where_the_level_changes(opened, segmented, case):
+def test_no_vertex_jumps_where_the_level_changes(opened_file, segmented, case):
     """It is asked for, or a segment begins of which less can be shown. No vertex goes further in a picture than a level
     takes it and its share of the way, nor does it jerk; without fading it does."""
     data, decoder = segmented
@@ -581,13 +581,12 @@ def test_no_vertex_jumps_where_the_level_changes(opened, segmented, case):
     wanted = [1] * 3 + [deepest] * 5 + [2] * 20 if case == "asked" else [deepest] * 30
     start = 0.0 if case == "asked" else 16 / 30 - 10 * step
     levels = sorted({1, *wanted})
-    with ThrottledServer({"tree.ath": data}) as line:
-        page = opened(line.page("tree.ath"), "athcodecViewer.motion?.readyLevel >= 1")
-        page.evaluate("athcodecViewer.setPlaying(false)")
-        page.wait_for_function("() => athcodecViewer.motion.readyLevel === 1", timeout=60_000)
-        page.evaluate(WATCHED)
-        plan = {"step": step, "wanted": wanted, "start": start, "known": levels}
-        faded, at_once = (page.evaluate(CHANGES, plan | {"fade": seconds}) for seconds in (fade, 0))
+    page = opened_file(data, "athcodecViewer.motion?.readyLevel >= 1")
+    page.evaluate("athcodecViewer.setPlaying(false)")
+    page.wait_for_function("() => athcodecViewer.motion.readyLevel === 1")
+    page.evaluate(WATCHED)
+    plan = {"step": step, "wanted": wanted, "start": start, "known": levels}
+    faded, at_once = (page.evaluate(CHANGES, plan | {"fade": seconds}) for seconds in (fade, 0))
     assert not faded["rest"] and faded["level"] == at_once["level"] != max(levels)
     faded, at_once = (np.array(found["rows"]) for found in (faded, at_once))
     assert np.allclose(faded[-1], at_once[-1], rtol=0, atol=1e-5)
@@ -635,7 +634,7 @@ def test_a_tree_that_sharpens_as_bytes_come_does_not_jump(opened, sample_ath):
         page.evaluate("athcodecViewer.setPlaying(false)")
         page.evaluate(WATCHED)
         page.evaluate(f"void (globalThis.sharpening = ({SHARPENING})({deepest}))")
-        page.wait_for_function("() => globalThis.held", timeout=60_000)
+        page.wait_for_function("() => globalThis.held")
         line.release()
         found = page.evaluate("sharpening")
     rows = np.array(found["rows"])
@@ -759,25 +758,24 @@ def test_clips_are_chosen_from_a_list_by_key_and_in_the_address(opened, medley_a
 
 
 @browser_test
-def test_instances_of_a_forest_play_clips_of_their_own(opened, windy_ath):
-    with ThrottledServer({"tree.ath": windy_ath.read_bytes()}) as line:
-        page = opened(line.page("tree.ath"))
-        page.evaluate("athcodecViewer.forestOf(30)")
-        drawn = """athcodecViewer.state.forest.children.filter(({ visible }) => visible)
-          .map(({ userData, geometry }) => [userData.clip, geometry.instanceCount])"""
+def test_instances_of_a_forest_play_clips_of_their_own(opened_file, windy_ath):
+    page = opened_file(windy_ath.read_bytes())
+    page.evaluate("athcodecViewer.forestOf(30)")
+    drawn = """athcodecViewer.state.forest.children.filter(({ visible }) => visible)
+      .map(({ userData, geometry }) => [userData.clip, geometry.instanceCount])"""
 
-        def clips(wanted: int) -> None:
-            page.wait_for_function(f"() => new Set({drawn}.map(([clip]) => clip)).size === {wanted}", timeout=60_000)
-            forest = page.evaluate("[...athcodecViewer.state.forest.counts, athcodecViewer.state.forest.culled]")
-            assert sum(forest) == 30
+    def clips(wanted: int) -> None:
+        page.wait_for_function(f"() => new Set({drawn}.map(([clip]) => clip)).size === {wanted}")
+        forest = page.evaluate("[...athcodecViewer.state.forest.counts, athcodecViewer.state.forest.culled]")
+        assert sum(forest) == 30
 
-        clips(1)
-        page.check("#forest-mix")
-        clips(3)
-        page.uncheck("#forest-mix")
-        page.evaluate("athcodecViewer.playClip(2)")
-        page.wait_for_function(f"() => {drawn}.every(([clip]) => clip === 2)", timeout=60_000)
-        assert ink(page) > 0.005
+    clips(1)
+    page.check("#forest-mix")
+    clips(3)
+    page.uncheck("#forest-mix")
+    page.evaluate("athcodecViewer.playClip(2)")
+    page.wait_for_function(f"() => {drawn}.every(([clip]) => clip === 2)")
+    assert ink(page) > 0.005
 
 
 @browser_test
@@ -788,7 +786,7 @@ def test_it_moves_before_a_seventh_of_the_file_has_come(opened, gusty_ath):
         assert line.log[0][1] == 0 and line.sent("tree.ath") <= len(data) / 7
         page.evaluate("athcodecViewer.setLevel(String(athcodecViewer.motion.levelCount - 1))")
         line.release()
-        page.wait_for_function("() => athcodecViewer.motion.complete", timeout=60_000)
+        page.wait_for_function("() => athcodecViewer.motion.complete")
         assert line.sent("tree.ath") <= 1.01 * len(data) and len(line.log) > 3
 
 
@@ -817,8 +815,8 @@ def test_a_server_without_ranges_sends_a_download_that_plays_while_it_grows(open
         page = opened(line.page("tree.ath"), "athcodecViewer.counters.firstMotion")
         assert line.sent("tree.ath") <= len(data) / 2
         line.release()
-        page.wait_for_function("() => athcodecViewer.motion.complete", timeout=60_000)
-        page.wait_for_function("() => athcodecViewer.plants[0].ath.attributes.radius", timeout=60_000)
+        page.wait_for_function("() => athcodecViewer.motion.complete")
+        page.wait_for_function("() => athcodecViewer.plants[0].ath.attributes.radius")
         assert len(line.log) == 1 and line.sent("tree.ath") == len(data)
 
 
@@ -861,18 +859,17 @@ def test_the_page_says_that_a_file_cannot_be_shown(opened, sample_ath, damage, w
 
 
 @browser_test
-def test_the_intact_levels_of_a_damaged_file_play(opened, sample_ath):
+def test_the_intact_levels_of_a_damaged_file_play(opened_file, sample_ath):
     parts = sample_ath.read_bytes()
     with athcodec.open(sample_ath) as decoder:
         at = decoder.file.info()["levels"][1]["bytes"] + 50
     damaged = parts[:at] + bytes([parts[at] ^ 4]) + parts[at + 1 :]
-    with ThrottledServer({"tree.ath": damaged}) as line:
-        shown = "!document.getElementById('trouble').hidden && athcodecViewer.motion"
-        page = opened(line.page("tree.ath"), shown)
-        assert "damaged" in page.inner_text("#trouble")
-        page.wait_for_function("() => athcodecViewer.counters.pictures > 20")
-        assert page.evaluate("athcodecViewer.motion.level") >= 1
-        assert page.is_visible("#trouble")  # as long as the file is open
+    shown = "!document.getElementById('trouble').hidden && athcodecViewer.motion"
+    page = opened_file(damaged, shown)
+    assert "damaged" in page.inner_text("#trouble")
+    page.wait_for_function("() => athcodecViewer.counters.pictures > 20")
+    assert page.evaluate("athcodecViewer.motion.level") >= 1
+    assert page.is_visible("#trouble")  # as long as the file is open
 
 
 @browser_test
@@ -970,16 +967,15 @@ def test_the_loader_takes_a_geometry_or_its_numbers_as_the_mesh(opened, hosted):
 
 
 @browser_test
-def test_a_thousand_instances_are_drawn_each_at_its_level(opened, sample_ath):
-    with ThrottledServer({"tree.ath": sample_ath.read_bytes()}) as line:
-        page = opened(line.page("tree.ath"))
-        page.evaluate("athcodecViewer.forestOf(1000)")
-        forest = "athcodecViewer.state.forest"
-        page.wait_for_function(f"() => {forest}?.baked.length === athcodecViewer.motion.levelCount")
-        page.wait_for_function(f"() => {forest}.counts.reduce((a, b) => a + b, 0) > 300", timeout=60_000)
-        counts = page.evaluate(f"[...{forest}.counts, {forest}.culled]")
-        assert sum(counts) == 1000 and sum(count > 0 for count in counts[:-1]) > 1
-        assert ink(page) > 0.1
+def test_a_thousand_instances_are_drawn_each_at_its_level(opened_file, sample_ath):
+    page = opened_file(sample_ath.read_bytes())
+    page.evaluate("athcodecViewer.forestOf(1000)")
+    forest = "athcodecViewer.state.forest"
+    page.wait_for_function(f"() => {forest}?.baked.length === athcodecViewer.motion.levelCount")
+    page.wait_for_function(f"() => {forest}.counts.reduce((a, b) => a + b, 0) > 300")
+    counts = page.evaluate(f"[...{forest}.counts, {forest}.culled]")
+    assert sum(counts) == 1000 and sum(count > 0 for count in counts[:-1]) > 1
+    assert ink(page) > 0.1
 
 
 INK = """() => {
@@ -1062,25 +1058,24 @@ def test_normals_turn_with_the_surface_at_every_level(opened, tmp_path):
 
 
 @browser_test
-def test_the_page_works_by_keyboard(opened, sample_ath):
-    with ThrottledServer({"tree.ath": sample_ath.read_bytes()}) as line:
-        page = opened(line.page("tree.ath"))
+def test_the_page_works_by_keyboard(opened_file, sample_ath):
+    page = opened_file(sample_ath.read_bytes())
 
-        def pressed(key: str, then: str):
-            page.keyboard.press(key)
-            return page.evaluate(then)
+    def pressed(key: str, then: str):
+        page.keyboard.press(key)
+        return page.evaluate(then)
 
-        assert pressed("Space", "athcodecViewer.state.playing") is False
-        pressed("Home", "0")
-        assert pressed("ArrowRight", "athcodecViewer.state.time") == pytest.approx(1 / 30, rel=1e-3)
-        assert pressed("[", "athcodecViewer.motion.target") < page.evaluate("athcodecViewer.motion.levelCount") - 1
-        assert pressed("a", "athcodecViewer.motion.automatic") is True
-        assert pressed("c", "document.querySelector('#colour [aria-checked=true]').textContent") == "Part"
-        assert pressed("s", "document.querySelector('#show [aria-checked=true]').textContent") == "Branch lines"
-        assert pressed("l", "athcodecViewer.motion.wrap") == "clamp", "a file without loops was repeated"
-        assert pressed("l", "athcodecViewer.motion.wrap") == "loop"
-        assert pressed("d", "athcodecViewer.plants.length") == 2
-        assert pressed("f", "Boolean(athcodecViewer.state.forest) && athcodecViewer.plants.length === 1") is True
-        with page.expect_download() as download:
-            page.keyboard.press("p")
-        assert Path(download.value.path()).read_bytes()[:4] == b"\x89PNG"
+    assert pressed("Space", "athcodecViewer.state.playing") is False
+    pressed("Home", "0")
+    assert pressed("ArrowRight", "athcodecViewer.state.time") == pytest.approx(1 / 30, rel=1e-3)
+    assert pressed("[", "athcodecViewer.motion.target") < page.evaluate("athcodecViewer.motion.levelCount") - 1
+    assert pressed("a", "athcodecViewer.motion.automatic") is True
+    assert pressed("c", "document.querySelector('#colour [aria-checked=true]').textContent") == "Part"
+    assert pressed("s", "document.querySelector('#show [aria-checked=true]').textContent") == "Branch lines"
+    assert pressed("l", "athcodecViewer.motion.wrap") == "clamp", "a file without loops was repeated"
+    assert pressed("l", "athcodecViewer.motion.wrap") == "loop"
+    assert pressed("d", "athcodecViewer.plants.length") == 2
+    assert pressed("f", "Boolean(athcodecViewer.state.forest) && athcodecViewer.plants.length === 1") is True
+    with page.expect_download() as download:
+        page.keyboard.press("p")
+    assert Path(download.value.path()).read_bytes()[:4] == b"\x89PNG"

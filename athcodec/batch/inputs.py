@@ -21,6 +21,7 @@ from athcodec.batch.settings import Settings, check_settings, settings_of
 from athcodec.decoding.container import MAGIC
 from athcodec.errors import ClipError, MissingExtra, RemoteError
 from athcodec.files.atomic import is_url
+from athcodec.files.plain import FilePath
 from athcodec.files.remote import _one_line, guarded
 from athcodec.files.shown import without_secrets
 from athcodec.sources import FORMATS, NUMBER_PATTERN, is_pattern
@@ -71,8 +72,8 @@ class Item:
 
 
 def find(
-    inputs: Iterable[str | os.PathLike[str]],
-    output: str | os.PathLike[str],
+    inputs: Iterable[FilePath],
+    output: FilePath,
     *,
     settings: Mapping[str, Any] | None = None,
     patterns: Mapping[str, Mapping[str, Any]] | None = None,
@@ -136,7 +137,7 @@ def _stem(name: str, path: str) -> str:
     return os.path.splitext(name)[0]
 
 
-def _named(inputs: Iterable[str | os.PathLike[str]]) -> Iterator[tuple[str, str]]:
+def _named(inputs: Iterable[FilePath]) -> Iterator[tuple[str, str]]:
     for given, called in each_once(map(os.fspath, inputs)):
         pairs = list(_remote(given) if is_url(given) else _local(given, called))
         yield from pairs
@@ -293,7 +294,7 @@ def remote_identity(url: str) -> dict[str, Any]:
     return {"size": info.get("size")} | {name: str(info[name]) for name in TAGS if info.get(name)}
 
 
-def sha256(path: str | os.PathLike[str]) -> str:
+def sha256(path: FilePath) -> str:
     """Return the digest of a file's content. Raises OSError."""
     with open(path, "rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()

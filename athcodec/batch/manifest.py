@@ -13,6 +13,7 @@ from typing import Any
 
 from athcodec.errors import AthError
 from athcodec.files.atomic import PLAIN_OPEN
+from athcodec.files.plain import FilePath
 
 try:
     import fcntl
@@ -33,7 +34,7 @@ class ManifestError(AthError):
 class Manifest:
     """An open manifest, locked: `records` are the last ones, by output. Raises ManifestError, OSError."""
 
-    def __init__(self, path: str | os.PathLike[str]):
+    def __init__(self, path: FilePath):
         self.path = os.fspath(path)
         is_new = not os.path.exists(self.path)
         self._file = os.open(self.path, os.O_RDWR | os.O_CREAT | PLAIN_OPEN, 0o666)
@@ -96,7 +97,7 @@ class Manifest:
             ) from None
 
 
-def read_records(path: str | os.PathLike[str]) -> dict[str, Record]:
+def read_records(path: FilePath) -> dict[str, Record]:
     """The last records by output, without a lock and without repair; none where there is no manifest."""
     try:
         with open(path, "rb") as file:

@@ -30,6 +30,7 @@ from athcodec.batch.show import Show
 from athcodec.batch.tasks import Result, one_line
 from athcodec.errors import AthError, MissingExtra
 from athcodec.files.atomic import is_url, remove_leftovers_of, scratch_folder
+from athcodec.files.plain import FilePath
 from athcodec.files.shown import without_secrets
 
 MANIFEST = "athcodec-batch.jsonl"
@@ -94,11 +95,7 @@ class Todo:
 
 
 def preview(
-    items: Sequence[Item],
-    output: str | os.PathLike[str],
-    *,
-    manifest: str | os.PathLike[str] | None = None,
-    redo: bool = False,
+    items: Sequence[Item], output: FilePath, *, manifest: FilePath | None = None, redo: bool = False
 ) -> list[Todo]:
     """Return what `run` would do with each clip. Nothing is written.
 
@@ -125,9 +122,9 @@ def preview(
 
 def run(
     items: Sequence[Item],
-    output: str | os.PathLike[str],
+    output: FilePath,
     *,
-    manifest: str | os.PathLike[str] | None = None,
+    manifest: FilePath | None = None,
     workers: int | None = None,
     scheduler: str | None = None,
     split: int = SPLIT,
@@ -201,7 +198,7 @@ def run(
     return outcome
 
 
-def _manifest_path(output: str | os.PathLike[str], manifest: str | os.PathLike[str] | None) -> str:
+def _manifest_path(output: FilePath, manifest: FilePath | None) -> str:
     if manifest is None and is_url(output):
         raise ManifestError(
             f"{without_secrets(output)}: got no manifest, expected a file of this machine where outputs go to a URL"
@@ -219,7 +216,7 @@ def _tidy(outputs: Iterable[str]) -> None:
         remove_leftovers_of(folder, names)
 
 
-def _key(item: Item, output: str | os.PathLike[str]) -> str:
+def _key(item: Item, output: FilePath) -> str:
     """Return the manifest's name for an output: the directory may be moved with it."""
     if is_url(item.output):
         return item.output[len(os.fspath(output).rstrip("/")) + 1 :]

@@ -24,6 +24,7 @@ from typing import Any
 from athcodec.encoding.shape import RestPrecision
 from athcodec.errors import ClipError
 from athcodec.files.atomic import is_url
+from athcodec.files.plain import FilePath
 from athcodec.motion.thresholds import Thresholds
 from athcodec.motion.units import parse_length, parse_size
 from athcodec.options import EFFORTS, HOST, MAX_SEGMENT, METHODS, MIN_SEGMENT, SMOOTHNESS, ladder_of
@@ -55,7 +56,7 @@ SHAPING = (
 Settings = dict[str, Any]
 
 
-def load_settings(path: str | os.PathLike[str]) -> dict[str, Settings]:
+def load_settings(path: FilePath) -> dict[str, Settings]:
     """Read the settings of a batch from a TOML file.
 
     Parameters
@@ -89,9 +90,7 @@ def load_settings(path: str | os.PathLike[str]) -> dict[str, Settings]:
     return content
 
 
-def check_settings(
-    settings: Mapping[str, Any], where: str = "settings", folder: str | os.PathLike[str] = "."
-) -> Settings:
+def check_settings(settings: Mapping[str, Any], where: str = "settings", folder: FilePath = ".") -> Settings:
     """Check the settings of clips, and bring them to the form in which the manifest has them.
 
     Parameters

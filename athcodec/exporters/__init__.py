@@ -26,6 +26,7 @@ from athcodec.options import whole
 from athcodec.sources import Format, format_by_suffix, format_named
 
 Report = Callable[[str, float], None]
+Progress = Callable[[float], None]
 MOST_RIGGED = 65535
 RIGS = ("usd", "gltf")
 HAVE_TRANSFORMS = ("usd", "gltf", "alembic")  # They hold the place of a plant that is far from the origin.

@@ -9,19 +9,18 @@ import os
 import pickle
 import subprocess
 import sys
-from collections.abc import Callable
 from contextlib import suppress
-from os import PathLike
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 
-from athcodec.exporters import WriteOptions
+from athcodec.exporters import Progress, WriteOptions
 from athcodec.exporters.copies import cost_of, fit_copies
 from athcodec.exporters.placing import origin_of
 from athcodec.exporters.scene_objects import hidden_copies, objects_of
 from athcodec.files.atomic import new_files
+from athcodec.files.plain import FilePath
 
 STATIC = (
     "frame_count vertex_count branch_count time fps metadata rest vertex_branch branch_parent stem_index edges".split()
@@ -30,9 +29,7 @@ STATIC += ["faces", "attributes", "polygons"]
 WRITER = "athcodec.exporters.alembic_archive"
 
 
-def write_clip(
-    motion: Any, path: str | PathLike[str], options: WriteOptions, report: Callable[[float], None]
-) -> dict[str, Any]:
+def write_clip(motion: Any, path: FilePath, options: WriteOptions, report: Progress) -> dict[str, Any]:
     """Write a MotionClip or a ClipView as .abc; returns what instances cost. Raises ClipError, OSError."""
     path = os.fspath(path)
     objects = objects_of(motion)
@@ -63,7 +60,7 @@ def write_clip(
     return cost_of(instanced) | hidden_copies(objects, options.instances)
 
 
-def _send(process: subprocess.Popen, head: Any, motion: Any, report: Callable[[float], None]) -> bytes:
+def _send(process: subprocess.Popen, head: Any, motion: Any, report: Progress) -> bytes:
     """Return the final answer of the process."""
     try:
         pickle.dump(head, process.stdin, pickle.HIGHEST_PROTOCOL)

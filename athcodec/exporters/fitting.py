@@ -12,13 +12,14 @@ each scale is a projection; the two take turns. Axes along which a part has no e
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from athcodec.decoding.clip_view import ClipView
+from athcodec.exporters import Progress
 from athcodec.motion.hierarchy import build_hierarchy, hierarchy_of
 from athcodec.motion.quaternions import quaternions
 
@@ -139,12 +140,7 @@ class Mapped:
 
 
 def fit(
-    motion: Any,
-    solver: type,
-    allowed: float,
-    most: int,
-    report: Callable[[float], None],
-    chosen: np.ndarray | None = None,
+    motion: Any, solver: type, allowed: float, most: int, report: Progress, chosen: np.ndarray | None = None
 ) -> Moving | None:
     """The parts of a motion, cut until none is further off than `allowed`; None where that takes more than `most`.
     chosen (N,) bool: parts without any of these vertices, of which there is one at least, are left out."""

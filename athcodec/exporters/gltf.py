@@ -19,8 +19,8 @@ numbers. Keys of animations are held in memory, morph targets are written frame 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
-from os import PathLike, fspath
+from collections.abc import Iterator, Mapping
+from os import fspath
 from pathlib import Path
 from typing import Any
 
@@ -28,7 +28,7 @@ import numpy as np
 
 from athcodec.decoding.clip_view import ClipView
 from athcodec.errors import ClipError
-from athcodec.exporters import WriteOptions
+from athcodec.exporters import Progress, WriteOptions
 from athcodec.exporters.fitting import allowed_error
 from athcodec.exporters.gltf_build import (
     UNKNOWN_BOUND,
@@ -49,6 +49,7 @@ from athcodec.exporters.gltf_joints import Joints, fit_joints
 from athcodec.exporters.rig import fit_rig
 from athcodec.exporters.scene_objects import NOT_WRITTEN, lost_arrays
 from athcodec.files.atomic import new_file
+from athcodec.files.plain import FilePath
 
 MOST_JOINTS = 65536
 SHORT_FRAMES, SHORT_BYTES = 300, 256 << 20
@@ -56,9 +57,7 @@ MORPH_FRAMES, MORPH_BYTES = 4096, 2 << 30
 BYTES_PER_JOINT_KEY, BYTES_PER_JOINT, BYTES_PER_TARGET = 40, 900, 180
 
 
-def write_clip(
-    motion: Any, path: str | PathLike[str], options: WriteOptions, report: Callable[[float], None]
-) -> dict[str, Any]:
+def write_clip(motion: Any, path: FilePath, options: WriteOptions, report: Progress) -> dict[str, Any]:
     """Write a MotionClip or a ClipView as GLB to `path`; returns what asset.extras.athcodec says of it.
 
     Raises ClipError where it has more joints, frames or bytes than glTF can sensibly hold.
@@ -73,9 +72,7 @@ def write_clip(
     return facts
 
 
-def _write(
-    motion: Any, path: str | PathLike[str], options: WriteOptions, report: Callable[[float], None]
-) -> dict[str, Any]:
+def _write(motion: Any, path: FilePath, options: WriteOptions, report: Progress) -> dict[str, Any]:
     meshes, left_out = meshes_of(motion, Path(fspath(path)).stem)
     has_copies = options.instances and options.rig is None
     found, lost_copies = with_copies(motion, meshes) if has_copies else (list(meshes), {})
@@ -107,7 +104,7 @@ def _write(
 
 
 def _writer(
-    motion: Any, options: WriteOptions, found: list[GltfMesh | GltfCopies], report: Callable[[float], None]
+    motion: Any, options: WriteOptions, found: list[GltfMesh | GltfCopies], report: Progress
 ) -> _Joined | _Morphed:
     """Return what moves the meshes, as the options ask."""
     if options.rig is not None:
@@ -208,12 +205,7 @@ class _Joined:
         self.facts = {} if joints is None else {"joints": len(joints.bind)}
 
     def add(
-        self,
-        glb: Glb,
-        root: int,
-        transform: dict[str, Any],
-        found: list[GltfMesh | GltfCopies],
-        report: Callable[[float], None],
+        self, glb: Glb, root: int, transform: dict[str, Any], found: list[GltfMesh | GltfCopies], report: Progress
     ) -> Iterator[bytes]:
         joints, movers = self._joints, []
         if joints is not None:
@@ -304,12 +296,7 @@ class _Morphed:
         self.max_error = 0.0
 
     def add(
-        self,
-        glb: Glb,
-        root: int,
-        transform: dict[str, Any],
-        found: list[GltfMesh | GltfCopies],
-        report: Callable[[float], None],
+        self, glb: Glb, root: int, transform: dict[str, Any], found: list[GltfMesh | GltfCopies], report: Progress
     ) -> Iterator[bytes]:
         shapes, meshes, channels, movers = [], [], [], []
         for shape in found:
@@ -348,12 +335,7 @@ class _Morphed:
         return accessors
 
     def _targets(
-        self,
-        glb: Glb,
-        found: list[GltfMesh],
-        accessors: list[list[dict]],
-        least: float,
-        report: Callable[[float], None],
+        self, glb: Glb, found: list[GltfMesh], accessors: list[list[dict]], least: float, report: Progress
     ) -> Iterator[bytes]:
         rest = np.asarray(self._motion.rest).astype(np.float32)
         largest = least**2

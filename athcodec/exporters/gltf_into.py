@@ -38,6 +38,7 @@ from athcodec.files.gltf.motion import (
     places_of,
 )
 from athcodec.files.gltf.primitives import triangles
+from athcodec.files.plain import FilePath
 from athcodec.files.reading import naming
 from athcodec.motion.clip import ClipRange, MotionClip
 from athcodec.motion.frames import Frames
@@ -66,9 +67,7 @@ class Into:
     another node though it is to be kept.
     """
 
-    def __init__(
-        self, path: str | os.PathLike[str], options: ReadOptions, keep_animation: bool = False, name: str | None = None
-    ):
+    def __init__(self, path: FilePath, options: ReadOptions, keep_animation: bool = False, name: str | None = None):
         self.path, self._keep, self._name = os.fspath(path), keep_animation, name
         with naming(path, *BROKEN):
             self._file = GltfFile(path)
@@ -109,7 +108,7 @@ class Into:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def write(self, path: str | os.PathLike[str], encoded: str | os.PathLike[str]) -> None:
+    def write(self, path: FilePath, encoded: FilePath) -> None:
         """Write the file with the .ath file `encoded` of `clip` in it, once. Raises ClipError, OSError."""
         with naming(self.path, *BROKEN):
             self._check_unchanged()
@@ -250,7 +249,7 @@ def _named(clip: MotionClip) -> MotionClip:
     return clip.replace(clip_ranges=(ClipRange(played[0], clip.frame_count, is_loop),))
 
 
-def write_back(path: str | os.PathLike[str], views: Sequence[ClipView], out: str | os.PathLike[str]) -> None:
+def write_back(path: FilePath, views: Sequence[ClipView], out: FilePath) -> None:
     """Write the GLB `path` with morph targets, a frame each, in place of the motions of ATH_motion that `views` show.
 
     Raises ClipError where these are more than glTF can sensibly hold, OSError.
@@ -291,7 +290,7 @@ def _remove_motions(gltf: dict, numbers: set[int]) -> None:
             own["motion"] = kept.index(own["motion"])
 
 
-def put_motion(path: str | os.PathLike[str], ath: bytes, out: str | os.PathLike[str], number: int) -> int:
+def put_motion(path: FilePath, ath: bytes, out: FilePath, number: int) -> int:
     """Write the GLB `path` with these bytes in place of those of a motion of it, which are as many or more; its size.
 
     Raises ClipError where it is no GLB that holds the motion inside, OSError.

@@ -8,17 +8,17 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from os import PathLike
 from typing import Any
 
 import h5py
 import numpy as np
 
 from athcodec.errors import ClipError
-from athcodec.exporters import WriteOptions
+from athcodec.exporters import Progress, WriteOptions
 from athcodec.files.atomic import PendingFile
+from athcodec.files.plain import FilePath
 from athcodec.motion.clip import RESERVED_NAMES, check_branches, check_float_dtype, check_time
 from athcodec.motion.hierarchy import branch_orders
 from athcodec.motion.joining import clip_metadata
@@ -56,7 +56,7 @@ class Hdf5Writer:
 
     def __init__(
         self,
-        path: str | PathLike[str],
+        path: FilePath,
         *,
         time: np.ndarray,
         vertex_branch: np.ndarray | None,
@@ -195,7 +195,7 @@ class Hdf5Writer:
         return {"compression": "gzip", "shuffle": True} if self._gzip else {}
 
 
-def write_clip(clip: Any, path: str | PathLike[str], options: WriteOptions, report: Callable[[float], None]) -> None:
+def write_clip(clip: Any, path: FilePath, options: WriteOptions, report: Progress) -> None:
     """Write `clip` to `path`, block by block; see Hdf5Writer.
 
     `clip` is a MotionClip, a ClipView, or anything with time, vertex_branch, branch_parent, rest, dtype and blocks()

@@ -7,22 +7,19 @@ starts there is at 1 / fps seconds, as the tools count.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from os import PathLike
 from typing import Any
 
 import numpy as np
 
 from athcodec.errors import ClipError
-from athcodec.exporters import WriteOptions
+from athcodec.exporters import Progress, WriteOptions
 from athcodec.exporters.pc2 import check_counts, write_cache
 from athcodec.exporters.timing import frame_rate_of, start_frame_of
+from athcodec.files.plain import FilePath
 from athcodec.sources.mdd import HEADER
 
 
-def write_clip(
-    motion: Any, path: str | PathLike[str], options: WriteOptions, report: Callable[[float], None]
-) -> dict[str, Any]:
+def write_clip(motion: Any, path: FilePath, options: WriteOptions, report: Progress) -> dict[str, Any]:
     """Write the cache and its mesh. Raises ClipError where there is another mesh beside it or times are closer than
     float32 tells apart, OSError where nothing can be written."""
     check_counts(motion)

@@ -9,22 +9,21 @@ from __future__ import annotations
 import json
 import re
 import zipfile
-from collections.abc import Callable
-from os import PathLike
 from typing import Any
 
 import numpy as np
 
 from athcodec.errors import ClipError
-from athcodec.exporters import WriteOptions
+from athcodec.exporters import Progress, WriteOptions
 from athcodec.files.atomic import new_file
+from athcodec.files.plain import FilePath
 from athcodec.motion.clip import RESERVED_NAMES
 from athcodec.motion.hierarchy import branch_orders
 from athcodec.motion.joining import clip_metadata
 from athcodec.sources.npz import METADATA
 
 
-def write_clip(motion: Any, path: str | PathLike[str], options: WriteOptions, report: Callable[[float], None]) -> None:
+def write_clip(motion: Any, path: FilePath, options: WriteOptions, report: Progress) -> None:
     """Write the archive. Raises ClipError for an attribute's name that is taken or leads elsewhere, OSError where
     nothing can be written."""
     arrays = _arrays(motion)
@@ -43,7 +42,7 @@ def _member(archive: zipfile.ZipFile, name: str, packing: int) -> Any:
     return archive.open(info, "w", force_zip64=True)
 
 
-def _write_positions(motion: Any, member: Any, report: Callable[[float], None]) -> None:
+def _write_positions(motion: Any, member: Any, report: Progress) -> None:
     shape, dtype = (motion.frame_count, motion.vertex_count, 3), motion.dtype.newbyteorder("<")
     np.lib.format.write_array_header_1_0(
         member, {"descr": np.lib.format.dtype_to_descr(dtype), "fortran_order": False, "shape": shape}

@@ -9,28 +9,26 @@ vat.md. The texture is made in memory.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
-from os import PathLike, fspath
+from os import fspath
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from athcodec.errors import ClipError
-from athcodec.exporters import WriteOptions
+from athcodec.exporters import Progress, WriteOptions
 from athcodec.exporters.fitting import portions
 from athcodec.exporters.gltf import write_rest
 from athcodec.exporters.gltf_build import branch_extras
 from athcodec.exporters.textures import WIDEST, facts_of, write_exr, write_json, write_png
 from athcodec.files.atomic import new_folder
+from athcodec.files.plain import FilePath
 
 NARROWEST = 64
 HIGHEST = 16384
 
 
-def write_clip(
-    motion: Any, path: str | PathLike[str], options: WriteOptions, report: Callable[[float], None]
-) -> dict[str, Any]:
+def write_clip(motion: Any, path: FilePath, options: WriteOptions, report: Progress) -> dict[str, Any]:
     """Write a MotionClip or a ClipView to the new folder `path`; returns what the JSON says of it. options.half: 16
     bits in place of float.
 
@@ -63,7 +61,7 @@ def _texels(motion: Any, width: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _texture(
-    motion: Any, size: tuple[int, int], half: bool, report: Callable[[float], None]
+    motion: Any, size: tuple[int, int], half: bool, report: Progress
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
     """The pixels, the least and the largest offset, and the largest distance of what they show from the motion."""
     rest = np.asarray(motion.rest).astype(np.float32).astype(np.float64)
@@ -98,7 +96,7 @@ def _size(vertices: int, frames: int) -> tuple[int, int]:
     return min(sizes)[2:]
 
 
-def _offset_bounds(motion: Any, rest: np.ndarray, report: Callable[[float], None]) -> tuple[np.ndarray, np.ndarray]:
+def _offset_bounds(motion: Any, rest: np.ndarray, report: Progress) -> tuple[np.ndarray, np.ndarray]:
     low, high = np.full(3, np.inf), np.full(3, -np.inf)
     for start, portion in portions(motion, motion.vertex_count):
         offsets = portion - rest

@@ -9,20 +9,20 @@ faces and edges are those of the clip, so that materials in it are kept; another
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
 from contextlib import suppress
-from os import PathLike, fspath
+from os import fspath
 from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
 
 from athcodec.errors import ClipError
-from athcodec.exporters import WriteOptions
+from athcodec.exporters import Progress, WriteOptions
 from athcodec.exporters.mesh import ObjWriter, has_mesh, obj_arrays
 from athcodec.exporters.scene_objects import lost_arrays
 from athcodec.exporters.timing import frame_numbers
 from athcodec.files.atomic import check_target, new_files
+from athcodec.files.plain import FilePath
 from athcodec.files.reading import Budget
 from athcodec.sources.mesh import Mesh, read_mesh
 from athcodec.sources.pc2 import HEADER, MAGIC
@@ -31,9 +31,7 @@ STEP_TOLERANCE = 1e-4
 LARGEST_COUNT = 2**31 - 1
 
 
-def write_clip(
-    motion: Any, path: str | PathLike[str], options: WriteOptions, report: Callable[[float], None]
-) -> dict[str, Any]:
+def write_clip(motion: Any, path: FilePath, options: WriteOptions, report: Progress) -> dict[str, Any]:
     """Write the cache and its mesh. Raises ClipError where the times are uneven or there is another mesh beside it,
     OSError where nothing can be written."""
     header = HEADER.pack(MAGIC, 1, *_counted(motion, *_start_and_step(motion)))
@@ -65,9 +63,7 @@ def _start_and_step(motion: Any) -> tuple[float, float]:
     return float(numbers[0]), float(round(step, 6))
 
 
-def write_cache(
-    motion: Any, path: str | PathLike[str], header: bytes, dtype: str, report: Callable[[float], None]
-) -> dict[str, Any]:
+def write_cache(motion: Any, path: FilePath, header: bytes, dtype: str, report: Progress) -> dict[str, Any]:
     """Write the header and the positions as `dtype`, and the mesh where the clip has one and none is there; return what
     they have no place for."""
     mesh_name = _mesh_to_write(motion, Path(check_target(path)))
@@ -81,7 +77,7 @@ def write_cache(
     return lost_arrays(motion, obj_arrays(motion) if has_mesh(motion) else ())
 
 
-def _write_frames(motion: Any, file: BinaryIO, dtype: str, report: Callable[[float], None]) -> None:
+def _write_frames(motion: Any, file: BinaryIO, dtype: str, report: Progress) -> None:
     for start, frames in motion.blocks():
         file.write(np.ascontiguousarray(frames, dtype))
         report((start + len(frames)) / motion.frame_count)

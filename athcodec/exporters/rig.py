@@ -14,13 +14,13 @@ A joint lies where its share of the stem begins and has the world's axes in the 
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from athcodec.decoding.clip_view import ClipView
+from athcodec.exporters import Progress
 from athcodec.exporters.fitting import allowed_error, portions
 from athcodec.exporters.gltf_joints import Joints
 from athcodec.exporters.scene_objects import distinct
@@ -93,7 +93,7 @@ def _cut(
     return [(branch, middle, 0), (middle, stop, 0)]
 
 
-def fit_rig(motion: Any, most: int = RIG_JOINTS, report: Callable[[float], None] = lambda done: None) -> Joints:
+def fit_rig(motion: Any, most: int = RIG_JOINTS, report: Progress = lambda done: None) -> Joints:
     """The joints of a motion, `most` at most beside the root. A clip without branches gets those that are found."""
     hierarchy = hierarchy_to_rig(motion)
     order = hierarchy.vertex_source
@@ -241,7 +241,7 @@ def _proper(matrices: np.ndarray) -> np.ndarray:
     return u @ v
 
 
-def _posed(motion: Any, bones: _Bones, order: np.ndarray, report: Callable[[float], None]) -> Joints:
+def _posed(motion: Any, bones: _Bones, order: np.ndarray, report: Progress) -> Joints:
     """The joints in all frames, each in the space of the one above, and how far off they are as they are written."""
     places, parents = bones.joints, np.append(-1, bones.parents() + 1)
     rest = np.concatenate([np.zeros((1, 3)), places])

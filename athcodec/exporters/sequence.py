@@ -10,27 +10,26 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Callable, Sequence
-from os import PathLike, fspath
+from collections.abc import Sequence
+from os import fspath
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from athcodec.errors import ClipError
-from athcodec.exporters import FILES, WriteOptions
+from athcodec.exporters import FILES, Progress, WriteOptions
 from athcodec.exporters.mesh import WRITERS
 from athcodec.exporters.scene_objects import lost_arrays
 from athcodec.exporters.timing import frame_numbers
 from athcodec.files.atomic import check_target, new_files
+from athcodec.files.plain import FilePath
 from athcodec.sources.sequence import LARGEST_NUMBER, Numbering, numbering_of
 
 DIGITS = 4
 
 
-def write_clip(
-    motion: Any, path: str | PathLike[str], options: WriteOptions, report: Callable[[float], None]
-) -> dict[str, Any]:
+def write_clip(motion: Any, path: FilePath, options: WriteOptions, report: Progress) -> dict[str, Any]:
     """Write all files; returns their names. Raises ClipError where there are others of the same numbering, OSError
     where nothing can be written."""
     suffix = Path(path).suffix.lower()
@@ -43,7 +42,7 @@ def write_clip(
     return {FILES: names} | lost_arrays(motion, writer.arrays(motion))
 
 
-def write_frames(motion: Any, writer: Any, paths: Sequence[str], report: Callable[[float], None]) -> None:
+def write_frames(motion: Any, writer: Any, paths: Sequence[str], report: Progress) -> None:
     """A file for each frame, by writer.write(file, points)."""
     for start, frames in motion.blocks():
         for frame, points in enumerate(frames, start):
@@ -52,7 +51,7 @@ def write_frames(motion: Any, writer: Any, paths: Sequence[str], report: Callabl
             report((frame + 1) / motion.frame_count)
 
 
-def file_names(motion: Any, path: str | PathLike[str]) -> list[str]:
+def file_names(motion: Any, path: FilePath) -> list[str]:
     """The name of each frame's file beside `path`. Raises ClipError where files with other numbers are there."""
     path = Path(check_target(path))
     numbering = _numbering(path)

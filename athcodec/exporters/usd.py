@@ -12,16 +12,15 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from os import PathLike
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from pxr import Sdf, Tf, Usd, UsdGeom, UsdShade, UsdSkel, Vt
 
-from athcodec.exporters import WriteOptions
+from athcodec.exporters import Progress, WriteOptions
 from athcodec.exporters import usd_nanite as nanite
 from athcodec.exporters.copies import Copies, cost_of, fit_copies, one_copy, rows_of_one
 from athcodec.exporters.gltf_joints import Joints
@@ -44,6 +43,7 @@ from athcodec.exporters.scene_objects import (
 from athcodec.exporters.timing import distinct_frame_numbers, frame_rate_of
 from athcodec.exporters.usd_rig import write_rig
 from athcodec.files.atomic import new_files
+from athcodec.files.plain import FilePath
 from athcodec.motion.units import METRES, unit_symbol
 from athcodec.sources.scene_objects import FACE_MATERIAL, OWN, SCHEME
 
@@ -82,9 +82,7 @@ WIND = "wind"  # in what is known of an assembly: the text of its JSON
 INTERPOLATION = {"vertex": "vertex", "corner": "faceVarying", "face": "uniform", "constant": "constant"}
 
 
-def write_clip(
-    motion: Any, path: str | PathLike[str], options: WriteOptions, report: Callable[[float], None]
-) -> dict[str, Any]:
+def write_clip(motion: Any, path: FilePath, options: WriteOptions, report: Progress) -> dict[str, Any]:
     """Write a MotionClip or a ClipView as .usdc, .usda, .usdz or, binary, .usd; returns what instances cost. Raises
     ClipError, OSError."""
     path = os.fspath(path)
@@ -133,7 +131,7 @@ def _must(done: object, name: str) -> None:
         raise OSError(f"{name}: cannot be written")
 
 
-def _write(motion: Any, name: str, options: WriteOptions, report: Callable[[float], None]) -> dict[str, Any]:
+def _write(motion: Any, name: str, options: WriteOptions, report: Progress) -> dict[str, Any]:
     codes, rate = _time_codes(motion), frame_rate_of(motion)
     stage = Usd.Stage.CreateNew(name)
     joints = None if options.rig is None else fit_rig(motion, options.rig, lambda done: report(0.9 * done))
@@ -172,12 +170,7 @@ def _time_codes(motion: Any) -> np.ndarray:
 
 
 def _write_rigged(
-    stage: Usd.Stage,
-    motion: Any,
-    joints: Joints,
-    objects: list[SceneObject],
-    codes: np.ndarray,
-    report: Callable[[float], None],
+    stage: Usd.Stage, motion: Any, joints: Joints, objects: list[SceneObject], codes: np.ndarray, report: Progress
 ) -> dict[str, Any]:
     _set_rest(motion, objects)
     write_rig(stage, "/clip", motion, joints, objects, codes)
@@ -196,12 +189,7 @@ def _set_rest(motion: Any, objects: list[SceneObject]) -> None:
 
 
 def _write_assembly(
-    stage: Usd.Stage,
-    motion: Any,
-    joints: Joints,
-    objects: list[SceneObject],
-    codes: np.ndarray,
-    report: Callable[[float], None],
+    stage: Usd.Stage, motion: Any, joints: Joints, objects: list[SceneObject], codes: np.ndarray, report: Progress
 ) -> dict[str, Any]:
     """As Nanite Assemblies are laid out, see usd_nanite.py."""
     parts = nanite.parts_of(motion, objects, joints)
@@ -465,7 +453,7 @@ def _own_arrays(root: Usd.Prim, motion: Any, left: dict[str, tuple[np.ndarray, s
 
 
 def _write_frames(
-    stage: Usd.Stage, motion: Any, objects: list[SceneObject], codes: np.ndarray, report: Callable[[float], None]
+    stage: Usd.Stage, motion: Any, objects: list[SceneObject], codes: np.ndarray, report: Progress
 ) -> None:
     layer = stage.GetRootLayer()
     points = [None if obj.copies > 1 else obj.target.GetPointsAttr().GetPath() for obj in objects]

@@ -9,29 +9,28 @@ memory, as image files are.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator
-from os import PathLike, fspath
+from collections.abc import Iterator
+from os import fspath
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from athcodec.errors import ClipError
-from athcodec.exporters import WriteOptions
+from athcodec.exporters import Progress, WriteOptions
 from athcodec.exporters.fitting import Mapped, Moving, allowed_error, fit
 from athcodec.exporters.gltf import write_rest
 from athcodec.exporters.gltf_build import branch_extras
 from athcodec.exporters.textures import WIDEST, facts_of, write_exr, write_json
 from athcodec.files.atomic import new_folder
+from athcodec.files.plain import FilePath
 
 PER_ROW = WIDEST // 3
 MOST_NODES = PER_ROW * WIDEST
 FLOAT16_MAX = 65504.0
 
 
-def write_clip(
-    motion: Any, path: str | PathLike[str], options: WriteOptions, report: Callable[[float], None]
-) -> dict[str, Any]:
+def write_clip(motion: Any, path: FilePath, options: WriteOptions, report: Progress) -> dict[str, Any]:
     """Write a MotionClip or a ClipView to the new folder `path`; returns what the JSON says. options.half: half
     precision in place of float.
 
@@ -49,9 +48,7 @@ def write_clip(
     return facts
 
 
-def _write(
-    motion: Any, moving: Moving, rows: np.ndarray, folder: str, name: str, report: Callable[[float], None]
-) -> dict[str, Any]:
+def _write(motion: Any, moving: Moving, rows: np.ndarray, folder: str, name: str, report: Progress) -> dict[str, Any]:
     pivots, vertex_node = moving.parts.middle.astype(np.float32), moving.parts.vertex_part()
     grid = _Grid(len(pivots), motion.frame_count)
     textures = []
@@ -130,7 +127,7 @@ class _Grid:
 
 
 def _measured(
-    motion: Any, rows: np.ndarray, pivots: np.ndarray, vertex_node: np.ndarray, report: Callable[[float], None]
+    motion: Any, rows: np.ndarray, pivots: np.ndarray, vertex_node: np.ndarray, report: Progress
 ) -> tuple[float, list[float], list[float]]:
     """The largest distance from the motion of what a shader makes of the texels, and the box of all it shows."""
     rest = np.asarray(motion.rest).astype(np.float32).astype(np.float64)

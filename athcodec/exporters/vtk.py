@@ -12,19 +12,18 @@ import base64
 import json
 import os
 import zlib
-from collections.abc import Callable
-from os import PathLike
 from pathlib import Path
 from typing import Any, BinaryIO
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from athcodec.exporters import FILES, WriteOptions
+from athcodec.exporters import FILES, Progress, WriteOptions
 from athcodec.exporters.cells import arrays_in, cell_and_point_data, cells_of
 from athcodec.exporters.scene_objects import lost_arrays, said_scene
 from athcodec.exporters.sequence import file_names, write_frames
 from athcodec.files.atomic import check_target, new_files
+from athcodec.files.plain import FilePath
 from athcodec.sources.scene_objects import OWN
 
 _HEAD = (
@@ -34,9 +33,7 @@ _HEAD = (
 _PIECE = '<Piece NumberOfPoints="{}" NumberOfCells="{}">\n<Points>\n'
 
 
-def write_clip(
-    motion: Any, path: str | PathLike[str], options: WriteOptions, report: Callable[[float], None]
-) -> dict[str, Any]:
+def write_clip(motion: Any, path: FilePath, options: WriteOptions, report: Progress) -> dict[str, Any]:
     """Write all files; returns the name of the index, or of the only one. Raises ClipError where there are others of
     the same numbering, OSError where nothing can be written."""
     target = Path(check_target(path))

@@ -10,8 +10,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable
-from os import PathLike, fspath
+from os import fspath
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -19,11 +18,12 @@ from xml.etree import ElementTree
 import h5py
 import numpy as np
 
-from athcodec.exporters import WriteOptions
+from athcodec.exporters import Progress, WriteOptions
 from athcodec.exporters.cells import Cells, arrays_in, cell_and_point_data, cells_of
 from athcodec.exporters.hdf5 import Sink
 from athcodec.exporters.scene_objects import lost_arrays, said_names
 from athcodec.files.atomic import check_target, new_files
+from athcodec.files.plain import FilePath
 from athcodec.sources.cells import VTK_NAMES, VTK_NUMBERS
 from athcodec.sources.xdmf import MIXED
 
@@ -48,9 +48,7 @@ _FORMS = {1: "Scalar", 3: "Vector", 6: "Tensor6", 9: "Tensor"}
 SERIES = "motion"
 
 
-def write_clip(
-    motion: Any, path: str | PathLike[str], options: WriteOptions, report: Callable[[float], None]
-) -> dict[str, Any]:
+def write_clip(motion: Any, path: FilePath, options: WriteOptions, report: Progress) -> dict[str, Any]:
     """Write both files. Raises OSError where nothing can be written."""
     name = Path(check_target(path)).name
     with new_files(path) as folder, open(os.path.join(folder, f"{name}.h5"), "w+b", buffering=0) as file:
@@ -69,7 +67,7 @@ class _Writer:
         self._motion, self._data, self._name, self._sink = motion, data, data_name, sink
         self._packing = {"compression": "gzip", "shuffle": True} if gzip else {}
 
-    def write(self, report: Callable[[float], None]) -> ElementTree.Element:
+    def write(self, report: Progress) -> ElementTree.Element:
         """The XML, once all numbers are in the HDF5 file."""
         motion, root = self._motion, ElementTree.Element("Xdmf", Version="3.0")
         domain = ElementTree.SubElement(root, "Domain")

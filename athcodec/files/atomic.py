@@ -22,6 +22,7 @@ from contextvars import ContextVar
 from typing import BinaryIO
 
 from athcodec.files.kinds import UNKNOWN, kind_by_suffix, kind_of
+from athcodec.files.plain import FilePath
 
 try:
     import fcntl
@@ -38,13 +39,13 @@ _URL = re.compile(r"[a-z][a-z0-9+.-]+(://|::)", re.IGNORECASE)
 _inputs: ContextVar[frozenset[FileId]] = ContextVar("_inputs", default=frozenset())
 
 
-def file_id(file: str | os.PathLike[str] | int) -> FileId:
+def file_id(file: FilePath | int) -> FileId:
     """Return device and inode, which a file has in common under all its names. Raises OSError."""
     status = os.stat(file)
     return status.st_dev, status.st_ino
 
 
-def file_ids(*paths: str | os.PathLike[str] | None) -> frozenset[FileId]:
+def file_ids(*paths: FilePath | None) -> frozenset[FileId]:
     """Return the device and inode of those of the paths that are files; URLs and others are left out."""
     return frozenset(file_id(path) for path in paths if path is not None and os.path.isfile(path))
 
@@ -59,7 +60,7 @@ def keeping(inputs: Iterable[FileId]) -> Iterator[None]:
         _inputs.reset(token)
 
 
-def check_target(path: str | os.PathLike[str], suffix: str = "") -> str:
+def check_target(path: FilePath, suffix: str = "") -> str:
     """Return the file that `path` names, behind any links. Raises OSError if nothing can be written there: the
     directory is missing or read-only, or `path` is a directory, no plain file, read-only, an input, or not of the kind
     that this suffix promises."""
@@ -109,7 +110,7 @@ class PendingFile:
     It has the permissions of the file that it replaces, or those of any new file. Raises OSError.
     """
 
-    def __init__(self, path: str | os.PathLike[str]):
+    def __init__(self, path: FilePath):
         self.path = check_target(path)
         remove_leftovers(self.path)
         self.name, self.descriptor = _locked_new_file(self.path)
@@ -169,7 +170,7 @@ class _Naming(io.FileIO):
 
 
 @contextmanager
-def new_file(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
+def new_file(path: FilePath) -> Iterator[BinaryIO]:
     """Give a file that replaces `path` when the block ends, and leaves nothing behind if the block raises. Raises
     OSError."""
     pending = PendingFile(path)
@@ -183,7 +184,7 @@ def new_file(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
 
 
 @contextmanager
-def new_files(path: str | os.PathLike[str], named: bool = True) -> Iterator[str]:
+def new_files(path: FilePath, named: bool = True) -> Iterator[str]:
     """Give a folder for files that belong together. When the block ends, they move beside `path`, the one of that name
     last, in place of older ones. If the block raises, nothing is left behind. One of them must have that name, unless
     `named` is False. Raises OSError."""
@@ -202,7 +203,7 @@ def new_files(path: str | os.PathLike[str], named: bool = True) -> Iterator[str]
 
 
 @contextmanager
-def new_folder(path: str | os.PathLike[str]) -> Iterator[str]:
+def new_folder(path: FilePath) -> Iterator[str]:
     """Give a folder that becomes `path` when the block ends. Nothing that exists is replaced, and if the block raises,
     nothing is left behind. Raises OSError."""
     path = check_target(path)

@@ -6,7 +6,7 @@ import os
 import re
 import struct
 
-from athcodec.files.plain import open_plain
+from athcodec.files.plain import FilePath, open_plain
 
 HEAD_BYTES = 4096
 TEXT, UNKNOWN = "text", "something else"
@@ -41,7 +41,7 @@ def kind_by_suffix(suffix: str) -> str | None:
     return next((kind for kind, (suffixes, _) in _KINDS.items() if suffix in suffixes), None)
 
 
-def kind_of(path: str | os.PathLike[str]) -> str:
+def kind_of(path: FilePath) -> str:
     """Return the kind of a file by its content; TEXT for other text, UNKNOWN for anything else. Raises ClipError,
     OSError."""
     try:

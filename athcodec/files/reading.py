@@ -6,16 +6,16 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
-from os import PathLike, fspath
+from os import fspath
 from pathlib import Path
 from typing import Protocol
 
 from athcodec.errors import ClipError
 from athcodec.files.atomic import FileId
-from athcodec.files.plain import open_plain
+from athcodec.files.plain import FilePath, open_plain
 from athcodec.options import MAX_MEMORY
 
-File = str | PathLike[str] | int
+File = FilePath | int
 Stamp = tuple[int, int, int, int]  # Size, time of change, device and inode.
 
 
@@ -23,7 +23,7 @@ class Closable(Protocol):
     def close(self) -> None: ...
 
 
-def read_plain(path: str | PathLike[str], budget: Budget) -> bytes:
+def read_plain(path: FilePath, budget: Budget) -> bytes:
     """Return all bytes of a plain file. Raises ClipError, OSError."""
     with open_plain(path) as file:
         budget.need(os.fstat(file.fileno()).st_size, fspath(path))
@@ -94,7 +94,7 @@ class FileWatch:
         return frozenset(stamp[2:] for stamp in self.stamps.values())
 
 
-def file_beside(folder: str | PathLike[str], name: str, allow_outside: bool = False) -> Path:
+def file_beside(folder: FilePath, name: str, allow_outside: bool = False) -> Path:
     """Return the file that a source names, by a path from its folder.
 
     Raises ClipError if it is no plain file and, unless `allow_outside`, if it lies outside of that folder: a
@@ -109,7 +109,7 @@ def file_beside(folder: str | PathLike[str], name: str, allow_outside: bool = Fa
     return path
 
 
-def check_inside(folder: str | PathLike[str], path: str | PathLike[str], allow_outside: bool) -> None:
+def check_inside(folder: FilePath, path: FilePath, allow_outside: bool) -> None:
     """Raise ClipError for a path outside of a folder. Links inside the folder may lead outside."""
     if not allow_outside and not Path(os.path.abspath(path)).is_relative_to(os.path.abspath(folder)):
         raise ClipError(
@@ -124,7 +124,7 @@ def _stamp(file: File) -> Stamp:
 
 
 @contextmanager
-def naming(path: str | PathLike[str], *errors: type[Exception]) -> Iterator[None]:
+def naming(path: FilePath, *errors: type[Exception]) -> Iterator[None]:
     """Turn ClipErrors of the block, and errors of these further types, into ClipErrors that begin with `path`."""
     try:
         yield
@@ -138,7 +138,7 @@ def naming(path: str | PathLike[str], *errors: type[Exception]) -> Iterator[None
 
 
 @contextmanager
-def naming_file(path: str | PathLike[str]) -> Iterator[None]:
+def naming_file(path: FilePath) -> Iterator[None]:
     """Let errors of the system that name no file, such as those of reading, name this one."""
     try:
         yield

@@ -3,14 +3,13 @@ works in a process of its own (reader_process.py)."""
 
 from __future__ import annotations
 
-from os import PathLike
-
+from athcodec.files.plain import FilePath
 from athcodec.motion.clip import MotionClip
 from athcodec.sources import ReadOptions
 from athcodec.sources.reader_process import read_apart
 
 
-def read_clip(path: str | PathLike[str], options: ReadOptions) -> MotionClip:
+def read_clip(path: FilePath, options: ReadOptions) -> MotionClip:
     """Open the clip in the Alembic file `path`; close it, or use it in a `with` statement.
 
     options.only are patterns of names or paths of objects. Raises ClipError, OSError.

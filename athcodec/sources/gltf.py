@@ -17,7 +17,6 @@ from __future__ import annotations
 import fnmatch
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
-from os import PathLike
 from typing import Any
 
 import numpy as np
@@ -27,6 +26,7 @@ from athcodec.files.gltf.document import DRACO, UNPACKED_BY, GltfFile
 from athcodec.files.gltf.json import BROKEN, brief, entries, entry, indices, integer
 from athcodec.files.gltf.motion import EXTENSION, extension_of
 from athcodec.files.gltf.primitives import corners, rows_of
+from athcodec.files.plain import FilePath
 from athcodec.files.reading import closing_on_failure, naming
 from athcodec.motion.clip import DEFAULT_FPS, RESERVED_NAMES, ClipRange, MotionClip, Skin
 from athcodec.motion.frames import Frames, is_far
@@ -58,7 +58,7 @@ REST_ROUNDING = 1e-6  # Distance by which joints may miss the unmoved mesh, over
 SAME = 1e-5  # Distance between the ends of a loop, over the plant's size.
 
 
-def read_clip(path: str | PathLike[str], options: ReadOptions) -> MotionClip:
+def read_clip(path: FilePath, options: ReadOptions) -> MotionClip:
     """Open the clip in the glTF file `path`; close it, or use it in a `with` statement.
 
     The rest pose, where options.rest is "auto", is the scene without animation. metadata has "animations", the names of

@@ -24,14 +24,14 @@ import json
 import os
 from collections.abc import Collection
 from contextlib import suppress
-from os import PathLike, fspath
+from os import fspath
 from typing import Any
 
 import h5py
 import numpy as np
 
 from athcodec.errors import ClipError
-from athcodec.files.plain import open_plain
+from athcodec.files.plain import FilePath, open_plain
 from athcodec.files.reading import Budget, FileWatch, closing_on_failure, naming
 from athcodec.motion.clip import RESERVED_NAMES, MotionClip
 from athcodec.motion.presence import PRESENCE
@@ -53,7 +53,7 @@ BROKEN = (OSError, RuntimeError, KeyError, ValueError, TypeError, OverflowError,
 _OWN = "expected numbers in the file itself; --allow-outside (allow_outside=True) reads others"
 
 
-def read_clip(path: str | PathLike[str], options: ReadOptions) -> MotionClip:
+def read_clip(path: FilePath, options: ReadOptions) -> MotionClip:
     """Open the clip in the HDF5 file `path`; close it, or use it in a `with` statement.
 
     The file's rest pose is used where options.rest is "auto"; branches derived from edges begin at options.root, or at
@@ -92,7 +92,7 @@ def open_clip(path: str, options: ReadOptions) -> MotionClip:
     return clip
 
 
-def _open(path: str | PathLike[str]) -> h5py.File:
+def _open(path: FilePath) -> h5py.File:
     open_plain(path).close()
     if not h5py.is_hdf5(path):
         raise ClipError(f"{fspath(path)}: got something else, expected an HDF5 file")

@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import os
 import struct
-from os import PathLike
 from typing import Any, BinaryIO
 
 import numpy as np
 
 from athcodec.errors import ClipError
+from athcodec.files.plain import FilePath
 from athcodec.motion.clip import MotionClip
 from athcodec.sources import ReadOptions
 from athcodec.sources.pc2 import check_size, open_cache
@@ -24,7 +24,7 @@ from athcodec.sources.timing import times_in_seconds
 HEADER = struct.Struct(">ii")
 
 
-def read_clip(path: str | PathLike[str], options: ReadOptions) -> MotionClip:
+def read_clip(path: FilePath, options: ReadOptions) -> MotionClip:
     """Open the clip in the point cache `path`. Raises ClipError where it is none, or where the mesh has another number
     of vertices; OSError where a file cannot be opened."""
     return open_cache(path, options, _read_header)

@@ -12,13 +12,13 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
-from os import PathLike
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from athcodec.errors import ClipError
+from athcodec.files.plain import FilePath
 from athcodec.files.reading import Budget, read_plain
 from athcodec.motion.clip import RESERVED_NAMES, polygons
 from athcodec.sources.scene_objects import FACE_MATERIAL, OWN, scene_of_json, scene_said
@@ -97,12 +97,12 @@ def same_values(values: np.ndarray | None, others: np.ndarray | None) -> bool:
     return np.array_equal(values, others, equal_nan=values.dtype.kind == "f")
 
 
-def read_mesh(path: str | PathLike[str], budget: Budget) -> Mesh:
+def read_mesh(path: FilePath, budget: Budget) -> Mesh:
     """The mesh in an OBJ or PLY file. Raises ClipError, OSError."""
     return parse_mesh(read_plain(path, budget), path, budget)
 
 
-def parse_mesh(data: bytes, path: str | PathLike[str], budget: Budget) -> Mesh:
+def parse_mesh(data: bytes, path: FilePath, budget: Budget) -> Mesh:
     """The mesh in the bytes of a file, whose name is for messages. Raises ClipError."""
     try:
         budget.need_for(data, WORD_ENDS, WORD_BYTES, "words")

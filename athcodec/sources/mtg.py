@@ -16,13 +16,13 @@ import os
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from os import PathLike, fspath
+from os import fspath
 from typing import Any
 
 import numpy as np
 
 from athcodec.errors import ClipError
-from athcodec.files.plain import open_plain
+from athcodec.files.plain import FilePath, open_plain
 from athcodec.motion.clip import MotionClip
 
 MAX_FILE_BYTES = 1 << 28
@@ -63,7 +63,7 @@ class Mtg:
         return np.stack([self.parent[above], above], axis=1).astype(np.int32)
 
 
-def read_mtg(path: str | PathLike[str]) -> Mtg:
+def read_mtg(path: FilePath) -> Mtg:
     """The plants in an MTG file. Raises ClipError that names the line, OSError where it cannot be opened."""
     if os.path.getsize(path) > MAX_FILE_BYTES:
         raise ClipError(f"{fspath(path)}: got {os.path.getsize(path)} bytes, expected at most {MAX_FILE_BYTES}")
@@ -75,7 +75,7 @@ def read_mtg(path: str | PathLike[str]) -> Mtg:
         raise ClipError(f"{fspath(path)}: {error}") from None
 
 
-def mtg_branches(path: str | PathLike[str], clip: MotionClip) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def mtg_branches(path: FilePath, clip: MotionClip) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """(vertex_branch (N,), branch_parent (B,), stem_index (N,)), int32, of a clip on the branches of an MTG.
 
     Every vertex goes to the nearest piece of the plant at rest where at least half of the parts have coordinates; else
@@ -430,9 +430,7 @@ def _depths(parent: np.ndarray) -> np.ndarray:
     return depth
 
 
-def _nearest(
-    path: str | PathLike[str], mtg: Mtg, located: np.ndarray, rest: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
+def _nearest(path: FilePath, mtg: Mtg, located: np.ndarray, rest: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The branch of the nearest piece, from a part's base to its position, and how far up the branch that is."""
     rows = np.flatnonzero(located)
     tip = mtg.positions[rows]

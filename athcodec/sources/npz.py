@@ -15,13 +15,12 @@ import zipfile
 import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
-from os import PathLike
 from typing import Any, BinaryIO
 
 import numpy as np
 
 from athcodec.errors import ClipError
-from athcodec.files.plain import open_plain
+from athcodec.files.plain import FilePath, open_plain
 from athcodec.files.reading import Budget, FileWatch, closing_on_failure, naming
 from athcodec.motion.clip import RESERVED_NAMES, MotionClip, check_float_dtype
 from athcodec.motion.frames import Frames
@@ -52,7 +51,7 @@ _BROKEN = (
 )
 
 
-def read_clip(path: str | PathLike[str], options: ReadOptions) -> MotionClip:
+def read_clip(path: FilePath, options: ReadOptions) -> MotionClip:
     """Open the clip in the archive `path`. Raises ClipError where it is no archive or its arrays are no usable clip,
     OSError where it cannot be opened."""
     file = open_plain(path)

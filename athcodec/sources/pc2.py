@@ -11,14 +11,14 @@ from __future__ import annotations
 import math
 import os
 import struct
-from os import PathLike, fspath
+from os import fspath
 from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
 
 from athcodec.errors import ClipError
-from athcodec.files.plain import open_plain
+from athcodec.files.plain import FilePath, open_plain
 from athcodec.files.reading import Budget, FileWatch, closing_on_failure, naming
 from athcodec.motion.clip import MotionClip
 from athcodec.sources import ReadOptions, read
@@ -31,7 +31,7 @@ HEADER = struct.Struct("<12siiffi")
 MESH_SUFFIXES = (".obj", ".ply")
 
 
-def read_clip(path: str | PathLike[str], options: ReadOptions) -> MotionClip:
+def read_clip(path: FilePath, options: ReadOptions) -> MotionClip:
     """Open the clip in the point cache `path`. Raises ClipError where it is none, or where the mesh has another number
     of vertices; OSError where a file cannot be opened."""
     return open_cache(path, options, _read_header)
@@ -64,7 +64,7 @@ def check_size(file: BinaryIO, frame_count: int, vertex_count: int, header_bytes
         raise ClipError(f"got {size} bytes, expected {expected} for {frame_count} frames of {vertex_count} vertices")
 
 
-def open_cache(path: str | PathLike[str], options: ReadOptions, read_header: Any) -> MotionClip:
+def open_cache(path: FilePath, options: ReadOptions, read_header: Any) -> MotionClip:
     """The clip in a point cache with the mesh that belongs to it. read_header(file, options) gives the clip's
     positions, time and metadata."""
     file = open_plain(path)
@@ -86,9 +86,7 @@ def open_cache(path: str | PathLike[str], options: ReadOptions, read_header: Any
         )
 
 
-def cached_mesh(
-    found: str | PathLike[str] | None, path: str | PathLike[str], options: ReadOptions, vertex_count: int
-) -> Mesh:
+def cached_mesh(found: FilePath | None, path: FilePath, options: ReadOptions, vertex_count: int) -> Mesh:
     """The mesh whose vertices the cache `path` moves, in the file `found`, or where that is None points alone.
 
     OBJ and PLY are read here, any other format as `read` does; the mesh's own positions are not used: they may be in

@@ -14,13 +14,13 @@ import sys
 import threading
 import warnings
 import weakref
-from os import PathLike, fspath
+from os import fspath
 from typing import Any
 
 import numpy as np
 
 from athcodec.errors import ClipError, GuessWarning
-from athcodec.files.plain import open_plain
+from athcodec.files.plain import FilePath, open_plain
 from athcodec.files.reading import FileWatch, closing_on_failure, naming
 from athcodec.motion.clip import MotionClip, Skin
 from athcodec.motion.frames import Frames
@@ -30,7 +30,7 @@ ARRAYS = ("vertex_branch", "branch_parent", "stem_index", "edges", "faces")
 MAIN = "athcodec.sources.reader_main"
 
 
-def read_apart(path: str | PathLike[str], options: ReadOptions, module: str, crashed: str) -> MotionClip:
+def read_apart(path: FilePath, options: ReadOptions, module: str, crashed: str) -> MotionClip:
     """The clip that `open_clip` of a module gives, there. crashed: the beginning of what to say where it has crashed.
     Raises ClipError, OSError."""
     path = fspath(path)

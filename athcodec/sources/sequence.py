@@ -17,12 +17,13 @@ import warnings
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from os import PathLike, fspath
+from os import fspath
 from pathlib import Path
 
 import numpy as np
 
 from athcodec.errors import ClipError, GuessWarning
+from athcodec.files.plain import FilePath
 from athcodec.files.reading import Budget, FileWatch, naming, read_plain
 from athcodec.motion.clip import MotionClip, stated_fps
 from athcodec.motion.frames import Frames
@@ -82,7 +83,7 @@ class Numbering:
         return dict(sorted(found.items()))
 
 
-def numbering_of(path: str | PathLike[str]) -> Numbering | None:
+def numbering_of(path: FilePath) -> Numbering | None:
     """The numbering that a pattern, or a file's name with digits before its suffix, belongs to; None: it has none."""
     path = Path(path)
     if is_pattern(path):
@@ -108,7 +109,7 @@ def _numbered(folder: Path, prefix: str, suffix: str) -> list[tuple[str, str, st
     return [(name, *match.groups()) for name in os.listdir(folder) if (match := form.fullmatch(name))]
 
 
-def sequence_files(path: str | PathLike[str]) -> dict[int | None, Path]:
+def sequence_files(path: FilePath) -> dict[int | None, Path]:
     """The files of the sequence by number; {None: path} for a single file without a number. Raises ClipError where a
     pattern matches none, OSError where the folder or the named file is not there."""
     numbering = numbering_of(path)
@@ -123,7 +124,7 @@ def sequence_files(path: str | PathLike[str]) -> dict[int | None, Path]:
     return files
 
 
-def files_to_read(path: str | PathLike[str]) -> dict[int | None, Path]:
+def files_to_read(path: FilePath) -> dict[int | None, Path]:
     """Return `sequence_files`; a GuessWarning names files whose names differ in numbers, but not in the last alone."""
     files, path = sequence_files(path), Path(path)
     form = _PLACES.sub("#", path.stem)
@@ -172,7 +173,7 @@ def each_once(paths: Iterable[str]) -> list[tuple[str, str]]:
     return found
 
 
-def read_clip(path: str | PathLike[str], options: ReadOptions) -> MotionClip:
+def read_clip(path: FilePath, options: ReadOptions) -> MotionClip:
     """The clip in the sequence that `path` belongs to. Raises ClipError where a file is broken or, when its frame is
     read, has other vertices, faces or edges than the first; OSError where one cannot be opened."""
     files = files_to_read(path)
@@ -201,7 +202,7 @@ def read_clip(path: str | PathLike[str], options: ReadOptions) -> MotionClip:
         )
 
 
-def _without_numbers(names: Sequence[str], first: Path, path: str | PathLike[str]) -> list[str]:
+def _without_numbers(names: Sequence[str], first: Path, path: FilePath) -> list[str]:
     """The names of parts, where they are only the file's own that of the sequence."""
     numbering = numbering_of(path)
     if list(names) != [first.stem] or numbering is None:

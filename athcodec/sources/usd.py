@@ -3,14 +3,13 @@ and may crash on damaged ones, so it works in a process of its own (reader_proce
 
 from __future__ import annotations
 
-from os import PathLike
-
+from athcodec.files.plain import FilePath
 from athcodec.motion.clip import MotionClip
 from athcodec.sources import ReadOptions
 from athcodec.sources.reader_process import read_apart
 
 
-def read_clip(path: str | PathLike[str], options: ReadOptions) -> MotionClip:
+def read_clip(path: FilePath, options: ReadOptions) -> MotionClip:
     """Open the clip in the USD file `path`; close it, or use it in a `with` statement.
 
     options.only are patterns of prim names or paths, options.fps the rate at which the stage is sampled in place of its

@@ -18,7 +18,7 @@ import re
 import zlib
 from collections.abc import Callable, Sequence
 from contextlib import redirect_stderr
-from os import PathLike, fspath
+from os import fspath
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -26,7 +26,7 @@ from xml.etree import ElementTree
 import numpy as np
 
 from athcodec.errors import ClipError, MissingExtra
-from athcodec.files.plain import open_plain
+from athcodec.files.plain import FilePath, open_plain
 from athcodec.files.reading import Budget, FileWatch, check_inside, naming, read_plain
 from athcodec.motion.clip import MotionClip
 from athcodec.sources import ReadOptions
@@ -73,7 +73,7 @@ _BROKEN = (
 )
 
 
-def read_clip(path: str | PathLike[str], options: ReadOptions) -> MotionClip:
+def read_clip(path: FilePath, options: ReadOptions) -> MotionClip:
     """Open the clip in the series that `path` belongs to. Raises ClipError where a file is broken or, when its frame is
     read, has other cells than the first; MissingExtra for .vtk without meshio; OSError where one cannot be opened."""
     try:

@@ -11,7 +11,6 @@ from __future__ import annotations
 import json
 import re
 from contextlib import suppress
-from os import PathLike
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -20,6 +19,7 @@ import h5py
 import numpy as np
 
 from athcodec.errors import ClipError
+from athcodec.files.plain import FilePath
 from athcodec.files.reading import Budget, FileWatch, closing_on_failure, file_beside, naming, no_room, read_plain
 from athcodec.motion.clip import MotionClip, frame_rate
 from athcodec.sources import ReadOptions
@@ -88,7 +88,7 @@ _SIZES = {"char": 1, "uchar": 1, "short": 2, "ushort": 2}
 _XML_ERRORS = (ElementTree.ParseError, ValueError, KeyError, OverflowError, IndexError, TypeError, MemoryError)
 
 
-def read_clip(path: str | PathLike[str], options: ReadOptions) -> MotionClip:
+def read_clip(path: FilePath, options: ReadOptions) -> MotionClip:
     """Open the clip in the XDMF file `path`. Raises ClipError where it or what it names is no usable series, OSError
     where the file cannot be opened."""
     data = Data(Path(path), options.allow_outside, Budget(options.max_memory))

@@ -13,6 +13,7 @@ from urllib.parse import quote
 
 from athcodec.errors import AthError
 from athcodec.files.atomic import check_target, file_ids, is_url, keeping, new_file
+from athcodec.files.plain import FilePath
 from athcodec.opening import open as open_ath
 from athcodec.viewer import picture
 from athcodec.viewer.view import WEB, file_name, refuse_glb
@@ -34,7 +35,7 @@ VIEWER = (
 _FLOAT3 = 12  # bytes of a position as float32
 
 
-def export_gallery(paths: Sequence[str | os.PathLike[str]], folder: str | os.PathLike[str], stills: bool = True) -> int:
+def export_gallery(paths: Sequence[FilePath], folder: FilePath, stills: bool = True) -> int:
     """Writes a folder with a page that shows several .ath files.
 
     Parameters
@@ -87,7 +88,7 @@ def _write(path: Path, data: bytes) -> None:
         out.write(data)
 
 
-def facts_of(path: str | os.PathLike[str]) -> str:
+def facts_of(path: FilePath) -> str:
     """How large a plant's motion is, in words and figures. Raises AthError for what a gallery cannot hold, OSError."""
     if is_url(path):
         raise AthError(f"{path}: got a URL, expected a file that can be copied into the gallery")

@@ -17,6 +17,7 @@ from typing import Any
 from athcodec.decoding.host_mesh import HostMesh
 from athcodec.errors import MissingExtra
 from athcodec.files.atomic import check_target, new_file
+from athcodec.files.plain import FilePath
 from athcodec.opening import open as open_ath
 from athcodec.viewer.view import export_page
 
@@ -58,8 +59,8 @@ def browser_path() -> str | None:
 
 
 def save_picture(
-    path: str | os.PathLike[str],
-    out: str | os.PathLike[str],
+    path: FilePath,
+    out: FilePath,
     kind: str = "gif",
     clip: str | None = None,
     size: tuple[int, int] = SIZE,
@@ -113,7 +114,7 @@ def save_picture(
     return data.tell()
 
 
-def still(path: str | os.PathLike[str], size: tuple[int, int] = SIZE) -> bytes:
+def still(path: FilePath, size: tuple[int, int] = SIZE) -> bytes:
     """A plant as WebP, with all of the viewer's scenery, late in its clip, when it has grown where it grows; raises as
     `save_picture`."""
     image = _packages()

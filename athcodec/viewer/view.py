@@ -23,12 +23,13 @@ from urllib.parse import quote, urlsplit
 from athcodec.decoding.host_mesh import HostMesh
 from athcodec.errors import AthError, ClipError, MissingExtra
 from athcodec.files.atomic import check_target, file_ids, is_url, keeping, new_file
+from athcodec.files.plain import FilePath
 from athcodec.opening import open as open_ath
 
 WEB = Path(__file__).parent / "web"
 PAGE = WEB / "index.html"
 INSTALL = 'pip install "athcodec[view]"'
-Floor = Mapping[str | os.PathLike[str], float]
+Floor = Mapping[FilePath, float]
 PASSED_ON = ("Content-Length", "Content-Range", "Content-Type", "ETag", "Last-Modified", "Accept-Ranges")
 
 _MAP = re.compile(r'<script type="importmap">(.*?)</script>', re.DOTALL)
@@ -39,8 +40,8 @@ _POLICY = (
 
 
 def export_page(
-    path: str | os.PathLike[str],
-    page: str | os.PathLike[str],
+    path: FilePath,
+    page: FilePath,
     clip: str | None = None,
     host_mesh: HostMesh | None = None,
     floor: Floor | None = None,
@@ -112,7 +113,7 @@ def refuse_glb(data: bytes) -> None:
         )
 
 
-def _read(path: str | os.PathLike[str]) -> bytes:
+def _read(path: FilePath) -> bytes:
     if not is_url(path):
         return Path(path).read_bytes()
     from athcodec.files.remote import Remote  # Its requirements take long to import.
@@ -171,13 +172,13 @@ def _script(text: str) -> str:
     return text.replace("</script", "<\\/script").replace("<!--", "<\\!--")
 
 
-def file_name(path: str | os.PathLike[str]) -> str:
+def file_name(path: FilePath) -> str:
     path = urlsplit(os.fspath(path)).path if is_url(path) else os.fspath(path)
     return path.replace("\\", "/").rstrip("/").rpartition("/")[2] or "file.ath"
 
 
 def serve(
-    path: str | os.PathLike[str],
+    path: FilePath,
     port: int = 0,
     ready: Callable[[str], None] = print,
     clip: str | None = None,
@@ -243,7 +244,7 @@ def serve(
     asyncio.run(run())
 
 
-def _check_server(path: str | os.PathLike[str]) -> None:
+def _check_server(path: FilePath) -> None:
     try:
         import aiohttp  # noqa: F401
     except ImportError:
@@ -251,14 +252,14 @@ def _check_server(path: str | os.PathLike[str]) -> None:
     _refuse_other_urls(path)
 
 
-def _refuse_other_urls(path: str | os.PathLike[str]) -> None:
+def _refuse_other_urls(path: FilePath) -> None:
     """The server passes on what http and https have; for others there is --export."""
     if is_url(path) and urlsplit(path).scheme.lower() not in ("http", "https"):
         scheme = urlsplit(path).scheme
         raise AthError(f"{path}: got {scheme}://, expected http:// or https://; --export PAGE reads others")
 
 
-def application(path: str | os.PathLike[str], place: str, beside: Mapping[str, bytes] | None = None):
+def application(path: FilePath, place: str, beside: Mapping[str, bytes] | None = None):
     """The aiohttp application: the page, and the file at `place`, which only the page's address tells; at other such
     places what goes with it, such as the host's mesh."""
     from aiohttp import ClientSession, web

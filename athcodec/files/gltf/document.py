@@ -13,7 +13,7 @@ import json
 import os
 import struct
 from collections.abc import Mapping
-from os import PathLike, fspath
+from os import fspath
 from typing import Any, BinaryIO
 from urllib.parse import unquote
 
@@ -22,7 +22,7 @@ import numpy as np
 from athcodec.errors import ClipError
 from athcodec.files.gltf.json import brief, entries, entry, integer, looked_up
 from athcodec.files.gltf.meshopt import unpack, unpacked_size
-from athcodec.files.plain import open_plain
+from athcodec.files.plain import FilePath, open_plain
 from athcodec.files.reading import Budget, FileWatch, closing_on_failure
 from athcodec.options import MAX_MEMORY
 
@@ -59,7 +59,7 @@ class GltfFile:
     """An opened file; close it. `json` is its structure, an object, `budget` what reading it may take. Raises
     ClipError, OSError."""
 
-    def __init__(self, path: str | PathLike[str], max_memory: int = MAX_MEMORY):
+    def __init__(self, path: FilePath, max_memory: int = MAX_MEMORY):
         self.path, self.budget = fspath(path), Budget(max_memory)
         self._files: list[BinaryIO] = []
         self._buffers: dict[int, _Bytes] = {}

@@ -17,7 +17,7 @@ from athcodec.errors import ClipError
 from athcodec.files.gltf.document import GltfFile
 from athcodec.files.gltf.json import BROKEN, brief, entries, entry, integer
 from athcodec.files.gltf.primitives import triangles
-from athcodec.files.plain import open_plain
+from athcodec.files.plain import FilePath, open_plain
 from athcodec.files.reading import closing_on_failure, naming
 
 EXTENSION = "ATH_motion"
@@ -43,7 +43,7 @@ def motion_names(gltf: dict) -> list[str]:
     return names
 
 
-def motions_in(path: str | os.PathLike[str]) -> list[str]:
+def motions_in(path: FilePath) -> list[str]:
     """Return the names of the motions in a GLB; none for another file. Raises ClipError, OSError."""
     with open_plain(path) as file:
         if file.read(4) != MAGIC:
@@ -58,7 +58,7 @@ class GltfMotion:
     `number` is its place among the motions; host_mesh (N, 3) float32 the rest pose, faces (F, 3) int32 or None.
     """
 
-    def __init__(self, path: str | os.PathLike[str], name: str | None = None):
+    def __init__(self, path: FilePath, name: str | None = None):
         self.path = os.fspath(path)
         with naming(path, *BROKEN):
             self._gltf = GltfFile(path)
