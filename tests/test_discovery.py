@@ -14,7 +14,10 @@ from plants import plant, ring_quads, runs_of_points, turns
 import athcodec
 from athcodec import MotionClip
 from athcodec.cli import main
+from athcodec.encoding.bounds import BoundOption
+from athcodec.encoding.branch_trials import best_branches
 from athcodec.encoding.job import EncodingJob
+from athcodec.encoding.progress import Work, allowed_work
 from athcodec.errors import ClipError
 from athcodec.motion.branches import finding, saving, seen
 from athcodec.motion.clip import Skin, source_stem_index
@@ -203,6 +206,13 @@ def test_branches_of_points_are_sought_in_few_frames_too(frames):
     points = np.stack([*bent, along + 0 * bent[0]], axis=-1).reshape(frames, -1, 3)[:, rng.permutation(4800)]
     found = athcodec.find_branches(MotionClip(points.astype(np.float32), np.arange(float(frames))))
     assert len(found.vertex_branch) == 4800
+
+
+def test_many_points_in_few_frames_are_not_searched_beyond_the_work_allowed(monkeypatch):
+    clip = MotionClip(np.random.default_rng(2).normal(size=(3, 40_000, 3)).astype(np.float32), np.arange(3.0))
+    monkeypatch.setitem(finding._FINDERS, "runs", lambda *_: pytest.fail("the points were searched"))
+    work = Work(allowed_work(clip.vertex_count, clip.frame_count, "default") / 2)
+    assert best_branches(clip, BoundOption(rel_error=1e-4), work).branch_parent.tolist() == [-1]
 
 
 @pytest.fixture(scope="module")

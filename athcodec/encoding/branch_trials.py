@@ -30,9 +30,10 @@ LEAST_TRIALS = 8  # Trials of settings that tell which branches are better.
 def best_branches(clip: MotionClip, option: BoundOption, work: Work, host_rest: bool = False) -> Found:
     """Return the candidate that makes the smallest file of a few frames at the bound, of those that fit the work.
     Predicted motion hardly depends on branches: if two candidates have it, no others are tried."""
-    proposals, trial = candidates(clip), _Trial(clip, option, host_rest, work)
+    by_points = work.fits(FINDING * clip.vertex_count)
+    proposals, trial = candidates(clip, by_points), _Trial(clip, option, host_rest, work)
     best, least, predicted = next(proposals), math.inf, 0
-    finding = FINDING * clip.vertex_count if best.method == "motion" and not stands_still(clip) else 0.0
+    finding = FINDING * clip.vertex_count if by_points and best.method == "motion" and not stands_still(clip) else 0.0
     work.add(finding)
     second = next(proposals, None) if work.fits(finding + 2 * trial.least_work) else None
     if second is None:

@@ -81,19 +81,21 @@ def find_branches(clip: MotionClip, method: str = "auto", root: int | None = Non
     return branches
 
 
-def candidates(clip: MotionClip) -> Iterator[Found]:
+def candidates(clip: MotionClip, by_points: bool = True) -> Iterator[Found]:
     """Yield what find_branches finds and, if only a trial shows which makes the smallest file, alternatives: for
     motion, or runs that leave many points alone, patches of other sizes, patches without parents and one single branch;
-    for a welded mesh, its pieces. A clip that stands still has no patches and no runs."""
+    for a welded mesh, its pieces. by_points: whether to look for patches and runs where there is nothing else; a clip
+    that stands still has none."""
     seen = Seen(clip)
     single = Found(np.zeros(clip.vertex_count, np.int32), np.array([-1], np.int32), None, "motion")
-    if stands_still(clip):
-        first = _first_found(seen, METHODS[:-2], None)
+    still = stands_still(clip)
+    by_points = by_points and not still
+    first = _first_found(seen, METHODS[:-1] if by_points else METHODS[:-2], None)
+    if still or not by_points and first is None:
         yield single
         if first is not None:
             yield first
         return
-    first = _first_found(seen, METHODS[:-1], None)
     if first is not None and first.method == "objects":  # What hangs on a part that grows may move more simply alone.
         yield dataclasses.replace(first, branch_parent=np.full_like(first.branch_parent, -1))
         yield first
