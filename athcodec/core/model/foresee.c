@@ -30,7 +30,7 @@ typedef struct {
 /* Returns a sum of products in no order that FORMAT.md states. */
 ATH_INLINE double quick_sum(int32_t count, const double *a, const double *b)
 {
-    double lane[ATH_LANES], rest = 0.0;
+    double lane[2 * ATH_LANES], rest = 0.0;
     ath_lanes sum, other;
     int32_t i = 0;
     lanes_set(&sum, 0.0);
@@ -40,8 +40,9 @@ ATH_INLINE double quick_sum(int32_t count, const double *a, const double *b)
         lanes_add_product(&other, a + i + ATH_LANES, b + i + ATH_LANES);
     }
     for (; i < count; i++) rest = rest + a[i] * b[i];
-    lanes_add(&sum, &other);
     lanes_store(lane, &sum);
+    lanes_store(lane + ATH_LANES, &other);
+    for (int32_t j = 0; j < ATH_LANES; j++) lane[j] = lane[j] + lane[ATH_LANES + j];
     return rest + ((lane[0] + lane[2]) + (lane[1] + lane[3]));
 }
 
@@ -143,7 +144,8 @@ ATH_HOT static void foresee_track(int32_t T, const placing_sums *terms, const ro
             for (int32_t k = 0; k < 9; k++) lanes_add_scaled(&turned[k], row->turn[j][k], terms->track[j] + t);
         lanes_set(&sum, -row->rest);
         for (int32_t k = 0; k < 3; k++) lanes_add_scaled(&sum, row->shift[k], moves + k * T + t);
-        for (int32_t k = 0; k < 9; k++) lanes_add_times(&sum, &turned[k], moves + (3 + k) * T + t);
+        for (int32_t k = 0; k < 9; k++)
+            lanes_add_product(&sum, (const double *)(const void *)&turned[k], moves + (3 + k) * T + t);
         lanes_store(track + t, &sum);
     }
 }

@@ -25,15 +25,7 @@ ATH_INLINE void lanes_add_product(ath_lanes *to, const double *a, const double *
     *to = *to + *(const ath_lanes *)(const void *)a * *(const ath_lanes *)(const void *)b;
 }
 
-ATH_INLINE void lanes_add(ath_lanes *to, const ath_lanes *a) { *to = *to + *a; }
-
 ATH_INLINE void lanes_load(ath_lanes *to, const double *from) { *to = *(const ath_lanes *)(const void *)from; }
-
-/* to += a * b */
-ATH_INLINE void lanes_add_times(ath_lanes *to, const ath_lanes *a, const double *b)
-{
-    *to = *to + *a * *(const ath_lanes *)(const void *)b;
-}
 
 /* to := c + row . x */
 ATH_INLINE void lanes_move(double *to, const ath_lanes *c, const ath_lanes row[3], const ath_lanes x[3])
@@ -62,16 +54,6 @@ ATH_INLINE void lanes_add_scaled(ath_lanes *to, double weight, const double *fro
 ATH_INLINE void lanes_add_product(ath_lanes *to, const double *a, const double *b)
 {
     for (int i = 0; i < ATH_LANES; i++) to->lane[i] = to->lane[i] + a[i] * b[i];
-}
-
-ATH_INLINE void lanes_add_times(ath_lanes *to, const ath_lanes *a, const double *b)
-{
-    for (int i = 0; i < ATH_LANES; i++) to->lane[i] = to->lane[i] + a->lane[i] * b[i];
-}
-
-ATH_INLINE void lanes_add(ath_lanes *to, const ath_lanes *a)
-{
-    for (int i = 0; i < ATH_LANES; i++) to->lane[i] = to->lane[i] + a->lane[i];
 }
 
 ATH_INLINE void lanes_load(ath_lanes *to, const double *from)
