@@ -18,7 +18,6 @@ from bench import (
     gallery,
     levels,
     memory,
-    moving,
     picture,
     progressive,
     rd,
@@ -47,7 +46,6 @@ VERBS = {
     "picture": picture,
     "viewer": viewer,
     "gallery": gallery,
-    "moving": moving,
     "smoothness": smoothness,
     "wrappings": wrappings,
 }

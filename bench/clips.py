@@ -9,7 +9,6 @@ import tempfile
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from os import PathLike
 from pathlib import Path
 from typing import Any
 
@@ -30,11 +29,6 @@ class Encoded:
     decoder: athcodec.Decoder
 
 
-def read(path: str | PathLike[str]) -> athcodec.MotionClip:
-    """Open the clip in a file of any format, as a user would: with the default options."""
-    return athcodec.read(path)
-
-
 def files_of(path: Path) -> list[Path]:
     """The files that a clip lies in: `path`, the other frames of a sequence, the arrays beside an XDMF file."""
     beside = path.parent.glob(f"{path.stem}.h5") if path.suffix == ".xdmf" else ()
@@ -42,14 +36,14 @@ def files_of(path: Path) -> list[Path]:
     return sorted({path, *frames, *beside})
 
 
-def add_clips(parser: argparse.ArgumentParser) -> None:
+def add_clips(parser: argparse.ArgumentParser, kinds: str = "motion clips") -> None:
     parser.add_argument(
         "clips",
         nargs="*",
         type=Path,
         metavar="CLIP",
         default=[athcodec.sample_path()],
-        help="motion clips; by default the sample that ships with athcodec",
+        help=f"{kinds}; by default the sample that ships with athcodec",
     )
 
 
@@ -96,7 +90,7 @@ def encoded(
     segment_frames: int | None = None,
 ) -> Iterator[Encoded]:
     """The clip at `path`, encoded without attributes into a file that is deleted with the context."""
-    with tempfile.TemporaryDirectory() as folder, read(path) as clip:
+    with tempfile.TemporaryDirectory() as folder, athcodec.read(path) as clip:
         file = Path(folder) / "clip.ath"
         settings = {"attributes": "none", "effort": effort, "ladder": ladder, "host_rest": host_rest}
         given = {"rel_error": rel_error, "rest_error": "bound", "segment_frames": segment_frames}

@@ -25,7 +25,7 @@ import numpy as np
 import athcodec
 from athcodec.motion.hierarchy import branch_orders
 from bench import foreign, odd
-from bench.clips import files_of, read
+from bench.clips import files_of
 from bench.tables import table
 from bench.trees import exact
 from bench.trees.beams import bend
@@ -173,7 +173,7 @@ def _make(name: str, path: Path) -> float:
 def digest(path: Path) -> str:
     """Digest of positions, rest pose and branches: the input of a codec."""
     total = hashlib.sha256()
-    with read(path) as clip:
+    with athcodec.read(path) as clip:
         for array in (clip.rest, clip.vertex_branch, clip.branch_parent):
             total.update(b"" if array is None else array.tobytes())
         for _, frames in clip.blocks():
@@ -237,7 +237,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
             continue
         except (Different, KeyError) as error:
             raise SystemExit(f"bench data: {error.args[0]}") from error
-        with read(path) as clip:
+        with athcodec.read(path) as clip:
             size = {"file MB": 1e-6 * sum(file.stat().st_size for file in files_of(path))}
             rows.append({"name": Path(name).stem} | _row(clip) | size | {"made": describe(name), "seconds": seconds})
     where = args.folder.name if args.folder else f"${FOLDER_VARIABLE} or {DEFAULT_FOLDER}"

@@ -22,7 +22,7 @@ import numpy as np
 
 import athcodec
 from athcodec._native import crc32c
-from bench.clips import add_ladder, add_number, add_rel_error, read
+from bench.clips import add_clips, add_ladder, add_number, add_rel_error
 from bench.codecs.coder import CORE, compile_c
 from bench.codecs.program import split
 from bench.codecs.sz3 import ALGORITHMS, Sz3
@@ -68,14 +68,7 @@ frames x vertices x 3, each number within the bound over the root of 3. Ratios a
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "clips",
-        nargs="*",
-        type=Path,
-        metavar="CLIP",
-        default=[athcodec.sample_path()],
-        help="motion clips, which are encoded first, or .ath files; by default the sample that ships with athcodec",
-    )
+    add_clips(parser, "motion clips, which are encoded first, or .ath files")
     add_rel_error(parser)
     add_ladder(parser, "decades")
     add_number(parser, "--rounds", ROUNDS, "runs of everything")
@@ -124,7 +117,7 @@ class Case:
         self.path, self._program = path, program
         self.file = path if path.suffix == ".ath" else folder / "clip.ath"
         if path.suffix != ".ath":
-            with read(path) as clip:
+            with athcodec.read(path) as clip:
                 athcodec.encode(clip, self.file, rel_error=rel_error, attributes="none", ladder=ladder)
         with athcodec.open(self.file, strict=True) as decoder:
             self.crc = crc32c(np.ascontiguousarray(decoder.positions(), np.float32))
@@ -235,7 +228,7 @@ def sz3_rows(case: Case, rel_error: float, rounds: int) -> list[dict[str, Any]]:
     """One row for a clip, whose file `case` has; none for an .ath file, which does not hold the source."""
     if case.path.suffix == ".ath":
         return []
-    with read(case.path) as clip:
+    with athcodec.read(case.path) as clip:
         positions = np.asarray(clip.positions[:], np.float32)
         single = athcodec.encode(clip, rel_error=rel_error, attributes="none", ladder="none")
     layers = case.file.read_bytes()

@@ -13,8 +13,8 @@ from typing import Any
 
 import athcodec
 from athcodec.viewer import picture, view
+from athcodec.viewer.picture import chromium
 from bench import data
-from bench.browser import chromium
 from bench.tables import table
 
 FOLDER = Path(__file__).parents[1] / "docs" / "gallery"

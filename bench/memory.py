@@ -22,7 +22,7 @@ import athcodec
 from athcodec.encoding.segmentation import split_segments
 from athcodec.exporters.hdf5 import Hdf5Writer
 from athcodec.options import MIN_SEGMENT
-from bench.clips import add_clips, add_number, add_rel_error, read
+from bench.clips import add_clips, add_number, add_rel_error
 from bench.tables import table
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -59,7 +59,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 
 
 def _segment_frames(path: Path) -> int:
-    with read(path) as clip:
+    with athcodec.read(path) as clip:
         segments = split_segments(clip.frame_count, clip.vertex_count)
     return max(MIN_SEGMENT, *(stop - start for start, stop in segments))
 

@@ -21,8 +21,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import athcodec
 from bench import compare, data
-from bench.clips import files_of, read
+from bench.clips import files_of
 from bench.codec_registry import OURS, all_codecs, chosen, fingerprint, is_lossless
 from bench.codecs import Codec, simple
 from bench.codecs.ours import Athcodec
@@ -139,7 +140,7 @@ def _about(store: Store, case: Case) -> dict[str, Any]:
     row = {"clip": case.name, "what": case.description} | ({"program": program} if colon else {})
     if case.path is None:
         return store.find("clips", row) or store.add("clips", row)
-    with read(case.path) as clip:
+    with athcodec.read(case.path) as clip:
         row |= {
             "frames": clip.frame_count,
             "vertices": clip.vertex_count,

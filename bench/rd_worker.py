@@ -28,7 +28,6 @@ from athcodec.encoding.branch_trials import best_branches
 from athcodec.encoding.progress import Work
 from athcodec.metrics import ErrorMeter, bits_per_vertex_frame
 from athcodec.motion.branches.result import with_branches
-from bench.clips import read
 from bench.codec_registry import OURS, chosen
 from bench.codecs import Codec, Source
 from bench.codecs.ours import LayeredAthcodec
@@ -39,7 +38,7 @@ from bench.speed import processor_seconds
 
 
 def encode(codec: Codec, clip_path: str, rel_bound: float, file: Path, limit: float) -> dict[str, Any]:
-    with read(clip_path) as clip:
+    with athcodec.read(clip_path) as clip:
         source = Source(_with_branches(clip, codec, rel_bound))
         bound = rel_bound * source.diagonal
         _ = source.rest
@@ -54,7 +53,7 @@ def decode(codec: Codec, clip_path: str, rel_bound: float, file: Path, limit: fl
     codec.decode(data)  # a warm-up: only its memory counts
     peak = peak_bytes()
     seconds, _, decoded = _timed(partial(codec.decode, data), limit)
-    with read(clip_path) as clip:
+    with athcodec.read(clip_path) as clip:
         result = _errors(Source(clip), decoded, rel_bound)
         rate = bits_per_vertex_frame(len(data), clip.frame_count, clip.vertex_count)
         if isinstance(codec, LayeredAthcodec):

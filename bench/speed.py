@@ -25,7 +25,7 @@ import athcodec
 import athcodec.encoding.encoder
 from athcodec.encoding import sample
 from bench import data
-from bench.clips import add_clips, add_rel_error, read
+from bench.clips import add_clips, add_rel_error
 from bench.tables import table
 
 DECODES = 7
@@ -64,7 +64,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 
 
 def _row(path: Path, rel_error: float) -> dict[str, Any]:
-    with tempfile.TemporaryDirectory() as folder, read(path) as clip:
+    with tempfile.TemporaryDirectory() as folder, athcodec.read(path) as clip:
         file, gzip = Path(folder) / "clip.ath", Path(folder) / "clip.h5"
         work, middle = clip.frame_count * clip.vertex_count, clip.frame_count // 2
         athcodec.write_hdf5(clip.replace(attributes={}), gzip, gzip=True)
@@ -108,7 +108,7 @@ def _sample_row(path: Path, rel_error: float) -> dict[str, Any]:
     summaries, seconds, large = [], [], sample.LARGE
     try:
         for sample.LARGE in (large, sys.maxsize):
-            with tempfile.TemporaryDirectory() as folder, read(path) as clip:
+            with tempfile.TemporaryDirectory() as folder, athcodec.read(path) as clip:
                 cpu = processor_seconds()
                 summaries.append(athcodec.encode(clip, Path(folder) / "clip.ath", rel_error=rel_error))
                 seconds.append(processor_seconds() - cpu)

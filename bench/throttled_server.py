@@ -7,6 +7,7 @@ import threading
 import time
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
+from urllib.parse import unquote
 
 import athcodec
 
@@ -17,17 +18,17 @@ TYPES = {".html": "text/html", ".js": "text/javascript", ".css": "text/css"}
 class ThrottledServer(ThreadingHTTPServer):
     """Serves the viewer, and `files` by name, on 127.0.0.1: a context manager.
 
-    rate: bytes a second of files (None: unlimited); the page is not throttled. latency: seconds before each response
-    with a file. ranges: whether byte ranges are supported. `log`: [name, first byte, bytes sent] per file response.
+    rate: bytes a second of files (None: unlimited); the page is not throttled. ranges: whether byte ranges are
+    supported. `log`: [name, first byte, bytes sent] per file response.
     """
 
     daemon_threads = True
     block_on_close = False
     packet = 1460  # bytes that are sent at once
 
-    def __init__(self, files: dict[str, bytes], rate: float | None = None, latency: float = 0.0, ranges: bool = True):
+    def __init__(self, files: dict[str, bytes], rate: float | None = None, ranges: bool = True):
         super().__init__(("127.0.0.1", 0), _Handler)
-        self.files, self.rate, self.latency, self.ranges = files, rate, latency, ranges
+        self.files, self.rate, self.ranges = files, rate, ranges
         self.log: list[list] = []
         self._free_at, self._lock = 0.0, threading.Lock()
 
@@ -70,7 +71,7 @@ class _Handler(BaseHTTPRequestHandler):
     server: ThrottledServer
 
     def do_GET(self) -> None:
-        name = self.path.split("?")[0].lstrip("/") or "index.html"
+        name = unquote(self.path.split("?")[0]).lstrip("/") or "index.html"
         if name in self.server.files:
             self._file(name, self.server.files[name])
         elif (WEB / name).is_file():
@@ -79,7 +80,6 @@ class _Handler(BaseHTTPRequestHandler):
             self._respond(404, b"", {})
 
     def _file(self, name: str, data: bytes) -> None:
-        time.sleep(self.server.latency)
         requested = re.fullmatch(r"bytes=(\d+)-(\d+)", self.headers.get("Range", "")) if self.server.ranges else None
         first, last = (int(requested[1]), min(int(requested[2]), len(data) - 1)) if requested else (0, len(data) - 1)
         entry = [name, first, 0]

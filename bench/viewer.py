@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from athcodec.options import LADDERS
-from bench.browser import chromium
+from athcodec.viewer.picture import chromium
 from bench.clips import add_clips, add_rel_error, encoded
 from bench.tables import table
 from bench.throttled_server import ThrottledServer

@@ -20,7 +20,7 @@ from athcodec.exporters import Written
 from athcodec.exporters.gltf_into import Into
 from athcodec.metrics import ErrorMeter
 from athcodec.sources import ReadOptions
-from bench.clips import add_clips, add_rel_error, read
+from bench.clips import add_clips, add_rel_error
 from bench.tables import MISSING, table
 
 JOINTS = 1024
@@ -44,7 +44,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> dict[str, Any]:
     rows, broken = [], []
     for path in args.clips:
-        with tempfile.TemporaryDirectory() as folder, read(path) as clip:
+        with tempfile.TemporaryDirectory() as folder, athcodec.read(path) as clip:
             bare = clip.replace(attributes={key: clip.attributes[key] for key in _FACES if key in clip.attributes})
             for row in _Wrappings(bare, Path(folder), args.rel_error, args.joints).rows():
                 rows.append({"clip": path.stem} | row)

@@ -28,6 +28,18 @@ sys.path.append(
     str(Path(__file__).resolve().parent.parent)
 )  # for bench, which is not installed; athcodec stays the installed one
 
+WEBGPU_FLAGS = [
+    "--no-sandbox",
+    "--enable-unsafe-webgpu",
+    "--use-webgpu-adapter=swiftshader",
+    "--enable-unsafe-swiftshader",
+    # These present a canvas of WebGPU; without them Chromium's GPU process ends at the first picture
+    "--use-gl=angle",
+    "--use-angle=swiftshader",
+    "--ignore-gpu-blocklist",
+    "--enable-features=Vulkan",
+    "--use-vulkan=swiftshader",
+]
 SLOWEST = 240_000  # ms, of waiting for a page that draws in software
 
 
@@ -74,7 +86,7 @@ def pytest_terminal_summary(terminalreporter):
 @pytest.fixture(scope="module")
 def browser():
     """Chromium, of the tests that are marked so."""
-    from bench.browser import chromium
+    from athcodec.viewer.picture import chromium
 
     with chromium() as found:
         yield found

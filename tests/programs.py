@@ -11,6 +11,7 @@ import venv
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 try:
     import fcntl
@@ -41,11 +42,15 @@ def usd_plugin_python() -> str:
     return _environment("usd-plugin", str(root / "athcodec/usd"), "numpy", state=digest)
 
 
-def run_script(python: str, script: str, *arguments: object) -> str:
-    """What the script prints; its errors with a failed run."""
-    done = subprocess.run([python, "-c", script, *map(str, arguments)], capture_output=True, text=True, timeout=600)
-    assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-4000:]
+def printed(*words: object, code: int = 0, timeout: float = 600, **options: Any) -> str:
+    """Return what a command prints, which has to end with the exit code `code`."""
+    done = subprocess.run([str(word) for word in words], capture_output=True, text=True, timeout=timeout, **options)
+    assert done.returncode == code, done.stdout[-2000:] + done.stderr[-4000:]
     return done.stdout
+
+
+def run_script(python: str, script: str, *arguments: object) -> str:
+    return printed(python, "-c", script, *arguments)
 
 
 def install_once(folder: Path, packages: str, install: Callable[[], object]) -> None:

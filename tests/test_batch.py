@@ -23,6 +23,7 @@ import fsspec
 import psutil
 import pytest
 from plants import plant
+from programs import printed
 
 import athcodec
 from athcodec import batch, cli
@@ -267,8 +268,7 @@ if __name__ == "__main__":
 def test_workers_keep_the_memory_of_their_arrays_and_are_reached_with_a_key(tmp_path):
     """By itself Dask has them give it back at once, and encoding takes twice the time."""
     (tmp_path / "ask.py").write_text(ASK_WORKER)
-    done = subprocess.run([sys.executable, str(tmp_path / "ask.py")], capture_output=True, text=True, timeout=60)
-    assert done.stdout == "tls None\n", done.stderr
+    assert printed(sys.executable, tmp_path / "ask.py") == "tls None\n"
 
 
 # ---- inputs and settings ----
@@ -414,11 +414,7 @@ def test_clips_in_an_object_store_become_files_there_and_a_second_run_does_what_
 
     def run() -> tuple[int, int]:
         words = [f"{url}/in/**/*.h5", "--out", f"{url}/out", "--manifest", str(notes), "--split", "3", "--verify"]
-        done = subprocess.run(
-            [*BATCH, *words, *WORDS, "--workers", "2", "--json"], capture_output=True, text=True, timeout=120
-        )
-        assert done.returncode == 0, done.stderr
-        result = json.loads(done.stdout)
+        result = json.loads(printed(*BATCH, *words, *WORDS, "--workers", "2", "--json"))
         return result["done"], result["kept"]
 
     assert run() == (4, 0)

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import os
-import subprocess
 import sys
 from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from programs import printed
 
 import athcodec
 from athcodec import encoding
@@ -35,16 +35,8 @@ def run_bench(tmp_path, *words, code=0, **environment):
     """(printed text, contents of the JSON file) of one run, on the sample where no clip is named."""
     file = tmp_path / "result.json"
     path = {"PYTHONPATH": str(ROOT / "tests")}
-    done = subprocess.run(
-        [sys.executable, "-m", "bench", *words, "--json", str(file)],
-        cwd=ROOT,
-        text=True,
-        capture_output=True,
-        timeout=300,
-        env=os.environ | path | environment,
-    )
-    assert done.returncode == code, done.stderr
-    return done.stdout, read(file)
+    command = [sys.executable, "-m", "bench", *words, "--json", file]
+    return printed(*command, code=code, cwd=ROOT, env=os.environ | path | environment), read(file)
 
 
 def tables_of(result):

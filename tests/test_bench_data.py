@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import os
-import subprocess
 import sys
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from programs import printed
 
 import athcodec
 from bench import data
@@ -190,10 +190,8 @@ def test_clips_are_found_by_name_and_by_path(monkeypatch, recipes, tmp_path):
 
 
 def test_the_verb_prints_a_table_of_the_clips(tmp_path):
-    words = [sys.executable, "-m", "bench", "data", "sample", "--folder", str(tmp_path)]
-    done = subprocess.run(words, cwd=ROOT, text=True, capture_output=True, timeout=120)
-    assert done.returncode == 0, done.stderr
-    assert "| sample |    1,001 |    120 |       99 | 0-2" in done.stdout
+    words = [sys.executable, "-m", "bench", "data", "sample", "--folder", tmp_path]
+    assert "| sample |    1,001 |    120 |       99 | 0-2" in printed(*words, cwd=ROOT)
 
 
 def exact_digests(folder: Path) -> list[str]:
@@ -209,16 +207,9 @@ def test_exact_clips_have_the_same_bits_on_every_machine(recipes, tmp_path):
 def test_exact_clips_have_the_same_bits_without_wide_vectors_and_with_kernels_of_another_processor(tmp_path):
     features = np._core._multiarray_umath.__cpu_dispatch__
     script = "import sys, pathlib, test_bench_data as t; print(*t.exact_digests(pathlib.Path(sys.argv[1])))"
-    environment = {"NPY_DISABLE_CPU_FEATURES": " ".join(features), "OPENBLAS_CORETYPE": "Nehalem"}
-    done = subprocess.run(
-        [sys.executable, "-c", script, str(tmp_path)],
-        cwd=ROOT / "tests",
-        env=os.environ | {"PYTHONPATH": str(ROOT)} | environment,
-        text=True,
-        capture_output=True,
-        timeout=300,
-    )
-    assert done.stdout.split() == [recipe.digest for recipe in SMALL_EXACT.values()], done.stderr
+    settings = {"NPY_DISABLE_CPU_FEATURES": " ".join(features), "OPENBLAS_CORETYPE": "Nehalem", "PYTHONPATH": str(ROOT)}
+    found = printed(sys.executable, "-c", script, tmp_path, cwd=ROOT / "tests", env=os.environ | settings)
+    assert found.split() == [recipe.digest for recipe in SMALL_EXACT.values()]
 
 
 def test_an_exact_clip_that_comes_out_otherwise_is_refused_and_not_kept(recipes, tmp_path):

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+import athcodec
 from bench import clips, data, foreign
 from bench.data import digest
 from bench.suite import cases
@@ -23,7 +24,7 @@ pytestmark = pytest.mark.tools
 def test_a_program_makes_the_same_clip_again_and_it_is_kept_with_its_recipe(name, frames, vertices, tmp_path):
     paths = [data.path_of(name, tmp_path / folder) for folder in ("one", "two")]
     assert digest(paths[0]) == digest(paths[1])
-    with clips.read(paths[0]) as clip:
+    with athcodec.read(paths[0]) as clip:
         assert (clip.frame_count, clip.vertex_count) == (frames, vertices)
     files = set((tmp_path / "one").iterdir())
     assert files == {*clips.files_of(paths[0]), tmp_path / "one" / f"{name}.recipe"}

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import hashlib
 import os
-import subprocess
 import sys
 from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
+from programs import printed
 
 import athcodec
 from athcodec.motion.hierarchy import hierarchy_of
@@ -49,10 +49,8 @@ def clips():
 
 def test_another_process_makes_the_same_clips_from_the_same_seeds(clips):
     script = "from test_bench_odd import digest, odd\nfor recipe in odd.CLIPS.values(): print(digest(recipe.make()))"
-    done = subprocess.run(
-        [sys.executable, "-c", script], cwd=ROOT / "tests", text=True, capture_output=True, timeout=300
-    )
-    assert done.stdout.split() == [digest(clip) for clip in clips.values()], done.stderr
+    found = printed(sys.executable, "-c", script, cwd=ROOT / "tests")
+    assert found.split() == [digest(clip) for clip in clips.values()]
 
 
 def test_clips_have_the_frames_and_vertices_that_they_are_known_for(clips):
@@ -247,13 +245,11 @@ def test_the_simple_codec_says_where_integers_are_too_small_for_the_bound(clips)
 
 def test_the_suite_prints_one_table_of_its_clips_with_sizes_that_were_checked(tmp_path):
     file = tmp_path / "result.json"
-    words = ["rd", "vertex", "--suite", "odd-quick", "--bounds", "1e-3", "--json", str(file)]
+    words = ["rd", "vertex", "--suite", "odd-quick", "--bounds", "1e-3", "--json", file]
     environment = os.environ | {data.FOLDER_VARIABLE: str(tmp_path)}
-    command = [sys.executable, "-m", "bench", *words]
-    done = subprocess.run(command, cwd=ROOT, text=True, capture_output=True, timeout=300, env=environment)
-    assert done.returncode == 0, done.stderr
+    text = printed(sys.executable, "-m", "bench", *words, cwd=ROOT, env=environment)
     sizes = {point["codec"]: point["bytes"] for point in read(file)["points"]}
     assert set(sizes) == set(rd.CODECS["odd-quick"])
     ratio = sizes[simple.NAME] / sizes["athcodec"]
-    assert f"{sizes[simple.NAME]:,} simple x{ratio:.2f}" in done.stdout
-    assert (tmp_path / "vertex.h5").exists() and rd.title("vertex") not in done.stdout
+    assert f"{sizes[simple.NAME]:,} simple x{ratio:.2f}" in text
+    assert (tmp_path / "vertex.h5").exists() and rd.title("vertex") not in text

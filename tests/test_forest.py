@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from conftest import WEBGPU_FLAGS
 from plants import bending_tube, blown_tree
 
 import athcodec
@@ -17,7 +18,7 @@ from athcodec.gpu import GpuFile
 from athcodec.gpu.evaluate import Passes, Source
 from athcodec.motion.joining import in_wind
 from athcodec.viewer.build_viewer import modules
-from bench.browser import WEBGPU_FLAGS, chromium
+from athcodec.viewer.picture import chromium
 from bench.throttled_server import ThrottledServer
 
 pytestmark = pytest.mark.browser

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import functools
 import re
 import subprocess
 import sys
-import threading
-from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 
 import pytest
@@ -89,41 +86,23 @@ def test_all_that_the_gallery_of_the_documentation_names_is_there():
     assert all((viewer / name).is_file() for name in files)
 
 
-class _Quiet(SimpleHTTPRequestHandler):
-    def log_message(self, *_) -> None:
-        pass
-
-
 @pytest.fixture
-def shown(browser, sample_ath, tmp_path):
-    """The page of a gallery of four plants on a low screen; it must not have logged an error at the end."""
-    files = small_files(sample_ath, tmp_path, [f"tree {number}.ath" for number in range(4)])
-    gallery.export_gallery(files, tmp_path / "gallery", stills=False)
-    server = ThreadingHTTPServer(("127.0.0.1", 0), functools.partial(_Quiet, directory=str(tmp_path / "gallery")))
-    threading.Thread(target=server.serve_forever, args=(0.02,), daemon=True).start()
-    page, errors, asked = browser.new_page(viewport={"width": 360, "height": 360}), [], []
-    page.set_default_timeout(SLOWEST)
-    page.on("console", lambda message: errors.append(message.text) if message.type == "error" else None)
-    page.on("pageerror", lambda error: errors.append(str(error)))
-    page.on("request", lambda request: asked.append(request.url))
-    page.asked = asked
-    page.goto(f"http://127.0.0.1:{server.server_address[1]}/")
-    page.evaluate("globalThis.plants = [...document.querySelectorAll('ath-viewer')]")
-    yield page
-    page.close()
-    server.shutdown()
-    server.server_close()
-    assert errors == []
-
-
-def files_asked_for(page) -> set[str]:
-    return {url.rsplit("/", 1)[1] for url in page.asked if "/plants/" in url}
+def shown(opened, sample_ath, tmp_path):
+    """The page of a gallery of four plants on a low screen, and `line`, the server that it comes from."""
+    files, out = small_files(sample_ath, tmp_path, [f"tree {number}.ath" for number in range(4)]), tmp_path / "gallery"
+    gallery.export_gallery(files, out, stills=False)
+    made = {path.relative_to(out).as_posix(): path.read_bytes() for path in out.rglob("*.*")}
+    with ThrottledServer(made) as line:
+        page = opened(line.address, "true", viewport={"width": 360, "height": 360})
+        page.line = line
+        page.evaluate("globalThis.plants = [...document.querySelectorAll('ath-viewer')]")
+        yield page
 
 
 @pytest.mark.browser
 def test_a_plant_of_a_gallery_starts_when_it_comes_into_view_and_is_given_back_behind(shown):
     shown.wait_for_function("() => plants[0].currentTime > 0.1")
-    assert files_asked_for(shown) == {"tree%200.ath"}
+    assert {name for name, *_ in shown.line.log if name.startswith("plants/")} == {"plants/tree 0.ath"}
     assert shown.evaluate("plants[3].ath") is None
     assert shown.evaluate("plants[3].shadowRoot.querySelector('canvas')") is None
     shown.evaluate("plants[3].scrollIntoView()")

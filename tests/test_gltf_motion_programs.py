@@ -22,7 +22,7 @@ import athcodec
 from athcodec.cli import main
 from athcodec.exporters import write
 from athcodec.motion.clip import MotionClip
-from bench.browser import chromium
+from athcodec.viewer.picture import chromium
 
 VIEWER = Path(__file__).resolve().parent.parent / "athcodec" / "viewer"
 ENGINES = ["three", "babylon"]

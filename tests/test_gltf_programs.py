@@ -8,7 +8,6 @@ import hashlib
 import json
 import os
 import shutil
-import subprocess
 import sys
 from pathlib import Path
 
@@ -16,7 +15,7 @@ import numpy as np
 import pygltflib
 import pytest
 from plants import distance
-from programs import install_once
+from programs import install_once, printed
 from test_gltf import Maker, as_metres, crown, leafy, leafy_ath, seasons, seasons_ath  # noqa: F401, the fixtures too
 from test_gltf_motion import structure
 from test_vat import exr
@@ -42,8 +41,7 @@ def node(request):
 
     def install():
         (folder / "package.json").write_text('{"name": "checks", "private": true, "type": "module"}')
-        command = ["npm", "install", "--no-audit", "--no-fund", *PACKAGES]
-        subprocess.run(command, cwd=folder, check=True, capture_output=True)
+        printed("npm", "install", "--no-audit", "--no-fund", *PACKAGES, cwd=folder)
         for script in SCRIPTS.glob("*.mjs"):
             shutil.copy(script, folder)
 
@@ -51,9 +49,7 @@ def node(request):
     install_once(folder, " ".join([*PACKAGES, *scripts]), install)
 
     def run(script, *words):
-        done = subprocess.run(["node", folder / script, *map(str, words)], capture_output=True, text=True)
-        assert done.returncode == 0, done.stderr
-        return done.stdout
+        return printed("node", folder / script, *words)
 
     return run
 
@@ -62,21 +58,11 @@ def node(request):
 def panda(request, tmp_path_factory):
     """A walking panda that people drew and rigged, as Panda3D moves it; see node/panda.py."""
     folder, package = Path(request.config.cache.mkdir("panda3d")), "panda3d==1.10.16"
-    install_once(
-        folder,
-        package,
-        lambda: subprocess.run(
-            [sys.executable, "-m", "pip", "install", "-q", "--no-deps", "--target", folder, package], check=True
-        ),
-    )
+    command = [sys.executable, "-m", "pip", "install", "-q", "--no-deps", "--target", folder, package]
+    install_once(folder, package, lambda: printed(*command))
     out = tmp_path_factory.mktemp("panda") / "panda.npz"
     path = os.pathsep.join([str(folder), *filter(None, [os.environ.get("PYTHONPATH")])])
-    subprocess.run(
-        [sys.executable, SCRIPTS / "panda.py", out],
-        check=True,
-        env=os.environ | {"PYTHONPATH": path},
-        capture_output=True,
-    )
+    printed(sys.executable, SCRIPTS / "panda.py", out, env=os.environ | {"PYTHONPATH": path})
     return dict(np.load(out))
 
 

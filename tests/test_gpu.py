@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from conftest import WEBGPU_FLAGS
 from moving_meshes import leafed_tree
 from plants import blown_tree, bush, chain_plant, distance
 from test_blending import simulated
@@ -19,7 +20,7 @@ from athcodec.decoding.core_file import FILE_ORDER, CoreError
 from athcodec.gpu import SHADERS, GpuFile, Room, corners_of
 from athcodec.gpu.evaluate import BODY, LEVEL, SEGMENT, Passes, Source, head, section
 from athcodec.sources import sample_path
-from bench.browser import WEBGPU_FLAGS, chromium
+from athcodec.viewer.picture import chromium
 from spec.robust.hostile import repaired
 
 pytestmark = pytest.mark.web

@@ -10,14 +10,13 @@ import hashlib
 import json
 import re
 import shutil
-import subprocess
 from pathlib import Path
 
 import numpy as np
 import pytest
 from files import coded
 from plants import bending_tube, distance, ring_quads, tube
-from programs import CACHE, install_once
+from programs import CACHE, install_once, printed
 from test_gltf_motion import encoded
 
 import athcodec
@@ -40,10 +39,7 @@ def node(*words) -> object:
     program = shutil.which("node")
     if program is None:
         pytest.fail("node: got none on PATH, expected Node.js 18 or newer to test the loader in")
-    command = [program, "--no-warnings", "--expose-gc", *map(str, words)]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=1800)
-    assert done.returncode == 0, done.stderr
-    return json.loads(done.stdout)
+    return json.loads(printed(program, "--no-warnings", "--expose-gc", *words, timeout=1800))
 
 
 def run_node(case: str, path: Path, *words):
@@ -131,7 +127,7 @@ def app(browser, tmp_path):
     folder = CACHE / "vite"
 
     def npm(*words: object, cwd: Path) -> str:
-        return subprocess.run(["npm", *map(str, words)], cwd=cwd, check=True, capture_output=True, text=True).stdout
+        return printed("npm", *words, cwd=cwd)
 
     tarball = tmp_path / npm("pack", "--silent", "--pack-destination", tmp_path, cwd=WEB.parent).split()[-1]
 

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 from fuzz.targets import CORE
+from programs import printed
 
 from spec import conformance
 
@@ -47,8 +48,7 @@ def sources(tmp_path_factory) -> list[Path]:
 def decoded(command: list[str], vectors: list[conformance.Vector]) -> dict[str, dict[str, str]]:
     """Results by vector and item."""
     lines = "".join(" ".join(map(str, filter(None, (v.path, v.mesh_path)))) + "\n" for v in vectors)
-    done = subprocess.run(command, input=lines, text=True, capture_output=True, check=True, timeout=1200)
-    rows = [line.split() for line in done.stdout.splitlines()]
+    rows = [line.split() for line in printed(*command, input=lines, timeout=1200).splitlines()]
     return {path: dict(result.split("=") for result in results) for path, *results in rows}
 
 

@@ -3,12 +3,12 @@ of its own."""
 
 from __future__ import annotations
 
-import subprocess
 import sys
 
 import numpy as np
 import pytest
 from plants import clip_of
+from programs import printed
 
 import athcodec
 from athcodec.exporters import FORMATS
@@ -67,6 +67,4 @@ def test_exporting_more_frames_takes_no_more_memory_nor_does_reading_them(kind, 
 
 
 def _peak(program: str, *words: object) -> int:
-    command = [sys.executable, "-c", program, *map(str, words)]
-    done = subprocess.run(command, check=True, capture_output=True, text=True)
-    return int(done.stdout) * (1 if sys.platform == "darwin" else 1024)
+    return int(printed(sys.executable, "-c", program, *words)) * (1 if sys.platform == "darwin" else 1024)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import h5py
@@ -41,18 +42,6 @@ def moved(folder: Path, tmp_path: Path, name: str, others: str, absolute: bool) 
         text = text.replace(file.name, f"{away if absolute else '../away'}/{file.name}")
     (own / name).write_text(text, "utf-8")
     return own / name
-
-
-def xdmf(folder: Path, tmp_path: Path) -> Path:
-    return moved(folder, tmp_path, "tree.xdmf", "*.h5", absolute=False)
-
-
-def xdmf_absolute(folder: Path, tmp_path: Path) -> Path:
-    return moved(folder, tmp_path, "tree.xdmf", "*.h5", absolute=True)
-
-
-def pvd(folder: Path, tmp_path: Path) -> Path:
-    return moved(folder, tmp_path, "tree.pvd", "*.vtu", absolute=True)
 
 
 def usd(folder: Path, tmp_path: Path) -> Path:
@@ -104,8 +93,16 @@ def virtual(folder: Path, tmp_path: Path) -> Path:
     return own
 
 
-@pytest.mark.parametrize("maker", [xdmf, xdmf_absolute, pvd, usd, linked, stored_elsewhere, virtual])
-def test_files_elsewhere_are_read_only_where_that_is_allowed(maker: Callable, folder, tmp_path, capsys):
+MAKERS: dict[str, Callable[[Path, Path], Path]] = {
+    "xdmf": partial(moved, name="tree.xdmf", others="*.h5", absolute=False),
+    "xdmf, absolute": partial(moved, name="tree.xdmf", others="*.h5", absolute=True),
+    "pvd": partial(moved, name="tree.pvd", others="*.vtu", absolute=True),
+    **{maker.__name__: maker for maker in (usd, linked, stored_elsewhere, virtual)},
+}
+
+
+@pytest.mark.parametrize("maker", MAKERS.values(), ids=MAKERS)
+def test_files_elsewhere_are_read_only_where_that_is_allowed(maker, folder, tmp_path, capsys):
     path = maker(folder, tmp_path)
     with pytest.raises(ClipError, match="allow-outside"):
         athcodec.read(path)

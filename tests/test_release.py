@@ -20,6 +20,7 @@ from pathlib import Path
 
 import pytest
 from fuzz.targets import CORE
+from programs import printed
 from test_install import CONSUMER, said_of
 
 import athcodec
@@ -121,7 +122,5 @@ def test_a_library_for_another_machine_decodes_there_what_python_does_here(name,
     )
     shutil.copy(sample_ath, tmp_path / "sample.ath")
     environment = os.environ | {"WINEPREFIX": str(tmp_path / "wine"), "WINEDEBUG": "-all"}
-    done = subprocess.run(
-        [*machine.emulator, program, "sample.ath"], cwd=tmp_path, env=environment, capture_output=True, text=True
-    )
-    assert done.stdout.splitlines() == said_of(sample_ath).splitlines(), done.stderr
+    found = printed(*machine.emulator, program, "sample.ath", cwd=tmp_path, env=environment)
+    assert found.splitlines() == said_of(sample_ath).splitlines()

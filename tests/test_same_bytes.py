@@ -7,13 +7,13 @@ from __future__ import annotations
 import hashlib
 import os
 import platform
-import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 from moving_meshes import leafed_tree
 from plants import awkward, blown_tree, plant, tube
+from programs import printed
 
 import athcodec
 
@@ -58,9 +58,7 @@ CLIPS = {
 def made(path: Path, folder: Path, settings: dict[str, str], options: list[dict]) -> list[str]:
     """Checksums: of what NumPy computes under such settings, and of the files."""
     command = [sys.executable, "-c", PROGRAM, path, folder / "made.ath", *map(repr, options)]
-    done = subprocess.run(command, env=os.environ | settings, capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
-    return done.stdout.split()
+    return printed(*command, env=os.environ | settings).split()
 
 
 def source(name: str, folder: Path) -> Path:

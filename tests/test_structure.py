@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 import shutil
-import subprocess
 import sys
 import tomllib
 from fnmatch import fnmatch
@@ -12,6 +11,7 @@ from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 import pytest
+from programs import printed
 
 ROOT = Path(__file__).resolve().parent.parent
 DECODING = (
@@ -26,8 +26,7 @@ DECODING = (
 @pytest.mark.parametrize("module", DECODING)
 def test_decoding_imports_nothing_of_encoding(module):
     program = f"import sys, {module}; print([name for name in sys.modules if name.startswith('athcodec.encoding')])"
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == "[]"
+    assert printed(sys.executable, "-c", program).strip() == "[]"
 
 
 CORE = ROOT / "athcodec" / "core"
@@ -112,8 +111,7 @@ except SystemExit:
     heavy = {{"numpy", "h5py", "scipy", "rich", "zstandard"}}
     print("imported:", sorted(heavy & set(sys.modules)))
 """
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
-    assert done.stdout.splitlines()[-1] == "imported: []"
+    assert printed(sys.executable, "-c", program).splitlines()[-1] == "imported: []"
 
 
 def test_the_package_names_all_that_it_gives_before_any_of_it_is_imported():
@@ -123,8 +121,7 @@ assert set(athcodec.__all__) <= set(dir(athcodec)) and "numpy" not in sys.module
 assert athcodec.truncate is athcodec.truncate and callable(athcodec.truncate)
 print([name for name in athcodec.__all__ if getattr(athcodec, name, None) is None])
 """
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == "[]"
+    assert printed(sys.executable, "-c", program).strip() == "[]"
 
 
 def test_the_benchmark_imports_nothing_that_a_wheel_leaves_out():

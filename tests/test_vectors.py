@@ -4,11 +4,11 @@ WebAssembly decoder and the code of FORMAT.md; and the program that tests the de
 from __future__ import annotations
 
 import re
-import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+from programs import printed
 
 from athcodec import errors
 from athcodec.decoding import container
@@ -21,15 +21,7 @@ VECTORS = conformance.vectors()
 
 def run(*words, code: int = 0) -> str:
     """What the program prints."""
-    done = subprocess.run(
-        [sys.executable, "-m", "spec.conformance", *map(str, words)],
-        cwd=ROOT,
-        text=True,
-        capture_output=True,
-        timeout=120,
-    )
-    assert done.returncode == code, done.stdout + done.stderr
-    return done.stdout
+    return printed(sys.executable, "-m", "spec.conformance", *words, code=code, cwd=ROOT)
 
 
 # ---- the files ---------------------------------------------------------------------------------------------

@@ -1,7 +1,7 @@
 """The viewer: its page comes complete, from a server or as one file; plays from the first bytes on, shows the bits of
 every level, and says what is wrong with a file.
 
-Tests with the marker `browser` look at the page in Chromium (Debian: apt-get install chromium; pip install playwright).
+Tests with the marker `browser` look at the page in Chromium (Debian: apt-get install chromium; athcodec[browser]).
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from plants import bending_tube, clip_of
+from programs import printed
 
 import athcodec
 from athcodec import cli
@@ -175,14 +176,12 @@ def test_no_view_of_the_page_imports_another_or_does_anything_where_it_is_import
     script = f"""import {{ register }} from "node:module";
       register({json.dumps((ROOT / "tests" / "node" / "page_modules.mjs").as_uri())});
       for (const view of {json.dumps(views)}) await import({json.dumps(page.as_uri())} + `/${{view}}.js`);"""
-    done = subprocess.run(["node", "--input-type=module", "-e", script], capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
+    printed("node", "--input-type=module", "-e", script)
 
 
 @pytest.mark.programs
 def test_the_bundles_are_what_the_sources_make():
-    done = subprocess.run([sys.executable, str(VIEWER / "build_viewer.py"), "--check"], capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
+    printed(sys.executable, VIEWER / "build_viewer.py", "--check")
 
 
 PACKED = """
@@ -202,23 +201,16 @@ console.log(JSON.stringify(found));
 
 @pytest.mark.programs
 def test_the_npm_package_installs_from_its_tarball(tmp_path):
-    def npm(*words: str, cwd: Path) -> str:
-        done = subprocess.run(["npm", *words], cwd=cwd, capture_output=True, text=True)
-        assert done.returncode == 0, done.stderr
-        return done.stdout
-
-    tarball = npm("pack", "--silent", "--pack-destination", str(tmp_path), cwd=VIEWER).split()[-1]
+    tarball = printed("npm", "pack", "--silent", "--pack-destination", tmp_path, cwd=VIEWER).split()[-1]
     (tmp_path / "package.json").write_text('{"type": "module", "private": true}')
     packages = "three@0.187.0 typescript@5.9.3 @types/three @gltf-transform/core@4.5.1".split()
-    npm("install", "--silent", "--no-audit", "--no-fund", f"./{tarball}", *packages, cwd=tmp_path)
+    printed("npm", "install", "--silent", "--no-audit", "--no-fund", f"./{tarball}", *packages, cwd=tmp_path)
     (tmp_path / "use.mjs").write_text(PACKED)
-    done = subprocess.run(["node", "use.mjs"], cwd=tmp_path, capture_output=True, text=True)
     wanted = ["function", "function", True, "/x/ath_worker.js", "ATH_motion", "ATH_motion", "function"]
-    assert json.loads(done.stdout) == wanted, done.stderr
+    assert json.loads(printed("node", "use.mjs", cwd=tmp_path)) == wanted
     (tmp_path / "use.ts").write_text(TYPED)
     command = "npx tsc --noEmit --strict --target esnext --module esnext --moduleResolution bundler use.ts".split()
-    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
-    assert done.returncode == 0, done.stdout
+    printed(*command, cwd=tmp_path)
 
 
 TYPED = """

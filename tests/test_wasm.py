@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 from header import core
 from plants import awkward, clip_of, grow, plant, random_hierarchy
+from programs import printed
 from test_core import FILE_ORDER, OK, SOURCE_ORDER, Player, cut
 
 import athcodec
@@ -64,9 +65,7 @@ def run_node(tmp_path, script: str, *words):
         pytest.fail("node: got none on PATH, expected Node.js 18 or newer to test the WebAssembly decoder in")
     file = tmp_path / "script.mjs"
     file.write_text(SCRIPT % (json.dumps(MODULE.as_uri()), script), "utf-8")
-    done = subprocess.run([node, str(file), *map(str, words)], capture_output=True, text=True, timeout=120)
-    assert done.returncode == 0, done.stderr
-    return json.loads(done.stdout)
+    return json.loads(printed(node, file, *words))
 
 
 def digest(*arrays) -> str:

@@ -15,6 +15,7 @@ import time
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
+from functools import wraps
 from typing import Any
 
 import athcodec
@@ -41,6 +42,23 @@ Result = dict[str, Any]
 Report = Callable[[str, float], None]
 
 
+def _task(work: Callable[..., Result]) -> Callable[..., Result]:
+    """Make of `work` a task, which returns what goes wrong as its result."""
+
+    @wraps(work)
+    def task(item: Item, folder: str, *arguments: Any, **options: Any) -> Result:
+        try:
+            with suppress(FileExistsError):
+                os.mkdir(folder)  # the run's own is there as long as the run
+            return work(item, folder, *arguments, **options)
+        except Exception as error:
+            reason = one_line(error).replace(_local_path(item, folder), item.shown)
+            return {"failed": reason.replace(item.input, item.shown)}  # a URL may hold keys
+
+    return task
+
+
+@_task
 def begin(
     item: Item,
     folder: str,
@@ -53,32 +71,13 @@ def begin(
 ) -> Result:
     """A clip of up to `split` segments, encoded; the draft of a longer one. folder: the clip's own, in the scratch
     folder. known: the record of an output that is up to date unless the content of its input has changed."""
-    return _result(lambda: _begin(item, folder, split, verify, version, _reporter(item, topic), known), item, folder)
-
-
-def code(item: Item, folder: str, segments: Sequence[int]) -> Result:
-    """Some segments of a long clip."""
-    return _result(lambda: _code(item, folder, segments), item, folder)
-
-
-def finish(item: Item, folder: str, parts: Sequence[Result], *, verify: bool, topic: str | None = None) -> Result:
-    """The file of a long clip, from the results of `code`."""
-    failed = [part for part in parts if "failed" in part]
-    if failed:
-        return failed[0]
-    return _result(lambda: _finish(item, folder, parts, verify, _reporter(item, topic)), item, folder)
-
-
-def _begin(
-    item: Item, folder: str, split: int, verify: bool, version: str, report: Report, known: dict[str, Any] | None
-) -> Result:
     if version != athcodec.__version__:
         raise AthError(f"worker: has athcodec {athcodec.__version__}, expected {version} as where the run was started")
     start = time.perf_counter()
     path = os.path.join(folder, "draft")
     if os.path.exists(path):
         return {"draft": _unpickled(path)[0].segment_count}
-    source = _source(item, folder)
+    source, report = _source(item, folder), _reporter(item, topic)
     if known is not None and source.get("sha256") == known["source"].get("sha256"):
         return {"kept": True, "source": source}
     with _opened(item, folder, source) as clip, keeping(clip.inputs):
@@ -92,7 +91,9 @@ def _begin(
     return {"draft": draft.segment_count}
 
 
-def _code(item: Item, folder: str, segments: Sequence[int]) -> Result:
+@_task
+def code(item: Item, folder: str, segments: Sequence[int]) -> Result:
+    """Some segments of a long clip."""
     start = time.perf_counter()
     path = os.path.join(folder, f"segments_{segments[0]}")
     if os.path.exists(path):
@@ -103,11 +104,15 @@ def _code(item: Item, folder: str, segments: Sequence[int]) -> Result:
     return {"part": path, "seconds": time.perf_counter() - start}
 
 
-def _finish(item: Item, folder: str, parts: Sequence[Result], verify: bool, report: Report) -> Result:
+@_task
+def finish(item: Item, folder: str, parts: Sequence[Result], *, verify: bool, topic: str | None = None) -> Result:
+    """The file of a long clip, from the results of `code`."""
+    if failed := [part for part in parts if "failed" in part]:
+        return failed[0]
     start = time.perf_counter()
     draft, source, seconds = _unpickled(os.path.join(folder, "draft"))
     with _opened(item, folder, source) as clip:
-        summary = encoding.write(clip, draft, _coded(parts), _target(item, folder), progress=report)
+        summary = encoding.write(clip, draft, _coded(parts), _target(item, folder), progress=_reporter(item, topic))
         start -= seconds + sum(part["seconds"] for part in parts)
         return _done(item, source, summary, clip if verify else None, start)
 
@@ -221,17 +226,7 @@ def _coded(parts: Sequence[Result]) -> Iterator[CodedSegment]:
                 yield pickle.load(file)
 
 
-# ---- results and reports ----
-
-
-def _result(work: Callable[[], Result], item: Item, folder: str) -> Result:
-    try:
-        with suppress(FileExistsError):
-            os.mkdir(folder)  # the run's own is there as long as the run
-        return work()
-    except Exception as error:
-        reason = one_line(error).replace(_local_path(item, folder), item.shown)
-        return {"failed": reason.replace(item.input, item.shown)}  # a URL may hold keys
+# ---- errors and reports ----
 
 
 def one_line(error: BaseException) -> str:

@@ -10,7 +10,8 @@ import io
 import os
 import shutil
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -149,24 +150,32 @@ def _packages() -> Any:
     return Image
 
 
-def _drawn(path, kind, clip, size, fps, time, host_mesh, asked="") -> Iterator[bytes]:
-    """Each picture as PNG."""
+@contextmanager
+def chromium(flags: Sequence[str] = FLAGS) -> Iterator[Any]:
+    """Start a browser, Playwright's. Raises MissingExtra."""
+    _packages()
     from playwright.sync_api import sync_playwright
 
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=browser_path(), args=list(flags))
+        try:
+            yield browser
+        finally:
+            browser.close()
+
+
+def _drawn(path, kind, clip, size, fps, time, host_mesh, asked="") -> Iterator[bytes]:
+    """Each picture as PNG."""
     with open_ath(path, clip=clip, host_mesh=host_mesh) as decoder:
         playing = decoder.clip
         steps = max(playing.frame_count - 1, 1)
         seconds = playing.duration * ((steps + 1) / steps if playing.loop else 1)
     times = [time] if kind == "png" else [i / fps for i in range(max(1, round(seconds * fps)))]
-    with tempfile.TemporaryDirectory() as folder, sync_playwright() as playwright:
+    with tempfile.TemporaryDirectory() as folder, chromium() as browser:
         export_page(path, Path(folder) / "page.html", clip, host_mesh)
-        browser = playwright.chromium.launch(executable_path=browser_path(), args=FLAGS)
-        try:
-            page = browser.new_page(viewport={"width": size[0], "height": size[1]})
-            page.goto((Path(folder) / "page.html").as_uri() + asked)
-            page.wait_for_function(_WHOLE, timeout=_TIMEOUT)
-            page.evaluate(_ALONE)
-            for at in times:
-                yield base64.b64decode(page.evaluate(_DRAWN, at))
-        finally:
-            browser.close()
+        page = browser.new_page(viewport={"width": size[0], "height": size[1]})
+        page.goto((Path(folder) / "page.html").as_uri() + asked)
+        page.wait_for_function(_WHOLE, timeout=_TIMEOUT)
+        page.evaluate(_ALONE)
+        for at in times:
+            yield base64.b64decode(page.evaluate(_DRAWN, at))
