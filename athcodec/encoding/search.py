@@ -40,7 +40,7 @@ STEP_TRIALS, FIRST_LAYER_TRIALS = 12, 6  # Trials for which choices leave work: 
 SEARCHED_SHARE = 0.5  # Share of the bytes of motion at its first settings that a search usually comes down to.
 SHORT_SHARE = 0.75  # Share of the bytes at which short segments are taken.
 OWN_BASES_SHARE = 0.8  # Share of the bytes at which time bases of each level are taken, which layers cannot have.
-LEAST_TRIALS = 36  # Trials without which another reference pose is not tried.
+POSE_TRIALS = 24  # Trials that another reference pose takes, beside those of steps that it has to leave.
 
 Choose = Callable[[Settings, Trials], Settings]
 
@@ -300,9 +300,10 @@ class Search:
             return self
         if source.keeps_shape.any():  # The mean of what turns is smaller than what turns.
             return self
-        work = self.trials.work
+        work, tried = self.trials.work, (self.of_sample or self).trials
+        maps = 0.0 if tried.is_layered else 2 * work_of_steps(tried)
         with work.trying("mean pose"):
-            if not work.fits(LEAST_TRIALS * (self.of_sample or self).trials.work_of_trial):
+            if not work.fits((POSE_TRIALS + STEP_TRIALS) * tried.work_of_trial + maps):
                 return self
         work.add(LEARNING * self.trials.source.clip.vertex_count * self.trials.frames)
         other = self.about_mean_pose()
