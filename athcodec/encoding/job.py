@@ -30,6 +30,7 @@ from athcodec.encoding import polygons, streams, writing
 from athcodec.encoding import quantise as qz
 from athcodec.encoding.choices.levels import chosen_levels
 from athcodec.encoding.choices.prediction import (
+    USUAL_REST_RATIO,
     FoundPrediction,
     Way,
     best_prediction,
@@ -279,6 +280,7 @@ class EncodingJob:
     report: Progress = silent
     branches: Found | None = None
     spent: float = 0.0  # Work of finding branches.
+    way: Way | None = None  # How to predict motion, where trials of branches told.
     untried: tuple[str, ...] = ()  # What that left out.
 
     @classmethod
@@ -461,7 +463,7 @@ class EncodingJob:
             search.keep_work_of_maps()
         start = search.trials.start
         is_rigid = (start.rigid > start.layer).any()  # Also in the last layer.
-        prediction = None if is_rigid else self._best_prediction(bound, unsearched, work)
+        prediction = None if is_rigid else self._best_prediction(bound, unsearched, work, self._known_way)
         if prediction is not None and prediction.bytes < SEARCH_SAVES * unsearched:
             return self._predicted(prediction.choice)
         try:
@@ -479,7 +481,10 @@ class EncodingJob:
         return self._predicted(prediction.choice)
 
     def _with_one_layer(self) -> EncodingJob:
-        return dataclasses.replace(self, options=dataclasses.replace(self.options, ladder=()))
+        """Return the job of a clip whose levels move by series of their own, which prediction hardly suits."""
+        return dataclasses.replace(
+            self, options=dataclasses.replace(self.options, ladder=()), way=self.way or Way(USUAL_REST_RATIO)
+        )
 
     def _in_short_segments(self) -> EncodingJob:
         """Return the job in short segments unless their length is given."""
@@ -525,6 +530,10 @@ class EncodingJob:
         if is_out:
             return None
         return best_prediction(self._long_segments, bound, most_bytes, work, self.options.smoothness, way)
+
+    @property
+    def _known_way(self) -> Way | None:
+        return self.way if self.options.smoothness == "default" else None
 
     @property
     def _long_segments(self) -> Source:

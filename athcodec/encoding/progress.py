@@ -19,7 +19,7 @@ Progress = Callable[[str, float], None]
 READING = 0.2  # For a vertex in a frame that is read; formats differ.
 POSES = 20  # For a vertex whose poses are compared before anything is tried.
 SURVEY, MOTION = 0.11, 0.24  # For a vertex in a frame of the survey, and of a layer that is coded.
-ANALYSIS, PREDICTION = 0.09, 0.3  # For a vertex in a frame that is tried: transformed, predicted.
+ANALYSIS, PREDICTION = 0.09, 0.24  # For a vertex in a frame that is tried: transformed, predicted.
 MAPS = 0.008  # For a vertex in a frame at a level whose maps are tried.
 TURNS = 0.03  # For the same where stems turn with what carries them.
 TRIAL = 1000  # For a trial, however small.
@@ -35,7 +35,7 @@ FINDING = 60  # For a vertex whose branch is sought by motion.
 BRANCH_SHARE = 0.45  # Largest share of all work that finding branches takes.
 LEARNING = 0.2  # For a vertex in a frame from which modes are learned.
 LEAST_WORK, WORK = 3e6, 5.0  # An encoding may take so much, and so much more for each vertex in a frame.
-EFFORTS = {"fast": math.inf, "default": 1.2, "best": 8.0}  # Factors on it.
+EFFORTS = {"fast": math.inf, "default": 0.9, "best": 8.0}  # Factors on it.
 
 TRIALS = {"fast": 7, "default": 31, "best": 50}  # Trials that a search is expected to take as long as, by effort.
 LAYER_TRIALS = {"fast": 3, "default": 24, "best": 10}  # Trials that layers of precision take in addition.

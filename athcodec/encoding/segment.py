@@ -47,6 +47,7 @@ from athcodec.motion.polygons import Polygons
 FINER = 32  # Step of a layer over the step at which bases and modes are learned.
 REST_ROUNDS = 16  # Steps of a rest pose that are tried until one keeps the bound; the last is 1/28 of the first.
 ROWS_AT_ONCE = 1 << 14  # Rows of coefficients whose moments are added at once.
+LEAST_THREADED = 16 << 20  # Bytes of a segment from which a clip of one segment is coded by several threads.
 WORK_BYTES = 1 << 28  # Memory of the segments coded at once, unless `jobs` says how many.
 SAMPLED = 4000  # Number of vertices from which trials find corrections of a sample of them only.
 WELD_TOLERANCE = 1e-7  # Size of the cells, in diagonals, in which vertices share a place.
@@ -56,7 +57,10 @@ SEGMENT_WORK = 9  # Memory of a segment while it is coded, over its float32 posi
 
 
 def thread_count(jobs: int | None, source: Source) -> int:
-    """Return how many segments are coded at once: `jobs`, or one per core, at most 4 and within WORK_BYTES."""
+    """Return how many segments are coded at once: `jobs`, or one per core, at most 4 and within WORK_BYTES. Threads of
+    small clips would mostly wait for each other."""
+    if len(source.segments) == 1 and source.segment_bytes < LEAST_THREADED:
+        return jobs or 1
     fit = WORK_BYTES // (SEGMENT_WORK * source.segment_bytes)
     return jobs or max(1, min(default_jobs(), fit))
 

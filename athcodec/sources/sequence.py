@@ -292,7 +292,15 @@ def _fast_obj(data: bytes, mesh: Mesh) -> Callable[[bytes], np.ndarray | None]:
     if any(b"-" in line for line in elements if line.startswith(_ELEMENTS)):
         return lambda data: None  # relative numbers: which vertices they mean depends on the lines around them
 
+    tail = data[data.rfind(b"\nv ") + 1 :].partition(b"\n")[2]  # Usually all that is not a coordinate.
+
     def points(data: bytes) -> np.ndarray | None:
+        if tail and colors is None and data.endswith(tail):
+            rows = [line for line in data[: -len(tail)].splitlines() if not line.startswith(b"#")]
+            words = b" ".join(rows).split()
+            if len(words) == 4 * len(rows) and set(words[::4]) == {b"v"}:
+                del words[::4]
+                return np.array(list(map(float, words)), np.float64).reshape(-1, 3).astype(dtype)
         lines = obj_lines(data)
         if _obj_elements(lines) != elements:
             return None

@@ -34,6 +34,7 @@ from athcodec.options import SMOOTHNESS
 
 CUBES, LATTICE = False, True  # Positions are rounded to one of these.
 REST_STEPS = (1.15, 0.5, 0.25, 0.125)  # Steps of the rest pose, in bounds.
+USUAL_REST_RATIO = 0.5
 REST_TRIALS = 3  # Steps of the rest pose that are tried, those nearest to the error of the motion.
 STEPS = (0.999, 0.97, 0.9, 0.75, 0.5, 0.3)  # Steps tried, over the largest that reaches every point in the limit.
 TRIAL_SEGMENTS, TRIAL_FRAMES = 3, 64  # Segments of a trial, and frames of each that show whether it may pay.
@@ -125,7 +126,7 @@ def best_prediction(
     if only is not None:
         found = coded(only)
         return found if found.bytes < most_bytes else None
-    some = by_ratio(0.5)
+    some = by_ratio(USUAL_REST_RATIO)
     try:
         if sum(_begun(prelude_of(some), some, sample) for sample in samples) > TOO_MANY * most_bytes:
             return None
