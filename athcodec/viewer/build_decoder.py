@@ -36,6 +36,7 @@ SMALL = (
     "gpu.c",
     "join.c",
     "keep.c",
+    "maps.c",
     "mesh.c",
     "open.c",
     "plan.c",
