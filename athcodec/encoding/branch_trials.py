@@ -27,11 +27,8 @@ TRIAL_SHARE = 0.3  # Largest share of the work that is left that trying a candid
 LEAST_TRIALS = 8  # Trials of settings that tell which branches are better.
 
 
-def best_branches(
-    clip: MotionClip, option: BoundOption, work: Work, host_rest: bool = False
-) -> tuple[Found, Way | None]:
-    """Return the candidate that makes the smallest file of a few frames at the bound, of those that fit the work, and
-    the best way to predict motion if that was tried.
+def best_branches(clip: MotionClip, option: BoundOption, work: Work, host_rest: bool = False) -> Found:
+    """Return the candidate that makes the smallest file of a few frames at the bound, of those that fit the work.
     Predicted motion hardly depends on branches: if two candidates have it, no others are tried."""
     by_points = work.fits(FINDING * clip.vertex_count)
     proposals, trial = candidates(clip, by_points), _Trial(clip, option, host_rest, work)
@@ -40,7 +37,7 @@ def best_branches(
     work.add(finding)
     second = next(proposals, None) if work.fits(finding + 2 * trial.least_work) else None
     if second is None:
-        return best, None
+        return best
     for number, branches in enumerate(chain([best, second], proposals), start=1):
         size, is_predicted = trial.size(branches)
         predicted += is_predicted
@@ -51,9 +48,9 @@ def best_branches(
             if predicted == number or not work.fits(finding + trial.least_work):
                 break
     if best.stem_index is None or best.method != "motion" or not work.fits(trial.least_work):
-        return best, trial.way
+        return best
     unordered = dataclasses.replace(best, stem_index=None)  # The source's order of vertices costs no bytes.
-    return unordered if trial.size(unordered)[0] < least else best, trial.way
+    return unordered if trial.size(unordered)[0] < least else best
 
 
 class _Trial:
@@ -66,7 +63,7 @@ class _Trial:
         self._clip.rest_given = clip.rest_given
         self._frames_ratio = clip.frame_count / (stop - start)
         self._option, self._host_rest, self._work = option, host_rest, work
-        self.way: Way | None = None  # The best way to predict motion hardly depends on branches.
+        self._way: Way | None = None  # The best way to predict motion hardly depends on branches.
         self.least_work = LEAST_TRIALS * (TRIAL + ANALYSIS * clip.vertex_count * (stop - start))
 
     def size(self, branches: Found) -> tuple[float, bool]:
@@ -88,7 +85,7 @@ class _Trial:
             self._option = self._bound_of_target(job)
         with self._work.trying("branches", TRIAL_SHARE):
             bound = self._option.in_scene_units(source, job.file_size)
-            size, is_predicted, self.way = job.tried(bound, self._work, self._frames_ratio, self.way)
+            size, is_predicted, self._way = job.tried(bound, self._work, self._frames_ratio, self._way)
             return size, is_predicted
 
     def _bound_of_target(self, job: EncodingJob) -> BoundOption:

@@ -175,10 +175,10 @@ def _begin(
         )
         work.expected = BRANCH_SHARE * allowed_work(clip.vertex_count, clip.frame_count, "default")
         with work.trying("branches"):
-            branches, way = best_branches(grown, option, work, options.host_rest)
+            branches = best_branches(grown, option, work, options.host_rest)
     job = EncodingJob.begin(clip, grown, branches, options, report)
     if branches is not None:
-        job.spent, job.way, job.untried = work.done, way, tuple(set(work.untried) & {"branches"})
+        job.spent, job.untried = work.done, tuple(set(work.untried) & {"branches"})
     attempts = itertools.count(1)
 
     def file_size(bound: float) -> float:

@@ -280,7 +280,7 @@ class EncodingJob:
     report: Progress = silent
     branches: Found | None = None
     spent: float = 0.0  # Work of finding branches.
-    way: Way | None = None  # How to predict motion, where trials of branches told.
+    way: Way | None = None  # The only way to predict motion that is tried; None: all are.
     untried: tuple[str, ...] = ()  # What that left out.
 
     @classmethod
@@ -463,7 +463,7 @@ class EncodingJob:
             search.keep_work_of_maps()
         start = search.trials.start
         is_rigid = (start.rigid > start.layer).any()  # Also in the last layer.
-        prediction = None if is_rigid else self._best_prediction(bound, unsearched, work, self._known_way)
+        prediction = None if is_rigid else self._best_prediction(bound, unsearched, work, self.way)
         if prediction is not None and prediction.bytes < SEARCH_SAVES * unsearched:
             return self._predicted(prediction.choice)
         try:
@@ -483,7 +483,7 @@ class EncodingJob:
     def _with_one_layer(self) -> EncodingJob:
         """Return the job of a clip whose levels move by series of their own, which prediction hardly suits."""
         return dataclasses.replace(
-            self, options=dataclasses.replace(self.options, ladder=()), way=self.way or Way(USUAL_REST_RATIO)
+            self, options=dataclasses.replace(self.options, ladder=()), way=Way(USUAL_REST_RATIO)
         )
 
     def _in_short_segments(self) -> EncodingJob:
@@ -530,10 +530,6 @@ class EncodingJob:
         if is_out:
             return None
         return best_prediction(self._long_segments, bound, most_bytes, work, self.options.smoothness, way)
-
-    @property
-    def _known_way(self) -> Way | None:
-        return self.way if self.options.smoothness == "default" else None
 
     @property
     def _long_segments(self) -> Source:
