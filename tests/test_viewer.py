@@ -861,7 +861,7 @@ def test_the_intact_levels_of_a_damaged_file_play(opened_file, sample_ath):
     assert "damaged" in page.inner_text("#trouble")
     page.wait_for_function("() => athcodecViewer.counters.pictures > 20")
     assert page.evaluate("athcodecViewer.motion.level") >= 1
-    assert page.is_visible("#trouble")  # as long as the file is open
+    assert page.is_visible("#trouble")  # It stays as long as the file is open.
 
 
 @browser_test

@@ -33,7 +33,7 @@ from athcodec.decoding import container
 from athcodec.errors import LimitExceeded
 from athcodec.motion.polygons import Polygons, type_of
 
-ALIGNMENT = 64  # a cache line
+ALIGNMENT = 64  # Bytes of a cache line.
 MOST_STEPS = 2**31 - 1
 KEPT_SHARE = 2  # A segment keeps at most 1 / KEPT_SHARE of its memory for a deeper level; a hundredth is usual.
 FAULT_TEXT = 256

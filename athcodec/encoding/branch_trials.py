@@ -81,11 +81,12 @@ class _Trial:
             host_rest=host_rest,
         )
         job = EncodingJob(source, EncodingOptions(attributes="none", lossless=lossless))
+        job.way = self._way
         if self._option.target_size is not None:
             self._option = self._bound_of_target(job)
         with self._work.trying("branches", TRIAL_SHARE):
             bound = self._option.in_scene_units(source, job.file_size)
-            size, is_predicted, self._way = job.tried(bound, self._work, self._frames_ratio, self._way)
+            size, is_predicted, self._way = job.tried(bound, self._work, self._frames_ratio)
             return size, is_predicted
 
     def _bound_of_target(self, job: EncodingJob) -> BoundOption:

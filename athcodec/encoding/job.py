@@ -400,30 +400,28 @@ class EncodingJob:
             low, high = (bound, high) if self.file_size(bound) == math.inf else (low, bound)
         return high
 
-    def tried(
-        self, bound: float, work: Work, frames_ratio: float, way: Way | None = None
-    ) -> tuple[float, bool, Way | None]:
+    def tried(self, bound: float, work: Work, frames_ratio: float) -> tuple[float, bool, Way | None]:
         """Return about the bytes of a file of so many times the frames, as far as the work allowed tells, whether its
-        motion is predicted, and the best way of that, unless one is given; infinite if the bound cannot be kept."""
-        return self._holding(bound)._tried(bound, work, frames_ratio, way)
+        motion is predicted, and the best way of that as far as it is known; infinite if the bound cannot be kept."""
+        return self._holding(bound)._tried(bound, work, frames_ratio)
 
-    def _tried(self, bound: float, work: Work, frames_ratio: float, way: Way | None) -> tuple[float, bool, Way | None]:
+    def _tried(self, bound: float, work: Work, frames_ratio: float) -> tuple[float, bool, Way | None]:
         try:
             self._check(bound)
             if self.source.still:
-                return self.decide(bound).shared_bytes, False, None
+                return self.decide(bound).shared_bytes, False, self.way
             ath = self.seen.ath(self.thresholds(bound))
             search = Search.of(self.source, ath, bound, self.options.effort, work, self.options.jobs)
             unsearched = search.first_cost()
-            prediction = self._best_prediction(bound, unsearched, work, way)
+            prediction = self._best_prediction(bound, unsearched, work)
             if prediction is None:  # First settings rank branches as the work that is left for a search hardly does.
-                return search.expected(frames_ratio), False, way
+                return search.expected(frames_ratio), False, self.way
             predicted = frames_ratio * prediction.bytes, True, prediction.way
             if prediction.bytes < SEARCH_SAVES * unsearched:
                 return predicted
             return min((search.tried(frames_ratio), False, prediction.way), predicted)
         except BoundError:
-            return math.inf, False, way
+            return math.inf, False, self.way
 
     def decide(self, bound: float) -> _Decided:
         """Search for settings."""
@@ -463,7 +461,7 @@ class EncodingJob:
             search.keep_work_of_maps()
         start = search.trials.start
         is_rigid = (start.rigid > start.layer).any()  # Also in the last layer.
-        prediction = None if is_rigid else self._best_prediction(bound, unsearched, work, self.way)
+        prediction = None if is_rigid else self._best_prediction(bound, unsearched, work)
         if prediction is not None and prediction.bytes < SEARCH_SAVES * unsearched:
             return self._predicted(prediction.choice)
         try:
@@ -522,14 +520,12 @@ class EncodingJob:
         search = Search.of(self.source, ath, bound, self.options.effort, work, self.options.jobs)
         return self._best_of(search, *search.decide())
 
-    def _best_prediction(
-        self, bound: float, most_bytes: float, work: Work, way: Way | None = None
-    ) -> FoundPrediction | None:
+    def _best_prediction(self, bound: float, most_bytes: float, work: Work) -> FoundPrediction | None:
         """Return the best prediction; None: it is too large, or a hierarchy of maps is asked for, which it lacks."""
         is_out = self.options.tam or Feature.PREDICTED in self.options.without
         if is_out:
             return None
-        return best_prediction(self._long_segments, bound, most_bytes, work, self.options.smoothness, way)
+        return best_prediction(self._long_segments, bound, most_bytes, work, self.options.smoothness, self.way)
 
     @property
     def _long_segments(self) -> Source:

@@ -283,12 +283,12 @@ def obj_points(rows: Sequence[Sequence[bytes]], dtype: object = None) -> tuple[n
         )
     width = len(rows[0])
     if width not in (6, 7) or any(len(row) != width for row in rows):
-        return _narrowed(points, dtype), None
+        return narrowed(points, dtype), None
     colors = np.array([float(word) for row in rows for word in row[3:]], np.float32)
-    return _narrowed(points, dtype), colors.reshape(len(rows), -1)
+    return narrowed(points, dtype), colors.reshape(len(rows), -1)
 
 
-def _narrowed(points: np.ndarray, dtype: object) -> np.ndarray:
+def narrowed(points: np.ndarray, dtype: object) -> np.ndarray:
     with np.errstate(over="ignore"):
         return points.astype(dtype)
 

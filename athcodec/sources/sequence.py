@@ -32,6 +32,7 @@ from athcodec.sources.mesh import (
     NAMED,
     POSITION_COLUMNS,
     Mesh,
+    narrowed,
     obj_lines,
     obj_points,
     parse_mesh,
@@ -300,7 +301,7 @@ def _fast_obj(data: bytes, mesh: Mesh) -> Callable[[bytes], np.ndarray | None]:
             words = b" ".join(rows).split()
             if len(words) == 4 * len(rows) and set(words[::4]) == {b"v"}:
                 del words[::4]
-                return np.array(list(map(float, words)), np.float64).reshape(-1, 3).astype(dtype)
+                return narrowed(np.array(list(map(float, words)), np.float64).reshape(-1, 3), dtype)
         lines = obj_lines(data)
         if _obj_elements(lines) != elements:
             return None
