@@ -263,13 +263,9 @@ class Search:
         """Return the settings of the first layer: the best ones if that is the only layer."""
         if not self.trials.is_layered:
             return self.best
-        choices = [rotations.best_rotations, learned_pieces.best_pieces]
-        first = replace(self.best.coarser(self.ratios[0]), learned_pieces=None)
-        if not first.turn_step:  # Else turns are as fine as those of refinements, which have that basis.
-            first = first.in_waves()
-            has_room = self._share_beside(FIRST_LAYER_TRIALS) > 0.5
-            choices.insert(int(has_room), learned_bases.best_bases)  # Bases save more than rotations.
-        return self._after([*([] if self.effort == "fast" else choices), best_node_steps], first)
+        choices = [] if self.effort == "fast" else [rotations.best_rotations, learned_pieces.best_pieces]
+        first = replace(self.best.coarser(self.ratios[0]), learned_pieces=None)  # Layers share a learned time basis.
+        return self._after([*choices, best_node_steps], first)
 
     def refinements(self) -> Iterator[Settings]:
         """Yield settings that may suit refinements, each of which has one stream: with rotations and without."""

@@ -11,6 +11,7 @@ import numpy as np
 from athcodec.encoding import quantise as qz
 from athcodec.encoding import streams
 from athcodec.encoding.features import Feature
+from athcodec.encoding.progress import START
 from athcodec.encoding.sample import sample_plant
 from athcodec.encoding.segment import Source, branch_records, poses_size
 from athcodec.encoding.settings import Settings
@@ -79,8 +80,11 @@ def connected_if_smaller(source: Source, ath: Ath, settings: Settings) -> Settin
 
 def with_slack(source: Source, ath: Ath, settings: Settings, slack: float) -> Settings:
     """Return the settings with a rest pose that may be off by a distance, at the coarsest step that allows it."""
-    rest_step = qz.single(0.9999 * qz.LATTICE_REST_CAP * slack)
-    return with_best_rest(source, ath, replace(settings, rest_step=rest_step, rest_slack=slack))
+    return with_best_rest(source, ath, _slack(settings, slack))
+
+
+def _slack(settings: Settings, slack: float) -> Settings:
+    return replace(settings, rest_step=qz.single(0.9999 * qz.LATTICE_REST_CAP * slack), rest_slack=slack)
 
 
 def best_slack(settings: Settings, trials: Trials) -> Settings:
@@ -91,8 +95,12 @@ def best_slack(settings: Settings, trials: Trials) -> Settings:
         return settings
     if trials.prelude_bytes(settings) < REST_SHARE * trials.cost(settings):
         return settings
-    looser = (with_slack(source, trials.ath, settings, part * limit) for part in REST_SLACKS)
-    return trials.cheapest([settings, *looser])
+    best = trials.cheapest([settings, *(_slack(settings, part * limit) for part in REST_SLACKS)])
+    work = START * source.clip.vertex_count
+    if best is settings or not trials.work.fits(work + trials.work_of_trial):
+        return best
+    trials.work.add(work)
+    return trials.cheapest([best, with_best_rest(source, trials.ath, best)])
 
 
 def _other_lags(source: Source, settings: Settings) -> list[Settings]:
