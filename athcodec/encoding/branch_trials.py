@@ -9,7 +9,6 @@ from itertools import chain
 import numpy as np
 
 from athcodec.encoding.bounds import BoundOption
-from athcodec.encoding.choices.prediction import Way
 from athcodec.encoding.job import EncodingJob, EncodingOptions
 from athcodec.encoding.progress import ANALYSIS, FINDING, SURVEY, TRIAL, Work
 from athcodec.encoding.segment import Source
@@ -63,7 +62,6 @@ class _Trial:
         self._clip.rest_given = clip.rest_given
         self._frames_ratio = clip.frame_count / (stop - start)
         self._option, self._host_rest, self._work = option, host_rest, work
-        self._way: Way | None = None  # The best way to predict motion hardly depends on branches.
         self.least_work = LEAST_TRIALS * (TRIAL + ANALYSIS * clip.vertex_count * (stop - start))
 
     def size(self, branches: Found) -> tuple[float, bool]:
@@ -80,14 +78,12 @@ class _Trial:
             exact_rest=lossless or host_rest,
             host_rest=host_rest,
         )
-        job = EncodingJob(source, EncodingOptions(attributes="none", lossless=lossless))
-        job.way = self._way
+        job = EncodingJob(source, EncodingOptions(attributes="none", lossless=lossless), predicts_as_usual=True)
         if self._option.target_size is not None:
             self._option = self._bound_of_target(job)
         with self._work.trying("branches", TRIAL_SHARE):
             bound = self._option.in_scene_units(source, job.file_size)
-            size, is_predicted, self._way = job.tried(bound, self._work, self._frames_ratio)
-            return size, is_predicted
+            return job.tried(bound, self._work, self._frames_ratio)
 
     def _bound_of_target(self, job: EncodingJob) -> BoundOption:
         """Return the bound at which the branches tried first meet the target size; all are tried at it."""

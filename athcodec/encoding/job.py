@@ -29,14 +29,7 @@ from athcodec.decoding.decoder import Decoder
 from athcodec.encoding import polygons, streams, writing
 from athcodec.encoding import quantise as qz
 from athcodec.encoding.choices.levels import chosen_levels
-from athcodec.encoding.choices.prediction import (
-    USUAL_REST_RATIO,
-    FoundPrediction,
-    Way,
-    best_prediction,
-    code_predicted_segment,
-    one_map_each,
-)
+from athcodec.encoding.choices.prediction import FoundPrediction, best_prediction, code_predicted_segment, one_map_each
 from athcodec.encoding.features import Feature
 from athcodec.encoding.layers import (
     MOST_LAYERS,
@@ -280,7 +273,7 @@ class EncodingJob:
     report: Progress = silent
     branches: Found | None = None
     spent: float = 0.0  # Work of finding branches.
-    way: Way | None = None  # The only way to predict motion that is tried; None: all are.
+    predicts_as_usual: bool = False  # Whether no other way to predict motion is tried.
     untried: tuple[str, ...] = ()  # What that left out.
 
     @classmethod
@@ -400,28 +393,28 @@ class EncodingJob:
             low, high = (bound, high) if self.file_size(bound) == math.inf else (low, bound)
         return high
 
-    def tried(self, bound: float, work: Work, frames_ratio: float) -> tuple[float, bool, Way | None]:
-        """Return about the bytes of a file of so many times the frames, as far as the work allowed tells, whether its
-        motion is predicted, and the best way of that as far as it is known; infinite if the bound cannot be kept."""
+    def tried(self, bound: float, work: Work, frames_ratio: float) -> tuple[float, bool]:
+        """Return about the bytes of a file of so many times the frames, as far as the work allowed tells, and whether
+        its motion is predicted; infinite if the bound cannot be kept."""
         return self._holding(bound)._tried(bound, work, frames_ratio)
 
-    def _tried(self, bound: float, work: Work, frames_ratio: float) -> tuple[float, bool, Way | None]:
+    def _tried(self, bound: float, work: Work, frames_ratio: float) -> tuple[float, bool]:
         try:
             self._check(bound)
             if self.source.still:
-                return self.decide(bound).shared_bytes, False, self.way
+                return self.decide(bound).shared_bytes, False
             ath = self.seen.ath(self.thresholds(bound))
             search = Search.of(self.source, ath, bound, self.options.effort, work, self.options.jobs)
             unsearched = search.first_cost()
             prediction = self._best_prediction(bound, unsearched, work)
             if prediction is None:  # First settings rank branches as the work that is left for a search hardly does.
-                return search.expected(frames_ratio), False, self.way
-            predicted = frames_ratio * prediction.bytes, True, prediction.way
+                return search.expected(frames_ratio), False
+            predicted = frames_ratio * prediction.bytes, True
             if prediction.bytes < SEARCH_SAVES * unsearched:
                 return predicted
-            return min((search.tried(frames_ratio), False, prediction.way), predicted)
+            return min((search.tried(frames_ratio), False), predicted)
         except BoundError:
-            return math.inf, False, self.way
+            return math.inf, False
 
     def decide(self, bound: float) -> _Decided:
         """Search for settings."""
@@ -480,9 +473,7 @@ class EncodingJob:
 
     def _with_one_layer(self) -> EncodingJob:
         """Return the job of a clip whose levels move by series of their own, which prediction hardly suits."""
-        return dataclasses.replace(
-            self, options=dataclasses.replace(self.options, ladder=()), way=Way(USUAL_REST_RATIO)
-        )
+        return dataclasses.replace(self, options=dataclasses.replace(self.options, ladder=()), predicts_as_usual=True)
 
     def _in_short_segments(self) -> EncodingJob:
         """Return the job in short segments unless their length is given."""
@@ -525,7 +516,9 @@ class EncodingJob:
         is_out = self.options.tam or Feature.PREDICTED in self.options.without
         if is_out:
             return None
-        return best_prediction(self._long_segments, bound, most_bytes, work, self.options.smoothness, self.way)
+        return best_prediction(
+            self._long_segments, bound, most_bytes, work, self.options.smoothness, self.predicts_as_usual
+        )
 
     @property
     def _long_segments(self) -> Source:

@@ -218,15 +218,13 @@ class Search:
         choices: list[Choose] = [
             best_freedom,
             rotations.still_if_smaller,
+            learned_bases.best_bases,  # They may save most.
             forms.best_forms,
             rotations.best_rotations,
             learned_bases.best_bases,
             forms.best_forms_again,
             learned_pieces.best_pieces_in_any_basis,
         ]
-        work = self.trials.work
-        if work.allowed - work.done < expected_trials(self.effort, False, False) * self.trials.work_of_trial:
-            choices.insert(2, learned_bases.best_bases)  # Time bases may save most; again where work is left.
         with self.trials.work.trying("steps", self._share_beside(STEP_TRIALS)):
             return self._after([best_level_steps, *choices, learned_bases.best_waves], self.trials.start)
 

@@ -82,10 +82,10 @@ class FoundPrediction:
 
 
 def best_prediction(
-    source: Source, bound: float, most_bytes: float, work: Work, smoothness: str = "default", only: Way | None = None
+    source: Source, bound: float, most_bytes: float, work: Work, smoothness: str = "default", usual: bool = False
 ) -> FoundPrediction | None:
-    """Return the best prediction, in one way only if that is known; None: it takes more than `most_bytes`, or cannot
-    keep the bound."""
+    """Return the best prediction; None: it takes more than `most_bytes`, or cannot keep the bound. usual: the usual way
+    alone is tried."""
     ath = one_map_each(source.seen)
     limit = source.rest_limit(source.smallest_bound(bound))
     by_ratio = cache(lambda ratio: _settings(source, ath, bound, ratio * limit))
@@ -123,8 +123,8 @@ def best_prediction(
             return found
         return min(found, coded(found.way._replace(lattice=LATTICE)), key=lambda one: one.bytes)
 
-    if only is not None:
-        found = coded(only)
+    if usual:
+        found = coded(Way(USUAL_REST_RATIO))
         return found if found.bytes < most_bytes else None
     some = by_ratio(USUAL_REST_RATIO)
     try:
