@@ -9,46 +9,14 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Sequence
+from importlib import import_module
 from pathlib import Path
 
-from bench import (
-    data,
-    decode,
-    features,
-    gallery,
-    levels,
-    memory,
-    picture,
-    progressive,
-    rd,
-    report,
-    sample,
-    sizes,
-    smoothness,
-    speed,
-    tables,
-    viewer,
-    wrappings,
-)
+from bench import tables
 
-VERBS = {
-    "data": data,
-    "rd": rd,
-    "report": report,
-    "sample": sample,
-    "sizes": sizes,
-    "features": features,
-    "levels": levels,
-    "progressive": progressive,
-    "speed": speed,
-    "memory": memory,
-    "decode": decode,
-    "picture": picture,
-    "viewer": viewer,
-    "gallery": gallery,
-    "smoothness": smoothness,
-    "wrappings": wrappings,
-}
+_NAMES = """data rd report sample sizes features levels progressive speed memory decode picture viewer gallery
+smoothness wrappings"""
+VERBS = {name: import_module(f"bench.{name}") for name in _NAMES.split()}
 
 
 def main(argv: Sequence[str]) -> int:
