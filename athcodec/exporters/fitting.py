@@ -112,7 +112,7 @@ class Placed:
         scale = self._scale  # The scale of the frame before is a close first guess.
         safe = np.where(self._flat, 1.0, self._spread)
         for _ in range(ROUNDS):
-            rotation = _proper(cross * scale[:, None, :] + self._held * self._axes)
+            rotation = nearest_rotations(cross * scale[:, None, :] + self._held * self._axes)
             reached = np.einsum("kij,kij->kj", rotation, cross) / safe
             better = np.where(self._flat, 1.0, np.maximum(reached, SMALLEST_SCALE))
             done = np.abs(better - scale).max() < CONVERGED
@@ -246,8 +246,8 @@ def _joined(done: list, order: np.ndarray, rest: np.ndarray) -> Moving:
     return Moving(Parts.over(order, first[by_place], count[by_place], rest), places, values)
 
 
-def _proper(matrices: np.ndarray) -> np.ndarray:
-    """The rotations nearest to matrices (K, 3, 3)."""
+def nearest_rotations(matrices: np.ndarray) -> np.ndarray:
+    """The rotations nearest to matrices (..., 3, 3)."""
     u, _, v = np.linalg.svd(matrices)
-    u[:, :, 2] *= np.sign(np.linalg.det(u @ v))[:, None]
+    u[..., 2] *= np.sign(np.linalg.det(u @ v))[..., None]
     return u @ v

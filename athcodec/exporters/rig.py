@@ -21,7 +21,7 @@ import numpy as np
 
 from athcodec.decoding.clip_view import ClipView
 from athcodec.exporters import Progress
-from athcodec.exporters.fitting import allowed_error, portions
+from athcodec.exporters.fitting import allowed_error, nearest_rotations, portions
 from athcodec.exporters.gltf_joints import Joints
 from athcodec.exporters.scene_objects import distinct
 from athcodec.motion.branches.finding import find_branches
@@ -229,16 +229,9 @@ class _Bones:
         products = wanted[:, :, :, None] * local[:, None, :]
         cross = np.add.reduceat(products, starts, axis=1)
         held = HELD * np.add.reduceat((local**2).sum(axis=1), starts)[:, None, None] * np.eye(3) + 1e-30 * np.eye(3)
-        found = _proper(cross + held)
+        found = nearest_rotations(cross + held)
         turn[:, bones] = found
         shift[:, bones] = aim - np.einsum("tkij,kj->tki", found, middle)
-
-
-def _proper(matrices: np.ndarray) -> np.ndarray:
-    """The rotations nearest to matrices (..., 3, 3)."""
-    u, _, v = np.linalg.svd(matrices)
-    u[..., 2] *= np.sign(np.linalg.det(u @ v))[..., None]
-    return u @ v
 
 
 def _posed(motion: Any, bones: _Bones, order: np.ndarray, report: Progress) -> Joints:

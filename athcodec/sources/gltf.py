@@ -23,7 +23,7 @@ import numpy as np
 
 from athcodec.errors import ClipError
 from athcodec.files.gltf.document import DRACO, UNPACKED_BY, GltfFile
-from athcodec.files.gltf.json import BROKEN, brief, entries, entry, indices, integer
+from athcodec.files.gltf.json import BROKEN, brief, entries, entry, extension, indices, integer
 from athcodec.files.gltf.motion import EXTENSION, extension_of
 from athcodec.files.gltf.primitives import corners, rows_of
 from athcodec.files.plain import FilePath
@@ -378,21 +378,15 @@ def _nodes(scene: Scene, index: int, mesh: dict, name: str) -> list[GltfNode]:
     return found
 
 
-def _extension(item: dict, name: str) -> dict | None:
-    """None where it has not got it."""
-    extensions = item.get("extensions")
-    return entry(extensions, name) if isinstance(extensions, dict) and name in extensions else None
-
-
 def _copies(scene: Scene, index: int) -> tuple[np.ndarray | None, dict[str, np.ndarray]]:
     """(k, 4, 4) from each instance of EXT_mesh_gpu_instancing to its node, None without; and what each copy of a shape
     has, (k, width) by attribute."""
-    extension = _extension(scene.nodes[index], INSTANCING)
-    if extension is None:
+    instancing = extension(scene.nodes[index], INSTANCING)
+    if instancing is None:
         return None, _own_extras(scene, index)
     if scene.nodes[index].get("skin") is not None:
         raise ClipError(f"node {index}: got {INSTANCING} of a mesh with a skin, expected one without")
-    own = entry(extension, "attributes")
+    own = entry(instancing, "attributes")
     for name in own:
         scene.file.budget.take(INSTANCE_BYTES * scene.file.count(integer(own, name)), f"node {index}")
     parts = {name: scene.file.floats(integer(own, name)).astype(np.float64) for name in INSTANCE_PARTS if name in own}
@@ -452,14 +446,14 @@ def _not_read(scene: Scene, nodes: Sequence[GltfNode]) -> dict[str, list[str]]:
             if item != TWO_SIDES and (kind != "scene" or number != file.json.get("scene", 0)):
                 add(kind, number, item)
     for index in scene.order:
-        if _extension(scene.nodes[index], "KHR_lights_punctual") is not None:
+        if extension(scene.nodes[index], "KHR_lights_punctual") is not None:
             add("Light", index, scene.nodes[index])
         if scene.nodes[index].get("mesh") is not None and scene.is_hidden(index):
             add("hidden", index, scene.nodes[index])
     for node in nodes:
         if node.is_flipped and node.kind == "mesh":
             found.setdefault(FLIPPED, []).append(node.name)
-        instancing = _extension(scene.nodes[node.index], INSTANCING)
+        instancing = extension(scene.nodes[node.index], INSTANCING)
         own = () if instancing is None else entry(instancing, "attributes")
         left = [key for key in node.attributes if not key.startswith(("_", "JOINTS_", "WEIGHTS_")) and key not in TAKEN]
         left += [key for key in own if key not in INSTANCE_PARTS and not key.startswith("_")]

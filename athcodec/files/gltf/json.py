@@ -21,6 +21,12 @@ def entry(holder: Mapping, key: str) -> dict:
     return value
 
 
+def extension(holder: Mapping, name: str) -> dict | None:
+    """Return the object of an extension of a part of the file, or None. Raises ClipError."""
+    extensions = holder.get("extensions")
+    return entry(extensions, name) if isinstance(extensions, dict) and name in extensions else None
+
+
 def entries(holder: Mapping, key: str) -> list[dict]:
     """Return the array of objects `key`, empty if there is none. Raises ClipError."""
     return _array(holder, key, lambda value: isinstance(value, dict), "objects")

@@ -15,7 +15,7 @@ import numpy as np
 
 from athcodec.errors import ClipError
 from athcodec.files.gltf.document import GltfFile
-from athcodec.files.gltf.json import BROKEN, brief, entries, entry, integer
+from athcodec.files.gltf.json import BROKEN, brief, entries, entry, extension, integer
 from athcodec.files.gltf.primitives import triangles
 from athcodec.files.plain import FilePath, open_plain
 from athcodec.files.reading import closing_on_failure, naming
@@ -29,8 +29,7 @@ GltfPlace = tuple[dict, np.ndarray]
 
 def extension_of(holder: dict) -> dict | None:
     """Return the extension object of a part of the file, or None. Raises ClipError."""
-    extensions = holder.get("extensions")
-    return entry(extensions, EXTENSION) if isinstance(extensions, dict) and EXTENSION in extensions else None
+    return extension(holder, EXTENSION)
 
 
 def motion_names(gltf: dict) -> list[str]:
