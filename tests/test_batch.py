@@ -56,6 +56,11 @@ def clips(tmp_path):
     return folder
 
 
+@pytest.fixture
+def out(tmp_path):
+    return tmp_path / "out"
+
+
 def alone(path: Path, folder: Path, **options) -> bytes:
     with athcodec.read(path) as clip:
         return athcodec.encode(clip, folder / "alone.ath", **options).path.read_bytes()
@@ -83,8 +88,7 @@ def leftovers(out: Path) -> list[Path]:
 # ---- what comes out ----
 
 
-def test_files_are_those_that_encode_writes_also_of_clips_that_workers_share(clips, tmp_path, cluster):
-    out = tmp_path / "out"
+def test_files_are_those_that_encode_writes_also_of_clips_that_workers_share(clips, tmp_path, cluster, out):
     items = batch.find([clips], out, settings=FAST)
     outcome = batch.run(items, out, scheduler=cluster, split=3, verify=True)
     assert len(outcome.done) == 4 and not outcome.failed and not leftovers(out)
@@ -143,8 +147,7 @@ def test_a_blend_that_is_too_long_for_a_clip_is_reported(clips, tmp_path, cluste
     assert "loop: got 7 frames to blend, expected 0 to 6" in capsys.readouterr().err
 
 
-def test_a_line_of_the_manifest_says_what_was_made_of_what(clips, tmp_path, cluster):
-    out = tmp_path / "out"
+def test_a_line_of_the_manifest_says_what_was_made_of_what(clips, cluster, out):
     items = batch.find([clips / "a.h5"], out, settings=FAST)
     batch.run(items, out, scheduler=cluster)
     [line] = lines(out)
@@ -171,8 +174,7 @@ def test_what_is_not_read_of_a_clip_is_in_its_line_and_said(tmp_path, cluster, c
     assert "a.obj: curve or surface curv" in capsys.readouterr().err
 
 
-def test_a_second_run_does_only_what_is_not_as_it_should_be(clips, tmp_path, cluster):
-    out = tmp_path / "out"
+def test_a_second_run_does_only_what_is_not_as_it_should_be(clips, tmp_path, cluster, out):
     items = batch.find([clips], out, settings=FAST)
     batch.run(items, out, scheduler=cluster)
     before = (out / runs.MANIFEST).read_bytes()
@@ -238,8 +240,7 @@ def test_a_file_that_is_no_manifest_is_refused_and_left_alone(content, tmp_path)
     assert path.read_bytes() == content
 
 
-def test_two_runs_on_one_manifest_are_refused(clips, tmp_path, capsys):
-    out = tmp_path / "out"
+def test_two_runs_on_one_manifest_are_refused(clips, capsys, out):
     out.mkdir()
     with Manifest(out / runs.MANIFEST):
         assert cli.main(["batch", str(clips), "--out", str(out)]) == 1
@@ -297,10 +298,9 @@ def test_inputs_can_come_from_a_list(clips, tmp_path, monkeypatch, capsys):
     assert [entry["input"] for entry in found] == [f"{clips}/a.h5", f"{clips}/b.h5"]
 
 
-def test_file_names_that_are_not_utf8_are_encoded_and_recognised(clips, tmp_path, cluster):
+def test_file_names_that_are_not_utf8_are_encoded_and_recognised(clips, cluster, out):
     name = os.fsdecode(b"b\xe4um.h5")
     (clips / "a.h5").rename(clips / name)
-    out = tmp_path / "out"
     items = batch.find([clips / name], out, settings=FAST)
     assert len(batch.run(items, out, scheduler=cluster, split=1).done) == 1 and done_once(out)
     assert reasons(items, out) == {name: ""}
@@ -378,8 +378,7 @@ def served(clips):
         server.shutdown()
 
 
-def test_inputs_behind_urls_are_fetched_and_known_again(clips, served, tmp_path, cluster):
-    out = tmp_path / "out"
+def test_inputs_behind_urls_are_fetched_and_known_again(clips, served, tmp_path, cluster, out):
     urls = [f"{served}/a.h5", f"{served}/long.h5", f"file://{clips}/sub/*.h5", f"{served}/none.h5"]
     items = batch.find(urls, out, settings=FAST)
     outcome = batch.run(items, out, scheduler=cluster)
@@ -391,9 +390,8 @@ def test_inputs_behind_urls_are_fetched_and_known_again(clips, served, tmp_path,
     assert reasons(items, out) == {"a.h5": "other input", "long.h5": "", "c.h5": "", "none.h5": "failed before"}
 
 
-def test_an_input_without_a_modification_time_is_known_by_its_content(clips, served, tmp_path, cluster, monkeypatch):
+def test_an_input_without_a_modification_time_is_known_by_its_content(clips, served, cluster, monkeypatch, out):
     monkeypatch.setattr(Quiet, "unsaid", "Last-Modified")
-    out = tmp_path / "out"
     items = batch.find([f"{served}/a.h5"], out, settings=FAST)
     [record] = batch.run(items, out, scheduler=cluster).done
     assert record["source"] == {"size": (clips / "a.h5").stat().st_size, "sha256": batch.inputs.sha256(clips / "a.h5")}
@@ -493,8 +491,7 @@ def test_a_terminal_shows_a_table_and_the_result_goes_elsewhere(clips, tmp_path)
 # ---- what goes wrong ----
 
 
-def test_one_broken_clip_among_many_is_named_and_the_others_are_done(clips, tmp_path, cluster, capsys):
-    out = tmp_path / "out"
+def test_one_broken_clip_among_many_is_named_and_the_others_are_done(clips, cluster, capsys, out):
     whole = (clips / "b.h5").read_bytes()
     (clips / "b.h5").write_bytes(whole[:3000])
     words = ["batch", str(clips), "--out", str(out), *WORDS, "--scheduler", cluster]
@@ -524,8 +521,7 @@ def test_an_unreachable_scheduler_is_an_error_of_one_line(clips, tmp_path, monke
     assert err.count("\n") == 1 and "expected the address of a scheduler" in err
 
 
-def test_a_scheduler_that_goes_away_ends_the_run_and_not_what_was_done(clips, tmp_path, cluster, monkeypatch):
-    out = tmp_path / "out"
+def test_a_scheduler_that_goes_away_ends_the_run_and_not_what_was_done(clips, cluster, monkeypatch, out):
 
     class Close(batch.show.Show):
         def finished(self, item, record) -> None:
@@ -595,8 +591,7 @@ def test_two_runs_at_once_do_not_disturb_each_other(clips, tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("after", [0, 3, 8])
-def test_a_worker_that_is_killed_costs_nothing_but_time(after, many, tmp_path):
-    out = tmp_path / "out"
+def test_a_worker_that_is_killed_costs_nothing_but_time(after, many, tmp_path, out):
     process = start(many, out, "--verify")
     wait_for(lambda: lines_so_far(out) >= after and any(".ath." in part.name for part in leftovers(out)), process)
     workers_of(process)[0].kill()
@@ -607,8 +602,7 @@ def test_a_worker_that_is_killed_costs_nothing_but_time(after, many, tmp_path):
 
 
 @pytest.mark.slow
-def test_a_worker_that_is_killed_while_it_codes_a_part_of_a_long_clip_costs_that_part(many, tmp_path):
-    out = tmp_path / "out"
+def test_a_worker_that_is_killed_while_it_codes_a_part_of_a_long_clip_costs_that_part(many, tmp_path, out):
     process = start(many / "long.h5", out)
     wait_for(lambda: any(out.rglob("segments_0")), process)
     workers_of(process)[1].kill()
@@ -618,8 +612,7 @@ def test_a_worker_that_is_killed_while_it_codes_a_part_of_a_long_clip_costs_that
 
 
 @pytest.mark.slow
-def test_a_clip_whose_workers_die_each_time_is_given_up(many, tmp_path):
-    out = tmp_path / "out"
+def test_a_clip_whose_workers_die_each_time_is_given_up(many, out):
     process = start(many / "long.h5", out, "--split", "100", "--effort", "default")
     seen = set()
     while process.poll() is None:
@@ -637,8 +630,7 @@ def test_a_clip_whose_workers_die_each_time_is_given_up(many, tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("after", [0, 2, 7])
-def test_a_run_that_is_killed_goes_on_where_it_ended(after, many, tmp_path):
-    out = tmp_path / "out"
+def test_a_run_that_is_killed_goes_on_where_it_ended(after, many, out):
     process = start(many, out)
     wait_for(lambda: lines_so_far(out) >= after and workers_of(process), process)
     workers = workers_of(process)
@@ -655,8 +647,7 @@ def test_a_run_that_is_killed_goes_on_where_it_ended(after, many, tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("number, expected", [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
-def test_an_interrupted_run_leaves_whole_files_only(number, expected, many, tmp_path):
-    out = tmp_path / "out"
+def test_an_interrupted_run_leaves_whole_files_only(number, expected, many, out):
     process = start(many, out, start_new_session=True)
     wait_for(lambda: lines_so_far(out) >= 2, process)
     os.killpg(process.pid, number)  # as a terminal does it: workers get it too
@@ -668,8 +659,7 @@ def test_an_interrupted_run_leaves_whole_files_only(number, expected, many, tmp_
 
 @pytest.mark.slow
 @pytest.mark.parametrize("limit", [2000, 9000])
-def test_a_full_disk_is_reported_and_a_second_run_does_what_is_missing(limit, many, tmp_path):
-    out = tmp_path / "out"
+def test_a_full_disk_is_reported_and_a_second_run_does_what_is_missing(limit, many, out):
     process = start(many, out, preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit)))
     code, err = finished(process)
     assert code == 1 and "File too large" in err and "Traceback" not in err, err

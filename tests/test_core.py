@@ -955,8 +955,19 @@ def test_between_two_frames_is_their_blend_forwards_and_backwards(player):
             assert np.allclose(shown, blended, rtol=0, atol=1e-6 * scale)
 
 
+def shaded_by(parts: list[Part], matrices: Memory, points: np.ndarray, rest: np.ndarray) -> np.ndarray:
+    """What the vertex shader of examples/play.c makes of a cut, in file order."""
+    shaded, maps = np.zeros((len(rest), 3)), matrices.bytes.view(np.float32).reshape(-1, 3, 4)
+    for p in parts:
+        own = slice(p.first, p.first + p.count)
+        if p.branch < 0:
+            shaded[own] = points[p.index : p.index + p.count]
+        else:
+            shaded[own] = rest[own] @ maps[p.index, :, :3].T + maps[p.index, :, 3]
+    return shaded
+
+
 def test_matrices_and_exact_vertices_of_a_cut_are_the_positions(player):
-    """The vertex shader of examples/play.c."""
     for level in player.levels:
         assert player.refine(level) == OK
         rest = rest_of(player, level).astype(np.float32)
@@ -971,14 +982,7 @@ def test_matrices_and_exact_vertices_of_a_cut_are_the_positions(player):
             assert core.ath_exact(*show, points.address, 12) == OK
             matrices.check()
             points.check()
-            shaded = np.zeros_like(rest)
-            for p in parts:
-                own = slice(p.first, p.first + p.count)
-                if p.branch < 0:
-                    shaded[own] = points.bytes.view(np.float32).reshape(-1, 3)[p.index : p.index + p.count]
-                else:
-                    m = matrices.bytes.view(np.float32).reshape(-1, 3, 4)[p.index]
-                    shaded[own] = rest[own] @ m[:, :3].T + m[:, 3]
+            shaded = shaded_by(parts, matrices, points.bytes.view(np.float32).reshape(-1, 3), rest)
             result, xyz = player.show(prepared, frame, FILE_ORDER)
             assert result == OK and np.allclose(shaded, xyz, rtol=0, atol=4e-6 * np.abs(rest).max())
 
@@ -1094,27 +1098,18 @@ def test_what_fades_is_the_blend_of_its_levels_as_positions_and_as_matrices(play
             drawn = sum(
                 weight * on_rest(player, by_level[level], level, place, rest) for level, weight in fade.weights.items()
             )
-            for p in parts:
-                own = slice(p.first, p.first + p.count)
-                if p.branch < 0:
-                    shaded = points.bytes.view(np.float32).reshape(-1, 3)[p.index : p.index + p.count]
-                else:
-                    m = matrices.bytes.view(np.float32).reshape(-1, 3, 4)[p.index]
-                    shaded = rest[own] @ m[:, :3].T + m[:, 3]
-                assert np.allclose(shaded, drawn[own], rtol=0, atol=4e-6 * size)
+            shaded = shaded_by(parts, matrices, points.bytes.view(np.float32).reshape(-1, 3), rest)
+            assert np.allclose(shaded, drawn, rtol=0, atol=4e-6 * size)
             core.ath_fade_to(byref(fade), levels[-1], 0.2)
 
 
 def on_rest(player: Player, prepared: list[Memory], level: int, place: float, rest: np.ndarray) -> np.ndarray:
     """What a level shows where its matrices move this rest pose, in file order."""
     parts, nodes, _ = cut(player, level)
-    matrices, out = Memory(48 * nodes), player.show(prepared, place, FILE_ORDER)[1].astype(float)
+    matrices, shown = Memory(48 * nodes), player.show(prepared, place, FILE_ORDER)[1]
     assert core.ath_matrices(*player.at(prepared, place), matrices.address, 48) == OK
-    for p in parts:
-        if p.branch >= 0:
-            m, own = matrices.bytes.view(np.float32).reshape(-1, 3, 4)[p.index], slice(p.first, p.first + p.count)
-            out[own] = rest[own] @ m[:, :3].T + m[:, 3]
-    return out
+    exact = [v for p in parts if p.branch < 0 for v in range(p.first, p.first + p.count)]
+    return shaded_by(parts, matrices, shown[exact], rest)
 
 
 def test_a_fade_that_lacks_a_level_writes_nothing(player):

@@ -132,6 +132,12 @@ def test_what_moved_moves_as_before_and_nothing_else_is_left_of_it(source, tmp_p
     assert out.stat().st_size < source.stat().st_size / 4
 
 
+@pytest.fixture
+def leafy_out(leafy, tmp_path):  # noqa: F811
+    write(leafy, tmp_path / "source.glb")
+    return encoded(tmp_path / "source.glb", tmp_path / "out.glb")
+
+
 def stored_positions(path):
     with closing(GltfFile(path)) as file:
         return file.array(file.json["meshes"][0]["primitives"][0]["attributes"]["POSITION"])
@@ -148,9 +154,8 @@ def test_units_and_axes_stay_those_of_the_file(up, unit, leafy, tmp_path):  # no
         assert np.array_equal(first, second), "the numbers of the mesh are its own"
 
 
-def test_the_mesh_is_not_stored_twice(leafy, tmp_path):  # noqa: F811
-    write(leafy, tmp_path / "source.glb")
-    with athcodec.open(encoded(tmp_path / "source.glb", tmp_path / "out.glb")) as decoder:
+def test_the_mesh_is_not_stored_twice(leafy_out):
+    with athcodec.open(leafy_out) as decoder:
         assert decoder.file.host_checksum is not None and decoder.file.info()["rest_bytes"] < 40
 
 
@@ -469,38 +474,31 @@ def test_seams_parts_and_clips_come_back_too(leafy, seasons, tmp_path):  # noqa:
         (lambda gltf: moved_primitives(gltf)[0]["attributes"].update(_ATH_VERTEX=0), "_ATH_VERTEX"),
     ],
 )
-def test_a_file_that_lies_is_refused_in_one_line(change, error, leafy, tmp_path):  # noqa: F811
-    write(leafy, tmp_path / "source.glb")
-    out = encoded(tmp_path / "source.glb", tmp_path / "out.glb")
-    bad = rewritten(out, tmp_path / "bad.glb", change)
+def test_a_file_that_lies_is_refused_in_one_line(change, error, leafy_out, tmp_path):
+    bad = rewritten(leafy_out, tmp_path / "bad.glb", change)
     with pytest.raises(AthError, match=f"(?is){error}") as raised, athcodec.open(bad) as decoder:
         decoder.positions(0)
     assert "\n" not in str(raised.value)
 
 
-def test_a_mesh_that_was_changed_is_told_from_the_one_of_the_motion(leafy, tmp_path):  # noqa: F811
-    write(leafy, tmp_path / "source.glb")
-    out = encoded(tmp_path / "source.glb", tmp_path / "out.glb")
-    data = bytearray(out.read_bytes())
-    place = data.index(stored_positions(out).tobytes())
+def test_a_mesh_that_was_changed_is_told_from_the_one_of_the_motion(leafy_out, tmp_path):
+    data = bytearray(leafy_out.read_bytes())
+    place = data.index(stored_positions(leafy_out).tobytes())
     data[place] ^= 1
     (tmp_path / "bad.glb").write_bytes(data)
     with pytest.raises(WrongHostMesh):
         athcodec.open(tmp_path / "bad.glb")
 
 
-def test_read_says_that_the_motion_is_the_extensions(leafy, tmp_path):  # noqa: F811
-    write(leafy, tmp_path / "source.glb")
-    out = encoded(tmp_path / "source.glb", tmp_path / "out.glb")
+def test_read_says_that_the_motion_is_the_extensions(leafy_out):
     with pytest.raises(ClipError, match="ATH_motion"):
-        read(out)
+        read(leafy_out)
 
 
-def test_the_viewer_shows_a_glb(leafy, tmp_path):  # noqa: F811
-    write(leafy, tmp_path / "source.glb")
-    out, page = encoded(tmp_path / "source.glb", tmp_path / "out.glb"), tmp_path / "page.html"
-    assert main(["view", str(out), "--export", str(page)]) == 0
-    assert page.stat().st_size > out.stat().st_size
+def test_the_viewer_shows_a_glb(leafy_out, tmp_path):
+    page = tmp_path / "page.html"
+    assert main(["view", str(leafy_out), "--export", str(page)]) == 0
+    assert page.stat().st_size > leafy_out.stat().st_size
 
 
 @pytest.mark.parametrize("options", [["--unit", "cm"], ["--rest", "mean"], ["-o", "b.ath"]])

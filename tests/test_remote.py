@@ -33,8 +33,7 @@ pytestmark = pytest.mark.formats
 
 
 class Server(ThreadingHTTPServer):
-    """Serves `data` under any path, with ranges; `fault` may answer a request in its own way, and says
-    whether it did."""
+    """Serves `data` under any path, with ranges; `fault` answers a request in its own way, unless it returns False."""
 
     daemon_threads = True
     block_on_close = False
@@ -43,7 +42,7 @@ class Server(ThreadingHTTPServer):
         super().__init__(("127.0.0.1", 0), Handler)
         self.data, self.tags = data, {"ETag": '"one"', "Last-Modified": "Mon, 01 Jan 2024 00:00:00 GMT"}
         self.ranges: list[tuple[int, int]] = []
-        self.fault: Callable[[Handler, int, int], bool] = lambda handler, start, stop: False
+        self.fault: Callable[[Handler, int, int], bool | None] = lambda handler, start, stop: False
         self.ending = threading.Event()
 
     @property
@@ -61,7 +60,7 @@ class Handler(BaseHTTPRequestHandler):
     def do_GET(self) -> None:
         start, stop = map(int, re.fullmatch(r"bytes=(\d+)-(\d+)", self.headers["Range"]).groups())
         self.server.ranges.append((start, stop + 1))
-        if not self.server.fault(self, start, stop + 1):
+        if self.server.fault(self, start, stop + 1) is False:
             self.send_range(start, min(stop + 1, len(self.server.data)))
 
     def send_range(self, start: int, stop: int, body: bytes | None = None, **headers: str) -> None:
@@ -76,10 +75,9 @@ class Handler(BaseHTTPRequestHandler):
         self.send_head(206, part | headers)
         self.wfile.write(self.server.data[start:stop] if body is None else body)
 
-    def send_whole(self, body: bytes, **headers: str) -> bool:
+    def send_whole(self, body: bytes, **headers: str) -> None:
         self.send_head(200, {"Content-Length": str(len(body))} | {k.replace("_", "-"): v for k, v in headers.items()})
         self.wfile.write(body)
-        return True
 
     def send_head(self, status: int, headers: dict[str, str]) -> None:
         self.send_response(status)
@@ -105,36 +103,32 @@ def after(count: int, fault: Callable) -> Callable:
     return among(lambda number: number > count, fault)
 
 
-def drop(handler: Handler, start: int, stop: int) -> bool:
+def drop(handler: Handler, start: int, stop: int) -> None:
     """Half of the answer, and the connection is gone."""
     stop = min(stop, len(handler.server.data))
     handler.send_range(start, stop, handler.server.data[start : (start + stop) // 2])
     handler.close_connection = True
-    return True
 
 
-def hang_up(handler: Handler, start: int, stop: int) -> bool:
+def hang_up(handler: Handler, start: int, stop: int) -> None:
     handler.close_connection = True
-    return True
 
 
-def stall(handler: Handler, start: int, stop: int) -> bool:
+def stall(handler: Handler, start: int, stop: int) -> None:
     handler.server.ending.wait()
     handler.close_connection = True
-    return True
 
 
-def overloaded(handler: Handler, start: int, stop: int) -> bool:
+def overloaded(handler: Handler, start: int, stop: int) -> None:
     handler.send_head(503, {"Content-Length": "0"})
-    return True
 
 
-def ignore_ranges(handler: Handler, start: int, stop: int) -> bool:
-    return handler.send_whole(handler.server.data)
+def ignore_ranges(handler: Handler, start: int, stop: int) -> None:
+    handler.send_whole(handler.server.data)
 
 
-def compress(handler: Handler, start: int, stop: int) -> bool:
-    return handler.send_whole(gzip.compress(handler.server.data), Content_Encoding="gzip")
+def compress(handler: Handler, start: int, stop: int) -> None:
+    handler.send_whole(gzip.compress(handler.server.data), Content_Encoding="gzip")
 
 
 @pytest.fixture(scope="module")
@@ -272,11 +266,10 @@ def test_a_prefix_on_a_server_plays_the_levels_that_are_there(server, local):
 
 
 def test_redirects_are_followed_and_counted(server, local):
-    def redirect(handler: Handler, start: int, stop: int) -> bool:
+    def redirect(handler: Handler, start: int, stop: int) -> bool | None:
         if handler.path.startswith("/moved"):
             return False
         handler.send_head(302, {"Location": "/moved.ath", "Content-Length": "0"})
-        return True
 
     server.fault = redirect
     with athcodec.open(server.url) as decoder:
@@ -288,10 +281,9 @@ def test_a_redirect_from_a_public_address_to_a_private_one_is_refused(server, mo
     async def is_private(host: str) -> bool:
         return host == "localhost"  # as if 127.0.0.1 were somewhere in the world
 
-    def redirect(handler: Handler, start: int, stop: int) -> bool:
+    def redirect(handler: Handler, start: int, stop: int) -> None:
         place = f"http://localhost:{server.server_address[1]}/inside"
         handler.send_head(302, {"Location": place, "Content-Length": "0"})
-        return True
 
     server.fault = redirect
     monkeypatch.setattr(remote, "is_private", is_private)
@@ -351,12 +343,11 @@ def test_a_server_that_stalls_is_given_up(server, local):
 
 
 def test_a_server_that_sends_a_byte_now_and_then_is_given_up_too(server, monkeypatch):
-    def trickle(handler: Handler, start: int, stop: int) -> bool:
+    def trickle(handler: Handler, start: int, stop: int) -> None:
         handler.send_range(start, stop, b"")
         for byte in handler.server.data[start:stop]:
             handler.server.ending.wait(0.02)
             handler.wfile.write(bytes([byte]))
-        return True
 
     server.fault = trickle
     monkeypatch.setattr(remote, "SLOWEST", 1 << 20)
@@ -379,11 +370,10 @@ def test_a_large_file_on_a_server_without_ranges_is_refused(server, monkeypatch)
         athcodec.open(server.url)
     del server.tags["ETag"]
 
-    def endless(handler: Handler, start: int, stop: int) -> bool:
+    def endless(handler: Handler, start: int, stop: int) -> None:
         handler.send_head(200, {"Connection": "close"})
         handler.wfile.write(server.data)
         handler.close_connection = True
-        return True
 
     server.fault = endless
     with pytest.raises(RemoteError, match=f"sends more than {len(server.data) - 1} bytes"):
@@ -399,19 +389,13 @@ def test_a_server_that_compresses_on_the_way_is_understood(server, local):
 @pytest.mark.parametrize(
     "fault, message",
     [
-        (lambda h, a, b: h.send_range(a + 1, b) or True, "got bytes 1 to .*, expected 0 to"),
-        (
-            lambda h, a, b: h.send_range(a, b, **{"Content-Range": "bytes 0-5/*"}) or True,
-            "got Content-Range 'bytes 0-5/",
-        ),
-        (lambda h, a, b: h.send_range(a, b, **{"Content-Encoding": "gzip"}) or True, "Content-Encoding 'gzip'"),
-        (lambda h, a, b: h.send_head(404, {"Content-Length": "0"}) or True, "answers 404"),
-        (lambda h, a, b: h.send_head(403, {"Content-Length": "0"}) or True, "answers 403"),
-        (
-            lambda h, a, b: h.send_head(416, {"Content-Length": "0", "Content-Range": "bytes */9"}) or True,
-            "answers 416",
-        ),
-        (lambda h, a, b: h.send_head(302, {"Location": h.path, "Content-Length": "0"}) or True, "TooManyRedirects"),
+        (lambda h, a, b: h.send_range(a + 1, b), "got bytes 1 to .*, expected 0 to"),
+        (lambda h, a, b: h.send_range(a, b, **{"Content-Range": "bytes 0-5/*"}), "got Content-Range 'bytes 0-5/"),
+        (lambda h, a, b: h.send_range(a, b, **{"Content-Encoding": "gzip"}), "Content-Encoding 'gzip'"),
+        (lambda h, a, b: h.send_head(404, {"Content-Length": "0"}), "answers 404"),
+        (lambda h, a, b: h.send_head(403, {"Content-Length": "0"}), "answers 403"),
+        (lambda h, a, b: h.send_head(416, {"Content-Length": "0", "Content-Range": "bytes */9"}), "answers 416"),
+        (lambda h, a, b: h.send_head(302, {"Location": h.path, "Content-Length": "0"}), "TooManyRedirects"),
     ],
     ids=["other bytes", "no length", "compressed part", "not there", "not allowed", "no such range", "in circles"],
 )

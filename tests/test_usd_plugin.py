@@ -16,9 +16,6 @@ from athcodec.decoding import container as ct
 pytestmark = pytest.mark.programs
 
 COMPARE = """
-import json, sys
-import numpy as np
-from pxr import Usd, UsdGeom
 path, known, prims = sys.argv[1], np.load(sys.argv[2])["positions"], json.loads(sys.argv[3])
 stage = Usd.Stage.Open(path)
 shown = [UsdGeom.PointBased(stage.GetPrimAtPath(prim)) for prim in prims]
@@ -38,8 +35,17 @@ print(json.dumps({
 """
 
 
+BEGIN = """
+import json, sys, time
+from concurrent.futures import ThreadPoolExecutor
+import numpy as np
+from pxr import Sdf, Tf, Usd, UsdGeom
+"""
+
+
 def script(text: str, *arguments: object) -> dict:
-    return json.loads(run_script(usd_plugin_python(), text, *arguments).splitlines()[-1])
+    """What a script prints last, which has the modules of BEGIN."""
+    return json.loads(run_script(usd_plugin_python(), BEGIN + text, *arguments).splitlines()[-1])
 
 
 def decoded(file: Path, clip: str | None = None, level: int | None = None) -> Path:
@@ -71,9 +77,6 @@ def test_objects_polygons_and_arrays_are_those_that_decode_writes(mesh_ath, tmp_
     assert main(["decode", str(file), str(written)]) == 0
     prims = script(
         """
-import json, sys
-import numpy as np
-from pxr import Usd
 OWN = "athcodec"
 def described(path):
     stage, prims = Usd.Stage.Open(path), {}
@@ -102,9 +105,6 @@ print(json.dumps({name: [kind, sorted(own)] for name, (kind, own) in ours.items(
 def test_clips_are_variants_and_can_be_asked_for_by_name(medley_ath, medley_clips):
     names = list(medley_clips)
     text = """
-import json, sys
-import numpy as np
-from pxr import Usd
 stage = Usd.Stage.CreateInMemory()
 prim = stage.DefinePrim("/tree")
 prim.GetReferences().AddReference(sys.argv[1])
@@ -131,9 +131,6 @@ def test_a_level_can_be_asked_for(sample_ath):
 
 
 DYNAMIC = """
-import json, sys
-import numpy as np
-from pxr import Sdf, Usd
 stage = Usd.Stage.CreateInMemory()
 def points(prim):
     return stage.GetPrimAtPath(f"{prim.GetPath()}/plant").GetAttribute("points")
@@ -176,9 +173,6 @@ def test_a_payload_shows_the_clip_and_the_level_that_attributes_of_its_prim_name
 
 def test_flattened_and_exported_stages_hold_all_samples(sample_ath, tmp_path):
     text = """
-import json, sys
-import numpy as np
-from pxr import Sdf, Usd
 stage = Usd.Stage.CreateInMemory()
 stage.DefinePrim("/tree").GetPayloads().AddPayload(sys.argv[1])
 flat = stage.Flatten().ExportToString()
@@ -195,10 +189,6 @@ print(json.dumps(flat.count("point3f[] points.timeSamples")))
 
 def test_a_hundred_stages_are_open_at_once_on_several_threads(sample_ath):
     text = """
-import json, sys
-from concurrent.futures import ThreadPoolExecutor
-import numpy as np
-from pxr import Usd
 known = np.load(sys.argv[2])["positions"]
 stages = [Usd.Stage.Open(sys.argv[1]) for _ in range(100)]
 def right(number):
@@ -226,8 +216,6 @@ def test_what_cannot_be_opened_is_one_error_that_names_the_file(sample_ath, tmp_
     bad.write_bytes({"cut": data[:100], "other": b"nothing of the kind"}.get(what, data))
     path = f"{bad}:SDF_FORMAT_ARGS:{what}" if "=" in what else str(bad)
     text = """
-import json, sys
-from pxr import Sdf, Tf
 try:
     layer = Sdf.Layer.FindOrOpen(sys.argv[1])
     print(json.dumps(["", bool(layer)]))
@@ -247,9 +235,6 @@ def test_damaged_motion_is_reported_once_and_other_segments_play(tmp_path, sampl
     data[last.offset + last.length // 2] ^= 1
     file.write_bytes(data)
     text = """
-import json, sys
-import numpy as np
-from pxr import Tf, Usd
 stage = Usd.Stage.Open(sys.argv[1])
 points = stage.GetPrimAtPath("/clip/plant").GetAttribute("points")
 said = []
@@ -267,9 +252,6 @@ print(json.dumps(said))
 
 def test_a_thousand_references_share_one_decoder(sample_ath):
     text = """
-import json, sys, time
-import numpy as np
-from pxr import Usd, UsdGeom
 stage = Usd.Stage.CreateInMemory()
 for i in range(1000):
     stage.DefinePrim(f"/forest/t{i}").GetReferences().AddReference(sys.argv[1])
