@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import struct
 import sys
-import tempfile
 from dataclasses import dataclass, replace
 from io import BytesIO
 from pathlib import Path
@@ -104,11 +103,6 @@ def with_checksum(front: bytes) -> bytes:
 
 def opened(data: bytes, **options) -> athcodec.Decoder:
     return athcodec.open(BytesIO(data), **options)
-
-
-def encoded(clip: athcodec.MotionClip, **options) -> bytes:
-    with tempfile.TemporaryDirectory() as folder:
-        return athcodec.encode(clip, Path(folder) / "a.ath", **options).path.read_bytes()
 
 
 def coded(clip: athcodec.MotionClip, path: Path, **options) -> athcodec.Decoder:

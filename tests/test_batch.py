@@ -61,9 +61,9 @@ def out(tmp_path):
     return tmp_path / "out"
 
 
-def alone(path: Path, folder: Path, **options) -> bytes:
+def alone(path: Path, **options) -> bytes:
     with athcodec.read(path) as clip:
-        return athcodec.encode(clip, folder / "alone.ath", **options).path.read_bytes()
+        return athcodec.encode(clip, **options)
 
 
 def lines(out: Path) -> list[dict]:
@@ -88,12 +88,12 @@ def leftovers(out: Path) -> list[Path]:
 # ---- what comes out ----
 
 
-def test_files_are_those_that_encode_writes_also_of_clips_that_workers_share(clips, tmp_path, cluster, out):
+def test_files_are_those_that_encode_writes_also_of_clips_that_workers_share(clips, cluster, out):
     items = batch.find([clips], out, settings=FAST)
     outcome = batch.run(items, out, scheduler=cluster, split=3, verify=True)
     assert len(outcome.done) == 4 and not outcome.failed and not leftovers(out)
     for item in items:
-        assert Path(item.output).read_bytes() == alone(Path(item.input), tmp_path, **FAST), item.name
+        assert Path(item.output).read_bytes() == alone(Path(item.input), **FAST), item.name
     assert done_once(out) == {"a.ath", "b.ath", "long.ath", "sub/c.ath"}
 
 
@@ -107,7 +107,7 @@ def test_a_long_clip_is_the_same_under_settings_of_all_kinds(settings, tmp_path,
     [record] = batch.run(items, tmp_path / "out", scheduler=cluster, split=2).done
     with athcodec.read(sample_file) as clip:
         options = batch.settings.coding_options(items[0].settings, clip.metadata["unit"])
-    assert Path(items[0].output).read_bytes() == alone(sample_file, tmp_path, **options)
+    assert Path(items[0].output).read_bytes() == alone(sample_file, **options)
     assert record["bytes"] == Path(items[0].output).stat().st_size
 
 
@@ -122,8 +122,7 @@ def test_clips_become_loops_by_pattern_and_by_option(clips, tmp_path, cluster):
             found[name] = decoder.clip.loop, decoder.frame_count
     assert found == {"a": (False, 20), "b": (True, 35), "sub/c": (True, 20), "long": (True, 195)}
     with athcodec.read(clips / "long.h5") as clip:
-        alone = athcodec.encode(athcodec.looped(clip, 5), tmp_path / "alone.ath", **FAST).path
-    assert (out / "long.ath").read_bytes() == alone.read_bytes()
+        assert (out / "long.ath").read_bytes() == athcodec.encode(athcodec.looped(clip, 5), **FAST)
     assert cli.main([*words, "--loop-blend", "5"]) == 0 and len(done_once(out)) == 4, "nothing is done again"
     assert cli.main([*words, "--loop"]) == 0
     with athcodec.open(out / "b.ath") as decoder:
@@ -174,7 +173,7 @@ def test_what_is_not_read_of_a_clip_is_in_its_line_and_said(tmp_path, cluster, c
     assert "a.obj: curve or surface curv" in capsys.readouterr().err
 
 
-def test_a_second_run_does_only_what_is_not_as_it_should_be(clips, tmp_path, cluster, out):
+def test_a_second_run_does_only_what_is_not_as_it_should_be(clips, cluster, out):
     items = batch.find([clips], out, settings=FAST)
     batch.run(items, out, scheduler=cluster)
     before = (out / runs.MANIFEST).read_bytes()
@@ -195,7 +194,7 @@ def test_a_second_run_does_only_what_is_not_as_it_should_be(clips, tmp_path, clu
     }
     assert len(batch.run(items, out, scheduler=cluster).done) == 4
     assert set(reasons(items, out).values()) == {""} and len(lines(out)) == 8
-    assert (out / "sub/c.ath").read_bytes() == alone(clips / "sub/c.h5", tmp_path, rel_error=1e-3, **FAST)
+    assert (out / "sub/c.ath").read_bytes() == alone(clips / "sub/c.h5", rel_error=1e-3, **FAST)
 
 
 def test_an_output_directory_may_be_moved_with_its_manifest(clips, tmp_path, cluster):
@@ -378,13 +377,13 @@ def served(clips):
         server.shutdown()
 
 
-def test_inputs_behind_urls_are_fetched_and_known_again(clips, served, tmp_path, cluster, out):
+def test_inputs_behind_urls_are_fetched_and_known_again(clips, served, cluster, out):
     urls = [f"{served}/a.h5", f"{served}/long.h5", f"file://{clips}/sub/*.h5", f"{served}/none.h5"]
     items = batch.find(urls, out, settings=FAST)
     outcome = batch.run(items, out, scheduler=cluster)
     assert [record["output"] for record in outcome.failed] == ["none.ath"] and "none.h5" in outcome.failed[0]["reason"]
     for name in ("a", "long", "sub/c"):
-        assert (out / f"{Path(name).name}.ath").read_bytes() == alone(clips / f"{name}.h5", tmp_path, **FAST)
+        assert (out / f"{Path(name).name}.ath").read_bytes() == alone(clips / f"{name}.h5", **FAST)
     assert not leftovers(out)
     os.utime(clips / "a.h5", ns=(0, 0))  # Last-Modified
     assert reasons(items, out) == {"a.h5": "other input", "long.h5": "", "c.h5": "", "none.h5": "failed before"}
@@ -419,7 +418,7 @@ def test_clips_in_an_object_store_become_files_there_and_a_second_run_does_what_
     names = {f"plants/out/{name}.ath" for name in ("a", "b", "long", "sub/c")}
     assert set(store.find("plants/out")) == names
     for name in ("a", "long", "sub/c"):
-        assert store.cat_file(f"plants/out/{name}.ath") == alone(clips / f"{name}.h5", tmp_path, **FAST)
+        assert store.cat_file(f"plants/out/{name}.ath") == alone(clips / f"{name}.h5", **FAST)
     assert [path.name for path in notes.parent.iterdir()] == ["n.jsonl"]
     assert run() == (0, 4)
     store.rm_file("plants/out/a.ath")
@@ -452,7 +451,7 @@ def test_memory_serves_workers_in_this_process_and_is_no_place_for_others(clips,
     with distributed.LocalCluster(processes=False, n_workers=1, dashboard_address="127.0.0.1:0") as here:
         outcome = batch.run(items, "memory://out", manifest=tmp_path / "here", scheduler=here.scheduler_address)
     assert len(outcome.done) == 4 and not outcome.failed
-    assert memory.cat_file("/out/sub/c.ath") == alone(clips / "sub/c.h5", tmp_path, **FAST)
+    assert memory.cat_file("/out/sub/c.ath") == alone(clips / "sub/c.h5", **FAST)
     items = batch.find([clips / "a.h5"], "memory://elsewhere", settings=FAST)
     outcome = batch.run(items, "memory://elsewhere", manifest=tmp_path / "there", scheduler=cluster)
     assert "workers need a file system that all share" in outcome.failed[0]["reason"]
@@ -591,24 +590,24 @@ def test_two_runs_at_once_do_not_disturb_each_other(clips, tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("after", [0, 3, 8])
-def test_a_worker_that_is_killed_costs_nothing_but_time(after, many, tmp_path, out):
+def test_a_worker_that_is_killed_costs_nothing_but_time(after, many, out):
     process = start(many, out, "--verify")
     wait_for(lambda: lines_so_far(out) >= after and any(".ath." in part.name for part in leftovers(out)), process)
     workers_of(process)[0].kill()
     code, err = finished(process)
     assert code == 0, err
     assert done_once(out) == ALL and len(lines(out)) == 12 and not leftovers(out)
-    assert (out / "long.ath").read_bytes() == alone(many / "long.h5", tmp_path, **FAST)
+    assert (out / "long.ath").read_bytes() == alone(many / "long.h5", **FAST)
 
 
 @pytest.mark.slow
-def test_a_worker_that_is_killed_while_it_codes_a_part_of_a_long_clip_costs_that_part(many, tmp_path, out):
+def test_a_worker_that_is_killed_while_it_codes_a_part_of_a_long_clip_costs_that_part(many, out):
     process = start(many / "long.h5", out)
     wait_for(lambda: any(out.rglob("segments_0")), process)
     workers_of(process)[1].kill()
     code, err = finished(process)
     assert code == 0 and done_once(out) == {"long.ath"} and not leftovers(out), err
-    assert (out / "long.ath").read_bytes() == alone(many / "long.h5", tmp_path, **FAST)
+    assert (out / "long.ath").read_bytes() == alone(many / "long.h5", **FAST)
 
 
 @pytest.mark.slow

@@ -590,11 +590,10 @@ def test_layers_are_built_in_any_order_and_play_the_same(layered):
         assert np.array_equal(step_by_step.frame([segment], 3), once.frame([once.prepare(0, level)], 3))
 
 
-def test_the_rest_pose_of_a_level_is_that_of_its_layer(bushy_clip, scratch, monkeypatch):
+def test_the_rest_pose_of_a_level_is_that_of_its_layer(bushy_clip, monkeypatch):
     monkeypatch.setattr(start, "AT_ONCE_SHARE", 0.0)  # One pose for all layers would be smaller.
-    path = scratch / "about_rest.ath"
-    athcodec.encode(bushy_clip, path, rel_error=1e-4, ladder=LADDER, effort="fast")  # about the rest pose of the source
-    player = Player(path.read_bytes())
+    # Its motion is about the rest pose of the source.
+    player = Player(athcodec.encode(bushy_clip, rel_error=1e-4, ladder=LADDER, effort="fast"))
     assert player.refine(player.levels[-1]) == OK
     source = bushy_clip.rest[np.ctypeslib.as_array(core.ath_vertex_source(player.address), (player.info.vertex_count,))]
     errors = [np.abs(rest_of(player, level) - source).max() for level in player.levels]
@@ -719,13 +718,10 @@ def test_threads_prepare_from_one_file_at_the_same_time(player):
     ],
     ids=["transformed", "layers", "lossless", "predicted", "another order"],
 )
-def test_positions_go_to_the_callers_memory_at_levels_of_all_vertices_in_the_order_of_the_source(
-    name, options, goes, scratch
-):
+def test_positions_go_to_the_callers_memory_at_levels_of_all_vertices_in_the_order_of_the_source(name, options, goes):
     """The segments are joined, too; frames of the growth repeat. What cannot go there is not touched."""
     clip = awkward(6, branches=6, shuffled=True) if name is None else athcodec.read(athcodec.sample_path(name))
-    athcodec.encode(clip, scratch / "to.ath", attributes="none", effort="fast", **options)
-    player, went = Player((scratch / "to.ath").read_bytes()), set()
+    player, went = Player(athcodec.encode(clip, attributes="none", effort="fast", **options)), set()
     for level, segment in itertools.product(player.levels, player.segments):
         alone, work = player.prepare(segment, level), player.work()
         into = Memory(core.ath_segment_size_to(player.address, segment, level))
@@ -797,17 +793,16 @@ def all_learned(settings: Settings, trials: Trials) -> Settings:
 
 
 @pytest.fixture(scope="module", params=REFINED)
-def refined(request, scratch) -> Player:
+def refined(request) -> Player:
     """Files with all that is kept: learned shapes and time bases, rotations and shifts, float64; several clips."""
     name, options = REFINED[request.param]
-    clip, path = request.getfixturevalue(name), scratch / "onward.ath"
+    clip = request.getfixturevalue(name)
     clip = athcodec.join(clip) if isinstance(clip, dict) else clip
     with pytest.MonkeyPatch.context() as patch:
         if request.param == "time bases":
             patch.setattr(learned_bases, "best_bases", all_learned)
             patch.setitem(search.CHOICES, all_learned, ("time bases", 1.0))
-        athcodec.encode(clip, path, **GIVEN | options)
-    return Player(path.read_bytes())
+        return Player(athcodec.encode(clip, **GIVEN | options))
 
 
 def test_going_on_from_any_level_to_any_deeper_one_gives_what_preparing_it_does(refined):
@@ -927,9 +922,8 @@ def test_going_on_takes_no_more_steps_than_preparing(layered):
 # ---- what is shown ----
 
 
-def test_frames_are_those_of_python_bit_for_bit_in_any_order_of_play(data, player, scratch):
-    (scratch / "core.ath").write_bytes(data)
-    with athcodec.open(scratch / "core.ath") as decoder:
+def test_frames_are_those_of_python_bit_for_bit_in_any_order_of_play(data, player):
+    with athcodec.open(data) as decoder:
         for level in player.levels:
             expected = decoder.positions(level=level)
             prepared = player.prepare_all(level)

@@ -47,6 +47,8 @@ from spec import conformance
 from spec.document import rules
 
 REFUSED = (FormatError, LevelUnavailable)
+TAM = athcodec.Thresholds(0, 0, 0, 0)  # with modes, whatever is smaller
+IN_MODES = {"segment_frames": 16, "tam": TAM, "ladder": "none", "rest_error": "bound"}
 
 
 @pytest.fixture(scope="module")
@@ -60,14 +62,9 @@ def parts(data) -> Parts:
 
 
 @pytest.fixture(scope="module")
-def fine_parts(other_full_clip, tmp_path_factory) -> Parts:
+def fine_parts(other_full_clip) -> Parts:
     """Coded so finely that stems of level 2 happen to mean something without SHAPES, too."""
-    path = tmp_path_factory.mktemp("fine") / "full.ath"
-    tam = athcodec.Thresholds(0, 0, 0, 0)  # with modes, whatever is smaller
-    athcodec.encode(
-        other_full_clip, path, rel_error=3e-5, segment_frames=16, tam=tam, ladder="none", rest_error="bound"
-    )
-    return Parts.of(path.read_bytes())
+    return Parts.of(athcodec.encode(other_full_clip, rel_error=3e-5, **IN_MODES))
 
 
 @pytest.fixture(scope="module")
@@ -82,11 +79,8 @@ def medley_parts(medley_ath) -> Parts:
 
 
 @pytest.fixture(scope="module")
-def lossless_parts(full_clip, tmp_path_factory) -> Parts:
-    path = tmp_path_factory.mktemp("lossless") / "full.ath"
-    tam = athcodec.Thresholds(0, 0, 0, 0)  # with modes, whatever is smaller
-    athcodec.encode(full_clip, path, lossless=True, segment_frames=16, tam=tam, ladder="none", rest_error="bound")
-    return Parts.of(path.read_bytes())
+def lossless_parts(full_clip) -> Parts:
+    return Parts.of(athcodec.encode(full_clip, lossless=True, **IN_MODES))
 
 
 @pytest.fixture(scope="module")

@@ -7,7 +7,7 @@ import tracemalloc
 import h5py
 import numpy as np
 import pytest
-from files import coded, encoded
+from files import coded
 from plants import chain_plant, clip_of, plant
 
 import athcodec
@@ -87,7 +87,7 @@ def test_a_bound_in_scene_units_is_taken_as_it_is(small, tmp_path):
 
 
 def test_a_looser_bound_gives_a_smaller_file(sample_clip):
-    sizes = [len(encoded(sample_clip, effort="fast", rel_error=r)) for r in (1e-5, 1e-4, 1e-3, 1e-2)]
+    sizes = [len(athcodec.encode(sample_clip, effort="fast", rel_error=r)) for r in (1e-5, 1e-4, 1e-3, 1e-2)]
     assert sizes == sorted(sizes, reverse=True) and sizes[0] > 4 * sizes[-1]
 
 
@@ -279,7 +279,7 @@ def test_half_of_the_progress_is_about_half_of_the_work(frames, effort, tmp_path
 
 @pytest.mark.parametrize("effort", ["fast", "default", "best"])
 def test_the_same_clip_gives_the_same_bytes(effort, bushy_clip):
-    first, second = (encoded(bushy_clip, effort=effort, segment_frames=16) for _ in range(2))
+    first, second = (athcodec.encode(bushy_clip, effort=effort, segment_frames=16) for _ in range(2))
     assert first == second
 
 
@@ -288,7 +288,7 @@ def test_encoding_leaves_the_clip_as_it_was(bushy_clip):
         name: getattr(bushy_clip, name).tobytes()
         for name in ("positions", "rest", "time", "vertex_branch", "branch_parent", "stem_index")
     }
-    encoded(bushy_clip, effort="fast")
+    athcodec.encode(bushy_clip, effort="fast")
     assert all(getattr(bushy_clip, name).tobytes() == data for name, data in before.items())
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import zstandard
-from files import encoded, opened
+from files import opened
 from plants import ring_quads
 from test_rest import cards, simple_bytes, terrain, tubes
 
@@ -89,7 +89,7 @@ def test_faces_of_different_sizes_come_back(dtype):
         "uv": random.normal(size=(100, 2)),
     }
     clip = athcodec.MotionClip(terrain(10, 10, 0.1, 1)[None], np.zeros(1), attributes=arrays)
-    with opened(encoded(clip)) as decoder:
+    with opened(athcodec.encode(clip)) as decoder:
         assert decoder.file.faces is None and set(decoder.file.attributes) == set(arrays)
         for name, array in arrays.items():
             assert decoder.file.attributes[name].dtype == array.dtype
@@ -101,12 +101,12 @@ def test_vertices_by_chance_cost_little_more_where_faces_are_stored(share):
     points, faces = terrain(40, 40, 0.1, 5), grid_faces(40, 40)
     mixed = shuffled(points, faces, 5)
     bound = {0.7: 1e-3, 0.85: 1e-4}[share] * float(np.linalg.norm(np.ptp(points, axis=0)))
-    data = encoded(still(*mixed), max_error=bound)
+    data = athcodec.encode(still(*mixed), max_error=bound)
     with opened(data) as decoder:
         assert np.array_equal(decoder.file.faces, mixed[1])
         assert np.linalg.norm(decoder.positions(0).astype(float) - mixed[0], axis=1).max() <= bound
     assert rest_bytes(data) < share * simple_bytes(mixed[0], bound)
-    assert rest_bytes(data) < 1.15 * rest_bytes(encoded(still(points, faces), max_error=bound))
+    assert rest_bytes(data) < 1.15 * rest_bytes(athcodec.encode(still(points, faces), max_error=bound))
 
 
 MESHES = {
@@ -121,13 +121,13 @@ MESHES = {
 def test_a_rest_pose_with_faces_takes_at_most_nine_tenths_of_a_simple_one(name, relative):
     points, faces = MESHES[name]
     bound = relative * float(np.linalg.norm(np.ptp(points, axis=0)))
-    data = encoded(still(points, faces), max_error=bound, rest_error="bound")
+    data = athcodec.encode(still(points, faces), max_error=bound, rest_error="bound")
     assert rest_bytes(data) <= 0.9 * simple_bytes(points, bound)
 
 
 def test_faces_are_not_stored_without_attributes():
     points, faces = shuffled(*MESHES["terrain"], 3)
-    data = encoded(still(points, faces), rel_error=1e-4, attributes="none")
+    data = athcodec.encode(still(points, faces), rel_error=1e-4, attributes="none")
     assert File(data).content(rules.REST)[0] & CONNECTED == 0
     with opened(data) as decoder:
         assert decoder.file.faces is None
@@ -138,9 +138,9 @@ def test_faces_are_not_stored_without_attributes():
 def test_faces_with_vertices_of_their_own_cost_the_mesh_and_its_map(name, options):
     points, faces = MESHES[name]
     clip, welded = still(*apart(points, faces)), still(points, faces)
-    data = encoded(clip, rel_error=1e-4, **options)
+    data = athcodec.encode(clip, rel_error=1e-4, **options)
     map_bytes = chunk_bytes(faces, len(points))
-    assert len(data) <= 1.1 * (len(encoded(welded, rel_error=1e-4, **options)) + map_bytes)
+    assert len(data) <= 1.1 * (len(athcodec.encode(welded, rel_error=1e-4, **options)) + map_bytes)
     with opened(data) as decoder:
         assert np.array_equal(decoder.file.faces, clip.faces)
         error = np.linalg.norm(decoder.positions(0) - clip.block(0, 1)[0], axis=1).max()
@@ -153,5 +153,5 @@ def test_vertices_that_a_seam_splits_cost_less_than_vertices_close_together():
     used, faces = np.unique(second, return_inverse=True)
     split = points[used % len(points)]
     close = split + 1e-6 * np.linalg.norm(np.ptp(points, axis=0)) * (used >= len(points))[:, None]
-    sizes = [rest_bytes(encoded(still(some, faces.reshape(-1, 3)), rel_error=1e-4)) for some in (split, close)]
+    sizes = [rest_bytes(athcodec.encode(still(some, faces.reshape(-1, 3)), rel_error=1e-4)) for some in (split, close)]
     assert sizes[0] < sizes[1]

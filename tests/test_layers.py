@@ -77,12 +77,9 @@ def test_what_is_no_ladder_is_refused(ladder, bushy_clip, tmp_path):
         athcodec.encode(bushy_clip, tmp_path / "a.ath", ladder=ladder)
 
 
-def test_errors_may_be_given_in_any_order_and_as_text(bushy_clip, tmp_path):
-    files = [
-        athcodec.encode(bushy_clip, tmp_path / "a.ath", ladder=ladder, effort="fast").path.read_bytes()
-        for ladder in ((1e-3, 1e-2), "1e-2,0.001")
-    ]
-    assert files[0] == files[1]
+def test_errors_may_be_given_in_any_order_and_as_text(bushy_clip):
+    one, other = (athcodec.encode(bushy_clip, ladder=each, effort="fast") for each in ((1e-3, 1e-2), "1e-2,0.001"))
+    assert one == other
 
 
 # ---- what it gives ----

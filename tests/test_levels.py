@@ -40,8 +40,8 @@ def assert_levels_get_better(clip: athcodec.MotionClip, data: bytes) -> None:
                 assert file.header.is_predicted or meter.jerks(file.max_error_bound).max(initial=0.0) <= 2
 
 
-def coded(clip: athcodec.MotionClip, folder, **options) -> bytes:
-    return athcodec.encode(clip, folder / "a.ath", **{"effort": "fast"} | options).path.read_bytes()
+def coded(clip: athcodec.MotionClip, **options) -> bytes:
+    return athcodec.encode(clip, **{"effort": "fast"} | options)
 
 
 @settings(max_examples=25)
@@ -50,8 +50,8 @@ def coded(clip: athcodec.MotionClip, folder, **options) -> bytes:
     ladder=st.sampled_from(["none", "decades", LADDER]),
     others=st.sampled_from([{}, {"segment_frames": 16}, {"lossless": True}, {"tam": athcodec.Thresholds(0, 0, 0, 0)}]),
 )
-def test_levels_of_any_plant_get_better(plant, ladder, others, scratch):
-    assert_levels_get_better(plant, coded(plant, scratch, max_error=bound_for(plant, 1e-3), ladder=ladder, **others))
+def test_levels_of_any_plant_get_better(plant, ladder, others):
+    assert_levels_get_better(plant, coded(plant, max_error=bound_for(plant, 1e-3), ladder=ladder, **others))
 
 
 @settings(max_examples=40)
@@ -63,16 +63,14 @@ def test_levels_of_any_plant_get_better(plant, ladder, others, scratch):
     nearly_repeats=st.booleans(),
     is_weighted=st.booleans(),
 )
-def test_each_level_that_a_ladder_names_holds_the_error(
-    plant, bound, ladder, others, nearly_repeats, is_weighted, scratch
-):
+def test_each_level_that_a_ladder_names_holds_the_error(plant, bound, ladder, others, nearly_repeats, is_weighted):
     bound = bound_for(plant, bound)
     if nearly_repeats:
         twice = np.repeat(plant.positions, 2, axis=0)
         twice[1::2, :, 0] += plant.positions.dtype.type(bound / 100)
         plant = plant.replace(positions=twice, time=np.arange(len(twice)) / 30)
     weights = {"weights": np.linspace(0.5, 3, plant.vertex_count)} if is_weighted else {}
-    data = coded(plant, scratch, max_error=bound, ladder=ladder, attributes="none", **others | weights)
+    data = coded(plant, max_error=bound, ladder=ladder, attributes="none", **others | weights)
     lengths = [error * diagonal(plant) for error in ladder if error * diagonal(plant) >= 4.001 * bound]
     with opened(data, strict=True) as decoder:
         header = decoder.file.header
@@ -87,22 +85,20 @@ def test_each_level_that_a_ladder_names_holds_the_error(
 @pytest.mark.parametrize(
     "options", [{}, {"segment_frames": 16, "ladder": LADDER}, {"tam": athcodec.Thresholds(0, 0, 0, 0)}]
 )
-def test_levels_of_clips_loops_growth_and_storms_get_better(options, medley_clips, tmp_path):
+def test_levels_of_clips_loops_growth_and_storms_get_better(options, medley_clips):
     growth = athcodec.read(athcodec.sample_path("growth"))
     tree = athcodec.read(athcodec.sample_path("tree"))
     for clip in (athcodec.join(medley_clips), growth, tree, blown_tree(0, branches=60, frames=40)):
-        assert_levels_get_better(clip, coded(clip, tmp_path, rel_error=1e-3, **options))
+        assert_levels_get_better(clip, coded(clip, rel_error=1e-3, **options))
 
 
 # ---- which levels are shown ----
 
 
 @pytest.fixture(scope="module")
-def parts(bushy_clip, tmp_path_factory):
+def parts(bushy_clip):
     """A lossless file in layers that shows not all of its levels."""
-    folder = tmp_path_factory.mktemp("levels")
-    data = coded(bushy_clip, folder, rel_error=1e-4, segment_frames=16, ladder=LADDER, lossless=True, effort="default")
-    return Parts.of(data)
+    return Parts.of(athcodec.encode(bushy_clip, rel_error=1e-4, segment_frames=16, ladder=LADDER, lossless=True))
 
 
 def test_levels_that_are_not_shown_have_no_maps_and_no_number(parts):

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from files import Parts, coded, encoded, opened
+from files import Parts, coded, opened
 from plants import clip_of, plant
 
 import athcodec
@@ -19,7 +19,7 @@ def bits(array: np.ndarray) -> bytes:
 @pytest.mark.parametrize("bound", [{}, {"rel_error": 1e-3}])
 def test_the_last_level_has_every_bit_of_positions_and_rest_pose(dtype, bound):
     clip = plant(seed=3, branches=9, frames=40, dtype=dtype, offset=5.0)
-    decoder = opened(encoded(clip, lossless=True, segment_frames=16, **bound), strict=True)
+    decoder = opened(athcodec.encode(clip, lossless=True, segment_frames=16, **bound), strict=True)
     assert bits(decoder.positions()) == bits(clip.positions) and decoder.positions().dtype == dtype
     assert bits(decoder.positions(17)) == bits(clip.positions[17])
     assert bits(decoder.file.rest.astype(clip.rest_dtype)) == bits(clip.rest.astype(clip.rest_dtype))
@@ -28,7 +28,7 @@ def test_the_last_level_has_every_bit_of_positions_and_rest_pose(dtype, bound):
 
 def test_the_level_before_keeps_the_bound_and_plays_as_without(tmp_path):
     clip = plant(seed=4, branches=9, frames=40)
-    lossless = opened(encoded(clip, lossless=True, rel_error=1e-4))
+    lossless = opened(athcodec.encode(clip, lossless=True, rel_error=1e-4))
     with coded(clip, tmp_path / "b.ath", rel_error=1e-4, exact_rest=True) as lossy:
         assert lossless.file.level_count == lossy.file.level_count + 1
         for level in range(lossy.file.level_count):
@@ -37,7 +37,7 @@ def test_the_level_before_keeps_the_bound_and_plays_as_without(tmp_path):
 
 def test_the_hierarchy_is_as_deep_as_that_of_the_lossy_file(tmp_path):
     clip = plant(seed=4, branches=9, frames=40)
-    lossless = opened(encoded(clip, lossless=True, rel_error=1e-4, ladder="none"))
+    lossless = opened(athcodec.encode(clip, lossless=True, rel_error=1e-4, ladder="none"))
     lossy = athcodec.encode(clip, tmp_path / "b.ath", rel_error=1e-4, ladder="none")
     assert lossless.file.full_level_count == len(lossy.levels) + 1
     assert lossless.file.table1() == lossy.table1 == lossless.file.info()["ath"]
@@ -55,12 +55,12 @@ def test_numbers_that_arithmetic_would_change_come_back(dtype):
     positions[5, 3] = np.finfo(dtype).smallest_subnormal
     positions[6, 1] = -np.finfo(dtype).smallest_subnormal
     clip = clip_of(positions, rest, np.zeros(6, np.int32), np.array([-1], np.int32), dtype)
-    assert bits(opened(encoded(clip, lossless=True)).positions()) == bits(positions)
+    assert bits(opened(athcodec.encode(clip, lossless=True)).positions()) == bits(positions)
 
 
 def test_leaving_the_last_level_out_leaves_a_lossy_file(tmp_path):
     clip = plant(seed=5, branches=9, frames=40)
-    data = encoded(clip, lossless=True, rel_error=1e-4)
+    data = athcodec.encode(clip, lossless=True, rel_error=1e-4)
     (tmp_path / "a.ath").write_bytes(data)
     deepest = opened(data).file.level_count - 1
     athcodec.truncate(tmp_path / "a.ath", tmp_path / "b.ath", deepest - 1)
@@ -73,7 +73,7 @@ def test_leaving_the_last_level_out_leaves_a_lossy_file(tmp_path):
 
 def test_a_missing_or_corrupted_exact_level_is_refused_by_name():
     clip = plant(seed=6, branches=5, frames=40)
-    parts = Parts.of(encoded(clip, lossless=True, segment_frames=16))
+    parts = Parts.of(athcodec.encode(clip, lossless=True, segment_frames=16))
     last = parts.header.level_count - 1
     i = parts.index(ct.EXACT, last, 1)
     with pytest.raises(BadChunkTable, match="EXACT"):

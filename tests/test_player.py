@@ -270,13 +270,12 @@ def test_what_no_clip_has_is_refused_and_damage_named(lib, sample_ath):
         assert player.result == 2 and "expected 0x89415448" in str(player.fault)
 
 
-def test_a_mesh_of_the_host_is_asked_for(lib, scratch, sample_clip):
-    path = scratch / "host.ath"
-    athcodec.encode(sample_clip, path, host_rest=True, ladder="none")
-    with Player(lib, path.read_bytes()) as player:
+def test_a_mesh_of_the_host_is_asked_for(lib, sample_clip):
+    data = athcodec.encode(sample_clip, host_rest=True, ladder="none")
+    with Player(lib, data) as player:
         assert player.result == 12
     mesh = np.ascontiguousarray(sample_clip.source_rest, np.float32)
-    with Player(lib, path.read_bytes(), host_mesh=mesh.ctypes.data, host_stride=12, host_vertices=len(mesh)) as player:
+    with Player(lib, data, host_mesh=mesh.ctypes.data, host_stride=12, host_vertices=len(mesh)) as player:
         assert isinstance(player.positions(len(mesh), 1.0), np.ndarray)
 
 
@@ -514,10 +513,10 @@ def test_blends_without_a_weight_or_a_clip_or_memory_are_refused(lib, medley_ath
     assert not memory.held
 
 
-def test_what_comes_of_each_blended_clip_is_prepared_ahead(lib, scratch, sample_clip):
-    memory, path = Memory(), scratch / "twice.ath"
-    athcodec.encode(athcodec.join({"one": sample_clip, "other": sample_clip}), path, rel_error=1e-3)
-    with Player(lib, path.read_bytes(), memory) as player:
+def test_what_comes_of_each_blended_clip_is_prepared_ahead(lib, sample_clip):
+    memory = Memory()
+    data = athcodec.encode(athcodec.join({"one": sample_clip, "other": sample_clip}), rel_error=1e-3)
+    with Player(lib, data, memory) as player:
 
         def at(seconds):
             return player.blended(sample_clip.vertex_count, [Share(i, -1, CLAMP, seconds, 1.0) for i in range(2)])
@@ -564,10 +563,10 @@ def fans(counts, corners) -> np.ndarray:
     )
 
 
-def test_triangles_are_fans_of_the_faces_in_either_order(lib, scratch):
+def test_triangles_are_fans_of_the_faces_in_either_order(lib):
     clip = mixed_clip()
-    athcodec.encode(clip, scratch / "mixed.ath", rel_error=1e-4)
-    with athcodec.open(scratch / "mixed.ath") as file, Player(lib, (scratch / "mixed.ath").read_bytes()) as player:
+    data = athcodec.encode(clip, rel_error=1e-4)
+    with athcodec.open(data) as file, Player(lib, data) as player:
         wanted = fans(clip.attributes["face_vertex_counts"], clip.attributes["face_vertex_indices"])
         np.testing.assert_array_equal(player.lines("triangles", 3), wanted)
         own = player.lines("triangles", 3, FILE_ORDER)
@@ -575,11 +574,10 @@ def test_triangles_are_fans_of_the_faces_in_either_order(lib, scratch):
         np.testing.assert_array_equal(there[own], player.positions(file.file.vertex_count, 0.1)[wanted])
 
 
-def test_lines_are_those_of_the_source_or_along_stems(lib, sample_ath, full_ath, full_clip, scratch, bushy_clip):
+def test_lines_are_those_of_the_source_or_along_stems(lib, full_ath, full_clip, bushy_clip):
     with Player(lib, full_ath.read_bytes()) as player:
         np.testing.assert_array_equal(player.lines("lines", 2), full_clip.edges)
-    athcodec.encode(bushy_clip, scratch / "bare.ath", rel_error=1e-3)
-    with Player(lib, (scratch / "bare.ath").read_bytes()) as player:
+    with Player(lib, athcodec.encode(bushy_clip, rel_error=1e-3)) as player:
         lines = player.lines("lines", 2)
         assert player.lines("triangles", 3) == BAD_ARGUMENT
     roots = int((np.asarray(bushy_clip.branch_parent) < 0).sum())
@@ -594,12 +592,10 @@ def normals_of(lib, triangles, points) -> np.ndarray:
     return out
 
 
-def test_normals_of_decoded_positions_are_those_of_the_source_within_a_degree(lib, scratch):
+def test_normals_of_decoded_positions_are_those_of_the_source_within_a_degree(lib):
     clip = leafed_tree()
-    path = scratch / "leafed.ath"
-    athcodec.encode(clip, path, rel_error=1e-4)
     source = clip.block(0, clip.frame_count)
-    with Player(lib, path.read_bytes()) as player:
+    with Player(lib, athcodec.encode(clip, rel_error=1e-4)) as player:
         triangles = player.lines("triangles", 3)
         decoded = player.positions(clip.vertex_count, float(clip.time[10] - clip.time[0]))
     faces = np.asarray(triangles, int)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from files import encoded
 from plants import plant
 
 import athcodec
@@ -53,7 +52,7 @@ def allow(share: float, monkeypatch) -> None:
 @pytest.mark.parametrize("kind", KINDS)
 def test_counted_work_keeps_to_what_the_clip_allows(kind, share, works, monkeypatch):
     allow(share, monkeypatch)
-    encoded(KINDS[kind]())
+    athcodec.encode(KINDS[kind]())
     assert works and all(work.done <= work.allowed for work in works)
 
 
@@ -97,4 +96,4 @@ def test_less_work_gives_a_file_that_keeps_its_bound(share, tmp_path, monkeypatc
 def test_the_same_is_left_out_with_any_number_of_threads(share, monkeypatch):
     allow(share, monkeypatch)
     clip = plant(seed=1, branches=20, frames=40)
-    assert len({encoded(clip, jobs=jobs) for jobs in (1, 2, 4)}) == 1
+    assert len({athcodec.encode(clip, jobs=jobs) for jobs in (1, 2, 4)}) == 1

@@ -95,10 +95,6 @@ def _wave(frames: int) -> bytes:
     return streams.encode_temporal(row.astype(np.int32)[None])
 
 
-def _bytes_of(clip: MotionClip, folder: Path, **options) -> bytes:
-    return athcodec.encode(clip, folder / "seed.ath", **{"effort": "fast"} | options).path.read_bytes()
-
-
 @cache
 def valid_files() -> dict[str, bytes]:
     """Small valid files by name."""
@@ -111,9 +107,9 @@ def valid_files() -> dict[str, bytes]:
     with TemporaryDirectory() as name:
         folder = Path(name)
         for seed, (make, options) in _ENCODED.items():
-            files[seed] = _bytes_of(make(), folder, **options)
+            files[seed] = athcodec.encode(make(), **{"effort": "fast"} | options)
         with read_hdf5(sample_path()) as clip:
-            files["sample"] = _bytes_of(clip, folder, rel_error=1e-2)
+            files["sample"] = athcodec.encode(clip, effort="fast", rel_error=1e-2)
         files |= {path.stem: path.read_bytes() for name in MANY_FEATURES for path in VECTORS.glob(name + ".ath")}
         files["cut_to_a_level"] = _truncated(files["full"], folder, 1)
         files["cut_to_a_layer"] = _truncated(files["layers"], folder, 4)
