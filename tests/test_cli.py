@@ -410,26 +410,31 @@ def test_a_failure_is_one_line_and_leaves_no_file(encoded, tmp_path, capsys, mon
     assert list(tmp_path.iterdir()) == [] and encoded.read_bytes() == before
 
 
-OTHERS = {  # what is there already, by the verb that would replace it
-    "encode": ("encode SOURCE OUT.ath --effort fast", "HDF5"),
-    "decode": ("decode FILE OUT.usda", "HDF5"),
-    "decode to a format that is named": ("decode FILE OUT.dat --format npz", "HDF5"),
-    "decode to numbered files": ("decode FILE OUT.obj --frames 0:1", "HDF5"),
-    "truncate": ("truncate FILE OUT.ath --level 0", "HDF5"),
-    "hierarchy": ("hierarchy SOURCE --save OUT.json", "HDF5"),
-    "view": ("view FILE --export OUT.html", "HDF5"),
-    "picture": ("picture FILE --png OUT.png", "HDF5"),
+OTHERS = {  # by the verb that would replace what is there already
+    "encode": "encode SOURCE OUT.ath --effort fast",
+    "decode": "decode FILE OUT.usda",
+    "decode to a format that is named": "decode FILE OUT.dat --format npz",
+    "decode to numbered files": "decode FILE OUT.obj --frames 0:1",
+    "truncate": "truncate FILE OUT.ath --level 0",
+    "hierarchy": "hierarchy SOURCE --save OUT.json",
+    "view": "view FILE --export OUT.html",
+    "picture": "picture FILE --png OUT.png",
 }
 
 
-@pytest.mark.parametrize("line, kind", OTHERS.values(), ids=OTHERS)
-def test_a_file_of_another_kind_is_never_replaced(encoded, tmp_path, capsys, line, kind):
-    words = [{"FILE": encoded, "SOURCE": SAMPLE}.get(word, word) for word in line.split()]
-    place = next(i for i, word in enumerate(words) if str(word).startswith("OUT"))
-    words[place] = out = tmp_path / words[place]
+def with_files(line: str, encoded: Path, folder: Path) -> tuple[list[str], Path]:
+    """The words of a line with its files, and the output among them, in a folder."""
+    out = folder / next(word for word in line.split() if word.startswith("OUT"))
+    files = {"FILE": str(encoded), "SOURCE": SAMPLE, out.name: str(out)}
+    return [files.get(word, word) for word in line.split()], out
+
+
+@pytest.mark.parametrize("line", OTHERS.values(), ids=OTHERS)
+def test_a_file_of_another_kind_is_never_replaced(encoded, tmp_path, capsys, line):
+    words, out = with_files(line, encoded, tmp_path)
     shutil.copy(SAMPLE, out)
     assert run(*words) == 1
-    message = f"athcodec: error: {re.escape(str(out))}: is there already and holds {kind}, expected .*another output"
+    message = f"athcodec: error: {re.escape(str(out))}: is there already and holds HDF5, expected .*another output"
     assert re.match(message, capsys.readouterr().err)
     assert list(tmp_path.iterdir()) == [out] and out.read_bytes() == Path(SAMPLE).read_bytes()
 
@@ -446,9 +451,7 @@ def test_a_file_of_another_kind_is_never_replaced(encoded, tmp_path, capsys, lin
     ],
 )
 def test_a_file_of_the_same_kind_and_an_empty_one_are_replaced(encoded, tmp_path, line):
-    words = [{"FILE": encoded, "SOURCE": SAMPLE}.get(word, word) for word in line.split()]
-    place = next(i for i, word in enumerate(words) if str(word).startswith("OUT"))
-    words[place] = out = tmp_path / words[place]
+    words, out = with_files(line, encoded, tmp_path)
     out.touch()
     for _ in range(2):
         assert run(*words) == 0

@@ -338,14 +338,12 @@ def test_the_frames_of_a_segment_in_turn_read_and_decode_it_once(played, monkeyp
     decoder, _ = played
     prepared = []
     prepare = core_file.File.prepare
-    monkeypatch.setattr(
-        core_file.File,
-        "prepare",
-        lambda file, work, segment, level, *memory: (
-            prepared.append((segment, level)),
-            prepare(file, work, segment, level, *memory),
-        ),
-    )
+
+    def counted(file, work, segment, level, *memory):
+        prepared.append((segment, level))
+        prepare(file, work, segment, level, *memory)
+
+    monkeypatch.setattr(core_file.File, "prepare", counted)
     (first, stop), last = decoder.segments[1], decoder.file.level_count - 1
     decoder.positions(first, last)
     before = decoder.file.bytes_read

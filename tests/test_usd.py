@@ -40,6 +40,17 @@ def new_stage(path, first=101, last=110, fps=FPS):
     return stage
 
 
+@pytest.fixture
+def stage(tmp_path):
+    """A stage without prims, of which a.usda has what it holds when it is saved."""
+    return new_stage(tmp_path / "a.usda")
+
+
+def read_saved(stage, **options):
+    stage.Save()
+    return read_all(stage.GetRootLayer().realPath, **options)
+
+
 def add_grid(stage, place="/root/grid", frames=range(101, 111), points=sway):
     mesh = UsdGeom.Mesh.Define(stage, place)
     mesh.CreateSubdivisionSchemeAttr("none")
@@ -90,8 +101,7 @@ def test_a_moving_mesh_below_a_moving_transform_is_read_in_world_space(tmp_path,
 def test_frames_are_the_samples_where_the_stage_has_no_range_or_at_the_rate_of_fps(tmp_path):
     stage = new_stage(tmp_path / "a.usda", first=None, fps=24.0)
     add_grid(stage, frames=[2, 3, 5.5])
-    stage.Save()
-    clip, positions = read_all(tmp_path / "a.usda")
+    clip, positions = read_saved(stage)
     assert np.allclose(clip.time, [0, 1 / 24, 3.5 / 24]) and clip.metadata["start_frame"] == 2
     assert np.array_equal(positions[2], sway(5.5))
     clip, positions = read_all(tmp_path / "a.usda", fps=48.0)
@@ -107,12 +117,10 @@ def test_frames_are_the_samples_where_the_stage_has_no_range_or_at_the_rate_of_f
 def test_units_without_a_symbol_are_kept_in_metres_and_missing_ones_stay_missing(tmp_path):
     stage = Usd.Stage.CreateNew(str(tmp_path / "a.usda"))
     add_grid(stage)
-    stage.Save()
-    clip, _ = read_all(tmp_path / "a.usda")
+    clip, _ = read_saved(stage)
     assert clip.metadata.keys().isdisjoint({"unit", "up_axis", "meters_per_unit"}) and clip.metadata["fps"] == 24
     UsdGeom.SetStageMetersPerUnit(stage, 0.9144)
-    stage.Save()
-    clip, _ = read_all(tmp_path / "a.usda")
+    clip, _ = read_saved(stage)
     assert clip.metadata["meters_per_unit"] == 0.9144 and "unit" not in clip.metadata
     layer = Sdf.Layer.FindOrOpen(str(tmp_path / "a.usda"))
     layer.pseudoRoot.SetInfo("metersPerUnit", Vt.Float(0.01))
@@ -124,9 +132,8 @@ def test_a_layer_that_no_search_finds_is_named_as_missing_and_the_rest_is_read(t
     stage = grid_file(tmp_path / "a.usda")
     for number, name in enumerate(("none.usda", "asset:none.usda", "./none.usda")):
         stage.DefinePrim(f"/gone{number}").GetReferences().AddReference(name)
-    stage.Save()
     with pytest.warns(SourceWarning, match="missing"):
-        clip, _ = read_all(tmp_path / "a.usda")
+        clip, _ = read_saved(stage)
     assert clip.vertex_count == len(GRID) and len(clip.not_read["missing"]) == 3
 
 
@@ -187,8 +194,7 @@ def test_only_and_skip_choose_prims_and_arrays(tmp_path):
         athcodec.read(tmp_path / "a.usdc", only=["bark"])
 
 
-def test_instances_are_read_where_they_stand_and_what_is_hidden_is_not(tmp_path):
-    stage = new_stage(tmp_path / "a.usda")
+def test_instances_are_read_where_they_stand_and_what_is_hidden_is_not(stage):
     stage.CreateClassPrim("/proto")
     add_grid(stage, "/proto/grid")
     for i in range(2):
@@ -201,8 +207,7 @@ def test_instances_are_read_where_they_stand_and_what_is_hidden_is_not(tmp_path)
     stage.GetPrimAtPath("/late").GetAttribute("visibility").Set("inherited", 105)
     for purpose in ("guide", "proxy"):
         UsdGeom.Imageable(add_grid(stage, f"/{purpose}")).CreatePurposeAttr(purpose)
-    stage.Save()
-    clip, positions = read_all(tmp_path / "a.usda")
+    clip, positions = read_saved(stage)
     assert sorted(clip.metadata["part_names"]) == ["/late", "/tree0/grid", "/tree1/grid"]
     first = 12 * clip.metadata["part_names"].index("/tree0/grid")
     assert np.allclose(positions[:, first + 12 : first + 24] - positions[:, first : first + 12], [10, 0, 0], atol=1e-5)
@@ -306,8 +311,7 @@ def test_copies_are_written_as_instances_again(tmp_path, capsys):
         assert again.attributes["part_copies"].tolist() == [1, 20, 20] and off <= 1.01 * decoder.file.max_error_bound
 
 
-def test_copies_that_are_written_as_one_mesh_although_instances_were_asked_for_are_named(tmp_path):
-    stage = new_stage(tmp_path / "a.usda")
+def test_copies_that_are_written_as_one_mesh_although_instances_were_asked_for_are_named(stage, tmp_path):
     instancer, _ = add_leaves(stage)
     instancer.CreateScalesAttr([(-1, 1, 1), (1, 1, 1), (1, 1, 1), (1, 1, 1), (1, 1, 1)])
     stage.Save()
@@ -317,13 +321,11 @@ def test_copies_that_are_written_as_one_mesh_although_instances_were_asked_for_a
         assert lost[0].startswith("copies as instances (mirrored") and "small/blade (3 in one mesh)" in lost[1][0], name
 
 
-def test_what_of_a_point_instancer_is_never_seen_is_not_read(tmp_path):
-    stage = new_stage(tmp_path / "a.usda")
+def test_what_of_a_point_instancer_is_never_seen_is_not_read(stage, tmp_path):
     instancer, _ = add_leaves(stage)
     instancer.CreateInvisibleIdsAttr([0, 3])
     instancer.GetInvisibleIdsAttr().Set([0], 105)
-    stage.Save()
-    clip, _ = read_all(tmp_path / "a.usda")
+    clip, _ = read_saved(stage)
     assert clip.attributes["part_copies"].tolist() == [2, 2]
     instancer.GetProtoIndicesAttr().Set([0] * 5, 104)
     instancer.GetProtoIndicesAttr().Set([1] * 5, 105)
@@ -332,8 +334,7 @@ def test_what_of_a_point_instancer_is_never_seen_is_not_read(tmp_path):
         athcodec.read(tmp_path / "a.usda")
 
 
-def test_what_is_not_read_is_named_once(tmp_path, capsys):
-    stage = new_stage(tmp_path / "a.usda")
+def test_what_is_not_read_is_named_once(stage, tmp_path, capsys):
     add_grid(stage)
     for i in range(2):
         UsdGeom.Cube.Define(stage, f"/root/box{i}")
@@ -344,9 +345,8 @@ def test_what_is_not_read_is_named_once(tmp_path, capsys):
     wet.Set(0.5, 101)
     wet.Set(0.7, 103)
     stage.DefinePrim("/gone").GetReferences().AddReference("./none.usda")
-    stage.Save()
     with pytest.warns(SourceWarning, match="Cube /root/box0, /root/box1$") as said:
-        clip, _ = read_all(tmp_path / "a.usda")
+        clip, _ = read_saved(stage)
     assert len(said) == 1
     found = {kind: len(names) for kind, names in clip.not_read.items()}
     assert found == {"missing": 1, "Material": 1, "Cube": 2, "Camera": 1, "attribute": 1}
@@ -360,8 +360,7 @@ def test_what_is_not_read_is_named_once(tmp_path, capsys):
     )
 
 
-def test_the_scheme_of_a_surface_comes_back_and_what_else_is_authored_is_named(tmp_path, capsys):
-    stage = new_stage(tmp_path / "a.usda")
+def test_the_scheme_of_a_surface_comes_back_and_what_else_is_authored_is_named(stage, tmp_path, capsys):
     mesh = add_grid(stage)
     mesh.CreateSubdivisionSchemeAttr("loop")
     mesh.CreateHoleIndicesAttr([1])
@@ -371,9 +370,8 @@ def test_the_scheme_of_a_surface_comes_back_and_what_else_is_authored_is_named(t
     mesh.GetPrim().SetCustomData({"author": "me"})
     mesh.GetPrim().CreateAttribute("userProperties:height", Sdf.ValueTypeNames.Float).Set(3.5)
     add_grid(stage, "/root/smooth").GetPrim().RemoveProperty("subdivisionScheme")
-    stage.Save()
     with pytest.warns(SourceWarning, match="not read: subdivision /root/grid.holeIndices$"):
-        clip, _ = read_all(tmp_path / "a.usda")
+        clip, _ = read_saved(stage)
     named = [f"/root/grid.{name}" for name in ("userProperties", "velocities", "customData")]
     assert clip.not_read == {"subdivision": ["/root/grid.holeIndices"], "attribute": named}
     assert cli.main(["encode", str(tmp_path / "a.usda"), str(tmp_path / "a.ath")]) == 0
@@ -386,18 +384,15 @@ def test_the_scheme_of_a_surface_comes_back_and_what_else_is_authored_is_named(t
     assert "subdivisionScheme grid, smooth" in capsys.readouterr().err
 
 
-def test_a_primvar_without_usable_indices_is_named_and_does_not_refuse_the_stage(tmp_path):
-    stage = new_stage(tmp_path / "a.usda")
+def test_a_primvar_without_usable_indices_is_named_and_does_not_refuse_the_stage(stage):
     prim = add_grid(stage).GetPrim()
     UsdGeom.PrimvarsAPI(prim).CreatePrimvar("hue", Sdf.ValueTypeNames.FloatArray, "vertex").Set([1.0])
     prim.CreateAttribute("primvars:hue:indices", Sdf.ValueTypeNames.UIntArray).Set([0] * 12)
-    stage.Save()
-    clip, _ = read_all(tmp_path / "a.usda")
+    clip, _ = read_saved(stage)
     assert clip.not_read == {"attribute": ["/root/grid.hue"]}
 
 
-def test_arrays_that_change_in_a_single_frame_are_named_and_those_with_equal_samples_stay(tmp_path):
-    stage = new_stage(tmp_path / "a.usda")
+def test_arrays_that_change_in_a_single_frame_are_named_and_those_with_equal_samples_stay(stage):
     primvars = UsdGeom.PrimvarsAPI(add_grid(stage))
     twig = UsdGeom.BasisCurves.Define(stage, "/root/twig")
     twig.CreateCurveVertexCountsAttr([2])
@@ -407,22 +402,19 @@ def test_arrays_that_change_in_a_single_frame_are_named_and_those_with_equal_sam
         for frame in range(101, 111):
             primvar.Set([float(changes and frame == 104)] * len(QUADS), frame)
             twig.GetWidthsAttr().Set([1.0 + (frame == 107)] * 2, frame)
-    stage.Save()
-    clip, _ = read_all(tmp_path / "a.usda")
+    clip, _ = read_saved(stage)
     assert clip.not_read == {"attribute": ["/root/grid.wet", "/root/twig.widths"]}
     assert "dry" in clip.attributes and not clip.attributes.keys() & {"wet", "radius"}
 
 
 @pytest.mark.parametrize("mirrored", [101, 105, 110])
-def test_a_mesh_that_turns_inside_out_in_a_single_frame_is_named(tmp_path, mirrored):
-    stage = new_stage(tmp_path / "a.usda")
+def test_a_mesh_that_turns_inside_out_in_a_single_frame_is_named(stage, mirrored):
     scale = UsdGeom.Xform.Define(stage, "/root").AddScaleOp()
     for frame in range(101, 111):
         scale.Set(Gf.Vec3f(-1 if frame == mirrored else 1, 1, 1), frame)
     add_grid(stage)
-    stage.Save()
     with pytest.warns(SourceWarning, match="not read: faces that turn inside out in time /root/grid"):
-        read_all(tmp_path / "a.usda")
+        read_saved(stage)
 
 
 def skinned(path):
@@ -500,8 +492,7 @@ def test_objects_beside_a_skinned_mesh_are_branches_on_the_nearest_joint(tmp_pat
 
 
 @pytest.mark.parametrize("change", ["faces", "points"])
-def test_a_topology_that_changes_is_refused_with_its_frame(tmp_path, change):
-    stage = new_stage(tmp_path / "a.usda")
+def test_a_topology_that_changes_is_refused_with_its_frame(stage, tmp_path, change):
     mesh = add_grid(stage)
     if change == "faces":
         mesh.GetFaceVertexIndicesAttr().Set(QUADS.reshape(-1).tolist(), 101)

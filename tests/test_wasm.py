@@ -243,11 +243,8 @@ def test_the_module_describes_a_file_as_the_c_library_does(any_ath, tmp_path):
         "clips": [
             [
                 *(clip.name.decode(), clip.duration, clip.first_frame, clip.frame_count, clip.first_segment),
-                *(
-                    clip.segment_count,
-                    bool(clip.loop),
-                    [core.ath_seam_error(file, i, level) for level in player.levels],
-                ),
+                *(clip.segment_count, bool(clip.loop)),
+                [core.ath_seam_error(file, i, level) for level in player.levels],
             ]
             for i, clip in enumerate(player.clips)
         ],
