@@ -278,7 +278,8 @@ int ath_gpu_build_level(const ath_file *file, int32_t level, void *memory, size_
         return ATH_NO_MEMORY;
     memset(&writer, 0, sizeof writer);
     carve_level(&writer, file, level, (uint8_t *)memory);
-    memset(writer.head, 0, sizeof *writer.head);
+    /* Also what lies between the sections, so that the same file gives the same block. */
+    memset(writer.head, 0, (size_t)((uint8_t *)writer.bases - (uint8_t *)writer.head));
     for (int32_t p = 0; p < file->plan.piece_count; p++) writer.body_of[p] = -1;
     body_walk walk = walk_bodies(file, level);
     int32_t count = 0;
