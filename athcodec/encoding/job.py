@@ -455,7 +455,8 @@ class EncodingJob:
         start = search.trials.start
         is_rigid = (start.rigid > start.layer).any()  # Also in the last layer.
         prediction = None if is_rigid else self._best_prediction(bound, unsearched, work)
-        if prediction is not None and prediction.bytes < SEARCH_SAVES * unsearched:
+        saves = SEARCH_SAVES if work.fits(search.trials.work_of_trial) else 1.0
+        if prediction is not None and prediction.bytes < saves * unsearched:
             return self._predicted(prediction.choice)
         try:
             choices, prelude = search.decide()
