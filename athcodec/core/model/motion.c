@@ -6,7 +6,7 @@
 #include "model/rotations.h"
 
 enum { POLAR_ITERATIONS = 4, ATH_TERMS = ATH_SHAPE_NUMBERS + ATH_PIECE_VERTICES - ATH_SHAPE_MODES };
-enum { PLACED_VERTICES = 2 * ATH_LANES, PLACED_FRAMES = 2 * ATH_LANES };
+enum { PLACED_VERTICES = 4 * ATH_LANES, PLACED_FRAMES = 2 * ATH_LANES };
 
 static const double LEAST_MOMENT =
     0.0009765625; /* smallest moment of inertia that sets a rotation step, over the sum of all moments */
@@ -168,9 +168,10 @@ static placing_terms terms_of(const ath_piece *piece, const ath_piece_rows *rows
     return terms;
 }
 
-/* A few vertices side by side: rest positions less the attach point, and how far each term moves them. */
+/* A few vertices side by side: rest positions less the attach point, and how far each term moves them. Shapes have a
+ * row of weights per axis, the modes behind them one each. */
 typedef struct {
-    double rest[3][PLACED_VERTICES], weight[ATH_TERMS][3][PLACED_VERTICES]; /* modes: axis 0 only */
+    double rest[3][PLACED_VERTICES], weight[3 * ATH_SHAPE_NUMBERS + ATH_PIECE_VERTICES][PLACED_VERTICES];
 } placed_vertices;
 
 ATH_INLINE void weigh_terms(const ath_plan *plan, const ath_piece *piece, const ath_piece_rows *rows,
@@ -189,9 +190,10 @@ ATH_INLINE void weigh_terms(const ath_plan *plan, const ath_piece *piece, const 
     for (int32_t j = 0; j < terms->shape_count; j++)
         for (int32_t v = 0; v < PLACED_VERTICES; v += ATH_LANES)
             lanes_of_shape(ath_shape_modes(piece), rows->shapes + terms->shape[j] * ATH_SHAPE_NUMBERS, mode[0] + v,
-                           PLACED_VERTICES, vertices->weight[j][0] + v, PLACED_VERTICES);
+                           PLACED_VERTICES, vertices->weight[3 * j] + v, PLACED_VERTICES);
     for (int32_t j = terms->shape_count; j < terms->count; j++)
-        for (int32_t i = 0; i < count; i++) vertices->weight[j][0][i] = basis[terms->mode[j] * piece->count + place[i]];
+        for (int32_t i = 0; i < count; i++)
+            vertices->weight[2 * terms->shape_count + j][i] = basis[terms->mode[j] * piece->count + place[i]];
 }
 
 /* Sums the terms of vertex v in PLACED_FRAMES frames from t on. */
@@ -208,16 +210,16 @@ ATH_INLINE void add_terms(int32_t t, const placing_terms *terms, const placed_ve
     z1 = z0;
     for (; j < terms->shape_count; j++) {
         const double *track = terms->track[j] + t;
-        lanes_add_scaled(&x0, vertices->weight[j][0][v], track);
-        lanes_add_scaled(&x1, vertices->weight[j][0][v], track + ATH_LANES);
-        lanes_add_scaled(&y0, vertices->weight[j][1][v], track);
-        lanes_add_scaled(&y1, vertices->weight[j][1][v], track + ATH_LANES);
-        lanes_add_scaled(&z0, vertices->weight[j][2][v], track);
-        lanes_add_scaled(&z1, vertices->weight[j][2][v], track + ATH_LANES);
+        lanes_add_scaled(&x0, vertices->weight[3 * j][v], track);
+        lanes_add_scaled(&x1, vertices->weight[3 * j][v], track + ATH_LANES);
+        lanes_add_scaled(&y0, vertices->weight[3 * j + 1][v], track);
+        lanes_add_scaled(&y1, vertices->weight[3 * j + 1][v], track + ATH_LANES);
+        lanes_add_scaled(&z0, vertices->weight[3 * j + 2][v], track);
+        lanes_add_scaled(&z1, vertices->weight[3 * j + 2][v], track + ATH_LANES);
     }
     for (; j < terms->count; j++) {
         const double *track = terms->track[j] + t;
-        double weight = vertices->weight[j][0][v];
+        double weight = vertices->weight[2 * terms->shape_count + j][v];
         lanes_add_scaled(&x0, weight, track);
         lanes_add_scaled(&x1, weight, track + ATH_LANES);
         lanes_add_scaled(&y0, weight, track + T);
@@ -256,9 +258,9 @@ ATH_INLINE void place_frame(int32_t t, const placing_terms *terms, const placed_
     double x[3];
     for (int32_t k = 0; k < 3; k++) {
         x[k] = vertices->rest[k][v];
-        for (int32_t j = 0; j < shapes; j++) x[k] = x[k] + vertices->weight[j][k][v] * terms->track[j][t];
+        for (int32_t j = 0; j < shapes; j++) x[k] = x[k] + vertices->weight[3 * j + k][v] * terms->track[j][t];
         for (int32_t j = shapes; j < terms->count; j++)
-            x[k] = x[k] + vertices->weight[j][0][v] * terms->track[j][k * T + t];
+            x[k] = x[k] + vertices->weight[2 * shapes + j][v] * terms->track[j][k * T + t];
     }
     for (int32_t k = 0; k < 3; k++, R += 3 * T)
         out[k * T + t] = c[k * T] + (R[0] * x[0] + R[T] * x[1] + R[2 * T] * x[2]);
@@ -269,7 +271,7 @@ ATH_INLINE void put_floats(int32_t rows, const double *from, int32_t row_size, c
                            size_t frame_size)
 {
     for (size_t t = 0; t < PLACED_FRAMES; t++)
-        for (size_t behind = 16; behind <= 3 * PLACED_VERTICES; behind += 8)
+        for (size_t behind = 16; behind <= 3 * PLACED_VERTICES; behind += 16)
             ath_expect_write((uintptr_t)out + (t * frame_size + (size_t)rows + behind - 1) * sizeof *out);
     for (int32_t r = 0; rows >= ATH_LANES && r < rows; r += ATH_LANES) {
         int32_t row = ath_min(r, rows - ATH_LANES);
