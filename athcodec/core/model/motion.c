@@ -6,7 +6,7 @@
 #include "model/rotations.h"
 
 enum { POLAR_ITERATIONS = 4, ATH_TERMS = ATH_SHAPE_NUMBERS + ATH_PIECE_VERTICES - ATH_SHAPE_MODES };
-enum { PLACED_VERTICES = 2 * ATH_LANES, PLACED_FRAMES = 2 * ATH_LANES };
+enum { PLACED_VERTICES = 4 * ATH_LANES, PLACED_FRAMES = 2 * ATH_LANES };
 
 static const double LEAST_MOMENT =
     0.0009765625; /* smallest moment of inertia that sets a rotation step, over the sum of all moments */
@@ -168,9 +168,10 @@ static placing_terms terms_of(const ath_piece *piece, const ath_piece_rows *rows
     return terms;
 }
 
-/* A few vertices side by side: rest positions less the attach point, and how far each term moves them. */
+/* A few vertices side by side: rest positions less the attach point, and how far each term moves them. Shapes have a
+ * row of weights per axis, the modes behind them one each. */
 typedef struct {
-    double rest[3][PLACED_VERTICES], weight[ATH_TERMS][3][PLACED_VERTICES]; /* modes: axis 0 only */
+    double rest[3][PLACED_VERTICES], weight[3 * ATH_SHAPE_NUMBERS + ATH_PIECE_VERTICES][PLACED_VERTICES];
 } placed_vertices;
 
 ATH_INLINE void weigh_terms(const ath_plan *plan, const ath_piece *piece, const ath_piece_rows *rows,
@@ -189,9 +190,10 @@ ATH_INLINE void weigh_terms(const ath_plan *plan, const ath_piece *piece, const 
     for (int32_t j = 0; j < terms->shape_count; j++)
         for (int32_t v = 0; v < PLACED_VERTICES; v += ATH_LANES)
             lanes_of_shape(ath_shape_modes(piece), rows->shapes + terms->shape[j] * ATH_SHAPE_NUMBERS, mode[0] + v,
-                           PLACED_VERTICES, vertices->weight[j][0] + v, PLACED_VERTICES);
+                           PLACED_VERTICES, vertices->weight[3 * j] + v, PLACED_VERTICES);
     for (int32_t j = terms->shape_count; j < terms->count; j++)
-        for (int32_t i = 0; i < count; i++) vertices->weight[j][0][i] = basis[terms->mode[j] * piece->count + place[i]];
+        for (int32_t i = 0; i < count; i++)
+            vertices->weight[2 * terms->shape_count + j][i] = basis[terms->mode[j] * piece->count + place[i]];
 }
 
 /* Sums the terms of vertex v in PLACED_FRAMES frames from t on. */
@@ -208,16 +210,16 @@ ATH_INLINE void add_terms(int32_t t, const placing_terms *terms, const placed_ve
     z1 = z0;
     for (; j < terms->shape_count; j++) {
         const double *track = terms->track[j] + t;
-        lanes_add_scaled(&x0, vertices->weight[j][0][v], track);
-        lanes_add_scaled(&x1, vertices->weight[j][0][v], track + ATH_LANES);
-        lanes_add_scaled(&y0, vertices->weight[j][1][v], track);
-        lanes_add_scaled(&y1, vertices->weight[j][1][v], track + ATH_LANES);
-        lanes_add_scaled(&z0, vertices->weight[j][2][v], track);
-        lanes_add_scaled(&z1, vertices->weight[j][2][v], track + ATH_LANES);
+        lanes_add_scaled(&x0, vertices->weight[3 * j][v], track);
+        lanes_add_scaled(&x1, vertices->weight[3 * j][v], track + ATH_LANES);
+        lanes_add_scaled(&y0, vertices->weight[3 * j + 1][v], track);
+        lanes_add_scaled(&y1, vertices->weight[3 * j + 1][v], track + ATH_LANES);
+        lanes_add_scaled(&z0, vertices->weight[3 * j + 2][v], track);
+        lanes_add_scaled(&z1, vertices->weight[3 * j + 2][v], track + ATH_LANES);
     }
     for (; j < terms->count; j++) {
         const double *track = terms->track[j] + t;
-        double weight = vertices->weight[j][0][v];
+        double weight = vertices->weight[2 * terms->shape_count + j][v];
         lanes_add_scaled(&x0, weight, track);
         lanes_add_scaled(&x1, weight, track + ATH_LANES);
         lanes_add_scaled(&y0, weight, track + T);
@@ -233,9 +235,9 @@ ATH_INLINE void add_terms(int32_t t, const placing_terms *terms, const placed_ve
     lanes_store(sum[2] + ATH_LANES, &z1);
 }
 
-/* x := c + R x for `count` vertices in ATH_LANES frames. Vertex i goes to row place[i]. */
+/* x := c + R x for `count` vertices in ATH_LANES frames. Vertex i goes to row 3 place[i] and the two behind it. */
 ATH_INLINE void move_vertices(int32_t T, const int32_t *place, int32_t count, const double *R, const double *c,
-                              double sums[][3][PLACED_FRAMES], int32_t from, double *out)
+                              double sums[][3][PLACED_FRAMES], int32_t from, double *out, int32_t row_size)
 {
     ath_lanes rows[3][3], centre[3], x[3];
     for (int32_t k = 0; k < 3; k++) {
@@ -244,7 +246,7 @@ ATH_INLINE void move_vertices(int32_t T, const int32_t *place, int32_t count, co
     }
     for (int32_t i = 0; i < count; i++) {
         for (int32_t k = 0; k < 3; k++) lanes_load(&x[k], sums[i][k] + from);
-        for (int32_t k = 0; k < 3; k++) lanes_move(out + (3 * place[i] + k) * T, &centre[k], rows[k], x);
+        for (int32_t k = 0; k < 3; k++) lanes_move(out + (3 * place[i] + k) * row_size, &centre[k], rows[k], x);
     }
 }
 
@@ -256,38 +258,70 @@ ATH_INLINE void place_frame(int32_t t, const placing_terms *terms, const placed_
     double x[3];
     for (int32_t k = 0; k < 3; k++) {
         x[k] = vertices->rest[k][v];
-        for (int32_t j = 0; j < shapes; j++) x[k] = x[k] + vertices->weight[j][k][v] * terms->track[j][t];
+        for (int32_t j = 0; j < shapes; j++) x[k] = x[k] + vertices->weight[3 * j + k][v] * terms->track[j][t];
         for (int32_t j = shapes; j < terms->count; j++)
-            x[k] = x[k] + vertices->weight[j][0][v] * terms->track[j][k * T + t];
+            x[k] = x[k] + vertices->weight[2 * shapes + j][v] * terms->track[j][k * T + t];
     }
     for (int32_t k = 0; k < 3; k++, R += 3 * T)
         out[k * T + t] = c[k * T] + (R[0] * x[0] + R[T] * x[1] + R[2 * T] * x[2]);
 }
 
+/* Puts rows of PLACED_FRAMES positions into frames, and prefetches the memory behind them, which the next ones fill. */
+ATH_INLINE void put_floats(int32_t rows, const double *from, int32_t row_size, const double *added, float *out,
+                           size_t frame_size)
+{
+    for (size_t t = 0; t < PLACED_FRAMES; t++)
+        for (size_t behind = 16; behind <= 3 * PLACED_VERTICES; behind += 16)
+            ath_expect_write((uintptr_t)out + (t * frame_size + (size_t)rows + behind - 1) * sizeof *out);
+    for (int32_t r = 0; rows >= ATH_LANES && r < rows; r += ATH_LANES) {
+        int32_t row = ath_min(r, rows - ATH_LANES);
+        for (size_t t = 0; t < PLACED_FRAMES; t += ATH_LANES)
+            lanes_transpose(from + row * row_size + t, (size_t)row_size, added + row % 3, out + t * frame_size + row,
+                            frame_size);
+    }
+    for (int32_t r = 0; rows < ATH_LANES && r < rows; r++)
+        for (size_t t = 0; t < PLACED_FRAMES; t++)
+            out[t * frame_size + (size_t)r] = (float)(from[(size_t)(r * row_size) + t] + added[r]);
+}
+
 /* placed = c + R (x0 - a + sum over terms of weight * track), shapes first, without tracks of zeros. A few vertices
  * pass through a few frames at a time, while tracks and attach frames stay in the innermost cache. wanted: bit v asks
- * for vertex v. */
+ * for vertex v. to: null, or the destination of all vertices, whose rows are then kept only for pieces behind. */
 ATH_HOT static void place(const ath_plan *plan, const ath_motion *motion, const ath_piece *piece,
-                          const ath_piece_rows *rows, const uint8_t *used, uint64_t wanted, const ath_scratch *scratch)
+                          const ath_piece_rows *rows, const uint8_t *used, uint64_t wanted, const ath_scratch *scratch,
+                          const ath_float_frames *to)
 {
     int32_t T = motion->frames, places[ATH_PIECE_VERTICES], total = 0, count;
     placing_terms terms = terms_of(piece, rows, T, used, scratch->rows);
     placed_vertices vertices;
-    double sums[PLACED_VERTICES][3][PLACED_FRAMES], *out = scratch->placed;
+    double sums[PLACED_VERTICES][3][PLACED_FRAMES], tile[3 * PLACED_VERTICES * PLACED_FRAMES], added[3 + ATH_LANES];
+    double *out = scratch->placed;
     const double *R = scratch->at.rotation, *c = scratch->at.point;
+    int kept = !to || piece->attach_cache >= 0;
     for (int32_t v = 0; v < piece->count; v++)
         if (wanted >> v & 1) places[total++] = v;
+    for (int32_t i = 0; to && i < 3 + ATH_LANES; i++) added[i] = to->origin[i % 3];
     for (const int32_t *at = places; at < places + total; at += count) {
-        int32_t t = 0;
         count = ath_min(PLACED_VERTICES, total - (int32_t)(at - places));
         weigh_terms(plan, piece, rows, &terms, at, count, &vertices);
-        for (; t + PLACED_FRAMES <= T; t += PLACED_FRAMES) {
+        for (int32_t start = 0; T >= PLACED_FRAMES && start < T; start += PLACED_FRAMES) {
+            int32_t t = ath_min(start, T - PLACED_FRAMES), row_size = kept ? T : PLACED_FRAMES;
+            double *moved = kept ? out + t : tile;
             for (int32_t i = 0; i < count; i++) add_terms(t, &terms, &vertices, i, sums[i]);
             for (int32_t from = 0; from < PLACED_FRAMES; from += ATH_LANES)
-                move_vertices(T, at, count, R + t + from, c + t + from, sums, from, out + t + from);
+                move_vertices(T, kept ? at : places, count, R + t + from, c + t + from, sums, from, moved + from,
+                              row_size);
+            if (to)
+                put_floats(3 * count, moved + (kept ? 3 * at[0] * T : 0), row_size, added,
+                           to->first + (size_t)t * to->frame_size + 3 * at[0], to->frame_size);
         }
-        for (; t < T; t++)
-            for (int32_t i = 0; i < count; i++) place_frame(t, &terms, &vertices, i, &scratch->at, out + at[i] * 3 * T);
+        for (int32_t t = 0; T < PLACED_FRAMES && t < T; t++)
+            for (int32_t i = 0; i < count; i++) {
+                double *x = out + at[i] * 3 * T;
+                place_frame(t, &terms, &vertices, i, &scratch->at, x);
+                for (int32_t k = 0; to && k < 3; k++)
+                    to->first[(size_t)t * to->frame_size + (size_t)(3 * at[i] + k)] = (float)(x[k * T + t] + added[k]);
+            }
     }
 }
 
@@ -507,11 +541,11 @@ void ath_inverse_row(const ath_motion *motion, const ath_piece *piece, const ath
 
 const double *ath_pose_used(const ath_plan *plan, const ath_motion *motion, const ath_piece *piece,
                             const ath_piece_rows *rows, const uint8_t *used, uint64_t wanted,
-                            const ath_scratch *scratch)
+                            const ath_scratch *scratch, const ath_float_frames *to)
 {
     ath_scratch here = *scratch;
     if (piece->attach_cache >= 0) here.placed = cached_vertices(motion, piece);
-    place(plan, motion, piece, rows, used, turns_with_sheet(piece) ? ATH_ALL_VERTICES : wanted, &here);
+    place(plan, motion, piece, rows, used, turns_with_sheet(piece) ? ATH_ALL_VERTICES : wanted, &here, to);
     carry(plan, motion, piece, &here);
     return here.placed;
 }
@@ -528,7 +562,7 @@ const double *ath_pose_rows(const ath_plan *plan, const ath_motion *motion, int3
     uint8_t used[ATH_PIECE_VERTICES];
     for (int32_t m = 0; m < ath_rank(piece); m++)
         used[m] = (uint8_t)any_nonzero(row_of(motion, scratch, m), 3 * motion->frames);
-    return ath_pose_used(plan, motion, piece, rows, used, ATH_ALL_VERTICES, scratch);
+    return ath_pose_used(plan, motion, piece, rows, used, ATH_ALL_VERTICES, scratch, 0);
 }
 
 const double *ath_pose_piece(const ath_plan *plan, const ath_motion *motion, int32_t p, const ath_piece_rows *rows,
@@ -537,7 +571,7 @@ const double *ath_pose_piece(const ath_plan *plan, const ath_motion *motion, int
     uint8_t used[ATH_PIECE_VERTICES];
     ath_turned_attach(plan, motion, p, rows, scratch);
     ath_pose_tracks(motion, plan->pieces + p, rows, scratch, used);
-    return ath_pose_used(plan, motion, plan->pieces + p, rows, used, ATH_ALL_VERTICES, scratch);
+    return ath_pose_used(plan, motion, plan->pieces + p, rows, used, ATH_ALL_VERTICES, scratch, 0);
 }
 
 void ath_pose_tracks(const ath_motion *motion, const ath_piece *piece, const ath_piece_rows *rows,

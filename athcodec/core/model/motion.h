@@ -84,6 +84,13 @@ typedef struct {
     double *rotation, *shift; /* 3 x frames each, contiguous: the tracks that a refinement predicts from, if coded */
 } ath_scratch;
 
+/* Where the vertices of a piece go as floats, frame by frame. */
+typedef struct {
+    float *first;      /* its first vertex in the first frame */
+    size_t frame_size; /* floats from one frame to the next */
+    const double *origin;
+} ath_float_frames;
+
 /* A piece's rotation rows are steps about axes, the rows of `axes`. */
 typedef struct {
     double steps[3], axes[9];
@@ -111,11 +118,12 @@ const double *ath_pose_piece(const ath_plan *plan, const ath_motion *motion, int
 /* After ath_turned_attach, fills the coefficients over time, and notes which rows are not all 0 (ATH_PIECE_VERTICES). */
 void ath_pose_tracks(const ath_motion *motion, const ath_piece *piece, const ath_piece_rows *rows,
                      const ath_scratch *scratch, uint8_t *used);
-/* Places those vertices of a piece that are wanted, after ath_pose_tracks. wanted: bit v asks for vertex v. */
+/* Places those vertices of a piece that are wanted, after ath_pose_tracks. wanted: bit v asks for vertex v. to: null, or
+ * the destination of all vertices, which are then not returned. */
 #define ATH_ALL_VERTICES (~(uint64_t)0)
 const double *ath_pose_used(const ath_plan *plan, const ath_motion *motion, const ath_piece *piece,
                             const ath_piece_rows *rows, const uint8_t *used, uint64_t wanted,
-                            const ath_scratch *scratch);
+                            const ath_scratch *scratch, const ath_float_frames *to);
 
 /* Turns R towards the rotation nearest to H, whose column k is what rest axis k became. Leaves R if H vanishes. */
 void ath_turn_to(const double H[9], int32_t steps, double R[9]);

@@ -764,11 +764,11 @@ static void look_before(ath_work *work, int32_t q, int32_t p)
     layer->rows.coarse_shift = same ? coarse->rows.shift : 0;
 }
 
-static const double *placed_piece(layer_work *layer, int32_t p)
+static const double *placed_piece(layer_work *layer, int32_t p, const ath_float_frames *to)
 {
     if (!layer->placed)
         layer->placed = ath_pose_used(layer->plan, &layer->motion, layer->plan->pieces + p, &layer->rows, layer->used,
-                                      ATH_ALL_VERTICES, &layer->scratch);
+                                      ATH_ALL_VERTICES, &layer->scratch, to);
     return layer->placed;
 }
 
@@ -776,12 +776,16 @@ static const double *placed_piece(layer_work *layer, int32_t p)
 static void pose_piece(const ath_work *work, layer_work *layer, int32_t p)
 {
     const ath_piece *piece = layer->plan->pieces + p;
+    ath_segment *segment = work->segment;
+    ath_float_frames to = {(float *)ath_vertex_at(segment, segment->positions, 0, (size_t)work->exact),
+                           3 * (size_t)segment->exact_vertices, work->file->info.origin};
     ath_pose_tracks(&layer->motion, piece, &layer->rows, &layer->scratch, layer->used);
     layer->placed = 0;
     if (layer == work->layers + work->layer)
-        placed_piece(layer, p);
+        placed_piece(layer, p, segment->is_float64 ? 0 : &to);
     else if (piece->attach_cache >= 0)
-        ath_pose_used(layer->plan, &layer->motion, piece, &layer->rows, layer->used, piece->attached, &layer->scratch);
+        ath_pose_used(layer->plan, &layer->motion, piece, &layer->rows, layer->used, piece->attached, &layer->scratch,
+                      0);
 }
 
 static void predict_modes(layer_work *layer, int32_t p)
@@ -790,7 +794,7 @@ static void predict_modes(layer_work *layer, int32_t p)
     ath_placing placing = {coarse->plan, &coarse->rows, &coarse->scratch, coarse->used};
     if (ath_foresee_modes(layer->plan, &layer->motion, p, &layer->before, &placing, &layer->scratch, &layer->rows))
         return;
-    layer->before.placed = placed_piece(coarse, p);
+    layer->before.placed = placed_piece(coarse, p, 0);
     ath_predict_modes(layer->plan, &layer->motion, layer->plan->pieces + p, &layer->before, &layer->scratch,
                       &layer->rows);
 }
@@ -915,7 +919,8 @@ static int place_piece(ath_work *work, int32_t p)
     if (work->keeping.at)
         ath_keep_piece(&work->keeping, piece, &layer->rows, layer->shape_integers, layer->motion.frames);
     if (watcher_of(work)) watch_piece(work, p);
-    ath_store_vertices(work->segment, work->file->info.origin, vertex, piece->count, layer->placed);
+    if (work->segment->is_float64)
+        ath_store_doubles(work->segment, work->file->info.origin, vertex, piece->count, layer->placed);
     ath_keep_end(work->segment, vertex, (size_t)piece->count);
     if (work->join.width > 0)
         ath_join_vertices(&work->join, work->segment, vertex, (size_t)piece->count, watcher_of(work));

@@ -4,9 +4,9 @@
 
 #include "play/segment.h"
 
-/* Puts `count` placed vertices (3 x frames each, relative to the origin) from exact vertex `vertex` on. */
-void ath_store_vertices(ath_segment *segment, const double origin[3], size_t vertex, int32_t count,
-                        const double *placed);
+/* Puts `count` placed vertices (3 x frames each, relative to the origin) from exact vertex `vertex` on as doubles. */
+void ath_store_doubles(ath_segment *segment, const double origin[3], size_t vertex, int32_t count,
+                       const double *placed);
 /* Copies exact vertices, and their end, from the same segment at another level. */
 void ath_copy_vertices(ath_segment *segment, const ath_segment *from, size_t vertex, size_t count);
 /* Keeps the last frames of exact vertices for the segment that is joined to this one. */
