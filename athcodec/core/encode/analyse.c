@@ -247,23 +247,6 @@ static void add_carried(const ath_plan *plan, int32_t T, const ath_piece *root, 
         for (int32_t t = 0; t < T; t++) H[k][t] += own2 / carried2 * carried[k][t];
 }
 
-static double determinant(const double m[9])
-{
-    return m[0] * (m[4] * m[8] - m[5] * m[7]) - m[1] * (m[3] * m[8] - m[5] * m[6]) + m[2] * (m[3] * m[7] - m[4] * m[6]);
-}
-
-/* Fills the rotation nearest to H by its singular vectors, whatever H is. */
-static void rotation_of_vectors(const double H[9], double R[9])
-{
-    double left[9], stretch[3], right[9];
-    ath_decompose(1, H, left, stretch, right);
-    double sign = determinant(left) * determinant(right) < 0.0 ? -1.0 : 1.0;
-    for (int32_t i = 0; i < 3; i++)
-        for (int32_t k = 0; k < 3; k++)
-            R[3 * i + k] =
-                left[3 * i] * right[k] + left[3 * i + 1] * right[3 + k] + sign * left[3 * i + 2] * right[6 + k];
-}
-
 /* Turns rotations, one in each lane, by a step of Newton's method towards those nearest to H, for which the product of H
  * and the transpose of R is symmetric. Fills the squares of the turns; 1 where R is too far from the nearest rotation. */
 ATH_INLINE void turn_closer(double H[9][ATH_LANES], double R[9][ATH_LANES], double size2[ATH_LANES])
@@ -308,7 +291,7 @@ ATH_HOT static void nearest_rotations(double H[9][ATH_LANES], const double befor
     for (int32_t l = 0; l < ATH_LANES; l++) {
         if (most[l] < far_turn && size2[l] <= close_turn) continue;
         for (int32_t k = 0; k < 9; k++) own[k] = H[k][l];
-        rotation_of_vectors(own, nearest);
+        ath_nearest_rotation(own, nearest);
         for (int32_t k = 0; k < 9; k++) R[k][l] = nearest[k];
     }
 }

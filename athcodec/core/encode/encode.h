@@ -80,6 +80,14 @@ ATH_ENCODER_API const char *ath_layout(int32_t index, size_t *offset, size_t *si
 /* Returns the bytes of scratch memory that any of the writers below needs as `model`. */
 ATH_ENCODER_API size_t ath_model_size(void);
 
+/* Fills the maps of pieces in each frame: matrix, its inverse, and centroid. stems: first vertices, and the number of all.
+ * order: pieces, each behind its parent. links, 5 per piece: first and last stem + 1, parent or -1, rank, and whether
+ * others inherit its rotation. shapes, 21 per piece: centroid, principal axes and pseudo-inverse of the rest pose. rest:
+ * 3 x vertices; positions: 3 x frames x vertices. work: 12 x (stem_count + 1) + 9 x piece_count. */
+ATH_ENCODER_API void ath_fit(int32_t vertex_count, int32_t frames, int32_t stem_count, const int64_t *stems,
+                             int32_t piece_count, const int64_t *order, const int64_t *links, const double *shapes,
+                             const double *rest, const double *positions, double *work, double *linear,
+                             double *inverse, double *centroid);
 /* Measures the residuals of pieces, ranges of vertices that each move by one affine map: the mean distance of each
  * piece in each frame, the largest distance, and the most vertices beyond xi in a frame. rest: 3 x vertices; positions:
  * 3 x frames x vertices; inverse, offset: 3 x 3 and 3 for each frame and piece, which make residuals of positions. */
@@ -145,6 +153,8 @@ ATH_ENCODER_API void ath_multiply(int64_t count, int64_t rows, int64_t inner, in
                                   int64_t a_step, const double *b, int64_t b_step, double *out);
 /* Decomposes 3 x 3 matrices: left (columns) times the 3 singular values, in descending order, times right (rows). */
 ATH_ENCODER_API void ath_decompose(int64_t count, const double *matrices, double *left, double *stretch, double *right);
+/* Fills the rotation nearest to H by its singular vectors, whatever H is. */
+void ath_nearest_rotation(const double H[9], double R[9]);
 /* Replaces `count` times rows, n x columns, by the solution of matrix * x = rows. The matrices are positive definite and
  * are destroyed. */
 ATH_ENCODER_API void ath_solve(int64_t count, int32_t n, int32_t columns, double *matrices, double *rows);
