@@ -215,7 +215,7 @@ _ENCODING = {  # Functions of core/model/*.h and core/encode/encode.h.
     "ath_differences": (None, [*[c_int32] * 3, *[c_void_p] * 6, c_double, *[c_void_p] * 3]),
     "ath_fit": (None, [*[c_int32] * 3, c_void_p, c_int32, *[c_void_p] * 9]),
     "ath_gather": (None, [c_int32, c_int32, c_void_p, c_int32, c_int, *[c_void_p] * 3]),
-    "ath_analyse": (None, [*_SEGMENT, c_int32, c_int32, c_void_p, POINTER(Rounding), c_void_p, c_int, c_void_p]),
+    "ath_analyse": (None, [*_SEGMENT, c_int32, c_int32, c_void_p, POINTER(Rounding), c_int, c_void_p, c_int, c_void_p]),
     "ath_analyse_nodes": (None, [*_SEGMENT, c_int32, c_int32, c_void_p, c_void_p, POINTER(Rounding)]),
     "ath_pose": (None, [*_SEGMENT, *[c_int32] * 3, c_void_p, c_int, c_void_p]),
     "ath_pose_nodes": (None, [*_SEGMENT, *[c_int32] * 3, c_void_p, c_int, c_void_p]),

@@ -414,14 +414,16 @@ class SegmentMotion:
         rounding: Rounding,
         origin: np.ndarray | None = None,
         positions: np.ndarray | None = None,
+        bending: bool = False,
     ) -> None:
         """Fill coefficients and tracks from positions, (N, 3, frames) float64 less the origin, in closed loop.
 
-        positions: filled with what `pose` returns at the last level, which the closed loop has at hand.
+        positions: filled with what `pose` returns at the last level, which the closed loop has at hand. bending: leave
+        out rigid pieces on which nothing hangs.
         """
-        at, into = self._source(source), (None, False, None)
+        at, into = self._source(source), (bending, None, False, None)
         if positions is not None:
-            into = address(origin, np.float64, 3), positions.dtype == np.float64, positions.ctypes.data
+            into = bending, address(origin, np.float64, 3), positions.dtype == np.float64, positions.ctypes.data
         self._piecewise(
             lambda motion, first, stop: lib.ath_analyse(
                 self.plan.core, motion, self.integers, first, stop, at, rounding, *into

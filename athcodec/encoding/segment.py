@@ -540,13 +540,13 @@ def _moments(segment: SegmentMotion, parts: Iterable[np.ndarray]) -> tuple[np.nd
     return multiply(waves.T, multiply(moments, waves)), count
 
 
-def analyse_finely(plan: Plan, settings: Settings, positions: np.ndarray) -> SegmentMotion:
+def analyse_finely(plan: Plan, settings: Settings, positions: np.ndarray, bending: bool = False) -> SegmentMotion:
     """A segment at a step FINER times smaller, in nothing learned, to learn bases and modes from."""
     fine = replace(settings, step=qz.single(settings.step / FINER), turn_step=settings.turn_step / FINER)
     segment = SegmentMotion(
         plan, positions.shape[2], level_streams(fine, plan.level_count, {}), periodic=settings.periodic
     )
-    segment.analyse(positions, Rounding(qz.DEAD_ZONE))
+    segment.analyse(positions, Rounding(qz.DEAD_ZONE), bending=bending)
     return segment
 
 

@@ -86,8 +86,8 @@ ATH_ENCODER_API size_t ath_model_size(void);
  * 3 x vertices; positions: 3 x frames x vertices. work: 12 x (stem_count + 1) + 9 x piece_count. */
 ATH_ENCODER_API void ath_fit(int32_t vertex_count, int32_t frames, int32_t stem_count, const int64_t *stems,
                              int32_t piece_count, const int64_t *order, const int64_t *links, const double *shapes,
-                             const double *rest, const double *positions, double *work, double *linear,
-                             double *inverse, double *centroid);
+                             const double *rest, const double *positions, double *work, double *linear, double *inverse,
+                             double *centroid);
 /* Measures the residuals of pieces, ranges of vertices that each move by one affine map: the mean distance of each
  * piece in each frame, the largest distance, and the most vertices beyond xi in a frame. rest: 3 x vertices; positions:
  * 3 x frames x vertices; inverse, offset: 3 x 3 and 3 for each frame and piece, which make residuals of positions. */
@@ -118,10 +118,11 @@ typedef struct ath_rounding {
  * less the origin. A map's step is that of its level (height + 2 lengths) over the root of its number of vertices, so
  * that equal errors of all vertices together cost the same everywhere. Attach caches have to be kept (ath_build_plan).
  * Only pieces, or nodes, first to stop - 1 are analysed: several threads may work on ranges of one segment, each with
- * its own scratch memory, once the pieces that theirs hang on are done. positions: see ath_pose; may be null. */
+ * its own scratch memory, once the pieces that theirs hang on are done. positions: see ath_pose; may be null.
+ * bending: leave out rigid pieces on which nothing hangs. */
 ATH_ENCODER_API void ath_analyse(const ath_plan *plan, const ath_motion *motion, const ath_integers *integers,
                                  int32_t first, int32_t stop, const double *source, const ath_rounding *rounding,
-                                 const double origin[3], int is_float64, void *positions);
+                                 int bending, const double origin[3], int is_float64, void *positions);
 ATH_ENCODER_API void ath_analyse_nodes(const ath_plan *plan, const ath_motion *motion, const ath_integers *integers,
                                        int32_t first, int32_t stop, const double *source, const double *level_steps,
                                        const ath_rounding *rounding);

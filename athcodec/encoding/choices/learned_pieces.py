@@ -58,7 +58,8 @@ def pieces_that_save(
     piece_of_row = np.repeat(np.arange(piece_count), plan.row_counts)
     bits_without, bits_with = (
         sum(
-            estimated_bits(trials.analysed(plain, number, tried).coefficients, piece_of_row, piece_count) * sample.scale
+            estimated_bits(trials.analysed(plain, number, tried, bending=True).coefficients, piece_of_row, piece_count)
+            * sample.scale
             for number, sample in enumerate(trials.samples)
         )
         for tried in (None, modes)
