@@ -82,13 +82,13 @@ class Stream(ctypes.Structure):
 class Motion(ctypes.Structure):
     """ath_motion."""
 
-    _fields_ = fields(c_void_p, "streams waves attach_caches work before known decoded", c_int32, "frames ratio")
+    _fields_ = fields(c_void_p, "streams waves attach_caches work before known", c_int32, "frames ratio")
 
 
 class Coarse(ctypes.Structure):
     """ath_coarse."""
 
-    _fields_ = fields(c_void_p, "placed integers integer_tracks shape_counts tracks frames extents turn_steps")
+    _fields_ = fields(c_void_p, "plan motion integers turn_steps nothing")
 
 
 class Integers(ctypes.Structure):
@@ -96,7 +96,7 @@ class Integers(ctypes.Structure):
 
     _fields_ = fields(
         *(c_void_p, "coefficients tracks node_tracks node_steps predicted predicted_tracks"),
-        *(c_void_p, "shape_counts shape_first shapes duals"),
+        *(c_void_p, "first_rows shape_counts shape_first shapes duals"),
     )
 
 
@@ -213,8 +213,9 @@ _ENCODING = {  # Functions of core/model/*.h and core/encode/encode.h.
     "ath_layout": (c_char_p, [c_int32, c_void_p, c_void_p]),
     "ath_model_size": (c_size_t, []),
     "ath_differences": (None, [*[c_int32] * 3, *[c_void_p] * 6, c_double, *[c_void_p] * 3]),
+    "ath_fit": (None, [*[c_int32] * 3, c_void_p, c_int32, *[c_void_p] * 9]),
     "ath_gather": (None, [c_int32, c_int32, c_void_p, c_int32, c_int, *[c_void_p] * 3]),
-    "ath_analyse": (None, [*_SEGMENT, c_int32, c_int32, c_void_p, POINTER(Rounding), c_void_p, c_int, c_void_p]),
+    "ath_analyse": (None, [*_SEGMENT, c_int32, c_int32, c_void_p, POINTER(Rounding), c_int, c_void_p, c_int, c_void_p]),
     "ath_analyse_nodes": (None, [*_SEGMENT, c_int32, c_int32, c_void_p, c_void_p, POINTER(Rounding)]),
     "ath_pose": (None, [*_SEGMENT, *[c_int32] * 3, c_void_p, c_int, c_void_p]),
     "ath_pose_nodes": (None, [*_SEGMENT, *[c_int32] * 3, c_void_p, c_int, c_void_p]),

@@ -743,7 +743,8 @@ class EncodingJob:
 
         def begin(read: tuple[int, list[np.ndarray], Ends | None, Ends | None]) -> tuple[int, CodedMotion]:
             index, block, before, after = read
-            return index, self._motion(decided, index, *self._positions(block.pop()), before, after)
+            frames = self._positions(block.pop()) if block else (source.positions(index), self._exact(index))
+            return index, self._motion(decided, index, *frames, before, after)
 
         if decided.choice.predicted is not None:
             return pool.ordered(predict, ((index, [source.block(index)]) for index in segments), at_once)
@@ -794,7 +795,9 @@ class EncodingJob:
         ends = None
         for (index, _), follows in zip(order, [*goes_on[1:], False]):
             before, ends = ends, Ends(decided.layers.level_count) if follows else None
-            yield index, [decided.source.block(index)], before, ends
+            # The search holds the positions of an only segment.
+            block = [decided.source.block(index)] if len(decided.source.segments) > 1 else []
+            yield index, block, before, ends
 
     def _positions(self, block: np.ndarray) -> tuple[np.ndarray, np.ndarray | None]:
         """Return what is coded of a block, and its very numbers if these are to come back."""

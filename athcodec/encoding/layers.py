@@ -414,9 +414,7 @@ class CodedMotion:
         """Code the levels of the branch hierarchy."""
         plan, settings = layer.plan, layer.settings
         bases = self._bases.first(layer) if self._bases else learned_bases(plan, settings, self.positions)
-        segment, decoded = analyse(
-            plan, self._output, settings, self.positions, layer.modes, bases, layered=self._layered
-        )
+        segment, decoded = analyse(plan, self._output, settings, self.positions, layer.modes, bases)
         stems, _ = stem_streams(segment, settings, bases)
         self.chunks |= {(level, ct.STEMS): data for level, data in stems.items()}
         last = plan.level_count - 1
@@ -461,10 +459,11 @@ class CodedMotion:
         """Code one further level; ratio: the step of the layer before over that of this one."""
         settings, last = layer.settings, layer.plan.level_count - 1
         bases = self._bases.refined(layer, last, level)
-        is_last = layer.ratio == 1
         segment, decoded = analyse(
-            layer.plan, self._output, settings, self.positions, layer.modes, bases, before, ratio, layered=not is_last
+            layer.plan, self._output, settings, self.positions, layer.modes, bases, before, ratio
         )
+        if layer.ratio == 1:
+            segment.forget_caches()
         head = stems_head(settings, last, bases)
         self.chunks[level, ct.STEMS] = writing.pack_refined_stems(ratio, head, streams.encode_refinement(segment, last))
         segment.forget_before()

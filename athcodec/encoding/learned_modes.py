@@ -37,10 +37,10 @@ class Components:
 def components(plan: Plan, segments: Iterable[SegmentMotion]) -> Components:
     """Return the components of segments that were analysed with a fine step and without learned modes, so that they
     describe the motion and not its rounding."""
-    sizes = np.minimum(plan.pieces["rank"], SHAPE_MODES)
+    sizes = np.minimum(plan.ranks, SHAPE_MODES)
     groups = [
         (pieces, np.zeros((len(pieces), 3 * size, 3 * size)))
-        for size in np.unique(sizes)
+        for size in np.unique(sizes[sizes > 0])
         for pieces in [np.flatnonzero(sizes == size)]
     ]
     frames = 0
@@ -76,7 +76,7 @@ def _mode_weights(pieces: np.ndarray) -> np.ndarray:
 
 def _tracks(plan: Plan, segment: SegmentMotion, pieces: np.ndarray, size: int) -> np.ndarray:
     """Return the tracks of the first modes over temporal frequency, (pieces, 3 size, frames) float64 in scene units."""
-    slots = plan.pieces["first"][pieces][:, None] + np.arange(size)
+    slots = plan.first_rows[pieces][:, None] + np.arange(size)
     steps = np.array([stream.step for stream in segment.streams])
     weight = _mode_weights(plan.pieces[pieces])[:, :size]
     scale = steps[plan.pieces["level"][pieces]][:, None] * weight

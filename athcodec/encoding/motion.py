@@ -205,6 +205,16 @@ class Plan:
         """Per piece the level whose stream holds its tracks and first modes, (P,)."""
         return np.where(self.pieces["low_level"] >= 0, self.pieces["low_level"], self.pieces["level"])
 
+    @cached_property
+    def row_counts(self) -> np.ndarray:
+        """Per piece the rows of coefficients that it has room for, (P,)."""
+        return np.where(self.is_rigid, 0, self.pieces["count"])
+
+    @cached_property
+    def first_rows(self) -> np.ndarray:
+        """Per piece the first of these rows, (P,) int32."""
+        return (np.cumsum(self.row_counts) - self.row_counts).astype(np.int32)
+
     @property
     def ranks(self) -> np.ndarray:
         """Per piece the modes that it moves by, (P,)."""
@@ -301,7 +311,6 @@ class SegmentMotion:
         learned_modes: LearnedModes | None = None,
         before: SegmentMotion | None = None,
         ratio: int = 1,
-        layered: bool = False,
         periodic: bool = False,
     ):
         if not 1 <= frames <= SEGMENT_FRAMES or len(streams) != plan.level_count:
@@ -311,7 +320,7 @@ class SegmentMotion:
             )
         self.plan, self.frames, self.streams, self.learned_modes = plan, frames, streams, learned_modes
         core = plan.core
-        self.coefficients = zeros((plan.vertex_count, 3, frames), np.int32)
+        self.coefficients = zeros((int(plan.row_counts.sum()), 3, frames), np.int32)
         self.tracks = zeros((core.piece_count, 2, 3, frames), np.int32)
         node_count = 0 if before is not None else core.node_count  # Refinements have no maps.
         self.node_tracks = zeros((node_count, 4, 3, frames), np.int32)
@@ -325,26 +334,14 @@ class SegmentMotion:
                 zeros(integers.shape, np.int32) for integers in (self.coefficients, self.tracks)
             )
             self.known = self._known(before)
-        self.coarse = None
-        if layered:
-            if before is None:
-                self.placed = zeros((plan.vertex_count, 3, frames))
-                self.placed_tracks = zeros(self.tracks.shape)
-                self.placed_frames = zeros((core.piece_count, 12, frames))  # Only rigid pieces use theirs.
-            else:  # A piece is read before it is replaced.
-                self.placed, self.placed_tracks = before.placed, before.placed_tracks
-                self.placed_frames = before.placed_frames
-            self.extents = np.zeros((core.piece_count, 2), np.int32)
-            self.turn_steps = np.full((core.piece_count, 3), -1.0)
+            self.turn_steps = np.empty((core.piece_count, 3))
+            self.nothing = np.zeros((core.longest, 3, frames), np.int32)
             self.coarse = Coarse(
-                self.placed.ctypes.data,
-                self.coefficients.ctypes.data,
-                self.tracks.ctypes.data,
-                None if learned_modes is None else learned_modes.counts.ctypes.data,
-                self.placed_tracks.ctypes.data,
-                self.placed_frames.ctypes.data,
-                self.extents.ctypes.data,
+                addressof(before.plan.core),
+                addressof(before.motion),
+                addressof(before.integers),
                 self.turn_steps.ctypes.data,
+                self.nothing.ctypes.data,
             )
         self._bind()
 
@@ -375,15 +372,15 @@ class SegmentMotion:
             waves=self.node_waves.ctypes.data,
             frames=self.frames,
             ratio=self.ratio,
-            before=None if self.before is None else addressof(self.before.coarse),
+            before=None if self.before is None else addressof(self.coarse),
             known=None if self.before is None else self.known.ctypes.data,
-            decoded=None if self.coarse is None else addressof(self.coarse),
         )
         self.integers = Integers(
             self.coefficients.ctypes.data,
             self.tracks.ctypes.data,
             self.node_tracks.ctypes.data,
             self.node_steps.ctypes.data,
+            first_rows=address(self.plan.first_rows, np.int32, 0),
         )
         if self.before is not None:
             self.integers.predicted = self.predicted.ctypes.data
@@ -398,15 +395,17 @@ class SegmentMotion:
                 setattr(self.integers, name, array.ctypes.data)
 
     def forget_nodes(self) -> None:
-        """Free the maps of nodes, and what they are made of."""
-        self._attach_caches = self.node_tracks = self.integers.node_tracks = None
+        """Free the maps of nodes."""
+        self.node_tracks = self.integers.node_tracks = None
+
+    def forget_caches(self) -> None:
+        """Free what pieces and maps of nodes are placed by."""
+        self._attach_caches = self.motion.attach_caches = None
 
     def forget_before(self) -> None:
         """Free the layer before, which nothing more is predicted from, and what is predicted from it."""
-        before, self.before = self.before, None
-        before.coarse = before.placed = before.placed_tracks = before.placed_frames = None
-        self.predicted = self.predicted_tracks = None
-        before.motion.decoded = self.motion.before = self.motion.known = None
+        self.before = self.coarse = self.predicted = self.predicted_tracks = None
+        self.motion.before = self.motion.known = None
         self.integers.predicted = self.integers.predicted_tracks = None
 
     def analyse(
@@ -415,14 +414,16 @@ class SegmentMotion:
         rounding: Rounding,
         origin: np.ndarray | None = None,
         positions: np.ndarray | None = None,
+        bending: bool = False,
     ) -> None:
         """Fill coefficients and tracks from positions, (N, 3, frames) float64 less the origin, in closed loop.
 
-        positions: filled with what `pose` returns at the last level, which the closed loop has at hand.
+        positions: filled with what `pose` returns at the last level, which the closed loop has at hand. bending: leave
+        out rigid pieces on which nothing hangs.
         """
-        at, into = self._source(source), (None, False, None)
+        at, into = self._source(source), (bending, None, False, None)
         if positions is not None:
-            into = address(origin, np.float64, 3), positions.dtype == np.float64, positions.ctypes.data
+            into = bending, address(origin, np.float64, 3), positions.dtype == np.float64, positions.ctypes.data
         self._piecewise(
             lambda motion, first, stop: lib.ath_analyse(
                 self.plan.core, motion, self.integers, first, stop, at, rounding, *into
@@ -469,7 +470,8 @@ class SegmentMotion:
 
         def run(first: int, stop: int) -> None:
             motion = Motion.from_buffer_copy(self.motion)
-            work = np.empty(lib.ath_motion_work(self.plan.core.longest, self.frames))
+            layers = 1 + (self.before is not None)
+            work = np.empty(layers * lib.ath_motion_work(self.plan.core.longest, self.frames))
             motion.work = work.ctypes.data
             call(motion, first, stop)
 

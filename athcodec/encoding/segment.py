@@ -520,14 +520,11 @@ def _level_moments(segment: SegmentMotion, level: int | None) -> tuple[np.ndarra
     quantise to nothing, in units of their steps, and the number of these tracks. The segment was analysed finely."""
     if level is None:
         return _moments(segment, [segment.coefficients, segment.tracks])
-    pieces, slots = segment.plan.pieces, []
-    for low, high, at in (
-        (0, pieces["low_modes"], pieces["low_level"]),
-        (pieces["low_modes"], pieces["count"], pieces["level"]),
-    ):
-        for piece in np.flatnonzero(at == level):
+    pieces, rows, slots = segment.plan.pieces, segment.plan.row_counts, []
+    for low, high, at in ((0, pieces["low_modes"], pieces["low_level"]), (pieces["low_modes"], rows, pieces["level"])):
+        for piece in np.flatnonzero((at == level) & (rows > 0)):
             start = low if np.isscalar(low) else low[piece]
-            slots.append(np.arange(pieces["first"][piece] + start, pieces["first"][piece] + high[piece]))
+            slots.append(segment.plan.first_rows[piece] + np.arange(start, high[piece]))
     chosen = np.concatenate(slots) if slots else np.zeros(0, int)
     parts = (segment.coefficients[chosen[at : at + ROWS_AT_ONCE]] for at in range(0, len(chosen), ROWS_AT_ONCE))
     return _moments(segment, (*parts, segment.tracks[segment.plan.base_level == level]))
@@ -543,13 +540,13 @@ def _moments(segment: SegmentMotion, parts: Iterable[np.ndarray]) -> tuple[np.nd
     return multiply(waves.T, multiply(moments, waves)), count
 
 
-def analyse_finely(plan: Plan, settings: Settings, positions: np.ndarray) -> SegmentMotion:
+def analyse_finely(plan: Plan, settings: Settings, positions: np.ndarray, bending: bool = False) -> SegmentMotion:
     """A segment at a step FINER times smaller, in nothing learned, to learn bases and modes from."""
     fine = replace(settings, step=qz.single(settings.step / FINER), turn_step=settings.turn_step / FINER)
     segment = SegmentMotion(
         plan, positions.shape[2], level_streams(fine, plan.level_count, {}), periodic=settings.periodic
     )
-    segment.analyse(positions, Rounding(qz.DEAD_ZONE))
+    segment.analyse(positions, Rounding(qz.DEAD_ZONE), bending=bending)
     return segment
 
 
@@ -654,17 +651,16 @@ def analyse(
     bases: dict[int, StreamBasis],
     before: SegmentMotion | None = None,
     ratio: int = 1,
-    layered: bool = False,
 ) -> tuple[SegmentMotion, np.ndarray]:
     """Return the integers of the stems, and the positions at the last level without corrections; output: origin and
-    type of the positions. bases: of the levels that learn theirs; before, ratio, layered: as SegmentMotion has them."""
+    type of the positions. bases: of the levels that learn theirs; before, ratio: as SegmentMotion has them."""
     levels = level_streams(settings, plan.level_count, bases)
-    segment = SegmentMotion(plan, positions.shape[2], levels, learned_modes, before, ratio, layered, settings.periodic)
+    segment = SegmentMotion(plan, positions.shape[2], levels, learned_modes, before, ratio, settings.periodic)
     origin, dtype = output
     decoded = zeros(positions.shape, dtype)
     segment.analyse(positions, settings.rounding, origin, decoded)
     if before is not None:
-        segment.forget_nodes()  # A refinement has no maps.
+        before.forget_caches()
     return segment, decoded
 
 

@@ -188,12 +188,12 @@ def encode_refined_modes(
 
 def encode_stems(segment: SegmentMotion, level: int) -> bytes:
     """Code coefficients and tracks of one level."""
-    return _encode_level("ath_encode_stems", segment, level, segment.coefficients.size)
+    return _encode_level("ath_encode_stems", segment, level, segment.coefficients.size + segment.tracks.size)
 
 
 def encode_refinement(segment: SegmentMotion, level: int) -> bytes:
     """Code coefficients and tracks of a refinement."""
-    return _encode_level("ath_encode_refinement", segment, level, segment.coefficients.size)
+    return _encode_level("ath_encode_refinement", segment, level, segment.coefficients.size + segment.tracks.size)
 
 
 def encode_affines(segment: SegmentMotion, level: int) -> bytes:

@@ -166,13 +166,15 @@ class Trials:
         seen = self._learn_modes(settings)
         return learn(plan, seen, settings.step, None if everywhere else settings.learned_pieces)
 
-    def analysed(self, settings: Settings, number: int, modes: LearnedModes | None) -> SegmentMotion:
-        """Return a sample in its integers."""
+    def analysed(
+        self, settings: Settings, number: int, modes: LearnedModes | None, bending: bool = False
+    ) -> SegmentMotion:
+        """Return a sample in its integers. bending: as SegmentMotion.analyse has it."""
         plan, sample = self.prelude(settings).plan, self.samples[number]
         of_sample = settings.of_segment(sample.whole_loop)
         levels = level_streams(of_sample, plan.level_count, self._bases(settings, number))
         segment = SegmentMotion(plan, sample.positions.shape[2], levels, modes, periodic=of_sample.periodic)
-        segment.analyse(sample.positions, of_sample.rounding)
+        segment.analyse(sample.positions, of_sample.rounding, bending=bending)
         return segment
 
     def coded(self, settings: Settings, number: int, modes: LearnedModes | None) -> Coded:
@@ -276,7 +278,8 @@ class Trials:
             frames = sum(self.source.frames_of(segment) for segment in chosen)
             self.work.add(progress.LEARNING * self.source.clip.vertex_count * frames)
             self._components[key] = components(
-                plan, (analyse_finely(plan, settings, self.source.positions(segment)) for segment in chosen)
+                plan,
+                (analyse_finely(plan, settings, self.source.positions(segment), bending=True) for segment in chosen),
             )
         return self._components[key]
 

@@ -11,17 +11,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from athcodec._native import address, lib
-from athcodec.motion.algebra import decompose, determinant, multiply, principal
+from athcodec.motion.algebra import determinant, multiply, principal
 from athcodec.motion.hierarchy import Hierarchy
 
 RANK_TOLERANCE = 1e-3
 """A subtree's principal extent counts as missing below this part of its largest one: its best-fit stretch
 along such a direction would be the noise of the rest pose."""
-MIN_STRETCH = 0.1
-"""Least stretch of any direction in a map, relative to its largest where that is below 1. A frame in which
-the best fit flattens a subtree would otherwise have no inverse, or residuals many times as long as the
-map's error."""
-_LEAST_SCALE = 1e-2  # Smallest value that MIN_STRETCH is relative to, because a subtree may shrink to a point.
 _SMALLEST_EXTENT = 1e-100  # Squares of smaller numbers have no inverse.
 _POINT_EXTENT = 1e-12  # Part of the plant's size below which a subtree is one point.
 
@@ -82,13 +77,16 @@ class Pieces:
         self.first_branch, self.stop_branch, self.parent = first_branch, stop_branch, parent
         self.first, self.stop = bounds[first_branch], bounds[stop_branch]
         self.counts = self.stop - self.first
-        self.levels = [np.flatnonzero(level == value) for value in np.unique(level)]
-        self.stem_starts = bounds[:-1]
+        self.stems, self.order = bounds.astype(np.int64), np.argsort(level, kind="stable")
         self.origin = rest.mean(axis=0)
         self.rest = np.ascontiguousarray((rest - self.origin).T)
-        self._describe_rest_pose()
-        self.lends_rotation = np.zeros(len(first_branch), bool)
-        self.lends_rotation[parent[(self.rank < 2) & (parent >= 0)]] = True
+        self._describe_rest_pose([np.flatnonzero(level == value) for value in np.unique(level)])
+        inherits, lends = (self.rank < 2) & (parent >= 0), np.zeros(len(first_branch), bool)
+        lends[parent[inherits]] = True
+        self.links = np.stack([first_branch, stop_branch, parent, self.rank, lends], axis=1).astype(np.int64)
+        self.shapes = np.concatenate(
+            [self.centroid, *(matrices.reshape(-1, 9) for matrices in (self.axes, self.pseudo_inverse))], axis=1
+        )
 
     @classmethod
     def subtrees(
@@ -106,12 +104,12 @@ class Pieces:
         """Return the maps of all pieces in frames (3,k,N)."""
         return Fit(self, frames)
 
-    def _describe_rest_pose(self) -> None:
-        """Return each piece's centroid, principal axes (columns, longest first), rank and pseudo-inverse."""
+    def _describe_rest_pose(self, levels: list[np.ndarray]) -> None:
+        """Fill each piece's centroid, principal axes (columns, longest first), rank and pseudo-inverse."""
         count = len(self.first)
         self.centroid = np.empty((count, 3))
         covariance = np.empty((count, 3, 3))
-        for some in self.levels:  # Pieces of one level do not overlap.
+        for some in levels:  # Pieces of one level do not overlap.
             vertices, counts = self.vertices(some), self.counts[some]
             points = self.rest[:, vertices]
             centroid = np.add.reduceat(points, starts(counts), axis=1) / counts
@@ -139,52 +137,22 @@ class Fit:
 
     def __init__(self, pieces: Pieces, frames: np.ndarray) -> None:
         self.pieces, self.frames = pieces, frames
-        sums = self._sums()
-        self.centroid = sums[..., 3] / pieces.counts[:, None]
-        covariance = sums[..., :3] / pieces.counts[:, None, None]
-        covariance -= self.centroid[..., None] * pieces.centroid[:, None]
-        self.linear = multiply(covariance, pieces.pseudo_inverse)
-        self.inverse = np.empty_like(self.linear)
-        rotation = np.broadcast_to(np.eye(3), (len(self.linear), len(pieces.first) + 1, 3, 3)).copy()
-        for some in pieces.levels:
-            self._complete(some, rotation)
-            self.linear[:, some], self.inverse[:, some] = _invertible(self.linear[:, some])
-            lenders = some[pieces.lends_rotation[some]]
-            rotation[:, lenders] = _nearest_rotation(self.linear[:, lenders])
-
-    def _sums(self) -> np.ndarray:
-        """Return sums of x_i y_j and x_i over each piece's vertices, (k,n,3,4), of x now and y at rest.
-
-        Running sums over the stems serve every subtree at once, because a subtree is a range of stems.
-        """
-        pieces, frames = self.pieces, self.frames
-        stems = np.empty((3, 4, frames.shape[1], len(pieces.stem_starts) + 1))
-        stems[..., 0] = 0.0
-        for j in range(3):
-            np.add.reduceat(frames * pieces.rest[j], pieces.stem_starts, axis=2, out=stems[:, j, :, 1:])
-        np.add.reduceat(frames, pieces.stem_starts, axis=2, out=stems[:, 3, :, 1:])
-        np.cumsum(stems, axis=3, out=stems)
-        sums = stems[..., pieces.stop_branch] - stems[..., pieces.first_branch]
-        return np.ascontiguousarray(sums.transpose(2, 3, 0, 1))
-
-    def _complete(self, some: np.ndarray, rotation: np.ndarray) -> None:
-        """Give the maps of flat, straight and point-like pieces the directions that their rest pose lacks."""
-        pieces = self.pieces
-        rank = pieces.rank[some]
-        flat, straight, points = some[rank == 2], some[rank == 1], some[rank == 0]
-        if len(flat):
-            axes = pieces.axes[flat]
-            images = multiply(self.linear[:, flat], axes[:, :, :2])
-            normal = _unit(np.cross(images[..., 0], images[..., 1]))
-            self.linear[:, flat] += normal[..., None] * axes[:, None, :, 2]
-        if len(straight):
-            axis = pieces.axes[straight][:, :, 0]
-            image = _unit(multiply(self.linear[:, straight], axis[..., None])[..., 0])
-            inherited = rotation[:, pieces.parent[straight]]
-            turn = _least_rotation(multiply(inherited, axis[..., None])[..., 0], image)
-            across = np.eye(3) - axis[:, :, None] * axis[:, None]
-            self.linear[:, straight] += multiply(multiply(turn, inherited), across)
-        self.linear[:, points] = rotation[:, pieces.parent[points]]
+        (_, count, vertices), stems, n = frames.shape, len(pieces.stems) - 1, len(pieces.first)
+        self.linear, self.inverse = np.empty((2, count, n, 3, 3))
+        self.centroid, work = np.empty((count, n, 3)), np.empty(12 * (stems + 1) + 9 * n)
+        lib.ath_fit(
+            vertices,
+            count,
+            stems,
+            address(pieces.stems, np.int64, stems + 1),
+            n,
+            address(pieces.order, np.int64, n),
+            address(pieces.links, np.int64, 5 * n),
+            address(pieces.shapes, np.float64, 21 * n),
+            address(pieces.rest, np.float64, 3 * vertices),
+            address(frames, np.float64, frames.size),
+            *(address(array, np.float64, 0) for array in (work, self.linear, self.inverse, self.centroid)),
+        )
 
     def matrices(self) -> np.ndarray:
         """Return maps (k,n,3,4) from rest positions to positions of each frame, in the scene's coordinates."""
@@ -240,53 +208,6 @@ def map_points(linear: np.ndarray, offset: np.ndarray, points: np.ndarray, count
         for j in range(3):
             result[i] += np.repeat(linear[..., i, j], counts, axis=1) * points[j]
     return result
-
-
-def _invertible(linear: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the maps (k,n,3,3) with every direction stretched by MIN_STRETCH at least, and their inverses."""
-    a, b, c = linear[..., 0], linear[..., 1], linear[..., 2]
-    adjugate = np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=-2)
-    determinant = (a * adjugate[..., 0, :]).sum(axis=-1)
-    # The least stretch is at least 1 / |inverse|, so the few suspects alone are decomposed.
-    suspect = np.linalg.norm(adjugate, axis=(-2, -1)) * MIN_STRETCH >= np.abs(determinant)
-    inverse = adjugate / np.where(suspect, 1.0, determinant)[..., None, None]
-    if suspect.any():
-        linear = linear.copy()
-        linear[suspect], inverse[suspect] = _stretched(linear[suspect])
-    return linear, inverse
-
-
-def _stretched(linear: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    left, stretch, right = decompose(linear)
-    least = MIN_STRETCH * np.clip(stretch[:, 0], _LEAST_SCALE, 1.0)
-    # Which side a flattened subtree shows is noise: it is not turned inside out.
-    mirrored = (determinant(left) * determinant(right) < 0) & (stretch[:, 2] < least)
-    left[mirrored, :, 2] *= -1.0
-    stretch = np.maximum(stretch, least[:, None])[:, None]
-    return multiply(left * stretch, right), multiply(np.swapaxes(right, 1, 2) / stretch, np.swapaxes(left, 1, 2))
-
-
-def _nearest_rotation(linear: np.ndarray) -> np.ndarray:
-    left, _, right = decompose(linear)
-    left[..., 2] *= np.sign(determinant(left) * determinant(right))[..., None]
-    return multiply(left, right)
-
-
-def _least_rotation(start: np.ndarray, goal: np.ndarray) -> np.ndarray:
-    """Return rotations (...,3,3) that turn unit vectors `start` into `goal` on the shortest way; identities where goal
-    is zero."""
-    axis = np.cross(start, goal)
-    cosine = (start * goal).sum(axis=-1)
-    turn = np.zeros((*axis.shape, 3))
-    turn[..., 0, 1], turn[..., 0, 2], turn[..., 1, 2] = -axis[..., 2], axis[..., 1], -axis[..., 0]
-    turn -= np.swapaxes(turn, -1, -2)
-    # Opposite vectors have no least rotation: they stay as they are.
-    return np.eye(3) + turn + multiply(turn, turn) / np.maximum(1.0 + cosine, 1e-9)[..., None, None]
-
-
-def _unit(vectors: np.ndarray) -> np.ndarray:
-    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
-    return np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0)
 
 
 def seen_from(origin: np.ndarray, portion: np.ndarray) -> np.ndarray:

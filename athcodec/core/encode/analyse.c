@@ -247,23 +247,6 @@ static void add_carried(const ath_plan *plan, int32_t T, const ath_piece *root, 
         for (int32_t t = 0; t < T; t++) H[k][t] += own2 / carried2 * carried[k][t];
 }
 
-static double determinant(const double m[9])
-{
-    return m[0] * (m[4] * m[8] - m[5] * m[7]) - m[1] * (m[3] * m[8] - m[5] * m[6]) + m[2] * (m[3] * m[7] - m[4] * m[6]);
-}
-
-/* Fills the rotation nearest to H by its singular vectors, whatever H is. */
-static void rotation_of_vectors(const double H[9], double R[9])
-{
-    double left[9], stretch[3], right[9];
-    ath_decompose(1, H, left, stretch, right);
-    double sign = determinant(left) * determinant(right) < 0.0 ? -1.0 : 1.0;
-    for (int32_t i = 0; i < 3; i++)
-        for (int32_t k = 0; k < 3; k++)
-            R[3 * i + k] =
-                left[3 * i] * right[k] + left[3 * i + 1] * right[3 + k] + sign * left[3 * i + 2] * right[6 + k];
-}
-
 /* Turns rotations, one in each lane, by a step of Newton's method towards those nearest to H, for which the product of H
  * and the transpose of R is symmetric. Fills the squares of the turns; 1 where R is too far from the nearest rotation. */
 ATH_INLINE void turn_closer(double H[9][ATH_LANES], double R[9][ATH_LANES], double size2[ATH_LANES])
@@ -308,7 +291,7 @@ ATH_HOT static void nearest_rotations(double H[9][ATH_LANES], const double befor
     for (int32_t l = 0; l < ATH_LANES; l++) {
         if (most[l] < far_turn && size2[l] <= close_turn) continue;
         for (int32_t k = 0; k < 9; k++) own[k] = H[k][l];
-        rotation_of_vectors(own, nearest);
+        ath_nearest_rotation(own, nearest);
         for (int32_t k = 0; k < 9; k++) R[k][l] = nearest[k];
     }
 }
@@ -375,7 +358,6 @@ static void code_shift(const ath_motion *motion, const ath_piece *piece, const a
     if (before) ath_predict_shift(motion, piece, before, scratch, rows);
     code_even_track(base, T, ath_shift_step(piece, base), rounding, scratch->track, rows->predicted_shift, rows->shift);
     ath_move_point(T, scratch->track, scratch->at.point);
-    if (motion->decoded) memcpy(scratch->shift, scratch->track, 3 * (size_t)T * sizeof(double));
 }
 
 /* Fills the first vertex less the attach point. */
@@ -430,7 +412,6 @@ static void analyse_tracks(const ath_plan *plan, const ath_motion *motion, const
         code_track(base, T, turning.steps, rounding, scratch->track, rows->predicted_rotation, rows->rotation);
         ath_out_of_axes(T, &turning, scratch->track);
         ath_turn(T, scratch->track, scratch->at.rotation);
-        if (motion->decoded) memcpy(scratch->rotation, scratch->track, 3 * (size_t)T * sizeof(double));
     }
     if (ath_has_shift(piece) && rigid) {
         shift_of_all(plan, T, piece, scratch, source);
@@ -438,60 +419,53 @@ static void analyse_tracks(const ath_plan *plan, const ath_motion *motion, const
     }
 }
 
-/* Stores what the next layer predicts from. */
-static void note_piece(const ath_plan *plan, const ath_motion *motion, const ath_piece *piece, int32_t p,
-                       const ath_piece_rows *rows, const ath_scratch *scratch, const double *placed)
-{
-    const ath_coarse *decoded = motion->decoded;
-    size_t T = (size_t)motion->frames;
-    memcpy(decoded->placed + (size_t)piece->first * 3 * T, placed, (size_t)piece->count * 3 * T * sizeof(double));
-    memcpy(decoded->tracks + (size_t)p * 6 * T, scratch->rotation, 3 * T * sizeof(double));
-    memcpy(decoded->tracks + (size_t)p * 6 * T + 3 * T, scratch->shift, 3 * T * sizeof(double));
-    if (piece->flags & ATH_RIGID) {
-        ath_turning turning = ath_turning_of(plan, piece, ath_base_stream(motion, piece));
-        memcpy(decoded->turn_steps + 3 * (size_t)p, turning.steps, sizeof turning.steps);
-        memcpy(decoded->frames + (size_t)p * 12 * T, scratch->at.point, 3 * T * sizeof(double));
-        memcpy(decoded->frames + (size_t)p * 12 * T + 3 * T, scratch->at.rotation, 9 * T * sizeof(double));
-    }
-    int32_t *extents = decoded->extents + 2 * p;
-    extents[0] = ath_max(ath_row_extent(rows->shift, motion->frames, motion->frames),
-                         ath_row_extent(rows->rotation, motion->frames, motion->frames));
-    extents[1] = 0;
-    for (int32_t r = 0; r < ath_rank(piece); r++) {
-        int32_t count = ath_row_extent(ath_row(rows->modes, r, motion->frames), motion->frames, motion->frames);
-        extents[0] = ath_max(extents[0], count);
-        if (count > 0) extents[1] = rows->shape_count > 0 ? ath_max(ath_shape_modes(piece), r + 1) : r + 1;
-    }
-}
-
-static ath_piece_before piece_before(const ath_plan *plan, const ath_motion *motion, int32_t p)
+/* Returns a piece as the layer before has it, in that layer's scratch memory. */
+static ath_piece_before piece_before(const ath_motion *motion, const ath_motion *coarse, int32_t p,
+                                     const ath_scratch *scratch)
 {
     const ath_coarse *layer = motion->before;
-    size_t T = (size_t)motion->frames;
-    ath_piece_before before = {layer->placed + (size_t)plan->pieces[p].first * 3 * T,
-                               layer->tracks + (size_t)p * 6 * T,
-                               layer->tracks + (size_t)p * 6 * T + 3 * T,
-                               layer->turn_steps[3 * p] >= 0.0 ? layer->frames + (size_t)p * 12 * T : 0,
-                               layer->extents[2 * p],
-                               layer->extents[2 * p + 1]};
-    if (!motion->known[p] && before.frequencies > 0) before.frequencies = motion->frames;
+    const ath_piece *piece = layer->plan->pieces + p;
+    int32_t T = motion->frames;
+    double *turn_steps = layer->turn_steps + 3 * (size_t)p;
+    uint8_t used[ATH_PIECE_VERTICES];
+    ath_piece_rows rows = ath_rows_of_piece(layer->integers, T, p);
+    ath_piece_before before = {0, scratch->rotation, scratch->shift, 0, 0, 0};
+    memset(scratch->rotation, 0, 6 * (size_t)T * sizeof(double));
+    ath_turned_attach(layer->plan, coarse, p, &rows, scratch);
+    turn_steps[0] = -1.0;
+    if (piece->flags & ATH_RIGID) {
+        ath_turning turning = ath_turning_of(layer->plan, piece, ath_base_stream(coarse, piece));
+        memcpy(turn_steps, turning.steps, sizeof turning.steps);
+        before.frames = scratch->at.point;
+    }
+    before.frequencies = ath_max(ath_row_extent(rows.shift, T, T), ath_row_extent(rows.rotation, T, T));
+    for (int32_t r = 0; r < ath_rank(piece); r++) {
+        int32_t count = ath_row_extent(ath_row(rows.modes, r, T), T, T);
+        before.frequencies = ath_max(before.frequencies, count);
+        if (count > 0) before.modes = rows.shape_count > 0 ? ath_max(ath_shape_modes(piece), r + 1) : r + 1;
+    }
+    if (before.modes > 0) {
+        ath_pose_tracks(coarse, piece, &rows, scratch, used);
+        before.placed = ath_pose_used(layer->plan, coarse, piece, &rows, used, ATH_ALL_VERTICES, scratch);
+    }
+    if (!motion->known[p] && before.frequencies > 0) before.frequencies = T;
     return before;
 }
 
 /* Returns the vertices as decoded. */
 static const double *analyse_piece(const ath_plan *plan, const ath_motion *motion, const ath_integers *integers,
-                                   int32_t p, const ath_scratch *scratch, const double *source,
-                                   const ath_rounding *rounding)
+                                   int32_t p, const ath_scratch *scratch, const ath_motion *coarse,
+                                   const double *source, const ath_rounding *rounding)
 {
     const ath_piece *piece = plan->pieces + p;
-    ath_piece_rows rows = ath_rows_of_piece(plan, integers, motion->frames, p);
+    ath_piece_rows rows = ath_rows_of_piece(integers, motion->frames, p);
     ath_piece_before before;
     int32_t T = motion->frames;
     if (motion->before) {
-        before = piece_before(plan, motion, p);
-        ath_coarse_rows(motion, piece, p, &rows);
+        ath_scratch beside = ath_motion_scratch(motion->before->plan, coarse);
+        before = piece_before(motion, coarse, p, &beside);
+        ath_coarse_rows(motion, p, &rows);
     }
-    if (motion->decoded) memset(scratch->rotation, 0, 6 * (size_t)T * sizeof(double));
     analyse_tracks(plan, motion, piece, motion->before ? &before : 0, &rows, scratch, source, rounding,
                    scratch->placed);
     if (motion->before) ath_predict_modes(plan, motion, piece, &before, scratch, &rows);
@@ -503,19 +477,20 @@ static const double *analyse_piece(const ath_plan *plan, const ath_motion *motio
         code_even_track(ath_mode_stream(motion, piece, r), T, ath_row_step(motion, piece, &rows, r), rounding,
                         scratch->rows + (size_t)r * 3 * (size_t)T,
                         rows.predicted_modes ? ath_row(rows.predicted_modes, r, T) : 0, ath_row(rows.modes, r, T));
-    const double *placed = ath_pose_rows(plan, motion, p, &rows, scratch);
-    if (motion->decoded) note_piece(plan, motion, piece, p, &rows, scratch, placed);
-    return placed;
+    return ath_pose_rows(plan, motion, p, &rows, scratch);
 }
 
 void ath_analyse(const ath_plan *plan, const ath_motion *motion, const ath_integers *integers, int32_t first,
-                 int32_t stop, const double *source, const ath_rounding *rounding, const double origin[3],
+                 int32_t stop, const double *source, const ath_rounding *rounding, int bending, const double origin[3],
                  int is_float64, void *positions)
 {
     ath_scratch scratch = ath_motion_scratch(plan, motion);
+    ath_motion coarse = motion->before ? *motion->before->motion : *motion;
+    coarse.work = motion->work + ath_motion_work(plan->longest, motion->frames);
     for (int32_t p = first; p < stop; p++) {
         const ath_piece *piece = plan->pieces + p;
-        const double *placed = analyse_piece(plan, motion, integers, p, &scratch, source, rounding);
+        if (bending && piece->flags & ATH_RIGID && piece->attach_cache < 0) continue;
+        const double *placed = analyse_piece(plan, motion, integers, p, &scratch, &coarse, source, rounding);
         if (positions)
             ath_store_positions(placed, piece->first, piece->count, motion->frames, origin, is_float64, positions);
     }

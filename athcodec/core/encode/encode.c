@@ -240,7 +240,7 @@ int64_t ath_encode_stems(void *model, uint8_t *bytes, size_t capacity, const ath
     coder_start(&coder, bytes, capacity);
     coefficient_model_init(rows, motion->frames, (uint32_t *)(rows + 1));
     for (int32_t p = 0; p < plan->piece_count; p++) {
-        ath_piece_rows piece = ath_rows_of_piece(plan, integers, motion->frames, p);
+        ath_piece_rows piece = ath_rows_of_piece(integers, motion->frames, p);
         code_piece(&coder, rows, plan, motion->streams + level, motion->frames, p, level, &piece);
     }
     return written(&coder, !rows->invalid);
@@ -254,8 +254,8 @@ int64_t ath_encode_refinement(void *model, uint8_t *bytes, size_t capacity, cons
     coder_start(&coder, bytes, capacity);
     refinement_model_init(rows, motion->frames, (uint32_t *)(rows + 1));
     for (int32_t p = 0; p < plan->piece_count; p++) {
-        ath_piece_rows piece = ath_rows_of_piece(plan, integers, motion->frames, p);
-        ath_coarse_rows(motion, plan->pieces + p, p, &piece);
+        ath_piece_rows piece = ath_rows_of_piece(integers, motion->frames, p);
+        ath_coarse_rows(motion, p, &piece);
         code_refined_tracks(&coder, rows, plan, motion->streams + level, motion, plan->pieces + p, &piece);
         code_refined_modes(&coder, rows, motion->streams + level, motion, plan->pieces + p, &piece);
     }

@@ -16,27 +16,36 @@
 
 /* The integers of one segment, which belong to the streams of an ath_motion. */
 typedef struct ath_integers {
-    int32_t *coefficients; /* vertex_count x 3 x frames: mode m of a piece at slot first + m */
+    int32_t *coefficients; /* rows of 3 x frames: mode m of piece p is row first_rows[p] + m */
     int32_t *tracks;       /* piece_count x 2 x 3 x frames: rotation, translation */
     int32_t *node_tracks;  /* node_count x 4 x 3 x frames: columns of the map, translation */
     int32_t *node_steps;   /* node_count: exponents of half-octave steps */
     int32_t *predicted;    /* null unless this is a refinement; as large as coefficients and tracks */
     int32_t *predicted_tracks;
+    const int32_t *first_rows;   /* piece_count; rigid pieces have no rows */
     const int32_t *shape_counts; /* piece_count; null: no piece has shapes */
     const int64_t *shape_first;  /* piece_count: where a piece's shapes begin in `shapes` */
     const double *shapes;        /* ATH_SHAPE_NUMBERS of each */
     const double *duals;         /* ATH_SHAPE_NUMBERS of each: take the modes' tracks to the shape's */
 } ath_integers;
 
-ATH_INLINE ath_piece_rows ath_rows_of_piece(const ath_plan *plan, const ath_integers *integers, int32_t frames,
-                                            int32_t p)
+/* The layer before, from which a refinement predicts. Its pieces are placed again, one at a time. */
+typedef struct ath_coarse {
+    const ath_plan *plan;
+    const ath_motion *motion; /* with its attach caches */
+    const ath_integers *integers;
+    double *turn_steps;     /* piece_count x 3, filled with rotation steps; below 0 where a piece is not rigid */
+    const int32_t *nothing; /* zeros in place of the modes of rigid pieces: longest x 3 x frames */
+} ath_coarse;
+
+ATH_INLINE ath_piece_rows ath_rows_of_piece(const ath_integers *integers, int32_t frames, int32_t p)
 {
     ath_piece_rows rows;
-    rows.modes = ath_row(integers->coefficients, plan->pieces[p].first, frames);
+    rows.modes = ath_row(integers->coefficients, integers->first_rows[p], frames);
     rows.rotation = ath_row(integers->tracks, 2 * p, frames);
     rows.shift = ath_row(integers->tracks, 2 * p + 1, frames);
     rows.counts = 0;
-    rows.predicted_modes = integers->predicted ? ath_row(integers->predicted, plan->pieces[p].first, frames) : 0;
+    rows.predicted_modes = integers->predicted ? ath_row(integers->predicted, integers->first_rows[p], frames) : 0;
     rows.predicted_rotation = integers->predicted ? ath_row(integers->predicted_tracks, 2 * p, frames) : 0;
     rows.predicted_shift = integers->predicted ? ath_row(integers->predicted_tracks, 2 * p + 1, frames) : 0;
     rows.shape_count = integers->shape_counts ? integers->shape_counts[p] : 0;
@@ -44,16 +53,16 @@ ATH_INLINE ath_piece_rows ath_rows_of_piece(const ath_plan *plan, const ath_inte
     return rows;
 }
 
-ATH_INLINE void ath_coarse_rows(const ath_motion *motion, const ath_piece *piece, int32_t p, ath_piece_rows *rows)
+ATH_INLINE void ath_coarse_rows(const ath_motion *motion, int32_t p, ath_piece_rows *rows)
 {
     const ath_coarse *before = motion->before;
-    size_t T = (size_t)motion->frames;
-    int known = motion->known[p];
-    int alike = (before->shape_counts && before->shape_counts[p] > 0) == (rows->shape_count > 0);
+    ath_piece_rows coarse = ath_rows_of_piece(before->integers, motion->frames, p);
+    int known = motion->known[p], alike = (coarse.shape_count > 0) == (rows->shape_count > 0);
+    const int32_t *modes = before->plan->pieces[p].flags & ATH_RIGID ? before->nothing : coarse.modes;
     rows->coarse_turn_steps = before->turn_steps[3 * p] >= 0.0 ? before->turn_steps + 3 * (size_t)p : 0;
-    rows->coarse_modes = known && alike ? before->integers + (size_t)piece->first * 3 * T : 0;
-    rows->coarse_rotation = known ? before->integer_tracks + (size_t)p * 6 * T : 0;
-    rows->coarse_shift = known ? before->integer_tracks + (size_t)p * 6 * T + 3 * T : 0;
+    rows->coarse_modes = known && alike ? modes : 0;
+    rows->coarse_rotation = known ? coarse.rotation : 0;
+    rows->coarse_shift = known ? coarse.shift : 0;
 }
 
 ATH_INLINE ath_node_rows ath_rows_of_node(const ath_integers *integers, int32_t frames, int32_t n)
@@ -71,6 +80,14 @@ ATH_ENCODER_API const char *ath_layout(int32_t index, size_t *offset, size_t *si
 /* Returns the bytes of scratch memory that any of the writers below needs as `model`. */
 ATH_ENCODER_API size_t ath_model_size(void);
 
+/* Fills the maps of pieces in each frame: matrix, its inverse, and centroid. stems: first vertices, and the number of all.
+ * order: pieces, each behind its parent. links, 5 per piece: first and last stem + 1, parent or -1, rank, and whether
+ * others inherit its rotation. shapes, 21 per piece: centroid, principal axes and pseudo-inverse of the rest pose. rest:
+ * 3 x vertices; positions: 3 x frames x vertices. work: 12 x (stem_count + 1) + 9 x piece_count. */
+ATH_ENCODER_API void ath_fit(int32_t vertex_count, int32_t frames, int32_t stem_count, const int64_t *stems,
+                             int32_t piece_count, const int64_t *order, const int64_t *links, const double *shapes,
+                             const double *rest, const double *positions, double *work, double *linear, double *inverse,
+                             double *centroid);
 /* Measures the residuals of pieces, ranges of vertices that each move by one affine map: the mean distance of each
  * piece in each frame, the largest distance, and the most vertices beyond xi in a frame. rest: 3 x vertices; positions:
  * 3 x frames x vertices; inverse, offset: 3 x 3 and 3 for each frame and piece, which make residuals of positions. */
@@ -101,10 +118,11 @@ typedef struct ath_rounding {
  * less the origin. A map's step is that of its level (height + 2 lengths) over the root of its number of vertices, so
  * that equal errors of all vertices together cost the same everywhere. Attach caches have to be kept (ath_build_plan).
  * Only pieces, or nodes, first to stop - 1 are analysed: several threads may work on ranges of one segment, each with
- * its own scratch memory, once the pieces that theirs hang on are done. positions: see ath_pose; may be null. */
+ * its own scratch memory, once the pieces that theirs hang on are done. positions: see ath_pose; may be null.
+ * bending: leave out rigid pieces on which nothing hangs. */
 ATH_ENCODER_API void ath_analyse(const ath_plan *plan, const ath_motion *motion, const ath_integers *integers,
                                  int32_t first, int32_t stop, const double *source, const ath_rounding *rounding,
-                                 const double origin[3], int is_float64, void *positions);
+                                 int bending, const double origin[3], int is_float64, void *positions);
 ATH_ENCODER_API void ath_analyse_nodes(const ath_plan *plan, const ath_motion *motion, const ath_integers *integers,
                                        int32_t first, int32_t stop, const double *source, const double *level_steps,
                                        const ath_rounding *rounding);
@@ -136,6 +154,8 @@ ATH_ENCODER_API void ath_multiply(int64_t count, int64_t rows, int64_t inner, in
                                   int64_t a_step, const double *b, int64_t b_step, double *out);
 /* Decomposes 3 x 3 matrices: left (columns) times the 3 singular values, in descending order, times right (rows). */
 ATH_ENCODER_API void ath_decompose(int64_t count, const double *matrices, double *left, double *stretch, double *right);
+/* Fills the rotation nearest to H by its singular vectors, whatever H is. */
+void ath_nearest_rotation(const double H[9], double R[9]);
 /* Replaces `count` times rows, n x columns, by the solution of matrix * x = rows. The matrices are positive definite and
  * are destroyed. */
 ATH_ENCODER_API void ath_solve(int64_t count, int32_t n, int32_t columns, double *matrices, double *rows);

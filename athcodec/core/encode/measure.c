@@ -110,7 +110,7 @@ static void pose_node(const ath_plan *plan, const ath_motion *motion, const ath_
 {
     const ath_node *node = plan->nodes + n;
     const double *a = ath_rest_attach(plan, plan->pieces + node->piece);
-    ath_piece_rows piece_rows = ath_rows_of_piece(plan, integers, motion->frames, node->piece);
+    ath_piece_rows piece_rows = ath_rows_of_piece(integers, motion->frames, node->piece);
     ath_node_rows rows = ath_rows_of_node(integers, motion->frames, n);
     ath_node_map(plan, motion, n, &piece_rows, &rows, scratch);
     for (int32_t v = node->first; v < node->first + node->count; v++) {
@@ -129,7 +129,7 @@ void ath_pose(const ath_plan *plan, const ath_motion *motion, const ath_integers
     ath_scratch scratch = ath_motion_scratch(plan, motion);
     for (int32_t p = first; p < stop; p++) {
         const ath_piece *piece = plan->pieces + p;
-        ath_piece_rows rows = ath_rows_of_piece(plan, integers, motion->frames, p);
+        ath_piece_rows rows = ath_rows_of_piece(integers, motion->frames, p);
         if (piece->level > level) continue;
         const double *placed = ath_pose_piece(plan, motion, p, &rows, &scratch);
         ath_store_positions(placed, piece->first, piece->count, motion->frames, origin, is_float64, positions);

@@ -17,26 +17,14 @@ typedef struct ath_stream {
     double turn_step; /* largest rotation step of rigid pieces; 0: no limit */
 } ath_stream;
 
-/* The layer before, from which a refinement predicts: what all pieces have become there. */
-typedef struct ath_coarse {
-    double *placed;                           /* vertex_count x 3 x frames: positions less the origin */
-    const int32_t *integers, *integer_tracks; /* vertex_count x 3 x frames, piece_count x 2 x 3 x frames */
-    const int32_t *shape_counts;              /* piece_count; null: no piece has shapes */
-    double *tracks;     /* piece_count x 2 x 3 x frames: rotation and translation over time; 0 where none is coded */
-    double *frames;     /* piece_count x 12 x frames: point and rotation of rigid pieces, moved and turned */
-    int32_t *extents;   /* piece_count x 2: frequencies and modes that the rows of a piece reach */
-    double *turn_steps; /* piece_count x 3: rotation steps; below 0 where a piece is not rigid */
-} ath_coarse;
-
 /* The inputs and memory from which the pieces and nodes of one segment are placed. */
 typedef struct ath_motion {
-    const ath_stream *streams; /* one per level, 0 to height + 1 */
-    const double *waves;       /* frames x frames, see ath_waves: the basis of node maps */
-    double *attach_caches;     /* ath_attach_cache_size(attach_cache_rows, frames) doubles */
-    double *work;              /* ath_motion_work(longest, frames) doubles */
-    const ath_coarse *before;  /* null unless this is a refinement */
-    const uint8_t *known;      /* encoder: whether the integers of a piece stand for the same in the layer before */
-    ath_coarse *decoded;       /* encoder: filled for the next layer; may be null */
+    const ath_stream *streams;       /* one per level, 0 to height + 1 */
+    const double *waves;             /* frames x frames, see ath_waves: the basis of node maps */
+    double *attach_caches;           /* ath_attach_cache_size(attach_cache_rows, frames) doubles */
+    double *work;                    /* ath_motion_work(longest, frames) doubles */
+    const struct ath_coarse *before; /* encoder: the layer before; null unless this is a refinement */
+    const uint8_t *known; /* encoder: whether the integers of a piece stand for the same in the layer before */
     int32_t frames;
     int32_t ratio; /* refinements: the steps of the layer before over this one's */
 } ath_motion;
