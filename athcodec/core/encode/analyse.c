@@ -446,7 +446,7 @@ static ath_piece_before piece_before(const ath_motion *motion, const ath_motion 
     }
     if (before.modes > 0) {
         ath_pose_tracks(coarse, piece, &rows, scratch, used);
-        before.placed = ath_pose_used(layer->plan, coarse, piece, &rows, used, ATH_ALL_VERTICES, scratch);
+        before.placed = ath_pose_used(layer->plan, coarse, piece, &rows, used, ATH_ALL_VERTICES, scratch, 0);
     }
     if (!motion->known[p] && before.frequencies > 0) before.frequencies = T;
     return before;
