@@ -27,8 +27,11 @@
 #if defined(__GNUC__) && !defined(__clang__) && defined(__x86_64__) && defined(__GLIBC__)                              \
     && !defined(__SANITIZE_THREAD__)
 #define ATH_HOT __attribute__((target_clones("avx2", "default")))
+/* For loops whose results do not depend on rounding: multiplications and additions may be fused. */
+#define ATH_FUSED __attribute__((target_clones("fma", "default"), optimize("fp-contract=fast")))
 #else
 #define ATH_HOT
+#define ATH_FUSED
 #endif
 
 #if defined(__GNUC__)

@@ -47,7 +47,7 @@ ATH_INLINE double quick_sum(int32_t count, const double *a, const double *b)
 }
 
 /* Returns a number that none of these is larger than. */
-ATH_HOT static double bound_of(const double *numbers, int32_t count)
+ATH_FUSED static double bound_of(const double *numbers, int32_t count)
 {
     return ath_sqrt(quick_sum(count, numbers, numbers));
 }
@@ -68,8 +68,8 @@ ATH_INLINE size_t summed_vertices(int32_t vertices)
 
 /* Fills the weights of shape s or, from the number of shapes on, of a mode along one axis. The piece has at least
  * ATH_LANES vertices. */
-ATH_HOT static void weigh_row(const ath_plan *plan, const ath_piece *piece, const ath_piece_rows *rows, int32_t s,
-                              vertex_row *ATH_RESTRICT weight)
+ATH_FUSED static void weigh_row(const ath_plan *plan, const ath_piece *piece, const ath_piece_rows *rows, int32_t s,
+                                vertex_row *ATH_RESTRICT weight)
 {
     const double *basis = plan->bases + piece->basis;
     int32_t n = piece->count;
@@ -86,7 +86,8 @@ ATH_HOT static void weigh_row(const ath_plan *plan, const ath_piece *piece, cons
 }
 
 /* Returns 0 if there are too many terms. */
-ATH_HOT static int find_placing_sums(const ath_placing *placing, const ath_piece *piece, int32_t T, placing_sums *sums)
+ATH_FUSED static int find_placing_sums(const ath_placing *placing, const ath_piece *piece, int32_t T,
+                                       placing_sums *sums)
 {
     weigh_rest(placing->plan, piece, sums->weight[0]);
     sums->count = 1;
@@ -106,7 +107,7 @@ ATH_HOT static int find_placing_sums(const ath_placing *placing, const ath_piece
 }
 
 /* Fills the way to the attach point of the layer before, and the turn to its attach frame: 3 and 9 rows. */
-ATH_HOT static void find_moves(int32_t T, const ath_frames *at, const ath_frames *before, double *ATH_RESTRICT moves)
+ATH_FUSED static void find_moves(int32_t T, const ath_frames *at, const ath_frames *before, double *ATH_RESTRICT moves)
 {
     const double *R = at->rotation, *S = before->rotation;
     ath_into_rest_space(T, at, before->point, moves);
@@ -117,8 +118,8 @@ ATH_HOT static void find_moves(int32_t T, const ath_frames *at, const ath_frames
                                                  + R[(6 + i) * T + t] * S[(6 + k) * T + t];
 }
 
-ATH_HOT static void find_row_sums(int32_t vertices, vertex_row *rest, vertex_row *weight, const placing_sums *terms,
-                                  row_sums *row)
+ATH_FUSED static void find_row_sums(int32_t vertices, vertex_row *rest, vertex_row *weight, const placing_sums *terms,
+                                    row_sums *row)
 {
     int32_t count = (int32_t)summed_vertices(vertices);
     row->rest = 0.0;
@@ -132,8 +133,8 @@ ATH_HOT static void find_row_sums(int32_t vertices, vertex_row *rest, vertex_row
 }
 
 /* Fills the track of a row. T is at least ATH_LANES. */
-ATH_HOT static void foresee_track(int32_t T, const placing_sums *terms, const row_sums *row, const double *moves,
-                                  double *track)
+ATH_FUSED static void foresee_track(int32_t T, const placing_sums *terms, const row_sums *row, const double *moves,
+                                    double *track)
 {
     for (int32_t from = 0; from < T; from += ATH_LANES) {
         int32_t t = ath_min(from, T - ATH_LANES);
@@ -151,8 +152,8 @@ ATH_HOT static void foresee_track(int32_t T, const placing_sums *terms, const ro
 }
 
 /* Fills the integers of a track as predict_track does. Returns 0 if one is in doubt, or the track is not finite. */
-ATH_HOT static int foresee_integers(int32_t T, int32_t count, const double *waves, const double *track, double step,
-                                    double least, double apart, const int32_t *coarse, int32_t *predicted)
+ATH_FUSED static int foresee_integers(int32_t T, int32_t count, const double *waves, const double *track, double step,
+                                      double least, double apart, const int32_t *coarse, int32_t *predicted)
 {
     for (int32_t k = 0; k < count; k++) {
         if (coarse && coarse[k] == 0) continue;
@@ -167,8 +168,9 @@ ATH_HOT static int foresee_integers(int32_t T, int32_t count, const double *wave
     return 1;
 }
 
-ATH_HOT int ath_foresee_modes(const ath_plan *plan, const ath_motion *motion, int32_t p, const ath_piece_before *before,
-                              const ath_placing *placing, const ath_scratch *scratch, ath_piece_rows *rows)
+ATH_FUSED int ath_foresee_modes(const ath_plan *plan, const ath_motion *motion, int32_t p,
+                                const ath_piece_before *before, const ath_placing *placing, const ath_scratch *scratch,
+                                ath_piece_rows *rows)
 {
     const ath_piece *piece = plan->pieces + p;
     int32_t T = motion->frames, modes = ath_predicted_modes(piece, before, rows);

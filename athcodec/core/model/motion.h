@@ -37,8 +37,8 @@ typedef struct {
     int32_t shape_count;  /* above 0: axis a of row r is the track of shape 3 r + a, where there is one */
     const double *shapes; /* shape_count x ATH_SHAPE_NUMBERS: axis a of mode m at 3 m + a */
     int32_t *predicted_modes, *predicted_rotation,
-        *predicted_shift; /* null unless this is a refinement; as large as the rows */
-    int32_t reach;        /* decoder: frequencies behind which all predictions are 0 */
+        *predicted_shift;         /* null unless this is a refinement; as large as the rows */
+    int32_t reach, reached_modes; /* decoder: frequencies and modes behind which all predictions are 0 */
     const int32_t *coarse_modes, *coarse_rotation,
         *coarse_shift;               /* rows of the layer before; null where their basis is another */
     const double *coarse_turn_steps; /* rotation steps of the layer before; null: the piece was not rigid there */

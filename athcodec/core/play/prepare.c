@@ -354,7 +354,7 @@ static void ready_layer(ath_work *work, int32_t q)
     memset(layer->shape_integers, 0, ATH_MOST_SHAPES * ATH_SHAPE_NUMBERS * sizeof(int32_t));
     memset(layer->rows.modes, 0, (size_t)work->file->plan.longest * row);
     if (q > 0) memset(layer->rows.predicted_modes, 0, (size_t)work->file->plan.longest * row);
-    layer->rows.reach = 0;
+    layer->rows.reach = layer->rows.reached_modes = 0;
     memset(layer->rows.rotation, 0, row);
     memset(layer->rows.shift, 0, row);
 }
@@ -670,7 +670,7 @@ static void clear_piece(layer_work *layer, const ath_piece *piece)
     for (int32_t m = 0; m < piece->count; m++) {
         int32_t reach = layer->rows.reach;
         clear_row(ath_row(layer->rows.modes, m, T), T, layer->counts + m);
-        if (reach > 0) clear_row(ath_row(layer->rows.predicted_modes, m, T), T, &reach);
+        if (m < layer->rows.reached_modes) clear_row(ath_row(layer->rows.predicted_modes, m, T), T, &reach);
     }
     memset(layer->shape_integers, 0, (size_t)layer->rows.shape_count * ATH_SHAPE_NUMBERS * sizeof(int32_t));
     layer->rows.shape_count = 0;
@@ -759,6 +759,7 @@ static void look_before(ath_work *work, int32_t q, int32_t p)
     if (!same && before->frequencies > 0) before->frequencies = T;
     int alike = (coarse->rows.shape_count > 0) == (layer->rows.shape_count > 0);
     layer->rows.reach = before->frequencies;
+    layer->rows.reached_modes = ath_predicted_modes(layer->plan->pieces + p, before, &layer->rows);
     layer->rows.coarse_modes = same && alike ? coarse->rows.modes : 0;
     layer->rows.coarse_rotation = same ? coarse->rows.rotation : 0;
     layer->rows.coarse_shift = same ? coarse->rows.shift : 0;

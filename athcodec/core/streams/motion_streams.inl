@@ -111,9 +111,9 @@ static void code_piece(ath_coder *coder, coefficient_model *model, const ath_pla
     }
 }
 
-static void note_extent(const ath_piece_rows *rows, int32_t slot, const int32_t *row, int32_t frames, int32_t count)
+static void note_extent(const ath_piece_rows *rows, int32_t slot, const int32_t *row, int32_t frames, int32_t most)
 {
-    if (rows->counts) rows->counts[slot] = ath_row_extent(row, frames, ath_max(count, rows->reach));
+    if (rows->counts) rows->counts[slot] = ath_row_extent(row, frames, most);
 }
 
 static void code_refined_track(ath_coder *coder, refinement_model *model, const ath_stream *stream,
@@ -123,7 +123,7 @@ static void code_refined_track(ath_coder *coder, refinement_model *model, const 
 {
     row_prediction prediction = {predicted, coarse, 0, motion->frames, rows->reach, {ratios[0], ratios[1], ratios[2]}};
     int32_t count = code_refined_row(coder, model, stream->temporal_rank, slot, -1, &prediction, row);
-    note_extent(rows, slot, row, motion->frames, count);
+    note_extent(rows, slot, row, motion->frames, ath_max(count, rows->reach));
 }
 
 /* The stream of a refinement holds a piece's tracks first, since the predictions of the modes need the attach frame
@@ -149,16 +149,17 @@ static void code_refined_modes(ath_coder *coder, refinement_model *model, const 
 {
     int32_t T = motion->frames, above_count = -1;
     uint32_t ratio = (uint32_t)motion->ratio;
-    row_prediction prediction = {0, 0, 0, T, rows->reach, {ratio, ratio, ratio}};
+    row_prediction prediction = {0, 0, 0, T, 0, {ratio, ratio, ratio}};
     for (int32_t m = 0; m < ath_rank(piece); m++) {
         if (ath_is_shape_row(piece, rows, m) && 3 * m >= rows->shape_count) continue;
         prediction.row = ath_row(rows->predicted_modes, m, T);
+        prediction.reach = m < rows->reached_modes ? rows->reach : 0;
         const int32_t *coarse = rows->coarse_modes ? rows->coarse_modes + (size_t)m * 3 * (size_t)T : 0;
         prediction.coarse = coarse;
         prediction.below = m + 1 < ath_rank(piece) ? (coarse ? coarse : prediction.row) + 3 * T : 0;
         above_count = code_refined_row(coder, model, stream->temporal_rank, m, above_count, &prediction,
                                        ath_row(rows->modes, m, T));
-        note_extent(rows, m, ath_row(rows->modes, m, T), T, above_count);
+        note_extent(rows, m, ath_row(rows->modes, m, T), T, ath_max(above_count, prediction.reach));
     }
 }
 
