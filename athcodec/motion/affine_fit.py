@@ -136,7 +136,7 @@ class Fit:
     """
 
     def __init__(self, pieces: Pieces, frames: np.ndarray) -> None:
-        self.pieces, self.frames = pieces, frames
+        self.pieces, self.frames = pieces, np.ascontiguousarray(frames, np.float64)
         (_, count, vertices), stems, n = frames.shape, len(pieces.stems) - 1, len(pieces.first)
         self.linear, self.inverse = np.empty((2, count, n, 3, 3))
         self.centroid, work = np.empty((count, n, 3)), np.empty(12 * (stems + 1) + 9 * n)
@@ -150,8 +150,7 @@ class Fit:
             address(pieces.links, np.int64, 5 * n),
             address(pieces.shapes, np.float64, 21 * n),
             address(pieces.rest, np.float64, 3 * vertices),
-            address(frames, np.float64, frames.size),
-            *(address(array, np.float64, 0) for array in (work, self.linear, self.inverse, self.centroid)),
+            *(address(array, np.float64, 0) for array in (self.frames, work, self.linear, self.inverse, self.centroid)),
         )
 
     def matrices(self) -> np.ndarray:
