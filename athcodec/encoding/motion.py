@@ -145,7 +145,8 @@ class Plan:
         table = np.empty(lib.ath_basis_table_size(pieces), np.int32)
         size = lib.ath_basis_layout(self.pieces.ctypes.data, pieces, at, gaps.ctypes.data, table.ctypes.data)
         shape = ["first", "count", "modes", "basis"]  # Sheets and tubes alone have a basis that is not their modes.
-        if like is not None and like.rest is self.rest and np.array_equal(like.pieces[shape], self.pieces[shape]):
+        is_like = like is not None and like.rest is self.rest and not (like.is_rigid & ~self.is_rigid).any()
+        if is_like and np.array_equal(like.pieces[shape], self.pieces[shape]):
             self.bases, self.core.bases, self.pieces["rank"] = like.bases, like.core.bases, like.pieces["rank"]
             return
         self.bases = np.empty(size)
