@@ -269,14 +269,46 @@ static void invert(double *linear, double *inverse)
         for (int32_t i = 0; i < 9; i++) inverse[i] = rows[i] / whole;
 }
 
+/* Measures one frame of a piece, vertices first to stop - 1: the mean distance of the residuals from the rest pose. Raises
+ * the largest distance, and the most vertices beyond xi. */
+static double measure_piece(size_t N, size_t plane, size_t first, size_t stop, const double *inverse, const double *now,
+                            const double *centre, const double *rest, const double *x, double xi, double *largest,
+                            int32_t *most_beyond)
+{
+    enum { TILE = 16 };
+    double o[3], sum = 0.0, distance[TILE];
+    int32_t beyond = 0;
+    apply(inverse, now, o);
+    for (int32_t k = 0; k < 3; k++) o[k] = centre[k] - o[k];
+    for (size_t v = first; v < stop; v += TILE) {
+        int32_t count = ath_min(TILE, (int32_t)(stop - v));
+        const double *x0 = x + v, *x1 = x0 + plane, *x2 = x1 + plane, *own = rest + v, *A = inverse;
+        for (int32_t i = 0; i < count; i++) {
+            double r0 = o[0] + A[0] * x0[i] + A[1] * x1[i] + A[2] * x2[i] - own[i];
+            double r1 = o[1] + A[3] * x0[i] + A[4] * x1[i] + A[5] * x2[i] - own[N + (size_t)i];
+            double r2 = o[2] + A[6] * x0[i] + A[7] * x1[i] + A[8] * x2[i] - own[2 * N + (size_t)i];
+            distance[i] = ath_sqrt(r0 * r0 + r1 * r1 + r2 * r2);
+        }
+        for (int32_t i = 0; i < count; i++) {
+            sum += distance[i];
+            beyond += distance[i] > xi;
+            if (distance[i] > *largest) *largest = distance[i];
+        }
+    }
+    *most_beyond = ath_max(*most_beyond, beyond);
+    return sum / (double)(stop - first);
+}
+
 void ath_fit(int32_t vertex_count, int32_t frames, int32_t stem_count, const int64_t *stems, int32_t piece_count,
              const int64_t *order, const int64_t *links, const double *shapes, const double *rest,
-             const double *positions, double *work, double *linear, double *inverse, double *centroid)
+             const double *positions, double xi, double *work, double *linear, double *inverse, double *centroid,
+             double *mean, double *largest, int32_t *most_beyond)
 {
     size_t N = (size_t)vertex_count;
     double *rotations = work + SUMS * ((size_t)stem_count + 1);
     for (int32_t t = 0; t < frames; t++, linear += 9 * piece_count, inverse += 9 * piece_count) {
-        sum_stems(N, N * (size_t)frames, stem_count, stems, rest, positions + (size_t)t * N, work);
+        const double *x = positions + (size_t)t * N;
+        sum_stems(N, N * (size_t)frames, stem_count, stems, rest, x, work);
         for (int32_t i = 0; i < piece_count; i++) {
             const int64_t p = order[i], *link = links + LINKS * p, first = link[0], stop = link[1];
             const double *centre = shapes + SHAPE * p, *axes = centre + 3, *low = work + SUMS * first;
@@ -291,6 +323,9 @@ void ath_fit(int32_t vertex_count, int32_t frames, int32_t stem_count, const int
             if (link[3] == 0) memcpy(map, R, 9 * sizeof *map);
             invert(map, inverse + 9 * p);
             if (link[4]) ath_nearest_rotation(map, rotations + 9 * p);
+            mean[(size_t)t * (size_t)piece_count + (size_t)p] =
+                measure_piece(N, N * (size_t)frames, (size_t)stems[first], (size_t)stems[stop], inverse + 9 * p, own,
+                              centre, rest, x, xi, largest + p, most_beyond + p);
         }
     }
 }
