@@ -159,7 +159,7 @@ def layers_of(source: Source, prelude: CodedPrelude, choice: Choice, ratios: Seq
     rest, level_0, rests = _rests(source, prelude, ratios, settings)
     layers: list[Layer] = []
     for i, (ratio, (pose, refined)) in enumerate(zip(ratios, rests)):
-        before = layers[-1].plan if layers else prelude.plan
+        before = layers[-1].plan if layers and pose is not prelude.plan.rest else prelude.plan
         plan = prelude.plan if len(ratios) == 1 else _plan_on(pose, prelude, before, i)
         of_layer = replace(
             choice.first_layer if i == 0 else _uniform(prelude.plan, settings),
@@ -560,9 +560,8 @@ class CodedMotion:
         self.joins[level] = join
         apply_join(end, positions, join)
         if layer is None:
-            positions = positions.astype(self._output[1])
-            size = max(positions.max(), -positions.min())
-            # A decoder joins maps. It may round a position to the other side, and slopes make last bits larger.
+            size = np.asarray(max(positions.max(), -positions.min()), self._output[1])
+            # A decoder joins maps and rounds what it shows, and slopes make last bits larger.
             last_bits = 16 * (1 + join % SLOPED) * float(np.spacing(np.float64(size)))
             self.errors[level] = self.error(positions, 2 * float(np.spacing(size)) + last_bits)
         else:

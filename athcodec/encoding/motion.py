@@ -145,7 +145,8 @@ class Plan:
         table = np.empty(lib.ath_basis_table_size(pieces), np.int32)
         size = lib.ath_basis_layout(self.pieces.ctypes.data, pieces, at, gaps.ctypes.data, table.ctypes.data)
         shape = ["first", "count", "modes", "basis"]  # Sheets and tubes alone have a basis that is not their modes.
-        if like is not None and like.rest is self.rest and np.array_equal(like.pieces[shape], self.pieces[shape]):
+        is_like = like is not None and like.rest is self.rest and not (like.is_rigid & ~self.is_rigid).any()
+        if is_like and np.array_equal(like.pieces[shape], self.pieces[shape]):
             self.bases, self.core.bases, self.pieces["rank"] = like.bases, like.core.bases, like.pieces["rank"]
             return
         self.bases = np.empty(size)
@@ -206,18 +207,13 @@ class Plan:
         return np.where(self.pieces["low_level"] >= 0, self.pieces["low_level"], self.pieces["level"])
 
     @cached_property
-    def row_counts(self) -> np.ndarray:
-        """Per piece the rows of coefficients that it has room for, (P,)."""
-        return np.where(self.is_rigid, 0, self.pieces["count"])
-
-    @cached_property
     def first_rows(self) -> np.ndarray:
-        """Per piece the first of these rows, (P,) int32."""
-        return (np.cumsum(self.row_counts) - self.row_counts).astype(np.int32)
+        """Per piece the row of its first mode in the coefficients of a segment, (P,) int32."""
+        return (np.cumsum(self.ranks) - self.ranks).astype(np.int32)
 
     @property
     def ranks(self) -> np.ndarray:
-        """Per piece the modes that it moves by, (P,)."""
+        """Per piece the modes that it moves by, each a row of coefficients, (P,). They are known with the rest pose."""
         return np.where(self.is_rigid, 0, self.pieces["rank"])
 
     @property
@@ -320,7 +316,7 @@ class SegmentMotion:
             )
         self.plan, self.frames, self.streams, self.learned_modes = plan, frames, streams, learned_modes
         core = plan.core
-        self.coefficients = zeros((int(plan.row_counts.sum()), 3, frames), np.int32)
+        self.coefficients = zeros((int(plan.ranks.sum()), 3, frames), np.int32)
         self.tracks = zeros((core.piece_count, 2, 3, frames), np.int32)
         node_count = 0 if before is not None else core.node_count  # Refinements have no maps.
         self.node_tracks = zeros((node_count, 4, 3, frames), np.int32)
@@ -336,13 +332,8 @@ class SegmentMotion:
             self.known = self._known(before)
             self.turn_steps = np.empty((core.piece_count, 3))
             self.nothing = np.zeros((core.longest, 3, frames), np.int32)
-            self.coarse = Coarse(
-                addressof(before.plan.core),
-                addressof(before.motion),
-                addressof(before.integers),
-                self.turn_steps.ctypes.data,
-                self.nothing.ctypes.data,
-            )
+            layer = map(addressof, (before.plan.core, before.motion, before.integers))
+            self.coarse = Coarse(*layer, self.turn_steps.ctypes.data, self.nothing.ctypes.data)
         self._bind()
 
     def _known(self, before: SegmentMotion) -> np.ndarray:
@@ -414,16 +405,16 @@ class SegmentMotion:
         rounding: Rounding,
         origin: np.ndarray | None = None,
         positions: np.ndarray | None = None,
-        bending: bool = False,
+        bent: bool = False,
     ) -> None:
         """Fill coefficients and tracks from positions, (N, 3, frames) float64 less the origin, in closed loop.
 
-        positions: filled with what `pose` returns at the last level, which the closed loop has at hand. bending: leave
+        positions: filled with what `pose` returns at the last level, which the closed loop has at hand. bent: leave
         out rigid pieces on which nothing hangs.
         """
-        at, into = self._source(source), (bending, None, False, None)
+        at, into = self._source(source), (bent, None, False, None)
         if positions is not None:
-            into = bending, address(origin, np.float64, 3), positions.dtype == np.float64, positions.ctypes.data
+            into = bent, address(origin, np.float64, 3), positions.dtype == np.float64, positions.ctypes.data
         self._piecewise(
             lambda motion, first, stop: lib.ath_analyse(
                 self.plan.core, motion, self.integers, first, stop, at, rounding, *into

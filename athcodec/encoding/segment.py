@@ -520,7 +520,7 @@ def _level_moments(segment: SegmentMotion, level: int | None) -> tuple[np.ndarra
     quantise to nothing, in units of their steps, and the number of these tracks. The segment was analysed finely."""
     if level is None:
         return _moments(segment, [segment.coefficients, segment.tracks])
-    pieces, rows, slots = segment.plan.pieces, segment.plan.row_counts, []
+    pieces, rows, slots = segment.plan.pieces, segment.plan.ranks, []
     for low, high, at in ((0, pieces["low_modes"], pieces["low_level"]), (pieces["low_modes"], rows, pieces["level"])):
         for piece in np.flatnonzero((at == level) & (rows > 0)):
             start = low if np.isscalar(low) else low[piece]
@@ -540,13 +540,13 @@ def _moments(segment: SegmentMotion, parts: Iterable[np.ndarray]) -> tuple[np.nd
     return multiply(waves.T, multiply(moments, waves)), count
 
 
-def analyse_finely(plan: Plan, settings: Settings, positions: np.ndarray, bending: bool = False) -> SegmentMotion:
+def analyse_finely(plan: Plan, settings: Settings, positions: np.ndarray, bent: bool = False) -> SegmentMotion:
     """A segment at a step FINER times smaller, in nothing learned, to learn bases and modes from."""
     fine = replace(settings, step=qz.single(settings.step / FINER), turn_step=settings.turn_step / FINER)
     segment = SegmentMotion(
         plan, positions.shape[2], level_streams(fine, plan.level_count, {}), periodic=settings.periodic
     )
-    segment.analyse(positions, Rounding(qz.DEAD_ZONE), bending=bending)
+    segment.analyse(positions, Rounding(qz.DEAD_ZONE), bent=bent)
     return segment
 
 

@@ -167,14 +167,14 @@ class Trials:
         return learn(plan, seen, settings.step, None if everywhere else settings.learned_pieces)
 
     def analysed(
-        self, settings: Settings, number: int, modes: LearnedModes | None, bending: bool = False
+        self, settings: Settings, number: int, modes: LearnedModes | None, bent: bool = False
     ) -> SegmentMotion:
-        """Return a sample in its integers. bending: as SegmentMotion.analyse has it."""
+        """Return a sample in its integers. bent: as SegmentMotion.analyse has it."""
         plan, sample = self.prelude(settings).plan, self.samples[number]
         of_sample = settings.of_segment(sample.whole_loop)
         levels = level_streams(of_sample, plan.level_count, self._bases(settings, number))
         segment = SegmentMotion(plan, sample.positions.shape[2], levels, modes, periodic=of_sample.periodic)
-        segment.analyse(sample.positions, of_sample.rounding, bending=bending)
+        segment.analyse(sample.positions, of_sample.rounding, bent=bent)
         return segment
 
     def coded(self, settings: Settings, number: int, modes: LearnedModes | None) -> Coded:
@@ -278,8 +278,7 @@ class Trials:
             frames = sum(self.source.frames_of(segment) for segment in chosen)
             self.work.add(progress.LEARNING * self.source.clip.vertex_count * frames)
             self._components[key] = components(
-                plan,
-                (analyse_finely(plan, settings, self.source.positions(segment), bending=True) for segment in chosen),
+                plan, (analyse_finely(plan, settings, self.source.positions(segment), bent=True) for segment in chosen)
             )
         return self._components[key]
 

@@ -33,7 +33,7 @@ class Differences:
     @classmethod
     def of(cls, frames: np.ndarray, pieces: Pieces, xi: float | None) -> Differences:
         """Return both measures of frames (3,k,N), seen from the origin of the pieces."""
-        return pieces.fit(frames).differences(np.inf if xi is None else xi)
+        return Fit(pieces, frames, np.inf if xi is None else xi).differences
 
     def __or__(self, other: Differences) -> Differences:
         """Return the LAD of the pieces with their GADs."""
@@ -132,14 +132,16 @@ class Pieces:
 class Fit:
     """The affine maps x -> linear (x - rest centroid) + centroid of all pieces in k frames.
 
-    linear and inverse are (k,n,3,3), centroid (k,n,3), all seen from the origin of the pieces.
+    linear and inverse are (k,n,3,3), centroid (k,n,3), all seen from the origin of the pieces. differences: how far the
+    residuals are from their base places.
     """
 
-    def __init__(self, pieces: Pieces, frames: np.ndarray) -> None:
-        self.pieces, self.frames = pieces, frames
+    def __init__(self, pieces: Pieces, frames: np.ndarray, xi: float = np.inf) -> None:
+        self.pieces, self.frames = pieces, np.ascontiguousarray(frames, np.float64)
         (_, count, vertices), stems, n = frames.shape, len(pieces.stems) - 1, len(pieces.first)
         self.linear, self.inverse = np.empty((2, count, n, 3, 3))
         self.centroid, work = np.empty((count, n, 3)), np.empty(12 * (stems + 1) + 9 * n)
+        self.differences = Differences(np.empty((count, n)), np.zeros(n), np.zeros(n, np.int32))
         lib.ath_fit(
             vertices,
             count,
@@ -150,8 +152,10 @@ class Fit:
             address(pieces.links, np.int64, 5 * n),
             address(pieces.shapes, np.float64, 21 * n),
             address(pieces.rest, np.float64, 3 * vertices),
-            address(frames, np.float64, frames.size),
+            address(self.frames, np.float64, 0),
+            xi,
             *(address(array, np.float64, 0) for array in (work, self.linear, self.inverse, self.centroid)),
+            *(array.ctypes.data for array in vars(self.differences).values()),
         )
 
     def matrices(self) -> np.ndarray:
@@ -171,29 +175,6 @@ class Fit:
         linear = self.linear[:, some]
         offset = self.centroid[:, some] - multiply(linear, self.pieces.centroid[some][..., None])[..., 0]
         return map_points(linear, offset, self.pieces.rest[:, None, vertices], counts)
-
-    def differences(self, xi: float) -> Differences:
-        """Return how far the residuals are from their base places."""
-        pieces, (_, frames, vertices) = self.pieces, self.frames.shape
-        inverse, offset = self.inverse_maps()
-        count = len(pieces.first)
-        fits = Differences(np.empty((frames, count)), np.empty(count), np.empty(count, np.int32))
-        lib.ath_differences(
-            vertices,
-            frames,
-            count,
-            address(pieces.first, np.int64, count),
-            address(pieces.stop, np.int64, count),
-            address(inverse, np.float64, frames * count * 9),
-            address(offset, np.float64, frames * count * 3),
-            address(pieces.rest, np.float64, 3 * vertices),
-            address(self.frames, np.float64, self.frames.size),
-            xi,
-            fits.gads.ctypes.data,
-            fits.largest_distance.ctypes.data,
-            fits.most_beyond_xi.ctypes.data,
-        )
-        return fits
 
 
 def starts(counts: np.ndarray) -> np.ndarray:

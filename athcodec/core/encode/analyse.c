@@ -481,7 +481,7 @@ static const double *analyse_piece(const ath_plan *plan, const ath_motion *motio
 }
 
 void ath_analyse(const ath_plan *plan, const ath_motion *motion, const ath_integers *integers, int32_t first,
-                 int32_t stop, const double *source, const ath_rounding *rounding, int bending, const double origin[3],
+                 int32_t stop, const double *source, const ath_rounding *rounding, int bent, const double origin[3],
                  int is_float64, void *positions)
 {
     ath_scratch scratch = ath_motion_scratch(plan, motion);
@@ -489,7 +489,7 @@ void ath_analyse(const ath_plan *plan, const ath_motion *motion, const ath_integ
     coarse.work = motion->work + ath_motion_work(plan->longest, motion->frames);
     for (int32_t p = first; p < stop; p++) {
         const ath_piece *piece = plan->pieces + p;
-        if (bending && piece->flags & ATH_RIGID && piece->attach_cache < 0) continue;
+        if (bent && piece->flags & ATH_RIGID && piece->attach_cache < 0) continue;
         const double *placed = analyse_piece(plan, motion, integers, p, &scratch, &coarse, source, rounding);
         if (positions)
             ath_store_positions(placed, piece->first, piece->count, motion->frames, origin, is_float64, positions);

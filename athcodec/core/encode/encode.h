@@ -80,21 +80,16 @@ ATH_ENCODER_API const char *ath_layout(int32_t index, size_t *offset, size_t *si
 /* Returns the bytes of scratch memory that any of the writers below needs as `model`. */
 ATH_ENCODER_API size_t ath_model_size(void);
 
-/* Fills the maps of pieces in each frame: matrix, its inverse, and centroid. stems: first vertices, and the number of all.
- * order: pieces, each behind its parent. links, 5 per piece: first and last stem + 1, parent or -1, rank, and whether
- * others inherit its rotation. shapes, 21 per piece: centroid, principal axes and pseudo-inverse of the rest pose. rest:
- * 3 x vertices; positions: 3 x frames x vertices. work: 12 x (stem_count + 1) + 9 x piece_count. */
+/* Fills the maps of pieces in each frame: matrix, its inverse, and centroid; and measures residuals: their mean distance
+ * from the rest pose in each frame, the largest, and the most vertices beyond xi in a frame (from those given). stems:
+ * first vertices, and the number of all. order: pieces, each behind its parent. links, 5 per piece: first and last stem +
+ * 1, parent or -1, rank, and whether others inherit its rotation. shapes, 21 per piece: centroid, principal axes and
+ * pseudo-inverse of the rest pose. rest: 3 x vertices; positions: 3 x frames x vertices. work: 12 x (stem_count + 1) + 9
+ * x piece_count. */
 ATH_ENCODER_API void ath_fit(int32_t vertex_count, int32_t frames, int32_t stem_count, const int64_t *stems,
                              int32_t piece_count, const int64_t *order, const int64_t *links, const double *shapes,
-                             const double *rest, const double *positions, double *work, double *linear, double *inverse,
-                             double *centroid);
-/* Measures the residuals of pieces, ranges of vertices that each move by one affine map: the mean distance of each
- * piece in each frame, the largest distance, and the most vertices beyond xi in a frame. rest: 3 x vertices; positions:
- * 3 x frames x vertices; inverse, offset: 3 x 3 and 3 for each frame and piece, which make residuals of positions. */
-ATH_ENCODER_API void ath_differences(int32_t vertex_count, int32_t frames, int32_t piece_count, const int64_t *first,
-                                     const int64_t *stop, const double *inverse, const double *offset,
-                                     const double *rest, const double *positions, double xi, double *mean,
-                                     double *largest, int32_t *most_beyond);
+                             const double *rest, const double *positions, double xi, double *work, double *linear,
+                             double *inverse, double *centroid, double *mean, double *largest, int32_t *most_beyond);
 
 /* Adds the squared second differences over time of rows of positions, float or (is_float64) double, to `sums`, frames -
  * 2. */
@@ -119,10 +114,10 @@ typedef struct ath_rounding {
  * that equal errors of all vertices together cost the same everywhere. Attach caches have to be kept (ath_build_plan).
  * Only pieces, or nodes, first to stop - 1 are analysed: several threads may work on ranges of one segment, each with
  * its own scratch memory, once the pieces that theirs hang on are done. positions: see ath_pose; may be null.
- * bending: leave out rigid pieces on which nothing hangs. */
+ * bent: leave out rigid pieces on which nothing hangs. */
 ATH_ENCODER_API void ath_analyse(const ath_plan *plan, const ath_motion *motion, const ath_integers *integers,
                                  int32_t first, int32_t stop, const double *source, const ath_rounding *rounding,
-                                 int bending, const double origin[3], int is_float64, void *positions);
+                                 int bent, const double origin[3], int is_float64, void *positions);
 ATH_ENCODER_API void ath_analyse_nodes(const ath_plan *plan, const ath_motion *motion, const ath_integers *integers,
                                        int32_t first, int32_t stop, const double *source, const double *level_steps,
                                        const ath_rounding *rounding);

@@ -3,46 +3,6 @@
 
 enum { TILE = 16 }; /* vertices that are processed at once */
 
-/* Fills the distances of up to TILE vertices. */
-static void residual_distances(int32_t count, const double A[9], const double o[3], const double *rest[3],
-                               const double *x[3], double distance[TILE])
-{
-    for (int32_t i = 0; i < count; i++) {
-        double r0 = o[0] + A[0] * x[0][i] + A[1] * x[1][i] + A[2] * x[2][i] - rest[0][i];
-        double r1 = o[1] + A[3] * x[0][i] + A[4] * x[1][i] + A[5] * x[2][i] - rest[1][i];
-        double r2 = o[2] + A[6] * x[0][i] + A[7] * x[1][i] + A[8] * x[2][i] - rest[2][i];
-        distance[i] = ath_sqrt(r0 * r0 + r1 * r1 + r2 * r2);
-    }
-}
-
-void ath_differences(int32_t vertex_count, int32_t frames, int32_t piece_count, const int64_t *first,
-                     const int64_t *stop, const double *inverse, const double *offset, const double *rest,
-                     const double *positions, double xi, double *mean, double *largest, int32_t *most_beyond)
-{
-    size_t N = (size_t)vertex_count, plane = N * (size_t)frames;
-    for (size_t p = 0; p < (size_t)piece_count; p++) largest[p] = most_beyond[p] = 0;
-    for (size_t t = 0; t < (size_t)frames; t++)
-        for (size_t p = 0; p < (size_t)piece_count; p++) {
-            size_t at = t * (size_t)piece_count + p;
-            double sum = 0.0, distance[TILE];
-            int32_t beyond = 0;
-            for (size_t v = (size_t)first[p]; v < (size_t)stop[p]; v += TILE) {
-                int32_t count = ath_min(TILE, (int32_t)((size_t)stop[p] - v));
-                const double *x = positions + t * N + v;
-                residual_distances(count, inverse + 9 * at, offset + 3 * at,
-                                   (const double *[3]){rest + v, rest + N + v, rest + 2 * N + v},
-                                   (const double *[3]){x, x + plane, x + 2 * plane}, distance);
-                for (int32_t i = 0; i < count; i++) {
-                    sum += distance[i];
-                    beyond += distance[i] > xi;
-                    if (distance[i] > largest[p]) largest[p] = distance[i];
-                }
-            }
-            mean[at] = sum / (double)(stop[p] - first[p]);
-            if (beyond > most_beyond[p]) most_beyond[p] = beyond;
-        }
-}
-
 ATH_HOT int64_t ath_add_moments(int64_t count, int32_t frames, const int32_t *rows, double least, double *moments)
 {
     int64_t kept = 0;

@@ -421,7 +421,8 @@ void ath_basis_modes(const ath_piece *pieces, int32_t first, int32_t stop, const
 
 void ath_basis_sheets(ath_piece *pieces, int32_t first, int32_t stop, const double *rest, double *bases)
 {
-    fill_sheets(pieces, first, stop, 0, INT32_MAX, rest, bases);
+    for (int32_t p = first; p < stop; p++) /* rigid pieces use no basis */
+        if (!(pieces[p].flags & ATH_RIGID)) fill_sheets(pieces, p, p + 1, 0, INT32_MAX, rest, bases);
 }
 
 void ath_basis_fill(ath_piece *pieces, int32_t piece_count, int32_t first_level, int32_t last_level, const double *rest,

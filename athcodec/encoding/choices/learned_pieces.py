@@ -55,10 +55,10 @@ def pieces_that_save(
     plan = trials.prelude(plain).plan
     modes = trials.learned_modes(plan, plain, everywhere=True)
     piece_count = len(modes.counts)
-    piece_of_row = np.repeat(np.arange(piece_count), plan.row_counts)
+    piece_of_row = np.repeat(np.arange(piece_count), plan.ranks)
     bits_without, bits_with = (
         sum(
-            estimated_bits(trials.analysed(plain, number, tried, bending=True).coefficients, piece_of_row, piece_count)
+            estimated_bits(trials.analysed(plain, number, tried, bent=True).coefficients, piece_of_row, piece_count)
             * sample.scale
             for number, sample in enumerate(trials.samples)
         )
