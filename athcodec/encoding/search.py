@@ -142,12 +142,11 @@ class Search:
         """Return whether a file is much smaller if each level learns a time basis of its own, as only a single layer
         can."""
         trials = (self.of_sample or self).trials
-        start, apart = trials.start, replace(trials)  # What a search chooses later may not depend on what is learned.
-        own = start.in_learned_bases()
+        start, own = trials.start, trials.start.in_learned_bases()
         if not trials.is_layered or trials.levels <= 2 or trials.without(Feature.TIME_BASES):
             return False
         for other in (start, replace(own, common_basis=True)):
-            if apart.costs([own])[0] > OWN_BASES_SHARE * apart.costs([other])[0]:
+            if trials.costs([own])[0] > OWN_BASES_SHARE * trials.costs([other])[0]:
                 return False
         return True
 
