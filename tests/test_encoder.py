@@ -265,9 +265,9 @@ def test_half_of_the_progress_is_about_half_of_the_work(frames, effort, tmp_path
     done, reported = [0], []
     analyse = SegmentMotion.analyse
 
-    def counted(self, source, *more):
+    def counted(self, source, *more, **options):
         done[0] += source.size
-        return analyse(self, source, *more)
+        return analyse(self, source, *more, **options)
 
     monkeypatch.setattr(SegmentMotion, "analyse", counted)
     how = {"progress": lambda stage, fraction: reported.append((fraction, done[0])), "effort": effort, "jobs": 1}
