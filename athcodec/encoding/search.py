@@ -40,6 +40,7 @@ STEP_TRIALS, FIRST_LAYER_TRIALS = 12, 6  # Trials for which choices leave work: 
 SEARCHED_SHARE = 0.5  # Share of the bytes of motion at its first settings that a search usually comes down to.
 SHORT_SHARE = 0.75  # Share of the bytes at which short segments are taken.
 OWN_BASES_SHARE = 0.8  # Share of the bytes at which time bases of each level are taken, which layers cannot have.
+TIGHT = 2.0  # Largest share of the work of a usual search at which time bases are tried before forms and rotations.
 POSE_TRIALS = 24  # Trials that another reference pose takes, beside those of steps that it has to leave.
 
 Choose = Callable[[Settings, Trials], Settings]
@@ -216,12 +217,14 @@ class Search:
         choices: list[Choose] = [
             best_freedom,
             rotations.still_if_smaller,
-            learned_bases.best_bases,  # They may save most.
             forms.best_forms,
             rotations.best_rotations,
             learned_bases.best_bases,
             learned_pieces.best_pieces_in_any_basis,
         ]
+        work = self.trials.work
+        if work.allowed - work.done < TIGHT * expected_trials(self.effort, False, False) * self.trials.work_of_trial:
+            choices.insert(2, learned_bases.best_bases)  # Time bases may save most; again where work is left.
         with self.trials.work.trying("steps", self._share_beside(STEP_TRIALS)):
             return self._after([best_level_steps, *choices, learned_bases.best_waves], self.trials.start)
 
