@@ -267,8 +267,8 @@ ATH_INLINE void place_frame(int32_t t, const placing_terms *terms, const placed_
 }
 
 /* Puts rows of PLACED_FRAMES positions into frames, and prefetches the memory behind them, which the next ones fill. */
-ATH_INLINE void put_floats(int32_t rows, const double *from, int32_t row_size, const double *added, float *out,
-                           size_t frame_size)
+ATH_INLINE void put_into_frames(int32_t rows, const double *from, int32_t row_size, const double *added, float *out,
+                                size_t frame_size)
 {
     for (size_t t = 0; t < PLACED_FRAMES; t++)
         for (size_t behind = 16; behind <= 3 * PLACED_VERTICES; behind += 16)
@@ -312,8 +312,8 @@ ATH_HOT static void place(const ath_plan *plan, const ath_motion *motion, const 
                 move_vertices(T, kept ? at : places, count, R + t + from, c + t + from, sums, from, moved + from,
                               row_size);
             if (to)
-                put_floats(3 * count, moved + (kept ? 3 * at[0] * T : 0), row_size, added,
-                           to->first + (size_t)t * to->frame_size + 3 * at[0], to->frame_size);
+                put_into_frames(3 * count, moved + (kept ? 3 * at[0] * T : 0), row_size, added,
+                                to->first + (size_t)t * to->frame_size + 3 * at[0], to->frame_size);
         }
         for (int32_t t = 0; T < PLACED_FRAMES && t < T; t++)
             for (int32_t i = 0; i < count; i++) {

@@ -1,4 +1,4 @@
-/* Puts placed vertices into the positions of a segment: rows over time become frames. Floats go there as they are placed. */
+/* Puts vertices placed as doubles into the positions of a segment: rows over time become frames. Copies frames. */
 #include "play/store.h"
 
 void ath_store_doubles(ath_segment *segment, const double origin[3], size_t vertex, int32_t count, const double *placed)
